@@ -1,0 +1,54 @@
+# How this project makes its targets: one function for libraries, with the warnings and options all share.
+
+add_library(regrade_flags INTERFACE)
+target_include_directories(regrade_flags INTERFACE ${PROJECT_SOURCE_DIR})
+# Host warnings only; nvcc passes host flags its own way.
+target_compile_options(regrade_flags INTERFACE
+  $<$<COMPILE_LANGUAGE:CXX>:-Wall -Wextra -Wno-unknown-pragmas -Wno-missing-field-initializers>
+  $<$<AND:$<BOOL:${REGRADE_WERROR}>,$<COMPILE_LANGUAGE:CXX>>:-Werror>)
+target_compile_definitions(regrade_flags INTERFACE REGRADE_VERSION="${PROJECT_VERSION}")
+if(REGRADE_SANITIZE)
+  target_compile_options(regrade_flags INTERFACE
+    -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer -g)
+  target_link_options(regrade_flags INTERFACE -fsanitize=address,undefined)
+endif()
+
+set(REGRADE_CUDA_FOUND FALSE)
+if(NOT REGRADE_CUDA STREQUAL "OFF")
+  include(CheckLanguage)
+  check_language(CUDA)
+  if(CMAKE_CUDA_COMPILER)
+    if(NOT DEFINED CMAKE_CUDA_ARCHITECTURES)
+      set(CMAKE_CUDA_ARCHITECTURES 75 80 86 89 90 120)
+    endif()
+    # CMake 3.25 does not know nvcc 13's C++20 flag and drops CMAKE_CUDA_STANDARD in silence.
+    string(APPEND CMAKE_CUDA_FLAGS " -std=c++20 --expt-relaxed-constexpr -diag-suppress=20012 -Xcompiler=-fopenmp")
+    enable_language(CUDA)
+    set(REGRADE_CUDA_FOUND TRUE)
+  elseif(REGRADE_CUDA STREQUAL "ON")
+    message(FATAL_ERROR "REGRADE_CUDA=ON, but no CUDA compiler was found; put nvcc on PATH or set CUDACXX")
+  endif()
+endif()
+message(STATUS "regrade: CUDA ${REGRADE_CUDA} -> ${REGRADE_CUDA_FOUND}")
+
+# regrade_library(name SOURCES... [LINK libs...]): a static library; its .cu files are C++ when CUDA is off.
+function(regrade_library name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LINK" ${ARGN})
+  add_library(${name} STATIC ${ARG_SOURCES})
+  target_link_libraries(${name} PUBLIC regrade_flags ${ARG_LINK})
+  if(NOT REGRADE_CUDA_FOUND)
+    foreach(source ${ARG_SOURCES})
+      if(source MATCHES "\\.cu$")
+        set_source_files_properties(${source} PROPERTIES LANGUAGE CXX COMPILE_OPTIONS "-xc++")
+      endif()
+    endforeach()
+  endif()
+endfunction()
+
+# regrade_test(name SOURCES... LINK libs...): one GoogleTest program, each case a CTest test.
+function(regrade_test name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LINK" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE regrade_flags ${ARG_LINK} GTest::gtest GTest::gtest_main)
+  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST PROPERTIES TIMEOUT 600)
+endfunction()

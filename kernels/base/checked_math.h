@@ -1,0 +1,21 @@
+// Sizes from files are hostile: products and sums that refuse to wrap around.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+namespace regrade {
+
+inline std::optional<uint64_t> CheckedMul(uint64_t a, uint64_t b) {
+  uint64_t result;
+  if (__builtin_mul_overflow(a, b, &result)) return std::nullopt;
+  return result;
+}
+
+inline std::optional<uint64_t> CheckedAdd(uint64_t a, uint64_t b) {
+  uint64_t result;
+  if (__builtin_add_overflow(a, b, &result)) return std::nullopt;
+  return result;
+}
+
+}  // namespace regrade

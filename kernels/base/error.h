@@ -1,0 +1,74 @@
+// Errors for people (Error, with an exit code and a remedy) and checks for our own mistakes (CHECK).
+#pragma once
+
+#include <sstream>
+#include <stdexcept>
+#include <string>
+
+namespace regrade {
+
+// The program's exit codes; a death by signal n is 128 + n and not listed here.
+enum class ExitCode {
+  kDone = 0,
+  kBug = 1,
+  kUsage = 2,
+  kInput = 3,
+  kExternalProgram = 4,
+  kResources = 5,
+  kScene = 6,
+  kFolderInUse = 7,
+};
+
+// Something a person can mend. `what` failed, `where` (file, photo, option; may be empty), and a `hint`
+// with the remedy. Thrown from any floor, printed once by main, which exits with `code`.
+class Error : public std::runtime_error {
+ public:
+  Error(ExitCode code, std::string what, std::string where = "", std::string hint = "");
+
+  ExitCode code() const { return code_; }
+  const std::string& what_failed() const { return what_; }
+  const std::string& where() const { return where_; }
+  const std::string& hint() const { return hint_; }
+
+ private:
+  ExitCode code_;
+  std::string what_, where_, hint_;
+};
+
+// Work was ended early at the user's wish (a signal); state has been saved where the stage can.
+class Interrupted : public std::runtime_error {
+ public:
+  Interrupted() : std::runtime_error("interrupted") {}
+};
+
+// A broken promise of our own code. main turns it into exit code 1.
+class CheckFailure : public std::logic_error {
+ public:
+  using std::logic_error::logic_error;
+};
+
+[[noreturn]] void FailCheck(const char* file, int line, const std::string& message);
+
+}  // namespace regrade
+
+#define REGRADE_CHECK(condition)                                             \
+  do {                                                                       \
+    if (!(condition)) ::regrade::FailCheck(__FILE__, __LINE__, #condition);  \
+  } while (false)
+
+#define REGRADE_CHECK_OP_(op, a, b)                                                    \
+  do {                                                                                 \
+    const auto& regrade_a_ = (a);                                                      \
+    const auto& regrade_b_ = (b);                                                      \
+    if (!(regrade_a_ op regrade_b_)) {                                                 \
+      std::ostringstream regrade_s_;                                                   \
+      regrade_s_ << #a " " #op " " #b " (" << regrade_a_ << " vs " << regrade_b_ << ")"; \
+      ::regrade::FailCheck(__FILE__, __LINE__, regrade_s_.str());                      \
+    }                                                                                  \
+  } while (false)
+
+#define REGRADE_CHECK_EQ(a, b) REGRADE_CHECK_OP_(==, a, b)
+#define REGRADE_CHECK_GE(a, b) REGRADE_CHECK_OP_(>=, a, b)
+#define REGRADE_CHECK_GT(a, b) REGRADE_CHECK_OP_(>, a, b)
+#define REGRADE_CHECK_LE(a, b) REGRADE_CHECK_OP_(<=, a, b)
+#define REGRADE_CHECK_LT(a, b) REGRADE_CHECK_OP_(<, a, b)

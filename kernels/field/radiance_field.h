@@ -1,0 +1,83 @@
+// A Plenoxel field: a sparse voxel grid of densities (Geometry, frozen once fitted) and of spherical
+// harmonics (Appearance, what a style may change).
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "kernels/base/buffer.h"
+#include "kernels/base/vec.h"
+
+namespace regrade {
+
+// Where values live: vertex (i, j, k) of a box. EQ(grid-from-world), svox2's cell-centred mapping:
+//   g = p * N / (2 radius) + (1 - center / radius) * N / 2 - 1/2, so the box spans [-1/2, N - 1/2].
+struct GridFrame {
+  Vec3i resolution{0, 0, 0};  // vertices per axis, each >= 2
+  Vec3f center{0, 0, 0};      // world units
+  Vec3f radius{1, 1, 1};      // world units, half extents of the box
+
+  HD Vec3f Scale() const {
+    return {0.5f * resolution.x / radius.x, 0.5f * resolution.y / radius.y,
+            0.5f * resolution.z / radius.z};
+  }
+  HD Vec3f Offset() const {
+    const Vec3f s = Scale();
+    return {0.5f * resolution.x - 0.5f - center.x * s.x,
+            0.5f * resolution.y - 0.5f - center.y * s.y,
+            0.5f * resolution.z - 0.5f - center.z * s.z};
+  }
+  Vec3f WorldOf(const Vec3f& grid) const {
+    const Vec3f s = Scale(), o = Offset();
+    return {(grid.x - o.x) / s.x, (grid.y - o.y) / s.y, (grid.z - o.z) / s.z};
+  }
+  int64_t NumVertices() const {
+    return static_cast<int64_t>(resolution.x) * resolution.y * resolution.z;
+  }
+  // z fastest.
+  HD int64_t Vertex(int x, int y, int z) const {
+    return (static_cast<int64_t>(x) * resolution.y + y) * resolution.z + z;
+  }
+};
+
+struct Geometry {
+  GridFrame frame;
+  Buffer<int32_t> links;  // [X, Y, Z]: voxel index, or -1 where nothing is stored
+  Buffer<float> density;  // [N]: per world unit of length; negative means empty (ReLU)
+
+  int64_t num_voxels() const { return density.size(); }
+};
+
+struct Appearance {
+  int basis = 9;     // spherical harmonics per channel: 1, 4 or 9
+  Buffer<float> sh;  // [N, 3, basis]: channel-major, R then G then B
+
+  int stride() const { return 3 * basis; }
+};
+
+// Geometry is shared and const: a restyled field has the same one, by type.
+struct RadianceField {
+  std::shared_ptr<const Geometry> geometry;
+  Appearance appearance;
+  Vec3f background{0, 0, 0};  // sRGB, seen where transmittance is left
+  float near_clip = 0;        // world units along the ray, at render as at fit
+};
+
+// Throws Error(kInput) naming the defect: sizes that disagree, a link out of range (F68), non-finite values (F69).
+void Validate(const RadianceField& field, const char* name);
+
+// What kernel bodies see: no owners, any scalar.
+template <typename T>
+struct FieldView {
+  GridFrame frame;
+  const int32_t* links = nullptr;
+  const T* density = nullptr;
+  const T* sh = nullptr;
+  int basis = 9;
+  Vec3<T> background{};
+  T near_clip = 0;
+};
+
+FieldView<float> ViewOf(const RadianceField& field);
+
+}  // namespace regrade

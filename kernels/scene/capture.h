@@ -1,0 +1,48 @@
+// A capture: photos with cameras, sparse points, and what became of each file that was given.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "kernels/scene/camera.h"
+#include "kernels/scene/image.h"
+
+namespace regrade {
+
+struct PhotoVerdict {
+  std::string file;     // as the user named it, relative to the given folder
+  std::string verdict;  // "used" | "skipped" | "unregistered"
+  std::string why;      // empty for "used", unless there is something to know
+};
+
+// A registered photo. `name` is our staged name ("00007.png"); `file` the user's.
+struct CaptureView {
+  std::string name;
+  std::string file;
+  std::string path;  // where the pixels are, absolute
+  Camera camera;     // at the photo's own size
+};
+
+// A triangulated point in the world frame of the cameras.
+struct ScenePoint {
+  Vec3d position;
+  Vec3f color;                    // sRGB in [0, 1]
+  double reprojection_error = 0;  // pixels
+  std::vector<int32_t> views;     // indices into Capture::views, ascending, without repeats
+};
+
+struct Capture {
+  std::vector<CaptureView> views;  // in natural order of `file`
+  std::vector<ScenePoint> points;  // empty when the poses came without points
+  std::vector<PhotoVerdict> verdicts;
+  double reprojection_px = 0;  // mean over observations, at the photos' size
+  int models_found = 0;        // by COLMAP; 0 when the poses came from elsewhere
+};
+
+// True for views kept for measuring: every `holdout`-th in order, starting with the first; holdout 0 keeps none.
+inline bool IsHeldOut(size_t view_index, int holdout) {
+  return holdout > 0 && view_index % static_cast<size_t>(holdout) == 0;
+}
+
+}  // namespace regrade
