@@ -48,9 +48,8 @@ class Buffer {
 
   void Reserve(int64_t capacity) {
     if (capacity <= capacity_) return;
-    const int64_t bytes =
-        (capacity * static_cast<int64_t>(sizeof(T)) + kBufferAlignment - 1) / kBufferAlignment *
-        kBufferAlignment;
+    const int64_t bytes = (capacity * static_cast<int64_t>(sizeof(T)) + kBufferAlignment - 1) /
+                          kBufferAlignment * kBufferAlignment;
     T* data = static_cast<T*>(std::aligned_alloc(kBufferAlignment, bytes));
     if (data == nullptr) throw std::bad_alloc();
     if (size_ > 0) std::memcpy(data, data_, sizeof(T) * size_);

@@ -1,4 +1,5 @@
-// Errors for people (Error, with an exit code and a remedy) and checks for our own mistakes (CHECK).
+// Errors for people (Error, with an exit code and a remedy) and checks for our own mistakes
+// (CHECK).
 #pragma once
 
 #include <sstream>
@@ -19,8 +20,9 @@ enum class ExitCode {
   kFolderInUse = 7,
 };
 
-// Something a person can mend. `what` failed, `where` (file, photo, option; may be empty), and a `hint`
-// with the remedy. Thrown from any floor, printed once by main, which exits with `code`.
+// Something a person can mend. `what` failed, `where` (file, photo, option; may be empty), and
+// a `hint` with the remedy. Thrown from any floor, printed once by main, which exits with
+// `code`.
 class Error : public std::runtime_error {
  public:
   Error(ExitCode code, std::string what, std::string where = "", std::string hint = "");
@@ -51,20 +53,20 @@ class CheckFailure : public std::logic_error {
 
 }  // namespace regrade
 
-#define REGRADE_CHECK(condition)                                             \
-  do {                                                                       \
-    if (!(condition)) ::regrade::FailCheck(__FILE__, __LINE__, #condition);  \
+#define REGRADE_CHECK(condition)                                            \
+  do {                                                                      \
+    if (!(condition)) ::regrade::FailCheck(__FILE__, __LINE__, #condition); \
   } while (false)
 
-#define REGRADE_CHECK_OP_(op, a, b)                                                    \
-  do {                                                                                 \
-    const auto& regrade_a_ = (a);                                                      \
-    const auto& regrade_b_ = (b);                                                      \
-    if (!(regrade_a_ op regrade_b_)) {                                                 \
-      std::ostringstream regrade_s_;                                                   \
+#define REGRADE_CHECK_OP_(op, a, b)                                                      \
+  do {                                                                                   \
+    const auto& regrade_a_ = (a);                                                        \
+    const auto& regrade_b_ = (b);                                                        \
+    if (!(regrade_a_ op regrade_b_)) {                                                   \
+      std::ostringstream regrade_s_;                                                     \
       regrade_s_ << #a " " #op " " #b " (" << regrade_a_ << " vs " << regrade_b_ << ")"; \
-      ::regrade::FailCheck(__FILE__, __LINE__, regrade_s_.str());                      \
-    }                                                                                  \
+      ::regrade::FailCheck(__FILE__, __LINE__, regrade_s_.str());                        \
+    }                                                                                    \
   } while (false)
 
 #define REGRADE_CHECK_EQ(a, b) REGRADE_CHECK_OP_(==, a, b)

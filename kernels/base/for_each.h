@@ -1,4 +1,5 @@
-// The only launcher of kernel bodies: body(i) for i in [0, n), on OpenMP threads or on a CUDA grid.
+// The only launcher of kernel bodies: body(i) for i in [0, n), on OpenMP threads or on a CUDA
+// grid.
 #pragma once
 
 #include <cstdint>
@@ -18,8 +19,9 @@ __global__ void ForEachKernel(int64_t n, Body body) {
 }
 #endif
 
-// `body` is a plain struct with `HD void operator()(int64_t) const`; bodies must not depend on each other.
-// `name` labels errors and profiles. Launches on the device are asynchronous on the default stream.
+// `body` is a plain struct with `HD void operator()(int64_t) const`; bodies must not depend on
+// each other. `name` labels errors and profiles. Launches on the device are asynchronous on the
+// default stream.
 template <typename Body>
 void ForEach(Backend backend, const char* name, int64_t n, const Body& body) {
   if (n <= 0) return;

@@ -1,4 +1,5 @@
-// One body for two processors: HD marks a function that both the host and a CUDA device may run.
+// One body for two processors: HD marks a function that both the host and a CUDA device may
+// run.
 #pragma once
 
 #if defined(__CUDACC__)

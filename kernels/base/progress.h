@@ -13,9 +13,9 @@ enum class Verdict {
 };
 
 struct Progress {
-  double done = 0.0;   // same unit as total; total <= 0 means unknown
+  double done = 0.0;  // same unit as total; total <= 0 means unknown
   double total = 0.0;
-  std::string note;    // one short clause for the progress line, e.g. "24.1 dB on training rays"
+  std::string note;  // one short clause for the progress line, e.g. "24.1 dB on training rays"
 };
 
 // Called often (every step); cheap when there is nothing to print.

@@ -1,5 +1,5 @@
-// Counter-based random numbers: a value is a pure function of (seed, stream, counter), so any thread
-// count and any resume draws the same numbers.
+// Counter-based random numbers: a value is a pure function of (seed, stream, counter), so any
+// thread count and any resume draws the same numbers.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,5 @@
-// A view of memory that somebody else owns: pointer and length, for kernel bodies on either processor.
+// A view of memory that somebody else owns: pointer and length, for kernel bodies on either
+// processor.
 #pragma once
 
 #include <cstdint>

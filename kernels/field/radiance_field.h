@@ -1,5 +1,5 @@
-// A Plenoxel field: a sparse voxel grid of densities (Geometry, frozen once fitted) and of spherical
-// harmonics (Appearance, what a style may change).
+// A Plenoxel field: a sparse voxel grid of densities (Geometry, frozen once fitted) and of
+// spherical harmonics (Appearance, what a style may change).
 #pragma once
 
 #include <cstdint>
@@ -10,8 +10,10 @@
 
 namespace regrade {
 
-// Where values live: vertex (i, j, k) of a box. EQ(grid-from-world), svox2's cell-centred mapping:
-//   g = p * N / (2 radius) + (1 - center / radius) * N / 2 - 1/2, so the box spans [-1/2, N - 1/2].
+// Where values live: vertex (i, j, k) of a box. EQ(grid-from-world), svox2's cell-centred
+// mapping:
+//   g = p * N / (2 radius) + (1 - center / radius) * N / 2 - 1/2, so the box spans [-1/2, N -
+//   1/2].
 struct GridFrame {
   Vec3i resolution{0, 0, 0};  // vertices per axis, each >= 2
   Vec3f center{0, 0, 0};      // world units
@@ -63,7 +65,8 @@ struct RadianceField {
   float near_clip = 0;        // world units along the ray, at render as at fit
 };
 
-// Throws Error(kInput) naming the defect: sizes that disagree, a link out of range (F68), non-finite values (F69).
+// Throws Error(kInput) naming the defect: sizes that disagree, a link out of range (F68),
+// non-finite values (F69).
 void Validate(const RadianceField& field, const char* name);
 
 // What kernel bodies see: no owners, any scalar.

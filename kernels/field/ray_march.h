@@ -11,8 +11,9 @@
 namespace regrade {
 
 struct MarchOptions {
-  float step = 0.5f;                 // voxels
-  float stop_transmittance = 1e-4f;  // a ray ends below it; at most this much light is lost a channel
+  float step = 0.5f;  // voxels
+  float stop_transmittance =
+      1e-4f;  // a ray ends below it; at most this much light is lost a channel
 };
 
 inline constexpr int64_t kMaxSteps = 1 << 20;
@@ -28,8 +29,9 @@ struct GridRay {
   HD Vec3<T> At(T t) const { return origin + direction * t; }
 };
 
-// Slab test with half-open faces [lo, hi): a ray parallel to a slab and outside it misses; parallel and inside
-// ignores that slab (svox2 counts the former as inside and clamps its samples to the face: not ported).
+// Slab test with half-open faces [lo, hi): a ray parallel to a slab and outside it misses;
+// parallel and inside ignores that slab (svox2 counts the former as inside and clamps its
+// samples to the face: not ported).
 template <typename T>
 HD GridRay<T> ClipToGrid(const GridFrame& frame, const RayT<T>& ray, T near_clip, T step) {
   using std::isfinite;

@@ -1,7 +1,7 @@
 // Trilinear interpolation on the sparse grid and its adjoint.
 //
-// EQ(trilinear): v(p) = sum over the 8 corners q of the cell of p: prod_a (1 - |p_a - q_a|) v_q; an empty
-// corner counts as 0 and takes no gradient (Plenoxels, Sec. 3).
+// EQ(trilinear): v(p) = sum over the 8 corners q of the cell of p: prod_a (1 - |p_a - q_a|)
+// v_q; an empty corner counts as 0 and takes no gradient (Plenoxels, Sec. 3).
 #pragma once
 
 #include "kernels/base/vec.h"
@@ -22,7 +22,8 @@ HD Cell<T> LocateCell(const GridFrame& frame, const Vec3<T>& p) {
   int base[3];
   for (int a = 0; a < 3; ++a) {
     const T top = T(frame.resolution[a] - 1);
-    const T clamped = p[a] >= 0 ? (p[a] <= top ? p[a] : top) : T(0);  // NaN goes to 0, not to a cast
+    const T clamped =
+        p[a] >= 0 ? (p[a] <= top ? p[a] : top) : T(0);  // NaN goes to 0, not to a cast
     int i = static_cast<int>(clamped);
     if (i > frame.resolution[a] - 2) i = frame.resolution[a] - 2;
     base[a] = i;
@@ -60,10 +61,11 @@ HD void Interpolate(const GridFrame& frame, const int32_t* links, const T* value
   }
 }
 
-// Adjoint of Interpolate: d_values += its transpose applied to d_out. Not for concurrent use on shared voxels.
+// Adjoint of Interpolate: d_values += its transpose applied to d_out. Not for concurrent use on
+// shared voxels.
 template <typename T>
-HD void InterpolateAdjoint(const GridFrame& frame, const int32_t* links, int stride, int channels,
-                           const Cell<T>& cell, const T* d_out, T* d_values) {
+HD void InterpolateAdjoint(const GridFrame& frame, const int32_t* links, int stride,
+                           int channels, const Cell<T>& cell, const T* d_out, T* d_values) {
   for (int corner = 0; corner < 8; ++corner) {
     const int32_t link = links[CornerVertex(frame, cell.vertex, corner)];
     if (link < 0) continue;

@@ -36,7 +36,8 @@ void Distort(const Camera& camera, double x, double y, double* xd, double* yd) {
   }
 }
 
-// Angle from the axis whose fisheye image radius is `radius`: Newton on the odd polynomial, kept in [0, pi).
+// Angle from the axis whose fisheye image radius is `radius`: Newton on the odd polynomial,
+// kept in [0, pi).
 double FisheyeAngle(const std::array<double, 8>& k, double radius) {
   double a = radius;
   for (int i = 0; i < 20; ++i) {
@@ -63,7 +64,8 @@ Vec3d Camera::CameraRay(double u, double v) const {
     const double a = FisheyeAngle(distortion, r);
     return {std::sin(a) * xd / r, std::sin(a) * yd / r, std::cos(a)};
   }
-  // Newton on the 2x2 system, Jacobian by central differences (the model is smooth and the step well scaled).
+  // Newton on the 2x2 system, Jacobian by central differences (the model is smooth and the step
+  // well scaled).
   double x = xd, y = yd;
   for (int i = 0; i < 50; ++i) {
     double fx0, fy0;

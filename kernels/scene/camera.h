@@ -20,8 +20,8 @@ struct RayT {
 using Ray = RayT<float>;
 
 enum class LensModel {
-  kPinhole,  // no coefficients
-  kOpenCv,   // k1 k2 p1 p2 (COLMAP OPENCV; RADIAL and SIMPLE_RADIAL are special cases)
+  kPinhole,     // no coefficients
+  kOpenCv,      // k1 k2 p1 p2 (COLMAP OPENCV; RADIAL and SIMPLE_RADIAL are special cases)
   kFullOpenCv,  // k1 k2 p1 p2 k3 k4 k5 k6
   kFisheye,     // k1 k2 k3 k4 (COLMAP OPENCV_FISHEYE)
 };
@@ -63,14 +63,16 @@ struct Camera {
   Vec3d Forward() const { return camera_from_world.rotation.row[2]; }
   Vec3d Up() const { return -camera_from_world.rotation.row[1]; }
 
-  // Direction in camera coordinates, z = 1 (unit length for a fisheye lens), of image point (u, v) in pixels.
-  // The lens is inverted by Newton steps to 1e-10; where it folds over, the last monotone point is used.
+  // Direction in camera coordinates, z = 1 (unit length for a fisheye lens), of image point (u,
+  // v) in pixels. The lens is inverted by Newton steps to 1e-10; where it folds over, the last
+  // monotone point is used.
   Vec3d CameraRay(double u, double v) const;
   // World ray through (u, v) pixels. Its direction is unit to double precision before rounding.
   RayT<double> WorldRay(double u, double v) const;
   Ray PixelRay(int x, int y) const;  // through the centre of pixel (x, y)
 
-  // Image point of a world point; false if it is behind the camera. Depth is z in the camera frame.
+  // Image point of a world point; false if it is behind the camera. Depth is z in the camera
+  // frame.
   bool Project(const Vec3d& point_world, double* u, double* v, double* depth = nullptr) const;
 
   // The same camera for a picture resampled to width x height.

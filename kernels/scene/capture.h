@@ -16,6 +16,17 @@ struct PhotoVerdict {
   std::string why;      // empty for "used", unless there is something to know
 };
 
+// A photo that was decoded and written beside the result as a plain 8-bit upright PNG, before
+// poses are known.
+struct StagedPhoto {
+  std::string file;  // as the user named it, relative to the given folder
+  std::string name;  // ours: "00007.png", numbered in natural order of `file`
+  std::string path;  // absolute path of the PNG
+  int width = 0;     // pixels, after EXIF orientation
+  int height = 0;
+  double exif_focal_px = 0;  // focal length in pixels from EXIF; 0 where unknown
+};
+
 // A registered photo. `name` is our staged name ("00007.png"); `file` the user's.
 struct CaptureView {
   std::string name;
@@ -40,7 +51,8 @@ struct Capture {
   int models_found = 0;        // by COLMAP; 0 when the poses came from elsewhere
 };
 
-// True for views kept for measuring: every `holdout`-th in order, starting with the first; holdout 0 keeps none.
+// True for views kept for measuring: every `holdout`-th in order, starting with the first;
+// holdout 0 keeps none.
 inline bool IsHeldOut(size_t view_index, int holdout) {
   return holdout > 0 && view_index % static_cast<size_t>(holdout) == 0;
 }

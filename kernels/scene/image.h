@@ -1,4 +1,5 @@
-// A picture in memory: row-major, channels interleaved, sRGB-encoded values nominally in [0, 1].
+// A picture in memory: row-major, channels interleaved, sRGB-encoded values nominally in [0,
+// 1].
 #pragma once
 
 #include <cstdint>
@@ -8,7 +9,8 @@
 
 namespace regrade {
 
-// Shape [height, width, channels]; channels is 1 (grey, depth, mask), 3 (RGB) or 4 (RGB + straight alpha).
+// Shape [height, width, channels]; channels is 1 (grey, depth, mask), 3 (RGB) or 4 (RGB +
+// straight alpha).
 struct Image {
   int width = 0;
   int height = 0;

@@ -1,0 +1,29 @@
+// Options describe themselves: name, default, unit, bounds and effect are written once, beside
+// the member, and become command-line flag, help text, run.json entry and range check.
+//
+//   struct FitOptions {
+//     float step = 0.5f;
+//     template <typename Bind>
+//     void Describe(Bind& bind) {
+//       bind("fit-step", step, {.unit = "voxels", .help = "distance of samples on a ray; 1
+//       halves the time",
+//                               .min = 0.1, .max = 4});
+//     }
+//   };
+//
+// A member is bool, int, int64_t, uint64_t, float, double, std::string or std::vector<int>.
+#pragma once
+
+#include <limits>
+
+namespace regrade {
+
+struct OptionInfo {
+  const char* unit = "";
+  const char* help = "";
+  double min = -std::numeric_limits<double>::infinity();  // inclusive; numbers only
+  double max = std::numeric_limits<double>::infinity();
+  const char* choices = "";  // for strings: "a|b|c"; empty allows anything
+};
+
+}  // namespace regrade
