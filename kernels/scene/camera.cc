@@ -142,7 +142,7 @@ double Camera::MaxCornerDistortion() const {
   for (const double u : {0.0, static_cast<double>(width)})
     for (const double v : {0.0, static_cast<double>(height)}) {
       const double x = (u - cx) / fx, y = (v - cy) / fy;
-      double xd, yd;
+      double xd = x, yd = y;
       Distort(*this, x, y, &xd, &yd);
       most = std::max(most, std::hypot((xd - x) * fx, (yd - y) * fy));
     }

@@ -1,0 +1,161 @@
+#include "kernels/field/fast_rays.h"
+
+#include <algorithm>
+#include <cstring>
+#include <memory>
+#include <vector>
+
+#include "kernels/field/trilinear.h"
+
+namespace regrade {
+
+namespace simd_baseline {
+extern const FastRayFunctions kFunctions;
+}
+namespace simd_avx2 {
+extern const FastRayFunctions kFunctions;
+}
+namespace simd_avx512 {
+extern const FastRayFunctions kFunctions;
+}
+
+const FastRayFunctions* FastRaysFor(const char* name) {
+  if (std::strcmp(name, "baseline") == 0) return &simd_baseline::kFunctions;
+#if defined(REGRADE_X86)
+  if (std::strcmp(name, "avx2") == 0 && __builtin_cpu_supports("avx2") &&
+      __builtin_cpu_supports("fma"))
+    return &simd_avx2::kFunctions;
+  if (std::strcmp(name, "avx512") == 0 && __builtin_cpu_supports("avx512f") &&
+      __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq") &&
+      __builtin_cpu_supports("avx512bw"))
+    return &simd_avx512::kFunctions;
+#endif
+  return nullptr;
+}
+
+const FastRayFunctions& FastRays() {
+  static const FastRayFunctions* const kBest = [] {
+    for (const char* name : {"avx512", "avx2"})
+      if (const FastRayFunctions* functions = FastRaysFor(name)) return functions;
+    return FastRaysFor("baseline");
+  }();
+  return *kBest;
+}
+
+void GradientArena::Reset(int64_t num_voxels, int lanes) {
+  slot_of_voxel = Buffer<int32_t>(num_voxels);
+  std::fill(slot_of_voxel.begin(), slot_of_voxel.end(), -1);
+  voxel_of_slot = Buffer<int32_t>();
+  gradient = Buffer<float>();
+  gradient_capacity = 0;
+  (void)lanes;
+}
+
+void GradientArena::Forget() {
+  for (const int32_t voxel : voxel_of_slot) slot_of_voxel[voxel] = -1;
+  voxel_of_slot.Clear();
+  gradient.Clear();
+}
+
+FastGrid MakeFastGrid(const RadianceField& field) {
+  FastGrid grid;
+  const Geometry& geometry = *field.geometry;
+  grid.frame = geometry.frame;
+  grid.links = geometry.links;
+  grid.basis = field.appearance.basis;
+  grid.background = field.background;
+  grid.near_clip = field.near_clip;
+  const int64_t n = geometry.num_voxels();
+  const int lanes = grid.lanes(), stride = field.appearance.stride();
+  grid.records.Resize(n * lanes);
+  for (int64_t v = 0; v < n; ++v) {
+    std::copy_n(field.appearance.sh.data() + v * stride, stride, grid.records.data() + v * lanes);
+    grid.records[v * lanes + DensityLane(grid.basis)] = geometry.density[v];
+  }
+  RefreshDerived(&grid);
+  return grid;
+}
+
+RadianceField ToRadianceField(const FastGrid& grid) {
+  auto geometry = std::make_shared<Geometry>();
+  geometry->frame = grid.frame;
+  geometry->links = grid.links;
+  const int64_t n = grid.num_voxels();
+  const int lanes = grid.lanes();
+  geometry->density.Resize(n);
+  RadianceField field;
+  field.appearance.basis = grid.basis;
+  const int stride = field.appearance.stride();
+  field.appearance.sh.Resize(n * stride);
+  for (int64_t v = 0; v < n; ++v) {
+    std::copy_n(grid.records.data() + v * lanes, stride, field.appearance.sh.data() + v * stride);
+    geometry->density[v] = grid.records[v * lanes + DensityLane(grid.basis)];
+  }
+  field.geometry = std::move(geometry);
+  field.background = grid.background;
+  field.near_clip = grid.near_clip;
+  return field;
+}
+
+namespace {
+
+// Two sweeps along one axis: distance <= neighbour + 1. Three axes give the Chebyshev distance when each pass
+// takes the minimum over max(distance, steps along the axis); done here by separable dilation counts.
+void SpreadAxis(const Vec3i& n, int axis, Buffer<uint8_t>* distance) {
+  const int64_t strides[3] = {static_cast<int64_t>(n.y) * n.z, n.z, 1};
+  const int length = n[axis];
+  const int64_t stride = strides[axis];
+  const int u = axis == 0 ? 1 : 0, v = axis == 2 ? 1 : 2;
+#pragma omp parallel for schedule(static)
+  for (int a = 0; a < n[u]; ++a) {
+    std::vector<uint8_t> line(static_cast<size_t>(length));
+    for (int b = 0; b < n[v]; ++b) {
+      uint8_t* p = distance->data() + a * strides[u] + b * strides[v];
+      for (int i = 0; i < length; ++i) line[static_cast<size_t>(i)] = p[i * stride];
+      // out(i) = min over j of max(line(j), |i - j|): grow the radius until it covers the smallest value found.
+      for (int i = 0; i < length; ++i) {
+        int best = line[static_cast<size_t>(i)];
+        for (int r = 1; r < best; ++r) {
+          if (i - r >= 0) best = std::min(best, std::max<int>(line[static_cast<size_t>(i - r)], r));
+          if (i + r < length)
+            best = std::min(best, std::max<int>(line[static_cast<size_t>(i + r)], r));
+        }
+        p[i * stride] = static_cast<uint8_t>(best);
+      }
+    }
+  }
+}
+
+}  // namespace
+
+void RefreshDerived(FastGrid* grid) {
+  const GridFrame& frame = grid->frame;
+  const Vec3i n = frame.resolution;
+  const int64_t vertices = frame.NumVertices();
+  const int lanes = grid->lanes();
+  const int64_t voxels = grid->records.size() / lanes;
+  grid->vertex_of_voxel = Buffer<int32_t>(voxels);
+  grid->dense_density = Buffer<float>(vertices);
+  grid->empty_distance = Buffer<uint8_t>(vertices);
+  constexpr uint8_t kFar = 64;  // longer skips gain nothing: a ray re-reads once in 64 voxels
+  std::fill(grid->empty_distance.begin(), grid->empty_distance.end(), kFar);
+  for (int x = 0; x < n.x; ++x)
+    for (int y = 0; y < n.y; ++y)
+      for (int z = 0; z < n.z; ++z) {
+        const int64_t vertex = frame.Vertex(x, y, z);
+        const int32_t link = grid->links[vertex];
+        if (link < 0) continue;
+        grid->vertex_of_voxel[link] = static_cast<int32_t>(vertex);
+        grid->dense_density[vertex] =
+            grid->records[static_cast<int64_t>(link) * lanes + DensityLane(grid->basis)];
+        // A vertex is a corner of the cells whose lowest corners lie up to one below it.
+        for (int dx = -1; dx <= 0; ++dx)
+          for (int dy = -1; dy <= 0; ++dy)
+            for (int dz = -1; dz <= 0; ++dz)
+              if (x + dx >= 0 && y + dy >= 0 && z + dz >= 0)
+                grid->empty_distance[frame.Vertex(x + dx, y + dy, z + dz)] = 0;
+      }
+  for (int axis = 0; axis < 3; ++axis) SpreadAxis(n, axis, &grid->empty_distance);
+}
+
+}  // namespace regrade

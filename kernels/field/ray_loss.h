@@ -1,0 +1,126 @@
+// One ray through the field, forward and adjoint, plainly: the specification of rendering and of fitting.
+//
+// EQ(fit-loss): L = 1 / (3 Q) sum over the batch's Q rays and 3 channels of (C - C_photo)^2 (svox2's gradient
+// 2 / (3 Q) (C - C_photo)); the scale 1 / (3 Q) is passed in. The adjoint walks the same samples back to front
+// (see EQ(composite-adjoint)) and recovers T_{i+1} = exp(-sum_{j<=i} tau_j) from the running optical depth, so
+// it stores nothing and divides by nothing.
+#pragma once
+
+#include <cmath>
+
+#include "kernels/field/radiance_field.h"
+#include "kernels/field/ray_march.h"
+#include "kernels/field/spherical_harmonics.h"
+#include "kernels/field/trilinear.h"
+#include "kernels/field/volume_rendering.h"
+
+namespace regrade {
+
+template <typename T>
+struct RayResult {
+  Vec3<T> color{};         // not clipped
+  T transmittance = 1;     // behind the last sample
+  T depth = 0;             // sum w t, t in world units along the ray
+  T optical_depth = 0;     // sum tau
+  int64_t last_step = -1;  // index of the last sample that was composited
+};
+
+// See EQ(sh-basis): raw [3] is before the clamp at 0.
+template <typename T>
+HD Vec3<T> SampleColor(const FieldView<T>& field, const Cell<T>& cell, const T* gamma,
+                       Vec3<T>* raw) {
+  T sh[3 * kMaxBasis];
+  const int stride = 3 * field.basis;
+  Interpolate(field.frame, field.links, field.sh, stride, stride, cell, sh);
+  Vec3<T> color;
+  for (int c = 0; c < 3; ++c) {
+    T sum = T(0.5);
+    for (int k = 0; k < field.basis; ++k) sum += sh[c * field.basis + k] * gamma[k];
+    (*raw)[c] = sum;
+    color[c] = sum > 0 ? sum : T(0);
+  }
+  return color;
+}
+
+template <typename T>
+HD RayResult<T> RenderRay(const FieldView<T>& field, const RayT<T>& ray,
+                          const MarchOptions& options) {
+  RayResult<T> result;
+  const GridRay<T> march =
+      ClipToGrid(field.frame, ray, field.near_clip, static_cast<T>(options.step));
+  const T delta = T(options.step) * march.world_per_voxel;
+  T gamma[kMaxBasis];
+  ShBasis(field.basis, ray.direction, gamma);
+  CompositeState<T> state;
+  for (int64_t i = 0; i < march.num_steps; ++i) {
+    const T t = march.t_begin + T(i) * T(options.step);
+    const Cell<T> cell = LocateCell(field.frame, march.At(t));
+    T density;
+    Interpolate(field.frame, field.links, field.density, 1, 1, cell, &density);
+    if (!(density > 0)) continue;
+    const T tau = OpticalDepth(density, delta);
+    Vec3<T> raw;
+    const Vec3<T> color = SampleColor(field, cell, gamma, &raw);
+    result.depth += Composite(tau, color, &state) * t * march.world_per_voxel;
+    result.optical_depth += tau;
+    result.last_step = i;
+    if (state.transmittance < T(options.stop_transmittance)) break;
+  }
+  result.transmittance = state.transmittance;
+  result.color = state.color + field.background * state.transmittance;
+  return result;
+}
+
+// Adds dL/d(density), dL/d(sh) for dL/dC = d_color to the gradients, which have the field's shapes. `result` is
+// RenderRay's of the same arguments. `Add(pointer, value)` is a plain or an atomic +=.
+template <typename T, typename Add>
+HD void RenderRayAdjoint(const FieldView<T>& field, const RayT<T>& ray,
+                         const MarchOptions& options, const RayResult<T>& result,
+                         const Vec3<T>& d_color, T* d_density, T* d_sh, const Add& add) {
+  using std::exp;
+  const GridRay<T> march =
+      ClipToGrid(field.frame, ray, field.near_clip, static_cast<T>(options.step));
+  const T delta = T(options.step) * march.world_per_voxel;
+  T gamma[kMaxBasis];
+  ShBasis(field.basis, ray.direction, gamma);
+  const int stride = 3 * field.basis;
+  Vec3<T> behind = field.background;
+  T depth_after = result.optical_depth;  // sum of tau up to and including the sample
+  for (int64_t i = result.last_step; i >= 0; --i) {
+    const T t = march.t_begin + T(i) * T(options.step);
+    const Cell<T> cell = LocateCell(field.frame, march.At(t));
+    T density;
+    Interpolate(field.frame, field.links, field.density, 1, 1, cell, &density);
+    if (!(density > 0)) continue;
+    const T tau = OpticalDepth(density, delta);
+    Vec3<T> raw;
+    const Vec3<T> color = SampleColor(field, cell, gamma, &raw);
+    const T transmittance_after = exp(-depth_after);
+    const T w = exp(-(depth_after - tau)) * Opacity(tau);
+    T d_sigma =
+        CompositeAdjoint(delta, tau, transmittance_after, color, d_color, &behind);
+    if (!(density < T(kMaxDensity)) || !(density * delta < T(kMaxOpticalDepth))) d_sigma = 0;
+    for (int corner = 0; corner < 8; ++corner) {
+      const int32_t link = field.links[CornerVertex(field.frame, cell.vertex, corner)];
+      if (link < 0) continue;
+      const T corner_weight = CornerWeight(cell.fraction, corner);
+      add(&d_density[link], corner_weight * d_sigma);
+      for (int c = 0; c < 3; ++c) {
+        if (!(raw[c] > 0)) continue;  // subgradient 0 of the clamp
+        for (int k = 0; k < field.basis; ++k)
+          add(&d_sh[static_cast<int64_t>(link) * stride + c * field.basis + k],
+              corner_weight * w * d_color[c] * gamma[k]);
+      }
+    }
+    depth_after -= tau;
+  }
+}
+
+struct PlainAdd {
+  template <typename T>
+  HD void operator()(T* target, T value) const {
+    *target += value;
+  }
+};
+
+}  // namespace regrade
