@@ -204,8 +204,9 @@ class Child {
 }  // namespace
 
 std::string ChildResult::Describe() const {
-  const std::string by_signal =
-      signal == 0 ? "" : "killed by signal " + std::to_string(signal) + " (" + strsignal(signal) + ")";
+  const std::string by_signal = signal == 0 ? ""
+                                            : "killed by signal " + std::to_string(signal) +
+                                                  " (" + strsignal(signal) + ")";
   switch (end) {
     case ChildEnd::kExited:
       return "exit status " + std::to_string(exit_status);
@@ -244,42 +245,43 @@ ChildResult RunChild(const ChildOptions& options, const LineFunction& on_line,
   output.Close();
 
   ChildResult result;
-  double heard = start, asked_to_end = 0;
-  // A grandchild may hold the pipe open for ever: once the child itself is over, what is in the
-  // pipe by then is all we wait for.
-  for (bool over = false, drained = false; !(over && drained);) {
-    over = child.Over();
-    drained = true;
-    pollfd wait{input.value, POLLIN, 0};
-    if (poll(&wait, 1, over ? 0 : kPollMs) > 0) {
-      char bytes[1 << 16];
-      const ssize_t size = read(input.value, bytes, sizeof(bytes));
-      if (size > 0) {
-        // The pipe holds as much as one read takes: a flood from a grandchild cannot keep us.
-        drained = over && size < static_cast<ssize_t>(sizeof(bytes));
-        heard = Now();
-        log.Append(bytes, static_cast<size_t>(size));
-        lines.Append(bytes, static_cast<size_t>(size));
-      } else if (size == 0 && !over) {
-        usleep(kPollMs * 1000 / 10);  // outputs closed, but still running
-      }
-    }
-    if (over) continue;
+  double heard = start, asked = start, told_to_end = 0, over_since = 0;
+  char bytes[1 << 16];
+  while (true) {
     const double now = Now();
-    if (asked_to_end > 0) {
-      if (now - asked_to_end > options.grace_s) child.Signal(SIGKILL);
+    if (over_since == 0 && child.Over()) {
+      child.Signal(SIGKILL);  // whoever is left of its group
+      over_since = now;
+    }
+    pollfd wait{input.value, POLLIN, 0};
+    const bool readable = poll(&wait, 1, over_since > 0 ? 0 : kPollMs) > 0;
+    const ssize_t size = readable ? read(input.value, bytes, sizeof(bytes)) : 0;
+    if (size > 0) {
+      heard = now;
+      log.Append(bytes, static_cast<size_t>(size));
+      lines.Append(bytes, static_cast<size_t>(size));
+    }
+    if (over_since > 0) {
+      // A grandchild outside the group may hold the pipe open, or flood it, for ever.
+      if (size <= 0 || now - over_since > 1) break;
       continue;
     }
-    if (keep_going && !keep_going())
-      result.end = ChildEnd::kStopped;
-    else if (options.wall_limit_s > 0 && now - start > options.wall_limit_s)
-      result.end = ChildEnd::kWallLimit;
-    else if (options.quiet_limit_s > 0 && now - heard > options.quiet_limit_s)
-      result.end = ChildEnd::kQuietLimit;
-    else
+    if (readable && size <= 0) usleep(kPollMs * 100);  // closed its outputs, but still runs
+    if (told_to_end > 0) {
+      if (now - told_to_end > options.grace_s) child.Signal(SIGKILL);
       continue;
+    }
+    if (keep_going && now - asked >= 1e-3 * kPollMs) {
+      asked = now;
+      if (!keep_going()) result.end = ChildEnd::kStopped;
+    }
+    if (options.wall_limit_s > 0 && now - start > options.wall_limit_s)
+      result.end = ChildEnd::kWallLimit;
+    if (options.quiet_limit_s > 0 && now - heard > options.quiet_limit_s)
+      result.end = ChildEnd::kQuietLimit;
+    if (result.end == ChildEnd::kExited) continue;  // nobody wants it ended
     child.Signal(SIGTERM);
-    asked_to_end = now;
+    told_to_end = now;
   }
   const int status = child.Reap();
   lines.End();

@@ -1,5 +1,5 @@
-// Starts another program without a shell, reads what it prints, and ends it when it is over time,
-// silent for too long, or no longer wanted.
+// Starts another program without a shell, reads what it prints, and ends it when it is over
+// time, silent for too long, or no longer wanted.
 #pragma once
 
 #include <cstdint>

@@ -1,0 +1,206 @@
+// Children that hang, flood, die, ignore signals or leave children of their own.
+#include "kernels/base/child_process.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "kernels/base/error.h"
+
+namespace regrade {
+namespace {
+
+namespace fs = std::filesystem;
+
+// What the child does is said in sh, so that a test reads as a sentence.
+ChildOptions Shell(const std::string& script) { return {.argv = {"/bin/sh", "-c", script}}; }
+
+std::vector<std::string> LinesOf(const ChildOptions& options) {
+  std::vector<std::string> lines;
+  RunChild(options, [&](const std::string& line) { lines.push_back(line); });
+  return lines;
+}
+
+std::string FileText(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+std::string TemporaryFile(const std::string& name) {
+  const fs::path folder =
+      fs::temp_directory_path() / ("child_process_test_" + std::to_string(getpid()));
+  fs::create_directories(folder);
+  return folder / name;
+}
+
+TEST(ChildProcess, ExitStatusAndBothOutputs) {
+  std::vector<std::string> lines;
+  const ChildResult result = RunChild(Shell("echo out; echo err >&2; printf end; exit 3"),
+                                      [&](const std::string& line) { lines.push_back(line); });
+  EXPECT_EQ(result.end, ChildEnd::kExited);
+  EXPECT_EQ(result.exit_status, 3);
+  EXPECT_FALSE(result.Succeeded());
+  EXPECT_EQ(lines, (std::vector<std::string>{"out", "err", "end"}));
+  EXPECT_EQ(result.LastLines(), "out\nerr\nend");
+}
+
+TEST(ChildProcess, F45_MissingProgramIsAnErrorWithTheReason) {
+  try {
+    RunChild({.argv = {"/no/such/program"}});
+    FAIL();
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ExitCode::kExternalProgram);
+    EXPECT_NE(e.what_failed().find("No such file"), std::string::npos) << e.what();
+  }
+  EXPECT_THROW(RunChild({.argv = {"/etc/passwd"}}), Error);  // there, but not executable
+}
+
+TEST(ChildProcess, F45_NoZombieStays) {
+  pid_t pid = 0;
+  RunChild(Shell("echo $$"), [&](const std::string& line) { pid = std::atoi(line.c_str()); });
+  ASSERT_GT(pid, 1);
+  EXPECT_EQ(kill(pid, 0), -1);  // a zombie would still be there
+}
+
+TEST(ChildProcess, F49_DeathBySignalIsNamed) {
+  const ChildResult result = RunChild(Shell("echo before; kill -SEGV $$"));
+  EXPECT_EQ(result.end, ChildEnd::kSignal);
+  EXPECT_EQ(result.signal, SIGSEGV);
+  EXPECT_NE(result.Describe().find("Segmentation fault"), std::string::npos);
+  EXPECT_EQ(result.LastLines(), "before");
+}
+
+TEST(ChildProcess, F50_HangEndsAtTheWallLimit) {
+  ChildOptions options = Shell("while :; do echo busy; sleep 0.05; done");
+  options.wall_limit_s = 0.5;
+  options.quiet_limit_s = 5;
+  const ChildResult result = RunChild(options);
+  EXPECT_EQ(result.end, ChildEnd::kWallLimit);
+  EXPECT_TRUE(result.TimedOut());
+  EXPECT_LT(result.seconds, 4);
+}
+
+TEST(ChildProcess, F50_SilenceEndsAtTheQuietLimit) {
+  ChildOptions options = Shell("echo started; exec sleep 30");
+  options.quiet_limit_s = 0.4;
+  const ChildResult result = RunChild(options);
+  EXPECT_EQ(result.end, ChildEnd::kQuietLimit);
+  EXPECT_LT(result.seconds, 4);
+}
+
+TEST(ChildProcess, F50_IgnoringSigtermIsKilledAfterTheGrace) {
+  ChildOptions options = Shell("trap '' TERM; while :; do sleep 0.05; done");
+  options.wall_limit_s = 0.3;
+  options.grace_s = 0.3;
+  const ChildResult result = RunChild(options);
+  EXPECT_EQ(result.end, ChildEnd::kWallLimit);
+  EXPECT_EQ(result.signal, SIGKILL);
+  EXPECT_LT(result.seconds, 4);
+}
+
+TEST(ChildProcess, F50_GrandchildrenEndWithTheGroup) {
+  // The grandchild prints its number, outlives its parent and holds the pipe open.
+  pid_t pid = 0;
+  const ChildResult result = RunChild(Shell("sleep 60 & echo $!; exit 0"),
+                                      [&](const auto& line) { pid = std::atoi(line.c_str()); });
+  EXPECT_TRUE(result.Succeeded());
+  EXPECT_LT(result.seconds, 4);
+  ASSERT_GT(pid, 1);
+  for (int i = 0; i < 100 && kill(pid, 0) == 0; ++i) usleep(10000);
+  // It may stay a zombie until init takes it; alive it is no longer.
+  std::ifstream stat("/proc/" + std::to_string(pid) + "/stat");
+  std::string number, name, state = "Z";
+  stat >> number >> name >> state;
+  EXPECT_EQ(state, "Z");
+}
+
+TEST(ChildProcess, StopsWhenNobodyWantsItAnyMore) {
+  int asked = 0;
+  const ChildResult result = RunChild(Shell("exec sleep 30"), {}, [&] { return ++asked < 3; });
+  EXPECT_EQ(result.end, ChildEnd::kStopped);
+  EXPECT_LT(result.seconds, 4);
+}
+
+TEST(ChildProcess, AnExceptionInTheCallbackEndsTheChild) {
+  pid_t pid = 0;
+  EXPECT_THROW(RunChild(Shell("echo $$; exec sleep 30"),
+                        [&](const std::string& line) {
+                          pid = std::atoi(line.c_str());
+                          throw Interrupted();
+                        }),
+               Interrupted);
+  EXPECT_EQ(kill(pid, 0), -1);
+}
+
+TEST(ChildProcess, F52_AFloodIsDrainedAndTheLogCapped) {
+  ChildOptions options = Shell(
+      "i=0; while [ $i -lt 400 ]; do printf '%01000d\\n' $i; i=$((i+1)); done; echo last "
+      "words");
+  options.log_path = TemporaryFile("flood.log");
+  options.log_cap_bytes = 10000;
+  size_t lines = 0;
+  const ChildResult result = RunChild(options, [&](const std::string&) { ++lines; });
+  EXPECT_TRUE(result.Succeeded());
+  EXPECT_EQ(lines, 401u);
+  const std::string log = FileText(options.log_path);
+  EXPECT_LT(log.size(), 10000u + 20 * 1001 + 100);  // the cap and the last 20 lines
+  EXPECT_NE(log.find("log cut here"), std::string::npos);
+  EXPECT_NE(log.find("last words"), std::string::npos);
+  fs::remove_all(fs::path(options.log_path).parent_path());
+}
+
+TEST(ChildProcess, F52_ALineWithoutEndComesInPieces) {
+  size_t longest = 0, bytes = 0;
+  RunChild(Shell("head -c 1000000 /dev/zero"), [&](const std::string& line) {
+    longest = std::max(longest, line.size());
+    bytes += line.size();
+  });
+  EXPECT_EQ(longest, 4096u);
+  EXPECT_EQ(bytes, 1000000u);
+}
+
+TEST(ChildProcess, F53_StdinIsEmpty) {
+  EXPECT_EQ(LinesOf(Shell("cat; echo done")), std::vector<std::string>{"done"});
+}
+
+TEST(ChildProcess, F54_ArgumentsAreNeverParsed) {
+  const std::string odd = "a b;$(touch x) '\"* \\ `id`";
+  EXPECT_EQ(LinesOf({.argv = {"printf", "%s\n", odd}}), std::vector<std::string>{odd});
+}
+
+TEST(ChildProcess, F57_EnvironmentIsMinimal) {
+  setenv("REGRADE_TEST_SECRET", "leaks", 1);
+  ChildOptions options = {.argv = {"env"}, .environment = {{"EXTRA", "yes"}}};
+  bool extra = false, locale = false;
+  for (const std::string& line : LinesOf(options)) {
+    EXPECT_EQ(line.find("REGRADE_TEST_SECRET"), std::string::npos);
+    extra |= line == "EXTRA=yes";
+    locale |= line == "LC_ALL=C.UTF-8";
+  }
+  EXPECT_TRUE(extra);
+  EXPECT_TRUE(locale);
+}
+
+TEST(ChildProcess, F57_InheritsNoOpenFile) {
+  int ends[2];
+  ASSERT_EQ(pipe(ends), 0);  // without O_CLOEXEC, as careless libraries do
+  for (const std::string& line : LinesOf(Shell("ls /proc/self/fd")))
+    EXPECT_LE(std::atoi(line.c_str()), 3) << line;  // 3 is the folder that ls itself reads
+  close(ends[0]);
+  close(ends[1]);
+}
+
+TEST(ChildProcess, WorkingFolder) {
+  ChildOptions options = {.argv = {"pwd"}, .working_folder = "/"};
+  EXPECT_EQ(LinesOf(options), std::vector<std::string>{"/"});
+}
+
+}  // namespace
+}  // namespace regrade
