@@ -1,0 +1,76 @@
+// The CPU's fast path through a narrow network for many voxels: blocks of rows stay in the
+// caches from the first layer to the last and back. Held to dense_layer.h by the tests.
+//
+// Rows are padded: inputs and outputs to kMlpEndLanes, hidden layers are kMlpHidden wide.
+// Weights and rows of the padding are zero, so it costs time and changes nothing.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "kernels/base/buffer.h"
+#include "kernels/network/activation.h"
+#include "kernels/network/dense_layer.h"
+
+namespace regrade {
+
+inline constexpr int kMlpEndLanes = 32;
+inline constexpr int kMlpHidden = 64;
+inline constexpr int kMlpMaxLayers = 8;
+inline constexpr int kMlpBlock =
+    96;  // voxels: six layers and their slopes are 250 KB, an L2 cache
+
+// A dense network with padded layers, each matrix kept in both orders.
+struct FusedMlp {
+  struct Layer {
+    int outputs = 0, inputs = 0;  // padded
+    Buffer<float> weight;         // [outputs, inputs]
+    Buffer<float> transposed;     // [inputs, outputs]
+    Buffer<float> bias;           // [outputs]
+  };
+  Activation activation = Activation::kSine;
+  float omega = 1;
+  std::vector<Layer> layers;
+
+  // Sizes of all padded weights and biases, and where layer l's begin: weight first, then bias.
+  int64_t NumParameters() const;
+  int64_t Offset(size_t layer) const;
+  // Floats of working memory a thread needs.
+  int64_t WorkspaceSize() const;
+};
+
+// The network needs at least two layers, hidden ones kMlpHidden wide, ends of at
+// most kMlpEndLanes, and at most kMlpMaxLayers of them.
+FusedMlp MakeFusedMlp(const DenseNetwork<float>& network);
+
+// output [n, kMlpEndLanes] of input [n, kMlpEndLanes].
+void FusedForward(const FusedMlp& mlp, const float* input, int64_t n, float* output);
+
+// Adds to `gradient` (the unpadded shapes) the adjoint of FusedForward for d_output
+// [n, kMlpEndLanes]. The forward pass is done again a block at a time, so memory does not grow
+// with n. Sums have a fixed order: the result does not depend on the number of threads.
+void FusedAdjoint(const FusedMlp& mlp, const float* input, const float* d_output, int64_t n,
+                  DenseNetwork<double>* gradient);
+
+// One set of functions an instruction set.
+struct FusedMlpFunctions {
+  const char* name;
+  // Rows [0, n) of input and output, on the calling thread; `workspace` [WorkspaceSize()].
+  void (*forward)(const FusedMlp&, const float* input, int64_t n, float* output,
+                  float* workspace);
+  // The same, and adds to partial [NumParameters()].
+  void (*adjoint)(const FusedMlp&, const float* input, const float* d_output, int64_t n,
+                  float* partial, float* workspace);
+  // sine [n] and cosine [n] of x [n]: absolute error <= 2e-7 for |x| <= 50, std::sin beyond.
+  void (*sine_cosine)(const float* x, int64_t n, float* sine, float* cosine);
+};
+
+// x [n] becomes act(x); slope [n], unless null, act'(x). The rare activations of all sets.
+void ActivateRowsPlain(Activation activation, float omega, int n, float* x, float* slope);
+
+// For tests and benchmarks: "baseline", "avx2", "avx512"; nullptr where the processor lacks it.
+const FusedMlpFunctions* FusedMlpFor(const char* name);
+// The best of this processor; `name` null returns to it. Tests choose another.
+void UseFusedMlp(const char* name);
+
+}  // namespace regrade

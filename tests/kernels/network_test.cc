@@ -1,0 +1,429 @@
+// The Lipschitz layer, the fused network against its plain specification, Adam and its
+// schedule.
+#include <gtest/gtest.h>
+#include <omp.h>
+
+#include <cmath>
+#include <limits>
+
+#include "kernels/base/random.h"
+#include "kernels/network/dense_layer.h"
+#include "kernels/network/fused_mlp.h"
+#include "kernels/network/lipschitz_layer.h"
+#include "kernels/optimize/adam.h"
+#include "kernels/optimize/schedule.h"
+
+namespace regrade {
+namespace {
+
+double Random(uint64_t stream, uint64_t counter) {  // uniform in [-1, 1)
+  return 2 * RandomDouble(20231103, stream, counter) - 1;
+}
+
+long double ExactSquareplus(long double x, long double b) {
+  const long double r = sqrtl(x * x + b);
+  return x >= 0 ? (x + r) / 2 : b / (2 * (r - x));
+}
+
+// Central differences with one Richardson step: error O(h^4).
+template <typename F>
+double Derivative(const F& f, double x, double h) {
+  const auto central = [&](double step) { return (f(x + step) - f(x - step)) / (2 * step); };
+  return (4 * central(h / 2) - central(h)) / 3;
+}
+
+template <typename T>
+struct Matrix {
+  int outputs, inputs;
+  std::vector<T> weight, u, v;
+
+  Matrix(int outputs, int inputs, uint64_t stream, T scale = 1)
+      : outputs(outputs), inputs(inputs), weight(outputs * inputs), u(outputs), v(inputs) {
+    for (size_t i = 0; i < weight.size(); ++i)
+      weight[i] = static_cast<T>(Random(stream, i)) * scale;
+  }
+  SpectralView<T> View() { return {outputs, inputs, weight.data(), u.data(), v.data()}; }
+};
+
+TEST(Squareplus, H31_AgreesWithLongDouble) {
+  for (int e = -30; e <= 30; ++e)
+    for (const double m : {1.0, 1.7, 3.3, 9.1})
+      for (const double sign : {-1.0, 1.0}) {
+        const double x = sign * m * std::pow(10.0, e);
+        const long double exact = ExactSquareplus(x, kSquareplusB);
+        // Three roundings (root, sum, quotient), each half an ulp, and hypot's own ulp.
+        EXPECT_NEAR(static_cast<double>(Squareplus(x) / exact - 1), 0, 4.5e-16) << x;
+      }
+  EXPECT_DOUBLE_EQ(Squareplus(0.0), 0.5e-6);
+}
+
+TEST(Squareplus, H32_DerivativeWithoutCancellation) {
+  for (const double x : {-3.0, -0.2, -1e-3, -1e-6, 0.0, 1e-6, 0.4, 5.0}) {
+    // b = 1e-2 so that finite differences see the bend; the formula is the same.
+    const double numeric = Derivative([](double y) { return Squareplus(y, 1e-2); }, x, 1e-3);
+    EXPECT_NEAR(SquareplusDerivative(x, 1e-2), numeric, 1e-9) << x;
+    EXPECT_GT(SquareplusDerivative(x), 0) << x;
+  }
+  EXPECT_EQ(SquareplusDerivative(0.0, 0.0), 0.5);
+}
+
+TEST(Squareplus, H33_FloatStaysAliveWhereTheTextbookFormDies) {
+  const float x = -0.01f, b = static_cast<float>(kSquareplusB);
+  EXPECT_EQ(0.5f * (x + std::sqrt(x * x + b)), 0.0f);
+  EXPECT_NEAR(Squareplus(x), 2.5e-11f, 1e-16f);
+  EXPECT_GT(SquareplusDerivative(x), 0.0f);
+}
+
+TEST(LipschitzLayer, H37_WarmedUpSigmaIsTheNorm) {
+  Matrix<double> m(3, 2, 1);
+  m.weight = {3, 0, 0, 4, 0, 0};
+  EXPECT_NEAR(WarmUpPowerIteration(m.View()) * LargestMagnitude(m.View()), 4, 1e-12);
+  Matrix<double> r(64, 64, 2);
+  const double sigma = WarmUpPowerIteration(r.View());
+  double longer = sigma;
+  for (int i = 0; i < 5000; ++i) longer = PowerStep(r.View());
+  EXPECT_GE(sigma / longer, 0.999);
+  EXPECT_LE(sigma / longer, 1 + 1e-12);
+}
+
+TEST(LipschitzLayer, H39_ZeroWeightGivesZeroAndAFiniteGradient) {
+  Matrix<float> m(4, 3, 3, 0.0f);
+  EXPECT_EQ(WarmUpPowerIteration(m.View()), 0.0f);
+  std::vector<float> a(12, 7.0f), d_a(12, 1.0f), d_w(12);
+  float d_k = 0;
+  LipschitzWeight(m.View(), 1.0f, a.data());
+  LipschitzWeightAdjoint(m.View(), 1.0f, d_a.data(), d_w.data(), &d_k);
+  for (int i = 0; i < 12; ++i) {
+    EXPECT_EQ(a[i], 0.0f);
+    EXPECT_EQ(d_w[i], 0.0f);
+  }
+  EXPECT_EQ(d_k, 0.0f);
+}
+
+TEST(LipschitzLayer, H40_RankOneIsFoundWhereverItsVectorPoints) {
+  for (int column = 0; column < 5; ++column) {
+    Matrix<double> m(6, 5, 4, 0.0);
+    m.weight[2 * 5 + column] = -2.5;
+    EXPECT_NEAR(WarmUpPowerIteration(m.View()) * LargestMagnitude(m.View()), 2.5, 1e-12);
+  }
+  // A vector u that has lost the range of W restarts instead of staying at zero.
+  Matrix<double> m(2, 2, 4, 0.0);
+  m.weight = {1, 0, 0, 0};
+  m.u = {0, 1};
+  EXPECT_NEAR(PowerStep(m.View()), 1, 1e-12);
+}
+
+TEST(LipschitzLayer, H41_EqualSingularValues) {
+  Matrix<double> m(2, 2, 5);
+  const double c = std::cos(0.7), s = std::sin(0.7);
+  m.weight = {c, -s, s, c};
+  EXPECT_NEAR(WarmUpPowerIteration(m.View()) * LargestMagnitude(m.View()), 1, 1e-12);
+}
+
+TEST(LipschitzLayer, H42_ScaleOfWDoesNotMatter) {
+  Matrix<float> one(8, 6, 6);
+  WarmUpPowerIteration(one.View());
+  std::vector<float> a(48), scaled(48);
+  LipschitzWeight(one.View(), 1.5f, a.data());
+  for (int e = -30; e <= 30; e += 5) {
+    Matrix<float> m(8, 6, 6, static_cast<float>(std::pow(10.0, e)));
+    WarmUpPowerIteration(m.View());
+    LipschitzWeight(m.View(), 1.5f, scaled.data());
+    // Scaling rounds W itself by half an ulp; sigma repeats that at most sqrt(48) / 2 times.
+    for (int i = 0; i < 48; ++i) EXPECT_NEAR(scaled[i], a[i], 4e-7f) << e;
+  }
+}
+
+TEST(LipschitzLayer, H43_SigmaBetweenFrobeniusBounds) {
+  for (int t = 0; t < 50; ++t) {
+    Matrix<float> m(1 + t % 9, 1 + t % 7, 100 + t);
+    const float sigma = WarmUpPowerIteration(m.View()) * LargestMagnitude(m.View());
+    double square = 0;
+    for (const float w : m.weight) square += static_cast<double>(w) * w;
+    EXPECT_LE(sigma, std::sqrt(square) * (1 + 4 * 1.2e-7));
+    EXPECT_GE(sigma, std::sqrt(square / m.inputs) * (1 - 4 * 1.2e-7));
+  }
+}
+
+TEST(LipschitzLayer, H46_H47_GradientWithFrozenVectors) {
+  Matrix<double> m(5, 4, 7);
+  WarmUpPowerIteration(m.View());
+  Matrix<double> d_a(5, 4, 8);
+  double k = 0.8;
+  const auto loss = [&] {
+    std::vector<double> a(20);
+    LipschitzWeight(m.View(), k, a.data());
+    double sum = 0;
+    for (int i = 0; i < 20; ++i) sum += a[i] * d_a.weight[i];
+    return sum;
+  };
+  std::vector<double> d_w(20);
+  double d_k = 0;
+  LipschitzWeightAdjoint(m.View(), k, d_a.weight.data(), d_w.data(), &d_k);
+  for (int i = 0; i < 20; ++i) {
+    const double before = m.weight[i];
+    const double numeric = Derivative(
+        [&](double x) {
+          m.weight[i] = x;
+          return loss();
+        },
+        before, 1e-3);
+    m.weight[i] = before;
+    EXPECT_NEAR(d_w[i], numeric, 1e-8) << i;
+  }
+  const double numeric = Derivative(
+      [&](double x) {
+        k = x;
+        return loss();
+      },
+      0.8, 1e-3);
+  EXPECT_NEAR(d_k, numeric, 1e-9);
+}
+
+// --- the network
+
+template <typename T>
+DenseNetwork<T> RandomNetwork(Activation activation, std::vector<int> sizes) {
+  DenseNetwork<T> network;
+  network.activation = activation;
+  for (size_t l = 0; l + 1 < sizes.size(); ++l) {
+    DenseLayer<T> layer(sizes[l + 1], sizes[l]);
+    for (size_t i = 0; i < layer.weight.size(); ++i)
+      layer.weight[i] = static_cast<T>(Random(10 + l, i) * std::sqrt(3.0 / sizes[l]));
+    for (size_t i = 0; i < layer.bias.size(); ++i)
+      layer.bias[i] = static_cast<T>(Random(20 + l, i));
+    network.layers.push_back(std::move(layer));
+  }
+  return network;
+}
+
+template <typename T>
+DenseNetwork<T> ZeroLike(const DenseNetwork<float>& network) {
+  DenseNetwork<T> zero;
+  for (const auto& layer : network.layers)
+    zero.layers.emplace_back(layer.outputs, layer.inputs);
+  return zero;
+}
+
+const std::vector<int> kPaperSizes = {30, 64, 64, 64, 64, 64, 27};
+constexpr Activation kAll[] = {Activation::kSine, Activation::kRelu, Activation::kLeakyRelu,
+                               Activation::kSigmoid, Activation::kTanh};
+
+TEST(DenseNetwork, AdjointAgainstRichardson) {
+  for (const Activation activation : kAll) {
+    DenseNetwork<double> network = RandomNetwork<double>(activation, {4, 6, 5, 3});
+    network.omega = 1.3;
+    DenseNetwork<double> gradient = network;
+    for (auto& layer : gradient.layers) {
+      std::fill(layer.weight.begin(), layer.weight.end(), 0);
+      std::fill(layer.bias.begin(), layer.bias.end(), 0);
+    }
+    std::vector<double> x = {0.3, -0.8, 0.5, 0.1}, d_x(4);
+    const std::vector<double> d_y = {1.0, -2.0, 0.7};
+    DenseAdjoint(network, x.data(), d_y.data(), &gradient, d_x.data());
+    const auto loss = [&] {
+      double y[3];
+      DenseForward(network, x.data(), y);
+      return y[0] * d_y[0] + y[1] * d_y[1] + y[2] * d_y[2];
+    };
+    const auto check = [&](double* value, double analytic) {
+      const double before = *value;
+      const double numeric = Derivative(
+          [&](double v) {
+            *value = v;
+            return loss();
+          },
+          before, 1e-3);
+      *value = before;
+      EXPECT_NEAR(analytic, numeric, 1e-8 * std::max(1.0, std::abs(numeric)));
+    };
+    for (size_t l = 0; l < network.layers.size(); ++l) {
+      for (size_t i = 0; i < network.layers[l].weight.size(); ++i)
+        check(&network.layers[l].weight[i], gradient.layers[l].weight[i]);
+      for (size_t i = 0; i < network.layers[l].bias.size(); ++i)
+        check(&network.layers[l].bias[i], gradient.layers[l].bias[i]);
+    }
+    for (int i = 0; i < 4; ++i) check(&x[i], d_x[i]);
+  }
+}
+
+TEST(FusedMlp, H45_SineAndCosine) {
+  for (const char* name : {"baseline", "avx2", "avx512"}) {
+    const FusedMlpFunctions* functions = FusedMlpFor(name);
+    if (functions == nullptr) continue;
+    std::vector<float> x;
+    for (int i = -500000; i <= 500000; ++i) x.push_back(i * 1e-4f);  // |x| <= 50
+    for (int i = 0; i < 20000; ++i)
+      x.push_back(std::ldexp(1.0f, 6) * (1 + i * 7.7e-3f));  // to 1e4
+    x.push_back(1e30f);
+    std::vector<float> sine(x.size()), cosine(x.size());
+    functions->sine_cosine(x.data(), static_cast<int64_t>(x.size()), sine.data(),
+                           cosine.data());
+    double worst = 0;
+    for (size_t i = 0; i < x.size(); ++i)
+      worst = std::max({worst, std::abs(sine[i] - std::sin(static_cast<double>(x[i]))),
+                        std::abs(cosine[i] - std::cos(static_cast<double>(x[i])))});
+    EXPECT_LE(worst, 2e-7) << name;
+    float bad = std::numeric_limits<float>::quiet_NaN(), s, c;
+    functions->sine_cosine(&bad, 1, &s, &c);
+    EXPECT_TRUE(std::isnan(s) && std::isnan(c));
+  }
+}
+
+TEST(FusedMlp, AgreesWithPlainDouble) {
+  constexpr int kRows = 1003;  // ends inside a block
+  for (const Activation activation : kAll)
+    for (const char* name : {"baseline", "avx2", "avx512"}) {
+      if (FusedMlpFor(name) == nullptr) continue;
+      UseFusedMlp(name);
+      const DenseNetwork<float> network = RandomNetwork<float>(activation, kPaperSizes);
+      DenseNetwork<double> reference;
+      reference.activation = activation;
+      for (const auto& layer : network.layers) {
+        reference.layers.emplace_back(layer.outputs, layer.inputs);
+        auto& copy = reference.layers.back();
+        std::copy(layer.weight.begin(), layer.weight.end(), copy.weight.begin());
+        std::copy(layer.bias.begin(), layer.bias.end(), copy.bias.begin());
+      }
+      std::vector<float> x(kRows * kMlpEndLanes), y(x.size()), d_y(x.size());
+      for (int r = 0; r < kRows; ++r) {
+        for (int i = 0; i < 30; ++i) x[r * kMlpEndLanes + i] = Random(30, r * 30 + i);
+        for (int i = 0; i < 27; ++i) d_y[r * kMlpEndLanes + i] = Random(31, r * 27 + i);
+      }
+      const FusedMlp mlp = MakeFusedMlp(network);
+      FusedForward(mlp, x.data(), kRows, y.data());
+      DenseNetwork<double> gradient = ZeroLike<double>(network);
+      FusedAdjoint(mlp, x.data(), d_y.data(), kRows, &gradient);
+
+      DenseNetwork<double> expected = ZeroLike<double>(network);
+      double worst = 0, largest = 0;
+      for (int r = 0; r < kRows; ++r) {
+        std::vector<double> xd(30), yd(27), d_yd(27);
+        std::copy_n(&x[r * kMlpEndLanes], 30, xd.begin());
+        std::copy_n(&d_y[r * kMlpEndLanes], 27, d_yd.begin());
+        DenseForward(reference, xd.data(), yd.data());
+        DenseAdjoint(reference, xd.data(), d_yd.data(), &expected,
+                     static_cast<double*>(nullptr));
+        for (int i = 0; i < 27; ++i) {
+          worst = std::max(worst, std::abs(yd[i] - y[r * kMlpEndLanes + i]));
+          largest = std::max(largest, std::abs(yd[i]));
+        }
+      }
+      EXPECT_LE(worst, 1e-5 * largest) << name;
+      for (size_t l = 0; l < expected.layers.size(); ++l) {
+        double difference = 0, norm = 0;
+        const auto compare = [&](const std::vector<double>& a, const std::vector<double>& b) {
+          for (size_t i = 0; i < a.size(); ++i) {
+            difference += (a[i] - b[i]) * (a[i] - b[i]);
+            norm += b[i] * b[i];
+          }
+        };
+        compare(gradient.layers[l].weight, expected.layers[l].weight);
+        compare(gradient.layers[l].bias, expected.layers[l].bias);
+        EXPECT_LE(std::sqrt(difference), 1e-5 * std::sqrt(norm))
+            << name << " layer " << l << " activation " << static_cast<int>(activation);
+      }
+    }
+  UseFusedMlp(nullptr);
+}
+
+TEST(FusedMlp, ThreadsDoNotChangeABit) {
+  constexpr int kRows = 20000;
+  const DenseNetwork<float> network = RandomNetwork<float>(Activation::kSine, kPaperSizes);
+  const FusedMlp mlp = MakeFusedMlp(network);
+  std::vector<float> x(kRows * kMlpEndLanes), y[2];
+  for (size_t i = 0; i < x.size(); ++i) x[i] = i % 32 < 27 ? Random(32, i) : 0;
+  DenseNetwork<double> gradient[2] = {ZeroLike<double>(network), ZeroLike<double>(network)};
+  const int threads = omp_get_max_threads();
+  for (int t = 0; t < 2; ++t) {
+    omp_set_num_threads(t == 0 ? 1 : 5);
+    y[t].resize(x.size());
+    FusedForward(mlp, x.data(), kRows, y[t].data());
+    FusedAdjoint(mlp, x.data(), x.data(), kRows, &gradient[t]);
+  }
+  omp_set_num_threads(threads);
+  EXPECT_EQ(y[0], y[1]);
+  for (size_t l = 0; l < 6; ++l) {
+    EXPECT_EQ(gradient[0].layers[l].weight, gradient[1].layers[l].weight);
+    EXPECT_EQ(gradient[0].layers[l].bias, gradient[1].layers[l].bias);
+  }
+}
+
+// --- the optimizer
+
+TEST(Adam, H99_ZeroGradientMovesNothing) {
+  AdamState state;
+  std::vector<float> x = {1.5f}, g = {0.0f};
+  ASSERT_TRUE(AdamStep({}, 0.1, {g.data(), 1}, {x.data(), 1}, &state));
+  EXPECT_EQ(x[0], 1.5f);
+}
+
+TEST(Adam, H100_TinyGradientTakesATinyStep) {
+  AdamState state;
+  std::vector<float> x = {0.0f}, g = {1e-25f};
+  ASSERT_TRUE(AdamStep({}, 1.0, {g.data(), 1}, {x.data(), 1}, &state));
+  EXPECT_NEAR(x[0], -1e-17, 1e-19);
+}
+
+TEST(Adam, H101_H106_HugeAndNonFiniteGradientsAreRejected) {
+  for (const float bad : {2e19f, std::numeric_limits<float>::infinity(), std::nanf("")}) {
+    AdamState state;
+    std::vector<float> x = {1.0f, 2.0f}, g = {0.5f, 0.5f};
+    ASSERT_TRUE(AdamStep({}, 0.1, {g.data(), 2}, {x.data(), 2}, &state));
+    const std::vector<float> kept = x, moment = state.second_moment;
+    g[1] = bad;
+    EXPECT_FALSE(AdamStep({}, 0.1, {g.data(), 2}, {x.data(), 2}, &state));
+    EXPECT_EQ(x, kept);
+    EXPECT_EQ(state.second_moment, moment);
+    EXPECT_EQ(state.steps, 1);
+    EXPECT_EQ(state.rejected, 1);
+    g[1] = 0.5f;
+    EXPECT_TRUE(AdamStep({}, 0.1, {g.data(), 2}, {x.data(), 2}, &state));
+    EXPECT_LT(x[1], kept[1]);
+  }
+}
+
+TEST(Adam, H102_BiasCorrection) {
+  // 0.999 as a double is 0.999 (1 + d), |d| < 1.2e-16: its complement differs by 1.2e-13 of
+  // itself.
+  EXPECT_NEAR(AdamBiasCorrection(0.999, 1) / 0.001, 1, 2e-13);
+  EXPECT_NEAR(AdamBiasCorrection(0.9, 3) / 0.271, 1, 1e-14);
+  EXPECT_EQ(AdamBiasCorrection(0.999, 2000000), 1.0);
+  // The first step has the length of the rate, whatever the gradient's scale.
+  for (const float scale : {1e-3f, 1.0f, 1e6f}) {
+    AdamState state;
+    std::vector<float> x = {0.0f}, g = {scale};
+    AdamStep({}, 0.01, {g.data(), 1}, {x.data(), 1}, &state);
+    EXPECT_NEAR(x[0], -0.01f, 1e-6f);
+  }
+}
+
+TEST(Adam, FollowsTheFormula) {
+  AdamState state;
+  std::vector<float> x = {1.0f};
+  double value = 1, m = 0, v = 0;
+  for (int t = 1; t <= 50; ++t) {
+    std::vector<float> g = {static_cast<float>(2 * x[0] + Random(40, t))};
+    const double gd = g[0];
+    AdamStep({}, 0.02, {g.data(), 1}, {x.data(), 1}, &state);
+    m = 0.9 * m + 0.1 * gd;
+    v = 0.999 * v + 0.001 * gd * gd;
+    value -=
+        0.02 * (m / (1 - std::pow(0.9, t))) / (std::sqrt(v / (1 - std::pow(0.999, t))) + 1e-8);
+    EXPECT_NEAR(x[0], value, 1e-5) << t;  // fifty float updates of at most 0.02
+  }
+}
+
+TEST(CosineAnnealing, H105_Table) {
+  EXPECT_EQ(CosineAnnealing(0, 300, 1e-2, 1e-4), 1e-2);
+  EXPECT_EQ(CosineAnnealing(299, 300, 1e-2, 1e-4), 1e-4);
+  EXPECT_EQ(CosineAnnealing(5000, 300, 1e-2, 1e-4), 1e-4);
+  EXPECT_EQ(CosineAnnealing(0, 0, 1e-2, 1e-4), 1e-2);
+  EXPECT_EQ(CosineAnnealing(0, 1, 1e-2, 1e-4), 1e-2);
+  EXPECT_NEAR(CosineAnnealing(150, 301, 1e-2, 1e-4), 0.5 * (1e-2 + 1e-4), 1e-15);
+  for (int t = 1; t < 320; ++t)
+    EXPECT_LE(CosineAnnealing(t, 300, 1e-2, 1e-4), CosineAnnealing(t - 1, 300, 1e-2, 1e-4));
+}
+
+}  // namespace
+}  // namespace regrade
