@@ -1,0 +1,79 @@
+#include "evaluate/optical_flow.h"
+
+#include <cmath>
+#include <cstring>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/video/tracking.hpp>
+
+#include "kernels/base/error.h"
+
+namespace regrade {
+namespace {
+
+constexpr int kMinSize = 12;  // pixels; DIS's coarsest patch grid is empty below
+
+std::string SizeText(const Image& image) {
+  return std::to_string(image.width) + " x " + std::to_string(image.height) + " px";
+}
+
+uint8_t ToByte(float value) {
+  // The comparison is false for NaN, which becomes black.
+  if (!(value > 0)) return 0;
+  return value >= 1 ? 255 : static_cast<uint8_t>(std::lround(value * 255.0f));
+}
+
+cv::Mat GreyBytes(const Image& image) {
+  const bool colour = image.channels >= 3;
+  cv::Mat bytes(image.height, image.width, colour ? CV_8UC3 : CV_8UC1);
+  const int kept = colour ? 3 : 1;
+  for (int y = 0; y < image.height; ++y) {
+    uint8_t* row = bytes.ptr<uint8_t>(y);
+    for (int x = 0; x < image.width; ++x)
+      for (int c = 0; c < kept; ++c) row[x * kept + c] = ToByte(image.at(x, y)[c]);
+  }
+  if (!colour) return bytes;
+  cv::Mat grey;
+  cv::cvtColor(bytes, grey, cv::COLOR_RGB2GRAY);
+  return grey;
+}
+
+cv::Ptr<cv::DenseOpticalFlow> MakeMethod(const std::string& name) {
+  using cv::DISOpticalFlow;
+  if (name == "dis-ultrafast") return DISOpticalFlow::create(DISOpticalFlow::PRESET_ULTRAFAST);
+  if (name == "dis-fast") return DISOpticalFlow::create(DISOpticalFlow::PRESET_FAST);
+  if (name == "dis-medium") return DISOpticalFlow::create(DISOpticalFlow::PRESET_MEDIUM);
+  if (name == "dis-tuned") {
+    auto dis = DISOpticalFlow::create(DISOpticalFlow::PRESET_MEDIUM);
+    dis->setFinestScale(0);
+    dis->setPatchStride(3);
+    dis->setVariationalRefinementIterations(10);
+    dis->setUseSpatialPropagation(true);
+    return dis;
+  }
+  if (name == "farneback") return cv::FarnebackOpticalFlow::create(5, 0.5, false, 15);
+  throw Error(ExitCode::kUsage, "unknown optical flow method", name,
+              std::string("choose one of ") + kFlowMethods + ", or files:DIR");
+}
+
+}  // namespace
+
+FlowField ComputeFlow(const Image& from, const Image& to, const std::string& method) {
+  const cv::Ptr<cv::DenseOpticalFlow> algorithm = MakeMethod(method);
+  if (!from.SameSize(to))
+    throw Error(ExitCode::kInput,
+                "frames differ in size: " + SizeText(from) + " and " + SizeText(to), "",
+                "all frames of a sequence need one size");
+  if (from.width < kMinSize || from.height < kMinSize)
+    throw Error(ExitCode::kInput, "frames of " + SizeText(from) + " are too small for flow", "",
+                "give frames of at least 12 x 12 px");
+  cv::Mat flow;
+  algorithm->calc(GreyBytes(from), GreyBytes(to), flow);
+  REGRADE_CHECK_EQ(flow.cols, from.width);
+  REGRADE_CHECK_EQ(flow.rows, from.height);
+  FlowField result(from.width, from.height);
+  for (int y = 0; y < flow.rows; ++y)
+    std::memcpy(result.at(0, y), flow.ptr<float>(y), sizeof(float) * 2 * flow.cols);
+  return result;
+}
+
+}  // namespace regrade

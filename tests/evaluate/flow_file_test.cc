@@ -1,0 +1,94 @@
+#include "evaluate/flow_file.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <random>
+
+#include "kernels/base/error.h"
+#include "tests/evaluate/synthetic_frames.h"
+
+namespace regrade {
+namespace {
+
+using namespace regrade::testing;
+
+class FlowFile : public ::testing::Test {
+ protected:
+  FlowFile()
+      : path_(std::filesystem::temp_directory_path() /
+              ("regrade_flow_" +
+               std::to_string(reinterpret_cast<uintptr_t>(this) ^ std::random_device{}()))) {}
+  ~FlowFile() override { std::filesystem::remove(path_); }
+
+  void WriteBytes(const std::string& bytes) { std::ofstream(path_, std::ios::binary) << bytes; }
+  std::string Bytes() {
+    std::ifstream file(path_, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+  ExitCode ReadCode() {
+    try {
+      ReadFlowFile(path_);
+    } catch (const Error& error) {
+      EXPECT_EQ(error.where(), path_.string());
+      return error.code();
+    }
+    return ExitCode::kDone;
+  }
+
+  std::filesystem::path path_;
+};
+
+TEST_F(FlowFile, RoundTripKeepsBitsAndCountsUnknown) {
+  FlowField flow = MixedFlows(17, 9, 3).first;
+  flow.at(4, 5)[1] = kNan;
+  flow.at(0, 0)[0] = std::numeric_limits<float>::infinity();
+  flow.at(16, 8)[0] = 2e9f;
+  WriteFlowFile(path_, flow);
+  int64_t unknown = 0;
+  const FlowField back = ReadFlowFile(path_, &unknown);
+  EXPECT_EQ(unknown, 3);
+  for (int y = 0; y < 9; ++y)
+    for (int x = 0; x < 17; ++x)
+      if ((x == 4 && y == 5) || (x == 0 && y == 0) || (x == 16 && y == 8))
+        EXPECT_TRUE(std::isnan(back.at(x, y)[0]) && std::isnan(back.at(x, y)[1]));
+      else
+        EXPECT_EQ(std::memcmp(back.at(x, y), flow.at(x, y), 8), 0);
+}
+
+TEST_F(FlowFile, HostileFilesAreRefused) {
+  EXPECT_EQ(ReadCode(), ExitCode::kInput);  // no file
+  WriteFlowFile(path_, ConstantFlow(5, 4, 1, 2));
+  const std::string good = Bytes();
+  EXPECT_EQ(ReadCode(), ExitCode::kDone);
+  for (size_t size : {size_t{0}, size_t{11}, size_t{12}, good.size() - 1}) {
+    WriteBytes(good.substr(0, size));
+    EXPECT_EQ(ReadCode(), ExitCode::kInput) << size;
+  }
+  WriteBytes(good + "x");
+  EXPECT_EQ(ReadCode(), ExitCode::kInput);
+  std::string bad = good;
+  bad[0] ^= 1;
+  WriteBytes(bad);
+  EXPECT_EQ(ReadCode(), ExitCode::kInput);
+  // A header of 60000 x 60000 in a small file must not allocate 28 GB first; nor may a negative
+  // side or a product that wraps around pass.
+  for (const int32_t side : {60000, -5, 0, 0x7fffffff}) {
+    bad = good;
+    std::memcpy(&bad[4], &side, 4);
+    std::memcpy(&bad[8], &side, 4);
+    WriteBytes(bad);
+    EXPECT_EQ(ReadCode(), ExitCode::kInput) << side;
+  }
+}
+
+TEST(FlowFileName, OneForEachDirection) {
+  EXPECT_EQ(FlowFileName(3, 4), "00003_00004.flo");
+  EXPECT_EQ(FlowFileName(4, 3), "00004_00003.flo");
+}
+
+}  // namespace
+}  // namespace regrade
