@@ -17,8 +17,8 @@ class FrameCache {
   FrameCache(FrameSource source, int64_t frames, int64_t bytes)
       : source_(std::move(source)), max_frames_(frames), max_bytes_(bytes) {}
 
-  // Fetches the frame unless it is kept. Beyond the limits the lowest frames go first: pairs are
-  // visited by ascending first frame and do not come back to it.
+  // Fetches the frame unless it is kept. Beyond the limits the lowest frames go first: pairs
+  // are visited by ascending first frame and do not come back to it.
   std::shared_ptr<const Image> Get(int index) {
     const auto found = kept_.find(index);
     if (found != kept_.end()) return found->second;

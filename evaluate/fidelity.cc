@@ -1,0 +1,97 @@
+#include "evaluate/fidelity.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "evaluate/hue_chroma.h"
+#include "evaluate/image_quality.h"
+#include "evaluate/sliced_wasserstein.h"
+#include "kernels/base/error.h"
+
+namespace regrade {
+namespace {
+
+Image Clipped(Image image) {
+  // std::clamp would turn NaN into a colour or not by the order of its comparisons; NaN stays.
+  for (float& p : image.pixels)
+    if (!std::isnan(p)) p = std::clamp(p, 0.0f, 1.0f);
+  return image;
+}
+
+void CheckCount(const NamedFrameSource& sequence, const FrameSource& other,
+                const std::string& what) {
+  if (other.count == 0 || other.count == sequence.frames.count) return;
+  throw Error(ExitCode::kInput,
+              "the sequence has " + std::to_string(sequence.frames.count) + " frames, " + what +
+                  " " + std::to_string(other.count),
+              sequence.name, "fidelity compares frame by frame");
+}
+
+void CheckSize(const Image& frame, const Image& other, const std::string& what, int index,
+               const NamedFrameSource& sequence) {
+  if (frame.SameSize(other)) return;
+  throw Error(ExitCode::kInput,
+              what + " of frame " + std::to_string(index) +
+                  " has another size: " + std::to_string(other.width) + " x " +
+                  std::to_string(other.height) + " px instead of " +
+                  std::to_string(frame.width) + " x " + std::to_string(frame.height),
+              sequence.name);
+}
+
+}  // namespace
+
+FidelityRow MeasureFidelity(const NamedFrameSource& sequence, const FidelityTargets& targets,
+                            const ProgressFunction& progress) {
+  CheckCount(sequence, targets.views_2d, "the 2D method's");
+  CheckCount(sequence, targets.transmittance, "transmittance");
+  HueChroma hues, hues_2d;
+  ColourSlices colours, style;
+  double sum_db = 0;
+  int finite = 0, perfect = 0;
+  const int count = sequence.frames.count;
+  for (int i = 0; i < count; ++i) {
+    const Image frame = Clipped(sequence.frames.frame(i));
+    hues.Add(frame);
+    if (targets.style != nullptr) colours.Add(frame);
+    if (targets.views_2d.count > 0) {
+      const Image target = Clipped(targets.views_2d.frame(i));
+      CheckSize(frame, target, "the 2D method's version", i, sequence);
+      hues_2d.Add(target);
+      Image transmittance;
+      if (targets.transmittance.count > 0) {
+        transmittance = targets.transmittance.frame(i);
+        CheckSize(frame, transmittance, "the transmittance", i, sequence);
+      }
+      const std::optional<double> db =
+          Psnr(frame, target, transmittance.empty() ? nullptr : &transmittance);
+      if (db && std::isfinite(*db)) {
+        sum_db += *db;
+        ++finite;
+      } else if (db) {
+        ++perfect;
+      }
+    }
+    const Verdict verdict = Report(progress, i + 1, count);
+    if (verdict == Verdict::kAbort) throw Interrupted();
+    if (verdict == Verdict::kFinish) break;
+  }
+
+  FidelityRow row;
+  row.sequence = sequence.name;
+  if (finite > 0)
+    row.psnr_to_2d_db = sum_db / finite;
+  else if (perfect > 0)
+    row.psnr_to_2d_db = std::numeric_limits<double>::infinity();
+  row.hue_std = hues.HueStd();
+  row.chroma = hues.MeanChroma();
+  row.hue_std_2d = hues_2d.HueStd();
+  row.chroma_2d = hues_2d.MeanChroma();
+  if (targets.style != nullptr) {
+    style.Add(*targets.style);
+    row.sliced_wasserstein_to_style = SlicedWasserstein(colours, style);
+  }
+  return row;
+}
+
+}  // namespace regrade

@@ -1,0 +1,42 @@
+// Whether a styled sequence still has the style: consistency alone is won by a grey video.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "evaluate/frame_source.h"
+#include "kernels/base/progress.h"
+
+namespace regrade {
+
+// One line of the fidelity table. A figure is empty when what it compares with was not given.
+struct FidelityRow {
+  std::string sequence;
+
+  // Mean over frames of the frames' PSNR against what the 2D method made of the same frame;
+  // both clipped to [0, 1]; identical frames are left out of the mean (all identical: +inf).
+  std::optional<double> psnr_to_2d_db;
+
+  // Circular standard deviation of the CIELAB hue weighted by chroma (radians), and mean chroma
+  // (CIELAB units), over all pixels of all frames: see hue_chroma.h. hue_std is empty for grey.
+  std::optional<double> hue_std, hue_std_2d;  // of the sequence, of the 2D method's frames
+  std::optional<double> chroma, chroma_2d;    // likewise
+
+  // Distance of the colours of all frames to the style picture's, see sliced_wasserstein.h.
+  std::optional<double> sliced_wasserstein_to_style;
+};
+
+// What a sequence is measured against; each member may be left empty (null, count 0).
+struct FidelityTargets {
+  FrameSource views_2d;          // the 2D method's version, frame for frame
+  FrameSource transmittance;     // one channel: pixels above 0.5 show no scene and are left
+                                 // out of psnr_to_2d_db
+  const Image* style = nullptr;  // the style picture
+};
+
+// Errors (kInput): counts or sizes that differ. One frame of each source is held at a time.
+// Progress counts frames; kFinish ends with the figures of the frames so far.
+FidelityRow MeasureFidelity(const NamedFrameSource& sequence, const FidelityTargets& targets,
+                            const ProgressFunction& progress = {});
+
+}  // namespace regrade

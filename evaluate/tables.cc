@@ -1,0 +1,96 @@
+#include "evaluate/tables.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <optional>
+
+namespace regrade {
+namespace {
+
+std::string Number(const std::optional<double>& value, int decimals) {
+  if (!value || std::isnan(*value)) return "-";
+  if (std::isinf(*value)) return *value > 0 ? "inf" : "-inf";
+  char text[64];
+  std::snprintf(text, sizeof(text), "%.*f", decimals, *value);
+  return text;
+}
+
+using Cells = std::vector<std::string>;
+
+// Columns as wide as their widest cell; the first is set flush left, figures flush right.
+std::string Align(const std::vector<Cells>& rows) {
+  std::vector<size_t> widths(rows.front().size(), 0);
+  for (const Cells& row : rows)
+    for (size_t c = 0; c < row.size(); ++c) widths[c] = std::max(widths[c], row[c].size());
+  std::string text;
+  for (const Cells& row : rows) {
+    std::string line;
+    for (size_t c = 0; c < row.size(); ++c) {
+      const std::string pad(widths[c] - row[c].size(), ' ');
+      line += (c > 0 ? "  " : "") + (c > 0 ? pad + row[c] : row[c] + pad);
+    }
+    text += line + "\n";
+  }
+  return text;
+}
+
+std::string ConsistencyTable(const ConsistencyReport& report) {
+  std::vector<Cells> rows{
+      {"sequence", "gap", "pairs", "undefined", "mean of dB", "dB of mean", "compared"}};
+  std::string remarks;
+  for (const ConsistencyRow& row : report.rows) {
+    rows.push_back({row.sequence, std::to_string(row.gap), std::to_string(row.pairs),
+                    std::to_string(row.undefined_pairs), Number(row.tc_psnr_mean_db, 2),
+                    Number(row.tc_psnr_of_mean_db, 2), Number(100 * row.coverage, 1) + " %"});
+    const std::string who = row.sequence + ", gap " + std::to_string(row.gap) + ": ";
+    if (!row.why.empty()) remarks += who + row.why + "\n";
+    if (row.perfect_pairs > 0)
+      remarks += who + std::to_string(row.perfect_pairs) +
+                 " identical pair(s) at inf dB, not in the mean of dB\n";
+    if (row.low_coverage_pairs > 0)
+      remarks += who + std::to_string(row.low_coverage_pairs) +
+                 " pair(s) with few comparable pixels\n";
+    if (row.pairs_above_8bit_floor > row.perfect_pairs)
+      remarks += who + std::to_string(row.pairs_above_8bit_floor - row.perfect_pairs) +
+                 " pair(s) above 58.9 dB, finer than 8-bit frames can tell\n";
+  }
+  if (!report.note.empty()) remarks += report.note + "\n";
+  return "Consistency: TC-PSNR, higher is steadier (mode " + report.mode + ", flow " +
+         report.flow + ", error per pixel and channel)\n" + Align(rows) + remarks;
+}
+
+std::string FidelityTable(const ConsistencyReport& consistency,
+                          const std::vector<FidelityRow>& fidelity) {
+  std::vector<Cells> rows{
+      {"sequence", "PSNR to 2D", "hue std", "of 2D", "chroma", "of 2D", "SW to style"}};
+  for (const FidelityRow& row : fidelity)
+    rows.push_back({row.sequence, Number(row.psnr_to_2d_db, 2), Number(row.hue_std, 3),
+                    Number(row.hue_std_2d, 3), Number(row.chroma, 2), Number(row.chroma_2d, 2),
+                    Number(row.sliced_wasserstein_to_style, 4)});
+  std::string remarks;
+  std::vector<std::string> seen;
+  for (const ConsistencyRow& row : consistency.rows) {
+    if (std::find(seen.begin(), seen.end(), row.sequence) != seen.end()) continue;
+    seen.push_back(row.sequence);
+    if (std::any_of(fidelity.begin(), fidelity.end(),
+                    [&](const FidelityRow& f) { return f.sequence == row.sequence; }))
+      continue;
+    rows.push_back({row.sequence, "-", "-", "-", "-", "-", "-"});
+    remarks +=
+        row.sequence +
+        ": fidelity was not measured, so its consistency may be bought with its colours; "
+        "give the 2D method's frames and the style picture\n";
+  }
+  return "Fidelity: closeness to the 2D method's frames and to the style's colours\n" +
+         Align(rows) + remarks;
+}
+
+}  // namespace
+
+std::string FormatTables(const ConsistencyReport& consistency,
+                         const std::vector<FidelityRow>& fidelity) {
+  return ConsistencyTable(consistency) + "\n" + FidelityTable(consistency, fidelity);
+}
+
+}  // namespace regrade
