@@ -1,0 +1,87 @@
+#include "kernels/field/radiance_field.h"
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "kernels/base/error.h"
+
+namespace regrade {
+namespace {
+
+[[noreturn]] void Refuse(const char* name, const std::string& defect) {
+  throw Error(ExitCode::kInput, defect, name,
+              "the file is damaged or was not written by a radiance field program");
+}
+
+int64_t CountNonFinite(const Buffer<float>& values) {
+  int64_t count = 0;
+  for (const float value : values) count += !std::isfinite(value);
+  return count;
+}
+
+void CheckFrame(const GridFrame& frame, const char* name) {
+  for (int a = 0; a < 3; ++a) {
+    if (frame.resolution[a] < 2)
+      Refuse(name, "the grid has " + std::to_string(frame.resolution[a]) +
+                       " vertices along an axis, at least 2 are needed");
+    if (!(frame.radius[a] > 0) || !std::isfinite(frame.radius[a]) ||
+        !std::isfinite(frame.center[a]))
+      Refuse(name, "the box has a radius or centre that is not a finite, positive length");
+  }
+}
+
+// One pass: a link out of range would be an access out of bounds, and a voxel that two vertices
+// share would be stepped twice.
+void CheckLinks(const Geometry& geometry, const char* name) {
+  const int64_t voxels = geometry.num_voxels();
+  std::vector<bool> taken(static_cast<size_t>(voxels), false);
+  for (int64_t i = 0; i < geometry.links.size(); ++i) {
+    const int64_t link = geometry.links[i];
+    if (link == -1) continue;
+    if (link < -1 || link >= voxels)
+      Refuse(name, "link " + std::to_string(i) + " is " + std::to_string(link) +
+                       ", but there are " + std::to_string(voxels) + " voxels");
+    if (taken[static_cast<size_t>(link)])
+      Refuse(name, "voxel " + std::to_string(link) + " belongs to two vertices");
+    taken[static_cast<size_t>(link)] = true;
+  }
+}
+
+}  // namespace
+
+void Validate(const RadianceField& field, const char* name) {
+  if (field.geometry == nullptr) Refuse(name, "there is no grid");
+  const Geometry& geometry = *field.geometry;
+  CheckFrame(geometry.frame, name);
+  if (geometry.links.size() != geometry.frame.NumVertices())
+    Refuse(name, std::to_string(geometry.links.size()) + " links for a grid of " +
+                     std::to_string(geometry.frame.NumVertices()) + " vertices");
+  const int basis = field.appearance.basis;
+  if (basis != 1 && basis != 4 && basis != 9)
+    Refuse(name, std::to_string(basis) + " harmonics a channel; 1, 4 or 9 are known");
+  const int64_t expected = geometry.num_voxels() * field.appearance.stride();
+  if (field.appearance.sh.size() != expected)
+    Refuse(name, std::to_string(field.appearance.sh.size()) + " colour coefficients, " +
+                     std::to_string(expected) + " expected");
+  CheckLinks(geometry, name);
+  const int64_t bad = CountNonFinite(geometry.density) + CountNonFinite(field.appearance.sh);
+  if (bad > 0)
+    Refuse(name, std::to_string(bad) + " values are not finite (of " +
+                     std::to_string(geometry.num_voxels() * (1 + field.appearance.stride())) +
+                     ")");
+  if (!AllFinite(field.background) || !std::isfinite(field.near_clip) || field.near_clip < 0)
+    Refuse(name, "the background colour or the near distance is not a usable number");
+}
+
+FieldView<float> ViewOf(const RadianceField& field) {
+  return {field.geometry->frame,
+          field.geometry->links.data(),
+          field.geometry->density.data(),
+          field.appearance.sh.data(),
+          field.appearance.basis,
+          field.background,
+          field.near_clip};
+}
+
+}  // namespace regrade

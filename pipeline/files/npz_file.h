@@ -1,0 +1,108 @@
+// Named arrays in one file: NumPy's .npz, a zip archive of .npy members.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "kernels/base/buffer.h"
+#include "pipeline/files/npy_header.h"
+
+namespace regrade {
+
+template <typename T>
+struct ArrayTypeOf;
+template <>
+struct ArrayTypeOf<uint8_t> : std::integral_constant<ArrayType, ArrayType::kU8> {};
+template <>
+struct ArrayTypeOf<int32_t> : std::integral_constant<ArrayType, ArrayType::kI32> {};
+template <>
+struct ArrayTypeOf<int64_t> : std::integral_constant<ArrayType, ArrayType::kI64> {};
+template <>
+struct ArrayTypeOf<uint16_t> : std::integral_constant<ArrayType, ArrayType::kF16> {};
+template <>
+struct ArrayTypeOf<float> : std::integral_constant<ArrayType, ArrayType::kF32> {};
+template <>
+struct ArrayTypeOf<double> : std::integral_constant<ArrayType, ArrayType::kF64> {};
+
+enum class NpzPacking { kStore, kDeflate };
+
+// Collects arrays by reference: what `data` points to must stay until WriteTo or Bytes. The
+// same arrays give the same bytes on any day. uint16_t holds the bit pattern of a half
+// (half.h).
+class NpzWriter {
+ public:
+  NpzWriter();
+  ~NpzWriter();
+
+  template <typename T>
+  void Add(const std::string& name, const std::vector<int64_t>& shape, const T* data,
+           NpzPacking packing = NpzPacking::kStore) {
+    AddBytes(name, ArrayTypeOf<T>::value, shape, data, packing);
+  }
+  // A copy is kept.
+  template <typename T>
+  void AddScalar(const std::string& name, T value) {
+    AddCopy(name, ArrayTypeOf<T>::value, {}, &value, sizeof value);
+  }
+  void AddText(const std::string& name, const std::string& text) {
+    AddCopy(name, ArrayType::kU8, {static_cast<int64_t>(text.size())}, text.data(),
+            text.size());
+  }
+
+  std::string Bytes() const;  // the archive
+  // Atomically. Throws Error(kResources).
+  void WriteTo(const std::string& path) const;
+
+ private:
+  struct Member;
+  void AddBytes(const std::string& name, ArrayType type, const std::vector<int64_t>& shape,
+                const void* data, NpzPacking packing);
+  void AddCopy(const std::string& name, ArrayType type, const std::vector<int64_t>& shape,
+               const void* data, size_t size);
+  std::vector<Member> members_;
+};
+
+struct NpzArray {
+  ArrayType type = ArrayType::kU8;
+  std::vector<int64_t> shape;
+  Buffer<uint8_t> bytes;
+
+  int64_t num_elements() const { return bytes.size() / SizeOf(type); }
+  template <typename T>
+  const T* As() const {
+    return reinterpret_cast<const T*>(bytes.data());
+  }
+  std::string ShapeText() const;  // "(3, 4)"
+};
+
+// Reads members by name, never to disk. Throws Error(kInput) naming file and array. `budget` is
+// the most memory that all arrays read through this reader may take.
+class NpzReader {
+ public:
+  NpzReader(const std::string& path, uint64_t budget);
+  ~NpzReader();
+
+  std::vector<std::string> names() const;  // without ".npy"
+  bool Has(const std::string& name) const;
+  // Any of our types.
+  NpzArray Read(const std::string& name);
+  // Exactly this type and shape; -1 in `shape` stands for any length.
+  NpzArray Read(const std::string& name, ArrayType type, const std::vector<int64_t>& shape);
+  template <typename T>
+  T ReadScalar(const std::string& name) {
+    return *Read(name, ArrayTypeOf<T>::value, {}).template As<T>();
+  }
+  std::string ReadText(const std::string& name);
+  const std::string& path() const { return path_; }
+
+ private:
+  struct Archive;
+  std::string path_;
+  uint64_t budget_;
+  std::unique_ptr<Archive> archive_;
+};
+
+}  // namespace regrade
