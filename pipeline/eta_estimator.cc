@@ -1,0 +1,41 @@
+#include "pipeline/eta_estimator.h"
+
+#include <algorithm>
+
+namespace regrade {
+namespace {
+
+constexpr double kWindowShare = 1.0 / 3;
+constexpr double kShortestWindow = 3;  // seconds
+constexpr size_t kMostPoints = 512;
+
+}  // namespace
+
+void EtaEstimator::Add(double seconds, double done, double total) {
+  if (points_.empty()) points_.push_back({0, 0});
+  total_ = total;
+  if (done < points_.back().done) {  // begun anew (a finer grid): the old pace says nothing
+    points_.assign(1, {seconds, done});
+    return;
+  }
+  points_.push_back({seconds, done});
+  const double window = std::max(kShortestWindow, seconds * kWindowShare);
+  while (points_.size() > 2 && points_[1].seconds <= seconds - window) points_.pop_front();
+  if (points_.size() > kMostPoints) {  // keep the ends and every other point between
+    std::deque<Point> thinned;
+    for (size_t i = 0; i < points_.size(); ++i)
+      if (i % 2 == 0 || i + 1 == points_.size()) thinned.push_back(points_[i]);
+    points_.swap(thinned);
+  }
+}
+
+std::optional<double> EtaEstimator::Remaining() const {
+  if (points_.size() < 2 || !(total_ > 0)) return std::nullopt;
+  const Point &first = points_.front(), &last = points_.back();
+  if (last.seconds < 1 || !(last.done > first.done) || !(last.seconds > first.seconds))
+    return std::nullopt;
+  const double rate = (last.done - first.done) / (last.seconds - first.seconds);
+  return std::max(0.0, (total_ - last.done) / rate);
+}
+
+}  // namespace regrade

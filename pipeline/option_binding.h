@@ -1,0 +1,79 @@
+// Option structs become flags: parsing, range checks, help and run.json from one description.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "kernels/base/options.h"
+#include "pipeline/files/json_file.h"
+
+namespace regrade {
+
+class OptionSet {
+ public:
+  // `options` must outlive the set. `group` heads its part of the help and names its part of a
+  // fingerprint. Flag names must be unique within the set (checked).
+  template <typename T>
+  void Add(const std::string& group, T* options) {
+    Binder binder{this, group};
+    options->Describe(binder);
+  }
+
+  // Reads flags and leaves the structs alone; returns what is not a flag. Forms: "--name
+  // value",
+  // "--name=value"; for switches "--name" and "--no-name"; "--" ends flags. Throws
+  // Error(kUsage): unknown names (with the nearest known one), a missing value, a flag twice.
+  std::vector<std::string> Parse(const std::vector<std::string>& arguments);
+
+  // What --name was given on the command line.
+  std::optional<std::string> Given(const std::string& name) const;
+
+  // Writes the values of a JSON object {"name": value, ...} into the structs. Throws
+  // Error(kUsage) with line and column for unknown names and bad values.
+  void ApplyConfig(const JsonValue& values, const std::string& where);
+  // Writes the parsed flags into the structs. Throws Error(kUsage) with the allowed range for
+  // values outside it, and for whatever is not wholly a number: NaN, 1e999, 0x10, 12abc.
+  void ApplyFlags();
+
+  // {"name": value, ...} of everything in effect, or of one group.
+  JsonValue Values() const;
+  JsonValue Values(const std::string& group) const;
+
+  // Names, units, what they do, defaults and bounds. Call before flags are applied.
+  std::string Help() const;
+
+ private:
+  using Target = std::variant<bool*, int*, int64_t*, uint64_t*, float*, double*, std::string*,
+                              std::vector<int>*>;
+  struct Entry {
+    std::string group, name;
+    Target target;
+    OptionInfo info;
+  };
+  struct Binder {
+    OptionSet* set;
+    std::string group;
+    template <typename T>
+    void operator()(const char* name, T& member, const OptionInfo& info) {
+      set->AddEntry({group, name, &member, info});
+    }
+  };
+  struct Flag {
+    std::string name, value;
+  };
+
+  void AddEntry(Entry entry);
+  const Entry* Find(const std::string& name) const;
+  std::vector<std::string> Names() const;
+  static void Assign(const Entry& entry, const std::string& text, const std::string& where);
+  static JsonValue ValueOf(const Entry& entry);
+
+  std::vector<Entry> entries_;
+  std::vector<Flag> flags_;
+};
+
+}  // namespace regrade

@@ -1,0 +1,49 @@
+// What a finished stage leaves behind: from which inputs, which files with which contents, how
+// long it took and what it measured.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "pipeline/files/json_file.h"
+
+namespace regrade {
+
+struct StageOutput {
+  std::string path;  // relative to the output folder
+  int64_t bytes = 0;
+  std::string hash;
+};
+
+struct StageRecord {
+  std::string version;               // of the program that made it
+  JsonValue inputs;                  // object: options and hashes of what went in
+  std::vector<StageOutput> outputs;  // sorted by path
+  double seconds = 0;
+  JsonValue figures;  // object, goes into the report
+
+  // One hash of everything that came out: an input of the stages behind.
+  std::string OutputHash() const;
+};
+
+// Content hash of a regular file, read in pieces. Throws Error(kInput).
+std::string HashFile(const std::string& path);
+
+// Hashes files, and all regular files in folders, given relative to `root`; our temporaries are
+// left out. Throws Error(kInput) if one is missing.
+std::vector<StageOutput> DescribeOutputs(const std::string& root,
+                                         const std::vector<std::string>& paths);
+
+// One sentence for each difference: "fit-rays: was 4096, now 8192"; many in one object are
+// counted and the first few named.
+std::vector<std::string> Differences(const JsonValue& was, const JsonValue& now);
+
+// One sentence for each output that is not what was recorded: missing, or changed.
+std::vector<std::string> ChangedOutputs(const std::string& root, const StageRecord& record);
+
+JsonValue ToJson(const StageRecord& record);
+// Throws Error(kInput): damaged, or from a newer version than this program.
+StageRecord StageRecordFromJson(const JsonValue& value, const std::string& where);
+
+}  // namespace regrade
