@@ -1,0 +1,154 @@
+// What a run has to say for itself, as plain data: report.json (schema 1) and report.html are
+// both written from these structs, so they cannot disagree.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "kernels/scene/capture.h"
+
+namespace regrade {
+
+// A number, or the reason why there is none. JSON has no NaN: a value that is not finite is a
+// figure without value.
+struct Figure {
+  std::optional<double> value;
+  std::string why = "not measured";  // read only while `value` is empty
+
+  Figure() = default;
+  Figure(double number) {  // NOLINT: a number is a figure
+    if (std::isfinite(number)) {
+      value = number;
+    } else {
+      why = std::isnan(number) ? "not a number" : "infinite: no error at all";
+    }
+  }
+  static Figure Undefined(std::string why) {
+    Figure figure;
+    figure.why = std::move(why);
+    return figure;
+  }
+};
+
+struct PhotosReport {
+  int given = 0;
+  int used = 0;
+  int registered = 0;
+  std::vector<PhotoVerdict> verdicts;  // one for each given file
+};
+
+// One decision of the scene profile.
+struct EffectReport {
+  std::string name;
+  bool on = false;
+  std::string evidence;  // a sentence for a person
+  Figure value;          // what was measured, in the unit that `evidence` names
+  Figure threshold;
+};
+
+struct PoseReport {
+  double seconds = 0;
+  Figure reprojection_px;
+  int64_t points = 0;
+  int models_found = 0;
+};
+
+struct ReconstructReport {
+  double seconds = 0;
+  int64_t voxels = 0;
+  Figure psnr_train_db, psnr_heldout_db, ssim_heldout;
+  std::vector<std::string> heldout;  // the user's file names
+};
+
+struct Style2dReport {
+  double seconds = 0;
+  std::string method;
+};
+
+struct StylizeReport {
+  double seconds = 0;
+  int steps = 0;
+  Figure k_est, bound, slope_observed;  // slopes in (SH, scaled position) space
+  Figure psnr_to_2d_db;                 // styled frames against the 2D method on our renders
+  Figure psnr_to_2d_photos_db;          // ... against the 2D method on the photos
+  Figure linear_map_psnr_to_2d_db;      // what the better of two linear colour maps reaches
+};
+
+struct RenderReport {
+  double seconds = 0;
+  int frames = 0;
+  Figure frames_per_second;
+};
+
+struct EvaluateReport {
+  double seconds = 0;
+  std::string flow;  // "dis-medium"
+  std::string mask;  // "lai2018"
+};
+
+// Only the stages that a command has run are there.
+struct StagesReport {
+  std::optional<PoseReport> pose;
+  std::optional<ReconstructReport> reconstruct;
+  std::optional<Style2dReport> style_2d;
+  std::optional<StylizeReport> stylize;
+  std::optional<RenderReport> render;
+  std::optional<EvaluateReport> evaluate;
+};
+
+// Temporal consistency of a sequence over frames `gap` apart.
+struct ConsistencyFigures {
+  std::string sequence;  // "source" | "views_2d" | "styled" | "photos"
+  int gap = 1;
+  int pairs = 0;                         // looked at, undefined ones included
+  int undefined_pairs = 0;               // nothing to compare; in no mean
+  Figure tc_psnr_mean_db;                // mean of the pairs' dB
+  Figure tc_psnr_of_mean_db;             // dB of the pairs' mean squared error
+  Figure coverage;                       // mean share of valid pixels
+  std::vector<Figure> tc_psnr_pairs_db;  // one for each pair in order of time; may be empty
+};
+
+// How near a sequence is to what the 2D method made, and how much colour it kept.
+struct FidelityFigures {
+  std::string sequence;
+  Figure psnr_to_2d_db;
+  Figure hue_std, hue_std_2d;  // radians
+  Figure chroma, chroma_2d;    // CIELAB
+  Figure sliced_wasserstein_to_style;
+};
+
+// What one knob costs and buys, measured on this machine.
+struct PriceRow {
+  std::string knob;     // the flag, "--style-steps"
+  std::string setting;  // "300"
+  Figure seconds;
+  Figure psnr_db;  // the accuracy that the knob buys; `measure` says which
+  std::string measure;
+};
+
+// An option in effect, as run.json has it.
+struct OptionValue {
+  std::string name, value;
+};
+
+struct RunReport {
+  std::string version;               // of regrade
+  std::vector<std::string> command;  // argv
+  std::string preset, device;
+  uint64_t seed = 0;
+  double seconds = 0;
+  Figure peak_memory_mb;
+  std::optional<PhotosReport> photos;
+  std::vector<EffectReport> effects;
+  StagesReport stages;
+  std::vector<ConsistencyFigures> consistency;
+  std::vector<FidelityFigures> fidelity;
+  std::vector<PriceRow> prices;
+  std::vector<OptionValue> options;  // of run.json; shown on the page only
+};
+
+}  // namespace regrade

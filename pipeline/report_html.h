@@ -1,0 +1,36 @@
+// report.html: one page that a person can keep, mail and open anywhere. It fetches nothing; its
+// only neighbours are the films in the same folder.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pipeline/report_data.h"
+
+namespace regrade {
+
+// An encoded picture, carried inside the page.
+struct ReportPicture {
+  std::string bytes;  // of a whole JPEG or PNG file
+  int width = 0, height = 0;
+};
+
+// One viewpoint through all sequences; a missing picture is left out.
+struct ReportView {
+  std::string name;  // "00012, IMG_0420.jpg"
+  std::optional<ReportPicture> photo, source, views_2d, styled;
+};
+
+struct ReportPictures {
+  std::string title;                   // the folder's name
+  std::optional<ReportPicture> style;  // the style picture
+  std::vector<ReportView> views;       // the middle one is the headline
+  bool has_styled_film = false;        // styled.mp4 lies beside the page
+  bool has_wipe_film = false;          // source_vs_styled.mp4 does
+};
+
+// The whole page, UTF-8. Every string in the arguments may be hostile.
+std::string ReportHtml(const RunReport& report, const ReportPictures& pictures);
+
+}  // namespace regrade

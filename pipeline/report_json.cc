@@ -1,0 +1,173 @@
+// Writes the report's structs as JSON, keys in the order of the schema.
+#include "pipeline/report_json.h"
+
+#include <string>
+
+namespace regrade {
+namespace {
+
+constexpr int kSchema = 1;
+
+using Object = JsonValue::Object;
+
+void Put(Object& object, const std::string& key, const Figure& figure) {
+  if (figure.value) {
+    object.emplace_back(key, *figure.value);
+  } else {
+    object.emplace_back(key, nullptr);
+    object.emplace_back(key + "_why", figure.why);
+  }
+}
+
+// Text that may be missing is null rather than empty.
+JsonValue TextOrNull(const std::string& text) {
+  return text.empty() ? JsonValue() : JsonValue(text);
+}
+
+JsonValue Strings(const std::vector<std::string>& strings) {
+  return JsonValue::Array(strings.begin(), strings.end());
+}
+
+template <typename Rows, typename ToJson>
+JsonValue List(const Rows& rows, ToJson&& to_json) {
+  JsonValue::Array array;
+  for (const auto& row : rows) array.push_back(to_json(row));
+  return array;
+}
+
+JsonValue PhotosJson(const PhotosReport& photos) {
+  return Object{{"given", photos.given},
+                {"used", photos.used},
+                {"registered", photos.registered},
+                {"verdicts", List(photos.verdicts, [](const PhotoVerdict& photo) {
+                   return Object{{"file", photo.file},
+                                 {"verdict", photo.verdict},
+                                 {"why", TextOrNull(photo.why)}};
+                 })}};
+}
+
+JsonValue EffectJson(const EffectReport& effect) {
+  Object object{{"name", effect.name}, {"on", effect.on}, {"evidence", effect.evidence}};
+  Put(object, "value", effect.value);
+  Put(object, "threshold", effect.threshold);
+  return object;
+}
+
+JsonValue StageJson(const PoseReport& stage) {
+  Object object{{"seconds", stage.seconds}};
+  Put(object, "reprojection_px", stage.reprojection_px);
+  object.emplace_back("points", stage.points);
+  object.emplace_back("models_found", stage.models_found);
+  return object;
+}
+
+JsonValue StageJson(const ReconstructReport& stage) {
+  Object object{{"seconds", stage.seconds}, {"voxels", stage.voxels}};
+  Put(object, "psnr_train_db", stage.psnr_train_db);
+  Put(object, "psnr_heldout_db", stage.psnr_heldout_db);
+  Put(object, "ssim_heldout", stage.ssim_heldout);
+  object.emplace_back("heldout", Strings(stage.heldout));
+  return object;
+}
+
+JsonValue StageJson(const Style2dReport& stage) {
+  return Object{{"seconds", stage.seconds}, {"method", stage.method}};
+}
+
+JsonValue StageJson(const StylizeReport& stage) {
+  Object object{{"seconds", stage.seconds}, {"steps", stage.steps}};
+  Put(object, "k_est", stage.k_est);
+  Put(object, "bound", stage.bound);
+  Put(object, "slope_observed", stage.slope_observed);
+  Put(object, "psnr_to_2d_db", stage.psnr_to_2d_db);
+  Put(object, "psnr_to_2d_photos_db", stage.psnr_to_2d_photos_db);
+  Put(object, "linear_map_psnr_to_2d_db", stage.linear_map_psnr_to_2d_db);
+  return object;
+}
+
+JsonValue StageJson(const RenderReport& stage) {
+  Object object{{"seconds", stage.seconds}, {"frames", stage.frames}};
+  Put(object, "frames_per_second", stage.frames_per_second);
+  return object;
+}
+
+JsonValue StageJson(const EvaluateReport& stage) {
+  return Object{{"seconds", stage.seconds}, {"flow", stage.flow}, {"mask", stage.mask}};
+}
+
+JsonValue StagesJson(const StagesReport& stages) {
+  Object object;
+  const auto add = [&](const char* name, const auto& stage) {
+    if (stage) object.emplace_back(name, StageJson(*stage));
+  };
+  add("pose", stages.pose);
+  add("reconstruct", stages.reconstruct);
+  add("style_2d", stages.style_2d);
+  add("stylize", stages.stylize);
+  add("render", stages.render);
+  add("evaluate", stages.evaluate);
+  return object;
+}
+
+JsonValue ConsistencyJson(const ConsistencyFigures& row) {
+  Object object{{"sequence", row.sequence},
+                {"gap", row.gap},
+                {"pairs", row.pairs},
+                {"undefined_pairs", row.undefined_pairs}};
+  Put(object, "tc_psnr_mean_db", row.tc_psnr_mean_db);
+  Put(object, "tc_psnr_of_mean_db", row.tc_psnr_of_mean_db);
+  Put(object, "coverage", row.coverage);
+  if (!row.tc_psnr_pairs_db.empty()) {
+    object.emplace_back("tc_psnr_pairs_db", List(row.tc_psnr_pairs_db, [](const Figure& pair) {
+                          return pair.value ? JsonValue(*pair.value) : JsonValue();
+                        }));
+  }
+  return object;
+}
+
+JsonValue FidelityJson(const FidelityFigures& row) {
+  Object object{{"sequence", row.sequence}};
+  Put(object, "psnr_to_2d_db", row.psnr_to_2d_db);
+  Put(object, "hue_std", row.hue_std);
+  Put(object, "hue_std_2d", row.hue_std_2d);
+  Put(object, "chroma", row.chroma);
+  Put(object, "chroma_2d", row.chroma_2d);
+  Put(object, "sliced_wasserstein_to_style", row.sliced_wasserstein_to_style);
+  return object;
+}
+
+JsonValue PriceJson(const PriceRow& price) {
+  Object object{{"knob", price.knob}, {"setting", price.setting}};
+  Put(object, "seconds", price.seconds);
+  Put(object, "psnr_db", price.psnr_db);
+  object.emplace_back("measure", price.measure);
+  return object;
+}
+
+}  // namespace
+
+JsonValue ReportJson(const RunReport& report) {
+  Object object{{"schema", kSchema},
+                {"regrade", report.version},
+                {"command", Strings(report.command)},
+                {"preset", report.preset},
+                {"device", report.device},
+                {"seed", report.seed},
+                {"seconds", report.seconds}};
+  Put(object, "peak_memory_mb", report.peak_memory_mb);
+  if (report.photos) object.emplace_back("photos", PhotosJson(*report.photos));
+  object.emplace_back("effects", List(report.effects, EffectJson));
+  object.emplace_back("stages", StagesJson(report.stages));
+  object.emplace_back("consistency", List(report.consistency, ConsistencyJson));
+  object.emplace_back("fidelity", List(report.fidelity, FidelityJson));
+  if (!report.prices.empty()) object.emplace_back("prices", List(report.prices, PriceJson));
+  return object;
+}
+
+JsonValue EvaluationJson(const RunReport& report) {
+  return Object{{"schema", kSchema},
+                {"consistency", List(report.consistency, ConsistencyJson)},
+                {"fidelity", List(report.fidelity, FidelityJson)}};
+}
+
+}  // namespace regrade

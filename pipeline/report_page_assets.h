@@ -1,0 +1,10 @@
+// The look of the report page: its style sheet and the few lines of script that it can do
+// without.
+#pragma once
+
+namespace regrade {
+
+extern const char kReportCss[];
+extern const char kReportScript[];
+
+}  // namespace regrade

@@ -1,0 +1,24 @@
+// The tables of report.html, one function a section; each returns "" when there is nothing to
+// tell.
+#pragma once
+
+#include <string>
+
+#include "pipeline/report_data.h"
+
+namespace regrade {
+
+// The number, or a dash that tells why there is none.
+std::string FigureHtml(const Figure& figure, int decimals, const std::string& unit = "");
+
+std::string HeadlineFiguresHtml(const RunReport& report);
+// Consistency with fidelity beside it in the same rows: a grey film is consistent, so neither
+// figure stands alone.
+std::string ConsistencyHtml(const RunReport& report);
+std::string PhotosHtml(const RunReport& report);
+std::string EffectsHtml(const RunReport& report);
+std::string StagesHtml(const RunReport& report);
+std::string PricesHtml(const RunReport& report);
+std::string RepeatHtml(const RunReport& report);
+
+}  // namespace regrade

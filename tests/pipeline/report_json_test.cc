@@ -1,0 +1,111 @@
+// report.json: the keys of schema 1, in its order, and nulls that say why.
+#include "pipeline/report_json.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <string>
+#include <vector>
+
+namespace regrade {
+namespace {
+
+using Keys = std::vector<std::string>;
+
+Keys KeysOf(const JsonValue& object) {
+  Keys keys;
+  for (const auto& [key, value] : object.AsObject()) keys.push_back(key);
+  return keys;
+}
+
+// A report in which every figure is measured.
+RunReport FullReport() {
+  RunReport report;
+  report.version = "0.1.0";
+  report.command = {"regrade", "run"};
+  report.seed = std::numeric_limits<uint64_t>::max();
+  report.peak_memory_mb = 900;
+  report.photos =
+      PhotosReport{2, 1, 1, {{"a.jpg", "used", ""}, {"\xFF.jpg", "skipped", "text"}}};
+  report.effects = {{"ndc", false, "corner rays", 0.41, 0.9}};
+  report.stages.pose = PoseReport{1, 0.9, 12775, 1};
+  report.stages.reconstruct = ReconstructReport{2, 1000, 29, 26.5, 0.8, {"a.jpg"}};
+  report.stages.style_2d = Style2dReport{3, "mkl"};
+  report.stages.stylize = StylizeReport{4, 300, 1.5, 1.9, 1.2, 27, 25, 26};
+  report.stages.render = RenderReport{5, 60, 12};
+  report.stages.evaluate = EvaluateReport{6, "dis-medium", "lai2018"};
+  report.consistency = {{"styled", 1, 49, 0, 29.8, 29.5, 0.8, {}}};
+  report.fidelity = {{"styled", 27, 0.19, 0.2, 12, 13, 0.01}};
+  return report;
+}
+
+TEST(ReportJson, HasTheKeysOfSchema1InOrder) {
+  const JsonValue json = ReportJson(FullReport());
+  EXPECT_EQ(KeysOf(json),
+            (Keys{"schema", "regrade", "command", "preset", "device", "seed", "seconds",
+                  "peak_memory_mb", "photos", "effects", "stages", "consistency", "fidelity"}));
+  EXPECT_EQ(json.At("schema").AsInt(), 1);
+  EXPECT_EQ(KeysOf(json.At("photos")), (Keys{"given", "used", "registered", "verdicts"}));
+  EXPECT_EQ(KeysOf(json.At("photos").At("verdicts").AsArray()[0]),
+            (Keys{"file", "verdict", "why"}));
+  EXPECT_EQ(KeysOf(json.At("effects").AsArray()[0]),
+            (Keys{"name", "on", "evidence", "value", "threshold"}));
+  const JsonValue& stages = json.At("stages");
+  EXPECT_EQ(KeysOf(stages),
+            (Keys{"pose", "reconstruct", "style_2d", "stylize", "render", "evaluate"}));
+  EXPECT_EQ(KeysOf(stages.At("pose")),
+            (Keys{"seconds", "reprojection_px", "points", "models_found"}));
+  EXPECT_EQ(KeysOf(stages.At("reconstruct")),
+            (Keys{"seconds", "voxels", "psnr_train_db", "psnr_heldout_db", "ssim_heldout",
+                  "heldout"}));
+  EXPECT_EQ(KeysOf(stages.At("style_2d")), (Keys{"seconds", "method"}));
+  EXPECT_EQ(KeysOf(stages.At("stylize")),
+            (Keys{"seconds", "steps", "k_est", "bound", "slope_observed", "psnr_to_2d_db",
+                  "psnr_to_2d_photos_db", "linear_map_psnr_to_2d_db"}));
+  EXPECT_EQ(KeysOf(stages.At("render")), (Keys{"seconds", "frames", "frames_per_second"}));
+  EXPECT_EQ(KeysOf(stages.At("evaluate")), (Keys{"seconds", "flow", "mask"}));
+  EXPECT_EQ(KeysOf(json.At("consistency").AsArray()[0]),
+            (Keys{"sequence", "gap", "pairs", "undefined_pairs", "tc_psnr_mean_db",
+                  "tc_psnr_of_mean_db", "coverage"}));
+  EXPECT_EQ(KeysOf(json.At("fidelity").AsArray()[0]),
+            (Keys{"sequence", "psnr_to_2d_db", "hue_std", "hue_std_2d", "chroma", "chroma_2d",
+                  "sliced_wasserstein_to_style"}));
+}
+
+TEST(ReportJson, UndefinedFiguresAreNullWithAWhy) {
+  RunReport report = FullReport();
+  report.stages.reconstruct->psnr_heldout_db = Figure::Undefined("holdout is 0");
+  report.consistency[0].tc_psnr_mean_db = std::numeric_limits<double>::quiet_NaN();
+  report.consistency[0].tc_psnr_pairs_db = {30.0, Figure(), 31.0};
+  const JsonValue json = ReportJson(report);
+  const JsonValue& stage = json.At("stages").At("reconstruct");
+  EXPECT_TRUE(stage.At("psnr_heldout_db").IsNull());
+  EXPECT_EQ(stage.At("psnr_heldout_db_why").AsString(), "holdout is 0");
+  EXPECT_EQ(stage.Find("psnr_train_db_why"), nullptr);
+  const JsonValue& row = json.At("consistency").AsArray()[0];
+  EXPECT_TRUE(row.At("tc_psnr_mean_db").IsNull());
+  EXPECT_FALSE(row.At("tc_psnr_mean_db_why").AsString().empty());
+  EXPECT_TRUE(row.At("tc_psnr_pairs_db").AsArray()[1].IsNull());
+  EXPECT_EQ(row.At("tc_psnr_pairs_db").AsArray().size(), 3u);
+}
+
+TEST(ReportJson, SurvivesATripThroughText) {
+  const std::string text = DumpJson(ReportJson(FullReport()));
+  const JsonValue back = ParseJson(text, "report.json");
+  EXPECT_EQ(DumpJson(back), text);  // also with a file name that is not UTF-8
+  EXPECT_TRUE(back.At("photos").At("verdicts").AsArray()[0].At("why").IsNull());
+}
+
+TEST(ReportJson, StagesThatDidNotRunAreAbsent) {
+  const JsonValue json = ReportJson(RunReport());
+  EXPECT_TRUE(json.At("stages").AsObject().empty());
+  EXPECT_EQ(json.Find("photos"), nullptr);
+  EXPECT_EQ(json.At("peak_memory_mb_why").AsString(), "not measured");
+}
+
+TEST(ReportJson, EvaluationAlone) {
+  EXPECT_EQ(KeysOf(EvaluationJson(FullReport())), (Keys{"schema", "consistency", "fidelity"}));
+}
+
+}  // namespace
+}  // namespace regrade

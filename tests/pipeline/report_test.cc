@@ -1,0 +1,154 @@
+// The report page: strangers' text stays text, nothing is fetched, and missing figures say why.
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <regex>
+#include <string>
+
+#include "pipeline/html_text.h"
+#include "pipeline/report_html.h"
+
+namespace regrade {
+namespace {
+
+ReportPicture Picture() { return {"\xFF\xD8\xFF pixels", 64, 48}; }
+
+RunReport SomeReport() {
+  RunReport report;
+  report.version = "0.1.0";
+  report.command = {"regrade", "run", "my photos", "--style", "it's.png"};
+  report.seconds = 95;
+  report.photos =
+      PhotosReport{3, 2, 2, {{"a.jpg", "used", ""}, {"b.jpg", "skipped", "cut at 20 kB"}}};
+  report.effects = {{"ndc", false, "corner rays spread too far", 0.41, 0.9}};
+  report.stages.reconstruct = ReconstructReport{
+      60, 1000, 28.25, Figure::Undefined("holdout is 0"), Figure::Undefined("holdout is 0"),
+      {}};
+  report.consistency = {{"styled", 1, 3, 1, 29.79, 29.5, 0.8, {30.0, Figure(), 29.5}}};
+  report.fidelity = {{"styled", 24.5, 0.19, 0.2, 12, 13, 0.01}};
+  return report;
+}
+
+ReportPictures SomePictures() {
+  ReportPictures pictures;
+  pictures.title = "fox";
+  pictures.views = {{"00000, a.jpg", Picture(), Picture(), Picture(), Picture()}};
+  pictures.has_styled_film = true;
+  return pictures;
+}
+
+size_t Count(const std::string& text, const std::string& what) {
+  size_t count = 0;
+  for (size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + 1))
+    ++count;
+  return count;
+}
+
+TEST(HtmlText, EscapesWhatAPageCouldRun) {
+  EXPECT_EQ(EscapeHtml("<a b='c' d=\"e\">&"), "&lt;a b=&#39;c&#39; d=&quot;e&quot;&gt;&amp;");
+  EXPECT_EQ(EscapeHtml("фото 写真 é"), "фото 写真 é");
+}
+
+TEST(HtmlText, SpellsOutBytesThatHideOrReorder) {
+  EXPECT_EQ(EscapeHtml("a\x1b[31m\x7f"), "a\\x1b[31m\\x7f");
+  EXPECT_EQ(EscapeHtml("gpj.\xE2\x80\xAE"
+                       "exe"),
+            "gpj.\\u{202e}exe");
+  EXPECT_EQ(EscapeHtml("\xC0\xBCscript"), "\\xc0\\xbcscript");  // overlong '<'
+  EXPECT_EQ(EscapeHtml("\xED\xA0\x80"), "\\xed\\xa0\\x80");     // a surrogate
+  EXPECT_EQ(EscapeHtml("cut \xE2\x80"), "cut \\xe2\\x80");      // ends too early
+  EXPECT_EQ(EscapeHtml(std::string("\xC3<", 2)), "\\xc3&lt;");  // must not swallow the '<'
+}
+
+TEST(HtmlText, ShellCommandSurvivesHostileNames) {
+  EXPECT_EQ(ShellCommand({"regrade", "run", "$(rm -rf ~)", "it's", "", "a-b_c/d.png"}),
+            "regrade run '$(rm -rf ~)' 'it'\\''s' '' a-b_c/d.png");
+}
+
+TEST(HtmlText, Base64VectorsOfRfc4648) {
+  EXPECT_EQ(Base64(""), "");
+  EXPECT_EQ(Base64("f"), "Zg==");
+  EXPECT_EQ(Base64("fo"), "Zm8=");
+  EXPECT_EQ(Base64("foobar"), "Zm9vYmFy");
+  EXPECT_EQ(Base64("\xFF\xFE\xFD"), "//79");
+}
+
+TEST(HtmlText, NumbersAndDurations) {
+  EXPECT_EQ(FixedNumber(-0.001, 2), "0.00");
+  EXPECT_EQ(FixedNumber(29.786, 2), "29.79");
+  EXPECT_EQ(Duration(0.84), "0.8 s");
+  EXPECT_EQ(Duration(59.7), "1 min 00 s");
+  EXPECT_EQ(Duration(7500), "2 h 05 min");
+}
+
+TEST(ReportHtml, HostileNamesStayText) {
+  const std::string evil = "\"><script>alert('x')</script><img src=x onerror=alert(1)>.jpg";
+  RunReport report = SomeReport();
+  ReportPictures pictures = SomePictures();
+  const std::string harmless = ReportHtml(report, pictures);
+  report.version = report.preset = report.device = evil;
+  report.command = {evil};
+  report.photos->verdicts = {{evil, "used", ""}, {evil, evil, evil}};
+  report.effects[0].name = report.effects[0].evidence = evil;
+  report.stages.reconstruct->psnr_heldout_db = Figure::Undefined(evil);
+  report.stages.style_2d = Style2dReport{1, evil};
+  report.stages.evaluate = EvaluateReport{1, evil, evil};
+  report.consistency[0].sequence = report.fidelity[0].sequence = evil;
+  report.prices = {{evil, evil, 1, 2, evil}};
+  report.options = {{evil, evil}};
+  pictures.title = pictures.views[0].name = evil;
+  const std::string page = ReportHtml(report, pictures);
+  // No tag beyond the page's own: as many scripts, and pictures as viewpoints ask for.
+  EXPECT_EQ(Count(page, "<script"), Count(harmless, "<script"));
+  EXPECT_EQ(Count(page, "<img"), Count(harmless, "<img"));
+  EXPECT_EQ(Count(page, "alert('x')"), 0u);
+  EXPECT_GE(Count(page, "&lt;script&gt;alert(&#39;x&#39;)"), 15u);
+}
+
+TEST(ReportHtml, FetchesNothing) {
+  const std::string page = ReportHtml(SomeReport(), SomePictures());
+  EXPECT_EQ(Count(page, "http://") + Count(page, "https://") + Count(page, "@import"), 0u);
+  EXPECT_EQ(Count(page, "<link"), 0u);
+  const std::regex address("(src|href|poster)=\"([^\"]{0,24})");
+  int addresses = 0;
+  for (std::sregex_iterator it(page.begin(), page.end(), address), end; it != end;
+       ++it, ++addresses) {
+    const std::string where = (*it)[2];
+    EXPECT_TRUE(where.rfind("data:image/", 0) == 0 || where == "styled.mp4") << where;
+  }
+  EXPECT_EQ(addresses, 2 + 4 + 2);  // headline pair, one view, a film with its poster
+}
+
+TEST(ReportHtml, UndefinedFiguresSayWhy) {
+  const std::string page = ReportHtml(SomeReport(), SomePictures());
+  EXPECT_NE(page.find("title=\"holdout is 0\""), std::string::npos);
+  EXPECT_EQ(page.find("nan"), std::string::npos);
+}
+
+TEST(ReportHtml, ConsistencyNeverStandsAlone) {
+  RunReport report = SomeReport();
+  report.fidelity.clear();
+  const std::string page = ReportHtml(report, SomePictures());
+  EXPECT_NE(page.find("fidelity to the 2D method"), std::string::npos);
+  EXPECT_NE(page.find("title=\"not measured\""), std::string::npos);
+}
+
+TEST(ReportHtml, AnUndefinedPairBreaksTheLine) {
+  const std::string page = ReportHtml(SomeReport(), SomePictures());
+  EXPECT_EQ(Count(page, "<polyline"), 2u);
+}
+
+TEST(ReportHtml, AnEmptyReportIsAPage) {
+  const std::string page = ReportHtml(RunReport(), ReportPictures());
+  EXPECT_EQ(page.find("<img"), std::string::npos);
+  EXPECT_NE(page.find("</html>"), std::string::npos);
+}
+
+TEST(Figure, H111_NotFiniteIsUndefined) {
+  EXPECT_FALSE(Figure(std::numeric_limits<double>::quiet_NaN()).value.has_value());
+  EXPECT_FALSE(Figure(std::numeric_limits<double>::infinity()).value.has_value());
+  EXPECT_TRUE(Figure(0.0).value.has_value());
+}
+
+}  // namespace
+}  // namespace regrade
