@@ -69,7 +69,8 @@ FastGrid MakeFastGrid(const RadianceField& field) {
   const int lanes = grid.lanes(), stride = field.appearance.stride();
   grid.records.Resize(n * lanes);
   for (int64_t v = 0; v < n; ++v) {
-    std::copy_n(field.appearance.sh.data() + v * stride, stride, grid.records.data() + v * lanes);
+    std::copy_n(field.appearance.sh.data() + v * stride, stride,
+                grid.records.data() + v * lanes);
     grid.records[v * lanes + DensityLane(grid.basis)] = geometry.density[v];
   }
   RefreshDerived(&grid);
@@ -88,7 +89,8 @@ RadianceField ToRadianceField(const FastGrid& grid) {
   const int stride = field.appearance.stride();
   field.appearance.sh.Resize(n * stride);
   for (int64_t v = 0; v < n; ++v) {
-    std::copy_n(grid.records.data() + v * lanes, stride, field.appearance.sh.data() + v * stride);
+    std::copy_n(grid.records.data() + v * lanes, stride,
+                field.appearance.sh.data() + v * stride);
     geometry->density[v] = grid.records[v * lanes + DensityLane(grid.basis)];
   }
   field.geometry = std::move(geometry);
@@ -99,8 +101,9 @@ RadianceField ToRadianceField(const FastGrid& grid) {
 
 namespace {
 
-// Two sweeps along one axis: distance <= neighbour + 1. Three axes give the Chebyshev distance when each pass
-// takes the minimum over max(distance, steps along the axis); done here by separable dilation counts.
+// Two sweeps along one axis: distance <= neighbour + 1. Three axes give the Chebyshev distance
+// when each pass takes the minimum over max(distance, steps along the axis); done here by
+// separable dilation counts.
 void SpreadAxis(const Vec3i& n, int axis, Buffer<uint8_t>* distance) {
   const int64_t strides[3] = {static_cast<int64_t>(n.y) * n.z, n.z, 1};
   const int length = n[axis];
@@ -112,11 +115,13 @@ void SpreadAxis(const Vec3i& n, int axis, Buffer<uint8_t>* distance) {
     for (int b = 0; b < n[v]; ++b) {
       uint8_t* p = distance->data() + a * strides[u] + b * strides[v];
       for (int i = 0; i < length; ++i) line[static_cast<size_t>(i)] = p[i * stride];
-      // out(i) = min over j of max(line(j), |i - j|): grow the radius until it covers the smallest value found.
+      // out(i) = min over j of max(line(j), |i - j|): grow the radius until it covers the
+      // smallest value found.
       for (int i = 0; i < length; ++i) {
         int best = line[static_cast<size_t>(i)];
         for (int r = 1; r < best; ++r) {
-          if (i - r >= 0) best = std::min(best, std::max<int>(line[static_cast<size_t>(i - r)], r));
+          if (i - r >= 0)
+            best = std::min(best, std::max<int>(line[static_cast<size_t>(i - r)], r));
           if (i + r < length)
             best = std::min(best, std::max<int>(line[static_cast<size_t>(i + r)], r));
         }

@@ -1,8 +1,10 @@
-// The CPU's fast path for rays: vectors over the values of a voxel, density marched first, colours after, and
-// gradients gathered in small private arenas. Held to ray_loss.h by the parity tests.
+// The CPU's fast path for rays: vectors over the values of a voxel, density marched first,
+// colours after, and gradients gathered in small private arenas. Held to ray_loss.h by the
+// parity tests.
 //
 // A voxel's values sit in one record of `lanes` floats that fills whole cache lines:
-//   basis 9: 32 lanes, basis 4: 16 lanes, basis 1: 4 lanes; sh [3, basis] first, density right behind them.
+//   basis 9: 32 lanes, basis 4: 16 lanes, basis 1: 4 lanes; sh [3, basis] first, density right
+//   behind them.
 #pragma once
 
 #include <cstdint>
@@ -20,12 +22,13 @@ constexpr int DensityLane(int basis) { return 3 * basis; }
 // Owner of what the fast path reads. `density` is dense, so that a probe costs no indirection.
 struct FastGrid {
   GridFrame frame;
-  Buffer<int32_t> links;           // [X, Y, Z]
-  Buffer<float> dense_density;     // [X, Y, Z]; 0 where nothing is stored
-  Buffer<uint8_t> empty_distance;  // [X, Y, Z]: by lowest corner, Chebyshev distance to the nearest cell with a
-                                   // stored corner, 0 for such cells, capped at 255
-  Buffer<int32_t> vertex_of_voxel; // [N]
-  Buffer<float> records;           // [N, lanes]
+  Buffer<int32_t> links;        // [X, Y, Z]
+  Buffer<float> dense_density;  // [X, Y, Z]; 0 where nothing is stored
+  Buffer<uint8_t>
+      empty_distance;  // [X, Y, Z]: by lowest corner, Chebyshev distance to the nearest cell
+                       // with a stored corner, 0 for such cells, capped at 255
+  Buffer<int32_t> vertex_of_voxel;  // [N]
+  Buffer<float> records;            // [N, lanes]
   int basis = 9;
   Vec3f background{0, 0, 0};
   float near_clip = 0;  // world units
@@ -56,8 +59,9 @@ struct RayBatch {
   int64_t size = 0;
 };
 
-// How parameters are stepped. EQ(rmsprop), svox2's: v = g^2 at first touch, then v = beta v + (1 - beta) g^2;
-// x -= rate g / (sqrt(v) + epsilon), no bias correction; untouched voxels keep value and state bit for bit.
+// How parameters are stepped. EQ(rmsprop), svox2's: v = g^2 at first touch, then v = beta v +
+// (1 - beta) g^2; x -= rate g / (sqrt(v) + epsilon), no bias correction; untouched voxels keep
+// value and state bit for bit.
 struct RmspropOptions {
   float beta = 0.95f;
   float epsilon = 1e-8f;
@@ -66,8 +70,8 @@ struct RmspropOptions {
 };
 
 struct FitStepResult {
-  double squared_error = 0;   // sum over rays and channels
-  int64_t samples = 0;        // that were composited
+  double squared_error = 0;     // sum over rays and channels
+  int64_t samples = 0;          // that were composited
   int64_t rejected_voxels = 0;  // with a non-finite gradient: kept as they were
 };
 
@@ -77,15 +81,20 @@ struct FastRayFunctions {
   // color [n, 3] unclipped, depth [n] = sum w t (world), transmittance [n].
   void (*render)(const FastGrid&, const Ray*, int64_t n, const MarchOptions&, float* color,
                  float* depth, float* transmittance);
-  // Renders, and adds the gradient of scale * sum (C - target)^2 to the arena. Returns squared error and samples.
-  FitStepResult (*accumulate)(const FastGrid&, const RayBatch&, const MarchOptions&, float scale,
-                              GradientArena*);
-  // Largest w_i that any ray gives a sample at each voxel's corners; weights [N] hold running maxima.
-  void (*max_weights)(const FastGrid&, const Ray*, int64_t n, const MarchOptions&, float* weights);
-  // Adds the gradient of the total variation of vertices [begin, end). See regularizers in total_variation.h.
+  // Renders, and adds the gradient of scale * sum (C - target)^2 to the arena. Returns squared
+  // error and samples.
+  FitStepResult (*accumulate)(const FastGrid&, const RayBatch&, const MarchOptions&,
+                              float scale, GradientArena*);
+  // Largest w_i that any ray gives a sample at each voxel's corners; weights [N] hold running
+  // maxima.
+  void (*max_weights)(const FastGrid&, const Ray*, int64_t n, const MarchOptions&,
+                      float* weights);
+  // Adds the gradient of the total variation of vertices [begin, end). See regularizers in
+  // total_variation.h.
   void (*total_variation)(const FastGrid&, int64_t begin, int64_t end, float scale_density,
                           float scale_sh, GradientArena*);
-  // Steps slots [begin, end) of arena `self`, summing all arenas in order; a voxel belongs to its first arena.
+  // Steps slots [begin, end) of arena `self`, summing all arenas in order; a voxel belongs to
+  // its first arena.
   int64_t (*step)(FastGrid*, float* second_moment, const GradientArena* arenas, int num_arenas,
                   int self, int64_t begin, int64_t end, const RmspropOptions&);
 };

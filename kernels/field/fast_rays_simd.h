@@ -1,5 +1,5 @@
-// Body of the fast path, compiled once an instruction set: define REGRADE_SIMD_NAMESPACE before including.
-// Only GCC's vector types are used, so the same text becomes SSE, AVX2 or AVX-512.
+// Body of the fast path, compiled once an instruction set: define REGRADE_SIMD_NAMESPACE before
+// including. Only GCC's vector types are used, so the same text becomes SSE, AVX2 or AVX-512.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -69,8 +69,8 @@ inline void CornerWeights(const Vec3f& f, float* w) {
   w[4] = x1y0 * z0, w[5] = x1y0 * f.z, w[6] = x1y1 * z0, w[7] = x1y1 * f.z;
 }
 
-// Walks the density and keeps the samples that composite. Skipping steps through cells without stored corners
-// leaves out exact zeros only.
+// Walks the density and keeps the samples that composite. Skipping steps through cells without
+// stored corners leaves out exact zeros only.
 Marched March(const FastGrid& grid, const Ray& ray, const MarchOptions& options,
               std::vector<Sample>* samples) {
   samples->clear();
@@ -81,16 +81,24 @@ Marched March(const FastGrid& grid, const Ray& ray, const MarchOptions& options,
   result.delta = options.step * march.world_per_voxel;
   const int32_t stride_y = frame.resolution.z;
   const int32_t stride_x = frame.resolution.y * frame.resolution.z;
-  const int32_t offsets[8] = {0,        1,            stride_y,            stride_y + 1,
-                              stride_x, stride_x + 1, stride_x + stride_y, stride_x + stride_y + 1};
+  const int32_t offsets[8] = {0,
+                              1,
+                              stride_y,
+                              stride_y + 1,
+                              stride_x,
+                              stride_x + 1,
+                              stride_x + stride_y,
+                              stride_x + stride_y + 1};
   float transmittance = 1;
   for (int64_t i = 0; i < march.num_steps;) {
     const float t = march.t_begin + static_cast<float>(i) * options.step;
     const Cell<float> cell = LocateCell(frame, march.At(t));
     const int distance = grid.empty_distance[cell.vertex];
     if (distance > 0) {
-      // Every cell nearer than `distance` is empty, and a coordinate moves by at most the length walked.
-      const int64_t skip = static_cast<int64_t>(static_cast<float>(distance - 1) / options.step);
+      // Every cell nearer than `distance` is empty, and a coordinate moves by at most the
+      // length walked.
+      const int64_t skip =
+          static_cast<int64_t>(static_cast<float>(distance - 1) / options.step);
       i += skip > 1 ? skip : 1;
       continue;
     }
@@ -181,7 +189,8 @@ void RenderRays(const FastGrid& grid, const Ray* rays, int64_t n, const MarchOpt
   std::vector<Sample> samples;
   for (int64_t r = 0; r < n; ++r) {
     const Marched marched = March(grid, rays[r], options, &samples);
-    const Vec3f c = Shade<kBasis>(grid, BasisRecord<kBasis>(rays[r].direction), marched, &samples);
+    const Vec3f c =
+        Shade<kBasis>(grid, BasisRecord<kBasis>(rays[r].direction), marched, &samples);
     for (int a = 0; a < 3; ++a) color[3 * r + a] = c[a];
     float sum = 0;
     for (const Sample& s : samples) sum += s.transmittance_before * s.alpha * s.t;
@@ -213,8 +222,8 @@ inline void ReserveSlots(GradientArena* arena, int64_t more, int lanes) {
 }
 
 template <int kBasis>
-FitStepResult Accumulate(const FastGrid& grid, const RayBatch& batch, const MarchOptions& options,
-                         float scale, GradientArena* arena) {
+FitStepResult Accumulate(const FastGrid& grid, const RayBatch& batch,
+                         const MarchOptions& options, float scale, GradientArena* arena) {
   constexpr int kLanes = RecordLanes(kBasis);
   using R = Record<kBasis>;
   FitStepResult result;
@@ -234,7 +243,8 @@ FitStepResult Accumulate(const FastGrid& grid, const RayBatch& batch, const Marc
       const Sample& s = samples[i];
       const float w = s.transmittance_before * s.alpha;
       // See EQ(composite-adjoint).
-      const Vec3f c{std::max(s.raw[0], 0.0f), std::max(s.raw[1], 0.0f), std::max(s.raw[2], 0.0f)};
+      const Vec3f c{std::max(s.raw[0], 0.0f), std::max(s.raw[1], 0.0f),
+                    std::max(s.raw[2], 0.0f)};
       const float transmittance_after = s.transmittance_before * (1 - s.alpha);
       float d_sigma = marched.delta * transmittance_after * Dot(c - behind, d_color);
       if (!(s.tau < static_cast<float>(kMaxOpticalDepth))) d_sigma = 0;
@@ -275,8 +285,8 @@ void MaxWeights(const FastGrid& grid, const Ray* rays, int64_t n, const MarchOpt
   }
 }
 
-// See EQ(total-variation) in total_variation.h. Lanes run side by side; the density lane sees an empty
-// neighbour as 0, the others see their own value there.
+// See EQ(total-variation) in total_variation.h. Lanes run side by side; the density lane sees
+// an empty neighbour as 0, the others see their own value there.
 template <int kBasis>
 void TotalVariation(const FastGrid& grid, int64_t begin, int64_t end, float scale_density,
                     float scale_sh, GradientArena* arena) {
@@ -304,7 +314,8 @@ void TotalVariation(const FastGrid& grid, int64_t begin, int64_t end, float scal
       neighbour[a] = inside ? grid.links[vertex + strides[a]] : -1;
       const float axis = static_cast<float>(n[a]) / 256.0f;
       if (neighbour[a] >= 0) {
-        const R other = R::Load(grid.records.data() + static_cast<int64_t>(neighbour[a]) * kLanes);
+        const R other =
+            R::Load(grid.records.data() + static_cast<int64_t>(neighbour[a]) * kLanes);
         for (int i = 0; i < Shape::kCount; ++i)
           difference[a].v[i] = axis * (other.v[i] - own.v[i]);
       } else {
@@ -320,7 +331,7 @@ void TotalVariation(const FastGrid& grid, int64_t begin, int64_t end, float scal
       Vector sum = difference[0].v[i] * difference[0].v[i] +
                    difference[1].v[i] * difference[1].v[i] +
                    difference[2].v[i] * difference[2].v[i] + 1e-9f;
-      Vector root;
+      Vector root{};
       for (int l = 0; l < Shape::kWidth; ++l) root[l] = std::sqrt(sum[l]);
       const Vector inverse = scale.v[i] / root;
       for (int a = 0; a < 3; ++a) {
@@ -383,7 +394,7 @@ int64_t Step(FastGrid* grid, float* second_moment, const GradientArena* arenas, 
       const Vector squared = g.v[i] * g.v[i];
       const Vector blended = options.beta * v.v[i] + (1 - options.beta) * squared;
       new_v.v[i] = v.v[i] == 0.0f ? squared : blended;
-      Vector root;
+      Vector root{};
       for (int l = 0; l < Shape::kWidth; ++l) root[l] = std::sqrt(new_v.v[i][l]);
       new_x.v[i] = x.v[i] - rate.v[i] * g.v[i] / (root + options.epsilon);
     }
@@ -401,6 +412,7 @@ auto ByBasis(int basis, const Body9& nine, const Body4& four, const Body1& one) 
 
 }  // namespace
 
+extern const FastRayFunctions kFunctions;  // external linkage
 const FastRayFunctions kFunctions = {
     REGRADE_SIMD_NAME,
     [](const FastGrid& g, const Ray* rays, int64_t n, const MarchOptions& o, float* color,

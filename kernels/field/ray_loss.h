@@ -1,9 +1,11 @@
-// One ray through the field, forward and adjoint, plainly: the specification of rendering and of fitting.
+// One ray through the field, forward and adjoint, plainly: the specification of rendering and
+// of fitting.
 //
-// EQ(fit-loss): L = 1 / (3 Q) sum over the batch's Q rays and 3 channels of (C - C_photo)^2 (svox2's gradient
-// 2 / (3 Q) (C - C_photo)); the scale 1 / (3 Q) is passed in. The adjoint walks the same samples back to front
-// (see EQ(composite-adjoint)) and recovers T_{i+1} = exp(-sum_{j<=i} tau_j) from the running optical depth, so
-// it stores nothing and divides by nothing.
+// EQ(fit-loss): L = 1 / (3 Q) sum over the batch's Q rays and 3 channels of (C - C_photo)^2
+// (svox2's gradient 2 / (3 Q) (C - C_photo)); the scale 1 / (3 Q) is passed in. The adjoint
+// walks the same samples back to front (see EQ(composite-adjoint)) and recovers T_{i+1} =
+// exp(-sum_{j<=i} tau_j) from the running optical depth, so it stores nothing and divides by
+// nothing.
 #pragma once
 
 #include <cmath>
@@ -71,8 +73,9 @@ HD RayResult<T> RenderRay(const FieldView<T>& field, const RayT<T>& ray,
   return result;
 }
 
-// Adds dL/d(density), dL/d(sh) for dL/dC = d_color to the gradients, which have the field's shapes. `result` is
-// RenderRay's of the same arguments. `Add(pointer, value)` is a plain or an atomic +=.
+// Adds dL/d(density), dL/d(sh) for dL/dC = d_color to the gradients, which have the field's
+// shapes. `result` is RenderRay's of the same arguments. `Add(pointer, value)` is a plain or an
+// atomic +=.
 template <typename T, typename Add>
 HD void RenderRayAdjoint(const FieldView<T>& field, const RayT<T>& ray,
                          const MarchOptions& options, const RayResult<T>& result,
@@ -97,8 +100,7 @@ HD void RenderRayAdjoint(const FieldView<T>& field, const RayT<T>& ray,
     const Vec3<T> color = SampleColor(field, cell, gamma, &raw);
     const T transmittance_after = exp(-depth_after);
     const T w = exp(-(depth_after - tau)) * Opacity(tau);
-    T d_sigma =
-        CompositeAdjoint(delta, tau, transmittance_after, color, d_color, &behind);
+    T d_sigma = CompositeAdjoint(delta, tau, transmittance_after, color, d_color, &behind);
     if (!(density < T(kMaxDensity)) || !(density * delta < T(kMaxOpticalDepth))) d_sigma = 0;
     for (int corner = 0; corner < 8; ++corner) {
       const int32_t link = field.links[CornerVertex(field.frame, cell.vertex, corner)];

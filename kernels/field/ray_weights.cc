@@ -9,7 +9,8 @@
 namespace regrade {
 namespace {
 
-// The density half of RenderRay; the same arithmetic, so that weights agree bit for bit with it.
+// The density half of RenderRay; the same arithmetic, so that weights agree bit for bit with
+// it.
 float MarchDensity(const Geometry& geometry, const Ray& ray, const MarchOptions& options,
                    float near_clip, float min_weight, std::vector<WeightedSample>* out) {
   const GridFrame& frame = geometry.frame;

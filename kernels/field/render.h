@@ -20,9 +20,10 @@ struct RenderedView {
 
 struct FastGrid;
 
-// The fast path of this machine. Rays go through the camera's lens. For many views make the grid once
-// (MakeFastGrid in fast_rays.h).
-RenderedView RenderView(const FastGrid& grid, const Camera& camera, const MarchOptions& options);
+// The fast path of this machine. Rays go through the camera's lens. For many views make the
+// grid once (MakeFastGrid in fast_rays.h).
+RenderedView RenderView(const FastGrid& grid, const Camera& camera,
+                        const MarchOptions& options);
 RenderedView RenderView(const RadianceField& field, const Camera& camera,
                         const MarchOptions& options);
 
@@ -30,7 +31,8 @@ RenderedView RenderView(const RadianceField& field, const Camera& camera,
 RenderedView RenderViewPlain(const RadianceField& field, const Camera& camera,
                              const MarchOptions& options, Backend backend = Backend::kCpu);
 
-// From raw sums to a view: colours clipped to [0, 1], ray lengths turned into depths along the optical axis.
+// From raw sums to a view: colours clipped to [0, 1], ray lengths turned into depths along the
+// optical axis.
 void FinishView(const Camera& camera, const std::vector<Ray>& rays, RenderedView* view);
 
 }  // namespace regrade

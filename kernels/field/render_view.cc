@@ -7,7 +7,8 @@
 
 namespace regrade {
 
-RenderedView RenderView(const FastGrid& grid, const Camera& camera, const MarchOptions& options) {
+RenderedView RenderView(const FastGrid& grid, const Camera& camera,
+                        const MarchOptions& options) {
   constexpr int kTile = 16;
   const int width = camera.width, height = camera.height;
   const int tiles_x = (width + kTile - 1) / kTile, tiles_y = (height + kTile - 1) / kTile;

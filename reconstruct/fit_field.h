@@ -1,0 +1,61 @@
+// Fitting a Plenoxel field to posed photos: coarse to fine, RMSProp on touched voxels, total
+// variation, pruning by rendering weight (Fridovich-Keil et al., CVPR 2022, and the recipe of
+// its public code).
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "kernels/base/progress.h"
+#include "kernels/field/fast_rays.h"
+#include "kernels/field/radiance_field.h"
+#include "reconstruct/fit_options.h"
+#include "reconstruct/training_rays.h"
+
+namespace regrade {
+
+// The part of the field's frame that is modelled.
+struct SceneBox {
+  Vec3f center{0, 0, 0};
+  Vec3f radius{1, 1, 1};
+  float near_clip = 0;  // nothing is modelled nearer to a camera than this
+};
+
+// Everything a fit needs to go on as if it had never stopped (H110).
+struct FitState {
+  FastGrid grid;
+  Buffer<float> second_moment;  // [N, lanes]
+  int stage = 0;
+  int step = 0;  // within the stage
+};
+
+struct FitCurvePoint {
+  int64_t rays = 0;
+  double seconds = 0;
+  double psnr_train_db = 0;  // over the rays since the last point
+};
+
+struct FitResult {
+  RadianceField field;
+  double psnr_train_db = 0;  // over the last tenth of the rays
+  int64_t rays = 0;
+  int64_t samples = 0;
+  int64_t rejected_voxels = 0;  // steps refused for a non-finite gradient
+  double seconds = 0;           // this call's, without checkpoints
+  std::vector<FitCurvePoint> curve;
+};
+
+struct FitHooks {
+  ProgressFunction progress;
+  const FitState* resume = nullptr;
+  // Called at stage ends, about once a minute, and before an abort.
+  std::function<void(const FitState&)> checkpoint;
+};
+
+// Throws Error(kScene) if the field comes out empty, Interrupted after kAbort (the checkpoint
+// has been called).
+FitResult FitField(const std::vector<TrainingView>& views, const SceneBox& box,
+                   const FitOptions& options, const FitHooks& hooks);
+
+}  // namespace regrade

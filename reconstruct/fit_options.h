@@ -1,0 +1,101 @@
+// What fitting a radiance field can be told.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "kernels/base/options.h"
+
+namespace regrade {
+
+struct FitOptions {
+  std::vector<int> resolutions = {64, 128, 192};
+  std::vector<int> steps = {600, 900, 900};
+  int rays_per_step = 8192;
+  int patch = 2;
+  int sh_degree = 2;
+  float step = 0.5f;
+  float stop_transmittance = 1e-3f;
+  float rate_density = 30.0f;
+  float rate_density_end = 1.0f;
+  float rate_sh = 1e-2f;
+  float rate_sh_end = 5e-4f;
+  float tv_density = 5e-3f;
+  float tv_sh = 5e-3f;
+  float tv_decay = 0.5f;
+  float tv_share = 0.01f;
+  float prune_weight = 1.28f;
+  float initial_density = 0.1f;
+  int shards = 0;
+  uint64_t seed = 0;
+
+  template <typename Bind>
+  void Describe(Bind& bind) {
+    bind("fit-resolutions", resolutions,
+         {.unit = "voxels",
+          .help = "longest side of the grid in each stage, coarse to fine; memory grows with "
+                  "its cube",
+          .min = 8,
+          .max = 1024});
+    bind("fit-steps", steps,
+         {.unit = "steps",
+          .help = "optimizer steps in each stage; time grows with their sum",
+          .min = 1,
+          .max = 1000000});
+    bind("fit-rays", rays_per_step,
+         {.unit = "rays", .help = "rays in a step", .min = 64, .max = 1 << 22});
+    bind("fit-patch", patch,
+         {.unit = "pixels",
+          .help = "side of the little squares rays are drawn in: larger is faster (rays share "
+                  "voxels in cache) and learns less from a ray",
+          .min = 1,
+          .max = 32});
+    bind(
+        "sh-degree", sh_degree,
+        {.help =
+             "view dependence: spherical harmonics degree 0, 1 or 2 (1, 4, 9 values a channel)",
+         .min = 0,
+         .max = 2});
+    bind("fit-step-size", step,
+         {.unit = "voxels",
+          .help = "distance of samples along a ray; 1 halves the time of 0.5",
+          .min = 0.1,
+          .max = 4});
+    bind("fit-stop", stop_transmittance,
+         {.help = "a ray ends when less light than this is left; the error a channel is at "
+                  "most this",
+          .min = 0,
+          .max = 0.1});
+    bind("fit-rate-density", rate_density,
+         {.help = "RMSProp rate of densities at the start", .min = 0, .max = 1e4});
+    bind("fit-rate-density-end", rate_density_end,
+         {.help = "the same at the end (exponential in between)", .min = 0, .max = 1e4});
+    bind("fit-rate-sh", rate_sh,
+         {.help = "RMSProp rate of colours at the start", .min = 0, .max = 10});
+    bind("fit-rate-sh-end", rate_sh_end, {.help = "the same at the end", .min = 0, .max = 10});
+    bind("tv-density", tv_density,
+         {.help =
+              "weight of the total variation of densities: smoother surfaces, fewer floaters",
+          .min = 0,
+          .max = 10});
+    bind("tv-sh", tv_sh,
+         {.help = "weight of the total variation of colours", .min = 0, .max = 10});
+    bind("tv-decay", tv_decay,
+         {.help = "factor on both weights at each finer stage", .min = 0, .max = 1});
+    bind("tv-share", tv_share,
+         {.help = "share of the voxels regularised in a step", .min = 0, .max = 1});
+    bind("prune-weight", prune_weight,
+         {.help = "voxels that weigh less than this / resolution in every view are dropped "
+                  "between stages",
+          .min = 0,
+          .max = 100});
+    bind("initial-density", initial_density,
+         {.unit = "1/radius", .help = "density everywhere at the start", .min = 0, .max = 100});
+    bind("fit-shards", shards,
+         {.help = "gradient arenas; 0: one a thread, or 4 with --reproducible",
+          .min = 0,
+          .max = 64});
+  }
+};
+
+}  // namespace regrade

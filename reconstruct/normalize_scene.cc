@@ -1,0 +1,160 @@
+#include "reconstruct/normalize_scene.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace regrade {
+namespace {
+
+constexpr size_t kMinPoints = 50;
+constexpr double kTail = 0.01;    // share of points left out at each end of an axis
+constexpr double kMargin = 0.08;  // of the extent, added on both sides
+constexpr double kNearestShare =
+    0.6;  // the scene begins at this share of the nearest points' distance
+
+Eigen::Vector3d ToEigen(const Vec3d& v) { return {v.x, v.y, v.z}; }
+Vec3d FromEigen(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+
+double Quantile(std::vector<double>* values, double q) {
+  const size_t k = std::min(values->size() - 1,
+                            static_cast<size_t>(q * static_cast<double>(values->size())));
+  std::nth_element(values->begin(), values->begin() + static_cast<long>(k), values->end());
+  return (*values)[k];
+}
+
+// Sums in the order of sorted values, so that re-ordered photos give the same bits (H154).
+Vec3d OrderFreeMean(std::vector<Vec3d> values) {
+  Vec3d mean;
+  for (int a = 0; a < 3; ++a) {
+    std::vector<double> axis;
+    for (const Vec3d& v : values) axis.push_back(v[a]);
+    std::sort(axis.begin(), axis.end());
+    double sum = 0;
+    for (const double v : axis) sum += v;
+    mean[a] = sum / static_cast<double>(axis.size());
+  }
+  return mean;
+}
+
+// Makes the largest component positive: an eigenvector's sign must not depend on the solver.
+Eigen::Vector3d FixSign(Eigen::Vector3d v) {
+  Eigen::Index largest;
+  v.cwiseAbs().maxCoeff(&largest);
+  return v(largest) < 0 ? Eigen::Vector3d(-v) : v;
+}
+
+Eigen::Matrix3d Spread(const std::vector<Vec3d>& positions, const Vec3d& mean) {
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  for (const Vec3d& p : positions) {
+    const Eigen::Vector3d d = ToEigen(p - mean);
+    covariance += d * d.transpose();
+  }
+  return covariance;
+}
+
+Mat3d UprightRotation(const std::vector<Vec3d>& centers, const std::vector<Vec3d>& ups,
+                      const std::vector<Vec3d>& forwards, std::string* notice) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> spread(
+      Spread(centers, OrderFreeMean(centers)));
+  Eigen::Vector3d up = ToEigen(OrderFreeMean(ups));
+  if (up.norm() < 0.1) {
+    up = FixSign(spread.eigenvectors().col(0));
+    *notice =
+        "the photos disagree about up; the direction in which the cameras moved least is taken";
+  }
+  up.normalize();
+  Eigen::Vector3d heading = ToEigen(OrderFreeMean(forwards));
+  heading -= up * up.dot(heading);
+  if (heading.norm() < 0.1) {
+    // Photos look all round: take the direction in which the cameras moved most.
+    heading = FixSign(spread.eigenvectors().col(2));
+    heading -= up * up.dot(heading);
+  }
+  if (heading.norm() < 1e-6) heading = up.unitOrthogonal();
+  heading.normalize();
+  const Eigen::Vector3d right = heading.cross(up);
+  Mat3d rotation;
+  rotation.row[0] = FromEigen(right);
+  rotation.row[1] = FromEigen(heading);
+  rotation.row[2] = FromEigen(up);
+  return rotation;
+}
+
+// The point nearest to all optical axes; regularised, so that parallel axes give the cameras'
+// mean.
+Vec3d CommonPoint(const std::vector<Vec3d>& centers, const std::vector<Vec3d>& forwards) {
+  const Eigen::Vector3d mean = ToEigen(OrderFreeMean(centers));
+  Eigen::Matrix3d a = 1e-6 * static_cast<double>(centers.size()) * Eigen::Matrix3d::Identity();
+  Eigen::Vector3d b = a * mean;
+  for (size_t i = 0; i < centers.size(); ++i) {
+    const Eigen::Vector3d d = ToEigen(forwards[i]);
+    const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - d * d.transpose();
+    a += across;
+    b += across * ToEigen(centers[i]);
+  }
+  return FromEigen(a.ldlt().solve(b));
+}
+
+}  // namespace
+
+NormalizedScene NormalizeScene(const Capture& capture) {
+  NormalizedScene result;
+  std::vector<Vec3d> centers, ups, forwards;
+  for (const CaptureView& view : capture.views) {
+    centers.push_back(view.camera.Center());
+    ups.push_back(view.camera.Up());
+    forwards.push_back(view.camera.Forward());
+  }
+  const Mat3d rotation = UprightRotation(centers, ups, forwards, &result.notice);
+
+  // Box and nearest distance in the rotated world.
+  Vec3d low, high;
+  double nearest = 0;
+  if (capture.points.size() >= kMinPoints) {
+    for (int a = 0; a < 3; ++a) {
+      std::vector<double> along;
+      for (const ScenePoint& p : capture.points)
+        along.push_back(Dot(rotation.row[a], p.position));
+      low[a] = Quantile(&along, kTail);
+      high[a] = Quantile(&along, 1 - kTail);
+    }
+    std::vector<double> distances;
+    for (const ScenePoint& p : capture.points)
+      for (const int32_t view : p.views)
+        distances.push_back(Norm(p.position - centers[static_cast<size_t>(view)]));
+    if (!distances.empty()) nearest = kNearestShare * Quantile(&distances, kTail);
+  } else {
+    const Vec3d common = CommonPoint(centers, forwards);
+    std::vector<double> distances;
+    for (const Vec3d& c : centers) distances.push_back(Norm(c - common));
+    double half = Quantile(&distances, 0.5) / 0.9;
+    if (!(half > 0)) half = 1;
+    result.notice = "few points: the box is the cube round the cameras' common point";
+    for (int a = 0; a < 3; ++a) {
+      const double middle = Dot(rotation.row[a], common);
+      low[a] = middle - half;
+      high[a] = middle + half;
+    }
+    nearest = 0.35 * half;
+  }
+  Vec3d middle, half;
+  double longest = 0;
+  for (int a = 0; a < 3; ++a) {
+    middle[a] = 0.5 * (low[a] + high[a]);
+    half[a] = (0.5 + kMargin) * (high[a] - low[a]);
+    longest = std::max(longest, half[a]);
+  }
+  if (!(longest > 0)) longest = 1;
+  Similarity& s = result.field_from_world;
+  s.scale = 1 / longest;
+  s.rotation = rotation;
+  s.translation = -(s.scale * middle);
+  for (int a = 0; a < 3; ++a)  // a flat scene still gets a box with a volume
+    result.box.radius[a] = static_cast<float>(std::max(half[a] / longest, 0.05));
+  result.box.near_clip = static_cast<float>(nearest * s.scale);
+  return result;
+}
+
+}  // namespace regrade
