@@ -1,0 +1,165 @@
+#!/usr/bin/env python3
+"""Checks that each equation has one home in the sources, one row in EQUATIONS.md, and a test that exists.
+
+A home is a comment with EQ(tag) followed by a comma or a colon; elsewhere one writes "see EQ(tag)".
+
+  check_equations.py [--root DIR]   checks the tree; one line for each finding, exit status 1 if there is any
+  check_equations.py --self-test    plants each kind of mistake in a scratch tree and sees it found
+"""
+
+import argparse
+import os
+import re
+import sys
+import tempfile
+
+ROOMS = ("kernels", "reconstruct", "stylize", "evaluate", "pipeline")
+TAG = re.compile(r"(?<![A-Za-z0-9_])EQ\(([a-z][a-z0-9-]*)\)")
+TEST = re.compile(r"\bTEST(?:_F|_P)?\(\s*(\w+)\s*,\s*(\w+)\s*\)|\bTYPED_TEST(?:_P)?\(\s*(\w+)\s*,\s*(\w+)\s*\)")
+TABLE_COLUMNS = 5  # tag, equation, source, file, tests
+
+
+def source_files(root, rooms):
+    for room in rooms:
+        for folder, subfolders, names in os.walk(os.path.join(root, room)):
+            subfolders.sort()
+            for name in sorted(names):
+                if name.endswith((".h", ".cuh", ".cc", ".cu")):
+                    path = os.path.join(folder, name)
+                    with open(path, encoding="utf-8", errors="replace") as file:
+                        yield os.path.relpath(path, root).replace(os.sep, "/"), file.read()
+
+
+def homes_and_references(root):
+    """({tag: [where]}, {tag: [where]}): where an equation is stated, and where it is pointed at."""
+    homes, references = {}, {}
+    for path, text in source_files(root, ROOMS + ("tests",)):
+        for number, line in enumerate(text.splitlines(), 1):
+            for match in TAG.finditer(line):
+                in_comment = re.search(r"//|/\*|^\s*\*", line[:match.start()]) is not None
+                stated = line[match.end():].startswith((",", ":"))
+                pointed = re.search(r"\bsee $", line[:match.start()], re.I) is not None
+                is_home = in_comment and stated and not pointed and not path.startswith("tests/")
+                (homes if is_home else references).setdefault(match.group(1), []).append((path, number))
+    return homes, references
+
+
+def test_names(root):
+    names = set()
+    for _, text in source_files(root, ("tests",)):
+        for match in TEST.finditer(text):
+            suite, case = match.group(1) or match.group(3), match.group(2) or match.group(4)
+            names.add(f"{suite}.{case}")
+    return names
+
+
+def table_rows(root):
+    """[(line, tag, file, [tests])] of EQUATIONS.md; raises ValueError on a row that is not one."""
+    rows = []
+    with open(os.path.join(root, "EQUATIONS.md"), encoding="utf-8") as file:
+        for number, line in enumerate(file, 1):
+            if not line.startswith("| `"):
+                continue
+            cells = [cell.strip() for cell in re.split(r"(?<!\\)\|", line.strip().strip("|"))]
+            if len(cells) != TABLE_COLUMNS:
+                raise ValueError(f"EQUATIONS.md:{number}: {len(cells)} cells instead of {TABLE_COLUMNS}")
+            tests = [test.strip(" `") for test in cells[4].split(",") if test.strip(" `")]
+            rows.append((number, cells[0].strip("`"), cells[3].strip("`"), tests))
+    return rows
+
+
+def check_tree(root):
+    homes, references = homes_and_references(root)
+    tests = test_names(root)
+    findings = []
+    try:
+        rows = table_rows(root)
+    except (OSError, ValueError) as error:
+        return [str(error)]
+
+    for tag, places in sorted(homes.items()):
+        if len(places) > 1:
+            findings.append(f"EQ({tag}) has {len(places)} homes: " + ", ".join(f"{p}:{n}" for p, n in places)
+                            + "; write 'see EQ(...)' in all but one")
+        if tag not in {row[1] for row in rows}:
+            findings.append(f"{places[0][0]}:{places[0][1]}: EQ({tag}) has no row in EQUATIONS.md")
+    for tag, places in sorted(references.items()):
+        if tag not in homes:
+            findings.append(f"{places[0][0]}:{places[0][1]}: EQ({tag}) is stated nowhere")
+
+    seen = set()
+    for number, tag, path, row_tests in rows:
+        where = f"EQUATIONS.md:{number}: {tag}"
+        if tag in seen:
+            findings.append(f"{where} has a second row")
+        seen.add(tag)
+        if tag not in homes:
+            findings.append(f"{where} is stated nowhere in the sources")
+        elif path != homes[tag][0][0]:
+            findings.append(f"{where} lives in {homes[tag][0][0]}, not in {path}")
+        if not row_tests:
+            findings.append(f"{where} names no test")
+        for test in row_tests:
+            if test not in tests:
+                findings.append(f"{where}: no test {test} in tests/")
+    return findings
+
+
+def self_test():
+    tidy = {
+        "kernels/field/a.h": "// EQ(one): x = y.\n// As in (see EQ(two)), above.\n// EQ(two), after Max: a | b.\n",
+        "tests/a_test.cc": "TEST(A, One) { EXPECT_EQ(two); }\nTEST_F(A,\n       Two) {}\n// see EQ(one): tested\n",
+        "EQUATIONS.md": "| tag | equation | source | file | tests |\n|---|---|---|---|---|\n"
+                        "| `one` | x = y | us | `kernels/field/a.h` | `A.One` |\n"
+                        "| `two` | a \\| b | Max | `kernels/field/a.h` | `A.One`, `A.Two` |\n",
+    }
+    table = tidy["EQUATIONS.md"]
+    planted = (
+        ({"kernels/field/b.h": "// EQ(one): x = y.\n"}, "2 homes"),
+        ({"kernels/field/b.h": "// EQ(three): z.\n"}, "no row"),
+        ({"kernels/field/b.h": "// see EQ(four).\n"}, "stated nowhere"),
+        ({"EQUATIONS.md": table + "| `five` | x | us | `kernels/field/a.h` | `A.One` |\n"}, "stated nowhere"),
+        ({"EQUATIONS.md": table + table.splitlines()[2] + "\n"}, "second row"),
+        ({"EQUATIONS.md": table.replace("a.h` | `A.One` |", "z.h` | `A.One` |")}, "lives in"),
+        ({"EQUATIONS.md": table.replace("`A.Two`", "`A.Three`")}, "no test A.Three"),
+        ({"EQUATIONS.md": table.replace("a.h` | `A.One` |", "a.h` | |")}, "names no test"),
+        ({"EQUATIONS.md": table.replace("\\|", "|")}, "6 cells"),
+    )
+    failures = 0
+
+    def findings_with(extra):
+        with tempfile.TemporaryDirectory() as root:
+            for path, text in {**tidy, **extra}.items():
+                os.makedirs(os.path.dirname(os.path.join(root, path)) or root, exist_ok=True)
+                with open(os.path.join(root, path), "w", encoding="utf-8") as file:
+                    file.write(text)
+            return check_tree(root)
+
+    for finding in findings_with({}):
+        failures += 1
+        print("self-test: a tidy tree is blamed:", finding)
+    for extra, expected in planted:
+        found = findings_with(extra)
+        if len(found) != 1 or expected not in found[0]:
+            failures += 1
+            print(f"self-test: expected one finding '{expected}', got {found}")
+    print(f"self-test: {len(planted)} planted mistakes, {failures} failures")
+    return failures
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--root", default=os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+    parser.add_argument("--self-test", action="store_true")
+    arguments = parser.parse_args()
+    if arguments.self_test:
+        return 1 if self_test() else 0
+    findings = check_tree(arguments.root)
+    for finding in findings:
+        print(finding)
+    print(f"check_equations: {len(findings)} findings")
+    return 1 if findings else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

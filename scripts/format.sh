@@ -1,0 +1,10 @@
+#!/usr/bin/env bash
+# Formats the sources as .clang-format says; with --check it changes nothing and fails on what it would change.
+set -euo pipefail
+
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+mode=(-i)
+if [[ "${1:-}" == "--check" ]]; then
+  mode=(--dry-run --Werror)
+fi
+git ls-files -z -- '*.h' '*.cc' '*.cu' | xargs -0 clang-format "${mode[@]}"

@@ -1,0 +1,30 @@
+#!/usr/bin/env python3
+"""Prints the headline figures of a report.json: print_headline.py FILE"""
+
+import json
+import sys
+
+
+def shown(holder, key, unit="dB"):
+    """The figure, or why there is none."""
+    value = (holder or {}).get(key)
+    if value is None:
+        return f"– ({(holder or {}).get(key + '_why', 'not measured')})"
+    return f"{value:.2f} {unit}"
+
+
+def main():
+    with open(sys.argv[1], encoding="utf-8") as file:
+        report = json.load(file)
+    consistency = {(row["sequence"], row["gap"]): row for row in report["consistency"]}
+    fidelity = {row["sequence"]: row for row in report["fidelity"]}
+    gap = min((gap for _, gap in consistency), default=1)
+    print(f"held-out PSNR of the reconstruction   {shown(report['stages'].get('reconstruct'), 'psnr_heldout_db')}")
+    print(f"consistency, frame by frame in 2D     {shown(consistency.get(('views_2d', gap)), 'tc_psnr_mean_db')}")
+    print(f"consistency, the styled scene         {shown(consistency.get(('styled', gap)), 'tc_psnr_mean_db')}")
+    print(f"fidelity of the styled scene to 2D    {shown(fidelity.get('styled'), 'psnr_to_2d_db')}")
+    print(f"time                                  {report['seconds']:.0f} s")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,30 @@
+#!/usr/bin/env bash
+# The whole test: a build with warnings as errors, every test, then kernels and readers once more under the address and
+# undefined-behaviour sanitizers. Asks nothing; exit status 0 means that all is well.
+set -euo pipefail
+exec </dev/null
+
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+cd "$root"
+jobs=$(nproc)
+
+# Test programs that meet hostile bytes or do pointer arithmetic.
+sanitized=(child_process_test kernels_network_test pipeline_report_test)
+
+scripts/install_packages.sh
+
+echo "== build, warnings are errors"
+cmake --preset cpu -DREGRADE_WERROR=ON
+cmake --build --preset cpu --parallel "$jobs"
+
+echo "== tests"
+ctest --test-dir build/cpu --output-on-failure -j2
+
+echo "== build with sanitizers"
+cmake --preset sanitize -DREGRADE_WERROR=OFF
+cmake --build --preset sanitize --parallel "$jobs" --target "${sanitized[@]}"
+
+echo "== tests under sanitizers"
+export ASAN_OPTIONS=allocator_may_return_null=1 UBSAN_OPTIONS=print_stacktrace=1
+# Programs that were not built here announce themselves as NAME_NOT_BUILT; the checks of the tree have run above.
+ctest --test-dir build/sanitize --output-on-failure --no-tests=error -j2 -E '_NOT_BUILT$|^check_'
