@@ -6,8 +6,8 @@
 #include <memory>
 
 #include "evaluate/frame_cache.h"
-#include "evaluate/row_sum.h"
 #include "kernels/base/error.h"
+#include "kernels/image/row_sum.h"
 #include "kernels/image/warp.h"
 
 namespace regrade {

@@ -18,7 +18,7 @@ struct ConsistencyOptions {
   std::vector<int> gaps{1, 5};
   std::string mode = "lai2018";
   std::string flow = "dis-medium";
-  double min_coverage = 0.1;
+  double min_coverage = 0.4;
 
   template <typename Bind>
   void Describe(Bind& bind) {
@@ -37,8 +37,9 @@ struct ConsistencyOptions {
                   "1 : 2 : 10 : 50 : 20 in time"});
     bind("min-coverage", min_coverage,
          {.unit = "share of pixels",
-          .help = "pairs with fewer comparable pixels are flagged (unrelated pictures can "
-                  "reach 0.35: look at the coverage too)",
+          .help =
+              "pairs with fewer comparable pixels are flagged; unrelated pictures reach 0.35, "
+              "neighbouring views of a scene 0.8",
           .min = 0,
           .max = 1});
   }

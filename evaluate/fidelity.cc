@@ -4,10 +4,10 @@
 #include <cmath>
 #include <limits>
 
-#include "evaluate/hue_chroma.h"
 #include "evaluate/image_quality.h"
 #include "evaluate/sliced_wasserstein.h"
 #include "kernels/base/error.h"
+#include "kernels/image/hue_chroma.h"
 
 namespace regrade {
 namespace {

@@ -18,7 +18,8 @@ struct FidelityRow {
   std::optional<double> psnr_to_2d_db;
 
   // Circular standard deviation of the CIELAB hue weighted by chroma (radians), and mean chroma
-  // (CIELAB units), over all pixels of all frames: see hue_chroma.h. hue_std is empty for grey.
+  // (CIELAB units), over all pixels of all frames: see kernels/image/hue_chroma.h. hue_std is
+  // empty for grey.
   std::optional<double> hue_std, hue_std_2d;  // of the sequence, of the 2D method's frames
   std::optional<double> chroma, chroma_2d;    // likewise
 

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 
-#include "evaluate/row_sum.h"
 #include "kernels/base/error.h"
+#include "kernels/image/row_sum.h"
 
 namespace regrade {
 namespace {

@@ -4,8 +4,8 @@
 #include <array>
 #include <cmath>
 
-#include "evaluate/row_sum.h"
 #include "kernels/base/error.h"
+#include "kernels/image/row_sum.h"
 #include "kernels/image/warp.h"
 
 namespace regrade {

@@ -1,6 +1,5 @@
 #include "evaluate/optical_flow.h"
 
-#include <cmath>
 #include <cstring>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
@@ -19,7 +18,7 @@ std::string SizeText(const Image& image) {
 uint8_t ToByte(float value) {
   // The comparison is false for NaN, which becomes black.
   if (!(value > 0)) return 0;
-  return value >= 1 ? 255 : static_cast<uint8_t>(std::lround(value * 255.0f));
+  return value < 1 ? static_cast<uint8_t>(value * 255.0f + 0.5f) : 255;
 }
 
 cv::Mat GreyBytes(const Image& image) {
@@ -28,8 +27,14 @@ cv::Mat GreyBytes(const Image& image) {
   const int kept = colour ? 3 : 1;
   for (int y = 0; y < image.height; ++y) {
     uint8_t* row = bytes.ptr<uint8_t>(y);
-    for (int x = 0; x < image.width; ++x)
-      for (int c = 0; c < kept; ++c) row[x * kept + c] = ToByte(image.at(x, y)[c]);
+    const float* pixels = image.at(0, y);
+    if (kept == image.channels) {
+      for (int i = 0; i < image.width * kept; ++i) row[i] = ToByte(pixels[i]);
+    } else {
+      for (int x = 0; x < image.width; ++x)
+        for (int c = 0; c < kept; ++c)
+          row[x * kept + c] = ToByte(pixels[x * image.channels + c]);
+    }
   }
   if (!colour) return bytes;
   cv::Mat grey;

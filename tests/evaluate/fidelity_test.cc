@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "evaluate/hue_chroma.h"
 #include "evaluate/sliced_wasserstein.h"
 #include "kernels/base/error.h"
+#include "kernels/image/hue_chroma.h"
 #include "tests/evaluate/synthetic_frames.h"
 
 namespace regrade {

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "evaluate/consistency.h"
 #include "tests/evaluate/synthetic_frames.h"
@@ -134,6 +136,38 @@ TEST(GeometricFlow, HiddenPointsFailTheDepthTest) {
   EXPECT_EQ(GeometricMask(flow, visible).disoccluded,
             std::count(visible.pixels.begin(), visible.pixels.end(), 0.f) -
                 GeometricMask(flow, visible).out_of_frame);
+}
+
+// The wall z = `z(x)` as camera a sees it.
+Image DepthOfColumns(const Camera& camera, const std::function<double(int)>& z) {
+  Image depth(kW, kH, 1);
+  for (int y = 0; y < kH; ++y)
+    for (int x = 0; x < kW; ++x)
+      *depth.at(x, y) = static_cast<float>(z(x) * Norm(camera.CameraRay(x + 0.5, y + 0.5)));
+  return depth;
+}
+
+TEST(GeometricFlow, DepthsOfTheSameSurfaceAgreeWithinOnePercent) {
+  const Camera a = CameraAt({0, 0, 0}, 0);
+  const Image depth = DepthOfColumns(a, [](int) { return 4.0; });
+  for (const double factor : {0.97, 0.995, 1.005, 1.03}) {
+    Image visible;
+    GeometricFlow(depth, a, DepthOfColumns(a, [=](int) { return 4 * factor; }), a, &visible);
+    EXPECT_EQ(*visible.at(50, 40), std::abs(factor - 1) < 0.01) << factor;
+  }
+}
+
+TEST(GeometricFlow, H117_TapsOnTwoSurfacesAreNoSurface) {
+  // Half a pixel to the side: each target lies between a near and a far column whose mean 1/z
+  // is the point's own by chance.
+  const Camera a = CameraAt({0, 0, 0}, 0);
+  Camera b = a;
+  b.cx += 0.5;
+  Image visible;
+  GeometricFlow(DepthOfColumns(a, [](int) { return 4.0; }), a,
+                DepthOfColumns(b, [](int x) { return x % 2 ? 4 / 1.5 : 4 / 0.5; }), b,
+                &visible);
+  EXPECT_EQ(std::count(visible.pixels.begin(), visible.pixels.end(), 1.f), 0);
 }
 
 TEST(GeometricFlow, H116_NothingThereIsUnknown) {

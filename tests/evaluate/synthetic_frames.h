@@ -54,11 +54,14 @@ inline std::pair<FlowField, FlowField> MixedFlows(int width, int height, uint64_
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) {
       const double s = std::sin(0.03 * x + 0.02 * y + phase);
+      const double grain =
+          seed % 2 ? 0.9 + 0.2 * RandomDouble(seed, 2, static_cast<uint64_t>(y) * width + x)
+                   : 1;
       const double u = 6 * s + (x + tilt * y > 0.6 * width ? 4 : 0);
       const double v = 3 * std::cos(0.025 * x - 0.04 * y + 2 * phase);
       const double wrong = 1.2 * std::sin(0.05 * y + phase) * std::cos(0.04 * x);
-      forward.at(x, y)[0] = static_cast<float>(u);
-      forward.at(x, y)[1] = static_cast<float>(v);
+      forward.at(x, y)[0] = static_cast<float>(grain * u);
+      forward.at(x, y)[1] = static_cast<float>(grain * v);
       backward.at(x, y)[0] = static_cast<float>(-u + wrong);
       backward.at(x, y)[1] = static_cast<float>(-v + 0.5 * wrong);
     }

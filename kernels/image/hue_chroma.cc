@@ -1,0 +1,56 @@
+#include "kernels/image/hue_chroma.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "kernels/base/error.h"
+#include "kernels/image/color_spaces.h"
+#include "kernels/image/row_sum.h"
+
+namespace regrade {
+
+HueChroma& HueChroma::operator+=(const HueChroma& o) {
+  sum_a_ += o.sum_a_;
+  sum_b_ += o.sum_b_;
+  sum_chroma_ += o.sum_chroma_;
+  count_ += o.count_;
+  return *this;
+}
+
+void HueChroma::Add(const Image& image, const Image* mask) {
+  if (mask != nullptr) {
+    REGRADE_CHECK(mask->SameSize(image));
+    REGRADE_CHECK_EQ(mask->channels, 1);
+  }
+  *this += SumOverRows(image.height, [&](int y) {
+    HueChroma row;
+    for (int x = 0; x < image.width; ++x) {
+      if (mask != nullptr && !(*mask->at(x, y) > 0.5f)) continue;
+      const float* p = image.at(x, y);
+      Vec3d lab;
+      if (image.channels >= 3) {
+        if (!AllFinite(Vec3f{p[0], p[1], p[2]})) continue;
+        lab = LabFromSrgb({std::clamp<double>(p[0], 0, 1), std::clamp<double>(p[1], 0, 1),
+                           std::clamp<double>(p[2], 0, 1)});
+      }
+      row.sum_a_ += lab.y;
+      row.sum_b_ += lab.z;
+      row.sum_chroma_ += std::hypot(lab.y, lab.z);
+      ++row.count_;
+    }
+    return row;
+  });
+}
+
+std::optional<double> HueChroma::MeanChroma() const {
+  if (count_ == 0) return std::nullopt;
+  return sum_chroma_ / static_cast<double>(count_);
+}
+
+std::optional<double> HueChroma::HueStd() const {
+  if (count_ == 0 || !(*MeanChroma() >= 1e-4)) return std::nullopt;
+  const double r = std::min(1.0, std::hypot(sum_a_, sum_b_) / sum_chroma_);
+  return std::sqrt(-2 * std::log(std::max(r, 1e-12)));  // hues that cancel: finite, 7.4
+}
+
+}  // namespace regrade
