@@ -1,0 +1,82 @@
+// Photos in, a Capture out: COLMAP run as a program, climbing a ladder of recipes until one
+// places the photos, its model checked, its camera fitted once more.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "kernels/base/progress.h"
+#include "kernels/scene/capture.h"
+
+namespace regrade {
+
+struct PoseOptions {
+  std::string colmap = "colmap";
+  int image_size = 1000;
+  int all_pairs_up_to = 30;
+  double min_registered = 0.5;
+  int min_photos = 5;
+  double time_limit_min = 0;
+  double quiet_limit_min = 15;
+  int threads = 0;  // 0: all; from --threads, no flag of its own
+
+  template <typename Bind>
+  void Describe(Bind& bind) {
+    bind("colmap", colmap, {.help = "the COLMAP program: a name on PATH, or a path"});
+    bind("pose-image-size", image_size,
+         {.unit = "pixels",
+          .help = "longer side at which features are found; 2000 takes about 4 times as long "
+                  "and hardly moves the poses",
+          .min = 200,
+          .max = 20000});
+    bind("pose-all-pairs-up-to", all_pairs_up_to,
+         {.unit = "photos",
+          .help = "match every photo with every other up to this many photos; above, each with "
+                  "its neighbours in the order of names",
+          .min = 2,
+          .max = 10000});
+    bind("pose-min-registered", min_registered,
+         {.help = "least share of the photos that must find their place", .min = 0, .max = 1});
+    bind("pose-min-photos", min_photos,
+         {.unit = "photos",
+          .help = "least number of photos that must find their place",
+          .min = 2,
+          .max = 1000});
+    bind("pose-time-limit", time_limit_min,
+         {.unit = "minutes",
+          .help = "for finding the poses; 0 allows what the number of photos asks for",
+          .min = 0,
+          .max = 1e6});
+    bind("pose-quiet-limit", quiet_limit_min,
+         {.unit = "minutes",
+          .help =
+              "COLMAP is taken for hung when it prints nothing for so long; 0 waits for ever",
+          .min = 0,
+          .max = 1e6});
+  }
+};
+
+// What there is to say besides the Capture itself.
+struct PoseReport {
+  std::string colmap_version;  // "3.8"
+  std::string recipe;          // the rung of the ladder that won
+  int rungs_tried = 0;
+  std::string lens;                // what the last adjustment chose
+  std::vector<std::string> notes;  // sentences for the user
+};
+
+// `photos`: staged PNGs, all in one folder; only these are used, whatever else lies there.
+// `ingest_verdicts`: what became of the files before, copied in front of ours (files that are
+// named in `photos` get their verdict here). `work_folder` is ours to fill (database, logs) and
+// may be removed afterwards. The chosen model's three .bin files are copied to
+// `sparse_output_folder`. kFinish ends the ladder after the rung it is on.
+//
+// Throws Error: kScene when the photos do not give poses that can be trusted, kExternalProgram
+// when COLMAP is missing or fails, kResources when the disk is full; Interrupted on kAbort.
+Capture PosesFromPhotos(const std::vector<StagedPhoto>& photos,
+                        const std::vector<PhotoVerdict>& ingest_verdicts,
+                        const PoseOptions& options, const std::string& work_folder,
+                        const std::string& sparse_output_folder,
+                        const ProgressFunction& progress = {}, PoseReport* report = nullptr);
+
+}  // namespace regrade

@@ -1,0 +1,44 @@
+// Does a posed capture hold a scene that can be reconstructed? Measures of its geometry as pure
+// functions, and the judgement that they lead to.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "kernels/scene/capture.h"
+
+namespace regrade {
+
+// Median over the points of the largest angle, in radians, between two rays that see the point.
+// 0 without points. Small angles mean that depth is a guess.
+double MedianTriangulationAngle(const Capture& capture);
+
+// Root-mean-square extents of the points along their principal axes, largest first, in world
+// units, without the tenth of the points that lies farthest from the median (outliers and sky).
+// Zero with fewer than ten points.
+Vec3d PointExtents(const Capture& capture);
+
+// The view whose ratio fx / fy is farthest from 1 (as |log|); its ratio. 1 without views.
+// Self-calibration that failed shows here first: sensors have square pixels.
+double WorstPixelAspect(const Capture& capture);
+
+// Largest distance between two camera centres, in world units.
+double CameraSpread(const Capture& capture);
+
+struct SceneLimits {
+  int min_views = 5;
+  double min_triangulation_angle_deg = 1.5;
+  double max_pixel_aspect = 1.05;  // fx / fy within [1 / this, this]
+  double min_thickness = 0.02;     // third extent over second; below: nearly a plane
+};
+
+// Sentences for a photographer: what is wrong, the number, and what to do.
+struct SceneJudgement {
+  std::string refusal;             // empty: the scene can be used
+  std::string remedy;              // beside a refusal
+  std::vector<std::string> notes;  // usable, but something to know
+};
+
+SceneJudgement JudgeScene(const Capture& capture, const SceneLimits& limits = {});
+
+}  // namespace regrade

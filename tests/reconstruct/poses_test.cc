@@ -1,0 +1,312 @@
+// Poses from photos against a colmap that misbehaves in every way we know of, and once against
+// the real one.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+
+#include "kernels/base/error.h"
+#include "reconstruct/colmap_ladder.h"
+#include "reconstruct/colmap_model.h"
+#include "reconstruct/colmap_output.h"
+#include "reconstruct/poses_from_photos.h"
+#include "reconstruct/refine_intrinsics.h"
+#include "tests/support/synthetic_model.h"
+
+namespace regrade {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::MakeSyntheticModel;
+using testing::StagedName;
+
+class Poses : public ::testing::Test {
+ protected:
+  Poses() : folder_(fs::temp_directory_path() / ("poses test " + std::to_string(getpid()))) {
+    fs::create_directories(folder_ / "photos");
+  }
+  ~Poses() override { fs::remove_all(folder_); }
+
+  std::vector<StagedPhoto> Photos(int count) const {
+    std::vector<StagedPhoto> photos;
+    for (int i = 0; i < count; ++i)
+      photos.push_back({"IMG " + std::to_string(i) + ".jpg", StagedName(i),
+                        folder_ / "photos" / StagedName(i), 640, 480, 0});
+    return photos;
+  }
+
+  // Runs with the fake whose name says how it behaves.
+  Capture Run(const std::string& behaviour, int photos = 10,
+              const ProgressFunction& progress = {}) {
+    const fs::path link = folder_ / ("colmap-" + behaviour);
+    if (!fs::exists(fs::symlink_status(link))) fs::create_symlink(FAKE_COLMAP, link);
+    options_.colmap = link;
+    return PosesFromPhotos(Photos(photos), verdicts_, options_, folder_ / "work",
+                           folder_ / "sparse", progress, &report_);
+  }
+
+  // Expects an error of this kind whose text contains all parts.
+  void ExpectError(const std::string& behaviour, ExitCode code,
+                   const std::vector<std::string>& parts, int photos = 10) {
+    try {
+      Run(behaviour, photos);
+      ADD_FAILURE() << behaviour << " was accepted";
+    } catch (const Error& e) {
+      EXPECT_EQ(static_cast<int>(e.code()), static_cast<int>(code)) << e.what();
+      for (const std::string& part : parts)
+        EXPECT_NE(std::string(e.what()).find(part), std::string::npos) << e.what();
+    }
+    EXPECT_FALSE(fs::exists(folder_ / "sparse")) << "a refused model was handed over";
+  }
+
+  fs::path folder_;
+  PoseOptions options_;
+  PoseReport report_;
+  std::vector<PhotoVerdict> verdicts_;
+};
+
+TEST_F(Poses, GoodCaptureComesWithModelAndVerdicts) {
+  verdicts_ = {{"IMG 0.jpg", "used", ""}, {"notes.txt", "skipped", "not a picture"}};
+  const Capture capture = Run("good");
+  EXPECT_EQ(capture.views.size(), 10u);
+  EXPECT_EQ(capture.points.size(), 60u);
+  EXPECT_EQ(capture.models_found, 1);
+  EXPECT_LT(capture.reprojection_px, 1e-6);
+  EXPECT_EQ(report_.colmap_version, "3.8");
+  EXPECT_EQ(report_.recipe, "quick");
+  EXPECT_EQ(report_.rungs_tried, 1);
+  ASSERT_EQ(capture.verdicts.size(), 11u);
+  EXPECT_EQ(capture.verdicts[1].why, "not a picture");
+  EXPECT_EQ(ReadColmapModel((folder_ / "sparse").string()).images.size(), 10u);
+}
+
+TEST_F(Poses, ProgressGrowsToItsTotal) {
+  double last = 0, most = 0;
+  Run("good", 10, [&](const Progress& p) {
+    EXPECT_GE(p.done, last);
+    EXPECT_LE(p.done, p.total);
+    EXPECT_FALSE(p.note.empty());
+    last = p.done;
+    most = std::max(most, p.done / p.total);
+    return Verdict::kContinue;
+  });
+}
+
+TEST_F(Poses, AbortEndsTheChild) {
+  int asked = 0;
+  EXPECT_THROW(
+      Run("hang", 10,
+          [&](const Progress&) { return ++asked > 2 ? Verdict::kAbort : Verdict::kContinue; }),
+      Interrupted);
+}
+
+TEST_F(Poses, F46_MissingProgram) {
+  options_.colmap = "no-such-colmap";
+  try {
+    PosesFromPhotos(Photos(10), {}, options_, folder_ / "work", folder_ / "sparse");
+    FAIL();
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ExitCode::kExternalProgram);
+    EXPECT_EQ(e.where(), "no-such-colmap");
+    EXPECT_NE(e.hint().find("apt install colmap"), std::string::npos);
+    EXPECT_NE(e.hint().find("--colmap"), std::string::npos);
+  }
+}
+
+TEST_F(Poses, F47_Versions) {
+  ExpectError("old", ExitCode::kExternalProgram, {"COLMAP 2.0 is too old"});
+  ExpectError("something-else", ExitCode::kExternalProgram, {"not COLMAP", "hello, world"});
+  // A later version has other names for some options, and refuses the old ones.
+  EXPECT_EQ(Run("new").views.size(), 10u);
+  EXPECT_EQ(report_.colmap_version, "9.9");
+}
+
+TEST_F(Poses, F49_CrashIsReportedWithTheLog) {
+  ExpectError("crash", ExitCode::kExternalProgram, {"mapper", "signal 6", "mapper.log"});
+  ASSERT_FALSE(report_.notes.empty());
+  EXPECT_NE(report_.notes[0].find("again with one thread"), std::string::npos);
+}
+
+TEST_F(Poses, F49_KilledForMemoryIsTriedAgainWithOneThread) {
+  EXPECT_EQ(Run("memory").views.size(), 10u);
+}
+
+TEST_F(Poses, F50_HangEndsAtTheLimits) {
+  options_.quiet_limit_min = 0.5 / 60;
+  ExpectError("hang", ExitCode::kExternalProgram, {"printed nothing", "--pose-time-limit"});
+}
+
+TEST_F(Poses, F50_TimeLimit) {
+  options_.time_limit_min = 2.0 / 60;
+  ExpectError("hang", ExitCode::kExternalProgram, {"time limit", "--pose-time-limit"});
+}
+
+TEST_F(Poses, F50_IgnoredSigtermIsFollowedBySigkill) {
+  options_.quiet_limit_min = 0.3 / 60;
+  ExpectError("stubborn", ExitCode::kExternalProgram, {"printed nothing"});
+}
+
+TEST_F(Poses, F50_AModelWrittenBeforeTheLimitIsUsed) {
+  options_.quiet_limit_min = 0.5 / 60;
+  EXPECT_EQ(Run("late").views.size(), 10u);
+}
+
+TEST_F(Poses, F51_SuccessWithoutAModel) {
+  ExpectError("nothing", ExitCode::kExternalProgram, {"wrote no model"});
+  ExpectError("empty", ExitCode::kExternalProgram, {"wrote no database"});
+}
+
+TEST_F(Poses, F51_SuccessWithHalfAModel) {
+  ExpectError("half", ExitCode::kExternalProgram, {"damaged model", "points3D.bin"});
+}
+
+TEST_F(Poses, F52_Flood) {
+  EXPECT_EQ(Run("flood").views.size(), 10u);
+  EXPECT_LT(fs::file_size(folder_ / "work/logs/feature_extractor.log"), 17u << 20);
+}
+
+TEST_F(Poses, F29_FullDiskIsSeenInTheLog) {
+  ExpectError("diskfull", ExitCode::kResources, {"disk is full"});
+}
+
+TEST_F(Poses, H125_NoPhotosAndOnePhoto) {
+  ExpectError("good", ExitCode::kInput, {"no photos"}, 0);
+  ExpectError("good", ExitCode::kScene, {"one photo"}, 1);
+}
+
+TEST_F(Poses, H125_TooFewPhotos) {
+  ExpectError("good", ExitCode::kScene, {"3 photos are too few", "5 at least"}, 3);
+  ExpectError("turned", ExitCode::kScene, {"3 photos are too few", "sideways"}, 3);
+  options_.min_photos = 3;
+  EXPECT_EQ(Run("good", 3).views.size(), 3u);
+}
+
+TEST_F(Poses, H127_CameraOnlyTurned) {
+  ExpectError("turned", ExitCode::kScene, {"nearly one place", "step sideways"});
+  ExpectError("nomodel", ExitCode::kScene, {"only turned", "step sideways"});
+  EXPECT_GT(report_.rungs_tried, 1);
+}
+
+TEST_F(Poses, H127_NothingMatches) {
+  ExpectError("nomatches", ExitCode::kScene, {"no two photos show the same"});
+  ExpectError("plain", ExitCode::kScene, {"about 12 features", "sharp photos"});
+}
+
+TEST_F(Poses, H128_PlanarSceneIsNoted) {
+  Run("planar");
+  ASSERT_EQ(report_.notes.size(), 1u);
+  EXPECT_NE(report_.notes[0].find("plane"), std::string::npos);
+}
+
+TEST_F(Poses, H132_TheLargestModelWinsAndTheOthersAreTold) {
+  const Capture capture = Run("two", 13);
+  EXPECT_EQ(capture.views.size(), 9u);
+  EXPECT_EQ(capture.models_found, 2);
+  EXPECT_EQ(capture.views[0].name, "00004.png");
+  EXPECT_EQ(capture.verdicts[0].verdict, "unregistered");
+  EXPECT_NE(capture.verdicts[0].why.find("another group of 4 photos"), std::string::npos);
+  ASSERT_FALSE(report_.notes.empty());
+  EXPECT_NE(report_.notes.back().find("2 groups"), std::string::npos);
+}
+
+TEST_F(Poses, H133_FewRegisteredAreRefusedByName) {
+  options_.min_photos = 3;
+  ExpectError("few", ExitCode::kScene, {"only 4 of 10 photos", "IMG 9.jpg: only 89 features"});
+  options_.min_registered = 0.3;
+  const Capture capture = Run("few");
+  EXPECT_EQ(capture.views.size(), 4u);
+  EXPECT_EQ(capture.verdicts[9].verdict, "unregistered");
+}
+
+TEST_F(Poses, H134_PixelsThatAreNotSquare) {
+  ExpectError("aspect", ExitCode::kScene, {"not square", "1.300"});
+}
+
+TEST_F(Poses, H134_APrincipalPointThatRunsOffStaysInTheCentre) {
+  const Capture capture = Run("runaway");
+  EXPECT_EQ(capture.views[0].camera.cx, 320);
+  EXPECT_NE(report_.lens.find("in the centre"), std::string::npos);
+}
+
+TEST_F(Poses, TheLadderIsClimbedUntilARungHolds) {
+  EXPECT_EQ(Run("ladder").views.size(), 10u);
+  EXPECT_EQ(report_.recipe, "more features");
+  EXPECT_EQ(report_.rungs_tried, 2);
+}
+
+TEST(PoseLadder, CostGrowsUpwards) {
+  std::vector<StagedPhoto> photos(50);
+  for (StagedPhoto& photo : photos) photo.width = 1920, photo.height = 1080;
+  const std::vector<PoseRecipe> ladder = PoseLadder(photos, 30);
+  EXPECT_FALSE(ladder[0].all_pairs);
+  EXPECT_EQ(ladder[0].first_octave, 0);
+  EXPECT_GT(ladder[1].max_features, ladder[0].max_features);
+  EXPECT_TRUE(ladder[2].keep_matches);
+  EXPECT_TRUE(ladder.back().all_pairs);
+  photos.resize(11);
+  EXPECT_TRUE(PoseLadder(photos, 30)[0].all_pairs);
+  EXPECT_EQ(PoseLadder(photos, 30)[0].lens, ColmapLens::kSimpleRadial);
+}
+
+TEST(PoseLadder, H148_MixedSizesAndFocalLengthsHaveTheirOwnCameras) {
+  std::vector<StagedPhoto> photos = {{"a", "0", "", 640, 480, 0},
+                                     {"b", "1", "", 480, 640, 0},
+                                     {"c", "2", "", 640, 480, 0},
+                                     {"d", "3", "", 640, 480, 700}};
+  const std::vector<CameraGroup> groups = GroupByCamera(photos);
+  ASSERT_EQ(groups.size(), 3u);
+  EXPECT_EQ(groups[0].names, (std::vector<std::string>{"0", "2"}));
+  const ColmapArguments arguments = ExtractArguments({}, groups[2], 1000, 0, {});
+  EXPECT_EQ(arguments.back().first, "ImageReader.camera_params");
+  EXPECT_EQ(arguments.back().second, "700,700,320,240,0,0,0,0");
+}
+
+TEST(ColmapOutput, ReadsProgressAndEvidence) {
+  ColmapOutput output(10);
+  output.Line("Processed file [3/12]");
+  EXPECT_DOUBLE_EQ(output.fraction(), 0.25);
+  output.Line("  Name:            a b.png");
+  output.Line("  Features:        1398");
+  output.StartCommand();
+  output.Line("Matching block [2/2, 1/2] in 1.9s");
+  EXPECT_DOUBLE_EQ(output.fraction(), 0.75);
+  output.StartCommand();
+  output.Line("I20250101 12:00:00 mapper.cc:1] Registering image #7 (5)");
+  EXPECT_DOUBLE_EQ(output.fraction(), 0.5);
+  output.Line("Loading matches... 41 in 0.000s");
+  output.Line("Matching block [x/0, 1");
+  output.Line("Processed file [5/0]");
+  EXPECT_DOUBLE_EQ(output.fraction(), 0.5);
+  EXPECT_EQ(output.evidence().features.at("a b.png"), 1398);
+  EXPECT_EQ(output.evidence().matched_pairs, 41);
+}
+
+TEST(RefineIntrinsics, OutliersLoseTheirObservationsAndEmptyPointsGo) {
+  ColmapModel model = MakeSyntheticModel({.images = 5, .points = 30});
+  for (ColmapImage& image : model.images)
+    for (ColmapKeypoint& keypoint : image.keypoints) keypoint.u += 0.2;  // the common error
+  model.images[2].keypoints[7].v += 3;
+  for (int i = 0; i < 4; ++i) model.images[i].keypoints[9].v += 3;
+  const ColmapModel cleaned = WithoutOutliers(model, model, 2.5);
+  EXPECT_EQ(cleaned.points.size(), 29u);  // point 10 keeps one observation, so none
+  EXPECT_EQ(cleaned.FindPoint(10), nullptr);
+  EXPECT_EQ(cleaned.FindPoint(8)->track.size(), 4u);
+  EXPECT_EQ(cleaned.images[2].keypoints[7].point_id, kNoColmapPoint);
+  EXPECT_EQ(cleaned.images[4].keypoints[9].point_id, kNoColmapPoint);
+  EXPECT_EQ(cleaned.images[0].keypoints[7].point_id, 8u);
+  EXPECT_NEAR(MeanSquaredReprojection(cleaned), 0.04, 1e-9);
+}
+
+TEST(RefineIntrinsics, WithLensKeepsWhatBothLensesHave) {
+  ColmapModel model = MakeSyntheticModel({});
+  model.cameras[0].intrinsics.distortion[0] = 0.1;
+  EXPECT_EQ(WithLens(model, ColmapLens::kOpenCv).cameras[0].intrinsics.distortion[0], 0.1);
+  const ColmapModel pinhole = WithLens(model, ColmapLens::kPinhole);
+  EXPECT_EQ(pinhole.cameras[0].intrinsics.MaxCornerDistortion(), 0);
+  EXPECT_EQ(pinhole.cameras[0].intrinsics.fx, 600);
+}
+
+}  // namespace
+}  // namespace regrade

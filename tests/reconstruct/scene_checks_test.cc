@@ -1,0 +1,101 @@
+// Geometry that can be trusted, and geometry that cannot.
+#include "reconstruct/scene_checks.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "reconstruct/colmap_model.h"
+#include "tests/support/synthetic_model.h"
+
+namespace regrade {
+namespace {
+
+using testing::MakeSyntheticModel;
+using testing::SyntheticModelOptions;
+
+Capture CaptureOf(const SyntheticModelOptions& options) {
+  const ColmapModel model = MakeSyntheticModel(options);
+  return CaptureFromModel(model, testing::PhotosOf(model));
+}
+
+TEST(SceneChecks, TriangulationAngleOfAnExactCase) {
+  Capture capture;
+  for (const double x : {-1.0, 0.5, 1.0}) {
+    CaptureView view;
+    view.camera.camera_from_world.translation = {-x, 0, 0};
+    capture.views.push_back(view);
+  }
+  ScenePoint point;
+  point.position = {0, 0, 1};
+  point.views = {0, 1, 2};
+  capture.points = {point};
+  EXPECT_NEAR(MedianTriangulationAngle(capture), M_PI / 2,
+              1e-12);  // the outer two, at 45 degrees
+  capture.points[0].views = {1, 2};
+  EXPECT_NEAR(MedianTriangulationAngle(capture), M_PI / 4 - std::atan(0.5), 1e-12);
+  EXPECT_EQ(MedianTriangulationAngle({}), 0);
+  EXPECT_NEAR(CameraSpread(capture), 2, 1e-12);
+}
+
+TEST(SceneChecks, GoodCaptureIsAccepted) {
+  const SceneJudgement judgement = JudgeScene(CaptureOf({}));
+  EXPECT_EQ(judgement.refusal, "");
+  EXPECT_TRUE(judgement.notes.empty());
+}
+
+TEST(SceneChecks, H127_CameraThatOnlyTurnsIsTold) {
+  const SceneJudgement judgement = JudgeScene(CaptureOf({.arc_deg = 0.4}));
+  EXPECT_NE(judgement.refusal.find("nearly one place"), std::string::npos) << judgement.refusal;
+  EXPECT_NE(judgement.remedy.find("sideways"), std::string::npos);
+}
+
+TEST(SceneChecks, H128_PlaneIsANoteNotARefusal) {
+  const SceneJudgement judgement = JudgeScene(CaptureOf({.thickness = 0.001}));
+  EXPECT_EQ(judgement.refusal, "");
+  ASSERT_EQ(judgement.notes.size(), 1u);
+  EXPECT_NE(judgement.notes[0].find("plane"), std::string::npos);
+}
+
+TEST(SceneChecks, H128_OneOutlierDoesNotHideThePlane) {
+  Capture capture = CaptureOf({.thickness = 0.001});
+  capture.points[0].position = {0, 0, 1000};
+  EXPECT_LT(PointExtents(capture).z, 0.01);
+}
+
+TEST(SceneChecks, H134_PixelsThatAreNotSquareAreRefused) {
+  SyntheticModelOptions options{.lens = ColmapLens::kOpenCv};
+  options.aspect = 0.7;
+  EXPECT_NEAR(WorstPixelAspect(CaptureOf(options)), 0.7, 1e-12);
+  EXPECT_NE(JudgeScene(CaptureOf(options)).refusal.find("not square"), std::string::npos);
+  options.aspect = 1.04;
+  EXPECT_EQ(JudgeScene(CaptureOf(options)).refusal, "");
+}
+
+TEST(SceneChecks, TooFewViewsAreRefused) {
+  EXPECT_NE(JudgeScene(CaptureOf({.images = 4})).refusal.find("only 4 photos"),
+            std::string::npos);
+  EXPECT_EQ(JudgeScene(CaptureOf({.images = 5})).refusal, "");
+}
+
+TEST(SceneChecks, EmptyCaptureIsRefusedWithoutDividingByZero) {
+  EXPECT_NE(JudgeScene({}).refusal, "");
+  EXPECT_EQ(PointExtents({}), Vec3d{});
+  EXPECT_EQ(WorstPixelAspect({}), 1);
+}
+
+// H140: the measures are angles and ratios, so they do not depend on the world's scale.
+TEST(SceneChecks, H140_ScaleDoesNotMatter) {
+  for (const double scale : {1e-6, 1e6}) {
+    Capture capture = CaptureOf({});
+    const double angle = MedianTriangulationAngle(capture);
+    const Similarity similarity{scale, {}, {1 * scale, 2 * scale, 3 * scale}};
+    for (CaptureView& view : capture.views) view.camera = view.camera.Transformed(similarity);
+    for (ScenePoint& point : capture.points) point.position = similarity * point.position;
+    EXPECT_NEAR(MedianTriangulationAngle(capture), angle, 1e-9);
+    EXPECT_EQ(JudgeScene(capture).refusal, "");
+  }
+}
+
+}  // namespace
+}  // namespace regrade

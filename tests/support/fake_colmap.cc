@@ -1,0 +1,180 @@
+// A program that behaves like colmap on the command line, and badly in the way that its own
+// file name says: "colmap-hang" hangs. It poses photos on an arc around a cloud of points.
+#include <unistd.h>
+
+#include <algorithm>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "reconstruct/colmap_model.h"
+#include "tests/support/synthetic_model.h"
+
+namespace fs = std::filesystem;
+using namespace regrade;
+
+namespace {
+
+std::string behaviour;
+std::map<std::string, std::string> arguments;
+
+bool Is(const char* name) { return behaviour == name; }
+
+// The options of 3.8, and for "colmap-new" as later versions spell them.
+std::vector<std::string> KnownOptions() {
+  const std::string extraction = Is("new") ? "FeatureExtraction." : "SiftExtraction.";
+  const std::string matching = Is("new") ? "FeatureMatching." : "SiftMatching.";
+  return {"database_path",
+          "image_path",
+          "image_list_path",
+          "output_path",
+          "input_path",
+          "ImageReader.single_camera",
+          "ImageReader.camera_model",
+          "ImageReader.camera_params",
+          "ImageReader.default_focal_length_factor",
+          extraction + "use_gpu",
+          extraction + "num_threads",
+          extraction + "max_image_size",
+          "SiftExtraction.max_num_features",
+          "SiftExtraction.first_octave",
+          matching + "use_gpu",
+          matching + "num_threads",
+          "ExhaustiveMatching.block_size",
+          "SequentialMatching.overlap",
+          "Mapper.num_threads",
+          "Mapper.min_model_size",
+          "Mapper.init_min_tri_angle",
+          "BundleAdjustment.refine_principal_point"};
+}
+
+[[noreturn]] void HangForEver() {
+  std::printf("working on it\n");
+  std::fflush(stdout);
+  while (true) pause();
+}
+
+int Extract() {
+  if (Is("flood"))
+    for (int i = 0; i < 300000; ++i) std::printf("%0100d\n", i);
+  if (Is("diskfull")) std::fprintf(stderr, "SQLite error: database or disk is full\n");
+  const std::string threads =
+      Is("new") ? "FeatureExtraction.num_threads" : "SiftExtraction.num_threads";
+  if (Is("memory") && arguments[threads] != "1") raise(SIGKILL);
+  std::ofstream database(arguments["database_path"], std::ios::app);
+  std::ifstream list(arguments["image_list_path"]);
+  int i = 0;
+  for (std::string name; std::getline(list, name); ++i) {
+    const int features = Is("plain") ? 12 : Is("few") && i > 3 ? 80 + i : 1500;
+    std::printf("Processed file [%d/99]\n  Name:            %s\n  Features:        %d\n", i + 1,
+                name.c_str(), features);
+    database << name << "\n";
+  }
+  database << "#features " << arguments["SiftExtraction.max_num_features"] << "\n";
+  return 0;
+}
+
+void Write(ColmapModel model, const std::vector<std::string>& names,
+           const std::string& folder) {
+  for (size_t i = 0; i < names.size(); ++i) model.images[i].name = names[i];
+  fs::create_directories(folder);
+  WriteColmapModel(model, folder);
+}
+
+int Map() {
+  if (Is("hang")) HangForEver();
+  if (Is("stubborn")) {
+    std::signal(SIGTERM, SIG_IGN);
+    HangForEver();
+  }
+  if (Is("nothing")) return 0;
+  if (Is("crash")) std::abort();
+  std::vector<std::string> names;
+  std::string features;
+  std::ifstream database(arguments["database_path"]);
+  for (std::string line; std::getline(database, line);)
+    (line.rfind("#features ", 0) == 0 ? features = line.substr(10),
+     void()                           : names.push_back(line));
+  std::printf("Loading matches... %d in 0.000s\n", Is("nomatches") ? 0 : 41);
+  if (Is("nomodel") || Is("nomatches") || Is("plain") || (Is("ladder") && features != "8192")) {
+    std::fprintf(stderr, "ERROR: failed to create sparse model\n");
+    return 1;
+  }
+  testing::SyntheticModelOptions options{.images = static_cast<int>(names.size())};
+  if (Is("turned")) options.arc_deg = 0.4;
+  if (Is("aspect")) options.aspect = 1.3, options.lens = ColmapLens::kOpenCv;
+  if (Is("planar")) options.thickness = 0.001;
+  const std::string out = arguments["output_path"];
+  if (Is("few")) {
+    names.resize(4);
+    options.images = 4;
+  }
+  if (Is("two")) {
+    // The larger model has the second number.
+    const std::vector<std::string> some(names.begin(), names.begin() + 4);
+    names.erase(names.begin(), names.begin() + 4);
+    options.images = 4;
+    Write(testing::MakeSyntheticModel(options), some, out + "/0");
+    options.images = static_cast<int>(names.size());
+    Write(testing::MakeSyntheticModel(options), names, out + "/1");
+    return 0;
+  }
+  Write(testing::MakeSyntheticModel(options), names, out + "/0");
+  if (Is("half"))
+    fs::resize_file(out + "/0/points3D.bin", fs::file_size(out + "/0/points3D.bin") / 2);
+  // Killed by a time limit, the real mapper has written its model before as well.
+  if (Is("late")) HangForEver();
+  return 0;
+}
+
+int Adjust() {
+  ColmapModel model = ReadColmapModel(arguments["input_path"]);
+  // A principal point that runs off, wherever it may.
+  if (Is("runaway") && arguments["BundleAdjustment.refine_principal_point"] == "1")
+    model.cameras[0].intrinsics.cx = 500;
+  WriteColmapModel(model, arguments["output_path"]);
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  behaviour = fs::path(argv[0]).filename().string().substr(std::string("colmap-").size());
+  const std::string command = argc > 1 ? argv[1] : "help";
+  if (Is("something-else")) {
+    std::printf("hello, world\n");
+    return 0;
+  }
+  if (command == "help") {
+    std::printf("COLMAP %s -- Structure-from-Motion and Multi-View Stereo\n", Is("old") ? "2.0"
+                                                                              : Is("new")
+                                                                                  ? "9.9"
+                                                                                  : "3.8");
+    return 0;
+  }
+  const std::vector<std::string> known = KnownOptions();
+  for (int i = 2; i < argc; ++i) {
+    const std::string name = argv[i];
+    if (name == "-h") {
+      for (const std::string& option : known) std::printf("  --%s arg (=1)\n", option.c_str());
+      return 0;
+    }
+    if (std::find(known.begin(), known.end(), name.substr(2)) == known.end() || i + 1 == argc) {
+      std::fprintf(stderr, "ERROR: Failed to parse options - unrecognised option '%s'.\n",
+                   argv[i]);
+      return 1;
+    }
+    arguments[name.substr(2)] = argv[++i];
+  }
+  if (Is("empty")) return 0;
+  if (command == "feature_extractor") return Extract();
+  if (command == "mapper") return Map();
+  if (command == "bundle_adjuster") return Adjust();
+  std::printf("Matching block [1/1, 1/1] in 0.001s\n");
+  return 0;
+}

@@ -1,0 +1,84 @@
+// pose_tool PHOTOS OUT [colmap]: stages a folder of pictures and finds their poses, for
+// measuring by hand. OUT gets photos/, work/ and sparse/.
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <opencv2/imgcodecs.hpp>
+
+#include "kernels/base/error.h"
+#include "reconstruct/poses_from_photos.h"
+#include "reconstruct/scene_checks.h"
+
+namespace fs = std::filesystem;
+using namespace regrade;
+
+namespace {
+
+std::vector<StagedPhoto> Stage(const fs::path& from, const fs::path& to) {
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(from)) files.push_back(entry.path());
+  std::sort(files.begin(), files.end());
+  fs::create_directories(to);
+  std::vector<StagedPhoto> photos;
+  for (const fs::path& file : files) {
+    const cv::Mat picture = cv::imread(file.string());
+    if (picture.empty()) continue;
+    char name[32];
+    std::snprintf(name, sizeof(name), "%05zu.png", photos.size());
+    cv::imwrite((to / name).string(), picture);
+    photos.push_back({file.filename(), name, to / name, picture.cols, picture.rows, 0});
+  }
+  return photos;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc < 3) {
+    std::fprintf(stderr, "usage: pose_tool PHOTOS OUT [colmap]\n");
+    return 2;
+  }
+  const fs::path out = fs::absolute(argv[2]);
+  PoseOptions options;
+  if (argc > 3) options.colmap = argv[3];
+  const std::vector<StagedPhoto> photos = Stage(argv[1], out / "photos");
+  const auto start = std::chrono::steady_clock::now();
+  const auto seconds = [&] {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  };
+  std::string last;
+  const ProgressFunction progress = [&](const Progress& p) {
+    const std::string line =
+        std::to_string(static_cast<int>(20 * p.done / p.total) * 5) + " % " + p.note;
+    if (line != last) std::printf("%6.1f s  %s\n", seconds(), line.c_str());
+    last = line;
+    return Verdict::kContinue;
+  };
+  PoseReport report;
+  try {
+    const Capture capture =
+        PosesFromPhotos(photos, {}, options, out / "work", out / "sparse", progress, &report);
+    const Vec3d extents = PointExtents(capture);
+    const Camera& camera = capture.views[0].camera;
+    std::printf(
+        "registered %zu of %zu, %zu points, %.3f px, %d models, recipe \"%s\" (%d tried), lens "
+        "%s\n"
+        "angle %.2f deg, extents %.3g %.3g %.3g, fx %.2f fy %.2f cx %.2f cy %.2f, corner moved "
+        "%.2f px, %.1f s\n",
+        capture.views.size(), photos.size(), capture.points.size(), capture.reprojection_px,
+        capture.models_found, report.recipe.c_str(), report.rungs_tried, report.lens.c_str(),
+        MedianTriangulationAngle(capture) * 180 / M_PI, extents.x, extents.y, extents.z,
+        camera.fx, camera.fy, camera.cx, camera.cy, camera.MaxCornerDistortion(), seconds());
+    for (const PhotoVerdict& verdict : capture.verdicts)
+      if (verdict.verdict != "used")
+        std::printf("%s: %s: %s\n", verdict.file.c_str(), verdict.verdict.c_str(),
+                    verdict.why.c_str());
+    for (const std::string& note : report.notes) std::printf("note: %s\n", note.c_str());
+  } catch (const Error& e) {
+    std::printf("exit %d after %.1f s, %d rungs: %s\n", static_cast<int>(e.code()), seconds(),
+                report.rungs_tried, e.what());
+    return static_cast<int>(e.code());
+  }
+  return 0;
+}
