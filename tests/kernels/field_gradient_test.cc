@@ -1,0 +1,275 @@
+// The plain ray's adjoint against derivatives in double, and the fast paths against the plain
+// ray.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "kernels/field/fast_rays.h"
+#include "kernels/field/ray_loss.h"
+#include "kernels/field/ray_weights.h"
+#include "kernels/field/render.h"
+#include "tests/support/small_field.h"
+
+namespace regrade {
+namespace {
+
+using testing::RandomField;
+using testing::RandomRays;
+
+// A field in double with the float field's values.
+struct DoubleField {
+  explicit DoubleField(const RadianceField& field)
+      : geometry(*field.geometry),
+        density(geometry.density.begin(), geometry.density.end()),
+        sh(field.appearance.sh.begin(), field.appearance.sh.end()),
+        basis(field.appearance.basis),
+        background(field.background.Cast<double>()) {}
+  FieldView<double> view() const {
+    return {geometry.frame,
+            geometry.links.data(),
+            density.data(),
+            sh.data(),
+            basis,
+            background,
+            0.0};
+  }
+  const Geometry& geometry;
+  std::vector<double> density, sh;
+  int basis;
+  Vec3d background;
+};
+
+RayT<double> ToDouble(const Ray& ray) {
+  return {ray.origin.Cast<double>(), Normalized(ray.direction.Cast<double>())};
+}
+
+class FieldGradient : public ::testing::TestWithParam<int> {};
+
+// Relative error 1e-8 of each derivative against Richardson-extrapolated central differences.
+// Kinks (ReLU of density, clamp of colour) are avoided by drawing values away from them and
+// skipping parameters whose two step sizes disagree; early stopping is on (H63).
+TEST_P(FieldGradient, AdjointEqualsDerivativeInDouble) {
+  RadianceField field = RandomField({5, 6, 4}, GetParam(), 0.8, 21);
+  DoubleField d(field);
+  const MarchOptions options{0.5f, 1e-3f};
+  const Vec3d d_color{0.8, -0.5, 0.3};
+  int checked = 0;
+  for (const Ray& ray_f : RandomRays(12, 22)) {
+    const RayT<double> ray = ToDouble(ray_f);
+    const RayResult<double> result = RenderRay(d.view(), ray, options);
+    std::vector<double> d_density(d.density.size()), d_sh(d.sh.size());
+    RenderRayAdjoint(d.view(), ray, options, result, d_color, d_density.data(), d_sh.data(),
+                     PlainAdd());
+    const auto loss = [&] { return Dot(RenderRay(d.view(), ray, options).color, d_color); };
+    const auto check = [&](double* x, double gradient) {
+      const double x0 = *x;
+      const auto central = [&](double h) {
+        *x = x0 + h;
+        const double up = loss();
+        *x = x0 - h;
+        const double down = loss();
+        *x = x0;
+        return (up - down) / (2 * h);
+      };
+      const double fine = central(1e-4), coarse = central(2e-4);
+      if (std::abs(fine - coarse) > 1e-6)
+        return;  // a kink between the two: no derivative to compare
+      EXPECT_NEAR((4 * fine - coarse) / 3, gradient, 1e-8 * (1 + std::abs(gradient)));
+      checked += gradient != 0;
+    };
+    for (size_t i = 0; i < d.density.size(); ++i)
+      if (d_density[i] != 0 || i % 17 == 0) check(&d.density[i], d_density[i]);
+    for (size_t i = 0; i < d.sh.size(); i += 5) check(&d.sh[i], d_sh[i]);
+  }
+  EXPECT_GT(checked, 300);
+}
+
+INSTANTIATE_TEST_SUITE_P(Basis, FieldGradient, ::testing::Values(1, 4, 9));
+
+class FastRaysParity : public ::testing::TestWithParam<std::tuple<const char*, int>> {
+ protected:
+  const FastRayFunctions* functions() const { return FastRaysFor(std::get<0>(GetParam())); }
+  int basis() const { return std::get<1>(GetParam()); }
+};
+
+// H70: 2e-5 a pixel; H84: skipping empty space leaves the picture as it is.
+TEST_P(FastRaysParity, RendersAsThePlainRay) {
+  if (functions() == nullptr)
+    GTEST_SKIP() << "this processor lacks " << std::get<0>(GetParam());
+  for (const double fill : {0.03, 0.9}) {
+    const RadianceField field = RandomField({20, 17, 23}, basis(), fill, 31);
+    const FastGrid grid = MakeFastGrid(field);
+    const std::vector<Ray> rays = RandomRays(500, 32);
+    const MarchOptions options{0.5f, 1e-4f};
+    std::vector<float> color(1500), depth(500), transmittance(500);
+    functions()->render(grid, rays.data(), 500, options, color.data(), depth.data(),
+                        transmittance.data());
+    for (size_t r = 0; r < rays.size(); ++r) {
+      const RayResult<float> plain = RenderRay(ViewOf(field), rays[r], options);
+      for (int c = 0; c < 3; ++c) ASSERT_NEAR(color[3 * r + c], plain.color[c], 2e-5);
+      ASSERT_NEAR(transmittance[r], plain.transmittance, 2e-5);
+      ASSERT_NEAR(depth[r], plain.depth, 1e-4);
+    }
+  }
+}
+
+// Float gradients against the plain adjoint in double: 1e-4 of the largest entry.
+TEST_P(FastRaysParity, GradientsAsThePlainAdjointInDouble) {
+  if (functions() == nullptr)
+    GTEST_SKIP() << "this processor lacks " << std::get<0>(GetParam());
+  const RadianceField field = RandomField({9, 8, 10}, basis(), 0.7, 41);
+  const DoubleField d(field);
+  FastGrid grid = MakeFastGrid(field);
+  const std::vector<Ray> rays = RandomRays(200, 42);
+  const std::vector<Vec3f> targets(rays.size(), Vec3f{0.4f, 0.5f, 0.2f});
+  const MarchOptions options{0.5f, 1e-4f};
+  GradientArena arena;
+  arena.Reset(grid.num_voxels(), grid.lanes());
+  const float scale = 1.0f / 600;
+  const FitStepResult step = functions()->accumulate(
+      grid, {rays.data(), targets.data(), static_cast<int64_t>(rays.size())}, options, scale,
+      &arena);
+  std::vector<double> d_density(d.density.size()), d_sh(d.sh.size());
+  double error = 0;
+  for (size_t r = 0; r < rays.size(); ++r) {
+    const RayT<double> ray{rays[r].origin.Cast<double>(), rays[r].direction.Cast<double>()};
+    const RayResult<double> result = RenderRay(d.view(), ray, options);
+    const Vec3d e = result.color - targets[r].Cast<double>();
+    error += Dot(e, e);
+    RenderRayAdjoint(d.view(), ray, options, result, e * (2.0 * scale), d_density.data(),
+                     d_sh.data(), PlainAdd());
+  }
+  EXPECT_NEAR(step.squared_error, error, 1e-4 * error);
+  double largest_density = 0, largest_sh = 0;
+  for (const double g : d_density) largest_density = std::max(largest_density, std::abs(g));
+  for (const double g : d_sh) largest_sh = std::max(largest_sh, std::abs(g));
+  const int stride = 3 * basis();
+  for (int64_t voxel = 0; voxel < grid.num_voxels(); ++voxel) {
+    const int32_t slot = arena.slot_of_voxel[voxel];
+    const float* g = slot < 0 ? nullptr : arena.gradient.data() + slot * grid.lanes();
+    ASSERT_NEAR(g ? g[DensityLane(basis())] : 0, d_density[voxel], 1e-4 * largest_density);
+    for (int k = 0; k < stride; ++k)
+      ASSERT_NEAR(g ? g[k] : 0, d_sh[voxel * stride + k], 1e-4 * largest_sh);
+  }
+}
+
+// H103: an untouched voxel keeps its value and state bit for bit. H104: a non-finite gradient
+// is counted and leaves the voxel as it was.
+TEST_P(FastRaysParity, H103_H104_StepIsSparseAndRefusesNan) {
+  if (functions() == nullptr)
+    GTEST_SKIP() << "this processor lacks " << std::get<0>(GetParam());
+  FastGrid grid = MakeFastGrid(RandomField({4, 4, 4}, basis(), 1.0, 51));
+  const FastGrid before = grid;
+  const int lanes = grid.lanes();
+  std::vector<GradientArena> arenas(2);
+  for (auto& arena : arenas) arena.Reset(grid.num_voxels(), lanes);
+  const auto touch = [&](int arena, int32_t voxel, float value) {
+    GradientArena& a = arenas[static_cast<size_t>(arena)];
+    const int64_t slot = a.voxel_of_slot.size();
+    a.slot_of_voxel[voxel] = static_cast<int32_t>(slot);
+    a.voxel_of_slot.Resize(slot + 1);
+    a.voxel_of_slot[slot] = voxel;
+    a.gradient.Resize((slot + 1) * lanes);
+    for (int l = 0; l <= DensityLane(basis()); ++l) a.gradient[slot * lanes + l] = value;
+  };
+  touch(0, 5, 0.25f);
+  touch(1, 5, 0.5f);
+  touch(1, 9, std::nanf(""));
+  touch(1, 11, 1e-25f);  // its square underflows; epsilon keeps the step finite (H100)
+  Buffer<float> moments(grid.records.size());
+  int64_t rejected = 0;
+  for (int s = 0; s < 2; ++s)
+    rejected += functions()->step(
+        &grid, moments.data(), arenas.data(), 2, s, 0,
+        arenas[static_cast<size_t>(s)].voxel_of_slot.size(),
+        {.beta = 0.95f, .epsilon = 1e-8f, .rate_sh = 0.1f, .rate_density = 2.0f});
+  EXPECT_EQ(rejected, 1);
+  for (int64_t v = 0; v < grid.num_voxels(); ++v)
+    for (int l = 0; l <= DensityLane(basis()); ++l) {
+      const float old_value = before.records[v * lanes + l],
+                  value = grid.records[v * lanes + l];
+      if (v ==
+          5) {  // first touch: v = g^2, so the step is the rate, whatever the gradient's size
+        const float rate = l == DensityLane(basis()) ? 2.0f : 0.1f;
+        EXPECT_NEAR(value, old_value - rate, 1e-5f);
+        EXPECT_NEAR(moments[v * lanes + l], 0.5625f, 1e-6f);
+      } else if (v == 11) {
+        EXPECT_TRUE(std::isfinite(value));
+      } else {
+        EXPECT_EQ(value, old_value);
+        EXPECT_EQ(moments[v * lanes + l], 0.0f);
+      }
+    }
+  EXPECT_EQ(grid.dense_density[grid.vertex_of_voxel[5]],
+            grid.records[5 * lanes + DensityLane(basis())]);
+}
+
+INSTANTIATE_TEST_SUITE_P(AllPaths, FastRaysParity,
+                         ::testing::Combine(::testing::Values("baseline", "avx2", "avx512"),
+                                            ::testing::Values(1, 4, 9)),
+                         [](const auto& info) {
+                           return std::string(std::get<0>(info.param)) + "_basis" +
+                                  std::to_string(std::get<1>(info.param));
+                         });
+
+// H62: stopping early costs at most the bound in each channel.
+TEST(RayLoss, H62_EarlyStopIsWithinItsBound) {
+  RadianceField field = RandomField({16, 16, 16}, 4, 0.9, 61);
+  field.background = {1, 1, 1};
+  for (const float stop : {1e-1f, 1e-2f, 1e-3f})
+    for (const Ray& ray : RandomRays(300, 62)) {
+      const Vec3f exact = RenderRay(ViewOf(field), ray, {0.5f, 0.0f}).color;
+      const Vec3f stopped = RenderRay(ViewOf(field), ray, {0.5f, stop}).color;
+      // Colours here stay below 4.
+      for (int c = 0; c < 3; ++c) ASSERT_NEAR(exact[c], stopped[c], 4 * stop);
+    }
+}
+
+// The weights are the renderer's: colours blended from the lists equal the rendered ones.
+TEST(RayWeights, GiveTheRenderedColour) {
+  const RadianceField field = RandomField({12, 13, 11}, 9, 0.7, 71);
+  const std::vector<Ray> rays = RandomRays(600, 72);
+  const MarchOptions options{0.5f, 1e-4f};
+  const RayWeights weights = ComputeRayWeights(
+      *field.geometry, {rays.data(), static_cast<int64_t>(rays.size())}, options, 0.0f);
+  ASSERT_EQ(weights.num_rays(), 600);
+  for (size_t r = 0; r < rays.size(); ++r) {
+    const RayResult<float> plain = RenderRay(ViewOf(field), rays[r], options);
+    float gamma[9];
+    ShBasis(9, rays[r].direction, gamma);
+    Vec3f color{};
+    float sum = 0;
+    for (int64_t s = weights.first[r]; s < weights.first[r + 1]; ++s) {
+      const WeightedSample& sample = weights.samples[static_cast<size_t>(s)];
+      Vec3f raw;
+      color += SampleColor(ViewOf(field), {sample.vertex, sample.fraction}, gamma, &raw) *
+               sample.weight;
+      sum += sample.weight;
+    }
+    color += field.background * weights.transmittance[r];
+    for (int c = 0; c < 3; ++c) ASSERT_NEAR(color[c], plain.color[c], 1e-6);
+    ASSERT_NEAR(sum + weights.transmittance[r], 1, 1e-5);
+  }
+}
+
+// H67: a pixel does not depend on how the picture is cut into work.
+TEST(RenderView, H67_TilesAndThePlainBodyAgree) {
+  const RadianceField field = RandomField({16, 16, 16}, 9, 0.5, 81);
+  Camera camera;
+  camera.width = 37;
+  camera.height = 29;
+  camera.fx = camera.fy = 40;
+  camera.cx = 18.5;
+  camera.cy = 14.5;
+  camera.camera_from_world.translation = {0, 0, 3};
+  const RenderedView fast = RenderView(field, camera, {0.5f, 1e-4f});
+  const RenderedView plain = RenderViewPlain(field, camera, {0.5f, 1e-4f});
+  for (size_t i = 0; i < fast.color.pixels.size(); ++i)
+    ASSERT_NEAR(fast.color.pixels[i], plain.color.pixels[i], 2e-5);
+  for (size_t i = 0; i < fast.depth.pixels.size(); ++i)
+    ASSERT_NEAR(fast.depth.pixels[i], plain.depth.pixels[i], 1e-4);
+}
+
+}  // namespace
+}  // namespace regrade

@@ -1,0 +1,58 @@
+// A small random field and rays through it, for tests of rendering and fitting.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "kernels/base/random.h"
+#include "kernels/field/radiance_field.h"
+#include "kernels/scene/camera.h"
+
+namespace regrade::testing {
+
+// Uniform in [lo, hi), keyed by a counter.
+inline double Uniform(uint64_t seed, uint64_t counter, double lo, double hi) {
+  return lo + (hi - lo) * RandomDouble(seed, 77, counter);
+}
+
+// About `fill` of the vertices are stored; densities in [-2, 10), so that some are empty by
+// ReLU.
+inline RadianceField RandomField(const Vec3i& resolution, int basis, double fill,
+                                 uint64_t seed) {
+  auto geometry = std::make_shared<Geometry>();
+  geometry->frame = {resolution, {0.1f, -0.2f, 0.05f}, {1.0f, 0.9f, 1.1f}};
+  geometry->links.Resize(geometry->frame.NumVertices());
+  int32_t count = 0;
+  for (int64_t v = 0; v < geometry->links.size(); ++v)
+    geometry->links[v] = RandomDouble(seed, 1, static_cast<uint64_t>(v)) < fill ? count++ : -1;
+  geometry->density.Resize(count);
+  RadianceField field;
+  field.appearance.basis = basis;
+  field.appearance.sh.Resize(static_cast<int64_t>(count) * field.appearance.stride());
+  for (int64_t i = 0; i < geometry->density.size(); ++i)
+    geometry->density[i] =
+        static_cast<float>(Uniform(seed, static_cast<uint64_t>(i), -2.0, 10.0));
+  for (int64_t i = 0; i < field.appearance.sh.size(); ++i)
+    field.appearance.sh[i] =
+        static_cast<float>(Uniform(seed + 1, static_cast<uint64_t>(i), -0.6, 0.9));
+  field.geometry = std::move(geometry);
+  field.background = {0.3f, 0.6f, 0.2f};
+  return field;
+}
+
+// Rays from a shell outside towards points inside the box.
+inline std::vector<Ray> RandomRays(int n, uint64_t seed) {
+  std::vector<Ray> rays;
+  for (int i = 0; i < n; ++i) {
+    const uint64_t c = static_cast<uint64_t>(i) * 6;
+    Vec3d origin{Uniform(seed, c, -1, 1), Uniform(seed, c + 1, -1, 1),
+                 Uniform(seed, c + 2, -1, 1)};
+    origin = Normalized(origin) * 2.5;
+    const Vec3d target{Uniform(seed, c + 3, -0.7, 0.7), Uniform(seed, c + 4, -0.7, 0.7),
+                       Uniform(seed, c + 5, -0.7, 0.7)};
+    rays.push_back({origin.Cast<float>(), Normalized(target - origin).Cast<float>()});
+  }
+  return rays;
+}
+
+}  // namespace regrade::testing
