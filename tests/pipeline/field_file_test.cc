@@ -1,0 +1,198 @@
+#include "pipeline/field_file.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "kernels/base/half.h"
+#include "kernels/base/random.h"
+#include "pipeline/files/npz_file.h"
+#include "tests/support/expect_error.h"
+#include "tests/support/temporary_folder.h"
+
+namespace regrade {
+namespace {
+
+using testing::ReadText;
+using testing::TemporaryFolder;
+using testing::WriteText;
+
+// A 3 x 4 x 5 grid with 17 voxels.
+StoredField SmallField(int basis) {
+  constexpr int kVoxels = 17;
+  auto geometry = std::make_shared<Geometry>();
+  geometry->frame = {{3, 4, 5}, {0.5f, -1, 2}, {1, 2, 0.25f}};
+  geometry->links.Resize(60);
+  for (int i = 0; i < 60; ++i) geometry->links[i] = i % 3 == 1 && i / 3 < kVoxels ? i / 3 : -1;
+  geometry->density.Resize(kVoxels);
+  StoredField stored;
+  stored.field.appearance.basis = basis;
+  stored.field.appearance.sh.Resize(kVoxels * 3 * basis);
+  for (int i = 0; i < kVoxels; ++i)
+    geometry->density[i] = static_cast<float>(RandomDouble(1, 2, i) * 100 - 20);
+  for (int64_t i = 0; i < stored.field.appearance.sh.size(); ++i)
+    stored.field.appearance.sh[i] = static_cast<float>(RandomDouble(3, 4, i) * 4 - 2);
+  stored.field.geometry = geometry;
+  stored.field.background = {0.25f, 0.5f, 1};
+  stored.field.near_clip = 0.125f;
+  stored.field_from_world.scale = 3;
+  stored.field_from_world.translation = {1, 2, 3};
+  stored.field_from_world.rotation(0, 1) = 0.5;
+  return stored;
+}
+
+TEST(FieldFile, RoundTripIsExactUpToHalfColours) {
+  const TemporaryFolder folder;
+  for (const int basis : {1, 4, 9}) {
+    const StoredField out = SmallField(basis);
+    WriteFieldFile(folder / "field.npz", out);
+    const StoredField in = ReadFieldFile(folder / "field.npz");
+    EXPECT_EQ(in.field.appearance.basis, basis);
+    for (int64_t i = 0; i < 60; ++i)
+      ASSERT_EQ(in.field.geometry->links[i], out.field.geometry->links[i]);
+    for (int64_t i = 0; i < 17; ++i)
+      ASSERT_EQ(in.field.geometry->density[i], out.field.geometry->density[i]);
+    for (int64_t i = 0; i < out.field.appearance.sh.size(); ++i)
+      ASSERT_EQ(in.field.appearance.sh[i],
+                FloatFromHalf(HalfFromFloat(out.field.appearance.sh[i])));
+    EXPECT_EQ(in.field.background, out.field.background);
+    EXPECT_EQ(in.field.near_clip, out.field.near_clip);
+    EXPECT_EQ(in.field_from_world.scale, 3);
+    EXPECT_EQ(in.field_from_world.rotation(0, 1), 0.5);
+    EXPECT_EQ(in.field_from_world.translation.z, 3);
+    EXPECT_EQ(in.field.geometry->frame.radius, out.field.geometry->frame.radius);
+    // What a reader gets, written again, is the same file.
+    WriteFieldFile(folder / "again.npz", in);
+    EXPECT_EQ(ReadText(folder / "again.npz"), ReadText(folder / "field.npz"));
+  }
+}
+
+TEST(FieldFile, LayoutIsSvox2s) {
+  const TemporaryFolder folder;
+  WriteFieldFile(folder / "field.npz", SmallField(4));
+  NpzReader file(folder / "field.npz", 1 << 20);
+  file.Read("radius", ArrayType::kF32, {3});
+  file.Read("center", ArrayType::kF32, {3});
+  file.Read("links", ArrayType::kI32, {3, 4, 5});
+  file.Read("density_data", ArrayType::kF32, {17, 1});
+  const NpzArray colours = file.Read("sh_data", ArrayType::kF16, {17, 27});
+  EXPECT_EQ(file.ReadScalar<int64_t>("basis_type"), 1);
+  // Degree 1 in the places of degree 2: channel-major, the rest zero.
+  const StoredField out = SmallField(4);
+  for (int channel = 0; channel < 3; ++channel)
+    for (int k = 0; k < 9; ++k)
+      EXPECT_EQ(colours.As<uint16_t>()[channel * 9 + k],
+                k < 4 ? HalfFromFloat(out.field.appearance.sh[channel * 4 + k]) : 0);
+}
+
+TEST(FieldFile, TooBrightColoursSaturate) {
+  const TemporaryFolder folder;
+  StoredField out = SmallField(1);
+  out.field.appearance.sh[0] = 1e9f;
+  out.field.appearance.sh[1] = -1e9f;
+  WriteFieldFile(folder / "field.npz", out);
+  const StoredField in = ReadFieldFile(folder / "field.npz");
+  EXPECT_EQ(in.field.appearance.sh[0], kMaxHalf);
+  EXPECT_EQ(in.field.appearance.sh[1], -kMaxHalf);
+}
+
+// svox2's own files: distance codes below -1, no arrays of ours, the joined array of old.
+TEST(FieldFile, ReadsForeignFiles) {
+  const TemporaryFolder folder;
+  const float radius[3] = {1, 1, 1}, center[3] = {0, 0, 0};
+  const int32_t links[8] = {-4, 0, -1, -2, 1, -1, -1, -1};
+  std::vector<float> data(2 * 28);
+  for (size_t i = 0; i < data.size(); ++i) data[i] = static_cast<float>(i);
+  NpzWriter writer;
+  writer.Add("radius", {3}, radius);
+  writer.Add("center", {3}, center);
+  writer.Add("links", {2, 2, 2}, links);
+  writer.Add("data", {2, 28}, data.data());
+  writer.WriteTo(folder / "old.npz");
+  const StoredField in = ReadFieldFile(folder / "old.npz");
+  EXPECT_EQ(in.field.geometry->links[0], -1);
+  EXPECT_EQ(in.field.geometry->density[1], 28);
+  EXPECT_EQ(in.field.appearance.sh[27], 29);
+  EXPECT_EQ(in.field.background, (Vec3f{1, 1, 1}));
+}
+
+class Changed : public ::testing::Test {
+ protected:
+  // Writes the small field with one array replaced, and reads it.
+  template <typename T>
+  void ReadWith(const std::string& name, const std::vector<int64_t>& shape, const T* data) {
+    WriteFieldFile(folder_ / "field.npz", SmallField(9));
+    NpzReader reader(folder_ / "field.npz", 1 << 20);
+    std::vector<NpzArray> kept;
+    for (const std::string& other : reader.names()) kept.push_back(reader.Read(other));
+    NpzWriter writer;
+    size_t i = 0;
+    for (const std::string& other : reader.names()) {
+      const NpzArray& array = kept[i++];
+      if (other == name) continue;
+      if (array.type == ArrayType::kF32) writer.Add(other, array.shape, array.As<float>());
+      if (array.type == ArrayType::kI32) writer.Add(other, array.shape, array.As<int32_t>());
+      if (array.type == ArrayType::kI64) writer.Add(other, array.shape, array.As<int64_t>());
+      if (array.type == ArrayType::kF16) writer.Add(other, array.shape, array.As<uint16_t>());
+      if (array.type == ArrayType::kF64) writer.Add(other, array.shape, array.As<double>());
+    }
+    writer.Add(name, shape, data);
+    writer.WriteTo(folder_ / "changed.npz");
+    before_ = ReadText(folder_ / "changed.npz");
+    ReadFieldFile(folder_ / "changed.npz");
+  }
+
+  TemporaryFolder folder_;
+  std::string before_;
+};
+
+TEST_F(Changed, F64_NewerVersionIsRefusedAndUntouched) {
+  const int32_t version = 99;
+  EXPECT_REGRADE_ERROR(ReadWith("regrade_version", {}, &version), ExitCode::kInput,
+                       "format 99");
+  EXPECT_EQ(ReadText(folder_ / "changed.npz"), before_);
+}
+
+TEST_F(Changed, F68_LinksOutOfRange) {
+  std::vector<int32_t> links(60, -1);
+  links[59] = 17;
+  EXPECT_REGRADE_ERROR(ReadWith("links", {3, 4, 5}, links.data()), ExitCode::kInput,
+                       "link 59 is 17");
+  links[59] = links[58] = 3;
+  EXPECT_REGRADE_ERROR(ReadWith("links", {3, 4, 5}, links.data()), ExitCode::kInput,
+                       "two vertices");
+}
+
+TEST_F(Changed, F69_NonFiniteValuesAreCounted) {
+  std::vector<float> density(17, 1);
+  density[3] = std::numeric_limits<float>::quiet_NaN();
+  density[4] = std::numeric_limits<float>::infinity();
+  EXPECT_REGRADE_ERROR(ReadWith("density_data", {17, 1}, density.data()), ExitCode::kInput,
+                       "2 values are not finite");
+}
+
+TEST_F(Changed, F66_ShapesThatDisagree) {
+  const std::vector<float> density(16, 1);
+  EXPECT_REGRADE_ERROR(ReadWith("density_data", {16, 1}, density.data()), ExitCode::kInput,
+                       "density_data");
+  const std::vector<int32_t> links(10, -1);
+  EXPECT_REGRADE_ERROR(ReadWith("links", {1, 2, 5}, links.data()), ExitCode::kInput,
+                       "at least 2");
+  const float radius[3] = {1, 0, 1};
+  EXPECT_REGRADE_ERROR(ReadWith("radius", {3}, radius), ExitCode::kInput, "radius");
+  const int32_t basis = 16;
+  EXPECT_REGRADE_ERROR(ReadWith("regrade_basis", {}, &basis), ExitCode::kInput, "16 of 9");
+}
+
+TEST_F(Changed, WhatCannotBeRenderedIsNamed) {
+  const int64_t learned = 4;
+  EXPECT_REGRADE_ERROR(ReadWith("basis_type", {}, &learned), ExitCode::kInput,
+                       "not spherical harmonics");
+  const int32_t spheres[1] = {0};
+  EXPECT_REGRADE_ERROR(ReadWith("background_links", {1}, spheres), ExitCode::kInput,
+                       "background spheres");
+}
+
+}  // namespace
+}  // namespace regrade

@@ -1,0 +1,242 @@
+#include "pipeline/files/npz_file.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "kernels/base/random.h"
+#include "pipeline/files/zip_directory.h"
+#include "tests/support/expect_error.h"
+#include "tests/support/temporary_folder.h"
+
+namespace regrade {
+namespace {
+
+using testing::TemporaryFolder;
+using testing::WriteText;
+
+constexpr uint64_t kBudget = 1 << 20;
+
+// Two members, the second deflated.
+std::string SmallArchive() {
+  static const float values[6] = {1, 2, 3, 4, 5, 6};
+  static const std::vector<int32_t> ramp(1000, 7);
+  NpzWriter writer;
+  writer.Add("values", {2, 3}, values);
+  writer.Add("ramp", {1000}, ramp.data(), NpzPacking::kDeflate);
+  writer.AddScalar<double>("pi", 3.25);
+  writer.AddText("note", "h\xc3\xa9llo");
+  return writer.Bytes();
+}
+
+void ReadEverything(const std::string& path) {
+  NpzReader reader(path, kBudget);
+  for (const std::string& name : reader.names()) reader.Read(name);
+}
+
+std::string Patched(std::string bytes, size_t at, uint64_t value, int size) {
+  for (int i = 0; i < size; ++i, value >>= 8) bytes[at + i] = static_cast<char>(value & 255);
+  return bytes;
+}
+
+TEST(Npz, RoundTrip) {
+  const TemporaryFolder folder;
+  WriteText(folder / "a.npz", SmallArchive());
+  NpzReader reader(folder / "a.npz", kBudget);
+  const NpzArray values = reader.Read("values", ArrayType::kF32, {2, -1});
+  EXPECT_EQ(values.shape, (std::vector<int64_t>{2, 3}));
+  EXPECT_EQ(values.As<float>()[5], 6);
+  EXPECT_EQ(reader.Read("ramp").As<int32_t>()[999], 7);
+  EXPECT_EQ(reader.ReadScalar<double>("pi"), 3.25);
+  EXPECT_EQ(reader.ReadText("note"), "h\xc3\xa9llo");
+  EXPECT_REGRADE_ERROR(reader.Read("none"), ExitCode::kInput, "'none'");
+  EXPECT_REGRADE_ERROR(reader.Read("values", ArrayType::kF32, {3, 2}), ExitCode::kInput,
+                       "(2, 3), expected <f4(3, 2)");
+}
+
+TEST(Npz, SameArraysSameBytes) { EXPECT_EQ(SmallArchive(), SmallArchive()); }
+
+TEST(Npz, EmptyArrays) {
+  const TemporaryFolder folder;
+  NpzWriter writer;
+  writer.Add<float>("none", {0, 27}, nullptr);
+  writer.WriteTo(folder / "a.npz");
+  NpzReader reader(folder / "a.npz", kBudget);
+  EXPECT_EQ(reader.Read("none").shape, (std::vector<int64_t>{0, 27}));
+}
+
+// Cut anywhere, the archive is refused and never believed.
+TEST(Npz, F71_TruncatedAnywhere) {
+  const TemporaryFolder folder;
+  const std::string bytes = SmallArchive();
+  for (size_t size = 0; size < bytes.size(); size += 3) {
+    WriteText(folder / "a.npz", bytes.substr(0, size));
+    EXPECT_REGRADE_ERROR(ReadEverything(folder / "a.npz"), ExitCode::kInput, "a.npz");
+  }
+}
+
+// One flipped bit of the packed data is found by the checksum; of the rest it is found, or
+// changes nothing that we use. Nothing else than Error may come out.
+TEST(Npz, F70_FlippedBits) {
+  const TemporaryFolder folder;
+  const std::string bytes = SmallArchive();
+  int refused = 0;
+  for (size_t i = 0; i < bytes.size(); ++i) {
+    std::string mutant = bytes;
+    mutant[i] ^= static_cast<char>(1 << i % 8);
+    WriteText(folder / "a.npz", mutant);
+    try {
+      ReadEverything(folder / "a.npz");
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ExitCode::kInput);
+      ++refused;
+    }
+  }
+  EXPECT_GT(refused, static_cast<int>(bytes.size() / 2));
+  std::string damaged = bytes;
+  damaged[bytes.find(std::string("\0\0\x80\x3f", 4))] ^= 1;  // the first stored float
+  WriteText(folder / "a.npz", damaged);
+  EXPECT_REGRADE_ERROR(ReadEverything(folder / "a.npz"), ExitCode::kInput, "'values'");
+}
+
+TEST(Npz, F66_SizesAboveTheBudget) {
+  const TemporaryFolder folder;
+  WriteText(folder / "a.npz", SmallArchive());
+  NpzReader reader(folder / "a.npz", 500);
+  EXPECT_REGRADE_ERROR(reader.Read("ramp"), ExitCode::kInput, "more than the 500");
+  reader.Read("values");
+  EXPECT_REGRADE_ERROR(  // one budget for all
+      {
+        for (int i = 0; i < 5; ++i) reader.Read("values");
+      },
+      ExitCode::kInput, "--max-memory");
+}
+
+TEST(Npz, F71_DeflateRatioAndStoredSizes) {
+  const TemporaryFolder folder;
+  const std::string bytes = SmallArchive();
+  const size_t central = bytes.find("PK\x01\x02");
+  const size_t second = bytes.find("PK\x01\x02", central + 4);
+  const size_t second_local = bytes.find("PK\x03\x04", 4);
+  // Both descriptions agree on a size that deflate cannot reach.
+  std::string bomb = Patched(bytes, second + 24, 1u << 30, 4);
+  bomb = Patched(bomb, second_local + 22, 1u << 30, 4);
+  WriteText(folder / "a.npz", bomb);
+  EXPECT_REGRADE_ERROR(ReadEverything(folder / "a.npz"), ExitCode::kInput,
+                       "more than deflate can do");
+  WriteText(folder / "a.npz", Patched(bytes, central + 24, 1000, 4));
+  EXPECT_REGRADE_ERROR(ReadEverything(folder / "a.npz"), ExitCode::kInput, "sizes differ");
+  // Only one of them says so.
+  WriteText(folder / "a.npz", Patched(bytes, second_local + 22, 4000, 4));
+  EXPECT_REGRADE_ERROR(ReadEverything(folder / "a.npz"), ExitCode::kInput, "disagree");
+}
+
+TEST(Npz, F67_OverlappingMembers) {
+  const TemporaryFolder folder;
+  // Two names for one member, both descriptions agreeing: only the byte ranges tell.
+  static const float values[6] = {1, 2, 3, 4, 5, 6};
+  NpzWriter writer;
+  writer.Add("a", {6}, values);
+  writer.Add("b", {6}, values);
+  std::string bytes = writer.Bytes();
+  const size_t central = bytes.find("PK\x01\x02", bytes.find("PK\x01\x02") + 4);
+  bytes = Patched(bytes, central + 42, 0, 4);  // b's local header is a's
+  bytes[central + 46] = 'a';
+  WriteText(folder / "a.npz", bytes);
+  EXPECT_REGRADE_ERROR(ReadEverything(folder / "a.npz"), ExitCode::kInput, "twice");
+  // The overlap itself: the first member claims the second's bytes too.
+  bytes = writer.Bytes();
+  const size_t first = bytes.find("PK\x01\x02");
+  const size_t whole = bytes.find("PK\x03\x04", 4) + 100 - bytes.find("\x93NUMPY");
+  for (const size_t at : {first + 20, first + 24, size_t{18}, size_t{22}})
+    bytes = Patched(bytes, at, whole, 4);
+  WriteText(folder / "a.npz", bytes);
+  EXPECT_REGRADE_ERROR(ReadEverything(folder / "a.npz"), ExitCode::kInput, "share bytes");
+}
+
+TEST(Npz, F71_OffsetsOutsideTheFile) {
+  const TemporaryFolder folder;
+  const std::string bytes = SmallArchive();
+  const size_t central = bytes.find("PK\x01\x02");
+  for (const uint64_t offset :
+       {uint64_t{0xfffffff0}, uint64_t{bytes.size() - 3}, uint64_t{1}}) {
+    WriteText(folder / "a.npz", Patched(bytes, central + 42, offset, 4));
+    EXPECT_REGRADE_ERROR(ReadEverything(folder / "a.npz"), ExitCode::kInput, "zip archive");
+  }
+}
+
+TEST(Npz, RandomMutantsOnlyEverThrowError) {
+  const TemporaryFolder folder;
+  const std::string bytes = SmallArchive();
+  const uint64_t kEdges[] = {0, 1, 0x7fffffff, 0x80000000, 0xffffffff, 0xffff};
+  for (uint64_t round = 0; round < 500; ++round) {
+    std::string mutant = bytes;
+    for (uint64_t k = 0; k < 1 + round % 3; ++k) {
+      const size_t at = RandomIndex(1, round, 3 * k, bytes.size() - 4);
+      const int size = 1 << RandomIndex(1, round, 3 * k + 1, 3);
+      mutant = Patched(mutant, at, kEdges[RandomIndex(1, round, 3 * k + 2, 6)], size);
+    }
+    WriteText(folder / "a.npz", mutant);
+    try {
+      ReadEverything(folder / "a.npz");
+    } catch (const Error&) {
+    }
+  }
+}
+
+std::string Npy(const std::string& dictionary) {
+  std::string bytes = std::string("\x93NUMPY\x01\x00", 8);
+  bytes += static_cast<char>(dictionary.size() & 255);
+  bytes += static_cast<char>(dictionary.size() >> 8);
+  return bytes + dictionary;
+}
+
+TEST(NpyHeader, ReadsWhatNumPyWrites) {
+  const NpyHeader header = ParseNpyHeader(
+      Npy("{'descr': '<f2', 'fortran_order': False, 'shape': (10, 27), }     \n"), "x");
+  EXPECT_EQ(header.type, ArrayType::kF16);
+  EXPECT_EQ(header.shape, (std::vector<int64_t>{10, 27}));
+  EXPECT_EQ(header.data_bytes, 540u);
+  EXPECT_EQ(ParseNpyHeader(Npy("{'descr': '<i8', 'fortran_order': False, 'shape': (), }"), "x")
+                .data_bytes,
+            8u);
+  const std::string ours = MakeNpyHeader(ArrayType::kF32, {3, 4});
+  EXPECT_EQ(ours.size() % 64, 0u);
+  EXPECT_EQ(ParseNpyHeader(ours, "x").data_offset, ours.size());
+}
+
+TEST(NpyHeader, F72_RefusedByName) {
+  const auto with = [](const std::string& type, const std::string& order,
+                       const std::string& shape) {
+    return Npy("{'descr': " + type + ", 'fortran_order': " + order + ", 'shape': " + shape +
+               ", }\n");
+  };
+  const struct {
+    std::string bytes;
+    const char* reason;
+  } cases[] = {
+      {with("'>f4'", "False", "(3,)"), "big-endian"},
+      {with("'|O'", "False", "(3,)"), "Python objects"},
+      {with("[('a', '<f4')]", "False", "(3,)"), "structured"},
+      {with("'<U5'", "False", "(3,)"), "<U5"},
+      {with("'<f4'", "True", "(3, 2)"), "Fortran"},
+      {with("'<f4'", "False", "(-3,)"), "not a length"},
+      {with("'<f4'", "False", "(4294967296, 4294967296)"), "too large"},
+      {with("'<f4'", "False", "(99999999999999999999,)"), "not a length"},
+      {with("'<f4'", "False", "(1,1,1,1,1,1,1,1,1)"), "8 axes"},
+      {with("'<f4'", "False", "(3,"), ""},
+      {with("'<f4'", "__import__('os')", "(3,)"), "True or False"},
+      {Npy("{'descr': '<f4'}"), "missing"},
+      {Npy("{'descr': '<f4', 'descr': '<f4'}"), "twice"},
+      {Npy("{'other': 1}"), "unknown key"},
+      {Npy("{'descr': '<f4', 'fortran_order': False, 'shape': (3,)} x"), "follows"},
+      {std::string("\x93NUMPY\x01\x00\xff\xff{", 11), "longer than the file"},
+      {"\x93NUMPY\x09", "not a NumPy array"},
+      {"not an array at all", "not a NumPy array"},
+  };
+  for (const auto& c : cases)
+    EXPECT_REGRADE_ERROR(ParseNpyHeader(c.bytes, "file"), ExitCode::kInput, c.reason);
+}
+
+}  // namespace
+}  // namespace regrade
