@@ -134,9 +134,7 @@ void Console::Warn(const std::string& text) {
   Event("warning", JsonValue::Object{{"text", text}});
 }
 
-void Console::Fail(const Error& error, const std::string& kept) {
-  Fail(MessageFor(error, kept), error.code());
-}
+void Console::Fail(const Error& error) { Fail(MessageFor(error, kept_), error.code()); }
 
 void Console::Fail(const std::string& text, ExitCode code) {
   Erase();

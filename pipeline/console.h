@@ -37,8 +37,10 @@ class Console {
 
   void Info(const std::string& text);
   void Warn(const std::string& text);
-  void Fail(const Error& error, const std::string& kept);
+  void Fail(const Error& error);
   void Fail(const std::string& text, ExitCode code);
+  // What survives a failure from now on; part of the message.
+  void SetKept(const std::string& kept) { kept_ = kept; }
   // A line of JSON {"event": name, ...members} with --json, nothing without.
   void Event(const std::string& name, const JsonValue& members);
 
@@ -59,7 +61,7 @@ class Console {
   bool color_ = false;
   bool line_drawn_ = false;
   std::unique_ptr<Log> log_;
-  std::string stage_;
+  std::string stage_, kept_;
   EtaEstimator eta_;
   std::chrono::steady_clock::time_point stage_begin_, last_drawn_;
 };

@@ -1,5 +1,6 @@
 #include "pipeline/option_binding.h"
 
+#include <algorithm>
 #include <boost/program_options.hpp>
 #include <charconv>
 #include <cmath>
@@ -12,6 +13,7 @@ namespace regrade {
 namespace {
 
 namespace po = boost::program_options;
+using Words = std::vector<std::string>;
 
 // Shortest text that reads back as the same value, in no locale.
 template <typename T>
@@ -86,8 +88,10 @@ std::string FlagText(const JsonValue& value) {
   if (value.IsString()) return value.AsString();
   if (!value.IsArray()) return DumpJson(value, -1);
   std::string text;
-  for (const JsonValue& element : value.AsArray())
-    text += (text.empty() ? "" : ",") + FlagText(element);
+  for (const JsonValue& element : value.AsArray()) {
+    if (!text.empty()) text += ',';
+    text += FlagText(element);
+  }
   return text;
 }
 
@@ -134,13 +138,14 @@ std::vector<std::string> OptionSet::Parse(const std::vector<std::string>& argume
       description.add_options()(("no-" + entry.name).c_str(), new po::untyped_value(true));
   }
   constexpr const char* kSeeHelp = "see --help";
+  const auto flags_end = std::find(arguments.begin(), arguments.end(), "--");
   po::parsed_options parsed(&description);
   try {
     namespace style = po::command_line_style;
     // An empty positional description would refuse what is not a flag.
     po::positional_options_description positional;
     positional.add("", -1);
-    parsed = po::command_line_parser(arguments)
+    parsed = po::command_line_parser(Words(arguments.begin(), flags_end))
                  .options(description)
                  .positional(positional)
                  .style(style::allow_long | style::long_allow_adjacent | style::long_allow_next)
@@ -165,8 +170,12 @@ std::vector<std::string> OptionSet::Parse(const std::vector<std::string>& argume
   std::vector<std::string> rest;
   for (const po::option& option : parsed.options) {
     if (option.position_key >= 0 || option.string_key.empty()) {
-      // A single dash introduces nothing here; "-" alone and what follows "--" are words.
-      rest.insert(rest.end(), option.value.begin(), option.value.end());
+      for (const std::string& word : option.value) {
+        if (word.size() > 1 && word[0] == '-')
+          throw Error(ExitCode::kUsage, "unknown option", word,
+                      "options begin with two dashes; a file of this name goes behind --");
+        rest.push_back(word);
+      }
       continue;
     }
     Flag flag{option.string_key, option.value.empty() ? "true" : option.value[0]};
@@ -177,6 +186,7 @@ std::vector<std::string> OptionSet::Parse(const std::vector<std::string>& argume
                   "keep one of them: which one is meant?");
     flags_.push_back(flag);
   }
+  if (flags_end != arguments.end()) rest.insert(rest.end(), flags_end + 1, arguments.end());
   return rest;
 }
 
@@ -288,8 +298,12 @@ std::string OptionSet::Help() const {
                            : value.empty() ? "none"
                                            : value);
     constexpr size_t kIndent = 28, kWidth = 96;
-    head += head.size() + 2 > kIndent ? "\n" + std::string(kIndent, ' ')
-                                      : std::string(kIndent - head.size(), ' ');
+    if (head.size() + 2 > kIndent) {
+      head += '\n';
+      head.append(kIndent, ' ');
+    } else {
+      head.resize(kIndent, ' ');
+    }
     text += head + Wrapped(std::string(entry.info.help) + " (" + facts + ")", kIndent, kWidth) +
             "\n";
   }
