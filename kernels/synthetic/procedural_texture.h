@@ -1,0 +1,39 @@
+// Paint for synthetic scenes: patterns that never repeat, with corners at several scales, so
+// that features can be matched from view to view.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "kernels/base/vec.h"
+
+namespace regrade {
+
+enum class Pattern {
+  kPlain,     // one colour
+  kTerrazzo,  // polygonal chips of two sizes in a ground
+  kTiles,     // square tiles, each with a motif of its own
+  kCloth,     // crossing bands of irregular widths
+  kPainting,  // contours of a warped noise
+  kDots,      // round spots on a glaze
+  kPlanks,    // boards of different tones with grain
+};
+
+struct Paint {
+  Pattern pattern = Pattern::kPlain;
+  double size = 0.2;               // world units: a tile's, a large chip's, a board's width
+  std::array<Vec3d, 5> palette{};  // linear RGB; the first is the ground
+  uint64_t seed = 0;
+};
+
+// Linear RGB of an 0xRRGGBB sRGB colour.
+Vec3d LinearFromHex(uint32_t hex);
+
+// Reflectance in [0, 1], linear RGB, at surface coordinates (u, v) in world units. Besides the
+// pattern there is a mottle of a few per cent down to kFinestDetail, for feature detectors.
+Vec3d Albedo(const Paint& paint, double u, double v);
+
+// Size of the smallest blobs, world units: a few pixels in the default captures.
+inline constexpr double kFinestDetail = 0.026;
+
+}  // namespace regrade

@@ -1,0 +1,176 @@
+#include "kernels/synthetic/solid.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace regrade {
+namespace {
+
+constexpr double kNever = std::numeric_limits<double>::infinity();
+
+Vec3d TurnedBy(const Vec3d& p, double cosine, double sine) {
+  return {cosine * p.x - sine * p.y, sine * p.x + cosine * p.y, p.z};
+}
+
+// Roots of a t^2 + 2 b t + c; false if there are none.
+bool SolveQuadratic(double a, double b, double c, double* t0, double* t1) {
+  const double discriminant = b * b - a * c;
+  if (!(discriminant > 0) || !(a > 0)) return false;
+  const double root = std::sqrt(discriminant);
+  const double q = b > 0 ? -b - root : -b + root;  // no cancellation
+  *t0 = q / a;
+  *t1 = c / q;
+  if (*t0 > *t1) std::swap(*t0, *t1);
+  return true;
+}
+
+double MeetSphere(const Vec3d& o, const Vec3d& d, double radius, double after) {
+  double t0, t1;
+  if (!SolveQuadratic(1, Dot(o, d), Dot(o, o) - radius * radius, &t0, &t1)) return kNever;
+  return t0 > after ? t0 : t1 > after ? t1 : kNever;
+}
+
+double MeetBox(const Vec3d& o, const Vec3d& d, const Vec3d& half, double after) {
+  double enter = -kNever, leave = kNever;
+  for (int a = 0; a < 3; ++a) {
+    if (d[a] == 0) {
+      if (std::abs(o[a]) > half[a]) return kNever;
+      continue;
+    }
+    const double inverse = 1 / d[a];
+    double t0 = (-half[a] - o[a]) * inverse, t1 = (half[a] - o[a]) * inverse;
+    if (t0 > t1) std::swap(t0, t1);
+    enter = std::max(enter, t0);
+    leave = std::min(leave, t1);
+  }
+  if (enter > leave) return kNever;
+  return enter > after ? enter : leave > after ? leave : kNever;
+}
+
+// The wall of an upright cylinder; a part of it may be cut away (local y <= min_y).
+double MeetTube(const Vec3d& o, const Vec3d& d, double radius, double half_height, double min_y,
+                double after) {
+  double roots[2];
+  if (!SolveQuadratic(d.x * d.x + d.y * d.y, o.x * d.x + o.y * d.y,
+                      o.x * o.x + o.y * o.y - radius * radius, &roots[0], &roots[1]))
+    return kNever;
+  for (const double t : roots)
+    if (t > after && std::abs(o.z + t * d.z) <= half_height && o.y + t * d.y > min_y) return t;
+  return kNever;
+}
+
+double MeetCylinder(const Vec3d& o, const Vec3d& d, const Vec3d& half, double after) {
+  double best = MeetTube(o, d, half.x, half.z, -kNever, after);
+  if (d.z != 0)
+    for (const double z : {-half.z, half.z}) {
+      const double t = (z - o.z) / d.z;
+      const double x = o.x + t * d.x, y = o.y + t * d.y;
+      if (t > after && t < best && x * x + y * y <= half.x * half.x) best = t;
+    }
+  return best;
+}
+
+double Meet(const Solid& solid, const Vec3d& o, const Vec3d& d, double after) {
+  switch (solid.shape) {
+    case Shape::kSphere:
+      return MeetSphere(o, d, solid.half.x, after);
+    case Shape::kBox:
+      return MeetBox(o, d, solid.half, after);
+    case Shape::kCylinder:
+      return MeetCylinder(o, d, solid.half, after);
+    case Shape::kBackdrop:
+      return MeetTube(o, d, solid.half.x, solid.half.z, solid.half.y, after);
+  }
+  return kNever;
+}
+
+// Whether the line of the ray passes the solid by: the quick test that most pairs end with.
+inline bool PassesBy(const Solid& solid, const RayT<double>& ray) {
+  if (solid.shape == Shape::kBackdrop) return false;
+  const Vec3d offset = ray.origin - solid.center;
+  const double along = Dot(offset, ray.direction);
+  return Dot(offset, offset) - along * along > Dot(solid.half, solid.half) * (1 + 1e-9);
+}
+
+// Distance along the ray; *o and *d are the ray in the solid's own frame.
+double Distance(const Solid& solid, const RayT<double>& ray, double after, Vec3d* o, Vec3d* d) {
+  *o = TurnedBy(ray.origin - solid.center, solid.cos_yaw, -solid.sin_yaw);
+  *d = TurnedBy(ray.direction, solid.cos_yaw, -solid.sin_yaw);
+  return Meet(solid, *o, *d, after);
+}
+
+// Outward normal and paint coordinates at local point p.
+void Dress(const Solid& solid, const Vec3d& p, Vec3d* normal, double* u, double* v) {
+  const Vec3d& half = solid.half;
+  if (solid.shape == Shape::kSphere) {
+    *normal = p / half.x;
+    // Lambert's equal-area map seen from the top: no pole but the hidden lowest point.
+    const double stretch = std::sqrt(2 / std::max(1e-6, 1 + normal->z));
+    *u = p.x * stretch, *v = p.y * stretch;
+    return;
+  }
+  if (solid.shape == Shape::kBox) {
+    int axis = 0;
+    double most = -kNever;
+    for (int a = 0; a < 3; ++a) {
+      const double outside = std::abs(p[a]) - half[a];
+      if (outside > most) most = outside, axis = a;
+    }
+    *normal = {};
+    (*normal)[axis] = p[axis] > 0 ? 1 : -1;
+    // Sides unfold into a strip; each face has a stretch of paint of its own.
+    const double shift = 17.0 * axis + (p[axis] > 0 ? 7.0 : 0.0);
+    *u = (axis == 0 ? p.y : p.x) + shift;
+    *v = axis == 2 ? p.y : p.z;
+    return;
+  }
+  const bool lid = solid.shape == Shape::kCylinder && std::abs(p.z) > half.z * (1 - 1e-9);
+  if (lid) {
+    *normal = {0, 0, p.z > 0 ? 1.0 : -1.0};
+    *u = p.x + 23, *v = p.y;
+    return;
+  }
+  *normal = {p.x / half.x, p.y / half.x, 0};
+  // A pot's seam is at its back, a backdrop's in the part cut away.
+  *u =
+      half.x * (solid.shape == Shape::kBackdrop ? std::atan2(p.x, p.y) : std::atan2(p.x, -p.y));
+  *v = p.z;
+}
+
+}  // namespace
+
+Hit FindHit(const std::vector<Solid>& solids, const RayT<double>& ray, double min_distance) {
+  Hit hit;
+  hit.distance = kNever;
+  Vec3d local;
+  for (size_t i = 0; i < solids.size(); ++i) {
+    if (PassesBy(solids[i], ray)) continue;
+    Vec3d o, d;
+    const double t = Distance(solids[i], ray, min_distance, &o, &d);
+    if (!(t < hit.distance)) continue;
+    hit.distance = t;
+    hit.solid = static_cast<int>(i);
+    local = o + d * t;
+  }
+  if (hit.solid < 0) return hit;
+  const Solid& solid = solids[hit.solid];
+  hit.point = ray.origin + ray.direction * hit.distance;
+  Vec3d normal;
+  Dress(solid, local, &normal, &hit.u, &hit.v);
+  hit.normal = TurnedBy(normal, solid.cos_yaw, solid.sin_yaw);
+  if (Dot(hit.normal, ray.direction) > 0) hit.normal = -hit.normal;
+  return hit;
+}
+
+bool IsShadowed(const std::vector<Solid>& solids, const RayT<double>& ray,
+                double min_distance) {
+  Vec3d o, d;
+  for (const Solid& solid : solids)
+    if (solid.casts_shadow && !PassesBy(solid, ray) &&
+        Distance(solid, ray, min_distance, &o, &d) < kNever)
+      return true;
+  return false;
+}
+
+}  // namespace regrade

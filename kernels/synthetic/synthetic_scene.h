@@ -1,0 +1,41 @@
+// Analytic scenes with known truth, and the cameras that photograph them.
+//
+// World: z is up, lengths are about those of furniture in metres. Everything that a default
+// camera sees lies inside the scene's bounds.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "kernels/scene/camera.h"
+#include "kernels/synthetic/solid.h"
+
+namespace regrade {
+
+struct SyntheticScene {
+  std::string name;
+  std::vector<Solid> solids;
+  Vec3d to_sun;           // unit
+  double sun = 0.95;      // reflected share of full light facing the sun
+  double ambient = 0.45;  // and in the shade
+  Vec3d bounds_min, bounds_max;
+};
+
+// "table|wall|room", for the help text and for errors.
+inline constexpr char kSyntheticSceneNames[] = "table|wall|room";
+
+// The shapes are fixed; `seed` draws the paint. Throws Error (kUsage) for an unknown name,
+// listing the known ones.
+//   table: a still life before a curved tiled wall, seen from an arc of 80 degrees
+//   wall:  a wall with shelves and reliefs, cameras on a small plane, all facing it
+//   room:  a furnished room, cameras on a loop inside, each looking across to the far side
+SyntheticScene MakeSyntheticScene(const std::string& name, uint64_t seed);
+
+// `views` cameras on a closed smooth path: neighbours in the list are neighbours in space, and
+// the first is in the midst of the others (a held-out view is never at the rim). Pinhole, focal
+// length 0.9 to 1.15 times the width, principal point at the centre.
+std::vector<Camera> SyntheticCameras(const SyntheticScene& scene, int views, int width,
+                                     int height);
+
+}  // namespace regrade

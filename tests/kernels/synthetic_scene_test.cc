@@ -1,0 +1,185 @@
+// Synthetic scenes: their truth is exact, their pictures repeat, their cameras see only what
+// the bounds hold.
+#include "kernels/synthetic/synthetic_scene.h"
+
+#include <gtest/gtest.h>
+#include <omp.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "kernels/base/error.h"
+#include "kernels/synthetic/ray_trace.h"
+
+namespace regrade {
+namespace {
+
+constexpr const char* kScenes[] = {"table", "wall", "room"};
+
+double Bilinear(const Image& image, double u, double v, int channel) {
+  const double x = u - 0.5, y = v - 0.5;
+  const int i = std::clamp(static_cast<int>(std::floor(x)), 0, image.width - 2);
+  const int j = std::clamp(static_cast<int>(std::floor(y)), 0, image.height - 2);
+  const double a = x - i, b = y - j;
+  return (1 - b) * ((1 - a) * image.at(i, j)[channel] + a * image.at(i + 1, j)[channel]) +
+         b * ((1 - a) * image.at(i, j + 1)[channel] + a * image.at(i + 1, j + 1)[channel]);
+}
+
+class EveryScene : public ::testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(SyntheticScene, EveryScene, ::testing::ValuesIn(kScenes));
+
+TEST_P(EveryScene, SameBytesForAnyNumberOfThreads) {
+  const SyntheticScene scene = MakeSyntheticScene(GetParam(), 3);
+  const Camera camera = SyntheticCameras(scene, 24, 96, 72)[5];
+  const int threads = omp_get_max_threads();
+  omp_set_num_threads(1);
+  const SyntheticView one = RenderSyntheticView(scene, camera);
+  omp_set_num_threads(3);
+  const SyntheticView three = RenderSyntheticView(scene, camera);
+  omp_set_num_threads(threads);
+  EXPECT_EQ(one.color.pixels, three.color.pixels);
+  EXPECT_EQ(one.depth.pixels, three.depth.pixels);
+}
+
+TEST_P(EveryScene, SeedRepaintsButDoesNotMoveAnything) {
+  const SyntheticScene a = MakeSyntheticScene(GetParam(), 0),
+                       b = MakeSyntheticScene(GetParam(), 1);
+  const Camera camera = SyntheticCameras(a, 24, 64, 48)[0];
+  const SyntheticView in_a = RenderSyntheticView(a, camera),
+                      in_b = RenderSyntheticView(b, camera);
+  EXPECT_EQ(in_a.depth.pixels, in_b.depth.pixels);
+  EXPECT_NE(in_a.color.pixels, in_b.color.pixels);
+}
+
+// A grid over the bounds must be able to explain every pixel of every default view.
+TEST_P(EveryScene, BoundsHoldAllThatCamerasSee) {
+  const SyntheticScene scene = MakeSyntheticScene(GetParam(), 0);
+  for (const Camera& camera : SyntheticCameras(scene, 24, 640, 480))
+    for (int y = 0; y < 480; y += 16)
+      for (int x = 0; x < 640; x += 16) {
+        const Hit hit = FindHit(scene.solids, camera.WorldRay(x + 0.5, y + 0.5), 1e-7);
+        ASSERT_GE(hit.solid, 0);
+        for (int a = 0; a < 3; ++a) {
+          ASSERT_GE(hit.point[a], scene.bounds_min[a] - 1e-9);
+          ASSERT_LE(hit.point[a], scene.bounds_max[a] + 1e-9);
+        }
+      }
+}
+
+TEST_P(EveryScene, DepthIsWhereTheMotionSaysItIs) {
+  const SyntheticScene scene = MakeSyntheticScene(GetParam(), 0);
+  const std::vector<Camera> cameras = SyntheticCameras(scene, 24, 80, 60);
+  const SyntheticView view = RenderSyntheticView(scene, cameras[2]);
+  const SyntheticMotion motion = TrueMotion(scene, cameras[2], cameras[3]);
+  const RigidTransform world_from_camera = cameras[2].camera_from_world.Inverse();
+  for (int y = 0; y < 60; ++y)
+    for (int x = 0; x < 80; ++x) {
+      const Vec3d point = world_from_camera * (cameras[2].CameraRay(x + 0.5, y + 0.5) *
+                                               static_cast<double>(*view.depth.at(x, y)));
+      double u, v;
+      ASSERT_TRUE(cameras[3].Project(point, &u, &v));
+      const float* uv = &motion.uv[2 * (80 * y + x)];
+      // Depth is stored as float: 1e-7 relative, times a motion of tens of pixels.
+      ASSERT_NEAR(u - (x + 0.5), uv[0], 1e-3);
+      ASSERT_NEAR(v - (y + 0.5), uv[1], 1e-3);
+    }
+}
+
+// Without highlights surfaces look the same from everywhere, so view i + 1 carried back by the
+// exact motion is view i up to the error of interpolation. Where the mask is wrong, whole
+// objects differ.
+TEST_P(EveryScene, H124_WarpingByTrueMotionLeavesInterpolationErrorOnly) {
+  const SyntheticScene scene = MakeSyntheticScene(GetParam(), 0);
+  const std::vector<Camera> cameras = SyntheticCameras(scene, 24, 320, 240);
+  for (const int i : {0, 9}) {
+    const SyntheticView a = RenderSyntheticView(scene, cameras[i]);
+    const SyntheticView b = RenderSyntheticView(scene, cameras[i + 1]);
+    const SyntheticMotion motion = TrueMotion(scene, cameras[i], cameras[i + 1]);
+    double sum = 0;
+    int64_t count = 0, wrong = 0;
+    for (int y = 0; y < 240; ++y)
+      for (int x = 0; x < 320; ++x) {
+        const size_t pixel = 320 * y + x;
+        if (!motion.visible[pixel]) continue;
+        double worst = 0;
+        for (int c = 0; c < 3; ++c) {
+          const double e = Bilinear(b.color, x + 0.5 + motion.uv[2 * pixel],
+                                    y + 0.5 + motion.uv[2 * pixel + 1], c) -
+                           a.color.at(x, y)[c];
+          sum += e * e;
+          worst = std::max(worst, std::abs(e));
+        }
+        ++count;
+        wrong += worst > 0.25;
+      }
+    ASSERT_GT(count, 320 * 240 / 2);
+    const double psnr = -10 * std::log10(sum / (3.0 * count));
+    // Edges of paint and of objects cover a few per cent of the pixels; there bilinear
+    // interpolation of two pictures with different pixel grids may be off by a third of the
+    // contrast.
+    EXPECT_GT(psnr, 30) << "views " << i << ", " << i + 1;
+    EXPECT_LT(static_cast<double>(wrong) / count, 0.005);
+  }
+}
+
+TEST(SyntheticScene, VisibleMeansNothingStandsBefore) {
+  // A ball before a wall: the other camera, to the left, cannot see the wall to the ball's
+  // right.
+  SyntheticScene scene;
+  Solid wall, ball;
+  wall.shape = Shape::kBox;
+  wall.center = {0, 2, 0};
+  wall.half = {4, 0.1, 4};
+  ball.center = {0, 0, 0};
+  ball.half = {0.4, 0, 0};
+  scene.solids = {wall, ball};
+  Camera from;
+  from.width = from.height = 100;
+  from.fx = from.fy = 100;
+  from.cx = from.cy = 50;
+  from.camera_from_world.rotation.row[0] = {1, 0, 0};
+  from.camera_from_world.rotation.row[1] = {0, 0, -1};
+  from.camera_from_world.rotation.row[2] = {0, 1, 0};
+  from.camera_from_world.translation = {0, 0, 2};
+  Camera to = from;
+  to.camera_from_world.translation = {0.5, 0, 2};  // its centre is at x = -0.5
+  const SyntheticMotion motion = TrueMotion(scene, from, to);
+  const auto at = [&](int x, int y) { return motion.visible[100 * y + x]; };
+  EXPECT_TRUE(at(50, 50));   // the ball's middle
+  EXPECT_FALSE(at(73, 50));  // wall just to the right of the ball
+  EXPECT_TRUE(at(25, 50));   // wall just to its left
+  EXPECT_FALSE(at(95, 50));  // outside the other picture
+  // The motion itself: f * baseline / depth for the ball's front at depth 1.6.
+  EXPECT_NEAR(motion.uv[2 * (100 * 50 + 50)], 100 * 0.5 / 1.6, 0.01);
+}
+
+TEST(SyntheticScene, HighlightsDependOnTheViewAndAreOffBitwise) {
+  const SyntheticScene scene = MakeSyntheticScene("table", 0);
+  SyntheticScene matte = scene;
+  for (Solid& solid : matte.solids) solid.gloss = 0;
+  const Camera camera = SyntheticCameras(scene, 24, 160, 120)[12];
+  const SyntheticView plain = RenderSyntheticView(scene, camera);
+  EXPECT_EQ(plain.color.pixels, RenderSyntheticView(matte, camera).color.pixels);
+  EXPECT_EQ(plain.color.pixels, RenderSyntheticView(matte, camera, true).color.pixels);
+  const SyntheticView glossy = RenderSyntheticView(scene, camera, true);
+  EXPECT_EQ(plain.depth.pixels, glossy.depth.pixels);
+  int brighter = 0;
+  for (size_t i = 0; i < plain.color.pixels.size(); ++i) {
+    EXPECT_GE(glossy.color.pixels[i], plain.color.pixels[i] - 0.02);
+    brighter += glossy.color.pixels[i] > plain.color.pixels[i] + 0.1;
+  }
+  EXPECT_GT(brighter, 20);
+}
+
+TEST(SyntheticScene, UnknownNameIsUsageAndListsTheScenes) {
+  try {
+    MakeSyntheticScene("garden", 0);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ExitCode::kUsage);
+    EXPECT_NE(error.hint().find("table|wall|room"), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace regrade
