@@ -1,0 +1,166 @@
+// Fitting: it learns, it is the same for any thread count and after a resume, and it refuses an
+// empty field.
+#include "reconstruct/fit_field.h"
+
+#include <gtest/gtest.h>
+#include <omp.h>
+
+#include <cmath>
+#include <cstring>
+#include <memory>
+#include <vector>
+
+#include "kernels/base/error.h"
+#include "kernels/field/render.h"
+#include "reconstruct/resample_grid.h"
+#include "tests/support/small_field.h"
+
+namespace regrade {
+namespace {
+
+// Twelve views of a coloured ball in a grid field, and the photos the plain renderer makes of
+// it.
+class FitField : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    RadianceField truth = testing::RandomField({24, 24, 24}, 1, 1.0, 5);
+    auto geometry = std::make_shared<Geometry>(*truth.geometry);
+    geometry->frame.center = {0, 0, 0};
+    geometry->frame.radius = {1, 1, 1};
+    for (int64_t v = 0; v < geometry->links.size(); ++v) {
+      const Vec3f p =
+          geometry->frame.WorldOf({static_cast<float>(v / 576), static_cast<float>(v / 24 % 24),
+                                   static_cast<float>(v % 24)});
+      const float inside = 0.6f - Norm(p);
+      geometry->density[v] = inside > 0 ? 60.0f * inside : -1.0f;
+      for (int c = 0; c < 3; ++c)
+        truth.appearance.sh[3 * v + c] =
+            0.8f * std::sin(3.0f * p[c] + 2.0f * p[(c + 1) % 3] + static_cast<float>(c));
+    }
+    truth.geometry = geometry;
+    truth.background = {0.2f, 0.4f, 0.6f};
+    for (int i = 0; i < 12; ++i) {
+      const double angle = 2 * M_PI * i / 12;
+      const Vec3d center{2.6 * std::cos(angle), 2.6 * std::sin(angle),
+                         0.7 * std::sin(2 * angle)};
+      Camera camera;
+      camera.width = camera.height = 48;
+      camera.fx = camera.fy = 60;
+      camera.cx = camera.cy = 24;
+      const Vec3d forward = Normalized(-center);
+      const Vec3d right = Normalized(Cross(forward, Vec3d{0, 0, 1}));
+      const Vec3d down = Cross(forward, right);
+      camera.camera_from_world.rotation.row[0] = right;
+      camera.camera_from_world.rotation.row[1] = down;
+      camera.camera_from_world.rotation.row[2] = forward;
+      camera.camera_from_world.translation = -(camera.camera_from_world.rotation * center);
+      cameras_.push_back(camera);
+      photos_.push_back(RenderViewPlain(truth, camera, {0.5f, 1e-4f}).color);
+    }
+    for (size_t i = 1; i < cameras_.size(); ++i) views_.push_back({cameras_[i], &photos_[i]});
+    options_.resolutions = {12, 24};
+    options_.steps = {60, 60};
+    options_.rays_per_step = 1024;
+    options_.sh_degree = 1;
+    options_.shards = 3;
+  }
+
+  double HeldOutPsnr(const RadianceField& field) const {
+    const RenderedView view = RenderView(field, cameras_[0], {0.5f, 1e-4f});
+    double error = 0;
+    for (size_t i = 0; i < view.color.pixels.size(); ++i)
+      error += std::pow(view.color.pixels[i] - photos_[0].pixels[i], 2.0);
+    return -10 * std::log10(error / static_cast<double>(view.color.pixels.size()));
+  }
+
+  static bool SameBits(const RadianceField& a, const RadianceField& b) {
+    const auto same = [](const auto& x, const auto& y) {
+      return x.size() == y.size() &&
+             std::memcmp(x.data(), y.data(), sizeof(x[0]) * static_cast<size_t>(x.size())) == 0;
+    };
+    return same(a.geometry->links, b.geometry->links) &&
+           same(a.geometry->density, b.geometry->density) &&
+           same(a.appearance.sh, b.appearance.sh);
+  }
+
+  std::vector<Camera> cameras_;
+  std::vector<Image> photos_;
+  std::vector<TrainingView> views_;
+  FitOptions options_;
+  SceneBox box_;
+};
+
+TEST_F(FitField, LearnsAViewItHasNotSeen) {
+  const FitResult result = regrade::FitField(views_, box_, options_, {});
+  RadianceField empty = result.field;
+  auto geometry = std::make_shared<Geometry>(*empty.geometry);
+  for (float& density : geometry->density) density = -1;
+  empty.geometry = geometry;
+  // Six decibels halve the error of the mean colour alone; a fit with a wrong pose or gradient
+  // does not get there.
+  EXPECT_GT(HeldOutPsnr(result.field), HeldOutPsnr(empty) + 6.0);
+  EXPECT_EQ(result.rejected_voxels, 0);
+  EXPECT_EQ(result.rays, 120 * 1024);
+}
+
+TEST_F(FitField, SameBytesForAnyThreadCount) {
+  const int before = omp_get_max_threads();
+  omp_set_num_threads(1);
+  const FitResult one = regrade::FitField(views_, box_, options_, {});
+  omp_set_num_threads(3);
+  const FitResult three = regrade::FitField(views_, box_, options_, {});
+  omp_set_num_threads(before);
+  EXPECT_TRUE(SameBits(one.field, three.field));
+}
+
+TEST_F(FitField, H109_H110_AResumedFitIsTheUndisturbedOne) {
+  const FitResult straight = regrade::FitField(views_, box_, options_, {});
+  for (const int stop_after : {25, 60, 95}) {
+    FitState saved;
+    int steps = 0;
+    FitHooks hooks;
+    hooks.checkpoint = [&](const FitState& state) { saved = state; };
+    hooks.progress = [&](const Progress&) {
+      return ++steps == stop_after ? Verdict::kAbort : Verdict::kContinue;
+    };
+    EXPECT_THROW(regrade::FitField(views_, box_, options_, hooks), Interrupted);
+    FitHooks go_on;
+    go_on.resume = &saved;
+    EXPECT_TRUE(
+        SameBits(straight.field, regrade::FitField(views_, box_, options_, go_on).field))
+        << stop_after;
+  }
+}
+
+TEST_F(FitField, H85_PruningEverythingIsAnError) {
+  options_.prune_weight = 100;
+  try {
+    regrade::FitField(views_, box_, options_, {});
+    FAIL() << "a field without voxels was accepted";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ExitCode::kScene);
+    EXPECT_NE(error.hint().find("--prune-weight"), std::string::npos);
+  }
+}
+
+TEST_F(FitField, H85_ResamplingKeepsConstants) {
+  const TrainingRays rays(views_);
+  FastGrid grid = MakeInitialGrid(rays, {{9, 9, 9}, {0, 0, 0}, {1, 1, 1}}, 4, 0.3f, 0, 1);
+  for (int64_t v = 0; v < grid.num_voxels(); ++v)
+    for (int l = 0; l < 12; ++l) grid.records[v * grid.lanes() + l] = 0.25f;
+  Buffer<float> weights(grid.num_voxels());
+  for (float& w : weights) w = 1;
+  const FastGrid fine = Resample(grid, weights, 0.5f, {17, 17, 17});
+  ASSERT_GT(fine.num_voxels(), 1000);
+  int whole = 0;
+  for (int64_t v = 0; v < fine.num_voxels(); ++v) {
+    // Next to unseen vertices values fade towards 0; inside they are constant.
+    const float density = fine.records[v * fine.lanes() + DensityLane(4)];
+    EXPECT_LE(density, 0.3f + 1e-6f);
+    whole += std::abs(density - 0.3f) < 1e-6f;
+  }
+  EXPECT_GT(whole, fine.num_voxels() / 2);
+}
+
+}  // namespace
+}  // namespace regrade

@@ -1,0 +1,139 @@
+// Where the box is: cameras on a line, at one point, upside down, and the scene in other units
+// (H129-H131, H140).
+#include "reconstruct/normalize_scene.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "kernels/base/random.h"
+
+namespace regrade {
+namespace {
+
+Camera LookAt(const Vec3d& center, const Vec3d& target, const Vec3d& up) {
+  Camera camera;
+  camera.width = 640;
+  camera.height = 480;
+  camera.fx = camera.fy = 600;
+  camera.cx = 320;
+  camera.cy = 240;
+  const Vec3d forward = Normalized(target - center);
+  const Vec3d right = Normalized(Cross(forward, up));
+  camera.camera_from_world.rotation.row[0] = right;
+  camera.camera_from_world.rotation.row[1] = Cross(forward, right);
+  camera.camera_from_world.rotation.row[2] = forward;
+  camera.camera_from_world.translation = -(camera.camera_from_world.rotation * center);
+  return camera;
+}
+
+Capture ArcCapture(bool points) {
+  Capture capture;
+  for (int i = 0; i < 9; ++i) {
+    const double a = 0.2 * (i - 4);
+    capture.views.push_back(
+        {"", "", "", LookAt({4 * std::sin(a), -4 * std::cos(a), 1}, {0, 0, 0}, {0, 0, 1})});
+  }
+  for (uint64_t i = 0; points && i < 400; ++i) {
+    ScenePoint p;
+    p.position = {2 * RandomDouble(1, 1, i) - 1, 2 * RandomDouble(1, 2, i) - 1,
+                  RandomDouble(1, 3, i) - 0.5};
+    p.views = {0, 4, 8};
+    capture.points.push_back(p);
+  }
+  return capture;
+}
+
+// Every proper box: a rotation (H96), finite numbers, half sizes in (0, 1], a near clip in
+// front of nothing.
+void ExpectProper(const NormalizedScene& scene) {
+  EXPECT_NEAR(scene.field_from_world.rotation.Determinant(), 1, 1e-12);
+  EXPECT_TRUE(std::isfinite(scene.field_from_world.scale));
+  EXPECT_GT(scene.field_from_world.scale, 0);
+  float longest = 0;
+  for (int a = 0; a < 3; ++a) {
+    EXPECT_GT(scene.box.radius[a], 0);
+    longest = std::max(longest, scene.box.radius[a]);
+  }
+  EXPECT_FLOAT_EQ(longest, 1);
+  EXPECT_GE(scene.box.near_clip, 0);
+}
+
+TEST(NormalizeScene, BoxHoldsThePointsUpright) {
+  const Capture capture = ArcCapture(true);
+  const NormalizedScene scene = NormalizeScene(capture);
+  ExpectProper(scene);
+  int inside = 0;
+  for (const ScenePoint& p : capture.points) {
+    const Vec3d q = scene.field_from_world * p.position;
+    inside += std::abs(q.x) <= scene.box.radius.x && std::abs(q.y) <= scene.box.radius.y &&
+              std::abs(q.z) <= scene.box.radius.z;
+  }
+  EXPECT_GE(inside, 390);
+  // z is up: the world's up stays up to the cameras' tilt.
+  EXPECT_GT((scene.field_from_world.rotation * Vec3d{0, 0, 1}).z, 0.9);
+}
+
+TEST(NormalizeScene, H140_OtherUnitsGiveTheSameField) {
+  const Capture capture = ArcCapture(true);
+  const NormalizedScene scene = NormalizeScene(capture);
+  for (const double scale : {1e-6, 1e6}) {
+    Capture scaled = capture;
+    const Vec3d shift{3 * scale, -7 * scale, 0.5 * scale};
+    for (ScenePoint& p : scaled.points) p.position = p.position * scale + shift;
+    for (CaptureView& view : scaled.views)
+      view.camera = view.camera.Transformed({scale, Mat3d(), shift});
+    const NormalizedScene other = NormalizeScene(scaled);
+    EXPECT_NEAR(other.box.near_clip, scene.box.near_clip, 1e-5);
+    for (size_t i = 0; i < capture.views.size(); ++i) {
+      const Vec3d a = capture.views[i].camera.Transformed(scene.field_from_world).Center();
+      const Vec3d b = scaled.views[i].camera.Transformed(other.field_from_world).Center();
+      EXPECT_NEAR(Norm(a - b), 0, 1e-6);
+    }
+  }
+}
+
+TEST(NormalizeScene, H154_OrderOfPhotosDoesNotMatter) {
+  const Capture capture = ArcCapture(true);
+  Capture reversed = capture;
+  std::reverse(reversed.views.begin(), reversed.views.end());
+  for (ScenePoint& p : reversed.points)
+    for (int32_t& v : p.views) v = 8 - v;
+  std::reverse(reversed.points.begin(), reversed.points.end());
+  const NormalizedScene a = NormalizeScene(capture), b = NormalizeScene(reversed);
+  EXPECT_EQ(a.field_from_world.scale, b.field_from_world.scale);
+  EXPECT_EQ(a.field_from_world.translation, b.field_from_world.translation);
+  EXPECT_EQ(a.box.near_clip, b.box.near_clip);
+}
+
+TEST(NormalizeScene, H129_CollinearCameras) {
+  Capture capture;
+  for (int i = 0; i < 6; ++i)
+    capture.views.push_back({"", "", "", LookAt({0.3 * i, 0, 0}, {0.3 * i, 5, 0}, {0, 0, 1})});
+  ExpectProper(NormalizeScene(capture));
+}
+
+TEST(NormalizeScene, H130_CamerasAtOnePoint) {
+  Capture capture;
+  for (int i = 0; i < 4; ++i)
+    capture.views.push_back(
+        {"", "", "", LookAt({1, 2, 3}, {1 + std::cos(i), 2 + std::sin(i), 3}, {0, 0, 1})});
+  ExpectProper(NormalizeScene(capture));
+  capture.views.resize(1);
+  ExpectProper(NormalizeScene(capture));
+}
+
+TEST(NormalizeScene, H131_UpsThatCancel) {
+  Capture capture;
+  for (int i = 0; i < 8; ++i)
+    capture.views.push_back(
+        {"", "", "",
+         LookAt({3 * std::cos(i), 3 * std::sin(i), 0}, {0, 0, 0}, {0, 0, i % 2 ? 1.0 : -1.0})});
+  const NormalizedScene scene = NormalizeScene(capture);
+  ExpectProper(scene);
+  EXPECT_NE(scene.notice, "");
+}
+
+}  // namespace
+}  // namespace regrade
