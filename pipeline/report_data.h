@@ -50,7 +50,7 @@ struct EffectReport {
   Figure threshold;
 };
 
-struct PoseReport {
+struct PoseStageReport {
   double seconds = 0;
   Figure reprojection_px;
   int64_t points = 0;
@@ -92,7 +92,7 @@ struct EvaluateReport {
 
 // Only the stages that a command has run are there.
 struct StagesReport {
-  std::optional<PoseReport> pose;
+  std::optional<PoseStageReport> pose;
   std::optional<ReconstructReport> reconstruct;
   std::optional<Style2dReport> style_2d;
   std::optional<StylizeReport> stylize;

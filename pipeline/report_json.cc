@@ -53,7 +53,7 @@ JsonValue EffectJson(const EffectReport& effect) {
   return object;
 }
 
-JsonValue StageJson(const PoseReport& stage) {
+JsonValue StageJson(const PoseStageReport& stage) {
   Object object{{"seconds", stage.seconds}};
   Put(object, "reprojection_px", stage.reprojection_px);
   object.emplace_back("points", stage.points);

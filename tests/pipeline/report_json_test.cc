@@ -28,7 +28,7 @@ RunReport FullReport() {
   report.photos =
       PhotosReport{2, 1, 1, {{"a.jpg", "used", ""}, {"\xFF.jpg", "skipped", "text"}}};
   report.effects = {{"ndc", false, "corner rays", 0.41, 0.9}};
-  report.stages.pose = PoseReport{1, 0.9, 12775, 1};
+  report.stages.pose = PoseStageReport{1, 0.9, 12775, 1};
   report.stages.reconstruct = ReconstructReport{2, 1000, 29, 26.5, 0.8, {"a.jpg"}};
   report.stages.style_2d = Style2dReport{3, "mkl"};
   report.stages.stylize = StylizeReport{4, 300, 1.5, 1.9, 1.2, 27, 25, 26};
