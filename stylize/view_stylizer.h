@@ -1,0 +1,37 @@
+// The seam between the pipeline and any 2D method that restyles one view at a time.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "kernels/scene/image.h"
+
+namespace regrade {
+
+// Safe to call from one thread at a time.
+class ViewStylizer {
+ public:
+  virtual ~ViewStylizer() = default;
+
+  // Same size and channels in and out, alpha unchanged. Values may leave [0, 1]: they are
+  // clipped where 8-bit files are written, and nowhere before. `view_index` identifies the
+  // view. Throws Error.
+  virtual Image Stylize(const Image& view, int view_index) const = 0;
+
+  // For reports, e.g. "mkl".
+  virtual std::string Name() const = 0;
+
+  // What a person should know before the first view, one sentence each.
+  virtual std::vector<std::string> Notices() const { return {}; }
+};
+
+// Pixels with a value that is not finite. Above 1 % of the picture: Error(kInput) naming
+// `where`. The few below it leave every loss and every measure.
+int64_t CountNotFinite(const Image& image, const std::string& where);
+
+// What Stylize promises, for methods that are not ours: same size and channels, and
+// CountNotFinite, which is returned. Throws Error(kExternalProgram) naming `where`.
+int64_t CheckStyledView(const Image& view, const Image& styled, const std::string& where);
+
+}  // namespace regrade
