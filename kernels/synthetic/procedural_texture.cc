@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "kernels/base/random.h"
-#include "kernels/image/color_spaces.h"
+#include "kernels/scene/srgb.h"
 
 namespace regrade {
 namespace {
@@ -194,8 +194,8 @@ Vec3d PatternColor(const Paint& paint, double u, double v) {
 }  // namespace
 
 Vec3d LinearFromHex(uint32_t hex) {
-  return LinearFromSrgb(
-      Vec3d{((hex >> 16) & 255) / 255.0, ((hex >> 8) & 255) / 255.0, (hex & 255) / 255.0});
+  return {LinearFromSrgb(((hex >> 16) & 255) / 255.0),
+          LinearFromSrgb(((hex >> 8) & 255) / 255.0), LinearFromSrgb((hex & 255) / 255.0)};
 }
 
 Vec3d Albedo(const Paint& paint, double u, double v) {

@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "kernels/base/error.h"
-#include "kernels/image/color_spaces.h"
+#include "kernels/scene/srgb.h"
 
 namespace regrade {
 namespace {
@@ -115,9 +115,9 @@ SyntheticView RenderSyntheticView(const SyntheticScene& scene, const Camera& cam
 #pragma omp parallel for schedule(dynamic)
   for (int y = 0; y < camera.height; ++y)
     for (int x = 0; x < camera.width; ++x) {
-      const Vec3d srgb = SrgbFromLinear(PixelLight(scene, rays, x, y, highlights));
+      const Vec3d light = PixelLight(scene, rays, x, y, highlights);
       for (int c = 0; c < 3; ++c)
-        view.color.at(x, y)[c] = static_cast<float>(std::min(1.0, srgb[c]));
+        view.color.at(x, y)[c] = static_cast<float>(SrgbFromLinear(std::min(1.0, light[c])));
       const Hit hit = FindHit(scene.solids, rays(x + 0.5, y + 0.5), kOffset);
       if (hit.solid >= 0)
         *view.depth.at(x, y) = static_cast<float>((camera.camera_from_world * hit.point).z);

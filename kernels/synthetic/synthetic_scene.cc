@@ -210,10 +210,11 @@ Camera TableCamera(double turn, int width, int height) {
   return LookAt(center, {0, 0.05, 0.24}, 1.15, width, height);
 }
 
-// A closed Lissajous figure fills a rectangle of the plane y = -2.6.
+// A closed Lissajous figure fills a rectangle of a plane. The cameras turn in by a few degrees:
+// views that differ by a shift alone leave the focal length undetermined.
 Camera WallCamera(double turn, int width, int height) {
-  const Vec3d center = {0.5 * std::sin(4 * M_PI * turn), -2.7, 0.3 * std::sin(6 * M_PI * turn)};
-  return LookAt(center, center + Vec3d{0, 1, 0}, 1.1, width, height);
+  const Vec3d center = {0.6 * std::sin(4 * M_PI * turn), -2.7, 0.4 * std::sin(6 * M_PI * turn)};
+  return LookAt(center, {0.25 * center.x, 0, 0.25 * center.z}, 1.1, width, height);
 }
 
 Camera RoomCamera(double turn, int width, int height) {

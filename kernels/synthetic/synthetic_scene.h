@@ -28,7 +28,7 @@ inline constexpr char kSyntheticSceneNames[] = "table|wall|room";
 // The shapes are fixed; `seed` draws the paint. Throws Error (kUsage) for an unknown name,
 // listing the known ones.
 //   table: a still life before a curved tiled wall, seen from an arc of 80 degrees
-//   wall:  a wall with shelves and reliefs, cameras on a small plane, all facing it
+//   wall:  a wall with shelves and reliefs, cameras on a small plane, facing it
 //   room:  a furnished room, cameras on a loop inside, each looking across to the far side
 SyntheticScene MakeSyntheticScene(const std::string& name, uint64_t seed);
 

@@ -1,0 +1,149 @@
+#include "pipeline/synth_capture.h"
+
+#include <charconv>
+#include <cstdio>
+#include <filesystem>
+#include <string_view>
+#include <vector>
+
+#include "evaluate/flow_file.h"
+#include "kernels/base/error.h"
+#include "kernels/synthetic/ray_trace.h"
+#include "kernels/synthetic/synthetic_scene.h"
+#include "pipeline/files/atomic_file.h"
+#include "pipeline/files/image_file.h"
+#include "pipeline/files/json_file.h"
+#include "pipeline/files/npy_header.h"
+#include "pipeline/files/transforms_json.h"
+#include "pipeline/synth_effects.h"
+
+namespace regrade {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kMinSide = 16, kMaxSide = 8192;  // pixels
+
+std::string FrameName(int index, const char* extension) {
+  char name[32];
+  std::snprintf(name, sizeof(name), "%05d%s", index, extension);
+  return name;
+}
+
+void ParseSize(const std::string& size, int* width, int* height) {
+  const char* const end = size.data() + size.size();
+  const auto [x, bad_width] = std::from_chars(size.data(), end, *width);
+  if (bad_width == std::errc() && x != end && *x == 'x') {
+    const auto [rest, bad_height] = std::from_chars(x + 1, end, *height);
+    if (bad_height == std::errc() && rest == end && *width >= kMinSide && *width <= kMaxSide &&
+        *height >= kMinSide && *height <= kMaxSide)
+      return;
+  }
+  throw Error(ExitCode::kUsage, "\"" + size + "\" is not a size of pictures", "--size",
+              "write WIDTHxHEIGHT, each from 16 to 8192, e.g. 640x480");
+}
+
+JsonValue Vector(const Vec3d& v) { return JsonValue::Array{v.x, v.y, v.z}; }
+
+// What was asked for, and the parameters of what was simulated.
+JsonValue DescribeCapture(const SynthOptions& options, const SynthEffects& effects,
+                          const SyntheticScene& scene) {
+  const auto off = [] { return JsonValue(JsonValue::Object{{"on", false}}); };
+  JsonValue exposure = off(), noise = off(), distortion = off(), highlights = off();
+  if (effects.exposure) {
+    JsonValue::Array gains;
+    for (int i = 0; i < options.views; ++i)
+      gains.push_back(SynthGain(options.seed, i, options.views));
+    exposure = JsonValue::Object{{"on", true}, {"of", "linear light"}, {"gains", gains}};
+  }
+  if (effects.noise)
+    noise = JsonValue::Object{
+        {"on", true}, {"of", "encoded values in [0, 1]"}, {"sigma", kSynthNoiseSigma}};
+  if (effects.distortion)
+    distortion = JsonValue::Object{{"on", true},     {"model", "OPENCV"}, {"k1", kSynthK1},
+                                   {"k2", kSynthK2}, {"p1", 0.0},         {"p2", 0.0}};
+  if (effects.highlights)
+    highlights = JsonValue::Object{
+        {"on", true}, {"exponent", kSunSharpness}, {"to_sun", Vector(scene.to_sun)}};
+  return JsonValue::Object{{"scene", options.scene},
+                           {"seed", options.seed},
+                           {"views", options.views},
+                           {"size", options.size},
+                           {"bounds_min", Vector(scene.bounds_min)},
+                           {"bounds_max", Vector(scene.bounds_max)},
+                           {"effects", JsonValue::Object{{"exposure", exposure},
+                                                         {"noise", noise},
+                                                         {"distortion", distortion},
+                                                         {"highlights", highlights}}}};
+}
+
+// A folder with photos is only written to if they are what the same options would write.
+void ClaimFolder(const fs::path& out, const JsonValue& description) {
+  const fs::path record = out / "truth" / "effects.json";
+  std::error_code none;
+  const bool has_photos = fs::exists(out / "images") && !fs::is_empty(out / "images", none);
+  if (has_photos && !(fs::exists(record) && ReadJsonFile(record.string()) == description))
+    throw Error(ExitCode::kFolderInUse, "the folder holds photos of something else",
+                (out / "images").string(), "name another folder, or remove this one first");
+  for (const char* folder : {"images", "truth/depth", "truth/flow", "truth/visible"}) {
+    std::error_code error;
+    fs::create_directories(out / folder, error);
+    if (error)
+      throw Error(ExitCode::kResources, "cannot make a folder: " + error.message(),
+                  (out / folder).string());
+  }
+  WriteJsonFile(record.string(), description);
+}
+
+void WriteDepth(const std::string& path, const Image& depth) {
+  std::string bytes = MakeNpyHeader(ArrayType::kF32, {depth.height, depth.width});
+  bytes.append(reinterpret_cast<const char*>(depth.pixels.data()),
+               depth.pixels.size() * sizeof(float));
+  WriteFileAtomically(path, bytes);
+}
+
+void WriteMotion(const fs::path& truth, int index, SyntheticMotion motion) {
+  FlowField flow;
+  flow.width = motion.width;
+  flow.height = motion.height;
+  flow.uv = std::move(motion.uv);
+  const std::string name = FlowFileName(index, index + 1);
+  WriteFlowFile((truth / "flow" / name).string(), flow);
+  Image mask(motion.width, motion.height, 1);
+  for (size_t i = 0; i < motion.visible.size(); ++i) mask.pixels[i] = motion.visible[i];
+  WritePng8((truth / "visible" / fs::path(name).replace_extension(".png")).string(), mask);
+}
+
+}  // namespace
+
+void WriteSyntheticCapture(const std::string& out, const SynthOptions& options,
+                           const ProgressFunction& progress) {
+  int width = 0, height = 0;
+  ParseSize(options.size, &width, &height);
+  const SynthEffects effects = ParseSynthEffects(options.effects);
+  const SyntheticScene scene = MakeSyntheticScene(options.scene, options.seed);
+  std::vector<Camera> cameras = SyntheticCameras(scene, options.views, width, height);
+  if (effects.distortion)
+    for (Camera& camera : cameras) camera = WithSynthLens(camera);
+  ClaimFolder(out, DescribeCapture(options, effects, scene));
+
+  const fs::path truth = fs::path(out) / "truth";
+  std::vector<TransformsFrame> frames;
+  for (int i = 0; i < options.views; ++i) {
+    SyntheticView view = RenderSyntheticView(scene, cameras[i], effects.highlights);
+    if (effects.exposure) ApplyGain(SynthGain(options.seed, i, options.views), &view.color);
+    if (effects.noise) ApplyNoise(options.seed, i, kSynthNoiseSigma, &view.color);
+    const std::string name = FrameName(i, ".png");
+    WritePng8((fs::path(out) / "images" / name).string(), view.color);
+    WriteDepth((truth / "depth" / FrameName(i, ".npy")).string(), view.depth);
+    if (i + 1 < options.views)
+      WriteMotion(truth, i, TrueMotion(scene, cameras[i], cameras[i + 1]));
+    frames.push_back({"../images/" + name, cameras[i]});
+    const Verdict verdict = Report(progress, i + 1, options.views, name);
+    if (verdict == Verdict::kAbort) throw Interrupted();
+    if (verdict == Verdict::kFinish) break;
+  }
+  WriteTransformsJson((truth / "transforms.json").string(), frames);
+}
+
+}  // namespace regrade

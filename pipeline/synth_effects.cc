@@ -1,0 +1,66 @@
+#include "pipeline/synth_effects.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "kernels/base/error.h"
+#include "kernels/base/random.h"
+#include "kernels/scene/srgb.h"
+
+namespace regrade {
+
+SynthEffects ParseSynthEffects(const std::string& list) {
+  constexpr char kHint[] = "the effects are exposure, noise, distortion, highlights";
+  SynthEffects effects;
+  size_t begin = 0;
+  while (begin < list.size()) {
+    const size_t end = std::min(list.find(',', begin), list.size());
+    const std::string name = list.substr(begin, end - begin);
+    begin = end + 1;
+    if (name == "exposure")
+      effects.exposure = true;
+    else if (name == "noise")
+      effects.noise = true;
+    else if (name == "distortion")
+      effects.distortion = true;
+    else if (name == "highlights")
+      effects.highlights = true;
+    else if (name == "motion-blur" || name == "occluders")
+      throw Error(ExitCode::kUsage, "the effect \"" + name + "\" is not in this version",
+                  "--effects", kHint);
+    else
+      throw Error(ExitCode::kUsage, "there is no effect \"" + name + "\"", "--effects", kHint);
+  }
+  return effects;
+}
+
+double SynthGain(uint64_t seed, int index, int views) {
+  const double phase = RandomDouble(seed, 0x6a1, 0);
+  const double swing = std::sin(2 * M_PI * (phase + 1.5 * index / views));
+  const double jump = 2 * RandomDouble(seed, 0x6a2, static_cast<uint64_t>(index)) - 1;
+  return 1 + kSynthGainRange * (0.75 * swing + 0.25 * jump);
+}
+
+void ApplyGain(double gain, Image* color) {
+  for (float& value : color->pixels)
+    value = static_cast<float>(SrgbFromLinear(std::min(1.0, gain * LinearFromSrgb(value))));
+}
+
+void ApplyNoise(uint64_t seed, uint64_t stream, double sigma, Image* color) {
+  for (size_t i = 0; i < color->pixels.size(); ++i) {
+    // Box and Muller 1958; 1 - u is in (0, 1].
+    const double radius =
+        std::sqrt(-2 * std::log(1 - RandomDouble(seed ^ 0x5e4507, stream, 2 * i)));
+    const double angle = 2 * M_PI * RandomDouble(seed ^ 0x5e4507, stream, 2 * i + 1);
+    color->pixels[i] = static_cast<float>(
+        std::clamp(color->pixels[i] + sigma * radius * std::cos(angle), 0.0, 1.0));
+  }
+}
+
+Camera WithSynthLens(Camera camera) {
+  camera.lens = LensModel::kOpenCv;
+  camera.distortion = {kSynthK1, kSynthK2};
+  return camera;
+}
+
+}  // namespace regrade

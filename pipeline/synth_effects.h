@@ -1,0 +1,41 @@
+// What a synthetic photograph may suffer between the scene and the file, each with its exact
+// parameters.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "kernels/scene/camera.h"
+#include "kernels/scene/image.h"
+
+namespace regrade {
+
+struct SynthEffects {
+  bool exposure = false;    // a gain per photo that drifts within +-30 %
+  bool noise = false;       // of the sensor
+  bool distortion = false;  // of the lens: a mild barrel
+  bool highlights = false;  // of the sun on glazed things
+};
+
+inline constexpr double kSynthNoiseSigma = 2.0 / 255;  // of encoded values
+inline constexpr double kSynthK1 = -0.1, kSynthK2 = 0.02;
+inline constexpr double kSynthGainRange = 0.3;
+
+// Parses "exposure,noise"; spaces are not allowed, empty means none. Throws Error (kUsage) for
+// a name that is unknown, listing the known ones, or not in this version.
+SynthEffects ParseSynthEffects(const std::string& list);
+
+// Gain of linear light for photo `index` of `views`: a slow swing and a small jump from photo
+// to photo, within 1 +- kSynthGainRange.
+double SynthGain(uint64_t seed, int index, int views);
+
+// The photo in other light: linear values times gain, clipped to [0, 1].
+void ApplyGain(double gain, Image* color);
+
+// Adds Gaussian noise to the encoded values, clipped to [0, 1]; `stream` is the photo's index.
+void ApplyNoise(uint64_t seed, uint64_t stream, double sigma, Image* color);
+
+// The same view through the simulated lens.
+Camera WithSynthLens(Camera camera);
+
+}  // namespace regrade

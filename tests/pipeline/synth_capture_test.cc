@@ -1,0 +1,230 @@
+// Synthetic captures on disk: complete, repeatable, and honest about what was simulated.
+#include "pipeline/synth_capture.h"
+
+#include <gtest/gtest.h>
+#include <omp.h>
+
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <vector>
+
+#include "evaluate/flow_file.h"
+#include "kernels/base/error.h"
+#include "kernels/synthetic/ray_trace.h"
+#include "pipeline/files/json_file.h"
+#include "pipeline/files/transforms_json.h"
+#include "pipeline/synth_effects.h"
+
+namespace regrade {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string Bytes(const fs::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+class SynthCapture : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    root_ = fs::path(::testing::TempDir()) /
+            ("synth_" +
+             std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()));
+    fs::remove_all(root_);
+  }
+  void TearDown() override { fs::remove_all(root_); }
+
+  // Writes a small capture and returns its folder.
+  fs::path Write(const std::string& name, const std::string& effects = "",
+                 const ProgressFunction& progress = {}, int views = 3) {
+    SynthOptions options;
+    options.views = views;
+    options.size = "64x48";
+    options.effects = effects;
+    WriteSyntheticCapture((root_ / name).string(), options, progress);
+    return root_ / name;
+  }
+
+  static std::map<std::string, std::string> AllBytes(const fs::path& folder) {
+    std::map<std::string, std::string> files;
+    for (const auto& entry : fs::recursive_directory_iterator(folder))
+      if (entry.is_regular_file())
+        files[fs::relative(entry.path(), folder).string()] = Bytes(entry.path());
+    return files;
+  }
+
+  fs::path root_;
+};
+
+TEST_F(SynthCapture, WritesPhotosAndTruth) {
+  const fs::path out = Write("a");
+  std::vector<std::string> names;
+  for (const auto& [name, bytes] : AllBytes(out)) names.push_back(name);
+  const std::vector<std::string> expected = {"images/00000.png",
+                                             "images/00001.png",
+                                             "images/00002.png",
+                                             "truth/depth/00000.npy",
+                                             "truth/depth/00001.npy",
+                                             "truth/depth/00002.npy",
+                                             "truth/effects.json",
+                                             "truth/flow/00000_00001.flo",
+                                             "truth/flow/00001_00002.flo",
+                                             "truth/transforms.json",
+                                             "truth/visible/00000_00001.png",
+                                             "truth/visible/00001_00002.png"};
+  EXPECT_EQ(names, expected);
+}
+
+TEST_F(SynthCapture, TruthOnDiskIsTheScenes) {
+  const fs::path out = Write("a");
+  const SyntheticScene scene = MakeSyntheticScene("table", 0);
+  const std::vector<Camera> cameras = SyntheticCameras(scene, 3, 64, 48);
+  const TransformsFile file = ReadTransformsJson((out / "truth/transforms.json").string());
+  ASSERT_EQ(file.frames.size(), 3u);
+  EXPECT_EQ(file.frames[1].file, "../images/00001.png");
+  EXPECT_TRUE(file.missing.empty());
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_EQ(file.frames[i].camera.fx, cameras[i].fx);
+    EXPECT_LT(Norm(file.frames[i].camera.Center() - cameras[i].Center()), 1e-14);
+  }
+  const SyntheticView view = RenderSyntheticView(scene, cameras[1]);
+  const std::string npy = Bytes(out / "truth/depth/00001.npy");
+  const size_t size = view.depth.pixels.size() * sizeof(float);
+  ASSERT_GT(npy.size(), size);
+  EXPECT_EQ(npy.substr(0, 6), "\x93NUMPY");
+  EXPECT_EQ(std::memcmp(npy.data() + npy.size() - size, view.depth.pixels.data(), size), 0);
+  const FlowField flow = ReadFlowFile((out / "truth/flow/00001_00002.flo").string());
+  EXPECT_EQ(flow.uv, TrueMotion(scene, cameras[1], cameras[2]).uv);
+}
+
+TEST_F(SynthCapture, SameBytesForAnyNumberOfThreadsAndEveryTime) {
+  const int threads = omp_get_max_threads();
+  omp_set_num_threads(1);
+  const auto one = AllBytes(Write("one", "exposure,noise,distortion,highlights"));
+  omp_set_num_threads(3);
+  const auto three = AllBytes(Write("three", "exposure,noise,distortion,highlights"));
+  omp_set_num_threads(threads);
+  EXPECT_EQ(one, three);
+  EXPECT_EQ(three, AllBytes(Write("three", "exposure,noise,distortion,highlights")));
+}
+
+// Each effect changes what it claims to change and nothing else; without it the files are those
+// of a capture that never heard of it.
+TEST_F(SynthCapture, EffectsThatAreOffLeaveNoTrace) {
+  const auto plain = AllBytes(Write("plain"));
+  for (const char* effect : {"exposure", "noise", "highlights", "distortion"}) {
+    const auto with = AllBytes(Write(effect, effect));
+    EXPECT_NE(with.at("images/00001.png"), plain.at("images/00001.png")) << effect;
+    EXPECT_NE(with.at("truth/effects.json"), plain.at("truth/effects.json")) << effect;
+    const bool moves = std::string(effect) == "distortion";
+    for (const char* name : {"truth/transforms.json", "truth/depth/00001.npy",
+                             "truth/flow/00000_00001.flo", "truth/visible/00000_00001.png"})
+      EXPECT_EQ(with.at(name) != plain.at(name), moves) << effect << " " << name;
+  }
+}
+
+TEST_F(SynthCapture, EachEffectLeavesItsExactTruth) {
+  const fs::path out = Write("all", "exposure,noise,distortion,highlights");
+  const JsonValue effects = ReadJsonFile((out / "truth/effects.json").string()).At("effects");
+  const JsonValue::Array& gains = effects.At("exposure").At("gains").AsArray();
+  ASSERT_EQ(gains.size(), 3u);
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(gains[i].AsDouble(), SynthGain(0, i, 3));
+  EXPECT_EQ(effects.At("noise").At("sigma").AsDouble(), 2.0 / 255);
+  EXPECT_EQ(effects.At("distortion").At("k1").AsDouble(), -0.1);
+  EXPECT_EQ(effects.At("distortion").At("k2").AsDouble(), 0.02);
+  EXPECT_EQ(effects.At("highlights").At("exponent").AsDouble(), 60);
+  const Camera camera =
+      ReadTransformsJson((out / "truth/transforms.json").string()).frames[0].camera;
+  EXPECT_EQ(camera.lens, LensModel::kOpenCv);
+  EXPECT_EQ(camera.distortion[0], -0.1);
+
+  const fs::path plain = Write("plain");
+  const JsonValue none = ReadJsonFile((plain / "truth/effects.json").string()).At("effects");
+  for (const char* name : {"exposure", "noise", "distortion", "highlights"})
+    EXPECT_FALSE(none.At(name).At("on").AsBool());
+}
+
+TEST_F(SynthCapture, GainsStayInRangeAndNoiseHasItsSigma) {
+  double low = 2, high = 0;
+  for (int i = 0; i < 24; ++i) {
+    const double gain = SynthGain(0, i, 24);
+    low = std::min(low, gain), high = std::max(high, gain);
+  }
+  EXPECT_GE(low, 0.7);
+  EXPECT_LE(high, 1.3);
+  EXPECT_LT(low, 0.85);
+  EXPECT_GT(high, 1.15);
+
+  Image grey(200, 200);
+  for (float& value : grey.pixels) value = 0.5f;
+  ApplyNoise(7, 0, kSynthNoiseSigma, &grey);
+  double sum = 0, squares = 0;
+  for (const float value : grey.pixels)
+    sum += value - 0.5, squares += (value - 0.5) * (value - 0.5);
+  const double n = static_cast<double>(grey.pixels.size());  // 120000
+  // Four standard errors: of the mean sigma / sqrt(n), of sigma sigma / sqrt(2 n).
+  EXPECT_NEAR(sum / n, 0, 4 * kSynthNoiseSigma / std::sqrt(n));
+  EXPECT_NEAR(std::sqrt(squares / n), kSynthNoiseSigma,
+              4 * kSynthNoiseSigma / std::sqrt(2 * n));
+}
+
+TEST_F(SynthCapture, RefusesUnknownEffectsScenesAndSizes) {
+  const auto refusal = [&](SynthOptions options) -> std::string {
+    try {
+      WriteSyntheticCapture((root_ / "never").string(), options);
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ExitCode::kUsage);
+      return error.what_failed() + " | " + error.hint();
+    }
+    ADD_FAILURE();
+    return "";
+  };
+  for (const char* effects : {"fog", "noise,,exposure", "noise ", "motion-blur", "occluders"}) {
+    SynthOptions options;
+    options.effects = effects;
+    EXPECT_NE(refusal(options).find("exposure, noise, distortion, highlights"),
+              std::string::npos);
+  }
+  for (const char* size : {"", "640", "640x", "x480", "640x480x3", "0x0", "8x8", "99999x2",
+                           "-64x48", "99999999999x48", "640 x 480"}) {
+    SynthOptions options;
+    options.size = size;
+    refusal(options);
+  }
+  SynthOptions options;
+  options.scene = "garden";
+  EXPECT_NE(refusal(options).find("table|wall|room"), std::string::npos);
+  EXPECT_FALSE(fs::exists(root_ / "never"));
+}
+
+TEST_F(SynthCapture, DoesNotMixWithOtherPhotos) {
+  fs::create_directories(root_ / "mine" / "images");
+  std::ofstream(root_ / "mine" / "images" / "holiday.jpg") << "x";
+  try {
+    Write("mine");
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ExitCode::kFolderInUse);
+  }
+  Write("other");
+  EXPECT_THROW(Write("other", "noise"), Error);
+}
+
+TEST_F(SynthCapture, StopsWhenAsked) {
+  const auto stop_after_two = [](Verdict verdict) {
+    return [verdict](const Progress& p) { return p.done >= 2 ? verdict : Verdict::kContinue; };
+  };
+  const fs::path out = Write("short", "", stop_after_two(Verdict::kFinish), 6);
+  const TransformsFile file = ReadTransformsJson((out / "truth/transforms.json").string());
+  EXPECT_EQ(file.frames.size(), 2u);
+  EXPECT_THROW(Write("aborted", "", stop_after_two(Verdict::kAbort), 6), Interrupted);
+  EXPECT_FALSE(fs::exists(root_ / "aborted" / "truth" / "transforms.json"));
+}
+
+}  // namespace
+}  // namespace regrade
