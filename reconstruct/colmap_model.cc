@@ -10,7 +10,6 @@
 #include <fstream>
 #include <set>
 #include <sstream>
-#include <unordered_map>
 
 #include "kernels/base/checked_math.h"
 #include "kernels/base/error.h"
@@ -97,30 +96,6 @@ class Reader {
   size_t place_ = 0;
 };
 
-// How COLMAP's parameters map to ours: focal lengths first, then the centre, then
-// `coefficients` of the distortion, of which the first `given` are in the file.
-struct LensInfo {
-  const char* name;
-  int focals;  // 1 or 2; 0: not supported
-  LensModel lens;
-  int coefficients;
-};
-
-constexpr LensInfo kLenses[] = {
-    {"SIMPLE_PINHOLE", 1, LensModel::kPinhole, 0},
-    {"PINHOLE", 2, LensModel::kPinhole, 0},
-    {"SIMPLE_RADIAL", 1, LensModel::kOpenCv, 1},
-    {"RADIAL", 1, LensModel::kOpenCv, 2},
-    {"OPENCV", 2, LensModel::kOpenCv, 4},
-    {"OPENCV_FISHEYE", 2, LensModel::kFisheye, 4},
-    {"FULL_OPENCV", 2, LensModel::kFullOpenCv, 8},
-    {"FOV", 0, LensModel::kPinhole, 0},
-    {"SIMPLE_RADIAL_FISHEYE", 1, LensModel::kFisheye, 1},
-    {"RADIAL_FISHEYE", 1, LensModel::kFisheye, 2},
-    {"THIN_PRISM_FISHEYE", 0, LensModel::kPinhole, 0},
-};
-constexpr int kNumLenses = sizeof(kLenses) / sizeof(kLenses[0]);
-
 std::string CameraText(uint32_t id) { return "camera " + std::to_string(id); }
 
 // A window wide enough for any lens and sensor, and narrow enough to catch damage.
@@ -146,11 +121,11 @@ std::vector<ColmapCamera> ReadCameras(const std::string& folder) {
   for (ColmapCamera& camera : cameras) {
     camera.id = reader.Read<uint32_t>("a camera");
     const int32_t lens = reader.Read<int32_t>("a camera");
-    if (lens < 0 || lens >= kNumLenses)
+    if (lens < 0 || lens >= kNumColmapLenses)
       reader.Fail(CameraText(camera.id) + " has the unknown camera model " +
                   std::to_string(lens));
     camera.lens = static_cast<ColmapLens>(lens);
-    const LensInfo& info = kLenses[lens];
+    const ColmapLensInfo& info = InfoOf(camera.lens);
     if (info.focals == 0)
       throw Error(ExitCode::kInput,
                   CameraText(camera.id) + " has the camera model " + info.name +
@@ -195,27 +170,6 @@ Mat3d RotationOf(double w, double x, double y, double z) {
   return {{{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)},
            {2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)},
            {2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)}}};
-}
-
-// The unit quaternion w x y z of a rotation, w >= 0. Starts from its largest component, which
-// is the well-conditioned one.
-std::array<double, 4> QuaternionOf(const Mat3d& r) {
-  const double trace = r(0, 0) + r(1, 1) + r(2, 2);
-  // 4 q_a q_b for all pairs, from the matrix; row a of it is 4 q_a q.
-  const double product[4][4] = {
-      {1 + trace, r(2, 1) - r(1, 2), r(0, 2) - r(2, 0), r(1, 0) - r(0, 1)},
-      {r(2, 1) - r(1, 2), 1 + 2 * r(0, 0) - trace, r(0, 1) + r(1, 0), r(0, 2) + r(2, 0)},
-      {r(0, 2) - r(2, 0), r(0, 1) + r(1, 0), 1 + 2 * r(1, 1) - trace, r(1, 2) + r(2, 1)},
-      {r(1, 0) - r(0, 1), r(0, 2) + r(2, 0), r(1, 2) + r(2, 1), 1 + 2 * r(2, 2) - trace}};
-  int largest = 0;
-  for (int a = 1; a < 4; ++a)
-    if (product[a][a] > product[largest][largest]) largest = a;
-  std::array<double, 4> q;
-  double norm = 0;
-  for (int a = 0; a < 4; ++a) norm += product[largest][a] * product[largest][a];
-  norm = std::copysign(std::sqrt(norm), product[largest][0]);
-  for (int a = 0; a < 4; ++a) q[a] = product[largest][a] / norm;
-  return q;
 }
 
 Mat3d ReadRotation(Reader& reader, uint32_t image_id) {
@@ -324,83 +278,7 @@ void CheckLinks(const ColmapModel& model, const std::string& folder) {
   }
 }
 
-class Writer {
- public:
-  Writer(const std::string& folder, const std::string& name)
-      : path_(folder + "/" + name), file_(path_, std::ios::binary | std::ios::trunc) {}
-
-  template <typename T>
-  void Write(const T& value) {
-    file_.write(reinterpret_cast<const char*>(&value), sizeof(T));
-  }
-  void WriteName(const std::string& name) { file_.write(name.c_str(), name.size() + 1); }
-
-  void Close() {
-    file_.close();
-    if (file_.fail())
-      throw Error(ExitCode::kResources, "cannot write it", path_, "is the disk full?");
-  }
-
- private:
-  std::string path_;
-  std::ofstream file_;
-};
-
-void WriteCameras(const ColmapModel& model, const std::string& folder) {
-  Writer writer(folder, "cameras.bin");
-  writer.Write<uint64_t>(model.cameras.size());
-  for (const ColmapCamera& camera : model.cameras) {
-    const LensInfo& info = kLenses[static_cast<int>(camera.lens)];
-    REGRADE_CHECK_GT(info.focals, 0);
-    const Camera& c = camera.intrinsics;
-    writer.Write(camera.id);
-    writer.Write(camera.lens);
-    writer.Write<uint64_t>(c.width);
-    writer.Write<uint64_t>(c.height);
-    writer.Write(c.fx);
-    if (info.focals == 2) writer.Write(c.fy);
-    writer.Write(c.cx);
-    writer.Write(c.cy);
-    for (int i = 0; i < info.coefficients; ++i) writer.Write(c.distortion[i]);
-  }
-  writer.Close();
-}
-
-void WriteImages(const ColmapModel& model, const std::string& folder) {
-  Writer writer(folder, "images.bin");
-  writer.Write<uint64_t>(model.images.size());
-  for (const ColmapImage& image : model.images) {
-    writer.Write(image.id);
-    writer.Write(QuaternionOf(image.camera_from_world.rotation));
-    writer.Write(image.camera_from_world.translation);
-    writer.Write(image.camera_id);
-    writer.WriteName(image.name);
-    writer.Write<uint64_t>(image.keypoints.size());
-    for (const ColmapKeypoint& keypoint : image.keypoints) writer.Write(keypoint);
-  }
-  writer.Close();
-}
-
-void WritePoints(const ColmapModel& model, const std::string& folder) {
-  Writer writer(folder, "points3D.bin");
-  writer.Write<uint64_t>(model.points.size());
-  for (const ColmapPoint& point : model.points) {
-    writer.Write(point.id);
-    writer.Write(point.position);
-    writer.Write(point.color);
-    writer.Write(point.error);
-    writer.Write<uint64_t>(point.track.size());
-    for (const ColmapTrackElement& element : point.track) writer.Write(element);
-  }
-  writer.Close();
-}
-
-static_assert(sizeof(ColmapKeypoint) == 24 && sizeof(ColmapTrackElement) == 8 &&
-              sizeof(Vec3d) == 24);
-
 }  // namespace
-
-const char* ColmapLensName(ColmapLens lens) { return kLenses[static_cast<int>(lens)].name; }
 
 const ColmapCamera* ColmapModel::FindCamera(uint32_t id) const { return FindById(cameras, id); }
 const ColmapImage* ColmapModel::FindImage(uint32_t id) const { return FindById(images, id); }
@@ -424,12 +302,6 @@ ColmapModel ReadColmapModel(const std::string& folder) {
   SortById(model.points, folder, "points3D.bin");
   CheckLinks(model, folder);
   return model;
-}
-
-void WriteColmapModel(const ColmapModel& model, const std::string& folder) {
-  WriteCameras(model, folder);
-  WriteImages(model, folder);
-  WritePoints(model, folder);
 }
 
 }  // namespace regrade

@@ -8,25 +8,9 @@
 #include <vector>
 
 #include "kernels/scene/capture.h"
+#include "reconstruct/colmap_lens.h"
 
 namespace regrade {
-
-// COLMAP's camera models by their number in the file (colmap/src/colmap/sensor/models.h).
-enum class ColmapLens : int32_t {
-  kSimplePinhole = 0,
-  kPinhole = 1,
-  kSimpleRadial = 2,
-  kRadial = 3,
-  kOpenCv = 4,
-  kOpenCvFisheye = 5,
-  kFullOpenCv = 6,
-  kFov = 7,  // refused
-  kSimpleRadialFisheye = 8,
-  kRadialFisheye = 9,
-  kThinPrismFisheye = 10,  // refused
-};
-
-const char* ColmapLensName(ColmapLens lens);
 
 struct ColmapCamera {
   uint32_t id = 0;

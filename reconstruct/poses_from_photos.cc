@@ -16,6 +16,7 @@
 #include "reconstruct/colmap_model.h"
 #include "reconstruct/colmap_output.h"
 #include "reconstruct/colmap_program.h"
+#include "reconstruct/pose_verdicts.h"
 #include "reconstruct/refine_intrinsics.h"
 #include "reconstruct/scene_checks.h"
 
@@ -25,33 +26,12 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kGoodShare = 0.95;     // of the photos: no need to climb further
-constexpr int kFewFeatures = 150;       // a photo with fewer has nothing to hold on to
 constexpr double kBytesPerPhoto = 3e6;  // database and logs, generously
 
 double Now() {
   using Clock = std::chrono::steady_clock;
   return std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
 }
-
-std::string Photos(size_t n) { return std::to_string(n) + (n == 1 ? " photo" : " photos"); }
-
-// One model that COLMAP wrote and our reader accepted.
-struct FoundModel {
-  ColmapModel model;
-  Capture capture;
-  std::string refusal;  // by JudgeScene; empty: plausible
-
-  // Plausible before implausible, then more photos, then more points.
-  auto Rank() const {
-    return std::tuple(refusal.empty(), model.images.size(), model.points.size());
-  }
-};
-
-struct RungResult {
-  std::string recipe;
-  std::vector<FoundModel> models;  // best first
-  ColmapEvidence evidence;
-};
 
 // Seconds on two cores, roughly: weights that make the progress and its ETA meaningful.
 struct StageWeights {
@@ -92,11 +72,12 @@ class PoseFinder {
     colmap_.emplace(options_.colmap, work_folder_ + "/logs");
     report_.colmap_version = colmap_->version();
     const RungResult best = Climb();
-    if (best.models.empty()) RefuseWithoutModel(best.evidence);
+    if (best.models.empty())
+      Refuse(WhyNoModel(best.evidence), photos_.size(), options_.min_photos);
     const RefinedModel refined = Refine(best.models.front().model);
     Capture capture = CaptureFromModel(refined.model, photos_);
     capture.models_found = static_cast<int>(best.models.size());
-    ExplainUnregistered(best, &capture);
+    ExplainUnregistered(best, photos_, &capture);
     Judge(capture);
     Describe(best, refined);
     CopyModel(refined.folder, sparse_output_folder);
@@ -134,7 +115,9 @@ class PoseFinder {
     // So few photos are refused whatever comes; one rung says whether more is wrong with them.
     if (TooFewGiven()) ladder.resize(1);
     RungResult best;
+    const PoseRecipe* last = nullptr;  // the recipe before, if it found all features there are
     for (const PoseRecipe& recipe : ladder) {
+      if (last != nullptr && IsSameSearch(*last, recipe)) continue;
       std::optional<RungResult> rung;
       try {
         rung = RunRecipe(recipe);
@@ -156,12 +139,25 @@ class PoseFinder {
       if (usable && share >= kGoodShare) break;
       // More features and more pairs placed no further photo: neither will what follows.
       if (usable && share >= options_.min_registered && Registered(best) <= before) break;
-      // All pairs of many features, and no two photos show the same thing.
-      if (recipe.all_pairs && recipe.first_octave < 0 && best.evidence.matched_pairs == 0)
+      last = FoundAllFeatures(recipe, output_.evidence()) ? &recipe : nullptr;
+      // Too few pairs to connect the photos, and no more features to find pairs with.
+      const int pairs = output_.evidence().matched_pairs;
+      if (best.models.empty() && last != nullptr && recipe.all_pairs && pairs >= 0 &&
+          pairs < static_cast<int>(photos_.size()) - 1)
         break;
       if (finish_ || Now() > deadline_) break;
     }
     return best;
+  }
+
+  static bool FoundAllFeatures(const PoseRecipe& recipe, const ColmapEvidence& evidence) {
+    return recipe.first_octave < 0 && evidence.MedianFeatures() < 0.9 * recipe.max_features;
+  }
+
+  // Would `next` find again what `last` found, which had all the features that there are?
+  static bool IsSameSearch(const PoseRecipe& last, const PoseRecipe& next) {
+    return !next.keep_matches && next.all_pairs == last.all_pairs && next.lens == last.lens &&
+           next.focal_factor == last.focal_factor && next.init_angle_deg == last.init_angle_deg;
   }
 
   static size_t Registered(const RungResult& rung) {
@@ -315,102 +311,25 @@ class PoseFinder {
                             on_step, [&] { return ReportAt(done, "adjusting"); });
   }
 
-  // The end of the matter when no recipe gave a model: the sentence follows the evidence.
-  [[noreturn]] void RefuseWithoutModel(const ColmapEvidence& evidence) const {
-    const int features = evidence.MedianFeatures();
-    std::string why, remedy;
-    if (features < kFewFeatures) {
-      why = "the photos show too little to hold on to (about " + std::to_string(features) +
-            " features each): they are blurred, or the scene is plain";
-      remedy = "take sharp photos, in good light, of something with texture";
-    } else if (evidence.matched_pairs == 0) {
-      why = "no two photos show the same things from two places";
-      remedy =
-          "take photos of one scene that keeps still, each overlapping the one before by "
-          "two thirds";
-    } else {
-      why =
-          "no two photos show the same things from clearly different places: the camera only "
-          "turned, or the scene moved";
-      remedy =
-          "step sideways between photos instead of turning the camera, and keep the scene "
-          "still";
-    }
-    throw Error(ExitCode::kScene, TooFew() + why, "", remedy);
-  }
-
   bool TooFewGiven() const { return static_cast<int>(photos_.size()) < options_.min_photos; }
 
-  // In front of another reason, for captures that are too small anyway.
-  std::string TooFew() const {
-    if (!TooFewGiven()) return "";
-    return Photos(photos_.size()) + " are too few (" + std::to_string(options_.min_photos) +
-           " at least; 20 to 60 are a good number); besides, ";
-  }
-
+  // Throws the refusal, if there is one.
   void Judge(const Capture& capture) {
-    const size_t registered = capture.views.size();
     SceneLimits limits = limits_;
     if (TooFewGiven()) limits.min_views = 0;  // said already, and better
     const SceneJudgement judgement = JudgeScene(capture, limits);
     if (!judgement.refusal.empty())
-      throw Error(ExitCode::kScene, TooFew() + judgement.refusal, "", judgement.remedy);
-    if (TooFewGiven())
-      throw Error(ExitCode::kScene,
-                  Photos(photos_.size()) + " are too few for a scene in 3D (" +
-                      std::to_string(options_.min_photos) + " at least)",
-                  "",
-                  "take 20 to 60 photos that overlap by two thirds, stepping sideways "
-                  "between them");
-    if (registered < options_.min_registered * static_cast<double>(photos_.size())) {
-      std::string names;
-      for (const PhotoVerdict& verdict : capture.verdicts)
-        if (verdict.verdict == "unregistered")
-          names += "\n  " + verdict.file + ": " + verdict.why;
-      throw Error(ExitCode::kScene,
-                  "only " + std::to_string(registered) + " of " + Photos(photos_.size()) +
-                      " found their place in one scene; not these:" + names,
-                  "",
-                  "give photos of one scene that overlap by two thirds, or lower "
-                  "--pose-min-registered to go on with what there is");
-    }
+      Refuse({judgement.refusal, judgement.remedy}, photos_.size(), options_.min_photos);
+    if (TooFewGiven()) RefuseTooFew(photos_.size(), options_.min_photos);
+    if (capture.views.size() < options_.min_registered * static_cast<double>(photos_.size()))
+      RefuseUnregistered(capture);
     report_.notes.insert(report_.notes.end(), judgement.notes.begin(), judgement.notes.end());
-  }
-
-  // Only what COLMAP's output proves; anything finer would be a guess.
-  void ExplainUnregistered(const RungResult& best, Capture* capture) const {
-    for (size_t i = 0; i < photos_.size(); ++i) {
-      PhotoVerdict& verdict = capture->verdicts[i];
-      if (verdict.verdict != "unregistered") continue;
-      const std::string& name = photos_[i].name;
-      const auto features = best.evidence.features.find(name);
-      if (features == best.evidence.features.end()) {
-        verdict.why = "COLMAP did not read it";
-      } else if (features->second < kFewFeatures) {
-        verdict.why = "only " + std::to_string(features->second) +
-                      " features: blurred, or nothing with texture in it";
-      } else {
-        verdict.why = "it overlaps too little with the photos that were placed";
-      }
-      for (size_t k = 1; k < best.models.size(); ++k)
-        for (const ColmapImage& image : best.models[k].model.images)
-          if (image.name == name)
-            verdict.why = "it belongs to another group of " +
-                          Photos(best.models[k].model.images.size()) +
-                          " that nothing connects to the main one";
-    }
   }
 
   void Describe(const RungResult& best, const RefinedModel& refined) const {
     report_.recipe = best.recipe;
     report_.lens = refined.lens;
-    if (best.models.size() < 2) return;
-    std::string others;
-    for (size_t k = 1; k < best.models.size(); ++k)
-      others += (k == 1 ? "" : ", ") + std::to_string(best.models[k].model.images.size());
-    report_.notes.push_back(
-        "the photos fall apart into " + std::to_string(best.models.size()) +
-        " groups that nothing connects; the largest is used (the others have " + others + ")");
+    if (best.models.size() > 1) report_.notes.push_back(NoteOnOtherModels(best));
   }
 
   static void CopyModel(const std::string& from, const std::string& to) {

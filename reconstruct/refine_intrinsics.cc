@@ -167,7 +167,7 @@ RefinedModel RefineIntrinsics(ColmapProgram& colmap, const ColmapModel& grown,
       return std::nullopt;
     }
     if (!result.Succeeded() || refined.model.images.size() != grown.images.size() ||
-        !IsPlausible(refined.model))
+        (attempt.free_center && !IsPlausible(refined.model)))
       return std::nullopt;
     refined.mean_squared_px = MeanSquaredReprojection(refined.model);
     return refined;

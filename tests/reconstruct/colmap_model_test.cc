@@ -242,9 +242,11 @@ TEST_F(ColmapModelFile, H135_Quaternions) {
   ExpectRefusal("image 1 has a rotation quaternion of length 0");
   Patch("images.bin", kImageQuaternion, 1.01);
   ExpectRefusal("length 1.01");
-  Patch("images.bin", kImageQuaternion, 1.0005);  // rounding: mended
-  EXPECT_NEAR(ReadColmapModel(folder_).images[0].camera_from_world.rotation.Determinant(), 1,
-              1e-14);
+  // Off by rounding: mended. A quarter turn about x, so that the length matters.
+  for (int i = 0; i < 2; ++i) Patch("images.bin", kImageQuaternion + 8 * i, 0.7075);
+  const Mat3d rotation = ReadColmapModel(folder_).images[0].camera_from_world.rotation;
+  EXPECT_NEAR(rotation.Determinant(), 1, 1e-14);
+  EXPECT_NEAR(rotation(1, 2), -1, 1e-14);
 }
 
 TEST_F(ColmapModelFile, H134_ImplausibleCameras) {

@@ -236,6 +236,13 @@ TEST_F(Poses, TheLadderIsClimbedUntilARungHolds) {
   EXPECT_EQ(report_.rungs_tried, 2);
 }
 
+TEST_F(Poses, ARungThatWouldFindTheSameFeaturesAgainIsLeftOut) {
+  EXPECT_THROW(Run("nomodel"), Error);
+  EXPECT_EQ(report_.rungs_tried, 3);  // all but "more features": there are no more
+  EXPECT_THROW(Run("nomatches"), Error);
+  EXPECT_EQ(report_.rungs_tried, 4);  // one more: without a match nothing further helps
+}
+
 TEST(PoseLadder, CostGrowsUpwards) {
   std::vector<StagedPhoto> photos(50);
   for (StagedPhoto& photo : photos) photo.width = 1920, photo.height = 1080;

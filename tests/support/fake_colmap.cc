@@ -70,7 +70,11 @@ int Extract() {
   std::ifstream list(arguments["image_list_path"]);
   int i = 0;
   for (std::string name; std::getline(list, name); ++i) {
-    const int features = Is("plain") ? 12 : Is("few") && i > 3 ? 80 + i : 1500;
+    const int features = Is("plain")          ? 12
+                         : Is("few") && i > 3 ? 80 + i
+                         : Is("ladder")
+                             ? std::stoi(arguments["SiftExtraction.max_num_features"])
+                             : 1500;
     std::printf("Processed file [%d/99]\n  Name:            %s\n  Features:        %d\n", i + 1,
                 name.c_str(), features);
     database << name << "\n";

@@ -1,38 +1,16 @@
 // pose_tool PHOTOS OUT [colmap]: stages a folder of pictures and finds their poses, for
 // measuring by hand. OUT gets photos/, work/ and sparse/.
-#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
-#include <opencv2/imgcodecs.hpp>
 
 #include "kernels/base/error.h"
+#include "pipeline/photo_folder.h"
 #include "reconstruct/poses_from_photos.h"
 #include "reconstruct/scene_checks.h"
 
 namespace fs = std::filesystem;
 using namespace regrade;
-
-namespace {
-
-std::vector<StagedPhoto> Stage(const fs::path& from, const fs::path& to) {
-  std::vector<fs::path> files;
-  for (const auto& entry : fs::directory_iterator(from)) files.push_back(entry.path());
-  std::sort(files.begin(), files.end());
-  fs::create_directories(to);
-  std::vector<StagedPhoto> photos;
-  for (const fs::path& file : files) {
-    const cv::Mat picture = cv::imread(file.string());
-    if (picture.empty()) continue;
-    char name[32];
-    std::snprintf(name, sizeof(name), "%05zu.png", photos.size());
-    cv::imwrite((to / name).string(), picture);
-    photos.push_back({file.filename(), name, to / name, picture.cols, picture.rows, 0});
-  }
-  return photos;
-}
-
-}  // namespace
 
 int main(int argc, char** argv) {
   if (argc < 3) {
@@ -42,7 +20,6 @@ int main(int argc, char** argv) {
   const fs::path out = fs::absolute(argv[2]);
   PoseOptions options;
   if (argc > 3) options.colmap = argv[3];
-  const std::vector<StagedPhoto> photos = Stage(argv[1], out / "photos");
   const auto start = std::chrono::steady_clock::now();
   const auto seconds = [&] {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -57,8 +34,11 @@ int main(int argc, char** argv) {
   };
   PoseReport report;
   try {
-    const Capture capture =
-        PosesFromPhotos(photos, {}, options, out / "work", out / "sparse", progress, &report);
+    const IngestResult ingest = IngestPhotos(argv[1], out / "photos", {}, {});
+    std::printf("%zu photos after %.1f s, EXIF focal length %.1f px\n", ingest.photos.size(),
+                seconds(), ingest.photos[0].exif_focal_px);
+    const Capture capture = PosesFromPhotos(ingest.photos, ingest.verdicts, options,
+                                            out / "work", out / "sparse", progress, &report);
     const Vec3d extents = PointExtents(capture);
     const Camera& camera = capture.views[0].camera;
     std::printf(
@@ -66,10 +46,11 @@ int main(int argc, char** argv) {
         "%s\n"
         "angle %.2f deg, extents %.3g %.3g %.3g, fx %.2f fy %.2f cx %.2f cy %.2f, corner moved "
         "%.2f px, %.1f s\n",
-        capture.views.size(), photos.size(), capture.points.size(), capture.reprojection_px,
-        capture.models_found, report.recipe.c_str(), report.rungs_tried, report.lens.c_str(),
-        MedianTriangulationAngle(capture) * 180 / M_PI, extents.x, extents.y, extents.z,
-        camera.fx, camera.fy, camera.cx, camera.cy, camera.MaxCornerDistortion(), seconds());
+        capture.views.size(), ingest.photos.size(), capture.points.size(),
+        capture.reprojection_px, capture.models_found, report.recipe.c_str(),
+        report.rungs_tried, report.lens.c_str(), MedianTriangulationAngle(capture) * 180 / M_PI,
+        extents.x, extents.y, extents.z, camera.fx, camera.fy, camera.cx, camera.cy,
+        camera.MaxCornerDistortion(), seconds());
     for (const PhotoVerdict& verdict : capture.verdicts)
       if (verdict.verdict != "used")
         std::printf("%s: %s: %s\n", verdict.file.c_str(), verdict.verdict.c_str(),

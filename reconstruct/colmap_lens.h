@@ -1,0 +1,40 @@
+// COLMAP's camera models, and how their parameters map to ours.
+#pragma once
+
+#include <cstdint>
+
+#include "kernels/scene/camera.h"
+
+namespace regrade {
+
+// COLMAP's camera models by their number in the file (colmap/src/colmap/sensor/models.h).
+enum class ColmapLens : int32_t {
+  kSimplePinhole = 0,
+  kPinhole = 1,
+  kSimpleRadial = 2,
+  kRadial = 3,
+  kOpenCv = 4,
+  kOpenCvFisheye = 5,
+  kFullOpenCv = 6,
+  kFov = 7,  // refused
+  kSimpleRadialFisheye = 8,
+  kRadialFisheye = 9,
+  kThinPrismFisheye = 10,  // refused
+};
+
+inline constexpr int kNumColmapLenses = 11;
+
+// In the file stand the focal lengths (one for both, or two), then the centre, then the
+// distortion coefficients: the first `coefficients` of ours in the same order.
+struct ColmapLensInfo {
+  const char* name;
+  int focals;  // 1 or 2; 0: not supported
+  LensModel lens;
+  int coefficients;
+};
+
+const ColmapLensInfo& InfoOf(ColmapLens lens);
+
+inline const char* ColmapLensName(ColmapLens lens) { return InfoOf(lens).name; }
+
+}  // namespace regrade
