@@ -1,0 +1,193 @@
+#include "pipeline/capture_store.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <set>
+
+#include "kernels/base/error.h"
+#include "pipeline/files/json_file.h"
+#include "pipeline/files/transforms_json.h"
+
+namespace regrade {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool HoldsModel(const fs::path& folder) {
+  return fs::is_regular_file(folder / "cameras.bin") &&
+         fs::is_regular_file(folder / "images.bin");
+}
+
+// The deepest folder that holds all pictures of a transforms.json.
+fs::path CommonFolder(const fs::path& folder, const TransformsFile& file) {
+  fs::path common;
+  for (const TransformsFrame& frame : file.frames) {
+    const fs::path parent = fs::weakly_canonical(folder / frame.file).parent_path();
+    if (common.empty()) {
+      common = parent;
+      continue;
+    }
+    fs::path shared;
+    for (auto a = common.begin(), b = parent.begin();
+         a != common.end() && b != parent.end() && *a == *b; ++a, ++b)
+      shared /= *a;
+    common = shared;
+  }
+  return common;
+}
+
+ColmapLens LensOf(const Camera& camera) {
+  switch (camera.lens) {
+    case LensModel::kPinhole:
+      return ColmapLens::kPinhole;
+    case LensModel::kOpenCv:
+      return ColmapLens::kOpenCv;
+    case LensModel::kFullOpenCv:
+      return ColmapLens::kFullOpenCv;
+    case LensModel::kFisheye:
+      return ColmapLens::kOpenCvFisheye;
+  }
+  return ColmapLens::kPinhole;
+}
+
+// A model with one camera an image and no points, under our own names.
+ColmapModel ModelFromTransforms(const CaptureSource& source,
+                                const std::vector<StagedPhoto>& photos) {
+  const fs::path folder = fs::path(source.poses).parent_path();
+  std::map<std::string, const StagedPhoto*> by_path;
+  for (const StagedPhoto& photo : photos)
+    by_path[fs::weakly_canonical(fs::path(source.photos) / photo.file).string()] = &photo;
+  const PictureSizeFunction size_of = [&by_path](const std::string& path, int* width,
+                                                 int* height) {
+    const auto found = by_path.find(fs::weakly_canonical(path).string());
+    *width = found == by_path.end() ? 1 : found->second->width;
+    *height = found == by_path.end() ? 1 : found->second->height;
+  };
+  ColmapModel model;
+  for (const TransformsFrame& frame : ReadTransformsJson(source.poses, size_of).frames) {
+    const auto found = by_path.find(fs::weakly_canonical(folder / frame.file).string());
+    if (found == by_path.end()) continue;  // left out at ingest, with a verdict
+    const uint32_t id = static_cast<uint32_t>(model.images.size()) + 1;
+    model.cameras.push_back({id, LensOf(frame.camera), frame.camera});
+    model.images.push_back({id, id, found->second->name, frame.camera.camera_from_world, {}});
+  }
+  return model;
+}
+
+JsonValue VerdictsJson(const std::vector<PhotoVerdict>& verdicts) {
+  JsonValue::Array array;
+  for (const PhotoVerdict& verdict : verdicts)
+    array.push_back(JsonValue::Object{
+        {"file", verdict.file}, {"verdict", verdict.verdict}, {"why", verdict.why}});
+  return array;
+}
+
+// Ingest's verdict stands, unless the photo was staged: then the poses decide.
+std::vector<PhotoVerdict> MergedVerdicts(const std::vector<PhotoVerdict>& ingest,
+                                         const std::vector<PhotoVerdict>& posed) {
+  std::vector<PhotoVerdict> merged = ingest;
+  for (PhotoVerdict& verdict : merged)
+    for (const PhotoVerdict& later : posed)
+      if (later.file == verdict.file) {
+        verdict.verdict = later.verdict;
+        if (!later.why.empty()) verdict.why = later.why;
+      }
+  return merged;
+}
+
+}  // namespace
+
+CaptureSource DetectCapture(const std::string& folder) {
+  std::error_code error;
+  const fs::path root = fs::canonical(folder, error);
+  if (error) throw Error(ExitCode::kInput, error.message(), folder, "name a folder of photos");
+  if (!fs::is_directory(root))
+    throw Error(ExitCode::kInput, "is a file, not a folder", folder, "name its folder");
+  if (fs::is_regular_file(root / "transforms.json")) {
+    const fs::path file = root / "transforms.json";
+    const auto unknown_size = [](const std::string&, int* width, int* height) {
+      *width = *height = 1;
+    };
+    const fs::path photos = CommonFolder(root, ReadTransformsJson(file.string(), unknown_size));
+    return {CaptureKind::kTransforms, photos.string(), file.string()};
+  }
+  if (fs::is_directory(root / "images"))
+    for (const char* model : {"sparse", "sparse/0"})
+      if (HoldsModel(root / model))
+        return {CaptureKind::kColmap, (root / "images").string(), (root / model).string()};
+  return {CaptureKind::kPhotos, root.string(), ""};
+}
+
+Capture ImportPoses(const CaptureSource& source, const std::vector<StagedPhoto>& photos,
+                    const std::vector<PhotoVerdict>& verdicts,
+                    const std::string& sparse_folder) {
+  ColmapModel model;
+  if (source.kind == CaptureKind::kTransforms) {
+    model = ModelFromTransforms(source, photos);
+  } else {
+    model = ReadColmapModel(source.poses);
+    // The model goes on under our names; images without a staged photo keep theirs.
+    std::map<std::string, std::string> name_of;
+    for (const StagedPhoto& photo : photos) name_of[photo.file] = photo.name;
+    for (ColmapImage& image : model.images)
+      if (const auto found = name_of.find(image.name); found != name_of.end())
+        image.name = found->second;
+  }
+  WriteColmapModel(model, sparse_folder);
+  Capture capture = CaptureFromModel(model, photos, PhotoNames::kStaged);
+  capture.verdicts = MergedVerdicts(verdicts, capture.verdicts);
+  return capture;
+}
+
+void WriteCaptureIndex(const std::string& folder, const Capture& capture,
+                       const std::vector<StagedPhoto>& photos) {
+  JsonValue::Array staged;
+  for (const StagedPhoto& photo : photos)
+    staged.push_back(JsonValue::Object{{"file", photo.file},
+                                       {"name", photo.name},
+                                       {"width", photo.width},
+                                       {"height", photo.height},
+                                       {"exif_focal_px", photo.exif_focal_px}});
+  WriteJsonFile(folder + "/photos.json",
+                JsonValue::Object{{"schema", 1},
+                                  {"photos", std::move(staged)},
+                                  {"verdicts", VerdictsJson(capture.verdicts)},
+                                  {"reprojection_px", capture.reprojection_px},
+                                  {"models_found", capture.models_found}});
+}
+
+Capture ReadCapture(const std::string& folder) {
+  const std::string path = folder + "/photos.json";
+  const JsonValue index = ReadJsonFile(path);
+  try {
+    std::vector<StagedPhoto> photos;
+    for (const JsonValue& entry : index.At("photos").AsArray()) {
+      StagedPhoto photo;
+      photo.file = entry.At("file").AsString();
+      photo.name = entry.At("name").AsString();
+      if (fs::path(photo.name).filename() != photo.name)
+        throw Error(ExitCode::kInput, "a photo's name is a path");
+      photo.path = folder + "/photos/" + photo.name;
+      photo.width = static_cast<int>(entry.At("width").AsInt());
+      photo.height = static_cast<int>(entry.At("height").AsInt());
+      photo.exif_focal_px = entry.At("exif_focal_px").AsDouble();
+      photos.push_back(std::move(photo));
+    }
+    Capture capture =
+        CaptureFromModel(ReadColmapModel(folder + "/sparse"), photos, PhotoNames::kStaged);
+    capture.verdicts.clear();
+    for (const JsonValue& verdict : index.At("verdicts").AsArray())
+      capture.verdicts.push_back({verdict.At("file").AsString(),
+                                  verdict.At("verdict").AsString(),
+                                  verdict.At("why").AsString()});
+    capture.reprojection_px = index.At("reprojection_px").AsDouble();
+    capture.models_found = static_cast<int>(index.At("models_found").AsInt());
+    return capture;
+  } catch (const Error& error) {
+    throw Error(ExitCode::kInput, error.what_failed(),
+                error.where().empty() ? path : error.where(), error.hint());
+  }
+}
+
+}  // namespace regrade

@@ -1,0 +1,41 @@
+// A capture on disk: poses/ in the output folder, with COLMAP's model, the staged photos, and
+// photos.json for what neither of them says.
+#pragma once
+
+#include <string>
+
+#include "kernels/scene/capture.h"
+#include "reconstruct/colmap_model.h"
+
+namespace regrade {
+
+// What the poses of a capture were known by before.
+enum class CaptureKind {
+  kPhotos,      // not at all
+  kColmap,      // images/ beside sparse/ or sparse/0/
+  kTransforms,  // transforms.json
+};
+
+struct CaptureSource {
+  CaptureKind kind = CaptureKind::kPhotos;
+  std::string photos;  // the folder to take photos from, absolute
+  std::string poses;   // folder of the model, or the .json file; empty for kPhotos
+};
+
+// Tells by content. Throws Error(kInput) if there is no such folder.
+CaptureSource DetectCapture(const std::string& folder);
+
+// Poses that came with the photos, for those that were staged; the model is written to
+// `sparse_folder`. Throws Error(kInput) if they do not fit each other.
+Capture ImportPoses(const CaptureSource& source, const std::vector<StagedPhoto>& photos,
+                    const std::vector<PhotoVerdict>& verdicts,
+                    const std::string& sparse_folder);
+
+// `folder` holds sparse/ and photos/ already; this adds photos.json.
+void WriteCaptureIndex(const std::string& folder, const Capture& capture,
+                       const std::vector<StagedPhoto>& photos);
+
+// Reads it all back. Throws Error(kInput).
+Capture ReadCapture(const std::string& folder);
+
+}  // namespace regrade

@@ -1,0 +1,37 @@
+// The program's commands: a name, what it takes, what it does.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "pipeline/console.h"
+#include "pipeline/option_binding.h"
+#include "pipeline/run_options.h"
+
+namespace regrade {
+
+using Arguments = std::vector<std::string>;
+
+struct Command {
+  const char* name;
+  const char* usage;    // what stands behind the name
+  const char* summary;  // one line
+  void (*run)(const Command& command, const Arguments& arguments, Console* console);
+};
+
+const std::vector<Command>& AllCommands();
+
+// Prints usage and options on stdout if --help is among the arguments, and says so.
+bool PrintedHelp(const Command& command, const Arguments& arguments, const OptionSet& options);
+
+// Throws Error(kUsage) unless there are between `least` and `most` words.
+void CheckWords(const Command& command, const Arguments& words, size_t least, size_t most);
+
+// Before any work.
+void ApplyProgramOptions(const ProgramOptions& options);
+
+void RunRoad(const Command&, const Arguments&, Console*);  // run, pose, reconstruct
+void RunSynth(const Command&, const Arguments&, Console*);
+void RunDoctor(const Command&, const Arguments&, Console*);
+
+}  // namespace regrade

@@ -1,0 +1,18 @@
+#include "pipeline/commands/command.h"
+
+namespace regrade {
+
+const std::vector<Command>& AllCommands() {
+  static const std::vector<Command> commands = {
+      {"run", "PHOTOS|CAPTURE --style PICTURE --out DIR [OPTIONS]",
+       "photos and a style picture become a styled scene, with films and a report", RunRoad},
+      {"pose", "PHOTOS --out DIR [OPTIONS]", "finds where each photo was taken", RunRoad},
+      {"reconstruct", "PHOTOS|CAPTURE --out DIR [OPTIONS]",
+       "fits a radiance field to the photos", RunRoad},
+      {"synth", "OUT [OPTIONS]", "writes a synthetic capture with its exact truth", RunSynth},
+      {"doctor", "[OPTIONS]", "what is installed, and what will run where", RunDoctor},
+  };
+  return commands;
+}
+
+}  // namespace regrade

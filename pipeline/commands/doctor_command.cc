@@ -1,0 +1,85 @@
+// regrade doctor: what is installed, and what will run where.
+#include <omp.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <filesystem>
+
+#include "kernels/base/child_process.h"
+#include "kernels/base/error.h"
+#include "kernels/field/fast_rays.h"
+#include "pipeline/commands/command.h"
+#include "pipeline/memory.h"
+
+namespace regrade {
+namespace {
+
+struct Finding {
+  std::string name, value, meaning;
+};
+
+// COLMAP has no --version: the first lines of its help name it.
+Finding FindColmap(const std::string& program) {
+  const std::string needed = "needed for `run` and `pose` on photos without poses";
+  std::string version;
+  try {
+    ChildOptions options;
+    options.argv = {program, "help"};
+    options.wall_limit_s = 20;
+    options.environment = {{"QT_QPA_PLATFORM", "offscreen"}};
+    RunChild(options, [&version](const std::string& line) {
+      if (version.empty() && line.find("COLMAP") != std::string::npos) version = line;
+    });
+  } catch (const Error& error) {
+    return {"COLMAP", "not found: " + error.what_failed(),
+            needed + "; install the package `colmap`"};
+  }
+  return {"COLMAP", version.empty() ? "'" + program + "' does not call itself COLMAP" : version,
+          needed};
+}
+
+}  // namespace
+
+void RunDoctor(const Command& command, const Arguments& arguments, Console* console) {
+  ProgramOptions program;
+  OptionSet options;
+  options.Add("Program", &program);
+  if (PrintedHelp(command, arguments, options)) return;
+  const Arguments words = options.Parse(arguments);
+  options.ApplyFlags();
+  CheckWords(command, words, 0, 0);
+  ApplyProgramOptions(program);
+
+  const auto gigabytes = [](uint64_t bytes) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.1f GB", static_cast<double>(bytes) / (1u << 30));
+    return std::string(text);
+  };
+  const MemoryStatus memory = ReadMemoryStatus();
+  const std::string scratch = std::filesystem::temp_directory_path().string();
+  std::vector<Finding> findings = {
+      {"regrade", REGRADE_VERSION, ""},
+      {"CUDA", "not in this build", "everything runs on the CPU"},
+      {"threads",
+       std::to_string(omp_get_max_threads()) + " of " +
+           std::to_string(::sysconf(_SC_NPROCESSORS_ONLN)) + " cores",
+       "set with --threads"},
+      {"memory", gigabytes(memory.available) + " free of " + gigabytes(memory.total),
+       "limit with --max-memory"},
+      {"fast path", FastRays().name, "instruction set of rendering and fitting"},
+      FindColmap("colmap"),
+  };
+  console->Event("doctor", JsonValue::Object());
+  for (const Finding& finding : findings) {
+    if (program.json) {
+      console->Event("finding", JsonValue::Object{{"name", finding.name},
+                                                  {"value", finding.value},
+                                                  {"meaning", finding.meaning}});
+      continue;
+    }
+    std::printf("%-10s %s%s%s\n", finding.name.c_str(), Printable(finding.value).c_str(),
+                finding.meaning.empty() ? "" : "  - ", finding.meaning.c_str());
+  }
+}
+
+}  // namespace regrade

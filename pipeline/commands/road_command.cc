@@ -1,0 +1,94 @@
+// regrade run, pose, reconstruct: the road from photos, or a part of it.
+#include <filesystem>
+
+#include "kernels/base/error.h"
+#include "pipeline/commands/command.h"
+#include "pipeline/files/image_file.h"
+#include "pipeline/run_file.h"
+#include "pipeline/run_pipeline.h"
+
+namespace regrade {
+namespace {
+
+// Defaults, then the preset, then --config, then flags: each may be narrower than the last. A
+// preset given as a flag is stronger than a whole run.json.
+Arguments ReadSettings(const Arguments& arguments, RunContext* context) {
+  Arguments words = context->options.Parse(arguments);
+  const auto flag = context->options.Given("preset");
+  RunFile file;
+  if (const auto config = context->options.Given("config")) {
+    file = ReadRunFile(*config);
+    if (words.empty()) words = file.words;
+    const JsonValue* preset = file.options.Find("preset");
+    if (!flag && preset != nullptr && preset->IsString())
+      ApplyPreset(preset->AsString(), &context->settings);
+    context->options.ApplyConfig(file.options, *config);
+  }
+  if (flag) ApplyPreset(*flag, &context->settings);
+  context->options.ApplyFlags();
+  return words;
+}
+
+void CheckDevice(const std::string& device) {
+  if (device == "cuda")
+    throw Error(ExitCode::kResources, "this build has no CUDA", "--device cuda",
+                "use --device auto or cpu");
+}
+
+// All inputs are looked at before long work starts.
+void ProbeInputs(const std::string& last, RunContext* context) {
+  if (!std::filesystem::exists(context->source))
+    throw Error(ExitCode::kInput, "there is no such folder", context->source,
+                "name a folder of photos");
+  if (last == "pose" || last == "reconstruct") return;
+  if (context->settings.style.picture.empty())
+    throw Error(ExitCode::kUsage, "its value is missing", "--style",
+                "name the picture whose colours the scene shall have");
+  ReadStylePicture(context->settings.style.picture, nullptr);
+}
+
+std::string Absolute(const std::string& path) {
+  std::error_code error;
+  const auto absolute = std::filesystem::absolute(path, error);
+  if (error)
+    throw Error(ExitCode::kResources, "the working folder is gone: " + error.message(), path,
+                "start from a folder that exists");
+  return absolute.lexically_normal().string();
+}
+
+}  // namespace
+
+void RunRoad(const Command& command, const Arguments& arguments, Console* console) {
+  const std::string name = command.name;
+  const std::string last = name == "run" ? "report" : name;
+  RunContext context;
+  context.console = console;
+  context.settings.Bind(&context.options);
+  if (PrintedHelp(command, arguments, context.options)) return;
+  const Arguments words = ReadSettings(arguments, &context);
+  RunSettings& settings = context.settings;
+  CheckWords(command, words, 1, 1);
+  if (settings.run.out.empty())
+    throw Error(ExitCode::kUsage, "its value is missing", "--out",
+                "name the folder that the results shall go to");
+  CheckDevice(settings.run.device);
+  ApplyProgramOptions(settings.program);
+  context.source = Absolute(words[0]);
+  if (!settings.style.picture.empty())
+    settings.style.picture = Absolute(settings.style.picture);
+  settings.run.out = Absolute(settings.run.out);
+  ProbeInputs(last, &context);
+
+  if (settings.start.dry_run && !Workspace::Exists(settings.run.out)) {
+    console->Info(settings.run.out + " is new: every stage would be done, from " +
+                  PoseStage(&context).plan);
+    return;
+  }
+  Workspace workspace(settings.run.out, settings.start.break_lock);
+  context.workspace = &workspace;
+  console->OpenLog(workspace.Path(".regrade/log.txt"));
+  RunPipeline("pose", last, &context);
+  if (!settings.start.dry_run) WriteRunFile(name, context);
+}
+
+}  // namespace regrade

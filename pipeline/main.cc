@@ -1,0 +1,83 @@
+// The program's entrance: finds the command, and turns what it throws into a message and an
+// exit code.
+#include <algorithm>
+#include <cstdio>
+#include <new>
+#include <string>
+#include <vector>
+
+#include "kernels/base/error.h"
+#include "pipeline/commands/command.h"
+#include "pipeline/console.h"
+#include "pipeline/interrupt.h"
+#include "pipeline/nearest_name.h"
+
+namespace regrade {
+namespace {
+
+// Named in the plans, not built yet: better said than "unknown".
+constexpr const char* kLater[] = {"tradeoff", "import", "export", "pack"};
+
+void PrintHelp() {
+  std::printf(
+      "regrade " REGRADE_VERSION
+      ": photographs in, a styled 3D scene out\n\nusage: regrade COMMAND [OPTIONS]\n\n");
+  for (const Command& command : AllCommands())
+    std::printf("  %-12s %s\n               regrade %s %s\n", command.name, command.summary,
+                command.name, command.usage);
+  std::printf("\nregrade COMMAND --help lists the options of a command.\n");
+}
+
+void Dispatch(const Arguments& arguments, Console* console) {
+  const std::string name = arguments.empty() ? "help" : arguments[0];
+  if (name == "help" || name == "--help" || name == "-h") return PrintHelp();
+  if (name == "--version" || name == "version") {
+    std::printf("regrade " REGRADE_VERSION "\n");
+    return;
+  }
+  std::vector<std::string> names = {"help"};
+  for (const Command& command : AllCommands()) {
+    if (name == command.name)
+      return command.run(command, Arguments(arguments.begin() + 1, arguments.end()), console);
+    names.push_back(command.name);
+  }
+  if (std::find(std::begin(kLater), std::end(kLater), name) != std::end(kLater))
+    throw Error(ExitCode::kUsage, "this command is not in this version", name);
+  const std::string nearest = NearestName(name, names);
+  throw Error(
+      ExitCode::kUsage, "unknown command", name,
+      nearest.empty() ? "see `regrade help`" : "did you mean `regrade " + nearest + "`?");
+}
+
+int Run(const Arguments& arguments) {
+  const auto flags_end = std::find(arguments.begin(), arguments.end(), "--");
+  Console console(std::find(arguments.begin(), flags_end, "--json") != flags_end);
+  ExitCode code = ExitCode::kBug;
+  try {
+    Dispatch(arguments, &console);
+    std::fflush(stdout);
+    return static_cast<int>(ExitCode::kDone);
+  } catch (const Error& error) {
+    console.Fail(error);
+    code = error.code();
+  } catch (const Interrupted&) {
+    console.Info("stopped; what was finished is kept, and the same command goes on from there");
+    DieBySignal(StopSignal());
+  } catch (const std::bad_alloc&) {
+    code = ExitCode::kResources;
+    console.Fail("out of memory. To do: close other programs, or take --preset draft", code);
+  } catch (const std::exception& error) {
+    console.Fail(std::string("a bug of ours: ") + error.what() +
+                     ". To do: please report it with the command and this line",
+                 code);
+  }
+  return static_cast<int>(code);
+}
+
+}  // namespace
+}  // namespace regrade
+
+int main(int argc, char** argv) {
+  regrade::InstallSignalHandling();
+  return regrade::Run(regrade::Arguments(argv + std::min(argc, 1), argv + argc));
+}

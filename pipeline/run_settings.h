@@ -1,0 +1,57 @@
+// Everything that can be set for a run over an output folder, stage by stage.
+#pragma once
+
+#include <string>
+
+#include "pipeline/option_binding.h"
+#include "pipeline/photo_folder.h"
+#include "pipeline/run_options.h"
+#include "reconstruct/fit_options.h"
+#include "reconstruct/poses_from_photos.h"
+#include "stylize/color_transfer.h"
+
+namespace regrade {
+
+struct SceneOptions {
+  int photo_size = 800;
+
+  template <typename Bind>
+  void Describe(Bind& bind) {
+    bind("photo-size", photo_size,
+         {.unit = "pixels",
+          .help = "longer side of the photos that the field is fitted to, and of the frames "
+                  "that are rendered; time grows with its square",
+          .min = 64,
+          .max = 16384});
+  }
+};
+
+struct StyleSource {
+  std::string picture;
+
+  template <typename Bind>
+  void Describe(Bind& bind) {
+    bind("style", picture, {.help = "the picture whose colours the scene shall have"});
+  }
+};
+
+struct RunSettings {
+  ProgramOptions program;
+  StartOptions start;
+  RunOptions run;
+  IngestOptions ingest;
+  PoseOptions pose;
+  SceneOptions scene;
+  FitOptions fit;
+  StyleSource style;
+  StyleOptions style_2d;
+
+  // Groups as they head the help and name parts of fingerprints.
+  void Bind(OptionSet* options);
+};
+
+// Sets what a preset decides, before single options are read: "draft", "standard", "paper",
+// "best". Throws Error(kUsage) for another name.
+void ApplyPreset(const std::string& preset, RunSettings* settings);
+
+}  // namespace regrade

@@ -1,0 +1,59 @@
+#include "pipeline/scene_views.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "kernels/base/error.h"
+#include "kernels/image/resize.h"
+#include "pipeline/files/image_file.h"
+
+namespace regrade {
+namespace {
+
+// Rounded per side; the camera's focal lengths follow each side's own ratio.
+void WorkingSize(int width, int height, int longest_side, int* new_width, int* new_height) {
+  const double scale =
+      std::min(1.0, static_cast<double>(longest_side) / std::max(width, height));
+  *new_width = std::max(1, static_cast<int>(std::lround(width * scale)));
+  *new_height = std::max(1, static_cast<int>(std::lround(height * scale)));
+}
+
+}  // namespace
+
+Camera WorkingCamera(const Camera& camera, int longest_side,
+                     const Similarity& field_from_world) {
+  int width = 0, height = 0;
+  WorkingSize(camera.width, camera.height, longest_side, &width, &height);
+  return camera.Resized(width, height).Transformed(field_from_world);
+}
+
+Image ReadWorkingPhoto(const CaptureView& view, int longest_side) {
+  Image photo = ReadImage(view.path);
+  if (photo.width != view.camera.width || photo.height != view.camera.height)
+    throw Error(ExitCode::kInput,
+                std::to_string(photo.width) + " x " + std::to_string(photo.height) +
+                    " pixels, but its camera has " + std::to_string(view.camera.width) + " x " +
+                    std::to_string(view.camera.height),
+                view.path, "the staged photo was changed: use --restart-from pose");
+  if (photo.channels != 3) throw Error(ExitCode::kInput, "not an RGB picture", view.path);
+  int width = 0, height = 0;
+  WorkingSize(photo.width, photo.height, longest_side, &width, &height);
+  if (width == photo.width && height == photo.height) return photo;
+  return Resize(photo, width, height);
+}
+
+std::vector<int> ViewIndices(const Capture& capture, int holdout, bool held_out) {
+  std::vector<int> indices;
+  for (size_t i = 0; i < capture.views.size(); ++i)
+    if (IsHeldOut(i, holdout) == held_out) indices.push_back(static_cast<int>(i));
+  return indices;
+}
+
+std::string FrameName(int index) {
+  char name[32];
+  std::snprintf(name, sizeof name, "%05d.png", index);
+  return name;
+}
+
+}  // namespace regrade

@@ -1,0 +1,25 @@
+// The capture as the later stages use it: photos at working size, cameras to match.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "kernels/scene/capture.h"
+
+namespace regrade {
+
+// The camera of a photo whose longer side is cut to `longest_side` pixels (never enlarged), in
+// a world transformed by `field_from_world`.
+Camera WorkingCamera(const Camera& camera, int longest_side,
+                     const Similarity& field_from_world);
+
+// The photo at the size of its working camera, 3 channels.
+Image ReadWorkingPhoto(const CaptureView& view, int longest_side);
+
+// Indices of views that are fitted, or of those that are kept for measuring.
+std::vector<int> ViewIndices(const Capture& capture, int holdout, bool held_out);
+
+// "00007.png"
+std::string FrameName(int index);
+
+}  // namespace regrade

@@ -1,0 +1,80 @@
+// Stage "pose": a folder of photos becomes poses/, a capture with a camera for each photo that
+// found its place.
+#include "pipeline/capture_store.h"
+#include "pipeline/folder_listing.h"
+#include "pipeline/stages/run_context.h"
+
+namespace regrade {
+namespace {
+
+// Which files, with which contents: what F40's difference is listed from.
+JsonValue PhotoSet(const CaptureSource& source) {
+  JsonValue files = JsonValue::Object();
+  for (const ListedFile& file : ListFolder(source.photos).files)
+    files[file.name] = file.problem.empty() ? HashFile(file.path) : file.problem;
+  return files;
+}
+
+StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
+                       const ProgressFunction& progress) {
+  const RunSettings& settings = context->settings;
+  Workspace& workspace = *context->workspace;
+  const std::string photo_folder = workspace.Path("poses/photos");
+  const std::string sparse_folder = workspace.Path("poses/sparse");
+  workspace.NewPath("poses/photos/x");
+  workspace.NewPath("poses/sparse/x");
+  workspace.NewPath(".regrade/work/pose/x");
+
+  const IngestResult ingest =
+      IngestPhotos(source.photos, photo_folder, settings.ingest, progress);
+  for (const std::string& notice : ingest.notices) context->console->Info(notice);
+
+  StageOutcome outcome;
+  Capture capture;
+  if (source.kind == CaptureKind::kPhotos) {
+    PoseOptions options = settings.pose;
+    options.threads = settings.program.threads;
+    PoseReport report;
+    capture =
+        PosesFromPhotos(ingest.photos, ingest.verdicts, options,
+                        workspace.Path(".regrade/work/pose"), sparse_folder, progress, &report);
+    for (const std::string& note : report.notes) context->console->Info(note);
+    outcome.figures["colmap"] = report.colmap_version;
+    outcome.figures["recipe"] = report.recipe;
+    outcome.figures["lens"] = report.lens;
+  } else {
+    capture = ImportPoses(source, ingest.photos, ingest.verdicts, sparse_folder);
+    outcome.figures["recipe"] = "poses came with the photos: " + source.poses;
+  }
+  WriteCaptureIndex(workspace.Path("poses"), capture, ingest.photos);
+  outcome.figures["registered"] = static_cast<int64_t>(capture.views.size());
+  outcome.figures["points"] = static_cast<int64_t>(capture.points.size());
+  outcome.figures["reprojection_px"] = capture.reprojection_px;
+  outcome.figures["models_found"] = capture.models_found;
+  outcome.outputs = {"poses"};
+  context->console->Info("placed " + std::to_string(capture.views.size()) + " of " +
+                         std::to_string(ingest.photos.size()) + " photos, " +
+                         std::to_string(capture.points.size()) + " points");
+  return outcome;
+}
+
+}  // namespace
+
+Stage PoseStage(RunContext* context) {
+  const CaptureSource source = DetectCapture(context->source);
+  Stage stage;
+  stage.name = "pose";
+  stage.inputs = JsonValue::Object{{"photos", PhotoSet(source)},
+                                   {"options", context->OptionsOf({"Photos", "Poses"})}};
+  stage.refuse_changes = true;
+  stage.plan = std::to_string(stage.inputs.At("photos").AsObject().size()) + " files in " +
+               source.photos +
+               (source.kind == CaptureKind::kPhotos ? ", poses by COLMAP"
+                                                    : ", poses from " + source.poses);
+  stage.work = [context, source](const ProgressFunction& progress) {
+    return FindPoses(context, source, progress);
+  };
+  return stage;
+}
+
+}  // namespace regrade

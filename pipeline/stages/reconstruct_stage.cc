@@ -1,0 +1,113 @@
+// Stage "reconstruct": the capture becomes field.npz, measured on the photos it has not seen.
+#include <numeric>
+
+#include "evaluate/image_quality.h"
+#include "kernels/field/render.h"
+#include "pipeline/capture_store.h"
+#include "pipeline/field_file.h"
+#include "pipeline/fit_checkpoint.h"
+#include "pipeline/scene_views.h"
+#include "pipeline/stages/run_context.h"
+#include "reconstruct/fit_field.h"
+#include "reconstruct/normalize_scene.h"
+
+namespace regrade {
+namespace {
+
+constexpr int kReproducibleShards = 4;  // sums in a fixed grouping, whatever the threads
+
+double Mean(const std::vector<double>& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0) /
+         static_cast<double>(values.size());
+}
+
+// PSNR and SSIM over the held-out photos.
+void MeasureHeldOut(RunContext* context, const Capture& capture, const StoredField& stored,
+                    JsonValue* figures) {
+  const RunSettings& settings = context->settings;
+  const FastGrid grid = MakeFastGrid(stored.field);
+  const MarchOptions march{settings.fit.step};
+  std::vector<double> psnr, ssim;
+  JsonValue::Array files;
+  for (const int i : ViewIndices(capture, settings.run.holdout, true)) {
+    const CaptureView& view = capture.views[static_cast<size_t>(i)];
+    const Image photo = ReadWorkingPhoto(view, settings.scene.photo_size);
+    const Camera camera =
+        WorkingCamera(view.camera, settings.scene.photo_size, stored.field_from_world);
+    const Image rendered = RenderView(grid, camera, march).color;
+    if (const auto value = Psnr(rendered, photo)) psnr.push_back(*value);
+    if (const auto value = Ssim(rendered, photo)) ssim.push_back(*value);
+    files.emplace_back(view.file);
+  }
+  (*figures)["heldout"] = std::move(files);
+  (*figures)["psnr_heldout_db"] = psnr.empty() ? JsonValue() : JsonValue(Mean(psnr));
+  (*figures)["ssim_heldout"] = ssim.empty() ? JsonValue() : JsonValue(Mean(ssim));
+}
+
+StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
+                         const ProgressFunction& progress) {
+  const RunSettings& settings = context->settings;
+  Workspace& workspace = *context->workspace;
+  const Capture capture = ReadCapture(workspace.Path("poses"));
+  const NormalizedScene scene = NormalizeScene(capture);
+  if (!scene.notice.empty()) context->console->Info(scene.notice);
+
+  const std::vector<int> fitted = ViewIndices(capture, settings.run.holdout, false);
+  std::vector<Image> photos;
+  photos.reserve(fitted.size());
+  std::vector<TrainingView> views;
+  for (const int i : fitted) {
+    const CaptureView& view = capture.views[static_cast<size_t>(i)];
+    photos.push_back(ReadWorkingPhoto(view, settings.scene.photo_size));
+    views.push_back(
+        {WorkingCamera(view.camera, settings.scene.photo_size, scene.field_from_world),
+         &photos.back()});
+  }
+
+  FitOptions options = settings.fit;
+  options.seed = settings.run.seed;
+  if (settings.run.reproducible && options.shards == 0) options.shards = kReproducibleShards;
+  FitHooks hooks;
+  hooks.progress = progress;
+  hooks.checkpoint = [&](const FitState& state) {
+    workspace.SaveCheckpoint("reconstruct", inputs, PackFitState(state));
+  };
+  std::optional<FitState> resume;
+  if (const auto bytes = workspace.LoadCheckpoint("reconstruct", inputs))
+    resume = UnpackFitState(*bytes);
+  if (resume) {
+    hooks.resume = &*resume;
+    context->console->Info("reconstruct: goes on from its checkpoint");
+  }
+  const FitResult fit = FitField(views, scene.box, options, hooks);
+
+  WriteFieldFile(workspace.Path("field.npz"), {fit.field, scene.field_from_world});
+  StageOutcome outcome;
+  outcome.outputs = {"field.npz"};
+  outcome.figures["voxels"] = fit.field.geometry->num_voxels();
+  outcome.figures["psnr_train_db"] = fit.psnr_train_db;
+  MeasureHeldOut(context, capture, ReadFieldFile(workspace.Path("field.npz")),
+                 &outcome.figures);
+  return outcome;
+}
+
+}  // namespace
+
+Stage ReconstructStage(RunContext* context) {
+  const RunOptions& run = context->settings.run;
+  Stage stage;
+  stage.name = "reconstruct";
+  stage.inputs = JsonValue::Object{{"poses", context->ResultOf("pose")},
+                                   {"options", context->OptionsOf({"Scene", "Fit"})},
+                                   {"seed", run.seed},
+                                   {"holdout", run.holdout},
+                                   {"effects", run.effects},
+                                   {"reproducible", run.reproducible}};
+  stage.refuse_changes = true;
+  stage.work = [context, inputs = stage.inputs](const ProgressFunction& progress) {
+    return Reconstruct(context, inputs, progress);
+  };
+  return stage;
+}
+
+}  // namespace regrade

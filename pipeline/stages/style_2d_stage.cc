@@ -1,0 +1,49 @@
+// Stage "style_2d": what the 2D method makes of each photo, in views_2d/.
+#include <filesystem>
+
+#include "kernels/image/color_statistics.h"
+#include "pipeline/capture_store.h"
+#include "pipeline/files/image_file.h"
+#include "pipeline/scene_views.h"
+#include "pipeline/stages/run_context.h"
+#include "pipeline/stages/scene_stylizer.h"
+
+namespace regrade {
+namespace {
+
+StageOutcome StyleViews(RunContext* context, const ProgressFunction& progress) {
+  const RunSettings& settings = context->settings;
+  Workspace& workspace = *context->workspace;
+  const Capture capture = ReadCapture(workspace.Path("poses"));
+  const std::unique_ptr<ViewStylizer> stylizer = MakeSceneStylizer(context, capture);
+  for (const std::string& notice : stylizer->Notices()) context->console->Info(notice);
+
+  std::filesystem::remove_all(workspace.Path("views_2d"));
+  const int count = static_cast<int>(capture.views.size());
+  for (int i = 0; i < count; ++i) {
+    if (Report(progress, i, count) == Verdict::kAbort) throw Interrupted();
+    const Image photo =
+        ReadWorkingPhoto(capture.views[static_cast<size_t>(i)], settings.scene.photo_size);
+    WritePng8(workspace.NewPath("views_2d/" + FrameName(i)), stylizer->Stylize(photo, i));
+  }
+  StageOutcome outcome;
+  outcome.outputs = {"views_2d"};
+  outcome.figures["method"] = stylizer->Name();
+  return outcome;
+}
+
+}  // namespace
+
+Stage Style2dStage(RunContext* context) {
+  Stage stage;
+  stage.name = "style_2d";
+  stage.inputs = JsonValue::Object{{"poses", context->ResultOf("pose")},
+                                   {"style", HashFile(context->settings.style.picture)},
+                                   {"options", context->OptionsOf({"Scene", "2D method"})}};
+  stage.work = [context](const ProgressFunction& progress) {
+    return StyleViews(context, progress);
+  };
+  return stage;
+}
+
+}  // namespace regrade

@@ -1,0 +1,79 @@
+#include "pipeline/console.h"
+
+#include <gtest/gtest.h>
+
+#include "kernels/base/random.h"
+#include "pipeline/eta_estimator.h"
+
+namespace regrade {
+namespace {
+
+TEST(Printable, ControlBytesAreEscaped) {
+  EXPECT_EQ(Printable("a\nb\x1b[31m\x7f"), "a\\x0ab\\x1b[31m\\x7f");
+  EXPECT_EQ(Printable("h\xc3\xa9llo \xe2\x82\xac \xf0\x9f\x93\xb7"),
+            "h\xc3\xa9llo \xe2\x82\xac \xf0\x9f\x93\xb7");
+  EXPECT_EQ(Printable("\xff\xc3("), "\\xff\\xc3(");
+  EXPECT_EQ(Printable("\xc2\x9b"
+                      "31m"),
+            "\\xc2\\x9b31m");  // an escape sequence in one character
+  EXPECT_EQ(Printable("\xc0\xaf \xed\xa0\x80"), "\\xc0\\xaf \\xed\\xa0\\x80");
+  EXPECT_EQ(Printable("\xe2\x82"), "\\xe2\\x82");
+}
+
+TEST(MessageFor, SaysAllOnOneLine) {
+  EXPECT_EQ(MessageFor(Error(ExitCode::kInput, "empty file", "a\nb.jpg", "remove it"), "pose"),
+            "a\\x0ab.jpg: empty file. To do: remove it. Kept: pose");
+}
+
+TEST(DurationText, ReadsWell) {
+  EXPECT_EQ(DurationText(8.4), "8 s");
+  EXPECT_EQ(DurationText(61), "1 min 01 s");
+  EXPECT_EQ(DurationText(7400), "2 h 03 min");
+}
+
+// Seconds left against the truth at many moments behind the first fifth; `cost(i)` is what step
+// i of 1000 takes.
+template <typename Cost>
+double WorstFactor(const Cost& cost) {
+  constexpr int kSteps = 1000;
+  double total = 0;
+  for (int i = 0; i < kSteps; ++i) total += cost(i);
+  EtaEstimator eta;
+  double now = 0, worst = 1;
+  for (int i = 0; i < kSteps; ++i) {
+    now += cost(i);
+    eta.Add(now, i + 1, kSteps);
+    if (i < kSteps / 5 || i > kSteps * 98 / 100) continue;
+    const double truth = total - now, estimate = eta.Remaining().value();
+    worst = std::max({worst, truth / estimate, estimate / truth});
+  }
+  return worst;
+}
+
+TEST(EtaEstimator, WithinAFactorOfTwoBehindTheFirstFifth) {
+  EXPECT_LT(WorstFactor([](int) { return 0.1; }), 1.01);
+  // Steps that differ by ten.
+  EXPECT_LT(WorstFactor([](int i) { return 0.02 + 0.2 * RandomDouble(1, 2, i); }), 2);
+  // A slow start.
+  EXPECT_LT(WorstFactor([](int i) { return i < 100 ? 1.0 : 0.1; }), 2);
+  // Steps that grow to three times their cost, as a scene gets denser.
+  EXPECT_LT(WorstFactor([](int i) { return 0.1 + 0.2 * i / 1000; }), 2);
+  // A stall for a checkpoint, now and then.
+  EXPECT_LT(WorstFactor([](int i) { return i % 100 == 99 ? 3.0 : 0.1; }), 2);
+}
+
+TEST(EtaEstimator, SilentWhereItKnowsNothing) {
+  EtaEstimator eta;
+  EXPECT_FALSE(eta.Remaining());
+  eta.Add(0.5, 1, 10);
+  EXPECT_FALSE(eta.Remaining());  // too early
+  eta.Add(5, 1, 0);
+  EXPECT_FALSE(eta.Remaining());  // no total
+  eta.Add(6, 2, 10);
+  EXPECT_TRUE(eta.Remaining());
+  eta.Add(7, 0, 10);  // begun anew
+  EXPECT_FALSE(eta.Remaining());
+}
+
+}  // namespace
+}  // namespace regrade

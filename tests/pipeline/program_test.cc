@@ -1,0 +1,198 @@
+// The built program from outside: exit codes and messages.
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <thread>
+
+#include "kernels/base/child_process.h"
+#include "pipeline/files/json_file.h"
+#include "pipeline/workspace.h"
+#include "tests/support/temporary_folder.h"
+
+namespace regrade {
+namespace {
+
+using testing::TemporaryFolder;
+using testing::WriteText;
+
+struct Outcome {
+  int code = 0;
+  std::string text;
+};
+
+Outcome Regrade(std::vector<std::string> arguments) {
+  ChildOptions options;
+  options.argv = {REGRADE_PROGRAM};
+  options.argv.insert(options.argv.end(), arguments.begin(), arguments.end());
+  options.wall_limit_s = 120;
+  Outcome outcome;
+  const ChildResult result =
+      RunChild(options, [&outcome](const std::string& line) { outcome.text += line + "\n"; });
+  outcome.code = result.end == ChildEnd::kExited ? result.exit_status : 128 + result.signal;
+  return outcome;
+}
+
+#define EXPECT_SAYS(outcome, part) \
+  EXPECT_NE(outcome.text.find(part), std::string::npos) << outcome.text
+
+TEST(Program, HelpAndVersion) {
+  for (const auto& arguments :
+       std::vector<std::vector<std::string>>{{}, {"help"}, {"--help"}, {"-h"}}) {
+    const Outcome outcome = Regrade(arguments);
+    EXPECT_EQ(outcome.code, 0);
+    EXPECT_SAYS(outcome, "reconstruct");
+    EXPECT_EQ(outcome.text.find("tradeoff"), std::string::npos);
+  }
+  EXPECT_SAYS(Regrade({"--version"}), "regrade 0.");
+  const Outcome help = Regrade({"run", "--help"});
+  EXPECT_EQ(help.code, 0);
+  EXPECT_SAYS(help, "--photo-size");
+  EXPECT_SAYS(help, "default 800");
+}
+
+TEST(Program, F18_UsageErrorsExitWith2) {
+  Outcome outcome = Regrade({"recontruct"});
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_SAYS(outcome, "did you mean `regrade reconstruct`?");
+  outcome = Regrade({"pose", "x", "--out", "y", "--treads", "2"});
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_SAYS(outcome, "--threads");
+  EXPECT_EQ(Regrade({"pose", "x", "--out", "y", "--threads", "12abc"}).code, 2);
+  EXPECT_EQ(Regrade({"pose", "--out", "y"}).code, 2);
+  EXPECT_EQ(Regrade({"pose", "a", "b", "--out", "y"}).code, 2);
+  EXPECT_EQ(Regrade({"pose", "a"}).code, 2);
+  EXPECT_EQ(Regrade({"tradeoff"}).code, 2);
+  EXPECT_EQ(Regrade({"synth", "x", "--scene", "moon"}).code, 2);
+}
+
+TEST(Program, F13_MissingFolderExitsWith3) {
+  const TemporaryFolder folder;
+  const Outcome outcome = Regrade({"pose", folder / "none", "--out", folder / "out"});
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_SAYS(outcome, folder / "none");
+  EXPECT_FALSE(std::filesystem::exists(folder / "out"));
+  std::filesystem::create_directories(folder / "empty");
+  EXPECT_EQ(Regrade({"pose", folder / "empty", "--out", folder / "out"}).code, 3);
+}
+
+TEST(Program, F16_StyleIsLookedAtFirst) {
+  const TemporaryFolder folder;
+  WriteText(folder / "photos/a.png", "x");
+  WriteText(folder / "style.jpg", "not a picture");
+  const Outcome outcome = Regrade(
+      {"run", folder / "photos", "--style", folder / "style.jpg", "--out", folder / "out"});
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_SAYS(outcome, "style.jpg");
+  EXPECT_FALSE(std::filesystem::exists(folder / "out"));
+}
+
+TEST(Program, F38_LockedFolderExitsWith7) {
+  const TemporaryFolder folder;
+  WriteText(folder / "photos/a.png", "x");
+  const Workspace workspace(folder / "out");
+  const Outcome outcome = Regrade({"pose", folder / "photos", "--out", folder / "out"});
+  EXPECT_EQ(outcome.code, 7);
+  EXPECT_SAYS(outcome, std::to_string(::getpid()));
+}
+
+TEST(Program, F33_OutputThatIsAFileExitsWith5) {
+  const TemporaryFolder folder;
+  WriteText(folder / "photos/a.png", "x");
+  WriteText(folder / "out", "x");
+  EXPECT_EQ(Regrade({"pose", folder / "photos", "--out", folder / "out"}).code, 5);
+}
+
+TEST(Program, F22_ConfigErrorsNameTheLine) {
+  const TemporaryFolder folder;
+  WriteText(folder / "c.json", "{\"arguments\": [],\n \"options\": {\n  \"sed\": 1}}");
+  Outcome outcome = Regrade({"run", "x", "--config", folder / "c.json"});
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_SAYS(outcome, "c.json:3:");
+  EXPECT_SAYS(outcome, "\"seed\"");
+  WriteText(folder / "c.json", "{\n oops");
+  outcome = Regrade({"run", "x", "--config", folder / "c.json"});
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_SAYS(outcome, "c.json:2:");
+}
+
+TEST(Program, DryRunTouchesNothing) {
+  const TemporaryFolder folder;
+  WriteText(folder / "photos/a.png", "x");
+  const Outcome outcome =
+      Regrade({"pose", folder / "photos", "--out", folder / "out", "--dry-run"});
+  EXPECT_EQ(outcome.code, 0);
+  EXPECT_FALSE(std::filesystem::exists(folder / "out"));
+}
+
+// Starts the program with its output on `fd`; its exit status as a shell has it. Any `signal`
+// is sent once the file `when` exists.
+int Spawn(const std::vector<std::string>& arguments, int fd, int signal = 0,
+          const std::string& when = "") {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    ::dup2(fd, STDOUT_FILENO);
+    ::dup2(fd, STDERR_FILENO);
+    std::vector<char*> argv = {const_cast<char*>(REGRADE_PROGRAM)};
+    for (const std::string& argument : arguments)
+      argv.push_back(const_cast<char*>(argument.c_str()));
+    argv.push_back(nullptr);
+    ::execv(REGRADE_PROGRAM, argv.data());
+    ::_exit(127);
+  }
+  if (signal != 0) {
+    for (int i = 0; i < 1000 && !std::filesystem::exists(when); ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    ::kill(child, signal);
+  }
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+}
+
+TEST(Program, F24_ClosedOutputIsNoReasonToStop) {
+  const TemporaryFolder folder;
+  int ends[2];
+  ASSERT_EQ(::pipe(ends), 0);
+  ::close(ends[0]);
+  EXPECT_EQ(
+      Spawn({"synth", folder / "s", "--views", "2", "--size", "64x48", "--json"}, ends[1]), 0);
+  EXPECT_TRUE(std::filesystem::exists(folder / "s/images/00001.png"));
+  // The exit code is right, too.
+  EXPECT_EQ(Spawn({"pose", folder / "none", "--out", folder / "out"}, ends[1]), 3);
+  ::close(ends[1]);
+}
+
+TEST(Program, F34_DiesByTheSignalThatStoppedIt) {
+  const TemporaryFolder folder;
+  const int null = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
+  for (const int signal : {SIGINT, SIGTERM}) {
+    const std::string out = folder / ("s" + std::to_string(signal));
+    EXPECT_EQ(Spawn({"synth", out, "--views", "9999", "--size", "64x48"}, null, signal,
+                    out + "/images/00000.png"),
+              128 + signal);
+  }
+  ::close(null);
+}
+
+TEST(Program, JsonLinesAreJson) {
+  const TemporaryFolder folder;
+  const Outcome outcome =
+      Regrade({"synth", folder / "s", "--views", "2", "--size", "64x48", "--json"});
+  EXPECT_EQ(outcome.code, 0);
+  int events = 0;
+  size_t begin = 0;
+  for (size_t end; (end = outcome.text.find('\n', begin)) != std::string::npos;
+       begin = end + 1) {
+    const std::string line = outcome.text.substr(begin, end - begin);
+    if (line.empty() || line[0] != '{') continue;  // stderr, for people
+    EXPECT_TRUE(ParseJson(line, "line").At("event").IsString());
+    ++events;
+  }
+  EXPECT_GE(events, 2);
+}
+
+}  // namespace
+}  // namespace regrade

@@ -1,0 +1,359 @@
+#include "pipeline/workspace.h"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <filesystem>
+#include <thread>
+
+#include "pipeline/files/atomic_file.h"
+#include "tests/support/expect_error.h"
+#include "tests/support/temporary_folder.h"
+
+namespace regrade {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::ReadText;
+using testing::TemporaryFolder;
+using testing::WriteText;
+
+JsonValue Inputs(int value) {
+  return JsonValue::Object{{"options", JsonValue::Object{{"fit-rays", value}, {"seed", 1}}}};
+}
+
+// Runs `body` in a child process; its exit status.
+template <typename Body>
+int InChild(const Body& body) {
+  const pid_t child = ::fork();
+  if (child == 0) ::_exit(body());
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+}
+
+TEST(Workspace, FinishedStagesAreKnownAgain) {
+  const TemporaryFolder folder;
+  {
+    Workspace workspace(folder / "out");
+    EXPECT_EQ(workspace.Status("pose", Inputs(1)).state, StageState::kNeverDone);
+    WriteText(workspace.Path("poses/a.bin"), "abc");
+    workspace.Record("pose", Inputs(1), {"poses"}, 2.5, JsonValue::Object{{"points", 7}});
+  }
+  Workspace workspace(folder / "out");
+  EXPECT_EQ(workspace.Status("pose", Inputs(1)).state, StageState::kDone);
+  EXPECT_EQ(workspace.Find("pose")->figures.At("points").AsInt(), 7);
+  EXPECT_EQ(workspace.FinishedStages(), std::vector<std::string>{"pose"});
+  workspace.Forget("pose");
+  EXPECT_EQ(workspace.Status("pose", Inputs(1)).state, StageState::kNeverDone);
+  EXPECT_TRUE(fs::exists(workspace.Path("poses/a.bin")));
+}
+
+TEST(Workspace, F40_DifferencesAreNamed) {
+  const TemporaryFolder folder;
+  Workspace workspace(folder / "out");
+  WriteText(workspace.Path("field.npz"), "abc");
+  workspace.Record("reconstruct", Inputs(4096), {"field.npz"}, 1, JsonValue::Object());
+  const StageStatus status = workspace.Status("reconstruct", Inputs(8192));
+  EXPECT_EQ(status.state, StageState::kInputsDiffer);
+  EXPECT_EQ(status.why, std::vector<std::string>{"options fit-rays: was 4096, now 8192"});
+}
+
+TEST(Workspace, F40_ChangedPhotoSetIsSummarised) {
+  const auto photos = [](std::vector<std::pair<std::string, int>> files) {
+    JsonValue set = JsonValue::Object();
+    for (const auto& [name, hash] : files) set[name] = hash;
+    return JsonValue(JsonValue::Object{{"photos", set}});
+  };
+  EXPECT_EQ(
+      Differences(photos({{"a.jpg", 1}, {"b.jpg", 2}}), photos({{"a.jpg", 1}, {"c.jpg", 3}})),
+      (std::vector<std::string>{"photos b.jpg is gone", "photos c.jpg is new"}));
+  EXPECT_EQ(Differences(photos({{"a.jpg", 1}}), photos({{"a.jpg", 2}})),
+            std::vector<std::string>{"photos a.jpg: was 1, now 2"});
+  std::vector<std::pair<std::string, int>> many;
+  for (int i = 0; i < 100; ++i) many.emplace_back(std::to_string(i), i);
+  const auto differences = Differences(photos({}), photos(many));
+  EXPECT_EQ(differences.size(), 5u);
+  EXPECT_EQ(differences.back(), "and 96 more differences of photos");
+}
+
+TEST(Workspace, F41_EditedAndDeletedResults) {
+  const TemporaryFolder folder;
+  Workspace workspace(folder / "out");
+  WriteText(workspace.Path("poses/a.bin"), "abc");
+  WriteText(workspace.Path("poses/b.bin"), "def");
+  workspace.Record("pose", Inputs(1), {"poses"}, 1, JsonValue::Object());
+  // Same length, and the time stamp of before: only the content tells.
+  const auto time = fs::last_write_time(workspace.Path("poses/a.bin"));
+  WriteText(workspace.Path("poses/a.bin"), "abd");
+  fs::last_write_time(workspace.Path("poses/a.bin"), time);
+  StageStatus status = workspace.Status("pose", Inputs(1));
+  EXPECT_EQ(status.state, StageState::kResultsDiffer);
+  EXPECT_EQ(status.why, std::vector<std::string>{"poses/a.bin has been changed"});
+  WriteText(workspace.Path("poses/a.bin"), "abc");
+  EXPECT_EQ(workspace.Status("pose", Inputs(1)).state, StageState::kDone);
+  fs::remove(workspace.Path("poses/b.bin"));
+  EXPECT_EQ(workspace.Status("pose", Inputs(1)).why,
+            std::vector<std::string>{"poses/b.bin is gone"});
+}
+
+TEST(Workspace, F42_TheFolderCanMove) {
+  const TemporaryFolder folder;
+  {
+    Workspace workspace(folder / "out");
+    WriteText(workspace.Path("poses/a.bin"), "abc");
+    workspace.Record("pose", Inputs(1), {"poses"}, 1, JsonValue::Object());
+    workspace.SaveCheckpoint("reconstruct", Inputs(2), "state");
+    EXPECT_EQ(ReadText(workspace.Path(".regrade/stages/pose.json")).find(folder.path()),
+              std::string::npos);
+  }
+  fs::create_directories(folder / "else where");
+  fs::rename(folder / "out", folder / "else where/moved");
+  Workspace workspace(folder / "else where/moved");
+  EXPECT_EQ(workspace.Status("pose", Inputs(1)).state, StageState::kDone);
+  EXPECT_EQ(workspace.LoadCheckpoint("reconstruct", Inputs(2)), "state");
+}
+
+TEST(Workspace, RecordsOfNewerVersionsAreRefused) {
+  const TemporaryFolder folder;
+  Workspace workspace(folder / "out");
+  WriteText(workspace.Path(".regrade/stages/pose.json"), R"({"schema": 99, "regrade": "7.0"})");
+  EXPECT_REGRADE_ERROR(workspace.Find("pose"), ExitCode::kInput, "written by regrade 7.0");
+}
+
+TEST(Workspace, RecordsCannotLeadOutOfTheFolder) {
+  const TemporaryFolder folder;
+  Workspace workspace(folder / "out");
+  for (const char* path : {"../secret", "/etc/passwd", "a/../../b", "poses/"}) {
+    WriteJsonFile(
+        workspace.Path(".regrade/stages/pose.json"),
+        JsonValue::Object{{"schema", 1},
+                          {"regrade", "x"},
+                          {"inputs", JsonValue::Object()},
+                          {"outputs", JsonValue::Array{JsonValue::Object{
+                                          {"path", path}, {"bytes", 1}, {"hash", "0"}}}},
+                          {"seconds", 1},
+                          {"figures", JsonValue::Object()}});
+    EXPECT_REGRADE_ERROR(workspace.Find("pose"), ExitCode::kInput, "leads out");
+  }
+}
+
+TEST(Workspace, F37_LeftoversAreRemoved) {
+  const TemporaryFolder folder;
+  { const Workspace workspace(folder / "out"); }
+  WriteText(folder / ("out/frames/styled/00001.png" + std::string(kTemporarySuffix)), "half");
+  WriteText(folder / "out/frames/styled/00000.png", "whole");
+  const Workspace workspace(folder / "out");
+  EXPECT_FALSE(
+      fs::exists(folder / ("out/frames/styled/00001.png" + std::string(kTemporarySuffix))));
+  EXPECT_TRUE(fs::exists(folder / "out/frames/styled/00000.png"));
+}
+
+TEST(Workspace, F33_UnusableFoldersAtStart) {
+  const TemporaryFolder folder;
+  WriteText(folder / "file", "x");
+  EXPECT_REGRADE_ERROR(Workspace(folder / "file"), ExitCode::kResources, "file");
+  EXPECT_REGRADE_ERROR(Workspace(folder / "file/below"), ExitCode::kResources, "cannot make");
+  // Root writes anywhere: the rest is for others.
+  if (::geteuid() == 0) {
+    const int code = InChild([&folder] {
+      ::chmod(folder.path().c_str(), 0555);
+      if (::setuid(65534) != 0) return 99;
+      try {
+        Workspace workspace(folder / "new");
+      } catch (const Error& error) {
+        return static_cast<int>(error.code());
+      }
+      return 0;
+    });
+    EXPECT_EQ(code, static_cast<int>(ExitCode::kResources));
+    ::chmod(folder.path().c_str(), 0755);
+  }
+}
+
+TEST(Workspace, OtherPeoplesFilesAreNotOverwritten) {
+  const TemporaryFolder folder;
+  WriteText(folder / "frames/holiday.png", "mine");
+  EXPECT_REGRADE_ERROR(Workspace(folder.path()), ExitCode::kInput, "'frames'");
+  EXPECT_FALSE(fs::exists(folder / ".regrade"));
+}
+
+TEST(Workspace, CheckpointsBelongToTheirInputs) {
+  const TemporaryFolder folder;
+  Workspace workspace(folder / "out");
+  const std::string state("a\0b", 3);
+  workspace.SaveCheckpoint("reconstruct", Inputs(1), state);
+  EXPECT_EQ(workspace.LoadCheckpoint("reconstruct", Inputs(1)), state);
+  EXPECT_EQ(workspace.LoadCheckpoint("reconstruct", Inputs(2)), std::nullopt);
+  EXPECT_EQ(workspace.LoadCheckpoint("stylize", Inputs(1)), std::nullopt);
+  const std::string path = workspace.Path(".regrade/checkpoints/reconstruct");
+  const std::string blob = ReadText(path);
+  for (size_t i = 0; i < blob.size(); ++i) {
+    std::string damaged = blob;
+    damaged[i] ^= 4;
+    WriteText(path, damaged);
+    EXPECT_EQ(workspace.LoadCheckpoint("reconstruct", Inputs(1)), std::nullopt) << i;
+    WriteText(path, blob.substr(0, i));
+    EXPECT_EQ(workspace.LoadCheckpoint("reconstruct", Inputs(1)), std::nullopt) << i;
+  }
+}
+
+TEST(Workspace, FreeSpaceIsLookedAtFirst) {
+  const TemporaryFolder folder;
+  const Workspace workspace(folder / "out");
+  EXPECT_NO_THROW(workspace.RequireFreeSpace(1, "a test"));
+  EXPECT_REGRADE_ERROR(workspace.RequireFreeSpace(uint64_t{1} << 62, "a test"),
+                       ExitCode::kResources, "a test needs");
+}
+
+TEST(FolderLock, F38_SecondRunIsToldWho) {
+  const TemporaryFolder folder;
+  const Workspace workspace(folder / "out");
+  try {
+    const Workspace second(folder / "out");
+    FAIL() << "two runs in one folder";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ExitCode::kFolderInUse);
+    EXPECT_NE(error.what_failed().find(std::to_string(::getpid())), std::string::npos);
+    EXPECT_NE(error.what_failed().find("started 2"), std::string::npos);
+  }
+}
+
+// Twenty processes wait for one starting signal; each that gets in stays until all have tried.
+TEST(FolderLock, F38_OfTwentyAtOnceOneWins) {
+  const TemporaryFolder folder;
+  for (int round = 0; round < 5; ++round) {
+    int gate[2], tried[2], leave[2];
+    ASSERT_EQ(::pipe(gate) | ::pipe(tried) | ::pipe(leave), 0);
+    std::vector<pid_t> children;
+    for (int i = 0; i < 20; ++i) {
+      const pid_t child = ::fork();
+      if (child == 0) {
+        char byte;
+        ::close(gate[1]);
+        ::close(leave[1]);
+        (void)!::read(gate[0], &byte, 1);
+        int code = 0;
+        try {
+          const Workspace workspace(folder / "out");
+          (void)!::write(tried[1], "x", 1);
+          (void)!::read(leave[0], &byte, 1);
+        } catch (const Error& error) {
+          code = static_cast<int>(error.code());
+          (void)!::write(tried[1], "x", 1);
+        }
+        ::_exit(code);
+      }
+      children.push_back(child);
+    }
+    ::close(gate[0]);
+    ::close(leave[0]);
+    ::close(gate[1]);  // go
+    for (int i = 0; i < 20; ++i) {
+      char byte;
+      ASSERT_EQ(::read(tried[0], &byte, 1), 1);
+    }
+    ::close(leave[1]);
+    int winners = 0, refused = 0;
+    for (const pid_t child : children) {
+      int status = 0;
+      ::waitpid(child, &status, 0);
+      winners += WIFEXITED(status) && WEXITSTATUS(status) == 0;
+      refused += WIFEXITED(status) && WEXITSTATUS(status) == 7;
+    }
+    ::close(tried[0]);
+    ::close(tried[1]);
+    EXPECT_EQ(winners, 1);
+    EXPECT_EQ(refused, 19);
+  }
+}
+
+TEST(FolderLock, F38_DeathReleasesIt) {
+  const TemporaryFolder folder;
+  const int code = InChild([&folder] {
+    auto* workspace = new Workspace(folder / "out");  // never destroyed
+    ::kill(::getpid(), SIGKILL);
+    return workspace == nullptr;
+  });
+  EXPECT_EQ(code, 128 + SIGKILL);
+  EXPECT_NO_THROW(Workspace(folder / "out"));
+}
+
+TEST(FolderLock, F39_BreakLock) {
+  const TemporaryFolder folder;
+  const Workspace workspace(folder / "out");
+  // A holder that lives here is not robbed.
+  EXPECT_REGRADE_ERROR(Workspace(folder / "out", true), ExitCode::kFolderInUse, "alive");
+  // One that nobody can ask, as on a network drive, is.
+  WriteText(folder / "out/.regrade/lock",
+            R"({"pid": 1, "host": "elsewhere", "start": "2001-01-01T00:00:00Z"})");
+  EXPECT_REGRADE_ERROR(Workspace(folder / "out"), ExitCode::kFolderInUse, "--break-lock");
+  EXPECT_NO_THROW(Workspace(folder / "out", true));
+}
+
+constexpr size_t kPayload = 2 << 20;
+
+// What is at `path` is one of the payloads, whole.
+bool Whole(const std::string& path) {
+  const std::string text = ReadText(path);
+  return text.size() == kPayload && text.find_first_not_of(text[0]) == std::string::npos;
+}
+
+// Kills a process that rewrites a file for ever, at a random instant; how often it was torn.
+template <typename WriteOnce>
+int TornAfterKills(const std::string& path, int kills, const WriteOnce& write_once) {
+  WriteFileAtomically(path, std::string(kPayload, 'a'));
+  int torn = 0;
+  for (int i = 0; i < kills; ++i) {
+    const pid_t child = ::fork();
+    if (child == 0)
+      for (char c = 'a';; c = static_cast<char>(c == 'z' ? 'a' : c + 1))
+        write_once(path, std::string(kPayload, c));
+    std::this_thread::sleep_for(std::chrono::microseconds(2000 + (i * 7919) % 9000));
+    ::kill(child, SIGKILL);
+    ::waitpid(child, nullptr, 0);
+    torn += !Whole(path);
+  }
+  return torn;
+}
+
+TEST(AtomicFile, F35_KilledAtAnyInstantNothingIsTorn) {
+  const TemporaryFolder folder;
+  EXPECT_EQ(TornAfterKills(folder / "a", 40,
+                           [](const std::string& path, const std::string& text) {
+                             WriteFileAtomically(path, text);
+                           }),
+            0);
+  // The same loop catches a writer that rewrites in place.
+  EXPECT_GT(TornAfterKills(folder / "b", 40,
+                           [](const std::string& path, const std::string& text) {
+                             WriteText(path, text);
+                           }),
+            0);
+}
+
+TEST(AtomicFile, F28_FailedWritesLeaveTheOldFile) {
+  const TemporaryFolder folder;
+  WriteFileAtomically(folder / "a", "old");
+  const int code = InChild([&folder] {
+    ::signal(SIGXFSZ, SIG_IGN);
+    const rlimit limit = {1000, 1000};
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+    try {
+      WriteFileAtomically(folder / "a", std::string(5000, 'x'));
+    } catch (const Error& error) {
+      return error.code() == ExitCode::kResources ? 0 : 1;
+    }
+    return 2;
+  });
+  EXPECT_EQ(code, 0);
+  EXPECT_EQ(ReadText(folder / "a"), "old");
+  EXPECT_FALSE(fs::exists(folder / ("a" + std::string(kTemporarySuffix))));
+}
+
+}  // namespace
+}  // namespace regrade
