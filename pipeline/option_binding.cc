@@ -142,9 +142,9 @@ std::vector<std::string> OptionSet::Parse(const std::vector<std::string>& argume
   po::parsed_options parsed(&description);
   try {
     namespace style = po::command_line_style;
-    // An empty positional description would refuse what is not a flag.
+    // Words that are no flags; without this line they would be refused.
     po::positional_options_description positional;
-    positional.add("", -1);
+    positional.add("word", -1);
     parsed = po::command_line_parser(Words(arguments.begin(), flags_end))
                  .options(description)
                  .positional(positional)
