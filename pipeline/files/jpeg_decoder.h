@@ -1,0 +1,35 @@
+// Decodes JPEG files and counts what libjpeg only warns about: it returns a full-size picture
+// for half a file.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <string_view>
+
+#include "kernels/scene/image.h"
+
+namespace regrade {
+
+struct JpegPicture {
+  Image image;  // as stored (EXIF orientation not applied): 1 channel, or 3 in RGB
+  bool from_cmyk = false;
+  std::string exif;  // the block "Exif\0\0..."; empty if there is none
+  std::string icc;   // the colour profile; empty if there is none
+  // Warnings that mean lost or invented pixels. Remarks about odd headers are not counted.
+  int64_t damage_warnings = 0;
+  std::string first_warning;
+};
+
+// Called with width, height and bytes per pixel from the header, before any pixel is allocated;
+// throws to refuse.
+using SizeCheck = std::function<void(int64_t width, int64_t height, int64_t pixel_bytes)>;
+
+// Throws Error(kInput) for what is no JPEG, is unsupported (12 bits) or has more than
+// kMaxJpegScans scans, each of which would cost a pass over the whole picture.
+JpegPicture DecodeJpeg(std::string_view bytes, const std::string& where,
+                       const SizeCheck& check);
+
+inline constexpr int kMaxJpegScans = 100;  // encoders write about 10
+
+}  // namespace regrade

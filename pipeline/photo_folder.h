@@ -1,0 +1,50 @@
+// From a folder of anything to staged photos: each is decoded once, hardened, and written as a
+// plain upright 8-bit PNG under a name of our own, which is all that later stages see.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "kernels/base/options.h"
+#include "kernels/base/progress.h"
+#include "kernels/scene/capture.h"
+
+namespace regrade {
+
+struct IngestOptions {
+  bool accept_damaged = false;
+  int64_t max_megapixels = 128;
+
+  template <typename Bind>
+  void Describe(Bind& bind) {
+    bind("accept-damaged", accept_damaged,
+         {.help = "keep JPEG photos with lost parts instead of leaving them out"});
+    bind("max-megapixels", max_megapixels,
+         {.unit = "megapixels",
+          .help = "leave larger photos out; one needs 16 bytes a pixel while it is read",
+          .min = 1,
+          .max = 1000});
+  }
+};
+
+struct IngestResult {
+  std::vector<StagedPhoto> photos;     // in natural order of `file`
+  std::vector<PhotoVerdict> verdicts;  // one for each file that is not hidden, same order
+  std::vector<std::string> notices;    // for people, one for each kind of thing that happened
+  int hidden = 0;                      // files and folders whose name begins with a dot
+  // Changes when a used photo's name or pixels change, or their order.
+  std::string fingerprint;
+};
+
+// Photos of `folder` and its subfolders, told by content, as `staging_folder`/00000.png, ... in
+// natural order of names. A photo with alpha is laid over white, its alpha goes beside it as
+// 00007.alpha.png. Files that are no photo, damaged, or the same picture as an earlier one get
+// a verdict and are left out. Staged files of an earlier call that are not of this one are
+// deleted; those that already hold the right pixels are not written again. Three photos are in
+// memory at a time. Throws Error(kInput) when there is no usable photo, Error(kScene) for 1
+// or 2, Error(kResources) when a disk fails, Interrupted.
+IngestResult IngestPhotos(const std::string& folder, const std::string& staging_folder,
+                          const IngestOptions& options, const ProgressFunction& progress);
+
+}  // namespace regrade

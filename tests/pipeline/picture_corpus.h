@@ -1,0 +1,153 @@
+// Pictures and files that a test makes for itself: textured photos, EXIF blocks, scratch
+// folders.
+#pragma once
+
+#include <gtest/gtest.h>
+#include <stdlib.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+
+#include "kernels/base/error.h"
+#include "kernels/base/random.h"
+#include "kernels/scene/image.h"
+#include "pipeline/files/image_file.h"
+
+namespace regrade::testing {
+
+class ScratchFolder {
+ public:
+  ScratchFolder() {
+    std::string name =
+        (std::filesystem::temp_directory_path() / "regrade-test-XXXXXX").string();
+    path_ = ::mkdtemp(name.data());
+  }
+  ~ScratchFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  ScratchFolder(const ScratchFolder&) = delete;
+  ScratchFolder& operator=(const ScratchFolder&) = delete;
+  const std::string& path() const { return path_; }
+  std::string operator/(const std::string& name) const { return path_ + "/" + name; }
+
+ private:
+  std::string path_;
+};
+
+inline void WriteBytes(const std::string& path, const std::string& bytes) {
+  std::filesystem::create_directories(std::filesystem::path(path).parent_path());
+  std::ofstream file(path, std::ios::binary);
+  file << bytes;
+  ASSERT_TRUE(file.good()) << path;
+}
+
+inline std::string ReadBytes(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+// Smooth waves with some grain, different for each seed, values on the 8-bit grid.
+inline Image Photo(int width, int height, uint64_t seed, int channels = 3) {
+  Image image(width, height, channels);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x)
+      for (int c = 0; c < channels; ++c) {
+        const uint64_t counter = (static_cast<uint64_t>(y) * width + x) * channels + c;
+        const double wave = 0.5 + 0.35 * std::sin(0.05 * x * (c + 1) + 0.03 * y + seed);
+        const double value = wave + 0.1 * (RandomDouble(seed, 0, counter) - 0.5);
+        image.at(x, y)[c] = static_cast<float>(std::floor(value * 255 + 0.5) / 255);
+      }
+  return image;
+}
+
+inline std::string Little(uint64_t value, int bytes) {
+  std::string text;
+  for (int i = 0; i < bytes; ++i, value >>= 8) text += static_cast<char>(value & 255);
+  return text;
+}
+
+// An entry of a little-endian TIFF directory; types: 3 short, 4 long, 5 rational.
+inline std::string TiffEntry(int tag, int type, uint32_t count, uint32_t value) {
+  return Little(tag, 2) + Little(type, 2) + Little(count, 4) + Little(value, 4);
+}
+
+// An EXIF block: orientation, focal length in 35 mm film (0: none), else focal length in mm and
+// pixels per cm on the sensor (0: none).
+inline std::string ExifBlock(int orientation, int focal_35mm, int focal_mm = 0,
+                             int sensor_px_per_cm = 0) {
+  std::string tiff = std::string("II*\0", 4) + Little(8, 4);
+  const uint32_t sub = 8 + 2 + 2 * 12 + 4;
+  tiff += Little(2, 2) + TiffEntry(0x0112, 3, 1, orientation) + TiffEntry(0x8769, 4, 1, sub) +
+          Little(0, 4);
+  const uint32_t rationals = sub + 2 + 4 * 12 + 4;
+  tiff += Little(4, 2) + TiffEntry(0x920a, 5, 1, rationals) +
+          TiffEntry(0xa20e, 5, 1, rationals + 8) + TiffEntry(0xa210, 3, 1, 3) +
+          TiffEntry(0xa405, 3, 1, focal_35mm) + Little(0, 4);
+  tiff += Little(focal_mm, 4) + Little(1, 4) + Little(sensor_px_per_cm, 4) + Little(1, 4);
+  return std::string("Exif\0\0", 6) + tiff;
+}
+
+// A JPEG with the segment put behind its first two bytes.
+inline std::string WithSegment(const std::string& jpeg, int marker, const std::string& body) {
+  std::string segment = "\xff";
+  segment += static_cast<char>(marker);
+  segment += static_cast<char>((body.size() + 2) >> 8);
+  segment += static_cast<char>((body.size() + 2) & 255);
+  return jpeg.substr(0, 2) + segment + body + jpeg.substr(2);
+}
+
+// A plain TIFF of floats, `channels` samples a pixel.
+inline std::string FloatTiff(const Image& image) {
+  const std::string data(reinterpret_cast<const char*>(image.pixels.data()),
+                         image.pixels.size() * sizeof(float));
+  constexpr uint32_t kData = 8 + 2 + 10 * 12 + 4;
+  std::string tiff = std::string("II*\0", 4) + Little(8, 4) + Little(10, 2);
+  tiff += TiffEntry(256, 4, 1, image.width) + TiffEntry(257, 4, 1, image.height) +
+          TiffEntry(258, 3, 1, 32) + TiffEntry(259, 3, 1, 1) +
+          TiffEntry(262, 3, 1, image.channels == 1 ? 1 : 2) + TiffEntry(273, 4, 1, kData) +
+          TiffEntry(277, 3, 1, image.channels) + TiffEntry(278, 4, 1, image.height) +
+          TiffEntry(279, 4, 1, static_cast<uint32_t>(data.size())) + TiffEntry(339, 3, 1, 3) +
+          Little(0, 4);
+  return tiff + data;
+}
+
+// What a person would be told; "" if the photo was decoded.
+inline std::string Refusal(const std::string& path, const DecodeLimits& limits = {}) {
+  try {
+    DecodePhoto(path, limits);
+    return "";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ExitCode::kInput);
+    EXPECT_EQ(error.where(), path);
+    return error.what_failed();
+  }
+}
+
+inline bool Contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+inline double MaxDifference(const Image& a, const Image& b) {
+  EXPECT_TRUE(a.SameSize(b) && a.channels == b.channels);
+  if (a.pixels.size() != b.pixels.size()) return 1e9;
+  double worst = 0;
+  for (size_t i = 0; i < a.pixels.size(); ++i)
+    worst = std::max(worst, std::abs(static_cast<double>(a.pixels[i]) - b.pixels[i]));
+  return worst;
+}
+
+// A test with a folder of its own.
+class PictureTest : public ::testing::Test {
+ protected:
+  std::string Put(const std::string& name, const std::string& bytes) {
+    WriteBytes(scratch_ / name, bytes);
+    return scratch_ / name;
+  }
+  ScratchFolder scratch_;
+};
+
+}  // namespace regrade::testing
