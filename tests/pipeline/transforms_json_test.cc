@@ -146,10 +146,12 @@ TEST_F(TransformsJson, F75_HostileJson) {
   // Depth: a bracket for each of a million levels must not reach the stack's end.
   const std::string deep = Refusal("{\"frames\":" + std::string(1000000, '['));
   EXPECT_NE(deep.find("transforms.json:1:"), std::string::npos) << deep;
+  EXPECT_NE(deep.find("64"), std::string::npos) << deep;
   EXPECT_NE(Refusal("{\n\"frames\":[],\n\"frames\":[]}").find(":3:"), std::string::npos);
   Refusal(OneFrame(kPlain, "\xff\xfe.png"));
   Refusal(OneFrame(kPlain, "\\ud800.png"));
-  Refusal(OneFrame(kPlain, "a\\u0000.png"));
+  // Cut at the NUL it would be the name of a picture that is there.
+  EXPECT_EQ(Refusal(OneFrame(kPlain, "a.png\\u0000.jpg")).find("none"), std::string::npos);
   Refusal(OneFrame(R"("fl_x":1e999,"w":64,"h":48)"));
   Refusal(OneFrame(R"("fl_x":NaN,"w":64,"h":48)"));
   Refusal("{\"frames\":[");
