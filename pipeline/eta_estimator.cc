@@ -5,7 +5,7 @@
 namespace regrade {
 namespace {
 
-constexpr double kWindowShare = 1.0 / 3;
+constexpr double kWindowShare = 0.1;      // of the work
 constexpr double kShortestWindow = 3;  // seconds
 constexpr size_t kMostPoints = 512;
 
@@ -19,8 +19,9 @@ void EtaEstimator::Add(double seconds, double done, double total) {
     return;
   }
   points_.push_back({seconds, done});
-  const double window = std::max(kShortestWindow, seconds * kWindowShare);
-  while (points_.size() > 2 && points_[1].seconds <= seconds - window) points_.pop_front();
+  while (points_.size() > 2 && points_[1].seconds <= seconds - kShortestWindow &&
+         points_[1].done <= done - total * kWindowShare)
+    points_.pop_front();
   if (points_.size() > kMostPoints) {  // keep the ends and every other point between
     std::deque<Point> thinned;
     for (size_t i = 0; i < points_.size(); ++i)

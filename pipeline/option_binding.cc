@@ -153,6 +153,7 @@ std::vector<std::string> OptionSet::Parse(const std::vector<std::string>& argume
   } catch (const po::unknown_option& error) {
     std::string typed = error.get_option_name();
     typed.erase(0, typed.find_first_not_of('-'));
+    typed.erase(std::min(typed.find('='), typed.size()));
     const std::string nearest = NearestName(typed, Names());
     throw Error(ExitCode::kUsage, "unknown option", "--" + typed,
                 nearest.empty() ? kSeeHelp : "did you mean --" + nearest + "?");

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <clocale>
+#include <locale>
 
 #include "pipeline/nearest_name.h"
 #include "pipeline/run_settings.h"
@@ -89,6 +90,7 @@ TEST_F(Options, F18_UnknownNamesSuggestTheNearest) {
 
 TEST_F(Options, F18_MissingValuesAndDuplicates) {
   EXPECT_REGRADE_ERROR(Parse({"--rays"}), ExitCode::kUsage, "--rays: its value is missing");
+  EXPECT_REGRADE_ERROR(Parse({"--rays="}), ExitCode::kUsage, "--rays: its value is missing");
   EXPECT_REGRADE_ERROR(Parse({"--rays", "--flag"}), ExitCode::kUsage, "--rays");
   EXPECT_REGRADE_ERROR(Parse({"--rays", "99", "--rays", "99"}), ExitCode::kUsage,
                        "given twice");
@@ -96,7 +98,7 @@ TEST_F(Options, F18_MissingValuesAndDuplicates) {
 }
 
 TEST_F(Options, F19_NumbersThatAreNot) {
-  for (const char* text : {"NaN", "nan", "inf", "-inf", "1e999", "-1e999", "0x10", "12abc", "",
+  for (const char* text : {"NaN", "nan", "inf", "-inf", "1e999", "-1e999", "0x10", "12abc",
                            " 1", "1 ", "1,5", "+1", "1e", "--", "1.5.2", "63", "4194305"})
     EXPECT_REGRADE_ERROR(Parse({std::string("--rays=") + text}), ExitCode::kUsage,
                          "allowed: 64 to 4194304, a whole number");
@@ -112,17 +114,26 @@ TEST_F(Options, F19_NumbersThatAreNot) {
   EXPECT_EQ(sample_.step, 0.1f);
 }
 
+struct CommaDecimals : std::numpunct<char> {
+  char do_decimal_point() const override { return ','; }
+  char do_thousands_sep() const override { return '.'; }
+  std::string do_grouping() const override { return "\3"; }
+};
+
 TEST_F(Options, F20_ACommaLocaleChangesNothing) {
-  // Where the system has none, the environment at least asks for one.
-  const char* set = nullptr;
+  // C's locale where the system has one, and C++'s own in any case.
   for (const char* name : {"de_DE.UTF-8", "de_DE.utf8", "fr_FR.UTF-8"})
-    if (set == nullptr) set = ::setlocale(LC_ALL, name);
-  Parse({"--step", "2.5", "--rate=1e-4"});
+    if (std::setlocale(LC_ALL, name) != nullptr) break;
+  const std::locale before = std::locale::global(std::locale(std::locale(), new CommaDecimals));
+  Parse({"--step", "2.5", "--rate=1e-4", "--rays=100000"});
   EXPECT_EQ(sample_.step, 2.5f);
   EXPECT_EQ(DumpJson(set_.Values().At("rate"), -1), "0.0001");
+  EXPECT_EQ(DumpJson(set_.Values().At("rays"), -1), "100000");
+  EXPECT_EQ(ParseJson("2.5", "text").AsDouble(), 2.5);
   EXPECT_NE(set_.Help().find("default 2.5"), std::string::npos);
-  ::setlocale(LC_ALL, "C");
-  if (set == nullptr) GTEST_SKIP() << "no locale with a decimal comma is installed";
+  EXPECT_REGRADE_ERROR(Parse({"--rays=1"}), ExitCode::kUsage, "64 to 4194304");
+  std::locale::global(before);
+  std::setlocale(LC_ALL, "C");
 }
 
 TEST_F(Options, ValuesFeedBackToTheSameValues) {
