@@ -69,6 +69,7 @@ class Fitter {
     // result.
     Refine(0);
     result_.field = ToRadianceField(state_.grid);
+    result_.field.step = options_.step;
     result_.seconds = SecondsSince(start_) - checkpoint_seconds_;
     result_.psnr_train_db = PsnrOf(tail_error_, tail_rays_);
     return std::move(result_);

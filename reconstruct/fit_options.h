@@ -9,23 +9,23 @@
 namespace regrade {
 
 struct FitOptions {
-  std::vector<int> resolutions = {64, 128, 192};
-  std::vector<int> steps = {600, 900, 900};
-  int rays_per_step = 8192;
-  int patch = 2;
+  std::vector<int> resolutions = {64, 128, 256};
+  std::vector<int> steps = {800, 2000, 3000};
+  int rays_per_step = 4096;
+  int patch = 1;
   int sh_degree = 2;
-  float step = 0.5f;
+  float step = 1.0f;
   float stop_transmittance = 1e-3f;
-  float rate_density = 4.0f;
-  float rate_density_end = 0.3f;
+  float rate_density = 8.0f;
+  float rate_density_end = 1.0f;
   float rate_sh = 6e-2f;
-  float rate_sh_end = 1e-3f;
-  float tv_density = 5e-3f;
-  float tv_sh = 5e-3f;
+  float rate_sh_end = 5e-3f;
+  float tv_density = 1e-2f;
+  float tv_sh = 1e-2f;
   float tv_decay = 0.5f;
-  float tv_share = 0.01f;
-  float prune_weight = 0.3f;
-  float initial_density = 0.1f;
+  float tv_share = 0.03f;
+  float prune_weight = 0.5f;
+  float initial_density = 0.5f;
   int shards = 0;
   uint64_t seed = 0;
 
@@ -58,7 +58,8 @@ struct FitOptions {
          .max = 2});
     bind("fit-step-size", step,
          {.unit = "voxels",
-          .help = "distance of samples along a ray; 1 halves the time of 0.5",
+          .help = "distance of samples along a ray; 0.5 doubles the time of 1 and gained "
+                  "nothing on real photos",
           .min = 0.1,
           .max = 4});
     bind("fit-stop", stop_transmittance,

@@ -63,6 +63,7 @@ struct RadianceField {
   Appearance appearance;
   Vec3f background{0, 0, 0};  // sRGB, seen where transmittance is left
   float near_clip = 0;        // world units along the ray, at render as at fit
+  float step = 0.5f;          // voxels between samples of a ray, at render as at fit
 };
 
 // Throws Error(kInput) naming the defect: sizes that disagree, a link out of range (F68),

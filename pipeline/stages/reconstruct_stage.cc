@@ -2,6 +2,7 @@
 #include <numeric>
 
 #include "evaluate/image_quality.h"
+#include "kernels/field/fast_rays.h"
 #include "kernels/field/render.h"
 #include "pipeline/capture_store.h"
 #include "pipeline/field_file.h"
@@ -26,7 +27,7 @@ void MeasureHeldOut(RunContext* context, const Capture& capture, const StoredFie
                     JsonValue* figures) {
   const RunSettings& settings = context->settings;
   const FastGrid grid = MakeFastGrid(stored.field);
-  const MarchOptions march{settings.fit.step};
+  const MarchOptions march{stored.field.step};
   std::vector<double> psnr, ssim;
   JsonValue::Array files;
   for (const int i : ViewIndices(capture, settings.run.holdout, true)) {

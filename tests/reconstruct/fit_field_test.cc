@@ -63,6 +63,7 @@ class FitField : public ::testing::Test {
     options_.rays_per_step = 1024;
     options_.sh_degree = 1;
     options_.shards = 3;
+    options_.step = 0.5f;
   }
 
   double HeldOutPsnr(const RadianceField& field) const {
