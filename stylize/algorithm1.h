@@ -1,0 +1,86 @@
+// LipRF's Algorithm 1 to the letter, for any scalar: every voxel of the field goes through f.
+// The specification that gradient_aggregation.h is held to; see EQ(liprf-loss) there.
+#pragma once
+
+#include <algorithm>
+#include <vector>
+
+#include "kernels/field/ray_weights.h"
+#include "kernels/field/spherical_harmonics.h"
+#include "kernels/field/trilinear.h"
+#include "stylize/lipschitz_network.h"
+
+namespace regrade {
+
+// L_rec = scale * sum over rays and channels of squared differences, and its gradient by the
+// effective matrices added to `d_effective`. `weights` belong to the rays; directions and
+// targets are [rays]. Not one-sided; every ray counts.
+template <typename T>
+T Algorithm1(const LipschitzNetwork& network, const RadianceField& field,
+             const RayWeights& weights, const std::vector<Vec3<T>>& directions,
+             const std::vector<Vec3<T>>& targets, T scale, DenseNetwork<T>* d_effective) {
+  const Geometry& geometry = *field.geometry;
+  const std::vector<int32_t> vertex = VertexOfVoxel(geometry);
+  const DenseNetwork<T> f = network.Effective<T>();
+  const int64_t n = geometry.num_voxels();
+
+  // 0. feed forward
+  std::vector<T> features(static_cast<size_t>(n) * kNetworkInputs);
+  std::vector<T> sh(static_cast<size_t>(n) * kNetworkSh), d_sh(sh.size());
+  for (int64_t v = 0; v < n; ++v) {
+    float row[kFeatureStride];
+    FillFeatures(field, network.data().position_scale, v, vertex[static_cast<size_t>(v)], row);
+    T* x = &features[static_cast<size_t>(v) * kNetworkInputs];
+    std::copy_n(row, kNetworkInputs, x);
+    T* y = &sh[static_cast<size_t>(v) * kNetworkSh];
+    DenseForward(f, x, y);
+    if (network.data().has_base) AddBaseMap(network.data().base, x, y);
+  }
+
+  // 1. from the loss to the image, and 2. from the image to the coefficients
+  T loss = 0;
+  for (int64_t r = 0; r < weights.num_rays(); ++r) {
+    T gamma[kMaxBasis] = {};
+    ShBasis(field.appearance.basis, directions[static_cast<size_t>(r)], gamma);
+    const int64_t first = weights.first[static_cast<size_t>(r)];
+    const int64_t last = weights.first[static_cast<size_t>(r) + 1];
+    std::vector<Vec3<T>> raw(static_cast<size_t>(last - first));
+    std::vector<Cell<T>> cells;
+    Vec3<T> color =
+        field.background.Cast<T>() * T(weights.transmittance[static_cast<size_t>(r)]);
+    for (int64_t i = first; i < last; ++i) {
+      const WeightedSample& sample = weights.samples[static_cast<size_t>(i)];
+      cells.push_back({sample.vertex, sample.fraction.Cast<T>()});
+      T blend[kNetworkSh];
+      Interpolate(geometry.frame, geometry.links.data(), sh.data(), kNetworkSh, kNetworkSh,
+                  cells.back(), blend);
+      for (int c = 0; c < 3; ++c) {
+        T value = T(0.5);
+        for (int k = 0; k < 9; ++k) value += blend[c * 9 + k] * gamma[k];
+        raw[static_cast<size_t>(i - first)][c] = value;
+        color[c] += T(sample.weight) * std::max(value, T(0));
+      }
+    }
+    const Vec3<T> difference = color - targets[static_cast<size_t>(r)];
+    loss += scale * Dot(difference, difference);
+    for (int64_t i = first; i < last; ++i) {
+      T d_blend[kNetworkSh] = {};
+      for (int c = 0; c < 3; ++c)
+        if (raw[static_cast<size_t>(i - first)][c] > 0)
+          for (int k = 0; k < 9; ++k)
+            d_blend[c * 9 + k] = 2 * scale * difference[c] *
+                                 T(weights.samples[static_cast<size_t>(i)].weight) * gamma[k];
+      InterpolateAdjoint(geometry.frame, geometry.links.data(), kNetworkSh, kNetworkSh,
+                         cells[static_cast<size_t>(i - first)], d_blend, d_sh.data());
+    }
+  }
+
+  // 3. from the coefficients to f
+  for (int64_t v = 0; v < n; ++v)
+    DenseAdjoint(f, &features[static_cast<size_t>(v) * kNetworkInputs],
+                 &d_sh[static_cast<size_t>(v) * kNetworkSh], d_effective,
+                 static_cast<T*>(nullptr));
+  return loss;
+}
+
+}  // namespace regrade

@@ -1,0 +1,53 @@
+#include "stylize/base_map.h"
+
+#include <algorithm>
+
+#include "kernels/field/spherical_harmonics.h"
+#include "kernels/field/trilinear.h"
+
+namespace regrade {
+
+ColorMap LeastSquaresMap(const RadianceField& field, const StyleRays& batch,
+                         const AggregationOptions& options) {
+  const Geometry& geometry = *field.geometry;
+  const int64_t n = static_cast<int64_t>(batch.rays.size());
+  const RayWeights weights = ComputeRayWeights(geometry, {batch.rays.data(), n}, options.march,
+                                               field.near_clip, options.min_weight);
+  const int basis = field.appearance.basis, stride = field.appearance.stride();
+  std::vector<Vec3f> foreground(static_cast<size_t>(n));
+#pragma omp parallel for schedule(dynamic, 64)
+  for (int64_t r = 0; r < n; ++r) {
+    float gamma[kMaxBasis];
+    ShBasis(basis, batch.rays[static_cast<size_t>(r)].direction, gamma);
+    for (int64_t i = weights.first[static_cast<size_t>(r)];
+         i < weights.first[static_cast<size_t>(r) + 1]; ++i) {
+      const WeightedSample& sample = weights.samples[static_cast<size_t>(i)];
+      float sh[3 * kMaxBasis];
+      Interpolate(geometry.frame, geometry.links.data(), field.appearance.sh.data(), stride,
+                  stride, Cell<float>{sample.vertex, sample.fraction}, sh);
+      for (int c = 0; c < 3; ++c) {
+        float value = 0.5f;
+        for (int k = 0; k < basis; ++k) value += sh[c * basis + k] * gamma[k];
+        foreground[static_cast<size_t>(r)][c] += sample.weight * std::max(value, 0.0f);
+      }
+    }
+  }
+  LeastSquaresAccumulator sum;
+  for (int64_t r = 0; r < n; ++r) {
+    const Vec3f& target = batch.targets[static_cast<size_t>(r)];
+    const float transmittance = weights.transmittance[static_cast<size_t>(r)];
+    if (!AllFinite(target) || transmittance > options.max_transmittance) continue;
+    sum.Add(foreground[static_cast<size_t>(r)].Cast<double>(),
+            (target - field.background * transmittance).Cast<double>(), 1, 1 - transmittance);
+  }
+  return sum.Solve();
+}
+
+LipschitzNetwork NetworkOfMap(const ColorMap& map) {
+  LipschitzNetwork network;
+  network.data().has_base = true;
+  network.data().base = map;
+  return network;
+}
+
+}  // namespace regrade

@@ -1,0 +1,116 @@
+// The network that restyles a field's spherical harmonics, and the bound that is promised for
+// it.
+//
+// EQ(liprf-network):  f(s, q) = (A (x) I_9) s + o + g(s, q),
+// s [27] the coefficients of a voxel, channel-major, q [3] its position in the box, scaled to
+// [-position_scale, position_scale]; g is five activated layers of 64 and a linear one, each
+// EQ(lipschitz-layer); A and o carry a colour map into coefficients (LipRF, Lemma 2). LipRF's
+// own network has no colour map: A = 0, o = 0.
+//
+// EQ(liprf-bound):  ||f(x) - f(y)|| <= (||A||_2 + L_act^5 prod_l ||A_l||_2) ||x - y||  for x =
+// (s, q), with ||A_1||_2 that of A_1 diag(sh_scale, 1). Norms are exact singular values, in
+// double, of the stored weights. It bounds coefficients, not rendered colours.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "kernels/base/buffer.h"
+#include "kernels/field/radiance_field.h"
+#include "kernels/network/dense_layer.h"
+#include "kernels/network/fused_mlp.h"
+#include "stylize/linear_map.h"
+
+namespace regrade {
+
+inline constexpr int kNetworkSh = 27;                // coefficients in and out
+inline constexpr int kNetworkInputs = 30;            // and a position
+inline constexpr int kNetworkLayers = 6;             // five activated and the last
+inline constexpr int kFeatureStride = kMlpEndLanes;  // floats of a feature row: 27, 3, zeros
+
+Activation ActivationByName(const std::string& name);  // throws Error(kUsage)
+const char* NameOf(Activation activation);
+
+// Everything that is stored of a network: plain, so that any file format can carry it.
+struct LipschitzNetworkData {
+  std::string activation = "sine";
+  float omega = 1;           // of the sine
+  float sh_scale = 1;        // coefficients are multiplied by it on the way in
+  float position_scale = 1;  // positions, [-1, 1] across the box, are multiplied by it
+  bool has_base = false;     // a colour map is added to the network
+  ColorMap base;
+  std::vector<float> parameters;        // by layer: W [out, in], bias [out], K
+  std::vector<float> singular_vectors;  // by layer: u [out], v [in]
+};
+
+class LipschitzNetwork {
+ public:
+  // Zero weights.
+  LipschitzNetwork();
+  // Throws Error(kInput) for sizes or values that are not a network.
+  explicit LipschitzNetwork(LipschitzNetworkData data);
+
+  const LipschitzNetworkData& data() const { return data_; }
+  LipschitzNetworkData& data() { return data_; }
+
+  static int Outputs(int layer);
+  static int Inputs(int layer);
+  static int64_t NumParameters();
+  float* weight(int layer);  // [Outputs, Inputs]
+  float* bias(int layer);    // [Outputs]
+  float& k(int layer);       // before squareplus
+  const float* weight(int layer) const { return Mutable()->weight(layer); }
+  const float* bias(int layer) const { return Mutable()->bias(layer); }
+  float k(int layer) const { return Mutable()->k(layer); }
+
+  // Power iteration: from the start until it has settled, and one step of it.
+  void WarmUpNorms();
+  void StepNorms();
+
+  // The matrices A_l as they act, input scaling included. For float and double.
+  template <typename T>
+  DenseNetwork<T> Effective() const;
+  // Adds to gradient [NumParameters()] what dL/dA_l, dL/db_l say; u and v are held constant.
+  void AddGradient(const DenseNetwork<double>& d_effective,
+                   std::vector<double>* gradient) const;
+
+  // output [n, kFeatureStride]: coefficients [27] of features [n, kFeatureStride] (see
+  // FillFeatures).
+  void Forward(const float* features, int64_t n, float* output) const;
+  // The same for one row in double, plainly: the specification.
+  void ForwardPlain(const double* features, double* output) const;
+
+  // EQ(liprf-bound), its two parts, and the largest sigma / sigma_hat - 1 of a layer.
+  double BaseNorm() const;
+  double ResidualBound() const;
+  double Bound() const { return BaseNorm() + ResidualBound(); }
+  double NormDrift() const;
+  // sigma_hat of a layer's W, from the running singular vectors.
+  double NormEstimate(int layer) const;
+  // The smallest squareplus(K_l).
+  double SmallestK() const;
+
+ private:
+  LipschitzNetwork* Mutable() const { return const_cast<LipschitzNetwork*>(this); }
+
+  LipschitzNetworkData data_;
+};
+
+// Adds (A (x) I_9) s + o to output [27] for coefficients s [27].
+template <typename T>
+void AddBaseMap(const ColorMap& map, const T* sh, T* output) {
+  T mapped[kNetworkSh];
+  MapCoefficients(map, 9, sh, mapped);
+  for (int i = 0; i < kNetworkSh; ++i) output[i] += mapped[i];
+}
+
+// The vertex of each voxel: the inverse of Geometry::links.
+std::vector<int32_t> VertexOfVoxel(const Geometry& geometry);
+
+// Feature row [kFeatureStride] of a voxel. Coefficients of a smaller basis are padded with
+// zeros, which leaves the bound as it is.
+void FillFeatures(const RadianceField& field, float position_scale, int64_t voxel,
+                  int32_t vertex, float* row);
+
+}  // namespace regrade

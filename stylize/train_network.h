@@ -1,0 +1,171 @@
+// Learning the network that restyles a field from what a 2D method made of each view.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "kernels/base/options.h"
+#include "kernels/base/progress.h"
+#include "kernels/field/radiance_field.h"
+#include "kernels/field/ray_march.h"
+#include "kernels/optimize/adam.h"
+#include "kernels/scene/camera.h"
+#include "kernels/scene/image.h"
+#include "stylize/linear_map.h"
+#include "stylize/lipschitz_network.h"
+
+namespace regrade {
+
+struct TrainNetworkOptions {
+  std::string recipe = "standard";
+  int steps = 300;
+  double rate_first = 7e-4;
+  double rate_last = 7e-6;
+  double lambda = 2e-4;
+  int rays_per_step = 4096;
+  int patch = 8;
+  float min_weight = 1e-3f;
+  std::string base = "best";
+  double bound_factor = 4;
+  float sh_scale = 2;
+  float position_scale = 2;
+  int norm_steps = 20;
+  std::string activation = "sine";
+  float omega = 1;
+  bool no_k_est = false;
+  bool no_regularisation = false;
+  bool spectral_normalisation = false;
+  std::string loss_scale = "mean";
+  uint64_t seed = 0;  // of the run; not an option of this stage
+
+  template <typename Bind>
+  void Describe(Bind& bind) {
+    bind("recipe", recipe,
+         {.help = "standard: a colour map and a bounded residual; paper: LipRF as published",
+          .choices = "standard|paper"});
+    bind("style-steps", steps,
+         {.unit = "steps",
+          .help = "of the style's network; time is proportional",
+          .min = 1,
+          .max = 1e6});
+    bind("style-rate", rate_first, {.help = "first learning rate", .min = 0, .max = 1});
+    bind("style-rate-last", rate_last,
+         {.help = "last learning rate, reached along a cosine", .min = 0, .max = 1});
+    bind("style-lambda", lambda,
+         {.help = "weight of the Lipschitz regularisation against the mean squared error",
+          .min = 0,
+          .max = 1e3});
+    bind("style-rays", rays_per_step,
+         {.unit = "rays",
+          .help = "of a step, in square patches; 0 takes a whole view",
+          .min = 0,
+          .max = 1e8});
+    bind("style-patch", patch,
+         {.unit = "pixels",
+          .help = "side of a patch; larger ones touch fewer voxels a ray, and learn noisier",
+          .min = 1,
+          .max = 1024});
+    bind("style-min-weight", min_weight,
+         {.help =
+              "samples of less weight are dropped while learning: faster, and off by at most "
+              "their sum",
+          .min = 0,
+          .max = 0.1});
+    bind("style-base", base,
+         {.help = "the colour map that the network starts from",
+          .choices = "best|mkl|least-squares|none"});
+    bind("style-bound", bound_factor,
+         {.help = "largest certified Lipschitz bound, in units of K_est; 0 sets no limit",
+          .min = 0,
+          .max = 1e6});
+    bind("style-position-scale", position_scale,
+         {.help = "how strongly the style may vary with position", .min = 0, .max = 100});
+    bind("style-sh-scale", sh_scale,
+         {.help = "how strongly the style may bend with colour; counts in the bound",
+          .min = 0.01,
+          .max = 100});
+    bind("style-norm-steps", norm_steps,
+         {.unit = "steps",
+          .help = "of the power iteration for each step of learning",
+          .min = 1,
+          .max = 1000});
+    bind("style-activation", activation,
+         {.help = "of the hidden layers", .choices = "sine|relu|leaky-relu|sigmoid|tanh"});
+    bind("style-omega", omega,
+         {.help = "frequency of the sine; five layers multiply the bound by its fifth power",
+          .min = 0.01,
+          .max = 100});
+    bind("style-no-k-est", no_k_est, {.help = "ablation: regularise towards 0, not K_est"});
+    bind("style-no-regularisation", no_regularisation,
+         {.help = "ablation: no Lipschitz regularisation"});
+    bind("style-spectral-normalisation", spectral_normalisation,
+         {.help = "ablation: every layer's norm is 1"});
+    bind("style-loss", loss_scale,
+         {.help = "mean over rays and channels, or the paper's sum divided by the voxels",
+          .choices = "mean|sum-over-voxels"});
+  }
+};
+
+// Sets every option that the recipe decides: "standard", or "paper" (LipRF Sec. 5: no colour
+// map, PyTorch's default initialisation, a whole view a step, 300 steps, 1e-2 to 1e-4). Call it
+// before options are read. Throws Error(kUsage) for another name.
+void ApplyStyleRecipe(const std::string& recipe, TrainNetworkOptions* options);
+
+struct StyledTrainingView {
+  Camera camera;
+  const Image* target = nullptr;  // [H, W, 3] sRGB, at the camera's size; may leave [0, 1]
+  const Image* mask = nullptr;    // [H, W, 1] or null: pixels below 0.5 are left out
+  std::string name;               // for messages
+};
+
+// The scene-wide Monge-Kantorovich map from the photos' colours to the styled ones.
+struct SceneColorMap {
+  ColorMap map;
+  double k_est = 0;  // ||M||_2
+};
+
+// All that a resumed run needs; N steps, and N more from here, are bitwise 2N steps.
+struct TrainingState {
+  LipschitzNetworkData network;
+  AdamState adam;
+  int64_t step = 0;  // done
+  double linear_map_mse = 0;
+  int64_t left_out_pixels = 0;
+};
+
+struct TrainingHooks {
+  ProgressFunction progress;
+  std::function<void(const TrainingState&)> checkpoint;  // may be empty
+  int checkpoint_every = 50;                             // steps
+};
+
+struct TrainNetworkResult {
+  LipschitzNetwork network;
+  int64_t steps = 0;              // taken
+  double k_est = 0;               // as used: cut at kLargestKEst
+  double bound = 0;               // LipschitzNetwork::Bound()
+  double slope_observed = 0;      // on the field's voxels
+  double smallest_k = 0;          // of the layers; near 0 a layer is dead
+  double largest_norm_drift = 0;  // of the power iteration, seen while learning
+  double psnr_db = 0;             // of a fixed sample of training rays to the targets, clipped
+  double linear_map_psnr_db = 0;  // the same of the base map alone; 0 without one
+  double mean_touched_voxels = 0;
+  int64_t rejected_steps = 0;   // not finite
+  int64_t left_out_pixels = 0;  // targets that are not finite
+  std::vector<std::string> warnings;
+};
+
+// `resume`, unless null, is a state that a checkpoint hook was given, of the same inputs.
+// Throws Error(kInput) for a target of another size or with more than 1 % of pixels that are
+// not finite, Error(kScene) when two steps in a row are not finite. On kFinish the result so
+// far is returned.
+TrainNetworkResult TrainNetwork(const RadianceField& field,
+                                const std::vector<StyledTrainingView>& views,
+                                const SceneColorMap& scene_map, const MarchOptions& march,
+                                const TrainNetworkOptions& options, const TrainingHooks& hooks,
+                                const TrainingState* resume = nullptr);
+
+}  // namespace regrade
