@@ -53,6 +53,12 @@ std::vector<std::string> KnownOptions() {
           "BundleAdjustment.refine_principal_point"};
 }
 
+// As the real one aborts without a display, when it is not told to leave the GPU alone.
+void NeedsNoGpu(const char* kind) {
+  if (arguments[(Is("new") ? "Feature" : "Sift") + std::string(kind) + ".use_gpu"] != "0")
+    std::abort();
+}
+
 [[noreturn]] void HangForEver() {
   std::printf("working on it\n");
   std::fflush(stdout);
@@ -60,6 +66,7 @@ std::vector<std::string> KnownOptions() {
 }
 
 int Extract() {
+  NeedsNoGpu("Extraction");
   if (Is("flood"))
     for (int i = 0; i < 300000; ++i) std::printf("%0100d\n", i);
   if (Is("diskfull")) std::fprintf(stderr, "SQLite error: database or disk is full\n");
@@ -105,7 +112,10 @@ int Map() {
     (line.rfind("#features ", 0) == 0 ? features = line.substr(10),
      void()                           : names.push_back(line));
   std::printf("Loading matches... %d in 0.000s\n", Is("nomatches") ? 0 : 41);
-  if (Is("nomodel") || Is("nomatches") || Is("plain") || (Is("ladder") && features != "8192")) {
+  const bool too_small =
+      static_cast<int>(names.size()) < std::stoi(arguments["Mapper.min_model_size"]);
+  if (Is("nomodel") || Is("nomatches") || Is("plain") || too_small ||
+      (Is("ladder") && features != "8192")) {
     std::fprintf(stderr, "ERROR: failed to create sparse model\n");
     return 1;
   }
@@ -179,6 +189,7 @@ int main(int argc, char** argv) {
   if (command == "feature_extractor") return Extract();
   if (command == "mapper") return Map();
   if (command == "bundle_adjuster") return Adjust();
+  NeedsNoGpu("Matching");
   std::printf("Matching block [1/1, 1/1] in 0.001s\n");
   return 0;
 }

@@ -1,0 +1,42 @@
+// The installed COLMAP on the quickest real capture, from JPEG files to a judged Capture.
+#include <gtest/gtest.h>
+
+#include "kernels/base/child_process.h"
+#include "kernels/base/error.h"
+#include "pipeline/photo_folder.h"
+#include "reconstruct/poses_from_photos.h"
+#include "reconstruct/scene_checks.h"
+#include "tests/support/data.h"
+#include "tests/support/temporary_folder.h"
+
+namespace regrade {
+namespace {
+
+bool HaveColmap() {
+  try {
+    return RunChild({.argv = {"colmap", "help"}}).Succeeded();
+  } catch (const Error&) {
+    return false;
+  }
+}
+
+// COLMAP does not repeat itself, so the bounds are wide: what a good result must have.
+TEST(RealColmap, Kermit) {
+  REGRADE_NEED_DATA("kermit");
+  if (!HaveColmap()) GTEST_SKIP() << "no colmap here";
+  const testing::TemporaryFolder folder;
+  const IngestResult ingest =
+      IngestPhotos(testing::DataPath("kermit"), folder / "photos", {}, {});
+  PoseReport report;
+  const Capture capture = PosesFromPhotos(ingest.photos, ingest.verdicts, {}, folder / "work",
+                                          folder / "sparse", {}, &report);
+  EXPECT_GE(capture.views.size(), 10u);  // of 11
+  EXPECT_GT(capture.points.size(), 200u);
+  EXPECT_LT(capture.reprojection_px, 0.5);
+  EXPECT_GT(MedianTriangulationAngle(capture), 0.2);
+  // The EXIF focal length, about 660 px, is right to some per cent.
+  EXPECT_NEAR(capture.views[0].camera.fx, 680, 70);
+}
+
+}  // namespace
+}  // namespace regrade
