@@ -25,12 +25,6 @@ double PsnrOf(double squared_error, int64_t rays) {
          std::log10(squared_error / (3.0 * static_cast<double>(std::max<int64_t>(rays, 1))));
 }
 
-// EQ(exponential-rate): rate(p) = begin^(1 - p) end^p, p in [0, 1] the share of all rays
-// already drawn.
-float RateAt(float begin, float end, double p) {
-  return begin <= 0 || end <= 0 ? 0.0f : static_cast<float>(begin * std::pow(end / begin, p));
-}
-
 class Fitter {
  public:
   Fitter(const std::vector<TrainingView>& views, const SceneBox& box, const FitOptions& options,
@@ -146,8 +140,9 @@ class Fitter {
     }
 
     RmspropOptions optimizer;
-    optimizer.rate_sh = RateAt(options_.rate_sh, options_.rate_sh_end, p);
-    optimizer.rate_density = RateAt(options_.rate_density, options_.rate_density_end, p);
+    optimizer.rate_sh = ExponentialRate(options_.rate_sh, options_.rate_sh_end, p);
+    optimizer.rate_density =
+        ExponentialRate(options_.rate_density, options_.rate_density_end, p);
     constexpr int64_t kChunk = 2048;
     std::vector<std::pair<int, int64_t>> chunks;
     for (int s = 0; s < shards; ++s)
@@ -235,6 +230,11 @@ class Fitter {
 };
 
 }  // namespace
+
+float ExponentialRate(float begin, float end, double p) {
+  if (begin <= 0 || end <= 0) return 0;
+  return static_cast<float>(begin * std::pow(static_cast<double>(end) / begin, p));
+}
 
 FitResult FitField(const std::vector<TrainingView>& views, const SceneBox& box,
                    const FitOptions& options, const FitHooks& hooks) {

@@ -53,6 +53,9 @@ struct FitHooks {
   std::function<void(const FitState&)> checkpoint;
 };
 
+// EQ(exponential-rate): rate(p) = begin^(1 - p) end^p, p in [0, 1] the share of all steps done.
+float ExponentialRate(float begin, float end, double p);
+
 // Throws Error(kScene) if the field comes out empty, Interrupted after kAbort (the checkpoint
 // has been called).
 FitResult FitField(const std::vector<TrainingView>& views, const SceneBox& box,

@@ -85,6 +85,18 @@ TEST(RayMarch, H74_TwoHalvesCoverTheBox) {
   EXPECT_GT(hits, 90000);
 }
 
+TEST(GridFrame, WorldAndGridAreInverse) {
+  const GridFrame frame{{5, 9, 3}, {0.5f, -1, 2}, {1, 2, 0.5f}};
+  for (const Vec3f g : {Vec3f{0, 0, 0}, Vec3f{4, 8, 2}, Vec3f{-0.5f, 8.5f, 1.25f}}) {
+    const Vec3f world = frame.WorldOf(g);
+    for (int a = 0; a < 3; ++a)
+      EXPECT_NEAR(world[a] * frame.Scale()[a] + frame.Offset()[a], g[a], 1e-5);
+  }
+  // The box's faces lie half a voxel outside the outermost vertices.
+  EXPECT_NEAR(frame.WorldOf({-0.5f, 0, 0}).x, -0.5, 1e-6);
+  EXPECT_NEAR(frame.WorldOf({4.5f, 0, 0}).x, 1.5, 1e-6);
+}
+
 TEST(RayMarch, H66_FarOriginNeitherLoopsNorDrifts) {
   const GridRay<float> ray =
       ClipToGrid<float>(UnitFrame(8), {{-1e8f, 4, 4}, {1, 0, 0}}, 0.0f, 1e-3f);

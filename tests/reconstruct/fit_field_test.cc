@@ -133,6 +133,13 @@ TEST_F(FitField, H109_H110_AResumedFitIsTheUndisturbedOne) {
   }
 }
 
+TEST(ExponentialRate, RunsFromBeginToEnd) {
+  EXPECT_FLOAT_EQ(ExponentialRate(8, 0.5f, 0), 8);
+  EXPECT_FLOAT_EQ(ExponentialRate(8, 0.5f, 0.5), 2);
+  EXPECT_FLOAT_EQ(ExponentialRate(8, 0.5f, 1), 0.5f);
+  EXPECT_EQ(ExponentialRate(0, 0.5f, 0.5), 0);
+}
+
 TEST_F(FitField, H85_PruningEverythingIsAnError) {
   options_.prune_weight = 100;
   try {

@@ -1,0 +1,134 @@
+// Total variation and the optimizer's step over voxel records, compiled once an instruction
+// set.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "kernels/field/fast_record_simd.h"
+
+namespace regrade::REGRADE_SIMD_NAMESPACE {
+namespace {
+
+// See EQ(total-variation) in total_variation.h. Lanes run side by side; the density lane sees
+// an empty neighbour as 0, the others see their own value there.
+template <int kBasis>
+void TotalVariation(const FastGrid& grid, int64_t begin, int64_t end, float scale_density,
+                    float scale_sh, GradientArena* arena) {
+  using R = Record<kBasis>;
+  using Shape = RecordShape<kBasis>;
+  using Vector = typename Shape::Vector;
+  constexpr int kLanes = Shape::kLanes;
+  alignas(64) float scale_lanes[kLanes] = {}, density_mask[kLanes] = {};
+  for (int l = 0; l < 3 * kBasis; ++l) scale_lanes[l] = scale_sh;
+  scale_lanes[DensityLane(kBasis)] = scale_density;
+  density_mask[DensityLane(kBasis)] = 1;
+  const R scale = R::Load(scale_lanes), only_density = R::Load(density_mask);
+  const Vec3i n = grid.frame.resolution;
+  const int64_t strides[3] = {static_cast<int64_t>(n.y) * n.z, n.z, 1};
+  ReserveSlots(arena, 4 * (end - begin), kLanes);
+  for (int64_t vertex = begin; vertex < end; ++vertex) {
+    const int32_t link = grid.links[vertex];
+    if (link < 0) continue;
+    const int64_t at[3] = {vertex / strides[0], vertex / strides[1] % n.y, vertex % n.z};
+    const R own = R::Load(grid.records.data() + static_cast<int64_t>(link) * kLanes);
+    int32_t neighbour[3];
+    R difference[3];
+    for (int a = 0; a < 3; ++a) {
+      const bool inside = at[a] + 1 < n[a];
+      neighbour[a] = inside ? grid.links[vertex + strides[a]] : -1;
+      const float axis = static_cast<float>(n[a]) / 256.0f;
+      if (neighbour[a] >= 0) {
+        const R other =
+            R::Load(grid.records.data() + static_cast<int64_t>(neighbour[a]) * kLanes);
+        for (int i = 0; i < Shape::kCount; ++i)
+          difference[a].v[i] = axis * (other.v[i] - own.v[i]);
+      } else {
+        // Beyond the box nothing is compared; an empty voxel inside has density 0.
+        const float missing = inside ? -axis : 0.0f;
+        for (int i = 0; i < Shape::kCount; ++i)
+          difference[a].v[i] = missing * only_density.v[i] * own.v[i];
+      }
+    }
+    float* own_slot = SlotOf(arena, link, kLanes);
+    R factor[3], d_own = R::Zero();
+    for (int i = 0; i < Shape::kCount; ++i) {
+      Vector sum = difference[0].v[i] * difference[0].v[i] +
+                   difference[1].v[i] * difference[1].v[i] +
+                   difference[2].v[i] * difference[2].v[i] + 1e-9f;
+      Vector root{};
+      for (int l = 0; l < Shape::kWidth; ++l) root[l] = std::sqrt(sum[l]);
+      const Vector inverse = scale.v[i] / root;
+      for (int a = 0; a < 3; ++a) {
+        const float axis = static_cast<float>(n[a]) / 256.0f;
+        factor[a].v[i] = axis * difference[a].v[i] * inverse;
+        d_own.v[i] -= factor[a].v[i];
+      }
+    }
+    for (int i = 0; i < Shape::kCount; ++i)
+      *reinterpret_cast<Vector*>(own_slot + i * Shape::kWidth) += d_own.v[i];
+    for (int a = 0; a < 3; ++a) {
+      if (neighbour[a] < 0) continue;
+      float* slot = SlotOf(arena, neighbour[a], kLanes);
+      for (int i = 0; i < Shape::kCount; ++i)
+        *reinterpret_cast<Vector*>(slot + i * Shape::kWidth) += factor[a].v[i];
+    }
+  }
+}
+
+template <int kBasis>
+int64_t Step(FastGrid* grid, float* second_moment, const GradientArena* arenas, int num_arenas,
+             int self, int64_t begin, int64_t end, const RmspropOptions& options) {
+  using R = Record<kBasis>;
+  using Shape = RecordShape<kBasis>;
+  using Vector = typename Shape::Vector;
+  constexpr int kLanes = Shape::kLanes;
+  alignas(64) float rate_lanes[kLanes] = {};
+  for (int l = 0; l < 3 * kBasis; ++l) rate_lanes[l] = options.rate_sh;
+  rate_lanes[DensityLane(kBasis)] = options.rate_density;
+  const R rate = R::Load(rate_lanes);
+  int64_t rejected = 0;
+  for (int64_t slot = begin; slot < end; ++slot) {
+    const int32_t voxel = arenas[self].voxel_of_slot[slot];
+    bool mine = true;
+    for (int other = 0; other < self; ++other)
+      mine = mine && arenas[other].slot_of_voxel[voxel] < 0;
+    if (!mine) continue;
+    R g = R::Load(arenas[self].gradient.data() + slot * kLanes);
+    for (int other = self + 1; other < num_arenas; ++other) {
+      const int32_t other_slot = arenas[other].slot_of_voxel[voxel];
+      if (other_slot < 0) continue;
+      const R more =
+          R::Load(arenas[other].gradient.data() + static_cast<int64_t>(other_slot) * kLanes);
+      for (int i = 0; i < Shape::kCount; ++i) g.v[i] += more.v[i];
+    }
+    // One sum is finite only if all lanes and their squares are.
+    Vector check{};
+    for (int i = 0; i < Shape::kCount; ++i) check += g.v[i] * g.v[i];
+    float total = 0;
+    for (int l = 0; l < Shape::kWidth; ++l) total += check[l];
+    if (!std::isfinite(total)) {
+      ++rejected;
+      continue;
+    }
+    float* values = grid->records.data() + static_cast<int64_t>(voxel) * kLanes;
+    float* moments = second_moment + static_cast<int64_t>(voxel) * kLanes;
+    const R v = R::Load(moments), x = R::Load(values);
+    R new_v, new_x;
+    for (int i = 0; i < Shape::kCount; ++i) {
+      const Vector squared = g.v[i] * g.v[i];
+      const Vector blended = options.beta * v.v[i] + (1 - options.beta) * squared;
+      new_v.v[i] = v.v[i] == 0.0f ? squared : blended;
+      Vector root{};
+      for (int l = 0; l < Shape::kWidth; ++l) root[l] = std::sqrt(new_v.v[i][l]);
+      new_x.v[i] = x.v[i] - rate.v[i] * g.v[i] / (root + options.epsilon);
+    }
+    new_v.Store(moments);
+    new_x.Store(values);
+    grid->dense_density[grid->vertex_of_voxel[voxel]] = values[DensityLane(kBasis)];
+  }
+  return rejected;
+}
+
+}  // namespace
+}  // namespace regrade::REGRADE_SIMD_NAMESPACE

@@ -1,0 +1,91 @@
+// Total variation: one function for value and gradient, and the fast path's beside it (H97,
+// H98).
+#include "kernels/field/total_variation.h"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "kernels/field/fast_rays.h"
+#include "tests/support/small_field.h"
+
+namespace regrade {
+namespace {
+
+TEST(TotalVariation, H97_GradientIsTheValuesDerivative) {
+  const RadianceField field =
+      testing::RandomField({5, 6, 7}, 1, 0.7, 91);  // voxels are no cubes (H98)
+  const Geometry& g = *field.geometry;
+  for (const bool empty_is_zero : {false, true}) {
+    std::vector<double> values(g.density.begin(), g.density.end());
+    std::vector<double> gradient(values.size());
+    const auto value = [&] {
+      return TotalVariation<double>(g.frame, g.links.data(), values.data(), 1, 0, empty_is_zero,
+                                    0, g.frame.NumVertices(), 1.0, nullptr);
+    };
+    TotalVariation<double>(g.frame, g.links.data(), values.data(), 1, 0, empty_is_zero, 0,
+                           g.frame.NumVertices(), 1.0, gradient.data());
+    for (size_t i = 0; i < values.size(); ++i) {
+      const double x = values[i];
+      const auto central = [&](double h) {
+        values[i] = x + h;
+        const double up = value();
+        values[i] = x - h;
+        const double down = value();
+        values[i] = x;
+        return (up - down) / (2 * h);
+      };
+      EXPECT_NEAR((4 * central(1e-4) - central(2e-4)) / 3, gradient[i],
+                  1e-8 * (1 + std::abs(gradient[i])));
+    }
+  }
+}
+
+TEST(TotalVariation, H97_ConstantAndShiftedFields) {
+  RadianceField field = testing::RandomField({6, 6, 6}, 1, 1.0, 92);
+  const Geometry& g = *field.geometry;
+  const int64_t n = g.frame.NumVertices();
+  std::vector<double> values(static_cast<size_t>(n), 3.5), gradient(values.size());
+  const double flat = TotalVariation<double>(g.frame, g.links.data(), values.data(), 1, 0, true,
+                                             0, n, 1.0, gradient.data());
+  EXPECT_NEAR(flat, static_cast<double>(n) * std::sqrt(kVariationEpsilon), 1e-9);
+  for (const double d : gradient) EXPECT_EQ(d, 0.0);
+  // A bump in the inside weighs the same wherever it is.
+  const auto bump_at = [&](int x, int y, int z) {
+    std::vector<double> bump(static_cast<size_t>(n));
+    bump[static_cast<size_t>(g.links[g.frame.Vertex(x, y, z)])] = 1;
+    return TotalVariation<double>(g.frame, g.links.data(), bump.data(), 1, 0, true, 0, n, 1.0,
+                                  nullptr);
+  };
+  EXPECT_NEAR(bump_at(2, 2, 2), bump_at(3, 2, 3), 1e-12);
+}
+
+TEST(TotalVariation, FastPathEqualsThePlainOne) {
+  for (const char* name : {"baseline", "avx2", "avx512"}) {
+    const FastRayFunctions* functions = FastRaysFor(name);
+    if (functions == nullptr) continue;
+    for (const int basis : {1, 4, 9}) {
+      const FastGrid grid = MakeFastGrid(testing::RandomField({7, 5, 6}, basis, 0.6, 93));
+      GradientArena arena;
+      arena.Reset(grid.num_voxels(), grid.lanes());
+      const int64_t begin = 13, end = 190;
+      functions->total_variation(grid, begin, end, 0.7f, 0.2f, &arena);
+      std::vector<float> plain(static_cast<size_t>(grid.records.size()));
+      for (int lane = 0; lane <= DensityLane(basis); ++lane) {
+        const bool density = lane == DensityLane(basis);
+        TotalVariation<float>(grid.frame, grid.links.data(), grid.records.data(), grid.lanes(),
+                              lane, density, begin, end, density ? 0.7f : 0.2f, plain.data());
+      }
+      for (int64_t v = 0; v < grid.num_voxels(); ++v) {
+        const int32_t slot = arena.slot_of_voxel[v];
+        for (int lane = 0; lane <= DensityLane(basis); ++lane)
+          ASSERT_NEAR(slot < 0 ? 0.0f : arena.gradient[slot * grid.lanes() + lane],
+                      plain[static_cast<size_t>(v * grid.lanes() + lane)], 2e-6)
+              << name << " basis " << basis;
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace regrade
