@@ -5,6 +5,7 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -128,6 +129,15 @@ void Console::Say(const std::string& text, bool warning) {
 }
 
 void Console::Info(const std::string& text) { Say(text, false); }
+
+void Console::Lines(const std::string& text) {
+  size_t begin = 0;
+  while (begin < text.size()) {
+    const size_t end = std::min(text.find('\n', begin), text.size());
+    Say(text.substr(begin, end - begin), false);
+    begin = end + 1;
+  }
+}
 
 void Console::Warn(const std::string& text) {
   Say(text, true);

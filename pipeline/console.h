@@ -36,6 +36,8 @@ class Console {
   void OpenLog(const std::string& path);
 
   void Info(const std::string& text);
+  // A text of our own making with line breaks, such as a table.
+  void Lines(const std::string& text);
   void Warn(const std::string& text);
   void Fail(const Error& error);
   void Fail(const std::string& text, ExitCode code);

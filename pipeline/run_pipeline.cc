@@ -12,11 +12,13 @@ struct Milestone {
 };
 
 // photos --pose--> capture --reconstruct--> field
-// capture + style --style_2d--> views
+// capture + style --style_2d--> styled views;  field + styled views --stylize--> styled field
+// both fields --render--> frames, films --evaluate--> figures --report--> report.json,
+// report.html
 constexpr Milestone kRoad[] = {
-    {"pose", PoseStage},
-    {"reconstruct", ReconstructStage},
-    {"style_2d", Style2dStage},
+    {"pose", PoseStage},       {"reconstruct", ReconstructStage}, {"style_2d", Style2dStage},
+    {"stylize", StylizeStage}, {"render", RenderStage},           {"evaluate", EvaluateStage},
+    {"report", ReportStage},
 };
 
 const Milestone* Find(const std::string& name) {

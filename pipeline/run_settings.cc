@@ -13,22 +13,25 @@ void RunSettings::Bind(OptionSet* options) {
   options->Add("Fit", &fit);
   options->Add("Style", &style);
   options->Add("2D method", &style_2d);
+  options->Add("Network", &network);
+  options->Add("Render", &render);
+  options->Add("Evaluation", &consistency);
   options->Add("Program", &program);
 }
 
 void ApplyPreset(const std::string& preset, RunSettings* settings) {
   settings->run.preset = preset;
+  ApplyStyleRecipe(preset == "paper" ? "paper" : "standard", &settings->network);
   if (preset == "standard") return;  // what the structs say themselves
   if (preset == "draft") {
-    settings->scene.photo_size = 400;
-    settings->fit.resolutions = {48, 96};
-    settings->fit.steps = {400, 600};
-    settings->fit.rays_per_step = 4096;
-    settings->fit.sh_degree = 1;
+    settings->scene.photo_size = 480;
+    settings->fit.resolutions = {64, 128, 192};
+    settings->fit.steps = {400, 1000, 600};
   } else if (preset == "best") {
     settings->scene.photo_size = 1280;
     settings->fit.resolutions = {96, 192, 320};
     settings->fit.steps = {2000, 3000, 4000};
+    settings->network.steps = 600;
   } else if (preset == "paper") {
     // svox2's configuration for captures of one's own; LipRF's recipe for the style.
     settings->scene.photo_size = 1280;
@@ -36,11 +39,28 @@ void ApplyPreset(const std::string& preset, RunSettings* settings) {
     settings->fit.steps = {25600, 25600, 51200};
     settings->fit.rays_per_step = 5000;
     settings->fit.patch = 1;
+    settings->fit.step = 0.5f;
     settings->fit.stop_transmittance = 1e-7f;
+    settings->fit.rate_density = 30;
+    settings->fit.rate_density_end = 1.5f;
+    settings->fit.rate_sh = 1e-2f;
+    settings->fit.rate_sh_end = 4e-4f;
+    settings->fit.tv_density = settings->fit.tv_sh = 5e-3f;
+    settings->fit.tv_share = 0.01f;
+    settings->fit.prune_weight = 1.28f;
+    settings->fit.initial_density = 0.1f;
   } else {
     throw Error(ExitCode::kUsage, "'" + preset + "' is not allowed", "--preset",
                 "allowed: draft, standard, paper, best");
   }
+}
+
+void CheckTogether(const RunSettings& settings) {
+  const size_t grids = settings.fit.resolutions.size(), steps = settings.fit.steps.size();
+  if (grids != steps)
+    throw Error(ExitCode::kUsage,
+                std::to_string(grids) + " stages against " + std::to_string(steps),
+                "--fit-resolutions and --fit-steps", "give both the same number of stages");
 }
 
 }  // namespace regrade

@@ -3,12 +3,14 @@
 
 #include <string>
 
+#include "evaluate/consistency.h"
 #include "pipeline/option_binding.h"
 #include "pipeline/photo_folder.h"
 #include "pipeline/run_options.h"
 #include "reconstruct/fit_options.h"
 #include "reconstruct/poses_from_photos.h"
 #include "stylize/color_transfer.h"
+#include "stylize/train_network.h"
 
 namespace regrade {
 
@@ -35,6 +37,15 @@ struct StyleSource {
   }
 };
 
+struct RenderOptions {
+  double fps = 12;
+
+  template <typename Bind>
+  void Describe(Bind& bind) {
+    bind("fps", fps, {.unit = "frames/s", .help = "pace of the films", .min = 1, .max = 240});
+  }
+};
+
 struct RunSettings {
   ProgramOptions program;
   StartOptions start;
@@ -45,13 +56,19 @@ struct RunSettings {
   FitOptions fit;
   StyleSource style;
   StyleOptions style_2d;
+  TrainNetworkOptions network;
+  RenderOptions render;
+  ConsistencyOptions consistency;
 
   // Groups as they head the help and name parts of fingerprints.
   void Bind(OptionSet* options);
 };
 
-// Sets what a preset decides, before single options are read: "draft", "standard", "paper",
-// "best". Throws Error(kUsage) for another name.
+// Sets what a preset and, within it, a recipe decide, before single options are read: "draft",
+// "standard", "paper", "best". Throws Error(kUsage) for another name.
 void ApplyPreset(const std::string& preset, RunSettings* settings);
+
+// Options that are fine alone and contradict each other: Error(kUsage) naming both.
+void CheckTogether(const RunSettings& settings);
 
 }  // namespace regrade

@@ -28,7 +28,10 @@ size_t PlaceOf(const std::string& stage) {
 
 void StageRunner::RestartFrom(const std::string& stage) {
   if (stage.empty()) return;
-  if (dry_run_) return;
+  if (dry_run_) {
+    planned_restart_ = stage;
+    return;
+  }
   workspace_->Forget(stage);
   ForgetAfter(stage);
 }
@@ -39,6 +42,10 @@ void StageRunner::ForgetAfter(const std::string& stage) {
 }
 
 bool StageRunner::Run(const Stage& stage) {
+  if (stage.name == planned_restart_) {
+    console_->Info(stage.name + ": would be done again");
+    return false;
+  }
   const StageStatus status = workspace_->Status(stage.name, stage.inputs);
   if (status.state == StageState::kDone) {
     console_->Info(stage.name + ": done before");

@@ -55,6 +55,7 @@ class StageRunner {
   Workspace* workspace_;
   Console* console_;
   bool dry_run_ = false;
+  std::string planned_restart_;  // in a dry run nothing is forgotten
 };
 
 }  // namespace regrade

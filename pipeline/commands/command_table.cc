@@ -9,6 +9,12 @@ const std::vector<Command>& AllCommands() {
       {"pose", "PHOTOS --out DIR [OPTIONS]", "finds where each photo was taken", RunRoad},
       {"reconstruct", "PHOTOS|CAPTURE --out DIR [OPTIONS]",
        "fits a radiance field to the photos", RunRoad},
+      {"stylize", "DIR --style PICTURE [OPTIONS]",
+       "gives a finished reconstruction another style, and measures it", RunFolder},
+      {"render", "DIR [OPTIONS]", "renders and measures a styled scene again", RunFolder},
+      {"evaluate",
+       "DIR [OPTIONS] | --frames DIR [--reference DIR] [--target DIR] [--style PICTURE]",
+       "measures consistency and fidelity, of a run or of any program's frames", RunEvaluate},
       {"synth", "OUT [OPTIONS]", "writes a synthetic capture with its exact truth", RunSynth},
       {"doctor", "[OPTIONS]", "what is installed, and what will run where", RunDoctor},
   };

@@ -71,6 +71,7 @@ void RunRoad(const Command& command, const Arguments& arguments, Console* consol
   if (settings.run.out.empty())
     throw Error(ExitCode::kUsage, "its value is missing", "--out",
                 "name the folder that the results shall go to");
+  CheckTogether(settings);
   CheckDevice(settings.run.device);
   ApplyProgramOptions(settings.program);
   context.source = Absolute(words[0]);
@@ -87,6 +88,9 @@ void RunRoad(const Command& command, const Arguments& arguments, Console* consol
   Workspace workspace(settings.run.out, settings.start.break_lock);
   context.workspace = &workspace;
   console->OpenLog(workspace.Path(".regrade/log.txt"));
+  // Later commands over this folder start from its options, also after an interruption.
+  const bool first_start = !std::filesystem::exists(workspace.Path("run.json"));
+  if (first_start && !settings.start.dry_run) WriteRunFile(name, context);
   RunPipeline("pose", last, &context);
   if (!settings.start.dry_run) WriteRunFile(name, context);
 }

@@ -36,5 +36,9 @@ struct RunContext {
 Stage PoseStage(RunContext* context);
 Stage ReconstructStage(RunContext* context);
 Stage Style2dStage(RunContext* context);
+Stage StylizeStage(RunContext* context);
+Stage RenderStage(RunContext* context);
+Stage EvaluateStage(RunContext* context);
+Stage ReportStage(RunContext* context);
 
 }  // namespace regrade

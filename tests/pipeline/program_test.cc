@@ -68,6 +68,14 @@ TEST(Program, F18_UsageErrorsExitWith2) {
   EXPECT_EQ(Regrade({"synth", "x", "--scene", "moon"}).code, 2);
 }
 
+TEST(Program, F21_ContradictionsNameBoth) {
+  const Outcome outcome = Regrade(
+      {"reconstruct", "x", "--out", "y", "--fit-resolutions", "32", "--fit-steps", "9,9"});
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_SAYS(outcome, "--fit-resolutions");
+  EXPECT_SAYS(outcome, "--fit-steps");
+}
+
 TEST(Program, F13_MissingFolderExitsWith3) {
   const TemporaryFolder folder;
   const Outcome outcome = Regrade({"pose", folder / "none", "--out", folder / "out"});

@@ -1,0 +1,106 @@
+// Stage "report": report.json with every number, and one page to look at.
+#include <algorithm>
+#include <filesystem>
+
+#include "pipeline/capture_store.h"
+#include "pipeline/files/atomic_file.h"
+#include "pipeline/files/image_file.h"
+#include "pipeline/memory.h"
+#include "pipeline/report_html.h"
+#include "pipeline/report_json.h"
+#include "pipeline/report_records.h"
+#include "pipeline/scene_views.h"
+#include "pipeline/stages/run_context.h"
+
+namespace regrade {
+namespace {
+
+constexpr int kPagePictures = 5;  // viewpoints shown
+constexpr int kJpegQuality = 85;
+
+std::optional<ReportPicture> PictureAt(const std::string& path) {
+  if (!std::filesystem::exists(path)) return std::nullopt;
+  const Image image = ReadImage(path);
+  if (image.channels != 3) return std::nullopt;
+  return ReportPicture{EncodeJpeg(image, kJpegQuality), image.width, image.height};
+}
+
+PhotosReport PhotosOf(const Capture& capture) {
+  PhotosReport photos;
+  photos.given = static_cast<int>(capture.verdicts.size());
+  photos.registered = static_cast<int>(capture.views.size());
+  photos.used = static_cast<int>(
+      std::count_if(capture.verdicts.begin(), capture.verdicts.end(),
+                    [](const PhotoVerdict& photo) { return photo.verdict == "used"; }));
+  photos.verdicts = capture.verdicts;
+  return photos;
+}
+
+ReportPictures PicturesOf(const RunContext& context, const Capture& capture) {
+  const Workspace& workspace = *context.workspace;
+  ReportPictures pictures;
+  pictures.title = std::filesystem::path(workspace.folder()).filename().string();
+  const Image style = ReadStylePicture(context.settings.style.picture, nullptr);
+  pictures.style = ReportPicture{EncodeJpeg(style, kJpegQuality), style.width, style.height};
+  const int count = static_cast<int>(capture.views.size());
+  const int shown = std::min(count, kPagePictures);
+  for (int k = 0; k < shown; ++k) {
+    const int i = shown < 2 ? 0 : k * (count - 1) / (shown - 1);
+    const CaptureView& photo = capture.views[static_cast<size_t>(i)];
+    const std::string name = FrameName(i);
+    const Image picture = ReadWorkingPhoto(photo, context.settings.scene.photo_size);
+    ReportView view;
+    view.name = name.substr(0, 5) + ", " + photo.file;
+    view.photo =
+        ReportPicture{EncodeJpeg(picture, kJpegQuality), picture.width, picture.height};
+    view.source = PictureAt(workspace.Path("frames/source/" + name));
+    view.views_2d = PictureAt(workspace.Path("frames/views_2d/" + name));
+    view.styled = PictureAt(workspace.Path("frames/styled/" + name));
+    pictures.views.push_back(std::move(view));
+  }
+  pictures.has_styled_film = std::filesystem::exists(workspace.Path("styled.mp4"));
+  pictures.has_wipe_film = std::filesystem::exists(workspace.Path("source_vs_styled.mp4"));
+  return pictures;
+}
+
+StageOutcome WriteReport(RunContext* context) {
+  const RunSettings& settings = context->settings;
+  Workspace& workspace = *context->workspace;
+  const Capture capture = ReadCapture(workspace.Path("poses"));
+  RunReport report = ReportFromRecords(workspace);
+  report.version = REGRADE_VERSION;
+  report.command = {"regrade", "run", context->source};
+  report.preset = settings.run.preset;
+  report.device = "cpu";
+  report.seed = settings.run.seed;
+  for (const char* stage : kStageNames)
+    if (const auto record = workspace.Find(stage)) report.seconds += record->seconds;
+  report.peak_memory_mb = static_cast<double>(ReadMemoryStatus().peak_used >> 20);
+  report.photos = PhotosOf(capture);
+  const JsonValue options = context->options.Values();
+  for (const auto& [name, value] : options.AsObject())
+    report.options.push_back({name, value.IsString() ? value.AsString() : DumpJson(value, -1)});
+  WriteJsonFile(workspace.Path("report.json"), ReportJson(report));
+  WriteFileAtomically(workspace.Path("report.html"),
+                      ReportHtml(report, PicturesOf(*context, capture)));
+  StageOutcome outcome;
+  outcome.outputs = {"report.json", "report.html"};
+  return outcome;
+}
+
+}  // namespace
+
+Stage ReportStage(RunContext* context) {
+  Stage stage;
+  stage.name = "report";
+  stage.inputs = JsonValue::Object();
+  for (const char* earlier : kStageNames)
+    if (std::string(earlier) != "report") stage.inputs[earlier] = context->ResultOf(earlier);
+  // Stage "evaluate" leaves figures alone.
+  if (const auto record = context->workspace->Find("evaluate"))
+    stage.inputs["evaluate"] = record->figures;
+  stage.work = [context](const ProgressFunction&) { return WriteReport(context); };
+  return stage;
+}
+
+}  // namespace regrade

@@ -1,0 +1,99 @@
+// Stage "stylize": a network learns from views_2d/ how the field's colours change, and
+// styled.npz is the same geometry in those colours.
+#include "pipeline/capture_store.h"
+#include "pipeline/field_file.h"
+#include "pipeline/files/image_file.h"
+#include "pipeline/network_checkpoint.h"
+#include "pipeline/scene_views.h"
+#include "pipeline/stages/run_context.h"
+#include "stylize/apply_network.h"
+#include "stylize/monge_kantorovich.h"
+
+namespace regrade {
+namespace {
+
+// What the network learns from: the views that the field was fitted to.
+struct Lessons {
+  std::vector<Image> targets;
+  std::vector<StyledTrainingView> views;
+  SceneColorMap scene_map;
+};
+
+Lessons ReadLessons(RunContext* context, const Capture& capture, const StoredField& stored) {
+  const RunSettings& settings = context->settings;
+  const std::vector<int> indices = ViewIndices(capture, settings.run.holdout, false);
+  Lessons lessons;
+  lessons.targets.reserve(indices.size());
+  std::vector<ColorStatistics> before, after;
+  for (const int i : indices) {
+    const CaptureView& view = capture.views[static_cast<size_t>(i)];
+    const std::string name = "views_2d/" + FrameName(i);
+    lessons.targets.push_back(ReadImage(context->workspace->Path(name)));
+    lessons.views.push_back(
+        {WorkingCamera(view.camera, settings.scene.photo_size, stored.field_from_world),
+         &lessons.targets.back(), nullptr, name});
+    before.push_back(MeasureColor(ReadWorkingPhoto(view, settings.scene.photo_size)));
+    after.push_back(MeasureColor(lessons.targets.back()));
+  }
+  const MklMap mkl = ComputeMkl(Pool(before), Pool(after));
+  for (const std::string& notice : mkl.notices) context->console->Info(notice);
+  lessons.scene_map = {mkl.map, mkl.norm};
+  return lessons;
+}
+
+StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
+                     const ProgressFunction& progress) {
+  const RunSettings& settings = context->settings;
+  Workspace& workspace = *context->workspace;
+  const Capture capture = ReadCapture(workspace.Path("poses"));
+  StoredField stored = ReadFieldFile(workspace.Path("field.npz"));
+  const Lessons lessons = ReadLessons(context, capture, stored);
+
+  TrainNetworkOptions options = settings.network;
+  options.seed = settings.run.seed;
+  TrainingHooks hooks;
+  hooks.progress = progress;
+  hooks.checkpoint = [&](const TrainingState& state) {
+    workspace.SaveCheckpoint("stylize", inputs, PackTrainingState(state));
+  };
+  std::optional<TrainingState> resume;
+  if (const auto bytes = workspace.LoadCheckpoint("stylize", inputs))
+    resume = UnpackTrainingState(*bytes);
+  if (resume) context->console->Info("stylize: goes on from its checkpoint");
+  const TrainNetworkResult trained = TrainNetwork(
+      stored.field, lessons.views, lessons.scene_map, MarchOptions{settings.fit.step}, options,
+      hooks, resume ? &*resume : nullptr);
+  for (const std::string& warning : trained.warnings) context->console->Warn(warning);
+
+  stored.field.appearance = ApplyNetwork(trained.network, stored.field, progress);
+  WriteFieldFile(workspace.Path("styled.npz"), stored);
+  StageOutcome outcome;
+  outcome.outputs = {"styled.npz"};
+  outcome.figures["steps"] = trained.steps;
+  outcome.figures["k_est"] = trained.k_est;
+  outcome.figures["bound"] = trained.bound;
+  outcome.figures["slope_observed"] = trained.slope_observed;
+  outcome.figures["linear_map_psnr_to_2d_db"] =
+      trained.linear_map_psnr_db > 0 ? JsonValue(trained.linear_map_psnr_db) : JsonValue();
+  outcome.figures["psnr_train_db"] = trained.psnr_db;
+  return outcome;
+}
+
+}  // namespace
+
+Stage StylizeStage(RunContext* context) {
+  const RunOptions& run = context->settings.run;
+  Stage stage;
+  stage.name = "stylize";
+  stage.inputs = JsonValue::Object{{"field", context->ResultOf("reconstruct")},
+                                   {"views_2d", context->ResultOf("style_2d")},
+                                   {"options", context->OptionsOf({"Scene", "Network"})},
+                                   {"seed", run.seed},
+                                   {"holdout", run.holdout}};
+  stage.work = [context, inputs = stage.inputs](const ProgressFunction& progress) {
+    return Stylize(context, inputs, progress);
+  };
+  return stage;
+}
+
+}  // namespace regrade
