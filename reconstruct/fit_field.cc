@@ -31,7 +31,10 @@ class Fitter {
          const FitHooks& hooks)
       : rays_(views), box_(box), options_(options), hooks_(hooks) {
     REGRADE_CHECK_EQ(options.resolutions.size(), options.steps.size());
-    for (const int steps : options.steps) total_steps_ += steps;
+    for (size_t s = 0; s < options.steps.size(); ++s) {
+      total_steps_ += options.steps[s];
+      total_work_ += options.steps[s] * WorkOfStep(static_cast<int>(s));
+    }
     arenas_.resize(
         static_cast<size_t>(options.shards > 0 ? options.shards : omp_get_max_threads()));
   }
@@ -76,6 +79,18 @@ class Fitter {
     int steps = state_.step;
     for (int s = 0; s < state_.stage; ++s) steps += options_.steps[static_cast<size_t>(s)];
     return steps;
+  }
+
+  // A step costs what its samples cost, and a ray's samples grow with the resolution: progress
+  // in that unit makes the time left come out right while the stages are still coarse.
+  double WorkBefore() const {
+    double work = static_cast<double>(state_.step) * WorkOfStep(state_.stage);
+    for (int s = 0; s < state_.stage; ++s)
+      work += options_.steps[static_cast<size_t>(s)] * WorkOfStep(s);
+    return work;
+  }
+  double WorkOfStep(int stage) const {
+    return options_.resolutions[static_cast<size_t>(stage)];
   }
 
   void RunStage() {
@@ -202,7 +217,7 @@ class Fitter {
       window_error_ = 0;
       window_rays_ = 0;
     }
-    return Report(hooks_.progress, done, total_steps_, note_);
+    return Report(hooks_.progress, WorkBefore(), total_work_, note_);
   }
 
   void SaveCheckpoint() {
@@ -222,6 +237,7 @@ class Fitter {
   std::vector<Ray> batch_rays_;
   std::vector<Vec3f> batch_targets_;
   int total_steps_ = 0;
+  double total_work_ = 0;
   bool finish_early_ = false;
   double window_error_ = 0, tail_error_ = 0, checkpoint_seconds_ = 0;
   int64_t window_rays_ = 0, tail_rays_ = 0;
