@@ -137,7 +137,6 @@ RunReport ReportFromRecords(const Workspace& workspace) {
     stages.stylize->k_est = FigureOf(f, "k_est");
     stages.stylize->bound = FigureOf(f, "bound");
     stages.stylize->slope_observed = FigureOf(f, "slope_observed");
-    stages.stylize->linear_map_psnr_to_2d_db = FigureOf(f, "linear_map_psnr_to_2d_db");
   }
   if (render)
     stages.render = {render->seconds, static_cast<int>(CountOf(render->figures, "frames")),
@@ -147,6 +146,7 @@ RunReport ReportFromRecords(const Workspace& workspace) {
     stages.evaluate = {evaluate->seconds, TextOf(f, "flow"), TextOf(f, "mask")};
     if (stages.stylize) {
       stages.stylize->psnr_to_2d_photos_db = FigureOf(f, "psnr_to_2d_photos_db");
+      stages.stylize->linear_map_psnr_to_2d_db = FigureOf(f, "linear_map_psnr_to_2d_db");
       for (const FidelityFigures& row : report.fidelity)
         if (row.sequence == "styled") stages.stylize->psnr_to_2d_db = row.psnr_to_2d_db;
     }

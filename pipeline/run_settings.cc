@@ -27,6 +27,7 @@ void ApplyPreset(const std::string& preset, RunSettings* settings) {
     settings->scene.photo_size = 480;
     settings->fit.resolutions = {64, 128, 192};
     settings->fit.steps = {400, 1000, 600};
+    settings->render.path.path_frames = 60;
   } else if (preset == "best") {
     settings->scene.photo_size = 1280;
     settings->fit.resolutions = {96, 192, 320};

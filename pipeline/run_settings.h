@@ -4,6 +4,7 @@
 #include <string>
 
 #include "evaluate/consistency.h"
+#include "pipeline/camera_path.h"
 #include "pipeline/option_binding.h"
 #include "pipeline/photo_folder.h"
 #include "pipeline/run_options.h"
@@ -38,11 +39,13 @@ struct StyleSource {
 };
 
 struct RenderOptions {
-  double fps = 12;
+  double fps = 24;
+  PathOptions path;
 
   template <typename Bind>
   void Describe(Bind& bind) {
     bind("fps", fps, {.unit = "frames/s", .help = "pace of the films", .min = 1, .max = 240});
+    path.Describe(bind);
   }
 };
 

@@ -19,6 +19,10 @@ Image ReadWorkingPhoto(const CaptureView& view, int longest_side);
 // Indices of views that are fitted, or of those that are kept for measuring.
 std::vector<int> ViewIndices(const Capture& capture, int holdout, bool held_out);
 
+// Sequences of the film's frames stand beside those of the photos' places: frames/path_source/,
+// ...
+inline constexpr char kPathPrefix[] = "path_";
+
 // "00007.png"
 std::string FrameName(int index);
 

@@ -13,6 +13,7 @@
 #include "pipeline/files/image_file.h"
 #include "pipeline/report_records.h"
 #include "pipeline/scene_views.h"
+#include "pipeline/stages/linear_map_reference.h"
 #include "pipeline/stages/run_context.h"
 
 namespace regrade {
@@ -40,13 +41,31 @@ Image AlongRays(const Camera& camera, Image depth) {
 GeometrySource GeometryOf(const RunSettings& settings, const Capture& capture,
                           const StoredField& stored) {
   const auto grid = std::make_shared<const FastGrid>(MakeFastGrid(stored.field));
-  return [&settings, &capture, grid,
+  return [&settings, &capture, grid, step = stored.field.step,
           field_from_world = stored.field_from_world](int i) -> FrameGeometry {
     const Camera camera = WorkingCamera(capture.views[static_cast<size_t>(i)].camera,
                                         settings.scene.photo_size, field_from_world);
-    return {AlongRays(camera, RenderView(*grid, camera, MarchOptions{settings.fit.step}).depth),
-            camera};
+    return {AlongRays(camera, RenderView(*grid, camera, MarchOptions{step}).depth), camera};
   };
+}
+
+// The film's frames, with flow and masks from its own unstyled ones. Its geometry is not on
+// disk, so "geometry" leaves it out.
+void AddFilm(RunContext* context, const ProgressFunction& progress, ConsistencyReport* report) {
+  const RunSettings& settings = context->settings;
+  if (settings.render.path.path == "views" || settings.consistency.mode == "geometry") return;
+  std::vector<int> all(static_cast<size_t>(settings.render.path.path_frames));
+  for (size_t i = 0; i < all.size(); ++i) all[i] = static_cast<int>(i);
+  std::vector<NamedFrameSource> sequences;
+  for (const char* name : {"source", "views_2d", "styled"}) {
+    const std::string sequence = std::string(kPathPrefix) + name;
+    sequences.push_back(
+        {sequence, FramesOf(context->workspace->Path("frames/" + sequence), all)});
+  }
+  const ConsistencyReport film =
+      EvaluateConsistency(sequences[0].frames, sequences, settings.consistency, progress, {});
+  report->rows.insert(report->rows.end(), film.rows.begin(), film.rows.end());
+  report->pairs.insert(report->pairs.end(), film.pairs.begin(), film.pairs.end());
 }
 
 StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
@@ -68,8 +87,9 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   const GeometrySource geometry = settings.consistency.mode == "geometry"
                                       ? GeometryOf(settings, capture, stored)
                                       : GeometrySource();
-  const ConsistencyReport consistency =
+  ConsistencyReport consistency =
       EvaluateConsistency(source, sequences, settings.consistency, progress, geometry);
+  AddFilm(context, progress, &consistency);
 
   // Fidelity is measured on the views that the style was learned from.
   const Image style = ReadStylePicture(settings.style.picture, nullptr);
@@ -84,6 +104,14 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   const FidelityRow to_photos =
       MeasureFidelity({"styled", frames("styled", fitted)}, photo_targets, progress);
 
+  std::vector<Camera> cameras;
+  for (const int i : fitted)
+    cameras.push_back(WorkingCamera(capture.views[static_cast<size_t>(i)].camera,
+                                    settings.scene.photo_size, stored.field_from_world));
+  const std::optional<double> linear_map =
+      LinearMapPsnr(stored.field, cameras, frames("source", fitted), frames("views_2d", fitted),
+                    frames("transmittance", fitted), progress);
+
   context->console->Lines(FormatTables(consistency, fidelity));
   StageOutcome outcome;
   outcome.figures = EvaluationRecord(consistency, fidelity);
@@ -91,6 +119,8 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   outcome.figures["mask"] = settings.consistency.mode;
   outcome.figures["psnr_to_2d_photos_db"] =
       to_photos.psnr_to_2d_db ? JsonValue(*to_photos.psnr_to_2d_db) : JsonValue();
+  outcome.figures["linear_map_psnr_to_2d_db"] =
+      linear_map ? JsonValue(*linear_map) : JsonValue();
   return outcome;
 }
 

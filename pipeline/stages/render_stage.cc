@@ -1,10 +1,11 @@
-// Stage "render": frames of the field before and after, what the 2D method makes of the former,
-// and two films.
+// Stage "render": frames of the field before and after, and what the 2D method makes of the
+// former, at the photos' places and along the film's way; and two films.
 #include <algorithm>
 #include <filesystem>
 
 #include "kernels/field/fast_rays.h"
 #include "kernels/field/render.h"
+#include "pipeline/camera_path.h"
 #include "pipeline/capture_store.h"
 #include "pipeline/field_file.h"
 #include "pipeline/files/image_file.h"
@@ -28,11 +29,13 @@ Image Wiped(const Image& left, const Image& right, int frame, int frames) {
   return mixed;
 }
 
-// Films of frames that are on disk already. A machine without H.264 has none.
-void WriteFilms(RunContext* context, int frames, std::vector<std::string>* outputs) {
+// Films of frames that are on disk already, of the sequences `prefix` + "source" and "styled".
+// A machine without H.264 has none.
+void WriteFilms(RunContext* context, const std::string& prefix, int frames,
+                std::vector<std::string>* outputs) {
   const Workspace& workspace = *context->workspace;
   const auto frame = [&](const char* sequence, int i) {
-    return ReadImage(workspace.Path(std::string("frames/") + sequence + "/" + FrameName(i)));
+    return ReadImage(workspace.Path("frames/" + prefix + sequence + "/" + FrameName(i)));
   };
   const Image first = frame("styled", 0);
   try {
@@ -58,40 +61,67 @@ void WriteFilms(RunContext* context, int frames, std::vector<std::string>* outpu
   }
 }
 
+// The two fields and the 2D method that frames are made with.
+struct Studio {
+  FastGrid source, styled;
+  MarchOptions march;
+  std::unique_ptr<ViewStylizer> stylizer;
+  double styled_seconds = 0;  // spent in rendering the restyled field
+};
+
+// frames/<prefix>{source, styled, views_2d, transmittance}/<index>.png
+void RenderFrame(RunContext* context, Studio* studio, const Camera& camera,
+                 const std::string& prefix, int index) {
+  Workspace& workspace = *context->workspace;
+  const RenderedView plain = RenderView(studio->source, camera, studio->march);
+  const double begin = context->console->StageSeconds();
+  const RenderedView restyled = RenderView(studio->styled, camera, studio->march);
+  studio->styled_seconds += context->console->StageSeconds() - begin;
+  const std::string folder = "frames/" + prefix, name = "/" + FrameName(index);
+  WritePng8(workspace.NewPath(folder + "source" + name), plain.color);
+  WritePng8(workspace.NewPath(folder + "styled" + name), restyled.color);
+  WritePng8(workspace.NewPath(folder + "views_2d" + name),
+            studio->stylizer->Stylize(plain.color, index));
+  // Where no scene is seen; evaluation leaves it out.
+  WritePng8(workspace.NewPath(folder + "transmittance" + name), plain.transmittance);
+}
+
 StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   const RunSettings& settings = context->settings;
   Workspace& workspace = *context->workspace;
   const Capture capture = ReadCapture(workspace.Path("poses"));
   const StoredField before = ReadFieldFile(workspace.Path("field.npz"));
   const StoredField after = ReadFieldFile(workspace.Path("styled.npz"));
-  const FastGrid source = MakeFastGrid(before.field), styled = MakeFastGrid(after.field);
-  const std::unique_ptr<ViewStylizer> stylizer = MakeSceneStylizer(context, capture);
-  const MarchOptions march{settings.fit.step};
+  Studio studio{MakeFastGrid(before.field), MakeFastGrid(after.field),
+                MarchOptions{before.field.step}, MakeSceneStylizer(context, capture)};
+
+  std::vector<Camera> views;
+  for (const CaptureView& view : capture.views)
+    views.push_back(
+        WorkingCamera(view.camera, settings.scene.photo_size, before.field_from_world));
+  const bool film_of_views = settings.render.path.path == "views";
+  const std::vector<Camera> way =
+      film_of_views ? std::vector<Camera>() : MakeCameraPath(views, settings.render.path);
 
   std::filesystem::remove_all(workspace.Path("frames"));
-  const int frames = static_cast<int>(capture.views.size());
-  double render_seconds = 0;
-  for (int i = 0; i < frames; ++i) {
-    if (Report(progress, i, frames) == Verdict::kAbort) throw Interrupted();
-    const Camera camera = WorkingCamera(capture.views[static_cast<size_t>(i)].camera,
-                                        settings.scene.photo_size, before.field_from_world);
-    const RenderedView plain = RenderView(source, camera, march);
-    const double begin = context->console->StageSeconds();
-    const RenderedView restyled = RenderView(styled, camera, march);
-    render_seconds += context->console->StageSeconds() - begin;
-    const std::string name = FrameName(i);
-    WritePng8(workspace.NewPath("frames/source/" + name), plain.color);
-    WritePng8(workspace.NewPath("frames/styled/" + name), restyled.color);
-    WritePng8(workspace.NewPath("frames/views_2d/" + name), stylizer->Stylize(plain.color, i));
-    // Where no scene is seen; evaluation leaves it out.
-    WritePng8(workspace.NewPath("frames/transmittance/" + name), plain.transmittance);
+  const int num_views = static_cast<int>(views.size()), num_way = static_cast<int>(way.size());
+  for (int i = 0; i < num_views + num_way; ++i) {
+    if (Report(progress, i, num_views + num_way) == Verdict::kAbort) throw Interrupted();
+    if (i < num_views)
+      RenderFrame(context, &studio, views[static_cast<size_t>(i)], "", i);
+    else
+      RenderFrame(context, &studio, way[static_cast<size_t>(i - num_views)], kPathPrefix,
+                  i - num_views);
   }
   StageOutcome outcome;
   outcome.outputs = {"frames"};
-  WriteFilms(context, frames, &outcome.outputs);
+  WriteFilms(context, film_of_views ? "" : kPathPrefix, film_of_views ? num_views : num_way,
+             &outcome.outputs);
+  const int frames = num_views + num_way;
   outcome.figures["frames"] = frames;
+  outcome.figures["path_frames"] = num_way;
   outcome.figures["frames_per_second"] =
-      render_seconds > 0 ? JsonValue(frames / render_seconds) : JsonValue();
+      studio.styled_seconds > 0 ? JsonValue(frames / studio.styled_seconds) : JsonValue();
   return outcome;
 }
 

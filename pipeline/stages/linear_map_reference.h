@@ -1,0 +1,25 @@
+// What a linear map of colours alone would have given: the yardstick that the network must not
+// fall short of.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "evaluate/frame_source.h"
+#include "kernels/base/progress.h"
+#include "kernels/field/radiance_field.h"
+#include "kernels/scene/camera.h"
+
+namespace regrade {
+
+// PSNR, as psnr_to_2d_db is taken, of the field under the better of two maps carried into its
+// coefficients (see EQ(sh-color-map)): the Monge-Kantorovich map between the pooled colours of
+// `source` and `views_2d`, and the least-squares map between their pixels. The better one is
+// found on the frames, and rendered at `cameras`.
+std::optional<double> LinearMapPsnr(const RadianceField& field,
+                                    const std::vector<Camera>& cameras,
+                                    const FrameSource& source, const FrameSource& views_2d,
+                                    const FrameSource& transmittance,
+                                    const ProgressFunction& progress);
+
+}  // namespace regrade
