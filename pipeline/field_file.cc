@@ -56,14 +56,7 @@ Vec3f ReadVec3(NpzReader* file, const std::string& name) {
 }
 
 void CheckReadable(NpzReader* file) {
-  if (file->Has("regrade_version")) {
-    const int32_t version = file->ReadScalar<int32_t>("regrade_version");
-    if (version > kVersion)
-      Refuse(file->path(),
-             "written in format " + std::to_string(version) + ", this program knows up to " +
-                 std::to_string(kVersion),
-             "update regrade; the file has not been touched");
-  }
+  RefuseNewerFormat(file, kVersion);
   if (file->Has("basis_type")) {
     const NpzArray type = file->Read("basis_type");
     const bool wide = type.type == ArrayType::kI64, narrow = type.type == ArrayType::kI32;

@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "kernels/base/error.h"
 #include "kernels/field/spherical_harmonics.h"
@@ -100,7 +101,9 @@ LipschitzNetwork::LipschitzNetwork(LipschitzNetworkData data) : data_(std::move(
     throw Error(ExitCode::kInput, "not a network: " + what, "network.npz",
                 "run regrade stylize again");
   };
-  ActivationByName(data_.activation);
+  if (std::none_of(std::begin(kActivations), std::end(kActivations),
+                   [this](const auto& entry) { return data_.activation == entry.name; }))
+    refuse("unknown activation '" + data_.activation + "'");
   if (static_cast<int64_t>(data_.parameters.size()) != NumParameters())
     refuse(std::to_string(data_.parameters.size()) + " parameters instead of " +
            std::to_string(NumParameters()));

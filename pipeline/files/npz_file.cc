@@ -257,4 +257,14 @@ std::string NpzReader::ReadText(const std::string& name) {
   return std::string(array.As<char>(), static_cast<size_t>(array.bytes.size()));
 }
 
+void RefuseNewerFormat(NpzReader* file, int32_t known) {
+  if (!file->Has("regrade_version")) return;
+  const int32_t version = file->ReadScalar<int32_t>("regrade_version");
+  if (version > known)
+    throw Error(ExitCode::kInput,
+                "written in format " + std::to_string(version) + ", this program knows up to " +
+                    std::to_string(known),
+                file->path(), "update regrade; the file has not been touched");
+}
+
 }  // namespace regrade

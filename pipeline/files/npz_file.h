@@ -105,4 +105,8 @@ class NpzReader {
   std::unique_ptr<Archive> archive_;
 };
 
+// Throws Error(kInput) if the file's array "regrade_version" is there and larger than `known`:
+// a newer program wrote it.
+void RefuseNewerFormat(NpzReader* file, int32_t known);
+
 }  // namespace regrade

@@ -1,9 +1,10 @@
 // Stage "stylize": a network learns from views_2d/ how the field's colours change, and
-// styled.npz is the same geometry in those colours.
+// styled.npz is the same geometry in those colours; network.npz keeps the network.
 #include "pipeline/capture_store.h"
 #include "pipeline/field_file.h"
 #include "pipeline/files/image_file.h"
 #include "pipeline/network_checkpoint.h"
+#include "pipeline/network_file.h"
 #include "pipeline/scene_views.h"
 #include "pipeline/stages/run_context.h"
 #include "stylize/apply_network.h"
@@ -61,20 +62,19 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
     resume = UnpackTrainingState(*bytes);
   if (resume) context->console->Info("stylize: goes on from its checkpoint");
   const TrainNetworkResult trained = TrainNetwork(
-      stored.field, lessons.views, lessons.scene_map, MarchOptions{settings.fit.step}, options,
+      stored.field, lessons.views, lessons.scene_map, MarchOptions{stored.field.step}, options,
       hooks, resume ? &*resume : nullptr);
   for (const std::string& warning : trained.warnings) context->console->Warn(warning);
 
+  WriteNetworkFile(workspace.Path("network.npz"), {trained.network, trained.k_est});
   stored.field.appearance = ApplyNetwork(trained.network, stored.field, progress);
   WriteFieldFile(workspace.Path("styled.npz"), stored);
   StageOutcome outcome;
-  outcome.outputs = {"styled.npz"};
+  outcome.outputs = {"network.npz", "styled.npz"};
   outcome.figures["steps"] = trained.steps;
   outcome.figures["k_est"] = trained.k_est;
   outcome.figures["bound"] = trained.bound;
   outcome.figures["slope_observed"] = trained.slope_observed;
-  outcome.figures["linear_map_psnr_to_2d_db"] =
-      trained.linear_map_psnr_db > 0 ? JsonValue(trained.linear_map_psnr_db) : JsonValue();
   outcome.figures["psnr_train_db"] = trained.psnr_db;
   return outcome;
 }
