@@ -25,7 +25,9 @@ Camera WorkingCamera(const Camera& camera, int longest_side,
                      const Similarity& field_from_world) {
   int width = 0, height = 0;
   WorkingSize(camera.width, camera.height, longest_side, &width, &height);
-  return camera.Resized(width, height).Transformed(field_from_world);
+  const Camera followed =
+      camera.MaxCornerDistortion() > kDistortionThreshold ? camera : camera.Undistorted();
+  return followed.Resized(width, height).Transformed(field_from_world);
 }
 
 Image ReadWorkingPhoto(const CaptureView& view, int longest_side) {

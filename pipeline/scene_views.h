@@ -8,8 +8,13 @@
 
 namespace regrade {
 
+// A lens that moves no corner of its photo by more than this, in pixels, is taken as a pinhole:
+// less than half a pixel is below what poses are known to, and rays without a lens model need
+// no Newton steps.
+inline constexpr double kDistortionThreshold = 0.5;
+
 // The camera of a photo whose longer side is cut to `longest_side` pixels (never enlarged), in
-// a world transformed by `field_from_world`.
+// a world transformed by `field_from_world`. Its lens is a pinhole up to kDistortionThreshold.
 Camera WorkingCamera(const Camera& camera, int longest_side,
                      const Similarity& field_from_world);
 

@@ -7,6 +7,7 @@
 #include "pipeline/capture_store.h"
 #include "pipeline/field_file.h"
 #include "pipeline/fit_checkpoint.h"
+#include "pipeline/scene_effects.h"
 #include "pipeline/scene_views.h"
 #include "pipeline/stages/run_context.h"
 #include "reconstruct/fit_field.h"
@@ -52,6 +53,8 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   const Capture capture = ReadCapture(workspace.Path("poses"));
   const NormalizedScene scene = NormalizeScene(capture);
   if (!scene.notice.empty()) context->console->Info(scene.notice);
+  for (const EffectReport& effect : EffectsOf(capture, settings.fit.sh_degree))
+    context->console->Info(EffectLine(effect));
 
   const std::vector<int> fitted = ViewIndices(capture, settings.run.holdout, false);
   std::vector<Image> photos;

@@ -1,0 +1,68 @@
+#include "pipeline/scene_effects.h"
+
+#include <gtest/gtest.h>
+
+#include "pipeline/scene_views.h"
+
+namespace regrade {
+namespace {
+
+// k1 moves the corner at r = 1.25 (fx = 400 of 800 x 600) by k1 r^3 400 pixels.
+Camera CameraWithShift(double pixels) {
+  Camera camera;
+  camera.width = 800, camera.height = 600;
+  camera.fx = camera.fy = 400;
+  camera.cx = 400, camera.cy = 300;
+  camera.lens = LensModel::kOpenCv;
+  camera.distortion[0] = pixels / (400 * 1.25 * 1.25 * 1.25);
+  return camera;
+}
+
+Capture CaptureWithShifts(const std::vector<double>& shifts) {
+  Capture capture;
+  for (const double shift : shifts) {
+    CaptureView view;
+    view.camera = CameraWithShift(shift);
+    capture.views.push_back(view);
+  }
+  return capture;
+}
+
+TEST(SceneEffects, LensBelowThresholdIsAPinhole) {
+  const Camera weak = WorkingCamera(CameraWithShift(0.49), 800, {});
+  EXPECT_EQ(weak.lens, LensModel::kPinhole);
+  EXPECT_EQ(weak.MaxCornerDistortion(), 0);
+  // Rays are, bit for bit, those of a camera without a lens model.
+  const Ray ray = weak.PixelRay(799, 0),
+            plain = CameraWithShift(0.49).Undistorted().PixelRay(799, 0);
+  EXPECT_EQ(ray.direction, plain.direction);
+}
+
+TEST(SceneEffects, LensAboveThresholdStays) {
+  const Camera strong = WorkingCamera(CameraWithShift(0.51), 800, {});
+  EXPECT_EQ(strong.lens, LensModel::kOpenCv);
+  EXPECT_NEAR(strong.MaxCornerDistortion(), 0.51, 1e-9);
+  // It is judged on the photo, not on the smaller picture that is worked with.
+  EXPECT_EQ(WorkingCamera(CameraWithShift(0.51), 100, {}).lens, LensModel::kOpenCv);
+}
+
+TEST(SceneEffects, RowsCarryTheNumbersOfTheDecision) {
+  const auto rows = EffectsOf(CaptureWithShifts({0.1, -12.3, 3}), 2);
+  ASSERT_EQ(rows.size(), 2u);
+  EXPECT_EQ(rows[0].name, "distortion");
+  EXPECT_TRUE(rows[0].on);
+  EXPECT_NEAR(*rows[0].value.value, 12.3, 1e-9);
+  EXPECT_EQ(*rows[0].threshold.value, 0.5);
+  EXPECT_EQ(EffectLine(rows[0]).substr(0, 25), "distortion on: 12.3 > 0.5");
+  EXPECT_EQ(rows[1].name, "view-dependence");
+  EXPECT_TRUE(rows[1].on);
+  EXPECT_EQ(*rows[1].value.value, 2);
+
+  const auto off = EffectsOf(CaptureWithShifts({0.1, 0.3}), 0);
+  EXPECT_FALSE(off[0].on);
+  EXPECT_FALSE(off[1].on);
+  EXPECT_EQ(EffectLine(off[0]).substr(0, 26), "distortion off: 0.3 <= 0.5");
+}
+
+}  // namespace
+}  // namespace regrade
