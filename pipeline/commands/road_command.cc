@@ -1,9 +1,12 @@
 // regrade run, pose, reconstruct: the road from photos, or a part of it.
+#include <omp.h>
+
 #include <filesystem>
 
 #include "kernels/base/error.h"
 #include "pipeline/commands/command.h"
 #include "pipeline/files/image_file.h"
+#include "pipeline/plan.h"
 #include "pipeline/run_file.h"
 #include "pipeline/run_pipeline.h"
 
@@ -47,6 +50,24 @@ void ProbeInputs(const std::string& last, RunContext* context) {
   ReadStylePicture(context->settings.style.picture, nullptr);
 }
 
+// What a dry run can say of a folder that is not there yet: photos are taken as 4 : 3, the
+// scene's box as a cube.
+void PrintPlan(const std::string& last, RunContext* context) {
+  const RunSettings& settings = context->settings;
+  const Stage pose = PoseStage(context);
+  context->console->Info(settings.run.out + " is new: every stage would be done, from " +
+                         pose.plan);
+  if (last == "pose") return;
+  const int threads = omp_get_max_threads();
+  const int64_t photos = static_cast<int64_t>(pose.inputs.At("photos").AsObject().size());
+  const int64_t side = settings.scene.photo_size;
+  context->console->Info(
+      "reconstruct: " +
+      PlanText(PlanFit(settings.fit, photos * side * side * 3 / 4, {1, 1, 1}, threads)));
+  if (last == "reconstruct") return;
+  context->console->Info("stylize: " + PlanText(PlanStyle(settings.network.steps, threads)));
+}
+
 std::string Absolute(const std::string& path) {
   std::error_code error;
   const auto absolute = std::filesystem::absolute(path, error);
@@ -81,8 +102,7 @@ void RunRoad(const Command& command, const Arguments& arguments, Console* consol
   ProbeInputs(last, &context);
 
   if (settings.start.dry_run && !Workspace::Exists(settings.run.out)) {
-    console->Info(settings.run.out + " is new: every stage would be done, from " +
-                  PoseStage(&context).plan);
+    PrintPlan(last, &context);
     return;
   }
   Workspace workspace(settings.run.out, settings.start.break_lock);

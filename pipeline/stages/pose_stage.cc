@@ -1,7 +1,10 @@
 // Stage "pose": a folder of photos becomes poses/, a capture with a camera for each photo that
 // found its place.
+#include <omp.h>
+
 #include "pipeline/capture_store.h"
 #include "pipeline/folder_listing.h"
+#include "pipeline/plan.h"
 #include "pipeline/stages/run_context.h"
 
 namespace regrade {
@@ -71,10 +74,11 @@ Stage PoseStage(RunContext* context) {
     for (const char* part : {"cameras.bin", "images.bin", "points3D.bin"})
       stage.inputs["poses"][part] = HashFile(source.poses + "/" + part);
   stage.refuse_changes = true;
-  stage.plan = std::to_string(stage.inputs.At("photos").AsObject().size()) + " files in " +
-               source.photos +
-               (source.kind == CaptureKind::kPhotos ? ", poses by COLMAP"
-                                                    : ", poses from " + source.poses);
+  const int64_t photos = static_cast<int64_t>(stage.inputs.At("photos").AsObject().size());
+  stage.plan = std::to_string(photos) + " files in " + source.photos +
+               (source.kind == CaptureKind::kPhotos
+                    ? ", poses by COLMAP: " + PlanText(PlanPoses(photos, omp_get_max_threads()))
+                    : ", poses from " + source.poses);
   stage.work = [context, source](const ProgressFunction& progress) {
     return FindPoses(context, source, progress);
   };

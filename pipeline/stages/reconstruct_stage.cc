@@ -1,4 +1,6 @@
 // Stage "reconstruct": the capture becomes field.npz, measured on the photos it has not seen.
+#include <omp.h>
+
 #include <numeric>
 
 #include "evaluate/image_quality.h"
@@ -7,6 +9,8 @@
 #include "pipeline/capture_store.h"
 #include "pipeline/field_file.h"
 #include "pipeline/fit_checkpoint.h"
+#include "pipeline/memory.h"
+#include "pipeline/plan.h"
 #include "pipeline/scene_effects.h"
 #include "pipeline/scene_views.h"
 #include "pipeline/stages/run_context.h"
@@ -46,6 +50,16 @@ void MeasureHeldOut(RunContext* context, const Capture& capture, const StoredFie
   (*figures)["ssim_heldout"] = ssim.empty() ? JsonValue() : JsonValue(Mean(ssim));
 }
 
+StagePlan PlanOf(const RunSettings& settings, const Capture& capture, const SceneBox& box) {
+  int64_t pixels = 0;
+  for (const int i : ViewIndices(capture, settings.run.holdout, false)) {
+    const Camera camera = WorkingCamera(capture.views[static_cast<size_t>(i)].camera,
+                                        settings.scene.photo_size, {});
+    pixels += int64_t{camera.width} * camera.height;
+  }
+  return PlanFit(settings.fit, pixels, box.radius, omp_get_max_threads());
+}
+
 StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
                          const ProgressFunction& progress) {
   const RunSettings& settings = context->settings;
@@ -55,6 +69,10 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   if (!scene.notice.empty()) context->console->Info(scene.notice);
   for (const EffectReport& effect : EffectsOf(capture, settings.fit.sh_degree))
     context->console->Info(EffectLine(effect));
+  const StagePlan plan = PlanOf(settings, capture, scene.box);
+  context->console->Info("the fit will take " + PlanText(plan));
+  CheckFitsMemory(plan,
+                  PlannedMemory(settings.run.max_memory_gb, ReadMemoryStatus().available));
 
   const std::vector<int> fitted = ViewIndices(capture, settings.run.holdout, false);
   std::vector<Image> photos;
@@ -108,6 +126,10 @@ Stage ReconstructStage(RunContext* context) {
                                    {"effects", run.effects},
                                    {"reproducible", run.reproducible}};
   stage.refuse_changes = true;
+  if (context->settings.start.dry_run) {
+    const Capture capture = ReadCapture(context->workspace->Path("poses"));
+    stage.plan = PlanText(PlanOf(context->settings, capture, NormalizeScene(capture).box));
+  }
   stage.work = [context, inputs = stage.inputs](const ProgressFunction& progress) {
     return Reconstruct(context, inputs, progress);
   };

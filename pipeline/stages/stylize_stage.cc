@@ -1,10 +1,13 @@
 // Stage "stylize": a network learns from views_2d/ how the field's colours change, and
 // styled.npz is the same geometry in those colours; network.npz keeps the network.
+#include <omp.h>
+
 #include "pipeline/capture_store.h"
 #include "pipeline/field_file.h"
 #include "pipeline/files/image_file.h"
 #include "pipeline/network_checkpoint.h"
 #include "pipeline/network_file.h"
+#include "pipeline/plan.h"
 #include "pipeline/scene_views.h"
 #include "pipeline/stages/run_context.h"
 #include "stylize/apply_network.h"
@@ -90,6 +93,7 @@ Stage StylizeStage(RunContext* context) {
                                    {"options", context->OptionsOf({"Scene", "Network"})},
                                    {"seed", run.seed},
                                    {"holdout", run.holdout}};
+  stage.plan = PlanText(PlanStyle(context->settings.network.steps, omp_get_max_threads()));
   stage.work = [context, inputs = stage.inputs](const ProgressFunction& progress) {
     return Stylize(context, inputs, progress);
   };

@@ -1,0 +1,77 @@
+#include "pipeline/plan.h"
+
+#include <algorithm>
+#include <cstdio>
+
+#include "kernels/base/error.h"
+#include "kernels/field/fast_rays.h"
+#include "kernels/field/spherical_harmonics.h"
+#include "pipeline/console.h"
+#include "reconstruct/resample_grid.h"
+
+namespace regrade {
+namespace {
+
+constexpr double kGridBytes = 4 + 4 + 1;  // a vertex: link, density, distance
+constexpr double kPixelBytes = 12 + 6;    // floats as read, 16 bits a channel as drawn
+constexpr double kIndexBytes = 4;         // vertex of a voxel, slot of a voxel, and back
+
+// Rates are of two threads.
+double Shared(double seconds, int threads) { return seconds * 2 / std::max(threads, 1); }
+
+std::string GigabytesText(double bytes) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.1f GB", bytes * 1e-9);
+  return text;
+}
+
+}  // namespace
+
+StagePlan PlanFit(const FitOptions& options, int64_t photo_pixels, const Vec3f& box_radius,
+                  int threads) {
+  const double record = 4.0 * RecordLanes(BasisOfDegree(options.sh_degree));
+  const int arenas = options.shards > 0 ? options.shards : std::max(threads, 1);
+  double field = 0, seconds = 0;
+  for (size_t s = 0; s < options.resolutions.size(); ++s) {
+    const Vec3i n = ResolutionFor(box_radius, options.resolutions[s]);
+    const double vertices = static_cast<double>(n.x) * n.y * n.z;
+    const double voxels = vertices * (s == 0 ? 1 : kStoredShare);
+    const double gradients = record + kIndexBytes + arenas * kIndexBytes;
+    field = std::max(
+        field, voxels * (3 * record + kIndexBytes + gradients) + vertices * 2 * kGridBytes);
+    const double rays = static_cast<double>(options.steps[s]) * options.rays_per_step;
+    seconds += rays / kRaysPerSecond * options.resolutions[s] / kRateResolution;
+  }
+  const double photos = static_cast<double>(photo_pixels) * kPixelBytes;
+  return {static_cast<uint64_t>(field + photos), Shared(seconds, threads)};
+}
+
+StagePlan PlanPoses(int64_t photos, int threads) {
+  return {0, Shared(kPoseSecondsPerPhoto * static_cast<double>(photos), threads)};
+}
+
+StagePlan PlanStyle(int64_t steps, int threads) {
+  return {0, Shared(kStyleSecondsPerStep * static_cast<double>(steps), threads)};
+}
+
+std::string PlanText(const StagePlan& plan) {
+  const std::string time = DurationText(plan.seconds);
+  if (plan.memory == 0) return "about " + time;
+  return "about " + GigabytesText(static_cast<double>(plan.memory)) + " of memory and " + time;
+}
+
+uint64_t PlannedMemory(double max_memory_gb, uint64_t available) {
+  return max_memory_gb > 0 ? static_cast<uint64_t>(max_memory_gb * 1e9) : available;
+}
+
+void CheckFitsMemory(const StagePlan& plan, uint64_t limit) {
+  if (limit == 0 || plan.memory <= limit) return;
+  throw Error(ExitCode::kResources,
+              "the fit would take about " + GigabytesText(static_cast<double>(plan.memory)) +
+                  " of memory, of " + GigabytesText(static_cast<double>(limit)) +
+                  " that it may",
+              "reconstruct",
+              "use --preset draft or smaller --fit-resolutions; memory grows with their cube");
+}
+
+}  // namespace regrade

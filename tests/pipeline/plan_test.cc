@@ -1,0 +1,76 @@
+#include "pipeline/plan.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/expect_error.h"
+
+namespace regrade {
+namespace {
+
+constexpr Vec3f kCube{1, 1, 1};
+
+FitOptions Fit(const std::vector<int>& resolutions, const std::vector<int>& steps) {
+  FitOptions options;
+  options.resolutions = resolutions;
+  options.steps = steps;
+  options.rays_per_step = 6000;
+  return options;
+}
+
+TEST(Plan, MemoryOfOneStageByHand) {
+  // 100^3 vertices, all stored: values, moments, the pruned copy and gradients of 128 B,
+  // vertex, slot and two arenas of 4 B; two dense grids of 9 B. 1000 pixels of 18 B.
+  const StagePlan plan = PlanFit(Fit({100}, {10}), 1000, kCube, 2);
+  EXPECT_EQ(plan.memory, 1000000u * (4 * 128 + 4 * 4 + 2 * 9) + 18000u);
+}
+
+TEST(Plan, LaterStagesStoreAShare) {
+  // 200^3 at a fifth outweighs 100^3 in full.
+  const StagePlan plan = PlanFit(Fit({100, 200}, {10, 10}), 0, kCube, 2);
+  EXPECT_EQ(plan.memory, 1600000u * (4 * 128 + 4 * 4) + 8000000u * 2 * 9);
+  // A coarse stage in full can be the peak: 0.2 * 110^3 < 100^3.
+  EXPECT_EQ(PlanFit(Fit({100, 110}, {10, 10}), 0, kCube, 2).memory,
+            PlanFit(Fit({100}, {10}), 0, kCube, 2).memory);
+}
+
+TEST(Plan, MemoryFollowsBoxDegreeAndThreads) {
+  const FitOptions fit = Fit({64, 128}, {10, 10});
+  const uint64_t cube = PlanFit(fit, 0, kCube, 2).memory;
+  const uint64_t flat = PlanFit(fit, 0, {1, 1, 0.25f}, 2).memory;
+  // Sides are rounded to whole voxels.
+  EXPECT_NEAR(static_cast<double>(flat), 0.25 * static_cast<double>(cube), 0.02 * cube);
+  EXPECT_GT(PlanFit(fit, 0, kCube, 16).memory, cube);
+  FitOptions plain = fit;
+  plain.sh_degree = 0;  // records of 4 lanes instead of 32
+  const double voxels = 0.2 * 128 * 128 * 128;
+  EXPECT_NEAR(static_cast<double>(cube - PlanFit(plain, 0, kCube, 2).memory),
+              voxels * 4 * (128 - 16), 2);  // whole bytes
+}
+
+TEST(Plan, TimeFollowsRaysResolutionAndThreads) {
+  // 1000 steps of 6000 rays are 6 M: 100 s of two threads at 160^3.
+  EXPECT_NEAR(PlanFit(Fit({160}, {1000}), 0, kCube, 2).seconds, 100, 1e-9);
+  EXPECT_NEAR(PlanFit(Fit({160}, {1000}), 0, kCube, 8).seconds, 25, 1e-9);
+  EXPECT_NEAR(PlanFit(Fit({80, 320}, {1000, 1000}), 0, kCube, 2).seconds, 250, 1e-9);
+  EXPECT_NEAR(PlanPoses(50, 2).seconds, 100, 1e-9);
+  EXPECT_NEAR(PlanStyle(300, 4).seconds, 30, 1e-9);
+}
+
+TEST(Plan, TooLittleMemoryNamesWhatToLower) {
+  const StagePlan plan{2000000000, 252};
+  EXPECT_EQ(PlanText(plan), "about 2.0 GB of memory and 4 min 12 s");
+  EXPECT_EQ(PlannedMemory(1.5, 99), 1500000000u);
+  EXPECT_EQ(PlannedMemory(0, 99), 99u);
+  EXPECT_NO_THROW(CheckFitsMemory(plan, 2000000000));
+  EXPECT_NO_THROW(CheckFitsMemory(plan, 0));  // not known
+  EXPECT_REGRADE_ERROR(CheckFitsMemory(plan, 1999999999), ExitCode::kResources, "2.0 GB");
+  try {
+    CheckFitsMemory(plan, 1);
+  } catch (const Error& error) {
+    EXPECT_NE(error.hint().find("--preset draft"), std::string::npos);
+    EXPECT_NE(error.hint().find("--fit-resolutions"), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace regrade
