@@ -19,9 +19,12 @@ constexpr double kIndexBytes = 4;         // vertex of a voxel, slot of a voxel,
 // Rates are of two threads.
 double Shared(double seconds, int threads) { return seconds * 2 / std::max(threads, 1); }
 
-std::string GigabytesText(double bytes) {
+std::string MemoryText(double bytes) {
   char text[32];
-  std::snprintf(text, sizeof text, "%.1f GB", bytes * 1e-9);
+  if (bytes < 1e8)
+    std::snprintf(text, sizeof text, "%.0f MB", bytes * 1e-6);
+  else
+    std::snprintf(text, sizeof text, "%.1f GB", bytes * 1e-9);
   return text;
 }
 
@@ -57,7 +60,7 @@ StagePlan PlanStyle(int64_t steps, int threads) {
 std::string PlanText(const StagePlan& plan) {
   const std::string time = DurationText(plan.seconds);
   if (plan.memory == 0) return "about " + time;
-  return "about " + GigabytesText(static_cast<double>(plan.memory)) + " of memory and " + time;
+  return "about " + MemoryText(static_cast<double>(plan.memory)) + " of memory and " + time;
 }
 
 uint64_t PlannedMemory(double max_memory_gb, uint64_t available) {
@@ -67,9 +70,8 @@ uint64_t PlannedMemory(double max_memory_gb, uint64_t available) {
 void CheckFitsMemory(const StagePlan& plan, uint64_t limit) {
   if (limit == 0 || plan.memory <= limit) return;
   throw Error(ExitCode::kResources,
-              "the fit would take about " + GigabytesText(static_cast<double>(plan.memory)) +
-                  " of memory, of " + GigabytesText(static_cast<double>(limit)) +
-                  " that it may",
+              "the fit would take about " + MemoryText(static_cast<double>(plan.memory)) +
+                  " of memory, of " + MemoryText(static_cast<double>(limit)) + " that it may",
               "reconstruct",
               "use --preset draft or smaller --fit-resolutions; memory grows with their cube");
 }

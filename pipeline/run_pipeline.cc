@@ -37,6 +37,7 @@ void RunPipeline(const std::string& first, const std::string& last, RunContext* 
   for (const Milestone* milestone = Find(first); milestone != std::end(kRoad); ++milestone) {
     // In a dry run the stages behind an undone one have no inputs to look at yet.
     if (!runner.Run(milestone->make(context))) {
+      if (last == milestone->name) return;
       for (++milestone; milestone != std::end(kRoad); ++milestone) {
         context->console->Info(std::string(milestone->name) + ": would be done after it");
         if (last == milestone->name) break;

@@ -59,6 +59,7 @@ TEST(Plan, TimeFollowsRaysResolutionAndThreads) {
 TEST(Plan, TooLittleMemoryNamesWhatToLower) {
   const StagePlan plan{2000000000, 252};
   EXPECT_EQ(PlanText(plan), "about 2.0 GB of memory and 4 min 12 s");
+  EXPECT_EQ(PlanText({18000000, 5}), "about 18 MB of memory and 5 s");
   EXPECT_EQ(PlannedMemory(1.5, 99), 1500000000u);
   EXPECT_EQ(PlannedMemory(0, 99), 99u);
   EXPECT_NO_THROW(CheckFitsMemory(plan, 2000000000));
