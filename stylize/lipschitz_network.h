@@ -81,7 +81,7 @@ class LipschitzNetwork {
   // The same for one row in double, plainly: the specification.
   void ForwardPlain(const double* features, double* output) const;
 
-  // EQ(liprf-bound), its two parts, and the largest sigma / sigma_hat - 1 of a layer.
+  // See EQ(liprf-bound): its two parts, and the largest sigma / sigma_hat - 1 of a layer.
   double BaseNorm() const;
   double ResidualBound() const;
   double Bound() const { return BaseNorm() + ResidualBound(); }

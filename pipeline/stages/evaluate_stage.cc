@@ -51,7 +51,8 @@ GeometrySource GeometryOf(const RunSettings& settings, const Capture& capture,
 
 // The film's frames, with flow and masks from its own unstyled ones. Its geometry is not on
 // disk, so "geometry" leaves it out.
-void AddFilm(RunContext* context, const ProgressFunction& progress, ConsistencyReport* report) {
+void AddFilm(RunContext* context, const Image& style, const ProgressFunction& progress,
+             ConsistencyReport* report, std::vector<FidelityRow>* fidelity) {
   const RunSettings& settings = context->settings;
   if (settings.render.path.path == "views" || settings.consistency.mode == "geometry") return;
   std::vector<int> all(static_cast<size_t>(settings.render.path.path_frames));
@@ -66,6 +67,13 @@ void AddFilm(RunContext* context, const ProgressFunction& progress, ConsistencyR
       EvaluateConsistency(sequences[0].frames, sequences, settings.consistency, progress, {});
   report->rows.insert(report->rows.end(), film.rows.begin(), film.rows.end());
   report->pairs.insert(report->pairs.end(), film.pairs.begin(), film.pairs.end());
+  const FidelityTargets targets{
+      sequences[1].frames,
+      FramesOf(context->workspace->Path(std::string("frames/") + kPathPrefix + "transmittance"),
+               all),
+      &style};
+  for (const NamedFrameSource& sequence : sequences)
+    fidelity->push_back(MeasureFidelity(sequence, targets, progress));
 }
 
 StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
@@ -89,7 +97,6 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
                                       : GeometrySource();
   ConsistencyReport consistency =
       EvaluateConsistency(source, sequences, settings.consistency, progress, geometry);
-  AddFilm(context, progress, &consistency);
 
   // Fidelity is measured on the views that the style was learned from.
   const Image style = ReadStylePicture(settings.style.picture, nullptr);
@@ -99,6 +106,7 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   for (const NamedFrameSource& sequence : sequences)
     fidelity.push_back(MeasureFidelity({sequence.name, frames(sequence.name.c_str(), fitted)},
                                        targets, progress));
+  AddFilm(context, style, progress, &consistency, &fidelity);
   const FidelityTargets photo_targets{FramesOf(workspace.Path("views_2d"), fitted),
                                       targets.transmittance, nullptr};
   const FidelityRow to_photos =

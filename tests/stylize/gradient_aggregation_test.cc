@@ -1,0 +1,206 @@
+// The network's gradient by touched voxels against Algorithm 1, and the network applied to a
+// field.
+#include "tests/support/styled_ball.h"
+
+namespace regrade {
+namespace {
+
+using namespace testing;  // NOLINT: a test
+
+// --- the gradient
+
+// Algorithm 1's loss and its gradient by the network's own parameters.
+double PlainGradient(const LipschitzNetwork& network, const RadianceField& field,
+                     const StyleRays& batch, double scale, std::vector<double>* gradient) {
+  const RayWeights weights = ComputeRayWeights(
+      *field.geometry, {batch.rays.data(), static_cast<int64_t>(batch.rays.size())},
+      MarchOptions{}, field.near_clip);
+  std::vector<Vec3d> directions, targets;
+  for (size_t r = 0; r < batch.rays.size(); ++r) {
+    directions.push_back(batch.rays[r].direction.Cast<double>());
+    targets.push_back(batch.targets[r].Cast<double>());
+  }
+  DenseNetwork<double> d_effective;
+  for (int l = 0; l < kNetworkLayers; ++l)
+    d_effective.layers.emplace_back(LipschitzNetwork::Outputs(l), LipschitzNetwork::Inputs(l));
+  const double loss =
+      Algorithm1<double>(network, field, weights, directions, targets, scale, &d_effective);
+  if (gradient != nullptr) network.AddGradient(d_effective, gradient);
+  return loss;
+}
+
+double RelativeDifference(const std::vector<double>& a, const std::vector<double>& b) {
+  double difference = 0, norm = 0;
+  for (size_t i = 0; i < a.size(); ++i) {
+    difference += (a[i] - b[i]) * (a[i] - b[i]);
+    norm += b[i] * b[i];
+  }
+  return std::sqrt(difference / norm);
+}
+
+std::vector<double> NoGradient() {
+  return std::vector<double>(static_cast<size_t>(LipschitzNetwork::NumParameters()));
+}
+
+TEST(Algorithm1, H46_GradientAgainstRichardson) {
+  const RadianceField field = Ball(6);
+  const StyleRays batch = SomeRays(2, 4);
+  LipschitzNetwork network = RandomNetwork(90);
+  network.data().has_base = true;
+  network.data().base = SomeMap();
+  std::vector<double> gradient = NoGradient();
+  PlainGradient(network, field, batch, 1.0, &gradient);
+  // Parameters are float: steps are powers of two, so that both ends are exact. Every layer's
+  // W, b and K; u and v stay, as in the adjoint.
+  for (int l = 0; l < kNetworkLayers; ++l) {
+    const int64_t first = network.weight(l) - network.weight(0);
+    const int64_t bias = network.bias(l) - network.weight(0);
+    const int64_t k = &network.k(l) - network.weight(0);
+    for (const int64_t at : {first, first + 37, bias + 3, k}) {
+      float& value = network.data().parameters[static_cast<size_t>(at)];
+      const float before = value = std::ldexp(std::round(std::ldexp(value, 14)), -14);
+      std::vector<double> analytic = NoGradient();
+      PlainGradient(network, field, batch, 1.0, &analytic);
+      const auto central = [&](float h) {
+        value = before + h;
+        const double plus = PlainGradient(network, field, batch, 1.0, nullptr);
+        value = before - h;
+        const double minus = PlainGradient(network, field, batch, 1.0, nullptr);
+        value = before;
+        return (plus - minus) / (2 * static_cast<double>(h));
+      };
+      // Two Richardson steps: error O(h^6).
+      const double h0 = central(0x1p-6f), h1 = central(0x1p-7f), h2 = central(0x1p-8f);
+      const double r0 = (4 * h1 - h0) / 3, r1 = (4 * h2 - h1) / 3;
+      const double numeric = (16 * r1 - r0) / 15;
+      EXPECT_NEAR(analytic[static_cast<size_t>(at)], numeric,
+                  2e-8 * std::max(1.0, std::abs(numeric)))
+          << "layer " << l << " parameter " << at - first;
+    }
+  }
+}
+
+TEST(GradientAggregation, EqualsAlgorithm1) {
+  for (const int basis : {9, 4, 1}) {
+    const RadianceField field = Ball(10, basis);
+    const StyleRays batch = SomeRays(3, 12);
+    LipschitzNetwork network = RandomNetwork(91);
+    network.data().has_base = true;
+    network.data().base = SomeMap();
+    GradientAggregation aggregation(field, {});
+    std::vector<double> gradient = NoGradient(), expected = NoGradient();
+    const AggregationResult result = aggregation.Run(network, batch, &gradient);
+    const double scale = 1 / (3.0 * static_cast<double>(batch.rays.size()));
+    const double loss = PlainGradient(network, field, batch, scale, &expected);
+    EXPECT_NEAR(result.loss, loss, 1e-5 * loss);
+    EXPECT_LE(RelativeDifference(gradient, expected), 1e-5) << "basis " << basis;
+    EXPECT_LT(result.touched_voxels, field.geometry->num_voxels());
+    EXPECT_GT(result.touched_voxels, 0);
+  }
+}
+
+TEST(GradientAggregation, PaperSumDividesByVoxels) {
+  const RadianceField field = Ball(8);
+  const StyleRays batch = SomeRays(1, 8);
+  const LipschitzNetwork network = RandomNetwork(92);
+  GradientAggregation mean(field, {});
+  GradientAggregation sum(field, {.divide_by_voxels = true});
+  const double ratio = 3.0 * static_cast<double>(batch.rays.size()) /
+                       static_cast<double>(field.geometry->num_voxels());
+  EXPECT_NEAR(sum.Run(network, batch, nullptr).loss / mean.Run(network, batch, nullptr).loss,
+              ratio, 1e-12);
+}
+
+TEST(GradientAggregation, H48_PatchesSumToTheWhole) {
+  const RadianceField field = Ball(12);
+  // More rays than a band, so that the whole is put together of bands too.
+  const StyleRays batch = SomeRays(8, 48);
+  const LipschitzNetwork network = RandomNetwork(93);
+  GradientAggregation aggregation(field, {});
+  std::vector<double> whole = NoGradient(), parts = NoGradient();
+  aggregation.Run(network, batch, &whole);
+  const size_t n = batch.rays.size();
+  for (const size_t part : {2u, 0u, 3u, 1u}) {  // any order
+    StyleRays patch;
+    patch.rays.assign(batch.rays.begin() + n * part / 4,
+                      batch.rays.begin() + n * (part + 1) / 4);
+    patch.targets.assign(batch.targets.begin() + n * part / 4,
+                         batch.targets.begin() + n * (part + 1) / 4);
+    std::vector<double> gradient = NoGradient();
+    aggregation.Run(network, patch, &gradient);
+    for (size_t i = 0; i < parts.size(); ++i) parts[i] += gradient[i] / 4;
+  }
+  EXPECT_LE(RelativeDifference(parts, whole), 1e-5);
+}
+
+TEST(GradientAggregation, ThreadsDoNotChangeABit) {
+  const RadianceField field = Ball(12);
+  const StyleRays batch = SomeRays(3, 20);
+  const LipschitzNetwork network = RandomNetwork(94);
+  std::vector<double> gradient[2] = {NoGradient(), NoGradient()};
+  for (int t = 0; t < 2; ++t) {
+    const Threads threads(t == 0 ? 1 : 5);
+    GradientAggregation(field, {}).Run(network, batch, &gradient[t]);
+  }
+  EXPECT_EQ(gradient[0], gradient[1]);
+}
+
+TEST(GradientAggregation, H29_RaysWithoutATargetLeaveTheLoss) {
+  const RadianceField field = Ball(10);
+  StyleRays batch = SomeRays(2, 10), kept;
+  for (size_t i = 0; i < batch.rays.size(); ++i)
+    if (i % 3 == 0) {
+      batch.targets[i].y = std::nanf("");
+    } else {
+      kept.rays.push_back(batch.rays[i]);
+      kept.targets.push_back(batch.targets[i]);
+    }
+  const LipschitzNetwork network = RandomNetwork(95);
+  GradientAggregation aggregation(field, {});
+  std::vector<double> with_nan = NoGradient(), without = NoGradient();
+  const AggregationResult a = aggregation.Run(network, batch, &with_nan);
+  const AggregationResult b = aggregation.Run(network, kept, &without);
+  EXPECT_EQ(a.rays, b.rays);
+  EXPECT_EQ(a.loss, b.loss);
+  EXPECT_LE(RelativeDifference(with_nan, without),
+            1e-6);  // other blocks of voxels, other rounding
+}
+
+// --- applying
+
+TEST(ApplyNetwork, MapAloneEqualsTheLinearMap) {
+  for (const int basis : {9, 4, 1}) {
+    const RadianceField field = Ball(10, basis);
+    const Appearance styled = ApplyNetwork(NetworkOfMap(SomeMap()), field);
+    const Appearance mapped = ApplyColorMap(field.appearance, SomeMap());
+    ASSERT_EQ(styled.basis, basis);
+    ASSERT_EQ(styled.sh.size(), mapped.sh.size());
+    for (int64_t i = 0; i < mapped.sh.size(); ++i) EXPECT_EQ(styled.sh[i], mapped.sh[i]);
+  }
+}
+
+TEST(ApplyNetwork, EveryVoxelAsThePlainNetwork) {
+  const RadianceField field = Ball(9);
+  LipschitzNetwork network = RandomNetwork(96);
+  network.data().has_base = true;
+  network.data().base = SomeMap();
+  const Appearance styled = ApplyNetwork(network, field);
+  const std::vector<int32_t> vertex = VertexOfVoxel(*field.geometry);
+  for (int64_t v = 0; v < field.geometry->num_voxels(); v += 17) {
+    float row[kFeatureStride];
+    FillFeatures(field, network.data().position_scale, v, vertex[static_cast<size_t>(v)], row);
+    double x[kFeatureStride], y[kNetworkSh];
+    std::copy_n(row, kFeatureStride, x);
+    network.ForwardPlain(x, y);
+    for (int i = 0; i < kNetworkSh; ++i) EXPECT_NEAR(styled.sh[v * 27 + i], y[i], 2e-5);
+  }
+}
+
+TEST(ApplyNetwork, AbortIsHeeded) {
+  EXPECT_THROW(
+      ApplyNetwork(RandomNetwork(97), Ball(8), [](const Progress&) { return Verdict::kAbort; }),
+      Interrupted);
+}
+
+}  // namespace
+}  // namespace regrade

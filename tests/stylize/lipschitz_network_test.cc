@@ -1,0 +1,147 @@
+// The Lipschitz network: its certificate under attack, its regularisation.
+#include "tests/support/styled_ball.h"
+
+namespace regrade {
+namespace {
+
+using namespace testing;  // NOLINT: a test
+
+// --- the certificate
+
+// 1e5 pairs of arbitrary points, near and far, against EQ(liprf-bound).
+double SteepestPair(const LipschitzNetwork& network, int pairs) {
+  const DenseNetwork<double> f = network.Effective<double>();
+  double steepest = 0;
+  for (int i = 0; i < pairs; ++i) {
+    double x[kFeatureStride] = {}, y[kFeatureStride] = {}, fx[kNetworkSh], fy[kNetworkSh];
+    const double reach = std::pow(10.0, -3 + 3 * (i % 7) / 6.0);
+    double distance = 0;
+    for (int k = 0; k < kNetworkInputs; ++k) {
+      x[k] = 2 * Random(70, static_cast<uint64_t>(i) * 64 + k);
+      y[k] = x[k] + reach * Random(71, static_cast<uint64_t>(i) * 64 + k);
+      distance += (x[k] - y[k]) * (x[k] - y[k]);
+    }
+    DenseForward(f, x, fx);
+    DenseForward(f, y, fy);
+    if (network.data().has_base) {
+      AddBaseMap(network.data().base, x, fx);
+      AddBaseMap(network.data().base, y, fy);
+    }
+    double change = 0;
+    for (int k = 0; k < kNetworkSh; ++k) change += (fx[k] - fy[k]) * (fx[k] - fy[k]);
+    steepest = std::max(steepest, std::sqrt(change / distance));
+  }
+  return steepest;
+}
+
+TEST(LipschitzNetwork, H36_NoPairIsSteeperThanTheBound) {
+  for (const char* activation : {"sine", "relu", "leaky-relu", "sigmoid", "tanh"}) {
+    LipschitzNetwork network = RandomNetwork(80);
+    network.data().activation = activation;
+    network.data().has_base = true;
+    network.data().base = SomeMap();
+    EXPECT_LE(SteepestPair(network, 4000), network.Bound()) << activation;
+  }
+}
+
+TEST(LipschitzNetwork, H36_SineUnderManyArbitraryPairs) {
+  const LipschitzNetwork network = RandomNetwork(81);
+  const double steepest = SteepestPair(network, 20000);
+  EXPECT_LE(steepest, network.Bound());
+  EXPECT_GT(steepest, 0.02 * network.Bound());  // the attack is not idle
+}
+
+TEST(LipschitzNetwork, H36_StaleNormsAreNotBelieved) {
+  // Every layer K W / sigma_hat with W = diag(1, 1/2, ...) and sigma_hat measured along the
+  // second axis: twice too small, so each layer's norm is 2 K. A linear network shows it.
+  LipschitzNetwork network;
+  network.data().activation = "leaky-relu";
+  network.data().singular_vectors.assign(network.data().singular_vectors.size(), 0.0f);
+  float* vectors = network.data().singular_vectors.data();
+  for (int l = 0; l < kNetworkLayers; ++l) {
+    const int inputs = LipschitzNetwork::Inputs(l);
+    network.weight(l)[0] = 1;
+    network.weight(l)[inputs + 1] = 0.5f;
+    network.k(l) = 1;
+    vectors[1] = 1;
+    vectors[LipschitzNetwork::Outputs(l) + 1] = 1;
+    vectors += LipschitzNetwork::Outputs(l) + inputs;
+  }
+  EXPECT_NEAR(network.Bound(), 64, 1e-3);
+  double x[kFeatureStride] = {1}, y[kNetworkSh];
+  network.ForwardPlain(x, y);
+  EXPECT_NEAR(y[0], 64, 1e-3);  // and f really is that steep; the declared product is 1
+  EXPECT_NEAR(network.NormDrift(), 1, 1e-6);
+  network.WarmUpNorms();
+  EXPECT_NEAR(network.Bound(), 1, 1e-3);
+}
+
+TEST(LipschitzNetwork, H44_OmegaMultipliesTheBoundOnceALayer) {
+  LipschitzNetwork network = RandomNetwork(82);
+  const double bound = network.Bound();
+  network.data().omega = 2;
+  EXPECT_NEAR(network.Bound() / bound, 32, 1e-9);
+  EXPECT_LE(SteepestPair(network, 2000), network.Bound());
+}
+
+TEST(LipschitzNetwork, BaseMapCountsWithItsNorm) {
+  const LipschitzNetwork network = NetworkOfMap(SomeMap());
+  EXPECT_EQ(network.ResidualBound(), 0);
+  EXPECT_NEAR(network.Bound(), SpectralNorm(SomeMap().matrix), 1e-12);
+  const ObservedSlopes slopes =
+      ObserveSlopes(network, Ball(12), {.pairs = 2000, .jacobians = 5});
+  EXPECT_LE(slopes.pairs, network.Bound() * (1 + 1e-12));
+  EXPECT_NEAR(slopes.jacobians, network.Bound(), 1e-4);  // thirty steps of the power iteration
+}
+
+TEST(ObservedSlope, H36_ClimbingStaysBelowTheBound) {
+  LipschitzNetwork network = RandomNetwork(83);
+  network.data().has_base = true;
+  network.data().base = SomeMap();
+  const ObservedSlopes slopes =
+      ObserveSlopes(network, Ball(12), {.pairs = 100000, .jacobians = 100});
+  EXPECT_GT(slopes.pairs, 0);
+  EXPECT_GE(slopes.jacobians, 0.5 * slopes.pairs);
+  EXPECT_GE(slopes.ascent, slopes.jacobians);
+  EXPECT_LE(slopes.ascent, network.Bound());
+  EXPECT_LE(slopes.pairs, network.Bound());
+}
+
+TEST(LipschitzNetwork, RefusesWhatIsNoNetwork) {
+  LipschitzNetworkData data = RandomNetwork(84).data();
+  EXPECT_NO_THROW(LipschitzNetwork{data});
+  for (int defect = 0; defect < 4; ++defect) {
+    LipschitzNetworkData bad = data;
+    if (defect == 0) bad.parameters.pop_back();
+    if (defect == 1) bad.singular_vectors.clear();
+    if (defect == 2) bad.parameters[100] = std::numeric_limits<float>::quiet_NaN();
+    if (defect == 3) bad.activation = "swish";
+    EXPECT_THROW(LipschitzNetwork{bad}, Error) << defect;
+  }
+}
+
+// --- the regularisation
+
+TEST(LipschitzRegularizer, H20_H21_H22_Targets) {
+  EXPECT_EQ(LayerTarget(0, 6), 0);
+  EXPECT_NEAR(std::pow(LayerTarget(2.87, 6), 6), 2.87, 1e-14 * 2.87 * 6);
+  bool capped = false;
+  EXPECT_NEAR(LayerTarget(1e7, 6, &capped), std::pow(1e3, 1.0 / 6), 1e-12);
+  EXPECT_TRUE(capped);
+  LayerTarget(5, 6, &capped);
+  EXPECT_FALSE(capped);
+  EXPECT_THROW(LayerTarget(std::numeric_limits<double>::infinity(), 6), Error);
+  EXPECT_THROW(LayerTarget(std::nan(""), 6), Error);
+}
+
+TEST(LipschitzRegularizer, H35_AlwaysPullsTheRightWay) {
+  for (const float k : {0.0f, 0.5f, 1.0f, 1.19f, 1.2f, 3.0f}) {
+    EXPECT_GT(LipschitzPenalty(k, 1.2), 0);
+    EXPECT_GT(LipschitzPenaltyDerivative(k, 1.2), 0);
+  }
+  EXPECT_NEAR(LipschitzPenaltyDerivative(3.0, 1.2), 1, 1e-9);
+  EXPECT_LT(LipschitzPenaltyDerivative(0.5, 1.2), 1e-9);
+}
+
+}  // namespace
+}  // namespace regrade

@@ -1,0 +1,266 @@
+// Learning a style: against the linear map, resumed, interrupted, with targets that are not
+// finite.
+#include "tests/support/styled_ball.h"
+
+namespace regrade {
+namespace {
+
+using namespace testing;  // NOLINT: a test
+
+// --- learning
+
+TrainNetworkOptions Quick(int steps) {
+  TrainNetworkOptions options;
+  options.steps = steps;
+  options.rays_per_step = 512;
+  return options;
+}
+
+SceneColorMap MapOf(const StyledBall& ball) {
+  // The scene-wide map's part is played by least squares over all pixels; K_est is its norm.
+  StyleRays all;
+  for (const auto& view : ball.views)
+    for (int y = 0; y < view.camera.height; ++y)
+      for (int x = 0; x < view.camera.width; ++x) {
+        const float* t = view.target->at(x, y);
+        all.rays.push_back(view.camera.PixelRay(x, y));
+        all.targets.push_back({t[0], t[1], t[2]});
+        if (*view.mask->at(x, y) < 0.5f) all.targets.back().x = std::nanf("");
+      }
+  SceneColorMap result;
+  result.map = LeastSquaresMap(ball.field, all, {.max_transmittance = 0.5f});
+  result.k_est = SpectralNorm(result.map.matrix);
+  return result;
+}
+
+TEST(LeastSquaresMap, RecoversALinearStyle) {
+  // Rendered targets of the mapped field: the map itself is the answer.
+  RadianceField field = Ball(14);
+  for (int64_t i = 0; i < field.appearance.sh.size(); ++i)
+    field.appearance.sh[i] *= 0.4f;  // no clamps
+  StyleRays batch = SomeRays(3, 16);
+  RadianceField mapped = field;
+  ColorMap map = SomeMap();
+  map.offset = {0.1, 0.1, 0.2};
+  mapped.appearance = ApplyColorMap(field.appearance, map);
+  batch.targets = Render(mapped, batch.rays);
+  const ColorMap found = LeastSquaresMap(field, batch, {});
+  for (int c = 0; c < 3; ++c) {
+    for (int d = 0; d < 3; ++d) EXPECT_NEAR(found.matrix(c, d), map.matrix(c, d), 1e-4);
+    EXPECT_NEAR(found.offset[c], map.offset[c], 1e-4);
+  }
+}
+
+TEST(TrainNetwork, BeatsTheLinearMapWhereTheStyleIsCurved) {
+  const StyledBall ball(20, 6, 40, CurvedStyle);
+  const TrainNetworkResult result =
+      TrainNetwork(ball.field, ball.views, MapOf(ball), {}, Quick(120), {});
+  EXPECT_GT(result.psnr_db, result.linear_map_psnr_db + 3);
+  EXPECT_LE(result.bound, 4 * result.k_est * (1 + 1e-9));
+  EXPECT_LE(result.slope_observed, result.bound);
+  EXPECT_LE(result.slope_observed, 1.5 * result.k_est);
+  EXPECT_NEAR(result.bound, result.network.Bound(), 1e-12);
+  EXPECT_LE(result.largest_norm_drift, 0.01);  // H38
+  EXPECT_GT(result.smallest_k, 0.01);          // H34
+}
+
+TEST(TrainNetwork, NeverLosesToTheLinearMap) {
+  const StyledBall ball(16, 4, 32, LinearStyle);
+  const TrainNetworkResult result =
+      TrainNetwork(ball.field, ball.views, MapOf(ball), {}, Quick(30), {});
+  EXPECT_GE(result.psnr_db, result.linear_map_psnr_db);
+}
+
+TEST(TrainNetwork, BoundIsKeptHoweverSmall) {
+  const StyledBall ball(16, 4, 32, CurvedStyle);
+  TrainNetworkOptions options = Quick(40);
+  options.bound_factor = 1.3;
+  const SceneColorMap map = MapOf(ball);
+  const TrainNetworkResult result = TrainNetwork(ball.field, ball.views, map, {}, options, {});
+  EXPECT_LE(result.bound, 1.3 * map.k_est * (1 + 1e-9));
+  EXPECT_GT(result.bound, result.network.BaseNorm());
+}
+
+TEST(TrainNetwork, PaperRecipe) {
+  TrainNetworkOptions options;
+  options.seed = 5;
+  ApplyStyleRecipe("paper", &options);
+  EXPECT_EQ(options.steps, 300);
+  EXPECT_EQ(options.rate_first, 1e-2);
+  EXPECT_EQ(options.rate_last, 1e-4);
+  EXPECT_EQ(options.lambda, 2e-4);
+  EXPECT_EQ(options.rays_per_step, 0);
+  EXPECT_EQ(options.base, "none");
+  EXPECT_EQ(options.norm_steps, 1);
+  EXPECT_EQ(options.seed, 5u);
+  EXPECT_THROW(ApplyStyleRecipe("fast", &options), Error);
+
+  const StyledBall ball(12, 3, 24, CurvedStyle);
+  options.steps = 60;
+  const TrainNetworkResult result =
+      TrainNetwork(ball.field, ball.views, MapOf(ball), {}, options, {});
+  EXPECT_FALSE(result.network.data().has_base);
+  EXPECT_EQ(result.linear_map_psnr_db, 0);
+  EXPECT_GT(result.psnr_db, 15);
+  EXPECT_LE(result.slope_observed, result.bound);
+}
+
+TEST(TrainNetwork, PyTorchStartHasItsWeightsNorms) {
+  LipschitzNetwork network;
+  InitializeAsPyTorch(3, &network);
+  const DenseNetwork<double> f = network.Effective<double>();
+  for (int l = 0; l < kNetworkLayers; ++l)
+    for (const int i : {0, 5, 900})
+      EXPECT_NEAR(f.layers[static_cast<size_t>(l)].weight[static_cast<size_t>(i)],
+                  network.weight(l)[i], 1e-6);
+}
+
+TEST(TrainNetwork, Ablations) {
+  const StyledBall ball(12, 3, 24, CurvedStyle);
+  const SceneColorMap map = MapOf(ball);
+  TrainNetworkOptions options;
+  ApplyStyleRecipe("paper", &options);
+  options.steps = 40;
+  options.rays_per_step = 512;
+  const auto bound = [&](const TrainNetworkOptions& o) {
+    return TrainNetwork(ball.field, ball.views, map, {}, o, {}).bound;
+  };
+  TrainNetworkOptions spectral = options;
+  spectral.spectral_normalisation = true;
+  EXPECT_NEAR(bound(spectral), 1, 0.02);  // the warm-up's sigma is within 1e-6, products of six
+  TrainNetworkOptions free = options, tight = options;
+  options.lambda = free.lambda = tight.lambda = 0.05;
+  free.no_regularisation = true;
+  tight.no_k_est = true;
+  EXPECT_GT(bound(free), bound(options));
+  EXPECT_GT(bound(options), bound(tight));
+}
+
+TEST(TrainNetwork, H109_H110_ResumeAndThreadsAreBitwise) {
+  const StyledBall ball(14, 4, 32, CurvedStyle);
+  const SceneColorMap map = MapOf(ball);
+  const TrainNetworkOptions options = Quick(30);
+  TrainingState half;
+  TrainingHooks hooks;
+  hooks.checkpoint_every = 15;
+  hooks.checkpoint = [&](const TrainingState& state) {
+    if (state.step == 15) half = state;
+  };
+  const TrainNetworkResult straight =
+      TrainNetwork(ball.field, ball.views, map, {}, options, hooks);
+  ASSERT_EQ(half.step, 15);
+  const Threads threads(3);
+  const TrainNetworkResult resumed =
+      TrainNetwork(ball.field, ball.views, map, {}, options, {}, &half);
+  EXPECT_EQ(straight.network.data().parameters, resumed.network.data().parameters);
+  EXPECT_EQ(straight.network.data().singular_vectors, resumed.network.data().singular_vectors);
+  EXPECT_EQ(straight.bound, resumed.bound);
+  EXPECT_EQ(straight.psnr_db, resumed.psnr_db);
+}
+
+TEST(TrainNetwork, H109_RaysAreAFunctionOfSeedAndStep) {
+  StyledBall ball(8, 3, 24, LinearStyle);
+  for (auto& view : ball.views) view.mask = nullptr;
+  const StyleRays a = SampleStyleRays(ball.views, 256, 8, 7, 3);
+  const StyleRays b = SampleStyleRays(ball.views, 256, 8, 7, 3);
+  const StyleRays c = SampleStyleRays(ball.views, 256, 8, 7, 4);
+  EXPECT_EQ(a.rays.size(), 256u);
+  EXPECT_TRUE(a.targets == b.targets);
+  EXPECT_FALSE(a.targets == c.targets);
+  EXPECT_EQ(SampleStyleRays(ball.views, 0, 8, 7, 3).rays.size(), 24u * 24u);
+}
+
+TEST(TrainNetwork, H106_StopsAtTheSecondStepThatIsNotFinite) {
+  const StyledBall ball(10, 3, 24, LinearStyle);
+  const SceneColorMap map = MapOf(ball);
+  TrainingState state;
+  TrainingHooks hooks;
+  hooks.checkpoint_every = 5;
+  hooks.checkpoint = [&](const TrainingState& s) { state = s; };
+  TrainNetwork(ball.field, ball.views, map, {}, Quick(5), hooks);
+  // A bias so large that the network's output overflows: finite itself, but no gradient is.
+  LipschitzNetwork broken(state.network);
+  broken.bias(5)[0] = 3e38f;
+  state.network = broken.data();
+  const TrainingState before = state;
+  try {
+    TrainNetwork(ball.field, ball.views, map, {}, Quick(20), hooks, &before);
+    FAIL() << "learning went on";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ExitCode::kScene);
+    EXPECT_NE(std::string(error.what()).find("step 6"), std::string::npos) << error.what();
+  }
+  EXPECT_EQ(state.adam.rejected, 2);
+  EXPECT_EQ(state.network.parameters, before.network.parameters);  // no step was taken
+}
+
+TEST(TrainNetwork, H29_PixelsThatAreNotFinite) {
+  StyledBall ball(10, 3, 24, LinearStyle);
+  const SceneColorMap map = MapOf(ball);
+  for (auto& view : ball.views) view.mask = nullptr;
+  ball.targets[1].pixels[5] = std::nanf("");
+  const TrainNetworkResult result = TrainNetwork(ball.field, ball.views, map, {}, Quick(5), {});
+  EXPECT_EQ(result.left_out_pixels, 1);
+  EXPECT_TRUE(std::isfinite(result.psnr_db));
+  for (int i = 0; i < 30; ++i)
+    ball.targets[1].pixels[static_cast<size_t>(i) * 3] = std::nanf("");
+  try {
+    TrainNetwork(ball.field, ball.views, map, {}, Quick(5), {});
+    FAIL() << "30 of 576 pixels were accepted";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.where(), "view 1");
+  }
+  ball.targets[1] = Image(20, 24);
+  EXPECT_THROW(TrainNetwork(ball.field, ball.views, map, {}, Quick(5), {}), Error);
+}
+
+TEST(TrainNetwork, MaskedPixelsDoNotTeach) {
+  StyledBall ball(10, 3, 24, LinearStyle);
+  const SceneColorMap map = MapOf(ball);
+  std::vector<float> learned[2];
+  Image mask(24, 24, 1);
+  for (size_t i = 0; i < mask.pixels.size(); ++i) mask.pixels[i] = i % 24 < 12 ? 1.0f : 0.0f;
+  for (auto& view : ball.views) view.mask = &mask;
+  for (int run = 0; run < 2; ++run) {
+    if (run == 1)
+      for (Image& target : ball.targets)
+        for (size_t i = 0; i < mask.pixels.size(); ++i)
+          if (mask.pixels[i] == 0) target.pixels[i * 3] = 0.9f;
+    learned[run] =
+        TrainNetwork(ball.field, ball.views, map, {}, Quick(5), {}).network.data().parameters;
+  }
+  EXPECT_EQ(learned[0], learned[1]);
+}
+
+TEST(TrainNetwork, H20_ConstantStyleRunsToCompletion) {
+  const StyledBall ball(10, 3, 24, [](const Vec3f&) { return Vec3f{0.4f, 0.5f, 0.6f}; });
+  SceneColorMap map;
+  map.map.matrix = Mat3d{};
+  for (auto& row : map.map.matrix.row) row = {0, 0, 0};
+  map.map.offset = {0.4, 0.5, 0.6};
+  map.k_est = 0;
+  const TrainNetworkResult result =
+      TrainNetwork(ball.field, ball.views, map, {}, Quick(10), {});
+  EXPECT_TRUE(std::isfinite(result.bound));
+  EXPECT_GT(result.psnr_db, 40);
+}
+
+TEST(TrainNetwork, FinishKeepsAUsableResultAndAbortLeaves) {
+  const StyledBall ball(10, 3, 24, CurvedStyle);
+  const SceneColorMap map = MapOf(ball);
+  TrainingHooks hooks;
+  hooks.progress = [](const Progress& p) {
+    return p.done >= 7 ? Verdict::kFinish : Verdict::kContinue;
+  };
+  EXPECT_EQ(TrainNetwork(ball.field, ball.views, map, {}, Quick(20), hooks).steps, 7);
+  int64_t saved = 0;
+  hooks.progress = [](const Progress& p) {
+    return p.done >= 3 ? Verdict::kAbort : Verdict::kContinue;
+  };
+  hooks.checkpoint = [&](const TrainingState& state) { saved = state.step; };
+  EXPECT_THROW(TrainNetwork(ball.field, ball.views, map, {}, Quick(20), hooks), Interrupted);
+  EXPECT_EQ(saved, 3);
+}
+
+}  // namespace
+}  // namespace regrade
