@@ -24,7 +24,7 @@ struct FramesOptions {
     bind("target", target,
          {.help = "folder of what the 2D method made of each frame, for fidelity"});
     bind("style", style, {.help = "the style picture, for fidelity"});
-    bind("out", out, {.help = "folder for evaluation.json"});
+    bind("out", out, {.help = "folder for report.json"});
   }
 };
 
@@ -71,7 +71,7 @@ void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& optio
   const JsonValue record = EvaluationRecord(consistency, fidelity);
   if (!frames.out.empty()) {
     Workspace workspace(frames.out);
-    WriteJsonFile(workspace.Path("evaluation.json"),
+    WriteJsonFile(workspace.Path("report.json"),
                   EvaluationJson(ReportOfEvaluation(record)));
   }
   console->Event("evaluation", record);

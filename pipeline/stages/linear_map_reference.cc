@@ -61,6 +61,9 @@ std::optional<double> LinearMapPsnr(const RadianceField& field,
           : least_squares;
   RadianceField mapped = field;
   mapped.appearance = ApplyColorMap(field.appearance, better);
+  const Vec3d background = better(field.background.Cast<double>());
+  for (int c = 0; c < 3; ++c)
+    mapped.background[c] = static_cast<float>(std::clamp(background[c], 0.0, 1.0));
   const FastGrid grid = MakeFastGrid(mapped);
   const FrameSource rendered{source.count, [&](int i) {
                                return RenderView(grid, cameras[static_cast<size_t>(i)],

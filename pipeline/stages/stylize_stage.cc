@@ -2,6 +2,8 @@
 // styled.npz is the same geometry in those colours; network.npz keeps the network.
 #include <omp.h>
 
+#include <algorithm>
+
 #include "pipeline/capture_store.h"
 #include "pipeline/field_file.h"
 #include "pipeline/files/image_file.h"
@@ -45,6 +47,12 @@ Lessons ReadLessons(RunContext* context, const Capture& capture, const StoredFie
   return lessons;
 }
 
+Vec3f Mapped(const ColorMap& map, const Vec3f& color) {
+  Vec3d mapped = map(color.Cast<double>());
+  for (int c = 0; c < 3; ++c) mapped[c] = std::clamp(mapped[c], 0.0, 1.0);
+  return mapped.Cast<float>();
+}
+
 StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
                      const ProgressFunction& progress) {
   const RunSettings& settings = context->settings;
@@ -53,6 +61,10 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
   StoredField stored = ReadFieldFile(workspace.Path("field.npz"));
   const Lessons lessons = ReadLessons(context, capture, stored);
 
+  // What a ray sees behind the box is a colour of the scene too, unless the paper's letter is
+  // asked for.
+  if (settings.network.recipe != "paper")
+    stored.field.background = Mapped(lessons.scene_map.map, stored.field.background);
   TrainNetworkOptions options = settings.network;
   options.seed = settings.run.seed;
   TrainingHooks hooks;
