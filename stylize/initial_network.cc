@@ -40,10 +40,6 @@ Eigen::MatrixXd RandomIsometry(int rows, int columns, uint64_t seed, uint64_t st
   return rows >= columns ? q : Eigen::MatrixXd(q.transpose());
 }
 
-void ClearLastLayer(LipschitzNetwork* network) {
-  std::fill(network->weight(kLast), &network->k(kLast), 0.0f);  // weights and biases
-}
-
 }  // namespace
 
 void InitializeAsPyTorch(uint64_t seed, LipschitzNetwork* network) {
@@ -77,6 +73,10 @@ void InitializeResidual(uint64_t seed, LipschitzNetwork* network) {
   ClearLastLayer(network);
   network->k(kLast) = 1;
   network->WarmUpNorms();
+}
+
+void ClearLastLayer(LipschitzNetwork* network) {
+  std::fill(network->weight(kLast), &network->k(kLast), 0.0f);  // weights and biases
 }
 
 void SolveOutputLayer(const GradientAggregation::HiddenSums& sums, double budget,

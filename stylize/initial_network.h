@@ -18,6 +18,9 @@ void InitializeAsPyTorch(uint64_t seed, LipschitzNetwork* network);
 // layer is zero: the network is its colour map, exactly.
 void InitializeResidual(uint64_t seed, LipschitzNetwork* network);
 
+// Makes the residual exactly zero.
+void ClearLastLayer(LipschitzNetwork* network);
+
 // Sets the last layer's constant coefficients (degree 0) by a ridge regression: what the colour
 // map leaves missing, explained by the sums of hidden activations along rays. Of ridges growing
 // from nearly none, the first whose ResidualBound() is within `budget`.

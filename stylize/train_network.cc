@@ -75,151 +75,209 @@ void ApplyStyleRecipe(const std::string& recipe, TrainNetworkOptions* options) {
   options->bound_factor = 0;
 }
 
+namespace {
+
+// One training from its start or its checkpoint to its result.
+class Training {
+ public:
+  Training(const RadianceField& field, const std::vector<StyledTrainingView>& views,
+           const SceneColorMap& scene_map, const MarchOptions& march,
+           const TrainNetworkOptions& options)
+      : field_(field),
+        views_(views),
+        scene_map_(scene_map),
+        options_(options),
+        aggregation_options_{.march = march,
+                             .min_weight = options.min_weight,
+                             .max_transmittance = options.recipe == "paper" ? 1.0f : 0.5f,
+                             .one_sided = options.recipe != "paper",
+                             .divide_by_voxels = options.loss_scale == "sum-over-voxels"},
+        aggregation_(field, aggregation_options_),
+        // A fixed sample of the training pixels chooses the base and says what was gained.
+        sample_(SampleStyleRays(views, 16384, 8, options.seed, kSampleStream)) {
+    bool capped = false;
+    const double target = LayerTarget(scene_map.k_est, kNetworkLayers, &capped);
+    layer_target_ = options.no_k_est ? 0 : target;
+    result_.k_est = std::min(scene_map.k_est, kLargestKEst);
+    if (capped)
+      result_.warnings.push_back(
+          "K_est is above 1000 and was cut: the 2D method is not smooth");
+  }
+
+  void Start(int64_t bad_pixels);
+  void Resume(const TrainingState& state);
+  // One step; false if it was not finite and nothing has changed.
+  bool Step(AggregationResult* step, std::vector<double>* gradient);
+  TrainNetworkResult Conclude();
+
+  const LipschitzNetwork& network() const { return network_; }
+  TrainingState Capture() const {
+    TrainingState state = state_;
+    state.network = network_.data();
+    return state;
+  }
+  int64_t steps_done() const { return state_.step; }
+
+ private:
+  ColorMap ChooseBase();
+  // What the certified bound leaves to the residual.
+  double Budget() const {
+    if (options_.bound_factor <= 0) return std::numeric_limits<double>::infinity();
+    return std::max(options_.bound_factor * result_.k_est - network_.BaseNorm(), 1e-3);
+  }
+
+  const RadianceField& field_;
+  const std::vector<StyledTrainingView>& views_;
+  const SceneColorMap& scene_map_;
+  const TrainNetworkOptions& options_;
+  AggregationOptions aggregation_options_;
+  GradientAggregation aggregation_;
+  StyleRays sample_;
+  double layer_target_ = 0;
+  LipschitzNetwork network_;
+  TrainingState state_;  // but for the network, which is network_
+  TrainNetworkResult result_;
+  double touched_ = 0;
+  int64_t steps_here_ = 0;
+};
+
+ColorMap Training::ChooseBase() {
+  ColorMap base = scene_map_.map;
+  state_.linear_map_mse = std::numeric_limits<double>::infinity();
+  const auto consider = [&](const ColorMap& map) {
+    const double mse = aggregation_.Run(NetworkOfMap(map), sample_, nullptr).Mse();
+    if (mse < state_.linear_map_mse) state_.linear_map_mse = mse, base = map;
+  };
+  if (options_.base != "least-squares") consider(scene_map_.map);
+  if (options_.base != "mkl") consider(LeastSquaresMap(field_, sample_, aggregation_options_));
+  return base;
+}
+
+void Training::Start(int64_t bad_pixels) {
+  state_.left_out_pixels = bad_pixels;
+  LipschitzNetworkData& data = network_.data();
+  data.activation = options_.activation;
+  data.omega = options_.omega;
+  data.sh_scale = options_.sh_scale;
+  data.position_scale = options_.position_scale;
+  if (options_.base == "none") {
+    InitializeAsPyTorch(options_.seed, &network_);
+  } else {
+    data.base = ChooseBase();
+    data.has_base = true;
+    InitializeResidual(options_.seed, &network_);
+    // Half of the largest bound: the rest is for learning.
+    SolveOutputLayer(aggregation_.SumHidden(network_, sample_), 2 * result_.k_est, &network_);
+  }
+  if (options_.spectral_normalisation)
+    for (int l = 0; l < kNetworkLayers; ++l) network_.k(l) = 1;
+  else
+    LimitProduct(Budget(), &network_);
+}
+
+void Training::Resume(const TrainingState& state) {
+  state_ = state;
+  network_ = LipschitzNetwork(state.network);
+}
+
+bool Training::Step(AggregationResult* step, std::vector<double>* gradient) {
+  for (int i = 0; i < options_.norm_steps; ++i) network_.StepNorms();
+  if (state_.step % 25 == 0) {
+    const double drift = network_.NormDrift();
+    result_.largest_norm_drift = std::max(result_.largest_norm_drift, drift);
+    if (drift > 0.01 / kNetworkLayers) network_.WarmUpNorms();
+  }
+  const StyleRays batch = SampleStyleRays(views_, options_.rays_per_step, options_.patch,
+                                          options_.seed, static_cast<uint64_t>(state_.step));
+  gradient->assign(static_cast<size_t>(LipschitzNetwork::NumParameters()), 0.0);
+  *step = aggregation_.Run(network_, batch, gradient);
+  touched_ += static_cast<double>(step->touched_voxels);
+  ++steps_here_;
+  for (int l = 0; l < kNetworkLayers; ++l) {
+    double& d_k = (*gradient)[static_cast<size_t>(&network_.k(l) - network_.weight(0))];
+    if (options_.spectral_normalisation)
+      d_k = 0;
+    else if (!options_.no_regularisation)
+      d_k += options_.lambda * LipschitzPenaltyDerivative(network_.k(l), layer_target_);
+  }
+  const std::vector<float> gradient32(gradient->begin(), gradient->end());
+  std::vector<float>& parameters = network_.data().parameters;
+  const int64_t size = static_cast<int64_t>(parameters.size());
+  const double rate =
+      CosineAnnealing(state_.step, options_.steps, options_.rate_first, options_.rate_last);
+  ++state_.step;
+  if (!AdamStep({}, rate, {gradient32.data(), size}, {parameters.data(), size}, &state_.adam))
+    return false;
+  if (!options_.spectral_normalisation) LimitProduct(Budget(), &network_);
+  return true;
+}
+
+TrainNetworkResult Training::Conclude() {
+  network_.WarmUpNorms();
+  double mse = aggregation_.Run(network_, sample_, nullptr).Mse();
+  if (network_.data().has_base && !(mse <= state_.linear_map_mse)) {
+    result_.warnings.push_back(
+        "the network did not beat the colour map: the map alone is used");
+    ClearLastLayer(&network_);
+    mse = state_.linear_map_mse;
+  }
+  // The power iteration's norms are a little low; the promise is about exact ones.
+  const double excess = network_.ResidualBound() / Budget();
+  if (excess > 1) network_.k(kNetworkLayers - 1) *= static_cast<float>((1 - 1e-6) / excess);
+  result_.bound = network_.Bound();
+  result_.slope_observed = ObserveSlopes(network_, field_, {.seed = options_.seed}).OnData();
+  result_.smallest_k = network_.SmallestK();
+  if (result_.smallest_k < 10 * std::sqrt(kSquareplusB))
+    result_.warnings.push_back("a layer's norm has vanished: the network is constant");
+  result_.psnr_db = Psnr(mse);
+  result_.linear_map_psnr_db = network_.data().has_base ? Psnr(state_.linear_map_mse) : 0;
+  result_.steps = state_.step;
+  result_.mean_touched_voxels =
+      steps_here_ > 0 ? touched_ / static_cast<double>(steps_here_) : 0;
+  result_.rejected_steps = state_.adam.rejected;
+  result_.left_out_pixels = state_.left_out_pixels;
+  result_.network = std::move(network_);
+  return std::move(result_);
+}
+
+}  // namespace
+
 TrainNetworkResult TrainNetwork(const RadianceField& field,
                                 const std::vector<StyledTrainingView>& views,
                                 const SceneColorMap& scene_map, const MarchOptions& march,
                                 const TrainNetworkOptions& options, const TrainingHooks& hooks,
                                 const TrainingState* resume) {
-  const bool paper = options.recipe == "paper";
-  AggregationOptions aggregation_options{
-      .march = march,
-      .min_weight = options.min_weight,
-      .max_transmittance = paper ? 1.0f : 0.5f,
-      .one_sided = !paper,
-      .divide_by_voxels = options.loss_scale == "sum-over-voxels"};
-  GradientAggregation aggregation(field, aggregation_options);
-  // A fixed sample of the training pixels: it chooses the base and says what was gained.
-  constexpr int kSampleRays = 16384;
   const int64_t bad_pixels = ValidateViews(views);
-  const StyleRays sample = SampleStyleRays(views, kSampleRays, 8, options.seed, kSampleStream);
-
-  TrainNetworkResult result;
-  bool capped = false;
-  const double layer_target =
-      options.no_k_est ? 0 : LayerTarget(scene_map.k_est, kNetworkLayers, &capped);
-  result.k_est = std::min(scene_map.k_est, kLargestKEst);
-  if (capped)
-    result.warnings.push_back("K_est is above 1000 and was cut: the 2D method is not smooth");
-
-  const auto budget_of = [&](const LipschitzNetwork& network) {
-    return options.bound_factor > 0
-               ? std::max(options.bound_factor * result.k_est - network.BaseNorm(), 1e-3)
-               : std::numeric_limits<double>::infinity();
-  };
-
-  TrainingState state;
-  if (resume != nullptr) {
-    state = *resume;
-  } else {
-    state.left_out_pixels = bad_pixels;
-    LipschitzNetwork network;
-    network.data().activation = options.activation;
-    network.data().omega = options.omega;
-    network.data().position_scale = options.position_scale;
-    if (options.base == "none") {
-      InitializeAsPyTorch(options.seed, &network);
-    } else {
-      double best = std::numeric_limits<double>::infinity();
-      const auto consider = [&](const ColorMap& map) {
-        const double mse = aggregation.Run(NetworkOfMap(map), sample, nullptr).Mse();
-        if (mse < best) best = mse, network.data().base = map;
-      };
-      if (options.base != "least-squares") consider(scene_map.map);
-      if (options.base != "mkl") consider(LeastSquaresMap(field, sample, aggregation_options));
-      network.data().has_base = true;
-      state.linear_map_mse = best;
-      network.data().sh_scale = options.sh_scale;
-      InitializeResidual(options.seed, &network);
-      SolveOutputLayer(aggregation.SumHidden(network, sample), 2 * result.k_est, &network);
-    }
-    if (options.spectral_normalisation)
-      for (int l = 0; l < kNetworkLayers; ++l) network.k(l) = 1;
-    LimitProduct(budget_of(network), &network);
-    state.network = network.data();
-  }
-  LipschitzNetwork network(state.network);
-  const double budget = budget_of(network);
-
-  const auto capture = [&] {
-    state.network = network.data();
-    return state;
-  };
+  Training training(field, views, scene_map, march, options);
+  if (resume != nullptr)
+    training.Resume(*resume);
+  else
+    training.Start(bad_pixels);
   int rejected_in_a_row = 0;
-  double touched = 0;
-  int64_t touched_steps = 0;
-  while (state.step < options.steps) {
-    for (int i = 0; i < options.norm_steps; ++i) network.StepNorms();
-    if (state.step % 25 == 0) {
-      const double drift = network.NormDrift();
-      result.largest_norm_drift = std::max(result.largest_norm_drift, drift);
-      if (drift > 0.01 / kNetworkLayers) network.WarmUpNorms();
-    }
-    const StyleRays batch = SampleStyleRays(views, options.rays_per_step, options.patch,
-                                            options.seed, static_cast<uint64_t>(state.step));
-    std::vector<double> gradient(static_cast<size_t>(LipschitzNetwork::NumParameters()));
-    const AggregationResult step = aggregation.Run(network, batch, &gradient);
-    touched += static_cast<double>(step.touched_voxels);
-    ++touched_steps;
-    for (int l = 0; l < kNetworkLayers; ++l) {
-      double& d_k = gradient[static_cast<size_t>(&network.k(l) - network.weight(0))];
-      if (options.spectral_normalisation)
-        d_k = 0;
-      else if (!options.no_regularisation)
-        d_k += options.lambda * LipschitzPenaltyDerivative(network.k(l), layer_target);
-    }
-    const std::vector<float> gradient32(gradient.begin(), gradient.end());
-    std::vector<float>& parameters = network.data().parameters;
-    const int64_t size = static_cast<int64_t>(parameters.size());
-    const double rate =
-        CosineAnnealing(state.step, options.steps, options.rate_first, options.rate_last);
-    if (AdamStep({}, rate, {gradient32.data(), size}, {parameters.data(), size}, &state.adam)) {
-      rejected_in_a_row = 0;
-      if (!options.spectral_normalisation) LimitProduct(budget, &network);
-    } else if (++rejected_in_a_row == 2) {
-      if (hooks.checkpoint) hooks.checkpoint(capture());
+  while (training.steps_done() < options.steps) {
+    AggregationResult step;
+    std::vector<double> gradient;
+    rejected_in_a_row = training.Step(&step, &gradient) ? 0 : rejected_in_a_row + 1;
+    if (rejected_in_a_row == 2) {
+      if (hooks.checkpoint) hooks.checkpoint(training.Capture());
       throw Error(ExitCode::kScene,
-                  "learning the style stopped at step " + std::to_string(state.step) +
+                  "learning the style stopped at step " +
+                      std::to_string(training.steps_done() - 1) +
                       ": two steps in a row were not finite, first in " +
-                      FirstNonFinite(network, gradient, step.loss),
+                      FirstNonFinite(training.network(), gradient, step.loss),
                   "", "lower --style-rate; the state before it was kept");
     }
-    ++state.step;
     char note[64];
     std::snprintf(note, sizeof note, "%.1f dB on this step's rays", Psnr(step.Mse()));
-    const Verdict verdict = Report(hooks.progress, static_cast<double>(state.step),
+    const Verdict verdict = Report(hooks.progress, static_cast<double>(training.steps_done()),
                                    static_cast<double>(options.steps), note);
-    const bool last = verdict != Verdict::kContinue || state.step == options.steps;
-    if (hooks.checkpoint && (last || state.step % hooks.checkpoint_every == 0))
-      hooks.checkpoint(capture());
+    const bool last = verdict != Verdict::kContinue || training.steps_done() == options.steps;
+    if (hooks.checkpoint && (last || training.steps_done() % hooks.checkpoint_every == 0))
+      hooks.checkpoint(training.Capture());
     if (verdict == Verdict::kAbort) throw Interrupted();
     if (verdict == Verdict::kFinish) break;
   }
-
-  network.WarmUpNorms();
-  double mse = aggregation.Run(network, sample, nullptr).Mse();
-  if (network.data().has_base && !(mse <= state.linear_map_mse)) {
-    result.warnings.push_back("the network did not beat the colour map: the map alone is used");
-    float* last_weight = network.weight(kNetworkLayers - 1);
-    std::fill(last_weight, &network.k(kNetworkLayers - 1), 0.0f);  // and its bias
-    mse = state.linear_map_mse;
-  }
-  // The power iteration's norms are a little low; the promise is about exact ones.
-  const double excess = network.ResidualBound() / budget;
-  if (excess > 1) network.k(kNetworkLayers - 1) *= static_cast<float>((1 - 1e-6) / excess);
-  result.bound = network.Bound();
-  result.slope_observed = ObserveSlopes(network, field, {.seed = options.seed}).OnData();
-  result.smallest_k = network.SmallestK();
-  if (result.smallest_k < 10 * std::sqrt(kSquareplusB))
-    result.warnings.push_back("a layer's norm has vanished: the network is constant");
-  result.psnr_db = Psnr(mse);
-  result.linear_map_psnr_db = network.data().has_base ? Psnr(state.linear_map_mse) : 0;
-  result.steps = state.step;
-  result.mean_touched_voxels =
-      touched_steps > 0 ? touched / static_cast<double>(touched_steps) : 0;
-  result.rejected_steps = state.adam.rejected;
-  result.left_out_pixels = state.left_out_pixels;
-  result.network = std::move(network);
-  return result;
+  return training.Conclude();
 }
 
 }  // namespace regrade
