@@ -139,6 +139,8 @@ TEST(LipschitzRegularizer, H35_AlwaysPullsTheRightWay) {
     EXPECT_GT(LipschitzPenalty(k, 1.2), 0);
     EXPECT_GT(LipschitzPenaltyDerivative(k, 1.2), 0);
   }
+  // Far below the target it is b / (4 |K - target|), which the textbook form rounds away.
+  EXPECT_NEAR(LipschitzPenalty(0, 1.2) / (1e-12 / 4.8), 1, 1e-9);
   EXPECT_NEAR(LipschitzPenaltyDerivative(3.0, 1.2), 1, 1e-9);
   EXPECT_LT(LipschitzPenaltyDerivative(0.5, 1.2), 1e-9);
 }
