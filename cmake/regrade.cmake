@@ -7,7 +7,9 @@ target_compile_options(regrade_flags INTERFACE
   # -Wrestrict misfires on std::string + in GCC 12 (GCC PR 105651).
   $<$<COMPILE_LANGUAGE:CXX>:-Wall -Wextra -Wno-unknown-pragmas -Wno-missing-field-initializers -Wno-restrict>
   $<$<AND:$<BOOL:${REGRADE_WERROR}>,$<COMPILE_LANGUAGE:CXX>>:-Werror>)
-target_compile_definitions(regrade_flags INTERFACE REGRADE_VERSION="${PROJECT_VERSION}")
+# Eigen's own threads wait for each other in busy loops, and its products here are small.
+target_compile_definitions(regrade_flags INTERFACE
+  REGRADE_VERSION="${PROJECT_VERSION}" EIGEN_DONT_PARALLELIZE)
 if(REGRADE_SANITIZE)
   target_compile_options(regrade_flags INTERFACE
     -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer -g)

@@ -41,6 +41,7 @@ void ApplyPreset(const std::string& preset, RunSettings* settings) {
     settings->fit.rays_per_step = 5000;
     settings->fit.patch = 1;
     settings->fit.step = 0.5f;
+    settings->fit.view_bound = 1e6f;
     settings->fit.stop_transmittance = 1e-7f;
     settings->fit.rate_density = 30;
     settings->fit.rate_density_end = 1.5f;

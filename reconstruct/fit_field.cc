@@ -158,6 +158,7 @@ class Fitter {
     optimizer.rate_sh = ExponentialRate(options_.rate_sh, options_.rate_sh_end, p);
     optimizer.rate_density =
         ExponentialRate(options_.rate_density, options_.rate_density_end, p);
+    optimizer.view_bound = options_.view_bound;
     constexpr int64_t kChunk = 2048;
     std::vector<std::pair<int, int64_t>> chunks;
     for (int s = 0; s < shards; ++s)

@@ -14,6 +14,7 @@ struct FitOptions {
   int rays_per_step = 4096;
   int patch = 1;
   int sh_degree = 2;
+  float view_bound = 0.2f;
   float step = 1.0f;
   float stop_transmittance = 1e-3f;
   float rate_density = 8.0f;
@@ -56,6 +57,11 @@ struct FitOptions {
              "view dependence: spherical harmonics degree 0, 1 or 2 (1, 4, 9 values a channel)",
          .min = 0,
          .max = 2});
+    bind("fit-view-bound", view_bound,
+         {.help = "largest view-dependent coefficient; a larger one lets colours wander where "
+                  "the clamp hides them, and styles then show it",
+          .min = 0,
+          .max = 1e6});
     bind("fit-step-size", step,
          {.unit = "voxels",
           .help = "distance of samples along a ray; 0.5 doubles the time of 1 and gained "

@@ -7,3 +7,11 @@
 #else
 #define HD
 #endif
+
+// For functions that files with instruction-set flags share with others: an out-of-line copy made there could be
+// the one the linker keeps for all, and end older processors.
+#if defined(__CUDACC__)
+#define REGRADE_ALWAYS_INLINE
+#else
+#define REGRADE_ALWAYS_INLINE __attribute__((always_inline)) inline
+#endif

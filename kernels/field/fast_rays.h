@@ -67,6 +67,11 @@ struct RmspropOptions {
   float epsilon = 1e-8f;
   float rate_sh = 1e-2f;
   float rate_density = 30.0f;
+  // Colours are then projected: a voxel's mean colour (degree 0) into [0, 1], its
+  // view-dependent coefficients into
+  // [-view_bound, view_bound]. What the colour clamp hides would otherwise wander off, and come
+  // to light under a colour map: clamping does not commute with it.
+  float view_bound = 0.2f;
 };
 
 struct FitStepResult {

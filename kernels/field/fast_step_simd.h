@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "kernels/field/fast_record_simd.h"
+#include "kernels/field/spherical_harmonics.h"
 
 namespace regrade::REGRADE_SIMD_NAMESPACE {
 namespace {
@@ -87,6 +88,16 @@ int64_t Step(FastGrid* grid, float* second_moment, const GradientArena* arenas, 
   for (int l = 0; l < 3 * kBasis; ++l) rate_lanes[l] = options.rate_sh;
   rate_lanes[DensityLane(kBasis)] = options.rate_density;
   const R rate = R::Load(rate_lanes);
+  alignas(64) float low_lanes[kLanes], high_lanes[kLanes];
+  constexpr float kMeanBound = static_cast<float>(0.5 / kSh0);  // 1/2 + kSh0 sh_0 in [0, 1]
+  for (int l = 0; l < kLanes; ++l) {
+    const float bound = l >= 3 * kBasis   ? 3e38f
+                        : l % kBasis == 0 ? kMeanBound
+                                          : options.view_bound;
+    low_lanes[l] = -bound;
+    high_lanes[l] = bound;
+  }
+  const R low = R::Load(low_lanes), high = R::Load(high_lanes);
   int64_t rejected = 0;
   for (int64_t slot = begin; slot < end; ++slot) {
     const int32_t voxel = arenas[self].voxel_of_slot[slot];
@@ -121,7 +132,9 @@ int64_t Step(FastGrid* grid, float* second_moment, const GradientArena* arenas, 
       new_v.v[i] = v.v[i] == 0.0f ? squared : blended;
       Vector root{};
       for (int l = 0; l < Shape::kWidth; ++l) root[l] = std::sqrt(new_v.v[i][l]);
-      new_x.v[i] = x.v[i] - rate.v[i] * g.v[i] / (root + options.epsilon);
+      const Vector stepped = x.v[i] - rate.v[i] * g.v[i] / (root + options.epsilon);
+      const Vector raised = stepped < low.v[i] ? low.v[i] : stepped;
+      new_x.v[i] = raised > high.v[i] ? high.v[i] : raised;
     }
     new_v.Store(moments);
     new_x.Store(values);

@@ -17,7 +17,7 @@ HD constexpr int BasisOfDegree(int degree) { return (degree + 1) * (degree + 1);
 // gamma [basis]; `basis` is 1, 4 or 9; `d` has unit length (a length s scales band l by s^l:
 // normalise once, where the ray is made).
 template <typename T>
-HD void ShBasis(int basis, const Vec3<T>& d, T* gamma) {
+HD REGRADE_ALWAYS_INLINE void ShBasis(int basis, const Vec3<T>& d, T* gamma) {
   gamma[0] = T(kSh0);
   if (basis <= 1) return;
   constexpr double kSh1 = 0.4886025119029199;

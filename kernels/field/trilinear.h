@@ -17,7 +17,7 @@ struct Cell {
 
 // `p` must be finite; it is clamped to the vertices' range [0, N - 1].
 template <typename T>
-HD Cell<T> LocateCell(const GridFrame& frame, const Vec3<T>& p) {
+HD REGRADE_ALWAYS_INLINE Cell<T> LocateCell(const GridFrame& frame, const Vec3<T>& p) {
   Cell<T> cell;
   int base[3];
   for (int a = 0; a < 3; ++a) {

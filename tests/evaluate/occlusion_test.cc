@@ -207,7 +207,9 @@ TEST(Occlusion, H116_TargetsOutOfTheFrameAreCountedApart) {
   EXPECT_EQ(ruder.out_of_frame, 40 * 30 - 31 * 29);
   for (int y = 0; y < 30; ++y)
     for (int x = 0; x < 40; ++x)
-      if (x >= 31 || y >= 29) EXPECT_EQ(*ruder.weight.at(x, y), 0) << x << " " << y;
+      if (x >= 31 || y >= 29) {
+        EXPECT_EQ(*ruder.weight.at(x, y), 0) << x << " " << y;
+      }
   EXPECT_EQ(*ruder.weight.at(10, 10), 1);
 }
 

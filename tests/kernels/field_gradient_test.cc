@@ -180,10 +180,13 @@ TEST_P(FastRaysParity, H103_H104_StepIsSparseAndRefusesNan) {
   Buffer<float> moments(grid.records.size());
   int64_t rejected = 0;
   for (int s = 0; s < 2; ++s)
-    rejected += functions()->step(
-        &grid, moments.data(), arenas.data(), 2, s, 0,
-        arenas[static_cast<size_t>(s)].voxel_of_slot.size(),
-        {.beta = 0.95f, .epsilon = 1e-8f, .rate_sh = 0.1f, .rate_density = 2.0f});
+    rejected += functions()->step(&grid, moments.data(), arenas.data(), 2, s, 0,
+                                  arenas[static_cast<size_t>(s)].voxel_of_slot.size(),
+                                  {.beta = 0.95f,
+                                   .epsilon = 1e-8f,
+                                   .rate_sh = 0.1f,
+                                   .rate_density = 2.0f,
+                                   .view_bound = 10.0f});
   EXPECT_EQ(rejected, 1);
   for (int64_t v = 0; v < grid.num_voxels(); ++v)
     for (int l = 0; l <= DensityLane(basis()); ++l) {
@@ -203,6 +206,36 @@ TEST_P(FastRaysParity, H103_H104_StepIsSparseAndRefusesNan) {
     }
   EXPECT_EQ(grid.dense_density[grid.vertex_of_voxel[5]],
             grid.records[5 * lanes + DensityLane(basis())]);
+}
+
+// The mean colour stays in [0, 1] and view dependence within its bound, however long the step.
+TEST_P(FastRaysParity, StepIsProjected) {
+  if (functions() == nullptr)
+    GTEST_SKIP() << "this processor lacks " << std::get<0>(GetParam());
+  for (const float direction : {-1.0f, 1.0f}) {
+    FastGrid grid = MakeFastGrid(RandomField({3, 3, 3}, basis(), 1.0, 52));
+    const int lanes = grid.lanes();
+    GradientArena arena;
+    arena.Reset(grid.num_voxels(), lanes);
+    arena.slot_of_voxel[4] = 0;
+    arena.voxel_of_slot.Resize(1);
+    arena.voxel_of_slot[0] = 4;
+    arena.gradient.Resize(lanes);
+    for (int l = 0; l <= DensityLane(basis()); ++l) arena.gradient[l] = direction;
+    Buffer<float> moments(grid.records.size());
+    functions()->step(&grid, moments.data(), &arena, 1, 0, 0, 1,
+                      {.rate_sh = 100, .rate_density = 100, .view_bound = 0.3f});
+    for (int l = 0; l < 3 * basis(); ++l) {
+      const float value = grid.records[4 * lanes + l];
+      if (l % basis() == 0) {
+        EXPECT_NEAR(0.5 + kSh0 * value, direction > 0 ? 0 : 1, 1e-6);
+      } else {
+        EXPECT_EQ(value, -direction * 0.3f);
+      }
+    }
+    EXPECT_GT(std::abs(grid.records[4 * lanes + DensityLane(basis())]),
+              80);  // densities are free
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(AllPaths, FastRaysParity,

@@ -12,10 +12,12 @@ TEST(Half, EveryHalfSurvivesTheRoundTrip) {
   for (uint32_t bits = 0; bits < 0x10000; ++bits) {
     const uint16_t half = static_cast<uint16_t>(bits);
     const float value = FloatFromHalf(half);
-    if (std::isnan(value))
+    if (std::isnan(value)) {
       EXPECT_TRUE(std::isnan(FloatFromHalf(HalfFromFloat(value))));
-    else
+    }
+    else {
       ASSERT_EQ(HalfFromFloat(value), half);
+    }
   }
 }
 
