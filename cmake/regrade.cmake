@@ -24,7 +24,10 @@ if(NOT REGRADE_CUDA STREQUAL "OFF")
     if(NOT DEFINED CMAKE_CUDA_ARCHITECTURES)
       set(CMAKE_CUDA_ARCHITECTURES 75 80 86 89 90 120)
     endif()
-    # CMake 3.25 does not know nvcc 13's C++20 flag and drops CMAKE_CUDA_STANDARD in silence.
+    # CMake 3.25 does not know nvcc 13's C++20 flag: it drops CMAKE_CUDA_STANDARD in silence, and fails if the
+    # standard is required (as C++'s is, which CUDA would take over).
+    set(CMAKE_CUDA_STANDARD 20)
+    set(CMAKE_CUDA_STANDARD_REQUIRED OFF)
     string(APPEND CMAKE_CUDA_FLAGS " -std=c++20 --expt-relaxed-constexpr -diag-suppress=20012 -Xcompiler=-fopenmp")
     enable_language(CUDA)
     set(REGRADE_CUDA_FOUND TRUE)
