@@ -46,8 +46,9 @@ struct RunOptions {
           .min = 0,
           .max = 1000});
     bind("effects", effects,
-         {.help = "what the scene calls for: auto decides by measurement; or a list of "
-                  "exposure, ndc, background, distortion, none"});
+         {.help = "what the scene calls for is decided by measurement; this version takes no "
+                  "other wish",
+          .choices = "auto"});
     bind("max-memory", max_memory_gb,
          {.unit = "GB",
           .help = "memory to plan with; 0 takes what is free",
