@@ -13,6 +13,11 @@ constexpr double kTail = 0.01;    // share of points left out at each end of an 
 constexpr double kMargin = 0.08;  // of the extent, added on both sides
 constexpr double kNearestShare =
     0.6;  // the scene begins at this share of the nearest points' distance
+// What a photo shows beside its points: its corners are taken to be as deep as this share of its
+// points, and all but this share of all photos' corners belong to the scene.
+constexpr double kCornerDepth = 0.25;
+constexpr double kCornerTail = 0.1;
+constexpr size_t kMinPointsOfView = 10;
 
 Eigen::Vector3d ToEigen(const Vec3d& v) { return {v.x, v.y, v.z}; }
 Vec3d FromEigen(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
@@ -97,6 +102,32 @@ Vec3d CommonPoint(const std::vector<Vec3d>& centers, const std::vector<Vec3d>& f
   return FromEigen(a.ldlt().solve(b));
 }
 
+// Where the corners of the photos are, at the depth of the nearer points each sees. Points alone
+// would leave out what has no texture: a third of a picture of an object before a dark room.
+std::vector<Vec3d> PhotoCorners(const Capture& capture) {
+  std::vector<std::vector<double>> depths(capture.views.size());
+  for (const ScenePoint& point : capture.points)
+    for (const int32_t view : point.views) {
+      const auto v = static_cast<size_t>(view);
+      const double depth =
+          (capture.views[v].camera.camera_from_world * point.position).z;
+      if (depth > 0) depths[v].push_back(depth);
+    }
+  std::vector<Vec3d> corners;
+  for (size_t v = 0; v < depths.size(); ++v) {
+    if (depths[v].size() < kMinPointsOfView) continue;
+    const Camera& camera = capture.views[v].camera;
+    const double depth = Quantile(&depths[v], kCornerDepth);
+    for (const double x : {0.0, static_cast<double>(camera.width)})
+      for (const double y : {0.0, static_cast<double>(camera.height)}) {
+        const Vec3d ray = camera.CameraRay(x, y);
+        if (!(ray.z > 0.1)) continue;  // sideways through a fisheye lens
+        corners.push_back(camera.camera_from_world.Inverse() * (ray * (depth / ray.z)));
+      }
+  }
+  return corners;
+}
+
 }  // namespace
 
 NormalizedScene NormalizeScene(const Capture& capture) {
@@ -113,12 +144,18 @@ NormalizedScene NormalizeScene(const Capture& capture) {
   Vec3d low, high;
   double nearest = 0;
   if (capture.points.size() >= kMinPoints) {
+    const std::vector<Vec3d> corners = PhotoCorners(capture);
     for (int a = 0; a < 3; ++a) {
       std::vector<double> along;
       for (const ScenePoint& p : capture.points)
         along.push_back(Dot(rotation.row[a], p.position));
       low[a] = Quantile(&along, kTail);
       high[a] = Quantile(&along, 1 - kTail);
+      if (corners.empty()) continue;
+      along.clear();
+      for (const Vec3d& corner : corners) along.push_back(Dot(rotation.row[a], corner));
+      low[a] = std::min(low[a], Quantile(&along, kCornerTail));
+      high[a] = std::max(high[a], Quantile(&along, 1 - kCornerTail));
     }
     std::vector<double> distances;
     for (const ScenePoint& p : capture.points)

@@ -18,9 +18,10 @@ struct NormalizedScene {
 };
 
 // From camera poses and triangulated points, order-free. The box holds all but the outermost
-// hundredth of the points on each side; with fewer than 50 points it is the cube round the
-// optical axes' common point that reaches the cameras. It survives collinear cameras (H129),
-// cameras at one point (H130) and ups that cancel (H131).
+// hundredth of the points on each side, and most corners of the photos at the depth of their
+// nearer points; with fewer than 50 points it is the cube round the optical axes' common point
+// that reaches the cameras. It survives collinear cameras (H129), cameras at one point (H130)
+// and ups that cancel (H131).
 NormalizedScene NormalizeScene(const Capture& capture);
 
 }  // namespace regrade

@@ -75,6 +75,25 @@ TEST(NormalizeScene, BoxHoldsThePointsUpright) {
   EXPECT_GT((scene.field_from_world.rotation * Vec3d{0, 0, 1}).z, 0.9);
 }
 
+// A textured thing before a bare wall: the points are a sixth of the picture, the box takes in all that the
+// photos show at its depth.
+TEST(NormalizeScene, BoxHoldsWhatPhotosShowBesideThePoints) {
+  Capture capture = ArcCapture(true);
+  for (ScenePoint& p : capture.points) p.position = p.position * 0.4;
+  const NormalizedScene scene = NormalizeScene(capture);
+  ExpectProper(scene);
+  int inside = 0;
+  for (const CaptureView& view : capture.views)
+    for (const double x : {64.0, 320.0, 576.0})
+      for (const double y : {48.0, 240.0, 432.0}) {
+        const RayT<double> ray = view.camera.WorldRay(x, y);
+        const Vec3d q = scene.field_from_world * (ray.origin + ray.direction * 4.0);
+        inside += std::abs(q.x) <= scene.box.radius.x && std::abs(q.y) <= scene.box.radius.y &&
+                  std::abs(q.z) <= scene.box.radius.z;
+      }
+  EXPECT_GE(inside, 73);  // of 81; without the corners 27
+}
+
 TEST(NormalizeScene, H140_OtherUnitsGiveTheSameField) {
   const Capture capture = ArcCapture(true);
   const NormalizedScene scene = NormalizeScene(capture);
