@@ -9,36 +9,15 @@
 #include "kernels/field/ray_loss.h"
 #include "kernels/field/ray_weights.h"
 #include "kernels/field/render.h"
+#include "tests/support/double_field.h"
 #include "tests/support/small_field.h"
 
 namespace regrade {
 namespace {
 
+using testing::DoubleField;
 using testing::RandomField;
 using testing::RandomRays;
-
-// A field in double with the float field's values.
-struct DoubleField {
-  explicit DoubleField(const RadianceField& field)
-      : geometry(*field.geometry),
-        density(geometry.density.begin(), geometry.density.end()),
-        sh(field.appearance.sh.begin(), field.appearance.sh.end()),
-        basis(field.appearance.basis),
-        background(field.background.Cast<double>()) {}
-  FieldView<double> view() const {
-    return {geometry.frame,
-            geometry.links.data(),
-            density.data(),
-            sh.data(),
-            basis,
-            background,
-            0.0};
-  }
-  const Geometry& geometry;
-  std::vector<double> density, sh;
-  int basis;
-  Vec3d background;
-};
 
 RayT<double> ToDouble(const Ray& ray) {
   return {ray.origin.Cast<double>(), Normalized(ray.direction.Cast<double>())};
