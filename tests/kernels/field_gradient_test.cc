@@ -183,7 +183,7 @@ TEST_P(FastRaysParity, H103_H104_StepIsSparseAndRefusesNan) {
         EXPECT_EQ(moments[v * lanes + l], 0.0f);
       }
     }
-  EXPECT_EQ(grid.dense_density[grid.vertex_of_voxel[5]],
+  EXPECT_EQ(grid.probes[grid.vertex_of_voxel[5]].density,
             grid.records[5 * lanes + DensityLane(basis())]);
 }
 
