@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "kernels/base/for_each.h"
+#include "kernels/field/render.h"
 #include "reconstruct/fit_field.h"
 
 namespace regrade {
@@ -38,6 +39,8 @@ class FitEngine {
   virtual Vec3i resolution() const = 0;
   virtual void Step(const FitStep& step) = 0;
   virtual FitSums TakeSums() = 0;  // since the last call; may wait for steps to finish
+  // The field as it is now, colours clipped. Nothing of it leaves the device but the picture.
+  virtual RenderedView Render(const Camera& camera, const MarchOptions& march) = 0;
   // Prunes voxels that weigh less than `threshold` in every view and resamples; the optimizer's state
   // starts anew, as in svox2.
   virtual void Refine(const MarchOptions& march, float threshold, const Vec3i& resolution) = 0;

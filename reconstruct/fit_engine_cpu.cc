@@ -39,6 +39,10 @@ class CpuFitEngine : public FitEngine {
     for (GradientArena& arena : arenas_) arena.Forget();
   }
 
+  RenderedView Render(const Camera& camera, const MarchOptions& march) override {
+    return RenderView(state_.grid, camera, march);
+  }
+
   FitSums TakeSums() override { return std::exchange(sums_, {}); }
 
   void Refine(const MarchOptions& march, float threshold, const Vec3i& resolution) override {

@@ -20,12 +20,10 @@ class CudaFitEngine : public FitEngine {
   CudaFitEngine(const TrainingRays* rays, uint64_t seed) : seed_(seed), views_(rays->ToDevice()) {}
 
   void Take(FitState state) override {
-    grid_ = UploadGrid(state.grid);
+    grid_ = UploadGrid(state.grid, true, state.second_moment);
     Renew();
-    if (state.second_moment.size() == grid_.records.size())
-      second_moment_ = DeviceBuffer<float>::Of(state.second_moment, "second moments");
   }
-  FitState Give() override { return {DownloadGrid(grid_), second_moment_.ToHost(), 0, 0}; }
+  FitState Give() override { return {DownloadGrid(grid_), DownloadSecondMoment(grid_), 0, 0}; }
   int64_t num_voxels() const override { return grid_.num_voxels(); }
   Vec3i resolution() const override { return grid_.frame.resolution; }
 
@@ -38,7 +36,7 @@ class CudaFitEngine : public FitEngine {
     Reserve(step.rays);
     views_.Draw(seed_, step.number, step.rays, rays_.data(), targets_.data());
     fitter_->Accumulate(grid_, rays_.data(), targets_.data(), step.rays,
-                        1.0f / (3.0f * static_cast<float>(step.rays)), &gradient_);
+                        1.0f / (3.0f * static_cast<float>(step.rays)), &touched_);
     // The same expectation as the CPU's run of vertices: each stored voxel with the share's probability.
     const int64_t voxels = grid_.num_voxels();
     const int64_t run = static_cast<int64_t>(step.tv_share * static_cast<float>(voxels));
@@ -47,9 +45,9 @@ class CudaFitEngine : public FitEngine {
           RandomIndex(seed_ ^ 0x7476ull, step.number, 0, static_cast<uint64_t>(voxels)));
       const float scale =
           1.0f / (step.tv_share * static_cast<float>(grid_.frame.NumVertices()));
-      AddTotalVariation(grid_, begin, run, step.tv_density * scale, step.tv_sh * scale, &gradient_);
+      AddTotalVariation(grid_, begin, run, step.tv_density * scale, step.tv_sh * scale, &touched_);
     }
-    StepOnDevice(&grid_, second_moment_.data(), &gradient_, step.optimizer, fitter_->sums());
+    StepOnDevice(&grid_, &touched_, step.optimizer, fitter_->sums());
   }
 
   FitSums TakeSums() override {
@@ -58,6 +56,10 @@ class CudaFitEngine : public FitEngine {
     DeviceWait("a step of the fit");
     return {sums.squared_error, static_cast<int64_t>(sums.samples),
             static_cast<int64_t>(sums.rejected_voxels)};
+  }
+
+  RenderedView Render(const Camera& camera, const MarchOptions& march) override {
+    return RenderViewOnDevice(grid_, camera, march);
   }
 
   void Refine(const MarchOptions& march, float threshold, const Vec3i& resolution) override {
@@ -69,8 +71,6 @@ class CudaFitEngine : public FitEngine {
       const int64_t n = views_.RaysOf(view, kStride, rays_.data());
       MaxWeightsOnDevice(grid_, rays_.data(), n, march, weights.data());
     }
-    gradient_ = {};
-    second_moment_ = {};
     DeviceGrid next = ResampleOnDevice(grid_, weights, threshold, resolution);
     if (next.num_voxels() == 0)
       throw Error(ExitCode::kScene,
@@ -82,12 +82,10 @@ class CudaFitEngine : public FitEngine {
   }
 
  private:
-  // Gradients and moments for the grid as it is now.
+  // What belongs to the grid as it is now.
   void Renew() {
     fitter_.reset();
-    gradient_ = DeviceGradient(grid_);
-    second_moment_ = DeviceBuffer<float>(grid_.records.size(), "second moments");
-    second_moment_.Zero();
+    touched_ = DeviceTouched(grid_);
   }
   void Reserve(int64_t rays) {
     if (rays <= rays_.size()) return;
@@ -98,8 +96,7 @@ class CudaFitEngine : public FitEngine {
   uint64_t seed_;
   DeviceViews views_;
   DeviceGrid grid_;
-  DeviceBuffer<float> second_moment_;
-  DeviceGradient gradient_;
+  DeviceTouched touched_;
   MarchOptions march_;
   std::optional<DeviceRayFitter> fitter_;
   DeviceBuffer<Ray> rays_;

@@ -66,6 +66,7 @@ class Fitter {
     const int num_stages = static_cast<int>(options_.steps.size());
     while (stage_ < num_stages) {
       RunStage();
+      if (stage_ + 1 < num_stages) Measure();
       if (finish_early_ || ++stage_ == num_stages) break;
       Refine(options_.resolutions[static_cast<size_t>(stage_)]);
       step_ = 0;
@@ -74,9 +75,13 @@ class Fitter {
     // A last pruning without growth: what no training view sees does not belong into the
     // result.
     Refine(0);
-    result_.field = ToRadianceField(engine_->Give().grid);
-    result_.field.step = options_.step;
-    result_.seconds = SecondsSince(start_) - checkpoint_seconds_;
+    result_.seconds = SecondsSince(start_) - idle_seconds_;
+    result_.voxels = engine_->num_voxels();
+    Measure();
+    if (hooks_.keep_field) {
+      result_.field = ToRadianceField(engine_->Give().grid);
+      result_.field.step = options_.step;
+    }
     result_.psnr_train_db = PsnrOf(tail_error_, tail_rays_);
     return std::move(result_);
   }
@@ -169,7 +174,7 @@ class Fitter {
                       " voxels is not finite at step " + std::to_string(done),
                   "reconstruct", "the last checkpoint has been kept");
     const double psnr = PsnrOf(sums.squared_error, window_rays_);
-    result_.curve.push_back({result_.rays, SecondsSince(start_), psnr});
+    result_.curve.push_back({result_.rays, SecondsSince(start_) - idle_seconds_, psnr});
     char text[96];
     std::snprintf(text, sizeof text, "%d^3, %.2f M voxels, %.2f dB on training rays",
                   options_.resolutions[static_cast<size_t>(stage_)],
@@ -186,8 +191,14 @@ class Fitter {
       state.step = step_;
       hooks_.checkpoint(state);
     }
-    checkpoint_seconds_ += SecondsSince(begin);
+    idle_seconds_ += SecondsSince(begin);
     last_checkpoint_ = Clock::now();
+  }
+
+  void Measure() {
+    const Clock::time_point begin = Clock::now();
+    if (hooks_.measure) hooks_.measure(engine_.get());
+    idle_seconds_ += SecondsSince(begin);
   }
 
   static constexpr int kWindow = 20;  // steps
@@ -202,7 +213,7 @@ class Fitter {
   int total_steps_ = 0;
   double total_work_ = 0;
   bool finish_early_ = false;
-  double tail_error_ = 0, checkpoint_seconds_ = 0;
+  double tail_error_ = 0, idle_seconds_ = 0;
   int64_t window_rays_ = 0, tail_rays_ = 0;
   std::string note_;
   Clock::time_point start_, last_checkpoint_;

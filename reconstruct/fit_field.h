@@ -43,6 +43,7 @@ struct FitCurvePoint {
 struct FitResult {
   RadianceField field;
   double psnr_train_db = 0;  // over the last tenth of the rays
+  int64_t voxels = 0;
   int64_t rays = 0;
   int64_t samples = 0;
   int64_t rejected_voxels = 0;  // steps refused for a non-finite gradient
@@ -50,8 +51,13 @@ struct FitResult {
   std::vector<FitCurvePoint> curve;
 };
 
+class FitEngine;
+
 struct FitHooks {
   ProgressFunction progress;
+  // Called when a stage's steps are done and when all is done, before the field leaves its device.
+  std::function<void(FitEngine*)> measure;
+  bool keep_field = true;  // false: FitResult::field stays empty
   const FitState* resume = nullptr;
   // Called at stage ends, about once a minute, and before an abort.
   std::function<void(const FitState&)> checkpoint;

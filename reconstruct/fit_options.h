@@ -37,7 +37,7 @@ struct FitOptions {
           .help = "longest side of the grid in each stage, coarse to fine; memory grows with "
                   "its cube",
           .min = 8,
-          .max = 1024});
+          .max = 2048});
     bind("fit-steps", steps,
          {.unit = "steps",
           .help = "optimizer steps in each stage; time grows with their sum",

@@ -31,14 +31,28 @@ struct Blocks {
       }
   }
 
-  // Points outside of the picture are not spoken of.
-  bool MayHold(const Vec3d& point) const {
+  enum class Answer { kOutside, kHeld, kUnseen };
+  Answer Ask(const Vec3d& point) const {
     double u, v;
-    if (!camera.Project(point, &u, &v)) return true;
-    if (!(u >= 0 && u < camera.width && v >= 0 && v < camera.height)) return true;
-    return object[static_cast<size_t>(v / kBlock) * columns + static_cast<size_t>(u / kBlock)];
+    if (!camera.Project(point, &u, &v)) return Answer::kUnseen;
+    if (!(u >= 0 && u < camera.width && v >= 0 && v < camera.height)) return Answer::kUnseen;
+    const size_t block =
+        static_cast<size_t>(v / kBlock) * columns + static_cast<size_t>(u / kBlock);
+    return object[block] != 0 ? Answer::kHeld : Answer::kOutside;
   }
 };
+
+// No view that sees the point denies it, and half of the views see it: what stands beside all pictures
+// is no part of the object.
+bool InHull(const std::vector<Blocks>& views, const Vec3d& point) {
+  size_t held = 0;
+  for (const Blocks& view : views) {
+    const Blocks::Answer answer = view.Ask(point);
+    if (answer == Blocks::Answer::kOutside) return false;
+    held += answer == Blocks::Answer::kHeld;
+  }
+  return 2 * held >= views.size();
+}
 
 }  // namespace
 
@@ -53,9 +67,9 @@ NormalizedScene TightenToOutlines(const NormalizedScene& scene,
     for (int j = 0; j < kSide; ++j)
       for (int k = 0; k < kSide; ++k) {
         Vec3d p;
-        for (int a = 0; a < 3; ++a) p[a] = radius[a] * (2.0 * (a == 0 ? i : a == 1 ? j : k) / (kSide - 1) - 1);
-        if (!std::all_of(views.begin(), views.end(), [&p](const Blocks& v) { return v.MayHold(p); }))
-          continue;
+        for (int a = 0; a < 3; ++a)
+          p[a] = radius[a] * (2.0 * (a == 0 ? i : a == 1 ? j : k) / (kSide - 1) - 1);
+        if (!InHull(views, p)) continue;
         for (int a = 0; a < 3; ++a) {
           low[a] = std::min(low[a], p[a]);
           high[a] = std::max(high[a], p[a]);

@@ -69,6 +69,14 @@ void DeviceCopyOut(void* host, const void* device, int64_t bytes) {
             "copying from the GPU");
 }
 
+void DeviceCopyRows(void* to, int64_t to_pitch, const void* from, int64_t from_pitch, int64_t bytes,
+                    int64_t rows) {
+  if (rows > 0)
+    Require(cudaMemcpy2D(to, static_cast<size_t>(to_pitch), from, static_cast<size_t>(from_pitch),
+                         static_cast<size_t>(bytes), static_cast<size_t>(rows), cudaMemcpyDefault),
+            "copying to or from the GPU");
+}
+
 void DeviceCopyWithin(void* to, const void* from, int64_t bytes) {
   if (bytes > 0)
     Require(cudaMemcpyAsync(to, from, static_cast<size_t>(bytes), cudaMemcpyDeviceToDevice),
@@ -102,6 +110,7 @@ void* DeviceAllocate(int64_t, const char*) { NoDevice(); }
 void DeviceFree(void*) noexcept {}
 void DeviceCopyIn(void*, const void*, int64_t) { NoDevice(); }
 void DeviceCopyOut(void*, const void*, int64_t) { NoDevice(); }
+void DeviceCopyRows(void*, int64_t, const void*, int64_t, int64_t, int64_t) { NoDevice(); }
 void DeviceCopyWithin(void*, const void*, int64_t) { NoDevice(); }
 void DeviceZero(void*, int64_t) { NoDevice(); }
 void DeviceWait(const char*) { NoDevice(); }

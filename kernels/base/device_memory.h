@@ -28,6 +28,9 @@ void* DeviceAllocate(int64_t bytes, const char* what);
 void DeviceFree(void* pointer) noexcept;
 void DeviceCopyIn(void* device, const void* host, int64_t bytes);
 void DeviceCopyOut(void* host, const void* device, int64_t bytes);  // waits for running kernels
+// Rows of `bytes` each, that begin `to_pitch` and `from_pitch` bytes apart, in any direction.
+void DeviceCopyRows(void* to, int64_t to_pitch, const void* from, int64_t from_pitch, int64_t bytes,
+                    int64_t rows);
 void DeviceCopyWithin(void* to, const void* from, int64_t bytes);
 void DeviceZero(void* device, int64_t bytes);
 // Waits; throws Error(kResources) with the first failure of the kernels so far.

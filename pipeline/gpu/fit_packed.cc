@@ -11,6 +11,7 @@
 #include "pipeline/files/json_file.h"
 #include "pipeline/gpu/gpu_commands.h"
 #include "pipeline/packed_capture.h"
+#include "reconstruct/fit_engine.h"
 #include "reconstruct/fit_field.h"
 
 namespace regrade {
@@ -29,20 +30,29 @@ double Median(std::vector<double> values) {
   return values[middle];
 }
 
-struct HeldOut {
-  std::vector<double> psnr, ssim;
-  double render_ms = 0;  // median of a view's kernel, rays on the device already
-};
-
 double Mean(const std::vector<double>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0) /
          static_cast<double>(std::max<size_t>(values.size(), 1));
 }
 
-HeldOut MeasureHeldOut(const RadianceField& field, const PackedCapture& capture,
-                       const MarchOptions& march) {
-  const DeviceGrid grid = UploadGrid(MakeFastGrid(field));
-  HeldOut result;
+struct HeldOut {
+  double psnr = 0, ssim = 0;
+};
+
+HeldOut MeasureHeldOut(FitEngine* engine, const PackedCapture& capture, const MarchOptions& march) {
+  std::vector<double> psnr, ssim;
+  for (const PackedView& view : capture.views) {
+    if (!view.held_out) continue;
+    const Image image = engine->Render(view.camera, march).color;
+    if (const auto value = Psnr(image, view.photo)) psnr.push_back(*value);
+    if (const auto value = Ssim(image, view.photo)) ssim.push_back(*value);
+  }
+  return {Mean(psnr), Mean(ssim)};
+}
+
+// Milliseconds of a view's kernel, rays on the device already: medians over the held-out views.
+double RenderMilliseconds(const DeviceGrid& grid, const PackedCapture& capture,
+                          const MarchOptions& march) {
   std::vector<double> milliseconds;
   for (const PackedView& view : capture.views) {
     if (!view.held_out) continue;
@@ -62,14 +72,8 @@ HeldOut MeasureHeldOut(const RadianceField& field, const PackedCapture& capture,
       DeviceWait("rendering");
       if (repeat > 0) milliseconds.push_back(1e3 * SecondsSince(start));
     }
-    Image image(view.camera.width, view.camera.height, 3);
-    DeviceCopyOut(image.pixels.data(), color.data(), n * 12);
-    for (float& value : image.pixels) value = std::clamp(value, 0.0f, 1.0f);
-    if (const auto value = Psnr(image, view.photo)) result.psnr.push_back(*value);
-    if (const auto value = Ssim(image, view.photo)) result.ssim.push_back(*value);
   }
-  result.render_ms = Median(milliseconds);
-  return result;
+  return Median(milliseconds);
 }
 
 }  // namespace
@@ -83,11 +87,32 @@ void FitPacked(const FitPackedOptions& settings, const FitOptions& options) {
   const double read_seconds = SecondsSince(start);
   const auto fit_start = Clock::now();
   const Backend backend = settings.device == "cpu" ? Backend::kCpu : Backend::kCuda;
-  const FitResult fit = FitField(views, capture.scene.box, options, {}, backend);
+  FitHooks hooks;
+  double last_note = 0;
+  hooks.progress = [&](const Progress& progress) {
+    if (SecondsSince(fit_start) - last_note > 5) {
+      last_note = SecondsSince(fit_start);
+      std::fprintf(stderr, "%3.0f %%  %.0f s  %s\n", 100 * progress.done / progress.total,
+                   last_note, progress.note.c_str());
+    }
+    return Verdict::kContinue;
+  };
+  HeldOut measured;
+  JsonValue::Array stages;
+  hooks.keep_field = !settings.field.empty();
+  hooks.measure = [&](FitEngine* engine) {
+    const double seconds = SecondsSince(fit_start);
+    measured = MeasureHeldOut(engine, capture, {options.step});
+    stages.push_back(JsonValue::Array{seconds, measured.psnr});
+  };
+  const FitResult fit = FitField(views, capture.scene.box, options, hooks, backend);
   const double fit_seconds = SecondsSince(fit_start);
-  const HeldOut measured = MeasureHeldOut(fit.field, capture, {options.step});
-  if (!settings.field.empty())
+  double render_ms = 0;
+  if (hooks.keep_field) {
     WriteFieldFile(settings.field, {fit.field, capture.scene.field_from_world, capture.scene.ndc});
+    if (backend == Backend::kCuda)
+      render_ms = RenderMilliseconds(UploadGrid(MakeFastGrid(fit.field)), capture, {options.step});
+  }
 
   JsonValue::Array curve;
   for (size_t i = 0; i < fit.curve.size(); i += std::max<size_t>(1, fit.curve.size() / 100))
@@ -98,15 +123,17 @@ void FitPacked(const FitPackedOptions& settings, const FitOptions& options) {
       {"device", settings.device == "cpu" ? "cpu" : device.name},
       {"seconds_read", read_seconds},
       {"seconds_fit", fit_seconds},
+      {"seconds_steps", fit.seconds},
       {"seconds_all", SecondsSince(start)},
       {"rays", fit.rays},
       {"samples", fit.samples},
       {"rejected_voxels", fit.rejected_voxels},
-      {"voxels", fit.field.geometry->num_voxels()},
+      {"voxels", fit.voxels},
       {"psnr_train_db", fit.psnr_train_db},
-      {"psnr_heldout_db", Mean(measured.psnr)},
-      {"ssim_heldout", Mean(measured.ssim)},
-      {"render_ms", measured.render_ms},
+      {"psnr_heldout_db", measured.psnr},
+      {"ssim_heldout", measured.ssim},
+      {"render_ms", render_ms},
+      {"curve_heldout", std::move(stages)},
       {"curve_train", std::move(curve)}};
   std::printf("%s\n", DumpJson(record, -1).c_str());
   std::fflush(stdout);

@@ -37,6 +37,13 @@ void Row(const char* body, int basis, const char* against, double error, double 
   EXPECT_LE(error, tolerance) << body << " against " << against;
 }
 
+Buffer<float> GradientOf(const DeviceGrid& grid) {
+  const int64_t row = 4 * grid.lanes();
+  Buffer<float> gradient(grid.num_voxels() * grid.lanes());
+  DeviceCopyRows(gradient.data(), row, grid.gradient(), 3 * row, row, grid.num_voxels());
+  return gradient;
+}
+
 // H70: 2e-5 a pixel against the plain body in float and in double; H84: skipping empty space leaves the
 // picture as it is.
 TEST_P(DeviceParity, Render) {
@@ -81,7 +88,7 @@ TEST_P(DeviceParity, Render) {
 TEST_P(DeviceParity, FitGradient) {
   const RadianceField field = RandomField({19, 18, 21}, basis(), 0.7, 41);
   const DoubleField in_double(field);
-  const DeviceGrid grid = UploadGrid(MakeFastGrid(field));
+  const DeviceGrid grid = UploadGrid(MakeFastGrid(field), true);
   Buffer<Ray> rays(700);
   const std::vector<Ray> drawn = RandomRays(static_cast<int>(rays.size()), 42);
   std::copy(drawn.begin(), drawn.end(), rays.begin());
@@ -89,14 +96,15 @@ TEST_P(DeviceParity, FitGradient) {
   for (Vec3f& target : targets) target = {0.4f, 0.5f, 0.2f};
   const MarchOptions options{0.5f, 1e-4f};
   const float scale = 1.0f / 600;
-  DeviceGradient gradient(grid);
+  DeviceTouched touched_voxels(grid);
   DeviceRayFitter fitter(grid.frame, options, 64 << 20);
   const DeviceBuffer<Ray> device_rays = DeviceBuffer<Ray>::Of(rays, "rays");
   const DeviceBuffer<Vec3f> device_targets = DeviceBuffer<Vec3f>::Of(targets, "targets");
-  fitter.Accumulate(grid, device_rays.data(), device_targets.data(), rays.size(), scale, &gradient);
+  fitter.Accumulate(grid, device_rays.data(), device_targets.data(), rays.size(), scale,
+                    &touched_voxels);
   const DeviceFitSums sums = fitter.TakeSums();
-  const Buffer<float> g = gradient.gradient.ToHost();
-  const Buffer<int32_t> touched = gradient.touched.ToHost();
+  const Buffer<float> g = GradientOf(grid);
+  const Buffer<uint32_t> touched = touched_voxels.bits.ToHost();
 
   std::vector<double> d_density(in_double.density.size()), d_sh(in_double.sh.size());
   double error = 0;
@@ -121,7 +129,7 @@ TEST_P(DeviceParity, FitGradient) {
     }
     off_density = std::max(off_density, std::abs(g[v * lanes + stride] - d_density[v]));
     if (any) {
-      ASSERT_EQ(touched[v], 1) << v;
+      ASSERT_NE(touched[v / 32] & (1u << v % 32), 0u) << v;
     }
   }
   Row("gradient of densities", basis(), "plain double, of the largest", off_density / largest_density, 1e-4);
@@ -131,13 +139,13 @@ TEST_P(DeviceParity, FitGradient) {
 TEST_P(DeviceParity, TotalVariation) {
   const RadianceField field = RandomField({9, 11, 10}, basis(), 0.6, 55);
   const FastGrid host = MakeFastGrid(field);
-  const DeviceGrid grid = UploadGrid(host);
-  DeviceGradient gradient(grid);
+  const DeviceGrid grid = UploadGrid(host, true);
+  DeviceTouched touched(grid);
   const int64_t n = host.num_voxels(), begin = n / 3;
   // All voxels, beginning somewhere: the run wraps around.
-  AddTotalVariation(grid, begin, n, 0.3f, 0.2f, &gradient);
+  AddTotalVariation(grid, begin, n, 0.3f, 0.2f, &touched);
   DeviceWait("total variation");
-  const Buffer<float> g = gradient.gradient.ToHost();
+  const Buffer<float> g = GradientOf(grid);
   const int lanes = host.lanes();
   std::vector<double> records(static_cast<size_t>(n * lanes)), expected(records.size());
   for (int64_t i = 0; i < n * lanes; ++i) records[static_cast<size_t>(i)] = host.records[i];
@@ -155,29 +163,24 @@ TEST_P(DeviceParity, TotalVariation) {
 // H103, H104: steps are sparse, bounded, and refuse what is not finite.
 TEST_P(DeviceParity, Step) {
   const FastGrid before = MakeFastGrid(RandomField({4, 4, 4}, basis(), 1.0, 51));
-  DeviceGrid grid = UploadGrid(before);
+  DeviceGrid grid = UploadGrid(before, true);
   const int lanes = before.lanes();
   const int64_t n = before.num_voxels();
-  DeviceGradient gradient(grid);
+  DeviceTouched marks(grid);
   Buffer<float> g(n * lanes);
-  Buffer<int32_t> touched(n), list(n), count(1);
+  Buffer<uint32_t> touched((n + 31) / 32);
   for (const int32_t voxel : {5, 11, 23}) {
-    touched[voxel] = 1;
-    list[count[0]++] = voxel;
+    touched[voxel / 32] |= 1u << voxel % 32;
     for (int k = 0; k <= DensityLane(basis()); ++k)
       g[voxel * lanes + k] = static_cast<float>(testing::Uniform(9, static_cast<uint64_t>(voxel * 40 + k), -1, 1));
   }
   g[11 * lanes] = std::nanf("");
-  gradient.gradient.CopyIn(g.data(), g.size());
-  gradient.touched.CopyIn(touched.data(), n);
-  gradient.list.CopyIn(list.data(), n);
-  gradient.count.CopyIn(count.data(), 1);
-  DeviceBuffer<float> moments(n * lanes, "moments");
-  moments.Zero();
+  DeviceCopyRows(grid.gradient(), 12 * lanes, g.data(), 4 * lanes, 4 * lanes, n);
+  marks.bits.CopyIn(touched.data(), touched.size());
   DeviceBuffer<DeviceFitSums> sums(1, "sums");
   sums.Zero();
   const RmspropOptions options{.rate_sh = 0.05f, .rate_density = 0.5f, .view_bound = 0.2f};
-  StepOnDevice(&grid, moments.data(), &gradient, options, sums.data());
+  StepOnDevice(&grid, &marks, options, sums.data());
   const FastGrid after = DownloadGrid(grid);
   const Buffer<float> densities = grid.dense_density.ToHost();
   DeviceFitSums taken;
@@ -204,17 +207,38 @@ TEST_P(DeviceParity, Step) {
   Row("step", basis(), "definition in double", off, 1e-5);
   const int32_t vertex = after.vertex_of_voxel[5];
   EXPECT_EQ(densities[vertex], after.records[5 * lanes + DensityLane(basis())]);
-  for (const float rest : gradient.gradient.ToHost()) ASSERT_EQ(rest, 0.0f);
-  for (const int32_t rest : gradient.touched.ToHost()) ASSERT_EQ(rest, 0);
+  for (const float rest : GradientOf(grid)) ASSERT_EQ(rest, 0.0f);
+  for (const uint32_t rest : marks.bits.ToHost()) ASSERT_EQ(rest, 0u);
 }
 
 // Up, down: links, records and what follows from them are the host's.
 TEST_P(DeviceParity, UploadAndDownload) {
   const FastGrid host = MakeFastGrid(RandomField({21, 9, 17}, basis(), 0.02, 3));
   const DeviceGrid grid = UploadGrid(host);
+  // Chebyshev distance of cells, named by their lowest corner, to the nearest with a stored corner.
+  const Vec3i n = host.frame.resolution;
+  const auto stored = [&](int x, int y, int z) {
+    for (int k = 0; k < 8; ++k) {
+      const int cx = x + (k >> 2 & 1), cy = y + (k >> 1 & 1), cz = z + (k & 1);
+      if (cx < n.x && cy < n.y && cz < n.z && host.links[host.frame.Vertex(cx, cy, cz)] >= 0) return true;
+    }
+    return false;
+  };
+  std::vector<Vec3i> cells;
+  for (int64_t v = 0; v < host.links.size(); ++v) {
+    const Vec3i at{static_cast<int>(v / (n.y * n.z)), static_cast<int>(v / n.z % n.y),
+                   static_cast<int>(v % n.z)};
+    if (stored(at.x, at.y, at.z)) cells.push_back(at);
+  }
   const Buffer<uint8_t> distance = grid.empty_distance.ToHost();
-  for (int64_t v = 0; v < distance.size(); ++v)
-    ASSERT_EQ(distance[v], std::min<int>(host.empty_distance[v], 16)) << v;
+  for (int64_t v = 0; v < distance.size(); ++v) {
+    int nearest = 16;
+    for (const Vec3i& c : cells)
+      nearest = std::min(nearest, std::max({std::abs(c.x - static_cast<int>(v / (n.y * n.z))),
+                                            std::abs(c.y - static_cast<int>(v / n.z % n.y)),
+                                            std::abs(c.z - static_cast<int>(v % n.z))}));
+    ASSERT_EQ(distance[v], nearest) << v;
+  }
   const FastGrid back = DownloadGrid(grid);
   for (int64_t i = 0; i < host.records.size(); ++i) ASSERT_EQ(host.records[i], back.records[i]);
 }

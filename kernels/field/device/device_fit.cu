@@ -4,19 +4,15 @@
 
 #include "kernels/base/error.h"
 #include "kernels/field/device/device_rays.h"
+#include "kernels/field/device/gradient_view.h"
 #include "kernels/field/device/launch.h"
 #include "kernels/field/device/warp_shade.h"
 
 namespace regrade {
 
-DeviceGradient::DeviceGradient(const DeviceGrid& grid)
-    : gradient(grid.num_voxels() * grid.lanes(), "the gradient"),
-      touched(grid.num_voxels(), "marks of touched voxels"),
-      list(grid.num_voxels(), "list of touched voxels"),
-      count(1, "number of touched voxels") {
-  gradient.Zero();
-  touched.Zero();
-  count.Zero();
+DeviceTouched::DeviceTouched(const DeviceGrid& grid)
+    : bits((grid.num_voxels() + 31) / 32, "marks of touched voxels") {
+  bits.Zero();
 }
 
 #if defined(__CUDACC__)
@@ -26,18 +22,6 @@ namespace {
 constexpr int kFloatsPerSample = 9;
 constexpr int kWarpsPerBlock = 4;
 
-struct GradientView {
-  float* gradient;
-  int32_t* touched;
-  int32_t* list;
-  int32_t* count;
-
-  __device__ void Touch(int32_t voxel) const {
-    if (touched[voxel] == 0 && atomicExch(&touched[voxel], 1) == 0)
-      list[atomicAdd(count, 1)] = voxel;
-  }
-};
-
 // A ray's composited samples, front to back, kept for the way back: [capacity] of each.
 struct SampleStore {
   float4* place;      // vertex (as bits), fraction
@@ -45,16 +29,89 @@ struct SampleStore {
   float* before;      // transmittance before
 };
 
+__device__ inline void AddQuad(float* target, const float4& v) {
+#if __CUDA_ARCH__ >= 900
+  atomicAdd(reinterpret_cast<float4*>(target), v);
+#else
+  atomicAdd(target, v.x);
+  atomicAdd(target + 1, v.y);
+  atomicAdd(target + 2, v.z);
+  atomicAdd(target + 3, v.w);
+#endif
+}
+
+// Four neighbouring values of a record, as one lane adds them: d / d value = sum_c of[c] d_raw[c] + density d_sigma.
+template <int kBasis>
+struct QuadValues {
+  static constexpr int kQuads = RecordLanes(kBasis) / 4;  // lanes a record
+  float of[3][4] = {};
+  float density[4] = {};
+
+  __device__ QuadValues(int lane, const Vec3f& direction) {
+    float basis[kMaxBasis];
+    ShBasis(kBasis, direction, basis);
+#pragma unroll
+    for (int index = 0; index <= DensityLane(kBasis); ++index) {
+      if (index / 4 != lane % kQuads) continue;
+      if (index == DensityLane(kBasis))
+        density[index % 4] = 1;
+      else
+        of[index / kBasis][index % 4] = basis[index % kBasis];
+    }
+  }
+  __device__ float At(int q, float weight, const Vec3f& d_raw, float d_sigma) const {
+    return weight * (of[0][q] * d_raw.x + of[1][q] * d_raw.y + of[2][q] * d_raw.z +
+                     density[q] * d_sigma);
+  }
+};
+
+// Adds the gradients of `count` samples, the i-th of them held by lane i, to the corners' records.
+template <int kBasis>
+__device__ void ScatterChunk(const DeviceGridView& grid, const QuadValues<kBasis>& values,
+                             const float4& place, const Vec3f& d_raw, float d_sigma, int count,
+                             const GradientView& gradient, int lane) {
+  constexpr int kLanes = RecordLanes(kBasis), kQuads = QuadValues<kBasis>::kQuads;
+  constexpr int kRecords = 32 / kQuads;                  // that one instruction adds to
+  constexpr int kParts = kRecords < 8 ? 8 / kRecords : 1;  // instructions a sample
+  constexpr int kSamples = kRecords > 8 ? kRecords / 8 : 1;  // samples an instruction
+  const int unit = lane / kQuads;
+  for (int s = 0; s < count; s += kTurn) {
+    const int source = s + (lane >> 3) < count ? s + (lane >> 3) : -1;
+    const int from = source & 31;
+    const int vertex = __shfl_sync(kAllLanes, __float_as_int(place.x), from);
+    const Vec3f fraction{__shfl_sync(kAllLanes, place.y, from), __shfl_sync(kAllLanes, place.z, from),
+                         __shfl_sync(kAllLanes, place.w, from)};
+    const TurnCorner corner(grid, vertex, fraction, source, lane);
+    if (corner.link >= 0) Touch(gradient.touched, corner.link);
+#pragma unroll
+    for (int j = 0; j < kTurn; j += kSamples) {
+      const int mine = j + (kSamples > 1 ? unit / 8 : 0);
+      const int owner = (s + mine) & 31;
+      const Vec3f d{__shfl_sync(kAllLanes, d_raw.x, owner), __shfl_sync(kAllLanes, d_raw.y, owner),
+                    __shfl_sync(kAllLanes, d_raw.z, owner)};
+      const float d_density = __shfl_sync(kAllLanes, d_sigma, owner);
+#pragma unroll
+      for (int part = 0; part < kParts; ++part) {
+        const int k = (unit & 7) + kRecords * part;
+        const int32_t link = __shfl_sync(kAllLanes, corner.link, 8 * mine + k);
+        const float weight = __shfl_sync(kAllLanes, corner.weight, 8 * mine + k);
+        if (link < 0) continue;
+        AddQuad(&gradient.gradient[link * grid.stride + 4 * (lane % kQuads)],
+                {values.At(0, weight, d, d_density), values.At(1, weight, d, d_density),
+                 values.At(2, weight, d, d_density), values.At(3, weight, d, d_density)});
+      }
+    }
+  }
+}
+
 // The way back along a ray; see EQ(composite-adjoint). Its recursion R_i = alpha_i c_i + (1 - alpha_i)
 // R_{i+1} is a chain of maps x -> b + a x; 32 of them are composed by a scan, and as all a and b are
 // positive nothing cancels.
 template <int kBasis>
-__device__ void WalkBack(const DeviceGridView& grid, const WarpRecord<kBasis>& record,
+__device__ void WalkBack(const DeviceGridView& grid, const QuadValues<kBasis>& values,
                          const SampleStore& store, int count, float delta, const Vec3f& d_color,
                          const GradientView& gradient, int lane) {
-  constexpr int kLanes = WarpRecord<kBasis>::kLanes, kGroups = WarpRecord<kBasis>::kGroups;
   Vec3f behind = grid.background;
-  const int channel = record.in_group / kBasis;
   for (int end = count; end > 0; end -= 32) {
     const int mine = end - 1 - lane;
     float a = 1, d_sigma = 0;
@@ -99,30 +156,7 @@ __device__ void WalkBack(const DeviceGridView& grid, const WarpRecord<kBasis>& r
     for (int c = 0; c < 3; ++c)
       behind[c] = __shfl_sync(kAllLanes, chain_b[c], 31) + last_a * behind[c];
 
-    const int chunk = min(32, end);
-    for (int s = 0; s < chunk; s += kGroups) {
-      const int source = (s + record.group) & 31;
-      const int vertex = __shfl_sync(kAllLanes, __float_as_int(place.x), source);
-      Vec3f fraction, d;
-      fraction.x = __shfl_sync(kAllLanes, place.y, source);
-      fraction.y = __shfl_sync(kAllLanes, place.z, source);
-      fraction.z = __shfl_sync(kAllLanes, place.w, source);
-      for (int c = 0; c < 3; ++c) d[c] = __shfl_sync(kAllLanes, d_raw[c], source);
-      const float d_density = __shfl_sync(kAllLanes, d_sigma, source);
-      if (s + record.group >= chunk) continue;  // the shuffles above were all lanes'
-      const float value = record.in_group == DensityLane(kBasis)
-                              ? d_density
-                              : record.gamma * (channel == 0 ? d.x : channel == 1 ? d.y : d.z);
-#pragma unroll
-      for (int k = 0; k < 8; ++k) {
-        const int32_t link = grid.links[vertex + CornerOffset(grid.frame, k)];
-        if (link < 0) continue;
-        if (record.in_group <= DensityLane(kBasis))
-          atomicAdd(&gradient.gradient[static_cast<int64_t>(link) * kLanes + record.in_group],
-                    CornerWeight(fraction, k) * value);
-        if (record.in_group == k % kLanes) gradient.Touch(link);
-      }
-    }
+    ScatterChunk<kBasis>(grid, values, place, d_raw, d_sigma, min(32, end), gradient, lane);
     __syncwarp();
   }
 }
@@ -171,7 +205,8 @@ __global__ void FitRaysKernel(DeviceGridView grid, const Ray* rays, const Vec3f*
     squared_error += static_cast<double>(Dot(error, error));
     samples += static_cast<unsigned>(count);
     __syncwarp();  // the store was written by all lanes and is read by others now
-    WalkBack<kBasis>(grid, record, store, count, march.delta(), error * (2 * scale), gradient, lane);
+    const QuadValues<kBasis> values(lane, ray.direction);
+    WalkBack<kBasis>(grid, values, store, count, march.delta(), error * (2 * scale), gradient, lane);
   }
   if (lane == 0) {
     atomicAdd(&sums->squared_error, squared_error);
@@ -196,10 +231,10 @@ DeviceRayFitter::DeviceRayFitter(const GridFrame& frame, const MarchOptions& opt
 }
 
 void DeviceRayFitter::Accumulate(const DeviceGrid& grid, const Ray* rays, const Vec3f* targets,
-                                 int64_t n, float scale, DeviceGradient* gradient) {
+                                 int64_t n, float scale, DeviceTouched* touched) {
   next_ray_.Zero();
-  const GradientView view{gradient->gradient.data(), gradient->touched.data(),
-                          gradient->list.data(), gradient->count.data()};
+  REGRADE_CHECK(grid.fitting);
+  const GradientView view{grid.gradient(), touched->bits.data()};
   ByBasis(grid.basis, [&](auto basis) {
     FitRaysKernel<basis.value><<<static_cast<unsigned>(warps_ / kWarpsPerBlock), 32 * kWarpsPerBlock>>>(
         grid.view(), rays, targets, static_cast<int>(n), options_, scale, view, store_.data(),
@@ -221,7 +256,7 @@ DeviceRayFitter::DeviceRayFitter(const GridFrame&, const MarchOptions&, int64_t)
   DeviceWait("fit_rays");
 }
 void DeviceRayFitter::Accumulate(const DeviceGrid&, const Ray*, const Vec3f*, int64_t, float,
-                                 DeviceGradient*) {}
+                                 DeviceTouched*) {}
 DeviceFitSums DeviceRayFitter::TakeSums() { return {}; }
 
 #endif

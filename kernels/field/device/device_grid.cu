@@ -12,21 +12,43 @@ DeviceGridView DeviceGrid::view() const {
           empty_distance.data(),
           vertex_of_voxel.data(),
           records.data(),
+          stride(),
           static_cast<int32_t>(num_voxels()),
           background,
           near_clip};
 }
 
-DeviceGrid UploadGrid(const FastGrid& grid) {
+DeviceGrid UploadGrid(const FastGrid& grid, bool fitting, const Buffer<float>& second_moment) {
   DeviceGrid device;
   device.frame = grid.frame;
   device.basis = grid.basis;
   device.background = grid.background;
   device.near_clip = grid.near_clip;
   device.links = DeviceBuffer<int32_t>::Of(grid.links, "links");
-  device.records = DeviceBuffer<float>::Of(grid.records, "voxels");
+  device.fitting = fitting;
+  const int64_t n = grid.num_voxels(), row = device.lanes() * int64_t{sizeof(float)};
+  device.records = DeviceBuffer<float>(n * device.stride(), "voxels");
+  device.records.Zero();
+  DeviceCopyRows(device.records.data(), fitting ? 3 * row : row, grid.records.data(), row, row, n);
+  if (fitting && second_moment.size() == grid.records.size())
+    DeviceCopyRows(device.second_moment(), 3 * row, second_moment.data(), row, row, n);
   RefreshDerived(&device, grid.num_voxels());
   return device;
+}
+
+namespace {
+
+Buffer<float> DownloadRows(const DeviceGrid& device, const float* from) {
+  const int64_t n = device.num_voxels(), row = device.lanes() * int64_t{sizeof(float)};
+  Buffer<float> rows(n * device.lanes());
+  DeviceCopyRows(rows.data(), row, from, device.stride() * int64_t{sizeof(float)}, row, n);
+  return rows;
+}
+
+}  // namespace
+
+Buffer<float> DownloadSecondMoment(const DeviceGrid& device) {
+  return DownloadRows(device, device.second_moment());
 }
 
 FastGrid DownloadGrid(const DeviceGrid& device) {
@@ -36,7 +58,7 @@ FastGrid DownloadGrid(const DeviceGrid& device) {
   grid.background = device.background;
   grid.near_clip = device.near_clip;
   grid.links = device.links.ToHost();
-  grid.records = device.records.ToHost();
+  grid.records = DownloadRows(device, device.records.data());
   RefreshDerived(&grid);
   return grid;
 }
@@ -47,13 +69,13 @@ namespace {
 
 constexpr uint8_t kFar = 16;  // a warp looks 32 samples ahead anyway
 
-__global__ void ScatterVoxels(DeviceGridView grid, int lanes, int density_lane, int64_t vertices,
+__global__ void ScatterVoxels(DeviceGridView grid, int density_lane, int64_t vertices,
                               int32_t* vertex_of_voxel, uint8_t* distance) {
   const int64_t vertex = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
   if (vertex >= vertices) return;
   const int32_t link = grid.links[vertex];
   grid.dense_density[vertex] =
-      link < 0 ? 0.0f : grid.records[static_cast<int64_t>(link) * lanes + density_lane];
+      link < 0 ? 0.0f : grid.records[link * grid.stride + density_lane];
   if (link >= 0) vertex_of_voxel[link] = static_cast<int32_t>(vertex);
   // Is a corner of the cell above this vertex stored?
   const Vec3i n = grid.frame.resolution;
@@ -89,7 +111,7 @@ void RefreshDerived(DeviceGrid* grid, int64_t num_voxels) {
   grid->dense_density = DeviceBuffer<float>(vertices, "dense densities");
   grid->empty_distance = DeviceBuffer<uint8_t>(vertices, "distances through empty space");
   DeviceBuffer<uint8_t> other(vertices, "distances through empty space");
-  ScatterVoxels<<<BlocksFor(vertices), kThreads>>>(grid->view(), grid->lanes(),
+  ScatterVoxels<<<BlocksFor(vertices), kThreads>>>(grid->view(),
                                                    DensityLane(grid->basis), vertices,
                                                    grid->vertex_of_voxel.data(),
                                                    grid->empty_distance.data());

@@ -17,7 +17,8 @@ struct DeviceGridView {
   float* dense_density = nullptr;           // [X, Y, Z]
   const uint8_t* empty_distance = nullptr;  // [X, Y, Z]
   const int32_t* vertex_of_voxel = nullptr;  // [N]
-  float* records = nullptr;                 // [N, lanes]
+  float* records = nullptr;                 // [N, stride], the first `lanes` of each
+  int64_t stride = 0;                       // floats from a record to the next
   int32_t num_voxels = 0;
   Vec3f background{};
   float near_clip = 0;
@@ -29,17 +30,27 @@ struct DeviceGrid {
   DeviceBuffer<float> dense_density;
   DeviceBuffer<uint8_t> empty_distance;
   DeviceBuffer<int32_t> vertex_of_voxel;
-  DeviceBuffer<float> records;
+  DeviceBuffer<float> records;  // [N, stride]
+  // A field that is being fitted keeps a voxel's gradient and moment behind its values: what one step touches
+  // lies together, on one page of memory.
+  bool fitting = false;
   int basis = 9;
   Vec3f background{0, 0, 0};
   float near_clip = 0;
 
   int lanes() const { return RecordLanes(basis); }
+  int stride() const { return (fitting ? 3 : 1) * lanes(); }
   int64_t num_voxels() const { return vertex_of_voxel.size(); }
   DeviceGridView view() const;
+  // Where gradients and moments begin, with the same stride; only of a field that is being fitted.
+  float* gradient() const { return records.data() + lanes(); }
+  float* second_moment() const { return records.data() + 2 * lanes(); }
 };
 
-DeviceGrid UploadGrid(const FastGrid& grid);
+// `second_moment` [N, lanes], or empty for zeros.
+DeviceGrid UploadGrid(const FastGrid& grid, bool fitting = false,
+                      const Buffer<float>& second_moment = {});
+Buffer<float> DownloadSecondMoment(const DeviceGrid& grid);
 FastGrid DownloadGrid(const DeviceGrid& grid);
 
 // Recomputes dense_density, vertex_of_voxel and empty_distance from links and records, which are
@@ -47,8 +58,8 @@ FastGrid DownloadGrid(const DeviceGrid& grid);
 void RefreshDerived(DeviceGrid* grid, int64_t num_voxels);
 
 // Prunes and resamples as Resample in resample_grid.h does: a new vertex is kept if the old vertex
-// nearest to it, or one of that one's 26 neighbours, weighs at least `threshold`. weights [N]. Returns
-// an empty grid (no voxels) if nothing is left.
+// nearest to it, or one of that one's 26 neighbours, weighs at least `threshold`. weights [N]. Gradients and
+// moments of a field that is being fitted become 0. Returns an empty grid (no voxels) if nothing is left.
 DeviceGrid ResampleOnDevice(const DeviceGrid& grid, const DeviceBuffer<float>& weights,
                             float threshold, const Vec3i& resolution);
 

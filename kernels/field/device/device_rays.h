@@ -6,6 +6,7 @@
 #include "kernels/field/device/device_grid.h"
 #include "kernels/field/fast_rays.h"
 #include "kernels/field/ray_march.h"
+#include "kernels/field/render.h"
 
 namespace regrade {
 
@@ -18,6 +19,10 @@ struct DeviceRenderTarget {
 void RenderOnDevice(const DeviceGrid& grid, const Ray* rays, int64_t n, const MarchOptions& options,
                     const DeviceRenderTarget& target);
 
+// A whole view, colours clipped and depths along the optical axis; see render.h.
+RenderedView RenderViewOnDevice(const DeviceGrid& grid, const Camera& camera,
+                                const MarchOptions& options);
+
 // Sums over many steps; read them seldom, reading waits for the device.
 struct DeviceFitSums {
   double squared_error = 0;
@@ -25,26 +30,22 @@ struct DeviceFitSums {
   unsigned long long rejected_voxels = 0;
 };
 
-// Gradient of a field on the device: dense records, and the list of those that were touched.
-class DeviceGradient {
- public:
-  DeviceGradient() = default;
-  explicit DeviceGradient(const DeviceGrid& grid);
-
-  DeviceBuffer<float> gradient;   // [N, lanes], 0 where untouched
-  DeviceBuffer<int32_t> touched;  // [N]: 1 where the gradient may differ from 0
-  DeviceBuffer<int32_t> list;     // [N]: touched voxels, in no order
-  DeviceBuffer<int32_t> count;    // [1]
+// Which voxels' gradients may differ from 0: bit v % 32 of word v / 32 for voxel v. Bits are walked in the
+// voxels' order; a list in the order of touching made the step half as slow again.
+struct DeviceTouched {
+  DeviceTouched() = default;
+  explicit DeviceTouched(const DeviceGrid& grid);
+  DeviceBuffer<uint32_t> bits;
 };
 
-// Forward, loss and adjoint of a batch: adds the gradient of scale * sum (C - target)^2. Float sums in no
+// Forward, loss and adjoint of a batch on a grid that is being fitted: adds the gradient of scale * sum (C - target)^2. Float sums in no
 // fixed order: two runs differ in the last bits.
 class DeviceRayFitter {
  public:
   // Keeps every sample of the rays in flight; `max_bytes` bounds that store.
   DeviceRayFitter(const GridFrame& frame, const MarchOptions& options, int64_t max_bytes);
   void Accumulate(const DeviceGrid& grid, const Ray* rays, const Vec3f* targets, int64_t n,
-                  float scale, DeviceGradient* gradient);
+                  float scale, DeviceTouched* touched);
   DeviceFitSums TakeSums();  // and sets them to zero
   DeviceFitSums* sums() { return sums_.data(); }
 
@@ -64,10 +65,10 @@ void MaxWeightsOnDevice(const DeviceGrid& grid, const Ray* rays, int64_t n,
 // Adds the gradient of the total variation (see EQ(total-variation)) of voxels begin, begin + 1, ...,
 // begin + count - 1, modulo their number.
 void AddTotalVariation(const DeviceGrid& grid, int64_t begin, int64_t count, float scale_density,
-                       float scale_sh, DeviceGradient* gradient);
+                       float scale_sh, DeviceTouched* touched);
 
-// See EQ(rmsprop): steps the touched voxels and forgets their gradients. second_moment [N, lanes].
-void StepOnDevice(DeviceGrid* grid, float* second_moment, DeviceGradient* gradient,
-                  const RmspropOptions& options, DeviceFitSums* sums);
+// See EQ(rmsprop): steps the touched voxels and forgets their gradients.
+void StepOnDevice(DeviceGrid* grid, DeviceTouched* touched, const RmspropOptions& options,
+                  DeviceFitSums* sums);
 
 }  // namespace regrade

@@ -1,9 +1,34 @@
 // Rendering and the largest weights of voxels, a warp a ray.
+#include <vector>
+
 #include "kernels/field/device/device_rays.h"
 #include "kernels/field/device/launch.h"
 #include "kernels/field/device/warp_shade.h"
 
 namespace regrade {
+
+RenderedView RenderViewOnDevice(const DeviceGrid& grid, const Camera& camera,
+                                const MarchOptions& options) {
+  const int64_t n = int64_t{camera.width} * camera.height;
+  std::vector<Ray> rays(static_cast<size_t>(n));
+#pragma omp parallel for schedule(static)
+  for (int y = 0; y < camera.height; ++y)
+    for (int x = 0; x < camera.width; ++x)
+      rays[static_cast<size_t>(y) * camera.width + x] = camera.PixelRay(x, y);
+  DeviceBuffer<Ray> device_rays(n, "rays of a view");
+  device_rays.CopyIn(rays.data(), n);
+  DeviceBuffer<Vec3f> color(n, "colours of a view");
+  DeviceBuffer<float> depth(n, "depths of a view"), transmittance(n, "transmittances of a view");
+  RenderOnDevice(grid, device_rays.data(), n, options,
+                 {color.data(), depth.data(), transmittance.data()});
+  RenderedView view{Image(camera.width, camera.height, 3), Image(camera.width, camera.height, 1),
+                    Image(camera.width, camera.height, 1)};
+  DeviceCopyOut(view.color.pixels.data(), color.data(), n * int64_t{sizeof(Vec3f)});
+  depth.CopyOut(view.depth.pixels.data(), n);
+  transmittance.CopyOut(view.transmittance.pixels.data(), n);
+  FinishView(camera, rays, &view);
+  return view;
+}
 
 #if defined(__CUDACC__)
 

@@ -62,7 +62,7 @@ __global__ void NumberKept(int64_t vertices, const int32_t* marks, int32_t* link
 
 template <int kBasis>
 __global__ void FillVoxels(GridFrame frame, int64_t vertices, const int32_t* links,
-                           DeviceGridView old, float* records) {
+                           DeviceGridView old, float* records, int64_t stride) {
   constexpr int kLanes = RecordLanes(kBasis);
   const int64_t thread = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
   const int64_t vertex = thread / kLanes;
@@ -73,9 +73,9 @@ __global__ void FillVoxels(GridFrame frame, int64_t vertices, const int32_t* lin
   for (int k = 0; k < 8; ++k) {
     const int32_t link = old.links[CornerVertex(old.frame, cell.vertex, k)];
     if (link >= 0)
-      sum += CornerWeight(cell.fraction, k) * old.records[static_cast<int64_t>(link) * kLanes + value];
+      sum += CornerWeight(cell.fraction, k) * old.records[link * old.stride + value];
   }
-  records[static_cast<int64_t>(links[vertex]) * kLanes + value] = sum;
+  records[links[vertex] * stride + value] = sum;
 }
 
 }  // namespace
@@ -120,10 +120,13 @@ DeviceGrid ResampleOnDevice(const DeviceGrid& grid, const DeviceBuffer<float>& w
   if (count == 0) return result;
   NumberKept<<<BlocksFor(vertices), kThreads>>>(vertices, marks.data(), result.links.data());
   CheckLaunch("number_kept");
-  result.records = DeviceBuffer<float>(count * result.lanes(), "voxels");
+  result.fitting = grid.fitting;
+  result.records = DeviceBuffer<float>(count * result.stride(), "voxels");
+  if (result.fitting) result.records.Zero();
   ByBasis(grid.basis, [&](auto basis) {
     FillVoxels<basis.value><<<BlocksFor(vertices * result.lanes()), kThreads>>>(
-        result.frame, vertices, result.links.data(), grid.view(), result.records.data());
+        result.frame, vertices, result.links.data(), grid.view(), result.records.data(),
+        result.stride());
   });
   CheckLaunch("fill_voxels");
   RefreshDerived(&result, count);

@@ -1,0 +1,106 @@
+// Forward-facing captures: what tells them, and that their space holds every pixel's ray (H87-H90).
+#include "reconstruct/forward_facing.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "kernels/base/random.h"
+#include "tests/support/expect_error.h"
+
+namespace regrade {
+namespace {
+
+// Cameras on a wall, looking along +y of a world with z up; the scene lies from 3 to 40 before them.
+Capture WallCapture(double turn_deg, double forth) {
+  Capture capture;
+  for (int i = 0; i < 9; ++i) {
+    Camera camera;
+    camera.width = 400, camera.height = 300;
+    camera.fx = camera.fy = 350;
+    camera.cx = 200, camera.cy = 150;
+    const double angle = turn_deg * M_PI / 180 * (i - 4) / 4;
+    const Vec3d forward{std::sin(angle), std::cos(angle), 0}, right{std::cos(angle), -std::sin(angle), 0};
+    camera.camera_from_world.rotation.row[0] = right;
+    camera.camera_from_world.rotation.row[1] = Vec3d{0, 0, -1};
+    camera.camera_from_world.rotation.row[2] = forward;
+    const Vec3d center{0.3 * (i % 3), forth * (i / 3), 0.2 * (i / 3)};
+    camera.camera_from_world.translation = -(camera.camera_from_world.rotation * center);
+    capture.views.push_back({"", "photo" + std::to_string(i), "", camera});
+  }
+  for (uint64_t i = 0; i < 300; ++i) {
+    ScenePoint point;
+    const double depth = 3 / (1 - 0.92 * RandomDouble(5, 1, i));
+    point.position = {depth * (RandomDouble(5, 2, i) - 0.5), depth, depth * 0.5 * (RandomDouble(5, 3, i) - 0.5)};
+    point.views = {0, 4, 8};
+    capture.points.push_back(point);
+  }
+  return capture;
+}
+
+TEST(ForwardFacing, H87_IsToldFromCapturesThatTurn) {
+  EXPECT_TRUE(MeasureForwardFacing(WallCapture(10, 0.05)).on);
+  EXPECT_FALSE(MeasureForwardFacing(WallCapture(40, 0.05)).on);
+  EXPECT_FALSE(MeasureForwardFacing(WallCapture(10, 1)).on);  // walks into the scene
+  Capture two = WallCapture(0, 0);
+  two.views.resize(2);
+  two.points.clear();
+  EXPECT_FALSE(MeasureForwardFacing(two).on);
+}
+
+TEST(ForwardFacing, H88_EveryRayStaysInTheBoxAndMeetsTheScene) {
+  const Capture capture = WallCapture(10, 0.05);
+  const NormalizedScene scene = NormalizeForwardFacing(capture, MeasureForwardFacing(capture));
+  ASSERT_TRUE(scene.ndc.on());
+  for (const CaptureView& view : capture.views) {
+    Camera camera = view.camera.Transformed(scene.field_from_world);
+    camera.ndc = scene.ndc;
+    for (const int x : {0, 200, 399})
+      for (const int y : {0, 150, 299}) {
+        const Ray ray = camera.PixelRay(x, y);
+        EXPECT_NEAR(Norm(ray.direction), 1, 1e-6);
+        EXPECT_EQ(ray.origin.z, -1.0f);
+        for (const float share : {0.0f, 0.5f, 1.0f}) {
+          const Vec3f p = ray.origin + ray.direction * (share * 2 / ray.direction.z);
+          EXPECT_LE(std::abs(p.x), scene.box.radius.x * 1.0001f);
+          EXPECT_LE(std::abs(p.y), scene.box.radius.y * 1.0001f);
+        }
+        // A point of the pixel's ray in the world has the ray's NDC.
+        const RayT<double> world = camera.WorldRay(x + 0.5, y + 0.5);
+        const Vec3d at = world.origin + world.direction * 5.0;
+        const Vec3d ndc{scene.ndc.a * at.x / at.z, scene.ndc.b * at.y / at.z, 1 - 2 / at.z};
+        const Vec3d off = Cross(ndc - ray.origin.Cast<double>(), ray.direction.Cast<double>());
+        EXPECT_NEAR(Norm(off), 0, 1e-6);
+        EXPECT_NEAR(Norm(WorldFromNdc(scene.ndc, ndc) - at), 0, 1e-9);
+      }
+  }
+  for (const ScenePoint& point : capture.points)
+    EXPECT_GT((scene.field_from_world * point.position).z, 1);  // behind the near plane
+}
+
+TEST(ForwardFacing, H89_ACameraThatLooksBackIsNamed) {
+  Capture capture = WallCapture(10, 0.05);
+  Camera& turned = capture.views[5].camera;
+  const Vec3d center = turned.Center();
+  for (const int axis : {0, 2})
+    turned.camera_from_world.rotation.row[axis] = -turned.camera_from_world.rotation.row[axis];
+  turned.camera_from_world.translation = -(turned.camera_from_world.rotation * center);
+  ForwardFacing measured = MeasureForwardFacing(WallCapture(10, 0.05));
+  try {
+    NormalizeForwardFacing(capture, measured);
+    FAIL() << "not refused";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ExitCode::kScene);
+    EXPECT_EQ(error.where(), "photo5");
+  }
+}
+
+TEST(ForwardFacing, H90_ARayThatDoesNotRunForwardMissesTheField) {
+  const NdcSpace space{1.5, 2};
+  Vec3f origin{0, 0, 0}, direction = Normalized(Vec3f{1, 0, -0.1f});
+  NdcRay(space, &origin, &direction);
+  EXPECT_EQ(Norm(direction), 0.0f);
+}
+
+}  // namespace
+}  // namespace regrade
