@@ -9,6 +9,7 @@
 
 #include "kernels/base/child_process.h"
 #include "pipeline/files/json_file.h"
+#include "pipeline/interrupt.h"
 #include "pipeline/workspace.h"
 #include "tests/support/temporary_folder.h"
 
@@ -183,6 +184,20 @@ TEST(Program, F34_DiesByTheSignalThatStoppedIt) {
               128 + signal);
   }
   ::close(null);
+}
+
+TEST(Interrupt, F34_TheSecondSignalEndsTheProcessAtOnce) {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    InstallSignalHandling();
+    ::raise(SIGINT);
+    if (StopSignal() != SIGINT) ::_exit(1);  // the first is a wish
+    ::raise(SIGTERM);
+    ::_exit(2);
+  }
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  EXPECT_TRUE(WIFSIGNALED(status) && WTERMSIG(status) == SIGTERM) << status;
 }
 
 TEST(Program, JsonLinesAreJson) {
