@@ -177,8 +177,9 @@ NormalizedScene NormalizeScene(const Capture& capture) {
     double half = Quantile(&distances, 0.5) / 0.9;
     result.notice = "few points: the box is the cube round the cameras' common point";
     if (!(half > RoundingOf(centers))) {
-      result.notice = "few points, and the cameras stand at one place: the size of the box is "
-                      "that of the points' distances, or 1";
+      result.notice =
+          "few points, and the cameras stand at one place: the size of the box is "
+          "that of the points' distances, or 1";
       std::vector<double> depths;
       for (const ScenePoint& p : capture.points) depths.push_back(Norm(p.position - common));
       half = depths.empty() ? 1 : Quantile(&depths, 0.5);

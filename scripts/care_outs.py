@@ -2,41 +2,36 @@
 """Takes the cares of tests/hard_cases/care_outs.json out of the code, one at a time, and sees a test fail each time.
 
 An entry is {case, care, file, find, replace, target, tests}: `find` occurs once in `file`; with `replace` in its place
-`target`, a test program, is built and run with the GoogleTest filter `tests`. Without a target `tests` is a regular
+the test program `target` is built and run with the GoogleTest filter `tests`. Without a target, `tests` is a regular
 expression for ctest. An entry {case, cannot_arise} says why there is nothing to take out.
-
-  care_outs.py [--only H51,F2] [--build DIR] [--jobs N]   does it in a copy of the tree; exit status 1 if a test did
-                                                          not fail, or an entry does not apply or does not compile
-  care_outs.py --write       the same, and writes tests/hard_cases/CARE_OUTS.md
-  care_outs.py --check       only whether every entry still applies and every case has one
-  care_outs.py --self-test   plants each kind of mistake in a scratch tree and sees it found
 """
 
 import argparse
+import filecmp
 import fnmatch
 import glob
 import json
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
 
 ENTRIES, TABLE = "tests/hard_cases/care_outs.json", "tests/hard_cases/CARE_OUTS.md"
-# The cases that have an entry: ranges of the numbers that tests are named after.
+# The cases that have an entry: the numbers that tests are named after.
 CASES = ("H1-H22 H31-H48 H51-H67 H71-H86 H99-H106 H109-H110 H125-H137 H141-H152 "
-         "F1-F17 F28 F33-F38 F46-F51 F54 F58-F63")
+         "F1-F17 F28-F28 F33-F38 F46-F51 F54-F54 F58-F63")
 KEYS = {"case", "care", "file", "find", "replace", "target", "tests"}
 TEST = re.compile(r"\bTEST(?:_F|_P)?\(\s*(\w+)\s*,\s*(\w+)\s*\)")
-TEST_SECONDS = 180  # a mutant that hangs has been seen, too
+FAILURE = r"^(?:\S+:\d+|unknown file): Failure\n"
+TEST_SECONDS = 180  # a test that hangs has seen it, too
 
 
 def all_cases():
-    for part in CASES.split():
-        first, _, last = part.partition("-")
-        for number in range(int(first[1:]), int((last or first)[1:]) + 1):
-            yield part[0] + str(number)
+    for first, last in (part.split("-") for part in CASES.split()):
+        yield from (first[0] + str(number) for number in range(int(first[1:]), int(last[1:]) + 1))
 
 
 def read(path):
@@ -44,13 +39,10 @@ def read(path):
         return file.read()
 
 
-def test_names(root):
-    """As a filter sees them: Suite.Case, and for tests with parameters Any/Suite.Case/0."""
-    names = []
-    for path in glob.glob(os.path.join(root, "tests", "**", "*.cc"), recursive=True):
-        for suite, case in TEST.findall(read(path)):
-            names += [f"{suite}.{case}", f"Any/{suite}.{case}/0"]
-    return names
+def write(path, text):
+    os.makedirs(os.path.dirname(path), exist_ok=True)
+    with open(path, "w", encoding="utf-8") as file:
+        file.write(text)
 
 
 def check(root):
@@ -58,8 +50,11 @@ def check(root):
     try:
         entries = json.loads(read(os.path.join(root, ENTRIES)))
     except (OSError, ValueError) as error:
-        return [], [f"{ENTRIES}: {error}"]
-    complaints, names = [], test_names(root)
+        return [], [str(error)]
+    names, complaints = [], []  # as a filter sees tests, without and with parameters
+    for path in glob.glob(os.path.join(root, "tests", "**", "*.cc"), recursive=True):
+        for suite, test in TEST.findall(read(path)):
+            names += [f"{suite}.{test}", f"Any/{suite}.{test}/0"]
     for entry in entries:
         case = entry.get("case")
         if set(entry) == {"case", "cannot_arise"}:
@@ -72,129 +67,110 @@ def check(root):
         if count != 1:
             complaints.append(f"{case}: {entry['find'][:60]!r} occurs {count} times in {entry['file']}, not once")
         if entry["find"] == entry["replace"]:
-            complaints.append(f"{case}: takes nothing out")
-        for pattern in entry["tests"].split(":") if entry["target"] else ():
-            if not fnmatch.filter(names, pattern):
-                complaints.append(f"{case}: no test is called {pattern}")
+            complaints.append(f"{case}: nothing is taken out")
+        complaints += [f"{case}: no test is called {pattern}" for pattern in entry["tests"].split(":")
+                       if entry["target"] and not fnmatch.filter(names, pattern)]
     have, want = {entry.get("case") for entry in entries}, list(all_cases())
     complaints += [f"{case}: no entry" for case in want if case not in have]
     complaints += [f"{case}: not one of {CASES}" for case in sorted(map(str, have - set(want)))]
     return entries, complaints
 
 
-def mirror(root, copy):
-    """Makes `copy` the tracked and the new files of `root`; what is equal keeps its time."""
-    listing = subprocess.run(["git", "-C", root, "ls-files", "-z", "-co", "--exclude-standard"], check=True,
-                             stdout=subprocess.PIPE).stdout
-    paths = {path for path in listing.decode().split("\0") if os.path.isfile(os.path.join(root, path))}
-    for folder, _, names in os.walk(copy):
-        for name in names:
-            if os.path.relpath(os.path.join(folder, name), copy) not in paths:
-                os.remove(os.path.join(folder, name))
-    for path in paths:
-        source, target = os.path.join(root, path), os.path.join(copy, path)
-        os.makedirs(os.path.dirname(target), exist_ok=True)
-        with open(source, "rb") as file:
-            content = file.read()
-        if not os.path.isfile(target) or open(target, "rb").read() != content:
-            shutil.copyfile(source, target)
-            shutil.copymode(source, target)
+def run(command, seconds=None):
+    """(output, exit status); the status is None if the time was up."""
+    environment = dict(os.environ, OMP_WAIT_POLICY="passive", LC_ALL="C.UTF-8")
+    with subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                          env=environment, start_new_session=True) as child:
+        try:
+            return child.communicate(timeout=seconds)[0].decode(errors="replace"), child.returncode
+        except subprocess.TimeoutExpired:
+            os.killpg(child.pid, signal.SIGKILL)
+            return "", None
 
 
 class Workshop:
-    """A copy of the tree and its build directory."""
+    """A copy of the tree and its build directory. What is equal to the copy of last time keeps its date."""
 
     def __init__(self, root, folder, jobs):
         self.tree, self.build, self.jobs = os.path.join(folder, "tree"), os.path.join(folder, "build"), jobs
-        mirror(root, self.tree)
+        listing = run(["git", "-C", root, "ls-files", "-z", "--cached", "--others", "--exclude-standard"])[0]
+        paths = {path for path in listing.split("\0") if os.path.isfile(os.path.join(root, path))}
+        for old in glob.glob(os.path.join(self.tree, "**"), recursive=True):
+            if os.path.isfile(old) and os.path.relpath(old, self.tree) not in paths:
+                os.remove(old)
+        for path in paths:
+            source, target = os.path.join(root, path), os.path.join(self.tree, path)
+            os.makedirs(os.path.dirname(target), exist_ok=True)
+            if not os.path.isfile(target) or not filecmp.cmp(source, target, shallow=False):
+                shutil.copy(source, target)
         launcher = ["-DCMAKE_CXX_COMPILER_LAUNCHER=ccache"] if shutil.which("ccache") else []
-        code, text = self.run(["cmake", "-G", "Ninja", "-S", self.tree, "-B", self.build, "-DREGRADE_CUDA=OFF",
-                               "-DREGRADE_BENCHMARKS=OFF", "-DCMAKE_BUILD_TYPE=Release",
-                               "-DCMAKE_CXX_FLAGS_RELEASE=-O1 -w", *launcher], None)
-        if code != 0:
+        text, status = run(["cmake", "-G", "Ninja", "-S", self.tree, "-B", self.build, "-DCMAKE_BUILD_TYPE=Release",
+                            "-DCMAKE_CXX_FLAGS_RELEASE=-O1 -w", "-DREGRADE_CUDA=OFF", "-DREGRADE_BENCHMARKS=OFF",
+                            *launcher])
+        if status != 0:
             sys.exit(text)
 
-    def run(self, command, seconds):
-        """(exit status, output); the status is None after `seconds`."""
-        environment = dict(os.environ, OMP_WAIT_POLICY="passive", LC_ALL="C.UTF-8")
-        try:
-            done = subprocess.run(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                                  stderr=subprocess.STDOUT, timeout=seconds, env=environment)
-            return done.returncode, done.stdout.decode(errors="replace")
-        except subprocess.TimeoutExpired:
-            return None, ""
-
     def make(self, target):
-        return self.run(["cmake", "--build", self.build, "--parallel", str(self.jobs), "--target", target], 3600)
+        """What the compiler complains of, or ''."""
+        if not target:
+            return ""
+        text, status = run(["cmake", "--build", self.build, "--parallel", str(self.jobs), "--target", target])
+        return "" if status == 0 else next((s for s in text.splitlines() if "error" in s.lower()), text[-300:])
 
     def test(self, target, tests):
-        """(tests run, [test that failed], how the first failed)"""
-        if not target:
-            code, text = self.run(["ctest", "--test-dir", self.build, "-R", tests, "--output-on-failure"], TEST_SECONDS)
-            run = "No tests were found" not in text
-            lines = [line for line in text.splitlines() if re.match(r"\S+:\d+: ", line) and "remark:" not in line]
-            return run, [tests] if code != 0 else [], lines[0].split(": ", 1)[1] if lines else "exit status not 0"
-        programs = glob.glob(os.path.join(self.build, "tests", "*", target))
-        code, text = self.run([*programs, "--gtest_filter=" + tests, "--gtest_brief=1"], TEST_SECONDS)
-        if code is None:
-            return 1, [tests], f"did not end within {TEST_SECONDS} s"
-        ran = re.search(r"\[=+\] (\d+) tests?.* ran", text)
-        failed = list(dict.fromkeys(re.findall(r"^\[  FAILED  \] ([\w/.]+)", text, re.M)))
-        if code != 0 and not ran:
-            return 1, [tests], "killed by signal %d" % -code if code < 0 else (text.strip().splitlines() or ["?"])[-1]
-        start = r"^(?:\S+:\d+|unknown file): Failure\n"
-        message = re.search(start + r"(.*?)(?=" + start + r"|^\[  FAILED)", text, re.M | re.S)
-        how = " ".join(re.sub(r"\d+-byte object <[^>]*>", "an object", message.group(1)).split()) if message else "?"
-        return int(ran.group(1)) if ran else 0, failed, how
+        """([test that failed], how the first one did)"""
+        program = glob.glob(os.path.join(self.build, "tests", "*", target))[0] if target else ""
+        text, status = run([program, "--gtest_filter=" + tests, "--gtest_brief=1"] if target else
+                           ["ctest", "--test-dir", self.build, "-R", tests, "--output-on-failure"], TEST_SECONDS)
+        if status == 0:
+            return [], "no test failed"
+        failed = list(dict.fromkeys(re.findall(r"^\[  FAILED  \] ([\w/.]+)", text, re.M))) or [tests]
+        message = (re.search(FAILURE + r"(.*?)(?=" + FAILURE + r"|^\[  FAILED)", text, re.M | re.S) or
+                   re.search(r"^\S+:\d+: (?!remark)(.*)$", text, re.M))
+        how = ("did not end" if status is None else message.group(1) if message else
+               f"ended by signal {-status}" if status < 0 else f"exit status {status}")
+        how = re.sub(re.escape(tempfile.gettempdir()) + r"/\S*", "PATH", how)
+        return failed, " ".join(re.sub(r"\d+-byte object <[^>]*>", "an object", how).split())
 
-
-def take_out(workshop, entry):
-    """(verdict, test, how): the verdict is 'failed' if all is as it should be."""
-    path = os.path.join(workshop.tree, entry["file"])
-    text = read(path)
-    with open(path, "w", encoding="utf-8") as file:
-        file.write(text.replace(entry["find"], entry["replace"]))
-    try:
-        code, output = workshop.make(entry["target"]) if entry["target"] else (0, "")
-        if code != 0:
-            errors = [line for line in output.splitlines() if "error" in line.lower()]
-            return "DOES NOT COMPILE", entry["tests"], (errors or ["?"])[0]
-        _, failed, how = workshop.test(entry["target"], entry["tests"])
-        return ("failed", failed[0], how) if failed else ("SURVIVED", entry["tests"], "no test failed")
-    finally:
-        with open(path, "w", encoding="utf-8") as file:
-            file.write(text)
+    def take_out(self, entry):
+        """(verdict, test, how); the verdict is "failed" if all is as it should be."""
+        path = os.path.join(self.tree, entry["file"])
+        text = read(path)
+        write(path, text.replace(entry["find"], entry["replace"]))
+        try:
+            complaint = self.make(entry["target"])
+            failed, how = ([], complaint) if complaint else self.test(entry["target"], entry["tests"])
+        finally:
+            write(path, text)
+        verdict = "failed" if failed else "DOES NOT COMPILE" if complaint else "SURVIVED"
+        return verdict, (failed + [entry["tests"]])[0], how
 
 
 def run_all(workshop, entries):
-    """[(entry, verdict, test, how)], files by turns so that little is built twice."""
-    rows, sound = [], {}
-    for entry in sorted(entries, key=lambda e: (e.get("target", ""), e.get("file", ""))):
-        if "cannot_arise" in entry:
-            rows.append((entry, "cannot arise", "", entry["cannot_arise"]))
-            continue
+    """[(entry, verdict, test, how)]; file after file, so that little is built twice."""
+    rows, sound = [(entry, "cannot arise", "", "") for entry in entries if "cannot_arise" in entry], {}
+    entries = [entry for entry in entries if "cannot_arise" not in entry]
+    for entry in sorted(entries, key=lambda e: (e["target"], e["file"])):
         target = entry["target"]
-        if target not in sound:
-            code, output = workshop.make(target) if target else (0, "")
-            filters = [e["tests"] for e in entries if e.get("target") == target and "tests" in e]
-            failed = workshop.test(target, (":" if target else "|").join(filters))[1] if code == 0 else [output[-300:]]
-            sound[target] = f"before anything was taken out, failed: {', '.join(failed)}" if failed else ""
-        row = ("UNSOUND", entry["tests"], sound[target]) if sound[target] else take_out(workshop, entry)
+        if target not in sound:  # nothing taken out yet: all tests that are named pass
+            filters = (":" if target else "|").join(e["tests"] for e in entries if e["target"] == target)
+            complaint = workshop.make(target)
+            sound[target] = complaint or ", ".join(workshop.test(target, filters)[0])
+        row = ("UNSOUND", sound[target], "before anything was taken out") if sound[target] else workshop.take_out(entry)
+        print(f"{entry['case']:5} {row[0]:9} {row[1]}: {row[2][:100]}", flush=True)
         rows.append((entry, *row))
-        print(f"{entry['case']:5} {row[0]:9} {row[1]}: {row[2][:110]}", flush=True)
     return rows
 
 
 def markdown(rows):
-    number = {case: i for i, case in enumerate(all_cases())}
-    text = ("# Cares taken out\n\nEach care of the hard cases, what the code does without it, and the test that saw "
-            "it. Written by\n`scripts/care_outs.py --write` from `care_outs.json`; every line has been run.\n\n"
+    order = {case: i for i, case in enumerate(all_cases())}
+    text = ("# Cares taken out\n\nEach care of the hard cases, and the test that failed when the code was built\n"
+            "without it. Written by `scripts/care_outs.py --write` from `care_outs.json`; every line has been run.\n\n"
             "| case | care taken out | test that failed | how it failed |\n|---|---|---|---|\n")
-    cell = lambda s: " ".join(s.replace("|", "\\|").replace("<", "&lt;").split())
-    for entry, verdict, test, how in sorted(rows, key=lambda row: number.get(row[0]["case"], 0)):
-        care = "cannot arise: " + how if verdict == "cannot arise" else entry["care"]
-        how = {"cannot arise": "", "failed": how if len(how) < 130 else how[:127] + "..."}.get(verdict, verdict)
-        text += f"| {entry['case']} | {cell(care)} | {cell(test)} | {cell(how)} |\n"
+    for entry, verdict, test, how in sorted(rows, key=lambda row: order[row[0]["case"]]):
+        cells = [entry["case"], entry.get("care", "cannot arise: " + entry.get("cannot_arise", "")), test,
+                 (how if len(how) < 130 else how[:127] + "...") if verdict in ("failed", "cannot arise") else verdict]
+        text += "| " + " | ".join(s.replace("|", "\\|").replace("<", "&lt;") for s in cells) + " |\n"
     return text
 
 
@@ -202,34 +178,34 @@ def self_test():
     """Plants one mistake at a time; each must be found, and a tidy list be clean."""
     tidy = [{"case": case, "cannot_arise": "no"} for case in all_cases()]
     good = {"case": "H1", "care": "c", "file": "a.cc", "find": "one", "replace": "", "target": "t", "tests": "*S.C*"}
-    planted = [(tidy + [good], ""), (tidy[1:], "H1: no entry"), (tidy + [{**good, "find": "twice"}], "occurs 2 times"),
-               (tidy + [{**good, "find": "none"}], "occurs 0 times"), (tidy + [{**good, "replace": "one"}], "nothing"),
-               (tidy + [{**good, "file": "b.cc"}], "occurs 0 times"), (tidy + [{**good, "tests": "X.*"}], "no test"),
-               (tidy + [{"case": "H1", "find": "one"}], "an entry has"), (tidy + [{**good, "case": "H999"}], "not one of")]
+    planted = [({}, ""), ({"find": "twice"}, "occurs 2 times"), ({"find": "none"}, "occurs 0 times"),
+               ({"file": "b.cc"}, "occurs 0 times"), ({"replace": "one"}, "nothing is taken out"),
+               ({"tests": "X.*"}, "no test is called"), ({"more": ""}, "an entry has"), ({"case": "H0"}, "not one of")]
+    lists = [(tidy + [{**good, **change}], expected) for change, expected in planted] + [(tidy[1:], "H1: no entry")]
     failures = 0
-    for entries, expected in planted:
+    for entries, expected in lists:
         with tempfile.TemporaryDirectory() as root:
-            os.makedirs(os.path.join(root, "tests", "hard_cases"))
-            for path, text in ((ENTRIES, json.dumps(entries)), ("a.cc", "one twice twice"), ("tests/t.cc", "TEST(S, C)")):
-                with open(os.path.join(root, path), "w", encoding="utf-8") as file:
-                    file.write(text)
+            files = {ENTRIES: json.dumps(entries), "a.cc": "one twice twice", "tests/t.cc": "TEST(S, C)"}
+            for path, text in files.items():
+                write(os.path.join(root, path), text)
             found = check(root)[1]
         if len(found) != bool(expected) or (found and expected not in found[0]):
             failures += 1
             print(f"self-test: expected '{expected}', got {found}")
-    print(f"self-test: {len(planted)} lists, {failures} failures")
+    print(f"self-test: {len(lists)} lists, {failures} failures")
     return failures
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter,
+                                     epilog="Exit status 1: no test failed, or an entry does not apply or compile.")
     parser.add_argument("--root", default=os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
     parser.add_argument("--only", metavar="CASE,...", help="these cases alone")
-    parser.add_argument("--build", metavar="DIR", help="keep the copy and its build here, and use them again")
+    parser.add_argument("--build", metavar="DIR", help="keep the tree's copy and its build here for the next time")
     parser.add_argument("--jobs", type=int, default=1, metavar="N", help="compilers side by side (1)")
-    parser.add_argument("--write", action="store_true")
-    parser.add_argument("--check", action="store_true")
-    parser.add_argument("--self-test", action="store_true")
+    parser.add_argument("--write", action="store_true", help=f"write {TABLE}")
+    parser.add_argument("--check", action="store_true", help="build nothing: does each entry apply, has each case one?")
+    parser.add_argument("--self-test", action="store_true", help="plant mistakes in a list and see --check find them")
     arguments = parser.parse_args()
     if arguments.self_test:
         return 1 if self_test() else 0
@@ -242,13 +218,11 @@ def main():
     if arguments.only:
         entries = [entry for entry in entries if entry["case"] in arguments.only.split(",")]
     with tempfile.TemporaryDirectory() as scratch:
-        workshop = Workshop(arguments.root, os.path.abspath(arguments.build or scratch), arguments.jobs)
-        rows = run_all(workshop, entries)
+        rows = run_all(Workshop(arguments.root, os.path.abspath(arguments.build or scratch), arguments.jobs), entries)
     wrong = sum(verdict not in ("failed", "cannot arise") for _, verdict, _, _ in rows)
     print(f"care_outs: {len(rows)} entries, {wrong} not seen to fail")
     if arguments.write:
-        with open(os.path.join(arguments.root, TABLE), "w", encoding="utf-8") as file:
-            file.write(markdown(rows))
+        write(os.path.join(arguments.root, TABLE), markdown(rows))
     return 1 if wrong else 0
 
 

@@ -332,8 +332,9 @@ TEST(RayLoss, H65_AClampedChannelTakesNoGradient) {
 // An opaque wall's optical depth, 1e8 and more, would swallow that of the mist before it in the
 // running sum from which the adjoint recovers its weights: depths end at 104, where exp is 0.
 TEST(RayLoss, H53_MistBeforeAWallKeepsItsGradient) {
-  const RadianceField field =
-      RowOfVertices(40, [](int x) { return x < 5 ? 0.0f : x < 20 ? 0.05f : 1e9f; });
+  const RadianceField field = RowOfVertices(40, [](int x) {
+    return x < 5 ? 0.0f : x < 20 ? 0.05f : 1e9f;
+  });
   const DoubleField d(field);
   const MarchOptions options{0.5f, 1e-4f};
   const Ray ray{{0.3f, 0.8f, 1.1f}, {1, 0, 0}};

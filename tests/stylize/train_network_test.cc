@@ -200,15 +200,19 @@ TEST(TrainNetwork, H34_AVanishedLayerIsWarnedOf) {
   TrainingState state;
   TrainingHooks hooks;
   hooks.checkpoint = [&](const TrainingState& s) { state = s; };
-  EXPECT_TRUE(TrainNetwork(ball.field, ball.views, map, {}, Quick(2), hooks).warnings.empty());
+  const auto warned = [](const TrainNetworkResult& result) {
+    for (const std::string& warning : result.warnings)
+      if (warning.find("norm has vanished") != std::string::npos) return true;
+    return false;
+  };
+  EXPECT_FALSE(warned(TrainNetwork(ball.field, ball.views, map, {}, Quick(2), hooks)));
   LipschitzNetwork vanished(state.network);
   vanished.k(2) = -1;  // squareplus of it is 2.5e-13
   state.network = vanished.data();
   const TrainNetworkResult result =
       TrainNetwork(ball.field, ball.views, map, {}, Quick(2), {}, &state);
   EXPECT_LT(result.smallest_k, 1e-12);
-  ASSERT_FALSE(result.warnings.empty());
-  EXPECT_NE(result.warnings.back().find("norm has vanished"), std::string::npos);
+  EXPECT_TRUE(warned(result));
 }
 
 TEST(TrainNetwork, H29_PixelsThatAreNotFinite) {
