@@ -129,8 +129,10 @@ class Workshop:
                    re.search(r"^\S+:\d+: (?!remark)(.*)$", text, re.M))
         how = ("did not end" if status is None else message.group(1) if message else
                f"ended by signal {-status}" if status < 0 else f"exit status {status}")
-        how = re.sub(re.escape(tempfile.gettempdir()) + r"/\S*", "PATH", how)
-        return failed, " ".join(re.sub(r"\d+-byte object <[^>]*>", "an object", how).split())
+        for pattern, word in ((re.escape(tempfile.gettempdir()) + r"/[^\n:]*", "PATH"), (str(2**64 - 1), "npos"),
+                              (r"\d+-byte object <[^>]*>", "an object")):
+            how = re.sub(pattern, word, how)
+        return failed, " ".join(how.split())
 
     def take_out(self, entry):
         """(verdict, test, how); the verdict is "failed" if all is as it should be."""

@@ -173,7 +173,9 @@ TEST_F(FitField, H85_ResamplingKeepsConstantsAndRamps) {
     // Vertex k of 17 lies at (k + 1/2) 9 / 17 - 1/2 of 9, and ramps end at the last vertices.
     const float z =
         std::clamp((fine.vertex_of_voxel[v] % 17 + 0.5f) * 9 / 17 - 0.5f, 0.0f, 8.0f);
-    if (inside) EXPECT_NEAR(fine.records[v * fine.lanes()], z, 1e-5f);
+    if (inside) {
+      EXPECT_NEAR(fine.records[v * fine.lanes()], z, 1e-5f);
+    }
   }
   EXPECT_GT(whole, fine.num_voxels() / 2);
 }
