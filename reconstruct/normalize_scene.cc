@@ -175,9 +175,9 @@ NormalizedScene NormalizeScene(const Capture& capture) {
     std::vector<double> distances;
     for (const Vec3d& c : centers) distances.push_back(Norm(c - common));
     double half = Quantile(&distances, 0.5) / 0.9;
-    result.notice = "few points: the box is the cube round the cameras' common point";
+    std::string notice = "few points: the box is the cube round the cameras' common point";
     if (!(half > RoundingOf(centers))) {
-      result.notice =
+      notice =
           "few points, and the cameras stand at one place: the size of the box is "
           "that of the points' distances, or 1";
       std::vector<double> depths;
@@ -185,6 +185,7 @@ NormalizedScene NormalizeScene(const Capture& capture) {
       half = depths.empty() ? 1 : Quantile(&depths, 0.5);
       if (!(half > RoundingOf(centers))) half = 1;
     }
+    result.notice += (result.notice.empty() ? "" : "; ") + notice;
     for (int a = 0; a < 3; ++a) {
       const double middle = Dot(rotation.row[a], common);
       low[a] = middle - half;

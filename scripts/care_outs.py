@@ -209,6 +209,8 @@ def main():
     parser.add_argument("--check", action="store_true", help="build nothing: does each entry apply, has each case one?")
     parser.add_argument("--self-test", action="store_true", help="plant mistakes in a list and see --check find them")
     arguments = parser.parse_args()
+    if arguments.write and arguments.only:
+        parser.error("--write wants all cases, --only takes some")
     if arguments.self_test:
         return 1 if self_test() else 0
     entries, complaints = check(arguments.root)
