@@ -7,6 +7,7 @@
 
 #include "kernels/base/error.h"
 #include "pipeline/files/json_file.h"
+#include "pipeline/files/poses_bounds.h"
 #include "pipeline/files/transforms_json.h"
 
 namespace regrade {
@@ -75,6 +76,26 @@ ColmapModel ModelFromTransforms(const CaptureSource& source,
   return model;
 }
 
+// Poses of an LLFF file belong to the pictures of its folder in natural order, all of them.
+ColmapModel ModelFromLlff(const CaptureSource& source, const std::vector<StagedPhoto>& photos,
+                          double* nearest_depth) {
+  const LlffPoses poses = ReadPosesBounds(source.poses);
+  if (poses.cameras.size() != photos.size())
+    throw Error(ExitCode::kInput,
+                std::to_string(poses.cameras.size()) + " poses, but " +
+                    std::to_string(photos.size()) + " usable photos in " + source.photos,
+                source.poses, "an LLFF file names no photos: all of its pictures must be there");
+  *nearest_depth = poses.nearest;
+  ColmapModel model;
+  for (size_t i = 0; i < photos.size(); ++i) {
+    const uint32_t id = static_cast<uint32_t>(i) + 1;
+    Camera camera = poses.cameras[i].Resized(photos[i].width, photos[i].height);
+    model.cameras.push_back({id, ColmapLens::kPinhole, camera});
+    model.images.push_back({id, id, photos[i].name, camera.camera_from_world, {}});
+  }
+  return model;
+}
+
 JsonValue VerdictsJson(const std::vector<PhotoVerdict>& verdicts) {
   JsonValue::Array array;
   for (const PhotoVerdict& verdict : verdicts)
@@ -104,14 +125,20 @@ CaptureSource DetectCapture(const std::string& folder) {
   if (error) throw Error(ExitCode::kInput, error.message(), folder, "name a folder of photos");
   if (!fs::is_directory(root))
     throw Error(ExitCode::kInput, "is a file, not a folder", folder, "name its folder");
-  if (fs::is_regular_file(root / "transforms.json")) {
-    const fs::path file = root / "transforms.json";
+  for (const char* name : {"transforms.json", "transforms_train.json"}) {
+    const fs::path file = root / name;
+    if (!fs::is_regular_file(file)) continue;
     const auto unknown_size = [](const std::string&, int* width, int* height) {
       *width = *height = 1;
     };
     const fs::path photos = CommonFolder(root, ReadTransformsJson(file.string(), unknown_size));
     return {CaptureKind::kTransforms, photos.string(), file.string()};
   }
+  if (fs::is_regular_file(root / "poses_bounds.npy"))
+    for (const char* pictures : {"images", "images_4", "images_8"})
+      if (fs::is_directory(root / pictures))
+        return {CaptureKind::kLlff, (root / pictures).string(),
+                (root / "poses_bounds.npy").string()};
   if (fs::is_directory(root / "images"))
     for (const char* model : {"sparse", "sparse/0"})
       if (HoldsModel(root / model))
@@ -123,8 +150,11 @@ Capture ImportPoses(const CaptureSource& source, const std::vector<StagedPhoto>&
                     const std::vector<PhotoVerdict>& verdicts,
                     const std::string& sparse_folder) {
   ColmapModel model;
+  double nearest_depth = 0;
   if (source.kind == CaptureKind::kTransforms) {
     model = ModelFromTransforms(source, photos);
+  } else if (source.kind == CaptureKind::kLlff) {
+    model = ModelFromLlff(source, photos, &nearest_depth);
   } else {
     model = ReadColmapModel(source.poses);
     // The model goes on under our names; images without a staged photo keep theirs.
@@ -136,6 +166,7 @@ Capture ImportPoses(const CaptureSource& source, const std::vector<StagedPhoto>&
   }
   WriteColmapModel(model, sparse_folder);
   Capture capture = CaptureFromModel(model, photos, PhotoNames::kStaged);
+  capture.nearest_depth = nearest_depth;
   capture.verdicts = MergedVerdicts(verdicts, capture.verdicts);
   return capture;
 }
@@ -154,6 +185,7 @@ void WriteCaptureIndex(const std::string& folder, const Capture& capture,
                                   {"photos", std::move(staged)},
                                   {"verdicts", VerdictsJson(capture.verdicts)},
                                   {"reprojection_px", capture.reprojection_px},
+                                  {"nearest_depth", capture.nearest_depth},
                                   {"models_found", capture.models_found}});
 }
 
@@ -182,6 +214,8 @@ Capture ReadCapture(const std::string& folder) {
                                   verdict.At("verdict").AsString(),
                                   verdict.At("why").AsString()});
     capture.reprojection_px = index.At("reprojection_px").AsDouble();
+    if (const JsonValue* depth = index.Find("nearest_depth"))
+      capture.nearest_depth = depth->AsDouble();
     capture.models_found = static_cast<int>(index.At("models_found").AsInt());
     return capture;
   } catch (const Error& error) {

@@ -13,13 +13,14 @@ namespace regrade {
 enum class CaptureKind {
   kPhotos,      // not at all
   kColmap,      // images/ beside sparse/ or sparse/0/
-  kTransforms,  // transforms.json
+  kTransforms,  // transforms.json, or transforms_train.json of a Blender capture
+  kLlff,        // poses_bounds.npy beside images/, images_4/ or images_8/
 };
 
 struct CaptureSource {
   CaptureKind kind = CaptureKind::kPhotos;
   std::string photos;  // the folder to take photos from, absolute
-  std::string poses;   // folder of the model, or the .json file; empty for kPhotos
+  std::string poses;   // folder of the model, or the file of poses; empty for kPhotos
 };
 
 // Tells by content. Throws Error(kInput) if there is no such folder.

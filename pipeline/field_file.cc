@@ -147,6 +147,7 @@ void WriteFieldFile(const std::string& path, const StoredField& stored) {
   file.AddScalar<float>("regrade_near_clip", field.near_clip);
   file.AddScalar<float>("regrade_step", field.step);
   file.Add("regrade_field_from_world", {13}, placement);
+  if (stored.ndc.on()) file.Add("regrade_ndc", {2}, &stored.ndc.a);
   file.WriteTo(path);
 }
 
@@ -171,6 +172,12 @@ StoredField ReadFieldFile(const std::string& path, uint64_t budget) {
         stored.field_from_world.rotation(i, j) = placement[1 + 3 * i + j];
       stored.field_from_world.translation[i] = placement[10 + i];
     }
+  }
+  if (file.Has("regrade_ndc")) {
+    const NpzArray array = file.Read("regrade_ndc", ArrayType::kF64, {2});
+    stored.ndc = {array.As<double>()[0], array.As<double>()[1]};
+    if (!(stored.ndc.a > 0 && stored.ndc.a < 1e3 && stored.ndc.b > 0 && stored.ndc.b < 1e3))
+      Refuse(path, "regrade_ndc is not the shape of a picture's view");
   }
   Validate(stored.field, path.c_str());
   return stored;

@@ -16,7 +16,7 @@ namespace regrade {
 namespace {
 
 // Named in the plans, not built yet: better said than "unknown".
-constexpr const char* kLater[] = {"tradeoff", "import", "export", "pack"};
+constexpr const char* kLater[] = {"tradeoff", "import", "export"};
 
 void PrintHelp() {
   std::printf(

@@ -12,7 +12,7 @@
 namespace regrade {
 namespace {
 
-constexpr double kGridBytes = 4 + 4 + 1;  // a vertex: link, density, distance
+constexpr double kGridBytes = 4 + 8;      // a vertex: link, and density with link again
 constexpr double kPixelBytes = 12 + 6;    // floats as read, 16 bits a channel as drawn
 constexpr double kIndexBytes = 4;         // vertex of a voxel, slot of a voxel, and back
 

@@ -21,13 +21,15 @@ void WorkingSize(int width, int height, int longest_side, int* new_width, int* n
 
 }  // namespace
 
-Camera WorkingCamera(const Camera& camera, int longest_side,
-                     const Similarity& field_from_world) {
+Camera WorkingCamera(const Camera& camera, int longest_side, const Similarity& field_from_world,
+                     const NdcSpace& ndc) {
   int width = 0, height = 0;
   WorkingSize(camera.width, camera.height, longest_side, &width, &height);
   const Camera followed =
       camera.MaxCornerDistortion() > kDistortionThreshold ? camera : camera.Undistorted();
-  return followed.Resized(width, height).Transformed(field_from_world);
+  Camera working = followed.Resized(width, height).Transformed(field_from_world);
+  working.ndc = ndc;
+  return working;
 }
 
 Image ReadWorkingPhoto(const CaptureView& view, int longest_side) {

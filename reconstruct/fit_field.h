@@ -4,9 +4,11 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "kernels/base/for_each.h"
 #include "kernels/base/progress.h"
 #include "kernels/field/fast_rays.h"
 #include "kernels/field/radiance_field.h"
@@ -20,6 +22,8 @@ struct SceneBox {
   Vec3f center{0, 0, 0};
   Vec3f radius{1, 1, 1};
   float near_clip = 0;  // nothing is modelled nearer to a camera than this
+  int layers = 0;  // most vertices along z; 0: as many as the radius asks for
+  std::optional<Vec3f> background;  // sRGB behind everything; not given: the photos' mean colour
 };
 
 // Everything a fit needs to go on as if it had never stopped (H110).
@@ -59,6 +63,7 @@ float ExponentialRate(float begin, float end, double p);
 // Throws Error(kScene) if the field comes out empty, Interrupted after kAbort (the checkpoint
 // has been called).
 FitResult FitField(const std::vector<TrainingView>& views, const SceneBox& box,
-                   const FitOptions& options, const FitHooks& hooks);
+                   const FitOptions& options, const FitHooks& hooks,
+                   Backend backend = Backend::kCpu);
 
 }  // namespace regrade

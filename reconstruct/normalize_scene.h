@@ -13,6 +13,7 @@ namespace regrade {
 struct NormalizedScene {
   Similarity field_from_world;  // the field's frame: z up, y the cameras' mean heading as far
                                 // as one exists
+  NdcSpace ndc;                 // on: the box is in normalised device coordinates of that frame
   SceneBox box;                 // in the field's frame; its longest half side is 1
   std::string notice;           // what was fallen back on, if anything
 };

@@ -36,11 +36,13 @@ std::vector<uint8_t> KeptVertices(const FastGrid& grid, const Buffer<float>& wei
 
 }  // namespace
 
-Vec3i ResolutionFor(const Vec3f& radius, int longest) {
-  const float most = std::max({radius.x, radius.y, radius.z});
+Vec3i ResolutionFor(const Vec3f& radius, int longest, int layers) {
+  const float most =
+      layers > 0 ? std::max(radius.x, radius.y) : std::max({radius.x, radius.y, radius.z});
   Vec3i n;
   for (int a = 0; a < 3; ++a)
     n[a] = std::max(2, static_cast<int>(std::lround(longest * radius[a] / most)));
+  if (layers > 0) n.z = std::min(layers, longest);
   return n;
 }
 
@@ -64,7 +66,9 @@ FastGrid MakeInitialGrid(const TrainingRays& rays, const GridFrame& frame, int b
         for (int v = 0; v < rays.num_views() && views < min_views; ++v) {
           const Camera& camera = rays.camera(v);
           double u, w;
-          if (Norm(p - camera.Center()) < near_clip || !camera.Project(p, &u, &w)) continue;
+          const Vec3d point = camera.ndc.on() ? WorldFromNdc(camera.ndc, p) : p;
+          if (Norm(point - camera.Center()) < near_clip || !camera.Project(point, &u, &w))
+            continue;
           // One voxel at the border may project just outside and still be a corner of a seen
           // cell.
           const double margin_x = 0.02 * camera.width, margin_y = 0.02 * camera.height;

@@ -76,7 +76,17 @@ Ray TrainingRays::RayOf(int view, int x, int y) const {
   const StoredView& v = views_[static_cast<size_t>(view)];
   const Vec3f& d = direction_maps_[static_cast<size_t>(v.direction_map)]
                                   [static_cast<size_t>(y) * v.camera.width + x];
-  return {v.origin, v.world_from_camera * d};
+  Ray ray{v.origin, v.world_from_camera * d};
+  if (v.camera.ndc.on()) NdcRay(v.camera.ndc, &ray.origin, &ray.direction);
+  return ray;
+}
+
+DeviceViews TrainingRays::ToDevice() const {
+  std::vector<DeviceViewSource> sources;
+  for (const StoredView& view : views_)
+    sources.push_back({view.origin, view.world_from_camera, view.camera.ndc, view.camera.width,
+                       view.camera.height, view.direction_map, view.color.data()});
+  return DeviceViews(direction_maps_, sources);
 }
 
 void TrainingRays::Draw(uint64_t seed, uint64_t step, int patches, int patch,

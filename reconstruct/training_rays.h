@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "kernels/scene/camera.h"
+#include "kernels/scene/device_views.h"
 #include "kernels/scene/image.h"
 
 namespace regrade {
@@ -32,6 +33,8 @@ class TrainingRays {
             std::vector<Vec3f>* targets) const;
 
   Ray RayOf(int view, int x, int y) const;
+  // Everything on a CUDA device. Throws Error(kResources) if it does not fit, or without CUDA.
+  DeviceViews ToDevice() const;
   const Camera& camera(int view) const { return views_[static_cast<size_t>(view)].camera; }
 
  private:

@@ -28,9 +28,8 @@ class Buffer {
 
   Buffer& operator=(const Buffer& other) {
     if (this == &other) return *this;
-    Buffer copy;
-    copy.Resize(other.size_);
-    if (other.size_ > 0) std::memcpy(copy.data_, other.data_, sizeof(T) * other.size_);
+    Buffer copy(other.size_);
+    if (other.size_ > 0) std::memcpy(static_cast<void*>(copy.data_), other.data_, sizeof(T) * other.size_);
     Swap(copy);
     return *this;
   }
@@ -42,7 +41,7 @@ class Buffer {
   // Keeps the old values, zeroes the new ones. Throws std::bad_alloc.
   void Resize(int64_t size) {
     if (size > capacity_) Reserve(size);
-    if (size > size_) std::memset(data_ + size_, 0, sizeof(T) * (size - size_));
+    if (size > size_) std::memset(static_cast<void*>(data_ + size_), 0, sizeof(T) * (size - size_));
     size_ = size;
   }
 
@@ -52,7 +51,7 @@ class Buffer {
                           kBufferAlignment * kBufferAlignment;
     T* data = static_cast<T*>(std::aligned_alloc(kBufferAlignment, bytes));
     if (data == nullptr) throw std::bad_alloc();
-    if (size_ > 0) std::memcpy(data, data_, sizeof(T) * size_);
+    if (size_ > 0) std::memcpy(static_cast<void*>(data), data_, sizeof(T) * size_);
     std::free(data_);
     data_ = data;
     capacity_ = capacity;

@@ -140,10 +140,12 @@ void RefreshDerived(FastGrid* grid) {
   const int lanes = grid->lanes();
   const int64_t voxels = grid->records.size() / lanes;
   grid->vertex_of_voxel = Buffer<int32_t>(voxels);
-  grid->dense_density = Buffer<float>(vertices);
-  grid->empty_distance = Buffer<uint8_t>(vertices);
-  constexpr uint8_t kFar = 64;  // longer skips gain nothing: a ray re-reads once in 64 voxels
-  std::fill(grid->empty_distance.begin(), grid->empty_distance.end(), kFar);
+  grid->probes = Buffer<Probe>(vertices);
+  std::fill(grid->probes.begin(), grid->probes.end(), Probe{0.0f, -1});
+  const Vec3i bricks = grid->bricks();
+  grid->brick_distance = Buffer<uint8_t>(static_cast<int64_t>(bricks.x) * bricks.y * bricks.z);
+  constexpr uint8_t kFar = 64;
+  std::fill(grid->brick_distance.begin(), grid->brick_distance.end(), kFar);
   for (int x = 0; x < n.x; ++x)
     for (int y = 0; y < n.y; ++y)
       for (int z = 0; z < n.z; ++z) {
@@ -151,16 +153,16 @@ void RefreshDerived(FastGrid* grid) {
         const int32_t link = grid->links[vertex];
         if (link < 0) continue;
         grid->vertex_of_voxel[link] = static_cast<int32_t>(vertex);
-        grid->dense_density[vertex] =
-            grid->records[static_cast<int64_t>(link) * lanes + DensityLane(grid->basis)];
+        grid->probes[vertex] = {
+            grid->records[static_cast<int64_t>(link) * lanes + DensityLane(grid->basis)], link};
         // A vertex is a corner of the cells whose lowest corners lie up to one below it.
-        for (int dx = -1; dx <= 0; ++dx)
-          for (int dy = -1; dy <= 0; ++dy)
-            for (int dz = -1; dz <= 0; ++dz)
-              if (x + dx >= 0 && y + dy >= 0 && z + dz >= 0)
-                grid->empty_distance[frame.Vertex(x + dx, y + dy, z + dz)] = 0;
+        for (int bx = std::max(x - 1, 0) / kBrick; bx <= x / kBrick; ++bx)
+          for (int by = std::max(y - 1, 0) / kBrick; by <= y / kBrick; ++by)
+            for (int bz = std::max(z - 1, 0) / kBrick; bz <= z / kBrick; ++bz)
+              grid->brick_distance[(static_cast<int64_t>(bx) * bricks.y + by) * bricks.z + bz] =
+                  0;
       }
-  for (int axis = 0; axis < 3; ++axis) SpreadAxis(n, axis, &grid->empty_distance);
+  for (int axis = 0; axis < 3; ++axis) SpreadAxis(bricks, axis, &grid->brick_distance);
 }
 
 }  // namespace regrade

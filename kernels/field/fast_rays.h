@@ -19,26 +19,42 @@ namespace regrade {
 constexpr int RecordLanes(int basis) { return basis == 9 ? 32 : basis == 4 ? 16 : 4; }
 constexpr int DensityLane(int basis) { return 3 * basis; }
 
-// Owner of what the fast path reads. `density` is dense, so that a probe costs no indirection.
+// Where empty space ends is kept for bricks of cells: their map stays in cache, and a ray that
+// skips must wait for each look into it.
+inline constexpr int kBrick = 4;  // cells along an edge
+
+// What a ray reads at every vertex it passes: dense, so that there is no indirection, and side
+// by side, so that both come in one cache line.
+struct Probe {
+  float density;  // 0 where nothing is stored
+  int32_t link;   // voxel, or -1
+};
+
+// Owner of what the fast path reads.
 struct FastGrid {
   GridFrame frame;
-  Buffer<int32_t> links;        // [X, Y, Z]
-  Buffer<float> dense_density;  // [X, Y, Z]; 0 where nothing is stored
-  Buffer<uint8_t>
-      empty_distance;  // [X, Y, Z]: by lowest corner, Chebyshev distance to the nearest cell
-                       // with a stored corner, 0 for such cells, capped at 255
+  Buffer<int32_t> links;            // [X, Y, Z]
+  Buffer<Probe> probes;             // [X, Y, Z]
+  Buffer<uint8_t> brick_distance;   // bricks of kBrick^3 cells, [X, Y, Z / kBrick rounded up]:
+                                    // Chebyshev distance in bricks to the nearest one that has
+                                    // a cell with a stored corner, 0 for such bricks
   Buffer<int32_t> vertex_of_voxel;  // [N]
   Buffer<float> records;            // [N, lanes]
   int basis = 9;
   Vec3f background{0, 0, 0};
   float near_clip = 0;  // world units
 
+  Vec3i bricks() const {
+    return {(frame.resolution.x + kBrick - 1) / kBrick,
+            (frame.resolution.y + kBrick - 1) / kBrick,
+            (frame.resolution.z + kBrick - 1) / kBrick};
+  }
   int lanes() const { return RecordLanes(basis); }
   int64_t num_voxels() const { return vertex_of_voxel.size(); }
 };
 
 FastGrid MakeFastGrid(const RadianceField& field);
-// Recomputes vertex_of_voxel, empty_distance and dense_density from links and records.
+// Recomputes vertex_of_voxel, brick_distance and probes from links and records.
 void RefreshDerived(FastGrid* grid);
 RadianceField ToRadianceField(const FastGrid& grid);
 
@@ -102,6 +118,9 @@ struct FastRayFunctions {
   // its first arena.
   int64_t (*step)(FastGrid*, float* second_moment, const GradientArena* arenas, int num_arenas,
                   int self, int64_t begin, int64_t end, const RmspropOptions&);
+  // alpha [n] = 1 - exp(-tau), decay [n] = exp(-tau), for tau in [0, kMaxOpticalDepth]: what
+  // the marches use, for tests.
+  void (*opacity)(const float* tau, int64_t n, float* alpha, float* decay);
 };
 
 const FastRayFunctions& FastRays();

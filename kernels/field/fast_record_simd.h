@@ -2,10 +2,11 @@
 // namespace.
 #pragma once
 
-#include <cmath>
+#include <algorithm>
 #include <cstdint>
 
 #include "kernels/field/fast_rays.h"
+#include "kernels/field/fast_vector_simd.h"
 
 namespace regrade::REGRADE_SIMD_NAMESPACE {
 namespace {
@@ -14,10 +15,12 @@ namespace {
 template <int kBasis>
 struct RecordShape {
   static constexpr int kLanes = RecordLanes(kBasis);
-  static constexpr int kWidth = kLanes < 16 ? kLanes : 16;
+  static constexpr int kWidth = kLanes < kWide ? kLanes : kWide;
   static constexpr int kCount = kLanes / kWidth;
   typedef float Vector __attribute__((vector_size(kWidth * sizeof(float))));
-  typedef int32_t IntVector __attribute__((vector_size(kWidth * sizeof(float))));
+  // Vectors [kFirst(c), kLast(c)] hold all coefficients of channel c.
+  static constexpr int kFirst(int channel) { return channel * kBasis / kWidth; }
+  static constexpr int kLast(int channel) { return (channel * kBasis + kBasis - 1) / kWidth; }
 };
 
 template <int kBasis>
@@ -43,8 +46,21 @@ struct Record {
   }
 };
 
+// Asks for the record at `index`, which may be -1: an address is all that a prefetch needs.
+template <int kBasis>
+inline void PrefetchRecord(const float* records, int32_t index, bool for_writing = false) {
+  constexpr int64_t kBytes = RecordLanes(kBasis) * sizeof(float);
+  const auto at = reinterpret_cast<uintptr_t>(records) + static_cast<uintptr_t>(index * kBytes);
+  for (int64_t line = 0; line < kBytes; line += 64) {
+    if (for_writing)
+      __builtin_prefetch(reinterpret_cast<const void*>(at + line), 1);
+    else
+      __builtin_prefetch(reinterpret_cast<const void*>(at + line), 0);
+  }
+}
+
 // Slot of a voxel in the arena, made and zeroed at its first touch. Room has been reserved.
-inline float* SlotOf(GradientArena* arena, int32_t voxel, int lanes) {
+inline int32_t SlotOf(GradientArena* arena, int32_t voxel, int lanes) {
   int32_t slot = arena->slot_of_voxel[voxel];
   if (slot < 0) {
     slot = static_cast<int32_t>(arena->voxel_of_slot.size());
@@ -53,7 +69,7 @@ inline float* SlotOf(GradientArena* arena, int32_t voxel, int lanes) {
     arena->voxel_of_slot[slot] = voxel;
     arena->gradient.Resize(static_cast<int64_t>(slot + 1) * lanes);
   }
-  return arena->gradient.data() + static_cast<int64_t>(slot) * lanes;
+  return slot;
 }
 
 inline void ReserveSlots(GradientArena* arena, int64_t more, int lanes) {

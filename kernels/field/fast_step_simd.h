@@ -11,6 +11,14 @@
 namespace regrade::REGRADE_SIMD_NAMESPACE {
 namespace {
 
+template <int kBasis>
+inline void AddToSlot(const Record<kBasis>& more, int32_t slot, GradientArena* arena) {
+  float* const at = arena->gradient.data() + static_cast<int64_t>(slot) * RecordLanes(kBasis);
+  auto sum = Record<kBasis>::Load(at);
+  for (int i = 0; i < RecordShape<kBasis>::kCount; ++i) sum.v[i] += more.v[i];
+  sum.Store(at);
+}
+
 // See EQ(total-variation) in total_variation.h. Lanes run side by side; the density lane sees
 // an empty neighbour as 0, the others see their own value there.
 template <int kBasis>
@@ -51,28 +59,23 @@ void TotalVariation(const FastGrid& grid, int64_t begin, int64_t end, float scal
           difference[a].v[i] = missing * only_density.v[i] * own.v[i];
       }
     }
-    float* own_slot = SlotOf(arena, link, kLanes);
+    const int32_t own_slot = SlotOf(arena, link, kLanes);
     R factor[3], d_own = R::Zero();
     for (int i = 0; i < Shape::kCount; ++i) {
-      Vector sum = difference[0].v[i] * difference[0].v[i] +
-                   difference[1].v[i] * difference[1].v[i] +
-                   difference[2].v[i] * difference[2].v[i] + 1e-9f;
-      Vector root{};
-      for (int l = 0; l < Shape::kWidth; ++l) root[l] = std::sqrt(sum[l]);
-      const Vector inverse = scale.v[i] / root;
+      const Vector sum = difference[0].v[i] * difference[0].v[i] +
+                         difference[1].v[i] * difference[1].v[i] +
+                         difference[2].v[i] * difference[2].v[i] + 1e-9f;
+      const Vector inverse = scale.v[i] / SquareRoot(sum);
       for (int a = 0; a < 3; ++a) {
         const float axis = static_cast<float>(n[a]) / 256.0f;
         factor[a].v[i] = axis * difference[a].v[i] * inverse;
         d_own.v[i] -= factor[a].v[i];
       }
     }
-    for (int i = 0; i < Shape::kCount; ++i)
-      *reinterpret_cast<Vector*>(own_slot + i * Shape::kWidth) += d_own.v[i];
+    AddToSlot(d_own, own_slot, arena);
     for (int a = 0; a < 3; ++a) {
       if (neighbour[a] < 0) continue;
-      float* slot = SlotOf(arena, neighbour[a], kLanes);
-      for (int i = 0; i < Shape::kCount; ++i)
-        *reinterpret_cast<Vector*>(slot + i * Shape::kWidth) += factor[a].v[i];
+      AddToSlot(factor[a], SlotOf(arena, neighbour[a], kLanes), arena);
     }
   }
 }
@@ -99,7 +102,16 @@ int64_t Step(FastGrid* grid, float* second_moment, const GradientArena* arenas, 
   }
   const R low = R::Load(low_lanes), high = R::Load(high_lanes);
   int64_t rejected = 0;
+  constexpr int64_t kAhead = 8;  // slots follow the rays, so that voxels are anywhere in memory
   for (int64_t slot = begin; slot < end; ++slot) {
+    if (slot + 2 * kAhead < end)
+      __builtin_prefetch(&grid->vertex_of_voxel[arenas[self].voxel_of_slot[slot + 2 * kAhead]]);
+    if (slot + kAhead < end) {
+      const int32_t ahead = arenas[self].voxel_of_slot[slot + kAhead];
+      PrefetchRecord<kBasis>(grid->records.data(), ahead, true);
+      PrefetchRecord<kBasis>(second_moment, ahead, true);
+      __builtin_prefetch(&grid->probes[grid->vertex_of_voxel[ahead]], 1);
+    }
     const int32_t voxel = arenas[self].voxel_of_slot[slot];
     bool mine = true;
     for (int other = 0; other < self; ++other)
@@ -116,9 +128,7 @@ int64_t Step(FastGrid* grid, float* second_moment, const GradientArena* arenas, 
     // One sum is finite only if all lanes and their squares are.
     Vector check{};
     for (int i = 0; i < Shape::kCount; ++i) check += g.v[i] * g.v[i];
-    float total = 0;
-    for (int l = 0; l < Shape::kWidth; ++l) total += check[l];
-    if (!std::isfinite(total)) {
+    if (!std::isfinite(SumOf(FoldToQuad(check)))) {
       ++rejected;
       continue;
     }
@@ -130,15 +140,14 @@ int64_t Step(FastGrid* grid, float* second_moment, const GradientArena* arenas, 
       const Vector squared = g.v[i] * g.v[i];
       const Vector blended = options.beta * v.v[i] + (1 - options.beta) * squared;
       new_v.v[i] = v.v[i] == 0.0f ? squared : blended;
-      Vector root{};
-      for (int l = 0; l < Shape::kWidth; ++l) root[l] = std::sqrt(new_v.v[i][l]);
-      const Vector stepped = x.v[i] - rate.v[i] * g.v[i] / (root + options.epsilon);
+      const Vector stepped =
+          x.v[i] - rate.v[i] * g.v[i] / (SquareRoot(new_v.v[i]) + options.epsilon);
       const Vector raised = stepped < low.v[i] ? low.v[i] : stepped;
       new_x.v[i] = raised > high.v[i] ? high.v[i] : raised;
     }
     new_v.Store(moments);
     new_x.Store(values);
-    grid->dense_density[grid->vertex_of_voxel[voxel]] = values[DensityLane(kBasis)];
+    grid->probes[grid->vertex_of_voxel[voxel]].density = values[DensityLane(kBasis)];
   }
   return rejected;
 }

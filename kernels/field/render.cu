@@ -25,6 +25,14 @@ struct RenderPixel {
   }
 };
 
+// Depth along the optical axis of the point at `length` along a ray in NDC. Infinity is set at z = 1e4 near
+// planes.
+float NdcDepth(const Camera& camera, const Ray& ray, float length) {
+  Vec3d p = (ray.origin + ray.direction * length).Cast<double>();
+  p.z = std::min(p.z, 1 - 2e-4);
+  return static_cast<float>((camera.camera_from_world * WorldFromNdc(camera.ndc, p)).z);
+}
+
 }  // namespace
 
 RenderedView RenderViewPlain(const RadianceField& field, const Camera& camera,
@@ -51,7 +59,12 @@ void FinishView(const Camera& camera, const std::vector<Ray>& rays, RenderedView
     }
     const float opaque = 1.0f - view->transmittance.pixels[i];
     float& depth = view->depth.pixels[i];
-    depth = opaque >= 0.5f ? depth / opaque * Dot(rays[i].direction, forward) : 0.0f;
+    if (!(opaque >= 0.5f))
+      depth = 0;
+    else if (camera.ndc.on())
+      depth = NdcDepth(camera, rays[i], depth / opaque);
+    else
+      depth = depth / opaque * Dot(rays[i].direction, forward);
   }
 }
 

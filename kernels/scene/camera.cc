@@ -94,7 +94,8 @@ RayT<double> Camera::WorldRay(double u, double v) const {
 }
 
 Ray Camera::PixelRay(int x, int y) const {
-  const RayT<double> ray = WorldRay(x + 0.5, y + 0.5);
+  RayT<double> ray = WorldRay(x + 0.5, y + 0.5);
+  if (ndc.on()) NdcRay(ndc, &ray.origin, &ray.direction);
   return {ray.origin.Cast<float>(), ray.direction.Cast<float>()};
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "kernels/base/vec.h"
+#include "kernels/scene/ndc.h"
 
 namespace regrade {
 
@@ -57,6 +58,7 @@ struct Camera {
   LensModel lens = LensModel::kPinhole;
   std::array<double, 8> distortion{};  // meaning by `lens`; unused entries are 0
   RigidTransform camera_from_world;
+  NdcSpace ndc;  // where it is on, pixel rays are in that space
 
   Vec3d Center() const { return camera_from_world.Inverse().translation; }
   // World directions of the optical axis (z) and of "up" in the picture (-y).
@@ -69,7 +71,8 @@ struct Camera {
   Vec3d CameraRay(double u, double v) const;
   // World ray through (u, v) pixels. Its direction is unit to double precision before rounding.
   RayT<double> WorldRay(double u, double v) const;
-  Ray PixelRay(int x, int y) const;  // through the centre of pixel (x, y)
+  // Through the centre of pixel (x, y), in the field's space: the world, or NDC.
+  Ray PixelRay(int x, int y) const;
 
   // Image point of a world point; false if it is behind the camera. Depth is z in the camera
   // frame.

@@ -46,6 +46,7 @@ struct ScenePoint {
 struct Capture {
   std::vector<CaptureView> views;  // in natural order of `file`
   std::vector<ScenePoint> points;  // empty when the poses came without points
+  double nearest_depth = 0;        // of the scene, where the poses came with it; else 0
   std::vector<PhotoVerdict> verdicts;
   double reprojection_px = 0;  // mean over observations, at the photos' size
   int models_found = 0;        // by COLMAP; 0 when the poses came from elsewhere

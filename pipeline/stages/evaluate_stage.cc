@@ -31,7 +31,7 @@ Image AlongRays(const Camera& camera, Image depth) {
   const Vec3d forward = camera.Forward();
   for (int y = 0; y < depth.height; ++y)
     for (int x = 0; x < depth.width; ++x) {
-      const Vec3d ray = camera.PixelRay(x, y).direction.Cast<double>();
+      const Vec3d ray = camera.WorldRay(x + 0.5, y + 0.5).direction;
       *depth.at(x, y) = static_cast<float>(*depth.at(x, y) / Dot(ray, forward));
     }
   return depth;
@@ -42,9 +42,9 @@ GeometrySource GeometryOf(const RunSettings& settings, const Capture& capture,
                           const StoredField& stored) {
   const auto grid = std::make_shared<const FastGrid>(MakeFastGrid(stored.field));
   return [&settings, &capture, grid, step = stored.field.step,
-          field_from_world = stored.field_from_world](int i) -> FrameGeometry {
+          field_from_world = stored.field_from_world, ndc = stored.ndc](int i) -> FrameGeometry {
     const Camera camera = WorkingCamera(capture.views[static_cast<size_t>(i)].camera,
-                                        settings.scene.photo_size, field_from_world);
+                                        settings.scene.photo_size, field_from_world, ndc);
     return {AlongRays(camera, RenderView(*grid, camera, MarchOptions{step}).depth), camera};
   };
 }
@@ -115,7 +115,8 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   std::vector<Camera> cameras;
   for (const int i : fitted)
     cameras.push_back(WorkingCamera(capture.views[static_cast<size_t>(i)].camera,
-                                    settings.scene.photo_size, stored.field_from_world));
+                                    settings.scene.photo_size, stored.field_from_world,
+                                    stored.ndc));
   const std::optional<double> linear_map =
       LinearMapPsnr(stored.field, cameras, frames("source", fitted), frames("views_2d", fitted),
                     frames("transmittance", fitted), progress);

@@ -69,7 +69,8 @@ Stage PoseStage(RunContext* context) {
   stage.name = "pose";
   stage.inputs = JsonValue::Object{{"photos", PhotoSet(source)},
                                    {"options", context->OptionsOf({"Photos", "Poses"})}};
-  if (source.kind == CaptureKind::kTransforms) stage.inputs["poses"] = HashFile(source.poses);
+  if (source.kind == CaptureKind::kTransforms || source.kind == CaptureKind::kLlff)
+    stage.inputs["poses"] = HashFile(source.poses);
   if (source.kind == CaptureKind::kColmap)
     for (const char* part : {"cameras.bin", "images.bin", "points3D.bin"})
       stage.inputs["poses"][part] = HashFile(source.poses + "/" + part);

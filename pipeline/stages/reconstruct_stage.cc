@@ -11,11 +11,10 @@
 #include "pipeline/fit_checkpoint.h"
 #include "pipeline/memory.h"
 #include "pipeline/plan.h"
-#include "pipeline/scene_effects.h"
+#include "pipeline/scene_profile.h"
 #include "pipeline/scene_views.h"
 #include "pipeline/stages/run_context.h"
 #include "reconstruct/fit_field.h"
-#include "reconstruct/normalize_scene.h"
 
 namespace regrade {
 namespace {
@@ -39,7 +38,8 @@ void MeasureHeldOut(RunContext* context, const Capture& capture, const StoredFie
     const CaptureView& view = capture.views[static_cast<size_t>(i)];
     const Image photo = ReadWorkingPhoto(view, settings.scene.photo_size);
     const Camera camera =
-        WorkingCamera(view.camera, settings.scene.photo_size, stored.field_from_world);
+        WorkingCamera(view.camera, settings.scene.photo_size, stored.field_from_world,
+                      stored.ndc);
     const Image rendered = RenderView(grid, camera, march).color;
     if (const auto value = Psnr(rendered, photo)) psnr.push_back(*value);
     if (const auto value = Ssim(rendered, photo)) ssim.push_back(*value);
@@ -54,7 +54,7 @@ StagePlan PlanOf(const RunSettings& settings, const Capture& capture, const Scen
   int64_t pixels = 0;
   for (const int i : ViewIndices(capture, settings.run.holdout, false)) {
     const Camera camera = WorkingCamera(capture.views[static_cast<size_t>(i)].camera,
-                                        settings.scene.photo_size, {});
+                                        settings.scene.photo_size, {}, {});
     pixels += int64_t{camera.width} * camera.height;
   }
   return PlanFit(settings.fit, pixels, box.radius, omp_get_max_threads());
@@ -65,9 +65,11 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   const RunSettings& settings = context->settings;
   Workspace& workspace = *context->workspace;
   const Capture capture = ReadCapture(workspace.Path("poses"));
-  const NormalizedScene scene = NormalizeScene(capture);
+  const SceneProfile profile =
+      ProfileScene(capture, settings.fit.sh_degree, settings.run.effects);
+  const NormalizedScene& scene = profile.scene;
   if (!scene.notice.empty()) context->console->Info(scene.notice);
-  for (const EffectReport& effect : EffectsOf(capture, settings.fit.sh_degree))
+  for (const EffectReport& effect : profile.effects)
     context->console->Info(EffectLine(effect));
   const StagePlan plan = PlanOf(settings, capture, scene.box);
   context->console->Info("the fit will take " + PlanText(plan));
@@ -82,7 +84,8 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
     const CaptureView& view = capture.views[static_cast<size_t>(i)];
     photos.push_back(ReadWorkingPhoto(view, settings.scene.photo_size));
     views.push_back(
-        {WorkingCamera(view.camera, settings.scene.photo_size, scene.field_from_world),
+        {WorkingCamera(view.camera, settings.scene.photo_size, scene.field_from_world,
+                       scene.ndc),
          &photos.back()});
   }
 
@@ -103,9 +106,10 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   }
   const FitResult fit = FitField(views, scene.box, options, hooks);
 
-  WriteFieldFile(workspace.Path("field.npz"), {fit.field, scene.field_from_world});
+  WriteFieldFile(workspace.Path("field.npz"), {fit.field, scene.field_from_world, scene.ndc});
   StageOutcome outcome;
   outcome.outputs = {"field.npz"};
+  outcome.figures["effects"] = EffectsRecord(profile.effects);
   outcome.figures["voxels"] = fit.field.geometry->num_voxels();
   outcome.figures["psnr_train_db"] = fit.psnr_train_db;
   MeasureHeldOut(context, capture, ReadFieldFile(workspace.Path("field.npz")),
@@ -128,7 +132,9 @@ Stage ReconstructStage(RunContext* context) {
   stage.refuse_changes = true;
   if (context->settings.start.dry_run) {
     const Capture capture = ReadCapture(context->workspace->Path("poses"));
-    stage.plan = PlanText(PlanOf(context->settings, capture, NormalizeScene(capture).box));
+    stage.plan = PlanText(PlanOf(context->settings, capture, ProfileScene(capture, context->settings.fit.sh_degree,
+                                        context->settings.run.effects)
+                               .scene.box));
   }
   stage.work = [context, inputs = stage.inputs](const ProgressFunction& progress) {
     return Reconstruct(context, inputs, progress);

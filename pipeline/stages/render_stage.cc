@@ -98,7 +98,8 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   std::vector<Camera> views;
   for (const CaptureView& view : capture.views)
     views.push_back(
-        WorkingCamera(view.camera, settings.scene.photo_size, before.field_from_world));
+        WorkingCamera(view.camera, settings.scene.photo_size, before.field_from_world,
+                      before.ndc));
   const bool film_of_views = settings.render.path.path == "views";
   const std::vector<Camera> way =
       film_of_views ? std::vector<Camera>() : MakeCameraPath(views, settings.render.path);

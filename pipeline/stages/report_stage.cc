@@ -9,7 +9,7 @@
 #include "pipeline/report_html.h"
 #include "pipeline/report_json.h"
 #include "pipeline/report_records.h"
-#include "pipeline/scene_effects.h"
+#include "pipeline/scene_profile.h"
 #include "pipeline/scene_views.h"
 #include "pipeline/stages/run_context.h"
 
@@ -78,7 +78,9 @@ StageOutcome WriteReport(RunContext* context) {
     if (const auto record = workspace.Find(stage)) report.seconds += record->seconds;
   report.peak_memory_mb = static_cast<double>(ReadMemoryStatus().peak_used >> 20);
   report.photos = PhotosOf(capture);
-  report.effects = EffectsOf(capture, settings.fit.sh_degree);
+  if (const auto record = workspace.Find("reconstruct"))
+    if (const JsonValue* effects = record->figures.Find("effects"))
+      report.effects = EffectsOfRecord(*effects);
   const JsonValue options = context->options.Values();
   for (const auto& [name, value] : options.AsObject())
     report.options.push_back({name, value.IsString() ? value.AsString() : DumpJson(value, -1)});

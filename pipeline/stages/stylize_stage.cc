@@ -36,7 +36,8 @@ Lessons ReadLessons(RunContext* context, const Capture& capture, const StoredFie
     const std::string name = "views_2d/" + FrameName(i);
     lessons.targets.push_back(ReadImage(context->workspace->Path(name)));
     lessons.views.push_back(
-        {WorkingCamera(view.camera, settings.scene.photo_size, stored.field_from_world),
+        {WorkingCamera(view.camera, settings.scene.photo_size, stored.field_from_world,
+                       stored.ndc),
          &lessons.targets.back(), nullptr, name});
     before.push_back(MeasureColor(ReadWorkingPhoto(view, settings.scene.photo_size)));
     after.push_back(MeasureColor(lessons.targets.back()));

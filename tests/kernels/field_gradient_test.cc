@@ -10,6 +10,7 @@
 #include "kernels/field/ray_loss.h"
 #include "kernels/field/ray_weights.h"
 #include "kernels/field/render.h"
+#include "tests/support/double_field.h"
 #include "tests/support/small_field.h"
 
 namespace regrade {
@@ -180,7 +181,7 @@ TEST_P(FastRaysParity, H103_H104_StepIsSparseAndRefusesNan) {
         EXPECT_EQ(moments[v * lanes + l], 0.0f);
       }
     }
-  EXPECT_EQ(grid.dense_density[grid.vertex_of_voxel[5]],
+  EXPECT_EQ(grid.probes[grid.vertex_of_voxel[5]].density,
             grid.records[5 * lanes + DensityLane(basis())]);
 
   // The next step: what only the last one touched keeps its bits, what is touched again moves.

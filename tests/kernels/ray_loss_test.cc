@@ -10,6 +10,7 @@
 #include <memory>
 #include <vector>
 
+#include "tests/support/double_field.h"
 #include "tests/support/small_field.h"
 
 namespace regrade {

@@ -21,13 +21,13 @@ TEST(Plan, MemoryOfOneStageByHand) {
   // 100^3 vertices, all stored: values, moments, the pruned copy and gradients of 128 B,
   // vertex, slot and two arenas of 4 B; two dense grids of 9 B. 1000 pixels of 18 B.
   const StagePlan plan = PlanFit(Fit({100}, {10}), 1000, kCube, 2);
-  EXPECT_EQ(plan.memory, 1000000u * (4 * 128 + 4 * 4 + 2 * 9) + 18000u);
+  EXPECT_EQ(plan.memory, 1000000u * (4 * 128 + 4 * 4 + 2 * 12) + 18000u);
 }
 
 TEST(Plan, LaterStagesStoreAShare) {
   // 200^3 at a fifth outweighs 100^3 in full.
   const StagePlan plan = PlanFit(Fit({100, 200}, {10, 10}), 0, kCube, 2);
-  EXPECT_EQ(plan.memory, 1600000u * (4 * 128 + 4 * 4) + 8000000u * 2 * 9);
+  EXPECT_EQ(plan.memory, 1600000u * (4 * 128 + 4 * 4) + 8000000u * 2 * 12);
   // A coarse stage in full can be the peak: 0.2 * 110^3 < 100^3.
   EXPECT_EQ(PlanFit(Fit({100, 110}, {10, 10}), 0, kCube, 2).memory,
             PlanFit(Fit({100}, {10}), 0, kCube, 2).memory);

@@ -91,7 +91,7 @@ TEST(NormalizeScene, BoxHoldsWhatPhotosShowBesideThePoints) {
         inside += std::abs(q.x) <= scene.box.radius.x && std::abs(q.y) <= scene.box.radius.y &&
                   std::abs(q.z) <= scene.box.radius.z;
       }
-  EXPECT_GE(inside, 73);  // of 81; without the corners 27
+  EXPECT_GE(inside, 73);  // of 81
 }
 
 TEST(NormalizeScene, H140_OtherUnitsGiveTheSameField) {

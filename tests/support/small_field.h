@@ -55,31 +55,4 @@ inline std::vector<Ray> RandomRays(int n, uint64_t seed) {
   return rays;
 }
 
-// A field in double with the float field's values.
-struct DoubleField {
-  explicit DoubleField(const RadianceField& field)
-      : geometry(*field.geometry),
-        density(geometry.density.begin(), geometry.density.end()),
-        sh(field.appearance.sh.begin(), field.appearance.sh.end()),
-        basis(field.appearance.basis),
-        background(field.background.Cast<double>()) {}
-  FieldView<double> view() const {
-    return {geometry.frame,
-            geometry.links.data(),
-            density.data(),
-            sh.data(),
-            basis,
-            background,
-            0.0};
-  }
-  const Geometry& geometry;
-  std::vector<double> density, sh;
-  int basis;
-  Vec3d background;
-};
-
-inline RayT<double> ToDouble(const Ray& ray) {
-  return {ray.origin.Cast<double>(), Normalized(ray.direction.Cast<double>())};
-}
-
 }  // namespace regrade::testing

@@ -1,4 +1,4 @@
-#include "pipeline/scene_effects.h"
+#include "pipeline/scene_profile.h"
 
 #include <gtest/gtest.h>
 
@@ -29,7 +29,7 @@ Capture CaptureWithShifts(const std::vector<double>& shifts) {
 }
 
 TEST(SceneEffects, LensBelowThresholdIsAPinhole) {
-  const Camera weak = WorkingCamera(CameraWithShift(0.49), 800, {});
+  const Camera weak = WorkingCamera(CameraWithShift(0.49), 800, {}, {});
   EXPECT_EQ(weak.lens, LensModel::kPinhole);
   EXPECT_EQ(weak.MaxCornerDistortion(), 0);
   // Rays are, bit for bit, those of a camera without a lens model.
@@ -39,28 +39,28 @@ TEST(SceneEffects, LensBelowThresholdIsAPinhole) {
 }
 
 TEST(SceneEffects, LensAboveThresholdStays) {
-  const Camera strong = WorkingCamera(CameraWithShift(0.51), 800, {});
+  const Camera strong = WorkingCamera(CameraWithShift(0.51), 800, {}, {});
   EXPECT_EQ(strong.lens, LensModel::kOpenCv);
   EXPECT_NEAR(strong.MaxCornerDistortion(), 0.51, 1e-9);
   // It is judged on the photo, not on the smaller picture that is worked with.
-  EXPECT_EQ(WorkingCamera(CameraWithShift(0.51), 100, {}).lens, LensModel::kOpenCv);
+  EXPECT_EQ(WorkingCamera(CameraWithShift(0.51), 100, {}, {}).lens, LensModel::kOpenCv);
 }
 
 TEST(SceneEffects, RowsCarryTheNumbersOfTheDecision) {
-  const auto rows = EffectsOf(CaptureWithShifts({0.1, -12.3, 3}), 2);
-  ASSERT_EQ(rows.size(), 2u);
+  const auto rows = ProfileScene(CaptureWithShifts({0.1, -12.3, 3}), 2, "auto").effects;
+  ASSERT_EQ(rows.size(), 4u);
   EXPECT_EQ(rows[0].name, "distortion");
   EXPECT_TRUE(rows[0].on);
   EXPECT_NEAR(*rows[0].value.value, 12.3, 1e-9);
   EXPECT_EQ(*rows[0].threshold.value, 0.5);
   EXPECT_EQ(EffectLine(rows[0]).substr(0, 25), "distortion on: 12.3 > 0.5");
-  EXPECT_EQ(rows[1].name, "view-dependence");
-  EXPECT_TRUE(rows[1].on);
-  EXPECT_EQ(*rows[1].value.value, 2);
+  EXPECT_EQ(rows[3].name, "view-dependence");
+  EXPECT_TRUE(rows[3].on);
+  EXPECT_EQ(*rows[3].value.value, 2);
 
-  const auto off = EffectsOf(CaptureWithShifts({0.1, 0.3}), 0);
+  const auto off = ProfileScene(CaptureWithShifts({0.1, 0.3}), 0, "auto").effects;
   EXPECT_FALSE(off[0].on);
-  EXPECT_FALSE(off[1].on);
+  EXPECT_FALSE(off[3].on);
   EXPECT_EQ(EffectLine(off[0]).substr(0, 26), "distortion off: 0.3 <= 0.5");
 }
 

@@ -1,0 +1,86 @@
+// Memory of a CUDA device: owners, copies and errors with names. Builds without CUDA have the same
+// interface; there every call throws Error(kResources).
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <utility>
+
+#include "kernels/base/buffer.h"
+#include "kernels/base/view.h"
+
+namespace regrade {
+
+struct DeviceStatus {
+  bool found = false;
+  std::string name;        // "NVIDIA H200", or why there is none
+  int compute_capability = 0;  // 90 for 9.0
+  int multiprocessors = 0;
+  int64_t free_bytes = 0;
+  int64_t total_bytes = 0;
+};
+// Of device 0; never throws.
+DeviceStatus ReadDeviceStatus();
+
+// `what` names the memory in errors ("gradients of 5600000 voxels"). Throws Error(kResources) with
+// what was asked for and what is free.
+void* DeviceAllocate(int64_t bytes, const char* what);
+void DeviceFree(void* pointer) noexcept;
+void DeviceCopyIn(void* device, const void* host, int64_t bytes);
+void DeviceCopyOut(void* host, const void* device, int64_t bytes);  // waits for running kernels
+void DeviceCopyWithin(void* to, const void* from, int64_t bytes);
+void DeviceZero(void* device, int64_t bytes);
+// Waits; throws Error(kResources) with the first failure of the kernels so far.
+void DeviceWait(const char* what);
+// To be called right after a launch: a launch that could not start is reported by its kernel's name.
+void CheckLaunch(const char* kernel);
+
+// Owner of trivially copyable values on the device. Contents are undefined until written.
+template <typename T>
+class DeviceBuffer {
+  static_assert(std::is_trivially_copyable_v<T>);
+
+ public:
+  DeviceBuffer() = default;
+  DeviceBuffer(int64_t size, const char* what) : size_(size) {
+    if (size > 0)
+      data_ = static_cast<T*>(DeviceAllocate(size * static_cast<int64_t>(sizeof(T)), what));
+  }
+  DeviceBuffer(const DeviceBuffer&) = delete;
+  DeviceBuffer(DeviceBuffer&& other) noexcept { Swap(other); }
+  DeviceBuffer& operator=(DeviceBuffer&& other) noexcept {
+    Swap(other);
+    return *this;
+  }
+  ~DeviceBuffer() { DeviceFree(data_); }
+
+  void CopyIn(const T* host, int64_t count) { DeviceCopyIn(data_, host, count * kBytes); }
+  void CopyOut(T* host, int64_t count) const { DeviceCopyOut(host, data_, count * kBytes); }
+  void Zero() { DeviceZero(data_, size_ * kBytes); }
+
+  static DeviceBuffer Of(const Buffer<T>& host, const char* what) {
+    DeviceBuffer buffer(host.size(), what);
+    buffer.CopyIn(host.data(), host.size());
+    return buffer;
+  }
+  Buffer<T> ToHost() const {
+    Buffer<T> host(size_);
+    CopyOut(host.data(), size_);
+    return host;
+  }
+
+  T* data() const { return data_; }
+  int64_t size() const { return size_; }
+  bool empty() const { return size_ == 0; }
+
+ private:
+  static constexpr int64_t kBytes = sizeof(T);
+  void Swap(DeviceBuffer& other) noexcept {
+    std::swap(data_, other.data_);
+    std::swap(size_, other.size_);
+  }
+  T* data_ = nullptr;
+  int64_t size_ = 0;
+};
+
+}  // namespace regrade

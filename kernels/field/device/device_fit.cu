@@ -1,0 +1,229 @@
+// Fitting's forward, loss and adjoint, a warp a ray.
+#include <algorithm>
+#include <cmath>
+
+#include "kernels/base/error.h"
+#include "kernels/field/device/device_rays.h"
+#include "kernels/field/device/launch.h"
+#include "kernels/field/device/warp_shade.h"
+
+namespace regrade {
+
+DeviceGradient::DeviceGradient(const DeviceGrid& grid)
+    : gradient(grid.num_voxels() * grid.lanes(), "the gradient"),
+      touched(grid.num_voxels(), "marks of touched voxels"),
+      list(grid.num_voxels(), "list of touched voxels"),
+      count(1, "number of touched voxels") {
+  gradient.Zero();
+  touched.Zero();
+  count.Zero();
+}
+
+#if defined(__CUDACC__)
+
+namespace {
+
+constexpr int kFloatsPerSample = 9;
+constexpr int kWarpsPerBlock = 4;
+
+struct GradientView {
+  float* gradient;
+  int32_t* touched;
+  int32_t* list;
+  int32_t* count;
+
+  __device__ void Touch(int32_t voxel) const {
+    if (touched[voxel] == 0 && atomicExch(&touched[voxel], 1) == 0)
+      list[atomicAdd(count, 1)] = voxel;
+  }
+};
+
+// A ray's composited samples, front to back, kept for the way back: [capacity] of each.
+struct SampleStore {
+  float4* place;      // vertex (as bits), fraction
+  float4* raw_tau;    // colour before the clamp, optical depth
+  float* before;      // transmittance before
+};
+
+// The way back along a ray; see EQ(composite-adjoint). Its recursion R_i = alpha_i c_i + (1 - alpha_i)
+// R_{i+1} is a chain of maps x -> b + a x; 32 of them are composed by a scan, and as all a and b are
+// positive nothing cancels.
+template <int kBasis>
+__device__ void WalkBack(const DeviceGridView& grid, const WarpRecord<kBasis>& record,
+                         const SampleStore& store, int count, float delta, const Vec3f& d_color,
+                         const GradientView& gradient, int lane) {
+  constexpr int kLanes = WarpRecord<kBasis>::kLanes, kGroups = WarpRecord<kBasis>::kGroups;
+  Vec3f behind = grid.background;
+  const int channel = record.in_group / kBasis;
+  for (int end = count; end > 0; end -= 32) {
+    const int mine = end - 1 - lane;
+    float a = 1, d_sigma = 0;
+    Vec3f b{}, d_raw{};
+    float4 place = {};
+    Vec3f color{};
+    float before = 0, tau = 0;
+    if (mine >= 0) {
+      place = store.place[mine];
+      const float4 raw_tau = store.raw_tau[mine];
+      before = store.before[mine];
+      tau = raw_tau.w;
+      a = expf(-tau);
+      color = {fmaxf(raw_tau.x, 0.0f), fmaxf(raw_tau.y, 0.0f), fmaxf(raw_tau.z, 0.0f)};
+      const float alpha = Opacity(tau);
+      b = color * alpha;
+      const float w = before * alpha;
+      d_raw = {raw_tau.x > 0 ? w * d_color.x : 0.0f, raw_tau.y > 0 ? w * d_color.y : 0.0f,
+               raw_tau.z > 0 ? w * d_color.z : 0.0f};
+    }
+    float chain_a = a;
+    Vec3f chain_b = b;
+#pragma unroll
+    for (int d = 1; d < 32; d *= 2) {
+      const float other_a = __shfl_up_sync(kAllLanes, chain_a, d);
+      Vec3f other_b;
+      for (int c = 0; c < 3; ++c) other_b[c] = __shfl_up_sync(kAllLanes, chain_b[c], d);
+      if (lane >= d) {
+        chain_b += other_b * chain_a;
+        chain_a *= other_a;
+      }
+    }
+    // R behind this lane's sample: the chain of the lanes before it (the samples behind it).
+    float up_a = __shfl_up_sync(kAllLanes, chain_a, 1);
+    Vec3f up_b;
+    for (int c = 0; c < 3; ++c) up_b[c] = __shfl_up_sync(kAllLanes, chain_b[c], 1);
+    if (lane == 0) up_a = 1, up_b = {};
+    const Vec3f seen_behind = up_b + behind * up_a;
+    if (mine >= 0 && tau < static_cast<float>(kMaxOpticalDepth))
+      d_sigma = delta * before * a * Dot(color - seen_behind, d_color);
+    const float last_a = __shfl_sync(kAllLanes, chain_a, 31);
+    for (int c = 0; c < 3; ++c)
+      behind[c] = __shfl_sync(kAllLanes, chain_b[c], 31) + last_a * behind[c];
+
+    const int chunk = min(32, end);
+    for (int s = 0; s < chunk; s += kGroups) {
+      const int source = (s + record.group) & 31;
+      const int vertex = __shfl_sync(kAllLanes, __float_as_int(place.x), source);
+      Vec3f fraction, d;
+      fraction.x = __shfl_sync(kAllLanes, place.y, source);
+      fraction.y = __shfl_sync(kAllLanes, place.z, source);
+      fraction.z = __shfl_sync(kAllLanes, place.w, source);
+      for (int c = 0; c < 3; ++c) d[c] = __shfl_sync(kAllLanes, d_raw[c], source);
+      const float d_density = __shfl_sync(kAllLanes, d_sigma, source);
+      if (s + record.group >= chunk) continue;  // the shuffles above were all lanes'
+      const float value = record.in_group == DensityLane(kBasis)
+                              ? d_density
+                              : record.gamma * (channel == 0 ? d.x : channel == 1 ? d.y : d.z);
+#pragma unroll
+      for (int k = 0; k < 8; ++k) {
+        const int32_t link = grid.links[vertex + CornerOffset(grid.frame, k)];
+        if (link < 0) continue;
+        if (record.in_group <= DensityLane(kBasis))
+          atomicAdd(&gradient.gradient[static_cast<int64_t>(link) * kLanes + record.in_group],
+                    CornerWeight(fraction, k) * value);
+        if (record.in_group == k % kLanes) gradient.Touch(link);
+      }
+    }
+    __syncwarp();
+  }
+}
+
+template <int kBasis>
+__global__ void FitRaysKernel(DeviceGridView grid, const Ray* rays, const Vec3f* targets, int n,
+                              MarchOptions options, float scale, GradientView gradient,
+                              float* store_memory, int64_t capacity, int32_t* next_ray,
+                              DeviceFitSums* sums) {
+  const int lane = static_cast<int>(threadIdx.x & 31);
+  const int64_t warp = (blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x) / 32;
+  float* mine = store_memory + warp * capacity * kFloatsPerSample;
+  const SampleStore store{reinterpret_cast<float4*>(mine),
+                          reinterpret_cast<float4*>(mine + 4 * capacity), mine + 8 * capacity};
+  double squared_error = 0;
+  unsigned long long samples = 0;
+  for (;;) {
+    int r = 0;
+    if (lane == 0) r = atomicAdd(next_ray, 1);
+    r = __shfl_sync(kAllLanes, r, 0);
+    if (r >= n) break;
+    const Ray ray = rays[r];
+    const WarpRecord<kBasis> record(lane, ray.direction);
+    WarpMarch march(grid, ray, options);
+    LaneSample sample;
+    unsigned composited;
+    Vec3f color{};
+    int count = 0;
+    while (march.Next(&sample, &composited)) {
+      const Vec3f raw = RawColors<kBasis>(grid, record, sample, composited, lane);
+      if (sample.tau > 0) {
+        const float w = sample.transmittance_before * Opacity(sample.tau);
+        for (int c = 0; c < 3; ++c) color[c] += w * fmaxf(raw[c], 0.0f);
+        const int at = count + __popc(composited & ((1u << lane) - 1));
+        const Vec3f& f = sample.cell.fraction;
+        store.place[at] = {__int_as_float(sample.cell.vertex), f.x, f.y, f.z};
+        store.raw_tau[at] = {raw.x, raw.y, raw.z, sample.tau};
+        store.before[at] = sample.transmittance_before;
+      }
+      count += __popc(composited);
+    }
+    const float left = expf(-march.optical_depth());
+    Vec3f error;
+    for (int c = 0; c < 3; ++c)
+      error[c] = WarpSum(color[c]) + grid.background[c] * left - targets[r][c];
+    squared_error += static_cast<double>(Dot(error, error));
+    samples += static_cast<unsigned>(count);
+    __syncwarp();  // the store was written by all lanes and is read by others now
+    WalkBack<kBasis>(grid, record, store, count, march.delta(), error * (2 * scale), gradient, lane);
+  }
+  if (lane == 0) {
+    atomicAdd(&sums->squared_error, squared_error);
+    atomicAdd(&sums->samples, samples);
+  }
+}
+
+}  // namespace
+
+DeviceRayFitter::DeviceRayFitter(const GridFrame& frame, const MarchOptions& options,
+                                 int64_t max_bytes)
+    : options_(options), next_ray_(1, "a counter of rays"), sums_(1, "sums of a fit") {
+  sums_.Zero();
+  const Vec3f n = frame.resolution.Cast<float>();
+  // The longest way through the box; a multiple of 4, so that the parts of a store are aligned.
+  capacity_ = (static_cast<int64_t>(Norm(n) / options.step) + 8) / 4 * 4;
+  const int64_t bytes_a_warp = capacity_ * kFloatsPerSample * static_cast<int64_t>(sizeof(float));
+  const int64_t wanted = static_cast<int64_t>(ReadDeviceStatus().multiprocessors) * 32;
+  const int64_t fitting = std::min(wanted, max_bytes / bytes_a_warp);
+  warps_ = static_cast<int>(std::max<int64_t>(fitting / kWarpsPerBlock, 1)) * kWarpsPerBlock;
+  store_ = DeviceBuffer<float>(warps_ * capacity_ * kFloatsPerSample, "samples of rays in flight");
+}
+
+void DeviceRayFitter::Accumulate(const DeviceGrid& grid, const Ray* rays, const Vec3f* targets,
+                                 int64_t n, float scale, DeviceGradient* gradient) {
+  next_ray_.Zero();
+  const GradientView view{gradient->gradient.data(), gradient->touched.data(),
+                          gradient->list.data(), gradient->count.data()};
+  ByBasis(grid.basis, [&](auto basis) {
+    FitRaysKernel<basis.value><<<static_cast<unsigned>(warps_ / kWarpsPerBlock), 32 * kWarpsPerBlock>>>(
+        grid.view(), rays, targets, static_cast<int>(n), options_, scale, view, store_.data(),
+        capacity_, next_ray_.data(), sums_.data());
+  });
+  CheckLaunch("fit_rays");
+}
+
+DeviceFitSums DeviceRayFitter::TakeSums() {
+  DeviceFitSums sums;
+  sums_.CopyOut(&sums, 1);
+  sums_.Zero();
+  return sums;
+}
+
+#else
+
+DeviceRayFitter::DeviceRayFitter(const GridFrame&, const MarchOptions&, int64_t) {
+  DeviceWait("fit_rays");
+}
+void DeviceRayFitter::Accumulate(const DeviceGrid&, const Ray*, const Vec3f*, int64_t, float,
+                                 DeviceGradient*) {}
+DeviceFitSums DeviceRayFitter::TakeSums() { return {}; }
+
+#endif
+
+}  // namespace regrade

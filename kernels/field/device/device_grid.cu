@@ -1,0 +1,112 @@
+// Upload, download, and what follows from links and records.
+#include "kernels/field/device/device_grid.h"
+
+#include "kernels/field/device/launch.h"
+
+namespace regrade {
+
+DeviceGridView DeviceGrid::view() const {
+  return {frame,
+          links.data(),
+          dense_density.data(),
+          empty_distance.data(),
+          vertex_of_voxel.data(),
+          records.data(),
+          static_cast<int32_t>(num_voxels()),
+          background,
+          near_clip};
+}
+
+DeviceGrid UploadGrid(const FastGrid& grid) {
+  DeviceGrid device;
+  device.frame = grid.frame;
+  device.basis = grid.basis;
+  device.background = grid.background;
+  device.near_clip = grid.near_clip;
+  device.links = DeviceBuffer<int32_t>::Of(grid.links, "links");
+  device.records = DeviceBuffer<float>::Of(grid.records, "voxels");
+  RefreshDerived(&device, grid.num_voxels());
+  return device;
+}
+
+FastGrid DownloadGrid(const DeviceGrid& device) {
+  FastGrid grid;
+  grid.frame = device.frame;
+  grid.basis = device.basis;
+  grid.background = device.background;
+  grid.near_clip = device.near_clip;
+  grid.links = device.links.ToHost();
+  grid.records = device.records.ToHost();
+  RefreshDerived(&grid);
+  return grid;
+}
+
+#if defined(__CUDACC__)
+
+namespace {
+
+constexpr uint8_t kFar = 16;  // a warp looks 32 samples ahead anyway
+
+__global__ void ScatterVoxels(DeviceGridView grid, int lanes, int density_lane, int64_t vertices,
+                              int32_t* vertex_of_voxel, uint8_t* distance) {
+  const int64_t vertex = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
+  if (vertex >= vertices) return;
+  const int32_t link = grid.links[vertex];
+  grid.dense_density[vertex] =
+      link < 0 ? 0.0f : grid.records[static_cast<int64_t>(link) * lanes + density_lane];
+  if (link >= 0) vertex_of_voxel[link] = static_cast<int32_t>(vertex);
+  // Is a corner of the cell above this vertex stored?
+  const Vec3i n = grid.frame.resolution;
+  const int at[3] = {static_cast<int>(vertex / (static_cast<int64_t>(n.y) * n.z)),
+                     static_cast<int>(vertex / n.z % n.y), static_cast<int>(vertex % n.z)};
+  bool stored = false;
+  for (int corner = 0; corner < 8; ++corner) {
+    const int x = at[0] + (corner >> 2 & 1), y = at[1] + (corner >> 1 & 1), z = at[2] + (corner & 1);
+    if (x < n.x && y < n.y && z < n.z) stored = stored || grid.links[grid.frame.Vertex(x, y, z)] >= 0;
+  }
+  distance[vertex] = stored ? 0 : kFar;
+}
+
+// One axis of the Chebyshev distance: the least of max(distance, steps along the axis).
+__global__ void SpreadAlongAxis(Vec3i n, int axis, int64_t vertices, const uint8_t* from, uint8_t* to) {
+  const int64_t vertex = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
+  if (vertex >= vertices) return;
+  const int64_t strides[3] = {static_cast<int64_t>(n.y) * n.z, n.z, 1};
+  const int at = static_cast<int>(vertex / strides[axis] % n[axis]);
+  int best = from[vertex];
+  for (int r = 1; r < best; ++r) {
+    if (at - r >= 0) best = min(best, max(static_cast<int>(from[vertex - r * strides[axis]]), r));
+    if (at + r < n[axis]) best = min(best, max(static_cast<int>(from[vertex + r * strides[axis]]), r));
+  }
+  to[vertex] = static_cast<uint8_t>(best);
+}
+
+}  // namespace
+
+void RefreshDerived(DeviceGrid* grid, int64_t num_voxels) {
+  const int64_t vertices = grid->frame.NumVertices();
+  grid->vertex_of_voxel = DeviceBuffer<int32_t>(num_voxels, "vertices of voxels");
+  grid->dense_density = DeviceBuffer<float>(vertices, "dense densities");
+  grid->empty_distance = DeviceBuffer<uint8_t>(vertices, "distances through empty space");
+  DeviceBuffer<uint8_t> other(vertices, "distances through empty space");
+  ScatterVoxels<<<BlocksFor(vertices), kThreads>>>(grid->view(), grid->lanes(),
+                                                   DensityLane(grid->basis), vertices,
+                                                   grid->vertex_of_voxel.data(),
+                                                   grid->empty_distance.data());
+  CheckLaunch("scatter_voxels");
+  for (int axis = 0; axis < 3; ++axis) {
+    SpreadAlongAxis<<<BlocksFor(vertices), kThreads>>>(grid->frame.resolution, axis, vertices,
+                                                       grid->empty_distance.data(), other.data());
+    CheckLaunch("spread_along_axis");
+    std::swap(grid->empty_distance, other);
+  }
+  DeviceWait("empty space");
+}
+
+#else
+
+void RefreshDerived(DeviceGrid*, int64_t) { DeviceWait("empty space"); }
+
+#endif
+
+}  // namespace regrade

@@ -1,0 +1,55 @@
+// The field on a CUDA device, laid out as the CPU's fast path has it (fast_rays.h): one record of
+// RecordLanes(basis) floats a voxel, density behind the colours and again in a dense array, so that a
+// march along a ray touches no record until something is seen.
+#pragma once
+
+#include <cstdint>
+
+#include "kernels/base/device_memory.h"
+#include "kernels/field/fast_rays.h"
+
+namespace regrade {
+
+// What kernels see. Shapes as in FastGrid.
+struct DeviceGridView {
+  GridFrame frame;
+  const int32_t* links = nullptr;           // [X, Y, Z]
+  float* dense_density = nullptr;           // [X, Y, Z]
+  const uint8_t* empty_distance = nullptr;  // [X, Y, Z]
+  const int32_t* vertex_of_voxel = nullptr;  // [N]
+  float* records = nullptr;                 // [N, lanes]
+  int32_t num_voxels = 0;
+  Vec3f background{};
+  float near_clip = 0;
+};
+
+struct DeviceGrid {
+  GridFrame frame;
+  DeviceBuffer<int32_t> links;
+  DeviceBuffer<float> dense_density;
+  DeviceBuffer<uint8_t> empty_distance;
+  DeviceBuffer<int32_t> vertex_of_voxel;
+  DeviceBuffer<float> records;
+  int basis = 9;
+  Vec3f background{0, 0, 0};
+  float near_clip = 0;
+
+  int lanes() const { return RecordLanes(basis); }
+  int64_t num_voxels() const { return vertex_of_voxel.size(); }
+  DeviceGridView view() const;
+};
+
+DeviceGrid UploadGrid(const FastGrid& grid);
+FastGrid DownloadGrid(const DeviceGrid& grid);
+
+// Recomputes dense_density, vertex_of_voxel and empty_distance from links and records, which are
+// there already; `num_voxels` is the number of non-negative links.
+void RefreshDerived(DeviceGrid* grid, int64_t num_voxels);
+
+// Prunes and resamples as Resample in resample_grid.h does: a new vertex is kept if the old vertex
+// nearest to it, or one of that one's 26 neighbours, weighs at least `threshold`. weights [N]. Returns
+// an empty grid (no voxels) if nothing is left.
+DeviceGrid ResampleOnDevice(const DeviceGrid& grid, const DeviceBuffer<float>& weights,
+                            float threshold, const Vec3i& resolution);
+
+}  // namespace regrade

@@ -1,0 +1,142 @@
+// Pruning and resampling on the device; the same rule as Resample in reconstruct/resample_grid.h.
+#include <algorithm>
+
+#include "kernels/field/device/device_grid.h"
+#include "kernels/field/device/launch.h"
+#include "kernels/field/trilinear.h"
+
+#if defined(__CUDACC__)
+#include <cub/device/device_scan.cuh>
+#endif
+
+namespace regrade {
+
+#if defined(__CUDACC__)
+
+namespace {
+
+__global__ void MarkHeavy(DeviceGridView grid, const float* weights, float threshold, uint8_t* keep) {
+  const int64_t voxel = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
+  if (voxel < grid.num_voxels && weights[voxel] >= threshold) keep[grid.vertex_of_voxel[voxel]] = 1;
+}
+
+__global__ void GrowAlongAxis(Vec3i n, int axis, int64_t vertices, const uint8_t* from, uint8_t* to) {
+  const int64_t vertex = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
+  if (vertex >= vertices) return;
+  const int64_t strides[3] = {static_cast<int64_t>(n.y) * n.z, n.z, 1};
+  const int at = static_cast<int>(vertex / strides[axis] % n[axis]);
+  to[vertex] = from[vertex] | (at > 0 ? from[vertex - strides[axis]] : 0) |
+               (at + 1 < n[axis] ? from[vertex + strides[axis]] : 0);
+}
+
+// Position of a vertex of `frame` among the vertices of `old`.
+__device__ Vec3f OldPosition(const GridFrame& frame, const GridFrame& old, int64_t vertex) {
+  const Vec3i n = frame.resolution;
+  const Vec3f at{static_cast<float>(vertex / (static_cast<int64_t>(n.y) * n.z)),
+                 static_cast<float>(vertex / n.z % n.y), static_cast<float>(vertex % n.z)};
+  const Vec3f scale = frame.Scale(), offset = frame.Offset();
+  const Vec3f old_scale = old.Scale(), old_offset = old.Offset();
+  Vec3f p;
+  for (int a = 0; a < 3; ++a) {
+    const float world = (at[a] - offset[a]) / scale[a];
+    p[a] = fminf(fmaxf(world * old_scale[a] + old_offset[a], 0.0f),
+                 static_cast<float>(old.resolution[a] - 1));
+  }
+  return p;
+}
+
+__global__ void MarkKept(GridFrame frame, GridFrame old, int64_t vertices, const uint8_t* keep,
+                         int32_t* marks) {
+  const int64_t vertex = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
+  if (vertex >= vertices) return;
+  const Vec3f p = OldPosition(frame, old, vertex);
+  marks[vertex] = keep[old.Vertex(static_cast<int>(lroundf(p.x)), static_cast<int>(lroundf(p.y)),
+                                  static_cast<int>(lroundf(p.z)))];
+}
+
+// `links` holds the number of kept vertices before each, `marks` whether it is kept itself.
+__global__ void NumberKept(int64_t vertices, const int32_t* marks, int32_t* links) {
+  const int64_t vertex = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
+  if (vertex < vertices && marks[vertex] == 0) links[vertex] = -1;
+}
+
+template <int kBasis>
+__global__ void FillVoxels(GridFrame frame, int64_t vertices, const int32_t* links,
+                           DeviceGridView old, float* records) {
+  constexpr int kLanes = RecordLanes(kBasis);
+  const int64_t thread = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
+  const int64_t vertex = thread / kLanes;
+  if (vertex >= vertices || links[vertex] < 0) return;
+  const int value = static_cast<int>(thread % kLanes);
+  const Cell<float> cell = LocateCell(old.frame, OldPosition(frame, old.frame, vertex));
+  float sum = 0;
+  for (int k = 0; k < 8; ++k) {
+    const int32_t link = old.links[CornerVertex(old.frame, cell.vertex, k)];
+    if (link >= 0)
+      sum += CornerWeight(cell.fraction, k) * old.records[static_cast<int64_t>(link) * kLanes + value];
+  }
+  records[static_cast<int64_t>(links[vertex]) * kLanes + value] = sum;
+}
+
+}  // namespace
+
+DeviceGrid ResampleOnDevice(const DeviceGrid& grid, const DeviceBuffer<float>& weights,
+                            float threshold, const Vec3i& resolution) {
+  const int64_t old_vertices = grid.frame.NumVertices();
+  DeviceBuffer<uint8_t> keep(old_vertices, "marks of kept vertices");
+  DeviceBuffer<uint8_t> grown(old_vertices, "marks of kept vertices");
+  keep.Zero();
+  MarkHeavy<<<BlocksFor(grid.num_voxels()), kThreads>>>(grid.view(), weights.data(), threshold,
+                                                        keep.data());
+  CheckLaunch("mark_heavy");
+  for (int axis = 0; axis < 3; ++axis) {
+    GrowAlongAxis<<<BlocksFor(old_vertices), kThreads>>>(grid.frame.resolution, axis, old_vertices,
+                                                         keep.data(), grown.data());
+    CheckLaunch("grow_along_axis");
+    std::swap(keep, grown);
+  }
+  DeviceGrid result;
+  result.frame = grid.frame;
+  result.frame.resolution = resolution;
+  result.basis = grid.basis;
+  result.background = grid.background;
+  result.near_clip = grid.near_clip;
+  const int64_t vertices = result.frame.NumVertices();
+  DeviceBuffer<int32_t> marks(vertices, "marks of new voxels");
+  MarkKept<<<BlocksFor(vertices), kThreads>>>(result.frame, grid.frame, vertices, keep.data(),
+                                              marks.data());
+  CheckLaunch("mark_kept");
+  result.links = DeviceBuffer<int32_t>(vertices, "links");
+  size_t scratch_bytes = 0;
+  cub::DeviceScan::ExclusiveSum(nullptr, scratch_bytes, marks.data(), result.links.data(), vertices);
+  DeviceBuffer<uint8_t> scratch(static_cast<int64_t>(scratch_bytes), "scratch of a scan");
+  cub::DeviceScan::ExclusiveSum(scratch.data(), scratch_bytes, marks.data(), result.links.data(),
+                                vertices);
+  CheckLaunch("scan");
+  int32_t last_link = 0, last_mark = 0;
+  DeviceCopyOut(&last_link, result.links.data() + vertices - 1, sizeof last_link);
+  DeviceCopyOut(&last_mark, marks.data() + vertices - 1, sizeof last_mark);
+  const int64_t count = int64_t{last_link} + last_mark;
+  if (count == 0) return result;
+  NumberKept<<<BlocksFor(vertices), kThreads>>>(vertices, marks.data(), result.links.data());
+  CheckLaunch("number_kept");
+  result.records = DeviceBuffer<float>(count * result.lanes(), "voxels");
+  ByBasis(grid.basis, [&](auto basis) {
+    FillVoxels<basis.value><<<BlocksFor(vertices * result.lanes()), kThreads>>>(
+        result.frame, vertices, result.links.data(), grid.view(), result.records.data());
+  });
+  CheckLaunch("fill_voxels");
+  RefreshDerived(&result, count);
+  return result;
+}
+
+#else
+
+DeviceGrid ResampleOnDevice(const DeviceGrid&, const DeviceBuffer<float>&, float, const Vec3i&) {
+  DeviceWait("resample");
+  return {};
+}
+
+#endif
+
+}  // namespace regrade

@@ -1,0 +1,47 @@
+// regrade pack: a posed capture in one file, for `regrade_gpu` on a machine that has nothing else.
+#include <filesystem>
+
+#include "kernels/base/error.h"
+#include "pipeline/capture_store.h"
+#include "pipeline/commands/command.h"
+#include "pipeline/packed_capture.h"
+#include "pipeline/run_settings.h"
+#include "pipeline/scene_profile.h"
+#include "pipeline/scene_views.h"
+
+namespace regrade {
+
+void RunPack(const Command& command, const Arguments& arguments, Console* console) {
+  ProgramOptions program;
+  RunOptions run;
+  SceneOptions scene;
+  OptionSet options;
+  options.Add("Run", &run);
+  options.Add("Scene", &scene);
+  options.Add("Program", &program);
+  if (PrintedHelp(command, arguments, options)) return;
+  const Arguments words = options.Parse(arguments);
+  options.ApplyFlags();
+  CheckWords(command, words, 1, 1);
+  ApplyProgramOptions(program);
+  if (run.out.empty())
+    throw Error(ExitCode::kUsage, "its value is missing", "--out", "name the .npz file to write");
+  if (!std::filesystem::exists(words[0] + "/poses/photos.json"))
+    throw Error(ExitCode::kInput, "holds no poses", words[0],
+                "run `regrade pose CAPTURE --out " + words[0] + "` first");
+  const Capture capture = ReadCapture(words[0] + "/poses");
+  const SceneProfile profile = ProfileScene(capture, 2, run.effects);
+  for (const EffectReport& effect : profile.effects) console->Info(EffectLine(effect));
+  PackedCapture packed;
+  packed.scene = profile.scene;
+  for (size_t i = 0; i < capture.views.size(); ++i)
+    packed.views.push_back({capture.views[i].file, IsHeldOut(i, run.holdout),
+                            WorkingCamera(capture.views[i].camera, scene.photo_size,
+                                          packed.scene.field_from_world, packed.scene.ndc),
+                            ReadWorkingPhoto(capture.views[i], scene.photo_size)});
+  WritePackedCapture(run.out, packed);
+  console->Info("wrote " + run.out + ": " + std::to_string(packed.views.size()) + " views, " +
+                std::to_string(std::filesystem::file_size(run.out) >> 20) + " MiB");
+}
+
+}  // namespace regrade

@@ -1,0 +1,66 @@
+// regrade_gpu: the parts of regrade that need a GPU and neither COLMAP nor pictures' formats.
+#include <algorithm>
+#include <cstdio>
+#include <string>
+#include <vector>
+
+#include "kernels/base/device_memory.h"
+#include "kernels/base/error.h"
+#include "pipeline/gpu/gpu_commands.h"
+#include "pipeline/option_binding.h"
+
+namespace regrade {
+namespace {
+
+constexpr char kUsage[] =
+    "regrade_gpu " REGRADE_VERSION ": regrade on a machine with nothing but a CUDA driver\n\n"
+    "usage: regrade_gpu device                       what the card is\n"
+    "       regrade_gpu fit --capture FILE [OPTIONS] a field from a file of `regrade pack`\n";
+
+void PrintDevice() {
+  const DeviceStatus status = ReadDeviceStatus();
+  std::printf("{\"found\": %s, \"name\": \"%s\", \"compute_capability\": %d, \"free_mib\": %lld}\n",
+              status.found ? "true" : "false", status.name.c_str(), status.compute_capability,
+              static_cast<long long>(status.free_bytes >> 20));
+}
+
+bool Run(const std::vector<std::string>& arguments) {
+  const std::string command = arguments.empty() ? "help" : arguments[0];
+  const std::vector<std::string> rest(arguments.begin() + !arguments.empty(), arguments.end());
+  FitPackedOptions fit_packed;
+  FitOptions fit;
+  OptionSet options;
+  if (command == "fit") {
+    options.Add("Capture", &fit_packed);
+    options.Add("Fit", &fit);
+  } else if (command == "device") {
+    PrintDevice();
+    return true;
+  } else {
+    std::printf("%s", kUsage);
+    return command == "help" || command == "--help";
+  }
+  if (std::find(rest.begin(), rest.end(), "--help") != rest.end()) {
+    std::printf("%s\n%s", kUsage, options.Help().c_str());
+    return true;
+  }
+  options.Parse(rest);
+  options.ApplyFlags();
+  FitPacked(fit_packed, fit);
+  return true;
+}
+
+}  // namespace
+}  // namespace regrade
+
+int main(int argc, char** argv) {
+  try {
+    return regrade::Run(std::vector<std::string>(argv + std::min(argc, 1), argv + argc)) ? 0 : 1;
+  } catch (const regrade::Error& error) {
+    std::fprintf(stderr, "regrade_gpu: %s\n", error.what());
+    return static_cast<int>(error.code());
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "regrade_gpu: a bug of ours: %s\n", error.what());
+    return 1;
+  }
+}

@@ -1,0 +1,141 @@
+#include "pipeline/scene_profile.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+
+#include "kernels/base/error.h"
+#include "pipeline/files/image_file.h"
+#include "pipeline/scene_views.h"
+#include "reconstruct/forward_facing.h"
+#include "reconstruct/visual_hull.h"
+
+namespace regrade {
+namespace {
+
+constexpr double kAlphaShare = 0.02;  // of the pixels; less is a photo with a soft edge
+constexpr const char* kNames[] = {"ndc", "alpha"};
+
+EffectReport Row(const char* name, bool on, double value, double threshold, const char* evidence) {
+  return {name, on, evidence, value, threshold};
+}
+
+std::string Short(const Figure& figure) {
+  if (!figure.value) return figure.why;
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g", *figure.value);
+  return text;
+}
+
+std::string AlphaPath(const CaptureView& view) {
+  const size_t dot = view.path.rfind(".png");
+  return dot == std::string::npos ? "" : view.path.substr(0, dot) + ".alpha.png";
+}
+
+// Outlines of all photos; empty unless each has one.
+std::vector<Outline> ReadOutlines(const Capture& capture) {
+  std::vector<Outline> outlines;
+  for (const CaptureView& view : capture.views)
+    if (!std::filesystem::is_regular_file(AlphaPath(view))) return {};
+  for (const CaptureView& view : capture.views)
+    outlines.push_back({view.camera, ReadImage(AlphaPath(view))});
+  return outlines;
+}
+
+double TransparentShare(const std::vector<Outline>& outlines) {
+  int64_t clear = 0, all = 0;
+  for (const Outline& outline : outlines) {
+    all += outline.alpha.num_pixels();
+    clear += std::count_if(outline.alpha.pixels.begin(), outline.alpha.pixels.end(),
+                           [](float a) { return a < 0.5f; });
+  }
+  return all > 0 ? static_cast<double>(clear) / static_cast<double>(all) : 0;
+}
+
+}  // namespace
+
+std::map<std::string, bool> ParseEffects(const std::string& text) {
+  std::map<std::string, bool> wishes;
+  for (size_t begin = 0; begin <= text.size();) {
+    const size_t end = std::min(text.find(',', begin), text.size());
+    const std::string word = text.substr(begin, end - begin);
+    begin = end + 1;
+    if (word == "auto") continue;
+    const size_t equals = word.find('=');
+    const std::string name = word.substr(0, equals);
+    const std::string wish = equals == std::string::npos ? "" : word.substr(equals + 1);
+    const bool known = std::find(std::begin(kNames), std::end(kNames), name) != std::end(kNames);
+    if (!known || (wish != "on" && wish != "off"))
+      throw Error(ExitCode::kUsage, "'" + word + "' is not allowed", "--effects",
+                  "auto, or ndc=on|off and alpha=on|off, with commas between; --sh-degree sets view dependence");
+    wishes[name] = wish == "on";
+  }
+  return wishes;
+}
+
+SceneProfile ProfileScene(const Capture& capture, int sh_degree, const std::string& effects) {
+  const std::map<std::string, bool> wishes = ParseEffects(effects);
+  const auto decided = [&wishes](const char* name, bool measured) {
+    const auto wish = wishes.find(name);
+    return wish == wishes.end() ? measured : wish->second;
+  };
+  SceneProfile profile;
+  double shift = 0;
+  for (const CaptureView& view : capture.views)
+    shift = std::max(shift, view.camera.MaxCornerDistortion());
+  profile.effects.push_back(
+      Row("distortion", shift > kDistortionThreshold, shift, kDistortionThreshold,
+          "largest shift of a picture's corner by the lens, over the cameras, in pixels"));
+
+  const std::vector<Outline> outlines = ReadOutlines(capture);
+  const double clear = TransparentShare(outlines);
+  const bool alpha = decided("alpha", clear > kAlphaShare);
+
+  const ForwardFacing forward = MeasureForwardFacing(capture);
+  const bool ndc = decided("ndc", forward.on && !alpha);
+  profile.effects.push_back(
+      Row("ndc", ndc, forward.angle_deg, kForwardAngle,
+          "on where all cameras look one way: largest angle of an optical axis to their mean, degrees"));
+  profile.effects.push_back(Row("alpha", alpha, clear, kAlphaShare,
+                                "share of transparent pixels, where every photo has some"));
+  profile.effects.push_back(Row("view-dependence", sh_degree > 0, sh_degree, 0,
+                                "spherical harmonics degree of the fit, as set"));
+
+  profile.scene = ndc ? NormalizeForwardFacing(capture, forward) : NormalizeScene(capture);
+  if (alpha && !outlines.empty()) {
+    profile.scene = TightenToOutlines(profile.scene, outlines);
+    profile.scene.box.background = Vec3f{1, 1, 1};  // what transparent photos are laid over
+  }
+  return profile;
+}
+
+std::string EffectLine(const EffectReport& effect) {
+  return effect.name + (effect.on ? " on: " : " off: ") + Short(effect.value) +
+         (effect.value.value && effect.threshold.value &&
+                  *effect.value.value > *effect.threshold.value
+              ? " > "
+              : " <= ") +
+         Short(effect.threshold) + " (" + effect.evidence + ")";
+}
+
+JsonValue EffectsRecord(const std::vector<EffectReport>& effects) {
+  JsonValue::Array rows;
+  for (const EffectReport& effect : effects)
+    rows.push_back(JsonValue::Object{{"name", effect.name},
+                                     {"on", effect.on},
+                                     {"evidence", effect.evidence},
+                                     {"value", effect.value.value.value_or(0)},
+                                     {"threshold", effect.threshold.value.value_or(0)}});
+  return rows;
+}
+
+std::vector<EffectReport> EffectsOfRecord(const JsonValue& record) {
+  std::vector<EffectReport> effects;
+  for (const JsonValue& row : record.AsArray())
+    effects.push_back({row.At("name").AsString(), row.At("on").AsBool(),
+                       row.At("evidence").AsString(), row.At("value").AsDouble(),
+                       row.At("threshold").AsDouble()});
+  return effects;
+}
+
+}  // namespace regrade

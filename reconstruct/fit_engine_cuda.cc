@@ -1,0 +1,117 @@
+// Steps of a fit on a CUDA device: photos, field, gradients and moments live there; the host only says what
+// comes next. Float sums in no fixed order, so two runs differ in the last bits.
+#include <algorithm>
+#include <optional>
+#include <utility>
+
+#include "kernels/base/error.h"
+#include "kernels/base/random.h"
+#include "kernels/field/device/device_rays.h"
+#include "kernels/scene/device_views.h"
+#include "reconstruct/fit_engine.h"
+
+namespace regrade {
+namespace {
+
+constexpr int64_t kSampleStoreBytes = int64_t{1} << 30;
+
+class CudaFitEngine : public FitEngine {
+ public:
+  CudaFitEngine(const TrainingRays* rays, uint64_t seed) : seed_(seed), views_(rays->ToDevice()) {}
+
+  void Take(FitState state) override {
+    grid_ = UploadGrid(state.grid);
+    Renew();
+    if (state.second_moment.size() == grid_.records.size())
+      second_moment_ = DeviceBuffer<float>::Of(state.second_moment, "second moments");
+  }
+  FitState Give() override { return {DownloadGrid(grid_), second_moment_.ToHost(), 0, 0}; }
+  int64_t num_voxels() const override { return grid_.num_voxels(); }
+  Vec3i resolution() const override { return grid_.frame.resolution; }
+
+  void Step(const FitStep& step) override {
+    if (!fitter_ || march_.step != step.march.step ||
+        march_.stop_transmittance != step.march.stop_transmittance) {
+      march_ = step.march;
+      fitter_.emplace(grid_.frame, march_, kSampleStoreBytes);
+    }
+    Reserve(step.rays);
+    views_.Draw(seed_, step.number, step.rays, rays_.data(), targets_.data());
+    fitter_->Accumulate(grid_, rays_.data(), targets_.data(), step.rays,
+                        1.0f / (3.0f * static_cast<float>(step.rays)), &gradient_);
+    // The same expectation as the CPU's run of vertices: each stored voxel with the share's probability.
+    const int64_t voxels = grid_.num_voxels();
+    const int64_t run = static_cast<int64_t>(step.tv_share * static_cast<float>(voxels));
+    if (run > 0) {
+      const int64_t begin = static_cast<int64_t>(
+          RandomIndex(seed_ ^ 0x7476ull, step.number, 0, static_cast<uint64_t>(voxels)));
+      const float scale =
+          1.0f / (step.tv_share * static_cast<float>(grid_.frame.NumVertices()));
+      AddTotalVariation(grid_, begin, run, step.tv_density * scale, step.tv_sh * scale, &gradient_);
+    }
+    StepOnDevice(&grid_, second_moment_.data(), &gradient_, step.optimizer, fitter_->sums());
+  }
+
+  FitSums TakeSums() override {
+    if (!fitter_) return {};
+    const DeviceFitSums sums = fitter_->TakeSums();
+    DeviceWait("a step of the fit");
+    return {sums.squared_error, static_cast<int64_t>(sums.samples),
+            static_cast<int64_t>(sums.rejected_voxels)};
+  }
+
+  void Refine(const MarchOptions& march, float threshold, const Vec3i& resolution) override {
+    DeviceBuffer<float> weights(grid_.num_voxels(), "weights of voxels");
+    weights.Zero();
+    constexpr int kStride = 2;  // every other row and column of a view
+    for (int view = 0; view < views_.num_views(); ++view) {
+      Reserve(views_.RaysOf(view, kStride, nullptr));
+      const int64_t n = views_.RaysOf(view, kStride, rays_.data());
+      MaxWeightsOnDevice(grid_, rays_.data(), n, march, weights.data());
+    }
+    gradient_ = {};
+    second_moment_ = {};
+    DeviceGrid next = ResampleOnDevice(grid_, weights, threshold, resolution);
+    if (next.num_voxels() == 0)
+      throw Error(ExitCode::kScene,
+                  "nothing of the scene is left: no voxel weighs more than " +
+                      std::to_string(threshold) + " in any view",
+                  "reconstruct", "check the poses, or lower --prune-weight");
+    grid_ = std::move(next);
+    Renew();
+  }
+
+ private:
+  // Gradients and moments for the grid as it is now.
+  void Renew() {
+    fitter_.reset();
+    gradient_ = DeviceGradient(grid_);
+    second_moment_ = DeviceBuffer<float>(grid_.records.size(), "second moments");
+    second_moment_.Zero();
+  }
+  void Reserve(int64_t rays) {
+    if (rays <= rays_.size()) return;
+    rays_ = DeviceBuffer<Ray>(rays, "rays");
+    targets_ = DeviceBuffer<Vec3f>(rays, "colours of rays");
+  }
+
+  uint64_t seed_;
+  DeviceViews views_;
+  DeviceGrid grid_;
+  DeviceBuffer<float> second_moment_;
+  DeviceGradient gradient_;
+  MarchOptions march_;
+  std::optional<DeviceRayFitter> fitter_;
+  DeviceBuffer<Ray> rays_;
+  DeviceBuffer<Vec3f> targets_;
+};
+
+}  // namespace
+
+std::unique_ptr<FitEngine> MakeCudaFitEngine(const TrainingRays* rays, uint64_t seed) {
+  const DeviceStatus device = ReadDeviceStatus();
+  if (!device.found) throw Error(ExitCode::kResources, device.name, "GPU", "use --device cpu");
+  return std::make_unique<CudaFitEngine>(rays, seed);
+}
+
+}  // namespace regrade

@@ -1,0 +1,226 @@
+// The parity table: each device body against the plain body in float and in double. It links kernels and
+// GoogleTest alone, so the program runs on a bare machine with a CUDA driver; without a device each test
+// skips and says so.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "kernels/field/device/device_rays.h"
+#include "kernels/field/fast_rays.h"
+#include "kernels/field/ray_loss.h"
+#include "kernels/field/total_variation.h"
+#include "kernels/scene/device_views.h"
+#include "tests/support/double_field.h"
+#include "tests/support/small_field.h"
+
+namespace regrade {
+namespace {
+
+using testing::DoubleField;
+using testing::RandomField;
+using testing::RandomRays;
+
+class DeviceParity : public ::testing::TestWithParam<int> {
+ protected:
+  void SetUp() override {
+    const DeviceStatus status = ReadDeviceStatus();
+    if (!status.found) GTEST_SKIP() << "no GPU here: " << status.name;
+  }
+  int basis() const { return GetParam(); }
+};
+
+// One row of the table, for people and for scripts.
+void Row(const char* body, int basis, const char* against, double error, double tolerance) {
+  std::printf("parity\t%s\tbasis %d\t%s\t%.3g\t%.3g\n", body, basis, against, error, tolerance);
+  EXPECT_LE(error, tolerance) << body << " against " << against;
+}
+
+// H70: 2e-5 a pixel against the plain body in float and in double; H84: skipping empty space leaves the
+// picture as it is.
+TEST_P(DeviceParity, Render) {
+  for (const double fill : {0.003, 0.05, 0.9}) {
+    const RadianceField field = RandomField({33, 27, 41}, basis(), fill, 31);
+    const DoubleField in_double(field);
+    const DeviceGrid grid = UploadGrid(MakeFastGrid(field));
+    Buffer<Ray> rays(2000);
+    const std::vector<Ray> drawn = RandomRays(static_cast<int>(rays.size()), 32);
+    std::copy(drawn.begin(), drawn.end(), rays.begin());
+    rays[0].direction = {0, 0, 0};  // no ray at all: the background
+    rays[1].origin.x = std::nanf("");
+    const MarchOptions options{0.5f, 1e-4f};
+    const DeviceBuffer<Ray> on_device = DeviceBuffer<Ray>::Of(rays, "rays");
+    DeviceBuffer<Vec3f> color(rays.size(), "colours");
+    DeviceBuffer<float> depth(rays.size(), "depths"), left(rays.size(), "transmittances");
+    RenderOnDevice(grid, on_device.data(), rays.size(), options,
+                   {color.data(), depth.data(), left.data()});
+    const Buffer<Vec3f> colors = color.ToHost();
+    const Buffer<float> depths = depth.ToHost(), lefts = left.ToHost();
+    double against_float = 0, against_double = 0, depth_error = 0;
+    for (int64_t r = 0; r < rays.size(); ++r) {
+      const RayResult<float> plain = RenderRay(ViewOf(field), rays[r], options);
+      const RayT<double> ray{rays[r].origin.Cast<double>(), rays[r].direction.Cast<double>()};
+      const RayResult<double> exact = RenderRay(in_double.view(), ray, options);
+      for (int c = 0; c < 3; ++c) {
+        const double value = static_cast<double>(colors[r][c]);
+        ASSERT_TRUE(std::isfinite(value));
+        against_float = std::max(against_float, std::abs(value - plain.color[c]));
+        against_double = std::max(against_double, std::abs(value - exact.color[c]));
+      }
+      against_float = std::max(against_float, std::abs(double{lefts[r]} - plain.transmittance));
+      depth_error = std::max(depth_error, std::abs(double{depths[r]} - plain.depth));
+    }
+    Row("render", basis(), "plain float", against_float, 2e-5);
+    Row("render", basis(), "plain double", against_double, 1e-4);  // a sample more or less at the stop
+    Row("depth", basis(), "plain float", depth_error, 1e-4);
+  }
+}
+
+// Float gradients against the plain adjoint in double: 1e-4 of the largest entry, as for the CPU's fast path.
+TEST_P(DeviceParity, FitGradient) {
+  const RadianceField field = RandomField({19, 18, 21}, basis(), 0.7, 41);
+  const DoubleField in_double(field);
+  const DeviceGrid grid = UploadGrid(MakeFastGrid(field));
+  Buffer<Ray> rays(700);
+  const std::vector<Ray> drawn = RandomRays(static_cast<int>(rays.size()), 42);
+  std::copy(drawn.begin(), drawn.end(), rays.begin());
+  Buffer<Vec3f> targets(rays.size());
+  for (Vec3f& target : targets) target = {0.4f, 0.5f, 0.2f};
+  const MarchOptions options{0.5f, 1e-4f};
+  const float scale = 1.0f / 600;
+  DeviceGradient gradient(grid);
+  DeviceRayFitter fitter(grid.frame, options, 64 << 20);
+  const DeviceBuffer<Ray> device_rays = DeviceBuffer<Ray>::Of(rays, "rays");
+  const DeviceBuffer<Vec3f> device_targets = DeviceBuffer<Vec3f>::Of(targets, "targets");
+  fitter.Accumulate(grid, device_rays.data(), device_targets.data(), rays.size(), scale, &gradient);
+  const DeviceFitSums sums = fitter.TakeSums();
+  const Buffer<float> g = gradient.gradient.ToHost();
+  const Buffer<int32_t> touched = gradient.touched.ToHost();
+
+  std::vector<double> d_density(in_double.density.size()), d_sh(in_double.sh.size());
+  double error = 0;
+  for (int64_t r = 0; r < rays.size(); ++r) {
+    const RayT<double> ray{rays[r].origin.Cast<double>(), rays[r].direction.Cast<double>()};
+    const RayResult<double> result = RenderRay(in_double.view(), ray, options);
+    const Vec3d e = result.color - targets[r].Cast<double>();
+    error += Dot(e, e);
+    RenderRayAdjoint(in_double.view(), ray, options, result, e * (2.0 * scale), d_density.data(),
+                     d_sh.data(), PlainAdd());
+  }
+  Row("loss", basis(), "plain double, relative", std::abs(sums.squared_error - error) / error, 1e-5);
+  double largest_density = 0, largest_sh = 0, off_density = 0, off_sh = 0;
+  for (const double d : d_density) largest_density = std::max(largest_density, std::abs(d));
+  for (const double d : d_sh) largest_sh = std::max(largest_sh, std::abs(d));
+  const int stride = 3 * basis(), lanes = grid.lanes();
+  for (int64_t v = 0; v < grid.num_voxels(); ++v) {
+    bool any = false;
+    for (int k = 0; k < stride; ++k) {
+      off_sh = std::max(off_sh, std::abs(g[v * lanes + k] - d_sh[v * stride + k]));
+      any = any || g[v * lanes + k] != 0;
+    }
+    off_density = std::max(off_density, std::abs(g[v * lanes + stride] - d_density[v]));
+    if (any) {
+      ASSERT_EQ(touched[v], 1) << v;
+    }
+  }
+  Row("gradient of densities", basis(), "plain double, of the largest", off_density / largest_density, 1e-4);
+  Row("gradient of colours", basis(), "plain double, of the largest", off_sh / largest_sh, 1e-4);
+}
+
+TEST_P(DeviceParity, TotalVariation) {
+  const RadianceField field = RandomField({9, 11, 10}, basis(), 0.6, 55);
+  const FastGrid host = MakeFastGrid(field);
+  const DeviceGrid grid = UploadGrid(host);
+  DeviceGradient gradient(grid);
+  const int64_t n = host.num_voxels(), begin = n / 3;
+  // All voxels, beginning somewhere: the run wraps around.
+  AddTotalVariation(grid, begin, n, 0.3f, 0.2f, &gradient);
+  DeviceWait("total variation");
+  const Buffer<float> g = gradient.gradient.ToHost();
+  const int lanes = host.lanes();
+  std::vector<double> records(static_cast<size_t>(n * lanes)), expected(records.size());
+  for (int64_t i = 0; i < n * lanes; ++i) records[static_cast<size_t>(i)] = host.records[i];
+  for (int k = 0; k <= DensityLane(basis()); ++k) {
+    const bool is_density = k == DensityLane(basis());
+    TotalVariation<double>(host.frame, host.links.data(), records.data(), lanes, k, is_density, 0,
+                           host.frame.NumVertices(), is_density ? 0.3f : 0.2f, expected.data());
+  }
+  double off = 0;
+  for (int64_t i = 0; i < n * lanes; ++i)
+    off = std::max(off, std::abs(g[i] - expected[static_cast<size_t>(i)]));
+  Row("total variation", basis(), "plain double", off, 2e-6);
+}
+
+// H103, H104: steps are sparse, bounded, and refuse what is not finite.
+TEST_P(DeviceParity, Step) {
+  const FastGrid before = MakeFastGrid(RandomField({4, 4, 4}, basis(), 1.0, 51));
+  DeviceGrid grid = UploadGrid(before);
+  const int lanes = before.lanes();
+  const int64_t n = before.num_voxels();
+  DeviceGradient gradient(grid);
+  Buffer<float> g(n * lanes);
+  Buffer<int32_t> touched(n), list(n), count(1);
+  for (const int32_t voxel : {5, 11, 23}) {
+    touched[voxel] = 1;
+    list[count[0]++] = voxel;
+    for (int k = 0; k <= DensityLane(basis()); ++k)
+      g[voxel * lanes + k] = static_cast<float>(testing::Uniform(9, static_cast<uint64_t>(voxel * 40 + k), -1, 1));
+  }
+  g[11 * lanes] = std::nanf("");
+  gradient.gradient.CopyIn(g.data(), g.size());
+  gradient.touched.CopyIn(touched.data(), n);
+  gradient.list.CopyIn(list.data(), n);
+  gradient.count.CopyIn(count.data(), 1);
+  DeviceBuffer<float> moments(n * lanes, "moments");
+  moments.Zero();
+  DeviceBuffer<DeviceFitSums> sums(1, "sums");
+  sums.Zero();
+  const RmspropOptions options{.rate_sh = 0.05f, .rate_density = 0.5f, .view_bound = 0.2f};
+  StepOnDevice(&grid, moments.data(), &gradient, options, sums.data());
+  const FastGrid after = DownloadGrid(grid);
+  const Buffer<float> densities = grid.dense_density.ToHost();
+  DeviceFitSums taken;
+  sums.CopyOut(&taken, 1);
+  EXPECT_EQ(taken.rejected_voxels, 1u);
+  double off = 0;
+  for (int64_t v = 0; v < n; ++v)
+    for (int k = 0; k < lanes; ++k) {
+      const float old = before.records[v * lanes + k], now = after.records[v * lanes + k];
+      if (v != 5 && v != 23) {
+        ASSERT_EQ(old, now);
+        continue;
+      }
+      if (k > DensityLane(basis())) continue;
+      const bool is_density = k == DensityLane(basis());
+      const double gradient_value = g[v * lanes + k];
+      double expected = old - (is_density ? 0.5 : 0.05) * gradient_value / (std::abs(gradient_value) + 1e-8);
+      if (!is_density) {
+        const double bound = k % basis() == 0 ? 0.5 / kSh0 : double{0.2f};
+        expected = std::clamp(expected, -bound, bound);
+      }
+      off = std::max(off, std::abs(now - expected));
+    }
+  Row("step", basis(), "definition in double", off, 1e-5);
+  const int32_t vertex = after.vertex_of_voxel[5];
+  EXPECT_EQ(densities[vertex], after.records[5 * lanes + DensityLane(basis())]);
+  for (const float rest : gradient.gradient.ToHost()) ASSERT_EQ(rest, 0.0f);
+  for (const int32_t rest : gradient.touched.ToHost()) ASSERT_EQ(rest, 0);
+}
+
+// Up, down: links, records and what follows from them are the host's.
+TEST_P(DeviceParity, UploadAndDownload) {
+  const FastGrid host = MakeFastGrid(RandomField({21, 9, 17}, basis(), 0.02, 3));
+  const DeviceGrid grid = UploadGrid(host);
+  const Buffer<uint8_t> distance = grid.empty_distance.ToHost();
+  for (int64_t v = 0; v < distance.size(); ++v)
+    ASSERT_EQ(distance[v], std::min<int>(host.empty_distance[v], 16)) << v;
+  const FastGrid back = DownloadGrid(grid);
+  for (int64_t i = 0; i < host.records.size(); ++i) ASSERT_EQ(host.records[i], back.records[i]);
+}
+
+INSTANTIATE_TEST_SUITE_P(AllBases, DeviceParity, ::testing::Values(1, 4, 9),
+                         [](const auto& info) { return "basis" + std::to_string(info.param); });
+
+}  // namespace
+}  // namespace regrade
