@@ -129,8 +129,9 @@ class Workshop:
                    re.search(r"^\S+:\d+: (?!remark)(.*)$", text, re.M))
         how = ("did not end" if status is None else message.group(1) if message else
                f"ended by signal {-status}" if status < 0 else f"exit status {status}")
-        for pattern, word in ((re.escape(tempfile.gettempdir()) + r"/[^\n:]*", "PATH"), (str(2**64 - 1), "npos"),
-                              (r"\d+-byte object <[^>]*>", "an object")):
+        scratch = re.escape(tempfile.gettempdir())
+        for pattern, word in ((re.escape(self.tree + os.sep), ""), (scratch + r"/[^\n:]*", "PATH"),
+                              (str(2**64 - 1), "npos"), (r"\d+-byte object <[^>]*>", "an object")):
             how = re.sub(pattern, word, how)
         return failed, " ".join(how.split())
 
@@ -164,16 +165,26 @@ def run_all(workshop, entries):
     return rows
 
 
-def markdown(rows):
-    order = {case: i for i, case in enumerate(all_cases())}
-    text = ("# Cares taken out\n\nEach care of the hard cases, and the test that failed when the code was built\n"
-            "without it. Written by `scripts/care_outs.py --write` from `care_outs.json`; every line has been run.\n\n"
-            "| case | care taken out | test that failed | how it failed |\n|---|---|---|---|\n")
-    for entry, verdict, test, how in sorted(rows, key=lambda row: order[row[0]["case"]]):
-        cells = [entry["case"], entry.get("care", "cannot arise: " + entry.get("cannot_arise", "")), test,
-                 (how if len(how) < 130 else how[:127] + "...") if verdict in ("failed", "cannot arise") else verdict]
-        text += "| " + " | ".join(s.replace("|", "\\|").replace("<", "&lt;") for s in cells) + " |\n"
-    return text
+def table_row(entry, *rest):
+    """A line of the table, or its beginning without the rest."""
+    cells = [entry["case"], entry.get("care", "cannot arise: " + entry.get("cannot_arise", "")), *rest]
+    return "| " + " | ".join(cell.replace("|", "\\|").replace("<", "&lt;") for cell in cells) + " |"
+
+
+def write_table(root, rows):
+    """Rows of other cases than these stay as they are."""
+    path, order = os.path.join(root, TABLE), {case: i for i, case in enumerate(all_cases())}
+    new = {entry["case"] for entry, *_ in rows}
+    lines = re.findall(r"^\| [HF]\d+ .*$", read(path), re.M) if os.path.isfile(path) else []
+    lines = [line for line in lines if line.split()[1] in order and line.split()[1] not in new]
+    for entry, verdict, test, how in rows:
+        how = verdict if verdict.isupper() else how if len(how) < 130 else how[:127] + "..."
+        lines.append(table_row(entry, test, how))
+    lines.sort(key=lambda line: order[line.split()[1]])
+    write(path, "# Cares taken out\n\n"
+          "Each care of the hard cases, and the test that failed when the code was built without it. Written by\n"
+          "`scripts/care_outs.py --write` from `care_outs.json`; every line has been run.\n\n"
+          "| case | care taken out | test that failed | how it failed |\n|---|---|---|---|\n" + "\n".join(lines) + "\n")
 
 
 def self_test():
@@ -205,15 +216,18 @@ def main():
     parser.add_argument("--only", metavar="CASE,...", help="these cases alone")
     parser.add_argument("--build", metavar="DIR", help="keep the tree's copy and its build here for the next time")
     parser.add_argument("--jobs", type=int, default=1, metavar="N", help="compilers side by side (1)")
-    parser.add_argument("--write", action="store_true", help=f"write {TABLE}")
+    parser.add_argument("--write", action="store_true", help=f"write {TABLE}, with --only these cases' lines of it")
     parser.add_argument("--check", action="store_true", help="build nothing: does each entry apply, has each case one?")
     parser.add_argument("--self-test", action="store_true", help="plant mistakes in a list and see --check find them")
     arguments = parser.parse_args()
-    if arguments.write and arguments.only:
-        parser.error("--write wants all cases, --only takes some")
     if arguments.self_test:
         return 1 if self_test() else 0
     entries, complaints = check(arguments.root)
+    if arguments.check and not complaints:
+        table = os.path.join(arguments.root, TABLE)
+        table = read(table) if os.path.isfile(table) else ""
+        complaints = [f"{entry['case']}: not in {TABLE}, see --write" for entry in entries
+                      if table_row(entry) not in table]
     for complaint in complaints:
         print(f"{ENTRIES}: {complaint}")
     if arguments.check or complaints:
@@ -226,7 +240,7 @@ def main():
     wrong = sum(verdict not in ("failed", "cannot arise") for _, verdict, _, _ in rows)
     print(f"care_outs: {len(rows)} entries, {wrong} not seen to fail")
     if arguments.write:
-        write(os.path.join(arguments.root, TABLE), markdown(rows))
+        write_table(arguments.root, rows)
     return 1 if wrong else 0
 
 

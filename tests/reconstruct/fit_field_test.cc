@@ -126,6 +126,7 @@ TEST_F(FitField, H109_H110_AResumedFitIsTheUndisturbedOne) {
       return ++steps == stop_after ? Verdict::kAbort : Verdict::kContinue;
     };
     EXPECT_THROW(regrade::FitField(views_, box_, options_, hooks), Interrupted);
+    ASSERT_GT(saved.grid.num_voxels(), 0) << "nothing was saved";
     FitHooks go_on;
     go_on.resume = &saved;
     EXPECT_TRUE(
