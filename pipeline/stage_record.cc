@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstring>
 #include <filesystem>
 #include <memory>
 
@@ -70,18 +69,18 @@ std::string StageRecord::OutputHash() const {
 
 std::string HashFile(const std::string& path) {
   const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-  if (fd < 0) throw Error(ExitCode::kInput, std::strerror(errno), path);
+  if (fd < 0) ThrowReadError(path);
   const std::unique_ptr<const int, void (*)(const int*)> closer(
       &fd, [](const int* f) { ::close(*f); });
   struct stat status;
-  if (::fstat(fd, &status) != 0) throw Error(ExitCode::kInput, std::strerror(errno), path);
+  if (::fstat(fd, &status) != 0) ThrowReadError(path);
   if (!S_ISREG(status.st_mode)) throw Error(ExitCode::kInput, "not a regular file", path);
   Hasher hasher;
   std::vector<char> piece(1 << 20);
   while (true) {
     const ssize_t n = ::read(fd, piece.data(), piece.size());
     if (n < 0 && errno == EINTR) continue;
-    if (n < 0) throw Error(ExitCode::kInput, std::strerror(errno), path);
+    if (n < 0) ThrowReadError(path);
     if (n == 0) break;
     hasher.Add(piece.data(), static_cast<size_t>(n));
   }

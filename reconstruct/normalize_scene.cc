@@ -128,6 +128,14 @@ std::vector<Vec3d> PhotoCorners(const Capture& capture) {
   return corners;
 }
 
+// A distance below this is the rounding of where the cameras stand, through a matrix of
+// condition 1e6.
+double RoundingOf(const std::vector<Vec3d>& centers) {
+  double farthest = 0;
+  for (const Vec3d& c : centers) farthest = std::max(farthest, Norm(c));
+  return 1e-8 * farthest;
+}
+
 }  // namespace
 
 NormalizedScene NormalizeScene(const Capture& capture) {
@@ -167,8 +175,17 @@ NormalizedScene NormalizeScene(const Capture& capture) {
     std::vector<double> distances;
     for (const Vec3d& c : centers) distances.push_back(Norm(c - common));
     double half = Quantile(&distances, 0.5) / 0.9;
-    if (!(half > 0)) half = 1;
-    result.notice = "few points: the box is the cube round the cameras' common point";
+    std::string notice = "few points: the box is the cube round the cameras' common point";
+    if (!(half > RoundingOf(centers))) {
+      notice =
+          "few points, and the cameras stand at one place: the size of the box is "
+          "that of the points' distances, or 1";
+      std::vector<double> depths;
+      for (const ScenePoint& p : capture.points) depths.push_back(Norm(p.position - common));
+      half = depths.empty() ? 1 : Quantile(&depths, 0.5);
+      if (!(half > RoundingOf(centers))) half = 1;
+    }
+    result.notice += (result.notice.empty() ? "" : "; ") + notice;
     for (int a = 0; a < 3; ++a) {
       const double middle = Dot(rotation.row[a], common);
       low[a] = middle - half;

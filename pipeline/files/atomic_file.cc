@@ -82,12 +82,19 @@ void RenameDurably(const std::string& from, const std::string& to) {
   SyncFolder(std::filesystem::path(to).parent_path().string());
 }
 
+void ThrowReadError(const std::string& path) {
+  const int error = errno;
+  if (error == EIO || error == ESTALE || error == ENODEV)
+    throw Error(ExitCode::kResources, std::string("cannot read: ") + std::strerror(error), path,
+                "is its drive still there? then run the same command again");
+  throw Error(ExitCode::kInput, std::strerror(error), path);
+}
+
 std::string ReadWholeFile(const std::string& path, uint64_t max_bytes) {
   FileDescriptor fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
-  if (fd.get() < 0) throw Error(ExitCode::kInput, std::strerror(errno), path);
+  if (fd.get() < 0) ThrowReadError(path);
   struct stat status;
-  if (::fstat(fd.get(), &status) != 0)
-    throw Error(ExitCode::kInput, std::strerror(errno), path);
+  if (::fstat(fd.get(), &status) != 0) ThrowReadError(path);
   if (!S_ISREG(status.st_mode)) throw Error(ExitCode::kInput, "not a regular file", path);
   if (static_cast<uint64_t>(status.st_size) > max_bytes)
     throw Error(ExitCode::kInput,
@@ -99,7 +106,7 @@ std::string ReadWholeFile(const std::string& path, uint64_t max_bytes) {
   while (done < bytes.size()) {
     const ssize_t n = ::read(fd.get(), bytes.data() + done, bytes.size() - done);
     if (n < 0 && errno == EINTR) continue;
-    if (n < 0) throw Error(ExitCode::kInput, std::strerror(errno), path);
+    if (n < 0) ThrowReadError(path);
     if (n == 0)
       throw Error(ExitCode::kInput, "the file became shorter while it was read", path);
     done += static_cast<size_t>(n);

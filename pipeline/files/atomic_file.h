@@ -16,6 +16,10 @@ void WriteFileAtomically(const std::string& path, std::string_view bytes);
 // Moves a finished file or folder of the same file system into place and makes that durable.
 void RenameDurably(const std::string& from, const std::string& to);
 
+// Throws what errno says of reading `path`: Error(kResources) if the drive failed or went away,
+// else Error(kInput).
+[[noreturn]] void ThrowReadError(const std::string& path);
+
 // Whole file into memory. Throws Error(kInput) if it is missing, not a regular file, or above
 // `max_bytes`.
 std::string ReadWholeFile(const std::string& path, uint64_t max_bytes);

@@ -55,6 +55,14 @@ TEST(Squareplus, H31_AgreesWithLongDouble) {
         EXPECT_NEAR(static_cast<double>(Squareplus(x) / exact - 1), 0, 4.5e-16) << x;
       }
   EXPECT_DOUBLE_EQ(Squareplus(0.0), 0.5e-6);
+  // In float as well, where a square overflows from 1.9e19 on: four roundings of 6e-8, and one
+  // to a subnormal number.
+  for (const float x : {-1e30f, -1e19f, -1.0f, -1e-4f, 1e-4f, 1.0f, 1e19f, 1e30f}) {
+    const long double exact = ExactSquareplus(x, static_cast<float>(kSquareplusB));
+    EXPECT_NEAR(Squareplus(x), static_cast<double>(exact),
+                2.5e-7 * static_cast<double>(exact) + 1e-45)
+        << x;
+  }
 }
 
 TEST(Squareplus, H32_DerivativeWithoutCancellation) {
@@ -62,7 +70,11 @@ TEST(Squareplus, H32_DerivativeWithoutCancellation) {
     // b = 1e-2 so that finite differences see the bend; the formula is the same.
     const double numeric = Derivative([](double y) { return Squareplus(y, 1e-2); }, x, 1e-3);
     EXPECT_NEAR(SquareplusDerivative(x, 1e-2), numeric, 1e-9) << x;
-    EXPECT_GT(SquareplusDerivative(x), 0) << x;
+    // Of the real b the digits are counted: squareplus' roundings, the root's and a quotient's.
+    const long double b = kSquareplusB;
+    const long double exact =
+        ExactSquareplus(x, b) / sqrtl(static_cast<long double>(x) * x + b);
+    EXPECT_NEAR(static_cast<double>(SquareplusDerivative(x) / exact - 1), 0, 1e-15) << x;
   }
   EXPECT_EQ(SquareplusDerivative(0.0, 0.0), 0.5);
 }
@@ -171,13 +183,20 @@ TEST(LipschitzLayer, H46_H47_GradientWithFrozenVectors) {
     m.weight[i] = before;
     EXPECT_NEAR(d_w[i], numeric, 1e-8) << i;
   }
-  const double numeric = Derivative(
-      [&](double x) {
-        k = x;
-        return loss();
-      },
-      0.8, 1e-3);
-  EXPECT_NEAR(d_k, numeric, 1e-9);
+  // Also where squareplus bends, at the root of b: steps of a hundredth of it leave an error of
+  // 1e-8 of the result by the method, and 1e-8 by rounding.
+  for (const double at : {0.8, 1e-6, 0.0, -1e-6}) {
+    k = at;
+    d_k = 0;
+    LipschitzWeightAdjoint(m.View(), k, d_a.weight.data(), d_w.data(), &d_k);
+    const double numeric = Derivative(
+        [&](double x) {
+          k = x;
+          return loss();
+        },
+        at, at > 0.1 ? 1e-3 : 1e-8);
+    EXPECT_NEAR(d_k, numeric, at > 0.1 ? 1e-9 : 1e-6 * std::abs(numeric)) << at;
+  }
 }
 
 // --- the network

@@ -3,13 +3,26 @@
 #include <gtest/gtest.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/syscall.h>
 #include <sys/un.h>
 #include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
 
 #include "kernels/base/error.h"
 #include "kernels/base/natural_order.h"
 #include "pipeline/files/atomic_file.h"
 #include "tests/pipeline/picture_corpus.h"
+
+// Every read of this program comes by here: while this is set, drives are gone.
+static std::atomic<bool> drive_is_gone = false;
+
+extern "C" ssize_t read(int fd, void* buffer, size_t size) {
+  if (!drive_is_gone) return ::syscall(SYS_read, fd, buffer, size);
+  errno = EIO;
+  return -1;
+}
 
 namespace regrade {
 namespace {
@@ -308,6 +321,12 @@ TEST_F(PhotoFolder, F15_FingerprintSeesAChangedPixelAndAName) {
   EXPECT_NE(Ingest().fingerprint, before);
   fs::rename(folder_ + "/p3.jpg", folder_ + "/p2.jpg");
   EXPECT_EQ(Ingest().fingerprint, before);
+  Image photo = DecodePhoto(folder_ + "/p2.jpg").image;
+  WritePng8(folder_ + "/p2.jpg", photo);  // the same pixels in other bytes
+  EXPECT_EQ(Ingest().fingerprint, before);
+  photo.pixels[100] = photo.pixels[100] > 0.5f ? 0.f : 1.f;
+  WritePng8(folder_ + "/p2.jpg", photo);
+  EXPECT_NE(Ingest().fingerprint, before);
 }
 
 TEST_F(PhotoFolder, AWishToStopIsObeyed) {
@@ -318,6 +337,16 @@ TEST_F(PhotoFolder, AWishToStopIsObeyed) {
   };
   EXPECT_THROW(IngestPhotos(folder_, staging_, {}, stop_at_third), Interrupted);
   EXPECT_EQ(calls, 3);
+}
+
+TEST_F(PhotoFolder, F14_AVanishedDriveIsNotADamagedPhoto) {
+  PutPhotos(4);
+  drive_is_gone = true;
+  const Error error = Failure();
+  drive_is_gone = false;
+  EXPECT_EQ(error.code(), ExitCode::kResources);
+  EXPECT_EQ(error.where(), folder_ + "/p0.jpg");
+  EXPECT_TRUE(Contains(error.what_failed(), "Input/output error")) << error.what();
 }
 
 TEST_F(PhotoFolder, F14_ThousandsOfOtherFilesAreNoTrouble) {

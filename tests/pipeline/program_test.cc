@@ -9,6 +9,7 @@
 
 #include "kernels/base/child_process.h"
 #include "pipeline/files/json_file.h"
+#include "pipeline/interrupt.h"
 #include "pipeline/workspace.h"
 #include "tests/support/temporary_folder.h"
 
@@ -143,6 +144,8 @@ int Spawn(const std::vector<std::string>& arguments, int fd, int signal = 0,
   if (child == 0) {
     ::dup2(fd, STDOUT_FILENO);
     ::dup2(fd, STDERR_FILENO);
+    // A test that is itself a background job would hand its ignored signals down.
+    for (const int s : {SIGINT, SIGTERM}) ::signal(s, SIG_DFL);
     std::vector<char*> argv = {const_cast<char*>(REGRADE_PROGRAM)};
     for (const std::string& argument : arguments)
       argv.push_back(const_cast<char*>(argument.c_str()));
@@ -183,6 +186,21 @@ TEST(Program, F34_DiesByTheSignalThatStoppedIt) {
               128 + signal);
   }
   ::close(null);
+}
+
+TEST(Interrupt, F34_TheSecondSignalEndsTheProcessAtOnce) {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    for (const int s : {SIGINT, SIGTERM}) ::signal(s, SIG_DFL);  // whatever was handed down
+    InstallSignalHandling();
+    ::raise(SIGINT);
+    if (StopSignal() != SIGINT) ::_exit(1);  // the first is a wish
+    ::raise(SIGTERM);
+    ::_exit(2);
+  }
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  EXPECT_TRUE(WIFSIGNALED(status) && WTERMSIG(status) == SIGTERM) << status;
 }
 
 TEST(Program, JsonLinesAreJson) {

@@ -1,8 +1,10 @@
 #include "pipeline/workspace.h"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -13,6 +15,21 @@
 #include "pipeline/files/atomic_file.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"
+
+// What this program asks of the disk while somebody listens.
+static std::vector<std::string>* disk_calls = nullptr;
+
+extern "C" int fsync(int fd) {
+  struct stat status = {};
+  ::fstat(fd, &status);
+  if (disk_calls) disk_calls->push_back(S_ISDIR(status.st_mode) ? "sync folder" : "sync file");
+  return static_cast<int>(::syscall(SYS_fsync, fd));
+}
+
+extern "C" int rename(const char* from, const char* to) noexcept {
+  if (disk_calls) disk_calls->push_back("rename");
+  return ::renameat(AT_FDCWD, from, AT_FDCWD, to);
+}
 
 namespace regrade {
 namespace {
@@ -334,6 +351,18 @@ TEST(AtomicFile, F35_KilledAtAnyInstantNothingIsTorn) {
                              WriteText(path, text);
                            }),
             0);
+}
+
+// After a power loss a name must not show a file that had not reached the disk, nor be lost.
+TEST(AtomicFile, F36_ContentIsOnDiskBeforeItsNameAndThenTheNameIs) {
+  const TemporaryFolder folder;
+  std::vector<std::string> calls;
+  disk_calls = &calls;
+  WriteFileAtomically(folder / "a", "text");
+  RenameDurably(folder / "a", folder / "b");
+  disk_calls = nullptr;
+  EXPECT_EQ(calls, (std::vector<std::string>{"sync file", "rename", "sync folder", "rename",
+                                             "sync folder"}));
 }
 
 TEST(AtomicFile, F28_FailedWritesLeaveTheOldFile) {

@@ -312,7 +312,8 @@ TEST_F(ColmapModelFile, H136_EveryCameraModelNumber) {
 }
 
 TEST_F(ColmapModelFile, F61_NamesAreKeysOnly) {
-  model_.images[0].name = "../../etc/passwd";
+  const std::string path_out = "../../" + model_.images[0].name;  // not the photo's name
+  model_.images[0].name = path_out;
   model_.images[1].name = "";
   WriteColmapModel(model_, folder_);
   const ColmapModel read = ReadColmapModel(folder_);

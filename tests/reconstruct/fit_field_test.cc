@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 #include <omp.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <memory>
@@ -125,6 +126,7 @@ TEST_F(FitField, H109_H110_AResumedFitIsTheUndisturbedOne) {
       return ++steps == stop_after ? Verdict::kAbort : Verdict::kContinue;
     };
     EXPECT_THROW(regrade::FitField(views_, box_, options_, hooks), Interrupted);
+    ASSERT_GT(saved.grid.num_voxels(), 0) << "nothing was saved";
     FitHooks go_on;
     go_on.resume = &saved;
     EXPECT_TRUE(
@@ -151,11 +153,13 @@ TEST_F(FitField, H85_PruningEverythingIsAnError) {
   }
 }
 
-TEST_F(FitField, H85_ResamplingKeepsConstants) {
+TEST_F(FitField, H85_ResamplingKeepsConstantsAndRamps) {
   const TrainingRays rays(views_);
   FastGrid grid = MakeInitialGrid(rays, {{9, 9, 9}, {0, 0, 0}, {1, 1, 1}}, 4, 0.3f, 0, 1);
   for (int64_t v = 0; v < grid.num_voxels(); ++v)
-    for (int l = 0; l < 12; ++l) grid.records[v * grid.lanes() + l] = 0.25f;
+    for (int l = 0; l < 12; ++l)  // the first one a ramp along z
+      grid.records[v * grid.lanes() + l] =
+          l == 0 ? static_cast<float>(grid.vertex_of_voxel[v] % 9) : 0.25f;
   Buffer<float> weights(grid.num_voxels());
   for (float& w : weights) w = 1;
   const FastGrid fine = Resample(grid, weights, 0.5f, {17, 17, 17});
@@ -165,7 +169,14 @@ TEST_F(FitField, H85_ResamplingKeepsConstants) {
     // Next to unseen vertices values fade towards 0; inside they are constant.
     const float density = fine.records[v * fine.lanes() + DensityLane(4)];
     EXPECT_LE(density, 0.3f + 1e-6f);
-    whole += std::abs(density - 0.3f) < 1e-6f;
+    const bool inside = std::abs(density - 0.3f) < 1e-6f;
+    whole += inside;
+    // Vertex k of 17 lies at (k + 1/2) 9 / 17 - 1/2 of 9, and ramps end at the last vertices.
+    const float z =
+        std::clamp((fine.vertex_of_voxel[v] % 17 + 0.5f) * 9 / 17 - 0.5f, 0.0f, 8.0f);
+    if (inside) {
+      EXPECT_NEAR(fine.records[v * fine.lanes()], z, 1e-5f);
+    }
   }
   EXPECT_GT(whole, fine.num_voxels() / 2);
 }

@@ -128,9 +128,12 @@ TEST(NormalizeScene, H154_OrderOfPhotosDoesNotMatter) {
 
 TEST(NormalizeScene, H129_CollinearCameras) {
   Capture capture;
+  const Vec3d up{0, -0.6, 0.8};  // not an axis: a line's other directions are as good as any
   for (int i = 0; i < 6; ++i)
-    capture.views.push_back({"", "", "", LookAt({0.3 * i, 0, 0}, {0.3 * i, 5, 0}, {0, 0, 1})});
-  ExpectProper(NormalizeScene(capture));
+    capture.views.push_back({"", "", "", LookAt({0.3 * i, 0, 0}, {0.3 * i, 4, 3}, up)});
+  const NormalizedScene scene = NormalizeScene(capture);
+  ExpectProper(scene);
+  EXPECT_NEAR((scene.field_from_world.rotation * up).z, 1, 1e-12);
 }
 
 TEST(NormalizeScene, H130_CamerasAtOnePoint) {
@@ -138,9 +141,21 @@ TEST(NormalizeScene, H130_CamerasAtOnePoint) {
   for (int i = 0; i < 4; ++i)
     capture.views.push_back(
         {"", "", "", LookAt({1, 2, 3}, {1 + std::cos(i), 2 + std::sin(i), 3}, {0, 0, 1})});
-  ExpectProper(NormalizeScene(capture));
+  // Distances that are rounding are no unit: without any other the box is the cube of radius 1.
+  const auto expect_scale = [&](double scale) {
+    const NormalizedScene scene = NormalizeScene(capture);
+    ExpectProper(scene);
+    EXPECT_NEAR(scene.field_from_world.scale, scale, 0.2 * scale);  // 8 % of margin
+    EXPECT_NE(scene.notice.find("one place"), std::string::npos) << scene.notice;
+  };
+  expect_scale(1);
+  ScenePoint far;
+  far.position = {1, 52, 3};
+  capture.points = {far};
+  expect_scale(1 / 50.0);
+  capture.points.clear();
   capture.views.resize(1);
-  ExpectProper(NormalizeScene(capture));
+  expect_scale(1);
 }
 
 TEST(NormalizeScene, H131_UpsThatCancel) {
@@ -151,7 +166,9 @@ TEST(NormalizeScene, H131_UpsThatCancel) {
          LookAt({3 * std::cos(i), 3 * std::sin(i), 0}, {0, 0, 0}, {0, 0, i % 2 ? 1.0 : -1.0})});
   const NormalizedScene scene = NormalizeScene(capture);
   ExpectProper(scene);
-  EXPECT_NE(scene.notice, "");
+  // The cameras' circle lies level; which side of it is up is a rule of ours.
+  EXPECT_NEAR(scene.field_from_world.rotation.row[2].z, 1, 1e-12);
+  EXPECT_NE(scene.notice.find("disagree about up"), std::string::npos) << scene.notice;
 }
 
 }  // namespace

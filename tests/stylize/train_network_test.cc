@@ -194,6 +194,27 @@ TEST(TrainNetwork, H106_StopsAtTheSecondStepThatIsNotFinite) {
   EXPECT_EQ(state.network.parameters, before.network.parameters);  // no step was taken
 }
 
+TEST(TrainNetwork, H34_AVanishedLayerIsWarnedOf) {
+  const StyledBall ball(10, 3, 24, LinearStyle);
+  const SceneColorMap map = MapOf(ball);
+  TrainingState state;
+  TrainingHooks hooks;
+  hooks.checkpoint = [&](const TrainingState& s) { state = s; };
+  const auto warned = [](const TrainNetworkResult& result) {
+    for (const std::string& warning : result.warnings)
+      if (warning.find("norm has vanished") != std::string::npos) return true;
+    return false;
+  };
+  EXPECT_FALSE(warned(TrainNetwork(ball.field, ball.views, map, {}, Quick(2), hooks)));
+  LipschitzNetwork vanished(state.network);
+  vanished.k(2) = -1;  // squareplus of it is 2.5e-13
+  state.network = vanished.data();
+  const TrainNetworkResult result =
+      TrainNetwork(ball.field, ball.views, map, {}, Quick(2), {}, &state);
+  EXPECT_LT(result.smallest_k, 1e-12);
+  EXPECT_TRUE(warned(result));
+}
+
 TEST(TrainNetwork, H29_PixelsThatAreNotFinite) {
   StyledBall ball(10, 3, 24, LinearStyle);
   const SceneColorMap map = MapOf(ball);

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "kernels/field/radiance_field.h"
+#include "kernels/scene/camera.h"
 
 namespace regrade::testing {
 
@@ -29,5 +30,10 @@ struct DoubleField {
   int basis;
   Vec3d background;
 };
+
+// Normalised anew: a float direction is a unit one to 1e-7 only.
+inline RayT<double> ToDouble(const Ray& ray) {
+  return {ray.origin.Cast<double>(), Normalized(ray.direction.Cast<double>())};
+}
 
 }  // namespace regrade::testing

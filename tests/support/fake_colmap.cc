@@ -171,6 +171,8 @@ int main(int argc, char** argv) {
                                                                                   : "3.8");
     return 0;
   }
+  const char* platform = std::getenv("QT_QPA_PLATFORM");  // the real one's Qt aborts, too
+  if (platform == nullptr || std::string(platform) != "offscreen") std::abort();
   const std::vector<std::string> known = KnownOptions();
   for (int i = 2; i < argc; ++i) {
     const std::string name = argv[i];
