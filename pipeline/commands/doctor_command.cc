@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "kernels/base/child_process.h"
+#include "kernels/base/device_memory.h"
 #include "kernels/base/error.h"
 #include "kernels/field/fast_rays.h"
 #include "pipeline/commands/command.h"
@@ -38,6 +39,16 @@ Finding FindColmap(const std::string& program) {
           needed};
 }
 
+Finding FindDevice() {
+  const DeviceStatus status = ReadDeviceStatus();
+  if (!status.found) return {"GPU", status.name, "everything runs on the CPU"};
+  char text[160];
+  std::snprintf(text, sizeof text, "%s, sm_%d, %.1f GB free of %.1f GB", status.name.c_str(),
+                status.compute_capability, static_cast<double>(status.free_bytes) / (1u << 30),
+                static_cast<double>(status.total_bytes) / (1u << 30));
+  return {"GPU", text, "fits run there; the rest runs on the CPU"};
+}
+
 }  // namespace
 
 void RunDoctor(const Command& command, const Arguments& arguments, Console* console) {
@@ -59,7 +70,7 @@ void RunDoctor(const Command& command, const Arguments& arguments, Console* cons
   const std::string scratch = std::filesystem::temp_directory_path().string();
   std::vector<Finding> findings = {
       {"regrade", REGRADE_VERSION, ""},
-      {"CUDA", "not in this build", "everything runs on the CPU"},
+      FindDevice(),
       {"threads",
        std::to_string(omp_get_max_threads()) + " of " +
            std::to_string(::sysconf(_SC_NPROCESSORS_ONLN)) + " cores",

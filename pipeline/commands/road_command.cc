@@ -5,6 +5,7 @@
 
 #include "kernels/base/error.h"
 #include "pipeline/commands/command.h"
+#include "pipeline/device_choice.h"
 #include "pipeline/files/image_file.h"
 #include "pipeline/plan.h"
 #include "pipeline/run_file.h"
@@ -30,12 +31,6 @@ Arguments ReadSettings(const Arguments& arguments, RunContext* context) {
   if (flag) ApplyPreset(*flag, &context->settings);
   context->options.ApplyFlags();
   return words;
-}
-
-void CheckDevice(const std::string& device) {
-  if (device == "cuda")
-    throw Error(ExitCode::kResources, "this build has no CUDA", "--device cuda",
-                "use --device auto or cpu");
 }
 
 // All inputs are looked at before long work starts.
@@ -93,7 +88,7 @@ void RunRoad(const Command& command, const Arguments& arguments, Console* consol
     throw Error(ExitCode::kUsage, "its value is missing", "--out",
                 "name the folder that the results shall go to");
   CheckTogether(settings);
-  CheckDevice(settings.run.device);
+  ChooseBackend(settings.run.device, settings.run.reproducible);
   ApplyProgramOptions(settings.program);
   context.source = Absolute(words[0]);
   if (!settings.style.picture.empty())

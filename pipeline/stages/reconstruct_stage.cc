@@ -7,6 +7,7 @@
 #include "kernels/field/fast_rays.h"
 #include "kernels/field/render.h"
 #include "pipeline/capture_store.h"
+#include "pipeline/device_choice.h"
 #include "pipeline/field_file.h"
 #include "pipeline/fit_checkpoint.h"
 #include "pipeline/memory.h"
@@ -104,12 +105,15 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
     hooks.resume = &*resume;
     context->console->Info("reconstruct: goes on from its checkpoint");
   }
-  const FitResult fit = FitField(views, scene.box, options, hooks);
+  const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
+  const FitResult fit = FitField(views, scene.box, options, hooks, backend);
 
   WriteFieldFile(workspace.Path("field.npz"), {fit.field, scene.field_from_world, scene.ndc});
   StageOutcome outcome;
   outcome.outputs = {"field.npz"};
   outcome.figures["effects"] = EffectsRecord(profile.effects);
+  outcome.figures["device"] = DeviceName(backend);
+  outcome.figures["rays"] = fit.rays;
   outcome.figures["voxels"] = fit.field.geometry->num_voxels();
   outcome.figures["psnr_train_db"] = fit.psnr_train_db;
   MeasureHeldOut(context, capture, ReadFieldFile(workspace.Path("field.npz")),
