@@ -128,7 +128,10 @@ void Console::Say(const std::string& text, bool warning) {
                      spdlog::string_view_t(line.data(), line.size()));
 }
 
-void Console::Info(const std::string& text) { Say(text, false); }
+void Console::Info(const std::string& text) {
+  Say(text, false);
+  Event("info", JsonValue::Object{{"text", text}});
+}
 
 void Console::Lines(const std::string& text) {
   size_t begin = 0;

@@ -1,0 +1,83 @@
+#!/usr/bin/env bash
+# Checks and measures the GPU parts of regrade.
+#
+#   gpu_check.sh bundle DIR [FILE.npz...]   on the machine that builds: the programs for sm_90 (REGRADE_CUDA_ARCH says
+#                                           otherwise), the libraries they need beyond glibc, and packed captures
+#   gpu_check.sh run DIR [OUT]              on the machine with the GPU, which needs a CUDA driver and nothing else;
+#                                           with compute-sanitizer on its PATH, small scenes run under its four tools
+#
+# `run` prints the parity table, fits each packed capture (named after settings below, or with the draft's), and leaves
+# one JSON file, OUT/gpu_check.json (default: DIR). Exit status 1 if a tolerance is missed or a sanitizer finds anything.
+set -euo pipefail
+exec </dev/null
+
+usage() { sed -n '2,12s/^# \{0,1\}//p' "${BASH_SOURCE[0]}" >&2; exit 2; }
+[[ $# -ge 2 ]] || usage
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+mkdir -p "$2"
+dir=$(cd "$2" && pwd)
+
+bundle() {
+  local build=$root/build/gpu-bundle
+  cmake -S "$root" -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DREGRADE_CUDA=ON -DREGRADE_BENCHMARKS=OFF \
+    -DCMAKE_CUDA_ARCHITECTURES="${REGRADE_CUDA_ARCH:-90}" >/dev/null
+  cmake --build "$build" --target regrade_gpu device_parity_test --parallel "$(nproc)"
+  cp "$build/pipeline/regrade_gpu" "$build/tests/gpu/device_parity_test" "${BASH_SOURCE[0]}" "$dir"
+  strip "$dir/regrade_gpu" "$dir/device_parity_test"
+  ldd "$dir/regrade_gpu" | awk '/lib(zip|boost|bz2|crypto|gomp|z)[._]/ {print $3}' | xargs -I{} cp -L {} "$dir"
+  [[ $# -eq 0 ]] || cp "$@" "$dir"
+  du -sh "$dir"
+}
+
+# Settings of the README's table; what is not named here is fitted as the draft is.
+settings_of() {
+  case $1 in
+    lego) echo "--fit-resolutions 128,256,512 --fit-steps 1500,4000,12000 --fit-rays 16384 --fit-step-size 0.5
+                --initial-density 0.1 --tv-density 1e-5 --tv-sh 1e-3 --tv-share 0.01 --tv-decay 0.1
+                --fit-rate-density 16 --fit-rate-density-end 0.5 --fit-rate-sh-end 5e-4 --prune-weight 0.256
+                --fit-view-bound 0.15" ;;
+    fern) echo "--fit-resolutions 256,512,1408 --fit-steps 2000,3000,5000 --fit-rays 12288 --fit-step-size 0.5
+                --prune-weight 2.5 --tv-share 0.01 --fit-rate-sh-end 2e-3" ;;
+    *) echo "--fit-resolutions 96,192,384 --fit-steps 600,1500,4000 --fit-rays 16384 --fit-rate-sh-end 2e-3" ;;
+  esac
+}
+
+run() {
+  local out=${1:-$dir} status=0 name
+  mkdir -p "$out"
+  export LD_LIBRARY_PATH=$dir${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}
+  "$dir/device_parity_test" >"$out/parity.txt" || status=1
+  grep -E '^parity|PASSED|FAILED|SKIPPED' "$out/parity.txt"
+  echo '{' >"$out/gpu_check.json"
+  printf '"device": %s,\n"parity_passed": %s' "$("$dir/regrade_gpu" device)" \
+    "$([[ $status == 0 ]] && echo true || echo false)" >>"$out/gpu_check.json"
+  if command -v compute-sanitizer >/dev/null; then
+    for tool in memcheck racecheck initcheck synccheck; do
+      local clean=true
+      compute-sanitizer --tool "$tool" --error-exitcode 9 "$dir/device_parity_test" --gtest_filter='*basis9*' \
+        >"$out/$tool.txt" 2>&1 || { clean=false; status=1; }
+      printf ',\n"%s_clean": %s' "$tool" "$clean" >>"$out/gpu_check.json"
+      echo "$tool: $(tail -1 "$out/$tool.txt")"
+    done
+  fi
+  for capture in "$dir"/*.npz; do
+    [[ -e $capture ]] || continue
+    name=$(basename "$capture" .npz)
+    # shellcheck disable=SC2046  # settings are words
+    if record=$("$dir/regrade_gpu" fit --capture "$capture" $(settings_of "$name") 2>/dev/null); then
+      printf ',\n"fit_%s": %s' "$name" "$record" >>"$out/gpu_check.json"
+      echo "$name: $record" | cut -c1-400
+    else
+      status=1
+      echo "$name: the fit failed"
+    fi
+  done
+  printf '\n}\n' >>"$out/gpu_check.json"
+  return $status
+}
+
+case $1 in
+  bundle) shift 2; bundle "$@" ;;
+  run) shift 2; run "$@" ;;
+  *) usage ;;
+esac
