@@ -16,8 +16,11 @@ namespace {
 namespace fs = std::filesystem;
 
 bool HoldsModel(const fs::path& folder) {
-  return fs::is_regular_file(folder / "cameras.bin") &&
-         fs::is_regular_file(folder / "images.bin");
+  for (const char* ending : {".bin", ".txt"})
+    if (fs::is_regular_file(folder / (std::string("cameras") + ending)) &&
+        fs::is_regular_file(folder / (std::string("images") + ending)))
+      return true;
+  return false;
 }
 
 // The deepest folder that holds all pictures of a transforms.json.

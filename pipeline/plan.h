@@ -18,9 +18,9 @@ namespace regrade {
 // 1.3 M of 7.1 M vertices at 192^3 on real captures, rounded up.
 inline constexpr double kStoredShare = 0.2;
 // Of two threads, at a grid of kRateResolution a side; a ray's cost grows with the resolution.
-inline constexpr double kRaysPerSecond = 60e3;
+inline constexpr double kRaysPerSecond = 105e3;  // 80 to 138 on three captures
 inline constexpr double kRateResolution = 160;
-inline constexpr double kStyleSecondsPerStep = 0.2;  // of two threads
+inline constexpr double kStyleSecondsPerStep = 0.075;  // of two threads
 inline constexpr double kPoseSecondsPerPhoto = 2;    // COLMAP's, of two threads
 
 struct StagePlan {

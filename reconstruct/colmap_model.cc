@@ -13,6 +13,7 @@
 
 #include "kernels/base/checked_math.h"
 #include "kernels/base/error.h"
+#include "reconstruct/colmap_text.h"
 
 namespace regrade {
 namespace {
@@ -30,16 +31,23 @@ constexpr const char* kDamagedHint =
 // A file in memory with a place in it; every read checks that its bytes are there.
 class Reader {
  public:
-  Reader(const std::string& folder, const std::string& name) : path_(folder + "/" + name) {
+  // Of `folder`/`name`.bin or, where there is only that, of the text file.
+  Reader(const std::string& folder, const std::string& name)
+      : path_(folder + "/" + name + ".bin") {
     std::ifstream file(path_, std::ios::binary | std::ios::ate);
+    const bool text = !file;
+    if (text) file.open(folder + "/" + name + ".txt", std::ios::binary | std::ios::ate);
     if (!file)
       throw Error(ExitCode::kInput, "cannot open it", path_,
-                  "a COLMAP model needs cameras.bin, images.bin and points3D.bin");
+                  "a COLMAP model needs cameras, images and points3D, as .bin or .txt");
     bytes_.resize(static_cast<size_t>(std::max<std::streamoff>(0, file.tellg())));
     file.seekg(0);
     if (!bytes_.empty() &&
         !file.read(bytes_.data(), static_cast<std::streamsize>(bytes_.size())))
       throw Error(ExitCode::kInput, "cannot read it", path_);
+    if (!text) return;
+    path_ = folder + "/" + name + ".txt";
+    bytes_ = BinaryOfColmapText(name, bytes_, path_);
   }
 
   template <typename T>
@@ -91,8 +99,7 @@ class Reader {
  private:
   size_t Left() const { return bytes_.size() - place_; }
 
-  std::string path_;
-  std::vector<char> bytes_;
+  std::string path_, bytes_;
   size_t place_ = 0;
 };
 
@@ -115,7 +122,7 @@ void CheckPlausible(const Reader& reader, uint32_t id, const Camera& camera) {
 }
 
 std::vector<ColmapCamera> ReadCameras(const std::string& folder) {
-  Reader reader(folder, "cameras.bin");
+  Reader reader(folder, "cameras");
   const size_t count = reader.ReadCount("cameras", 4 + 4 + 8 + 8 + 3 * 8);
   std::vector<ColmapCamera> cameras(count);
   for (ColmapCamera& camera : cameras) {
@@ -189,7 +196,7 @@ Mat3d ReadRotation(Reader& reader, uint32_t image_id) {
 }
 
 std::vector<ColmapImage> ReadImages(const std::string& folder) {
-  Reader reader(folder, "images.bin");
+  Reader reader(folder, "images");
   const size_t count = reader.ReadCount("images", 4 + 7 * 8 + 4 + 1 + 8);
   std::vector<ColmapImage> images(count);
   std::set<std::string> names;
@@ -213,7 +220,7 @@ std::vector<ColmapImage> ReadImages(const std::string& folder) {
 }
 
 std::vector<ColmapPoint> ReadPoints(const std::string& folder) {
-  Reader reader(folder, "points3D.bin");
+  Reader reader(folder, "points3D");
   const size_t count = reader.ReadCount("points", 8 + 3 * 8 + 3 + 8 + 8);
   std::vector<ColmapPoint> points(count);
   for (ColmapPoint& point : points) {

@@ -61,13 +61,16 @@ struct ColmapModel {
   Camera CameraOf(const ColmapImage& image) const;
 };
 
-// Reads `folder`/{cameras,images,points3D}.bin. Nothing in the files is trusted: counts are
+// Reads `folder`/{cameras,images,points3D}.bin, or .txt where there is no .bin. Nothing in the files is trusted: counts are
 // checked against the bytes left before memory is taken, every id must resolve, numbers must be
 // finite and plausible, nothing may follow. Throws Error(kInput) that names the file, the place
 // and the reason.
 ColmapModel ReadColmapModel(const std::string& folder);
 
-// Writes the same three files into `folder`, which exists. Throws Error(kResources) when they
+// The unit quaternion w x y z of a rotation, w >= 0.
+std::array<double, 4> QuaternionOf(const Mat3d& rotation);
+
+// Writes the three .bin files into `folder`, which exists. Throws Error(kResources) when they
 // do not fit. Reading them back gives the same numbers.
 void WriteColmapModel(const ColmapModel& model, const std::string& folder);
 

@@ -7,9 +7,7 @@
 #include "reconstruct/colmap_model.h"
 
 namespace regrade {
-namespace {
-
-// The unit quaternion w x y z of a rotation, w >= 0. Starts from its largest component, which
+// Starts from its largest component, which
 // is the well-conditioned one.
 std::array<double, 4> QuaternionOf(const Mat3d& r) {
   const double trace = r(0, 0) + r(1, 1) + r(2, 2);
@@ -29,6 +27,8 @@ std::array<double, 4> QuaternionOf(const Mat3d& r) {
   for (int a = 0; a < 4; ++a) q[a] = product[largest][a] / norm;
   return q;
 }
+
+namespace {
 
 class Writer {
  public:

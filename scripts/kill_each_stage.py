@@ -9,6 +9,7 @@ finish, announce every earlier stage as done before, and redo the killed one. Ex
 """
 
 import argparse
+import glob
 import json
 import os
 import shutil
@@ -60,15 +61,18 @@ def main():
         capture = os.path.join(scratch, "capture")
         subprocess.run([regrade, "synth", capture, "--scene", options.scene], check=True, stderr=subprocess.DEVNULL)
         style = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "assets", "style_sunset.png")
-        posed = os.path.join(scratch, "posed")
+        finished = ""
 
         def command(out):
             return [regrade, "run", os.path.join(capture, "images"), "--style", style, "--out", out] + SMALL
 
         for number, stage in enumerate(STAGES):
             out = os.path.join(scratch, stage)
-            if stage not in ("pose", "reconstruct"):
-                shutil.copytree(posed, out)  # the stages before it are finished there
+            if stage not in ("pose", "reconstruct"):  # the stages before it are finished in `out`
+                shutil.copytree(finished, out)
+                for later in STAGES[number:]:
+                    for record in glob.glob(os.path.join(out, ".regrade", "stages", later + ".*")):
+                        os.remove(record)
             open_stage = kill_in(command(out), stage, 0.0 if stage in ("style_2d", "report") else 0.4)
             child = start(command(out))
             done_before, redone, bad = [], [], ""
@@ -87,7 +91,7 @@ def main():
             print(f"{stage:12} {'FAILED: ' + bad if bad else 'goes on, nothing earlier redone'}{note}", flush=True)
             failures += bool(bad)
             if stage == "reconstruct":
-                shutil.copytree(out, posed)
+                finished = out
     return 1 if failures else 0
 
 

@@ -5,8 +5,8 @@
 
 Prints a table: for each stage its seconds and, from 20 % of its work on, the least and the largest ratio of the time
 left that it announced to the time that it then took; and the peak memory of the process and its children. Stages
-below 5 seconds, and announcements with less than 2 seconds left, are not judged. Exit status: regrade's, or 1 if an
-announcement was off by more than a factor of 2.
+below 5 seconds, and announcements in the last tenth of a stage's time, are not judged. Exit status: regrade's, or 1 if
+an announcement was off by more than a factor of 2.
 """
 
 import json
@@ -15,7 +15,7 @@ import subprocess
 import sys
 import time
 
-LEAST_STAGE, LEAST_LEFT, FIRST_SHARE, FACTOR = 5.0, 2.0, 0.2, 2.0
+LEAST_STAGE, LAST_SHARE, FIRST_SHARE, FACTOR = 5.0, 0.1, 0.2, 2.0
 
 
 def main():
@@ -37,7 +37,7 @@ def main():
             if event["done"] / event["total"] >= FIRST_SHARE:
                 announced.append((now, event["seconds_left"]))
         elif name == "stage_end":
-            ratios = [left / (now - at) for at, left in announced if now - at >= LEAST_LEFT]
+            ratios = [left / (now - at) for at, left in announced if now - at >= LAST_SHARE * (now - began)]
             stages.append((event["stage"], now - began, ratios))
         elif name == "info" and "will take" in event.get("text", ""):
             plans.append(event["text"])

@@ -1,8 +1,10 @@
 // How a long loop reports where it is and learns whether to go on.
 #pragma once
 
+#include <algorithm>
 #include <functional>
 #include <string>
+#include <utility>
 
 namespace regrade {
 
@@ -25,5 +27,27 @@ inline Verdict Report(const ProgressFunction& progress, double done, double tota
                       const std::string& note = "") {
   return progress ? progress({done, total, note}) : Verdict::kContinue;
 }
+
+// One progress for work in several parts, each of which reports its own from 0 to its total. `whole` is told
+// the weights of the parts before plus the share of the present one, so that the time left is that of all.
+class ProgressParts {
+ public:
+  // total_weight: the sum of the weights that Next will be called with; seconds make good weights.
+  ProgressParts(ProgressFunction whole, double total_weight)
+      : whole_(std::move(whole)), total_(total_weight) {}
+
+  // The progress function of the next part; those handed out before must not be used any more.
+  ProgressFunction Next(double weight) {
+    begun_ += weight;
+    return [this, begin = begun_ - weight, weight](const Progress& part) {
+      const double share = part.total > 0 ? std::clamp(part.done / part.total, 0.0, 1.0) : 0.0;
+      return Report(whole_, std::min(begin + weight * share, total_), total_, part.note);
+    };
+  }
+
+ private:
+  ProgressFunction whole_;
+  double total_, begun_ = 0;
+};
 
 }  // namespace regrade

@@ -49,12 +49,25 @@ GeometrySource GeometryOf(const RunSettings& settings, const Capture& capture,
   };
 }
 
+// Seconds on two cores at 480 pixels, roughly: what makes the stage's time left come out right.
+constexpr double kPairSeconds = 0.085, kFrameSeconds = 0.07, kLinearMapSeconds = 0.23;
+
+double PairWeight(const RunSettings& settings, int frames) {
+  double weight = 0;
+  for (const int gap : settings.consistency.gaps) weight += kPairSeconds * std::max(0, frames - gap);
+  return std::max(weight, kPairSeconds);
+}
+
+bool HasFilm(const RunSettings& settings) {
+  return settings.render.path.path != "views" && settings.consistency.mode != "geometry";
+}
+
 // The film's frames, with flow and masks from its own unstyled ones. Its geometry is not on
 // disk, so "geometry" leaves it out.
-void AddFilm(RunContext* context, const Image& style, const ProgressFunction& progress,
+void AddFilm(RunContext* context, const Image& style, ProgressParts* parts,
              ConsistencyReport* report, std::vector<FidelityRow>* fidelity) {
   const RunSettings& settings = context->settings;
-  if (settings.render.path.path == "views" || settings.consistency.mode == "geometry") return;
+  if (!HasFilm(settings)) return;
   std::vector<int> all(static_cast<size_t>(settings.render.path.path_frames));
   for (size_t i = 0; i < all.size(); ++i) all[i] = static_cast<int>(i);
   std::vector<NamedFrameSource> sequences;
@@ -64,7 +77,8 @@ void AddFilm(RunContext* context, const Image& style, const ProgressFunction& pr
         {sequence, FramesOf(context->workspace->Path("frames/" + sequence), all)});
   }
   const ConsistencyReport film =
-      EvaluateConsistency(sequences[0].frames, sequences, settings.consistency, progress, {});
+      EvaluateConsistency(sequences[0].frames, sequences, settings.consistency,
+                          parts->Next(PairWeight(settings, static_cast<int>(all.size()))), {});
   report->rows.insert(report->rows.end(), film.rows.begin(), film.rows.end());
   report->pairs.insert(report->pairs.end(), film.pairs.begin(), film.pairs.end());
   const FidelityTargets targets{
@@ -73,7 +87,8 @@ void AddFilm(RunContext* context, const Image& style, const ProgressFunction& pr
                all),
       &style};
   for (const NamedFrameSource& sequence : sequences)
-    fidelity->push_back(MeasureFidelity(sequence, targets, progress));
+    fidelity->push_back(MeasureFidelity(sequence, targets,
+                                        parts->Next(kFrameSeconds * static_cast<double>(all.size()))));
 }
 
 StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
@@ -88,6 +103,13 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
     return FramesOf(workspace.Path(std::string("frames/") + sequence), views);
   };
 
+  const double n = static_cast<double>(fitted.size());
+  const int film = HasFilm(settings) ? settings.render.path.path_frames : 0;
+  double weight = PairWeight(settings, static_cast<int>(all.size())) +
+                  n * (4 * kFrameSeconds + kLinearMapSeconds);
+  if (film > 0) weight += PairWeight(settings, film) + 3 * kFrameSeconds * film;
+  ProgressParts parts(progress, weight);
+
   const FrameSource source = frames("source", all);
   const std::vector<NamedFrameSource> sequences = {{"source", source},
                                                    {"views_2d", frames("views_2d", all)},
@@ -96,7 +118,8 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
                                       ? GeometryOf(settings, capture, stored)
                                       : GeometrySource();
   ConsistencyReport consistency =
-      EvaluateConsistency(source, sequences, settings.consistency, progress, geometry);
+      EvaluateConsistency(source, sequences, settings.consistency,
+                          parts.Next(PairWeight(settings, static_cast<int>(all.size()))), geometry);
 
   // Fidelity is measured on the views that the style was learned from.
   const Image style = ReadStylePicture(settings.style.picture, nullptr);
@@ -105,12 +128,13 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   std::vector<FidelityRow> fidelity;
   for (const NamedFrameSource& sequence : sequences)
     fidelity.push_back(MeasureFidelity({sequence.name, frames(sequence.name.c_str(), fitted)},
-                                       targets, progress));
-  AddFilm(context, style, progress, &consistency, &fidelity);
+                                       targets, parts.Next(n * kFrameSeconds)));
+  AddFilm(context, style, &parts, &consistency, &fidelity);
   const FidelityTargets photo_targets{FramesOf(workspace.Path("views_2d"), fitted),
                                       targets.transmittance, nullptr};
   const FidelityRow to_photos =
-      MeasureFidelity({"styled", frames("styled", fitted)}, photo_targets, progress);
+      MeasureFidelity({"styled", frames("styled", fitted)}, photo_targets,
+                      parts.Next(n * kFrameSeconds));
 
   std::vector<Camera> cameras;
   for (const int i : fitted)
@@ -119,7 +143,7 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
                                     stored.ndc));
   const std::optional<double> linear_map =
       LinearMapPsnr(stored.field, cameras, frames("source", fitted), frames("views_2d", fitted),
-                    frames("transmittance", fitted), progress);
+                    frames("transmittance", fitted), parts.Next(n * kLinearMapSeconds));
 
   context->console->Lines(FormatTables(consistency, fidelity));
   StageOutcome outcome;

@@ -2,6 +2,8 @@
 // found its place.
 #include <omp.h>
 
+#include <filesystem>
+
 #include "pipeline/capture_store.h"
 #include "pipeline/folder_listing.h"
 #include "pipeline/plan.h"
@@ -28,8 +30,10 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
   workspace.NewPath("poses/sparse/x");
   workspace.NewPath(".regrade/work/pose/x");
 
+  // Reading a photo takes about a fifth of placing it.
+  ProgressParts parts(progress, source.kind == CaptureKind::kPhotos ? 6 : 1);
   const IngestResult ingest =
-      IngestPhotos(source.photos, photo_folder, settings.ingest, progress);
+      IngestPhotos(source.photos, photo_folder, settings.ingest, parts.Next(1));
   for (const std::string& notice : ingest.notices) context->console->Info(notice);
 
   StageOutcome outcome;
@@ -40,7 +44,7 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
     PoseReport report;
     capture =
         PosesFromPhotos(ingest.photos, ingest.verdicts, options,
-                        workspace.Path(".regrade/work/pose"), sparse_folder, progress, &report);
+                        workspace.Path(".regrade/work/pose"), sparse_folder, parts.Next(5), &report);
     for (const std::string& note : report.notes) context->console->Info(note);
     outcome.figures["colmap"] = report.colmap_version;
     outcome.figures["recipe"] = report.recipe;
@@ -72,8 +76,10 @@ Stage PoseStage(RunContext* context) {
   if (source.kind == CaptureKind::kTransforms || source.kind == CaptureKind::kLlff)
     stage.inputs["poses"] = HashFile(source.poses);
   if (source.kind == CaptureKind::kColmap)
-    for (const char* part : {"cameras.bin", "images.bin", "points3D.bin"})
-      stage.inputs["poses"][part] = HashFile(source.poses + "/" + part);
+    for (const char* part : {"cameras.bin", "images.bin", "points3D.bin", "cameras.txt",
+                             "images.txt", "points3D.txt"})
+      if (std::filesystem::is_regular_file(source.poses + "/" + part))
+        stage.inputs["poses"][part] = HashFile(source.poses + "/" + part);
   stage.refuse_changes = true;
   const int64_t photos = static_cast<int64_t>(stage.inputs.At("photos").AsObject().size());
   stage.plan = std::to_string(photos) + " files in " + source.photos +

@@ -20,6 +20,7 @@
 namespace regrade {
 namespace {
 
+constexpr double kAfterFit = 0.08;  // pruning, writing and measuring, as a share of the steps' time
 constexpr int kReproducibleShards = 4;  // sums in a fixed grouping, whatever the threads
 
 double Mean(const std::vector<double>& values) {
@@ -94,7 +95,8 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   options.seed = settings.run.seed;
   if (settings.run.reproducible && options.shards == 0) options.shards = kReproducibleShards;
   FitHooks hooks;
-  hooks.progress = progress;
+  ProgressParts parts(progress, 1 + kAfterFit);
+  hooks.progress = parts.Next(1);
   hooks.checkpoint = [&](const FitState& state) {
     workspace.SaveCheckpoint("reconstruct", inputs, PackFitState(state));
   };

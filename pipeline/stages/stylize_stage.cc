@@ -48,6 +48,8 @@ Lessons ReadLessons(RunContext* context, const Capture& capture, const StoredFie
   return lessons;
 }
 
+constexpr double kAfterTraining = 0.15;  // conclusion, and the network over the field, of the steps' time
+
 Vec3f Mapped(const ColorMap& map, const Vec3f& color) {
   Vec3d mapped = map(color.Cast<double>());
   for (int c = 0; c < 3; ++c) mapped[c] = std::clamp(mapped[c], 0.0, 1.0);
@@ -69,7 +71,8 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
   TrainNetworkOptions options = settings.network;
   options.seed = settings.run.seed;
   TrainingHooks hooks;
-  hooks.progress = progress;
+  ProgressParts parts(progress, 1 + kAfterTraining);
+  hooks.progress = parts.Next(1);
   hooks.checkpoint = [&](const TrainingState& state) {
     workspace.SaveCheckpoint("stylize", inputs, PackTrainingState(state));
   };
@@ -83,7 +86,7 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
   for (const std::string& warning : trained.warnings) context->console->Warn(warning);
 
   WriteNetworkFile(workspace.Path("network.npz"), {trained.network, trained.k_est});
-  stored.field.appearance = ApplyNetwork(trained.network, stored.field, progress);
+  stored.field.appearance = ApplyNetwork(trained.network, stored.field, parts.Next(kAfterTraining));
   WriteFieldFile(workspace.Path("styled.npz"), stored);
   StageOutcome outcome;
   outcome.outputs = {"network.npz", "styled.npz"};
