@@ -16,7 +16,7 @@ namespace regrade {
 namespace {
 
 // Named in the plans, not built yet: better said than "unknown".
-constexpr const char* kLater[] = {"tradeoff", "import", "export"};
+constexpr const char* kLater[] = {"tradeoff", "import"};
 
 void PrintHelp() {
   std::printf(

@@ -34,6 +34,7 @@ void RunRoad(const Command&, const Arguments&, Console*);    // run, pose, recon
 void RunFolder(const Command&, const Arguments&, Console*);  // stylize, render
 void RunEvaluate(const Command&, const Arguments&, Console*);
 void RunSynth(const Command&, const Arguments&, Console*);
+void RunExport(const Command&, const Arguments&, Console*);
 void RunPack(const Command&, const Arguments&, Console*);
 void RunDoctor(const Command&, const Arguments&, Console*);
 

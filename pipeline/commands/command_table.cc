@@ -16,6 +16,8 @@ const std::vector<Command>& AllCommands() {
        "DIR [OPTIONS] | --frames DIR [--reference DIR] [--target DIR] [--style PICTURE]",
        "measures consistency and fidelity, of a run or of any program's frames", RunEvaluate},
       {"synth", "OUT [OPTIONS]", "writes a synthetic capture with its exact truth", RunSynth},
+      {"export", "DIR --out FOLDER [OPTIONS]",
+       "photos and poses for other programs: COLMAP text or binary, transforms.json", RunExport},
       {"pack", "DIR --out FILE [OPTIONS]",
        "a posed capture in one file, for regrade_gpu on a bare GPU machine", RunPack},
       {"doctor", "[OPTIONS]", "what is installed, and what will run where", RunDoctor},

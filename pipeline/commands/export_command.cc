@@ -1,0 +1,84 @@
+// regrade export: the photos and poses of an output folder, as other programs read them. (field.npz and styled.npz
+// are svox2's format already.)
+#include <filesystem>
+
+#include "kernels/base/error.h"
+#include "pipeline/capture_store.h"
+#include "pipeline/commands/command.h"
+#include "pipeline/files/transforms_json.h"
+#include "reconstruct/colmap_text.h"
+
+namespace regrade {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct ExportOptions {
+  std::string out;
+  std::string format = "colmap-text";
+
+  template <typename Bind>
+  void Describe(Bind& bind) {
+    bind("out", out, {.help = "the folder to write, which is made and must be empty"});
+    bind("format", format,
+         {.help = "colmap-text and colmap: images/ and sparse/; transforms: images/ and a transforms.json "
+                  "as nerfstudio and instant-ngp read it",
+          .choices = "colmap-text|colmap|transforms"});
+  }
+};
+
+void MakeEmptyFolder(const fs::path& folder) {
+  std::error_code error;
+  if (fs::exists(folder, error) && !fs::is_empty(folder, error))
+    throw Error(ExitCode::kUsage, "is not empty", folder.string(), "name a new folder with --out");
+  fs::create_directories(folder / "images", error);
+  if (error) throw Error(ExitCode::kResources, error.message(), folder.string());
+}
+
+void WritePoses(const ExportOptions& options, const std::string& folder, const Capture& capture) {
+  if (options.format == "transforms") {
+    std::vector<TransformsFrame> frames;
+    for (const CaptureView& view : capture.views)
+      frames.push_back({"images/" + view.name, view.camera});
+    WriteTransformsJson(options.out + "/transforms.json", frames);
+    return;
+  }
+  const ColmapModel model = ReadColmapModel(folder + "/poses/sparse");
+  fs::create_directories(options.out + "/sparse");
+  if (options.format == "colmap")
+    WriteColmapModel(model, options.out + "/sparse");
+  else
+    WriteColmapText(model, options.out + "/sparse");
+}
+
+}  // namespace
+
+void RunExport(const Command& command, const Arguments& arguments, Console* console) {
+  ExportOptions settings;
+  ProgramOptions program;
+  OptionSet options;
+  options.Add("Export", &settings);
+  options.Add("Program", &program);
+  if (PrintedHelp(command, arguments, options)) return;
+  const Arguments words = options.Parse(arguments);
+  options.ApplyFlags();
+  CheckWords(command, words, 1, 1);
+  ApplyProgramOptions(program);
+  if (settings.out.empty())
+    throw Error(ExitCode::kUsage, "its value is missing", "--out", "name the folder to write");
+  if (!fs::exists(words[0] + "/poses/photos.json"))
+    throw Error(ExitCode::kInput, "holds no poses", words[0],
+                "run `regrade pose PHOTOS --out " + words[0] + "` first");
+  const Capture capture = ReadCapture(words[0] + "/poses");
+  MakeEmptyFolder(settings.out);
+  for (const CaptureView& view : capture.views) {
+    std::error_code error;
+    fs::copy_file(view.path, settings.out + "/images/" + view.name, error);
+    if (error) throw Error(ExitCode::kResources, error.message(), settings.out + "/images/" + view.name);
+  }
+  WritePoses(settings, words[0], capture);
+  console->Info("wrote " + std::to_string(capture.views.size()) + " photos and their poses to " +
+                settings.out);
+}
+
+}  // namespace regrade
