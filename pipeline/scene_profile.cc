@@ -13,6 +13,7 @@
 namespace regrade {
 namespace {
 
+constexpr int kOutlineSide = 512;
 constexpr double kAlphaShare = 0.02;  // of the pixels; less is a photo with a soft edge
 constexpr const char* kNames[] = {"ndc", "alpha"};
 
@@ -32,13 +33,29 @@ std::string AlphaPath(const CaptureView& view) {
   return dot == std::string::npos ? "" : view.path.substr(0, dot) + ".alpha.png";
 }
 
+// An outline of at most kOutlineSide pixels, each the most opaque of those it stands for: hundreds of large
+// photos need not be in memory at once.
+Outline Reduced(const Outline& full) {
+  const int side = std::max(full.alpha.width, full.alpha.height);
+  const int factor = (side + kOutlineSide - 1) / kOutlineSide;
+  if (factor <= 1) return full;
+  const int width = full.alpha.width / factor, height = full.alpha.height / factor;
+  Outline small{full.camera.Resized(width, height), Image(width, height, 1)};
+  for (int y = 0; y < height * factor; ++y)
+    for (int x = 0; x < width * factor; ++x) {
+      float& most = *small.alpha.at(x / factor, y / factor);
+      most = std::max(most, *full.alpha.at(x, y));
+    }
+  return small;
+}
+
 // Outlines of all photos; empty unless each has one.
 std::vector<Outline> ReadOutlines(const Capture& capture) {
   std::vector<Outline> outlines;
   for (const CaptureView& view : capture.views)
     if (!std::filesystem::is_regular_file(AlphaPath(view))) return {};
   for (const CaptureView& view : capture.views)
-    outlines.push_back({view.camera, ReadImage(AlphaPath(view))});
+    outlines.push_back(Reduced({view.camera, ReadImage(AlphaPath(view))}));
   return outlines;
 }
 
@@ -103,7 +120,7 @@ SceneProfile ProfileScene(const Capture& capture, int sh_degree, const std::stri
 
   profile.scene = ndc ? NormalizeForwardFacing(capture, forward) : NormalizeScene(capture);
   if (alpha && !outlines.empty()) {
-    profile.scene = TightenToOutlines(profile.scene, outlines);
+    if (!ndc) profile.scene = TightenToOutlines(profile.scene, outlines);
     profile.scene.box.background = Vec3f{1, 1, 1};  // what transparent photos are laid over
   }
   return profile;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "pipeline/scene_views.h"
+#include "tests/support/expect_error.h"
 
 namespace regrade {
 namespace {
@@ -62,6 +63,28 @@ TEST(SceneEffects, RowsCarryTheNumbersOfTheDecision) {
   EXPECT_FALSE(off[0].on);
   EXPECT_FALSE(off[3].on);
   EXPECT_EQ(EffectLine(off[0]).substr(0, 26), "distortion off: 0.3 <= 0.5");
+}
+
+TEST(SceneProfile, WishesAreReadAndNonsenseIsNamed) {
+  EXPECT_TRUE(ParseEffects("auto").empty());
+  const auto wishes = ParseEffects("ndc=off,alpha=on");
+  EXPECT_FALSE(wishes.at("ndc"));
+  EXPECT_TRUE(wishes.at("alpha"));
+  for (const char* text : {"fog", "ndc", "ndc=maybe", "distortion=on", ","})
+    EXPECT_REGRADE_ERROR(ParseEffects(text), ExitCode::kUsage, "is not allowed");
+}
+
+// Cameras side by side that look one way: NDC by itself, the box when that is wished.
+TEST(SceneProfile, ForwardFacingCapturesGetTheirSpace) {
+  Capture capture = CaptureWithShifts({0, 0, 0, 0});
+  for (size_t i = 0; i < capture.views.size(); ++i)
+    capture.views[i].camera.camera_from_world.translation = {0.1 * static_cast<double>(i), 0, 0};
+  capture.nearest_depth = 2;
+  EXPECT_TRUE(ProfileScene(capture, 2, "auto").scene.ndc.on());
+  EXPECT_FALSE(ProfileScene(capture, 2, "ndc=off").scene.ndc.on());
+  const auto rows = ProfileScene(capture, 2, "auto").effects;
+  EXPECT_EQ(rows[1].name, "ndc");
+  EXPECT_TRUE(rows[1].on);
 }
 
 }  // namespace
