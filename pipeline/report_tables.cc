@@ -50,6 +50,12 @@ std::string Across(const std::string& html, size_t rows, const std::string& clas
   return "<td rowspan=" + std::to_string(rows) + " class=\"" + classes + "\">" + html + "</td>";
 }
 
+std::string IntervalHtml(const ConsistencyFigures& row) {
+  if (!row.tc_psnr_low_db.value || !row.tc_psnr_high_db.value)
+    return FigureHtml(row.tc_psnr_low_db, 2);
+  return FigureHtml(row.tc_psnr_low_db, 2) + "–" + FigureHtml(row.tc_psnr_high_db, 2);
+}
+
 // The sequence's own figure with the 2D method's in brackets.
 std::string WithTarget(const Figure& value, const Figure& target, int decimals) {
   std::string html = FigureHtml(value, decimals);
@@ -199,8 +205,8 @@ std::string ConsistencyHtml(const RunReport& report) {
         body +=
             "<th scope=row rowspan=" + std::to_string(n) + ">" + EscapeHtml(sequence) + "</th>";
       body += Cell(measured ? std::to_string(row.gap) : "–", "n") +
-              Number(row.tc_psnr_mean_db, 2) + Number(row.tc_psnr_of_mean_db, 2) +
-              Cell(pairs, "n") + Number(row.coverage, 2);
+              Number(row.tc_psnr_mean_db, 2) + Cell(IntervalHtml(row), "n") +
+              Number(row.tc_psnr_of_mean_db, 2) + Cell(pairs, "n") + Number(row.coverage, 2);
       if (i == 0) {
         body += Across(FigureHtml(fidelity->psnr_to_2d_db, 2), n, "n beside") +
                 Across(WithTarget(fidelity->hue_std, fidelity->hue_std_2d, 3), n, "n") +
@@ -214,9 +220,10 @@ std::string ConsistencyHtml(const RunReport& report) {
       meanings += (meanings.empty() ? "" : "; ") + EscapeHtml(sequence) + ": " + meaning;
   }
   const std::string head =
-      "<tr><th rowspan=2>sequence<th colspan=5>consistency<th class=beside "
+      "<tr><th rowspan=2>sequence<th colspan=6>consistency<th class=beside "
       "colspan=4>fidelity</tr>"
-      "<tr><th class=n>gap<th class=n>TC-PSNR, dB<th class=n>dB of mean<th class=n>pairs<th "
+      "<tr><th class=n>gap<th class=n>TC-PSNR, dB<th class=n>95&nbsp;%<th class=n>dB of "
+      "mean<th class=n>pairs<th "
       "class=n>coverage"
       "<th class=\"n beside\">PSNR to 2D, dB<th class=n>hue spread (2D)<th class=n>chroma (2D)"
       "<th class=n>distance to style</tr>";
@@ -226,7 +233,9 @@ std::string ConsistencyHtml(const RunReport& report) {
          "along the motion between them, and how much of the 2D method's colour is still "
          "there.</p>" +
          Table(head, body) + "<p class=note>" + meanings +
-         ". In brackets: the 2D method's own figure.</p>" + ConsistencyChartHtml(report);
+         ". In brackets: the 2D method's own figure. 95 %: block bootstrap over pairs, 1000 "
+         "resamples, runs as long as the gap because such pairs overlap.</p>" +
+         ConsistencyChartHtml(report);
 }
 
 std::string PhotosHtml(const RunReport& report) {
