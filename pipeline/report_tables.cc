@@ -304,6 +304,7 @@ std::string PricesHtml(const RunReport& report) {
 }
 
 std::string RepeatHtml(const RunReport& report) {
+  if (report.command.empty()) return "";
   std::string html = Heading("To repeat this run") + "<pre>" +
                      EscapeHtml(ShellCommand(report.command)) + "</pre><p>regrade " +
                      EscapeHtml(report.version) + ", seed " + std::to_string(report.seed) +

@@ -1,13 +1,16 @@
 // regrade evaluate: the figures of a run, or of frames that any program has made.
 #include <algorithm>
+#include <filesystem>
 #include <optional>
 
 #include "evaluate/tables.h"
 #include "kernels/base/error.h"
 #include "pipeline/commands/folder_command.h"
+#include "pipeline/files/atomic_file.h"
 #include "pipeline/files/image_file.h"
 #include "pipeline/frame_folder.h"
 #include "pipeline/heat_map_files.h"
+#include "pipeline/report_html.h"
 #include "pipeline/report_json.h"
 #include "pipeline/report_records.h"
 #include "pipeline/run_settings.h"
@@ -28,22 +31,41 @@ struct FramesOptions {
     bind("target", target,
          {.help = "folder of what the 2D method made of each frame, for fidelity"});
     bind("style", style, {.help = "the style picture, for fidelity"});
-    bind("out", out,
-         {.help = "folder for report.json and heatmaps/, pictures of the worst pairs"});
+    bind(
+        "out", out,
+        {.help =
+             "folder for report.html, report.json and heatmaps/, pictures of the worst pairs"});
   }
 };
 
-// The figures, and in the output folder the pictures of the worst pairs with them.
+constexpr int kJpegQuality = 85;
+
+std::string PairCaption(const HeatMapFile& map) {
+  return map.sequence + ", frames " + std::to_string(map.from) + " and " +
+         std::to_string(map.to);
+}
+
+// The figures, the pictures of the worst pairs, and a page with both.
 void WriteEvaluation(const Workspace& workspace, const JsonValue& record,
                      const FrameSource& reference,
                      const std::vector<NamedFrameSource>& sequences,
-                     const ConsistencyOptions& options, const ConsistencyReport& consistency) {
+                     const ConsistencyOptions& options, const ConsistencyReport& consistency,
+                     double seconds) {
   RunReport report = ReportOfEvaluation(record);
+  ReportPictures pictures;
+  pictures.title = std::filesystem::path(workspace.folder()).filename().string();
   for (const HeatMapFile& map :
-       WriteHeatMaps(workspace, reference, sequences, options, consistency))
+       WriteHeatMaps(workspace, reference, sequences, options, consistency)) {
     for (ConsistencyFigures& row : report.consistency)
       if (row.sequence == map.sequence && row.gap == map.gap) row.heat_map = map.path;
+    const Image picture = ReadImage(workspace.Path(map.path));
+    pictures.heat_maps.push_back(
+        {PairCaption(map), {EncodeJpeg(picture, kJpegQuality), picture.width, picture.height}});
+  }
+  report.version = REGRADE_VERSION;
+  report.seconds = seconds;
   WriteJsonFile(workspace.Path("report.json"), EvaluationJson(report));
+  WriteFileAtomically(workspace.Path("report.html"), ReportHtml(report, pictures));
 }
 
 void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& options,
@@ -91,10 +113,11 @@ void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& optio
   std::vector<FidelityRow> fidelity;
   for (const NamedFrameSource& sequence : sequences)
     fidelity.push_back(MeasureFidelity(sequence, targets, console->StageProgress()));
+  const double seconds = console->StageSeconds();
   console->EndStage();
   const JsonValue record = EvaluationRecord(consistency, fidelity);
   if (workspace)
-    WriteEvaluation(*workspace, record, reference, sequences, options, consistency);
+    WriteEvaluation(*workspace, record, reference, sequences, options, consistency, seconds);
   console->Event("evaluation", record);
   console->Lines(FormatTables(consistency, fidelity));
 }

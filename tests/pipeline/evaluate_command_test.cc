@@ -80,6 +80,9 @@ TEST(EvaluateCommand, WritesFiguresIntervalsAndHeatMaps) {
   }
   EXPECT_EQ(maps, 4);
   EXPECT_FALSE(std::filesystem::exists(folder / "out/heatmaps/styled_gap1_99999.png"));
+  const std::string page = testing::ReadText(folder / "out/report.html");
+  EXPECT_NE(page.find("styled, frames 0 and 5"), std::string::npos);
+  EXPECT_EQ(page.find("run.json"), std::string::npos);  // there is none here
   EXPECT_EQ(json.At("consistency_pairs").AsArray().size(), 2u * (5 + 1));
 }
 
