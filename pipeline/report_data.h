@@ -152,7 +152,7 @@ struct OptionValue {
 
 struct RunReport {
   std::string version;               // of regrade
-  std::vector<std::string> command;  // argv
+  std::vector<std::string> command;  // argv; empty for frames that any program has made
   std::string preset, device;
   uint64_t seed = 0;
   double seconds = 0;

@@ -37,7 +37,13 @@ std::string Table(const std::string& head, const std::string& body) {
          "</tbody></table></div>";
 }
 
-const char* SequenceMeaning(const std::string& sequence) {
+// A report without a command is of frames that any program has made.
+const char* SequenceMeaning(const RunReport& report, const std::string& sequence) {
+  if (report.command.empty()) {
+    if (sequence == "source") return "the frames before styling, which motion comes from";
+    if (sequence == "views_2d") return "the 2D method on each of them";
+    if (sequence == "styled") return "the frames that are judged";
+  }
   if (sequence == "source") return "our renders before styling";
   if (sequence == "views_2d") return "the 2D method on each of those renders";
   if (sequence == "styled") return "the restyled field";
@@ -215,7 +221,7 @@ std::string ConsistencyHtml(const RunReport& report) {
       }
       body += "</tr>";
     }
-    const std::string meaning = SequenceMeaning(sequence);
+    const std::string meaning = SequenceMeaning(report, sequence);
     if (!meaning.empty())
       meanings += (meanings.empty() ? "" : "; ") + EscapeHtml(sequence) + ": " + meaning;
   }

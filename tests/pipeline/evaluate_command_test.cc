@@ -83,6 +83,7 @@ TEST(EvaluateCommand, WritesFiguresIntervalsAndHeatMaps) {
   const std::string page = testing::ReadText(folder / "out/report.html");
   EXPECT_NE(page.find("styled, frames 0 and 5"), std::string::npos);
   EXPECT_EQ(page.find("run.json"), std::string::npos);  // there is none here
+  EXPECT_EQ(page.find("the restyled field"), std::string::npos);
   EXPECT_EQ(json.At("consistency_pairs").AsArray().size(), 2u * (5 + 1));
 }
 
