@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <numeric>
 
 #include "evaluate/frame_cache.h"
 #include "kernels/base/error.h"
@@ -104,8 +105,9 @@ ConsistencyRow Summarize(const std::string& sequence, int gap,
   ConsistencyRow row;
   row.sequence = sequence;
   row.gap = gap;
-  double sum_db = 0, sum_error = 0, sum_coverage = 0;
-  int finite = 0, defined = 0;
+  double sum_error = 0, sum_coverage = 0;
+  int defined = 0;
+  std::vector<double> finite_db;  // in order of time
   for (const PairResult& pair : pairs) {
     if (pair.sequence != sequence || pair.to - pair.from != gap) continue;
     ++row.pairs;
@@ -122,17 +124,20 @@ ConsistencyRow Summarize(const std::string& sequence, int gap,
       ++row.perfect_pairs;
       continue;
     }
-    ++finite;
-    sum_db += *pair.psnr_db;
+    finite_db.push_back(*pair.psnr_db);
   }
   if (row.pairs > 0) row.coverage = sum_coverage / row.pairs;
   if (defined > 0) row.tc_psnr_of_mean_db = Decibel(sum_error / defined);
-  if (finite > 0) row.tc_psnr_mean_db = sum_db / finite;
+  if (!finite_db.empty()) {
+    row.tc_psnr_mean_db = std::accumulate(finite_db.begin(), finite_db.end(), 0.0) /
+                          static_cast<double>(finite_db.size());
+    row.tc_psnr_interval_db = BootstrapMean(finite_db, gap);
+  }
   if (row.pairs == 0)
     row.why = "no pair of frames is " + std::to_string(gap) + " apart";
   else if (defined == 0)
     row.why = "no pair has a pixel that can be compared";
-  else if (finite == 0)
+  else if (finite_db.empty())
     row.why = "all compared pairs are identical: infinite";
   return row;
 }

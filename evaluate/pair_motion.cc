@@ -1,5 +1,7 @@
 #include "evaluate/pair_motion.h"
 
+#include <filesystem>
+
 #include "evaluate/flow_file.h"
 #include "evaluate/geometric_flow.h"
 #include "evaluate/optical_flow.h"
@@ -18,6 +20,24 @@ OcclusionMask MakeMask(const std::string& mode, const FlowField& forward,
               "choose lai2018, ruder2016 or geometry (which needs depth and cameras)");
 }
 
+// The motion from frame i to frame j as somebody else has computed it; `frame` is any of them.
+FlowField FlowOfFrames(const std::string& folder, int i, int j, const Image& frame) {
+  const std::string path = folder + "/" + FlowFileName(i, j);
+  if (!std::filesystem::exists(path))
+    throw Error(ExitCode::kInput,
+                "there is no flow file from frame " + std::to_string(i) + " to frame " +
+                    std::to_string(j),
+                path, "every pair of --gaps needs its flow in both directions");
+  FlowField flow = ReadFlowFile(path);
+  if (flow.width != frame.width || flow.height != frame.height)
+    throw Error(ExitCode::kInput,
+                "the flow is " + std::to_string(flow.width) + " x " +
+                    std::to_string(flow.height) + " px, the frames " +
+                    std::to_string(frame.width) + " x " + std::to_string(frame.height) + " px",
+                path, "compute it at the frames' size, or scale it with its vectors");
+  return flow;
+}
+
 }  // namespace
 
 PairMotionFunction EstimatedMotion(const FrameSource& frames, const std::string& mode,
@@ -26,14 +46,10 @@ PairMotionFunction EstimatedMotion(const FrameSource& frames, const std::string&
   if (flow.starts_with(kFilesPrefix)) {
     const std::string folder = flow.substr(sizeof(kFilesPrefix) - 1);
     return [=](int i, int j) {
+      const Image frame = frames.frame(i);
       PairMotion motion;
-      motion.flow = ReadFlowFile(folder + "/" + FlowFileName(i, j));
-      const std::string backward_path = folder + "/" + FlowFileName(j, i);
-      const FlowField backward = ReadFlowFile(backward_path);
-      if (!motion.flow.SameSize(backward))
-        throw Error(ExitCode::kInput, "forward and backward flow differ in size",
-                    backward_path);
-      motion.mask = MakeMask(mode, motion.flow, backward);
+      motion.flow = FlowOfFrames(folder, i, j, frame);
+      motion.mask = MakeMask(mode, motion.flow, FlowOfFrames(folder, j, i, frame));
       return motion;
     };
   }

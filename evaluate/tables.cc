@@ -16,6 +16,10 @@ std::string Number(const std::optional<double>& value, int decimals) {
   return text;
 }
 
+std::string Range(const std::optional<Interval>& interval) {
+  return interval ? Number(interval->low, 2) + ".." + Number(interval->high, 2) : "-";
+}
+
 using Cells = std::vector<std::string>;
 
 // Columns as wide as their widest cell; the first is set flush left, figures flush right.
@@ -36,13 +40,14 @@ std::string Align(const std::vector<Cells>& rows) {
 }
 
 std::string ConsistencyTable(const ConsistencyReport& report) {
-  std::vector<Cells> rows{
-      {"sequence", "gap", "pairs", "undefined", "mean of dB", "dB of mean", "compared"}};
+  std::vector<Cells> rows{{"sequence", "gap", "pairs", "undefined", "mean of dB", "95 %",
+                           "dB of mean", "compared"}};
   std::string remarks;
   for (const ConsistencyRow& row : report.rows) {
     rows.push_back({row.sequence, std::to_string(row.gap), std::to_string(row.pairs),
                     std::to_string(row.undefined_pairs), Number(row.tc_psnr_mean_db, 2),
-                    Number(row.tc_psnr_of_mean_db, 2), Number(100 * row.coverage, 1) + " %"});
+                    Range(row.tc_psnr_interval_db), Number(row.tc_psnr_of_mean_db, 2),
+                    Number(100 * row.coverage, 1) + " %"});
     const std::string who = row.sequence + ", gap " + std::to_string(row.gap) + ": ";
     if (!row.why.empty()) remarks += who + row.why + "\n";
     if (row.perfect_pairs > 0)
@@ -57,7 +62,10 @@ std::string ConsistencyTable(const ConsistencyReport& report) {
   }
   if (!report.note.empty()) remarks += report.note + "\n";
   return "Consistency: TC-PSNR, higher is steadier (mode " + report.mode + ", flow " +
-         report.flow + ", error per pixel and channel)\n" + Align(rows) + remarks;
+         report.flow +
+         ", error per pixel and channel; 95 %: block bootstrap of the mean of dB, runs of a "
+         "gap's length)\n" +
+         Align(rows) + remarks;
 }
 
 std::string FidelityTable(const ConsistencyReport& consistency,

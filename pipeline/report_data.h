@@ -104,12 +104,27 @@ struct StagesReport {
 struct ConsistencyFigures {
   std::string sequence;  // "source" | "views_2d" | "styled" | "photos"
   int gap = 1;
-  int pairs = 0;                         // looked at, undefined ones included
-  int undefined_pairs = 0;               // nothing to compare; in no mean
-  Figure tc_psnr_mean_db;                // mean of the pairs' dB
-  Figure tc_psnr_of_mean_db;             // dB of the pairs' mean squared error
-  Figure coverage;                       // mean share of valid pixels
-  std::vector<Figure> tc_psnr_pairs_db;  // one for each pair in order of time; may be empty
+  int pairs = 0;                           // looked at, undefined ones included
+  int undefined_pairs = 0;                 // nothing to compare; in no mean
+  Figure tc_psnr_mean_db;                  // mean of the pairs' dB
+  Figure tc_psnr_of_mean_db;               // dB of the pairs' mean squared error
+  Figure coverage;                         // mean share of valid pixels
+  std::vector<Figure> tc_psnr_pairs_db;    // one for each pair in order of time; may be empty
+  Figure tc_psnr_low_db, tc_psnr_high_db;  // the mean of dB lies between with 95 %
+  std::string heat_map;  // picture of the worst pair, relative to the folder; may be empty
+};
+
+// What one pair of one sequence says, and which pixels had no say in it.
+struct PairFigures {
+  std::string sequence;
+  int from = 0, to = 0;  // frames, counted from 0
+  Figure error;          // mean square of a trusted pixel and channel, white = 1
+  Figure tc_psnr_db;
+  double coverage = 0;        // share of the frame that was compared
+  bool low_coverage = false;  // so little that the figure says little
+  // Pixels by what speaks against them.
+  int64_t flow_not_finite = 0, out_of_frame = 0, disoccluded = 0, motion_boundary = 0,
+          colour_not_finite = 0;
 };
 
 // How near a sequence is to what the 2D method made, and how much colour it kept.
@@ -137,7 +152,7 @@ struct OptionValue {
 
 struct RunReport {
   std::string version;               // of regrade
-  std::vector<std::string> command;  // argv
+  std::vector<std::string> command;  // argv; empty for frames that any program has made
   std::string preset, device;
   uint64_t seed = 0;
   double seconds = 0;
@@ -146,6 +161,7 @@ struct RunReport {
   std::vector<EffectReport> effects;
   StagesReport stages;
   std::vector<ConsistencyFigures> consistency;
+  std::vector<PairFigures> pairs;  // of all sequences, by first frame
   std::vector<FidelityFigures> fidelity;
   std::vector<PriceRow> prices;
   std::vector<OptionValue> options;  // of run.json; shown on the page only

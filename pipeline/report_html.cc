@@ -88,6 +88,16 @@ std::string ViewsHtml(const ReportPictures& pictures) {
   return html;
 }
 
+std::string HeatMapsHtml(const ReportPictures& pictures) {
+  std::string html;
+  for (const ReportHeatMap& map : pictures.heat_maps)
+    html += PictureHtml(map.picture, map.caption);
+  if (html.empty()) return "";
+  return "<h2>Where the worst pairs err</h2><p class=note>White: 50 dB and better for the "
+         "pixel, dark red: 10 dB and worse. Dark and grey: not compared.</p><div class=view>" +
+         html + "</div>";
+}
+
 std::string FactsHtml(const RunReport& report) {
   std::string facts = "regrade " + EscapeHtml(report.version);
   if (!report.preset.empty()) facts += " · preset " + EscapeHtml(report.preset);
@@ -117,8 +127,8 @@ std::string ReportHtml(const RunReport& report, const ReportPictures& pictures) 
   if (headline) html += CompareHtml(*headline);
   for (const std::string& section :
        {HeadlineFiguresHtml(report), FilmsHtml(pictures, headline), ViewsHtml(pictures),
-        ConsistencyHtml(report), StagesHtml(report), PricesHtml(report), EffectsHtml(report),
-        PhotosHtml(report), RepeatHtml(report)}) {
+        ConsistencyHtml(report), HeatMapsHtml(pictures), StagesHtml(report), PricesHtml(report),
+        EffectsHtml(report), PhotosHtml(report), RepeatHtml(report)}) {
     if (!section.empty()) html += "<section>" + section + "</section>\n";
   }
   return html + "</main></body></html>\n";

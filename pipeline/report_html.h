@@ -22,12 +22,19 @@ struct ReportView {
   std::optional<ReportPicture> photo, source, views_2d, styled;
 };
 
+// Where in the frame a pair's error lies, see ErrorHeatMap.
+struct ReportHeatMap {
+  std::string caption;  // "styled, frames 3 and 8"
+  ReportPicture picture;
+};
+
 struct ReportPictures {
   std::string title;                   // the folder's name
   std::optional<ReportPicture> style;  // the style picture
   std::vector<ReportView> views;       // the middle one is the headline
-  bool has_styled_film = false;        // styled.mp4 lies beside the page
-  bool has_wipe_film = false;          // source_vs_styled.mp4 does
+  std::vector<ReportHeatMap> heat_maps;
+  bool has_styled_film = false;  // styled.mp4 lies beside the page
+  bool has_wipe_film = false;    // source_vs_styled.mp4 does
 };
 
 // The whole page, UTF-8. Every string in the arguments may be hostile.

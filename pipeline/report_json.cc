@@ -116,12 +116,32 @@ JsonValue ConsistencyJson(const ConsistencyFigures& row) {
                 {"undefined_pairs", row.undefined_pairs}};
   Put(object, "tc_psnr_mean_db", row.tc_psnr_mean_db);
   Put(object, "tc_psnr_of_mean_db", row.tc_psnr_of_mean_db);
+  Put(object, "tc_psnr_low_db", row.tc_psnr_low_db);
+  Put(object, "tc_psnr_high_db", row.tc_psnr_high_db);
   Put(object, "coverage", row.coverage);
+  if (!row.heat_map.empty()) object.emplace_back("heat_map", row.heat_map);
   if (!row.tc_psnr_pairs_db.empty()) {
     object.emplace_back("tc_psnr_pairs_db", List(row.tc_psnr_pairs_db, [](const Figure& pair) {
                           return pair.value ? JsonValue(*pair.value) : JsonValue();
                         }));
   }
+  return object;
+}
+
+JsonValue PairJson(const PairFigures& pair) {
+  Object object{{"sequence", pair.sequence},
+                {"gap", pair.to - pair.from},
+                {"from", pair.from},
+                {"to", pair.to}};
+  Put(object, "error", pair.error);
+  Put(object, "tc_psnr_db", pair.tc_psnr_db);
+  object.emplace_back("coverage", pair.coverage);
+  object.emplace_back("low_coverage", pair.low_coverage);
+  object.emplace_back("flow_not_finite", pair.flow_not_finite);
+  object.emplace_back("out_of_frame", pair.out_of_frame);
+  object.emplace_back("disoccluded", pair.disoccluded);
+  object.emplace_back("motion_boundary", pair.motion_boundary);
+  object.emplace_back("colour_not_finite", pair.colour_not_finite);
   return object;
 }
 
@@ -160,14 +180,19 @@ JsonValue ReportJson(const RunReport& report) {
   object.emplace_back("stages", StagesJson(report.stages));
   object.emplace_back("consistency", List(report.consistency, ConsistencyJson));
   object.emplace_back("fidelity", List(report.fidelity, FidelityJson));
+  if (!report.pairs.empty())
+    object.emplace_back("consistency_pairs", List(report.pairs, PairJson));
   if (!report.prices.empty()) object.emplace_back("prices", List(report.prices, PriceJson));
   return object;
 }
 
 JsonValue EvaluationJson(const RunReport& report) {
-  return Object{{"schema", kSchema},
+  Object object{{"schema", kSchema},
                 {"consistency", List(report.consistency, ConsistencyJson)},
                 {"fidelity", List(report.fidelity, FidelityJson)}};
+  if (!report.pairs.empty())
+    object.emplace_back("consistency_pairs", List(report.pairs, PairJson));
+  return object;
 }
 
 }  // namespace regrade

@@ -11,8 +11,8 @@ namespace regrade {
 // were measured.
 JsonValue ReportJson(const RunReport& report);
 
-// {"schema": 1, "consistency": [...], "fidelity": [...]}: what `regrade evaluate` writes for
-// any program's frames.
+// {"schema": 1, "consistency": [...], "fidelity": [...], "consistency_pairs": [...]}: what
+// `regrade evaluate` writes for any program's frames; the pairs where there are any.
 JsonValue EvaluationJson(const RunReport& report);
 
 }  // namespace regrade

@@ -46,10 +46,46 @@ ConsistencyFigures ConsistencyOf(const JsonValue& row) {
   figures.tc_psnr_mean_db = FigureOf(row, "tc_psnr_mean_db");
   figures.tc_psnr_of_mean_db = FigureOf(row, "tc_psnr_of_mean_db");
   figures.coverage = FigureOf(row, "coverage");
+  figures.tc_psnr_low_db = FigureOf(row, "tc_psnr_low_db");
+  figures.tc_psnr_high_db = FigureOf(row, "tc_psnr_high_db");
   for (const JsonValue& pair : row.At("tc_psnr_pairs_db").AsArray())
     figures.tc_psnr_pairs_db.push_back(pair.IsNumber() ? Figure(pair.AsDouble())
                                                        : Figure::Undefined("not defined"));
   return figures;
+}
+
+PairFigures PairOf(const JsonValue& row) {
+  PairFigures pair;
+  pair.sequence = row.At("sequence").AsString();
+  pair.from = static_cast<int>(row.At("from").AsInt());
+  pair.to = static_cast<int>(row.At("to").AsInt());
+  pair.error = FigureOf(row, "error");
+  pair.tc_psnr_db = FigureOf(row, "tc_psnr_db");
+  pair.coverage = row.At("coverage").AsDouble();
+  pair.low_coverage = row.At("low_coverage").AsBool();
+  pair.flow_not_finite = CountOf(row, "flow_not_finite");
+  pair.out_of_frame = CountOf(row, "out_of_frame");
+  pair.disoccluded = CountOf(row, "disoccluded");
+  pair.motion_boundary = CountOf(row, "motion_boundary");
+  pair.colour_not_finite = CountOf(row, "colour_not_finite");
+  return pair;
+}
+
+JsonValue RecordOf(const PairResult& pair) {
+  JsonValue row = JsonValue::Object{{"sequence", pair.sequence},
+                                    {"from", pair.from},
+                                    {"to", pair.to},
+                                    {"coverage", pair.coverage},
+                                    {"low_coverage", pair.low_coverage},
+                                    {"flow_not_finite", pair.flow_not_finite},
+                                    {"out_of_frame", pair.out_of_frame},
+                                    {"disoccluded", pair.disoccluded},
+                                    {"motion_boundary", pair.motion_boundary},
+                                    {"colour_not_finite", pair.colour_not_finite}};
+  const std::string why = pair.error ? "" : "no pixel can be compared";
+  Put(&row, "error", pair.error, why);
+  Put(&row, "tc_psnr_db", pair.psnr_db, why);
+  return row;
 }
 
 FidelityFigures FidelityOf(const JsonValue& row) {
@@ -68,7 +104,7 @@ FidelityFigures FidelityOf(const JsonValue& row) {
 
 JsonValue EvaluationRecord(const ConsistencyReport& consistency,
                            const std::vector<FidelityRow>& fidelity) {
-  JsonValue::Array rows, fidelity_rows;
+  JsonValue::Array rows, pair_rows, fidelity_rows;
   for (const ConsistencyRow& row : consistency.rows) {
     JsonValue::Array pairs;
     for (const PairResult& pair : consistency.pairs)
@@ -80,6 +116,11 @@ JsonValue EvaluationRecord(const ConsistencyReport& consistency,
                                         {"undefined_pairs", row.undefined_pairs}};
     Put(&entry, "tc_psnr_mean_db", row.tc_psnr_mean_db, row.why);
     Put(&entry, "tc_psnr_of_mean_db", row.tc_psnr_of_mean_db, row.why);
+    const std::optional<Interval>& interval = row.tc_psnr_interval_db;
+    const std::string few = !row.why.empty() ? row.why : "too few pairs for an interval";
+    Put(&entry, "tc_psnr_low_db", interval ? std::optional(interval->low) : std::nullopt, few);
+    Put(&entry, "tc_psnr_high_db", interval ? std::optional(interval->high) : std::nullopt,
+        few);
     entry["coverage"] = row.coverage;
     entry["tc_psnr_pairs_db"] = std::move(pairs);
     rows.push_back(std::move(entry));
@@ -94,7 +135,9 @@ JsonValue EvaluationRecord(const ConsistencyReport& consistency,
     Put(&entry, "sliced_wasserstein_to_style", row.sliced_wasserstein_to_style, "");
     fidelity_rows.push_back(std::move(entry));
   }
+  for (const PairResult& pair : consistency.pairs) pair_rows.push_back(RecordOf(pair));
   return JsonValue::Object{{"consistency", std::move(rows)},
+                           {"consistency_pairs", std::move(pair_rows)},
                            {"fidelity", std::move(fidelity_rows)}};
 }
 
@@ -102,6 +145,8 @@ RunReport ReportOfEvaluation(const JsonValue& figures) {
   RunReport report;
   for (const JsonValue& row : figures.At("consistency").AsArray())
     report.consistency.push_back(ConsistencyOf(row));
+  if (const JsonValue* pairs = figures.Find("consistency_pairs"))
+    for (const JsonValue& pair : pairs->AsArray()) report.pairs.push_back(PairOf(pair));
   for (const JsonValue& row : figures.At("fidelity").AsArray())
     report.fidelity.push_back(FidelityOf(row));
   return report;

@@ -10,7 +10,8 @@
 
 namespace regrade {
 
-// The figures of stage "evaluate": {"consistency": [...], "fidelity": [...]}.
+// The figures of stage "evaluate":
+// {"consistency": [...], "consistency_pairs": [...], "fidelity": [...]}.
 JsonValue EvaluationRecord(const ConsistencyReport& consistency,
                            const std::vector<FidelityRow>& fidelity);
 

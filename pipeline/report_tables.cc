@@ -37,7 +37,13 @@ std::string Table(const std::string& head, const std::string& body) {
          "</tbody></table></div>";
 }
 
-const char* SequenceMeaning(const std::string& sequence) {
+// A report without a command is of frames that any program has made.
+const char* SequenceMeaning(const RunReport& report, const std::string& sequence) {
+  if (report.command.empty()) {
+    if (sequence == "source") return "the frames before styling, which motion comes from";
+    if (sequence == "views_2d") return "the 2D method on each of them";
+    if (sequence == "styled") return "the frames that are judged";
+  }
   if (sequence == "source") return "our renders before styling";
   if (sequence == "views_2d") return "the 2D method on each of those renders";
   if (sequence == "styled") return "the restyled field";
@@ -48,6 +54,12 @@ const char* SequenceMeaning(const std::string& sequence) {
 // A cell that speaks for several rows.
 std::string Across(const std::string& html, size_t rows, const std::string& classes) {
   return "<td rowspan=" + std::to_string(rows) + " class=\"" + classes + "\">" + html + "</td>";
+}
+
+std::string IntervalHtml(const ConsistencyFigures& row) {
+  if (!row.tc_psnr_low_db.value || !row.tc_psnr_high_db.value)
+    return FigureHtml(row.tc_psnr_low_db, 2);
+  return FigureHtml(row.tc_psnr_low_db, 2) + "–" + FigureHtml(row.tc_psnr_high_db, 2);
 }
 
 // The sequence's own figure with the 2D method's in brackets.
@@ -199,8 +211,8 @@ std::string ConsistencyHtml(const RunReport& report) {
         body +=
             "<th scope=row rowspan=" + std::to_string(n) + ">" + EscapeHtml(sequence) + "</th>";
       body += Cell(measured ? std::to_string(row.gap) : "–", "n") +
-              Number(row.tc_psnr_mean_db, 2) + Number(row.tc_psnr_of_mean_db, 2) +
-              Cell(pairs, "n") + Number(row.coverage, 2);
+              Number(row.tc_psnr_mean_db, 2) + Cell(IntervalHtml(row), "n") +
+              Number(row.tc_psnr_of_mean_db, 2) + Cell(pairs, "n") + Number(row.coverage, 2);
       if (i == 0) {
         body += Across(FigureHtml(fidelity->psnr_to_2d_db, 2), n, "n beside") +
                 Across(WithTarget(fidelity->hue_std, fidelity->hue_std_2d, 3), n, "n") +
@@ -209,14 +221,15 @@ std::string ConsistencyHtml(const RunReport& report) {
       }
       body += "</tr>";
     }
-    const std::string meaning = SequenceMeaning(sequence);
+    const std::string meaning = SequenceMeaning(report, sequence);
     if (!meaning.empty())
       meanings += (meanings.empty() ? "" : "; ") + EscapeHtml(sequence) + ": " + meaning;
   }
   const std::string head =
-      "<tr><th rowspan=2>sequence<th colspan=5>consistency<th class=beside "
+      "<tr><th rowspan=2>sequence<th colspan=6>consistency<th class=beside "
       "colspan=4>fidelity</tr>"
-      "<tr><th class=n>gap<th class=n>TC-PSNR, dB<th class=n>dB of mean<th class=n>pairs<th "
+      "<tr><th class=n>gap<th class=n>TC-PSNR, dB<th class=n>95&nbsp;%<th class=n>dB of "
+      "mean<th class=n>pairs<th "
       "class=n>coverage"
       "<th class=\"n beside\">PSNR to 2D, dB<th class=n>hue spread (2D)<th class=n>chroma (2D)"
       "<th class=n>distance to style</tr>";
@@ -226,7 +239,9 @@ std::string ConsistencyHtml(const RunReport& report) {
          "along the motion between them, and how much of the 2D method's colour is still "
          "there.</p>" +
          Table(head, body) + "<p class=note>" + meanings +
-         ". In brackets: the 2D method's own figure.</p>" + ConsistencyChartHtml(report);
+         ". In brackets: the 2D method's own figure. 95 %: block bootstrap over pairs, 1000 "
+         "resamples, runs as long as the gap because such pairs overlap.</p>" +
+         ConsistencyChartHtml(report);
 }
 
 std::string PhotosHtml(const RunReport& report) {
@@ -295,6 +310,7 @@ std::string PricesHtml(const RunReport& report) {
 }
 
 std::string RepeatHtml(const RunReport& report) {
+  if (report.command.empty()) return "";
   std::string html = Heading("To repeat this run") + "<pre>" +
                      EscapeHtml(ShellCommand(report.command)) + "</pre><p>regrade " +
                      EscapeHtml(report.version) + ", seed " + std::to_string(report.seed) +

@@ -5,7 +5,7 @@ set -euo pipefail
 
 packages=(
   g++ cmake ninja-build pkg-config python3   # to build
-  libgtest-dev libbenchmark-dev              # to test and to measure
+  libgtest-dev libbenchmark-dev python3-numpy   # to test and to measure
   libboost-program-options-dev               # command line
   nlohmann-json3-dev libzip-dev libspdlog-dev
   libopenimageio-dev libjpeg62-turbo-dev     # pictures

@@ -1,11 +1,16 @@
 // regrade evaluate: the figures of a run, or of frames that any program has made.
 #include <algorithm>
+#include <filesystem>
+#include <optional>
 
 #include "evaluate/tables.h"
 #include "kernels/base/error.h"
 #include "pipeline/commands/folder_command.h"
+#include "pipeline/files/atomic_file.h"
 #include "pipeline/files/image_file.h"
-#include "pipeline/folder_listing.h"
+#include "pipeline/frame_folder.h"
+#include "pipeline/heat_map_files.h"
+#include "pipeline/report_html.h"
 #include "pipeline/report_json.h"
 #include "pipeline/report_records.h"
 #include "pipeline/run_settings.h"
@@ -18,23 +23,49 @@ struct FramesOptions {
 
   template <typename Bind>
   void Describe(Bind& bind) {
-    bind("frames", frames, {.help = "folder of the styled frames, in natural order of names"});
+    bind(
+        "frames", frames,
+        {.help = "folder of the styled frames, in natural order of names; nothing else in it"});
     bind("reference", reference,
          {.help = "folder of the same frames without style: motion and masks come from them"});
     bind("target", target,
          {.help = "folder of what the 2D method made of each frame, for fidelity"});
     bind("style", style, {.help = "the style picture, for fidelity"});
-    bind("out", out, {.help = "folder for report.json"});
+    bind(
+        "out", out,
+        {.help =
+             "folder for report.html, report.json and heatmaps/, pictures of the worst pairs"});
   }
 };
 
-FrameSource FramesIn(const std::string& folder) {
-  std::vector<std::string> paths;
-  for (const ListedFile& file : ListFolder(folder).files)
-    if (file.problem.empty()) paths.push_back(file.path);
-  if (paths.empty()) throw Error(ExitCode::kInput, "there are no frames here", folder);
-  return {static_cast<int>(paths.size()),
-          [paths](int i) { return ReadImage(paths[static_cast<size_t>(i)]); }};
+constexpr int kJpegQuality = 85;
+
+std::string PairCaption(const HeatMapFile& map) {
+  return map.sequence + ", frames " + std::to_string(map.from) + " and " +
+         std::to_string(map.to);
+}
+
+// The figures, the pictures of the worst pairs, and a page with both.
+void WriteEvaluation(const Workspace& workspace, const JsonValue& record,
+                     const FrameSource& reference,
+                     const std::vector<NamedFrameSource>& sequences,
+                     const ConsistencyOptions& options, const ConsistencyReport& consistency,
+                     double seconds) {
+  RunReport report = ReportOfEvaluation(record);
+  ReportPictures pictures;
+  pictures.title = std::filesystem::path(workspace.folder()).filename().string();
+  for (const HeatMapFile& map :
+       WriteHeatMaps(workspace, reference, sequences, options, consistency)) {
+    for (ConsistencyFigures& row : report.consistency)
+      if (row.sequence == map.sequence && row.gap == map.gap) row.heat_map = map.path;
+    const Image picture = ReadImage(workspace.Path(map.path));
+    pictures.heat_maps.push_back(
+        {PairCaption(map), {EncodeJpeg(picture, kJpegQuality), picture.width, picture.height}});
+  }
+  report.version = REGRADE_VERSION;
+  report.seconds = seconds;
+  WriteJsonFile(workspace.Path("report.json"), EvaluationJson(report));
+  WriteFileAtomically(workspace.Path("report.html"), ReportHtml(report, pictures));
 }
 
 void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& options,
@@ -42,16 +73,27 @@ void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& optio
   if (options.mode == "geometry")
     throw Error(ExitCode::kUsage, "geometry is known of our own runs only", "--mode",
                 "use lai2018 or ruder2016 for frames of other programs");
-  const NamedFrameSource styled{"styled", FramesIn(frames.frames)};
   const bool has_reference = !frames.reference.empty();
   if (!has_reference)
     console->Warn("no --reference: motion is estimated from the styled frames themselves");
-  const FrameSource reference = has_reference ? FramesIn(frames.reference) : styled.frames;
+  console->BeginStage("frames");
+  const auto open = [&](const std::string& folder) {
+    return OpenFrameFolder(folder, console->StageProgress());
+  };
+  const FrameFolder styled_folder = open(frames.frames);
+  const FrameFolder reference_folder = has_reference ? open(frames.reference) : styled_folder;
+  CheckSameFrames(reference_folder, styled_folder);
+  if (styled_folder.paths.size() == 1)
+    console->Warn("one frame only: consistency compares two and more, so it is not defined");
+  const NamedFrameSource styled{"styled", styled_folder.Source()};
+  const FrameSource reference = reference_folder.Source();
   std::vector<NamedFrameSource> sequences;
   if (has_reference) sequences.push_back({"source", reference});
   FidelityTargets targets;
   if (!frames.target.empty()) {
-    targets.views_2d = FramesIn(frames.target);
+    const FrameFolder target_folder = open(frames.target);
+    CheckSameFrames(reference_folder, target_folder);
+    targets.views_2d = target_folder.Source();
     sequences.push_back({"views_2d", targets.views_2d});
   }
   Image style;
@@ -60,6 +102,10 @@ void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& optio
     targets.style = &style;
   }
   sequences.push_back(styled);
+  console->EndStage();
+  std::optional<Workspace>
+      workspace;  // before the work: a folder that cannot be used is told now
+  if (!frames.out.empty()) workspace.emplace(frames.out);
 
   console->BeginStage("evaluate");
   const ConsistencyReport consistency =
@@ -67,13 +113,11 @@ void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& optio
   std::vector<FidelityRow> fidelity;
   for (const NamedFrameSource& sequence : sequences)
     fidelity.push_back(MeasureFidelity(sequence, targets, console->StageProgress()));
+  const double seconds = console->StageSeconds();
   console->EndStage();
   const JsonValue record = EvaluationRecord(consistency, fidelity);
-  if (!frames.out.empty()) {
-    Workspace workspace(frames.out);
-    WriteJsonFile(workspace.Path("report.json"),
-                  EvaluationJson(ReportOfEvaluation(record)));
-  }
+  if (workspace)
+    WriteEvaluation(*workspace, record, reference, sequences, options, consistency, seconds);
   console->Event("evaluation", record);
   console->Lines(FormatTables(consistency, fidelity));
 }

@@ -39,6 +39,8 @@ const Signature kSignatures[] = {
     {"\xff\x4f\xff\x51"sv, 0, {"JPEG 2000", "jpeg2000"}},
     {"P5\n"sv, 0, {"PGM", "pnm"}},
     {"P6\n"sv, 0, {"PPM", "pnm"}},
+    {"P5 "sv, 0, {"PGM", "pnm"}},  // any white space may follow
+    {"P6 "sv, 0, {"PPM", "pnm"}},
     {"\xff\x0a"sv, 0, kJpegXl},
     {"\0\0\0\x0cJXL \r\n\x87\n"sv, 0, kJpegXl},
     {"FUJIFILMCCD-RAW"sv, 0, kRaw},

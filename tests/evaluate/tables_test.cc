@@ -17,11 +17,13 @@ ConsistencyReport SomeReport() {
   row.pairs = 49;
   row.undefined_pairs = 2;
   row.tc_psnr_mean_db = 31.234;
+  row.tc_psnr_interval_db = Interval{30.876, 31.5};
   row.tc_psnr_of_mean_db = std::numeric_limits<double>::infinity();
   row.coverage = 0.8125;
   report.rows.push_back(row);
   row.gap = 5;
   row.tc_psnr_mean_db.reset();
+  row.tc_psnr_interval_db.reset();
   row.why = "no pair of frames is 5 apart";
   row.perfect_pairs = 3;
   row.pairs_above_8bit_floor = 7;
@@ -40,6 +42,7 @@ TEST(Tables, FiguresUndefinedOnesAndInfinity) {
   fidelity.psnr_to_2d_db = 27.456;
   const std::string text = FormatTables(SomeReport(), {fidelity});
   EXPECT_TRUE(Has(text, "31.23"));
+  EXPECT_TRUE(Has(text, "30.88..31.50"));
   EXPECT_TRUE(Has(text, " inf"));
   EXPECT_TRUE(Has(text, "81.2 %"));
   EXPECT_TRUE(Has(text, "27.46"));

@@ -284,6 +284,15 @@ TEST_F(ImageFile, OtherFormatsAreReadByContent) {
   }
 }
 
+TEST_F(ImageFile, AnyWhiteSpaceMayFollowThePpmMark) {
+  for (const std::string space : {"\n", " "}) {
+    testing::WriteBytes(scratch_ / "a.ppm", "P6" + space + "2 1 255\nabcdef");
+    const Image image = ReadImage(scratch_ / "a.ppm");
+    EXPECT_EQ(image.width, 2);
+    EXPECT_NEAR(image.at(1, 0)[2], 'f' / 255.0, 1e-6);
+  }
+}
+
 TEST_F(ImageFile, UnsupportedFormatsAreNamedWithARemedy) {
   const std::string path = Put("clip.jpg", std::string("\0\0\0\x18"
                                                        "ftypisom",

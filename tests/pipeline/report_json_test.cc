@@ -34,7 +34,7 @@ RunReport FullReport() {
   report.stages.stylize = StylizeReport{4, 300, 1.5, 1.9, 1.2, 27, 25, 26};
   report.stages.render = RenderReport{5, 60, 12};
   report.stages.evaluate = EvaluateReport{6, "dis-medium", "lai2018"};
-  report.consistency = {{"styled", 1, 49, 0, 29.8, 29.5, 0.8, {}}};
+  report.consistency = {{"styled", 1, 49, 0, 29.8, 29.5, 0.8, {}, 29.1, 30.4, ""}};
   report.fidelity = {{"styled", 27, 0.19, 0.2, 12, 13, 0.01}};
   return report;
 }
@@ -66,7 +66,7 @@ TEST(ReportJson, HasTheKeysOfSchema1InOrder) {
   EXPECT_EQ(KeysOf(stages.At("evaluate")), (Keys{"seconds", "flow", "mask"}));
   EXPECT_EQ(KeysOf(json.At("consistency").AsArray()[0]),
             (Keys{"sequence", "gap", "pairs", "undefined_pairs", "tc_psnr_mean_db",
-                  "tc_psnr_of_mean_db", "coverage"}));
+                  "tc_psnr_of_mean_db", "tc_psnr_low_db", "tc_psnr_high_db", "coverage"}));
   EXPECT_EQ(KeysOf(json.At("fidelity").AsArray()[0]),
             (Keys{"sequence", "psnr_to_2d_db", "hue_std", "hue_std_2d", "chroma", "chroma_2d",
                   "sliced_wasserstein_to_style"}));
@@ -104,7 +104,16 @@ TEST(ReportJson, StagesThatDidNotRunAreAbsent) {
 }
 
 TEST(ReportJson, EvaluationAlone) {
-  EXPECT_EQ(KeysOf(EvaluationJson(FullReport())), (Keys{"schema", "consistency", "fidelity"}));
+  RunReport report = FullReport();
+  EXPECT_EQ(KeysOf(EvaluationJson(report)), (Keys{"schema", "consistency", "fidelity"}));
+  report.pairs = {{"styled", 3, 8, 0.001, 30, 0.8, false, 1, 2, 3, 4, 5}};
+  const JsonValue json = EvaluationJson(report);
+  EXPECT_EQ(KeysOf(json), (Keys{"schema", "consistency", "fidelity", "consistency_pairs"}));
+  const JsonValue& pair = json.At("consistency_pairs").AsArray()[0];
+  EXPECT_EQ(KeysOf(pair), (Keys{"sequence", "gap", "from", "to", "error", "tc_psnr_db",
+                                "coverage", "low_coverage", "flow_not_finite", "out_of_frame",
+                                "disoccluded", "motion_boundary", "colour_not_finite"}));
+  EXPECT_EQ(pair.At("gap").AsInt(), 5);
 }
 
 }  // namespace

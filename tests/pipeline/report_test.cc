@@ -33,6 +33,7 @@ ReportPictures SomePictures() {
   ReportPictures pictures;
   pictures.title = "fox";
   pictures.views = {{"00000, a.jpg", Picture(), Picture(), Picture(), Picture()}};
+  pictures.heat_maps = {{"styled, frames 3 and 8", Picture()}};
   pictures.has_styled_film = true;
   return pictures;
 }
@@ -116,7 +117,8 @@ TEST(ReportHtml, FetchesNothing) {
     const std::string where = (*it)[2];
     EXPECT_TRUE(where.rfind("data:image/", 0) == 0 || where == "styled.mp4") << where;
   }
-  EXPECT_EQ(addresses, 2 + 4 + 2);  // headline pair, one view, a film with its poster
+  EXPECT_EQ(addresses,
+            2 + 4 + 1 + 2);  // headline pair, one view, a heat map, a film with its poster
 }
 
 TEST(ReportHtml, UndefinedFiguresSayWhy) {
