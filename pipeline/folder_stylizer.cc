@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <map>
 
 #include "kernels/base/error.h"
 #include "kernels/image/resize.h"
 #include "pipeline/files/image_file.h"
+#include "pipeline/files/image_format.h"
 #include "pipeline/folder_listing.h"
 
 namespace regrade {
@@ -15,6 +17,21 @@ namespace {
 
 std::string StemOf(const std::string& name) {
   return std::filesystem::path(name).stem().string();
+}
+
+// By content; a name that says picture is taken at its word, so that a damaged one is not
+// passed over in silence.
+bool MeansAPicture(const std::string& path) {
+  std::string extension = std::filesystem::path(path).extension().string();
+  for (char& c : extension)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  for (const char* name : {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".exr"})
+    if (extension == name) return true;
+  std::string begin(4096, '\0');
+  std::ifstream file(path, std::ios::binary);
+  file.read(begin.data(), static_cast<std::streamsize>(begin.size()));
+  begin.resize(static_cast<size_t>(std::max<std::streamsize>(0, file.gcount())));
+  return SniffImageFormat(begin, path) != nullptr;
 }
 
 std::string SizeOf(const Image& image) {
@@ -83,6 +100,7 @@ std::unique_ptr<ViewStylizer> MakeFolderStylizer(const std::string& folder,
     const auto match = view_of.find(StemOf(file.name));
     if (match == view_of.end()) continue;
     if (!file.problem.empty()) throw Error(ExitCode::kInput, file.problem, file.path);
+    if (!MeansAPicture(file.path)) continue;
     std::string& path = paths[match->second];
     if (!path.empty())
       throw Error(ExitCode::kInput, "two pictures for the photo " + photos[match->second],

@@ -10,7 +10,8 @@
 namespace regrade {
 
 // `photos` are the views' files as the user named them. A picture belongs to the photo with the
-// same name less folder and extension; views without one are not known, so a single retouched
+// same name less folder and extension (notes that an editor leaves beside it, IMG_1.xmp, are
+// passed over); views without one are not known, so a single retouched
 // photo is enough. Each picture is brought to its view's size (area mean or bilinear) when it
 // is asked for; its sides must have the same ratio, to a pixel of either.
 //

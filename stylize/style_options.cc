@@ -17,7 +17,8 @@ StyleMethod ParseStyleMethod(const StyleOptions& options) {
       throw Error(ExitCode::kUsage, "nothing follows \"" + prefix + "\"", "--method", hint);
     if (options.scene_wide)
       throw Error(ExitCode::kUsage, "\"" + std::string(kind) + "\" styles each view by itself",
-                  "--method and --scene-wide", "leave --scene-wide away");
+                  "--method and --scene-wide",
+                  "leave it away, or add --no-scene-wide where an earlier run asked for it");
     return {kind, argument};
   }
   throw Error(ExitCode::kUsage, "there is no 2D method \"" + text + "\"", "--method", hint);

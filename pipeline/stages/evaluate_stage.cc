@@ -145,6 +145,7 @@ Stage EvaluateStage(RunContext* context) {
   Stage stage;
   stage.name = "evaluate";
   stage.inputs = JsonValue::Object{{"frames", context->ResultOf("render")},
+                                   {"views_2d", context->ResultOf("style_2d")},
                                    {"style", HashFile(context->settings.style.picture)},
                                    {"holdout", context->settings.run.holdout},
                                    {"options", context->OptionsOf({"Evaluation"})}};

@@ -25,6 +25,8 @@ TEST(FolderStylizer, PicturesAreFoundByNameAndBroughtToTheViewsSize) {
   WritePng8(folder / "IMG.3.png", Constant(20, 15, 0.4f));
   WritePng8(folder / "somebody_elses.png", Constant(7, 7, 1));
   testing::WriteText(folder / "IMG_9.txt", "not asked for");
+  testing::WriteText(folder / "IMG_1.xmp", "an editor's notes");
+  testing::WriteText(folder / "deep/IMG_2.xmp", "notes of a picture that is not there");
   const auto stylizer = MakeFolderStylizer(folder.path(), kPhotos);
   EXPECT_FALSE(stylizer->StylesAnything());
   EXPECT_TRUE(stylizer->Knows(0));
