@@ -63,6 +63,7 @@ void CheckTogether(const RunSettings& settings) {
     throw Error(ExitCode::kUsage,
                 std::to_string(grids) + " stages against " + std::to_string(steps),
                 "--fit-resolutions and --fit-steps", "give both the same number of stages");
+  ParseStyleMethod(settings.style_2d);
 }
 
 }  // namespace regrade

@@ -10,7 +10,7 @@
 #include "pipeline/run_options.h"
 #include "reconstruct/fit_options.h"
 #include "reconstruct/poses_from_photos.h"
-#include "stylize/color_transfer.h"
+#include "stylize/style_options.h"
 #include "stylize/train_network.h"
 
 namespace regrade {

@@ -78,16 +78,6 @@ class ColorTransfer : public ViewStylizer {
   std::optional<ColorStatistics> scene_;
 };
 
-[[noreturn]] void ThrowUnknownMethod(const std::string& method) {
-  for (const char* prefix : {"onnx:", "folder:", "command:"})
-    if (method.starts_with(prefix))
-      throw Error(ExitCode::kUsage, "\"" + method + "\" is not in this version", "--method",
-                  "use mkl or reinhard");
-  throw Error(ExitCode::kUsage, "there is no 2D method \"" + method + "\"", "--method",
-              "use mkl or reinhard (onnx:FILE, folder:DIR and command:\"...\" are not in this "
-              "version)");
-}
-
 }  // namespace
 
 ChannelMap ComputeReinhard(const ColorStatistics& source_lab,
@@ -104,14 +94,13 @@ ChannelMap ComputeReinhard(const ColorStatistics& source_lab,
 
 ColorStatistics MeasureForMethod(const StyleOptions& options, const Image& image) {
   if (options.method == "mkl") return MeasureColor(image);
-  if (options.method == "reinhard") return MeasureColor(image, LabFromSrgb);
-  ThrowUnknownMethod(options.method);
+  REGRADE_CHECK(options.method == "reinhard");
+  return MeasureColor(image, LabFromSrgb);
 }
 
-std::unique_ptr<ViewStylizer> MakeViewStylizer(const StyleOptions& options, const Image& style,
-                                               const ColorStatistics* scene) {
-  if (options.method != "mkl" && options.method != "reinhard")
-    ThrowUnknownMethod(options.method);
+std::unique_ptr<ViewStylizer> MakeColorTransfer(const StyleOptions& options, const Image& style,
+                                                const ColorStatistics* scene) {
+  REGRADE_CHECK(options.method == "mkl" || options.method == "reinhard");
   if (options.scene_wide) REGRADE_CHECK(scene != nullptr);
   return std::make_unique<ColorTransfer>(options, style, scene);
 }

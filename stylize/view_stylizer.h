@@ -22,6 +22,15 @@ class ViewStylizer {
   // For reports, e.g. "mkl".
   virtual std::string Name() const = 0;
 
+  // False for methods that cannot style a picture of their own making, but only know what was
+  // made of the photos: they are asked for views alone, never for renders.
+  virtual bool StylesAnything() const { return true; }
+  // False for a view that the method has nothing for; it is not asked for it then.
+  virtual bool Knows(int view_index) const {
+    (void)view_index;
+    return true;
+  }
+
   // What a person should know before the first view, one sentence each.
   virtual std::vector<std::string> Notices() const { return {}; }
 };
@@ -33,5 +42,12 @@ int64_t CountNotFinite(const Image& image, const std::string& where);
 // What Stylize promises, for methods that are not ours: same size and channels, and
 // CountNotFinite, which is returned. Throws Error(kExternalProgram) naming `where`.
 int64_t CheckStyledView(const Image& view, const Image& styled, const std::string& where);
+
+// For methods that know colours alone. The three channels of a view, grey as R = G = B, clipped
+// to [0, 1]; pixels that are not finite become a middle grey, so that they spoil no neighbour.
+Image Colors(const Image& view);
+// `colors` (three channels) in the view's own channels, with its alpha; a grey view gets the
+// mean of the three. Pixels of the view that are not finite stay what they were.
+Image WithColors(const Image& view, const Image& colors);
 
 }  // namespace regrade

@@ -6,6 +6,7 @@
 #include "pipeline/files/image_file.h"
 #include "pipeline/run_file.h"
 #include "pipeline/run_pipeline.h"
+#include "pipeline/stages/scene_stylizer.h"
 
 namespace regrade {
 
@@ -37,6 +38,7 @@ void ContinueRun(const Command& command, const Arguments& arguments, const std::
   settings.style.picture =
       std::filesystem::absolute(settings.style.picture).lexically_normal().string();
   ReadStylePicture(settings.style.picture, nullptr);
+  ProbeMethod(&settings.style_2d);
 
   Workspace workspace(folder, settings.start.break_lock);
   context.workspace = &workspace;

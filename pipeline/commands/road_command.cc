@@ -10,6 +10,7 @@
 #include "pipeline/plan.h"
 #include "pipeline/run_file.h"
 #include "pipeline/run_pipeline.h"
+#include "pipeline/stages/scene_stylizer.h"
 
 namespace regrade {
 namespace {
@@ -43,6 +44,7 @@ void ProbeInputs(const std::string& last, RunContext* context) {
     throw Error(ExitCode::kUsage, "its value is missing", "--style",
                 "name the picture whose colours the scene shall have");
   ReadStylePicture(context->settings.style.picture, nullptr);
+  ProbeMethod(&context->settings.style_2d);
 }
 
 // What a dry run can say of a folder that is not there yet: photos are taken as 4 : 3, the

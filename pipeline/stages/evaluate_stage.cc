@@ -1,5 +1,6 @@
 // Stage "evaluate": temporal consistency of the rendered sequences, and beside it how much of
 // the style they kept.
+#include <filesystem>
 #include <optional>
 
 #include "evaluate/consistency.h"
@@ -15,6 +16,7 @@
 #include "pipeline/scene_views.h"
 #include "pipeline/stages/linear_map_reference.h"
 #include "pipeline/stages/run_context.h"
+#include "pipeline/stages/scene_stylizer.h"
 
 namespace regrade {
 namespace {
@@ -70,22 +72,23 @@ void AddFilm(RunContext* context, const Image& style, ProgressParts* parts,
   if (!HasFilm(settings)) return;
   std::vector<int> all(static_cast<size_t>(settings.render.path.path_frames));
   for (size_t i = 0; i < all.size(); ++i) all[i] = static_cast<int>(i);
+  const auto folder = [&](const char* name) {
+    return context->workspace->Path(std::string("frames/") + kPathPrefix + name);
+  };
+  const bool renders_styled = std::filesystem::exists(folder("views_2d"));
   std::vector<NamedFrameSource> sequences;
   for (const char* name : {"source", "views_2d", "styled"}) {
+    if (name == std::string("views_2d") && !renders_styled) continue;
     const std::string sequence = std::string(kPathPrefix) + name;
-    sequences.push_back(
-        {sequence, FramesOf(context->workspace->Path("frames/" + sequence), all)});
+    sequences.push_back({sequence, FramesOf(folder(name), all)});
   }
   const ConsistencyReport film =
       EvaluateConsistency(sequences[0].frames, sequences, settings.consistency,
                           parts->Next(PairWeight(settings, static_cast<int>(all.size()))), {});
   report->rows.insert(report->rows.end(), film.rows.begin(), film.rows.end());
   report->pairs.insert(report->pairs.end(), film.pairs.begin(), film.pairs.end());
-  const FidelityTargets targets{
-      sequences[1].frames,
-      FramesOf(context->workspace->Path(std::string("frames/") + kPathPrefix + "transmittance"),
-               all),
-      &style};
+  const FidelityTargets targets{renders_styled ? sequences[1].frames : FrameSource(),
+                                FramesOf(folder("transmittance"), all), &style};
   for (const NamedFrameSource& sequence : sequences)
     fidelity->push_back(MeasureFidelity(sequence, targets,
                                         parts->Next(kFrameSeconds * static_cast<double>(all.size()))));
@@ -98,12 +101,12 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   const StoredField stored = ReadFieldFile(workspace.Path("field.npz"));
   std::vector<int> all(capture.views.size());
   for (size_t i = 0; i < all.size(); ++i) all[i] = static_cast<int>(i);
-  const std::vector<int> fitted = ViewIndices(capture, settings.run.holdout, false);
+  const std::vector<int> taught = StyledViews(workspace, capture, settings.run.holdout);
   const auto frames = [&](const char* sequence, const std::vector<int>& views) {
     return FramesOf(workspace.Path(std::string("frames/") + sequence), views);
   };
 
-  const double n = static_cast<double>(fitted.size());
+  const double n = static_cast<double>(taught.size());
   const int film = HasFilm(settings) ? settings.render.path.path_frames : 0;
   double weight = PairWeight(settings, static_cast<int>(all.size())) +
                   n * (4 * kFrameSeconds + kLinearMapSeconds);
@@ -111,9 +114,11 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   ProgressParts parts(progress, weight);
 
   const FrameSource source = frames("source", all);
-  const std::vector<NamedFrameSource> sequences = {{"source", source},
-                                                   {"views_2d", frames("views_2d", all)},
-                                                   {"styled", frames("styled", all)}};
+  // A method that only knows pictures of photos made nothing of our renders.
+  const bool renders_styled = std::filesystem::exists(workspace.Path("frames/views_2d"));
+  std::vector<NamedFrameSource> sequences = {{"source", source}};
+  if (renders_styled) sequences.push_back({"views_2d", frames("views_2d", all)});
+  sequences.push_back({"styled", frames("styled", all)});
   const GeometrySource geometry = settings.consistency.mode == "geometry"
                                       ? GeometryOf(settings, capture, stored)
                                       : GeometrySource();
@@ -121,29 +126,30 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
       EvaluateConsistency(source, sequences, settings.consistency,
                           parts.Next(PairWeight(settings, static_cast<int>(all.size()))), geometry);
 
-  // Fidelity is measured on the views that the style was learned from.
+  // Fidelity is measured on the views that the style was learned from, against what the 2D
+  // method made of the renders, or else of the photos.
   const Image style = ReadStylePicture(settings.style.picture, nullptr);
-  const FidelityTargets targets{frames("views_2d", fitted), frames("transmittance", fitted),
-                                &style};
+  const FrameSource of_photos = FramesOf(workspace.Path("views_2d"), taught);
+  const FidelityTargets targets{renders_styled ? frames("views_2d", taught) : of_photos,
+                                frames("transmittance", taught), &style};
   std::vector<FidelityRow> fidelity;
   for (const NamedFrameSource& sequence : sequences)
-    fidelity.push_back(MeasureFidelity({sequence.name, frames(sequence.name.c_str(), fitted)},
+    fidelity.push_back(MeasureFidelity({sequence.name, frames(sequence.name.c_str(), taught)},
                                        targets, parts.Next(n * kFrameSeconds)));
   AddFilm(context, style, &parts, &consistency, &fidelity);
-  const FidelityTargets photo_targets{FramesOf(workspace.Path("views_2d"), fitted),
-                                      targets.transmittance, nullptr};
+  const FidelityTargets photo_targets{of_photos, targets.transmittance, nullptr};
   const FidelityRow to_photos =
-      MeasureFidelity({"styled", frames("styled", fitted)}, photo_targets,
+      MeasureFidelity({"styled", frames("styled", taught)}, photo_targets,
                       parts.Next(n * kFrameSeconds));
 
   std::vector<Camera> cameras;
-  for (const int i : fitted)
+  for (const int i : taught)
     cameras.push_back(WorkingCamera(capture.views[static_cast<size_t>(i)].camera,
                                     settings.scene.photo_size, stored.field_from_world,
                                     stored.ndc));
   const std::optional<double> linear_map =
-      LinearMapPsnr(stored.field, cameras, frames("source", fitted), frames("views_2d", fitted),
-                    frames("transmittance", fitted), parts.Next(n * kLinearMapSeconds));
+      LinearMapPsnr(stored.field, cameras, frames("source", taught), targets.views_2d,
+                    targets.transmittance, parts.Next(n * kLinearMapSeconds));
 
   context->console->Lines(FormatTables(consistency, fidelity));
   StageOutcome outcome;
@@ -163,6 +169,7 @@ Stage EvaluateStage(RunContext* context) {
   Stage stage;
   stage.name = "evaluate";
   stage.inputs = JsonValue::Object{{"frames", context->ResultOf("render")},
+                                   {"views_2d", context->ResultOf("style_2d")},
                                    {"style", HashFile(context->settings.style.picture)},
                                    {"holdout", context->settings.run.holdout},
                                    {"options", context->OptionsOf({"Evaluation"})}};

@@ -69,7 +69,8 @@ struct Studio {
   double styled_seconds = 0;  // spent in rendering the restyled field
 };
 
-// frames/<prefix>{source, styled, views_2d, transmittance}/<index>.png
+// frames/<prefix>{source, styled, views_2d, transmittance}/<index>.png; views_2d for methods
+// that can style a render
 void RenderFrame(RunContext* context, Studio* studio, const Camera& camera,
                  const std::string& prefix, int index) {
   Workspace& workspace = *context->workspace;
@@ -80,8 +81,9 @@ void RenderFrame(RunContext* context, Studio* studio, const Camera& camera,
   const std::string folder = "frames/" + prefix, name = "/" + FrameName(index);
   WritePng8(workspace.NewPath(folder + "source" + name), plain.color);
   WritePng8(workspace.NewPath(folder + "styled" + name), restyled.color);
-  WritePng8(workspace.NewPath(folder + "views_2d" + name),
-            studio->stylizer->Stylize(plain.color, index));
+  if (studio->stylizer->StylesAnything())
+    WritePng8(workspace.NewPath(folder + "views_2d" + name),
+              studio->stylizer->Stylize(plain.color, index));
   // Where no scene is seen; evaluation leaves it out.
   WritePng8(workspace.NewPath(folder + "transmittance" + name), plain.transmittance);
 }
@@ -97,9 +99,8 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
 
   std::vector<Camera> views;
   for (const CaptureView& view : capture.views)
-    views.push_back(
-        WorkingCamera(view.camera, settings.scene.photo_size, before.field_from_world,
-                      before.ndc));
+    views.push_back(WorkingCamera(view.camera, settings.scene.photo_size,
+                                  before.field_from_world, before.ndc));
   const bool film_of_views = settings.render.path.path == "views";
   const std::vector<Camera> way =
       film_of_views ? std::vector<Camera>() : MakeCameraPath(views, settings.render.path);

@@ -1,22 +1,109 @@
 #include "pipeline/stages/scene_stylizer.h"
 
+#include <algorithm>
+#include <filesystem>
+
+#include "kernels/base/error.h"
+#include "pipeline/command_stylizer.h"
 #include "pipeline/files/image_file.h"
+#include "pipeline/folder_listing.h"
+#include "pipeline/folder_stylizer.h"
 #include "pipeline/scene_views.h"
+#include "pipeline/stage_record.h"
+#include "stylize/color_transfer.h"
+#include "stylize/distribution_transfer.h"
+#include "stylize/onnx_stylizer.h"
 
 namespace regrade {
+namespace {
+
+// Scene-wide colours are of all photos, so that a map does not depend on which are held out.
+std::unique_ptr<ViewStylizer> MakeColorMethod(const RunSettings& settings, const Image& style,
+                                              const Capture& capture) {
+  const StyleOptions& options = settings.style_2d;
+  const auto photo = [&](const CaptureView& view) {
+    return ReadWorkingPhoto(view, settings.scene.photo_size);
+  };
+  if (options.method == "idt" || options.method == "histogram") {
+    if (!options.scene_wide) return MakeDistributionTransfer(options, style);
+    // As many colours in all as are taken of one view otherwise, but 256 of each at least.
+    const int64_t most = std::max<int64_t>(
+        256,
+        4 * kColorSample / std::max<int64_t>(1, static_cast<int64_t>(capture.views.size())));
+    std::vector<Vec3d> scene;
+    for (const CaptureView& view : capture.views)
+      for (const Vec3d& color : SampleColors(photo(view), view.path, most))
+        scene.push_back(color);
+    return MakeDistributionTransfer(options, style, &scene);
+  }
+  if (!options.scene_wide) return MakeColorTransfer(options, style);
+  std::vector<ColorStatistics> parts;
+  for (const CaptureView& view : capture.views)
+    parts.push_back(MeasureForMethod(options, photo(view)));
+  const ColorStatistics scene = Pool(parts);
+  return MakeColorTransfer(options, style, &scene);
+}
+
+}  // namespace
 
 std::unique_ptr<ViewStylizer> MakeSceneStylizer(RunContext* context, const Capture& capture) {
   const RunSettings& settings = context->settings;
+  const StyleMethod method = ParseStyleMethod(settings.style_2d);
   std::string notice;
   const Image style = ReadStylePicture(settings.style.picture, &notice);
   if (!notice.empty()) context->console->Info(notice);
-  if (!settings.style_2d.scene_wide) return MakeViewStylizer(settings.style_2d, style);
-  std::vector<ColorStatistics> parts;
-  for (const CaptureView& view : capture.views)
-    parts.push_back(
-        MeasureForMethod(settings.style_2d, ReadWorkingPhoto(view, settings.scene.photo_size)));
-  const ColorStatistics scene = Pool(parts);
-  return MakeViewStylizer(settings.style_2d, style, &scene);
+  if (method.kind == "onnx")
+    return MakeOnnxStylizer(method.argument, settings.style_2d.max_side, style);
+  if (method.kind == "folder") {
+    std::vector<std::string> photos;
+    for (const CaptureView& view : capture.views) photos.push_back(view.file);
+    return MakeFolderStylizer(method.argument, photos);
+  }
+  if (method.kind == "command")
+    return MakeCommandStylizer(method.argument, settings.style.picture,
+                               settings.style_2d.command_limit_s);
+  return MakeColorMethod(settings, style, capture);
+}
+
+void ProbeMethod(StyleOptions* options) {
+  namespace fs = std::filesystem;
+  const StyleMethod method = ParseStyleMethod(*options);
+  if (method.kind == "command") MakeCommandStylizer(method.argument, "", 0);
+  if (method.kind != "onnx" && method.kind != "folder") return;
+  std::error_code error;
+  if (!fs::exists(method.argument, error))
+    throw Error(ExitCode::kInput, "there is no such file or folder", method.argument,
+                "what follows \"" + method.kind + ":\" in --method must exist");
+  const fs::path absolute = fs::absolute(method.argument, error);
+  if (!error) options->method = method.kind + ":" + absolute.lexically_normal().string();
+}
+
+std::vector<int> StyledViews(const Workspace& workspace, const Capture& capture, int holdout) {
+  const auto with_picture = [&](const std::vector<int>& views) {
+    std::vector<int> kept;
+    for (const int i : views)
+      if (std::filesystem::exists(workspace.Path("views_2d/" + FrameName(i))))
+        kept.push_back(i);
+    return kept;
+  };
+  std::vector<int> views = with_picture(ViewIndices(capture, holdout, false));
+  if (views.empty()) views = with_picture(ViewIndices(capture, holdout, true));
+  if (views.empty())
+    throw Error(ExitCode::kInput, "no view has a styled picture", workspace.Path("views_2d"),
+                "use --restart-from style_2d");
+  return views;
+}
+
+JsonValue MethodFiles(const StyleOptions& options) {
+  const StyleMethod method = ParseStyleMethod(options);
+  if (method.kind != "onnx" && method.kind != "folder") return JsonValue();
+  std::error_code error;
+  if (std::filesystem::is_regular_file(method.argument, error))
+    return HashFile(method.argument);
+  JsonValue hashes = JsonValue::Object();
+  for (const ListedFile& file : ListFolder(method.argument).files)
+    if (file.problem.empty()) hashes[file.name] = HashFile(file.path);
+  return hashes;
 }
 
 }  // namespace regrade

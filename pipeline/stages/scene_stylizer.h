@@ -3,12 +3,28 @@
 #pragma once
 
 #include <memory>
+#include <vector>
 
+#include "pipeline/files/json_file.h"
 #include "pipeline/stages/run_context.h"
 #include "stylize/view_stylizer.h"
 
 namespace regrade {
 
 std::unique_ptr<ViewStylizer> MakeSceneStylizer(RunContext* context, const Capture& capture);
+
+// Looked at before long work starts: the method exists, and so does the folder or file that it
+// names, which is made absolute; a command has its placeholders. Throws Error(kUsage, kInput).
+void ProbeMethod(StyleOptions* options);
+
+// Views that the style is learned from and measured on: the fitted ones that have a picture in
+// views_2d/; where none of them has, all that do, held out or not. Throws Error(kInput) if
+// there is none at all.
+std::vector<int> StyledViews(const Workspace& workspace, const Capture& capture, int holdout);
+
+// Hashes of the files that the method itself reads, as part of a stage's inputs: networks, or
+// pictures of a folder. Null for other methods. Throws Error(kInput) for a file or folder that
+// is not there.
+JsonValue MethodFiles(const StyleOptions& options);
 
 }  // namespace regrade

@@ -1,4 +1,4 @@
-// Stage "style_2d": what the 2D method makes of each photo, in views_2d/.
+// Stage "style_2d": what the 2D method makes of each photo that it knows, in views_2d/.
 #include <filesystem>
 
 #include "kernels/image/color_statistics.h"
@@ -20,8 +20,11 @@ StageOutcome StyleViews(RunContext* context, const ProgressFunction& progress) {
 
   std::filesystem::remove_all(workspace.Path("views_2d"));
   const int count = static_cast<int>(capture.views.size());
+  int styled = 0;
   for (int i = 0; i < count; ++i) {
     if (Report(progress, i, count) == Verdict::kAbort) throw Interrupted();
+    if (!stylizer->Knows(i)) continue;
+    ++styled;
     const Image photo =
         ReadWorkingPhoto(capture.views[static_cast<size_t>(i)], settings.scene.photo_size);
     WritePng8(workspace.NewPath("views_2d/" + FrameName(i)), stylizer->Stylize(photo, i));
@@ -29,6 +32,7 @@ StageOutcome StyleViews(RunContext* context, const ProgressFunction& progress) {
   StageOutcome outcome;
   outcome.outputs = {"views_2d"};
   outcome.figures["method"] = stylizer->Name();
+  outcome.figures["views"] = styled;
   return outcome;
 }
 
@@ -40,6 +44,8 @@ Stage Style2dStage(RunContext* context) {
   stage.inputs = JsonValue::Object{{"poses", context->ResultOf("pose")},
                                    {"style", HashFile(context->settings.style.picture)},
                                    {"options", context->OptionsOf({"Scene", "2D method"})}};
+  const JsonValue files = MethodFiles(context->settings.style_2d);
+  if (!files.IsNull()) stage.inputs["method_files"] = files;
   stage.work = [context](const ProgressFunction& progress) {
     return StyleViews(context, progress);
   };

@@ -12,13 +12,14 @@
 #include "pipeline/plan.h"
 #include "pipeline/scene_views.h"
 #include "pipeline/stages/run_context.h"
+#include "pipeline/stages/scene_stylizer.h"
 #include "stylize/apply_network.h"
 #include "stylize/monge_kantorovich.h"
 
 namespace regrade {
 namespace {
 
-// What the network learns from: the views that the field was fitted to.
+// What the network learns from: the views that the field was fitted to, see StyledViews.
 struct Lessons {
   std::vector<Image> targets;
   std::vector<StyledTrainingView> views;
@@ -27,7 +28,8 @@ struct Lessons {
 
 Lessons ReadLessons(RunContext* context, const Capture& capture, const StoredField& stored) {
   const RunSettings& settings = context->settings;
-  const std::vector<int> indices = ViewIndices(capture, settings.run.holdout, false);
+  const std::vector<int> indices =
+      StyledViews(*context->workspace, capture, settings.run.holdout);
   Lessons lessons;
   lessons.targets.reserve(indices.size());
   std::vector<ColorStatistics> before, after;

@@ -77,6 +77,27 @@ TEST(Program, F21_ContradictionsNameBoth) {
   EXPECT_SAYS(outcome, "--fit-steps");
 }
 
+TEST(Program, TheStyleMethodIsLookedAtBeforeAnyWork) {
+  const TemporaryFolder folder;
+  WriteText(folder / "photos/a.png", "x");
+  const std::string style = std::string(REGRADE_SOURCE_DIR) + "/assets/style_sunset.png";
+  const auto run = [&](const std::string& method) {
+    return Regrade({"run", folder / "photos", "--style", style, "--out", folder / "out",
+                    "--method", method});
+  };
+  for (const char* method : {"wct2", "folder:", "command:restyle {input}"}) {
+    const Outcome outcome = run(method);
+    EXPECT_EQ(outcome.code, 2) << method;
+    EXPECT_SAYS(outcome, "--method");
+  }
+  for (const char* method : {"folder:/nowhere/styled", "onnx:/nowhere/styled"}) {
+    const Outcome outcome = run(method);
+    EXPECT_EQ(outcome.code, 3) << method;
+    EXPECT_SAYS(outcome, "/nowhere/styled");
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder / "out"));
+}
+
 TEST(Program, F13_MissingFolderExitsWith3) {
   const TemporaryFolder folder;
   const Outcome outcome = Regrade({"pose", folder / "none", "--out", folder / "out"});

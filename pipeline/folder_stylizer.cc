@@ -1,0 +1,117 @@
+#include "pipeline/folder_stylizer.h"
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <map>
+
+#include "kernels/base/error.h"
+#include "kernels/image/resize.h"
+#include "pipeline/files/image_file.h"
+#include "pipeline/files/image_format.h"
+#include "pipeline/folder_listing.h"
+
+namespace regrade {
+namespace {
+
+std::string StemOf(const std::string& name) {
+  return std::filesystem::path(name).stem().string();
+}
+
+// By content; a name that says picture is taken at its word, so that a damaged one is not
+// passed over in silence.
+bool MeansAPicture(const std::string& path) {
+  std::string extension = std::filesystem::path(path).extension().string();
+  for (char& c : extension)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  for (const char* name : {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".exr"})
+    if (extension == name) return true;
+  std::string begin(4096, '\0');
+  std::ifstream file(path, std::ios::binary);
+  file.read(begin.data(), static_cast<std::streamsize>(begin.size()));
+  begin.resize(static_cast<size_t>(std::max<std::streamsize>(0, file.gcount())));
+  return SniffImageFormat(begin, path) != nullptr;
+}
+
+std::string SizeOf(const Image& image) {
+  return std::to_string(image.width) + " x " + std::to_string(image.height);
+}
+
+class FolderStylizer : public ViewStylizer {
+ public:
+  FolderStylizer(std::vector<std::string> paths, int known)
+      : paths_(std::move(paths)), known_(known) {}
+
+  Image Stylize(const Image& view, int view_index) const override {
+    REGRADE_CHECK(Knows(view_index));
+    const std::string& path = paths_[static_cast<size_t>(view_index)];
+    DecodeLimits limits;
+    limits.min_side = 1;
+    return WithColors(view, FittedToView(DecodePhoto(path, limits).image, view, path));
+  }
+
+  std::string Name() const override { return "folder"; }
+  bool StylesAnything() const override { return false; }
+  bool Knows(int view_index) const override {
+    const size_t i = static_cast<size_t>(view_index);
+    return i < paths_.size() && !paths_[i].empty();
+  }
+  std::vector<std::string> Notices() const override {
+    const int all = static_cast<int>(paths_.size());
+    if (known_ == all) return {};
+    return {std::to_string(known_) + " of " + std::to_string(all) +
+            " views have a styled picture; the style is learned from these"};
+  }
+
+ private:
+  std::vector<std::string> paths_;  // one for each view; empty where there is none
+  int known_;
+};
+
+}  // namespace
+
+Image FittedToView(const Image& styled, const Image& view, const std::string& where) {
+  // Each side scaled by the other's ratio must come out to a pixel of the smaller picture.
+  const double ratio_x = static_cast<double>(styled.width) / view.width;
+  const double ratio_y = static_cast<double>(styled.height) / view.height;
+  const double larger = std::max(ratio_x, ratio_y);
+  const double slack = 1.0 / std::min({view.width, view.height, styled.width, styled.height});
+  if (std::abs(ratio_x - ratio_y) > slack * larger)
+    throw Error(
+        ExitCode::kExternalProgram,
+        "the styled picture has " + SizeOf(styled) + " pixels, its view " + SizeOf(view), where,
+        "keep the photo's aspect: no cropping, no turning");
+  const Image colors = Colors(styled);
+  return colors.SameSize(view) ? colors : Resize(colors, view.width, view.height);
+}
+
+std::unique_ptr<ViewStylizer> MakeFolderStylizer(const std::string& folder,
+                                                 const std::vector<std::string>& photos) {
+  std::map<std::string, size_t> view_of;
+  for (size_t i = 0; i < photos.size(); ++i)
+    if (!view_of.emplace(StemOf(photos[i]), i).second)
+      throw Error(ExitCode::kInput, "two photos have the name \"" + StemOf(photos[i]) + "\"",
+                  photos[i],
+                  "styled pictures are found by name: give photos names of their own");
+  std::vector<std::string> paths(photos.size());
+  int known = 0;
+  for (const ListedFile& file : ListFolder(folder).files) {
+    const auto match = view_of.find(StemOf(file.name));
+    if (match == view_of.end()) continue;
+    if (!file.problem.empty()) throw Error(ExitCode::kInput, file.problem, file.path);
+    if (!MeansAPicture(file.path)) continue;
+    std::string& path = paths[match->second];
+    if (!path.empty())
+      throw Error(ExitCode::kInput, "two pictures for the photo " + photos[match->second],
+                  path + " and " + file.path, "leave one of them");
+    path = file.path;
+    ++known;
+  }
+  if (known == 0)
+    throw Error(ExitCode::kInput, "no picture in it has the name of a photo", folder,
+                photos.empty() ? "" : "expected are names like " + StemOf(photos[0]) + ".png");
+  return std::make_unique<FolderStylizer>(std::move(paths), known);
+}
+
+}  // namespace regrade

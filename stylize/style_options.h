@@ -1,0 +1,64 @@
+// What can be set of the 2D method that styles each view.
+#pragma once
+
+#include <string>
+
+#include "kernels/base/options.h"
+
+namespace regrade {
+
+// What stands in hints; --method has no `choices`, for four of its values go on after a colon.
+inline constexpr char kStyleMethods[] =
+    "mkl, reinhard, idt, histogram, onnx:DIR, folder:DIR or command:\"PROGRAM ...\"";
+
+struct StyleOptions {
+  std::string method = "mkl";
+  bool scene_wide = false;
+  int iterations = 20;
+  int max_side = 1024;
+  double command_limit_s = 600;
+
+  template <typename Bind>
+  void Describe(Bind& bind) {
+    bind(
+        "method", method,
+        {.help =
+             "2D method that styles each view: mkl moves mean and covariance of the colours "
+             "onto the style's, reinhard mean and spread of each CIELAB channel, idt the whole "
+             "distribution, histogram that of each channel; onnx:DIR runs the networks of "
+             "PCA-KD or WCT that are in DIR; folder:DIR takes the pictures that anything made "
+             "of the photos, by the photos' names (some may be missing); "
+             "command:\"PROGRAM {input} {style} {output}\" runs a program for each view, "
+             "without a shell"});
+    bind("scene-wide", scene_wide,
+         {.help = "one colour map from the colours of all views, instead of one for each view: "
+                  "steadier, but a view's own colours meet the style's less well; with mkl, "
+                  "reinhard, idt and histogram"});
+    bind("style-iterations", iterations,
+         {.help = "rotations of method idt; its time grows with them", .min = 1, .max = 200});
+    bind("style-max-side", max_side,
+         {.unit = "pixels",
+          .help =
+              "longer side at which networks of onnx:DIR see a picture; memory and time grow "
+              "with its square",
+          .min = 64,
+          .max = 8192});
+    bind("style-command-limit", command_limit_s,
+         {.unit = "s",
+          .help = "longest time that command:... may take for one view",
+          .min = 0.1,
+          .max = 86400});
+  }
+};
+
+// The kind of a method, "onnx" of "onnx:DIR", and what follows the colon.
+struct StyleMethod {
+  std::string kind;
+  std::string argument;
+};
+
+// Error(kUsage) that lists the methods for one that does not exist, or lacks what it needs
+// behind the colon, or does not go with --scene-wide.
+StyleMethod ParseStyleMethod(const StyleOptions& options);
+
+}  // namespace regrade

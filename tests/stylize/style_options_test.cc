@@ -1,0 +1,35 @@
+#include "stylize/style_options.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/expect_error.h"
+
+namespace regrade {
+namespace {
+
+StyleOptions Method(const std::string& method, bool scene_wide = false) {
+  StyleOptions options;
+  options.method = method;
+  options.scene_wide = scene_wide;
+  return options;
+}
+
+TEST(StyleMethod, KindAndWhatFollowsTheColon) {
+  EXPECT_EQ(ParseStyleMethod(Method("mkl", true)).kind, "mkl");
+  const StyleMethod method = ParseStyleMethod(Method("command:/opt/style -x {input}"));
+  EXPECT_EQ(method.kind, "command");
+  EXPECT_EQ(method.argument, "/opt/style -x {input}");
+  EXPECT_EQ(ParseStyleMethod(Method("folder:a:b")).argument, "a:b");
+}
+
+TEST(StyleMethod, UnknownMethodsAreUsageErrorsThatListTheOthers) {
+  for (const char* method :
+       {"", "wct2", "MKL", "mkl:", "onnx", "onnx:", "folder: ", "command:"})
+    EXPECT_REGRADE_ERROR(ParseStyleMethod(Method(method)), ExitCode::kUsage,
+                         "mkl, reinhard, idt");
+  EXPECT_REGRADE_ERROR(ParseStyleMethod(Method("folder:x", true)), ExitCode::kUsage,
+                       "--scene-wide");
+}
+
+}  // namespace
+}  // namespace regrade
