@@ -162,7 +162,8 @@ DistributionMap LearnDistributionMap(std::vector<Vec3d> source, const StyleTurns
       turn.axes[static_cast<size_t>(axis)] =
           MatchHistograms(SortedAxis(source, turn.rotation, axis),
                           style.quantiles[i][static_cast<size_t>(axis)]);
-    for (Vec3d& color : source) color = Turned(turn, color);
+#pragma omp parallel for schedule(static)
+    for (size_t k = 0; k < source.size(); ++k) source[k] = Turned(turn, source[k]);
     map.turns.push_back(std::move(turn));
   }
   return map;

@@ -25,7 +25,8 @@ struct StyleOptions {
         {.help =
              "2D method that styles each view: mkl moves mean and covariance of the colours "
              "onto the style's, reinhard mean and spread of each CIELAB channel, idt the whole "
-             "distribution, histogram that of each channel; onnx:DIR runs the networks of "
+             "distribution (strongest, and loud where the photo has grain or soft edges), "
+             "histogram that of each channel; onnx:DIR runs the networks of "
              "PCA-KD or WCT that are in DIR; folder:DIR takes the pictures that anything made "
              "of the photos, by the photos' names (some may be missing); "
              "command:\"PROGRAM {input} {style} {output}\" runs a program for each view, "
