@@ -13,7 +13,6 @@
 #include <limits>
 
 #include "kernels/base/error.h"
-#include "reconstruct/colmap_text.h"
 #include "tests/support/data.h"
 #include "tests/support/synthetic_model.h"
 
@@ -108,62 +107,6 @@ TEST_F(ColmapModelFile, RoundTripKeepsEveryNumber) {
   WriteColmapModel(ReadColmapModel(folder_), folder_);
   EXPECT_EQ(Bytes("points3D.bin"), points);
   EXPECT_EQ(Bytes("images.bin").size(), images.size());
-}
-
-// The same model as text, which the one reader takes where there is no .bin; numbers are the same to the bit,
-// but for the quaternion's own rounding.
-TEST_F(ColmapModelFile, TextIsReadAsBinaryIs) {
-  for (ColmapImage& image : model_.images) image.name = "a name with spaces/" + image.name;
-  WriteColmapModel(model_, folder_);
-  const ColmapModel binary = ReadColmapModel(folder_);
-  for (const char* name : {"cameras", "images", "points3D"})
-    fs::remove(folder_ + "/" + name + ".bin");
-  WriteColmapText(model_, folder_);
-  const ColmapModel text = ReadColmapModel(folder_);
-  ASSERT_EQ(text.images.size(), binary.images.size());
-  ASSERT_EQ(text.points.size(), binary.points.size());
-  EXPECT_EQ(text.cameras[0].intrinsics.fx, binary.cameras[0].intrinsics.fx);
-  EXPECT_EQ(text.cameras[0].lens, binary.cameras[0].lens);
-  for (size_t i = 0; i < text.images.size(); ++i) {
-    EXPECT_EQ(text.images[i].name, binary.images[i].name);
-    EXPECT_EQ(text.images[i].camera_from_world.translation,
-              binary.images[i].camera_from_world.translation);
-    ASSERT_EQ(text.images[i].keypoints.size(), binary.images[i].keypoints.size());
-    for (size_t k = 0; k < text.images[i].keypoints.size(); ++k) {
-      EXPECT_EQ(text.images[i].keypoints[k].u, binary.images[i].keypoints[k].u);
-      EXPECT_EQ(text.images[i].keypoints[k].point_id, binary.images[i].keypoints[k].point_id);
-    }
-  }
-  for (size_t p = 0; p < text.points.size(); ++p) {
-    EXPECT_EQ(text.points[p].position, binary.points[p].position);
-    EXPECT_EQ(text.points[p].color, binary.points[p].color);
-    EXPECT_EQ(text.points[p].track.size(), binary.points[p].track.size());
-  }
-}
-
-TEST_F(ColmapModelFile, F58_TextThatIsDamagedIsRefusedWithItsLine) {
-  WriteColmapText(model_, folder_);
-  for (const char* name : {"cameras", "images", "points3D"})
-    fs::remove(folder_ + "/" + name + ".bin");
-  const std::string cameras = Bytes("cameras.txt");
-  SetBytes("cameras.txt", "# a comment\n1 PINHOLE 640 480 nonsense 600 320 240\n");
-  EXPECT_NE(Refusal().find("line 2 has 'nonsense'"), std::string::npos);
-  SetBytes("cameras.txt", "1 PANORAMA 640 480 600 320 240\n");
-  EXPECT_NE(Refusal().find("unknown camera model 'PANORAMA'"), std::string::npos);
-  SetBytes("cameras.txt", "1 PINHOLE 640\n");
-  EXPECT_NE(Refusal().find("line 1 ends before a height"), std::string::npos);
-  SetBytes("cameras.txt", "1 PINHOLE 640 480 nan 600 320 240\n");
-  Refusal();
-  SetBytes("cameras.txt", cameras);
-  const std::string images = Bytes("images.txt");
-  for (size_t cut = 0; cut < images.size(); cut += 7) {  // anywhere: an error or fewer images, never a crash
-    SetBytes("images.txt", images.substr(0, cut));
-    try {
-      ReadColmapModel(folder_);
-    } catch (const Error& error) {
-      EXPECT_EQ(error.code(), ExitCode::kInput);
-    }
-  }
 }
 
 TEST_F(ColmapModelFile, RotationsSurviveTheQuaternionInEveryOctant) {
