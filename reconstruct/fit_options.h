@@ -48,7 +48,7 @@ struct FitOptions {
     bind("fit-patch", patch,
          {.unit = "pixels",
           .help = "side of the little squares rays are drawn in: larger is faster (rays share "
-                  "voxels in cache) and learns less from a ray",
+                  "voxels in cache) and learns less from a ray; a GPU draws single pixels",
           .min = 1,
           .max = 32});
     bind(

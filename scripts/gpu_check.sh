@@ -6,8 +6,8 @@
 #   gpu_check.sh run DIR [OUT]              on the machine with the GPU, which needs a CUDA driver and nothing else;
 #                                           with compute-sanitizer on its PATH, small scenes run under its four tools
 #
-# `run` prints the parity table, fits each packed capture (named after settings below, or with the draft's), and leaves
-# one JSON file, OUT/gpu_check.json (default: DIR). Exit status 1 if a tolerance is missed or a sanitizer finds anything.
+# `run` prints the parity table, fits each packed capture (by the settings below that bear its name, or the last ones),
+# and leaves one JSON file, OUT/gpu_check.json (default: DIR). Exit status 1 if a tolerance is missed or a sanitizer finds anything.
 set -euo pipefail
 exec </dev/null
 
@@ -29,7 +29,7 @@ bundle() {
   du -sh "$dir"
 }
 
-# Settings of the README's table; what is not named here is fitted as the draft is.
+# Settings of the README's table; what is not named here is fitted as its phone capture is.
 settings_of() {
   case $1 in
     lego) echo "--fit-resolutions 128,256,512 --fit-steps 1500,4000,12000 --fit-rays 16384 --fit-step-size 0.5

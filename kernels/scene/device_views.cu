@@ -1,6 +1,6 @@
 #include "kernels/scene/device_views.h"
 
-#include "kernels/base/error.h"
+#include "kernels/base/launch_size.h"
 #include "kernels/base/random.h"
 
 namespace regrade {
@@ -8,12 +8,6 @@ namespace regrade {
 #if defined(__CUDACC__)
 
 namespace {
-
-constexpr int kThreads = 256;
-
-unsigned BlocksFor(int64_t threads) {
-  return static_cast<unsigned>((threads + kThreads - 1) / kThreads);
-}
 
 __device__ Ray RayThrough(const DeviceViews::View& view, const Vec3f* directions, int x, int y) {
   Ray ray{view.origin, view.world_from_camera *

@@ -1,18 +1,12 @@
-// How device kernels are launched: sizes, and the choice of a template by the field's basis.
+// The choice of a device kernel's template by the field's basis.
 #pragma once
 
-#include <cstdint>
 #include <type_traits>
 
 #include "kernels/base/error.h"
+#include "kernels/base/launch_size.h"
 
 namespace regrade {
-
-inline constexpr int kThreads = 256;
-
-inline unsigned BlocksFor(int64_t threads) {
-  return static_cast<unsigned>((threads + kThreads - 1) / kThreads);
-}
 
 template <typename Launch>
 void ByBasis(int basis, const Launch& launch) {
