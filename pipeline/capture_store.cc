@@ -120,6 +120,15 @@ std::vector<PhotoVerdict> MergedVerdicts(const std::vector<PhotoVerdict>& ingest
   return merged;
 }
 
+std::string IndexOf(const CaptureSource& posed) {
+  return (fs::path(posed.poses).parent_path() / "photos.json").string();
+}
+
+double NearestDepth(const JsonValue& index) {
+  const JsonValue* depth = index.Find("nearest_depth");
+  return depth == nullptr ? 0 : depth->AsDouble();
+}
+
 }  // namespace
 
 CaptureSource DetectCapture(const std::string& folder) {
@@ -142,6 +151,9 @@ CaptureSource DetectCapture(const std::string& folder) {
       if (fs::is_directory(root / pictures))
         return {CaptureKind::kLlff, (root / pictures).string(),
                 (root / "poses_bounds.npy").string()};
+  for (const fs::path& poses : {root / "poses", root})
+    if (fs::is_regular_file(poses / "photos.json") && HoldsModel(poses / "sparse"))
+      return {CaptureKind::kPosed, (poses / "photos").string(), (poses / "sparse").string()};
   if (fs::is_directory(root / "images"))
     for (const char* model : {"sparse", "sparse/0"})
       if (HoldsModel(root / model))
@@ -160,6 +172,7 @@ Capture ImportPoses(const CaptureSource& source, const std::vector<StagedPhoto>&
     model = ModelFromLlff(source, photos, &nearest_depth);
   } else {
     model = ReadColmapModel(source.poses);
+    if (source.kind == CaptureKind::kPosed) nearest_depth = NearestDepth(ReadJsonFile(IndexOf(source)));
     // The model goes on under our names; images without a staged photo keep theirs.
     std::map<std::string, std::string> name_of;
     for (const StagedPhoto& photo : photos) name_of[photo.file] = photo.name;
@@ -217,8 +230,7 @@ Capture ReadCapture(const std::string& folder) {
                                   verdict.At("verdict").AsString(),
                                   verdict.At("why").AsString()});
     capture.reprojection_px = index.At("reprojection_px").AsDouble();
-    if (const JsonValue* depth = index.Find("nearest_depth"))
-      capture.nearest_depth = depth->AsDouble();
+    capture.nearest_depth = NearestDepth(index);
     capture.models_found = static_cast<int>(index.At("models_found").AsInt());
     return capture;
   } catch (const Error& error) {

@@ -12,6 +12,7 @@ namespace regrade {
 // What the poses of a capture were known by before.
 enum class CaptureKind {
   kPhotos,      // not at all
+  kPosed,       // an output folder of ours, or its poses/: photos.json, photos/ and sparse/
   kColmap,      // images/ beside sparse/ or sparse/0/
   kTransforms,  // transforms.json, or transforms_train.json of a Blender capture
   kLlff,        // poses_bounds.npy beside images/, images_4/ or images_8/

@@ -106,6 +106,11 @@ void WritePackedCapture(const std::string& path, const PackedCapture& capture) {
   if (box.background) file.Add("background", {3}, &box.background->x);
   file.Add("field_from_world", {13}, placement);
   file.Add("ndc", {2}, &capture.scene.ndc.a);
+  Buffer<uint8_t> style(capture.style.num_pixels() * 3);  // the writer reads it when it writes
+  if (style.size() > 0) {
+    PackPixels(capture.style, style.data());
+    file.Add("style", {capture.style.height, capture.style.width, 3}, style.data(), NpzPacking::kDeflate);
+  }
   file.WriteTo(path);
 }
 
@@ -136,6 +141,14 @@ PackedCapture ReadPackedCapture(const std::string& path) {
   similarity.scale = placement.As<double>()[0];
   for (int i = 0; i < 9; ++i) similarity.rotation(i / 3, i % 3) = placement.As<double>()[1 + i];
   for (int i = 0; i < 3; ++i) similarity.translation[i] = placement.As<double>()[10 + i];
+
+  if (file.Has("style")) {
+    const NpzArray style = file.Read("style", ArrayType::kU8, {-1, -1, 3});
+    if (style.shape[0] > kMaxSide || style.shape[1] > kMaxSide)
+      throw Error(ExitCode::kInput, "is too large", path + ": style", "pack the capture again");
+    capture.style = UnpackPixels(style.bytes.data(), static_cast<int>(style.shape[1]),
+                                 static_cast<int>(style.shape[0]));
+  }
 
   int64_t at = 0;
   size_t name_begin = 0;

@@ -24,6 +24,7 @@ struct PackedView {
 struct PackedCapture {
   NormalizedScene scene;
   std::vector<PackedView> views;
+  Image style;  // [H, W, 3] sRGB, or empty: the picture whose colours the scene shall have
 };
 
 // Throws Error(kResources).

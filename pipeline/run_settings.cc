@@ -57,6 +57,10 @@ void ApplyPreset(const std::string& preset, RunSettings* settings) {
   }
 }
 
+void ApplyRecipeFlag(OptionSet* options, RunSettings* settings) {
+  if (const auto recipe = options->Given("recipe")) ApplyStyleRecipe(*recipe, &settings->network);
+}
+
 void CheckTogether(const RunSettings& settings) {
   const size_t grids = settings.fit.resolutions.size(), steps = settings.fit.steps.size();
   if (grids != steps)

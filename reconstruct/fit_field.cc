@@ -139,7 +139,8 @@ class Fitter {
     step.march = {options_.step, options_.stop_transmittance};
     step.optimizer.rate_sh = ExponentialRate(options_.rate_sh, options_.rate_sh_end, p);
     step.optimizer.rate_density =
-        ExponentialRate(options_.rate_density, options_.rate_density_end, p);
+        ExponentialRate(options_.rate_density, options_.rate_density_end, p) *
+        DelayFactor(number, options_.density_delay * static_cast<float>(total_steps_));
     step.optimizer.view_bound = options_.view_bound;
     step.tv_share = options_.tv_share;
     step.tv_density = decay * options_.tv_density;
@@ -224,6 +225,13 @@ class Fitter {
 float ExponentialRate(float begin, float end, double p) {
   if (begin <= 0 || end <= 0) return 0;
   return static_cast<float>(begin * std::pow(static_cast<double>(end) / begin, p));
+}
+
+// As in svox2, which begins at a hundredth.
+float DelayFactor(int step, float delay) {
+  if (static_cast<float>(step) >= delay) return 1;
+  constexpr float kLeast = 0.01f, kQuarterTurn = 1.57079633f;
+  return kLeast + (1 - kLeast) * std::sin(kQuarterTurn * static_cast<float>(step) / delay);
 }
 
 FitResult FitField(const std::vector<TrainingView>& views, const SceneBox& box,

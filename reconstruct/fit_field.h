@@ -65,6 +65,8 @@ struct FitHooks {
 
 // EQ(exponential-rate): rate(p) = begin^(1 - p) end^p, p in [0, 1] the share of all steps done.
 float ExponentialRate(float begin, float end, double p);
+// Rises along a sine from 1/100 at step 0 to 1 at step `delay`.
+float DelayFactor(int step, float delay);
 
 // Throws Error(kScene) if the field comes out empty, Interrupted after kAbort (the checkpoint
 // has been called).

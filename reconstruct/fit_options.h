@@ -19,6 +19,7 @@ struct FitOptions {
   float stop_transmittance = 1e-3f;
   float rate_density = 8.0f;
   float rate_density_end = 1.0f;
+  float density_delay = 0;
   float rate_sh = 6e-2f;
   float rate_sh_end = 5e-3f;
   float tv_density = 1e-2f;
@@ -77,6 +78,12 @@ struct FitOptions {
          {.help = "RMSProp rate of densities at the start", .min = 0, .max = 1e4});
     bind("fit-rate-density-end", rate_density_end,
          {.help = "the same at the end (exponential in between)", .min = 0, .max = 1e4});
+    bind("fit-density-delay", density_delay,
+         {.unit = "share of all steps",
+          .help = "the rate of densities rises to its course meanwhile, along a sine from a hundredth of it: colours "
+                  "settle before surfaces do, and less fog is left",
+          .min = 0,
+          .max = 1});
     bind("fit-rate-sh", rate_sh,
          {.help = "RMSProp rate of colours at the start", .min = 0, .max = 10});
     bind("fit-rate-sh-end", rate_sh_end, {.help = "the same at the end", .min = 0, .max = 10});

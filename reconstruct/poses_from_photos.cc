@@ -17,6 +17,7 @@
 #include "reconstruct/colmap_output.h"
 #include "reconstruct/colmap_program.h"
 #include "reconstruct/pose_verdicts.h"
+#include "reconstruct/pose_weights.h"
 #include "reconstruct/refine_intrinsics.h"
 #include "reconstruct/scene_checks.h"
 
@@ -31,21 +32,6 @@ constexpr double kBytesPerPhoto = 3e6;  // database and logs, generously
 double Now() {
   using Clock = std::chrono::steady_clock;
   return std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
-}
-
-// Seconds on two cores, roughly: weights that make the progress and its ETA meaningful.
-struct StageWeights {
-  double extract, match, map, refine;
-  double Sum() const { return extract + match + map + refine; }
-};
-
-StageWeights EstimateWeights(const PoseRecipe& recipe, double num_photos) {
-  const double pairs = recipe.all_pairs ? num_photos * (num_photos - 1) / 2
-                                        : std::min(10.0, num_photos) * num_photos;
-  const double size = recipe.max_features / 2048.0;
-  return {recipe.keep_matches ? 0 : (recipe.first_octave < 0 ? 0.6 : 0.25) * num_photos,
-          recipe.keep_matches ? 0 : 0.12 * pairs * size, 0.4 * num_photos * std::sqrt(size),
-          0.2 * num_photos};
 }
 
 class PoseFinder {
@@ -184,7 +170,7 @@ class PoseFinder {
   };
 
   RungResult TryRecipe(const PoseRecipe& recipe) {
-    const StageWeights weights = EstimateWeights(recipe, static_cast<double>(photos_.size()));
+    const PoseWeights weights = EstimateWeights(recipe, photos_, options_.image_size);
     planned_ = spent_ + weights.Sum();
     const std::string rung_folder =
         recipe.keep_matches ? rung_folder_

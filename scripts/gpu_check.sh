@@ -7,7 +7,7 @@
 #                                           with compute-sanitizer on its PATH, small scenes run under its four tools
 #
 # `run` prints the parity table, fits each packed capture (by the settings below that bear its name, or the last ones),
-# and leaves one JSON file, OUT/gpu_check.json (default: DIR). Exit status 1 if a tolerance is missed or a sanitizer finds anything.
+# restyles the field by both recipes if the capture was packed with a style, and leaves one JSON file, OUT/gpu_check.json (default: DIR). Exit status 1 if a tolerance is missed or a sanitizer finds anything.
 set -euo pipefail
 exec </dev/null
 
@@ -21,9 +21,9 @@ bundle() {
   local build=$root/build/gpu-bundle
   cmake -S "$root" -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DREGRADE_CUDA=ON -DREGRADE_BENCHMARKS=OFF \
     -DCMAKE_CUDA_ARCHITECTURES="${REGRADE_CUDA_ARCH:-90}" >/dev/null
-  cmake --build "$build" --target regrade_gpu device_parity_test --parallel "$(nproc)"
-  cp "$build/pipeline/regrade_gpu" "$build/tests/gpu/device_parity_test" "${BASH_SOURCE[0]}" "$dir"
-  strip "$dir/regrade_gpu" "$dir/device_parity_test"
+  cmake --build "$build" --target regrade_gpu device_parity_test device_style_test --parallel "$(nproc)"
+  cp "$build/pipeline/regrade_gpu" "$build"/tests/gpu/device_{parity,style}_test "${BASH_SOURCE[0]}" "$dir"
+  strip "$dir/regrade_gpu" "$dir"/device_{parity,style}_test
   ldd "$dir/regrade_gpu" | awk '/lib(zip|boost|bz2|crypto|gomp|z)[._]/ {print $3}' | xargs -I{} cp -L {} "$dir"
   [[ $# -eq 0 ]] || cp "$@" "$dir"
   du -sh "$dir"
@@ -32,13 +32,15 @@ bundle() {
 # Settings of the README's table; what is not named here is fitted as its phone capture is.
 settings_of() {
   case $1 in
-    lego) echo "--fit-resolutions 128,256,512 --fit-steps 1500,4000,12000 --fit-rays 16384 --fit-step-size 0.5
-                --initial-density 0.1 --tv-density 1e-5 --tv-sh 1e-3 --tv-share 0.01 --tv-decay 0.1
-                --fit-rate-density 16 --fit-rate-density-end 0.5 --fit-rate-sh-end 5e-4 --prune-weight 0.256
-                --fit-view-bound 0.15" ;;
-    fern) echo "--fit-resolutions 256,512,1408 --fit-steps 2000,3000,5000 --fit-rays 12288 --fit-step-size 0.5
-                --prune-weight 2.5 --tv-share 0.01 --fit-rate-sh-end 2e-3" ;;
-    *) echo "--fit-resolutions 96,192,384 --fit-steps 600,1500,4000 --fit-rays 16384 --fit-rate-sh-end 2e-3" ;;
+    lego) echo "--fit-resolutions 128,256,512 --fit-steps 1500,4000,16000 --fit-rays 16384 --fit-step-size 0.5
+                --initial-density 0.1 --tv-density 1e-5 --tv-sh 1e-3 --tv-share 0.01 --tv-decay 1
+                --fit-rate-density 64 --fit-rate-density-end 4 --fit-density-delay 0.07 --fit-rate-sh-end 3e-4
+                --prune-weight 0.256" ;;
+    fern) echo "--fit-resolutions 256,512,1408 --fit-steps 2000,3000,6000 --fit-rays 12288 --fit-step-size 0.5
+                --prune-weight 2.5 --tv-share 0.01 --fit-rate-density 16 --fit-rate-density-end 4
+                --fit-density-delay 0.03 --fit-view-bound 0.4 --fit-rate-sh-end 4e-3" ;;
+    *) echo "--fit-resolutions 96,192,384 --fit-steps 600,1500,4000 --fit-rays 16384 --fit-rate-density 32
+             --fit-rate-density-end 4 --fit-density-delay 0.1 --fit-rate-sh-end 2e-3" ;;
   esac
 }
 
@@ -46,7 +48,10 @@ run() {
   local out=${1:-$dir} status=0 name
   mkdir -p "$out"
   export LD_LIBRARY_PATH=$dir${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}
-  "$dir/device_parity_test" >"$out/parity.txt" || status=1
+  : >"$out/parity.txt"
+  for test in device_parity_test device_style_test; do
+    "$dir/$test" >>"$out/parity.txt" || status=1
+  done
   grep -E '^parity|PASSED|FAILED|SKIPPED' "$out/parity.txt"
   echo '{' >"$out/gpu_check.json"
   printf '"device": %s,\n"parity_passed": %s' "$("$dir/regrade_gpu" device)" \
@@ -54,8 +59,12 @@ run() {
   if command -v compute-sanitizer >/dev/null; then
     for tool in memcheck racecheck initcheck synccheck; do
       local clean=true
-      compute-sanitizer --tool "$tool" --error-exitcode 9 "$dir/device_parity_test" --gtest_filter='*basis9*' \
-        >"$out/$tool.txt" 2>&1 || { clean=false; status=1; }
+      : >"$out/$tool.txt"
+      for test in "device_parity_test --gtest_filter=*basis9*" "device_style_test --gtest_filter=-*Large*"; do
+        # shellcheck disable=SC2086  # a program and its option
+        compute-sanitizer --tool "$tool" --error-exitcode 9 "$dir"/$test >>"$out/$tool.txt" 2>&1 ||
+          { clean=false; status=1; }
+      done
       printf ',\n"%s_clean": %s' "$tool" "$clean" >>"$out/gpu_check.json"
       echo "$tool: $(tail -1 "$out/$tool.txt")"
     done
@@ -64,13 +73,29 @@ run() {
     [[ -e $capture ]] || continue
     name=$(basename "$capture" .npz)
     # shellcheck disable=SC2046  # settings are words
-    if record=$("$dir/regrade_gpu" fit --capture "$capture" $(settings_of "$name") 2>/dev/null); then
+    if record=$("$dir/regrade_gpu" fit --capture "$capture" --field "$out/field.npz" $(settings_of "$name") \
+      2>/dev/null); then
       printf ',\n"fit_%s": %s' "$name" "$record" >>"$out/gpu_check.json"
       echo "$name: $record" | cut -c1-400
     else
       status=1
       echo "$name: the fit failed"
+      continue
     fi
+    for recipe in standard paper letter; do  # letter: every voxel at every step, ten steps of it
+      local options="--recipe $recipe"
+      [[ $recipe == letter ]] && options="--recipe paper --style-every-voxel --style-steps 10"
+      # shellcheck disable=SC2086  # options are words
+      if record=$("$dir/regrade_gpu" style --capture "$capture" --field "$out/field.npz" $options 2>"$out/style.txt"); then
+        printf ',\n"style_%s_%s": %s' "$name" "$recipe" "$record" >>"$out/gpu_check.json"
+        echo "$name, $recipe: $record" | cut -c1-400
+      else
+        grep -q "holds no style picture" "$out/style.txt" && break
+        status=1
+        echo "$name: learning the style failed ($recipe)"; cat "$out/style.txt"
+      fi
+    done
+    rm -f "$out/field.npz"
   done
   printf '\n}\n' >>"$out/gpu_check.json"
   return $status

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kernels/field/color_error.h"
 #include "kernels/field/spherical_harmonics.h"
 #include "kernels/field/trilinear.h"
 
@@ -13,24 +14,21 @@ namespace {
 
 constexpr int64_t kBandRays = 16384;
 
-// Difference that the loss sees, and that a clipped picture shows.
-struct PixelError {
-  float loss, shown;
-};
-
 // Gamma(d) [9]; zero beyond the field's own basis, which is all that a restyled field keeps.
 void RayBasis(int basis, const Vec3f& direction, float* gamma) {
   std::fill_n(gamma, kMaxBasis, 0.0f);
   ShBasis(basis, direction, gamma);
 }
 
-PixelError ErrorOf(float color, float target, bool one_sided) {
-  const float shown = std::clamp(color, 0.0f, 1.0f) - std::clamp(target, 0.0f, 1.0f);
-  const bool clipped = (color >= 1 && target >= 1) || (color <= 0 && target <= 0);
-  return {one_sided && clipped ? 0.0f : color - target, shown};
-}
-
 }  // namespace
+
+DenseNetwork<float> HiddenUnits(const LipschitzNetwork& network, int first) {
+  DenseNetwork<float> hidden = network.Effective<float>();
+  hidden.layers.back() = DenseLayer<float>(kFeatureStride, kMlpHidden);
+  for (int o = 0; o < kFeatureStride; ++o)
+    hidden.layers.back().weight[static_cast<size_t>(o * kMlpHidden + first + o)] = 1;
+  return hidden;
+}
 
 // Rays [begin, end) of a batch and all that is derived of them.
 struct GradientAggregation::Band {
@@ -67,6 +65,12 @@ void GradientAggregation::Touch(Band* band) {
       }
       *slot++ = known;
     }
+}
+
+void GradientAggregation::TouchAll() {
+  touched_.resize(slot_of_voxel_.size());
+  for (size_t voxel = 0; voxel < touched_.size(); ++voxel)
+    slot_of_voxel_[voxel] = touched_[voxel] = static_cast<int32_t>(voxel);
 }
 
 namespace {
@@ -208,6 +212,7 @@ AggregationResult GradientAggregation::Run(const LipschitzNetwork& network,
   const bool one_band = num_rays <= kBandRays;
   AggregationResult result;
   Band band;
+  if (options_.every_voxel) TouchAll();
   // Which voxels are touched. The lists of a whole view are large: marched again below.
   for (int64_t begin = 0; begin < num_rays; begin += kBandRays) {
     March(batch, begin, std::min(num_rays, begin + kBandRays), &band);
@@ -232,7 +237,7 @@ AggregationResult GradientAggregation::Run(const LipschitzNetwork& network,
       ++result.rays;
       const Vec3f& target = batch.targets[static_cast<size_t>(begin + r)];
       for (int c = 0; c < 3; ++c) {
-        const PixelError error =
+        const ColorError error =
             ErrorOf(band.color[static_cast<size_t>(r)][c], target[c], options_.one_sided);
         loss_sum += static_cast<double>(error.loss) * error.loss;
         result.squared_error += static_cast<double>(error.shown) * error.shown;
@@ -261,7 +266,7 @@ AggregationResult GradientAggregation::Run(const LipschitzNetwork& network,
   return result;
 }
 
-GradientAggregation::HiddenSums GradientAggregation::SumHidden(const LipschitzNetwork& network,
+StyleLoss::HiddenSums GradientAggregation::SumHidden(const LipschitzNetwork& network,
                                                                const StyleRays& batch) {
   HiddenSums sums;
   const int64_t num_rays = static_cast<int64_t>(batch.rays.size());
@@ -282,13 +287,8 @@ GradientAggregation::HiddenSums GradientAggregation::SumHidden(const LipschitzNe
                                band.color[static_cast<size_t>(r)][c]);
     }
     sums.hidden.resize(sums.opacity.size() * kMlpHidden);
-    // The hidden layer leaves through the output lanes, half of it at a time.
     for (int half = 0; half < kMlpHidden; half += kFeatureStride) {
-      DenseNetwork<float> hidden = network.Effective<float>();
-      hidden.layers.back() = DenseLayer<float>(kFeatureStride, kMlpHidden);
-      for (int o = 0; o < kFeatureStride; ++o)
-        hidden.layers.back().weight[static_cast<size_t>(o * kMlpHidden + half + o)] = 1;
-      FusedForward(MakeFusedMlp(hidden), features_.data(), slots, sh_.data());
+      FusedForward(MakeFusedMlp(HiddenUnits(network, half)), features_.data(), slots, sh_.data());
       size_t next = row;
       for (int64_t r = 0; r < weights.num_rays(); ++r) {
         if (!Counts(batch, band, r)) continue;

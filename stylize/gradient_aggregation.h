@@ -35,6 +35,7 @@ struct AggregationOptions {
   float max_transmittance = 1;  // rays that let more light through are left out
   bool one_sided = false;
   bool divide_by_voxels = false;  // 1 / B instead of 1 / (3 Q)
+  bool every_voxel = false;       // through f at each step, as Algorithm 1 has it: the same gradient, for timing
 };
 
 struct AggregationResult {
@@ -49,15 +50,15 @@ struct AggregationResult {
   }
 };
 
-class GradientAggregation {
+// What learning asks for at each step, on one processor or the other.
+class StyleLoss {
  public:
-  GradientAggregation(const RadianceField& field, const AggregationOptions& options);
+  virtual ~StyleLoss() = default;
 
   // Adds the gradient of L_rec to `gradient` [LipschitzNetwork::NumParameters()] unless it is
-  // null. Rays are taken in bands, so memory grows with the touched voxels only. The result
-  // does not depend on the number of threads.
-  AggregationResult Run(const LipschitzNetwork& network, const StyleRays& batch,
-                        std::vector<double>* gradient);
+  // null. Rays are taken in bands, so memory grows with the touched voxels only.
+  virtual AggregationResult Run(const LipschitzNetwork& network, const StyleRays& batch,
+                                std::vector<double>* gradient) = 0;
 
   // Along each ray that counts, sum_i w_i h(x_i) [rays, kMlpHidden] of the last hidden layer h,
   // and what is missing to the target [rays, 3]: the last layer's weights enter a ray's colour
@@ -65,7 +66,20 @@ class GradientAggregation {
   struct HiddenSums {
     std::vector<float> hidden, missing, opacity;
   };
-  HiddenSums SumHidden(const LipschitzNetwork& network, const StyleRays& batch);
+  virtual HiddenSums SumHidden(const LipschitzNetwork& network, const StyleRays& batch) = 0;
+};
+
+// `network` cut off behind its last hidden layer: units first ... first + kFeatureStride - 1 of that are its outputs.
+DenseNetwork<float> HiddenUnits(const LipschitzNetwork& network, int first);
+
+// On the CPU. Results do not depend on the number of threads.
+class GradientAggregation : public StyleLoss {
+ public:
+  GradientAggregation(const RadianceField& field, const AggregationOptions& options);
+
+  AggregationResult Run(const LipschitzNetwork& network, const StyleRays& batch,
+                        std::vector<double>* gradient) override;
+  HiddenSums SumHidden(const LipschitzNetwork& network, const StyleRays& batch) override;
 
  private:
   struct Band;
@@ -78,6 +92,7 @@ class GradientAggregation {
   void ForgetTouched();
 
   void Touch(Band* band);
+  void TouchAll();
 
   const RadianceField& field_;
   AggregationOptions options_;

@@ -79,7 +79,7 @@ void ClearLastLayer(LipschitzNetwork* network) {
   std::fill(network->weight(kLast), &network->k(kLast), 0.0f);  // weights and biases
 }
 
-void SolveOutputLayer(const GradientAggregation::HiddenSums& sums, double budget,
+void SolveOutputLayer(const StyleLoss::HiddenSums& sums, double budget,
                       LipschitzNetwork* network) {
   constexpr int kSize = kMlpHidden + 1;
   const int64_t n = static_cast<int64_t>(sums.opacity.size());

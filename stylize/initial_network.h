@@ -27,7 +27,7 @@ void ClearLastLayer(LipschitzNetwork* network);
 //
 // EQ(output-layer): min over W [3, 64], b [3] of
 //   sum_r |missing_r - Gamma_0 (W h_r + b O_r)|^2 + ridge n |W|^2,  O_r = 1 - T_r.
-void SolveOutputLayer(const GradientAggregation::HiddenSums& sums, double budget,
+void SolveOutputLayer(const StyleLoss::HiddenSums& sums, double budget,
                       LipschitzNetwork* network);
 
 }  // namespace regrade

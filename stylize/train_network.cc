@@ -4,11 +4,13 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <memory>
 
 #include "kernels/base/error.h"
 #include "kernels/network/lipschitz_layer.h"
 #include "kernels/optimize/schedule.h"
 #include "stylize/base_map.h"
+#include "stylize/device_style.h"
 #include "stylize/gradient_aggregation.h"
 #include "stylize/initial_network.h"
 #include "stylize/lipschitz_regularizer.h"
@@ -82,7 +84,7 @@ class Training {
  public:
   Training(const RadianceField& field, const std::vector<StyledTrainingView>& views,
            const SceneColorMap& scene_map, const MarchOptions& march,
-           const TrainNetworkOptions& options)
+           const TrainNetworkOptions& options, const DeviceGrid* device_field)
       : field_(field),
         views_(views),
         scene_map_(scene_map),
@@ -91,8 +93,11 @@ class Training {
                              .min_weight = options.min_weight,
                              .max_transmittance = options.recipe == "paper" ? 1.0f : 0.5f,
                              .one_sided = options.recipe != "paper",
-                             .divide_by_voxels = options.loss_scale == "sum-over-voxels"},
-        aggregation_(field, aggregation_options_),
+                             .divide_by_voxels = options.loss_scale == "sum-over-voxels",
+                             .every_voxel = options.every_voxel},
+        loss_(device_field != nullptr
+                  ? MakeDeviceStyleLoss(device_field, aggregation_options_)
+                  : std::make_unique<GradientAggregation>(field, aggregation_options_)),
         // A fixed sample of the training pixels chooses the base and says what was gained.
         sample_(SampleStyleRays(views, 16384, 8, options.seed, kSampleStream)) {
     bool capped = false;
@@ -131,7 +136,7 @@ class Training {
   const SceneColorMap& scene_map_;
   const TrainNetworkOptions& options_;
   AggregationOptions aggregation_options_;
-  GradientAggregation aggregation_;
+  std::unique_ptr<StyleLoss> loss_;
   StyleRays sample_;
   double layer_target_ = 0;
   LipschitzNetwork network_;
@@ -145,7 +150,7 @@ ColorMap Training::ChooseBase() {
   ColorMap base = scene_map_.map;
   state_.linear_map_mse = std::numeric_limits<double>::infinity();
   const auto consider = [&](const ColorMap& map) {
-    const double mse = aggregation_.Run(NetworkOfMap(map), sample_, nullptr).Mse();
+    const double mse = loss_->Run(NetworkOfMap(map), sample_, nullptr).Mse();
     if (mse < state_.linear_map_mse) state_.linear_map_mse = mse, base = map;
   };
   if (options_.base != "least-squares") consider(scene_map_.map);
@@ -167,7 +172,7 @@ void Training::Start(int64_t bad_pixels) {
     data.has_base = true;
     InitializeResidual(options_.seed, &network_);
     // Half of the largest bound: the rest is for learning.
-    SolveOutputLayer(aggregation_.SumHidden(network_, sample_), 2 * result_.k_est, &network_);
+    SolveOutputLayer(loss_->SumHidden(network_, sample_), 2 * result_.k_est, &network_);
   }
   if (options_.spectral_normalisation)
     for (int l = 0; l < kNetworkLayers; ++l) network_.k(l) = 1;
@@ -190,7 +195,7 @@ bool Training::Step(AggregationResult* step, std::vector<double>* gradient) {
   const StyleRays batch = SampleStyleRays(views_, options_.rays_per_step, options_.patch,
                                           options_.seed, static_cast<uint64_t>(state_.step));
   gradient->assign(static_cast<size_t>(LipschitzNetwork::NumParameters()), 0.0);
-  *step = aggregation_.Run(network_, batch, gradient);
+  *step = loss_->Run(network_, batch, gradient);
   touched_ += static_cast<double>(step->touched_voxels);
   ++steps_here_;
   for (int l = 0; l < kNetworkLayers; ++l) {
@@ -214,7 +219,7 @@ bool Training::Step(AggregationResult* step, std::vector<double>* gradient) {
 
 TrainNetworkResult Training::Conclude() {
   network_.WarmUpNorms();
-  double mse = aggregation_.Run(network_, sample_, nullptr).Mse();
+  double mse = loss_->Run(network_, sample_, nullptr).Mse();
   if (network_.data().has_base && !(mse <= state_.linear_map_mse)) {
     result_.warnings.push_back(
         "the network did not beat the colour map: the map alone is used");
@@ -246,9 +251,9 @@ TrainNetworkResult TrainNetwork(const RadianceField& field,
                                 const std::vector<StyledTrainingView>& views,
                                 const SceneColorMap& scene_map, const MarchOptions& march,
                                 const TrainNetworkOptions& options, const TrainingHooks& hooks,
-                                const TrainingState* resume) {
+                                const TrainingState* resume, const DeviceGrid* device_field) {
   const int64_t bad_pixels = ValidateViews(views);
-  Training training(field, views, scene_map, march, options);
+  Training training(field, views, scene_map, march, options, device_field);
   if (resume != nullptr)
     training.Resume(*resume);
   else

@@ -9,6 +9,7 @@
 
 #include "kernels/base/options.h"
 #include "kernels/base/progress.h"
+#include "kernels/field/device/device_grid.h"
 #include "kernels/field/radiance_field.h"
 #include "kernels/field/ray_march.h"
 #include "kernels/optimize/adam.h"
@@ -39,6 +40,7 @@ struct TrainNetworkOptions {
   bool no_regularisation = false;
   bool spectral_normalisation = false;
   std::string loss_scale = "mean";
+  bool every_voxel = false;
   uint64_t seed = 0;  // of the run; not an option of this stage
 
   template <typename Bind>
@@ -106,6 +108,10 @@ struct TrainNetworkOptions {
     bind("style-loss", loss_scale,
          {.help = "mean over rays and channels, or the paper's sum divided by the voxels",
           .choices = "mean|sum-over-voxels"});
+    bind("style-every-voxel", every_voxel,
+         {.help = "sends every voxel through the network at each step, as the paper's Algorithm 1 "
+                  "is written, instead of those that the step's rays touch: the same result, "
+                  "slower; for timing"});
   }
 };
 
@@ -161,11 +167,13 @@ struct TrainNetworkResult {
 // `resume`, unless null, is a state that a checkpoint hook was given, of the same inputs.
 // Throws Error(kInput) for a target of another size or with more than 1 % of pixels that are
 // not finite, Error(kScene) when two steps in a row are not finite. On kFinish the result so
-// far is returned.
+// far is returned. `device_field`, unless null, is the same field on a device, where the steps are
+// then made.
 TrainNetworkResult TrainNetwork(const RadianceField& field,
                                 const std::vector<StyledTrainingView>& views,
                                 const SceneColorMap& scene_map, const MarchOptions& march,
                                 const TrainNetworkOptions& options, const TrainingHooks& hooks,
-                                const TrainingState* resume = nullptr);
+                                const TrainingState* resume = nullptr,
+                                const DeviceGrid* device_field = nullptr);
 
 }  // namespace regrade

@@ -27,6 +27,7 @@ void ContinueRun(const Command& command, const Arguments& arguments, const std::
   context.options.ApplyConfig(file.options, run_json);
   if (const auto preset = context.options.Given("preset"))
     ApplyPreset(*preset, &context.settings);
+  ApplyRecipeFlag(&context.options, &context.settings);
   context.options.ApplyFlags();
   RunSettings& settings = context.settings;
   ApplyProgramOptions(settings.program);

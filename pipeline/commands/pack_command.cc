@@ -1,23 +1,42 @@
 // regrade pack: a posed capture in one file, for `regrade_gpu` on a machine that has nothing else.
+#include <algorithm>
 #include <filesystem>
 
 #include "kernels/base/error.h"
+#include "kernels/image/resize.h"
 #include "pipeline/capture_store.h"
 #include "pipeline/commands/command.h"
+#include "pipeline/files/image_file.h"
 #include "pipeline/packed_capture.h"
 #include "pipeline/run_settings.h"
 #include "pipeline/scene_profile.h"
 #include "pipeline/scene_views.h"
+#include "stylize/view_stylizer.h"
 
 namespace regrade {
+namespace {
+
+// Colours matter of a style picture, not its pixels.
+constexpr int kStyleSide = 512;
+
+Image SmallPicture(const std::string& path) {
+  const Image picture = ReadStylePicture(path, nullptr);
+  const double scale = std::min(1.0, static_cast<double>(kStyleSide) / std::max(picture.width, picture.height));
+  return Colors(Resize(picture, std::max(1, static_cast<int>(picture.width * scale)),
+                       std::max(1, static_cast<int>(picture.height * scale))));
+}
+
+}  // namespace
 
 void RunPack(const Command& command, const Arguments& arguments, Console* console) {
   ProgramOptions program;
   RunOptions run;
   SceneOptions scene;
+  StyleSource style;
   OptionSet options;
   options.Add("Run", &run);
   options.Add("Scene", &scene);
+  options.Add("Style", &style);
   options.Add("Program", &program);
   if (PrintedHelp(command, arguments, options)) return;
   const Arguments words = options.Parse(arguments);
@@ -33,6 +52,7 @@ void RunPack(const Command& command, const Arguments& arguments, Console* consol
   const SceneProfile profile = ProfileScene(capture, 2, run.effects);
   for (const EffectReport& effect : profile.effects) console->Info(EffectLine(effect));
   PackedCapture packed;
+  if (!style.picture.empty()) packed.style = SmallPicture(style.picture);
   packed.scene = profile.scene;
   for (size_t i = 0; i < capture.views.size(); ++i)
     packed.views.push_back({capture.views[i].file, IsHeldOut(i, run.holdout),

@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "kernels/base/error.h"
+#include "pipeline/capture_store.h"
 #include "pipeline/commands/command.h"
 #include "pipeline/device_choice.h"
 #include "pipeline/files/image_file.h"
@@ -30,6 +31,7 @@ Arguments ReadSettings(const Arguments& arguments, RunContext* context) {
     context->options.ApplyConfig(file.options, *config);
   }
   if (flag) ApplyPreset(*flag, &context->settings);
+  ApplyRecipeFlag(&context->options, &context->settings);
   context->options.ApplyFlags();
   return words;
 }
@@ -39,6 +41,12 @@ void ProbeInputs(const std::string& last, RunContext* context) {
   if (!std::filesystem::exists(context->source))
     throw Error(ExitCode::kInput, "there is no such folder", context->source,
                 "name a folder of photos");
+  const std::filesystem::path out = std::filesystem::weakly_canonical(context->settings.run.out);
+  for (const std::filesystem::path& folder : {out, out / "poses"})
+    if (DetectCapture(context->source).kind == CaptureKind::kPosed &&
+        std::filesystem::weakly_canonical(context->source) == folder)
+      throw Error(ExitCode::kUsage, "is the capture itself, and would be written over", "--out",
+                  "name another folder; to go on in this one, give the photos it was made of");
   if (last == "pose" || last == "reconstruct") return;
   if (context->settings.style.picture.empty())
     throw Error(ExitCode::kUsage, "its value is missing", "--style",

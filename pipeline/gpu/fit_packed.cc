@@ -4,7 +4,6 @@
 #include <numeric>
 
 #include "evaluate/image_quality.h"
-#include "kernels/field/device/device_rays.h"
 #include "kernels/field/fast_rays.h"
 #include "kernels/field/render.h"
 #include "pipeline/field_file.h"
@@ -21,13 +20,6 @@ using Clock = std::chrono::steady_clock;
 
 double SecondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
-}
-
-double Median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const size_t middle = values.size() / 2;
-  std::nth_element(values.begin(), values.begin() + static_cast<long>(middle), values.end());
-  return values[middle];
 }
 
 double Mean(const std::vector<double>& values) {
@@ -48,32 +40,6 @@ HeldOut MeasureHeldOut(FitEngine* engine, const PackedCapture& capture, const Ma
     if (const auto value = Ssim(image, view.photo)) ssim.push_back(*value);
   }
   return {Mean(psnr), Mean(ssim)};
-}
-
-// Milliseconds of a view's kernel, rays on the device already: medians over the held-out views.
-double RenderMilliseconds(const DeviceGrid& grid, const PackedCapture& capture,
-                          const MarchOptions& march) {
-  std::vector<double> milliseconds;
-  for (const PackedView& view : capture.views) {
-    if (!view.held_out) continue;
-    Buffer<Ray> rays(view.photo.num_pixels());
-    for (int y = 0; y < view.camera.height; ++y)
-      for (int x = 0; x < view.camera.width; ++x)
-        rays[int64_t{y} * view.camera.width + x] = view.camera.PixelRay(x, y);
-    const int64_t n = rays.size();
-    const DeviceBuffer<Ray> device_rays = DeviceBuffer<Ray>::Of(rays, "rays");
-    DeviceBuffer<Vec3f> color(n, "colours");
-    DeviceBuffer<float> depth(n, "depths"), transmittance(n, "transmittances");
-    for (int repeat = 0; repeat < 6; ++repeat) {
-      DeviceWait("rendering");
-      const auto start = Clock::now();
-      RenderOnDevice(grid, device_rays.data(), n, march,
-                     {color.data(), depth.data(), transmittance.data()});
-      DeviceWait("rendering");
-      if (repeat > 0) milliseconds.push_back(1e3 * SecondsSince(start));
-    }
-  }
-  return Median(milliseconds);
 }
 
 }  // namespace
@@ -107,11 +73,11 @@ void FitPacked(const FitPackedOptions& settings, const FitOptions& options) {
   };
   const FitResult fit = FitField(views, capture.scene.box, options, hooks, backend);
   const double fit_seconds = SecondsSince(fit_start);
-  double render_ms = 0;
+  JsonValue render;
   if (hooks.keep_field) {
     WriteFieldFile(settings.field, {fit.field, capture.scene.field_from_world, capture.scene.ndc});
     if (backend == Backend::kCuda)
-      render_ms = RenderMilliseconds(UploadGrid(MakeFastGrid(fit.field)), capture, {options.step});
+      render = RenderPrices(UploadGrid(MakeFastGrid(fit.field)), capture, options.step);
   }
 
   JsonValue::Array curve;
@@ -132,7 +98,7 @@ void FitPacked(const FitPackedOptions& settings, const FitOptions& options) {
       {"psnr_train_db", fit.psnr_train_db},
       {"psnr_heldout_db", measured.psnr},
       {"ssim_heldout", measured.ssim},
-      {"render_ms", render_ms},
+      {"render", std::move(render)},
       {"curve_heldout", std::move(stages)},
       {"curve_train", std::move(curve)}};
   std::printf("%s\n", DumpJson(record, -1).c_str());

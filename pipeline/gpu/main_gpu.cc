@@ -15,7 +15,9 @@ namespace {
 constexpr char kUsage[] =
     "regrade_gpu " REGRADE_VERSION ": regrade on a machine with nothing but a CUDA driver\n\n"
     "usage: regrade_gpu device                       what the card is\n"
-    "       regrade_gpu fit --capture FILE [OPTIONS] a field from a file of `regrade pack`\n";
+    "       regrade_gpu fit --capture FILE [OPTIONS]   a field from a file of `regrade pack`\n"
+    "       regrade_gpu style --capture FILE --field FILE [OPTIONS]\n"
+    "                                                that field in the colours of the file's style picture\n";
 
 void PrintDevice() {
   const DeviceStatus status = ReadDeviceStatus();
@@ -24,15 +26,28 @@ void PrintDevice() {
               static_cast<long long>(status.free_bytes >> 20));
 }
 
+// It decides the defaults of the options that are read after it.
+std::string RecipeOf(const std::vector<std::string>& arguments) {
+  for (size_t i = 0; i + 1 < arguments.size(); ++i)
+    if (arguments[i] == "--recipe") return arguments[i + 1];
+  return "standard";
+}
+
 bool Run(const std::vector<std::string>& arguments) {
   const std::string command = arguments.empty() ? "help" : arguments[0];
   const std::vector<std::string> rest(arguments.begin() + !arguments.empty(), arguments.end());
   FitPackedOptions fit_packed;
   FitOptions fit;
+  StylePackedOptions style_packed;
+  TrainNetworkOptions network;
   OptionSet options;
   if (command == "fit") {
     options.Add("Capture", &fit_packed);
     options.Add("Fit", &fit);
+  } else if (command == "style") {
+    ApplyStyleRecipe(RecipeOf(rest), &network);
+    options.Add("Capture", &style_packed);
+    options.Add("Network", &network);
   } else if (command == "device") {
     PrintDevice();
     return true;
@@ -46,7 +61,10 @@ bool Run(const std::vector<std::string>& arguments) {
   }
   options.Parse(rest);
   options.ApplyFlags();
-  FitPacked(fit_packed, fit);
+  if (command == "fit")
+    FitPacked(fit_packed, fit);
+  else
+    StylePacked(style_packed, network);
   return true;
 }
 

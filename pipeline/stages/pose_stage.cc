@@ -20,6 +20,23 @@ JsonValue PhotoSet(const CaptureSource& source) {
   return files;
 }
 
+// Seconds on two cores, roughly: photos take what their bytes take to read, and their number to place.
+struct StageShares {
+  double ingest = 1, poses = 0;
+};
+
+StageShares EstimateShares(const CaptureSource& source) {
+  StageShares shares;
+  if (source.kind != CaptureKind::kPhotos) return shares;
+  double bytes = 0, photos = 0;
+  for (const ListedFile& file : ListFolder(source.photos).files) {
+    std::error_code none;
+    const auto size = std::filesystem::file_size(file.path, none);
+    if (!none) bytes += static_cast<double>(size), ++photos;
+  }
+  return {0.5e-6 * bytes + 0.1, 0.75 * kPoseSecondsPerPhoto * photos};
+}
+
 StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
                        const ProgressFunction& progress) {
   const RunSettings& settings = context->settings;
@@ -30,10 +47,10 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
   workspace.NewPath("poses/sparse/x");
   workspace.NewPath(".regrade/work/pose/x");
 
-  // Reading a photo takes about a fifth of placing it.
-  ProgressParts parts(progress, source.kind == CaptureKind::kPhotos ? 6 : 1);
+  const StageShares shares = EstimateShares(source);
+  ProgressParts parts(progress, shares.ingest + shares.poses);
   const IngestResult ingest =
-      IngestPhotos(source.photos, photo_folder, settings.ingest, parts.Next(1));
+      IngestPhotos(source.photos, photo_folder, settings.ingest, parts.Next(shares.ingest));
   for (const std::string& notice : ingest.notices) context->console->Info(notice);
 
   StageOutcome outcome;
@@ -44,7 +61,7 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
     PoseReport report;
     capture =
         PosesFromPhotos(ingest.photos, ingest.verdicts, options,
-                        workspace.Path(".regrade/work/pose"), sparse_folder, parts.Next(5), &report);
+                        workspace.Path(".regrade/work/pose"), sparse_folder, parts.Next(shares.poses), &report);
     for (const std::string& note : report.notes) context->console->Info(note);
     outcome.figures["colmap"] = report.colmap_version;
     outcome.figures["recipe"] = report.recipe;
@@ -75,7 +92,7 @@ Stage PoseStage(RunContext* context) {
                                    {"options", context->OptionsOf({"Photos", "Poses"})}};
   if (source.kind == CaptureKind::kTransforms || source.kind == CaptureKind::kLlff)
     stage.inputs["poses"] = HashFile(source.poses);
-  if (source.kind == CaptureKind::kColmap)
+  if (source.kind == CaptureKind::kColmap || source.kind == CaptureKind::kPosed)
     for (const char* part : {"cameras.bin", "images.bin", "points3D.bin", "cameras.txt",
                              "images.txt", "points3D.txt"})
       if (std::filesystem::is_regular_file(source.poses + "/" + part))

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "kernels/field/fast_rays.h"
-#include "kernels/field/render.h"
 #include "pipeline/camera_path.h"
 #include "pipeline/capture_store.h"
+#include "pipeline/device_choice.h"
 #include "pipeline/field_file.h"
+#include "pipeline/field_renderer.h"
 #include "pipeline/files/image_file.h"
 #include "pipeline/files/video_file.h"
 #include "pipeline/scene_views.h"
@@ -63,8 +63,7 @@ void WriteFilms(RunContext* context, const std::string& prefix, int frames,
 
 // The two fields and the 2D method that frames are made with.
 struct Studio {
-  FastGrid source, styled;
-  MarchOptions march;
+  FieldRenderer source, styled;
   std::unique_ptr<ViewStylizer> stylizer;
   double styled_seconds = 0;  // spent in rendering the restyled field
 };
@@ -74,9 +73,9 @@ struct Studio {
 void RenderFrame(RunContext* context, Studio* studio, const Camera& camera,
                  const std::string& prefix, int index) {
   Workspace& workspace = *context->workspace;
-  const RenderedView plain = RenderView(studio->source, camera, studio->march);
+  const RenderedView plain = studio->source.Render(camera);
   const double begin = context->console->StageSeconds();
-  const RenderedView restyled = RenderView(studio->styled, camera, studio->march);
+  const RenderedView restyled = studio->styled.Render(camera);
   studio->styled_seconds += context->console->StageSeconds() - begin;
   const std::string folder = "frames/" + prefix, name = "/" + FrameName(index);
   WritePng8(workspace.NewPath(folder + "source" + name), plain.color);
@@ -94,8 +93,9 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   const Capture capture = ReadCapture(workspace.Path("poses"));
   const StoredField before = ReadFieldFile(workspace.Path("field.npz"));
   const StoredField after = ReadFieldFile(workspace.Path("styled.npz"));
-  Studio studio{MakeFastGrid(before.field), MakeFastGrid(after.field),
-                MarchOptions{before.field.step}, MakeSceneStylizer(context, capture)};
+  const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
+  Studio studio{FieldRenderer(before.field, backend), FieldRenderer(after.field, backend),
+                MakeSceneStylizer(context, capture)};
 
   std::vector<Camera> views;
   for (const CaptureView& view : capture.views)
@@ -120,6 +120,7 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   WriteFilms(context, film_of_views ? "" : kPathPrefix, film_of_views ? num_views : num_way,
              &outcome.outputs);
   const int frames = num_views + num_way;
+  outcome.figures["device"] = DeviceName(backend);
   outcome.figures["frames"] = frames;
   outcome.figures["path_frames"] = num_way;
   outcome.figures["frames_per_second"] =

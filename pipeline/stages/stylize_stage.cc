@@ -4,7 +4,9 @@
 
 #include <algorithm>
 
+#include "kernels/field/fast_rays.h"
 #include "pipeline/capture_store.h"
+#include "pipeline/device_choice.h"
 #include "pipeline/field_file.h"
 #include "pipeline/files/image_file.h"
 #include "pipeline/network_checkpoint.h"
@@ -14,6 +16,7 @@
 #include "pipeline/stages/run_context.h"
 #include "pipeline/stages/scene_stylizer.h"
 #include "stylize/apply_network.h"
+#include "stylize/device_style.h"
 #include "stylize/monge_kantorovich.h"
 
 namespace regrade {
@@ -82,16 +85,25 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
   if (const auto bytes = workspace.LoadCheckpoint("stylize", inputs))
     resume = UnpackTrainingState(*bytes);
   if (resume) context->console->Info("stylize: goes on from its checkpoint");
+  const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
+  DeviceGrid device_field;
+  if (backend == Backend::kCuda) device_field = UploadGrid(MakeFastGrid(stored.field));
   const TrainNetworkResult trained = TrainNetwork(
       stored.field, lessons.views, lessons.scene_map, MarchOptions{stored.field.step}, options,
-      hooks, resume ? &*resume : nullptr);
+      hooks, resume ? &*resume : nullptr, backend == Backend::kCuda ? &device_field : nullptr);
   for (const std::string& warning : trained.warnings) context->console->Warn(warning);
 
   WriteNetworkFile(workspace.Path("network.npz"), {trained.network, trained.k_est});
-  stored.field.appearance = ApplyNetwork(trained.network, stored.field, parts.Next(kAfterTraining));
+  if (backend == Backend::kCuda) {
+    RestyleOnDevice(trained.network, &device_field);
+    stored.field.appearance = ToRadianceField(DownloadGrid(device_field)).appearance;
+  } else {
+    stored.field.appearance = ApplyNetwork(trained.network, stored.field, parts.Next(kAfterTraining));
+  }
   WriteFieldFile(workspace.Path("styled.npz"), stored);
   StageOutcome outcome;
   outcome.outputs = {"network.npz", "styled.npz"};
+  outcome.figures["device"] = DeviceName(backend);
   outcome.figures["steps"] = trained.steps;
   outcome.figures["k_est"] = trained.k_est;
   outcome.figures["bound"] = trained.bound;

@@ -13,6 +13,7 @@
 #include "kernels/field/total_variation.h"
 #include "kernels/scene/device_views.h"
 #include "tests/support/double_field.h"
+#include "tests/support/parity_row.h"
 #include "tests/support/small_field.h"
 
 namespace regrade {
@@ -31,10 +32,8 @@ class DeviceParity : public ::testing::TestWithParam<int> {
   int basis() const { return GetParam(); }
 };
 
-// One row of the table, for people and for scripts.
 void Row(const char* body, int basis, const char* against, double error, double tolerance) {
-  std::printf("parity\t%s\tbasis %d\t%s\t%.3g\t%.3g\n", body, basis, against, error, tolerance);
-  EXPECT_LE(error, tolerance) << body << " against " << against;
+  testing::ParityRow(body, "basis " + std::to_string(basis), against, error, tolerance);
 }
 
 Buffer<float> GradientOf(const DeviceGrid& grid) {
@@ -78,6 +77,18 @@ TEST_P(DeviceParity, Render) {
       against_float = std::max(against_float, std::abs(double{lefts[r]} - plain.transmittance));
       depth_error = std::max(depth_error, std::abs(double{depths[r]} - plain.depth));
     }
+    // Colours at steps of the opacity: within a step of the exact ones, these fields' colours lie within [-1, 2].
+    constexpr float kOpacityStep = 1.0f / 64;
+    RenderOnDevice(grid, on_device.data(), rays.size(), options, {color.data(), depth.data(), left.data()}, kOpacityStep);
+    const Buffer<Vec3f> stepped = color.ToHost();
+    const Buffer<float> stepped_lefts = left.ToHost();
+    double step_error = 0;
+    for (int64_t r = 0; r < rays.size(); ++r) {
+      ASSERT_EQ(stepped_lefts[r], lefts[r]);
+      for (int c = 0; c < 3; ++c)
+        step_error = std::max(step_error, std::abs(double{stepped[r][c]} - double{colors[r][c]}));
+    }
+    Row("render in opacity steps", basis(), "every sample", step_error, 3 * kOpacityStep);
     Row("render", basis(), "plain float", against_float, 2e-5);
     Row("render", basis(), "plain double", against_double, 1e-4);  // a sample more or less at the stop
     Row("depth", basis(), "plain float", depth_error, 1e-4);

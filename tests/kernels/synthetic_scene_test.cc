@@ -51,6 +51,19 @@ TEST_P(EveryScene, SeedRepaintsButDoesNotMoveAnything) {
   EXPECT_NE(in_a.color.pixels, in_b.color.pixels);
 }
 
+// The same photo twice would be left out as a duplicate.
+TEST_P(EveryScene, NoTwoViewsShareAPlace) {
+  const SyntheticScene scene = MakeSyntheticScene(GetParam(), 0);
+  for (const int views : {12, 24, 50, 96}) {
+    const std::vector<Camera> cameras = SyntheticCameras(scene, views, 64, 48);
+    for (size_t i = 0; i < cameras.size(); ++i)
+      for (size_t j = 0; j < i; ++j)
+        EXPECT_GT(Norm(cameras[i].Center() - cameras[j].Center()),
+                  0.3 / views)
+            << i << " and " << j << " of " << views;
+  }
+}
+
 // A grid over the bounds must be able to explain every pixel of every default view.
 TEST_P(EveryScene, BoundsHoldAllThatCamerasSee) {
   const SyntheticScene scene = MakeSyntheticScene(GetParam(), 0);

@@ -198,5 +198,21 @@ TEST(RunSettings, AllOptionsBind) {
   EXPECT_REGRADE_ERROR(ApplyPreset("fast", &settings), ExitCode::kUsage, "draft");
 }
 
+// The recipe alone brings all that it stands for, and other flags are stronger.
+TEST(RunSettings, RecipeDecidesWhatIsNotSaid) {
+  RunSettings settings, paper;
+  ApplyStyleRecipe("paper", &paper.network);
+  OptionSet options;
+  settings.Bind(&options);
+  options.Parse({"--recipe", "paper", "--style-rays", "1024"});
+  ApplyRecipeFlag(&options, &settings);
+  options.ApplyFlags();
+  EXPECT_EQ(settings.network.recipe, "paper");
+  EXPECT_EQ(settings.network.base, paper.network.base);
+  EXPECT_EQ(settings.network.rate_first, paper.network.rate_first);
+  EXPECT_EQ(settings.network.norm_steps, paper.network.norm_steps);
+  EXPECT_EQ(settings.network.rays_per_step, 1024);
+}
+
 }  // namespace
 }  // namespace regrade

@@ -50,6 +50,11 @@ TEST(PackedCapture, ReadsBackAsWritten) {
   EXPECT_EQ(back.scene.box.layers, 128);
   ASSERT_TRUE(back.scene.box.background);
   EXPECT_EQ(*back.scene.box.background, *capture.scene.box.background);
+  EXPECT_EQ(back.style.num_pixels(), 0);
+  PackedCapture with_style = capture;
+  with_style.style = capture.views[1].photo;
+  WritePackedCapture(folder / "styled.npz", with_style);
+  EXPECT_EQ(ReadPackedCapture(folder / "styled.npz").style.pixels, with_style.style.pixels);
   for (size_t i = 0; i < 3; ++i) {
     const PackedView &a = capture.views[i], &b = back.views[i];
     EXPECT_EQ(a.file, b.file);

@@ -142,6 +142,13 @@ TEST(ExponentialRate, RunsFromBeginToEnd) {
   EXPECT_EQ(ExponentialRate(0, 0.5f, 0.5), 0);
 }
 
+TEST(DelayFactor, RisesFromAHundredthToOne) {
+  EXPECT_FLOAT_EQ(DelayFactor(0, 200), 0.01f);
+  EXPECT_NEAR(DelayFactor(100, 200), 0.01 + 0.99 * std::sqrt(0.5), 1e-6);
+  EXPECT_EQ(DelayFactor(200, 200), 1);
+  EXPECT_EQ(DelayFactor(0, 0), 1);
+}
+
 TEST_F(FitField, H85_PruningEverythingIsAnError) {
   options_.prune_weight = 100;
   try {

@@ -99,6 +99,20 @@ TEST(GradientAggregation, EqualsAlgorithm1) {
   }
 }
 
+TEST(GradientAggregation, EveryVoxelGivesTheSameGradient) {
+  const RadianceField field = Ball(10);
+  const StyleRays batch = SomeRays(2, 9);
+  const LipschitzNetwork network = RandomNetwork(96);
+  std::vector<double> touched = NoGradient(), all = NoGradient();
+  const AggregationResult some = GradientAggregation(field, {}).Run(network, batch, &touched);
+  const AggregationResult every =
+      GradientAggregation(field, {.every_voxel = true}).Run(network, batch, &all);
+  EXPECT_LT(some.touched_voxels, field.geometry->num_voxels());
+  EXPECT_EQ(every.touched_voxels, field.geometry->num_voxels());
+  EXPECT_NEAR(every.loss, some.loss, 1e-12);
+  EXPECT_LE(RelativeDifference(all, touched), 1e-6);
+}
+
 TEST(GradientAggregation, PaperSumDividesByVoxels) {
   const RadianceField field = Ball(8);
   const StyleRays batch = SomeRays(1, 8);

@@ -1,6 +1,7 @@
 // Fitting's forward, loss and adjoint, a warp a ray.
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "kernels/base/error.h"
 #include "kernels/field/device/device_rays.h"
@@ -11,8 +12,14 @@
 namespace regrade {
 
 DeviceTouched::DeviceTouched(const DeviceGrid& grid)
-    : bits((grid.num_voxels() + 31) / 32, "marks of touched voxels") {
+    : num_voxels(grid.num_voxels()), bits((grid.num_voxels() + 31) / 32, "marks of touched voxels") {
   bits.Zero();
+}
+
+void DeviceTouched::MarkAll() {
+  std::vector<uint32_t> all(static_cast<size_t>(bits.size()), ~uint32_t{0});
+  if (num_voxels % 32 != 0) all.back() = (uint32_t{1} << (num_voxels % 32)) - 1;
+  bits.CopyIn(all.data(), bits.size());
 }
 
 #if defined(__CUDACC__)

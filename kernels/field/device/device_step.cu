@@ -5,6 +5,7 @@
 #include "kernels/field/device/device_rays.h"
 #include "kernels/field/device/gradient_view.h"
 #include "kernels/field/device/launch.h"
+#include "kernels/field/device/warp_march.h"
 #include "kernels/field/spherical_harmonics.h"
 
 namespace regrade {
@@ -58,46 +59,104 @@ __global__ void TotalVariationKernel(DeviceGridView grid, int64_t begin, int64_t
   if (value == 0) Touch(gradient.touched, static_cast<int32_t>(voxel));
 }
 
-// A warp takes the 32 voxels of one word of marks; its lanes are the values of one record (basis 9), or of
-// two or eight.
+// What a lane of the step kernel stands for: four neighbouring values of a record.
 template <int kBasis>
-__global__ void StepKernel(DeviceGridView grid, uint32_t* __restrict__ touched, int64_t words, RmspropOptions options, DeviceFitSums* sums) {
-  constexpr int kLanes = RecordLanes(kBasis), kGroups = 32 / kLanes;
-  constexpr float kMeanBound = static_cast<float>(0.5 / kSh0);  // 1/2 + kSh0 sh_0 in [0, 1]
+struct StepRules {
+  float rate[4], bound[4];
+
+  __device__ StepRules(int quad, const RmspropOptions& options) {
+    constexpr float kMeanBound = static_cast<float>(0.5 / kSh0);  // 1/2 + kSh0 sh_0 in [0, 1]
+#pragma unroll
+    for (int i = 0; i < 4; ++i) {
+      const int value = 4 * quad + i;
+      rate[i] = value == DensityLane(kBasis) ? options.rate_density
+                : value < 3 * kBasis         ? options.rate_sh
+                                             : 0.0f;
+      bound[i] = value >= 3 * kBasis   ? 3e38f
+                 : value % kBasis == 0 ? kMeanBound
+                                       : options.view_bound;
+    }
+  }
+};
+
+// One voxel's share of a lane, between loading and storing.
+struct StepQuad {
+  float4 *at = nullptr;  // values; gradient and moment follow; null where the lane has no voxel
+  float4 value, gradient, moment;
+  int64_t voxel;
+};
+
+__device__ inline float Stepped(float x, float g, float moment, float rate, float bound, float epsilon) {
+  const float stepped = x - rate * g / (sqrtf(moment) + epsilon);
+  return fminf(fmaxf(stepped, -bound), bound);
+}
+
+__device__ inline float NextMoment(float old, float g, float beta) {
+  return old == 0 ? g * g : beta * old + (1 - beta) * g * g;
+}
+
+// A warp takes the 32 voxels of one word of marks. A lane stands for four neighbouring values, and kTurns sets of
+// records are on their way at once; lanes stay together, for a warp that splits waits for each part's loads in turn.
+template <int kBasis>
+__global__ void StepKernel(DeviceGridView grid, uint32_t* __restrict__ touched, int64_t words, RmspropOptions options,
+                           DeviceFitSums* sums) {
+  constexpr int kQuads = RecordLanes(kBasis) / 4, kGroups = 32 / kQuads;
+  constexpr int kTurns = kGroups >= 8 ? 1 : 2;
   const int lane = static_cast<int>(threadIdx.x & 31);
-  const int value = lane % kLanes, group = lane / kLanes;
-  const unsigned group_lanes = kLanes == 32 ? 0xffffffffu : ((1u << kLanes) - 1) << (group * kLanes);
-  const bool is_density = value == DensityLane(kBasis);
-  const float rate = is_density ? options.rate_density : value < 3 * kBasis ? options.rate_sh : 0.0f;
-  const float bound = value >= 3 * kBasis   ? 3e38f
-                      : value % kBasis == 0 ? kMeanBound
-                                            : options.view_bound;
+  const int quad = lane % kQuads, group = lane / kQuads;
+  const unsigned group_lanes = kQuads == 32 ? kAllLanes : ((1u << kQuads) - 1) << (group * kQuads);
+  const StepRules<kBasis> rules(quad, options);
   const int64_t warps = static_cast<int64_t>(gridDim.x) * (blockDim.x / 32);
   for (int64_t w = blockIdx.x * static_cast<int64_t>(blockDim.x / 32) + threadIdx.x / 32; w < words;
        w += warps) {
     unsigned marks = touched[w];
     if (marks == 0) continue;
+    __syncwarp();
     if (lane == 0) touched[w] = 0;
-    for (; marks != 0; ) {
-      unsigned mine = marks;  // with the marks of the groups before this one taken away
-      for (int g = 0; g < group; ++g) mine &= mine - 1;
-      for (int g = 0; g < kGroups; ++g) marks &= marks - 1;
-      if (mine == 0) continue;
-      const int64_t voxel = 32 * w + __ffs(mine) - 1;
-      float* at = grid.records + voxel * grid.stride + value;  // values, gradient, moment
-      const float x = at[0], g = at[kLanes], old = at[2 * kLanes];
-      at[kLanes] = 0;
-      // A voxel of whose gradient any part is not finite stays as it is.
-      if (!__all_sync(group_lanes, isfinite(g * g))) {
-        if (value == 0) atomicAdd(&sums->rejected_voxels, 1ull);
-        continue;
+    while (marks != 0) {
+      StepQuad q[kTurns];
+#pragma unroll
+      for (int i = 0; i < kTurns; ++i) {
+        unsigned mine = marks;  // with the marks of the groups before this one taken away
+        for (int g = 0; g < group; ++g) mine &= mine - 1;
+        for (int g = 0; g < kGroups; ++g) marks &= marks - 1;
+        q[i].gradient = make_float4(0, 0, 0, 0);
+        if (mine == 0) continue;
+        q[i].voxel = 32 * w + __ffs(mine) - 1;
+        q[i].at = reinterpret_cast<float4*>(grid.records + q[i].voxel * grid.stride) + quad;
+        q[i].value = q[i].at[0];
+        q[i].gradient = q[i].at[kQuads];
+        q[i].moment = q[i].at[2 * kQuads];
       }
-      const float moment = old == 0 ? g * g : options.beta * old + (1 - options.beta) * g * g;
-      at[2 * kLanes] = moment;
-      const float stepped = x - rate * g / (sqrtf(moment) + options.epsilon);
-      const float bounded = fminf(fmaxf(stepped, -bound), bound);
-      at[0] = bounded;
-      if (is_density) grid.dense_density[grid.vertex_of_voxel[voxel]] = bounded;
+#pragma unroll
+      for (int i = 0; i < kTurns; ++i) {
+        const float4 g = q[i].gradient;
+        const bool finite = isfinite(g.x * g.x) && isfinite(g.y * g.y) && isfinite(g.z * g.z) && isfinite(g.w * g.w);
+        // A voxel of whose gradient any part is not finite stays as it is.
+        const bool good = (__ballot_sync(kAllLanes, finite) & group_lanes) == group_lanes;
+        if (q[i].at == nullptr) continue;
+        q[i].at[kQuads] = make_float4(0, 0, 0, 0);
+        if (!good) {
+          if (quad == 0) atomicAdd(&sums->rejected_voxels, 1ull);
+          continue;
+        }
+        float4 m = q[i].moment, x = q[i].value;
+        m.x = NextMoment(m.x, g.x, options.beta);
+        m.y = NextMoment(m.y, g.y, options.beta);
+        m.z = NextMoment(m.z, g.z, options.beta);
+        m.w = NextMoment(m.w, g.w, options.beta);
+        x.x = Stepped(x.x, g.x, m.x, rules.rate[0], rules.bound[0], options.epsilon);
+        x.y = Stepped(x.y, g.y, m.y, rules.rate[1], rules.bound[1], options.epsilon);
+        x.z = Stepped(x.z, g.z, m.z, rules.rate[2], rules.bound[2], options.epsilon);
+        x.w = Stepped(x.w, g.w, m.w, rules.rate[3], rules.bound[3], options.epsilon);
+        q[i].at[0] = x;
+        q[i].at[2 * kQuads] = m;
+        constexpr int kDensity = DensityLane(kBasis);
+        if (quad == kDensity / 4)
+          grid.dense_density[grid.vertex_of_voxel[q[i].voxel]] =
+              kDensity % 4 == 0 ? x.x : kDensity % 4 == 1 ? x.y : kDensity % 4 == 2 ? x.z : x.w;
+      }
+      __syncwarp();
     }
   }
 }

@@ -1,0 +1,81 @@
+// How long a view takes to render.
+#include <algorithm>
+#include <chrono>
+#include <vector>
+
+#include "evaluate/image_quality.h"
+#include "kernels/field/device/device_rays.h"
+#include "pipeline/gpu/gpu_commands.h"
+
+namespace regrade {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double SecondsSince(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+double Median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const size_t middle = values.size() / 2;
+  std::nth_element(values.begin(), values.begin() + static_cast<long>(middle), values.end());
+  return values[middle];
+}
+
+}  // namespace
+
+double RenderMilliseconds(const DeviceGrid& grid, const PackedCapture& capture, const MarchOptions& march,
+                          float opacity_step) {
+  std::vector<double> milliseconds;
+  for (const PackedView& view : capture.views) {
+    if (!view.held_out) continue;
+    Buffer<Ray> rays(view.photo.num_pixels());
+    for (int y = 0; y < view.camera.height; ++y)
+      for (int x = 0; x < view.camera.width; ++x)
+        rays[int64_t{y} * view.camera.width + x] = view.camera.PixelRay(x, y);
+    const int64_t n = rays.size();
+    const DeviceBuffer<Ray> device_rays = DeviceBuffer<Ray>::Of(rays, "rays");
+    DeviceBuffer<Vec3f> color(n, "colours");
+    DeviceBuffer<float> depth(n, "depths"), transmittance(n, "transmittances");
+    for (int repeat = 0; repeat < 6; ++repeat) {
+      DeviceWait("rendering");
+      const auto start = Clock::now();
+      RenderOnDevice(grid, device_rays.data(), n, march,
+                     {color.data(), depth.data(), transmittance.data()}, opacity_step);
+      DeviceWait("rendering");
+      if (repeat > 0) milliseconds.push_back(1e3 * SecondsSince(start));
+    }
+  }
+  return Median(milliseconds);
+}
+
+JsonValue RenderPrices(const DeviceGrid& grid, const PackedCapture& capture, float step) {
+  struct Setting {
+    float stop, opacity_step;
+  };
+  const Setting settings[] = {{1e-4f, 0},          {1e-3f, 0},          {1e-2f, 0},          {1e-3f, 1.0f / 256},
+                              {1e-3f, 1.0f / 128}, {1e-3f, 1.0f / 64},  {1e-3f, 1.0f / 32},  {1e-2f, 1.0f / 64}};
+  std::vector<Image> exact;
+  JsonValue::Array rows;
+  for (const Setting& setting : settings) {
+    const MarchOptions march{step, setting.stop};
+    std::vector<double> against_exact, against_photo;
+    size_t index = 0;
+    for (const PackedView& view : capture.views) {
+      if (!view.held_out) continue;
+      const Image image = RenderViewOnDevice(grid, view.camera, march, setting.opacity_step).color;
+      if (rows.empty()) exact.push_back(image);
+      against_exact.push_back(Psnr(image, exact[index++]).value_or(0));
+      against_photo.push_back(Psnr(image, view.photo).value_or(0));
+    }
+    rows.push_back(JsonValue::Object{{"stop", setting.stop},
+                                     {"opacity_step", setting.opacity_step},
+                                     {"ms", RenderMilliseconds(grid, capture, march, setting.opacity_step)},
+                                     {"db_against_first", rows.empty() ? 0.0 : Median(against_exact)},
+                                     {"db_against_photos", Median(against_photo)}});
+  }
+  return rows;
+}
+
+}  // namespace regrade

@@ -1,0 +1,152 @@
+// regrade_gpu style: a packed capture's field learns the colours of its style picture.
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <numeric>
+
+#include "kernels/base/error.h"
+#include "kernels/field/device/device_rays.h"
+#include "kernels/field/fast_rays.h"
+#include "kernels/image/color_statistics.h"
+#include "pipeline/field_file.h"
+#include "pipeline/files/json_file.h"
+#include "pipeline/gpu/gpu_commands.h"
+#include "stylize/apply_network.h"
+#include "stylize/color_transfer.h"
+#include "stylize/device_style.h"
+#include "stylize/monge_kantorovich.h"
+
+namespace regrade {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// Seconds since the last call, or since it was made.
+class Stopwatch {
+ public:
+  double Lap() {
+    const auto now = Clock::now();
+    const double seconds = std::chrono::duration<double>(now - last_).count();
+    last_ = now;
+    return seconds;
+  }
+
+ private:
+  Clock::time_point last_ = Clock::now();
+};
+
+void WritePpm(const std::string& path, const Image& image) {
+  std::ofstream file(path, std::ios::binary);
+  file << "P6\n" << image.width << " " << image.height << "\n255\n";
+  for (const float value : image.pixels)
+    file.put(static_cast<char>(std::lround(255 * std::clamp(value, 0.0f, 1.0f))));
+  if (!file) throw Error(ExitCode::kResources, "cannot be written", path, "is the disk full?");
+}
+
+// What the 2D method made of the views that the field was fitted to.
+struct Lessons {
+  std::vector<Image> targets;
+  std::vector<StyledTrainingView> views;
+  SceneColorMap scene_map;
+};
+
+Lessons StyleViews(const PackedCapture& capture) {
+  Lessons lessons;
+  lessons.targets.reserve(capture.views.size());
+  const std::unique_ptr<ViewStylizer> method = MakeColorTransfer(StyleOptions(), capture.style);
+  std::vector<ColorStatistics> before, after;
+  for (size_t i = 0; i < capture.views.size(); ++i) {
+    const PackedView& view = capture.views[i];
+    if (view.held_out) continue;
+    lessons.targets.push_back(method->Stylize(view.photo, static_cast<int>(i)));
+    lessons.views.push_back({view.camera, &lessons.targets.back(), nullptr, view.file});
+    before.push_back(MeasureColor(view.photo));
+    after.push_back(MeasureColor(lessons.targets.back()));
+  }
+  const MklMap mkl = ComputeMkl(Pool(before), Pool(after));
+  lessons.scene_map = {mkl.map, mkl.norm};
+  return lessons;
+}
+
+void RenderHeldOut(const DeviceGrid& grid, const PackedCapture& capture, const MarchOptions& march,
+                   const std::string& folder, const std::string& name) {
+  std::filesystem::create_directories(folder);
+  int index = 0;
+  for (const PackedView& view : capture.views)
+    if (view.held_out)
+      WritePpm(folder + "/" + name + "_" + std::to_string(index++) + ".ppm",
+               RenderViewOnDevice(grid, view.camera, march).color);
+}
+
+}  // namespace
+
+void StylePacked(const StylePackedOptions& settings, const TrainNetworkOptions& options) {
+  Stopwatch watch;
+  const PackedCapture capture = ReadPackedCapture(settings.capture);
+  if (capture.style.num_pixels() == 0)
+    throw Error(ExitCode::kInput, "holds no style picture", settings.capture, "pack it with --style PICTURE");
+  StoredField stored = ReadFieldFile(settings.field);
+  const MarchOptions march{stored.field.step};
+  JsonValue record = JsonValue::Object{{"capture", settings.capture}};
+  record["seconds_read"] = watch.Lap();
+  const Lessons lessons = StyleViews(capture);
+  record["seconds_2d"] = watch.Lap();
+  const Vec3d background = lessons.scene_map.map(stored.field.background.Cast<double>());
+  for (int c = 0; c < 3; ++c)
+    stored.field.background[c] = static_cast<float>(std::clamp(background[c], 0.0, 1.0));
+
+  const bool on_device = settings.device == "cuda";
+  DeviceGrid grid;
+  if (on_device) grid = UploadGrid(MakeFastGrid(stored.field));
+  const int64_t free_before = ReadDeviceStatus().free_bytes;
+  int64_t least_free = free_before;
+  record["seconds_upload"] = watch.Lap();
+  if (on_device && !settings.frames.empty())
+    RenderHeldOut(grid, capture, march, settings.frames, "source");
+  watch.Lap();
+  TrainingHooks hooks;
+  Stopwatch steps;
+  double seconds_start = 0, seconds_steps = 0;
+  hooks.progress = [&](const Progress& progress) {
+    (progress.done == 1 ? seconds_start : seconds_steps) += steps.Lap();
+    if (on_device && static_cast<int64_t>(progress.done) % 50 == 1)
+      least_free = std::min(least_free, ReadDeviceStatus().free_bytes);
+    return Verdict::kContinue;
+  };
+  const TrainNetworkResult trained =
+      TrainNetwork(stored.field, lessons.views, lessons.scene_map, march, options, hooks, nullptr,
+                   on_device ? &grid : nullptr);
+  record["seconds_learn"] = watch.Lap();
+  record["seconds_start_and_first_step"] = seconds_start;
+  record["seconds_other_steps"] = seconds_steps;
+  if (on_device)
+    RestyleOnDevice(trained.network, &grid);
+  else
+    stored.field.appearance = ApplyNetwork(trained.network, stored.field);
+  record["seconds_restyle"] = watch.Lap();
+  if (on_device) {
+    const auto first = std::find_if(capture.views.begin(), capture.views.end(),
+                                    [](const PackedView& view) { return view.held_out; });
+    if (first != capture.views.end()) RenderViewOnDevice(grid, first->camera, march);
+    record["seconds_first_frame"] = watch.Lap();
+    record["render"] = RenderPrices(grid, capture, march.step);
+    if (!settings.frames.empty()) RenderHeldOut(grid, capture, march, settings.frames, "styled");
+  }
+  record["device"] = on_device ? ReadDeviceStatus().name : "cpu";
+  record["voxels"] = stored.field.geometry->num_voxels();
+  record["steps"] = trained.steps;
+  record["mean_touched_voxels"] = trained.mean_touched_voxels;
+  record["mib_beyond_the_field"] = static_cast<double>(free_before - least_free) / (1 << 20);
+  record["psnr_to_2d_db"] = trained.psnr_db;
+  record["linear_map_psnr_db"] = trained.linear_map_psnr_db;
+  record["k_est"] = trained.k_est;
+  record["bound"] = trained.bound;
+  record["slope_observed"] = trained.slope_observed;
+  std::printf("%s\n", DumpJson(record, -1).c_str());
+  std::fflush(stdout);
+}
+
+}  // namespace regrade

@@ -1,0 +1,205 @@
+// The parity table of learning a style: each device body against the plain body in double, or against the CPU's path
+// that is held to it. Without a device each test skips and says so.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "kernels/base/device_memory.h"
+#include "kernels/field/fast_rays.h"
+#include "kernels/network/device_mlp.h"
+#include "stylize/device_style.h"
+#include "tests/support/parity_row.h"
+#include "tests/support/styled_ball.h"
+
+namespace regrade {
+namespace {
+
+using namespace testing;  // NOLINT: a test
+
+class DeviceStyle : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const DeviceStatus status = ReadDeviceStatus();
+    if (!status.found) GTEST_SKIP() << "no GPU here: " << status.name;
+  }
+};
+
+DenseNetwork<double> InDouble(const DenseNetwork<float>& network) {
+  DenseNetwork<double> exact;
+  exact.activation = network.activation;
+  exact.omega = network.omega;
+  for (const DenseLayer<float>& layer : network.layers) {
+    DenseLayer<double> wide(layer.outputs, layer.inputs);
+    std::copy(layer.weight.begin(), layer.weight.end(), wide.weight.begin());
+    std::copy(layer.bias.begin(), layer.bias.end(), wide.bias.begin());
+    exact.layers.push_back(std::move(wide));
+  }
+  return exact;
+}
+
+// TF32 rounds each factor to 10 bits of mantissa: 5e-4 a factor, through six layers. Split factors are as good as
+// floats, and held to what the CPU's fast path is.
+struct Tolerances {
+  MlpPrecision precision;
+  const char* name;
+  double forward, gradient;
+};
+constexpr Tolerances kTolerances[] = {{MlpPrecision::kTensor, "tf32", 6e-3, 6e-3},
+                                      {MlpPrecision::kSplit, "split tf32", 1e-5, 1e-5}};
+
+bool HasKink(const std::string& activation) { return activation == "relu" || activation == "leaky-relu"; }
+
+// n rows through the network and back, by each activation and precision.
+void CheckMlp(int64_t n) {
+  for (const char* activation : {"sine", "relu", "leaky-relu", "sigmoid", "tanh"}) {
+    LipschitzNetwork random = RandomNetwork(17);
+    random.data().activation = activation;
+    const DenseNetwork<float> network = random.Effective<float>();
+    const DenseNetwork<double> exact = InDouble(network);
+    Buffer<float> input(n * kMlpEndLanes), d_output(input.size());
+    for (int64_t i = 0; i < input.size(); ++i) {
+      const int64_t lane = i % kMlpEndLanes;
+      if (lane < kNetworkInputs) input[i] = static_cast<float>(Random(60, static_cast<uint64_t>(i)));
+      if (lane < kNetworkSh) d_output[i] = static_cast<float>(Random(61, static_cast<uint64_t>(i)));
+    }
+    const DeviceBuffer<float> x = DeviceBuffer<float>::Of(input, "input"),
+                              d_y = DeviceBuffer<float>::Of(d_output, "gradient");
+    DenseNetwork<double> expected;
+    for (int l = 0; l < kNetworkLayers; ++l)
+      expected.layers.emplace_back(LipschitzNetwork::Outputs(l), LipschitzNetwork::Inputs(l));
+    std::vector<double> outputs(static_cast<size_t>(n * kNetworkSh));
+    for (int64_t r = 0; r < n; ++r) {
+      double row[kNetworkInputs], d_row[kNetworkSh];
+      std::copy_n(&input[r * kMlpEndLanes], kNetworkInputs, row);
+      std::copy_n(&d_output[r * kMlpEndLanes], kNetworkSh, d_row);
+      DenseForward(exact, row, &outputs[static_cast<size_t>(r * kNetworkSh)]);
+      DenseAdjoint(exact, row, d_row, &expected, static_cast<double*>(nullptr));
+    }
+    for (const Tolerances& tolerances : kTolerances) {
+      DeviceMlp mlp(MakeFusedMlp(network));
+      DeviceBuffer<float> y(n * kMlpEndLanes, "output");
+      mlp.Forward(tolerances.precision, x.data(), n, y.data());
+      const Buffer<float> rows = y.ToHost();
+      double off = 0, largest = 0;
+      for (int64_t r = 0; r < n; ++r)
+        for (int k = 0; k < kNetworkSh; ++k) {
+          const double value = outputs[static_cast<size_t>(r * kNetworkSh + k)];
+          off = std::max(off, std::abs(rows[r * kMlpEndLanes + k] - value));
+          largest = std::max(largest, std::abs(value));
+        }
+      const std::string what = std::string(activation) + ", " + std::to_string(n) + " rows, " + tolerances.name;
+      ParityRow("network forward", what, "double, of the largest", off / largest, tolerances.forward);
+
+      mlp.AddAdjoint(tolerances.precision, x.data(), d_y.data(), n);
+      // The slope of a rectifier jumps: a unit that rounding takes over the kink has another slope, and as the rows'
+      // gradients here are random and nearly cancel, each such unit shows.
+      if (HasKink(activation) && (n > 100 || tolerances.precision == MlpPrecision::kTensor)) continue;
+      DenseNetwork<double> gradient;
+      for (int l = 0; l < kNetworkLayers; ++l)
+        gradient.layers.emplace_back(LipschitzNetwork::Outputs(l), LipschitzNetwork::Inputs(l));
+      mlp.TakeGradient(&gradient);
+      double gradient_off = 0;
+      for (size_t l = 0; l < kNetworkLayers; ++l) {  // of the largest entry of a layer's weights, and of its biases
+        for (const auto part : {&DenseLayer<double>::weight, &DenseLayer<double>::bias}) {
+          double largest_entry = 0, off_entry = 0;
+          const std::vector<double>&is = gradient.layers[l].*part, &should = expected.layers[l].*part;
+          for (size_t i = 0; i < should.size(); ++i) {
+            largest_entry = std::max(largest_entry, std::abs(should[i]));
+            off_entry = std::max(off_entry, std::abs(is[i] - should[i]));
+          }
+          gradient_off = std::max(gradient_off, off_entry / largest_entry);
+        }
+      }
+      ParityRow("network gradient", what, "double, of a layer's largest", gradient_off, tolerances.gradient);
+    }
+  }
+}
+
+TEST_F(DeviceStyle, MlpLessThanATile) { CheckMlp(1); }
+TEST_F(DeviceStyle, MlpNoWholeTiles) { CheckMlp(37); }
+TEST_F(DeviceStyle, LargeMlpOfTwoChunks) { CheckMlp(70001); }
+
+double RelativeDifference(const std::vector<double>& a, const std::vector<double>& b) {
+  double difference = 0, norm = 0;
+  for (size_t i = 0; i < a.size(); ++i) {
+    difference += (a[i] - b[i]) * (a[i] - b[i]);
+    norm += b[i] * b[i];
+  }
+  return std::sqrt(difference / norm);
+}
+
+// Loss, gradient and counts of the device's path against the CPU's, which the tests hold to Algorithm 1 in double.
+void CheckLossAndGradient(int side) {
+  for (const int basis : {9, 4, 1}) {
+    const RadianceField field = Ball(14, basis);
+    const DeviceGrid grid = UploadGrid(MakeFastGrid(field));
+    LipschitzNetwork network = RandomNetwork(91);
+    network.data().has_base = true;
+    network.data().base = SomeMap();
+    StyleRays batch = SomeRays(3, side);
+    batch.targets[5].y = std::nanf("");
+    for (const bool every_voxel : {false, true}) {
+      const AggregationOptions options{
+          .min_weight = 1e-4f, .max_transmittance = 0.9f, .one_sided = true, .every_voxel = every_voxel};
+      GradientAggregation on_cpu(field, options);
+      const std::unique_ptr<StyleLoss> on_device = MakeDeviceStyleLoss(&grid, options);
+      const size_t size = static_cast<size_t>(LipschitzNetwork::NumParameters());
+      std::vector<double> expected(size), gradient(size);
+      const AggregationResult should = on_cpu.Run(network, batch, &expected);
+      const AggregationResult exact = on_device->Run(network, batch, nullptr);
+      const AggregationResult is = on_device->Run(network, batch, &gradient);
+      const std::string what = "basis " + std::to_string(basis) + ", " + std::to_string(batch.rays.size()) + " rays";
+      EXPECT_EQ(is.rays, should.rays);
+      EXPECT_NEAR(static_cast<double>(is.samples), static_cast<double>(should.samples), 3);  // at the threshold
+      EXPECT_NEAR(static_cast<double>(is.touched_voxels), static_cast<double>(should.touched_voxels), 8);
+      ParityRow("style loss", what, "CPU, relative", std::abs(exact.loss - should.loss) / should.loss, 2e-5);
+      ParityRow("style loss, tf32", what, "CPU, relative", std::abs(is.loss - should.loss) / should.loss, 2e-3);
+      ParityRow("style gradient, tf32", what, "CPU, norms", RelativeDifference(gradient, expected), 5e-3);
+    }
+  }
+}
+
+TEST_F(DeviceStyle, LossAndGradient) { CheckLossAndGradient(13); }
+TEST_F(DeviceStyle, LargeLossAndGradientOfTwoBands) { CheckLossAndGradient(150); }
+
+TEST_F(DeviceStyle, HiddenSums) {
+  const RadianceField field = Ball(12);
+  const DeviceGrid grid = UploadGrid(MakeFastGrid(field));
+  const StyleRays batch = SomeRays(2, 20);
+  const LipschitzNetwork network = RandomNetwork(33);
+  const AggregationOptions options{.max_transmittance = 0.5f};
+  const auto should = GradientAggregation(field, options).SumHidden(network, batch);
+  const auto is = MakeDeviceStyleLoss(&grid, options)->SumHidden(network, batch);
+  ASSERT_EQ(is.hidden.size(), should.hidden.size());
+  ASSERT_EQ(is.missing.size(), should.missing.size());
+  double off = 0;
+  for (size_t i = 0; i < is.hidden.size(); ++i) off = std::max(off, std::abs(double{is.hidden[i]} - should.hidden[i]));
+  for (size_t i = 0; i < is.missing.size(); ++i)
+    off = std::max(off, std::abs(double{is.missing[i]} - should.missing[i]));
+  ParityRow("hidden sums", "basis 9", "CPU", off, 5e-5);
+}
+
+TEST_F(DeviceStyle, Restyle) {
+  for (const int basis : {9, 4, 1}) {
+    const RadianceField field = Ball(13, basis);
+    LipschitzNetwork network = RandomNetwork(92);
+    network.data().has_base = true;
+    network.data().base = SomeMap();
+    DeviceGrid grid = UploadGrid(MakeFastGrid(field));
+    RestyleOnDevice(network, &grid);
+    const FastGrid restyled = DownloadGrid(grid);
+    const Appearance should = ApplyNetwork(network, field);
+    double off = 0;
+    for (int64_t v = 0; v < restyled.num_voxels(); ++v) {
+      for (int k = 0; k < 3 * basis; ++k)
+        off = std::max(off, std::abs(double{restyled.records[v * restyled.lanes() + k]} - should.sh[v * 3 * basis + k]));
+      ASSERT_EQ(restyled.records[v * restyled.lanes() + DensityLane(basis)], field.geometry->density[v]);
+    }
+    ParityRow("restyled voxels", "basis " + std::to_string(basis), "CPU", off, 2e-5);
+  }
+}
+
+}  // namespace
+}  // namespace regrade
