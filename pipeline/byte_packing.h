@@ -15,6 +15,9 @@ namespace regrade {
 
 class BytePacker {
  public:
+  // A string that grows by itself holds up to three times what it ends with.
+  void Reserve(size_t bytes) { bytes_.reserve(bytes); }
+
   template <typename T>
   void Value(const T& value) {
     static_assert(std::is_arithmetic_v<T>);

@@ -1,6 +1,7 @@
 #include "pipeline/eta_estimator.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace regrade {
 namespace {
@@ -12,10 +13,14 @@ constexpr size_t kMostPoints = 512;
 }  // namespace
 
 void EtaEstimator::Add(double seconds, double done, double total) {
-  if (points_.empty()) points_.push_back({0, 0});
+  if (points_.empty()) {
+    points_.push_back({0, 0});
+    start_ = {seconds, done};
+  }
   total_ = total;
   if (done < points_.back().done) {  // begun anew (a finer grid): the old pace says nothing
     points_.assign(1, {seconds, done});
+    start_ = points_.front();
     return;
   }
   points_.push_back({seconds, done});
@@ -35,7 +40,12 @@ std::optional<double> EtaEstimator::Remaining() const {
   const Point &first = points_.front(), &last = points_.back();
   if (last.seconds < 1 || !(last.done > first.done) || !(last.seconds > first.seconds))
     return std::nullopt;
-  const double rate = (last.done - first.done) / (last.seconds - first.seconds);
+  double rate = (last.done - first.done) / (last.seconds - first.seconds);
+  // Where a unit of work is not always the same time, the pace of late and that of all so far err to both sides; a slow
+  // start must be forgotten all the same.
+  constexpr double kShareOfAll = 0.35;
+  if (last.seconds > start_.seconds && last.done > start_.done)
+    rate *= std::pow((last.done - start_.done) / (last.seconds - start_.seconds) / rate, kShareOfAll);
   return std::max(0.0, (total_ - last.done) / rate);
 }
 

@@ -6,9 +6,8 @@
 
 namespace regrade {
 
-// The rate is measured over a window that grows with the stage (its last third, at least 3 s),
-// so that a slow start and a change of pace are forgotten, and single slow steps are not
-// noticed.
+// The rate is measured over a window (a tenth of the work, at least 3 s), so that a slow start and a change of pace are
+// forgotten, and single slow steps are not noticed; the pace since the start has a third of the say.
 class EtaEstimator {
  public:
   // `seconds` since the stage began, from a clock that never goes back; `done` of `total`.
@@ -21,6 +20,7 @@ class EtaEstimator {
     double seconds, done;
   };
   std::deque<Point> points_;
+  Point start_{0, 0};  // the first that was told: a resumed stage does not begin at 0
   double total_ = 0;
 };
 

@@ -41,12 +41,28 @@ StagePlan PlanFit(const FitOptions& options, int64_t photo_pixels, const Vec3f& 
     const double voxels = vertices * (s == 0 ? 1 : kStoredShare);
     const double gradients = record + kIndexBytes + arenas * kIndexBytes;
     field = std::max(
-        field, voxels * (3 * record + kIndexBytes + gradients) + vertices * 2 * kGridBytes);
+        field, voxels * (4 * record + kIndexBytes + gradients) + vertices * 2 * kGridBytes);
     const double rays = static_cast<double>(options.steps[s]) * options.rays_per_step;
     seconds += rays / kRaysPerSecond * options.resolutions[s] / kRateResolution;
   }
   const double photos = static_cast<double>(photo_pixels) * kPixelBytes;
-  return {static_cast<uint64_t>(field + photos), Shared(seconds, threads)};
+  return {static_cast<uint64_t>(kProgramBytes + field + photos), Shared(seconds, threads)};
+}
+
+StagePlan PlanFitOnDevice(const FitOptions& options, int64_t photo_pixels, const Vec3f& box_radius) {
+  constexpr double kSampleStore = 1 << 30, kVertexBytes = 4 + 4 + 1 + 1, kSamplesPerRay = 40;
+  const double record = 4.0 * RecordLanes(BasisOfDegree(options.sh_degree));
+  double peak = 0, coarser = 0, seconds = 0;
+  for (size_t s = 0; s < options.resolutions.size(); ++s) {
+    const Vec3i n = ResolutionFor(box_radius, options.resolutions[s]);
+    const double vertices = static_cast<double>(n.x) * n.y * n.z;
+    const double voxels = vertices * (s == 0 ? 1 : kStoredShare);
+    const double field = voxels * (3 * record + kIndexBytes) + vertices * kVertexBytes;
+    peak = std::max(peak, field + coarser);
+    coarser = field + 4 * voxels;  // its weights say what is kept
+    seconds += static_cast<double>(options.steps[s]) * options.rays_per_step * kSamplesPerRay / kDeviceSamplesPerSecond;
+  }
+  return {static_cast<uint64_t>(peak + kSampleStore + 6.0 * static_cast<double>(photo_pixels)), seconds};
 }
 
 StagePlan PlanPoses(int64_t photos, int threads) {
@@ -67,11 +83,11 @@ uint64_t PlannedMemory(double max_memory_gb, uint64_t available) {
   return max_memory_gb > 0 ? static_cast<uint64_t>(max_memory_gb * 1e9) : available;
 }
 
-void CheckFitsMemory(const StagePlan& plan, uint64_t limit) {
+void CheckFitsMemory(const StagePlan& plan, uint64_t limit, const char* memory) {
   if (limit == 0 || plan.memory <= limit) return;
   throw Error(ExitCode::kResources,
               "the fit would take about " + MemoryText(static_cast<double>(plan.memory)) +
-                  " of memory, of " + MemoryText(static_cast<double>(limit)) + " that it may",
+                  " of " + memory + ", of " + MemoryText(static_cast<double>(limit)) + " that it may",
               "reconstruct",
               "use --preset draft or smaller --fit-resolutions; memory grows with their cube");
 }

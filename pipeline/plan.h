@@ -1,10 +1,10 @@
 // What a run will take, estimated before it starts, from sizes and rates that were measured.
 //
-// A fit's memory peaks at its last pruning or at its largest stage: values, moments and the
-// pruned copy of a record of floats a voxel; indices and gradients a voxel in each arena; two
-// dense grids of links (4 B), densities (4 B) and distances (1 B) a vertex; 18 B for each pixel
-// of the photos (12 B as read, 6 B as rays draw them). The first stage stores every vertex; of
-// later ones kStoredShare is stored. Gradients of a step are taken to touch each voxel once.
+// A fit's memory peaks where its largest stage writes a checkpoint, or is pruned: values and moments of a record of
+// floats a voxel and both packed, or the pruned copy; indices and gradients a voxel in each arena; two dense grids of
+// links and densities (12 B) a vertex; 18 B for each pixel of the photos (12 B as read, 6 B as rays draw them); and the
+// program itself. The first stage stores every vertex; of later ones kStoredShare is stored. Gradients of a step are
+// taken to touch each voxel once.
 #pragma once
 
 #include <cstdint>
@@ -15,11 +15,13 @@
 
 namespace regrade {
 
-// 1.3 M of 7.1 M vertices at 192^3 on real captures, rounded up.
-inline constexpr double kStoredShare = 0.2;
+// 1.4 M of the 3.4 M vertices of a box of its own shape, at 192 voxels its longest side.
+inline constexpr double kStoredShare = 0.4;
+inline constexpr double kProgramBytes = 150e6;
 // Of two threads, at a grid of kRateResolution a side; a ray's cost grows with the resolution.
 inline constexpr double kRaysPerSecond = 105e3;  // 80 to 138 on three captures
 inline constexpr double kRateResolution = 160;
+inline constexpr double kDeviceSamplesPerSecond = 4e8;  // of an H200, fit and step together: 270 to 450 on three captures
 inline constexpr double kStyleSecondsPerStep = 0.075;  // of two threads
 inline constexpr double kPoseSecondsPerPhoto = 2;    // COLMAP's, of two threads
 
@@ -32,6 +34,9 @@ struct StagePlan {
 // the scene's box; (1, 1, 1), the most, where it is not known yet.
 StagePlan PlanFit(const FitOptions& options, int64_t photo_pixels, const Vec3f& box_radius,
                   int threads);
+// The same on a GPU: values, gradients and moments of a voxel side by side; links, densities and distances of a vertex;
+// the coarser grid beside the finer one while it is resampled; 6 B a pixel; and the store of samples in flight.
+StagePlan PlanFitOnDevice(const FitOptions& options, int64_t photo_pixels, const Vec3f& box_radius);
 StagePlan PlanPoses(int64_t photos, int threads);
 StagePlan PlanStyle(int64_t steps, int threads);
 
@@ -42,7 +47,7 @@ std::string PlanText(const StagePlan& plan);
 uint64_t PlannedMemory(double max_memory_gb, uint64_t available);
 
 // Throws Error(kResources), naming the options to lower, if the plan of a fit takes more than
-// `limit` bytes; a limit of 0 is not known, and none.
-void CheckFitsMemory(const StagePlan& plan, uint64_t limit);
+// `limit` bytes of `memory` ("memory", "GPU memory"); a limit of 0 is not known, and none.
+void CheckFitsMemory(const StagePlan& plan, uint64_t limit, const char* memory = "memory");
 
 }  // namespace regrade

@@ -143,11 +143,10 @@ std::vector<std::string> Workspace::FinishedStages() const {
 // Layout: mark, hash of the inputs, hash of the content, the content.
 void Workspace::SaveCheckpoint(const std::string& stage, const JsonValue& inputs,
                                std::string_view bytes) const {
-  std::string blob(kCheckpointMark);
-  blob += HashText(HashOf(DumpJson(inputs, -1)));
-  blob += HashText(HashOf(bytes));
-  blob += bytes;
-  WriteFileAtomically(CheckpointPath(stage), blob);
+  std::string head(kCheckpointMark);
+  head += HashText(HashOf(DumpJson(inputs, -1)));
+  head += HashText(HashOf(bytes));
+  WriteFileAtomically(CheckpointPath(stage), head, bytes);
 }
 
 std::optional<std::string> Workspace::LoadCheckpoint(const std::string& stage,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 
 #include "kernels/base/for_each.h"
@@ -34,7 +35,8 @@ class FitEngine {
   virtual ~FitEngine() = default;
 
   virtual void Take(FitState state) = 0;  // goes on from it
-  virtual FitState Give() = 0;            // a copy of grid and moments; stage and step are 0
+  // Shows grid and moments; a processor that has them in the host's memory copies nothing. `use` may set stage and step.
+  virtual void Show(const std::function<void(FitState*)>& use) = 0;
   virtual int64_t num_voxels() const = 0;
   virtual Vec3i resolution() const = 0;
   virtual void Step(const FitStep& step) = 0;

@@ -26,7 +26,7 @@ class CpuFitEngine : public FitEngine {
       state_.second_moment = Buffer<float>(state_.grid.records.size());
     ResetArenas();
   }
-  FitState Give() override { return {state_.grid, state_.second_moment, 0, 0}; }
+  void Show(const std::function<void(FitState*)>& use) override { use(&state_); }
   int64_t num_voxels() const override { return state_.grid.num_voxels(); }
   Vec3i resolution() const override { return state_.grid.frame.resolution; }
 

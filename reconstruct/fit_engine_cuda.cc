@@ -23,7 +23,10 @@ class CudaFitEngine : public FitEngine {
     grid_ = UploadGrid(state.grid, true, state.second_moment);
     Renew();
   }
-  FitState Give() override { return {DownloadGrid(grid_), DownloadSecondMoment(grid_), 0, 0}; }
+  void Show(const std::function<void(FitState*)>& use) override {
+    FitState state{DownloadGrid(grid_), DownloadSecondMoment(grid_), 0, 0};
+    use(&state);
+  }
   int64_t num_voxels() const override { return grid_.num_voxels(); }
   Vec3i resolution() const override { return grid_.frame.resolution; }
 

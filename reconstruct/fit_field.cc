@@ -79,7 +79,7 @@ class Fitter {
     result_.voxels = engine_->num_voxels();
     Measure();
     if (hooks_.keep_field) {
-      result_.field = ToRadianceField(engine_->Give().grid);
+      engine_->Show([this](FitState* state) { result_.field = ToRadianceField(state->grid); });
       result_.field.step = options_.step;
     }
     result_.psnr_train_db = PsnrOf(tail_error_, tail_rays_);
@@ -187,10 +187,11 @@ class Fitter {
   void SaveCheckpoint() {
     const Clock::time_point begin = Clock::now();
     if (hooks_.checkpoint) {
-      FitState state = engine_->Give();
-      state.stage = stage_;
-      state.step = step_;
-      hooks_.checkpoint(state);
+      engine_->Show([this](FitState* state) {
+        state->stage = stage_;
+        state->step = step_;
+        hooks_.checkpoint(*state);
+      });
     }
     idle_seconds_ += SecondsSince(begin);
     last_checkpoint_ = Clock::now();

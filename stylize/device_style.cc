@@ -43,6 +43,7 @@ class DeviceStyleLoss : public StyleLoss {
         slots_(*grid),
         sums_(1, "sums of a loss") {
     REGRADE_CHECK(!grid->fitting);
+    sums_.Zero();
   }
 
   AggregationResult Run(const LipschitzNetwork& network, const StyleRays& batch,

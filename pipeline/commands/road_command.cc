@@ -68,7 +68,9 @@ void PrintPlan(const std::string& last, RunContext* context) {
   const int64_t side = settings.scene.photo_size;
   context->console->Info(
       "reconstruct: " +
-      PlanText(PlanFit(settings.fit, photos * side * side * 3 / 4, {1, 1, 1}, threads)));
+      PlanText(ChooseBackend(settings.run.device, settings.run.reproducible) == Backend::kCuda
+                   ? PlanFitOnDevice(settings.fit, photos * side * side * 3 / 4, {1, 1, 1})
+                   : PlanFit(settings.fit, photos * side * side * 3 / 4, {1, 1, 1}, threads)));
   if (last == "reconstruct") return;
   context->console->Info("stylize: " + PlanText(PlanStyle(settings.network.steps, threads)));
 }

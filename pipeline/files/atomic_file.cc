@@ -54,22 +54,27 @@ void SyncFolder(const std::string& folder) {
 }  // namespace
 
 void WriteFileAtomically(const std::string& path, std::string_view bytes) {
+  WriteFileAtomically(path, {}, bytes);
+}
+
+void WriteFileAtomically(const std::string& path, std::string_view head, std::string_view bytes) {
+  const size_t size = head.size() + bytes.size();
   const std::string temporary = path + kTemporarySuffix;
   try {
     FileDescriptor fd(
         ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0644));
-    if (fd.get() < 0) ThrowWriteError(path, "create", bytes.size());
-    size_t done = 0;
-    while (done < bytes.size()) {
-      const ssize_t n = ::write(fd.get(), bytes.data() + done, bytes.size() - done);
-      if (n < 0 && errno == EINTR) continue;
-      if (n <= 0) ThrowWriteError(path, "write", bytes.size());
-      done += static_cast<size_t>(n);
-    }
-    if (::fsync(fd.get()) != 0) ThrowWriteError(path, "flush to disk", bytes.size());
-    if (fd.Close() != 0) ThrowWriteError(path, "close", bytes.size());
+    if (fd.get() < 0) ThrowWriteError(path, "create", size);
+    for (const std::string_view part : {head, bytes})
+      for (size_t done = 0; done < part.size();) {
+        const ssize_t n = ::write(fd.get(), part.data() + done, part.size() - done);
+        if (n < 0 && errno == EINTR) continue;
+        if (n <= 0) ThrowWriteError(path, "write", size);
+        done += static_cast<size_t>(n);
+      }
+    if (::fsync(fd.get()) != 0) ThrowWriteError(path, "flush to disk", size);
+    if (fd.Close() != 0) ThrowWriteError(path, "close", size);
     if (::rename(temporary.c_str(), path.c_str()) != 0)
-      ThrowWriteError(path, "rename into place", bytes.size());
+      ThrowWriteError(path, "rename into place", size);
   } catch (...) {
     ::unlink(temporary.c_str());
     throw;

@@ -4,11 +4,11 @@
 #include <numeric>
 
 #include "evaluate/image_quality.h"
-#include "kernels/field/fast_rays.h"
-#include "kernels/field/render.h"
+#include "kernels/base/device_memory.h"
 #include "pipeline/capture_store.h"
 #include "pipeline/device_choice.h"
 #include "pipeline/field_file.h"
+#include "pipeline/field_renderer.h"
 #include "pipeline/fit_checkpoint.h"
 #include "pipeline/memory.h"
 #include "pipeline/plan.h"
@@ -30,10 +30,9 @@ double Mean(const std::vector<double>& values) {
 
 // PSNR and SSIM over the held-out photos.
 void MeasureHeldOut(RunContext* context, const Capture& capture, const StoredField& stored,
-                    JsonValue* figures) {
+                    Backend backend, JsonValue* figures) {
   const RunSettings& settings = context->settings;
-  const FastGrid grid = MakeFastGrid(stored.field);
-  const MarchOptions march{stored.field.step};
+  const FieldRenderer renderer(stored.field, backend);
   std::vector<double> psnr, ssim;
   JsonValue::Array files;
   for (const int i : ViewIndices(capture, settings.run.holdout, true)) {
@@ -42,7 +41,7 @@ void MeasureHeldOut(RunContext* context, const Capture& capture, const StoredFie
     const Camera camera =
         WorkingCamera(view.camera, settings.scene.photo_size, stored.field_from_world,
                       stored.ndc);
-    const Image rendered = RenderView(grid, camera, march).color;
+    const Image rendered = renderer.Render(camera).color;
     if (const auto value = Psnr(rendered, photo)) psnr.push_back(*value);
     if (const auto value = Ssim(rendered, photo)) ssim.push_back(*value);
     files.emplace_back(view.file);
@@ -52,14 +51,15 @@ void MeasureHeldOut(RunContext* context, const Capture& capture, const StoredFie
   (*figures)["ssim_heldout"] = ssim.empty() ? JsonValue() : JsonValue(Mean(ssim));
 }
 
-StagePlan PlanOf(const RunSettings& settings, const Capture& capture, const SceneBox& box) {
+StagePlan PlanOf(const RunSettings& settings, const Capture& capture, const SceneBox& box, Backend backend) {
   int64_t pixels = 0;
   for (const int i : ViewIndices(capture, settings.run.holdout, false)) {
     const Camera camera = WorkingCamera(capture.views[static_cast<size_t>(i)].camera,
                                         settings.scene.photo_size, {}, {});
     pixels += int64_t{camera.width} * camera.height;
   }
-  return PlanFit(settings.fit, pixels, box.radius, omp_get_max_threads());
+  return backend == Backend::kCuda ? PlanFitOnDevice(settings.fit, pixels, box.radius)
+                                   : PlanFit(settings.fit, pixels, box.radius, omp_get_max_threads());
 }
 
 StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
@@ -73,10 +73,15 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   if (!scene.notice.empty()) context->console->Info(scene.notice);
   for (const EffectReport& effect : profile.effects)
     context->console->Info(EffectLine(effect));
-  const StagePlan plan = PlanOf(settings, capture, scene.box);
+  const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
+  const StagePlan plan = PlanOf(settings, capture, scene.box, backend);
   context->console->Info("the fit will take " + PlanText(plan));
-  CheckFitsMemory(plan,
-                  PlannedMemory(settings.run.max_memory_gb, ReadMemoryStatus().available));
+  if (backend == Backend::kCuda)
+    CheckFitsMemory(plan,
+                    PlannedMemory(settings.run.max_memory_gb, static_cast<uint64_t>(ReadDeviceStatus().free_bytes)),
+                    "GPU memory");
+  else
+    CheckFitsMemory(plan, PlannedMemory(settings.run.max_memory_gb, ReadMemoryStatus().available));
 
   const std::vector<int> fitted = ViewIndices(capture, settings.run.holdout, false);
   std::vector<Image> photos;
@@ -107,7 +112,6 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
     hooks.resume = &*resume;
     context->console->Info("reconstruct: goes on from its checkpoint");
   }
-  const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
   const FitResult fit = FitField(views, scene.box, options, hooks, backend);
 
   WriteFieldFile(workspace.Path("field.npz"), {fit.field, scene.field_from_world, scene.ndc});
@@ -118,7 +122,7 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   outcome.figures["rays"] = fit.rays;
   outcome.figures["voxels"] = fit.field.geometry->num_voxels();
   outcome.figures["psnr_train_db"] = fit.psnr_train_db;
-  MeasureHeldOut(context, capture, ReadFieldFile(workspace.Path("field.npz")),
+  MeasureHeldOut(context, capture, ReadFieldFile(workspace.Path("field.npz")), backend,
                  &outcome.figures);
   return outcome;
 }
@@ -140,7 +144,8 @@ Stage ReconstructStage(RunContext* context) {
     const Capture capture = ReadCapture(context->workspace->Path("poses"));
     stage.plan = PlanText(PlanOf(context->settings, capture, ProfileScene(capture, context->settings.fit.sh_degree,
                                         context->settings.run.effects)
-                               .scene.box));
+                               .scene.box,
+                                 ChooseBackend(run.device, run.reproducible)));
   }
   stage.work = [context, inputs = stage.inputs](const ProgressFunction& progress) {
     return Reconstruct(context, inputs, progress);

@@ -32,7 +32,7 @@ Image Wiped(const Image& left, const Image& right, int frame, int frames) {
 // Films of frames that are on disk already, of the sequences `prefix` + "source" and "styled".
 // A machine without H.264 has none.
 void WriteFilms(RunContext* context, const std::string& prefix, int frames,
-                std::vector<std::string>* outputs) {
+                const ProgressFunction& progress, std::vector<std::string>* outputs) {
   const Workspace& workspace = *context->workspace;
   const auto frame = [&](const char* sequence, int i) {
     return ReadImage(workspace.Path("frames/" + prefix + sequence + "/" + FrameName(i)));
@@ -44,6 +44,7 @@ void WriteFilms(RunContext* context, const std::string& prefix, int frames,
     VideoWriter wipe(workspace.Path("source_vs_styled.mp4"), first.width, first.height,
                      context->settings.render.fps);
     for (int i = 0; i < frames; ++i) {
+      if (Report(progress, i, frames, "films") == Verdict::kAbort) throw Interrupted();
       const Image styled = frame("styled", i), source = frame("source", i);
       if (!styled.SameSize(first)) {
         context->console->Info("no film: the photos have different sizes");
@@ -107,8 +108,11 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
 
   std::filesystem::remove_all(workspace.Path("frames"));
   const int num_views = static_cast<int>(views.size()), num_way = static_cast<int>(way.size());
+  constexpr double kFilms = 0.1;  // of the frames' time
+  ProgressParts parts(progress, 1 + kFilms);
+  const ProgressFunction frames_progress = parts.Next(1);
   for (int i = 0; i < num_views + num_way; ++i) {
-    if (Report(progress, i, num_views + num_way) == Verdict::kAbort) throw Interrupted();
+    if (Report(frames_progress, i, num_views + num_way) == Verdict::kAbort) throw Interrupted();
     if (i < num_views)
       RenderFrame(context, &studio, views[static_cast<size_t>(i)], "", i);
     else
@@ -118,7 +122,7 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   StageOutcome outcome;
   outcome.outputs = {"frames"};
   WriteFilms(context, film_of_views ? "" : kPathPrefix, film_of_views ? num_views : num_way,
-             &outcome.outputs);
+             parts.Next(kFilms), &outcome.outputs);
   const int frames = num_views + num_way;
   outcome.figures["device"] = DeviceName(backend);
   outcome.figures["frames"] = frames;

@@ -121,15 +121,6 @@ TEST_F(DeviceStyle, MlpLessThanATile) { CheckMlp(1); }
 TEST_F(DeviceStyle, MlpNoWholeTiles) { CheckMlp(37); }
 TEST_F(DeviceStyle, LargeMlpOfTwoChunks) { CheckMlp(70001); }
 
-double RelativeDifference(const std::vector<double>& a, const std::vector<double>& b) {
-  double difference = 0, norm = 0;
-  for (size_t i = 0; i < a.size(); ++i) {
-    difference += (a[i] - b[i]) * (a[i] - b[i]);
-    norm += b[i] * b[i];
-  }
-  return std::sqrt(difference / norm);
-}
-
 // Loss, gradient and counts of the device's path against the CPU's, which the tests hold to Algorithm 1 in double.
 void CheckLossAndGradient(int side) {
   for (const int basis : {9, 4, 1}) {

@@ -8,6 +8,7 @@ namespace regrade {
 namespace {
 
 constexpr Vec3f kCube{1, 1, 1};
+constexpr uint64_t kProgram = static_cast<uint64_t>(kProgramBytes);
 
 FitOptions Fit(const std::vector<int>& resolutions, const std::vector<int>& steps) {
   FitOptions options;
@@ -18,33 +19,33 @@ FitOptions Fit(const std::vector<int>& resolutions, const std::vector<int>& step
 }
 
 TEST(Plan, MemoryOfOneStageByHand) {
-  // 100^3 vertices, all stored: values, moments, the pruned copy and gradients of 128 B,
-  // vertex, slot and two arenas of 4 B; two dense grids of 9 B. 1000 pixels of 18 B.
+  // 100^3 vertices, all stored: values, moments, both packed and gradients of 128 B,
+  // vertex, slot and two arenas of 4 B; two dense grids of 12 B. 1000 pixels of 18 B.
   const StagePlan plan = PlanFit(Fit({100}, {10}), 1000, kCube, 2);
-  EXPECT_EQ(plan.memory, 1000000u * (4 * 128 + 4 * 4 + 2 * 12) + 18000u);
+  EXPECT_EQ(plan.memory, kProgram + 1000000u * (5 * 128 + 4 * 4 + 2 * 12) + 18000u);
 }
 
 TEST(Plan, LaterStagesStoreAShare) {
-  // 200^3 at a fifth outweighs 100^3 in full.
+  // 200^3 at two fifths outweighs 100^3 in full.
   const StagePlan plan = PlanFit(Fit({100, 200}, {10, 10}), 0, kCube, 2);
-  EXPECT_EQ(plan.memory, 1600000u * (4 * 128 + 4 * 4) + 8000000u * 2 * 12);
-  // A coarse stage in full can be the peak: 0.2 * 110^3 < 100^3.
+  EXPECT_EQ(plan.memory, kProgram + 3200000u * (5 * 128 + 4 * 4) + 8000000u * 2 * 12);
+  // A coarse stage in full can be the peak: 0.4 * 110^3 < 100^3.
   EXPECT_EQ(PlanFit(Fit({100, 110}, {10, 10}), 0, kCube, 2).memory,
             PlanFit(Fit({100}, {10}), 0, kCube, 2).memory);
 }
 
 TEST(Plan, MemoryFollowsBoxDegreeAndThreads) {
   const FitOptions fit = Fit({64, 128}, {10, 10});
-  const uint64_t cube = PlanFit(fit, 0, kCube, 2).memory;
-  const uint64_t flat = PlanFit(fit, 0, {1, 1, 0.25f}, 2).memory;
+  const uint64_t cube = PlanFit(fit, 0, kCube, 2).memory - kProgram;
+  const uint64_t flat = PlanFit(fit, 0, {1, 1, 0.25f}, 2).memory - kProgram;
   // Sides are rounded to whole voxels.
   EXPECT_NEAR(static_cast<double>(flat), 0.25 * static_cast<double>(cube), 0.02 * cube);
-  EXPECT_GT(PlanFit(fit, 0, kCube, 16).memory, cube);
+  EXPECT_GT(PlanFit(fit, 0, kCube, 16).memory - kProgram, cube);
   FitOptions plain = fit;
   plain.sh_degree = 0;  // records of 4 lanes instead of 32
-  const double voxels = 0.2 * 128 * 128 * 128;
-  EXPECT_NEAR(static_cast<double>(cube - PlanFit(plain, 0, kCube, 2).memory),
-              voxels * 4 * (128 - 16), 2);  // whole bytes
+  const double voxels = 0.4 * 128 * 128 * 128;
+  EXPECT_NEAR(static_cast<double>(cube + kProgram - PlanFit(plain, 0, kCube, 2).memory),
+              voxels * 5 * (128 - 16), 2);  // whole bytes
 }
 
 TEST(Plan, TimeFollowsRaysResolutionAndThreads) {
@@ -56,6 +57,16 @@ TEST(Plan, TimeFollowsRaysResolutionAndThreads) {
   EXPECT_NEAR(PlanStyle(300, 4).seconds, 11.25, 1e-9);
 }
 
+TEST(Plan, DeviceMemoryByHand) {
+  // 100^3 vertices, all stored: three records of 128 B and an index; link, density, two distances; 1 GiB of samples.
+  const StagePlan one = PlanFitOnDevice(Fit({100}, {10}), 1000, kCube);
+  EXPECT_EQ(one.memory, 1000000u * (3 * 128 + 4 + 10) + 6000u + (1u << 30));
+  // The coarser grid and its weights stay until the finer one, two fifths of it stored, is there.
+  const StagePlan two = PlanFitOnDevice(Fit({100, 200}, {10, 10}), 0, kCube);
+  EXPECT_EQ(two.memory,
+            1000000u * (3 * 128 + 4 + 10 + 4) + 3200000u * (3 * 128 + 4) + 8000000u * 10 + (1u << 30));
+}
+
 TEST(Plan, TooLittleMemoryNamesWhatToLower) {
   const StagePlan plan{2000000000, 252};
   EXPECT_EQ(PlanText(plan), "about 2.0 GB of memory and 4 min 12 s");
@@ -65,6 +76,7 @@ TEST(Plan, TooLittleMemoryNamesWhatToLower) {
   EXPECT_NO_THROW(CheckFitsMemory(plan, 2000000000));
   EXPECT_NO_THROW(CheckFitsMemory(plan, 0));  // not known
   EXPECT_REGRADE_ERROR(CheckFitsMemory(plan, 1999999999), ExitCode::kResources, "2.0 GB");
+  EXPECT_REGRADE_ERROR(CheckFitsMemory(plan, 1999999999, "GPU memory"), ExitCode::kResources, "GPU memory");
   try {
     CheckFitsMemory(plan, 1);
   } catch (const Error& error) {

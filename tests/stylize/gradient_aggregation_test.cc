@@ -29,15 +29,6 @@ double PlainGradient(const LipschitzNetwork& network, const RadianceField& field
   return loss;
 }
 
-double RelativeDifference(const std::vector<double>& a, const std::vector<double>& b) {
-  double difference = 0, norm = 0;
-  for (size_t i = 0; i < a.size(); ++i) {
-    difference += (a[i] - b[i]) * (a[i] - b[i]);
-    norm += b[i] * b[i];
-  }
-  return std::sqrt(difference / norm);
-}
-
 std::vector<double> NoGradient() {
   return std::vector<double>(static_cast<size_t>(LipschitzNetwork::NumParameters()));
 }

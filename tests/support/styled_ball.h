@@ -183,6 +183,16 @@ inline StyleRays SomeRays(int views, int size) {
   return batch;
 }
 
+// |a - b| / |b|
+inline double RelativeDifference(const std::vector<double>& a, const std::vector<double>& b) {
+  double difference = 0, norm = 0;
+  for (size_t i = 0; i < a.size(); ++i) {
+    difference += (a[i] - b[i]) * (a[i] - b[i]);
+    norm += b[i] * b[i];
+  }
+  return std::sqrt(difference / norm);
+}
+
 struct Threads {
   explicit Threads(int n) : before(omp_get_max_threads()) { omp_set_num_threads(n); }
   ~Threads() { omp_set_num_threads(before); }
