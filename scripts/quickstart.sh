@@ -2,7 +2,7 @@
 # From a fresh checkout to a styled film.
 #   quickstart.sh                 makes a synthetic capture and styles it with a picture of ours
 #   quickstart.sh PHOTOS STYLE    styles a folder of photographs with a picture
-# Results are in regrade_out/ of the folder it is started in. The build is for the CPU; with REGRADE_CUDA=AUTO in the
+# Results are in regrade_out/ of the folder it is started in, those of the synthetic capture in regrade_demo/. The build is for the CPU; with REGRADE_CUDA=AUTO in the
 # environment it also builds for the GPU if nvcc is found, which takes minutes longer.
 set -euo pipefail
 
@@ -21,13 +21,12 @@ cmake --build "$build" --target regrade --parallel "$(nproc)"
 regrade=$build/pipeline/regrade
 
 if [[ $# -eq 2 ]]; then
-  photos=$1 style=$2
+  photos=$1 style=$2 out=$PWD/regrade_out
 else
   capture=$root/build/quickstart/capture
   [[ -d $capture/images ]] || "$regrade" synth "$capture" --scene table
-  photos=$capture/images style=$root/assets/style_sunset.png
+  photos=$capture/images style=$root/assets/style_sunset.png out=$PWD/regrade_demo
 fi
-out=$PWD/regrade_out
 
 "$regrade" run "$photos" --style "$style" --out "$out" --preset draft
 
