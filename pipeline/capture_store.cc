@@ -87,7 +87,8 @@ ColmapModel ModelFromLlff(const CaptureSource& source, const std::vector<StagedP
     throw Error(ExitCode::kInput,
                 std::to_string(poses.cameras.size()) + " poses, but " +
                     std::to_string(photos.size()) + " usable photos in " + source.photos,
-                source.poses, "an LLFF file names no photos: all of its pictures must be there");
+                source.poses,
+                "an LLFF file names no photos: all of its pictures must be there");
   *nearest_depth = poses.nearest;
   ColmapModel model;
   for (size_t i = 0; i < photos.size(); ++i) {
@@ -172,7 +173,8 @@ Capture ImportPoses(const CaptureSource& source, const std::vector<StagedPhoto>&
     model = ModelFromLlff(source, photos, &nearest_depth);
   } else {
     model = ReadColmapModel(source.poses);
-    if (source.kind == CaptureKind::kPosed) nearest_depth = NearestDepth(ReadJsonFile(IndexOf(source)));
+    if (source.kind == CaptureKind::kPosed)
+      nearest_depth = NearestDepth(ReadJsonFile(IndexOf(source)));
     // The model goes on under our names; images without a staged photo keep theirs.
     std::map<std::string, std::string> name_of;
     for (const StagedPhoto& photo : photos) name_of[photo.file] = photo.name;

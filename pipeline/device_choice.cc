@@ -13,7 +13,8 @@ constexpr int kLeastCapability = 75;  // what the build is made for: Turing and 
 Backend ChooseBackend(const std::string& device, bool reproducible) {
   if (device == "cpu") return Backend::kCpu;
   if (device == "cuda" && reproducible)
-    throw Error(ExitCode::kUsage, "the GPU's sums have no fixed order", "--device cuda --reproducible",
+    throw Error(ExitCode::kUsage, "the GPU's sums have no fixed order",
+                "--device cuda --reproducible",
                 "use --device cpu, or leave out --reproducible");
   if (reproducible) return Backend::kCpu;
   const DeviceStatus status = ReadDeviceStatus();

@@ -6,7 +6,7 @@
 namespace regrade {
 namespace {
 
-constexpr double kWindowShare = 0.1;      // of the work
+constexpr double kWindowShare = 0.1;   // of the work
 constexpr double kShortestWindow = 3;  // seconds
 constexpr size_t kMostPoints = 512;
 
@@ -41,11 +41,12 @@ std::optional<double> EtaEstimator::Remaining() const {
   if (last.seconds < 1 || !(last.done > first.done) || !(last.seconds > first.seconds))
     return std::nullopt;
   double rate = (last.done - first.done) / (last.seconds - first.seconds);
-  // Where a unit of work is not always the same time, the pace of late and that of all so far err to both sides; a slow
-  // start must be forgotten all the same.
+  // Where a unit of work is not always the same time, the pace of late and that of all so far
+  // err to both sides; a slow start must be forgotten all the same.
   constexpr double kShareOfAll = 0.35;
   if (last.seconds > start_.seconds && last.done > start_.done)
-    rate *= std::pow((last.done - start_.done) / (last.seconds - start_.seconds) / rate, kShareOfAll);
+    rate *= std::pow((last.done - start_.done) / (last.seconds - start_.seconds) / rate,
+                     kShareOfAll);
   return std::max(0.0, (total_ - last.done) / rate);
 }
 

@@ -6,8 +6,9 @@
 
 namespace regrade {
 
-// The rate is measured over a window (a tenth of the work, at least 3 s), so that a slow start and a change of pace are
-// forgotten, and single slow steps are not noticed; the pace since the start has a third of the say.
+// The rate is measured over a window (a tenth of the work, at least 3 s), so that a slow start
+// and a change of pace are forgotten, and single slow steps are not noticed; the pace since the
+// start has a third of the say.
 class EtaEstimator {
  public:
   // `seconds` since the stage began, from a clock that never goes back; `done` of `total`.

@@ -5,8 +5,8 @@
 // f16[N,27], basis_type i64 (1: spherical harmonics). Colours of a lower degree are padded with
 // zeros to 9 harmonics a channel. Ours: regrade_version i32, regrade_basis i32,
 // regrade_background f32[3], regrade_near_clip f32, regrade_step f32 (voxels),
-// regrade_field_from_world f64[13] (scale, rotation by rows, translation), regrade_ndc f64[2] where
-// the field is in normalised device coordinates (ndc.h).
+// regrade_field_from_world f64[13] (scale, rotation by rows, translation), regrade_ndc f64[2]
+// where the field is in normalised device coordinates (ndc.h).
 #pragma once
 
 #include <cstdint>

@@ -18,7 +18,7 @@ class FieldRenderer {
  private:
   Backend backend_;
   MarchOptions march_;
-  FastGrid grid_;      // one of the two
+  FastGrid grid_;  // one of the two
   DeviceGrid device_;
 };
 

@@ -27,7 +27,8 @@ std::string PackFitState(const FitState& state) {
   BytePacker packer;
   constexpr size_t kHead = 256;  // generously
   packer.Reserve(kHead + sizeof(int32_t) * static_cast<size_t>(grid.links.size()) +
-                 sizeof(float) * static_cast<size_t>(grid.records.size() + state.second_moment.size()));
+                 sizeof(float) *
+                     static_cast<size_t>(grid.records.size() + state.second_moment.size()));
   packer.Value(kVersion);
   packer.Value(grid.basis);
   packer.Value(state.stage);

@@ -16,8 +16,12 @@ constexpr int64_t kMaxSide = 1 << 14;
 
 // width, height, fx, fy, cx, cy, lens, distortion [8], rotation [9] by rows, translation [3].
 void PackCamera(const Camera& camera, double* v) {
-  const double head[] = {static_cast<double>(camera.width), static_cast<double>(camera.height),
-                         camera.fx, camera.fy, camera.cx, camera.cy,
+  const double head[] = {static_cast<double>(camera.width),
+                         static_cast<double>(camera.height),
+                         camera.fx,
+                         camera.fy,
+                         camera.cx,
+                         camera.cy,
                          static_cast<double>(camera.lens)};
   v = std::copy(std::begin(head), std::end(head), v);
   v = std::copy(camera.distortion.begin(), camera.distortion.end(), v);
@@ -27,8 +31,8 @@ void PackCamera(const Camera& camera, double* v) {
 
 Camera UnpackCamera(const double* v, const std::string& where) {
   if (!std::all_of(v, v + kCameraValues, [](double x) { return std::isfinite(x); }) ||
-      !(v[0] >= 1 && v[0] <= kMaxSide && v[1] >= 1 && v[1] <= kMaxSide && v[2] > 0 && v[3] > 0 &&
-        v[6] >= 0 && v[6] <= static_cast<double>(LensModel::kFisheye)))
+      !(v[0] >= 1 && v[0] <= kMaxSide && v[1] >= 1 && v[1] <= kMaxSide && v[2] > 0 &&
+        v[3] > 0 && v[6] >= 0 && v[6] <= static_cast<double>(LensModel::kFisheye)))
     throw Error(ExitCode::kInput, "a camera is out of range", where, "pack the capture again");
   Camera camera;
   camera.width = static_cast<int>(v[0]);
@@ -88,8 +92,8 @@ void WritePackedCapture(const std::string& path, const PackedCapture& capture) {
     names += view.file + '\0';
   }
   const SceneBox& box = capture.scene.box;
-  const float box_values[] = {box.center.x, box.center.y, box.center.z, box.radius.x, box.radius.y,
-                              box.radius.z, box.near_clip};
+  const float box_values[] = {box.center.x, box.center.y, box.center.z, box.radius.x,
+                              box.radius.y, box.radius.z, box.near_clip};
   const Similarity& similarity = capture.scene.field_from_world;
   double placement[13] = {similarity.scale};
   for (int i = 0; i < 9; ++i) placement[1 + i] = similarity.rotation(i / 3, i % 3);
@@ -109,7 +113,8 @@ void WritePackedCapture(const std::string& path, const PackedCapture& capture) {
   Buffer<uint8_t> style(capture.style.num_pixels() * 3);  // the writer reads it when it writes
   if (style.size() > 0) {
     PackPixels(capture.style, style.data());
-    file.Add("style", {capture.style.height, capture.style.width, 3}, style.data(), NpzPacking::kDeflate);
+    file.Add("style", {capture.style.height, capture.style.width, 3}, style.data(),
+             NpzPacking::kDeflate);
   }
   file.WriteTo(path);
 }
@@ -162,8 +167,8 @@ PackedCapture ReadPackedCapture(const std::string& path) {
     name_begin = std::min(name_end + 1, names.size());
     const int64_t bytes = BytesOf(view.camera);
     if (bytes > pixels.bytes.size() - at)
-      throw Error(ExitCode::kInput, "holds fewer pixels than its cameras have", path + ": pixels",
-                  "pack the capture again");
+      throw Error(ExitCode::kInput, "holds fewer pixels than its cameras have",
+                  path + ": pixels", "pack the capture again");
     view.photo = UnpackPixels(pixels.bytes.data() + at, view.camera.width, view.camera.height);
     at += bytes;
     capture.views.push_back(std::move(view));

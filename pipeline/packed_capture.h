@@ -1,8 +1,9 @@
-// A capture in one file, for a machine that has a GPU and nothing else: decoded photos at working size,
-// cameras in the field's frame, the box, and which views are kept for measuring.
+// A capture in one file, for a machine that has a GPU and nothing else: decoded photos at
+// working size, cameras in the field's frame, the box, and which views are kept for measuring.
 //
-// The file is a deflated .npz. Pixels are 8 bits a channel, each row stored as differences (modulo 256) to the
-// pixel on the left, which deflates to two thirds; photos that were scaled down lose what lies below a level.
+// The file is a deflated .npz. Pixels are 8 bits a channel, each row stored as differences
+// (modulo 256) to the pixel on the left, which deflates to two thirds; photos that were scaled
+// down lose what lies below a level.
 #pragma once
 
 #include <string>

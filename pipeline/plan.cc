@@ -12,9 +12,9 @@
 namespace regrade {
 namespace {
 
-constexpr double kGridBytes = 4 + 8;      // a vertex: link, and density with link again
-constexpr double kPixelBytes = 12 + 6;    // floats as read, 16 bits a channel as drawn
-constexpr double kIndexBytes = 4;         // vertex of a voxel, slot of a voxel, and back
+constexpr double kGridBytes = 4 + 8;    // a vertex: link, and density with link again
+constexpr double kPixelBytes = 12 + 6;  // floats as read, 16 bits a channel as drawn
+constexpr double kIndexBytes = 4;       // vertex of a voxel, slot of a voxel, and back
 
 // Rates are of two threads.
 double Shared(double seconds, int threads) { return seconds * 2 / std::max(threads, 1); }
@@ -49,7 +49,8 @@ StagePlan PlanFit(const FitOptions& options, int64_t photo_pixels, const Vec3f& 
   return {static_cast<uint64_t>(kProgramBytes + field + photos), Shared(seconds, threads)};
 }
 
-StagePlan PlanFitOnDevice(const FitOptions& options, int64_t photo_pixels, const Vec3f& box_radius) {
+StagePlan PlanFitOnDevice(const FitOptions& options, int64_t photo_pixels,
+                          const Vec3f& box_radius) {
   constexpr double kSampleStore = 1 << 30, kVertexBytes = 4 + 4 + 1 + 1, kSamplesPerRay = 40;
   const double record = 4.0 * RecordLanes(BasisOfDegree(options.sh_degree));
   double peak = 0, coarser = 0, seconds = 0;
@@ -60,9 +61,11 @@ StagePlan PlanFitOnDevice(const FitOptions& options, int64_t photo_pixels, const
     const double field = voxels * (3 * record + kIndexBytes) + vertices * kVertexBytes;
     peak = std::max(peak, field + coarser);
     coarser = field + 4 * voxels;  // its weights say what is kept
-    seconds += static_cast<double>(options.steps[s]) * options.rays_per_step * kSamplesPerRay / kDeviceSamplesPerSecond;
+    seconds += static_cast<double>(options.steps[s]) * options.rays_per_step * kSamplesPerRay /
+               kDeviceSamplesPerSecond;
   }
-  return {static_cast<uint64_t>(peak + kSampleStore + 6.0 * static_cast<double>(photo_pixels)), seconds};
+  return {static_cast<uint64_t>(peak + kSampleStore + 6.0 * static_cast<double>(photo_pixels)),
+          seconds};
 }
 
 StagePlan PlanPoses(int64_t photos, int threads) {
@@ -87,7 +90,8 @@ void CheckFitsMemory(const StagePlan& plan, uint64_t limit, const char* memory) 
   if (limit == 0 || plan.memory <= limit) return;
   throw Error(ExitCode::kResources,
               "the fit would take about " + MemoryText(static_cast<double>(plan.memory)) +
-                  " of " + memory + ", of " + MemoryText(static_cast<double>(limit)) + " that it may",
+                  " of " + memory + ", of " + MemoryText(static_cast<double>(limit)) +
+                  " that it may",
               "reconstruct",
               "use --preset draft or smaller --fit-resolutions; memory grows with their cube");
 }

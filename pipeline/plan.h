@@ -1,10 +1,11 @@
 // What a run will take, estimated before it starts, from sizes and rates that were measured.
 //
-// A fit's memory peaks where its largest stage writes a checkpoint, or is pruned: values and moments of a record of
-// floats a voxel and both packed, or the pruned copy; indices and gradients a voxel in each arena; two dense grids of
-// links and densities (12 B) a vertex; 18 B for each pixel of the photos (12 B as read, 6 B as rays draw them); and the
-// program itself. The first stage stores every vertex; of later ones kStoredShare is stored. Gradients of a step are
-// taken to touch each voxel once.
+// A fit's memory peaks where its largest stage writes a checkpoint, or is pruned: values and
+// moments of a record of floats a voxel and both packed, or the pruned copy; indices and
+// gradients a voxel in each arena; two dense grids of links and densities (12 B) a vertex; 18 B
+// for each pixel of the photos (12 B as read, 6 B as rays draw them); and the program itself.
+// The first stage stores every vertex; of later ones kStoredShare is stored. Gradients of a
+// step are taken to touch each voxel once.
 #pragma once
 
 #include <cstdint>
@@ -21,9 +22,10 @@ inline constexpr double kProgramBytes = 150e6;
 // Of two threads, at a grid of kRateResolution a side; a ray's cost grows with the resolution.
 inline constexpr double kRaysPerSecond = 105e3;  // 80 to 138 on three captures
 inline constexpr double kRateResolution = 160;
-inline constexpr double kDeviceSamplesPerSecond = 4e8;  // of an H200, fit and step together: 270 to 450 on three captures
+inline constexpr double kDeviceSamplesPerSecond =
+    4e8;  // of an H200, fit and step together: 270 to 450 on three captures
 inline constexpr double kStyleSecondsPerStep = 0.075;  // of two threads
-inline constexpr double kPoseSecondsPerPhoto = 2;    // COLMAP's, of two threads
+inline constexpr double kPoseSecondsPerPhoto = 2;      // COLMAP's, of two threads
 
 struct StagePlan {
   uint64_t memory = 0;  // bytes at the peak; 0 where it is not planned
@@ -34,9 +36,11 @@ struct StagePlan {
 // the scene's box; (1, 1, 1), the most, where it is not known yet.
 StagePlan PlanFit(const FitOptions& options, int64_t photo_pixels, const Vec3f& box_radius,
                   int threads);
-// The same on a GPU: values, gradients and moments of a voxel side by side; links, densities and distances of a vertex;
-// the coarser grid beside the finer one while it is resampled; 6 B a pixel; and the store of samples in flight.
-StagePlan PlanFitOnDevice(const FitOptions& options, int64_t photo_pixels, const Vec3f& box_radius);
+// The same on a GPU: values, gradients and moments of a voxel side by side; links, densities
+// and distances of a vertex; the coarser grid beside the finer one while it is resampled; 6 B a
+// pixel; and the store of samples in flight.
+StagePlan PlanFitOnDevice(const FitOptions& options, int64_t photo_pixels,
+                          const Vec3f& box_radius);
 StagePlan PlanPoses(int64_t photos, int threads);
 StagePlan PlanStyle(int64_t steps, int threads);
 

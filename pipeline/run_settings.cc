@@ -58,7 +58,8 @@ void ApplyPreset(const std::string& preset, RunSettings* settings) {
 }
 
 void ApplyRecipeFlag(OptionSet* options, RunSettings* settings) {
-  if (const auto recipe = options->Given("recipe")) ApplyStyleRecipe(*recipe, &settings->network);
+  if (const auto recipe = options->Given("recipe"))
+    ApplyStyleRecipe(*recipe, &settings->network);
 }
 
 void CheckTogether(const RunSettings& settings) {

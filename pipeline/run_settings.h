@@ -70,8 +70,8 @@ struct RunSettings {
 // Sets what a preset and, within it, a recipe decide, before single options are read: "draft",
 // "standard", "paper", "best". Throws Error(kUsage) for another name.
 void ApplyPreset(const std::string& preset, RunSettings* settings);
-// --recipe, where it was given, decides every option of the network that other flags do not: call it before
-// ApplyFlags. Throws Error(kUsage) for a recipe that does not exist.
+// --recipe, where it was given, decides every option of the network that other flags do not:
+// call it before ApplyFlags. Throws Error(kUsage) for a recipe that does not exist.
 void ApplyRecipeFlag(OptionSet* options, RunSettings* settings);
 
 // Options that are fine alone and contradict each other: Error(kUsage) naming both.

@@ -17,7 +17,8 @@ constexpr int kOutlineSide = 512;
 constexpr double kAlphaShare = 0.02;  // of the pixels; less is a photo with a soft edge
 constexpr const char* kNames[] = {"ndc", "alpha"};
 
-EffectReport Row(const char* name, bool on, double value, double threshold, const char* evidence) {
+EffectReport Row(const char* name, bool on, double value, double threshold,
+                 const char* evidence) {
   return {name, on, evidence, value, threshold};
 }
 
@@ -33,8 +34,8 @@ std::string AlphaPath(const CaptureView& view) {
   return dot == std::string::npos ? "" : view.path.substr(0, dot) + ".alpha.png";
 }
 
-// An outline of at most kOutlineSide pixels, each the most opaque of those it stands for: hundreds of large
-// photos need not be in memory at once.
+// An outline of at most kOutlineSide pixels, each the most opaque of those it stands for:
+// hundreds of large photos need not be in memory at once.
 Outline Reduced(const Outline& full) {
   const int side = std::max(full.alpha.width, full.alpha.height);
   const int factor = (side + kOutlineSide - 1) / kOutlineSide;
@@ -81,10 +82,12 @@ std::map<std::string, bool> ParseEffects(const std::string& text) {
     const size_t equals = word.find('=');
     const std::string name = word.substr(0, equals);
     const std::string wish = equals == std::string::npos ? "" : word.substr(equals + 1);
-    const bool known = std::find(std::begin(kNames), std::end(kNames), name) != std::end(kNames);
+    const bool known =
+        std::find(std::begin(kNames), std::end(kNames), name) != std::end(kNames);
     if (!known || (wish != "on" && wish != "off"))
       throw Error(ExitCode::kUsage, "'" + word + "' is not allowed", "--effects",
-                  "auto, or ndc=on|off and alpha=on|off, with commas between; --sh-degree sets view dependence");
+                  "auto, or ndc=on|off and alpha=on|off, with commas between; --sh-degree sets "
+                  "view dependence");
     wishes[name] = wish == "on";
   }
   return wishes;
@@ -110,9 +113,9 @@ SceneProfile ProfileScene(const Capture& capture, int sh_degree, const std::stri
 
   const ForwardFacing forward = MeasureForwardFacing(capture);
   const bool ndc = decided("ndc", forward.on && !alpha);
-  profile.effects.push_back(
-      Row("ndc", ndc, forward.angle_deg, kForwardAngle,
-          "on where all cameras look one way: largest angle of an optical axis to their mean, degrees"));
+  profile.effects.push_back(Row("ndc", ndc, forward.angle_deg, kForwardAngle,
+                                "on where all cameras look one way: largest angle of an "
+                                "optical axis to their mean, degrees"));
   profile.effects.push_back(Row("alpha", alpha, clear, kAlphaShare,
                                 "share of transparent pixels, where every photo has some"));
   profile.effects.push_back(Row("view-dependence", sh_degree > 0, sh_degree, 0,

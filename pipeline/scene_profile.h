@@ -1,4 +1,5 @@
-// What the scene calls for, decided from what was measured of its capture, and the space that follows from it.
+// What the scene calls for, decided from what was measured of its capture, and the space that
+// follows from it.
 #pragma once
 
 #include <map>
@@ -12,21 +13,22 @@
 
 namespace regrade {
 
-// What the user decided instead: "auto", or "ndc=off,alpha=on" and the like. Throws Error(kUsage) naming the
-// word for anything else.
+// What the user decided instead: "auto", or "ndc=off,alpha=on" and the like. Throws
+// Error(kUsage) naming the word for anything else.
 std::map<std::string, bool> ParseEffects(const std::string& text);
 
 struct SceneProfile {
-  // One row an effect. "distortion": the lens is followed where it moves a picture's corner by more than
-  // kDistortionThreshold (scene_views.h). "ndc": all cameras look one way (forward_facing.h). "alpha": all
-  // photos have transparent parts; white is behind them and the box is the object's. "view-dependence":
-  // colours change with the direction, as `sh_degree` was set.
+  // One row an effect. "distortion": the lens is followed where it moves a picture's corner by
+  // more than kDistortionThreshold (scene_views.h). "ndc": all cameras look one way
+  // (forward_facing.h). "alpha": all photos have transparent parts; white is behind them and
+  // the box is the object's. "view-dependence": colours change with the direction, as
+  // `sh_degree` was set.
   std::vector<EffectReport> effects;
   NormalizedScene scene;
 };
 
-// Free of the photos' order (H154). Throws Error(kScene) where an effect was asked for that the capture
-// does not allow.
+// Free of the photos' order (H154). Throws Error(kScene) where an effect was asked for that the
+// capture does not allow.
 SceneProfile ProfileScene(const Capture& capture, int sh_degree, const std::string& effects);
 
 // "distortion on: 12.3 > 0.5 (pixels, ...)"

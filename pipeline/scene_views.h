@@ -14,8 +14,8 @@ namespace regrade {
 inline constexpr double kDistortionThreshold = 0.5;
 
 // The camera of a photo whose longer side is cut to `longest_side` pixels (never enlarged), in
-// a world transformed by `field_from_world`, its pixel rays in `ndc` where that is on. Its lens is a
-// pinhole up to kDistortionThreshold.
+// a world transformed by `field_from_world`, its pixel rays in `ndc` where that is on. Its lens
+// is a pinhole up to kDistortionThreshold.
 Camera WorkingCamera(const Camera& camera, int longest_side, const Similarity& field_from_world,
                      const NdcSpace& ndc);
 

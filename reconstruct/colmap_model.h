@@ -61,10 +61,10 @@ struct ColmapModel {
   Camera CameraOf(const ColmapImage& image) const;
 };
 
-// Reads `folder`/{cameras,images,points3D}.bin, or .txt where there is no .bin. Nothing in the files is trusted: counts are
-// checked against the bytes left before memory is taken, every id must resolve, numbers must be
-// finite and plausible, nothing may follow. Throws Error(kInput) that names the file, the place
-// and the reason.
+// Reads `folder`/{cameras,images,points3D}.bin, or .txt where there is no .bin. Nothing in the
+// files is trusted: counts are checked against the bytes left before memory is taken, every id
+// must resolve, numbers must be finite and plausible, nothing may follow. Throws Error(kInput)
+// that names the file, the place and the reason.
 ColmapModel ReadColmapModel(const std::string& folder);
 
 // The unit quaternion w x y z of a rotation, w >= 0.

@@ -1,5 +1,6 @@
-// Format: colmap.github.io/format.html. Lines that begin with '#' are comments. An image takes two lines, the
-// second (its keypoints) may be empty; an image's name may hold spaces and ends the first.
+// Format: colmap.github.io/format.html. Lines that begin with '#' are comments. An image takes
+// two lines, the second (its keypoints) may be empty; an image's name may hold spaces and ends
+// the first.
 #include "reconstruct/colmap_text.h"
 
 #include <algorithm>
@@ -16,7 +17,8 @@ class LineReader {
  public:
   LineReader(const std::string& text, const std::string& path) : text_(text), path_(path) {}
 
-  // The next line that is no comment; blank lines count only where `blank_counts`. False at the end.
+  // The next line that is no comment; blank lines count only where `blank_counts`. False at the
+  // end.
   bool Next(bool blank_counts) {
     while (place_ < text_.size()) {
       const size_t end = std::min(text_.find('\n', place_), text_.size());
@@ -128,7 +130,8 @@ void WriteTextFile(const std::string& path, const std::string& text) {
   std::ofstream file(path, std::ios::binary | std::ios::trunc);
   file << text;
   file.close();
-  if (file.fail()) throw Error(ExitCode::kResources, "cannot write it", path, "is the disk full?");
+  if (file.fail())
+    throw Error(ExitCode::kResources, "cannot write it", path, "is the disk full?");
 }
 
 }  // namespace
@@ -156,19 +159,23 @@ void WriteColmapText(const ColmapModel& model, const std::string& folder) {
   for (const ColmapCamera& camera : model.cameras) {
     const ColmapLensInfo& info = InfoOf(camera.lens);
     const Camera& c = camera.intrinsics;
-    cameras += std::to_string(camera.id) + " " + info.name + " " + std::to_string(c.width) + " " +
-               std::to_string(c.height) + " " + NumberText(c.fx);
+    cameras += std::to_string(camera.id) + " " + info.name + " " + std::to_string(c.width) +
+               " " + std::to_string(c.height) + " " + NumberText(c.fx);
     if (info.focals == 2) cameras += " " + NumberText(c.fy);
     cameras += " " + NumberText(c.cx) + " " + NumberText(c.cy);
     for (int i = 0; i < info.coefficients; ++i)
       cameras += " " + NumberText(c.distortion[static_cast<size_t>(i)]);
     cameras += "\n";
   }
-  std::string images = "# IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME\n# POINTS2D[] as (X, Y, POINT3D_ID)\n";
+  std::string images =
+      "# IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME\n# POINTS2D[] as (X, Y, "
+      "POINT3D_ID)\n";
   for (const ColmapImage& image : model.images) {
     images += std::to_string(image.id);
-    for (const double q : QuaternionOf(image.camera_from_world.rotation)) images += " " + NumberText(q);
-    for (int i = 0; i < 3; ++i) images += " " + NumberText(image.camera_from_world.translation[i]);
+    for (const double q : QuaternionOf(image.camera_from_world.rotation))
+      images += " " + NumberText(q);
+    for (int i = 0; i < 3; ++i)
+      images += " " + NumberText(image.camera_from_world.translation[i]);
     images += " " + std::to_string(image.camera_id) + " " + image.name + "\n";
     const char* separator = "";
     for (const ColmapKeypoint& keypoint : image.keypoints) {
@@ -178,7 +185,8 @@ void WriteColmapText(const ColmapModel& model, const std::string& folder) {
     }
     images += "\n";
   }
-  std::string points = "# POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[] as (IMAGE_ID, POINT2D_IDX)\n";
+  std::string points =
+      "# POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[] as (IMAGE_ID, POINT2D_IDX)\n";
   for (const ColmapPoint& point : model.points) {
     points += std::to_string(point.id);
     for (int i = 0; i < 3; ++i) points += " " + NumberText(point.position[i]);

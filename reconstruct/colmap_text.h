@@ -7,9 +7,10 @@
 
 namespace regrade {
 
-// The bytes that `name`.bin would hold for the text of `name`.txt ("cameras", "images" or "points3D"), so that
-// one reader judges both. `path` names the file in errors. Throws Error(kInput) with the line for a word that is
-// no number, a line that ends too early, or an unknown camera model.
+// The bytes that `name`.bin would hold for the text of `name`.txt ("cameras", "images" or
+// "points3D"), so that one reader judges both. `path` names the file in errors. Throws
+// Error(kInput) with the line for a word that is no number, a line that ends too early, or an
+// unknown camera model.
 std::string BinaryOfColmapText(const std::string& name, const std::string& text,
                                const std::string& path);
 

@@ -35,7 +35,8 @@ class FitEngine {
   virtual ~FitEngine() = default;
 
   virtual void Take(FitState state) = 0;  // goes on from it
-  // Shows grid and moments; a processor that has them in the host's memory copies nothing. `use` may set stage and step.
+  // Shows grid and moments; a processor that has them in the host's memory copies nothing.
+  // `use` may set stage and step.
   virtual void Show(const std::function<void(FitState*)>& use) = 0;
   virtual int64_t num_voxels() const = 0;
   virtual Vec3i resolution() const = 0;
@@ -43,13 +44,14 @@ class FitEngine {
   virtual FitSums TakeSums() = 0;  // since the last call; may wait for steps to finish
   // The field as it is now, colours clipped. Nothing of it leaves the device but the picture.
   virtual RenderedView Render(const Camera& camera, const MarchOptions& march) = 0;
-  // Prunes voxels that weigh less than `threshold` in every view and resamples; the optimizer's state
-  // starts anew, as in svox2.
+  // Prunes voxels that weigh less than `threshold` in every view and resamples; the optimizer's
+  // state starts anew, as in svox2.
   virtual void Refine(const MarchOptions& march, float threshold, const Vec3i& resolution) = 0;
 };
 
 // `rays` and what it was made from stay with the caller. shards: gradient arenas of the CPU.
-std::unique_ptr<FitEngine> MakeCpuFitEngine(const TrainingRays* rays, uint64_t seed, int shards);
+std::unique_ptr<FitEngine> MakeCpuFitEngine(const TrainingRays* rays, uint64_t seed,
+                                            int shards);
 // Throws Error(kResources) without CUDA.
 std::unique_ptr<FitEngine> MakeCudaFitEngine(const TrainingRays* rays, uint64_t seed);
 

@@ -1,4 +1,5 @@
-// Steps of a fit on the CPU's fast path: gradients gathered in private arenas, stepped in a fixed order.
+// Steps of a fit on the CPU's fast path: gradients gathered in private arenas, stepped in a
+// fixed order.
 #include <omp.h>
 
 #include <algorithm>
@@ -12,8 +13,8 @@
 namespace regrade {
 namespace {
 
-constexpr int64_t kChunk = 2048;     // slots a task
-constexpr int kPruningStride = 2;    // every other row and column of a view
+constexpr int64_t kChunk = 2048;   // slots a task
+constexpr int kPruningStride = 2;  // every other row and column of a view
 
 class CpuFitEngine : public FitEngine {
  public:
@@ -55,7 +56,8 @@ class CpuFitEngine : public FitEngine {
 
  private:
   void ResetArenas() {
-    for (GradientArena& arena : arenas_) arena.Reset(state_.grid.num_voxels(), state_.grid.lanes());
+    for (GradientArena& arena : arenas_)
+      arena.Reset(state_.grid.num_voxels(), state_.grid.lanes());
   }
 
   void Accumulate(const FitStep& step) {
@@ -63,8 +65,8 @@ class CpuFitEngine : public FitEngine {
     const float scale = 1.0f / (3.0f * static_cast<float>(n));
     const int shards = static_cast<int>(arenas_.size());
     std::vector<FitStepResult> results(arenas_.size());
-    // A contiguous run of vertices is regularised, from a random start, wrapping around; of the run alone,
-    // scaled so that its expectation is lambda times the mean over all voxels.
+    // A contiguous run of vertices is regularised, from a random start, wrapping around; of the
+    // run alone, scaled so that its expectation is lambda times the mean over all voxels.
     const int64_t vertices = state_.grid.frame.NumVertices();
     const int64_t run = static_cast<int64_t>(step.tv_share * static_cast<float>(vertices));
     const int64_t run_begin = static_cast<int64_t>(
@@ -122,7 +124,8 @@ class CpuFitEngine : public FitEngine {
 
 }  // namespace
 
-std::unique_ptr<FitEngine> MakeCpuFitEngine(const TrainingRays* rays, uint64_t seed, int shards) {
+std::unique_ptr<FitEngine> MakeCpuFitEngine(const TrainingRays* rays, uint64_t seed,
+                                            int shards) {
   return std::make_unique<CpuFitEngine>(rays, seed, shards);
 }
 

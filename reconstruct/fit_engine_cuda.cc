@@ -1,5 +1,5 @@
-// Steps of a fit on a CUDA device: photos, field, gradients and moments live there; the host only says what
-// comes next. Float sums in no fixed order, so two runs differ in the last bits.
+// Steps of a fit on a CUDA device: photos, field, gradients and moments live there; the host
+// only says what comes next. Float sums in no fixed order, so two runs differ in the last bits.
 #include <algorithm>
 #include <optional>
 #include <utility>
@@ -17,7 +17,8 @@ constexpr int64_t kSampleStoreBytes = int64_t{1} << 30;
 
 class CudaFitEngine : public FitEngine {
  public:
-  CudaFitEngine(const TrainingRays* rays, uint64_t seed) : seed_(seed), views_(rays->ToDevice()) {}
+  CudaFitEngine(const TrainingRays* rays, uint64_t seed)
+      : seed_(seed), views_(rays->ToDevice()) {}
 
   void Take(FitState state) override {
     grid_ = UploadGrid(state.grid, true, state.second_moment);
@@ -40,7 +41,8 @@ class CudaFitEngine : public FitEngine {
     views_.Draw(seed_, step.number, step.rays, rays_.data(), targets_.data());
     fitter_->Accumulate(grid_, rays_.data(), targets_.data(), step.rays,
                         1.0f / (3.0f * static_cast<float>(step.rays)), &touched_);
-    // The same expectation as the CPU's run of vertices: each stored voxel with the share's probability.
+    // The same expectation as the CPU's run of vertices: each stored voxel with the share's
+    // probability.
     const int64_t voxels = grid_.num_voxels();
     const int64_t run = static_cast<int64_t>(step.tv_share * static_cast<float>(voxels));
     if (run > 0) {
@@ -48,7 +50,8 @@ class CudaFitEngine : public FitEngine {
           RandomIndex(seed_ ^ 0x7476ull, step.number, 0, static_cast<uint64_t>(voxels)));
       const float scale =
           1.0f / (step.tv_share * static_cast<float>(grid_.frame.NumVertices()));
-      AddTotalVariation(grid_, begin, run, step.tv_density * scale, step.tv_sh * scale, &touched_);
+      AddTotalVariation(grid_, begin, run, step.tv_density * scale, step.tv_sh * scale,
+                        &touched_);
     }
     StepOnDevice(&grid_, &touched_, step.optimizer, fitter_->sums());
   }

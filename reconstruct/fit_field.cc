@@ -49,8 +49,8 @@ class Fitter {
     if (hooks_.resume != nullptr) {
       state = *hooks_.resume;
     } else {
-      const GridFrame frame{ResolutionFor(box_.radius, options_.resolutions[0], box_.layers), box_.center,
-                            box_.radius};
+      const GridFrame frame{ResolutionFor(box_.radius, options_.resolutions[0], box_.layers),
+                            box_.center, box_.radius};
       state.grid = MakeInitialGrid(rays_, frame, BasisOf(options_.sh_degree),
                                    options_.initial_density, box_.near_clip, 2);
       if (box_.background) state.grid.background = *box_.background;

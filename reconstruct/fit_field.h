@@ -22,8 +22,9 @@ struct SceneBox {
   Vec3f center{0, 0, 0};
   Vec3f radius{1, 1, 1};
   float near_clip = 0;  // nothing is modelled nearer to a camera than this
-  int layers = 0;  // most vertices along z; 0: as many as the radius asks for
-  std::optional<Vec3f> background;  // sRGB behind everything; not given: the photos' mean colour
+  int layers = 0;       // most vertices along z; 0: as many as the radius asks for
+  std::optional<Vec3f>
+      background;  // sRGB behind everything; not given: the photos' mean colour
 };
 
 // Everything a fit needs to go on as if it had never stopped (H110).
@@ -55,7 +56,8 @@ class FitEngine;
 
 struct FitHooks {
   ProgressFunction progress;
-  // Called when a stage's steps are done and when all is done, before the field leaves its device.
+  // Called when a stage's steps are done and when all is done, before the field leaves its
+  // device.
   std::function<void(FitEngine*)> measure;
   bool keep_field = true;  // false: FitResult::field stays empty
   const FitState* resume = nullptr;

@@ -80,7 +80,8 @@ struct FitOptions {
          {.help = "the same at the end (exponential in between)", .min = 0, .max = 1e4});
     bind("fit-density-delay", density_delay,
          {.unit = "share of all steps",
-          .help = "the rate of densities rises to its course meanwhile, along a sine from a hundredth of it: colours "
+          .help = "the rate of densities rises to its course meanwhile, along a sine from a "
+                  "hundredth of it: colours "
                   "settle before surfaces do, and less fog is left",
           .min = 0,
           .max = 1});

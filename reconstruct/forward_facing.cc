@@ -9,10 +9,11 @@
 namespace regrade {
 namespace {
 
-constexpr double kNearestTail = 0.01;  // share of observations that may be nearer: wrong matches
-constexpr double kNearFactor = 0.75;   // the near plane, as a share of the nearest depth
-constexpr int kLayers = 128;           // along z, as svox2's LLFF configuration has
-constexpr double kLargestRadius = 2;   // half side in NDC; 1 is what the mean camera sees
+constexpr double kNearestTail =
+    0.01;                             // share of observations that may be nearer: wrong matches
+constexpr double kNearFactor = 0.75;  // the near plane, as a share of the nearest depth
+constexpr int kLayers = 128;          // along z, as svox2's LLFF configuration has
+constexpr double kLargestRadius = 2;  // half side in NDC; 1 is what the mean camera sees
 
 Vec3d MeanForward(const Capture& capture) {
   Vec3d sum{};
@@ -76,8 +77,8 @@ NormalizedScene NormalizeForwardFacing(const Capture& capture, const ForwardFaci
   for (const CaptureView& view : capture.views) {
     const Camera camera = view.camera.Transformed(s);
     if (!(camera.Center().z < 1))
-      throw Error(ExitCode::kScene, "stands in front of the near plane of its capture", view.file,
-                  "leave this photo out");
+      throw Error(ExitCode::kScene, "stands in front of the near plane of its capture",
+                  view.file, "leave this photo out");
     for (const double u : {0.5, camera.width - 0.5})
       for (const double v : {0.5, camera.height - 0.5}) {
         RayT<double> ray = camera.WorldRay(u, v);

@@ -6,9 +6,9 @@
 
 namespace regrade {
 
-// NDC is chosen where both hold; every threshold has a margin to where the space fails (a ray must run
-// forward, and a camera must stand behind the near plane).
-inline constexpr double kForwardAngle = 25;      // degrees
+// NDC is chosen where both hold; every threshold has a margin to where the space fails (a ray
+// must run forward, and a camera must stand behind the near plane).
+inline constexpr double kForwardAngle = 25;  // degrees
 inline constexpr double kForwardDepthShare = 0.3;
 
 struct ForwardFacing {
@@ -19,9 +19,9 @@ struct ForwardFacing {
 };
 ForwardFacing MeasureForwardFacing(const Capture& capture);
 
-// The frame of the mean camera, scaled so that the nearest depth is 4/3 (LLFF's factor 0.75), and the box in
-// NDC that every pixel's ray stays in. See EQ(ndc). Throws Error(kScene) with a camera's name where the
-// space is not valid (H87-H90).
+// The frame of the mean camera, scaled so that the nearest depth is 4/3 (LLFF's factor 0.75),
+// and the box in NDC that every pixel's ray stays in. See EQ(ndc). Throws Error(kScene) with a
+// camera's name where the space is not valid (H87-H90).
 NormalizedScene NormalizeForwardFacing(const Capture& capture, const ForwardFacing& measured);
 
 }  // namespace regrade

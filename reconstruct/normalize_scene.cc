@@ -13,8 +13,8 @@ constexpr double kTail = 0.01;    // share of points left out at each end of an 
 constexpr double kMargin = 0.08;  // of the extent, added on both sides
 constexpr double kNearestShare =
     0.6;  // the scene begins at this share of the nearest points' distance
-// What a photo shows beside its points: its corners are taken to be as deep as this share of its
-// points, and all but this share of all photos' corners belong to the scene.
+// What a photo shows beside its points: its corners are taken to be as deep as this share of
+// its points, and all but this share of all photos' corners belong to the scene.
 constexpr double kCornerDepth = 0.25;
 constexpr double kCornerTail = 0.1;
 constexpr size_t kMinPointsOfView = 10;
@@ -102,15 +102,15 @@ Vec3d CommonPoint(const std::vector<Vec3d>& centers, const std::vector<Vec3d>& f
   return FromEigen(a.ldlt().solve(b));
 }
 
-// Where the corners of the photos are, at the depth of the nearer points each sees. Points alone
-// would leave out what has no texture: a third of a picture of an object before a dark room.
+// Where the corners of the photos are, at the depth of the nearer points each sees. Points
+// alone would leave out what has no texture: a third of a picture of an object before a dark
+// room.
 std::vector<Vec3d> PhotoCorners(const Capture& capture) {
   std::vector<std::vector<double>> depths(capture.views.size());
   for (const ScenePoint& point : capture.points)
     for (const int32_t view : point.views) {
       const auto v = static_cast<size_t>(view);
-      const double depth =
-          (capture.views[v].camera.camera_from_world * point.position).z;
+      const double depth = (capture.views[v].camera.camera_from_world * point.position).z;
       if (depth > 0) depths[v].push_back(depth);
     }
   std::vector<Vec3d> corners;

@@ -8,7 +8,7 @@ namespace {
 
 constexpr int kSide = 96;
 constexpr float kOpaque = 0.02f;  // alpha above which a pixel belongs to the object
-constexpr int kBlock = 8;         // pixels: an outline is looked up in blocks, widened by one block
+constexpr int kBlock = 8;  // pixels: an outline is looked up in blocks, widened by one block
 
 // Blocks of an outline that hold a pixel of the object, widened by one.
 struct Blocks {
@@ -42,8 +42,8 @@ struct Blocks {
   }
 };
 
-// No view that sees the point denies it, and half of the views see it: what stands beside all pictures
-// is no part of the object.
+// No view that sees the point denies it, and half of the views see it: what stands beside all
+// pictures is no part of the object.
 bool InHull(const std::vector<Blocks>& views, const Vec3d& point) {
   size_t held = 0;
   for (const Blocks& view : views) {
@@ -86,8 +86,7 @@ NormalizedScene TightenToOutlines(const NormalizedScene& scene,
   Similarity& s = result.field_from_world;
   s.scale /= longest;
   s.translation = (s.translation - (low + high) * 0.5) / longest;
-  for (int a = 0; a < 3; ++a)
-    result.box.radius[a] = static_cast<float>(half[a] / longest);
+  for (int a = 0; a < 3; ++a) result.box.radius[a] = static_cast<float>(half[a] / longest);
   result.box.near_clip = static_cast<float>(scene.box.near_clip / longest);
   result.notice = "";
   return result;

@@ -15,7 +15,8 @@ static_assert(kRowLanes == kFeatureStride && kRowLanes == kMlpEndLanes);
 
 constexpr int64_t kBandRays = 1 << 16;
 
-void AddBaseMap(const LipschitzNetworkData& data, const float* features, int64_t n, float* rows) {
+void AddBaseMap(const LipschitzNetworkData& data, const float* features, int64_t n,
+                float* rows) {
   if (!data.has_base) return;
   const double zeros[kNetworkSh] = {};
   double of_zero[kNetworkSh];
@@ -49,7 +50,8 @@ class DeviceStyleLoss : public StyleLoss {
   AggregationResult Run(const LipschitzNetwork& network, const StyleRays& batch,
                         std::vector<double>* gradient) override {
     AggregationResult result = Touch(network, batch);
-    const MlpPrecision precision = gradient != nullptr ? MlpPrecision::kTensor : MlpPrecision::kSplit;
+    const MlpPrecision precision =
+        gradient != nullptr ? MlpPrecision::kTensor : MlpPrecision::kSplit;
     Forward(network.Effective<float>(), precision);
     AddBaseMap(network.data(), features_.data(), slots_.num_slots, rows_.data());
     if (gradient != nullptr) {
@@ -60,8 +62,8 @@ class DeviceStyleLoss : public StyleLoss {
     ForEachBand([&](int64_t begin, int64_t) {
       BlendBand(begin);
       if (gradient != nullptr)
-        BlendColorsAdjoint(grid_, weights_, slots_, rays_.data() + begin, open_.data(), d_color_.data(),
-                           d_rows_.data());
+        BlendColorsAdjoint(grid_, weights_, slots_, rays_.data() + begin, open_.data(),
+                           d_color_.data(), d_rows_.data());
     });
     DeviceColorLoss sums;
     sums_.CopyOut(&sums, 1);
@@ -75,7 +77,8 @@ class DeviceStyleLoss : public StyleLoss {
     mlp_->AddAdjoint(precision, features_.data(), d_rows_.data(), slots_.num_slots);
     DenseNetwork<double> d_effective;
     for (int l = 0; l < kNetworkLayers; ++l)
-      d_effective.layers.emplace_back(LipschitzNetwork::Outputs(l), LipschitzNetwork::Inputs(l));
+      d_effective.layers.emplace_back(LipschitzNetwork::Outputs(l),
+                                      LipschitzNetwork::Inputs(l));
     mlp_->TakeGradient(&d_effective);
     std::vector<double> sum(gradient->size());
     network.AddGradient(d_effective, &sum);
@@ -103,7 +106,8 @@ class DeviceStyleLoss : public StyleLoss {
       if (!AllFinite(target) || !(left <= options_.max_transmittance)) continue;
       counted.push_back(r);
       sums.opacity.push_back(1 - left);
-      for (int c = 0; c < 3; ++c) sums.missing.push_back(target[c] - color[static_cast<size_t>(r)][c]);
+      for (int c = 0; c < 3; ++c)
+        sums.missing.push_back(target[c] - color[static_cast<size_t>(r)][c]);
     }
     sums.hidden.resize(counted.size() * kMlpHidden);
     std::vector<float> band(static_cast<size_t>(n * kRowLanes));
@@ -139,8 +143,8 @@ class DeviceStyleLoss : public StyleLoss {
     result.touched_voxels = slots_.num_slots;
     Reserve(slots_.num_slots * kRowLanes, "features of touched voxels", &features_);
     Reserve(slots_.num_slots * kRowLanes, "styled voxels", &rows_);
-    GatherRows(grid_, slots_.voxel_of_slot.data(), 0, slots_.num_slots, network.data().position_scale,
-               features_.data());
+    GatherRows(grid_, slots_.voxel_of_slot.data(), 0, slots_.num_slots,
+               network.data().position_scale, features_.data());
     return result;
   }
 
@@ -154,8 +158,8 @@ class DeviceStyleLoss : public StyleLoss {
   }
 
   void March(int64_t begin, DeviceTouched* touched) {
-    weights_.March(grid_, rays_.data() + begin, std::min(kBandRays, num_rays_ - begin), options_.march,
-                   options_.min_weight, touched);
+    weights_.March(grid_, rays_.data() + begin, std::min(kBandRays, num_rays_ - begin),
+                   options_.march, options_.min_weight, touched);
   }
 
   // body(first ray, rays) with weights_ of each band; a single one has been marched already.
@@ -172,9 +176,11 @@ class DeviceStyleLoss : public StyleLoss {
     Reserve(weights_.num_rays, "colours of rays", &color_);
     Reserve(weights_.num_rays, "gradients of colours", &d_color_);
     Reserve(weights_.num_samples, "clamps of samples", &open_);
-    BlendColors(grid_, weights_, slots_, rays_.data() + begin, rows_.data(), color_.data(), open_.data());
-    AddColorLoss(color_.data(), targets_.data() + begin, weights_.transmittance.data(), weights_.num_rays,
-                 {options_.max_transmittance, options_.one_sided}, d_color_.data(), sums_.data());
+    BlendColors(grid_, weights_, slots_, rays_.data() + begin, rows_.data(), color_.data(),
+                open_.data());
+    AddColorLoss(color_.data(), targets_.data() + begin, weights_.transmittance.data(),
+                 weights_.num_rays, {options_.max_transmittance, options_.one_sided},
+                 d_color_.data(), sums_.data());
   }
 
   const DeviceGrid& grid_;
@@ -193,7 +199,8 @@ class DeviceStyleLoss : public StyleLoss {
 
 }  // namespace
 
-std::unique_ptr<StyleLoss> MakeDeviceStyleLoss(const DeviceGrid* grid, const AggregationOptions& options) {
+std::unique_ptr<StyleLoss> MakeDeviceStyleLoss(const DeviceGrid* grid,
+                                               const AggregationOptions& options) {
   return std::make_unique<DeviceStyleLoss>(grid, options);
 }
 

@@ -267,7 +267,7 @@ AggregationResult GradientAggregation::Run(const LipschitzNetwork& network,
 }
 
 StyleLoss::HiddenSums GradientAggregation::SumHidden(const LipschitzNetwork& network,
-                                                               const StyleRays& batch) {
+                                                     const StyleRays& batch) {
   HiddenSums sums;
   const int64_t num_rays = static_cast<int64_t>(batch.rays.size());
   Band band;
@@ -288,7 +288,8 @@ StyleLoss::HiddenSums GradientAggregation::SumHidden(const LipschitzNetwork& net
     }
     sums.hidden.resize(sums.opacity.size() * kMlpHidden);
     for (int half = 0; half < kMlpHidden; half += kFeatureStride) {
-      FusedForward(MakeFusedMlp(HiddenUnits(network, half)), features_.data(), slots, sh_.data());
+      FusedForward(MakeFusedMlp(HiddenUnits(network, half)), features_.data(), slots,
+                   sh_.data());
       size_t next = row;
       for (int64_t r = 0; r < weights.num_rays(); ++r) {
         if (!Counts(batch, band, r)) continue;

@@ -35,7 +35,8 @@ struct AggregationOptions {
   float max_transmittance = 1;  // rays that let more light through are left out
   bool one_sided = false;
   bool divide_by_voxels = false;  // 1 / B instead of 1 / (3 Q)
-  bool every_voxel = false;       // through f at each step, as Algorithm 1 has it: the same gradient, for timing
+  bool every_voxel =
+      false;  // through f at each step, as Algorithm 1 has it: the same gradient, for timing
 };
 
 struct AggregationResult {
@@ -69,7 +70,8 @@ class StyleLoss {
   virtual HiddenSums SumHidden(const LipschitzNetwork& network, const StyleRays& batch) = 0;
 };
 
-// `network` cut off behind its last hidden layer: units first ... first + kFeatureStride - 1 of that are its outputs.
+// `network` cut off behind its last hidden layer: units first ... first + kFeatureStride - 1 of
+// that are its outputs.
 DenseNetwork<float> HiddenUnits(const LipschitzNetwork& network, int first);
 
 // On the CPU. Results do not depend on the number of threads.

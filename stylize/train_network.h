@@ -109,9 +109,10 @@ struct TrainNetworkOptions {
          {.help = "mean over rays and channels, or the paper's sum divided by the voxels",
           .choices = "mean|sum-over-voxels"});
     bind("style-every-voxel", every_voxel,
-         {.help = "sends every voxel through the network at each step, as the paper's Algorithm 1 "
-                  "is written, instead of those that the step's rays touch: the same result, "
-                  "slower; for timing"});
+         {.help =
+              "sends every voxel through the network at each step, as the paper's Algorithm 1 "
+              "is written, instead of those that the step's rays touch: the same result, "
+              "slower; for timing"});
   }
 };
 
@@ -167,8 +168,8 @@ struct TrainNetworkResult {
 // `resume`, unless null, is a state that a checkpoint hook was given, of the same inputs.
 // Throws Error(kInput) for a target of another size or with more than 1 % of pixels that are
 // not finite, Error(kScene) when two steps in a row are not finite. On kFinish the result so
-// far is returned. `device_field`, unless null, is the same field on a device, where the steps are
-// then made.
+// far is returned. `device_field`, unless null, is the same field on a device, where the steps
+// are then made.
 TrainNetworkResult TrainNetwork(const RadianceField& field,
                                 const std::vector<StyledTrainingView>& views,
                                 const SceneColorMap& scene_map, const MarchOptions& march,

@@ -29,7 +29,8 @@ class Buffer {
   Buffer& operator=(const Buffer& other) {
     if (this == &other) return *this;
     Buffer copy(other.size_);
-    if (other.size_ > 0) std::memcpy(static_cast<void*>(copy.data_), other.data_, sizeof(T) * other.size_);
+    if (other.size_ > 0)
+      std::memcpy(static_cast<void*>(copy.data_), other.data_, sizeof(T) * other.size_);
     Swap(copy);
     return *this;
   }
@@ -41,7 +42,8 @@ class Buffer {
   // Keeps the old values, zeroes the new ones. Throws std::bad_alloc.
   void Resize(int64_t size) {
     if (size > capacity_) Reserve(size);
-    if (size > size_) std::memset(static_cast<void*>(data_ + size_), 0, sizeof(T) * (size - size_));
+    if (size > size_)
+      std::memset(static_cast<void*>(data_ + size_), 0, sizeof(T) * (size - size_));
     size_ = size;
   }
 

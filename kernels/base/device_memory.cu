@@ -1,5 +1,4 @@
 #include "kernels/base/device_memory.h"
-
 #include "kernels/base/error.h"
 
 namespace regrade {
@@ -48,10 +47,11 @@ void* DeviceAllocate(int64_t bytes, const char* what) {
   size_t free_bytes = 0, total_bytes = 0;
   cudaMemGetInfo(&free_bytes, &total_bytes);
   throw Error(ExitCode::kResources,
-              std::string(what) + ": " + Mebibytes(bytes) + " of GPU memory are not to be had (" +
+              std::string(what) + ": " + Mebibytes(bytes) +
+                  " of GPU memory are not to be had (" +
                   Mebibytes(static_cast<int64_t>(free_bytes)) + " of " +
-                  Mebibytes(static_cast<int64_t>(total_bytes)) + " free): " +
-                  cudaGetErrorString(status),
+                  Mebibytes(static_cast<int64_t>(total_bytes)) +
+                  " free): " + cudaGetErrorString(status),
               "GPU", "lower --fit-resolutions, use --device cpu, or close other GPU programs");
 }
 
@@ -69,12 +69,13 @@ void DeviceCopyOut(void* host, const void* device, int64_t bytes) {
             "copying from the GPU");
 }
 
-void DeviceCopyRows(void* to, int64_t to_pitch, const void* from, int64_t from_pitch, int64_t bytes,
-                    int64_t rows) {
+void DeviceCopyRows(void* to, int64_t to_pitch, const void* from, int64_t from_pitch,
+                    int64_t bytes, int64_t rows) {
   if (rows > 0)
-    Require(cudaMemcpy2D(to, static_cast<size_t>(to_pitch), from, static_cast<size_t>(from_pitch),
-                         static_cast<size_t>(bytes), static_cast<size_t>(rows), cudaMemcpyDefault),
-            "copying to or from the GPU");
+    Require(
+        cudaMemcpy2D(to, static_cast<size_t>(to_pitch), from, static_cast<size_t>(from_pitch),
+                     static_cast<size_t>(bytes), static_cast<size_t>(rows), cudaMemcpyDefault),
+        "copying to or from the GPU");
 }
 
 void DeviceCopyWithin(void* to, const void* from, int64_t bytes) {
@@ -84,7 +85,8 @@ void DeviceCopyWithin(void* to, const void* from, int64_t bytes) {
 }
 
 void DeviceZero(void* device, int64_t bytes) {
-  if (bytes > 0) Require(cudaMemsetAsync(device, 0, static_cast<size_t>(bytes)), "clearing GPU memory");
+  if (bytes > 0)
+    Require(cudaMemsetAsync(device, 0, static_cast<size_t>(bytes)), "clearing GPU memory");
 }
 
 void DeviceWait(const char* what) { Require(cudaDeviceSynchronize(), what); }

@@ -8,8 +8,8 @@
 #define HD
 #endif
 
-// For functions that files with instruction-set flags share with others: an out-of-line copy made there could be
-// the one the linker keeps for all, and end older processors.
+// For functions that files with instruction-set flags share with others: an out-of-line copy
+// made there could be the one the linker keeps for all, and end older processors.
 #if defined(__CUDACC__)
 #define REGRADE_ALWAYS_INLINE
 #else

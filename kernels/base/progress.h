@@ -28,11 +28,13 @@ inline Verdict Report(const ProgressFunction& progress, double done, double tota
   return progress ? progress({done, total, note}) : Verdict::kContinue;
 }
 
-// One progress for work in several parts, each of which reports its own from 0 to its total. `whole` is told
-// the weights of the parts before plus the share of the present one, so that the time left is that of all.
+// One progress for work in several parts, each of which reports its own from 0 to its total.
+// `whole` is told the weights of the parts before plus the share of the present one, so that
+// the time left is that of all.
 class ProgressParts {
  public:
-  // total_weight: the sum of the weights that Next will be called with; seconds make good weights.
+  // total_weight: the sum of the weights that Next will be called with; seconds make good
+  // weights.
   ProgressParts(ProgressFunction whole, double total_weight)
       : whole_(std::move(whole)), total_(total_weight) {}
 

@@ -73,7 +73,8 @@ void Validate(const RadianceField& field, const char* name) {
   if (!AllFinite(field.background) || !std::isfinite(field.near_clip) || field.near_clip < 0)
     Refuse(name, "the background colour or the near distance is not a usable number");
   if (!(field.step >= 0.01f && field.step <= 16))
-    Refuse(name, "the step is " + std::to_string(field.step) + " voxels, 0.01 to 16 are usable");
+    Refuse(name,
+           "the step is " + std::to_string(field.step) + " voxels, 0.01 to 16 are usable");
 }
 
 FieldView<float> ViewOf(const RadianceField& field) {

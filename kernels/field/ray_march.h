@@ -33,7 +33,8 @@ struct GridRay {
 // parallel and inside ignores that slab (svox2 counts the former as inside and clamps its
 // samples to the face: not ported).
 template <typename T>
-HD REGRADE_ALWAYS_INLINE GridRay<T> ClipToGrid(const GridFrame& frame, const RayT<T>& ray, T near_clip, T step) {
+HD REGRADE_ALWAYS_INLINE GridRay<T> ClipToGrid(const GridFrame& frame, const RayT<T>& ray,
+                                               T near_clip, T step) {
   using std::isfinite;
   GridRay<T> result;
   if (!AllFinite(ray.origin) || !AllFinite(ray.direction)) return result;

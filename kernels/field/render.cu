@@ -1,10 +1,9 @@
 // Plain rendering: one body a pixel, on either processor.
-#include "kernels/field/render.h"
-
 #include <algorithm>
 #include <vector>
 
 #include "kernels/field/ray_loss.h"
+#include "kernels/field/render.h"
 
 namespace regrade {
 namespace {
@@ -25,8 +24,8 @@ struct RenderPixel {
   }
 };
 
-// Depth along the optical axis of the point at `length` along a ray in NDC. Infinity is set at z = 1e4 near
-// planes.
+// Depth along the optical axis of the point at `length` along a ray in NDC. Infinity is set at
+// z = 1e4 near planes.
 float NdcDepth(const Camera& camera, const Ray& ray, float length) {
   Vec3d p = (ray.origin + ray.direction * length).Cast<double>();
   p.z = std::min(p.z, 1 - 2e-4);
@@ -41,7 +40,8 @@ RenderedView RenderViewPlain(const RadianceField& field, const Camera& camera,
   rays.reserve(static_cast<size_t>(camera.width) * camera.height);
   for (int y = 0; y < camera.height; ++y)
     for (int x = 0; x < camera.width; ++x) rays.push_back(camera.PixelRay(x, y));
-  RenderedView view{Image(camera.width, camera.height, 3), Image(camera.width, camera.height, 1),
+  RenderedView view{Image(camera.width, camera.height, 3),
+                    Image(camera.width, camera.height, 1),
                     Image(camera.width, camera.height, 1)};
   ForEach(backend, "render_pixel", static_cast<int64_t>(rays.size()),
           RenderPixel{ViewOf(field), options, rays.data(), view.color.pixels.data(),

@@ -1,13 +1,12 @@
-// See EQ(mlp). The adjoint is two kernels: the first walks each row down and up again and leaves every layer's input
-// x_{l-1} and dL/d(A_l x_{l-1} + b_l); the second sums their outer products over the rows, one block for a share of
-// the rows and a layer.
-#include "kernels/network/device_mlp.h"
-
+// See EQ(mlp). The adjoint is two kernels: the first walks each row down and up again and
+// leaves every layer's input x_{l-1} and dL/d(A_l x_{l-1} + b_l); the second sums their outer
+// products over the rows, one block for a share of the rows and a layer.
 #include <algorithm>
 #include <vector>
 
 #include "kernels/base/error.h"
 #include "kernels/base/launch_size.h"
+#include "kernels/network/device_mlp.h"
 #include "kernels/network/warp_dense.h"
 
 namespace regrade {
@@ -27,8 +26,9 @@ struct Scratch {
 };
 
 template <bool kSplit, bool kKeep>
-__device__ void WalkDown(const MlpView& mlp, const Weights& weights, const float* input, int64_t row, int64_t n,
-                         const Scratch& scratch, Tile (&hidden)[kHiddenTiles]) {
+__device__ void WalkDown(const MlpView& mlp, const Weights& weights, const float* input,
+                         int64_t row, int64_t n, const Scratch& scratch,
+                         Tile (&hidden)[kHiddenTiles]) {
   Tile first[kEndTiles], slope[kHiddenTiles];
   LoadRows(input, kMlpEndLanes, row, n, first);
   Dense<kSplit>(weights, 0, first, hidden);
@@ -51,7 +51,8 @@ __device__ inline int64_t WarpOfGrid() {
 }
 
 template <bool kSplit>
-__global__ void __launch_bounds__(kThreads) ForwardKernel(MlpView mlp, bool stage, const float* input, int64_t n, float* output) {
+__global__ void __launch_bounds__(kThreads)
+    ForwardKernel(MlpView mlp, bool stage, const float* input, int64_t n, float* output) {
   extern __shared__ float4 shared_quads[];
   const Weights weights(mlp, stage ? reinterpret_cast<float*>(shared_quads) : nullptr);
   const int64_t warps = static_cast<int64_t>(gridDim.x) * (blockDim.x / 32);
@@ -64,14 +65,16 @@ __global__ void __launch_bounds__(kThreads) ForwardKernel(MlpView mlp, bool stag
 }
 
 template <bool kSplit>
-__global__ void __launch_bounds__(kThreads) AdjointRowsKernel(MlpView mlp, bool stage, const float* input, const float* d_output, int64_t n,
-                                  Scratch scratch) {
+__global__ void __launch_bounds__(kThreads)
+    AdjointRowsKernel(MlpView mlp, bool stage, const float* input, const float* d_output,
+                      int64_t n, Scratch scratch) {
   extern __shared__ float4 shared_quads[];
   const Weights weights(mlp, stage ? reinterpret_cast<float*>(shared_quads) : nullptr);
   const int64_t warps = static_cast<int64_t>(gridDim.x) * (blockDim.x / 32);
   for (int64_t row = WarpOfGrid() * kRows; row < n; row += warps * kRows) {
     Tile d_hidden[kHiddenTiles], slope[kHiddenTiles];
-    WalkDown<kSplit, true>(mlp, weights, input, row, n, scratch, d_hidden);  // what it holds is kept already
+    WalkDown<kSplit, true>(mlp, weights, input, row, n, scratch,
+                           d_hidden);  // what it holds is kept already
     Tile d_last[kEndTiles];
     LoadRows(d_output, kMlpEndLanes, row, n, d_last);
     DenseAdjointRows<kSplit>(weights, mlp.layers - 1, d_last, d_hidden);
@@ -91,21 +94,27 @@ __global__ void __launch_bounds__(kThreads) AdjointRowsKernel(MlpView mlp, bool 
 // Blocks (x: share of the rows, y: layer) of four warps, each of them 16 outputs.
 constexpr int kOuterRows = 32, kOuterStride = kMlpHidden + 4, kOuterThreads = 128;
 
-__device__ inline void StageRows(const float* from, int width, int64_t row, int64_t n, float* to) {
+__device__ inline void StageRows(const float* from, int width, int64_t row, int64_t n,
+                                 float* to) {
   const int quads = width / 4;
   for (int i = static_cast<int>(threadIdx.x); i < kOuterRows * quads; i += kOuterThreads) {
     const int r = i / quads, q = i % quads;
     *reinterpret_cast<float4*>(to + r * kOuterStride + 4 * q) =
-        row + r < n ? *reinterpret_cast<const float4*>(from + (row + r) * width + 4 * q) : make_float4(0, 0, 0, 0);
+        row + r < n ? *reinterpret_cast<const float4*>(from + (row + r) * width + 4 * q)
+                    : make_float4(0, 0, 0, 0);
   }
 }
 
 template <bool kSplit>
-__global__ void __launch_bounds__(kOuterThreads) OuterProductsKernel(MlpView mlp, const float* input, const float* d_output, int64_t n, Scratch scratch,
-                                    double* gradient) {
-  __shared__ float4 left_quads[kOuterRows * kOuterStride / 4], right_quads[kOuterRows * kOuterStride / 4];
-  float *left_rows = reinterpret_cast<float*>(left_quads), *right_rows = reinterpret_cast<float*>(right_quads);
-  const int layer = static_cast<int>(blockIdx.y), inputs = mlp.Inputs(layer), outputs = mlp.Outputs(layer);
+__global__ void __launch_bounds__(kOuterThreads)
+    OuterProductsKernel(MlpView mlp, const float* input, const float* d_output, int64_t n,
+                        Scratch scratch, double* gradient) {
+  __shared__ float4 left_quads[kOuterRows * kOuterStride / 4],
+      right_quads[kOuterRows * kOuterStride / 4];
+  float *left_rows = reinterpret_cast<float*>(left_quads),
+        *right_rows = reinterpret_cast<float*>(right_quads);
+  const int layer = static_cast<int>(blockIdx.y), inputs = mlp.Inputs(layer),
+            outputs = mlp.Outputs(layer);
   const float* x = layer == 0 ? input : scratch.Input(layer);
   const float* d = layer + 1 == mlp.layers ? d_output : scratch.Slope(layer + 1);
   const LanePlace lane;
@@ -155,7 +164,8 @@ __global__ void __launch_bounds__(kOuterThreads) OuterProductsKernel(MlpView mlp
 }
 
 MlpView ViewOf(const FusedMlp& shape, const DeviceBuffer<float>& parameters) {
-  return {parameters.data(), static_cast<int>(shape.layers.size()), shape.activation, shape.omega};
+  return {parameters.data(), static_cast<int>(shape.layers.size()), shape.activation,
+          shape.omega};
 }
 
 // How a kernel that walks rows is launched: weights in shared memory where they fit.
@@ -171,7 +181,8 @@ struct WalkLaunch {
     const int wanted = Weights::SharedFloats(mlp) * static_cast<int>(sizeof(float));
     stage = wanted <= most;
     bytes = stage ? static_cast<unsigned>(wanted) : 0;
-    if (stage) cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize, wanted);
+    if (stage)
+      cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize, wanted);
     const int64_t tiles = (n + kRows - 1) / kRows, tiles_a_block = kThreads / 32;
     blocks = static_cast<unsigned>(
         std::clamp<int64_t>((tiles + tiles_a_block - 1) / tiles_a_block, 1, 2 * processors));
@@ -181,25 +192,30 @@ struct WalkLaunch {
 template <bool kSplit>
 void LaunchForward(const MlpView& mlp, const float* input, int64_t n, float* output) {
   const WalkLaunch launch(ForwardKernel<kSplit>, mlp, n);
-  ForwardKernel<kSplit><<<launch.blocks, kThreads, launch.bytes>>>(mlp, launch.stage, input, n, output);
+  ForwardKernel<kSplit>
+      <<<launch.blocks, kThreads, launch.bytes>>>(mlp, launch.stage, input, n, output);
   CheckLaunch("mlp_forward");
 }
 
 template <bool kSplit>
-void LaunchAdjoint(const MlpView& mlp, const float* input, const float* d_output, int64_t n, const Scratch& scratch,
-                   double* gradient) {
+void LaunchAdjoint(const MlpView& mlp, const float* input, const float* d_output, int64_t n,
+                   const Scratch& scratch, double* gradient) {
   const WalkLaunch launch(AdjointRowsKernel<kSplit>, mlp, n);
-  AdjointRowsKernel<kSplit><<<launch.blocks, kThreads, launch.bytes>>>(mlp, launch.stage, input, d_output, n, scratch);
+  AdjointRowsKernel<kSplit><<<launch.blocks, kThreads, launch.bytes>>>(mlp, launch.stage, input,
+                                                                       d_output, n, scratch);
   CheckLaunch("mlp_adjoint_rows");
   const int64_t tiles = (n + kOuterRows - 1) / kOuterRows;
-  const dim3 blocks(static_cast<unsigned>(std::min<int64_t>(tiles, 256)), static_cast<unsigned>(mlp.layers));
-  OuterProductsKernel<kSplit><<<blocks, kOuterThreads>>>(mlp, input, d_output, n, scratch, gradient);
+  const dim3 blocks(static_cast<unsigned>(std::min<int64_t>(tiles, 256)),
+                    static_cast<unsigned>(mlp.layers));
+  OuterProductsKernel<kSplit>
+      <<<blocks, kOuterThreads>>>(mlp, input, d_output, n, scratch, gradient);
   CheckLaunch("mlp_outer_products");
 }
 
 }  // namespace
 
-void DeviceMlp::Forward(MlpPrecision precision, const float* input, int64_t n, float* output) const {
+void DeviceMlp::Forward(MlpPrecision precision, const float* input, int64_t n,
+                        float* output) const {
   if (n == 0) return;
   const MlpView mlp = ViewOf(shape_, parameters_);
   if (precision == MlpPrecision::kSplit)
@@ -208,10 +224,12 @@ void DeviceMlp::Forward(MlpPrecision precision, const float* input, int64_t n, f
     LaunchForward<false>(mlp, input, n, output);
 }
 
-void DeviceMlp::AddAdjoint(MlpPrecision precision, const float* input, const float* d_output, int64_t n) {
+void DeviceMlp::AddAdjoint(MlpPrecision precision, const float* input, const float* d_output,
+                           int64_t n) {
   const MlpView mlp = ViewOf(shape_, parameters_);
   const int64_t rows = std::min(n, kChunk), kept = (mlp.layers - 1) * rows * kMlpHidden;
-  if (scratch_.size() < 2 * kept) scratch_ = DeviceBuffer<float>(2 * kept, "layers of the style's network");
+  if (scratch_.size() < 2 * kept)
+    scratch_ = DeviceBuffer<float>(2 * kept, "layers of the style's network");
   for (int64_t begin = 0; begin < n; begin += rows) {
     const int64_t count = std::min(rows, n - begin);
     const Scratch scratch{scratch_.data(), scratch_.data() + kept, rows};
@@ -225,8 +243,12 @@ void DeviceMlp::AddAdjoint(MlpPrecision precision, const float* input, const flo
 
 #else
 
-void DeviceMlp::Forward(MlpPrecision, const float*, int64_t, float*) const { DeviceWait("mlp_forward"); }
-void DeviceMlp::AddAdjoint(MlpPrecision, const float*, const float*, int64_t) { DeviceWait("mlp_adjoint"); }
+void DeviceMlp::Forward(MlpPrecision, const float*, int64_t, float*) const {
+  DeviceWait("mlp_forward");
+}
+void DeviceMlp::AddAdjoint(MlpPrecision, const float*, const float*, int64_t) {
+  DeviceWait("mlp_adjoint");
+}
 
 #endif
 

@@ -1,10 +1,11 @@
 // Products of small matrices by a warp on the tensor cores. Device code only.
 //
-// A warp holds 16 rows of K values as tiles of 8 columns, four registers a lane: lane 4 g + t has, of tile j, rows g
-// (first two) and g + 8 (last two) at columns 8 j + 2 t and 8 j + 2 t + 1. That is how the tensor cores leave a
-// product (mma.m16n8). They take a left factor in another order, columns t and t + 4; but the sum over k may be taken
-// in any order, so column 2 t stands in for t and 2 t + 1 for t + 4, in both factors, and what one layer leaves is
-// what the next one takes.
+// A warp holds 16 rows of K values as tiles of 8 columns, four registers a lane: lane 4 g + t
+// has, of tile j, rows g (first two) and g + 8 (last two) at columns 8 j + 2 t and 8 j + 2 t
+// + 1. That is how the tensor cores leave a product (mma.m16n8). They take a left factor in
+// another order, columns t and t + 4; but the sum over k may be taken in any order, so column 2
+// t stands in for t and 2 t + 1 for t + 4, in both factors, and what one layer leaves is what
+// the next one takes.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +18,8 @@ struct Tile {
   float x[4];  // (g, 2t), (g, 2t + 1), (g + 8, 2t), (g + 8, 2t + 1)
 };
 
-// sum += left * right for 8 values of k: right[0] = R[2t][g], right[1] = R[2t + 1][g] of the tile's [k, n].
+// sum += left * right for 8 values of k: right[0] = R[2t][g], right[1] = R[2t + 1][g] of the
+// tile's [k, n].
 #if __CUDA_ARCH__ >= 800
 
 __device__ inline uint32_t RoundToTensor(float x) {
@@ -26,9 +28,11 @@ __device__ inline uint32_t RoundToTensor(float x) {
   return bits;
 }
 
-__device__ inline void MultiplyRounded(Tile* sum, const uint32_t (&a)[4], const uint32_t (&b)[2]) {
+__device__ inline void MultiplyRounded(Tile* sum, const uint32_t (&a)[4],
+                                       const uint32_t (&b)[2]) {
   asm volatile(
-      "mma.sync.aligned.m16n8k8.row.col.f32.tf32.tf32.f32 {%0,%1,%2,%3}, {%4,%5,%6,%7}, {%8,%9}, {%0,%1,%2,%3};"
+      "mma.sync.aligned.m16n8k8.row.col.f32.tf32.tf32.f32 {%0,%1,%2,%3}, {%4,%5,%6,%7}, "
+      "{%8,%9}, {%0,%1,%2,%3};"
       : "+f"(sum->x[0]), "+f"(sum->x[1]), "+f"(sum->x[2]), "+f"(sum->x[3])
       : "r"(a[0]), "r"(a[1]), "r"(a[2]), "r"(a[3]), "r"(b[0]), "r"(b[1]));
 }
@@ -41,7 +45,8 @@ __device__ inline void Multiply(Tile* sum, const Tile& left, const float (&right
   for (int i = 0; i < 4; ++i) a[i] = RoundToTensor(in_order[i]);
 #pragma unroll
   for (int i = 0; i < 2; ++i) b[i] = RoundToTensor(right[i]);
-  if constexpr (kSplit) {  // what rounding left over, multiplied first: small terms before large ones
+  if constexpr (kSplit) {  // what rounding left over, multiplied first: small terms before
+                           // large ones
     uint32_t rest_a[4], rest_b[2];
 #pragma unroll
     for (int i = 0; i < 4; ++i) rest_a[i] = RoundToTensor(in_order[i] - __uint_as_float(a[i]));

@@ -11,7 +11,7 @@ namespace regrade {
 inline constexpr int kRows = 16;                    // a warp's tile
 inline constexpr int kEndTiles = kMlpEndLanes / 8;  // columns of a tile are 8
 inline constexpr int kHiddenTiles = kMlpHidden / 8;
-inline constexpr int kPad = 8;                      // floats behind a row of weights: no two lanes ask one bank
+inline constexpr int kPad = 8;  // floats behind a row of weights: no two lanes ask one bank
 
 struct MlpView {
   const float* parameters;  // as FusedMlp::Offset says
@@ -20,7 +20,9 @@ struct MlpView {
   float omega;
 
   __host__ __device__ int Inputs(int l) const { return l == 0 ? kMlpEndLanes : kMlpHidden; }
-  __host__ __device__ int Outputs(int l) const { return l + 1 == layers ? kMlpEndLanes : kMlpHidden; }
+  __host__ __device__ int Outputs(int l) const {
+    return l + 1 == layers ? kMlpEndLanes : kMlpHidden;
+  }
   __host__ __device__ int Offset(int l) const {
     int offset = 0;
     for (int i = 0; i < l; ++i) offset += Outputs(i) * (Inputs(i) + 1);
@@ -37,14 +39,18 @@ class Weights {
       const int inputs = mlp.Inputs(l), outputs = mlp.Outputs(l), stride = inputs + kPad;
       const float* from = mlp.parameters + mlp.Offset(l);
       float* to = shared + SharedOffset(l);
-      for (int i = static_cast<int>(threadIdx.x); i < outputs * inputs; i += static_cast<int>(blockDim.x))
+      for (int i = static_cast<int>(threadIdx.x); i < outputs * inputs;
+           i += static_cast<int>(blockDim.x))
         to[i / inputs * stride + i % inputs] = from[i];
-      for (int i = static_cast<int>(threadIdx.x); i < outputs; i += static_cast<int>(blockDim.x))
+      for (int i = static_cast<int>(threadIdx.x); i < outputs;
+           i += static_cast<int>(blockDim.x))
         to[outputs * stride + i] = from[outputs * inputs + i];
     }
     __syncthreads();
   }
-  __device__ int Stride(int l) const { return mlp_.Inputs(l) + (shared_ != nullptr ? kPad : 0); }
+  __device__ int Stride(int l) const {
+    return mlp_.Inputs(l) + (shared_ != nullptr ? kPad : 0);
+  }
   __device__ const float* Matrix(int l) const {
     return shared_ != nullptr ? shared_ + SharedOffset(l) : mlp_.parameters + mlp_.Offset(l);
   }
@@ -67,20 +73,23 @@ class Weights {
 
 struct LanePlace {
   int g, t;
-  __device__ LanePlace() : g(static_cast<int>(threadIdx.x & 31) / 4), t(static_cast<int>(threadIdx.x & 3)) {}
+  __device__ LanePlace()
+      : g(static_cast<int>(threadIdx.x & 31) / 4), t(static_cast<int>(threadIdx.x & 3)) {}
 };
 
 // Rows [row, row + 16) of a row-major [n, width] array; rows at n and beyond are zero.
 template <int kTiles>
-__device__ void LoadRows(const float* from, int width, int64_t row, int64_t n, Tile (&tile)[kTiles]) {
+__device__ void LoadRows(const float* from, int width, int64_t row, int64_t n,
+                         Tile (&tile)[kTiles]) {
   const LanePlace lane;
 #pragma unroll
   for (int half = 0; half < 2; ++half) {
     const int64_t r = row + lane.g + 8 * half;
 #pragma unroll
     for (int j = 0; j < kTiles; ++j) {
-      const float2 pair = r < n ? *reinterpret_cast<const float2*>(from + r * width + 8 * j + 2 * lane.t)
-                                : make_float2(0, 0);
+      const float2 pair =
+          r < n ? *reinterpret_cast<const float2*>(from + r * width + 8 * j + 2 * lane.t)
+                : make_float2(0, 0);
       tile[j].x[2 * half] = pair.x;
       tile[j].x[2 * half + 1] = pair.y;
     }
@@ -88,7 +97,8 @@ __device__ void LoadRows(const float* from, int width, int64_t row, int64_t n, T
 }
 
 template <int kTiles>
-__device__ void StoreRows(float* to, int width, int64_t row, int64_t n, const Tile (&tile)[kTiles]) {
+__device__ void StoreRows(float* to, int width, int64_t row, int64_t n,
+                          const Tile (&tile)[kTiles]) {
   const LanePlace lane;
 #pragma unroll
   for (int half = 0; half < 2; ++half) {
@@ -103,7 +113,8 @@ __device__ void StoreRows(float* to, int width, int64_t row, int64_t n, const Ti
 
 // out = A in + b
 template <bool kSplit, int kIn, int kOut>
-__device__ void Dense(const Weights& weights, int layer, const Tile (&in)[kIn], Tile (&out)[kOut]) {
+__device__ void Dense(const Weights& weights, int layer, const Tile (&in)[kIn],
+                      Tile (&out)[kOut]) {
   const LanePlace lane;
   const float *matrix = weights.Matrix(layer), *bias = weights.Bias(layer);
   const int stride = weights.Stride(layer);
@@ -114,7 +125,8 @@ __device__ void Dense(const Weights& weights, int layer, const Tile (&in)[kIn], 
     out[j].x[1] = out[j].x[3] = start.y;
 #pragma unroll
     for (int i = 0; i < kIn; ++i) {
-      const float2 pair = *reinterpret_cast<const float2*>(matrix + (8 * j + lane.g) * stride + 8 * i + 2 * lane.t);
+      const float2 pair = *reinterpret_cast<const float2*>(matrix + (8 * j + lane.g) * stride +
+                                                           8 * i + 2 * lane.t);
       const float right[2] = {pair.x, pair.y};
       Multiply<kSplit>(&out[j], in[i], right);
     }
@@ -123,7 +135,8 @@ __device__ void Dense(const Weights& weights, int layer, const Tile (&in)[kIn], 
 
 // d_in = A^T d_out
 template <bool kSplit, int kIn, int kOut>
-__device__ void DenseAdjointRows(const Weights& weights, int layer, const Tile (&d_out)[kOut], Tile (&d_in)[kIn]) {
+__device__ void DenseAdjointRows(const Weights& weights, int layer, const Tile (&d_out)[kOut],
+                                 Tile (&d_in)[kIn]) {
   const LanePlace lane;
   const float* matrix = weights.Matrix(layer);
   const int stride = weights.Stride(layer);
@@ -141,7 +154,8 @@ __device__ void DenseAdjointRows(const Weights& weights, int layer, const Tile (
 
 // x becomes act(x); slope, if wanted, act'(x).
 template <bool kWantSlope>
-__device__ void ActivateRows(const MlpView& mlp, Tile (&x)[kHiddenTiles], Tile (&slope)[kHiddenTiles]) {
+__device__ void ActivateRows(const MlpView& mlp, Tile (&x)[kHiddenTiles],
+                             Tile (&slope)[kHiddenTiles]) {
   if (mlp.activation == Activation::kSine) {
 #pragma unroll
     for (int j = 0; j < kHiddenTiles; ++j)
@@ -161,7 +175,8 @@ __device__ void ActivateRows(const MlpView& mlp, Tile (&x)[kHiddenTiles], Tile (
   for (int j = 0; j < kHiddenTiles; ++j)
 #pragma unroll
     for (int i = 0; i < 4; ++i) {
-      if constexpr (kWantSlope) slope[j].x[i] = ActivateDerivative(mlp.activation, mlp.omega, x[j].x[i]);
+      if constexpr (kWantSlope)
+        slope[j].x[i] = ActivateDerivative(mlp.activation, mlp.omega, x[j].x[i]);
       x[j].x[i] = Activate(mlp.activation, mlp.omega, x[j].x[i]);
     }
 }

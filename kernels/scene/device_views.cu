@@ -1,7 +1,6 @@
-#include "kernels/scene/device_views.h"
-
 #include "kernels/base/launch_size.h"
 #include "kernels/base/random.h"
+#include "kernels/scene/device_views.h"
 
 namespace regrade {
 
@@ -9,16 +8,18 @@ namespace regrade {
 
 namespace {
 
-__device__ Ray RayThrough(const DeviceViews::View& view, const Vec3f* directions, int x, int y) {
-  Ray ray{view.origin, view.world_from_camera *
-                           directions[view.direction_map + static_cast<int64_t>(y) * view.width + x]};
+__device__ Ray RayThrough(const DeviceViews::View& view, const Vec3f* directions, int x,
+                          int y) {
+  Ray ray{view.origin,
+          view.world_from_camera *
+              directions[view.direction_map + static_cast<int64_t>(y) * view.width + x]};
   if (view.ndc.on()) NdcRay(view.ndc, &ray.origin, &ray.direction);
   return ray;
 }
 
-__global__ void DrawKernel(const DeviceViews::View* views, int num_views, const Vec3f* directions,
-                           const uint16_t* colors, uint64_t seed, uint64_t step, int64_t n, Ray* rays,
-                           Vec3f* targets) {
+__global__ void DrawKernel(const DeviceViews::View* views, int num_views,
+                           const Vec3f* directions, const uint16_t* colors, uint64_t seed,
+                           uint64_t step, int64_t n, Ray* rays, Vec3f* targets) {
   const int64_t i = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
   if (i >= n) return;
   // Equal shares of the views behind a random turn, so that chance leaves none out of a batch.
@@ -26,16 +27,17 @@ __global__ void DrawKernel(const DeviceViews::View* views, int num_views, const 
   const double position = (static_cast<double>(i) + turn) / static_cast<double>(n) * num_views;
   const DeviceViews::View view = views[static_cast<int>(position) % num_views];
   const uint64_t counter = 1 + 2 * static_cast<uint64_t>(i);
-  const int x = static_cast<int>(RandomIndex(seed, step, counter, static_cast<uint64_t>(view.width)));
-  const int y =
-      static_cast<int>(RandomIndex(seed, step, counter + 1, static_cast<uint64_t>(view.height)));
+  const int x =
+      static_cast<int>(RandomIndex(seed, step, counter, static_cast<uint64_t>(view.width)));
+  const int y = static_cast<int>(
+      RandomIndex(seed, step, counter + 1, static_cast<uint64_t>(view.height)));
   rays[i] = RayThrough(view, directions, x, y);
   const uint16_t* color = colors + view.color + (static_cast<int64_t>(y) * view.width + x) * 3;
   targets[i] = {color[0] / 65535.0f, color[1] / 65535.0f, color[2] / 65535.0f};
 }
 
-__global__ void RaysKernel(DeviceViews::View view, const Vec3f* directions, int stride, int columns,
-                           int64_t n, Ray* rays) {
+__global__ void RaysKernel(DeviceViews::View view, const Vec3f* directions, int stride,
+                           int columns, int64_t n, Ray* rays) {
   const int64_t i = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
   if (i >= n) return;
   rays[i] = RayThrough(view, directions, static_cast<int>(i % columns) * stride,
@@ -53,7 +55,8 @@ DeviceViews::DeviceViews(const std::vector<std::vector<Vec3f>>& direction_maps,
     directions += static_cast<int64_t>(map.size());
   }
   for (const DeviceViewSource& source : views) {
-    host_views_.push_back({source.origin, source.world_from_camera, source.ndc, source.width, source.height,
+    host_views_.push_back({source.origin, source.world_from_camera, source.ndc, source.width,
+                           source.height,
                            map_begin.at(static_cast<size_t>(source.direction_map)), colors});
     if (source.color != nullptr) colors += int64_t{source.width} * source.height * 3;
   }
@@ -70,7 +73,8 @@ DeviceViews::DeviceViews(const std::vector<std::vector<Vec3f>>& direction_maps,
   views_.CopyIn(host_views_.data(), num_views());
 }
 
-void DeviceViews::Draw(uint64_t seed, uint64_t step, int64_t n, Ray* rays, Vec3f* targets) const {
+void DeviceViews::Draw(uint64_t seed, uint64_t step, int64_t n, Ray* rays,
+                       Vec3f* targets) const {
   DrawKernel<<<BlocksFor(n), kThreads>>>(views_.data(), num_views(), directions_.data(),
                                          colors_.data(), seed, step, n, rays, targets);
   CheckLaunch("draw_rays");

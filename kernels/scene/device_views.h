@@ -1,4 +1,5 @@
-// Photos and cameras on a CUDA device: where training rays are drawn and a view's rays are made.
+// Photos and cameras on a CUDA device: where training rays are drawn and a view's rays are
+// made.
 #pragma once
 
 #include <cstdint>
@@ -9,10 +10,11 @@
 
 namespace regrade {
 
-// A view as it is handed over. `color` [H, W, 3] unorm16 may be null where only rays are wanted.
+// A view as it is handed over. `color` [H, W, 3] unorm16 may be null where only rays are
+// wanted.
 struct DeviceViewSource {
-  Vec3f origin;              // field
-  Mat3f world_from_camera;   // rotation
+  Vec3f origin;             // field
+  Mat3f world_from_camera;  // rotation
   NdcSpace ndc;
   int width = 0, height = 0;  // pixels
   int direction_map = 0;
@@ -27,7 +29,8 @@ class DeviceViews {
 
   // The same rays and targets as TrainingRays::Draw with patches of one pixel, unordered.
   void Draw(uint64_t seed, uint64_t step, int64_t n, Ray* rays, Vec3f* targets) const;
-  // Rays of every `stride`-th pixel of a view, row by row; returns their number. rays may be null.
+  // Rays of every `stride`-th pixel of a view, row by row; returns their number. rays may be
+  // null.
   int64_t RaysOf(int view, int stride, Ray* rays) const;
   int num_views() const { return static_cast<int>(host_views_.size()); }
 

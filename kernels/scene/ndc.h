@@ -1,11 +1,12 @@
-// Normalised device coordinates: the space of forward-facing captures, in which everything from a near plane
-// to infinity is a box.
+// Normalised device coordinates: the space of forward-facing captures, in which everything from
+// a near plane to infinity is a box.
 //
-// EQ(ndc), Mildenhall et al. 2020, appendix C, with z forward and near plane z = 1: a point (x, y, z) goes to
+// EQ(ndc), Mildenhall et al. 2020, appendix C, with z forward and near plane z = 1: a point (x,
+// y, z) goes to
 //   (a x / z, b y / z, 1 - 2 / z),   a = 2 f_x / W, b = 2 f_y / H,
-// a ray's origin is first moved to z = 1, and its direction (a (dx/dz - ox/oz), b (dy/dz - oy/oz), 2 / oz) is
-// normalised, as svox2 has it (NeRF does not). A ray that does not run forward has no image here: its
-// direction becomes 0, which no march follows.
+// a ray's origin is first moved to z = 1, and its direction (a (dx/dz - ox/oz), b (dy/dz -
+// oy/oz), 2 / oz) is normalised, as svox2 has it (NeRF does not). A ray that does not run
+// forward has no image here: its direction becomes 0, which no march follows.
 #pragma once
 
 #include "kernels/base/vec.h"

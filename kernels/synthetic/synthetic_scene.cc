@@ -210,10 +210,12 @@ Camera TableCamera(double turn, int width, int height) {
   return LookAt(center, {0, 0.05, 0.24}, 1.15, width, height);
 }
 
-// A closed Lissajous figure fills a rectangle of a plane, shifted so that no two of 24 or 96 places coincide. The
-// cameras turn in by a few degrees: views that differ by a shift alone leave the focal length undetermined.
+// A closed Lissajous figure fills a rectangle of a plane, shifted so that no two of 24 or 96
+// places coincide. The cameras turn in by a few degrees: views that differ by a shift alone
+// leave the focal length undetermined.
 Camera WallCamera(double turn, int width, int height) {
-  const Vec3d center = {0.6 * std::sin(4 * M_PI * turn + 0.2), -2.7, 0.4 * std::sin(6 * M_PI * turn + 0.3)};
+  const Vec3d center = {0.6 * std::sin(4 * M_PI * turn + 0.2), -2.7,
+                        0.4 * std::sin(6 * M_PI * turn + 0.3)};
   return LookAt(center, {0.25 * center.x, 0, 0.25 * center.z}, 1.1, width, height);
 }
 

@@ -1,5 +1,5 @@
-// regrade export: the photos and poses of an output folder, as other programs read them. (field.npz and styled.npz
-// are svox2's format already.)
+// regrade export: the photos and poses of an output folder, as other programs read them.
+// (field.npz and styled.npz are svox2's format already.)
 #include <filesystem>
 
 #include "kernels/base/error.h"
@@ -21,7 +21,8 @@ struct ExportOptions {
   void Describe(Bind& bind) {
     bind("out", out, {.help = "the folder to write, which is made and must be empty"});
     bind("format", format,
-         {.help = "colmap-text and colmap: images/ and sparse/; transforms: images/ and a transforms.json "
+         {.help = "colmap-text and colmap: images/ and sparse/; transforms: images/ and a "
+                  "transforms.json "
                   "as nerfstudio and instant-ngp read it",
           .choices = "colmap-text|colmap|transforms"});
   }
@@ -30,12 +31,14 @@ struct ExportOptions {
 void MakeEmptyFolder(const fs::path& folder) {
   std::error_code error;
   if (fs::exists(folder, error) && !fs::is_empty(folder, error))
-    throw Error(ExitCode::kUsage, "is not empty", folder.string(), "name a new folder with --out");
+    throw Error(ExitCode::kUsage, "is not empty", folder.string(),
+                "name a new folder with --out");
   fs::create_directories(folder / "images", error);
   if (error) throw Error(ExitCode::kResources, error.message(), folder.string());
 }
 
-void WritePoses(const ExportOptions& options, const std::string& folder, const Capture& capture) {
+void WritePoses(const ExportOptions& options, const std::string& folder,
+                const Capture& capture) {
   if (options.format == "transforms") {
     std::vector<TransformsFrame> frames;
     for (const CaptureView& view : capture.views)
@@ -74,11 +77,12 @@ void RunExport(const Command& command, const Arguments& arguments, Console* cons
   for (const CaptureView& view : capture.views) {
     std::error_code error;
     fs::copy_file(view.path, settings.out + "/images/" + view.name, error);
-    if (error) throw Error(ExitCode::kResources, error.message(), settings.out + "/images/" + view.name);
+    if (error)
+      throw Error(ExitCode::kResources, error.message(), settings.out + "/images/" + view.name);
   }
   WritePoses(settings, words[0], capture);
-  console->Info("wrote " + std::to_string(capture.views.size()) + " photos and their poses to " +
-                settings.out);
+  console->Info("wrote " + std::to_string(capture.views.size()) +
+                " photos and their poses to " + settings.out);
 }
 
 }  // namespace regrade

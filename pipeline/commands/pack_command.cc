@@ -1,4 +1,5 @@
-// regrade pack: a posed capture in one file, for `regrade_gpu` on a machine that has nothing else.
+// regrade pack: a posed capture in one file, for `regrade_gpu` on a machine that has nothing
+// else.
 #include <algorithm>
 #include <filesystem>
 
@@ -21,7 +22,8 @@ constexpr int kStyleSide = 512;
 
 Image SmallPicture(const std::string& path) {
   const Image picture = ReadStylePicture(path, nullptr);
-  const double scale = std::min(1.0, static_cast<double>(kStyleSide) / std::max(picture.width, picture.height));
+  const double scale =
+      std::min(1.0, static_cast<double>(kStyleSide) / std::max(picture.width, picture.height));
   return Colors(Resize(picture, std::max(1, static_cast<int>(picture.width * scale)),
                        std::max(1, static_cast<int>(picture.height * scale))));
 }
@@ -44,7 +46,8 @@ void RunPack(const Command& command, const Arguments& arguments, Console* consol
   CheckWords(command, words, 1, 1);
   ApplyProgramOptions(program);
   if (run.out.empty())
-    throw Error(ExitCode::kUsage, "its value is missing", "--out", "name the .npz file to write");
+    throw Error(ExitCode::kUsage, "its value is missing", "--out",
+                "name the .npz file to write");
   if (!std::filesystem::exists(words[0] + "/poses/photos.json"))
     throw Error(ExitCode::kInput, "holds no poses", words[0],
                 "run `regrade pose CAPTURE --out " + words[0] + "` first");

@@ -41,7 +41,8 @@ void ProbeInputs(const std::string& last, RunContext* context) {
   if (!std::filesystem::exists(context->source))
     throw Error(ExitCode::kInput, "there is no such folder", context->source,
                 "name a folder of photos");
-  const std::filesystem::path out = std::filesystem::weakly_canonical(context->settings.run.out);
+  const std::filesystem::path out =
+      std::filesystem::weakly_canonical(context->settings.run.out);
   for (const std::filesystem::path& folder : {out, out / "poses"})
     if (DetectCapture(context->source).kind == CaptureKind::kPosed &&
         std::filesystem::weakly_canonical(context->source) == folder)

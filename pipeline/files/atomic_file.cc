@@ -57,7 +57,8 @@ void WriteFileAtomically(const std::string& path, std::string_view bytes) {
   WriteFileAtomically(path, {}, bytes);
 }
 
-void WriteFileAtomically(const std::string& path, std::string_view head, std::string_view bytes) {
+void WriteFileAtomically(const std::string& path, std::string_view head,
+                         std::string_view bytes) {
   const size_t size = head.size() + bytes.size();
   const std::string temporary = path + kTemporarySuffix;
   try {

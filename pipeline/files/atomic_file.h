@@ -12,8 +12,10 @@ namespace regrade {
 // with the file, the bytes needed and the errno text; then the old file is untouched and the
 // temporary removed.
 void WriteFileAtomically(const std::string& path, std::string_view bytes);
-// The same for `head` and `bytes` behind it: what is large need not be copied to stand behind a few words.
-void WriteFileAtomically(const std::string& path, std::string_view head, std::string_view bytes);
+// The same for `head` and `bytes` behind it: what is large need not be copied to stand behind a
+// few words.
+void WriteFileAtomically(const std::string& path, std::string_view head,
+                         std::string_view bytes);
 
 // Moves a finished file or folder of the same file system into place and makes that durable.
 void RenameDurably(const std::string& from, const std::string& to);

@@ -38,9 +38,9 @@ Camera CameraOf(const std::string& path, size_t row, const double* v) {
     axis[1][i] = at(i, 0);
     axis[2][i] = -at(i, 2);
   }
-  const double off = std::max({std::abs(Norm(axis[0]) - 1), std::abs(Norm(axis[2]) - 1),
-                               std::abs(Dot(axis[0], axis[2])),
-                               Norm(Cross(axis[2], axis[0]) - axis[1])});
+  const double off =
+      std::max({std::abs(Norm(axis[0]) - 1), std::abs(Norm(axis[2]) - 1),
+                std::abs(Dot(axis[0], axis[2])), Norm(Cross(axis[2], axis[0]) - axis[1])});
   if (!(off < kRigidTolerance)) Refuse(path, row, "the matrix is not a rotation");
   const Vec3d forward = Normalized(axis[2]);
   const Vec3d right = Normalized(axis[0] - forward * Dot(axis[0], forward));
@@ -57,8 +57,9 @@ Camera CameraOf(const std::string& path, size_t row, const double* v) {
 LlffPoses ReadPosesBounds(const std::string& path) {
   const std::string bytes = ReadWholeFile(path, kMaxBytes);
   const NpyHeader header = ParseNpyHeader(bytes, path);
-  if (header.type != ArrayType::kF64 || header.shape.size() != 2 || header.shape[1] != kColumns ||
-      header.shape[0] < 1 || header.data_bytes != bytes.size() - header.data_offset)
+  if (header.type != ArrayType::kF64 || header.shape.size() != 2 ||
+      header.shape[1] != kColumns || header.shape[0] < 1 ||
+      header.data_bytes != bytes.size() - header.data_offset)
     throw Error(ExitCode::kInput, "is no table of 17 doubles a pose", path,
                 "poses_bounds.npy is written by LLFF's imgs2poses.py");
   std::vector<double> values(header.data_bytes / sizeof(double));

@@ -14,10 +14,11 @@ struct LlffPoses {
   double farthest = 0;          // largest of the far bounds
 };
 
-// f64 [N, 17]: by rows a 3x5 matrix (camera-to-world with axes down, right, backward; then height, width and
-// focal length in pixels) and the near and far depth of what the camera sees. Rotations are made orthonormal.
-// Throws Error(kInput) for another shape or type, values that are not finite, a matrix that is no rigid
-// motion, a size that is not one of pictures, or bounds that are not 0 < near < far.
+// f64 [N, 17]: by rows a 3x5 matrix (camera-to-world with axes down, right, backward; then
+// height, width and focal length in pixels) and the near and far depth of what the camera sees.
+// Rotations are made orthonormal. Throws Error(kInput) for another shape or type, values that
+// are not finite, a matrix that is no rigid motion, a size that is not one of pictures, or
+// bounds that are not 0 < near < far.
 LlffPoses ReadPosesBounds(const std::string& path);
 
 }  // namespace regrade

@@ -31,7 +31,8 @@ struct HeldOut {
   double psnr = 0, ssim = 0;
 };
 
-HeldOut MeasureHeldOut(FitEngine* engine, const PackedCapture& capture, const MarchOptions& march) {
+HeldOut MeasureHeldOut(FitEngine* engine, const PackedCapture& capture,
+                       const MarchOptions& march) {
   std::vector<double> psnr, ssim;
   for (const PackedView& view : capture.views) {
     if (!view.held_out) continue;
@@ -75,7 +76,8 @@ void FitPacked(const FitPackedOptions& settings, const FitOptions& options) {
   const double fit_seconds = SecondsSince(fit_start);
   JsonValue render;
   if (hooks.keep_field) {
-    WriteFieldFile(settings.field, {fit.field, capture.scene.field_from_world, capture.scene.ndc});
+    WriteFieldFile(settings.field,
+                   {fit.field, capture.scene.field_from_world, capture.scene.ndc});
     if (backend == Backend::kCuda)
       render = RenderPrices(UploadGrid(MakeFastGrid(fit.field)), capture, options.step);
   }
@@ -84,23 +86,23 @@ void FitPacked(const FitPackedOptions& settings, const FitOptions& options) {
   for (size_t i = 0; i < fit.curve.size(); i += std::max<size_t>(1, fit.curve.size() / 100))
     curve.push_back(JsonValue::Array{fit.curve[i].seconds, fit.curve[i].psnr_train_db});
   const DeviceStatus device = ReadDeviceStatus();
-  const JsonValue record = JsonValue::Object{
-      {"capture", settings.capture},
-      {"device", settings.device == "cpu" ? "cpu" : device.name},
-      {"seconds_read", read_seconds},
-      {"seconds_fit", fit_seconds},
-      {"seconds_steps", fit.seconds},
-      {"seconds_all", SecondsSince(start)},
-      {"rays", fit.rays},
-      {"samples", fit.samples},
-      {"rejected_voxels", fit.rejected_voxels},
-      {"voxels", fit.voxels},
-      {"psnr_train_db", fit.psnr_train_db},
-      {"psnr_heldout_db", measured.psnr},
-      {"ssim_heldout", measured.ssim},
-      {"render", std::move(render)},
-      {"curve_heldout", std::move(stages)},
-      {"curve_train", std::move(curve)}};
+  const JsonValue record =
+      JsonValue::Object{{"capture", settings.capture},
+                        {"device", settings.device == "cpu" ? "cpu" : device.name},
+                        {"seconds_read", read_seconds},
+                        {"seconds_fit", fit_seconds},
+                        {"seconds_steps", fit.seconds},
+                        {"seconds_all", SecondsSince(start)},
+                        {"rays", fit.rays},
+                        {"samples", fit.samples},
+                        {"rejected_voxels", fit.rejected_voxels},
+                        {"voxels", fit.voxels},
+                        {"psnr_train_db", fit.psnr_train_db},
+                        {"psnr_heldout_db", measured.psnr},
+                        {"ssim_heldout", measured.ssim},
+                        {"render", std::move(render)},
+                        {"curve_heldout", std::move(stages)},
+                        {"curve_train", std::move(curve)}};
   std::printf("%s\n", DumpJson(record, -1).c_str());
   std::fflush(stdout);
 }

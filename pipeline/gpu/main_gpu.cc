@@ -13,17 +13,20 @@ namespace regrade {
 namespace {
 
 constexpr char kUsage[] =
-    "regrade_gpu " REGRADE_VERSION ": regrade on a machine with nothing but a CUDA driver\n\n"
+    "regrade_gpu " REGRADE_VERSION
+    ": regrade on a machine with nothing but a CUDA driver\n\n"
     "usage: regrade_gpu device                       what the card is\n"
     "       regrade_gpu fit --capture FILE [OPTIONS]   a field from a file of `regrade pack`\n"
     "       regrade_gpu style --capture FILE --field FILE [OPTIONS]\n"
-    "                                                that field in the colours of the file's style picture\n";
+    "                                                that field in the colours of the file's "
+    "style picture\n";
 
 void PrintDevice() {
   const DeviceStatus status = ReadDeviceStatus();
-  std::printf("{\"found\": %s, \"name\": \"%s\", \"compute_capability\": %d, \"free_mib\": %lld}\n",
-              status.found ? "true" : "false", status.name.c_str(), status.compute_capability,
-              static_cast<long long>(status.free_bytes >> 20));
+  std::printf(
+      "{\"found\": %s, \"name\": \"%s\", \"compute_capability\": %d, \"free_mib\": %lld}\n",
+      status.found ? "true" : "false", status.name.c_str(), status.compute_capability,
+      static_cast<long long>(status.free_bytes >> 20));
 }
 
 // It decides the defaults of the options that are read after it.
@@ -73,7 +76,8 @@ bool Run(const std::vector<std::string>& arguments) {
 
 int main(int argc, char** argv) {
   try {
-    return regrade::Run(std::vector<std::string>(argv + std::min(argc, 1), argv + argc)) ? 0 : 1;
+    return regrade::Run(std::vector<std::string>(argv + std::min(argc, 1), argv + argc)) ? 0
+                                                                                         : 1;
   } catch (const regrade::Error& error) {
     std::fprintf(stderr, "regrade_gpu: %s\n", error.what());
     return static_cast<int>(error.code());

@@ -25,8 +25,8 @@ double Median(std::vector<double> values) {
 
 }  // namespace
 
-double RenderMilliseconds(const DeviceGrid& grid, const PackedCapture& capture, const MarchOptions& march,
-                          float opacity_step) {
+double RenderMilliseconds(const DeviceGrid& grid, const PackedCapture& capture,
+                          const MarchOptions& march, float opacity_step) {
   std::vector<double> milliseconds;
   for (const PackedView& view : capture.views) {
     if (!view.held_out) continue;
@@ -54,8 +54,9 @@ JsonValue RenderPrices(const DeviceGrid& grid, const PackedCapture& capture, flo
   struct Setting {
     float stop, opacity_step;
   };
-  const Setting settings[] = {{1e-4f, 0},          {1e-3f, 0},          {1e-2f, 0},          {1e-3f, 1.0f / 256},
-                              {1e-3f, 1.0f / 128}, {1e-3f, 1.0f / 64},  {1e-3f, 1.0f / 32},  {1e-2f, 1.0f / 64}};
+  const Setting settings[] = {{1e-4f, 0},          {1e-3f, 0},          {1e-2f, 0},
+                              {1e-3f, 1.0f / 256}, {1e-3f, 1.0f / 128}, {1e-3f, 1.0f / 64},
+                              {1e-3f, 1.0f / 32},  {1e-2f, 1.0f / 64}};
   std::vector<Image> exact;
   JsonValue::Array rows;
   for (const Setting& setting : settings) {
@@ -64,16 +65,18 @@ JsonValue RenderPrices(const DeviceGrid& grid, const PackedCapture& capture, flo
     size_t index = 0;
     for (const PackedView& view : capture.views) {
       if (!view.held_out) continue;
-      const Image image = RenderViewOnDevice(grid, view.camera, march, setting.opacity_step).color;
+      const Image image =
+          RenderViewOnDevice(grid, view.camera, march, setting.opacity_step).color;
       if (rows.empty()) exact.push_back(image);
       against_exact.push_back(Psnr(image, exact[index++]).value_or(0));
       against_photo.push_back(Psnr(image, view.photo).value_or(0));
     }
-    rows.push_back(JsonValue::Object{{"stop", setting.stop},
-                                     {"opacity_step", setting.opacity_step},
-                                     {"ms", RenderMilliseconds(grid, capture, march, setting.opacity_step)},
-                                     {"db_against_first", rows.empty() ? 0.0 : Median(against_exact)},
-                                     {"db_against_photos", Median(against_photo)}});
+    rows.push_back(JsonValue::Object{
+        {"stop", setting.stop},
+        {"opacity_step", setting.opacity_step},
+        {"ms", RenderMilliseconds(grid, capture, march, setting.opacity_step)},
+        {"db_against_first", rows.empty() ? 0.0 : Median(against_exact)},
+        {"db_against_photos", Median(against_photo)}});
   }
   return rows;
 }

@@ -71,8 +71,9 @@ Lessons StyleViews(const PackedCapture& capture) {
   return lessons;
 }
 
-void RenderHeldOut(const DeviceGrid& grid, const PackedCapture& capture, const MarchOptions& march,
-                   const std::string& folder, const std::string& name) {
+void RenderHeldOut(const DeviceGrid& grid, const PackedCapture& capture,
+                   const MarchOptions& march, const std::string& folder,
+                   const std::string& name) {
   std::filesystem::create_directories(folder);
   int index = 0;
   for (const PackedView& view : capture.views)
@@ -87,7 +88,8 @@ void StylePacked(const StylePackedOptions& settings, const TrainNetworkOptions& 
   Stopwatch watch;
   const PackedCapture capture = ReadPackedCapture(settings.capture);
   if (capture.style.num_pixels() == 0)
-    throw Error(ExitCode::kInput, "holds no style picture", settings.capture, "pack it with --style PICTURE");
+    throw Error(ExitCode::kInput, "holds no style picture", settings.capture,
+                "pack it with --style PICTURE");
   StoredField stored = ReadFieldFile(settings.field);
   const MarchOptions march{stored.field.step};
   JsonValue record = JsonValue::Object{{"capture", settings.capture}};
@@ -117,8 +119,8 @@ void StylePacked(const StylePackedOptions& settings, const TrainNetworkOptions& 
     return Verdict::kContinue;
   };
   const TrainNetworkResult trained =
-      TrainNetwork(stored.field, lessons.views, lessons.scene_map, march, options, hooks, nullptr,
-                   on_device ? &grid : nullptr);
+      TrainNetwork(stored.field, lessons.views, lessons.scene_map, march, options, hooks,
+                   nullptr, on_device ? &grid : nullptr);
   record["seconds_learn"] = watch.Lap();
   record["seconds_start_and_first_step"] = seconds_start;
   record["seconds_other_steps"] = seconds_steps;
@@ -133,7 +135,8 @@ void StylePacked(const StylePackedOptions& settings, const TrainNetworkOptions& 
     if (first != capture.views.end()) RenderViewOnDevice(grid, first->camera, march);
     record["seconds_first_frame"] = watch.Lap();
     record["render"] = RenderPrices(grid, capture, march.step);
-    if (!settings.frames.empty()) RenderHeldOut(grid, capture, march, settings.frames, "styled");
+    if (!settings.frames.empty())
+      RenderHeldOut(grid, capture, march, settings.frames, "styled");
   }
   record["device"] = on_device ? ReadDeviceStatus().name : "cpu";
   record["voxels"] = stored.field.geometry->num_voxels();

@@ -43,12 +43,13 @@ Image AlongRays(const Camera& camera, Image depth) {
 GeometrySource GeometryOf(const RunSettings& settings, const Capture& capture,
                           const StoredField& stored) {
   const auto grid = std::make_shared<const FastGrid>(MakeFastGrid(stored.field));
-  return [&settings, &capture, grid, step = stored.field.step,
-          field_from_world = stored.field_from_world, ndc = stored.ndc](int i) -> FrameGeometry {
-    const Camera camera = WorkingCamera(capture.views[static_cast<size_t>(i)].camera,
-                                        settings.scene.photo_size, field_from_world, ndc);
-    return {AlongRays(camera, RenderView(*grid, camera, MarchOptions{step}).depth), camera};
-  };
+  return
+      [&settings, &capture, grid, step = stored.field.step,
+       field_from_world = stored.field_from_world, ndc = stored.ndc](int i) -> FrameGeometry {
+        const Camera camera = WorkingCamera(capture.views[static_cast<size_t>(i)].camera,
+                                            settings.scene.photo_size, field_from_world, ndc);
+        return {AlongRays(camera, RenderView(*grid, camera, MarchOptions{step}).depth), camera};
+      };
 }
 
 // Seconds on two cores at 480 pixels, roughly: what makes the stage's time left come out right.
@@ -56,7 +57,8 @@ constexpr double kPairSeconds = 0.085, kFrameSeconds = 0.07, kLinearMapSeconds =
 
 double PairWeight(const RunSettings& settings, int frames) {
   double weight = 0;
-  for (const int gap : settings.consistency.gaps) weight += kPairSeconds * std::max(0, frames - gap);
+  for (const int gap : settings.consistency.gaps)
+    weight += kPairSeconds * std::max(0, frames - gap);
   return std::max(weight, kPairSeconds);
 }
 
@@ -90,8 +92,8 @@ void AddFilm(RunContext* context, const Image& style, ProgressParts* parts,
   const FidelityTargets targets{renders_styled ? sequences[1].frames : FrameSource(),
                                 FramesOf(folder("transmittance"), all), &style};
   for (const NamedFrameSource& sequence : sequences)
-    fidelity->push_back(MeasureFidelity(sequence, targets,
-                                        parts->Next(kFrameSeconds * static_cast<double>(all.size()))));
+    fidelity->push_back(MeasureFidelity(
+        sequence, targets, parts->Next(kFrameSeconds * static_cast<double>(all.size()))));
 }
 
 StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
@@ -122,9 +124,9 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   const GeometrySource geometry = settings.consistency.mode == "geometry"
                                       ? GeometryOf(settings, capture, stored)
                                       : GeometrySource();
-  ConsistencyReport consistency =
-      EvaluateConsistency(source, sequences, settings.consistency,
-                          parts.Next(PairWeight(settings, static_cast<int>(all.size()))), geometry);
+  ConsistencyReport consistency = EvaluateConsistency(
+      source, sequences, settings.consistency,
+      parts.Next(PairWeight(settings, static_cast<int>(all.size()))), geometry);
 
   // Fidelity is measured on the views that the style was learned from, against what the 2D
   // method made of the renders, or else of the photos.
@@ -138,9 +140,8 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
                                        targets, parts.Next(n * kFrameSeconds)));
   AddFilm(context, style, &parts, &consistency, &fidelity);
   const FidelityTargets photo_targets{of_photos, targets.transmittance, nullptr};
-  const FidelityRow to_photos =
-      MeasureFidelity({"styled", frames("styled", taught)}, photo_targets,
-                      parts.Next(n * kFrameSeconds));
+  const FidelityRow to_photos = MeasureFidelity({"styled", frames("styled", taught)},
+                                                photo_targets, parts.Next(n * kFrameSeconds));
 
   std::vector<Camera> cameras;
   for (const int i : taught)

@@ -20,7 +20,8 @@ JsonValue PhotoSet(const CaptureSource& source) {
   return files;
 }
 
-// Seconds on two cores, roughly: photos take what their bytes take to read, and their number to place.
+// Seconds on two cores, roughly: photos take what their bytes take to read, and their number to
+// place.
 struct StageShares {
   double ingest = 1, poses = 0;
 };
@@ -59,9 +60,9 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
     PoseOptions options = settings.pose;
     options.threads = settings.program.threads;
     PoseReport report;
-    capture =
-        PosesFromPhotos(ingest.photos, ingest.verdicts, options,
-                        workspace.Path(".regrade/work/pose"), sparse_folder, parts.Next(shares.poses), &report);
+    capture = PosesFromPhotos(ingest.photos, ingest.verdicts, options,
+                              workspace.Path(".regrade/work/pose"), sparse_folder,
+                              parts.Next(shares.poses), &report);
     for (const std::string& note : report.notes) context->console->Info(note);
     outcome.figures["colmap"] = report.colmap_version;
     outcome.figures["recipe"] = report.recipe;

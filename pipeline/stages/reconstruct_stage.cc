@@ -20,7 +20,8 @@
 namespace regrade {
 namespace {
 
-constexpr double kAfterFit = 0.08;  // pruning, writing and measuring, as a share of the steps' time
+constexpr double kAfterFit =
+    0.08;  // pruning, writing and measuring, as a share of the steps' time
 constexpr int kReproducibleShards = 4;  // sums in a fixed grouping, whatever the threads
 
 double Mean(const std::vector<double>& values) {
@@ -38,9 +39,8 @@ void MeasureHeldOut(RunContext* context, const Capture& capture, const StoredFie
   for (const int i : ViewIndices(capture, settings.run.holdout, true)) {
     const CaptureView& view = capture.views[static_cast<size_t>(i)];
     const Image photo = ReadWorkingPhoto(view, settings.scene.photo_size);
-    const Camera camera =
-        WorkingCamera(view.camera, settings.scene.photo_size, stored.field_from_world,
-                      stored.ndc);
+    const Camera camera = WorkingCamera(view.camera, settings.scene.photo_size,
+                                        stored.field_from_world, stored.ndc);
     const Image rendered = renderer.Render(camera).color;
     if (const auto value = Psnr(rendered, photo)) psnr.push_back(*value);
     if (const auto value = Ssim(rendered, photo)) ssim.push_back(*value);
@@ -51,15 +51,17 @@ void MeasureHeldOut(RunContext* context, const Capture& capture, const StoredFie
   (*figures)["ssim_heldout"] = ssim.empty() ? JsonValue() : JsonValue(Mean(ssim));
 }
 
-StagePlan PlanOf(const RunSettings& settings, const Capture& capture, const SceneBox& box, Backend backend) {
+StagePlan PlanOf(const RunSettings& settings, const Capture& capture, const SceneBox& box,
+                 Backend backend) {
   int64_t pixels = 0;
   for (const int i : ViewIndices(capture, settings.run.holdout, false)) {
     const Camera camera = WorkingCamera(capture.views[static_cast<size_t>(i)].camera,
                                         settings.scene.photo_size, {}, {});
     pixels += int64_t{camera.width} * camera.height;
   }
-  return backend == Backend::kCuda ? PlanFitOnDevice(settings.fit, pixels, box.radius)
-                                   : PlanFit(settings.fit, pixels, box.radius, omp_get_max_threads());
+  return backend == Backend::kCuda
+             ? PlanFitOnDevice(settings.fit, pixels, box.radius)
+             : PlanFit(settings.fit, pixels, box.radius, omp_get_max_threads());
 }
 
 StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
@@ -71,17 +73,18 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
       ProfileScene(capture, settings.fit.sh_degree, settings.run.effects);
   const NormalizedScene& scene = profile.scene;
   if (!scene.notice.empty()) context->console->Info(scene.notice);
-  for (const EffectReport& effect : profile.effects)
-    context->console->Info(EffectLine(effect));
+  for (const EffectReport& effect : profile.effects) context->console->Info(EffectLine(effect));
   const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
   const StagePlan plan = PlanOf(settings, capture, scene.box, backend);
   context->console->Info("the fit will take " + PlanText(plan));
   if (backend == Backend::kCuda)
     CheckFitsMemory(plan,
-                    PlannedMemory(settings.run.max_memory_gb, static_cast<uint64_t>(ReadDeviceStatus().free_bytes)),
+                    PlannedMemory(settings.run.max_memory_gb,
+                                  static_cast<uint64_t>(ReadDeviceStatus().free_bytes)),
                     "GPU memory");
   else
-    CheckFitsMemory(plan, PlannedMemory(settings.run.max_memory_gb, ReadMemoryStatus().available));
+    CheckFitsMemory(plan,
+                    PlannedMemory(settings.run.max_memory_gb, ReadMemoryStatus().available));
 
   const std::vector<int> fitted = ViewIndices(capture, settings.run.holdout, false);
   std::vector<Image> photos;
@@ -90,10 +93,9 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   for (const int i : fitted) {
     const CaptureView& view = capture.views[static_cast<size_t>(i)];
     photos.push_back(ReadWorkingPhoto(view, settings.scene.photo_size));
-    views.push_back(
-        {WorkingCamera(view.camera, settings.scene.photo_size, scene.field_from_world,
-                       scene.ndc),
-         &photos.back()});
+    views.push_back({WorkingCamera(view.camera, settings.scene.photo_size,
+                                   scene.field_from_world, scene.ndc),
+                     &photos.back()});
   }
 
   FitOptions options = settings.fit;
@@ -142,10 +144,11 @@ Stage ReconstructStage(RunContext* context) {
   stage.refuse_changes = true;
   if (context->settings.start.dry_run) {
     const Capture capture = ReadCapture(context->workspace->Path("poses"));
-    stage.plan = PlanText(PlanOf(context->settings, capture, ProfileScene(capture, context->settings.fit.sh_degree,
-                                        context->settings.run.effects)
-                               .scene.box,
-                                 ChooseBackend(run.device, run.reproducible)));
+    stage.plan = PlanText(PlanOf(
+        context->settings, capture,
+        ProfileScene(capture, context->settings.fit.sh_degree, context->settings.run.effects)
+            .scene.box,
+        ChooseBackend(run.device, run.reproducible)));
   }
   stage.work = [context, inputs = stage.inputs](const ProgressFunction& progress) {
     return Reconstruct(context, inputs, progress);

@@ -74,7 +74,8 @@ StageOutcome WriteReport(RunContext* context) {
   report.preset = settings.run.preset;
   report.device = "cpu";
   if (const auto record = workspace.Find("reconstruct"))
-    if (const JsonValue* device = record->figures.Find("device")) report.device = device->AsString();
+    if (const JsonValue* device = record->figures.Find("device"))
+      report.device = device->AsString();
   report.seed = settings.run.seed;
   for (const char* stage : kStageNames)
     if (const auto record = workspace.Find(stage)) report.seconds += record->seconds;

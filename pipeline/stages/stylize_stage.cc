@@ -40,10 +40,9 @@ Lessons ReadLessons(RunContext* context, const Capture& capture, const StoredFie
     const CaptureView& view = capture.views[static_cast<size_t>(i)];
     const std::string name = "views_2d/" + FrameName(i);
     lessons.targets.push_back(ReadImage(context->workspace->Path(name)));
-    lessons.views.push_back(
-        {WorkingCamera(view.camera, settings.scene.photo_size, stored.field_from_world,
-                       stored.ndc),
-         &lessons.targets.back(), nullptr, name});
+    lessons.views.push_back({WorkingCamera(view.camera, settings.scene.photo_size,
+                                           stored.field_from_world, stored.ndc),
+                             &lessons.targets.back(), nullptr, name});
     before.push_back(MeasureColor(ReadWorkingPhoto(view, settings.scene.photo_size)));
     after.push_back(MeasureColor(lessons.targets.back()));
   }
@@ -53,7 +52,8 @@ Lessons ReadLessons(RunContext* context, const Capture& capture, const StoredFie
   return lessons;
 }
 
-constexpr double kAfterTraining = 0.15;  // conclusion, and the network over the field, of the steps' time
+constexpr double kAfterTraining =
+    0.15;  // conclusion, and the network over the field, of the steps' time
 
 Vec3f Mapped(const ColorMap& map, const Vec3f& color) {
   Vec3d mapped = map(color.Cast<double>());
@@ -98,7 +98,8 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
     RestyleOnDevice(trained.network, &device_field);
     stored.field.appearance = ToRadianceField(DownloadGrid(device_field)).appearance;
   } else {
-    stored.field.appearance = ApplyNetwork(trained.network, stored.field, parts.Next(kAfterTraining));
+    stored.field.appearance =
+        ApplyNetwork(trained.network, stored.field, parts.Next(kAfterTraining));
   }
   WriteFieldFile(workspace.Path("styled.npz"), stored);
   StageOutcome outcome;

@@ -55,8 +55,7 @@ TEST_F(FlowFile, RoundTripKeepsBitsAndCountsUnknown) {
     for (int x = 0; x < 17; ++x)
       if ((x == 4 && y == 5) || (x == 0 && y == 0) || (x == 16 && y == 8)) {
         EXPECT_TRUE(std::isnan(back.at(x, y)[0]) && std::isnan(back.at(x, y)[1]));
-      }
-      else {
+      } else {
         EXPECT_EQ(std::memcmp(back.at(x, y), flow.at(x, y), 8), 0);
       }
 }

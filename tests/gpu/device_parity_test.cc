@@ -1,6 +1,6 @@
-// The parity table: each device body against the plain body in float and in double. It links kernels and
-// GoogleTest alone, so the program runs on a bare machine with a CUDA driver; without a device each test
-// skips and says so.
+// The parity table: each device body against the plain body in float and in double. It links
+// kernels and GoogleTest alone, so the program runs on a bare machine with a CUDA driver;
+// without a device each test skips and says so.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -43,8 +43,8 @@ Buffer<float> GradientOf(const DeviceGrid& grid) {
   return gradient;
 }
 
-// H70: 2e-5 a pixel against the plain body in float and in double; H84: skipping empty space leaves the
-// picture as it is.
+// H70: 2e-5 a pixel against the plain body in float and in double; H84: skipping empty space
+// leaves the picture as it is.
 TEST_P(DeviceParity, Render) {
   for (const double fill : {0.003, 0.05, 0.9}) {
     const RadianceField field = RandomField({33, 27, 41}, basis(), fill, 31);
@@ -77,25 +77,30 @@ TEST_P(DeviceParity, Render) {
       against_float = std::max(against_float, std::abs(double{lefts[r]} - plain.transmittance));
       depth_error = std::max(depth_error, std::abs(double{depths[r]} - plain.depth));
     }
-    // Colours at steps of the opacity: within a step of the exact ones, these fields' colours lie within [-1, 2].
+    // Colours at steps of the opacity: within a step of the exact ones, these fields' colours
+    // lie within [-1, 2].
     constexpr float kOpacityStep = 1.0f / 64;
-    RenderOnDevice(grid, on_device.data(), rays.size(), options, {color.data(), depth.data(), left.data()}, kOpacityStep);
+    RenderOnDevice(grid, on_device.data(), rays.size(), options,
+                   {color.data(), depth.data(), left.data()}, kOpacityStep);
     const Buffer<Vec3f> stepped = color.ToHost();
     const Buffer<float> stepped_lefts = left.ToHost();
     double step_error = 0;
     for (int64_t r = 0; r < rays.size(); ++r) {
       ASSERT_EQ(stepped_lefts[r], lefts[r]);
       for (int c = 0; c < 3; ++c)
-        step_error = std::max(step_error, std::abs(double{stepped[r][c]} - double{colors[r][c]}));
+        step_error =
+            std::max(step_error, std::abs(double{stepped[r][c]} - double{colors[r][c]}));
     }
     Row("render in opacity steps", basis(), "every sample", step_error, 3 * kOpacityStep);
     Row("render", basis(), "plain float", against_float, 2e-5);
-    Row("render", basis(), "plain double", against_double, 1e-4);  // a sample more or less at the stop
+    Row("render", basis(), "plain double", against_double,
+        1e-4);  // a sample more or less at the stop
     Row("depth", basis(), "plain float", depth_error, 1e-4);
   }
 }
 
-// Float gradients against the plain adjoint in double: 1e-4 of the largest entry, as for the CPU's fast path.
+// Float gradients against the plain adjoint in double: 1e-4 of the largest entry, as for the
+// CPU's fast path.
 TEST_P(DeviceParity, FitGradient) {
   const RadianceField field = RandomField({19, 18, 21}, basis(), 0.7, 41);
   const DoubleField in_double(field);
@@ -124,10 +129,11 @@ TEST_P(DeviceParity, FitGradient) {
     const RayResult<double> result = RenderRay(in_double.view(), ray, options);
     const Vec3d e = result.color - targets[r].Cast<double>();
     error += Dot(e, e);
-    RenderRayAdjoint(in_double.view(), ray, options, result, e * (2.0 * scale), d_density.data(),
-                     d_sh.data(), PlainAdd());
+    RenderRayAdjoint(in_double.view(), ray, options, result, e * (2.0 * scale),
+                     d_density.data(), d_sh.data(), PlainAdd());
   }
-  Row("loss", basis(), "plain double, relative", std::abs(sums.squared_error - error) / error, 1e-5);
+  Row("loss", basis(), "plain double, relative", std::abs(sums.squared_error - error) / error,
+      1e-5);
   double largest_density = 0, largest_sh = 0, off_density = 0, off_sh = 0;
   for (const double d : d_density) largest_density = std::max(largest_density, std::abs(d));
   for (const double d : d_sh) largest_sh = std::max(largest_sh, std::abs(d));
@@ -143,8 +149,10 @@ TEST_P(DeviceParity, FitGradient) {
       ASSERT_NE(touched[v / 32] & (1u << v % 32), 0u) << v;
     }
   }
-  Row("gradient of densities", basis(), "plain double, of the largest", off_density / largest_density, 1e-4);
-  Row("gradient of colours", basis(), "plain double, of the largest", off_sh / largest_sh, 1e-4);
+  Row("gradient of densities", basis(), "plain double, of the largest",
+      off_density / largest_density, 1e-4);
+  Row("gradient of colours", basis(), "plain double, of the largest", off_sh / largest_sh,
+      1e-4);
 }
 
 TEST_P(DeviceParity, TotalVariation) {
@@ -162,8 +170,9 @@ TEST_P(DeviceParity, TotalVariation) {
   for (int64_t i = 0; i < n * lanes; ++i) records[static_cast<size_t>(i)] = host.records[i];
   for (int k = 0; k <= DensityLane(basis()); ++k) {
     const bool is_density = k == DensityLane(basis());
-    TotalVariation<double>(host.frame, host.links.data(), records.data(), lanes, k, is_density, 0,
-                           host.frame.NumVertices(), is_density ? 0.3f : 0.2f, expected.data());
+    TotalVariation<double>(host.frame, host.links.data(), records.data(), lanes, k, is_density,
+                           0, host.frame.NumVertices(), is_density ? 0.3f : 0.2f,
+                           expected.data());
   }
   double off = 0;
   for (int64_t i = 0; i < n * lanes; ++i)
@@ -183,7 +192,8 @@ TEST_P(DeviceParity, Step) {
   for (const int32_t voxel : {5, 11, 23}) {
     touched[voxel / 32] |= 1u << voxel % 32;
     for (int k = 0; k <= DensityLane(basis()); ++k)
-      g[voxel * lanes + k] = static_cast<float>(testing::Uniform(9, static_cast<uint64_t>(voxel * 40 + k), -1, 1));
+      g[voxel * lanes + k] =
+          static_cast<float>(testing::Uniform(9, static_cast<uint64_t>(voxel * 40 + k), -1, 1));
   }
   g[11 * lanes] = std::nanf("");
   DeviceCopyRows(grid.gradient(), 12 * lanes, g.data(), 4 * lanes, 4 * lanes, n);
@@ -208,7 +218,8 @@ TEST_P(DeviceParity, Step) {
       if (k > DensityLane(basis())) continue;
       const bool is_density = k == DensityLane(basis());
       const double gradient_value = g[v * lanes + k];
-      double expected = old - (is_density ? 0.5 : 0.05) * gradient_value / (std::abs(gradient_value) + 1e-8);
+      double expected =
+          old - (is_density ? 0.5 : 0.05) * gradient_value / (std::abs(gradient_value) + 1e-8);
       if (!is_density) {
         const double bound = k % basis() == 0 ? 0.5 / kSh0 : double{0.2f};
         expected = std::clamp(expected, -bound, bound);
@@ -226,12 +237,14 @@ TEST_P(DeviceParity, Step) {
 TEST_P(DeviceParity, UploadAndDownload) {
   const FastGrid host = MakeFastGrid(RandomField({21, 9, 17}, basis(), 0.02, 3));
   const DeviceGrid grid = UploadGrid(host);
-  // Chebyshev distance of cells, named by their lowest corner, to the nearest with a stored corner.
+  // Chebyshev distance of cells, named by their lowest corner, to the nearest with a stored
+  // corner.
   const Vec3i n = host.frame.resolution;
   const auto stored = [&](int x, int y, int z) {
     for (int k = 0; k < 8; ++k) {
       const int cx = x + (k >> 2 & 1), cy = y + (k >> 1 & 1), cz = z + (k & 1);
-      if (cx < n.x && cy < n.y && cz < n.z && host.links[host.frame.Vertex(cx, cy, cz)] >= 0) return true;
+      if (cx < n.x && cy < n.y && cz < n.z && host.links[host.frame.Vertex(cx, cy, cz)] >= 0)
+        return true;
     }
     return false;
   };

@@ -1,5 +1,7 @@
-// The parity table of learning a style: each device body against the plain body in double, or against the CPU's path
-// that is held to it. Without a device each test skips and says so.
+// The parity table of learning a style: each device body against the plain body in double, or
+// against the CPU's path that is held to it. Without a device each test skips and says so.
+#include "stylize/device_style.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,7 +11,6 @@
 #include "kernels/base/device_memory.h"
 #include "kernels/field/fast_rays.h"
 #include "kernels/network/device_mlp.h"
-#include "stylize/device_style.h"
 #include "tests/support/parity_row.h"
 #include "tests/support/styled_ball.h"
 
@@ -39,8 +40,8 @@ DenseNetwork<double> InDouble(const DenseNetwork<float>& network) {
   return exact;
 }
 
-// TF32 rounds each factor to 10 bits of mantissa: 5e-4 a factor, through six layers. Split factors are as good as
-// floats, and held to what the CPU's fast path is.
+// TF32 rounds each factor to 10 bits of mantissa: 5e-4 a factor, through six layers. Split
+// factors are as good as floats, and held to what the CPU's fast path is.
 struct Tolerances {
   MlpPrecision precision;
   const char* name;
@@ -49,7 +50,9 @@ struct Tolerances {
 constexpr Tolerances kTolerances[] = {{MlpPrecision::kTensor, "tf32", 6e-3, 6e-3},
                                       {MlpPrecision::kSplit, "split tf32", 1e-5, 1e-5}};
 
-bool HasKink(const std::string& activation) { return activation == "relu" || activation == "leaky-relu"; }
+bool HasKink(const std::string& activation) {
+  return activation == "relu" || activation == "leaky-relu";
+}
 
 // n rows through the network and back, by each activation and precision.
 void CheckMlp(int64_t n) {
@@ -61,8 +64,10 @@ void CheckMlp(int64_t n) {
     Buffer<float> input(n * kMlpEndLanes), d_output(input.size());
     for (int64_t i = 0; i < input.size(); ++i) {
       const int64_t lane = i % kMlpEndLanes;
-      if (lane < kNetworkInputs) input[i] = static_cast<float>(Random(60, static_cast<uint64_t>(i)));
-      if (lane < kNetworkSh) d_output[i] = static_cast<float>(Random(61, static_cast<uint64_t>(i)));
+      if (lane < kNetworkInputs)
+        input[i] = static_cast<float>(Random(60, static_cast<uint64_t>(i)));
+      if (lane < kNetworkSh)
+        d_output[i] = static_cast<float>(Random(61, static_cast<uint64_t>(i)));
     }
     const DeviceBuffer<float> x = DeviceBuffer<float>::Of(input, "input"),
                               d_y = DeviceBuffer<float>::Of(d_output, "gradient");
@@ -89,22 +94,28 @@ void CheckMlp(int64_t n) {
           off = std::max(off, std::abs(rows[r * kMlpEndLanes + k] - value));
           largest = std::max(largest, std::abs(value));
         }
-      const std::string what = std::string(activation) + ", " + std::to_string(n) + " rows, " + tolerances.name;
-      ParityRow("network forward", what, "double, of the largest", off / largest, tolerances.forward);
+      const std::string what =
+          std::string(activation) + ", " + std::to_string(n) + " rows, " + tolerances.name;
+      ParityRow("network forward", what, "double, of the largest", off / largest,
+                tolerances.forward);
 
       mlp.AddAdjoint(tolerances.precision, x.data(), d_y.data(), n);
-      // The slope of a rectifier jumps: a unit that rounding takes over the kink has another slope, and as the rows'
-      // gradients here are random and nearly cancel, each such unit shows.
-      if (HasKink(activation) && (n > 100 || tolerances.precision == MlpPrecision::kTensor)) continue;
+      // The slope of a rectifier jumps: a unit that rounding takes over the kink has another
+      // slope, and as the rows' gradients here are random and nearly cancel, each such unit
+      // shows.
+      if (HasKink(activation) && (n > 100 || tolerances.precision == MlpPrecision::kTensor))
+        continue;
       DenseNetwork<double> gradient;
       for (int l = 0; l < kNetworkLayers; ++l)
         gradient.layers.emplace_back(LipschitzNetwork::Outputs(l), LipschitzNetwork::Inputs(l));
       mlp.TakeGradient(&gradient);
       double gradient_off = 0;
-      for (size_t l = 0; l < kNetworkLayers; ++l) {  // of the largest entry of a layer's weights, and of its biases
+      for (size_t l = 0; l < kNetworkLayers;
+           ++l) {  // of the largest entry of a layer's weights, and of its biases
         for (const auto part : {&DenseLayer<double>::weight, &DenseLayer<double>::bias}) {
           double largest_entry = 0, off_entry = 0;
-          const std::vector<double>&is = gradient.layers[l].*part, &should = expected.layers[l].*part;
+          const std::vector<double>&is = gradient.layers[l].*part,
+                &should = expected.layers[l].*part;
           for (size_t i = 0; i < should.size(); ++i) {
             largest_entry = std::max(largest_entry, std::abs(should[i]));
             off_entry = std::max(off_entry, std::abs(is[i] - should[i]));
@@ -112,7 +123,8 @@ void CheckMlp(int64_t n) {
           gradient_off = std::max(gradient_off, off_entry / largest_entry);
         }
       }
-      ParityRow("network gradient", what, "double, of a layer's largest", gradient_off, tolerances.gradient);
+      ParityRow("network gradient", what, "double, of a layer's largest", gradient_off,
+                tolerances.gradient);
     }
   }
 }
@@ -121,7 +133,8 @@ TEST_F(DeviceStyle, MlpLessThanATile) { CheckMlp(1); }
 TEST_F(DeviceStyle, MlpNoWholeTiles) { CheckMlp(37); }
 TEST_F(DeviceStyle, LargeMlpOfTwoChunks) { CheckMlp(70001); }
 
-// Loss, gradient and counts of the device's path against the CPU's, which the tests hold to Algorithm 1 in double.
+// Loss, gradient and counts of the device's path against the CPU's, which the tests hold to
+// Algorithm 1 in double.
 void CheckLossAndGradient(int side) {
   for (const int basis : {9, 4, 1}) {
     const RadianceField field = Ball(14, basis);
@@ -132,8 +145,10 @@ void CheckLossAndGradient(int side) {
     StyleRays batch = SomeRays(3, side);
     batch.targets[5].y = std::nanf("");
     for (const bool every_voxel : {false, true}) {
-      const AggregationOptions options{
-          .min_weight = 1e-4f, .max_transmittance = 0.9f, .one_sided = true, .every_voxel = every_voxel};
+      const AggregationOptions options{.min_weight = 1e-4f,
+                                       .max_transmittance = 0.9f,
+                                       .one_sided = true,
+                                       .every_voxel = every_voxel};
       GradientAggregation on_cpu(field, options);
       const std::unique_ptr<StyleLoss> on_device = MakeDeviceStyleLoss(&grid, options);
       const size_t size = static_cast<size_t>(LipschitzNetwork::NumParameters());
@@ -141,13 +156,19 @@ void CheckLossAndGradient(int side) {
       const AggregationResult should = on_cpu.Run(network, batch, &expected);
       const AggregationResult exact = on_device->Run(network, batch, nullptr);
       const AggregationResult is = on_device->Run(network, batch, &gradient);
-      const std::string what = "basis " + std::to_string(basis) + ", " + std::to_string(batch.rays.size()) + " rays";
+      const std::string what =
+          "basis " + std::to_string(basis) + ", " + std::to_string(batch.rays.size()) + " rays";
       EXPECT_EQ(is.rays, should.rays);
-      EXPECT_NEAR(static_cast<double>(is.samples), static_cast<double>(should.samples), 3);  // at the threshold
-      EXPECT_NEAR(static_cast<double>(is.touched_voxels), static_cast<double>(should.touched_voxels), 8);
-      ParityRow("style loss", what, "CPU, relative", std::abs(exact.loss - should.loss) / should.loss, 2e-5);
-      ParityRow("style loss, tf32", what, "CPU, relative", std::abs(is.loss - should.loss) / should.loss, 2e-3);
-      ParityRow("style gradient, tf32", what, "CPU, norms", RelativeDifference(gradient, expected), 5e-3);
+      EXPECT_NEAR(static_cast<double>(is.samples), static_cast<double>(should.samples),
+                  3);  // at the threshold
+      EXPECT_NEAR(static_cast<double>(is.touched_voxels),
+                  static_cast<double>(should.touched_voxels), 8);
+      ParityRow("style loss", what, "CPU, relative",
+                std::abs(exact.loss - should.loss) / should.loss, 2e-5);
+      ParityRow("style loss, tf32", what, "CPU, relative",
+                std::abs(is.loss - should.loss) / should.loss, 2e-3);
+      ParityRow("style gradient, tf32", what, "CPU, norms",
+                RelativeDifference(gradient, expected), 5e-3);
     }
   }
 }
@@ -166,7 +187,8 @@ TEST_F(DeviceStyle, HiddenSums) {
   ASSERT_EQ(is.hidden.size(), should.hidden.size());
   ASSERT_EQ(is.missing.size(), should.missing.size());
   double off = 0;
-  for (size_t i = 0; i < is.hidden.size(); ++i) off = std::max(off, std::abs(double{is.hidden[i]} - should.hidden[i]));
+  for (size_t i = 0; i < is.hidden.size(); ++i)
+    off = std::max(off, std::abs(double{is.hidden[i]} - should.hidden[i]));
   for (size_t i = 0; i < is.missing.size(); ++i)
     off = std::max(off, std::abs(double{is.missing[i]} - should.missing[i]));
   ParityRow("hidden sums", "basis 9", "CPU", off, 5e-5);
@@ -185,8 +207,10 @@ TEST_F(DeviceStyle, Restyle) {
     double off = 0;
     for (int64_t v = 0; v < restyled.num_voxels(); ++v) {
       for (int k = 0; k < 3 * basis; ++k)
-        off = std::max(off, std::abs(double{restyled.records[v * restyled.lanes() + k]} - should.sh[v * 3 * basis + k]));
-      ASSERT_EQ(restyled.records[v * restyled.lanes() + DensityLane(basis)], field.geometry->density[v]);
+        off = std::max(off, std::abs(double{restyled.records[v * restyled.lanes() + k]} -
+                                     should.sh[v * 3 * basis + k]));
+      ASSERT_EQ(restyled.records[v * restyled.lanes() + DensityLane(basis)],
+                field.geometry->density[v]);
     }
     ParityRow("restyled voxels", "basis " + std::to_string(basis), "CPU", off, 2e-5);
   }

@@ -14,8 +14,7 @@ TEST(Half, EveryHalfSurvivesTheRoundTrip) {
     const float value = FloatFromHalf(half);
     if (std::isnan(value)) {
       EXPECT_TRUE(std::isnan(FloatFromHalf(HalfFromFloat(value))));
-    }
-    else {
+    } else {
       ASSERT_EQ(HalfFromFloat(value), half);
     }
   }

@@ -58,8 +58,7 @@ TEST_P(EveryScene, NoTwoViewsShareAPlace) {
     const std::vector<Camera> cameras = SyntheticCameras(scene, views, 64, 48);
     for (size_t i = 0; i < cameras.size(); ++i)
       for (size_t j = 0; j < i; ++j)
-        EXPECT_GT(Norm(cameras[i].Center() - cameras[j].Center()),
-                  0.3 / views)
+        EXPECT_GT(Norm(cameras[i].Center() - cameras[j].Center()), 0.3 / views)
             << i << " and " << j << " of " << views;
   }
 }

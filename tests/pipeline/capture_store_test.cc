@@ -33,10 +33,12 @@ TEST(CaptureStore, AnOutputFolderIsACaptureWithItsPoses) {
     EXPECT_EQ(std::filesystem::path(source.photos).filename(), "photos");
   }
   ASSERT_EQ(Regrade({"pose", folder / "first", "--out", folder / "second"}), 0);
-  const Capture before = ReadCapture(folder / "first/poses"), after = ReadCapture(folder / "second/poses");
+  const Capture before = ReadCapture(folder / "first/poses"),
+                after = ReadCapture(folder / "second/poses");
   ASSERT_EQ(after.views.size(), 6u);
   for (size_t i = 0; i < 6; ++i)
-    EXPECT_LE(Norm(before.views[i].camera.Center() - after.views[i].camera.Center()), 1e-12) << "a quaternion's rounding";
+    EXPECT_LE(Norm(before.views[i].camera.Center() - after.views[i].camera.Center()), 1e-12)
+        << "a quaternion's rounding";
   // Into itself it would be written over.
   EXPECT_EQ(Regrade({"pose", folder / "first", "--out", folder / "first"}), 2);
   EXPECT_EQ(Regrade({"pose", folder / "first/poses", "--out", folder / "first"}), 2);

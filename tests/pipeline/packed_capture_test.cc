@@ -31,7 +31,8 @@ PackedCapture SmallCapture() {
     view.camera.ndc = capture.scene.ndc;
     view.photo = Image(20 + i, 10, 3);
     for (size_t p = 0; p < view.photo.pixels.size(); ++p)
-      view.photo.pixels[p] = static_cast<float>(RandomIndex(3, static_cast<uint64_t>(i), p, 256)) / 255.0f;
+      view.photo.pixels[p] =
+          static_cast<float>(RandomIndex(3, static_cast<uint64_t>(i), p, 256)) / 255.0f;
     capture.views.push_back(view);
   }
   return capture;
@@ -44,7 +45,8 @@ TEST(PackedCapture, ReadsBackAsWritten) {
   const PackedCapture back = ReadPackedCapture(folder / "a.npz");
   ASSERT_EQ(back.views.size(), 3u);
   EXPECT_EQ(back.scene.field_from_world.scale, 0.25);
-  EXPECT_EQ(back.scene.field_from_world.translation, capture.scene.field_from_world.translation);
+  EXPECT_EQ(back.scene.field_from_world.translation,
+            capture.scene.field_from_world.translation);
   EXPECT_EQ(back.scene.ndc.b, 2);
   EXPECT_EQ(back.scene.box.radius, capture.scene.box.radius);
   EXPECT_EQ(back.scene.box.layers, 128);

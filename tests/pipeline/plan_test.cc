@@ -58,13 +58,15 @@ TEST(Plan, TimeFollowsRaysResolutionAndThreads) {
 }
 
 TEST(Plan, DeviceMemoryByHand) {
-  // 100^3 vertices, all stored: three records of 128 B and an index; link, density, two distances; 1 GiB of samples.
+  // 100^3 vertices, all stored: three records of 128 B and an index; link, density, two
+  // distances; 1 GiB of samples.
   const StagePlan one = PlanFitOnDevice(Fit({100}, {10}), 1000, kCube);
   EXPECT_EQ(one.memory, 1000000u * (3 * 128 + 4 + 10) + 6000u + (1u << 30));
-  // The coarser grid and its weights stay until the finer one, two fifths of it stored, is there.
+  // The coarser grid and its weights stay until the finer one, two fifths of it stored, is
+  // there.
   const StagePlan two = PlanFitOnDevice(Fit({100, 200}, {10, 10}), 0, kCube);
-  EXPECT_EQ(two.memory,
-            1000000u * (3 * 128 + 4 + 10 + 4) + 3200000u * (3 * 128 + 4) + 8000000u * 10 + (1u << 30));
+  EXPECT_EQ(two.memory, 1000000u * (3 * 128 + 4 + 10 + 4) + 3200000u * (3 * 128 + 4) +
+                            8000000u * 10 + (1u << 30));
 }
 
 TEST(Plan, TooLittleMemoryNamesWhatToLower) {
@@ -76,7 +78,8 @@ TEST(Plan, TooLittleMemoryNamesWhatToLower) {
   EXPECT_NO_THROW(CheckFitsMemory(plan, 2000000000));
   EXPECT_NO_THROW(CheckFitsMemory(plan, 0));  // not known
   EXPECT_REGRADE_ERROR(CheckFitsMemory(plan, 1999999999), ExitCode::kResources, "2.0 GB");
-  EXPECT_REGRADE_ERROR(CheckFitsMemory(plan, 1999999999, "GPU memory"), ExitCode::kResources, "GPU memory");
+  EXPECT_REGRADE_ERROR(CheckFitsMemory(plan, 1999999999, "GPU memory"), ExitCode::kResources,
+                       "GPU memory");
   try {
     CheckFitsMemory(plan, 1);
   } catch (const Error& error) {

@@ -18,9 +18,9 @@ namespace {
 // Camera at (1, 2, 3), not turned against LLFF's axes: right x, up y, backward z.
 std::vector<double> Row() {
   // columns: down, right, backward, position, size
-  return {0,  1, 0, 1, 480,   //
-          -1, 0, 0, 2, 640,   //
-          0,  0, 1, 3, 500,   //
+  return {0,   1, 0, 1, 480,  //
+          -1,  0, 0, 2, 640,  //
+          0,   0, 1, 3, 500,  //
           1.5, 20};
 }
 
@@ -55,9 +55,15 @@ TEST_F(PosesBounds, AxesSizesAndBounds) {
 
 TEST_F(PosesBounds, F64_DamageIsRefused) {
   EXPECT_REGRADE_ERROR(ReadPosesBounds(Write(Row(), {17})), ExitCode::kInput, "17 doubles");
-  EXPECT_REGRADE_ERROR(ReadPosesBounds(Write(Row(), {2, 17})), ExitCode::kInput, "poses_bounds");
-  for (const auto& [at, value] : std::vector<std::pair<size_t, double>>{
-           {3, std::numeric_limits<double>::quiet_NaN()}, {1, 0.5}, {9, -3}, {14, 0}, {15, -1}, {15, 30}}) {
+  EXPECT_REGRADE_ERROR(ReadPosesBounds(Write(Row(), {2, 17})), ExitCode::kInput,
+                       "poses_bounds");
+  for (const auto& [at, value] :
+       std::vector<std::pair<size_t, double>>{{3, std::numeric_limits<double>::quiet_NaN()},
+                                              {1, 0.5},
+                                              {9, -3},
+                                              {14, 0},
+                                              {15, -1},
+                                              {15, 30}}) {
     std::vector<double> row = Row();
     row[at] = value;
     EXPECT_REGRADE_ERROR(ReadPosesBounds(Write(row, {1, 17})), ExitCode::kInput, "pose 0");

@@ -78,7 +78,8 @@ TEST(SceneProfile, WishesAreReadAndNonsenseIsNamed) {
 TEST(SceneProfile, ForwardFacingCapturesGetTheirSpace) {
   Capture capture = CaptureWithShifts({0, 0, 0, 0});
   for (size_t i = 0; i < capture.views.size(); ++i)
-    capture.views[i].camera.camera_from_world.translation = {0.1 * static_cast<double>(i), 0, 0};
+    capture.views[i].camera.camera_from_world.translation = {0.1 * static_cast<double>(i), 0,
+                                                             0};
   capture.nearest_depth = 2;
   EXPECT_TRUE(ProfileScene(capture, 2, "auto").scene.ndc.on());
   EXPECT_FALSE(ProfileScene(capture, 2, "ndc=off").scene.ndc.on());

@@ -35,8 +35,8 @@ class ColmapText : public ::testing::Test {
   ColmapModel model_;
 };
 
-// The same model as text, which the one reader takes where there is no .bin; numbers are the same to the bit,
-// but for the quaternion's own rounding.
+// The same model as text, which the one reader takes where there is no .bin; numbers are the
+// same to the bit, but for the quaternion's own rounding.
 TEST_F(ColmapText, TextIsReadAsBinaryIs) {
   for (ColmapImage& image : model_.images) image.name = "a name with spaces/" + image.name;
   WriteColmapModel(model_, folder_);
@@ -71,7 +71,8 @@ TEST_F(ColmapText, F58_TextThatIsDamagedIsRefusedWithItsLine) {
   for (const char* name : {"cameras", "images", "points3D"})
     fs::remove(folder_ + "/" + name + ".bin");
   const std::string cameras = testing::ReadText(folder_ + "/cameras.txt");
-  testing::WriteText(folder_ + "/cameras.txt", "# a comment\n1 PINHOLE 640 480 nonsense 600 320 240\n");
+  testing::WriteText(folder_ + "/cameras.txt",
+                     "# a comment\n1 PINHOLE 640 480 nonsense 600 320 240\n");
   EXPECT_NE(Refusal().find("line 2 has 'nonsense'"), std::string::npos);
   testing::WriteText(folder_ + "/cameras.txt", "1 PANORAMA 640 480 600 320 240\n");
   EXPECT_NE(Refusal().find("unknown camera model 'PANORAMA'"), std::string::npos);
@@ -81,7 +82,8 @@ TEST_F(ColmapText, F58_TextThatIsDamagedIsRefusedWithItsLine) {
   Refusal();
   testing::WriteText(folder_ + "/cameras.txt", cameras);
   const std::string images = testing::ReadText(folder_ + "/images.txt");
-  for (size_t cut = 0; cut < images.size(); cut += 7) {  // anywhere: an error or fewer images, never a crash
+  for (size_t cut = 0; cut < images.size();
+       cut += 7) {  // anywhere: an error or fewer images, never a crash
     testing::WriteText(folder_ + "/images.txt", images.substr(0, cut));
     try {
       ReadColmapModel(folder_);

@@ -1,4 +1,5 @@
-// Forward-facing captures: what tells them, and that their space holds every pixel's ray (H87-H90).
+// Forward-facing captures: what tells them, and that their space holds every pixel's ray
+// (H87-H90).
 #include "reconstruct/forward_facing.h"
 
 #include <gtest/gtest.h>
@@ -11,7 +12,8 @@
 namespace regrade {
 namespace {
 
-// Cameras on a wall, looking along +y of a world with z up; the scene lies from 3 to 40 before them.
+// Cameras on a wall, looking along +y of a world with z up; the scene lies from 3 to 40 before
+// them.
 Capture WallCapture(double turn_deg, double forth) {
   Capture capture;
   for (int i = 0; i < 9; ++i) {
@@ -20,7 +22,8 @@ Capture WallCapture(double turn_deg, double forth) {
     camera.fx = camera.fy = 350;
     camera.cx = 200, camera.cy = 150;
     const double angle = turn_deg * M_PI / 180 * (i - 4) / 4;
-    const Vec3d forward{std::sin(angle), std::cos(angle), 0}, right{std::cos(angle), -std::sin(angle), 0};
+    const Vec3d forward{std::sin(angle), std::cos(angle), 0},
+        right{std::cos(angle), -std::sin(angle), 0};
     camera.camera_from_world.rotation.row[0] = right;
     camera.camera_from_world.rotation.row[1] = Vec3d{0, 0, -1};
     camera.camera_from_world.rotation.row[2] = forward;
@@ -31,7 +34,8 @@ Capture WallCapture(double turn_deg, double forth) {
   for (uint64_t i = 0; i < 300; ++i) {
     ScenePoint point;
     const double depth = 3 / (1 - 0.92 * RandomDouble(5, 1, i));
-    point.position = {depth * (RandomDouble(5, 2, i) - 0.5), depth, depth * 0.5 * (RandomDouble(5, 3, i) - 0.5)};
+    point.position = {depth * (RandomDouble(5, 2, i) - 0.5), depth,
+                      depth * 0.5 * (RandomDouble(5, 3, i) - 0.5)};
     point.views = {0, 4, 8};
     capture.points.push_back(point);
   }

@@ -75,8 +75,8 @@ TEST(NormalizeScene, BoxHoldsThePointsUpright) {
   EXPECT_GT((scene.field_from_world.rotation * Vec3d{0, 0, 1}).z, 0.9);
 }
 
-// A textured thing before a bare wall: the points are a sixth of the picture, the box takes in all that the
-// photos show at its depth.
+// A textured thing before a bare wall: the points are a sixth of the picture, the box takes in
+// all that the photos show at its depth.
 TEST(NormalizeScene, BoxHoldsWhatPhotosShowBesideThePoints) {
   Capture capture = ArcCapture(true);
   for (ScenePoint& p : capture.points) p.position = p.position * 0.4;

@@ -1,4 +1,5 @@
-// The box of an object before a transparent background: as large as the object, wherever the cameras are.
+// The box of an object before a transparent background: as large as the object, wherever the
+// cameras are.
 #include "reconstruct/visual_hull.h"
 
 #include <gtest/gtest.h>
@@ -8,7 +9,8 @@
 namespace regrade {
 namespace {
 
-// A ball of radius 0.5 round (1, 0, 0), seen from a circle; pictures show little more than the ball.
+// A ball of radius 0.5 round (1, 0, 0), seen from a circle; pictures show little more than the
+// ball.
 std::vector<Outline> BallOutlines(double empty_angle) {
   std::vector<Outline> outlines;
   for (int i = 0; i < 12; ++i) {
@@ -40,7 +42,8 @@ std::vector<Outline> BallOutlines(double empty_angle) {
 
 NormalizedScene CubeRoundTheCameras() {
   NormalizedScene scene;
-  scene.field_from_world = {1 / 6.0, Mat3d(), Vec3d{-1 / 6.0, 0, 0}};  // half side 6 round the ball
+  scene.field_from_world = {1 / 6.0, Mat3d(),
+                            Vec3d{-1 / 6.0, 0, 0}};  // half side 6 round the ball
   scene.box.radius = {1, 1, 1};
   scene.box.near_clip = 0.1f;
   return scene;
@@ -50,11 +53,13 @@ TEST(VisualHull, BoxIsTheObjects) {
   const NormalizedScene tight = TightenToOutlines(CubeRoundTheCameras(), BallOutlines(0));
   const double half = 1 / tight.field_from_world.scale;  // world units
   EXPECT_GE(half, 0.5);
-  // Widened by up to two blocks of pixels (0.13), and a vertex of the grid (0.126) on top of its rounding.
+  // Widened by up to two blocks of pixels (0.13), and a vertex of the grid (0.126) on top of
+  // its rounding.
   EXPECT_LE(half, 0.5 + 0.13 + 2 * 12.0 / 95);
   const Vec3d middle = tight.field_from_world * Vec3d{1, 0, 0};
   EXPECT_NEAR(Norm(middle), 0, 0.2);
-  EXPECT_NEAR(tight.box.near_clip / tight.field_from_world.scale, 0.6, 1e-5);  // the same length
+  EXPECT_NEAR(tight.box.near_clip / tight.field_from_world.scale, 0.6,
+              1e-5);  // the same length
 }
 
 TEST(VisualHull, OutlinesThatDisagreeLeaveTheBox) {

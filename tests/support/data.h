@@ -1,4 +1,5 @@
-// Where real captures for tests are: REGRADE_DATA, or ../shared/data beside the source tree. Tests skip without it.
+// Where real captures for tests are: REGRADE_DATA, or ../shared/data beside the source tree.
+// Tests skip without it.
 #pragma once
 
 #include <cstdlib>
@@ -20,7 +21,7 @@ inline bool HaveData(const std::string& relative) {
 
 }  // namespace regrade::testing
 
-#define REGRADE_NEED_DATA(relative)                                               \
-  if (!::regrade::testing::HaveData(relative))                                    \
+#define REGRADE_NEED_DATA(relative)                                            \
+  if (!::regrade::testing::HaveData(relative))                                 \
   GTEST_SKIP() << "no test data at " << ::regrade::testing::DataPath(relative) \
                << " (set REGRADE_DATA)"

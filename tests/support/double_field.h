@@ -1,4 +1,5 @@
-// A field's values in double, for bodies that are checked against themselves in higher precision.
+// A field's values in double, for bodies that are checked against themselves in higher
+// precision.
 #pragma once
 
 #include <vector>

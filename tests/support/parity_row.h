@@ -8,8 +8,10 @@
 
 namespace regrade::testing {
 
-inline void ParityRow(const char* body, const std::string& what, const char* against, double error, double tolerance) {
-  std::printf("parity\t%s\t%s\t%s\t%.3g\t%.3g\n", body, what.c_str(), against, error, tolerance);
+inline void ParityRow(const char* body, const std::string& what, const char* against,
+                      double error, double tolerance) {
+  std::printf("parity\t%s\t%s\t%s\t%.3g\t%.3g\n", body, what.c_str(), against, error,
+              tolerance);
   EXPECT_LE(error, tolerance) << body << " (" << what << ") against " << against;
 }
 

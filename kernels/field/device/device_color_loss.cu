@@ -1,7 +1,6 @@
-#include "kernels/field/device/device_color_loss.h"
-
 #include "kernels/base/launch_size.h"
 #include "kernels/field/color_error.h"
+#include "kernels/field/device/device_color_loss.h"
 
 namespace regrade {
 
@@ -9,8 +8,9 @@ namespace regrade {
 
 namespace {
 
-__global__ void ColorLossKernel(const Vec3f* color, const Vec3f* targets, const float* transmittance, int64_t n,
-                                ColorLossRule rule, Vec3f* d_color, DeviceColorLoss* sums) {
+__global__ void ColorLossKernel(const Vec3f* color, const Vec3f* targets,
+                                const float* transmittance, int64_t n, ColorLossRule rule,
+                                Vec3f* d_color, DeviceColorLoss* sums) {
   const int64_t r = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
   double loss = 0, shown = 0;
   unsigned counts = 0;
@@ -43,16 +43,18 @@ __global__ void ColorLossKernel(const Vec3f* color, const Vec3f* targets, const 
 
 }  // namespace
 
-void AddColorLoss(const Vec3f* color, const Vec3f* targets, const float* transmittance, int64_t n,
-                  const ColorLossRule& rule, Vec3f* d_color, DeviceColorLoss* sums) {
+void AddColorLoss(const Vec3f* color, const Vec3f* targets, const float* transmittance,
+                  int64_t n, const ColorLossRule& rule, Vec3f* d_color, DeviceColorLoss* sums) {
   if (n == 0) return;
-  ColorLossKernel<<<BlocksFor(n), kThreads>>>(color, targets, transmittance, n, rule, d_color, sums);
+  ColorLossKernel<<<BlocksFor(n), kThreads>>>(color, targets, transmittance, n, rule, d_color,
+                                              sums);
   CheckLaunch("color_loss");
 }
 
 #else
 
-void AddColorLoss(const Vec3f*, const Vec3f*, const float*, int64_t, const ColorLossRule&, Vec3f*, DeviceColorLoss*) {
+void AddColorLoss(const Vec3f*, const Vec3f*, const float*, int64_t, const ColorLossRule&,
+                  Vec3f*, DeviceColorLoss*) {
   DeviceWait("color_loss");
 }
 

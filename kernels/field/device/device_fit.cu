@@ -12,7 +12,8 @@
 namespace regrade {
 
 DeviceTouched::DeviceTouched(const DeviceGrid& grid)
-    : num_voxels(grid.num_voxels()), bits((grid.num_voxels() + 31) / 32, "marks of touched voxels") {
+    : num_voxels(grid.num_voxels()),
+      bits((grid.num_voxels() + 31) / 32, "marks of touched voxels") {
   bits.Zero();
 }
 
@@ -31,9 +32,9 @@ constexpr int kWarpsPerBlock = 4;
 
 // A ray's composited samples, front to back, kept for the way back: [capacity] of each.
 struct SampleStore {
-  float4* place;      // vertex (as bits), fraction
-  float4* raw_tau;    // colour before the clamp, optical depth
-  float* before;      // transmittance before
+  float4* place;    // vertex (as bits), fraction
+  float4* raw_tau;  // colour before the clamp, optical depth
+  float* before;    // transmittance before
 };
 
 __device__ inline void AddQuad(float* target, const float4& v) {
@@ -47,7 +48,8 @@ __device__ inline void AddQuad(float* target, const float4& v) {
 #endif
 }
 
-// Four neighbouring values of a record, as one lane adds them: d / d value = sum_c of[c] d_raw[c] + density d_sigma.
+// Four neighbouring values of a record, as one lane adds them: d / d value = sum_c of[c]
+// d_raw[c] + density d_sigma.
 template <int kBasis>
 struct QuadValues {
   static constexpr int kQuads = RecordLanes(kBasis) / 4;  // lanes a record
@@ -72,21 +74,23 @@ struct QuadValues {
   }
 };
 
-// Adds the gradients of `count` samples, the i-th of them held by lane i, to the corners' records.
+// Adds the gradients of `count` samples, the i-th of them held by lane i, to the corners'
+// records.
 template <int kBasis>
 __device__ void ScatterChunk(const DeviceGridView& grid, const QuadValues<kBasis>& values,
                              const float4& place, const Vec3f& d_raw, float d_sigma, int count,
                              const GradientView& gradient, int lane) {
   constexpr int kLanes = RecordLanes(kBasis), kQuads = QuadValues<kBasis>::kQuads;
-  constexpr int kRecords = 32 / kQuads;                  // that one instruction adds to
-  constexpr int kParts = kRecords < 8 ? 8 / kRecords : 1;  // instructions a sample
+  constexpr int kRecords = 32 / kQuads;                      // that one instruction adds to
+  constexpr int kParts = kRecords < 8 ? 8 / kRecords : 1;    // instructions a sample
   constexpr int kSamples = kRecords > 8 ? kRecords / 8 : 1;  // samples an instruction
   const int unit = lane / kQuads;
   for (int s = 0; s < count; s += kTurn) {
     const int source = s + (lane >> 3) < count ? s + (lane >> 3) : -1;
     const int from = source & 31;
     const int vertex = __shfl_sync(kAllLanes, __float_as_int(place.x), from);
-    const Vec3f fraction{__shfl_sync(kAllLanes, place.y, from), __shfl_sync(kAllLanes, place.z, from),
+    const Vec3f fraction{__shfl_sync(kAllLanes, place.y, from),
+                         __shfl_sync(kAllLanes, place.z, from),
                          __shfl_sync(kAllLanes, place.w, from)};
     const TurnCorner corner(grid, vertex, fraction, source, lane);
     if (corner.link >= 0) Touch(gradient.touched, corner.link);
@@ -94,7 +98,8 @@ __device__ void ScatterChunk(const DeviceGridView& grid, const QuadValues<kBasis
     for (int j = 0; j < kTurn; j += kSamples) {
       const int mine = j + (kSamples > 1 ? unit / 8 : 0);
       const int owner = (s + mine) & 31;
-      const Vec3f d{__shfl_sync(kAllLanes, d_raw.x, owner), __shfl_sync(kAllLanes, d_raw.y, owner),
+      const Vec3f d{__shfl_sync(kAllLanes, d_raw.x, owner),
+                    __shfl_sync(kAllLanes, d_raw.y, owner),
                     __shfl_sync(kAllLanes, d_raw.z, owner)};
       const float d_density = __shfl_sync(kAllLanes, d_sigma, owner);
 #pragma unroll
@@ -111,9 +116,9 @@ __device__ void ScatterChunk(const DeviceGridView& grid, const QuadValues<kBasis
   }
 }
 
-// The way back along a ray; see EQ(composite-adjoint). Its recursion R_i = alpha_i c_i + (1 - alpha_i)
-// R_{i+1} is a chain of maps x -> b + a x; 32 of them are composed by a scan, and as all a and b are
-// positive nothing cancels.
+// The way back along a ray; see EQ(composite-adjoint). Its recursion R_i = alpha_i c_i + (1 -
+// alpha_i) R_{i+1} is a chain of maps x -> b + a x; 32 of them are composed by a scan, and as
+// all a and b are positive nothing cancels.
 template <int kBasis>
 __device__ void WalkBack(const DeviceGridView& grid, const QuadValues<kBasis>& values,
                          const SampleStore& store, int count, float delta, const Vec3f& d_color,
@@ -213,7 +218,8 @@ __global__ void FitRaysKernel(DeviceGridView grid, const Ray* rays, const Vec3f*
     samples += static_cast<unsigned>(count);
     __syncwarp();  // the store was written by all lanes and is read by others now
     const QuadValues<kBasis> values(lane, ray.direction);
-    WalkBack<kBasis>(grid, values, store, count, march.delta(), error * (2 * scale), gradient, lane);
+    WalkBack<kBasis>(grid, values, store, count, march.delta(), error * (2 * scale), gradient,
+                     lane);
   }
   if (lane == 0) {
     atomicAdd(&sums->squared_error, squared_error);
@@ -230,11 +236,13 @@ DeviceRayFitter::DeviceRayFitter(const GridFrame& frame, const MarchOptions& opt
   const Vec3f n = frame.resolution.Cast<float>();
   // The longest way through the box; a multiple of 4, so that the parts of a store are aligned.
   capacity_ = (static_cast<int64_t>(Norm(n) / options.step) + 8) / 4 * 4;
-  const int64_t bytes_a_warp = capacity_ * kFloatsPerSample * static_cast<int64_t>(sizeof(float));
+  const int64_t bytes_a_warp =
+      capacity_ * kFloatsPerSample * static_cast<int64_t>(sizeof(float));
   const int64_t wanted = static_cast<int64_t>(ReadDeviceStatus().multiprocessors) * 32;
   const int64_t fitting = std::min(wanted, max_bytes / bytes_a_warp);
   warps_ = static_cast<int>(std::max<int64_t>(fitting / kWarpsPerBlock, 1)) * kWarpsPerBlock;
-  store_ = DeviceBuffer<float>(warps_ * capacity_ * kFloatsPerSample, "samples of rays in flight");
+  store_ =
+      DeviceBuffer<float>(warps_ * capacity_ * kFloatsPerSample, "samples of rays in flight");
 }
 
 void DeviceRayFitter::Accumulate(const DeviceGrid& grid, const Ray* rays, const Vec3f* targets,
@@ -243,9 +251,10 @@ void DeviceRayFitter::Accumulate(const DeviceGrid& grid, const Ray* rays, const 
   REGRADE_CHECK(grid.fitting);
   const GradientView view{grid.gradient(), touched->bits.data()};
   ByBasis(grid.basis, [&](auto basis) {
-    FitRaysKernel<basis.value><<<static_cast<unsigned>(warps_ / kWarpsPerBlock), 32 * kWarpsPerBlock>>>(
-        grid.view(), rays, targets, static_cast<int>(n), options_, scale, view, store_.data(),
-        capacity_, next_ray_.data(), sums_.data());
+    FitRaysKernel<basis.value>
+        <<<static_cast<unsigned>(warps_ / kWarpsPerBlock), 32 * kWarpsPerBlock>>>(
+            grid.view(), rays, targets, static_cast<int>(n), options_, scale, view,
+            store_.data(), capacity_, next_ray_.data(), sums_.data());
   });
   CheckLaunch("fit_rays");
 }

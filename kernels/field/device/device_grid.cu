@@ -1,6 +1,5 @@
 // Upload, download, and what follows from links and records.
 #include "kernels/field/device/device_grid.h"
-
 #include "kernels/field/device/launch.h"
 
 namespace regrade {
@@ -29,7 +28,8 @@ DeviceGrid UploadGrid(const FastGrid& grid, bool fitting, const Buffer<float>& s
   const int64_t n = grid.num_voxels(), row = device.lanes() * int64_t{sizeof(float)};
   device.records = DeviceBuffer<float>(n * device.stride(), "voxels");
   device.records.Zero();
-  DeviceCopyRows(device.records.data(), fitting ? 3 * row : row, grid.records.data(), row, row, n);
+  DeviceCopyRows(device.records.data(), fitting ? 3 * row : row, grid.records.data(), row, row,
+                 n);
   if (fitting && second_moment.size() == grid.records.size())
     DeviceCopyRows(device.second_moment(), 3 * row, second_moment.data(), row, row, n);
   RefreshDerived(&device, grid.num_voxels());
@@ -83,22 +83,27 @@ __global__ void ScatterVoxels(DeviceGridView grid, int density_lane, int64_t ver
                      static_cast<int>(vertex / n.z % n.y), static_cast<int>(vertex % n.z)};
   bool stored = false;
   for (int corner = 0; corner < 8; ++corner) {
-    const int x = at[0] + (corner >> 2 & 1), y = at[1] + (corner >> 1 & 1), z = at[2] + (corner & 1);
-    if (x < n.x && y < n.y && z < n.z) stored = stored || grid.links[grid.frame.Vertex(x, y, z)] >= 0;
+    const int x = at[0] + (corner >> 2 & 1), y = at[1] + (corner >> 1 & 1),
+              z = at[2] + (corner & 1);
+    if (x < n.x && y < n.y && z < n.z)
+      stored = stored || grid.links[grid.frame.Vertex(x, y, z)] >= 0;
   }
   distance[vertex] = stored ? 0 : kFar;
 }
 
 // One axis of the Chebyshev distance: the least of max(distance, steps along the axis).
-__global__ void SpreadAlongAxis(Vec3i n, int axis, int64_t vertices, const uint8_t* from, uint8_t* to) {
+__global__ void SpreadAlongAxis(Vec3i n, int axis, int64_t vertices, const uint8_t* from,
+                                uint8_t* to) {
   const int64_t vertex = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
   if (vertex >= vertices) return;
   const int64_t strides[3] = {static_cast<int64_t>(n.y) * n.z, n.z, 1};
   const int at = static_cast<int>(vertex / strides[axis] % n[axis]);
   int best = from[vertex];
   for (int r = 1; r < best; ++r) {
-    if (at - r >= 0) best = min(best, max(static_cast<int>(from[vertex - r * strides[axis]]), r));
-    if (at + r < n[axis]) best = min(best, max(static_cast<int>(from[vertex + r * strides[axis]]), r));
+    if (at - r >= 0)
+      best = min(best, max(static_cast<int>(from[vertex - r * strides[axis]]), r));
+    if (at + r < n[axis])
+      best = min(best, max(static_cast<int>(from[vertex + r * strides[axis]]), r));
   }
   to[vertex] = static_cast<uint8_t>(best);
 }
@@ -111,14 +116,13 @@ void RefreshDerived(DeviceGrid* grid, int64_t num_voxels) {
   grid->dense_density = DeviceBuffer<float>(vertices, "dense densities");
   grid->empty_distance = DeviceBuffer<uint8_t>(vertices, "distances through empty space");
   DeviceBuffer<uint8_t> other(vertices, "distances through empty space");
-  ScatterVoxels<<<BlocksFor(vertices), kThreads>>>(grid->view(),
-                                                   DensityLane(grid->basis), vertices,
-                                                   grid->vertex_of_voxel.data(),
+  ScatterVoxels<<<BlocksFor(vertices), kThreads>>>(grid->view(), DensityLane(grid->basis),
+                                                   vertices, grid->vertex_of_voxel.data(),
                                                    grid->empty_distance.data());
   CheckLaunch("scatter_voxels");
   for (int axis = 0; axis < 3; ++axis) {
-    SpreadAlongAxis<<<BlocksFor(vertices), kThreads>>>(grid->frame.resolution, axis, vertices,
-                                                       grid->empty_distance.data(), other.data());
+    SpreadAlongAxis<<<BlocksFor(vertices), kThreads>>>(
+        grid->frame.resolution, axis, vertices, grid->empty_distance.data(), other.data());
     CheckLaunch("spread_along_axis");
     std::swap(grid->empty_distance, other);
   }

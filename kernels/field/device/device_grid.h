@@ -1,6 +1,6 @@
-// The field on a CUDA device, laid out as the CPU's fast path has it (fast_rays.h): one record of
-// RecordLanes(basis) floats a voxel, density behind the colours and again in a dense array, so that a
-// march along a ray touches no record until something is seen.
+// The field on a CUDA device, laid out as the CPU's fast path has it (fast_rays.h): one record
+// of RecordLanes(basis) floats a voxel, density behind the colours and again in a dense array,
+// so that a march along a ray touches no record until something is seen.
 #pragma once
 
 #include <cstdint>
@@ -13,12 +13,12 @@ namespace regrade {
 // What kernels see. Shapes as in FastGrid.
 struct DeviceGridView {
   GridFrame frame;
-  const int32_t* links = nullptr;           // [X, Y, Z]
-  float* dense_density = nullptr;           // [X, Y, Z]
-  const uint8_t* empty_distance = nullptr;  // [X, Y, Z]
+  const int32_t* links = nullptr;            // [X, Y, Z]
+  float* dense_density = nullptr;            // [X, Y, Z]
+  const uint8_t* empty_distance = nullptr;   // [X, Y, Z]
   const int32_t* vertex_of_voxel = nullptr;  // [N]
-  float* records = nullptr;                 // [N, stride], the first `lanes` of each
-  int64_t stride = 0;                       // floats from a record to the next
+  float* records = nullptr;                  // [N, stride], the first `lanes` of each
+  int64_t stride = 0;                        // floats from a record to the next
   int32_t num_voxels = 0;
   Vec3f background{};
   float near_clip = 0;
@@ -31,8 +31,8 @@ struct DeviceGrid {
   DeviceBuffer<uint8_t> empty_distance;
   DeviceBuffer<int32_t> vertex_of_voxel;
   DeviceBuffer<float> records;  // [N, stride]
-  // A field that is being fitted keeps a voxel's gradient and moment behind its values: what one step touches
-  // lies together, on one page of memory.
+  // A field that is being fitted keeps a voxel's gradient and moment behind its values: what
+  // one step touches lies together, on one page of memory.
   bool fitting = false;
   int basis = 9;
   Vec3f background{0, 0, 0};
@@ -42,7 +42,8 @@ struct DeviceGrid {
   int stride() const { return (fitting ? 3 : 1) * lanes(); }
   int64_t num_voxels() const { return vertex_of_voxel.size(); }
   DeviceGridView view() const;
-  // Where gradients and moments begin, with the same stride; only of a field that is being fitted.
+  // Where gradients and moments begin, with the same stride; only of a field that is being
+  // fitted.
   float* gradient() const { return records.data() + lanes(); }
   float* second_moment() const { return records.data() + 2 * lanes(); }
 };
@@ -53,13 +54,14 @@ DeviceGrid UploadGrid(const FastGrid& grid, bool fitting = false,
 Buffer<float> DownloadSecondMoment(const DeviceGrid& grid);
 FastGrid DownloadGrid(const DeviceGrid& grid);
 
-// Recomputes dense_density, vertex_of_voxel and empty_distance from links and records, which are
-// there already; `num_voxels` is the number of non-negative links.
+// Recomputes dense_density, vertex_of_voxel and empty_distance from links and records, which
+// are there already; `num_voxels` is the number of non-negative links.
 void RefreshDerived(DeviceGrid* grid, int64_t num_voxels);
 
-// Prunes and resamples as Resample in resample_grid.h does: a new vertex is kept if the old vertex
-// nearest to it, or one of that one's 26 neighbours, weighs at least `threshold`. weights [N]. Gradients and
-// moments of a field that is being fitted become 0. Returns an empty grid (no voxels) if nothing is left.
+// Prunes and resamples as Resample in resample_grid.h does: a new vertex is kept if the old
+// vertex nearest to it, or one of that one's 26 neighbours, weighs at least `threshold`.
+// weights [N]. Gradients and moments of a field that is being fitted become 0. Returns an empty
+// grid (no voxels) if nothing is left.
 DeviceGrid ResampleOnDevice(const DeviceGrid& grid, const DeviceBuffer<float>& weights,
                             float threshold, const Vec3i& resolution);
 

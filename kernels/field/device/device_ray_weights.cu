@@ -1,7 +1,6 @@
-#include "kernels/field/device/device_ray_weights.h"
-
 #include <algorithm>
 
+#include "kernels/field/device/device_ray_weights.h"
 #include "kernels/field/device/gradient_view.h"
 #include "kernels/field/device/launch.h"
 #include "kernels/field/device/warp_shade.h"
@@ -18,9 +17,10 @@ DeviceSlots::DeviceSlots(const DeviceGrid& grid)
 namespace {
 
 // A warp a ray. Samples beyond the list's capacity are counted and not written.
-__global__ void MarchWeightsKernel(DeviceGridView grid, const Ray* rays, int64_t n, MarchOptions options,
-                                   float min_weight, DeviceWeightedSample* samples, int64_t capacity, int32_t* counter,
-                                   float* transmittance, uint32_t* touched) {
+__global__ void MarchWeightsKernel(DeviceGridView grid, const Ray* rays, int64_t n,
+                                   MarchOptions options, float min_weight,
+                                   DeviceWeightedSample* samples, int64_t capacity,
+                                   int32_t* counter, float* transmittance, uint32_t* touched) {
   const int64_t r = (blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x) / 32;
   if (r >= n) return;
   WarpMarch march(grid, rays[r], options);
@@ -48,8 +48,8 @@ __global__ void MarchWeightsKernel(DeviceGridView grid, const Ray* rays, int64_t
 }
 
 // A lane a word of marks; a warp takes its slots at once.
-__global__ void AssignSlotsKernel(uint32_t* touched, int64_t words, int32_t* slot_of_voxel, int32_t* voxel_of_slot,
-                                  int32_t* counter) {
+__global__ void AssignSlotsKernel(uint32_t* touched, int64_t words, int32_t* slot_of_voxel,
+                                  int32_t* voxel_of_slot, int32_t* counter) {
   const int64_t word = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
   const int lane = static_cast<int>(threadIdx.x & 31);
   unsigned marks = word < words ? touched[word] : 0;
@@ -75,15 +75,16 @@ __global__ void AssignSlotsKernel(uint32_t* touched, int64_t words, int32_t* slo
 }
 
 // A warp a voxel.
-__global__ void GatherRowsKernel(DeviceGridView grid, int basis, const int32_t* voxels, int64_t first, int64_t n,
-                                 float position_scale, float* rows) {
+__global__ void GatherRowsKernel(DeviceGridView grid, int basis, const int32_t* voxels,
+                                 int64_t first, int64_t n, float position_scale, float* rows) {
   const int64_t i = (blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x) / 32;
   if (i >= n) return;
   const int lane = static_cast<int>(threadIdx.x & 31);
   const int64_t voxel = voxels != nullptr ? voxels[i] : first + i;
   float value = 0;
   if (lane < 27) {
-    if (lane % 9 < basis) value = grid.records[voxel * grid.stride + lane / 9 * basis + lane % 9];
+    if (lane % 9 < basis)
+      value = grid.records[voxel * grid.stride + lane / 9 * basis + lane % 9];
   } else if (lane < 30) {
     const Vec3i size = grid.frame.resolution;
     const int32_t vertex = grid.vertex_of_voxel[voxel];
@@ -91,12 +92,14 @@ __global__ void GatherRowsKernel(DeviceGridView grid, int basis, const int32_t* 
                       : lane == 28 ? vertex / size.z % size.y
                                    : vertex % size.z;
     const int length = lane == 27 ? size.x : lane == 28 ? size.y : size.z;
-    value = position_scale * (2 * (static_cast<float>(index) + 0.5f) / static_cast<float>(length) - 1);
+    value = position_scale *
+            (2 * (static_cast<float>(index) + 0.5f) / static_cast<float>(length) - 1);
   }
   rows[i * kRowLanes + lane] = value;
 }
 
-__global__ void AddMappedRowsKernel(Mat3f matrix, Vec3f constant, const float* from, int64_t n, float* rows) {
+__global__ void AddMappedRowsKernel(Mat3f matrix, Vec3f constant, const float* from, int64_t n,
+                                    float* rows) {
   const int64_t i = (blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x) / 32;
   if (i >= n) return;
   const int lane = static_cast<int>(threadIdx.x & 31);
@@ -108,21 +111,24 @@ __global__ void AddMappedRowsKernel(Mat3f matrix, Vec3f constant, const float* f
   rows[i * kRowLanes + lane] += value;
 }
 
-__global__ void ScatterRowsKernel(const float* rows, int64_t first, int64_t n, int basis, DeviceGridView grid) {
+__global__ void ScatterRowsKernel(const float* rows, int64_t first, int64_t n, int basis,
+                                  DeviceGridView grid) {
   const int64_t i = (blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x) / 32;
   if (i >= n) return;
   const int lane = static_cast<int>(threadIdx.x & 31);
   if (lane < 27 && lane % 9 < basis)
-    grid.records[(first + i) * grid.stride + lane / 9 * basis + lane % 9] = rows[i * kRowLanes + lane];
+    grid.records[(first + i) * grid.stride + lane / 9 * basis + lane % 9] =
+        rows[i * kRowLanes + lane];
 }
 
-// What a warp knows of its sample: lane c * 9 + k stands for coefficient k of channel c, lane j < 8 for corner j.
+// What a warp knows of its sample: lane c * 9 + k stands for coefficient k of channel c, lane j
+// < 8 for corner j.
 struct WarpSample {
   DeviceWeightedSample sample;
   int lane;
-  int32_t slot;    // of this lane's corner; -1 where nothing is stored
-  float corner;    // its trilinear weight
-  float gamma;     // this lane's basis function along the ray, 0 beyond the field's own
+  int32_t slot;  // of this lane's corner; -1 where nothing is stored
+  float corner;  // its trilinear weight
+  float gamma;   // this lane's basis function along the ray, 0 beyond the field's own
 
   __device__ WarpSample(const DeviceGridView& grid, int basis, const DeviceWeightedSample& s,
                         const int32_t* slot_of_voxel, const Ray* rays)
@@ -153,28 +159,35 @@ struct WarpSample {
   }
 };
 
-__global__ void BeginColorsKernel(Vec3f background, const float* transmittance, int64_t n, Vec3f* color) {
+__global__ void BeginColorsKernel(Vec3f background, const float* transmittance, int64_t n,
+                                  Vec3f* color) {
   const int64_t r = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
   if (r < n) color[r] = background * transmittance[r];
 }
 
-__global__ void BlendColorsKernel(DeviceGridView grid, int basis, const DeviceWeightedSample* samples, int64_t n,
-                                  const int32_t* slot_of_voxel, const Ray* rays, const float* rows, Vec3f* color,
-                                  uint8_t* open) {
+__global__ void BlendColorsKernel(DeviceGridView grid, int basis,
+                                  const DeviceWeightedSample* samples, int64_t n,
+                                  const int32_t* slot_of_voxel, const Ray* rays,
+                                  const float* rows, Vec3f* color, uint8_t* open) {
   const int64_t i = (blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x) / 32;
   if (i >= n) return;
   const WarpSample warp(grid, basis, samples[i], slot_of_voxel, rays);
   const float sum = WarpRecord<9>::ChannelSums(warp.Blend(rows) * warp.gamma, warp.lane);
   const float value = 0.5f + sum;  // of a channel on its first lane
   const bool first = warp.lane < 27 && warp.lane % 9 == 0;
-  if (first && value > 0) atomicAdd(&color[warp.sample.ray][warp.lane / 9], warp.sample.weight * value);
+  if (first && value > 0)
+    atomicAdd(&color[warp.sample.ray][warp.lane / 9], warp.sample.weight * value);
   const unsigned above = __ballot_sync(kAllLanes, first && value > 0);
-  if (warp.lane == 0) open[i] = static_cast<uint8_t>((above & 1) | (above >> 9 & 1) << 1 | (above >> 18 & 1) << 2);
+  if (warp.lane == 0)
+    open[i] =
+        static_cast<uint8_t>((above & 1) | (above >> 9 & 1) << 1 | (above >> 18 & 1) << 2);
 }
 
-__global__ void BlendColorsAdjointKernel(DeviceGridView grid, int basis, const DeviceWeightedSample* samples,
-                                         int64_t n, const int32_t* slot_of_voxel, const Ray* rays, const uint8_t* open,
-                                         const Vec3f* d_color, float* d_rows) {
+__global__ void BlendColorsAdjointKernel(DeviceGridView grid, int basis,
+                                         const DeviceWeightedSample* samples, int64_t n,
+                                         const int32_t* slot_of_voxel, const Ray* rays,
+                                         const uint8_t* open, const Vec3f* d_color,
+                                         float* d_rows) {
   const int64_t i = (blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x) / 32;
   if (i >= n) return;
   const unsigned bits = open[i];
@@ -189,62 +202,71 @@ __global__ void BlendColorsAdjointKernel(DeviceGridView grid, int basis, const D
   for (int k = 0; k < 8; ++k) {
     const int32_t at = __shfl_sync(kAllLanes, warp.slot, k);
     const float w = __shfl_sync(kAllLanes, warp.corner, k);
-    if (at >= 0 && d_blend != 0) atomicAdd(&d_rows[int64_t{at} * kRowLanes + warp.lane], w * d_blend);
+    if (at >= 0 && d_blend != 0)
+      atomicAdd(&d_rows[int64_t{at} * kRowLanes + warp.lane], w * d_blend);
   }
 }
 
-__global__ void BlendRowsKernel(DeviceGridView grid, const DeviceWeightedSample* samples, int64_t n,
-                                const int32_t* slot_of_voxel, const float* rows, float* sums) {
+__global__ void BlendRowsKernel(DeviceGridView grid, const DeviceWeightedSample* samples,
+                                int64_t n, const int32_t* slot_of_voxel, const float* rows,
+                                float* sums) {
   const int64_t i = (blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x) / 32;
   if (i >= n) return;
   const WarpSample warp(grid, 1, samples[i], slot_of_voxel, nullptr);
-  atomicAdd(&sums[int64_t{warp.sample.ray} * kRowLanes + warp.lane], warp.sample.weight * warp.Blend(rows));
+  atomicAdd(&sums[int64_t{warp.sample.ray} * kRowLanes + warp.lane],
+            warp.sample.weight * warp.Blend(rows));
 }
 
 }  // namespace
 
-void DeviceRayWeights::March(const DeviceGrid& grid, const Ray* rays, int64_t n, const MarchOptions& options,
-                             float min_weight, DeviceTouched* touched) {
+void DeviceRayWeights::March(const DeviceGrid& grid, const Ray* rays, int64_t n,
+                             const MarchOptions& options, float min_weight,
+                             DeviceTouched* touched) {
   constexpr int64_t kFewest = 1 << 20;  // samples there is room for from the start
   if (counter.empty()) counter = DeviceBuffer<int32_t>(1, "a counter of samples");
   if (samples.empty()) samples = DeviceBuffer<DeviceWeightedSample>(kFewest, "samples of rays");
-  if (transmittance.size() < n) transmittance = DeviceBuffer<float>(n, "transmittances of rays");
+  if (transmittance.size() < n)
+    transmittance = DeviceBuffer<float>(n, "transmittances of rays");
   num_rays = n;
   num_samples = 0;
   while (n > 0) {
     counter.Zero();
-    MarchWeightsKernel<<<BlocksFor(32 * n), kThreads>>>(grid.view(), rays, n, options, min_weight, samples.data(),
-                                                       samples.size(), counter.data(), transmittance.data(),
-                                                       touched != nullptr ? touched->bits.data() : nullptr);
+    MarchWeightsKernel<<<BlocksFor(32 * n), kThreads>>>(
+        grid.view(), rays, n, options, min_weight, samples.data(), samples.size(),
+        counter.data(), transmittance.data(),
+        touched != nullptr ? touched->bits.data() : nullptr);
     CheckLaunch("march_weights");
     int32_t count = 0;
     counter.CopyOut(&count, 1);
     num_samples = count;
     if (num_samples <= samples.size()) break;
     samples = {};
-    samples = DeviceBuffer<DeviceWeightedSample>(num_samples + num_samples / 4, "samples of rays");
+    samples =
+        DeviceBuffer<DeviceWeightedSample>(num_samples + num_samples / 4, "samples of rays");
   }
 }
 
 void DeviceSlots::Assign(DeviceTouched* touched) {
   counter.Zero();
   const int64_t words = touched->bits.size();
-  AssignSlotsKernel<<<BlocksFor(words), kThreads>>>(touched->bits.data(), words, slot_of_voxel.data(),
-                                                   voxel_of_slot.data(), counter.data());
+  AssignSlotsKernel<<<BlocksFor(words), kThreads>>>(
+      touched->bits.data(), words, slot_of_voxel.data(), voxel_of_slot.data(), counter.data());
   CheckLaunch("assign_slots");
   int32_t count = 0;
   counter.CopyOut(&count, 1);
   num_slots = count;
 }
 
-void GatherRows(const DeviceGrid& grid, const int32_t* voxels, int64_t first, int64_t n, float position_scale,
-                float* rows) {
+void GatherRows(const DeviceGrid& grid, const int32_t* voxels, int64_t first, int64_t n,
+                float position_scale, float* rows) {
   if (n == 0) return;
-  GatherRowsKernel<<<BlocksFor(32 * n), kThreads>>>(grid.view(), grid.basis, voxels, first, n, position_scale, rows);
+  GatherRowsKernel<<<BlocksFor(32 * n), kThreads>>>(grid.view(), grid.basis, voxels, first, n,
+                                                    position_scale, rows);
   CheckLaunch("gather_rows");
 }
 
-void AddMappedRows(const Mat3f& matrix, const Vec3f& constant, const float* from, int64_t n, float* rows) {
+void AddMappedRows(const Mat3f& matrix, const Vec3f& constant, const float* from, int64_t n,
+                   float* rows) {
   if (n == 0) return;
   AddMappedRowsKernel<<<BlocksFor(32 * n), kThreads>>>(matrix, constant, from, n, rows);
   CheckLaunch("add_mapped_rows");
@@ -256,56 +278,64 @@ void ScatterRows(const float* rows, int64_t first, int64_t n, DeviceGrid* grid) 
   CheckLaunch("scatter_rows");
 }
 
-void BlendColors(const DeviceGrid& grid, const DeviceRayWeights& weights, const DeviceSlots& slots, const Ray* rays,
-                 const float* rows, Vec3f* color, uint8_t* open) {
+void BlendColors(const DeviceGrid& grid, const DeviceRayWeights& weights,
+                 const DeviceSlots& slots, const Ray* rays, const float* rows, Vec3f* color,
+                 uint8_t* open) {
   if (weights.num_rays == 0) return;
-  BeginColorsKernel<<<BlocksFor(weights.num_rays), kThreads>>>(grid.background, weights.transmittance.data(),
-                                                              weights.num_rays, color);
+  BeginColorsKernel<<<BlocksFor(weights.num_rays), kThreads>>>(
+      grid.background, weights.transmittance.data(), weights.num_rays, color);
   CheckLaunch("begin_colors");
   if (weights.num_samples == 0) return;
   BlendColorsKernel<<<BlocksFor(32 * weights.num_samples), kThreads>>>(
-      grid.view(), grid.basis, weights.samples.data(), weights.num_samples, slots.slot_of_voxel.data(), rays, rows,
-      color, open);
+      grid.view(), grid.basis, weights.samples.data(), weights.num_samples,
+      slots.slot_of_voxel.data(), rays, rows, color, open);
   CheckLaunch("blend_colors");
 }
 
-void BlendColorsAdjoint(const DeviceGrid& grid, const DeviceRayWeights& weights, const DeviceSlots& slots,
-                        const Ray* rays, const uint8_t* open, const Vec3f* d_color, float* d_rows) {
+void BlendColorsAdjoint(const DeviceGrid& grid, const DeviceRayWeights& weights,
+                        const DeviceSlots& slots, const Ray* rays, const uint8_t* open,
+                        const Vec3f* d_color, float* d_rows) {
   if (weights.num_samples == 0) return;
   BlendColorsAdjointKernel<<<BlocksFor(32 * weights.num_samples), kThreads>>>(
-      grid.view(), grid.basis, weights.samples.data(), weights.num_samples, slots.slot_of_voxel.data(), rays, open,
-      d_color, d_rows);
+      grid.view(), grid.basis, weights.samples.data(), weights.num_samples,
+      slots.slot_of_voxel.data(), rays, open, d_color, d_rows);
   CheckLaunch("blend_colors_adjoint");
 }
 
-void BlendRows(const DeviceGrid& grid, const DeviceRayWeights& weights, const DeviceSlots& slots, const float* rows,
-               float* sums) {
+void BlendRows(const DeviceGrid& grid, const DeviceRayWeights& weights,
+               const DeviceSlots& slots, const float* rows, float* sums) {
   DeviceZero(sums, weights.num_rays * kRowLanes * int64_t{sizeof(float)});
   if (weights.num_samples == 0) return;
-  BlendRowsKernel<<<BlocksFor(32 * weights.num_samples), kThreads>>>(grid.view(), weights.samples.data(),
-                                                                    weights.num_samples, slots.slot_of_voxel.data(),
-                                                                    rows, sums);
+  BlendRowsKernel<<<BlocksFor(32 * weights.num_samples), kThreads>>>(
+      grid.view(), weights.samples.data(), weights.num_samples, slots.slot_of_voxel.data(),
+      rows, sums);
   CheckLaunch("blend_rows");
 }
 
 #else
 
-void DeviceRayWeights::March(const DeviceGrid&, const Ray*, int64_t, const MarchOptions&, float, DeviceTouched*) {
+void DeviceRayWeights::March(const DeviceGrid&, const Ray*, int64_t, const MarchOptions&, float,
+                             DeviceTouched*) {
   DeviceWait("march_weights");
 }
 void DeviceSlots::Assign(DeviceTouched*) { DeviceWait("assign_slots"); }
-void GatherRows(const DeviceGrid&, const int32_t*, int64_t, int64_t, float, float*) { DeviceWait("gather_rows"); }
-void AddMappedRows(const Mat3f&, const Vec3f&, const float*, int64_t, float*) { DeviceWait("add_mapped_rows"); }
+void GatherRows(const DeviceGrid&, const int32_t*, int64_t, int64_t, float, float*) {
+  DeviceWait("gather_rows");
+}
+void AddMappedRows(const Mat3f&, const Vec3f&, const float*, int64_t, float*) {
+  DeviceWait("add_mapped_rows");
+}
 void ScatterRows(const float*, int64_t, int64_t, DeviceGrid*) { DeviceWait("scatter_rows"); }
-void BlendColors(const DeviceGrid&, const DeviceRayWeights&, const DeviceSlots&, const Ray*, const float*, Vec3f*,
-                 uint8_t*) {
+void BlendColors(const DeviceGrid&, const DeviceRayWeights&, const DeviceSlots&, const Ray*,
+                 const float*, Vec3f*, uint8_t*) {
   DeviceWait("blend_colors");
 }
-void BlendColorsAdjoint(const DeviceGrid&, const DeviceRayWeights&, const DeviceSlots&, const Ray*, const uint8_t*,
-                        const Vec3f*, float*) {
+void BlendColorsAdjoint(const DeviceGrid&, const DeviceRayWeights&, const DeviceSlots&,
+                        const Ray*, const uint8_t*, const Vec3f*, float*) {
   DeviceWait("blend_colors_adjoint");
 }
-void BlendRows(const DeviceGrid&, const DeviceRayWeights&, const DeviceSlots&, const float*, float*) {
+void BlendRows(const DeviceGrid&, const DeviceRayWeights&, const DeviceSlots&, const float*,
+               float*) {
   DeviceWait("blend_rows");
 }
 

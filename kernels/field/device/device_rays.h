@@ -1,6 +1,6 @@
-// Rays through a field on a CUDA device: rendering, fitting's forward and adjoint in one kernel, and the
-// largest weights. Held to ray_loss.h by the parity table. A warp walks a ray; its lanes first look at 32
-// samples at a time, then stand for the values of a voxel.
+// Rays through a field on a CUDA device: rendering, fitting's forward and adjoint in one
+// kernel, and the largest weights. Held to ray_loss.h by the parity table. A warp walks a ray;
+// its lanes first look at 32 samples at a time, then stand for the values of a voxel.
 #pragma once
 
 #include "kernels/field/device/device_grid.h"
@@ -16,15 +16,18 @@ struct DeviceRenderTarget {
   float* depth = nullptr;
   float* transmittance = nullptr;
 };
-// EQ(opacity-steps): a ray's colour is the integral of the colour along it over what it has lost of its light,
+// EQ(opacity-steps): a ray's colour is the integral of the colour along it over what it has
+// lost of its light,
 //   C = int_0^{1 - T} c(o) do + T c_bg,   o = 1 - (what is left of the light),
-// and the sum over samples is that integral with c constant between them. With opacity_step s > 0 only the samples
-// at which o passes (k + 1/2) s are looked at, each stands for all that was lost since the one before, and the sum is
-// scaled to what was lost in all: at most 1 / s + 1 colours a ray, and an error of about s times the change of colour
-// within a step; a ray that loses less than s / 2 loses it to nothing. 0 looks at every sample. Depths and
-// transmittances are exact either way.
-void RenderOnDevice(const DeviceGrid& grid, const Ray* rays, int64_t n, const MarchOptions& options,
-                    const DeviceRenderTarget& target, float opacity_step = 0);
+// and the sum over samples is that integral with c constant between them. With opacity_step s >
+// 0 only the samples at which o passes (k + 1/2) s are looked at, each stands for all that was
+// lost since the one before, and the sum is scaled to what was lost in all: at most 1 / s + 1
+// colours a ray, and an error of about s times the change of colour within a step; a ray that
+// loses less than s / 2 loses it to nothing. 0 looks at every sample. Depths and transmittances
+// are exact either way.
+void RenderOnDevice(const DeviceGrid& grid, const Ray* rays, int64_t n,
+                    const MarchOptions& options, const DeviceRenderTarget& target,
+                    float opacity_step = 0);
 
 // A whole view, colours clipped and depths along the optical axis; see render.h.
 RenderedView RenderViewOnDevice(const DeviceGrid& grid, const Camera& camera,
@@ -37,8 +40,9 @@ struct DeviceFitSums {
   unsigned long long rejected_voxels = 0;
 };
 
-// Which voxels' gradients may differ from 0: bit v % 32 of word v / 32 for voxel v. Bits are walked in the
-// voxels' order; a list in the order of touching made the step half as slow again.
+// Which voxels' gradients may differ from 0: bit v % 32 of word v / 32 for voxel v. Bits are
+// walked in the voxels' order; a list in the order of touching made the step half as slow
+// again.
 struct DeviceTouched {
   DeviceTouched() = default;
   explicit DeviceTouched(const DeviceGrid& grid);
@@ -47,8 +51,8 @@ struct DeviceTouched {
   DeviceBuffer<uint32_t> bits;
 };
 
-// Forward, loss and adjoint of a batch on a grid that is being fitted: adds the gradient of scale * sum (C - target)^2. Float sums in no
-// fixed order: two runs differ in the last bits.
+// Forward, loss and adjoint of a batch on a grid that is being fitted: adds the gradient of
+// scale * sum (C - target)^2. Float sums in no fixed order: two runs differ in the last bits.
 class DeviceRayFitter {
  public:
   // Keeps every sample of the rays in flight; `max_bytes` bounds that store.
@@ -71,10 +75,10 @@ class DeviceRayFitter {
 void MaxWeightsOnDevice(const DeviceGrid& grid, const Ray* rays, int64_t n,
                         const MarchOptions& options, float* weights);
 
-// Adds the gradient of the total variation (see EQ(total-variation)) of voxels begin, begin + 1, ...,
-// begin + count - 1, modulo their number.
-void AddTotalVariation(const DeviceGrid& grid, int64_t begin, int64_t count, float scale_density,
-                       float scale_sh, DeviceTouched* touched);
+// Adds the gradient of the total variation (see EQ(total-variation)) of voxels begin, begin +
+// 1, ..., begin + count - 1, modulo their number.
+void AddTotalVariation(const DeviceGrid& grid, int64_t begin, int64_t count,
+                       float scale_density, float scale_sh, DeviceTouched* touched);
 
 // See EQ(rmsprop): steps the touched voxels and forgets their gradients.
 void StepOnDevice(DeviceGrid* grid, DeviceTouched* touched, const RmspropOptions& options,

@@ -18,10 +18,12 @@ RenderedView RenderViewOnDevice(const DeviceGrid& grid, const Camera& camera,
   DeviceBuffer<Ray> device_rays(n, "rays of a view");
   device_rays.CopyIn(rays.data(), n);
   DeviceBuffer<Vec3f> color(n, "colours of a view");
-  DeviceBuffer<float> depth(n, "depths of a view"), transmittance(n, "transmittances of a view");
+  DeviceBuffer<float> depth(n, "depths of a view"),
+      transmittance(n, "transmittances of a view");
   RenderOnDevice(grid, device_rays.data(), n, options,
                  {color.data(), depth.data(), transmittance.data()}, opacity_step);
-  RenderedView view{Image(camera.width, camera.height, 3), Image(camera.width, camera.height, 1),
+  RenderedView view{Image(camera.width, camera.height, 3),
+                    Image(camera.width, camera.height, 1),
                     Image(camera.width, camera.height, 1)};
   DeviceCopyOut(view.color.pixels.data(), color.data(), n * int64_t{sizeof(Vec3f)});
   depth.CopyOut(view.depth.pixels.data(), n);
@@ -39,20 +41,25 @@ class OpacitySteps {
  public:
   __device__ explicit OpacitySteps(float step) : inverse_(step > 0 ? 1 / step : 0) {}
 
-  // `before` and `after`: transmittances around a compositing lane's sample. Lanes that are looked at get a weight
-  // above 0.
-  __device__ unsigned Choose(bool composites, float before, float after, int lane, float* weight) {
+  // `before` and `after`: transmittances around a compositing lane's sample. Lanes that are
+  // looked at get a weight above 0.
+  __device__ unsigned Choose(bool composites, float before, float after, int lane,
+                             float* weight) {
     const bool chosen =
-        composites && (inverse_ == 0 || floorf((1 - after) * inverse_ + 0.5f) > floorf((1 - before) * inverse_ + 0.5f));
+        composites && (inverse_ == 0 || floorf((1 - after) * inverse_ + 0.5f) >
+                                            floorf((1 - before) * inverse_ + 0.5f));
     const unsigned all = __ballot_sync(kAllLanes, chosen);
     const unsigned earlier = all & ((1u << lane) - 1);
-    const float last_of_batch = __shfl_sync(kAllLanes, after, earlier == 0 ? 0 : 31 - __clz(earlier));
+    const float last_of_batch =
+        __shfl_sync(kAllLanes, after, earlier == 0 ? 0 : 31 - __clz(earlier));
     *weight = chosen ? (earlier == 0 ? seen_ : last_of_batch) - after : 0.0f;
     if (all != 0) seen_ = __shfl_sync(kAllLanes, after, 31 - __clz(all));
     return all;
   }
   // What the sum of the weights lacks at the ray's end, where `left` of the light is left.
-  __device__ float Scale(float left) const { return seen_ < 1 ? (1 - left) / (1 - seen_) : 1.0f; }
+  __device__ float Scale(float left) const {
+    return seen_ < 1 ? (1 - left) / (1 - seen_) : 1.0f;
+  }
 
  private:
   float inverse_;
@@ -61,7 +68,8 @@ class OpacitySteps {
 
 template <int kBasis>
 __global__ void RenderRaysKernel(DeviceGridView grid, const Ray* rays, int64_t n,
-                                 MarchOptions options, float opacity_step, DeviceRenderTarget target) {
+                                 MarchOptions options, float opacity_step,
+                                 DeviceRenderTarget target) {
   const int lane = static_cast<int>(threadIdx.x & 31);
   const int64_t r = (blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x) / 32;
   if (r >= n) return;
@@ -78,8 +86,8 @@ __global__ void RenderRaysKernel(DeviceGridView grid, const Ray* rays, int64_t n
     const float w = sample.transmittance_before * alpha;
     depth += w * sample.t;
     float seen;
-    const unsigned chosen =
-        steps.Choose(sample.tau > 0, sample.transmittance_before, sample.transmittance_before - w, lane, &seen);
+    const unsigned chosen = steps.Choose(sample.tau > 0, sample.transmittance_before,
+                                         sample.transmittance_before - w, lane, &seen);
     if (chosen == 0) continue;
     const Vec3f raw = RawColors<kBasis>(grid, record, sample, chosen, lane);
     const float weight = opacity_step > 0 ? seen : w;
@@ -119,8 +127,9 @@ __global__ void MaxWeightsKernel(DeviceGridView grid, const Ray* rays, int64_t n
 
 }  // namespace
 
-void RenderOnDevice(const DeviceGrid& grid, const Ray* rays, int64_t n, const MarchOptions& options,
-                    const DeviceRenderTarget& target, float opacity_step) {
+void RenderOnDevice(const DeviceGrid& grid, const Ray* rays, int64_t n,
+                    const MarchOptions& options, const DeviceRenderTarget& target,
+                    float opacity_step) {
   if (n == 0) return;
   ByBasis(grid.basis, [&](auto basis) {
     RenderRaysKernel<basis.value>

@@ -1,4 +1,5 @@
-// Pruning and resampling on the device; the same rule as Resample in reconstruct/resample_grid.h.
+// Pruning and resampling on the device; the same rule as Resample in
+// reconstruct/resample_grid.h.
 #include <algorithm>
 
 #include "kernels/field/device/device_grid.h"
@@ -15,12 +16,15 @@ namespace regrade {
 
 namespace {
 
-__global__ void MarkHeavy(DeviceGridView grid, const float* weights, float threshold, uint8_t* keep) {
+__global__ void MarkHeavy(DeviceGridView grid, const float* weights, float threshold,
+                          uint8_t* keep) {
   const int64_t voxel = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
-  if (voxel < grid.num_voxels && weights[voxel] >= threshold) keep[grid.vertex_of_voxel[voxel]] = 1;
+  if (voxel < grid.num_voxels && weights[voxel] >= threshold)
+    keep[grid.vertex_of_voxel[voxel]] = 1;
 }
 
-__global__ void GrowAlongAxis(Vec3i n, int axis, int64_t vertices, const uint8_t* from, uint8_t* to) {
+__global__ void GrowAlongAxis(Vec3i n, int axis, int64_t vertices, const uint8_t* from,
+                              uint8_t* to) {
   const int64_t vertex = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
   if (vertex >= vertices) return;
   const int64_t strides[3] = {static_cast<int64_t>(n.y) * n.z, n.z, 1};
@@ -50,8 +54,9 @@ __global__ void MarkKept(GridFrame frame, GridFrame old, int64_t vertices, const
   const int64_t vertex = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
   if (vertex >= vertices) return;
   const Vec3f p = OldPosition(frame, old, vertex);
-  marks[vertex] = keep[old.Vertex(static_cast<int>(lroundf(p.x)), static_cast<int>(lroundf(p.y)),
-                                  static_cast<int>(lroundf(p.z)))];
+  marks[vertex] =
+      keep[old.Vertex(static_cast<int>(lroundf(p.x)), static_cast<int>(lroundf(p.y)),
+                      static_cast<int>(lroundf(p.z)))];
 }
 
 // `links` holds the number of kept vertices before each, `marks` whether it is kept itself.
@@ -90,8 +95,8 @@ DeviceGrid ResampleOnDevice(const DeviceGrid& grid, const DeviceBuffer<float>& w
                                                         keep.data());
   CheckLaunch("mark_heavy");
   for (int axis = 0; axis < 3; ++axis) {
-    GrowAlongAxis<<<BlocksFor(old_vertices), kThreads>>>(grid.frame.resolution, axis, old_vertices,
-                                                         keep.data(), grown.data());
+    GrowAlongAxis<<<BlocksFor(old_vertices), kThreads>>>(
+        grid.frame.resolution, axis, old_vertices, keep.data(), grown.data());
     CheckLaunch("grow_along_axis");
     std::swap(keep, grown);
   }
@@ -108,10 +113,11 @@ DeviceGrid ResampleOnDevice(const DeviceGrid& grid, const DeviceBuffer<float>& w
   CheckLaunch("mark_kept");
   result.links = DeviceBuffer<int32_t>(vertices, "links");
   size_t scratch_bytes = 0;
-  cub::DeviceScan::ExclusiveSum(nullptr, scratch_bytes, marks.data(), result.links.data(), vertices);
-  DeviceBuffer<uint8_t> scratch(static_cast<int64_t>(scratch_bytes), "scratch of a scan");
-  cub::DeviceScan::ExclusiveSum(scratch.data(), scratch_bytes, marks.data(), result.links.data(),
+  cub::DeviceScan::ExclusiveSum(nullptr, scratch_bytes, marks.data(), result.links.data(),
                                 vertices);
+  DeviceBuffer<uint8_t> scratch(static_cast<int64_t>(scratch_bytes), "scratch of a scan");
+  cub::DeviceScan::ExclusiveSum(scratch.data(), scratch_bytes, marks.data(),
+                                result.links.data(), vertices);
   CheckLaunch("scan");
   int32_t last_link = 0, last_mark = 0;
   DeviceCopyOut(&last_link, result.links.data() + vertices - 1, sizeof last_link);
@@ -135,7 +141,8 @@ DeviceGrid ResampleOnDevice(const DeviceGrid& grid, const DeviceBuffer<float>& w
 
 #else
 
-DeviceGrid ResampleOnDevice(const DeviceGrid&, const DeviceBuffer<float>&, float, const Vec3i&) {
+DeviceGrid ResampleOnDevice(const DeviceGrid&, const DeviceBuffer<float>&, float,
+                            const Vec3i&) {
   DeviceWait("resample");
   return {};
 }

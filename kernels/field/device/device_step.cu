@@ -1,5 +1,5 @@
-// Total variation and the optimizer's step on touched voxels; the lanes of a group stand for the values of
-// one record.
+// Total variation and the optimizer's step on touched voxels; the lanes of a group stand for
+// the values of one record.
 #include <algorithm>
 
 #include "kernels/field/device/device_rays.h"
@@ -14,11 +14,12 @@ namespace regrade {
 
 namespace {
 
-// See EQ(total-variation): an empty neighbour counts as 0 for densities and as the voxel's own value for
-// colours; beyond the box nothing is compared.
+// See EQ(total-variation): an empty neighbour counts as 0 for densities and as the voxel's own
+// value for colours; beyond the box nothing is compared.
 template <int kBasis>
 __global__ void TotalVariationKernel(DeviceGridView grid, int64_t begin, int64_t count,
-                                     float scale_density, float scale_sh, GradientView gradient) {
+                                     float scale_density, float scale_sh,
+                                     GradientView gradient) {
   constexpr int kLanes = RecordLanes(kBasis);
   const int64_t thread = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
   if (thread / kLanes >= count) return;
@@ -81,12 +82,13 @@ struct StepRules {
 
 // One voxel's share of a lane, between loading and storing.
 struct StepQuad {
-  float4 *at = nullptr;  // values; gradient and moment follow; null where the lane has no voxel
+  float4* at = nullptr;  // values; gradient and moment follow; null where the lane has no voxel
   float4 value, gradient, moment;
   int64_t voxel;
 };
 
-__device__ inline float Stepped(float x, float g, float moment, float rate, float bound, float epsilon) {
+__device__ inline float Stepped(float x, float g, float moment, float rate, float bound,
+                                float epsilon) {
   const float stepped = x - rate * g / (sqrtf(moment) + epsilon);
   return fminf(fmaxf(stepped, -bound), bound);
 }
@@ -95,20 +97,22 @@ __device__ inline float NextMoment(float old, float g, float beta) {
   return old == 0 ? g * g : beta * old + (1 - beta) * g * g;
 }
 
-// A warp takes the 32 voxels of one word of marks. A lane stands for four neighbouring values, and kTurns sets of
-// records are on their way at once; lanes stay together, for a warp that splits waits for each part's loads in turn.
+// A warp takes the 32 voxels of one word of marks. A lane stands for four neighbouring values,
+// and kTurns sets of records are on their way at once; lanes stay together, for a warp that
+// splits waits for each part's loads in turn.
 template <int kBasis>
-__global__ void StepKernel(DeviceGridView grid, uint32_t* __restrict__ touched, int64_t words, RmspropOptions options,
-                           DeviceFitSums* sums) {
+__global__ void StepKernel(DeviceGridView grid, uint32_t* __restrict__ touched, int64_t words,
+                           RmspropOptions options, DeviceFitSums* sums) {
   constexpr int kQuads = RecordLanes(kBasis) / 4, kGroups = 32 / kQuads;
   constexpr int kTurns = kGroups >= 8 ? 1 : 2;
   const int lane = static_cast<int>(threadIdx.x & 31);
   const int quad = lane % kQuads, group = lane / kQuads;
-  const unsigned group_lanes = kQuads == 32 ? kAllLanes : ((1u << kQuads) - 1) << (group * kQuads);
+  const unsigned group_lanes =
+      kQuads == 32 ? kAllLanes : ((1u << kQuads) - 1) << (group * kQuads);
   const StepRules<kBasis> rules(quad, options);
   const int64_t warps = static_cast<int64_t>(gridDim.x) * (blockDim.x / 32);
-  for (int64_t w = blockIdx.x * static_cast<int64_t>(blockDim.x / 32) + threadIdx.x / 32; w < words;
-       w += warps) {
+  for (int64_t w = blockIdx.x * static_cast<int64_t>(blockDim.x / 32) + threadIdx.x / 32;
+       w < words; w += warps) {
     unsigned marks = touched[w];
     if (marks == 0) continue;
     __syncwarp();
@@ -131,7 +135,8 @@ __global__ void StepKernel(DeviceGridView grid, uint32_t* __restrict__ touched, 
 #pragma unroll
       for (int i = 0; i < kTurns; ++i) {
         const float4 g = q[i].gradient;
-        const bool finite = isfinite(g.x * g.x) && isfinite(g.y * g.y) && isfinite(g.z * g.z) && isfinite(g.w * g.w);
+        const bool finite = isfinite(g.x * g.x) && isfinite(g.y * g.y) && isfinite(g.z * g.z) &&
+                            isfinite(g.w * g.w);
         // A voxel of whose gradient any part is not finite stays as it is.
         const bool good = (__ballot_sync(kAllLanes, finite) & group_lanes) == group_lanes;
         if (q[i].at == nullptr) continue;
@@ -153,8 +158,10 @@ __global__ void StepKernel(DeviceGridView grid, uint32_t* __restrict__ touched, 
         q[i].at[2 * kQuads] = m;
         constexpr int kDensity = DensityLane(kBasis);
         if (quad == kDensity / 4)
-          grid.dense_density[grid.vertex_of_voxel[q[i].voxel]] =
-              kDensity % 4 == 0 ? x.x : kDensity % 4 == 1 ? x.y : kDensity % 4 == 2 ? x.z : x.w;
+          grid.dense_density[grid.vertex_of_voxel[q[i].voxel]] = kDensity % 4 == 0   ? x.x
+                                                                 : kDensity % 4 == 1 ? x.y
+                                                                 : kDensity % 4 == 2 ? x.z
+                                                                                     : x.w;
       }
       __syncwarp();
     }
@@ -163,8 +170,8 @@ __global__ void StepKernel(DeviceGridView grid, uint32_t* __restrict__ touched, 
 
 }  // namespace
 
-void AddTotalVariation(const DeviceGrid& grid, int64_t begin, int64_t count, float scale_density,
-                       float scale_sh, DeviceTouched* touched) {
+void AddTotalVariation(const DeviceGrid& grid, int64_t begin, int64_t count,
+                       float scale_density, float scale_sh, DeviceTouched* touched) {
   REGRADE_CHECK(grid.fitting);
   if (count <= 0) return;
   ByBasis(grid.basis, [&](auto basis) {

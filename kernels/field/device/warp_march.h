@@ -1,4 +1,5 @@
-// One ray, one warp: its 32 lanes look at 32 consecutive samples of the march. Device code only.
+// One ray, one warp: its 32 lanes look at 32 consecutive samples of the march. Device code
+// only.
 #pragma once
 
 #include "kernels/field/device/device_grid.h"
@@ -31,8 +32,8 @@ __device__ inline float WarpSum(float value) {
 // What a lane knows of its sample.
 struct LaneSample {
   Cell<float> cell;
-  float t = 0;                    // voxels along the ray
-  float tau = 0;                  // optical depth; 0 where nothing is composited
+  float t = 0;    // voxels along the ray
+  float tau = 0;  // optical depth; 0 where nothing is composited
   float transmittance_before = 0;
 };
 
@@ -47,10 +48,10 @@ class WarpMarch {
     delta_ = options.step * ray_.world_per_voxel;
   }
 
-  // Steps to the next 32 samples of which at least one composites; false at the ray's end. Lanes
-  // that composite get sample->tau > 0; they come in the order of the ray, and the first of them
-  // follows the last of the call before. See EQ(composite); the ray ends behind the sample that
-  // leaves less than stop_transmittance.
+  // Steps to the next 32 samples of which at least one composites; false at the ray's end.
+  // Lanes that composite get sample->tau > 0; they come in the order of the ray, and the first
+  // of them follows the last of the call before. See EQ(composite); the ray ends behind the
+  // sample that leaves less than stop_transmittance.
   __device__ bool Next(LaneSample* sample, unsigned* composited) {
     while (step_ < ray_.num_steps && !stopped_) {
       const int64_t mine = step_ + lane_;
@@ -64,9 +65,10 @@ class WarpMarch {
       if (__ballot_sync(kAllLanes, inside && distance == 0) == 0) {
         // Nothing is stored at these 32. Each lane knows how far it stays so.
         const int skip =
-            inside ? lane_ + max(1, static_cast<int>(static_cast<float>(distance - 1) /
-                                                     options_.step))
-                   : 32;
+            inside
+                ? lane_ +
+                      max(1, static_cast<int>(static_cast<float>(distance - 1) / options_.step))
+                : 32;
         step_ += max(32, __reduce_max_sync(kAllLanes, skip));
         continue;
       }

@@ -1,5 +1,5 @@
-// Colours and gradients of a warp's samples: the lanes that marched now stand for the values of one
-// record (basis 9), of two (basis 4) or of eight (basis 1). Device code only.
+// Colours and gradients of a warp's samples: the lanes that marched now stand for the values of
+// one record (basis 9), of two (basis 4) or of eight (basis 1). Device code only.
 #pragma once
 
 #include "kernels/field/device/warp_march.h"
@@ -26,7 +26,8 @@ struct WarpRecord {
       if (in_group < 3 * kBasis && in_group % kBasis == k) gamma = basis[k];
   }
 
-  // Value c x kBasis + k in lane order; sums of a channel's kBasis lanes land on its first lane.
+  // Value c x kBasis + k in lane order; sums of a channel's kBasis lanes land on its first
+  // lane.
   __device__ static float ChannelSums(float value, int in_group) {
     if constexpr (kBasis == 9) {
       const float ninth = __shfl_down_sync(kAllLanes, value, 8);
@@ -46,13 +47,13 @@ __device__ inline int CornerOffset(const GridFrame& frame, int corner) {
          ((corner >> 1) & 1) * frame.resolution.z + (corner & 1);
 }
 
-// Four samples are worked on at a time: lane 8 j + k knows corner k of the j-th. Loads of many records are in
-// flight at once, which is what a single ray's latency asks for.
+// Four samples are worked on at a time: lane 8 j + k knows corner k of the j-th. Loads of many
+// records are in flight at once, which is what a single ray's latency asks for.
 inline constexpr int kTurn = 4;
 
 struct TurnCorner {
-  int source;      // the lane whose sample this is; -1 past the last
-  int32_t link;    // -1 where nothing is stored
+  int source;    // the lane whose sample this is; -1 past the last
+  int32_t link;  // -1 where nothing is stored
   float weight;
 
   __device__ TurnCorner(const DeviceGridView& grid, int vertex, const Vec3f& fraction, int from,
@@ -93,8 +94,7 @@ __device__ Vec3f RawColors(const DeviceGridView& grid, const WarpRecord<kBasis>&
       for (int k = 0; k < 8; ++k) {
         const int32_t link = __shfl_sync(kAllLanes, corner.link, 8 * j + k);
         const float weight = __shfl_sync(kAllLanes, corner.weight, 8 * j + k);
-        if (link >= 0)
-          value[i] += weight * grid.records[link * grid.stride + record.in_group];
+        if (link >= 0) value[i] += weight * grid.records[link * grid.stride + record.in_group];
       }
     }
 #pragma unroll
