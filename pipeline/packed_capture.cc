@@ -137,6 +137,7 @@ PackedCapture ReadPackedCapture(const std::string& path) {
   capture.scene.box.radius = {b[3], b[4], b[5]};
   capture.scene.box.near_clip = b[6];
   capture.scene.box.layers = file.ReadScalar<int32_t>("layers");
+  capture.scene.box.voxel_aspect = VoxelAspect(capture.scene.ndc);
   if (file.Has("background")) {
     const NpzArray array = file.Read("background", ArrayType::kF32, {3});
     capture.scene.box.background =

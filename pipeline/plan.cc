@@ -30,13 +30,13 @@ std::string MemoryText(double bytes) {
 
 }  // namespace
 
-StagePlan PlanFit(const FitOptions& options, int64_t photo_pixels, const Vec3f& box_radius,
+StagePlan PlanFit(const FitOptions& options, int64_t photo_pixels, const SceneBox& box,
                   int threads) {
   const double record = 4.0 * RecordLanes(BasisOfDegree(options.sh_degree));
   const int arenas = options.shards > 0 ? options.shards : std::max(threads, 1);
   double field = 0, seconds = 0;
   for (size_t s = 0; s < options.resolutions.size(); ++s) {
-    const Vec3i n = ResolutionFor(box_radius, options.resolutions[s]);
+    const Vec3i n = ResolutionFor(box, options.resolutions[s]);
     const double vertices = static_cast<double>(n.x) * n.y * n.z;
     const double voxels = vertices * (s == 0 ? 1 : kStoredShare);
     const double gradients = record + kIndexBytes + arenas * kIndexBytes;
@@ -50,12 +50,12 @@ StagePlan PlanFit(const FitOptions& options, int64_t photo_pixels, const Vec3f& 
 }
 
 StagePlan PlanFitOnDevice(const FitOptions& options, int64_t photo_pixels,
-                          const Vec3f& box_radius) {
+                          const SceneBox& box) {
   constexpr double kSampleStore = 1 << 30, kVertexBytes = 4 + 4 + 1 + 1, kSamplesPerRay = 40;
   const double record = 4.0 * RecordLanes(BasisOfDegree(options.sh_degree));
   double peak = 0, coarser = 0, seconds = 0;
   for (size_t s = 0; s < options.resolutions.size(); ++s) {
-    const Vec3i n = ResolutionFor(box_radius, options.resolutions[s]);
+    const Vec3i n = ResolutionFor(box, options.resolutions[s]);
     const double vertices = static_cast<double>(n.x) * n.y * n.z;
     const double voxels = vertices * (s == 0 ? 1 : kStoredShare);
     const double field = voxels * (3 * record + kIndexBytes) + vertices * kVertexBytes;
@@ -94,6 +94,20 @@ void CheckFitsMemory(const StagePlan& plan, uint64_t limit, const char* memory) 
                   " that it may",
               "reconstruct",
               "use --preset draft or smaller --fit-resolutions; memory grows with their cube");
+}
+
+bool LowerToMemory(const std::function<StagePlan(const FitOptions&)>& plan_of, uint64_t limit,
+                   FitOptions* options) {
+  bool lowered = false;
+  while (limit > 0 && plan_of(*options).memory > limit) {
+    auto& sides = options->resolutions;
+    const int finest = *std::max_element(sides.begin(), sides.end());
+    if (finest <= kLeastResolution) break;
+    const int lower = std::max(kLeastResolution, finest - std::max(1, finest / 16));
+    for (int& side : sides) side = std::min(side, lower);
+    lowered = true;
+  }
+  return lowered;
 }
 
 }  // namespace regrade

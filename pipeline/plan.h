@@ -9,10 +9,11 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 
-#include "kernels/base/vec.h"
 #include "reconstruct/fit_options.h"
+#include "reconstruct/scene_box.h"
 
 namespace regrade {
 
@@ -32,15 +33,14 @@ struct StagePlan {
   double seconds = 0;
 };
 
-// `photo_pixels`: of all photos that are fitted, at working size. `box_radius`: half sides of
-// the scene's box; (1, 1, 1), the most, where it is not known yet.
-StagePlan PlanFit(const FitOptions& options, int64_t photo_pixels, const Vec3f& box_radius,
+// `photo_pixels`: of all photos that are fitted, at working size. A cube, the most, where
+// the `box` is not known yet.
+StagePlan PlanFit(const FitOptions& options, int64_t photo_pixels, const SceneBox& box,
                   int threads);
 // The same on a GPU: values, gradients and moments of a voxel side by side; links, densities
 // and distances of a vertex; the coarser grid beside the finer one while it is resampled; 6 B a
 // pixel; and the store of samples in flight.
-StagePlan PlanFitOnDevice(const FitOptions& options, int64_t photo_pixels,
-                          const Vec3f& box_radius);
+StagePlan PlanFitOnDevice(const FitOptions& options, int64_t photo_pixels, const SceneBox& box);
 StagePlan PlanPoses(int64_t photos, int threads);
 StagePlan PlanStyle(int64_t steps, int threads);
 
@@ -53,5 +53,12 @@ uint64_t PlannedMemory(double max_memory_gb, uint64_t available);
 // Throws Error(kResources), naming the options to lower, if the plan of a fit takes more than
 // `limit` bytes of `memory` ("memory", "GPU memory"); a limit of 0 is not known, and none.
 void CheckFitsMemory(const StagePlan& plan, uint64_t limit, const char* memory = "memory");
+
+// Lowers the resolutions of the finest stages until the plan takes at most `limit` bytes, to
+// kLeastResolution at the least; false if there was nothing to lower. Half the voxels cost a
+// decibel or so, a run that fails costs everything.
+inline constexpr int kLeastResolution = 64;
+bool LowerToMemory(const std::function<StagePlan(const FitOptions&)>& plan_of, uint64_t limit,
+                   FitOptions* options);
 
 }  // namespace regrade

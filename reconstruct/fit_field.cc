@@ -49,8 +49,8 @@ class Fitter {
     if (hooks_.resume != nullptr) {
       state = *hooks_.resume;
     } else {
-      const GridFrame frame{ResolutionFor(box_.radius, options_.resolutions[0], box_.layers),
-                            box_.center, box_.radius};
+      const GridFrame frame{ResolutionFor(box_, options_.resolutions[0]), box_.center,
+                            box_.radius};
       state.grid = MakeInitialGrid(rays_, frame, BasisOf(options_.sh_degree),
                                    options_.initial_density, box_.near_clip, 2);
       if (box_.background) state.grid.background = *box_.background;
@@ -152,7 +152,7 @@ class Fitter {
   void Refine(int longest) {
     const Vec3i now = engine_->resolution();
     const float longest_now = static_cast<float>(std::max({now.x, now.y, now.z}));
-    const Vec3i next = longest > 0 ? ResolutionFor(box_.radius, longest, box_.layers) : now;
+    const Vec3i next = longest > 0 ? ResolutionFor(box_, longest) : now;
     engine_->Refine({options_.step, options_.stop_transmittance},
                     options_.prune_weight / longest_now, next);
   }

@@ -13,19 +13,10 @@
 #include "kernels/field/fast_rays.h"
 #include "kernels/field/radiance_field.h"
 #include "reconstruct/fit_options.h"
+#include "reconstruct/scene_box.h"
 #include "reconstruct/training_rays.h"
 
 namespace regrade {
-
-// The part of the field's frame that is modelled.
-struct SceneBox {
-  Vec3f center{0, 0, 0};
-  Vec3f radius{1, 1, 1};
-  float near_clip = 0;  // nothing is modelled nearer to a camera than this
-  int layers = 0;       // most vertices along z; 0: as many as the radius asks for
-  std::optional<Vec3f>
-      background;  // sRGB behind everything; not given: the photos' mean colour
-};
 
 // Everything a fit needs to go on as if it had never stopped (H110).
 struct FitState {

@@ -94,6 +94,7 @@ NormalizedScene NormalizeForwardFacing(const Capture& capture, const ForwardFaci
   result.box.radius = {static_cast<float>(std::min(radius_x, kLargestRadius)),
                        static_cast<float>(std::min(radius_y, kLargestRadius)), 1};
   result.box.layers = kLayers;
+  result.box.voxel_aspect = VoxelAspect(result.ndc);
   return result;
 }
 

@@ -6,7 +6,7 @@
 
 #include "kernels/scene/camera.h"
 #include "kernels/scene/capture.h"
-#include "reconstruct/fit_field.h"
+#include "reconstruct/scene_box.h"
 
 namespace regrade {
 

@@ -36,16 +36,6 @@ std::vector<uint8_t> KeptVertices(const FastGrid& grid, const Buffer<float>& wei
 
 }  // namespace
 
-Vec3i ResolutionFor(const Vec3f& radius, int longest, int layers) {
-  const float most =
-      layers > 0 ? std::max(radius.x, radius.y) : std::max({radius.x, radius.y, radius.z});
-  Vec3i n;
-  for (int a = 0; a < 3; ++a)
-    n[a] = std::max(2, static_cast<int>(std::lround(longest * radius[a] / most)));
-  if (layers > 0) n.z = std::min(layers, longest);
-  return n;
-}
-
 FastGrid MakeInitialGrid(const TrainingRays& rays, const GridFrame& frame, int basis,
                          float density, float near_clip, int min_views) {
   FastGrid grid;

@@ -10,10 +10,6 @@
 
 namespace regrade {
 
-// Vertices per axis for a box whose longest side gets `longest`; voxels are cubes to within
-// rounding. With `layers`, z gets that many at most, and x and y share the rest.
-Vec3i ResolutionFor(const Vec3f& radius, int longest, int layers = 0);
-
 // A grid that stores every vertex seen by at least `min_views` cameras beyond near_clip, at
 // `density`, mid-grey.
 FastGrid MakeInitialGrid(const TrainingRays& rays, const GridFrame& frame, int basis,

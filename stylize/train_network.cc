@@ -73,6 +73,7 @@ void ApplyStyleRecipe(const std::string& recipe, TrainNetworkOptions* options) {
   options->min_weight = 0;
   options->sh_scale = 1;
   options->position_scale = 1;
+  options->omega = 1;
   options->norm_steps = 1;
   options->bound_factor = 0;
 }

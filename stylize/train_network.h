@@ -32,10 +32,10 @@ struct TrainNetworkOptions {
   std::string base = "best";
   double bound_factor = 4;
   float sh_scale = 2;
-  float position_scale = 2;
+  float position_scale = 8;
   int norm_steps = 20;
   std::string activation = "sine";
-  float omega = 1;
+  float omega = 1.5f;
   bool no_k_est = false;
   bool no_regularisation = false;
   bool spectral_normalisation = false;

@@ -32,6 +32,11 @@ HD void NdcRay(const NdcSpace& space, Vec3<T>* origin, Vec3<T>* direction) {
   *direction = Normalized(Vec3<T>{a * (d.x / d.z - x), b * (d.y / d.z - y), T(2)});
 }
 
+// Height over width, in NDC, of what is as high as wide in a picture with square pixels.
+HD inline float VoxelAspect(const NdcSpace& space) {
+  return space.on() ? static_cast<float>(space.b / space.a) : 1.0f;
+}
+
 // z < 1 in NDC; z = 1 is infinitely far.
 template <typename T>
 HD Vec3<T> WorldFromNdc(const NdcSpace& space, const Vec3<T>& p) {

@@ -70,8 +70,8 @@ void PrintPlan(const std::string& last, RunContext* context) {
   context->console->Info(
       "reconstruct: " +
       PlanText(ChooseBackend(settings.run.device, settings.run.reproducible) == Backend::kCuda
-                   ? PlanFitOnDevice(settings.fit, photos * side * side * 3 / 4, {1, 1, 1})
-                   : PlanFit(settings.fit, photos * side * side * 3 / 4, {1, 1, 1}, threads)));
+                   ? PlanFitOnDevice(settings.fit, photos * side * side * 3 / 4, SceneBox())
+                   : PlanFit(settings.fit, photos * side * side * 3 / 4, SceneBox(), threads)));
   if (last == "reconstruct") return;
   context->console->Info("stylize: " + PlanText(PlanStyle(settings.network.steps, threads)));
 }

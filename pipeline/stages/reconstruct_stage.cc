@@ -1,7 +1,10 @@
 // Stage "reconstruct": the capture becomes field.npz, measured on the photos it has not seen.
 #include <omp.h>
 
+#include <algorithm>
+#include <functional>
 #include <numeric>
+#include <string>
 
 #include "evaluate/image_quality.h"
 #include "kernels/base/device_memory.h"
@@ -51,17 +54,50 @@ void MeasureHeldOut(RunContext* context, const Capture& capture, const StoredFie
   (*figures)["ssim_heldout"] = ssim.empty() ? JsonValue() : JsonValue(Mean(ssim));
 }
 
-StagePlan PlanOf(const RunSettings& settings, const Capture& capture, const SceneBox& box,
-                 Backend backend) {
+int Finest(const FitOptions& options) {
+  return *std::max_element(options.resolutions.begin(), options.resolutions.end());
+}
+
+// What a fit of this capture's photos takes, by its options.
+std::function<StagePlan(const FitOptions&)> PlannerOf(const RunSettings& settings,
+                                                      const Capture& capture,
+                                                      const SceneBox& box, Backend backend) {
   int64_t pixels = 0;
   for (const int i : ViewIndices(capture, settings.run.holdout, false)) {
     const Camera camera = WorkingCamera(capture.views[static_cast<size_t>(i)].camera,
                                         settings.scene.photo_size, {}, {});
     pixels += int64_t{camera.width} * camera.height;
   }
-  return backend == Backend::kCuda
-             ? PlanFitOnDevice(settings.fit, pixels, box.radius)
-             : PlanFit(settings.fit, pixels, box.radius, omp_get_max_threads());
+  return [pixels, box, backend](const FitOptions& options) {
+    return backend == Backend::kCuda ? PlanFitOnDevice(options, pixels, box)
+                                     : PlanFit(options, pixels, box, omp_get_max_threads());
+  };
+}
+
+// The fit's options, their resolutions lowered where memory asks for it: said, and recorded.
+FitOptions OptionsForMemory(RunContext* context,
+                            const std::function<StagePlan(const FitOptions&)>& plan_of,
+                            Backend backend) {
+  const RunSettings& settings = context->settings;
+  const bool on_device = backend == Backend::kCuda;
+  const uint64_t limit =
+      PlannedMemory(settings.run.max_memory_gb,
+                    on_device ? static_cast<uint64_t>(ReadDeviceStatus().free_bytes)
+                              : ReadMemoryStatus().available);
+  FitOptions options = settings.fit;
+  options.seed = settings.run.seed;
+  // What happens to be free must not decide about the bytes of a reproducible run.
+  if ((!settings.run.reproducible || settings.run.max_memory_gb > 0) &&
+      LowerToMemory(plan_of, limit, &options))
+    context->console->Info(
+        "the finest grid has " + std::to_string(Finest(options)) +
+        " voxels a side instead of " + std::to_string(Finest(settings.fit)) +
+        ": more would not fit into " +
+        (settings.run.max_memory_gb > 0 ? "--max-memory" : "the memory that is free"));
+  const StagePlan plan = plan_of(options);
+  context->console->Info("the fit will take " + PlanText(plan));
+  CheckFitsMemory(plan, limit, on_device ? "GPU memory" : "memory");
+  return options;
 }
 
 StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
@@ -75,16 +111,8 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   if (!scene.notice.empty()) context->console->Info(scene.notice);
   for (const EffectReport& effect : profile.effects) context->console->Info(EffectLine(effect));
   const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
-  const StagePlan plan = PlanOf(settings, capture, scene.box, backend);
-  context->console->Info("the fit will take " + PlanText(plan));
-  if (backend == Backend::kCuda)
-    CheckFitsMemory(plan,
-                    PlannedMemory(settings.run.max_memory_gb,
-                                  static_cast<uint64_t>(ReadDeviceStatus().free_bytes)),
-                    "GPU memory");
-  else
-    CheckFitsMemory(plan,
-                    PlannedMemory(settings.run.max_memory_gb, ReadMemoryStatus().available));
+  FitOptions options =
+      OptionsForMemory(context, PlannerOf(settings, capture, scene.box, backend), backend);
 
   const std::vector<int> fitted = ViewIndices(capture, settings.run.holdout, false);
   std::vector<Image> photos;
@@ -98,8 +126,6 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
                      &photos.back()});
   }
 
-  FitOptions options = settings.fit;
-  options.seed = settings.run.seed;
   if (settings.run.reproducible && options.shards == 0) options.shards = kReproducibleShards;
   FitHooks hooks;
   ProgressParts parts(progress, 1 + kAfterFit);
@@ -121,6 +147,7 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   outcome.outputs = {"field.npz"};
   outcome.figures["effects"] = EffectsRecord(profile.effects);
   outcome.figures["device"] = DeviceName(backend);
+  outcome.figures["finest_grid"] = Finest(options);
   outcome.figures["rays"] = fit.rays;
   outcome.figures["voxels"] = fit.field.geometry->num_voxels();
   outcome.figures["psnr_train_db"] = fit.psnr_train_db;
@@ -144,11 +171,11 @@ Stage ReconstructStage(RunContext* context) {
   stage.refuse_changes = true;
   if (context->settings.start.dry_run) {
     const Capture capture = ReadCapture(context->workspace->Path("poses"));
-    stage.plan = PlanText(PlanOf(
-        context->settings, capture,
-        ProfileScene(capture, context->settings.fit.sh_degree, context->settings.run.effects)
-            .scene.box,
-        ChooseBackend(run.device, run.reproducible)));
+    const SceneProfile profile =
+        ProfileScene(capture, context->settings.fit.sh_degree, run.effects);
+    stage.plan =
+        PlanText(PlannerOf(context->settings, capture, profile.scene.box,
+                           ChooseBackend(run.device, run.reproducible))(context->settings.fit));
   }
   stage.work = [context, inputs = stage.inputs](const ProgressFunction& progress) {
     return Reconstruct(context, inputs, progress);

@@ -7,7 +7,7 @@
 namespace regrade {
 namespace {
 
-constexpr Vec3f kCube{1, 1, 1};
+const SceneBox kCube;
 constexpr uint64_t kProgram = static_cast<uint64_t>(kProgramBytes);
 
 FitOptions Fit(const std::vector<int>& resolutions, const std::vector<int>& steps) {
@@ -37,7 +37,7 @@ TEST(Plan, LaterStagesStoreAShare) {
 TEST(Plan, MemoryFollowsBoxDegreeAndThreads) {
   const FitOptions fit = Fit({64, 128}, {10, 10});
   const uint64_t cube = PlanFit(fit, 0, kCube, 2).memory - kProgram;
-  const uint64_t flat = PlanFit(fit, 0, {1, 1, 0.25f}, 2).memory - kProgram;
+  const uint64_t flat = PlanFit(fit, 0, {.radius = {1, 1, 0.25f}}, 2).memory - kProgram;
   // Sides are rounded to whole voxels.
   EXPECT_NEAR(static_cast<double>(flat), 0.25 * static_cast<double>(cube), 0.02 * cube);
   EXPECT_GT(PlanFit(fit, 0, kCube, 16).memory - kProgram, cube);
@@ -86,6 +86,27 @@ TEST(Plan, TooLittleMemoryNamesWhatToLower) {
     EXPECT_NE(error.hint().find("--preset draft"), std::string::npos);
     EXPECT_NE(error.hint().find("--fit-resolutions"), std::string::npos);
   }
+}
+
+// Before a run fails its finest grids become coarser, no further than they must, and what was
+// coarse already stays.
+TEST(Plan, ResolutionsAreLoweredToMemory) {
+  const auto plan_of = [](const FitOptions& options) { return PlanFit(options, 0, kCube, 2); };
+  const FitOptions asked = Fit({64, 128, 320}, {10, 10, 10});
+  FitOptions options = asked;
+  EXPECT_FALSE(LowerToMemory(plan_of, plan_of(asked).memory, &options));
+  EXPECT_FALSE(LowerToMemory(plan_of, 0, &options));  // not known
+  EXPECT_EQ(options.resolutions, asked.resolutions);
+  const uint64_t half = plan_of(asked).memory / 2;
+  EXPECT_TRUE(LowerToMemory(plan_of, half, &options));
+  EXPECT_EQ(options.resolutions[0], 64);
+  EXPECT_EQ(options.resolutions[1], 128);
+  EXPECT_LE(plan_of(options).memory, half);
+  // Steps of a sixteenth of the side are a sixth of the memory.
+  EXPECT_GT(static_cast<double>(plan_of(options).memory), 0.8 * static_cast<double>(half));
+  EXPECT_TRUE(LowerToMemory(plan_of, 1, &options));  // in vain: CheckFitsMemory then says so
+  EXPECT_EQ(options.resolutions, (std::vector<int>{64, 64, 64}));
+  EXPECT_FALSE(LowerToMemory(plan_of, 1, &options));
 }
 
 }  // namespace
