@@ -1,0 +1,102 @@
+#!/usr/bin/env python3
+"""Lets each write of a run fail once, and requires a clear end, a folder that is whole, and the same result afterwards.
+
+  fail_each_write.py REGRADE LIBRARY [--runs 24] [--kinds ENOSPC,EIO,SHORT]     LIBRARY: libfailing_writes.so; needs colmap
+
+A small synthetic capture is run once undisturbed in reproducible mode. Then, beginning behind the poses and behind
+the reconstruction, a copy is run with its k-th write failing, for `--runs` values of k over all of them (0: every k).
+A failed write must end the run with exit status 5 and a message that names a file (a short one must change nothing);
+the same command again must finish, with the undisturbed run's fields and frames byte for byte. Exit status 1 otherwise.
+"""
+
+import argparse
+import glob
+import hashlib
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+
+SMALL = ["--photo-size", "96", "--fit-resolutions", "24,32", "--fit-steps", "60,60", "--fit-rays", "1024",
+         "--style-steps", "20", "--style-rays", "512", "--path-frames", "4", "--preset", "draft", "--reproducible",
+         "--holdout", "0", "--threads", "2"]
+
+
+def call(command, failing=None):
+    environment = dict(os.environ, **(failing or {}))
+    done = subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, env=environment,
+                          timeout=600)
+    return done.returncode, done.stderr.strip()
+
+
+def results(folder):
+    """name -> digest of every field and frame."""
+    names = glob.glob(os.path.join(folder, "*.npz")) + glob.glob(os.path.join(folder, "frames", "*", "*.png"))
+    return {os.path.relpath(name, folder): hashlib.sha256(open(name, "rb").read()).hexdigest() for name in names}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("regrade")
+    parser.add_argument("library")
+    parser.add_argument("--runs", type=int, default=24)
+    parser.add_argument("--kinds", default="ENOSPC,EIO,SHORT")
+    options = parser.parse_args()
+    regrade, library = os.path.abspath(options.regrade), os.path.abspath(options.library)
+    failures = tried = 0
+    with tempfile.TemporaryDirectory() as scratch:
+        capture, work = os.path.join(scratch, "capture"), os.path.join(scratch, "work")
+        style = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "assets", "style_sunset.png")
+        call([regrade, "synth", capture, "--scene", "table", "--views", "8", "--size", "256x192"])
+        run = [regrade, "run", capture, "--style", style, "--out", work] + SMALL
+        begins = {}
+        for name, command in (("poses", "pose"), ("reconstruction", "reconstruct")):
+            status, words = call([regrade, command, capture, "--out", work] + SMALL)
+            if status != 0:
+                sys.exit(f"{command} of the undisturbed run: exit status {status}: {words}")
+            begins[name] = shutil.copytree(work, os.path.join(scratch, name))
+        if call(run)[0] != 0:
+            sys.exit("the undisturbed run failed")
+        expected = results(work)
+        for name, begin in begins.items():
+            def fresh():
+                shutil.rmtree(work)
+                shutil.copytree(begin, work)
+
+            fresh()
+            count_file = os.path.join(scratch, "count")
+            base = {"LD_PRELOAD": library, "FAILING_WRITES_UNDER": work, "FAILING_WRITES_COUNT": count_file}
+            call(run, base)
+            with open(count_file) as file:
+                count = int(file.read())
+            wanted = count if options.runs == 0 else min(options.runs, count)
+            kinds = options.kinds.split(",")
+            print(f"behind the {name}: {count} operations that write, {wanted} of them fail in turn", flush=True)
+            for i in range(wanted):
+                k, kind = 1 + i * count // wanted, kinds[i % len(kinds)]
+                fresh()
+                status, words = call(run, dict(base, FAILING_WRITES_AT=str(k), FAILING_WRITES_KIND=kind))
+                problem = None
+                last = words.splitlines()[-1] if words else ""
+                if status not in ((0,) if kind == "SHORT" else (0, 5)):
+                    problem = f"exit status {status}: {last}"
+                elif status == 5 and scratch not in words and "/" not in last:
+                    problem = f"no file is named: {last}"
+                else:
+                    again, words = call(run)
+                    if again != 0:
+                        problem = f"the same command again: exit status {again}: {words[-200:]}"
+                    elif results(work) != expected:
+                        now = results(work)
+                        problem = f"differs: {sorted(n for n in set(now) | set(expected) if now.get(n) != expected.get(n))[:5]}"
+                tried += 1
+                if problem:
+                    failures += 1
+                    print(f"  {kind} at {k} of {count}: {problem}", flush=True)
+    print(f"{tried} runs, {failures} findings")
+    return 1 if failures else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
