@@ -7,6 +7,7 @@
 #include "kernels/base/error.h"
 #include "pipeline/files/image_file.h"
 #include "pipeline/scene_views.h"
+#include "pipeline/track_colors.h"
 #include "reconstruct/forward_facing.h"
 #include "reconstruct/visual_hull.h"
 
@@ -15,10 +16,10 @@ namespace {
 
 constexpr int kOutlineSide = 512;
 constexpr double kAlphaShare = 0.02;  // of the pixels; less is a photo with a soft edge
-constexpr const char* kNames[] = {"ndc", "alpha"};
+constexpr const char* kNames[] = {"ndc", "alpha", "exposure"};
 
 EffectReport Row(const char* name, bool on, double value, double threshold,
-                 const char* evidence) {
+                 const std::string& evidence) {
   return {name, on, evidence, value, threshold};
 }
 
@@ -70,6 +71,46 @@ double TransparentShare(const std::vector<Outline>& outlines) {
   return all > 0 ? static_cast<double>(clear) / static_cast<double>(all) : 0;
 }
 
+// The photos that keep their exposure for want of evidence.
+void NameUnknownPhotos(const Capture& capture, SceneProfile* profile) {
+  std::string names;
+  for (size_t v = 0; v < capture.views.size(); ++v)
+    if (!profile->exposure.photos[v].known)
+      names += (names.empty() ? "" : ", ") + capture.views[v].file;
+  if (!names.empty())
+    profile->notices.push_back("exposure: taken as they are, having fewer than " +
+                               std::to_string(kFewestColors) +
+                               " colours in common with other photos: " + names);
+}
+
+// The row "exposure", and where it is on the gains.
+void ProfileExposure(const Capture& capture, const std::map<std::string, bool>& wishes,
+                     bool alpha, SceneProfile* profile) {
+  const auto wish = wishes.find("exposure");
+  const bool asked_for = wish != wishes.end() && wish->second;
+  const auto leave_out = [&](const char* why) {
+    if (asked_for) throw Error(ExitCode::kScene, why, "--effects exposure=on");
+    profile->effects.push_back(
+        Row("exposure", false, 0, kExposureSpread, std::string("not measured: ") + why));
+  };
+  if (wish != wishes.end() && !wish->second) return leave_out("it was not wanted");
+  if (alpha) return leave_out("the white behind transparent photos has no exposure");
+  if (capture.points.empty())
+    return leave_out("the poses came without points to compare colours at");
+  profile->exposure =
+      EstimateExposure(static_cast<int>(capture.views.size()), ReadTrackColors(capture));
+  const double spread = profile->exposure.spread, threshold = profile->exposure.Threshold();
+  const bool on = asked_for || spread > threshold;
+  profile->effects.push_back(
+      Row("exposure", on, spread, threshold,
+          "root mean square of the logarithms of the photos' gains, from the colours of shared "
+          "points; the threshold is four standard errors at least"));
+  if (!on) return;
+  for (const PhotoExposure& photo : profile->exposure.photos)
+    profile->gains.of_view.push_back(photo.gain);
+  NameUnknownPhotos(capture, profile);
+}
+
 }  // namespace
 
 std::map<std::string, bool> ParseEffects(const std::string& text) {
@@ -86,8 +127,8 @@ std::map<std::string, bool> ParseEffects(const std::string& text) {
         std::find(std::begin(kNames), std::end(kNames), name) != std::end(kNames);
     if (!known || (wish != "on" && wish != "off"))
       throw Error(ExitCode::kUsage, "'" + word + "' is not allowed", "--effects",
-                  "auto, or ndc=on|off and alpha=on|off, with commas between; --sh-degree sets "
-                  "view dependence");
+                  "auto, or ndc=on|off, alpha=on|off and exposure=on|off, with commas between; "
+                  "--sh-degree sets view dependence");
     wishes[name] = wish == "on";
   }
   return wishes;
@@ -126,6 +167,7 @@ SceneProfile ProfileScene(const Capture& capture, int sh_degree, const std::stri
     if (!ndc) profile.scene = TightenToOutlines(profile.scene, outlines);
     profile.scene.box.background = Vec3f{1, 1, 1};  // what transparent photos are laid over
   }
+  ProfileExposure(capture, wishes, alpha, &profile);
   return profile;
 }
 

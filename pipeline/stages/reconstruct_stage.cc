@@ -33,15 +33,15 @@ double Mean(const std::vector<double>& values) {
 }
 
 // PSNR and SSIM over the held-out photos.
-void MeasureHeldOut(RunContext* context, const Capture& capture, const StoredField& stored,
-                    Backend backend, JsonValue* figures) {
+void MeasureHeldOut(RunContext* context, const Capture& capture, const PhotoGains& gains,
+                    const StoredField& stored, Backend backend, JsonValue* figures) {
   const RunSettings& settings = context->settings;
   const FieldRenderer renderer(stored.field, backend);
   std::vector<double> psnr, ssim;
   JsonValue::Array files;
   for (const int i : ViewIndices(capture, settings.run.holdout, true)) {
     const CaptureView& view = capture.views[static_cast<size_t>(i)];
-    const Image photo = ReadWorkingPhoto(view, settings.scene.photo_size);
+    const Image photo = ReadWorkingPhoto(view, settings.scene.photo_size, gains.Of(i));
     const Camera camera = WorkingCamera(view.camera, settings.scene.photo_size,
                                         stored.field_from_world, stored.ndc);
     const Image rendered = renderer.Render(camera).color;
@@ -110,6 +110,7 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   const NormalizedScene& scene = profile.scene;
   if (!scene.notice.empty()) context->console->Info(scene.notice);
   for (const EffectReport& effect : profile.effects) context->console->Info(EffectLine(effect));
+  for (const std::string& notice : profile.notices) context->console->Info(notice);
   const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
   FitOptions options =
       OptionsForMemory(context, PlannerOf(settings, capture, scene.box, backend), backend);
@@ -120,7 +121,7 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   std::vector<TrainingView> views;
   for (const int i : fitted) {
     const CaptureView& view = capture.views[static_cast<size_t>(i)];
-    photos.push_back(ReadWorkingPhoto(view, settings.scene.photo_size));
+    photos.push_back(ReadWorkingPhoto(view, settings.scene.photo_size, profile.gains.Of(i)));
     views.push_back({WorkingCamera(view.camera, settings.scene.photo_size,
                                    scene.field_from_world, scene.ndc),
                      &photos.back()});
@@ -146,13 +147,15 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   StageOutcome outcome;
   outcome.outputs = {"field.npz"};
   outcome.figures["effects"] = EffectsRecord(profile.effects);
+  if (!profile.gains.of_view.empty())
+    outcome.figures["exposure"] = GainsRecord(capture, profile.exposure);
   outcome.figures["device"] = DeviceName(backend);
   outcome.figures["finest_grid"] = Finest(options);
   outcome.figures["rays"] = fit.rays;
   outcome.figures["voxels"] = fit.field.geometry->num_voxels();
   outcome.figures["psnr_train_db"] = fit.psnr_train_db;
-  MeasureHeldOut(context, capture, ReadFieldFile(workspace.Path("field.npz")), backend,
-                 &outcome.figures);
+  MeasureHeldOut(context, capture, profile.gains, ReadFieldFile(workspace.Path("field.npz")),
+                 backend, &outcome.figures);
   return outcome;
 }
 
@@ -171,8 +174,9 @@ Stage ReconstructStage(RunContext* context) {
   stage.refuse_changes = true;
   if (context->settings.start.dry_run) {
     const Capture capture = ReadCapture(context->workspace->Path("poses"));
-    const SceneProfile profile =
-        ProfileScene(capture, context->settings.fit.sh_degree, run.effects);
+    // Exposures have no say in the box, and measuring them would read every photo.
+    const SceneProfile profile = ProfileScene(capture, context->settings.fit.sh_degree,
+                                              run.effects + ",exposure=off");
     stage.plan =
         PlanText(PlannerOf(context->settings, capture, profile.scene.box,
                            ChooseBackend(run.device, run.reproducible))(context->settings.fit));
