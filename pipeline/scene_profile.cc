@@ -83,6 +83,16 @@ void NameUnknownPhotos(const Capture& capture, SceneProfile* profile) {
                                " colours in common with other photos: " + names);
 }
 
+std::string GainsEvidence(const ExposureEstimate& exposure) {
+  char spread[96];
+  std::snprintf(spread, sizeof spread, "; gains spread by %.3g, known to %.2g; ",
+                exposure.spread, exposure.median_error);
+  return "share of the photos' disagreement about points' colours that gains found without "
+         "those points take away" +
+         std::string(spread) + "a spread up to " + Short(Figure{kExposureSpread}) +
+         " is left alone";
+}
+
 // The row "exposure", and where it is on the gains.
 void ProfileExposure(const Capture& capture, const std::map<std::string, bool>& wishes,
                      bool alpha, SceneProfile* profile) {
@@ -97,17 +107,15 @@ void ProfileExposure(const Capture& capture, const std::map<std::string, bool>& 
   if (alpha) return leave_out("the white behind transparent photos has no exposure");
   if (capture.points.empty())
     return leave_out("the poses came without points to compare colours at");
+  const TrackColors colors = ReadTrackColors(capture);
   profile->exposure =
-      EstimateExposure(static_cast<int>(capture.views.size()), ReadTrackColors(capture));
-  const double spread = profile->exposure.spread, threshold = profile->exposure.Threshold();
-  const bool on = asked_for || spread > threshold;
+      EstimateExposure(static_cast<int>(capture.views.size()), colors.observations);
+  const ExposureEstimate& exposure = profile->exposure;
+  const bool on = asked_for || exposure.Pays();
   profile->effects.push_back(
-      Row("exposure", on, spread, threshold,
-          "root mean square of the logarithms of the photos' gains, from the colours of shared "
-          "points; the threshold is four standard errors at least"));
+      Row("exposure", on, exposure.explained, exposure.Threshold(), GainsEvidence(exposure)));
   if (!on) return;
-  for (const PhotoExposure& photo : profile->exposure.photos)
-    profile->gains.of_view.push_back(photo.gain);
+  profile->gains = GainsOf(exposure, colors.clipped);
   NameUnknownPhotos(capture, profile);
 }
 

@@ -33,7 +33,7 @@ Camera WorkingCamera(const Camera& camera, int longest_side, const Similarity& f
   return working;
 }
 
-Image ReadWorkingPhoto(const CaptureView& view, int longest_side, const Vec3d& gain) {
+Image ReadWorkingPhoto(const CaptureView& view, int longest_side, const PhotoGain& gain) {
   Image photo = ReadImage(view.path);
   if (photo.width != view.camera.width || photo.height != view.camera.height)
     throw Error(ExitCode::kInput,

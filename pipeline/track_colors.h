@@ -14,8 +14,14 @@ namespace regrade {
 // rounding.
 bool WindowLight(const Image& photo, double u, double v, Vec3d* light);
 
-// One entry for each point and photo that sees it and shows it unclipped; `point` is the index
-// into capture.points. Reads every photo once. Throws Error(kInput).
-std::vector<ColorObservation> ReadTrackColors(const Capture& capture);
+struct TrackColors {
+  // One entry for each point and photo that sees it and shows it unclipped; `point` is the
+  // index into capture.points.
+  std::vector<ColorObservation> observations;
+  std::vector<Vec3d> clipped;  // of each view: the share of its pixels that are, by channel
+};
+
+// Reads every photo once. Throws Error(kInput).
+TrackColors ReadTrackColors(const Capture& capture);
 
 }  // namespace regrade

@@ -1,5 +1,5 @@
 // Exposure and white balance of each photo, from the colours that its tracked points have in
-// other photos.
+// other photos, and whether undoing them pays.
 //
 // A phone chooses both anew for every picture; a radiance field has one colour a place and
 // direction, and would spend its density on the difference.
@@ -16,16 +16,22 @@ namespace regrade {
 struct ColorObservation {
   int32_t view = 0;
   int32_t point = 0;
-  Vec3d light;  // linear, each channel > 0, not clipped
+  Vec3d light;       // linear, each channel > 0, not clipped
+  int32_t fold = 0;  // of its point, in [0, kExposureFolds): points of a fold err together
 };
 
-// Undoing exposures is worth its while from here on. 2 % of light is one step of an 8-bit
-// picture's mid-tones: less, the field does not see.
+// So many parts of the scene are left out in turn (exposure_folds.h).
+inline constexpr int kExposureFolds = 16;
+
+// Gains pay if, found from the other parts of the scene, they take this share at least of the
+// disagreement between photos about the colours of the part that was left out. What shines or
+// lies in shade there does not follow gains from elsewhere; noise follows none.
+inline constexpr double kExposurePays = 0.1;
+// ... and if the share is this many standard errors above nothing,
+inline constexpr double kExposureSurety = 3;
+// ... and gains spread by more than this: 2 % of light is one step of an 8-bit picture's
+// mid-tones. Less, the field does not see.
 inline constexpr double kExposureSpread = 0.02;
-// ... and where noise does not explain the spread. Neighbouring points err alike: on a
-// synthetic capture with poses from photos, gains were off by 3.6 of their standard errors
-// (root mean square).
-inline constexpr double kExposureErrors = 4;
 
 // A photo with fewer is not judged: one surface that shines could decide.
 inline constexpr int kFewestColors = 20;
@@ -39,11 +45,14 @@ struct PhotoExposure {
 
 struct ExposureEstimate {
   std::vector<PhotoExposure> photos;
-  double spread = 0;        // root mean square of the log gains that are known, over channels
-  double median_error = 0;  // of their standard errors
+  double spread = 0;           // root mean square of the known log gains, over channels
+  double median_error = 0;     // of their standard errors
+  double explained = 0;        // share of the disagreement about points that were left out
+  double explained_error = 0;  // its standard error
 
-  // What `spread` is held against.
+  // What `explained` is held against.
   double Threshold() const;
+  bool Pays() const { return spread > kExposureSpread && explained > Threshold(); }
 };
 
 // EQ(exposure): min over log gains a_v and log colours b_p of
@@ -54,9 +63,11 @@ struct ExposureEstimate {
 // answer, whatever the order of photos. Photos that no track ties to the others have a sum of
 // their own.
 //
-// Standard errors are those of the normal equations, which are linear here but for rho: the
-// points' colours eliminated exactly, weights rho' at the minimum, the variance from the median
-// absolute residual.
+// EQ(exposure-pays): explained = 1 - D(a^(-f)) / D(0), D(a) = sum over folds f of the least
+// sum of rho that colours b alone reach on the points of f at gains a; a^(-f) is the minimum
+// over the other folds. Standard errors are jackknifed over folds (Miller 1974):
+// (F - 1) / F sum_f (x^(-f) - mean)^2, x a log gain, or the explained share of the other folds.
+// Neighbouring points err alike, and so count as one.
 ExposureEstimate EstimateExposure(int num_views,
                                   const std::vector<ColorObservation>& observations);
 

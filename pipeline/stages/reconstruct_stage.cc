@@ -32,7 +32,8 @@ double Mean(const std::vector<double>& values) {
          static_cast<double>(values.size());
 }
 
-// PSNR and SSIM over the held-out photos.
+// PSNR and SSIM over the held-out photos as they were taken: a render is given its photo's
+// gain, which is known from the colours of points that the photo shares with others.
 void MeasureHeldOut(RunContext* context, const Capture& capture, const PhotoGains& gains,
                     const StoredField& stored, Backend backend, JsonValue* figures) {
   const RunSettings& settings = context->settings;
@@ -41,10 +42,11 @@ void MeasureHeldOut(RunContext* context, const Capture& capture, const PhotoGain
   JsonValue::Array files;
   for (const int i : ViewIndices(capture, settings.run.holdout, true)) {
     const CaptureView& view = capture.views[static_cast<size_t>(i)];
-    const Image photo = ReadWorkingPhoto(view, settings.scene.photo_size, gains.Of(i));
+    const Image photo = ReadWorkingPhoto(view, settings.scene.photo_size, kAsTaken);
     const Camera camera = WorkingCamera(view.camera, settings.scene.photo_size,
                                         stored.field_from_world, stored.ndc);
-    const Image rendered = renderer.Render(camera).color;
+    Image rendered = renderer.Render(camera).color;
+    PutGain(gains.Of(i), &rendered);
     if (const auto value = Psnr(rendered, photo)) psnr.push_back(*value);
     if (const auto value = Ssim(rendered, photo)) ssim.push_back(*value);
     files.emplace_back(view.file);
@@ -148,7 +150,7 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   outcome.outputs = {"field.npz"};
   outcome.figures["effects"] = EffectsRecord(profile.effects);
   if (!profile.gains.of_view.empty())
-    outcome.figures["exposure"] = GainsRecord(capture, profile.exposure);
+    outcome.figures["exposure"] = GainsRecord(capture, profile.exposure, profile.gains);
   outcome.figures["device"] = DeviceName(backend);
   outcome.figures["finest_grid"] = Finest(options);
   outcome.figures["rays"] = fit.rays;

@@ -20,8 +20,7 @@ namespace {
 
 // Scene-wide colours are of all photos, so that a map does not depend on which are held out.
 std::unique_ptr<ViewStylizer> MakeColorMethod(const RunSettings& settings, const Image& style,
-                                              const Capture& capture,
-                                              const PhotoGains& gains) {
+                                              const Capture& capture, const PhotoGains& gains) {
   const StyleOptions& options = settings.style_2d;
   const auto photo = [&](size_t i) {
     return ReadWorkingPhoto(capture.views[i], settings.scene.photo_size,
@@ -65,8 +64,7 @@ std::unique_ptr<ViewStylizer> MakeSceneStylizer(RunContext* context, const Captu
   if (method.kind == "command")
     return MakeCommandStylizer(method.argument, settings.style.picture,
                                settings.style_2d.command_limit_s);
-  return MakeColorMethod(settings, style, capture,
-                         RecordedGains(*context->workspace, capture));
+  return MakeColorMethod(settings, style, capture, RecordedGains(*context->workspace, capture));
 }
 
 void ProbeMethod(StyleOptions* options) {
