@@ -8,19 +8,18 @@
 
 #include "kernels/base/error.h"
 #include "kernels/scene/srgb.h"
-#include "kernels/synthetic/ray_trace.h"
-#include "pipeline/files/image_file.h"
 #include "pipeline/scene_profile.h"
 #include "pipeline/scene_views.h"
 #include "pipeline/synth_effects.h"
 #include "pipeline/track_colors.h"
+#include "tests/support/synthetic_photos.h"
 
 namespace regrade {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kViews = 8, kWidth = 200, kHeight = 150;
+constexpr int kViews = 8;
 constexpr uint64_t kSeed = 4;
 
 class SyntheticExposure : public ::testing::Test {
@@ -33,45 +32,10 @@ class SyntheticExposure : public ::testing::Test {
   }
   void TearDown() override { fs::remove_all(folder_); }
 
-  // Photos, true poses, and points: what every 10th pixel shows, seen wherever the depths
-  // agree.
   Capture MakeCapture(bool exposure) {
-    const SyntheticScene scene = MakeSyntheticScene("table", kSeed);
-    Capture capture;
-    std::vector<Image> depths;
-    for (const Camera& camera : SyntheticCameras(scene, kViews, kWidth, kHeight)) {
-      const int i = static_cast<int>(capture.views.size());
-      SyntheticView view = RenderSyntheticView(scene, camera);
-      if (exposure) ApplyGain(SynthGain(kSeed, i, kViews), &view.color);
-      ApplyNoise(kSeed, static_cast<uint64_t>(i), kSynthNoiseSigma, &view.color);
-      const std::string name = FrameName(i);
-      WritePng8((folder_ / name).string(), view.color);
-      depths.push_back(view.depth);
-      capture.views.push_back({name, name, (folder_ / name).string(), camera});
-    }
-    for (size_t v = 0; v < kViews; ++v)
-      for (int y = 5; y < kHeight; y += 10)
-        for (int x = 5; x < kWidth; x += 10) AddPoint(depths, v, x, y, &capture);
-    return capture;
-  }
-
-  static void AddPoint(const std::vector<Image>& depths, size_t view, int x, int y,
-                       Capture* capture) {
-    const Camera& camera = capture->views[view].camera;
-    const double depth = *depths[view].at(x, y);
-    if (depth <= 0) return;
-    const RayT<double> ray = camera.WorldRay(x + 0.5, y + 0.5);
-    ScenePoint point;
-    point.position =
-        ray.origin + ray.direction * (depth / Dot(ray.direction, camera.Forward()));
-    for (size_t v = 0; v < depths.size(); ++v) {
-      double u = 0, w = 0, z = 0;
-      if (!capture->views[v].camera.Project(point.position, &u, &w, &z)) continue;
-      if (!(u >= 0 && w >= 0 && u < kWidth && w < kHeight)) continue;
-      const double there = *depths[v].at(static_cast<int>(u), static_cast<int>(w));
-      if (std::abs(there - z) < 0.01 * z) point.views.push_back(static_cast<int32_t>(v));
-    }
-    if (point.views.size() >= 2) capture->points.push_back(point);
+    testing::SyntheticPhotos photos{.views = kViews, .seed = kSeed};
+    photos.effects.exposure = exposure;
+    return testing::MakeSyntheticPhotos(photos, folder_.string());
   }
 
   fs::path folder_;
