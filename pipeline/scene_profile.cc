@@ -16,7 +16,7 @@ namespace {
 
 constexpr int kOutlineSide = 512;
 constexpr double kAlphaShare = 0.02;  // of the pixels; less is a photo with a soft edge
-constexpr const char* kNames[] = {"ndc", "alpha", "exposure"};
+constexpr const char* kNames[] = {"ndc", "alpha", "exposure", kViewDependence};
 
 EffectReport Row(const char* name, bool on, double value, double threshold,
                  const std::string& evidence) {
@@ -134,9 +134,9 @@ std::map<std::string, bool> ParseEffects(const std::string& text) {
     const bool known =
         std::find(std::begin(kNames), std::end(kNames), name) != std::end(kNames);
     if (!known || (wish != "on" && wish != "off"))
-      throw Error(ExitCode::kUsage, "'" + word + "' is not allowed", "--effects",
-                  "auto, or ndc=on|off, alpha=on|off and exposure=on|off, with commas between; "
-                  "--sh-degree sets view dependence");
+      throw Error(
+          ExitCode::kUsage, "'" + word + "' is not allowed", "--effects",
+          "auto, or on|off of ndc, alpha, exposure and view-dependence: ndc=on,exposure=off");
     wishes[name] = wish == "on";
   }
   return wishes;
@@ -167,7 +167,7 @@ SceneProfile ProfileScene(const Capture& capture, int sh_degree, const std::stri
                                 "optical axis to their mean, degrees"));
   profile.effects.push_back(Row("alpha", alpha, clear, kAlphaShare,
                                 "share of transparent pixels, where every photo has some"));
-  profile.effects.push_back(Row("view-dependence", sh_degree > 0, sh_degree, 0,
+  profile.effects.push_back(Row(kViewDependence, sh_degree > 0, sh_degree, 0,
                                 "spherical harmonics degree of the fit, as set"));
 
   profile.scene = ndc ? NormalizeForwardFacing(capture, forward) : NormalizeScene(capture);

@@ -18,13 +18,17 @@ namespace regrade {
 // Error(kUsage) naming the word for anything else.
 std::map<std::string, bool> ParseEffects(const std::string& text);
 
+// The row that a fit's trial decides (choose_degree.h).
+inline constexpr char kViewDependence[] = "view-dependence";
+
 struct SceneProfile {
   // One row an effect. "distortion": the lens is followed where it moves a picture's corner by
   // more than kDistortionThreshold (scene_views.h). "ndc": all cameras look one way
   // (forward_facing.h). "alpha": all photos have transparent parts; white is behind them and
   // the box is the object's. "view-dependence": colours change with the direction, as
-  // `sh_degree` was set. "exposure": photos differ in brightness or white balance by more than
-  // noise explains, and undoing that pays on points that had no say in it (exposure.h).
+  // `sh_degree` was set; the fit's trial has the last word. "exposure": photos differ in
+  // brightness or white balance by more than noise explains, and undoing that pays on points
+  // that had no say in it (exposure.h).
   std::vector<EffectReport> effects;
   NormalizedScene scene;
   ExposureEstimate exposure;         // empty where it was not measured

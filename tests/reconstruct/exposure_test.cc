@@ -165,7 +165,7 @@ TEST(Exposure, StandardErrorsHoldWhereNeighboursErrAlike) {
 
 // A third of the scene shines brighter and darker by a half as the camera goes round; the other
 // parts do not, and gains that follow the sheen make them worse.
-TEST(Exposure, WhatShinesIsNoExposure) {
+TEST(Exposure, H139_WhatShinesIsNoExposure) {
   std::vector<ColorObservation> observations = Observations(PlantedLogs(0), 0.03, false);
   for (ColorObservation& o : observations)
     if (o.fold < 5) o.light = std::exp(0.5 * std::sin(2 * M_PI * o.view / kViews)) * o.light;

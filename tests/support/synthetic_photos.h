@@ -47,8 +47,7 @@ inline Capture MakeSyntheticPhotos(const SyntheticPhotos& options, const std::st
   const SyntheticScene scene = MakeSyntheticScene(options.scene, options.seed);
   Capture capture;
   std::vector<Image> depths;
-  for (Camera camera :
-       SyntheticCameras(scene, options.views, options.width, options.height)) {
+  for (Camera camera : SyntheticCameras(scene, options.views, options.width, options.height)) {
     const int i = static_cast<int>(capture.views.size());
     camera = WithSynthLens(options.effects, camera);
     SyntheticView view = RenderSyntheticView(scene, camera, options.effects.highlights);
@@ -77,9 +76,10 @@ inline void WriteSyntheticWorkspace(const SyntheticPhotos& options, const std::s
   for (size_t v = 0; v < capture.views.size(); ++v) {
     const CaptureView& view = capture.views[v];
     const auto id = static_cast<uint32_t>(v + 1);
-    const ColmapLens lens = view.camera.lens == LensModel::kPinhole  ? ColmapLens::kPinhole
-                            : view.camera.lens == LensModel::kOpenCv ? ColmapLens::kOpenCv
-                                                                     : ColmapLens::kOpenCvFisheye;
+    const ColmapLens lens = view.camera.lens == LensModel::kPinhole ? ColmapLens::kPinhole
+                            : view.camera.lens == LensModel::kOpenCv
+                                ? ColmapLens::kOpenCv
+                                : ColmapLens::kOpenCvFisheye;
     model.cameras.push_back({id, lens, view.camera});
     model.images.push_back({id, id, view.name, view.camera.camera_from_world, {}});
   }
