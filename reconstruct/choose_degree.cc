@@ -11,7 +11,7 @@ namespace regrade {
 namespace {
 
 constexpr int kFold = 5;
-constexpr int kResolution = 48;  // voxels, the longest side; half of it to begin with
+constexpr int kResolution = 48;    // voxels, the longest side; half of it to begin with
 constexpr int kSmallestSide = 24;  // pixels
 constexpr int kSteps[] = {100, 200}, kRays = 2048;
 

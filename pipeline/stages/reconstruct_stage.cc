@@ -209,8 +209,8 @@ Stage ReconstructStage(RunContext* context) {
   if (context->settings.start.dry_run) {
     const Capture capture = ReadCapture(context->workspace->Path("poses"));
     // Exposures have no say in the box, and measuring them would read every photo.
-    const SceneProfile profile = ProfileScene(capture, context->settings.fit.sh_degree,
-                                              run.effects + ",exposure=off");
+    const SceneProfile profile =
+        ProfileScene(capture, context->settings.fit.sh_degree, run.effects + ",exposure=off");
     stage.plan =
         PlanText(PlannerOf(context->settings, capture, profile.scene.box,
                            ChooseBackend(run.device, run.reproducible))(context->settings.fit));

@@ -116,6 +116,8 @@ TEST(EffectsOff, H155_ResultsAreThoseOfTheBuildWithoutThem) {
   EXPECT_EQ(DigestOf(refused.stored, camera), kDigestField);
 }
 
+const std::vector<std::string> kTrialless = {"--effects", "exposure=off,view-dependence=on"};
+
 SyntheticPhotos Wall() {
   return {.scene = "wall", .views = 18, .width = 96, .height = 72, .pixels_a_point = 4};
 }
@@ -127,9 +129,10 @@ TEST(EffectsOn, UndoneExposureGainsThreeDecibels) {
   SyntheticPhotos photos = Wall();
   photos.effects.exposure = true;
   WriteSyntheticWorkspace(photos, folder / "capture");
-  const Reconstruction on = Reconstruct(folder / "capture", folder / "on", kFine);
-  const Reconstruction off =
-      Reconstruct(folder / "capture", folder / "off", kFine, {"--effects", "exposure=off"});
+  const Reconstruction on = Reconstruct(folder / "capture", folder / "on", kFine,
+                                        {"--effects", "view-dependence=on"});
+  const Reconstruction off = Reconstruct(folder / "capture", folder / "off", kFine,
+                                         {"--effects", "exposure=off,view-dependence=on"});
   EXPECT_TRUE(on.effect("exposure").At("on").AsBool());
   EXPECT_FALSE(off.effect("exposure").At("on").AsBool());
   EXPECT_GT(on.heldout_db(), off.heldout_db() + 3) << on.heldout_db();
@@ -140,14 +143,16 @@ TEST(EffectsOn, UndoneExposureGainsThreeDecibels) {
 TEST(EffectsOn, BentLensesAreAsGoodAsAPinhole) {
   TemporaryFolder folder;
   WriteSyntheticWorkspace(Wall(), folder / "pinhole");
-  const Reconstruction plain = Reconstruct(folder / "pinhole", folder / "plain", kFine);
+  const Reconstruction plain =
+      Reconstruct(folder / "pinhole", folder / "plain", kFine, kTrialless);
   EXPECT_FALSE(plain.effect("distortion").At("on").AsBool());
   for (const bool fisheye : {false, true}) {
     const std::string name = fisheye ? "fisheye" : "barrel";
     SyntheticPhotos photos = Wall();
     (fisheye ? photos.effects.fisheye : photos.effects.barrel) = true;
     WriteSyntheticWorkspace(photos, folder / name);
-    const Reconstruction bent = Reconstruct(folder / name, folder / (name + "_out"), kFine);
+    const Reconstruction bent =
+        Reconstruct(folder / name, folder / (name + "_out"), kFine, kTrialless);
     EXPECT_TRUE(bent.effect("distortion").At("on").AsBool());
     EXPECT_GT(bent.heldout_db(), plain.heldout_db() - 0.5) << name;
   }
