@@ -40,11 +40,15 @@ struct StyleSource {
 
 struct RenderOptions {
   double fps = 24;
+  bool keep_exposure = false;
   PathOptions path;
 
   template <typename Bind>
   void Describe(Bind& bind) {
     bind("fps", fps, {.unit = "frames/s", .help = "pace of the films", .min = 1, .max = 240});
+    bind("keep-exposure", keep_exposure,
+         {.help = "frames at the photos' places in the exposure and white balance of their "
+                  "photos, where these were undone"});
     path.Describe(bind);
   }
 };

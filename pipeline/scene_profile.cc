@@ -7,6 +7,7 @@
 #include "kernels/base/error.h"
 #include "pipeline/files/image_file.h"
 #include "pipeline/scene_views.h"
+#include "pipeline/track_colors.h"
 #include "reconstruct/forward_facing.h"
 #include "reconstruct/visual_hull.h"
 
@@ -15,10 +16,10 @@ namespace {
 
 constexpr int kOutlineSide = 512;
 constexpr double kAlphaShare = 0.02;  // of the pixels; less is a photo with a soft edge
-constexpr const char* kNames[] = {"ndc", "alpha"};
+constexpr const char* kNames[] = {"ndc", "alpha", "exposure", kViewDependence};
 
 EffectReport Row(const char* name, bool on, double value, double threshold,
-                 const char* evidence) {
+                 const std::string& evidence) {
   return {name, on, evidence, value, threshold};
 }
 
@@ -70,6 +71,54 @@ double TransparentShare(const std::vector<Outline>& outlines) {
   return all > 0 ? static_cast<double>(clear) / static_cast<double>(all) : 0;
 }
 
+// The photos that keep their exposure for want of evidence.
+void NameUnknownPhotos(const Capture& capture, SceneProfile* profile) {
+  std::string names;
+  for (size_t v = 0; v < capture.views.size(); ++v)
+    if (!profile->exposure.photos[v].known)
+      names += (names.empty() ? "" : ", ") + capture.views[v].file;
+  if (!names.empty())
+    profile->notices.push_back("exposure: taken as they are, having fewer than " +
+                               std::to_string(kFewestColors) +
+                               " colours in common with other photos: " + names);
+}
+
+std::string GainsEvidence(const ExposureEstimate& exposure) {
+  char spread[96];
+  std::snprintf(spread, sizeof spread, "; gains spread by %.3g, known to %.2g; ",
+                exposure.spread, exposure.median_error);
+  return "share of the photos' disagreement about points' colours that gains found without "
+         "those points take away" +
+         std::string(spread) + "a spread up to " + Short(Figure{kExposureSpread}) +
+         " is left alone";
+}
+
+// The row "exposure", and where it is on the gains.
+void ProfileExposure(const Capture& capture, const std::map<std::string, bool>& wishes,
+                     bool alpha, SceneProfile* profile) {
+  const auto wish = wishes.find("exposure");
+  const bool asked_for = wish != wishes.end() && wish->second;
+  const auto leave_out = [&](const char* why) {
+    if (asked_for) throw Error(ExitCode::kScene, why, "--effects exposure=on");
+    profile->effects.push_back(
+        Row("exposure", false, 0, kExposureSpread, std::string("not measured: ") + why));
+  };
+  if (wish != wishes.end() && !wish->second) return leave_out("it was not wanted");
+  if (alpha) return leave_out("the white behind transparent photos has no exposure");
+  if (capture.points.empty())
+    return leave_out("the poses came without points to compare colours at");
+  const TrackColors colors = ReadTrackColors(capture);
+  profile->exposure =
+      EstimateExposure(static_cast<int>(capture.views.size()), colors.observations);
+  const ExposureEstimate& exposure = profile->exposure;
+  const bool on = asked_for || exposure.Pays();
+  profile->effects.push_back(
+      Row("exposure", on, exposure.explained, exposure.Threshold(), GainsEvidence(exposure)));
+  if (!on) return;
+  profile->gains = GainsOf(exposure, colors.clipped);
+  NameUnknownPhotos(capture, profile);
+}
+
 }  // namespace
 
 std::map<std::string, bool> ParseEffects(const std::string& text) {
@@ -85,9 +134,9 @@ std::map<std::string, bool> ParseEffects(const std::string& text) {
     const bool known =
         std::find(std::begin(kNames), std::end(kNames), name) != std::end(kNames);
     if (!known || (wish != "on" && wish != "off"))
-      throw Error(ExitCode::kUsage, "'" + word + "' is not allowed", "--effects",
-                  "auto, or ndc=on|off and alpha=on|off, with commas between; --sh-degree sets "
-                  "view dependence");
+      throw Error(
+          ExitCode::kUsage, "'" + word + "' is not allowed", "--effects",
+          "auto, or on|off of ndc, alpha, exposure and view-dependence: ndc=on,exposure=off");
     wishes[name] = wish == "on";
   }
   return wishes;
@@ -118,7 +167,7 @@ SceneProfile ProfileScene(const Capture& capture, int sh_degree, const std::stri
                                 "optical axis to their mean, degrees"));
   profile.effects.push_back(Row("alpha", alpha, clear, kAlphaShare,
                                 "share of transparent pixels, where every photo has some"));
-  profile.effects.push_back(Row("view-dependence", sh_degree > 0, sh_degree, 0,
+  profile.effects.push_back(Row(kViewDependence, sh_degree > 0, sh_degree, 0,
                                 "spherical harmonics degree of the fit, as set"));
 
   profile.scene = ndc ? NormalizeForwardFacing(capture, forward) : NormalizeScene(capture);
@@ -126,6 +175,7 @@ SceneProfile ProfileScene(const Capture& capture, int sh_degree, const std::stri
     if (!ndc) profile.scene = TightenToOutlines(profile.scene, outlines);
     profile.scene.box.background = Vec3f{1, 1, 1};  // what transparent photos are laid over
   }
+  ProfileExposure(capture, wishes, alpha, &profile);
   return profile;
 }
 

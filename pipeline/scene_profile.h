@@ -8,6 +8,7 @@
 
 #include "kernels/scene/capture.h"
 #include "pipeline/files/json_file.h"
+#include "pipeline/photo_gains.h"
 #include "pipeline/report_data.h"
 #include "reconstruct/normalize_scene.h"
 
@@ -17,18 +18,26 @@ namespace regrade {
 // Error(kUsage) naming the word for anything else.
 std::map<std::string, bool> ParseEffects(const std::string& text);
 
+// The row that a fit's trial decides (choose_degree.h).
+inline constexpr char kViewDependence[] = "view-dependence";
+
 struct SceneProfile {
   // One row an effect. "distortion": the lens is followed where it moves a picture's corner by
   // more than kDistortionThreshold (scene_views.h). "ndc": all cameras look one way
   // (forward_facing.h). "alpha": all photos have transparent parts; white is behind them and
   // the box is the object's. "view-dependence": colours change with the direction, as
-  // `sh_degree` was set.
+  // `sh_degree` was set; the fit's trial has the last word. "exposure": photos differ in
+  // brightness or white balance by more than noise explains, and undoing that pays on points
+  // that had no say in it (exposure.h).
   std::vector<EffectReport> effects;
   NormalizedScene scene;
+  ExposureEstimate exposure;         // empty where it was not measured
+  PhotoGains gains;                  // to be undone; none where exposure is off
+  std::vector<std::string> notices;  // sentences for a person
 };
 
-// Free of the photos' order (H154). Throws Error(kScene) where an effect was asked for that the
-// capture does not allow.
+// Free of the photos' order (H154). Reads every photo, unless "exposure=off". Throws
+// Error(kScene) where an effect was asked for that the capture does not allow.
 SceneProfile ProfileScene(const Capture& capture, int sh_degree, const std::string& effects);
 
 // "distortion on: 12.3 > 0.5 (pixels, ...)"

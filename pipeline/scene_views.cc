@@ -7,6 +7,7 @@
 #include "kernels/base/error.h"
 #include "kernels/image/resize.h"
 #include "pipeline/files/image_file.h"
+#include "pipeline/photo_gains.h"
 
 namespace regrade {
 namespace {
@@ -32,7 +33,7 @@ Camera WorkingCamera(const Camera& camera, int longest_side, const Similarity& f
   return working;
 }
 
-Image ReadWorkingPhoto(const CaptureView& view, int longest_side) {
+Image ReadWorkingPhoto(const CaptureView& view, int longest_side, const PhotoGain& gain) {
   Image photo = ReadImage(view.path);
   if (photo.width != view.camera.width || photo.height != view.camera.height)
     throw Error(ExitCode::kInput,
@@ -43,8 +44,9 @@ Image ReadWorkingPhoto(const CaptureView& view, int longest_side) {
   if (photo.channels != 3) throw Error(ExitCode::kInput, "not an RGB picture", view.path);
   int width = 0, height = 0;
   WorkingSize(photo.width, photo.height, longest_side, &width, &height);
-  if (width == photo.width && height == photo.height) return photo;
-  return Resize(photo, width, height);
+  if (width != photo.width || height != photo.height) photo = Resize(photo, width, height);
+  UndoGain(gain, &photo);
+  return photo;
 }
 
 std::vector<int> ViewIndices(const Capture& capture, int holdout, bool held_out) {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "kernels/scene/capture.h"
+#include "pipeline/photo_gains.h"
 
 namespace regrade {
 
@@ -19,8 +20,8 @@ inline constexpr double kDistortionThreshold = 0.5;
 Camera WorkingCamera(const Camera& camera, int longest_side, const Similarity& field_from_world,
                      const NdcSpace& ndc);
 
-// The photo at the size of its working camera, 3 channels.
-Image ReadWorkingPhoto(const CaptureView& view, int longest_side);
+// The photo at the size of its working camera, 3 channels, rid of its gain (photo_gains.h).
+Image ReadWorkingPhoto(const CaptureView& view, int longest_side, const PhotoGain& gain);
 
 // Indices of views that are fitted, or of those that are kept for measuring.
 std::vector<int> ViewIndices(const Capture& capture, int holdout, bool held_out);

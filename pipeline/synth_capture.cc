@@ -62,6 +62,13 @@ JsonValue DescribeCapture(const SynthOptions& options, const SynthEffects& effec
   if (effects.distortion)
     distortion = JsonValue::Object{{"on", true},     {"model", "OPENCV"}, {"k1", kSynthK1},
                                    {"k2", kSynthK2}, {"p1", 0.0},         {"p2", 0.0}};
+  if (effects.barrel)
+    distortion = JsonValue::Object{{"on", true}, {"model", "OPENCV"}, {"k1", kSynthBarrelK1},
+                                   {"k2", 0.0},  {"p1", 0.0},         {"p2", 0.0}};
+  if (effects.fisheye)
+    distortion = JsonValue::Object{{"on", true}, {"model", "OPENCV_FISHEYE"},
+                                   {"k1", 0.0},  {"k2", 0.0},
+                                   {"k3", 0.0},  {"k4", 0.0}};
   if (effects.highlights)
     highlights = JsonValue::Object{
         {"on", true}, {"exponent", kSunSharpness}, {"to_sun", Vector(scene.to_sun)}};
@@ -123,8 +130,7 @@ void WriteSyntheticCapture(const std::string& out, const SynthOptions& options,
   const SynthEffects effects = ParseSynthEffects(options.effects);
   const SyntheticScene scene = MakeSyntheticScene(options.scene, options.seed);
   std::vector<Camera> cameras = SyntheticCameras(scene, options.views, width, height);
-  if (effects.distortion)
-    for (Camera& camera : cameras) camera = WithSynthLens(camera);
+  for (Camera& camera : cameras) camera = WithSynthLens(effects, camera);
   ClaimFolder(out, DescribeCapture(options, effects, scene));
 
   const fs::path truth = fs::path(out) / "truth";

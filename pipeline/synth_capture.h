@@ -25,10 +25,10 @@ struct SynthOptions {
     bind("views", views,
          {.unit = "photos", .help = "length of the capture", .min = 2, .max = 9999});
     bind("size", size, {.unit = "pixels", .help = "WIDTHxHEIGHT of a photo"});
-    bind(
-        "effects", effects,
-        {.help = "what else to simulate, from exposure, noise, distortion, highlights; what is "
-                 "not named costs nothing"});
+    bind("effects", effects,
+         {.help = "what else to simulate, from exposure, noise, highlights, and a lens of "
+                  "distortion "
+                  "(mild), barrel (k1 = -0.2), fisheye; what is not named costs nothing"});
     bind("seed", seed, {.help = "draws the paint, the exposures and the noise"});
   }
 };

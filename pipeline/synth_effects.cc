@@ -10,7 +10,9 @@
 namespace regrade {
 
 SynthEffects ParseSynthEffects(const std::string& list) {
-  constexpr char kHint[] = "the effects are exposure, noise, distortion, highlights";
+  constexpr char kHint[] =
+      "the effects are exposure, noise, highlights, and one lens of distortion, barrel, "
+      "fisheye";
   SynthEffects effects;
   size_t begin = 0;
   while (begin < list.size()) {
@@ -23,6 +25,10 @@ SynthEffects ParseSynthEffects(const std::string& list) {
       effects.noise = true;
     else if (name == "distortion")
       effects.distortion = true;
+    else if (name == "barrel")
+      effects.barrel = true;
+    else if (name == "fisheye")
+      effects.fisheye = true;
     else if (name == "highlights")
       effects.highlights = true;
     else if (name == "motion-blur" || name == "occluders")
@@ -31,6 +37,8 @@ SynthEffects ParseSynthEffects(const std::string& list) {
     else
       throw Error(ExitCode::kUsage, "there is no effect \"" + name + "\"", "--effects", kHint);
   }
+  if (effects.distortion + effects.barrel + effects.fisheye > 1)
+    throw Error(ExitCode::kUsage, "a camera has one lens", "--effects", kHint);
   return effects;
 }
 
@@ -57,9 +65,11 @@ void ApplyNoise(uint64_t seed, uint64_t stream, double sigma, Image* color) {
   }
 }
 
-Camera WithSynthLens(Camera camera) {
-  camera.lens = LensModel::kOpenCv;
-  camera.distortion = {kSynthK1, kSynthK2};
+Camera WithSynthLens(const SynthEffects& effects, Camera camera) {
+  if (effects.fisheye) camera.lens = LensModel::kFisheye;  // k1 to k4 are 0: equidistant
+  if (effects.distortion || effects.barrel) camera.lens = LensModel::kOpenCv;
+  if (effects.distortion) camera.distortion = {kSynthK1, kSynthK2};
+  if (effects.barrel) camera.distortion = {kSynthBarrelK1};
   return camera;
 }
 

@@ -14,15 +14,18 @@ struct SynthEffects {
   bool exposure = false;    // a gain per photo that drifts within +-30 %
   bool noise = false;       // of the sensor
   bool distortion = false;  // of the lens: a mild barrel
+  bool barrel = false;      // a strong one
+  bool fisheye = false;     // a lens that shows angles, not tangents
   bool highlights = false;  // of the sun on glazed things
 };
 
 inline constexpr double kSynthNoiseSigma = 2.0 / 255;  // of encoded values
 inline constexpr double kSynthK1 = -0.1, kSynthK2 = 0.02;
+inline constexpr double kSynthBarrelK1 = -0.2;
 inline constexpr double kSynthGainRange = 0.3;
 
 // Parses "exposure,noise"; spaces are not allowed, empty means none. Throws Error (kUsage) for
-// a name that is unknown, listing the known ones, or not in this version.
+// a name that is unknown, listing the known ones, or not in this version, and for two lenses.
 SynthEffects ParseSynthEffects(const std::string& list);
 
 // Gain of linear light for photo `index` of `views`: a slow swing and a small jump from photo
@@ -35,7 +38,7 @@ void ApplyGain(double gain, Image* color);
 // Adds Gaussian noise to the encoded values, clipped to [0, 1]; `stream` is the photo's index.
 void ApplyNoise(uint64_t seed, uint64_t stream, double sigma, Image* color);
 
-// The same view through the simulated lens.
-Camera WithSynthLens(Camera camera);
+// The same view through the simulated lens, if there is one.
+Camera WithSynthLens(const SynthEffects& effects, Camera camera);
 
 }  // namespace regrade

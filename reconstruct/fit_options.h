@@ -52,12 +52,12 @@ struct FitOptions {
                   "voxels in cache) and learns less from a ray; a GPU draws single pixels",
           .min = 1,
           .max = 32});
-    bind(
-        "sh-degree", sh_degree,
-        {.help =
-             "view dependence: spherical harmonics degree 0, 1 or 2 (1, 4, 9 values a channel)",
-         .min = 0,
-         .max = 2});
+    bind("sh-degree", sh_degree,
+         {.help = "view dependence: spherical harmonics degree 0, 1 or 2 (1, 4, 9 values a "
+                  "channel); a "
+                  "small trial falls back to 0 where that loses nothing",
+          .min = 0,
+          .max = 2});
     bind("fit-view-bound", view_bound,
          {.help = "largest view-dependent coefficient; a larger one lets colours wander where "
                   "the clamp hides them, and styles then show it",

@@ -54,6 +54,7 @@ void RunPack(const Command& command, const Arguments& arguments, Console* consol
   const Capture capture = ReadCapture(words[0] + "/poses");
   const SceneProfile profile = ProfileScene(capture, 2, run.effects);
   for (const EffectReport& effect : profile.effects) console->Info(EffectLine(effect));
+  for (const std::string& notice : profile.notices) console->Info(notice);
   PackedCapture packed;
   if (!style.picture.empty()) packed.style = SmallPicture(style.picture);
   packed.scene = profile.scene;
@@ -61,7 +62,8 @@ void RunPack(const Command& command, const Arguments& arguments, Console* consol
     packed.views.push_back({capture.views[i].file, IsHeldOut(i, run.holdout),
                             WorkingCamera(capture.views[i].camera, scene.photo_size,
                                           packed.scene.field_from_world, packed.scene.ndc),
-                            ReadWorkingPhoto(capture.views[i], scene.photo_size)});
+                            ReadWorkingPhoto(capture.views[i], scene.photo_size,
+                                             profile.gains.Of(static_cast<int>(i)))});
   WritePackedCapture(run.out, packed);
   console->Info("wrote " + run.out + ": " + std::to_string(packed.views.size()) + " views, " +
                 std::to_string(std::filesystem::file_size(run.out) >> 20) + " MiB");

@@ -18,6 +18,7 @@
 #include "pipeline/scene_profile.h"
 #include "pipeline/scene_views.h"
 #include "pipeline/stages/run_context.h"
+#include "reconstruct/choose_degree.h"
 #include "reconstruct/fit_field.h"
 
 namespace regrade {
@@ -25,6 +26,7 @@ namespace {
 
 constexpr double kAfterFit =
     0.08;  // pruning, writing and measuring, as a share of the steps' time
+constexpr double kTrial = 0.08;         // the trial of degrees, likewise
 constexpr int kReproducibleShards = 4;  // sums in a fixed grouping, whatever the threads
 
 double Mean(const std::vector<double>& values) {
@@ -32,19 +34,21 @@ double Mean(const std::vector<double>& values) {
          static_cast<double>(values.size());
 }
 
-// PSNR and SSIM over the held-out photos.
-void MeasureHeldOut(RunContext* context, const Capture& capture, const StoredField& stored,
-                    Backend backend, JsonValue* figures) {
+// PSNR and SSIM over the held-out photos as they were taken: a render is given its photo's
+// gain, which is known from the colours of points that the photo shares with others.
+void MeasureHeldOut(RunContext* context, const Capture& capture, const PhotoGains& gains,
+                    const StoredField& stored, Backend backend, JsonValue* figures) {
   const RunSettings& settings = context->settings;
   const FieldRenderer renderer(stored.field, backend);
   std::vector<double> psnr, ssim;
   JsonValue::Array files;
   for (const int i : ViewIndices(capture, settings.run.holdout, true)) {
     const CaptureView& view = capture.views[static_cast<size_t>(i)];
-    const Image photo = ReadWorkingPhoto(view, settings.scene.photo_size);
+    const Image photo = ReadWorkingPhoto(view, settings.scene.photo_size, kAsTaken);
     const Camera camera = WorkingCamera(view.camera, settings.scene.photo_size,
                                         stored.field_from_world, stored.ndc);
-    const Image rendered = renderer.Render(camera).color;
+    Image rendered = renderer.Render(camera).color;
+    PutGain(gains.Of(i), &rendered);
     if (const auto value = Psnr(rendered, photo)) psnr.push_back(*value);
     if (const auto value = Ssim(rendered, photo)) ssim.push_back(*value);
     files.emplace_back(view.file);
@@ -100,16 +104,39 @@ FitOptions OptionsForMemory(RunContext* context,
   return options;
 }
 
+// Whether the fit keeps its spherical harmonics, and the row that says why.
+EffectReport ProfileViewDependence(const RunSettings& settings, const FitOptions& options,
+                                   const std::vector<TrainingView>& views, const SceneBox& box,
+                                   const FitState* resume, const ProgressFunction& progress,
+                                   Backend backend) {
+  const auto row = [](bool on, double value, const std::string& evidence) {
+    return EffectReport{kViewDependence, on, evidence, value, kDegreePays};
+  };
+  const auto wishes = ParseEffects(settings.run.effects);
+  const auto wish = wishes.find(kViewDependence);
+  const bool wanted = wish == wishes.end() || wish->second;
+  if (options.sh_degree == 0 || !wanted) return row(false, 0, "not measured: as asked for");
+  if (wish != wishes.end()) return row(true, 0, "not measured: as asked for");
+  if (resume != nullptr)
+    return row(resume->grid.basis > 1, 0, "not measured again: as before the interruption");
+  const DegreeTrial trial = TryDegrees(views, box, options, progress, backend);
+  return row(trial.Pays(), trial.gain_db,
+             "decibels that harmonics of degree " + std::to_string(options.sh_degree) +
+                 " gain over one colour for all directions, on a fifth of the views that a "
+                 "small trial did not see");
+}
+
 StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
                          const ProgressFunction& progress) {
   const RunSettings& settings = context->settings;
   Workspace& workspace = *context->workspace;
   const Capture capture = ReadCapture(workspace.Path("poses"));
-  const SceneProfile profile =
-      ProfileScene(capture, settings.fit.sh_degree, settings.run.effects);
+  SceneProfile profile = ProfileScene(capture, settings.fit.sh_degree, settings.run.effects);
   const NormalizedScene& scene = profile.scene;
   if (!scene.notice.empty()) context->console->Info(scene.notice);
-  for (const EffectReport& effect : profile.effects) context->console->Info(EffectLine(effect));
+  for (const EffectReport& effect : profile.effects)
+    if (effect.name != kViewDependence) context->console->Info(EffectLine(effect));
+  for (const std::string& notice : profile.notices) context->console->Info(notice);
   const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
   FitOptions options =
       OptionsForMemory(context, PlannerOf(settings, capture, scene.box, backend), backend);
@@ -120,7 +147,7 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   std::vector<TrainingView> views;
   for (const int i : fitted) {
     const CaptureView& view = capture.views[static_cast<size_t>(i)];
-    photos.push_back(ReadWorkingPhoto(view, settings.scene.photo_size));
+    photos.push_back(ReadWorkingPhoto(view, settings.scene.photo_size, profile.gains.Of(i)));
     views.push_back({WorkingCamera(view.camera, settings.scene.photo_size,
                                    scene.field_from_world, scene.ndc),
                      &photos.back()});
@@ -128,8 +155,6 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
 
   if (settings.run.reproducible && options.shards == 0) options.shards = kReproducibleShards;
   FitHooks hooks;
-  ProgressParts parts(progress, 1 + kAfterFit);
-  hooks.progress = parts.Next(1);
   hooks.checkpoint = [&](const FitState& state) {
     workspace.SaveCheckpoint("reconstruct", inputs, PackFitState(state));
   };
@@ -140,19 +165,31 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
     hooks.resume = &*resume;
     context->console->Info("reconstruct: goes on from its checkpoint");
   }
+  ProgressParts parts(progress, kTrial + 1 + kAfterFit);
+  EffectReport& view_dependence =
+      *std::find_if(profile.effects.begin(), profile.effects.end(),
+                    [](const EffectReport& effect) { return effect.name == kViewDependence; });
+  view_dependence = ProfileViewDependence(settings, options, views, scene.box, hooks.resume,
+                                          parts.Next(kTrial), backend);
+  context->console->Info(EffectLine(view_dependence));
+  if (!view_dependence.on) options.sh_degree = 0;
+  hooks.progress = parts.Next(1);
   const FitResult fit = FitField(views, scene.box, options, hooks, backend);
 
   WriteFieldFile(workspace.Path("field.npz"), {fit.field, scene.field_from_world, scene.ndc});
   StageOutcome outcome;
   outcome.outputs = {"field.npz"};
   outcome.figures["effects"] = EffectsRecord(profile.effects);
+  if (!profile.gains.of_view.empty())
+    outcome.figures["exposure"] = GainsRecord(capture, profile.exposure, profile.gains);
   outcome.figures["device"] = DeviceName(backend);
   outcome.figures["finest_grid"] = Finest(options);
   outcome.figures["rays"] = fit.rays;
+  outcome.figures["sh_degree"] = options.sh_degree;
   outcome.figures["voxels"] = fit.field.geometry->num_voxels();
   outcome.figures["psnr_train_db"] = fit.psnr_train_db;
-  MeasureHeldOut(context, capture, ReadFieldFile(workspace.Path("field.npz")), backend,
-                 &outcome.figures);
+  MeasureHeldOut(context, capture, profile.gains, ReadFieldFile(workspace.Path("field.npz")),
+                 backend, &outcome.figures);
   return outcome;
 }
 
@@ -171,8 +208,9 @@ Stage ReconstructStage(RunContext* context) {
   stage.refuse_changes = true;
   if (context->settings.start.dry_run) {
     const Capture capture = ReadCapture(context->workspace->Path("poses"));
+    // Exposures have no say in the box, and measuring them would read every photo.
     const SceneProfile profile =
-        ProfileScene(capture, context->settings.fit.sh_degree, run.effects);
+        ProfileScene(capture, context->settings.fit.sh_degree, run.effects + ",exposure=off");
     stage.plan =
         PlanText(PlannerOf(context->settings, capture, profile.scene.box,
                            ChooseBackend(run.device, run.reproducible))(context->settings.fit));

@@ -10,6 +10,7 @@
 #include "pipeline/field_renderer.h"
 #include "pipeline/files/image_file.h"
 #include "pipeline/files/video_file.h"
+#include "pipeline/photo_gains.h"
 #include "pipeline/scene_views.h"
 #include "pipeline/stages/run_context.h"
 #include "pipeline/stages/scene_stylizer.h"
@@ -69,15 +70,17 @@ struct Studio {
   double styled_seconds = 0;  // spent in rendering the restyled field
 };
 
-// frames/<prefix>{source, styled, views_2d, transmittance}/<index>.png; views_2d for methods
-// that can style a render
+// frames/<prefix>{source, styled, views_2d, transmittance}/<index>.png, as a camera of that
+// gain shows them; views_2d for methods that can style a render
 void RenderFrame(RunContext* context, Studio* studio, const Camera& camera,
-                 const std::string& prefix, int index) {
+                 const PhotoGain& gain, const std::string& prefix, int index) {
   Workspace& workspace = *context->workspace;
-  const RenderedView plain = studio->source.Render(camera);
+  RenderedView plain = studio->source.Render(camera);
   const double begin = context->console->StageSeconds();
-  const RenderedView restyled = studio->styled.Render(camera);
+  RenderedView restyled = studio->styled.Render(camera);
   studio->styled_seconds += context->console->StageSeconds() - begin;
+  PutGain(gain, &plain.color);
+  PutGain(gain, &restyled.color);
   const std::string folder = "frames/" + prefix, name = "/" + FrameName(index);
   WritePng8(workspace.NewPath(folder + "source" + name), plain.color);
   WritePng8(workspace.NewPath(folder + "styled" + name), restyled.color);
@@ -106,6 +109,8 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   const std::vector<Camera> way =
       film_of_views ? std::vector<Camera>() : MakeCameraPath(views, settings.render.path);
 
+  const PhotoGains gains =
+      settings.render.keep_exposure ? RecordedGains(workspace, capture) : PhotoGains();
   std::filesystem::remove_all(workspace.Path("frames"));
   const int num_views = static_cast<int>(views.size()), num_way = static_cast<int>(way.size());
   constexpr double kFilms = 0.1;  // of the frames' time
@@ -114,10 +119,10 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   for (int i = 0; i < num_views + num_way; ++i) {
     if (Report(frames_progress, i, num_views + num_way) == Verdict::kAbort) throw Interrupted();
     if (i < num_views)
-      RenderFrame(context, &studio, views[static_cast<size_t>(i)], "", i);
+      RenderFrame(context, &studio, views[static_cast<size_t>(i)], gains.Of(i), "", i);
     else
-      RenderFrame(context, &studio, way[static_cast<size_t>(i - num_views)], kPathPrefix,
-                  i - num_views);
+      RenderFrame(context, &studio, way[static_cast<size_t>(i - num_views)], kAsTaken,
+                  kPathPrefix, i - num_views);
   }
   StageOutcome outcome;
   outcome.outputs = {"frames"};

@@ -6,6 +6,7 @@
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/files/image_file.h"
 #include "pipeline/memory.h"
+#include "pipeline/photo_gains.h"
 #include "pipeline/report_html.h"
 #include "pipeline/report_json.h"
 #include "pipeline/report_records.h"
@@ -49,7 +50,7 @@ ReportPictures PicturesOf(const RunContext& context, const Capture& capture) {
     const int i = shown < 2 ? 0 : k * (count - 1) / (shown - 1);
     const CaptureView& photo = capture.views[static_cast<size_t>(i)];
     const std::string name = FrameName(i);
-    const Image picture = ReadWorkingPhoto(photo, context.settings.scene.photo_size);
+    const Image picture = ReadWorkingPhoto(photo, context.settings.scene.photo_size, kAsTaken);
     ReportView view;
     view.name = name.substr(0, 5) + ", " + photo.file;
     view.photo =

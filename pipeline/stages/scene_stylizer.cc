@@ -8,6 +8,7 @@
 #include "pipeline/files/image_file.h"
 #include "pipeline/folder_listing.h"
 #include "pipeline/folder_stylizer.h"
+#include "pipeline/photo_gains.h"
 #include "pipeline/scene_views.h"
 #include "pipeline/stage_record.h"
 #include "stylize/color_transfer.h"
@@ -19,10 +20,11 @@ namespace {
 
 // Scene-wide colours are of all photos, so that a map does not depend on which are held out.
 std::unique_ptr<ViewStylizer> MakeColorMethod(const RunSettings& settings, const Image& style,
-                                              const Capture& capture) {
+                                              const Capture& capture, const PhotoGains& gains) {
   const StyleOptions& options = settings.style_2d;
-  const auto photo = [&](const CaptureView& view) {
-    return ReadWorkingPhoto(view, settings.scene.photo_size);
+  const auto photo = [&](size_t i) {
+    return ReadWorkingPhoto(capture.views[i], settings.scene.photo_size,
+                            gains.Of(static_cast<int>(i)));
   };
   if (options.method == "idt" || options.method == "histogram") {
     if (!options.scene_wide) return MakeDistributionTransfer(options, style);
@@ -31,15 +33,15 @@ std::unique_ptr<ViewStylizer> MakeColorMethod(const RunSettings& settings, const
         256,
         4 * kColorSample / std::max<int64_t>(1, static_cast<int64_t>(capture.views.size())));
     std::vector<Vec3d> scene;
-    for (const CaptureView& view : capture.views)
-      for (const Vec3d& color : SampleColors(photo(view), view.path, most))
+    for (size_t i = 0; i < capture.views.size(); ++i)
+      for (const Vec3d& color : SampleColors(photo(i), capture.views[i].path, most))
         scene.push_back(color);
     return MakeDistributionTransfer(options, style, &scene);
   }
   if (!options.scene_wide) return MakeColorTransfer(options, style);
   std::vector<ColorStatistics> parts;
-  for (const CaptureView& view : capture.views)
-    parts.push_back(MeasureForMethod(options, photo(view)));
+  for (size_t i = 0; i < capture.views.size(); ++i)
+    parts.push_back(MeasureForMethod(options, photo(i)));
   const ColorStatistics scene = Pool(parts);
   return MakeColorTransfer(options, style, &scene);
 }
@@ -62,7 +64,7 @@ std::unique_ptr<ViewStylizer> MakeSceneStylizer(RunContext* context, const Captu
   if (method.kind == "command")
     return MakeCommandStylizer(method.argument, settings.style.picture,
                                settings.style_2d.command_limit_s);
-  return MakeColorMethod(settings, style, capture);
+  return MakeColorMethod(settings, style, capture, RecordedGains(*context->workspace, capture));
 }
 
 void ProbeMethod(StyleOptions* options) {

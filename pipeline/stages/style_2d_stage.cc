@@ -4,6 +4,7 @@
 #include "kernels/image/color_statistics.h"
 #include "pipeline/capture_store.h"
 #include "pipeline/files/image_file.h"
+#include "pipeline/photo_gains.h"
 #include "pipeline/scene_views.h"
 #include "pipeline/stages/run_context.h"
 #include "pipeline/stages/scene_stylizer.h"
@@ -18,6 +19,7 @@ StageOutcome StyleViews(RunContext* context, const ProgressFunction& progress) {
   const std::unique_ptr<ViewStylizer> stylizer = MakeSceneStylizer(context, capture);
   for (const std::string& notice : stylizer->Notices()) context->console->Info(notice);
 
+  const PhotoGains gains = RecordedGains(workspace, capture);
   std::filesystem::remove_all(workspace.Path("views_2d"));
   const int count = static_cast<int>(capture.views.size());
   int styled = 0;
@@ -25,8 +27,8 @@ StageOutcome StyleViews(RunContext* context, const ProgressFunction& progress) {
     if (Report(progress, i, count) == Verdict::kAbort) throw Interrupted();
     if (!stylizer->Knows(i)) continue;
     ++styled;
-    const Image photo =
-        ReadWorkingPhoto(capture.views[static_cast<size_t>(i)], settings.scene.photo_size);
+    const Image photo = ReadWorkingPhoto(capture.views[static_cast<size_t>(i)],
+                                         settings.scene.photo_size, gains.Of(i));
     WritePng8(workspace.NewPath("views_2d/" + FrameName(i)), stylizer->Stylize(photo, i));
   }
   StageOutcome outcome;
@@ -46,6 +48,8 @@ Stage Style2dStage(RunContext* context) {
                                    {"options", context->OptionsOf({"Scene", "2D method"})}};
   const JsonValue files = MethodFiles(context->settings.style_2d);
   if (!files.IsNull()) stage.inputs["method_files"] = files;
+  const JsonValue gains = RecordedGainRows(*context->workspace);
+  if (!gains.IsNull()) stage.inputs["exposure"] = gains;
   stage.work = [context](const ProgressFunction& progress) {
     return StyleViews(context, progress);
   };

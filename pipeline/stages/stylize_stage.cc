@@ -11,6 +11,7 @@
 #include "pipeline/files/image_file.h"
 #include "pipeline/network_checkpoint.h"
 #include "pipeline/network_file.h"
+#include "pipeline/photo_gains.h"
 #include "pipeline/plan.h"
 #include "pipeline/scene_views.h"
 #include "pipeline/stages/run_context.h"
@@ -33,6 +34,7 @@ Lessons ReadLessons(RunContext* context, const Capture& capture, const StoredFie
   const RunSettings& settings = context->settings;
   const std::vector<int> indices =
       StyledViews(*context->workspace, capture, settings.run.holdout);
+  const PhotoGains gains = RecordedGains(*context->workspace, capture);
   Lessons lessons;
   lessons.targets.reserve(indices.size());
   std::vector<ColorStatistics> before, after;
@@ -43,7 +45,8 @@ Lessons ReadLessons(RunContext* context, const Capture& capture, const StoredFie
     lessons.views.push_back({WorkingCamera(view.camera, settings.scene.photo_size,
                                            stored.field_from_world, stored.ndc),
                              &lessons.targets.back(), nullptr, name});
-    before.push_back(MeasureColor(ReadWorkingPhoto(view, settings.scene.photo_size)));
+    before.push_back(
+        MeasureColor(ReadWorkingPhoto(view, settings.scene.photo_size, gains.Of(i))));
     after.push_back(MeasureColor(lessons.targets.back()));
   }
   const MklMap mkl = ComputeMkl(Pool(before), Pool(after));

@@ -87,5 +87,31 @@ TEST(TotalVariation, FastPathEqualsThePlainOne) {
   }
 }
 
+TEST(TotalVariation, H98_AxesAreWeightedByTheirVoxels) {
+  // Twice the vertices along an axis of the same box: voxels are half as long there, and a
+  // slope that is the same in the world is half as steep from voxel to voxel.
+  const auto slope = [](const Vec3i& resolution, int axis) {
+    const RadianceField field = testing::RandomField(resolution, 1, 1.0, 94);
+    const Geometry& g = *field.geometry;
+    std::vector<double> values(static_cast<size_t>(g.num_voxels()));
+    for (int x = 0; x < resolution.x; ++x)
+      for (int y = 0; y < resolution.y; ++y)
+        for (int z = 0; z < resolution.z; ++z) {
+          const int at[3] = {x, y, z};
+          values[static_cast<size_t>(g.links[g.frame.Vertex(x, y, z)])] =
+              100.0 * at[axis] / resolution[axis];
+        }
+    // One vertex in the midst, where no neighbour is missing.
+    const int64_t middle = g.frame.Vertex(resolution.x / 2, resolution.y / 2, resolution.z / 2);
+    return TotalVariation<double>(g.frame, g.links.data(), values.data(), 1, 0, false, middle,
+                                  middle + 1, 1.0, nullptr);
+  };
+  for (int axis = 0; axis < 3; ++axis) {
+    Vec3i fine{8, 8, 8};
+    fine[axis] = 16;
+    EXPECT_NEAR(slope(fine, axis), slope({8, 8, 8}, axis), 1e-8);
+  }
+}
+
 }  // namespace
 }  // namespace regrade

@@ -47,9 +47,9 @@ TEST(SceneEffects, LensAboveThresholdStays) {
   EXPECT_EQ(WorkingCamera(CameraWithShift(0.51), 100, {}, {}).lens, LensModel::kOpenCv);
 }
 
-TEST(SceneEffects, RowsCarryTheNumbersOfTheDecision) {
+TEST(SceneEffects, H153_RowsCarryTheNumbersOfTheDecision) {
   const auto rows = ProfileScene(CaptureWithShifts({0.1, -12.3, 3}), 2, "auto").effects;
-  ASSERT_EQ(rows.size(), 4u);
+  ASSERT_EQ(rows.size(), 5u);
   EXPECT_EQ(rows[0].name, "distortion");
   EXPECT_TRUE(rows[0].on);
   EXPECT_NEAR(*rows[0].value.value, 12.3, 1e-9);

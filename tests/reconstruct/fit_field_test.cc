@@ -13,6 +13,7 @@
 
 #include "kernels/base/error.h"
 #include "kernels/field/render.h"
+#include "reconstruct/choose_degree.h"
 #include "reconstruct/resample_grid.h"
 #include "tests/support/small_field.h"
 
@@ -40,6 +41,7 @@ class FitField : public ::testing::Test {
     }
     truth.geometry = geometry;
     truth.background = {0.2f, 0.4f, 0.6f};
+    truth_ = truth;
     for (int i = 0; i < 12; ++i) {
       const double angle = 2 * M_PI * i / 12;
       const Vec3d center{2.6 * std::cos(angle), 2.6 * std::sin(angle),
@@ -85,6 +87,7 @@ class FitField : public ::testing::Test {
            same(a.appearance.sh, b.appearance.sh);
   }
 
+  RadianceField truth_;
   std::vector<Camera> cameras_;
   std::vector<Image> photos_;
   std::vector<TrainingView> views_;
@@ -186,6 +189,30 @@ TEST_F(FitField, H85_ResamplingKeepsConstantsAndRamps) {
     }
   }
   EXPECT_GT(whole, fine.num_voxels() / 2);
+}
+
+// A matte ball in voxels as fine as its photos: one colour a place is enough.
+TEST_F(FitField, AMatteSceneNeedsNoViewDependence) {
+  const DegreeTrial trial = TryDegrees(views_, {}, options_, {}, Backend::kCpu);
+  EXPECT_FALSE(trial.Pays()) << trial.gain_db << " dB";
+}
+
+// The same ball, brighter from one side than from the other whatever it shows there.
+TEST_F(FitField, ColoursThatChangeWithTheDirectionNeedIt) {
+  RadianceField shiny = truth_;
+  shiny.appearance.basis = 4;
+  shiny.appearance.sh = Buffer<float>(4 * truth_.appearance.sh.size());
+  for (int64_t i = 0; i < truth_.appearance.sh.size(); ++i) {
+    shiny.appearance.sh[4 * i] = truth_.appearance.sh[i];
+    shiny.appearance.sh[4 * i + 1] = shiny.appearance.sh[4 * i + 3] = 0.15f;
+    shiny.appearance.sh[4 * i + 2] = 0;
+  }
+  for (size_t i = 0; i < photos_.size(); ++i)
+    photos_[i] = RenderViewPlain(shiny, cameras_[i], {0.5f, 1e-4f}).color;
+  const DegreeTrial trial = TryDegrees(views_, {}, options_, {}, Backend::kCpu);
+  EXPECT_TRUE(trial.Pays()) << trial.gain_db << " dB";
+  views_.resize(4);  // too few to keep one of five
+  EXPECT_TRUE(TryDegrees(views_, {}, options_, {}, Backend::kCpu).Pays());
 }
 
 }  // namespace

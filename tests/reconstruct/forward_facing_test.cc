@@ -106,5 +106,19 @@ TEST(ForwardFacing, H90_ARayThatDoesNotRunForwardMissesTheField) {
   EXPECT_EQ(Norm(direction), 0.0f);
 }
 
+TEST(ForwardFacing, H90_InfinitelyFarIsTheFarFace) {
+  const NdcSpace space{1.5, 2};
+  Vec3d origin{0.3, -0.2, 0}, direction = Normalized(Vec3d{0.1, 0.2, 1});
+  const Vec3d towards = direction, from = origin;
+  NdcRay(space, &origin, &direction);
+  const Vec3d far = origin + direction * (2 / direction.z);  // z = 1
+  EXPECT_NEAR(far.z, 1, 1e-12);
+  // A point at a depth of 1e12 lies there, to 2e-12; and the space is finite all the way.
+  const Vec3d p = from + towards * (1e12 / towards.z);
+  EXPECT_NEAR(far.x, space.a * p.x / p.z, 1e-9);
+  EXPECT_NEAR(far.y, space.b * p.y / p.z, 1e-9);
+  EXPECT_TRUE(std::isfinite(WorldFromNdc(space, Vec3d{0, 0, 1 - 2e-12}).z));
+}
+
 }  // namespace
 }  // namespace regrade

@@ -1,0 +1,190 @@
+// Exposures of a synthetic capture, from its photos to the gains that are undone.
+#include "pipeline/photo_gains.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+
+#include "kernels/base/error.h"
+#include "kernels/scene/srgb.h"
+#include "pipeline/scene_profile.h"
+#include "pipeline/scene_views.h"
+#include "pipeline/synth_effects.h"
+#include "pipeline/track_colors.h"
+#include "tests/support/synthetic_photos.h"
+
+namespace regrade {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kViews = 8;
+constexpr uint64_t kSeed = 4;
+
+class SyntheticExposure : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::path(::testing::TempDir()) /
+              ("exposure_" +
+               std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()));
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  Capture MakeCapture(bool exposure) {
+    testing::SyntheticPhotos photos{.views = kViews, .seed = kSeed};
+    photos.effects.exposure = exposure;
+    return testing::MakeSyntheticPhotos(photos, folder_.string());
+  }
+
+  fs::path folder_;
+};
+
+TEST_F(SyntheticExposure, GainsOfTheSimulationAreFoundWithinTwoPercent) {
+  const SceneProfile profile = ProfileScene(MakeCapture(true), 2, "auto");
+  const EffectReport& row = profile.effects.back();
+  EXPECT_EQ(row.name, "exposure");
+  EXPECT_TRUE(row.on) << EffectLine(row);
+  ASSERT_EQ(profile.gains.of_view.size(), size_t{kViews});
+  double mean = 0;
+  for (int v = 0; v < kViews; ++v) mean += std::log(SynthGain(kSeed, v, kViews)) / kViews;
+  for (int v = 0; v < kViews; ++v)
+    for (int c = 0; c < 3; ++c)
+      EXPECT_NEAR(profile.gains.Of(v).light[c] / (SynthGain(kSeed, v, kViews) / std::exp(mean)),
+                  1, 0.02)
+          << "photo " << v << " channel " << c;
+}
+
+TEST_F(SyntheticExposure, EqualPhotosAreTakenAsTheyAre) {
+  const SceneProfile profile = ProfileScene(MakeCapture(false), 2, "auto");
+  EXPECT_FALSE(profile.effects.back().on) << EffectLine(profile.effects.back());
+  // Measured, and nothing: the disagreement that is left is noise.
+  EXPECT_LT(std::abs(*profile.effects.back().value.value), 0.02);
+  EXPECT_GT(profile.exposure.spread, 0);
+  EXPECT_TRUE(profile.gains.of_view.empty());
+}
+
+TEST_F(SyntheticExposure, TheUserDecides) {
+  const Capture capture = MakeCapture(true);
+  EXPECT_TRUE(ProfileScene(capture, 2, "exposure=off").gains.of_view.empty());
+  Capture without = capture;
+  without.points.clear();
+  const SceneProfile off = ProfileScene(without, 2, "auto");
+  EXPECT_FALSE(off.effects.back().on);
+  EXPECT_NE(EffectLine(off.effects.back()).find("without points"), std::string::npos);
+  EXPECT_THROW(ProfileScene(without, 2, "exposure=on"), Error);
+  // Photos without a point between them keep their exposures, and are named.
+  for (CaptureView& view : without.views) view.file = "photo of " + view.name;
+  without.points.push_back(capture.points[0]);
+  const SceneProfile asked_for = ProfileScene(without, 2, "exposure=on");
+  EXPECT_EQ(asked_for.gains.Of(3), kAsTaken);
+  ASSERT_EQ(asked_for.notices.size(), 1u);
+  EXPECT_NE(asked_for.notices[0].find("photo of 00003.png"), std::string::npos);
+}
+
+TEST_F(SyntheticExposure, AGainIsUndoneWhereAPhotoIsRead) {
+  const Capture capture = MakeCapture(false);
+  const CaptureView& view = capture.views[0];
+  const Image plain = ReadWorkingPhoto(view, 100, kAsTaken);
+  const Image undone = ReadWorkingPhoto(view, 100, PhotoGain{{0.5, 1, 2}});
+  EXPECT_EQ(plain.width, 100);
+  for (int y = 0; y < plain.height; ++y)
+    for (int x = 0; x < plain.width; ++x) {
+      const float *before = plain.at(x, y), *after = undone.at(x, y);
+      EXPECT_NEAR(LinearFromSrgb(after[0]), std::min(1.0, 2 * LinearFromSrgb(before[0])), 1e-5);
+      EXPECT_NEAR(LinearFromSrgb(after[2]), LinearFromSrgb(before[2]) / 2, 1e-5);
+    }
+}
+
+TEST(PhotoGains, ClippedIsShownAsBrightAsItWasAtLeast) {
+  ExposureEstimate estimate;
+  estimate.photos.resize(3);
+  for (PhotoExposure& photo : estimate.photos) photo.known = true;
+  estimate.photos[0].gain = {2, 2, 2};
+  estimate.photos[1].gain = {0.5, 0.5, 0.5};
+  estimate.photos[2].gain = {0.8, 0.8, 0.8};
+  const auto white_undone = [&](const Vec3d& in_dark) {
+    Image photo(1, 1);
+    for (float& value : photo.pixels) value = 1;
+    UndoGain(GainsOf(estimate, {{0.2, 0.2, 0.2}, in_dark, in_dark}).Of(0), &photo);
+    return photo.pixels[0];
+  };
+  // Where dark photos clip nothing, what was clipped lay just above; where they clip as much,
+  // it is a lamp or the sky; and between in between.
+  EXPECT_NEAR(white_undone({0, 0, 0}), SrgbFromLinear(0.5), 1e-6);
+  EXPECT_FLOAT_EQ(white_undone({0.2, 0.2, 0.2}), 1);
+  EXPECT_NEAR(white_undone({0.1, 0.1, 0.1}), (1 + SrgbFromLinear(0.5)) / 2, 1e-6);
+  // What is not clipped stays what it was.
+  Image photo(1, 1);
+  for (float& value : photo.pixels) value = 0.9f;
+  UndoGain(GainsOf(estimate, {{0.2, 0.2, 0.2}, {0.2, 0.2, 0.2}, {0.2, 0.2, 0.2}}).Of(0),
+           &photo);
+  EXPECT_NEAR(photo.pixels[1], SrgbFromLinear(LinearFromSrgb(0.9) / 2), 1e-6);
+}
+
+TEST(PhotoGains, PutBackIsTheInverse) {
+  Image photo(4, 1);
+  for (size_t i = 0; i < photo.pixels.size(); ++i)
+    photo.pixels[i] = 0.05f * static_cast<float>(i + 1);
+  const Image before = photo;
+  const PhotoGain gain{{1.3, 0.8, 1}};
+  UndoGain(gain, &photo);
+  PutGain(gain, &photo);
+  for (size_t i = 0; i < photo.pixels.size(); ++i)
+    EXPECT_NEAR(photo.pixels[i], before.pixels[i], 1e-6);
+}
+
+TEST(PhotoGains, H155_AsTakenIsBitForBit) {
+  Image photo(2, 1);
+  for (size_t i = 0; i < photo.pixels.size(); ++i)
+    photo.pixels[i] = 0.1f * static_cast<float>(i);
+  photo.pixels[0] = 1.5f;  // would be clipped
+  const Image before = photo;
+  UndoGain(kAsTaken, &photo);
+  EXPECT_EQ(photo.pixels, before.pixels);
+  EXPECT_EQ(PhotoGains().Of(17), kAsTaken);
+}
+
+TEST(PhotoGains, StagesReadWhatTheRecordHas) {
+  const fs::path folder = fs::path(::testing::TempDir()) / "photo_gains_record";
+  fs::remove_all(folder);
+  Workspace workspace(folder.string());
+  Capture capture;
+  capture.views.resize(2);
+  capture.views[0].file = "a.jpg", capture.views[1].file = "b.jpg";
+  EXPECT_TRUE(RecordedGains(workspace, capture).of_view.empty());
+
+  ExposureEstimate estimate;
+  estimate.photos.resize(2);
+  estimate.photos[1].gain = {1.1, 0.9, 1 / 3.0};
+  estimate.photos[1].known = true;
+  JsonValue figures = JsonValue::Object();
+  figures["exposure"] =
+      GainsRecord(capture, estimate, GainsOf(estimate, {{0.1, 0.1, 0.1}, {0.1, 0.1, 0.1}}));
+  workspace.Record("reconstruct", JsonValue::Object(), {}, 0, figures);
+  EXPECT_EQ(RecordedGains(workspace, capture).Of(0), kAsTaken);
+  EXPECT_EQ(RecordedGains(workspace, capture).Of(1), (PhotoGain{{1.1, 0.9, 1 / 3.0}, 1}));
+  capture.views[1].file = "c.jpg";
+  EXPECT_THROW(RecordedGains(workspace, capture), Error);
+  fs::remove_all(folder);
+}
+
+TEST(TrackColors, WindowIsTheMeanLightRoundAPoint) {
+  Image photo(16, 16);
+  for (int y = 0; y < 16; ++y)
+    for (int x = 0; x < 16; ++x)
+      for (int c = 0; c < 3; ++c)  // light grows linearly to the right
+        photo.at(x, y)[c] = static_cast<float>(SrgbFromLinear(0.2 + 0.02 * (x + 0.5)));
+  Vec3d light;
+  ASSERT_TRUE(WindowLight(photo, 7.3, 8.8, &light));
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(light[c], 0.2 + 0.02 * 7.3, 1e-6);
+  EXPECT_FALSE(WindowLight(photo, 2.4, 8, &light));  // its window leaves the photo
+  EXPECT_FALSE(WindowLight(photo, 8, 13.6, &light));
+  photo.at(9, 8)[1] = 1;  // clipped
+  EXPECT_FALSE(WindowLight(photo, 7.3, 8.8, &light));
+  EXPECT_TRUE(WindowLight(photo, 5.3, 8.8, &light));
+}
+
+}  // namespace
+}  // namespace regrade
