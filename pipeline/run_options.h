@@ -46,8 +46,8 @@ struct RunOptions {
           .min = 0,
           .max = 1000});
     bind("effects", effects,
-         {.help = "what the scene calls for is decided by measurement (auto); ndc=on|off and "
-                  "alpha=on|off, with commas between, decide instead"});
+         {.help = "what the scene calls for is decided by measurement (auto); ndc=on|off, "
+                  "alpha=on|off and background=on|off, with commas between, decide instead"});
     bind("max-memory", max_memory_gb,
          {.unit = "GB",
           .help = "memory to plan with; 0 takes what is free",

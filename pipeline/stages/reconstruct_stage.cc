@@ -110,7 +110,9 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   const NormalizedScene& scene = profile.scene;
   if (!scene.notice.empty()) context->console->Info(scene.notice);
   for (const EffectReport& effect : profile.effects) context->console->Info(EffectLine(effect));
-  const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
+  const Backend backend =
+      ChooseBackendFor(scene.box.spheres, settings.run.device, settings.run.reproducible,
+                       [context](const std::string& text) { context->console->Info(text); });
   FitOptions options =
       OptionsForMemory(context, PlannerOf(settings, capture, scene.box, backend), backend);
 
@@ -150,6 +152,8 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   outcome.figures["finest_grid"] = Finest(options);
   outcome.figures["rays"] = fit.rays;
   outcome.figures["voxels"] = fit.field.geometry->num_voxels();
+  if (scene.box.spheres)
+    outcome.figures["background_texels"] = fit.field.geometry->spheres.num_texels();
   outcome.figures["psnr_train_db"] = fit.psnr_train_db;
   MeasureHeldOut(context, capture, ReadFieldFile(workspace.Path("field.npz")), backend,
                  &outcome.figures);
@@ -173,9 +177,11 @@ Stage ReconstructStage(RunContext* context) {
     const Capture capture = ReadCapture(context->workspace->Path("poses"));
     const SceneProfile profile =
         ProfileScene(capture, context->settings.fit.sh_degree, run.effects);
+    const SceneBox& box = profile.scene.box;
+    const Backend backend =
+        ChooseBackendFor(box.spheres, run.device, run.reproducible, [](const std::string&) {});
     stage.plan =
-        PlanText(PlannerOf(context->settings, capture, profile.scene.box,
-                           ChooseBackend(run.device, run.reproducible))(context->settings.fit));
+        PlanText(PlannerOf(context->settings, capture, box, backend)(context->settings.fit));
   }
   stage.work = [context, inputs = stage.inputs](const ProgressFunction& progress) {
     return Reconstruct(context, inputs, progress);
