@@ -47,7 +47,7 @@ class FitField : public ::testing::Test {
                          0.7 * std::sin(2 * angle)};
       Camera camera;
       camera.width = camera.height = 48;
-      camera.fx = camera.fy = 60;
+      camera.fx = camera.fy = focal_;
       camera.cx = camera.cy = 24;
       const Vec3d forward = Normalized(-center);
       const Vec3d right = Normalized(Cross(forward, Vec3d{0, 0, 1}));
@@ -86,6 +86,7 @@ class FitField : public ::testing::Test {
            same(a.appearance.sh, b.appearance.sh);
   }
 
+  double focal_ = 60;  // pixels
   std::vector<Camera> cameras_;
   std::vector<Image> photos_;
   std::vector<TrainingView> views_;
@@ -141,6 +142,7 @@ TEST_F(FitField, H109_H110_AResumedFitIsTheUndisturbedOne) {
 class FitSpheres : public FitField {
  protected:
   void SetUp() override {
+    focal_ = 30;  // so wide that other views see all directions of the one that is kept
     FitField::SetUp();
     for (size_t v = 0; v < cameras_.size(); ++v) {
       for (int y = 0; y < cameras_[v].height; ++y)
@@ -157,7 +159,10 @@ class FitSpheres : public FitField {
     options_.background_layers = 16;
     options_.background_resolution = 32;
     options_.steps = {150, 150};
-    options_.background_lead = 0.5f;
+    // A small map learns in few steps: larger colour steps, and a run of texels that is one.
+    options_.rate_background_color = 0.3f;
+    options_.rate_background_density = 3;
+    options_.tv_background_share = 0.3f;
   }
 };
 
@@ -167,12 +172,14 @@ TEST_F(FitSpheres, FarSurroundingsAreLearned) {
   const FitResult with = regrade::FitField(views_, box_, options_, {});
   EXPECT_TRUE(with.field.geometry->spheres.on());
   EXPECT_EQ(with.rejected_voxels, 0);
-  EXPECT_GT(HeldOutPsnr(with.field), without + 3);  // half of the squared error is gone
+  // Three decibels are half of the squared error; 11.8 were measured.
+  EXPECT_GT(HeldOutPsnr(with.field), without + 3);
 }
 
 TEST_F(FitSpheres, H109_H110_AResumedFitIsTheUndisturbedOne) {
   box_.spheres = true;
   options_.steps = {40, 40};
+  options_.background_lead = 0.5f;
   const auto same = [](const FitResult& a, const FitResult& b) {
     const auto& s = a.field.geometry->spheres.density;
     const auto& t = b.field.geometry->spheres.density;
