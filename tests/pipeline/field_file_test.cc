@@ -227,9 +227,9 @@ TEST_F(Changed, WhatCannotBeRenderedIsNamed) {
   const int64_t learned = 4;
   EXPECT_REGRADE_ERROR(ReadWith("basis_type", {}, &learned), ExitCode::kInput,
                        "not spherical harmonics");
-  const int32_t spheres[1] = {0};
+  const int32_t spheres[1] = {0};  // a map has two sides, and values
   EXPECT_REGRADE_ERROR(ReadWith("background_links", {1}, spheres), ExitCode::kInput,
-                       "background spheres");
+                       "background_links");
 }
 
 }  // namespace
