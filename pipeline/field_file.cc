@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <utility>
+#include <vector>
 
 #include "kernels/base/error.h"
 #include "kernels/base/half.h"
@@ -65,9 +66,47 @@ void CheckReadable(NpzReader* file) {
       Refuse(file->path(), "its colours are not spherical harmonics",
              "train the checkpoint with svox2's default basis");
   }
-  if (file->Has("background_links"))
-    Refuse(file->path(), "it has background spheres, which this version cannot render",
-           "train the checkpoint without a background");
+}
+
+// svox2's arrays: links [2R, R], and by column and layer red, green, blue, density.
+void AddSpheres(const RadianceField& field, std::vector<float>* texels, NpzWriter* file) {
+  const SphereGeometry& spheres = field.geometry->spheres;
+  if (!spheres.on()) return;
+  texels->resize(static_cast<size_t>(4 * spheres.num_texels()));
+  for (int64_t i = 0; i < spheres.num_texels(); ++i) {
+    float* const texel = texels->data() + 4 * i;
+    std::copy_n(field.appearance.sphere_color.data() + 3 * i, 3, texel);
+    texel[3] = spheres.density[i];
+  }
+  file->Add("background_links", {2 * spheres.resolution, spheres.resolution},
+            spheres.links.data(), NpzPacking::kDeflate);
+  file->Add("background_data", {spheres.num_columns(), spheres.layers, 4}, texels->data());
+}
+
+void ReadSpheres(NpzReader* file, SphereGeometry* spheres, Buffer<float>* color) {
+  if (!file->Has("background_links")) return;
+  const NpzArray links = file->Read("background_links", ArrayType::kI32, {-1, -1});
+  const NpzArray data = file->Read("background_data", ArrayType::kF32, {-1, -1, 4});
+  if (links.shape[0] != 2 * links.shape[1] || links.shape[1] > kMaxSphereResolution ||
+      data.shape[1] < 1 || data.shape[1] > kMaxLayers)
+    Refuse(
+        file->path(),
+        "a background of " + links.ShapeText() + " texels and " + data.ShapeText() + " values",
+        "the map is twice as wide as high, of at most " + std::to_string(kMaxSphereResolution) +
+            " and " + std::to_string(kMaxLayers) + " layers");
+  spheres->layers = static_cast<int>(data.shape[1]);
+  spheres->resolution = static_cast<int>(links.shape[1]);
+  spheres->links.Resize(links.num_elements());
+  for (int64_t i = 0; i < links.num_elements(); ++i)
+    spheres->links[i] = std::max(links.As<int32_t>()[i], -1);
+  const int64_t texels = data.shape[0] * data.shape[1];
+  spheres->density.Resize(texels);
+  color->Resize(3 * texels);
+  for (int64_t i = 0; i < texels; ++i) {
+    const float* const texel = data.As<float>() + 4 * i;
+    std::copy_n(texel, 3, color->data() + 3 * i);
+    spheres->density[i] = texel[3];
+  }
 }
 
 Geometry ReadGeometry(NpzReader* file) {
@@ -148,6 +187,8 @@ void WriteFieldFile(const std::string& path, const StoredField& stored) {
   file.AddScalar<float>("regrade_step", field.step);
   file.Add("regrade_field_from_world", {13}, placement);
   if (stored.ndc.on()) file.Add("regrade_ndc", {2}, &stored.ndc.a);
+  std::vector<float> texels;  // the writer reads them when it writes
+  AddSpheres(field, &texels, &file);
   file.WriteTo(path);
 }
 
@@ -157,6 +198,7 @@ StoredField ReadFieldFile(const std::string& path, uint64_t budget) {
   StoredField stored;
   Geometry geometry = ReadGeometry(&file);
   ReadValues(&file, &geometry, &stored.field.appearance);
+  ReadSpheres(&file, &geometry.spheres, &stored.field.appearance.sphere_color);
   stored.field.geometry = std::make_shared<const Geometry>(std::move(geometry));
   stored.field.background =
       file.Has("regrade_background") ? ReadVec3(&file, "regrade_background") : Vec3f{1, 1, 1};

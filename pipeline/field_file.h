@@ -2,8 +2,9 @@
 // a few named arrays of our own beside theirs.
 //
 // Theirs: radius f32[3], center f32[3], links i32[X,Y,Z], density_data f32[N,1], sh_data
-// f16[N,27], basis_type i64 (1: spherical harmonics). Colours of a lower degree are padded with
-// zeros to 9 harmonics a channel. Ours: regrade_version i32, regrade_basis i32,
+// f16[N,27], basis_type i64 (1: spherical harmonics); with background spheres
+// background_links i32[2R,R], background_data f32[columns,L,4]. Colours of a lower degree are
+// padded with zeros to 9 harmonics a channel. Ours: regrade_version i32, regrade_basis i32,
 // regrade_background f32[3], regrade_near_clip f32, regrade_step f32 (voxels),
 // regrade_field_from_world f64[13] (scale, rotation by rows, translation), regrade_ndc f64[2]
 // where the field is in normalised device coordinates (ndc.h).
@@ -32,7 +33,7 @@ void WriteFieldFile(const std::string& path, const StoredField& stored);
 // Reads our files and svox2's (its `data` key of old, and links below -1, included). A foreign
 // field gets a white background, svox2's default, as its file has no entry for it. Throws
 // Error(kInput) for files that are damaged, larger than `budget` bytes, from a newer version of
-// this program, or hold what we cannot render (learned bases, background spheres). The field
+// this program, or hold what we cannot render (learned bases). The field
 // has passed Validate.
 StoredField ReadFieldFile(const std::string& path, uint64_t budget = uint64_t{64} << 30);
 

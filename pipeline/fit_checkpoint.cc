@@ -20,6 +20,19 @@ bool Consistent(const FastGrid& grid) {
   return true;
 }
 
+bool Consistent(const FastSpheres& spheres) {
+  if (spheres.layers < 1 || spheres.layers > kMaxLayers || spheres.resolution < 2 ||
+      spheres.resolution > kMaxSphereResolution)
+    return false;
+  if (spheres.links.size() != int64_t{2} * spheres.resolution * spheres.resolution ||
+      spheres.texels.size() % (4 * spheres.layers) != 0)
+    return false;
+  const int64_t columns = spheres.num_texels() / spheres.layers;
+  for (const int32_t link : spheres.links)
+    if (link < -1 || link >= columns) return false;
+  return true;
+}
+
 }  // namespace
 
 std::string PackFitState(const FitState& state) {
@@ -27,8 +40,10 @@ std::string PackFitState(const FitState& state) {
   BytePacker packer;
   constexpr size_t kHead = 256;  // generously
   packer.Reserve(kHead + sizeof(int32_t) * static_cast<size_t>(grid.links.size()) +
-                 sizeof(float) *
-                     static_cast<size_t>(grid.records.size() + state.second_moment.size()));
+                 sizeof(float) * static_cast<size_t>(
+                                     grid.records.size() + state.second_moment.size() +
+                                     grid.spheres.links.size() + grid.spheres.texels.size() +
+                                     state.sphere_moment.size()));
   packer.Value(kVersion);
   packer.Value(grid.basis);
   packer.Value(state.stage);
@@ -43,6 +58,12 @@ std::string PackFitState(const FitState& state) {
   packer.Values(grid.links);
   packer.Values(grid.records);
   packer.Values(state.second_moment);
+  if (!grid.spheres.on()) return packer.Take();
+  packer.Value(grid.spheres.layers);
+  packer.Value(grid.spheres.resolution);
+  packer.Values(grid.spheres.links);
+  packer.Values(grid.spheres.texels);
+  packer.Values(state.sphere_moment);
   return packer.Take();
 }
 
@@ -66,6 +87,14 @@ std::optional<FitState> UnpackFitState(std::string_view bytes) {
   unpacker.Values(&grid.links);
   unpacker.Values(&grid.records);
   unpacker.Values(&state.second_moment);
+  if (unpacker.ok() && !unpacker.at_end()) {
+    unpacker.Value(&grid.spheres.layers);
+    unpacker.Value(&grid.spheres.resolution);
+    unpacker.Values(&grid.spheres.links);
+    unpacker.Values(&grid.spheres.texels);
+    unpacker.Values(&state.sphere_moment);
+    if (!Consistent(grid.spheres)) return std::nullopt;
+  }
   if (!unpacker.at_end() || !Consistent(grid)) return std::nullopt;
   RefreshDerived(&grid);
   return state;

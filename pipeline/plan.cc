@@ -14,6 +14,7 @@ namespace {
 
 constexpr double kGridBytes = 4 + 8;    // a vertex: link, and density with link again
 constexpr double kPixelBytes = 12 + 6;  // floats as read, 16 bits a channel as drawn
+constexpr double kSphereShare = 0.6;    // of a map's texels that photos see
 constexpr double kIndexBytes = 4;       // vertex of a voxel, slot of a voxel, and back
 
 // Rates are of two threads.
@@ -44,6 +45,13 @@ StagePlan PlanFit(const FitOptions& options, int64_t photo_pixels, const SceneBo
         field, voxels * (4 * record + kIndexBytes + gradients) + vertices * 2 * kGridBytes);
     const double rays = static_cast<double>(options.steps[s]) * options.rays_per_step;
     seconds += rays / kRaysPerSecond * options.resolutions[s] / kRateResolution;
+  }
+  if (box.spheres) {
+    // Values, moments, and both packed, 16 bytes each; a slot in each arena. Time is about the
+    // same: the ball has fewer voxels than the box.
+    const double map = 2.0 * options.background_resolution * options.background_resolution;
+    field += map * (kIndexBytes +
+                    kSphereShare * options.background_layers * (4 * 16 + arenas * kIndexBytes));
   }
   const double photos = static_cast<double>(photo_pixels) * kPixelBytes;
   return {static_cast<uint64_t>(kProgramBytes + field + photos), Shared(seconds, threads)};

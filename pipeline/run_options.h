@@ -45,10 +45,11 @@ struct RunOptions {
                   "fits all, and no held-out figure exists",
           .min = 0,
           .max = 1000});
-    bind("effects", effects,
-         {.help = "what the scene calls for is decided by measurement (auto); ndc=on|off, "
-                  "alpha=on|off, exposure=on|off and view-dependence=on|off, with commas "
-                  "between, decide instead"});
+    bind(
+        "effects", effects,
+        {.help = "what the scene calls for is decided by measurement (auto); ndc=on|off, "
+                 "alpha=on|off, background=on|off, exposure=on|off and view-dependence=on|off, "
+                 "with commas between, decide instead"});
     bind("max-memory", max_memory_gb,
          {.unit = "GB",
           .help = "memory to plan with; 0 takes what is free",

@@ -51,6 +51,13 @@ void ApplyPreset(const std::string& preset, RunSettings* settings) {
     settings->fit.tv_share = 0.01f;
     settings->fit.prune_weight = 1.28f;
     settings->fit.initial_density = 0.1f;
+    // Rates end where svox2's course over 250000 steps is after 102400.
+    settings->fit.background_resolution = 1024;
+    settings->fit.background_lead = 0.04f;
+    settings->fit.rate_background_density = 3;
+    settings->fit.rate_background_density_end = 0.18f;
+    settings->fit.rate_background_color = 0.1f;
+    settings->fit.rate_background_color_end = 1.7e-3f;
   } else {
     throw Error(ExitCode::kUsage, "'" + preset + "' is not allowed", "--preset",
                 "allowed: draft, standard, paper, best");

@@ -16,7 +16,7 @@ namespace {
 
 constexpr int kOutlineSide = 512;
 constexpr double kAlphaShare = 0.02;  // of the pixels; less is a photo with a soft edge
-constexpr const char* kNames[] = {"ndc", "alpha", "exposure", kViewDependence};
+constexpr const char* kNames[] = {"ndc", "alpha", "background", "exposure", kViewDependence};
 
 EffectReport Row(const char* name, bool on, double value, double threshold,
                  const std::string& evidence) {
@@ -134,9 +134,9 @@ std::map<std::string, bool> ParseEffects(const std::string& text) {
     const bool known =
         std::find(std::begin(kNames), std::end(kNames), name) != std::end(kNames);
     if (!known || (wish != "on" && wish != "off"))
-      throw Error(
-          ExitCode::kUsage, "'" + word + "' is not allowed", "--effects",
-          "auto, or on|off of ndc, alpha, exposure and view-dependence: ndc=on,exposure=off");
+      throw Error(ExitCode::kUsage, "'" + word + "' is not allowed", "--effects",
+                  "auto, or on|off of ndc, alpha, background, exposure and view-dependence: "
+                  "ndc=on,exposure=off");
     wishes[name] = wish == "on";
   }
   return wishes;
@@ -167,10 +167,22 @@ SceneProfile ProfileScene(const Capture& capture, int sh_degree, const std::stri
                                 "optical axis to their mean, degrees"));
   profile.effects.push_back(Row("alpha", alpha, clear, kAlphaShare,
                                 "share of transparent pixels, where every photo has some"));
+  const Surroundings surroundings = MeasureSurroundings(capture);
+  const bool background =
+      decided("background", surroundings.far_share > kFarShare && !ndc && !alpha);
+  if (background && (ndc || alpha))
+    throw Error(ExitCode::kUsage,
+                std::string("background spheres do not go with ") + (ndc ? "ndc" : "alpha"),
+                "--effects background=on", ndc ? "add ndc=off" : "add alpha=off");
+  profile.effects.push_back(Row("background", background, surroundings.far_share, kFarShare,
+                                "spheres behind the box, on where much is far all round: share "
+                                "of sightings of points beyond four times the cameras' reach"));
   profile.effects.push_back(Row(kViewDependence, sh_degree > 0, sh_degree, 0,
                                 "spherical harmonics degree of the fit, as set"));
 
-  profile.scene = ndc ? NormalizeForwardFacing(capture, forward) : NormalizeScene(capture);
+  profile.scene = ndc          ? NormalizeForwardFacing(capture, forward)
+                  : background ? NormalizeSurrounded(capture, surroundings)
+                               : NormalizeScene(capture);
   if (alpha && !outlines.empty()) {
     if (!ndc) profile.scene = TightenToOutlines(profile.scene, outlines);
     profile.scene.box.background = Vec3f{1, 1, 1};  // what transparent photos are laid over

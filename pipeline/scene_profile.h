@@ -25,10 +25,11 @@ struct SceneProfile {
   // One row an effect. "distortion": the lens is followed where it moves a picture's corner by
   // more than kDistortionThreshold (scene_views.h). "ndc": all cameras look one way
   // (forward_facing.h). "alpha": all photos have transparent parts; white is behind them and
-  // the box is the object's. "view-dependence": colours change with the direction, as
-  // `sh_degree` was set; the fit's trial has the last word. "exposure": photos differ in
-  // brightness or white balance by more than noise explains, and undoing that pays on points
-  // that had no say in it (exposure.h).
+  // the box is the object's. "background": much is far beyond what the cameras stand round
+  // (normalize_scene.h); it is on spheres behind a box round the latter. "view-dependence":
+  // colours change with the direction, as `sh_degree` was set; the fit's trial has the last
+  // word. "exposure": photos differ in brightness or white balance by more than noise explains,
+  // and undoing that pays on points that had no say in it (exposure.h).
   std::vector<EffectReport> effects;
   NormalizedScene scene;
   ExposureEstimate exposure;         // empty where it was not measured

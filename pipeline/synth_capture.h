@@ -21,7 +21,7 @@ struct SynthOptions {
   void Describe(Bind& bind) {
     bind("scene", scene,
          {.help = "a still life on a table, a wall with shelves, or a room seen all round",
-          .choices = "table|wall|room"});
+          .choices = "table|wall|room|square"});
     bind("views", views,
          {.unit = "photos", .help = "length of the capture", .min = 2, .max = 9999});
     bind("size", size, {.unit = "pixels", .help = "WIDTHxHEIGHT of a photo"});

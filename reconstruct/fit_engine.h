@@ -22,6 +22,10 @@ struct FitStep {
   float tv_share = 0;
   float tv_density = 0;
   float tv_sh = 0;
+  // The same of the background's layers, where there are some.
+  float tv_sphere_share = 0;
+  float tv_sphere_density = 0;
+  float tv_sphere_color = 0;
 };
 
 struct FitSums {
@@ -45,8 +49,10 @@ class FitEngine {
   // The field as it is now, colours clipped. Nothing of it leaves the device but the picture.
   virtual RenderedView Render(const Camera& camera, const MarchOptions& march) = 0;
   // Prunes voxels that weigh less than `threshold` in every view and resamples; the optimizer's
-  // state starts anew, as in svox2.
-  virtual void Refine(const MarchOptions& march, float threshold, const Vec3i& resolution) = 0;
+  // state starts anew, as in svox2. Background layers, where there are some, get maps of
+  // `sphere_resolution` and are not pruned.
+  virtual void Refine(const MarchOptions& march, float threshold, const Vec3i& resolution,
+                      int sphere_resolution) = 0;
 };
 
 // `rays` and what it was made from stay with the caller. shards: gradient arenas of the CPU.

@@ -9,6 +9,7 @@
 #include "kernels/base/random.h"
 #include "reconstruct/fit_engine.h"
 #include "reconstruct/resample_grid.h"
+#include "reconstruct/sphere_grid.h"
 
 namespace regrade {
 namespace {
@@ -25,6 +26,8 @@ class CpuFitEngine : public FitEngine {
     state_ = std::move(state);
     if (state_.second_moment.size() != state_.grid.records.size())
       state_.second_moment = Buffer<float>(state_.grid.records.size());
+    if (state_.sphere_moment.size() != state_.grid.spheres.texels.size())
+      state_.sphere_moment = Buffer<float>(state_.grid.spheres.texels.size());
     ResetArenas();
   }
   void Show(const std::function<void(FitState*)>& use) override { use(&state_); }
@@ -36,6 +39,7 @@ class CpuFitEngine : public FitEngine {
     rays_->Draw(seed_, step.number, patches, step.patch, &batch_rays_, &batch_targets_);
     Accumulate(step);
     StepVoxels(step.optimizer);
+    if (state_.grid.spheres.on()) StepLayers(step.optimizer);
 #pragma omp parallel for schedule(dynamic, 1)
     for (GradientArena& arena : arenas_) arena.Forget();
   }
@@ -46,18 +50,26 @@ class CpuFitEngine : public FitEngine {
 
   FitSums TakeSums() override { return std::exchange(sums_, {}); }
 
-  void Refine(const MarchOptions& march, float threshold, const Vec3i& resolution) override {
+  void Refine(const MarchOptions& march, float threshold, const Vec3i& resolution,
+              int sphere_resolution) override {
     const Buffer<float> weights =
         MaxWeightsOverViews(state_.grid, *rays_, march, kPruningStride);
+    FastSpheres spheres = std::move(state_.grid.spheres);
     state_.grid = Resample(state_.grid, weights, threshold, resolution);
+    if (spheres.on() && sphere_resolution != spheres.resolution)
+      spheres = ResampleSpheres(spheres, sphere_resolution);
+    state_.grid.spheres = std::move(spheres);
+    state_.sphere_moment = Buffer<float>(state_.grid.spheres.texels.size());
     state_.second_moment = Buffer<float>(state_.grid.records.size());
     ResetArenas();
   }
 
  private:
   void ResetArenas() {
-    for (GradientArena& arena : arenas_)
+    for (GradientArena& arena : arenas_) {
       arena.Reset(state_.grid.num_voxels(), state_.grid.lanes());
+      arena.spheres.Reset(state_.grid.spheres.num_texels());
+    }
   }
 
   void Accumulate(const FitStep& step) {
@@ -88,11 +100,51 @@ class CpuFitEngine : public FitEngine {
                                    step.tv_sh * tv_scale, arena);
         v += count;
       }
+      if (state_.grid.spheres.on()) RegularizeLayers(step, s, shards, &arena->spheres);
     }
     for (const FitStepResult& r : results) {
       sums_.squared_error += r.squared_error;
       sums_.samples += r.samples;
     }
+  }
+
+  // A contiguous run of the map's texels, as of the vertices.
+  void RegularizeLayers(const FitStep& step, int shard, int shards, SphereArena* arena) const {
+    const FastSpheres& spheres = state_.grid.spheres;
+    const int64_t map = spheres.links.size();
+    const int64_t run = static_cast<int64_t>(step.tv_sphere_share * static_cast<float>(map));
+    if (run == 0) return;
+    const int64_t first = static_cast<int64_t>(
+        RandomIndex(seed_ ^ 0x6d7369ull, step.number, 0, static_cast<uint64_t>(map)));
+    const float scale = 1.0f / (static_cast<float>(run) * static_cast<float>(spheres.layers));
+    for (int64_t v = run * shard / shards; v < run * (shard + 1) / shards;) {
+      const int64_t from = (first + v) % map;
+      const int64_t count = std::min(run * (shard + 1) / shards - v, map - from);
+      SphereVariationGradient(spheres, from, from + count, step.tv_sphere_density * scale,
+                              step.tv_sphere_color * scale, arena);
+      v += count;
+    }
+  }
+
+  void StepLayers(const RmspropOptions& optimizer) {
+    std::vector<const SphereArena*> arenas;
+    std::vector<std::pair<int, int64_t>> chunks;
+    for (const GradientArena& arena : arenas_) {
+      const int s = static_cast<int>(arenas.size());
+      for (int64_t b = 0; b < arena.spheres.texel_of_slot.size(); b += kChunk)
+        chunks.push_back({s, b});
+      arenas.push_back(&arena.spheres);
+    }
+    int64_t rejected = 0;
+#pragma omp parallel for schedule(dynamic, 4) reduction(+ : rejected)
+    for (size_t c = 0; c < chunks.size(); ++c) {
+      const auto [s, begin] = chunks[c];
+      const int64_t size = arenas[static_cast<size_t>(s)]->texel_of_slot.size();
+      rejected += StepSpheres(&state_.grid.spheres, state_.sphere_moment.data(), arenas.data(),
+                              static_cast<int>(arenas.size()), s, begin,
+                              std::min(begin + kChunk, size), optimizer);
+    }
+    sums_.rejected_voxels += rejected;
   }
 
   void StepVoxels(const RmspropOptions& optimizer) {

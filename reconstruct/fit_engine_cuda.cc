@@ -68,7 +68,8 @@ class CudaFitEngine : public FitEngine {
     return RenderViewOnDevice(grid_, camera, march);
   }
 
-  void Refine(const MarchOptions& march, float threshold, const Vec3i& resolution) override {
+  void Refine(const MarchOptions& march, float threshold, const Vec3i& resolution,
+              int) override {
     DeviceBuffer<float> weights(grid_.num_voxels(), "weights of voxels");
     weights.Zero();
     constexpr int kStride = 2;  // every other row and column of a view

@@ -12,6 +12,7 @@
 #include "kernels/base/error.h"
 #include "reconstruct/fit_engine.h"
 #include "reconstruct/resample_grid.h"
+#include "reconstruct/sphere_grid.h"
 
 namespace regrade {
 namespace {
@@ -37,6 +38,7 @@ class Fitter {
       total_steps_ += options.steps[s];
       total_work_ += options.steps[s] * WorkOfStep(static_cast<int>(s));
     }
+    REGRADE_CHECK(!box.spheres || backend == Backend::kCpu);  // the GPU has no spheres yet
     if (backend == Backend::kCuda)
       engine_ = MakeCudaFitEngine(&rays_, options.seed);
     else
@@ -52,12 +54,19 @@ class Fitter {
       const GridFrame frame{ResolutionFor(box_, options_.resolutions[0]), box_.center,
                             box_.radius};
       state.grid = MakeInitialGrid(rays_, frame, BasisOf(options_.sh_degree),
-                                   options_.initial_density, box_.near_clip, 2);
+                                   options_.initial_density, box_.near_clip, 2, box_.spheres);
       if (box_.background) state.grid.background = *box_.background;
       if (state.grid.num_voxels() == 0)
         throw Error(ExitCode::kScene, "no part of the scene's box is seen by two cameras",
                     "reconstruct",
                     "the poses do not fit together; photograph with more overlap");
+      if (box_.spheres) {
+        state.grid.spheres =
+            MakeInitialSpheres(rays_, frame, options_.background_layers, SphereResolution(0),
+                               options_.initial_background_density, state.grid.background);
+        // The background comes first: a box that may explain the far will do so, wrongly.
+        if (LeadSteps() > 0) SetDensities(0, &state.grid);
+      }
     }
     stage_ = state.stage;
     step_ = state.step;
@@ -87,6 +96,12 @@ class Fitter {
   }
 
  private:
+  static void SetDensities(float density, FastGrid* grid) {
+    for (int64_t v = 0; v < grid->num_voxels(); ++v)
+      grid->records[v * grid->lanes() + DensityLane(grid->basis)] = density;
+    RefreshDerived(grid);
+  }
+
   static int BasisOf(int degree) { return (degree + 1) * (degree + 1); }
 
   int StepsBefore() const {
@@ -110,6 +125,9 @@ class Fitter {
   void RunStage() {
     const int steps = options_.steps[static_cast<size_t>(stage_)];
     while (step_ < steps) {
+      if (box_.spheres && LeadSteps() > 0 && StepsBefore() == LeadSteps())
+        engine_->Show(
+            [this](FitState* state) { SetDensities(options_.initial_density, &state->grid); });
       engine_->Step(NextStep());
       ++step_;
       const int square = options_.patch * options_.patch;
@@ -145,16 +163,36 @@ class Fitter {
     step.tv_share = options_.tv_share;
     step.tv_density = decay * options_.tv_density;
     step.tv_sh = decay * options_.tv_sh;
+    if (!box_.spheres) return step;
+    step.optimizer.rate_sphere_density = ExponentialRate(
+        options_.rate_background_density, options_.rate_background_density_end, p);
+    step.optimizer.rate_sphere_color =
+        ExponentialRate(options_.rate_background_color, options_.rate_background_color_end, p);
+    step.tv_sphere_share = options_.tv_background_share;
+    step.tv_sphere_density = decay * options_.tv_background_density;
+    step.tv_sphere_color = decay * options_.tv_background_color;
     return step;
+  }
+
+  int LeadSteps() const {
+    return static_cast<int>(options_.background_lead * static_cast<float>(options_.steps[0]));
+  }
+
+  int SphereResolution(int stage) const {
+    return SphereResolutionFor(options_.background_resolution,
+                               options_.resolutions[static_cast<size_t>(stage)],
+                               options_.resolutions.back());
   }
 
   // Prunes by weight and goes on at `longest` voxels a side; 0 keeps the resolution.
   void Refine(int longest) {
     const Vec3i now = engine_->resolution();
     const float longest_now = static_cast<float>(std::max({now.x, now.y, now.z}));
+    const int last_stage = static_cast<int>(options_.resolutions.size()) - 1;
     const Vec3i next = longest > 0 ? ResolutionFor(box_, longest) : now;
     engine_->Refine({options_.step, options_.stop_transmittance},
-                    options_.prune_weight / longest_now, next);
+                    options_.prune_weight / longest_now, next,
+                    SphereResolution(std::min(stage_, last_stage)));
   }
 
   // Sums are read once in a while: a device need not wait for the host at each step.

@@ -23,7 +23,8 @@ struct FitState {
   FastGrid grid;
   Buffer<float> second_moment;  // [N, lanes]
   int stage = 0;
-  int step = 0;  // within the stage
+  int step = 0;                 // within the stage
+  Buffer<float> sphere_moment;  // [columns, L, 4], where there are background spheres
 };
 
 struct FitCurvePoint {

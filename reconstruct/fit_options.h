@@ -28,6 +28,17 @@ struct FitOptions {
   float tv_share = 0.03f;
   float prune_weight = 0.5f;
   float initial_density = 0.5f;
+  int background_layers = 64;
+  int background_resolution = 512;
+  float rate_background_density = 10.0f;
+  float rate_background_density_end = 1.0f;
+  float rate_background_color = 0.1f;
+  float rate_background_color_end = 5e-3f;
+  float tv_background_density = 5e-3f;
+  float tv_background_color = 5e-3f;
+  float tv_background_share = 0.01f;
+  float initial_background_density = 0.1f;
+  float background_lead = 0.9f;
   int shards = 0;
   uint64_t seed = 0;
 
@@ -106,6 +117,46 @@ struct FitOptions {
           .max = 100});
     bind("initial-density", initial_density,
          {.unit = "1/radius", .help = "density everywhere at the start", .min = 0, .max = 100});
+    bind("background-layers", background_layers,
+         {.unit = "spheres",
+          .help = "of the background, where the scene calls for it; time and memory grow with "
+                  "them",
+          .min = 2,
+          .max = 512});
+    bind("background-resolution", background_resolution,
+         {.unit = "texels",
+          .help = "from pole to pole of a background sphere at the last stage; memory grows "
+                  "with its square",
+          .min = 16,
+          .max = 4096});
+    bind("background-rate-density", rate_background_density,
+         {.help = "RMSProp rate of the background's densities at the start",
+          .min = 0,
+          .max = 1e4});
+    bind("background-rate-density-end", rate_background_density_end,
+         {.help = "the same at the end", .min = 0, .max = 1e4});
+    bind(
+        "background-rate-color", rate_background_color,
+        {.help = "RMSProp rate of the background's colours at the start", .min = 0, .max = 10});
+    bind("background-rate-color-end", rate_background_color_end,
+         {.help = "the same at the end", .min = 0, .max = 10});
+    bind("background-tv-density", tv_background_density,
+         {.help = "weight of the total variation of the background's densities",
+          .min = 0,
+          .max = 10});
+    bind("background-tv-color", tv_background_color,
+         {.help = "weight of the total variation of the background's colours",
+          .min = 0,
+          .max = 10});
+    bind("background-tv-share", tv_background_share,
+         {.help = "share of the background regularised in a step", .min = 0, .max = 1});
+    bind("background-initial-density", initial_background_density,
+         {.help = "density of all layers at the start", .min = 0, .max = 100});
+    bind("background-lead", background_lead,
+         {.unit = "share of the first stage",
+          .help = "meanwhile the background alone is fitted",
+          .min = 0,
+          .max = 0.9});
     bind("fit-shards", shards,
          {.help = "gradient arenas; 0: one a thread, or 4 with --reproducible",
           .min = 0,

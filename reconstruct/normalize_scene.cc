@@ -5,6 +5,8 @@
 #include <cmath>
 #include <vector>
 
+#include "kernels/base/error.h"
+
 namespace regrade {
 namespace {
 
@@ -18,6 +20,12 @@ constexpr double kNearestShare =
 constexpr double kCornerDepth = 0.25;
 constexpr double kCornerTail = 0.1;
 constexpr size_t kMinPointsOfView = 10;
+// Of a cube round the axes' common point: the cameras' median distance is this share of its
+// half side, and without points nothing is nearer to a camera than that share.
+constexpr double kReachOfCameras = 0.9;
+constexpr double kFewPointsNearest = 0.35;
+constexpr double kNearPoints = 0.1;    // the share of points that are near for cameras within
+constexpr double kMostNearClip = 0.5;  // half sides
 
 Eigen::Vector3d ToEigen(const Vec3d& v) { return {v.x, v.y, v.z}; }
 Vec3d FromEigen(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
@@ -136,16 +144,35 @@ double RoundingOf(const std::vector<Vec3d>& centers) {
   return 1e-8 * farthest;
 }
 
+// Places and directions of all cameras.
+struct CameraPoses {
+  std::vector<Vec3d> centers, ups, forwards;
+
+  explicit CameraPoses(const Capture& capture) {
+    for (const CaptureView& view : capture.views) {
+      centers.push_back(view.camera.Center());
+      ups.push_back(view.camera.Up());
+      forwards.push_back(view.camera.Forward());
+    }
+  }
+};
+
+// World units: nothing is modelled nearer to a camera than a share of where the nearest points
+// are; 0 without points.
+double NearestDistance(const Capture& capture, const std::vector<Vec3d>& centers) {
+  std::vector<double> distances;
+  for (const ScenePoint& p : capture.points)
+    for (const int32_t view : p.views)
+      distances.push_back(Norm(p.position - centers[static_cast<size_t>(view)]));
+  return distances.empty() ? 0 : kNearestShare * Quantile(&distances, kTail);
+}
+
 }  // namespace
 
 NormalizedScene NormalizeScene(const Capture& capture) {
   NormalizedScene result;
-  std::vector<Vec3d> centers, ups, forwards;
-  for (const CaptureView& view : capture.views) {
-    centers.push_back(view.camera.Center());
-    ups.push_back(view.camera.Up());
-    forwards.push_back(view.camera.Forward());
-  }
+  const CameraPoses poses(capture);
+  const auto& [centers, ups, forwards] = poses;
   const Mat3d rotation = UprightRotation(centers, ups, forwards, &result.notice);
 
   // Box and nearest distance in the rotated world.
@@ -165,16 +192,12 @@ NormalizedScene NormalizeScene(const Capture& capture) {
       low[a] = std::min(low[a], Quantile(&along, kCornerTail));
       high[a] = std::max(high[a], Quantile(&along, 1 - kCornerTail));
     }
-    std::vector<double> distances;
-    for (const ScenePoint& p : capture.points)
-      for (const int32_t view : p.views)
-        distances.push_back(Norm(p.position - centers[static_cast<size_t>(view)]));
-    if (!distances.empty()) nearest = kNearestShare * Quantile(&distances, kTail);
+    nearest = NearestDistance(capture, centers);
   } else {
     const Vec3d common = CommonPoint(centers, forwards);
     std::vector<double> distances;
     for (const Vec3d& c : centers) distances.push_back(Norm(c - common));
-    double half = Quantile(&distances, 0.5) / 0.9;
+    double half = Quantile(&distances, 0.5) / kReachOfCameras;
     std::string notice = "few points: the box is the cube round the cameras' common point";
     if (!(half > RoundingOf(centers))) {
       notice =
@@ -191,7 +214,7 @@ NormalizedScene NormalizeScene(const Capture& capture) {
       low[a] = middle - half;
       high[a] = middle + half;
     }
-    nearest = 0.35 * half;
+    nearest = kFewPointsNearest * half;
   }
   Vec3d middle, half;
   double longest = 0;
@@ -208,6 +231,60 @@ NormalizedScene NormalizeScene(const Capture& capture) {
   for (int a = 0; a < 3; ++a)  // a flat scene still gets a box with a volume
     result.box.radius[a] = static_cast<float>(std::max(half[a] / longest, 0.05));
   result.box.near_clip = static_cast<float>(nearest * s.scale);
+  return result;
+}
+
+Surroundings MeasureSurroundings(const Capture& capture) {
+  Surroundings result;
+  const CameraPoses poses(capture);
+  result.center = CommonPoint(poses.centers, poses.forwards);
+  std::vector<double> distances, ahead;
+  for (size_t i = 0; i < poses.centers.size(); ++i) {
+    const Vec3d to_center = result.center - poses.centers[i];
+    distances.push_back(Norm(to_center));
+    ahead.push_back(Dot(to_center, poses.forwards[i]));
+  }
+  const double reach = Quantile(&distances, 0.5) / kReachOfCameras;
+  if (!(reach > RoundingOf(poses.centers))) return result;
+  result.half = reach;
+  // Cameras that look outwards stand round nothing: what is near to them begins with the
+  // points.
+  if (Quantile(&ahead, 0.5) < 0 && capture.points.size() >= kMinPoints) {
+    std::vector<double> out;
+    for (const ScenePoint& p : capture.points) out.push_back(Norm(p.position - result.center));
+    result.half = std::max(reach, Quantile(&out, kNearPoints));
+  }
+  int64_t far = 0, all = 0;
+  for (const ScenePoint& p : capture.points) {
+    const auto views = static_cast<int64_t>(p.views.size());
+    all += views;
+    if (Norm(p.position - result.center) > kFarSides * result.half) far += views;
+  }
+  if (capture.points.size() >= kMinPoints && all > 0)
+    result.far_share = static_cast<double>(far) / static_cast<double>(all);
+  return result;
+}
+
+NormalizedScene NormalizeSurrounded(const Capture& capture, const Surroundings& surroundings) {
+  NormalizedScene result;
+  const CameraPoses poses(capture);
+  if (!(surroundings.half > 0))
+    throw Error(ExitCode::kScene, "the cameras stand at one place: there is no box to surround",
+                "--effects background=on", "leave the choice to auto");
+  const Mat3d upright =
+      UprightRotation(poses.centers, poses.ups, poses.forwards, &result.notice);
+  Similarity& s = result.field_from_world;
+  s.scale = 1 / surroundings.half;
+  s.rotation.row[0] = upright.row[0];
+  s.rotation.row[1] = upright.row[2];
+  s.rotation.row[2] = -upright.row[1];
+  s.translation = -(s.scale * (s.rotation * surroundings.center));
+  const double nearest = capture.points.size() >= kMinPoints
+                             ? NearestDistance(capture, poses.centers)
+                             : kFewPointsNearest * surroundings.half;
+  // Beyond the box nothing would be left of it.
+  result.box.near_clip = static_cast<float>(std::min(nearest * s.scale, kMostNearClip));
+  result.box.spheres = true;
   return result;
 }
 

@@ -25,4 +25,21 @@ struct NormalizedScene {
 // and ups that cancel (H131).
 NormalizedScene NormalizeScene(const Capture& capture);
 
+// What the cameras stand round, and how much of what they see lies far beyond it.
+struct Surroundings {
+  Vec3d center;          // world: the optical axes' common point
+  double half = 0;       // world: half side of the cube that reaches the cameras; 0: unknown
+  double far_share = 0;  // of all observations of points: farther out than kFarSides halves
+};
+// Beyond this many half sides of that cube, a box round everything would leave what the cameras
+// stand round less than a quarter of its voxels a side.
+inline constexpr double kFarSides = 4;
+inline constexpr double kFarShare = 0.05;  // more than this, and the scene has a background
+// Free of the photos' order. A capture without points has no far share.
+Surroundings MeasureSurroundings(const Capture& capture);
+
+// The cube as the box, for a scene whose background is on spheres: the field's frame has y up,
+// so that the spheres' poles are where few photos look.
+NormalizedScene NormalizeSurrounded(const Capture& capture, const Surroundings& surroundings);
+
 }  // namespace regrade

@@ -34,10 +34,18 @@ std::vector<uint8_t> KeptVertices(const FastGrid& grid, const Buffer<float>& wei
   return keep;
 }
 
+// To within a cell's diagonal, as in svox2: the cells that the sphere cuts are whole.
+bool InsideBall(const GridFrame& frame, const Vec3f& p) {
+  Vec3f q;
+  for (int a = 0; a < 3; ++a) q[a] = (p[a] - frame.center[a]) / frame.radius[a];
+  const int least = std::min({frame.resolution.x, frame.resolution.y, frame.resolution.z});
+  return Norm(q) <= 1 + std::sqrt(3.0f) / static_cast<float>(least);
+}
+
 }  // namespace
 
 FastGrid MakeInitialGrid(const TrainingRays& rays, const GridFrame& frame, int basis,
-                         float density, float near_clip, int min_views) {
+                         float density, float near_clip, int min_views, bool ball) {
   FastGrid grid;
   grid.frame = frame;
   grid.basis = basis;
@@ -52,6 +60,7 @@ FastGrid MakeInitialGrid(const TrainingRays& rays, const GridFrame& frame, int b
         const Vec3d p =
             frame.WorldOf({static_cast<float>(x), static_cast<float>(y), static_cast<float>(z)})
                 .Cast<double>();
+        if (ball && !InsideBall(frame, p.Cast<float>())) continue;
         int views = 0;
         for (int v = 0; v < rays.num_views() && views < min_views; ++v) {
           const Camera& camera = rays.camera(v);

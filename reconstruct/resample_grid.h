@@ -11,9 +11,10 @@
 namespace regrade {
 
 // A grid that stores every vertex seen by at least `min_views` cameras beyond near_clip, at
-// `density`, mid-grey.
+// `density`, mid-grey. With `ball`, only within the unit sphere of the box: the rest is the
+// background's.
 FastGrid MakeInitialGrid(const TrainingRays& rays, const GridFrame& frame, int basis,
-                         float density, float near_clip, int min_views);
+                         float density, float near_clip, int min_views, bool ball = false);
 
 // Largest rendering weight each voxel has in any training view; every `stride`-th pixel both
 // ways is looked at.

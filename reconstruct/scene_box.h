@@ -16,7 +16,8 @@ struct SceneBox {
   // are the picture's sides, whatever their lengths.
   float voxel_aspect = 1;
   std::optional<Vec3f>
-      background;  // sRGB behind everything; not given: the photos' mean colour
+      background;        // sRGB behind everything; not given: the photos' mean colour
+  bool spheres = false;  // what lies beyond the box is fitted on background spheres
 };
 
 // Vertices per axis where the longest side gets `longest`; voxels are cubes to within rounding.

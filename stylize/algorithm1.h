@@ -22,14 +22,21 @@ T Algorithm1(const LipschitzNetwork& network, const RadianceField& field,
   const Geometry& geometry = *field.geometry;
   const std::vector<int32_t> vertex = VertexOfVoxel(geometry);
   const DenseNetwork<T> f = network.Effective<T>();
-  const int64_t n = geometry.num_voxels();
+  const std::vector<int32_t> place = PlaceOfColumn(geometry.spheres);
+  const int64_t voxels = geometry.num_voxels(), n = voxels + geometry.spheres.num_texels();
 
   // 0. feed forward
   std::vector<T> features(static_cast<size_t>(n) * kNetworkInputs);
   std::vector<T> sh(static_cast<size_t>(n) * kNetworkSh), d_sh(sh.size());
   for (int64_t v = 0; v < n; ++v) {
     float row[kFeatureStride];
-    FillFeatures(field, network.data().position_scale, v, vertex[static_cast<size_t>(v)], row);
+    if (v < voxels)
+      FillFeatures(field, network.data().position_scale, v, vertex[static_cast<size_t>(v)],
+                   row);
+    else
+      FillTexelFeatures(field, network.data().position_scale, v - voxels,
+                        place[static_cast<size_t>((v - voxels) / geometry.spheres.layers)],
+                        row);
     T* x = &features[static_cast<size_t>(v) * kNetworkInputs];
     std::copy_n(row, kNetworkInputs, x);
     T* y = &sh[static_cast<size_t>(v) * kNetworkSh];
@@ -45,18 +52,23 @@ T Algorithm1(const LipschitzNetwork& network, const RadianceField& field,
     const int64_t first = weights.first[static_cast<size_t>(r)];
     const int64_t last = weights.first[static_cast<size_t>(r) + 1];
     std::vector<Vec3<T>> raw(static_cast<size_t>(last - first));
-    std::vector<Cell<T>> cells;
     Vec3<T> color =
         field.background.Cast<T>() * T(weights.transmittance[static_cast<size_t>(r)]);
     for (int64_t i = first; i < last; ++i) {
       const WeightedSample& sample = weights.samples[static_cast<size_t>(i)];
-      cells.push_back({sample.vertex, sample.fraction.Cast<T>()});
-      T blend[kNetworkSh];
-      Interpolate(geometry.frame, geometry.links.data(), sh.data(), kNetworkSh, kNetworkSh,
-                  cells.back(), blend);
+      const Vec3<T> fraction = sample.fraction.Cast<T>();
+      int32_t points[8];
+      CornerPoints(geometry, sample, points);
+      T blend[kNetworkSh] = {};
+      for (int corner = 0; corner < 8; ++corner)
+        for (int k = 0; k < kNetworkSh && points[corner] >= 0; ++k)
+          blend[k] +=
+              CornerWeight(fraction, corner) *
+              sh[static_cast<size_t>(points[corner]) * kNetworkSh + static_cast<size_t>(k)];
       for (int c = 0; c < 3; ++c) {
         T value = T(0.5);
-        for (int k = 0; k < 9; ++k) value += blend[c * 9 + k] * gamma[k];
+        for (int k = 0; k < (sample.on_sphere() ? 1 : 9); ++k)
+          value += blend[c * 9 + k] * gamma[k];
         raw[static_cast<size_t>(i - first)][c] = value;
         color[c] += T(sample.weight) * std::max(value, T(0));
       }
@@ -64,14 +76,20 @@ T Algorithm1(const LipschitzNetwork& network, const RadianceField& field,
     const Vec3<T> difference = color - targets[static_cast<size_t>(r)];
     loss += scale * Dot(difference, difference);
     for (int64_t i = first; i < last; ++i) {
-      T d_blend[kNetworkSh] = {};
-      for (int c = 0; c < 3; ++c)
-        if (raw[static_cast<size_t>(i - first)][c] > 0)
-          for (int k = 0; k < 9; ++k)
-            d_blend[c * 9 + k] = 2 * scale * difference[c] *
-                                 T(weights.samples[static_cast<size_t>(i)].weight) * gamma[k];
-      InterpolateAdjoint(geometry.frame, geometry.links.data(), kNetworkSh, kNetworkSh,
-                         cells[static_cast<size_t>(i - first)], d_blend, d_sh.data());
+      const WeightedSample& sample = weights.samples[static_cast<size_t>(i)];
+      const Vec3<T> fraction = sample.fraction.Cast<T>();
+      int32_t points[8];
+      CornerPoints(geometry, sample, points);
+      for (int c = 0; c < 3; ++c) {
+        if (!(raw[static_cast<size_t>(i - first)][c] > 0)) continue;
+        for (int k = 0; k < (sample.on_sphere() ? 1 : 9); ++k) {
+          const T d_blend = 2 * scale * difference[c] * T(sample.weight) * gamma[k];
+          for (int corner = 0; corner < 8; ++corner)
+            if (points[corner] >= 0)
+              d_sh[static_cast<size_t>(points[corner]) * kNetworkSh +
+                   static_cast<size_t>(c * 9 + k)] += CornerWeight(fraction, corner) * d_blend;
+        }
+      }
     }
   }
 

@@ -2,10 +2,28 @@
 
 #include <algorithm>
 
+#include "kernels/field/background_spheres.h"
 #include "kernels/field/spherical_harmonics.h"
 #include "kernels/field/trilinear.h"
 
 namespace regrade {
+namespace {
+
+Vec3f SphereColor(const RadianceField& field, const WeightedSample& sample) {
+  const int64_t voxels = field.geometry->num_voxels();
+  int32_t points[8];
+  CornerPoints(*field.geometry, sample, points);
+  float value[3] = {};
+  for (int k = 0; k < 8; ++k) {
+    if (points[k] < 0) continue;
+    for (int c = 0; c < 3; ++c)
+      value[c] += CornerWeight(sample.fraction, k) *
+                  field.appearance.sphere_color[3 * (points[k] - voxels) + c];
+  }
+  return LayerColor(value);
+}
+
+}  // namespace
 
 ColorMap LeastSquaresMap(const RadianceField& field, const StyleRays& batch,
                          const AggregationOptions& options) {
@@ -22,6 +40,10 @@ ColorMap LeastSquaresMap(const RadianceField& field, const StyleRays& batch,
     for (int64_t i = weights.first[static_cast<size_t>(r)];
          i < weights.first[static_cast<size_t>(r) + 1]; ++i) {
       const WeightedSample& sample = weights.samples[static_cast<size_t>(i)];
+      if (sample.on_sphere()) {
+        foreground[static_cast<size_t>(r)] += SphereColor(field, sample) * sample.weight;
+        continue;
+      }
       float sh[3 * kMaxBasis];
       Interpolate(geometry.frame, geometry.links.data(), field.appearance.sh.data(), stride,
                   stride, Cell<float>{sample.vertex, sample.fraction}, sh);

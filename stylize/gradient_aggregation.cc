@@ -44,36 +44,43 @@ GradientAggregation::GradientAggregation(const RadianceField& field,
     : field_(field),
       options_(options),
       vertex_of_voxel_(VertexOfVoxel(*field.geometry)),
-      slot_of_voxel_(vertex_of_voxel_.size(), -1) {}
+      place_of_column_(PlaceOfColumn(field.geometry->spheres)),
+      slot_of_point_(static_cast<size_t>(field.geometry->num_voxels() +
+                                         field.geometry->spheres.num_texels()),
+                     -1) {}
 
 // Slots in the order of first touch: a function of the rays alone.
 void GradientAggregation::Touch(Band* band) {
-  const Geometry& geometry = *field_.geometry;
   band->slots.resize(band->weights.samples.size() * 8);
   int32_t* slot = band->slots.data();
-  for (const WeightedSample& sample : band->weights.samples)
-    for (int corner = 0; corner < 8; ++corner) {
-      const int32_t voxel = geometry.links[CornerVertex(geometry.frame, sample.vertex, corner)];
-      if (voxel < 0) {
+  for (const WeightedSample& sample : band->weights.samples) {
+    int32_t points[8];
+    CornerPoints(*field_.geometry, sample, points);
+    for (const int32_t point : points) {
+      if (point < 0) {
         *slot++ = -1;
         continue;
       }
-      int32_t& known = slot_of_voxel_[static_cast<size_t>(voxel)];
+      int32_t& known = slot_of_point_[static_cast<size_t>(point)];
       if (known < 0) {
         known = static_cast<int32_t>(touched_.size());
-        touched_.push_back(voxel);
+        touched_.push_back(point);
       }
       *slot++ = known;
     }
+  }
 }
 
 void GradientAggregation::TouchAll() {
-  touched_.resize(slot_of_voxel_.size());
-  for (size_t voxel = 0; voxel < touched_.size(); ++voxel)
-    slot_of_voxel_[voxel] = touched_[voxel] = static_cast<int32_t>(voxel);
+  touched_.resize(slot_of_point_.size());
+  for (size_t point = 0; point < touched_.size(); ++point)
+    slot_of_point_[point] = touched_[point] = static_cast<int32_t>(point);
 }
 
 namespace {
+
+// Background spheres have plain colours.
+int TermsOf(const WeightedSample& sample) { return sample.on_sphere() ? 1 : 9; }
 
 // Colours of a ray before the background, and which channels of which samples the clamp left
 // open.
@@ -89,10 +96,11 @@ Vec3f RenderStyled(const WeightedSample* samples, const int32_t* slots, int64_t 
       const float* row = sh + static_cast<int64_t>(slot) * kFeatureStride;
       for (int l = 0; l < kFeatureStride; ++l) blend[l] += w * row[l];
     }
+    const int terms = TermsOf(samples[i]);
     uint8_t bits = 0;
     for (int c = 0; c < 3; ++c) {
       float value = 0.5f;
-      for (int k = 0; k < 9; ++k) value += blend[c * 9 + k] * gamma[k];
+      for (int k = 0; k < terms; ++k) value += blend[c * 9 + k] * gamma[k];
       if (!(value > 0)) continue;
       bits = static_cast<uint8_t>(bits | (1 << c));
       color[c] += samples[i].weight * value;
@@ -115,10 +123,14 @@ void ScatterStyled(const WeightedSample* samples, const int32_t* slots, int64_t 
     if (bits == 0) continue;
     float masked[kFeatureStride];
     const float* d = d_blend;
-    if (bits != 7) {
+    const int terms = TermsOf(samples[i]);
+    if (bits != 7 || terms != 9) {
       std::copy_n(d_blend, kFeatureStride, masked);
       for (int c = 0; c < 3; ++c)
-        if (!(bits & (1 << c))) std::fill_n(masked + c * 9, 9, 0.0f);
+        if (bits & (1 << c))
+          std::fill_n(masked + c * 9 + terms, 9 - terms, 0.0f);
+        else
+          std::fill_n(masked + c * 9, 9, 0.0f);
       d = masked;
     }
     for (int corner = 0; corner < 8; ++corner) {
@@ -144,13 +156,21 @@ void GradientAggregation::March(const StyleRays& batch, int64_t begin, int64_t e
 
 void GradientAggregation::FillTouchedFeatures(float position_scale) {
   const int64_t slots = static_cast<int64_t>(touched_.size());
+  const int64_t voxels = field_.geometry->num_voxels();
   features_.Resize(slots * kFeatureStride);
   sh_.Resize(slots * kFeatureStride);
 #pragma omp parallel for schedule(static)
   for (int64_t s = 0; s < slots; ++s) {
-    const int32_t voxel = touched_[static_cast<size_t>(s)];
-    FillFeatures(field_, position_scale, voxel, vertex_of_voxel_[static_cast<size_t>(voxel)],
-                 features_.data() + s * kFeatureStride);
+    const int32_t point = touched_[static_cast<size_t>(s)];
+    float* const row = features_.data() + s * kFeatureStride;
+    if (point < voxels) {
+      FillFeatures(field_, position_scale, point, vertex_of_voxel_[static_cast<size_t>(point)],
+                   row);
+    } else {
+      const int64_t texel = point - voxels;
+      const size_t column = static_cast<size_t>(texel / field_.geometry->spheres.layers);
+      FillTexelFeatures(field_, position_scale, texel, place_of_column_[column], row);
+    }
   }
 }
 
@@ -201,7 +221,7 @@ bool GradientAggregation::Counts(const StyleRays& batch, const Band& band, int64
 }
 
 void GradientAggregation::ForgetTouched() {
-  for (const int32_t voxel : touched_) slot_of_voxel_[static_cast<size_t>(voxel)] = -1;
+  for (const int32_t point : touched_) slot_of_point_[static_cast<size_t>(point)] = -1;
   touched_.clear();
 }
 

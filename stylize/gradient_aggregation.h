@@ -98,9 +98,10 @@ class GradientAggregation : public StyleLoss {
 
   const RadianceField& field_;
   AggregationOptions options_;
-  std::vector<int32_t> vertex_of_voxel_;
-  std::vector<int32_t> slot_of_voxel_;  // -1 between runs
-  std::vector<int32_t> touched_;        // voxel of slot
+  std::vector<int32_t> vertex_of_voxel_, place_of_column_;
+  // Of points, see CornerPoints: voxels, and then the texels of background spheres.
+  std::vector<int32_t> slot_of_point_;  // -1 between runs
+  std::vector<int32_t> touched_;        // point of slot
   Buffer<float> features_, sh_, d_sh_;  // [slots, kFeatureStride]
 };
 

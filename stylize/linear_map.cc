@@ -14,6 +14,12 @@ Appearance ApplyColorMap(const Appearance& appearance, const ColorMap& map) {
     float* sh = &result.sh[i * result.stride()];
     MapCoefficients(map, result.basis, sh, sh);
   }
+  const int64_t texels = appearance.sphere_color.size() / 3;
+#pragma omp parallel for schedule(static)
+  for (int64_t i = 0; i < texels; ++i) {
+    float* color = &result.sphere_color[3 * i];
+    MapCoefficients(map, 1, color, color);
+  }
   return result;
 }
 

@@ -32,8 +32,8 @@ void MapCoefficients(const ColorMap& map, int basis, const T* sh, T* mapped) {
   }
 }
 
-// Every voxel's coefficients. A constant background colour is no coefficient: it stays, as in
-// the paper.
+// Every voxel's coefficients, and every background texel's colour. A constant background colour
+// is no coefficient: it stays, as in the paper.
 Appearance ApplyColorMap(const Appearance& appearance, const ColorMap& map);
 
 // Largest singular value, ||m||_2.

@@ -6,6 +6,7 @@
 #include <iterator>
 
 #include "kernels/base/error.h"
+#include "kernels/field/background_spheres.h"
 #include "kernels/field/spherical_harmonics.h"
 #include "kernels/network/lipschitz_layer.h"
 
@@ -245,6 +246,23 @@ void FillFeatures(const RadianceField& field, float position_scale, int64_t voxe
     row[kNetworkSh + a] =
         position_scale *
         (2 * (static_cast<float>(index[a]) + 0.5f) / static_cast<float>(n[a]) - 1);
+}
+
+void FillTexelFeatures(const RadianceField& field, float position_scale, int64_t texel,
+                       int32_t at, float* row) {
+  const int resolution = field.geometry->spheres.resolution;
+  std::fill_n(row, kFeatureStride, 0.0f);
+  for (int c = 0; c < 3; ++c) row[c * 9] = field.appearance.sphere_color[3 * texel + c];
+  const Vec3f direction = TexelDirection<float>(resolution, at / resolution, at % resolution);
+  for (int a = 0; a < 3; ++a) row[kNetworkSh + a] = position_scale * direction[a];
+}
+
+std::vector<int32_t> PlaceOfColumn(const SphereGeometry& spheres) {
+  std::vector<int32_t> place(static_cast<size_t>(spheres.num_columns()));
+  for (int64_t at = 0; at < spheres.links.size(); ++at)
+    if (spheres.links[at] >= 0)
+      place[static_cast<size_t>(spheres.links[at])] = static_cast<int32_t>(at);
+  return place;
 }
 
 }  // namespace regrade

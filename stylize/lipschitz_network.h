@@ -113,4 +113,11 @@ std::vector<int32_t> VertexOfVoxel(const Geometry& geometry);
 void FillFeatures(const RadianceField& field, float position_scale, int64_t voxel,
                   int32_t vertex, float* row);
 
+// The same of a texel of a background sphere: its colour as degree 0, its direction on the unit
+// sphere as the position. `at`: its place in the map, x R + y.
+void FillTexelFeatures(const RadianceField& field, float position_scale, int64_t texel,
+                       int32_t at, float* row);
+// The place in the map of each column: the inverse of SphereGeometry::links.
+std::vector<int32_t> PlaceOfColumn(const SphereGeometry& spheres);
+
 }  // namespace regrade

@@ -55,6 +55,7 @@ void GradientArena::Forget() {
   for (const int32_t voxel : voxel_of_slot) slot_of_voxel[voxel] = -1;
   voxel_of_slot.Clear();
   gradient.Clear();
+  spheres.Forget();
 }
 
 FastGrid MakeFastGrid(const RadianceField& field) {
@@ -65,6 +66,7 @@ FastGrid MakeFastGrid(const RadianceField& field) {
   grid.basis = field.appearance.basis;
   grid.background = field.background;
   grid.near_clip = field.near_clip;
+  grid.spheres = MakeFastSpheres(field);
   const int64_t n = geometry.num_voxels();
   const int lanes = grid.lanes(), stride = field.appearance.stride();
   grid.records.Resize(n * lanes);
@@ -93,6 +95,7 @@ RadianceField ToRadianceField(const FastGrid& grid) {
                 field.appearance.sh.data() + v * stride);
     geometry->density[v] = grid.records[v * lanes + DensityLane(grid.basis)];
   }
+  ToSphereGeometry(grid.spheres, &geometry->spheres, &field.appearance.sphere_color);
   field.geometry = std::move(geometry);
   field.background = grid.background;
   field.near_clip = grid.near_clip;

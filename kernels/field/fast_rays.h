@@ -10,6 +10,7 @@
 #include <cstdint>
 
 #include "kernels/base/buffer.h"
+#include "kernels/field/fast_spheres.h"
 #include "kernels/field/radiance_field.h"
 #include "kernels/field/ray_march.h"
 
@@ -43,6 +44,7 @@ struct FastGrid {
   int basis = 9;
   Vec3f background{0, 0, 0};
   float near_clip = 0;  // world units
+  FastSpheres spheres;  // behind the box, where a scene has them
 
   Vec3i bricks() const {
     return {(frame.resolution.x + kBrick - 1) / kBrick,
@@ -64,6 +66,7 @@ struct GradientArena {
   Buffer<int32_t> voxel_of_slot;  // [slots]
   Buffer<float> gradient;         // [slots, lanes]
   int64_t gradient_capacity = 0;  // floats reserved in `gradient`
+  SphereArena spheres;
 
   void Reset(int64_t num_voxels, int lanes);  // allocate and forget
   void Forget();                              // untouch, in time proportional to the slots
@@ -88,6 +91,8 @@ struct RmspropOptions {
   // [-view_bound, view_bound]. What the colour clamp hides would otherwise wander off, and come
   // to light under a colour map: clamping does not commute with it.
   float view_bound = 0.2f;
+  float rate_sphere_density = 3.0f;  // of the background's layers
+  float rate_sphere_color = 0.1f;
 };
 
 struct FitStepResult {

@@ -7,6 +7,7 @@
 #include "kernels/field/fast_rays.h"
 #include "kernels/field/fast_scatter_simd.h"
 #include "kernels/field/fast_shade_simd.h"
+#include "kernels/field/fast_spheres_simd.h"
 #include "kernels/field/fast_step_simd.h"
 
 namespace regrade::REGRADE_SIMD_NAMESPACE {
@@ -16,13 +17,19 @@ template <int kBasis>
 void RenderRays(const FastGrid& grid, const Ray* rays, int64_t n, const MarchOptions& options,
                 float* color, float* depth, float* transmittance) {
   Marched marched;
+  const auto spheres = MakeMarchedSpheres(grid);
   for (int64_t r = 0; r < n; ++r) {
     March(grid, rays[r], options, &marched);
-    const Quad sums = Shade(grid, RayBasis<kBasis>(rays[r].direction), &marched);
-    for (int a = 0; a < 3; ++a)
-      color[3 * r + a] = sums[a] + grid.background[a] * marched.transmittance;
-    depth[r] = sums[3] * marched.world_per_voxel;
-    transmittance[r] = marched.transmittance;
+    Quad sums = Shade(grid, RayBasis<kBasis>(rays[r].direction), &marched);
+    sums[3] *= marched.world_per_voxel;
+    float left = marched.transmittance;
+    if (spheres) {
+      sums += ShadeSpheres(grid, rays[r], options.stop_transmittance, left, spheres.get());
+      left = spheres->transmittance;
+    }
+    for (int a = 0; a < 3; ++a) color[3 * r + a] = sums[a] + grid.background[a] * left;
+    depth[r] = sums[3];
+    transmittance[r] = left;
   }
 }
 
@@ -31,16 +38,27 @@ FitStepResult Accumulate(const FastGrid& grid, const RayBatch& batch,
                          const MarchOptions& options, float scale, GradientArena* arena) {
   FitStepResult result;
   Marched marched;
+  const auto spheres = MakeMarchedSpheres(grid);
   for (int64_t r = 0; r < batch.size; ++r) {
     March(grid, batch.rays[r], options, &marched);
     const RayBasis<kBasis> basis(batch.rays[r].direction);
-    const Quad sums = Shade(grid, basis, &marched);
+    Quad sums = Shade(grid, basis, &marched);
+    float left = marched.transmittance;
+    if (spheres) {
+      sums +=
+          ShadeSpheres(grid, batch.rays[r], options.stop_transmittance, left, spheres.get());
+      left = spheres->transmittance;
+      result.samples += spheres->num_samples;
+    }
     Vec3f error;
     for (int a = 0; a < 3; ++a)
-      error[a] = sums[a] + grid.background[a] * marched.transmittance - batch.targets[r][a];
+      error[a] = sums[a] + grid.background[a] * left - batch.targets[r][a];
     result.squared_error += Dot(error, error);
     result.samples += marched.num_samples;
-    ScatterRay(grid, basis, error * (2 * scale), &marched, arena);
+    const Vec3f d_color = error * (2 * scale);
+    Quad behind{grid.background.x, grid.background.y, grid.background.z, 0};
+    if (spheres) ScatterSpheres(*spheres, d_color, &behind, &arena->spheres);
+    ScatterRay(basis, d_color, behind, &marched, arena);
   }
   return result;
 }

@@ -29,11 +29,11 @@ inline void FindSlots(Marched* marched, GradientArena* arena) {
   }
 }
 
-// Adds dL/d(record) of all samples for dL/dC = d_color, last sample to first. See
-// EQ(composite-adjoint).
+// Adds dL/d(record) of all samples for dL/dC = d_color, last sample to first; `behind` is the
+// colour that the box has behind it. See EQ(composite-adjoint).
 template <int kBasis>
-inline void ScatterRay(const FastGrid& grid, const RayBasis<kBasis>& basis,
-                       const Vec3f& d_color, Marched* marched, GradientArena* arena) {
+inline void ScatterRay(const RayBasis<kBasis>& basis, const Vec3f& d_color, Quad behind,
+                       Marched* marched, GradientArena* arena) {
   using Shape = RecordShape<kBasis>;
   constexpr int kLanes = Shape::kLanes;
   constexpr int kDensityVector = DensityLane(kBasis) / Shape::kWidth;
@@ -46,7 +46,6 @@ inline void ScatterRay(const FastGrid& grid, const RayBasis<kBasis>& basis,
   };
   constexpr int64_t kAhead = 6;
   const Quad d_quad{d_color.x, d_color.y, d_color.z, 0};  // the last lane of raw is no colour
-  Quad behind{grid.background.x, grid.background.y, grid.background.z, 0};
   for (int64_t i = marched->num_samples; i-- > 0;) {
     if (i >= kAhead) {
       const Sample& ahead = marched->samples[static_cast<size_t>(i - kAhead)];

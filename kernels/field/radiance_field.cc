@@ -48,6 +48,33 @@ void CheckLinks(const Geometry& geometry, const char* name) {
   }
 }
 
+void CheckSpheres(const Geometry& geometry, const Buffer<float>& color, const char* name) {
+  const SphereGeometry& spheres = geometry.spheres;
+  if (!spheres.on()) {
+    if (spheres.layers < 0 || spheres.density.size() > 0 || color.size() > 0)
+      Refuse(name, "there is a background without layers");
+    return;
+  }
+  if (spheres.layers > kMaxLayers || spheres.resolution < 2 ||
+      spheres.resolution > kMaxSphereResolution)
+    Refuse(name, "a background of " + std::to_string(spheres.layers) + " layers and " +
+                     std::to_string(spheres.resolution) +
+                     " texels from pole to pole; at most " + std::to_string(kMaxLayers) +
+                     " and " + std::to_string(kMaxSphereResolution) + " are known");
+  const int64_t map = int64_t{2} * spheres.resolution * spheres.resolution;
+  if (map * spheres.layers > INT32_MAX ||
+      geometry.num_voxels() + spheres.density.size() > INT32_MAX ||
+      spheres.links.size() != map || spheres.density.size() % spheres.layers != 0 ||
+      color.size() != 3 * spheres.density.size())
+    Refuse(name, "the background's arrays do not fit together");
+  for (const int32_t link : spheres.links)
+    if (link < -1 || link >= spheres.num_columns())
+      Refuse(name, "a background texel links to column " + std::to_string(link) + " of " +
+                       std::to_string(spheres.num_columns()));
+  if (CountNonFinite(spheres.density) + CountNonFinite(color) > 0)
+    Refuse(name, "values of the background are not finite");
+}
+
 }  // namespace
 
 void Validate(const RadianceField& field, const char* name) {
@@ -65,6 +92,7 @@ void Validate(const RadianceField& field, const char* name) {
     Refuse(name, std::to_string(field.appearance.sh.size()) + " colour coefficients, " +
                      std::to_string(expected) + " expected");
   CheckLinks(geometry, name);
+  CheckSpheres(geometry, field.appearance.sphere_color, name);
   const int64_t bad = CountNonFinite(geometry.density) + CountNonFinite(field.appearance.sh);
   if (bad > 0)
     Refuse(name, std::to_string(bad) + " values are not finite (of " +
@@ -78,13 +106,16 @@ void Validate(const RadianceField& field, const char* name) {
 }
 
 FieldView<float> ViewOf(const RadianceField& field) {
+  const SphereGeometry& spheres = field.geometry->spheres;
   return {field.geometry->frame,
           field.geometry->links.data(),
           field.geometry->density.data(),
           field.appearance.sh.data(),
           field.appearance.basis,
           field.background,
-          field.near_clip};
+          field.near_clip,
+          {spheres.layers, spheres.resolution, spheres.links.data(), spheres.density.data(),
+           field.appearance.sphere_color.data()}};
 }
 
 }  // namespace regrade

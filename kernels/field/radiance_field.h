@@ -42,17 +42,35 @@ struct GridFrame {
   }
 };
 
+inline constexpr int kMaxLayers = 512;
+inline constexpr int kMaxSphereResolution = 4096;
+
+// Where the background's layers have matter, see background_spheres.h. Nothing is allocated
+// where a scene has none.
+struct SphereGeometry {
+  int layers = 0;         // L; 0: no background spheres
+  int resolution = 0;     // R: a layer's map has 2R x R texels
+  Buffer<int32_t> links;  // [2R, R]: column of a texel, or -1 where nothing is stored
+  Buffer<float> density;  // [columns, L]: per unit of inverse radius and world unit of length
+
+  bool on() const { return layers > 0; }
+  int64_t num_texels() const { return density.size(); }
+  int64_t num_columns() const { return on() ? density.size() / layers : 0; }
+};
+
 struct Geometry {
   GridFrame frame;
   Buffer<int32_t> links;  // [X, Y, Z]: voxel index, or -1 where nothing is stored
   Buffer<float> density;  // [N]: per world unit of length; negative means empty (ReLU)
+  SphereGeometry spheres;
 
   int64_t num_voxels() const { return density.size(); }
 };
 
 struct Appearance {
-  int basis = 9;     // spherical harmonics per channel: 1, 4 or 9
-  Buffer<float> sh;  // [N, 3, basis]: channel-major, R then G then B
+  int basis = 9;               // spherical harmonics per channel: 1, 4 or 9
+  Buffer<float> sh;            // [N, 3, basis]: channel-major, R then G then B
+  Buffer<float> sphere_color;  // [columns, L, 3]: of degree 0, where there are spheres
 
   int stride() const { return 3 * basis; }
 };
@@ -70,6 +88,15 @@ struct RadianceField {
 // non-finite values (F69).
 void Validate(const RadianceField& field, const char* name);
 
+template <typename T>
+struct SpheresView {
+  int layers = 0;
+  int resolution = 0;
+  const int32_t* links = nullptr;
+  const T* density = nullptr;
+  const T* color = nullptr;
+};
+
 // What kernel bodies see: no owners, any scalar.
 template <typename T>
 struct FieldView {
@@ -80,6 +107,7 @@ struct FieldView {
   int basis = 9;
   Vec3<T> background{};
   T near_clip = 0;
+  SpheresView<T> spheres{};
 };
 
 FieldView<float> ViewOf(const RadianceField& field);

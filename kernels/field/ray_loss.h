@@ -10,6 +10,7 @@
 
 #include <cmath>
 
+#include "kernels/field/background_spheres.h"
 #include "kernels/field/radiance_field.h"
 #include "kernels/field/ray_march.h"
 #include "kernels/field/spherical_harmonics.h"
@@ -20,11 +21,12 @@ namespace regrade {
 
 template <typename T>
 struct RayResult {
-  Vec3<T> color{};         // not clipped
-  T transmittance = 1;     // behind the last sample
-  T depth = 0;             // sum w t, t in world units along the ray
-  T optical_depth = 0;     // sum tau
-  int64_t last_step = -1;  // index of the last sample that was composited
+  Vec3<T> color{};           // not clipped
+  T transmittance = 1;       // behind the last sample
+  T depth = 0;               // sum w t, t in world units along the ray
+  T optical_depth = 0;       // sum tau, of the box
+  int64_t last_step = -1;    // index of the last sample that was composited
+  SpheresResult<T> spheres;  // what the background's layers added to the above
 };
 
 // See EQ(sh-basis): raw [3] is before the clamp at 0.
@@ -68,18 +70,24 @@ HD RayResult<T> RenderRay(const FieldView<T>& field, const RayT<T>& ray,
     result.last_step = i;
     if (state.transmittance < T(options.stop_transmittance)) break;
   }
+  if (field.spheres.layers > 0) {
+    result.spheres = CompositeSpheres(field.frame, field.spheres, ray,
+                                      T(options.stop_transmittance), &state);
+    result.depth += result.spheres.depth;
+  }
   result.transmittance = state.transmittance;
   result.color = state.color + field.background * state.transmittance;
   return result;
 }
 
 // Adds dL/d(density), dL/d(sh) for dL/dC = d_color to the gradients, which have the field's
-// shapes. `result` is RenderRay's of the same arguments. `Add(pointer, value)` is a plain or an
-// atomic +=.
+// shapes; those of the background's layers are needed only where it has some. `result` is
+// RenderRay's of the same arguments. `Add(pointer, value)` is a plain or an atomic +=.
 template <typename T, typename Add>
 HD void RenderRayAdjoint(const FieldView<T>& field, const RayT<T>& ray,
                          const MarchOptions& options, const RayResult<T>& result,
-                         const Vec3<T>& d_color, T* d_density, T* d_sh, const Add& add) {
+                         const Vec3<T>& d_color, T* d_density, T* d_sh, const Add& add,
+                         T* d_sphere_density = nullptr, T* d_sphere_color = nullptr) {
   using std::exp;
   const GridRay<T> march =
       ClipToGrid(field.frame, ray, field.near_clip, static_cast<T>(options.step));
@@ -88,6 +96,10 @@ HD void RenderRayAdjoint(const FieldView<T>& field, const RayT<T>& ray,
   ShBasis(field.basis, ray.direction, gamma);
   const int stride = 3 * field.basis;
   Vec3<T> behind = field.background;
+  if (field.spheres.layers > 0)
+    CompositeSpheresAdjoint(field.frame, field.spheres, ray, result.spheres,
+                            result.optical_depth, d_color, &behind, d_sphere_density,
+                            d_sphere_color, add);
   T depth_after = result.optical_depth;  // sum of tau up to and including the sample
   for (int64_t i = result.last_step; i >= 0; --i) {
     const T t = march.t_begin + T(i) * T(options.step);

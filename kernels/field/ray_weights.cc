@@ -3,11 +3,40 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kernels/field/background_spheres.h"
 #include "kernels/field/trilinear.h"
 #include "kernels/field/volume_rendering.h"
 
 namespace regrade {
 namespace {
+
+// The density half of CompositeSpheres.
+void MarchSpheres(const Geometry& geometry, const Ray& world_ray, float stop, float min_weight,
+                  CompositeState<float>* state, std::vector<WeightedSample>* out) {
+  const SphereGeometry& spheres = geometry.spheres;
+  const SphereRay<float> ray = ToSphereRay(geometry.frame, world_ray);
+  if (!(ray.world_per_unit > 0)) return;
+  const float delta = ray.world_per_unit / static_cast<float>(spheres.layers);
+  for (int i = 0; i < spheres.layers; ++i) {
+    Vec3f place;
+    float ahead;
+    if (!CrossSphere(ray, InverseRadius<float>(i, spheres.layers), &place, &ahead)) continue;
+    const TexelCell<float> cell = LocateTexel(spheres.resolution, place);
+    float density = 0;
+    for (int k = 0; k < 4; ++k) {
+      const int32_t column = spheres.links[cell.texel[k]];
+      if (column < 0) continue;
+      density += cell.weight[k] * spheres.density[int64_t{column} * spheres.layers + i];
+    }
+    if (!(density > 0)) continue;
+    const float w = Composite(OpticalDepth(density, delta), Vec3f{}, state);
+    if (w > min_weight)
+      out->push_back({~(cell.texel[0] * spheres.layers + i),
+                      {cell.weight[2] + cell.weight[3], cell.weight[1] + cell.weight[3], 0},
+                      w});
+    if (state->transmittance < stop) break;
+  }
+}
 
 // The density half of RenderRay; the same arithmetic, so that weights agree bit for bit with
 // it.
@@ -27,10 +56,32 @@ float MarchDensity(const Geometry& geometry, const Ray& ray, const MarchOptions&
     if (w > min_weight) out->push_back({cell.vertex, cell.fraction, w});
     if (state.transmittance < options.stop_transmittance) break;
   }
+  if (geometry.spheres.on() && !(state.transmittance < options.stop_transmittance))
+    MarchSpheres(geometry, ray, options.stop_transmittance, min_weight, &state, out);
   return state.transmittance;
 }
 
 }  // namespace
+
+void CornerPoints(const Geometry& geometry, const WeightedSample& sample, int32_t* point) {
+  if (!sample.on_sphere()) {
+    for (int k = 0; k < 8; ++k)
+      point[k] = geometry.links[CornerVertex(geometry.frame, sample.vertex, k)];
+    return;
+  }
+  const SphereGeometry& spheres = geometry.spheres;
+  const int r = spheres.resolution, texel = ~sample.vertex;
+  const int layer = texel % spheres.layers, at = texel / spheres.layers;
+  const int x = at / r, y = at % r;
+  for (int k = 0; k < 8; ++k) {
+    const int east = k & 4 ? (x + 1 < 2 * r ? x + 1 : 0) : x;
+    const int south = k & 2 ? std::min(y + 1, r - 1) : y;
+    const int32_t column = k & 1 ? -1 : spheres.links[int64_t{east} * r + south];
+    point[k] = column < 0 ? -1
+                          : static_cast<int32_t>(geometry.num_voxels()) +
+                                column * spheres.layers + layer;
+  }
+}
 
 RayWeights ComputeRayWeights(const Geometry& geometry, View<const Ray> rays,
                              const MarchOptions& options, float near_clip, float min_weight) {

@@ -12,11 +12,19 @@
 
 namespace regrade {
 
+// One of the box, or, where `vertex` is negative, of a background sphere.
 struct WeightedSample {
-  int32_t vertex;  // lowest corner of the sample's cell, linear index into links
-  Vec3f fraction;  // trilinear fractions within the cell
+  int32_t vertex;  // lowest corner of the sample's cell, linear index into links; of a sphere
+                   // ~((x R + y) L + layer), see TexelCell
+  Vec3f fraction;  // trilinear fractions within the cell; bilinear, z = 0, on a sphere
   float weight;    // w_i of EQ(composite)
+
+  bool on_sphere() const { return vertex < 0; }
 };
+
+// What a sample blends with CornerWeight(fraction, k), k = 0..7: points, which are first the
+// voxels and then the texels of the spheres; -1 where nothing is stored.
+void CornerPoints(const Geometry& geometry, const WeightedSample& sample, int32_t* point);
 
 // Lists for a batch of rays, concatenated in the rays' order.
 struct RayWeights {

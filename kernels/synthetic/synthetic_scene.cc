@@ -140,6 +140,33 @@ SyntheticScene MakeWall(uint64_t seed) {
   return b.Finish({-0.5, -0.75, 0.75}, {-2.3, -0.7, -1.75}, {2.3, 0.08, 1.75});
 }
 
+SyntheticScene MakeSquare(uint64_t seed) {
+  SceneBuilder b("square", seed);
+  // The near: a pedestal and what stands on it.
+  b.AddPot(0, 0, -0.5, 0.95, 0.5, b.MakePaint(Pattern::kTerrazzo, 0.21, kStone));
+  b.AddBall(-0.4, -0.3, 0, 0.24, b.MakePaint(Pattern::kDots, 0.18, kCoral));
+  b.AddBlock(0.35, -0.3, 0, {0.4, 0.34, 0.3}, -24, b.MakePaint(Pattern::kCloth, 0.13, kTeal));
+  b.AddBall(0.35, -0.3, 0.3, 0.15, b.MakePaint(Pattern::kTerrazzo, 0.12, kMustard));
+  b.AddPot(0.05, 0.35, 0, 0.17, 0.66, b.MakePaint(Pattern::kPainting, 0.18, kPlum));
+  b.AddBlock(-0.5, 0.3, 0, {0.3, 0.3, 0.48}, 31, b.MakePaint(Pattern::kTiles, 0.2, kSky));
+  b.AddBall(0.55, 0.3, 0, 0.16, b.MakePaint(Pattern::kPainting, 0.14, kLeaf));
+  // The far: paving, houses at 12 to 20, a dome of hills and clouds at 100.
+  b.Add(Shape::kCylinder, {0, 0, -0.6}, {30, 0, 0.1}, b.MakePaint(Pattern::kTiles, 2.6, kStone))
+      .casts_shadow = false;
+  const std::array<uint32_t, 5> walls[] = {kCoral, kLinen, kTeal, kMustard, kPlum, kAzulejo};
+  const Pattern patterns[] = {Pattern::kPainting, Pattern::kTiles, Pattern::kTerrazzo};
+  for (int i = 0; i < 9; ++i) {
+    const double angle = 2 * M_PI * (i + 0.3 * (i % 2)) / 9, away = 12 + 8.0 * (i * 4 % 9) / 8;
+    b.AddBlock(away * std::cos(angle), away * std::sin(angle), -0.5,
+               {3.0 + i % 3, 3.0, 3.5 + 1.5 * (i * 5 % 4)}, 40.0 * i,
+               b.MakePaint(patterns[i % 3], 1.7, walls[i % 6]));
+  }
+  const double dome = 100;
+  b.Add(Shape::kSphere, {0, 0, 0}, {dome, 0, 0}, b.MakePaint(Pattern::kPainting, 14, kSky))
+      .casts_shadow = false;
+  return b.Finish({-0.45, -0.55, 0.85}, {-dome, -dome, -dome}, {dome, dome, dome});
+}
+
 SyntheticScene MakeRoom(uint64_t seed) {
   SceneBuilder b("room", seed);
   const double x = 1.7, y = 1.5, h = 1.8, t = 0.06;  // half sides, height, thickness
@@ -219,6 +246,14 @@ Camera WallCamera(double turn, int width, int height) {
   return LookAt(center, {0.25 * center.x, 0, 0.25 * center.z}, 1.1, width, height);
 }
 
+// Once round and three times up and down.
+Camera SquareCamera(double turn, int width, int height) {
+  const double angle = 2 * M_PI * turn, distance = 2.2;
+  const Vec3d center = {distance * std::sin(angle), -distance * std::cos(angle),
+                        0.55 + 0.2 * std::sin(3 * angle)};
+  return LookAt(center, {0, 0, 0.42}, 0.95, width, height);
+}
+
 Camera RoomCamera(double turn, int width, int height) {
   const double angle = 2 * M_PI * turn;
   const Vec3d center = {0.75 * std::sin(angle), -0.65 * std::cos(angle),
@@ -233,6 +268,7 @@ SyntheticScene MakeSyntheticScene(const std::string& name, uint64_t seed) {
   if (name == "table") return MakeTable(seed);
   if (name == "wall") return MakeWall(seed);
   if (name == "room") return MakeRoom(seed);
+  if (name == "square") return MakeSquare(seed);
   throw Error(ExitCode::kUsage, "there is no synthetic scene \"" + name + "\"", "--scene",
               std::string("choose one of ") + kSyntheticSceneNames);
 }
@@ -247,7 +283,8 @@ std::vector<Camera> SyntheticCameras(const SyntheticScene& scene, int views, int
     const double turn = static_cast<double>(i) / views;
     cameras.push_back(scene.name == "table"  ? TableCamera(turn, width, height)
                       : scene.name == "wall" ? WallCamera(turn, width, height)
-                                             : RoomCamera(turn, width, height));
+                      : scene.name == "room" ? RoomCamera(turn, width, height)
+                                             : SquareCamera(turn, width, height));
   }
   return cameras;
 }

@@ -22,14 +22,17 @@ struct SyntheticScene {
   Vec3d bounds_min, bounds_max;
 };
 
-// "table|wall|room", for the help text and for errors.
-inline constexpr char kSyntheticSceneNames[] = "table|wall|room";
+// "table|wall|room|square", for the help text and for errors.
+inline constexpr char kSyntheticSceneNames[] = "table|wall|room|square";
 
 // The shapes are fixed; `seed` draws the paint. Throws Error (kUsage) for an unknown name,
 // listing the known ones.
 //   table: a still life before a curved tiled wall, seen from an arc of 80 degrees
 //   wall:  a wall with shelves and reliefs, cameras on a small plane, facing it
 //   room:  a furnished room, cameras on a loop inside, each looking across to the far side
+//   square: a still life on a pedestal seen all round, houses and hills up to 45 times as far
+//   away
+//          as the cameras are
 SyntheticScene MakeSyntheticScene(const std::string& name, uint64_t seed);
 
 // `views` cameras on a closed smooth path: neighbours in the list are neighbours in space, and

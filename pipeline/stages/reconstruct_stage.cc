@@ -137,7 +137,9 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   for (const EffectReport& effect : profile.effects)
     if (effect.name != kViewDependence) context->console->Info(EffectLine(effect));
   for (const std::string& notice : profile.notices) context->console->Info(notice);
-  const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
+  const Backend backend =
+      ChooseBackendFor(scene.box.spheres, settings.run.device, settings.run.reproducible,
+                       [context](const std::string& text) { context->console->Info(text); });
   FitOptions options =
       OptionsForMemory(context, PlannerOf(settings, capture, scene.box, backend), backend);
 
@@ -187,6 +189,8 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   outcome.figures["rays"] = fit.rays;
   outcome.figures["sh_degree"] = options.sh_degree;
   outcome.figures["voxels"] = fit.field.geometry->num_voxels();
+  if (scene.box.spheres)
+    outcome.figures["background_texels"] = fit.field.geometry->spheres.num_texels();
   outcome.figures["psnr_train_db"] = fit.psnr_train_db;
   MeasureHeldOut(context, capture, profile.gains, ReadFieldFile(workspace.Path("field.npz")),
                  backend, &outcome.figures);
@@ -211,9 +215,11 @@ Stage ReconstructStage(RunContext* context) {
     // Exposures have no say in the box, and measuring them would read every photo.
     const SceneProfile profile =
         ProfileScene(capture, context->settings.fit.sh_degree, run.effects + ",exposure=off");
+    const SceneBox& box = profile.scene.box;
+    const Backend backend =
+        ChooseBackendFor(box.spheres, run.device, run.reproducible, [](const std::string&) {});
     stage.plan =
-        PlanText(PlannerOf(context->settings, capture, profile.scene.box,
-                           ChooseBackend(run.device, run.reproducible))(context->settings.fit));
+        PlanText(PlannerOf(context->settings, capture, box, backend)(context->settings.fit));
   }
   stage.work = [context, inputs = stage.inputs](const ProgressFunction& progress) {
     return Reconstruct(context, inputs, progress);

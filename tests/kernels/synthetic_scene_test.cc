@@ -14,7 +14,7 @@
 namespace regrade {
 namespace {
 
-constexpr const char* kScenes[] = {"table", "wall", "room"};
+constexpr const char* kScenes[] = {"table", "wall", "room", "square"};
 
 double Bilinear(const Image& image, double u, double v, int channel) {
   const double x = u - 0.5, y = v - 0.5;

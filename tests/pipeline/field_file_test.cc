@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -9,6 +10,7 @@
 #include "kernels/base/random.h"
 #include "pipeline/files/npz_file.h"
 #include "tests/support/expect_error.h"
+#include "tests/support/small_field.h"
 #include "tests/support/temporary_folder.h"
 
 namespace regrade {
@@ -84,6 +86,42 @@ TEST(FieldFile, LayoutIsSvox2s) {
     for (int k = 0; k < 9; ++k)
       EXPECT_EQ(colours.As<uint16_t>()[channel * 9 + k],
                 k < 4 ? HalfFromFloat(out.field.appearance.sh[channel * 4 + k]) : 0);
+}
+
+// svox2's background: links [2R, R], and by column and layer red, green, blue, density.
+TEST(FieldFile, BackgroundSpheresAreSvox2sArrays) {
+  const TemporaryFolder folder;
+  StoredField out = SmallField(4);
+  testing::AddSpheres(7, 6, 0.4, 3, &out.field);
+  WriteFieldFile(folder / "field.npz", out);
+  NpzReader file(folder / "field.npz", 1 << 20);
+  const NpzArray links = file.Read("background_links", ArrayType::kI32, {12, 6});
+  const NpzArray data = file.Read("background_data", ArrayType::kF32,
+                                  {out.field.geometry->spheres.num_columns(), 7, 4});
+  EXPECT_EQ(data.As<float>()[4 * 9 + 3], out.field.geometry->spheres.density[9]);
+  EXPECT_EQ(data.As<float>()[4 * 9 + 1], out.field.appearance.sphere_color[3 * 9 + 1]);
+  const StoredField in = ReadFieldFile(folder / "field.npz");
+  const SphereGeometry &a = in.field.geometry->spheres, &b = out.field.geometry->spheres;
+  EXPECT_EQ(a.layers, 7);
+  EXPECT_EQ(a.resolution, 6);
+  ASSERT_EQ(a.links.size(), b.links.size());
+  EXPECT_TRUE(std::equal(a.links.begin(), a.links.end(), b.links.begin()));
+  ASSERT_EQ(a.density.size(), b.density.size());
+  EXPECT_TRUE(std::equal(a.density.begin(), a.density.end(), b.density.begin()));
+  EXPECT_TRUE(std::equal(out.field.appearance.sphere_color.begin(),
+                         out.field.appearance.sphere_color.end(),
+                         in.field.appearance.sphere_color.begin()));
+  WriteFieldFile(folder / "again.npz", in);
+  EXPECT_EQ(ReadText(folder / "again.npz"), ReadText(folder / "field.npz"));
+  // Without spheres there are no such arrays.
+  WriteFieldFile(folder / "without.npz", SmallField(4));
+  EXPECT_FALSE(NpzReader(folder / "without.npz", 1 << 20).Has("background_links"));
+  // A link that points nowhere is refused.
+  auto damaged = std::make_shared<Geometry>(*out.field.geometry);
+  damaged->spheres.links[0] = 1000;
+  out.field.geometry = damaged;
+  WriteFieldFile(folder / "damaged.npz", out);
+  EXPECT_REGRADE_ERROR(ReadFieldFile(folder / "damaged.npz"), ExitCode::kInput, "column 1000");
 }
 
 TEST(FieldFile, TooBrightColoursSaturate) {
@@ -189,9 +227,9 @@ TEST_F(Changed, WhatCannotBeRenderedIsNamed) {
   const int64_t learned = 4;
   EXPECT_REGRADE_ERROR(ReadWith("basis_type", {}, &learned), ExitCode::kInput,
                        "not spherical harmonics");
-  const int32_t spheres[1] = {0};
+  const int32_t spheres[1] = {0};  // a map has two sides, and values
   EXPECT_REGRADE_ERROR(ReadWith("background_links", {1}, spheres), ExitCode::kInput,
-                       "background spheres");
+                       "background_links");
 }
 
 }  // namespace

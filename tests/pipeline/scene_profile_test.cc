@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "pipeline/scene_views.h"
 #include "tests/support/expect_error.h"
 
@@ -55,13 +58,13 @@ TEST(SceneEffects, H153_RowsCarryTheNumbersOfTheDecision) {
   EXPECT_NEAR(*rows[0].value.value, 12.3, 1e-9);
   EXPECT_EQ(*rows[0].threshold.value, 0.5);
   EXPECT_EQ(EffectLine(rows[0]).substr(0, 25), "distortion on: 12.3 > 0.5");
-  EXPECT_EQ(rows[3].name, "view-dependence");
-  EXPECT_TRUE(rows[3].on);
-  EXPECT_EQ(*rows[3].value.value, 2);
+  EXPECT_EQ(rows[4].name, "view-dependence");
+  EXPECT_TRUE(rows[4].on);
+  EXPECT_EQ(*rows[4].value.value, 2);
 
   const auto off = ProfileScene(CaptureWithShifts({0.1, 0.3}), 0, "auto").effects;
   EXPECT_FALSE(off[0].on);
-  EXPECT_FALSE(off[3].on);
+  EXPECT_FALSE(off[4].on);
   EXPECT_EQ(EffectLine(off[0]).substr(0, 26), "distortion off: 0.3 <= 0.5");
 }
 
@@ -86,6 +89,61 @@ TEST(SceneProfile, ForwardFacingCapturesGetTheirSpace) {
   const auto rows = ProfileScene(capture, 2, "auto").effects;
   EXPECT_EQ(rows[1].name, "ndc");
   EXPECT_TRUE(rows[1].on);
+}
+
+// Eight cameras round a table of points, and `far` points per camera fifty times as far out.
+Capture CaptureSeenAllRound(int far) {
+  Capture capture;
+  for (int i = 0; i < 8; ++i) {
+    const double a = 2 * M_PI * i / 8;
+    CaptureView view;
+    view.camera = CameraWithShift(0);
+    const Vec3d center{2 * std::cos(a), 2 * std::sin(a), 0.3};
+    const Vec3d forward = Normalized(-center),
+                right = Normalized(Cross(forward, Vec3d{0, 0, 1}));
+    RigidTransform& t = view.camera.camera_from_world;
+    t.rotation.row[0] = right, t.rotation.row[1] = Cross(forward, right);
+    t.rotation.row[2] = forward;
+    t.translation = -(t.rotation * center);
+    capture.views.push_back(view);
+    const auto add = [&](const Vec3d& position) {
+      ScenePoint point;
+      point.position = position;
+      point.views = {i, (i + 1) % 8};
+      capture.points.push_back(point);
+    };
+    for (int k = 0; k < 20; ++k) add({0.3 * std::sin(k + a), 0.3 * std::cos(2 * k), 0.02 * k});
+    for (int k = 0; k < far; ++k) add(forward * 100.0 + right * (3.0 * k));
+  }
+  return capture;
+}
+
+// H153, H156: layers where much is far all round, measured, and no trace of them elsewhere.
+TEST(SceneProfile, H153_H156_FarSurroundingsCallForSpheres) {
+  const SceneProfile near = ProfileScene(CaptureSeenAllRound(0), 2, "auto");
+  EXPECT_FALSE(near.scene.box.spheres);
+  EXPECT_EQ(near.effects[3].name, "background");
+  EXPECT_EQ(*near.effects[3].value.value, 0);
+  const SceneProfile far = ProfileScene(CaptureSeenAllRound(5), 2, "auto");
+  EXPECT_TRUE(far.scene.box.spheres);
+  EXPECT_NEAR(*far.effects[3].value.value, 0.2, 1e-12);  // 5 of 25
+  // The box is the cube that reaches the cameras, upright along y: 2.02 m are 0.9 of its half.
+  EXPECT_EQ(far.scene.box.radius, (Vec3f{1, 1, 1}));
+  EXPECT_NEAR(far.scene.field_from_world.scale, 0.9 / std::hypot(2.0, 0.3), 1e-3);
+  EXPECT_NEAR(far.scene.field_from_world.rotation(1, 2), 1, 1e-9);
+  // A wish decides, and one that contradicts another is named.
+  EXPECT_FALSE(ProfileScene(CaptureSeenAllRound(5), 2, "background=off").scene.box.spheres);
+  EXPECT_TRUE(ProfileScene(CaptureSeenAllRound(0), 2, "background=on").scene.box.spheres);
+  EXPECT_REGRADE_ERROR(ProfileScene(CaptureSeenAllRound(5), 2, "background=on,alpha=on"),
+                       ExitCode::kUsage, "alpha");
+}
+
+// H154: the photos' order has no say.
+TEST(SceneProfile, H154_BackgroundDoesNotKnowThePhotosOrder) {
+  Capture capture = CaptureSeenAllRound(2);
+  const double value = *ProfileScene(capture, 2, "auto").effects[3].value.value;
+  std::reverse(capture.points.begin(), capture.points.end());
+  EXPECT_EQ(*ProfileScene(capture, 2, "auto").effects[3].value.value, value);
 }
 
 }  // namespace

@@ -31,7 +31,8 @@ TEST(SceneBox, H98_VoxelsOfNdcAreAsManyPixelsWideAsHigh) {
     const double pixels_high = box.radius.y * height / n.y;
     EXPECT_EQ(std::max(n.x, n.y), 1408);
     EXPECT_EQ(n.z, 128);
-    EXPECT_NEAR(pixels_wide, pixels_high, 2e-3);  // a side is rounded to whole voxels: 1 in 1000
+    EXPECT_NEAR(pixels_wide, pixels_high,
+                2e-3);  // a side is rounded to whole voxels: 1 in 1000
   }
   EXPECT_EQ(VoxelAspect(NdcSpace()), 1.0f);
 }

@@ -1,5 +1,7 @@
 // The network's gradient by touched voxels against Algorithm 1, and the network applied to a
 // field.
+#include "kernels/field/background_spheres.h"
+#include "tests/support/small_field.h"
 #include "tests/support/styled_ball.h"
 
 namespace regrade {
@@ -88,6 +90,62 @@ TEST(GradientAggregation, EqualsAlgorithm1) {
     EXPECT_LT(result.touched_voxels, field.geometry->num_voxels());
     EXPECT_GT(result.touched_voxels, 0);
   }
+}
+
+// A ball before background spheres: texels go through f as plain colours at their direction.
+RadianceField BallBeforeSpheres(int n) {
+  RadianceField field = Ball(n);
+  AddSpheres(5, 6, 0.9, 17, &field);
+  return field;
+}
+
+TEST(GradientAggregation, BackgroundSpheresAreInAlgorithm1sGradient) {
+  const RadianceField field = BallBeforeSpheres(8);
+  StyleRays batch = SomeRays(3, 8);
+  for (size_t r = 0; r < batch.rays.size(); r += 2)  // and past the ball
+    batch.rays[r].direction = Normalized(batch.rays[r].direction + Vec3f{0.4f, -0.5f, 0.6f});
+  LipschitzNetwork network = RandomNetwork(97);
+  network.data().has_base = true;
+  network.data().base = SomeMap();
+  std::vector<double> gradient = NoGradient(), expected = NoGradient(), box = NoGradient();
+  const AggregationResult result =
+      GradientAggregation(field, {}).Run(network, batch, &gradient);
+  const double scale = 1 / (3.0 * static_cast<double>(batch.rays.size()));
+  const double loss = PlainGradient(network, field, batch, scale, &expected);
+  EXPECT_NEAR(result.loss, loss, 1e-5 * loss);
+  EXPECT_LE(RelativeDifference(gradient, expected), 1e-5);
+  // The layers have a say: the ball alone has another gradient.
+  PlainGradient(network, Ball(8), batch, scale, &box);
+  EXPECT_GT(RelativeDifference(box, expected), 0.01);
+}
+
+TEST(ApplyNetwork, BackgroundTexelsGoThroughItAsPlainColours) {
+  RadianceField field = BallBeforeSpheres(6);
+  LipschitzNetwork network = RandomNetwork(98);
+  network.data().has_base = true;
+  network.data().base = SomeMap();
+  const Appearance styled = ApplyNetwork(network, field);
+  const SphereGeometry& spheres = field.geometry->spheres;
+  const std::vector<int32_t> place = PlaceOfColumn(spheres);
+  for (int64_t t = 0; t < spheres.num_texels(); t += 7) {
+    const int at = place[static_cast<size_t>(t / spheres.layers)];
+    const Vec3d direction = TexelDirection<double>(6, at / 6, at % 6);
+    double row[kFeatureStride] = {}, out[kFeatureStride] = {};
+    for (int c = 0; c < 3; ++c) {
+      row[9 * c] = field.appearance.sphere_color[3 * t + c];
+      row[kNetworkSh + c] = network.data().position_scale * direction[c];
+    }
+    network.ForwardPlain(row, out);
+    for (int c = 0; c < 3; ++c)
+      EXPECT_NEAR(styled.sphere_color[3 * t + c], out[9 * c], 1e-4);  // float's against double
+  }
+  // What a network that is a colour map makes of the field, the map makes of the picture.
+  field.background = {0.3f, 0.5f, 0.4f};
+  RadianceField mapped = field;
+  mapped.appearance = ApplyNetwork(NetworkOfMap(SomeMap()), field);
+  const Appearance same = ApplyColorMap(field.appearance, SomeMap());
+  for (int64_t i = 0; i < same.sphere_color.size(); ++i)
+    EXPECT_NEAR(mapped.appearance.sphere_color[i], same.sphere_color[i], 1e-5);
 }
 
 TEST(GradientAggregation, EveryVoxelGivesTheSameGradient) {

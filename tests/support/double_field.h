@@ -16,7 +16,10 @@ struct DoubleField {
         density(geometry.density.begin(), geometry.density.end()),
         sh(field.appearance.sh.begin(), field.appearance.sh.end()),
         basis(field.appearance.basis),
-        background(field.background.Cast<double>()) {}
+        background(field.background.Cast<double>()),
+        sphere_density(geometry.spheres.density.begin(), geometry.spheres.density.end()),
+        sphere_color(field.appearance.sphere_color.begin(),
+                     field.appearance.sphere_color.end()) {}
   FieldView<double> view() const {
     return {geometry.frame,
             geometry.links.data(),
@@ -24,12 +27,15 @@ struct DoubleField {
             sh.data(),
             basis,
             background,
-            0.0};
+            0.0,
+            {geometry.spheres.layers, geometry.spheres.resolution,
+             geometry.spheres.links.data(), sphere_density.data(), sphere_color.data()}};
   }
   const Geometry& geometry;
   std::vector<double> density, sh;
   int basis;
   Vec3d background;
+  std::vector<double> sphere_density, sphere_color;
 };
 
 // Normalised anew: a float direction is a unit one to 1e-7 only.

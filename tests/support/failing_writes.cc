@@ -1,10 +1,11 @@
-// A library to be preloaded: the k-th operation that writes below a folder fails, once or from then on.
+// A library to be preloaded: the k-th operation that writes below a folder fails, once or from
+// then on.
 //
 //   FAILING_WRITES_UNDER   the folder, absolute
 //   FAILING_WRITES_AT      k, from 1; 0 or nothing: none fails, they are only counted
-//   FAILING_WRITES_KIND    ENOSPC, EIO, or SHORT (a write takes half of its bytes, which is no error)
-//   FAILING_WRITES_ALWAYS  if set, every later one fails too, as on a disk that stays full
-//   FAILING_WRITES_COUNT   file that gets the number of operations when the program ends
+//   FAILING_WRITES_KIND    ENOSPC, EIO, or SHORT (a write takes half of its bytes, which is no
+//   error) FAILING_WRITES_ALWAYS  if set, every later one fails too, as on a disk that stays
+//   full FAILING_WRITES_COUNT   file that gets the number of operations when the program ends
 //
 // Operations are: opening for writing, write, pwrite, writev, fsync, fdatasync, rename, mkdir.
 #include <dlfcn.h>
@@ -39,7 +40,8 @@ bool Below(const char* path) {
   if (path[0] != '/') {
     char here[PATH_MAX];
     if (getcwd(here, sizeof here) == nullptr) return false;
-    if (snprintf(whole, sizeof whole, "%s/%s", here, path) >= static_cast<int>(sizeof whole)) return false;
+    if (snprintf(whole, sizeof whole, "%s/%s", here, path) >= static_cast<int>(sizeof whole))
+      return false;
     path = whole;
   }
   return strncmp(path, folder, strlen(folder)) == 0;
@@ -55,7 +57,8 @@ bool Fails() {
   const long number = ++operations;
   const char* at = getenv("FAILING_WRITES_AT");
   const long k = at == nullptr ? 0 : atol(at);
-  if (k <= 0 || number < k || (number > k && getenv("FAILING_WRITES_ALWAYS") == nullptr)) return false;
+  if (k <= 0 || number < k || (number > k && getenv("FAILING_WRITES_ALWAYS") == nullptr))
+    return false;
   const char* kind = getenv("FAILING_WRITES_KIND");
   errno = kind != nullptr && strcmp(kind, "EIO") == 0 ? EIO : ENOSPC;
   return true;
@@ -74,11 +77,14 @@ bool ForWriting(int flags) { return (flags & O_ACCMODE) != O_RDONLY; }
 __attribute__((destructor)) void SayCount() {
   const char* path = getenv("FAILING_WRITES_COUNT");
   if (path == nullptr) return;
-  const int fd = Real<int (*)(const char*, int, ...)>("open")(path, O_WRONLY | O_CREAT | O_TRUNC, 0644);
+  const int fd =
+      Real<int (*)(const char*, int, ...)>("open")(path, O_WRONLY | O_CREAT | O_TRUNC, 0644);
   if (fd < 0) return;
   char text[32];
   const int size = snprintf(text, sizeof text, "%ld\n", operations.load());
-  if (Real<ssize_t (*)(int, const void*, size_t)>("write")(fd, text, static_cast<size_t>(size)) < 0) abort();
+  if (Real<ssize_t (*)(int, const void*, size_t)>("write")(fd, text,
+                                                           static_cast<size_t>(size)) < 0)
+    abort();
   Real<int (*)(int)>("close")(fd);
 }
 
@@ -99,27 +105,28 @@ mode_t ModeOf(int flags, va_list list) {
 
 extern "C" {
 
-#define OPEN_LIKE(name)                                                                       \
-  int name(const char* path, int flags, ...) {                                                \
-    va_list list;                                                                             \
-    va_start(list, flags);                                                                    \
-    const mode_t mode = ModeOf(flags, list);                                                  \
-    va_end(list);                                                                             \
-    return Opened(path, flags,                                                                \
-                  [&] { return Real<int (*)(const char*, int, ...)>(#name)(path, flags, mode); }); \
+#define OPEN_LIKE(name)                                                      \
+  int name(const char* path, int flags, ...) {                               \
+    va_list list;                                                            \
+    va_start(list, flags);                                                   \
+    const mode_t mode = ModeOf(flags, list);                                 \
+    va_end(list);                                                            \
+    return Opened(path, flags, [&] {                                         \
+      return Real<int (*)(const char*, int, ...)>(#name)(path, flags, mode); \
+    });                                                                      \
   }
 OPEN_LIKE(open)
 OPEN_LIKE(open64)
 
-#define OPENAT_LIKE(name)                                                                      \
-  int name(int at, const char* path, int flags, ...) {                                         \
-    va_list list;                                                                              \
-    va_start(list, flags);                                                                     \
-    const mode_t mode = ModeOf(flags, list);                                                   \
-    va_end(list);                                                                              \
-    return Opened(path, flags, [&] {                                                           \
-      return Real<int (*)(int, const char*, int, ...)>(#name)(at, path, flags, mode);          \
-    });                                                                                        \
+#define OPENAT_LIKE(name)                                                             \
+  int name(int at, const char* path, int flags, ...) {                                \
+    va_list list;                                                                     \
+    va_start(list, flags);                                                            \
+    const mode_t mode = ModeOf(flags, list);                                          \
+    va_end(list);                                                                     \
+    return Opened(path, flags, [&] {                                                  \
+      return Real<int (*)(int, const char*, int, ...)>(#name)(at, path, flags, mode); \
+    });                                                                               \
   }
 OPENAT_LIKE(openat)
 OPENAT_LIKE(openat64)
@@ -145,7 +152,8 @@ ssize_t writev(int fd, const struct iovec* parts, int count) {
 
 ssize_t pwrite64(int fd, const void* bytes, size_t size, off64_t offset) {
   if (Watched(fd) && FailsUnlessShort()) return -1;
-  return Real<ssize_t (*)(int, const void*, size_t, off64_t)>("pwrite64")(fd, bytes, size, offset);
+  return Real<ssize_t (*)(int, const void*, size_t, off64_t)>("pwrite64")(fd, bytes, size,
+                                                                          offset);
 }
 
 int fsync(int fd) {

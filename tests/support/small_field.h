@@ -40,6 +40,28 @@ inline RadianceField RandomField(const Vec3i& resolution, int basis, double fill
   return field;
 }
 
+// Background layers behind it, of which about `fill` of the columns are stored.
+inline void AddSpheres(int layers, int resolution, double fill, uint64_t seed,
+                       RadianceField* field) {
+  auto geometry = std::make_shared<Geometry>(*field->geometry);
+  SphereGeometry& spheres = geometry->spheres;
+  spheres.layers = layers;
+  spheres.resolution = resolution;
+  spheres.links.Resize(int64_t{2} * resolution * resolution);
+  int32_t columns = 0;
+  for (int64_t i = 0; i < spheres.links.size(); ++i)
+    spheres.links[i] = RandomDouble(seed, 2, static_cast<uint64_t>(i)) < fill ? columns++ : -1;
+  spheres.density.Resize(int64_t{columns} * layers);
+  field->appearance.sphere_color.Resize(3 * spheres.density.size());
+  for (int64_t i = 0; i < spheres.density.size(); ++i)
+    spheres.density[i] =
+        static_cast<float>(Uniform(seed + 2, static_cast<uint64_t>(i), -1.0, 3.0));
+  for (int64_t i = 0; i < field->appearance.sphere_color.size(); ++i)
+    field->appearance.sphere_color[i] =
+        static_cast<float>(Uniform(seed + 3, static_cast<uint64_t>(i), -2.2, 2.2));
+  field->geometry = std::move(geometry);
+}
+
 // Rays from a shell outside towards points inside the box.
 inline std::vector<Ray> RandomRays(int n, uint64_t seed) {
   std::vector<Ray> rays;

@@ -1,0 +1,52 @@
+#include "pipeline/fit_checkpoint.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "tests/support/small_field.h"
+
+namespace regrade {
+namespace {
+
+FitState StateOf(const RadianceField& field) {
+  FitState state;
+  state.grid = MakeFastGrid(field);
+  state.second_moment.Resize(state.grid.records.size());
+  state.sphere_moment.Resize(state.grid.spheres.texels.size());
+  for (int64_t i = 0; i < state.sphere_moment.size(); ++i)
+    state.sphere_moment[i] = 0.25f * static_cast<float>(i);
+  state.stage = 1;
+  state.step = 17;
+  return state;
+}
+
+TEST(FitCheckpoint, BackgroundSpheresComeBackBitForBit) {
+  RadianceField field = testing::RandomField({5, 4, 6}, 4, 0.5, 1);
+  const std::string without = PackFitState(StateOf(field));
+  testing::AddSpheres(6, 5, 0.6, 2, &field);
+  const FitState state = StateOf(field);
+  const std::string with = PackFitState(state);
+  // The section is there only where there are spheres, behind all else.
+  EXPECT_EQ(with.substr(0, without.size()), without);
+  EXPECT_GT(with.size(), without.size());
+  ASSERT_TRUE(UnpackFitState(without));
+  EXPECT_FALSE(UnpackFitState(without)->grid.spheres.on());
+
+  const std::optional<FitState> back = UnpackFitState(with);
+  ASSERT_TRUE(back);
+  EXPECT_EQ(back->step, 17);
+  const FastSpheres &a = back->grid.spheres, &b = state.grid.spheres;
+  EXPECT_EQ(a.layers, b.layers);
+  EXPECT_EQ(a.resolution, b.resolution);
+  EXPECT_TRUE(std::equal(a.links.begin(), a.links.end(), b.links.begin(), b.links.end()));
+  EXPECT_TRUE(std::equal(a.texels.begin(), a.texels.end(), b.texels.begin(), b.texels.end()));
+  EXPECT_TRUE(std::equal(back->sphere_moment.begin(), back->sphere_moment.end(),
+                         state.sphere_moment.begin(), state.sphere_moment.end()));
+  // Cut short, it is no state.
+  for (const size_t size : {without.size() + 1, without.size() + 8, with.size() - 1})
+    EXPECT_FALSE(UnpackFitState(std::string_view(with).substr(0, size))) << size;
+}
+
+}  // namespace
+}  // namespace regrade
