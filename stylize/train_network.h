@@ -134,6 +134,14 @@ struct SceneColorMap {
   double k_est = 0;  // ||M||_2
 };
 
+inline constexpr int kBoundEvery = 25;  // steps between two looks at exact norms
+
+// How the promise goes while the network learns.
+struct BoundHistory {
+  std::vector<int64_t> steps;
+  std::vector<double> bounds;  // LipschitzNetwork::Bound() before that step
+};
+
 // All that a resumed run needs; N steps, and N more from here, are bitwise 2N steps.
 struct TrainingState {
   LipschitzNetworkData network;
@@ -141,6 +149,7 @@ struct TrainingState {
   int64_t step = 0;  // done
   double linear_map_mse = 0;
   int64_t left_out_pixels = 0;
+  BoundHistory history;
 };
 
 struct TrainingHooks {
@@ -155,6 +164,7 @@ struct TrainNetworkResult {
   double k_est = 0;               // as used: cut at kLargestKEst
   double bound = 0;               // LipschitzNetwork::Bound()
   double slope_observed = 0;      // on the field's voxels
+  double slope_ascent = 0;        // climbed to from there
   double smallest_k = 0;          // of the layers; near 0 a layer is dead
   double largest_norm_drift = 0;  // of the power iteration, seen while learning
   double psnr_db = 0;             // of a fixed sample of training rays to the targets, clipped
@@ -162,6 +172,7 @@ struct TrainNetworkResult {
   double mean_touched_voxels = 0;
   int64_t rejected_steps = 0;   // not finite
   int64_t left_out_pixels = 0;  // targets that are not finite
+  BoundHistory history;         // every kBoundEvery steps, and the end
   std::vector<std::string> warnings;
 };
 

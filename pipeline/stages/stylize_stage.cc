@@ -3,6 +3,7 @@
 #include <omp.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "kernels/field/fast_rays.h"
 #include "pipeline/capture_store.h"
@@ -18,6 +19,7 @@
 #include "stylize/apply_network.h"
 #include "stylize/device_style.h"
 #include "stylize/monge_kantorovich.h"
+#include "stylize/volume_variance.h"
 
 namespace regrade {
 namespace {
@@ -61,6 +63,32 @@ Vec3f Mapped(const ColorMap& map, const Vec3f& color) {
   return mapped.Cast<float>();
 }
 
+// Pairs of neighbouring pixels, drawn for the measurement of what the propositions promise.
+constexpr int64_t kVariancePairs = 4000;
+
+JsonValue GroupRecord(const VarianceGroup& group) {
+  JsonValue record = JsonValue::Object{{"pairs", group.pairs}, {"above", group.above}};
+  if (group.pairs > 0) {
+    record["gain"] = group.Gain();
+    record["largest_excess"] = group.largest_excess;
+  }
+  return record;
+}
+
+JsonValue VarianceRecord(const RadianceField& source, const RadianceField& styled,
+                         const LipschitzNetwork& network,
+                         const std::vector<StyledTrainingView>& views, uint64_t seed) {
+  std::vector<Camera> cameras;
+  for (const StyledTrainingView& view : views) cameras.push_back(view.camera);
+  const VarianceReport report = MeasureVariance(
+      source, styled, network, NeighbouringPixels(cameras, kVariancePairs, seed),
+      MarchOptions{source.step});
+  return JsonValue::Object{{"inside", GroupRecord(report.inside)},
+                           {"clamp", GroupRecord(report.clamp)},
+                           {"open", GroupRecord(report.open)},
+                           {"largest_share", report.largest_share}};
+}
+
 StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
                      const ProgressFunction& progress) {
   const RunSettings& settings = context->settings;
@@ -71,6 +99,7 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
 
   // What a ray sees behind the box is a colour of the scene too, unless the paper's letter is
   // asked for.
+  const Vec3f source_background = stored.field.background;
   if (settings.network.recipe != "paper")
     stored.field.background = Mapped(lessons.scene_map.map, stored.field.background);
   TrainNetworkOptions options = settings.network;
@@ -94,13 +123,16 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
   for (const std::string& warning : trained.warnings) context->console->Warn(warning);
 
   WriteNetworkFile(workspace.Path("network.npz"), {trained.network, trained.k_est});
+  RadianceField source{
+      stored.field.geometry, {}, source_background, stored.field.near_clip, stored.field.step};
+  Appearance restyled;
   if (backend == Backend::kCuda) {
     RestyleOnDevice(trained.network, &device_field);
-    stored.field.appearance = ToRadianceField(DownloadGrid(device_field)).appearance;
+    restyled = ToRadianceField(DownloadGrid(device_field)).appearance;
   } else {
-    stored.field.appearance =
-        ApplyNetwork(trained.network, stored.field, parts.Next(kAfterTraining));
+    restyled = ApplyNetwork(trained.network, stored.field, parts.Next(kAfterTraining));
   }
+  source.appearance = std::exchange(stored.field.appearance, std::move(restyled));
   WriteFieldFile(workspace.Path("styled.npz"), stored);
   StageOutcome outcome;
   outcome.outputs = {"network.npz", "styled.npz"};
@@ -109,6 +141,13 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
   outcome.figures["k_est"] = trained.k_est;
   outcome.figures["bound"] = trained.bound;
   outcome.figures["slope_observed"] = trained.slope_observed;
+  for (size_t i = 0; i < trained.history.steps.size(); ++i) {
+    outcome.figures["bound_steps"].Append(trained.history.steps[i]);
+    outcome.figures["bound_at_steps"].Append(trained.history.bounds[i]);
+  }
+  outcome.figures["slope_ascent"] = trained.slope_ascent;
+  outcome.figures["variance"] =
+      VarianceRecord(source, stored.field, trained.network, lessons.views, settings.run.seed);
   outcome.figures["psnr_train_db"] = trained.psnr_db;
   return outcome;
 }
