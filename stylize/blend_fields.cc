@@ -51,8 +51,8 @@ bool SameGeometry(const Geometry& a, const Geometry& b) {
   if (&a == &b) return true;
   const auto same = [](const auto& x, const auto& y) {
     return x.size() == y.size() &&
-           (x.size() == 0 || std::memcmp(x.data(), y.data(),
-                                         static_cast<size_t>(x.size()) * sizeof(x[0])) == 0);
+           (x.size() == 0 ||
+            std::memcmp(x.data(), y.data(), static_cast<size_t>(x.size()) * sizeof(x[0])) == 0);
   };
   const auto same_vector = [](const auto& x, const auto& y) {
     return x.x == y.x && x.y == y.y && x.z == y.z;

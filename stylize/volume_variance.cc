@@ -21,8 +21,8 @@ struct Atom {
 
 // What one ray sees of the field before and after.
 struct Seen {
-  std::vector<Atom> atoms;  // mu, front to back; weights sum to 1
-  Vec3d source{}, styled{};  // as rendered
+  std::vector<Atom> atoms;                 // mu, front to back; weights sum to 1
+  Vec3d source{}, styled{};                // as rendered
   Vec3d closed_source{}, closed_styled{};  // with mu for weights, nothing clamped
   double gamma[kMaxBasis] = {};
   bool open = false, clamp = false;
@@ -95,8 +95,7 @@ class Observer {
 
  private:
   Vec3d ColorOf(const Appearance& appearance, int32_t voxel, const double* gamma) const {
-    const float* sh =
-        appearance.sh.data() + static_cast<int64_t>(voxel) * appearance.stride();
+    const float* sh = appearance.sh.data() + static_cast<int64_t>(voxel) * appearance.stride();
     Vec3d color{};
     for (int c = 0; c < 3; ++c)
       for (int k = 0; k < basis_; ++k) color[c] += sh[c * basis_ + k] * gamma[k];
@@ -201,8 +200,7 @@ VarianceReport MeasureVariance(const RadianceField& source, const RadianceField&
               a.clamp || b.clamp};
     if (result.open || result.clamp) continue;
     const double bound = observer.Bound(a, b);
-    if (bound > kVarianceSlack)
-      result.share = Norm(a.closed_styled - b.closed_styled) / bound;
+    if (bound > kVarianceSlack) result.share = Norm(a.closed_styled - b.closed_styled) / bound;
   }
   VarianceReport report;
   report.k = observer.k();
@@ -226,7 +224,8 @@ std::vector<RayPair> NeighbouringPixels(const std::vector<Camera>& cameras, int6
       return static_cast<int>(RandomIndex(seed, kStream, static_cast<uint64_t>(4 * i + which),
                                           static_cast<uint64_t>(below)));
     };
-    const Camera& camera = cameras[static_cast<size_t>(draw(0, static_cast<int>(cameras.size())))];
+    const Camera& camera =
+        cameras[static_cast<size_t>(draw(0, static_cast<int>(cameras.size())))];
     const bool down = draw(1, 2) == 1;
     const int right = down ? 0 : 1, below = down ? 1 : 0;
     if (camera.width <= right || camera.height <= below) continue;

@@ -51,7 +51,7 @@ struct VarianceReport {
   int64_t Above() const { return open.above + clamp.above + inside.above; }
 };
 
-inline constexpr double kVarianceSlack = 1e-5;    // float's rounding in a ray's colour
+inline constexpr double kVarianceSlack = 1e-5;      // float's rounding in a ray's colour
 inline constexpr double kOpenTransmittance = 1e-2;  // more than that is background
 
 // `styled` is `source` restyled by `network`. Colours are as rendered, but not clipped to [0,

@@ -12,6 +12,8 @@ const std::vector<Command>& AllCommands() {
       {"stylize", "DIR --style PICTURE [OPTIONS]",
        "gives a finished reconstruction another style, and measures it", RunFolder},
       {"render", "DIR [OPTIONS]", "renders and measures a styled scene again", RunFolder},
+      {"mix", "DIR [STYLED.npz|DIR ...] --out FOLDER [OPTIONS]",
+       "a film that turns from the scene as it was into its style, and on into others", RunMix},
       {"evaluate",
        "DIR [OPTIONS] | --frames DIR [--reference DIR] [--target DIR] [--style PICTURE]",
        "measures consistency and fidelity, of a run or of any program's frames", RunEvaluate},

@@ -121,16 +121,14 @@ double NormProduct(const DenseNetwork<double>& network) {
       for (int o = 0; o < layer.outputs; ++o) {
         u[static_cast<size_t>(o)] = 0;
         for (int i = 0; i < layer.inputs; ++i)
-          u[static_cast<size_t>(o)] +=
-              layer.weight[static_cast<size_t>(o * layer.inputs + i)] *
-              v[static_cast<size_t>(i)];
+          u[static_cast<size_t>(o)] += layer.weight[static_cast<size_t>(o * layer.inputs + i)] *
+                                       v[static_cast<size_t>(i)];
       }
       std::fill(v.begin(), v.end(), 0.0);
       for (int o = 0; o < layer.outputs; ++o)
         for (int i = 0; i < layer.inputs; ++i)
-          v[static_cast<size_t>(i)] +=
-              layer.weight[static_cast<size_t>(o * layer.inputs + i)] *
-              u[static_cast<size_t>(o)];
+          v[static_cast<size_t>(i)] += layer.weight[static_cast<size_t>(o * layer.inputs + i)] *
+                                       u[static_cast<size_t>(o)];
       for (const double x : v) length += x * x;
       norm = std::sqrt(std::sqrt(length));  // |A^T A v| = sigma^2
       for (double& x : v) x /= std::sqrt(length);
@@ -284,7 +282,8 @@ TEST(VolumeVariance, NoPairInsideThePremisesExceedsItsBound) {
 TEST(VolumeVariance, AnUnfaithfulFieldIsFound) {
   StyledField field(0.3f);
   for (int64_t i = 0; i < field.styled.appearance.sh.size(); i += 27)
-    field.styled.appearance.sh[i] += 4 * static_cast<float>(Random(9, static_cast<uint64_t>(i)));
+    field.styled.appearance.sh[i] +=
+        4 * static_cast<float>(Random(9, static_cast<uint64_t>(i)));
   const VarianceReport report = field.Measure(3000);
   EXPECT_GT(report.inside.above, 0);
   EXPECT_GT(report.inside.largest_excess, 0.01);
