@@ -15,6 +15,7 @@ struct SynthEffects {
   bool noise = false;       // of the sensor
   bool distortion = false;  // of the lens: a mild barrel
   bool highlights = false;  // of the sun on glazed things
+  bool masks = false;       // of one object, some of them wrong
 };
 
 inline constexpr double kSynthNoiseSigma = 2.0 / 255;  // of encoded values
@@ -34,6 +35,13 @@ void ApplyGain(double gain, Image* color);
 
 // Adds Gaussian noise to the encoded values, clipped to [0, 1]; `stream` is the photo's index.
 void ApplyNoise(uint64_t seed, uint64_t stream, double sigma, Image* color);
+
+// What a hasty person would hand over for the mask of photo `index`: of every six the third is
+// a fifth of the width off, the fourth empty, the sixth has swallowed a block beside the
+// object.
+enum class MaskFault { kNone, kShifted, kEmpty, kSwollen };
+MaskFault SynthMaskFault(int index);
+Image FaultyMask(const Image& mask, MaskFault fault);
 
 // The same view through the simulated lens.
 Camera WithSynthLens(Camera camera);

@@ -126,6 +126,8 @@ struct StyledTrainingView {
   const Image* target = nullptr;  // [H, W, 3] sRGB, at the camera's size; may leave [0, 1]
   const Image* mask = nullptr;    // [H, W, 1] or null: pixels below 0.5 are left out
   std::string name;               // for messages
+  // The part of the picture that steps look at, [x0, x1) x [y0, y1); empty stands for all.
+  int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
 };
 
 // The scene-wide Monge-Kantorovich map from the photos' colours to the styled ones.

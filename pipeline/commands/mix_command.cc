@@ -98,7 +98,8 @@ void WriteMix(const std::string& out, const RadianceField& source,
   const int frames = static_cast<int>(cameras.size());
   for (int i = 0; i < frames; ++i) {
     if (Report(progress, i, frames) == Verdict::kAbort) throw Interrupted();
-    const std::vector<double> shares = keys.At(static_cast<double>(i) / std::max(1, frames - 1));
+    const std::vector<double> shares =
+        keys.At(static_cast<double>(i) / std::max(1, frames - 1));
     if (!renderer || shares != shown) {
       renderer.reset();  // one at a time: a field may be most of the memory
       renderer = std::make_unique<FieldRenderer>(MixFields(source, styles, shares), backend);

@@ -11,6 +11,7 @@
 #include "pipeline/files/image_file.h"
 #include "pipeline/files/video_file.h"
 #include "pipeline/scene_views.h"
+#include "pipeline/stages/object_edit.h"
 #include "pipeline/stages/run_context.h"
 #include "pipeline/stages/scene_stylizer.h"
 
@@ -66,7 +67,9 @@ void WriteFilms(RunContext* context, const std::string& prefix, int frames,
 struct Studio {
   FieldRenderer source, styled;
   std::unique_ptr<ViewStylizer> stylizer;
-  double styled_seconds = 0;  // spent in rendering the restyled field
+  std::unique_ptr<CoverageRenderer> object;  // null where the whole scene is styled
+  std::vector<Image> coverage;               // of the frame at hand
+  double styled_seconds = 0;                 // spent in rendering the restyled field
 };
 
 // frames/<prefix>{source, styled, views_2d, transmittance}/<index>.png; views_2d for methods
@@ -81,6 +84,7 @@ void RenderFrame(RunContext* context, Studio* studio, const Camera& camera,
   const std::string folder = "frames/" + prefix, name = "/" + FrameName(index);
   WritePng8(workspace.NewPath(folder + "source" + name), plain.color);
   WritePng8(workspace.NewPath(folder + "styled" + name), restyled.color);
+  if (studio->object != nullptr) studio->coverage = studio->object->Render(camera);
   if (studio->stylizer->StylesAnything())
     WritePng8(workspace.NewPath(folder + "views_2d" + name),
               studio->stylizer->Stylize(plain.color, index));
@@ -95,8 +99,18 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   const StoredField before = ReadFieldFile(workspace.Path("field.npz"));
   const StoredField after = ReadFieldFile(workspace.Path("styled.npz"));
   const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
-  Studio studio{FieldRenderer(before.field, backend), FieldRenderer(after.field, backend),
-                MakeSceneStylizer(context, capture)};
+  Studio studio{FieldRenderer(before.field, backend),
+                FieldRenderer(after.field, backend),
+                nullptr,
+                nullptr,
+                {}};
+  const std::unique_ptr<ObjectMasks> masks = OpenObjectMasks(settings, capture);
+  if (masks != nullptr)
+    studio.object = std::make_unique<CoverageRenderer>(
+        before.field,
+        ReadObjectFile(workspace.Path("object.npz"), before.field.geometry->num_voxels()));
+  studio.stylizer = MakeSceneStylizer(context, capture, masks.get(),
+                                      [&](const Image&, int) { return studio.coverage; });
 
   std::vector<Camera> views;
   for (const CaptureView& view : capture.views)

@@ -14,9 +14,13 @@
 #include "pipeline/network_file.h"
 #include "pipeline/plan.h"
 #include "pipeline/scene_views.h"
+#include "pipeline/stages/lessons.h"
+#include "pipeline/stages/object_edit.h"
 #include "pipeline/stages/run_context.h"
 #include "pipeline/stages/scene_stylizer.h"
 #include "stylize/apply_network.h"
+#include "stylize/base_map.h"
+#include "stylize/blend_fields.h"
 #include "stylize/device_style.h"
 #include "stylize/monge_kantorovich.h"
 #include "stylize/volume_variance.h"
@@ -24,36 +28,7 @@
 namespace regrade {
 namespace {
 
-// What the network learns from: the views that the field was fitted to, see StyledViews.
-struct Lessons {
-  std::vector<Image> targets;
-  std::vector<StyledTrainingView> views;
-  SceneColorMap scene_map;
-};
-
-Lessons ReadLessons(RunContext* context, const Capture& capture, const StoredField& stored) {
-  const RunSettings& settings = context->settings;
-  const std::vector<int> indices =
-      StyledViews(*context->workspace, capture, settings.run.holdout);
-  Lessons lessons;
-  lessons.targets.reserve(indices.size());
-  std::vector<ColorStatistics> before, after;
-  for (const int i : indices) {
-    const CaptureView& view = capture.views[static_cast<size_t>(i)];
-    const std::string name = "views_2d/" + FrameName(i);
-    lessons.targets.push_back(ReadImage(context->workspace->Path(name)));
-    lessons.views.push_back({WorkingCamera(view.camera, settings.scene.photo_size,
-                                           stored.field_from_world, stored.ndc),
-                             &lessons.targets.back(), nullptr, name});
-    before.push_back(MeasureColor(ReadWorkingPhoto(view, settings.scene.photo_size)));
-    after.push_back(MeasureColor(lessons.targets.back()));
-  }
-  const MklMap mkl = ComputeMkl(Pool(before), Pool(after));
-  for (const std::string& notice : mkl.notices) context->console->Info(notice);
-  lessons.scene_map = {mkl.map, mkl.norm};
-  return lessons;
-}
-
+constexpr double kVoting = 0.2;  // of the steps' time, roughly
 constexpr double kAfterTraining =
     0.15;  // conclusion, and the network over the field, of the steps' time
 
@@ -89,23 +64,46 @@ JsonValue VarianceRecord(const RadianceField& source, const RadianceField& style
                            {"largest_share", report.largest_share}};
 }
 
+// An object's style that no view shows.
+StageOutcome LeaveAsItWas(RunContext* context, const StoredField& stored,
+                          const ObjectShares& shares) {
+  const Workspace& workspace = *context->workspace;
+  context->console->Warn(
+      "the masks agree on no part of the scene: it stays as it was. Look at --masks, or lower "
+      "--mask-vote");
+  WriteNetworkFile(workspace.Path("network.npz"), {NetworkOfMap({}), 0});
+  WriteFieldFile(workspace.Path("styled.npz"), stored);
+  WriteObjectFile(workspace.Path("object.npz"), shares);
+  StageOutcome outcome;
+  outcome.outputs = {"network.npz", "styled.npz", "object.npz"};
+  outcome.figures["steps"] = 0;
+  return outcome;
+}
+
 StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
                      const ProgressFunction& progress) {
   const RunSettings& settings = context->settings;
   Workspace& workspace = *context->workspace;
   const Capture capture = ReadCapture(workspace.Path("poses"));
   StoredField stored = ReadFieldFile(workspace.Path("field.npz"));
-  const Lessons lessons = ReadLessons(context, capture, stored);
+  ProgressParts parts(progress, 1 + kAfterTraining + (settings.object.On() ? kVoting : 0));
+  const std::vector<int> indices = StyledViews(workspace, capture, settings.run.holdout);
+  const std::unique_ptr<ObjectMasks> object = OpenObjectMasks(settings, capture);
+  ObjectShares shares;
+  if (object != nullptr)
+    shares = VoteForObject(settings, capture, indices, *object, stored.field,
+                           stored.field_from_world, stored.ndc, parts.Next(kVoting));
+  const Lessons lessons = ReadLessons(context, capture, stored, indices, object.get(), &shares);
+  if (lessons.views.empty()) return LeaveAsItWas(context, stored, shares);
 
   // What a ray sees behind the box is a colour of the scene too, unless the paper's letter is
   // asked for.
   const Vec3f source_background = stored.field.background;
-  if (settings.network.recipe != "paper")
+  if (settings.network.recipe != "paper" && object == nullptr)
     stored.field.background = Mapped(lessons.scene_map.map, stored.field.background);
   TrainNetworkOptions options = settings.network;
   options.seed = settings.run.seed;
   TrainingHooks hooks;
-  ProgressParts parts(progress, 1 + kAfterTraining);
   hooks.progress = parts.Next(1);
   hooks.checkpoint = [&](const TrainingState& state) {
     workspace.SaveCheckpoint("stylize", inputs, PackTrainingState(state));
@@ -133,9 +131,17 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
     restyled = ApplyNetwork(trained.network, stored.field, parts.Next(kAfterTraining));
   }
   source.appearance = std::exchange(stored.field.appearance, std::move(restyled));
-  WriteFieldFile(workspace.Path("styled.npz"), stored);
   StageOutcome outcome;
   outcome.outputs = {"network.npz", "styled.npz"};
+  if (object != nullptr) {
+    const RadianceField styled = std::move(stored.field);
+    stored.field = MixFields(source, {&styled}, {1}, &shares.all);
+    WriteObjectFile(workspace.Path("object.npz"), shares);
+    outcome.outputs.push_back("object.npz");
+    outcome.figures["object_voxels"] = static_cast<int64_t>(
+        std::count_if(shares.all.begin(), shares.all.end(), [](float e) { return e > 0; }));
+  }
+  WriteFieldFile(workspace.Path("styled.npz"), stored);
   outcome.figures["device"] = DeviceName(backend);
   outcome.figures["steps"] = trained.steps;
   outcome.figures["k_est"] = trained.k_est;
@@ -146,8 +152,9 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
     outcome.figures["bound_at_steps"].Append(trained.history.bounds[i]);
   }
   outcome.figures["slope_ascent"] = trained.slope_ascent;
-  outcome.figures["variance"] =
-      VarianceRecord(source, stored.field, trained.network, lessons.views, settings.run.seed);
+  if (object == nullptr)  // a network's promise is about what it alone has made
+    outcome.figures["variance"] =
+        VarianceRecord(source, stored.field, trained.network, lessons.views, settings.run.seed);
   outcome.figures["psnr_train_db"] = trained.psnr_db;
   return outcome;
 }
@@ -163,6 +170,10 @@ Stage StylizeStage(RunContext* context) {
                                    {"options", context->OptionsOf({"Scene", "Network"})},
                                    {"seed", run.seed},
                                    {"holdout", run.holdout}};
+  if (context->settings.object.On()) {
+    stage.inputs["object"] = context->OptionsOf({"Object"});
+    stage.inputs["masks"] = MaskFiles(context->settings.object);
+  }
   stage.plan = PlanText(PlanStyle(context->settings.network.steps, omp_get_max_threads()));
   stage.work = [context, inputs = stage.inputs](const ProgressFunction& progress) {
     return Stylize(context, inputs, progress);

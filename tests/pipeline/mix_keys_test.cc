@@ -34,8 +34,7 @@ TEST(MixKeys, SeveralStylesHaveAShareEach) {
 
 TEST(MixKeys, H49_WhatIsNoShareIsRefusedByName) {
   for (const char* text : {"1.1", "-0.1", "nan", "", ":", "0:x", "0:1e999", "0x1", "1,0"})
-    if (*text != 0)
-      EXPECT_REGRADE_ERROR(ParseMixKeys(text, 1), ExitCode::kUsage, "--mix");
+    if (*text != 0) EXPECT_REGRADE_ERROR(ParseMixKeys(text, 1), ExitCode::kUsage, "--mix");
   EXPECT_REGRADE_ERROR(ParseMixKeys("0.7,0.7", 2), ExitCode::kUsage, "more than 1");
   EXPECT_REGRADE_ERROR(ParseMixKeys("1:0", 2), ExitCode::kUsage, "for 2 styles");
 }
