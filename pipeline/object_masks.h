@@ -57,7 +57,8 @@ class ObjectMasks {
   // [regions] of [height, width, 1] for a photo of that size. Throws Error(kInput) for a mask
   // of another aspect, and for one that cannot be read.
   std::vector<Image> Coverage(int view, int width, int height) const;
-  // The part of the style for a region, of the style picture's size; empty without --style-mask.
+  // The part of the style for a region, of the style picture's size; empty without
+  // --style-mask.
   Image StyleRegion(int region, int width, int height) const;
 
  private:

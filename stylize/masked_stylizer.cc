@@ -25,16 +25,16 @@ class MaskedStylizer : public ViewStylizer {
     for (size_t k = 0; k < regions_.size(); ++k) {
       REGRADE_CHECK(coverage[k].SameSize(view) && coverage[k].channels == 1);
       if (!ShowsRegion(coverage[k])) continue;
-      const Image styled = regions_[k]->Stylize(
-          alpha_tells_ ? WithRegion(view, coverage[k]) : view, view_index);
+      const Image styled =
+          regions_[k]->Stylize(alpha_tells_ ? WithRegion(view, coverage[k]) : view, view_index);
       for (int64_t i = 0; i < view.num_pixels(); ++i) {
         const float m = coverage[k].pixels[static_cast<size_t>(i)];
         if (!(m > 0)) continue;
         for (int c = 0; c < std::min(3, view.channels); ++c) {
           const size_t at = static_cast<size_t>(i * view.channels + c);
           result.pixels[at] +=
-              m * (styled.pixels[static_cast<size_t>(i * styled.channels + c)] -
-                   view.pixels[at]);
+              m *
+              (styled.pixels[static_cast<size_t>(i * styled.channels + c)] - view.pixels[at]);
         }
       }
     }
@@ -81,8 +81,7 @@ bool ShowsRegion(const Image& coverage) {
 std::unique_ptr<ViewStylizer> MakeMaskedStylizer(
     std::vector<std::unique_ptr<ViewStylizer>> regions, bool alpha_tells,
     CoverageFunction coverage) {
-  return std::make_unique<MaskedStylizer>(std::move(regions), alpha_tells,
-                                          std::move(coverage));
+  return std::make_unique<MaskedStylizer>(std::move(regions), alpha_tells, std::move(coverage));
 }
 
 }  // namespace regrade

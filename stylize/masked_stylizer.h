@@ -12,8 +12,7 @@ namespace regrade {
 
 // How much of each pixel belongs to each region: [regions] of [H, W, 1] in [0, 1] that sum to
 // at most 1.
-using CoverageFunction =
-    std::function<std::vector<Image>(const Image& view, int view_index)>;
+using CoverageFunction = std::function<std::vector<Image>(const Image& view, int view_index)>;
 
 // EQ(region-mix): result = view + sum_k m_k (styled_k - view), m_k the coverage of region k:
 // the weights of all parts sum to 1, and a pixel with m = 0 keeps its bits. styled_k is what

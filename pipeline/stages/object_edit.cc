@@ -63,10 +63,10 @@ void WriteObjectFile(const std::string& path, const ObjectShares& shares) {
   for (const std::vector<float>& region : shares.regions)
     values.insert(values.end(), region.begin(), region.end());
   NpzWriter file;
-  file.Add("shares",
-           {static_cast<int64_t>(shares.regions.size()),
-            static_cast<int64_t>(shares.all.size())},
-           values.data(), NpzPacking::kDeflate);
+  file.Add(
+      "shares",
+      {static_cast<int64_t>(shares.regions.size()), static_cast<int64_t>(shares.all.size())},
+      values.data(), NpzPacking::kDeflate);
   file.AddScalar<int32_t>("regrade_version", 1);
   file.WriteTo(path);
 }

@@ -27,8 +27,8 @@ TEST(MixCommand, H49_AFilmBetweenTheSceneAndItsStyle) {
   const TemporaryFolder folder;
   const std::string style = std::string(REGRADE_SOURCE_DIR) + "/assets/style_sunset.png";
   ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}).code, 0);
-  std::vector<std::string> run{"run",   folder / "s/truth", "--style",
-                               style,   "--out",            folder / "e"};
+  std::vector<std::string> run{"run",   folder / "s/truth", "--style", style,
+                               "--out", folder / "e"};
   for (const std::string& flag : testing::TinyFlags()) run.push_back(flag);
   const ProgramOutcome done = Regrade(run);
   ASSERT_EQ(done.code, 0) << done.text;
