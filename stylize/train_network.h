@@ -95,16 +95,25 @@ struct TrainNetworkOptions {
           .min = 1,
           .max = 1000});
     bind("style-activation", activation,
-         {.help = "of the hidden layers", .choices = "sine|relu|leaky-relu|sigmoid|tanh"});
+         {.help =
+              "of the hidden layers: sine follows strong styles best; relu and leaky-relu are "
+              "piecewise linear and a little less faithful; sigmoid and tanh flatten far from "
+              "0 and may stop learning",
+          .choices = "sine|relu|leaky-relu|sigmoid|tanh"});
     bind("style-omega", omega,
          {.help = "frequency of the sine; five layers multiply the bound by its fifth power",
           .min = 0.01,
           .max = 100});
-    bind("style-no-k-est", no_k_est, {.help = "ablation: regularise towards 0, not K_est"});
+    bind("style-no-k-est", no_k_est,
+         {.help = "ablation: regularise towards 0, not K_est: a smaller bound, paler "
+                  "colours"});
     bind("style-no-regularisation", no_regularisation,
-         {.help = "ablation: no Lipschitz regularisation"});
-    bind("style-spectral-normalisation", spectral_normalisation,
-         {.help = "ablation: every layer's norm is 1"});
+         {.help = "ablation: no Lipschitz regularisation: nearer to the 2D method, and "
+                  "noisier where its views disagree; only --style-bound still holds"});
+    bind(
+        "style-spectral-normalisation", spectral_normalisation,
+        {.help = "ablation: every layer's norm is 1, and so is the network's bound: smoothest, "
+                 "and weakest in colour"});
     bind("style-loss", loss_scale,
          {.help = "mean over rays and channels, or the paper's sum divided by the voxels",
           .choices = "mean|sum-over-voxels"});

@@ -18,6 +18,7 @@
 #include "pipeline/run_file.h"
 #include "pipeline/run_settings.h"
 #include "pipeline/scene_views.h"
+#include "pipeline/stages/object_edit.h"
 #include "pipeline/workspace.h"
 #include "stylize/blend_fields.h"
 
@@ -29,6 +30,7 @@ namespace fs = std::filesystem;
 struct MixOptions {
   std::string out;
   std::string mix;
+  bool object = false;
   std::string device = "auto";
   bool dry_run = false;
 
@@ -41,6 +43,9 @@ struct MixOptions {
               "from one into the other, 0:1:0 and back, 0.5 stays half way and also writes "
               "mixed.npz. With several styles a share for each: 1,0:0,1 turns the first into "
               "the second. Without it, all styles in order"});
+    bind("object", object,
+         {.help = "only the object changes whose masks DIR was styled with, the rest stays as "
+                  "it was; styles of the whole scene may be named"});
     bind("device", device, {.help = "where arithmetic runs", .choices = "auto|cpu|cuda"});
     bind("dry-run", dry_run, {.help = "say what would be done, and do nothing"});
   }
@@ -82,8 +87,8 @@ std::vector<Camera> FilmCameras(const std::string& folder, const StoredField& st
 
 void WriteMix(const std::string& out, const RadianceField& source,
               const std::vector<const RadianceField*>& styles, const MixKeys& keys,
-              const std::vector<Camera>& cameras, double fps, Backend backend,
-              Console* console) {
+              const std::vector<float>* shares_of_voxels, const std::vector<Camera>& cameras,
+              double fps, Backend backend, Console* console) {
   std::optional<VideoWriter> film;
   try {
     film.emplace(out + "/mixed.mp4", cameras[0].width, cameras[0].height, fps);
@@ -102,7 +107,8 @@ void WriteMix(const std::string& out, const RadianceField& source,
         keys.At(static_cast<double>(i) / std::max(1, frames - 1));
     if (!renderer || shares != shown) {
       renderer.reset();  // one at a time: a field may be most of the memory
-      renderer = std::make_unique<FieldRenderer>(MixFields(source, styles, shares), backend);
+      renderer = std::make_unique<FieldRenderer>(
+          MixFields(source, styles, shares, shares_of_voxels), backend);
       shown = shares;
     }
     const Image frame = renderer->Render(cameras[static_cast<size_t>(i)]).color;
@@ -174,14 +180,25 @@ void RunMix(const Command& command, const Arguments& arguments, Console* console
   }
   for (const StoredField& style : styles) fields.push_back(&style.field);
 
+  std::optional<ObjectShares> object;
+  if (settings.object) {
+    const std::string file = folder + "/object.npz";
+    if (!fs::exists(file))
+      throw Error(ExitCode::kInput, "there is no object", file,
+                  "make it with `regrade stylize " + folder + " --masks FOLDER`");
+    object = ReadObjectFile(file, stored.field.geometry->num_voxels());
+  }
+  const std::vector<float>* within = object ? &object->all : nullptr;
+
   MakeMixFolder(settings.out);
   JsonValue record = JsonValue::Object{{"field", folder}, {"options", options.Values()}};
   for (const std::string& word : words) record["styles"].Append(StyleFile(word));
   WriteJsonFile(settings.out + "/mix.json", record);
-  WriteMix(settings.out, stored.field, fields, keys, cameras, render.fps, backend, console);
+  WriteMix(settings.out, stored.field, fields, keys, within, cameras, render.fps, backend,
+           console);
   if (keys.IsConstant()) {
     StoredField mixed = stored;
-    mixed.field = MixFields(stored.field, fields, keys.points[0]);
+    mixed.field = MixFields(stored.field, fields, keys.points[0], within);
     WriteFieldFile(settings.out + "/mixed.npz", mixed);
   }
   console->Info("wrote " + std::to_string(cameras.size()) + " frames to " + settings.out);

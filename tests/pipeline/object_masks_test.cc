@@ -93,14 +93,30 @@ TEST(ObjectMasks, H50_ARunWithWrongMasksRestylesTheObjectAlone) {
   const auto regrade = [](const std::vector<std::string>& arguments) {
     return testing::RunProgram(REGRADE_PROGRAM, arguments);
   };
-  ASSERT_EQ(regrade({"synth", folder / "s", "--views", "12", "--size", "96x72", "--effects",
-                     "masks"})
-                .code,
-            0);
-  std::vector<std::string> run{
-      "run",     folder / "s/truth", "--style", style,    "--out",       folder / "e",
-      "--masks", folder / "s/masks", "--path",  "views",  "--photo-size", "96",
-      "--fit-resolutions", "32", "--fit-steps", "200", "--style-steps", "10", "--threads", "2"};
+  ASSERT_EQ(
+      regrade({"synth", folder / "s", "--views", "12", "--size", "96x72", "--effects", "masks"})
+          .code,
+      0);
+  std::vector<std::string> run{"run",
+                               folder / "s/truth",
+                               "--style",
+                               style,
+                               "--out",
+                               folder / "e",
+                               "--masks",
+                               folder / "s/masks",
+                               "--path",
+                               "views",
+                               "--photo-size",
+                               "96",
+                               "--fit-resolutions",
+                               "32",
+                               "--fit-steps",
+                               "200",
+                               "--style-steps",
+                               "10",
+                               "--threads",
+                               "2"};
   const ProgramOutcome done = regrade(run);
   ASSERT_EQ(done.code, 0) << done.text;
   // View 2 was given a mask beside the ball, view 3 an empty one, view 5 a swollen one.
@@ -109,8 +125,7 @@ TEST(ObjectMasks, H50_ARunWithWrongMasksRestylesTheObjectAlone) {
     const auto frame = [&](const char* sequence) {
       return ReadImage(folder / (std::string("e/frames/") + sequence + "/" + name + ".png"));
     };
-    const Image truth =
-        ReadImage(folder / (std::string("s/truth/masks/") + name + ".png"));
+    const Image truth = ReadImage(folder / (std::string("s/truth/masks/") + name + ".png"));
     restyled += Change(frame("source"), frame("styled"), truth, true);
     spilled += Change(frame("source"), frame("styled"), truth, false);
   }
@@ -125,8 +140,7 @@ TEST(ObjectMasks, H50_ARunWithWrongMasksRestylesTheObjectAlone) {
     std::snprintf(name, sizeof name, "%05d.png", i);
     WritePng8(folder / ("none/" + std::string(name)), Image(96, 72, 1));
   }
-  const ProgramOutcome empty =
-      regrade({"stylize", folder / "e", "--masks", folder / "none"});
+  const ProgramOutcome empty = regrade({"stylize", folder / "e", "--masks", folder / "none"});
   ASSERT_EQ(empty.code, 0) << empty.text;
   EXPECT_NE(empty.text.find("--mask-vote"), std::string::npos) << empty.text;
   const auto pixels = [&](const char* path) { return ReadImage(folder / path).pixels; };

@@ -75,13 +75,13 @@ TEST(ObjectEdit, H50_OutsideTheObjectEveryPixelIsTheSources) {
         bool touches = false;
         for (const WeightedSample& sample : weights.samples) {
           for (int corner = 0; corner < 8; ++corner) {
-            const int32_t voxel = ball.field.geometry->links[CornerVertex(
-                ball.field.geometry->frame, sample.vertex, corner)];
+            const int32_t voxel =
+                ball.field.geometry
+                    ->links[CornerVertex(ball.field.geometry->frame, sample.vertex, corner)];
             if (voxel >= 0) touches |= shares[static_cast<size_t>(voxel)] > 0;
           }
         }
-        const bool same =
-            std::memcmp(before.at(x, y), after.at(x, y), 3 * sizeof(float)) == 0;
+        const bool same = std::memcmp(before.at(x, y), after.at(x, y), 3 * sizeof(float)) == 0;
         if (!touches) {
           EXPECT_TRUE(same) << x << " " << y;
           ++outside;
@@ -149,8 +149,7 @@ TEST(ObjectEdit, VotesDoNotDependOnTheirOrderOrOnThreads) {
   MaskVote backwards(*ball.field.geometry, 0, MarchOptions{});
   const std::vector<float> shares = ball.Vote(ball.masks);
   const Threads single(1);
-  for (size_t i = ball.cameras.size(); i-- > 0;)
-    backwards.Add(ball.cameras[i], ball.masks[i]);
+  for (size_t i = ball.cameras.size(); i-- > 0;) backwards.Add(ball.cameras[i], ball.masks[i]);
   EXPECT_EQ(backwards.Shares(0.5, 0.25), shares);
 }
 
@@ -196,9 +195,9 @@ TEST(MaskedStylizer, H50_RegionsAreMixedAndTheRestKeepsItsBits) {
   std::vector<std::unique_ptr<ViewStylizer>> regions;
   regions.push_back(std::make_unique<MeanAdder>());
   regions.push_back(std::make_unique<MeanAdder>());
-  const auto stylizer = MakeMaskedStylizer(
-      std::move(regions), true,
-      [&](const Image&, int) { return std::vector<Image>{left, right}; });
+  const auto stylizer = MakeMaskedStylizer(std::move(regions), true, [&](const Image&, int) {
+    return std::vector<Image>{left, right};
+  });
   const Image styled = stylizer->Stylize(view, 0);
   for (int x = 3; x < 6; ++x) EXPECT_EQ(*styled.at(x, 0), *view.at(x, 0));
   const float of_left = (view.pixels[0] + view.pixels[3] + view.pixels[6]) / 3,
