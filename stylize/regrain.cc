@@ -10,7 +10,7 @@
 namespace regrade {
 namespace {
 
-constexpr int kSmallestSide = 20;  // pixels of the picture that the solution begins with
+constexpr int kSmallestSide = 20;    // pixels of the picture that the solution begins with
 constexpr double kTolerance = 1e-3;  // of the residual, against the right side's
 constexpr int kMostIterations = 200;
 
@@ -127,9 +127,9 @@ Image SolveFromSmall(const Image& picture, const Image& transferred) {
   Image guess = transferred;
   const int width = picture.width / 2, height = picture.height / 2;
   if (std::min(width, height) >= kSmallestSide)
-    guess = Resize(SolveFromSmall(Resize(picture, width, height),
-                                  Resize(transferred, width, height)),
-                   picture.width, picture.height);
+    guess = Resize(
+        SolveFromSmall(Resize(picture, width, height), Resize(transferred, width, height)),
+        picture.width, picture.height);
   return Equations(picture, transferred).Solve(std::move(guess));
 }
 

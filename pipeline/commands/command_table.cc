@@ -14,6 +14,8 @@ const std::vector<Command>& AllCommands() {
       {"render", "DIR [OPTIONS]", "renders and measures a styled scene again", RunFolder},
       {"mix", "DIR [STYLED.npz|DIR ...] --out FOLDER [OPTIONS]",
        "a film that turns from the scene as it was into its style, and on into others", RunMix},
+      {"contact-sheet", "DIR STYLE... --out FILE.png [OPTIONS]",
+       "one picture of what each way of styling makes of a reconstruction", RunContactSheet},
       {"evaluate",
        "DIR [OPTIONS] | --frames DIR [--reference DIR] [--target DIR] [--style PICTURE]",
        "measures consistency and fidelity, of a run or of any program's frames", RunEvaluate},

@@ -74,7 +74,7 @@ Image Styled(const Image& photo, bool regrain) {
 
 TEST(Regrain, GrainGetsNoLouderThanThePhotos) {
   const Image photo = GrainyPhoto(), loud = Styled(photo, false), quiet = Styled(photo, true);
-  EXPECT_GT(Grain(loud), 3 * Grain(photo));     // what has to be taken back
+  EXPECT_GT(Grain(loud), 3 * Grain(photo));      // what has to be taken back
   EXPECT_LE(Grain(quiet), 1.25 * Grain(photo));  // the transfer's own slopes remain, no noise
   // The fields have the colours that the transfer gave them: a step of 8 bits or two is the
   // slope of the plain parts, which follow their neighbours.
