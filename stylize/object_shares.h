@@ -3,7 +3,7 @@
 //
 // EQ(mask-vote): v_j = sum_r m_r W_rj / sum_r W_rj over the rays r of all masked photos, m_r
 // what the mask says of the ray's pixel and W_rj = sum_i w_i b_ij the weight with which the ray
-// sees voxel j (w_i of EQ(composite), b_ij of EQ(trilinear)). The share is
+// sees voxel j (for w_i see EQ(composite), for b_ij see EQ(trilinear)). The share is
 //   e_j = clamp((v_j - t + h) / (2 h), 0, 1),  h <= t and h <= 1 - t:
 // t the vote that half belongs, h half the width of the edge. A voxel that no mask votes for
 // has v_j = 0 and so e_j = 0, exactly, as has one that only a few wrong masks hit; one that

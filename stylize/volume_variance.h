@@ -3,7 +3,7 @@
 //
 // EQ(vrr), LipRF eq. 5: vrr(r1, r2; F) = |C(r1; F) - C(r2; F)|.
 //
-// EQ(vrr-bound): for the field restyled by f = A + g of EQ(liprf-network), where no colour is
+// EQ(vrr-bound): for the field restyled by f = A + g, see EQ(liprf-network), where no colour is
 // clamped and the weights of either ray sum to 1,
 //   vrr' <= |A| vrr + |Gamma| K_g W1(mu_1, mu_2) + |sum_j mu_2j g_j| |Gamma(d_1) - Gamma(d_2)|.
 // mu_r are the weights that ray r gives to voxels: the linear part of a ray's colour is A C + o
@@ -44,8 +44,9 @@ struct VarianceReport {
   double k = 0;          // |A| + K_g
   VarianceGroup open;    // light is left behind a ray, or it passes cells with empty corners
   VarianceGroup clamp;   // a sample's colour is clamped, before or after
-  VarianceGroup inside;  // every premise of EQ(vrr-bound) holds
-  double largest_share = 0;  // of vrr' in EQ(vrr-bound), over `inside`; at most 1
+  VarianceGroup inside;  // every premise of the bound holds
+  double largest_share =
+      0;  // of vrr' in its bound, see EQ(vrr-bound), over `inside`; at most 1
 
   int64_t Pairs() const { return open.pairs + clamp.pairs + inside.pairs; }
   int64_t Above() const { return open.above + clamp.above + inside.above; }

@@ -72,9 +72,9 @@ std::string PsnrCaption(const Image& a, const Image& b) {
     if (std::isfinite(d)) sum += d * d, ++count;
   }
   char text[48];
-  std::snprintf(text, sizeof text, "%.1f dB from the 2D method",
-                -10 * std::log10(std::max(sum / static_cast<double>(std::max<int64_t>(1, count)),
-                                          1e-12)));
+  std::snprintf(text, sizeof text, "%.1f dB to 2D",
+                -10 * std::log10(std::max(
+                          sum / static_cast<double>(std::max<int64_t>(1, count)), 1e-12)));
   return text;
 }
 
@@ -95,9 +95,8 @@ Scene ReadScene(const std::string& folder, const SheetOptions& sheet, int holdou
   if (scene.taught.empty()) scene.taught = ViewIndices(scene.capture, holdout, true);
   const int count = std::min(sheet.views, static_cast<int>(scene.taught.size()));
   for (int k = 0; k < count; ++k)
-    scene.shown.push_back(
-        scene.taught[(2 * static_cast<size_t>(k) + 1) * scene.taught.size() /
-                     (2 * static_cast<size_t>(count))]);
+    scene.shown.push_back(scene.taught[(2 * static_cast<size_t>(k) + 1) * scene.taught.size() /
+                                       (2 * static_cast<size_t>(count))]);
   for (const CaptureView& view : scene.capture.views) {
     scene.cameras.push_back(WorkingCamera(view.camera, sheet.size,
                                           scene.stored.field_from_world, scene.stored.ndc));
@@ -112,14 +111,15 @@ std::vector<Image> Shown(const Scene& scene, const RadianceField& field) {
   std::vector<Image> frames;
   for (const int i : scene.shown)
     frames.push_back(
-        RenderView(grid, scene.cameras[static_cast<size_t>(i)], MarchOptions{field.step}).color);
+        RenderView(grid, scene.cameras[static_cast<size_t>(i)], MarchOptions{field.step})
+            .color);
   return frames;
 }
 
 TrainNetworkResult Train(const Scene& scene, const RadianceField& field,
-                         const std::vector<StyledTrainingView>& views,
-                         const SceneColorMap& map, const std::string& recipe, int steps,
-                         uint64_t seed, const ProgressFunction& progress) {
+                         const std::vector<StyledTrainingView>& views, const SceneColorMap& map,
+                         const std::string& recipe, int steps, uint64_t seed,
+                         const ProgressFunction& progress) {
   TrainNetworkOptions options;
   ApplyStyleRecipe(recipe, &options);
   options.seed = seed;
@@ -167,16 +167,15 @@ void AddStyle(RunContext* context, const Scene& scene, const SheetOptions& sheet
   linear.background = standard.background;
   const TrainNetworkResult by_standard = Train(scene, standard, views, map, "standard",
                                                sheet.steps, settings.run.seed, parts.Next(1));
-  const TrainNetworkResult by_paper = Train(scene, paper, views, map, "paper", sheet.steps,
-                                            settings.run.seed, parts.Next(1));
+  const TrainNetworkResult by_paper =
+      Train(scene, paper, views, map, "paper", sheet.steps, settings.run.seed, parts.Next(1));
   linear.appearance = ApplyColorMap(source.appearance, by_standard.network.data().base);
   standard.appearance = ApplyNetwork(by_standard.network, standard);
   paper.appearance = ApplyNetwork(by_paper.network, paper);
   const std::vector<Image> columns[] = {Shown(scene, linear), Shown(scene, paper),
                                         Shown(scene, standard)};
   char words[160];
-  std::snprintf(words, sizeof words,
-                "%s by %s: K_est %.2f; bound of the standard recipe %.2f, of the paper's %.2f",
+  std::snprintf(words, sizeof words, "%s, %s: K_est %.2f, bounds %.2f (standard), %.2f (paper)",
                 name.c_str(), stylizer->Name().c_str(), by_standard.k_est, by_standard.bound,
                 by_paper.bound);
   for (size_t k = 0; k < scene.shown.size(); ++k) {
@@ -218,7 +217,8 @@ void RunContactSheet(const Command& command, const Arguments& arguments, Console
   options.ApplyFlags();
   ApplyProgramOptions(settings.program);
   if (sheet.out.empty() && !sheet.dry_run)
-    throw Error(ExitCode::kUsage, "its value is missing", "--out", "name the PNG file to write");
+    throw Error(ExitCode::kUsage, "its value is missing", "--out",
+                "name the PNG file to write");
   for (size_t i = 1; i < words.size(); ++i) ReadStylePicture(words[i], nullptr);
   ProbeMethod(&settings.style_2d);
 
@@ -230,8 +230,7 @@ void RunContactSheet(const Command& command, const Arguments& arguments, Console
   console->Info(plan);
   if (sheet.dry_run) return;
   std::vector<SheetRow> rows;
-  for (size_t i = 1; i < words.size(); ++i)
-    AddStyle(&context, scene, sheet, words[i], &rows);
+  for (size_t i = 1; i < words.size(); ++i) AddStyle(&context, scene, sheet, words[i], &rows);
   const Image picture = MakeContactSheet(kColumns, rows);
   WritePng8(sheet.out, picture);
   console->Info("wrote " + sheet.out + ", " + std::to_string(picture.width) + "x" +

@@ -11,6 +11,7 @@
 #include "pipeline/files/image_file.h"
 #include "pipeline/folder_listing.h"
 #include "pipeline/folder_stylizer.h"
+#include "pipeline/rehearsal.h"
 #include "pipeline/scene_views.h"
 #include "pipeline/stage_record.h"
 #include "stylize/color_transfer.h"
@@ -110,6 +111,8 @@ void ProbeMethod(StyleOptions* options) {
                 "what follows \"" + method.kind + ":\" in --method must exist");
   const fs::path absolute = fs::absolute(method.argument, error);
   if (!error) options->method = method.kind + ":" + absolute.lexically_normal().string();
+  if (method.kind == "onnx")
+    Rehearse([&] { MakeOnnxStylizer(method.argument, 64, Image(64, 64)); }, method.argument);
 }
 
 std::vector<int> StyledViews(const Workspace& workspace, const Capture& capture, int holdout) {

@@ -18,8 +18,9 @@ Image Plain(int width, int height, float value) {
 
 TEST(ContactSheet, EveryPictureIsThereWhole) {
   const Image sheet = MakeContactSheet(
-      {"one", "two"}, {{"a style", {{Plain(40, 30, 0.25f), "28.1 dB"}, {Plain(30, 30, 0.5f), ""}}},
-                       {"", {{Plain(40, 20, 0.75f), "x"}, {Image(), "nothing"}}}});
+      {"one", "two"},
+      {{"a style", {{Plain(40, 30, 0.25f), "28.1 dB"}, {Plain(30, 30, 0.5f), ""}}},
+       {"", {{Plain(40, 20, 0.75f), "x"}, {Image(), "nothing"}}}});
   int quarter = 0, half = 0, three = 0, ink = 0;
   for (int64_t i = 0; i < sheet.num_pixels(); ++i) {
     const float v = sheet.pixels[static_cast<size_t>(3 * i)];

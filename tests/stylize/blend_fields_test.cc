@@ -101,7 +101,7 @@ TEST(MixFields, H49_WhatIsBeyondTheEndsIsRefused) {
                        "style 2");
 }
 
-TEST(MixFields, SharesKeepWhatIsNotTheirs) {
+TEST(MixFields, H50_SharesKeepWhatIsNotTheirs) {
   const Styles s;
   const int64_t n = s.source.geometry->num_voxels();
   std::vector<float> shares(static_cast<size_t>(n), 0.0f);
