@@ -8,8 +8,8 @@
 namespace regrade {
 
 struct RehearsalLimits {
-  double seconds = 300;                        // of the wall clock
-  int64_t memory_bytes = int64_t{32} << 30;    // of address space; not kept by sanitizers' builds
+  double seconds = 300;                      // of the wall clock
+  int64_t memory_bytes = int64_t{32} << 30;  // of address space; not kept by sanitizers' builds
 };
 
 // Runs `work` in a copy of this process that has one thread and says nothing. Returns if it

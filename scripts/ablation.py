@@ -131,8 +131,9 @@ def curves(rows):
 
 
 def main():
-    own, _, extra = (lambda a: (a[:a.index("--")], None, a[a.index("--") + 1:]) if "--" in a else (a, None, []))(
-        sys.argv[1:])
+    words = sys.argv[1:]
+    split = words.index("--") if "--" in words else len(words)
+    own, extra = words[:split], words[split + 1:]
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("regrade")
     parser.add_argument("folder")

@@ -1,4 +1,4 @@
-// regrade mix over a whole, tiny run: exact ends, and what it refuses.
+// regrade mix and contact-sheet over a whole, tiny run: exact ends, and what they refuse.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -57,6 +57,16 @@ TEST(MixCommand, H49_AFilmBetweenTheSceneAndItsStyle) {
   EXPECT_EQ(Regrade({"mix", folder / "e"}).code, 2);                         // no --out
   EXPECT_EQ(Regrade({"mix", folder / "e", "--dry-run"}).code, 0);
   EXPECT_FALSE(std::filesystem::exists(folder / "x"));
+
+  const ProgramOutcome sheet =
+      Regrade({"contact-sheet", folder / "e", style, "--out", folder / "sheet.png", "--size",
+               "64", "--steps", "2", "--views", "1"});
+  EXPECT_EQ(sheet.code, 0) << sheet.text;
+  EXPECT_GT(frame("sheet.png").size(), 10000u);
+  EXPECT_EQ(Regrade({"contact-sheet", folder / "e", "--out", folder / "y.png"}).code, 2);
+  EXPECT_EQ(
+      Regrade({"contact-sheet", folder / "e", folder / "no.jpg", "--out", folder / "y"}).code,
+      3);
 }
 
 }  // namespace

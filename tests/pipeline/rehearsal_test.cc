@@ -22,10 +22,9 @@ TEST(Rehearsal, F73_ACrashBecomesAMessage) {
 TEST(Rehearsal, F73_TimeAndMemoryHaveLimits) {
   RehearsalLimits limits;
   limits.seconds = 0.1;
-  EXPECT_REGRADE_ERROR(
-      Rehearse([] { std::this_thread::sleep_for(std::chrono::seconds(60)); }, "slow.onnx",
-               limits),
-      ExitCode::kExternalProgram, "slow.onnx");
+  EXPECT_REGRADE_ERROR(Rehearse([] { std::this_thread::sleep_for(std::chrono::seconds(60)); },
+                                "slow.onnx", limits),
+                       ExitCode::kExternalProgram, "slow.onnx");
 #if !defined(__SANITIZE_ADDRESS__)
   limits.seconds = 60;
   limits.memory_bytes = int64_t{4} << 30;
