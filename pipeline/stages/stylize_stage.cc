@@ -3,6 +3,7 @@
 #include <omp.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <utility>
 
 #include "kernels/field/fast_rays.h"
@@ -140,6 +141,8 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
     outcome.outputs.push_back("object.npz");
     outcome.figures["object_voxels"] = static_cast<int64_t>(
         std::count_if(shares.all.begin(), shares.all.end(), [](float e) { return e > 0; }));
+  } else {
+    std::filesystem::remove(workspace.Path("object.npz"));  // of an earlier style
   }
   WriteFieldFile(workspace.Path("styled.npz"), stored);
   outcome.figures["device"] = DeviceName(backend);
