@@ -175,9 +175,11 @@ void AddStyle(RunContext* context, const Scene& scene, const SheetOptions& sheet
   const std::vector<Image> columns[] = {Shown(scene, linear), Shown(scene, paper),
                                         Shown(scene, standard)};
   char words[160];
-  std::snprintf(words, sizeof words, "%s, %s: K_est %.2f, bounds %.2f (standard), %.2f (paper)",
+  std::snprintf(words, sizeof words,
+                "%s, %s: K_est %.2f, bounds %.2f (standard, %d steps), %.2f (paper, %d steps)",
                 name.c_str(), stylizer->Name().c_str(), by_standard.k_est, by_standard.bound,
-                by_paper.bound);
+                static_cast<int>(by_standard.steps), by_paper.bound,
+                static_cast<int>(by_paper.steps));
   for (size_t k = 0; k < scene.shown.size(); ++k) {
     const size_t n = static_cast<size_t>(scene.shown[k]);
     SheetRow row;
