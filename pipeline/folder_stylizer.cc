@@ -71,31 +71,36 @@ class FolderStylizer : public ViewStylizer {
 
 }  // namespace
 
-Image FittedToView(const Image& styled, const Image& view, const std::string& where) {
+void CheckAspect(const Image& picture, int width, int height, const std::string& where,
+                 ExitCode code) {
   // Each side scaled by the other's ratio must come out to a pixel of the smaller picture.
-  const double ratio_x = static_cast<double>(styled.width) / view.width;
-  const double ratio_y = static_cast<double>(styled.height) / view.height;
+  const double ratio_x = static_cast<double>(picture.width) / width;
+  const double ratio_y = static_cast<double>(picture.height) / height;
   const double larger = std::max(ratio_x, ratio_y);
-  const double slack = 1.0 / std::min({view.width, view.height, styled.width, styled.height});
+  const double slack = 1.0 / std::min({width, height, picture.width, picture.height});
   if (std::abs(ratio_x - ratio_y) > slack * larger)
-    throw Error(
-        ExitCode::kExternalProgram,
-        "the styled picture has " + SizeOf(styled) + " pixels, its view " + SizeOf(view), where,
-        "keep the photo's aspect: no cropping, no turning");
+    throw Error(code,
+                "has " + SizeOf(picture) + " pixels, its view " + std::to_string(width) +
+                    " x " + std::to_string(height),
+                where, "keep the photo's aspect: no cropping, no turning");
+}
+
+Image FittedToView(const Image& styled, const Image& view, const std::string& where) {
+  CheckAspect(styled, view.width, view.height, where, ExitCode::kExternalProgram);
   const Image colors = Colors(styled);
   return colors.SameSize(view) ? colors : Resize(colors, view.width, view.height);
 }
 
-std::unique_ptr<ViewStylizer> MakeFolderStylizer(const std::string& folder,
-                                                 const std::vector<std::string>& photos) {
+std::vector<std::string> PicturesByPhotoName(const std::string& folder,
+                                             const std::vector<std::string>& photos,
+                                             const std::string& what) {
   std::map<std::string, size_t> view_of;
   for (size_t i = 0; i < photos.size(); ++i)
     if (!view_of.emplace(StemOf(photos[i]), i).second)
       throw Error(ExitCode::kInput, "two photos have the name \"" + StemOf(photos[i]) + "\"",
-                  photos[i],
-                  "styled pictures are found by name: give photos names of their own");
+                  photos[i], what + "s are found by name: give photos names of their own");
   std::vector<std::string> paths(photos.size());
-  int known = 0;
+  bool any = false;
   for (const ListedFile& file : ListFolder(folder).files) {
     const auto match = view_of.find(StemOf(file.name));
     if (match == view_of.end()) continue;
@@ -103,14 +108,22 @@ std::unique_ptr<ViewStylizer> MakeFolderStylizer(const std::string& folder,
     if (!MeansAPicture(file.path)) continue;
     std::string& path = paths[match->second];
     if (!path.empty())
-      throw Error(ExitCode::kInput, "two pictures for the photo " + photos[match->second],
+      throw Error(ExitCode::kInput, "two " + what + "s for the photo " + photos[match->second],
                   path + " and " + file.path, "leave one of them");
     path = file.path;
-    ++known;
+    any = true;
   }
-  if (known == 0)
+  if (!any)
     throw Error(ExitCode::kInput, "no picture in it has the name of a photo", folder,
                 photos.empty() ? "" : "expected are names like " + StemOf(photos[0]) + ".png");
+  return paths;
+}
+
+std::unique_ptr<ViewStylizer> MakeFolderStylizer(const std::string& folder,
+                                                 const std::vector<std::string>& photos) {
+  std::vector<std::string> paths = PicturesByPhotoName(folder, photos, "picture");
+  const int known = static_cast<int>(std::count_if(
+      paths.begin(), paths.end(), [](const std::string& path) { return !path.empty(); }));
   return std::make_unique<FolderStylizer>(std::move(paths), known);
 }
 

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "kernels/base/error.h"
 #include "stylize/view_stylizer.h"
 
 namespace regrade {
@@ -20,6 +21,16 @@ namespace regrade {
 // read and Error(kExternalProgram) for one of another shape.
 std::unique_ptr<ViewStylizer> MakeFolderStylizer(const std::string& folder,
                                                  const std::vector<std::string>& photos);
+
+// The picture in `folder` for each photo, by the names' stems; empty where there is none.
+// `what` names such pictures ("mask"). Throws as MakeFolderStylizer does.
+std::vector<std::string> PicturesByPhotoName(const std::string& folder,
+                                             const std::vector<std::string>& photos,
+                                             const std::string& what);
+
+// Throws Error(code) if the sides of `picture` have another ratio than width and height.
+void CheckAspect(const Image& picture, int width, int height, const std::string& where,
+                 ExitCode code);
 
 // A styled picture from somewhere else at the size of its view: see above.
 Image FittedToView(const Image& styled, const Image& view, const std::string& where);

@@ -5,7 +5,7 @@
 namespace regrade {
 namespace {
 
-constexpr uint32_t kVersion = 1;
+constexpr uint32_t kVersion = 2;
 
 // One list of members for both directions.
 template <typename Visitor, typename State>
@@ -29,6 +29,8 @@ void Visit(Visitor* visit, State* state) {
   visit->Value(&state->step);
   visit->Value(&state->linear_map_mse);
   visit->Value(&state->left_out_pixels);
+  visit->Values(&state->history.steps);
+  visit->Values(&state->history.bounds);
 }
 
 struct Packing {

@@ -1,4 +1,4 @@
-// Draws TC-PSNR over time as one polyline for each sequence.
+// Draws TC-PSNR over time as one polyline for each sequence, and a bound over steps.
 #include "pipeline/report_chart.h"
 
 #include <algorithm>
@@ -94,6 +94,61 @@ std::string ConsistencyChartHtml(const RunReport& report) {
   return html + "</svg>" + legend +
          "</div><p class=note>TC-PSNR in dB of each pair of frames " + std::to_string(gap) +
          " apart, in order of time.</p>";
+}
+
+std::string BoundChartHtml(const StylizeReport& stage) {
+  std::vector<std::pair<int64_t, double>> points;
+  for (const auto& point : stage.bound_at_steps)
+    if (point.second > 0) points.push_back(point);
+  if (points.size() < 2 || points.back().first <= points.front().first) return "";
+  double low = points[0].second, high = low;
+  const auto see = [&](double value) {
+    low = std::min(low, value);
+    high = std::max(high, value);
+  };
+  for (const auto& point : points) see(point.second);
+  const bool has_k_est = stage.k_est.value && *stage.k_est.value > 0;
+  if (has_k_est) see(*stage.k_est.value);
+  low /= 1.1, high *= 1.1;
+  const auto y_of = [&](double value) {
+    return kHeight - kBottom -
+           std::log(value / low) / std::log(high / low) * (kHeight - kTop - kBottom);
+  };
+  const double first = static_cast<double>(points.front().first),
+               span = static_cast<double>(points.back().first) - first;
+  std::string html =
+      "<svg class=chart role=img aria-label=\"Lipschitz bound over steps\" viewBox=\"0 0 " +
+      FixedNumber(kWidth, 0) + " " + FixedNumber(kHeight, 0) + "\">";
+  // Powers of two, and of ten where the curve spans more.
+  const double base = high / low > 64 ? 10 : 2;
+  for (double value = std::pow(base, std::ceil(std::log(low) / std::log(base))); value < high;
+       value *= base) {
+    const std::string y = FixedNumber(y_of(value), 1);
+    html += "<line x1=" + FixedNumber(kLeft, 0) + " x2=" + FixedNumber(kWidth - kRight, 0) +
+            " y1=" + y + " y2=" + y + " /><text x=" + FixedNumber(kLeft - 6, 0) +
+            " y=" + FixedNumber(y_of(value) + 4, 1) + " text-anchor=end>" +
+            FixedNumber(value, value < 1 ? 2 : 0) + "</text>";
+  }
+  const auto line = [&](int colour, const std::string& places) {
+    html += "<polyline class=k" + std::to_string(colour) + " points=\"" + places +
+            "\" style=\"fill:none\"/>";
+  };
+  std::string places;
+  for (const auto& [step, bound] : points)
+    places +=
+        FixedNumber(
+            kLeft + (static_cast<double>(step) - first) / span * (kWidth - kLeft - kRight), 1) +
+        "," + FixedNumber(y_of(bound), 1) + " ";
+  line(0, places);
+  std::string legend = "<div class=legend><span><i class=k0></i>Lipschitz bound</span>";
+  if (has_k_est) {
+    const std::string y = FixedNumber(y_of(*stage.k_est.value), 1);
+    line(1, FixedNumber(kLeft, 1) + "," + y + " " + FixedNumber(kWidth - kRight, 1) + "," + y);
+    legend += "<span><i class=k1></i>K_est, the colours' own</span>";
+  }
+  return html + "</svg>" + legend + "</div><p class=note>From step " +
+         std::to_string(points.front().first) + " to " + std::to_string(points.back().first) +
+         " of the style's network, from exact singular values.</p>";
 }
 
 }  // namespace regrade

@@ -69,6 +69,20 @@ struct Style2dReport {
   std::string method;
 };
 
+// How far apart neighbouring pixels' colours became, against K = the bound times how far they
+// were; pairs by what the promise asks for and they lack.
+struct VarianceFigures {
+  struct Group {
+    std::string name;  // "inside" the premises | "clamp" | "open"
+    int64_t pairs = 0;
+    int64_t above = 0;  // further apart than K times before
+    Figure gain;        // mean distance after over mean distance before
+    Figure largest_excess;
+  };
+  std::vector<Group> groups;
+  Figure largest_share;  // of the bound that holds inside the premises; at most 1
+};
+
 struct StylizeReport {
   double seconds = 0;
   int steps = 0;
@@ -76,6 +90,9 @@ struct StylizeReport {
   Figure psnr_to_2d_db;                 // styled frames against the 2D method on our renders
   Figure psnr_to_2d_photos_db;          // ... against the 2D method on the photos
   Figure linear_map_psnr_to_2d_db;      // what the better of two linear colour maps reaches
+  Figure slope_ascent;                  // the largest that climbing from the voxels finds
+  std::vector<std::pair<int64_t, double>> bound_at_steps;  // while it was learned
+  std::optional<VarianceFigures> variance;
 };
 
 struct RenderReport {

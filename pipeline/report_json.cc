@@ -74,6 +74,18 @@ JsonValue StageJson(const Style2dReport& stage) {
   return Object{{"seconds", stage.seconds}, {"method", stage.method}};
 }
 
+JsonValue VarianceJson(const VarianceFigures& variance) {
+  Object object;
+  for (const VarianceFigures::Group& group : variance.groups) {
+    Object entry{{"pairs", group.pairs}, {"above", group.above}};
+    Put(entry, "gain", group.gain);
+    Put(entry, "largest_excess", group.largest_excess);
+    object.emplace_back(group.name, std::move(entry));
+  }
+  Put(object, "largest_share_of_bound", variance.largest_share);
+  return object;
+}
+
 JsonValue StageJson(const StylizeReport& stage) {
   Object object{{"seconds", stage.seconds}, {"steps", stage.steps}};
   Put(object, "k_est", stage.k_est);
@@ -82,6 +94,13 @@ JsonValue StageJson(const StylizeReport& stage) {
   Put(object, "psnr_to_2d_db", stage.psnr_to_2d_db);
   Put(object, "psnr_to_2d_photos_db", stage.psnr_to_2d_photos_db);
   Put(object, "linear_map_psnr_to_2d_db", stage.linear_map_psnr_to_2d_db);
+  Put(object, "slope_ascent", stage.slope_ascent);
+  if (!stage.bound_at_steps.empty())
+    object.emplace_back("bound_at_steps",
+                        List(stage.bound_at_steps, [](const std::pair<int64_t, double>& at) {
+                          return JsonValue(JsonValue::Array{at.first, at.second});
+                        }));
+  if (stage.variance) object.emplace_back("variance", VarianceJson(*stage.variance));
   return object;
 }
 

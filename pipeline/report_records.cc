@@ -1,5 +1,7 @@
 #include "pipeline/report_records.h"
 
+#include <algorithm>
+
 namespace regrade {
 namespace {
 
@@ -100,6 +102,18 @@ FidelityFigures FidelityOf(const JsonValue& row) {
   return figures;
 }
 
+VarianceFigures VarianceOf(const JsonValue& record) {
+  VarianceFigures variance;
+  for (const char* name : {"inside", "clamp", "open"}) {
+    const JsonValue* group = record.Find(name);
+    if (group == nullptr) continue;
+    variance.groups.push_back({name, CountOf(*group, "pairs"), CountOf(*group, "above"),
+                               FigureOf(*group, "gain"), FigureOf(*group, "largest_excess")});
+  }
+  variance.largest_share = FigureOf(record, "largest_share");
+  return variance;
+}
+
 }  // namespace
 
 JsonValue EvaluationRecord(const ConsistencyReport& consistency,
@@ -182,6 +196,14 @@ RunReport ReportFromRecords(const Workspace& workspace) {
     stages.stylize->k_est = FigureOf(f, "k_est");
     stages.stylize->bound = FigureOf(f, "bound");
     stages.stylize->slope_observed = FigureOf(f, "slope_observed");
+    stages.stylize->slope_ascent = FigureOf(f, "slope_ascent");
+    const JsonValue *steps = f.Find("bound_steps"), *bounds = f.Find("bound_at_steps");
+    if (steps != nullptr && bounds != nullptr)
+      for (size_t i = 0; i < std::min(steps->AsArray().size(), bounds->AsArray().size()); ++i)
+        stages.stylize->bound_at_steps.emplace_back(steps->AsArray()[i].AsInt(),
+                                                    bounds->AsArray()[i].AsDouble());
+    if (const JsonValue* variance = f.Find("variance"))
+      stages.stylize->variance = VarianceOf(*variance);
   }
   if (render)
     stages.render = {render->seconds, static_cast<int>(CountOf(render->figures, "frames")),

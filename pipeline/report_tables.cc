@@ -88,6 +88,21 @@ void Say(std::string& said, const std::string& clause) {
   said += (said.empty() ? "" : " · ") + clause;
 }
 
+// How neighbouring pixels came apart, by what the promise asks for and they lack.
+void SayVariance(const VarianceFigures& variance, std::string* said) {
+  for (const VarianceFigures::Group& group : variance.groups) {
+    if (group.pairs == 0) continue;
+    const std::string where = group.name == "clamp"  ? "where a colour is clamped"
+                              : group.name == "open" ? "where light passes the scene"
+                                                     : "where the theory's premises hold";
+    Say(*said, std::to_string(group.above) + " of " + std::to_string(group.pairs) +
+                   " pairs of neighbouring pixels " + where +
+                   " are further apart than bound times before, at most by " +
+                   FigureHtml(group.largest_excess, 3) + "; on the mean " +
+                   FigureHtml(group.gain, 2) + " times as far apart as before");
+  }
+}
+
 std::vector<StageLine> StageLines(const StagesReport& stages) {
   std::vector<StageLine> lines;
   const auto add = [&](const char* name, double seconds) -> std::string& {
@@ -119,8 +134,10 @@ std::vector<StageLine> StageLines(const StagesReport& stages) {
     Say(said,
         "a linear colour map reaches " + FigureHtml(s->linear_map_psnr_to_2d_db, 2, "dB"));
     Say(said, "Lipschitz bound " + FigureHtml(s->bound, 2) + ", largest slope seen " +
-                  FigureHtml(s->slope_observed, 2) + ", estimated from the colours " +
+                  FigureHtml(s->slope_observed, 2) + ", climbed to " +
+                  FigureHtml(s->slope_ascent, 2) + ", estimated from the colours " +
                   FigureHtml(s->k_est, 2));
+    if (s->variance) SayVariance(*s->variance, &said);
   }
   if (const auto& s = stages.render) {
     std::string& said = add("render", s->seconds);
@@ -293,7 +310,8 @@ std::string StagesHtml(const RunReport& report) {
                       "n"),
                  Cell(line.said, "w")});
   }
-  return Heading("Stages") + Table("<tr><th>stage<th class=n>time<th>figures</tr>", body);
+  return Heading("Stages") + Table("<tr><th>stage<th class=n>time<th>figures</tr>", body) +
+         (report.stages.stylize ? BoundChartHtml(*report.stages.stylize) : "");
 }
 
 std::string PricesHtml(const RunReport& report) {

@@ -13,6 +13,7 @@ void RunSettings::Bind(OptionSet* options) {
   options->Add("Fit", &fit);
   options->Add("Style", &style);
   options->Add("2D method", &style_2d);
+  options->Add("Object", &object);
   options->Add("Network", &network);
   options->Add("Render", &render);
   options->Add("Evaluation", &consistency);
@@ -76,6 +77,9 @@ void CheckTogether(const RunSettings& settings) {
                 std::to_string(grids) + " stages against " + std::to_string(steps),
                 "--fit-resolutions and --fit-steps", "give both the same number of stages");
   ParseStyleMethod(settings.style_2d);
+  if (!settings.object.style_mask.empty() && !settings.object.On())
+    throw Error(ExitCode::kUsage, "labels of the style need labels of the photos",
+                "--style-mask and --masks", "give --masks, a folder of labels for the photos");
 }
 
 }  // namespace regrade

@@ -5,6 +5,7 @@
 
 #include "evaluate/consistency.h"
 #include "pipeline/camera_path.h"
+#include "pipeline/object_masks.h"
 #include "pipeline/option_binding.h"
 #include "pipeline/photo_folder.h"
 #include "pipeline/run_options.h"
@@ -63,6 +64,7 @@ struct RunSettings {
   FitOptions fit;
   StyleSource style;
   StyleOptions style_2d;
+  MaskOptions object;
   TrainNetworkOptions network;
   RenderOptions render;
   ConsistencyOptions consistency;

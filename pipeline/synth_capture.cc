@@ -45,6 +45,13 @@ void ParseSize(const std::string& size, int* width, int* height) {
 
 JsonValue Vector(const Vec3d& v) { return JsonValue::Array{v.x, v.y, v.z}; }
 
+// The object that masks are of: the first ball.
+int MaskedSolid(const SyntheticScene& scene) {
+  for (size_t i = 0; i < scene.solids.size(); ++i)
+    if (scene.solids[i].shape == Shape::kSphere) return static_cast<int>(i);
+  return 0;
+}
+
 // What was asked for, and the parameters of what was simulated.
 JsonValue DescribeCapture(const SynthOptions& options, const SynthEffects& effects,
                           const SyntheticScene& scene) {
@@ -72,27 +79,32 @@ JsonValue DescribeCapture(const SynthOptions& options, const SynthEffects& effec
   if (effects.highlights)
     highlights = JsonValue::Object{
         {"on", true}, {"exponent", kSunSharpness}, {"to_sun", Vector(scene.to_sun)}};
+  JsonValue of_effects = JsonValue::Object{{"exposure", exposure},
+                                           {"noise", noise},
+                                           {"distortion", distortion},
+                                           {"highlights", highlights}};
+  if (effects.masks)
+    of_effects["masks"] = JsonValue::Object{{"on", true}, {"solid", MaskedSolid(scene)}};
   return JsonValue::Object{{"scene", options.scene},
                            {"seed", options.seed},
                            {"views", options.views},
                            {"size", options.size},
                            {"bounds_min", Vector(scene.bounds_min)},
                            {"bounds_max", Vector(scene.bounds_max)},
-                           {"effects", JsonValue::Object{{"exposure", exposure},
-                                                         {"noise", noise},
-                                                         {"distortion", distortion},
-                                                         {"highlights", highlights}}}};
+                           {"effects", of_effects}};
 }
 
 // A folder with photos is only written to if they are what the same options would write.
-void ClaimFolder(const fs::path& out, const JsonValue& description) {
+void ClaimFolder(const fs::path& out, const JsonValue& description, bool with_masks) {
   const fs::path record = out / "truth" / "effects.json";
   std::error_code none;
   const bool has_photos = fs::exists(out / "images") && !fs::is_empty(out / "images", none);
   if (has_photos && !(fs::exists(record) && ReadJsonFile(record.string()) == description))
     throw Error(ExitCode::kFolderInUse, "the folder holds photos of something else",
                 (out / "images").string(), "name another folder, or remove this one first");
-  for (const char* folder : {"images", "truth/depth", "truth/flow", "truth/visible"}) {
+  for (const char* folder :
+       {"images", "truth/depth", "truth/flow", "truth/visible", "masks", "truth/masks"}) {
+    if (!with_masks && std::string(folder).ends_with("masks")) continue;
     std::error_code error;
     fs::create_directories(out / folder, error);
     if (error)
@@ -131,7 +143,7 @@ void WriteSyntheticCapture(const std::string& out, const SynthOptions& options,
   const SyntheticScene scene = MakeSyntheticScene(options.scene, options.seed);
   std::vector<Camera> cameras = SyntheticCameras(scene, options.views, width, height);
   for (Camera& camera : cameras) camera = WithSynthLens(effects, camera);
-  ClaimFolder(out, DescribeCapture(options, effects, scene));
+  ClaimFolder(out, DescribeCapture(options, effects, scene), effects.masks);
 
   const fs::path truth = fs::path(out) / "truth";
   std::vector<TransformsFrame> frames;
@@ -142,6 +154,11 @@ void WriteSyntheticCapture(const std::string& out, const SynthOptions& options,
     const std::string name = FrameName(i, ".png");
     WritePng8((fs::path(out) / "images" / name).string(), view.color);
     WriteDepth((truth / "depth" / FrameName(i, ".npy")).string(), view.depth);
+    if (effects.masks) {
+      const Image mask = RenderSolidMask(scene, cameras[i], MaskedSolid(scene));
+      WritePng8((truth / "masks" / name).string(), mask);
+      WritePng8((fs::path(out) / "masks" / name).string(), FaultyMask(mask, SynthMaskFault(i)));
+    }
     if (i + 1 < options.views)
       WriteMotion(truth, i, TrueMotion(scene, cameras[i], cameras[i + 1]));
     frames.push_back({"../images/" + name, cameras[i]});

@@ -25,10 +25,12 @@ struct SynthOptions {
     bind("views", views,
          {.unit = "photos", .help = "length of the capture", .min = 2, .max = 9999});
     bind("size", size, {.unit = "pixels", .help = "WIDTHxHEIGHT of a photo"});
-    bind("effects", effects,
-         {.help = "what else to simulate, from exposure, noise, highlights, and a lens of "
-                  "distortion "
-                  "(mild), barrel (k1 = -0.2), fisheye; what is not named costs nothing"});
+    bind(
+        "effects", effects,
+        {.help =
+             "what else to simulate, from exposure, noise, highlights, masks of one object, of "
+             "which some are wrong, and a lens of distortion (mild), barrel (k1 = -0.2) or "
+             "fisheye; what is not named costs nothing"});
     bind("seed", seed, {.help = "draws the paint, the exposures and the noise"});
   }
 };
@@ -39,6 +41,7 @@ struct SynthOptions {
 //   OUT/truth/depth/00000.npy             [H, W] float32, z along the optical axis, world units
 //   OUT/truth/flow/00000_00001.flo        motion of view i to view i + 1, pixels
 //   OUT/truth/visible/00000_00001.png     255 where view i + 1 sees the same point
+//   with `masks`: OUT/masks/00000.png, some of them wrong, and the right OUT/truth/masks/
 //   OUT/truth/effects.json                the options, and the parameters of what was simulated
 // The scene itself does not change with the effects. Same options, same bytes, for any number
 // of threads. Reports progress once a view; kFinish stops after the view at hand, with the list

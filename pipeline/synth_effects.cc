@@ -11,7 +11,7 @@ namespace regrade {
 
 SynthEffects ParseSynthEffects(const std::string& list) {
   constexpr char kHint[] =
-      "the effects are exposure, noise, highlights, and one lens of distortion, barrel, "
+      "the effects are exposure, noise, highlights, masks, and one lens of distortion, barrel, "
       "fisheye";
   SynthEffects effects;
   size_t begin = 0;
@@ -31,6 +31,8 @@ SynthEffects ParseSynthEffects(const std::string& list) {
       effects.fisheye = true;
     else if (name == "highlights")
       effects.highlights = true;
+    else if (name == "masks")
+      effects.masks = true;
     else if (name == "motion-blur" || name == "occluders")
       throw Error(ExitCode::kUsage, "the effect \"" + name + "\" is not in this version",
                   "--effects", kHint);
@@ -47,6 +49,25 @@ double SynthGain(uint64_t seed, int index, int views) {
   const double swing = std::sin(2 * M_PI * (phase + 1.5 * index / views));
   const double jump = 2 * RandomDouble(seed, 0x6a2, static_cast<uint64_t>(index)) - 1;
   return 1 + kSynthGainRange * (0.75 * swing + 0.25 * jump);
+}
+
+MaskFault SynthMaskFault(int index) {
+  constexpr MaskFault kFaults[] = {MaskFault::kNone,  MaskFault::kNone, MaskFault::kShifted,
+                                   MaskFault::kEmpty, MaskFault::kNone, MaskFault::kSwollen};
+  return kFaults[index % 6];
+}
+
+Image FaultyMask(const Image& mask, MaskFault fault) {
+  if (fault == MaskFault::kNone) return mask;
+  Image faulty(mask.width, mask.height, 1);
+  if (fault == MaskFault::kEmpty) return faulty;
+  const int step = mask.width / 5;
+  for (int y = 0; y < mask.height; ++y)
+    for (int x = 0; x < mask.width; ++x) {
+      const float here = *mask.at(x, y), beside = x >= step ? *mask.at(x - step, y) : 0;
+      *faulty.at(x, y) = fault == MaskFault::kShifted ? beside : std::max(here, beside);
+    }
+  return faulty;
 }
 
 void ApplyGain(double gain, Image* color) {

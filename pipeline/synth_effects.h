@@ -17,6 +17,7 @@ struct SynthEffects {
   bool barrel = false;      // a strong one
   bool fisheye = false;     // a lens that shows angles, not tangents
   bool highlights = false;  // of the sun on glazed things
+  bool masks = false;       // of one object, some of them wrong
 };
 
 inline constexpr double kSynthNoiseSigma = 2.0 / 255;  // of encoded values
@@ -37,6 +38,13 @@ void ApplyGain(double gain, Image* color);
 
 // Adds Gaussian noise to the encoded values, clipped to [0, 1]; `stream` is the photo's index.
 void ApplyNoise(uint64_t seed, uint64_t stream, double sigma, Image* color);
+
+// What a hasty person would hand over for the mask of photo `index`: of every six the third is
+// a fifth of the width off, the fourth empty, the sixth has swallowed a block beside the
+// object.
+enum class MaskFault { kNone, kShifted, kEmpty, kSwollen };
+MaskFault SynthMaskFault(int index);
+Image FaultyMask(const Image& mask, MaskFault fault);
 
 // The same view through the simulated lens, if there is one.
 Camera WithSynthLens(const SynthEffects& effects, Camera camera);

@@ -9,6 +9,7 @@
 #include "kernels/base/random.h"
 #include "kernels/image/color_statistics.h"
 #include "stylize/monge_kantorovich.h"
+#include "stylize/regrain.h"
 
 namespace regrade {
 namespace {
@@ -67,6 +68,7 @@ class DistributionTransfer : public ViewStylizer {
   DistributionTransfer(const StyleOptions& options, const Image& style,
                        const std::vector<Vec3d>* scene)
       : name_(options.method),
+        regrain_(options.regrain),
         iterations_(options.method == "histogram" ? 1 : options.iterations),
         style_(MeasureTurns(SampleColors(style, "the style picture"), iterations_)) {
     const Mat3d& c = MeasureColor(style).covariance;
@@ -86,6 +88,7 @@ class DistributionTransfer : public ViewStylizer {
       const Vec3d mapped = map({p[0], p[1], p[2]});
       for (int c = 0; c < 3; ++c) p[c] = static_cast<float>(mapped[c]);
     }
+    if (regrain_) colors = Regrain(Colors(view), colors);
     return WithColors(view, colors);
   }
 
@@ -97,6 +100,7 @@ class DistributionTransfer : public ViewStylizer {
 
  private:
   std::string name_;
+  bool regrain_;
   int iterations_;
   StyleTurns style_;
   bool flat_ = false;

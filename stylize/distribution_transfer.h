@@ -31,9 +31,9 @@ MonotoneMap MatchHistograms(const std::vector<double>& sorted_source,
 // and t the histogram matching of each of its axes between what the source has become and the
 // style. The first R is the identity; the others are uniform rotations, drawn from a counter,
 // so every view and every run has the same ones. The rotations are kept with their maps: the
-// result is a map of colours, that can be learned from a sample and applied anywhere. No grain
-// is taken back afterwards ("regrain"): where the map is steep, the photo's noise becomes
-// louder.
+// result is a map of colours, that can be learned from a sample and applied anywhere. Where the
+// map is steep, the photo's noise becomes louder; EQ(regrain) takes it back where it is asked
+// for.
 struct DistributionMap {
   struct Turn {
     Mat3d rotation;

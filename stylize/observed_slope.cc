@@ -159,6 +159,13 @@ ObservedSlopes ObserveSlopes(const LipschitzNetwork& network, const RadianceFiel
       }
     }
     result.ascent = std::max(result.ascent, best);
+    f.Slope(point, &direction);
+    MatrixXd ends(kNetworkInputs, 2);
+    ends << point - 0.5 * options.min_distance * direction,
+        point + 0.5 * options.min_distance * direction;
+    const MatrixXd images = f.Forward(ends);
+    result.summit_pair = std::max(result.summit_pair, (images.col(1) - images.col(0)).norm() /
+                                                          (ends.col(1) - ends.col(0)).norm());
   }
   return result;
 }

@@ -19,7 +19,10 @@ struct SlopeOptions {
 struct ObservedSlopes {
   double pairs = 0;      // largest ||f(x) - f(y)|| / ||x - y|| over the pairs
   double jacobians = 0;  // largest ||J f(x)||_2 at voxels
-  double ascent = 0;     // largest found by climbing from there, off the data
+  double ascent = 0;     // largest found by climbing from the steepest of them, off the data
+  // What the summit's own pair says: the points `min_distance` apart about it, along the
+  // steepest direction. No derivative has a part in it.
+  double summit_pair = 0;
   double OnData() const { return pairs > jacobians ? pairs : jacobians; }
 };
 

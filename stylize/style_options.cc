@@ -7,6 +7,10 @@ namespace regrade {
 StyleMethod ParseStyleMethod(const StyleOptions& options) {
   const std::string& text = options.method;
   const std::string hint = std::string("use ") + kStyleMethods;
+  if (options.regrain && text != "idt" && text != "histogram")
+    throw Error(ExitCode::kUsage, "\"" + text + "\" makes no grain louder",
+                "--method and --style-regrain",
+                "leave it away, or add --no-style-regrain where an earlier run asked for it");
   for (const char* kind : {"mkl", "reinhard", "idt", "histogram"})
     if (text == kind) return {kind, ""};
   for (const char* kind : {"onnx", "folder", "command"}) {

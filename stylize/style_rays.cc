@@ -31,22 +31,32 @@ void AddPatch(const StyledTrainingView& view, int x0, int y0, int width, int hei
 StyleRays SampleStyleRays(const std::vector<StyledTrainingView>& views, int rays, int patch,
                           uint64_t seed, uint64_t step) {
   StyleRays batch;
+  const auto part_of = [](const StyledTrainingView& view) {
+    const bool all = view.x1 <= view.x0 || view.y1 <= view.y0;
+    struct Part {
+      int x0, y0, width, height;
+    };
+    return all ? Part{0, 0, view.camera.width, view.camera.height}
+               : Part{view.x0, view.y0, view.x1 - view.x0, view.y1 - view.y0};
+  };
   if (rays <= 0) {
     const auto& view = views[RandomIndex(seed, step, 0, views.size())];
-    AddPatch(view, 0, 0, view.camera.width, view.camera.height, &batch);
+    const auto part = part_of(view);
+    AddPatch(view, part.x0, part.y0, part.width, part.height, &batch);
     return batch;
   }
   const int patches = std::max(1, rays / (patch * patch));
   for (int p = 0; p < patches; ++p) {
     const uint64_t counter = 3 * static_cast<uint64_t>(p);
     const auto& view = views[RandomIndex(seed, step, counter, views.size())];
-    const int width = std::min(patch, view.camera.width);
-    const int height = std::min(patch, view.camera.height);
-    const int x0 = static_cast<int>(RandomIndex(
-        seed, step, counter + 1, static_cast<uint64_t>(view.camera.width - width + 1)));
-    const int y0 = static_cast<int>(RandomIndex(
-        seed, step, counter + 2, static_cast<uint64_t>(view.camera.height - height + 1)));
-    AddPatch(view, x0, y0, width, height, &batch);
+    const auto part = part_of(view);
+    const int width = std::min(patch, part.width);
+    const int height = std::min(patch, part.height);
+    const int x0 = static_cast<int>(
+        RandomIndex(seed, step, counter + 1, static_cast<uint64_t>(part.width - width + 1)));
+    const int y0 = static_cast<int>(
+        RandomIndex(seed, step, counter + 2, static_cast<uint64_t>(part.height - height + 1)));
+    AddPatch(view, part.x0 + x0, part.y0 + y0, width, height, &batch);
   }
   return batch;
 }

@@ -188,7 +188,9 @@ void Training::Resume(const TrainingState& state) {
 
 bool Training::Step(AggregationResult* step, std::vector<double>* gradient) {
   for (int i = 0; i < options_.norm_steps; ++i) network_.StepNorms();
-  if (state_.step % 25 == 0) {
+  if (state_.step % kBoundEvery == 0) {
+    state_.history.steps.push_back(state_.step);
+    state_.history.bounds.push_back(network_.Bound());
     const double drift = network_.NormDrift();
     result_.largest_norm_drift = std::max(result_.largest_norm_drift, drift);
     if (drift > 0.01 / kNetworkLayers) network_.WarmUpNorms();
@@ -231,13 +233,18 @@ TrainNetworkResult Training::Conclude() {
   const double excess = network_.ResidualBound() / Budget();
   if (excess > 1) network_.k(kNetworkLayers - 1) *= static_cast<float>((1 - 1e-6) / excess);
   result_.bound = network_.Bound();
-  result_.slope_observed = ObserveSlopes(network_, field_, {.seed = options_.seed}).OnData();
+  const ObservedSlopes slopes = ObserveSlopes(network_, field_, {.seed = options_.seed});
+  result_.slope_observed = slopes.OnData();
+  result_.slope_ascent = std::max(slopes.ascent, slopes.summit_pair);
   result_.smallest_k = network_.SmallestK();
   if (result_.smallest_k < 10 * std::sqrt(kSquareplusB))
     result_.warnings.push_back("a layer's norm has vanished: the network is constant");
   result_.psnr_db = Psnr(mse);
   result_.linear_map_psnr_db = network_.data().has_base ? Psnr(state_.linear_map_mse) : 0;
   result_.steps = state_.step;
+  result_.history = std::move(state_.history);
+  result_.history.steps.push_back(state_.step);
+  result_.history.bounds.push_back(result_.bound);
   result_.mean_touched_voxels =
       steps_here_ > 0 ? touched_ / static_cast<double>(steps_here_) : 0;
   result_.rejected_steps = state_.adam.rejected;

@@ -95,16 +95,25 @@ struct TrainNetworkOptions {
           .min = 1,
           .max = 1000});
     bind("style-activation", activation,
-         {.help = "of the hidden layers", .choices = "sine|relu|leaky-relu|sigmoid|tanh"});
+         {.help =
+              "of the hidden layers: sine follows strong styles best; relu and leaky-relu are "
+              "piecewise linear and a little less faithful; sigmoid and tanh flatten far from "
+              "0 and may stop learning",
+          .choices = "sine|relu|leaky-relu|sigmoid|tanh"});
     bind("style-omega", omega,
          {.help = "frequency of the sine; five layers multiply the bound by its fifth power",
           .min = 0.01,
           .max = 100});
-    bind("style-no-k-est", no_k_est, {.help = "ablation: regularise towards 0, not K_est"});
+    bind("style-no-k-est", no_k_est,
+         {.help = "ablation: regularise towards 0, not K_est: a smaller bound, paler "
+                  "colours"});
     bind("style-no-regularisation", no_regularisation,
-         {.help = "ablation: no Lipschitz regularisation"});
-    bind("style-spectral-normalisation", spectral_normalisation,
-         {.help = "ablation: every layer's norm is 1"});
+         {.help = "ablation: no Lipschitz regularisation: nearer to the 2D method, and "
+                  "noisier where its views disagree; only --style-bound still holds"});
+    bind(
+        "style-spectral-normalisation", spectral_normalisation,
+        {.help = "ablation: every layer's norm is 1, and so is the network's bound: smoothest, "
+                 "and weakest in colour"});
     bind("style-loss", loss_scale,
          {.help = "mean over rays and channels, or the paper's sum divided by the voxels",
           .choices = "mean|sum-over-voxels"});
@@ -126,12 +135,22 @@ struct StyledTrainingView {
   const Image* target = nullptr;  // [H, W, 3] sRGB, at the camera's size; may leave [0, 1]
   const Image* mask = nullptr;    // [H, W, 1] or null: pixels below 0.5 are left out
   std::string name;               // for messages
+  // The part of the picture that steps look at, [x0, x1) x [y0, y1); empty stands for all.
+  int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
 };
 
 // The scene-wide Monge-Kantorovich map from the photos' colours to the styled ones.
 struct SceneColorMap {
   ColorMap map;
   double k_est = 0;  // ||M||_2
+};
+
+inline constexpr int kBoundEvery = 25;  // steps between two looks at exact norms
+
+// How the promise goes while the network learns.
+struct BoundHistory {
+  std::vector<int64_t> steps;
+  std::vector<double> bounds;  // LipschitzNetwork::Bound() before that step
 };
 
 // All that a resumed run needs; N steps, and N more from here, are bitwise 2N steps.
@@ -141,6 +160,7 @@ struct TrainingState {
   int64_t step = 0;  // done
   double linear_map_mse = 0;
   int64_t left_out_pixels = 0;
+  BoundHistory history;
 };
 
 struct TrainingHooks {
@@ -155,6 +175,7 @@ struct TrainNetworkResult {
   double k_est = 0;               // as used: cut at kLargestKEst
   double bound = 0;               // LipschitzNetwork::Bound()
   double slope_observed = 0;      // on the field's voxels
+  double slope_ascent = 0;        // climbed to from there
   double smallest_k = 0;          // of the layers; near 0 a layer is dead
   double largest_norm_drift = 0;  // of the power iteration, seen while learning
   double psnr_db = 0;             // of a fixed sample of training rays to the targets, clipped
@@ -162,6 +183,7 @@ struct TrainNetworkResult {
   double mean_touched_voxels = 0;
   int64_t rejected_steps = 0;   // not finite
   int64_t left_out_pixels = 0;  // targets that are not finite
+  BoundHistory history;         // every kBoundEvery steps, and the end
   std::vector<std::string> warnings;
 };
 

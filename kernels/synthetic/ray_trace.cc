@@ -125,6 +125,24 @@ SyntheticView RenderSyntheticView(const SyntheticScene& scene, const Camera& cam
   return view;
 }
 
+Image RenderSolidMask(const SyntheticScene& scene, const Camera& camera, int solid) {
+  constexpr int kSide = 4;  // rays along a pixel's side
+  Image mask(camera.width, camera.height, 1);
+  const RaySource rays(camera);
+#pragma omp parallel for schedule(dynamic)
+  for (int y = 0; y < camera.height; ++y)
+    for (int x = 0; x < camera.width; ++x) {
+      int met = 0;
+      for (int k = 0; k < kSide * kSide; ++k)
+        met +=
+            FindHit(scene.solids,
+                    rays(x + (k % kSide + 0.5) / kSide, y + (k / kSide + 0.5) / kSide), kOffset)
+                .solid == solid;
+      *mask.at(x, y) = static_cast<float>(met) / (kSide * kSide);
+    }
+  return mask;
+}
+
 SyntheticMotion TrueMotion(const SyntheticScene& scene, const Camera& from, const Camera& to) {
   SyntheticMotion motion;
   motion.width = from.width;

@@ -25,6 +25,10 @@ struct SyntheticView {
 SyntheticView RenderSyntheticView(const SyntheticScene& scene, const Camera& camera,
                                   bool highlights = false);
 
+// [H, W, 1]: the share of each pixel's area in which the nearest thing is `solid`, an index
+// into the scene's solids.
+Image RenderSolidMask(const SyntheticScene& scene, const Camera& camera, int solid);
+
 // Where the surface point seen at each pixel's centre of one view lies in another.
 struct SyntheticMotion {
   int width = 0;

@@ -33,6 +33,8 @@ void ApplyProgramOptions(const ProgramOptions& options);
 void RunRoad(const Command&, const Arguments&, Console*);    // run, pose, reconstruct
 void RunFolder(const Command&, const Arguments&, Console*);  // stylize, render
 void RunEvaluate(const Command&, const Arguments&, Console*);
+void RunContactSheet(const Command&, const Arguments&, Console*);
+void RunMix(const Command&, const Arguments&, Console*);
 void RunSynth(const Command&, const Arguments&, Console*);
 void RunExport(const Command&, const Arguments&, Console*);
 void RunPack(const Command&, const Arguments&, Console*);

@@ -40,6 +40,8 @@ void ContinueRun(const Command& command, const Arguments& arguments, const std::
       std::filesystem::absolute(settings.style.picture).lexically_normal().string();
   ReadStylePicture(settings.style.picture, nullptr);
   ProbeMethod(&settings.style_2d);
+  ProbeMasks(&settings.object);
+  CheckTogether(settings);
 
   Workspace workspace(folder, settings.start.break_lock);
   context.workspace = &workspace;

@@ -54,6 +54,7 @@ void ProbeInputs(const std::string& last, RunContext* context) {
                 "name the picture whose colours the scene shall have");
   ReadStylePicture(context->settings.style.picture, nullptr);
   ProbeMethod(&context->settings.style_2d);
+  ProbeMasks(&context->settings.object);
 }
 
 // What a dry run can say of a folder that is not there yet: photos are taken as 4 : 3, the

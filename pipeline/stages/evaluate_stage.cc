@@ -148,9 +148,12 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
     cameras.push_back(WorkingCamera(capture.views[static_cast<size_t>(i)].camera,
                                     settings.scene.photo_size, stored.field_from_world,
                                     stored.ndc));
-  const std::optional<double> linear_map =
-      LinearMapPsnr(stored.field, cameras, frames("source", taught), targets.views_2d,
-                    targets.transmittance, parts.Next(n * kLinearMapSeconds));
+  // One map for the whole scene is no yardstick of an object's style.
+  std::optional<double> linear_map;
+  if (!settings.object.On())
+    linear_map =
+        LinearMapPsnr(stored.field, cameras, frames("source", taught), targets.views_2d,
+                      targets.transmittance, parts.Next(n * kLinearMapSeconds));
 
   context->console->Lines(FormatTables(consistency, fidelity));
   StageOutcome outcome;

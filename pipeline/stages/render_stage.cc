@@ -12,6 +12,7 @@
 #include "pipeline/files/video_file.h"
 #include "pipeline/photo_gains.h"
 #include "pipeline/scene_views.h"
+#include "pipeline/stages/object_edit.h"
 #include "pipeline/stages/run_context.h"
 #include "pipeline/stages/scene_stylizer.h"
 
@@ -67,7 +68,9 @@ void WriteFilms(RunContext* context, const std::string& prefix, int frames,
 struct Studio {
   FieldRenderer source, styled;
   std::unique_ptr<ViewStylizer> stylizer;
-  double styled_seconds = 0;  // spent in rendering the restyled field
+  std::unique_ptr<CoverageRenderer> object;  // null where the whole scene is styled
+  std::vector<Image> coverage;               // of the frame at hand
+  double styled_seconds = 0;                 // spent in rendering the restyled field
 };
 
 // frames/<prefix>{source, styled, views_2d, transmittance}/<index>.png, as a camera of that
@@ -84,6 +87,7 @@ void RenderFrame(RunContext* context, Studio* studio, const Camera& camera,
   const std::string folder = "frames/" + prefix, name = "/" + FrameName(index);
   WritePng8(workspace.NewPath(folder + "source" + name), plain.color);
   WritePng8(workspace.NewPath(folder + "styled" + name), restyled.color);
+  if (studio->object != nullptr) studio->coverage = studio->object->Render(camera);
   if (studio->stylizer->StylesAnything())
     WritePng8(workspace.NewPath(folder + "views_2d" + name),
               studio->stylizer->Stylize(plain.color, index));
@@ -100,8 +104,18 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   const Backend backend = ChooseBackendFor(
       before.field.geometry->spheres.on(), settings.run.device, settings.run.reproducible,
       [context](const std::string& text) { context->console->Info(text); });
-  Studio studio{FieldRenderer(before.field, backend), FieldRenderer(after.field, backend),
-                MakeSceneStylizer(context, capture)};
+  Studio studio{FieldRenderer(before.field, backend),
+                FieldRenderer(after.field, backend),
+                nullptr,
+                nullptr,
+                {}};
+  const std::unique_ptr<ObjectMasks> masks = OpenObjectMasks(settings, capture);
+  if (masks != nullptr)
+    studio.object = std::make_unique<CoverageRenderer>(
+        before.field,
+        ReadObjectFile(workspace.Path("object.npz"), before.field.geometry->num_voxels()));
+  studio.stylizer = MakeSceneStylizer(context, capture, masks.get(),
+                                      [&](const Image&, int) { return studio.coverage; });
 
   std::vector<Camera> views;
   for (const CaptureView& view : capture.views)

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <functional>
+#include <optional>
+#include <utility>
 
 #include "kernels/base/error.h"
 #include "pipeline/command_stylizer.h"
@@ -9,6 +12,7 @@
 #include "pipeline/folder_listing.h"
 #include "pipeline/folder_stylizer.h"
 #include "pipeline/photo_gains.h"
+#include "pipeline/rehearsal.h"
 #include "pipeline/scene_views.h"
 #include "pipeline/stage_record.h"
 #include "stylize/color_transfer.h"
@@ -18,14 +22,14 @@
 namespace regrade {
 namespace {
 
-// Scene-wide colours are of all photos, so that a map does not depend on which are held out.
+// Colours of all photos, so that a scene-wide map does not depend on which are held out; of a
+// region, where `region` says which pixels are of it.
+using PhotoFunction = std::function<std::optional<Image>(size_t view)>;
+
 std::unique_ptr<ViewStylizer> MakeColorMethod(const RunSettings& settings, const Image& style,
-                                              const Capture& capture, const PhotoGains& gains) {
+                                              const Capture& capture,
+                                              const PhotoFunction& photo) {
   const StyleOptions& options = settings.style_2d;
-  const auto photo = [&](size_t i) {
-    return ReadWorkingPhoto(capture.views[i], settings.scene.photo_size,
-                            gains.Of(static_cast<int>(i)));
-  };
   if (options.method == "idt" || options.method == "histogram") {
     if (!options.scene_wide) return MakeDistributionTransfer(options, style);
     // As many colours in all as are taken of one view otherwise, but 256 of each at least.
@@ -34,26 +38,24 @@ std::unique_ptr<ViewStylizer> MakeColorMethod(const RunSettings& settings, const
         4 * kColorSample / std::max<int64_t>(1, static_cast<int64_t>(capture.views.size())));
     std::vector<Vec3d> scene;
     for (size_t i = 0; i < capture.views.size(); ++i)
-      for (const Vec3d& color : SampleColors(photo(i), capture.views[i].path, most))
-        scene.push_back(color);
+      if (const std::optional<Image> picture = photo(i))
+        for (const Vec3d& color : SampleColors(*picture, capture.views[i].path, most))
+          scene.push_back(color);
     return MakeDistributionTransfer(options, style, &scene);
   }
   if (!options.scene_wide) return MakeColorTransfer(options, style);
   std::vector<ColorStatistics> parts;
   for (size_t i = 0; i < capture.views.size(); ++i)
-    parts.push_back(MeasureForMethod(options, photo(i)));
+    if (const std::optional<Image> picture = photo(i))
+      parts.push_back(MeasureForMethod(options, *picture));
   const ColorStatistics scene = Pool(parts);
   return MakeColorTransfer(options, style, &scene);
 }
 
-}  // namespace
-
-std::unique_ptr<ViewStylizer> MakeSceneStylizer(RunContext* context, const Capture& capture) {
+std::unique_ptr<ViewStylizer> MakeMethod(RunContext* context, const Capture& capture,
+                                         const Image& style, const PhotoFunction& photo) {
   const RunSettings& settings = context->settings;
   const StyleMethod method = ParseStyleMethod(settings.style_2d);
-  std::string notice;
-  const Image style = ReadStylePicture(settings.style.picture, &notice);
-  if (!notice.empty()) context->console->Info(notice);
   if (method.kind == "onnx")
     return MakeOnnxStylizer(method.argument, settings.style_2d.max_side, style);
   if (method.kind == "folder") {
@@ -64,7 +66,41 @@ std::unique_ptr<ViewStylizer> MakeSceneStylizer(RunContext* context, const Captu
   if (method.kind == "command")
     return MakeCommandStylizer(method.argument, settings.style.picture,
                                settings.style_2d.command_limit_s);
-  return MakeColorMethod(settings, style, capture, RecordedGains(*context->workspace, capture));
+  return MakeColorMethod(settings, style, capture, photo);
+}
+
+}  // namespace
+
+std::unique_ptr<ViewStylizer> MakeSceneStylizer(RunContext* context, const Capture& capture,
+                                                const ObjectMasks* masks,
+                                                const CoverageFunction& coverage) {
+  const RunSettings& settings = context->settings;
+  std::string notice;
+  const Image style = ReadStylePicture(settings.style.picture, &notice);
+  if (!notice.empty()) context->console->Info(notice);
+  const PhotoGains gains = RecordedGains(*context->workspace, capture);
+  const auto photo = [&](size_t i) {
+    return ReadWorkingPhoto(capture.views[i], settings.scene.photo_size,
+                            gains.Of(static_cast<int>(i)));
+  };
+  if (masks == nullptr) return MakeMethod(context, capture, style, photo);
+  std::vector<std::unique_ptr<ViewStylizer>> regions;
+  for (int k = 0; k < masks->num_regions(); ++k) {
+    const Image part = masks->StyleRegion(k, style.width, style.height);
+    const auto photo_region = [&](size_t i) -> std::optional<Image> {
+      if (!masks->Knows(static_cast<int>(i))) return std::nullopt;
+      const Image picture = photo(i);
+      const Image region = masks->Coverage(static_cast<int>(i), picture.width,
+                                           picture.height)[static_cast<size_t>(k)];
+      if (!ShowsRegion(region)) return std::nullopt;
+      return WithRegion(picture, region);
+    };
+    regions.push_back(MakeMethod(context, capture,
+                                 part.empty() ? style : WithRegion(style, part), photo_region));
+  }
+  const std::string kind = ParseStyleMethod(settings.style_2d).kind;
+  const bool of_colors = kind != "onnx" && kind != "folder" && kind != "command";
+  return MakeMaskedStylizer(std::move(regions), of_colors, coverage);
 }
 
 void ProbeMethod(StyleOptions* options) {
@@ -78,6 +114,8 @@ void ProbeMethod(StyleOptions* options) {
                 "what follows \"" + method.kind + ":\" in --method must exist");
   const fs::path absolute = fs::absolute(method.argument, error);
   if (!error) options->method = method.kind + ":" + absolute.lexically_normal().string();
+  if (method.kind == "onnx")
+    Rehearse([&] { MakeOnnxStylizer(method.argument, 64, Image(64, 64)); }, method.argument);
 }
 
 std::vector<int> StyledViews(const Workspace& workspace, const Capture& capture, int holdout) {

@@ -6,12 +6,16 @@
 #include <vector>
 
 #include "pipeline/files/json_file.h"
+#include "pipeline/object_masks.h"
 #include "pipeline/stages/run_context.h"
+#include "stylize/masked_stylizer.h"
 #include "stylize/view_stylizer.h"
 
 namespace regrade {
 
-std::unique_ptr<ViewStylizer> MakeSceneStylizer(RunContext* context, const Capture& capture);
+std::unique_ptr<ViewStylizer> MakeSceneStylizer(RunContext* context, const Capture& capture,
+                                                const ObjectMasks* masks = nullptr,
+                                                const CoverageFunction& coverage = nullptr);
 
 // Looked at before long work starts: the method exists, and so does the folder or file that it
 // names, which is made absolute; a command has its placeholders. Throws Error(kUsage, kInput).

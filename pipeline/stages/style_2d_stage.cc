@@ -6,6 +6,7 @@
 #include "pipeline/files/image_file.h"
 #include "pipeline/photo_gains.h"
 #include "pipeline/scene_views.h"
+#include "pipeline/stages/object_edit.h"
 #include "pipeline/stages/run_context.h"
 #include "pipeline/stages/scene_stylizer.h"
 
@@ -16,7 +17,14 @@ StageOutcome StyleViews(RunContext* context, const ProgressFunction& progress) {
   const RunSettings& settings = context->settings;
   Workspace& workspace = *context->workspace;
   const Capture capture = ReadCapture(workspace.Path("poses"));
-  const std::unique_ptr<ViewStylizer> stylizer = MakeSceneStylizer(context, capture);
+  const std::unique_ptr<ObjectMasks> masks = OpenObjectMasks(settings, capture);
+  const std::unique_ptr<ViewStylizer> stylizer = MakeSceneStylizer(
+      context, capture, masks.get(),
+      [&](const Image& view, int i) { return masks->Coverage(i, view.width, view.height); });
+  if (masks != nullptr && masks->num_known() < static_cast<int>(capture.views.size()))
+    context->console->Info(std::to_string(masks->num_known()) + " of " +
+                           std::to_string(capture.views.size()) +
+                           " photos have a mask; the style is learned from these");
   for (const std::string& notice : stylizer->Notices()) context->console->Info(notice);
 
   const PhotoGains gains = RecordedGains(workspace, capture);
@@ -25,7 +33,7 @@ StageOutcome StyleViews(RunContext* context, const ProgressFunction& progress) {
   int styled = 0;
   for (int i = 0; i < count; ++i) {
     if (Report(progress, i, count) == Verdict::kAbort) throw Interrupted();
-    if (!stylizer->Knows(i)) continue;
+    if (!stylizer->Knows(i) || (masks != nullptr && !masks->Knows(i))) continue;
     ++styled;
     const Image photo = ReadWorkingPhoto(capture.views[static_cast<size_t>(i)],
                                          settings.scene.photo_size, gains.Of(i));
@@ -50,6 +58,10 @@ Stage Style2dStage(RunContext* context) {
   if (!files.IsNull()) stage.inputs["method_files"] = files;
   const JsonValue gains = RecordedGainRows(*context->workspace);
   if (!gains.IsNull()) stage.inputs["exposure"] = gains;
+  if (context->settings.object.On()) {
+    stage.inputs["object"] = context->OptionsOf({"Object"});
+    stage.inputs["masks"] = MaskFiles(context->settings.object);
+  }
   stage.work = [context](const ProgressFunction& progress) {
     return StyleViews(context, progress);
   };

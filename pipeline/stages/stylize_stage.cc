@@ -3,6 +3,8 @@
 #include <omp.h>
 
 #include <algorithm>
+#include <filesystem>
+#include <utility>
 
 #include "kernels/field/fast_rays.h"
 #include "pipeline/capture_store.h"
@@ -14,47 +16,21 @@
 #include "pipeline/photo_gains.h"
 #include "pipeline/plan.h"
 #include "pipeline/scene_views.h"
+#include "pipeline/stages/lessons.h"
+#include "pipeline/stages/object_edit.h"
 #include "pipeline/stages/run_context.h"
 #include "pipeline/stages/scene_stylizer.h"
 #include "stylize/apply_network.h"
+#include "stylize/base_map.h"
+#include "stylize/blend_fields.h"
 #include "stylize/device_style.h"
 #include "stylize/monge_kantorovich.h"
+#include "stylize/volume_variance.h"
 
 namespace regrade {
 namespace {
 
-// What the network learns from: the views that the field was fitted to, see StyledViews.
-struct Lessons {
-  std::vector<Image> targets;
-  std::vector<StyledTrainingView> views;
-  SceneColorMap scene_map;
-};
-
-Lessons ReadLessons(RunContext* context, const Capture& capture, const StoredField& stored) {
-  const RunSettings& settings = context->settings;
-  const std::vector<int> indices =
-      StyledViews(*context->workspace, capture, settings.run.holdout);
-  const PhotoGains gains = RecordedGains(*context->workspace, capture);
-  Lessons lessons;
-  lessons.targets.reserve(indices.size());
-  std::vector<ColorStatistics> before, after;
-  for (const int i : indices) {
-    const CaptureView& view = capture.views[static_cast<size_t>(i)];
-    const std::string name = "views_2d/" + FrameName(i);
-    lessons.targets.push_back(ReadImage(context->workspace->Path(name)));
-    lessons.views.push_back({WorkingCamera(view.camera, settings.scene.photo_size,
-                                           stored.field_from_world, stored.ndc),
-                             &lessons.targets.back(), nullptr, name});
-    before.push_back(
-        MeasureColor(ReadWorkingPhoto(view, settings.scene.photo_size, gains.Of(i))));
-    after.push_back(MeasureColor(lessons.targets.back()));
-  }
-  const MklMap mkl = ComputeMkl(Pool(before), Pool(after));
-  for (const std::string& notice : mkl.notices) context->console->Info(notice);
-  lessons.scene_map = {mkl.map, mkl.norm};
-  return lessons;
-}
-
+constexpr double kVoting = 0.2;  // of the steps' time, roughly
 constexpr double kAfterTraining =
     0.15;  // conclusion, and the network over the field, of the steps' time
 
@@ -64,22 +40,72 @@ Vec3f Mapped(const ColorMap& map, const Vec3f& color) {
   return mapped.Cast<float>();
 }
 
+// Pairs of neighbouring pixels, drawn for the measurement of what the propositions promise.
+constexpr int64_t kVariancePairs = 4000;
+
+JsonValue GroupRecord(const VarianceGroup& group) {
+  JsonValue record = JsonValue::Object{{"pairs", group.pairs}, {"above", group.above}};
+  if (group.pairs > 0) {
+    record["gain"] = group.Gain();
+    record["largest_excess"] = group.largest_excess;
+  }
+  return record;
+}
+
+JsonValue VarianceRecord(const RadianceField& source, const RadianceField& styled,
+                         const LipschitzNetwork& network,
+                         const std::vector<StyledTrainingView>& views, uint64_t seed) {
+  std::vector<Camera> cameras;
+  for (const StyledTrainingView& view : views) cameras.push_back(view.camera);
+  const VarianceReport report = MeasureVariance(
+      source, styled, network, NeighbouringPixels(cameras, kVariancePairs, seed),
+      MarchOptions{source.step});
+  return JsonValue::Object{{"inside", GroupRecord(report.inside)},
+                           {"clamp", GroupRecord(report.clamp)},
+                           {"open", GroupRecord(report.open)},
+                           {"largest_share", report.largest_share}};
+}
+
+// An object's style that no view shows.
+StageOutcome LeaveAsItWas(RunContext* context, const StoredField& stored,
+                          const ObjectShares& shares) {
+  const Workspace& workspace = *context->workspace;
+  context->console->Warn(
+      "the masks agree on no part of the scene: it stays as it was. Look at --masks, or lower "
+      "--mask-vote");
+  WriteNetworkFile(workspace.Path("network.npz"), {NetworkOfMap({}), 0});
+  WriteFieldFile(workspace.Path("styled.npz"), stored);
+  WriteObjectFile(workspace.Path("object.npz"), shares);
+  StageOutcome outcome;
+  outcome.outputs = {"network.npz", "styled.npz", "object.npz"};
+  outcome.figures["steps"] = 0;
+  return outcome;
+}
+
 StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
                      const ProgressFunction& progress) {
   const RunSettings& settings = context->settings;
   Workspace& workspace = *context->workspace;
   const Capture capture = ReadCapture(workspace.Path("poses"));
   StoredField stored = ReadFieldFile(workspace.Path("field.npz"));
-  const Lessons lessons = ReadLessons(context, capture, stored);
+  ProgressParts parts(progress, 1 + kAfterTraining + (settings.object.On() ? kVoting : 0));
+  const std::vector<int> indices = StyledViews(workspace, capture, settings.run.holdout);
+  const std::unique_ptr<ObjectMasks> object = OpenObjectMasks(settings, capture);
+  ObjectShares shares;
+  if (object != nullptr)
+    shares = VoteForObject(settings, capture, indices, *object, stored.field,
+                           stored.field_from_world, stored.ndc, parts.Next(kVoting));
+  const Lessons lessons = ReadLessons(context, capture, stored, indices, object.get(), &shares);
+  if (lessons.views.empty()) return LeaveAsItWas(context, stored, shares);
 
   // What a ray sees behind the box is a colour of the scene too, unless the paper's letter is
   // asked for.
-  if (settings.network.recipe != "paper")
+  const Vec3f source_background = stored.field.background;
+  if (settings.network.recipe != "paper" && object == nullptr)
     stored.field.background = Mapped(lessons.scene_map.map, stored.field.background);
   TrainNetworkOptions options = settings.network;
   options.seed = settings.run.seed;
   TrainingHooks hooks;
-  ProgressParts parts(progress, 1 + kAfterTraining);
   hooks.progress = parts.Next(1);
   hooks.checkpoint = [&](const TrainingState& state) {
     workspace.SaveCheckpoint("stylize", inputs, PackTrainingState(state));
@@ -99,21 +125,42 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
   for (const std::string& warning : trained.warnings) context->console->Warn(warning);
 
   WriteNetworkFile(workspace.Path("network.npz"), {trained.network, trained.k_est});
+  RadianceField source{
+      stored.field.geometry, {}, source_background, stored.field.near_clip, stored.field.step};
+  Appearance restyled;
   if (backend == Backend::kCuda) {
     RestyleOnDevice(trained.network, &device_field);
-    stored.field.appearance = ToRadianceField(DownloadGrid(device_field)).appearance;
+    restyled = ToRadianceField(DownloadGrid(device_field)).appearance;
   } else {
-    stored.field.appearance =
-        ApplyNetwork(trained.network, stored.field, parts.Next(kAfterTraining));
+    restyled = ApplyNetwork(trained.network, stored.field, parts.Next(kAfterTraining));
   }
-  WriteFieldFile(workspace.Path("styled.npz"), stored);
+  source.appearance = std::exchange(stored.field.appearance, std::move(restyled));
   StageOutcome outcome;
   outcome.outputs = {"network.npz", "styled.npz"};
+  if (object != nullptr) {
+    const RadianceField styled = std::move(stored.field);
+    stored.field = MixFields(source, {&styled}, {1}, &shares.all);
+    WriteObjectFile(workspace.Path("object.npz"), shares);
+    outcome.outputs.push_back("object.npz");
+    outcome.figures["object_voxels"] = static_cast<int64_t>(
+        std::count_if(shares.all.begin(), shares.all.end(), [](float e) { return e > 0; }));
+  } else {
+    std::filesystem::remove(workspace.Path("object.npz"));  // of an earlier style
+  }
+  WriteFieldFile(workspace.Path("styled.npz"), stored);
   outcome.figures["device"] = DeviceName(backend);
   outcome.figures["steps"] = trained.steps;
   outcome.figures["k_est"] = trained.k_est;
   outcome.figures["bound"] = trained.bound;
   outcome.figures["slope_observed"] = trained.slope_observed;
+  for (size_t i = 0; i < trained.history.steps.size(); ++i) {
+    outcome.figures["bound_steps"].Append(trained.history.steps[i]);
+    outcome.figures["bound_at_steps"].Append(trained.history.bounds[i]);
+  }
+  outcome.figures["slope_ascent"] = trained.slope_ascent;
+  if (object == nullptr)  // a network's promise is about what it alone has made
+    outcome.figures["variance"] =
+        VarianceRecord(source, stored.field, trained.network, lessons.views, settings.run.seed);
   outcome.figures["psnr_train_db"] = trained.psnr_db;
   return outcome;
 }
@@ -129,6 +176,10 @@ Stage StylizeStage(RunContext* context) {
                                    {"options", context->OptionsOf({"Scene", "Network"})},
                                    {"seed", run.seed},
                                    {"holdout", run.holdout}};
+  if (context->settings.object.On()) {
+    stage.inputs["object"] = context->OptionsOf({"Object"});
+    stage.inputs["masks"] = MaskFiles(context->settings.object);
+  }
   stage.plan = PlanText(PlanStyle(context->settings.network.steps, omp_get_max_threads()));
   stage.work = [context, inputs = stage.inputs](const ProgressFunction& progress) {
     return Stylize(context, inputs, progress);

@@ -140,6 +140,19 @@ TEST(ReportHtml, AnUndefinedPairBreaksTheLine) {
   EXPECT_EQ(Count(page, "<polyline"), 2u);
 }
 
+TEST(ReportHtml, TheBoundIsDrawnOverTheSteps) {
+  RunReport report = SomeReport();
+  report.stages.stylize = StylizeReport{4, 300, 1.5, 1.9, 1.2};
+  EXPECT_EQ(ReportHtml(report, {}).find("Lipschitz bound over steps"), std::string::npos);
+  report.stages.stylize->bound_at_steps = {{0, 1.9}, {25, 4.0}, {300, 1.9}};
+  const std::string html = ReportHtml(report, {});
+  EXPECT_NE(html.find("Lipschitz bound over steps"), std::string::npos);
+  EXPECT_NE(html.find("K_est"), std::string::npos);
+  EXPECT_EQ(html.find("nan"), std::string::npos);
+  report.stages.stylize->variance = VarianceFigures{{{"inside", 40, 3, 1.2, 0.01}}, 0.7};
+  EXPECT_NE(ReportHtml(report, {}).find("3 of 40 pairs"), std::string::npos);
+}
+
 TEST(ReportHtml, AnEmptyReportIsAPage) {
   const std::string page = ReportHtml(RunReport(), ReportPictures());
   EXPECT_EQ(page.find("<img"), std::string::npos);

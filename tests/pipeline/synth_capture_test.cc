@@ -15,6 +15,7 @@
 #include "evaluate/flow_file.h"
 #include "kernels/base/error.h"
 #include "kernels/synthetic/ray_trace.h"
+#include "pipeline/files/image_file.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/files/transforms_json.h"
 #include "pipeline/synth_effects.h"
@@ -60,6 +61,24 @@ class SynthCapture : public ::testing::Test {
 
   fs::path root_;
 };
+
+TEST_F(SynthCapture, MasksAreOfOneObjectAndSomeAreWrong) {
+  const fs::path with = Write("masked", "masks", {}, 6), plain = Write("plain", "", {}, 6);
+  EXPECT_FALSE(fs::exists(plain / "masks"));
+  EXPECT_EQ(Bytes(with / "images/00004.png"), Bytes(plain / "images/00004.png"));
+  const auto covered = [&](const char* folder, int i) {
+    char name[32];
+    std::snprintf(name, sizeof name, "%05d.png", i);
+    double sum = 0;
+    for (const float m : ReadImage((with / folder / name).string()).pixels) sum += m;
+    return sum;
+  };
+  for (int i = 0; i < 6; ++i) EXPECT_GT(covered("truth/masks", i), 20) << i;
+  for (const int i : {0, 1, 4}) EXPECT_EQ(covered("masks", i), covered("truth/masks", i)) << i;
+  EXPECT_EQ(covered("masks", 3), 0);
+  EXPECT_GT(covered("masks", 5), 1.3 * covered("truth/masks", 5));
+  EXPECT_NE(Bytes(with / "masks/00002.png"), Bytes(with / "truth/masks/00002.png"));
+}
 
 TEST_F(SynthCapture, WritesPhotosAndTruth) {
   const fs::path out = Write("a");

@@ -105,6 +105,20 @@ TEST(ObservedSlope, H36_ClimbingStaysBelowTheBound) {
   EXPECT_GE(slopes.ascent, slopes.jacobians);
   EXPECT_LE(slopes.ascent, network.Bound());
   EXPECT_LE(slopes.pairs, network.Bound());
+  EXPECT_LE(slopes.summit_pair, network.Bound());
+  // A chord of 1e-3 is shorter than the curve of a sine by its curvature squared.
+  EXPECT_NEAR(slopes.summit_pair / slopes.ascent, 1, 1e-3);
+}
+
+TEST(ObservedSlope, PairsNearerThanTheirDistanceHaveNoSay) {
+  const LipschitzNetwork network = RandomNetwork(85);
+  RadianceField field = Ball(12);
+  for (int64_t i = 0; i < field.appearance.sh.size(); ++i) field.appearance.sh[i] *= 1e-5f;
+  // Positions are a twelfth of the box apart, times the network's scale of 1.
+  EXPECT_GT(ObserveSlopes(network, field, {.pairs = 3000, .jacobians = 1}).pairs, 0);
+  EXPECT_EQ(
+      ObserveSlopes(network, field, {.pairs = 3000, .jacobians = 1, .min_distance = 4}).pairs,
+      0);
 }
 
 TEST(LipschitzNetwork, RefusesWhatIsNoNetwork) {

@@ -1,0 +1,210 @@
+// regrade mix: a film that turns from the scene as it was into its style, or from one style
+// into another, and the field half way.
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+#include <optional>
+
+#include "kernels/base/error.h"
+#include "pipeline/capture_store.h"
+#include "pipeline/commands/command.h"
+#include "pipeline/device_choice.h"
+#include "pipeline/field_file.h"
+#include "pipeline/field_renderer.h"
+#include "pipeline/files/image_file.h"
+#include "pipeline/files/json_file.h"
+#include "pipeline/files/video_file.h"
+#include "pipeline/mix_keys.h"
+#include "pipeline/run_file.h"
+#include "pipeline/run_settings.h"
+#include "pipeline/scene_views.h"
+#include "pipeline/stages/object_edit.h"
+#include "pipeline/workspace.h"
+#include "stylize/blend_fields.h"
+
+namespace regrade {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct MixOptions {
+  std::string out;
+  std::string mix;
+  bool object = false;
+  std::string device = "auto";
+  bool dry_run = false;
+
+  template <typename Bind>
+  void Describe(Bind& bind) {
+    bind("out", out, {.help = "the folder to write; must be new, or hold an earlier mix"});
+    bind("mix", mix,
+         {.help =
+              "shares of the style in time, 0 the scene as it was and 1 the style: 0:1 turns "
+              "from one into the other, 0:1:0 and back, 0.5 stays half way and also writes "
+              "mixed.npz. With several styles a share for each: 1,0:0,1 turns the first into "
+              "the second. Without it, all styles in order"});
+    bind("object", object,
+         {.help = "only the object changes whose masks DIR was styled with, the rest stays as "
+                  "it was; styles of the whole scene may be named"});
+    bind("device", device, {.help = "where arithmetic runs", .choices = "auto|cpu|cuda"});
+    bind("dry-run", dry_run, {.help = "say what would be done, and do nothing"});
+  }
+};
+
+// What the run in `folder` was done with, where no flag says otherwise.
+void TakeRunsOptions(const std::string& folder, OptionSet* options) {
+  const std::string run_json = folder + "/run.json";
+  const RunFile file = ReadRunFile(run_json);
+  JsonValue taken = JsonValue::Object();
+  for (const char* name : {"photo-size", "fps", "path", "path-frames"})
+    if (const JsonValue* value = file.options.Find(name)) taken[name] = *value;
+  options->ApplyConfig(taken, run_json);
+}
+
+std::string StyleFile(const std::string& word) {
+  std::error_code error;
+  return fs::is_directory(word, error) ? word + "/styled.npz" : word;
+}
+
+void MakeMixFolder(const fs::path& out) {
+  std::error_code error;
+  if (fs::exists(out, error) && !fs::is_empty(out, error) && !fs::exists(out / "mix.json"))
+    throw Error(ExitCode::kUsage, "is not empty", out.string(), "name a new folder with --out");
+  fs::remove_all(out / "frames", error);
+  for (const char* file : {"mixed.mp4", "mixed.npz"}) fs::remove(out / file, error);
+  fs::create_directories(out / "frames", error);
+  if (error) throw Error(ExitCode::kResources, error.message(), out.string());
+}
+
+std::vector<Camera> FilmCameras(const std::string& folder, const StoredField& stored,
+                                const SceneOptions& scene, const RenderOptions& render) {
+  std::vector<Camera> views;
+  for (const CaptureView& view : ReadCapture(folder + "/poses").views)
+    views.push_back(
+        WorkingCamera(view.camera, scene.photo_size, stored.field_from_world, stored.ndc));
+  return MakeCameraPath(views, render.path);
+}
+
+void WriteMix(const std::string& out, const RadianceField& source,
+              const std::vector<const RadianceField*>& styles, const MixKeys& keys,
+              const std::vector<float>* shares_of_voxels, const std::vector<Camera>& cameras,
+              double fps, Backend backend, Console* console) {
+  std::optional<VideoWriter> film;
+  try {
+    film.emplace(out + "/mixed.mp4", cameras[0].width, cameras[0].height, fps);
+  } catch (const Error& error) {
+    if (error.code() != ExitCode::kExternalProgram) throw;
+    console->Warn("no film: " + error.what_failed());
+  }
+  console->BeginStage("mix");
+  const ProgressFunction progress = console->StageProgress();
+  std::vector<double> shown;
+  std::unique_ptr<FieldRenderer> renderer;
+  const int frames = static_cast<int>(cameras.size());
+  for (int i = 0; i < frames; ++i) {
+    if (Report(progress, i, frames) == Verdict::kAbort) throw Interrupted();
+    const std::vector<double> shares =
+        keys.At(static_cast<double>(i) / std::max(1, frames - 1));
+    if (!renderer || shares != shown) {
+      renderer.reset();  // one at a time: a field may be most of the memory
+      renderer = std::make_unique<FieldRenderer>(
+          MixFields(source, styles, shares, shares_of_voxels), backend);
+      shown = shares;
+    }
+    const Image frame = renderer->Render(cameras[static_cast<size_t>(i)]).color;
+    WritePng8(out + "/frames/" + FrameName(i), frame);
+    if (film && (frame.width != cameras[0].width || frame.height != cameras[0].height)) {
+      console->Info("no film: the photos have different sizes");
+      film.reset();
+    }
+    if (film) film->Add(frame);
+  }
+  if (film) film->Finish();
+  console->EndStage();
+}
+
+}  // namespace
+
+void RunMix(const Command& command, const Arguments& arguments, Console* console) {
+  MixOptions settings;
+  SceneOptions scene;
+  RenderOptions render;
+  ProgramOptions program;
+  OptionSet options;
+  options.Add("Mix", &settings);
+  options.Add("Scene", &scene);
+  options.Add("Render", &render);
+  options.Add("Program", &program);
+  if (PrintedHelp(command, arguments, options)) return;
+  const Arguments words = options.Parse(arguments);
+  constexpr size_t kMostStyles = 16;
+  CheckWords(command, words, 1, kMostStyles);
+  const std::string& folder = words[0];
+  if (!Workspace::Exists(folder))
+    throw Error(ExitCode::kInput, "no run has worked in this folder", folder,
+                "make one with `regrade run`");
+  TakeRunsOptions(folder, &options);
+  options.ApplyFlags();
+  ApplyProgramOptions(program);
+  const MixKeys keys = ParseMixKeys(settings.mix, static_cast<int>(words.size()));
+  if (settings.out.empty() && !settings.dry_run)
+    throw Error(ExitCode::kUsage, "its value is missing", "--out", "name the folder to write");
+  ChooseBackend(settings.device, false);
+  for (const std::string& word : words)
+    if (!fs::is_regular_file(StyleFile(word)))
+      throw Error(ExitCode::kInput, "there is no styled field", StyleFile(word),
+                  "make it with `regrade stylize`, and keep a copy of styled.npz before the "
+                  "next style takes its place");
+
+  const StoredField stored = ReadFieldFile(folder + "/field.npz");
+  const Backend backend =
+      ChooseBackendFor(stored.field.geometry->spheres.on(), settings.device, false,
+                       [console](const std::string& text) { console->Info(text); });
+  const std::vector<Camera> cameras = FilmCameras(folder, stored, scene, render);
+  if (settings.dry_run) {
+    console->Info(std::to_string(cameras.size()) + " frames of " +
+                  std::to_string(cameras[0].width) + "x" + std::to_string(cameras[0].height) +
+                  " along " + render.path.path + ", " + std::to_string(keys.points.size()) +
+                  (keys.points.size() == 1 ? " point" : " points") + " of " +
+                  std::to_string(words.size()) + (words.size() == 1 ? " style" : " styles"));
+    return;
+  }
+  std::vector<StoredField> styles;
+  std::vector<const RadianceField*> fields;
+  for (const std::string& word : words) {
+    styles.push_back(ReadFieldFile(StyleFile(word)));
+    RadianceField& field = styles.back().field;
+    if (field.appearance.basis != stored.field.appearance.basis ||
+        !SameGeometry(*field.geometry, *stored.field.geometry))
+      throw Error(ExitCode::kInput, "is a style of another reconstruction", StyleFile(word),
+                  "styles that are mixed restyle one field: make them with `regrade stylize " +
+                      folder + "`");
+    field.geometry = stored.field.geometry;
+  }
+  for (const StoredField& style : styles) fields.push_back(&style.field);
+
+  std::optional<ObjectShares> object;
+  if (settings.object) {
+    const std::string file = folder + "/object.npz";
+    if (!fs::exists(file))
+      throw Error(ExitCode::kInput, "there is no object", file,
+                  "make it with `regrade stylize " + folder + " --masks FOLDER`");
+    object = ReadObjectFile(file, stored.field.geometry->num_voxels());
+  }
+  const std::vector<float>* within = object ? &object->all : nullptr;
+
+  MakeMixFolder(settings.out);
+  JsonValue record = JsonValue::Object{{"field", folder}, {"options", options.Values()}};
+  for (const std::string& word : words) record["styles"].Append(StyleFile(word));
+  WriteJsonFile(settings.out + "/mix.json", record);
+  WriteMix(settings.out, stored.field, fields, keys, within, cameras, render.fps, backend,
+           console);
+  if (keys.IsConstant()) {
+    StoredField mixed = stored;
+    mixed.field = MixFields(stored.field, fields, keys.points[0], within);
+    WriteFieldFile(settings.out + "/mixed.npz", mixed);
+  }
+  console->Info("wrote " + std::to_string(cameras.size()) + " frames to " + settings.out);
+}
+
+}  // namespace regrade

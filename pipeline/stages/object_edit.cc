@@ -1,0 +1,115 @@
+#include "pipeline/stages/object_edit.h"
+
+#include <algorithm>
+
+#include "kernels/base/error.h"
+#include "kernels/field/render.h"
+#include "pipeline/files/npz_file.h"
+#include "pipeline/scene_views.h"
+#include "stylize/object_shares.h"
+
+namespace regrade {
+namespace {
+
+// A render's rounding of what is exactly 0.
+constexpr float kNothing = 1.0f / 1024;
+
+std::vector<float> SumOf(const std::vector<std::vector<float>>& regions) {
+  std::vector<float> sum(regions[0].size());
+  for (size_t v = 0; v < sum.size(); ++v) {
+    for (const std::vector<float>& region : regions) sum[v] += region[v];
+    sum[v] = std::min(sum[v], 1.0f);
+  }
+  return sum;
+}
+
+}  // namespace
+
+std::unique_ptr<ObjectMasks> OpenObjectMasks(const RunSettings& settings,
+                                             const Capture& capture) {
+  if (!settings.object.On()) return nullptr;
+  std::vector<std::string> photos;
+  for (const CaptureView& view : capture.views) photos.push_back(view.file);
+  return std::make_unique<ObjectMasks>(settings.object, photos);
+}
+
+ObjectShares VoteForObject(const RunSettings& settings, const Capture& capture,
+                           const std::vector<int>& views, const ObjectMasks& masks,
+                           const RadianceField& field, const Similarity& field_from_world,
+                           const NdcSpace& ndc, const ProgressFunction& progress) {
+  std::vector<MaskVote> votes;
+  for (int k = 0; k < masks.num_regions(); ++k)
+    votes.emplace_back(*field.geometry, field.near_clip, MarchOptions{field.step});
+  for (size_t n = 0; n < views.size(); ++n) {
+    if (Report(progress, static_cast<double>(n), static_cast<double>(views.size()),
+               "masks vote") == Verdict::kAbort)
+      throw Interrupted();
+    const int i = views[n];
+    if (!masks.Knows(i)) continue;
+    const Camera camera = WorkingCamera(capture.views[static_cast<size_t>(i)].camera,
+                                        settings.scene.photo_size, field_from_world, ndc);
+    const std::vector<Image> coverage = masks.Coverage(i, camera.width, camera.height);
+    for (size_t k = 0; k < votes.size(); ++k) votes[k].Add(camera, coverage[k]);
+  }
+  ObjectShares shares;
+  for (const MaskVote& vote : votes)
+    shares.regions.push_back(vote.Shares(settings.object.vote, settings.object.edge));
+  shares.all = SumOf(shares.regions);
+  return shares;
+}
+
+void WriteObjectFile(const std::string& path, const ObjectShares& shares) {
+  std::vector<float> values;
+  for (const std::vector<float>& region : shares.regions)
+    values.insert(values.end(), region.begin(), region.end());
+  NpzWriter file;
+  file.Add(
+      "shares",
+      {static_cast<int64_t>(shares.regions.size()), static_cast<int64_t>(shares.all.size())},
+      values.data(), NpzPacking::kDeflate);
+  file.AddScalar<int32_t>("regrade_version", 1);
+  file.WriteTo(path);
+}
+
+ObjectShares ReadObjectFile(const std::string& path, int64_t voxels) {
+  NpzReader file(path, uint64_t{16} << 30);
+  RefuseNewerFormat(&file, 1);
+  const NpzArray array = file.Read("shares", ArrayType::kF32, {-1, voxels});
+  const int64_t regions = array.shape[0];
+  if (regions < 1 || regions > ObjectMasks::kMostRegions)
+    throw Error(ExitCode::kInput, "holds " + std::to_string(regions) + " regions", path,
+                "run regrade stylize again");
+  ObjectShares shares;
+  for (int64_t k = 0; k < regions; ++k) {
+    const float* first = array.As<float>() + k * voxels;
+    shares.regions.emplace_back(first, first + voxels);
+  }
+  for (const std::vector<float>& region : shares.regions)
+    if (!std::all_of(region.begin(), region.end(), [](float e) { return e >= 0 && e <= 1; }))
+      throw Error(ExitCode::kInput, "holds a share outside [0, 1]", path,
+                  "run regrade stylize again");
+  shares.all = SumOf(shares.regions);
+  return shares;
+}
+
+CoverageRenderer::CoverageRenderer(const RadianceField& field, const ObjectShares& shares)
+    : step_(field.step) {
+  for (const std::vector<float>& region : shares.regions)
+    grids_.push_back(MakeFastGrid(ShareField(field, region)));
+}
+
+std::vector<Image> CoverageRenderer::Render(const Camera& camera) const {
+  std::vector<Image> coverage;
+  for (const FastGrid& grid : grids_) {
+    const Image color = RenderView(grid, camera, MarchOptions{step_}).color;
+    Image region(color.width, color.height, 1);
+    for (int64_t i = 0; i < region.num_pixels(); ++i) {
+      const float m = color.pixels[static_cast<size_t>(3 * i)];
+      region.pixels[static_cast<size_t>(i)] = m > kNothing ? m : 0;
+    }
+    coverage.push_back(std::move(region));
+  }
+  return coverage;
+}
+
+}  // namespace regrade

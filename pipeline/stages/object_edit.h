@@ -1,0 +1,49 @@
+// A style for an object alone: masks of photos become shares of voxels, and everything that a
+// stage needs to know of them.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "kernels/field/fast_rays.h"
+#include "kernels/field/radiance_field.h"
+#include "kernels/scene/capture.h"
+#include "pipeline/object_masks.h"
+#include "pipeline/stages/run_context.h"
+
+namespace regrade {
+
+// The masks that --masks names, of the capture's photos; null where the whole scene is styled.
+std::unique_ptr<ObjectMasks> OpenObjectMasks(const RunSettings& settings,
+                                             const Capture& capture);
+
+// Shares of each voxel: one list a region, and their sum.
+struct ObjectShares {
+  std::vector<std::vector<float>> regions;
+  std::vector<float> all;
+};
+
+// See EQ(mask-vote); the masks of `views` vote.
+ObjectShares VoteForObject(const RunSettings& settings, const Capture& capture,
+                           const std::vector<int>& views, const ObjectMasks& masks,
+                           const RadianceField& field, const Similarity& field_from_world,
+                           const NdcSpace& ndc, const ProgressFunction& progress);
+
+// object.npz: f32 "shares" [regions, voxels]. Reading throws Error(kInput) for a file that
+// does not fit the field.
+void WriteObjectFile(const std::string& path, const ObjectShares& shares);
+ObjectShares ReadObjectFile(const std::string& path, int64_t voxels);
+
+// What of each pixel of a render is of each region: masks for any camera, all of one mind.
+class CoverageRenderer {
+ public:
+  CoverageRenderer(const RadianceField& field, const ObjectShares& shares);
+  std::vector<Image> Render(const Camera& camera) const;
+
+ private:
+  float step_;
+  std::vector<FastGrid> grids_;
+};
+
+}  // namespace regrade

@@ -1,0 +1,187 @@
+#!/usr/bin/env python3
+"""Restyles a finished output folder with LipRF's parts taken out one at a time, and tabulates what each was worth.
+
+  ablation.py REGRADE DIR --work FOLDER [--style PICTURE] [--steps N] [--recipes paper,standard] [--only NAME,...] [-- FLAGS...]
+
+DIR is left alone: the reconstruction is copied to FOLDER/NAME for each variant, and `regrade stylize` runs there; a
+variant that is finished is not done again. Printed is a table in Markdown; FOLDER/ablation.json holds the figures and
+FOLDER/bound.svg the Lipschitz bound over the steps, one line a variant, on a logarithmic scale.
+
+Variants are of LipRF's Sec. 5.3: the activation, without K_est, without regularisation, with spectral normalisation
+to 1. They are taken of each recipe; what a variant trades is in `regrade stylize --help`.
+"""
+
+import argparse
+import json
+import math
+import os
+import shutil
+import subprocess
+import sys
+
+VARIANTS = (
+    ("as it is", ()),
+    ("relu", ("--style-activation", "relu")),
+    ("leaky-relu", ("--style-activation", "leaky-relu")),
+    ("sigmoid", ("--style-activation", "sigmoid")),
+    ("tanh", ("--style-activation", "tanh")),
+    ("without K_est", ("--style-no-k-est",)),
+    ("without regularisation", ("--style-no-regularisation",)),
+    ("spectral normalisation", ("--style-spectral-normalisation",)),
+)
+KEPT = ("poses", "field.npz", "run.json", ".regrade")
+STAGES_KEPT = ("pose.json", "reconstruct.json")
+COLOURS = ("#1b6ca8", "#c8553d", "#588157", "#8d6a9f", "#b08900", "#2a9d8f", "#7f5539", "#444444")
+
+
+def copy_reconstruction(source, target):
+    """Poses and field with their records: what every variant begins from."""
+    os.makedirs(target)
+    for name in KEPT:
+        path = os.path.join(source, name)
+        if os.path.isdir(path):
+            shutil.copytree(path, os.path.join(target, name), ignore=shutil.ignore_patterns("lock", "checkpoints"))
+        else:
+            shutil.copy2(path, target)
+    stages = os.path.join(target, ".regrade", "stages")
+    for name in os.listdir(stages):
+        if name not in STAGES_KEPT:
+            os.remove(os.path.join(stages, name))
+
+
+def figures_of(folder):
+    with open(os.path.join(folder, "report.json"), encoding="utf-8") as file:
+        report = json.load(file)
+    stylize = report["stages"]["stylize"]
+    steady = {row["gap"]: row["tc_psnr_mean_db"] for row in report["consistency"] if row["sequence"] == "styled"}
+    faith = next(row for row in report["fidelity"] if row["sequence"] == "styled")
+    return {
+        "psnr_to_2d_db": stylize["psnr_to_2d_db"],
+        "tc": [steady[gap] for gap in sorted(steady)],
+        "gaps": sorted(steady),
+        "bound": stylize["bound"],
+        "k_est": stylize["k_est"],
+        "slope": stylize["slope_observed"],
+        "slope_ascent": stylize.get("slope_ascent"),
+        "hue_std": faith["hue_std"],
+        "hue_std_2d": faith["hue_std_2d"],
+        "chroma": faith["chroma"],
+        "chroma_2d": faith["chroma_2d"],
+        "bound_at_steps": stylize.get("bound_at_steps", []),
+        "seconds": stylize["seconds"],
+    }
+
+
+def number(value, digits=2):
+    return "–" if value is None else f"{value:.{digits}f}"
+
+
+def ratio(value, whole):
+    return "–" if value is None or not whole else f"{value / whole:.2f}"
+
+
+def table(rows):
+    gaps = rows[0][2]["gaps"]
+    head = ["recipe", "variant", "styled to 2D, dB"] + [f"TC-PSNR gap {gap}, dB" for gap in gaps]
+    head += ["bound", "steepest seen", "climbed to", "K_est", "hue spread kept", "chroma kept", "s"]
+    lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
+    for recipe, variant, f in rows:
+        cells = [recipe, variant, number(f["psnr_to_2d_db"])] + [number(tc) for tc in f["tc"]]
+        cells += [number(f["bound"]), number(f["slope"]), number(f["slope_ascent"]), number(f["k_est"])]
+        cells += [ratio(f["hue_std"], f["hue_std_2d"]), ratio(f["chroma"], f["chroma_2d"]), number(f["seconds"], 0)]
+        lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+def curves(rows):
+    """SVG text: the bound over the steps."""
+    width, height, left, right, top, bottom = 860, 420, 60, 240, 16, 36
+    lines = [(f"{recipe}, {variant}", f["bound_at_steps"]) for recipe, variant, f in rows]
+    points = [p for _, line in lines for p in line if p[1] > 0]
+    if not points:
+        return None
+    low, high = min(p[1] for p in points) / 1.1, max(p[1] for p in points) * 1.1
+    last = max(max(p[0] for p in points), 1)
+
+    def x(step):
+        return left + step / last * (width - left - right)
+
+    def y(value):
+        return height - bottom - math.log(value / low) / math.log(high / low) * (height - top - bottom)
+
+    svg = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" font-family="sans-serif" '
+           'font-size="12"><rect width="100%" height="100%" fill="white"/>']
+    base = 10 if high / low > 64 else 2
+    value = base ** math.ceil(math.log(low, base))
+    while value < high:
+        svg.append(f'<line x1="{left}" x2="{width - right}" y1="{y(value):.1f}" y2="{y(value):.1f}" stroke="#ddd"/>'
+                   f'<text x="{left - 6}" y="{y(value) + 4:.1f}" text-anchor="end">{value:g}</text>')
+        value *= base
+    svg.append(f'<text x="{left}" y="{height - 12}">step 0</text>'
+               f'<text x="{width - right}" y="{height - 12}" text-anchor="end">{last}</text>')
+    for k, (name, line) in enumerate(lines):
+        colour = COLOURS[k % len(COLOURS)]
+        dash = "" if k < len(COLOURS) else ' stroke-dasharray="5 3"'
+        path = " ".join(f"{x(step):.1f},{y(bound):.1f}" for step, bound in line if bound > 0)
+        svg.append(f'<polyline points="{path}" fill="none" stroke="{colour}" stroke-width="1.6"{dash}/>'
+                   f'<line x1="{width - right + 12}" x2="{width - right + 32}" y1="{26 + 18 * k}" y2="{26 + 18 * k}" '
+                   f'stroke="{colour}" stroke-width="2"{dash}/>'
+                   f'<text x="{width - right + 38}" y="{30 + 18 * k}">{name}</text>')
+    return "".join(svg) + "</svg>\n"
+
+
+def main():
+    words = sys.argv[1:]
+    split = words.index("--") if "--" in words else len(words)
+    own, extra = words[:split], words[split + 1:]
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("regrade")
+    parser.add_argument("folder")
+    parser.add_argument("--work", required=True, help="where the variants are made")
+    parser.add_argument("--style", help="default: the one that DIR was styled with")
+    parser.add_argument("--steps", type=int, help="of each training; default: the recipe's")
+    parser.add_argument("--recipes", default="paper", help="paper, standard, or both with a comma between")
+    parser.add_argument("--only", help="names of variants with commas between")
+    options = parser.parse_args(own)
+    for name in KEPT:
+        if not os.path.exists(os.path.join(options.folder, name)):
+            parser.error(f"{options.folder} has no {name}: make it with `regrade run`")
+    names = [name for name, _ in VARIANTS]
+    wanted = options.only.split(",") if options.only else names
+    for name in wanted:
+        if name not in names:
+            parser.error(f"there is no variant '{name}'; there are: " + ", ".join(names))
+    rows = []
+    for recipe in options.recipes.split(","):
+        for name, flags in VARIANTS:
+            if name not in wanted:
+                continue
+            folder = os.path.join(options.work, f"{recipe} {name}".replace(" ", "_"))
+            if not os.path.exists(folder):
+                copy_reconstruction(options.folder, folder)
+            command = [options.regrade, "stylize", folder, "--recipe", recipe, "--path", "views", *flags, *extra]
+            if options.style:
+                command += ["--style", options.style]
+            if options.steps:
+                command += ["--style-steps", str(options.steps)]
+            print(f"{recipe}, {name} ...", file=sys.stderr, flush=True)
+            log = os.path.join(options.work, os.path.basename(folder) + ".log")
+            with open(log, "w", encoding="utf-8") as file:
+                status = subprocess.run(command, stdout=file, stderr=subprocess.STDOUT, check=False).returncode
+            if status != 0:
+                print(f"{recipe}, {name}: regrade ended with {status}, see {log}", file=sys.stderr)
+                return 1
+            rows.append((recipe, name, figures_of(folder)))
+    print(table(rows))
+    with open(os.path.join(options.work, "ablation.json"), "w", encoding="utf-8") as file:
+        json.dump([{"recipe": r, "variant": v, **f} for r, v, f in rows], file, indent=1)
+    drawing = curves(rows)
+    if drawing:
+        with open(os.path.join(options.work, "bound.svg"), "w", encoding="utf-8") as file:
+            file.write(drawing)
+        print(f"\nthe bound over the steps: {os.path.join(options.work, 'bound.svg')}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,55 @@
+// Pictures on one sheet: each in its place, words outside of them.
+#include "pipeline/contact_sheet.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "pipeline/files/picture_text.h"
+
+namespace regrade {
+namespace {
+
+Image Plain(int width, int height, float value) {
+  Image image(width, height);
+  std::fill(image.pixels.begin(), image.pixels.end(), value);
+  return image;
+}
+
+TEST(ContactSheet, EveryPictureIsThereWhole) {
+  const Image sheet = MakeContactSheet(
+      {"one", "two"},
+      {{"a style", {{Plain(40, 30, 0.25f), "28.1 dB"}, {Plain(30, 30, 0.5f), ""}}},
+       {"", {{Plain(40, 20, 0.75f), "x"}, {Image(), "nothing"}}}});
+  int quarter = 0, half = 0, three = 0, ink = 0;
+  for (int64_t i = 0; i < sheet.num_pixels(); ++i) {
+    const float v = sheet.pixels[static_cast<size_t>(3 * i)];
+    quarter += v == 0.25f, half += v == 0.5f, three += v == 0.75f, ink += v < 0.2f;
+  }
+  EXPECT_GE(quarter, 40 * 30);
+  EXPECT_GE(half, 30 * 30);
+  EXPECT_GE(three, 40 * 20);
+  EXPECT_LE(quarter, 40 * 30 + 100);  // and not more than some of the letters' edges
+  EXPECT_GT(ink, 20);                 // the title
+  EXPECT_GT(sheet.width, 80);
+  EXPECT_EQ(MakeContactSheet({"one"}, {}).channels, 3);
+}
+
+TEST(PictureText, StaysWithinItsWidthAndThePicture) {
+  Image image = Plain(60, 30, 1);
+  DrawText(&image, 10, 4, 20, "WWWWWWWWWWWW", 1, 0);
+  int left = 0, inside = 0, right = 0;
+  for (int y = 0; y < 30; ++y)
+    for (int x = 0; x < 60; ++x) {
+      const bool dark = *image.at(x, y) < 0.5f;
+      (x < 10 ? left : x < 30 ? inside : right) += dark;
+    }
+  EXPECT_EQ(left, 0);
+  EXPECT_GT(inside, 10);
+  EXPECT_EQ(right, 0);
+  DrawText(&image, 50, 25, 500, "\xF0\x9F\x98\x80 beyond", 2, 0);  // no crash at the rim
+  DrawText(&image, -5, -5, 50, "x", 1, 0);
+}
+
+}  // namespace
+}  // namespace regrade

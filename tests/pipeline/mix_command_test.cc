@@ -1,0 +1,73 @@
+// regrade mix and contact-sheet over a whole, tiny run: exact ends, and what they refuse.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "tests/support/temporary_folder.h"
+#include "tests/support/tiny_run.h"
+
+namespace regrade {
+namespace {
+
+using testing::ProgramOutcome;
+using testing::TemporaryFolder;
+
+std::string Bytes(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+ProgramOutcome Regrade(const std::vector<std::string>& arguments) {
+  return testing::RunProgram(REGRADE_PROGRAM, arguments);
+}
+
+TEST(MixCommand, H49_AFilmBetweenTheSceneAndItsStyle) {
+  const TemporaryFolder folder;
+  const std::string style = std::string(REGRADE_SOURCE_DIR) + "/assets/style_sunset.png";
+  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}).code, 0);
+  std::vector<std::string> run{"run",   folder / "s/truth", "--style", style,
+                               "--out", folder / "e"};
+  for (const std::string& flag : testing::TinyFlags()) run.push_back(flag);
+  const ProgramOutcome done = Regrade(run);
+  ASSERT_EQ(done.code, 0) << done.text;
+
+  const ProgramOutcome mixed =
+      Regrade({"mix", folder / "e", "--mix", "0:0.5:1", "--out", folder / "m"});
+  ASSERT_EQ(mixed.code, 0) << mixed.text;
+  const auto frame = [&](const std::string& path) { return Bytes(folder / path); };
+  EXPECT_EQ(frame("m/frames/00000.png"), frame("e/frames/path_source/00000.png"));
+  EXPECT_EQ(frame("m/frames/00002.png"), frame("e/frames/path_styled/00002.png"));
+  EXPECT_NE(frame("m/frames/00001.png"), frame("e/frames/path_source/00001.png"));
+  EXPECT_NE(frame("m/frames/00001.png"), frame("e/frames/path_styled/00001.png"));
+
+  // The field at the end is the style's file, and the folder of a mix may be used again.
+  ASSERT_EQ(Regrade({"mix", folder / "e", "--mix", "1", "--out", folder / "m"}).code, 0);
+  EXPECT_EQ(frame("m/mixed.npz"), frame("e/styled.npz"));
+
+  ProgramOutcome refused =
+      Regrade({"mix", folder / "e", "--mix", "0:1.5", "--out", folder / "x"});
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_NE(refused.text.find("not between 0 and 1"), std::string::npos) << refused.text;
+  refused = Regrade({"mix", folder / "e", folder / "none.npz", "--out", folder / "x"});
+  EXPECT_EQ(refused.code, 3);
+  EXPECT_NE(refused.text.find("none.npz"), std::string::npos) << refused.text;
+  EXPECT_EQ(Regrade({"mix", folder / "e", "--out", folder / "s"}).code, 2);  // not empty
+  EXPECT_EQ(Regrade({"mix", folder / "e"}).code, 2);                         // no --out
+  EXPECT_EQ(Regrade({"mix", folder / "e", "--dry-run"}).code, 0);
+  EXPECT_FALSE(std::filesystem::exists(folder / "x"));
+
+  const ProgramOutcome sheet =
+      Regrade({"contact-sheet", folder / "e", style, "--out", folder / "sheet.png", "--size",
+               "64", "--steps", "2", "--views", "1"});
+  EXPECT_EQ(sheet.code, 0) << sheet.text;
+  EXPECT_GT(frame("sheet.png").size(), 10000u);
+  EXPECT_EQ(Regrade({"contact-sheet", folder / "e", "--out", folder / "y.png"}).code, 2);
+  EXPECT_EQ(
+      Regrade({"contact-sheet", folder / "e", folder / "no.jpg", "--out", folder / "y"}).code,
+      3);
+}
+
+}  // namespace
+}  // namespace regrade

@@ -1,0 +1,35 @@
+// The built program at work on a synthetic capture so small that a whole run takes seconds.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "kernels/base/child_process.h"
+
+namespace regrade::testing {
+
+struct ProgramOutcome {
+  int code = 0;
+  std::string text;
+};
+
+inline ProgramOutcome RunProgram(const std::string& program,
+                                 const std::vector<std::string>& arguments) {
+  ChildOptions options;
+  options.argv = {program};
+  options.argv.insert(options.argv.end(), arguments.begin(), arguments.end());
+  options.wall_limit_s = 300;
+  ProgramOutcome outcome;
+  const ChildResult result =
+      RunChild(options, [&outcome](const std::string& line) { outcome.text += line + "\n"; });
+  outcome.code = result.end == ChildEnd::kExited ? result.exit_status : 128 + result.signal;
+  return outcome;
+}
+
+// Flags that make fit, style and film as small as they go.
+inline std::vector<std::string> TinyFlags() {
+  return {"--photo-size",  "64", "--fit-resolutions", "24", "--fit-steps", "30",
+          "--style-steps", "3",  "--path-frames",     "3",  "--threads",   "2"};
+}
+
+}  // namespace regrade::testing
