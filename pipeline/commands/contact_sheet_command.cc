@@ -88,17 +88,17 @@ struct Scene {
   std::vector<Image> photos;       // of all views that are taught or shown
 };
 
-Scene ReadScene(const std::string& folder, const SheetOptions& sheet, int holdout) {
+Scene ReadScene(const Workspace& workspace, const SheetOptions& sheet, int holdout) {
   Scene scene;
-  scene.capture = ReadCapture(folder + "/poses");
-  scene.stored = ReadFieldFile(folder + "/field.npz");
+  scene.capture = ReadCapture(workspace.Path("poses"));
+  scene.stored = ReadFieldFile(workspace.Path("field.npz"));
   scene.taught = ViewIndices(scene.capture, holdout, false);
   if (scene.taught.empty()) scene.taught = ViewIndices(scene.capture, holdout, true);
   const int count = std::min(sheet.views, static_cast<int>(scene.taught.size()));
   for (int k = 0; k < count; ++k)
     scene.shown.push_back(scene.taught[(2 * static_cast<size_t>(k) + 1) * scene.taught.size() /
                                        (2 * static_cast<size_t>(count))]);
-  const PhotoGains gains = RecordedGains(Workspace(folder), scene.capture);
+  const PhotoGains gains = RecordedGains(workspace, scene.capture);
   for (size_t i = 0; i < scene.capture.views.size(); ++i) {
     const CaptureView& view = scene.capture.views[i];
     scene.cameras.push_back(WorkingCamera(view.camera, sheet.size,
@@ -227,7 +227,9 @@ void RunContactSheet(const Command& command, const Arguments& arguments, Console
   for (size_t i = 1; i < words.size(); ++i) ReadStylePicture(words[i], nullptr);
   ProbeMethod(&settings.style_2d);
 
-  const Scene scene = ReadScene(folder, sheet, settings.run.holdout);
+  Workspace workspace(folder);
+  context.workspace = &workspace;
+  const Scene scene = ReadScene(workspace, sheet, settings.run.holdout);
   const std::string plan = std::to_string(words.size() - 1) + " styles, " +
                            std::to_string(scene.shown.size()) + " views each, learned from " +
                            std::to_string(scene.taught.size()) + " photos at " +

@@ -158,7 +158,8 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
     outcome.figures["bound_at_steps"].Append(trained.history.bounds[i]);
   }
   outcome.figures["slope_ascent"] = trained.slope_ascent;
-  if (object == nullptr)  // a network's promise is about what it alone has made
+  // A network's promise is about what it alone has made, and is measured on voxels.
+  if (object == nullptr && !source.geometry->spheres.on())
     outcome.figures["variance"] =
         VarianceRecord(source, stored.field, trained.network, lessons.views, settings.run.seed);
   outcome.figures["psnr_train_db"] = trained.psnr_db;

@@ -52,7 +52,7 @@ TEST(SceneEffects, LensAboveThresholdStays) {
 
 TEST(SceneEffects, H153_RowsCarryTheNumbersOfTheDecision) {
   const auto rows = ProfileScene(CaptureWithShifts({0.1, -12.3, 3}), 2, "auto").effects;
-  ASSERT_EQ(rows.size(), 5u);
+  ASSERT_EQ(rows.size(), 6u);
   EXPECT_EQ(rows[0].name, "distortion");
   EXPECT_TRUE(rows[0].on);
   EXPECT_NEAR(*rows[0].value.value, 12.3, 1e-9);
@@ -120,11 +120,11 @@ Capture CaptureSeenAllRound(int far) {
 
 // H153, H156: layers where much is far all round, measured, and no trace of them elsewhere.
 TEST(SceneProfile, H153_H156_FarSurroundingsCallForSpheres) {
-  const SceneProfile near = ProfileScene(CaptureSeenAllRound(0), 2, "auto");
+  const SceneProfile near = ProfileScene(CaptureSeenAllRound(0), 2, "exposure=off");
   EXPECT_FALSE(near.scene.box.spheres);
   EXPECT_EQ(near.effects[3].name, "background");
   EXPECT_EQ(*near.effects[3].value.value, 0);
-  const SceneProfile far = ProfileScene(CaptureSeenAllRound(5), 2, "auto");
+  const SceneProfile far = ProfileScene(CaptureSeenAllRound(5), 2, "exposure=off");
   EXPECT_TRUE(far.scene.box.spheres);
   EXPECT_NEAR(*far.effects[3].value.value, 0.2, 1e-12);  // 5 of 25
   // The box is the cube that reaches the cameras, upright along y: 2.02 m are 0.9 of its half.
@@ -132,18 +132,21 @@ TEST(SceneProfile, H153_H156_FarSurroundingsCallForSpheres) {
   EXPECT_NEAR(far.scene.field_from_world.scale, 0.9 / std::hypot(2.0, 0.3), 1e-3);
   EXPECT_NEAR(far.scene.field_from_world.rotation(1, 2), 1, 1e-9);
   // A wish decides, and one that contradicts another is named.
-  EXPECT_FALSE(ProfileScene(CaptureSeenAllRound(5), 2, "background=off").scene.box.spheres);
-  EXPECT_TRUE(ProfileScene(CaptureSeenAllRound(0), 2, "background=on").scene.box.spheres);
-  EXPECT_REGRADE_ERROR(ProfileScene(CaptureSeenAllRound(5), 2, "background=on,alpha=on"),
-                       ExitCode::kUsage, "alpha");
+  EXPECT_FALSE(
+      ProfileScene(CaptureSeenAllRound(5), 2, "background=off,exposure=off").scene.box.spheres);
+  EXPECT_TRUE(
+      ProfileScene(CaptureSeenAllRound(0), 2, "background=on,exposure=off").scene.box.spheres);
+  EXPECT_REGRADE_ERROR(
+      ProfileScene(CaptureSeenAllRound(5), 2, "background=on,alpha=on,exposure=off"),
+      ExitCode::kUsage, "alpha");
 }
 
 // H154: the photos' order has no say.
 TEST(SceneProfile, H154_BackgroundDoesNotKnowThePhotosOrder) {
   Capture capture = CaptureSeenAllRound(2);
-  const double value = *ProfileScene(capture, 2, "auto").effects[3].value.value;
+  const double value = *ProfileScene(capture, 2, "exposure=off").effects[3].value.value;
   std::reverse(capture.points.begin(), capture.points.end());
-  EXPECT_EQ(*ProfileScene(capture, 2, "auto").effects[3].value.value, value);
+  EXPECT_EQ(*ProfileScene(capture, 2, "exposure=off").effects[3].value.value, value);
 }
 
 }  // namespace
