@@ -47,7 +47,7 @@ double PsnrOn(const std::vector<TrainingView>& views, const RadianceField& field
 DegreeTrial TryDegrees(const std::vector<TrainingView>& views, const SceneBox& box,
                        const FitOptions& options, const ProgressFunction& progress,
                        Backend backend) {
-  if (views.size() < kFold) return {std::numeric_limits<double>::infinity()};
+  if (views.size() < kLeastTrialViews) return {std::numeric_limits<double>::infinity()};
   FitOptions small = options;
   const int resolution = std::min(kResolution, options.resolutions.back());
   small.resolutions = {std::max(8, resolution / 2), resolution};

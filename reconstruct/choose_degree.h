@@ -10,6 +10,8 @@ namespace regrade {
 // below what the choice of a seed does.
 inline constexpr double kDegreePays = 0.1;  // dB
 
+inline constexpr int kLeastTrialViews = 10;
+
 struct DegreeTrial {
   double gain_db = 0;  // of `options.sh_degree` over degree 0, on every fifth view
   bool Pays() const { return gain_db > kDegreePays; }
@@ -17,8 +19,9 @@ struct DegreeTrial {
 
 // Fits with the voxels as large in pixels as they will be, for a wrong place that a few pixels
 // of a voxel leave to colours is what view dependence serves, too, even where all surfaces are
-// matte. Free of the number of threads where options.shards is set. Throws as FitField does;
-// fewer than five views: nothing is tried, and it pays.
+// matte. Free of the number of threads where options.shards is set. Throws as FitField does.
+// With fewer than kLeastTrialViews nothing is tried, and it pays: of nine flash photos two were
+// kept, and spoke against a view dependence that the other seven showed.
 DegreeTrial TryDegrees(const std::vector<TrainingView>& views, const SceneBox& box,
                        const FitOptions& options, const ProgressFunction& progress,
                        Backend backend);

@@ -119,6 +119,8 @@ EffectReport ProfileViewDependence(const RunSettings& settings, const FitOptions
   if (wish != wishes.end()) return row(true, 0, "not measured: as asked for");
   if (resume != nullptr)
     return row(resume->grid.basis > 1, 0, "not measured again: as before the interruption");
+  if (views.size() < kLeastTrialViews)
+    return row(true, 0, "not measured: too few photos to keep some from a trial");
   const DegreeTrial trial = TryDegrees(views, box, options, progress, backend);
   return row(trial.Pays(), trial.gain_db,
              "decibels that harmonics of degree " + std::to_string(options.sh_degree) +

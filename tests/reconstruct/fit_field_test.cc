@@ -299,7 +299,7 @@ TEST_F(FitField, ColoursThatChangeWithTheDirectionNeedIt) {
     photos_[i] = RenderViewPlain(shiny, cameras_[i], {0.5f, 1e-4f}).color;
   const DegreeTrial trial = TryDegrees(views_, {}, options_, {}, Backend::kCpu);
   EXPECT_TRUE(trial.Pays()) << trial.gain_db << " dB";
-  views_.resize(4);  // too few to keep one of five
+  views_.resize(kLeastTrialViews - 1);  // too few to judge by those that are kept
   EXPECT_TRUE(TryDegrees(views_, {}, options_, {}, Backend::kCpu).Pays());
 }
 
