@@ -44,7 +44,7 @@ def main():
     parser.add_argument("--kinds", default="ENOSPC,EIO,SHORT")
     options = parser.parse_args()
     regrade, library = os.path.abspath(options.regrade), os.path.abspath(options.library)
-    failures = tried = 0
+    failures = tried = ended = 0
     with tempfile.TemporaryDirectory() as scratch:
         capture, work = os.path.join(scratch, "capture"), os.path.join(scratch, "work")
         style = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "assets", "style_sunset.png")
@@ -91,10 +91,14 @@ def main():
                         now = results(work)
                         problem = f"differs: {sorted(n for n in set(now) | set(expected) if now.get(n) != expected.get(n))[:5]}"
                 tried += 1
+                ended += status == 5
                 if problem:
                     failures += 1
                     print(f"  {kind} at {k} of {count}: {problem}", flush=True)
-    print(f"{tried} runs, {failures} findings")
+    print(f"{tried} runs, {ended} of them ended by the failed write, {failures} findings")
+    if ended == 0 and set(options.kinds.split(",")) != {"SHORT"}:
+        print("no write failed: is the library preloaded?")
+        failures += 1
     return 1 if failures else 0
 
 
