@@ -10,6 +10,9 @@ namespace regrade {
 // below what the choice of a seed does.
 inline constexpr double kDegreePays = 0.1;  // dB
 
+// A judgement, from one capture: of nine flash photos the trial kept two, and these spoke
+// against a view dependence that the other seven showed. How many views make it sure is not
+// measured.
 inline constexpr int kLeastTrialViews = 10;
 
 struct DegreeTrial {
@@ -20,8 +23,7 @@ struct DegreeTrial {
 // Fits with the voxels as large in pixels as they will be, for a wrong place that a few pixels
 // of a voxel leave to colours is what view dependence serves, too, even where all surfaces are
 // matte. Free of the number of threads where options.shards is set. Throws as FitField does.
-// With fewer than kLeastTrialViews nothing is tried, and it pays: of nine flash photos two were
-// kept, and spoke against a view dependence that the other seven showed.
+// With fewer than kLeastTrialViews nothing is tried, and it pays.
 DegreeTrial TryDegrees(const std::vector<TrainingView>& views, const SceneBox& box,
                        const FitOptions& options, const ProgressFunction& progress,
                        Backend backend);
