@@ -32,6 +32,7 @@ class CudaFitEngine : public FitEngine {
   Vec3i resolution() const override { return grid_.frame.resolution; }
 
   void Step(const FitStep& step) override {
+    const DeviceRange range("step of a fit");
     if (!fitter_ || march_.step != step.march.step ||
         march_.stop_transmittance != step.march.stop_transmittance) {
       march_ = step.march;
@@ -70,6 +71,7 @@ class CudaFitEngine : public FitEngine {
 
   void Refine(const MarchOptions& march, float threshold, const Vec3i& resolution,
               int) override {
+    const DeviceRange range("pruning and resampling");
     DeviceBuffer<float> weights(grid_.num_voxels(), "weights of voxels");
     weights.Zero();
     constexpr int kStride = 2;  // every other row and column of a view

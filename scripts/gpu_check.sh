@@ -4,14 +4,16 @@
 #   gpu_check.sh bundle DIR [FILE.npz...]   on the machine that builds: the programs for sm_90 (REGRADE_CUDA_ARCH says
 #                                           otherwise), the libraries they need beyond glibc, and packed captures
 #   gpu_check.sh run DIR [OUT]              on the machine with the GPU, which needs a CUDA driver and nothing else;
-#                                           with compute-sanitizer on its PATH, small scenes run under its four tools
+#                                           with compute-sanitizer on its PATH, small scenes run under its four tools,
+#                                           with ncu, the kernels of one small fit, restyling and frame are measured
 #
+# REGRADE_RECIPES="standard" leaves the paper's recipes out.
 # `run` prints the parity table, fits each packed capture (by the settings below that bear its name, or the last ones),
 # restyles the field by both recipes if the capture was packed with a style, and leaves one JSON file, OUT/gpu_check.json (default: DIR). Exit status 1 if a tolerance is missed or a sanitizer finds anything.
 set -euo pipefail
 exec </dev/null
 
-usage() { sed -n '2,12s/^# \{0,1\}//p' "${BASH_SOURCE[0]}" >&2; exit 2; }
+usage() { sed -n '2,14s/^# \{0,1\}//p' "${BASH_SOURCE[0]}" >&2; exit 2; }
 [[ $# -ge 2 ]] || usage
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 mkdir -p "$2"
@@ -45,6 +47,29 @@ settings_of() {
   esac
 }
 
+# What each kernel moves and does, of a small fit of a capture packed with a style: bytes of memory and of the second
+# cache, instructions of warps, those of the tensor cores among them.
+measure_kernels() {
+  local capture=$1 field=$2/kernels_field.npz
+  local metrics=gpu__time_duration.sum,dram__bytes.sum,lts__t_bytes.sum,smsp__inst_executed.sum
+  metrics+=,sm__inst_executed_pipe_tensor.sum,sm__warps_active.avg.pct_of_peak_sustained_active
+  local fit="fit --capture $capture --fit-resolutions 128,256 --fit-rays 16384 --fit-steps"
+  local profile="ncu --clock-control none --csv --metrics $metrics"
+  # shellcheck disable=SC2086  # words
+  "$dir/regrade_gpu" $fit 600,600 --field "$field" >/dev/null 2>&1 || return 1
+  # The last steps of the finer grid: every kernel of a step once.
+  # shellcheck disable=SC2086
+  $profile -k 'regex:FitRays|StepKernel|TotalVariation|DrawKernel' --launch-skip 2000 --launch-count 4 \
+    "$dir/regrade_gpu" $fit 600,600 | grep '^"'
+  # shellcheck disable=SC2086
+  $profile -k 'regex:MarchWeights|GatherRows|ForwardKernel|AdjointRows|OuterProducts|Blend|ColorLoss|AssignSlots' --launch-skip 100 --launch-count 12 \
+    "$dir/regrade_gpu" style --capture "$capture" --field "$field" --style-steps 30 | grep '^"'
+  # shellcheck disable=SC2086
+  $profile -k 'regex:RenderRays' --launch-skip 20 --launch-count 1 \
+    "$dir/regrade_gpu" render --capture "$capture" --field "$field" | grep '^"'
+  rm -f "$field"
+}
+
 run() {
   local out=${1:-$dir} status=0 name
   mkdir -p "$out"
@@ -70,6 +95,12 @@ run() {
       echo "$tool: $(tail -1 "$out/$tool.txt")"
     done
   fi
+  if command -v ncu >/dev/null; then
+    for capture in "$dir"/*.npz; do
+      [[ ! -e $capture ]] || measure_kernels "$capture" "$out" >"$out/kernels.txt" 2>&1 || status=1
+      break
+    done
+  fi
   for capture in "$dir"/*.npz; do
     [[ -e $capture ]] || continue
     name=$(basename "$capture" .npz)
@@ -83,7 +114,7 @@ run() {
       echo "$name: the fit failed"
       continue
     fi
-    for recipe in standard paper letter; do  # letter: every voxel at every step, ten steps of it
+    for recipe in ${REGRADE_RECIPES:-standard paper letter}; do  # letter: every voxel at every step, ten steps of it
       local options="--recipe $recipe"
       [[ $recipe == letter ]] && options="--recipe paper --style-every-voxel --style-steps 10"
       # shellcheck disable=SC2086  # options are words

@@ -49,6 +49,7 @@ class DeviceStyleLoss : public StyleLoss {
 
   AggregationResult Run(const LipschitzNetwork& network, const StyleRays& batch,
                         std::vector<double>* gradient) override {
+    const DeviceRange range("loss of a step of the style");
     AggregationResult result = Touch(network, batch);
     const MlpPrecision precision =
         gradient != nullptr ? MlpPrecision::kTensor : MlpPrecision::kSplit;
@@ -206,6 +207,7 @@ std::unique_ptr<StyleLoss> MakeDeviceStyleLoss(const DeviceGrid* grid,
 
 void RestyleOnDevice(const LipschitzNetwork& network, DeviceGrid* grid) {
   REGRADE_CHECK(!grid->fitting);
+  const DeviceRange range("restyling the field");
   constexpr int64_t kChunk = 1 << 20;  // voxels; 256 MiB of features and results
   const int64_t n = grid->num_voxels();
   DeviceBuffer<float> features(std::min(n, kChunk) * kRowLanes, "features of voxels");

@@ -1,6 +1,10 @@
 #include "kernels/base/device_memory.h"
 #include "kernels/base/error.h"
 
+#if defined(__CUDACC__)
+#include <nvtx3/nvToolsExt.h>
+#endif
+
 namespace regrade {
 
 #if defined(__CUDACC__)
@@ -57,6 +61,9 @@ void* DeviceAllocate(int64_t bytes, const char* what) {
 
 void DeviceFree(void* pointer) noexcept { cudaFree(pointer); }
 
+DeviceRange::DeviceRange(const char* name) { nvtxRangePushA(name); }
+DeviceRange::~DeviceRange() { nvtxRangePop(); }
+
 void DeviceCopyIn(void* device, const void* host, int64_t bytes) {
   if (bytes > 0)
     Require(cudaMemcpy(device, host, static_cast<size_t>(bytes), cudaMemcpyHostToDevice),
@@ -96,6 +103,9 @@ void CheckLaunch(const char* kernel) {
 }
 
 #else
+
+DeviceRange::DeviceRange(const char*) {}
+DeviceRange::~DeviceRange() = default;
 
 namespace {
 [[noreturn]] void NoDevice() {

@@ -39,6 +39,15 @@ void DeviceWait(const char* what);
 // name.
 void CheckLaunch(const char* kernel);
 
+// A stretch of work with a name, which Nsight shows (NVTX); nothing without a profiler.
+class DeviceRange {
+ public:
+  explicit DeviceRange(const char* name);
+  ~DeviceRange();
+  DeviceRange(const DeviceRange&) = delete;
+  DeviceRange& operator=(const DeviceRange&) = delete;
+};
+
 // Owner of trivially copyable values on the device. Contents are undefined until written.
 template <typename T>
 class DeviceBuffer {

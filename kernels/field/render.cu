@@ -1,7 +1,7 @@
 // Plain rendering: one body a pixel, on either processor.
-#include <algorithm>
 #include <vector>
 
+#include "kernels/field/finish_pixel.h"
 #include "kernels/field/ray_loss.h"
 #include "kernels/field/render.h"
 
@@ -24,14 +24,6 @@ struct RenderPixel {
   }
 };
 
-// Depth along the optical axis of the point at `length` along a ray in NDC. Infinity is set at
-// z = 1e4 near planes.
-float NdcDepth(const Camera& camera, const Ray& ray, float length) {
-  Vec3d p = (ray.origin + ray.direction * length).Cast<double>();
-  p.z = std::min(p.z, 1 - 2e-4);
-  return static_cast<float>((camera.camera_from_world * WorldFromNdc(camera.ndc, p)).z);
-}
-
 }  // namespace
 
 RenderedView RenderViewPlain(const RadianceField& field, const Camera& camera,
@@ -51,20 +43,12 @@ RenderedView RenderViewPlain(const RadianceField& field, const Camera& camera,
 }
 
 void FinishView(const Camera& camera, const std::vector<Ray>& rays, RenderedView* view) {
-  const Vec3f forward = camera.Forward().Cast<float>();
+  const FinishPixel finish(camera);
   for (size_t i = 0; i < rays.size(); ++i) {
-    for (int c = 0; c < 3; ++c) {
-      float& value = view->color.pixels[3 * i + c];
-      value = std::clamp(value, 0.0f, 1.0f);
-    }
-    const float opaque = 1.0f - view->transmittance.pixels[i];
-    float& depth = view->depth.pixels[i];
-    if (!(opaque >= 0.5f))
-      depth = 0;
-    else if (camera.ndc.on())
-      depth = NdcDepth(camera, rays[i], depth / opaque);
-    else
-      depth = depth / opaque * Dot(rays[i].direction, forward);
+    float* pixel = &view->color.pixels[3 * i];
+    Vec3f color{pixel[0], pixel[1], pixel[2]};
+    finish(rays[i], view->transmittance.pixels[i], &color, &view->depth.pixels[i]);
+    for (int c = 0; c < 3; ++c) pixel[c] = color[c];
   }
 }
 

@@ -78,8 +78,10 @@ void FitPacked(const FitPackedOptions& settings, const FitOptions& options) {
   if (hooks.keep_field) {
     WriteFieldFile(settings.field,
                    {fit.field, capture.scene.field_from_world, capture.scene.ndc});
-    if (backend == Backend::kCuda)
-      render = RenderPrices(UploadGrid(MakeFastGrid(fit.field)), capture, options.step);
+    if (backend == Backend::kCuda) {
+      const DeviceGrid grid = UploadGrid(MakeFastGrid(fit.field));
+      render = RenderPrices(grid, capture, options.step);
+    }
   }
 
   JsonValue::Array curve;

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "kernels/base/options.h"
-#include "kernels/field/device/device_grid.h"
+#include "kernels/field/device/half_grid.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/packed_capture.h"
 #include "reconstruct/fit_options.h"
@@ -41,12 +41,35 @@ struct StylePackedOptions {
   }
 };
 
-// Milliseconds of a held-out view's kernel, rays on the device already: the median of all.
+struct RenderPackedOptions {
+  std::string capture;  // packed
+  std::string field;    // .npz
+  std::string frames;   // folder for pictures; empty: none
+
+  template <typename Bind>
+  void Describe(Bind& bind) {
+    bind("capture", capture, {.help = "a file of `regrade pack`, for its held-out cameras"});
+    bind("field", field, {.help = "an .npz file with svox2's layout"});
+    bind("frames", frames, {.help = "a folder for .ppm pictures of the held-out views"});
+  }
+};
+
+// Milliseconds from a held-out view's camera (through a lens without distortion) to its pixels
+// on the device: the median of all.
 double RenderMilliseconds(const DeviceGrid& grid, const PackedCapture& capture,
-                          const MarchOptions& march, float opacity_step = 0);
+                          const MarchOptions& march, float opacity_step = 0,
+                          const HalfGrid* half = nullptr);
 // The same for a row of settings of the march and of opacity_step: milliseconds, and the error
 // against the first in dB.
 JsonValue RenderPrices(const DeviceGrid& grid, const PackedCapture& capture, float step);
+
+// The held-out views, exact, as pictures NAME_0.ppm, NAME_1.ppm, ...
+void RenderHeldOut(const DeviceGrid& grid, const PackedCapture& capture,
+                   const MarchOptions& march, const std::string& folder,
+                   const std::string& name);
+
+// Prints one line of JSON: what frames of a field cost at which accuracy.
+void RenderPacked(const RenderPackedOptions& settings);
 
 // MKL on each view, then the network; prints one line of JSON: times of the parts, what was
 // learned, device memory beyond the field.

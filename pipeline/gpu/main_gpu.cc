@@ -19,7 +19,11 @@ constexpr char kUsage[] =
     "       regrade_gpu fit --capture FILE [OPTIONS]   a field from a file of `regrade pack`\n"
     "       regrade_gpu style --capture FILE --field FILE [OPTIONS]\n"
     "                                                that field in the colours of the file's "
-    "style picture\n";
+    "style picture\n"
+    "       regrade_gpu render --capture FILE --field FILE\n"
+    "                                                what frames of it cost, and what "
+    "exactness "
+    "costs\n";
 
 void PrintDevice() {
   const DeviceStatus status = ReadDeviceStatus();
@@ -42,6 +46,7 @@ bool Run(const std::vector<std::string>& arguments) {
   FitPackedOptions fit_packed;
   FitOptions fit;
   StylePackedOptions style_packed;
+  RenderPackedOptions render_packed;
   TrainNetworkOptions network;
   OptionSet options;
   if (command == "fit") {
@@ -51,6 +56,8 @@ bool Run(const std::vector<std::string>& arguments) {
     ApplyStyleRecipe(RecipeOf(rest), &network);
     options.Add("Capture", &style_packed);
     options.Add("Network", &network);
+  } else if (command == "render") {
+    options.Add("Capture", &render_packed);
   } else if (command == "device") {
     PrintDevice();
     return true;
@@ -66,6 +73,8 @@ bool Run(const std::vector<std::string>& arguments) {
   options.ApplyFlags();
   if (command == "fit")
     FitPacked(fit_packed, fit);
+  else if (command == "render")
+    RenderPacked(render_packed);
   else
     StylePacked(style_packed, network);
   return true;

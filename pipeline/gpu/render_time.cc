@@ -26,23 +26,20 @@ double Median(std::vector<double> values) {
 }  // namespace
 
 double RenderMilliseconds(const DeviceGrid& grid, const PackedCapture& capture,
-                          const MarchOptions& march, float opacity_step) {
+                          const MarchOptions& march, float opacity_step, const HalfGrid* half) {
   std::vector<double> milliseconds;
   for (const PackedView& view : capture.views) {
     if (!view.held_out) continue;
-    Buffer<Ray> rays(view.photo.num_pixels());
-    for (int y = 0; y < view.camera.height; ++y)
-      for (int x = 0; x < view.camera.width; ++x)
-        rays[int64_t{y} * view.camera.width + x] = view.camera.PixelRay(x, y);
-    const int64_t n = rays.size();
-    const DeviceBuffer<Ray> device_rays = DeviceBuffer<Ray>::Of(rays, "rays");
+    const Camera camera = view.camera.Undistorted();
+    const int64_t n = view.photo.num_pixels();
     DeviceBuffer<Vec3f> color(n, "colours");
     DeviceBuffer<float> depth(n, "depths"), transmittance(n, "transmittances");
     for (int repeat = 0; repeat < 6; ++repeat) {
       DeviceWait("rendering");
       const auto start = Clock::now();
-      RenderOnDevice(grid, device_rays.data(), n, march,
-                     {color.data(), depth.data(), transmittance.data()}, opacity_step);
+      RenderFrameOnDevice(grid, camera, march,
+                          {color.data(), depth.data(), transmittance.data()}, opacity_step,
+                          half);
       DeviceWait("rendering");
       if (repeat > 0) milliseconds.push_back(1e3 * SecondsSince(start));
     }
@@ -52,21 +49,31 @@ double RenderMilliseconds(const DeviceGrid& grid, const PackedCapture& capture,
 
 JsonValue RenderPrices(const DeviceGrid& grid, const PackedCapture& capture, float step) {
   struct Setting {
-    float stop, opacity_step;
+    float stop, opacity_step, step;
+    bool half;
   };
-  const Setting settings[] = {{1e-4f, 0},          {1e-3f, 0},          {1e-2f, 0},
-                              {1e-3f, 1.0f / 256}, {1e-3f, 1.0f / 128}, {1e-3f, 1.0f / 64},
-                              {1e-3f, 1.0f / 32},  {1e-2f, 1.0f / 64}};
+  const float coarse = 2 * step;
+  const Setting settings[] = {
+      {1e-4f, 0, step, false},          {1e-3f, 0, step, false},
+      {1e-2f, 0, step, false},          {1e-3f, 1.0f / 256, step, false},
+      {1e-3f, 1.0f / 128, step, false}, {1e-3f, 1.0f / 64, step, false},
+      {1e-3f, 1.0f / 32, step, false},  {1e-2f, 1.0f / 64, step, false},
+      {1e-3f, 0, coarse, false},        {1e-4f, 0, step, true},
+      {1e-3f, 0, step, true},           {1e-3f, 1.0f / 64, step, true},
+      {1e-2f, 1.0f / 64, step, true},   {1e-2f, 1.0f / 32, step, true},
+      {1e-3f, 0, coarse, true},         {1e-2f, 1.0f / 64, coarse, true}};
+  const HalfGrid half = MakeHalfGrid(grid);
   std::vector<Image> exact;
   JsonValue::Array rows;
   for (const Setting& setting : settings) {
-    const MarchOptions march{step, setting.stop};
+    const MarchOptions march{setting.step, setting.stop};
+    const HalfGrid* halves = setting.half ? &half : nullptr;
     std::vector<double> against_exact, against_photo;
     size_t index = 0;
     for (const PackedView& view : capture.views) {
       if (!view.held_out) continue;
       const Image image =
-          RenderViewOnDevice(grid, view.camera, march, setting.opacity_step).color;
+          RenderViewOnDevice(grid, view.camera, march, setting.opacity_step, halves).color;
       if (rows.empty()) exact.push_back(image);
       against_exact.push_back(Psnr(image, exact[index++]).value_or(0));
       against_photo.push_back(Psnr(image, view.photo).value_or(0));
@@ -74,7 +81,9 @@ JsonValue RenderPrices(const DeviceGrid& grid, const PackedCapture& capture, flo
     rows.push_back(JsonValue::Object{
         {"stop", setting.stop},
         {"opacity_step", setting.opacity_step},
-        {"ms", RenderMilliseconds(grid, capture, march, setting.opacity_step)},
+        {"step", setting.step},
+        {"half", setting.half},
+        {"ms", RenderMilliseconds(grid, capture, march, setting.opacity_step, halves)},
         {"db_against_first", rows.empty() ? 0.0 : Median(against_exact)},
         {"db_against_photos", Median(against_photo)}});
   }

@@ -1,10 +1,7 @@
 // regrade_gpu style: a packed capture's field learns the colours of its style picture.
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <cstdio>
-#include <filesystem>
-#include <fstream>
 #include <numeric>
 
 #include "kernels/base/error.h"
@@ -38,14 +35,6 @@ class Stopwatch {
   Clock::time_point last_ = Clock::now();
 };
 
-void WritePpm(const std::string& path, const Image& image) {
-  std::ofstream file(path, std::ios::binary);
-  file << "P6\n" << image.width << " " << image.height << "\n255\n";
-  for (const float value : image.pixels)
-    file.put(static_cast<char>(std::lround(255 * std::clamp(value, 0.0f, 1.0f))));
-  if (!file) throw Error(ExitCode::kResources, "cannot be written", path, "is the disk full?");
-}
-
 // What the 2D method made of the views that the field was fitted to.
 struct Lessons {
   std::vector<Image> targets;
@@ -69,17 +58,6 @@ Lessons StyleViews(const PackedCapture& capture) {
   const MklMap mkl = ComputeMkl(Pool(before), Pool(after));
   lessons.scene_map = {mkl.map, mkl.norm};
   return lessons;
-}
-
-void RenderHeldOut(const DeviceGrid& grid, const PackedCapture& capture,
-                   const MarchOptions& march, const std::string& folder,
-                   const std::string& name) {
-  std::filesystem::create_directories(folder);
-  int index = 0;
-  for (const PackedView& view : capture.views)
-    if (view.held_out)
-      WritePpm(folder + "/" + name + "_" + std::to_string(index++) + ".ppm",
-               RenderViewOnDevice(grid, view.camera, march).color);
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include "kernels/field/device/device_rays.h"
 #include "kernels/field/fast_rays.h"
 #include "kernels/field/ray_loss.h"
+#include "kernels/field/render.h"
 #include "kernels/field/total_variation.h"
 #include "kernels/scene/device_views.h"
 #include "tests/support/double_field.h"
@@ -97,6 +98,113 @@ TEST_P(DeviceParity, Render) {
         1e-4);  // a sample more or less at the stop
     Row("depth", basis(), "plain float", depth_error, 1e-4);
   }
+}
+
+Camera SmallCamera(bool ndc) {
+  Camera camera;
+  camera.width = 37;
+  camera.height = 29;
+  camera.fx = camera.fy = 40;
+  camera.cx = 18;
+  camera.cy = 15;
+  camera.camera_from_world.translation = {0.1, -0.05, ndc ? 0.0 : 2.5};
+  if (ndc) camera.ndc = {2 * 40.0 / 37, 2 * 40.0 / 29};
+  return camera;
+}
+
+// Frames are what the plain body shows, pixel for pixel; in half precision, what is lost stays
+// below half a step of an 8-bit picture: values up to 1 are rounded by 2^-12, nine of them and
+// the density enter a colour.
+TEST_P(DeviceParity, Frame) {
+  const RadianceField field = RandomField({33, 27, 41}, basis(), 0.5, 31);
+  const DeviceGrid grid = UploadGrid(MakeFastGrid(field));
+  const HalfGrid half = MakeHalfGrid(grid);
+  ASSERT_EQ(half.empty(), basis() != 9);
+  for (const bool ndc : {false, true}) {
+    const Camera camera = SmallCamera(ndc);
+    const MarchOptions options{0.5f, 1e-4f};
+    const RenderedView plain = RenderViewPlain(field, camera, options);
+    double error = 0, depth_error = 0, half_error = 0, seen = 0;
+    const RenderedView view = RenderViewOnDevice(grid, camera, options);
+    const RenderedView halved = RenderViewOnDevice(grid, camera, options, 0, &half);
+    for (size_t i = 0; i < plain.color.pixels.size(); ++i) {
+      const double value = plain.color.pixels[i];
+      error = std::max(error, std::abs(double{view.color.pixels[i]} - value));
+      half_error = std::max(half_error, std::abs(double{halved.color.pixels[i]} - value));
+    }
+    for (size_t i = 0; i < plain.depth.pixels.size(); ++i) {
+      seen += plain.depth.pixels[i] > 0;
+      // Relative: an NDC ray's depths go to infinity.
+      depth_error =
+          std::max(depth_error, std::abs(double{view.depth.pixels[i]} - plain.depth.pixels[i]) /
+                                    std::max(1.0f, plain.depth.pixels[i]));
+    }
+    ASSERT_GT(seen, 100);
+    Row("frame", basis(), ndc ? "plain float, NDC" : "plain float", error, 2e-5);
+    Row("depth of a frame", basis(), ndc ? "plain float, NDC" : "plain float", depth_error,
+        1e-3);
+    Row("frame in half precision", basis(), ndc ? "plain float, NDC" : "plain float",
+        half_error, 0.5 / 255);
+  }
+}
+
+// Pruned and resampled voxels against the rule told one vertex at a time.
+TEST_P(DeviceParity, Resample) {
+  const RadianceField field = RandomField({9, 7, 11}, basis(), 0.4, 61);
+  const FastGrid before = MakeFastGrid(field);
+  const DeviceGrid grid = UploadGrid(before, true);
+  Buffer<float> weights(before.num_voxels());
+  for (int64_t v = 0; v < weights.size(); ++v)
+    weights[v] = static_cast<float>(testing::Uniform(5, static_cast<uint64_t>(v), 0, 1));
+  const float threshold = 0.93f;
+  const Vec3i resolution{18, 13, 23};
+  const DeviceGrid next = ResampleOnDevice(grid, DeviceBuffer<float>::Of(weights, "weights"),
+                                           threshold, resolution);
+  const FastGrid after = DownloadGrid(next);
+  const Vec3i n = before.frame.resolution;
+  const auto kept = [&](int x, int y, int z) {
+    for (int i = std::max(x - 1, 0); i <= std::min(x + 1, n.x - 1); ++i)
+      for (int j = std::max(y - 1, 0); j <= std::min(y + 1, n.y - 1); ++j)
+        for (int k = std::max(z - 1, 0); k <= std::min(z + 1, n.z - 1); ++k) {
+          const int32_t link = before.links[before.frame.Vertex(i, j, k)];
+          if (link >= 0 && weights[link] >= threshold) return true;
+        }
+    return false;
+  };
+  const Vec3f scale = after.frame.Scale(), offset = after.frame.Offset();
+  const Vec3f old_scale = before.frame.Scale(), old_offset = before.frame.Offset();
+  int64_t stored = 0, missing = 0;
+  double off = 0;
+  std::vector<bool> numbers(static_cast<size_t>(after.num_voxels()));
+  for (int x = 0; x < resolution.x; ++x)
+    for (int y = 0; y < resolution.y; ++y)
+      for (int z = 0; z < resolution.z; ++z) {
+        Vec3f p{static_cast<float>(x), static_cast<float>(y), static_cast<float>(z)};
+        for (int a = 0; a < 3; ++a)
+          p[a] = std::clamp((p[a] - offset[a]) / scale[a] * old_scale[a] + old_offset[a], 0.0f,
+                            static_cast<float>(n[a] - 1));
+        const int32_t link = after.links[after.frame.Vertex(x, y, z)];
+        const bool keep =
+            kept(static_cast<int>(std::lround(p.x)), static_cast<int>(std::lround(p.y)),
+                 static_cast<int>(std::lround(p.z)));
+        ASSERT_EQ(link >= 0, keep) << x << " " << y << " " << z;
+        missing += !keep;
+        if (!keep) continue;
+        ++stored;
+        ASSERT_LT(link, after.num_voxels());
+        ASSERT_FALSE(numbers[static_cast<size_t>(link)]);
+        numbers[static_cast<size_t>(link)] = true;
+        std::vector<float> expected(static_cast<size_t>(before.lanes()));
+        Interpolate(before.frame, before.links.data(), before.records.data(), before.lanes(),
+                    before.lanes(), LocateCell(before.frame, p), expected.data());
+        for (int k = 0; k <= DensityLane(basis()); ++k)
+          off = std::max(off, std::abs(double{after.records[link * after.lanes() + k]} -
+                                       double{expected[static_cast<size_t>(k)]}));
+      }
+  ASSERT_EQ(stored, after.num_voxels());
+  ASSERT_GT(stored, 100);
+  ASSERT_GT(missing, 100);
+  Row("resampled voxels", basis(), "plain float", off, 1e-5);
 }
 
 // Float gradients against the plain adjoint in double: 1e-4 of the largest entry, as for the

@@ -48,70 +48,38 @@ __device__ inline void AddQuad(float* target, const float4& v) {
 #endif
 }
 
-// Four neighbouring values of a record, as one lane adds them: d / d value = sum_c of[c]
-// d_raw[c] + density d_sigma.
-template <int kBasis>
-struct QuadValues {
-  static constexpr int kQuads = RecordLanes(kBasis) / 4;  // lanes a record
-  float of[3][4] = {};
-  float density[4] = {};
-
-  __device__ QuadValues(int lane, const Vec3f& direction) {
-    float basis[kMaxBasis];
-    ShBasis(kBasis, direction, basis);
-#pragma unroll
-    for (int index = 0; index <= DensityLane(kBasis); ++index) {
-      if (index / 4 != lane % kQuads) continue;
-      if (index == DensityLane(kBasis))
-        density[index % 4] = 1;
-      else
-        of[index / kBasis][index % 4] = basis[index % kBasis];
-    }
-  }
-  __device__ float At(int q, float weight, const Vec3f& d_raw, float d_sigma) const {
-    return weight * (of[0][q] * d_raw.x + of[1][q] * d_raw.y + of[2][q] * d_raw.z +
-                     density[q] * d_sigma);
-  }
-};
-
 // Adds the gradients of `count` samples, the i-th of them held by lane i, to the corners'
-// records.
+// records: d / d value = sum_c of[c] d_raw[c] + density d_sigma.
 template <int kBasis>
-__device__ void ScatterChunk(const DeviceGridView& grid, const QuadValues<kBasis>& values,
+__device__ void ScatterChunk(const DeviceGridView& grid, const LaneValues<kBasis>& values,
                              const float4& place, const Vec3f& d_raw, float d_sigma, int count,
                              const GradientView& gradient, int lane) {
-  constexpr int kLanes = RecordLanes(kBasis), kQuads = QuadValues<kBasis>::kQuads;
-  constexpr int kRecords = 32 / kQuads;                      // that one instruction adds to
-  constexpr int kParts = kRecords < 8 ? 8 / kRecords : 1;    // instructions a sample
-  constexpr int kSamples = kRecords > 8 ? kRecords / 8 : 1;  // samples an instruction
-  const int unit = lane / kQuads;
-  for (int s = 0; s < count; s += kTurn) {
-    const int source = s + (lane >> 3) < count ? s + (lane >> 3) : -1;
-    const int from = source & 31;
+  using Layout = RecordLayout<kBasis>;
+  float* mine = gradient.gradient + lane % Layout::kGroup * Layout::kValues;
+  for (int s = 0; s < count; s += Layout::kSamples) {
+    const int source = s + lane / Layout::kGroup, from = source & 31;
+    const bool valid = source < count;
     const int vertex = __shfl_sync(kAllLanes, __float_as_int(place.x), from);
     const Vec3f fraction{__shfl_sync(kAllLanes, place.y, from),
                          __shfl_sync(kAllLanes, place.z, from),
                          __shfl_sync(kAllLanes, place.w, from)};
-    const TurnCorner corner(grid, vertex, fraction, source, lane);
-    if (corner.link >= 0) Touch(gradient.touched, corner.link);
+    const Vec3f d{__shfl_sync(kAllLanes, d_raw.x, from), __shfl_sync(kAllLanes, d_raw.y, from),
+                  __shfl_sync(kAllLanes, d_raw.z, from)};
+    const float d_density = __shfl_sync(kAllLanes, d_sigma, from);
+    float own[Layout::kValues];
 #pragma unroll
-    for (int j = 0; j < kTurn; j += kSamples) {
-      const int mine = j + (kSamples > 1 ? unit / 8 : 0);
-      const int owner = (s + mine) & 31;
-      const Vec3f d{__shfl_sync(kAllLanes, d_raw.x, owner),
-                    __shfl_sync(kAllLanes, d_raw.y, owner),
-                    __shfl_sync(kAllLanes, d_raw.z, owner)};
-      const float d_density = __shfl_sync(kAllLanes, d_sigma, owner);
+    for (int i = 0; i < Layout::kValues; ++i)
+      own[i] = values.of[0][i] * d.x + values.of[1][i] * d.y + values.of[2][i] * d.z +
+               values.density[i] * d_density;
+    const GroupLinks<Layout::kGroup> links(GridSpace(grid), vertex, valid, lane);
+    links.ForEachOwn([&](int32_t link) { Touch(gradient.touched, link); });
 #pragma unroll
-      for (int part = 0; part < kParts; ++part) {
-        const int k = (unit & 7) + kRecords * part;
-        const int32_t link = __shfl_sync(kAllLanes, corner.link, 8 * mine + k);
-        const float weight = __shfl_sync(kAllLanes, corner.weight, 8 * mine + k);
-        if (link < 0) continue;
-        AddQuad(&gradient.gradient[link * grid.stride + 4 * (lane % kQuads)],
-                {values.At(0, weight, d, d_density), values.At(1, weight, d, d_density),
-                 values.At(2, weight, d, d_density), values.At(3, weight, d, d_density)});
-      }
+    for (int k = 0; k < 8; ++k) {
+      const int32_t link = links.Of(k);
+      if (link < 0) continue;
+      const float weight = CornerWeight(fraction, k);
+      AddQuad(mine + link * grid.stride,
+              {weight * own[0], weight * own[1], weight * own[2], weight * own[3]});
     }
   }
 }
@@ -120,7 +88,7 @@ __device__ void ScatterChunk(const DeviceGridView& grid, const QuadValues<kBasis
 // alpha_i) R_{i+1} is a chain of maps x -> b + a x; 32 of them are composed by a scan, and as
 // all a and b are positive nothing cancels.
 template <int kBasis>
-__device__ void WalkBack(const DeviceGridView& grid, const QuadValues<kBasis>& values,
+__device__ void WalkBack(const DeviceGridView& grid, const LaneValues<kBasis>& values,
                          const SampleStore& store, int count, float delta, const Vec3f& d_color,
                          const GradientView& gradient, int lane) {
   Vec3f behind = grid.background;
@@ -178,6 +146,7 @@ __global__ void FitRaysKernel(DeviceGridView grid, const Ray* rays, const Vec3f*
                               MarchOptions options, float scale, GradientView gradient,
                               float* store_memory, int64_t capacity, int32_t* next_ray,
                               DeviceFitSums* sums) {
+  using Layout = RecordLayout<kBasis>;
   const int lane = static_cast<int>(threadIdx.x & 31);
   const int64_t warp = (blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x) / 32;
   float* mine = store_memory + warp * capacity * kFloatsPerSample;
@@ -191,33 +160,47 @@ __global__ void FitRaysKernel(DeviceGridView grid, const Ray* rays, const Vec3f*
     r = __shfl_sync(kAllLanes, r, 0);
     if (r >= n) break;
     const Ray ray = rays[r];
-    const WarpRecord<kBasis> record(lane, ray.direction);
-    WarpMarch march(grid, ray, options);
+    float basis[kMaxBasis];
+    ShBasis(kBasis, ray.direction, basis);
+    const LaneValues<kBasis> values(lane, basis);
+    WarpMarch<> march(grid, ray, options);
     LaneSample sample;
     unsigned composited;
     Vec3f color{};
-    int count = 0;
+    int count = 0, shaded = 0;
+    // A sample of those that the store holds from `shaded` on for each group of lanes.
+    const auto shade = [&] {
+      const int at = shaded + lane / Layout::kGroup;
+      const bool valid = at < count;
+      const float4 place = valid ? store.place[at] : float4{};
+      const Vec3f raw = RawColor(grid, values, __float_as_int(place.x),
+                                 {place.y, place.z, place.w}, valid, lane);
+      shaded += Layout::kSamples;
+      if (!valid || lane % Layout::kGroup != 0) return;
+      const float tau = store.raw_tau[at].w, w = store.before[at] * Opacity(tau);
+      store.raw_tau[at] = {raw.x, raw.y, raw.z, tau};
+      for (int c = 0; c < 3; ++c) color[c] += w * fmaxf(raw[c], 0.0f);
+    };
     while (march.Next(&sample, &composited)) {
-      const Vec3f raw = RawColors<kBasis>(grid, record, sample, composited, lane);
       if (sample.tau > 0) {
-        const float w = sample.transmittance_before * Opacity(sample.tau);
-        for (int c = 0; c < 3; ++c) color[c] += w * fmaxf(raw[c], 0.0f);
         const int at = count + __popc(composited & ((1u << lane) - 1));
         const Vec3f& f = sample.cell.fraction;
         store.place[at] = {__int_as_float(sample.cell.vertex), f.x, f.y, f.z};
-        store.raw_tau[at] = {raw.x, raw.y, raw.z, sample.tau};
+        store.raw_tau[at].w = sample.tau;
         store.before[at] = sample.transmittance_before;
       }
       count += __popc(composited);
+      __syncwarp();  // written by some lanes, read by others
+      while (count - shaded >= Layout::kSamples) shade();
     }
+    if (count > shaded) shade();
     const float left = expf(-march.optical_depth());
     Vec3f error;
     for (int c = 0; c < 3; ++c)
       error[c] = WarpSum(color[c]) + grid.background[c] * left - targets[r][c];
     squared_error += static_cast<double>(Dot(error, error));
     samples += static_cast<unsigned>(count);
-    __syncwarp();  // the store was written by all lanes and is read by others now
-    const QuadValues<kBasis> values(lane, ray.direction);
+    __syncwarp();  // colours were written by some lanes and are read by others now
     WalkBack<kBasis>(grid, values, store, count, march.delta(), error * (2 * scale), gradient,
                      lane);
   }

@@ -5,16 +5,19 @@
 namespace regrade {
 
 DeviceGridView DeviceGrid::view() const {
-  return {frame,
-          links.data(),
-          dense_density.data(),
-          empty_distance.data(),
-          vertex_of_voxel.data(),
-          records.data(),
-          stride(),
-          static_cast<int32_t>(num_voxels()),
-          background,
-          near_clip};
+  return {
+      frame,
+      links.data(),
+      dense_density.data(),
+      empty_distance.data(),
+      vertex_of_voxel.data(),
+      records.data(),
+      stride(),
+      static_cast<int32_t>(num_voxels()),
+      background,
+      near_clip,
+      {static_cast<float>(frame.resolution.x - 1), static_cast<float>(frame.resolution.y - 1),
+       static_cast<float>(frame.resolution.z - 1)}};
 }
 
 DeviceGrid UploadGrid(const FastGrid& grid, bool fitting, const Buffer<float>& second_moment) {

@@ -22,6 +22,7 @@ struct DeviceGridView {
   int32_t num_voxels = 0;
   Vec3f background{};
   float near_clip = 0;
+  Vec3f last{};  // the frame's resolution less 1
 };
 
 struct DeviceGrid {

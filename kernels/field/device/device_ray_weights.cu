@@ -23,7 +23,7 @@ __global__ void MarchWeightsKernel(DeviceGridView grid, const Ray* rays, int64_t
                                    int32_t* counter, float* transmittance, uint32_t* touched) {
   const int64_t r = (blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x) / 32;
   if (r >= n) return;
-  WarpMarch march(grid, rays[r], options);
+  WarpMarch<> march(grid, rays[r], options);
   const int lane = march.lane();
   LaneSample sample;
   unsigned composited;
@@ -39,8 +39,9 @@ __global__ void MarchWeightsKernel(DeviceGridView grid, const Ray* rays, int64_t
     if (at >= capacity) continue;
     samples[at] = {sample.cell.vertex, sample.cell.fraction, w, static_cast<int32_t>(r)};
     if (touched == nullptr) continue;
+    const NeighbourSteps steps = GridSpace(grid).Steps(sample.cell.vertex);
     for (int k = 0; k < 8; ++k) {
-      const int32_t link = grid.links[sample.cell.vertex + CornerOffset(grid.frame, k)];
+      const int32_t link = grid.links[sample.cell.vertex + steps.To(k)];
       if (link >= 0) Touch(touched, link);
     }
   }
@@ -134,7 +135,8 @@ struct WarpSample {
                         const int32_t* slot_of_voxel, const Ray* rays)
       : sample(s), lane(static_cast<int>(threadIdx.x & 31)), slot(-1), corner(0), gamma(0) {
     if (lane < 8) {
-      const int32_t link = grid.links[sample.vertex + CornerOffset(grid.frame, lane)];
+      const NeighbourSteps steps = GridSpace(grid).Steps(sample.vertex);
+      const int32_t link = grid.links[sample.vertex + steps.To(lane)];
       if (link >= 0) slot = slot_of_voxel[link];
       corner = CornerWeight(sample.fraction, lane);
     }
@@ -159,6 +161,15 @@ struct WarpSample {
   }
 };
 
+// Value c * 9 + k in lane order; sums of a channel's nine lanes land on its first one.
+__device__ float ChannelSums(float value, int lane) {
+  const float ninth = __shfl_down_sync(kAllLanes, value, 8);
+  if (lane % 9 == 0) value += ninth;
+  value += __shfl_down_sync(kAllLanes, value, 4);
+  value += __shfl_down_sync(kAllLanes, value, 2);
+  return value + __shfl_down_sync(kAllLanes, value, 1);
+}
+
 __global__ void BeginColorsKernel(Vec3f background, const float* transmittance, int64_t n,
                                   Vec3f* color) {
   const int64_t r = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
@@ -172,7 +183,7 @@ __global__ void BlendColorsKernel(DeviceGridView grid, int basis,
   const int64_t i = (blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x) / 32;
   if (i >= n) return;
   const WarpSample warp(grid, basis, samples[i], slot_of_voxel, rays);
-  const float sum = WarpRecord<9>::ChannelSums(warp.Blend(rows) * warp.gamma, warp.lane);
+  const float sum = ChannelSums(warp.Blend(rows) * warp.gamma, warp.lane);
   const float value = 0.5f + sum;  // of a channel on its first lane
   const bool first = warp.lane < 27 && warp.lane % 9 == 0;
   if (first && value > 0)

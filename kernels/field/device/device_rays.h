@@ -4,6 +4,7 @@
 #pragma once
 
 #include "kernels/field/device/device_grid.h"
+#include "kernels/field/device/half_grid.h"
 #include "kernels/field/fast_rays.h"
 #include "kernels/field/ray_march.h"
 #include "kernels/field/render.h"
@@ -29,9 +30,17 @@ void RenderOnDevice(const DeviceGrid& grid, const Ray* rays, int64_t n,
                     const MarchOptions& options, const DeviceRenderTarget& target,
                     float opacity_step = 0);
 
+// A frame at a camera without distortion: its rays are made where they are followed, and pixels
+// are finished there (see FinishPixel). `target` [height, width]; does not wait. `half`, if it
+// is given and not empty, stands in for the grid's own colours and densities.
+void RenderFrameOnDevice(const DeviceGrid& grid, const Camera& camera,
+                         const MarchOptions& options, const DeviceRenderTarget& target,
+                         float opacity_step = 0, const HalfGrid* half = nullptr);
+
 // A whole view, colours clipped and depths along the optical axis; see render.h.
 RenderedView RenderViewOnDevice(const DeviceGrid& grid, const Camera& camera,
-                                const MarchOptions& options, float opacity_step = 0);
+                                const MarchOptions& options, float opacity_step = 0,
+                                const HalfGrid* half = nullptr);
 
 // Sums over many steps; read them seldom, reading waits for the device.
 struct DeviceFitSums {

@@ -1,15 +1,36 @@
-// Rendering and the largest weights of voxels, a warp a ray.
+// Rendering, a warp a ray at a time.
 #include <vector>
 
+#include "kernels/base/error.h"
 #include "kernels/field/device/device_rays.h"
 #include "kernels/field/device/launch.h"
-#include "kernels/field/device/warp_shade.h"
+#include "kernels/field/device/ray_shaders.h"
+#include "kernels/field/finish_pixel.h"
+#include "kernels/scene/pinhole_rays.h"
 
 namespace regrade {
 
 RenderedView RenderViewOnDevice(const DeviceGrid& grid, const Camera& camera,
-                                const MarchOptions& options, float opacity_step) {
+                                const MarchOptions& options, float opacity_step,
+                                const HalfGrid* half) {
   const int64_t n = int64_t{camera.width} * camera.height;
+  DeviceBuffer<Vec3f> color(n, "colours of a view");
+  DeviceBuffer<float> depth(n, "depths of a view"),
+      transmittance(n, "transmittances of a view");
+  const DeviceRenderTarget target{color.data(), depth.data(), transmittance.data()};
+  RenderedView view{Image(camera.width, camera.height, 3),
+                    Image(camera.width, camera.height, 1),
+                    Image(camera.width, camera.height, 1)};
+  const auto take = [&] {
+    DeviceCopyOut(view.color.pixels.data(), color.data(), n * int64_t{sizeof(Vec3f)});
+    depth.CopyOut(view.depth.pixels.data(), n);
+    transmittance.CopyOut(view.transmittance.pixels.data(), n);
+  };
+  if (camera.lens == LensModel::kPinhole) {
+    RenderFrameOnDevice(grid, camera, options, target, opacity_step, half);
+    take();
+    return view;
+  }
   std::vector<Ray> rays(static_cast<size_t>(n));
 #pragma omp parallel for schedule(static)
   for (int y = 0; y < camera.height; ++y)
@@ -17,17 +38,8 @@ RenderedView RenderViewOnDevice(const DeviceGrid& grid, const Camera& camera,
       rays[static_cast<size_t>(y) * camera.width + x] = camera.PixelRay(x, y);
   DeviceBuffer<Ray> device_rays(n, "rays of a view");
   device_rays.CopyIn(rays.data(), n);
-  DeviceBuffer<Vec3f> color(n, "colours of a view");
-  DeviceBuffer<float> depth(n, "depths of a view"),
-      transmittance(n, "transmittances of a view");
-  RenderOnDevice(grid, device_rays.data(), n, options,
-                 {color.data(), depth.data(), transmittance.data()}, opacity_step);
-  RenderedView view{Image(camera.width, camera.height, 3),
-                    Image(camera.width, camera.height, 1),
-                    Image(camera.width, camera.height, 1)};
-  DeviceCopyOut(view.color.pixels.data(), color.data(), n * int64_t{sizeof(Vec3f)});
-  depth.CopyOut(view.depth.pixels.data(), n);
-  transmittance.CopyOut(view.transmittance.pixels.data(), n);
+  RenderOnDevice(grid, device_rays.data(), n, options, target, opacity_step);
+  take();
   FinishView(camera, rays, &view);
   return view;
 }
@@ -35,6 +47,10 @@ RenderedView RenderViewOnDevice(const DeviceGrid& grid, const Camera& camera,
 #if defined(__CUDACC__)
 
 namespace {
+
+constexpr int kWarps = 4;     // a block
+constexpr int kRays = 8;      // a block; 16 are as fast, 32 lose what neighbours share
+constexpr int kWaiting = 64;  // samples that wait for their colours; a power of 2
 
 // Which lanes' colours are looked at, and what each of them weighs; see EQ(opacity-steps).
 class OpacitySteps {
@@ -45,9 +61,7 @@ class OpacitySteps {
   // looked at get a weight above 0.
   __device__ unsigned Choose(bool composites, float before, float after, int lane,
                              float* weight) {
-    const bool chosen =
-        composites && (inverse_ == 0 || floorf((1 - after) * inverse_ + 0.5f) >
-                                            floorf((1 - before) * inverse_ + 0.5f));
+    const bool chosen = composites && (inverse_ == 0 || Steps(after) > Steps(before));
     const unsigned all = __ballot_sync(kAllLanes, chosen);
     const unsigned earlier = all & ((1u << lane) - 1);
     const float last_of_batch =
@@ -62,67 +76,177 @@ class OpacitySteps {
   }
 
  private:
+  // 2^23 + round((1 - transmittance) / step); see LocateCellOnDevice.
+  __device__ float Steps(float transmittance) const {
+    return __fadd_rd((1 - transmittance) * inverse_ + 0.5f, 8388608.0f);
+  }
+
   float inverse_;
   float seen_ = 1;  // transmittance behind the last sample that was looked at
 };
 
-template <int kBasis>
-__global__ void RenderRaysKernel(DeviceGridView grid, const Ray* rays, int64_t n,
-                                 MarchOptions options, float opacity_step,
-                                 DeviceRenderTarget target) {
+// Rays from a list; sums are left as they are. A block takes kRays of them.
+struct ListedRays {
+  const Ray* rays;
+  int64_t n;
+
+  // The block's i-th ray, and where its results go; false past the last.
+  __device__ bool Get(int i, Ray* ray, int64_t* place) const {
+    *place = blockIdx.x * int64_t{kRays} + i;
+    if (*place >= n) return false;
+    *ray = rays[*place];
+    return true;
+  }
+  __device__ void Finish(const Ray&, float, Vec3f*, float*) const {}
+  int64_t Blocks() const { return (n + kRays - 1) / kRays; }
+};
+
+// The rays of a frame. Warps that run at the same time stand for neighbouring pixels, which
+// read the same voxels: square tiles one after the other, Morton order within each.
+struct FrameRays {
+  static constexpr int kTile = 16, kPixels = kTile * kTile;
+  PinholeRays camera;
+  FinishPixel finish;
+
+  HD int Columns() const { return (camera.width + kTile - 1) / kTile; }
+  __device__ bool Get(int i, Ray* ray, int64_t* place) const {
+    const int64_t index = blockIdx.x * int64_t{kRays} + i;
+    const int tile = static_cast<int>(index / kPixels);
+    int x = tile % Columns() * kTile, y = tile / Columns() * kTile;
+#pragma unroll
+    for (int bit = 0; bit < 4; ++bit) {
+      x += static_cast<int>(index >> (2 * bit) & 1) << bit;
+      y += static_cast<int>(index >> (2 * bit + 1) & 1) << bit;
+    }
+    if (x >= camera.width || y >= camera.height) return false;
+    *ray = camera.At(x, y);
+    *place = int64_t{y} * camera.width + x;
+    return true;
+  }
+  __device__ void Finish(const Ray& ray, float transmittance, Vec3f* color,
+                         float* depth) const {
+    finish(ray, transmittance, color, depth);
+  }
+  int64_t Blocks() const {
+    return int64_t{Columns()} * ((camera.height + kTile - 1) / kTile) * (kPixels / kRays);
+  }
+};
+
+// A ray as a warp follows it; one thread of the block makes it.
+struct PreparedRay {
+  GridRay<float> ray;
+  float basis[kMaxBasis];
+};
+
+// What a warp leaves of a ray.
+struct RaySums {
+  Vec3f color;
+  float depth, transmittance;
+};
+
+// A warp's samples that wait until every group of lanes has one.
+struct WaitingSamples {
+  float4 place[kWaiting];  // vertex (as bits), fraction
+  float weight[kWaiting];
+};
+
+template <typename Shader, typename View>
+__device__ RaySums FollowRay(const View& grid, const PreparedRay& prepared,
+                             const MarchOptions& options, float opacity_step,
+                             WaitingSamples* waiting) {
+  constexpr int kSamples = 32 / Shader::kGroup;
   const int lane = static_cast<int>(threadIdx.x & 31);
-  const int64_t r = (blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x) / 32;
-  if (r >= n) return;
-  const Ray ray = rays[r];
-  const WarpRecord<kBasis> record(lane, ray.direction);
-  WarpMarch march(grid, ray, options);
+  Shader shader(grid, prepared.basis, lane);
+  WarpMarch<typename Shader::Space> march(shader.space(), prepared.ray, options);
   LaneSample sample;
   unsigned composited;
-  Vec3f color{};
   float depth = 0;
   OpacitySteps steps(opacity_step);
+  int arrived = 0, shaded = 0;
+  const auto shade = [&] {
+    const int mine = shaded + lane / Shader::kGroup;
+    const bool valid = mine < arrived;
+    const float4 at = waiting->place[mine % kWaiting];
+    shader.Add(valid ? __float_as_int(at.x) : 0, {at.y, at.z, at.w}, valid,
+               valid ? waiting->weight[mine % kWaiting] : 0.0f);
+    shaded += kSamples;
+  };
   while (march.Next(&sample, &composited)) {
-    const float alpha = sample.tau > 0 ? Opacity(sample.tau) : 0.0f;
+    const float alpha = sample.tau > 0 ? Shader::Space::Alpha(sample.tau) : 0.0f;
     const float w = sample.transmittance_before * alpha;
     depth += w * sample.t;
     float seen;
     const unsigned chosen = steps.Choose(sample.tau > 0, sample.transmittance_before,
                                          sample.transmittance_before - w, lane, &seen);
     if (chosen == 0) continue;
-    const Vec3f raw = RawColors<kBasis>(grid, record, sample, chosen, lane);
-    const float weight = opacity_step > 0 ? seen : w;
-    for (int c = 0; c < 3; ++c) color[c] += weight * fmaxf(raw[c], 0.0f);
+    if (chosen >> lane & 1) {
+      const int at = (arrived + __popc(chosen & ((1u << lane) - 1))) % kWaiting;
+      const Vec3f& f = sample.cell.fraction;
+      waiting->place[at] = {__int_as_float(sample.cell.vertex), f.x, f.y, f.z};
+      waiting->weight[at] = opacity_step > 0 ? seen : w;
+    }
+    arrived += __popc(chosen);
+    __syncwarp();  // written by some lanes, read by others
+    while (arrived - shaded >= kSamples) shade();
+    __syncwarp();  // read before it is written again
   }
+  if (arrived > shaded) shade();
+  __syncwarp();
   const float left = expf(-march.optical_depth());
   const float scale = opacity_step > 0 ? steps.Scale(left) : 1.0f;
-  for (int c = 0; c < 3; ++c) color[c] = scale * WarpSum(color[c]) + grid.background[c] * left;
-  depth = WarpSum(depth) * march.world_per_voxel();
-  if (lane != 0) return;
-  target.color[r] = color;
-  target.depth[r] = depth;
-  target.transmittance[r] = left;
+  return {shader.Sum() * scale + grid.background * left,
+          WarpSum(depth) * march.world_per_voxel(), left};
 }
 
-// Positive floats are ordered as their bits.
-__device__ void RaiseTo(float* target, float value) {
-  if (*target < value) atomicMax(reinterpret_cast<int*>(target), __float_as_int(value));
-}
-
-__global__ void MaxWeightsKernel(DeviceGridView grid, const Ray* rays, int64_t n,
-                                 MarchOptions options, float* weights) {
-  const int64_t r = (blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x) / 32;
-  if (r >= n) return;
-  WarpMarch march(grid, rays[r], options);
-  LaneSample sample;
-  unsigned composited;
-  while (march.Next(&sample, &composited)) {
-    if (!(sample.tau > 0)) continue;
-    const float w = sample.transmittance_before * Opacity(sample.tau);
-    for (int k = 0; k < 8; ++k) {
-      const int32_t link = grid.links[sample.cell.vertex + CornerOffset(grid.frame, k)];
-      if (link >= 0) RaiseTo(&weights[link], w);
+template <typename Shader, int kBasis, typename View, typename Rays>
+__global__ void __launch_bounds__(32 * kWarps, 5)
+    RenderRaysKernel(View grid, Rays rays, MarchOptions options, float opacity_step,
+                     DeviceRenderTarget target) {
+  __shared__ PreparedRay prepared[kRays];
+  __shared__ RaySums sums[kRays];
+  __shared__ WaitingSamples waiting[kWarps];
+  const int thread = static_cast<int>(threadIdx.x), warp = thread / 32;
+  Ray ray;
+  int64_t place;
+  if (thread < kRays) {
+    PreparedRay mine{};
+    if (rays.Get(thread, &ray, &place)) {
+      mine.ray = ClipToGrid(grid.frame, ray, grid.near_clip, options.step);
+      ShBasis(kBasis, ray.direction, mine.basis);
     }
+    prepared[thread] = mine;
   }
+  __syncthreads();
+  for (int i = warp; i < kRays; i += kWarps) {
+    const RaySums result =
+        FollowRay<Shader>(grid, prepared[i], options, opacity_step, &waiting[warp]);
+    if (thread % 32 == 0) sums[i] = result;
+  }
+  __syncthreads();
+  if (thread >= kRays || !rays.Get(thread, &ray, &place)) return;
+  RaySums mine = sums[thread];
+  rays.Finish(ray, mine.transmittance, &mine.color, &mine.depth);
+  target.color[place] = mine.color;
+  target.depth[place] = mine.depth;
+  target.transmittance[place] = mine.transmittance;
+}
+
+template <typename Rays>
+void RenderBlocks(const DeviceGrid& grid, const HalfGrid* half, const Rays& rays,
+                  const MarchOptions& options, float opacity_step,
+                  const DeviceRenderTarget& target) {
+  const auto blocks = static_cast<unsigned>(rays.Blocks());
+  if (blocks == 0) return;
+  if (half != nullptr && !half->empty()) {
+    RenderRaysKernel<HalfShader, 9>
+        <<<blocks, 32 * kWarps>>>(half->view(grid), rays, options, opacity_step, target);
+  } else {
+    ByBasis(grid.basis, [&](auto basis) {
+      RenderRaysKernel<FloatShader<basis.value>, basis.value>
+          <<<blocks, 32 * kWarps>>>(grid.view(), rays, options, opacity_step, target);
+    });
+  }
+  CheckLaunch("render_rays");
 }
 
 }  // namespace
@@ -130,19 +254,16 @@ __global__ void MaxWeightsKernel(DeviceGridView grid, const Ray* rays, int64_t n
 void RenderOnDevice(const DeviceGrid& grid, const Ray* rays, int64_t n,
                     const MarchOptions& options, const DeviceRenderTarget& target,
                     float opacity_step) {
-  if (n == 0) return;
-  ByBasis(grid.basis, [&](auto basis) {
-    RenderRaysKernel<basis.value>
-        <<<BlocksFor(32 * n), kThreads>>>(grid.view(), rays, n, options, opacity_step, target);
-  });
-  CheckLaunch("render_rays");
+  RenderBlocks(grid, nullptr, ListedRays{rays, n}, options, opacity_step, target);
 }
 
-void MaxWeightsOnDevice(const DeviceGrid& grid, const Ray* rays, int64_t n,
-                        const MarchOptions& options, float* weights) {
-  if (n == 0) return;
-  MaxWeightsKernel<<<BlocksFor(32 * n), kThreads>>>(grid.view(), rays, n, options, weights);
-  CheckLaunch("max_weights");
+void RenderFrameOnDevice(const DeviceGrid& grid, const Camera& camera,
+                         const MarchOptions& options, const DeviceRenderTarget& target,
+                         float opacity_step, const HalfGrid* half) {
+  REGRADE_CHECK(camera.lens == LensModel::kPinhole);
+  const DeviceRange range("frame");
+  RenderBlocks(grid, half, FrameRays{PinholeRays(camera), FinishPixel(camera)}, options,
+               opacity_step, target);
 }
 
 #else
@@ -151,8 +272,9 @@ void RenderOnDevice(const DeviceGrid&, const Ray*, int64_t, const MarchOptions&,
                     const DeviceRenderTarget&, float) {
   DeviceWait("render_rays");
 }
-void MaxWeightsOnDevice(const DeviceGrid&, const Ray*, int64_t, const MarchOptions&, float*) {
-  DeviceWait("max_weights");
+void RenderFrameOnDevice(const DeviceGrid&, const Camera&, const MarchOptions&,
+                         const DeviceRenderTarget&, float, const HalfGrid*) {
+  DeviceWait("render_rays");
 }
 
 #endif

@@ -2,6 +2,8 @@
 // reconstruct/resample_grid.h.
 #include <algorithm>
 
+#include "kernels/base/error.h"
+#include "kernels/field/brick_order.h"
 #include "kernels/field/device/device_grid.h"
 #include "kernels/field/device/launch.h"
 #include "kernels/field/trilinear.h"
@@ -34,53 +36,67 @@ __global__ void GrowAlongAxis(Vec3i n, int axis, int64_t vertices, const uint8_t
 }
 
 // Position of a vertex of `frame` among the vertices of `old`.
-__device__ Vec3f OldPosition(const GridFrame& frame, const GridFrame& old, int64_t vertex) {
-  const Vec3i n = frame.resolution;
-  const Vec3f at{static_cast<float>(vertex / (static_cast<int64_t>(n.y) * n.z)),
-                 static_cast<float>(vertex / n.z % n.y), static_cast<float>(vertex % n.z)};
+__device__ Vec3f OldPosition(const GridFrame& frame, const GridFrame& old, const Vec3i& at) {
   const Vec3f scale = frame.Scale(), offset = frame.Offset();
   const Vec3f old_scale = old.Scale(), old_offset = old.Offset();
   Vec3f p;
   for (int a = 0; a < 3; ++a) {
-    const float world = (at[a] - offset[a]) / scale[a];
+    const float world = (static_cast<float>(at[a]) - offset[a]) / scale[a];
     p[a] = fminf(fmaxf(world * old_scale[a] + old_offset[a], 0.0f),
                  static_cast<float>(old.resolution[a] - 1));
   }
   return p;
 }
 
-__global__ void MarkKept(GridFrame frame, GridFrame old, int64_t vertices, const uint8_t* keep,
-                         int32_t* marks) {
-  const int64_t vertex = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
-  if (vertex >= vertices) return;
-  const Vec3f p = OldPosition(frame, old, vertex);
-  marks[vertex] =
-      keep[old.Vertex(static_cast<int>(lroundf(p.x)), static_cast<int>(lroundf(p.y)),
-                      static_cast<int>(lroundf(p.z)))];
+// The vertex at a place of the order; false where the place only fills up a brick.
+__device__ bool VertexAt(const GridFrame& frame, const BrickOrder& order, int64_t place,
+                         Vec3i* at) {
+  if (place >= order.size) return false;
+  *at = order.At(static_cast<int32_t>(place));
+  return at->x < frame.resolution.x && at->y < frame.resolution.y && at->z < frame.resolution.z;
 }
 
-// `links` holds the number of kept vertices before each, `marks` whether it is kept itself.
-__global__ void NumberKept(int64_t vertices, const int32_t* marks, int32_t* links) {
-  const int64_t vertex = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
-  if (vertex < vertices && marks[vertex] == 0) links[vertex] = -1;
+__global__ void MarkKept(GridFrame frame, GridFrame old, BrickOrder order, const uint8_t* keep,
+                         int32_t* marks) {
+  const int64_t place = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
+  if (place >= order.size) return;
+  Vec3i at;
+  int32_t mark = 0;
+  if (VertexAt(frame, order, place, &at)) {
+    const Vec3f p = OldPosition(frame, old, at);
+    mark = keep[old.Vertex(static_cast<int>(lroundf(p.x)), static_cast<int>(lroundf(p.y)),
+                           static_cast<int>(lroundf(p.z)))];
+  }
+  marks[place] = mark;
+}
+
+// `ranks` holds the number of kept vertices before each place, `marks` whether its own is kept.
+__global__ void NumberKept(GridFrame frame, BrickOrder order, const int32_t* marks,
+                           const int32_t* ranks, int32_t* links) {
+  const int64_t place = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
+  Vec3i at;
+  if (VertexAt(frame, order, place, &at))
+    links[frame.Vertex(at.x, at.y, at.z)] = marks[place] != 0 ? ranks[place] : -1;
 }
 
 template <int kBasis>
-__global__ void FillVoxels(GridFrame frame, int64_t vertices, const int32_t* links,
-                           DeviceGridView old, float* records, int64_t stride) {
+__global__ void FillVoxels(GridFrame frame, BrickOrder order, const int32_t* marks,
+                           const int32_t* ranks, DeviceGridView old, float* records,
+                           int64_t stride) {
   constexpr int kLanes = RecordLanes(kBasis);
   const int64_t thread = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
-  const int64_t vertex = thread / kLanes;
-  if (vertex >= vertices || links[vertex] < 0) return;
+  const int64_t place = thread / kLanes;
+  Vec3i at;
+  if (!VertexAt(frame, order, place, &at) || marks[place] == 0) return;
   const int value = static_cast<int>(thread % kLanes);
-  const Cell<float> cell = LocateCell(old.frame, OldPosition(frame, old.frame, vertex));
+  const Cell<float> cell = LocateCell(old.frame, OldPosition(frame, old.frame, at));
   float sum = 0;
   for (int k = 0; k < 8; ++k) {
     const int32_t link = old.links[CornerVertex(old.frame, cell.vertex, k)];
     if (link >= 0)
       sum += CornerWeight(cell.fraction, k) * old.records[link * old.stride + value];
   }
-  records[links[vertex] * stride + value] = sum;
+  records[ranks[place] * stride + value] = sum;
 }
 
 }  // namespace
@@ -106,32 +122,35 @@ DeviceGrid ResampleOnDevice(const DeviceGrid& grid, const DeviceBuffer<float>& w
   result.basis = grid.basis;
   result.background = grid.background;
   result.near_clip = grid.near_clip;
-  const int64_t vertices = result.frame.NumVertices();
-  DeviceBuffer<int32_t> marks(vertices, "marks of new voxels");
-  MarkKept<<<BlocksFor(vertices), kThreads>>>(result.frame, grid.frame, vertices, keep.data(),
-                                              marks.data());
+  // Voxels are numbered by bricks: what a ray passes then lies together.
+  const BrickOrder order(resolution);
+  REGRADE_CHECK(order.size <= INT32_MAX);
+  DeviceBuffer<int32_t> marks(order.size, "marks of new voxels");
+  MarkKept<<<BlocksFor(order.size), kThreads>>>(result.frame, grid.frame, order, keep.data(),
+                                                marks.data());
   CheckLaunch("mark_kept");
-  result.links = DeviceBuffer<int32_t>(vertices, "links");
+  DeviceBuffer<int32_t> ranks(order.size, "numbers of new voxels");
   size_t scratch_bytes = 0;
-  cub::DeviceScan::ExclusiveSum(nullptr, scratch_bytes, marks.data(), result.links.data(),
-                                vertices);
+  cub::DeviceScan::ExclusiveSum(nullptr, scratch_bytes, marks.data(), ranks.data(), order.size);
   DeviceBuffer<uint8_t> scratch(static_cast<int64_t>(scratch_bytes), "scratch of a scan");
-  cub::DeviceScan::ExclusiveSum(scratch.data(), scratch_bytes, marks.data(),
-                                result.links.data(), vertices);
+  cub::DeviceScan::ExclusiveSum(scratch.data(), scratch_bytes, marks.data(), ranks.data(),
+                                order.size);
   CheckLaunch("scan");
-  int32_t last_link = 0, last_mark = 0;
-  DeviceCopyOut(&last_link, result.links.data() + vertices - 1, sizeof last_link);
-  DeviceCopyOut(&last_mark, marks.data() + vertices - 1, sizeof last_mark);
-  const int64_t count = int64_t{last_link} + last_mark;
+  int32_t last_rank = 0, last_mark = 0;
+  DeviceCopyOut(&last_rank, ranks.data() + order.size - 1, sizeof last_rank);
+  DeviceCopyOut(&last_mark, marks.data() + order.size - 1, sizeof last_mark);
+  const int64_t count = int64_t{last_rank} + last_mark;
   if (count == 0) return result;
-  NumberKept<<<BlocksFor(vertices), kThreads>>>(vertices, marks.data(), result.links.data());
+  result.links = DeviceBuffer<int32_t>(result.frame.NumVertices(), "links");
+  NumberKept<<<BlocksFor(order.size), kThreads>>>(result.frame, order, marks.data(),
+                                                  ranks.data(), result.links.data());
   CheckLaunch("number_kept");
   result.fitting = grid.fitting;
   result.records = DeviceBuffer<float>(count * result.stride(), "voxels");
   if (result.fitting) result.records.Zero();
   ByBasis(grid.basis, [&](auto basis) {
-    FillVoxels<basis.value><<<BlocksFor(vertices * result.lanes()), kThreads>>>(
-        result.frame, vertices, result.links.data(), grid.view(), result.records.data(),
+    FillVoxels<basis.value><<<BlocksFor(order.size * result.lanes()), kThreads>>>(
+        result.frame, order, marks.data(), ranks.data(), grid.view(), result.records.data(),
         result.stride());
   });
   CheckLaunch("fill_voxels");

@@ -1,5 +1,6 @@
-// Colours and gradients of a warp's samples: the lanes that marched now stand for the values of
-// one record (basis 9), of two (basis 4) or of eight (basis 1). Device code only.
+// Colours and gradients of samples, a group of lanes a sample: a lane reads 16 bytes of each of
+// the eight corners' records, so that one instruction fetches several whole records and a sum
+// over a group takes few exchanges. Device code only.
 #pragma once
 
 #include "kernels/field/device/warp_march.h"
@@ -9,108 +10,97 @@
 
 namespace regrade {
 
+// Which values of a record a lane stands for: kValues neighbouring ones.
 template <int kBasis>
-struct WarpRecord {
-  static constexpr int kLanes = RecordLanes(kBasis);
-  static constexpr int kGroups = 32 / kLanes;  // records side by side
+struct RecordLayout {
+  static constexpr int kValues = 4;
+  static constexpr int kGroup = RecordLanes(kBasis) / kValues;  // lanes a record: 8, 4 or 1
+  static constexpr int kSamples = 32 / kGroup;                  // side by side in a warp
+};
 
-  int group, in_group;
-  float gamma = 0;  // of the value that this lane stands for; 0 for density and padding
+// What a lane's values of a record mean along one ray: basis functions of the three channels,
+// and which of them is the density.
+template <int kBasis>
+struct LaneValues {
+  using Layout = RecordLayout<kBasis>;
+  float of[3][Layout::kValues] = {};
+  float density[Layout::kValues] = {};
 
-  __device__ WarpRecord(int lane, const Vec3f& direction)
-      : group(lane / kLanes), in_group(lane % kLanes) {
-    float basis[kMaxBasis];
-    ShBasis(kBasis, direction, basis);
+  __device__ LaneValues(int lane, const float (&basis)[kMaxBasis]) {
 #pragma unroll
-    for (int k = 0; k < kBasis; ++k)
-      if (in_group < 3 * kBasis && in_group % kBasis == k) gamma = basis[k];
-  }
-
-  // Value c x kBasis + k in lane order; sums of a channel's kBasis lanes land on its first
-  // lane.
-  __device__ static float ChannelSums(float value, int in_group) {
-    if constexpr (kBasis == 9) {
-      const float ninth = __shfl_down_sync(kAllLanes, value, 8);
-      if (in_group % 9 == 0) value += ninth;
-      value += __shfl_down_sync(kAllLanes, value, 4);
+    for (int index = 0; index <= DensityLane(kBasis); ++index) {
+      if (index / Layout::kValues != lane % Layout::kGroup) continue;
+      if (index == DensityLane(kBasis))
+        density[index % Layout::kValues] = 1;
+      else
+        of[index / kBasis][index % Layout::kValues] = basis[index % kBasis];
     }
-    if constexpr (kBasis >= 4) {
-      value += __shfl_down_sync(kAllLanes, value, 2);
-      value += __shfl_down_sync(kAllLanes, value, 1);
-    }
-    return value;
   }
 };
 
-__device__ inline int CornerOffset(const GridFrame& frame, int corner) {
-  return ((corner >> 2) & 1) * frame.resolution.y * frame.resolution.z +
-         ((corner >> 1) & 1) * frame.resolution.z + (corner & 1);
-}
-
-// Four samples are worked on at a time: lane 8 j + k knows corner k of the j-th. Loads of many
-// records are in flight at once, which is what a single ray's latency asks for.
-inline constexpr int kTurn = 4;
-
-struct TurnCorner {
-  int source;    // the lane whose sample this is; -1 past the last
-  int32_t link;  // -1 where nothing is stored
-  float weight;
-
-  __device__ TurnCorner(const DeviceGridView& grid, int vertex, const Vec3f& fraction, int from,
-                        int lane)
-      : source(from), link(-1), weight(0) {
-    if (from < 0) return;
-    link = grid.links[vertex + CornerOffset(grid.frame, lane & 7)];
-    weight = CornerWeight(fraction, lane & 7);
+// The links of the corners of a group's sample; each lane of the group looks some of them up.
+template <int kGroup>
+class GroupLinks {
+ public:
+  template <typename Space>
+  __device__ GroupLinks(const Space& space, int vertex, bool valid, int lane) {
+    const NeighbourSteps steps = space.Steps(vertex);
+#pragma unroll
+    for (int i = 0; i < kOwn; ++i)
+      own_[i] = valid ? space.Link(vertex + steps.To(lane % kGroup + kGroup * i)) : -1;
   }
+  __device__ int32_t Of(int corner) const {
+    return __shfl_sync(kAllLanes, own_[corner / kGroup], corner % kGroup, kGroup);
+  }
+  // body(link) for the stored corners, each by one lane.
+  template <typename Body>
+  __device__ void ForEachOwn(const Body& body) const {
+#pragma unroll
+    for (int i = 0; i < kOwn; ++i)
+      if (own_[i] >= 0) body(own_[i]);
+  }
+
+ private:
+  static constexpr int kOwn = 8 / kGroup;
+  int32_t own_[kOwn];
 };
 
-// The lane that holds the j-th lowest set bit of `left`, or -1.
-__device__ inline int NthLane(unsigned left, int j) {
-  for (; j > 0 && left != 0; --j) left &= left - 1;
-  return left == 0 ? -1 : __ffs(left) - 1;
+__device__ inline float4 LoadQuad(const float* from) {
+  return *reinterpret_cast<const float4*>(from);
 }
 
-// The colour of each compositing lane's own sample, before the clamp. See EQ(sh-basis).
+// The colour, before the clamp, of the sample of the lane's group; every lane of the warp takes
+// part, those of a group with the same sample, and get the same colour. See EQ(sh-basis).
 template <int kBasis>
-__device__ Vec3f RawColors(const DeviceGridView& grid, const WarpRecord<kBasis>& record,
-                           const LaneSample& sample, unsigned composited, int lane) {
-  constexpr int kLanes = WarpRecord<kBasis>::kLanes, kGroups = WarpRecord<kBasis>::kGroups;
-  constexpr int kSums = kGroups < kTurn ? kTurn / kGroups : 1;  // samples that a group works on
-  Vec3f raw{0.5f, 0.5f, 0.5f};
-  for (unsigned left = composited; left != 0;) {
-    const int source = NthLane(left, lane >> 3);
-    const int from = source & 31;
-    const int vertex = __shfl_sync(kAllLanes, sample.cell.vertex, from);
-    const Vec3f fraction{__shfl_sync(kAllLanes, sample.cell.fraction.x, from),
-                         __shfl_sync(kAllLanes, sample.cell.fraction.y, from),
-                         __shfl_sync(kAllLanes, sample.cell.fraction.z, from)};
-    const TurnCorner corner(grid, vertex, fraction, source, lane);
-    float value[kSums] = {};
+__device__ Vec3f RawColor(const DeviceGridView& grid, const LaneValues<kBasis>& values,
+                          int vertex, const Vec3f& fraction, bool valid, int lane) {
+  using Layout = RecordLayout<kBasis>;
+  const GroupLinks<Layout::kGroup> links(GridSpace(grid), vertex, valid, lane);
+  const float* mine = grid.records + lane % Layout::kGroup * Layout::kValues;
+  float4 corner[8];  // all on their way before the first is used
 #pragma unroll
-    for (int i = 0; i < kSums; ++i) {
-      const int j = (record.group + kGroups * i) & (kTurn - 1);
+  for (int k = 0; k < 8; ++k) {
+    const int32_t link = links.Of(k);
+    corner[k] = link < 0 ? float4{} : LoadQuad(mine + link * grid.stride);
+  }
+  float4 sum{};
 #pragma unroll
-      for (int k = 0; k < 8; ++k) {
-        const int32_t link = __shfl_sync(kAllLanes, corner.link, 8 * j + k);
-        const float weight = __shfl_sync(kAllLanes, corner.weight, 8 * j + k);
-        if (link >= 0) value[i] += weight * grid.records[link * grid.stride + record.in_group];
-      }
-    }
+  for (int k = 0; k < 8; ++k) {
+    const float weight = CornerWeight(fraction, k);
+    sum.x += weight * corner[k].x;
+    sum.y += weight * corner[k].y;
+    sum.z += weight * corner[k].z;
+    sum.w += weight * corner[k].w;
+  }
+  Vec3f raw;
 #pragma unroll
-    for (int i = 0; i < kSums; ++i)
-      value[i] = WarpRecord<kBasis>::ChannelSums(value[i] * record.gamma, record.in_group);
+  for (int c = 0; c < 3; ++c) {
+    raw[c] = values.of[c][0] * sum.x + values.of[c][1] * sum.y + values.of[c][2] * sum.z +
+             values.of[c][3] * sum.w;
 #pragma unroll
-    for (int j = 0; j < kTurn; ++j) {
-      const int owner = __shfl_sync(kAllLanes, corner.source, 8 * j);
-#pragma unroll
-      for (int c = 0; c < 3; ++c) {
-        const float sum = __shfl_sync(kAllLanes, value[j / kGroups % kSums],
-                                      j % kGroups * kLanes + c * kBasis);
-        if (lane == owner) raw[c] += sum;
-      }
-    }
-    for (int j = 0; j < kTurn; ++j) left &= left - 1;
+    for (int d = Layout::kGroup / 2; d > 0; d /= 2)
+      raw[c] += __shfl_xor_sync(kAllLanes, raw[c], d);
+    raw[c] += 0.5f;
   }
   return raw;
 }

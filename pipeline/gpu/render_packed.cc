@@ -1,0 +1,56 @@
+// regrade_gpu render: frames of a field at a packed capture's held-out cameras, and what they cost.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+
+#include "kernels/base/error.h"
+#include "kernels/field/device/device_rays.h"
+#include "kernels/field/fast_rays.h"
+#include "pipeline/field_file.h"
+#include "pipeline/gpu/gpu_commands.h"
+
+namespace regrade {
+namespace {
+
+void WritePpm(const std::string& path, const Image& image) {
+  std::ofstream file(path, std::ios::binary);
+  file << "P6\n" << image.width << " " << image.height << "\n255\n";
+  for (const float value : image.pixels)
+    file.put(static_cast<char>(std::lround(255 * std::clamp(value, 0.0f, 1.0f))));
+  if (!file) throw Error(ExitCode::kResources, "cannot be written", path, "is the disk full?");
+}
+
+}  // namespace
+
+void RenderHeldOut(const DeviceGrid& grid, const PackedCapture& capture,
+                   const MarchOptions& march, const std::string& folder,
+                   const std::string& name) {
+  std::filesystem::create_directories(folder);
+  int index = 0;
+  for (const PackedView& view : capture.views)
+    if (view.held_out)
+      WritePpm(folder + "/" + name + "_" + std::to_string(index++) + ".ppm",
+               RenderViewOnDevice(grid, view.camera, march).color);
+}
+
+void RenderPacked(const RenderPackedOptions& settings) {
+  const PackedCapture capture = ReadPackedCapture(settings.capture);
+  const StoredField stored = ReadFieldFile(settings.field);
+  if (stored.field.geometry->spheres.on())
+    throw Error(ExitCode::kInput, "it has background spheres, which the GPU does not know yet",
+                settings.field, "use `regrade render`, which takes the CPU for it");
+  const DeviceGrid grid = UploadGrid(MakeFastGrid(stored.field));
+  if (!settings.frames.empty())
+    RenderHeldOut(grid, capture, {stored.field.step}, settings.frames, "frame");
+  const JsonValue record = JsonValue::Object{
+      {"capture", settings.capture},
+      {"device", ReadDeviceStatus().name},
+      {"voxels", stored.field.geometry->num_voxels()},
+      {"render", RenderPrices(grid, capture, stored.field.step)}};
+  std::printf("%s\n", DumpJson(record, -1).c_str());
+  std::fflush(stdout);
+}
+
+}  // namespace regrade
