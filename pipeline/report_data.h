@@ -61,7 +61,8 @@ struct ReconstructReport {
   double seconds = 0;
   int64_t voxels = 0;
   Figure psnr_train_db, psnr_heldout_db, ssim_heldout;
-  std::vector<std::string> heldout;  // the user's file names
+  std::vector<std::string> heldout;                       // the user's file names
+  std::vector<std::pair<int64_t, double>> psnr_at_steps;  // dB on the rays of the last steps
 };
 
 struct Style2dReport {
@@ -128,7 +129,8 @@ struct ConsistencyFigures {
   Figure coverage;                         // mean share of valid pixels
   std::vector<Figure> tc_psnr_pairs_db;    // one for each pair in order of time; may be empty
   Figure tc_psnr_low_db, tc_psnr_high_db;  // the mean of dB lies between with 95 %
-  std::string heat_map;  // picture of the worst pair, relative to the folder; may be empty
+  std::string heat_map;   // picture of the worst pair, relative to the folder; may be empty
+  int heat_map_from = 0;  // the pair's first frame
 };
 
 // What one pair of one sequence says, and which pixels had no say in it.
@@ -174,6 +176,8 @@ struct RunReport {
   uint64_t seed = 0;
   double seconds = 0;
   Figure peak_memory_mb;
+  // By stage, all threads and the programs that it started; of its last start.
+  std::vector<std::pair<std::string, double>> cpu_seconds;
   std::optional<PhotosReport> photos;
   std::vector<EffectReport> effects;
   StagesReport stages;
@@ -181,7 +185,8 @@ struct RunReport {
   std::vector<PairFigures> pairs;  // of all sequences, by first frame
   std::vector<FidelityFigures> fidelity;
   std::vector<PriceRow> prices;
-  std::vector<OptionValue> options;  // of run.json; shown on the page only
+  std::vector<OptionValue> options;   // of run.json; shown on the page only
+  std::vector<OptionValue> versions;  // of this program's parts and helpers
 };
 
 }  // namespace regrade

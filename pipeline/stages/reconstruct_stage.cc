@@ -2,6 +2,7 @@
 #include <omp.h>
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <numeric>
 #include <string>
@@ -28,6 +29,9 @@ constexpr double kAfterFit =
     0.08;  // pruning, writing and measuring, as a share of the steps' time
 constexpr double kTrial = 0.08;         // the trial of degrees, likewise
 constexpr int kReproducibleShards = 4;  // sums in a fixed grouping, whatever the threads
+
+// To a thousandth: what a drawing can show.
+double Rounded(double value) { return std::round(value * 1000) / 1000; }
 
 double Mean(const std::vector<double>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0) /
@@ -109,18 +113,18 @@ EffectReport ProfileViewDependence(const RunSettings& settings, const FitOptions
                                    const std::vector<TrainingView>& views, const SceneBox& box,
                                    const FitState* resume, const ProgressFunction& progress,
                                    Backend backend) {
-  const auto row = [](bool on, double value, const std::string& evidence) {
+  const auto row = [](bool on, const Figure& value, const std::string& evidence) {
     return EffectReport{kViewDependence, on, evidence, value, kDegreePays};
   };
   const auto wishes = ParseEffects(settings.run.effects);
   const auto wish = wishes.find(kViewDependence);
   const bool wanted = wish == wishes.end() || wish->second;
-  if (options.sh_degree == 0 || !wanted) return row(false, 0, "not measured: as asked for");
-  if (wish != wishes.end()) return row(true, 0, "not measured: as asked for");
+  if (options.sh_degree == 0 || !wanted) return row(false, Figure(), "as asked for");
+  if (wish != wishes.end()) return row(true, Figure(), "as asked for");
   if (resume != nullptr)
-    return row(resume->grid.basis > 1, 0, "not measured again: as before the interruption");
+    return row(resume->grid.basis > 1, Figure(), "as before the interruption");
   if (views.size() < kLeastTrialViews)
-    return row(true, 0, "not measured: too few photos to keep some from a trial");
+    return row(true, Figure(), "too few photos to keep some from a trial");
   const DegreeTrial trial = TryDegrees(views, box, options, progress, backend);
   return row(trial.Pays(), trial.gain_db,
              "decibels that harmonics of degree " + std::to_string(options.sh_degree) +
@@ -194,6 +198,10 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   if (scene.box.spheres)
     outcome.figures["background_texels"] = fit.field.geometry->spheres.num_texels();
   outcome.figures["psnr_train_db"] = fit.psnr_train_db;
+  for (const FitCurvePoint& point : fit.curve) {
+    outcome.figures["curve_steps"].Append(point.step);
+    outcome.figures["curve_psnr_db"].Append(Rounded(point.psnr_train_db));
+  }
   MeasureHeldOut(context, capture, profile.gains, ReadFieldFile(workspace.Path("field.npz")),
                  backend, &outcome.figures);
   return outcome;
