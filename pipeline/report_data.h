@@ -155,13 +155,20 @@ struct FidelityFigures {
   Figure sliced_wasserstein_to_style;
 };
 
-// What one knob costs and buys, measured on this machine.
+// What one value of a knob costs and buys, measured on this machine. Rows of one plane compare
+// with each other.
 struct PriceRow {
-  std::string knob;     // the flag, "--style-steps"
+  std::string plane;    // "fit"
+  std::string knob;     // the option, "fit-steps"; empty for what all others are compared with
   std::string setting;  // "300"
-  Figure seconds;
-  Figure psnr_db;  // the accuracy that the knob buys; `measure` says which
-  std::string measure;
+  std::string measure;  // what accuracy is: "held-out PSNR"
+  std::string unit;     // "dB"
+  int repeats = 1;
+  // Medians, and half of what lies between the least and the most.
+  Figure seconds, seconds_spread, cpu_seconds, cpu_spread, accuracy, accuracy_spread;
+  Figure error;              // against the knob's accurate end; positive is worse
+  bool on_front = false;     // nothing is as accurate in less time
+  std::string dominated_by;  // what is better beyond the spreads; may be empty
 };
 
 // An option in effect, as run.json has it.

@@ -6,6 +6,7 @@
 #include "pipeline/html_text.h"
 #include "pipeline/report_page_assets.h"
 #include "pipeline/report_photos.h"
+#include "pipeline/report_prices.h"
 #include "pipeline/report_tables.h"
 
 namespace regrade {

@@ -188,15 +188,22 @@ JsonValue FidelityJson(const FidelityFigures& row) {
   return object;
 }
 
+}  // namespace
+
 JsonValue PriceJson(const PriceRow& price) {
-  Object object{{"knob", price.knob}, {"setting", price.setting}};
+  Object object{{"plane", price.plane},     {"knob", price.knob}, {"setting", price.setting},
+                {"measure", price.measure}, {"unit", price.unit}, {"repeats", price.repeats}};
   Put(object, "seconds", price.seconds);
-  Put(object, "psnr_db", price.psnr_db);
-  object.emplace_back("measure", price.measure);
+  Put(object, "seconds_spread", price.seconds_spread);
+  Put(object, "cpu_seconds", price.cpu_seconds);
+  Put(object, "cpu_spread", price.cpu_spread);
+  Put(object, "accuracy", price.accuracy);
+  Put(object, "accuracy_spread", price.accuracy_spread);
+  Put(object, "error", price.error);
+  object.emplace_back("on_front", price.on_front);
+  object.emplace_back("dominated_by", TextOrNull(price.dominated_by));
   return object;
 }
-
-}  // namespace
 
 JsonValue ReportJson(const RunReport& report) {
   Object object{{"schema", kSchema},

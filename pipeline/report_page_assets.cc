@@ -14,6 +14,7 @@ html{-webkit-text-size-adjust:100%}
 body{margin:0;background:var(--paper);color:var(--ink);font:16px/1.55 system-ui,-apple-system,"Segoe UI",Roboto,sans-serif}
 main{max-width:68rem;margin:0 auto;padding:2.5rem 1.25rem 5rem}
 h1{font:600 2rem/1.2 ui-serif,Georgia,"Times New Roman",serif;margin:0;letter-spacing:-.01em;overflow-wrap:anywhere}
+h3{font-size:1.05rem;margin:1.75rem 0 .25rem}
 h2{font:600 1.35rem/1.3 ui-serif,Georgia,"Times New Roman",serif;margin:3.25rem 0 .5rem}
 p{margin:.4rem 0 1rem;max-width:46rem;overflow-wrap:anywhere}
 .soft,figcaption,.facts,.note{color:var(--soft)}

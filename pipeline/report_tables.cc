@@ -303,19 +303,6 @@ std::string StagesHtml(const RunReport& report) {
          (report.stages.stylize ? BoundChartHtml(*report.stages.stylize) : "");
 }
 
-std::string PricesHtml(const RunReport& report) {
-  if (report.prices.empty()) return "";
-  std::string body;
-  for (const PriceRow& price : report.prices) {
-    body += Row({Cell("<code>" + EscapeHtml(price.knob) + "</code>"), Text(price.setting),
-                 Number(price.seconds, 1, "s"), Number(price.psnr_db, 2, "dB"),
-                 Text(price.measure)});
-  }
-  return Heading("What accuracy costs here") +
-         "<p>Measured on this machine with this capture.</p>" +
-         Table("<tr><th>knob<th>setting<th class=n>time<th class=n>accuracy<th>of</tr>", body);
-}
-
 std::string RepeatHtml(const RunReport& report, const std::string& run_json) {
   if (report.command.empty()) return "";
   std::string html = Heading("To repeat this run") + "<pre>" +

@@ -17,7 +17,6 @@ std::string HeadlineFiguresHtml(const RunReport& report);
 std::string ConsistencyHtml(const RunReport& report);
 std::string EffectsHtml(const RunReport& report);
 std::string StagesHtml(const RunReport& report);
-std::string PricesHtml(const RunReport& report);
 // `run_json`: what --config reads; may be empty.
 std::string RepeatHtml(const RunReport& report, const std::string& run_json);
 

@@ -29,17 +29,6 @@ FrameSource FramesOf(const std::string& folder, const std::vector<int>& views) {
           }};
 }
 
-// The renderer's depth is along the optical axis; the evaluator wants it along each ray.
-Image AlongRays(const Camera& camera, Image depth) {
-  const Vec3d forward = camera.Forward();
-  for (int y = 0; y < depth.height; ++y)
-    for (int x = 0; x < depth.width; ++x) {
-      const Vec3d ray = camera.WorldRay(x + 0.5, y + 0.5).direction;
-      *depth.at(x, y) = static_cast<float>(*depth.at(x, y) / Dot(ray, forward));
-    }
-  return depth;
-}
-
 // Depth and camera of each view, rendered when they are asked for.
 GeometrySource GeometryOf(const RunSettings& settings, const Capture& capture,
                           const StoredField& stored) {
@@ -49,7 +38,8 @@ GeometrySource GeometryOf(const RunSettings& settings, const Capture& capture,
        field_from_world = stored.field_from_world, ndc = stored.ndc](int i) -> FrameGeometry {
         const Camera camera = WorkingCamera(capture.views[static_cast<size_t>(i)].camera,
                                             settings.scene.photo_size, field_from_world, ndc);
-        return {AlongRays(camera, RenderView(*grid, camera, MarchOptions{step}).depth), camera};
+        return {DepthAlongRays(camera, RenderView(*grid, camera, MarchOptions{step}).depth),
+                camera};
       };
 }
 

@@ -18,12 +18,15 @@
 #include "pipeline/scene_profile.h"
 #include "pipeline/scene_views.h"
 #include "pipeline/stages/run_context.h"
+#include "pipeline/tradeoff/price_list.h"
 
 namespace regrade {
 namespace {
 
 constexpr int kPagePictures = 5;  // viewpoints shown
 constexpr int kJpegQuality = 85;
+constexpr char kPriceList[] =
+    "tradeoff/tradeoff.json";  // of `regrade tradeoff DIR --out DIR/tradeoff`
 
 PhotosReport PhotosOf(const Capture& capture) {
   PhotosReport photos;
@@ -102,6 +105,7 @@ StageOutcome WriteReport(RunContext* context) {
   if (const auto record = workspace.Find("reconstruct"))
     if (const JsonValue* effects = record->figures.Find("effects"))
       report.effects = EffectsOfRecord(*effects);
+  report.prices = ReadPriceList(workspace.Path(kPriceList));
   const JsonValue options = context->options.Values();
   for (const auto& [name, value] : options.AsObject())
     report.options.push_back({name, value.IsString() ? value.AsString() : DumpJson(value, -1)});
@@ -124,6 +128,8 @@ Stage ReportStage(RunContext* context) {
   // Stage "evaluate" leaves figures alone.
   if (const auto record = context->workspace->Find("evaluate"))
     stage.inputs["evaluate"] = record->figures;
+  const std::string prices = context->workspace->Path(kPriceList);
+  if (std::filesystem::is_regular_file(prices)) stage.inputs["prices"] = HashFile(prices);
   stage.work = [context](const ProgressFunction&) { return WriteReport(context); };
   return stage;
 }

@@ -98,7 +98,7 @@ TEST(ReportHtml, HostileNamesStayText) {
   report.stages.style_2d = Style2dReport{1, evil};
   report.stages.evaluate = EvaluateReport{1, evil, evil};
   report.consistency[0].sequence = report.fidelity[0].sequence = evil;
-  report.prices = {{evil, evil, 1, 2, evil}};
+  report.prices = {{"fit", evil, evil, evil, evil, 1, 1, 2, 3, 4, 5, 6, 7, true, evil}};
   report.options = {{evil, evil}};
   report.versions = {{evil, evil}};
   pictures.title = pictures.views[0].name = pictures.run_json = evil;

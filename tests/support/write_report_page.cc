@@ -48,7 +48,10 @@ RunReport EveryFigure(const std::string& evil) {
     report.consistency.push_back(row);
   }
   report.fidelity = {{"styled", 24.5, 0.19, 0.2, 12, 13, 0.01}};
-  report.prices = {{"--fit-steps", evil, 12, 27.5, "held-out PSNR"}};
+  for (int i = 0; i < 6; ++i)
+    report.prices.push_back({"fit", i == 0 ? "" : "fit-steps", evil, "held-out PSNR", "dB", 3,
+                             12.0 + i, 0.5, 20.0 + 3 * i, 1, 25 + std::sqrt(i), 0.1,
+                             i == 5 ? Figure() : Figure(0.1), i != 3, i == 3 ? evil : ""});
   report.options = {{"style", evil}};
   report.versions = {{"COLMAP", evil}};
   return report;

@@ -1,0 +1,44 @@
+// What a run will cost on another capture, from what one was seen to cost: seconds of a stage
+// for each unit of its work.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "kernels/scene/capture.h"
+#include "pipeline/tradeoff/measurements.h"
+#include "pipeline/workspace.h"
+
+namespace regrade {
+
+// A stage's time is a sum of terms, each so much a unit of work that is known before it begins.
+struct PriceTerm {
+  std::string stage, unit;
+  double seconds = 0, cpu_seconds = 0;  // a unit
+};
+
+struct StageTime {
+  std::string stage;
+  double seconds = 0, cpu_seconds = 0;
+};
+
+// How much of `unit` a run of these settings does:
+//   photo megapixels at matching size | ray voxels: rays times the grid's side, over the fit |
+//   photo pixels: of all photos at working size | style rays | frame ray voxels | pair pixels
+double AmountOf(const std::string& unit, const RunSettings& settings, const Capture& capture);
+
+// From the records of a finished run, and for the fit and the style, where knobs of steps and
+// grids were measured, by least squares of relative errors over them.
+std::vector<PriceTerm> LearnPrices(const RunSettings& base, const Capture& capture,
+                                   const Workspace& workspace,
+                                   const std::vector<Variant>& variants,
+                                   const std::vector<Measurement>& measurements);
+
+std::vector<StageTime> Predict(const std::vector<PriceTerm>& prices,
+                               const RunSettings& settings, const Capture& capture);
+
+JsonValue ToJson(const std::vector<PriceTerm>& prices);
+// Throws Error(kInput).
+std::vector<PriceTerm> PricesFromJson(const JsonValue& json, const std::string& where);
+
+}  // namespace regrade
