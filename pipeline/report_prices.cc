@@ -31,6 +31,7 @@ std::string FrontHtml(const Rows& rows) {
     (row->knob.empty() ? base : row->on_front ? front : beaten).points.push_back(point);
     if (row->on_front) line.points.push_back(point);
   }
+  if (line.points.size() < 2) line.points.clear();
   std::sort(line.points.begin(), line.points.end(),
             [](const PlotPoint& a, const PlotPoint& b) { return a.x < b.x; });
   for (PlotSeries* series : {&beaten, &front, &base, &line})

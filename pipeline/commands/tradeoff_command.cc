@@ -49,7 +49,8 @@ struct TradeoffOptions {
           .max = 100});
     bind("budget", budget,
          {.unit = "minutes",
-          .help = "no measurement begins after it; the same command again goes on; 0 has no "
+          .help = "after it no measurement begins but the first; the same command again goes "
+                  "on; 0 has no "
                   "end",
           .min = 0,
           .max = 1e6});
@@ -73,8 +74,10 @@ std::vector<std::string> Words(const std::string& text) {
   return words;
 }
 
-double SecondsSince(std::chrono::steady_clock::time_point begin) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+using Clock = std::chrono::steady_clock;
+
+double SecondsSince(Clock::time_point begin) {
+  return std::chrono::duration<double>(Clock::now() - begin).count();
 }
 
 // One measurement that is to be made.
@@ -165,18 +168,18 @@ void WriteResults(const RunContext& base, const TradeoffOptions& tradeoff,
 
 // What is not measured yet, one at a time, until all is or the budget is spent.
 void MeasureAll(RunContext* base, const TradeoffOptions& tradeoff, const std::string& folder,
-                const std::vector<Variant>& variants, MeasurementStore* store) {
+                const std::vector<Variant>& variants, Clock::time_point begin,
+                MeasurementStore* store) {
   std::vector<Job> jobs = JobsOf(variants, tradeoff.repeats);
   std::erase_if(
       jobs, [&](const Job& job) { return store->Find(*job.variant, job.repeat) != nullptr; });
   Console* console = base->console;
   Guess guess(base->settings, store->all());
-  const auto begin = std::chrono::steady_clock::now();
   Bench bench(base, folder + "/work");
   for (size_t i = 0; i < jobs.size(); ++i) {
     double left = 0;
     for (size_t k = i; k < jobs.size(); ++k) left += guess.Seconds(*jobs[k].variant);
-    if (tradeoff.budget > 0 && SecondsSince(begin) > 60 * tradeoff.budget) {
+    if (i > 0 && tradeoff.budget > 0 && SecondsSince(begin) > 60 * tradeoff.budget) {
       console->Warn("the budget is spent: " + std::to_string(jobs.size() - i) +
                     " measurements are left, about " + DurationText(left) +
                     "; the same command goes on");
@@ -267,6 +270,7 @@ void PrintPrediction(const TradeoffOptions& tradeoff, Console* console) {
 }  // namespace
 
 void RunTradeoff(const Command& command, const Arguments& arguments, Console* console) {
+  const Clock::time_point begin = Clock::now();
   TradeoffOptions tradeoff;
   RunContext base;
   base.console = console;
@@ -323,7 +327,7 @@ void RunTradeoff(const Command& command, const Arguments& arguments, Console* co
   RunPipeline("pose", style ? "evaluate" : "reconstruct", &base);
   WriteRunFile("run", base);
   MeasurementStore store(folder + "/measurements.json", Fingerprint(base, workspace));
-  MeasureAll(&base, tradeoff, folder, variants, &store);
+  MeasureAll(&base, tradeoff, folder, variants, begin, &store);
   WriteResults(base, tradeoff, folder, variants, store, base_name);
 }
 

@@ -16,9 +16,11 @@
 #include "pipeline/cpu_time.h"
 #include "pipeline/field_file.h"
 #include "pipeline/files/image_file.h"
+#include "pipeline/scene_profile.h"
 #include "pipeline/scene_views.h"
 #include "pipeline/stages/held_out.h"
 #include "pipeline/stages/scene_stylizer.h"
+#include "reconstruct/fit_field.h"
 
 namespace regrade {
 namespace {
@@ -149,29 +151,69 @@ void Bench::MeasurePoses(const Variant& variant, const ProgressFunction& progres
   for (const char* name : {"registered", "points"}) m->work[name] = outcome.figures.At(name);
 }
 
+// Photos at one working size, as a fit of the base's capture sees them; read once, for their
+// reading is the same for all variants and is none of their price.
+struct Bench::Photos {
+  int size = 0;
+  Capture capture;
+  PhotoGains gains;
+  NormalizedScene scene;
+  std::vector<Image> pictures;
+  std::vector<TrainingView> views;
+};
+
+const Bench::Photos& Bench::PhotosAt(int size) {
+  if (photos_ != nullptr && photos_->size == size) return *photos_;
+  photos_ = std::make_unique<Photos>();
+  Photos& p = *photos_;
+  const RunOptions& run = base_->settings.run;
+  p.size = size;
+  p.capture = ReadCapture(base_->workspace->Path("poses"));
+  p.gains = RecordedGains(*base_->workspace, p.capture);
+  // Exposures have no say in the box, and are known already.
+  p.scene =
+      ProfileScene(p.capture, base_->settings.fit.sh_degree, run.effects + ",exposure=off")
+          .scene;
+  const std::vector<int> fitted = ViewIndices(p.capture, run.holdout, false);
+  p.pictures.reserve(fitted.size());
+  for (const int i : fitted) {
+    const CaptureView& view = p.capture.views[static_cast<size_t>(i)];
+    p.pictures.push_back(ReadWorkingPhoto(view, size, p.gains.Of(i)));
+    p.views.push_back({WorkingCamera(view.camera, size, p.scene.field_from_world, p.scene.ndc),
+                       &p.pictures.back()});
+  }
+  return p;
+}
+
 void Bench::MeasureFit(const Variant& variant, const ProgressFunction& progress,
                        Measurement* m) {
-  Trial trial(*base_, variant, folder_);
-  trial.Take(*base_, "poses");
-  const Stage stage = ReconstructStage(&trial.context);
+  RunSettings settings = base_->settings;
+  OptionSet set;
+  settings.Bind(&set);
+  set.ApplyConfig(variant.options, "tradeoff");
+  const Photos& photos = PhotosAt(settings.scene.photo_size);
+  FitOptions options = settings.fit;
+  options.seed = settings.run.seed;
+  // The degree that the base's trial has decided for, unless it is the knob.
+  const auto record = base_->workspace->Find("reconstruct");
+  if (record && variant.knob != "sh-degree")
+    options.sh_degree = static_cast<int>(record->figures.At("sh_degree").AsInt());
+  FitHooks hooks;
+  hooks.progress = progress;
   Clocks clocks(m);
-  const StageOutcome outcome = stage.work(progress);
+  FitResult fit = FitField(photos.views, photos.scene.box, options, hooks);
   clocks.Stop();
-  for (const char* name : {"rays", "voxels", "sh_degree", "finest_grid"})
-    m->work[name] = outcome.figures.At(name);
+  m->work["rays"] = fit.rays;
+  m->work["samples"] = fit.samples;
+  m->work["voxels"] = fit.voxels;
   // All variants are measured at the base's size of photos, or they would not compare.
-  const int size = base_->settings.scene.photo_size;
-  if (trial.context.settings.scene.photo_size == size) {
-    m->accuracy = NumberOf(outcome.figures, "psnr_heldout_db");
-    return;
-  }
-  trial.workspace.Record("reconstruct", stage.inputs, outcome.outputs, 0, outcome.figures);
-  const Capture capture = ReadCapture(trial.workspace.Path("poses"));
-  m->accuracy = MeasureHeldOut(capture, base_->settings.run.holdout, size,
-                               RecordedGains(trial.workspace, capture),
-                               ReadFieldFile(trial.workspace.Path("field.npz")), Backend::kCpu)
-                    .MeanPsnr()
-                    .value_or(std::nan(""));
+  m->accuracy =
+      MeasureHeldOut(photos.capture, settings.run.holdout, base_->settings.scene.photo_size,
+                     photos.gains,
+                     {std::move(fit.field), photos.scene.field_from_world, photos.scene.ndc},
+                     Backend::kCpu)
+          .MeanPsnr()
+          .value_or(std::nan(""));
 }
 
 void Bench::MeasureStyle(const Variant& variant, const ProgressFunction& progress,

@@ -1,5 +1,5 @@
-// Measures one variant: the same stages that a run does, in a folder of their own, with a clock
-// beside them.
+// Measures one variant: the same fit and the same stages that a run does, with a clock beside
+// them.
 #pragma once
 
 #include <memory>
@@ -22,6 +22,7 @@ class Bench {
   Measurement Measure(const Variant& variant, int repeat, const ProgressFunction& progress);
 
  private:
+  struct Photos;  // read once, for the plane "fit"
   struct Frames;  // rendered once, for the planes "render" and "flow"
 
   void MeasurePoses(const Variant& variant, const ProgressFunction& progress, Measurement* m);
@@ -29,10 +30,12 @@ class Bench {
   void MeasureStyle(const Variant& variant, const ProgressFunction& progress, Measurement* m);
   void MeasureRender(const Variant& variant, Measurement* m);
   void MeasureFlow(const Variant& variant, Measurement* m);
+  const Photos& PhotosAt(int size);
   const Frames& BaseFrames();
 
   RunContext* base_;
   std::string folder_;
+  std::unique_ptr<Photos> photos_;
   std::unique_ptr<Frames> frames_;
 };
 

@@ -45,10 +45,7 @@ double Guess::Rough(const Variant& variant) const {
   if (variant.plane == "fit" || variant.plane == "style")
     options.ApplyConfig(variant.options, "tradeoff");
   const int threads = omp_get_max_threads();
-  if (variant.plane == "fit") {
-    constexpr double kBeside = 1.2;  // the trial of degrees, photos, held-out views
-    return kBeside * PlanFit(settings.fit, 0, SceneBox(), threads).seconds;
-  }
+  if (variant.plane == "fit") return PlanFit(settings.fit, 0, SceneBox(), threads).seconds;
   if (variant.plane == "style") return PlanStyle(settings.network.steps, threads).seconds;
   return variant.plane == "poses" ? kPoses : kFewSeconds;
 }

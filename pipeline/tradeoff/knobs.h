@@ -21,7 +21,7 @@ struct Plane {
 
 inline constexpr Plane kPlanes[] = {
     {"poses", "reprojection error", "px", false, "finding the poses"},
-    {"fit", "held-out PSNR", "dB", true, "a fit"},
+    {"fit", "held-out PSNR", "dB", true, "a fit's steps, photos read before"},
     {"style", "PSNR to the 2D method on the renders", "dB", true, "learning a style"},
     {"render", "RMS difference to the accurate end, of 255 levels", "levels", false, "a frame"},
     {"flow", "mean end-point error against exact motion", "px", false, "a pair, both ways"},

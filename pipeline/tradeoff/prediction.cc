@@ -20,7 +20,7 @@ struct StageUnits {
 const std::vector<StageUnits>& AllUnits() {
   static const std::vector<StageUnits> all = {
       {"pose", {"photo megapixels"}, "", {}},
-      {"reconstruct", {"ray voxels", "photo pixels"}, "fit", {"fit-steps", "fit-resolutions"}},
+      {"reconstruct", {"ray voxels"}, "fit", {"fit-steps", "fit-resolutions"}},
       {"style_2d", {"photo pixels"}, "", {}},
       {"stylize", {"style rays", "photo pixels"}, "style", {"style-steps"}},
       {"render", {"frame ray voxels"}, "", {}},
@@ -103,6 +103,12 @@ double AmountOf(const std::string& unit, const RunSettings& settings, const Capt
     return sum;
   }
   if (unit == "photo pixels") return pixels;
+  if (unit == "staged pixels") {
+    double sum = 0;
+    for (const CaptureView& view : capture.views)
+      sum += static_cast<double>(view.camera.width) * view.camera.height;
+    return sum;
+  }
   if (unit == "ray voxels") {
     double sum = 0;
     for (size_t s = 0; s < std::min(settings.fit.steps.size(), settings.fit.resolutions.size());
@@ -151,6 +157,15 @@ std::vector<PriceTerm> LearnPrices(const RunSettings& base, const Capture& captu
                               cpu = LeastSquares(seen, &Observation::cpu_seconds);
     for (size_t k = 0; k < stage.units.size(); ++k)
       prices.push_back({stage.stage, stage.units[k], seconds[k], cpu[k]});
+    if (stage.stage == std::string("reconstruct") && record) {
+      const double amount = AmountOf("staged pixels", base, capture);
+      const Observation own = ObservationOf(stage, base, capture, 0, 0);
+      const auto beside = [&](double whole, double factor) {
+        return amount > 0 ? std::max(0.0, whole - factor * own.amounts[0]) / amount : 0;
+      };
+      prices.push_back({stage.stage, "staged pixels", beside(record->seconds, seconds[0]),
+                        beside(record->cpu_seconds.value_or(record->seconds), cpu[0])});
+    }
   }
   return prices;
 }

@@ -23,12 +23,14 @@ struct StageTime {
 };
 
 // How much of `unit` a run of these settings does:
-//   photo megapixels at matching size | ray voxels: rays times the grid's side, over the fit |
-//   photo pixels: of all photos at working size | style rays | frame ray voxels | pair pixels
+//   photo megapixels: at matching size | ray voxels: rays times the grid's side, over the fit |
+//   photo pixels: at working size | staged pixels: as they were given | style rays |
+//   frame ray voxels | pair pixels
 double AmountOf(const std::string& unit, const RunSettings& settings, const Capture& capture);
 
-// From the records of a finished run, and for the fit and the style, where knobs of steps and
-// grids were measured, by least squares of relative errors over them.
+// From the records of a finished run; where knobs of steps and grids were measured, by least
+// squares of relative errors over them. A fit's steps have a price of their own, and what the
+// stage took beside them (photos, the trial of degrees, held-out views) goes by staged pixels.
 std::vector<PriceTerm> LearnPrices(const RunSettings& base, const Capture& capture,
                                    const Workspace& workspace,
                                    const std::vector<Variant>& variants,

@@ -26,6 +26,7 @@ RunReport SomeReport() {
       {}};
   report.consistency = {{"styled", 1, 3, 1, 29.79, 29.5, 0.8, {30.0, Figure(), 29.5}}};
   report.fidelity = {{"styled", 24.5, 0.19, 0.2, 12, 13, 0.01}};
+  report.prices = {{"fit", "fit-steps", "5", "PSNR", "dB", 1, 1, 2, 3, 4, 5, 6, 7, true, ""}};
   return report;
 }
 
