@@ -195,6 +195,7 @@ std::string HeadlineFiguresHtml(const RunReport& report) {
   } else if (styled != nullptr) {
     card("fidelity to the 2D method (PSNR)", FigureHtml(Figure(), 2));
   }
+  if (html.empty() && !report.prices.empty()) return "";  // a price list alone
   card("time", Duration(report.seconds));
   return "<dl class=cards>" + html + "</dl>";
 }

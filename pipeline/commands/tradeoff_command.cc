@@ -43,8 +43,8 @@ struct TradeoffOptions {
          {.help = "measured as points beside the knobs, dear and last; none leaves them out"});
     bind("repeats", repeats,
          {.unit = "measurements",
-          .help = "of everything, in an order that turns from one to the next; medians are "
-                  "printed, and with one alone there is no spread",
+          .help = "of everything, in an order that turns from one to the next, each with "
+                  "another seed; medians are printed, and with one alone there is no spread",
           .min = 1,
           .max = 100});
     bind("budget", budget,

@@ -193,7 +193,7 @@ void Bench::MeasureFit(const Variant& variant, const ProgressFunction& progress,
   set.ApplyConfig(variant.options, "tradeoff");
   const Photos& photos = PhotosAt(settings.scene.photo_size);
   FitOptions options = settings.fit;
-  options.seed = settings.run.seed;
+  options.seed = settings.run.seed + static_cast<uint64_t>(m->repeat);
   // The degree that the base's trial has decided for, unless it is the knob.
   const auto record = base_->workspace->Find("reconstruct");
   if (record && variant.knob != "sh-degree")
@@ -221,6 +221,7 @@ void Bench::MeasureStyle(const Variant& variant, const ProgressFunction& progres
   Trial trial(*base_, variant, folder_);
   for (const char* path : {"poses", "field.npz", "views_2d"}) trial.Take(*base_, path);
   for (const char* stage : {"reconstruct", "style_2d"}) trial.TakeRecord(*base_, stage);
+  trial.context.settings.run.seed += static_cast<uint64_t>(m->repeat);
   const Stage stage = StylizeStage(&trial.context);
   Clocks clocks(m);
   const StageOutcome outcome = stage.work(progress);

@@ -18,7 +18,8 @@ class Bench {
   Bench(RunContext* base, const std::string& folder);
   ~Bench();
 
-  // Throws Interrupted, and what the stages throw.
+  // Each repetition draws anew, so that the spread of accuracy is a seed's. Throws Interrupted,
+  // and what the stages throw.
   Measurement Measure(const Variant& variant, int repeat, const ProgressFunction& progress);
 
  private:
