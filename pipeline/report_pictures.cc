@@ -1,6 +1,7 @@
 #include "pipeline/report_pictures.h"
 
 #include <algorithm>
+#include <exception>
 #include <filesystem>
 #include <map>
 
@@ -25,13 +26,13 @@ std::optional<Image> ImageAt(const std::string& path) {
   try {
     Image image = ReadImage(path);
     if (image.channels == 3) return image;
-  } catch (const Error&) {
+  } catch (const std::exception&) {  // none leaves a parallel loop
   }
   return std::nullopt;
 }
 
 std::optional<ReportPicture> ThumbnailAt(const std::string& path) {
-  const std::optional<Image> image = ImageAt(path);
+  const std::optional<Image> image = path.empty() ? std::nullopt : ImageAt(path);
   if (!image) return std::nullopt;
   const double scale = std::min(
       1.0, static_cast<double>(kThumbnailSide) / std::max(image->width, image->height));
@@ -77,7 +78,7 @@ std::vector<std::optional<ReportPicture>> Thumbnails(const Workspace& workspace,
                                                      const Capture& capture) {
   const std::map<std::string, std::string> staged = StagedPictures(workspace);
   const int count = static_cast<int>(capture.verdicts.size());
-  std::vector<std::optional<ReportPicture>> thumbnails(capture.verdicts.size());
+  std::vector<std::string> wanted(capture.verdicts.size());
   int taken = 0;
   for (int i = 0; i < count; ++i) {
     const PhotoVerdict& photo = capture.verdicts[static_cast<size_t>(i)];
@@ -88,8 +89,13 @@ std::vector<std::optional<ReportPicture>> Thumbnails(const Workspace& workspace,
                      taken < (i + 1) * static_cast<int64_t>(kMostThumbnails) / count;
     if (photo.verdict == "used" && !due) continue;
     taken += photo.verdict == "used";
-    thumbnails[static_cast<size_t>(i)] = ThumbnailAt(path->second);
+    wanted[static_cast<size_t>(i)] = path->second;
   }
+  // Reading whole photos is what takes the time.
+  std::vector<std::optional<ReportPicture>> thumbnails(wanted.size());
+#pragma omp parallel for schedule(dynamic)
+  for (int i = 0; i < count; ++i)
+    thumbnails[static_cast<size_t>(i)] = ThumbnailAt(wanted[static_cast<size_t>(i)]);
   return thumbnails;
 }
 
