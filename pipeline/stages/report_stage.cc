@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "kernels/base/error.h"
 #include "kernels/field/fast_rays.h"
 #include "pipeline/capture_store.h"
 #include "pipeline/chart_library.h"
@@ -105,7 +106,11 @@ StageOutcome WriteReport(RunContext* context) {
   if (const auto record = workspace.Find("reconstruct"))
     if (const JsonValue* effects = record->figures.Find("effects"))
       report.effects = EffectsOfRecord(*effects);
-  report.prices = ReadPriceList(workspace.Path(kPriceList));
+  try {
+    report.prices = ReadPriceList(workspace.Path(kPriceList));
+  } catch (const Error& error) {  // a report is worth having without it
+    context->console->Warn(std::string(kPriceList) + " is left out: " + error.what_failed());
+  }
   const JsonValue options = context->options.Values();
   for (const auto& [name, value] : options.AsObject())
     report.options.push_back({name, value.IsString() ? value.AsString() : DumpJson(value, -1)});

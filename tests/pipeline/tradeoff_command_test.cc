@@ -79,6 +79,18 @@ TEST(TradeoffCommand, MeasuresGoesOnAndPredicts) {
   for (const char* stage : {"reconstruct", "stylize", "render", "evaluate", "all"})
     EXPECT_NE(outcome.text.find(std::string("\n") + stage), std::string::npos)
         << stage << outcome.text;
+
+  // Beside a run the list becomes part of its report; a damaged one is left out, and said.
+  const auto page = [&] { return testing::ReadText(folder / "t/base/report.html"); };
+  testing::WriteText(folder / "t/base/tradeoff/tradeoff.json", "{\"prices\": [{}]}");
+  outcome = Regrade({"evaluate", folder / "t/base"});
+  ASSERT_EQ(outcome.code, 0) << outcome.text;
+  EXPECT_NE(outcome.text.find("tradeoff.json is left out"), std::string::npos) << outcome.text;
+  EXPECT_EQ(page().find("What accuracy costs here"), std::string::npos);
+  testing::WriteText(folder / "t/base/tradeoff/tradeoff.json",
+                     testing::ReadText(folder / "t/tradeoff.json"));
+  EXPECT_EQ(Regrade({"evaluate", folder / "t/base"}).code, 0);
+  EXPECT_NE(page().find("What accuracy costs here"), std::string::npos);
 }
 
 TEST(TradeoffCommand, SaysWhatWillNotDo) {
