@@ -122,7 +122,8 @@ void Console::Say(const std::string& text, bool warning) {
   Erase();
   const char* begin = warning && color_ ? "\033[33m" : "";
   const char* end = warning && color_ ? "\033[0m" : "";
-  Put(stderr, std::string(begin) + (warning ? "warning: " : "") + line + end + "\n");
+  if (!quiet_ || warning)
+    Put(stderr, std::string(begin) + (warning ? "warning: " : "") + line + end + "\n");
   if (log_ != nullptr)
     log_->logger.log(warning ? spdlog::level::warn : spdlog::level::info,
                      spdlog::string_view_t(line.data(), line.size()));
@@ -130,7 +131,7 @@ void Console::Say(const std::string& text, bool warning) {
 
 void Console::Info(const std::string& text) {
   Say(text, false);
-  Event("info", JsonValue::Object{{"text", text}});
+  if (!quiet_) Event("info", JsonValue::Object{{"text", text}});
 }
 
 void Console::Lines(const std::string& text) {
@@ -189,6 +190,7 @@ ProgressFunction Console::StageProgress() {
 }
 
 void Console::Draw(const Progress& progress) {
+  if (quiet_) return;
   const Clock::time_point now = Clock::now();
   eta_.Add(Seconds(now - stage_begin_), progress.done, progress.total);
   const double interval = terminal_ ? 0.1 : json_ ? 1.0 : 10.0;  // seconds

@@ -41,6 +41,9 @@ class Console {
   void Warn(const std::string& text);
   void Fail(const Error& error);
   void Fail(const std::string& text, ExitCode code);
+  // While it is quiet, messages and progress go to the log only; warnings and failures are
+  // said.
+  void SetQuiet(bool quiet) { quiet_ = quiet; }
   // What survives a failure from now on; part of the message.
   void SetKept(const std::string& kept) { kept_ = kept; }
   // A line of JSON {"event": name, ...members} with --json, nothing without.
@@ -62,6 +65,7 @@ class Console {
   bool terminal_ = false;
   bool color_ = false;
   bool line_drawn_ = false;
+  bool quiet_ = false;
   std::unique_ptr<Log> log_;
   std::string stage_, kept_;
   EtaEstimator eta_;

@@ -5,7 +5,7 @@
 namespace regrade {
 namespace {
 
-constexpr uint32_t kVersion = 1;
+constexpr uint32_t kVersion = 2;
 
 bool Consistent(const FastGrid& grid) {
   if (grid.basis != 1 && grid.basis != 4 && grid.basis != 9) return false;
@@ -33,13 +33,45 @@ bool Consistent(const FastSpheres& spheres) {
   return true;
 }
 
+void PackTally(const FitTally& tally, BytePacker* packer) {
+  packer->Value(tally.window_error);
+  packer->Value(tally.tail_error);
+  for (const int64_t count :
+       {tally.window_rays, tally.tail_rays, tally.rays, tally.samples, tally.rejected_voxels})
+    packer->Value(count);
+  packer->Value(static_cast<int64_t>(tally.curve.size()));
+  for (const FitCurvePoint& point : tally.curve) {
+    packer->Value(point.rays);
+    packer->Value(point.seconds);
+    packer->Value(point.psnr_train_db);
+    packer->Value(point.step);
+  }
+}
+
+void UnpackTally(ByteUnpacker* unpacker, FitTally* tally) {
+  unpacker->Value(&tally->window_error);
+  unpacker->Value(&tally->tail_error);
+  for (int64_t* count : {&tally->window_rays, &tally->tail_rays, &tally->rays, &tally->samples,
+                         &tally->rejected_voxels})
+    unpacker->Value(count);
+  int64_t points = 0;
+  unpacker->Value(&points);
+  for (int64_t i = 0; i < points && unpacker->ok(); ++i) {
+    FitCurvePoint& point = tally->curve.emplace_back();
+    unpacker->Value(&point.rays);
+    unpacker->Value(&point.seconds);
+    unpacker->Value(&point.psnr_train_db);
+    unpacker->Value(&point.step);
+  }
+}
+
 }  // namespace
 
 std::string PackFitState(const FitState& state) {
   const FastGrid& grid = state.grid;
   BytePacker packer;
-  constexpr size_t kHead = 256;  // generously
-  packer.Reserve(kHead + sizeof(int32_t) * static_cast<size_t>(grid.links.size()) +
+  const size_t head = 256 + sizeof(FitCurvePoint) * state.tally.curve.size();  // generously
+  packer.Reserve(head + sizeof(int32_t) * static_cast<size_t>(grid.links.size()) +
                  sizeof(float) * static_cast<size_t>(
                                      grid.records.size() + state.second_moment.size() +
                                      grid.spheres.links.size() + grid.spheres.texels.size() +
@@ -55,6 +87,7 @@ std::string PackFitState(const FitState& state) {
     packer.Value(grid.background[a]);
   }
   packer.Value(grid.near_clip);
+  PackTally(state.tally, &packer);
   packer.Values(grid.links);
   packer.Values(grid.records);
   packer.Values(state.second_moment);
@@ -84,6 +117,7 @@ std::optional<FitState> UnpackFitState(std::string_view bytes) {
     unpacker.Value(&grid.background[a]);
   }
   unpacker.Value(&grid.near_clip);
+  UnpackTally(&unpacker, &state.tally);
   unpacker.Values(&grid.links);
   unpacker.Values(&grid.records);
   unpacker.Values(&state.second_moment);

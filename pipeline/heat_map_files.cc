@@ -8,11 +8,10 @@
 #include "pipeline/files/image_file.h"
 
 namespace regrade {
-namespace {
 
-constexpr char kFolder[] = "heatmaps";
-
-void RemoveOldMaps(const std::string& folder) {
+void BeginHeatMaps(const Workspace& workspace) {
+  workspace.NewPath(std::string(kHeatMapFolder) + "/x");
+  const std::string folder = workspace.Path(kHeatMapFolder);
   std::error_code none;
   std::vector<std::filesystem::path> old;
   for (const auto& entry : std::filesystem::directory_iterator(folder, none)) {
@@ -23,23 +22,20 @@ void RemoveOldMaps(const std::string& folder) {
   for (const auto& path : old) std::filesystem::remove(path, none);
 }
 
-}  // namespace
-
-std::vector<HeatMapFile> WriteHeatMaps(const Workspace& workspace, const FrameSource& reference,
+std::vector<HeatMapFile> WriteHeatMaps(const Workspace& workspace,
+                                       const PairMotionFunction& motion,
                                        const std::vector<NamedFrameSource>& sequences,
-                                       const ConsistencyOptions& options,
+                                       const std::vector<int>& gaps,
                                        const ConsistencyReport& report) {
-  RemoveOldMaps(workspace.Path(kFolder));
-  const PairMotionFunction motion = EstimatedMotion(reference, options.mode, options.flow);
   std::map<std::pair<int, int>, PairMotion> motions;  // sequences often share their worst pair
   std::vector<HeatMapFile> written;
   for (const NamedFrameSource& sequence : sequences)
-    for (const int gap : options.gaps) {
+    for (const int gap : gaps) {
       const PairResult* worst = WorstPair(sequence.name, gap, report.pairs);
       if (worst == nullptr || *worst->error == 0) continue;
       const auto key = std::pair(worst->from, worst->to);
       if (!motions.count(key)) motions[key] = motion(worst->from, worst->to);
-      const std::string path = std::string(kFolder) + "/" + HeatMapFileName(*worst);
+      const std::string path = std::string(kHeatMapFolder) + "/" + HeatMapFileName(*worst);
       WritePng8(workspace.NewPath(path),
                 ErrorHeatMap(sequence.frames.frame(worst->from),
                              sequence.frames.frame(worst->to), motions[key]));

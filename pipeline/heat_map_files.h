@@ -15,15 +15,20 @@ struct HeatMapFile {
   std::string path;  // relative to the output folder
 };
 
+inline constexpr char kHeatMapFolder[] = "heatmaps";
+
+// Makes the folder, and removes maps of an earlier evaluation from it.
+void BeginHeatMaps(const Workspace& workspace);
+
 // Writes heatmaps/NAME_gap1_00012.png for the pair with the largest error of each row, see
-// ErrorHeatMap; rows whose pairs are all perfect or undefined have none. Maps of an earlier
-// evaluation in this folder are removed. Flow and masks of these pairs are computed once more
-// (the evaluation keeps none of them).
+// ErrorHeatMap; rows whose pairs are all perfect or undefined have none. Flow and masks of
+// these pairs are computed once more by `motion` (the evaluation keeps none of them).
 //
 // Errors: as EvaluateConsistency, and kResources from the disk.
-std::vector<HeatMapFile> WriteHeatMaps(const Workspace& workspace, const FrameSource& reference,
+std::vector<HeatMapFile> WriteHeatMaps(const Workspace& workspace,
+                                       const PairMotionFunction& motion,
                                        const std::vector<NamedFrameSource>& sequences,
-                                       const ConsistencyOptions& options,
+                                       const std::vector<int>& gaps,
                                        const ConsistencyReport& report);
 
 }  // namespace regrade

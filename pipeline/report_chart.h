@@ -1,5 +1,5 @@
-// The small drawings of report.html: how consistent each pair of frames is, sequence by
-// sequence, and how the network's Lipschitz bound went while it was learned.
+// The drawings of report.html: how consistent each pair of frames is, sequence by sequence, how
+// the fit learned, and how the network's Lipschitz bound went.
 #pragma once
 
 #include <string>
@@ -8,12 +8,14 @@
 
 namespace regrade {
 
-// Inline SVG of tc_psnr_pairs_db at the smallest gap; gaps in a line are undefined pairs. ""
-// without pairs.
+// tc_psnr_pairs_db at the smallest gap; gaps in a line are undefined pairs. Frames at the
+// photos' places and those of the film's way have a drawing each. "" without pairs.
 std::string ConsistencyChartHtml(const RunReport& report);
 
-// Inline SVG of bound_at_steps, with K_est beside it, on a logarithmic scale. "" without two
-// points.
+// psnr_at_steps, with the held-out figure beside it. "" without two points.
+std::string FitChartHtml(const ReconstructReport& stage);
+
+// bound_at_steps, with K_est beside it, on a logarithmic scale. "" without two points.
 std::string BoundChartHtml(const StylizeReport& stage);
 
 }  // namespace regrade

@@ -61,7 +61,8 @@ struct ReconstructReport {
   double seconds = 0;
   int64_t voxels = 0;
   Figure psnr_train_db, psnr_heldout_db, ssim_heldout;
-  std::vector<std::string> heldout;  // the user's file names
+  std::vector<std::string> heldout;                       // the user's file names
+  std::vector<std::pair<int64_t, double>> psnr_at_steps;  // dB on the rays of the last steps
 };
 
 struct Style2dReport {
@@ -128,7 +129,8 @@ struct ConsistencyFigures {
   Figure coverage;                         // mean share of valid pixels
   std::vector<Figure> tc_psnr_pairs_db;    // one for each pair in order of time; may be empty
   Figure tc_psnr_low_db, tc_psnr_high_db;  // the mean of dB lies between with 95 %
-  std::string heat_map;  // picture of the worst pair, relative to the folder; may be empty
+  std::string heat_map;   // picture of the worst pair, relative to the folder; may be empty
+  int heat_map_from = 0;  // the pair's first frame
 };
 
 // What one pair of one sequence says, and which pixels had no say in it.
@@ -153,13 +155,20 @@ struct FidelityFigures {
   Figure sliced_wasserstein_to_style;
 };
 
-// What one knob costs and buys, measured on this machine.
+// What one value of a knob costs and buys, measured on this machine. Rows of one plane compare
+// with each other.
 struct PriceRow {
-  std::string knob;     // the flag, "--style-steps"
+  std::string plane;    // "fit"
+  std::string knob;     // the option, "fit-steps"; empty for what all others are compared with
   std::string setting;  // "300"
-  Figure seconds;
-  Figure psnr_db;  // the accuracy that the knob buys; `measure` says which
-  std::string measure;
+  std::string measure;  // what accuracy is: "held-out PSNR"
+  std::string unit;     // "dB"
+  int repeats = 1;
+  // Medians, and half of what lies between the least and the most.
+  Figure seconds, seconds_spread, cpu_seconds, cpu_spread, accuracy, accuracy_spread;
+  Figure error;              // against the knob's accurate end; positive is worse
+  bool on_front = false;     // nothing is as accurate in less time
+  std::string dominated_by;  // what is better beyond the spreads; may be empty
 };
 
 // An option in effect, as run.json has it.
@@ -174,6 +183,8 @@ struct RunReport {
   uint64_t seed = 0;
   double seconds = 0;
   Figure peak_memory_mb;
+  // By stage, all threads and the programs that it started; of its last start.
+  std::vector<std::pair<std::string, double>> cpu_seconds;
   std::optional<PhotosReport> photos;
   std::vector<EffectReport> effects;
   StagesReport stages;
@@ -181,7 +192,8 @@ struct RunReport {
   std::vector<PairFigures> pairs;  // of all sequences, by first frame
   std::vector<FidelityFigures> fidelity;
   std::vector<PriceRow> prices;
-  std::vector<OptionValue> options;  // of run.json; shown on the page only
+  std::vector<OptionValue> options;   // of run.json; shown on the page only
+  std::vector<OptionValue> versions;  // of this program's parts and helpers
 };
 
 }  // namespace regrade

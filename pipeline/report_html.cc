@@ -2,10 +2,11 @@
 #include "pipeline/report_html.h"
 
 #include <algorithm>
-#include <string_view>
 
 #include "pipeline/html_text.h"
 #include "pipeline/report_page_assets.h"
+#include "pipeline/report_photos.h"
+#include "pipeline/report_prices.h"
 #include "pipeline/report_tables.h"
 
 namespace regrade {
@@ -15,24 +16,6 @@ namespace {
 constexpr char kPolicy[] =
     "default-src 'none'; img-src data:; media-src 'self' file:; style-src 'unsafe-inline'; "
     "script-src 'unsafe-inline'; base-uri 'none'; form-action 'none'";
-
-std::string DataUrl(const ReportPicture& picture) {
-  const bool png = std::string_view(picture.bytes).substr(0, 4) == "\x89PNG";
-  return std::string("data:image/") + (png ? "png" : "jpeg") + ";base64," +
-         Base64(picture.bytes);
-}
-
-std::string PictureHtml(const std::optional<ReportPicture>& picture,
-                        const std::string& caption) {
-  if (!picture) return "";
-  std::string size;
-  if (picture->width > 0 && picture->height > 0) {
-    size = " width=" + std::to_string(picture->width) +
-           " height=" + std::to_string(picture->height);
-  }
-  return "<figure><img alt=\"" + EscapeHtml(caption) + "\"" + size + " src=\"" +
-         DataUrl(*picture) + "\"><figcaption>" + EscapeHtml(caption) + "</figcaption></figure>";
-}
 
 // Two pictures side by side; with script, one over the other with a sliding edge.
 std::string CompareHtml(const ReportView& view) {
@@ -58,12 +41,16 @@ std::string FilmHtml(const char* file, const char* caption,
 }
 
 std::string FilmsHtml(const ReportPictures& pictures, const ReportView* headline) {
-  if (!pictures.has_styled_film && !pictures.has_wipe_film) return "";
+  if (!pictures.has_styled_film && !pictures.has_wipe_film && !pictures.has_views_2d_film)
+    return "";
   const std::optional<ReportPicture> poster = headline ? headline->styled : std::nullopt;
   std::string html = "<h2>Films</h2><div class=films>";
   if (pictures.has_styled_film) html += FilmHtml("styled.mp4", "the styled scene", poster);
   if (pictures.has_wipe_film)
     html += FilmHtml("source_vs_styled.mp4", "before and styled, as a wipe", std::nullopt);
+  if (pictures.has_views_2d_film)
+    html += FilmHtml("views_2d.mp4", "the 2D method, frame by frame",
+                     headline ? headline->views_2d : std::nullopt);
   return html + "</div>";
 }
 
@@ -128,10 +115,16 @@ std::string ReportHtml(const RunReport& report, const ReportPictures& pictures) 
   for (const std::string& section :
        {HeadlineFiguresHtml(report), FilmsHtml(pictures, headline), ViewsHtml(pictures),
         ConsistencyHtml(report), HeatMapsHtml(pictures), StagesHtml(report), PricesHtml(report),
-        EffectsHtml(report), PhotosHtml(report), RepeatHtml(report)}) {
+        EffectsHtml(report), PhotosHtml(report, pictures),
+        RepeatHtml(report, pictures.run_json)}) {
     if (!section.empty()) html += "<section>" + section + "</section>\n";
   }
-  return html + "</main></body></html>\n";
+  html += "</main>";
+  // Last, so that the page is there before a script is read.
+  if (!pictures.chart_library.empty())
+    html += "<script>" + pictures.chart_library + "</script>\n<script>" + kReportPlotScript +
+            "</script>";
+  return html + "</body></html>\n";
 }
 
 }  // namespace regrade

@@ -6,15 +6,11 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/report_camera_map.h"
 #include "pipeline/report_data.h"
+#include "pipeline/report_picture.h"
 
 namespace regrade {
-
-// An encoded picture, carried inside the page.
-struct ReportPicture {
-  std::string bytes;  // of a whole JPEG or PNG file
-  int width = 0, height = 0;
-};
 
 // One viewpoint through all sequences; a missing picture is left out.
 struct ReportView {
@@ -33,8 +29,14 @@ struct ReportPictures {
   std::optional<ReportPicture> style;  // the style picture
   std::vector<ReportView> views;       // the middle one is the headline
   std::vector<ReportHeatMap> heat_maps;
-  bool has_styled_film = false;  // styled.mp4 lies beside the page
-  bool has_wipe_film = false;    // source_vs_styled.mp4 does
+  bool has_styled_film = false;    // styled.mp4 lies beside the page
+  bool has_wipe_film = false;      // source_vs_styled.mp4 does
+  bool has_views_2d_film = false;  // views_2d.mp4 does
+  // Of the photos in the order of their verdicts; may be missing or fewer.
+  std::vector<std::optional<ReportPicture>> thumbnails;
+  CameraMap cameras;
+  std::string chart_library;  // see ReadChartLibrary; may be empty
+  std::string run_json;       // what repeats the run
 };
 
 // The whole page, UTF-8. Every string in the arguments may be hostile.

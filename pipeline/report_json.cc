@@ -35,6 +35,12 @@ JsonValue List(const Rows& rows, ToJson&& to_json) {
   return array;
 }
 
+JsonValue CurveJson(const std::vector<std::pair<int64_t, double>>& curve) {
+  return List(curve, [](const std::pair<int64_t, double>& at) {
+    return JsonValue(JsonValue::Array{at.first, at.second});
+  });
+}
+
 JsonValue PhotosJson(const PhotosReport& photos) {
   return Object{{"given", photos.given},
                 {"used", photos.used},
@@ -67,6 +73,8 @@ JsonValue StageJson(const ReconstructReport& stage) {
   Put(object, "psnr_heldout_db", stage.psnr_heldout_db);
   Put(object, "ssim_heldout", stage.ssim_heldout);
   object.emplace_back("heldout", Strings(stage.heldout));
+  if (!stage.psnr_at_steps.empty())
+    object.emplace_back("psnr_at_steps", CurveJson(stage.psnr_at_steps));
   return object;
 }
 
@@ -96,10 +104,7 @@ JsonValue StageJson(const StylizeReport& stage) {
   Put(object, "linear_map_psnr_to_2d_db", stage.linear_map_psnr_to_2d_db);
   Put(object, "slope_ascent", stage.slope_ascent);
   if (!stage.bound_at_steps.empty())
-    object.emplace_back("bound_at_steps",
-                        List(stage.bound_at_steps, [](const std::pair<int64_t, double>& at) {
-                          return JsonValue(JsonValue::Array{at.first, at.second});
-                        }));
+    object.emplace_back("bound_at_steps", CurveJson(stage.bound_at_steps));
   if (stage.variance) object.emplace_back("variance", VarianceJson(*stage.variance));
   return object;
 }
@@ -114,10 +119,15 @@ JsonValue StageJson(const EvaluateReport& stage) {
   return Object{{"seconds", stage.seconds}, {"flow", stage.flow}, {"mask", stage.mask}};
 }
 
-JsonValue StagesJson(const StagesReport& stages) {
+JsonValue StagesJson(const RunReport& report) {
+  const StagesReport& stages = report.stages;
   Object object;
   const auto add = [&](const char* name, const auto& stage) {
-    if (stage) object.emplace_back(name, StageJson(*stage));
+    if (!stage) return;
+    JsonValue json = StageJson(*stage);
+    for (const auto& [of, seconds] : report.cpu_seconds)
+      if (of == name) json["cpu_seconds"] = seconds;
+    object.emplace_back(name, std::move(json));
   };
   add("pose", stages.pose);
   add("reconstruct", stages.reconstruct);
@@ -138,7 +148,10 @@ JsonValue ConsistencyJson(const ConsistencyFigures& row) {
   Put(object, "tc_psnr_low_db", row.tc_psnr_low_db);
   Put(object, "tc_psnr_high_db", row.tc_psnr_high_db);
   Put(object, "coverage", row.coverage);
-  if (!row.heat_map.empty()) object.emplace_back("heat_map", row.heat_map);
+  if (!row.heat_map.empty()) {
+    object.emplace_back("heat_map", row.heat_map);
+    object.emplace_back("heat_map_from", row.heat_map_from);
+  }
   if (!row.tc_psnr_pairs_db.empty()) {
     object.emplace_back("tc_psnr_pairs_db", List(row.tc_psnr_pairs_db, [](const Figure& pair) {
                           return pair.value ? JsonValue(*pair.value) : JsonValue();
@@ -175,15 +188,22 @@ JsonValue FidelityJson(const FidelityFigures& row) {
   return object;
 }
 
+}  // namespace
+
 JsonValue PriceJson(const PriceRow& price) {
-  Object object{{"knob", price.knob}, {"setting", price.setting}};
+  Object object{{"plane", price.plane},     {"knob", price.knob}, {"setting", price.setting},
+                {"measure", price.measure}, {"unit", price.unit}, {"repeats", price.repeats}};
   Put(object, "seconds", price.seconds);
-  Put(object, "psnr_db", price.psnr_db);
-  object.emplace_back("measure", price.measure);
+  Put(object, "seconds_spread", price.seconds_spread);
+  Put(object, "cpu_seconds", price.cpu_seconds);
+  Put(object, "cpu_spread", price.cpu_spread);
+  Put(object, "accuracy", price.accuracy);
+  Put(object, "accuracy_spread", price.accuracy_spread);
+  Put(object, "error", price.error);
+  object.emplace_back("on_front", price.on_front);
+  object.emplace_back("dominated_by", TextOrNull(price.dominated_by));
   return object;
 }
-
-}  // namespace
 
 JsonValue ReportJson(const RunReport& report) {
   Object object{{"schema", kSchema},
@@ -196,11 +216,17 @@ JsonValue ReportJson(const RunReport& report) {
   Put(object, "peak_memory_mb", report.peak_memory_mb);
   if (report.photos) object.emplace_back("photos", PhotosJson(*report.photos));
   object.emplace_back("effects", List(report.effects, EffectJson));
-  object.emplace_back("stages", StagesJson(report.stages));
+  object.emplace_back("stages", StagesJson(report));
   object.emplace_back("consistency", List(report.consistency, ConsistencyJson));
   object.emplace_back("fidelity", List(report.fidelity, FidelityJson));
   if (!report.pairs.empty())
     object.emplace_back("consistency_pairs", List(report.pairs, PairJson));
+  if (!report.versions.empty()) {
+    Object versions;
+    for (const OptionValue& version : report.versions)
+      versions.emplace_back(version.name, version.value);
+    object.emplace_back("versions", std::move(versions));
+  }
   if (!report.prices.empty()) object.emplace_back("prices", List(report.prices, PriceJson));
   return object;
 }

@@ -11,6 +11,8 @@ namespace regrade {
 // were measured.
 JsonValue ReportJson(const RunReport& report);
 
+JsonValue PriceJson(const PriceRow& price);
+
 // {"schema": 1, "consistency": [...], "fidelity": [...], "consistency_pairs": [...]}: what
 // `regrade evaluate` writes for any program's frames; the pairs where there are any.
 JsonValue EvaluationJson(const RunReport& report);

@@ -14,10 +14,12 @@ html{-webkit-text-size-adjust:100%}
 body{margin:0;background:var(--paper);color:var(--ink);font:16px/1.55 system-ui,-apple-system,"Segoe UI",Roboto,sans-serif}
 main{max-width:68rem;margin:0 auto;padding:2.5rem 1.25rem 5rem}
 h1{font:600 2rem/1.2 ui-serif,Georgia,"Times New Roman",serif;margin:0;letter-spacing:-.01em;overflow-wrap:anywhere}
+h3{font-size:1.05rem;margin:1.75rem 0 .25rem}
 h2{font:600 1.35rem/1.3 ui-serif,Georgia,"Times New Roman",serif;margin:3.25rem 0 .5rem}
-p{margin:.4rem 0 1rem;max-width:46rem}
+p{margin:.4rem 0 1rem;max-width:46rem;overflow-wrap:anywhere}
 .soft,figcaption,.facts,.note{color:var(--soft)}
 .facts{margin:.35rem 0 1.75rem;font-size:.9rem}
+td code{white-space:nowrap;overflow-wrap:normal}
 code,pre{font:.85em/1.5 ui-monospace,SFMono-Regular,Menlo,Consolas,monospace;overflow-wrap:anywhere}
 pre{background:var(--wash);padding:.9rem 1.1rem;border-radius:.5rem;white-space:pre-wrap}
 figure{margin:0;min-width:0}
@@ -57,15 +59,26 @@ th.n{white-space:normal}
 .none{color:var(--soft);border-bottom:1px dotted;cursor:help}
 .bar{display:block;height:.35rem;border-radius:.2rem;background:var(--accent);min-width:2px;margin-top:.35rem}
 .on,.used{color:var(--good)}.skipped,.unregistered{color:var(--bad)}
-.chart{display:block;width:100%;max-width:46rem;height:auto;font-size:11px;margin-top:1.5rem}
+.plot{margin-top:1.5rem;max-width:46rem}
+.chart{display:block;width:100%;height:auto;font-size:11px}
 .chart text{fill:var(--soft)}.chart line{stroke:var(--line)}
 .chart polyline{fill:none;stroke-width:1.6;stroke-linejoin:round}
+.plot .canvas{position:relative;height:17rem}
+.plot.live .chart,.plot.live .legend{display:none}
+.map svg{display:block;width:100%;max-width:34rem;height:auto;max-height:34rem;background:var(--wash);border-radius:.4rem}
+.map .points{stroke:var(--s0);stroke-width:1.6;stroke-linecap:round;opacity:.45;fill:none}
+.map .cam{fill:var(--s1);stroke:var(--s1)}.map .kept{fill:var(--s2);stroke:var(--s2)}
+.map path{fill-opacity:.18;stroke-width:1}
+.thumbs{display:grid;grid-template-columns:repeat(auto-fill,minmax(6rem,1fr));gap:.6rem;margin-top:.75rem}
+.thumbs img{width:100%;height:auto}
+.thumb{width:auto;max-width:6rem}
 .k0{stroke:var(--s0);fill:var(--s0)}.k1{stroke:var(--s1);fill:var(--s1)}.k2{stroke:var(--s2);fill:var(--s2)}.k3{stroke:var(--s3);fill:var(--s3)}
-.legend{display:flex;flex-wrap:wrap;gap:.3rem 1.2rem;font-size:.85rem}
+.legend{overflow-wrap:anywhere;margin-top:.3rem;display:flex;flex-wrap:wrap;gap:.3rem 1.2rem;font-size:.85rem}
 .legend i{display:inline-block;width:1.1rem;height:.2rem;margin-right:.4rem;vertical-align:middle}
 .legend .k0{background:var(--s0)}.legend .k1{background:var(--s1)}.legend .k2{background:var(--s2)}.legend .k3{background:var(--s3)}
 details{margin-top:.75rem}summary{cursor:pointer;color:var(--accent)}
-@media(max-width:40rem){main{padding:1.5rem 1rem 3rem}h1{font-size:1.6rem}h2{margin-top:2.5rem}
+@media(max-width:40rem){.chart{font-size:15px}.plot .canvas{height:15rem}
+main{padding:1.5rem 1rem 3rem}h1{font-size:1.6rem}h2{margin-top:2.5rem}
 th,td{padding:.4rem .4rem}table{font-size:.85rem}.w{min-width:9rem}
 .view{grid-template-columns:1fr 1fr}.cards{grid-template-columns:1fr 1fr}}
 @media print{.js .compare{display:grid}.js .compare figure+figure{position:static;clip-path:none}}
@@ -75,6 +88,30 @@ const char kReportScript[] = R"js(
 document.documentElement.className='js';
 document.addEventListener('input',function(e){var c=e.target.closest('.compare');
 if(c)c.style.setProperty('--cut',e.target.value+'%')});
+)js";
+
+const char kReportPlotScript[] = R"js(
+(function(){
+if(!window.Chart)return;
+var css=getComputedStyle(document.documentElement);
+function ink(name){return css.getPropertyValue(name).trim()}
+function axis(title,log){return{type:log?'logarithmic':'linear',title:{display:true,text:title,color:ink('--soft')},
+grid:{color:ink('--line')},ticks:{color:ink('--soft'),maxTicksLimit:8}}}
+document.querySelectorAll('.plot').forEach(function(figure){
+var data=JSON.parse(figure.querySelector('script').textContent);
+var box=document.createElement('div'),canvas=document.createElement('canvas');
+box.className='canvas';box.appendChild(canvas);figure.insertBefore(box,figure.firstChild);
+canvas.setAttribute('role','img');canvas.setAttribute('aria-label',figure.querySelector('svg').getAttribute('aria-label'));
+new Chart(canvas,{type:'scatter',data:{datasets:data.series.map(function(s){var colour=ink('--s'+s.colour);return{
+label:s.name,labels:s.labels,showLine:!s.dots,borderWidth:1.8,borderColor:colour,backgroundColor:colour,
+pointRadius:s.dots?4:0,pointHitRadius:8,
+data:s.points.map(function(p){return{x:p[0],y:p[1]}})}})},
+options:{animation:false,responsive:true,maintainAspectRatio:false,interaction:{mode:data.series[0].dots?'nearest':'index',intersect:false},
+scales:{x:axis(data.x,data.log_x),y:axis(data.y,data.log_y)},
+plugins:{legend:{position:'bottom',labels:{color:ink('--ink'),boxWidth:14,boxHeight:2}},
+tooltip:{callbacks:{label:function(c){var l=c.dataset.labels&&c.dataset.labels[c.dataIndex];
+return(l?l+': ':c.dataset.label+': ')+c.formattedValue}}}}}});
+figure.classList.add('live')})})();
 )js";
 
 }  // namespace regrade

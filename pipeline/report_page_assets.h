@@ -6,5 +6,7 @@ namespace regrade {
 
 extern const char kReportCss[];
 extern const char kReportScript[];
+// Draws every plot of the page by Chart.js, which must be there.
+extern const char kReportPlotScript[];
 
 }  // namespace regrade

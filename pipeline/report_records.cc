@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "pipeline/stage_runner.h"
+
 namespace regrade {
 namespace {
 
@@ -50,6 +52,8 @@ ConsistencyFigures ConsistencyOf(const JsonValue& row) {
   figures.coverage = FigureOf(row, "coverage");
   figures.tc_psnr_low_db = FigureOf(row, "tc_psnr_low_db");
   figures.tc_psnr_high_db = FigureOf(row, "tc_psnr_high_db");
+  figures.heat_map = TextOf(row, "heat_map");
+  figures.heat_map_from = static_cast<int>(CountOf(row, "heat_map_from"));
   for (const JsonValue& pair : row.At("tc_psnr_pairs_db").AsArray())
     figures.tc_psnr_pairs_db.push_back(pair.IsNumber() ? Figure(pair.AsDouble())
                                                        : Figure::Undefined("not defined"));
@@ -114,10 +118,24 @@ VarianceFigures VarianceOf(const JsonValue& record) {
   return variance;
 }
 
+// Two arrays of a record, steps and what was measured at them.
+std::vector<std::pair<int64_t, double>> CurveOf(const JsonValue& figures, const char* at,
+                                                const char* of) {
+  std::vector<std::pair<int64_t, double>> curve;
+  const JsonValue *steps = figures.Find(at), *values = figures.Find(of);
+  if (steps == nullptr || values == nullptr) return curve;
+  const size_t points = std::min(steps->AsArray().size(), values->AsArray().size());
+  for (size_t i = 0; i < points; ++i)
+    if (values->AsArray()[i].IsNumber())
+      curve.emplace_back(steps->AsArray()[i].AsInt(), values->AsArray()[i].AsDouble());
+  return curve;
+}
+
 }  // namespace
 
 JsonValue EvaluationRecord(const ConsistencyReport& consistency,
-                           const std::vector<FidelityRow>& fidelity) {
+                           const std::vector<FidelityRow>& fidelity,
+                           const std::vector<HeatMapFile>& heat_maps) {
   JsonValue::Array rows, pair_rows, fidelity_rows;
   for (const ConsistencyRow& row : consistency.rows) {
     JsonValue::Array pairs;
@@ -137,6 +155,11 @@ JsonValue EvaluationRecord(const ConsistencyReport& consistency,
         few);
     entry["coverage"] = row.coverage;
     entry["tc_psnr_pairs_db"] = std::move(pairs);
+    for (const HeatMapFile& map : heat_maps) {
+      if (map.sequence != row.sequence || map.gap != row.gap) continue;
+      entry["heat_map"] = map.path;
+      entry["heat_map_from"] = map.from;
+    }
     rows.push_back(std::move(entry));
   }
   for (const FidelityRow& row : fidelity) {
@@ -186,6 +209,7 @@ RunReport ReportFromRecords(const Workspace& workspace) {
     if (const JsonValue* files = f.Find("heldout"))
       for (const JsonValue& file : files->AsArray())
         stages.reconstruct->heldout.push_back(file.AsString());
+    stages.reconstruct->psnr_at_steps = CurveOf(f, "curve_steps", "curve_psnr_db");
   }
   if (style_2d) stages.style_2d = {style_2d->seconds, TextOf(style_2d->figures, "method")};
   if (stylize) {
@@ -197,11 +221,7 @@ RunReport ReportFromRecords(const Workspace& workspace) {
     stages.stylize->bound = FigureOf(f, "bound");
     stages.stylize->slope_observed = FigureOf(f, "slope_observed");
     stages.stylize->slope_ascent = FigureOf(f, "slope_ascent");
-    const JsonValue *steps = f.Find("bound_steps"), *bounds = f.Find("bound_at_steps");
-    if (steps != nullptr && bounds != nullptr)
-      for (size_t i = 0; i < std::min(steps->AsArray().size(), bounds->AsArray().size()); ++i)
-        stages.stylize->bound_at_steps.emplace_back(steps->AsArray()[i].AsInt(),
-                                                    bounds->AsArray()[i].AsDouble());
+    stages.stylize->bound_at_steps = CurveOf(f, "bound_steps", "bound_at_steps");
     if (const JsonValue* variance = f.Find("variance"))
       stages.stylize->variance = VarianceOf(*variance);
   }
@@ -218,6 +238,9 @@ RunReport ReportFromRecords(const Workspace& workspace) {
         if (row.sequence == "styled") stages.stylize->psnr_to_2d_db = row.psnr_to_2d_db;
     }
   }
+  for (const char* name : kStageNames)
+    if (const auto record = workspace.Find(name); record && record->cpu_seconds)
+      report.cpu_seconds.emplace_back(name, *record->cpu_seconds);
   return report;
 }
 

@@ -5,6 +5,7 @@
 
 #include "evaluate/consistency.h"
 #include "evaluate/fidelity.h"
+#include "pipeline/heat_map_files.h"
 #include "pipeline/report_data.h"
 #include "pipeline/workspace.h"
 
@@ -13,7 +14,8 @@ namespace regrade {
 // The figures of stage "evaluate":
 // {"consistency": [...], "consistency_pairs": [...], "fidelity": [...]}.
 JsonValue EvaluationRecord(const ConsistencyReport& consistency,
-                           const std::vector<FidelityRow>& fidelity);
+                           const std::vector<FidelityRow>& fidelity,
+                           const std::vector<HeatMapFile>& heat_maps = {});
 
 // The two tables of such a record, and nothing else.
 RunReport ReportOfEvaluation(const JsonValue& figures);

@@ -152,6 +152,12 @@ std::vector<StageLine> StageLines(const StagesReport& stages) {
   return lines;
 }
 
+std::string CpuText(const RunReport& report, const std::string& stage) {
+  for (const auto& [name, seconds] : report.cpu_seconds)
+    if (name == stage) return Duration(seconds);
+  return FigureHtml(Figure(), 0);
+}
+
 }  // namespace
 
 std::string FigureHtml(const Figure& figure, int decimals, const std::string& unit) {
@@ -189,6 +195,7 @@ std::string HeadlineFiguresHtml(const RunReport& report) {
   } else if (styled != nullptr) {
     card("fidelity to the 2D method (PSNR)", FigureHtml(Figure(), 2));
   }
+  if (html.empty() && !report.prices.empty()) return "";  // a price list alone
   card("time", Duration(report.seconds));
   return "<dl class=cards>" + html + "</dl>";
 }
@@ -261,35 +268,14 @@ std::string ConsistencyHtml(const RunReport& report) {
          ConsistencyChartHtml(report);
 }
 
-std::string PhotosHtml(const RunReport& report) {
-  if (!report.photos) return "";
-  const PhotosReport& photos = *report.photos;
-  std::string left_out, used;
-  for (const PhotoVerdict& photo : photos.verdicts) {
-    const bool plain = photo.verdict == "used" && photo.why.empty();
-    (plain ? used : left_out) +=
-        Row({Text(photo.file, "file"),
-             Cell(EscapeHtml(photo.verdict), EscapeHtml(photo.verdict)), Text(photo.why, "w")});
-  }
-  const std::string head = "<tr><th>photo<th>verdict<th>why</tr>";
-  std::string html = Heading("Photos") + "<p>" + std::to_string(photos.given) + " given, " +
-                     std::to_string(photos.registered) + " registered, " +
-                     std::to_string(photos.used) + " used.</p>";
-  if (!left_out.empty()) html += Table(head, left_out);
-  if (!used.empty()) {
-    html += "<details><summary>photos used without remark</summary>" + Table(head, used) +
-            "</details>";
-  }
-  return html;
-}
-
 std::string EffectsHtml(const RunReport& report) {
   if (report.effects.empty()) return "";
   std::string body;
   for (const EffectReport& effect : report.effects) {
     body +=
         Row({Text(effect.name), Cell(effect.on ? "on" : "off", effect.on ? "on" : "soft"),
-             Number(effect.value, 3), Number(effect.threshold, 3), Text(effect.evidence, "w")});
+             effect.value.value ? Number(effect.value, 3) : Text(effect.value.why, "n soft"),
+             Number(effect.threshold, 3), Text(effect.evidence, "w")});
   }
   return Heading("Effects that this scene calls for") + "<p>What is off costs nothing.</p>" +
          Table("<tr><th>effect<th><th class=n>measured<th class=n>threshold<th>evidence</tr>",
@@ -308,41 +294,39 @@ std::string StagesHtml(const RunReport& report) {
                  Cell(Duration(line.seconds) + "<span class=bar style=\"width:" +
                           FixedNumber(percent, 1) + "%\"></span>",
                       "n"),
-                 Cell(line.said, "w")});
+                 Cell(CpuText(report, line.name), "n"), Cell(line.said, "w")});
   }
-  return Heading("Stages") + Table("<tr><th>stage<th class=n>time<th>figures</tr>", body) +
+  return Heading("Stages, and what they cost") +
+         Table("<tr><th>stage<th class=n>time<th class=n>CPU time<th>figures</tr>", body) +
+         "<p class=note>CPU time is of all threads and of the programs that a stage started; a "
+         "stage that was interrupted counts from its last start.</p>" +
+         (report.stages.reconstruct ? FitChartHtml(*report.stages.reconstruct) : "") +
          (report.stages.stylize ? BoundChartHtml(*report.stages.stylize) : "");
 }
 
-std::string PricesHtml(const RunReport& report) {
-  if (report.prices.empty()) return "";
-  std::string body;
-  for (const PriceRow& price : report.prices) {
-    body += Row({Cell("<code>" + EscapeHtml(price.knob) + "</code>"), Text(price.setting),
-                 Number(price.seconds, 1, "s"), Number(price.psnr_db, 2, "dB"),
-                 Text(price.measure)});
-  }
-  return Heading("What accuracy costs here") +
-         "<p>Measured on this machine with this capture.</p>" +
-         Table("<tr><th>knob<th>setting<th class=n>time<th class=n>accuracy<th>of</tr>", body);
-}
-
-std::string RepeatHtml(const RunReport& report) {
+std::string RepeatHtml(const RunReport& report, const std::string& run_json) {
   if (report.command.empty()) return "";
   std::string html = Heading("To repeat this run") + "<pre>" +
-                     EscapeHtml(ShellCommand(report.command)) + "</pre><p>regrade " +
+                     EscapeHtml(ShellCommand(report.command)) +
+                     "</pre><p>or, with every option as it was,</p><pre>regrade run --config "
+                     "run.json --out again</pre><p>regrade " +
                      EscapeHtml(report.version) + ", seed " + std::to_string(report.seed) +
-                     ". Every option in effect is in <code>run.json</code> in this folder, "
-                     "every number of this "
-                     "page in <code>report.json</code>.</p>";
-  if (report.options.empty()) return html;
-  std::string body;
-  for (const OptionValue& option : report.options) {
-    body +=
+                     ". Every number of this page is in <code>report.json</code> in this "
+                     "folder.</p>";
+  std::string versions, options;
+  for (const OptionValue& version : report.versions)
+    versions += Row({Text(version.name), Text(version.value, "w")});
+  for (const OptionValue& option : report.options)
+    options +=
         Row({Cell("<code>" + EscapeHtml(option.name) + "</code>"), Text(option.value, "w")});
-  }
-  return html + "<details><summary>options in effect</summary>" +
-         Table("<tr><th>option<th>value</tr>", body) + "</details>";
+  if (!versions.empty()) html += Table("<tr><th>part<th>version</tr>", versions);
+  if (!options.empty())
+    html += "<details><summary>options in effect</summary>" +
+            Table("<tr><th>option<th>value</tr>", options) + "</details>";
+  if (!run_json.empty())
+    html +=
+        "<details><summary>run.json</summary><pre>" + EscapeHtml(run_json) + "</pre></details>";
+  return html;
 }
 
 }  // namespace regrade

@@ -15,10 +15,9 @@ std::string HeadlineFiguresHtml(const RunReport& report);
 // Consistency with fidelity beside it in the same rows: a grey film is consistent, so neither
 // figure stands alone.
 std::string ConsistencyHtml(const RunReport& report);
-std::string PhotosHtml(const RunReport& report);
 std::string EffectsHtml(const RunReport& report);
 std::string StagesHtml(const RunReport& report);
-std::string PricesHtml(const RunReport& report);
-std::string RepeatHtml(const RunReport& report);
+// `run_json`: what --config reads; may be empty.
+std::string RepeatHtml(const RunReport& report, const std::string& run_json);
 
 }  // namespace regrade

@@ -26,7 +26,7 @@ RunFile ReadRunFile(const std::string& path) {
   }
 }
 
-void WriteRunFile(const std::string& command, const RunContext& context) {
+JsonValue RunFileJson(const std::string& command, const RunContext& context) {
   JsonValue fingerprints = JsonValue::Object();
   for (const char* stage : kStageNames)
     if (const auto record = context.workspace->Find(stage))
@@ -41,14 +41,17 @@ void WriteRunFile(const std::string& command, const RunContext& context) {
   JsonValue kept = JsonValue::Object();
   for (const auto& [name, value] : options.AsObject())
     if (start.Find(name) == nullptr) kept[name] = value;
-  WriteJsonFile(context.workspace->Path("run.json"),
-                JsonValue::Object{{"schema", 1},
-                                  {"regrade", REGRADE_VERSION},
-                                  {"command", command},
-                                  {"arguments", words},
-                                  {"seed", context.settings.run.seed},
-                                  {"options", kept},
-                                  {"fingerprints", fingerprints}});
+  return JsonValue::Object{{"schema", 1},
+                           {"regrade", REGRADE_VERSION},
+                           {"command", command},
+                           {"arguments", words},
+                           {"seed", context.settings.run.seed},
+                           {"options", kept},
+                           {"fingerprints", fingerprints}};
+}
+
+void WriteRunFile(const std::string& command, const RunContext& context) {
+  WriteJsonFile(context.workspace->Path("run.json"), RunFileJson(command, context));
 }
 
 }  // namespace regrade

@@ -16,7 +16,9 @@ struct RunFile {
 // Throws Error(kUsage) with line and column for what is not such a file.
 RunFile ReadRunFile(const std::string& path);
 
-// With the fingerprints of the stages that are finished.
+// What `command` would write, with the fingerprints of the stages that are finished.
+JsonValue RunFileJson(const std::string& command, const RunContext& context);
+
 void WriteRunFile(const std::string& command, const RunContext& context);
 
 }  // namespace regrade

@@ -71,6 +71,13 @@ double TransparentShare(const std::vector<Outline>& outlines) {
   return all > 0 ? static_cast<double>(clear) / static_cast<double>(all) : 0;
 }
 
+JsonValue NumberOrNull(const Figure& figure) {
+  return figure.value ? JsonValue(*figure.value) : JsonValue();
+}
+Figure FigureOrNone(const JsonValue& value) {
+  return value.IsNumber() ? Figure(value.AsDouble()) : Figure();
+}
+
 // The photos that keep their exposure for want of evidence.
 void NameUnknownPhotos(const Capture& capture, SceneProfile* profile) {
   std::string names;
@@ -100,8 +107,7 @@ void ProfileExposure(const Capture& capture, const std::map<std::string, bool>& 
   const bool asked_for = wish != wishes.end() && wish->second;
   const auto leave_out = [&](const char* why) {
     if (asked_for) throw Error(ExitCode::kScene, why, "--effects exposure=on");
-    profile->effects.push_back(
-        Row("exposure", false, 0, kExposureSpread, std::string("not measured: ") + why));
+    profile->effects.push_back({"exposure", false, why, Figure(), kExposureSpread});
   };
   if (wish != wishes.end() && !wish->second) return leave_out("it was not wanted");
   if (alpha) return leave_out("the white behind transparent photos has no exposure");
@@ -192,11 +198,12 @@ SceneProfile ProfileScene(const Capture& capture, int sh_degree, const std::stri
 }
 
 std::string EffectLine(const EffectReport& effect) {
+  if (!effect.value.value)
+    return effect.name + (effect.on ? " on: " : " off: ") + effect.value.why + " (" +
+           effect.evidence + ")";
   return effect.name + (effect.on ? " on: " : " off: ") + Short(effect.value) +
-         (effect.value.value && effect.threshold.value &&
-                  *effect.value.value > *effect.threshold.value
-              ? " > "
-              : " <= ") +
+         (effect.threshold.value && *effect.value.value > *effect.threshold.value ? " > "
+                                                                                  : " <= ") +
          Short(effect.threshold) + " (" + effect.evidence + ")";
 }
 
@@ -206,8 +213,8 @@ JsonValue EffectsRecord(const std::vector<EffectReport>& effects) {
     rows.push_back(JsonValue::Object{{"name", effect.name},
                                      {"on", effect.on},
                                      {"evidence", effect.evidence},
-                                     {"value", effect.value.value.value_or(0)},
-                                     {"threshold", effect.threshold.value.value_or(0)}});
+                                     {"value", NumberOrNull(effect.value)},
+                                     {"threshold", NumberOrNull(effect.threshold)}});
   return rows;
 }
 
@@ -215,8 +222,8 @@ std::vector<EffectReport> EffectsOfRecord(const JsonValue& record) {
   std::vector<EffectReport> effects;
   for (const JsonValue& row : record.AsArray())
     effects.push_back({row.At("name").AsString(), row.At("on").AsBool(),
-                       row.At("evidence").AsString(), row.At("value").AsDouble(),
-                       row.At("threshold").AsDouble()});
+                       row.At("evidence").AsString(), FigureOrNone(row.At("value")),
+                       FigureOrNone(row.At("threshold"))});
   return effects;
 }
 

@@ -56,6 +56,16 @@ std::vector<int> ViewIndices(const Capture& capture, int holdout, bool held_out)
   return indices;
 }
 
+Image DepthAlongRays(const Camera& camera, Image depth) {
+  const Vec3d forward = camera.Forward();
+  for (int y = 0; y < depth.height; ++y)
+    for (int x = 0; x < depth.width; ++x) {
+      const Vec3d ray = camera.WorldRay(x + 0.5, y + 0.5).direction;
+      *depth.at(x, y) = static_cast<float>(*depth.at(x, y) / Dot(ray, forward));
+    }
+  return depth;
+}
+
 std::string FrameName(int index) {
   char name[32];
   std::snprintf(name, sizeof name, "%05d.png", index);

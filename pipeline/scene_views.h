@@ -30,6 +30,9 @@ std::vector<int> ViewIndices(const Capture& capture, int holdout, bool held_out)
 // ...
 inline constexpr char kPathPrefix[] = "path_";
 
+// The renderer's depth is along the optical axis; the evaluator wants it along each ray.
+Image DepthAlongRays(const Camera& camera, Image depth);
+
 // "00007.png"
 std::string FrameName(int index);
 

@@ -139,9 +139,14 @@ JsonValue ToJson(const StageRecord& record) {
   for (const StageOutput& output : record.outputs)
     outputs.push_back(JsonValue::Object{
         {"path", output.path}, {"bytes", output.bytes}, {"hash", output.hash}});
-  return JsonValue::Object{{"schema", kSchema},         {"regrade", record.version},
-                           {"inputs", record.inputs},   {"outputs", std::move(outputs)},
-                           {"seconds", record.seconds}, {"figures", record.figures}};
+  JsonValue json = JsonValue::Object{{"schema", kSchema},
+                                     {"regrade", record.version},
+                                     {"inputs", record.inputs},
+                                     {"outputs", std::move(outputs)},
+                                     {"seconds", record.seconds}};
+  if (record.cpu_seconds) json["cpu_seconds"] = *record.cpu_seconds;
+  json["figures"] = record.figures;
+  return json;
 }
 
 StageRecord StageRecordFromJson(const JsonValue& value, const std::string& where) {
@@ -163,6 +168,7 @@ StageRecord StageRecordFromJson(const JsonValue& value, const std::string& where
           {path.string(), output.At("bytes").AsInt(), output.At("hash").AsString()});
     }
     record.seconds = value.At("seconds").AsDouble();
+    if (const JsonValue* cpu = value.Find("cpu_seconds")) record.cpu_seconds = cpu->AsDouble();
     record.figures = value.At("figures");
   } catch (const Error& error) {
     if (!error.hint().empty()) throw;

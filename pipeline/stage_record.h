@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,11 +18,12 @@ struct StageOutput {
 };
 
 struct StageRecord {
-  std::string version;               // of the program that made it
-  JsonValue inputs;                  // object: options and hashes of what went in
-  std::vector<StageOutput> outputs;  // sorted by path
-  double seconds = 0;
-  JsonValue figures;  // object, goes into the report
+  std::string version;                // of the program that made it
+  JsonValue inputs;                   // object: options and hashes of what went in
+  std::vector<StageOutput> outputs;   // sorted by path
+  double seconds = 0;                 // by the wall
+  std::optional<double> cpu_seconds;  // of all threads and programs started; not in old records
+  JsonValue figures;                  // object, goes into the report
 
   // One hash of everything that came out: an input of the stages behind.
   std::string OutputHash() const;

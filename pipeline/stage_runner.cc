@@ -5,6 +5,7 @@
 #include <new>
 
 #include "kernels/base/error.h"
+#include "pipeline/cpu_time.h"
 
 namespace regrade {
 namespace {
@@ -71,6 +72,7 @@ bool StageRunner::Run(const Stage& stage) {
   ForgetAfter(stage.name);
   console_->SetKept(Joined(workspace_->FinishedStages(), ", "));
   console_->BeginStage(stage.name);
+  const double cpu_before = CpuSeconds();
   StageOutcome outcome;
   try {
     outcome = stage.work(console_->StageProgress());
@@ -80,7 +82,8 @@ bool StageRunner::Run(const Stage& stage) {
                 "close other programs, take --preset draft, or set --max-memory");
   }
   const double seconds = console_->StageSeconds();
-  workspace_->Record(stage.name, stage.inputs, outcome.outputs, seconds, outcome.figures);
+  workspace_->Record(stage.name, stage.inputs, outcome.outputs, seconds, outcome.figures,
+                     CpuSeconds() - cpu_before);
   console_->EndStage();
   console_->SetKept(Joined(workspace_->FinishedStages(), ", "));
   console_->Info(stage.name + ": done in " + DurationText(seconds));

@@ -32,7 +32,11 @@ class Fitter {
  public:
   Fitter(const std::vector<TrainingView>& views, const SceneBox& box, const FitOptions& options,
          const FitHooks& hooks, Backend backend)
-      : rays_(views), box_(box), options_(options), hooks_(hooks) {
+      : rays_(views),
+        box_(box),
+        options_(options),
+        hooks_(hooks),
+        sums_each_step_(backend == Backend::kCpu) {
     REGRADE_CHECK_EQ(options.resolutions.size(), options.steps.size());
     for (size_t s = 0; s < options.steps.size(); ++s) {
       total_steps_ += options.steps[s];
@@ -70,6 +74,7 @@ class Fitter {
     }
     stage_ = state.stage;
     step_ = state.step;
+    tally_ = std::move(state.tally);
     engine_->Take(std::move(state));
     start_ = last_checkpoint_ = Clock::now();
     const int num_stages = static_cast<int>(options_.steps.size());
@@ -91,7 +96,11 @@ class Fitter {
       engine_->Show([this](FitState* state) { result_.field = ToRadianceField(state->grid); });
       result_.field.step = options_.step;
     }
-    result_.psnr_train_db = PsnrOf(tail_error_, tail_rays_);
+    result_.psnr_train_db = PsnrOf(tally_.tail_error, tally_.tail_rays);
+    result_.rays = tally_.rays;
+    result_.samples = tally_.samples;
+    result_.rejected_voxels = tally_.rejected_voxels;
+    result_.curve = std::move(tally_.curve);
     return std::move(result_);
   }
 
@@ -130,8 +139,9 @@ class Fitter {
             [this](FitState* state) { SetDensities(options_.initial_density, &state->grid); });
       engine_->Step(NextStep());
       ++step_;
+      if (sums_each_step_) TakeSums();
       const int square = options_.patch * options_.patch;
-      window_rays_ += std::max(1, options_.rays_per_step / square) * square;
+      tally_.window_rays += std::max(1, options_.rays_per_step / square) * square;
       if (StepsBefore() % kWindow == 0 || step_ == steps) CloseWindow();
       const Verdict verdict = Report(hooks_.progress, WorkBefore(), total_work_, note_);
       if (verdict == Verdict::kAbort) {
@@ -195,39 +205,48 @@ class Fitter {
                     SphereResolution(std::min(stage_, last_stage)));
   }
 
-  // Sums are read once in a while: a device need not wait for the host at each step.
+  // A device's sums are read once in a while: it need not wait for the host at each step. The
+  // CPU's are read at each, so that a fit that was interrupted adds them up in the same order.
   void CloseWindow() {
-    const FitSums sums = engine_->TakeSums();
+    TakeSums();
     const int done = StepsBefore();
-    result_.rays += window_rays_;
-    result_.samples += sums.samples;
-    result_.rejected_voxels += sums.rejected_voxels;
+    tally_.rays += tally_.window_rays;
     if (done > total_steps_ - total_steps_ / 10 - 1) {
-      tail_error_ += sums.squared_error;
-      tail_rays_ += window_rays_;
+      tally_.tail_error += tally_.window_error;
+      tally_.tail_rays += tally_.window_rays;
     }
-    // A few bad voxels are skipped and counted; a flood means the field is broken.
-    if (sums.rejected_voxels > 1000)
-      throw Error(ExitCode::kBug,
-                  "the gradient of " + std::to_string(sums.rejected_voxels) +
-                      " voxels is not finite at step " + std::to_string(done),
-                  "reconstruct", "the last checkpoint has been kept");
-    const double psnr = PsnrOf(sums.squared_error, window_rays_);
-    result_.curve.push_back({result_.rays, SecondsSince(start_) - idle_seconds_, psnr});
+    const double psnr = PsnrOf(tally_.window_error, tally_.window_rays);
+    tally_.curve.push_back({tally_.rays, SecondsSince(start_) - idle_seconds_, psnr, done});
     char text[96];
     std::snprintf(text, sizeof text, "%d^3, %.2f M voxels, %.2f dB on training rays",
                   options_.resolutions[static_cast<size_t>(stage_)],
                   static_cast<double>(engine_->num_voxels()) * 1e-6, psnr);
     note_ = text;
-    window_rays_ = 0;
+    tally_.window_rays = 0;
+    tally_.window_error = 0;
+  }
+
+  void TakeSums() {
+    const FitSums sums = engine_->TakeSums();
+    tally_.window_error += sums.squared_error;
+    tally_.samples += sums.samples;
+    tally_.rejected_voxels += sums.rejected_voxels;
+    // A few bad voxels are skipped and counted; a flood means the field is broken.
+    if (sums.rejected_voxels > 1000)
+      throw Error(ExitCode::kBug,
+                  "the gradient of " + std::to_string(sums.rejected_voxels) +
+                      " voxels is not finite at step " + std::to_string(StepsBefore()),
+                  "reconstruct", "the last checkpoint has been kept");
   }
 
   void SaveCheckpoint() {
     const Clock::time_point begin = Clock::now();
     if (hooks_.checkpoint) {
+      TakeSums();  // the window goes on where the checkpoint is read
       engine_->Show([this](FitState* state) {
         state->stage = stage_;
         state->step = step_;
+        state->tally = tally_;
         hooks_.checkpoint(*state);
       });
     }
@@ -247,14 +266,15 @@ class Fitter {
   SceneBox box_;
   FitOptions options_;
   FitHooks hooks_;
+  const bool sums_each_step_;
   std::unique_ptr<FitEngine> engine_;
   FitResult result_;
   int stage_ = 0, step_ = 0;  // step within the stage
   int total_steps_ = 0;
   double total_work_ = 0;
   bool finish_early_ = false;
-  double tail_error_ = 0, idle_seconds_ = 0;
-  int64_t window_rays_ = 0, tail_rays_ = 0;
+  FitTally tally_;
+  double idle_seconds_ = 0;
   std::string note_;
   Clock::time_point start_, last_checkpoint_;
 };

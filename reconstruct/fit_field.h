@@ -18,6 +18,22 @@
 
 namespace regrade {
 
+struct FitCurvePoint {
+  int64_t rays = 0;
+  double seconds = 0;
+  double psnr_train_db = 0;  // over the rays since the last point
+  int64_t step = 0;          // steps done
+};
+
+// What a fit has counted so far: of its rays since the last point of the curve, and of the last
+// tenth of all.
+struct FitTally {
+  double window_error = 0, tail_error = 0;  // squared, over channels
+  int64_t window_rays = 0, tail_rays = 0;
+  int64_t rays = 0, samples = 0, rejected_voxels = 0;
+  std::vector<FitCurvePoint> curve;
+};
+
 // Everything a fit needs to go on as if it had never stopped (H110).
 struct FitState {
   FastGrid grid;
@@ -25,12 +41,7 @@ struct FitState {
   int stage = 0;
   int step = 0;                 // within the stage
   Buffer<float> sphere_moment;  // [columns, L, 4], where there are background spheres
-};
-
-struct FitCurvePoint {
-  int64_t rays = 0;
-  double seconds = 0;
-  double psnr_train_db = 0;  // over the rays since the last point
+  FitTally tally;
 };
 
 struct FitResult {

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Installs the Debian 12 packages that regrade is built with and runs on; does nothing when all are there.
-#   install_packages.sh [--dev]     --dev adds clang-format and clang-tidy
+#   install_packages.sh [--dev]     --dev adds clang-format, clang-tidy, and a browser to look at report pages with
 set -euo pipefail
 
 packages=(
@@ -12,8 +12,9 @@ packages=(
   libopencv-dev                              # flow, networks of 2D methods, films
   libceres-dev libeigen3-dev
   colmap                                     # poses, started as a program
+  libjs-chart.js                             # drawings of the report that answer to a pointer
 )
-[[ "${1:-}" == "--dev" ]] && packages+=(clang-format clang-tidy)
+[[ "${1:-}" == "--dev" ]] && packages+=(clang-format clang-tidy chromium)
 
 if ! command -v dpkg-query >/dev/null; then
   echo "This is not a Debian system; install what corresponds to: ${packages[*]}" >&2

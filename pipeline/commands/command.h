@@ -35,6 +35,7 @@ void RunFolder(const Command&, const Arguments&, Console*);  // stylize, render
 void RunEvaluate(const Command&, const Arguments&, Console*);
 void RunContactSheet(const Command&, const Arguments&, Console*);
 void RunMix(const Command&, const Arguments&, Console*);
+void RunTradeoff(const Command&, const Arguments&, Console*);
 void RunSynth(const Command&, const Arguments&, Console*);
 void RunExport(const Command&, const Arguments&, Console*);
 void RunPack(const Command&, const Arguments&, Console*);

@@ -19,6 +19,8 @@ const std::vector<Command>& AllCommands() {
       {"evaluate",
        "DIR [OPTIONS] | --frames DIR [--reference DIR] [--target DIR] [--style PICTURE]",
        "measures consistency and fidelity, of a run or of any program's frames", RunEvaluate},
+      {"tradeoff", "PHOTOS|CAPTURE|DIR --out DIR [--style PICTURE] [OPTIONS] | --predict DIR",
+       "measures here what each knob costs in time and buys in accuracy", RunTradeoff},
       {"synth", "OUT [OPTIONS]", "writes a synthetic capture with its exact truth", RunSynth},
       {"export", "DIR --out FOLDER [OPTIONS]",
        "photos and poses for other programs: COLMAP text or binary, transforms.json",

@@ -9,6 +9,7 @@
 #include "kernels/base/device_memory.h"
 #include "kernels/base/error.h"
 #include "kernels/field/fast_rays.h"
+#include "pipeline/chart_library.h"
 #include "pipeline/commands/command.h"
 #include "pipeline/memory.h"
 
@@ -79,6 +80,8 @@ void RunDoctor(const Command& command, const Arguments& arguments, Console* cons
        "limit with --max-memory"},
       {"fast path", FastRays().name, "instruction set of rendering and fitting"},
       FindColmap("colmap"),
+      {"Chart.js", ReadChartLibrary().empty() ? "not found" : "found",
+       "optional: drawings of the report that answer to a pointer; package `libjs-chart.js`"},
   };
   console->Event("doctor", JsonValue::Object());
   for (const Finding& finding : findings) {

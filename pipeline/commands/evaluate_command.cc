@@ -5,6 +5,7 @@
 
 #include "evaluate/tables.h"
 #include "kernels/base/error.h"
+#include "pipeline/chart_library.h"
 #include "pipeline/commands/folder_command.h"
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/files/image_file.h"
@@ -12,6 +13,7 @@
 #include "pipeline/heat_map_files.h"
 #include "pipeline/report_html.h"
 #include "pipeline/report_json.h"
+#include "pipeline/report_pictures.h"
 #include "pipeline/report_records.h"
 #include "pipeline/run_settings.h"
 
@@ -38,30 +40,13 @@ struct FramesOptions {
   }
 };
 
-constexpr int kJpegQuality = 85;
-
-std::string PairCaption(const HeatMapFile& map) {
-  return map.sequence + ", frames " + std::to_string(map.from) + " and " +
-         std::to_string(map.to);
-}
-
-// The figures, the pictures of the worst pairs, and a page with both.
-void WriteEvaluation(const Workspace& workspace, const JsonValue& record,
-                     const FrameSource& reference,
-                     const std::vector<NamedFrameSource>& sequences,
-                     const ConsistencyOptions& options, const ConsistencyReport& consistency,
-                     double seconds) {
+// The figures and the pictures of the worst pairs on one page.
+void WriteEvaluation(const Workspace& workspace, const JsonValue& record, double seconds) {
   RunReport report = ReportOfEvaluation(record);
   ReportPictures pictures;
   pictures.title = std::filesystem::path(workspace.folder()).filename().string();
-  for (const HeatMapFile& map :
-       WriteHeatMaps(workspace, reference, sequences, options, consistency)) {
-    for (ConsistencyFigures& row : report.consistency)
-      if (row.sequence == map.sequence && row.gap == map.gap) row.heat_map = map.path;
-    const Image picture = ReadImage(workspace.Path(map.path));
-    pictures.heat_maps.push_back(
-        {PairCaption(map), {EncodeJpeg(picture, kJpegQuality), picture.width, picture.height}});
-  }
+  pictures.chart_library = ReadChartLibrary();
+  pictures.heat_maps = HeatMapPictures(workspace, report);
   report.version = REGRADE_VERSION;
   report.seconds = seconds;
   WriteJsonFile(workspace.Path("report.json"), EvaluationJson(report));
@@ -115,9 +100,15 @@ void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& optio
     fidelity.push_back(MeasureFidelity(sequence, targets, console->StageProgress()));
   const double seconds = console->StageSeconds();
   console->EndStage();
-  const JsonValue record = EvaluationRecord(consistency, fidelity);
-  if (workspace)
-    WriteEvaluation(*workspace, record, reference, sequences, options, consistency, seconds);
+  std::vector<HeatMapFile> heat_maps;
+  if (workspace) {
+    BeginHeatMaps(*workspace);
+    heat_maps =
+        WriteHeatMaps(*workspace, EstimatedMotion(reference, options.mode, options.flow),
+                      sequences, options.gaps, consistency);
+  }
+  const JsonValue record = EvaluationRecord(consistency, fidelity, heat_maps);
+  if (workspace) WriteEvaluation(*workspace, record, seconds);
   console->Event("evaluation", record);
   console->Lines(FormatTables(consistency, fidelity));
 }

@@ -12,6 +12,7 @@
 #include "pipeline/capture_store.h"
 #include "pipeline/field_file.h"
 #include "pipeline/files/image_file.h"
+#include "pipeline/heat_map_files.h"
 #include "pipeline/report_records.h"
 #include "pipeline/scene_views.h"
 #include "pipeline/stages/linear_map_reference.h"
@@ -28,17 +29,6 @@ FrameSource FramesOf(const std::string& folder, const std::vector<int>& views) {
           }};
 }
 
-// The renderer's depth is along the optical axis; the evaluator wants it along each ray.
-Image AlongRays(const Camera& camera, Image depth) {
-  const Vec3d forward = camera.Forward();
-  for (int y = 0; y < depth.height; ++y)
-    for (int x = 0; x < depth.width; ++x) {
-      const Vec3d ray = camera.WorldRay(x + 0.5, y + 0.5).direction;
-      *depth.at(x, y) = static_cast<float>(*depth.at(x, y) / Dot(ray, forward));
-    }
-  return depth;
-}
-
 // Depth and camera of each view, rendered when they are asked for.
 GeometrySource GeometryOf(const RunSettings& settings, const Capture& capture,
                           const StoredField& stored) {
@@ -48,7 +38,8 @@ GeometrySource GeometryOf(const RunSettings& settings, const Capture& capture,
        field_from_world = stored.field_from_world, ndc = stored.ndc](int i) -> FrameGeometry {
         const Camera camera = WorkingCamera(capture.views[static_cast<size_t>(i)].camera,
                                             settings.scene.photo_size, field_from_world, ndc);
-        return {AlongRays(camera, RenderView(*grid, camera, MarchOptions{step}).depth), camera};
+        return {DepthAlongRays(camera, RenderView(*grid, camera, MarchOptions{step}).depth),
+                camera};
       };
 }
 
@@ -69,7 +60,8 @@ bool HasFilm(const RunSettings& settings) {
 // The film's frames, with flow and masks from its own unstyled ones. Its geometry is not on
 // disk, so "geometry" leaves it out.
 void AddFilm(RunContext* context, const Image& style, ProgressParts* parts,
-             ConsistencyReport* report, std::vector<FidelityRow>* fidelity) {
+             ConsistencyReport* report, std::vector<FidelityRow>* fidelity,
+             std::vector<HeatMapFile>* heat_maps) {
   const RunSettings& settings = context->settings;
   if (!HasFilm(settings)) return;
   std::vector<int> all(static_cast<size_t>(settings.render.path.path_frames));
@@ -87,6 +79,11 @@ void AddFilm(RunContext* context, const Image& style, ProgressParts* parts,
   const ConsistencyReport film =
       EvaluateConsistency(sequences[0].frames, sequences, settings.consistency,
                           parts->Next(PairWeight(settings, static_cast<int>(all.size()))), {});
+  const ConsistencyOptions& options = settings.consistency;
+  const std::vector<HeatMapFile> maps = WriteHeatMaps(
+      *context->workspace, EstimatedMotion(sequences[0].frames, options.mode, options.flow),
+      sequences, options.gaps, film);
+  heat_maps->insert(heat_maps->end(), maps.begin(), maps.end());
   report->rows.insert(report->rows.end(), film.rows.begin(), film.rows.end());
   report->pairs.insert(report->pairs.end(), film.pairs.begin(), film.pairs.end());
   const FidelityTargets targets{renders_styled ? sequences[1].frames : FrameSource(),
@@ -128,6 +125,13 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
       source, sequences, settings.consistency,
       parts.Next(PairWeight(settings, static_cast<int>(all.size()))), geometry);
 
+  BeginHeatMaps(workspace);
+  std::vector<HeatMapFile> heat_maps = WriteHeatMaps(
+      workspace,
+      geometry ? KnownMotion(geometry)
+               : EstimatedMotion(source, settings.consistency.mode, settings.consistency.flow),
+      sequences, settings.consistency.gaps, consistency);
+
   // Fidelity is measured on the views that the style was learned from, against what the 2D
   // method made of the renders, or else of the photos.
   const Image style = ReadStylePicture(settings.style.picture, nullptr);
@@ -138,7 +142,7 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   for (const NamedFrameSource& sequence : sequences)
     fidelity.push_back(MeasureFidelity({sequence.name, frames(sequence.name.c_str(), taught)},
                                        targets, parts.Next(n * kFrameSeconds)));
-  AddFilm(context, style, &parts, &consistency, &fidelity);
+  AddFilm(context, style, &parts, &consistency, &fidelity, &heat_maps);
   const FidelityTargets photo_targets{of_photos, targets.transmittance, nullptr};
   const FidelityRow to_photos = MeasureFidelity({"styled", frames("styled", taught)},
                                                 photo_targets, parts.Next(n * kFrameSeconds));
@@ -157,7 +161,8 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
 
   context->console->Lines(FormatTables(consistency, fidelity));
   StageOutcome outcome;
-  outcome.figures = EvaluationRecord(consistency, fidelity);
+  outcome.outputs = {kHeatMapFolder};
+  outcome.figures = EvaluationRecord(consistency, fidelity, heat_maps);
   outcome.figures["flow"] = settings.consistency.flow;
   outcome.figures["mask"] = settings.consistency.mode;
   outcome.figures["psnr_to_2d_photos_db"] =

@@ -2,21 +2,20 @@
 #include <omp.h>
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
-#include <numeric>
 #include <string>
 
-#include "evaluate/image_quality.h"
 #include "kernels/base/device_memory.h"
 #include "pipeline/capture_store.h"
 #include "pipeline/device_choice.h"
 #include "pipeline/field_file.h"
-#include "pipeline/field_renderer.h"
 #include "pipeline/fit_checkpoint.h"
 #include "pipeline/memory.h"
 #include "pipeline/plan.h"
 #include "pipeline/scene_profile.h"
 #include "pipeline/scene_views.h"
+#include "pipeline/stages/held_out.h"
 #include "pipeline/stages/run_context.h"
 #include "reconstruct/choose_degree.h"
 #include "reconstruct/fit_field.h"
@@ -29,33 +28,16 @@ constexpr double kAfterFit =
 constexpr double kTrial = 0.08;         // the trial of degrees, likewise
 constexpr int kReproducibleShards = 4;  // sums in a fixed grouping, whatever the threads
 
-double Mean(const std::vector<double>& values) {
-  return std::accumulate(values.begin(), values.end(), 0.0) /
-         static_cast<double>(values.size());
-}
+// To a thousandth: what a drawing can show.
+double Rounded(double value) { return std::round(value * 1000) / 1000; }
 
-// PSNR and SSIM over the held-out photos as they were taken: a render is given its photo's
-// gain, which is known from the colours of points that the photo shares with others.
-void MeasureHeldOut(RunContext* context, const Capture& capture, const PhotoGains& gains,
-                    const StoredField& stored, Backend backend, JsonValue* figures) {
-  const RunSettings& settings = context->settings;
-  const FieldRenderer renderer(stored.field, backend);
-  std::vector<double> psnr, ssim;
-  JsonValue::Array files;
-  for (const int i : ViewIndices(capture, settings.run.holdout, true)) {
-    const CaptureView& view = capture.views[static_cast<size_t>(i)];
-    const Image photo = ReadWorkingPhoto(view, settings.scene.photo_size, kAsTaken);
-    const Camera camera = WorkingCamera(view.camera, settings.scene.photo_size,
-                                        stored.field_from_world, stored.ndc);
-    Image rendered = renderer.Render(camera).color;
-    PutGain(gains.Of(i), &rendered);
-    if (const auto value = Psnr(rendered, photo)) psnr.push_back(*value);
-    if (const auto value = Ssim(rendered, photo)) ssim.push_back(*value);
-    files.emplace_back(view.file);
-  }
-  (*figures)["heldout"] = std::move(files);
-  (*figures)["psnr_heldout_db"] = psnr.empty() ? JsonValue() : JsonValue(Mean(psnr));
-  (*figures)["ssim_heldout"] = ssim.empty() ? JsonValue() : JsonValue(Mean(ssim));
+void RecordHeldOut(const HeldOutFigures& held_out, JsonValue* figures) {
+  const auto number = [](const std::optional<double>& value) {
+    return value ? JsonValue(*value) : JsonValue();
+  };
+  (*figures)["heldout"] = JsonValue::Array(held_out.files.begin(), held_out.files.end());
+  (*figures)["psnr_heldout_db"] = number(held_out.MeanPsnr());
+  (*figures)["ssim_heldout"] = number(held_out.MeanSsim());
 }
 
 int Finest(const FitOptions& options) {
@@ -109,18 +91,18 @@ EffectReport ProfileViewDependence(const RunSettings& settings, const FitOptions
                                    const std::vector<TrainingView>& views, const SceneBox& box,
                                    const FitState* resume, const ProgressFunction& progress,
                                    Backend backend) {
-  const auto row = [](bool on, double value, const std::string& evidence) {
+  const auto row = [](bool on, const Figure& value, const std::string& evidence) {
     return EffectReport{kViewDependence, on, evidence, value, kDegreePays};
   };
   const auto wishes = ParseEffects(settings.run.effects);
   const auto wish = wishes.find(kViewDependence);
   const bool wanted = wish == wishes.end() || wish->second;
-  if (options.sh_degree == 0 || !wanted) return row(false, 0, "not measured: as asked for");
-  if (wish != wishes.end()) return row(true, 0, "not measured: as asked for");
+  if (options.sh_degree == 0 || !wanted) return row(false, Figure(), "as asked for");
+  if (wish != wishes.end()) return row(true, Figure(), "as asked for");
   if (resume != nullptr)
-    return row(resume->grid.basis > 1, 0, "not measured again: as before the interruption");
+    return row(resume->grid.basis > 1, Figure(), "as before the interruption");
   if (views.size() < kLeastTrialViews)
-    return row(true, 0, "not measured: too few photos to keep some from a trial");
+    return row(true, Figure(), "too few photos to keep some from a trial");
   const DegreeTrial trial = TryDegrees(views, box, options, progress, backend);
   return row(trial.Pays(), trial.gain_db,
              "decibels that harmonics of degree " + std::to_string(options.sh_degree) +
@@ -194,8 +176,14 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   if (scene.box.spheres)
     outcome.figures["background_texels"] = fit.field.geometry->spheres.num_texels();
   outcome.figures["psnr_train_db"] = fit.psnr_train_db;
-  MeasureHeldOut(context, capture, profile.gains, ReadFieldFile(workspace.Path("field.npz")),
-                 backend, &outcome.figures);
+  for (const FitCurvePoint& point : fit.curve) {
+    outcome.figures["curve_steps"].Append(point.step);
+    outcome.figures["curve_psnr_db"].Append(Rounded(point.psnr_train_db));
+  }
+  RecordHeldOut(
+      MeasureHeldOut(capture, settings.run.holdout, settings.scene.photo_size, profile.gains,
+                     ReadFieldFile(workspace.Path("field.npz")), backend),
+      &outcome.figures);
   return outcome;
 }
 

@@ -1,5 +1,5 @@
 // Stage "render": frames of the field before and after, and what the 2D method makes of the
-// former, at the photos' places and along the film's way; and two films.
+// former, at the photos' places and along the film's way; and films.
 #include <algorithm>
 #include <filesystem>
 
@@ -31,8 +31,8 @@ Image Wiped(const Image& left, const Image& right, int frame, int frames) {
   return mixed;
 }
 
-// Films of frames that are on disk already, of the sequences `prefix` + "source" and "styled".
-// A machine without H.264 has none.
+// Films of frames that are on disk already, of the sequences `prefix` + "source" and "styled",
+// and of "views_2d" where there is one. A machine without H.264 has none.
 void WriteFilms(RunContext* context, const std::string& prefix, int frames,
                 const ProgressFunction& progress, std::vector<std::string>* outputs) {
   const Workspace& workspace = *context->workspace;
@@ -40,11 +40,16 @@ void WriteFilms(RunContext* context, const std::string& prefix, int frames,
     return ReadImage(workspace.Path("frames/" + prefix + sequence + "/" + FrameName(i)));
   };
   const Image first = frame("styled", 0);
+  std::filesystem::remove(workspace.Path("views_2d.mp4"));  // of a method that had one
   try {
     VideoWriter film(workspace.Path("styled.mp4"), first.width, first.height,
                      context->settings.render.fps);
     VideoWriter wipe(workspace.Path("source_vs_styled.mp4"), first.width, first.height,
                      context->settings.render.fps);
+    std::optional<VideoWriter> frame_by_frame;
+    if (std::filesystem::exists(workspace.Path("frames/" + prefix + "views_2d")))
+      frame_by_frame.emplace(workspace.Path("views_2d.mp4"), first.width, first.height,
+                             context->settings.render.fps);
     for (int i = 0; i < frames; ++i) {
       if (Report(progress, i, frames, "films") == Verdict::kAbort) throw Interrupted();
       const Image styled = frame("styled", i), source = frame("source", i);
@@ -54,10 +59,15 @@ void WriteFilms(RunContext* context, const std::string& prefix, int frames,
       }
       film.Add(styled);
       wipe.Add(Wiped(source, styled, i, frames));
+      if (frame_by_frame) frame_by_frame->Add(frame("views_2d", i));
     }
     film.Finish();
     wipe.Finish();
     outputs->insert(outputs->end(), {"styled.mp4", "source_vs_styled.mp4"});
+    if (frame_by_frame) {
+      frame_by_frame->Finish();
+      outputs->push_back("views_2d.mp4");
+    }
   } catch (const Error& error) {
     if (error.code() != ExitCode::kExternalProgram) throw;
     context->console->Warn("no film: " + error.what_failed());

@@ -2,30 +2,32 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "kernels/base/error.h"
+#include "kernels/field/fast_rays.h"
 #include "pipeline/capture_store.h"
+#include "pipeline/chart_library.h"
+#include "pipeline/equivalent_command.h"
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/files/image_file.h"
 #include "pipeline/memory.h"
 #include "pipeline/photo_gains.h"
 #include "pipeline/report_html.h"
 #include "pipeline/report_json.h"
+#include "pipeline/report_pictures.h"
 #include "pipeline/report_records.h"
+#include "pipeline/run_file.h"
 #include "pipeline/scene_profile.h"
 #include "pipeline/scene_views.h"
 #include "pipeline/stages/run_context.h"
+#include "pipeline/tradeoff/price_list.h"
 
 namespace regrade {
 namespace {
 
 constexpr int kPagePictures = 5;  // viewpoints shown
 constexpr int kJpegQuality = 85;
-
-std::optional<ReportPicture> PictureAt(const std::string& path) {
-  if (!std::filesystem::exists(path)) return std::nullopt;
-  const Image image = ReadImage(path);
-  if (image.channels != 3) return std::nullopt;
-  return ReportPicture{EncodeJpeg(image, kJpegQuality), image.width, image.height};
-}
+constexpr char kPriceList[] =
+    "tradeoff/tradeoff.json";  // of `regrade tradeoff DIR --out DIR/tradeoff`
 
 PhotosReport PhotosOf(const Capture& capture) {
   PhotosReport photos;
@@ -38,7 +40,19 @@ PhotosReport PhotosOf(const Capture& capture) {
   return photos;
 }
 
-ReportPictures PicturesOf(const RunContext& context, const Capture& capture) {
+// Of what made the results: this program's parts, and the programs that it started.
+std::vector<OptionValue> VersionsOf(const Workspace& workspace) {
+  std::vector<OptionValue> versions = {{"regrade", REGRADE_VERSION},
+                                       {"compiler", __VERSION__},
+                                       {"instructions", FastRays().name}};
+  if (const auto record = workspace.Find("pose"))
+    if (const JsonValue* colmap = record->figures.Find("colmap"))
+      versions.push_back({"COLMAP", colmap->AsString()});
+  return versions;
+}
+
+ReportPictures PicturesOf(const RunContext& context, const Capture& capture,
+                          const RunReport& report) {
   const Workspace& workspace = *context.workspace;
   ReportPictures pictures;
   pictures.title = std::filesystem::path(workspace.folder()).filename().string();
@@ -62,6 +76,12 @@ ReportPictures PicturesOf(const RunContext& context, const Capture& capture) {
   }
   pictures.has_styled_film = std::filesystem::exists(workspace.Path("styled.mp4"));
   pictures.has_wipe_film = std::filesystem::exists(workspace.Path("source_vs_styled.mp4"));
+  pictures.has_views_2d_film = std::filesystem::exists(workspace.Path("views_2d.mp4"));
+  pictures.heat_maps = HeatMapPictures(workspace, report);
+  pictures.thumbnails = Thumbnails(workspace, capture);
+  pictures.cameras = MapCameras(capture, context.settings.run.holdout);
+  pictures.chart_library = ReadChartLibrary();
+  pictures.run_json = DumpJson(RunFileJson("run", context), 1);
   return pictures;
 }
 
@@ -71,7 +91,8 @@ StageOutcome WriteReport(RunContext* context) {
   const Capture capture = ReadCapture(workspace.Path("poses"));
   RunReport report = ReportFromRecords(workspace);
   report.version = REGRADE_VERSION;
-  report.command = {"regrade", "run", context->source};
+  report.command = EquivalentCommand(*context);
+  report.versions = VersionsOf(workspace);
   report.preset = settings.run.preset;
   report.device = "cpu";
   if (const auto record = workspace.Find("reconstruct"))
@@ -85,12 +106,17 @@ StageOutcome WriteReport(RunContext* context) {
   if (const auto record = workspace.Find("reconstruct"))
     if (const JsonValue* effects = record->figures.Find("effects"))
       report.effects = EffectsOfRecord(*effects);
+  try {
+    report.prices = ReadPriceList(workspace.Path(kPriceList));
+  } catch (const Error& error) {  // a report is worth having without it
+    context->console->Warn(std::string(kPriceList) + " is left out: " + error.what_failed());
+  }
   const JsonValue options = context->options.Values();
   for (const auto& [name, value] : options.AsObject())
     report.options.push_back({name, value.IsString() ? value.AsString() : DumpJson(value, -1)});
   WriteJsonFile(workspace.Path("report.json"), ReportJson(report));
   WriteFileAtomically(workspace.Path("report.html"),
-                      ReportHtml(report, PicturesOf(*context, capture)));
+                      ReportHtml(report, PicturesOf(*context, capture, report)));
   StageOutcome outcome;
   outcome.outputs = {"report.json", "report.html"};
   return outcome;
@@ -107,6 +133,8 @@ Stage ReportStage(RunContext* context) {
   // Stage "evaluate" leaves figures alone.
   if (const auto record = context->workspace->Find("evaluate"))
     stage.inputs["evaluate"] = record->figures;
+  const std::string prices = context->workspace->Path(kPriceList);
+  if (std::filesystem::is_regular_file(prices)) stage.inputs["prices"] = HashFile(prices);
   stage.work = [context](const ProgressFunction&) { return WriteReport(context); };
   return stage;
 }

@@ -179,6 +179,11 @@ TEST(Consistency, H120_MotionComesFromTheReferenceOnceForAllSequences) {
     EXPECT_EQ(a.coverage, b.coverage);
     EXPECT_GT(a.coverage, 0.5);
     EXPECT_EQ(a.disoccluded, b.disoccluded);
+    // The waves' own motion explains nearly all of what moves; another's would not.
+    EXPECT_LT(*a.error,
+              0.1 * *ComparePair(waves[static_cast<size_t>(a.from)],
+                                 waves[static_cast<size_t>(a.to)], StillMotion(64, 48))
+                         .error);
     EXPECT_EQ(*b.error, 0);  // grey is perfectly consistent, whatever its flow would have been
   }
   int calls = 0;

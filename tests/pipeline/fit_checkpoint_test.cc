@@ -18,6 +18,7 @@ FitState StateOf(const RadianceField& field) {
     state.sphere_moment[i] = 0.25f * static_cast<float>(i);
   state.stage = 1;
   state.step = 17;
+  state.tally = {1.5, 2.5, 3, 4, 5, 6, 7, {{8, 9.5, 10.5, 11}, {12, 13.5, 14.5, 15}}};
   return state;
 }
 
@@ -36,6 +37,11 @@ TEST(FitCheckpoint, BackgroundSpheresComeBackBitForBit) {
   const std::optional<FitState> back = UnpackFitState(with);
   ASSERT_TRUE(back);
   EXPECT_EQ(back->step, 17);
+  EXPECT_EQ(back->tally.tail_error, 2.5);
+  EXPECT_EQ(back->tally.rejected_voxels, 7);
+  ASSERT_EQ(back->tally.curve.size(), 2u);
+  EXPECT_EQ(back->tally.curve[1].psnr_train_db, 14.5);
+  EXPECT_EQ(back->tally.curve[1].step, 15);
   const FastSpheres &a = back->grid.spheres, &b = state.grid.spheres;
   EXPECT_EQ(a.layers, b.layers);
   EXPECT_EQ(a.resolution, b.resolution);

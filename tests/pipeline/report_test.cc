@@ -26,6 +26,7 @@ RunReport SomeReport() {
       {}};
   report.consistency = {{"styled", 1, 3, 1, 29.79, 29.5, 0.8, {30.0, Figure(), 29.5}}};
   report.fidelity = {{"styled", 24.5, 0.19, 0.2, 12, 13, 0.01}};
+  report.prices = {{"fit", "fit-steps", "5", "PSNR", "dB", 1, 1, 2, 3, 4, 5, 6, 7, true, ""}};
   return report;
 }
 
@@ -35,6 +36,9 @@ ReportPictures SomePictures() {
   pictures.views = {{"00000, a.jpg", Picture(), Picture(), Picture(), Picture()}};
   pictures.heat_maps = {{"styled, frames 3 and 8", Picture()}};
   pictures.has_styled_film = true;
+  pictures.thumbnails = {Picture(), std::nullopt};
+  pictures.cameras.cameras = {{0, 0, 0, 1, 0.5, true, "a.jpg"},
+                              {1, 0.2, 0, 1, 0.5, false, "b"}};
   return pictures;
 }
 
@@ -95,15 +99,17 @@ TEST(ReportHtml, HostileNamesStayText) {
   report.stages.style_2d = Style2dReport{1, evil};
   report.stages.evaluate = EvaluateReport{1, evil, evil};
   report.consistency[0].sequence = report.fidelity[0].sequence = evil;
-  report.prices = {{evil, evil, 1, 2, evil}};
+  report.prices = {{"fit", evil, evil, evil, evil, 1, 1, 2, 3, 4, 5, 6, 7, true, evil}};
   report.options = {{evil, evil}};
-  pictures.title = pictures.views[0].name = evil;
+  report.versions = {{evil, evil}};
+  pictures.title = pictures.views[0].name = pictures.run_json = evil;
+  pictures.heat_maps[0].caption = pictures.cameras.cameras[0].file = evil;
   const std::string page = ReportHtml(report, pictures);
   // No tag beyond the page's own: as many scripts, and pictures as viewpoints ask for.
   EXPECT_EQ(Count(page, "<script"), Count(harmless, "<script"));
   EXPECT_EQ(Count(page, "<img"), Count(harmless, "<img"));
   EXPECT_EQ(Count(page, "alert('x')"), 0u);
-  EXPECT_GE(Count(page, "&lt;script&gt;alert(&#39;x&#39;)"), 15u);
+  EXPECT_GE(Count(page, "&lt;script&gt;alert(&#39;x&#39;)"), 20u);
 }
 
 TEST(ReportHtml, FetchesNothing) {
@@ -118,7 +124,8 @@ TEST(ReportHtml, FetchesNothing) {
     EXPECT_TRUE(where.rfind("data:image/", 0) == 0 || where == "styled.mp4") << where;
   }
   EXPECT_EQ(addresses,
-            2 + 4 + 1 + 2);  // headline pair, one view, a heat map, a film with its poster
+            2 + 4 + 1 + 2 + 1);  // headline pair, one view, a heat map, a film with its
+                                 // poster, a thumbnail
 }
 
 TEST(ReportHtml, UndefinedFiguresSayWhy) {
@@ -151,6 +158,40 @@ TEST(ReportHtml, TheBoundIsDrawnOverTheSteps) {
   EXPECT_EQ(html.find("nan"), std::string::npos);
   report.stages.stylize->variance = VarianceFigures{{{"inside", 40, 3, 1.2, 0.01}}, 0.7};
   EXPECT_NE(ReportHtml(report, {}).find("3 of 40 pairs"), std::string::npos);
+}
+
+TEST(ReportHtml, TheFitIsDrawnOverTheSteps) {
+  RunReport report = SomeReport();
+  report.stages.reconstruct->psnr_at_steps = {{20, 15.5}, {40, 21.25}};
+  const std::string html = ReportHtml(report, {});
+  EXPECT_NE(html.find("aria-label=\"PSNR of the fit over steps\""), std::string::npos);
+  EXPECT_NE(html.find("[[20.0,15.5],[40.0,21.25]]"), std::string::npos);   // for the library
+  EXPECT_EQ(html.find("held-out photos, at the end"), std::string::npos);  // there are none
+  report.stages.reconstruct->psnr_heldout_db = 20;
+  EXPECT_NE(ReportHtml(report, {}).find("held-out photos, at the end"), std::string::npos);
+}
+
+TEST(ReportHtml, AnEffectThatWasNotMeasuredSaysSo) {
+  RunReport report = SomeReport();
+  report.effects = {{"exposure", false, "it was not wanted", Figure(), 0.1}};
+  const std::string html = ReportHtml(report, {});
+  EXPECT_NE(html.find("<td class=\"n soft\">not measured</td>"), std::string::npos);
+}
+
+TEST(ReportHtml, WhatAStageCostTheProcessor) {
+  RunReport report = SomeReport();
+  report.cpu_seconds = {{"reconstruct", 117}};
+  EXPECT_NE(ReportHtml(report, {}).find("1 min 57 s"), std::string::npos);
+}
+
+TEST(ReportHtml, TheLibraryComesAlongOnlyWhereThereIsOne) {
+  ReportPictures pictures = SomePictures();
+  const std::string without = ReportHtml(SomeReport(), pictures);
+  pictures.chart_library = "/* Chart.js v3 */";
+  const std::string with = ReportHtml(SomeReport(), pictures);
+  EXPECT_EQ(Count(with, "<script>"), Count(without, "<script>") + 2);
+  EXPECT_EQ(Count(without, "new Chart"), 0u);
+  EXPECT_EQ(Count(without, "<svg"), Count(with, "<svg"));  // what those without script see
 }
 
 TEST(ReportHtml, AnEmptyReportIsAPage) {

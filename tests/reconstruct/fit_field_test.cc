@@ -134,9 +134,16 @@ TEST_F(FitField, H109_H110_AResumedFitIsTheUndisturbedOne) {
     ASSERT_GT(saved.grid.num_voxels(), 0) << "nothing was saved";
     FitHooks go_on;
     go_on.resume = &saved;
-    EXPECT_TRUE(
-        SameBits(straight.field, regrade::FitField(views_, box_, options_, go_on).field))
-        << stop_after;
+    const FitResult resumed = regrade::FitField(views_, box_, options_, go_on);
+    EXPECT_TRUE(SameBits(straight.field, resumed.field)) << stop_after;
+    // What was counted before the interruption counts, to the bit.
+    EXPECT_EQ(resumed.psnr_train_db, straight.psnr_train_db) << stop_after;
+    EXPECT_EQ(resumed.rays, straight.rays);
+    ASSERT_EQ(resumed.curve.size(), straight.curve.size());
+    for (size_t i = 0; i < resumed.curve.size(); ++i) {
+      EXPECT_EQ(resumed.curve[i].step, straight.curve[i].step);
+      EXPECT_EQ(resumed.curve[i].psnr_train_db, straight.curve[i].psnr_train_db);
+    }
   }
 }
 

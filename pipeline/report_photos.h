@@ -1,0 +1,14 @@
+// The photos' part of the report page: what became of each, with a thumbnail, and where they
+// were taken.
+#pragma once
+
+#include <string>
+
+#include "pipeline/report_html.h"
+
+namespace regrade {
+
+// "" without photos. File names and reasons may be hostile.
+std::string PhotosHtml(const RunReport& report, const ReportPictures& pictures);
+
+}  // namespace regrade

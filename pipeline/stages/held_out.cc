@@ -1,0 +1,42 @@
+#include "pipeline/stages/held_out.h"
+
+#include <numeric>
+
+#include "evaluate/image_quality.h"
+#include "pipeline/field_renderer.h"
+#include "pipeline/scene_views.h"
+
+namespace regrade {
+namespace {
+
+std::optional<double> Mean(const std::vector<double>& values) {
+  if (values.empty()) return std::nullopt;
+  return std::accumulate(values.begin(), values.end(), 0.0) /
+         static_cast<double>(values.size());
+}
+
+}  // namespace
+
+std::optional<double> HeldOutFigures::MeanPsnr() const { return Mean(psnr); }
+std::optional<double> HeldOutFigures::MeanSsim() const { return Mean(ssim); }
+
+HeldOutFigures MeasureHeldOut(const Capture& capture, int holdout, int photo_size,
+                              const PhotoGains& gains, const StoredField& stored,
+                              Backend backend) {
+  const FieldRenderer renderer(stored.field, backend);
+  HeldOutFigures figures;
+  for (const int i : ViewIndices(capture, holdout, true)) {
+    const CaptureView& view = capture.views[static_cast<size_t>(i)];
+    const Image photo = ReadWorkingPhoto(view, photo_size, kAsTaken);
+    const Camera camera =
+        WorkingCamera(view.camera, photo_size, stored.field_from_world, stored.ndc);
+    Image rendered = renderer.Render(camera).color;
+    PutGain(gains.Of(i), &rendered);
+    if (const auto value = Psnr(rendered, photo)) figures.psnr.push_back(*value);
+    if (const auto value = Ssim(rendered, photo)) figures.ssim.push_back(*value);
+    figures.files.push_back(view.file);
+  }
+  return figures;
+}
+
+}  // namespace regrade

@@ -1,0 +1,28 @@
+// How well a field shows photos that it has not seen.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "kernels/base/for_each.h"
+#include "kernels/scene/capture.h"
+#include "pipeline/field_file.h"
+#include "pipeline/photo_gains.h"
+
+namespace regrade {
+
+struct HeldOutFigures {
+  std::vector<std::string> files;  // the photos kept for measuring, the user's names
+  std::vector<double> psnr, ssim;  // of those that have one
+  std::optional<double> MeanPsnr() const;
+  std::optional<double> MeanSsim() const;
+};
+
+// Over the held-out photos as they were taken, at `photo_size` pixels: a render is given its
+// photo's gain, which is known from the colours of points that the photo shares with others.
+HeldOutFigures MeasureHeldOut(const Capture& capture, int holdout, int photo_size,
+                              const PhotoGains& gains, const StoredField& stored,
+                              Backend backend);
+
+}  // namespace regrade

@@ -1,0 +1,64 @@
+#include "pipeline/tradeoff/measurements.h"
+
+#include <filesystem>
+
+#include "kernels/base/error.h"
+
+namespace regrade {
+namespace {
+
+Measurement FromJson(const JsonValue& row) {
+  Measurement measurement;
+  measurement.plane = row.At("plane").AsString();
+  measurement.knob = row.At("knob").AsString();
+  measurement.value = row.At("value").AsString();
+  measurement.repeat = static_cast<int>(row.At("repeat").AsInt());
+  measurement.seconds = row.At("seconds").AsDouble();
+  measurement.cpu_seconds = row.At("cpu_seconds").AsDouble();
+  measurement.accuracy = row.At("accuracy").AsDouble();
+  measurement.work = row.At("work");
+  return measurement;
+}
+
+}  // namespace
+
+JsonValue ToJson(const Measurement& measurement) {
+  return JsonValue::Object{
+      {"plane", measurement.plane},       {"knob", measurement.knob},
+      {"value", measurement.value},       {"repeat", measurement.repeat},
+      {"seconds", measurement.seconds},   {"cpu_seconds", measurement.cpu_seconds},
+      {"accuracy", measurement.accuracy}, {"work", measurement.work}};
+}
+
+MeasurementStore::MeasurementStore(const std::string& path, const std::string& fingerprint)
+    : path_(path), fingerprint_(fingerprint) {
+  if (!std::filesystem::is_regular_file(path)) return;
+  try {
+    const JsonValue file = ReadJsonFile(path);
+    if (file.At("fingerprint").AsString() != fingerprint) return;
+    for (const JsonValue& row : file.At("measurements").AsArray())
+      all_.push_back(FromJson(row));
+  } catch (const Error& error) {
+    throw Error(ExitCode::kInput, error.what_failed(), path,
+                "delete this file: what it held will be measured again");
+  }
+}
+
+const Measurement* MeasurementStore::Find(const Variant& variant, int repeat) const {
+  for (const Measurement& m : all_)
+    if (m.plane == variant.plane && m.knob == variant.knob && m.value == variant.value &&
+        m.repeat == repeat)
+      return &m;
+  return nullptr;
+}
+
+void MeasurementStore::Add(const Measurement& measurement) {
+  all_.push_back(measurement);
+  JsonValue::Array rows;
+  for (const Measurement& m : all_) rows.push_back(ToJson(m));
+  WriteJsonFile(path_, JsonValue::Object{{"schema", 1},
+                                         {"fingerprint", fingerprint_},
+                                         {"measurements", std::move(rows)}});
+}
+
+}  // namespace regrade

@@ -1,0 +1,210 @@
+#include "pipeline/tradeoff/prediction.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "kernels/base/error.h"
+#include "pipeline/scene_views.h"
+
+namespace regrade {
+namespace {
+
+// A stage and the units that its time is made of; the first is what its knobs change.
+struct StageUnits {
+  const char* stage;
+  std::vector<const char*> units;
+  const char* plane;  // whose variants teach more than the run itself
+  std::vector<const char*> knobs;
+};
+
+const std::vector<StageUnits>& AllUnits() {
+  static const std::vector<StageUnits> all = {
+      {"pose", {"photo megapixels"}, "", {}},
+      {"reconstruct", {"ray voxels"}, "fit", {"fit-steps", "fit-resolutions"}},
+      {"style_2d", {"photo pixels"}, "", {}},
+      {"stylize", {"style rays", "photo pixels"}, "style", {"style-steps"}},
+      {"render", {"frame ray voxels"}, "", {}},
+      {"evaluate", {"pair pixels"}, "", {}},
+  };
+  return all;
+}
+
+double PhotoPixels(const RunSettings& settings, const Capture& capture) {
+  double pixels = 0;
+  for (const CaptureView& view : capture.views) {
+    const Camera camera = WorkingCamera(view.camera, settings.scene.photo_size, {}, {});
+    pixels += static_cast<double>(camera.width) * camera.height;
+  }
+  return pixels;
+}
+
+// One observation: how much of each unit there was, and what it took.
+struct Observation {
+  std::vector<double> amounts;
+  double seconds = 0, cpu_seconds = 0;
+};
+
+// The factors, none negative, that make sum_i (sum_k f_k a_ik / y_i - 1)^2 least; for one unit
+// or two.
+std::vector<double> LeastSquares(const std::vector<Observation>& seen,
+                                 double Observation::*time) {
+  const size_t units = seen[0].amounts.size();
+  double a00 = 0, a01 = 0, a11 = 0, b0 = 0, b1 = 0;
+  for (const Observation& o : seen) {
+    const double y = std::max(o.*time, 1e-9);
+    const double x0 = o.amounts[0] / y, x1 = units > 1 ? o.amounts[1] / y : 0;
+    a00 += x0 * x0, a01 += x0 * x1, a11 += x1 * x1, b0 += x0, b1 += x1;
+  }
+  const double first = a00 > 0 ? b0 / a00 : 0;
+  if (units == 1) return {first};
+  // With one observation, or all alike, the two cannot be told apart.
+  const double determinant = a00 * a11 - a01 * a01;
+  if (determinant > 1e-9 * a00 * a11) {
+    const double f0 = (b0 * a11 - b1 * a01) / determinant;
+    const double f1 = (b1 * a00 - b0 * a01) / determinant;
+    if (f0 >= 0 && f1 >= 0) return {f0, f1};
+    if (f0 < 0) return {0, a11 > 0 ? b1 / a11 : 0};
+  }
+  return {first, 0};
+}
+
+Observation ObservationOf(const StageUnits& stage, const RunSettings& settings,
+                          const Capture& capture, double seconds, double cpu_seconds) {
+  Observation seen{{}, seconds, cpu_seconds};
+  for (const char* unit : stage.units)
+    seen.amounts.push_back(AmountOf(unit, settings, capture));
+  return seen;
+}
+
+// The base's settings with a variant's options over them.
+RunSettings SettingsOf(const RunSettings& base, const Variant& variant) {
+  RunSettings settings = base;
+  OptionSet options;
+  settings.Bind(&options);
+  options.ApplyConfig(variant.options, "tradeoff");
+  return settings;
+}
+
+}  // namespace
+
+double AmountOf(const std::string& unit, const RunSettings& settings, const Capture& capture) {
+  const double photos = static_cast<double>(capture.views.size());
+  const double pixels = PhotoPixels(settings, capture);
+  const double film = settings.render.path.path == "views"
+                          ? 0
+                          : static_cast<double>(settings.render.path.path_frames);
+  const double frame = photos > 0 ? pixels / photos : 0;
+  if (unit == "photo megapixels") {
+    double sum = 0;
+    for (const CaptureView& view : capture.views) {
+      const Camera camera = WorkingCamera(view.camera, settings.pose.image_size, {}, {});
+      sum += 1e-6 * camera.width * camera.height;
+    }
+    return sum;
+  }
+  if (unit == "photo pixels") return pixels;
+  if (unit == "staged pixels") {
+    double sum = 0;
+    for (const CaptureView& view : capture.views)
+      sum += static_cast<double>(view.camera.width) * view.camera.height;
+    return sum;
+  }
+  if (unit == "ray voxels") {
+    double sum = 0;
+    for (size_t s = 0; s < std::min(settings.fit.steps.size(), settings.fit.resolutions.size());
+         ++s)
+      sum += static_cast<double>(settings.fit.steps[s]) * settings.fit.rays_per_step *
+             settings.fit.resolutions[s];
+    return sum;
+  }
+  if (unit == "style rays")
+    return static_cast<double>(settings.network.steps) *
+           (settings.network.rays_per_step > 0 ? settings.network.rays_per_step : frame);
+  if (unit == "frame ray voxels")
+    return (photos + film) * frame * settings.fit.resolutions.back();
+  if (unit == "pair pixels") {
+    double pairs = 0;
+    for (const int gap : settings.consistency.gaps)
+      pairs += std::max(0.0, photos - gap) + std::max(0.0, film - gap);
+    return pairs * frame;
+  }
+  throw Error(ExitCode::kInput, "'" + unit + "' is no unit of work");
+}
+
+std::vector<PriceTerm> LearnPrices(const RunSettings& base, const Capture& capture,
+                                   const Workspace& workspace,
+                                   const std::vector<Variant>& variants,
+                                   const std::vector<Measurement>& measurements) {
+  std::vector<PriceTerm> prices;
+  for (const StageUnits& stage : AllUnits()) {
+    std::vector<Observation> seen;
+    for (const Measurement& m : measurements) {
+      const bool teaches =
+          m.knob.empty() || std::any_of(stage.knobs.begin(), stage.knobs.end(),
+                                        [&m](const char* knob) { return m.knob == knob; });
+      if (m.plane != stage.plane || !teaches) continue;
+      for (const Variant& variant : variants)
+        if (variant.plane == m.plane && variant.knob == m.knob && variant.value == m.value)
+          seen.push_back(ObservationOf(stage, SettingsOf(base, variant), capture, m.seconds,
+                                       m.cpu_seconds));
+    }
+    const auto record = workspace.Find(stage.stage);
+    if (seen.empty() && record)
+      seen.push_back(ObservationOf(stage, base, capture, record->seconds,
+                                   record->cpu_seconds.value_or(record->seconds)));
+    if (seen.empty()) continue;
+    const std::vector<double> seconds = LeastSquares(seen, &Observation::seconds),
+                              cpu = LeastSquares(seen, &Observation::cpu_seconds);
+    for (size_t k = 0; k < stage.units.size(); ++k)
+      prices.push_back({stage.stage, stage.units[k], seconds[k], cpu[k]});
+    if (stage.stage == std::string("reconstruct") && record) {
+      const double amount = AmountOf("staged pixels", base, capture);
+      const Observation own = ObservationOf(stage, base, capture, 0, 0);
+      const auto beside = [&](double whole, double factor) {
+        return amount > 0 ? std::max(0.0, whole - factor * own.amounts[0]) / amount : 0;
+      };
+      prices.push_back({stage.stage, "staged pixels", beside(record->seconds, seconds[0]),
+                        beside(record->cpu_seconds.value_or(record->seconds), cpu[0])});
+    }
+  }
+  return prices;
+}
+
+std::vector<StageTime> Predict(const std::vector<PriceTerm>& prices,
+                               const RunSettings& settings, const Capture& capture) {
+  std::vector<StageTime> times;
+  for (const PriceTerm& term : prices) {
+    auto at = std::find_if(times.begin(), times.end(),
+                           [&term](const StageTime& time) { return time.stage == term.stage; });
+    if (at == times.end()) at = times.insert(times.end(), {term.stage, 0, 0});
+    const double amount = AmountOf(term.unit, settings, capture);
+    at->seconds += amount * term.seconds;
+    at->cpu_seconds += amount * term.cpu_seconds;
+  }
+  return times;
+}
+
+JsonValue ToJson(const std::vector<PriceTerm>& prices) {
+  JsonValue::Array rows;
+  for (const PriceTerm& term : prices)
+    rows.push_back(JsonValue::Object{{"stage", term.stage},
+                                     {"unit", term.unit},
+                                     {"seconds", term.seconds},
+                                     {"cpu_seconds", term.cpu_seconds}});
+  return rows;
+}
+
+std::vector<PriceTerm> PricesFromJson(const JsonValue& json, const std::string& where) {
+  try {
+    std::vector<PriceTerm> prices;
+    for (const JsonValue& row : json.At("unit_prices").AsArray())
+      prices.push_back({row.At("stage").AsString(), row.At("unit").AsString(),
+                        row.At("seconds").AsDouble(), row.At("cpu_seconds").AsDouble()});
+    return prices;
+  } catch (const Error& error) {
+    throw Error(ExitCode::kInput, error.what_failed(), where,
+                "give the tradeoff.json that `regrade tradeoff` wrote");
+  }
+}
+
+}  // namespace regrade

@@ -1,0 +1,257 @@
+#!/usr/bin/env python3
+"""Opens a report page in headless Chromium as a phone and as a desktop would, and checks that it behaves.
+
+  look_at_report.py REPORT.html [--shots FOLDER] [--chromium PROGRAM]
+
+Checked at each width: nothing on the console, nothing asked of the network (films beside the page are files), no
+scrolling sideways, every picture decoded, the slider cuts the picture where it is pulled to, drawings are drawn by
+Chart.js where the page carries it; and without JavaScript the static drawings are seen and no script is missed.
+--shots keeps pictures of the whole page. Exit status 1 if anything is wrong, 77 if there is no Chromium.
+"""
+
+import argparse
+import base64
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from urllib.parse import urlparse
+from urllib.request import pathname2url
+
+SIZES = {"phone": (390, 844), "desktop": (1280, 900)}
+NO_CHROMIUM = 77  # what the test driver takes for "skipped"
+PATIENCE = 60  # seconds for any answer
+
+
+class Browser:
+    """Chromium on two pipes: messages of JSON that end with a zero byte."""
+
+    def __init__(self, program, profile):
+        to_browser, self.send_fd = os.pipe()
+        self.read_fd, from_browser = os.pipe()
+
+        def connect():
+            # The numbers that the browser expects; the pipes may have them already, crosswise.
+            read, write = os.dup(to_browser), os.dup(from_browser)
+            os.dup2(read, 3)
+            os.dup2(write, 4)
+            os.set_inheritable(3, True)
+            os.set_inheritable(4, True)
+
+        self.process = subprocess.Popen(
+            [program, "--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--no-first-run",
+             "--disable-background-networking", "--mute-audio", "--user-data-dir=" + profile, "--remote-debugging-pipe",
+             "about:blank"],
+            preexec_fn=connect, close_fds=False, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        os.close(to_browser)
+        os.close(from_browser)
+        os.set_blocking(self.read_fd, False)
+        self.buffer, self.number, self.events = b"", 0, []
+
+    def _message(self, deadline):
+        while b"\0" not in self.buffer:
+            if time.monotonic() > deadline or self.process.poll() is not None:
+                raise RuntimeError("Chromium does not answer")
+            try:
+                piece = os.read(self.read_fd, 1 << 20)
+            except BlockingIOError:
+                time.sleep(0.01)
+                continue
+            if not piece:
+                raise RuntimeError("Chromium has gone")
+            self.buffer += piece
+        text, self.buffer = self.buffer.split(b"\0", 1)
+        return json.loads(text)
+
+    def call(self, method, session=None, **parameters):
+        self.number += 1
+        message = {"id": self.number, "method": method, "params": parameters}
+        if session:
+            message["sessionId"] = session
+        data = json.dumps(message).encode() + b"\0"
+        while data:
+            data = data[os.write(self.send_fd, data):]
+        deadline = time.monotonic() + PATIENCE
+        while True:
+            answer = self._message(deadline)
+            if answer.get("id") == self.number:
+                if "error" in answer:
+                    raise RuntimeError(method + ": " + answer["error"]["message"])
+                return answer["result"]
+            self.events.append(answer)
+
+    def wait_for(self, method):
+        deadline = time.monotonic() + PATIENCE
+        while not any(event.get("method") == method for event in self.events):
+            self.events.append(self._message(deadline))
+
+    def close(self):
+        try:
+            self.call("Browser.close")
+        except (RuntimeError, OSError):
+            pass
+        try:
+            self.process.wait(timeout=10)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+
+
+class Page:
+    """One tab at one size, on the report."""
+
+    def __init__(self, browser, path, size, script=True):
+        self.browser, self.path = browser, path
+        browser.events = []
+        target = browser.call("Target.createTarget", url="about:blank")["targetId"]
+        self.target = target
+        self.session = browser.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+        for domain in ["Page", "Runtime", "Log", "Network"]:
+            self.call(domain + ".enable")
+        self.call("Emulation.setDeviceMetricsOverride", width=size[0], height=size[1], deviceScaleFactor=1,
+                  mobile=size[0] < 600)
+        if not script:
+            self.call("Emulation.setScriptExecutionDisabled", value=True)
+        self.call("Page.navigate", url="file://" + pathname2url(os.path.abspath(path)))
+        browser.wait_for("Page.loadEventFired")
+
+    def call(self, method, **parameters):
+        return self.browser.call(method, session=self.session, **parameters)
+
+    def value(self, expression):
+        result = self.call("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
+        if "exceptionDetails" in result:
+            raise RuntimeError(result["exceptionDetails"]["text"] + " in " + expression)
+        return result["result"].get("value")
+
+    def click(self, x, y):
+        for kind in ["mousePressed", "mouseReleased"]:
+            self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
+
+    def shot(self, file):
+        picture = self.call("Page.captureScreenshot", format="png", captureBeyondViewport=True)["data"]
+        with open(file, "wb") as out:
+            out.write(base64.b64decode(picture))
+
+    def close(self):
+        self.browser.call("Target.closeTarget", targetId=self.target)
+
+    def complaints(self):
+        """What the page said on the console or asked of the network."""
+        found, folder = [], os.path.dirname(os.path.abspath(self.path))
+        for event in self.browser.events:
+            about, method = event.get("params", {}), event.get("method")
+            if method == "Runtime.exceptionThrown":
+                found.append("exception: " + about["exceptionDetails"].get("exception", {}).get("description", "?"))
+            elif method == "Runtime.consoleAPICalled" and about["type"] in ("error", "warning", "assert"):
+                found.append("console: " + str(about["args"]))
+            elif method == "Log.entryAdded" and about["entry"]["level"] in ("error", "warning"):
+                found.append("log: " + about["entry"]["text"] + " " + about["entry"].get("url", ""))
+            elif method == "Network.requestWillBeSent":
+                address = urlparse(about["request"]["url"])
+                beside = address.scheme == "file" and os.path.dirname(address.path) == pathname2url(folder)
+                if address.scheme not in ("data", "about", "blob") and not beside:
+                    found.append("asks for " + about["request"]["url"][:200])
+        return found
+
+
+def check_slider(page):
+    """Pulls the first slider to a quarter and to three quarters of its picture."""
+    box = page.value("(function(){var c=document.querySelector('.compare input');if(!c)return null;"
+                     "c.scrollIntoView({block:'center'});var r=c.getBoundingClientRect();"
+                     "return [r.left,r.top,r.width,r.height]})()")
+    if box is None:
+        return []
+    cuts = []
+    for share in (0.25, 0.75):
+        page.click(box[0] + share * box[2], box[1] + box[3] / 2)
+        cuts.append(page.value("parseFloat(document.querySelector('.compare').style.getPropertyValue('--cut'))"))
+        shown = page.value("getComputedStyle(document.querySelector('.compare figure+figure')).clipPath")
+        if "%" not in (shown or ""):
+            return ["the slider cuts nothing: clip-path is " + str(shown)]
+    good = all(cut is not None and abs(cut - want) < 6 for cut, want in zip(cuts, (25, 75)))
+    return [] if good else [f"the slider went to {cuts} where it was pulled to 25 and 75 percent"]
+
+
+def check_page(page, width):
+    found = page.complaints()
+    wide = page.value("document.documentElement.scrollWidth")
+    if wide > width:
+        culprit = page.value("(function(){var w=document.documentElement.clientWidth,n='';"
+                             "document.querySelectorAll('main *').forEach(function(e){if(!n&&!e.closest('.scroll')&&"
+                             "e.getBoundingClientRect().right>w+1)n=e.outerHTML.slice(0,120)});return n})()")
+        found.append(f"scrolls sideways: {wide} pixels wide at {width}, by {culprit}")
+    # Pictures that wait until they are seen are asked for now.
+    # Hostile names on test pages would set the title if they were run.
+    if page.value("document.title") == "run":
+        found.append("a name on the page was run as a script")
+    broken = page.value("(async function(){var n=0;for(var i of document.images){i.loading='eager';"
+                        "try{await i.decode()}catch(e){n++}}return n})()")
+    if broken:
+        found.append(f"{broken} pictures do not decode")
+    plots, live = (page.value("document.querySelectorAll('.plot%s').length" % state) for state in ("", ".live"))
+    if page.value("typeof Chart") != "undefined" and live < plots:
+        found.append(f"{live} of {plots} drawings are drawn by the library")
+    hidden = page.value("[].filter.call(document.querySelectorAll('.plot'),function(p){"
+                        "var d=p.querySelector(p.classList.contains('live')?'canvas':'svg').getBoundingClientRect();"
+                        "return d.width<100||d.height<50}).length")
+    if hidden:
+        found.append(f"{hidden} drawings are not seen")
+    return found + check_slider(page) + [c for c in page.complaints() if c not in found]
+
+
+def check_without_script(page):
+    found = page.complaints()
+    shown = page.value("[].every.call(document.querySelectorAll('.plot svg'),function(s){"
+                       "return s.getBoundingClientRect().height>50})")
+    if not shown:
+        found.append("without JavaScript a drawing is not seen")
+    return found
+
+
+def look(browser, arguments):
+    found = []
+    for name, size in SIZES.items():
+        page = Page(browser, arguments.report, size)
+        found += [name + ": " + complaint for complaint in check_page(page, size[0])]
+        if arguments.shots:
+            page.shot(os.path.join(arguments.shots, name + ".png"))
+        page.close()
+    page = Page(browser, arguments.report, SIZES["phone"], script=False)
+    found += ["no script: " + complaint for complaint in check_without_script(page)]
+    if arguments.shots:
+        page.shot(os.path.join(arguments.shots, "no_script.png"))
+    page.close()
+    return found
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("report", help="the page")
+    parser.add_argument("--shots", help="folder for pictures of the page")
+    parser.add_argument("--chromium", default=shutil.which("chromium") or shutil.which("chromium-browser"))
+    arguments = parser.parse_args()
+    if not arguments.chromium:
+        print("skipped: there is no Chromium here (Debian package chromium)")
+        return NO_CHROMIUM
+    if not os.path.isfile(arguments.report):
+        parser.error(arguments.report + " is no file")
+    if arguments.shots:
+        os.makedirs(arguments.shots, exist_ok=True)
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
+        browser = Browser(arguments.chromium, profile)
+        try:
+            found = look(browser, arguments)
+        finally:
+            browser.close()
+    for complaint in found:
+        print(complaint)
+    print("the page behaves" if not found else f"{len(found)} complaints")
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,207 @@
+// Price lists: which variants there are, what is kept, what beats what, and what is predicted.
+#include "pipeline/tradeoff/price_list.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "pipeline/tradeoff/guess.h"
+#include "pipeline/tradeoff/prediction.h"
+#include "tests/support/expect_error.h"
+#include "tests/support/temporary_folder.h"
+
+namespace regrade {
+namespace {
+
+using testing::TemporaryFolder;
+
+Measurement Of(const Variant& variant, double cpu, double accuracy, int repeat = 0) {
+  return {variant.plane, variant.knob, variant.value, repeat, 0.6 * cpu, cpu, accuracy};
+}
+
+Variant FitVariant(const std::string& knob, const std::string& value, bool end = false) {
+  return {"fit", knob, value, JsonValue::Object(), end};
+}
+
+const PriceRow& RowOf(const std::vector<PriceRow>& rows, const std::string& setting) {
+  return *std::find_if(rows.begin(), rows.end(),
+                       [&](const PriceRow& row) { return row.setting == setting; });
+}
+
+TEST(Knobs, ValuesFollowTheBase) {
+  RunSettings base;
+  base.fit.steps = {10, 20};
+  base.fit.resolutions = {16, 24};
+  const std::vector<Variant> variants =
+      VariantsOf(base, {{"fit-steps", "sh-degree"}, false, true, {}});
+  std::vector<std::string> said;
+  for (const Variant& variant : variants) said.push_back(variant.knob + "=" + variant.value);
+  // Half and a quarter of the base's steps and twice as many, not the base's own again; other
+  // planes have no knob here, and so no base.
+  EXPECT_EQ(said, (std::vector<std::string>{"=", "fit-steps=3,5", "fit-steps=5,10",
+                                            "fit-steps=20,40", "sh-degree=0", "sh-degree=1"}));
+  EXPECT_TRUE(variants[3].accurate_end);
+  EXPECT_FALSE(variants[5].accurate_end);  // the base is
+  EXPECT_REGRADE_ERROR(VariantsOf(base, {{"fit-stepz"}, false, true, {}}), ExitCode::kUsage,
+                       "fit-stepz");
+}
+
+TEST(Knobs, EveryOptionIsOneOfARun) {
+  RunSettings base;
+  OptionSet options;
+  base.Bind(&options);
+  for (const Variant& variant : VariantsOf(base, {{}, true, true, {"draft", "paper"}}))
+    if (variant.plane != "render") {
+      RunSettings settings = base;
+      OptionSet set;
+      settings.Bind(&set);
+      set.ApplyConfig(variant.options, "here");  // throws for a name that is none
+      EXPECT_EQ(DumpJson(set.Values(), -1) == DumpJson(options.Values(), -1),
+                variant.knob.empty())
+          << variant.knob << " " << variant.value;
+    }
+}
+
+TEST(PriceList, MediansSpreadsAndErrorsAgainstTheAccurateEnd) {
+  const std::vector<Variant> variants = {FitVariant("", ""), FitVariant("fit-steps", "5"),
+                                         FitVariant("fit-steps", "20", true),
+                                         FitVariant("sh-degree", "1")};
+  std::vector<Measurement> measured = {Of(variants[1], 4, 24, 0), Of(variants[1], 9, 25, 1),
+                                       Of(variants[1], 5, 24.5, 2)};
+  measured.push_back(Of(variants[0], 10, 26));
+  measured.push_back(Of(variants[2], 20, 27));
+  measured.push_back(Of(variants[3], 8, 25.75));
+  const std::vector<PriceRow> rows = PriceList(variants, measured, "preset draft");
+  ASSERT_EQ(rows.size(), 4u);
+  const PriceRow& few = RowOf(rows, "5");
+  EXPECT_EQ(*few.cpu_seconds.value, 5);
+  EXPECT_EQ(*few.cpu_spread.value, 2.5);
+  EXPECT_EQ(*few.accuracy.value, 24.5);
+  EXPECT_EQ(*few.error.value, 2.5);                // against 20 steps
+  EXPECT_EQ(*RowOf(rows, "1").error.value, 0.25);  // against the base
+  EXPECT_FALSE(RowOf(rows, "preset draft").error.value);
+  EXPECT_NE(PriceListText(rows).find("* preset draft"), std::string::npos);
+  EXPECT_NE(PriceListCsv(rows).find("fit,\"fit-steps\",\"5\",3,3.000000,1.500000,5.000000"),
+            std::string::npos)
+      << PriceListCsv(rows);
+}
+
+TEST(PriceList, TheFrontIsWhatNothingBeats) {
+  const std::vector<Variant> variants = {FitVariant("", ""), FitVariant("a", "good"),
+                                         FitVariant("a", "bad"), FitVariant("a", "twin")};
+  std::vector<Measurement> measured;
+  for (int repeat = 0; repeat < 2; ++repeat) {
+    const double noise = repeat;
+    measured.push_back(Of(variants[0], 10 + noise, 26, repeat));
+    measured.push_back(Of(variants[1], 5 + noise, 27, repeat));
+    measured.push_back(Of(variants[2], 7 + noise, 25, repeat));
+    measured.push_back(Of(variants[3], 5.5 + noise, 27, repeat));
+  }
+  std::vector<PriceRow> rows = PriceList(variants, measured, "the base");
+  EXPECT_TRUE(RowOf(rows, "good").on_front);
+  EXPECT_EQ(RowOf(rows, "the base").dominated_by, "a good");
+  EXPECT_EQ(RowOf(rows, "bad").dominated_by, "a good");
+  // Half a second is within the noise of half a second each: beaten, but not dominated.
+  EXPECT_FALSE(RowOf(rows, "twin").on_front);
+  EXPECT_EQ(RowOf(rows, "twin").dominated_by, "");
+  // Where less is better the front turns round.
+  for (const Variant& variant : variants) EXPECT_EQ(variant.plane, "fit");
+  std::vector<Variant> flow = variants;
+  for (Variant& variant : flow) variant.plane = "flow";
+  for (Measurement& m : measured) m.plane = "flow";
+  rows = PriceList(flow, measured, "the base");
+  EXPECT_TRUE(RowOf(rows, "bad").on_front);
+  EXPECT_TRUE(RowOf(rows, "good").on_front);  // the fastest
+  EXPECT_EQ(RowOf(rows, "the base").dominated_by, "a bad");
+  // One measurement of each says nothing about noise.
+  std::erase_if(measured, [](const Measurement& m) { return m.repeat > 0; });
+  EXPECT_EQ(RowOf(PriceList(flow, measured, "the base"), "the base").dominated_by, "");
+}
+
+TEST(MeasurementStore, KeepsWhatIsOfTheSameFingerprint) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "measurements.json";
+  const Variant variant = FitVariant("fit-steps", "5");
+  {
+    MeasurementStore store(path, "one");
+    Measurement m = Of(variant, 4, 24, 1);
+    m.work["rays"] = int64_t{1} << 40;
+    store.Add(m);
+  }
+  const MeasurementStore again(path, "one");
+  ASSERT_NE(again.Find(variant, 1), nullptr);
+  EXPECT_EQ(again.Find(variant, 1)->accuracy, 24);
+  EXPECT_EQ(again.Find(variant, 1)->work.At("rays").AsInt(), int64_t{1} << 40);
+  EXPECT_EQ(again.Find(variant, 0), nullptr);
+  EXPECT_TRUE(MeasurementStore(path, "other").all().empty());
+  testing::WriteText(path, "{\"fingerprint\": \"one\", \"measurements\": [{}]}");
+  EXPECT_REGRADE_ERROR(MeasurementStore(path, "one"), ExitCode::kInput, "measurements.json");
+}
+
+Capture Photos(int count) {
+  Capture capture;
+  for (int i = 0; i < count; ++i) {
+    CaptureView view;
+    view.camera.width = 400;
+    view.camera.height = 300;
+    view.camera.fx = view.camera.fy = 300;
+    capture.views.push_back(view);
+  }
+  return capture;
+}
+
+TEST(Prediction, LearnsWhatAUnitCostsAndAppliesItElsewhere) {
+  // A machine that needs 2e-9 s a ray voxel, exactly, and where the whole stage took 3 s more.
+  RunSettings base;
+  base.fit.steps = {100, 100};
+  base.fit.resolutions = {50, 100};
+  const Capture capture = Photos(10), other = Photos(35);
+  const auto truth = [](const RunSettings& settings, const Capture& photos) {
+    return 2e-9 * AmountOf("ray voxels", settings, photos);
+  };
+  EXPECT_EQ(AmountOf("photo pixels", base, capture), 10 * 400 * 300);
+  EXPECT_EQ(AmountOf("ray voxels", base, capture), 100.0 * 4096 * 150);
+  const std::vector<Variant> variants =
+      VariantsOf(base, {{"fit-steps", "fit-stop"}, false, false, {}});
+  std::vector<Measurement> measured;
+  for (const Variant& variant : variants) {
+    RunSettings settings = base;
+    OptionSet options;
+    settings.Bind(&options);
+    options.ApplyConfig(variant.options, "here");
+    // What is no matter of work's amount must not teach anything.
+    const double odd = variant.knob == "fit-stop" ? 7 : 1;
+    measured.push_back(Of(variant, odd * truth(settings, capture), 26));
+  }
+  const TemporaryFolder folder;
+  Workspace workspace(folder / "w");
+  workspace.Record("reconstruct", JsonValue::Object(), {}, 0.6 * truth(base, capture) + 3,
+                   JsonValue::Object(), truth(base, capture) + 4);
+  const std::vector<PriceTerm> prices =
+      LearnPrices(base, capture, workspace, variants, measured);
+  RunSettings larger = base;
+  larger.fit.steps = {700, 900};
+  const std::vector<StageTime> times =
+      Predict(PricesFromJson(JsonValue::Object{{"unit_prices", ToJson(prices)}}, "here"),
+              larger, other);
+  ASSERT_EQ(times.size(), 1u);  // of what was never seen nothing is said
+  EXPECT_EQ(times[0].stage, "reconstruct");
+  // Three and a half times as many photos.
+  EXPECT_NEAR(times[0].cpu_seconds, truth(larger, other) + 3.5 * 4, 1e-6);
+  EXPECT_NEAR(times[0].seconds, 0.6 * truth(larger, other) + 3.5 * 3, 1e-6);
+}
+
+TEST(Guess, GetsBetterWithTheFirstMeasurement) {
+  RunSettings base;
+  const Variant own = FitVariant("", "");
+  Variant twice = FitVariant("fit-steps", "1600,4000,6000", true);
+  twice.options["fit-steps"] = JsonValue::Array{1600, 4000, 6000};
+  Guess guess(base, {});
+  EXPECT_NEAR(guess.Seconds(twice), 2 * guess.Seconds(own), 1e-6 * guess.Seconds(own));
+  guess.Add({"fit", "", "", 0, 10, 15, 26});
+  EXPECT_NEAR(guess.Seconds(own), 10, 1e-9);
+  EXPECT_NEAR(guess.Seconds(twice), 20, 1e-6);
+}
+
+}  // namespace
+}  // namespace regrade

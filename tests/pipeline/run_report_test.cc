@@ -1,0 +1,94 @@
+// What a whole run leaves to look at: heat maps, curves, costs, and the command that repeats
+// it.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "pipeline/files/image_file.h"
+#include "pipeline/files/json_file.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/support/tiny_run.h"
+
+namespace regrade {
+namespace {
+
+using testing::TemporaryFolder;
+
+testing::ProgramOutcome Regrade(const std::vector<std::string>& arguments) {
+  return testing::RunProgram(REGRADE_PROGRAM, arguments);
+}
+
+int HeatMapFiles(const std::string& folder) {
+  int files = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder + "/heatmaps"))
+    files += entry.path().extension() == ".png";
+  return files;
+}
+
+// Each row of a sequence that errs names a map that is there.
+int HeatMapsNamed(const std::string& folder) {
+  int maps = 0;
+  const JsonValue report = ReadJsonFile(folder + "/report.json");
+  for (const JsonValue& row : report.At("consistency").AsArray()) {
+    const JsonValue* path = row.Find("heat_map");
+    if (path == nullptr) continue;
+    EXPECT_EQ(ReadImage(folder + "/" + path->AsString()).width, 64);
+    EXPECT_GE(row.At("heat_map_from").AsInt(), 0);
+    ++maps;
+  }
+  return maps;
+}
+
+TEST(RunReport, ShowsWhatTheRunWasLike) {
+  const TemporaryFolder folder;
+  const std::string style = std::string(REGRADE_SOURCE_DIR) + "/assets/style_sunset.png";
+  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}).code, 0);
+  std::vector<std::string> run{"run",       folder / "s/truth", "--style",  style,
+                               "--out",     folder / "e",       "--preset", "draft",
+                               "--effects", "exposure=off"};
+  for (const std::string& flag : testing::TinyFlags()) run.push_back(flag);
+  const testing::ProgramOutcome done = Regrade(run);
+  ASSERT_EQ(done.code, 0) << done.text;
+  EXPECT_NE(done.text.find("exposure off: not measured (it was not wanted)"), std::string::npos)
+      << done.text;
+
+  // Three sequences at the photos' places and three along the way, at gaps 1 and 5; the way has
+  // three frames, so no pair 5 apart.
+  EXPECT_EQ(HeatMapsNamed(folder / "e"), 9);
+  EXPECT_EQ(HeatMapFiles(folder / "e"), 9);
+  const JsonValue report = ReadJsonFile(folder / "e/report.json");
+  const JsonValue& fit = report.At("stages").At("reconstruct");
+  EXPECT_EQ(fit.At("psnr_at_steps").AsArray().back().AsArray()[0].AsInt(), 30);
+  EXPECT_GT(fit.At("cpu_seconds").AsDouble(), 0);
+  EXPECT_TRUE(std::filesystem::exists(folder / "e/views_2d.mp4"));
+  const std::string page = testing::ReadText(folder / "e/report.html");
+  for (const char* part : {"PSNR of the fit over steps", "Lipschitz bound over steps",
+                           "where the photos were taken", "styled, frames ", "views_2d.mp4",
+                           "<td class=\"n soft\">not measured"})
+    EXPECT_NE(page.find(part), std::string::npos) << part;
+
+  // The command that the report names asks for the same options.
+  std::vector<std::string> again;
+  for (const JsonValue& word : report.At("command").AsArray()) again.push_back(word.AsString());
+  ASSERT_EQ(again[0], "regrade");
+  again.erase(again.begin());
+  *(std::find(again.begin(), again.end(), "--out") + 1) = folder / "again";
+  again[0] = "pose";
+  EXPECT_EQ(Regrade(again).code, 0);
+  const JsonValue were = ReadJsonFile(folder / "e/run.json").At("options"),
+                  are = ReadJsonFile(folder / "again/run.json").At("options");
+  for (const auto& [name, value] : were.AsObject())
+    if (name != "out" && name != "threads") {
+      EXPECT_EQ(DumpJson(value, -1), DumpJson(are.At(name), -1)) << name;
+    }
+
+  // Measured again, with other pairs: the earlier ones' maps are gone.
+  const testing::ProgramOutcome measured = Regrade({"evaluate", folder / "e", "--gaps", "2"});
+  ASSERT_EQ(measured.code, 0) << measured.text;
+  EXPECT_EQ(HeatMapsNamed(folder / "e"), 6);
+  EXPECT_EQ(HeatMapFiles(folder / "e"), 6);
+}
+
+}  // namespace
+}  // namespace regrade

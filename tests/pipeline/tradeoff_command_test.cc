@@ -1,0 +1,117 @@
+// regrade tradeoff over a tiny capture: what it writes, that it goes on where it stopped, and
+// what it predicts.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "pipeline/files/json_file.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/support/tiny_run.h"
+
+namespace regrade {
+namespace {
+
+using testing::ProgramOutcome;
+using testing::TemporaryFolder;
+
+ProgramOutcome Regrade(const std::vector<std::string>& arguments) {
+  return testing::RunProgram(REGRADE_PROGRAM, arguments);
+}
+
+size_t Count(const std::string& text, const std::string& what) {
+  size_t count = 0;
+  for (size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + 1))
+    ++count;
+  return count;
+}
+
+TEST(TradeoffCommand, MeasuresGoesOnAndPredicts) {
+  const TemporaryFolder folder;
+  const std::string style = std::string(REGRADE_SOURCE_DIR) + "/assets/style_sunset.png";
+  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}).code, 0);
+  const auto tradeoff = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> words{"tradeoff",  folder / "s/truth",
+                                   "--style",   style,
+                                   "--out",     folder / "t",
+                                   "--knobs",   "fit-steps,style-min-weight,flow,ray-stop",
+                                   "--presets", "none",
+                                   "--effects", "view-dependence=off,exposure=off"};
+    for (const std::string& flag : testing::TinyFlags()) words.push_back(flag);
+    words.insert(words.end(), more.begin(), more.end());
+    return Regrade(words);
+  };
+  ProgramOutcome outcome = tradeoff({"--dry-run"});
+  ASSERT_EQ(outcome.code, 0) << outcome.text;
+  EXPECT_NE(outcome.text.find("flow: flow dis-ultrafast, about"), std::string::npos);
+  EXPECT_FALSE(std::filesystem::exists(folder / "t"));
+
+  // Without a minute to spend, one measurement is made and the rest is told.
+  outcome = tradeoff({"--repeats", "1", "--budget", "1e-9"});
+  ASSERT_EQ(outcome.code, 0) << outcome.text;
+  EXPECT_NE(outcome.text.find("the budget is spent"), std::string::npos) << outcome.text;
+  const size_t left =
+      ReadJsonFile(folder / "t/measurements.json").At("measurements").AsArray().size();
+
+  outcome = tradeoff({"--repeats", "1"});
+  ASSERT_EQ(outcome.code, 0) << outcome.text;
+  const JsonValue list = ReadJsonFile(folder / "t/tradeoff.json");
+  // Four bases, three values of the steps, two weights, four flows and three ends of a ray.
+  EXPECT_EQ(list.At("prices").AsArray().size(), 4u + 3 + 2 + 4 + 3);
+  EXPECT_EQ(Count(outcome.text, "] "), 16 - left);  // what was measured is not measured again
+  int on_front = 0;
+  for (const JsonValue& row : list.At("prices").AsArray()) {
+    EXPECT_TRUE(row.At("accuracy").IsNumber()) << DumpJson(row, -1);
+    EXPECT_GT(row.At("cpu_seconds").AsDouble(), 0);
+    on_front += row.At("on_front").AsBool();
+  }
+  EXPECT_GE(on_front, 4);  // each plane has at least its best
+  EXPECT_EQ(Count(testing::ReadText(folder / "t/tradeoff.csv"), "\n"), 17u);
+  EXPECT_NE(testing::ReadText(folder / "t/tradeoff.html").find("accuracy over time, flow"),
+            std::string::npos);
+  EXPECT_FALSE(std::filesystem::exists(folder / "t/work"));
+  outcome = tradeoff({"--repeats", "1"});
+  EXPECT_EQ(Count(outcome.text, "] "), 0u) << outcome.text;
+
+  // The base is a run like any other, and is predicted from the prices.
+  outcome = Regrade(
+      {"tradeoff", "--predict", folder / "t/base", "--prices", folder / "t/tradeoff.json"});
+  ASSERT_EQ(outcome.code, 0) << outcome.text;
+  for (const char* stage : {"reconstruct", "stylize", "render", "evaluate", "all"})
+    EXPECT_NE(outcome.text.find(std::string("\n") + stage), std::string::npos)
+        << stage << outcome.text;
+
+  // Beside a run the list becomes part of its report; a damaged one is left out, and said.
+  const auto page = [&] { return testing::ReadText(folder / "t/base/report.html"); };
+  testing::WriteText(folder / "t/base/tradeoff/tradeoff.json", "{\"prices\": [{}]}");
+  outcome = Regrade({"evaluate", folder / "t/base"});
+  ASSERT_EQ(outcome.code, 0) << outcome.text;
+  EXPECT_NE(outcome.text.find("tradeoff.json is left out"), std::string::npos) << outcome.text;
+  EXPECT_EQ(page().find("What accuracy costs here"), std::string::npos);
+  testing::WriteText(folder / "t/base/tradeoff/tradeoff.json",
+                     testing::ReadText(folder / "t/tradeoff.json"));
+  EXPECT_EQ(Regrade({"evaluate", folder / "t/base"}).code, 0);
+  EXPECT_NE(page().find("What accuracy costs here"), std::string::npos);
+}
+
+TEST(TradeoffCommand, SaysWhatWillNotDo) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directories(folder / "photos");
+  EXPECT_EQ(
+      Regrade({"tradeoff", folder / "photos", "--out", folder / "t", "--knobs", "stepz"}).code,
+      2);
+  EXPECT_EQ(
+      Regrade({"tradeoff", folder / "photos", "--out", folder / "t", "--presets", "best,x"})
+          .code,
+      2);
+  EXPECT_EQ(Regrade({"tradeoff", folder / "photos"}).code, 2);
+  EXPECT_EQ(Regrade({"tradeoff", "--predict", folder / "photos"}).code, 2);
+  testing::WriteText(folder / "prices.json", "{}");
+  EXPECT_EQ(
+      Regrade({"tradeoff", "--predict", folder / "photos", "--prices", folder / "prices.json"})
+          .code,
+      3);
+  EXPECT_FALSE(std::filesystem::exists(folder / "t"));
+}
+
+}  // namespace
+}  // namespace regrade
