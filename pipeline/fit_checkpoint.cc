@@ -5,7 +5,7 @@
 namespace regrade {
 namespace {
 
-constexpr uint32_t kVersion = 1;
+constexpr uint32_t kVersion = 2;
 
 bool Consistent(const FastGrid& grid) {
   if (grid.basis != 1 && grid.basis != 4 && grid.basis != 9) return false;
@@ -33,21 +33,32 @@ bool Consistent(const FastSpheres& spheres) {
   return true;
 }
 
+template <typename Tally, typename Visitor>
+void VisitTally(Tally& tally, const Visitor& visit) {
+  visit(tally.rays), visit(tally.samples), visit(tally.rejected_voxels);
+  visit(tally.tail_error), visit(tally.tail_rays), visit(tally.window_rays);
+  visit(tally.window.squared_error), visit(tally.window.samples);
+  visit(tally.window.rejected_voxels);
+}
+
 }  // namespace
 
-std::string PackFitState(const FitState& state) {
+std::string PackFitState(const FitState& state, const std::string& note) {
   const FastGrid& grid = state.grid;
   BytePacker packer;
   constexpr size_t kHead = 256;  // generously
-  packer.Reserve(kHead + sizeof(int32_t) * static_cast<size_t>(grid.links.size()) +
-                 sizeof(float) * static_cast<size_t>(
-                                     grid.records.size() + state.second_moment.size() +
-                                     grid.spheres.links.size() + grid.spheres.texels.size() +
-                                     state.sphere_moment.size()));
+  packer.Reserve(
+      kHead + note.size() + sizeof(int32_t) * static_cast<size_t>(grid.links.size()) +
+      sizeof(float) *
+          static_cast<size_t>(grid.records.size() + state.second_moment.size() +
+                              grid.spheres.links.size() + grid.spheres.texels.size() +
+                              state.sphere_moment.size()));
   packer.Value(kVersion);
+  packer.Values(note);
   packer.Value(grid.basis);
   packer.Value(state.stage);
   packer.Value(state.step);
+  VisitTally(state.tally, [&packer](const auto& value) { packer.Value(value); });
   for (int a = 0; a < 3; ++a) {
     packer.Value(grid.frame.resolution[a]);
     packer.Value(grid.frame.center[a]);
@@ -67,16 +78,19 @@ std::string PackFitState(const FitState& state) {
   return packer.Take();
 }
 
-std::optional<FitState> UnpackFitState(std::string_view bytes) {
+std::optional<FitState> UnpackFitState(std::string_view bytes, std::string* note) {
   ByteUnpacker unpacker(bytes);
   FitState state;
   FastGrid& grid = state.grid;
   uint32_t version = 0;
   unpacker.Value(&version);
   if (version != kVersion) return std::nullopt;
+  std::string unwanted;
+  unpacker.Values(note != nullptr ? note : &unwanted);
   unpacker.Value(&grid.basis);
   unpacker.Value(&state.stage);
   unpacker.Value(&state.step);
+  VisitTally(state.tally, [&unpacker](auto& value) { unpacker.Value(&value); });
   for (int a = 0; a < 3; ++a) {
     unpacker.Value(&grid.frame.resolution[a]);
     unpacker.Value(&grid.frame.center[a]);

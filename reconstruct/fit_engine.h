@@ -28,12 +28,6 @@ struct FitStep {
   float tv_sphere_color = 0;
 };
 
-struct FitSums {
-  double squared_error = 0;  // over rays and channels
-  int64_t samples = 0;
-  int64_t rejected_voxels = 0;
-};
-
 class FitEngine {
  public:
   virtual ~FitEngine() = default;
@@ -46,6 +40,7 @@ class FitEngine {
   virtual Vec3i resolution() const = 0;
   virtual void Step(const FitStep& step) = 0;
   virtual FitSums TakeSums() = 0;  // since the last call; may wait for steps to finish
+  virtual void PutSums(const FitSums& sums) = 0;  // as if they had not been taken
   // The field as it is now, colours clipped. Nothing of it leaves the device but the picture.
   virtual RenderedView Render(const Camera& camera, const MarchOptions& march) = 0;
   // Prunes voxels that weigh less than `threshold` in every view and resamples; the optimizer's

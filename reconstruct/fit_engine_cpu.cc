@@ -49,6 +49,7 @@ class CpuFitEngine : public FitEngine {
   }
 
   FitSums TakeSums() override { return std::exchange(sums_, {}); }
+  void PutSums(const FitSums& sums) override { sums_ = sums; }
 
   void Refine(const MarchOptions& march, float threshold, const Vec3i& resolution,
               int sphere_resolution) override {

@@ -57,12 +57,16 @@ class CudaFitEngine : public FitEngine {
   }
 
   FitSums TakeSums() override {
-    if (!fitter_) return {};
+    FitSums total = std::exchange(put_, {});
+    if (!fitter_) return total;
     const DeviceFitSums sums = fitter_->TakeSums();
     DeviceWait("a step of the fit");
-    return {sums.squared_error, static_cast<int64_t>(sums.samples),
-            static_cast<int64_t>(sums.rejected_voxels)};
+    total.squared_error += sums.squared_error;
+    total.samples += static_cast<int64_t>(sums.samples);
+    total.rejected_voxels += static_cast<int64_t>(sums.rejected_voxels);
+    return total;
   }
+  void PutSums(const FitSums& sums) override { put_ = sums; }
 
   RenderedView Render(const Camera& camera, const MarchOptions& march) override {
     return RenderViewOnDevice(grid_, camera, march);
@@ -105,6 +109,7 @@ class CudaFitEngine : public FitEngine {
   DeviceGrid grid_;
   DeviceTouched touched_;
   MarchOptions march_;
+  FitSums put_;
   std::optional<DeviceRayFitter> fitter_;
   DeviceBuffer<Ray> rays_;
   DeviceBuffer<Vec3f> targets_;

@@ -70,7 +70,9 @@ class Fitter {
     }
     stage_ = state.stage;
     step_ = state.step;
+    tally_ = state.tally;
     engine_->Take(std::move(state));
+    engine_->PutSums(tally_.window);
     start_ = last_checkpoint_ = Clock::now();
     const int num_stages = static_cast<int>(options_.steps.size());
     while (stage_ < num_stages) {
@@ -91,7 +93,10 @@ class Fitter {
       engine_->Show([this](FitState* state) { result_.field = ToRadianceField(state->grid); });
       result_.field.step = options_.step;
     }
-    result_.psnr_train_db = PsnrOf(tail_error_, tail_rays_);
+    result_.rays = tally_.rays;
+    result_.samples = tally_.samples;
+    result_.rejected_voxels = tally_.rejected_voxels;
+    result_.psnr_train_db = PsnrOf(tally_.tail_error, tally_.tail_rays);
     return std::move(result_);
   }
 
@@ -131,7 +136,7 @@ class Fitter {
       engine_->Step(NextStep());
       ++step_;
       const int square = options_.patch * options_.patch;
-      window_rays_ += std::max(1, options_.rays_per_step / square) * square;
+      tally_.window_rays += std::max(1, options_.rays_per_step / square) * square;
       if (StepsBefore() % kWindow == 0 || step_ == steps) CloseWindow();
       const Verdict verdict = Report(hooks_.progress, WorkBefore(), total_work_, note_);
       if (verdict == Verdict::kAbort) {
@@ -199,12 +204,12 @@ class Fitter {
   void CloseWindow() {
     const FitSums sums = engine_->TakeSums();
     const int done = StepsBefore();
-    result_.rays += window_rays_;
-    result_.samples += sums.samples;
-    result_.rejected_voxels += sums.rejected_voxels;
+    tally_.rays += tally_.window_rays;
+    tally_.samples += sums.samples;
+    tally_.rejected_voxels += sums.rejected_voxels;
     if (done > total_steps_ - total_steps_ / 10 - 1) {
-      tail_error_ += sums.squared_error;
-      tail_rays_ += window_rays_;
+      tally_.tail_error += sums.squared_error;
+      tally_.tail_rays += tally_.window_rays;
     }
     // A few bad voxels are skipped and counted; a flood means the field is broken.
     if (sums.rejected_voxels > 1000)
@@ -212,22 +217,25 @@ class Fitter {
                   "the gradient of " + std::to_string(sums.rejected_voxels) +
                       " voxels is not finite at step " + std::to_string(done),
                   "reconstruct", "the last checkpoint has been kept");
-    const double psnr = PsnrOf(sums.squared_error, window_rays_);
-    result_.curve.push_back({result_.rays, SecondsSince(start_) - idle_seconds_, psnr});
+    const double psnr = PsnrOf(sums.squared_error, tally_.window_rays);
+    result_.curve.push_back({tally_.rays, SecondsSince(start_) - idle_seconds_, psnr});
     char text[96];
     std::snprintf(text, sizeof text, "%d^3, %.2f M voxels, %.2f dB on training rays",
                   options_.resolutions[static_cast<size_t>(stage_)],
                   static_cast<double>(engine_->num_voxels()) * 1e-6, psnr);
     note_ = text;
-    window_rays_ = 0;
+    tally_.window_rays = 0;
   }
 
   void SaveCheckpoint() {
     const Clock::time_point begin = Clock::now();
     if (hooks_.checkpoint) {
+      tally_.window = engine_->TakeSums();
+      engine_->PutSums(tally_.window);
       engine_->Show([this](FitState* state) {
         state->stage = stage_;
         state->step = step_;
+        state->tally = tally_;
         hooks_.checkpoint(*state);
       });
     }
@@ -253,8 +261,8 @@ class Fitter {
   int total_steps_ = 0;
   double total_work_ = 0;
   bool finish_early_ = false;
-  double tail_error_ = 0, idle_seconds_ = 0;
-  int64_t window_rays_ = 0, tail_rays_ = 0;
+  FitTally tally_;
+  double idle_seconds_ = 0;
   std::string note_;
   Clock::time_point start_, last_checkpoint_;
 };

@@ -18,6 +18,23 @@
 
 namespace regrade {
 
+struct FitSums {
+  double squared_error = 0;  // over rays and channels
+  int64_t samples = 0;
+  int64_t rejected_voxels = 0;
+};
+
+// What a fit says about itself at its end; an interruption must not change it.
+struct FitTally {
+  int64_t rays = 0;
+  int64_t samples = 0;
+  int64_t rejected_voxels = 0;
+  double tail_error = 0;    // squared, over the last tenth of the steps
+  int64_t tail_rays = 0;
+  int64_t window_rays = 0;  // since the sums were read last, and these sums
+  FitSums window;
+};
+
 // Everything a fit needs to go on as if it had never stopped (H110).
 struct FitState {
   FastGrid grid;
@@ -25,6 +42,7 @@ struct FitState {
   int stage = 0;
   int step = 0;                 // within the stage
   Buffer<float> sphere_moment;  // [columns, L, 4], where there are background spheres
+  FitTally tally;
 };
 
 struct FitCurvePoint {

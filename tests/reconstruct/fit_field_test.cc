@@ -122,7 +122,7 @@ TEST_F(FitField, SameBytesForAnyThreadCount) {
 
 TEST_F(FitField, H109_H110_AResumedFitIsTheUndisturbedOne) {
   const FitResult straight = regrade::FitField(views_, box_, options_, {});
-  for (const int stop_after : {25, 60, 95}) {
+  for (const int stop_after : {25, 60, 95, 113}) {
     FitState saved;
     int steps = 0;
     FitHooks hooks;
@@ -134,9 +134,12 @@ TEST_F(FitField, H109_H110_AResumedFitIsTheUndisturbedOne) {
     ASSERT_GT(saved.grid.num_voxels(), 0) << "nothing was saved";
     FitHooks go_on;
     go_on.resume = &saved;
-    EXPECT_TRUE(
-        SameBits(straight.field, regrade::FitField(views_, box_, options_, go_on).field))
-        << stop_after;
+    const FitResult resumed = regrade::FitField(views_, box_, options_, go_on);
+    EXPECT_TRUE(SameBits(straight.field, resumed.field)) << stop_after;
+    // So is what it says about itself.
+    EXPECT_EQ(resumed.psnr_train_db, straight.psnr_train_db) << stop_after;
+    EXPECT_EQ(resumed.rays, straight.rays) << stop_after;
+    EXPECT_EQ(resumed.samples, straight.samples) << stop_after;
   }
 }
 

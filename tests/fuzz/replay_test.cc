@@ -1,0 +1,116 @@
+// Every fuzz target without a fuzzer: its seeds, what was found before, and some thousand
+// mutants that are the same everywhere.
+#include <gtest/gtest.h>
+#include <omp.h>
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+
+#include "tests/fuzz/fuzz_support.h"
+#include "tests/fuzz/fuzz_target.h"
+
+namespace regrade::testing {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kLongest = 5;      // seconds an input may take
+constexpr long kMostMemory = 512;   // MiB
+constexpr size_t kKept = 64;        // accepted mutants that further ones are made of
+constexpr size_t kShown = 300;      // bytes of an input that a failure shows
+
+std::string Hex(const std::string& bytes) {
+  std::string text;
+  char two[3];
+  for (const char c : bytes.substr(0, kShown)) {
+    std::snprintf(two, sizeof two, "%02x", static_cast<unsigned char>(c));
+    text += two;
+  }
+  return text + (bytes.size() > kShown ? "..." : "");
+}
+
+// Of lines of hexadecimal digits; '#' begins a line of words.
+std::string FromHex(const std::string& text) {
+  std::string bytes, digits;
+  bool words = false;
+  for (const char c : text) {
+    words = c != '\n' && (words || c == '#');
+    if (words || std::string_view(" \n\r").find(c) != std::string_view::npos) continue;
+    digits += c;
+    if (digits.size() < 2) continue;
+    bytes += static_cast<char>(std::stoi(digits, nullptr, 16));
+    digits.clear();
+  }
+  return bytes;
+}
+
+class FuzzReplay : public ::testing::TestWithParam<FuzzTarget> {
+ protected:
+  void SetUp() override { omp_set_num_threads(1); }
+
+  // Whether the input was accepted; anything but yes and no fails the test.
+  bool Read(const std::string& bytes, const std::string& name) {
+    const auto begin = std::chrono::steady_clock::now();
+    bool accepted = false;
+    try {
+      accepted = GetParam().read(bytes);
+    } catch (const Error& error) {
+      ADD_FAILURE() << name << " was refused too late: " << error.what();
+    } catch (const std::exception& error) {
+      ADD_FAILURE() << name << ": " << error.what() << "\n" << Hex(bytes);
+    }
+    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
+    EXPECT_LT(took.count(), kLongest) << name << "\n" << Hex(bytes);
+    return accepted;
+  }
+};
+
+TEST_P(FuzzReplay, SeedsFindsAndMutants) {
+  const FuzzTarget& target = GetParam();
+  std::vector<std::string> kept = target.seeds();
+  const size_t seeds = kept.size();
+  for (size_t i = 0; i < seeds; ++i)
+    EXPECT_TRUE(Read(kept[i], "seed " + std::to_string(i))) << "a good input was refused";
+
+  const fs::path finds = fs::path(REGRADE_SOURCE_DIR) / "tests/fuzz/found" / target.name;
+  if (fs::is_directory(finds))
+    for (const auto& entry : fs::directory_iterator(finds))
+      Read(FromHex(ReadText(entry.path())), entry.path().filename());
+
+  int accepted = 0;
+  for (int i = 0; i < target.mutants && !HasFailure(); ++i) {
+    FuzzRandom random(static_cast<uint64_t>(i));
+    const std::string& base = kept[random.Below(random.Chance(0.5) ? seeds : kept.size())];
+    std::string mutant = target.mutate(base, &random);
+    if (!Read(mutant, "mutant " + std::to_string(i))) continue;
+    ++accepted;
+    if (kept.size() < seeds + kKept)
+      kept.push_back(std::move(mutant));
+    else
+      kept[seeds + random.Below(kKept)] = std::move(mutant);
+  }
+  // Mutants that are all refused would show the reader's first line only.
+  EXPECT_GT(accepted, target.mutants / 100) << "of " << target.mutants;
+#if !defined(__SANITIZE_ADDRESS__)
+  rusage usage;
+  ::getrusage(RUSAGE_SELF, &usage);
+  EXPECT_LT(usage.ru_maxrss >> 10, kMostMemory);
+#endif
+}
+
+INSTANTIATE_TEST_SUITE_P(Any, FuzzReplay, ::testing::ValuesIn(AllFuzzTargets()),
+                         [](const auto& info) { return std::string(info.param.name); });
+
+// A reader that promises too much is seen, and so is one that throws what is no Error.
+TEST(FuzzReplayItself, AFindIsAFind) {
+  EXPECT_THROW(Accepts([] { FuzzRequire(false, "a promise"); }), BrokenPromise);
+  EXPECT_THROW(Accepts([] { throw Error(ExitCode::kBug, "odd"); }), BrokenPromise);
+  EXPECT_THROW(Accepts([] { throw Error(ExitCode::kInput, ""); }), BrokenPromise);
+  EXPECT_THROW(Accepts([] { throw std::bad_alloc(); }), std::bad_alloc);
+  EXPECT_FALSE(Accepts([] { throw Error(ExitCode::kInput, "bad"); }));
+}
+
+}  // namespace
+}  // namespace regrade::testing
