@@ -125,9 +125,8 @@ const std::set<std::string>& ColmapProgram::OptionsOf(const std::string& command
   const auto it = options_.find(command);
   if (it != options_.end()) return it->second;
   std::set<std::string>& names = options_[command];
-  ChildOptions options{.argv = {program_, command, "-h"},
-                       .environment = kEnvironment,
-                       .wall_limit_s = 60};
+  ChildOptions options{
+      .argv = {program_, command, "-h"}, .environment = kEnvironment, .wall_limit_s = 60};
   RunChild(options, [&](const std::string& line) {
     const size_t begin = line.find("--");
     if (begin == std::string::npos) return;

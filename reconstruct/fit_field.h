@@ -29,7 +29,7 @@ struct FitTally {
   int64_t rays = 0;
   int64_t samples = 0;
   int64_t rejected_voxels = 0;
-  double tail_error = 0;    // squared, over the last tenth of the steps
+  double tail_error = 0;  // squared, over the last tenth of the steps
   int64_t tail_rays = 0;
   int64_t window_rays = 0;  // since the sums were read last, and these sums
   FitSums window;

@@ -11,17 +11,16 @@ report but for times. COLMAP's own stage does not repeat: `regrade pose` is kill
 COLMAP behind), started again until done, and its model must have every photo and lie within 0.5 degrees and 1 % of the
 camera spread of the truth.
 
-  --control   whether the supervisor can see anything: between two starts a checkpoint is exchanged for that of a run
-              with another seed, a frame is cut short, a record of a finished stage is
-              removed. Each must be caught. One byte of a checkpoint is changed, too: the program itself must see that
-              and come out with the same result.
+  --control all   whether the supervisor can see anything: between two starts a checkpoint is exchanged for that of a
+                  run with another seed, a frame is cut short, the record of a finished stage is removed. Each must be
+                  caught. One bit of a checkpoint is changed, too: the program itself must see that, and come out with
+                  the same result. "short" is the first of these.
 
 Exit status 1 for any finding.
 """
 
 import argparse
 import collections
-import hashlib
 import json
 import os
 import random
@@ -34,12 +33,9 @@ import threading
 import time
 import zipfile
 
-STAGES = ("pose", "reconstruct", "style_2d", "stylize", "render", "evaluate", "report")
-SMALL = ["--photo-size", "96", "--fit-resolutions", "24,32", "--fit-steps", "60,60", "--fit-rays", "1024",
-         "--style-steps", "20", "--style-rays", "512", "--path-frames", "4", "--preset", "draft", "--reproducible",
-         "--holdout", "0"]
+from small_run import SMALL, STAGES, STYLE, different, make_capture, results
+
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
-TIMES = {"seconds", "frames_per_second", "peak_memory_mb"}
 CHECKPOINT_HEAD, HASH_DIGITS = b"regrade checkpoint 1\n", 16
 
 
@@ -129,55 +125,16 @@ def torn_files(folder):
     return torn
 
 
-def without_times(value):
-    if isinstance(value, dict):
-        return {key: without_times(member) for key, member in value.items() if key not in TIMES}
-    return [without_times(member) for member in value] if isinstance(value, list) else value
-
-
-def flattened(value, name=""):
-    """path -> value of each leaf."""
-    if not isinstance(value, (dict, list)):
-        return {name: value}
-    leaves = {}
-    for key, member in value.items() if isinstance(value, dict) else enumerate(value):
-        leaves.update(flattened(member, f"{name}.{key}" if name else str(key)))
-    return leaves
-
-
-def results(folder):
-    """name -> digest of every field, network and frame, and each figure of the report that is no time."""
-    digests = {}
-    for place, _, names in os.walk(folder):
-        relative = os.path.relpath(place, folder)
-        for name in names:
-            path = os.path.join(place, name)
-            if relative == "." and name == "report.json":
-                with open(path, encoding="utf-8") as file:
-                    report = json.load(file)
-                digests.update(flattened(without_times(report), "report.json"))
-                continue
-            elif name.endswith(".npz") or relative.split(os.sep)[0] in ("frames", "views_2d"):
-                with open(path, "rb") as file:
-                    content = file.read()
-            else:
-                continue
-            digests[os.path.normpath(os.path.join(relative, name))] = hashlib.sha256(content).hexdigest()
-    return digests
-
-
 class Supervisor:
     def __init__(self, regrade, scratch, seed):
         self.regrade, self.scratch, self.random = regrade, scratch, random.Random(seed)
         self.capture, self.work = os.path.join(scratch, "capture"), os.path.join(scratch, "work")
-        self.style = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "assets", "style_sunset.png")
         self.kills, self.findings = collections.Counter(), []
         self.compared = self.starts = 0
-        subprocess.run([regrade, "synth", self.capture, "--scene", "table", "--views", "8", "--size", "256x192"],
-                       check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        make_capture(regrade, self.capture)
 
     def command(self, threads=2, more=()):
-        return [self.regrade, "run", self.capture, "--style", self.style, "--out", self.work, *SMALL,
+        return [self.regrade, "run", self.capture, "--style", STYLE, "--out", self.work, *SMALL,
                 "--threads", str(threads), *more]
 
     def pose_command(self):
@@ -251,11 +208,10 @@ class Supervisor:
         return sum(self.kills.values())
 
     def compare(self, what):
-        now = results(self.work)
-        different = sorted(n for n in set(now) | set(self.expected) if now.get(n) != self.expected.get(n))
+        changed = different(results(self.work), self.expected)
         self.compared += 1
-        if different:
-            self.complain(f"{what}: {len(different)} results differ from the undisturbed run's: {different[:4]}")
+        if changed:
+            self.complain(f"{what}: {len(changed)} results differ from the undisturbed run's: {changed[:4]}")
 
     def complete(self, command, finished):
         run = self.start(command, finished)
@@ -270,7 +226,7 @@ class Supervisor:
         finished, limit = ["pose"], self.total() + most
         for stage in (None,) + STAGES[1:]:
             length = self.startup if stage is None else self.duration[stage]
-            for _ in range(self.random.choice((0, 1, 1, 2))):
+            for _ in range(self.random.choice((0, 1, 2, 3))):
                 if self.total() >= limit or stage in finished:
                     break
                 self.strike(self.command(self.random.choice((1, 2))), finished, stage,
@@ -352,7 +308,7 @@ class Supervisor:
         if seen != wanted:
             self.complain(f"control: {what}: {'not caught' if wanted else 'was not healed'}")
 
-    def control(self):
+    def control(self, short):
         def exchange():
             other = self.kill_in_fit(("--seed", "1"))
             with open(other, "rb") as file:
@@ -390,6 +346,8 @@ class Supervisor:
             self.complete(self.command(), list(STAGES))
 
         self.caught("a checkpoint of another seed", True, exchange)
+        if short:
+            return
         self.caught("one bit of a checkpoint", False, flip)
         self.caught("a frame cut short", True, cut)
         self.caught("a stage's record removed", True, forget)
@@ -409,14 +367,15 @@ def main():
     parser.add_argument("--pose-kills", type=int, default=50, metavar="N", help="inside COLMAP's stage (50)")
     parser.add_argument("--seed", type=int, default=0, help="draws stages, instants, signals and threads")
     parser.add_argument("--compare-poses", metavar="PROGRAM", help="the test program compare_poses, for the tolerance")
-    parser.add_argument("--control", action="store_true", help="see the supervisor catch what it must")
+    parser.add_argument("--control", choices=("none", "short", "all"), default="none",
+                        help="see the supervisor catch what it must")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
         supervisor = Supervisor(os.path.abspath(options.regrade), scratch, options.seed)
-        if options.control or options.kills:
+        if options.control != "none" or options.kills:
             supervisor.undisturbed()
-        if options.control:
-            supervisor.control()
+        if options.control != "none":
+            supervisor.control(options.control == "short")
         begin = supervisor.total()
         said = 0
         while supervisor.total() - begin < options.kills:

@@ -48,9 +48,10 @@ void CheckModel(const ColmapModel& model) {
     FuzzRequire(std::abs(camera.camera_from_world.rotation.Determinant() - 1) < 1e-9,
                 "a pose is a rotation");
     for (const ColmapKeypoint& keypoint : image.keypoints)
-      FuzzRequire(std::isfinite(keypoint.u) && std::isfinite(keypoint.v) &&
-                      (keypoint.point_id == kNoColmapPoint || model.FindPoint(keypoint.point_id)),
-                  "keypoints are finite and their points exist");
+      FuzzRequire(
+          std::isfinite(keypoint.u) && std::isfinite(keypoint.v) &&
+              (keypoint.point_id == kNoColmapPoint || model.FindPoint(keypoint.point_id)),
+          "keypoints are finite and their points exist");
     double u, v;
     camera.Project({0, 0, 0}, &u, &v);
   }
@@ -71,9 +72,9 @@ bool ReadIt(std::string_view bytes) {
     std::filesystem::create_directories(again);
     WriteColmapModel(model, again);
     const ColmapModel back = ReadColmapModel(again);
-    FuzzRequire(back.images.size() == model.images.size() &&
-                    back.points.size() == model.points.size(),
-                "a round trip keeps everything");
+    FuzzRequire(
+        back.images.size() == model.images.size() && back.points.size() == model.points.size(),
+        "a round trip keeps everything");
     try {
       CaptureFromModel(model, PhotosOf(SmallModel()));
     } catch (const Error&) {
@@ -102,8 +103,20 @@ std::vector<std::string> Seeds() {
 
 double AnyDouble(FuzzRandom* random) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  const double values[] = {0, -0.0, 1, -1, 1e-300, 1e300, 1e12, 1e13, kInfinity, -kInfinity,
-                           std::numeric_limits<double>::quiet_NaN(), 1e-3, 640, 1e9};
+  const double values[] = {0,
+                           -0.0,
+                           1,
+                           -1,
+                           1e-300,
+                           1e300,
+                           1e12,
+                           1e13,
+                           kInfinity,
+                           -kInfinity,
+                           std::numeric_limits<double>::quiet_NaN(),
+                           1e-3,
+                           640,
+                           1e9};
   return values[random->Below(std::size(values))];
 }
 
@@ -139,7 +152,8 @@ void ChangeModel(ColmapModel* model, FuzzRandom* random) {
       image.keypoints.resize(random->Below(6));
       break;
     case 7:
-      image.name = std::string(random->Below(2) ? 4090 + random->Below(10) : random->Below(3), '/');
+      image.name =
+          std::string(random->Below(2) ? 4090 + random->Below(10) : random->Below(3), '/');
       break;
     case 8:
       image.camera_from_world.translation[static_cast<int>(random->Below(3))] =
@@ -166,9 +180,20 @@ void ChangeModel(ColmapModel* model, FuzzRandom* random) {
 
 template <File file, bool text>
 std::string Mutate(std::string bytes, FuzzRandom* random) {
-  static const std::vector<std::string> kWords = {
-      "\n",      "#",      "\n\n",     "FOV",    "OPENCV",  "SIMPLE_PINHOLE", "\t", " ",
-      "\r\n",    "-1",     "18446744073709551615", "image.png", "../../x", std::string(1, '\0')};
+  static const std::vector<std::string> kWords = {"\n",
+                                                  "#",
+                                                  "\n\n",
+                                                  "FOV",
+                                                  "OPENCV",
+                                                  "SIMPLE_PINHOLE",
+                                                  "\t",
+                                                  " ",
+                                                  "\r\n",
+                                                  "-1",
+                                                  "18446744073709551615",
+                                                  "image.png",
+                                                  "../../x",
+                                                  std::string(1, '\0')};
   if (random->Chance(0.4)) {
     FuzzFile(Place(file, text), bytes);
     try {
@@ -190,9 +215,12 @@ FuzzTarget Target(const char* name) {
 }  // namespace
 
 std::vector<FuzzTarget> ColmapTargets() {
-  return {Target<kCameras, false>("colmap_cameras_bin"), Target<kImages, false>("colmap_images_bin"),
-          Target<kPoints, false>("colmap_points_bin"), Target<kCameras, true>("colmap_cameras_txt"),
-          Target<kImages, true>("colmap_images_txt"), Target<kPoints, true>("colmap_points_txt")};
+  return {Target<kCameras, false>("colmap_cameras_bin"),
+          Target<kImages, false>("colmap_images_bin"),
+          Target<kPoints, false>("colmap_points_bin"),
+          Target<kCameras, true>("colmap_cameras_txt"),
+          Target<kImages, true>("colmap_images_txt"),
+          Target<kPoints, true>("colmap_points_txt")};
 }
 
 }  // namespace regrade::testing

@@ -14,14 +14,14 @@ namespace {
 // Words stand on lines of their own.
 std::vector<std::string> Words(std::string_view bytes) {
   std::vector<std::string> words(1);
-  for (const char c : bytes)
-    c == '\n' ? words.emplace_back() : words.back() += c;
+  for (const char c : bytes) c == '\n' ? words.emplace_back() : words.back() += c;
   return words;
 }
 
 std::vector<std::string> OptionSeeds() {
   return {"photos\n--out\nx\n--seed=7\n--reproducible\n--fit-steps\n10,20\n--no-json",
-          "--threads\n2\n--fps\n24.5\n--\n--not-an-option", "--preset\ndraft\n--effects\nndc=off"};
+          "--threads\n2\n--fps\n24.5\n--\n--not-an-option",
+          "--preset\ndraft\n--effects\nndc=off"};
 }
 
 bool ReadOptions(std::string_view bytes) {
@@ -40,11 +40,30 @@ bool ReadOptions(std::string_view bytes) {
 }
 
 std::string MutateOptions(std::string text, FuzzRandom* random) {
-  static const std::vector<std::string> kWords = {
-      "\n",         "--",      "--fit-steps\n", "--photo-size\n", "=",        ",",
-      "--no-",      "-",       "--seed\n",      "--out\n",        "--out=",   "--help",
-      "--preset\n", "paper",   "--method\n",    "mkl",            "--threads\n", "true",
-      "--masks\n",  "--fps=",  "--max-memory\n", "\xff",          "--json",   "--gaps\n1,5"};
+  static const std::vector<std::string> kWords = {"\n",
+                                                  "--",
+                                                  "--fit-steps\n",
+                                                  "--photo-size\n",
+                                                  "=",
+                                                  ",",
+                                                  "--no-",
+                                                  "-",
+                                                  "--seed\n",
+                                                  "--out\n",
+                                                  "--out=",
+                                                  "--help",
+                                                  "--preset\n",
+                                                  "paper",
+                                                  "--method\n",
+                                                  "mkl",
+                                                  "--threads\n",
+                                                  "true",
+                                                  "--masks\n",
+                                                  "--fps=",
+                                                  "--max-memory\n",
+                                                  "\xff",
+                                                  "--json",
+                                                  "--gaps\n1,5"};
   return MutateText(std::move(text), kWords, random);
 }
 
@@ -61,13 +80,16 @@ bool ReadCommand(std::string_view bytes) {
 }
 
 std::string MutateCommand(std::string text, FuzzRandom* random) {
-  static const std::vector<std::string> kWords = {"\"", "'", " ", "\t", "{input}", "{style}",
-                                                  "$(x)", "\\", "|", "\"\"", "''"};
+  static const std::vector<std::string> kWords = {
+      "\"", "'", " ", "\t", "{input}", "{style}", "$(x)", "\\", "|", "\"\"", "''"};
   return MutateText(std::move(text), kWords, random);
 }
 
 std::vector<std::string> NameSeeds() {
-  return {"a photo.jpg", "\x1b[31mred", "<script>&\"'", "\xe2\x80\xae" "gpj.exe", "\xff\xc3"};
+  return {"a photo.jpg", "\x1b[31mred", "<script>&\"'",
+          "\xe2\x80\xae"
+          "gpj.exe",
+          "\xff\xc3"};
 }
 
 // Every name can be shown.

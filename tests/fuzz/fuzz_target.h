@@ -50,9 +50,9 @@ std::vector<FuzzTarget> CommandLineTargets();
 
 inline std::vector<FuzzTarget> AllFuzzTargets() {
   std::vector<FuzzTarget> all;
-  for (const auto list : {ColmapTargets, ArchiveTargets, FieldTargets, JsonTargets,
-                          PoseTableTargets, PictureTargets, MovieTargets, FlowTargets,
-                          StateTargets, CommandLineTargets})
+  for (const auto list :
+       {ColmapTargets, ArchiveTargets, FieldTargets, JsonTargets, PoseTableTargets,
+        PictureTargets, MovieTargets, FlowTargets, StateTargets, CommandLineTargets})
     for (const FuzzTarget& target : list()) all.push_back(target);
   return all;
 }

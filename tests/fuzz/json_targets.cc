@@ -1,4 +1,5 @@
-// JSON and what is said in it: transforms.json, run.json, stage records, the index of a capture.
+// JSON and what is said in it: transforms.json, run.json, stage records, the index of a
+// capture.
 #include <cmath>
 #include <filesystem>
 
@@ -15,13 +16,39 @@ namespace regrade::testing {
 namespace {
 
 std::string MutateJson(std::string text, FuzzRandom* random) {
-  static const std::vector<std::string> kWords = {
-      "{",      "}",          "[",       "]",           ":",          ",",
-      "null",   "true",       "false",   "\"\"",        "\"\\ud800\"", "\"\\u0000\"",
-      "\xff",   "\xef\xbb\xbf", "// x\n", "\"frames\"",  "\"w\":",     "\"fl_x\":",
-      "\"k4\":", "\"camera_angle_x\":", "\"camera_model\":", "\"OPENCV_FISHEYE\"",
-      "\"is_fisheye\":", "\"file_path\":", "\"0.png\"", "\"../1\"", "\"transform_matrix\":",
-      "\"options\":", "\"arguments\":", "\"schema\":", "\"width\":", "\"seed\":", "\"out\":"};
+  static const std::vector<std::string> kWords = {"{",
+                                                  "}",
+                                                  "[",
+                                                  "]",
+                                                  ":",
+                                                  ",",
+                                                  "null",
+                                                  "true",
+                                                  "false",
+                                                  "\"\"",
+                                                  "\"\\ud800\"",
+                                                  "\"\\u0000\"",
+                                                  "\xff",
+                                                  "\xef\xbb\xbf",
+                                                  "// x\n",
+                                                  "\"frames\"",
+                                                  "\"w\":",
+                                                  "\"fl_x\":",
+                                                  "\"k4\":",
+                                                  "\"camera_angle_x\":",
+                                                  "\"camera_model\":",
+                                                  "\"OPENCV_FISHEYE\"",
+                                                  "\"is_fisheye\":",
+                                                  "\"file_path\":",
+                                                  "\"0.png\"",
+                                                  "\"../1\"",
+                                                  "\"transform_matrix\":",
+                                                  "\"options\":",
+                                                  "\"arguments\":",
+                                                  "\"schema\":",
+                                                  "\"width\":",
+                                                  "\"seed\":",
+                                                  "\"out\":"};
   return MutateText(std::move(text), kWords, random);
 }
 
@@ -46,8 +73,7 @@ const std::string& PictureFolder() {
   if (folder.empty()) {
     folder = "transforms";
     std::filesystem::create_directories(FuzzFolder() + "/" + folder);
-    for (const char* name : {"/0.png", "/1.jpg", "/2.png"})
-      FuzzFile(folder + name, "x");
+    for (const char* name : {"/0.png", "/1.jpg", "/2.png"}) FuzzFile(folder + name, "x");
   }
   return folder;
 }
@@ -74,16 +100,15 @@ std::vector<std::string> TransformsSeeds() {
 bool ReadTransforms(std::string_view bytes) {
   const std::string path = FuzzFile(PictureFolder() + "/transforms.json", bytes);
   return Accepts([&path] {
-    const TransformsFile file = ReadTransformsJson(path, [](const std::string&, int* w, int* h) {
-      *w = 640, *h = 480;
-    });
+    const TransformsFile file = ReadTransformsJson(
+        path, [](const std::string&, int* w, int* h) { *w = 640, *h = 480; });
     for (const TransformsFrame& frame : file.frames) {
       const Camera& c = frame.camera;
       const double side = std::max(c.width, c.height);
       FuzzRequire(c.width >= 1 && c.height >= 1, "a picture has a size");
-      FuzzRequire(c.fx > 0.05 * side && c.fx < 100 * side && c.fy > 0.05 * side &&
-                      c.fy < 100 * side,
-                  "a focal length is one of a lens");
+      FuzzRequire(
+          c.fx > 0.05 * side && c.fx < 100 * side && c.fy > 0.05 * side && c.fy < 100 * side,
+          "a focal length is one of a lens");
       FuzzRequire(c.cx >= 0 && c.cx <= c.width && c.cy >= 0 && c.cy <= c.height,
                   "the principal point is in the picture");
       FuzzRequire(Norm(c.camera_from_world.translation) < 2e12, "no camera is at infinity");
@@ -162,9 +187,9 @@ bool ReadIndex(std::string_view bytes) {
   FuzzFile("poses/photos.json", bytes);
   return Accepts([] {
     for (const CaptureView& view : ReadCapture(FuzzFolder() + "/poses").views)
-      FuzzRequire(std::filesystem::path(view.path).parent_path() ==
-                      FuzzFolder() + "/poses/photos",
-                  "photos lie in their folder");
+      FuzzRequire(
+          std::filesystem::path(view.path).parent_path() == FuzzFolder() + "/poses/photos",
+          "photos lie in their folder");
   });
 }
 

@@ -18,11 +18,11 @@ std::string Atom(const std::string& type, const std::string& body) {
 
 std::string Movie(int width, bool index_first) {
   const std::string ftyp = Atom("ftyp", "isom0000"), data = Atom("mdat", "frames!");
-  const std::string table = Atom(width == 4 ? "stco" : "co64",
-                                 Big(0, 4) + Big(1, 4) + Big(ftyp.size() + 10, width));
+  const std::string table =
+      Atom(width == 4 ? "stco" : "co64", Big(0, 4) + Big(1, 4) + Big(ftyp.size() + 10, width));
   const std::string index =
-      Atom("moov", Atom("trak", Atom("mdia", Atom("minf", Atom("stbl", table)))) +
-                       Atom("udta", "x"));
+      Atom("moov",
+           Atom("trak", Atom("mdia", Atom("minf", Atom("stbl", table)))) + Atom("udta", "x"));
   return index_first ? ftyp + index + data : ftyp + data + index;
 }
 

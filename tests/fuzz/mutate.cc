@@ -69,7 +69,8 @@ void ChangeBytes(std::string* bytes, FuzzRandom* random) {
   } else if (kind == 10) {
     bytes->resize(begin);
   } else {
-    bytes->insert(begin, length, random->Chance(0.5) ? '\0' : static_cast<char>(random->Bits()));
+    bytes->insert(begin, length,
+                  random->Chance(0.5) ? '\0' : static_cast<char>(random->Bits()));
   }
 }
 
@@ -79,14 +80,38 @@ bool InNumber(char c) {
 }
 
 void SetNumber(std::string* text, FuzzRandom* random) {
-  static const std::vector<std::string> kNumbers = {
-      "0", "-0", "-1", "1", "0.5", "1e-310", "1e308", "-1e308", "1e999", "nan", "inf", "-inf",
-      "2147483647", "2147483648", "4294967296", "9223372036854775807", "18446744073709551615",
-      "18446744073709551616", "1e18", "0x10", "1.", ".5", "--1", "1e", "007", "16777217",
-      "65536", "4611686018427387904"};
+  static const std::vector<std::string> kNumbers = {"0",
+                                                    "-0",
+                                                    "-1",
+                                                    "1",
+                                                    "0.5",
+                                                    "1e-310",
+                                                    "1e308",
+                                                    "-1e308",
+                                                    "1e999",
+                                                    "nan",
+                                                    "inf",
+                                                    "-inf",
+                                                    "2147483647",
+                                                    "2147483648",
+                                                    "4294967296",
+                                                    "9223372036854775807",
+                                                    "18446744073709551615",
+                                                    "18446744073709551616",
+                                                    "1e18",
+                                                    "0x10",
+                                                    "1.",
+                                                    ".5",
+                                                    "--1",
+                                                    "1e",
+                                                    "007",
+                                                    "16777217",
+                                                    "65536",
+                                                    "4611686018427387904"};
   const size_t from = random->Below(text->size());
-  const auto begin = std::find_if(text->begin() + static_cast<std::ptrdiff_t>(from), text->end(),
-                                  [](char c) { return std::isdigit((unsigned char)c) != 0; });
+  const auto begin =
+      std::find_if(text->begin() + static_cast<std::ptrdiff_t>(from), text->end(),
+                   [](char c) { return std::isdigit((unsigned char)c) != 0; });
   if (begin == text->end()) return;
   size_t first = static_cast<size_t>(begin - text->begin()), last = first;
   while (first > 0 && InNumber((*text)[first - 1])) --first;
@@ -98,8 +123,8 @@ void SetNumber(std::string* text, FuzzRandom* random) {
 void AnyItem(const std::string& text, FuzzRandom* random, size_t* begin, size_t* length) {
   constexpr const char* kSeparators = ",\n{}[]() :;\t\0";
   *begin = random->Below(text.size());
-  while (*begin > 0 && std::string_view(kSeparators).find(text[*begin - 1]) ==
-                           std::string_view::npos)
+  while (*begin > 0 &&
+         std::string_view(kSeparators).find(text[*begin - 1]) == std::string_view::npos)
     --*begin;
   size_t end = *begin;
   for (size_t separators = 1 + random->Below(4); separators > 0 && end < text.size();

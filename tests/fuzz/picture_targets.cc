@@ -24,7 +24,9 @@ Image Waves(int width, int height) {
 
 std::vector<std::string> FormatSeeds() {
   using std::string_literals::operator""s;
-  return {"\xff\xd8\xff\xe0"s, "\x89PNG\r\n\x1a\n"s, "\0\0\0\x18" "ftypheic"s,
+  return {"\xff\xd8\xff\xe0"s, "\x89PNG\r\n\x1a\n"s,
+          "\0\0\0\x18"
+          "ftypheic"s,
           // A TIFF directory of two entries, the second DNG's version.
           "II*\0\x08\0\0\0\x02\0\0\x01\x03\0\1\0\0\0\x40\0\0\0\x12\xc6\1\0\4\0\0\0\1\4\0\0"s,
           "MM\0*\0\0\0\x08\0\1\x01\0\0\3\0\0\0\1\0\x40\0\0"s};
@@ -49,7 +51,9 @@ std::string Mutate(std::string bytes, FuzzRandom* random) {
 
 constexpr size_t kSignature = 8;
 
-std::vector<std::string> PngSeeds() { return {EncodePng8(Waves(8, 6)), EncodePng16(Waves(3, 2))}; }
+std::vector<std::string> PngSeeds() {
+  return {EncodePng8(Waves(8, 6)), EncodePng16(Waves(3, 2))};
+}
 
 bool ReadChunks(std::string_view bytes) {
   if (bytes.size() < kSignature) return false;
@@ -63,7 +67,8 @@ std::string MutatePng(std::string bytes, FuzzRandom* random) {
   if (random->Chance(0.3)) return bytes;
   const auto big = [&bytes](size_t at) {
     size_t value = 0;
-    for (size_t i = 0; i < 4; ++i) value = value << 8 | static_cast<unsigned char>(bytes[at + i]);
+    for (size_t i = 0; i < 4; ++i)
+      value = value << 8 | static_cast<unsigned char>(bytes[at + i]);
     return value;
   };
   for (size_t at = kSignature; at + 12 <= bytes.size() && big(at) <= bytes.size() - at - 12;
@@ -104,7 +109,8 @@ std::string MutatePhoto(std::string bytes, FuzzRandom* random) {
 // --- words in pictures: four numbers, then the text
 
 std::vector<std::string> TextSeeds() {
-  return {std::string("\x02\0\x05\0\x28\0\x03", 7) + "source gap 1", std::string(8, '\0') + "x"};
+  return {std::string("\x02\0\x05\0\x28\0\x03", 7) + "source gap 1",
+          std::string(8, '\0') + "x"};
 }
 
 bool Draw(std::string_view bytes) {

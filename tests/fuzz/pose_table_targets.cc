@@ -14,7 +14,8 @@ std::vector<std::string> Seeds() {
   std::string bytes = MakeNpyHeader(ArrayType::kF64, {2, 17});
   for (int row = 0; row < 2; ++row) {
     // Columns: down, right, backward, position, size; then the bounds.
-    const double values[17] = {0, 1, 0, 1.0 + row, 480, -1, 0, 0, 2, 640, 0, 0, 1, 3, 500, 1.5, 20};
+    const double values[17] = {0,   1, 0, 1.0 + row, 480, -1,  0,   0, 2,
+                               640, 0, 0, 1,         3,   500, 1.5, 20};
     bytes.append(reinterpret_cast<const char*>(values), sizeof values);
   }
   return {bytes};

@@ -16,10 +16,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kLongest = 5;      // seconds an input may take
-constexpr long kMostMemory = 512;   // MiB
-constexpr size_t kKept = 64;        // accepted mutants that further ones are made of
-constexpr size_t kShown = 300;      // bytes of an input that a failure shows
+constexpr double kLongest = 5;     // seconds an input may take
+constexpr long kMostMemory = 512;  // MiB
+constexpr size_t kKept = 64;       // accepted mutants that further ones are made of
+constexpr size_t kShown = 300;     // bytes of an input that a failure shows
 
 std::string Hex(const std::string& bytes) {
   std::string text;

@@ -18,7 +18,8 @@ std::string Little(uint64_t value, int width) {
 uint64_t ValueAt(const std::string& bytes, size_t at, size_t width) {
   uint64_t value = 0;
   for (size_t i = width; i-- > 0;)
-    value = value << 8 | (at + i < bytes.size() ? static_cast<unsigned char>(bytes[at + i]) : 0);
+    value =
+        value << 8 | (at + i < bytes.size() ? static_cast<unsigned char>(bytes[at + i]) : 0);
   return value;
 }
 
@@ -33,8 +34,8 @@ std::string BuildStoredZip(const std::vector<ZipPart>& parts) {
                                Little(33, 2) + Little(crc, 4) + Little(part.bytes.size(), 4) +
                                Little(part.bytes.size(), 4) + Little(part.name.size(), 2) +
                                Little(0, 2);
-    directory += "PK\1\2" + Little(20, 2) + shared + Little(0, 2) + Little(0, 2) + Little(0, 2) +
-                 Little(0, 4) + Little(bytes.size(), 4) + part.name;
+    directory += "PK\1\2" + Little(20, 2) + shared + Little(0, 2) + Little(0, 2) +
+                 Little(0, 2) + Little(0, 4) + Little(bytes.size(), 4) + part.name;
     bytes += "PK\3\4" + shared + part.name + part.bytes;
   }
   const std::string end = "PK\5\6" + Little(0, 4) + Little(parts.size(), 2) +
@@ -62,18 +63,24 @@ std::string StoredCopyOfNpz(const std::string& path) {
   std::vector<ZipPart> parts;
   for (const std::string& name : reader.names()) {
     const NpzArray array = reader.Read(name);
-    parts.push_back({name + ".npy",
-                     MakeNpyHeader(array.type, array.shape) +
-                         std::string(array.As<char>(), static_cast<size_t>(array.bytes.size()))});
+    parts.push_back({name + ".npy", MakeNpyHeader(array.type, array.shape) +
+                                        std::string(array.As<char>(),
+                                                    static_cast<size_t>(array.bytes.size()))});
   }
   return BuildStoredZip(parts);
 }
 
 std::string MutateNpy(std::string bytes, FuzzRandom* random) {
-  static const std::vector<std::string> kWords = {
-      "'descr': ",  "'fortran_order': ", "'shape': ", "True", "False", "'<f4'",  "'|O'", "'<f2'",
-      "'<i8'",      "(",                 ")",         ",",    "L",     "(3, 4)", "{",    "}",
-      "4294967296", "'>f4'",             "'<f8'"};
+  static const std::vector<std::string> kWords = {"'descr': ",  "'fortran_order': ",
+                                                  "'shape': ",  "True",
+                                                  "False",      "'<f4'",
+                                                  "'|O'",       "'<f2'",
+                                                  "'<i8'",      "(",
+                                                  ")",          ",",
+                                                  "L",          "(3, 4)",
+                                                  "{",          "}",
+                                                  "4294967296", "'>f4'",
+                                                  "'<f8'"};
   const size_t newline = bytes.find('\n');
   if (bytes.size() < 10 || newline == std::string::npos || newline < 10)
     return MutateBytes(std::move(bytes), random);

@@ -1,7 +1,6 @@
 #include "pipeline/command_stylizer.h"
 
 #include <gtest/gtest.h>
-
 #include <unistd.h>
 
 #include <algorithm>
@@ -91,7 +90,8 @@ TEST(CommandStylizer, F55_AProgramThatDiesIsNamedWithItsSignal) {
 }
 
 TEST(CommandStylizer, F55_AFloodIsDrained) {
-  const std::string flood = "i=0; while [ $i -lt 3000 ]; do printf %01000d 7; i=$((i+1)); done; ";
+  const std::string flood =
+      "i=0; while [ $i -lt 3000 ]; do printf %01000d 7; i=$((i+1)); done; ";
   EXPECT_EQ(Styled(Script(flood + "cp \"$1\" \"$2\"")).pixels, Photo().pixels);
 }
 
@@ -111,8 +111,9 @@ TEST(CommandStylizer, F55_IgnoredSigtermIsFollowedBySigkill) {
 
 TEST(CommandStylizer, F55_GrandchildrenEndWithTheirParent) {
   const testing::TemporaryFolder folder;
-  EXPECT_EQ(Styled(Script("sleep 60 & echo $! > " + (folder / "pid") + "; cp \"$1\" \"$2\"")).pixels,
-            Photo().pixels);
+  EXPECT_EQ(
+      Styled(Script("sleep 60 & echo $! > " + (folder / "pid") + "; cp \"$1\" \"$2\"")).pixels,
+      Photo().pixels);
   const pid_t grandchild = std::stoi(testing::ReadText(folder / "pid"));
   const std::string stat = "/proc/" + std::to_string(grandchild) + "/stat";
   std::string number, name, state = "Z";  // a zombie until init takes it

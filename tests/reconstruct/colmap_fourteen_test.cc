@@ -1,6 +1,6 @@
 // Fourteen models on which COLMAP 3.8's own reader was tried: it hung on four, aborted on five
-// and took three that are wrong. Ours reads the two good ones and says what is wrong with each of
-// the others.
+// and took three that are wrong. Ours reads the two good ones and says what is wrong with each
+// of the others.
 #include <gtest/gtest.h>
 
 #include <chrono>
