@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Lets each write of a run fail once, and requires a clear end, a folder that is whole, and the same result afterwards.
 
-  fail_each_write.py REGRADE LIBRARY [--runs 24] [--kinds ENOSPC,EIO,SHORT]     LIBRARY: libfailing_writes.so; needs colmap
+  fail_each_write.py REGRADE LIBRARY [--runs 24] [--kinds ENOSPC,EIO,SHORT]     LIBRARY: libfailing_writes.so
 
 A small synthetic capture is run once undisturbed in reproducible mode. Then, beginning behind the poses and behind
 the reconstruction, a copy is run with its k-th write failing, for `--runs` values of k over all of them (0: every k).
@@ -39,7 +39,7 @@ def main():
     failures = tried = ended = 0
     with tempfile.TemporaryDirectory() as scratch:
         capture, work = os.path.join(scratch, "capture"), os.path.join(scratch, "work")
-        make_capture(regrade, capture)
+        capture = make_capture(regrade, capture)
         run = [regrade, "run", capture, "--style", STYLE, "--out", work] + FLAGS
         begins = {}
         for name, command in (("poses", "pose"), ("reconstruction", "reconstruct")):

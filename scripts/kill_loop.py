@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Kills runs at random instants of every stage, starts them again until they are done, and compares what they made.
 
-  kill_loop.py REGRADE [--kills 1000] [--pose-kills 50] [--seed 0]      needs colmap; about 3 s a kill on two cores
+  kill_loop.py REGRADE [--kills 1000] [--pose-kills 50] [--seed 0]      colmap for --pose-kills; about 3 s a kill on two cores
 
 Behind finished poses: a small synthetic capture is run once undisturbed in reproducible mode. Then copies of its poses
 are run, and killed with SIGKILL, SIGTERM or SIGINT a random time after a stage has begun, stage by stage, with one
@@ -131,10 +131,10 @@ class Supervisor:
         self.capture, self.work = os.path.join(scratch, "capture"), os.path.join(scratch, "work")
         self.kills, self.findings = collections.Counter(), []
         self.compared = self.starts = 0
-        make_capture(regrade, self.capture)
+        self.posed_capture = make_capture(regrade, self.capture)
 
     def command(self, threads=2, more=()):
-        return [self.regrade, "run", self.capture, "--style", STYLE, "--out", self.work, *SMALL,
+        return [self.regrade, "run", self.posed_capture, "--style", STYLE, "--out", self.work, *SMALL,
                 "--threads", str(threads), *more]
 
     def pose_command(self):
@@ -151,7 +151,7 @@ class Supervisor:
 
     def undisturbed(self):
         """Runs once; learns the results and how long each stage takes."""
-        if Run([self.regrade, "pose", self.capture, "--out", self.work, "--photo-size", "96"]).finish() != 0:
+        if Run([self.regrade, "pose", self.posed_capture, "--out", self.work, "--photo-size", "96"]).finish() != 0:
             sys.exit("the undisturbed run's poses failed")
         self.posed = shutil.copytree(self.work, os.path.join(self.scratch, "posed"))
         run, self.duration, last = Run(self.command()), {}, time.monotonic()

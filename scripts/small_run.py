@@ -14,9 +14,10 @@ TIMES = {"seconds", "frames_per_second", "peak_memory_mb"}  # of the report
 
 
 def make_capture(regrade, folder):
-    """Eight photos with their true poses in FOLDER; photos alone in FOLDER/images."""
+    """Eight photos in FOLDER/images; the folder that also has their true poses, so that no COLMAP is needed."""
     subprocess.run([regrade, "synth", folder, "--scene", "table", "--views", "8", "--size", "256x192"], check=True,
                    stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    return os.path.join(folder, "truth")
 
 
 def call(command, **more):

@@ -42,10 +42,10 @@ class Trials:
         self.capture, self.work = os.path.join(scratch, "capture"), os.path.join(scratch, "work")
         self.findings = self.trials = self.ended = 0
         self.begins, self.expected = {}, {}
-        make_capture(regrade, self.capture)
+        self.posed_capture = make_capture(regrade, self.capture)
 
-    def command(self, source=""):
-        return [self.regrade, "run", os.path.join(self.capture, source), "--style", STYLE, "--out", self.work, *SMALL]
+    def command(self):
+        return [self.regrade, "run", self.posed_capture, "--style", STYLE, "--out", self.work, *SMALL]
 
     def pose(self):
         """From photos, by COLMAP."""
@@ -73,7 +73,7 @@ class Trials:
     def undisturbed(self):
         """Runs once, and keeps the folder as it is before each stage."""
         for name, command in (("reconstruct", "pose"), ("style_2d", "reconstruct")):
-            status, words = call([self.regrade, command, self.capture, "--out", self.work, *SMALL])
+            status, words = call([self.regrade, command, self.posed_capture, "--out", self.work, *SMALL])
             if status != 0:
                 sys.exit(f"the undisturbed {command} failed: {words}")
             self.begins[name] = shutil.copytree(self.work, os.path.join(self.scratch, name))
@@ -173,7 +173,7 @@ class Trials:
     # --- two at once
 
     def pairs(self, count):
-        command = [self.regrade, "pose", self.capture, "--out", self.work, "--photo-size", "96"]
+        command = [self.regrade, "pose", self.posed_capture, "--out", self.work, "--photo-size", "96"]
         both = 0
         for number in range(count):
             shutil.rmtree(self.work, ignore_errors=True)
