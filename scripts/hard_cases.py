@@ -46,7 +46,7 @@ class Tree:
     def __init__(self, root):
         self.root = root
         self.tests, self.of_case = set(), {}
-        for path in sorted(glob.glob(os.path.join(root, "tests", "**", "*.cc"), recursive=True)):
+        for path in sorted(glob.glob(os.path.join(root, "tests", "**", "*.[ch]*"), recursive=True)):
             for suite, name in TEST.findall(read(path)):
                 self.add(f"{suite}.{name}", NUMBER.findall(name.replace("_", " ")))
         for path in glob.glob(os.path.join(root, "tests", "**", "CMakeLists.txt"), recursive=True):

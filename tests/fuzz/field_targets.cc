@@ -1,9 +1,8 @@
-// field.npz, network.npz and a packed capture as wholes, and a look through what was accepted.
+// field.npz and a packed capture as wholes, and a look through what was accepted.
 #include <cmath>
 
 #include "kernels/field/render.h"
 #include "pipeline/field_file.h"
-#include "pipeline/network_file.h"
 #include "pipeline/packed_capture.h"
 #include "tests/fuzz/fuzz_support.h"
 #include "tests/fuzz/stored_zip.h"
@@ -51,28 +50,6 @@ bool ReadField(std::string_view bytes) {
   });
 }
 
-std::vector<std::string> NetworkSeeds() {
-  StoredNetwork stored;
-  for (size_t i = 0; i < stored.network.data().parameters.size(); ++i)
-    stored.network.data().parameters[i] = static_cast<float>(RandomDouble(5, 1, i) - 0.5);
-  stored.network.WarmUpNorms();
-  stored.k_est = 1.5;
-  const std::string path = FuzzFolder() + "/seed_network.npz";
-  WriteNetworkFile(path, stored);
-  return {StoredCopyOfNpz(path)};
-}
-
-bool ReadNetwork(std::string_view bytes) {
-  const std::string path = FuzzFile("network.npz", bytes);
-  return Accepts([&path] {
-    const StoredNetwork stored = ReadNetworkFile(path);
-    FuzzRequire(std::isfinite(stored.network.Bound()) && std::isfinite(stored.k_est),
-                "its bound is a number");
-    double features[64] = {0.5, -0.25, 1}, output[64];
-    stored.network.ForwardPlain(features, output);
-  });
-}
-
 std::vector<std::string> PackedSeeds() {
   PackedCapture capture;
   capture.scene.ndc = {1.5, 2};
@@ -105,7 +82,6 @@ bool ReadPacked(std::string_view bytes) {
 
 std::vector<FuzzTarget> FieldTargets() {
   return {{"field_npz", FieldSeeds, ReadField, MutateNpz, 5000},
-          {"network_npz", NetworkSeeds, ReadNetwork, MutateNpz, 300},
           {"packed_npz", PackedSeeds, ReadPacked, MutateNpz, 10000}};
 }
 

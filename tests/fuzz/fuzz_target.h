@@ -37,24 +37,33 @@ struct FuzzTarget {
 };
 
 // By kind of file; each list stands in the file of its name.
-std::vector<FuzzTarget> ColmapTargets();
 std::vector<FuzzTarget> ArchiveTargets();
-std::vector<FuzzTarget> FieldTargets();
-std::vector<FuzzTarget> JsonTargets();
-std::vector<FuzzTarget> PoseTableTargets();
-std::vector<FuzzTarget> PictureTargets();
-std::vector<FuzzTarget> MovieTargets();
-std::vector<FuzzTarget> FlowTargets();
-std::vector<FuzzTarget> StateTargets();
+std::vector<FuzzTarget> ColmapTargets();
 std::vector<FuzzTarget> CommandLineTargets();
+std::vector<FuzzTarget> FieldTargets();
+std::vector<FuzzTarget> FlowTargets();
+std::vector<FuzzTarget> JsonTargets();
+std::vector<FuzzTarget> MovieTargets();
+std::vector<FuzzTarget> PictureTargets();
+std::vector<FuzzTarget> PoseTableTargets();
+std::vector<FuzzTarget> RecordTargets();
+std::vector<FuzzTarget> StateTargets();
 
-inline std::vector<FuzzTarget> AllFuzzTargets() {
+template <typename... Lists>
+std::vector<FuzzTarget> Joined(Lists... lists) {
   std::vector<FuzzTarget> all;
-  for (const auto list :
-       {ColmapTargets, ArchiveTargets, FieldTargets, JsonTargets, PoseTableTargets,
-        PictureTargets, MovieTargets, FlowTargets, StateTargets, CommandLineTargets})
+  for (const auto list : {lists...})
     for (const FuzzTarget& target : list()) all.push_back(target);
   return all;
+}
+
+// Readers that need little of the program to be built, and the others.
+inline std::vector<FuzzTarget> ReaderTargets() {
+  return Joined(ColmapTargets, ArchiveTargets, FieldTargets, JsonTargets, PoseTableTargets,
+                PictureTargets, MovieTargets);
+}
+inline std::vector<FuzzTarget> ProgramTargets() {
+  return Joined(RecordTargets, FlowTargets, StateTargets, CommandLineTargets);
 }
 
 }  // namespace regrade::testing

@@ -14,7 +14,6 @@
 
 namespace {
 
-using regrade::testing::AllFuzzTargets;
 using regrade::testing::FuzzRandom;
 using regrade::testing::FuzzTarget;
 
@@ -30,7 +29,12 @@ const char* ValueOf(const char* word, const char* flag) {
 extern "C" size_t LLVMFuzzerMutate(uint8_t* data, size_t size, size_t max_size);
 
 extern "C" int LLVMFuzzerInitialize(int* argc, char*** argv) {
-  static const std::vector<FuzzTarget> all = AllFuzzTargets();
+  static const std::vector<FuzzTarget> all = [] {
+    using namespace regrade::testing;
+    std::vector<FuzzTarget> targets = ReaderTargets();
+    for (const FuzzTarget& target : ProgramTargets()) targets.push_back(target);
+    return targets;
+  }();
   omp_set_num_threads(1);
   const char* seeds = nullptr;
   for (int i = 1; i < *argc; ++i) {

@@ -181,4 +181,41 @@ std::string MutateText(std::string text, const std::vector<std::string>& diction
   return text;
 }
 
+std::string MutateJson(std::string text, FuzzRandom* random) {
+  static const std::vector<std::string> kWords = {"{",
+                                                  "}",
+                                                  "[",
+                                                  "]",
+                                                  ":",
+                                                  ",",
+                                                  "null",
+                                                  "true",
+                                                  "false",
+                                                  "\"\"",
+                                                  "\"\\ud800\"",
+                                                  "\"\\u0000\"",
+                                                  "\xff",
+                                                  "\xef\xbb\xbf",
+                                                  "// x\n",
+                                                  "\"frames\"",
+                                                  "\"w\":",
+                                                  "\"fl_x\":",
+                                                  "\"k4\":",
+                                                  "\"camera_angle_x\":",
+                                                  "\"camera_model\":",
+                                                  "\"OPENCV_FISHEYE\"",
+                                                  "\"is_fisheye\":",
+                                                  "\"file_path\":",
+                                                  "\"0.png\"",
+                                                  "\"../1\"",
+                                                  "\"transform_matrix\":",
+                                                  "\"options\":",
+                                                  "\"arguments\":",
+                                                  "\"schema\":",
+                                                  "\"width\":",
+                                                  "\"seed\":",
+                                                  "\"out\":"};
+  return MutateText(std::move(text), kWords, random);
+}
+
 }  // namespace regrade::testing

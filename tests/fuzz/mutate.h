@@ -19,4 +19,7 @@ std::string MutateBytes(std::string bytes, FuzzRandom* random);
 std::string MutateText(std::string text, const std::vector<std::string>& dictionary,
                        FuzzRandom* random);
 
+// Of JSON, with the words of our files.
+std::string MutateJson(std::string text, FuzzRandom* random);
+
 }  // namespace regrade::testing

@@ -1,9 +1,13 @@
-// States of an interrupted fit and training. Their checksums stand outside of these bytes, so a
-// mutant gets as far as any.
+// The network, and states of an interrupted fit and training. The checksums of these states
+// stand outside of their bytes, so a mutant gets as far as any.
+#include <cmath>
+
 #include "pipeline/fit_checkpoint.h"
 #include "pipeline/network_checkpoint.h"
+#include "pipeline/network_file.h"
 #include "tests/fuzz/fuzz_support.h"
 #include "tests/fuzz/mutate.h"
+#include "tests/fuzz/stored_zip.h"
 #include "tests/support/small_field.h"
 
 namespace regrade::testing {
@@ -54,6 +58,28 @@ bool ReadTraining(std::string_view bytes) {
   return true;
 }
 
+std::vector<std::string> NetworkSeeds() {
+  StoredNetwork stored;
+  for (size_t i = 0; i < stored.network.data().parameters.size(); ++i)
+    stored.network.data().parameters[i] = static_cast<float>(RandomDouble(5, 1, i) - 0.5);
+  stored.network.WarmUpNorms();
+  stored.k_est = 1.5;
+  const std::string path = FuzzFolder() + "/seed_network.npz";
+  WriteNetworkFile(path, stored);
+  return {StoredCopyOfNpz(path)};
+}
+
+bool ReadNetwork(std::string_view bytes) {
+  const std::string path = FuzzFile("network.npz", bytes);
+  return Accepts([&path] {
+    const StoredNetwork stored = ReadNetworkFile(path);
+    FuzzRequire(std::isfinite(stored.network.Bound()) && std::isfinite(stored.k_est),
+                "its bound is a number");
+    double features[64] = {0.5, -0.25, 1}, output[64];
+    stored.network.ForwardPlain(features, output);
+  });
+}
+
 std::string Mutate(std::string bytes, FuzzRandom* random) {
   return MutateBytes(std::move(bytes), random);
 }
@@ -62,7 +88,8 @@ std::string Mutate(std::string bytes, FuzzRandom* random) {
 
 std::vector<FuzzTarget> StateTargets() {
   return {{"fit_state", FitSeeds, ReadFit, Mutate, 40000},
-          {"training_state", TrainingSeeds, ReadTraining, Mutate, 3000}};
+          {"training_state", TrainingSeeds, ReadTraining, Mutate, 3000},
+          {"network_npz", NetworkSeeds, ReadNetwork, MutateNpz, 300}};
 }
 
 }  // namespace regrade::testing

@@ -26,8 +26,9 @@ ProgramOutcome RunIn(const std::vector<std::string>& words) {
 
 std::string Synthetic(const TemporaryFolder& folder) {
   const std::string capture = folder / "capture";
-  EXPECT_EQ(RunProgram(REGRADE_PROGRAM, {"synth", capture, "--views", "5", "--size", "96x72"}).code,
-            0);
+  EXPECT_EQ(
+      RunProgram(REGRADE_PROGRAM, {"synth", capture, "--views", "5", "--size", "96x72"}).code,
+      0);
   return capture + "/truth";  // the photos with their poses
 }
 
@@ -66,8 +67,8 @@ TEST(Surroundings, F27_AWorkingFolderThatIsGone) {
   const std::string capture = Synthetic(folder), gone = folder / "gone";
   const std::string leave = "mkdir \"$1\" && cd \"$1\" && rmdir \"$1\" && shift && exec \"$@\"";
   const auto run_gone = [&](const std::string& out) {
-    return RunIn({"/bin/sh", "-c", leave, "sh", gone, REGRADE_PROGRAM, "pose", capture, "--out",
-                  out});
+    return RunIn(
+        {"/bin/sh", "-c", leave, "sh", gone, REGRADE_PROGRAM, "pose", capture, "--out", out});
   };
   const ProgramOutcome relative = run_gone("out");
   EXPECT_EQ(relative.code, 5) << relative.text;
@@ -82,8 +83,8 @@ TEST(Surroundings, F27_RelativePathsAndBlanks) {
   fs::rename(folder / "capture", folder / "a capture");
   const std::string go = "cd \"$1\" && shift && exec \"$@\"";
   const ProgramOutcome outcome =
-      RunIn({"/bin/sh", "-c", go, "sh", folder.path(), REGRADE_PROGRAM, "pose", "./a capture/truth",
-             "--out", "an out/../an out"});
+      RunIn({"/bin/sh", "-c", go, "sh", folder.path(), REGRADE_PROGRAM, "pose",
+             "./a capture/truth", "--out", "an out/../an out"});
   EXPECT_EQ(outcome.code, 0) << outcome.text;
   EXPECT_TRUE(fs::exists(folder / "an out/poses/photos.json"));
 }

@@ -1,5 +1,7 @@
-// Every fuzz target without a fuzzer: its seeds, what was found before, and some thousand
-// mutants that are the same everywhere.
+// A fuzz target without a fuzzer: its seeds, what was found before, and some thousand mutants
+// that are the same everywhere.
+#pragma once
+
 #include <gtest/gtest.h>
 #include <omp.h>
 #include <sys/resource.h>
@@ -12,16 +14,13 @@
 #include "tests/fuzz/fuzz_target.h"
 
 namespace regrade::testing {
-namespace {
 
-namespace fs = std::filesystem;
+inline constexpr double kLongest = 5;     // seconds an input may take
+inline constexpr long kMostMemory = 512;  // MiB
+inline constexpr size_t kKept = 64;       // accepted mutants that further ones are made of
+inline constexpr size_t kShown = 300;     // bytes of an input that a failure shows
 
-constexpr double kLongest = 5;     // seconds an input may take
-constexpr long kMostMemory = 512;  // MiB
-constexpr size_t kKept = 64;       // accepted mutants that further ones are made of
-constexpr size_t kShown = 300;     // bytes of an input that a failure shows
-
-std::string Hex(const std::string& bytes) {
+inline std::string Hex(const std::string& bytes) {
   std::string text;
   char two[3];
   for (const char c : bytes.substr(0, kShown)) {
@@ -32,7 +31,7 @@ std::string Hex(const std::string& bytes) {
 }
 
 // Of lines of hexadecimal digits; '#' begins a line of words.
-std::string FromHex(const std::string& text) {
+inline std::string FromHex(const std::string& text) {
   std::string bytes, digits;
   bool words = false;
   for (const char c : text) {
@@ -74,9 +73,9 @@ TEST_P(FuzzReplay, SeedsFindsAndMutants) {
   for (size_t i = 0; i < seeds; ++i)
     EXPECT_TRUE(Read(kept[i], "seed " + std::to_string(i))) << "a good input was refused";
 
-  const fs::path finds = fs::path(REGRADE_SOURCE_DIR) / "tests/fuzz/found" / target.name;
-  if (fs::is_directory(finds))
-    for (const auto& entry : fs::directory_iterator(finds))
+  const std::filesystem::path finds = std::filesystem::path(REGRADE_SOURCE_DIR) / "tests/fuzz/found" / target.name;
+  if (std::filesystem::is_directory(finds))
+    for (const auto& entry : std::filesystem::directory_iterator(finds))
       Read(FromHex(ReadText(entry.path())), entry.path().filename());
 
   int accepted = 0;
@@ -100,17 +99,4 @@ TEST_P(FuzzReplay, SeedsFindsAndMutants) {
 #endif
 }
 
-INSTANTIATE_TEST_SUITE_P(Any, FuzzReplay, ::testing::ValuesIn(AllFuzzTargets()),
-                         [](const auto& info) { return std::string(info.param.name); });
-
-// A reader that promises too much is seen, and so is one that throws what is no Error.
-TEST(FuzzReplayItself, AFindIsAFind) {
-  EXPECT_THROW(Accepts([] { FuzzRequire(false, "a promise"); }), BrokenPromise);
-  EXPECT_THROW(Accepts([] { throw Error(ExitCode::kBug, "odd"); }), BrokenPromise);
-  EXPECT_THROW(Accepts([] { throw Error(ExitCode::kInput, ""); }), BrokenPromise);
-  EXPECT_THROW(Accepts([] { throw std::bad_alloc(); }), std::bad_alloc);
-  EXPECT_FALSE(Accepts([] { throw Error(ExitCode::kInput, "bad"); }));
-}
-
-}  // namespace
 }  // namespace regrade::testing
