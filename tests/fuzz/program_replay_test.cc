@@ -1,4 +1,5 @@
-// What the program reads besides: its own records and states, JSON with a meaning, command lines.
+// What the program reads besides: its own records and states, JSON with a meaning, command
+// lines.
 #include "tests/fuzz/replay.h"
 
 namespace regrade::testing {

@@ -73,7 +73,8 @@ TEST_P(FuzzReplay, SeedsFindsAndMutants) {
   for (size_t i = 0; i < seeds; ++i)
     EXPECT_TRUE(Read(kept[i], "seed " + std::to_string(i))) << "a good input was refused";
 
-  const std::filesystem::path finds = std::filesystem::path(REGRADE_SOURCE_DIR) / "tests/fuzz/found" / target.name;
+  const std::filesystem::path finds =
+      std::filesystem::path(REGRADE_SOURCE_DIR) / "tests/fuzz/found" / target.name;
   if (std::filesystem::is_directory(finds))
     for (const auto& entry : std::filesystem::directory_iterator(finds))
       Read(FromHex(ReadText(entry.path())), entry.path().filename());
