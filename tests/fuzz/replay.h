@@ -4,7 +4,6 @@
 
 #include <gtest/gtest.h>
 #include <omp.h>
-#include <sys/resource.h>
 
 #include <algorithm>
 #include <chrono>
@@ -18,32 +17,13 @@ namespace regrade::testing {
 inline constexpr double kLongest = 5;     // seconds an input may take
 inline constexpr long kMostMemory = 512;  // MiB
 inline constexpr size_t kKept = 64;       // accepted mutants that further ones are made of
-inline constexpr size_t kShown = 300;     // bytes of an input that a failure shows
 
-inline std::string Hex(const std::string& bytes) {
-  std::string text;
-  char two[3];
-  for (const char c : bytes.substr(0, kShown)) {
-    std::snprintf(two, sizeof two, "%02x", static_cast<unsigned char>(c));
-    text += two;
-  }
-  return text + (bytes.size() > kShown ? "..." : "");
-}
-
+// The first bytes as hexadecimal digits.
+std::string Hex(const std::string& bytes);
 // Of lines of hexadecimal digits; '#' begins a line of words.
-inline std::string FromHex(const std::string& text) {
-  std::string bytes, digits;
-  bool words = false;
-  for (const char c : text) {
-    words = c != '\n' && (words || c == '#');
-    if (words || std::string_view(" \n\r").find(c) != std::string_view::npos) continue;
-    digits += c;
-    if (digits.size() < 2) continue;
-    bytes += static_cast<char>(std::stoi(digits, nullptr, 16));
-    digits.clear();
-  }
-  return bytes;
-}
+std::string FromHex(const std::string& text);
+// The largest memory that this process has had, MiB.
+long PeakMemory();
 
 class FuzzReplay : public ::testing::TestWithParam<FuzzTarget> {
  protected:
@@ -94,9 +74,7 @@ TEST_P(FuzzReplay, SeedsFindsAndMutants) {
   // Mutants that are all refused would show the reader's first line only.
   EXPECT_GT(accepted, target.mutants / 100) << "of " << target.mutants;
 #if !defined(__SANITIZE_ADDRESS__)
-  rusage usage;
-  ::getrusage(RUSAGE_SELF, &usage);
-  EXPECT_LT(usage.ru_maxrss >> 10, kMostMemory);
+  EXPECT_LT(PeakMemory(), kMostMemory);
 #endif
 }
 

@@ -1,7 +1,7 @@
 // A library to be preloaded: counts and times what makes writing safe, to say what it costs.
 //
-//   TIMED_WRITES_REPORT   file that gets a line "NAME CALLS SECONDS" for each, added at the end of
-//   each process
+//   TIMED_WRITES_REPORT   file that gets a line "NAME CALLS SECONDS" for each, added at the end
+//   of each process
 //
 // Operations are: fsync and fdatasync (of files and folders), rename.
 #include <dlfcn.h>
