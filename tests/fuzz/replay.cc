@@ -6,7 +6,7 @@
 namespace regrade::testing {
 namespace {
 
-constexpr size_t kShown = 300;     // bytes of an input that a failure shows
+constexpr size_t kShown = 300;  // bytes of an input that a failure shows
 
 }  // namespace
 
