@@ -10,6 +10,11 @@ target_compile_options(regrade_flags INTERFACE
 # Eigen's own threads wait for each other in busy loops, and its products here are small.
 target_compile_definitions(regrade_flags INTERFACE
   REGRADE_VERSION="${PROJECT_VERSION}" EIGEN_DONT_PARALLELIZE)
+if(REGRADE_FUZZ)
+  target_compile_options(regrade_flags INTERFACE
+    -fsanitize=fuzzer-no-link,address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer -g)
+  target_link_options(regrade_flags INTERFACE -fsanitize=address,undefined)
+endif()
 if(REGRADE_SANITIZE)
   target_compile_options(regrade_flags INTERFACE
     -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer -g)

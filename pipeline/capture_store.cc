@@ -142,7 +142,7 @@ CaptureSource DetectCapture(const std::string& folder) {
     const fs::path file = root / name;
     if (!fs::is_regular_file(file)) continue;
     const auto unknown_size = [](const std::string&, int* width, int* height) {
-      *width = *height = 1;
+      *width = *height = 0;
     };
     const fs::path photos = CommonFolder(root, ReadTransformsJson(file.string(), unknown_size));
     return {CaptureKind::kTransforms, photos.string(), file.string()};

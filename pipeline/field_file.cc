@@ -6,6 +6,7 @@
 
 #include "kernels/base/error.h"
 #include "kernels/base/half.h"
+#include "kernels/scene/camera_checks.h"
 #include "pipeline/files/npz_file.h"
 
 namespace regrade {
@@ -214,6 +215,8 @@ StoredField ReadFieldFile(const std::string& path, uint64_t budget) {
         stored.field_from_world.rotation(i, j) = placement[1 + 3 * i + j];
       stored.field_from_world.translation[i] = placement[10 + i];
     }
+    if (!IsSound(stored.field_from_world))
+      Refuse(path, "regrade_field_from_world is no scale, rotation and translation");
   }
   if (file.Has("regrade_ndc")) {
     const NpzArray array = file.Read("regrade_ndc", ArrayType::kF64, {2});

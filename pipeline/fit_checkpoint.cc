@@ -67,16 +67,18 @@ void UnpackTally(ByteUnpacker* unpacker, FitTally* tally) {
 
 }  // namespace
 
-std::string PackFitState(const FitState& state) {
+std::string PackFitState(const FitState& state, const std::string& note) {
   const FastGrid& grid = state.grid;
   BytePacker packer;
-  const size_t head = 256 + sizeof(FitCurvePoint) * state.tally.curve.size();  // generously
+  const size_t head =
+      256 + note.size() + sizeof(FitCurvePoint) * state.tally.curve.size();  // generously
   packer.Reserve(head + sizeof(int32_t) * static_cast<size_t>(grid.links.size()) +
                  sizeof(float) * static_cast<size_t>(
                                      grid.records.size() + state.second_moment.size() +
                                      grid.spheres.links.size() + grid.spheres.texels.size() +
                                      state.sphere_moment.size()));
   packer.Value(kVersion);
+  packer.Values(note);
   packer.Value(grid.basis);
   packer.Value(state.stage);
   packer.Value(state.step);
@@ -100,13 +102,15 @@ std::string PackFitState(const FitState& state) {
   return packer.Take();
 }
 
-std::optional<FitState> UnpackFitState(std::string_view bytes) {
+std::optional<FitState> UnpackFitState(std::string_view bytes, std::string* note) {
   ByteUnpacker unpacker(bytes);
   FitState state;
   FastGrid& grid = state.grid;
   uint32_t version = 0;
   unpacker.Value(&version);
   if (version != kVersion) return std::nullopt;
+  std::string unwanted;
+  unpacker.Values(note != nullptr ? note : &unwanted);
   unpacker.Value(&grid.basis);
   unpacker.Value(&state.stage);
   unpacker.Value(&state.step);

@@ -9,10 +9,10 @@
 
 namespace regrade {
 
-// Floats keep all their bits.
-std::string PackFitState(const FitState& state);
+// Floats keep all their bits. `note`: what else the fit's stage wants back.
+std::string PackFitState(const FitState& state, const std::string& note = "");
 
 // Empty for bytes that are no such state.
-std::optional<FitState> UnpackFitState(std::string_view bytes);
+std::optional<FitState> UnpackFitState(std::string_view bytes, std::string* note = nullptr);
 
 }  // namespace regrade

@@ -11,8 +11,15 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// What the machine lacks says nothing about the folder: its photos are not gone.
+bool IsLack(const std::error_code& error) {
+  return error == std::errc::io_error || error == std::errc::too_many_files_open ||
+         error == std::errc::too_many_files_open_in_system ||
+         error == std::errc::not_enough_memory;
+}
+
 [[noreturn]] void ThrowListError(const std::error_code& error, const fs::path& path) {
-  throw Error(error == std::errc::io_error ? ExitCode::kResources : ExitCode::kInput,
+  throw Error(IsLack(error) ? ExitCode::kResources : ExitCode::kInput,
               "cannot list the folder: " + error.message(), path.string());
 }
 
@@ -51,7 +58,7 @@ void ListInto(const fs::path& folder, const std::string& prefix, const fs::path&
   std::error_code error;
   fs::directory_iterator entry(folder, error);
   if (error) {
-    if (prefix.empty() || error == std::errc::io_error) ThrowListError(error, folder);
+    if (prefix.empty() || IsLack(error)) ThrowListError(error, folder);
     listing->files.push_back({prefix, folder.string(), "cannot list it: " + error.message()});
     return;
   }

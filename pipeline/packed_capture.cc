@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "kernels/base/error.h"
+#include "kernels/scene/camera_checks.h"
 #include "pipeline/files/npz_file.h"
 
 namespace regrade {
@@ -13,6 +14,7 @@ constexpr int32_t kVersion = 1;
 constexpr int64_t kCameraValues = 27;  // see PackCamera
 constexpr uint64_t kBudget = uint64_t{16} << 30;
 constexpr int64_t kMaxSide = 1 << 14;
+constexpr int kMaxVertices = 4096;  // along an axis, as in field files
 
 // width, height, fx, fy, cx, cy, lens, distortion [8], rotation [9] by rows, translation [3].
 void PackCamera(const Camera& camera, double* v) {
@@ -42,6 +44,9 @@ Camera UnpackCamera(const double* v, const std::string& where) {
   std::copy_n(v + 7, 8, camera.distortion.begin());
   for (int i = 0; i < 9; ++i) camera.camera_from_world.rotation(i / 3, i % 3) = v[15 + i];
   for (int i = 0; i < 3; ++i) camera.camera_from_world.translation[i] = v[24 + i];
+  const RigidTransform& pose = camera.camera_from_world;
+  if (!ImplausibleCamera(camera).empty() || !IsSound({1, pose.rotation, pose.translation}))
+    throw Error(ExitCode::kInput, "a camera that none can be", where, "pack the capture again");
   return camera;
 }
 
@@ -69,6 +74,21 @@ Image UnpackPixels(const uint8_t* from, int width, int height) {
       }
   }
   return photo;
+}
+
+// Throws for a placement that a fit would stumble over.
+void CheckScene(const NormalizedScene& scene, const std::string& path) {
+  const SceneBox& box = scene.box;
+  bool sound = IsSound(scene.field_from_world) && std::isfinite(box.near_clip) &&
+               box.near_clip >= 0 && box.layers >= 0 && box.layers <= kMaxVertices;
+  for (int i = 0; i < 3; ++i)
+    sound = sound && std::isfinite(box.center[i]) && std::isfinite(box.radius[i]) &&
+            box.radius[i] > 0 && (!box.background || std::isfinite((*box.background)[i]));
+  for (const double side : {scene.ndc.a, scene.ndc.b})
+    sound = sound && side >= 0 && side < 1e3 && (side > 0) == (scene.ndc.a > 0);
+  if (!sound)
+    throw Error(ExitCode::kInput, "its box or its place is none that a capture can have", path,
+                "pack the capture again");
 }
 
 int64_t BytesOf(const Camera& camera) { return int64_t{camera.width} * camera.height * 3; }
@@ -148,6 +168,7 @@ PackedCapture ReadPackedCapture(const std::string& path) {
   for (int i = 0; i < 9; ++i) similarity.rotation(i / 3, i % 3) = placement.As<double>()[1 + i];
   for (int i = 0; i < 3; ++i) similarity.translation[i] = placement.As<double>()[10 + i];
 
+  CheckScene(capture.scene, path);
   if (file.Has("style")) {
     const NpzArray style = file.Read("style", ArrayType::kU8, {-1, -1, 3});
     if (style.shape[0] > kMaxSide || style.shape[1] > kMaxSide)

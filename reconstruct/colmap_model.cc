@@ -13,6 +13,7 @@
 
 #include "kernels/base/checked_math.h"
 #include "kernels/base/error.h"
+#include "kernels/scene/camera_checks.h"
 #include "reconstruct/colmap_text.h"
 
 namespace regrade {
@@ -105,22 +106,6 @@ class Reader {
 
 std::string CameraText(uint32_t id) { return "camera " + std::to_string(id); }
 
-// A window wide enough for any lens and sensor, and narrow enough to catch damage.
-void CheckPlausible(const Reader& reader, uint32_t id, const Camera& camera) {
-  const double side = std::max(camera.width, camera.height);
-  for (double f : {camera.fx, camera.fy}) {
-    if (!(f > 0.05 * side && f < 100 * side)) {
-      std::ostringstream text;
-      text << CameraText(id) << " has the focal length " << f << " px for a picture of "
-           << camera.width << " x " << camera.height;
-      reader.Fail(text.str());
-    }
-  }
-  if (!(camera.cx >= 0 && camera.cx <= camera.width && camera.cy >= 0 &&
-        camera.cy <= camera.height))
-    reader.Fail(CameraText(id) + " has its principal point outside the picture");
-}
-
 std::vector<ColmapCamera> ReadCameras(const std::string& folder) {
   Reader reader(folder, "cameras");
   const size_t count = reader.ReadCount("cameras", 4 + 4 + 8 + 8 + 3 * 8);
@@ -155,7 +140,8 @@ std::vector<ColmapCamera> ReadCameras(const std::string& folder) {
     c.lens = info.lens;
     for (int i = 0; i < info.coefficients; ++i)
       c.distortion[i] = reader.ReadFinite("a distortion coefficient");
-    CheckPlausible(reader, camera.id, c);
+    const std::string implausible = ImplausibleCamera(c);
+    if (!implausible.empty()) reader.Fail(CameraText(camera.id) + " has " + implausible);
   }
   reader.ExpectEnd();
   return cameras;

@@ -23,6 +23,11 @@ constexpr std::pair<const char*, const char*> kRenamed[] = {
     {"BundleAdjustment.function_tolerance", "BundleAdjustmentCeres.function_tolerance"},
 };
 
+// Without a display, COLMAP's use of Qt aborts; its log files would go to the system's folder
+// for temporary files, and stay there.
+const std::vector<std::pair<std::string, std::string>> kEnvironment = {
+    {"QT_QPA_PLATFORM", "offscreen"}, {"GLOG_logtostderr", "1"}};
+
 bool IsPathOption(const std::string& name) { return name.find('.') == std::string::npos; }
 
 bool SpeaksOfFullDisk(const std::string& line) {
@@ -54,7 +59,8 @@ const char* LikelyCause(const ChildResult& result) {
 ColmapProgram::ColmapProgram(const std::string& program, const std::string& log_folder)
     : program_(program.find('/') == std::string::npos ? program : Absolute(program)),
       log_folder_(log_folder) {
-  ChildOptions options{.argv = {program_, "help"}, .wall_limit_s = 60};
+  ChildOptions options{
+      .argv = {program_, "help"}, .environment = kEnvironment, .wall_limit_s = 60};
   options.log_path = LogPath("help");
   int major = 0, minor = 0;
   bool found = false;
@@ -89,8 +95,7 @@ ChildResult ColmapProgram::Run(const std::string& command, const ColmapArguments
                                const KeepGoingFunction& keep_going) {
   ChildOptions options;
   options.argv = Spelled(command, arguments);
-  // Without a display, COLMAP's use of Qt aborts.
-  options.environment = {{"QT_QPA_PLATFORM", "offscreen"}};
+  options.environment = kEnvironment;
   options.wall_limit_s = limits.wall_s;
   options.quiet_limit_s = limits.quiet_s;
   options.log_path = LogPath(log_name);
@@ -120,9 +125,8 @@ const std::set<std::string>& ColmapProgram::OptionsOf(const std::string& command
   const auto it = options_.find(command);
   if (it != options_.end()) return it->second;
   std::set<std::string>& names = options_[command];
-  ChildOptions options{.argv = {program_, command, "-h"},
-                       .environment = {{"QT_QPA_PLATFORM", "offscreen"}},
-                       .wall_limit_s = 60};
+  ChildOptions options{
+      .argv = {program_, command, "-h"}, .environment = kEnvironment, .wall_limit_s = 60};
   RunChild(options, [&](const std::string& line) {
     const size_t begin = line.find("--");
     if (begin == std::string::npos) return;

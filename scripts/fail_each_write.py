@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Lets each write of a run fail once, and requires a clear end, a folder that is whole, and the same result afterwards.
 
-  fail_each_write.py REGRADE LIBRARY [--runs 24] [--kinds ENOSPC,EIO,SHORT]     LIBRARY: libfailing_writes.so; needs colmap
+  fail_each_write.py REGRADE LIBRARY [--runs 24] [--kinds ENOSPC,EIO,SHORT]     LIBRARY: libfailing_writes.so
 
 A small synthetic capture is run once undisturbed in reproducible mode. Then, beginning behind the poses and behind
 the reconstruction, a copy is run with its k-th write failing, for `--runs` values of k over all of them (0: every k).
@@ -10,17 +10,15 @@ the same command again must finish, with the undisturbed run's fields and frames
 """
 
 import argparse
-import glob
-import hashlib
 import os
 import shutil
 import subprocess
 import sys
 import tempfile
 
-SMALL = ["--photo-size", "96", "--fit-resolutions", "24,32", "--fit-steps", "60,60", "--fit-rays", "1024",
-         "--style-steps", "20", "--style-rays", "512", "--path-frames", "4", "--preset", "draft", "--reproducible",
-         "--holdout", "0", "--threads", "2"]
+from small_run import SMALL, STYLE, different, make_capture, results
+
+FLAGS = SMALL + ["--threads", "2"]
 
 
 def call(command, failing=None):
@@ -28,12 +26,6 @@ def call(command, failing=None):
     done = subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, env=environment,
                           timeout=600)
     return done.returncode, done.stderr.strip()
-
-
-def results(folder):
-    """name -> digest of every field and frame."""
-    names = glob.glob(os.path.join(folder, "*.npz")) + glob.glob(os.path.join(folder, "frames", "*", "*.png"))
-    return {os.path.relpath(name, folder): hashlib.sha256(open(name, "rb").read()).hexdigest() for name in names}
 
 
 def main():
@@ -47,12 +39,11 @@ def main():
     failures = tried = ended = 0
     with tempfile.TemporaryDirectory() as scratch:
         capture, work = os.path.join(scratch, "capture"), os.path.join(scratch, "work")
-        style = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "assets", "style_sunset.png")
-        call([regrade, "synth", capture, "--scene", "table", "--views", "8", "--size", "256x192"])
-        run = [regrade, "run", capture, "--style", style, "--out", work] + SMALL
+        capture = make_capture(regrade, capture)
+        run = [regrade, "run", capture, "--style", STYLE, "--out", work] + FLAGS
         begins = {}
         for name, command in (("poses", "pose"), ("reconstruction", "reconstruct")):
-            status, words = call([regrade, command, capture, "--out", work] + SMALL)
+            status, words = call([regrade, command, capture, "--out", work] + FLAGS)
             if status != 0:
                 sys.exit(f"{command} of the undisturbed run: exit status {status}: {words}")
             begins[name] = shutil.copytree(work, os.path.join(scratch, name))
@@ -87,9 +78,8 @@ def main():
                     again, words = call(run)
                     if again != 0:
                         problem = f"the same command again: exit status {again}: {words[-200:]}"
-                    elif results(work) != expected:
-                        now = results(work)
-                        problem = f"differs: {sorted(n for n in set(now) | set(expected) if now.get(n) != expected.get(n))[:5]}"
+                    elif different(results(work), expected):
+                        problem = f"differs: {different(results(work), expected)[:5]}"
                 tried += 1
                 ended += status == 5
                 if problem:

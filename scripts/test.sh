@@ -11,7 +11,7 @@ jobs=$(nproc)
 # Test programs that meet hostile bytes or do pointer arithmetic.
 sanitized=(
   child_process_test kernels_bits_test kernels_color_test kernels_field_test kernels_network_test resize_test
-  colmap_model_test pipeline_files_test pipeline_report_test
+  colmap_model_test pipeline_files_test pipeline_report_test readers_replay_test
 )
 
 scripts/install_packages.sh

@@ -1,5 +1,5 @@
-// From a ray's raw sums to a pixel: the colour clipped, the length along the ray turned into the
-// depth along the optical axis.
+// From a ray's raw sums to a pixel: the colour clipped, the length along the ray turned into
+// the depth along the optical axis.
 #pragma once
 
 #include "kernels/base/vec.h"

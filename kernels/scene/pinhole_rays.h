@@ -1,5 +1,5 @@
-// The rays through a frame's pixels, for any processor: what Camera::PixelRay gives for a camera
-// without distortion, to the bit.
+// The rays through a frame's pixels, for any processor: what Camera::PixelRay gives for a
+// camera without distortion, to the bit.
 #pragma once
 
 #include "kernels/base/vec.h"
@@ -30,8 +30,8 @@ struct PinholeRays {
   // Through the centre of pixel (x, y), in the field's space.
   HD Ray At(int x, int y) const {
     Vec3d from = origin;
-    Vec3d direction = Normalized(
-        world_from_camera * Vec3d{(x + 0.5 - cx) / fx, (y + 0.5 - cy) / fy, 1.0});
+    Vec3d direction =
+        Normalized(world_from_camera * Vec3d{(x + 0.5 - cx) / fx, (y + 0.5 - cy) / fy, 1.0});
     if (ndc.on()) NdcRay(ndc, &from, &direction);
     return {from.Cast<float>(), direction.Cast<float>()};
   }

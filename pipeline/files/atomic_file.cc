@@ -93,6 +93,9 @@ void ThrowReadError(const std::string& path) {
   if (error == EIO || error == ESTALE || error == ENODEV)
     throw Error(ExitCode::kResources, std::string("cannot read: ") + std::strerror(error), path,
                 "is its drive still there? then run the same command again");
+  if (error == EMFILE || error == ENFILE || error == ENOMEM)
+    throw Error(ExitCode::kResources, std::string("cannot read: ") + std::strerror(error), path,
+                "raise the limit (ulimit -n, ulimit -v), then run the same command again");
   throw Error(ExitCode::kInput, std::strerror(error), path);
 }
 

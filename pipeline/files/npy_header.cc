@@ -92,7 +92,8 @@ class LiteralReader {
     const std::string_view name = Quoted();
     if (name == "|b1") return ArrayType::kU8;
     for (const TypeRow& row : kTypes)
-      if (name == row.name || (row.size == 1 && name.substr(1) == "u1")) return row.type;
+      if (name == row.name || (row.size == 1 && name.size() == 3 && name.substr(1) == "u1"))
+        return row.type;
     if (name.substr(0, 1) == ">") Refuse("big-endian data (" + std::string(name) + ")");
     if (name.find('O') != std::string_view::npos)
       Refuse("Python objects: refused, they could run code");

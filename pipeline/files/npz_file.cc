@@ -130,11 +130,11 @@ struct NpzReader::Archive {
 NpzReader::NpzReader(const std::string& path, uint64_t budget)
     : path_(path), budget_(budget), archive_(std::make_unique<Archive>()) {
   const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-  if (fd < 0) throw Error(ExitCode::kInput, std::strerror(errno), path);
+  if (fd < 0) ThrowReadError(path);
   const std::unique_ptr<const int, void (*)(const int*)> closer(
       &fd, [](const int* f) { ::close(*f); });
   struct stat status;
-  if (::fstat(fd, &status) != 0) throw Error(ExitCode::kInput, std::strerror(errno), path);
+  if (::fstat(fd, &status) != 0) ThrowReadError(path);
   if (!S_ISREG(status.st_mode)) throw Error(ExitCode::kInput, "not a regular file", path);
   const ReadAt read_at = [fd, &path](uint64_t offset, void* to, size_t size) {
     size_t done = 0;

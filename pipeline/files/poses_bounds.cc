@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "kernels/base/error.h"
+#include "kernels/scene/camera_checks.h"
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/files/npy_header.h"
 
@@ -49,6 +50,8 @@ Camera CameraOf(const std::string& path, size_t row, const double* v) {
   rotation.row[1] = Cross(forward, right);
   rotation.row[2] = forward;
   camera.camera_from_world.translation = -(rotation * Vec3d{at(0, 3), at(1, 3), at(2, 3)});
+  const std::string implausible = ImplausibleCamera(camera);
+  if (!implausible.empty()) Refuse(path, row, "the camera has " + implausible);
   return camera;
 }
 

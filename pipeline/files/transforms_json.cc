@@ -6,6 +6,7 @@
 #include <set>
 
 #include "kernels/base/error.h"
+#include "kernels/scene/camera_checks.h"
 #include "pipeline/files/json_file.h"
 
 namespace regrade {
@@ -149,9 +150,12 @@ Camera ReadCamera(const std::string& path, const JsonValue& top, const JsonValue
   camera.camera_from_world = ReadPose(path, frame);
   camera.width = values.Side("w");
   camera.height = values.Side("h");
+  bool size_known = true;
   if (camera.width == 0 || camera.height == 0) {
     if (!size_of) Refuse(path, frame, "the size of the pictures (w, h) is missing");
     size_of(picture, &camera.width, &camera.height);
+    size_known = camera.width > 0 && camera.height > 0;
+    if (!size_known) camera.width = camera.height = 1;
   }
   const std::optional<double> angle_x = values.Number("camera_angle_x");
   const std::optional<double> angle_y = values.Number("camera_angle_y");
@@ -165,6 +169,8 @@ Camera ReadCamera(const std::string& path, const JsonValue& top, const JsonValue
   camera.cx = values.NumberOr("cx", 0.5 * camera.width);
   camera.cy = values.NumberOr("cy", 0.5 * camera.height);
   ReadLens(path, frame, values, &camera);
+  const std::string implausible = size_known ? ImplausibleCamera(camera) : "";
+  if (!implausible.empty()) Refuse(path, frame, "the camera has " + implausible);
   return camera;
 }
 

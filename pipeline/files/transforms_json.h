@@ -23,7 +23,8 @@ struct TransformsFile {
   std::vector<std::string> missing;     // listed, but not there
 };
 
-// Size in pixels of a picture on disk, for files that leave out "w" and "h".
+// Size in pixels of a picture on disk, for files that leave out "w" and "h". Where it says 0,
+// cameras are read without knowing their size, and without a look at whether they can be.
 using PictureSizeFunction =
     std::function<void(const std::string& path, int* width, int* height)>;
 
@@ -34,8 +35,9 @@ using PictureSizeFunction =
 // captures.
 //
 // Throws Error (kInput) with the place in the file: JSON that ParseJson refuses, more than 64
-// MiB, values that are missing, out of range or not finite, a matrix that is no rigid motion,
-// an unknown lens, a picture listed twice, or no picture at all on disk.
+// MiB, values that are missing, out of range or not finite, a matrix that is no rigid motion, a
+// camera that none can be, an unknown lens, a picture listed twice, or no picture at all on
+// disk.
 TransformsFile ReadTransformsJson(const std::string& path,
                                   const PictureSizeFunction& size_of = {});
 

@@ -1,4 +1,5 @@
-// regrade_gpu render: frames of a field at a packed capture's held-out cameras, and what they cost.
+// regrade_gpu render: frames of a field at a packed capture's held-out cameras, and what they
+// cost.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -44,11 +45,11 @@ void RenderPacked(const RenderPackedOptions& settings) {
   const DeviceGrid grid = UploadGrid(MakeFastGrid(stored.field));
   if (!settings.frames.empty())
     RenderHeldOut(grid, capture, {stored.field.step}, settings.frames, "frame");
-  const JsonValue record = JsonValue::Object{
-      {"capture", settings.capture},
-      {"device", ReadDeviceStatus().name},
-      {"voxels", stored.field.geometry->num_voxels()},
-      {"render", RenderPrices(grid, capture, stored.field.step)}};
+  const JsonValue record =
+      JsonValue::Object{{"capture", settings.capture},
+                        {"device", ReadDeviceStatus().name},
+                        {"voxels", stored.field.geometry->num_voxels()},
+                        {"render", RenderPrices(grid, capture, stored.field.step)}};
   std::printf("%s\n", DumpJson(record, -1).c_str());
   std::fflush(stdout);
 }

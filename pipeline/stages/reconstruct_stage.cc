@@ -89,8 +89,7 @@ FitOptions OptionsForMemory(RunContext* context,
 // Whether the fit keeps its spherical harmonics, and the row that says why.
 EffectReport ProfileViewDependence(const RunSettings& settings, const FitOptions& options,
                                    const std::vector<TrainingView>& views, const SceneBox& box,
-                                   const FitState* resume, const ProgressFunction& progress,
-                                   Backend backend) {
+                                   const ProgressFunction& progress, Backend backend) {
   const auto row = [](bool on, const Figure& value, const std::string& evidence) {
     return EffectReport{kViewDependence, on, evidence, value, kDegreePays};
   };
@@ -99,8 +98,6 @@ EffectReport ProfileViewDependence(const RunSettings& settings, const FitOptions
   const bool wanted = wish == wishes.end() || wish->second;
   if (options.sh_degree == 0 || !wanted) return row(false, Figure(), "as asked for");
   if (wish != wishes.end()) return row(true, Figure(), "as asked for");
-  if (resume != nullptr)
-    return row(resume->grid.basis > 1, Figure(), "as before the interruption");
   if (views.size() < kLeastTrialViews)
     return row(true, Figure(), "too few photos to keep some from a trial");
   const DegreeTrial trial = TryDegrees(views, box, options, progress, backend);
@@ -141,12 +138,13 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
 
   if (settings.run.reproducible && options.shards == 0) options.shards = kReproducibleShards;
   FitHooks hooks;
+  std::string measured;  // the row of view dependence: an interruption must not change it
   hooks.checkpoint = [&](const FitState& state) {
-    workspace.SaveCheckpoint("reconstruct", inputs, PackFitState(state));
+    workspace.SaveCheckpoint("reconstruct", inputs, PackFitState(state, measured));
   };
   std::optional<FitState> resume;
   if (const auto bytes = workspace.LoadCheckpoint("reconstruct", inputs))
-    resume = UnpackFitState(*bytes);
+    resume = UnpackFitState(*bytes, &measured);
   if (resume) {
     hooks.resume = &*resume;
     context->console->Info("reconstruct: goes on from its checkpoint");
@@ -155,8 +153,11 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   EffectReport& view_dependence =
       *std::find_if(profile.effects.begin(), profile.effects.end(),
                     [](const EffectReport& effect) { return effect.name == kViewDependence; });
-  view_dependence = ProfileViewDependence(settings, options, views, scene.box, hooks.resume,
-                                          parts.Next(kTrial), backend);
+  const ProgressFunction trial = parts.Next(kTrial);
+  view_dependence =
+      resume ? EffectsOfRecord(ParseJson(measured, "checkpoint")).at(0)
+             : ProfileViewDependence(settings, options, views, scene.box, trial, backend);
+  measured = DumpJson(EffectsRecord({view_dependence}), -1);
   context->console->Info(EffectLine(view_dependence));
   if (!view_dependence.on) options.sh_degree = 0;
   hooks.progress = parts.Next(1);

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
+#include <vector>
 
 #include "kernels/base/half.h"
 #include "kernels/base/random.h"
@@ -40,7 +42,9 @@ StoredField SmallField(int basis) {
   stored.field.near_clip = 0.125f;
   stored.field_from_world.scale = 3;
   stored.field_from_world.translation = {1, 2, 3};
-  stored.field_from_world.rotation(0, 1) = 0.5;
+  Mat3d& turn = stored.field_from_world.rotation;
+  turn(0, 0) = turn(1, 1) = 0.8;
+  turn(0, 1) = 0.6, turn(1, 0) = -0.6;
   return stored;
 }
 
@@ -61,7 +65,7 @@ TEST(FieldFile, RoundTripIsExactUpToHalfColours) {
     EXPECT_EQ(in.field.background, out.field.background);
     EXPECT_EQ(in.field.near_clip, out.field.near_clip);
     EXPECT_EQ(in.field_from_world.scale, 3);
-    EXPECT_EQ(in.field_from_world.rotation(0, 1), 0.5);
+    EXPECT_EQ(in.field_from_world.rotation(0, 1), 0.6);
     EXPECT_EQ(in.field_from_world.translation.z, 3);
     EXPECT_EQ(in.field.geometry->frame.radius, out.field.geometry->frame.radius);
     // What a reader gets, written again, is the same file.
@@ -208,6 +212,22 @@ TEST_F(Changed, F69_NonFiniteValuesAreCounted) {
   density[4] = std::numeric_limits<float>::infinity();
   EXPECT_REGRADE_ERROR(ReadWith("density_data", {17, 1}, density.data()), ExitCode::kInput,
                        "2 values are not finite");
+}
+
+TEST_F(Changed, F69_APlaceThatIsNone) {
+  double placement[13] = {1, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
+  for (const auto& [at, value] :
+       std::vector<std::pair<int, double>>{{0, 0},
+                                           {0, -1},
+                                           {0, std::numeric_limits<double>::quiet_NaN()},
+                                           {5, 2},
+                                           {12, INFINITY}}) {
+    const double good = std::exchange(placement[at], value);
+    EXPECT_REGRADE_ERROR(ReadWith("regrade_field_from_world", {13}, placement),
+                         ExitCode::kInput, "no scale, rotation and translation");
+    placement[at] = good;
+  }
+  ReadWith("regrade_field_from_world", {13}, placement);
 }
 
 TEST_F(Changed, F66_ShapesThatDisagree) {

@@ -224,6 +224,7 @@ TEST(NpyHeader, F72_RefusedByName) {
   } cases[] = {
       {with("'>f4'", "False", "(3,)"), "big-endian"},
       {with("'|O'", "False", "(3,)"), "Python objects"},
+      {with("''", "False", "(3,)"), "element type ''"},
       {with("[('a', '<f4')]", "False", "(3,)"), "structured"},
       {with("'<U5'", "False", "(3,)"), "<U5"},
       {with("'<f4'", "True", "(3, 2)"), "Fortran"},

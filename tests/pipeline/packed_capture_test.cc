@@ -82,5 +82,28 @@ TEST(PackedCapture, F71_DamageIsNamed) {
   EXPECT_REGRADE_ERROR(ReadPackedCapture(folder / "b.npz"), ExitCode::kInput, "cameras");
 }
 
+TEST(PackedCapture, F69_H134_WhatNoCaptureHas) {
+  const testing::TemporaryFolder folder;
+  const auto refuse = [&folder](const PackedCapture& capture, const char* part) {
+    WritePackedCapture(folder / "a.npz", capture);
+    EXPECT_REGRADE_ERROR(ReadPackedCapture(folder / "a.npz"), ExitCode::kInput, part);
+  };
+  PackedCapture capture = SmallCapture();
+  capture.views[1].camera.fx = 1e9;
+  refuse(capture, "a camera that none can be");
+  capture = SmallCapture();
+  capture.views[1].camera.camera_from_world.rotation(0, 0) = 2;
+  refuse(capture, "a camera that none can be");
+  capture = SmallCapture();
+  capture.scene.field_from_world.scale = 0;
+  refuse(capture, "its box or its place");
+  capture = SmallCapture();
+  capture.scene.box.radius.y = -1;
+  refuse(capture, "its box or its place");
+  capture = SmallCapture();
+  capture.scene.ndc = {1.5, 0};
+  refuse(capture, "its box or its place");
+}
+
 }  // namespace
 }  // namespace regrade

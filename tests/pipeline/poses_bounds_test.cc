@@ -62,6 +62,8 @@ TEST_F(PosesBounds, F64_DamageIsRefused) {
                                               {1, 0.5},
                                               {9, -3},
                                               {14, 0},
+                                              {14, 1e9},   // H134: no lens has it
+                                              {3, 1e300},  // at infinity
                                               {15, -1},
                                               {15, 30}}) {
     std::vector<double> row = Row();

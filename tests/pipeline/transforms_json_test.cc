@@ -120,6 +120,16 @@ TEST_F(TransformsJson, BlenderDialect) {
   EXPECT_EQ(file.frames[0].camera.cy, 300);
 }
 
+TEST_F(TransformsJson, H134_WhatNoCameraHas) {
+  EXPECT_NE(Refusal(OneFrame(R"("fl_x":1e9,"w":64,"h":48)")).find("focal length"),
+            std::string::npos);
+  EXPECT_NE(Refusal(OneFrame(R"("fl_x":60,"cx":-5,"w":64,"h":48)")).find("principal point"),
+            std::string::npos);
+  // Without a size nobody can tell.
+  const auto unknown = [](const std::string&, int* w, int* h) { *w = *h = 0; };
+  EXPECT_EQ(Read(OneFrame(R"("fl_x":1e9)"), unknown).frames.size(), 1u);
+}
+
 TEST_F(TransformsJson, MissingPicturesAreNamed) {
   const std::string frame = std::string(R"(","transform_matrix":)") + kUnit + "}";
   const TransformsFile file =

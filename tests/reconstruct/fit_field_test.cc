@@ -122,7 +122,7 @@ TEST_F(FitField, SameBytesForAnyThreadCount) {
 
 TEST_F(FitField, H109_H110_AResumedFitIsTheUndisturbedOne) {
   const FitResult straight = regrade::FitField(views_, box_, options_, {});
-  for (const int stop_after : {25, 60, 95}) {
+  for (const int stop_after : {25, 60, 95, 113}) {
     FitState saved;
     int steps = 0;
     FitHooks hooks;

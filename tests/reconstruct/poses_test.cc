@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 
@@ -146,6 +147,41 @@ TEST_F(Poses, F50_TimeLimit) {
 TEST_F(Poses, F50_IgnoredSigtermIsFollowedBySigkill) {
   options_.quiet_limit_min = 0.3 / 60;
   ExpectError("stubborn", ExitCode::kExternalProgram, {"printed nothing"});
+}
+
+TEST_F(Poses, F49_DeathByAnySignalIsNamed) {
+  for (const int number : {SIGHUP, SIGINT, SIGQUIT, SIGILL, SIGTRAP, SIGBUS, SIGFPE, SIGKILL,
+                           SIGSEGV, SIGPIPE, SIGALRM, SIGTERM, SIGXCPU, SIGXFSZ, SIGSYS}) {
+    fs::remove_all(folder_ / "work");
+    ExpectError("signal-" + std::to_string(number), ExitCode::kExternalProgram,
+                {"mapper", "signal " + std::to_string(number), "mapper.log"});
+  }
+}
+
+TEST_F(Poses, F50_AnEndlessFloodThatIgnoresSigtermEnds) {
+  options_.time_limit_min = 1.0 / 60;
+  ExpectError("endless", ExitCode::kExternalProgram, {"time limit"});
+  EXPECT_LT(fs::file_size(folder_ / "work/logs/mapper.log"), 17u << 20);
+}
+
+TEST_F(Poses, F50_GrandchildrenEndWithTheirParent) {
+  EXPECT_EQ(Run("grandchildren").views.size(), 10u);
+  pid_t grandchild = 0;
+  std::ifstream(folder_ / "work/grandchild") >> grandchild;
+  ASSERT_GT(grandchild, 1);
+  // It may stay a zombie until init takes it; alive it is no longer.
+  const std::string stat = "/proc/" + std::to_string(grandchild) + "/stat";
+  std::string number, name, state = "Z";
+  for (int i = 0; i < 100 && fs::exists(stat); ++i, usleep(10000)) {
+    std::ifstream(stat) >> number >> name >> state;
+    if (state == "Z") break;
+  }
+  EXPECT_EQ(state, "Z");
+}
+
+TEST_F(Poses, F52_AFloodBeforeTheModel) {
+  EXPECT_EQ(Run("flood-at-the-end").views.size(), 10u);
+  EXPECT_LT(fs::file_size(folder_ / "work/logs/mapper.log"), 17u << 20);
 }
 
 TEST_F(Poses, F50_AModelWrittenBeforeTheLimitIsUsed) {

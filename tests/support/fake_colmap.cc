@@ -105,6 +105,18 @@ int Map() {
   }
   if (Is("nothing")) return 0;
   if (Is("crash")) std::abort();
+  if (behaviour.rfind("signal-", 0) == 0) {
+    const int number = std::stoi(behaviour.substr(7));
+    std::signal(number, SIG_DFL);
+    raise(number);
+  }
+  if (Is("flood-at-the-end"))
+    for (int i = 0; i < 300000; ++i) std::printf("%0100d\n", i);
+  if (Is("endless")) {
+    // Never silent, never done, and not to be asked to go.
+    std::signal(SIGTERM, SIG_IGN);
+    while (true) std::printf("still working\n");
+  }
   std::vector<std::string> names;
   std::string features;
   std::ifstream database(arguments["database_path"]);
@@ -137,6 +149,11 @@ int Map() {
     options.images = static_cast<int>(names.size());
     Write(testing::MakeSyntheticModel(options), names, out + "/1");
     return 0;
+  }
+  if (Is("grandchildren") && fork() == 0) {
+    // Outlives its parent, holds the pipe open, and says who it is.
+    std::ofstream(arguments["output_path"] + "/../../grandchild") << getpid() << "\n";
+    HangForEver();
   }
   Write(testing::MakeSyntheticModel(options), names, out + "/0");
   if (Is("half"))
@@ -173,6 +190,8 @@ int main(int argc, char** argv) {
   }
   const char* platform = std::getenv("QT_QPA_PLATFORM");  // the real one's Qt aborts, too
   if (platform == nullptr || std::string(platform) != "offscreen") std::abort();
+  // The real one leaves logs in the system's folder for temporary files otherwise.
+  if (std::getenv("GLOG_logtostderr") == nullptr) std::abort();
   const std::vector<std::string> known = KnownOptions();
   for (int i = 2; i < argc; ++i) {
     const std::string name = argv[i];

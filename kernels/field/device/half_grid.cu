@@ -1,6 +1,5 @@
-#include "kernels/field/device/half_grid.h"
-
 #include "kernels/base/half.h"
+#include "kernels/field/device/half_grid.h"
 #include "kernels/field/device/launch.h"
 
 #if defined(__CUDACC__)
@@ -10,15 +9,9 @@
 namespace regrade {
 
 HalfGridView HalfGrid::view(const DeviceGrid& grid) const {
-  return {order,
-          grid.frame,
-          grid.view().last,
-          links.data(),
-          density_pairs.data(),
-          empty_distance.data(),
-          records.data(),
-          grid.background,
-          grid.near_clip};
+  return {order,          grid.frame,           grid.view().last,
+          links.data(),   density_pairs.data(), empty_distance.data(),
+          records.data(), grid.background,      grid.near_clip};
 }
 
 #if defined(__CUDACC__)
@@ -28,7 +21,9 @@ namespace {
 constexpr int kBasis = 9, kValues = 32;  // of a record in half precision
 constexpr uint8_t kOutside = 255;        // vertices that only fill up bricks: no cell is there
 
-__device__ uint32_t HalfDensity(float density) { return HalfFromFloat(fminf(density, kMaxHalf)); }
+__device__ uint32_t HalfDensity(float density) {
+  return HalfFromFloat(fminf(density, kMaxHalf));
+}
 
 __global__ void OrderByBricks(DeviceGridView grid, BrickOrder order, int32_t* marks,
                               uint32_t* density_pairs, uint8_t* empty_distance) {
@@ -80,16 +75,15 @@ HalfGrid MakeHalfGrid(const DeviceGrid& grid) {
   half.records =
       DeviceBuffer<uint16_t>(grid.num_voxels() * kValues, "voxels in half precision");
   DeviceBuffer<int32_t> marks(order.size, "marks of stored vertices");
-  OrderByBricks<<<BlocksFor(order.size), kThreads>>>(grid.view(), order, marks.data(),
-                                                     half.density_pairs.data(),
-                                                     half.empty_distance.data());
+  OrderByBricks<<<BlocksFor(order.size), kThreads>>>(
+      grid.view(), order, marks.data(), half.density_pairs.data(), half.empty_distance.data());
   CheckLaunch("order_by_bricks");
   size_t scratch_bytes = 0;
   cub::DeviceScan::ExclusiveSum(nullptr, scratch_bytes, marks.data(), half.links.data(),
                                 order.size);
   DeviceBuffer<uint8_t> scratch(static_cast<int64_t>(scratch_bytes), "scratch of a scan");
-  cub::DeviceScan::ExclusiveSum(scratch.data(), scratch_bytes, marks.data(),
-                                half.links.data(), order.size);
+  cub::DeviceScan::ExclusiveSum(scratch.data(), scratch_bytes, marks.data(), half.links.data(),
+                                order.size);
   CheckLaunch("scan");
   FillRecords<<<BlocksFor(order.size * kValues), kThreads>>>(
       grid.view(), order, marks.data(), half.links.data(), half.records.data());

@@ -24,8 +24,8 @@ struct HalfGridView {
 // Only of fields of degree 2; of others it stays empty, their records are small already.
 struct HalfGrid {
   BrickOrder order;
-  DeviceBuffer<int32_t> links;            // [order.size]: records, or -1
-  DeviceBuffer<uint8_t> empty_distance;   // [order.size]
+  DeviceBuffer<int32_t> links;           // [order.size]: records, or -1
+  DeviceBuffer<uint8_t> empty_distance;  // [order.size]
   // [order.size]: the density of a vertex in the low half, of its neighbour along z in the high
   // one; at most 65504 a world unit.
   DeviceBuffer<uint32_t> density_pairs;

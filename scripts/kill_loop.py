@@ -1,0 +1,395 @@
+#!/usr/bin/env python3
+"""Kills runs at random instants of every stage, starts them again until they are done, and compares what they made.
+
+  kill_loop.py REGRADE [--kills 1000] [--pose-kills 50] [--seed 0]      colmap for --pose-kills; about 3 s a kill on two cores
+
+Behind finished poses: a small synthetic capture is run once undisturbed in reproducible mode. Then copies of its poses
+are run, and killed with SIGKILL, SIGTERM or SIGINT a random time after a stage has begun, stage by stage, with one
+thread or two, until they are done. After each kill every file must be whole, and the next start must not redo a stage
+that had ended. The finished folder must hold the undisturbed run's fields, network and frames byte for byte, and its
+report but for times. COLMAP's own stage does not repeat: `regrade pose` is killed (SIGKILL hits it alone and leaves
+COLMAP behind), started again until done, and its model must have every photo and lie within 0.5 degrees and 1 % of the
+camera spread of the truth.
+
+  --control all   whether the supervisor can see anything: between two starts a checkpoint is exchanged for that of a
+                  run with another seed, a frame is cut short, the record of a finished stage is removed. Each must be
+                  caught. One bit of a checkpoint is changed, too: the program itself must see that, and come out with
+                  the same result. "short" is the first of these.
+
+Exit status 1 for any finding.
+"""
+
+import argparse
+import collections
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import zipfile
+
+from small_run import SMALL, STAGES, STYLE, different, make_capture, results
+
+SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
+CHECKPOINT_HEAD, HASH_DIGITS = b"regrade checkpoint 1\n", 16
+
+
+class Run:
+    """A started regrade whose events are read as they come."""
+
+    def __init__(self, command, group=True):
+        self.group, self.open, self.ended, self.began, self.done_before = group, None, [], [], []
+        self.changed = threading.Condition()
+        self.child = subprocess.Popen(command + ["--json"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
+                                      stdin=subprocess.DEVNULL, start_new_session=True)
+        self.reader = threading.Thread(target=self.read, daemon=True)
+        self.reader.start()
+
+    def read(self):
+        for line in self.child.stdout:
+            try:
+                event = json.loads(line)
+            except ValueError:
+                continue
+            with self.changed:
+                if event.get("event") == "stage_begin":
+                    self.open = event["stage"]
+                    self.began.append(self.open)
+                elif event.get("event") == "stage_end":
+                    self.ended.append(event["stage"])
+                    self.open = None
+                elif event.get("event") == "info" and event["text"].endswith(": done before"):
+                    self.done_before.append(event["text"].split(":")[0])
+                self.changed.notify_all()
+
+    def wait_for(self, stage):
+        """True once `stage` has begun; False if the run ended without."""
+        while self.child.poll() is None:
+            with self.changed:
+                if stage in self.began:
+                    return True
+                self.changed.wait(0.05)
+        return stage in self.began
+
+    def finish(self):
+        status = self.child.wait(timeout=600)
+        self.reader.join()
+        return status
+
+    def kill(self, number):
+        """Exit status; None if the program did not go within 60 s."""
+        try:
+            if self.group and number == signal.SIGKILL:
+                os.killpg(self.child.pid, number)
+            else:
+                self.child.send_signal(number)
+            status = self.child.wait(timeout=60)
+        except ProcessLookupError:
+            status = self.child.wait()
+        except subprocess.TimeoutExpired:
+            os.killpg(self.child.pid, signal.SIGKILL)
+            return None
+        self.reader.join(timeout=5)  # COLMAP, left behind, may hold the pipe
+        return status
+
+
+def torn_files(folder):
+    """Files under their final names that are not whole."""
+    torn = []
+    for place, _, names in os.walk(folder):
+        if os.sep + "work" in place[len(folder):]:
+            continue  # COLMAP's own, used by nobody after it has ended
+        for name in names:
+            path = os.path.join(place, name)
+            try:
+                if name.endswith(".npz"):
+                    with zipfile.ZipFile(path) as archive:
+                        whole = archive.testzip() is None
+                elif name.endswith(".png"):
+                    with open(path, "rb") as file:
+                        whole = file.read()[-8:-4] == b"IEND"
+                elif name.endswith(".json"):
+                    with open(path, encoding="utf-8") as file:
+                        whole = json.load(file) is not None
+                else:
+                    continue
+            except (ValueError, zipfile.BadZipFile):
+                whole = False
+            if not whole:
+                torn.append(os.path.relpath(path, folder))
+    return torn
+
+
+class Supervisor:
+    def __init__(self, regrade, scratch, seed):
+        self.regrade, self.scratch, self.random = regrade, scratch, random.Random(seed)
+        self.capture, self.work = os.path.join(scratch, "capture"), os.path.join(scratch, "work")
+        self.kills, self.findings = collections.Counter(), []
+        self.compared = self.starts = 0
+        self.posed_capture = make_capture(regrade, self.capture)
+
+    def command(self, threads=2, more=()):
+        return [self.regrade, "run", self.posed_capture, "--style", STYLE, "--out", self.work, *SMALL,
+                "--threads", str(threads), *more]
+
+    def pose_command(self):
+        return [self.regrade, "pose", os.path.join(self.capture, "images"), "--out", self.work, "--photo-size", "256"]
+
+    def complain(self, text):
+        self.findings.append(text)
+        print("FINDING: " + text, flush=True)
+
+    def fresh(self, begin=None):
+        shutil.rmtree(self.work, ignore_errors=True)
+        if begin:
+            shutil.copytree(begin, self.work)
+
+    def undisturbed(self):
+        """Runs once; learns the results and how long each stage takes."""
+        if Run([self.regrade, "pose", self.posed_capture, "--out", self.work, "--photo-size", "96"]).finish() != 0:
+            sys.exit("the undisturbed run's poses failed")
+        self.posed = shutil.copytree(self.work, os.path.join(self.scratch, "posed"))
+        run, self.duration, last = Run(self.command()), {}, time.monotonic()
+        for stage in STAGES[1:]:
+            if not run.wait_for(stage):
+                break
+            now = time.monotonic()
+            self.duration[stage], last = now - last, now
+        if run.finish() != 0:
+            sys.exit("the undisturbed run failed")
+        starts = [self.duration[stage] for stage in STAGES[1:]] + [time.monotonic() - last]
+        self.startup = starts[0]
+        self.duration = dict(zip(STAGES[1:], starts[1:]))
+        self.expected = results(self.work)
+        if not any(name.endswith("styled.npz") for name in self.expected):
+            sys.exit("the undisturbed run left no styled field")
+
+    def start(self, command, finished, group=True):
+        self.starts += 1
+        run = Run(command, group)
+        run.finished_before = list(finished)
+        return run
+
+    def judge(self, run, finished, killed_by=None):
+        """Checks a run that is over, and learns which stages have ended."""
+        for stage in run.finished_before:
+            if stage in run.began:
+                self.complain(f"{stage} had ended, and was done again")
+        finished += [stage for stage in run.ended if stage not in finished]
+        if killed_by is not None:
+            for name in torn_files(self.work):
+                self.complain(f"{name} is torn after {killed_by.name}")
+
+    def strike(self, command, finished, stage, delay, group=True):
+        """Starts, kills `delay` after `stage` began (None: after the start). Exit status."""
+        number = self.random.choice(SIGNALS)
+        run = self.start(command, finished, group)
+        if stage is None or run.wait_for(stage):
+            time.sleep(delay)
+            where = run.open or ("between two stages" if run.began else "the start")
+            status = run.kill(number)
+        else:
+            status = run.finish()
+        self.judge(run, finished, number)
+        if status == -number:
+            self.kills[where, number.name] += 1
+        elif status is None:
+            self.complain(f"not gone 60 s after {number.name} in {where}")
+        elif status != 0:
+            self.complain(f"exit status {status} after {number.name} in {where}")
+        return status
+
+    def total(self):
+        return sum(self.kills.values())
+
+    def compare(self, what):
+        changed = different(results(self.work), self.expected)
+        self.compared += 1
+        if changed:
+            self.complain(f"{what}: {len(changed)} results differ from the undisturbed run's: {changed[:4]}")
+
+    def complete(self, command, finished):
+        run = self.start(command, finished)
+        status = run.finish()
+        self.judge(run, finished)
+        if status != 0:
+            self.complain(f"the last start ended with exit status {status}")
+
+    def one_life(self, most):
+        """A copy of the poses, killed a few times in each stage, until it is done."""
+        self.fresh(self.posed)
+        finished, limit = ["pose"], self.total() + most
+        for stage in (None,) + STAGES[1:]:
+            length = self.startup if stage is None else self.duration[stage]
+            for _ in range(self.random.choice((0, 1, 2, 3))):
+                if self.total() >= limit or stage in finished:
+                    break
+                self.strike(self.command(self.random.choice((1, 2))), finished, stage,
+                            self.random.uniform(0, 1.1 * length))
+        self.complete(self.command(self.random.choice((1, 2))), finished)
+        self.compare("a killed run")
+
+    def pose_life(self, seconds, most, compare_poses):
+        """`regrade pose` from photos, killed a few times anywhere, until it is done."""
+        self.fresh()
+        for _ in range(self.random.randint(1, most)):
+            if self.strike(self.pose_command(), [], None, self.random.uniform(0, 1.1 * seconds), group=False) == 0:
+                break
+        self.complete(self.pose_command(), [])
+        self.check_poses(compare_poses)
+
+    def check_poses(self, compare_poses):
+        self.compared += 1
+        with open(os.path.join(self.work, ".regrade/stages/pose.json"), encoding="utf-8") as file:
+            figures = json.load(file)["figures"]
+        if figures["registered"] != 8:
+            self.complain(f"{figures['registered']} of 8 photos placed")
+        if not compare_poses:
+            return
+        done = subprocess.run([compare_poses, os.path.join(self.work, "poses/sparse"),
+                               os.path.join(self.capture, "truth/transforms.json"),
+                               os.path.join(self.capture, "images")], stdout=subprocess.PIPE, text=True)
+        worst = [float(line.split("largest")[1]) for line in done.stdout.splitlines() if "largest" in line]
+        if done.returncode != 0 or len(worst) != 2 or worst[0] > 0.5 or worst[1] > 1:
+            self.complain("poses after kills: " + " ".join(done.stdout.split()))
+
+    def pose_kills(self, kills, compare_poses):
+        self.fresh()
+        begin = time.monotonic()
+        self.complete(self.pose_command(), [])
+        seconds = time.monotonic() - begin
+        self.check_poses(compare_poses)
+        goal = self.total() + kills
+        while self.total() < goal:
+            self.pose_life(seconds, min(4, goal - self.total()), compare_poses)
+        deadline = time.monotonic() + 30
+        while time.monotonic() < deadline and self.left_behind():
+            time.sleep(0.5)
+        for line in self.left_behind():
+            self.complain("a process was left behind: " + line)
+
+    def left_behind(self):
+        found = []
+        for number in filter(str.isdigit, os.listdir("/proc")):
+            try:
+                with open(f"/proc/{number}/cmdline", "rb") as file:
+                    words = file.read().replace(b"\0", b" ").decode(errors="replace")
+            except OSError:
+                continue
+            if self.work in words and int(number) != os.getpid():
+                found.append(words.strip())
+        return found
+
+    def kill_in_fit(self, more=()):
+        """A run that was asked to stop half way through the fit; the path of its checkpoint."""
+        self.fresh(self.posed)
+        path = os.path.join(self.work, ".regrade/checkpoints/reconstruct")
+        for share in (0.5, 0.4, 0.3, 0.2, 0.1, 0.0):
+            run = Run(self.command(more=more))
+            if run.wait_for("reconstruct"):
+                time.sleep(share * self.duration["reconstruct"])
+            run.kill(signal.SIGTERM)
+            if os.path.isfile(path):
+                return path
+            self.fresh(self.posed)
+        sys.exit("no checkpoint after SIGTERM in the fit")
+
+    def caught(self, what, wanted, change):
+        """Changes something between two starts; the supervisor must complain, or must not."""
+        before, self.findings = self.findings, []
+        print(f"control: {what}; this {'must' if wanted else 'must not'} be found", flush=True)
+        change()
+        seen, self.findings = bool(self.findings), before
+        if seen != wanted:
+            self.complain(f"control: {what}: {'not caught' if wanted else 'was not healed'}")
+
+    def control(self, short):
+        def exchange():
+            other = self.kill_in_fit(("--seed", "1"))
+            with open(other, "rb") as file:
+                foreign = file.read()
+            mine = self.kill_in_fit()
+            with open(mine, "rb") as file:
+                head = file.read(len(CHECKPOINT_HEAD) + HASH_DIGITS)
+            with open(mine, "wb") as file:
+                file.write(head + foreign[len(head):])
+            self.complete(self.command(), ["pose"])
+            self.compare("with a foreign checkpoint")
+
+        def flip():
+            mine = self.kill_in_fit()
+            with open(mine, "r+b") as file:
+                file.seek(os.path.getsize(mine) // 2)
+                byte = file.read(1)
+                file.seek(-1, os.SEEK_CUR)
+                file.write(bytes([byte[0] ^ 1]))
+            self.complete(self.command(), ["pose"])
+            self.compare("with a changed checkpoint")
+
+        def cut():
+            self.fresh(self.posed)
+            self.complete(self.command(), ["pose"])
+            frame = os.path.join(self.work, "frames/styled/00001.png")
+            os.truncate(frame, os.path.getsize(frame) // 2)
+            for name in torn_files(self.work):
+                self.complain(f"{name} is torn")
+
+        def forget():
+            self.fresh(self.posed)
+            self.complete(self.command(), ["pose"])
+            os.remove(os.path.join(self.work, ".regrade/stages/render.json"))
+            self.complete(self.command(), list(STAGES))
+
+        self.caught("a checkpoint of another seed", True, exchange)
+        if short:
+            return
+        self.caught("one bit of a checkpoint", False, flip)
+        self.caught("a frame cut short", True, cut)
+        self.caught("a stage's record removed", True, forget)
+
+    def table(self):
+        print(f"{'killed in':20}" + "".join(f"{number.name:>9}" for number in SIGNALS))
+        for where in ("the start", *STAGES, "between two stages"):
+            counts = [self.kills[where, number.name] for number in SIGNALS]
+            if any(counts):
+                print(f"{where:20}" + "".join(f"{count:9}" for count in counts))
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("regrade")
+    parser.add_argument("--kills", type=int, default=1000, metavar="N", help="behind the poses (1000)")
+    parser.add_argument("--pose-kills", type=int, default=50, metavar="N", help="inside COLMAP's stage (50)")
+    parser.add_argument("--seed", type=int, default=0, help="draws stages, instants, signals and threads")
+    parser.add_argument("--compare-poses", metavar="PROGRAM", help="the test program compare_poses, for the tolerance")
+    parser.add_argument("--control", choices=("none", "short", "all"), default="none",
+                        help="see the supervisor catch what it must")
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as scratch:
+        supervisor = Supervisor(os.path.abspath(options.regrade), scratch, options.seed)
+        if options.control != "none" or options.kills:
+            supervisor.undisturbed()
+        if options.control != "none":
+            supervisor.control(options.control == "short")
+        begin = supervisor.total()
+        said = 0
+        while supervisor.total() - begin < options.kills:
+            supervisor.one_life(options.kills - supervisor.total() + begin)
+            if supervisor.total() // 100 > said:
+                said = supervisor.total() // 100
+                print(f"{supervisor.total()} kills, {supervisor.compared} results compared", flush=True)
+        if options.pose_kills:
+            supervisor.pose_kills(options.pose_kills, options.compare_poses)
+        supervisor.table()
+        print(f"{supervisor.total()} kills, {supervisor.starts} starts, {supervisor.compared} finished runs compared, "
+              f"{len(supervisor.findings)} findings")
+        return 1 if supervisor.findings else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

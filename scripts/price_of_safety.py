@@ -1,0 +1,90 @@
+#!/usr/bin/env python3
+"""What care costs a run: writing so that nothing is torn, checksums, checks of what is read, staged photos, fixed sums.
+
+  price_of_safety.py REGRADE --library LIBRARY --tool TOOL [--views 24] [--size 640x480] [--preset draft]
+                             [-- OPTION...]
+
+LIBRARY is libtimed_writes.so and TOOL validation_tool, both of the tests' build. A synthetic capture is run; then
+
+  durable writes   wall seconds inside of fsync and rename, timed by the preloaded library
+  checksums        CPU seconds of the same command again, which looks at every file of the run once, less those of
+                   `regrade --version`; a run itself computes each checksum once, when its stage ends
+  checks           of a field that is read (links, values, sizes), times the stages that read one, and of COLMAP's model
+  staging          CPU seconds of `regrade pose` from photos with poses: each is decoded, judged and written again
+  fixed sums       CPU seconds of the fit and the rest with --reproducible, against without
+
+as shares of the run's wall or CPU seconds. Wall seconds mean something on a quiet machine only. OPTIONs go to the runs.
+"""
+
+import argparse
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+
+from small_run import STYLE
+
+FIELD_READS = 6  # field.npz by reconstruct, stylize, render and evaluate, styled.npz by render and evaluate
+
+
+def measured(command, environment=None):
+    """(wall seconds, CPU seconds)"""
+    before, begin = resource.getrusage(resource.RUSAGE_CHILDREN), time.monotonic()
+    done = subprocess.run(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+                          env=dict(os.environ, **(environment or {})))
+    wall, after = time.monotonic() - begin, resource.getrusage(resource.RUSAGE_CHILDREN)
+    if done.returncode != 0:
+        sys.exit(f"{' '.join(command)}: exit status {done.returncode}: {done.stderr[-500:]}")
+    return wall, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def row(name, what, seconds, of, whole):
+    print(f"{name:16} {seconds:10.3f} s {100 * seconds / whole:8.2f} % of {of} {whole:.1f} s   {what}", flush=True)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("regrade")
+    parser.add_argument("--library", required=True)
+    parser.add_argument("--tool", required=True)
+    parser.add_argument("--views", default="24")
+    parser.add_argument("--size", default="640x480")
+    parser.add_argument("--preset", default="draft")
+    words = sys.argv[1:]
+    end = words.index("--") if "--" in words else len(words)
+    options, of_runs = parser.parse_args(words[:end]), words[end + 1:]
+    regrade = os.path.abspath(options.regrade)
+    with tempfile.TemporaryDirectory() as scratch:
+        capture, report = os.path.join(scratch, "capture"), os.path.join(scratch, "times")
+        measured([regrade, "synth", capture, "--scene", "table", "--views", options.views, "--size", options.size])
+
+        def run(out, *more):
+            return [regrade, "run", os.path.join(capture, "truth"), "--style", STYLE, "--out", os.path.join(scratch, out),
+                    "--preset", options.preset, "--device", "cpu", *of_runs, *more]
+
+        timed = {"LD_PRELOAD": os.path.abspath(options.library), "TIMED_WRITES_REPORT": report}
+        wall, cpu = measured(run("plain"), timed)
+        calls, seconds = {}, {}
+        with open(report, encoding="utf-8") as file:
+            for line in file:
+                name, count, spent = line.split()
+                calls[name] = calls.get(name, 0) + int(count)
+                seconds[name] = seconds.get(name, 0) + float(spent)
+        row("durable writes", f"{calls['fsync']} fsync, {calls['rename']} rename", sum(seconds.values()), "wall", wall)
+        again, start = measured(run("plain"))[1], measured([regrade, "--version"])[1]
+        row("checksums", "every file of the run once", max(0, again - start), "CPU", cpu)
+        figures = dict(line.split() for line in subprocess.run(
+            [options.tool, os.path.join(scratch, "plain/field.npz"), os.path.join(scratch, "plain/poses/sparse")],
+            check=True, stdout=subprocess.PIPE, text=True).stdout.splitlines())
+        row("checks", f"{figures['checks']} s a field; COLMAP's model read in {figures['model']} s",
+            FIELD_READS * float(figures["checks"]) + float(figures["model"]), "CPU", cpu)
+        pose = measured([regrade, "pose", os.path.join(capture, "truth"), "--out", os.path.join(scratch, "posed")])[1]
+        row("staging", f"{options.views} photos", max(0, pose - start), "CPU", cpu)
+        fixed = measured(run("fixed", "--reproducible"))[1]
+        row("fixed sums", "--reproducible, against without", fixed - cpu, "CPU", cpu)
+
+
+if __name__ == "__main__":
+    main()

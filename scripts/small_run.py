@@ -1,0 +1,58 @@
+"""The small run that scripts disturb: a synthetic capture, options that make it take seconds, and what it leaves."""
+
+import hashlib
+import json
+import os
+import subprocess
+
+SMALL = ["--photo-size", "96", "--fit-resolutions", "24,32", "--fit-steps", "60,60", "--fit-rays", "1024",
+         "--style-steps", "20", "--style-rays", "512", "--path-frames", "4", "--preset", "draft", "--reproducible",
+         "--holdout", "0"]
+STAGES = ("pose", "reconstruct", "style_2d", "stylize", "render", "evaluate", "report")
+STYLE = os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "assets", "style_sunset.png")
+TIMES = {"seconds", "frames_per_second", "peak_memory_mb"}  # of the report
+
+
+def make_capture(regrade, folder):
+    """Eight photos in FOLDER/images; the folder that also has their true poses, so that no COLMAP is needed."""
+    subprocess.run([regrade, "synth", folder, "--scene", "table", "--views", "8", "--size", "256x192"], check=True,
+                   stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    return os.path.join(folder, "truth")
+
+
+def call(command, **more):
+    """(exit status, what was said)"""
+    done = subprocess.run(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
+                          text=True, errors="replace", timeout=600, **more)
+    return done.returncode, done.stderr.strip()
+
+
+def leaves(value, name=""):
+    """path -> value of each figure that is no time."""
+    if not isinstance(value, (dict, list)):
+        return {name: value}
+    found = {}
+    for key, member in value.items() if isinstance(value, dict) else enumerate(value):
+        if key not in TIMES and not (name == "report.json" and key in ("command", "threads")):
+            found.update(leaves(member, f"{name}.{key}"))
+    return found
+
+
+def results(folder):
+    """name -> digest of every field, network and frame, and each figure of the report."""
+    found = {}
+    for place, _, names in os.walk(folder):
+        relative = os.path.relpath(place, folder)
+        for name in names:
+            path = os.path.join(place, name)
+            if relative == "." and name == "report.json":
+                with open(path, encoding="utf-8") as file:
+                    found.update(leaves(json.load(file), name))
+            elif name.endswith(".npz") or relative.split(os.sep)[0] in ("frames", "views_2d"):
+                with open(path, "rb") as file:
+                    found[os.path.normpath(os.path.join(relative, name))] = hashlib.sha256(file.read()).hexdigest()
+    return found
+
+
+def different(now, expected):
+    return sorted(name for name in set(now) | set(expected) if now.get(name) != expected.get(name))

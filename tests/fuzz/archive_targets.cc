@@ -1,0 +1,87 @@
+// Archives and arrays: zip's directory, whole .npz files, the header of .npy.
+#include <cstring>
+
+#include "pipeline/files/npz_file.h"
+#include "pipeline/files/zip_directory.h"
+#include "tests/fuzz/fuzz_support.h"
+#include "tests/fuzz/mutate.h"
+#include "tests/fuzz/stored_zip.h"
+
+namespace regrade::testing {
+namespace {
+
+constexpr uint64_t kBudget = 4 << 20;
+
+std::string SmallArchive() {
+  static const float values[6] = {1, 2, 3, 4, 5, 6};
+  static const std::vector<int32_t> ramp(1000, 7);
+  NpzWriter writer;
+  writer.Add("values", {2, 3}, values);
+  writer.Add("ramp", {1000}, ramp.data(), NpzPacking::kDeflate);
+  writer.AddScalar<double>("pi", 3.25);
+  writer.AddText("note", "h\xc3\xa9llo");
+  return writer.Bytes();
+}
+
+// The second is not packed: mutants of what is inside keep right checksums.
+std::vector<std::string> ArchiveSeeds() {
+  const std::string archive = SmallArchive();
+  return {archive, StoredCopyOfNpz(FuzzFile("seed.npz", archive))};
+}
+
+bool ReadDirectory(std::string_view bytes) {
+  return Accepts([bytes] {
+    const ReadAt read_at = [bytes](uint64_t offset, void* to, size_t size) {
+      FuzzRequire(offset <= bytes.size() && size <= bytes.size() - offset,
+                  "only what is there is read");
+      std::memcpy(to, bytes.data() + offset, size);
+    };
+    uint64_t packed = 0;
+    for (const ZipMember& member : ReadZipDirectory(bytes.size(), read_at, "fuzz.zip")) {
+      FuzzRequire(member.data_offset <= bytes.size() &&
+                      member.compressed_bytes <= bytes.size() - member.data_offset,
+                  "members lie inside of the file");
+      FuzzRequire(member.bytes / 1032 <= member.compressed_bytes, "no bomb");
+      packed += member.compressed_bytes;
+    }
+    FuzzRequire(packed <= bytes.size(), "no two members share a byte");
+  });
+}
+
+bool ReadArrays(std::string_view bytes) {
+  const std::string path = FuzzFile("a.npz", bytes);
+  return Accepts([&path] {
+    NpzReader reader(path, kBudget);
+    for (const std::string& name : reader.names()) {
+      const NpzArray array = reader.Read(name);
+      FuzzRequire(array.bytes.size() == array.num_elements() * SizeOf(array.type),
+                  "a shape has its bytes");
+    }
+  });
+}
+
+std::vector<std::string> HeaderSeeds() {
+  return {MakeNpyHeader(ArrayType::kF32, {3, 4}), MakeNpyHeader(ArrayType::kU8, {}),
+          MakeNpyHeader(ArrayType::kF64, {20, 17})};
+}
+
+bool ReadHeader(std::string_view bytes) {
+  return Accepts([bytes] {
+    const NpyHeader header = ParseNpyHeader(bytes, "fuzz.npy");
+    FuzzRequire(header.data_offset <= bytes.size(), "the data begins inside of the file");
+    FuzzRequire(header.shape.size() <= 8, "no more than 8 axes");
+    const NpyHeader again = ParseNpyHeader(MakeNpyHeader(header.type, header.shape), "again");
+    FuzzRequire(again.shape == header.shape && again.data_bytes == header.data_bytes,
+                "a round trip keeps type and shape");
+  });
+}
+
+}  // namespace
+
+std::vector<FuzzTarget> ArchiveTargets() {
+  return {{"zip_directory", ArchiveSeeds, ReadDirectory, MutateNpz, 50000},
+          {"npz", ArchiveSeeds, ReadArrays, MutateNpz},
+          {"npy_header", HeaderSeeds, ReadHeader, MutateNpy, 50000}};
+}
+
+}  // namespace regrade::testing

@@ -1,0 +1,88 @@
+// field.npz and a packed capture as wholes, and a look through what was accepted.
+#include <cmath>
+
+#include "kernels/field/render.h"
+#include "pipeline/field_file.h"
+#include "pipeline/packed_capture.h"
+#include "tests/fuzz/fuzz_support.h"
+#include "tests/fuzz/stored_zip.h"
+#include "tests/support/small_field.h"
+
+namespace regrade::testing {
+namespace {
+
+constexpr uint64_t kBudget = 4 << 20;
+
+std::string StoredField(bool spheres, bool ndc) {
+  regrade::StoredField stored;
+  stored.field = RandomField({4, 3, 5}, spheres ? 1 : 4, 0.6, 3);
+  if (spheres) AddSpheres(3, 4, 0.7, 4, &stored.field);
+  if (ndc) stored.ndc = {1.5, 2};
+  const std::string path = FuzzFolder() + "/seed_field.npz";
+  WriteFieldFile(path, stored);
+  return StoredCopyOfNpz(path);
+}
+
+std::vector<std::string> FieldSeeds() {
+  return {StoredField(false, false), StoredField(true, false), StoredField(false, true)};
+}
+
+bool ReadField(std::string_view bytes) {
+  const std::string path = FuzzFile("field.npz", bytes);
+  return Accepts([&path] {
+    const regrade::StoredField stored = ReadFieldFile(path, kBudget);
+    const Similarity& placement = stored.field_from_world;
+    bool finite = std::isfinite(placement.scale) && placement.scale > 0;
+    for (int i = 0; i < 3; ++i) {
+      finite = finite && std::isfinite(placement.translation[i]);
+      for (int j = 0; j < 3; ++j) finite = finite && std::isfinite(placement.rotation(i, j));
+    }
+    FuzzRequire(finite, "its place in the world is finite");
+    Camera camera;
+    camera.width = 4, camera.height = 3;
+    camera.fx = camera.fy = 4, camera.cx = 2, camera.cy = 1.5;
+    const Vec3f center = stored.field.geometry->frame.center,
+                radius = stored.field.geometry->frame.radius;
+    camera.camera_from_world.translation = {-center.x, -center.y, 2.0 * radius.z - center.z};
+    const RenderedView view = RenderView(stored.field, camera, {stored.field.step, 1e-3f});
+    for (const float value : view.color.pixels)
+      FuzzRequire(value >= 0 && value <= 1, "its colours are in [0, 1]");
+  });
+}
+
+std::vector<std::string> PackedSeeds() {
+  PackedCapture capture;
+  capture.scene.ndc = {1.5, 2};
+  for (int i = 0; i < 2; ++i) {
+    PackedView view;
+    view.file = "photo " + std::to_string(i) + ".jpg";
+    view.held_out = i == 1;
+    view.camera.width = 6 + i, view.camera.height = 5;
+    view.camera.fx = view.camera.fy = 7, view.camera.cx = 3, view.camera.cy = 2.5;
+    view.photo = Image(6 + i, 5, 3);
+    capture.views.push_back(view);
+  }
+  const std::string path = FuzzFolder() + "/seed_packed.npz";
+  WritePackedCapture(path, capture);
+  return {StoredCopyOfNpz(path)};
+}
+
+bool ReadPacked(std::string_view bytes) {
+  const std::string path = FuzzFile("packed.npz", bytes);
+  return Accepts([&path] {
+    for (const PackedView& view : ReadPackedCapture(path).views)
+      FuzzRequire(view.camera.width == view.photo.width &&
+                      view.camera.height == view.photo.height && view.camera.fx > 0 &&
+                      std::isfinite(view.camera.camera_from_world.translation.x),
+                  "a view's camera is that of its photo");
+  });
+}
+
+}  // namespace
+
+std::vector<FuzzTarget> FieldTargets() {
+  return {{"field_npz", FieldSeeds, ReadField, MutateNpz, 5000},
+          {"packed_npz", PackedSeeds, ReadPacked, MutateNpz, 10000}};
+}
+
+}  // namespace regrade::testing

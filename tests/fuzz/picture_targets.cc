@@ -1,0 +1,140 @@
+// What pictures are told by, before a decoder sees them, and words drawn into pictures.
+#include <zlib.h>
+
+#include <cmath>
+
+#include "pipeline/files/image_file.h"
+#include "pipeline/files/image_format.h"
+#include "pipeline/files/picture_text.h"
+#include "pipeline/files/png_chunks.h"
+#include "tests/fuzz/fuzz_support.h"
+#include "tests/fuzz/mutate.h"
+
+namespace regrade::testing {
+namespace {
+
+Image Waves(int width, int height) {
+  Image image(width, height, 3);
+  for (size_t i = 0; i < image.pixels.size(); ++i)
+    image.pixels[i] = 0.5f + 0.5f * std::sin(0.3f * static_cast<float>(i));
+  return image;
+}
+
+// --- the format, by the first bytes
+
+std::vector<std::string> FormatSeeds() {
+  using std::string_literals::operator""s;
+  return {"\xff\xd8\xff\xe0"s, "\x89PNG\r\n\x1a\n"s,
+          "\0\0\0\x18"
+          "ftypheic"s,
+          // A TIFF directory of two entries, the second DNG's version.
+          "II*\0\x08\0\0\0\x02\0\0\x01\x03\0\1\0\0\0\x40\0\0\0\x12\xc6\1\0\4\0\0\0\1\4\0\0"s,
+          "MM\0*\0\0\0\x08\0\1\x01\0\0\3\0\0\0\1\0\x40\0\0"s};
+}
+
+bool ReadFormat(std::string_view bytes) {
+  // A copy of its own size: reading beyond it is seen.
+  const std::vector<char> own(bytes.begin(), bytes.end());
+  const ImageFormat* format = nullptr;
+  for (const char* name : {"a.jpg", "a.nef"})
+    format = SniffImageFormat({own.data(), own.size()}, name);
+  if (format == nullptr) return false;
+  FuzzRequire(format->name[0] != '\0', "a format has a name");
+  return true;
+}
+
+std::string Mutate(std::string bytes, FuzzRandom* random) {
+  return MutateBytes(std::move(bytes), random);
+}
+
+// --- PNG's chunks
+
+constexpr size_t kSignature = 8;
+
+std::vector<std::string> PngSeeds() {
+  return {EncodePng8(Waves(8, 6)), EncodePng16(Waves(3, 2))};
+}
+
+bool ReadChunks(std::string_view bytes) {
+  if (bytes.size() < kSignature) return false;
+  const std::vector<char> own(bytes.begin(), bytes.end());
+  return FindPngDamage({own.data(), own.size()}).empty();
+}
+
+// Puts the checksums of all chunks right, as far as their lengths lead.
+std::string MutatePng(std::string bytes, FuzzRandom* random) {
+  bytes = MutateBytes(std::move(bytes), random);
+  if (random->Chance(0.3)) return bytes;
+  const auto big = [&bytes](size_t at) {
+    size_t value = 0;
+    for (size_t i = 0; i < 4; ++i)
+      value = value << 8 | static_cast<unsigned char>(bytes[at + i]);
+    return value;
+  };
+  for (size_t at = kSignature; at + 12 <= bytes.size() && big(at) <= bytes.size() - at - 12;
+       at += 12 + big(at)) {
+    uLong crc = crc32(0, reinterpret_cast<const Bytef*>(&bytes[at + 4]),
+                      static_cast<uInt>(4 + big(at)));
+    for (size_t i = 4; i-- > 0; crc >>= 8)
+      bytes[at + 8 + big(at) + i] = static_cast<char>(crc & 255);
+  }
+  return bytes;
+}
+
+// --- whole pictures: our rules round the decoders' work
+
+std::vector<std::string> PhotoSeeds() {
+  return {EncodePng8(Waves(12, 9)), EncodeJpeg(Waves(16, 16), 90), EncodePng16(Waves(5, 7))};
+}
+
+bool ReadPhoto(std::string_view bytes) {
+  // JPEG and PNG alone: what phones and renderers write.
+  if (bytes.substr(0, 3) != "\xff\xd8\xff" && bytes.substr(0, 8) != "\x89PNG\r\n\x1a\n")
+    return false;
+  const std::string path = FuzzFile("photo", bytes);
+  return Accepts([&path] {
+    const DecodedPhoto photo = DecodePhoto(path, {.max_pixels = 1 << 20, .min_side = 1});
+    FuzzRequire(photo.image.channels == 3 || photo.image.channels == 4, "RGB, or with alpha");
+    FuzzRequire(photo.image.num_pixels() <= 1 << 20, "no larger than the limit");
+    for (const float value : photo.image.pixels)
+      FuzzRequire(value >= 0 && value <= 1, "values in [0, 1]");
+  });
+}
+
+std::string MutatePhoto(std::string bytes, FuzzRandom* random) {
+  return bytes[0] == '\x89' ? MutatePng(std::move(bytes), random)
+                            : MutateBytes(std::move(bytes), random);
+}
+
+// --- words in pictures: four numbers, then the text
+
+std::vector<std::string> TextSeeds() {
+  return {std::string("\x02\0\x05\0\x28\0\x03", 7) + "source gap 1",
+          std::string(8, '\0') + "x"};
+}
+
+bool Draw(std::string_view bytes) {
+  if (bytes.size() < 7) return false;
+  const auto number = [bytes](size_t at) {
+    return static_cast<int16_t>(static_cast<unsigned char>(bytes[at]) |
+                                static_cast<unsigned char>(bytes[at + 1]) << 8);
+  };
+  Image picture(60, 40, 3);
+  const double size = 0.25 * (1 + static_cast<unsigned char>(bytes[6]) % 16);
+  DrawText(&picture, number(0), number(2), std::max<int>(0, number(4)),
+           std::string(bytes.substr(7, 200)), size, 1);
+  for (const float value : picture.pixels)
+    FuzzRequire(value >= 0 && value <= 1, "a picture stays a picture");
+  return true;
+}
+
+}  // namespace
+
+std::vector<FuzzTarget> PictureTargets() {
+  return {{"image_format", FormatSeeds, ReadFormat, Mutate, 100000},
+          {"png_chunks", PngSeeds, ReadChunks, MutatePng, 100000},
+          {"photo", PhotoSeeds, ReadPhoto, MutatePhoto, 6000},
+          {"picture_text", TextSeeds, Draw, Mutate, 8000}};
+}
+
+}  // namespace regrade::testing

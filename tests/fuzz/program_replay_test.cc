@@ -1,0 +1,12 @@
+// What the program reads besides: its own records and states, JSON with a meaning, command
+// lines.
+#include "tests/fuzz/replay.h"
+
+namespace regrade::testing {
+namespace {
+
+INSTANTIATE_TEST_SUITE_P(Program, FuzzReplay, ::testing::ValuesIn(ProgramTargets()),
+                         [](const auto& info) { return std::string(info.param.name); });
+
+}  // namespace
+}  // namespace regrade::testing

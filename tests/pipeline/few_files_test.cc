@@ -1,0 +1,47 @@
+// Where the machine has no file descriptor left, nothing is said about the files: they are not
+// gone, and not damaged.
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include "pipeline/files/atomic_file.h"
+#include "pipeline/files/npz_file.h"
+#include "pipeline/folder_listing.h"
+#include "pipeline/stage_record.h"
+#include "tests/support/expect_error.h"
+#include "tests/support/temporary_folder.h"
+
+namespace regrade {
+namespace {
+
+// No further file can be opened while it lives.
+class NoFilesLeft {
+ public:
+  NoFilesLeft() {
+    ::getrlimit(RLIMIT_NOFILE, &before_);
+    const rlimit none{3, before_.rlim_max};
+    ::setrlimit(RLIMIT_NOFILE, &none);
+  }
+  ~NoFilesLeft() { ::setrlimit(RLIMIT_NOFILE, &before_); }
+
+ private:
+  rlimit before_;
+};
+
+TEST(FewFiles, F25_TheLimitIsNamedAndTheFilesAreNotBlamed) {
+  const testing::TemporaryFolder folder;
+  testing::WriteText(folder / "photos/a.png", "x");
+  testing::WriteText(folder / "a.npz", "x");
+  NpzWriter writer;
+  writer.AddScalar<int32_t>("one", 1);
+  writer.WriteTo(folder / "one.npz");
+  EXPECT_EQ(ListFolder(folder / "photos").files.size(), 1u);
+  const NoFilesLeft none;
+  const char* reason = "Too many open files";
+  EXPECT_REGRADE_ERROR(ListFolder(folder / "photos"), ExitCode::kResources, reason);
+  EXPECT_REGRADE_ERROR(ReadWholeFile(folder / "a.npz", 100), ExitCode::kResources, reason);
+  EXPECT_REGRADE_ERROR(NpzReader(folder / "one.npz", 100), ExitCode::kResources, reason);
+  EXPECT_REGRADE_ERROR(WriteFileAtomically(folder / "b", "x"), ExitCode::kResources, reason);
+}
+
+}  // namespace
+}  // namespace regrade

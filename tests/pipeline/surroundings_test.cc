@@ -1,0 +1,101 @@
+// The built program in odd surroundings: no home, no folder for temporary files, a clock that
+// jumps, a working folder that is gone, no GPU.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "kernels/base/device_memory.h"
+#include "pipeline/device_choice.h"
+#include "tests/support/expect_error.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/support/tiny_run.h"
+
+namespace regrade {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::ProgramOutcome;
+using testing::ReadText;
+using testing::RunProgram;
+using testing::TemporaryFolder;
+
+// A program, started by another one that changes its surroundings.
+ProgramOutcome RunIn(const std::vector<std::string>& words) {
+  return RunProgram(words[0], {words.begin() + 1, words.end()});
+}
+
+std::string Synthetic(const TemporaryFolder& folder) {
+  const std::string capture = folder / "capture";
+  EXPECT_EQ(
+      RunProgram(REGRADE_PROGRAM, {"synth", capture, "--views", "5", "--size", "96x72"}).code,
+      0);
+  return capture + "/truth";  // the photos with their poses
+}
+
+TEST(Surroundings, F23_WithoutHomeAndTemporaryFolder) {
+  const TemporaryFolder folder;
+  const std::string capture = Synthetic(folder);
+  const ProgramOutcome outcome =
+      RunIn({"/usr/bin/env", "-i", "TMPDIR=/nowhere", REGRADE_PROGRAM, "pose", capture, "--out",
+             folder / "out"});
+  EXPECT_EQ(outcome.code, 0) << outcome.text;
+  EXPECT_TRUE(fs::exists(folder / "out/poses/photos.json"));
+}
+
+TEST(Surroundings, F26_AClockThatJumpsChangesNothing) {
+  const TemporaryFolder folder;
+  const std::string capture = Synthetic(folder);
+  EXPECT_EQ(RunProgram(REGRADE_PROGRAM, {"pose", capture, "--out", folder / "plain"}).code, 0);
+  const std::string clock = std::string("LD_PRELOAD=") + ODD_CLOCK;
+  for (const char* when : {"fresh", "again"}) {
+    const ProgramOutcome outcome = RunIn({"/usr/bin/env", clock, REGRADE_PROGRAM, "pose",
+                                          capture, "--out", folder / "odd", "--json"});
+    EXPECT_EQ(outcome.code, 0) << outcome.text;
+    // What is done is known by its content, not by its date; and no duration is of that clock.
+    EXPECT_EQ(outcome.text.find("done before") != std::string::npos, when[0] == 'a')
+        << outcome.text;
+    EXPECT_EQ(outcome.text.find("86400"), std::string::npos) << outcome.text;
+  }
+  EXPECT_EQ(ReadText(folder / "odd/poses/photos.json"),
+            ReadText(folder / "plain/poses/photos.json"));
+  EXPECT_EQ(ReadText(folder / "odd/poses/sparse/images.bin"),
+            ReadText(folder / "plain/poses/sparse/images.bin"));
+}
+
+TEST(Surroundings, F27_AWorkingFolderThatIsGone) {
+  const TemporaryFolder folder;
+  const std::string capture = Synthetic(folder), gone = folder / "gone";
+  const std::string leave = "mkdir \"$1\" && cd \"$1\" && rmdir \"$1\" && shift && exec \"$@\"";
+  const auto run_gone = [&](const std::string& out) {
+    return RunIn(
+        {"/bin/sh", "-c", leave, "sh", gone, REGRADE_PROGRAM, "pose", capture, "--out", out});
+  };
+  const ProgramOutcome relative = run_gone("out");
+  EXPECT_EQ(relative.code, 5) << relative.text;
+  EXPECT_NE(relative.text.find("the working folder is gone"), std::string::npos)
+      << relative.text;
+  EXPECT_EQ(run_gone(folder / "out").code, 0);
+}
+
+TEST(Surroundings, F27_RelativePathsAndBlanks) {
+  const TemporaryFolder folder;
+  Synthetic(folder);
+  fs::rename(folder / "capture", folder / "a capture");
+  const std::string go = "cd \"$1\" && shift && exec \"$@\"";
+  const ProgramOutcome outcome =
+      RunIn({"/bin/sh", "-c", go, "sh", folder.path(), REGRADE_PROGRAM, "pose",
+             "./a capture/truth", "--out", "an out/../an out"});
+  EXPECT_EQ(outcome.code, 0) << outcome.text;
+  EXPECT_TRUE(fs::exists(folder / "an out/poses/photos.json"));
+}
+
+TEST(Surroundings, F77_NoGpu) {
+  EXPECT_REGRADE_ERROR(ChooseBackend("cuda", true), ExitCode::kUsage, "--reproducible");
+  EXPECT_EQ(ChooseBackend("cpu", false), Backend::kCpu);
+  if (ReadDeviceStatus().found) GTEST_SKIP() << "there is one";
+  EXPECT_EQ(ChooseBackend("auto", false), Backend::kCpu);
+  EXPECT_REGRADE_ERROR(ChooseBackend("cuda", false), ExitCode::kResources, "--device");
+}
+
+}  // namespace
+}  // namespace regrade
