@@ -5,6 +5,8 @@
 namespace regrade::testing {
 namespace {
 
+TEST_P(FuzzReplay, SeedsFindsAndMutants) { ReadSeedsFindsAndMutants(); }
+
 INSTANTIATE_TEST_SUITE_P(Program, FuzzReplay, ::testing::ValuesIn(ProgramTargets()),
                          [](const auto& info) { return std::string(info.param.name); });
 

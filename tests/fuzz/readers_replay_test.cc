@@ -4,6 +4,8 @@
 namespace regrade::testing {
 namespace {
 
+TEST_P(FuzzReplay, SeedsFindsAndMutants) { ReadSeedsFindsAndMutants(); }
+
 INSTANTIATE_TEST_SUITE_P(Readers, FuzzReplay, ::testing::ValuesIn(ReaderTargets()),
                          [](const auto& info) { return std::string(info.param.name); });
 

@@ -5,9 +5,7 @@
 #include <gtest/gtest.h>
 #include <omp.h>
 
-#include <algorithm>
 #include <chrono>
-#include <filesystem>
 
 #include "tests/fuzz/fuzz_support.h"
 #include "tests/fuzz/fuzz_target.h"
@@ -44,38 +42,8 @@ class FuzzReplay : public ::testing::TestWithParam<FuzzTarget> {
     EXPECT_LT(took.count(), kLongest) << name << "\n" << Hex(bytes);
     return accepted;
   }
+  // The body of the test that each program of targets has.
+  void ReadSeedsFindsAndMutants();
 };
-
-TEST_P(FuzzReplay, SeedsFindsAndMutants) {
-  const FuzzTarget& target = GetParam();
-  std::vector<std::string> kept = target.seeds();
-  const size_t seeds = kept.size();
-  for (size_t i = 0; i < seeds; ++i)
-    EXPECT_TRUE(Read(kept[i], "seed " + std::to_string(i))) << "a good input was refused";
-
-  const std::filesystem::path finds =
-      std::filesystem::path(REGRADE_SOURCE_DIR) / "tests/fuzz/found" / target.name;
-  if (std::filesystem::is_directory(finds))
-    for (const auto& entry : std::filesystem::directory_iterator(finds))
-      Read(FromHex(ReadText(entry.path())), entry.path().filename());
-
-  int accepted = 0;
-  for (int i = 0; i < target.mutants && !HasFailure(); ++i) {
-    FuzzRandom random(static_cast<uint64_t>(i));
-    const std::string& base = kept[random.Below(random.Chance(0.5) ? seeds : kept.size())];
-    std::string mutant = target.mutate(base, &random);
-    if (!Read(mutant, "mutant " + std::to_string(i))) continue;
-    ++accepted;
-    if (kept.size() < seeds + kKept)
-      kept.push_back(std::move(mutant));
-    else
-      kept[seeds + random.Below(kKept)] = std::move(mutant);
-  }
-  // Mutants that are all refused would show the reader's first line only.
-  EXPECT_GT(accepted, target.mutants / 100) << "of " << target.mutants;
-#if !defined(__SANITIZE_ADDRESS__)
-  EXPECT_LT(PeakMemory(), kMostMemory);
-#endif
-}
 
 }  // namespace regrade::testing
