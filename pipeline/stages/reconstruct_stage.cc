@@ -8,6 +8,7 @@
 
 #include "kernels/base/device_memory.h"
 #include "pipeline/capture_store.h"
+#include "pipeline/cpu_time.h"
 #include "pipeline/device_choice.h"
 #include "pipeline/field_file.h"
 #include "pipeline/fit_checkpoint.h"
@@ -154,10 +155,13 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
       *std::find_if(profile.effects.begin(), profile.effects.end(),
                     [](const EffectReport& effect) { return effect.name == kViewDependence; });
   const ProgressFunction trial = parts.Next(kTrial);
+  const double trial_begin = context->console->StageSeconds(), trial_cpu_begin = CpuSeconds();
   view_dependence =
       resume ? EffectsOfRecord(ParseJson(measured, "checkpoint")).at(0)
              : ProfileViewDependence(settings, options, views, scene.box, trial, backend);
   measured = DumpJson(EffectsRecord({view_dependence}), -1);
+  const double trial_seconds = context->console->StageSeconds() - trial_begin,
+               trial_cpu_seconds = CpuSeconds() - trial_cpu_begin;
   context->console->Info(EffectLine(view_dependence));
   if (!view_dependence.on) options.sh_degree = 0;
   hooks.progress = parts.Next(1);
@@ -169,6 +173,10 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   outcome.figures["effects"] = EffectsRecord(profile.effects);
   if (!profile.gains.of_view.empty())
     outcome.figures["exposure"] = GainsRecord(capture, profile.exposure, profile.gains);
+  if (!resume && view_dependence.value.value) {  // what a prediction needs to know apart
+    outcome.figures["trial_seconds"] = trial_seconds;
+    outcome.figures["trial_cpu_seconds"] = trial_cpu_seconds;
+  }
   outcome.figures["device"] = DeviceName(backend);
   outcome.figures["finest_grid"] = Finest(options);
   outcome.figures["rays"] = fit.rays;

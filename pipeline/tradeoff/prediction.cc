@@ -4,7 +4,9 @@
 #include <cmath>
 
 #include "kernels/base/error.h"
+#include "pipeline/scene_profile.h"
 #include "pipeline/scene_views.h"
+#include "reconstruct/choose_degree.h"
 
 namespace regrade {
 namespace {
@@ -103,6 +105,12 @@ double AmountOf(const std::string& unit, const RunSettings& settings, const Capt
     return sum;
   }
   if (unit == "photo pixels") return pixels;
+  if (unit == "trials") {
+    const int fitted =
+        static_cast<int>(ViewIndices(capture, settings.run.holdout, false).size());
+    return settings.fit.sh_degree > 0 && fitted >= kLeastTrialViews &&
+           settings.run.effects.find(kViewDependence) == std::string::npos;
+  }
   if (unit == "staged pixels") {
     double sum = 0;
     for (const CaptureView& view : capture.views)
@@ -160,11 +168,20 @@ std::vector<PriceTerm> LearnPrices(const RunSettings& base, const Capture& captu
     if (stage.stage == std::string("reconstruct") && record) {
       const double amount = AmountOf("staged pixels", base, capture);
       const Observation own = ObservationOf(stage, base, capture, 0, 0);
-      const auto beside = [&](double whole, double factor) {
-        return amount > 0 ? std::max(0.0, whole - factor * own.amounts[0]) / amount : 0;
+      const auto figure = [&record](const char* name) {
+        const JsonValue* value = record->figures.Find(name);
+        return value != nullptr && value->IsNumber() ? value->AsDouble() : 0;
       };
-      prices.push_back({stage.stage, "staged pixels", beside(record->seconds, seconds[0]),
-                        beside(record->cpu_seconds.value_or(record->seconds), cpu[0])});
+      const PriceTerm trial{stage.stage, "trials", figure("trial_seconds"),
+                            figure("trial_cpu_seconds")};
+      const auto beside = [&](double whole, double factor, double of_trial) {
+        const double left = whole - factor * own.amounts[0] - of_trial;
+        return amount > 0 ? std::max(0.0, left) / amount : 0;
+      };
+      if (trial.seconds > 0) prices.push_back(trial);
+      prices.push_back(
+          {stage.stage, "staged pixels", beside(record->seconds, seconds[0], trial.seconds),
+           beside(record->cpu_seconds.value_or(record->seconds), cpu[0], trial.cpu_seconds)});
     }
   }
   return prices;

@@ -23,6 +23,7 @@ struct StageTime {
 };
 
 // How much of `unit` a run of these settings does:
+//   trials: of view dependence, 1 or 0, the same work for every capture |
 //   photo megapixels: at matching size | ray voxels: rays times the grid's side, over the fit |
 //   photo pixels: at working size | staged pixels: as they were given | style rays |
 //   frame ray voxels | pair pixels
@@ -30,7 +31,8 @@ double AmountOf(const std::string& unit, const RunSettings& settings, const Capt
 
 // From the records of a finished run; where knobs of steps and grids were measured, by least
 // squares of relative errors over them. A fit's steps have a price of their own, and what the
-// stage took beside them (photos, the trial of degrees, held-out views) goes by staged pixels.
+// stage took beside them and its trial of degrees (photos, held-out views) goes by staged
+// pixels.
 std::vector<PriceTerm> LearnPrices(const RunSettings& base, const Capture& capture,
                                    const Workspace& workspace,
                                    const std::vector<Variant>& variants,

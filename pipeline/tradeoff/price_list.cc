@@ -148,6 +148,10 @@ std::vector<PriceRow> PriceList(const std::vector<Variant>& variants,
     row.error = Figure::Undefined("it is not a value of one knob");
     rows.push_back(std::move(row));
   }
+  // Presets, measured last, stand with the other rows of their plane.
+  std::stable_sort(rows.begin(), rows.end(), [](const PriceRow& a, const PriceRow& b) {
+    return &PlaneOf(a.plane) < &PlaneOf(b.plane);
+  });
   FillErrors(variants, &rows);
   MarkFront(&rows);
   return rows;

@@ -10,8 +10,8 @@
 
 namespace regrade {
 
-// A row for each variant that was measured at least once, in the variants' order. `base` names
-// the base ("preset draft"). See PriceRow for what is in a row.
+// A row for each variant that was measured at least once, plane by plane in the variants'
+// order. `base` names the base ("preset draft"). See PriceRow for what is in a row.
 //
 // A variant is on the front where no other of its plane is at least as accurate in no more CPU
 // time, and better in one of the two. It is dominated where the other one is better by more

@@ -151,7 +151,8 @@ Capture Photos(int count) {
 }
 
 TEST(Prediction, LearnsWhatAUnitCostsAndAppliesItElsewhere) {
-  // A machine that needs 2e-9 s a ray voxel, exactly, and where the whole stage took 3 s more.
+  // A machine that needs 2e-9 s a ray voxel, exactly, and where the whole stage took 3 s more,
+  // one of them for its trial.
   RunSettings base;
   base.fit.steps = {100, 100};
   base.fit.resolutions = {50, 100};
@@ -176,7 +177,8 @@ TEST(Prediction, LearnsWhatAUnitCostsAndAppliesItElsewhere) {
   const TemporaryFolder folder;
   Workspace workspace(folder / "w");
   workspace.Record("reconstruct", JsonValue::Object(), {}, 0.6 * truth(base, capture) + 3,
-                   JsonValue::Object(), truth(base, capture) + 4);
+                   JsonValue::Object{{"trial_seconds", 1}, {"trial_cpu_seconds", 1}},
+                   truth(base, capture) + 4);
   const std::vector<PriceTerm> prices =
       LearnPrices(base, capture, workspace, variants, measured);
   RunSettings larger = base;
@@ -186,9 +188,9 @@ TEST(Prediction, LearnsWhatAUnitCostsAndAppliesItElsewhere) {
               larger, other);
   ASSERT_EQ(times.size(), 1u);  // of what was never seen nothing is said
   EXPECT_EQ(times[0].stage, "reconstruct");
-  // Three and a half times as many photos.
-  EXPECT_NEAR(times[0].cpu_seconds, truth(larger, other) + 3.5 * 4, 1e-6);
-  EXPECT_NEAR(times[0].seconds, 0.6 * truth(larger, other) + 3.5 * 3, 1e-6);
+  // Three and a half times as many photos, and one trial (ten photos fitted are enough).
+  EXPECT_NEAR(times[0].cpu_seconds, truth(larger, other) + 3.5 * 3 + 1, 1e-6);
+  EXPECT_NEAR(times[0].seconds, 0.6 * truth(larger, other) + 3.5 * 2 + 1, 1e-6);
 }
 
 TEST(Guess, GetsBetterWithTheFirstMeasurement) {
