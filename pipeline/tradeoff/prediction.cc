@@ -23,9 +23,9 @@ const std::vector<StageUnits>& AllUnits() {
   static const std::vector<StageUnits> all = {
       {"pose", {"photo megapixels"}, "", {}},
       {"reconstruct", {"ray voxels"}, "fit", {"fit-steps", "fit-resolutions"}},
-      {"style_2d", {"photo pixels"}, "", {}},
+      {"style_2d", {"staged pixels"}, "", {}},
       {"stylize", {"style rays", "photo pixels"}, "style", {"style-steps"}},
-      {"render", {"frame ray voxels"}, "", {}},
+      {"render", {"frame pixels"}, "", {}},
       {"evaluate", {"pair pixels"}, "", {}},
   };
   return all;
@@ -128,8 +128,7 @@ double AmountOf(const std::string& unit, const RunSettings& settings, const Capt
   if (unit == "style rays")
     return static_cast<double>(settings.network.steps) *
            (settings.network.rays_per_step > 0 ? settings.network.rays_per_step : frame);
-  if (unit == "frame ray voxels")
-    return (photos + film) * frame * settings.fit.resolutions.back();
+  if (unit == "frame pixels") return (photos + film) * frame;
   if (unit == "pair pixels") {
     double pairs = 0;
     for (const int gap : settings.consistency.gaps)
@@ -144,7 +143,12 @@ std::vector<PriceTerm> LearnPrices(const RunSettings& base, const Capture& captu
                                    const std::vector<Variant>& variants,
                                    const std::vector<Measurement>& measurements) {
   std::vector<PriceTerm> prices;
-  for (const StageUnits& stage : AllUnits()) {
+  for (StageUnits stage : AllUnits()) {
+    const auto record = workspace.Find(stage.stage);
+    // Photos whose poses came along are only read.
+    if (stage.stage == std::string("pose") && record &&
+        record->figures.Find("colmap") == nullptr)
+      stage.units = {"staged pixels"};
     std::vector<Observation> seen;
     for (const Measurement& m : measurements) {
       const bool teaches =
@@ -156,7 +160,6 @@ std::vector<PriceTerm> LearnPrices(const RunSettings& base, const Capture& captu
           seen.push_back(ObservationOf(stage, SettingsOf(base, variant), capture, m.seconds,
                                        m.cpu_seconds));
     }
-    const auto record = workspace.Find(stage.stage);
     if (seen.empty() && record)
       seen.push_back(ObservationOf(stage, base, capture, record->seconds,
                                    record->cpu_seconds.value_or(record->seconds)));

@@ -26,7 +26,7 @@ struct StageTime {
 //   trials: of view dependence, 1 or 0, the same work for every capture |
 //   photo megapixels: at matching size | ray voxels: rays times the grid's side, over the fit |
 //   photo pixels: at working size | staged pixels: as they were given | style rays |
-//   frame ray voxels | pair pixels
+//   frame pixels | pair pixels
 double AmountOf(const std::string& unit, const RunSettings& settings, const Capture& capture);
 
 // From the records of a finished run; where knobs of steps and grids were measured, by least
