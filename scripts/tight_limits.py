@@ -123,12 +123,14 @@ class Trials:
         finally:
             subprocess.run(["umount", self.work], check=True)
 
-    def full_disks(self, sizes):
-        for name in STAGES[1:]:
+    def full_disks(self, sizes, short):
+        for name in ("stylize", "render") if short else STAGES[1:]:
             begin = size_of(self.begins[name])
             room = max(self.finished - begin, 64 << 10)
             for i in range(sizes):
                 self.on_disk_of(name, name, begin + room * (2 * i + 1) // (2 * sizes), self.command(), self.expected)
+        if short:
+            return
         self.fresh("")
         status, words = call(self.pose())
         if status != 0:
@@ -154,13 +156,14 @@ class Trials:
         self.finishes(f"{what} {value}", self.command(), self.expected)
 
     def limits(self, short):
+        begin = "stylize" if short else "reconstruct"
         for value in (1 << 16,) if short else (1 << 10, 1 << 12, 1 << 14, 1 << 16, 1 << 18, 1 << 20):
-            self.limited("files of at most", "reconstruct", resource.RLIMIT_FSIZE, value, (0, 5))
+            self.limited("files of at most", begin, resource.RLIMIT_FSIZE, value, (0, 5))
         for value in (16,) if short else (4, 6, 8, 10, 12, 16, 24, 32):
-            self.limited("open files, at most", "style_2d", resource.RLIMIT_NOFILE, value, (0, 5))
+            self.limited("open files, at most", begin, resource.RLIMIT_NOFILE, value, (0, 5))
         least = self.least_memory()
         for more in (60,) if short else (5, 10, 20, 40, 60, 80, 120, 160, 240, 320, 480):
-            self.limited("bytes of address space, at most", "reconstruct", resource.RLIMIT_AS, least + (more << 20), (0, 5))
+            self.limited("bytes of address space, at most", begin, resource.RLIMIT_AS, least + (more << 20), (0, 5))
 
     def least_memory(self):
         """Address space in which the program's libraries load at all."""
@@ -199,7 +202,7 @@ def main():
     parser.add_argument("regrade")
     parser.add_argument("--pairs", type=int, default=100, metavar="N", help="of runs on one folder (100)")
     parser.add_argument("--sizes", type=int, default=6, metavar="N", help="of disks, for each stage (6)")
-    parser.add_argument("--short", action="store_true", help="one limit of each kind")
+    parser.add_argument("--short", action="store_true", help="one limit of each kind, and disks for two stages")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
         trials = Trials(os.path.abspath(options.regrade), scratch)
@@ -217,7 +220,7 @@ def main():
             mounts = False
         if mounts:
             trials.read_only()
-            trials.full_disks(options.sizes)
+            trials.full_disks(options.sizes, options.short)
         else:
             print("SKIPPED: full disks and read-only folders, which need root that may mount", flush=True)
         print(f"{trials.trials} trials, {trials.ended} ended by their limit, {trials.findings} findings")
