@@ -39,6 +39,12 @@ SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
 CHECKPOINT_HEAD, HASH_DIGITS = b"regrade checkpoint 1\n", 16
 
 
+def listen_to_signals():
+    """A supervisor in the background would hand the signals that it ignores down."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_DFL)
+
+
 class Run:
     """A started regrade whose events are read as they come."""
 
@@ -46,7 +52,7 @@ class Run:
         self.group, self.open, self.ended, self.began, self.done_before = group, None, [], [], []
         self.changed = threading.Condition()
         self.child = subprocess.Popen(command + ["--json"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
-                                      stdin=subprocess.DEVNULL, start_new_session=True)
+                                      stdin=subprocess.DEVNULL, start_new_session=True, preexec_fn=listen_to_signals)
         self.reader = threading.Thread(target=self.read, daemon=True)
         self.reader.start()
 

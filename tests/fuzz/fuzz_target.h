@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <ostream>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -35,6 +36,10 @@ struct FuzzTarget {
   std::string (*mutate)(std::string bytes, FuzzRandom* random);
   int mutants = 12000;  // that the replay test tries: half a second or so
 };
+
+inline std::ostream& operator<<(std::ostream& out, const FuzzTarget& target) {
+  return out << target.name;
+}
 
 // By kind of file; each list stands in the file of its name.
 std::vector<FuzzTarget> ArchiveTargets();
