@@ -8,7 +8,8 @@
 
 A test belongs to a case whose number is in its name ("Mkl.H7_H20_StyleOfOneColour"). tests/hard_cases/cases.json has the
 cases' titles, further tests ("tests": names with *, or of ctest), and a sentence ("why") where there is none. What is
-asserted, and whether it was seen to fail, is taken from care_outs.json and CARE_OUTS.md beside it.
+asserted, and whether it was seen to fail, is taken from care_outs.json and CARE_OUTS.md beside it. Measured figures of merit,
+each with its command, stand in figures.json.
 """
 
 import argparse
@@ -21,8 +22,8 @@ import sys
 import tempfile
 
 FOLDER = os.path.join("tests", "hard_cases")
-CASES, CARES, SEEN, PAGE = (os.path.join(FOLDER, name) for name in
-                            ("cases.json", "care_outs.json", "CARE_OUTS.md", "RESULTS.md"))
+CASES, CARES, SEEN, PAGE, FIGURES = (os.path.join(FOLDER, name) for name in (
+    "cases.json", "care_outs.json", "CARE_OUTS.md", "RESULTS.md", "figures.json"))
 TEST = re.compile(r"\bTEST(?:_F|_P)?\(\s*(\w+)\s*,\s*(\w+)\s*\)")
 CTEST = re.compile(r"add_test\(NAME (\w+)")
 NUMBER = re.compile(r"(?<![A-Za-z0-9])([HF]\d+)(?![A-Za-z0-9])")
@@ -60,6 +61,8 @@ class Tree:
         for entry in json.loads(read(os.path.join(root, CARES))):
             self.cares.setdefault(entry["case"], []).append(entry)
         self.seen = read(os.path.join(root, SEEN))
+        figures = os.path.join(root, FIGURES)
+        self.figures = json.loads(read(figures)) if os.path.isfile(figures) else []
 
     def add(self, test, cases):
         self.tests.add(test)
@@ -91,6 +94,14 @@ def shown(tests):
     return ", ".join(words)
 
 
+def figures_table(figures):
+    lines = ["## Figures of merit", "",
+             "Measured by the commands beside them, which anyone can run; `name_test` is a program of the build's `tests/`.", "",
+             "| figure | measured | with | commit, machine |", "|---|---|---|---|"]
+    lines += [f"| {cell(row['figure'])} | {cell(row['measured'])} | `{row['with']}` | {cell(row['at'])} |" for row in figures]
+    return "\n".join(lines)
+
+
 def page(tree):
     """(text, complaints)"""
     complaints, tables = [], []
@@ -120,6 +131,8 @@ def page(tree):
         tables.append("\n".join(lines))
     summary = (f"{len(tree.cases)} cases: {count['tested']} have a test, {count['seen']} of these were seen to fail without their "
                f"care; {count['cannot']} cannot arise here; {count['untested']} are not tested, and it is said why.")
+    if tree.figures:
+        tables.insert(0, figures_table(tree.figures))
     return HEAD.format(summary=summary) + "\n" + "\n\n".join(tables) + "\n", complaints
 
 
