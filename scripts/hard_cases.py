@@ -96,7 +96,7 @@ def shown(tests):
 
 def figures_table(figures):
     lines = ["## Figures of merit", "",
-             "Measured by the commands beside them, which anyone can run; `name_test` is a program of the build's `tests/`.", "",
+             "Measured by the commands beside them, which anyone can run.", "",
              "| figure | measured | with | commit, machine |", "|---|---|---|---|"]
     lines += [f"| {cell(row['figure'])} | {cell(row['measured'])} | `{row['with']}` | {cell(row['at'])} |" for row in figures]
     return "\n".join(lines)

@@ -6,22 +6,12 @@
 #include "tests/fuzz/fuzz_support.h"
 #include "tests/fuzz/mutate.h"
 #include "tests/fuzz/stored_zip.h"
+#include "tests/support/small_archive.h"
 
 namespace regrade::testing {
 namespace {
 
 constexpr uint64_t kBudget = 4 << 20;
-
-std::string SmallArchive() {
-  static const float values[6] = {1, 2, 3, 4, 5, 6};
-  static const std::vector<int32_t> ramp(1000, 7);
-  NpzWriter writer;
-  writer.Add("values", {2, 3}, values);
-  writer.Add("ramp", {1000}, ramp.data(), NpzPacking::kDeflate);
-  writer.AddScalar<double>("pi", 3.25);
-  writer.AddText("note", "h\xc3\xa9llo");
-  return writer.Bytes();
-}
 
 // The second is not packed: mutants of what is inside keep right checksums.
 std::vector<std::string> ArchiveSeeds() {

@@ -7,27 +7,17 @@
 #include "kernels/base/random.h"
 #include "pipeline/files/zip_directory.h"
 #include "tests/support/expect_error.h"
+#include "tests/support/small_archive.h"
 #include "tests/support/temporary_folder.h"
 
 namespace regrade {
 namespace {
 
+using testing::SmallArchive;
 using testing::TemporaryFolder;
 using testing::WriteText;
 
 constexpr uint64_t kBudget = 1 << 20;
-
-// Two members, the second deflated.
-std::string SmallArchive() {
-  static const float values[6] = {1, 2, 3, 4, 5, 6};
-  static const std::vector<int32_t> ramp(1000, 7);
-  NpzWriter writer;
-  writer.Add("values", {2, 3}, values);
-  writer.Add("ramp", {1000}, ramp.data(), NpzPacking::kDeflate);
-  writer.AddScalar<double>("pi", 3.25);
-  writer.AddText("note", "h\xc3\xa9llo");
-  return writer.Bytes();
-}
 
 void ReadEverything(const std::string& path) {
   NpzReader reader(path, kBudget);

@@ -76,7 +76,7 @@ class OpacitySteps {
   }
 
  private:
-  // 2^23 + round((1 - transmittance) / step); see LocateCellOnDevice.
+  // 2^23 + round((1 - transmittance) / step); see LocateCellIn.
   __device__ float Steps(float transmittance) const {
     return __fadd_rd((1 - transmittance) * inverse_ + 0.5f, 8388608.0f);
   }
