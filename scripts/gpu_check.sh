@@ -23,9 +23,9 @@ bundle() {
   local build=$root/build/gpu-bundle
   cmake -S "$root" -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DREGRADE_CUDA=ON -DREGRADE_BENCHMARKS=OFF \
     -DCMAKE_CUDA_ARCHITECTURES="${REGRADE_CUDA_ARCH:-90}" >/dev/null
-  cmake --build "$build" --target regrade_gpu device_parity_test device_style_test --parallel "$(nproc)"
-  cp "$build/pipeline/regrade_gpu" "$build"/tests/gpu/device_{parity,style}_test "${BASH_SOURCE[0]}" "$dir"
-  strip "$dir/regrade_gpu" "$dir"/device_{parity,style}_test
+  cmake --build "$build" --target regrade_gpu device_{parity,style,training}_test --parallel "$(nproc)"
+  cp "$build/pipeline/regrade_gpu" "$build"/tests/gpu/device_{parity,style,training}_test "${BASH_SOURCE[0]}" "$dir"
+  strip "$dir/regrade_gpu" "$dir"/device_{parity,style,training}_test
   ldd "$dir/regrade_gpu" | awk '/lib(zip|boost|bz2|crypto|gomp|z)[._]/ {print $3}' | xargs -I{} cp -L {} "$dir"
   [[ $# -eq 0 ]] || cp "$@" "$dir"
   du -sh "$dir"
@@ -62,7 +62,9 @@ measure_kernels() {
   $profile -k 'regex:FitRays|StepKernel|TotalVariation|DrawKernel' --launch-skip 2000 --launch-count 4 \
     "$dir/regrade_gpu" $fit 600,600 | grep '^"'
   # shellcheck disable=SC2086
-  $profile -k 'regex:MarchWeights|GatherRows|ForwardKernel|AdjointRows|OuterProducts|Blend|ColorLoss|AssignSlots' --launch-skip 100 --launch-count 12 \
+  # Every kernel of a step of the style; the network's adjoint comes once for 65536 voxels.
+  $profile -k 'regex:MarchWeights|GatherRows|AddMapped|ForwardKernel|AdjointRows|OuterProducts|Blend|ColorLoss|AssignSlots|ActivateWeights|GradientKernel|UpdateKernel' \
+    --launch-skip 300 --launch-count 40 \
     "$dir/regrade_gpu" style --capture "$capture" --field "$field" --style-steps 30 | grep '^"'
   # shellcheck disable=SC2086
   $profile -k 'regex:RenderRays' --launch-skip 20 --launch-count 1 \
@@ -75,7 +77,7 @@ run() {
   mkdir -p "$out"
   export LD_LIBRARY_PATH=$dir${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}
   : >"$out/parity.txt"
-  for test in device_parity_test device_style_test; do
+  for test in device_{parity,style,training}_test; do
     "$dir/$test" >>"$out/parity.txt" || status=1
   done
   grep -E '^parity|PASSED|FAILED|SKIPPED' "$out/parity.txt"
@@ -86,7 +88,8 @@ run() {
     for tool in memcheck racecheck initcheck synccheck; do
       local clean=true
       : >"$out/$tool.txt"
-      for test in "device_parity_test --gtest_filter=*basis9*" "device_style_test --gtest_filter=-*Large*"; do
+      for test in "device_parity_test --gtest_filter=*basis9*" "device_style_test --gtest_filter=-*Large*" \
+        device_training_test; do
         # shellcheck disable=SC2086  # a program and its option
         compute-sanitizer --tool "$tool" --error-exitcode 9 "$dir"/$test >>"$out/$tool.txt" 2>&1 ||
           { clean=false; status=1; }

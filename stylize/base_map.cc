@@ -72,4 +72,14 @@ LipschitzNetwork NetworkOfMap(const ColorMap& map) {
   return network;
 }
 
+RowMap RowMapOf(const ColorMap& map) {
+  const double zeros[kNetworkSh] = {};
+  double of_zero[kNetworkSh];
+  MapCoefficients(map, 9, zeros, of_zero);
+  RowMap rows;
+  for (int c = 0; c < 3; ++c) rows.matrix.row[c] = map.matrix.row[c].Cast<float>();
+  rows.constant = Vec3d{of_zero[0], of_zero[9], of_zero[18]}.Cast<float>();
+  return rows;
+}
+
 }  // namespace regrade

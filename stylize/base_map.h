@@ -19,4 +19,12 @@ ColorMap LeastSquaresMap(const RadianceField& field, const StyleRays& batch,
 // A network whose residual is exactly zero: the map alone, carried into coefficients.
 LipschitzNetwork NetworkOfMap(const ColorMap& map);
 
+// The map as it acts on rows of nine coefficients a channel: row -> (matrix (x) I_9) row +
+// constant on each channel's first.
+struct RowMap {
+  Mat3f matrix;
+  Vec3f constant;
+};
+RowMap RowMapOf(const ColorMap& map);
+
 }  // namespace regrade

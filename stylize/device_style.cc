@@ -7,6 +7,7 @@
 #include "kernels/field/device/device_color_loss.h"
 #include "kernels/field/device/device_ray_weights.h"
 #include "kernels/network/device_mlp.h"
+#include "stylize/base_map.h"
 
 namespace regrade {
 namespace {
@@ -18,13 +19,8 @@ constexpr int64_t kBandRays = 1 << 16;
 void AddBaseMap(const LipschitzNetworkData& data, const float* features, int64_t n,
                 float* rows) {
   if (!data.has_base) return;
-  const double zeros[kNetworkSh] = {};
-  double of_zero[kNetworkSh];
-  MapCoefficients(data.base, 9, zeros, of_zero);
-  Mat3f matrix;
-  for (int c = 0; c < 3; ++c) matrix.row[c] = data.base.matrix.row[c].Cast<float>();
-  const Vec3d constant{of_zero[0], of_zero[9], of_zero[18]};
-  AddMappedRows(matrix, constant.Cast<float>(), features, n, rows);
+  const RowMap map = RowMapOf(data.base);
+  AddMappedRows(map.matrix, map.constant, features, n, rows);
 }
 
 // Grown, never shrunk: what one step needed the next one needs about as much of.

@@ -11,6 +11,7 @@
 #include "kernels/optimize/schedule.h"
 #include "stylize/base_map.h"
 #include "stylize/device_style.h"
+#include "stylize/device_training.h"
 #include "stylize/gradient_aggregation.h"
 #include "stylize/initial_network.h"
 #include "stylize/lipschitz_regularizer.h"
@@ -25,12 +26,16 @@ constexpr uint64_t kSampleStream = ~uint64_t{0};
 
 double Psnr(double mse) { return -10 * std::log10(std::max(mse, 1e-12)); }
 
+// What the bound has beside the product of squareplus(K_i).
+double FixedFactor(const LipschitzNetworkData& data) {
+  return std::max(1.0f, data.sh_scale) *
+         std::pow(ActivationLipschitz(ActivationByName(data.activation), data.omega),
+                  kNetworkLayers - 1);
+}
+
 // Shrinks all K_i alike until the product is within `budget`.
 void LimitProduct(double budget, LipschitzNetwork* network) {
-  const LipschitzNetworkData& data = network->data();
-  double product = std::max(1.0f, data.sh_scale) *
-                   std::pow(ActivationLipschitz(ActivationByName(data.activation), data.omega),
-                            kNetworkLayers - 1);
+  double product = FixedFactor(network->data());
   for (int l = 0; l < kNetworkLayers; ++l) product *= Squareplus<double>(network->k(l));
   if (!(product > budget)) return;
   const double factor = std::pow(budget / product, 1.0 / kNetworkLayers);
@@ -99,6 +104,7 @@ class Training {
         loss_(device_field != nullptr
                   ? MakeDeviceStyleLoss(device_field, aggregation_options_)
                   : std::make_unique<GradientAggregation>(field, aggregation_options_)),
+        device_field_(device_field),
         // A fixed sample of the training pixels chooses the base and says what was gained.
         sample_(SampleStyleRays(views, 16384, 8, options.seed, kSampleStream)) {
     bool capped = false;
@@ -112,8 +118,9 @@ class Training {
 
   void Start(int64_t bad_pixels);
   void Resume(const TrainingState& state);
-  // One step; false if it was not finite and nothing has changed.
-  bool Step(AggregationResult* step, std::vector<double>* gradient);
+  // One step, or on a device as many as go without a look at the norms, up to `most`. False if
+  // two in a row were not finite and changed nothing; *last and *gradient are the last one's.
+  bool Advance(int64_t most, AggregationResult* last, std::vector<double>* gradient);
   TrainNetworkResult Conclude();
 
   const LipschitzNetwork& network() const { return network_; }
@@ -126,6 +133,20 @@ class Training {
 
  private:
   ColorMap ChooseBase();
+  bool Step(AggregationResult* step, std::vector<double>* gradient);
+  bool StepsOnDevice(int64_t most, AggregationResult* last, std::vector<double>* gradient);
+  void DrawAhead(int64_t step);
+  // Of the network as a step uses it; true if the power iteration lags behind.
+  bool LookAtBound(const LipschitzNetwork& ahead);
+  // Rays of a step, if it takes patches.
+  int64_t RaysOfPatches() const {
+    const int64_t square = int64_t{options_.patch} * options_.patch;
+    return std::max<int64_t>(1, options_.rays_per_step / square) * square;
+  }
+  bool StepsStayOnDevice() const {
+    return device_field_ != nullptr && options_.rays_per_step > 0 && !options_.every_voxel &&
+           RaysOfPatches() <= DeviceTraining::kMostRays;
+  }
   // What the certified bound leaves to the residual.
   double Budget() const {
     if (options_.bound_factor <= 0) return std::numeric_limits<double>::infinity();
@@ -138,6 +159,10 @@ class Training {
   const TrainNetworkOptions& options_;
   AggregationOptions aggregation_options_;
   std::unique_ptr<StyleLoss> loss_;
+  const DeviceGrid* device_field_;
+  std::unique_ptr<DeviceTraining> on_device_;
+  std::vector<StyleRays> drawn_;  // of the steps from drawn_from_ on
+  int64_t drawn_from_ = -1;
   StyleRays sample_;
   double layer_target_ = 0;
   LipschitzNetwork network_;
@@ -145,6 +170,7 @@ class Training {
   TrainNetworkResult result_;
   double touched_ = 0;
   int64_t steps_here_ = 0;
+  int rejected_in_a_row_ = 0;
 };
 
 ColorMap Training::ChooseBase() {
@@ -186,15 +212,77 @@ void Training::Resume(const TrainingState& state) {
   network_ = LipschitzNetwork(state.network);
 }
 
+bool Training::Advance(int64_t most, AggregationResult* last, std::vector<double>* gradient) {
+  if (StepsStayOnDevice()) return StepsOnDevice(most, last, gradient);
+  rejected_in_a_row_ = Step(last, gradient) ? 0 : rejected_in_a_row_ + 1;
+  return rejected_in_a_row_ < 2;
+}
+
+bool Training::LookAtBound(const LipschitzNetwork& ahead) {
+  state_.history.steps.push_back(state_.step);
+  state_.history.bounds.push_back(ahead.Bound());
+  const double drift = ahead.NormDrift();
+  result_.largest_norm_drift = std::max(result_.largest_norm_drift, drift);
+  return drift > 0.01 / kNetworkLayers;
+}
+
+// The rays of the steps from `step` to the next look at the norms.
+void Training::DrawAhead(int64_t step) {
+  const int64_t n = std::min<int64_t>(kBoundEvery - step % kBoundEvery, options_.steps - step);
+  drawn_from_ = step;
+  drawn_.assign(static_cast<size_t>(std::max<int64_t>(n, 0)), {});
+#pragma omp parallel for schedule(dynamic)
+  for (int64_t i = 0; i < n; ++i)
+    drawn_[static_cast<size_t>(i)] =
+        SampleStyleRays(views_, options_.rays_per_step, options_.patch, options_.seed,
+                        static_cast<uint64_t>(step + i));
+}
+
+bool Training::StepsOnDevice(int64_t most, AggregationResult* last,
+                             std::vector<double>* gradient) {
+  if (on_device_ == nullptr) {
+    const bool pulled = !options_.no_regularisation && !options_.spectral_normalisation;
+    const LipschitzRule rule{
+        .steps = options_.steps,
+        .rate_first = options_.rate_first,
+        .rate_last = options_.rate_last,
+        .norm_steps = options_.norm_steps,
+        .lambda = pulled ? options_.lambda : 0,
+        .layer_target = layer_target_,
+        .fixed_norms = options_.spectral_normalisation,
+        .product_limit = Budget() / FixedFactor(network_.data()),
+        .input_scale = network_.data().sh_scale,
+        .scaled_inputs = kNetworkSh,
+        .loss_divisor = aggregation_options_.divide_by_voxels
+                            ? static_cast<double>(field_.geometry->num_voxels())
+                            : 0};
+    on_device_ = std::make_unique<DeviceTraining>(device_field_, aggregation_options_, rule,
+                                                  network_, RaysOfPatches(), kBoundEvery);
+  }
+  if (drawn_from_ != state_.step) DrawAhead(state_.step);
+  if (static_cast<int64_t>(drawn_.size()) > most) drawn_.resize(static_cast<size_t>(most));
+  LipschitzNetwork ahead = network_;
+  on_device_->Begin(state_.step, drawn_, network_, state_.adam);
+  // While the device makes its steps: what it did not wait for.
+  bool lags = false;
+  if (state_.step % kBoundEvery == 0) {
+    for (int i = 0; i < options_.norm_steps; ++i) ahead.StepNorms();
+    lags = LookAtBound(ahead);
+  }
+  DrawAhead(state_.step + static_cast<int64_t>(drawn_.size()));
+  const DeviceTraining::Steps steps = on_device_->End(&network_, &state_.adam);
+  if (lags) network_.WarmUpNorms();
+  state_.step += steps.made;
+  steps_here_ += steps.made;
+  touched_ += steps.touched_voxels;
+  *last = steps.last;
+  gradient->assign(steps.gradient.begin(), steps.gradient.end());
+  return !steps.stopped;
+}
+
 bool Training::Step(AggregationResult* step, std::vector<double>* gradient) {
   for (int i = 0; i < options_.norm_steps; ++i) network_.StepNorms();
-  if (state_.step % kBoundEvery == 0) {
-    state_.history.steps.push_back(state_.step);
-    state_.history.bounds.push_back(network_.Bound());
-    const double drift = network_.NormDrift();
-    result_.largest_norm_drift = std::max(result_.largest_norm_drift, drift);
-    if (drift > 0.01 / kNetworkLayers) network_.WarmUpNorms();
-  }
+  if (state_.step % kBoundEvery == 0 && LookAtBound(network_)) network_.WarmUpNorms();
   const StyleRays batch = SampleStyleRays(views_, options_.rays_per_step, options_.patch,
                                           options_.seed, static_cast<uint64_t>(state_.step));
   gradient->assign(static_cast<size_t>(LipschitzNetwork::NumParameters()), 0.0);
@@ -266,12 +354,13 @@ TrainNetworkResult TrainNetwork(const RadianceField& field,
     training.Resume(*resume);
   else
     training.Start(bad_pixels);
-  int rejected_in_a_row = 0;
   while (training.steps_done() < options.steps) {
     AggregationResult step;
     std::vector<double> gradient;
-    rejected_in_a_row = training.Step(&step, &gradient) ? 0 : rejected_in_a_row + 1;
-    if (rejected_in_a_row == 2) {
+    const int64_t most = std::min<int64_t>(
+        options.steps - training.steps_done(),
+        hooks.checkpoint_every - training.steps_done() % hooks.checkpoint_every);
+    if (!training.Advance(most, &step, &gradient)) {
       if (hooks.checkpoint) hooks.checkpoint(training.Capture());
       throw Error(ExitCode::kScene,
                   "learning the style stopped at step " +

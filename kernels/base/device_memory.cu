@@ -1,4 +1,5 @@
 #include "kernels/base/device_memory.h"
+#include "kernels/base/device_stream.h"
 #include "kernels/base/error.h"
 
 #if defined(__CUDACC__)
@@ -87,13 +88,15 @@ void DeviceCopyRows(void* to, int64_t to_pitch, const void* from, int64_t from_p
 
 void DeviceCopyWithin(void* to, const void* from, int64_t bytes) {
   if (bytes > 0)
-    Require(cudaMemcpyAsync(to, from, static_cast<size_t>(bytes), cudaMemcpyDeviceToDevice),
+    Require(cudaMemcpyAsync(to, from, static_cast<size_t>(bytes), cudaMemcpyDeviceToDevice,
+                            LaunchStream()),
             "copying on the GPU");
 }
 
 void DeviceZero(void* device, int64_t bytes) {
   if (bytes > 0)
-    Require(cudaMemsetAsync(device, 0, static_cast<size_t>(bytes)), "clearing GPU memory");
+    Require(cudaMemsetAsync(device, 0, static_cast<size_t>(bytes), LaunchStream()),
+            "clearing GPU memory");
 }
 
 void DeviceWait(const char* what) { Require(cudaDeviceSynchronize(), what); }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "kernels/base/device_stream.h"
 #include "kernels/base/error.h"
 #include "kernels/base/launch_size.h"
 #include "kernels/network/device_mlp.h"
@@ -46,13 +47,27 @@ __device__ void WalkDown(const MlpView& mlp, const Weights& weights, const float
   }
 }
 
+// How many rows there are: n, or fewer if that is counted on the device. `begin`: of a chunk.
+struct RowCount {
+  int64_t n;
+  const int32_t* counted;  // may be null
+  int64_t begin;
+  __device__ int64_t Get() const {
+    if (counted == nullptr) return n;
+    const int64_t left = *counted - begin;
+    return left < n ? left : n;
+  }
+};
+
 __device__ inline int64_t WarpOfGrid() {
   return (blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x) / 32;
 }
 
 template <bool kSplit>
 __global__ void __launch_bounds__(kThreads)
-    ForwardKernel(MlpView mlp, bool stage, const float* input, int64_t n, float* output) {
+    ForwardKernel(MlpView mlp, bool stage, const float* input, RowCount count, float* output) {
+  const int64_t n = count.Get();
+  if (n <= 0) return;
   extern __shared__ float4 shared_quads[];
   const Weights weights(mlp, stage ? reinterpret_cast<float*>(shared_quads) : nullptr);
   const int64_t warps = static_cast<int64_t>(gridDim.x) * (blockDim.x / 32);
@@ -67,7 +82,9 @@ __global__ void __launch_bounds__(kThreads)
 template <bool kSplit>
 __global__ void __launch_bounds__(kThreads)
     AdjointRowsKernel(MlpView mlp, bool stage, const float* input, const float* d_output,
-                      int64_t n, Scratch scratch) {
+                      RowCount count, Scratch scratch) {
+  const int64_t n = count.Get();
+  if (n <= 0) return;
   extern __shared__ float4 shared_quads[];
   const Weights weights(mlp, stage ? reinterpret_cast<float*>(shared_quads) : nullptr);
   const int64_t warps = static_cast<int64_t>(gridDim.x) * (blockDim.x / 32);
@@ -107,8 +124,10 @@ __device__ inline void StageRows(const float* from, int width, int64_t row, int6
 
 template <bool kSplit>
 __global__ void __launch_bounds__(kOuterThreads)
-    OuterProductsKernel(MlpView mlp, const float* input, const float* d_output, int64_t n,
+    OuterProductsKernel(MlpView mlp, const float* input, const float* d_output, RowCount count,
                         Scratch scratch, double* gradient) {
+  const int64_t n = count.Get();
+  if (n <= 0) return;
   __shared__ float4 left_quads[kOuterRows * kOuterStride / 4],
       right_quads[kOuterRows * kOuterStride / 4];
   float *left_rows = reinterpret_cast<float*>(left_quads),
@@ -190,48 +209,55 @@ struct WalkLaunch {
 };
 
 template <bool kSplit>
-void LaunchForward(const MlpView& mlp, const float* input, int64_t n, float* output) {
-  const WalkLaunch launch(ForwardKernel<kSplit>, mlp, n);
-  ForwardKernel<kSplit>
-      <<<launch.blocks, kThreads, launch.bytes>>>(mlp, launch.stage, input, n, output);
+void LaunchForward(const MlpView& mlp, const float* input, const RowCount& count,
+                   float* output) {
+  const WalkLaunch launch(ForwardKernel<kSplit>, mlp, count.n);
+  ForwardKernel<kSplit><<<launch.blocks, kThreads, launch.bytes, LaunchStream()>>>(
+      mlp, launch.stage, input, count, output);
   CheckLaunch("mlp_forward");
 }
 
 template <bool kSplit>
-void LaunchAdjoint(const MlpView& mlp, const float* input, const float* d_output, int64_t n,
-                   const Scratch& scratch, double* gradient) {
-  const WalkLaunch launch(AdjointRowsKernel<kSplit>, mlp, n);
-  AdjointRowsKernel<kSplit><<<launch.blocks, kThreads, launch.bytes>>>(mlp, launch.stage, input,
-                                                                       d_output, n, scratch);
+void LaunchAdjoint(const MlpView& mlp, const float* input, const float* d_output,
+                   const RowCount& count, const Scratch& scratch, double* gradient) {
+  const WalkLaunch launch(AdjointRowsKernel<kSplit>, mlp, count.n);
+  AdjointRowsKernel<kSplit><<<launch.blocks, kThreads, launch.bytes, LaunchStream()>>>(
+      mlp, launch.stage, input, d_output, count, scratch);
   CheckLaunch("mlp_adjoint_rows");
-  const int64_t tiles = (n + kOuterRows - 1) / kOuterRows;
+  const int64_t tiles = (count.n + kOuterRows - 1) / kOuterRows;
   const dim3 blocks(static_cast<unsigned>(std::min<int64_t>(tiles, 256)),
                     static_cast<unsigned>(mlp.layers));
-  OuterProductsKernel<kSplit>
-      <<<blocks, kOuterThreads>>>(mlp, input, d_output, n, scratch, gradient);
+  OuterProductsKernel<kSplit><<<blocks, kOuterThreads, 0, LaunchStream()>>>(
+      mlp, input, d_output, count, scratch, gradient);
   CheckLaunch("mlp_outer_products");
 }
 
 }  // namespace
 
-void DeviceMlp::Forward(MlpPrecision precision, const float* input, int64_t n,
-                        float* output) const {
+void DeviceMlp::Forward(MlpPrecision precision, const float* input, int64_t n, float* output,
+                        const int32_t* counted) const {
   if (n == 0) return;
   const MlpView mlp = ViewOf(shape_, parameters_);
   if (precision == MlpPrecision::kSplit)
-    LaunchForward<true>(mlp, input, n, output);
+    LaunchForward<true>(mlp, input, {n, counted, 0}, output);
   else
-    LaunchForward<false>(mlp, input, n, output);
+    LaunchForward<false>(mlp, input, {n, counted, 0}, output);
+}
+
+void DeviceMlp::ReserveAdjoint(int64_t n) {
+  const int64_t kept =
+      (static_cast<int64_t>(shape_.layers.size()) - 1) * std::min(n, kChunk) * kMlpHidden;
+  if (scratch_.size() < 2 * kept)
+    scratch_ = DeviceBuffer<float>(2 * kept, "layers of the style's network");
 }
 
 void DeviceMlp::AddAdjoint(MlpPrecision precision, const float* input, const float* d_output,
-                           int64_t n) {
+                           int64_t n, const int32_t* counted) {
   const MlpView mlp = ViewOf(shape_, parameters_);
   const int64_t rows = std::min(n, kChunk), kept = (mlp.layers - 1) * rows * kMlpHidden;
-  if (scratch_.size() < 2 * kept)
-    scratch_ = DeviceBuffer<float>(2 * kept, "layers of the style's network");
+  ReserveAdjoint(n);
   for (int64_t begin = 0; begin < n; begin += rows) {
-    const int64_t count = std::min(rows, n - begin);
+    const RowCount count{std::min(rows, n - begin), counted, begin};
     const Scratch scratch{scratch_.data(), scratch_.data() + kept, rows};
     const float *from = input + begin * kMlpEndLanes, *d_from = d_output + begin * kMlpEndLanes;
     if (precision == MlpPrecision::kSplit)
@@ -243,10 +269,11 @@ void DeviceMlp::AddAdjoint(MlpPrecision precision, const float* input, const flo
 
 #else
 
-void DeviceMlp::Forward(MlpPrecision, const float*, int64_t, float*) const {
+void DeviceMlp::Forward(MlpPrecision, const float*, int64_t, float*, const int32_t*) const {
   DeviceWait("mlp_forward");
 }
-void DeviceMlp::AddAdjoint(MlpPrecision, const float*, const float*, int64_t) {
+void DeviceMlp::ReserveAdjoint(int64_t) { DeviceWait("mlp_adjoint"); }
+void DeviceMlp::AddAdjoint(MlpPrecision, const float*, const float*, int64_t, const int32_t*) {
   DeviceWait("mlp_adjoint");
 }
 

@@ -22,13 +22,23 @@ class DeviceMlp {
   // Other weights for the same shapes.
   void Set(const FusedMlp& mlp);
 
-  // output [n, kMlpEndLanes] of input [n, kMlpEndLanes]; both on the device.
-  void Forward(MlpPrecision precision, const float* input, int64_t n, float* output) const;
+  // output [n, kMlpEndLanes] of input [n, kMlpEndLanes]; both on the device. `counted`, if it
+  // is not null, lies there too: n is no more than room then, and *counted rows are meant.
+  void Forward(MlpPrecision precision, const float* input, int64_t n, float* output,
+               const int32_t* counted = nullptr) const;
 
   // Adds the adjoint for d_output [n, kMlpEndLanes] to sums that TakeGradient gives and sets to
   // zero. The forward pass is done again a chunk at a time, so memory does not grow with n.
-  void AddAdjoint(MlpPrecision precision, const float* input, const float* d_output, int64_t n);
+  void AddAdjoint(MlpPrecision precision, const float* input, const float* d_output, int64_t n,
+                  const int32_t* counted = nullptr);
+  void ReserveAdjoint(int64_t n);                     // makes the room for it beforehand
   void TakeGradient(DenseNetwork<double>* gradient);  // adds to it; the unpadded shapes
+
+  // For those that learn on the device, laid out as FusedMlp::Offset says: the weights that
+  // act, and the sums so far.
+  float* parameters() { return parameters_.data(); }
+  const DeviceBuffer<double>& gradient() const { return gradient_; }
+  int64_t ParameterOffset(size_t layer) const { return shape_.Offset(layer); }
 
  private:
   FusedMlp shape_;                  // its weights are of no interest

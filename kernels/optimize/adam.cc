@@ -6,10 +6,6 @@
 
 namespace regrade {
 
-double AdamBiasCorrection(double beta, int64_t t) {
-  return -std::expm1(static_cast<double>(t) * std::log(beta));
-}
-
 bool AdamStep(const AdamOptions& options, double rate, View<const float> gradient,
               View<float> values, AdamState* state) {
   REGRADE_CHECK_EQ(gradient.size, values.size);
@@ -20,9 +16,8 @@ bool AdamStep(const AdamOptions& options, double rate, View<const float> gradien
   }
   REGRADE_CHECK_EQ(state->first_moment.size(), size);
   REGRADE_CHECK_EQ(state->second_moment.size(), size);
-  constexpr float kLargest = 1e19f;
   for (const float g : gradient)
-    if (!(std::abs(g) < kLargest)) {
+    if (!(std::abs(g) < kLargestGradient)) {
       ++state->rejected;
       return false;
     }

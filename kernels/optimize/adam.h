@@ -22,7 +22,13 @@ struct AdamOptions {
 };
 
 // 1 - beta^t without cancellation, for any t >= 1.
-double AdamBiasCorrection(double beta, int64_t t);
+HD inline double AdamBiasCorrection(double beta, int64_t t) {
+  using std::expm1, std::log;
+  return -expm1(static_cast<double>(t) * log(beta));
+}
+
+// A gradient of this size or more, whose square is not finite, is not stepped along.
+inline constexpr float kLargestGradient = 1e19f;
 
 template <typename T>
 HD void AdamUpdate(T gradient, T beta1, T beta2, T epsilon, T rate_over_correction1,

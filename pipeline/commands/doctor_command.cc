@@ -47,7 +47,7 @@ Finding FindDevice() {
   std::snprintf(text, sizeof text, "%s, sm_%d, %.1f GB free of %.1f GB", status.name.c_str(),
                 status.compute_capability, static_cast<double>(status.free_bytes) / (1u << 30),
                 static_cast<double>(status.total_bytes) / (1u << 30));
-  return {"GPU", text, "fits run there; the rest runs on the CPU"};
+  return {"GPU", text, "fits, restyling and frames are made there, the rest on the CPU"};
 }
 
 }  // namespace

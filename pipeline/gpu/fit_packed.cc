@@ -29,18 +29,21 @@ double Mean(const std::vector<double>& values) {
 
 struct HeldOut {
   double psnr = 0, ssim = 0;
+  double transmittance = 0;  // what the field lets through, of all that is seen
 };
 
 HeldOut MeasureHeldOut(FitEngine* engine, const PackedCapture& capture,
                        const MarchOptions& march) {
-  std::vector<double> psnr, ssim;
+  std::vector<double> psnr, ssim, transmittance;
   for (const PackedView& view : capture.views) {
     if (!view.held_out) continue;
-    const Image image = engine->Render(view.camera, march).color;
-    if (const auto value = Psnr(image, view.photo)) psnr.push_back(*value);
-    if (const auto value = Ssim(image, view.photo)) ssim.push_back(*value);
+    const RenderedView seen = engine->Render(view.camera, march);
+    if (const auto value = Psnr(seen.color, view.photo)) psnr.push_back(*value);
+    if (const auto value = Ssim(seen.color, view.photo)) ssim.push_back(*value);
+    transmittance.insert(transmittance.end(), seen.transmittance.pixels.begin(),
+                         seen.transmittance.pixels.end());
   }
-  return {Mean(psnr), Mean(ssim)};
+  return {Mean(psnr), Mean(ssim), Mean(transmittance)};
 }
 
 }  // namespace
@@ -102,6 +105,7 @@ void FitPacked(const FitPackedOptions& settings, const FitOptions& options) {
                         {"psnr_train_db", fit.psnr_train_db},
                         {"psnr_heldout_db", measured.psnr},
                         {"ssim_heldout", measured.ssim},
+                        {"transmittance_heldout", measured.transmittance},
                         {"render", std::move(render)},
                         {"curve_heldout", std::move(stages)},
                         {"curve_train", std::move(curve)}};

@@ -93,9 +93,10 @@ void StylePacked(const StylePackedOptions& settings, const TrainNetworkOptions& 
   TrainingHooks hooks;
   Stopwatch steps;
   double seconds_start = 0, seconds_steps = 0;
-  hooks.progress = [&](const Progress& progress) {
-    (progress.done == 1 ? seconds_start : seconds_steps) += steps.Lap();
-    if (on_device && static_cast<int64_t>(progress.done) % 50 == 1)
+  int reports = 0;
+  hooks.progress = [&](const Progress&) {
+    (reports++ == 0 ? seconds_start : seconds_steps) += steps.Lap();
+    if (on_device && reports % 4 == 1)
       least_free = std::min(least_free, ReadDeviceStatus().free_bytes);
     return Verdict::kContinue;
   };
@@ -103,7 +104,7 @@ void StylePacked(const StylePackedOptions& settings, const TrainNetworkOptions& 
       TrainNetwork(stored.field, lessons.views, lessons.scene_map, march, options, hooks,
                    nullptr, on_device ? &grid : nullptr);
   record["seconds_learn"] = watch.Lap();
-  record["seconds_start_and_first_step"] = seconds_start;
+  record["seconds_start_and_first_steps"] = seconds_start;
   record["seconds_other_steps"] = seconds_steps;
   if (on_device)
     RestyleOnDevice(trained.network, &grid);

@@ -1,7 +1,8 @@
 // Stage "render": frames of the field before and after, and what the 2D method makes of the
 // former, at the photos' places and along the film's way; and films.
-#include <algorithm>
 #include <filesystem>
+#include <memory>
+#include <optional>
 
 #include "pipeline/camera_path.h"
 #include "pipeline/capture_store.h"
@@ -9,8 +10,9 @@
 #include "pipeline/field_file.h"
 #include "pipeline/field_renderer.h"
 #include "pipeline/files/image_file.h"
-#include "pipeline/files/video_file.h"
+#include "pipeline/ordered_worker.h"
 #include "pipeline/photo_gains.h"
+#include "pipeline/run_films.h"
 #include "pipeline/scene_views.h"
 #include "pipeline/stages/object_edit.h"
 #include "pipeline/stages/run_context.h"
@@ -18,61 +20,6 @@
 
 namespace regrade {
 namespace {
-
-// Left of the border the one, right of it the other; the border crosses the frame and returns.
-Image Wiped(const Image& left, const Image& right, int frame, int frames) {
-  const double phase = 2.0 * frame / std::max(1, frames - 1);
-  const double share = phase <= 1 ? phase : 2 - phase;
-  const int border = static_cast<int>(share * left.width);
-  Image mixed = left;
-  for (int y = 0; y < left.height; ++y)
-    for (int x = border; x < left.width; ++x)
-      std::copy_n(right.at(x, y), right.channels, mixed.at(x, y));
-  return mixed;
-}
-
-// Films of frames that are on disk already, of the sequences `prefix` + "source" and "styled",
-// and of "views_2d" where there is one. A machine without H.264 has none.
-void WriteFilms(RunContext* context, const std::string& prefix, int frames,
-                const ProgressFunction& progress, std::vector<std::string>* outputs) {
-  const Workspace& workspace = *context->workspace;
-  const auto frame = [&](const char* sequence, int i) {
-    return ReadImage(workspace.Path("frames/" + prefix + sequence + "/" + FrameName(i)));
-  };
-  const Image first = frame("styled", 0);
-  std::filesystem::remove(workspace.Path("views_2d.mp4"));  // of a method that had one
-  try {
-    VideoWriter film(workspace.Path("styled.mp4"), first.width, first.height,
-                     context->settings.render.fps);
-    VideoWriter wipe(workspace.Path("source_vs_styled.mp4"), first.width, first.height,
-                     context->settings.render.fps);
-    std::optional<VideoWriter> frame_by_frame;
-    if (std::filesystem::exists(workspace.Path("frames/" + prefix + "views_2d")))
-      frame_by_frame.emplace(workspace.Path("views_2d.mp4"), first.width, first.height,
-                             context->settings.render.fps);
-    for (int i = 0; i < frames; ++i) {
-      if (Report(progress, i, frames, "films") == Verdict::kAbort) throw Interrupted();
-      const Image styled = frame("styled", i), source = frame("source", i);
-      if (!styled.SameSize(first)) {
-        context->console->Info("no film: the photos have different sizes");
-        return;
-      }
-      film.Add(styled);
-      wipe.Add(Wiped(source, styled, i, frames));
-      if (frame_by_frame) frame_by_frame->Add(frame("views_2d", i));
-    }
-    film.Finish();
-    wipe.Finish();
-    outputs->insert(outputs->end(), {"styled.mp4", "source_vs_styled.mp4"});
-    if (frame_by_frame) {
-      frame_by_frame->Finish();
-      outputs->push_back("views_2d.mp4");
-    }
-  } catch (const Error& error) {
-    if (error.code() != ExitCode::kExternalProgram) throw;
-    context->console->Warn("no film: " + error.what_failed());
-  }
-}
 
 // The two fields and the 2D method that frames are made with.
 struct Studio {
@@ -83,27 +30,69 @@ struct Studio {
   double styled_seconds = 0;                 // spent in rendering the restyled field
 };
 
-// frames/<prefix>{source, styled, views_2d, transmittance}/<index>.png, as a camera of that
-// gain shows them; views_2d for methods that can style a render
-void RenderFrame(RunContext* context, Studio* studio, const Camera& camera,
-                 const PhotoGain& gain, const std::string& prefix, int index) {
-  Workspace& workspace = *context->workspace;
+// A camera's frames as they are written.
+struct Frame {
+  Image source, styled, transmittance;
+  std::optional<Image> views_2d;  // of methods that can style a render
+};
+
+// As a camera of that gain shows the scene.
+Frame RenderFrame(RunContext* context, Studio* studio, const Camera& camera,
+                  const PhotoGain& gain, int index) {
+  Frame frame;
   RenderedView plain = studio->source.Render(camera);
   const double begin = context->console->StageSeconds();
-  RenderedView restyled = studio->styled.Render(camera);
+  frame.styled = studio->styled.Render(camera).color;
   studio->styled_seconds += context->console->StageSeconds() - begin;
-  PutGain(gain, &plain.color);
-  PutGain(gain, &restyled.color);
-  const std::string folder = "frames/" + prefix, name = "/" + FrameName(index);
-  WritePng8(workspace.NewPath(folder + "source" + name), plain.color);
-  WritePng8(workspace.NewPath(folder + "styled" + name), restyled.color);
+  frame.source = std::move(plain.color);
+  frame.transmittance = std::move(plain.transmittance);
+  PutGain(gain, &frame.source);
+  PutGain(gain, &frame.styled);
   if (studio->object != nullptr) studio->coverage = studio->object->Render(camera);
   if (studio->stylizer->StylesAnything())
-    WritePng8(workspace.NewPath(folder + "views_2d" + name),
-              studio->stylizer->Stylize(plain.color, index));
-  // Where no scene is seen; evaluation leaves it out.
-  WritePng8(workspace.NewPath(folder + "transmittance" + name), plain.transmittance);
+    frame.views_2d = studio->stylizer->Stylize(frame.source, index);
+  return frame;
 }
+
+// Writes files and films while the next frames are rendered, on a thread for each half of the
+// pictures and one for the films, which a GPU's frames would wait for.
+class FrameWriter {
+ public:
+  FrameWriter(const Workspace& workspace, RunFilms* films)
+      : workspace_(workspace), films_(films) {}
+
+  // frames/<prefix>{source, styled, views_2d, transmittance}/<index>.png
+  void Write(const std::shared_ptr<const Frame>& frame, const std::string& prefix, int index,
+             bool of_film) {
+    const auto write = [this, prefix, index](const char* sequence, const Image& image) {
+      WritePng8(workspace_.NewPath("frames/" + prefix + sequence + "/" + FrameName(index)),
+                image);
+    };
+    before_.Do([=] {
+      write("source", frame->source);
+      write("transmittance", frame->transmittance);  // evaluation looks away where it is high
+    });
+    after_.Do([=] {
+      write("styled", frame->styled);
+      if (frame->views_2d) write("views_2d", *frame->views_2d);
+    });
+    if (!of_film) return;
+    film_.Do([=, this] {
+      films_->Add(index, frame->source, frame->styled,
+                  frame->views_2d ? &*frame->views_2d : nullptr);
+    });
+  }
+  void Finish() {
+    before_.Finish();
+    after_.Finish();
+    film_.Finish();
+  }
+
+ private:
+  const Workspace& workspace_;
+  RunFilms* films_;
+  OrderedWorker before_, after_, film_;
+};
 
 StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   const RunSettings& settings = context->settings;
@@ -139,21 +128,25 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
       settings.render.keep_exposure ? RecordedGains(workspace, capture) : PhotoGains();
   std::filesystem::remove_all(workspace.Path("frames"));
   const int num_views = static_cast<int>(views.size()), num_way = static_cast<int>(way.size());
-  constexpr double kFilms = 0.1;  // of the frames' time
-  ProgressParts parts(progress, 1 + kFilms);
-  const ProgressFunction frames_progress = parts.Next(1);
-  for (int i = 0; i < num_views + num_way; ++i) {
-    if (Report(frames_progress, i, num_views + num_way) == Verdict::kAbort) throw Interrupted();
-    if (i < num_views)
-      RenderFrame(context, &studio, views[static_cast<size_t>(i)], gains.Of(i), "", i);
-    else
-      RenderFrame(context, &studio, way[static_cast<size_t>(i - num_views)], kAsTaken,
-                  kPathPrefix, i - num_views);
-  }
   StageOutcome outcome;
   outcome.outputs = {"frames"};
-  WriteFilms(context, film_of_views ? "" : kPathPrefix, film_of_views ? num_views : num_way,
-             parts.Next(kFilms), &outcome.outputs);
+  RunFilms films(workspace, settings.render.fps, film_of_views ? num_views : num_way);
+  {
+    FrameWriter writer(workspace, &films);
+    for (int i = 0; i < num_views + num_way; ++i) {
+      if (Report(progress, i, num_views + num_way) == Verdict::kAbort) throw Interrupted();
+      const bool of_view = i < num_views;
+      const int index = of_view ? i : i - num_views;
+      const auto& cameras = of_view ? views : way;
+      writer.Write(std::make_shared<const Frame>(
+                       RenderFrame(context, &studio, cameras[static_cast<size_t>(index)],
+                                   of_view ? gains.Of(i) : kAsTaken, index)),
+                   of_view ? "" : kPathPrefix, index, of_view == film_of_views);
+    }
+    writer.Finish();
+  }
+  films.Finish(&outcome.outputs);
+  if (!films.why_none().empty()) context->console->Warn("no film: " + films.why_none());
   const int frames = num_views + num_way;
   outcome.figures["device"] = DeviceName(backend);
   outcome.figures["frames"] = frames;

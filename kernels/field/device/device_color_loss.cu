@@ -1,3 +1,4 @@
+#include "kernels/base/device_stream.h"
 #include "kernels/base/launch_size.h"
 #include "kernels/field/color_error.h"
 #include "kernels/field/device/device_color_loss.h"
@@ -46,8 +47,8 @@ __global__ void ColorLossKernel(const Vec3f* color, const Vec3f* targets,
 void AddColorLoss(const Vec3f* color, const Vec3f* targets, const float* transmittance,
                   int64_t n, const ColorLossRule& rule, Vec3f* d_color, DeviceColorLoss* sums) {
   if (n == 0) return;
-  ColorLossKernel<<<BlocksFor(n), kThreads>>>(color, targets, transmittance, n, rule, d_color,
-                                              sums);
+  ColorLossKernel<<<BlocksFor(n), kThreads, 0, LaunchStream()>>>(color, targets, transmittance,
+                                                                 n, rule, d_color, sums);
   CheckLaunch("color_loss");
 }
 

@@ -1,8 +1,10 @@
 #include <algorithm>
 
+#include "kernels/base/device_stream.h"
 #include "kernels/field/device/device_ray_weights.h"
 #include "kernels/field/device/gradient_view.h"
 #include "kernels/field/device/launch.h"
+#include "kernels/field/device/warp_item.h"
 #include "kernels/field/device/warp_shade.h"
 
 namespace regrade {
@@ -75,53 +77,6 @@ __global__ void AssignSlotsKernel(uint32_t* touched, int64_t words, int32_t* slo
   }
 }
 
-// A warp a voxel.
-__global__ void GatherRowsKernel(DeviceGridView grid, int basis, const int32_t* voxels,
-                                 int64_t first, int64_t n, float position_scale, float* rows) {
-  const int64_t i = (blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x) / 32;
-  if (i >= n) return;
-  const int lane = static_cast<int>(threadIdx.x & 31);
-  const int64_t voxel = voxels != nullptr ? voxels[i] : first + i;
-  float value = 0;
-  if (lane < 27) {
-    if (lane % 9 < basis)
-      value = grid.records[voxel * grid.stride + lane / 9 * basis + lane % 9];
-  } else if (lane < 30) {
-    const Vec3i size = grid.frame.resolution;
-    const int32_t vertex = grid.vertex_of_voxel[voxel];
-    const int index = lane == 27   ? vertex / (size.y * size.z)
-                      : lane == 28 ? vertex / size.z % size.y
-                                   : vertex % size.z;
-    const int length = lane == 27 ? size.x : lane == 28 ? size.y : size.z;
-    value = position_scale *
-            (2 * (static_cast<float>(index) + 0.5f) / static_cast<float>(length) - 1);
-  }
-  rows[i * kRowLanes + lane] = value;
-}
-
-__global__ void AddMappedRowsKernel(Mat3f matrix, Vec3f constant, const float* from, int64_t n,
-                                    float* rows) {
-  const int64_t i = (blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x) / 32;
-  if (i >= n) return;
-  const int lane = static_cast<int>(threadIdx.x & 31);
-  if (lane >= 27) return;
-  const int c = lane / 9, k = lane % 9;
-  const float* row = from + i * kRowLanes;
-  float value = k == 0 ? constant[c] : 0.0f;
-  for (int other = 0; other < 3; ++other) value += matrix.row[c][other] * row[other * 9 + k];
-  rows[i * kRowLanes + lane] += value;
-}
-
-__global__ void ScatterRowsKernel(const float* rows, int64_t first, int64_t n, int basis,
-                                  DeviceGridView grid) {
-  const int64_t i = (blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x) / 32;
-  if (i >= n) return;
-  const int lane = static_cast<int>(threadIdx.x & 31);
-  if (lane < 27 && lane % 9 < basis)
-    grid.records[(first + i) * grid.stride + lane / 9 * basis + lane % 9] =
-        rows[i * kRowLanes + lane];
-}
-
 // What a warp knows of its sample: lane c * 9 + k stands for coefficient k of channel c, lane j
 // < 8 for corner j.
 struct WarpSample {
@@ -178,10 +133,11 @@ __global__ void BeginColorsKernel(Vec3f background, const float* transmittance, 
 
 __global__ void BlendColorsKernel(DeviceGridView grid, int basis,
                                   const DeviceWeightedSample* samples, int64_t n,
-                                  const int32_t* slot_of_voxel, const Ray* rays,
-                                  const float* rows, Vec3f* color, uint8_t* open) {
-  const int64_t i = (blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x) / 32;
-  if (i >= n) return;
+                                  const int32_t* counted, const int32_t* slot_of_voxel,
+                                  const Ray* rays, const float* rows, Vec3f* color,
+                                  uint8_t* open) {
+  const int64_t i = ItemOfWarp(n, counted);
+  if (i < 0) return;
   const WarpSample warp(grid, basis, samples[i], slot_of_voxel, rays);
   const float sum = ChannelSums(warp.Blend(rows) * warp.gamma, warp.lane);
   const float value = 0.5f + sum;  // of a channel on its first lane
@@ -196,11 +152,11 @@ __global__ void BlendColorsKernel(DeviceGridView grid, int basis,
 
 __global__ void BlendColorsAdjointKernel(DeviceGridView grid, int basis,
                                          const DeviceWeightedSample* samples, int64_t n,
-                                         const int32_t* slot_of_voxel, const Ray* rays,
-                                         const uint8_t* open, const Vec3f* d_color,
-                                         float* d_rows) {
-  const int64_t i = (blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x) / 32;
-  if (i >= n) return;
+                                         const int32_t* counted, const int32_t* slot_of_voxel,
+                                         const Ray* rays, const uint8_t* open,
+                                         const Vec3f* d_color, float* d_rows) {
+  const int64_t i = ItemOfWarp(n, counted);
+  if (i < 0) return;
   const unsigned bits = open[i];
   if (bits == 0) return;
   const Vec3f d = d_color[samples[i].ray];
@@ -219,87 +175,100 @@ __global__ void BlendColorsAdjointKernel(DeviceGridView grid, int basis,
 }
 
 __global__ void BlendRowsKernel(DeviceGridView grid, const DeviceWeightedSample* samples,
-                                int64_t n, const int32_t* slot_of_voxel, const float* rows,
-                                float* sums) {
-  const int64_t i = (blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x) / 32;
-  if (i >= n) return;
+                                int64_t n, const int32_t* counted, const int32_t* slot_of_voxel,
+                                const float* rows, float* sums) {
+  const int64_t i = ItemOfWarp(n, counted);
+  if (i < 0) return;
   const WarpSample warp(grid, 1, samples[i], slot_of_voxel, nullptr);
   atomicAdd(&sums[int64_t{warp.sample.ray} * kRowLanes + warp.lane],
             warp.sample.weight * warp.Blend(rows));
 }
 
+// What does not fit is not worked on: the step is made again with more room.
+__global__ void LimitToRoomKernel(int64_t sample_room, int64_t slot_room, int32_t* samples,
+                                  int32_t* slots, DeviceRoom* room) {
+  room->samples = *samples;
+  room->slots = *slots;
+  if (*samples <= sample_room && *slots <= slot_room) return;
+  room->short_of = 1;
+  *samples = *slots = 0;
+}
+
 }  // namespace
+
+void DeviceRayWeights::Reserve(int64_t rays, int64_t most_samples) {
+  if (counter.empty()) counter = DeviceBuffer<int32_t>(1, "a counter of samples");
+  if (samples.size() < most_samples) {
+    samples = {};
+    samples = DeviceBuffer<DeviceWeightedSample>(most_samples, "samples of rays");
+  }
+  if (transmittance.size() < rays)
+    transmittance = DeviceBuffer<float>(rays, "transmittances of rays");
+}
+
+void DeviceRayWeights::Launch(const DeviceGrid& grid, const Ray* rays, int64_t n,
+                              const MarchOptions& options, float min_weight,
+                              DeviceTouched* touched) {
+  num_rays = n;
+  num_samples = samples.size();
+  counter.Zero();
+  MarchWeightsKernel<<<BlocksFor(32 * n), kThreads, 0, LaunchStream()>>>(
+      grid.view(), rays, n, options, min_weight, samples.data(), samples.size(), counter.data(),
+      transmittance.data(), touched != nullptr ? touched->bits.data() : nullptr);
+  CheckLaunch("march_weights");
+}
 
 void DeviceRayWeights::March(const DeviceGrid& grid, const Ray* rays, int64_t n,
                              const MarchOptions& options, float min_weight,
                              DeviceTouched* touched) {
   constexpr int64_t kFewest = 1 << 20;  // samples there is room for from the start
-  if (counter.empty()) counter = DeviceBuffer<int32_t>(1, "a counter of samples");
-  if (samples.empty()) samples = DeviceBuffer<DeviceWeightedSample>(kFewest, "samples of rays");
-  if (transmittance.size() < n)
-    transmittance = DeviceBuffer<float>(n, "transmittances of rays");
+  Reserve(n, kFewest);
   num_rays = n;
   num_samples = 0;
   while (n > 0) {
-    counter.Zero();
-    MarchWeightsKernel<<<BlocksFor(32 * n), kThreads>>>(
-        grid.view(), rays, n, options, min_weight, samples.data(), samples.size(),
-        counter.data(), transmittance.data(),
-        touched != nullptr ? touched->bits.data() : nullptr);
-    CheckLaunch("march_weights");
+    Launch(grid, rays, n, options, min_weight, touched);
     int32_t count = 0;
     counter.CopyOut(&count, 1);
     num_samples = count;
     if (num_samples <= samples.size()) break;
-    samples = {};
-    samples =
-        DeviceBuffer<DeviceWeightedSample>(num_samples + num_samples / 4, "samples of rays");
+    Reserve(n, num_samples + num_samples / 4);
   }
 }
 
-void DeviceSlots::Assign(DeviceTouched* touched) {
+void DeviceSlots::Launch(DeviceTouched* touched) {
   counter.Zero();
   const int64_t words = touched->bits.size();
-  AssignSlotsKernel<<<BlocksFor(words), kThreads>>>(
+  AssignSlotsKernel<<<BlocksFor(words), kThreads, 0, LaunchStream()>>>(
       touched->bits.data(), words, slot_of_voxel.data(), voxel_of_slot.data(), counter.data());
   CheckLaunch("assign_slots");
+}
+
+void DeviceSlots::Assign(DeviceTouched* touched) {
+  Launch(touched);
   int32_t count = 0;
   counter.CopyOut(&count, 1);
   num_slots = count;
 }
 
-void GatherRows(const DeviceGrid& grid, const int32_t* voxels, int64_t first, int64_t n,
-                float position_scale, float* rows) {
-  if (n == 0) return;
-  GatherRowsKernel<<<BlocksFor(32 * n), kThreads>>>(grid.view(), grid.basis, voxels, first, n,
-                                                    position_scale, rows);
-  CheckLaunch("gather_rows");
-}
-
-void AddMappedRows(const Mat3f& matrix, const Vec3f& constant, const float* from, int64_t n,
-                   float* rows) {
-  if (n == 0) return;
-  AddMappedRowsKernel<<<BlocksFor(32 * n), kThreads>>>(matrix, constant, from, n, rows);
-  CheckLaunch("add_mapped_rows");
-}
-
-void ScatterRows(const float* rows, int64_t first, int64_t n, DeviceGrid* grid) {
-  if (n == 0) return;
-  ScatterRowsKernel<<<BlocksFor(32 * n), kThreads>>>(rows, first, n, grid->basis, grid->view());
-  CheckLaunch("scatter_rows");
+void LimitToRoom(int64_t slot_room, DeviceRayWeights* weights, DeviceSlots* slots,
+                 DeviceRoom* room) {
+  slots->num_slots = slot_room;
+  LimitToRoomKernel<<<1, 1, 0, LaunchStream()>>>(
+      weights->samples.size(), slot_room, weights->counter.data(), slots->counter.data(), room);
+  CheckLaunch("limit_to_room");
 }
 
 void BlendColors(const DeviceGrid& grid, const DeviceRayWeights& weights,
                  const DeviceSlots& slots, const Ray* rays, const float* rows, Vec3f* color,
                  uint8_t* open) {
   if (weights.num_rays == 0) return;
-  BeginColorsKernel<<<BlocksFor(weights.num_rays), kThreads>>>(
+  BeginColorsKernel<<<BlocksFor(weights.num_rays), kThreads, 0, LaunchStream()>>>(
       grid.background, weights.transmittance.data(), weights.num_rays, color);
   CheckLaunch("begin_colors");
   if (weights.num_samples == 0) return;
-  BlendColorsKernel<<<BlocksFor(32 * weights.num_samples), kThreads>>>(
+  BlendColorsKernel<<<BlocksFor(32 * weights.num_samples), kThreads, 0, LaunchStream()>>>(
       grid.view(), grid.basis, weights.samples.data(), weights.num_samples,
-      slots.slot_of_voxel.data(), rays, rows, color, open);
+      weights.counter.data(), slots.slot_of_voxel.data(), rays, rows, color, open);
   CheckLaunch("blend_colors");
 }
 
@@ -307,9 +276,10 @@ void BlendColorsAdjoint(const DeviceGrid& grid, const DeviceRayWeights& weights,
                         const DeviceSlots& slots, const Ray* rays, const uint8_t* open,
                         const Vec3f* d_color, float* d_rows) {
   if (weights.num_samples == 0) return;
-  BlendColorsAdjointKernel<<<BlocksFor(32 * weights.num_samples), kThreads>>>(
+  BlendColorsAdjointKernel<<<BlocksFor(32 * weights.num_samples), kThreads, 0,
+                             LaunchStream()>>>(
       grid.view(), grid.basis, weights.samples.data(), weights.num_samples,
-      slots.slot_of_voxel.data(), rays, open, d_color, d_rows);
+      weights.counter.data(), slots.slot_of_voxel.data(), rays, open, d_color, d_rows);
   CheckLaunch("blend_colors_adjoint");
 }
 
@@ -317,9 +287,9 @@ void BlendRows(const DeviceGrid& grid, const DeviceRayWeights& weights,
                const DeviceSlots& slots, const float* rows, float* sums) {
   DeviceZero(sums, weights.num_rays * kRowLanes * int64_t{sizeof(float)});
   if (weights.num_samples == 0) return;
-  BlendRowsKernel<<<BlocksFor(32 * weights.num_samples), kThreads>>>(
-      grid.view(), weights.samples.data(), weights.num_samples, slots.slot_of_voxel.data(),
-      rows, sums);
+  BlendRowsKernel<<<BlocksFor(32 * weights.num_samples), kThreads, 0, LaunchStream()>>>(
+      grid.view(), weights.samples.data(), weights.num_samples, weights.counter.data(),
+      slots.slot_of_voxel.data(), rows, sums);
   CheckLaunch("blend_rows");
 }
 
@@ -329,14 +299,16 @@ void DeviceRayWeights::March(const DeviceGrid&, const Ray*, int64_t, const March
                              DeviceTouched*) {
   DeviceWait("march_weights");
 }
+void DeviceRayWeights::Reserve(int64_t, int64_t) { DeviceWait("march_weights"); }
+void DeviceRayWeights::Launch(const DeviceGrid&, const Ray*, int64_t, const MarchOptions&,
+                              float, DeviceTouched*) {
+  DeviceWait("march_weights");
+}
+void DeviceSlots::Launch(DeviceTouched*) { DeviceWait("assign_slots"); }
 void DeviceSlots::Assign(DeviceTouched*) { DeviceWait("assign_slots"); }
-void GatherRows(const DeviceGrid&, const int32_t*, int64_t, int64_t, float, float*) {
-  DeviceWait("gather_rows");
+void LimitToRoom(int64_t, DeviceRayWeights*, DeviceSlots*, DeviceRoom*) {
+  DeviceWait("limit_to_room");
 }
-void AddMappedRows(const Mat3f&, const Vec3f&, const float*, int64_t, float*) {
-  DeviceWait("add_mapped_rows");
-}
-void ScatterRows(const float*, int64_t, int64_t, DeviceGrid*) { DeviceWait("scatter_rows"); }
 void BlendColors(const DeviceGrid&, const DeviceRayWeights&, const DeviceSlots&, const Ray*,
                  const float*, Vec3f*, uint8_t*) {
   DeviceWait("blend_colors");

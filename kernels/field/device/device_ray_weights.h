@@ -7,6 +7,7 @@
 
 #include "kernels/field/device/device_grid.h"
 #include "kernels/field/device/device_rays.h"
+#include "kernels/field/device/device_rows.h"
 
 namespace regrade {
 
@@ -28,6 +29,12 @@ struct DeviceRayWeights {
   // `touched` unless it is null.
   void March(const DeviceGrid& grid, const Ray* rays, int64_t n, const MarchOptions& options,
              float min_weight, DeviceTouched* touched);
+
+  // The same without waiting, in the room that Reserve has made: num_samples is that room, and
+  // how many samples there are stays in `counter`, which may pass it.
+  void Reserve(int64_t rays, int64_t most_samples);
+  void Launch(const DeviceGrid& grid, const Ray* rays, int64_t n, const MarchOptions& options,
+              float min_weight, DeviceTouched* touched);
 };
 
 // Touched voxels in a dense list, near each other where the voxels are.
@@ -39,22 +46,18 @@ struct DeviceSlots {
 
   explicit DeviceSlots(const DeviceGrid& grid);
   void Assign(DeviceTouched* touched);  // and forgets the marks; waits for the device
+  void Launch(DeviceTouched* touched);  // the same without waiting: num_slots is not known
 };
 
-inline constexpr int kRowLanes =
-    32;  // floats of a voxel's row: three channels of nine coefficients, and five more
-
-// rows [n, kRowLanes]: coefficients padded to nine a channel, the place of the voxel in the box
-// times position_scale (see FillFeatures in stylize/lipschitz_network.h), zeros. voxels [n], or
-// null for first, first + 1, ...
-void GatherRows(const DeviceGrid& grid, const int32_t* voxels, int64_t first, int64_t n,
-                float position_scale, float* rows);
-// rows += (matrix (x) I_9) from, and `constant` on each channel's first coefficient. [n,
-// kRowLanes]
-void AddMappedRows(const Mat3f& matrix, const Vec3f& constant, const float* from, int64_t n,
-                   float* rows);
-// The field's own colours from rows [n, kRowLanes] of voxels first, first + 1, ...
-void ScatterRows(const float* rows, int64_t first, int64_t n, DeviceGrid* grid);
+// What a step that the host does not watch asked for, and whether there was room.
+struct DeviceRoom {
+  int32_t samples = 0, slots = 0;
+  int32_t short_of = 0;  // 1 from the first step on that did not fit
+};
+// Behind the two Launch: num_slots becomes `slot_room`. Where samples or slots have no room all
+// of them are dropped, and *room, which lies on the device, says so.
+void LimitToRoom(int64_t slot_room, DeviceRayWeights* weights, DeviceSlots* slots,
+                 DeviceRoom* room);
 
 // The colours of rays whose voxels have the rows of `slots` instead of their own: color [rays]
 // begins with the background and is not clipped at 1. open [samples]: bit c is set where the

@@ -1,0 +1,97 @@
+#include "kernels/base/device_stream.h"
+#include "kernels/base/launch_size.h"
+#include "kernels/field/device/device_rows.h"
+#include "kernels/field/device/warp_item.h"
+
+namespace regrade {
+
+#if defined(__CUDACC__)
+
+namespace {
+
+// A warp a voxel.
+__global__ void GatherRowsKernel(DeviceGridView grid, int basis, const int32_t* voxels,
+                                 int64_t first, int64_t n, const int32_t* counted,
+                                 float position_scale, float* rows) {
+  const int64_t i = ItemOfWarp(n, counted);
+  if (i < 0) return;
+  const int lane = static_cast<int>(threadIdx.x & 31);
+  const int64_t voxel = voxels != nullptr ? voxels[i] : first + i;
+  float value = 0;
+  if (lane < 27) {
+    if (lane % 9 < basis)
+      value = grid.records[voxel * grid.stride + lane / 9 * basis + lane % 9];
+  } else if (lane < 30) {
+    const Vec3i size = grid.frame.resolution;
+    const int32_t vertex = grid.vertex_of_voxel[voxel];
+    const int index = lane == 27   ? vertex / (size.y * size.z)
+                      : lane == 28 ? vertex / size.z % size.y
+                                   : vertex % size.z;
+    const int length = lane == 27 ? size.x : lane == 28 ? size.y : size.z;
+    value = position_scale *
+            (2 * (static_cast<float>(index) + 0.5f) / static_cast<float>(length) - 1);
+  }
+  rows[i * kRowLanes + lane] = value;
+}
+
+__global__ void AddMappedRowsKernel(Mat3f matrix, Vec3f constant, const float* from, int64_t n,
+                                    const int32_t* counted, float* rows) {
+  const int64_t i = ItemOfWarp(n, counted);
+  if (i < 0) return;
+  const int lane = static_cast<int>(threadIdx.x & 31);
+  if (lane >= 27) return;
+  const int c = lane / 9, k = lane % 9;
+  const float* row = from + i * kRowLanes;
+  float value = k == 0 ? constant[c] : 0.0f;
+  for (int other = 0; other < 3; ++other) value += matrix.row[c][other] * row[other * 9 + k];
+  rows[i * kRowLanes + lane] += value;
+}
+
+__global__ void ScatterRowsKernel(const float* rows, int64_t first, int64_t n, int basis,
+                                  DeviceGridView grid) {
+  const int64_t i = ItemOfWarp(n, nullptr);
+  if (i < 0) return;
+  const int lane = static_cast<int>(threadIdx.x & 31);
+  if (lane < 27 && lane % 9 < basis)
+    grid.records[(first + i) * grid.stride + lane / 9 * basis + lane % 9] =
+        rows[i * kRowLanes + lane];
+}
+
+}  // namespace
+
+void GatherRows(const DeviceGrid& grid, const int32_t* voxels, int64_t first, int64_t n,
+                float position_scale, float* rows, const int32_t* counted) {
+  if (n == 0) return;
+  GatherRowsKernel<<<BlocksFor(32 * n), kThreads, 0, LaunchStream()>>>(
+      grid.view(), grid.basis, voxels, first, n, counted, position_scale, rows);
+  CheckLaunch("gather_rows");
+}
+
+void AddMappedRows(const Mat3f& matrix, const Vec3f& constant, const float* from, int64_t n,
+                   float* rows, const int32_t* counted) {
+  if (n == 0) return;
+  AddMappedRowsKernel<<<BlocksFor(32 * n), kThreads, 0, LaunchStream()>>>(
+      matrix, constant, from, n, counted, rows);
+  CheckLaunch("add_mapped_rows");
+}
+
+void ScatterRows(const float* rows, int64_t first, int64_t n, DeviceGrid* grid) {
+  if (n == 0) return;
+  ScatterRowsKernel<<<BlocksFor(32 * n), kThreads, 0, LaunchStream()>>>(rows, first, n, grid->basis, grid->view());
+  CheckLaunch("scatter_rows");
+}
+
+#else
+
+void GatherRows(const DeviceGrid&, const int32_t*, int64_t, int64_t, float, float*,
+                const int32_t*) {
+  DeviceWait("gather_rows");
+}
+void AddMappedRows(const Mat3f&, const Vec3f&, const float*, int64_t, float*, const int32_t*) {
+  DeviceWait("add_mapped_rows");
+}
+void ScatterRows(const float*, int64_t, int64_t, DeviceGrid*) { DeviceWait("scatter_rows"); }
+
+#endif
+
+}  // namespace regrade

@@ -1,0 +1,77 @@
+// Jobs that a second thread does: in order, few at a time, and with their errors.
+#include "pipeline/ordered_worker.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <memory>
+#include <stdexcept>
+#include <vector>
+
+namespace regrade {
+namespace {
+
+TEST(OrderedWorker, DoesAllJobsInOrder) {
+  std::vector<int> done;
+  OrderedWorker worker;
+  for (int i = 0; i < 100; ++i) worker.Do([&done, i] { done.push_back(i); });
+  worker.Finish();
+  ASSERT_EQ(done.size(), 100u);
+  for (int i = 0; i < 100; ++i) EXPECT_EQ(done[static_cast<size_t>(i)], i);
+}
+
+// What jobs hold is bounded: those that wait, one at work, and the one that is offered.
+TEST(OrderedWorker, HoldsFewJobs) {
+  std::atomic<int> held = 0, most = 0;
+  struct Load {
+    std::atomic<int>& held;
+    Load(std::atomic<int>& held, std::atomic<int>& most) : held(held) {
+      const int now = ++held;
+      if (now > most) most = now;
+    }
+    ~Load() { --held; }
+  };
+  OrderedWorker worker(2);
+  for (int i = 0; i < 50; ++i) {
+    auto load = std::make_shared<Load>(held, most);
+    worker.Do([load] { std::this_thread::sleep_for(std::chrono::milliseconds(1)); });
+  }
+  worker.Finish();
+  EXPECT_LE(most, 4);
+  EXPECT_EQ(held, 0);
+}
+
+TEST(OrderedWorker, AnErrorComesBackAndNothingIsDoneAfterIt) {
+  std::atomic<int> done = 0;
+  OrderedWorker worker;
+  worker.Do([&done] { ++done; });
+  worker.Do([] { throw std::runtime_error("the disk is full"); });
+  EXPECT_THROW(
+      {
+        for (int i = 0; i < 10; ++i) worker.Do([&done] { ++done; });
+        worker.Finish();
+      },
+      std::runtime_error);
+  EXPECT_EQ(done, 1);
+  EXPECT_THROW(worker.Finish(), std::runtime_error);
+}
+
+TEST(OrderedWorker, WhoLeavesDropsWhatWaits) {
+  std::atomic<int> done = 0;
+  std::atomic<bool> go = false;
+  {
+    OrderedWorker worker(2);
+    worker.Do([&] {
+      while (!go) std::this_thread::yield();
+      ++done;
+    });
+    worker.Do([&done] { ++done; });
+    worker.Do([&done] { ++done; });
+    go = true;
+  }
+  EXPECT_GE(done, 1);
+  EXPECT_LE(done, 3);
+}
+
+}  // namespace
+}  // namespace regrade
