@@ -58,7 +58,8 @@ class FitEngine {
 // `rays` and what it was made from stay with the caller. shards: gradient arenas of the CPU.
 std::unique_ptr<FitEngine> MakeCpuFitEngine(const TrainingRays* rays, uint64_t seed,
                                             int shards);
-// Throws Error(kResources) without CUDA.
-std::unique_ptr<FitEngine> MakeCudaFitEngine(const TrainingRays* rays, uint64_t seed);
+// Throws Error(kResources) without CUDA. exact_sums: see FitOptions.
+std::unique_ptr<FitEngine> MakeCudaFitEngine(const TrainingRays* rays, uint64_t seed,
+                                             bool exact_sums);
 
 }  // namespace regrade

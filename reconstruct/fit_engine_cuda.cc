@@ -1,5 +1,6 @@
 // Steps of a fit on a CUDA device: photos, field, gradients and moments live there; the host
-// only says what comes next. Float sums in no fixed order, so two runs differ in the last bits.
+// only says what comes next. Float sums in no fixed order, so two runs differ in the last bits
+// unless sums are exact.
 #include <algorithm>
 #include <optional>
 #include <utility>
@@ -17,11 +18,11 @@ constexpr int64_t kSampleStoreBytes = int64_t{1} << 30;
 
 class CudaFitEngine : public FitEngine {
  public:
-  CudaFitEngine(const TrainingRays* rays, uint64_t seed)
-      : seed_(seed), views_(rays->ToDevice()) {}
+  CudaFitEngine(const TrainingRays* rays, uint64_t seed, bool exact_sums)
+      : seed_(seed), exact_sums_(exact_sums), views_(rays->ToDevice()) {}
 
   void Take(FitState state) override {
-    grid_ = UploadGrid(state.grid, true, state.second_moment);
+    grid_ = UploadGrid(state.grid, true, state.second_moment, exact_sums_);
     Renew();
   }
   void Show(const std::function<void(FitState*)>& use) override {
@@ -103,6 +104,7 @@ class CudaFitEngine : public FitEngine {
   }
 
   uint64_t seed_;
+  bool exact_sums_;
   DeviceViews views_;
   DeviceGrid grid_;
   DeviceTouched touched_;
@@ -114,10 +116,11 @@ class CudaFitEngine : public FitEngine {
 
 }  // namespace
 
-std::unique_ptr<FitEngine> MakeCudaFitEngine(const TrainingRays* rays, uint64_t seed) {
+std::unique_ptr<FitEngine> MakeCudaFitEngine(const TrainingRays* rays, uint64_t seed,
+                                             bool exact_sums) {
   const DeviceStatus device = ReadDeviceStatus();
   if (!device.found) throw Error(ExitCode::kResources, device.name, "GPU", "use --device cpu");
-  return std::make_unique<CudaFitEngine>(rays, seed);
+  return std::make_unique<CudaFitEngine>(rays, seed, exact_sums);
 }
 
 }  // namespace regrade

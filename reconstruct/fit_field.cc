@@ -44,7 +44,7 @@ class Fitter {
     }
     REGRADE_CHECK(!box.spheres || backend == Backend::kCpu);  // the GPU has no spheres yet
     if (backend == Backend::kCuda)
-      engine_ = MakeCudaFitEngine(&rays_, options.seed);
+      engine_ = MakeCudaFitEngine(&rays_, options.seed, options.exact_sums);
     else
       engine_ = MakeCpuFitEngine(&rays_, options.seed,
                                  options.shards > 0 ? options.shards : omp_get_max_threads());

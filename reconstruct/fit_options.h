@@ -40,6 +40,7 @@ struct FitOptions {
   float initial_background_density = 0.1f;
   float background_lead = 0.9f;
   int shards = 0;
+  bool exact_sums = false;
   uint64_t seed = 0;
 
   template <typename Bind>
@@ -161,6 +162,9 @@ struct FitOptions {
          {.help = "gradient arenas; 0: one a thread, or 4 with --reproducible",
           .min = 0,
           .max = 64});
+    bind("fit-exact-sums", exact_sums,
+         {.help = "GPU: gradients are summed as integers, so that two fits of the same photos "
+                  "are the same to the bit; slower, and a third more memory"});
   }
 };
 

@@ -90,9 +90,8 @@ class DeviceTraining::Recording {
       if (i + 1 < state.step) continue;
       steps.last = {step.loss, step.squared_error, static_cast<int64_t>(step.rays),
                     step.touched, step.samples};
-      const double divisor = options_.divide_by_voxels
-                                 ? static_cast<double>(grid_.num_voxels())
-                                 : 3.0 * static_cast<double>(step.rays);
+      const double divisor = options_.divide_by_voxels ? static_cast<double>(grid_.num_voxels())
+                                                       : 3.0 * static_cast<double>(step.rays);
       steps.last.loss = step.rays > 0 ? step.loss / divisor : 0;
     }
     return steps;

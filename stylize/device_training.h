@@ -31,11 +31,11 @@ class DeviceTraining {
              const LipschitzNetwork& network, const AdamState& adam);
 
   struct Steps {
-    int64_t made = 0;        // fewer than begun where two in a row were not finite
-    AggregationResult last;  // of the last one
-    double touched_voxels = 0;     // summed over the steps
-    bool stopped = false;          // two in a row were not finite
-    std::vector<float> gradient;   // of the last step, if it stopped
+    int64_t made = 0;             // fewer than begun where two in a row were not finite
+    AggregationResult last;       // of the last one
+    double touched_voxels = 0;    // summed over the steps
+    bool stopped = false;         // two in a row were not finite
+    std::vector<float> gradient;  // of the last step, if it stopped
   };
   // Waits, and gives the weights and moments after the last step.
   Steps End(LipschitzNetwork* network, AdamState* adam);

@@ -1,5 +1,4 @@
 #include "kernels/base/device_graph.h"
-
 #include "kernels/base/device_memory.h"
 #include "kernels/base/device_stream.h"
 #include "kernels/base/error.h"

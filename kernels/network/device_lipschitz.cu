@@ -1,9 +1,8 @@
-#include "kernels/network/device_lipschitz.h"
-
 #include <cfloat>
 
 #include "kernels/base/device_stream.h"
 #include "kernels/base/error.h"
+#include "kernels/network/device_lipschitz.h"
 #include "kernels/network/lipschitz_layer.h"
 #include "kernels/optimize/schedule.h"
 
@@ -33,9 +32,9 @@ DeviceLipschitz::View DeviceLipschitz::GetView() const {
 
 namespace {
 
-constexpr int kLayerThreads = 256;   // of the block that has a layer
+constexpr int kLayerThreads = 256;    // of the block that has a layer
 constexpr int kUpdateThreads = 1024;  // of the one block that has all
-constexpr int kSide = 64;            // no layer is wider
+constexpr int kSide = 64;             // no layer is wider
 constexpr int kSideStride = kSide + 1;
 
 // The sum, or the largest, over a block, in every thread; `scratch` [32].
@@ -76,8 +75,8 @@ __device__ float MultiplyAndNormalize(SharedLayer* layer, int rows, int columns,
   float sum = 0;
   if (row < rows)
     for (int c = part; c < columns; c += 4)
-      sum += layer->matrix[kTransposed ? c * kSideStride + row : row * kSideStride + c] *
-             from[c];
+      sum +=
+          layer->matrix[kTransposed ? c * kSideStride + row : row * kSideStride + c] * from[c];
   sum += __shfl_xor_sync(0xffffffffu, sum, 1);
   sum += __shfl_xor_sync(0xffffffffu, sum, 2);
   const bool mine = row < rows && part == 0;
@@ -131,8 +130,7 @@ __global__ void __launch_bounds__(kLayerThreads)
   if (thread < inputs) layer.v[thread] = v[thread];
   __syncthreads();
   for (int step = 0; step < all.rule.norm_steps && scale > 0; ++step) {
-    const float length =
-        MultiplyAndNormalize<true>(&layer, inputs, outputs, layer.u, layer.v);
+    const float length = MultiplyAndNormalize<true>(&layer, inputs, outputs, layer.u, layer.v);
     if (!(length > FLT_EPSILON * sqrtf(square))) StartAtLongestColumn(&layer, outputs, inputs);
     MultiplyAndNormalize<false>(&layer, outputs, inputs, layer.v, layer.u);
   }
@@ -169,8 +167,8 @@ __global__ void __launch_bounds__(kLayerThreads)
   const double k = weight[size + outputs];
   const float *u = all.vectors + all.shape.vectors[l], *v = u + outputs;
   const double* from = d_mlp + all.shape.mlp[l];
-  const double divisor = all.rule.loss_divisor > 0 ? all.rule.loss_divisor
-                                                   : 3 * static_cast<double>(*rays);
+  const double divisor =
+      all.rule.loss_divisor > 0 ? all.rule.loss_divisor : 3 * static_cast<double>(*rays);
   const double share = *rays > 0 ? 1 / divisor : 0.0;
   const auto d_a = [&](int o, int c) {
     const double in = l == 0 && c < all.rule.scaled_inputs ? all.rule.input_scale : 1.0;
@@ -201,8 +199,7 @@ __global__ void __launch_bounds__(kLayerThreads)
   if (thread < outputs)
     give(size + thread, share * from[all.shape.mlp_outputs[l] * stride + thread]);
   if (thread != 0) return;
-  const double pull =
-      all.rule.lambda * SquareplusDerivative(k - all.rule.layer_target);
+  const double pull = all.rule.lambda * SquareplusDerivative(k - all.rule.layer_target);
   give(size + outputs,
        all.rule.fixed_norms ? 0.0 : share * SquareplusDerivative(k) * inner + pull);
 }
@@ -228,8 +225,8 @@ __global__ void __launch_bounds__(kUpdateThreads)
   const bool made = *step.skip == 0 && state.halted == 0, bad = *all.not_finite != 0;
   const int64_t t = state.adam_steps + 1;
   const AdamOptions adam = all.rule.adam;
-  const double rate = CosineAnnealing(state.step, all.rule.steps, all.rule.rate_first,
-                                      all.rule.rate_last);
+  const double rate =
+      CosineAnnealing(state.step, all.rule.steps, all.rule.rate_first, all.rule.rate_last);
   const float forward = static_cast<float>(rate / AdamBiasCorrection(adam.beta1, t));
   const float inverse = static_cast<float>(1 / AdamBiasCorrection(adam.beta2, t));
   const int size = all.shape.parameters[all.shape.layers];

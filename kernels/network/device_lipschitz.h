@@ -1,6 +1,6 @@
 // Learning the weights of a Lipschitz network on a CUDA device, without the host: norms,
-// weights as they act, gradient, regularisation, Adam and the limit of the bound; see EQ(lipschitz-layer),
-// see EQ(liprf-regularizer) and see EQ(adam), which the CPU has. Held to
+// weights as they act, gradient, regularisation, Adam and the limit of the bound; see
+// EQ(lipschitz-layer), see EQ(liprf-regularizer) and see EQ(adam), which the CPU has. Held to
 // stylize/train_network.cc by the parity table.
 #pragma once
 
@@ -19,19 +19,19 @@ struct LipschitzRule {
   int64_t steps = 0;  // of the whole learning; the rate falls along EQ(cosine-annealing)
   double rate_first = 0, rate_last = 0;
   AdamOptions adam;
-  int norm_steps = 1;       // of the power iteration before each step
-  double lambda = 0;        // of the regularisation towards layer_target; 0 for none
+  int norm_steps = 1;  // of the power iteration before each step
+  double lambda = 0;   // of the regularisation towards layer_target; 0 for none
   double layer_target = 0;
-  bool fixed_norms = false;    // K does not learn
-  double product_limit = 0;    // of all squareplus(K_i); infinite for none
-  float input_scale = 1;       // of the first scaled_inputs inputs
+  bool fixed_norms = false;  // K does not learn
+  double product_limit = 0;  // of all squareplus(K_i); infinite for none
+  float input_scale = 1;     // of the first scaled_inputs inputs
   int scaled_inputs = 0;
-  double loss_divisor = 0;     // the loss is a sum over this; 0: over 3 x the rays that count
+  double loss_divisor = 0;  // the loss is a sum over this; 0: over 3 x the rays that count
 };
 
 // Of one step, as it was before its weights moved.
 struct LearnedStep {
-  double loss = 0;           // a sum, not yet divided
+  double loss = 0;  // a sum, not yet divided
   double squared_error = 0;
   unsigned long long rays = 0;
   int32_t samples = 0, touched = 0;
@@ -78,8 +78,8 @@ class DeviceLipschitz {
   static constexpr int kMaxLayers = 8;
   struct Shape {
     int layers = 0;
-    int outputs[kMaxLayers], inputs[kMaxLayers];      // as they are
-    int mlp_outputs[kMaxLayers], mlp_inputs[kMaxLayers];  // padded
+    int outputs[kMaxLayers], inputs[kMaxLayers];                               // as they are
+    int mlp_outputs[kMaxLayers], mlp_inputs[kMaxLayers];                       // padded
     int parameters[kMaxLayers + 1], vectors[kMaxLayers + 1], mlp[kMaxLayers];  // offsets
   };
   struct View;

@@ -37,13 +37,6 @@ void Row(const char* body, int basis, const char* against, double error, double 
   testing::ParityRow(body, "basis " + std::to_string(basis), against, error, tolerance);
 }
 
-Buffer<float> GradientOf(const DeviceGrid& grid) {
-  const int64_t row = 4 * grid.lanes();
-  Buffer<float> gradient(grid.num_voxels() * grid.lanes());
-  DeviceCopyRows(gradient.data(), row, grid.gradient(), 3 * row, row, grid.num_voxels());
-  return gradient;
-}
-
 // H70: 2e-5 a pixel against the plain body in float and in double; H84: skipping empty space
 // leaves the picture as it is.
 TEST_P(DeviceParity, Render) {
@@ -227,7 +220,7 @@ TEST_P(DeviceParity, FitGradient) {
   fitter.Accumulate(grid, device_rays.data(), device_targets.data(), rays.size(), scale,
                     &touched_voxels);
   const DeviceFitSums sums = fitter.TakeSums();
-  const Buffer<float> g = GradientOf(grid);
+  const Buffer<float> g = DownloadGradient(grid);
   const Buffer<uint32_t> touched = touched_voxels.bits.ToHost();
 
   std::vector<double> d_density(in_double.density.size()), d_sh(in_double.sh.size());
@@ -272,7 +265,7 @@ TEST_P(DeviceParity, TotalVariation) {
   // All voxels, beginning somewhere: the run wraps around.
   AddTotalVariation(grid, begin, n, 0.3f, 0.2f, &touched);
   DeviceWait("total variation");
-  const Buffer<float> g = GradientOf(grid);
+  const Buffer<float> g = DownloadGradient(grid);
   const int lanes = host.lanes();
   std::vector<double> records(static_cast<size_t>(n * lanes)), expected(records.size());
   for (int64_t i = 0; i < n * lanes; ++i) records[static_cast<size_t>(i)] = host.records[i];
@@ -337,7 +330,7 @@ TEST_P(DeviceParity, Step) {
   Row("step", basis(), "definition in double", off, 1e-5);
   const int32_t vertex = after.vertex_of_voxel[5];
   EXPECT_EQ(densities[vertex], after.records[5 * lanes + DensityLane(basis())]);
-  for (const float rest : GradientOf(grid)) ASSERT_EQ(rest, 0.0f);
+  for (const float rest : DownloadGradient(grid)) ASSERT_EQ(rest, 0.0f);
   for (const uint32_t rest : marks.bits.ToHost()) ASSERT_EQ(rest, 0u);
 }
 

@@ -50,7 +50,7 @@ __device__ inline void AddQuad(float* target, const float4& v) {
 
 // Adds the gradients of `count` samples, the i-th of them held by lane i, to the corners'
 // records: d / d value = sum_c of[c] d_raw[c] + density d_sigma.
-template <int kBasis>
+template <int kBasis, bool kExact>
 __device__ void ScatterChunk(const DeviceGridView& grid, const LaneValues<kBasis>& values,
                              const float4& place, const Vec3f& d_raw, float d_sigma, int count,
                              const GradientView& gradient, int lane) {
@@ -78,8 +78,14 @@ __device__ void ScatterChunk(const DeviceGridView& grid, const LaneValues<kBasis
       const int32_t link = links.Of(k);
       if (link < 0) continue;
       const float weight = CornerWeight(fraction, k);
-      AddQuad(mine + link * grid.stride,
-              {weight * own[0], weight * own[1], weight * own[2], weight * own[3]});
+      if constexpr (kExact) {
+        const int first = lane % Layout::kGroup * Layout::kValues;
+        for (int i = 0; i < Layout::kValues; ++i)
+          AddExact(gradient.gradient + link * grid.stride, first + i, weight * own[i]);
+      } else {
+        AddQuad(mine + link * grid.stride,
+                {weight * own[0], weight * own[1], weight * own[2], weight * own[3]});
+      }
     }
   }
 }
@@ -87,7 +93,7 @@ __device__ void ScatterChunk(const DeviceGridView& grid, const LaneValues<kBasis
 // The way back along a ray; see EQ(composite-adjoint). Its recursion R_i = alpha_i c_i + (1 -
 // alpha_i) R_{i+1} is a chain of maps x -> b + a x; 32 of them are composed by a scan, and as
 // all a and b are positive nothing cancels.
-template <int kBasis>
+template <int kBasis, bool kExact>
 __device__ void WalkBack(const DeviceGridView& grid, const LaneValues<kBasis>& values,
                          const SampleStore& store, int count, float delta, const Vec3f& d_color,
                          const GradientView& gradient, int lane) {
@@ -136,12 +142,13 @@ __device__ void WalkBack(const DeviceGridView& grid, const LaneValues<kBasis>& v
     for (int c = 0; c < 3; ++c)
       behind[c] = __shfl_sync(kAllLanes, chain_b[c], 31) + last_a * behind[c];
 
-    ScatterChunk<kBasis>(grid, values, place, d_raw, d_sigma, min(32, end), gradient, lane);
+    ScatterChunk<kBasis, kExact>(grid, values, place, d_raw, d_sigma, min(32, end), gradient,
+                                 lane);
     __syncwarp();
   }
 }
 
-template <int kBasis>
+template <int kBasis, bool kExact>
 __global__ void FitRaysKernel(DeviceGridView grid, const Ray* rays, const Vec3f* targets, int n,
                               MarchOptions options, float scale, GradientView gradient,
                               float* store_memory, int64_t capacity, int32_t* next_ray,
@@ -201,8 +208,8 @@ __global__ void FitRaysKernel(DeviceGridView grid, const Ray* rays, const Vec3f*
     squared_error += static_cast<double>(Dot(error, error));
     samples += static_cast<unsigned>(count);
     __syncwarp();  // colours were written by some lanes and are read by others now
-    WalkBack<kBasis>(grid, values, store, count, march.delta(), error * (2 * scale), gradient,
-                     lane);
+    WalkBack<kBasis, kExact>(grid, values, store, count, march.delta(), error * (2 * scale),
+                             gradient, lane);
   }
   if (lane == 0) {
     atomicAdd(&sums->squared_error, squared_error);
@@ -233,8 +240,8 @@ void DeviceRayFitter::Accumulate(const DeviceGrid& grid, const Ray* rays, const 
   next_ray_.Zero();
   REGRADE_CHECK(grid.fitting);
   const GradientView view{grid.gradient(), touched->bits.data()};
-  ByBasis(grid.basis, [&](auto basis) {
-    FitRaysKernel<basis.value>
+  ByBasis(grid.basis, grid.exact_sums, [&](auto basis, auto exact) {
+    FitRaysKernel<basis.value, exact.value>
         <<<static_cast<unsigned>(warps_ / kWarpsPerBlock), 32 * kWarpsPerBlock>>>(
             grid.view(), rays, targets, static_cast<int>(n), options_, scale, view,
             store_.data(), capacity_, next_ray_.data(), sums_.data());

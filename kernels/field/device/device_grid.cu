@@ -1,5 +1,6 @@
 // Upload, download, and what follows from links and records.
 #include "kernels/field/device/device_grid.h"
+#include "kernels/field/device/gradient_view.h"
 #include "kernels/field/device/launch.h"
 
 namespace regrade {
@@ -20,7 +21,8 @@ DeviceGridView DeviceGrid::view() const {
        static_cast<float>(frame.resolution.z - 1)}};
 }
 
-DeviceGrid UploadGrid(const FastGrid& grid, bool fitting, const Buffer<float>& second_moment) {
+DeviceGrid UploadGrid(const FastGrid& grid, bool fitting, const Buffer<float>& second_moment,
+                      bool exact_sums) {
   DeviceGrid device;
   device.frame = grid.frame;
   device.basis = grid.basis;
@@ -28,13 +30,14 @@ DeviceGrid UploadGrid(const FastGrid& grid, bool fitting, const Buffer<float>& s
   device.near_clip = grid.near_clip;
   device.links = DeviceBuffer<int32_t>::Of(grid.links, "links");
   device.fitting = fitting;
+  device.exact_sums = exact_sums;
   const int64_t n = grid.num_voxels(), row = device.lanes() * int64_t{sizeof(float)};
   device.records = DeviceBuffer<float>(n * device.stride(), "voxels");
   device.records.Zero();
-  DeviceCopyRows(device.records.data(), fitting ? 3 * row : row, grid.records.data(), row, row,
-                 n);
+  const int64_t pitch = device.stride() * int64_t{sizeof(float)};
+  DeviceCopyRows(device.records.data(), pitch, grid.records.data(), row, row, n);
   if (fitting && second_moment.size() == grid.records.size())
-    DeviceCopyRows(device.second_moment(), 3 * row, second_moment.data(), row, row, n);
+    DeviceCopyRows(device.second_moment(), pitch, second_moment.data(), row, row, n);
   RefreshDerived(&device, grid.num_voxels());
   return device;
 }
@@ -52,6 +55,19 @@ Buffer<float> DownloadRows(const DeviceGrid& device, const float* from) {
 
 Buffer<float> DownloadSecondMoment(const DeviceGrid& device) {
   return DownloadRows(device, device.second_moment());
+}
+
+Buffer<float> DownloadGradient(const DeviceGrid& device) {
+  if (!device.exact_sums) return DownloadRows(device, device.gradient());
+  const int64_t values = device.num_voxels() * device.lanes(),
+                row = device.lanes() * int64_t{sizeof(int64_t)};
+  Buffer<int64_t> units(values);
+  DeviceCopyRows(units.data(), row, device.gradient(), device.stride() * int64_t{sizeof(float)},
+                 row, device.num_voxels());
+  Buffer<float> gradient(values);
+  for (int64_t i = 0; i < values; ++i)
+    gradient[i] = static_cast<float>(static_cast<double>(units[i]) * kExactUnit);
+  return gradient;
 }
 
 FastGrid DownloadGrid(const DeviceGrid& device) {

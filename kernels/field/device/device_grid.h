@@ -35,23 +35,28 @@ struct DeviceGrid {
   // A field that is being fitted keeps a voxel's gradient and moment behind its values: what
   // one step touches lies together, on one page of memory.
   bool fitting = false;
+  // Its gradients are 64-bit integers (AddExact in gradient_view.h), and a fit is the same to
+  // the bit each time.
+  bool exact_sums = false;
   int basis = 9;
   Vec3f background{0, 0, 0};
   float near_clip = 0;
 
   int lanes() const { return RecordLanes(basis); }
-  int stride() const { return (fitting ? 3 : 1) * lanes(); }
+  int stride() const { return (!fitting ? 1 : exact_sums ? 4 : 3) * lanes(); }
   int64_t num_voxels() const { return vertex_of_voxel.size(); }
   DeviceGridView view() const;
   // Where gradients and moments begin, with the same stride; only of a field that is being
   // fitted.
   float* gradient() const { return records.data() + lanes(); }
-  float* second_moment() const { return records.data() + 2 * lanes(); }
+  float* second_moment() const { return records.data() + (stride() - lanes()); }
 };
 
 // `second_moment` [N, lanes], or empty for zeros.
 DeviceGrid UploadGrid(const FastGrid& grid, bool fitting = false,
-                      const Buffer<float>& second_moment = {});
+                      const Buffer<float>& second_moment = {}, bool exact_sums = false);
+// Gradients [N, lanes] of a grid that is being fitted.
+Buffer<float> DownloadGradient(const DeviceGrid& grid);
 Buffer<float> DownloadSecondMoment(const DeviceGrid& grid);
 FastGrid DownloadGrid(const DeviceGrid& grid);
 

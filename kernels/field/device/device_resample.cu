@@ -146,6 +146,7 @@ DeviceGrid ResampleOnDevice(const DeviceGrid& grid, const DeviceBuffer<float>& w
                                                   ranks.data(), result.links.data());
   CheckLaunch("number_kept");
   result.fitting = grid.fitting;
+  result.exact_sums = grid.exact_sums;
   result.records = DeviceBuffer<float>(count * result.stride(), "voxels");
   if (result.fitting) result.records.Zero();
   ByBasis(grid.basis, [&](auto basis) {

@@ -77,7 +77,8 @@ void AddMappedRows(const Mat3f& matrix, const Vec3f& constant, const float* from
 
 void ScatterRows(const float* rows, int64_t first, int64_t n, DeviceGrid* grid) {
   if (n == 0) return;
-  ScatterRowsKernel<<<BlocksFor(32 * n), kThreads, 0, LaunchStream()>>>(rows, first, n, grid->basis, grid->view());
+  ScatterRowsKernel<<<BlocksFor(32 * n), kThreads, 0, LaunchStream()>>>(
+      rows, first, n, grid->basis, grid->view());
   CheckLaunch("scatter_rows");
 }
 

@@ -16,7 +16,7 @@ namespace {
 
 // See EQ(total-variation): an empty neighbour counts as 0 for densities and as the voxel's own
 // value for colours; beyond the box nothing is compared.
-template <int kBasis>
+template <int kBasis, bool kExact>
 __global__ void TotalVariationKernel(DeviceGridView grid, int64_t begin, int64_t count,
                                      float scale_density, float scale_sh,
                                      GradientView gradient) {
@@ -47,16 +47,23 @@ __global__ void TotalVariationKernel(DeviceGridView grid, int64_t begin, int64_t
   }
   const float scale = is_density ? scale_density : value < 3 * kBasis ? scale_sh : 0.0f;
   const float inverse = scale * rsqrtf(inside);
+  const auto add = [&](int64_t to, float d) {
+    float* const row = gradient.gradient + to * grid.stride;
+    if constexpr (kExact)
+      AddExact(row, value, d);
+    else
+      atomicAdd(row + value, d);
+  };
   float d_own = 0;
 #pragma unroll
   for (int a = 0; a < 3; ++a) {
     const float d = static_cast<float>(n[a]) / 256.0f * weighted[a] * inverse;
     d_own -= d;
     if (neighbour[a] < 0) continue;
-    if (d != 0) atomicAdd(&gradient.gradient[neighbour[a] * grid.stride + value], d);
+    if (d != 0) add(neighbour[a], d);
     if (value == 0) Touch(gradient.touched, neighbour[a]);
   }
-  if (d_own != 0) atomicAdd(&gradient.gradient[voxel * grid.stride + value], d_own);
+  if (d_own != 0) add(voxel, d_own);
   if (value == 0) Touch(gradient.touched, static_cast<int32_t>(voxel));
 }
 
@@ -100,7 +107,7 @@ __device__ inline float NextMoment(float old, float g, float beta) {
 // A warp takes the 32 voxels of one word of marks. A lane stands for four neighbouring values,
 // and kTurns sets of records are on their way at once; lanes stay together, for a warp that
 // splits waits for each part's loads in turn.
-template <int kBasis>
+template <int kBasis, bool kExact>
 __global__ void StepKernel(DeviceGridView grid, uint32_t* __restrict__ touched, int64_t words,
                            RmspropOptions options, DeviceFitSums* sums) {
   constexpr int kQuads = RecordLanes(kBasis) / 4, kGroups = 32 / kQuads;
@@ -109,6 +116,15 @@ __global__ void StepKernel(DeviceGridView grid, uint32_t* __restrict__ touched, 
   const int quad = lane % kQuads, group = lane / kQuads;
   const unsigned group_lanes =
       kQuads == 32 ? kAllLanes : ((1u << kQuads) - 1) << (group * kQuads);
+  constexpr int kMoment = (kExact ? 3 : 2) * kQuads;  // quads from a value to its moment
+  const auto clear = [&](StepQuad* of) {
+    if constexpr (kExact) {  // twice as wide
+      float4* const row = of->at - quad + kQuads;
+      row[2 * quad] = row[2 * quad + 1] = make_float4(0, 0, 0, 0);
+    } else {
+      of->at[kQuads] = make_float4(0, 0, 0, 0);
+    }
+  };
   const StepRules<kBasis> rules(quad, options);
   const int64_t warps = static_cast<int64_t>(gridDim.x) * (blockDim.x / 32);
   for (int64_t w = blockIdx.x * static_cast<int64_t>(blockDim.x / 32) + threadIdx.x / 32;
@@ -129,8 +145,14 @@ __global__ void StepKernel(DeviceGridView grid, uint32_t* __restrict__ touched, 
         q[i].voxel = 32 * w + __ffs(mine) - 1;
         q[i].at = reinterpret_cast<float4*>(grid.records + q[i].voxel * grid.stride) + quad;
         q[i].value = q[i].at[0];
-        q[i].gradient = q[i].at[kQuads];
-        q[i].moment = q[i].at[2 * kQuads];
+        if constexpr (kExact) {
+          const float* row = grid.records + q[i].voxel * grid.stride + 4 * kQuads;
+          q[i].gradient = {ExactSum(row, 4 * quad), ExactSum(row, 4 * quad + 1),
+                           ExactSum(row, 4 * quad + 2), ExactSum(row, 4 * quad + 3)};
+        } else {
+          q[i].gradient = q[i].at[kQuads];
+        }
+        q[i].moment = q[i].at[kMoment];
       }
 #pragma unroll
       for (int i = 0; i < kTurns; ++i) {
@@ -140,7 +162,7 @@ __global__ void StepKernel(DeviceGridView grid, uint32_t* __restrict__ touched, 
         // A voxel of whose gradient any part is not finite stays as it is.
         const bool good = (__ballot_sync(kAllLanes, finite) & group_lanes) == group_lanes;
         if (q[i].at == nullptr) continue;
-        q[i].at[kQuads] = make_float4(0, 0, 0, 0);
+        clear(&q[i]);
         if (!good) {
           if (quad == 0) atomicAdd(&sums->rejected_voxels, 1ull);
           continue;
@@ -155,7 +177,7 @@ __global__ void StepKernel(DeviceGridView grid, uint32_t* __restrict__ touched, 
         x.z = Stepped(x.z, g.z, m.z, rules.rate[2], rules.bound[2], options.epsilon);
         x.w = Stepped(x.w, g.w, m.w, rules.rate[3], rules.bound[3], options.epsilon);
         q[i].at[0] = x;
-        q[i].at[2 * kQuads] = m;
+        q[i].at[kMoment] = m;
         constexpr int kDensity = DensityLane(kBasis);
         if (quad == kDensity / 4)
           grid.dense_density[grid.vertex_of_voxel[q[i].voxel]] = kDensity % 4 == 0   ? x.x
@@ -174,10 +196,11 @@ void AddTotalVariation(const DeviceGrid& grid, int64_t begin, int64_t count,
                        float scale_density, float scale_sh, DeviceTouched* touched) {
   REGRADE_CHECK(grid.fitting);
   if (count <= 0) return;
-  ByBasis(grid.basis, [&](auto basis) {
-    TotalVariationKernel<basis.value><<<BlocksFor(count * grid.lanes()), kThreads>>>(
-        grid.view(), begin, count, scale_density, scale_sh,
-        GradientView{grid.gradient(), touched->bits.data()});
+  ByBasis(grid.basis, grid.exact_sums, [&](auto basis, auto exact) {
+    TotalVariationKernel<basis.value, exact.value>
+        <<<BlocksFor(count * grid.lanes()), kThreads>>>(
+            grid.view(), begin, count, scale_density, scale_sh,
+            GradientView{grid.gradient(), touched->bits.data()});
   });
   CheckLaunch("total_variation");
 }
@@ -186,9 +209,10 @@ void StepOnDevice(DeviceGrid* grid, DeviceTouched* touched, const RmspropOptions
                   DeviceFitSums* sums) {
   REGRADE_CHECK(grid->fitting);
   const int64_t words = touched->bits.size();
-  ByBasis(grid->basis, [&](auto basis) {
-    StepKernel<basis.value><<<std::min(BlocksFor(32 * words), 1u << 16), kThreads>>>(
-        grid->view(), touched->bits.data(), words, options, sums);
+  ByBasis(grid->basis, grid->exact_sums, [&](auto basis, auto exact) {
+    StepKernel<basis.value, exact.value>
+        <<<std::min(BlocksFor(32 * words), 1u << 16), kThreads>>>(
+            grid->view(), touched->bits.data(), words, options, sums);
   });
   CheckLaunch("step");
 }

@@ -1,4 +1,4 @@
-// The choice of a device kernel's template by the field's basis.
+// The choice of a device kernel's template by the field's basis, and by a flag.
 #pragma once
 
 #include <type_traits>
@@ -18,6 +18,16 @@ void ByBasis(int basis, const Launch& launch) {
     launch(std::integral_constant<int, 1>());
   else
     REGRADE_CHECK(false);
+}
+
+template <typename Launch>
+void ByBasis(int basis, bool flag, const Launch& launch) {
+  ByBasis(basis, [&](auto constant) {
+    if (flag)
+      launch(constant, std::true_type());
+    else
+      launch(constant, std::false_type());
+  });
 }
 
 }  // namespace regrade
