@@ -132,6 +132,10 @@ double NearestDepth(const JsonValue& index) {
 
 }  // namespace
 
+double NearestDepthOf(const CaptureSource& source) {
+  return source.kind == CaptureKind::kPosed ? NearestDepth(ReadJsonFile(IndexOf(source))) : 0;
+}
+
 CaptureSource DetectCapture(const std::string& folder) {
   std::error_code error;
   const fs::path root = fs::canonical(folder, error);
@@ -173,8 +177,7 @@ Capture ImportPoses(const CaptureSource& source, const std::vector<StagedPhoto>&
     model = ModelFromLlff(source, photos, &nearest_depth);
   } else {
     model = ReadColmapModel(source.poses);
-    if (source.kind == CaptureKind::kPosed)
-      nearest_depth = NearestDepth(ReadJsonFile(IndexOf(source)));
+    nearest_depth = NearestDepthOf(source);
     // The model goes on under our names; images without a staged photo keep theirs.
     std::map<std::string, std::string> name_of;
     for (const StagedPhoto& photo : photos) name_of[photo.file] = photo.name;

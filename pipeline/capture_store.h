@@ -27,6 +27,9 @@ struct CaptureSource {
 // Tells by content. Throws Error(kInput) if there is no such folder.
 CaptureSource DetectCapture(const std::string& folder);
 
+// What photos.json of a kPosed capture says of Capture::nearest_depth; 0 of others.
+double NearestDepthOf(const CaptureSource& source);
+
 // Poses that came with the photos, for those that were staged; the model is written to
 // `sparse_folder`. Throws Error(kInput) if they do not fit each other.
 Capture ImportPoses(const CaptureSource& source, const std::vector<StagedPhoto>& photos,

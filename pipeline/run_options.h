@@ -48,8 +48,8 @@ struct RunOptions {
     bind(
         "effects", effects,
         {.help = "what the scene calls for is decided by measurement (auto); ndc=on|off, "
-                 "alpha=on|off, background=on|off, exposure=on|off and view-dependence=on|off, "
-                 "with commas between, decide instead"});
+                 "alpha=on|off, background=on|off, exposure=on|off, view-dependence=on|off and "
+                 "pose-refinement=on|off, with commas between, decide instead"});
     bind("max-memory", max_memory_gb,
          {.unit = "GB",
           .help = "memory to plan with; 0 takes what is free",

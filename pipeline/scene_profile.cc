@@ -16,7 +16,8 @@ namespace {
 
 constexpr int kOutlineSide = 512;
 constexpr double kAlphaShare = 0.02;  // of the pixels; less is a photo with a soft edge
-constexpr const char* kNames[] = {"ndc", "alpha", "background", "exposure", kViewDependence};
+constexpr const char* kNames[] = {"ndc",      "alpha",         "background",
+                                  "exposure", kViewDependence, kPoseRefinement};
 
 EffectReport Row(const char* name, bool on, double value, double threshold,
                  const std::string& evidence) {
@@ -141,8 +142,8 @@ std::map<std::string, bool> ParseEffects(const std::string& text) {
         std::find(std::begin(kNames), std::end(kNames), name) != std::end(kNames);
     if (!known || (wish != "on" && wish != "off"))
       throw Error(ExitCode::kUsage, "'" + word + "' is not allowed", "--effects",
-                  "auto, or on|off of ndc, alpha, background, exposure and view-dependence: "
-                  "ndc=on,exposure=off");
+                  "auto, or on|off of ndc, alpha, background, exposure, view-dependence and "
+                  "pose-refinement: ndc=on,exposure=off");
     wishes[name] = wish == "on";
   }
   return wishes;

@@ -20,6 +20,8 @@ std::map<std::string, bool> ParseEffects(const std::string& text);
 
 // The row that a fit's trial decides (choose_degree.h).
 inline constexpr char kViewDependence[] = "view-dependence";
+// The row that stage "pose" decides (pose_profile.h).
+inline constexpr char kPoseRefinement[] = "pose-refinement";
 
 struct SceneProfile {
   // One row an effect. "distortion": the lens is followed where it moves a picture's corner by

@@ -16,6 +16,7 @@
 #include "pipeline/files/npy_header.h"
 #include "pipeline/files/transforms_json.h"
 #include "pipeline/synth_effects.h"
+#include "pipeline/synth_model.h"
 
 namespace regrade {
 namespace {
@@ -85,6 +86,11 @@ JsonValue DescribeCapture(const SynthOptions& options, const SynthEffects& effec
                                            {"highlights", highlights}};
   if (effects.masks)
     of_effects["masks"] = JsonValue::Object{{"on", true}, {"solid", MaskedSolid(scene)}};
+  if (effects.poses)
+    of_effects["poses"] = JsonValue::Object{{"on", true},
+                                            {"turn_degrees", kSynthPoseTurn},
+                                            {"step_share", kSynthPoseStep},
+                                            {"track_sigma_px", kSynthTrackSigma}};
   return JsonValue::Object{{"scene", options.scene},
                            {"seed", options.seed},
                            {"views", options.views},
@@ -147,6 +153,7 @@ void WriteSyntheticCapture(const std::string& out, const SynthOptions& options,
 
   const fs::path truth = fs::path(out) / "truth";
   std::vector<TransformsFrame> frames;
+  std::vector<Image> depths;  // of all views, where tracks are asked for
   for (int i = 0; i < options.views; ++i) {
     SyntheticView view = RenderSyntheticView(scene, cameras[i], effects.highlights);
     if (effects.exposure) ApplyGain(SynthGain(options.seed, i, options.views), &view.color);
@@ -162,11 +169,20 @@ void WriteSyntheticCapture(const std::string& out, const SynthOptions& options,
     if (i + 1 < options.views)
       WriteMotion(truth, i, TrueMotion(scene, cameras[i], cameras[i + 1]));
     frames.push_back({"../images/" + name, cameras[i]});
+    if (effects.poses) depths.push_back(std::move(view.depth));
     const Verdict verdict = Report(progress, i + 1, options.views, name);
     if (verdict == Verdict::kAbort) throw Interrupted();
     if (verdict == Verdict::kFinish) break;
   }
   WriteTransformsJson((truth / "transforms.json").string(), frames);
+  if (!effects.poses) return;
+  cameras.resize(depths.size());
+  std::vector<std::string> names;
+  for (size_t i = 0; i < depths.size(); ++i)
+    names.push_back(FrameName(static_cast<int>(i), ".png"));
+  fs::create_directories(fs::path(out) / "sparse" / "0");
+  WriteColmapModel(ShakenModel(TracksOf(cameras, depths, names, options.seed), options.seed),
+                   (fs::path(out) / "sparse" / "0").string());
 }
 
 }  // namespace regrade

@@ -29,7 +29,8 @@ struct SynthOptions {
         "effects", effects,
         {.help =
              "what else to simulate, from exposure, noise, highlights, masks of one object, of "
-             "which some are wrong, and a lens of distortion (mild), barrel (k1 = -0.2) or "
+             "which some are wrong, poses that come with tracks and are 0.3 degrees and 0.5 % "
+             "of the spread off, and a lens of distortion (mild), barrel (k1 = -0.2) or "
              "fisheye; what is not named costs nothing"});
     bind("seed", seed, {.help = "draws the paint, the exposures and the noise"});
   }
@@ -42,6 +43,7 @@ struct SynthOptions {
 //   OUT/truth/flow/00000_00001.flo        motion of view i to view i + 1, pixels
 //   OUT/truth/visible/00000_00001.png     255 where view i + 1 sees the same point
 //   with `masks`: OUT/masks/00000.png, some of them wrong, and the right OUT/truth/masks/
+//   with `poses`: OUT/sparse/0/, a COLMAP model whose poses are off (synth_model.h)
 //   OUT/truth/effects.json                the options, and the parameters of what was simulated
 // The scene itself does not change with the effects. Same options, same bytes, for any number
 // of threads. Reports progress once a view; kFinish stops after the view at hand, with the list

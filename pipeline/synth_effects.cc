@@ -11,8 +11,8 @@ namespace regrade {
 
 SynthEffects ParseSynthEffects(const std::string& list) {
   constexpr char kHint[] =
-      "the effects are exposure, noise, highlights, masks, and one lens of distortion, barrel, "
-      "fisheye";
+      "the effects are exposure, noise, highlights, masks, poses, and one lens of distortion, "
+      "barrel, fisheye";
   SynthEffects effects;
   size_t begin = 0;
   while (begin < list.size()) {
@@ -33,6 +33,8 @@ SynthEffects ParseSynthEffects(const std::string& list) {
       effects.highlights = true;
     else if (name == "masks")
       effects.masks = true;
+    else if (name == "poses")
+      effects.poses = true;
     else if (name == "motion-blur" || name == "occluders")
       throw Error(ExitCode::kUsage, "the effect \"" + name + "\" is not in this version",
                   "--effects", kHint);

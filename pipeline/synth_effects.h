@@ -18,12 +18,16 @@ struct SynthEffects {
   bool fisheye = false;     // a lens that shows angles, not tangents
   bool highlights = false;  // of the sun on glazed things
   bool masks = false;       // of one object, some of them wrong
+  bool poses = false;       // handed over with tracks, and a little off
 };
 
 inline constexpr double kSynthNoiseSigma = 2.0 / 255;  // of encoded values
 inline constexpr double kSynthK1 = -0.1, kSynthK2 = 0.02;
 inline constexpr double kSynthBarrelK1 = -0.2;
 inline constexpr double kSynthGainRange = 0.3;
+inline constexpr double kSynthPoseTurn = 0.3;    // degrees, about an axis of each camera's own
+inline constexpr double kSynthPoseStep = 0.005;  // of the largest distance between cameras
+inline constexpr double kSynthTrackSigma = 0.5;  // pixels, each way
 
 // Parses "exposure,noise"; spaces are not allowed, empty means none. Throws Error (kUsage) for
 // a name that is unknown, listing the known ones, or not in this version, and for two lenses.

@@ -18,6 +18,7 @@ struct PoseOptions {
   int min_photos = 5;
   double time_limit_min = 0;
   double quiet_limit_min = 15;
+  bool free_focal = false;
   int threads = 0;  // 0: all; from --threads, no flag of its own
 
   template <typename Bind>
@@ -53,6 +54,9 @@ struct PoseOptions {
               "COLMAP is taken for hung when it prints nothing for so long; 0 waits for ever",
           .min = 0,
           .max = 1e6});
+    bind("pose-free-focal", free_focal,
+         {.help = "where poses that came with the photos are refined, so are focal lengths, by "
+                  "one factor a camera"});
   }
 };
 

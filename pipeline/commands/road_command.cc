@@ -43,9 +43,9 @@ void ProbeInputs(const std::string& last, RunContext* context) {
                 "name a folder of photos");
   const std::filesystem::path out =
       std::filesystem::weakly_canonical(context->settings.run.out);
+  const bool posed = DetectCapture(context->source).kind == CaptureKind::kPosed;
   for (const std::filesystem::path& folder : {out, out / "poses"})
-    if (DetectCapture(context->source).kind == CaptureKind::kPosed &&
-        std::filesystem::weakly_canonical(context->source) == folder)
+    if (posed && std::filesystem::weakly_canonical(context->source) == folder)
       throw Error(ExitCode::kUsage, "is the capture itself, and would be written over", "--out",
                   "name another folder; to go on in this one, give the photos it was made of");
   if (last == "pose" || last == "reconstruct") return;

@@ -7,6 +7,8 @@
 #include "pipeline/capture_store.h"
 #include "pipeline/folder_listing.h"
 #include "pipeline/plan.h"
+#include "pipeline/pose_profile.h"
+#include "pipeline/scene_profile.h"
 #include "pipeline/stages/run_context.h"
 
 namespace regrade {
@@ -23,7 +25,7 @@ JsonValue PhotoSet(const CaptureSource& source) {
 // Seconds on two cores, roughly: photos take what their bytes take to read, and their number to
 // place.
 struct StageShares {
-  double ingest = 1, poses = 0;
+  double ingest = 1, poses = 0, refinement = 0.5;
 };
 
 StageShares EstimateShares(const CaptureSource& source) {
@@ -35,7 +37,7 @@ StageShares EstimateShares(const CaptureSource& source) {
     const auto size = std::filesystem::file_size(file.path, none);
     if (!none) bytes += static_cast<double>(size), ++photos;
   }
-  return {0.5e-6 * bytes + 0.1, 0.75 * kPoseSecondsPerPhoto * photos};
+  return {0.5e-6 * bytes + 0.1, 0.75 * kPoseSecondsPerPhoto * photos, 0};
 }
 
 StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
@@ -49,7 +51,7 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
   workspace.NewPath(".regrade/work/pose/x");
 
   const StageShares shares = EstimateShares(source);
-  ProgressParts parts(progress, shares.ingest + shares.poses);
+  ProgressParts parts(progress, shares.ingest + shares.poses + shares.refinement);
   const IngestResult ingest =
       IngestPhotos(source.photos, photo_folder, settings.ingest, parts.Next(shares.ingest));
   for (const std::string& notice : ingest.notices) context->console->Info(notice);
@@ -71,6 +73,11 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
     capture = ImportPoses(source, ingest.photos, ingest.verdicts, sparse_folder);
     outcome.figures["recipe"] = "poses came with the photos: " + source.poses;
   }
+  const PoseProfile profile = ProfilePoses(source.kind, settings, sparse_folder, ingest.photos,
+                                           &capture, parts.Next(shares.refinement));
+  context->console->Info(EffectLine(profile.effect));
+  outcome.figures["effects"] = EffectsRecord({profile.effect});
+  if (!profile.figures.IsNull()) outcome.figures["pose_refinement"] = profile.figures;
   WriteCaptureIndex(workspace.Path("poses"), capture, ingest.photos);
   outcome.figures["registered"] = static_cast<int64_t>(capture.views.size());
   outcome.figures["points"] = static_cast<int64_t>(capture.points.size());
@@ -98,6 +105,11 @@ Stage PoseStage(RunContext* context) {
                              "images.txt", "points3D.txt"})
       if (std::filesystem::is_regular_file(source.poses + "/" + part))
         stage.inputs["poses"][part] = HashFile(source.poses + "/" + part);
+  if (source.kind == CaptureKind::kPosed)
+    stage.inputs["poses"]["nearest_depth"] = NearestDepthOf(source);
+  const auto wishes = ParseEffects(context->settings.run.effects);
+  if (const auto wish = wishes.find(kPoseRefinement); wish != wishes.end())
+    stage.inputs[kPoseRefinement] = wish->second;
   stage.refuse_changes = true;
   const int64_t photos = static_cast<int64_t>(stage.inputs.At("photos").AsObject().size());
   stage.plan = std::to_string(photos) + " files in " + source.photos +

@@ -103,9 +103,11 @@ StageOutcome WriteReport(RunContext* context) {
     if (const auto record = workspace.Find(stage)) report.seconds += record->seconds;
   report.peak_memory_mb = static_cast<double>(ReadMemoryStatus().peak_used >> 20);
   report.photos = PhotosOf(capture);
-  if (const auto record = workspace.Find("reconstruct"))
-    if (const JsonValue* effects = record->figures.Find("effects"))
-      report.effects = EffectsOfRecord(*effects);
+  for (const char* stage : {"pose", "reconstruct"})
+    if (const auto record = workspace.Find(stage))
+      if (const JsonValue* effects = record->figures.Find("effects"))
+        for (const EffectReport& effect : EffectsOfRecord(*effects))
+          report.effects.push_back(effect);
   try {
     report.prices = ReadPriceList(workspace.Path(kPriceList));
   } catch (const Error& error) {  // a report is worth having without it

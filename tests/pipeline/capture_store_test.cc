@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "kernels/base/child_process.h"
+#include "pipeline/files/json_file.h"
 #include "tests/support/temporary_folder.h"
 
 namespace regrade {
@@ -43,6 +44,29 @@ TEST(CaptureStore, AnOutputFolderIsACaptureWithItsPoses) {
   EXPECT_EQ(Regrade({"pose", folder / "first", "--out", folder / "first"}), 2);
   EXPECT_EQ(Regrade({"pose", folder / "first/poses", "--out", folder / "first"}), 2);
   EXPECT_EQ(ReadCapture(folder / "first/poses").views.size(), 6u);
+}
+
+// What photos.json alone knows of a capture decides about its field's box: it is an input.
+TEST(CaptureStore, ANearestDepthThatChangedIsAnotherCapture) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}), 0);
+  ASSERT_EQ(Regrade({"pose", folder / "s/truth", "--out", folder / "first"}), 0);
+  ASSERT_EQ(Regrade({"pose", folder / "first", "--out", folder / "second"}), 0);
+  ASSERT_EQ(Regrade({"pose", folder / "first", "--out", folder / "second"}), 0);
+  const std::string index = folder / "first/poses/photos.json";
+  JsonValue json = ReadJsonFile(index);
+  json["nearest_depth"] = 0.5;
+  WriteJsonFile(index, json);
+  EXPECT_EQ(Regrade({"pose", folder / "first", "--out", folder / "second"}), 3);
+}
+
+// Without tracks there is nothing to refine by: said where it was asked for.
+TEST(CaptureStore, PosesWithoutTracksCannotBeRefined) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}), 0);
+  EXPECT_EQ(Regrade({"pose", folder / "s/truth", "--out", folder / "out", "--effects",
+                     "pose-refinement=on"}),
+            6);
 }
 
 }  // namespace

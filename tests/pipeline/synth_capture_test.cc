@@ -19,6 +19,7 @@
 #include "pipeline/files/json_file.h"
 #include "pipeline/files/transforms_json.h"
 #include "pipeline/synth_effects.h"
+#include "reconstruct/colmap_model.h"
 
 namespace regrade {
 namespace {
@@ -166,6 +167,34 @@ TEST_F(SynthCapture, EachEffectLeavesItsExactTruth) {
   const JsonValue none = ReadJsonFile((plain / "truth/effects.json").string()).At("effects");
   for (const char* name : {"exposure", "noise", "distortion", "highlights"})
     EXPECT_FALSE(none.At(name).At("on").AsBool());
+}
+
+// Tracks are true to half a pixel, poses are off by what is stated, and photos do not change.
+TEST_F(SynthCapture, PosesThatAreOffComeWithTracks) {
+  const fs::path out = Write("poses", "poses", {}, 5), plain = Write("plain", "", {}, 5);
+  EXPECT_EQ(Bytes(out / "images/00003.png"), Bytes(plain / "images/00003.png"));
+  const ColmapModel model = ReadColmapModel((out / "sparse/0").string());
+  const auto truth = ReadTransformsJson((out / "truth/transforms.json").string()).frames;
+  ASSERT_EQ(model.images.size(), 5u);
+  EXPECT_GT(model.points.size(), 200u);
+  double squares = 0, turned = 0;
+  int64_t count = 0;
+  for (size_t v = 0; v < 5; ++v) {
+    const Camera& camera = truth[v].camera;
+    for (const ColmapKeypoint& keypoint : model.images[v].keypoints) {
+      double x = 0, y = 0;
+      ASSERT_TRUE(camera.Project(model.FindPoint(keypoint.point_id)->position, &x, &y));
+      squares += (x - keypoint.u) * (x - keypoint.u) + (y - keypoint.v) * (y - keypoint.v);
+      ++count;
+    }
+    const Mat3d turn = model.images[v].camera_from_world.rotation *
+                       camera.camera_from_world.rotation.Transposed();
+    const Vec3d sine{turn(2, 1) - turn(1, 2), turn(0, 2) - turn(2, 0), turn(1, 0) - turn(0, 1)};
+    turned = std::asin(Norm(sine) / 2) * 180 / M_PI;
+    EXPECT_NEAR(turned, kSynthPoseTurn, 1e-6) << v;
+  }
+  ASSERT_GT(count, 500);
+  EXPECT_NEAR(std::sqrt(squares / static_cast<double>(count) / 2), kSynthTrackSigma, 0.05);
 }
 
 TEST_F(SynthCapture, GainsStayInRangeAndNoiseHasItsSigma) {

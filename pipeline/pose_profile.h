@@ -1,0 +1,29 @@
+// Whether the poses of a capture are refined by its tracks, with the evidence.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "kernels/base/progress.h"
+#include "pipeline/capture_store.h"
+#include "pipeline/files/json_file.h"
+#include "pipeline/report_data.h"
+#include "pipeline/run_settings.h"
+
+namespace regrade {
+
+struct PoseProfile {
+  EffectReport effect;  // "pose-refinement"
+  JsonValue figures;    // of the trial; null where there was none
+};
+
+// Poses that came with tracks are refined where reprojection says so (refine_poses.h); those
+// that COLMAP has just found and adjusted only if asked for. Where it pays, the model in
+// `sparse_folder` and `capture` are rewritten; otherwise nothing is touched. Throws
+// Error(kScene) where refinement was asked for and there is nothing to refine by, Interrupted.
+PoseProfile ProfilePoses(CaptureKind kind, const RunSettings& settings,
+                         const std::string& sparse_folder,
+                         const std::vector<StagedPhoto>& photos, Capture* capture,
+                         const ProgressFunction& progress);
+
+}  // namespace regrade
