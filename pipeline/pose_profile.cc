@@ -24,10 +24,11 @@ std::string Evidence(const PoseRefinement& refinement) {
       "median distance of sightings from their points, wherever these are put, in pixels";
   if (!refinement.tried) return text;
   if (refinement.held_out_after_px > 0)
-    text += Text("; poses adjusted: %.2f, and %.2f instead of %.2f for %lld sightings without "
-                 "a say",
-                 refinement.refined_px, refinement.held_out_after_px,
-                 refinement.held_out_before_px, static_cast<long long>(refinement.held_out));
+    text += Text(
+        "; poses adjusted: %.2f, and %.2f instead of %.2f for %lld sightings without "
+        "a say",
+        refinement.refined_px, refinement.held_out_after_px, refinement.held_out_before_px,
+        static_cast<long long>(refinement.held_out));
   if (!refinement.Accepted()) return text + "; refused: " + refinement.refused;
   text += Text("; they turned by %.2g deg and moved by %.2g %% of the cameras' spread",
                refinement.turned_deg, 100 * refinement.moved_share);
@@ -71,7 +72,8 @@ PoseProfile ProfilePoses(CaptureKind kind, const RunSettings& settings,
     return {{kPoseRefinement, false, why, Figure(), kPoseMisfit}, JsonValue()};
   };
   if (wish != wishes.end() && !asked_for) return leave_out("it was not wanted");
-  if (capture->points.empty()) return leave_out("the poses came without tracks to hold them to");
+  if (capture->points.empty())
+    return leave_out("the poses came without tracks to hold them to");
   if (kind == CaptureKind::kPhotos && !asked_for)
     return leave_out("COLMAP has just adjusted them to their tracks");
 

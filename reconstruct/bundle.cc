@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kHeldOutShare = 0.1;
 constexpr double kLeastSpread = 1e-4;  // of the points' distance: less shows no depth
-constexpr size_t kLeastKept = 3;  // sightings of a point that are not held out
+constexpr size_t kLeastKept = 3;       // sightings of a point that are not held out
 
 // Rodrigues' formula.
 Mat3d RotationOf(const double* w) {
@@ -165,13 +165,13 @@ ColmapModel ModelOfBundle(const Bundle& bundle, const ColmapModel& model) {
   }
   world_from_bundle.scale = across / along;
   world_from_bundle.translation =
-      mean_before -
-      world_from_bundle.rotation * mean_after * world_from_bundle.scale;
+      mean_before - world_from_bundle.rotation * mean_after * world_from_bundle.scale;
 
   ColmapModel moved = model;
   for (size_t v = 0; v < n; ++v) {
     const Mat3d rotation = rotations[v] * world_from_bundle.rotation.Transposed();
-    moved.images[v].camera_from_world = {rotation, -(rotation * (world_from_bundle * after[v]))};
+    moved.images[v].camera_from_world = {rotation,
+                                         -(rotation * (world_from_bundle * after[v]))};
   }
   for (size_t c = 0; c < bundle.focal.size(); ++c) {
     moved.cameras[c].intrinsics.fx *= std::exp(bundle.focal[c]);

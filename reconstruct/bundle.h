@@ -25,11 +25,11 @@ struct Bundle {
   std::vector<Mat3d> rotations;              // camera from world, as they came
   std::vector<std::array<double, 6>> poses;  // of each view: a further rotation vector, centre
   std::vector<std::array<double, 3>> points;
-  std::vector<double> focal;               // of each camera: log of a factor
-  std::vector<BundleSighting> sightings;   // those of a point side by side
-  std::vector<bool> adjustable;            // views with kFewestSightings
-  Similarity bundle_from_world;            //
-  double spread = 0;                       // largest distance between cameras, here
+  std::vector<double> focal;              // of each camera: log of a factor
+  std::vector<BundleSighting> sightings;  // those of a point side by side
+  std::vector<bool> adjustable;           // views with kFewestSightings
+  Similarity bundle_from_world;           //
+  double spread = 0;                      // largest distance between cameras, here
 };
 
 // Sightings behind their camera are left out, and so are points that fewer than two photos

@@ -15,8 +15,8 @@ namespace {
 
 constexpr int64_t kFewestHeldOut = 100;  // to judge by: their median is known to a tenth
 constexpr int kMostIterations = 50;
-constexpr double kLeastLossScale = 0.5;   // pixels
-constexpr double kLossScaleOfMedian = 2;  // errors of twice the median are outliers' already
+constexpr double kLeastLossScale = 0.5;     // pixels
+constexpr double kLossScaleOfMedian = 2;    // errors of twice the median are outliers' already
 constexpr double kRayleighMedian = 1.1774;  // of a distance in two coordinates of deviation 1
 
 // Differences of the camera's own projection: one body for all lenses.
@@ -27,8 +27,8 @@ struct SightingError {
 
   bool operator()(const double* pose, const double* point, const double* focal,
                   double* residual) const {
-    const Vec3d p = *rotation * Vec3d{point[0] - pose[3], point[1] - pose[4],
-                                      point[2] - pose[5]};
+    const Vec3d p =
+        *rotation * Vec3d{point[0] - pose[3], point[1] - pose[4], point[2] - pose[5]};
     const double before[3] = {p.x, p.y, p.z};
     double turned[3];
     ceres::AngleAxisRotatePoint(pose, before, turned);
@@ -69,9 +69,9 @@ struct Freedom {
 };
 
 struct Gauge {
-  size_t view = 0;           // keeps its pose
-  size_t far_view = 0;       // keeps ...
-  int coordinate = 0;        // ... this one of its centre
+  size_t view = 0;      // keeps its pose
+  size_t far_view = 0;  // keeps ...
+  int coordinate = 0;   // ... this one of its centre
 };
 
 Gauge ChooseGauge(const Bundle& bundle) {
@@ -79,7 +79,8 @@ Gauge ChooseGauge(const Bundle& bundle) {
   for (const BundleSighting& sighting : bundle.sightings)
     count[sighting.view] += !sighting.held_out;
   Gauge gauge;
-  gauge.view = static_cast<size_t>(std::max_element(count.begin(), count.end()) - count.begin());
+  gauge.view =
+      static_cast<size_t>(std::max_element(count.begin(), count.end()) - count.begin());
   double farthest = -1;
   for (size_t v = 0; v < bundle.poses.size(); ++v) {
     if (!bundle.adjustable[v]) continue;
@@ -221,8 +222,8 @@ PoseRefinement RefinePoses(const ColmapModel& model, const RefinePosesOptions& o
   Bundle bundle = MakeBundle(model);
   result.sightings = static_cast<int64_t>(bundle.sightings.size());
   for (const BundleSighting& s : bundle.sightings) result.held_out += s.held_out;
-  result.left_alone = static_cast<int>(
-      std::count(bundle.adjustable.begin(), bundle.adjustable.end(), false));
+  result.left_alone =
+      static_cast<int>(std::count(bundle.adjustable.begin(), bundle.adjustable.end(), false));
   ProgressParts parts(progress, 4);
   const auto refuse = [&result](const std::string& why) {
     result.tried = true;

@@ -31,9 +31,9 @@ struct PoseRefinement {
   // Median, points adjusted to the poses as they came; not adjusted where it is low already.
   double misfit_px = 0;
   bool tried = false;
-  double refined_px = 0;                                  // median, poses and points adjusted
-  double held_out_before_px = 0, held_out_after_px = 0;   // medians
-  double turned_deg = 0, moved_share = 0;                 // medians of the corrections ...
+  double refined_px = 0;                                    // median, poses and points adjusted
+  double held_out_before_px = 0, held_out_after_px = 0;     // medians
+  double turned_deg = 0, moved_share = 0;                   // medians of the corrections ...
   std::optional<double> turn_error_deg, place_error_share;  // ... and of their standard errors
   int left_alone = 0;   // photos with too few sightings, their poses as they came
   std::string refused;  // why a trial was not taken

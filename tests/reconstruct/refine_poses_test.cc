@@ -21,11 +21,13 @@ double Normal(uint64_t stream, uint64_t counter) {
          std::cos(2 * M_PI * RandomDouble(11, stream, 2 * counter + 1));
 }
 
-// Sixteen photos of 400 points, each keypoint off by half a pixel each way; where asked for, one
-// sighting in twenty shows another point.
+// Sixteen photos of 400 points, each keypoint off by half a pixel each way; where asked for,
+// one sighting in twenty shows another point.
 ColmapModel Tracks(bool outliers = false, ColmapLens lens = ColmapLens::kOpenCv) {
-  ColmapModel model = MakeSyntheticModel({.images = 16, .points = 400, .arc_deg = 90, .thickness = 2, .lens = lens});
-  if (lens == ColmapLens::kOpenCvFisheye) model.cameras[0].intrinsics.lens = LensModel::kFisheye;
+  ColmapModel model = MakeSyntheticModel(
+      {.images = 16, .points = 400, .arc_deg = 90, .thickness = 2, .lens = lens});
+  if (lens == ColmapLens::kOpenCvFisheye)
+    model.cameras[0].intrinsics.lens = LensModel::kFisheye;
   uint64_t counter = 0;
   for (ColmapImage& image : model.images)
     for (ColmapKeypoint& keypoint : image.keypoints) {
@@ -71,7 +73,8 @@ struct Distance {
   double degrees = 0, share = 0;  // largest over the images
 };
 
-// After the similarity that is best for all: the mean turn, then scale and shift by the centres.
+// After the similarity that is best for all: the mean turn, then scale and shift by the
+// centres.
 Distance DistanceOf(const ColmapModel& model, const ColmapModel& truth) {
   const size_t n = model.images.size();
   const auto matrix = [](const Mat3d& m) {
@@ -118,8 +121,8 @@ Distance DistanceOf(const ColmapModel& model, const ColmapModel& truth) {
 }
 
 // A camera of 600 px sees 0.3 degrees as 3 px; half a pixel in 400 sightings leaves a tenth of
-// that. The largest error of sixteen is held to three times the standard error that is reported,
-// and the latter to what there was to find.
+// that. The largest error of sixteen is held to three times the standard error that is
+// reported, and the latter to what there was to find.
 TEST(RefinePoses, FindsThePosesThatTheTracksWereMadeOf) {
   for (const bool outliers : {false, true}) {
     const ColmapModel truth = Tracks(outliers);
