@@ -68,6 +68,7 @@ struct ReconstructReport {
 struct Style2dReport {
   double seconds = 0;
   std::string method;
+  std::vector<std::string> notices;  // what a person should know: a grey or constant picture
 };
 
 // How far apart neighbouring pixels' colours became, against K = the bound times how far they
@@ -94,6 +95,7 @@ struct StylizeReport {
   Figure slope_ascent;                  // the largest that climbing from the voxels finds
   std::vector<std::pair<int64_t, double>> bound_at_steps;  // while it was learned
   std::optional<VarianceFigures> variance;
+  std::vector<std::string> notices;  // of the colour map and of learning
 };
 
 struct RenderReport {

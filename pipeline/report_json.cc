@@ -79,7 +79,9 @@ JsonValue StageJson(const ReconstructReport& stage) {
 }
 
 JsonValue StageJson(const Style2dReport& stage) {
-  return Object{{"seconds", stage.seconds}, {"method", stage.method}};
+  Object object{{"seconds", stage.seconds}, {"method", stage.method}};
+  if (!stage.notices.empty()) object.emplace_back("notices", Strings(stage.notices));
+  return object;
 }
 
 JsonValue VarianceJson(const VarianceFigures& variance) {
@@ -106,6 +108,7 @@ JsonValue StageJson(const StylizeReport& stage) {
   if (!stage.bound_at_steps.empty())
     object.emplace_back("bound_at_steps", CurveJson(stage.bound_at_steps));
   if (stage.variance) object.emplace_back("variance", VarianceJson(*stage.variance));
+  if (!stage.notices.empty()) object.emplace_back("notices", Strings(stage.notices));
   return object;
 }
 

@@ -30,6 +30,13 @@ std::string TextOf(const JsonValue& figures, const std::string& key) {
   return value != nullptr && value->IsString() ? value->AsString() : "";
 }
 
+std::vector<std::string> TextsOf(const JsonValue& figures, const std::string& key) {
+  std::vector<std::string> texts;
+  if (const JsonValue* list = figures.Find(key))
+    for (const JsonValue& text : list->AsArray()) texts.push_back(text.AsString());
+  return texts;
+}
+
 // Infinite figures are no JSON numbers: their reason stands beside them.
 void Put(JsonValue* row, const std::string& key, const std::optional<double>& value,
          const std::string& why) {
@@ -206,12 +213,12 @@ RunReport ReportFromRecords(const Workspace& workspace) {
     stages.reconstruct = {reconstruct->seconds,         CountOf(f, "voxels"),
                           FigureOf(f, "psnr_train_db"), FigureOf(f, "psnr_heldout_db"),
                           FigureOf(f, "ssim_heldout"),  {}};
-    if (const JsonValue* files = f.Find("heldout"))
-      for (const JsonValue& file : files->AsArray())
-        stages.reconstruct->heldout.push_back(file.AsString());
+    stages.reconstruct->heldout = TextsOf(f, "heldout");
     stages.reconstruct->psnr_at_steps = CurveOf(f, "curve_steps", "curve_psnr_db");
   }
-  if (style_2d) stages.style_2d = {style_2d->seconds, TextOf(style_2d->figures, "method")};
+  if (style_2d)
+    stages.style_2d = {style_2d->seconds, TextOf(style_2d->figures, "method"),
+                       TextsOf(style_2d->figures, "notices")};
   if (stylize) {
     const JsonValue& f = stylize->figures;
     stages.stylize.emplace();
@@ -222,6 +229,7 @@ RunReport ReportFromRecords(const Workspace& workspace) {
     stages.stylize->slope_observed = FigureOf(f, "slope_observed");
     stages.stylize->slope_ascent = FigureOf(f, "slope_ascent");
     stages.stylize->bound_at_steps = CurveOf(f, "bound_steps", "bound_at_steps");
+    stages.stylize->notices = TextsOf(f, "notices");
     if (const JsonValue* variance = f.Find("variance"))
       stages.stylize->variance = VarianceOf(*variance);
   }

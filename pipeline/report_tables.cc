@@ -124,7 +124,9 @@ std::vector<StageLine> StageLines(const StagesReport& stages) {
       Say(said, std::to_string(s->heldout.size()) + " photos kept for measuring");
   }
   if (const auto& s = stages.style_2d) {
-    Say(add("style_2d", s->seconds), "method " + EscapeHtml(s->method));
+    std::string& said = add("style_2d", s->seconds);
+    Say(said, "method " + EscapeHtml(s->method));
+    for (const std::string& notice : s->notices) Say(said, EscapeHtml(notice));
   }
   if (const auto& s = stages.stylize) {
     std::string& said = add("stylize", s->seconds);
@@ -137,6 +139,7 @@ std::vector<StageLine> StageLines(const StagesReport& stages) {
                   FigureHtml(s->slope_observed, 2) + ", climbed to " +
                   FigureHtml(s->slope_ascent, 2) + ", estimated from the colours " +
                   FigureHtml(s->k_est, 2));
+    for (const std::string& notice : s->notices) Say(said, EscapeHtml(notice));
     if (s->variance) SayVariance(*s->variance, &said);
   }
   if (const auto& s = stages.render) {

@@ -72,6 +72,7 @@ Lessons ReadLessons(RunContext* context, const Capture& capture, const StoredFie
   if (lessons.views.empty()) return lessons;
   const MklMap mkl = ComputeMkl(Pool(before), Pool(after));
   for (const std::string& notice : mkl.notices) context->console->Info(notice);
+  lessons.notices = mkl.notices;
   lessons.scene_map = {mkl.map, mkl.norm};
   return lessons;
 }

@@ -15,6 +15,7 @@ struct Lessons {
   std::vector<Image> targets, masks;  // that `views` point to
   std::vector<StyledTrainingView> views;
   SceneColorMap scene_map;
+  std::vector<std::string> notices;  // of the map
 };
 
 // Of the views `indices` (see StyledViews). With `object`, the lessons are of the pixels where

@@ -25,7 +25,8 @@ StageOutcome StyleViews(RunContext* context, const ProgressFunction& progress) {
     context->console->Info(std::to_string(masks->num_known()) + " of " +
                            std::to_string(capture.views.size()) +
                            " photos have a mask; the style is learned from these");
-  for (const std::string& notice : stylizer->Notices()) context->console->Info(notice);
+  const std::vector<std::string> notices = stylizer->Notices();
+  for (const std::string& notice : notices) context->console->Info(notice);
 
   const PhotoGains gains = RecordedGains(workspace, capture);
   std::filesystem::remove_all(workspace.Path("views_2d"));
@@ -43,6 +44,7 @@ StageOutcome StyleViews(RunContext* context, const ProgressFunction& progress) {
   outcome.outputs = {"views_2d"};
   outcome.figures["method"] = stylizer->Name();
   outcome.figures["views"] = styled;
+  for (const std::string& notice : notices) outcome.figures["notices"].Append(notice);
   return outcome;
 }
 

@@ -163,6 +163,9 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
     outcome.figures["variance"] =
         VarianceRecord(source, stored.field, trained.network, lessons.views, settings.run.seed);
   outcome.figures["psnr_train_db"] = trained.psnr_db;
+  for (const std::string& notice : lessons.notices) outcome.figures["notices"].Append(notice);
+  for (const std::string& warning : trained.warnings)
+    outcome.figures["notices"].Append(warning);
   return outcome;
 }
 

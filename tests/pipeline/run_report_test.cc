@@ -90,5 +90,39 @@ TEST(RunReport, ShowsWhatTheRunWasLike) {
   EXPECT_EQ(HeatMapFiles(folder / "e"), 6);
 }
 
+// A picture of one colour has no spread to give: said on the terminal, in report.json and on
+// the page. H158: before that, up to the field, nobody has looked for motion.
+TEST(RunReport, H157_H158_AGreyStyleIsNamedAndWithoutEvaluationNothingMoves) {
+  const TemporaryFolder folder;
+  Image grey(32, 24, 3);
+  for (float& value : grey.pixels) value = 0.5f;
+  WritePng8(folder / "grey.png", grey);
+  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}).code, 0);
+  std::vector<std::string> flags = testing::TinyFlags();
+  flags.insert(flags.end(),
+               {"--out", folder / "e", "--preset", "draft", "--effects", "exposure=off"});
+  std::vector<std::string> fit{"reconstruct", folder / "s/truth"};
+  fit.insert(fit.end(), flags.begin(), flags.end());
+  const testing::ProgramOutcome fitted = Regrade(fit);
+  ASSERT_EQ(fitted.code, 0) << fitted.text;
+  EXPECT_EQ(fitted.text.find("flow"), std::string::npos) << fitted.text;
+  for (const char* name : {".regrade/stages/evaluate.json", ".regrade/checkpoints/evaluate",
+                           "report.json", "heatmaps", "frames"})
+    EXPECT_FALSE(std::filesystem::exists(folder / (std::string("e/") + name))) << name;
+
+  std::vector<std::string> run{"run", folder / "s/truth", "--style", folder / "grey.png"};
+  run.insert(run.end(), flags.begin(), flags.end());
+  const testing::ProgramOutcome done = Regrade(run);
+  ASSERT_EQ(done.code, 0) << done.text;
+  const JsonValue stages = ReadJsonFile(folder / "e/report.json").At("stages");
+  const JsonValue* notices = stages.At("style_2d").Find("notices");
+  ASSERT_NE(notices, nullptr);
+  const std::string said = notices->AsArray()[0].AsString();
+  EXPECT_NE(said.find("single colour"), std::string::npos) << said;
+  EXPECT_NE(done.text.find(said), std::string::npos);
+  EXPECT_NE(testing::ReadText(folder / "e/report.html").find("single colour"),
+            std::string::npos);
+}
+
 }  // namespace
 }  // namespace regrade
