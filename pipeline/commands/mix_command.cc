@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "kernels/base/error.h"
+#include "kernels/field/widened.h"
 #include "pipeline/capture_store.h"
 #include "pipeline/commands/command.h"
 #include "pipeline/device_choice.h"
@@ -156,7 +157,7 @@ void RunMix(const Command& command, const Arguments& arguments, Console* console
                   "make it with `regrade stylize`, and keep a copy of styled.npz before the "
                   "next style takes its place");
 
-  const StoredField stored = ReadFieldFile(folder + "/field.npz");
+  StoredField stored = ReadFieldFile(folder + "/field.npz");
   const Backend backend =
       ChooseBackendFor(stored.field.geometry->spheres.on(), settings.device, false,
                        [console](const std::string& text) { console->Info(text); });
@@ -171,16 +172,21 @@ void RunMix(const Command& command, const Arguments& arguments, Console* console
   }
   std::vector<StoredField> styles;
   std::vector<const RadianceField*> fields;
+  int basis = stored.field.appearance.basis;
   for (const std::string& word : words) {
     styles.push_back(ReadFieldFile(StyleFile(word)));
     RadianceField& field = styles.back().field;
-    if (field.appearance.basis != stored.field.appearance.basis ||
-        !SameGeometry(*field.geometry, *stored.field.geometry))
+    if (!SameGeometry(*field.geometry, *stored.field.geometry))
       throw Error(ExitCode::kInput, "is a style of another reconstruction", StyleFile(word),
                   "styles that are mixed restyle one field: make them with `regrade stylize " +
                       folder + "`");
     field.geometry = stored.field.geometry;
+    basis = std::max(basis, field.appearance.basis);
   }
+  // Styles of a field whose colours know no direction may know some.
+  stored.field.appearance = Widened(std::move(stored.field.appearance), basis);
+  for (StoredField& style : styles)
+    style.field.appearance = Widened(std::move(style.field.appearance), basis);
   for (const StoredField& style : styles) fields.push_back(&style.field);
 
   std::optional<ObjectShares> object;

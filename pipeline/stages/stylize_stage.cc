@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "kernels/field/fast_rays.h"
+#include "kernels/field/widened.h"
 #include "pipeline/capture_store.h"
 #include "pipeline/device_choice.h"
 #include "pipeline/field_file.h"
@@ -30,6 +31,7 @@
 namespace regrade {
 namespace {
 
+constexpr int kStyledBasis = 9;
 constexpr double kVoting = 0.2;  // of the steps' time, roughly
 constexpr double kAfterTraining =
     0.15;  // conclusion, and the network over the field, of the steps' time
@@ -88,6 +90,9 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
   Workspace& workspace = *context->workspace;
   const Capture capture = ReadCapture(workspace.Path("poses"));
   StoredField stored = ReadFieldFile(workspace.Path("field.npz"));
+  // A 2D method maps each view by itself, and what differs from view to view needs directions,
+  // also where the scene's own colours do not.
+  stored.field.appearance = Widened(std::move(stored.field.appearance), kStyledBasis);
   ProgressParts parts(progress, 1 + kAfterTraining + (settings.object.On() ? kVoting : 0));
   const std::vector<int> indices = StyledViews(workspace, capture, settings.run.holdout);
   const std::unique_ptr<ObjectMasks> object = OpenObjectMasks(settings, capture);

@@ -1,10 +1,13 @@
 // regrade mix and contact-sheet over a whole, tiny run: exact ends, and what they refuse.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 
+#include "pipeline/field_file.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/tiny_run.h"
 
@@ -21,6 +24,31 @@ std::string Bytes(const std::string& path) {
 
 ProgramOutcome Regrade(const std::vector<std::string>& arguments) {
   return testing::RunProgram(REGRADE_PROGRAM, arguments);
+}
+
+// A scene whose colours know no direction has a style that does, and a film between the two.
+TEST(MixCommand, AStyleMayKnowDirectionsThatItsSceneDoesNot) {
+  const TemporaryFolder folder;
+  const std::string style = std::string(REGRADE_SOURCE_DIR) + "/assets/style_sunset.png";
+  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}).code, 0);
+  std::vector<std::string> run{"run",   folder / "s/truth", "--style",   style,
+                               "--out", folder / "e",       "--effects", "view-dependence=off"};
+  for (const std::string& flag : testing::TinyFlags()) run.push_back(flag);
+  const ProgramOutcome done = Regrade(run);
+  ASSERT_EQ(done.code, 0) << done.text;
+  EXPECT_EQ(ReadFieldFile(folder / "e/field.npz").field.appearance.basis, 1);
+  const Appearance styled = ReadFieldFile(folder / "e/styled.npz").field.appearance;
+  ASSERT_EQ(styled.basis, 9);
+  float beyond = 0;
+  for (int64_t i = 0; i < styled.sh.size(); ++i)
+    if (i % 9 != 0) beyond = std::max(beyond, std::abs(styled.sh[i]));
+  EXPECT_GT(beyond, 0);
+
+  ASSERT_EQ(Regrade({"mix", folder / "e", "--mix", "0:0.5:1", "--out", folder / "m"}).code, 0);
+  const auto frame = [&](const std::string& path) { return Bytes(folder / path); };
+  EXPECT_EQ(frame("m/frames/00000.png"), frame("e/frames/path_source/00000.png"));
+  EXPECT_EQ(frame("m/frames/00002.png"), frame("e/frames/path_styled/00002.png"));
+  EXPECT_NE(frame("m/frames/00001.png"), frame("e/frames/path_styled/00001.png"));
 }
 
 TEST(MixCommand, H49_AFilmBetweenTheSceneAndItsStyle) {

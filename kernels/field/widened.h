@@ -1,0 +1,25 @@
+// An appearance with room for more spherical harmonics than it has.
+#pragma once
+
+#include <algorithm>
+#include <utility>
+
+#include "kernels/field/radiance_field.h"
+
+namespace regrade {
+
+// The same colours with `basis` harmonics a channel, those beyond its own 0: it renders the
+// same to the bit. Nothing changes where it has as many.
+inline Appearance Widened(Appearance appearance, int basis) {
+  const int own = appearance.basis;
+  if (own >= basis) return appearance;
+  const int64_t rows = appearance.sh.size() / own;
+  Buffer<float> sh(rows * basis);  // zero
+  for (int64_t i = 0; i < rows; ++i)
+    std::copy_n(appearance.sh.data() + i * own, own, sh.data() + i * basis);
+  appearance.basis = basis;
+  appearance.sh = std::move(sh);
+  return appearance;
+}
+
+}  // namespace regrade
