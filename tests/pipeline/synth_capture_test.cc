@@ -236,7 +236,7 @@ TEST_F(SynthCapture, RefusesUnknownEffectsScenesAndSizes) {
        {"fog", "noise,,exposure", "noise ", "motion-blur", "occluders", "barrel,fisheye"}) {
     SynthOptions options;
     options.effects = effects;
-    EXPECT_NE(refusal(options).find("exposure, noise, highlights, masks, and one lens"),
+    EXPECT_NE(refusal(options).find("exposure, noise, highlights, masks, poses, and one lens"),
               std::string::npos);
   }
   for (const char* size : {"", "640", "640x", "x480", "640x480x3", "0x0", "8x8", "99999x2",
