@@ -1,0 +1,176 @@
+#!/usr/bin/env python3
+"""Reconstructs every capture at hand with no option that decides about effects, and tabulates what was decided.
+
+  captures.py REGRADE DATA --work FOLDER [--gains] [--only NAME,...] [-- OPTIONS OF reconstruct]
+
+DATA is a folder of real captures (those that are missing are left out); synthetic ones, one for each effect, are made
+in FOLDER. With --gains each effect that was chosen is taken out once (`--effects NAME=off`, the same poses unless they
+are what is taken out), and the table says what it gained in held-out PSNR and cost in CPU seconds of the fit. OPTIONS
+default to `--preset draft`. What is finished is not done again. Printed is a table in Markdown; FOLDER/captures.json
+holds the figures, FOLDER/NAME.log what was said. Exit status 1 if a capture ended otherwise than it should.
+"""
+
+import argparse
+import json
+import os
+import shutil
+import subprocess
+import sys
+
+# name, path in DATA, exit status that is right
+REAL = (("kermit", "kermit", 0), ("sceaux_castle", "sceaux_castle", 0),
+        ("fountain-P11", "strecha/fountain-P11/images", 0),
+        ("Herz-Jesus-P8", "strecha/Herz-Jesus-P8/images", 0), ("fox", "fox/images", 0), ("llff_fern", "llff_fern", 0),
+        ("lego", "lego", 0), ("pure_rotation", "hard/pure_rotation", 6), ("three_photos", "hard/three_photos", 6),
+        ("no_rigid_scene", "hard/no_rigid_scene", 6))
+# name, options of synth, what of it is the capture
+SMALL = ("--size", "320x240")
+SYNTHETIC = (("matte", ("--scene", "table"), "images"),
+             ("highlights", ("--scene", "table", "--effects", "highlights"), "images"),
+             ("wall", ("--scene", "wall"), "images"), ("square", ("--scene", "square", "--views", "40"), "images"),
+             ("exposure", ("--scene", "table", "--effects", "exposure"), "images"),
+             ("barrel", ("--scene", "table", "--effects", "barrel"), "images"),
+             ("poses", ("--scene", "table", "--effects", "poses"), ""))
+NO_SWITCH = ("distortion",)  # photos are followed through their lens or not: nothing to choose
+
+
+def call(command, log):
+    with open(log, "a", encoding="utf-8") as file:
+        file.write(" ".join(command) + "\n")
+        file.flush()
+        return subprocess.run(command, stdin=subprocess.DEVNULL, stdout=file, stderr=file, check=False).returncode
+
+
+def record_of(folder, stage):
+    path = os.path.join(folder, ".regrade", "stages", stage + ".json")
+    if not os.path.exists(path):
+        return {}
+    with open(path, encoding="utf-8") as file:
+        return json.load(file)
+
+
+def last_words(log):
+    with open(log, encoding="utf-8", errors="replace") as file:
+        lines = [line.strip() for line in file if line.strip()]
+    return next((line for line in reversed(lines) if "error" in line.lower()), lines[-1] if lines else "")
+
+
+def figures_of(folder):
+    pose, fit = record_of(folder, "pose"), record_of(folder, "reconstruct")
+    figures = {"cpu_seconds": {"pose": pose.get("cpu_seconds"), "reconstruct": fit.get("cpu_seconds")}}
+    for key in ("psnr_heldout_db", "psnr_train_db", "voxels", "sh_degree"):
+        figures[key] = fit.get("figures", {}).get(key)
+    index = os.path.join(folder, "poses", "photos.json")
+    if os.path.exists(index):
+        with open(index, encoding="utf-8") as file:
+            figures["given"] = len(json.load(file)["photos"])
+    figures["placed"] = pose.get("figures", {}).get("registered")
+    figures["effects"] = pose.get("figures", {}).get("effects", []) + fit.get("figures", {}).get("effects", [])
+    return figures
+
+
+def copy_poses(source, target):
+    """The finished first stage of one folder, for another: it is not done again."""
+    stages = os.path.join(".regrade", "stages")
+    if os.path.exists(os.path.join(target, stages, "pose.json")):
+        return
+    os.makedirs(os.path.join(target, stages), exist_ok=True)
+    shutil.copytree(os.path.join(source, "poses"), os.path.join(target, "poses"), dirs_exist_ok=True)
+    shutil.copy2(os.path.join(source, stages, "pose.json"), os.path.join(target, stages))
+
+
+def measure(arguments, name, source, status):
+    """The figures of one capture, and of it without each effect that was chosen."""
+    log, out = os.path.join(arguments.work, name + ".log"), os.path.join(arguments.work, name)
+    ended = call([arguments.regrade, "reconstruct", source, "--out", out] + arguments.options, log)
+    figures = {"name": name, "status": ended, "as_expected": ended == status, "words": last_words(log)}
+    figures.update(figures_of(out))
+    if ended != 0 or not arguments.gains:
+        return figures
+    decided = {effect["name"]: "on" if effect["on"] else "off" for effect in figures["effects"]}
+    for effect in figures["effects"]:
+        if not effect["on"] or effect["name"] in NO_SWITCH:
+            continue
+        without = out + ".without." + effect["name"]
+        # The trial of view dependence has had its say: what is compared differs in one thing.
+        wishes = {"view-dependence": decided.get("view-dependence", "on"), effect["name"]: "off"}
+        if effect["name"] != "pose-refinement":
+            copy_poses(out, without)
+        wish = ",".join(f"{key}={value}" for key, value in wishes.items())
+        again = call([arguments.regrade, "reconstruct", source, "--out", without, "--effects", wish]
+                     + arguments.options, log)
+        effect["without"] = figures_of(without) if again == 0 else {"why": last_words(log)}
+    return figures
+
+
+def number(value, form="{:.2f}"):
+    return "–" if value is None else form.format(value)
+
+
+def chosen(effect, figures):
+    value, threshold = effect.get("value"), effect.get("threshold")
+    text = effect["name"]
+    if value is not None and threshold is not None:
+        text += f" ({value:.3g} {'>' if value > threshold else '<='} {threshold:.3g})"
+    else:
+        text += f" ({effect['evidence']})"
+    without = effect.get("without", {})
+    if without.get("psnr_heldout_db") is not None:
+        stage = "pose" if effect["name"] == "pose-refinement" else "reconstruct"
+        text += f": {figures['psnr_heldout_db'] - without['psnr_heldout_db']:+.2f} dB"
+        if figures["cpu_seconds"][stage] is not None and without["cpu_seconds"][stage] is not None:
+            text += f", {figures['cpu_seconds'][stage] - without['cpu_seconds'][stage]:+.0f} s"
+    elif "why" in without:
+        text += ": does not work without"
+    return text
+
+
+def table_of(rows):
+    lines = ["| capture | photos placed | chosen (measured, threshold): what it gained and cost | held-out PSNR "
+             "| CPU s |", "|---|---|---|---|---|"]
+    for row in rows:
+        seconds = row["cpu_seconds"]["reconstruct"]
+        if row["status"] != 0:
+            lines.append(f"| {row['name']} | | refused, exit status {row['status']}: {row['words']} | | |")
+            continue
+        on = "; ".join(chosen(effect, row) for effect in row["effects"] if effect["on"]) or "nothing"
+        lines.append(f"| {row['name']} | {row['placed']}/{row['given']} | {on} | "
+                     f"{number(row['psnr_heldout_db'])} dB | {number(seconds, '{:.0f}')} |")
+    return "\n".join(lines)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("regrade")
+    parser.add_argument("data")
+    parser.add_argument("--work", required=True)
+    parser.add_argument("--gains", action="store_true")
+    parser.add_argument("--only", default="")
+    split = sys.argv.index("--") if "--" in sys.argv else len(sys.argv)
+    arguments = parser.parse_args(sys.argv[1:split])
+    arguments.options = sys.argv[split + 1:] or ["--preset", "draft"]
+    only = [name for name in arguments.only.split(",") if name]
+    os.makedirs(arguments.work, exist_ok=True)
+    captures = [(name, os.path.join(arguments.data, path), status) for name, path, status in REAL]
+    for name, options, part in SYNTHETIC:
+        if only and name not in only:
+            continue
+        folder = os.path.join(arguments.work, "synthetic", name)
+        log = os.path.join(arguments.work, name + ".log")
+        if call([arguments.regrade, "synth", folder, *SMALL, *options], log) != 0:
+            sys.exit(f"captures.py: no synthetic capture {name}, see its log")
+        captures.append(("synthetic: " + name, os.path.join(folder, part), 0))
+    rows = []
+    for name, source, status in captures:
+        if (only and name.split(": ")[-1] not in only) or not os.path.isdir(source):
+            continue
+        rows.append(measure(arguments, name.split(": ")[-1], source, status) | {"name": name})
+        with open(os.path.join(arguments.work, "captures.json"), "w", encoding="utf-8") as file:
+            json.dump(rows, file, indent=1)
+        print(name, "done", file=sys.stderr, flush=True)
+    print(table_of(rows))
+    return 0 if all(row["as_expected"] for row in rows) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
