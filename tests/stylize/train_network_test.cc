@@ -1,5 +1,6 @@
 // Learning a style: against the linear map, resumed, interrupted, with targets that are not
 // finite.
+#include "tests/support/floating_point_traps.h"
 #include "tests/support/record_error.h"
 #include "tests/support/styled_ball.h"
 
@@ -182,6 +183,7 @@ TEST(TrainNetwork, H109_RaysAreAFunctionOfSeedAndStep) {
 }
 
 TEST(TrainNetwork, H106_StopsAtTheSecondStepThatIsNotFinite) {
+  const testing::MayBeNotFinite allowed;
   const StyledBall ball(10, 3, 24, LinearStyle);
   const SceneColorMap map = MapOf(ball);
   TrainingState state;
