@@ -4,10 +4,11 @@
   hard_cases.py             writes the page
   hard_cases.py --check     changes nothing; exit status 1 if the page is not what would be written, if a test that is
                             named does not exist, or if a case has neither a test nor a sentence why
-  hard_cases.py --measured REPORT...
-                            keeps what tests of numbers measured (measured.json), from GoogleTest's reports or folders of
-                            them, and writes the page: GTEST_OUTPUT=xml:FOLDER/ ctest --test-dir build/cpu writes them here,
-                            device_parity_test --gtest_output=xml:FOLDER/ on a machine with a GPU
+  hard_cases.py --measured build/cpu
+                            runs the tests of numbers in a build, keeps what they measured (measured.json), and writes the page
+  hard_cases.py --measured REPORT.xml...
+                            the same from GoogleTest's reports or folders of them: of tests that have begun to measure, and of
+                            device_parity_test and device_style_test --gtest_output=xml:FILE on a machine with a GPU
   hard_cases.py --self-test plants mistakes and sees --check find them
 
 A test belongs to a case whose number is in its name ("Mkl.H7_H20_StyleOfOneColour"). tests/hard_cases/cases.json has the
@@ -181,7 +182,10 @@ def check(root):
 def keep(root, reports):
     """Of tests that ran what they measured now, of others what is kept, as long as they are there."""
     tree = Tree(root)
-    kept = {test: rows for test, rows in {**tree.measured, **measured_errors.gather(reports)}.items() if test in tree.tests}
+    build = os.path.isfile(os.path.join(reports[0], "CMakeCache.txt"))
+    known = set(tree.measured) | set(measured_errors.in_sources(root)[0])
+    now = measured_errors.run(reports[0], sorted(known)) if build else measured_errors.gather(reports)
+    kept = {test: rows for test, rows in {**tree.measured, **now}.items() if test in tree.tests}
     with open(os.path.join(root, MEASURED), "w", encoding="utf-8") as file:
         rows = [f" {json.dumps(test)}: [\n  " + ",\n  ".join(json.dumps(row) for row in kept[test]) + "]"
                 for test in sorted(kept)]

@@ -3,7 +3,7 @@
 
 Tests measure with tests/support/record_error.h. hard_cases.py --measured gathers and keeps it in
 tests/hard_cases/measured.json: {test: [{what, kind, where, measured, allowed}]}, of a test with parameters the worst.
-Kinds: "digits" is an error relative to the size of what it is of, "bound" anything that stays below what is allowed,
+Kinds: "count" is how many there were, "digits" is an error relative to the size of what it is of, "bound" anything that stays below what is allowed,
 "bits" 0 where two results are the same to the last bit. A number may differ by machine and compiler in its last digits:
 what is compared with the sources is which tests measure, and what.
 """
@@ -12,6 +12,8 @@ import glob
 import math
 import os
 import re
+import subprocess
+import tempfile
 import xml.etree.ElementTree
 
 TEST = re.compile(r"^TEST(?:_F|_P)?\(\s*(\w+)\s*,\s*(\w+)\s*\)(.*?)^\}", re.M | re.S)
@@ -41,6 +43,21 @@ def gather(paths):
                     if last is None or share(row) > share(last):
                         found[test][what] = row
     return {test: [rows[what] for what in sorted(rows)] for test, rows in sorted(found.items())}
+
+
+def run(build, tests):
+    """Runs those of a build's test programs that have some of these tests, and gathers; a test that fails is an error."""
+    with tempfile.TemporaryDirectory() as reports:
+        for program in sorted(glob.glob(os.path.join(build, "tests", "*", "*_test"))):
+            listed = subprocess.run([program, "--gtest_list_tests"], check=True, capture_output=True, text=True).stdout
+            suites = set(re.findall(r"^(?:\w+/)?(\w+)(?:/\d+)?\.", listed, re.M))
+            wanted = [test for test in tests if test.split(".")[0] in suites]
+            if wanted:
+                names = ":".join(f"{test}:*/{test}/*" for test in wanted)
+                subprocess.run([program, "--gtest_brief=1", f"--gtest_filter={names}",
+                                f"--gtest_output=xml:{reports}/{os.path.basename(program)}.xml"], check=True,
+                               env=dict(os.environ, OMP_WAIT_POLICY="passive"))
+        return gather([reports])
 
 
 def in_sources(root):
@@ -87,6 +104,8 @@ def number(text):
 
 def told(row):
     """One row in words."""
+    if row["kind"] == "count":
+        return f"{row['what']}: {row['measured']}"
     if row["kind"] == "bits":
         return f"{row['what']}: no bit differs ({row['where']})"
     if row["kind"] == "digits":

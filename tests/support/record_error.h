@@ -26,7 +26,8 @@ inline void Record(const char* kind, const std::string& what, Computed computed,
   if (!first && share <= place->second) return;
   place->second = share;
   char text[96];
-  std::snprintf(text, sizeof text, "%s %s %.2e %.2e", kind,
+  const char* format = std::string(kind) == "count" ? "%s %s %.0f %.0f" : "%s %s %.2e %.2e";
+  std::snprintf(text, sizeof text, format, kind,
                 computed == Computed::kFloat    ? "float CPU"
                 : computed == Computed::kDouble ? "double CPU"
                                                 : "float GPU",
@@ -47,6 +48,11 @@ inline double RecordBound(const std::string& what, Computed computed, double mea
                           double allowed) {
   Record("bound", what, computed, measured, allowed);
   return allowed;
+}
+
+// How many there were of something.
+inline void RecordCount(const std::string& what, double count) {
+  Record("count", what, Computed::kDouble, count, 0);
 }
 
 // Two results that are the same to the last bit. Returns what it is told, for EXPECT_TRUE.
