@@ -57,13 +57,15 @@ TEST(LipschitzNetwork, H36_SineUnderManyArbitraryPairs) {
   constexpr int kPairs = 20000;
   const char* wanted = std::getenv("REGRADE_PAIRS");
   const int networks = std::max(1, (wanted ? std::atoi(wanted) : 0) / kPairs);
+  double steepest = 0;
   for (int n = 0; n < networks; ++n) {
     const LipschitzNetwork network = RandomNetwork(81 + 1000 * static_cast<uint64_t>(n));
     const double share = SteepestPair(network, kPairs) / network.Bound();
     EXPECT_LE(share, RecordBound("steepest of 20 000 pairs over the bound", Computed::kDouble,
                                  share, 1));
-    EXPECT_GT(share, 0.02);  // the attack is not idle
+    steepest = std::max(steepest, share);
   }
+  EXPECT_GT(steepest, 0.02);  // the attack is not idle
 }
 
 TEST(LipschitzNetwork, H36_StaleNormsAreNotBelieved) {
