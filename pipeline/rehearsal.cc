@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <omp.h>
+#include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -31,7 +32,11 @@ void Limit(int64_t bytes) {
   ::setrlimit(RLIMIT_CORE, &no_core);
 }
 
-[[noreturn]] void RunChild(const std::function<void()>& work, const RehearsalLimits& limits) {
+[[noreturn]] void RunChild(const std::function<void()>& work, const RehearsalLimits& limits,
+                           pid_t parent) {
+  // It ends with us, also where we had ended before it could ask for that.
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (::getppid() != parent) ::_exit(1);
   const int nowhere = ::open("/dev/null", O_RDWR | O_CLOEXEC);
   for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) ::dup2(nowhere, fd);
   for (const int signal : {SIGINT, SIGTERM, SIGSEGV, SIGBUS, SIGABRT, SIGFPE, SIGILL})
@@ -58,11 +63,11 @@ void Limit(int64_t bytes) {
 
 void Rehearse(const std::function<void()>& work, const std::string& where,
               const RehearsalLimits& limits) {
-  const pid_t child = ::fork();
+  const pid_t parent = ::getpid(), child = ::fork();
   if (child < 0)
     throw Error(ExitCode::kResources,
                 std::string("cannot start a process: ") + std::strerror(errno), where);
-  if (child == 0) RunChild(work, limits);
+  if (child == 0) RunChild(work, limits, parent);
   const auto begin = std::chrono::steady_clock::now();
   int status = 0;
   bool late = false;

@@ -63,6 +63,8 @@ struct ReconstructReport {
   Figure psnr_train_db, psnr_heldout_db, ssim_heldout;
   std::vector<std::string> heldout;                       // the user's file names
   std::vector<std::pair<int64_t, double>> psnr_at_steps;  // dB on the rays of the last steps
+  // Steps of voxels that were not taken, their gradient being no number.
+  std::optional<int64_t> rejected_voxels;
 };
 
 struct Style2dReport {
@@ -95,7 +97,8 @@ struct StylizeReport {
   Figure slope_ascent;                  // the largest that climbing from the voxels finds
   std::vector<std::pair<int64_t, double>> bound_at_steps;  // while it was learned
   std::optional<VarianceFigures> variance;
-  std::vector<std::string> notices;  // of the colour map and of learning
+  std::vector<std::string> notices;       // of the colour map and of learning
+  std::optional<int64_t> rejected_steps;  // not taken, the gradient being no number
 };
 
 struct RenderReport {

@@ -75,6 +75,7 @@ JsonValue StageJson(const ReconstructReport& stage) {
   object.emplace_back("heldout", Strings(stage.heldout));
   if (!stage.psnr_at_steps.empty())
     object.emplace_back("psnr_at_steps", CurveJson(stage.psnr_at_steps));
+  if (stage.rejected_voxels) object.emplace_back("rejected_voxels", *stage.rejected_voxels);
   return object;
 }
 
@@ -109,6 +110,7 @@ JsonValue StageJson(const StylizeReport& stage) {
     object.emplace_back("bound_at_steps", CurveJson(stage.bound_at_steps));
   if (stage.variance) object.emplace_back("variance", VarianceJson(*stage.variance));
   if (!stage.notices.empty()) object.emplace_back("notices", Strings(stage.notices));
+  if (stage.rejected_steps) object.emplace_back("rejected_steps", *stage.rejected_steps);
   return object;
 }
 

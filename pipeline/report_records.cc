@@ -215,6 +215,8 @@ RunReport ReportFromRecords(const Workspace& workspace) {
                           FigureOf(f, "ssim_heldout"),  {}};
     stages.reconstruct->heldout = TextsOf(f, "heldout");
     stages.reconstruct->psnr_at_steps = CurveOf(f, "curve_steps", "curve_psnr_db");
+    if (f.Find("rejected_voxels"))
+      stages.reconstruct->rejected_voxels = CountOf(f, "rejected_voxels");
   }
   if (style_2d)
     stages.style_2d = {style_2d->seconds, TextOf(style_2d->figures, "method"),
@@ -224,6 +226,7 @@ RunReport ReportFromRecords(const Workspace& workspace) {
     stages.stylize.emplace();
     stages.stylize->seconds = stylize->seconds;
     stages.stylize->steps = static_cast<int>(CountOf(f, "steps"));
+    if (f.Find("rejected_steps")) stages.stylize->rejected_steps = CountOf(f, "rejected_steps");
     stages.stylize->k_est = FigureOf(f, "k_est");
     stages.stylize->bound = FigureOf(f, "bound");
     stages.stylize->slope_observed = FigureOf(f, "slope_observed");

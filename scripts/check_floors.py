@@ -32,6 +32,7 @@ DOORS = (
       r"pipeline/files/picture_text\.cc")),
     ("OpenImageIO", r"OpenImageIO/", (r"pipeline/files/image_file\.cc",)),
     ("libjpeg-turbo", r"(jpeglib|jerror|jmorecfg|turbojpeg)\.h", (r"pipeline/files/jpeg_decoder\.cc",)),
+    ("libpng", r"(png|pngconf|pnglibconf)\.h", (r"pipeline/files/png_decoder\.cc",)),
     ("Ceres", r"(ceres|glog)/", (r"reconstruct/(exposure|refine_poses)\.cc",)),
     ("Boost", r"boost/", (r"pipeline/option_binding\.cc",)),
     ("nlohmann-json", r"nlohmann/", (r"pipeline/files/[^/]*\.cc",)),

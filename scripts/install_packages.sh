@@ -8,7 +8,7 @@ packages=(
   libgtest-dev libbenchmark-dev python3-numpy   # to test and to measure
   libboost-program-options-dev               # command line
   nlohmann-json3-dev libzip-dev libspdlog-dev
-  libopenimageio-dev libjpeg62-turbo-dev     # pictures
+  libopenimageio-dev libjpeg62-turbo-dev libpng-dev   # pictures
   libopencv-dev                              # flow, networks of 2D methods, films
   libceres-dev libeigen3-dev
   colmap                                     # poses, started as a program

@@ -17,6 +17,7 @@
 #include <deque>
 
 #include "kernels/base/error.h"
+#include "kernels/base/process_guard.h"
 
 namespace regrade {
 namespace {
@@ -138,7 +139,8 @@ std::vector<char*> Pointers(const std::vector<std::string>& strings) {
   return pointers;
 }
 
-// Owns a started child: whatever happens, its group is killed and it is reaped.
+// Owns a started child: whatever happens, its group is killed and it is reaped; if it is we who
+// are killed, the group's guard sees to that.
 class Child {
  public:
   Child(const ChildOptions& options, int output) {
@@ -158,7 +160,7 @@ class Child {
     sigfillset(&all);
     posix_spawnattr_setsigmask(&attributes, &none);
     posix_spawnattr_setsigdefault(&attributes, &all);
-    posix_spawnattr_setpgroup(&attributes, 0);
+    posix_spawnattr_setpgroup(&attributes, guard_.group());
     posix_spawnattr_setflags(
         &attributes, POSIX_SPAWN_SETPGROUP | POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
     const std::vector<std::string> environment = MinimalEnvironment(options);
@@ -179,9 +181,9 @@ class Child {
     if (pid_ > 0) Reap();
   }
 
-  void Signal(int signal) const { kill(-pid_, signal); }
+  void Signal(int signal) const { guard_.Signal(signal); }
 
-  // True once the child is over; it stays a zombie, so its group's number cannot be reused yet.
+  // True once the child is over.
   bool Over() const {
     siginfo_t info{};
     return waitid(P_PID, pid_, &info, WEXITED | WNOHANG | WNOWAIT) != 0 || info.si_pid == pid_;
@@ -198,6 +200,7 @@ class Child {
   }
 
  private:
+  ProcessGuard guard_;  // keeps the group's number taken as long as the child is wanted
   pid_t pid_ = -1;
 };
 

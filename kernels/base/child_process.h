@@ -45,10 +45,10 @@ using LineFunction = std::function<void(const std::string& line)>;
 // Asked about ten times a second, also while the child is silent; false ends the child.
 using KeepGoingFunction = std::function<bool()>;
 
-// Runs the program to its end. The child leads a process group of its own, so that its children
-// end with it; its stdin is /dev/null; it inherits no other file of ours. Throws Error:
-// kExternalProgram if it cannot be started (the reason in `what`), kResources if the system has
-// no process, pipe or log space left.
+// Runs the program to its end. The child is in a process group of its own, so that its children
+// end with it, and all of them with us, even by SIGKILL; its stdin is /dev/null; it inherits no
+// other file of ours. Throws Error: kExternalProgram if it cannot be started (the reason in
+// `what`), kResources if the system has no process, pipe or log space left.
 ChildResult RunChild(const ChildOptions& options, const LineFunction& on_line = {},
                      const KeepGoingFunction& keep_going = {});
 

@@ -20,6 +20,7 @@
 #include "pipeline/files/jpeg_decoder.h"
 #include "pipeline/files/photo_rules.h"
 #include "pipeline/files/png_chunks.h"
+#include "pipeline/files/png_decoder.h"
 
 namespace regrade {
 namespace {
@@ -112,8 +113,27 @@ StoredPicture ReadJpeg(std::string_view bytes, const std::string& where,
   return picture;
 }
 
-// Size of a PNG or GIF from its first bytes: these decoders allocate, or complain on stderr,
-// before they can be asked.
+StoredPicture ReadPng(std::string_view bytes, const std::string& where,
+                      const DecodeLimits& limits) {
+  PngPicture png = DecodePng(bytes, where, [&](int64_t w, int64_t h, int64_t pixel_bytes) {
+    CheckSize(w, h, pixel_bytes, static_cast<int64_t>(bytes.size()), limits, where);
+  });
+  StoredPicture picture;
+  picture.image = std::move(png.image);
+  picture.bits = png.bits;
+  picture.linear_light = png.linear_light;
+  OIIO::ImageSpec spec;
+  if (!png.exif.empty()) OIIO::decode_exif(OIIO::string_view(png.exif), spec);
+  TakeMetadata(spec, &picture);
+  NoteProfile(png.icc, &picture);
+  if (png.remarks > 0)
+    picture.notices.push_back("an odd PNG (" + std::to_string(png.remarks) +
+                              (png.remarks == 1 ? " remark: " : " remarks, first: ") +
+                              png.first_remark + ")");
+  return picture;
+}
+
+// Size of a PNG or GIF from its first bytes: these decoders allocate before they can be asked.
 std::optional<std::pair<int64_t, int64_t>> PeekSize(std::string_view decoder,
                                                     std::string_view bytes) {
   const auto byte = [&](size_t at) -> int64_t { return static_cast<unsigned char>(bytes[at]); };
@@ -211,8 +231,9 @@ StoredPicture ReadStored(const std::string& path, const DecodeLimits& limits) {
                   "copy the file again from where it came");
   if (const auto size = PeekSize(decoder, bytes))
     CheckSize(size->first, size->second, 1, static_cast<int64_t>(bytes.size()), limits, path);
-  StoredPicture picture = decoder == "jpeg" ? ReadJpeg(bytes, path, limits)
-                                            : ReadWithOiio(*format, bytes, path, limits);
+  StoredPicture picture = decoder == "jpeg"  ? ReadJpeg(bytes, path, limits)
+                          : decoder == "png" ? ReadPng(bytes, path, limits)
+                                             : ReadWithOiio(*format, bytes, path, limits);
   ApplyPhotoRules(&picture, path);
   return picture;
 }

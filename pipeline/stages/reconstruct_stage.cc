@@ -185,6 +185,7 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   if (scene.box.spheres)
     outcome.figures["background_texels"] = fit.field.geometry->spheres.num_texels();
   outcome.figures["psnr_train_db"] = fit.psnr_train_db;
+  outcome.figures["rejected_voxels"] = fit.rejected_voxels;
   for (const FitCurvePoint& point : fit.curve) {
     outcome.figures["curve_steps"].Append(point.step);
     outcome.figures["curve_psnr_db"].Append(Rounded(point.psnr_train_db));

@@ -155,6 +155,7 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
   WriteFieldFile(workspace.Path("styled.npz"), stored);
   outcome.figures["device"] = DeviceName(backend);
   outcome.figures["steps"] = trained.steps;
+  outcome.figures["rejected_steps"] = trained.rejected_steps;
   outcome.figures["k_est"] = trained.k_est;
   outcome.figures["bound"] = trained.bound;
   outcome.figures["slope_observed"] = trained.slope_observed;

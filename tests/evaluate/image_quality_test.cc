@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "tests/evaluate/synthetic_frames.h"
+#include "tests/support/record_error.h"
 
 namespace regrade {
 namespace {
@@ -29,7 +30,9 @@ TEST(Psnr, KnownValuesAndUndefinedOnes) {
 TEST(Psnr, H123_SumsAreDouble) {
   const Image a = ConstantImage(2048, 2048, 0, 1), b = ConstantImage(2048, 2048, 0.1f, 1);
   const double exact = static_cast<double>(0.1f) * 0.1f;
-  EXPECT_NEAR(*MeanSquaredError(a, b), exact, 1e-10 * exact);
+  EXPECT_NEAR(*MeanSquaredError(a, b), exact,
+              testing::RecordDigits("mean over many pixels", testing::Computed::kDouble,
+                                    *MeanSquaredError(a, b) - exact, 1e-10, exact));
 }
 
 // One window, straight from the definition.
@@ -61,7 +64,9 @@ TEST(Ssim, AgreesWithTheDefinition) {
   Image b = NoiseImage(11, 11, 2, 1);
   for (size_t i = 0; i < b.pixels.size(); ++i)
     b.pixels[i] = 0.3f * b.pixels[i] + 0.7f * a.pixels[i];
-  EXPECT_NEAR(*Ssim(a, b), LiteralSsim(a, b), 1e-12);
+  EXPECT_NEAR(*Ssim(a, b), LiteralSsim(a, b),
+              testing::RecordDigits("SSIM against its definition", testing::Computed::kDouble,
+                                    *Ssim(a, b) - LiteralSsim(a, b), 1e-12));
   EXPECT_NEAR(*Ssim(NoiseImage(40, 30, 5), NoiseImage(40, 30, 5)), 1, 1e-12);
   EXPECT_LT(*Ssim(NoiseImage(40, 30, 5), NoiseImage(40, 30, 6)), 0.1);
   EXPECT_FALSE(Ssim(NoiseImage(10, 30, 5), NoiseImage(10, 30, 5)));

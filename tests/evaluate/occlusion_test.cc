@@ -8,6 +8,7 @@
 
 #include "evaluate/consistency.h"
 #include "tests/evaluate/synthetic_frames.h"
+#include "tests/support/record_error.h"
 
 namespace regrade {
 namespace {
@@ -154,7 +155,10 @@ TEST(Occlusion, Ruder2016AgreesWithALiteralTranscription) {
     const Plane expected = LiteralRuder(forward, backward);
     for (int y = 0; y < h; ++y)
       for (int x = 0; x < w; ++x)
-        ASSERT_NEAR(*mask.weight.at(x, y), expected[y][x], 1e-7);  // weights are float
+        ASSERT_NEAR(*mask.weight.at(x, y), expected[y][x],
+                    testing::RecordBound(
+                        "a weight against its definition", testing::Computed::kFloat,
+                        *mask.weight.at(x, y) - expected[y][x], 1e-7));  // weights are float
     EXPECT_GT(ShareAt(mask.weight, 1), 0.01);  // grain leaves few pixels without a neighbour
     EXPECT_GT(1 - ShareAt(mask.weight, 1) - ShareAt(mask.weight, 0), 0.02);  // it is soft
     EXPECT_GT(mask.disoccluded, 50);

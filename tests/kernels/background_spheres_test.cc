@@ -12,6 +12,7 @@
 #include "kernels/field/ray_loss.h"
 #include "kernels/field/sphere_variation.h"
 #include "tests/support/double_field.h"
+#include "tests/support/record_error.h"
 #include "tests/support/small_field.h"
 
 namespace regrade {
@@ -57,7 +58,9 @@ TEST(BackgroundSpheres, H91_CrossingsFromInside) {
         CrossingError(origin.Cast<float>(), RandomDirection(2, n).Cast<float>(), radius);
     ASSERT_GE(error, 0) << i;
     // A radius is kept as its inverse: 6e-8 of it moves a crossing that grazes by more.
-    ASSERT_LT(error, 6e-6) << i;
+    ASSERT_LT(error, testing::RecordBound("a crossing, over the radius",
+                                          testing::Computed::kFloat, error, 6e-6))
+        << i;
   }
 }
 
@@ -74,7 +77,8 @@ TEST(BackgroundSpheres, H92_CrossingsFromFarOutside) {
     ASSERT_GE(error, 0) << i;
     worst = std::max(worst, error);
   }
-  EXPECT_LT(worst, 3e-5);
+  EXPECT_LT(worst, testing::RecordBound("a crossing, over the radius",
+                                        testing::Computed::kFloat, worst, 3e-5));
 }
 
 TEST(BackgroundSpheres, H93_OutsideTheInnerSpheresAndAtInfinity) {
@@ -85,7 +89,9 @@ TEST(BackgroundSpheres, H93_OutsideTheInnerSpheresAndAtInfinity) {
   const SphereRay<double> inside =
       ToSphereRay(unit, RayT<double>{{0.3, -0.2, 0.6}, {0.6, 0, 0.8}});
   ASSERT_TRUE(CrossSphere(inside, 0.0, &place, &ahead));
-  EXPECT_NEAR(Norm(place - Vec3d{0.6, 0, 0.8}), 0, 1e-15);
+  EXPECT_NEAR(Norm(place - Vec3d{0.6, 0, 0.8}), 0,
+              testing::RecordDigits("the place at infinity", testing::Computed::kDouble,
+                                    Norm(place - Vec3d{0.6, 0, 0.8}), 1e-15));
   // From three radii away, looking out: what is nearer lies behind the camera.
   const SphereRay<double> out = ToSphereRay(unit, RayT<double>{{3, 0.1, 0}, {1, 0, 0}});
   EXPECT_FALSE(CrossSphere(out, 1.0, &place, &ahead));
@@ -183,7 +189,11 @@ TEST(BackgroundSpheres, AdjointEqualsDerivativeInDouble) {
       };
       const double fine = central(1e-4), coarse = central(2e-4);
       if (std::abs(fine - coarse) > 1e-6) return 0;  // a kink between the two
-      EXPECT_NEAR((4 * fine - coarse) / 3, gradient, 1e-8 * (1 + std::abs(gradient)));
+      const double numeric = (4 * fine - coarse) / 3;
+      EXPECT_NEAR(numeric, gradient,
+                  testing::RecordDigits("gradient of a pixel before spheres",
+                                        testing::Computed::kDouble, numeric - gradient, 1e-8,
+                                        1 + std::abs(gradient)));
       return gradient != 0 ? 1 : 0;
     };
     for (size_t i = 0; i < d.sphere_density.size(); ++i)
@@ -229,7 +239,12 @@ TEST_P(FastSpheresParity, RendersAsThePlainRay) {
   for (size_t r = 0; r < rays_.size(); ++r) {
     const RayResult<float> plain = RenderRay(ViewOf(field_), rays_[r], options);
     behind += plain.spheres.last_layer >= 0;
-    for (int c = 0; c < 3; ++c) ASSERT_NEAR(color[3 * r + c], plain.color[c], 4e-5) << r;
+    for (int c = 0; c < 3; ++c)
+      ASSERT_NEAR(
+          color[3 * r + c], plain.color[c],
+          testing::RecordBound("a pixel against the plain ray", testing::Computed::kFloat,
+                               color[3 * r + c] - plain.color[c], 4e-5))
+          << r;
     ASSERT_NEAR(transmittance[r], plain.transmittance, 2e-5);
     ASSERT_NEAR(depth[r], plain.depth, 1e-4 * (1 + plain.depth));
   }
@@ -268,7 +283,11 @@ TEST_P(FastSpheresParity, GradientsAsThePlainAdjointInDouble) {
   for (int64_t t = 0; t < grid.spheres.num_texels(); ++t) {
     const int32_t slot = arena.spheres.slot_of_texel[t];
     const float* g = slot < 0 ? nullptr : arena.spheres.gradient.data() + 4 * slot;
-    ASSERT_NEAR(g ? g[3] : 0, d_sphere_density[static_cast<size_t>(t)], 1e-4 * most_density);
+    const double by_density = g ? g[3] : 0, expected = d_sphere_density[static_cast<size_t>(t)];
+    ASSERT_NEAR(
+        by_density, expected,
+        testing::RecordDigits("gradient by texels, of its largest", testing::Computed::kFloat,
+                              by_density - expected, 1e-4, most_density));
     for (int c = 0; c < 3; ++c)
       ASSERT_NEAR(g ? g[c] : 0, d_sphere_color[static_cast<size_t>(3 * t + c)],
                   1e-4 * most_color);
@@ -299,13 +318,19 @@ TEST(SphereVariation, GradientIsTheValuesDerivative) {
   value(1.0, [&](int32_t texel, double d) { gradient[static_cast<size_t>(texel)] += d; });
   const auto nothing = [](int32_t, double) {};
   for (size_t i = 0; i < values.size(); ++i) {
-    const double x = values[i], h = 1e-6;
-    values[i] = x + h;
-    const double up = value(0.0, nothing);
-    values[i] = x - h;
-    const double down = value(0.0, nothing);
-    values[i] = x;
-    EXPECT_NEAR((up - down) / (2 * h), gradient[i], 1e-6);  // as H97
+    const double x = values[i];
+    const auto central = [&](double h) {
+      values[i] = x + h;
+      const double up = value(0.0, nothing);
+      values[i] = x - h;
+      const double down = value(0.0, nothing);
+      values[i] = x;
+      return (up - down) / (2 * h);
+    };
+    const double numeric = (4 * central(1e-4) - central(2e-4)) / 3;
+    EXPECT_NEAR(numeric, gradient[i],
+                testing::RecordDigits("gradient", testing::Computed::kDouble,
+                                      numeric - gradient[i], 1e-8));  // see H97
   }
   // A constant background has no edge, not even beside empty texels: the roots of epsilon
   // alone.

@@ -2,6 +2,7 @@
 #include "kernels/base/child_process.h"
 
 #include <gtest/gtest.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <csignal>
@@ -11,6 +12,7 @@
 #include <sstream>
 
 #include "kernels/base/error.h"
+#include "tests/support/process_state.h"
 
 namespace regrade {
 namespace {
@@ -114,12 +116,46 @@ TEST(ChildProcess, F50_GrandchildrenEndWithTheGroup) {
   EXPECT_TRUE(result.Succeeded());
   EXPECT_LT(result.seconds, 4);
   ASSERT_GT(pid, 1);
-  for (int i = 0; i < 100 && kill(pid, 0) == 0; ++i) usleep(10000);
-  // It may stay a zombie until init takes it; alive it is no longer.
-  std::ifstream stat("/proc/" + std::to_string(pid) + "/stat");
-  std::string number, name, state = "Z";
-  stat >> number >> name >> state;
-  EXPECT_EQ(state, "Z");
+  EXPECT_TRUE(testing::Ends(pid));
+}
+
+// SIGKILL leaves nobody time to say goodbye: the child, deaf to SIGTERM and silent, and its own
+// child end all the same, and nothing of ours stays behind.
+TEST(ChildProcess, F35_ChildrenEndWithAProcessThatIsKilled) {
+  const fs::path child_file = TemporaryFile("child"), grandchild_file = TemporaryFile("grand");
+  const pid_t copy = fork();
+  if (copy == 0) {
+    RunChild(Shell("trap '' TERM HUP; sleep 60 & echo $! > '" + grandchild_file.string() +
+                   "'; echo $$ > '" + child_file.string() + "'; wait"));
+    _exit(0);
+  }
+  const pid_t child = testing::NumberIn(child_file),
+              grandchild = testing::NumberIn(grandchild_file);
+  ASSERT_GT(child, 1);
+  ASSERT_GT(grandchild, 1);
+  const pid_t group = getpgid(child);
+  EXPECT_TRUE(testing::IsAlive(child) && testing::IsAlive(grandchild));
+  EXPECT_NE(group, getpgid(copy));
+  kill(copy, SIGKILL);
+  waitpid(copy, nullptr, 0);
+  EXPECT_TRUE(testing::Ends(child));
+  EXPECT_TRUE(testing::Ends(grandchild));
+  EXPECT_TRUE(testing::Ends(group));  // the guard, whose number the group has
+  kill(-group, SIGKILL);              // nothing may be left of a test that fails
+  fs::remove_all(child_file.parent_path());
+}
+
+// The guard holds nothing of ours open: a lock or a pipe of a process that was killed is free.
+TEST(ChildProcess, F35_TheGuardHoldsNoFileOfOurs) {
+  int ends[2];
+  ASSERT_EQ(pipe(ends), 0);
+  // The group's number is the guard's; a guard that has just been born has a moment to close.
+  EXPECT_EQ(LinesOf(Shell("guard=$(cut -d' ' -f5 /proc/$$/stat); for i in $(seq 100); do "
+                          "n=$(ls /proc/$guard/fd | wc -l); [ $n = 1 ] && break; sleep 0.05; "
+                          "done; echo $n")),
+            std::vector<std::string>{"1"});
+  close(ends[0]);
+  close(ends[1]);
 }
 
 TEST(ChildProcess, StopsWhenNobodyWantsItAnyMore) {
@@ -168,7 +204,16 @@ TEST(ChildProcess, F52_ALineWithoutEndComesInPieces) {
 }
 
 TEST(ChildProcess, F53_StdinIsEmpty) {
+  const int before = dup(STDIN_FILENO);
+  int ends[2];
+  ASSERT_EQ(pipe(ends), 0);
+  ASSERT_EQ(write(ends[1], "for us\n", 7), 7);
+  close(ends[1]);
+  dup2(ends[0], STDIN_FILENO);
+  close(ends[0]);
   EXPECT_EQ(LinesOf(Shell("cat; echo done")), std::vector<std::string>{"done"});
+  dup2(before, STDIN_FILENO);
+  close(before);
 }
 
 TEST(ChildProcess, F54_ArgumentsAreNeverParsed) {

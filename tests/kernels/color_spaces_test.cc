@@ -7,6 +7,7 @@
 #include "kernels/base/error.h"
 #include "kernels/image/hue_chroma.h"
 #include "tests/support/floating_point_traps.h"
+#include "tests/support/record_error.h"
 
 namespace regrade {
 namespace {
@@ -24,7 +25,9 @@ TEST(ColorSpaces, H149_AllGreyValuesSurviveEverySpace) {
           SrgbFromLab(LabFromSrgb(srgb))}) {
       for (int c = 0; c < 3; ++c) EXPECT_EQ(std::lround(255 * back[c]), v);
       // The two pieces of the standard's curve meet to 3e-8 only.
-      EXPECT_LE(LargestDifference(back, srgb), 1e-7);
+      EXPECT_LE(LargestDifference(back, srgb),
+                testing::RecordDigits("greys there and back", testing::Computed::kDouble,
+                                      LargestDifference(back, srgb), 1e-7));
     }
     const Vec3d lab = LabFromSrgb(srgb);
     EXPECT_NEAR(std::hypot(lab.y, lab.z), 0, 1e-12);  // grey has no chroma
@@ -40,14 +43,20 @@ TEST(ColorSpaces, H24_ColourCubeAndBlackSurviveLab) {
         const Vec3d back = SrgbFromLab(LabFromSrgb(srgb));
         ASSERT_LE(LargestDifference(back, srgb), 0.5 / 255) << r << ' ' << g << ' ' << b;
         // Much better than half a step, in fact: the curve's seam is what is left.
-        ASSERT_LE(LargestDifference(back, srgb), 1e-6);
+        ASSERT_LE(
+            LargestDifference(back, srgb),
+            testing::RecordDigits("the colour cube through Lab", testing::Computed::kDouble,
+                                  LargestDifference(back, srgb), 1e-6));
       }
 }
 
 TEST(ColorSpaces, H28_ValuesOutsideTheCubeSurvive) {
   for (const Vec3d& srgb :
        {Vec3d{-0.2, 0.5, 1.3}, Vec3d{1.5, 1.5, -0.01}, Vec3d{-0.5, -0.5, -0.5}})
-    EXPECT_LE(LargestDifference(SrgbFromLab(LabFromSrgb(srgb)), srgb), 1e-6);
+    EXPECT_LE(
+        LargestDifference(SrgbFromLab(LabFromSrgb(srgb)), srgb),
+        testing::RecordDigits("colours outside the cube", testing::Computed::kDouble,
+                              LargestDifference(SrgbFromLab(LabFromSrgb(srgb)), srgb), 1e-6));
 }
 
 TEST(ColorSpaces, H29_NanIsNoColour) {

@@ -11,6 +11,7 @@
 #include "kernels/base/error.h"
 #include "kernels/base/random.h"
 #include "tests/support/floating_point_traps.h"
+#include "tests/support/record_error.h"
 
 namespace regrade {
 namespace {
@@ -53,7 +54,10 @@ void ExpectMatchesReference(const Image& image, const ColorStatistics& s, double
   for (int a = 0; a < 3; ++a) {
     EXPECT_NEAR(s.mean[a], static_cast<double>(mean[a]), tolerance * (1 + std::abs(s.mean[a])));
     for (int b = 0; b < 3; ++b)
-      EXPECT_NEAR(s.covariance(a, b), static_cast<double>(covariance[a][b]), tolerance);
+      EXPECT_NEAR(s.covariance(a, b), static_cast<double>(covariance[a][b]),
+                  testing::RecordBound(
+                      "covariance against long double", testing::Computed::kDouble,
+                      s.covariance(a, b) - static_cast<double>(covariance[a][b]), tolerance));
   }
 }
 
@@ -137,7 +141,10 @@ TEST(ColorStatistics, H17_AHundredMillionConstantPixelsHaveNoVariance) {
   for (int i = 0; i < 3; ++i) EXPECT_EQ(pooled.covariance.row[i], Vec3d{});
   // Floats: the mean of 1e6 equal values is off by their sum's rounding at most.
   for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) EXPECT_LE(std::abs(floats.covariance(i, j)), 1e-20);
+    for (int j = 0; j < 3; ++j)
+      EXPECT_LE(std::abs(floats.covariance(i, j)),
+                testing::RecordBound("variance of a constant", testing::Computed::kDouble,
+                                     floats.covariance(i, j), 1e-20));
 }
 
 TEST(ColorStatistics, H17_IntegerSumsDoNotLoseASingleStep) {
@@ -146,7 +153,11 @@ TEST(ColorStatistics, H17_IntegerSumsDoNotLoseASingleStep) {
   for (float& v : image.pixels) v = 254 / 255.0f;
   image.pixels[0] = 1;
   const double n = 1e6, truth = (n - 1) / (n * n * 255 * 255);
-  EXPECT_NEAR(MeasureColor(image).covariance(0, 0), truth, 4 * kEps * truth);
+  const double measured = MeasureColor(image).covariance(0, 0);
+  EXPECT_NEAR(
+      measured, truth,
+      testing::RecordDigits("variance of one step in a million", testing::Computed::kDouble,
+                            measured - truth, 4 * kEps, truth));
 }
 
 TEST(ColorStatistics, H17_SameBitsForAnyNumberOfThreads) {
@@ -157,7 +168,9 @@ TEST(ColorStatistics, H17_SameBitsForAnyNumberOfThreads) {
     const ColorStatistics one = MeasureColor(image);
     for (const int n : {2, 3, 7}) {
       omp_set_num_threads(n);
-      EXPECT_TRUE(SameBits(MeasureColor(image), one)) << n << " threads, 8-bit " << is_8_bit;
+      EXPECT_TRUE(testing::RecordSameBits("1 to 7 threads", testing::Computed::kDouble,
+                                          SameBits(MeasureColor(image), one)))
+          << n << " threads, 8-bit " << is_8_bit;
     }
   }
   omp_set_num_threads(threads);
@@ -250,7 +263,8 @@ TEST(SymmetricEigen, H16_ResidualOfTheIterativeSolver) {
       worst = std::max(worst, Norm(m * v - v * eigen.values[k]));
     }
   }
-  EXPECT_LE(worst, 1e-14);
+  EXPECT_LE(worst, testing::RecordDigits("residual of eigenvectors", testing::Computed::kDouble,
+                                         worst, 1e-14));
 }
 
 }  // namespace

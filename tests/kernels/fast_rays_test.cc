@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "kernels/field/ray_loss.h"
+#include "tests/support/record_error.h"
 #include "tests/support/small_field.h"
 
 namespace regrade {
@@ -30,7 +31,10 @@ TEST(FastRays, OpacityAndDecayKeepTheirDigits) {
     for (size_t i = 0; i < tau.size(); ++i) {
       const double exact_alpha = -std::expm1(-static_cast<double>(tau[i]));
       const double exact_decay = std::exp(-static_cast<double>(tau[i]));
-      ASSERT_NEAR(alpha[i], exact_alpha, 2.4e-7 * exact_alpha) << name << " at " << tau[i];
+      ASSERT_NEAR(alpha[i], exact_alpha,
+                  testing::RecordDigits("opacity", testing::Computed::kFloat,
+                                        alpha[i] - exact_alpha, 2.4e-7, exact_alpha))
+          << name << " at " << tau[i];
       // Below 1.7e-38, at the end of the normal numbers, it is 0.
       ASSERT_NEAR(decay[i], exact_decay, 2.4e-7 * exact_decay + 1.7e-38)
           << name << " at " << tau[i];
@@ -60,7 +64,11 @@ TEST(FastRays, H84_SkippingLosesNoVoxel) {
     int seen = 0;
     for (size_t r = 0; r < rays.size(); ++r) {
       const RayResult<float> plain = RenderRay(ViewOf(field), rays[r], options);
-      for (int c = 0; c < 3; ++c) ASSERT_NEAR(color[3 * r + c], plain.color[c], 2e-5) << name;
+      for (int c = 0; c < 3; ++c)
+        ASSERT_NEAR(color[3 * r + c], plain.color[c],
+                    testing::RecordBound("a pixel past empty space", testing::Computed::kFloat,
+                                         color[3 * r + c] - plain.color[c], 2e-5))
+            << name;
       seen += plain.transmittance < 0.99f;
     }
     EXPECT_GT(seen, 100);

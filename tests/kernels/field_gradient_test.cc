@@ -11,6 +11,7 @@
 #include "kernels/field/ray_weights.h"
 #include "kernels/field/render.h"
 #include "tests/support/double_field.h"
+#include "tests/support/record_error.h"
 #include "tests/support/small_field.h"
 
 namespace regrade {
@@ -52,7 +53,10 @@ TEST_P(FieldGradient, AdjointEqualsDerivativeInDouble) {
       const double fine = central(1e-4), coarse = central(2e-4);
       if (std::abs(fine - coarse) > 1e-6)
         return;  // a kink between the two: no derivative to compare
-      EXPECT_NEAR((4 * fine - coarse) / 3, gradient, 1e-8 * (1 + std::abs(gradient)));
+      const double numeric = (4 * fine - coarse) / 3;
+      EXPECT_NEAR(numeric, gradient,
+                  testing::RecordDigits("gradient of a pixel", testing::Computed::kDouble,
+                                        numeric - gradient, 1e-8, 1 + std::abs(gradient)));
       checked += gradient != 0;
     };
     for (size_t i = 0; i < d.density.size(); ++i)
@@ -84,9 +88,16 @@ TEST_P(FastRaysParity, RendersAsThePlainRay) {
                         transmittance.data());
     for (size_t r = 0; r < rays.size(); ++r) {
       const RayResult<float> plain = RenderRay(ViewOf(field), rays[r], options);
-      for (int c = 0; c < 3; ++c) ASSERT_NEAR(color[3 * r + c], plain.color[c], 2e-5);
+      for (int c = 0; c < 3; ++c)
+        ASSERT_NEAR(
+            color[3 * r + c], plain.color[c],
+            testing::RecordBound("a pixel against the plain ray", testing::Computed::kFloat,
+                                 color[3 * r + c] - plain.color[c], 2e-5));
       ASSERT_NEAR(transmittance[r], plain.transmittance, 2e-5);
-      ASSERT_NEAR(depth[r], plain.depth, 1e-4);
+      ASSERT_NEAR(
+          depth[r], plain.depth,
+          testing::RecordBound("a depth against the plain ray", testing::Computed::kFloat,
+                               depth[r] - plain.depth, 1e-4));
     }
   }
 }
@@ -117,7 +128,10 @@ TEST_P(FastRaysParity, GradientsAsThePlainAdjointInDouble) {
     RenderRayAdjoint(d.view(), ray, options, result, e * (2.0 * scale), d_density.data(),
                      d_sh.data(), PlainAdd());
   }
-  EXPECT_NEAR(step.squared_error, error, 1e-4 * error);
+  EXPECT_NEAR(
+      step.squared_error, error,
+      testing::RecordDigits("loss against the plain ray in double", testing::Computed::kFloat,
+                            step.squared_error - error, 1e-4, error));
   double largest_density = 0, largest_sh = 0;
   for (const double g : d_density) largest_density = std::max(largest_density, std::abs(g));
   for (const double g : d_sh) largest_sh = std::max(largest_sh, std::abs(g));
@@ -125,9 +139,18 @@ TEST_P(FastRaysParity, GradientsAsThePlainAdjointInDouble) {
   for (int64_t voxel = 0; voxel < grid.num_voxels(); ++voxel) {
     const int32_t slot = arena.slot_of_voxel[voxel];
     const float* g = slot < 0 ? nullptr : arena.gradient.data() + slot * grid.lanes();
-    ASSERT_NEAR(g ? g[DensityLane(basis())] : 0, d_density[voxel], 1e-4 * largest_density);
-    for (int k = 0; k < stride; ++k)
-      ASSERT_NEAR(g ? g[k] : 0, d_sh[voxel * stride + k], 1e-4 * largest_sh);
+    const double by_density = g ? g[DensityLane(basis())] : 0;
+    ASSERT_NEAR(by_density, d_density[voxel],
+                testing::RecordDigits("gradient by densities, of its largest",
+                                      testing::Computed::kFloat, by_density - d_density[voxel],
+                                      1e-4, largest_density));
+    for (int k = 0; k < stride; ++k) {
+      const double by_color = g ? g[k] : 0;
+      ASSERT_NEAR(by_color, d_sh[voxel * stride + k],
+                  testing::RecordDigits("gradient by colours, of its largest",
+                                        testing::Computed::kFloat,
+                                        by_color - d_sh[voxel * stride + k], 1e-4, largest_sh));
+    }
   }
 }
 
@@ -172,7 +195,9 @@ TEST_P(FastRaysParity, H103_H104_StepIsSparseAndRefusesNan) {
       if (v ==
           5) {  // first touch: v = g^2, so the step is the rate, whatever the gradient's size
         const float rate = l == DensityLane(basis()) ? 2.0f : 0.1f;
-        EXPECT_NEAR(value, old_value - rate, 1e-5f);
+        EXPECT_NEAR(value, old_value - rate,
+                    testing::RecordBound("a first step of RMSProp", testing::Computed::kFloat,
+                                         value - (old_value - rate), 1e-5));
         EXPECT_NEAR(moments[v * lanes + l], 0.5625f, 1e-6f);
       } else if (v == 11) {
         EXPECT_TRUE(std::isfinite(value));
@@ -259,7 +284,10 @@ TEST(RayWeights, GiveTheRenderedColour) {
       sum += sample.weight;
     }
     color += field.background * weights.transmittance[r];
-    for (int c = 0; c < 3; ++c) ASSERT_NEAR(color[c], plain.color[c], 1e-6);
+    for (int c = 0; c < 3; ++c)
+      ASSERT_NEAR(color[c], plain.color[c],
+                  testing::RecordBound("colours blended by weights", testing::Computed::kFloat,
+                                       color[c] - plain.color[c], 1e-6));
     ASSERT_NEAR(sum + weights.transmittance[r], 1, 1e-5);
   }
 }
@@ -277,14 +305,18 @@ TEST(RenderView, H67_TilesAndThePlainBodyAgree) {
   const RenderedView fast = RenderView(field, camera, {0.5f, 1e-4f});
   const RenderedView plain = RenderViewPlain(field, camera, {0.5f, 1e-4f});
   for (size_t i = 0; i < fast.color.pixels.size(); ++i)
-    ASSERT_NEAR(fast.color.pixels[i], plain.color.pixels[i], 2e-5);
+    ASSERT_NEAR(
+        fast.color.pixels[i], plain.color.pixels[i],
+        testing::RecordBound("a frame against the plain body", testing::Computed::kFloat,
+                             fast.color.pixels[i] - plain.color.pixels[i], 2e-5));
   for (size_t i = 0; i < fast.depth.pixels.size(); ++i)
     ASSERT_NEAR(fast.depth.pixels[i], plain.depth.pixels[i], 1e-4);
   const int threads = omp_get_max_threads();
   omp_set_num_threads(threads == 1 ? 3 : 1);
   const RenderedView other = RenderView(field, camera, {0.5f, 1e-4f});
   omp_set_num_threads(threads);
-  EXPECT_EQ(other.color.pixels, fast.color.pixels);
+  EXPECT_TRUE(testing::RecordSameBits("1 and more threads", testing::Computed::kFloat,
+                                      other.color.pixels == fast.color.pixels));
   EXPECT_EQ(other.depth.pixels, fast.depth.pixels);
 }
 

@@ -12,25 +12,17 @@
 #include "kernels/network/lipschitz_layer.h"
 #include "kernels/optimize/adam.h"
 #include "kernels/optimize/schedule.h"
+#include "tests/support/derivative.h"
 #include "tests/support/floating_point_traps.h"
+#include "tests/support/record_error.h"
 
 namespace regrade {
 namespace {
 
+using testing::Derivative;
+
 double Random(uint64_t stream, uint64_t counter) {  // uniform in [-1, 1)
   return 2 * RandomDouble(20231103, stream, counter) - 1;
-}
-
-long double ExactSquareplus(long double x, long double b) {
-  const long double r = sqrtl(x * x + b);
-  return x >= 0 ? (x + r) / 2 : b / (2 * (r - x));
-}
-
-// Central differences with one Richardson step: error O(h^4).
-template <typename F>
-double Derivative(const F& f, double x, double h) {
-  const auto central = [&](double step) { return (f(x + step) - f(x - step)) / (2 * step); };
-  return (4 * central(h / 2) - central(h)) / 3;
 }
 
 template <typename T>
@@ -46,47 +38,6 @@ struct Matrix {
   SpectralView<T> View() { return {outputs, inputs, weight.data(), u.data(), v.data()}; }
 };
 
-TEST(Squareplus, H31_AgreesWithLongDouble) {
-  for (int e = -30; e <= 30; ++e)
-    for (const double m : {1.0, 1.7, 3.3, 9.1})
-      for (const double sign : {-1.0, 1.0}) {
-        const double x = sign * m * std::pow(10.0, e);
-        const long double exact = ExactSquareplus(x, kSquareplusB);
-        // Three roundings (root, sum, quotient), each half an ulp, and hypot's own ulp.
-        EXPECT_NEAR(static_cast<double>(Squareplus(x) / exact - 1), 0, 4.5e-16) << x;
-      }
-  EXPECT_DOUBLE_EQ(Squareplus(0.0), 0.5e-6);
-  // In float as well, where a square overflows from 1.9e19 on: four roundings of 6e-8, and one
-  // to a subnormal number.
-  for (const float x : {-1e30f, -1e19f, -1.0f, -1e-4f, 1e-4f, 1.0f, 1e19f, 1e30f}) {
-    const long double exact = ExactSquareplus(x, static_cast<float>(kSquareplusB));
-    EXPECT_NEAR(Squareplus(x), static_cast<double>(exact),
-                2.5e-7 * static_cast<double>(exact) + 1e-45)
-        << x;
-  }
-}
-
-TEST(Squareplus, H32_DerivativeWithoutCancellation) {
-  for (const double x : {-3.0, -0.2, -1e-3, -1e-6, 0.0, 1e-6, 0.4, 5.0}) {
-    // b = 1e-2 so that finite differences see the bend; the formula is the same.
-    const double numeric = Derivative([](double y) { return Squareplus(y, 1e-2); }, x, 1e-3);
-    EXPECT_NEAR(SquareplusDerivative(x, 1e-2), numeric, 1e-9) << x;
-    // Of the real b the digits are counted: squareplus' roundings, the root's and a quotient's.
-    const long double b = kSquareplusB;
-    const long double exact =
-        ExactSquareplus(x, b) / sqrtl(static_cast<long double>(x) * x + b);
-    EXPECT_NEAR(static_cast<double>(SquareplusDerivative(x) / exact - 1), 0, 1e-15) << x;
-  }
-  EXPECT_EQ(SquareplusDerivative(0.0, 0.0), 0.5);
-}
-
-TEST(Squareplus, H33_FloatStaysAliveWhereTheTextbookFormDies) {
-  const float x = -0.01f, b = static_cast<float>(kSquareplusB);
-  EXPECT_EQ(0.5f * (x + std::sqrt(x * x + b)), 0.0f);
-  EXPECT_NEAR(Squareplus(x), 2.5e-11f, 1e-16f);
-  EXPECT_GT(SquareplusDerivative(x), 0.0f);
-}
-
 TEST(LipschitzLayer, H37_WarmedUpSigmaIsTheNorm) {
   Matrix<double> m(3, 2, 1);
   m.weight = {3, 0, 0, 4, 0, 0};
@@ -95,7 +46,9 @@ TEST(LipschitzLayer, H37_WarmedUpSigmaIsTheNorm) {
   const double sigma = WarmUpPowerIteration(r.View());
   double longer = sigma;
   for (int i = 0; i < 5000; ++i) longer = PowerStep(r.View());
-  EXPECT_GE(sigma / longer, 0.999);
+  EXPECT_GE(sigma / longer,
+            1 - testing::RecordBound("short of the norm after the warm-up",
+                                     testing::Computed::kDouble, 1 - sigma / longer, 1e-3));
   EXPECT_LE(sigma / longer, 1 + 1e-12);
 }
 
@@ -117,7 +70,10 @@ TEST(LipschitzLayer, H40_RankOneIsFoundWhereverItsVectorPoints) {
   for (int column = 0; column < 5; ++column) {
     Matrix<double> m(6, 5, 4, 0.0);
     m.weight[2 * 5 + column] = -2.5;
-    EXPECT_NEAR(WarmUpPowerIteration(m.View()) * LargestMagnitude(m.View()), 2.5, 1e-12);
+    const double norm = WarmUpPowerIteration(m.View()) * LargestMagnitude(m.View());
+    EXPECT_NEAR(norm, 2.5,
+                testing::RecordDigits("norm of rank one", testing::Computed::kDouble,
+                                      norm - 2.5, 4e-13, 2.5));
   }
   // A vector u that has lost the range of W restarts instead of staying at zero.
   Matrix<double> m(2, 2, 4, 0.0);
@@ -130,7 +86,10 @@ TEST(LipschitzLayer, H41_EqualSingularValues) {
   Matrix<double> m(2, 2, 5);
   const double c = std::cos(0.7), s = std::sin(0.7);
   m.weight = {c, -s, s, c};
-  EXPECT_NEAR(WarmUpPowerIteration(m.View()) * LargestMagnitude(m.View()), 1, 1e-12);
+  const double norm = WarmUpPowerIteration(m.View()) * LargestMagnitude(m.View());
+  EXPECT_NEAR(
+      norm, 1,
+      testing::RecordDigits("norm of a rotation", testing::Computed::kDouble, norm - 1, 1e-12));
 }
 
 TEST(LipschitzLayer, H42_ScaleOfWDoesNotMatter) {
@@ -143,7 +102,11 @@ TEST(LipschitzLayer, H42_ScaleOfWDoesNotMatter) {
     WarmUpPowerIteration(m.View());
     LipschitzWeight(m.View(), 1.5f, scaled.data());
     // Scaling rounds W itself by half an ulp; sigma repeats that at most sqrt(48) / 2 times.
-    for (int i = 0; i < 48; ++i) EXPECT_NEAR(scaled[i], a[i], 4e-7f) << e;
+    for (int i = 0; i < 48; ++i)
+      EXPECT_NEAR(scaled[i], a[i],
+                  testing::RecordDigits("weights at any scale", testing::Computed::kFloat,
+                                        scaled[i] - a[i], 4e-7))
+          << e;
   }
 }
 
@@ -153,7 +116,9 @@ TEST(LipschitzLayer, H43_SigmaBetweenFrobeniusBounds) {
     const float sigma = WarmUpPowerIteration(m.View()) * LargestMagnitude(m.View());
     double square = 0;
     for (const float w : m.weight) square += static_cast<double>(w) * w;
-    EXPECT_LE(sigma, std::sqrt(square) * (1 + 4 * 1.2e-7));
+    EXPECT_LE(sigma, std::sqrt(square) *
+                         testing::RecordBound("norm over Frobenius", testing::Computed::kFloat,
+                                              sigma / std::sqrt(square), 1 + 4 * 1.2e-7));
     EXPECT_GE(sigma, std::sqrt(square / m.inputs) * (1 - 4 * 1.2e-7));
   }
 }
@@ -182,7 +147,10 @@ TEST(LipschitzLayer, H46_H47_GradientWithFrozenVectors) {
         },
         before, 1e-3);
     m.weight[i] = before;
-    EXPECT_NEAR(d_w[i], numeric, 1e-8) << i;
+    EXPECT_NEAR(d_w[i], numeric,
+                testing::RecordDigits("gradient by W", testing::Computed::kDouble,
+                                      d_w[i] - numeric, 1e-8))
+        << i;
   }
   // Also where squareplus bends, at the root of b: steps of a hundredth of it leave an error of
   // 1e-8 of the result by the method, and 1e-8 by rounding.
@@ -196,7 +164,13 @@ TEST(LipschitzLayer, H46_H47_GradientWithFrozenVectors) {
           return loss();
         },
         at, at > 0.1 ? 1e-3 : 1e-8);
-    EXPECT_NEAR(d_k, numeric, at > 0.1 ? 1e-9 : 1e-6 * std::abs(numeric)) << at;
+    EXPECT_NEAR(d_k, numeric,
+                at > 0.1 ? testing::RecordDigits("gradient by K", testing::Computed::kDouble,
+                                                 d_k - numeric, 1e-9)
+                         : testing::RecordDigits("gradient by K at squareplus's bend",
+                                                 testing::Computed::kDouble, d_k - numeric,
+                                                 1e-6, std::abs(numeric)))
+        << at;
   }
 }
 
@@ -255,7 +229,10 @@ TEST(DenseNetwork, AdjointAgainstRichardson) {
           },
           before, 1e-3);
       *value = before;
-      EXPECT_NEAR(analytic, numeric, 1e-8 * std::max(1.0, std::abs(numeric)));
+      EXPECT_NEAR(
+          analytic, numeric,
+          testing::RecordDigits("gradient of a dense network", testing::Computed::kDouble,
+                                analytic - numeric, 1e-8, std::max(1.0, std::abs(numeric))));
     };
     for (size_t l = 0; l < network.layers.size(); ++l) {
       for (size_t i = 0; i < network.layers[l].weight.size(); ++i)
@@ -284,7 +261,9 @@ TEST(FusedMlp, H45_SineAndCosine) {
     for (size_t i = 0; i < x.size(); ++i)
       worst = std::max({worst, std::abs(sine[i] - std::sin(static_cast<double>(x[i]))),
                         std::abs(cosine[i] - std::cos(static_cast<double>(x[i])))});
-    EXPECT_LE(worst, 2e-7) << name;
+    EXPECT_LE(worst,
+              testing::RecordDigits("sine and cosine", testing::Computed::kFloat, worst, 2e-7))
+        << name;
     float bad = std::numeric_limits<float>::quiet_NaN(), s, c;
     functions->sine_cosine(&bad, 1, &s, &c);
     EXPECT_TRUE(std::isnan(s) && std::isnan(c));
@@ -330,7 +309,9 @@ TEST(FusedMlp, AgreesWithPlainDouble) {
           largest = std::max(largest, std::abs(yd[i]));
         }
       }
-      EXPECT_LE(worst, 1e-5 * largest) << name;
+      EXPECT_LE(worst, testing::RecordDigits("the fused network, of its largest",
+                                             testing::Computed::kFloat, worst, 1e-5, largest))
+          << name;
       for (size_t l = 0; l < expected.layers.size(); ++l) {
         double difference = 0, norm = 0;
         const auto compare = [&](const std::vector<double>& a, const std::vector<double>& b) {
@@ -341,7 +322,10 @@ TEST(FusedMlp, AgreesWithPlainDouble) {
         };
         compare(gradient.layers[l].weight, expected.layers[l].weight);
         compare(gradient.layers[l].bias, expected.layers[l].bias);
-        EXPECT_LE(std::sqrt(difference), 1e-5 * std::sqrt(norm))
+        EXPECT_LE(
+            std::sqrt(difference),
+            testing::RecordDigits("its gradient, of a layer's norm", testing::Computed::kFloat,
+                                  std::sqrt(difference), 1e-5, std::sqrt(norm)))
             << name << " layer " << l << " activation " << static_cast<int>(activation);
       }
     }
@@ -363,7 +347,8 @@ TEST(FusedMlp, ThreadsDoNotChangeABit) {
     FusedAdjoint(mlp, x.data(), x.data(), kRows, &gradient[t]);
   }
   omp_set_num_threads(threads);
-  EXPECT_EQ(y[0], y[1]);
+  EXPECT_TRUE(
+      testing::RecordSameBits("1 and 5 threads", testing::Computed::kFloat, y[0] == y[1]));
   for (size_t l = 0; l < 6; ++l) {
     EXPECT_EQ(gradient[0].layers[l].weight, gradient[1].layers[l].weight);
     EXPECT_EQ(gradient[0].layers[l].bias, gradient[1].layers[l].bias);

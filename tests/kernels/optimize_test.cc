@@ -9,6 +9,7 @@
 #include "kernels/optimize/adam.h"
 #include "kernels/optimize/schedule.h"
 #include "tests/support/floating_point_traps.h"
+#include "tests/support/record_error.h"
 
 namespace regrade {
 namespace {
@@ -29,7 +30,9 @@ TEST(Adam, H100_TinyGradientTakesATinyStep) {
   AdamState state;
   std::vector<float> x = {0.0f}, g = {1e-25f};
   ASSERT_TRUE(AdamStep({}, 1.0, {g.data(), 1}, {x.data(), 1}, &state));
-  EXPECT_NEAR(x[0], -1e-17, 1e-19);
+  EXPECT_NEAR(x[0], -1e-17,
+              testing::RecordDigits("a tiny step", testing::Computed::kFloat, x[0] + 1e-17,
+                                    1e-2, 1e-17));
 }
 
 TEST(Adam, H101_H106_HugeAndNonFiniteGradientsAreRejected) {
@@ -54,8 +57,12 @@ TEST(Adam, H101_H106_HugeAndNonFiniteGradientsAreRejected) {
 TEST(Adam, H102_BiasCorrection) {
   // 0.999 as a double is 0.999 (1 + d), |d| < 1.2e-16: its complement differs by 1.2e-13 of
   // itself.
-  EXPECT_NEAR(AdamBiasCorrection(0.999, 1) / 0.001, 1, 2e-13);
-  EXPECT_NEAR(AdamBiasCorrection(0.9, 3) / 0.271, 1, 1e-14);
+  EXPECT_NEAR(AdamBiasCorrection(0.999, 1) / 0.001, 1,
+              testing::RecordDigits("first correction of 0.999", testing::Computed::kDouble,
+                                    AdamBiasCorrection(0.999, 1) / 0.001 - 1, 2e-13));
+  EXPECT_NEAR(AdamBiasCorrection(0.9, 3) / 0.271, 1,
+              testing::RecordDigits("third correction of 0.9", testing::Computed::kDouble,
+                                    AdamBiasCorrection(0.9, 3) / 0.271 - 1, 1e-14));
   EXPECT_EQ(AdamBiasCorrection(0.999, 2000000), 1.0);
   // The first step has the length of the rate, whatever the gradient's scale.
   for (const float scale : {1e-3f, 1.0f, 1e6f}) {
@@ -78,7 +85,10 @@ TEST(Adam, FollowsTheFormula) {
     v = 0.999 * v + 0.001 * gd * gd;
     value -=
         0.02 * (m / (1 - std::pow(0.9, t))) / (std::sqrt(v / (1 - std::pow(0.999, t))) + 1e-8);
-    EXPECT_NEAR(x[0], value, 1e-5) << t;  // fifty float updates of at most 0.02
+    EXPECT_NEAR(
+        x[0], value,
+        testing::RecordBound("fifty steps", testing::Computed::kFloat, x[0] - value, 1e-5))
+        << t;  // fifty float updates of at most 0.02
   }
 }
 
@@ -88,7 +98,10 @@ TEST(CosineAnnealing, H105_Table) {
   EXPECT_EQ(CosineAnnealing(5000, 300, 1e-2, 1e-4), 1e-4);
   EXPECT_EQ(CosineAnnealing(0, 0, 1e-2, 1e-4), 1e-2);
   EXPECT_EQ(CosineAnnealing(0, 1, 1e-2, 1e-4), 1e-2);
-  EXPECT_NEAR(CosineAnnealing(150, 301, 1e-2, 1e-4), 0.5 * (1e-2 + 1e-4), 1e-15);
+  const double middle = CosineAnnealing(150, 301, 1e-2, 1e-4);
+  EXPECT_NEAR(middle, 0.5 * (1e-2 + 1e-4),
+              testing::RecordDigits("rate at the middle", testing::Computed::kDouble,
+                                    middle - 0.5 * (1e-2 + 1e-4), 2e-13, 5e-3));
   for (int t = 1; t < 320; ++t)
     EXPECT_LE(CosineAnnealing(t, 300, 1e-2, 1e-4), CosineAnnealing(t - 1, 300, 1e-2, 1e-4));
 }

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "tests/support/double_field.h"
+#include "tests/support/record_error.h"
 #include "tests/support/small_field.h"
 
 namespace regrade {
@@ -30,7 +31,11 @@ TEST(RayLoss, H62_EarlyStopIsWithinItsBound) {
       const Vec3f exact = RenderRay(ViewOf(field), ray, {0.5f, 0.0f}).color;
       const Vec3f stopped = RenderRay(ViewOf(field), ray, {0.5f, stop}).color;
       // Colours here stay below 4.
-      for (int c = 0; c < 3; ++c) ASSERT_NEAR(exact[c], stopped[c], 4 * stop);
+      for (int c = 0; c < 3; ++c)
+        ASSERT_NEAR(exact[c], stopped[c],
+                    stop * testing::RecordBound("error of an early stop over its threshold",
+                                                testing::Computed::kFloat,
+                                                (exact[c] - stopped[c]) / stop, 4));
     }
 }
 
@@ -42,7 +47,10 @@ TEST(RayLoss, H62_LightThatIsNotFollowedIsTheBackgrounds) {
   field.background = {0.5f, 0.5f, 0.5f};
   for (const Ray& ray : RandomRays(300, 64))
     // Some fifty samples, each with a rounding of its weight and one of the transmittance.
-    ASSERT_NEAR(RenderRay(ViewOf(field), ray, {0.5f, 0.1f}).color.x, 0.5, 1e-5);
+    ASSERT_NEAR(
+        RenderRay(ViewOf(field), ray, {0.5f, 0.1f}).color.x, 0.5,
+        testing::RecordBound("a scene of one colour", testing::Computed::kFloat,
+                             RenderRay(ViewOf(field), ray, {0.5f, 0.1f}).color.x - 0.5, 1e-5));
 }
 
 // A row of vertices along x, a world unit apart: the box is [0, n) x [0, 2) x [0, 2).
@@ -107,7 +115,11 @@ TEST(RayLoss, H53_MistBeforeAWallKeepsItsGradient) {
   EXPECT_NEAR(result.color.x, exact.color.x, 1e-5);
   for (int v = 0; v < 4 * 19; ++v) {
     // Float's rounding of a sum of 104 is 4e-6 of each weight; 1e-4 leaves room for its parts.
-    EXPECT_NEAR(d_density[v], exact_density[v], 1e-4) << v;
+    EXPECT_NEAR(
+        d_density[v], exact_density[v],
+        testing::RecordBound("gradient of mist before a wall", testing::Computed::kFloat,
+                             d_density[v] - exact_density[v], 1e-4))
+        << v;
     EXPECT_NEAR(d_sh[3 * v], exact_sh[3 * v], 1e-4) << v;
   }
 }

@@ -10,6 +10,7 @@
 #include "kernels/field/spherical_harmonics.h"
 #include "kernels/field/trilinear.h"
 #include "tests/support/floating_point_traps.h"
+#include "tests/support/record_error.h"
 #include "tests/support/small_field.h"
 
 namespace regrade {
@@ -144,7 +145,9 @@ TEST(RayMarch, H66_FarOriginNeitherLoopsNorDrifts) {
   // t_i = t_0 + i step: the last sample is within a rounding of where it belongs; t += step
   // drifts 0.016.
   const float last = near.t_begin + static_cast<float>(near.num_steps - 1) * 0.001f;
-  EXPECT_NEAR(last, 1.0 + (near.num_steps - 1) * 0.001, 1e-5);
+  EXPECT_NEAR(last, 1.0 + (near.num_steps - 1) * 0.001,
+              testing::RecordBound("place of the last sample", testing::Computed::kFloat,
+                                   last - (1.0 + (near.num_steps - 1) * 0.001), 1e-5));
   // A step below any rounding ends at the cap, not in a cast of 8e30 to an integer.
   EXPECT_EQ(ClipToGrid<float>(UnitFrame(8), {{-1, 4, 4}, {1, 0, 0}}, 0.0f, 1e-30f).num_steps,
             kMaxSteps);
@@ -184,9 +187,14 @@ TEST(Trilinear, H81_WeightsSumToOneAndReproduceLinearFields) {
       EXPECT_GE(CornerWeight(cell.fraction, k), 0);
       sum += CornerWeight(cell.fraction, k);
     }
-    EXPECT_NEAR(sum, 1, 1e-15);
+    EXPECT_NEAR(
+        sum, 1,
+        testing::RecordDigits("sum of weights", testing::Computed::kDouble, sum - 1, 1e-15));
     Interpolate(frame, links.data(), values.data(), 1, 1, cell, &value);
-    EXPECT_NEAR(value, 2 * p.x - 3 * p.y + 0.5 * p.z + 1, 1e-13);
+    const double plane = 2 * p.x - 3 * p.y + 0.5 * p.z + 1;
+    EXPECT_NEAR(value, plane,
+                testing::RecordDigits("linear fields", testing::Computed::kDouble,
+                                      value - plane, 1e-13));
   }
 }
 
@@ -211,7 +219,9 @@ TEST(Trilinear, H82_H83_AdjointAndEmptyCorners) {
   }
   double x_aty = 0;
   for (size_t i = 0; i < x.size(); ++i) x_aty += x[i] * at_y[i];
-  EXPECT_NEAR(ax_y, x_aty, 1e-12 * std::abs(ax_y) + 1e-12);
+  EXPECT_NEAR(ax_y, x_aty,
+              testing::RecordDigits("adjoint", testing::Computed::kDouble, ax_y - x_aty, 1e-12,
+                                    std::abs(ax_y) + 1));
 }
 
 TEST(Trilinear, H86_VertexIndexIs64Bit) {
@@ -232,7 +242,12 @@ TEST(SphericalHarmonics, H94_BandsHaveConstantPower) {
     ShBasis(9, Normalized(d), gamma);
     double power[3] = {};
     for (int k = 0; k < 9; ++k) power[k == 0 ? 0 : k < 4 ? 1 : 2] += gamma[k] * gamma[k];
-    for (int l = 0; l < 3; ++l) ASSERT_NEAR(power[l], (2 * l + 1) / (4 * M_PI), 1e-12);
+    for (int l = 0; l < 3; ++l) {
+      const double exact = (2 * l + 1) / (4 * M_PI);
+      ASSERT_NEAR(power[l], exact,
+                  testing::RecordDigits("power of a band", testing::Computed::kDouble,
+                                        power[l] - exact, 1e-12));
+    }
   }
 }
 
@@ -251,7 +266,10 @@ TEST(SphericalHarmonics, H95_RaysOfEveryLensAreUnit) {
       for (int y = 0; y < camera.height; y += 23)
         for (int x = 0; x < camera.width; x += 17) {
           const Vec3f d = camera.PixelRay(x, y).direction;
-          ASSERT_NEAR(Dot(d, d), 1, 1e-6) << x << " " << y;
+          ASSERT_NEAR(Dot(d, d), 1,
+                      testing::RecordDigits("squared length of a ray",
+                                            testing::Computed::kFloat, Dot(d, d) - 1, 1e-6))
+              << x << " " << y;
         }
     }
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "kernels/field/fast_rays.h"
+#include "tests/support/record_error.h"
 #include "tests/support/small_field.h"
 
 namespace regrade {
@@ -35,8 +36,11 @@ TEST(TotalVariation, H97_GradientIsTheValuesDerivative) {
         values[i] = x;
         return (up - down) / (2 * h);
       };
-      EXPECT_NEAR((4 * central(1e-4) - central(2e-4)) / 3, gradient[i],
-                  1e-8 * (1 + std::abs(gradient[i])));
+      const double numeric = (4 * central(1e-4) - central(2e-4)) / 3;
+      EXPECT_NEAR(
+          numeric, gradient[i],
+          testing::RecordDigits("gradient", testing::Computed::kDouble, numeric - gradient[i],
+                                1e-8, 1 + std::abs(gradient[i])));
     }
   }
 }
@@ -48,7 +52,10 @@ TEST(TotalVariation, H97_ConstantAndShiftedFields) {
   std::vector<double> values(static_cast<size_t>(n), 3.5), gradient(values.size());
   const double flat = TotalVariation<double>(g.frame, g.links.data(), values.data(), 1, 0, true,
                                              0, n, 1.0, gradient.data());
-  EXPECT_NEAR(flat, static_cast<double>(n) * std::sqrt(kVariationEpsilon), 1e-9);
+  const double roots = static_cast<double>(n) * std::sqrt(kVariationEpsilon);
+  EXPECT_NEAR(flat, roots,
+              testing::RecordDigits("a constant field", testing::Computed::kDouble,
+                                    flat - roots, 1e-9));
   for (const double d : gradient) EXPECT_EQ(d, 0.0);
   // A bump in the inside weighs the same wherever it is.
   const auto bump_at = [&](int x, int y, int z) {
@@ -78,10 +85,14 @@ TEST(TotalVariation, FastPathEqualsThePlainOne) {
       }
       for (int64_t v = 0; v < grid.num_voxels(); ++v) {
         const int32_t slot = arena.slot_of_voxel[v];
-        for (int lane = 0; lane <= DensityLane(basis); ++lane)
-          ASSERT_NEAR(slot < 0 ? 0.0f : arena.gradient[slot * grid.lanes() + lane],
-                      plain[static_cast<size_t>(v * grid.lanes() + lane)], 2e-6)
+        for (int lane = 0; lane <= DensityLane(basis); ++lane) {
+          const float fast = slot < 0 ? 0.0f : arena.gradient[slot * grid.lanes() + lane];
+          const float exact = plain[static_cast<size_t>(v * grid.lanes() + lane)];
+          ASSERT_NEAR(fast, exact,
+                      testing::RecordBound("fast against plain", testing::Computed::kFloat,
+                                           fast - exact, 2e-6))
               << name << " basis " << basis;
+        }
       }
     }
   }
@@ -109,7 +120,10 @@ TEST(TotalVariation, H98_AxesAreWeightedByTheirVoxels) {
   for (int axis = 0; axis < 3; ++axis) {
     Vec3i fine{8, 8, 8};
     fine[axis] = 16;
-    EXPECT_NEAR(slope(fine, axis), slope({8, 8, 8}, axis), 1e-8);
+    const double coarse = slope({8, 8, 8}, axis), finer = slope(fine, axis);
+    EXPECT_NEAR(finer, coarse,
+                testing::RecordDigits("a slope in other voxels", testing::Computed::kDouble,
+                                      finer - coarse, 1e-8));
   }
 }
 

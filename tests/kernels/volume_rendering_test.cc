@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "kernels/base/random.h"
+#include "tests/support/record_error.h"
 
 namespace regrade {
 namespace {
@@ -25,7 +26,10 @@ TEST(VolumeRendering, H51_WeightsAndTransmittanceSumToOne) {
       sum += Composite(tau, Vec3f{1, 1, 1}, &state);
     }
     // Each step adds at most a rounding of the weight and one of the transmittance.
-    EXPECT_NEAR(sum + state.transmittance, 1.0, 4 * (n + 1) * kFloatEpsilon);
+    EXPECT_NEAR(sum + state.transmittance, 1.0,
+                testing::RecordDigits(
+                    "weights and transmittance, of 1, over samples", testing::Computed::kFloat,
+                    sum + state.transmittance - 1.0, 4 * kFloatEpsilon, n + 1));
   }
 }
 
@@ -33,7 +37,10 @@ TEST(VolumeRendering, H52_TinyOpticalDepthKeepsItsLastBit) {
   EXPECT_EQ(Opacity(0.0f), 0.0f);
   for (const float tau : {1e-30f, 1e-10f, 1e-8f, 1e-40f})  // 1e-40 is subnormal
     EXPECT_EQ(Opacity(tau), tau);
-  EXPECT_NEAR(Opacity(1e-6f) / -std::expm1(-1e-6L), 1.0, kFloatEpsilon);
+  const long double ratio = Opacity(1e-6f) / -std::expm1(-static_cast<long double>(1e-6f));
+  EXPECT_NEAR(static_cast<double>(ratio), 1.0,
+              testing::RecordDigits("opacity of a thin sample", testing::Computed::kFloat,
+                                    static_cast<double>(ratio - 1), kFloatEpsilon));
   // What 1 - exp(-tau) would give: 0 at 1e-8.
   EXPECT_EQ(1.0f - std::exp(-1e-8f), 0.0f);
 }
@@ -67,7 +74,9 @@ TEST(VolumeRendering, H57_LongRayUnderflowsQuietly) {
   for (int i = 0; i < 100000; ++i) Composite(0.01f, Vec3f{0.5f, 0.5f, 0.5f}, &state);
   EXPECT_GE(state.transmittance, 0.0f);
   EXPECT_LT(state.transmittance, 1e-37f);
-  EXPECT_NEAR(state.color.x, 0.5f, 1e-4);
+  EXPECT_NEAR(state.color.x, 0.5f,
+              testing::RecordDigits("colour of 100 000 samples", testing::Computed::kFloat,
+                                    state.color.x - 0.5, 1e-4));
 }
 
 // The adjoint against central differences with one Richardson step, in double (relative error
@@ -115,10 +124,18 @@ TEST(VolumeRendering, H58_H61_AdjointEqualsDerivative) {
     for (int i = kN - 1; i >= 0; --i) {
       const double d_sigma = CompositeAdjoint(delta[i], OpticalDepth(sigma[i], delta[i]),
                                               after[i], color[i], d_color, &behind);
-      EXPECT_NEAR(d_sigma, derivative(&sigma[i]), 1e-8 * (1 + std::abs(d_sigma)));
-      EXPECT_NEAR(weight[i] * d_color.x, derivative(&color[i].x), 1e-9);
+      const double by_sigma = derivative(&sigma[i]), by_color = derivative(&color[i].x);
+      EXPECT_NEAR(d_sigma, by_sigma,
+                  testing::RecordDigits("gradient by densities", testing::Computed::kDouble,
+                                        d_sigma - by_sigma, 1e-8, 1 + std::abs(d_sigma)));
+      EXPECT_NEAR(weight[i] * d_color.x, by_color,
+                  testing::RecordDigits("gradient by colours", testing::Computed::kDouble,
+                                        weight[i] * d_color.x - by_color, 1e-9));
     }
-    EXPECT_NEAR(state.transmittance * d_color.y, derivative(&background.y), 1e-9);
+    const double by_background = derivative(&background.y);
+    EXPECT_NEAR(state.transmittance * d_color.y, by_background,
+                testing::RecordDigits("gradient by the background", testing::Computed::kDouble,
+                                      state.transmittance * d_color.y - by_background, 1e-9));
   }
 }
 
@@ -156,7 +173,9 @@ TEST(VolumeRendering, H59_SuffixFormKeepsSignsInFloat) {
     }
   }
   EXPECT_GT(counted, 1000);
-  EXPECT_LE(wrong, counted / 10000);
+  EXPECT_LE(wrong,
+            counted * testing::RecordBound("share of wrong signs", testing::Computed::kFloat,
+                                           static_cast<double>(wrong) / counted, 1e-4));
 }
 
 }  // namespace

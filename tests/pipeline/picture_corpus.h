@@ -9,12 +9,14 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <map>
 #include <string>
 
 #include "kernels/base/error.h"
 #include "kernels/base/random.h"
 #include "kernels/scene/image.h"
 #include "pipeline/files/image_file.h"
+#include "tests/support/record_error.h"
 
 namespace regrade::testing {
 
@@ -117,10 +119,14 @@ inline std::string FloatTiff(const Image& image) {
 
 // What a person would be told; "" if the photo was decoded.
 inline std::string Refusal(const std::string& path, const DecodeLimits& limits = {}) {
+  static std::map<std::string, int> count;  // of this test
+  const std::string test = ::testing::UnitTest::GetInstance()->current_test_info()->name();
   try {
     DecodePhoto(path, limits);
+    RecordCount("pictures read", ++count[test + " read"]);
     return "";
   } catch (const Error& error) {
+    RecordCount("pictures refused by name", ++count[test + " refused"]);
     EXPECT_EQ(error.code(), ExitCode::kInput);
     EXPECT_EQ(error.where(), path);
     return error.what_failed();

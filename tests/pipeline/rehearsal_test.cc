@@ -2,12 +2,16 @@
 #include "pipeline/rehearsal.h"
 
 #include <gtest/gtest.h>
+#include <sys/wait.h>
 
 #include <csignal>
 #include <cstdlib>
+#include <fstream>
 #include <thread>
 
 #include "tests/support/expect_error.h"
+#include "tests/support/process_state.h"
+#include "tests/support/temporary_folder.h"
 
 namespace regrade {
 namespace {
@@ -35,6 +39,25 @@ TEST(Rehearsal, F73_TimeAndMemoryHaveLimits) {
   };
   EXPECT_REGRADE_ERROR(Rehearse(greedy, "big.onnx", limits), ExitCode::kExternalProgram, "MiB");
 #endif
+}
+
+TEST(Rehearsal, F35_ACopyEndsWithAProcessThatIsKilled) {
+  const testing::TemporaryFolder folder;
+  const pid_t run = ::fork();
+  if (run == 0) {
+    Rehearse(
+        [&] {
+          std::ofstream(folder / "copy") << ::getpid() << "\n";
+          std::this_thread::sleep_for(std::chrono::seconds(60));
+        },
+        "x");
+    ::_exit(0);
+  }
+  const pid_t copy = testing::NumberIn(folder / "copy");
+  ASSERT_GT(copy, 1);
+  ::kill(run, SIGKILL);
+  ::waitpid(run, nullptr, 0);
+  EXPECT_TRUE(testing::Ends(copy));
 }
 
 TEST(Rehearsal, WhatAProgramCanGoOnFromPasses) {

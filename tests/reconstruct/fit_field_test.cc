@@ -16,6 +16,7 @@
 #include "reconstruct/choose_degree.h"
 #include "reconstruct/resample_grid.h"
 #include "reconstruct/sphere_grid.h"
+#include "tests/support/record_error.h"
 #include "tests/support/small_field.h"
 
 namespace regrade {
@@ -117,7 +118,8 @@ TEST_F(FitField, SameBytesForAnyThreadCount) {
   omp_set_num_threads(3);
   const FitResult three = regrade::FitField(views_, box_, options_, {});
   omp_set_num_threads(before);
-  EXPECT_TRUE(SameBits(one.field, three.field));
+  EXPECT_TRUE(testing::RecordSameBits("1 and 3 threads", testing::Computed::kFloat,
+                                      SameBits(one.field, three.field)));
 }
 
 TEST_F(FitField, H109_H110_AResumedFitIsTheUndisturbedOne) {
@@ -135,7 +137,9 @@ TEST_F(FitField, H109_H110_AResumedFitIsTheUndisturbedOne) {
     FitHooks go_on;
     go_on.resume = &saved;
     const FitResult resumed = regrade::FitField(views_, box_, options_, go_on);
-    EXPECT_TRUE(SameBits(straight.field, resumed.field)) << stop_after;
+    EXPECT_TRUE(testing::RecordSameBits("resumed and straight", testing::Computed::kFloat,
+                                        SameBits(straight.field, resumed.field)))
+        << stop_after;
     // What was counted before the interruption counts, to the bit.
     EXPECT_EQ(resumed.psnr_train_db, straight.psnr_train_db) << stop_after;
     EXPECT_EQ(resumed.rays, straight.rays);
@@ -215,7 +219,10 @@ TEST_F(FitSpheres, H109_H110_AResumedFitIsTheUndisturbedOne) {
     EXPECT_THROW(regrade::FitField(views_, box_, options_, hooks), Interrupted);
     FitHooks go_on;
     go_on.resume = &saved;
-    EXPECT_TRUE(same(straight, regrade::FitField(views_, box_, options_, go_on))) << stop_after;
+    EXPECT_TRUE(testing::RecordSameBits(
+        "resumed and straight, before spheres", testing::Computed::kFloat,
+        same(straight, regrade::FitField(views_, box_, options_, go_on))))
+        << stop_after;
   }
   omp_set_num_threads(before);
 }
@@ -280,7 +287,9 @@ TEST_F(FitField, H85_ResamplingKeepsConstantsAndRamps) {
     const float z =
         std::clamp((fine.vertex_of_voxel[v] % 17 + 0.5f) * 9 / 17 - 0.5f, 0.0f, 8.0f);
     if (inside) {
-      EXPECT_NEAR(fine.records[v * fine.lanes()], z, 1e-5f);
+      EXPECT_NEAR(fine.records[v * fine.lanes()], z,
+                  testing::RecordBound("a ramp resampled", testing::Computed::kFloat,
+                                       fine.records[v * fine.lanes()] - z, 1e-5));
     }
   }
   EXPECT_GT(whole, fine.num_voxels() / 2);

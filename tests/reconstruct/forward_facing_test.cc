@@ -8,6 +8,7 @@
 
 #include "kernels/base/random.h"
 #include "tests/support/expect_error.h"
+#include "tests/support/record_error.h"
 
 namespace regrade {
 namespace {
@@ -74,8 +75,12 @@ TEST(ForwardFacing, H88_EveryRayStaysInTheBoxAndMeetsTheScene) {
         const Vec3d at = world.origin + world.direction * 5.0;
         const Vec3d ndc{scene.ndc.a * at.x / at.z, scene.ndc.b * at.y / at.z, 1 - 2 / at.z};
         const Vec3d off = Cross(ndc - ray.origin.Cast<double>(), ray.direction.Cast<double>());
-        EXPECT_NEAR(Norm(off), 0, 1e-6);
-        EXPECT_NEAR(Norm(WorldFromNdc(scene.ndc, ndc) - at), 0, 1e-9);
+        EXPECT_NEAR(Norm(off), 0,
+                    testing::RecordBound("a ray from its point", testing::Computed::kFloat,
+                                         Norm(off), 1e-6));
+        EXPECT_NEAR(Norm(WorldFromNdc(scene.ndc, ndc) - at), 0,
+                    testing::RecordBound("there and back", testing::Computed::kDouble,
+                                         Norm(WorldFromNdc(scene.ndc, ndc) - at), 1e-9));
       }
   }
   for (const ScenePoint& point : capture.points)
@@ -115,7 +120,9 @@ TEST(ForwardFacing, H90_InfinitelyFarIsTheFarFace) {
   EXPECT_NEAR(far.z, 1, 1e-12);
   // A point at a depth of 1e12 lies there, to 2e-12; and the space is finite all the way.
   const Vec3d p = from + towards * (1e12 / towards.z);
-  EXPECT_NEAR(far.x, space.a * p.x / p.z, 1e-9);
+  EXPECT_NEAR(far.x, space.a * p.x / p.z,
+              testing::RecordBound("a point at a depth of 1e12", testing::Computed::kDouble,
+                                   far.x - space.a * p.x / p.z, 1e-9));
   EXPECT_NEAR(far.y, space.b * p.y / p.z, 1e-9);
   EXPECT_TRUE(std::isfinite(WorldFromNdc(space, Vec3d{0, 0, 1 - 2e-12}).z));
 }

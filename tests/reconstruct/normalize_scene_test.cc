@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "kernels/base/random.h"
+#include "tests/support/record_error.h"
 
 namespace regrade {
 namespace {
@@ -108,7 +109,9 @@ TEST(NormalizeScene, H140_OtherUnitsGiveTheSameField) {
     for (size_t i = 0; i < capture.views.size(); ++i) {
       const Vec3d a = capture.views[i].camera.Transformed(scene.field_from_world).Center();
       const Vec3d b = scaled.views[i].camera.Transformed(other.field_from_world).Center();
-      EXPECT_NEAR(Norm(a - b), 0, 1e-6);
+      EXPECT_NEAR(Norm(a - b), 0,
+                  testing::RecordBound("a camera in units of 1e-6 and 1e6",
+                                       testing::Computed::kDouble, Norm(a - b), 1e-6));
     }
   }
 }
@@ -121,7 +124,8 @@ TEST(NormalizeScene, H154_OrderOfPhotosDoesNotMatter) {
     for (int32_t& v : p.views) v = 8 - v;
   std::reverse(reversed.points.begin(), reversed.points.end());
   const NormalizedScene a = NormalizeScene(capture), b = NormalizeScene(reversed);
-  EXPECT_EQ(a.field_from_world.scale, b.field_from_world.scale);
+  EXPECT_TRUE(testing::RecordSameBits("scale of reversed photos", testing::Computed::kDouble,
+                                      a.field_from_world.scale == b.field_from_world.scale));
   EXPECT_EQ(a.field_from_world.translation, b.field_from_world.translation);
   EXPECT_EQ(a.box.near_clip, b.box.near_clip);
 }
@@ -133,7 +137,9 @@ TEST(NormalizeScene, H129_CollinearCameras) {
     capture.views.push_back({"", "", "", LookAt({0.3 * i, 0, 0}, {0.3 * i, 4, 3}, up)});
   const NormalizedScene scene = NormalizeScene(capture);
   ExpectProper(scene);
-  EXPECT_NEAR((scene.field_from_world.rotation * up).z, 1, 1e-12);
+  const double upright = (scene.field_from_world.rotation * up).z;
+  EXPECT_NEAR(upright, 1,
+              testing::RecordDigits("up", testing::Computed::kDouble, upright - 1, 1e-12));
 }
 
 TEST(NormalizeScene, H130_CamerasAtOnePoint) {
@@ -167,7 +173,10 @@ TEST(NormalizeScene, H131_UpsThatCancel) {
   const NormalizedScene scene = NormalizeScene(capture);
   ExpectProper(scene);
   // The cameras' circle lies level; which side of it is up is a rule of ours.
-  EXPECT_NEAR(scene.field_from_world.rotation.row[2].z, 1, 1e-12);
+  const double level = scene.field_from_world.rotation.row[2].z;
+  EXPECT_NEAR(level, 1,
+              testing::RecordDigits("the circle's normal", testing::Computed::kDouble,
+                                    level - 1, 1e-12));
   EXPECT_NE(scene.notice.find("disagree about up"), std::string::npos) << scene.notice;
 }
 

@@ -1,6 +1,7 @@
 // Poses from photos against a colmap that misbehaves in every way we know of, and once against
 // the real one.
 #include <gtest/gtest.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -14,6 +15,7 @@
 #include "reconstruct/colmap_output.h"
 #include "reconstruct/poses_from_photos.h"
 #include "reconstruct/refine_intrinsics.h"
+#include "tests/support/process_state.h"
 #include "tests/support/synthetic_model.h"
 
 namespace regrade {
@@ -169,14 +171,23 @@ TEST_F(Poses, F50_GrandchildrenEndWithTheirParent) {
   pid_t grandchild = 0;
   std::ifstream(folder_ / "work/grandchild") >> grandchild;
   ASSERT_GT(grandchild, 1);
-  // It may stay a zombie until init takes it; alive it is no longer.
-  const std::string stat = "/proc/" + std::to_string(grandchild) + "/stat";
-  std::string number, name, state = "Z";
-  for (int i = 0; i < 100 && fs::exists(stat); ++i, usleep(10000)) {
-    std::ifstream(stat) >> number >> name >> state;
-    if (state == "Z") break;
+  EXPECT_TRUE(testing::Ends(grandchild));
+}
+
+TEST_F(Poses, F35_ColmapEndsWithARunThatIsKilled) {
+  const pid_t run = fork();
+  if (run == 0) {
+    Run("family");
+    _exit(0);
   }
-  EXPECT_EQ(state, "Z");
+  const pid_t colmap = testing::NumberIn(folder_ / "work/parent"),
+              child = testing::NumberIn(folder_ / "work/child");
+  ASSERT_GT(colmap, 1);
+  ASSERT_GT(child, 1);
+  kill(run, SIGKILL);
+  waitpid(run, nullptr, 0);
+  EXPECT_TRUE(testing::Ends(colmap));
+  EXPECT_TRUE(testing::Ends(child));
 }
 
 TEST_F(Poses, F52_AFloodBeforeTheModel) {

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "reconstruct/colmap_model.h"
+#include "tests/support/record_error.h"
 #include "tests/support/synthetic_model.h"
 
 namespace regrade {
@@ -92,7 +93,9 @@ TEST(SceneChecks, H140_ScaleDoesNotMatter) {
     const Similarity similarity{scale, {}, {1 * scale, 2 * scale, 3 * scale}};
     for (CaptureView& view : capture.views) view.camera = view.camera.Transformed(similarity);
     for (ScenePoint& point : capture.points) point.position = similarity * point.position;
-    EXPECT_NEAR(MedianTriangulationAngle(capture), angle, 1e-9);
+    EXPECT_NEAR(MedianTriangulationAngle(capture), angle,
+                testing::RecordBound("the angle in other units", testing::Computed::kDouble,
+                                     MedianTriangulationAngle(capture) - angle, 1e-9));
     EXPECT_EQ(JudgeScene(capture).refusal, "");
   }
 }

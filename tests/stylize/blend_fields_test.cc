@@ -4,6 +4,8 @@
 #include <cstring>
 
 #include "tests/support/expect_error.h"
+#include "tests/support/floating_point_traps.h"
+#include "tests/support/record_error.h"
 #include "tests/support/styled_ball.h"
 
 namespace regrade {
@@ -38,7 +40,9 @@ bool SameBits(const RadianceField& a, const RadianceField& b) {
 TEST(MixFields, H49_TheEndsAreTheFieldsThemselves) {
   const Styles s;
   EXPECT_TRUE(SameBits(MixFields(s.source, {&s.day, &s.night}, {0, 0}), s.source));
-  EXPECT_TRUE(SameBits(MixFields(s.source, {&s.day, &s.night}, {1, 0}), s.day));
+  EXPECT_TRUE(testing::RecordSameBits(
+      "the end of a mix", testing::Computed::kFloat,
+      SameBits(MixFields(s.source, {&s.day, &s.night}, {1, 0}), s.day)));
   EXPECT_TRUE(SameBits(MixFields(s.source, {&s.day, &s.night}, {0, 1}), s.night));
   EXPECT_FALSE(SameBits(MixFields(s.source, {&s.day}, {0.5}), s.day));
   EXPECT_EQ(MixFields(s.source, {&s.day}, {0.5}).geometry, s.source.geometry);
@@ -55,7 +59,10 @@ TEST(MixFields, WhereNothingIsClampedTheRendersMixToo) {
   for (size_t r = 0; r < rays.size(); ++r) {
     const Vec3f expected = before[r] * 0.2f + day[r] * 0.5f + night[r] * 0.3f;
     farthest = std::max<double>(farthest, Norm(mixed[r] - expected));
-    EXPECT_LE(Norm(mixed[r] - expected), 2e-6f);  // float sums of some fifty samples
+    EXPECT_LE(Norm(mixed[r] - expected),
+              testing::RecordBound("a mixed render", testing::Computed::kFloat,
+                                   Norm(mixed[r] - expected),
+                                   2e-6));  // float sums of some fifty samples
   }
   EXPECT_GT(farthest, 0);  // another order of sums, not the same field
 }
@@ -86,11 +93,14 @@ TEST(MixFields, H49_TheMixIsNoSteeperThanItsParts) {
     if (apart > 1e-6) steepest = std::max(steepest, std::sqrt(changed / apart));
   }
   EXPECT_GT(steepest, 0);
-  EXPECT_LE(steepest, limit);
+  EXPECT_LE(steepest,
+            limit * testing::RecordBound("a mix's steepest pair over its bound",
+                                         testing::Computed::kFloat, steepest / limit, 1));
   EXPECT_LE(limit, std::max(one.Bound(), other.Bound()));
 }
 
 TEST(MixFields, H49_WhatIsBeyondTheEndsIsRefused) {
+  const testing::MayBeNotFinite allowed;
   const Styles s;
   for (const std::vector<double>& weights :
        {std::vector<double>{1.1, 0}, {-0.1, 0.5}, {0.6, 0.6}, {std::nan(""), 0}})

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "kernels/base/random.h"
+#include "tests/support/record_error.h"
 
 namespace regrade {
 namespace {
@@ -72,7 +73,10 @@ TEST(FeatureTransform, ARidgeIsAddedOnBothSides) {
         for (int l = 0; l < n; ++l)
           sum += a.matrix[i * n + k] * (content.covariance[k * n + l] + (k == l)) *
                  a.matrix[j * n + l];
-      EXPECT_NEAR(sum, style.covariance[i * n + j] + (i == j), 1e-12);
+      const double ridged = style.covariance[i * n + j] + (i == j);
+      EXPECT_NEAR(sum, ridged,
+                  testing::RecordDigits("covariance with a ridge", testing::Computed::kDouble,
+                                        sum - ridged, 1e-12));
     }
 }
 
@@ -81,7 +85,9 @@ TEST(FeatureTransform, H26_DirectionsWithoutFeaturesAreNeverBlownUp) {
   const FeatureStatistics style = MeasureFeatures(Features(2, 5, -3));
   for (const WhiteningRule rule : {WhiteningRule{0, 1e-5}, WhiteningRule{1, 1e-5}}) {
     const FeatureAffine a = WhitenAndColor(MeasureFeatures(Features(1, 3, 2, 2)), style, rule);
-    for (const double v : a.matrix) EXPECT_LE(std::abs(v), 10);
+    for (const double v : a.matrix)
+      EXPECT_LE(std::abs(v),
+                testing::RecordBound("largest entry", testing::Computed::kDouble, v, 10));
   }
 }
 
@@ -91,7 +97,9 @@ TEST(FeatureTransform, H6_AConstantPhotoTakesTheStylesMean) {
     const FeatureMap result = Transformed(Features(1, 0, 2), style, rule);
     const FeatureStatistics got = MeasureFeatures(result);
     for (int c = 0; c < kChannels; ++c) {
-      EXPECT_NEAR(got.mean[c], style.mean[c], 1e-5);
+      EXPECT_NEAR(got.mean[c], style.mean[c],
+                  testing::RecordBound("the style's mean", testing::Computed::kFloat,
+                                       got.mean[c] - style.mean[c], 1e-5));
       EXPECT_LE(got.covariance[c * kChannels + c], 1e-10);
     }
   }

@@ -1,6 +1,7 @@
 // The network's gradient by touched voxels against Algorithm 1, and the network applied to a
 // field.
 #include "kernels/field/background_spheres.h"
+#include "tests/support/record_error.h"
 #include "tests/support/small_field.h"
 #include "tests/support/styled_ball.h"
 
@@ -67,7 +68,10 @@ TEST(Algorithm1, H46_GradientAgainstRichardson) {
       const double r0 = (4 * h1 - h0) / 3, r1 = (4 * h2 - h1) / 3;
       const double numeric = (16 * r1 - r0) / 15;
       EXPECT_NEAR(analytic[static_cast<size_t>(at)], numeric,
-                  2e-8 * std::max(1.0, std::abs(numeric)))
+                  testing::RecordDigits("gradient through sigma, W, b and K",
+                                        testing::Computed::kDouble,
+                                        analytic[static_cast<size_t>(at)] - numeric, 2e-8,
+                                        std::max(1.0, std::abs(numeric))))
           << "layer " << l << " parameter " << at - first;
     }
   }
@@ -86,7 +90,11 @@ TEST(GradientAggregation, EqualsAlgorithm1) {
     const double scale = 1 / (3.0 * static_cast<double>(batch.rays.size()));
     const double loss = PlainGradient(network, field, batch, scale, &expected);
     EXPECT_NEAR(result.loss, loss, 1e-5 * loss);
-    EXPECT_LE(RelativeDifference(gradient, expected), 1e-5) << "basis " << basis;
+    EXPECT_LE(RelativeDifference(gradient, expected),
+              testing::RecordDigits("by voxels against Algorithm 1 in double",
+                                    testing::Computed::kFloat,
+                                    RelativeDifference(gradient, expected), 1e-5))
+        << "basis " << basis;
     EXPECT_LT(result.touched_voxels, field.geometry->num_voxels());
     EXPECT_GT(result.touched_voxels, 0);
   }
@@ -113,7 +121,10 @@ TEST(GradientAggregation, BackgroundSpheresAreInAlgorithm1sGradient) {
   const double scale = 1 / (3.0 * static_cast<double>(batch.rays.size()));
   const double loss = PlainGradient(network, field, batch, scale, &expected);
   EXPECT_NEAR(result.loss, loss, 1e-5 * loss);
-  EXPECT_LE(RelativeDifference(gradient, expected), 1e-5);
+  EXPECT_LE(RelativeDifference(gradient, expected),
+            testing::RecordDigits("with spheres against Algorithm 1 in double",
+                                  testing::Computed::kFloat,
+                                  RelativeDifference(gradient, expected), 1e-5));
   // The layers have a say: the ball alone has another gradient.
   PlainGradient(network, Ball(8), batch, scale, &box);
   EXPECT_GT(RelativeDifference(box, expected), 0.01);
@@ -193,7 +204,9 @@ TEST(GradientAggregation, H48_PatchesSumToTheWhole) {
     aggregation.Run(network, patch, &gradient);
     for (size_t i = 0; i < parts.size(); ++i) parts[i] += gradient[i] / 4;
   }
-  EXPECT_LE(RelativeDifference(parts, whole), 1e-5);
+  EXPECT_LE(RelativeDifference(parts, whole),
+            testing::RecordDigits("patches against the whole", testing::Computed::kFloat,
+                                  RelativeDifference(parts, whole), 1e-5));
 }
 
 TEST(GradientAggregation, ThreadsDoNotChangeABit) {
@@ -205,7 +218,8 @@ TEST(GradientAggregation, ThreadsDoNotChangeABit) {
     const Threads threads(t == 0 ? 1 : 5);
     GradientAggregation(field, {}).Run(network, batch, &gradient[t]);
   }
-  EXPECT_EQ(gradient[0], gradient[1]);
+  EXPECT_TRUE(testing::RecordSameBits("1 and 5 threads", testing::Computed::kFloat,
+                                      gradient[0] == gradient[1]));
 }
 
 TEST(GradientAggregation, H29_RaysWithoutATargetLeaveTheLoss) {
@@ -225,8 +239,11 @@ TEST(GradientAggregation, H29_RaysWithoutATargetLeaveTheLoss) {
   const AggregationResult b = aggregation.Run(network, kept, &without);
   EXPECT_EQ(a.rays, b.rays);
   EXPECT_EQ(a.loss, b.loss);
-  EXPECT_LE(RelativeDifference(with_nan, without),
-            1e-6);  // other blocks of voxels, other rounding
+  EXPECT_LE(
+      RelativeDifference(with_nan, without),
+      testing::RecordDigits("gradient without the rays that have no target",
+                            testing::Computed::kFloat, RelativeDifference(with_nan, without),
+                            1e-6));  // other blocks of voxels, other rounding
 }
 
 // --- applying
@@ -255,7 +272,11 @@ TEST(ApplyNetwork, EveryVoxelAsThePlainNetwork) {
     double x[kFeatureStride], y[kNetworkSh];
     std::copy_n(row, kFeatureStride, x);
     network.ForwardPlain(x, y);
-    for (int i = 0; i < kNetworkSh; ++i) EXPECT_NEAR(styled.sh[v * 27 + i], y[i], 2e-5);
+    for (int i = 0; i < kNetworkSh; ++i)
+      EXPECT_NEAR(
+          styled.sh[v * 27 + i], y[i],
+          testing::RecordBound("a restyled voxel against double", testing::Computed::kFloat,
+                               styled.sh[v * 27 + i] - y[i], 2e-5));
   }
 }
 

@@ -6,6 +6,7 @@
 
 #include "kernels/base/error.h"
 #include "kernels/base/random.h"
+#include "tests/support/record_error.h"
 
 namespace regrade {
 namespace {
@@ -57,9 +58,13 @@ double LargestErrorOfLemma2() {
 }
 
 TEST(LinearMap, Lemma2_MappedCoefficientsGiveMappedColours) {
-  EXPECT_LE(LargestErrorOfLemma2<double>(), 1e-12);
+  EXPECT_LE(LargestErrorOfLemma2<double>(),
+            testing::RecordDigits("mapped colours", testing::Computed::kDouble,
+                                  LargestErrorOfLemma2<double>(), 1e-12));
   // Up to 30 products of size 1 to 5 in float, each rounded to 6e-8.
-  EXPECT_LE(LargestErrorOfLemma2<float>(), 4e-6);
+  EXPECT_LE(LargestErrorOfLemma2<float>(),
+            testing::RecordDigits("mapped colours in float", testing::Computed::kFloat,
+                                  LargestErrorOfLemma2<float>(), 4e-6));
 }
 
 TEST(LinearMap, AppearanceIsMappedVoxelByVoxel) {
@@ -102,7 +107,10 @@ TEST(LeastSquares, RecoversAMap) {
   const ColorMap map = first.Solve();
   for (int i = 0; i < 3; ++i) {
     EXPECT_NEAR(map.offset[i], truth.offset[i], 1e-11);
-    for (int j = 0; j < 3; ++j) EXPECT_NEAR(map.matrix(i, j), truth.matrix(i, j), 1e-11);
+    for (int j = 0; j < 3; ++j)
+      EXPECT_NEAR(map.matrix(i, j), truth.matrix(i, j),
+                  testing::RecordDigits("a map by least squares", testing::Computed::kDouble,
+                                        map.matrix(i, j) - truth.matrix(i, j), 1e-11));
   }
 }
 

@@ -1,5 +1,6 @@
 // LipRF's propositions under their own premises, and how a field that breaks them is reported.
 #include "stylize/volume_variance.h"
+#include "tests/support/record_error.h"
 #include "tests/support/styled_ball.h"
 
 namespace regrade {
@@ -82,7 +83,10 @@ TEST(Propositions, One_ALinearMapOfColoursGainsAtMostItsNorm) {
       return mapped;
     });
     const double limit = SpectralNorm(map.matrix) * rays.Vrr();
-    EXPECT_LE(styled, limit * kRounding) << trial;
+    EXPECT_LE(styled, limit * testing::RecordBound("gain over the norm, 400 pairs of rays",
+                                                   testing::Computed::kDouble, styled / limit,
+                                                   kRounding))
+        << trial;
     tightest = std::max(tightest, styled / limit);
   }
   EXPECT_GT(tightest, 0.98);  // no smaller factor would do
@@ -178,7 +182,11 @@ TEST(Propositions, Two_AReluNetworkOfSamplesThatAgreeOneByOne) {
     const DenseNetwork<double> f = ColorNetwork(40 + 11 * trial);
     const SampleBySample pair(9000 + 5 * trial, 1 + static_cast<int>(trial % 10), f);
     const double limit = NormProduct(f) * pair.epsilon;
-    EXPECT_LT(pair.styled, limit * kRounding) << trial;
+    EXPECT_LT(pair.styled,
+              limit * testing::RecordBound("gain over the product of norms, 300 networks",
+                                           testing::Computed::kDouble, pair.styled / limit,
+                                           kRounding))
+        << trial;
     tightest = std::max(tightest, pair.styled / limit);
   }
   EXPECT_GT(tightest, 0.05);  // norms of layers multiply up; it is no vacuous promise
@@ -237,7 +245,11 @@ TEST(Propositions, Three_CoefficientsWithAnOffsetOfEveryHarmonic) {
       return t;
     });
     const double k1 = SpectralNorm(map.matrix), k2 = constant ? 0 : std::sqrt(b_norm);
-    EXPECT_LE(styled, (k1 * rays.Vrr() + k2 * rays.Turn()) * kRounding) << trial;
+    const double limit = k1 * rays.Vrr() + k2 * rays.Turn();
+    EXPECT_LE(styled, limit * testing::RecordBound("gain over the bound, 400 pairs of rays",
+                                                   testing::Computed::kDouble, styled / limit,
+                                                   kRounding))
+        << trial;
     if (!constant) gain = std::max(gain, styled / (k1 * rays.Vrr()));
   }
   EXPECT_GT(gain, 1);  // the second term is needed
@@ -274,7 +286,9 @@ TEST(VolumeVariance, NoPairInsideThePremisesExceedsItsBound) {
   EXPECT_EQ(report.Pairs(), 3000);
   EXPECT_GT(report.inside.pairs, 300);
   // float's rounding of the restyled coefficients, 27 of them about 1
-  EXPECT_LE(report.largest_share, 1 + 1e-4);
+  EXPECT_LE(report.largest_share,
+            testing::RecordBound("largest share of its bound, 3 000 pairs",
+                                 testing::Computed::kFloat, report.largest_share, 1 + 1e-4));
   EXPECT_GT(report.largest_share, 0.2);
   EXPECT_GT(report.open.pairs, 100);  // the ball's rim and what is beside it
 }
@@ -313,7 +327,8 @@ TEST(VolumeVariance, TheSameForAnyNumberOfThreads) {
     return field.Measure(500);
   }();
   const VarianceReport many = field.Measure(500);
-  EXPECT_EQ(one.inside.sum_styled, many.inside.sum_styled);
+  EXPECT_TRUE(testing::RecordSameBits("1 and more threads", testing::Computed::kDouble,
+                                      one.inside.sum_styled == many.inside.sum_styled));
   EXPECT_EQ(one.largest_share, many.largest_share);
 }
 

@@ -99,6 +99,15 @@ void Write(ColmapModel model, const std::vector<std::string>& names,
 
 int Map() {
   if (Is("hang")) HangForEver();
+  if (Is("family")) {  // says who it and its child are
+    const std::string work = arguments["output_path"] + "/../../";
+    const pid_t child = fork();
+    if (child > 0) {
+      std::ofstream(work + "child") << child << "\n";
+      std::ofstream(work + "parent") << getpid() << "\n";
+    }
+    HangForEver();
+  }
   if (Is("stubborn")) {
     std::signal(SIGTERM, SIG_IGN);
     HangForEver();

@@ -1,4 +1,5 @@
-// Threads inherit the traps of the one that starts them, so OpenMP's are covered as well.
+// A thread inherits the traps of the one that starts it, and OpenMP's stay for later tests:
+// what is switched is switched in all of them.
 #include "tests/support/floating_point_traps.h"
 
 #include <gtest/gtest.h>
@@ -10,12 +11,20 @@ namespace {
 
 constexpr int kTraps = FE_INVALID | FE_DIVBYZERO | FE_OVERFLOW;
 
-class Traps : public ::testing::EmptyTestEventListener {
-  void OnTestStart(const ::testing::TestInfo&) override {
+void TrapInAllThreads(bool on) {
+#pragma omp parallel
+  {
     std::feclearexcept(FE_ALL_EXCEPT);
-    ::feenableexcept(kTraps);
+    if (on)
+      ::feenableexcept(kTraps);
+    else
+      ::fedisableexcept(kTraps);
   }
-  void OnTestEnd(const ::testing::TestInfo&) override { ::fedisableexcept(kTraps); }
+}
+
+class Traps : public ::testing::EmptyTestEventListener {
+  void OnTestStart(const ::testing::TestInfo&) override { TrapInAllThreads(true); }
+  void OnTestEnd(const ::testing::TestInfo&) override { TrapInAllThreads(false); }
 };
 
 [[maybe_unused]] const bool appended = [] {
@@ -25,11 +34,10 @@ class Traps : public ::testing::EmptyTestEventListener {
 
 }  // namespace
 
-MayBeNotFinite::MayBeNotFinite() : before_(::fedisableexcept(kTraps)) {}
-
-MayBeNotFinite::~MayBeNotFinite() {
-  std::feclearexcept(FE_ALL_EXCEPT);
-  if (before_ > 0) ::feenableexcept(before_);
+MayBeNotFinite::MayBeNotFinite() : trapped_((::fegetexcept() & kTraps) != 0) {
+  TrapInAllThreads(false);
 }
+
+MayBeNotFinite::~MayBeNotFinite() { TrapInAllThreads(trapped_); }
 
 }  // namespace regrade::testing

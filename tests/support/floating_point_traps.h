@@ -14,7 +14,7 @@ class MayBeNotFinite {
   MayBeNotFinite& operator=(const MayBeNotFinite&) = delete;
 
  private:
-  int before_;
+  bool trapped_;
 };
 
 }  // namespace regrade::testing

@@ -1,0 +1,34 @@
+// Whether a process is still at work, for tests of what ends with what.
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <thread>
+
+namespace regrade::testing {
+
+// It may stay a zombie until init takes it; alive it is no longer.
+inline bool IsAlive(int pid) {
+  std::ifstream stat("/proc/" + std::to_string(pid) + "/stat");
+  std::string number, name, state;
+  return static_cast<bool>(stat >> number >> name >> state) && state != "Z" && state != "X";
+}
+
+inline void Moment() { std::this_thread::sleep_for(std::chrono::milliseconds(10)); }
+
+// Waits up to five seconds.
+inline bool Ends(int pid) {
+  for (int i = 0; i < 500 && IsAlive(pid); ++i) Moment();
+  return !IsAlive(pid);
+}
+
+// A number that another process writes into a file and renames; 0 after ten seconds without it.
+inline int NumberIn(const std::filesystem::path& file) {
+  int number = 0;
+  for (int i = 0; i < 1000 && number == 0; ++i, Moment()) std::ifstream(file) >> number;
+  return number;
+}
+
+}  // namespace regrade::testing
