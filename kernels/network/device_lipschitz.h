@@ -1,7 +1,7 @@
 // Learning the weights of a Lipschitz network on a CUDA device, without the host: norms,
-// weights as they act, gradient, regularisation, Adam and the limit of the bound; see
-// EQ(lipschitz-layer), see EQ(liprf-regularizer) and see EQ(adam), which the CPU has. Held to
-// stylize/train_network.cc by the parity table.
+// weights as they act, gradient, regularisation, Adam and the limit of the bound, each as
+// kernels/network/lipschitz_layer.h, stylize/lipschitz_regularizer.h and
+// kernels/optimize/adam.h have it. Held to stylize/train_network.cc by the parity table.
 #pragma once
 
 #include <cstdint>
