@@ -19,6 +19,7 @@ struct ConsistencyOptions {
   std::vector<int> gaps{1, 5};
   std::string mode = "lai2018";
   std::string flow = "dis-medium";
+  std::string lpips;
   double min_coverage = 0.4;
 
   template <typename Bind>
@@ -34,8 +35,14 @@ struct ConsistencyOptions {
           .choices = "lai2018|ruder2016|geometry"});
     bind("flow", flow,
          {.help = "optical flow of the reference frames: dis-ultrafast, dis-fast, dis-medium, "
-                  "dis-tuned, farneback, or files:DIR with 00000_00001.flo both ways; costs "
-                  "1 : 1.3 : 5 : 25 : 16 in time, errors in PRICES.md"});
+                  "dis-tuned, farneback (costs 1 : 1.3 : 5 : 25 : 16 in time, errors in "
+                  "PRICES.md), with OpenCV's optflow deepflow, tvl1, pca-flow, rlof; "
+                  "files:DIR with 00000_00001.flo both ways; onnx:FILE, a network with inputs "
+                  "named first and second, RGB from -1 to 1"});
+    bind("lpips", lpips,
+         {.help = "ONNX file of a network that says how different two pictures look, with "
+                  "inputs as --flow onnx:FILE has them; measured between a sequence and the "
+                  "2D method's frames"});
     bind("min-coverage", min_coverage,
          {.unit = "share of pixels",
           .help =

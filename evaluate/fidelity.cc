@@ -47,7 +47,8 @@ FidelityRow MeasureFidelity(const NamedFrameSource& sequence, const FidelityTarg
   CheckCount(sequence, targets.transmittance, "transmittance");
   HueChroma hues, hues_2d;
   ColourSlices colours, style;
-  double sum_db = 0;
+  double sum_db = 0, sum_lpips = 0;
+  int compared = 0;
   int finite = 0, perfect = 0;
   const int count = sequence.frames.count;
   for (int i = 0; i < count; ++i) {
@@ -58,6 +59,10 @@ FidelityRow MeasureFidelity(const NamedFrameSource& sequence, const FidelityTarg
       const Image target = Clipped(targets.views_2d.frame(i));
       CheckSize(frame, target, "the 2D method's version", i, sequence);
       hues_2d.Add(target);
+      if (targets.perceptual) {
+        sum_lpips += targets.perceptual(frame, target);
+        ++compared;
+      }
       Image transmittance;
       if (targets.transmittance.count > 0) {
         transmittance = targets.transmittance.frame(i);
@@ -83,6 +88,7 @@ FidelityRow MeasureFidelity(const NamedFrameSource& sequence, const FidelityTarg
     row.psnr_to_2d_db = sum_db / finite;
   else if (perfect > 0)
     row.psnr_to_2d_db = std::numeric_limits<double>::infinity();
+  if (compared > 0) row.lpips_to_2d = sum_lpips / compared;
   row.hue_std = hues.HueStd();
   row.chroma = hues.MeanChroma();
   row.hue_std_2d = hues_2d.HueStd();

@@ -1,6 +1,7 @@
 // Whether a styled sequence still has the style: consistency alone is won by a grey video.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -16,6 +17,10 @@ struct FidelityRow {
   // Mean over frames of the frames' PSNR against what the 2D method made of the same frame;
   // both clipped to [0, 1]; identical frames are left out of the mean (all identical: +inf).
   std::optional<double> psnr_to_2d_db;
+
+  // Mean over frames of how different they look from the 2D method's (LPIPS), by the network
+  // that was given; 0 for the same pictures.
+  std::optional<double> lpips_to_2d;
 
   // Circular standard deviation of the CIELAB hue weighted by chroma (radians), and mean chroma
   // (CIELAB units), over all pixels of all frames: see kernels/image/hue_chroma.h. hue_std is
@@ -33,6 +38,7 @@ struct FidelityTargets {
   FrameSource transmittance;     // one channel: pixels above 0.5 show no scene and are left
                                  // out of psnr_to_2d_db
   const Image* style = nullptr;  // the style picture
+  std::function<double(const Image&, const Image&)> perceptual;  // see PairNetwork::Distance
 };
 
 // Errors (kInput): counts or sizes that differ. One frame of each source is held at a time.

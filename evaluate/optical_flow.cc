@@ -3,6 +3,9 @@
 #include <cstring>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
+#if defined(REGRADE_OPTFLOW)
+#include <opencv2/optflow.hpp>
+#endif
 
 #include "kernels/base/error.h"
 
@@ -21,7 +24,7 @@ uint8_t ToByte(float value) {
   return value < 1 ? static_cast<uint8_t>(value * 255.0f + 0.5f) : 255;
 }
 
-cv::Mat GreyBytes(const Image& image) {
+cv::Mat Bytes(const Image& image, bool in_colour) {
   const bool colour = image.channels >= 3;
   cv::Mat bytes(image.height, image.width, colour ? CV_8UC3 : CV_8UC1);
   const int kept = colour ? 3 : 1;
@@ -36,10 +39,27 @@ cv::Mat GreyBytes(const Image& image) {
           row[x * kept + c] = ToByte(pixels[x * image.channels + c]);
     }
   }
-  if (!colour) return bytes;
-  cv::Mat grey;
-  cv::cvtColor(bytes, grey, cv::COLOR_RGB2GRAY);
-  return grey;
+  cv::Mat result = bytes;
+  if (colour && !in_colour) cv::cvtColor(bytes, result, cv::COLOR_RGB2GRAY);
+  if (!colour && in_colour) cv::cvtColor(bytes, result, cv::COLOR_GRAY2RGB);
+  return result;
+}
+
+bool Contributed(const std::string& name) {
+  return name == "deepflow" || name == "tvl1" || name == "pca-flow" || name == "rlof";
+}
+
+cv::Ptr<cv::DenseOpticalFlow> MakeContributed([[maybe_unused]] const std::string& name) {
+#if defined(REGRADE_OPTFLOW)
+  if (name == "deepflow") return cv::optflow::createOptFlow_DeepFlow();
+  if (name == "tvl1") return cv::optflow::createOptFlow_DualTVL1();
+  if (name == "pca-flow") return cv::optflow::createOptFlow_PCAFlow();
+  return cv::optflow::createOptFlow_DenseRLOF();
+#else
+  throw Error(ExitCode::kUsage, "this build has no optical flow '" + name + "'", "--flow",
+              "install the package libopencv-contrib-dev and build again, or choose one of " +
+                  std::string(kFlowMethods));
+#endif
 }
 
 cv::Ptr<cv::DenseOpticalFlow> MakeMethod(const std::string& name) {
@@ -55,9 +75,11 @@ cv::Ptr<cv::DenseOpticalFlow> MakeMethod(const std::string& name) {
     dis->setUseSpatialPropagation(true);
     return dis;
   }
+  if (Contributed(name)) return MakeContributed(name);
   if (name == "farneback") return cv::FarnebackOpticalFlow::create(5, 0.5, false, 15);
   throw Error(ExitCode::kUsage, "unknown optical flow method", name,
-              std::string("choose one of ") + kFlowMethods + ", or files:DIR");
+              std::string("choose one of ") + kFlowMethods + "|" + kContributedFlowMethods +
+                  ", files:DIR or onnx:FILE");
 }
 
 }  // namespace
@@ -72,7 +94,8 @@ FlowField ComputeFlow(const Image& from, const Image& to, const std::string& met
     throw Error(ExitCode::kInput, "frames of " + SizeText(from) + " are too small for flow", "",
                 "give frames of at least 12 x 12 px");
   cv::Mat flow;
-  algorithm->calc(GreyBytes(from), GreyBytes(to), flow);
+  const bool in_colour = method == "rlof";  // it takes nothing else
+  algorithm->calc(Bytes(from, in_colour), Bytes(to, in_colour), flow);
   REGRADE_CHECK_EQ(flow.cols, from.width);
   REGRADE_CHECK_EQ(flow.rows, from.height);
   FlowField result(from.width, from.height);

@@ -1,4 +1,5 @@
-// Optical flow between two frames, with the methods of OpenCV's own video module.
+// Optical flow between two frames, with the methods of OpenCV's own video module and, where it
+// is installed, of the contributed module optflow.
 #pragma once
 
 #include <string>
@@ -10,6 +11,8 @@ namespace regrade {
 
 inline constexpr const char* kFlowMethods =
     "dis-ultrafast|dis-fast|dis-medium|dis-tuned|farneback";
+// Of optflow.
+inline constexpr const char* kContributedFlowMethods = "deepflow|tvl1|pca-flow|rlof";
 
 // Motion from `from` to `to`, for every pixel of `from`. Both are turned to 8-bit grey as
 // OpenCV does it for 8-bit RGB files (an alpha channel is ignored), so the flow is the one that
@@ -21,7 +24,8 @@ inline constexpr const char* kFlowMethods =
 // Flow is always some flow: two unrelated pictures give finite vectors too. Check it both ways
 // (evaluate/occlusion.h) before use.
 //
-// Errors: kUsage for an unknown method; kInput for sizes that differ or are below 12 pixels.
+// Errors: kUsage for an unknown method, or one that this build lacks; kInput for sizes that
+// differ or are below 12 pixels.
 FlowField ComputeFlow(const Image& from, const Image& to, const std::string& method);
 
 }  // namespace regrade

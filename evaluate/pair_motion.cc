@@ -1,16 +1,18 @@
 #include "evaluate/pair_motion.h"
 
 #include <filesystem>
+#include <memory>
 
 #include "evaluate/flow_file.h"
 #include "evaluate/geometric_flow.h"
 #include "evaluate/optical_flow.h"
+#include "evaluate/pair_network.h"
 #include "kernels/base/error.h"
 
 namespace regrade {
 namespace {
 
-constexpr char kFilesPrefix[] = "files:";
+constexpr char kFilesPrefix[] = "files:", kOnnxPrefix[] = "onnx:";
 
 OcclusionMask MakeMask(const std::string& mode, const FlowField& forward,
                        const FlowField& backward) {
@@ -53,11 +55,18 @@ PairMotionFunction EstimatedMotion(const FrameSource& frames, const std::string&
       return motion;
     };
   }
+  std::function<FlowField(const Image&, const Image&)> compute =
+      [flow](const Image& from, const Image& to) { return ComputeFlow(from, to, flow); };
+  if (flow.starts_with(kOnnxPrefix)) {
+    const auto network =
+        std::make_shared<const PairNetwork>(flow.substr(sizeof(kOnnxPrefix) - 1));
+    compute = [network](const Image& from, const Image& to) { return network->Flow(from, to); };
+  }
   return [=](int i, int j) {
     const Image from = frames.frame(i), to = frames.frame(j);
     PairMotion motion;
-    motion.flow = ComputeFlow(from, to, flow);
-    motion.mask = MakeMask(mode, motion.flow, ComputeFlow(to, from, flow));
+    motion.flow = compute(from, to);
+    motion.mask = MakeMask(mode, motion.flow, compute(to, from));
     return motion;
   };
 }

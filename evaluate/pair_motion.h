@@ -26,10 +26,10 @@ struct FrameGeometry {
 };
 using GeometrySource = std::function<FrameGeometry(int)>;
 
-// Motion estimated from pictures. `mode` is lai2018 or ruder2016; `flow` one of kFlowMethods or
-// "files:DIR", where DIR holds 00003_00004.flo and 00004_00003.flo for the pair (3, 4).
-// Files must have the frames' size. Errors: kUsage for unknown names, kInput from flow and
-// files.
+// Motion estimated from pictures. `mode` is lai2018 or ruder2016; `flow` one of
+// optical_flow.h's methods, or "files:DIR", where DIR holds 00003_00004.flo and 00004_00003.flo
+// for the pair (3, 4), or "onnx:FILE", a network (see pair_network.h). Files must have the
+// frames' size. Errors: kUsage for unknown names, kInput from flow and files.
 PairMotionFunction EstimatedMotion(const FrameSource& frames, const std::string& mode,
                                    const std::string& flow);
 

@@ -72,10 +72,16 @@ std::string FidelityTable(const ConsistencyReport& consistency,
                           const std::vector<FidelityRow>& fidelity) {
   std::vector<Cells> rows{
       {"sequence", "PSNR to 2D", "hue std", "of 2D", "chroma", "of 2D", "SW to style"}};
-  for (const FidelityRow& row : fidelity)
+  const bool lpips = std::any_of(fidelity.begin(), fidelity.end(), [](const FidelityRow& f) {
+    return f.lpips_to_2d.has_value();
+  });
+  if (lpips) rows[0].push_back("LPIPS to 2D");
+  for (const FidelityRow& row : fidelity) {
     rows.push_back({row.sequence, Number(row.psnr_to_2d_db, 2), Number(row.hue_std, 3),
                     Number(row.hue_std_2d, 3), Number(row.chroma, 2), Number(row.chroma_2d, 2),
                     Number(row.sliced_wasserstein_to_style, 4)});
+    if (lpips) rows.back().push_back(Number(row.lpips_to_2d, 4));
+  }
   std::string remarks;
   std::vector<std::string> seen;
   for (const ConsistencyRow& row : consistency.rows) {
@@ -85,6 +91,7 @@ std::string FidelityTable(const ConsistencyReport& consistency,
                     [&](const FidelityRow& f) { return f.sequence == row.sequence; }))
       continue;
     rows.push_back({row.sequence, "-", "-", "-", "-", "-", "-"});
+    if (lpips) rows.back().push_back("-");
     remarks +=
         row.sequence +
         ": fidelity was not measured, so its consistency may be bought with its colours; "

@@ -155,8 +155,9 @@ struct PairFigures {
 struct FidelityFigures {
   std::string sequence;
   Figure psnr_to_2d_db;
-  Figure hue_std, hue_std_2d;  // radians
-  Figure chroma, chroma_2d;    // CIELAB
+  std::optional<double> lpips_to_2d;  // where a network was given
+  Figure hue_std, hue_std_2d;         // radians
+  Figure chroma, chroma_2d;           // CIELAB
   Figure sliced_wasserstein_to_style;
 };
 

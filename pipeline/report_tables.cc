@@ -241,7 +241,10 @@ std::string ConsistencyHtml(const RunReport& report) {
               Number(row.tc_psnr_mean_db, 2) + Cell(IntervalHtml(row), "n") +
               Number(row.tc_psnr_of_mean_db, 2) + Cell(pairs, "n") + Number(row.coverage, 2);
       if (i == 0) {
-        body += Across(FigureHtml(fidelity->psnr_to_2d_db, 2), n, "n beside") +
+        std::string near_2d = FigureHtml(fidelity->psnr_to_2d_db, 2);
+        if (fidelity->lpips_to_2d)
+          near_2d += "<br>LPIPS " + FigureHtml(*fidelity->lpips_to_2d, 3);
+        body += Across(near_2d, n, "n beside") +
                 Across(WithTarget(fidelity->hue_std, fidelity->hue_std_2d, 3), n, "n") +
                 Across(WithTarget(fidelity->chroma, fidelity->chroma_2d, 1), n, "n") +
                 Across(FigureHtml(fidelity->sliced_wasserstein_to_style, 4), n, "n");

@@ -28,7 +28,7 @@ MAY_INCLUDE = {
 ANY_WING_SOURCE = r"(reconstruct|stylize|evaluate)/.*\.(cc|cu)"
 DOORS = (
     ("OpenCV", r"opencv2/",
-     (r"evaluate/optical_flow\.cc", r"stylize/onnx_network\.cc", r"pipeline/files/video_file\.cc",
+     (r"evaluate/(optical_flow|pair_network)\.cc", r"stylize/onnx_network\.cc", r"pipeline/files/video_file\.cc",
       r"pipeline/files/picture_text\.cc")),
     ("OpenImageIO", r"OpenImageIO/", (r"pipeline/files/image_file\.cc",)),
     ("libjpeg-turbo", r"(jpeglib|jerror|jmorecfg|turbojpeg)\.h", (r"pipeline/files/jpeg_decoder\.cc",)),

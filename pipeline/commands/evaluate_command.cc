@@ -3,10 +3,12 @@
 #include <filesystem>
 #include <optional>
 
+#include "evaluate/pair_network.h"
 #include "evaluate/tables.h"
 #include "kernels/base/error.h"
 #include "pipeline/chart_library.h"
 #include "pipeline/commands/folder_command.h"
+#include "pipeline/evaluation_networks.h"
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/files/image_file.h"
 #include "pipeline/frame_folder.h"
@@ -58,6 +60,7 @@ void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& optio
   if (options.mode == "geometry")
     throw Error(ExitCode::kUsage, "geometry is known of our own runs only", "--mode",
                 "use lai2018 or ruder2016 for frames of other programs");
+  ProbeEvaluationNetworks(options);
   const bool has_reference = !frames.reference.empty();
   if (!has_reference)
     console->Warn("no --reference: motion is estimated from the styled frames themselves");
@@ -87,6 +90,7 @@ void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& optio
     targets.style = &style;
   }
   sequences.push_back(styled);
+  targets.perceptual = PerceptualDistance(options.lpips);
   console->EndStage();
   std::optional<Workspace>
       workspace;  // before the work: a folder that cannot be used is told now

@@ -7,6 +7,7 @@
 #include "pipeline/capture_store.h"
 #include "pipeline/commands/command.h"
 #include "pipeline/device_choice.h"
+#include "pipeline/evaluation_networks.h"
 #include "pipeline/files/image_file.h"
 #include "pipeline/plan.h"
 #include "pipeline/run_file.h"
@@ -55,6 +56,7 @@ void ProbeInputs(const std::string& last, RunContext* context) {
   ReadStylePicture(context->settings.style.picture, nullptr);
   ProbeMethod(&context->settings.style_2d);
   ProbeMasks(&context->settings.object);
+  ProbeEvaluationNetworks(context->settings.consistency);
 }
 
 // What a dry run can say of a folder that is not there yet: photos are taken as 4 : 3, the

@@ -6,6 +6,7 @@
 #include "evaluate/consistency.h"
 #include "evaluate/fidelity.h"
 #include "evaluate/image_quality.h"
+#include "evaluate/pair_network.h"
 #include "evaluate/tables.h"
 #include "kernels/field/fast_rays.h"
 #include "kernels/field/render.h"
@@ -87,7 +88,8 @@ void AddFilm(RunContext* context, const Image& style, ProgressParts* parts,
   report->rows.insert(report->rows.end(), film.rows.begin(), film.rows.end());
   report->pairs.insert(report->pairs.end(), film.pairs.begin(), film.pairs.end());
   const FidelityTargets targets{renders_styled ? sequences[1].frames : FrameSource(),
-                                FramesOf(folder("transmittance"), all), &style};
+                                FramesOf(folder("transmittance"), all), &style,
+                                PerceptualDistance(settings.consistency.lpips)};
   for (const NamedFrameSource& sequence : sequences)
     fidelity->push_back(MeasureFidelity(
         sequence, targets, parts->Next(kFrameSeconds * static_cast<double>(all.size()))));
@@ -137,13 +139,14 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   const Image style = ReadStylePicture(settings.style.picture, nullptr);
   const FrameSource of_photos = FramesOf(workspace.Path("views_2d"), taught);
   const FidelityTargets targets{renders_styled ? frames("views_2d", taught) : of_photos,
-                                frames("transmittance", taught), &style};
+                                frames("transmittance", taught), &style,
+                                PerceptualDistance(settings.consistency.lpips)};
   std::vector<FidelityRow> fidelity;
   for (const NamedFrameSource& sequence : sequences)
     fidelity.push_back(MeasureFidelity({sequence.name, frames(sequence.name.c_str(), taught)},
                                        targets, parts.Next(n * kFrameSeconds)));
   AddFilm(context, style, &parts, &consistency, &fidelity, &heat_maps);
-  const FidelityTargets photo_targets{of_photos, targets.transmittance, nullptr};
+  const FidelityTargets photo_targets{of_photos, targets.transmittance, nullptr, {}};
   const FidelityRow to_photos = MeasureFidelity({"styled", frames("styled", taught)},
                                                 photo_targets, parts.Next(n * kFrameSeconds));
 

@@ -70,7 +70,8 @@ std::optional<double> LinearMapPsnr(const RadianceField& field,
                                                  MarchOptions{field.step})
                                    .color;
                              }};
-  return MeasureFidelity({"linear_map", rendered}, {views_2d, transmittance, nullptr}, progress)
+  return MeasureFidelity({"linear_map", rendered}, {views_2d, transmittance, nullptr, {}},
+                         progress)
       .psnr_to_2d_db;
 }
 

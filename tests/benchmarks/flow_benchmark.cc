@@ -20,8 +20,9 @@
 namespace regrade {
 namespace {
 
-const std::vector<std::string> kMethods = {"dis-ultrafast", "dis-fast", "dis-medium",
-                                           "dis-tuned", "farneback"};
+const std::vector<std::string> kMethods = {"dis-ultrafast", "dis-fast",  "dis-medium",
+                                           "dis-tuned",     "farneback", "deepflow",
+                                           "tvl1",          "pca-flow",  "rlof"};
 
 // Sums over pairs of frames; printed as means.
 struct Mean {

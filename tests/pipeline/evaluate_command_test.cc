@@ -10,6 +10,7 @@
 #include "pipeline/files/image_file.h"
 #include "pipeline/files/json_file.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/tiny_onnx.h"
 
 namespace regrade {
 namespace {
@@ -113,6 +114,38 @@ TEST(EvaluateCommand, FramesThatWillNotDoAreNamed) {
   EXPECT_EQ(outcome.code, 3);
   EXPECT_SAYS(outcome, "2 frames, the reference has 4");
   EXPECT_FALSE(std::filesystem::exists(folder / "out"));  // told before work began
+}
+
+// A network tells how different frames look from the 2D method's; another gives the motion. One
+// that cannot be used is refused before any frame is read.
+TEST(EvaluateCommand, NetworksOfOnesOwn) {
+  const TemporaryFolder folder;
+  WriteFrames(folder / "source", 3);
+  WriteFrames(folder / "styled", 3, 0.03f);
+  WriteText(folder / "distance.onnx", testing::DistanceNetwork(48, 64));
+  WriteText(folder / "flow.onnx", testing::FlowNetwork(48, 64));
+  WriteText(folder / "diary.onnx", "Dear diary,");
+  const auto evaluate = [&](std::vector<std::string> more) {
+    more.insert(more.end(), {"--frames", folder / "styled", "--reference", folder / "source",
+                             "--target", folder / "source", "--out", folder / "e"});
+    return Evaluate(more);
+  };
+  const Outcome done =
+      evaluate({"--lpips", folder / "distance.onnx", "--flow", "onnx:" + folder / "flow.onnx"});
+  ASSERT_EQ(done.code, 0) << done.text;
+  EXPECT_SAYS(done, "LPIPS to 2D");
+  const JsonValue report = ReadJsonFile(folder / "e/report.json");
+  for (const JsonValue& row : report.At("fidelity").AsArray()) {
+    const double lpips = row.At("lpips_to_2d").AsDouble();
+    EXPECT_EQ(lpips > 1e-4, row.At("sequence").AsString() == "styled") << lpips;
+  }
+  EXPECT_NE(testing::ReadText(folder / "e/report.html").find("LPIPS"), std::string::npos);
+  for (const char* option : {"--lpips", "--flow"}) {
+    const bool flow = std::string(option) == "--flow";
+    const Outcome refused = evaluate({option, (flow ? "onnx:" : "") + (folder / "diary.onnx")});
+    EXPECT_EQ(refused.code, 4) << refused.text;
+    EXPECT_SAYS(refused, "diary.onnx");
+  }
 }
 
 TEST(EvaluateCommand, H121_OneFrameIsNoPair) {

@@ -1,0 +1,96 @@
+// ONNX files of two or three operators, written byte by byte (Protocol Buffers' wire format; the
+// numbers are the fields of onnx.proto3), for tests of what runs networks.
+#pragma once
+
+#include <cstdint>
+#include <cstring>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace regrade::testing {
+
+class TinyOnnx {
+ public:
+  // Two pictures [1, 3, height, width] go in as "first" and "second".
+  TinyOnnx(int height, int width) {
+    for (const char* name : {"first", "second"})
+      graph_ += Field(11, ValueInfo(name, {1, 3, height, width}));
+  }
+
+  void Node(const std::string& type, const std::vector<std::string>& inputs,
+            const std::string& output, const std::string& attributes = "") {
+    std::string node;
+    for (const std::string& input : inputs) node += Field(1, input);
+    graph_ += Field(1, node + Field(2, output) + Field(3, output) + Field(4, type) + attributes);
+    last_ = output;
+  }
+  static std::string Integer(const std::string& name, int64_t value) {
+    return Field(5, Field(1, name) + Number(3, value) + Number(20, 2));
+  }
+  static std::string Integers(const std::string& name, const std::vector<int64_t>& values) {
+    std::string attribute = Field(1, name);
+    for (const int64_t value : values) attribute += Number(8, value);
+    return Field(5, attribute + Number(20, 7));
+  }
+  void Weights(const std::string& name, const std::vector<int64_t>& shape,
+               const std::vector<float>& values) {
+    std::string tensor;
+    for (const int64_t side : shape) tensor += Number(1, side);
+    std::string raw(values.size() * sizeof(float), '\0');
+    std::memcpy(raw.data(), values.data(), raw.size());
+    graph_ += Field(5, tensor + Number(2, 1) + Field(8, name) + Field(9, raw));
+  }
+
+  // The last node's output is the network's, of this shape.
+  std::string Bytes(const std::vector<int64_t>& shape) const {
+    const std::string graph = graph_ + Field(2, "tiny") + Field(12, ValueInfo(last_, shape));
+    return Number(1, 7) + Field(8, Field(1, "") + Number(2, 11)) + Field(7, graph);
+  }
+
+ private:
+  static std::string Varint(uint64_t value) {
+    std::string bytes;
+    for (; value >= 128; value >>= 7) bytes += static_cast<char>(value % 128 + 128);
+    return bytes + static_cast<char>(value);
+  }
+  static std::string Number(int field, int64_t value) {
+    return Varint(static_cast<uint64_t>(field) << 3) + Varint(static_cast<uint64_t>(value));
+  }
+  static std::string Field(int field, const std::string& bytes) {
+    return Varint(static_cast<uint64_t>(field) << 3 | 2) + Varint(bytes.size()) + bytes;
+  }
+  static std::string ValueInfo(const std::string& name, const std::vector<int64_t>& shape) {
+    std::string sides;
+    for (const int64_t side : shape) sides += Field(1, Number(1, side));
+    return Field(1, name) + Field(2, Field(1, Number(1, 1) + Field(2, sides)));
+  }
+
+  std::string graph_, last_;
+};
+
+// The mean of the squared difference of both pictures as the network sees them: 4 times that
+// of pictures from 0 to 1.
+inline std::string DistanceNetwork(int height, int width) {
+  TinyOnnx network(height, width);
+  network.Node("Sub", {"first", "second"}, "difference");
+  network.Node("Mul", {"difference", "difference"}, "square");
+  network.Node("GlobalAveragePool", {"square"}, "distance");
+  return network.Bytes({1, 3, 1, 1});
+}
+
+// The motion u = 10 + 3 (red of the second - red of the first) / 2, v = -0.5.
+inline std::string FlowNetwork(int height, int width) {
+  TinyOnnx network(height, width);
+  std::vector<float> weights(12);
+  weights[0] = -0.75f * 2;
+  weights[3] = 0.75f * 2;
+  network.Weights("weights", {2, 6, 1, 1}, weights);
+  network.Weights("bias", {2}, {10, -0.5f});
+  network.Node("Concat", {"first", "second"}, "both", TinyOnnx::Integer("axis", 1));
+  network.Node("Conv", {"both", "weights", "bias"}, "flow",
+               TinyOnnx::Integers("kernel_shape", {1, 1}));
+  return network.Bytes({1, 2, height, width});
+}
+
+}  // namespace regrade::testing
