@@ -69,7 +69,8 @@ struct PairNetwork::Implementation {
   }
 
   cv::Mat Run(const Image& first, const Image& second) const {
-    if (!first.SameSize(second)) Fail("two pictures differ in size", "give pictures of one size");
+    if (!first.SameSize(second))
+      Fail("two pictures differ in size", "give pictures of one size");
     const std::lock_guard lock(mutex);
     cv::Mat output;
     try {

@@ -42,7 +42,8 @@ TEST(PairNetwork, MotionIsFromTheFirstToTheSecondInPixels) {
 TEST(PairNetwork, EvaluationTakesItsMotion) {
   const TemporaryFolder folder;
   testing::WriteText(folder / "flow.onnx", testing::FlowNetwork(24, 32));
-  const FrameSource frames{2, [](int i) { return Plain(0.2f + 0.4f * static_cast<float>(i), 0, 0); }};
+  const FrameSource frames{
+      2, [](int i) { return Plain(0.2f + 0.4f * static_cast<float>(i), 0, 0); }};
   const PairMotionFunction motion =
       EstimatedMotion(frames, "lai2018", "onnx:" + (folder / "flow.onnx"));
   EXPECT_NEAR(motion(0, 1).flow.at(3, 3)[0], 11.2f, 1e-5);
@@ -62,8 +63,8 @@ TEST(PairNetwork, DistanceIsWhatTheNetworkSays) {
   FidelityTargets targets;
   targets.views_2d = {2, [&](int) { return a; }};
   targets.perceptual = distance;
-  const FidelityRow row = MeasureFidelity(
-      {"styled", {2, [&](int i) { return i == 0 ? a : b; }}}, targets);
+  const FidelityRow row =
+      MeasureFidelity({"styled", {2, [&](int i) { return i == 0 ? a : b; }}}, targets);
   ASSERT_TRUE(row.lpips_to_2d.has_value());
   EXPECT_NEAR(*row.lpips_to_2d, 2 * (0.4 * 0.4 + 0.2 * 0.2) / 3, 1e-5);
   targets.perceptual = {};
@@ -81,7 +82,8 @@ TEST(PairNetwork, RefusalsNameTheFile) {
   const PairNetwork distance(folder / "distance.onnx");
   const Image a = Plain(0, 0, 0);
   EXPECT_REGRADE_ERROR(distance.Flow(a, a), ExitCode::kExternalProgram, "no motion");
-  EXPECT_REGRADE_ERROR(distance.Distance(a, Image(8, 8, 3)), ExitCode::kExternalProgram, "size");
+  EXPECT_REGRADE_ERROR(distance.Distance(a, Image(8, 8, 3)), ExitCode::kExternalProgram,
+                       "size");
 }
 
 // Where OpenCV's contributed module is installed its flows find a shift; elsewhere they are

@@ -159,10 +159,12 @@ int Map() {
     Write(testing::MakeSyntheticModel(options), names, out + "/1");
     return 0;
   }
-  if (Is("grandchildren") && fork() == 0) {
-    // Outlives its parent, holds the pipe open, and says who it is.
-    std::ofstream(arguments["output_path"] + "/../../grandchild") << getpid() << "\n";
-    HangForEver();
+  if (Is("grandchildren")) {
+    // Outlives its parent and holds the pipe open. Who it is the parent says: it may be ended
+    // before it has run at all.
+    const pid_t grandchild = fork();
+    if (grandchild == 0) HangForEver();
+    std::ofstream(arguments["output_path"] + "/../../grandchild") << grandchild << "\n";
   }
   Write(testing::MakeSyntheticModel(options), names, out + "/0");
   if (Is("half"))

@@ -1,5 +1,5 @@
-// ONNX files of two or three operators, written byte by byte (Protocol Buffers' wire format; the
-// numbers are the fields of onnx.proto3), for tests of what runs networks.
+// ONNX files of two or three operators, written byte by byte (Protocol Buffers' wire format;
+// the numbers are the fields of onnx.proto3), for tests of what runs networks.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +22,8 @@ class TinyOnnx {
             const std::string& output, const std::string& attributes = "") {
     std::string node;
     for (const std::string& input : inputs) node += Field(1, input);
-    graph_ += Field(1, node + Field(2, output) + Field(3, output) + Field(4, type) + attributes);
+    graph_ +=
+        Field(1, node + Field(2, output) + Field(3, output) + Field(4, type) + attributes);
     last_ = output;
   }
   static std::string Integer(const std::string& name, int64_t value) {
