@@ -59,19 +59,23 @@ StagePlan PlanFit(const FitOptions& options, int64_t photo_pixels, const SceneBo
 
 StagePlan PlanFitOnDevice(const FitOptions& options, int64_t photo_pixels,
                           const SceneBox& box) {
-  constexpr double kSampleStore = 1 << 30, kVertexBytes = 4 + 4 + 1 + 1, kSamplesPerRay = 40;
+  constexpr double kSampleStore = 1 << 30, kVertexBytes = 4 + 4 + 1 + 1, kSamplesPerRay = 40,
+                   kExactSumsSlower = 2;
   const double record = 4.0 * RecordLanes(BasisOfDegree(options.sh_degree));
   double peak = 0, coarser = 0, seconds = 0;
   for (size_t s = 0; s < options.resolutions.size(); ++s) {
     const Vec3i n = ResolutionFor(box, options.resolutions[s]);
     const double vertices = static_cast<double>(n.x) * n.y * n.z;
     const double voxels = vertices * (s == 0 ? 1 : kStoredShare);
-    const double field = voxels * (3 * record + kIndexBytes) + vertices * kVertexBytes;
+    // Values, gradients, moments; exact sums are twice as wide.
+    const double field = voxels * ((options.exact_sums ? 4 : 3) * record + kIndexBytes) +
+                         vertices * kVertexBytes;
     peak = std::max(peak, field + coarser);
     coarser = field + 4 * voxels;  // its weights say what is kept
     seconds += static_cast<double>(options.steps[s]) * options.rays_per_step * kSamplesPerRay /
                kDeviceSamplesPerSecond;
   }
+  if (options.exact_sums) seconds *= kExactSumsSlower;
   return {static_cast<uint64_t>(peak + kSampleStore + 6.0 * static_cast<double>(photo_pixels)),
           seconds};
 }

@@ -155,10 +155,10 @@ struct PairFigures {
 struct FidelityFigures {
   std::string sequence;
   Figure psnr_to_2d_db;
-  std::optional<double> lpips_to_2d;  // where a network was given
-  Figure hue_std, hue_std_2d;         // radians
-  Figure chroma, chroma_2d;           // CIELAB
+  Figure hue_std, hue_std_2d;  // radians
+  Figure chroma, chroma_2d;    // CIELAB
   Figure sliced_wasserstein_to_style;
+  std::optional<double> lpips_to_2d;  // where a network was given
 };
 
 // What one value of a knob costs and buys, measured on this machine. Rows of one plane compare

@@ -64,6 +64,11 @@ TEST(Plan, DeviceMemoryByHand) {
   EXPECT_EQ(one.memory, 1000000u * (3 * 128 + 4 + 10) + 6000u + (1u << 30));
   // The coarser grid and its weights stay until the finer one, two fifths of it stored, is
   // there.
+  FitOptions exact = Fit({100}, {10});
+  exact.exact_sums = true;  // a million voxels of 32 floats more, and slower
+  EXPECT_NEAR(static_cast<double>(PlanFitOnDevice(exact, 1000, kCube).memory - one.memory),
+              128e6, 1e6);
+  EXPECT_GT(PlanFitOnDevice(exact, 1000, kCube).seconds, one.seconds);
   const StagePlan two = PlanFitOnDevice(Fit({100, 200}, {10, 10}), 0, kCube);
   EXPECT_EQ(two.memory, 1000000u * (3 * 128 + 4 + 10 + 4) + 3200000u * (3 * 128 + 4) +
                             8000000u * 10 + (1u << 30));
