@@ -26,15 +26,6 @@ Backend ChooseBackend(const std::string& device, bool reproducible) {
   return Backend::kCpu;
 }
 
-Backend ChooseBackendFor(bool spheres, const std::string& device, bool reproducible,
-                         const std::function<void(const std::string&)>& say) {
-  const Backend backend = ChooseBackend(device, reproducible);
-  if (!spheres || backend == Backend::kCpu) return backend;
-  say("the CPU is used: the GPU does not know background spheres yet; --effects "
-      "background=off leaves them out");
-  return Backend::kCpu;
-}
-
 std::string DeviceName(Backend backend) {
   return backend == Backend::kCpu ? "cpu" : ReadDeviceStatus().name;
 }

@@ -75,6 +75,11 @@ StagePlan PlanFitOnDevice(const FitOptions& options, int64_t photo_pixels,
     seconds += static_cast<double>(options.steps[s]) * options.rays_per_step * kSamplesPerRay /
                kDeviceSamplesPerSecond;
   }
+  if (box.spheres) {  // values, gradients and moments
+    const double map = 2.0 * options.background_resolution * options.background_resolution;
+    peak += map * (kIndexBytes + kSphereShare * options.background_layers *
+                                     (options.exact_sums ? 4 : 3) * 16);
+  }
   if (options.exact_sums) seconds *= kExactSumsSlower;
   return {static_cast<uint64_t>(peak + kSampleStore + 6.0 * static_cast<double>(photo_pixels)),
           seconds};

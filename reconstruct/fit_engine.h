@@ -42,6 +42,8 @@ class FitEngine {
   // Shows grid and moments; a processor that has them in the host's memory copies nothing.
   // `use` may set stage and step.
   virtual void Show(const std::function<void(FitState*)>& use) = 0;
+  // The same, and goes on from what `use` has made of them.
+  virtual void Change(const std::function<void(FitState*)>& use) = 0;
   virtual int64_t num_voxels() const = 0;
   virtual Vec3i resolution() const = 0;
   virtual void Step(const FitStep& step) = 0;

@@ -31,6 +31,7 @@ class CpuFitEngine : public FitEngine {
     ResetArenas();
   }
   void Show(const std::function<void(FitState*)>& use) override { use(&state_); }
+  void Change(const std::function<void(FitState*)>& use) override { use(&state_); }
   int64_t num_voxels() const override { return state_.grid.num_voxels(); }
   Vec3i resolution() const override { return state_.grid.frame.resolution; }
 

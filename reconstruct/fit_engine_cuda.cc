@@ -8,8 +8,10 @@
 #include "kernels/base/error.h"
 #include "kernels/base/random.h"
 #include "kernels/field/device/device_rays.h"
+#include "kernels/field/device/device_sphere_rays.h"
 #include "kernels/scene/device_views.h"
 #include "reconstruct/fit_engine.h"
+#include "reconstruct/sphere_grid.h"
 
 namespace regrade {
 namespace {
@@ -22,12 +24,17 @@ class CudaFitEngine : public FitEngine {
       : seed_(seed), exact_sums_(exact_sums), views_(rays->ToDevice()) {}
 
   void Take(FitState state) override {
-    grid_ = UploadGrid(state.grid, true, state.second_moment, exact_sums_);
+    grid_ = UploadGrid(state.grid, true, state.second_moment, exact_sums_, state.sphere_moment);
     Renew();
   }
   void Show(const std::function<void(FitState*)>& use) override {
-    FitState state{DownloadGrid(grid_), DownloadSecondMoment(grid_), 0, 0};
+    FitState state = Download();
     use(&state);
+  }
+  void Change(const std::function<void(FitState*)>& use) override {
+    FitState state = Download();
+    use(&state);
+    Take(std::move(state));
   }
   int64_t num_voxels() const override { return grid_.num_voxels(); }
   Vec3i resolution() const override { return grid_.frame.resolution; }
@@ -56,6 +63,7 @@ class CudaFitEngine : public FitEngine {
                         &touched_);
     }
     StepOnDevice(&grid_, &touched_, step.optimizer, fitter_->sums());
+    if (grid_.spheres.on()) StepLayers(step);
   }
 
   FitSums TakeSums() override {
@@ -71,7 +79,7 @@ class CudaFitEngine : public FitEngine {
   }
 
   void Refine(const MarchOptions& march, float threshold, const Vec3i& resolution,
-              int) override {
+              int sphere_resolution) override {
     const DeviceRange range("pruning and resampling");
     DeviceBuffer<float> weights(grid_.num_voxels(), "weights of voxels");
     weights.Zero();
@@ -87,11 +95,42 @@ class CudaFitEngine : public FitEngine {
                   "nothing of the scene is left: no voxel weighs more than " +
                       std::to_string(threshold) + " in any view",
                   "reconstruct", "check the poses, or lower --prune-weight");
+    next.spheres = Resampled(std::move(grid_.spheres), sphere_resolution);
     grid_ = std::move(next);
     Renew();
   }
 
  private:
+  FitState Download() const {
+    FitState state{DownloadGrid(grid_), DownloadSecondMoment(grid_), 0, 0};
+    if (grid_.spheres.on()) state.sphere_moment = grid_.spheres.second_moment.ToHost();
+    return state;
+  }
+
+  // A contiguous run of the map's texels is regularised, as on the CPU.
+  void StepLayers(const FitStep& step) {
+    const DeviceSpheres& spheres = grid_.spheres;
+    const int64_t map = spheres.links.size();
+    const int64_t run = static_cast<int64_t>(step.tv_sphere_share * static_cast<float>(map));
+    if (run > 0) {
+      const int64_t begin = static_cast<int64_t>(
+          RandomIndex(seed_ ^ 0x6d7369ull, step.number, 0, static_cast<uint64_t>(map)));
+      const float scale = 1.0f / (static_cast<float>(run) * static_cast<float>(spheres.layers));
+      AddSphereVariation(grid_, begin, run, step.tv_sphere_density * scale,
+                         step.tv_sphere_color * scale, &touched_);
+    }
+    StepSpheresOnDevice(&grid_, &touched_, step.optimizer, fitter_->sums());
+  }
+
+  // By the host, three times a fit: it takes a fraction of a second.
+  DeviceSpheres Resampled(DeviceSpheres spheres, int resolution) const {
+    if (!spheres.on()) return spheres;
+    FastSpheres host = DownloadSpheres(spheres);
+    spheres = {};
+    if (resolution != host.resolution) host = ResampleSpheres(host, resolution);
+    return UploadSpheres(host, true, {}, exact_sums_);
+  }
+
   // What belongs to the grid as it is now.
   void Renew() {
     fitter_.reset();

@@ -42,7 +42,6 @@ class Fitter {
       total_steps_ += options.steps[s];
       total_work_ += options.steps[s] * WorkOfStep(static_cast<int>(s));
     }
-    REGRADE_CHECK(!box.spheres || backend == Backend::kCpu);  // the GPU has no spheres yet
     if (backend == Backend::kCuda)
       engine_ = MakeCudaFitEngine(&rays_, options.seed, options.exact_sums);
     else
@@ -135,7 +134,7 @@ class Fitter {
     const int steps = options_.steps[static_cast<size_t>(stage_)];
     while (step_ < steps) {
       if (box_.spheres && LeadSteps() > 0 && StepsBefore() == LeadSteps())
-        engine_->Show(
+        engine_->Change(
             [this](FitState* state) { SetDensities(options_.initial_density, &state->grid); });
       engine_->Step(NextStep());
       ++step_;

@@ -140,7 +140,7 @@ class DeviceStyleLoss : public StyleLoss {
     result.touched_voxels = slots_.num_slots;
     Reserve(slots_.num_slots * kRowLanes, "features of touched voxels", &features_);
     Reserve(slots_.num_slots * kRowLanes, "styled voxels", &rows_);
-    GatherRows(grid_, slots_.voxel_of_slot.data(), 0, slots_.num_slots,
+    GatherRows(grid_, slots_.point_of_slot.data(), 0, slots_.num_slots,
                network.data().position_scale, features_.data());
     return result;
   }
@@ -204,18 +204,23 @@ std::unique_ptr<StyleLoss> MakeDeviceStyleLoss(const DeviceGrid* grid,
 void RestyleOnDevice(const LipschitzNetwork& network, DeviceGrid* grid) {
   REGRADE_CHECK(!grid->fitting);
   const DeviceRange range("restyling the field");
-  constexpr int64_t kChunk = 1 << 20;  // voxels; 256 MiB of features and results
-  const int64_t n = grid->num_voxels();
-  DeviceBuffer<float> features(std::min(n, kChunk) * kRowLanes, "features of voxels");
-  DeviceBuffer<float> rows(std::min(n, kChunk) * kRowLanes, "styled voxels");
+  constexpr int64_t kChunk = 1 << 20;  // points; 256 MiB of features and results
+  const int64_t room =
+      std::min(std::max(grid->num_voxels(), grid->spheres.num_texels()), kChunk);
+  DeviceBuffer<float> features(room * kRowLanes, "features of voxels");
+  DeviceBuffer<float> rows(room * kRowLanes, "styled voxels");
   const DeviceMlp mlp(MakeFusedMlp(network.Effective<float>()));
-  for (int64_t begin = 0; begin < n; begin += kChunk) {
-    const int64_t count = std::min(kChunk, n - begin);
-    GatherRows(*grid, nullptr, begin, count, network.data().position_scale, features.data());
-    mlp.Forward(MlpPrecision::kSplit, features.data(), count, rows.data());
-    AddBaseMap(network.data(), features.data(), count, rows.data());
-    ScatterRows(rows.data(), begin, count, grid);
-  }
+  const auto restyle = [&](int64_t first, int64_t end) {
+    for (int64_t begin = first; begin < end; begin += kChunk) {
+      const int64_t count = std::min(kChunk, end - begin);
+      GatherRows(*grid, nullptr, begin, count, network.data().position_scale, features.data());
+      mlp.Forward(MlpPrecision::kSplit, features.data(), count, rows.data());
+      AddBaseMap(network.data(), features.data(), count, rows.data());
+      ScatterRows(rows.data(), begin, count, grid);
+    }
+  };
+  restyle(0, grid->num_voxels());
+  if (grid->spheres.on()) restyle(grid->first_texel(), grid->num_points());
   DeviceWait("restyling the field");
 }
 

@@ -18,7 +18,8 @@ namespace regrade {
 std::unique_ptr<StyleLoss> MakeDeviceStyleLoss(const DeviceGrid* grid,
                                                const AggregationOptions& options);
 
-// The colours of every voxel become what the network makes of them.
+// The colours of every voxel, and of the background's layers, become what the network makes of
+// them.
 void RestyleOnDevice(const LipschitzNetwork& network, DeviceGrid* grid);
 
 }  // namespace regrade

@@ -101,7 +101,7 @@ class DeviceTraining::Recording {
 
   void SetRoom(int64_t samples, int64_t slots) {
     sample_room_ = samples;
-    slot_room_ = std::min(slots, grid_.num_voxels());
+    slot_room_ = std::min(slots, grid_.num_points());
     weights_ = {};
     weights_.Reserve(rays_.size(), sample_room_);
     const int64_t floats = slot_room_ * kRowLanes;
@@ -127,7 +127,7 @@ class DeviceTraining::Recording {
     slots_.Launch(&touched_);
     LimitToRoom(slot_room_, &weights_, &slots_, room_.data());
     const int32_t* touched = slots_.counter.data();
-    GatherRows(grid_, slots_.voxel_of_slot.data(), 0, slot_room_, position_scale_,
+    GatherRows(grid_, slots_.point_of_slot.data(), 0, slot_room_, position_scale_,
                features_.data(), touched);
     weights_that_learn_.ActivateWeights(&mlp_);
     mlp_.Forward(MlpPrecision::kTensor, features_.data(), slot_room_, rows_.data(), touched);

@@ -158,9 +158,7 @@ void RunMix(const Command& command, const Arguments& arguments, Console* console
                   "next style takes its place");
 
   StoredField stored = ReadFieldFile(folder + "/field.npz");
-  const Backend backend =
-      ChooseBackendFor(stored.field.geometry->spheres.on(), settings.device, false,
-                       [console](const std::string& text) { console->Info(text); });
+  const Backend backend = ChooseBackend(settings.device, false);
   const std::vector<Camera> cameras = FilmCameras(folder, stored, scene, render);
   if (settings.dry_run) {
     console->Info(std::to_string(cameras.size()) + " frames of " +

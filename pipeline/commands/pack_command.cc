@@ -52,12 +52,7 @@ void RunPack(const Command& command, const Arguments& arguments, Console* consol
     throw Error(ExitCode::kInput, "holds no poses", words[0],
                 "run `regrade pose CAPTURE --out " + words[0] + "` first");
   const Capture capture = ReadCapture(words[0] + "/poses");
-  SceneProfile profile = ProfileScene(capture, 2, run.effects);
-  if (profile.scene.box.spheres) {
-    console->Info("packed without background spheres: regrade_gpu does not know them yet");
-    profile = ProfileScene(
-        capture, 2, run.effects == "auto" ? "background=off" : run.effects + ",background=off");
-  }
+  const SceneProfile profile = ProfileScene(capture, 2, run.effects);
   for (const EffectReport& effect : profile.effects) console->Info(EffectLine(effect));
   for (const std::string& notice : profile.notices) console->Info(notice);
   PackedCapture packed;

@@ -39,9 +39,6 @@ void RenderHeldOut(const DeviceGrid& grid, const PackedCapture& capture,
 void RenderPacked(const RenderPackedOptions& settings) {
   const PackedCapture capture = ReadPackedCapture(settings.capture);
   const StoredField stored = ReadFieldFile(settings.field);
-  if (stored.field.geometry->spheres.on())
-    throw Error(ExitCode::kInput, "it has background spheres, which the GPU does not know yet",
-                settings.field, "use `regrade render`, which takes the CPU for it");
   const DeviceGrid grid = UploadGrid(MakeFastGrid(stored.field));
   if (!settings.frames.empty())
     RenderHeldOut(grid, capture, {stored.field.step}, settings.frames, "frame");

@@ -69,9 +69,6 @@ void StylePacked(const StylePackedOptions& settings, const TrainNetworkOptions& 
     throw Error(ExitCode::kInput, "holds no style picture", settings.capture,
                 "pack it with --style PICTURE");
   StoredField stored = ReadFieldFile(settings.field);
-  if (stored.field.geometry->spheres.on())
-    throw Error(ExitCode::kInput, "it has background spheres, which the GPU does not know yet",
-                settings.field, "use `regrade stylize`, which takes the CPU for it");
   const MarchOptions march{stored.field.step};
   JsonValue record = JsonValue::Object{{"capture", settings.capture}};
   record["seconds_read"] = watch.Lap();

@@ -119,9 +119,7 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   for (const EffectReport& effect : profile.effects)
     if (effect.name != kViewDependence) context->console->Info(EffectLine(effect));
   for (const std::string& notice : profile.notices) context->console->Info(notice);
-  const Backend backend =
-      ChooseBackendFor(scene.box.spheres, settings.run.device, settings.run.reproducible,
-                       [context](const std::string& text) { context->console->Info(text); });
+  const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
   FitOptions options =
       OptionsForMemory(context, PlannerOf(settings, capture, scene.box, backend), backend);
 
@@ -216,8 +214,7 @@ Stage ReconstructStage(RunContext* context) {
     const SceneProfile profile =
         ProfileScene(capture, context->settings.fit.sh_degree, run.effects + ",exposure=off");
     const SceneBox& box = profile.scene.box;
-    const Backend backend =
-        ChooseBackendFor(box.spheres, run.device, run.reproducible, [](const std::string&) {});
+    const Backend backend = ChooseBackend(run.device, run.reproducible);
     stage.plan =
         PlanText(PlannerOf(context->settings, capture, box, backend)(context->settings.fit));
   }

@@ -100,9 +100,7 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   const Capture capture = ReadCapture(workspace.Path("poses"));
   const StoredField before = ReadFieldFile(workspace.Path("field.npz"));
   const StoredField after = ReadFieldFile(workspace.Path("styled.npz"));
-  const Backend backend = ChooseBackendFor(
-      before.field.geometry->spheres.on(), settings.run.device, settings.run.reproducible,
-      [context](const std::string& text) { context->console->Info(text); });
+  const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
   Studio studio{FieldRenderer(before.field, backend),
                 FieldRenderer(after.field, backend),
                 nullptr,

@@ -119,9 +119,7 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
   if (const auto bytes = workspace.LoadCheckpoint("stylize", inputs))
     resume = UnpackTrainingState(*bytes);
   if (resume) context->console->Info("stylize: goes on from its checkpoint");
-  const Backend backend = ChooseBackendFor(
-      stored.field.geometry->spheres.on(), settings.run.device, settings.run.reproducible,
-      [context](const std::string& text) { context->console->Info(text); });
+  const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
   DeviceGrid device_field;
   if (backend == Backend::kCuda) device_field = UploadGrid(MakeFastGrid(stored.field));
   const TrainNetworkResult trained = TrainNetwork(

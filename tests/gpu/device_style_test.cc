@@ -12,6 +12,7 @@
 #include "kernels/field/fast_rays.h"
 #include "kernels/network/device_mlp.h"
 #include "tests/support/parity_row.h"
+#include "tests/support/small_field.h"
 #include "tests/support/styled_ball.h"
 
 namespace regrade {
@@ -133,11 +134,18 @@ TEST_F(DeviceStyle, MlpLessThanATile) { CheckMlp(1); }
 TEST_F(DeviceStyle, MlpNoWholeTiles) { CheckMlp(37); }
 TEST_F(DeviceStyle, LargeMlpOfTwoChunks) { CheckMlp(70001); }
 
+// A ball, and one before background layers.
+RadianceField BallBefore(bool layers, int n, int basis) {
+  RadianceField field = Ball(n, basis);
+  if (layers) AddSpheres(40, 9, 0.7, 5, &field);
+  return field;
+}
+
 // Loss, gradient and counts of the device's path against the CPU's, which the tests hold to
 // Algorithm 1 in double.
-void CheckLossAndGradient(int side) {
+void CheckLossAndGradient(int side, bool layers) {
   for (const int basis : {9, 4, 1}) {
-    const RadianceField field = Ball(14, basis);
+    const RadianceField field = BallBefore(layers, 14, basis);
     const DeviceGrid grid = UploadGrid(MakeFastGrid(field));
     LipschitzNetwork network = RandomNetwork(91);
     network.data().has_base = true;
@@ -156,8 +164,9 @@ void CheckLossAndGradient(int side) {
       const AggregationResult should = on_cpu.Run(network, batch, &expected);
       const AggregationResult exact = on_device->Run(network, batch, nullptr);
       const AggregationResult is = on_device->Run(network, batch, &gradient);
-      const std::string what =
-          "basis " + std::to_string(basis) + ", " + std::to_string(batch.rays.size()) + " rays";
+      const std::string what = "basis " + std::to_string(basis) + ", " +
+                               std::to_string(batch.rays.size()) +
+                               (layers ? " rays, layers" : " rays");
       EXPECT_EQ(is.rays, should.rays);
       EXPECT_NEAR(static_cast<double>(is.samples), static_cast<double>(should.samples),
                   3);  // at the threshold
@@ -173,11 +182,15 @@ void CheckLossAndGradient(int side) {
   }
 }
 
-TEST_F(DeviceStyle, LossAndGradient) { CheckLossAndGradient(13); }
-TEST_F(DeviceStyle, LargeLossAndGradientOfTwoBands) { CheckLossAndGradient(150); }
+TEST_F(DeviceStyle, LossAndGradient) { CheckLossAndGradient(13, false); }
+TEST_F(DeviceStyle, LossAndGradientBeforeLayers) { CheckLossAndGradient(13, true); }
+TEST_F(DeviceStyle, LargeLossAndGradientOfTwoBands) { CheckLossAndGradient(150, false); }
+TEST_F(DeviceStyle, LargeLossAndGradientOfTwoBandsBeforeLayers) {
+  CheckLossAndGradient(150, true);
+}
 
-TEST_F(DeviceStyle, HiddenSums) {
-  const RadianceField field = Ball(12);
+void CheckHiddenSums(bool layers) {
+  const RadianceField field = BallBefore(layers, 12, 9);
   const DeviceGrid grid = UploadGrid(MakeFastGrid(field));
   const StyleRays batch = SomeRays(2, 20);
   const LipschitzNetwork network = RandomNetwork(33);
@@ -191,12 +204,15 @@ TEST_F(DeviceStyle, HiddenSums) {
     off = std::max(off, std::abs(double{is.hidden[i]} - should.hidden[i]));
   for (size_t i = 0; i < is.missing.size(); ++i)
     off = std::max(off, std::abs(double{is.missing[i]} - should.missing[i]));
-  ParityRow("hidden sums", "basis 9", "CPU", off, 5e-5);
+  ParityRow("hidden sums", layers ? "basis 9, layers" : "basis 9", "CPU", off, 5e-5);
 }
+
+TEST_F(DeviceStyle, HiddenSums) { CheckHiddenSums(false); }
+TEST_F(DeviceStyle, HiddenSumsBeforeLayers) { CheckHiddenSums(true); }
 
 TEST_F(DeviceStyle, Restyle) {
   for (const int basis : {9, 4, 1}) {
-    const RadianceField field = Ball(13, basis);
+    const RadianceField field = BallBefore(true, 13, basis);
     LipschitzNetwork network = RandomNetwork(92);
     network.data().has_base = true;
     network.data().base = SomeMap();
@@ -213,6 +229,14 @@ TEST_F(DeviceStyle, Restyle) {
                 field.geometry->density[v]);
     }
     ParityRow("restyled voxels", "basis " + std::to_string(basis), "CPU", off, 2e-5);
+    double layers_off = 0;
+    for (int64_t t = 0; t < restyled.spheres.num_texels(); ++t) {
+      for (int c = 0; c < 3; ++c)
+        layers_off = std::max(layers_off, std::abs(double{restyled.spheres.texels[4 * t + c]} -
+                                                   should.sphere_color[3 * t + c]));
+      ASSERT_EQ(restyled.spheres.texels[4 * t + 3], field.geometry->spheres.density[t]);
+    }
+    ParityRow("restyled layers", "basis " + std::to_string(basis), "CPU", layers_off, 2e-5);
   }
 }
 

@@ -15,6 +15,7 @@
 #include "stylize/initial_network.h"
 #include "stylize/lipschitz_regularizer.h"
 #include "tests/support/parity_row.h"
+#include "tests/support/small_field.h"
 #include "tests/support/styled_ball.h"
 
 namespace regrade {
@@ -101,7 +102,8 @@ bool StepFromHost(const LipschitzRule& rule, StyleLoss* loss, const StyleRays& b
 // Adam divides a gradient by its own size, so where a gradient is little more than rounding the
 // two ways may step to opposite sides: what is compared is the whole way that the weights went.
 TEST_F(DeviceLearning, StepsAreThoseOfTheHost) {
-  const RadianceField field = Ball(14, 9);
+  RadianceField field = Ball(14, 9);
+  AddSpheres(40, 9, 0.7, 5, &field);
   const DeviceGrid grid = UploadGrid(MakeFastGrid(field));
   const std::unique_ptr<StyleLoss> loss = MakeDeviceStyleLoss(&grid, Options());
   for (const double limit : {std::numeric_limits<double>::infinity(), 1e-3}) {

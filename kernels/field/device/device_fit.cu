@@ -4,22 +4,28 @@
 #include <vector>
 
 #include "kernels/base/error.h"
-#include "kernels/field/device/device_rays.h"
+#include "kernels/field/device/device_sphere_rays.h"
 #include "kernels/field/device/gradient_view.h"
 #include "kernels/field/device/launch.h"
+#include "kernels/field/device/warp_chain.h"
 #include "kernels/field/device/warp_shade.h"
 
 namespace regrade {
 
 DeviceTouched::DeviceTouched(const DeviceGrid& grid)
     : num_voxels(grid.num_voxels()),
-      bits((grid.num_voxels() + 31) / 32, "marks of touched voxels") {
+      num_points(grid.num_points()),
+      bits((grid.num_points() + 31) / 32, "marks of touched voxels") {
   bits.Zero();
 }
 
 void DeviceTouched::MarkAll() {
   std::vector<uint32_t> all(static_cast<size_t>(bits.size()), ~uint32_t{0});
-  if (num_voxels % 32 != 0) all.back() = (uint32_t{1} << (num_voxels % 32)) - 1;
+  const auto end_at = [&all](int64_t end) {
+    if (end % 32 != 0) all[static_cast<size_t>(end / 32)] = (uint32_t{1} << (end % 32)) - 1;
+  };
+  end_at(num_voxels);
+  end_at(num_points);
   bits.CopyIn(all.data(), bits.size());
 }
 
@@ -36,17 +42,6 @@ struct SampleStore {
   float4* raw_tau;  // colour before the clamp, optical depth
   float* before;    // transmittance before
 };
-
-__device__ inline void AddQuad(float* target, const float4& v) {
-#if __CUDA_ARCH__ >= 900
-  atomicAdd(reinterpret_cast<float4*>(target), v);
-#else
-  atomicAdd(target, v.x);
-  atomicAdd(target + 1, v.y);
-  atomicAdd(target + 2, v.z);
-  atomicAdd(target + 3, v.w);
-#endif
-}
 
 // Adds the gradients of `count` samples, the i-th of them held by lane i, to the corners'
 // records: d / d value = sum_c of[c] d_raw[c] + density d_sigma.
@@ -90,14 +85,12 @@ __device__ void ScatterChunk(const DeviceGridView& grid, const LaneValues<kBasis
   }
 }
 
-// The way back along a ray; see EQ(composite-adjoint). Its recursion R_i = alpha_i c_i + (1 -
-// alpha_i) R_{i+1} is a chain of maps x -> b + a x; 32 of them are composed by a scan, and as
-// all a and b are positive nothing cancels.
+// The way back along a ray; see EQ(composite-adjoint). `behind` is what is seen through all
+// samples.
 template <int kBasis, bool kExact>
 __device__ void WalkBack(const DeviceGridView& grid, const LaneValues<kBasis>& values,
-                         const SampleStore& store, int count, float delta, const Vec3f& d_color,
-                         const GradientView& gradient, int lane) {
-  Vec3f behind = grid.background;
+                         const SampleStore& store, int count, float delta, Vec3f behind,
+                         const Vec3f& d_color, const GradientView& gradient, int lane) {
   for (int end = count; end > 0; end -= 32) {
     const int mine = end - 1 - lane;
     float a = 1, d_sigma = 0;
@@ -118,30 +111,9 @@ __device__ void WalkBack(const DeviceGridView& grid, const LaneValues<kBasis>& v
       d_raw = {raw_tau.x > 0 ? w * d_color.x : 0.0f, raw_tau.y > 0 ? w * d_color.y : 0.0f,
                raw_tau.z > 0 ? w * d_color.z : 0.0f};
     }
-    float chain_a = a;
-    Vec3f chain_b = b;
-#pragma unroll
-    for (int d = 1; d < 32; d *= 2) {
-      const float other_a = __shfl_up_sync(kAllLanes, chain_a, d);
-      Vec3f other_b;
-      for (int c = 0; c < 3; ++c) other_b[c] = __shfl_up_sync(kAllLanes, chain_b[c], d);
-      if (lane >= d) {
-        chain_b += other_b * chain_a;
-        chain_a *= other_a;
-      }
-    }
-    // R behind this lane's sample: the chain of the lanes before it (the samples behind it).
-    float up_a = __shfl_up_sync(kAllLanes, chain_a, 1);
-    Vec3f up_b;
-    for (int c = 0; c < 3; ++c) up_b[c] = __shfl_up_sync(kAllLanes, chain_b[c], 1);
-    if (lane == 0) up_a = 1, up_b = {};
-    const Vec3f seen_behind = up_b + behind * up_a;
+    const Vec3f seen_behind = SeenBehind(a, b, lane, &behind);
     if (mine >= 0 && tau < static_cast<float>(kMaxOpticalDepth))
       d_sigma = delta * before * a * Dot(color - seen_behind, d_color);
-    const float last_a = __shfl_sync(kAllLanes, chain_a, 31);
-    for (int c = 0; c < 3; ++c)
-      behind[c] = __shfl_sync(kAllLanes, chain_b[c], 31) + last_a * behind[c];
-
     ScatterChunk<kBasis, kExact>(grid, values, place, d_raw, d_sigma, min(32, end), gradient,
                                  lane);
     __syncwarp();
@@ -152,6 +124,7 @@ template <int kBasis, bool kExact>
 __global__ void FitRaysKernel(DeviceGridView grid, const Ray* rays, const Vec3f* targets, int n,
                               MarchOptions options, float scale, GradientView gradient,
                               float* store_memory, int64_t capacity, int32_t* next_ray,
+                              const Vec3f* behind_rays, Vec3f* d_behind_rays,
                               DeviceFitSums* sums) {
   using Layout = RecordLayout<kBasis>;
   const int lane = static_cast<int>(threadIdx.x & 31);
@@ -202,14 +175,17 @@ __global__ void FitRaysKernel(DeviceGridView grid, const Ray* rays, const Vec3f*
     }
     if (count > shaded) shade();
     const float left = expf(-march.optical_depth());
+    const bool sees_layers = behind_rays != nullptr && left >= options.stop_transmittance;
+    const Vec3f behind = sees_layers ? behind_rays[r] : grid.background;
     Vec3f error;
-    for (int c = 0; c < 3; ++c)
-      error[c] = WarpSum(color[c]) + grid.background[c] * left - targets[r][c];
+    for (int c = 0; c < 3; ++c) error[c] = WarpSum(color[c]) + behind[c] * left - targets[r][c];
+    if (d_behind_rays != nullptr && lane == 0)
+      d_behind_rays[r] = error * (sees_layers ? 2 * scale * left : 0.0f);
     squared_error += static_cast<double>(Dot(error, error));
     samples += static_cast<unsigned>(count);
     __syncwarp();  // colours were written by some lanes and are read by others now
-    WalkBack<kBasis, kExact>(grid, values, store, count, march.delta(), error * (2 * scale),
-                             gradient, lane);
+    WalkBack<kBasis, kExact>(grid, values, store, count, march.delta(), behind,
+                             error * (2 * scale), gradient, lane);
   }
   if (lane == 0) {
     atomicAdd(&sums->squared_error, squared_error);
@@ -240,13 +216,24 @@ void DeviceRayFitter::Accumulate(const DeviceGrid& grid, const Ray* rays, const 
   next_ray_.Zero();
   REGRADE_CHECK(grid.fitting);
   const GradientView view{grid.gradient(), touched->bits.data()};
+  const bool spheres = grid.spheres.on();
+  if (spheres) {
+    if (behind_.size() < n) {
+      behind_ = DeviceBuffer<Vec3f>(n, "what rays see behind the box");
+      d_behind_ = DeviceBuffer<Vec3f>(n, "gradients of what is behind the box");
+    }
+    SeeSpheres(grid, rays, n, options_, behind_.data());
+  }
   ByBasis(grid.basis, grid.exact_sums, [&](auto basis, auto exact) {
     FitRaysKernel<basis.value, exact.value>
         <<<static_cast<unsigned>(warps_ / kWarpsPerBlock), 32 * kWarpsPerBlock>>>(
             grid.view(), rays, targets, static_cast<int>(n), options_, scale, view,
-            store_.data(), capacity_, next_ray_.data(), sums_.data());
+            store_.data(), capacity_, next_ray_.data(), spheres ? behind_.data() : nullptr,
+            spheres ? d_behind_.data() : nullptr, sums_.data());
   });
   CheckLaunch("fit_rays");
+  if (spheres)
+    SeeSpheresAdjoint(grid, rays, d_behind_.data(), n, options_, touched, sums_.data());
 }
 
 DeviceFitSums DeviceRayFitter::TakeSums() {

@@ -18,11 +18,12 @@ DeviceGridView DeviceGrid::view() const {
       background,
       near_clip,
       {static_cast<float>(frame.resolution.x - 1), static_cast<float>(frame.resolution.y - 1),
-       static_cast<float>(frame.resolution.z - 1)}};
+       static_cast<float>(frame.resolution.z - 1)},
+      spheres.view()};
 }
 
 DeviceGrid UploadGrid(const FastGrid& grid, bool fitting, const Buffer<float>& second_moment,
-                      bool exact_sums) {
+                      bool exact_sums, const Buffer<float>& sphere_moment) {
   DeviceGrid device;
   device.frame = grid.frame;
   device.basis = grid.basis;
@@ -39,6 +40,7 @@ DeviceGrid UploadGrid(const FastGrid& grid, bool fitting, const Buffer<float>& s
   if (fitting && second_moment.size() == grid.records.size())
     DeviceCopyRows(device.second_moment(), pitch, second_moment.data(), row, row, n);
   RefreshDerived(&device, grid.num_voxels());
+  device.spheres = UploadSpheres(grid.spheres, fitting, sphere_moment, exact_sums);
   return device;
 }
 
@@ -79,6 +81,7 @@ FastGrid DownloadGrid(const DeviceGrid& device) {
   grid.links = device.links.ToHost();
   grid.records = DownloadRows(device, device.records.data());
   RefreshDerived(&grid);
+  grid.spheres = DownloadSpheres(device.spheres);
   return grid;
 }
 

@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "kernels/base/device_memory.h"
+#include "kernels/field/device/device_spheres.h"
 #include "kernels/field/fast_rays.h"
 
 namespace regrade {
@@ -23,6 +24,10 @@ struct DeviceGridView {
   Vec3f background{};
   float near_clip = 0;
   Vec3f last{};  // the frame's resolution less 1
+  DeviceSpheresView spheres;
+
+  // Points are the voxels, and from the next multiple of 32 on the texels of the background.
+  HD int32_t first_texel() const { return (num_voxels + 31) / 32 * 32; }
 };
 
 struct DeviceGrid {
@@ -41,10 +46,16 @@ struct DeviceGrid {
   int basis = 9;
   Vec3f background{0, 0, 0};
   float near_clip = 0;
+  DeviceSpheres spheres;
 
   int lanes() const { return RecordLanes(basis); }
   int stride() const { return (!fitting ? 1 : exact_sums ? 4 : 3) * lanes(); }
   int64_t num_voxels() const { return vertex_of_voxel.size(); }
+  // See DeviceGridView.
+  int64_t first_texel() const { return (num_voxels() + 31) / 32 * 32; }
+  int64_t num_points() const {
+    return spheres.on() ? first_texel() + spheres.num_texels() : num_voxels();
+  }
   DeviceGridView view() const;
   // Where gradients and moments begin, with the same stride; only of a field that is being
   // fitted.
@@ -52,9 +63,10 @@ struct DeviceGrid {
   float* second_moment() const { return records.data() + (stride() - lanes()); }
 };
 
-// `second_moment` [N, lanes], or empty for zeros.
+// `second_moment` [N, lanes], or empty for zeros; `sphere_moment` as the layers' texels.
 DeviceGrid UploadGrid(const FastGrid& grid, bool fitting = false,
-                      const Buffer<float>& second_moment = {}, bool exact_sums = false);
+                      const Buffer<float>& second_moment = {}, bool exact_sums = false,
+                      const Buffer<float>& sphere_moment = {});
 // Gradients [N, lanes] of a grid that is being fitted.
 Buffer<float> DownloadGradient(const DeviceGrid& grid);
 Buffer<float> DownloadSecondMoment(const DeviceGrid& grid);
@@ -67,7 +79,7 @@ void RefreshDerived(DeviceGrid* grid, int64_t num_voxels);
 // Prunes and resamples as Resample in resample_grid.h does: a new vertex is kept if the old
 // vertex nearest to it, or one of that one's 26 neighbours, weighs at least `threshold`.
 // weights [N]. Gradients and moments of a field that is being fitted become 0. Returns an empty
-// grid (no voxels) if nothing is left.
+// grid (no voxels) if nothing is left. Background layers stay with `grid`.
 DeviceGrid ResampleOnDevice(const DeviceGrid& grid, const DeviceBuffer<float>& weights,
                             float threshold, const Vec3i& resolution);
 

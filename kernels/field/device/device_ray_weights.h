@@ -11,8 +11,9 @@
 
 namespace regrade {
 
+// As WeightedSample.
 struct DeviceWeightedSample {
-  int32_t vertex;  // lowest corner of the cell
+  int32_t vertex;  // lowest corner of the cell; negative on a background sphere
   Vec3f fraction;
   float weight;
   int32_t ray;
@@ -37,10 +38,10 @@ struct DeviceRayWeights {
               float min_weight, DeviceTouched* touched);
 };
 
-// Touched voxels in a dense list, near each other where the voxels are.
+// Touched points (see DeviceGridView) in a dense list, near each other where the voxels are.
 struct DeviceSlots {
-  DeviceBuffer<int32_t> slot_of_voxel;  // [N]; only touched voxels' entries mean anything
-  DeviceBuffer<int32_t> voxel_of_slot;  // [N], the first num_slots of it
+  DeviceBuffer<int32_t> slot_of_point;  // only touched points' entries mean anything
+  DeviceBuffer<int32_t> point_of_slot;  // the first num_slots of it
   DeviceBuffer<int32_t> counter;
   int64_t num_slots = 0;
 

@@ -49,19 +49,20 @@ struct DeviceFitSums {
   unsigned long long rejected_voxels = 0;
 };
 
-// Which voxels' gradients may differ from 0: bit v % 32 of word v / 32 for voxel v. Bits are
-// walked in the voxels' order; a list in the order of touching made the step half as slow
-// again.
+// Which points' gradients may differ from 0: bit p % 32 of word p / 32 for point p (see
+// DeviceGridView). Bits are walked in the voxels' order; a list in the order of touching made
+// the step half as slow again.
 struct DeviceTouched {
   DeviceTouched() = default;
   explicit DeviceTouched(const DeviceGrid& grid);
   void MarkAll();
-  int64_t num_voxels = 0;
+  int64_t num_voxels = 0, num_points = 0;
   DeviceBuffer<uint32_t> bits;
 };
 
 // Forward, loss and adjoint of a batch on a grid that is being fitted: adds the gradient of
-// scale * sum (C - target)^2. Float sums in no fixed order: two runs differ in the last bits.
+// scale * sum (C - target)^2, of background layers, too (see device_sphere_rays.h). Float sums
+// in no fixed order: two runs differ in the last bits.
 class DeviceRayFitter {
  public:
   // Keeps every sample of the rays in flight; `max_bytes` bounds that store.
@@ -78,6 +79,7 @@ class DeviceRayFitter {
   DeviceBuffer<float> store_;
   DeviceBuffer<int32_t> next_ray_;
   DeviceBuffer<DeviceFitSums> sums_;
+  DeviceBuffer<Vec3f> behind_, d_behind_;  // of rays; nothing where a field has no layers
 };
 
 // weights [N] hold running maxima of w_i over the samples whose cell has the voxel as a corner.

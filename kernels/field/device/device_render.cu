@@ -5,6 +5,7 @@
 #include "kernels/field/device/device_rays.h"
 #include "kernels/field/device/launch.h"
 #include "kernels/field/device/ray_shaders.h"
+#include "kernels/field/device/warp_layers.h"
 #include "kernels/field/finish_pixel.h"
 #include "kernels/scene/pinhole_rays.h"
 
@@ -90,10 +91,10 @@ struct ListedRays {
   const Ray* rays;
   int64_t n;
 
-  // The block's i-th ray, and where its results go; false past the last.
-  __device__ bool Get(int i, Ray* ray, int64_t* place) const {
-    *place = blockIdx.x * int64_t{kRays} + i;
-    if (*place >= n) return false;
+  // The index-th ray, and where its results go; false past the last.
+  __device__ bool Get(int64_t index, Ray* ray, int64_t* place) const {
+    *place = index;
+    if (index >= n) return false;
     *ray = rays[*place];
     return true;
   }
@@ -109,8 +110,7 @@ struct FrameRays {
   FinishPixel finish;
 
   HD int Columns() const { return (camera.width + kTile - 1) / kTile; }
-  __device__ bool Get(int i, Ray* ray, int64_t* place) const {
-    const int64_t index = blockIdx.x * int64_t{kRays} + i;
+  __device__ bool Get(int64_t index, Ray* ray, int64_t* place) const {
     const int tile = static_cast<int>(index / kPixels);
     int x = tile % Columns() * kTile, y = tile / Columns() * kTile;
 #pragma unroll
@@ -201,16 +201,17 @@ __device__ RaySums FollowRay(const View& grid, const PreparedRay& prepared,
 template <typename Shader, int kBasis, typename View, typename Rays>
 __global__ void __launch_bounds__(32 * kWarps, 5)
     RenderRaysKernel(View grid, Rays rays, MarchOptions options, float opacity_step,
-                     DeviceRenderTarget target) {
+                     DeviceRenderTarget target, bool finish) {
   __shared__ PreparedRay prepared[kRays];
   __shared__ RaySums sums[kRays];
   __shared__ WaitingSamples waiting[kWarps];
   const int thread = static_cast<int>(threadIdx.x), warp = thread / 32;
+  const int64_t index = blockIdx.x * int64_t{kRays} + thread;
   Ray ray;
   int64_t place;
   if (thread < kRays) {
     PreparedRay mine{};
-    if (rays.Get(thread, &ray, &place)) {
+    if (rays.Get(index, &ray, &place)) {
       mine.ray = ClipToGrid(grid.frame, ray, grid.near_clip, options.step);
       ShBasis(kBasis, ray.direction, mine.basis);
     }
@@ -223,12 +224,41 @@ __global__ void __launch_bounds__(32 * kWarps, 5)
     if (thread % 32 == 0) sums[i] = result;
   }
   __syncthreads();
-  if (thread >= kRays || !rays.Get(thread, &ray, &place)) return;
+  if (thread >= kRays || !rays.Get(index, &ray, &place)) return;
   RaySums mine = sums[thread];
-  rays.Finish(ray, mine.transmittance, &mine.color, &mine.depth);
+  if (finish) rays.Finish(ray, mine.transmittance, &mine.color, &mine.depth);
   target.color[place] = mine.color;
   target.depth[place] = mine.depth;
   target.transmittance[place] = mine.transmittance;
+}
+
+// Goes on behind the box, where a field has layers there; a warp a ray.
+template <typename Rays>
+__global__ void RenderSpheresKernel(DeviceGridView grid, Rays rays, float stop,
+                                    DeviceRenderTarget target) {
+  Ray ray;
+  int64_t place;
+  if (!rays.Get((blockIdx.x * int64_t{blockDim.x} + threadIdx.x) / 32, &ray, &place)) return;
+  WarpLayers layers(grid, ray, target.transmittance[place], stop);
+  LaneLayer mine;
+  unsigned composited;
+  Vec3f color{};
+  float depth = 0;
+  while (layers.Next(&mine, &composited)) {
+    if (!(mine.tau > 0)) continue;
+    const float w = mine.Weight();
+    color += mine.Color() * w;
+    depth += w * mine.depth;
+  }
+  for (int c = 0; c < 3; ++c) color[c] = WarpSum(color[c]);
+  depth = target.depth[place] + WarpSum(depth);
+  if (layers.lane() != 0) return;
+  const float left = layers.left();
+  color += target.color[place] + grid.background * left;
+  rays.Finish(ray, left, &color, &depth);
+  target.color[place] = color;
+  target.depth[place] = depth;
+  target.transmittance[place] = left;
 }
 
 template <typename Rays>
@@ -237,16 +267,29 @@ void RenderBlocks(const DeviceGrid& grid, const HalfGrid* half, const Rays& rays
                   const DeviceRenderTarget& target) {
   const auto blocks = static_cast<unsigned>(rays.Blocks());
   if (blocks == 0) return;
+  const bool finish = !grid.spheres.on();
+  const auto render = [&](auto view, auto launch) {
+    if (!finish) view.background = {};  // the layers come first
+    launch(view);
+    CheckLaunch("render_rays");
+  };
   if (half != nullptr && !half->empty()) {
-    RenderRaysKernel<HalfShader, 9>
-        <<<blocks, 32 * kWarps>>>(half->view(grid), rays, options, opacity_step, target);
+    render(half->view(grid), [&](const HalfGridView& view) {
+      RenderRaysKernel<HalfShader, 9>
+          <<<blocks, 32 * kWarps>>>(view, rays, options, opacity_step, target, finish);
+    });
   } else {
     ByBasis(grid.basis, [&](auto basis) {
-      RenderRaysKernel<FloatShader<basis.value>, basis.value>
-          <<<blocks, 32 * kWarps>>>(grid.view(), rays, options, opacity_step, target);
+      render(grid.view(), [&](const DeviceGridView& view) {
+        RenderRaysKernel<FloatShader<basis.value>, basis.value>
+            <<<blocks, 32 * kWarps>>>(view, rays, options, opacity_step, target, finish);
+      });
     });
   }
-  CheckLaunch("render_rays");
+  if (finish) return;
+  RenderSpheresKernel<<<BlocksFor(int64_t{32} * kRays * blocks), kThreads>>>(
+      grid.view(), rays, options.stop_transmittance, target);
+  CheckLaunch("render_spheres");
 }
 
 }  // namespace

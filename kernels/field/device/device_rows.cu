@@ -1,5 +1,6 @@
 #include "kernels/base/device_stream.h"
 #include "kernels/base/launch_size.h"
+#include "kernels/field/background_spheres.h"
 #include "kernels/field/device/device_rows.h"
 #include "kernels/field/device/warp_item.h"
 
@@ -9,16 +10,27 @@ namespace regrade {
 
 namespace {
 
-// A warp a voxel.
-__global__ void GatherRowsKernel(DeviceGridView grid, int basis, const int32_t* voxels,
+// A warp a point; see FillFeatures and FillTexelFeatures.
+__global__ void GatherRowsKernel(DeviceGridView grid, int basis, const int32_t* points,
                                  int64_t first, int64_t n, const int32_t* counted,
                                  float position_scale, float* rows) {
   const int64_t i = ItemOfWarp(n, counted);
   if (i < 0) return;
   const int lane = static_cast<int>(threadIdx.x & 31);
-  const int64_t voxel = voxels != nullptr ? voxels[i] : first + i;
+  const int64_t voxel = points != nullptr ? points[i] : first + i;
   float value = 0;
-  if (lane < 27) {
+  if (voxel >= grid.num_voxels) {
+    const DeviceSpheresView& spheres = grid.spheres;
+    const int64_t texel = voxel - grid.first_texel();
+    if (lane < 27 && lane % 9 == 0) {
+      value = spheres.texels[4 * texel + lane / 9];
+    } else if (lane >= 27 && lane < 30) {
+      const int at = spheres.place_of_column[texel / spheres.layers];
+      value =
+          position_scale * TexelDirection<float>(spheres.resolution, at / spheres.resolution,
+                                                 at % spheres.resolution)[lane - 27];
+    }
+  } else if (lane < 27) {
     if (lane % 9 < basis)
       value = grid.records[voxel * grid.stride + lane / 9 * basis + lane % 9];
   } else if (lane < 30) {
@@ -52,18 +64,24 @@ __global__ void ScatterRowsKernel(const float* rows, int64_t first, int64_t n, i
   const int64_t i = ItemOfWarp(n, nullptr);
   if (i < 0) return;
   const int lane = static_cast<int>(threadIdx.x & 31);
-  if (lane < 27 && lane % 9 < basis)
-    grid.records[(first + i) * grid.stride + lane / 9 * basis + lane % 9] =
-        rows[i * kRowLanes + lane];
+  const int64_t voxel = first + i;
+  if (lane >= 27) return;
+  const float value = rows[i * kRowLanes + lane];
+  if (voxel < grid.num_voxels) {
+    if (lane % 9 < basis)
+      grid.records[voxel * grid.stride + lane / 9 * basis + lane % 9] = value;
+  } else if (lane % 9 == 0) {
+    grid.spheres.texels[4 * (voxel - grid.first_texel()) + lane / 9] = value;
+  }
 }
 
 }  // namespace
 
-void GatherRows(const DeviceGrid& grid, const int32_t* voxels, int64_t first, int64_t n,
+void GatherRows(const DeviceGrid& grid, const int32_t* points, int64_t first, int64_t n,
                 float position_scale, float* rows, const int32_t* counted) {
   if (n == 0) return;
   GatherRowsKernel<<<BlocksFor(32 * n), kThreads, 0, LaunchStream()>>>(
-      grid.view(), grid.basis, voxels, first, n, counted, position_scale, rows);
+      grid.view(), grid.basis, points, first, n, counted, position_scale, rows);
   CheckLaunch("gather_rows");
 }
 

@@ -208,7 +208,7 @@ void AddTotalVariation(const DeviceGrid& grid, int64_t begin, int64_t count,
 void StepOnDevice(DeviceGrid* grid, DeviceTouched* touched, const RmspropOptions& options,
                   DeviceFitSums* sums) {
   REGRADE_CHECK(grid->fitting);
-  const int64_t words = touched->bits.size();
+  const int64_t words = grid->first_texel() / 32;
   ByBasis(grid->basis, grid->exact_sums, [&](auto basis, auto exact) {
     StepKernel<basis.value, exact.value>
         <<<std::min(BlocksFor(32 * words), 1u << 16), kThreads>>>(

@@ -1,8 +1,10 @@
-// What kernels see of a gradient: its rows have the grid's stride.
+// What kernels see of a gradient: a voxel's rows have the grid's stride, a texel's four values.
 #pragma once
 
 #include <cmath>
 #include <cstdint>
+
+#include "kernels/field/device/device_rays.h"
 
 namespace regrade {
 
@@ -11,16 +13,21 @@ namespace regrade {
 inline constexpr float kExactUnit = 0x1p-44f;
 inline constexpr long long kNotFinite = 1ll << 62;
 
+struct GradientView {
+  float* gradient;
+  uint32_t* touched;
+};
+
+// Of the background's layers, of a field that is being fitted.
+inline GradientView TexelGradient(const DeviceGrid& grid, DeviceTouched* touched) {
+  return {grid.spheres.gradient.data(), touched->bits.data() + grid.first_texel() / 32};
+}
+
 }  // namespace regrade
 
 #if defined(__CUDACC__)
 
 namespace regrade {
-
-struct GradientView {
-  float* gradient;
-  uint32_t* touched;
-};
 
 __device__ inline void AddExact(float* gradient, int value, float v) {
   auto* const sum = reinterpret_cast<unsigned long long*>(gradient) + value;
@@ -40,6 +47,32 @@ __device__ inline void Touch(uint32_t* touched, int32_t voxel) {
   uint32_t* word = touched + (voxel >> 5);
   const uint32_t bit = 1u << (voxel & 31);
   if ((*word & bit) == 0) atomicOr(word, bit);  // most have been marked by another ray already
+}
+
+__device__ inline void AddQuad(float* target, const float4& v) {
+#if __CUDA_ARCH__ >= 900
+  atomicAdd(reinterpret_cast<float4*>(target), v);
+#else
+  atomicAdd(target, v.x);
+  atomicAdd(target + 1, v.y);
+  atomicAdd(target + 2, v.z);
+  atomicAdd(target + 3, v.w);
+#endif
+}
+
+// Adds to a texel's four values and marks it.
+template <bool kExact>
+__device__ void AddTexel(const GradientView& gradient, int32_t texel, const float4& v) {
+  if constexpr (kExact) {
+    float* const row = gradient.gradient + int64_t{texel} * 8;
+    AddExact(row, 0, v.x);
+    AddExact(row, 1, v.y);
+    AddExact(row, 2, v.z);
+    AddExact(row, 3, v.w);
+  } else {
+    AddQuad(gradient.gradient + int64_t{texel} * 4, v);
+  }
+  Touch(gradient.touched, texel);
 }
 
 }  // namespace regrade
