@@ -44,17 +44,26 @@ void CheckSize(const Image& frame, const Image& other, const std::string& what, 
 FidelityRow MeasureFidelity(const NamedFrameSource& sequence, const FidelityTargets& targets,
                             const ProgressFunction& progress) {
   CheckCount(sequence, targets.views_2d, "the 2D method's");
+  CheckCount(sequence, targets.unstyled, "the unstyled");
   CheckCount(sequence, targets.transmittance, "transmittance");
   HueChroma hues, hues_2d;
   ColourSlices colours, style;
-  double sum_db = 0, sum_lpips = 0;
-  int compared = 0;
+  double sum_db = 0, sum_lpips = 0, sum_structure = 0;
+  int compared = 0, with_edges = 0;
   int finite = 0, perfect = 0;
   const int count = sequence.frames.count;
   for (int i = 0; i < count; ++i) {
     const Image frame = Clipped(sequence.frames.frame(i));
     hues.Add(frame);
     if (targets.style != nullptr) colours.Add(frame);
+    if (targets.unstyled.count > 0) {
+      const Image unstyled = Clipped(targets.unstyled.frame(i));
+      CheckSize(frame, unstyled, "the unstyled version", i, sequence);
+      if (const std::optional<double> correlation = GradientCorrelation(frame, unstyled)) {
+        sum_structure += *correlation;
+        ++with_edges;
+      }
+    }
     if (targets.views_2d.count > 0) {
       const Image target = Clipped(targets.views_2d.frame(i));
       CheckSize(frame, target, "the 2D method's version", i, sequence);
@@ -89,6 +98,7 @@ FidelityRow MeasureFidelity(const NamedFrameSource& sequence, const FidelityTarg
   else if (perfect > 0)
     row.psnr_to_2d_db = std::numeric_limits<double>::infinity();
   if (compared > 0) row.lpips_to_2d = sum_lpips / compared;
+  if (with_edges > 0) row.structure = sum_structure / with_edges;
   row.hue_std = hues.HueStd();
   row.chroma = hues.MeanChroma();
   row.hue_std_2d = hues_2d.HueStd();

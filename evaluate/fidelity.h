@@ -22,6 +22,10 @@ struct FidelityRow {
   // that was given; 0 for the same pictures.
   std::optional<double> lpips_to_2d;
 
+  // Mean over frames of GradientCorrelation with the unstyled frame: 1 where edges are where
+  // they were and none came to them, as noise does.
+  std::optional<double> structure;
+
   // Circular standard deviation of the CIELAB hue weighted by chroma (radians), and mean chroma
   // (CIELAB units), over all pixels of all frames: see kernels/image/hue_chroma.h. hue_std is
   // empty for grey.
@@ -39,6 +43,7 @@ struct FidelityTargets {
                                  // out of psnr_to_2d_db
   const Image* style = nullptr;  // the style picture
   std::function<double(const Image&, const Image&)> perceptual;  // see PairNetwork::Distance
+  FrameSource unstyled = {};  // what was styled, frame for frame
 };
 
 // Errors (kInput): counts or sizes that differ. One frame of each source is held at a time.

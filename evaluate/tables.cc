@@ -76,11 +76,16 @@ std::string FidelityTable(const ConsistencyReport& consistency,
     return f.lpips_to_2d.has_value();
   });
   if (lpips) rows[0].push_back("LPIPS to 2D");
+  const bool structure =
+      std::any_of(fidelity.begin(), fidelity.end(),
+                  [](const FidelityRow& f) { return f.structure.has_value(); });
+  if (structure) rows[0].push_back("structure");
   for (const FidelityRow& row : fidelity) {
     rows.push_back({row.sequence, Number(row.psnr_to_2d_db, 2), Number(row.hue_std, 3),
                     Number(row.hue_std_2d, 3), Number(row.chroma, 2), Number(row.chroma_2d, 2),
                     Number(row.sliced_wasserstein_to_style, 4)});
     if (lpips) rows.back().push_back(Number(row.lpips_to_2d, 4));
+    if (structure) rows.back().push_back(Number(row.structure, 3));
   }
   std::string remarks;
   std::vector<std::string> seen;
@@ -92,6 +97,7 @@ std::string FidelityTable(const ConsistencyReport& consistency,
       continue;
     rows.push_back({row.sequence, "-", "-", "-", "-", "-", "-"});
     if (lpips) rows.back().push_back("-");
+    if (structure) rows.back().push_back("-");
     remarks +=
         row.sequence +
         ": fidelity was not measured, so its consistency may be bought with its colours; "

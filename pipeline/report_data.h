@@ -159,6 +159,7 @@ struct FidelityFigures {
   Figure chroma, chroma_2d;    // CIELAB
   Figure sliced_wasserstein_to_style;
   std::optional<double> lpips_to_2d;  // where a network was given
+  std::optional<double> structure;    // where the unstyled frames are known
 };
 
 // What one value of a knob costs and buys, measured on this machine. Rows of one plane compare

@@ -186,6 +186,7 @@ JsonValue FidelityJson(const FidelityFigures& row) {
   Object object{{"sequence", row.sequence}};
   Put(object, "psnr_to_2d_db", row.psnr_to_2d_db);
   if (row.lpips_to_2d) object.emplace_back("lpips_to_2d", *row.lpips_to_2d);
+  if (row.structure) object.emplace_back("structure", *row.structure);
   Put(object, "hue_std", row.hue_std);
   Put(object, "hue_std_2d", row.hue_std_2d);
   Put(object, "chroma", row.chroma);

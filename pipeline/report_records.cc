@@ -106,6 +106,7 @@ FidelityFigures FidelityOf(const JsonValue& row) {
   figures.sequence = row.At("sequence").AsString();
   figures.psnr_to_2d_db = FigureOf(row, "psnr_to_2d_db");
   if (const JsonValue* lpips = row.Find("lpips_to_2d")) figures.lpips_to_2d = lpips->AsDouble();
+  if (const JsonValue* s = row.Find("structure")) figures.structure = s->AsDouble();
   figures.hue_std = FigureOf(row, "hue_std");
   figures.hue_std_2d = FigureOf(row, "hue_std_2d");
   figures.chroma = FigureOf(row, "chroma");
@@ -174,6 +175,7 @@ JsonValue EvaluationRecord(const ConsistencyReport& consistency,
     JsonValue entry = JsonValue::Object{{"sequence", row.sequence}};
     Put(&entry, "psnr_to_2d_db", row.psnr_to_2d_db, "");
     if (row.lpips_to_2d) entry["lpips_to_2d"] = *row.lpips_to_2d;
+    if (row.structure) entry["structure"] = *row.structure;
     Put(&entry, "hue_std", row.hue_std, "");
     Put(&entry, "hue_std_2d", row.hue_std_2d, "");
     Put(&entry, "chroma", row.chroma, "");

@@ -244,6 +244,8 @@ std::string ConsistencyHtml(const RunReport& report) {
         std::string near_2d = FigureHtml(fidelity->psnr_to_2d_db, 2);
         if (fidelity->lpips_to_2d)
           near_2d += "<br>LPIPS " + FigureHtml(*fidelity->lpips_to_2d, 3);
+        if (fidelity->structure)
+          near_2d += "<br>structure " + FigureHtml(*fidelity->structure, 3);
         body += Across(near_2d, n, "n beside") +
                 Across(WithTarget(fidelity->hue_std, fidelity->hue_std_2d, 3), n, "n") +
                 Across(WithTarget(fidelity->chroma, fidelity->chroma_2d, 1), n, "n") +
@@ -269,8 +271,10 @@ std::string ConsistencyHtml(const RunReport& report) {
          "along the motion between them, and how much of the 2D method's colour is still "
          "there.</p>" +
          Table(head, body) + "<p class=note>" + meanings +
-         ". In brackets: the 2D method's own figure. 95 %: block bootstrap over pairs, 1000 "
-         "resamples, runs as long as the gap because such pairs overlap.</p>" +
+         ". In brackets: the 2D method's own figure. Structure: correlation of "
+         "edges with the unstyled frames', 1 where none moved and no noise came. 95 %: block "
+         "bootstrap over pairs, 1000 resamples, runs as long as the gap because such pairs "
+         "overlap.</p>" +
          ConsistencyChartHtml(report);
 }
 

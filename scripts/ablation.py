@@ -1,14 +1,16 @@
 #!/usr/bin/env python3
 """Restyles a finished output folder with LipRF's parts taken out one at a time, and tabulates what each was worth.
 
-  ablation.py REGRADE DIR --work FOLDER [--style PICTURE] [--steps N] [--recipes paper,standard] [--only NAME,...] [-- FLAGS...]
+  ablation.py REGRADE DIR --work FOLDER [--readings] [--style PICTURE] [--steps N] [--recipes paper,standard]
+              [--only NAME ...] [-- FLAGS...]
 
 DIR is left alone: the reconstruction is copied to FOLDER/NAME for each variant, and `regrade stylize` runs there; a
-variant that is finished is not done again. Printed is a table in Markdown; FOLDER/ablation.json holds the figures and
+variant that is finished is not done again. Printed is a table in Markdown, which is FOLDER/ablation.md, too; FOLDER/ablation.json holds the figures and
 FOLDER/bound.svg the Lipschitz bound over the steps, one line a variant, on a logarithmic scale.
 
 Variants are of LipRF's Sec. 5.3: the activation, without K_est, without regularisation, with spectral normalisation
-to 1. They are taken of each recipe; what a variant trades is in `regrade stylize --help`.
+to 1. They are taken of each recipe; what a variant trades is in `regrade stylize --help`. With --readings they are the
+readings of the paper's text instead: what its B counts, and steps, rates, starts and seeds.
 """
 
 import argparse
@@ -28,6 +30,19 @@ VARIANTS = (
     ("without K_est", ("--style-no-k-est",)),
     ("without regularisation", ("--style-no-regularisation",)),
     ("spectral normalisation", ("--style-spectral-normalisation",)),
+)
+# How the paper's text can be read, and what it leaves open.
+READINGS = (
+    ("as it is", ()),
+    ("B counts voxels", ("--style-loss", "sum-over-voxels")),
+    ("1000 steps", ("--style-steps", "1000")),
+    ("B counts voxels, 1000 steps", ("--style-loss", "sum-over-voxels", "--style-steps", "1000")),
+    ("rate 3e-3, 1000 steps", ("--style-rate", "3e-3", "--style-rate-last", "3e-5", "--style-steps", "1000")),
+    ("starts orthogonal", ("--style-start", "orthogonal")),
+    ("starts at the identity", ("--style-start", "identity")),
+    ("another seed", ("--seed", "1")),
+    ("a third seed", ("--seed", "2")),
+    ("starts at the colour map", ("--style-base", "best")),
 )
 KEPT = ("poses", "field.npz", "run.json", ".regrade")
 STAGES_KEPT = ("pose.json", "reconstruct.json")
@@ -57,6 +72,8 @@ def figures_of(folder):
     faith = next(row for row in report["fidelity"] if row["sequence"] == "styled")
     return {
         "psnr_to_2d_db": stylize["psnr_to_2d_db"],
+        "psnr_to_2d_photos_db": stylize.get("psnr_to_2d_photos_db"),
+        "linear_map_psnr_to_2d_db": stylize.get("linear_map_psnr_to_2d_db"),
         "tc": [steady[gap] for gap in sorted(steady)],
         "gaps": sorted(steady),
         "bound": stylize["bound"],
@@ -82,11 +99,11 @@ def ratio(value, whole):
 
 def table(rows):
     gaps = rows[0][2]["gaps"]
-    head = ["recipe", "variant", "styled to 2D, dB"] + [f"TC-PSNR gap {gap}, dB" for gap in gaps]
+    head = ["recipe", "variant", "styled to 2D, dB", "to 2D of the photos, dB"] + [f"TC-PSNR gap {gap}, dB" for gap in gaps]
     head += ["bound", "steepest seen", "climbed to", "K_est", "hue spread kept", "chroma kept", "s"]
     lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
     for recipe, variant, f in rows:
-        cells = [recipe, variant, number(f["psnr_to_2d_db"])] + [number(tc) for tc in f["tc"]]
+        cells = [recipe, variant, number(f["psnr_to_2d_db"]), number(f["psnr_to_2d_photos_db"])] + [number(tc) for tc in f["tc"]]
         cells += [number(f["bound"]), number(f["slope"]), number(f["slope_ascent"]), number(f["k_est"])]
         cells += [ratio(f["hue_std"], f["hue_std_2d"]), ratio(f["chroma"], f["chroma_2d"]), number(f["seconds"], 0)]
         lines.append("| " + " | ".join(cells) + " |")
@@ -130,6 +147,18 @@ def curves(rows):
     return "".join(svg) + "</svg>\n"
 
 
+def keep(work, rows):
+    """Writes what is there so far, so that an end halfway costs the rest alone."""
+    with open(os.path.join(work, "ablation.json"), "w", encoding="utf-8") as file:
+        json.dump([{"recipe": r, "variant": v, **f} for r, v, f in rows], file, indent=1)
+    with open(os.path.join(work, "ablation.md"), "w", encoding="utf-8") as file:
+        file.write(table(rows) + "\n")
+    drawing = curves(rows)
+    if drawing:
+        with open(os.path.join(work, "bound.svg"), "w", encoding="utf-8") as file:
+            file.write(drawing)
+
+
 def main():
     words = sys.argv[1:]
     split = words.index("--") if "--" in words else len(words)
@@ -141,29 +170,32 @@ def main():
     parser.add_argument("--style", help="default: the one that DIR was styled with")
     parser.add_argument("--steps", type=int, help="of each training; default: the recipe's")
     parser.add_argument("--recipes", default="paper", help="paper, standard, or both with a comma between")
-    parser.add_argument("--only", help="names of variants with commas between")
+    parser.add_argument("--readings", action="store_true", help="readings of the paper's text for variants")
+    parser.add_argument("--only", action="append", help="the name of a variant; may be given more than once")
     options = parser.parse_args(own)
     for name in KEPT:
         if not os.path.exists(os.path.join(options.folder, name)):
             parser.error(f"{options.folder} has no {name}: make it with `regrade run`")
-    names = [name for name, _ in VARIANTS]
-    wanted = options.only.split(",") if options.only else names
+    variants = READINGS if options.readings else VARIANTS
+    names = [name for name, _ in variants]
+    wanted = options.only or names
     for name in wanted:
         if name not in names:
             parser.error(f"there is no variant '{name}'; there are: " + ", ".join(names))
     rows = []
     for recipe in options.recipes.split(","):
-        for name, flags in VARIANTS:
+        for name, flags in variants:
             if name not in wanted:
                 continue
-            folder = os.path.join(options.work, f"{recipe} {name}".replace(" ", "_"))
+            folder = os.path.join(options.work, f"{recipe} {name}".replace(" ", "_").replace(",", ""))
             if not os.path.exists(folder):
                 copy_reconstruction(options.folder, folder)
-            command = [options.regrade, "stylize", folder, "--recipe", recipe, "--path", "views", *flags, *extra]
+            command = [options.regrade, "stylize", folder, "--recipe", recipe, "--path", "views", *extra]
             if options.style:
                 command += ["--style", options.style]
             if options.steps:
                 command += ["--style-steps", str(options.steps)]
+            command += flags
             print(f"{recipe}, {name} ...", file=sys.stderr, flush=True)
             log = os.path.join(options.work, os.path.basename(folder) + ".log")
             with open(log, "w", encoding="utf-8") as file:
@@ -172,13 +204,9 @@ def main():
                 print(f"{recipe}, {name}: regrade ended with {status}, see {log}", file=sys.stderr)
                 return 1
             rows.append((recipe, name, figures_of(folder)))
+            keep(options.work, rows)
     print(table(rows))
-    with open(os.path.join(options.work, "ablation.json"), "w", encoding="utf-8") as file:
-        json.dump([{"recipe": r, "variant": v, **f} for r, v, f in rows], file, indent=1)
-    drawing = curves(rows)
-    if drawing:
-        with open(os.path.join(options.work, "bound.svg"), "w", encoding="utf-8") as file:
-            file.write(drawing)
+    if curves(rows):
         print(f"\nthe bound over the steps: {os.path.join(options.work, 'bound.svg')}")
     return 0
 

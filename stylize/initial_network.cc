@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kernels/base/error.h"
 #include "kernels/base/random.h"
 #include "kernels/field/spherical_harmonics.h"
 
@@ -48,6 +49,33 @@ void InitializeAsPyTorch(uint64_t seed, LipschitzNetwork* network) {
     const double range = 1 / std::sqrt(static_cast<double>(LipschitzNetwork::Inputs(l)));
     for (int64_t i = 0; i < size; ++i)
       network->weight(l)[i] = static_cast<float>(range * Uniform(seed, StreamOf(l, 0), i));
+  }
+  network->WarmUpNorms();
+  for (int l = 0; l < kNetworkLayers; ++l)
+    network->k(l) = static_cast<float>(network->NormEstimate(l));
+}
+
+void InitializeWithoutMap(const std::string& start, uint64_t seed, LipschitzNetwork* network) {
+  InitializeAsPyTorch(seed, network);
+  if (start == "pytorch") return;
+  REGRADE_CHECK(start == "orthogonal" || start == "identity");
+  constexpr float kSmallBias = 0.05f, kHalf = 0.5f;
+  for (int l = 0; l < kNetworkLayers; ++l) {
+    const int outputs = LipschitzNetwork::Outputs(l), inputs = LipschitzNetwork::Inputs(l);
+    const auto weight = [&](int o, int i) -> float& {
+      return network->weight(l)[static_cast<int64_t>(o) * inputs + i];
+    };
+    for (int o = 0; o < outputs; ++o) network->bias(l)[o] *= kSmallBias;
+    if (start == "orthogonal") {
+      const Eigen::MatrixXd w = RandomIsometry(outputs, inputs, seed, StreamOf(l, 0));
+      for (int o = 0; o < outputs; ++o)
+        for (int i = 0; i < inputs; ++i) weight(o, i) = static_cast<float>(w(o, i));
+      continue;
+    }
+    const int through = std::min({outputs, inputs, kNetworkInputs});
+    const float gain = l == 0 ? kHalf : l == kLast ? 1 / kHalf : 1;
+    for (int o = 0; o < through; ++o)
+      for (int i = 0; i < inputs; ++i) weight(o, i) = o == i ? gain : 0;
   }
   network->WarmUpNorms();
   for (int l = 0; l < kNetworkLayers; ++l)

@@ -1,8 +1,9 @@
-// Where learning the network starts: as PyTorch would, or at the colour map with a residual
-// that already explains part of what the map cannot.
+// Where learning the network starts: as PyTorch would, as others would without a map, or at the
+// colour map with a residual that already explains part of what the map cannot.
 #pragma once
 
 #include <cstdint>
+#include <string>
 
 #include "stylize/gradient_aggregation.h"
 #include "stylize/lipschitz_network.h"
@@ -12,6 +13,12 @@ namespace regrade {
 // PyTorch's nn.Linear: weights and biases uniform in +-1 / sqrt(inputs); K_i = ||W_i||_2, so
 // that A_i = W_i at the start.
 void InitializeAsPyTorch(uint64_t seed, LipschitzNetwork* network);
+
+// Without a colour map, "pytorch" as above, or to see what that costs: "orthogonal", layers
+// that are random isometries with small biases, or "identity", which halves the coefficients
+// and position, hands them through the first units and doubles the coefficients at the end: but
+// for the activations the colours that are there. The other units are PyTorch's.
+void InitializeWithoutMap(const std::string& start, uint64_t seed, LipschitzNetwork* network);
 
 // Hidden layers are isometries (random matrices made orthogonal), so that a bound is spent
 // evenly; the first layer's biases spread the units over the sine's whole period. The last

@@ -193,7 +193,7 @@ void Training::Start(int64_t bad_pixels) {
   data.sh_scale = options_.sh_scale;
   data.position_scale = options_.position_scale;
   if (options_.base == "none") {
-    InitializeAsPyTorch(options_.seed, &network_);
+    InitializeWithoutMap(options_.start, options_.seed, &network_);
   } else {
     data.base = ChooseBase();
     data.has_base = true;

@@ -30,6 +30,7 @@ struct TrainNetworkOptions {
   int patch = 8;
   float min_weight = 1e-3f;
   std::string base = "best";
+  std::string start = "pytorch";
   double bound_factor = 4;
   float sh_scale = 2;
   float position_scale = 8;
@@ -79,6 +80,11 @@ struct TrainNetworkOptions {
     bind("style-base", base,
          {.help = "the colour map that the network starts from",
           .choices = "best|mkl|least-squares|none"});
+    bind("style-start", start,
+         {.help = "ablation, with --style-base none: the weights that learning begins with; "
+                  "pytorch sends all voxels to almost one colour, orthogonal keeps them as far "
+                  "apart as they are, identity begins near the colours that are there",
+          .choices = "pytorch|orthogonal|identity"});
     bind("style-bound", bound_factor,
          {.help = "largest certified Lipschitz bound, in units of K_est; 0 sets no limit",
           .min = 0,

@@ -7,11 +7,13 @@
 #include "kernels/base/error.h"
 #include "kernels/field/fast_rays.h"
 #include "kernels/field/render.h"
+#include "kernels/field/widened.h"
 #include "kernels/image/color_statistics.h"
 #include "kernels/image/resize.h"
 #include "pipeline/capture_store.h"
 #include "pipeline/commands/command.h"
 #include "pipeline/contact_sheet.h"
+#include "pipeline/device_choice.h"
 #include "pipeline/field_file.h"
 #include "pipeline/files/image_file.h"
 #include "pipeline/photo_gains.h"
@@ -35,6 +37,7 @@ struct SheetOptions {
   int views = 3;
   int size = 320;
   int steps = 0;
+  std::string device = "auto";
   bool dry_run = false;
 
   template <typename Bind>
@@ -53,9 +56,12 @@ struct SheetOptions {
           .help = "of each network; 0 takes those of its recipe",
           .min = 0,
           .max = 1e6});
+    bind("device", device, {.help = "where networks learn", .choices = "auto|cpu|cuda"});
     bind("dry-run", dry_run, {.help = "say what would be done, and do nothing"});
   }
 };
+
+constexpr int kStyledBasis = 9;
 
 const std::vector<std::string> kColumns = {"photo", "2D method", "linear map", "paper recipe",
                                            "standard recipe"};
@@ -65,17 +71,19 @@ Image Clipped(Image image) {
   return image;
 }
 
-std::string PsnrCaption(const Image& a, const Image& b) {
+// What the 2D method makes of our renders is what a frame of the styled field should be; of
+// photos, where it knows these alone.
+std::string PsnrCaption(const Image& a, const Image& b, bool of_photos) {
   double sum = 0;
   int64_t count = 0;
   for (size_t i = 0; i < a.pixels.size(); ++i) {
     const double d = a.pixels[i] - b.pixels[i];
     if (std::isfinite(d)) sum += d * d, ++count;
   }
-  char text[48];
-  std::snprintf(text, sizeof text, "%.1f dB to 2D",
-                -10 * std::log10(std::max(
-                          sum / static_cast<double>(std::max<int64_t>(1, count)), 1e-12)));
+  char text[64];
+  const double mse = sum / static_cast<double>(std::max<int64_t>(1, count));
+  std::snprintf(text, sizeof text, "%.1f dB to 2D%s", -10 * std::log10(std::max(mse, 1e-12)),
+                of_photos ? " of photo" : "");
   return text;
 }
 
@@ -83,15 +91,19 @@ std::string PsnrCaption(const Image& a, const Image& b) {
 struct Scene {
   Capture capture;
   StoredField stored;
-  std::vector<int> taught, shown;  // views
-  std::vector<Camera> cameras;     // of all views
-  std::vector<Image> photos;       // of all views that are taught or shown
+  Backend backend = Backend::kCpu;  // where networks learn
+  std::vector<int> taught, shown;   // views
+  std::vector<Camera> cameras;      // of all views
+  std::vector<Image> photos;        // of all views that are taught or shown
 };
 
 Scene ReadScene(const Workspace& workspace, const SheetOptions& sheet, int holdout) {
   Scene scene;
   scene.capture = ReadCapture(workspace.Path("poses"));
   scene.stored = ReadFieldFile(workspace.Path("field.npz"));
+  // As a run does it: what differs from view to view needs directions.
+  scene.stored.field.appearance =
+      Widened(std::move(scene.stored.field.appearance), kStyledBasis);
   scene.taught = ViewIndices(scene.capture, holdout, false);
   if (scene.taught.empty()) scene.taught = ViewIndices(scene.capture, holdout, true);
   const int count = std::min(sheet.views, static_cast<int>(scene.taught.size()));
@@ -108,14 +120,14 @@ Scene ReadScene(const Workspace& workspace, const SheetOptions& sheet, int holdo
   return scene;
 }
 
-// Renders of the shown views.
+// Renders of the shown views, clipped as pictures are.
 std::vector<Image> Shown(const Scene& scene, const RadianceField& field) {
   const FastGrid grid = MakeFastGrid(field);
   std::vector<Image> frames;
   for (const int i : scene.shown)
-    frames.push_back(
+    frames.push_back(Clipped(
         RenderView(grid, scene.cameras[static_cast<size_t>(i)], MarchOptions{field.step})
-            .color);
+            .color));
   return frames;
 }
 
@@ -129,7 +141,11 @@ TrainNetworkResult Train(const Scene& scene, const RadianceField& field,
   if (steps > 0) options.steps = steps;
   TrainingHooks hooks;
   hooks.progress = progress;
-  return TrainNetwork(field, views, map, MarchOptions{scene.stored.field.step}, options, hooks);
+  const bool on_device = scene.backend == Backend::kCuda;
+  DeviceGrid grid;
+  if (on_device) grid = UploadGrid(MakeFastGrid(field));
+  return TrainNetwork(field, views, map, MarchOptions{scene.stored.field.step}, options, hooks,
+                      nullptr, on_device ? &grid : nullptr);
 }
 
 void AddStyle(RunContext* context, const Scene& scene, const SheetOptions& sheet,
@@ -177,6 +193,8 @@ void AddStyle(RunContext* context, const Scene& scene, const SheetOptions& sheet
   paper.appearance = ApplyNetwork(by_paper.network, paper);
   const std::vector<Image> columns[] = {Shown(scene, linear), Shown(scene, paper),
                                         Shown(scene, standard)};
+  const bool of_photos = !stylizer->StylesAnything();
+  const std::vector<Image> renders = of_photos ? std::vector<Image>() : Shown(scene, source);
   char words[160];
   std::snprintf(words, sizeof words,
                 "%s, %s: K_est %.2f, bounds %.2f (standard, %d steps), %.2f (paper, %d steps)",
@@ -189,9 +207,11 @@ void AddStyle(RunContext* context, const Scene& scene, const SheetOptions& sheet
     if (k == 0) row.title = words;
     row.cells.push_back({scene.photos[n], scene.capture.views[n].file});
     row.cells.push_back({targets[n], ""});
+    const Image wanted =
+        of_photos ? targets[n] : Clipped(stylizer->Stylize(renders[k], static_cast<int>(n)));
     for (const std::vector<Image>& column : columns)
       row.cells.push_back(
-          {column[k], targets[n].empty() ? "" : PsnrCaption(column[k], targets[n])});
+          {column[k], wanted.empty() ? "" : PsnrCaption(column[k], wanted, of_photos)});
     rows->push_back(std::move(row));
   }
   context->console->EndStage();
@@ -229,7 +249,11 @@ void RunContactSheet(const Command& command, const Arguments& arguments, Console
 
   Workspace workspace(folder);
   context.workspace = &workspace;
-  const Scene scene = ReadScene(workspace, sheet, settings.run.holdout);
+  ChooseBackend(sheet.device, false);
+  Scene scene = ReadScene(workspace, sheet, settings.run.holdout);
+  scene.backend =
+      ChooseBackendFor(scene.stored.field.geometry->spheres.on(), sheet.device, false,
+                       [console](const std::string& text) { console->Info(text); });
   const std::string plan = std::to_string(words.size() - 1) + " styles, " +
                            std::to_string(scene.shown.size()) + " views each, learned from " +
                            std::to_string(scene.taught.size()) + " photos at " +

@@ -76,8 +76,11 @@ void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& optio
   const NamedFrameSource styled{"styled", styled_folder.Source()};
   const FrameSource reference = reference_folder.Source();
   std::vector<NamedFrameSource> sequences;
-  if (has_reference) sequences.push_back({"source", reference});
   FidelityTargets targets;
+  if (has_reference) {
+    sequences.push_back({"source", reference});
+    targets.unstyled = reference;
+  }
   if (!frames.target.empty()) {
     const FrameFolder target_folder = open(frames.target);
     CheckSameFrames(reference_folder, target_folder);

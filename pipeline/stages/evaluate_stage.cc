@@ -89,7 +89,8 @@ void AddFilm(RunContext* context, const Image& style, ProgressParts* parts,
   report->pairs.insert(report->pairs.end(), film.pairs.begin(), film.pairs.end());
   const FidelityTargets targets{renders_styled ? sequences[1].frames : FrameSource(),
                                 FramesOf(folder("transmittance"), all), &style,
-                                PerceptualDistance(settings.consistency.lpips)};
+                                PerceptualDistance(settings.consistency.lpips),
+                                sequences[0].frames};
   for (const NamedFrameSource& sequence : sequences)
     fidelity->push_back(MeasureFidelity(
         sequence, targets, parts->Next(kFrameSeconds * static_cast<double>(all.size()))));
@@ -138,15 +139,15 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   // method made of the renders, or else of the photos.
   const Image style = ReadStylePicture(settings.style.picture, nullptr);
   const FrameSource of_photos = FramesOf(workspace.Path("views_2d"), taught);
-  const FidelityTargets targets{renders_styled ? frames("views_2d", taught) : of_photos,
-                                frames("transmittance", taught), &style,
-                                PerceptualDistance(settings.consistency.lpips)};
+  const FidelityTargets targets{
+      renders_styled ? frames("views_2d", taught) : of_photos, frames("transmittance", taught),
+      &style, PerceptualDistance(settings.consistency.lpips), frames("source", taught)};
   std::vector<FidelityRow> fidelity;
   for (const NamedFrameSource& sequence : sequences)
     fidelity.push_back(MeasureFidelity({sequence.name, frames(sequence.name.c_str(), taught)},
                                        targets, parts.Next(n * kFrameSeconds)));
   AddFilm(context, style, &parts, &consistency, &fidelity, &heat_maps);
-  const FidelityTargets photo_targets{of_photos, targets.transmittance, nullptr, {}};
+  const FidelityTargets photo_targets{of_photos, targets.transmittance, nullptr, {}, {}};
   const FidelityRow to_photos = MeasureFidelity({"styled", frames("styled", taught)},
                                                 photo_targets, parts.Next(n * kFrameSeconds));
 

@@ -70,7 +70,7 @@ std::optional<double> LinearMapPsnr(const RadianceField& field,
                                                  MarchOptions{field.step})
                                    .color;
                              }};
-  return MeasureFidelity({"linear_map", rendered}, {views_2d, transmittance, nullptr, {}},
+  return MeasureFidelity({"linear_map", rendered}, {views_2d, transmittance, nullptr, {}, {}},
                          progress)
       .psnr_to_2d_db;
 }
