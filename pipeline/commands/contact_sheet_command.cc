@@ -249,11 +249,8 @@ void RunContactSheet(const Command& command, const Arguments& arguments, Console
 
   Workspace workspace(folder);
   context.workspace = &workspace;
-  ChooseBackend(sheet.device, false);
   Scene scene = ReadScene(workspace, sheet, settings.run.holdout);
-  scene.backend =
-      ChooseBackendFor(scene.stored.field.geometry->spheres.on(), sheet.device, false,
-                       [console](const std::string& text) { console->Info(text); });
+  scene.backend = ChooseBackend(sheet.device, false);
   const std::string plan = std::to_string(words.size() - 1) + " styles, " +
                            std::to_string(scene.shown.size()) + " views each, learned from " +
                            std::to_string(scene.taught.size()) + " photos at " +
