@@ -97,8 +97,8 @@ std::string CameraMapHtml(const CameraMap& map) {
   const double scale = (kSide - 2 * kMargin) / span;
   const double width = (right - left) * scale + 2 * kMargin,
                height = (high - low) * scale + 2 * kMargin;
-  const auto px = [&](double x) { return kMargin + (x - left) * scale; };
-  const auto py = [&](double y) { return height - kMargin - (y - low) * scale; };
+  const auto px = [&, from = left](double x) { return kMargin + (x - from) * scale; };
+  const auto py = [&, from = low](double y) { return height - kMargin - (y - from) * scale; };
 
   std::string dots;
   for (const auto& [x, y] : map.points)

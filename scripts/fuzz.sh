@@ -23,7 +23,8 @@ launcher=()
 if command -v ccache >/dev/null; then launcher=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache); fi
 cmake -S . -B build/fuzz -G Ninja -DCMAKE_BUILD_TYPE=RelWithDebInfo -DCMAKE_C_COMPILER=clang \
   -DCMAKE_CXX_COMPILER=clang++ -DREGRADE_FUZZ=ON -DREGRADE_CUDA=OFF -DREGRADE_BENCHMARKS=OFF "${launcher[@]}" >/dev/null
-cmake --build build/fuzz --target fuzz_readers --parallel "${FUZZ_JOBS:-$(nproc)}" >/dev/null
+cmake --build build/fuzz --target fuzz_readers --parallel "${FUZZ_JOBS:-$(nproc)}" >build/fuzz/build.log 2>&1 ||
+  { grep -E 'error|FAILED' build/fuzz/build.log >&2; echo "fuzz.sh: the build failed, see build/fuzz/build.log" >&2; exit 1; }
 
 fuzzer=build/fuzz/tests/fuzz/fuzz_readers
 finds=build/fuzz/finds

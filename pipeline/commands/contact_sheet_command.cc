@@ -249,8 +249,9 @@ void RunContactSheet(const Command& command, const Arguments& arguments, Console
 
   Workspace workspace(folder);
   context.workspace = &workspace;
+  const Backend backend = ChooseBackend(sheet.device, false);  // before work begins
   Scene scene = ReadScene(workspace, sheet, settings.run.holdout);
-  scene.backend = ChooseBackend(sheet.device, false);
+  scene.backend = backend;
   const std::string plan = std::to_string(words.size() - 1) + " styles, " +
                            std::to_string(scene.shown.size()) + " views each, learned from " +
                            std::to_string(scene.taught.size()) + " photos at " +

@@ -1,5 +1,5 @@
-// The parity table of background layers: each device body against the plain body in float and in
-// double. Without a device each test skips and says so.
+// The parity table of background layers: each device body against the plain body in float and
+// in double. Without a device each test skips and says so.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -89,8 +89,8 @@ TEST_P(DeviceSpheresParity, Render) {
       }
       against_float = std::max(against_float, std::abs(double{lefts[r]} - plain.transmittance));
       // Relative: layers lie up to 140 radii away.
-      depth_error = std::max(depth_error, std::abs(double{depths[r]} - plain.depth) /
-                                              std::max(1.0f, plain.depth));
+      depth_error = std::max(
+          depth_error, std::abs(double{depths[r]} - plain.depth) / std::max(1.0f, plain.depth));
     }
     EXPECT_GT(from_layers, 200);
     Row("render before layers", "plain float", against_float, 2e-5);
@@ -185,16 +185,17 @@ TEST_P(DeviceSpheresParity, FitGradient) {
     }
     double off_voxels = 0, off_density = 0, off_color = 0;
     for (int64_t v = 0; v < grid.num_voxels(); ++v)
-      off_voxels = std::max(off_voxels,
-                            std::abs(is.voxels[v * grid.lanes() + DensityLane(basis())] -
-                                     d_density[static_cast<size_t>(v)]));
+      off_voxels =
+          std::max(off_voxels, std::abs(is.voxels[v * grid.lanes() + DensityLane(basis())] -
+                                        d_density[static_cast<size_t>(v)]));
     int64_t with_gradient = 0;
     for (int64_t t = 0; t < grid.spheres.num_texels(); ++t) {
       off_density = std::max(off_density, std::abs(is.texels[4 * t + 3] -
                                                    d_sphere_density[static_cast<size_t>(t)]));
       for (int c = 0; c < 3; ++c)
-        off_color = std::max(off_color, std::abs(is.texels[4 * t + c] -
-                                                 d_sphere_color[static_cast<size_t>(3 * t + c)]));
+        off_color = std::max(
+            off_color,
+            std::abs(is.texels[4 * t + c] - d_sphere_color[static_cast<size_t>(3 * t + c)]));
       if (is.texels[4 * t + 3] == 0) continue;
       ++with_gradient;
       const int64_t point = grid.first_texel() + t;
@@ -208,7 +209,8 @@ TEST_P(DeviceSpheresParity, FitGradient) {
     Row("loss before layers", against, std::abs(is.sums.squared_error - error) / error,
         stop > 0 ? most : 1e-5);
     Row("gradient of densities before layers", against, off_voxels / Largest(d_density), most);
-    Row("gradient of layers' densities", against, off_density / Largest(d_sphere_density), most);
+    Row("gradient of layers' densities", against, off_density / Largest(d_sphere_density),
+        most);
     Row("gradient of layers' colours", against, off_color / Largest(d_sphere_color), most);
   }
 }
@@ -239,8 +241,8 @@ TEST_P(DeviceSpheresParity, SphereVariation) {
   std::vector<double> values(spheres.texels.begin(), spheres.texels.end()), expected(values);
   std::fill(expected.begin(), expected.end(), 0.0);
   for (int c = 0; c < 4; ++c)
-    SphereVariation(spheres.layers, spheres.resolution, spheres.links.data(), values.data(), 4, c,
-                    0, map, c == 3 ? 0.3 : 0.2, [&](int32_t texel, double d) {
+    SphereVariation(spheres.layers, spheres.resolution, spheres.links.data(), values.data(), 4,
+                    c, 0, map, c == 3 ? 0.3 : 0.2, [&](int32_t texel, double d) {
                       expected[static_cast<size_t>(4 * texel + c)] += d;
                     });
   for (const bool exact : {false, true}) {

@@ -1,5 +1,4 @@
 #include "kernels/field/device/device_sphere_rays.h"
-
 #include "kernels/field/device/gradient_view.h"
 #include "kernels/field/device/launch.h"
 #include "kernels/field/device/warp_chain.h"
@@ -79,8 +78,7 @@ __global__ void SeeSpheresAdjointKernel(DeviceGridView grid, const Ray* rays,
         Reversed(SeenBehind(Reversed(a), Reversed(color * Opacity(mine.tau)), lane, &behind));
     if (!(mine.tau > 0)) continue;
     const float w = mine.Weight() * static_cast<float>(kSh0);
-    float d_sigma =
-        layers.delta() * mine.transmittance_before * a * Dot(color - seen, d);
+    float d_sigma = layers.delta() * mine.transmittance_before * a * Dot(color - seen, d);
     if (!(mine.value.w < static_cast<float>(kMaxDensity)) ||
         !(mine.value.w * layers.delta() < static_cast<float>(kMaxOpticalDepth)))
       d_sigma = 0;
@@ -95,8 +93,8 @@ __global__ void SeeSpheresAdjointKernel(DeviceGridView grid, const Ray* rays,
 
 }  // namespace
 
-void SeeSpheres(const DeviceGrid& grid, const Ray* rays, int64_t n,
-                const MarchOptions& options, Vec3f* behind) {
+void SeeSpheres(const DeviceGrid& grid, const Ray* rays, int64_t n, const MarchOptions& options,
+                Vec3f* behind) {
   if (n == 0) return;
   SeeSpheresKernel<<<BlocksFor(32 * n), kThreads>>>(grid.view(), rays, n,
                                                     options.stop_transmittance, behind);

@@ -10,8 +10,8 @@ namespace regrade {
 // composites it as its background. A ray whose light ends in the layers is followed as far as
 // that asks for, a little farther than behind the box: what that shows is below
 // stop_transmittance.
-void SeeSpheres(const DeviceGrid& grid, const Ray* rays, int64_t n,
-                const MarchOptions& options, Vec3f* behind);
+void SeeSpheres(const DeviceGrid& grid, const Ray* rays, int64_t n, const MarchOptions& options,
+                Vec3f* behind);
 
 // Its adjoint: adds to the gradients of a field that is being fitted. d_behind [n].
 void SeeSpheresAdjoint(const DeviceGrid& grid, const Ray* rays, const Vec3f* d_behind,

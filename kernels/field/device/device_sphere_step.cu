@@ -47,7 +47,7 @@ __global__ void SphereVariationKernel(DeviceSpheresView spheres, int64_t begin, 
       d_own[v] -= d[a][v];
     }
   }
-  const auto add = [&](int32_t texel, const float (&v)[4]) {
+  const auto add = [&](int32_t texel, const float(&v)[4]) {
     if (v[0] != 0 || v[1] != 0 || v[2] != 0 || v[3] != 0)  // NaN is not 0 either
       AddTexel<kExact>(gradient, texel, {v[0], v[1], v[2], v[3]});
   };

@@ -1,5 +1,5 @@
-// Background layers on a CUDA device, laid out as FastSpheres has them; and what a fit does with
-// them. Held to background_spheres.h and sphere_variation.h by the parity table.
+// Background layers on a CUDA device, laid out as FastSpheres has them; and what a fit does
+// with them. Held to background_spheres.h and sphere_variation.h by the parity table.
 #pragma once
 
 #include <cstdint>
