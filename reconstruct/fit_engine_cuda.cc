@@ -67,11 +67,8 @@ class CudaFitEngine : public FitEngine {
   }
 
   FitSums TakeSums() override {
-    if (!fitter_) return {};
-    const DeviceFitSums sums = fitter_->TakeSums();
-    DeviceWait("a step of the fit");
-    return {sums.squared_error, static_cast<int64_t>(sums.samples),
-            static_cast<int64_t>(sums.rejected_voxels)};
+    KeepSums();
+    return std::exchange(sums_, {});
   }
 
   RenderedView Render(const Camera& camera, const MarchOptions& march) override {
@@ -131,8 +128,18 @@ class CudaFitEngine : public FitEngine {
     return UploadSpheres(host, true, {}, exact_sums_);
   }
 
+  void KeepSums() {
+    if (!fitter_) return;
+    const DeviceFitSums sums = fitter_->TakeSums();
+    DeviceWait("a step of the fit");
+    sums_.squared_error += sums.squared_error;
+    sums_.samples += static_cast<int64_t>(sums.samples);
+    sums_.rejected_voxels += static_cast<int64_t>(sums.rejected_voxels);
+  }
+
   // What belongs to the grid as it is now.
   void Renew() {
+    KeepSums();
     fitter_.reset();
     touched_ = DeviceTouched(grid_);
   }
@@ -149,6 +156,7 @@ class CudaFitEngine : public FitEngine {
   DeviceTouched touched_;
   MarchOptions march_;
   std::optional<DeviceRayFitter> fitter_;
+  FitSums sums_;  // of fitters that are gone
   DeviceBuffer<Ray> rays_;
   DeviceBuffer<Vec3f> targets_;
 };
