@@ -89,6 +89,10 @@ StagePlan PlanPoses(int64_t photos, int threads) {
   return {0, Shared(kPoseSecondsPerPhoto * static_cast<double>(photos), threads)};
 }
 
+StagePlan PlanTracks(int64_t photos, int threads) {
+  return {0, Shared(kTrackSecondsPerPhoto * static_cast<double>(photos), threads)};
+}
+
 StagePlan PlanStyle(int64_t steps, int threads) {
   return {0, Shared(kStyleSecondsPerStep * static_cast<double>(steps), threads)};
 }

@@ -27,6 +27,7 @@ inline constexpr double kDeviceSamplesPerSecond =
     4e8;  // of an H200, fit and step together: 270 to 450 on three captures
 inline constexpr double kStyleSecondsPerStep = 0.075;  // of two threads
 inline constexpr double kPoseSecondsPerPhoto = 2;      // COLMAP's, of two threads
+inline constexpr double kTrackSecondsPerPhoto = 0.6;   // likewise, where poses are known
 
 struct StagePlan {
   uint64_t memory = 0;  // bytes at the peak; 0 where it is not planned
@@ -42,6 +43,7 @@ StagePlan PlanFit(const FitOptions& options, int64_t photo_pixels, const SceneBo
 // pixel; and the store of samples in flight.
 StagePlan PlanFitOnDevice(const FitOptions& options, int64_t photo_pixels, const SceneBox& box);
 StagePlan PlanPoses(int64_t photos, int threads);
+StagePlan PlanTracks(int64_t photos, int threads);
 StagePlan PlanStyle(int64_t steps, int threads);
 
 // "about 1.8 GB of memory and 4 min 12 s"

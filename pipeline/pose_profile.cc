@@ -61,15 +61,16 @@ JsonValue FiguresOf(const PoseRefinement& refinement) {
 
 PoseProfile ProfilePoses(CaptureKind kind, const RunSettings& settings,
                          const std::string& sparse_folder,
-                         const std::vector<StagedPhoto>& photos, Capture* capture,
-                         const ProgressFunction& progress) {
+                         const std::vector<StagedPhoto>& photos, double misfit_scale,
+                         Capture* capture, const ProgressFunction& progress) {
   const auto wishes = ParseEffects(settings.run.effects);
   const auto wish = wishes.find(kPoseRefinement);
   const bool asked_for = wish != wishes.end() && wish->second;
-  const auto leave_out = [asked_for](const char* why) -> PoseProfile {
+  const double threshold = kPoseMisfit * misfit_scale;
+  const auto leave_out = [asked_for, threshold](const char* why) -> PoseProfile {
     if (asked_for)
       throw Error(ExitCode::kScene, why, std::string("--effects ") + kPoseRefinement + "=on");
-    return {{kPoseRefinement, false, why, Figure(), kPoseMisfit}, JsonValue()};
+    return {{kPoseRefinement, false, why, Figure(), threshold}, JsonValue()};
   };
   if (wish != wishes.end() && !asked_for) return leave_out("it was not wanted");
   if (capture->points.empty())
@@ -77,9 +78,10 @@ PoseProfile ProfilePoses(CaptureKind kind, const RunSettings& settings,
   if (kind == CaptureKind::kPhotos && !asked_for)
     return leave_out("COLMAP has just adjusted them to their tracks");
 
-  const PoseRefinement refinement =
-      RefinePoses(ReadColmapModel(sparse_folder),
-                  {.asked_for = asked_for, .free_focal = settings.pose.free_focal}, progress);
+  const PoseRefinement refinement = RefinePoses(
+      ReadColmapModel(sparse_folder),
+      {.asked_for = asked_for, .misfit_px = threshold, .free_focal = settings.pose.free_focal},
+      progress);
   if (refinement.Accepted()) {
     WriteColmapModel(refinement.model, sparse_folder);
     Capture refined = CaptureFromModel(refinement.model, photos, PhotoNames::kStaged);
@@ -88,7 +90,7 @@ PoseProfile ProfilePoses(CaptureKind kind, const RunSettings& settings,
     capture->reprojection_px = refined.reprojection_px;
   }
   return {{kPoseRefinement, refinement.Accepted(), Evidence(refinement), refinement.misfit_px,
-           kPoseMisfit},
+           threshold},
           refinement.tried ? FiguresOf(refinement) : JsonValue()};
 }
 

@@ -19,11 +19,12 @@ struct PoseProfile {
 
 // Poses that came with tracks are refined where reprojection says so (refine_poses.h); those
 // that COLMAP has just found and adjusted only if asked for. Where it pays, the model in
-// `sparse_folder` and `capture` are rewritten; otherwise nothing is touched. Throws
+// `sparse_folder` and `capture` are rewritten; otherwise nothing is touched. `misfit_scale`:
+// pixels of the photos that are one of those that features were found in. Throws
 // Error(kScene) where refinement was asked for and there is nothing to refine by, Interrupted.
 PoseProfile ProfilePoses(CaptureKind kind, const RunSettings& settings,
                          const std::string& sparse_folder,
-                         const std::vector<StagedPhoto>& photos, Capture* capture,
-                         const ProgressFunction& progress);
+                         const std::vector<StagedPhoto>& photos, double misfit_scale,
+                         Capture* capture, const ProgressFunction& progress);
 
 }  // namespace regrade

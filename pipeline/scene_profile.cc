@@ -128,6 +128,10 @@ void ProfileExposure(const Capture& capture, const std::map<std::string, bool>& 
 
 }  // namespace
 
+bool ShowsThroughPhotos(const Capture& capture) {
+  return TransparentShare(ReadOutlines(capture)) > kAlphaShare;
+}
+
 std::map<std::string, bool> ParseEffects(const std::string& text) {
   std::map<std::string, bool> wishes;
   for (size_t begin = 0; begin <= text.size();) {

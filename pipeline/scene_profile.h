@@ -39,6 +39,9 @@ struct SceneProfile {
   std::vector<std::string> notices;  // sentences for a person
 };
 
+// Has every photo transparent parts, and more of them than a soft edge has?
+bool ShowsThroughPhotos(const Capture& capture);
+
 // Free of the photos' order (H154). Reads every photo, unless "exposure=off". Throws
 // Error(kScene) where an effect was asked for that the capture does not allow.
 SceneProfile ProfileScene(const Capture& capture, int sh_degree, const std::string& effects);

@@ -28,7 +28,7 @@ constexpr std::pair<const char*, const char*> kRenamed[] = {
 const std::vector<std::pair<std::string, std::string>> kEnvironment = {
     {"QT_QPA_PLATFORM", "offscreen"}, {"GLOG_logtostderr", "1"}};
 
-bool IsPathOption(const std::string& name) { return name.find('.') == std::string::npos; }
+bool IsPathOption(const std::string& name) { return name.ends_with("_path"); }
 
 bool SpeaksOfFullDisk(const std::string& line) {
   return line.find("disk is full") != std::string::npos ||

@@ -22,6 +22,7 @@ Vec3d MeanForward(const Capture& capture) {
 }
 
 double NearestDepth(const Capture& capture) {
+  if (capture.nearest_depth > 0) return capture.nearest_depth;  // said, not estimated
   std::vector<double> depths;
   for (const ScenePoint& point : capture.points)
     for (const int32_t v : point.views) {
@@ -29,7 +30,7 @@ double NearestDepth(const Capture& capture) {
       const double depth = (camera.camera_from_world * point.position).z;
       if (depth > 0) depths.push_back(depth);
     }
-  if (depths.size() < 50) return capture.nearest_depth;
+  if (depths.size() < 50) return 0;
   const size_t k = static_cast<size_t>(kNearestTail * static_cast<double>(depths.size()));
   std::nth_element(depths.begin(), depths.begin() + static_cast<long>(k), depths.end());
   return depths[k];

@@ -14,7 +14,8 @@ inline constexpr double kForwardDepthShare = 0.3;
 struct ForwardFacing {
   double angle_deg = 0;    // largest angle between an optical axis and their mean
   double depth_share = 0;  // spread of the cameras along that mean, over the nearest depth
-  double nearest = 0;      // depth of the nearest points, world units; 0 where nothing is known
+  // Of the scene, world units: as it came with the poses, or of the nearest points; 0 unknown.
+  double nearest = 0;
   bool on = false;
 };
 ForwardFacing MeasureForwardFacing(const Capture& capture);

@@ -19,6 +19,7 @@ struct PoseOptions {
   double time_limit_min = 0;
   double quiet_limit_min = 15;
   bool free_focal = false;
+  std::string tracks = "auto";
   int threads = 0;  // 0: all; from --threads, no flag of its own
 
   template <typename Bind>
@@ -57,6 +58,13 @@ struct PoseOptions {
     bind("pose-free-focal", free_focal,
          {.help = "where poses that came with the photos are refined, so are focal lengths, by "
                   "one factor a camera"});
+    bind("tracks", tracks,
+         {.help =
+              "of poses that came without points: auto has COLMAP find what the photos share, "
+              "half a second to a second a photo, so that exposure, the poses themselves, "
+              "the scene's reach and its surroundings can be measured; given goes without. "
+              "Transparent photos are never searched",
+          .choices = "auto|given"});
   }
 };
 

@@ -238,12 +238,12 @@ PoseRefinement RefinePoses(const ColmapModel& model, const RefinePosesOptions& o
   }
   // Points that are put where they fit best only come nearer.
   result.misfit_px = MedianError(bundle, false);
-  if (!options.asked_for && !(result.misfit_px > kPoseMisfit)) return result;
+  if (!options.asked_for && !(result.misfit_px > options.misfit_px)) return result;
   if (!Adjustment(&bundle, {}, LossScale(bundle)).Solve(true, parts.Next(1)))
     return refuse("the points could not be adjusted");
   result.misfit_px = MedianError(bundle, false);
   result.held_out_before_px = MedianError(bundle, true);
-  if (!options.asked_for && !(result.misfit_px > kPoseMisfit)) return result;
+  if (!options.asked_for && !(result.misfit_px > options.misfit_px)) return result;
 
   result.tried = true;
   const Freedom freedom{true, options.free_focal};

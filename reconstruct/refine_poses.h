@@ -22,7 +22,8 @@ inline constexpr double kPoseMisfit = 1.0;
 inline constexpr double kRefinementPays = 0.1;
 
 struct RefinePosesOptions {
-  bool asked_for = false;   // try below kPoseMisfit, too, and take any gain
+  bool asked_for = false;          // try below `misfit_px`, too, and take any gain
+  double misfit_px = kPoseMisfit;  // what poses are in question above
   bool free_focal = false;  // one factor of the focal lengths for each camera of the model
 };
 

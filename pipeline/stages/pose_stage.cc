@@ -8,6 +8,7 @@
 #include "pipeline/folder_listing.h"
 #include "pipeline/plan.h"
 #include "pipeline/pose_profile.h"
+#include "pipeline/pose_tracks.h"
 #include "pipeline/scene_profile.h"
 #include "pipeline/stages/run_context.h"
 
@@ -25,19 +26,32 @@ JsonValue PhotoSet(const CaptureSource& source) {
 // Seconds on two cores, roughly: photos take what their bytes take to read, and their number to
 // place.
 struct StageShares {
-  double ingest = 1, poses = 0, refinement = 0.5;
+  double ingest = 1, poses = 0, tracks = 0, refinement = 0.5;
 };
 
 StageShares EstimateShares(const CaptureSource& source) {
-  StageShares shares;
-  if (source.kind != CaptureKind::kPhotos) return shares;
   double bytes = 0, photos = 0;
   for (const ListedFile& file : ListFolder(source.photos).files) {
     std::error_code none;
     const auto size = std::filesystem::file_size(file.path, none);
     if (!none) bytes += static_cast<double>(size), ++photos;
   }
-  return {0.5e-6 * bytes + 0.1, 0.75 * kPoseSecondsPerPhoto * photos, 0};
+  const double ingest = 0.5e-6 * bytes + 0.1;
+  if (source.kind == CaptureKind::kPhotos)
+    return {ingest, 0.75 * kPoseSecondsPerPhoto * photos, 0, 0};
+  // Whether tracks are looked for is known later.
+  if (source.kind == CaptureKind::kTransforms || source.kind == CaptureKind::kLlff)
+    return {ingest, 0, kTrackSecondsPerPhoto * photos, 0.1 * photos};
+  return {ingest, 0, 0, 0.1 * photos};
+}
+
+// What a dry run says of tracks, which may be looked for.
+std::string PlannedTracks(const RunSettings& settings, const CaptureSource& source,
+                          int64_t photos) {
+  const bool may = source.kind == CaptureKind::kTransforms || source.kind == CaptureKind::kLlff;
+  if (!may || settings.pose.tracks != "auto") return "";
+  return "; points by COLMAP, unless photos are transparent: " +
+         PlanText(PlanTracks(photos, omp_get_max_threads()));
 }
 
 StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
@@ -51,7 +65,8 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
   workspace.NewPath(".regrade/work/pose/x");
 
   const StageShares shares = EstimateShares(source);
-  ProgressParts parts(progress, shares.ingest + shares.poses + shares.refinement);
+  ProgressParts parts(progress,
+                      shares.ingest + shares.poses + shares.tracks + shares.refinement);
   const IngestResult ingest =
       IngestPhotos(source.photos, photo_folder, settings.ingest, parts.Next(shares.ingest));
   for (const std::string& notice : ingest.notices) context->console->Info(notice);
@@ -73,8 +88,16 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
     capture = ImportPoses(source, ingest.photos, ingest.verdicts, sparse_folder);
     outcome.figures["recipe"] = "poses came with the photos: " + source.poses;
   }
-  const PoseProfile profile = ProfilePoses(source.kind, settings, sparse_folder, ingest.photos,
-                                           &capture, parts.Next(shares.refinement));
+  PoseTracks tracks;
+  if (source.kind != CaptureKind::kPhotos)
+    tracks = AddTracks(settings, sparse_folder, ingest.photos,
+                       workspace.Path(".regrade/work/pose/tracks"), &capture,
+                       parts.Next(shares.tracks));
+  if (!tracks.note.empty()) context->console->Info(tracks.note);
+  if (!tracks.figures.IsNull()) outcome.figures["tracks"] = tracks.figures;
+  const PoseProfile profile =
+      ProfilePoses(source.kind, settings, sparse_folder, ingest.photos, tracks.misfit_scale,
+                   &capture, parts.Next(shares.refinement));
   context->console->Info(EffectLine(profile.effect));
   outcome.figures["effects"] = EffectsRecord({profile.effect});
   if (!profile.figures.IsNull()) outcome.figures["pose_refinement"] = profile.figures;
@@ -112,10 +135,11 @@ Stage PoseStage(RunContext* context) {
     stage.inputs[kPoseRefinement] = wish->second;
   stage.refuse_changes = true;
   const int64_t photos = static_cast<int64_t>(stage.inputs.At("photos").AsObject().size());
-  stage.plan = std::to_string(photos) + " files in " + source.photos +
-               (source.kind == CaptureKind::kPhotos
-                    ? ", poses by COLMAP: " + PlanText(PlanPoses(photos, omp_get_max_threads()))
-                    : ", poses from " + source.poses);
+  stage.plan =
+      std::to_string(photos) + " files in " + source.photos +
+      (source.kind == CaptureKind::kPhotos
+           ? ", poses by COLMAP: " + PlanText(PlanPoses(photos, omp_get_max_threads()))
+           : ", poses from " + source.poses + PlannedTracks(context->settings, source, photos));
   stage.work = [context, source](const ProgressFunction& progress) {
     return FindPoses(context, source, progress);
   };

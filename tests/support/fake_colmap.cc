@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -50,7 +51,10 @@ std::vector<std::string> KnownOptions() {
           "Mapper.num_threads",
           "Mapper.min_model_size",
           "Mapper.init_min_tri_angle",
-          "BundleAdjustment.refine_principal_point"};
+          "BundleAdjustment.refine_principal_point",
+          "match_list_path",
+          "clear_points",
+          "Mapper.filter_max_reproj_error"};
 }
 
 // As the real one aborts without a display, when it is not told to leave the GPU alone.
@@ -183,6 +187,35 @@ int Adjust() {
   return 0;
 }
 
+// Points where the synthetic model has them, for the images of the input that features were
+// extracted of, under the numbers that a database might give them.
+int Triangulate() {
+  if (Is("hang")) HangForEver();
+  if (arguments["clear_points"] != "1") return 1;  // numbers would not be the database's
+  const ColmapModel posed = ReadColmapModel(arguments["input_path"]);
+  std::set<std::string> extracted;
+  std::ifstream database(arguments["database_path"]);
+  for (std::string line; std::getline(database, line);) extracted.insert(line);
+  ColmapModel model =
+      testing::MakeSyntheticModel({.images = static_cast<int>(posed.images.size())});
+  for (size_t i = 0; i < model.images.size(); ++i) {
+    if (extracted.count(posed.images[i].name) == 0) std::abort();
+    model.images[i].name = posed.images[i].name;
+    model.images[i].id = static_cast<uint32_t>(1000 - i);
+  }
+  std::reverse(model.images.begin(), model.images.end());  // by number
+  for (ColmapPoint& point : model.points)
+    for (ColmapTrackElement& element : point.track) element.image_id = 1001 - element.image_id;
+  if (Is("sparse")) model.points.clear();
+  if (Is("sparse"))
+    for (ColmapImage& image : model.images) image.keypoints.clear();
+  WriteColmapModel(model, arguments["output_path"]);
+  if (Is("half"))
+    fs::resize_file(arguments["output_path"] + "/points3D.bin",
+                    fs::file_size(arguments["output_path"] + "/points3D.bin") / 2);
+  return 0;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -221,6 +254,7 @@ int main(int argc, char** argv) {
   if (command == "feature_extractor") return Extract();
   if (command == "mapper") return Map();
   if (command == "bundle_adjuster") return Adjust();
+  if (command == "point_triangulator") return Triangulate();
   NeedsNoGpu("Matching");
   std::printf("Matching block [1/1, 1/1] in 0.001s\n");
   return 0;

@@ -1,0 +1,162 @@
+// Captures with poses and without points: what the installed COLMAP finds for them, and that
+// nothing is lost where there is none.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "kernels/base/child_process.h"
+#include "kernels/base/error.h"
+#include "pipeline/capture_store.h"
+#include "pipeline/files/image_file.h"
+#include "pipeline/files/json_file.h"
+#include "pipeline/pose_tracks.h"
+#include "pipeline/scene_profile.h"
+#include "pipeline/synth_effects.h"
+#include "tests/support/temporary_folder.h"
+
+namespace regrade {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::TemporaryFolder;
+
+constexpr int kViews = 12;
+
+bool HaveColmap() {
+  try {
+    return RunChild({.argv = {"colmap", "help"}}).Succeeded();
+  } catch (const Error&) {
+    return false;
+  }
+}
+
+// What it said, after it ended well.
+std::string Regrade(std::vector<std::string> arguments) {
+  ChildOptions options;
+  options.argv = {REGRADE_PROGRAM};
+  options.argv.insert(options.argv.end(), arguments.begin(), arguments.end());
+  options.wall_limit_s = 240;
+  std::string said;
+  const ChildResult result =
+      RunChild(options, [&said](const std::string& line) { said += line + "\n"; });
+  EXPECT_TRUE(result.Succeeded()) << said;
+  return said;
+}
+
+void Synth(const std::string& out, const std::string& effects) {
+  std::vector<std::string> words = {"synth", out,      "--views",
+                                    std::to_string(kViews), "--size", "280x210"};
+  if (!effects.empty()) words.insert(words.end(), {"--effects", effects});
+  Regrade(words);
+}
+
+JsonValue PoseFigures(const std::string& out) {
+  return ReadJsonFile(out + "/.regrade/stages/pose.json").At("figures");
+}
+
+std::string Bytes(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream bytes;
+  bytes << file.rdbuf();
+  return bytes.str();
+}
+
+TEST(PoseTracks, WithoutColmapEverythingIsAsWithoutTracks) {
+  const TemporaryFolder folder;
+  Synth(folder / "s", "");
+  Regrade({"pose", folder / "s/truth", "--out", folder / "given", "--tracks", "given"});
+  const std::string said = Regrade({"pose", folder / "s/truth", "--out", folder / "none",
+                                    "--colmap", folder / "no-such-colmap"});
+  EXPECT_NE(said.find("no tracks were found"), std::string::npos) << said;
+  for (const char* name : {"cameras.bin", "images.bin", "points3D.bin"})
+    EXPECT_EQ(Bytes(folder / (std::string("given/poses/sparse/") + name)),
+              Bytes(folder / (std::string("none/poses/sparse/") + name)))
+        << name;
+  EXPECT_EQ(Bytes(folder / "given/poses/photos.json"),
+            Bytes(folder / "none/poses/photos.json"));
+  EXPECT_EQ(PoseFigures(folder / "given").Find("tracks"), nullptr);
+}
+
+TEST(PoseTracks, TransparentPhotosAndOwnPointsAreNotSearched) {
+  const TemporaryFolder folder;
+  RunSettings settings;
+  Capture capture;
+  Image alpha(8, 8, 1);  // all transparent
+  const std::string photo = folder / "00000.png";
+  WritePng8(folder / "00000.alpha.png", alpha);
+  CaptureView view{"00000.png", "a.png", photo, {}};
+  view.camera.width = view.camera.height = 8;
+  capture.views = {view};
+  EXPECT_FALSE(WantsTracks(settings, capture));
+  settings.run.effects = "alpha=off";
+  EXPECT_TRUE(WantsTracks(settings, capture));
+  settings.pose.tracks = "given";
+  EXPECT_FALSE(WantsTracks(settings, capture));
+  settings.pose.tracks = "auto";
+  capture.points.resize(1);
+  EXPECT_FALSE(WantsTracks(settings, capture));
+}
+
+// A drift of +-30 %, poses in a transforms.json, no points.
+TEST(PoseTracks, ExposureOfGivenPosesIsFoundWithinTwoPerCent) {
+  if (!HaveColmap()) GTEST_SKIP() << "no colmap here";
+  const TemporaryFolder folder;
+  Synth(folder / "s", "exposure");
+  Regrade({"pose", folder / "s/truth", "--out", folder / "out"});
+  const Capture capture = ReadCapture(folder / "out/poses");
+  ASSERT_EQ(capture.views.size(), static_cast<size_t>(kViews));
+  const SceneProfile profile = ProfileScene(capture, 2, "auto");
+  ASSERT_FALSE(profile.gains.of_view.empty()) << "exposure is off";
+  std::vector<double> ratios;
+  double mean = 0;
+  for (int i = 0; i < kViews; ++i) {
+    const PhotoExposure& photo = profile.exposure.photos[static_cast<size_t>(i)];
+    ASSERT_TRUE(photo.known);
+    for (int c = 0; c < 3; ++c) {
+      ratios.push_back(std::log(photo.gain[c] / SynthGain(0, i, kViews)));
+      mean += ratios.back() / (3 * kViews);
+    }
+  }
+  double worst = 0;
+  for (const double ratio : ratios) worst = std::max(worst, std::abs(ratio - mean));
+  EXPECT_LE(worst, 0.02);
+}
+
+// Poses 0.3 degrees and 0.5 % of the spread off, handed over without their tracks.
+TEST(PoseTracks, ShakenPosesAreRefined) {
+  if (!HaveColmap()) GTEST_SKIP() << "no colmap here";
+  const TemporaryFolder folder;
+  Synth(folder / "s", "poses");
+  Regrade({"pose", folder / "s", "--out", folder / "off", "--effects", "pose-refinement=off"});
+  Regrade({"export", folder / "off", "--format", "transforms", "--out", folder / "shaken"});
+  const std::string said =
+      Regrade({"pose", folder / "shaken", "--out", folder / "out"});
+  ASSERT_NE(said.find("pose-refinement on"), std::string::npos) << said;
+  Regrade({"pose", folder / "s/truth", "--out", folder / "truth", "--tracks", "given"});
+  const Capture truth = ReadCapture(folder / "truth/poses"),
+                before = ReadCapture(folder / "off/poses"),
+                after = ReadCapture(folder / "out/poses");
+  // How far turns from photo to photo are from the true ones, degrees: free of the gauge.
+  const auto error = [&truth](const Capture& capture) {
+    double sum = 0;
+    for (size_t i = 1; i < truth.views.size(); ++i) {
+      const auto turn = [i](const Capture& c) {
+        return c.views[i].camera.camera_from_world.rotation *
+               c.views[i - 1].camera.camera_from_world.rotation.Transposed();
+      };
+      const Mat3d off = turn(capture) * turn(truth).Transposed();
+      const Vec3d axis{off(2, 1) - off(1, 2), off(0, 2) - off(2, 0), off(1, 0) - off(0, 1)};
+      sum += std::asin(std::min(1.0, 0.5 * Norm(axis))) * 180 / M_PI;
+    }
+    return sum / static_cast<double>(truth.views.size() - 1);
+  };
+  EXPECT_GT(error(before), 0.3);
+  EXPECT_LT(error(after), 0.1 * error(before));
+}
+
+}  // namespace
+}  // namespace regrade
