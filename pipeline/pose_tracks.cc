@@ -47,8 +47,8 @@ PoseTracks AddTracks(const RunSettings& settings, const std::string& sparse_fold
   const double cpu_before = CpuSeconds();
   FoundTracks found;
   try {
-    found = TracksForPoses(ReadColmapModel(sparse_folder), photos, options, work_folder,
-                           progress);
+    found =
+        TracksForPoses(ReadColmapModel(sparse_folder), photos, options, work_folder, progress);
   } catch (const Error& error) {
     if (error.code() != ExitCode::kExternalProgram) throw;
     result.note = "no tracks were found for the poses, for " + error.what_failed() + kUnjudged;

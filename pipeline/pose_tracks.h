@@ -20,8 +20,8 @@ inline constexpr size_t kFewestTracks = 50;
 bool WantsTracks(const RunSettings& settings, const Capture& capture);
 
 struct PoseTracks {
-  JsonValue figures;  // null where none were looked for
-  std::string note;   // a sentence for a person; empty likewise
+  JsonValue figures;        // null where none were looked for
+  std::string note;         // a sentence for a person; empty likewise
   double misfit_scale = 1;  // pixels of the photos that are one of those features were found in
 };
 

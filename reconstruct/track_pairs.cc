@@ -43,8 +43,7 @@ std::vector<std::pair<size_t, size_t>> PairsWorthMatching(const std::vector<Came
     }
     std::sort(by_distance.begin(), by_distance.end());
     for (const size_t rank : kRanks)
-      if (rank < by_distance.size())
-        pairs.insert(std::minmax(i, by_distance[rank].second));
+      if (rank < by_distance.size()) pairs.insert(std::minmax(i, by_distance[rank].second));
   }
   return {pairs.begin(), pairs.end()};
 }

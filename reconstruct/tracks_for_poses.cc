@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kFeatures = 768;  // a photo: hundreds of tracks are left of them
+constexpr int kFeatures = 768;   // a photo: hundreds of tracks are left of them
 constexpr int kSmallSide = 900;  // pixels; such photos are doubled first, as in the ladder
 // The matcher for lists of pairs says nothing until it is done: so many at a time.
 constexpr size_t kPairsAtATime = 200;
@@ -42,8 +42,8 @@ struct LensGroup {
 bool SameLens(const ColmapCamera& a, const ColmapCamera& b) {
   const auto near = [](double x, double y) { return std::abs(x - y) <= kSameFocal * x; };
   return a.lens == b.lens && a.intrinsics.width == b.intrinsics.width &&
-         a.intrinsics.height == b.intrinsics.height &&
-         near(a.intrinsics.fx, b.intrinsics.fx) && near(a.intrinsics.fy, b.intrinsics.fy);
+         a.intrinsics.height == b.intrinsics.height && near(a.intrinsics.fx, b.intrinsics.fx) &&
+         near(a.intrinsics.fy, b.intrinsics.fy);
 }
 
 // As COLMAP lists a camera's parameters on its command line.
@@ -124,8 +124,8 @@ class TrackFinder {
         return SameLens(other.camera, camera);
       });
       if (group == groups.end())
-        group = groups.insert(groups.end(),
-                              {camera, {photos_[i].width, photos_[i].height, 0, {}}});
+        group =
+            groups.insert(groups.end(), {camera, {photos_[i].width, photos_[i].height, 0, {}}});
       group->photos.names.push_back(photos_[i].name);
     }
     return groups;
@@ -192,10 +192,10 @@ class TrackFinder {
     try {
       return ReadColmapModel(out);
     } catch (const Error& error) {
-      throw Error(ExitCode::kExternalProgram,
-                  "colmap point_triangulator left no model that can be read: " +
-                      error.what_failed(),
-                  colmap_->log_folder());
+      throw Error(
+          ExitCode::kExternalProgram,
+          "colmap point_triangulator left no model that can be read: " + error.what_failed(),
+          colmap_->log_folder());
     }
   }
 
@@ -246,9 +246,8 @@ class TrackFinder {
         {std::max(1.0, allowed - spent), 60 * options_.quiet_limit_min},
         [&](const std::string& line) { output_.Line(line); },
         [&] {
-          return Report(progress_,
-                        std::min(spent_ + weight * output_.fraction(), planned_), planned_,
-                        what + " (for the poses that were given)") != Verdict::kAbort;
+          return Report(progress_, std::min(spent_ + weight * output_.fraction(), planned_),
+                        planned_, what + " (for the poses that were given)") != Verdict::kAbort;
         });
     spent_ += weight;
     if (!result.Succeeded()) colmap_->Fail(command, result, command);

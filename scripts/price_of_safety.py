@@ -62,7 +62,7 @@ def main():
 
         def run(out, *more):
             return [regrade, "run", os.path.join(capture, "truth"), "--style", STYLE, "--out", os.path.join(scratch, out),
-                    "--preset", options.preset, "--device", "cpu", *of_runs, *more]
+                    "--preset", options.preset, "--device", "cpu", "--tracks", "given", *of_runs, *more]
 
         timed = {"LD_PRELOAD": os.path.abspath(options.library), "TIMED_WRITES_REPORT": report}
         wall, cpu = measured(run("plain"), timed)
@@ -80,7 +80,8 @@ def main():
             check=True, stdout=subprocess.PIPE, text=True).stdout.splitlines())
         row("checks", f"{figures['checks']} s a field; COLMAP's model read in {figures['model']} s",
             FIELD_READS * float(figures["checks"]) + float(figures["model"]), "CPU", cpu)
-        pose = measured([regrade, "pose", os.path.join(capture, "truth"), "--out", os.path.join(scratch, "posed")])[1]
+        pose = measured([regrade, "pose", os.path.join(capture, "truth"), "--tracks", "given",
+                         "--out", os.path.join(scratch, "posed")])[1]
         row("staging", f"{options.views} photos", max(0, pose - start), "CPU", cpu)
         fixed = measured(run("fixed", "--reproducible"))[1]
         row("fixed sums", "--reproducible, against without", fixed - cpu, "CPU", cpu)

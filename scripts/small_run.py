@@ -7,7 +7,7 @@ import subprocess
 
 SMALL = ["--photo-size", "96", "--fit-resolutions", "24,32", "--fit-steps", "60,60", "--fit-rays", "1024",
          "--style-steps", "20", "--style-rays", "512", "--path-frames", "4", "--preset", "draft", "--reproducible",
-         "--holdout", "0"]
+         "--holdout", "0", "--tracks", "given"]
 STAGES = ("pose", "reconstruct", "style_2d", "stylize", "render", "evaluate", "report")
 STYLE = os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "assets", "style_sunset.png")
 TIMES = {"seconds", "cpu_seconds", "frames_per_second", "peak_memory_mb"}  # of the report, and what else does not repeat

@@ -26,14 +26,16 @@ int Regrade(std::vector<std::string> arguments) {
 TEST(CaptureStore, AnOutputFolderIsACaptureWithItsPoses) {
   const TemporaryFolder folder;
   ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}), 0);
-  ASSERT_EQ(Regrade({"pose", folder / "s/truth", "--out", folder / "first"}), 0);
+  ASSERT_EQ(
+      Regrade({"pose", folder / "s/truth", "--out", folder / "first", "--tracks", "given"}), 0);
   EXPECT_EQ(DetectCapture(folder / "s/truth").kind, CaptureKind::kTransforms);
   for (const char* name : {"first", "first/poses"}) {
     const CaptureSource source = DetectCapture(folder / name);
     EXPECT_EQ(source.kind, CaptureKind::kPosed) << name;
     EXPECT_EQ(std::filesystem::path(source.photos).filename(), "photos");
   }
-  ASSERT_EQ(Regrade({"pose", folder / "first", "--out", folder / "second"}), 0);
+  ASSERT_EQ(
+      Regrade({"pose", folder / "first", "--out", folder / "second", "--tracks", "given"}), 0);
   const Capture before = ReadCapture(folder / "first/poses"),
                 after = ReadCapture(folder / "second/poses");
   ASSERT_EQ(after.views.size(), 6u);
@@ -50,14 +52,18 @@ TEST(CaptureStore, AnOutputFolderIsACaptureWithItsPoses) {
 TEST(CaptureStore, ANearestDepthThatChangedIsAnotherCapture) {
   const TemporaryFolder folder;
   ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}), 0);
-  ASSERT_EQ(Regrade({"pose", folder / "s/truth", "--out", folder / "first"}), 0);
-  ASSERT_EQ(Regrade({"pose", folder / "first", "--out", folder / "second"}), 0);
-  ASSERT_EQ(Regrade({"pose", folder / "first", "--out", folder / "second"}), 0);
+  ASSERT_EQ(
+      Regrade({"pose", folder / "s/truth", "--out", folder / "first", "--tracks", "given"}), 0);
+  ASSERT_EQ(
+      Regrade({"pose", folder / "first", "--out", folder / "second", "--tracks", "given"}), 0);
+  ASSERT_EQ(
+      Regrade({"pose", folder / "first", "--out", folder / "second", "--tracks", "given"}), 0);
   const std::string index = folder / "first/poses/photos.json";
   JsonValue json = ReadJsonFile(index);
   json["nearest_depth"] = 0.5;
   WriteJsonFile(index, json);
-  EXPECT_EQ(Regrade({"pose", folder / "first", "--out", folder / "second"}), 3);
+  EXPECT_EQ(
+      Regrade({"pose", folder / "first", "--out", folder / "second", "--tracks", "given"}), 3);
 }
 
 // Without tracks there is nothing to refine by: said where it was asked for.
@@ -65,7 +71,7 @@ TEST(CaptureStore, PosesWithoutTracksCannotBeRefined) {
   const TemporaryFolder folder;
   ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}), 0);
   EXPECT_EQ(Regrade({"pose", folder / "s/truth", "--out", folder / "out", "--effects",
-                     "pose-refinement=on"}),
+                     "pose-refinement=on", "--tracks", "given"}),
             6);
 }
 

@@ -118,7 +118,9 @@ TEST(ObjectMasks, H50_ARunWithWrongMasksRestylesTheObjectAlone) {
                                "--style-steps",
                                "10",
                                "--threads",
-                               "2"};
+                               "2",
+                               "--tracks",
+                               "given"};
   const ProgramOutcome done = regrade(run);
   ASSERT_EQ(done.code, 0) << done.text;
   // View 2 was given a mask beside the ball, view 3 an empty one, view 5 a swollen one.

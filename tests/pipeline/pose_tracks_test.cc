@@ -1,5 +1,7 @@
 // Captures with poses and without points: what the installed COLMAP finds for them, and that
 // nothing is lost where there is none.
+#include "pipeline/pose_tracks.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -13,7 +15,6 @@
 #include "pipeline/capture_store.h"
 #include "pipeline/files/image_file.h"
 #include "pipeline/files/json_file.h"
-#include "pipeline/pose_tracks.h"
 #include "pipeline/scene_profile.h"
 #include "pipeline/synth_effects.h"
 #include "tests/support/temporary_folder.h"
@@ -48,8 +49,8 @@ std::string Regrade(std::vector<std::string> arguments) {
 }
 
 void Synth(const std::string& out, const std::string& effects) {
-  std::vector<std::string> words = {"synth", out,      "--views",
-                                    std::to_string(kViews), "--size", "280x210"};
+  std::vector<std::string> words = {"synth",  out,      "--views", std::to_string(kViews),
+                                    "--size", "280x210"};
   if (!effects.empty()) words.insert(words.end(), {"--effects", effects});
   Regrade(words);
 }
@@ -133,8 +134,7 @@ TEST(PoseTracks, ShakenPosesAreRefined) {
   Synth(folder / "s", "poses");
   Regrade({"pose", folder / "s", "--out", folder / "off", "--effects", "pose-refinement=off"});
   Regrade({"export", folder / "off", "--format", "transforms", "--out", folder / "shaken"});
-  const std::string said =
-      Regrade({"pose", folder / "shaken", "--out", folder / "out"});
+  const std::string said = Regrade({"pose", folder / "shaken", "--out", folder / "out"});
   ASSERT_NE(said.find("pose-refinement on"), std::string::npos) << said;
   Regrade({"pose", folder / "s/truth", "--out", folder / "truth", "--tracks", "given"});
   const Capture truth = ReadCapture(folder / "truth/poses"),

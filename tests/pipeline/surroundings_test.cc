@@ -37,7 +37,7 @@ TEST(Surroundings, F23_WithoutHomeAndTemporaryFolder) {
   const std::string capture = Synthetic(folder);
   const ProgramOutcome outcome =
       RunIn({"/usr/bin/env", "-i", "TMPDIR=/nowhere", REGRADE_PROGRAM, "pose", capture, "--out",
-             folder / "out"});
+             folder / "out", "--tracks", "given"});
   EXPECT_EQ(outcome.code, 0) << outcome.text;
   EXPECT_TRUE(fs::exists(folder / "out/poses/photos.json"));
 }
@@ -45,11 +45,15 @@ TEST(Surroundings, F23_WithoutHomeAndTemporaryFolder) {
 TEST(Surroundings, F26_AClockThatJumpsChangesNothing) {
   const TemporaryFolder folder;
   const std::string capture = Synthetic(folder);
-  EXPECT_EQ(RunProgram(REGRADE_PROGRAM, {"pose", capture, "--out", folder / "plain"}).code, 0);
+  EXPECT_EQ(RunProgram(REGRADE_PROGRAM,
+                       {"pose", capture, "--out", folder / "plain", "--tracks", "given"})
+                .code,
+            0);
   const std::string clock = std::string("LD_PRELOAD=") + ODD_CLOCK;
   for (const char* when : {"fresh", "again"}) {
-    const ProgramOutcome outcome = RunIn({"/usr/bin/env", clock, REGRADE_PROGRAM, "pose",
-                                          capture, "--out", folder / "odd", "--json"});
+    const ProgramOutcome outcome =
+        RunIn({"/usr/bin/env", clock, REGRADE_PROGRAM, "pose", capture, "--out", folder / "odd",
+               "--json", "--tracks", "given"});
     EXPECT_EQ(outcome.code, 0) << outcome.text;
     // What is done is known by its content, not by its date; and no duration is of that clock.
     EXPECT_EQ(outcome.text.find("done before") != std::string::npos, when[0] == 'a')
@@ -74,8 +78,8 @@ TEST(Surroundings, F27_AWorkingFolderThatIsGone) {
   const std::string capture = Synthetic(folder), gone = folder / "gone";
   const std::string leave = "mkdir \"$1\" && cd \"$1\" && rmdir \"$1\" && shift && exec \"$@\"";
   const auto run_gone = [&](const std::string& out) {
-    return RunIn(
-        {"/bin/sh", "-c", leave, "sh", gone, REGRADE_PROGRAM, "pose", capture, "--out", out});
+    return RunIn({"/bin/sh", "-c", leave, "sh", gone, REGRADE_PROGRAM, "pose", capture, "--out",
+                  out, "--tracks", "given"});
   };
   const ProgramOutcome relative = run_gone("out");
   EXPECT_EQ(relative.code, 5) << relative.text;
@@ -91,7 +95,7 @@ TEST(Surroundings, F27_RelativePathsAndBlanks) {
   const std::string go = "cd \"$1\" && shift && exec \"$@\"";
   const ProgramOutcome outcome =
       RunIn({"/bin/sh", "-c", go, "sh", folder.path(), REGRADE_PROGRAM, "pose",
-             "./a capture/truth", "--out", "an out/../an out"});
+             "./a capture/truth", "--out", "an out/../an out", "--tracks", "given"});
   EXPECT_EQ(outcome.code, 0) << outcome.text;
   EXPECT_TRUE(fs::exists(folder / "an out/poses/photos.json"));
 }

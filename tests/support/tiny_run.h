@@ -28,8 +28,9 @@ inline ProgramOutcome RunProgram(const std::string& program,
 
 // Flags that make fit, style and film as small as they go.
 inline std::vector<std::string> TinyFlags() {
-  return {"--photo-size",  "64", "--fit-resolutions", "24", "--fit-steps", "30",
-          "--style-steps", "3",  "--path-frames",     "3",  "--threads",   "2"};
+  return {"--photo-size",  "64",   "--fit-resolutions", "24", "--fit-steps", "30",
+          "--style-steps", "3",    "--path-frames",     "3",  "--threads",   "2",
+          "--tracks",      "given"};
 }
 
 }  // namespace regrade::testing
