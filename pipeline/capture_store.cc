@@ -6,9 +6,11 @@
 #include <set>
 
 #include "kernels/base/error.h"
+#include "kernels/base/natural_order.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/files/poses_bounds.h"
 #include "pipeline/files/transforms_json.h"
+#include "reconstruct/resized_model.h"
 
 namespace regrade {
 namespace {
@@ -41,6 +43,19 @@ fs::path CommonFolder(const fs::path& folder, const TransformsFile& file) {
   return common;
 }
 
+// Where the pictures are; empty if there is no such folder.
+fs::path PictureFolder(const fs::path& root) {
+  if (fs::is_directory(root / "images")) return root / "images";
+  std::vector<std::string> names;
+  std::error_code error;  // a folder that cannot be listed is told of by whoever needs it
+  for (fs::directory_iterator it(root, error), end; !error && it != end; it.increment(error))
+    if (const std::string name = it->path().filename().string();
+        name.starts_with("images_") && fs::is_directory(it->path(), error))
+      names.push_back(name);
+  std::sort(names.begin(), names.end(), NaturalLess);
+  return names.empty() ? fs::path() : root / names[0];
+}
+
 ColmapLens LensOf(const Camera& camera) {
   switch (camera.lens) {
     case LensModel::kPinhole:
@@ -57,7 +72,8 @@ ColmapLens LensOf(const Camera& camera) {
 
 // A model with one camera an image and no points, under our own names.
 ColmapModel ModelFromTransforms(const CaptureSource& source,
-                                const std::vector<StagedPhoto>& photos) {
+                                const std::vector<StagedPhoto>& photos,
+                                std::vector<std::string>* missing) {
   const fs::path folder = fs::path(source.poses).parent_path();
   std::map<std::string, const StagedPhoto*> by_path;
   for (const StagedPhoto& photo : photos)
@@ -69,7 +85,9 @@ ColmapModel ModelFromTransforms(const CaptureSource& source,
     *height = found == by_path.end() ? 1 : found->second->height;
   };
   ColmapModel model;
-  for (const TransformsFrame& frame : ReadTransformsJson(source.poses, size_of).frames) {
+  const TransformsFile file = ReadTransformsJson(source.poses, size_of);
+  *missing = file.missing;
+  for (const TransformsFrame& frame : file.frames) {
     const auto found = by_path.find(fs::weakly_canonical(folder / frame.file).string());
     if (found == by_path.end()) continue;  // left out at ingest, with a verdict
     const uint32_t id = static_cast<uint32_t>(model.images.size()) + 1;
@@ -98,6 +116,19 @@ ColmapModel ModelFromLlff(const CaptureSource& source, const std::vector<StagedP
     model.images.push_back({id, id, photos[i].name, camera.camera_from_world, {}});
   }
   return model;
+}
+
+constexpr char kAbsent[] = "absent/";  // no staged photo's name has a slash
+constexpr char kNoPicture[] = "has a pose, but there is no such picture";
+
+void NoteMissing(const std::vector<PhotoVerdict>& verdicts, std::vector<std::string>* notes) {
+  std::string first;
+  int count = 0;
+  for (const PhotoVerdict& verdict : verdicts)
+    if (verdict.why == kNoPicture && count++ == 0) first = verdict.file;
+  if (count > 0)
+    notes->push_back("pictures of " + std::to_string(count) + " poses are not there: " + first +
+                     (count > 1 ? " and others" : ""));
 }
 
 JsonValue VerdictsJson(const std::vector<PhotoVerdict>& verdicts) {
@@ -151,44 +182,57 @@ CaptureSource DetectCapture(const std::string& folder) {
     const fs::path photos = CommonFolder(root, ReadTransformsJson(file.string(), unknown_size));
     return {CaptureKind::kTransforms, photos.string(), file.string()};
   }
+  const fs::path pictures = PictureFolder(root);
   if (fs::is_regular_file(root / "poses_bounds.npy"))
-    for (const char* pictures : {"images", "images_4", "images_8"})
-      if (fs::is_directory(root / pictures))
-        return {CaptureKind::kLlff, (root / pictures).string(),
-                (root / "poses_bounds.npy").string()};
+    return {CaptureKind::kLlff, (pictures.empty() ? root : pictures).string(),
+            (root / "poses_bounds.npy").string()};
   for (const fs::path& poses : {root / "poses", root})
     if (fs::is_regular_file(poses / "photos.json") && HoldsModel(poses / "sparse"))
       return {CaptureKind::kPosed, (poses / "photos").string(), (poses / "sparse").string()};
-  if (fs::is_directory(root / "images"))
+  if (!pictures.empty())
     for (const char* model : {"sparse", "sparse/0"})
       if (HoldsModel(root / model))
-        return {CaptureKind::kColmap, (root / "images").string(), (root / model).string()};
+        return {CaptureKind::kColmap, pictures.string(), (root / model).string()};
   return {CaptureKind::kPhotos, root.string(), ""};
 }
 
 Capture ImportPoses(const CaptureSource& source, const std::vector<StagedPhoto>& photos,
-                    const std::vector<PhotoVerdict>& verdicts,
-                    const std::string& sparse_folder) {
+                    const std::vector<PhotoVerdict>& verdicts, const std::string& sparse_folder,
+                    std::vector<std::string>* notes) {
   ColmapModel model;
   double nearest_depth = 0;
+  std::vector<std::string> missing;
   if (source.kind == CaptureKind::kTransforms) {
-    model = ModelFromTransforms(source, photos);
+    model = ModelFromTransforms(source, photos, &missing);
   } else if (source.kind == CaptureKind::kLlff) {
     model = ModelFromLlff(source, photos, &nearest_depth);
   } else {
     model = ReadColmapModel(source.poses);
     nearest_depth = NearestDepthOf(source);
-    // The model goes on under our names; images without a staged photo keep theirs.
+    // The model goes on under our names. An image without a staged photo gets one that no photo
+    // has: its own may be the name under which another was staged.
     std::map<std::string, std::string> name_of;
     for (const StagedPhoto& photo : photos) name_of[photo.file] = photo.name;
     for (ColmapImage& image : model.images)
       if (const auto found = name_of.find(image.name); found != name_of.end())
         image.name = found->second;
+      else if (!image.name.starts_with(kAbsent))
+        image.name = kAbsent + image.name;
   }
+  if (const int resized = ResizeToPhotos(photos, &model); resized > 0)
+    notes->push_back(std::to_string(resized) +
+                     " photos have another size than their cameras and the same shape: the "
+                     "cameras follow");
   WriteColmapModel(model, sparse_folder);
   Capture capture = CaptureFromModel(model, photos, PhotoNames::kStaged);
   capture.nearest_depth = nearest_depth;
+  for (const PhotoVerdict& verdict : capture.verdicts)
+    if (verdict.verdict == "skipped")
+      missing.push_back(verdict.file.substr(std::string(kAbsent).size()));
   capture.verdicts = MergedVerdicts(verdicts, capture.verdicts);
+  for (const std::string& file : missing)
+    capture.verdicts.push_back({file, "skipped", kNoPicture});
+  NoteMissing(capture.verdicts, notes);
   return capture;
 }
 

@@ -13,9 +13,9 @@ namespace regrade {
 enum class CaptureKind {
   kPhotos,      // not at all
   kPosed,       // an output folder of ours, or its poses/: photos.json, photos/ and sparse/
-  kColmap,      // images/ beside sparse/ or sparse/0/
+  kColmap,      // a folder of pictures beside sparse/ or sparse/0/
   kTransforms,  // transforms.json, or transforms_train.json of a Blender capture
-  kLlff,        // poses_bounds.npy beside images/, images_4/ or images_8/
+  kLlff,        // poses_bounds.npy beside a folder of pictures, or among them
 };
 
 struct CaptureSource {
@@ -24,17 +24,19 @@ struct CaptureSource {
   std::string poses;   // folder of the model, or the file of poses; empty for kPhotos
 };
 
-// Tells by content. Throws Error(kInput) if there is no such folder.
+// Tells by content. A folder of pictures beside the poses is images/, or else the first of
+// images_2/, images_4/ and the like. Throws Error(kInput) if there is no such folder.
 CaptureSource DetectCapture(const std::string& folder);
 
 // What photos.json of a kPosed capture says of Capture::nearest_depth; 0 of others.
 double NearestDepthOf(const CaptureSource& source);
 
 // Poses that came with the photos, for those that were staged; the model is written to
-// `sparse_folder`. Throws Error(kInput) if they do not fit each other.
+// `sparse_folder`. Photos that were resampled since get cameras of their size. `notes`:
+// sentences for a person. Throws Error(kInput) if photos and poses do not fit each other.
 Capture ImportPoses(const CaptureSource& source, const std::vector<StagedPhoto>& photos,
-                    const std::vector<PhotoVerdict>& verdicts,
-                    const std::string& sparse_folder);
+                    const std::vector<PhotoVerdict>& verdicts, const std::string& sparse_folder,
+                    std::vector<std::string>* notes);
 
 // `folder` holds sparse/ and photos/ already; this adds photos.json.
 void WriteCaptureIndex(const std::string& folder, const Capture& capture,

@@ -66,6 +66,12 @@ Image AlphaOf(const Image& rgba) {
   return alpha;
 }
 
+bool ShowsThrough(const Image& rgba) {
+  for (int64_t i = 0; i < rgba.num_pixels(); ++i)
+    if (rgba.pixels[4 * i + 3] < 1) return true;
+  return false;
+}
+
 // Writes the picture unless the file already holds these very pixels.
 void Stage(const std::string& path, const Image& image) {
   if (fs::exists(path)) {
@@ -222,8 +228,9 @@ IngestResult IngestPhotos(const std::string& folder, const std::string& staging_
       const std::string alpha = StagedName(result.photos.size(), ".alpha.png");
       Stage(staging + "/" + alpha, AlphaOf(candidate.photo.image));
       staged_names.insert(alpha);
-      notice +=
-          std::string(notice.empty() ? "" : "; ") + "transparent parts are laid over white";
+      if (ShowsThrough(candidate.photo.image))
+        notice +=
+            std::string(notice.empty() ? "" : "; ") + "transparent parts are laid over white";
     }
     if (!notice.empty()) notices.Add(notice, file);
     result.verdicts.push_back({file, "used", notice});

@@ -85,7 +85,9 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
     outcome.figures["recipe"] = report.recipe;
     outcome.figures["lens"] = report.lens;
   } else {
-    capture = ImportPoses(source, ingest.photos, ingest.verdicts, sparse_folder);
+    std::vector<std::string> notes;
+    capture = ImportPoses(source, ingest.photos, ingest.verdicts, sparse_folder, &notes);
+    for (const std::string& note : notes) context->console->Info(note);
     outcome.figures["recipe"] = "poses came with the photos: " + source.poses;
   }
   PoseTracks tracks;

@@ -4,8 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <fstream>
 
 #include "kernels/base/child_process.h"
+#include "kernels/image/resize.h"
+#include "pipeline/files/image_file.h"
 #include "pipeline/files/json_file.h"
 #include "tests/support/temporary_folder.h"
 
@@ -73,6 +76,93 @@ TEST(CaptureStore, PosesWithoutTracksCannotBeRefined) {
   EXPECT_EQ(Regrade({"pose", folder / "s/truth", "--out", folder / "out", "--effects",
                      "pose-refinement=on", "--tracks", "given"}),
             6);
+}
+
+// Of a COLMAP workspace in which pictures are missing the others are staged under names that
+// the missing ones have in the model: no photo may get another's pose.
+TEST(CaptureStore, PicturesThatAreMissingLendNobodyTheirPoses) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}), 0);
+  ASSERT_EQ(Regrade({"pose", folder / "s/truth", "--out", folder / "all", "--tracks", "given"}),
+            0);
+  ASSERT_EQ(Regrade({"export", folder / "all", "--out", folder / "w"}), 0);
+  for (const char* name : {"00000.png", "00003.png"})
+    std::filesystem::remove(folder / (std::string("w/images/") + name));
+  ASSERT_EQ(Regrade({"pose", folder / "w", "--out", folder / "some", "--tracks", "given"}), 0);
+  const Capture all = ReadCapture(folder / "all/poses"),
+                some = ReadCapture(folder / "some/poses");
+  ASSERT_EQ(some.views.size(), 4u);
+  const size_t number[] = {1, 2, 4, 5};
+  for (size_t i = 0; i < 4; ++i) {
+    EXPECT_EQ(some.views[i].file, all.views[number[i]].name);
+    EXPECT_LE(Norm(some.views[i].camera.Center() - all.views[number[i]].camera.Center()), 1e-12)
+        << "a quaternion's rounding";
+  }
+  ASSERT_EQ(some.verdicts.size(), 6u);
+  EXPECT_EQ(some.verdicts[4].file, "00000.png");
+  EXPECT_EQ(some.verdicts[4].verdict, "skipped");
+  // And so as a capture of its own.
+  EXPECT_EQ(Regrade({"pose", folder / "some", "--out", folder / "again", "--tracks", "given"}),
+            0);
+  EXPECT_EQ(ReadCapture(folder / "again/poses").views.size(), 4u);
+}
+
+// Pictures that were made smaller after their poses were found, in a folder of another name.
+TEST(CaptureStore, CamerasFollowPicturesThatWereResampled) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "200x150", "--effects",
+                     "poses"}),
+            0);
+  std::filesystem::rename(folder / "s/images", folder / "s/images_4");
+  std::filesystem::create_directories(folder / "s/images_8");  // not this one
+  for (int i = 0; i < 6; i += 2) {
+    const std::string path = folder / ("s/images_4/0000" + std::to_string(i) + ".png");
+    WritePng8(path, Resize(ReadImage(path), 133, 100));
+  }
+  EXPECT_EQ(DetectCapture(folder / "s").kind, CaptureKind::kColmap);
+  ASSERT_EQ(Regrade({"pose", folder / "s", "--out", folder / "out", "--effects",
+                     "pose-refinement=off"}),
+            0);
+  const Capture capture = ReadCapture(folder / "out/poses");
+  ASSERT_EQ(capture.views.size(), 6u);
+  EXPECT_EQ(capture.views[0].camera.width, 133);
+  EXPECT_NEAR(capture.views[0].camera.fy, capture.views[1].camera.fy / 1.5, 1e-9);
+  EXPECT_EQ(capture.views[1].camera.width, 200);
+  EXPECT_GT(capture.points.size(), 100u);
+  EXPECT_LT(capture.reprojection_px, 3);  // sightings moved along
+  // Another shape is no size.
+  for (int i = 0; i < 6; ++i) {
+    const std::string path = folder / ("s/images_4/0000" + std::to_string(i) + ".png");
+    WritePng8(path, Resize(ReadImage(path), 200, 180));
+  }
+  EXPECT_EQ(Regrade({"pose", folder / "s", "--out", folder / "other"}), 3);
+}
+
+// LLFF's file beside pictures of one size only, or among them.
+TEST(CaptureStore, PicturesOfAnLlffFile) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directories(folder / "a/images_2");
+  std::filesystem::create_directories(folder / "b");
+  for (const char* name : {"a", "b"})
+    std::ofstream(folder / (std::string(name) + "/poses_bounds.npy")) << "poses";
+  EXPECT_EQ(DetectCapture(folder / "a").kind, CaptureKind::kLlff);
+  EXPECT_EQ(std::filesystem::path(DetectCapture(folder / "a").photos).filename(), "images_2");
+  EXPECT_EQ(DetectCapture(folder / "b").kind, CaptureKind::kLlff);
+  EXPECT_EQ(std::filesystem::path(DetectCapture(folder / "b").photos).filename(), "b");
+}
+
+// A list of poses that names pictures which are not there.
+TEST(CaptureStore, PicturesThatATransformsFileMissesAreTold) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}), 0);
+  std::filesystem::remove(folder / "s/images/00002.png");
+  ASSERT_EQ(Regrade({"pose", folder / "s/truth", "--out", folder / "out", "--tracks", "given"}),
+            0);
+  const Capture capture = ReadCapture(folder / "out/poses");
+  EXPECT_EQ(capture.views.size(), 5u);
+  ASSERT_EQ(capture.verdicts.size(), 6u);
+  EXPECT_EQ(capture.verdicts[5].file, "../images/00002.png");
+  EXPECT_EQ(capture.verdicts[5].verdict, "skipped");
 }
 
 }  // namespace
