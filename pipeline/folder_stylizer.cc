@@ -19,14 +19,19 @@ std::string StemOf(const std::string& name) {
   return std::filesystem::path(name).stem().string();
 }
 
-// By content; a name that says picture is taken at its word, so that a damaged one is not
-// passed over in silence.
-bool MeansAPicture(const std::string& path) {
+bool NamesAPicture(const std::string& path) {
   std::string extension = std::filesystem::path(path).extension().string();
   for (char& c : extension)
     if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
   for (const char* name : {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".exr"})
     if (extension == name) return true;
+  return false;
+}
+
+// By content; a name that says picture is taken at its word, so that a damaged one is not
+// passed over in silence.
+bool MeansAPicture(const std::string& path) {
+  if (NamesAPicture(path)) return true;
   std::string begin(4096, '\0');
   std::ifstream file(path, std::ios::binary);
   file.read(begin.data(), static_cast<std::streamsize>(begin.size()));
@@ -102,7 +107,10 @@ std::vector<std::string> PicturesByPhotoName(const std::string& folder,
   std::vector<std::string> paths(photos.size());
   bool any = false;
   for (const ListedFile& file : ListFolder(folder).files) {
-    const auto match = view_of.find(StemOf(file.name));
+    auto match = view_of.find(StemOf(file.name));
+    // IMG_7.jpg.png, as COLMAP names masks.
+    if (match == view_of.end() && NamesAPicture(StemOf(file.name)))
+      match = view_of.find(StemOf(StemOf(file.name)));
     if (match == view_of.end()) continue;
     if (!file.problem.empty()) throw Error(ExitCode::kInput, file.problem, file.path);
     if (!MeansAPicture(file.path)) continue;

@@ -22,7 +22,8 @@ namespace regrade {
 std::unique_ptr<ViewStylizer> MakeFolderStylizer(const std::string& folder,
                                                  const std::vector<std::string>& photos);
 
-// The picture in `folder` for each photo, by the names' stems; empty where there is none.
+// The picture in `folder` for each photo, by the names' stems, the photo's own extension kept
+// or not (IMG_7.jpg.png); empty where there is none.
 // `what` names such pictures ("mask"). Throws as MakeFolderStylizer does.
 std::vector<std::string> PicturesByPhotoName(const std::string& folder,
                                              const std::vector<std::string>& photos,

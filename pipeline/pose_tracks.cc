@@ -28,20 +28,20 @@ std::string Summary(const FoundTracks& found, double seconds, double cpu_seconds
 
 }  // namespace
 
-bool WantsTracks(const RunSettings& settings, const Capture& capture) {
-  if (settings.pose.tracks != "auto" || !capture.points.empty()) return false;
-  const auto wishes = ParseEffects(settings.run.effects);
+bool WantsTracks(const PoseOptions& options, const std::string& effects,
+                 const Capture& capture) {
+  if (options.tracks != "auto" || !capture.points.empty()) return false;
+  const auto wishes = ParseEffects(effects);
   const auto alpha = wishes.find("alpha");
   return alpha == wishes.end() ? !ShowsThroughPhotos(capture) : !alpha->second;
 }
 
-PoseTracks AddTracks(const RunSettings& settings, const std::string& sparse_folder,
-                     const std::vector<StagedPhoto>& photos, const std::string& work_folder,
-                     Capture* capture, const ProgressFunction& progress) {
+PoseTracks AddTracks(const PoseOptions& options, const std::string& effects,
+                     const std::string& sparse_folder, const std::vector<StagedPhoto>& photos,
+                     const std::string& work_folder, Capture* capture,
+                     const ProgressFunction& progress) {
   PoseTracks result;
-  if (!WantsTracks(settings, *capture)) return result;
-  PoseOptions options = settings.pose;
-  options.threads = settings.program.threads;
+  if (!WantsTracks(options, effects, *capture)) return result;
   using Clock = std::chrono::steady_clock;
   const Clock::time_point began = Clock::now();
   const double cpu_before = CpuSeconds();

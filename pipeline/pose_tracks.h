@@ -8,7 +8,7 @@
 #include "kernels/base/progress.h"
 #include "kernels/scene/capture.h"
 #include "pipeline/files/json_file.h"
-#include "pipeline/run_settings.h"
+#include "reconstruct/poses_from_photos.h"
 
 namespace regrade {
 
@@ -16,8 +16,10 @@ namespace regrade {
 inline constexpr size_t kFewestTracks = 50;
 
 // Would they be looked for? Not where poses came with points, not for transparent photos, whose
-// outlines say more, and not against --tracks given. Reads outlines, where every photo has one.
-bool WantsTracks(const RunSettings& settings, const Capture& capture);
+// outlines say more (`effects`: --effects, which may say of alpha), and not against --tracks
+// given. Reads outlines, where every photo has one.
+bool WantsTracks(const PoseOptions& options, const std::string& effects,
+                 const Capture& capture);
 
 struct PoseTracks {
   JsonValue figures;        // null where none were looked for
@@ -29,8 +31,9 @@ struct PoseTracks {
 // poses, and `capture` anew; where that fails, or finds fewer than kFewestTracks points, both
 // stay as they are, and the note says why. Throws Interrupted, and Error(kResources) when the
 // disk is full.
-PoseTracks AddTracks(const RunSettings& settings, const std::string& sparse_folder,
-                     const std::vector<StagedPhoto>& photos, const std::string& work_folder,
-                     Capture* capture, const ProgressFunction& progress);
+PoseTracks AddTracks(const PoseOptions& options, const std::string& effects,
+                     const std::string& sparse_folder, const std::vector<StagedPhoto>& photos,
+                     const std::string& work_folder, Capture* capture,
+                     const ProgressFunction& progress);
 
 }  // namespace regrade

@@ -92,6 +92,7 @@ ColmapArguments ExtractArguments(const PoseRecipe& recipe, const CameraGroup& gr
       {"SiftExtraction.max_num_features", std::to_string(recipe.max_features)},
       {"SiftExtraction.first_octave", std::to_string(recipe.first_octave)},
   };
+  if (!paths.masks.empty()) arguments.push_back({"ImageReader.mask_path", paths.masks});
   if (group.focal_px > 0) {
     const std::string f = Text(group.focal_px);
     std::string parameters = recipe.lens == ColmapLens::kOpenCv ? f + "," + f : f;

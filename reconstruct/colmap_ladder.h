@@ -41,6 +41,7 @@ std::vector<PoseRecipe> PoseLadder(const std::vector<StagedPhoto>& photos, int a
 
 struct ColmapPaths {
   std::string photos, database, image_list, model;
+  std::string masks;  // folder; empty: none
 };
 
 // The command lines of one recipe. `threads` 0 leaves the number to COLMAP.

@@ -176,7 +176,8 @@ class PoseFinder {
         recipe.keep_matches ? rung_folder_
                             : work_folder_ + "/rung_" + std::to_string(report_.rungs_tried + 1);
     const ColmapPaths paths = {photo_folder_, rung_folder + "/database.db",
-                               rung_folder + "/images.txt", rung_folder + "/sparse"};
+                               rung_folder + "/images.txt", rung_folder + "/sparse",
+                               options_.mask_folder};
     if (!recipe.keep_matches) {
       // COLMAP skips what a database holds already, also when it was made with other options.
       fs::remove_all(rung_folder);

@@ -20,7 +20,9 @@ struct PoseOptions {
   double quiet_limit_min = 15;
   bool free_focal = false;
   std::string tracks = "auto";
-  int threads = 0;  // 0: all; from --threads, no flag of its own
+  std::string photo_masks;
+  std::string mask_folder;  // as COLMAP wants them (photo_masks.h); empty: none. No flag.
+  int threads = 0;          // 0: all; from --threads, no flag of its own
 
   template <typename Bind>
   void Describe(Bind& bind) {
@@ -65,6 +67,9 @@ struct PoseOptions {
               "the scene's reach and its surroundings can be measured; given goes without. "
               "Transparent photos are never searched",
           .choices = "auto|given"});
+    bind("photo-masks", photo_masks,
+         {.help = "folder of pictures by the photos' names, black on people, cars and whatever "
+                  "else moved, white elsewhere: what is black is not matched"});
   }
 };
 

@@ -140,7 +140,7 @@ class TrackFinder {
       recipe.lens = group.camera.lens;
       ColmapArguments arguments =
           ExtractArguments(recipe, group.photos, options_.image_size, options_.threads,
-                           {PhotoFolder(), Database(), list, ""});
+                           {PhotoFolder(), Database(), list, "", options_.mask_folder});
       arguments.push_back({"ImageReader.camera_params", ParametersOf(group.camera)});
       RunColmap("feature_extractor", arguments, "features",
                 weight * static_cast<double>(group.photos.names.size()) /

@@ -20,7 +20,8 @@ import sys
 # name, path in DATA, exit status that is right
 REAL = (("kermit", "kermit", 0), ("sceaux_castle", "sceaux_castle", 0),
         ("fountain-P11", "strecha/fountain-P11/images", 0),
-        ("Herz-Jesus-P8", "strecha/Herz-Jesus-P8/images", 0), ("fox", "fox/images", 0), ("llff_fern", "llff_fern", 0),
+        ("Herz-Jesus-P8", "strecha/Herz-Jesus-P8/images", 0), ("fox", "fox/images", 0),
+        ("fox_given", "fox", 0), ("llff_fern", "llff_fern", 0),
         ("lego", "lego", 0), ("pure_rotation", "hard/pure_rotation", 6), ("three_photos", "hard/three_photos", 6),
         ("no_rigid_scene", "hard/no_rigid_scene", 6))
 # name, options of synth, what of it is the capture
@@ -29,6 +30,9 @@ SYNTHETIC = (("matte", ("--scene", "table"), "images"),
              ("highlights", ("--scene", "table", "--effects", "highlights"), "images"),
              ("wall", ("--scene", "wall"), "images"), ("square", ("--scene", "square", "--views", "40"), "images"),
              ("exposure", ("--scene", "table", "--effects", "exposure"), "images"),
+             # With their true poses in a transforms.json, and no points.
+             ("exposure_given", ("--scene", "table", "--effects", "exposure"), "truth"),
+             ("wall_given", ("--scene", "wall"), "truth"),
              ("barrel", ("--scene", "table", "--effects", "barrel"), "images"),
              ("poses", ("--scene", "table", "--effects", "poses"), ""))
 NO_SWITCH = ("distortion",)  # photos are followed through their lens or not: nothing to choose

@@ -9,6 +9,7 @@
 #include "pipeline/device_choice.h"
 #include "pipeline/evaluation_networks.h"
 #include "pipeline/files/image_file.h"
+#include "pipeline/photo_masks.h"
 #include "pipeline/plan.h"
 #include "pipeline/run_file.h"
 #include "pipeline/run_pipeline.h"
@@ -49,6 +50,10 @@ void ProbeInputs(const std::string& last, RunContext* context) {
     if (posed && std::filesystem::weakly_canonical(context->source) == folder)
       throw Error(ExitCode::kUsage, "is the capture itself, and would be written over", "--out",
                   "name another folder; to go on in this one, give the photos it was made of");
+  if (std::string& masks = context->settings.pose.photo_masks; !masks.empty()) {
+    PhotoMaskFiles(masks);
+    masks = std::filesystem::absolute(masks).lexically_normal().string();
+  }
   if (last == "pose" || last == "reconstruct") return;
   if (context->settings.style.picture.empty())
     throw Error(ExitCode::kUsage, "its value is missing", "--style",

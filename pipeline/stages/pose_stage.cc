@@ -6,6 +6,7 @@
 
 #include "pipeline/capture_store.h"
 #include "pipeline/folder_listing.h"
+#include "pipeline/photo_masks.h"
 #include "pipeline/plan.h"
 #include "pipeline/pose_profile.h"
 #include "pipeline/pose_tracks.h"
@@ -73,9 +74,15 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
 
   StageOutcome outcome;
   Capture capture;
+  PoseOptions options = settings.pose;
+  options.threads = settings.program.threads;
+  if (!options.photo_masks.empty()) {
+    options.mask_folder = workspace.Path(".regrade/work/pose/masks");
+    const int masks = StagePhotoMasks(options.photo_masks, ingest.photos, options.mask_folder);
+    context->console->Info("what " + std::to_string(masks) + " masks blacken is not matched");
+    outcome.figures["photo_masks"] = masks;
+  }
   if (source.kind == CaptureKind::kPhotos) {
-    PoseOptions options = settings.pose;
-    options.threads = settings.program.threads;
     PoseReport report;
     capture = PosesFromPhotos(ingest.photos, ingest.verdicts, options,
                               workspace.Path(".regrade/work/pose"), sparse_folder,
@@ -92,7 +99,7 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
   }
   PoseTracks tracks;
   if (source.kind != CaptureKind::kPhotos)
-    tracks = AddTracks(settings, sparse_folder, ingest.photos,
+    tracks = AddTracks(options, settings.run.effects, sparse_folder, ingest.photos,
                        workspace.Path(".regrade/work/pose/tracks"), &capture,
                        parts.Next(shares.tracks));
   if (!tracks.note.empty()) context->console->Info(tracks.note);
@@ -135,6 +142,8 @@ Stage PoseStage(RunContext* context) {
   const auto wishes = ParseEffects(context->settings.run.effects);
   if (const auto wish = wishes.find(kPoseRefinement); wish != wishes.end())
     stage.inputs[kPoseRefinement] = wish->second;
+  if (!context->settings.pose.photo_masks.empty())
+    stage.inputs["photo_masks"] = PhotoMaskFiles(context->settings.pose.photo_masks);
   stage.refuse_changes = true;
   const int64_t photos = static_cast<int64_t>(stage.inputs.At("photos").AsObject().size());
   stage.plan =

@@ -84,7 +84,7 @@ TEST(PoseTracks, WithoutColmapEverythingIsAsWithoutTracks) {
 
 TEST(PoseTracks, TransparentPhotosAndOwnPointsAreNotSearched) {
   const TemporaryFolder folder;
-  RunSettings settings;
+  PoseOptions options;
   Capture capture;
   Image alpha(8, 8, 1);  // all transparent
   const std::string photo = folder / "00000.png";
@@ -92,14 +92,13 @@ TEST(PoseTracks, TransparentPhotosAndOwnPointsAreNotSearched) {
   CaptureView view{"00000.png", "a.png", photo, {}};
   view.camera.width = view.camera.height = 8;
   capture.views = {view};
-  EXPECT_FALSE(WantsTracks(settings, capture));
-  settings.run.effects = "alpha=off";
-  EXPECT_TRUE(WantsTracks(settings, capture));
-  settings.pose.tracks = "given";
-  EXPECT_FALSE(WantsTracks(settings, capture));
-  settings.pose.tracks = "auto";
+  EXPECT_FALSE(WantsTracks(options, "auto", capture));
+  EXPECT_TRUE(WantsTracks(options, "alpha=off", capture));
+  options.tracks = "given";
+  EXPECT_FALSE(WantsTracks(options, "alpha=off", capture));
+  options.tracks = "auto";
   capture.points.resize(1);
-  EXPECT_FALSE(WantsTracks(settings, capture));
+  EXPECT_FALSE(WantsTracks(options, "alpha=off", capture));
 }
 
 // A drift of +-30 %, poses in a transforms.json, no points.
@@ -125,6 +124,46 @@ TEST(PoseTracks, ExposureOfGivenPosesIsFoundWithinTwoPerCent) {
   double worst = 0;
   for (const double ratio : ratios) worst = std::max(worst, std::abs(ratio - mean));
   EXPECT_LE(worst, 0.02);
+}
+
+// Masks by the names of photos, with their extension or without, of half the size: what they
+// blacken is not matched.
+TEST(PoseTracks, WhatMasksBlackenIsNotMatched) {
+  if (!HaveColmap()) GTEST_SKIP() << "no colmap here";
+  const TemporaryFolder folder;
+  Synth(folder / "s", "");
+  fs::create_directories(folder / "masks");
+  Image mask(140, 105, 1);
+  for (int y = 0; y < mask.height; ++y)
+    for (int x = 70; x < mask.width; ++x) *mask.at(x, y) = 1;
+  for (int i = 1; i < kViews; ++i) {  // the first has none
+    char name[32];
+    std::snprintf(name, sizeof name, i % 2 ? "%05d.png" : "%05d.png.png", i);
+    WritePng8(folder / ("masks/" + std::string(name)), mask);
+  }
+  Regrade(
+      {"pose", folder / "s/truth", "--out", folder / "out", "--photo-masks", folder / "masks"});
+  const ColmapModel model = ReadColmapModel(folder / "out/poses/sparse");
+  ASSERT_GE(model.points.size(), kFewestTracks);
+  int64_t sightings = 0, in_first = 0;
+  for (const ColmapImage& image : model.images)
+    for (const ColmapKeypoint& keypoint : image.keypoints) {
+      if (image.name != "00000.png") {
+        EXPECT_GE(keypoint.u, 139) << image.name;  // the mask's edge, to a pixel
+        ++sightings;
+      } else if (keypoint.u < 139) {
+        ++in_first;
+      }
+    }
+  EXPECT_GT(sightings, 500);
+  EXPECT_GT(in_first, 20);
+  // Other masks are other inputs; and a folder without a mask of a photo is a mistake.
+  EXPECT_NE(
+      ReadJsonFile(folder / "out/.regrade/stages/pose.json").At("inputs").Find("photo_masks"),
+      nullptr);
+  EXPECT_FALSE(RunChild({.argv = {REGRADE_PROGRAM, "pose", folder / "s/truth", "--out",
+                                  folder / "wrong", "--photo-masks", folder / "s/truth/flow"}})
+                   .Succeeded());
 }
 
 // Poses 0.3 degrees and 0.5 % of the spread off, handed over without their tracks.
