@@ -64,6 +64,10 @@ JsonValue StageJson(const PoseStageReport& stage) {
   Put(object, "reprojection_px", stage.reprojection_px);
   object.emplace_back("points", stage.points);
   object.emplace_back("models_found", stage.models_found);
+  if (stage.tracks_seconds) {
+    object.emplace_back("tracks_seconds", *stage.tracks_seconds);
+    object.emplace_back("tracks_cpu_seconds", stage.tracks_cpu_seconds.value_or(0));
+  }
   return object;
 }
 

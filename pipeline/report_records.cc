@@ -211,6 +211,10 @@ RunReport ReportFromRecords(const Workspace& workspace) {
     const JsonValue& f = pose->figures;
     stages.pose = {pose->seconds, FigureOf(f, "reprojection_px"), CountOf(f, "points"),
                    static_cast<int>(CountOf(f, "models_found"))};
+    if (const JsonValue* tracks = f.Find("tracks"); tracks && tracks->Find("seconds")) {
+      stages.pose->tracks_seconds = tracks->At("seconds").AsDouble();
+      stages.pose->tracks_cpu_seconds = tracks->At("cpu_seconds").AsDouble();
+    }
   }
   if (reconstruct) {
     const JsonValue& f = reconstruct->figures;

@@ -112,6 +112,9 @@ std::vector<StageLine> StageLines(const StagesReport& stages) {
     std::string& said = add("pose", s->seconds);
     Say(said, "reprojection " + FigureHtml(s->reprojection_px, 2, "px"));
     Say(said, std::to_string(s->points) + " points");
+    if (s->tracks_seconds)
+      Say(said, "looked for under the poses that were given in " +
+                    FigureHtml(Figure(*s->tracks_seconds), 1, "s"));
     if (s->models_found != 1) Say(said, std::to_string(s->models_found) + " models found");
   }
   if (const auto& s = stages.reconstruct) {

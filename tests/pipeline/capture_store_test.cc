@@ -80,7 +80,7 @@ TEST(CaptureStore, PosesWithoutTracksCannotBeRefined) {
 
 // Of a COLMAP workspace in which pictures are missing the others are staged under names that
 // the missing ones have in the model: no photo may get another's pose.
-TEST(CaptureStore, PicturesThatAreMissingLendNobodyTheirPoses) {
+TEST(CaptureStore, F61_PicturesThatAreMissingLendNobodyTheirPoses) {
   const TemporaryFolder folder;
   ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}), 0);
   ASSERT_EQ(Regrade({"pose", folder / "s/truth", "--out", folder / "all", "--tracks", "given"}),
@@ -108,7 +108,7 @@ TEST(CaptureStore, PicturesThatAreMissingLendNobodyTheirPoses) {
 }
 
 // Pictures that were made smaller after their poses were found, in a folder of another name.
-TEST(CaptureStore, CamerasFollowPicturesThatWereResampled) {
+TEST(CaptureStore, H137_CamerasFollowPicturesThatWereResampled) {
   const TemporaryFolder folder;
   ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "200x150", "--effects",
                      "poses"}),

@@ -40,6 +40,17 @@ RunReport FullReport() {
   return report;
 }
 
+TEST(ReportJson, SecondsOfTracksWhereTheyWereLookedFor) {
+  RunReport report = FullReport();
+  report.stages.pose->tracks_seconds = 12.5;
+  report.stages.pose->tracks_cpu_seconds = 20;
+  const JsonValue pose = ReportJson(report).At("stages").At("pose");
+  EXPECT_EQ(KeysOf(pose), (Keys{"seconds", "reprojection_px", "points", "models_found",
+                                "tracks_seconds", "tracks_cpu_seconds"}));
+  EXPECT_EQ(pose.At("tracks_seconds").AsDouble(), 12.5);
+  EXPECT_EQ(pose.At("tracks_cpu_seconds").AsDouble(), 20);
+}
+
 TEST(ReportJson, HasTheKeysOfSchema1InOrder) {
   const JsonValue json = ReportJson(FullReport());
   EXPECT_EQ(KeysOf(json),

@@ -53,6 +53,14 @@ TEST(ForwardFacing, H87_IsToldFromCapturesThatTurn) {
   EXPECT_FALSE(MeasureForwardFacing(two).on);
 }
 
+// What came with the poses is not estimated again from points that are found later.
+TEST(ForwardFacing, ADepthThatWasSaidStands) {
+  Capture capture = WallCapture(10, 0.05);
+  EXPECT_NEAR(MeasureForwardFacing(capture).nearest, 3, 0.2);
+  capture.nearest_depth = 2.5;
+  EXPECT_EQ(MeasureForwardFacing(capture).nearest, 2.5);
+}
+
 TEST(ForwardFacing, H88_EveryRayStaysInTheBoxAndMeetsTheScene) {
   const Capture capture = WallCapture(10, 0.05);
   const NormalizedScene scene = NormalizeForwardFacing(capture, MeasureForwardFacing(capture));
