@@ -13,7 +13,7 @@ namespace regrade {
 namespace {
 
 constexpr char kUnjudged[] =
-    ": exposure and the poses stay unjudged, and the box is a guess from the cameras";
+    " Exposure and the poses stay unjudged, and the box is a guess from the cameras";
 
 std::string Summary(const FoundTracks& found, double seconds, double cpu_seconds) {
   char text[256];
@@ -24,6 +24,27 @@ std::string Summary(const FoundTracks& found, double seconds, double cpu_seconds
                 found.colmap_version.c_str(), found.model.points.size(),
                 static_cast<long long>(found.sightings), found.median_px, seconds, cpu_seconds);
   return text;
+}
+
+// Wrong poses find points, too: a match between two photos may fit them by chance, a third
+// photo's sighting besides hardly ever does.
+bool Believable(const FoundTracks& found) {
+  const double points = static_cast<double>(found.model.points.size());
+  return found.model.points.size() >= kFewestTracks &&
+         static_cast<double>(found.sightings) >= kFewestSightingsOfAPoint * points;
+}
+
+std::string DoubtText(const FoundTracks& found) {
+  char text[256];
+  std::snprintf(text, sizeof text,
+                "under the poses that were given COLMAP found %zu points, seen %.1f times on "
+                "average: little texture, or do the poses not belong to these photos?",
+                found.model.points.size(),
+                found.model.points.empty()
+                    ? 0.0
+                    : static_cast<double>(found.sightings) /
+                          static_cast<double>(found.model.points.size()));
+  return text + std::string(kUnjudged);
 }
 
 }  // namespace
@@ -51,7 +72,8 @@ PoseTracks AddTracks(const PoseOptions& options, const std::string& effects,
         TracksForPoses(ReadColmapModel(sparse_folder), photos, options, work_folder, progress);
   } catch (const Error& error) {
     if (error.code() != ExitCode::kExternalProgram) throw;
-    result.note = "no tracks were found for the poses, for " + error.what_failed() + kUnjudged;
+    result.note =
+        "no tracks were found for the poses, for " + error.what_failed() + "." + kUnjudged;
     result.figures = JsonValue::Object{{"points", 0}, {"failed", error.what_failed()}};
     return result;
   }
@@ -65,11 +87,8 @@ PoseTracks AddTracks(const PoseOptions& options, const std::string& effects,
                         {"colmap", found.colmap_version},
                         {"seconds", seconds},
                         {"cpu_seconds", cpu_seconds}};
-  if (found.model.points.size() < kFewestTracks) {
-    result.note = "under the poses that were given the photos have " +
-                  std::to_string(found.model.points.size()) +
-                  " points in common: too little texture, or poses of something else" +
-                  kUnjudged;
+  if (!Believable(found)) {
+    result.note = DoubtText(found);
     return result;
   }
   WriteColmapModel(found.model, sparse_folder);

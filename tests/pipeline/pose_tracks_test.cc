@@ -126,6 +126,25 @@ TEST(PoseTracks, ExposureOfGivenPosesIsFoundWithinTwoPerCent) {
   EXPECT_LE(worst, 0.02);
 }
 
+// Poses of the right photos in the wrong order: COLMAP finds points for them, by chance.
+TEST(PoseTracks, PosesOfOtherPhotosAreDoubted) {
+  if (!HaveColmap()) GTEST_SKIP() << "no colmap here";
+  const TemporaryFolder folder;
+  Synth(folder / "s", "");
+  const std::string path = folder / "s/truth/transforms.json";
+  JsonValue json = ReadJsonFile(path);
+  JsonValue::Array frames = json.At("frames").AsArray();
+  std::vector<JsonValue> poses;
+  for (const JsonValue& frame : frames) poses.push_back(frame.At("transform_matrix"));
+  for (size_t i = 0; i < frames.size(); ++i)
+    frames[i]["transform_matrix"] = poses[(5 * i + 3) % poses.size()];
+  json["frames"] = frames;
+  WriteJsonFile(path, json);
+  const std::string said = Regrade({"pose", folder / "s/truth", "--out", folder / "out"});
+  EXPECT_NE(said.find("do the poses not belong"), std::string::npos) << said;
+  EXPECT_TRUE(ReadCapture(folder / "out/poses").points.empty());
+}
+
 // Masks by the names of photos, with their extension or without, of half the size: what they
 // blacken is not matched.
 TEST(PoseTracks, WhatMasksBlackenIsNotMatched) {
