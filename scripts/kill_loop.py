@@ -92,7 +92,8 @@ class Supervisor:
 
     def undisturbed(self):
         """Runs once; learns the results and how long each stage takes."""
-        if Run([self.regrade, "pose", self.posed_capture, "--out", self.work, "--photo-size", "96"]).finish() != 0:
+        if Run([self.regrade, "pose", self.posed_capture, "--out", self.work, "--photo-size", "96",
+                "--tracks", "given"]).finish() != 0:
             sys.exit("the undisturbed run's poses failed")
         self.posed = shutil.copytree(self.work, os.path.join(self.scratch, "posed"))
         run, self.duration, last = Run(self.command()), {}, time.monotonic()

@@ -176,7 +176,8 @@ class Trials:
     # --- two at once
 
     def pairs(self, count):
-        command = [self.regrade, "pose", self.posed_capture, "--out", self.work, "--photo-size", "96"]
+        command = [self.regrade, "pose", self.posed_capture, "--out", self.work, "--photo-size", "96",
+                   "--tracks", "given"]
         both = 0
         for number in range(count):
             shutil.rmtree(self.work, ignore_errors=True)
