@@ -97,6 +97,9 @@ struct StylizeReport {
   Figure psnr_to_2d_photos_db;          // ... against the 2D method on the photos
   Figure linear_map_psnr_to_2d_db;      // what the better of two linear colour maps reaches
   Figure slope_ascent;                  // the largest that climbing from the voxels finds
+  // Of the colour map that it started from; and where it is steepest, with the position held
+  // and with the coefficients held.
+  Figure slope_of_map, slope_along_coefficients, slope_along_position;
   std::vector<std::pair<int64_t, double>> bound_at_steps;  // while it was learned
   std::optional<VarianceFigures> variance;
   std::vector<std::string> notices;       // of the colour map and of learning

@@ -110,6 +110,9 @@ JsonValue StageJson(const StylizeReport& stage) {
   Put(object, "psnr_to_2d_photos_db", stage.psnr_to_2d_photos_db);
   Put(object, "linear_map_psnr_to_2d_db", stage.linear_map_psnr_to_2d_db);
   Put(object, "slope_ascent", stage.slope_ascent);
+  Put(object, "slope_of_map", stage.slope_of_map);
+  Put(object, "slope_along_coefficients", stage.slope_along_coefficients);
+  Put(object, "slope_along_position", stage.slope_along_position);
   if (!stage.bound_at_steps.empty())
     object.emplace_back("bound_at_steps", CurveJson(stage.bound_at_steps));
   if (stage.variance) object.emplace_back("variance", VarianceJson(*stage.variance));

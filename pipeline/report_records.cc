@@ -239,6 +239,9 @@ RunReport ReportFromRecords(const Workspace& workspace) {
     stages.stylize->bound = FigureOf(f, "bound");
     stages.stylize->slope_observed = FigureOf(f, "slope_observed");
     stages.stylize->slope_ascent = FigureOf(f, "slope_ascent");
+    stages.stylize->slope_of_map = FigureOf(f, "slope_of_map");
+    stages.stylize->slope_along_coefficients = FigureOf(f, "slope_along_coefficients");
+    stages.stylize->slope_along_position = FigureOf(f, "slope_along_position");
     stages.stylize->bound_at_steps = CurveOf(f, "bound_steps", "bound_at_steps");
     stages.stylize->notices = TextsOf(f, "notices");
     if (const JsonValue* variance = f.Find("variance"))

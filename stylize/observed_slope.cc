@@ -127,7 +127,13 @@ ObservedSlopes ObserveSlopes(const LipschitzNetwork& network, const RadianceFiel
   }
   std::sort(steepest.begin(), steepest.end(),
             [](const auto& a, const auto& b) { return a.first > b.first; });
-  if (!steepest.empty()) result.jacobians = steepest.front().first;
+  if (!steepest.empty()) {
+    result.jacobians = steepest.front().first;
+    const MatrixXd jacobian = f.Jacobian(steepest.front().second);
+    const auto norm = [](const MatrixXd& m) { return m.jacobiSvd().singularValues()(0); };
+    result.along_coefficients = norm(jacobian.leftCols(kNetworkSh));
+    result.along_position = norm(jacobian.rightCols(kNetworkInputs - kNetworkSh));
+  }
 
   // Climb: finite differences of the slope, a step of shrinking length along them.
   result.ascent = result.jacobians;

@@ -19,7 +19,9 @@ struct SlopeOptions {
 struct ObservedSlopes {
   double pairs = 0;      // largest ||f(x) - f(y)|| / ||x - y|| over the pairs
   double jacobians = 0;  // largest ||J f(x)||_2 at voxels
-  double ascent = 0;     // largest found by climbing from the steepest of them, off the data
+  // Of the steepest of those voxels: with the position held, and with the coefficients held.
+  double along_coefficients = 0, along_position = 0;
+  double ascent = 0;  // largest found by climbing from the steepest of them, off the data
   // What the summit's own pair says: the points `min_distance` apart about it, along the
   // steepest direction. No derivative has a part in it.
   double summit_pair = 0;

@@ -133,6 +133,8 @@ class Training {
 
  private:
   ColorMap ChooseBase();
+  // Of those that --style-base and the bound allow; mse of the sample.
+  ColorMap BetterMap(double* mse);
   bool Step(AggregationResult* step, std::vector<double>* gradient);
   bool StepsOnDevice(int64_t most, AggregationResult* last, std::vector<double>* gradient);
   void DrawAhead(int64_t step);
@@ -173,16 +175,29 @@ class Training {
   int rejected_in_a_row_ = 0;
 };
 
-ColorMap Training::ChooseBase() {
-  ColorMap base = scene_map_.map;
-  state_.linear_map_mse = std::numeric_limits<double>::infinity();
+ColorMap Training::BetterMap(double* mse) {
+  ColorMap better = scene_map_.map;
+  *mse = std::numeric_limits<double>::infinity();
   const auto consider = [&](const ColorMap& map) {
-    const double mse = loss_->Run(NetworkOfMap(map), sample_, nullptr).Mse();
-    if (mse < state_.linear_map_mse) state_.linear_map_mse = mse, base = map;
+    const double error = loss_->Run(NetworkOfMap(map), sample_, nullptr).Mse();
+    if (error < *mse) *mse = error, better = map;
   };
   if (options_.base != "least-squares") consider(scene_map_.map);
-  if (options_.base != "mkl") consider(LeastSquaresMap(field_, sample_, aggregation_options_));
-  return base;
+  if (options_.base == "mkl") return better;
+  const ColorMap least_squares = LeastSquaresMap(field_, sample_, aggregation_options_);
+  if (options_.bound_factor <= 0 || options_.base == "least-squares" ||
+      SpectralNorm(least_squares.matrix) <= options_.bound_factor * result_.k_est)
+    consider(least_squares);
+  return better;
+}
+
+ColorMap Training::ChooseBase() {
+  result_.linear_map = BetterMap(&state_.linear_map_mse);
+  // Where the 2D method is no colour map, least squares may find a steep one, and every voxel
+  // pays for it in the bound and the slope. Up to a quarter its head start is worth that.
+  const double least_squares = SpectralNorm(result_.linear_map.matrix);
+  const bool steep = least_squares > 1.25 * SpectralNorm(scene_map_.map.matrix);
+  return options_.base == "best" && steep ? scene_map_.map : result_.linear_map;
 }
 
 void Training::Start(int64_t bad_pixels) {
@@ -312,10 +327,9 @@ TrainNetworkResult Training::Conclude() {
   network_.WarmUpNorms();
   double mse = loss_->Run(network_, sample_, nullptr).Mse();
   if (network_.data().has_base && !(mse <= state_.linear_map_mse)) {
-    result_.warnings.push_back(
-        "the network did not beat the colour map: the map alone is used");
+    result_.warnings.push_back("the network did not beat the colour map: that alone is used");
+    network_.data().base = BetterMap(&mse);
     ClearLastLayer(&network_);
-    mse = state_.linear_map_mse;
   }
   // The power iteration's norms are a little low; the promise is about exact ones.
   const double excess = network_.ResidualBound() / Budget();
@@ -323,6 +337,7 @@ TrainNetworkResult Training::Conclude() {
   result_.bound = network_.Bound();
   const ObservedSlopes slopes = ObserveSlopes(network_, field_, {.seed = options_.seed});
   result_.slope_observed = slopes.OnData();
+  result_.slopes = slopes;
   result_.slope_ascent = std::max(slopes.ascent, slopes.summit_pair);
   result_.smallest_k = network_.SmallestK();
   if (result_.smallest_k < 10 * std::sqrt(kSquareplusB))

@@ -17,6 +17,7 @@
 #include "kernels/scene/image.h"
 #include "stylize/linear_map.h"
 #include "stylize/lipschitz_network.h"
+#include "stylize/observed_slope.h"
 
 namespace regrade {
 
@@ -78,7 +79,8 @@ struct TrainNetworkOptions {
           .min = 0,
           .max = 0.1});
     bind("style-base", base,
-         {.help = "the colour map that the network starts from",
+         {.help = "the colour map that the network starts from; best is least squares where it "
+                  "is nearer to the 2D method and not much steeper than mkl, else mkl",
           .choices = "best|mkl|least-squares|none"});
     bind("style-start", start,
          {.help = "ablation, with --style-base none: the weights that learning begins with; "
@@ -177,16 +179,18 @@ struct TrainingHooks {
 
 struct TrainNetworkResult {
   LipschitzNetwork network;
-  int64_t steps = 0;              // taken
-  double k_est = 0;               // as used: cut at kLargestKEst
-  double bound = 0;               // LipschitzNetwork::Bound()
-  double slope_observed = 0;      // on the field's voxels
+  int64_t steps = 0;          // taken
+  double k_est = 0;           // as used: cut at kLargestKEst
+  double bound = 0;           // LipschitzNetwork::Bound()
+  double slope_observed = 0;  // on the field's voxels
+  ObservedSlopes slopes;
   double slope_ascent = 0;        // climbed to from there
   double smallest_k = 0;          // of the layers; near 0 a layer is dead
   double largest_norm_drift = 0;  // of the power iteration, seen while learning
   double psnr_db = 0;             // of a fixed sample of training rays to the targets, clipped
-  double linear_map_psnr_db = 0;  // the same of the base map alone; 0 without one
+  double linear_map_psnr_db = 0;  // the same of linear_map; 0 without a base map
   double mean_touched_voxels = 0;
+  ColorMap linear_map;          // the nearer one to the targets, however steep
   int64_t rejected_steps = 0;   // not finite
   int64_t left_out_pixels = 0;  // targets that are not finite
   BoundHistory history;         // every kBoundEvery steps, and the end

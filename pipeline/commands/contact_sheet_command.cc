@@ -188,7 +188,7 @@ void AddStyle(RunContext* context, const Scene& scene, const SheetOptions& sheet
                                                sheet.steps, settings.run.seed, parts.Next(1));
   const TrainNetworkResult by_paper =
       Train(scene, paper, views, map, "paper", sheet.steps, settings.run.seed, parts.Next(1));
-  linear.appearance = ApplyColorMap(source.appearance, by_standard.network.data().base);
+  linear.appearance = ApplyColorMap(source.appearance, by_standard.linear_map);
   standard.appearance = ApplyNetwork(by_standard.network, standard);
   paper.appearance = ApplyNetwork(by_paper.network, paper);
   const std::vector<Image> columns[] = {Shown(scene, linear), Shown(scene, paper),

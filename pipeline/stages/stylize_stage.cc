@@ -3,6 +3,7 @@
 #include <omp.h>
 
 #include <algorithm>
+#include <cstdio>
 #include <filesystem>
 #include <utility>
 
@@ -66,6 +67,28 @@ JsonValue VarianceRecord(const RadianceField& source, const RadianceField& style
                            {"clamp", GroupRecord(report.clamp)},
                            {"open", GroupRecord(report.open)},
                            {"largest_share", report.largest_share}};
+}
+
+// Why the network is steeper than the colours' covariances tell, where it is.
+std::string WhySteep(const TrainNetworkResult& trained) {
+  constexpr double kSteep = 1.5;
+  if (!(trained.slope_observed > kSteep * trained.k_est)) return "";
+  const double of_map = trained.network.BaseNorm(),
+               of_colors = trained.slopes.along_coefficients;
+  const double of_places = trained.slopes.along_position;
+  const char* reason = "the 2D method bends colours more than one map for all of them does";
+  if (of_map > kSteep * trained.k_est)
+    reason = "a colour map that follows the 2D method is that steep by itself";
+  else if (of_places > of_colors - of_map)
+    reason = "the 2D method maps the same colours differently in different views and places";
+  char text[360];
+  std::snprintf(
+      text, sizeof text,
+      "the largest slope seen, %.2f, is %.2f K_est: %s (the map alone %.2f; where it is "
+      "steepest %.2f along coefficients and %.2f along positions)",
+      trained.slope_observed, trained.slope_observed / trained.k_est, reason, of_map, of_colors,
+      of_places);
+  return text;
 }
 
 // An object's style that no view shows.
@@ -162,6 +185,9 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
     outcome.figures["bound_at_steps"].Append(trained.history.bounds[i]);
   }
   outcome.figures["slope_ascent"] = trained.slope_ascent;
+  outcome.figures["slope_of_map"] = trained.network.BaseNorm();
+  outcome.figures["slope_along_coefficients"] = trained.slopes.along_coefficients;
+  outcome.figures["slope_along_position"] = trained.slopes.along_position;
   // A network's promise is about what it alone has made, and is measured on voxels.
   if (object == nullptr && !source.geometry->spheres.on())
     outcome.figures["variance"] =
@@ -170,6 +196,10 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
   for (const std::string& notice : lessons.notices) outcome.figures["notices"].Append(notice);
   for (const std::string& warning : trained.warnings)
     outcome.figures["notices"].Append(warning);
+  if (const std::string why = WhySteep(trained); !why.empty()) {
+    context->console->Info(why);
+    outcome.figures["notices"].Append(why);
+  }
   return outcome;
 }
 

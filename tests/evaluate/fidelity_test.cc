@@ -125,6 +125,24 @@ TEST(Fidelity, GreyVideoIsFoundOut) {
   EXPECT_LT(*trap.chroma, 1e-6);
 }
 
+TEST(Fidelity, StructureIsLostToNoiseAndNotToColour) {
+  Image before(40, 30), darker(40, 30), noisy(40, 30);
+  for (int y = 0; y < 30; ++y)
+    for (int x = 0; x < 40; ++x)
+      for (int c = 0; c < 3; ++c) {
+        const float v = (x / 8 + y / 6) % 2 == 0 ? 0.3f : 0.7f;
+        before.at(x, y)[c] = v;
+        darker.at(x, y)[c] = 0.2f + 0.5f * v;
+        noisy.at(x, y)[c] =
+            v + 0.3f * (static_cast<float>((x * 7919 + y * 104729) % 101) / 101 - 0.5f);
+      }
+  FidelityTargets targets;
+  EXPECT_FALSE(MeasureFidelity({"s", Frames({darker})}, targets).structure);
+  targets.unstyled = Frames({before});
+  EXPECT_NEAR(*MeasureFidelity({"s", Frames({darker})}, targets).structure, 1, 1e-5);
+  EXPECT_LT(*MeasureFidelity({"s", Frames({noisy})}, targets).structure, 0.9);
+}
+
 TEST(Fidelity, PsnrClipsBothAndLeavesEmptySpaceOut) {
   Image frame = ConstantImage(20, 20, 1.7f), target = ConstantImage(20, 20, 0.9f);
   Image transmittance(20, 20, 1);

@@ -33,6 +33,9 @@ RunReport FullReport() {
   report.stages.style_2d = Style2dReport{3, "mkl"};
   report.stages.stylize = StylizeReport{4, 300, 1.5, 1.9, 1.2, 27, 25, 26};
   report.stages.stylize->slope_ascent = 1.3;
+  report.stages.stylize->slope_of_map = 1.1;
+  report.stages.stylize->slope_along_coefficients = 1.2;
+  report.stages.stylize->slope_along_position = 0.1;
   report.stages.render = RenderReport{5, 60, 12};
   report.stages.evaluate = EvaluateReport{6, "dis-medium", "lai2018"};
   report.consistency = {{"styled", 1, 49, 0, 29.8, 29.5, 0.8, {}, 29.1, 30.4, ""}};
@@ -73,7 +76,8 @@ TEST(ReportJson, HasTheKeysOfSchema1InOrder) {
   EXPECT_EQ(KeysOf(stages.At("style_2d")), (Keys{"seconds", "method"}));
   EXPECT_EQ(KeysOf(stages.At("stylize")),
             (Keys{"seconds", "steps", "k_est", "bound", "slope_observed", "psnr_to_2d_db",
-                  "psnr_to_2d_photos_db", "linear_map_psnr_to_2d_db", "slope_ascent"}));
+                  "psnr_to_2d_photos_db", "linear_map_psnr_to_2d_db", "slope_ascent",
+                  "slope_of_map", "slope_along_coefficients", "slope_along_position"}));
   EXPECT_EQ(KeysOf(stages.At("render")), (Keys{"seconds", "frames", "frames_per_second"}));
   EXPECT_EQ(KeysOf(stages.At("evaluate")), (Keys{"seconds", "flow", "mask"}));
   EXPECT_EQ(KeysOf(json.At("consistency").AsArray()[0]),

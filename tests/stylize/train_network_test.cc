@@ -81,6 +81,39 @@ TEST(TrainNetwork, NeverLosesToTheLinearMap) {
   EXPECT_GE(result.psnr_db, result.linear_map_psnr_db);
 }
 
+TEST(TrainNetwork, AMapSteeperThanTheScenesIsAYardstickButNoStart) {
+  const StyledBall ball(16, 4, 32, CurvedStyle);
+  const SceneColorMap steep = MapOf(ball);
+  SceneColorMap flat = steep;
+  for (Vec3d& row : flat.map.matrix.row) row = 0.7 * row;
+  TrainNetworkOptions options = Quick(120);
+  const TrainNetworkResult result = TrainNetwork(ball.field, ball.views, flat, {}, options, {});
+  EXPECT_GT(SpectralNorm(result.linear_map.matrix), 1.25 * SpectralNorm(flat.map.matrix));
+  EXPECT_EQ(result.network.BaseNorm(), SpectralNorm(flat.map.matrix));
+  EXPECT_GT(result.psnr_db, result.linear_map_psnr_db);  // that of the steep one
+  EXPECT_LE(std::max(result.slopes.along_coefficients, result.slopes.along_position),
+            result.slope_observed * (1 + 1e-9));
+  // As steep as the scene's own it is the start.
+  const TrainNetworkResult same = TrainNetwork(ball.field, ball.views, steep, {}, Quick(1), {});
+  EXPECT_EQ(same.network.BaseNorm(), SpectralNorm(same.linear_map.matrix));
+}
+
+TEST(TrainNetwork, OneThatLearnedLittleGivesWayToTheBetterMapWithinTheBound) {
+  const StyledBall ball(16, 4, 32, LinearStyle);
+  SceneColorMap flat = MapOf(ball);
+  for (Vec3d& row : flat.map.matrix.row) row = 0.7 * row;
+  const TrainNetworkResult result =
+      TrainNetwork(ball.field, ball.views, flat, {}, Quick(1), {});
+  EXPECT_EQ(result.network.BaseNorm(), SpectralNorm(result.linear_map.matrix));
+  EXPECT_EQ(result.psnr_db, result.linear_map_psnr_db);
+  TrainNetworkOptions narrow = Quick(1);
+  narrow.bound_factor = 0.9;
+  const TrainNetworkResult kept = TrainNetwork(ball.field, ball.views, flat, {}, narrow, {});
+  EXPECT_EQ(kept.network.BaseNorm(), SpectralNorm(flat.map.matrix));
+  EXPECT_LE(kept.bound, 0.9 * flat.k_est * (1 + 1e-9));
+  EXPECT_LT(kept.psnr_db, result.psnr_db - 1);
+}
+
 TEST(TrainNetwork, BoundIsKeptHoweverSmall) {
   const StyledBall ball(16, 4, 32, CurvedStyle);
   TrainNetworkOptions options = Quick(40);
@@ -123,6 +156,42 @@ TEST(TrainNetwork, PyTorchStartHasItsWeightsNorms) {
     for (const int i : {0, 5, 900})
       EXPECT_NEAR(f.layers[static_cast<size_t>(l)].weight[static_cast<size_t>(i)],
                   network.weight(l)[i], 1e-6);
+}
+
+// How far apart the voxels' coefficients are after the network, of how far they were.
+TEST(TrainNetwork, PyTorchStartSendsVoxelsToOneColourAndOthersDoNot) {
+  const RadianceField field = Ball(10);
+  const std::vector<int32_t> vertex = VertexOfVoxel(*field.geometry);
+  const int64_t n = static_cast<int64_t>(vertex.size());
+  const auto spread = [](const std::vector<float>& rows) {
+    double sum = 0;
+    const int64_t count = static_cast<int64_t>(rows.size()) / kFeatureStride;
+    for (int k = 0; k < kNetworkSh; ++k) {
+      double mean = 0, squares = 0;
+      for (int64_t i = 0; i < count; ++i)
+        mean += rows[static_cast<size_t>(i * kFeatureStride + k)];
+      mean /= static_cast<double>(count);
+      for (int64_t i = 0; i < count; ++i) {
+        const double d = rows[static_cast<size_t>(i * kFeatureStride + k)] - mean;
+        squares += d * d;
+      }
+      sum += squares;
+    }
+    return std::sqrt(sum);
+  };
+  std::vector<float> features(static_cast<size_t>(n * kFeatureStride)), out(features.size());
+  for (int64_t i = 0; i < n; ++i)
+    FillFeatures(field, 1, i, vertex[static_cast<size_t>(i)],
+                 &features[static_cast<size_t>(i * kFeatureStride)]);
+  const auto kept = [&](const char* start) {
+    LipschitzNetwork network;
+    InitializeWithoutMap(start, 3, &network);
+    network.Forward(features.data(), n, out.data());
+    return spread(out) / spread(features);
+  };
+  EXPECT_LT(kept("pytorch"), 0.1);
+  EXPECT_GT(kept("orthogonal"), 0.2);
+  EXPECT_GT(kept("identity"), 0.5);
 }
 
 TEST(TrainNetwork, Ablations) {
