@@ -194,9 +194,9 @@ ColorMap Training::BetterMap(double* mse) {
 ColorMap Training::ChooseBase() {
   result_.linear_map = BetterMap(&state_.linear_map_mse);
   // Where the 2D method is no colour map, least squares may find a steep one, and every voxel
-  // pays for it in the bound and the slope. Up to a quarter its head start is worth that.
+  // pays for it in the slope and in noise; from the other map the network learns as much.
   const double least_squares = SpectralNorm(result_.linear_map.matrix);
-  const bool steep = least_squares > 1.25 * SpectralNorm(scene_map_.map.matrix);
+  const bool steep = least_squares > SpectralNorm(scene_map_.map.matrix);
   return options_.base == "best" && steep ? scene_map_.map : result_.linear_map;
 }
 

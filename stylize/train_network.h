@@ -80,7 +80,7 @@ struct TrainNetworkOptions {
           .max = 0.1});
     bind("style-base", base,
          {.help = "the colour map that the network starts from; best is least squares where it "
-                  "is nearer to the 2D method and not much steeper than mkl, else mkl",
+                  "is nearer to the 2D method and no steeper than mkl, else mkl",
           .choices = "best|mkl|least-squares|none"});
     bind("style-start", start,
          {.help = "ablation, with --style-base none: the weights that learning begins with; "
