@@ -41,6 +41,13 @@ Eigen::MatrixXd RandomIsometry(int rows, int columns, uint64_t seed, uint64_t st
   return rows >= columns ? q : Eigen::MatrixXd(q.transpose());
 }
 
+// K_i = ||W_i||_2, so that A_i = W_i.
+void UseWeightsNorms(LipschitzNetwork* network) {
+  network->WarmUpNorms();
+  for (int l = 0; l < kNetworkLayers; ++l)
+    network->k(l) = static_cast<float>(network->NormEstimate(l));
+}
+
 }  // namespace
 
 void InitializeAsPyTorch(uint64_t seed, LipschitzNetwork* network) {
@@ -50,9 +57,7 @@ void InitializeAsPyTorch(uint64_t seed, LipschitzNetwork* network) {
     for (int64_t i = 0; i < size; ++i)
       network->weight(l)[i] = static_cast<float>(range * Uniform(seed, StreamOf(l, 0), i));
   }
-  network->WarmUpNorms();
-  for (int l = 0; l < kNetworkLayers; ++l)
-    network->k(l) = static_cast<float>(network->NormEstimate(l));
+  UseWeightsNorms(network);
 }
 
 void InitializeWithoutMap(const std::string& start, uint64_t seed, LipschitzNetwork* network) {
@@ -77,9 +82,7 @@ void InitializeWithoutMap(const std::string& start, uint64_t seed, LipschitzNetw
     for (int o = 0; o < through; ++o)
       for (int i = 0; i < inputs; ++i) weight(o, i) = o == i ? gain : 0;
   }
-  network->WarmUpNorms();
-  for (int l = 0; l < kNetworkLayers; ++l)
-    network->k(l) = static_cast<float>(network->NormEstimate(l));
+  UseWeightsNorms(network);
 }
 
 void InitializeResidual(uint64_t seed, LipschitzNetwork* network) {
