@@ -11,7 +11,7 @@ namespace regrade {
 namespace {
 
 constexpr int kFont = cv::FONT_HERSHEY_SIMPLEX;
-constexpr double kScale = 0.5;
+constexpr double kScale = 0.5, kSmallest = 0.5;  // smaller is illegible
 
 }  // namespace
 
@@ -23,9 +23,12 @@ void DrawText(Image* picture, int x, int y, int width, const std::string& text, 
   std::string line;
   for (const char c : text) line += c >= 32 && c < 127 ? c : '?';
   const int height = TextLineHeight(size);
+  const int long_side = cv::getTextSize(line, kFont, kScale * size, 1, nullptr).width;
+  const double fitting =
+      long_side > width ? std::max(kSmallest, static_cast<double>(width) / long_side) : 1;
   cv::Mat mask = cv::Mat::zeros(height, std::max(1, width), CV_8UC1);
-  cv::putText(mask, line, {0, static_cast<int>(16 * size)}, kFont, kScale * size, 255, 1,
-              cv::LINE_AA);
+  cv::putText(mask, line, {0, static_cast<int>(16 * size)}, kFont, kScale * size * fitting, 255,
+              1, cv::LINE_AA);
   for (int v = 0; v < height && y + v < picture->height; ++v)
     for (int u = 0; u < mask.cols && x + u < picture->width; ++u) {
       if (x + u < 0 || y + v < 0) continue;

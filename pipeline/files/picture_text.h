@@ -11,8 +11,8 @@ namespace regrade {
 int TextLineHeight(double size);
 
 // Writes `text` in grey of the given brightness into an RGB picture, its line from (x, y) down;
-// what is beyond `width` pixels is cut. Only ASCII is drawn, other bytes as '?'. `size` 1 is
-// about 11 pixels for a capital.
+// what is longer than `width` pixels is drawn smaller, down to half, and then cut. Only ASCII
+// is drawn, other bytes as '?'. `size` 1 is about 11 pixels for a capital.
 void DrawText(Image* picture, int x, int y, int width, const std::string& text, double size,
               float brightness);
 

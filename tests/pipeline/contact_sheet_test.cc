@@ -51,5 +51,20 @@ TEST(PictureText, StaysWithinItsWidthAndThePicture) {
   DrawText(&image, -5, -5, 50, "x", 1, 0);
 }
 
+// What comes last of a line that is too long, as of a title over narrow columns.
+TEST(PictureText, ALineThatIsTooLongIsDrawnSmaller) {
+  const auto ink_at = [](const std::string& text) {
+    Image image = Plain(120, 30, 1);
+    DrawText(&image, 0, 0, 100, text, 1, 0);
+    int ink = 0;
+    for (int y = 0; y < 30; ++y)
+      for (int x = 70; x < 100; ++x) ink += *image.at(x, y) < 0.5f;
+    return ink;
+  };
+  const std::string spaces(14, ' ');
+  EXPECT_GT(ink_at(spaces + "WW"), 10);
+  EXPECT_EQ(ink_at(spaces + spaces + spaces + "WW"), 0);  // smaller than half is not drawn
+}
+
 }  // namespace
 }  // namespace regrade
