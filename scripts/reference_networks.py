@@ -50,8 +50,10 @@ def write_random(seed, version, paths):
         for name, inputs, outputs, side in layers:
             spread = (2 / (inputs * side * side)) ** 0.5
             first, last = name in ("0", "conv0"), file == "decoder" and outputs == 3
-            factor = 20 if first and file != "decoder" else 0.04 if last else 1
-            if file == "sct" and name == "uncompress":
+            factor = 20 if first and file != "decoder" else 1
+            if last:
+                factor = 0.04 if version in ("cat5", "sum") else 0.007
+            elif name == "uncompress":
                 factor = 0.2
             tensors[f"{name}.weight"] = torch.randn(outputs, inputs, side, side, generator=random) * spread * factor
             tensors[f"{name}.bias"] = torch.randn(outputs, generator=random) * 0.05 + (0.5 if last else 0)

@@ -69,8 +69,7 @@ class Ccpl : public ViewStylizer {
     const FeatureMap features =
         NormalizedFeatures(encoder_.Run({{"image", &map}}, {"feat"})[0]);
     FeatureMap code = content_.Run({{"feat", &features}}, {"code"})[0];
-    CheckShape(code, style_.moments.channels, features.height, features.width,
-               content_.path());
+    CheckShape(code, style_.moments.channels, features.height, features.width, content_.path());
     Apply(style_.moments, &code);
     FeatureMap x = expand_.Run({{"code", &code}}, {"feat"})[0];
     CheckShape(x, features.channels, features.height, features.width, expand_.path());

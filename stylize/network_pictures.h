@@ -8,8 +8,8 @@
 
 namespace regrade {
 
-FeatureMap MapOf(const Image& image);           // three channels
-Image ClippedImageOf(const FeatureMap& map);    // to [0, 1]
+FeatureMap MapOf(const Image& image);            // three channels
+Image ClippedImageOf(const FeatureMap& map);     // to [0, 1]
 inline constexpr int kSmallestNetworkSide = 16;  // pixels; reflects at the edges of 16 / 16
 
 // The picture that networks see: longer side cut to `max_side`, sides cut to multiples of

@@ -57,7 +57,7 @@ class Wct2 : public ViewStylizer {
  private:
   // What passes over the bottleneck, from an encoder to a decoder.
   struct Bypass {
-    FeatureMap skip;                 // with cat5
+    FeatureMap skip;                  // with cat5
     std::array<FeatureMap, 3> bands;  // of kBands
   };
 
@@ -128,7 +128,7 @@ class Wct2 : public ViewStylizer {
 
   bool cat5_;
   int max_side_;
-  std::vector<OnnxNetwork> encoders_, decoders_;      // [level - 1]
+  std::vector<OnnxNetwork> encoders_, decoders_;    // [level - 1]
   std::map<std::string, FeatureStatistics> style_;  // of the places that `at` is told
 };
 

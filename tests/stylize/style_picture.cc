@@ -47,8 +47,7 @@ int main(int argc, char** argv) {
     return asked ? 0 : 2;
   }
   try {
-    const auto stylizer =
-        regrade::MakeOnnxStylizer(argv[1], std::stoi(argv[2]), Read(argv[4]));
+    const auto stylizer = regrade::MakeOnnxStylizer(argv[1], std::stoi(argv[2]), Read(argv[4]));
     Write(argv[5], stylizer->Stylize(Read(argv[3]), 0));
     std::cout << stylizer->Name() << "\n";
   } catch (const std::exception& exception) {
