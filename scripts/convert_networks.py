@@ -114,8 +114,8 @@ def check_haar(state):
     import numpy
     for key, value in state.tensors.items():
         parts = key.split(".")
-        if parts[-2].lower() in HAAR and parts[0].startswith(("pool", "recon")):
-            expected = numpy.array(HAAR[parts[-2].lower()]).reshape(2, 2) / 2
+        if len(parts) == 3 and parts[1].lower() in HAAR:
+            expected = numpy.array(HAAR[parts[1].lower()]).reshape(2, 2) / 2
             if abs(value.numpy() - expected).max() > 1e-6:
                 sys.exit(f"{state.path}: {key} is no Haar wavelet")
 

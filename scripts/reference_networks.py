@@ -17,9 +17,13 @@ from torch.nn import functional
 # Layers of the published files: (name, channels in, channels out, side of the kernel).
 VGG = [("0", 3, 3, 1), ("2", 3, 64, 3), ("5", 64, 64, 3), ("9", 64, 128, 3), ("12", 128, 128, 3), ("16", 128, 256, 3),
        ("19", 256, 256, 3), ("22", 256, 256, 3), ("25", 256, 256, 3), ("29", 256, 512, 3)]
-WAVE_NAMES = ["conv0", "conv1_1", "conv1_2", "conv2_1", "conv2_2", "conv3_1", "conv3_2", "conv3_3", "conv3_4", "conv4_1"]
+WAVE_NAMES = ("conv0", "conv1_1", "conv1_2", "conv2_1", "conv2_2", "conv3_1", "conv3_2", "conv3_3", "conv3_4",
+              "conv4_1")
 DECODER = [(1, 512, 256, 3), (5, 256, 256, 3), (8, 256, 256, 3), (11, 256, 256, 3), (14, 256, 128, 3),
            (18, 128, 128, 3), (21, 128, 64, 3), (25, 64, 64, 3), (28, 64, 3, 3)]
+
+# Of the four pixels of a block in a Haar wavelet's low, LH, HL and HH part.
+SIGNS = ((1, 1, 1, 1), (-1, 1, -1, 1), (-1, -1, 1, 1), (1, -1, -1, 1))
 
 
 def layers_of(version):
@@ -57,7 +61,13 @@ def write_random(seed, version, paths):
                 factor = 0.2
             tensors[f"{name}.weight"] = torch.randn(outputs, inputs, side, side, generator=random) * spread * factor
             tensors[f"{name}.bias"] = torch.randn(outputs, generator=random) * 0.05 + (0.5 if last else 0)
-        torch.save(tensors, paths[file])
+        if version in ("cat5", "sum"):  # the fixed wavelets are in the published files, too
+            for level, count in enumerate((64, 128, 256), 1):
+                name = f"pool{level}" if file == "encoder" else f"recon_block{level}"
+                for part, signs in zip(("LL", "LH", "HL", "HH"), SIGNS):
+                    tensors[f"{name}.{part}.weight"] = torch.tensor(signs).reshape(2, 2).repeat(count, 1, 1, 1) / 2
+        # In the older of torch's two formats, for WCT2's files are older than torch 1.6.
+        torch.save(tensors, paths[file], _use_new_zipfile_serialization=False)
 
 
 class Layers:
@@ -88,9 +98,6 @@ def spread_out(part, signs):
     for i, sign in enumerate(signs):
         whole[..., i // 2::2, i % 2::2] = sign * part / 2
     return whole
-
-
-SIGNS = ((1, 1, 1, 1), (-1, 1, -1, 1), (-1, -1, 1, 1), (1, -1, -1, 1))
 
 
 def root(features, exponent):

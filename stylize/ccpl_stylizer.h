@@ -33,7 +33,8 @@ void AddMean(const std::vector<double>& mean, FeatureMap* features);
 //
 // Works at the photo's size and has no filter then; a photo whose longer side is above
 // `max_side` is worked on small and its result brought to the photo's size and edges by
-// WithEdgesOf. The networks are tried on a small picture first.
+// WithEdgesOf. The networks are tried on a small picture first; what does not fit is
+// Error(kExternalProgram) naming the file.
 std::unique_ptr<ViewStylizer> MakeCcplStylizer(const std::string& folder, int max_side,
                                                const Image& style);
 

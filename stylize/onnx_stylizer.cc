@@ -131,7 +131,8 @@ std::unique_ptr<ViewStylizer> MakeOnnxStylizer(const std::string& path, int max_
     if (fs::path(path).filename().string().find("encoder") == std::string::npos)
       throw Error(
           ExitCode::kExternalProgram, "one network alone is no method known here", path,
-          "name the folder with PCA-KD's encoder.onnx and decoder1.onnx ... decoder4.onnx");
+          "name the folder that holds all networks of a method, such as PCA-KD's encoder.onnx "
+          "and decoder1.onnx ... decoder4.onnx");
   }
   if (fs::exists(folder + "/encoder.onnx", error))
     return std::make_unique<PcaKd>(folder, max_side, style);

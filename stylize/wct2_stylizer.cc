@@ -37,7 +37,7 @@ class Wct2 : public ViewStylizer {
     });
     Restyled(trial);
     style_.clear();
-    const FeatureMap picture = MapOf(Working(Colors(style), max_side_, kMultiple));
+    const FeatureMap picture = Padded(MapOf(Working(Colors(style), max_side_, 1)), kMultiple);
     Restyle(picture, [this](const std::string& place, FeatureMap* x) {
       style_[place] = MeasureFeatures(*x, 1);
     });

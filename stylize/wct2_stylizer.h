@@ -24,7 +24,9 @@ namespace regrade {
 //
 // Works at the photo's size, its edges reflected to multiples of 8, and has no filter then; a
 // photo whose longer side is above `max_side` is worked on small and its result brought to the
-// photo's size and edges by WithEdgesOf. The networks are tried on a small picture first.
+// photo's size and edges by WithEdgesOf. The style picture is cut and reflected the same way.
+// The networks are tried on a small picture first; what does not fit is Error(kExternalProgram)
+// naming the file.
 std::unique_ptr<ViewStylizer> MakeWct2Stylizer(const std::string& folder, bool cat5,
                                                int max_side, const Image& style);
 

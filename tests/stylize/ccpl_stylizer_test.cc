@@ -27,13 +27,13 @@ using testing::WavyPicture;
 
 const Vec3d kDay{0.8, 0.9, 1.0}, kEvening{1.0, 0.6, 0.35};
 
-// The networks: the largest of 2 x 2 pixels of each colour, into a code of two numbers and out again,
-// and four equal pixels for each.
+// The networks: the largest of 2 x 2 pixels of each colour, into a code of two numbers and out
+// again, and four equal pixels for each.
 using Weights = std::vector<double>;
 const Weights kContent{0.7, 0.2, -0.4, 0.1, -0.6, 0.5};  // 3 -> 2
 const Weights kStyle{1.5, -0.5, 0.8, 0.3, 1.2, -0.9};    // 3 -> 2, the middle of 3 x 3
-const Weights kStyleBias{0.4, -0.3};  // so that the code's mean is not 0
-const Weights kExpand{0.5, -0.2, 0.1, 0.4, -0.3, 0.6};  // 2 -> 3
+const Weights kStyleBias{0.4, -0.3};                     // so that the code's mean is not 0
+const Weights kExpand{0.5, -0.2, 0.1, 0.4, -0.3, 0.6};   // 2 -> 3
 const Weights kExpandBias{0.05, -0.04, 0.03};
 constexpr double kShade = 0.9;  // the decoder's, of what it is given
 
@@ -104,8 +104,7 @@ Features Halved(const Image& image) {
       for (int k = 0; k < 4; ++k) {
         const int u = 2 * x + k % 2, v = 2 * y + k / 2;
         if (u < image.width && v < image.height)
-          for (size_t c = 0; c < 3; ++c)
-            most[c] = std::max<double>(most[c], image.at(u, v)[c]);
+          for (size_t c = 0; c < 3; ++c) most[c] = std::max<double>(most[c], image.at(u, v)[c]);
       }
       features.values.push_back(most);
     }
@@ -152,8 +151,8 @@ Image Expected(const Image& photo, const Image& style) {
       for (size_t c = 0; c < 3; ++c) {
         double value = kExpandBias[c] + style_mean[c];
         for (size_t i = 0; i < 2; ++i)
-          value += kExpand[2 * c + i] *
-                   (moments[i][0] * code[0] + moments[i][1] * code[1]) / count;
+          value +=
+              kExpand[2 * c + i] * (moments[i][0] * code[0] + moments[i][1] * code[1]) / count;
         image.at(x, y)[c] = static_cast<float>(std::clamp(kShade * value, 0.0, 1.0));
       }
     }
@@ -220,7 +219,7 @@ TEST(CcplPictures, PaddingReflectsAtRightAndBottom) {
   EXPECT_EQ(padded.height, 8);
   EXPECT_EQ(padded.width, 16);
   EXPECT_EQ(padded.plane(0)[8], 8);
-  EXPECT_EQ(padded.plane(0)[9], 7);   // the edge itself is not repeated
+  EXPECT_EQ(padded.plane(0)[9], 7);  // the edge itself is not repeated
   EXPECT_EQ(padded.plane(0)[15], 1);
   EXPECT_EQ(padded.plane(0)[7 * 16 + 9], 7 * 9 + 7);
 }
