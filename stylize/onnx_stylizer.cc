@@ -7,63 +7,18 @@
 
 #include "kernels/base/error.h"
 #include "kernels/image/resize.h"
+#include "stylize/ccpl_stylizer.h"
 #include "stylize/feature_transform.h"
-#include "stylize/guided_filter.h"
+#include "stylize/network_pictures.h"
 #include "stylize/onnx_network.h"
+#include "stylize/wct2_stylizer.h"
 
 namespace regrade {
 namespace {
 
-constexpr int kSmallestSide = 16;  // pixels; PCA-KD reflects at the edges of 16 / 16
-constexpr int kGuideRadius = 30;   // pixels of the working size
-constexpr double kGuideEpsilon = 0.02 * 0.02;  // squared values
 constexpr WhiteningRule kPcaKdRule{1, 1e-5};
 constexpr WhiteningRule kWctRule{0, 1e-5};
 constexpr double kWctStrength = 0.6;  // of the original's sample pictures
-
-FeatureMap MapOf(const Image& image) {
-  FeatureMap map(3, image.height, image.width);
-  for (int c = 0; c < 3; ++c)
-    for (int64_t i = 0; i < image.num_pixels(); ++i) map.plane(c)[i] = image.pixels[3 * i + c];
-  return map;
-}
-
-Image ClippedImageOf(const FeatureMap& map) {
-  Image image(map.width, map.height);
-  for (int c = 0; c < 3; ++c)
-    for (int64_t i = 0; i < image.num_pixels(); ++i)
-      image.pixels[3 * i + c] = std::clamp(map.plane(c)[i], 0.0f, 1.0f);
-  return image;
-}
-
-// The picture that networks see: longer side cut to max_side, sides cut to multiples.
-Image Working(const Image& image, int max_side, int multiple) {
-  const double scale =
-      std::min(1.0, static_cast<double>(max_side) / std::max(image.width, image.height));
-  const auto cut = [&](int side) {
-    const int scaled = static_cast<int>(side * scale + 0.5);
-    return std::max(kSmallestSide, scaled / multiple * multiple);
-  };
-  return Resize(image, cut(image.width), cut(image.height));
-}
-
-std::string ShapeOf(const FeatureMap& map) {
-  return std::to_string(map.channels) + " x " + std::to_string(map.height) + " x " +
-         std::to_string(map.width);
-}
-
-void CheckShape(const FeatureMap& map, int channels, int height, int width,
-                const std::string& path) {
-  if (map.channels == channels && map.height == height && map.width == width) return;
-  throw Error(
-      ExitCode::kExternalProgram,
-      "it gives " + ShapeOf(map) + ", expected is " + ShapeOf({channels, height, width}), path,
-      "take all files of the folder from one conversion");
-}
-
-std::string Numbered(const std::string& folder, const std::string& name, int level) {
-  return folder + "/" + name + std::to_string(level) + ".onnx";
-}
 
 class PcaKd : public ViewStylizer {
  public:
@@ -92,8 +47,7 @@ class PcaKd : public ViewStylizer {
     const Image photo = Colors(view);
     const Image small = Working(photo, max_side_, multiple_);
     const Image styled = Restyle(small);
-    return WithColors(
-        view, ApplyGuided(FitGuided(small, styled, kGuideRadius, kGuideEpsilon), photo));
+    return WithColors(view, WithEdgesOf(photo, small, styled));
   }
 
   std::string Name() const override { return "pca-kd"; }
@@ -149,7 +103,7 @@ class Wct : public ViewStylizer {
       FeatureMap f = encoders_[i].Run({{"image", &x}}, {"feat"})[0];
       CheckShape(f, style_[i].channels, f.height, f.width, encoders_[i].path());
       Apply(WhitenAndColor(MeasureFeatures(f, 1), style_[i], kWctRule, kWctStrength), &f);
-      x = Cropped(decoders_[i].Run({{"feat", &f}}, {"image"})[0], width, height,
+      x = Cropped(decoders_[i].Run({{"feat", &f}}, {"image"})[0], width, height, 3,
                   decoders_[i].path());
     }
     return WithColors(view, Resize(ClippedImageOf(x), view.width, view.height));
@@ -158,21 +112,6 @@ class Wct : public ViewStylizer {
   std::string Name() const override { return "wct"; }
 
  private:
-  // Pooling rounds sizes up: up to three rows and columns are too many at right and bottom.
-  static FeatureMap Cropped(const FeatureMap& map, int width, int height,
-                            const std::string& path) {
-    if (map.width < width || map.height < height || map.width > width + 3 ||
-        map.height > height + 3)
-      CheckShape(map, 3, height, width, path);
-    CheckShape(map, 3, map.height, map.width, path);
-    FeatureMap part(3, height, width);
-    for (int c = 0; c < 3; ++c)
-      for (int y = 0; y < height; ++y)
-        std::copy_n(map.plane(c) + static_cast<int64_t>(y) * map.width, width,
-                    part.plane(c) + static_cast<int64_t>(y) * width);
-    return part;
-  }
-
   int max_side_;
   std::vector<OnnxNetwork> encoders_, decoders_;  // [level - 1]
   std::vector<FeatureStatistics> style_;          // [level - 1]
@@ -189,19 +128,26 @@ std::unique_ptr<ViewStylizer> MakeOnnxStylizer(const std::string& path, int max_
     const OnnxNetwork alone(path);
     folder = fs::path(path).parent_path().string();
     if (folder.empty()) folder = ".";
-    if (!fs::path(path).filename().string().starts_with("encoder"))
+    if (fs::path(path).filename().string().find("encoder") == std::string::npos)
       throw Error(
           ExitCode::kExternalProgram, "one network alone is no method known here", path,
-          "name the folder with PCA-KD's encoder.onnx and decoder1.onnx ... decoder4.onnx");
+          "name the folder that holds all networks of a method, such as PCA-KD's encoder.onnx "
+          "and decoder1.onnx ... decoder4.onnx");
   }
   if (fs::exists(folder + "/encoder.onnx", error))
     return std::make_unique<PcaKd>(folder, max_side, style);
   if (fs::exists(folder + "/encoder3.onnx", error))
     return std::make_unique<Wct>(folder, max_side, style);
+  for (const bool cat5 : {true, false})
+    if (fs::exists(folder + "/" + Wct2FirstFile(cat5), error))
+      return MakeWct2Stylizer(folder, cat5, max_side, style);
+  if (fs::exists(folder + "/ccpl_encoder.onnx", error))
+    return MakeCcplStylizer(folder, max_side, style);
   throw Error(
       ExitCode::kExternalProgram, "there is no encoder.onnx in this folder", folder,
       "PCA-KD is encoder.onnx and decoder1.onnx ... decoder4.onnx, WCT encoder1.onnx ... "
-      "encoder3.onnx and decoder1.onnx ... decoder3.onnx");
+      "encoder3.onnx and decoder1.onnx ... decoder3.onnx; scripts/convert_networks.py makes "
+      "the files of WCT2 and CCPL");
 }
 
 }  // namespace regrade

@@ -1,5 +1,5 @@
-// 2D methods that are networks: PCA-KD (Chiu and Gurari 2022) and WCT (Li et al. 2017), from
-// the segments that their published weights were converted to.
+// 2D methods that are networks: PCA-KD (Chiu and Gurari 2022), WCT (Li et al. 2017), WCT2 and
+// CCPL, from the segments that their published weights were converted to.
 #pragma once
 
 #include <memory>
@@ -17,11 +17,13 @@ namespace regrade {
 //   encoder1..3.onnx (image -> feat), decoder1..3.onnx (feat -> image): WCT from level 3 down.
 //     x = photo; for L = 3..1: x <- decoderL(0.6 W(f) + 0.4 f), f = encoderL(x), W without a
 //     ridge, eigenvalues up to 1e-5 dropped. Clipped; no filter: painterly.
-// Both work at the photo's size, or with its longer side cut to `max_side` pixels; PCA-KD's
-// sides are cut to multiples of 8 or 16, whatever its encoder halves to, and of 16 at least.
-// PCA-KD's result is brought to the photo's size by the filter, whose coefficients are enlarged
-// and meet the photo's own detail; WCT's is enlarged itself (bilinear). The style picture is
-// cut the same way.
+//   wct2_cat5_encoder1.onnx or wct2_sum_encoder1.onnx and so on: WCT2, see wct2_stylizer.h.
+//   ccpl_encoder.onnx and so on: CCPL, see ccpl_stylizer.h.
+// PCA-KD and WCT work at the photo's size, or with its longer side cut to `max_side` pixels;
+// PCA-KD's sides are cut to multiples of 8 or 16, whatever its encoder halves to, and of 16 at
+// least. PCA-KD's result is brought to the photo's size by the filter, whose coefficients are
+// enlarged and meet the photo's own detail; WCT's is enlarged itself (bilinear). The style
+// picture is cut the same way.
 //
 // The networks are tried on a small picture first. Throws Error(kExternalProgram) that names
 // the file for one that is missing, is not ONNX, lacks an output or gives another shape.

@@ -28,7 +28,9 @@ struct StyleOptions {
              "onto the style's, reinhard mean and spread of each CIELAB channel, idt the whole "
              "distribution (strongest, and loud where the photo has grain or soft edges), "
              "histogram that of each channel; onnx:DIR runs the networks of "
-             "PCA-KD or WCT that are in DIR; folder:DIR takes the pictures that anything made "
+             "PCA-KD, WCT, WCT2 or CCPL that are in DIR (scripts/convert_networks.py makes "
+             "the last two of the authors' files); folder:DIR takes the pictures that anything "
+             "made "
              "of the photos, by the photos' names (some may be missing); "
              "command:\"PROGRAM {input} {style} {output}\" runs a program for each view, "
              "without a shell"});

@@ -9,12 +9,12 @@
 #include <limits>
 #include <utility>
 
-#include "kernels/base/random.h"
 #include "kernels/image/color_statistics.h"
 #include "stylize/onnx_network.h"
 #include "tests/support/data.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/wavy_picture.h"
 
 namespace regrade {
 namespace {
@@ -23,20 +23,8 @@ using testing::DataPath;
 
 const std::string kPcaKd = "weights/pca_kd_mobilenet";
 
-// Soft waves with an edge and some grain: what a small photo is made of.
 Image Scene(int width, int height, const Vec3d& tint) {
-  Image image(width, height);
-  for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x)
-      for (int c = 0; c < 3; ++c) {
-        const double wave = 0.25 * std::sin(x * 0.11 + c) + 0.2 * std::cos(y * 0.07 - c);
-        const double edge = x + y > width ? 0.15 : -0.1;
-        const double grain =
-            0.04 * (RandomDouble(9, c, static_cast<uint64_t>(y) * width + x) - 0.5);
-        image.at(x, y)[c] =
-            static_cast<float>(std::clamp(tint[c] * (0.5 + wave + edge) + grain, 0.0, 1.0));
-      }
-  return image;
+  return testing::WavyPicture(width, height, tint);
 }
 
 const Vec3d kDay{0.8, 0.9, 1.0}, kEvening{1.0, 0.6, 0.35};

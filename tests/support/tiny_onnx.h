@@ -12,10 +12,19 @@ namespace regrade::testing {
 
 class TinyOnnx {
  public:
+  // Nothing yet; pictures of any size are said by Input and Output.
+  TinyOnnx() = default;
   // Two pictures [1, 3, height, width] go in as "first" and "second".
   TinyOnnx(int height, int width) {
     for (const char* name : {"first", "second"})
       graph_ += Field(11, ValueInfo(name, {1, 3, height, width}));
+  }
+
+  void Input(const std::string& name, int channels) {
+    graph_ += Field(11, ValueInfo(name, {1, channels, kAnySide, kAnySide}));
+  }
+  void Output(const std::string& name, int channels) {
+    outputs_ += Field(12, ValueInfo(name, {1, channels, kAnySide, kAnySide}));
   }
 
   void Node(const std::string& type, const std::vector<std::string>& inputs,
@@ -45,11 +54,18 @@ class TinyOnnx {
 
   // The last node's output is the network's, of this shape.
   std::string Bytes(const std::vector<int64_t>& shape) const {
-    const std::string graph = graph_ + Field(2, "tiny") + Field(12, ValueInfo(last_, shape));
-    return Number(1, 7) + Field(8, Field(1, "") + Number(2, 11)) + Field(7, graph);
+    return File(Field(12, ValueInfo(last_, shape)));
   }
+  // The network's outputs are those of Output.
+  std::string Bytes() const { return File(outputs_); }
 
  private:
+  static constexpr int64_t kAnySide = -1;
+
+  std::string File(const std::string& outputs) const {
+    const std::string graph = graph_ + Field(2, "tiny") + outputs;
+    return Number(1, 7) + Field(8, Field(1, "") + Number(2, 11)) + Field(7, graph);
+  }
   static std::string Varint(uint64_t value) {
     std::string bytes;
     for (; value >= 128; value >>= 7) bytes += static_cast<char>(value % 128 + 128);
@@ -63,11 +79,14 @@ class TinyOnnx {
   }
   static std::string ValueInfo(const std::string& name, const std::vector<int64_t>& shape) {
     std::string sides;
-    for (const int64_t side : shape) sides += Field(1, Number(1, side));
+    for (const int64_t side : shape)
+      sides +=
+          Field(1, side == kAnySide ? Field(2, name + "_side" + std::to_string(sides.size()))
+                                    : Number(1, side));
     return Field(1, name) + Field(2, Field(1, Number(1, 1) + Field(2, sides)));
   }
 
-  std::string graph_, last_;
+  std::string graph_, outputs_, last_;
 };
 
 // The mean of the squared difference of both pictures as the network sees them: 4 times that

@@ -1,0 +1,248 @@
+#!/usr/bin/env python3
+"""Turns published weights of WCT2 or CCPL (PyTorch) into the ONNX files that `--method onnx:DIR` reads.
+
+  convert_networks.py wct2 --encoder wave_encoder_cat5_l4.pth --decoder wave_decoder_cat5_l4.pth --out DIR
+  convert_networks.py ccpl --vgg vgg_normalised.pth --sct SCT.pth.tar --decoder DECODER.pth.tar --out DIR
+
+The weights are their authors' (github.com/clovaai/WCT2, github.com/JarrentWu1031/CCPL): download them there; whether
+their licences allow what you want is for you to read. Of WCT2 both versions are known, cat5 and sum, of CCPL the
+photorealistic model and the artistic one: what a file holds tells which. Needs Debian's python3-torch and python3-onnx
+(run it with /usr/bin/python3). Files are read as weights alone: no code of theirs runs.
+
+  --random SEED    first makes files of those names with random weights of the right shapes in DIR (--version cat5, sum,
+                   photo or art), and converts these
+  --check PROGRAM  then styles two pictures with PROGRAM (build/cpu/tests/stylize/style_picture) and with a PyTorch
+                   forward of its own (reference_networks.py), prints the largest difference of both, and beside it what
+                   leaving the transforms out would be; exit status 1 above 1e-4 of white
+"""
+
+import argparse
+import os
+import sys
+
+HAAR = {"ll": (1, 1, 1, 1), "lh": (-1, 1, -1, 1), "hl": (-1, -1, 1, 1), "hh": (1, -1, -1, 1)}  # halves, 2 x 2
+BANDS = ("lh", "hl", "hh")
+
+
+class Segment:
+    """One ONNX file: opset 11, float32, height and width of any size."""
+
+    def __init__(self, **inputs):
+        import onnx.numpy_helper
+        self.onnx, self.nodes, self.weights, self.channels = onnx, [], {}, dict(inputs)
+        self.inputs = list(inputs)
+
+    def add(self, kind, inputs, channels, output=None, **attributes):
+        name = output or f"t{len(self.nodes)}"
+        self.nodes.append(self.onnx.helper.make_node(kind, inputs, [name], name=name, **attributes))
+        self.channels[name] = channels
+        return name
+
+    def constant(self, values, kind="float32"):
+        import numpy
+        name = f"w{len(self.weights)}"
+        self.weights[name] = numpy.asarray(values, kind)
+        return name
+
+    def conv(self, x, state, key, out=None, relu=True, pad=True):
+        """Reflects one pixel at each edge where `pad` says so, then a convolution without padding, then max(0, x)."""
+        weight, bias = state.take(key)
+        if weight.shape[1] != self.channels[x]:
+            sys.exit(f"{state.path}: {key} takes {weight.shape[1]} channels, {self.channels[x]} come in")
+        if pad:
+            edges = self.constant([0, 0, 1, 1, 0, 0, 1, 1], "int64")
+            x = self.add("Pad", [x, edges], self.channels[x], mode="reflect")
+        sides = list(weight.shape[2:])
+        x = self.add("Conv", [x, self.constant(weight), self.constant(bias)], weight.shape[0],
+                     None if relu else out, kernel_shape=sides)
+        return self.add("Relu", [x], weight.shape[0], out) if relu else x
+
+    def halve(self, x):
+        return self.add("MaxPool", [x], self.channels[x], kernel_shape=[2, 2], strides=[2, 2], ceil_mode=1)
+
+    def double(self, x):
+        return self.add("Resize", [x, self.constant([]), self.constant([1, 1, 2, 2])], self.channels[x],
+                        mode="nearest", coordinate_transformation_mode="asymmetric", nearest_mode="floor")
+
+    def wavelet(self, kind, x, band, out=None):
+        """Haar pooling ("Conv") or its transpose ("ConvTranspose"), channel by channel."""
+        count = self.channels[x]
+        kernel = [[[[v / 2 for v in HAAR[band][:2]], [v / 2 for v in HAAR[band][2:]]]]] * count
+        return self.add(kind, [x, self.constant(kernel)], count, out, group=count, kernel_shape=[2, 2], strides=[2, 2])
+
+    def write(self, path, outputs):
+        helper, to_tensor = self.onnx.helper, self.onnx.numpy_helper.from_array
+
+        def info(name):
+            shape = [1, self.channels[name], f"{name}_h", f"{name}_w"]
+            return helper.make_tensor_value_info(name, self.onnx.TensorProto.FLOAT, shape)
+        graph = helper.make_graph(self.nodes, os.path.basename(path), [info(n) for n in self.inputs],
+                                  [info(n) for n in outputs], [to_tensor(v, n) for n, v in self.weights.items()])
+        model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 11)])
+        model.ir_version = 6
+        self.onnx.checker.check_model(model)
+        with open(path, "wb") as file:
+            file.write(model.SerializeToString())
+        print(path)
+
+
+class State:
+    """The tensors of a weights file."""
+
+    def __init__(self, path):
+        import torch
+        self.path = path
+        try:
+            self.tensors = torch.load(path, map_location="cpu", weights_only=True)
+        except Exception as error:
+            sys.exit(f"{path}: no weights that torch.load reads ({str(error).splitlines()[0]}); download it again")
+        if not isinstance(self.tensors, dict):
+            sys.exit(f"{path}: holds no table of tensors")
+
+    def __contains__(self, key):
+        return f"{key}.weight" in self.tensors
+
+    def take(self, key):
+        parts = [self.tensors.get(f"{key}.{part}") for part in ("weight", "bias")]
+        if any(part is None for part in parts):
+            sys.exit(f"{self.path}: has no {key}.weight and {key}.bias; is it the file of another model?")
+        return [part.float().numpy() for part in parts]
+
+
+def check_haar(state):
+    """Published files carry the fixed wavelets too; other ones would be another method."""
+    import numpy
+    for key, value in state.tensors.items():
+        parts = key.split(".")
+        if len(parts) == 3 and parts[1].lower() in HAAR:
+            expected = numpy.array(HAAR[parts[1].lower()]).reshape(2, 2) / 2
+            if abs(value.numpy() - expected).max() > 1e-6:
+                sys.exit(f"{state.path}: {key} is no Haar wavelet")
+
+
+def convert_wct2(encoder, decoder, folder):
+    """Yoo et al. 2019, Fig. 3, and the layers of clovaai/WCT2: where features are transformed, a file ends."""
+    for state in (encoder, decoder):
+        check_haar(state)
+    version = "cat5" if "conv3_4_2" in decoder else "sum"
+    cat5, two = version == "cat5", "_2" if version == "cat5" else ""
+    # With cat5 the features after the first layer of each size are transformed, with sum those after each pooling.
+    stages = ([["conv0", "conv1_1"], ["conv1_2", "|", "conv2_1"], ["conv2_2", "|", "conv3_1"],
+               ["conv3_2", "conv3_3", "conv3_4", "|", "conv4_1"]] if cat5 else
+              [["conv0", "conv1_1", "conv1_2", "|"], ["conv2_1", "conv2_2", "|"],
+               ["conv3_1", "conv3_2", "conv3_3", "conv3_4", "|"], ["conv4_1"]])
+    widths = (3, 64, 128, 256)
+    for level, layers in enumerate(stages, 1):
+        name = "image" if level == 1 else "feat"
+        segment = Segment(**{name: widths[level - 1]})
+        x, outputs = name, ["out"]
+        for layer in layers:
+            last = layer == layers[-1]
+            if layer == "|":
+                if cat5:
+                    outputs.append("skip")
+                for band in BANDS:
+                    segment.wavelet("Conv", x, band, band)
+                outputs += BANDS
+                x = segment.wavelet("Conv", x, "ll", "out" if last else None)
+            else:
+                splits = cat5 and not last and layers[layers.index(layer) + 1] == "|"
+                x = segment.conv(x, encoder, layer, "out" if last else "skip" if splits else None,
+                                 relu=layer != "conv0", pad=layer != "conv0")
+        segment.write(f"{folder}/wct2_{version}_encoder{level}.onnx", outputs)
+    blocks = {4: (["conv4_1"], ["conv3_4" + two, "conv3_3", "conv3_2"]), 3: (["conv3_1"], ["conv2_2" + two]),
+              2: (["conv2_1"], ["conv1_2" + two])}
+    for level, (before, after) in blocks.items():
+        count = widths[level - 1]
+        inputs = dict(feat=2 * count, **{band: count for band in BANDS})
+        segment = Segment(**inputs, **({"skip": count} if cat5 else {}))
+        x = segment.conv("feat", decoder, before[0])
+        parts = [segment.wavelet("ConvTranspose", part, band) for part, band in zip([x, *BANDS], HAAR)]
+        if cat5:
+            x = segment.add("Concat", [*parts, "skip"], 5 * count, axis=1)
+        else:
+            x = parts[0]
+            for part in parts[1:]:
+                x = segment.add("Add", [x, part], count)
+        for layer in after:
+            x = segment.conv(x, decoder, layer, "out" if layer == after[-1] else None)
+        segment.write(f"{folder}/wct2_{version}_decoder{level}.onnx", ["out"])
+    segment = Segment(feat=64)
+    segment.conv("feat", decoder, "conv1_1", "image", relu=False)
+    segment.write(f"{folder}/wct2_{version}_decoder1.onnx", ["image"])
+
+
+def convert_ccpl(vgg, sct, decoder, folder):
+    """Wu et al. 2022, Fig. 3, and the layers of JarrentWu1031/CCPL, which torch numbers."""
+    count = sct.take("uncompress")[0].shape[0]
+    if count not in (256, 512):
+        sys.exit(f"{sct.path}: {count} channels are neither the photorealistic model (256) nor the artistic one (512)")
+    artistic = count == 512
+    segment = Segment(image=3)
+    x = segment.conv("image", vgg, "0", relu=False, pad=False)
+    layers = ["2", "5", "|", "9", "12", "|", "16"] + (["19", "22", "25", "|", "29"] if artistic else [])
+    for layer in layers:
+        last = layer == layers[-1]
+        x = segment.halve(x) if layer == "|" else segment.conv(x, vgg, layer, "feat" if last else None)
+    segment.write(f"{folder}/ccpl_encoder.onnx", ["feat"])
+    for net, name in (("cnet", "content"), ("snet", "style")):
+        segment, x = Segment(feat=count), "feat"
+        numbers = (0, 2, 4) if artistic else (0, 2)
+        for number in numbers:
+            last = number == numbers[-1]
+            x = segment.conv(x, sct, f"{net}.{number}", "code" if last else None, relu=not last, pad=False)
+        segment.write(f"{folder}/ccpl_{name}.onnx", ["code"])
+    segment = Segment(code=sct.take("uncompress")[0].shape[1])
+    segment.conv("code", sct, "uncompress", "feat", relu=False, pad=False)
+    segment.write(f"{folder}/ccpl_expand.onnx", ["feat"])
+    # The photorealistic decoder is the artistic one from its tenth part on; files of it number either way.
+    first = 0 if artistic or "28" in decoder else 10
+    layers = [1, "|", 5, 8] if artistic else []
+    layers += [11, 14, "|", 18, 21, "|", 25, 28]
+    segment, x = Segment(feat=count), "feat"
+    for layer in layers:
+        last = layer == 28
+        x = (segment.double(x) if layer == "|" else
+             segment.conv(x, decoder, str(layer - first), "image" if last else None, relu=not last))
+    segment.write(f"{folder}/ccpl_decoder.onnx", ["image"])
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("method", choices=["wct2", "ccpl"])
+    for name, text in (("encoder", "WCT2's encoder"), ("decoder", "WCT2's or CCPL's decoder"),
+                       ("vgg", "CCPL's VGG-19"), ("sct", "CCPL's SCT module")):
+        parser.add_argument(f"--{name}", metavar="FILE", help=text)
+    parser.add_argument("--out", metavar="DIR", required=True, help="folder for the ONNX files; made if it is missing")
+    parser.add_argument("--random", metavar="SEED", type=int, help="convert random weights, see above")
+    parser.add_argument("--version", choices=["cat5", "sum", "photo", "art"], help="which model --random makes")
+    parser.add_argument("--check", metavar="PROGRAM", help="compare with a PyTorch forward, see above")
+    options = parser.parse_args()
+    try:
+        import onnx  # noqa: F401
+        import torch  # noqa: F401
+    except ImportError as error:
+        sys.exit(f"{error}: install Debian's python3-torch and python3-onnx, and run this with /usr/bin/python3")
+    os.makedirs(options.out, exist_ok=True)
+    names = ("encoder", "decoder") if options.method == "wct2" else ("vgg", "sct", "decoder")
+    paths = {name: getattr(options, name) for name in names}
+    if options.random is not None:
+        import reference_networks
+        version = options.version or {"wct2": "cat5", "ccpl": "photo"}[options.method]
+        if version not in {"wct2": ("cat5", "sum"), "ccpl": ("photo", "art")}[options.method]:
+            parser.error(f"{options.method} has no version {version}")
+        paths = {name: f"{options.out}/random_{name}.pth" for name in names}
+        reference_networks.write_random(options.random, version, paths)
+    missing = [name for name in names if not paths[name]]
+    if missing:
+        parser.error("of " + options.method + " are missing: " + ", ".join(f"--{name}" for name in missing))
+    states = {name: State(path) for name, path in paths.items()}
+    {"wct2": convert_wct2, "ccpl": convert_ccpl}[options.method](**states, folder=options.out)
+    if options.check:
+        import reference_networks
+        tensors = {name: state.tensors for name, state in states.items()}
+        sys.exit(reference_networks.check(options.method, tensors, options.out, options.check))
+
+
+if __name__ == "__main__":
+    main()

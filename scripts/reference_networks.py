@@ -1,0 +1,249 @@
+#!/usr/bin/env python3
+"""WCT2 and CCPL in PyTorch, in double and from their papers: what scripts/convert_networks.py --check compares with.
+
+Not run by itself: `convert_networks.py --help` says how. It shares nothing with the conversion but the weights.
+"""
+
+import os
+import struct
+import subprocess
+import sys
+import tempfile
+
+import numpy
+import torch
+from torch.nn import functional
+
+# Layers of the published files: (name, channels in, channels out, side of the kernel).
+VGG = [("0", 3, 3, 1), ("2", 3, 64, 3), ("5", 64, 64, 3), ("9", 64, 128, 3), ("12", 128, 128, 3), ("16", 128, 256, 3),
+       ("19", 256, 256, 3), ("22", 256, 256, 3), ("25", 256, 256, 3), ("29", 256, 512, 3)]
+WAVE_NAMES = ("conv0", "conv1_1", "conv1_2", "conv2_1", "conv2_2", "conv3_1", "conv3_2", "conv3_3", "conv3_4",
+              "conv4_1")
+DECODER = [(1, 512, 256, 3), (5, 256, 256, 3), (8, 256, 256, 3), (11, 256, 256, 3), (14, 256, 128, 3),
+           (18, 128, 128, 3), (21, 128, 64, 3), (25, 64, 64, 3), (28, 64, 3, 3)]
+
+# Of the four pixels of a block in a Haar wavelet's low, LH, HL and HH part.
+SIGNS = ((1, 1, 1, 1), (-1, 1, -1, 1), (-1, -1, 1, 1), (1, -1, -1, 1))
+
+
+def layers_of(version):
+    """By file."""
+    if version in ("cat5", "sum"):
+        many, two = (5, "_2") if version == "cat5" else (1, "")
+        encoder = [(name, *layer[1:]) for name, layer in zip(WAVE_NAMES, VGG)]
+        decoder = [("conv4_1", 512, 256, 3), ("conv3_4" + two, 256 * many, 256, 3), ("conv3_3", 256, 256, 3),
+                   ("conv3_2", 256, 256, 3), ("conv3_1", 256, 128, 3), ("conv2_2" + two, 128 * many, 128, 3),
+                   ("conv2_1", 128, 64, 3), ("conv1_2" + two, 64 * many, 64, 3), ("conv1_1", 64, 3, 3)]
+        return {"encoder": encoder, "decoder": decoder}
+    if version == "photo":
+        sct = [("cnet.0", 256, 128, 1), ("cnet.2", 128, 32, 1), ("snet.0", 256, 128, 3), ("snet.2", 128, 32, 1),
+               ("uncompress", 32, 256, 1)]
+        decoder = [(str(number - 10), *rest) for number, *rest in DECODER if number > 10]
+    else:
+        sct = [("cnet.0", 512, 256, 1), ("cnet.2", 256, 128, 1), ("cnet.4", 128, 32, 1), ("snet.0", 512, 256, 3),
+               ("snet.2", 256, 128, 3), ("snet.4", 128, 32, 1), ("uncompress", 32, 512, 1)]
+        decoder = [(str(number), *rest) for number, *rest in DECODER]
+    return {"vgg": VGG, "sct": sct, "decoder": decoder}
+
+
+def write_random(seed, version, paths):
+    """Weights that keep the size of what they pass, features of some tens, and pictures of a middle grey."""
+    random = torch.Generator().manual_seed(seed)
+    for file, layers in layers_of(version).items():
+        tensors = {}
+        for name, inputs, outputs, side in layers:
+            spread = (2 / (inputs * side * side)) ** 0.5
+            first, last = name in ("0", "conv0"), file == "decoder" and outputs == 3
+            factor = 20 if first and file != "decoder" else 1
+            if last:
+                factor = 0.04 if version in ("cat5", "sum") else 0.007
+            elif name == "uncompress":
+                factor = 0.2
+            tensors[f"{name}.weight"] = torch.randn(outputs, inputs, side, side, generator=random) * spread * factor
+            tensors[f"{name}.bias"] = torch.randn(outputs, generator=random) * 0.05 + (0.5 if last else 0)
+        if version in ("cat5", "sum"):  # the fixed wavelets are in the published files, too
+            for level, count in enumerate((64, 128, 256), 1):
+                name = f"pool{level}" if file == "encoder" else f"recon_block{level}"
+                for part, signs in zip(("LL", "LH", "HL", "HH"), SIGNS):
+                    tensors[f"{name}.{part}.weight"] = torch.tensor(signs).reshape(2, 2).repeat(count, 1, 1, 1) / 2
+        # In the older of torch's two formats, for WCT2's files are older than torch 1.6.
+        torch.save(tensors, paths[file], _use_new_zipfile_serialization=False)
+
+
+class Layers:
+    def __init__(self, tensors):
+        self.tensors = {key: value.double() for key, value in tensors.items()}
+
+    def has(self, name):
+        return f"{name}.weight" in self.tensors
+
+    def __call__(self, x, *names, pad=True, relu=True):
+        for name in names:
+            if pad:
+                x = functional.pad(x, (1, 1, 1, 1), mode="reflect")
+            x = functional.conv2d(x, self.tensors[f"{name}.weight"], self.tensors[f"{name}.bias"])
+            x = x.clamp(min=0) if relu else x
+        return x
+
+
+def haar(x):
+    """The four halves of a picture by sums and differences of its 2 x 2 blocks."""
+    a, b, c, d = x[..., ::2, ::2], x[..., ::2, 1::2], x[..., 1::2, ::2], x[..., 1::2, 1::2]
+    return (a + b + c + d) / 2, (b - a + d - c) / 2, (c - a + d - b) / 2, (a - b - c + d) / 2
+
+
+def spread_out(part, signs):
+    """What one of the four contributes to the picture: its value at each of the block's pixels, with a sign."""
+    whole = part.new_zeros(*part.shape[:2], 2 * part.shape[2], 2 * part.shape[3])
+    for i, sign in enumerate(signs):
+        whole[..., i // 2::2, i % 2::2] = sign * part / 2
+    return whole
+
+
+def root(features, exponent):
+    """(C + 1)^exponent and the mean; WCT2 divides by n - 1 and adds the unit matrix."""
+    rows = features.flatten(2)[0]
+    mean = rows.mean(1, keepdim=True)
+    covariance = (rows - mean) @ (rows - mean).T / (rows.shape[1] - 1) + torch.eye(len(rows), dtype=torch.float64)
+    values, vectors = torch.linalg.eigh(covariance)
+    return vectors @ torch.diag(values ** exponent) @ vectors.T, mean
+
+
+def whitened_and_colored(content, style):
+    whiten, mean = root(content, -0.5)
+    color, target = root(style, 0.5)
+    rows = color @ whiten @ (content.flatten(2)[0] - mean) + target
+    return rows.clamp(content.min(), content.max()).reshape(content.shape)
+
+
+def wct2(states, photo, style, transform):
+    encode, decode = Layers(states["encoder"]), Layers(states["decoder"])
+    cat5 = decode.has("conv3_4_2")
+
+    def run(x, at):
+        over = {}
+
+        def pool(x, level):
+            low, *bands = haar(x)
+            over[level] = (bands, x)
+            return low
+
+        def unpool(x, level):
+            bands, whole = over[level]
+            parts = [spread_out(part, signs) for part, signs in zip([x, *bands], SIGNS)]
+            return torch.cat([*parts, whole], 1) if cat5 else sum(parts)
+        x = encode(encode(x, "conv0", pad=False, relu=False), "conv1_1")
+        if cat5:
+            x = at("e1", x)
+            x = at("e2", encode(pool(encode(x, "conv1_2"), 1), "conv2_1"))
+            x = at("e3", encode(pool(encode(x, "conv2_2"), 2), "conv3_1"))
+            x = at("e4", encode(pool(encode(x, "conv3_2", "conv3_3", "conv3_4"), 3), "conv4_1"))
+        else:
+            x = at("e1", pool(encode(x, "conv1_2"), 1))
+            x = at("e2", pool(encode(x, "conv2_1", "conv2_2"), 2))
+            x = at("e3", pool(encode(x, "conv3_1", "conv3_2", "conv3_3", "conv3_4"), 3))
+            x = at("e4", encode(x, "conv4_1"))
+        for level, (bands, whole) in over.items():
+            over[level] = ([at(f"s{level}{i}", band) for i, band in enumerate(bands)], whole)
+        two = "_2" if cat5 else ""
+        x = decode(unpool(decode(x, "conv4_1"), 3), "conv3_4" + two, "conv3_3", "conv3_2")
+        x = at("d3", x) if cat5 else x
+        x = decode(unpool(decode(x, "conv3_1"), 2), "conv2_2" + two)
+        x = at("d2", x) if cat5 else x
+        x = decode(unpool(decode(x, "conv2_1"), 1), "conv1_2" + two)
+        x = at("d1", x) if cat5 else x
+        return decode(x, "conv1_1", relu=False)
+    seen = {}
+    run(style, lambda place, x: seen.setdefault(place, x))
+    height, width = photo.shape[2:]
+    photo = functional.pad(photo, (0, -width % 8, 0, -height % 8), mode="reflect")
+    styled = run(photo, lambda place, x: whitened_and_colored(x, seen[place]) if transform else x)
+    return styled[..., :height, :width]
+
+
+def ccpl(states, photo, style, transform):
+    vgg, sct, decode = (Layers(states[name]) for name in ("vgg", "sct", "decoder"))
+    artistic = sct.has("cnet.4")
+
+    def pool(x):
+        return functional.max_pool2d(x, 2, ceil_mode=True)
+
+    def encode(x):
+        x = pool(vgg(vgg(x, "0", pad=False, relu=False), "2", "5"))
+        x = vgg(pool(vgg(x, "9", "12")), "16")
+        return vgg(pool(vgg(x, "19", "22", "25")), "29") if artistic else x
+
+    def code(net, x):
+        x = sct(x, *([f"{net}.0", f"{net}.2"] if artistic else [f"{net}.0"]), pad=False)
+        return sct(x, f"{net}.4" if artistic else f"{net}.2", pad=False, relu=False)
+
+    def doubled(x):
+        return x.repeat_interleave(2, 2).repeat_interleave(2, 3)
+    content, styles = encode(photo), encode(style)
+    mean = styles.mean((2, 3), keepdim=True)
+    x = content
+    if transform:
+        normal = (content - content.mean((2, 3), keepdim=True)) / (content.var((2, 3), keepdim=True) + 1e-5).sqrt()
+        rows = code("snet", styles - mean).flatten(2)[0]
+        narrow = code("cnet", normal)
+        narrow = (rows @ rows.T / rows.shape[1] @ narrow.flatten(2)[0]).reshape(narrow.shape)
+        x = sct(narrow, "uncompress", pad=False, relu=False) + mean
+    first = 10 if not artistic and not decode.has("28") else 0
+
+    def layer(x, *numbers, relu=True):
+        return decode(x, *(str(number - first) for number in numbers), relu=relu)
+    x = layer(doubled(layer(x, 1)), 5, 8) if artistic else x
+    x = layer(doubled(layer(x, 11, 14)), 18, 21)
+    x = layer(layer(doubled(x), 25), 28, relu=False)
+    return x[..., :photo.shape[2], :photo.shape[3]]
+
+
+def picture(height, width, tint, seed):
+    """Soft waves, an edge and grain, in [0, 1]: [1, 3, height, width]."""
+    y, x = numpy.mgrid[:height, :width]
+    grain = numpy.random.default_rng(seed).random((3, height, width)) - 0.5
+    planes = [t * (0.5 + 0.25 * numpy.sin(0.11 * x + c) + 0.2 * numpy.cos(0.07 * y - c) + 0.15 * (x + y > width))
+              for c, t in enumerate(tint)]
+    return torch.from_numpy(numpy.clip(numpy.array(planes) + 0.06 * grain, 0, 1).astype("float32"))[None]
+
+
+def write_picture(path, values):
+    with open(path, "wb") as file:
+        file.write(struct.pack("=ii", values.shape[3], values.shape[2]))
+        file.write(values[0].permute(1, 2, 0).contiguous().numpy().tobytes())
+
+
+def read_picture(path):
+    with open(path, "rb") as file:
+        width, height = struct.unpack("=ii", file.read(8))
+        values = numpy.frombuffer(file.read(), "float32").reshape(height, width, 3)
+    return torch.from_numpy(values.copy()).permute(2, 0, 1)[None].double()
+
+
+def check(method, states, folder, program):
+    """0 if the program's pictures are this file's to 1e-4 of white."""
+    forward = {"wct2": wct2, "ccpl": ccpl}[method]
+    style = picture(64, 96, (1.0, 0.6, 0.35), 2)
+    worst = 0.0
+    with tempfile.TemporaryDirectory() as scratch, torch.no_grad():
+        paths = [os.path.join(scratch, name) for name in ("photo", "style", "out")]
+        write_picture(paths[1], style)
+        for height, width in ((72, 104), (61, 83)):
+            photo = picture(height, width, (0.8, 0.9, 1.0), 1)
+            write_picture(paths[0], photo)
+            subprocess.run([program, folder, "1024", *paths], check=True, stdout=subprocess.DEVNULL)
+            got = read_picture(paths[2])
+            expected = forward(states, photo.double(), style.double(), True)
+            without = forward(states, photo.double(), style.double(), False).clamp(0, 1)
+            inside = ((expected > 0) & (expected < 1)).double().mean()
+            difference = (got - expected.clamp(0, 1)).abs().max()
+            worst = max(worst, difference.item())
+            print(f"{method} {width} x {height}: largest difference {difference:.2e} of pictures from "
+                  f"{expected.min():.3f} to {expected.max():.3f}, spread {expected.std():.3f} ({100 * inside:.1f} % "
+                  f"not clipped); without transforms {(without - expected.clamp(0, 1)).abs().max():.2e}")
+    return 0 if worst <= 1e-4 else 1
+
+
+if __name__ == "__main__":
+    print(__doc__)
+    sys.exit(0 if sys.argv[1:] == ["--help"] else 2)
