@@ -56,7 +56,8 @@ def record_of(folder, stage):
 def last_words(log):
     with open(log, encoding="utf-8", errors="replace") as file:
         lines = [line.strip() for line in file if line.strip()]
-    return next((line for line in reversed(lines) if "error" in line.lower()), lines[-1] if lines else "")
+    words = next((line for line in reversed(lines) if "error" in line.lower()), lines[-1] if lines else "")
+    return words.removeprefix("regrade: ").split(" To do: ")[0]
 
 
 def figures_of(folder):
