@@ -70,20 +70,19 @@ class Segment:
         kernel = [[[[v / 2 for v in HAAR[band][:2]], [v / 2 for v in HAAR[band][2:]]]]] * count
         return self.add(kind, [x, self.constant(kernel)], count, out, group=count, kernel_shape=[2, 2], strides=[2, 2])
 
-    def write(self, path, outputs):
+    def file(self, name, outputs):
+        """(name, bytes)"""
         helper, to_tensor = self.onnx.helper, self.onnx.numpy_helper.from_array
 
-        def info(name):
-            shape = [1, self.channels[name], f"{name}_h", f"{name}_w"]
-            return helper.make_tensor_value_info(name, self.onnx.TensorProto.FLOAT, shape)
-        graph = helper.make_graph(self.nodes, os.path.basename(path), [info(n) for n in self.inputs],
+        def info(tensor):
+            shape = [1, self.channels[tensor], f"{tensor}_h", f"{tensor}_w"]
+            return helper.make_tensor_value_info(tensor, self.onnx.TensorProto.FLOAT, shape)
+        graph = helper.make_graph(self.nodes, name, [info(n) for n in self.inputs],
                                   [info(n) for n in outputs], [to_tensor(v, n) for n, v in self.weights.items()])
         model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 11)])
         model.ir_version = 6
         self.onnx.checker.check_model(model)
-        with open(path, "wb") as file:
-            file.write(model.SerializeToString())
-        print(path)
+        return name + ".onnx", model.SerializeToString()
 
 
 class State:
@@ -92,10 +91,12 @@ class State:
     def __init__(self, path):
         import torch
         self.path = path
+        if not os.path.isfile(path):
+            sys.exit(f"{path}: there is no such file; download it from the authors")
         try:
             self.tensors = torch.load(path, map_location="cpu", weights_only=True)
-        except Exception as error:
-            sys.exit(f"{path}: no weights that torch.load reads ({str(error).splitlines()[0]}); download it again")
+        except Exception:  # torch's own words tell people to trust the file
+            sys.exit(f"{path}: torch finds no weights in it; download it again")
         if not isinstance(self.tensors, dict):
             sys.exit(f"{path}: holds no table of tensors")
 
@@ -120,7 +121,7 @@ def check_haar(state):
                 sys.exit(f"{state.path}: {key} is no Haar wavelet")
 
 
-def convert_wct2(encoder, decoder, folder):
+def wct2_files(encoder, decoder):
     """Yoo et al. 2019, Fig. 3, and the layers of clovaai/WCT2: where features are transformed, a file ends."""
     for state in (encoder, decoder):
         check_haar(state)
@@ -149,7 +150,7 @@ def convert_wct2(encoder, decoder, folder):
                 splits = cat5 and not last and layers[layers.index(layer) + 1] == "|"
                 x = segment.conv(x, encoder, layer, "out" if last else "skip" if splits else None,
                                  relu=layer != "conv0", pad=layer != "conv0")
-        segment.write(f"{folder}/wct2_{version}_encoder{level}.onnx", outputs)
+        yield segment.file(f"wct2_{version}_encoder{level}", outputs)
     blocks = {4: (["conv4_1"], ["conv3_4" + two, "conv3_3", "conv3_2"]), 3: (["conv3_1"], ["conv2_2" + two]),
               2: (["conv2_1"], ["conv1_2" + two])}
     for level, (before, after) in blocks.items():
@@ -166,13 +167,13 @@ def convert_wct2(encoder, decoder, folder):
                 x = segment.add("Add", [x, part], count)
         for layer in after:
             x = segment.conv(x, decoder, layer, "out" if layer == after[-1] else None)
-        segment.write(f"{folder}/wct2_{version}_decoder{level}.onnx", ["out"])
+        yield segment.file(f"wct2_{version}_decoder{level}", ["out"])
     segment = Segment(feat=64)
     segment.conv("feat", decoder, "conv1_1", "image", relu=False)
-    segment.write(f"{folder}/wct2_{version}_decoder1.onnx", ["image"])
+    yield segment.file(f"wct2_{version}_decoder1", ["image"])
 
 
-def convert_ccpl(vgg, sct, decoder, folder):
+def ccpl_files(vgg, sct, decoder):
     """Wu et al. 2022, Fig. 3, and the layers of JarrentWu1031/CCPL, which torch numbers."""
     count = sct.take("uncompress")[0].shape[0]
     if count not in (256, 512):
@@ -184,17 +185,17 @@ def convert_ccpl(vgg, sct, decoder, folder):
     for layer in layers:
         last = layer == layers[-1]
         x = segment.halve(x) if layer == "|" else segment.conv(x, vgg, layer, "feat" if last else None)
-    segment.write(f"{folder}/ccpl_encoder.onnx", ["feat"])
+    yield segment.file("ccpl_encoder", ["feat"])
     for net, name in (("cnet", "content"), ("snet", "style")):
         segment, x = Segment(feat=count), "feat"
         numbers = (0, 2, 4) if artistic else (0, 2)
         for number in numbers:
             last = number == numbers[-1]
             x = segment.conv(x, sct, f"{net}.{number}", "code" if last else None, relu=not last, pad=False)
-        segment.write(f"{folder}/ccpl_{name}.onnx", ["code"])
+        yield segment.file(f"ccpl_{name}", ["code"])
     segment = Segment(code=sct.take("uncompress")[0].shape[1])
     segment.conv("code", sct, "uncompress", "feat", relu=False, pad=False)
-    segment.write(f"{folder}/ccpl_expand.onnx", ["feat"])
+    yield segment.file("ccpl_expand", ["feat"])
     # The photorealistic decoder is the artistic one from its tenth part on; files of it number either way.
     first = 0 if artistic or "28" in decoder else 10
     layers = [1, "|", 5, 8] if artistic else []
@@ -204,7 +205,7 @@ def convert_ccpl(vgg, sct, decoder, folder):
         last = layer == 28
         x = (segment.double(x) if layer == "|" else
              segment.conv(x, decoder, str(layer - first), "image" if last else None, relu=not last))
-    segment.write(f"{folder}/ccpl_decoder.onnx", ["image"])
+    yield segment.file("ccpl_decoder", ["image"])
 
 
 def main():
@@ -237,7 +238,11 @@ def main():
     if missing:
         parser.error("of " + options.method + " are missing: " + ", ".join(f"--{name}" for name in missing))
     states = {name: State(path) for name, path in paths.items()}
-    {"wct2": convert_wct2, "ccpl": convert_ccpl}[options.method](**states, folder=options.out)
+    files = list({"wct2": wct2_files, "ccpl": ccpl_files}[options.method](**states))  # all of them, or none is written
+    for name, content in files:
+        with open(os.path.join(options.out, name), "wb") as file:
+            file.write(content)
+        print(os.path.join(options.out, name))
     if options.check:
         import reference_networks
         tensors = {name: state.tensors for name, state in states.items()}

@@ -76,25 +76,32 @@ FeatureMap Copied(const cv::Mat& blob, const std::string& name, const std::strin
 
 struct OnnxNetwork::Implementation {
   std::string path;
+  std::string bytes;
   cv::dnn::Net net;
+
+  void Load() {
+    const char* hint = "convert the network to ONNX of opset 11 with 32-bit numbers";
+    try {
+      const QuietOpenCv quiet;
+      net = cv::dnn::readNetFromONNX(bytes.data(), bytes.size());
+    } catch (const cv::Exception& exception) {
+      Fail("it is not an ONNX file, or not one that OpenCV can run: " + Reason(exception), path,
+           hint);
+    }
+    if (net.empty()) Fail("it holds no network", path, hint);
+    net.setPreferableBackend(cv::dnn::DNN_BACKEND_OPENCV);
+    net.setPreferableTarget(cv::dnn::DNN_TARGET_CPU);
+  }
 };
 
 OnnxNetwork::OnnxNetwork(const std::string& path)
     : implementation_(std::make_unique<Implementation>()) {
   implementation_->path = path;
-  const std::string bytes = ReadBytes(path);
-  const char* hint = "convert the network to ONNX of opset 11 with 32-bit numbers";
-  try {
-    const QuietOpenCv quiet;
-    implementation_->net = cv::dnn::readNetFromONNX(bytes.data(), bytes.size());
-  } catch (const cv::Exception& exception) {
-    Fail("it is not an ONNX file, or not one that OpenCV can run: " + Reason(exception), path,
-         hint);
-  }
-  if (implementation_->net.empty()) Fail("it holds no network", path, hint);
-  implementation_->net.setPreferableBackend(cv::dnn::DNN_BACKEND_OPENCV);
-  implementation_->net.setPreferableTarget(cv::dnn::DNN_TARGET_CPU);
+  implementation_->bytes = ReadBytes(path);
+  implementation_->Load();
 }
+
+void OnnxNetwork::GiveBackMemory() const { implementation_->Load(); }
 
 OnnxNetwork::~OnnxNetwork() = default;
 OnnxNetwork::OnnxNetwork(OnnxNetwork&&) noexcept = default;

@@ -25,6 +25,9 @@ class OnnxNetwork {
   // may change from call to call.
   std::vector<FeatureMap> Run(const std::vector<Input>& inputs,
                               const std::vector<std::string>& outputs) const;
+  // Gives back the memory that Run keeps for pictures of the sizes it has seen, which is
+  // several times what comes out; costs reading the network anew, from memory.
+  void GiveBackMemory() const;
   const std::string& path() const;
 
  private:

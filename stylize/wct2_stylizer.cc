@@ -91,6 +91,7 @@ class Wct2 : public ViewStylizer {
       const int height = x.height, width = x.width;
       std::vector<FeatureMap> parts =
           encoder.Run({{level == 1 ? "image" : "feat", &x}}, outputs);
+      encoder.GiveBackMemory();
       x = std::move(parts[0]);
       CheckShape(x, x.channels, halves ? height / 2 : height, halves ? width / 2 : width,
                  encoder.path());
@@ -120,6 +121,7 @@ class Wct2 : public ViewStylizer {
       }
       const int times = level >= 2 ? 2 : 1, height = x.height * times, width = x.width * times;
       x = std::move(decoder.Run(inputs, {level == 1 ? "image" : "out"})[0]);
+      decoder.GiveBackMemory();
       CheckShape(x, level == 1 ? 3 : x.channels, height, width, decoder.path());
       over[level] = {};
     }
