@@ -36,21 +36,15 @@ class Ccpl : public ViewStylizer {
         expand_(folder + "/ccpl_expand.onnx"),
         decoder_(folder + "/ccpl_decoder.onnx") {
     // Files that do not fit each other are found before a large picture is begun.
-    Image trial(kSmallestStyle + 3, kSmallestStyle);
-    for (size_t i = 0; i < trial.pixels.size(); ++i)
-      trial.pixels[i] = static_cast<float>(i * 37 % 256) / 255.0f;
+    const Image trial = TrialPicture(kSmallestStyle + 3, kSmallestStyle);
     LearnStyle(trial);
     Restyled(trial);
     LearnStyle(Working(Colors(style), max_side_, 1, kSmallestStyle));
   }
 
   Image Stylize(const Image& view, int view_index) const override {
-    CountNotFinite(view, "view " + std::to_string(view_index));
-    const Image photo = Colors(view);
-    const Image small = Working(photo, max_side_, 1);
-    const Image styled = Restyled(small);
-    const bool whole = small.width == photo.width && small.height == photo.height;
-    return WithColors(view, whole ? styled : WithEdgesOf(photo, small, styled));
+    return StyledAtWorkingSize(view, view_index, max_side_,
+                               [this](const Image& photo) { return Restyled(photo); });
   }
 
   std::string Name() const override { return "ccpl"; }

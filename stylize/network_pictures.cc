@@ -5,6 +5,7 @@
 #include "kernels/base/error.h"
 #include "kernels/image/resize.h"
 #include "stylize/guided_filter.h"
+#include "stylize/view_stylizer.h"
 
 namespace regrade {
 namespace {
@@ -75,6 +76,23 @@ FeatureMap Cropped(const FeatureMap& map, int width, int height, int spare,
 
 Image WithEdgesOf(const Image& photo, const Image& small, const Image& styled) {
   return ApplyGuided(FitGuided(small, styled, kGuideRadius, kGuideEpsilon), photo);
+}
+
+Image StyledAtWorkingSize(const Image& view, int view_index, int max_side,
+                          const std::function<Image(const Image&)>& restyled) {
+  CountNotFinite(view, "view " + std::to_string(view_index));
+  const Image photo = Colors(view);
+  const Image small = Working(photo, max_side, 1);
+  const Image styled = restyled(small);
+  const bool whole = small.width == photo.width && small.height == photo.height;
+  return WithColors(view, whole ? styled : WithEdgesOf(photo, small, styled));
+}
+
+Image TrialPicture(int width, int height) {
+  Image picture(width, height);
+  for (size_t i = 0; i < picture.pixels.size(); ++i)
+    picture.pixels[i] = static_cast<float>(i * 37 % 256) / 255.0f;
+  return picture;
 }
 
 void CheckShape(const FeatureMap& map, int channels, int height, int width,

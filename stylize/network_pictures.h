@@ -1,6 +1,7 @@
 // Pictures on their way into networks and out of them: sizes that networks can take, and back.
 #pragma once
 
+#include <functional>
 #include <string>
 
 #include "kernels/scene/image.h"
@@ -30,6 +31,15 @@ FeatureMap Cropped(const FeatureMap& map, int width, int height, int spare,
 // the photo's edges: EQ(guided-filter) with radius 30 and eps 0.02^2, whose coefficients are
 // enlarged and meet the photo's own detail.
 Image WithEdgesOf(const Image& photo, const Image& small, const Image& styled);
+
+// What Stylize of view_stylizer.h promises, by a method that gives a picture of any size back
+// at that size: a photo whose longer side is above `max_side` is restyled small, and
+// WithEdgesOf brings the result to its size.
+Image StyledAtWorkingSize(const Image& view, int view_index, int max_side,
+                          const std::function<Image(const Image&)>& restyled);
+
+// Of many colours, for a first try of networks.
+Image TrialPicture(int width, int height);
 
 // Throws Error(kExternalProgram) naming `path` unless the map has this shape.
 void CheckShape(const FeatureMap& map, int channels, int height, int width,

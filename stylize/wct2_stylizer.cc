@@ -29,9 +29,7 @@ class Wct2 : public ViewStylizer {
       decoders_.emplace_back(Numbered(folder, Prefix(cat5) + "decoder", level));
     }
     // Files that do not fit each other are found before a large picture is begun.
-    Image trial(4 * kMultiple, 3 * kMultiple);
-    for (size_t i = 0; i < trial.pixels.size(); ++i)
-      trial.pixels[i] = static_cast<float>(i * 37 % 256) / 255.0f;
+    const Image trial = TrialPicture(4 * kMultiple, 3 * kMultiple);
     Restyle(MapOf(trial), [this](const std::string& place, FeatureMap* x) {
       style_[place] = MeasureFeatures(*x, 1);
     });
@@ -44,12 +42,8 @@ class Wct2 : public ViewStylizer {
   }
 
   Image Stylize(const Image& view, int view_index) const override {
-    CountNotFinite(view, "view " + std::to_string(view_index));
-    const Image photo = Colors(view);
-    const Image small = Working(photo, max_side_, 1);
-    const Image styled = Restyled(small);
-    const bool whole = small.width == photo.width && small.height == photo.height;
-    return WithColors(view, whole ? styled : WithEdgesOf(photo, small, styled));
+    return StyledAtWorkingSize(view, view_index, max_side_,
+                               [this](const Image& photo) { return Restyled(photo); });
   }
 
   std::string Name() const override { return cat5_ ? "wct2-cat5" : "wct2-sum"; }

@@ -114,8 +114,10 @@ void ProbeMethod(StyleOptions* options) {
                 "what follows \"" + method.kind + ":\" in --method must exist");
   const fs::path absolute = fs::absolute(method.argument, error);
   if (!error) options->method = method.kind + ":" + absolute.lexically_normal().string();
-  if (method.kind == "onnx")
-    Rehearse([&] { MakeOnnxStylizer(method.argument, 64, Image(64, 64)); }, method.argument);
+  if (method.kind != "onnx") return;
+  const auto make = [&] { MakeOnnxStylizer(method.argument, 64, Image(64, 64)); };
+  Rehearse(make, method.argument);
+  make();  // a rehearsal keeps plain errors to itself
 }
 
 std::vector<int> StyledViews(const Workspace& workspace, const Capture& capture, int holdout) {

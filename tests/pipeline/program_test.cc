@@ -95,6 +95,15 @@ TEST(Program, TheStyleMethodIsLookedAtBeforeAnyWork) {
     EXPECT_EQ(outcome.code, 3) << method;
     EXPECT_SAYS(outcome, "/nowhere/styled");
   }
+  // Folders that are there, and hold no networks, or none that can be read.
+  WriteText(folder / "letters/a.txt", "x");
+  WriteText(folder / "broken/encoder.onnx", "not a network");
+  for (const char* networks : {"letters", "broken"}) {
+    const Outcome outcome = run("onnx:" + (folder / networks));
+    EXPECT_EQ(outcome.code, 4) << networks;
+    EXPECT_SAYS(outcome, folder / networks);
+    EXPECT_SAYS(outcome, "encoder.onnx");
+  }
   EXPECT_FALSE(std::filesystem::exists(folder / "out"));
 }
 
