@@ -9,15 +9,20 @@ namespace {
 constexpr double kWindowShare = 0.1;   // of the work
 constexpr double kShortestWindow = 3;  // seconds
 constexpr size_t kMostPoints = 512;
+constexpr double kSmallFirstShare = 0.02;  // of the work: what came before it was preparation
 
 }  // namespace
 
 void EtaEstimator::Add(double seconds, double done, double total) {
-  if (points_.empty()) {
-    points_.push_back({0, 0});
-    start_ = {seconds, done};
-  }
   total_ = total;
+  if (points_.empty()) {
+    start_ = {seconds, done};
+    if (done < total * kSmallFirstShare) {
+      points_.push_back(start_);
+      return;
+    }
+    points_.push_back({0, 0});
+  }
   if (done < points_.back().done) {  // begun anew (a finer grid): the old pace says nothing
     points_.assign(1, {seconds, done});
     start_ = points_.front();

@@ -8,7 +8,8 @@ namespace regrade {
 
 // The rate is measured over a window (a tenth of the work, at least 3 s), so that a slow start
 // and a change of pace are forgotten, and single slow steps are not noticed; the pace since the
-// start has a third of the say.
+// start has a third of the say. A first report of a small share of the work ends preparations,
+// which say nothing of the pace.
 class EtaEstimator {
  public:
   // `seconds` since the stage began, from a clock that never goes back; `done` of `total`.

@@ -28,7 +28,7 @@ KNOBS = {
     ],
     "style": [
         ("style-steps", ["100", "1000"]), ("style-rays", ["1024", "16384"]), ("style-patch", ["1", "32"]),
-        ("style-min-weight", ["0", "1e-2"]), ("style-rate", ["2e-4", "2e-3"]), ("style-rate-last", ["7e-4"]),
+        ("style-min-weight", ["0", "1e-2"]), ("style-view-weight", ["0", "0.3", "10"]), ("style-rate", ["2e-4", "2e-3"]), ("style-rate-last", ["7e-4"]),
         ("style-lambda", ["2e-5", "2e-3"]), ("style-base", ["mkl", "least-squares", "none"]),
         ("style-bound", ["2", "0"]), ("style-position-scale", ["0", "8"]), ("style-sh-scale", ["1", "4"]),
         ("style-norm-steps", ["1"]), ("style-activation", ["relu", "tanh"]), ("style-omega", ["2"]),

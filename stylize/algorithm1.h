@@ -8,17 +8,20 @@
 #include "kernels/field/ray_weights.h"
 #include "kernels/field/spherical_harmonics.h"
 #include "kernels/field/trilinear.h"
+#include "kernels/field/view_penalty.h"
 #include "stylize/lipschitz_network.h"
 
 namespace regrade {
 
-// L_rec = scale * sum over rays and channels of squared differences, and its gradient by the
-// effective matrices added to `d_effective`. `weights` belong to the rays; directions and
-// targets are [rays]. Not one-sided; every ray counts.
+// L_rec = scale * sum over rays and channels of squared differences, and view_weight times
+// EQ(view-penalty) with `scale` for 1 / (3 Q), and the gradient by the effective matrices added
+// to `d_effective`. `weights` belong to the rays; directions and targets are [rays]. Not
+// one-sided; every ray counts.
 template <typename T>
 T Algorithm1(const LipschitzNetwork& network, const RadianceField& field,
              const RayWeights& weights, const std::vector<Vec3<T>>& directions,
-             const std::vector<Vec3<T>>& targets, T scale, DenseNetwork<T>* d_effective) {
+             const std::vector<Vec3<T>>& targets, T scale, T view_weight,
+             DenseNetwork<T>* d_effective) {
   const Geometry& geometry = *field.geometry;
   const std::vector<int32_t> vertex = VertexOfVoxel(geometry);
   const DenseNetwork<T> f = network.Effective<T>();
@@ -27,7 +30,8 @@ T Algorithm1(const LipschitzNetwork& network, const RadianceField& field,
 
   // 0. feed forward
   std::vector<T> features(static_cast<size_t>(n) * kNetworkInputs);
-  std::vector<T> sh(static_cast<size_t>(n) * kNetworkSh), d_sh(sh.size());
+  std::vector<T> sh(static_cast<size_t>(n) * kNetworkSh), change(sh.size()), d_sh(sh.size());
+  std::vector<T> mass(static_cast<size_t>(n) * 3);  // see EQ(view-penalty)
   for (int64_t v = 0; v < n; ++v) {
     float row[kFeatureStride];
     if (v < voxels)
@@ -41,6 +45,7 @@ T Algorithm1(const LipschitzNetwork& network, const RadianceField& field,
     std::copy_n(row, kNetworkInputs, x);
     T* y = &sh[static_cast<size_t>(v) * kNetworkSh];
     DenseForward(f, x, y);
+    std::copy_n(y, kNetworkSh, &change[static_cast<size_t>(v) * kNetworkSh]);
     if (network.data().has_base) AddBaseMap(network.data().base, x, y);
   }
 
@@ -82,6 +87,10 @@ T Algorithm1(const LipschitzNetwork& network, const RadianceField& field,
       CornerPoints(geometry, sample, points);
       for (int c = 0; c < 3; ++c) {
         if (!(raw[static_cast<size_t>(i - first)][c] > 0)) continue;
+        for (int corner = 0; corner < 8; ++corner)
+          if (points[corner] >= 0 && !sample.on_sphere())
+            mass[static_cast<size_t>(points[corner]) * 3 + static_cast<size_t>(c)] +=
+                T(sample.weight) * CornerWeight(fraction, corner);
         for (int k = 0; k < (sample.on_sphere() ? 1 : 9); ++k) {
           const T d_blend = 2 * scale * difference[c] * T(sample.weight) * gamma[k];
           for (int corner = 0; corner < 8; ++corner)
@@ -91,6 +100,14 @@ T Algorithm1(const LipschitzNetwork& network, const RadianceField& field,
         }
       }
     }
+  }
+
+  // and what changes with the direction
+  for (size_t i = 0; i < sh.size(); ++i) {
+    if (i % 9 == 0) continue;
+    const ViewPenalty<T> penalty = ViewPenaltyOf(mass[i / 9], change[i]);
+    loss += scale * view_weight * penalty.value;
+    d_sh[i] += scale * view_weight * penalty.derivative;
   }
 
   // 3. from the coefficients to f

@@ -82,4 +82,9 @@ RowMap RowMapOf(const ColorMap& map) {
   return rows;
 }
 
+RowMap BaseOf(const LipschitzNetworkData& data) {
+  if (data.has_base) return RowMapOf(data.base);
+  return {.matrix = {.row = {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}}}, .constant = {0, 0, 0}};
+}
+
 }  // namespace regrade

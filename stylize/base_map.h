@@ -26,5 +26,7 @@ struct RowMap {
   Vec3f constant;
 };
 RowMap RowMapOf(const ColorMap& map);
+// What a network is added to: its base, or nothing.
+RowMap BaseOf(const LipschitzNetworkData& data);
 
 }  // namespace regrade

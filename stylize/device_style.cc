@@ -62,6 +62,11 @@ class DeviceStyleLoss : public StyleLoss {
         BlendColorsAdjoint(grid_, weights_, slots_, rays_.data() + begin, open_.data(),
                            d_color_.data(), d_rows_.data());
     });
+    if (gradient != nullptr) {
+      AddViewPenalty(BaseOf(network.data()).matrix, features_.data(), rows_.data(),
+                     slots_.num_slots, static_cast<float>(options_.view_weight), d_rows_.data(),
+                     &sums_.data()->loss);
+    }
     DeviceColorLoss sums;
     sums_.CopyOut(&sums, 1);
     result.rays = static_cast<int64_t>(sums.rays);

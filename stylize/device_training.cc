@@ -31,7 +31,7 @@ class DeviceTraining::Recording {
         options_(options),
         position_scale_(network.data().position_scale),
         has_base_(network.data().has_base),
-        base_(RowMapOf(network.data().base)),
+        base_(BaseOf(network.data())),
         batches_(rays_per_step, most_steps),
         touched_(*grid),
         slots_(*grid),
@@ -143,6 +143,9 @@ class DeviceTraining::Recording {
                  sums_.data());
     BlendColorsAdjoint(grid_, weights_, slots_, rays_.data(), open_.data(), d_color_.data(),
                        d_rows_.data());
+    AddViewPenalty(base_.matrix, features_.data(), rows_.data(), slot_room_,
+                   static_cast<float>(options_.view_weight), d_rows_.data(),
+                   &sums_.data()->loss, touched);
     mlp_.AddAdjoint(MlpPrecision::kTensor, features_.data(), d_rows_.data(), slot_room_,
                     touched);
     const DeviceColorLoss* sums = sums_.data();

@@ -4,10 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "kernels/field/color_error.h"
 #include "kernels/field/spherical_harmonics.h"
 #include "kernels/field/trilinear.h"
+#include "kernels/field/view_penalty.h"
+#include "stylize/base_map.h"
 
 namespace regrade {
 namespace {
@@ -110,7 +113,8 @@ Vec3f RenderStyled(const WeightedSample* samples, const int32_t* slots, int64_t 
   return color;
 }
 
-// Adds the adjoint of RenderStyled to the rows of d_sh in [first, last).
+// Adds the adjoint of RenderStyled to the rows of d_sh in [first, last), and the masses of
+// EQ(view-penalty).
 void ScatterStyled(const WeightedSample* samples, const int32_t* slots, int64_t n,
                    const float* gamma, const uint8_t* open, const Vec3f& d_color, int32_t first,
                    int32_t last, float* d_sh) {
@@ -118,6 +122,7 @@ void ScatterStyled(const WeightedSample* samples, const int32_t* slots, int64_t 
   float d_blend[kFeatureStride] = {};
   for (int c = 0; c < 3; ++c)
     for (int k = 0; k < 9; ++k) d_blend[c * 9 + k] = d_color[c] * gamma[k];
+  std::fill_n(d_blend + kMassLane, 3, 1.0f);
   for (int64_t i = 0; i < n; ++i) {
     const uint8_t bits = open[i];
     if (bits == 0) continue;
@@ -126,11 +131,12 @@ void ScatterStyled(const WeightedSample* samples, const int32_t* slots, int64_t 
     const int terms = TermsOf(samples[i]);
     if (bits != 7 || terms != 9) {
       std::copy_n(d_blend, kFeatureStride, masked);
-      for (int c = 0; c < 3; ++c)
-        if (bits & (1 << c))
-          std::fill_n(masked + c * 9 + terms, 9 - terms, 0.0f);
-        else
-          std::fill_n(masked + c * 9, 9, 0.0f);
+      for (int c = 0; c < 3; ++c) {
+        const bool is_open = (bits & (1 << c)) != 0;
+        const int kept = is_open ? terms : 0;
+        std::fill_n(masked + c * 9 + kept, 9 - kept, 0.0f);
+        if (kept < 9) masked[kMassLane + c] = 0;
+      }
       d = masked;
     }
     for (int corner = 0; corner < 8; ++corner) {
@@ -215,6 +221,29 @@ void GradientAggregation::Scatter(const StyleRays& batch, const Band& band) {
   }
 }
 
+double GradientAggregation::AddViewPenalty(const LipschitzNetworkData& data) {
+  const int64_t slots = static_cast<int64_t>(touched_.size());
+  const RowMap map = BaseOf(data);
+  std::vector<double> sums(static_cast<size_t>(slots));  // summed up in order below
+#pragma omp parallel for schedule(static)
+  for (int64_t s = 0; s < slots; ++s) {
+    const float* const from = features_.data() + s * kFeatureStride;
+    const float* const styled = sh_.data() + s * kFeatureStride;
+    float* const d = d_sh_.data() + s * kFeatureStride;
+    for (int c = 0; c < 3; ++c) {
+      for (int k = 1; k < 9; ++k) {
+        const Vec3f source{from[k], from[9 + k], from[18 + k]};
+        const ViewPenalty<float> penalty =
+            ViewPenaltyOf(d[kMassLane + c], styled[c * 9 + k] - Dot(map.matrix.row[c], source));
+        sums[static_cast<size_t>(s)] += double{penalty.value};
+        d[c * 9 + k] += static_cast<float>(options_.view_weight) * penalty.derivative;
+      }
+      d[kMassLane + c] = 0;
+    }
+  }
+  return options_.view_weight * std::accumulate(sums.begin(), sums.end(), 0.0);
+}
+
 bool GradientAggregation::Counts(const StyleRays& batch, const Band& band, int64_t ray) const {
   return AllFinite(batch.targets[static_cast<size_t>(band.begin + ray)]) &&
          band.weights.transmittance[static_cast<size_t>(ray)] <= options_.max_transmittance;
@@ -266,6 +295,7 @@ AggregationResult GradientAggregation::Run(const LipschitzNetwork& network,
     }
     if (gradient != nullptr) Scatter(batch, band);
   }
+  if (gradient != nullptr) loss_sum += AddViewPenalty(network.data());
   ForgetTouched();
 
   const double count = options_.divide_by_voxels

@@ -9,6 +9,9 @@
 // gives the same gradient. The paper's text also allows 1 / B in place of 1 / (3 Q), B the
 // number of voxels.
 //
+// With view_weight > 0 the loss has a second term, see EQ(view-penalty), and so has the
+// gradient.
+//
 // One-sided (the standard recipe): a colour at or above 1 whose target is 1, or at or below 0
 // whose target is 0, is no error, because a picture clips it.
 #pragma once
@@ -34,13 +37,14 @@ struct AggregationOptions {
   float min_weight = 0;         // samples of less weight are dropped
   float max_transmittance = 1;  // rays that let more light through are left out
   bool one_sided = false;
+  double view_weight = 0;         // lambda_view of EQ(view-penalty)
   bool divide_by_voxels = false;  // 1 / B instead of 1 / (3 Q)
   bool every_voxel =
       false;  // through f at each step, as Algorithm 1 has it: the same gradient, for timing
 };
 
 struct AggregationResult {
-  double loss = 0;           // EQ(liprf-loss)
+  double loss = 0;           // see EQ(liprf-loss); with a gradient see EQ(view-penalty), too
   double squared_error = 0;  // sum over rays and channels, colours clipped to [0, 1]
   int64_t rays = 0;          // that count
   int64_t touched_voxels = 0;
@@ -90,6 +94,8 @@ class GradientAggregation : public StyleLoss {
   void FillTouchedFeatures(float position_scale);
   void RenderColors(const StyleRays& batch, Band* band) const;
   void Scatter(const StyleRays& batch, const Band& band);
+  // Behind Scatter: EQ(view-penalty) times 3 Q. Adds its gradient, and clears the masses.
+  double AddViewPenalty(const LipschitzNetworkData& data);
   bool Counts(const StyleRays& batch, const Band& band, int64_t ray) const;
   void ForgetTouched();
 

@@ -74,6 +74,7 @@ void ApplyStyleRecipe(const std::string& recipe, TrainNetworkOptions* options) {
   options->steps = 300;
   options->rate_first = 1e-2;
   options->rate_last = 1e-4;
+  options->view_weight = 0;
   options->rays_per_step = 0;
   options->min_weight = 0;
   options->sh_scale = 1;
@@ -99,6 +100,7 @@ class Training {
                              .min_weight = options.min_weight,
                              .max_transmittance = options.recipe == "paper" ? 1.0f : 0.5f,
                              .one_sided = options.recipe != "paper",
+                             .view_weight = options.view_weight,
                              .divide_by_voxels = options.loss_scale == "sum-over-voxels",
                              .every_voxel = options.every_voxel},
         loss_(device_field != nullptr

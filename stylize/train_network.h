@@ -35,6 +35,7 @@ struct TrainNetworkOptions {
   double bound_factor = 4;
   float sh_scale = 2;
   float position_scale = 8;
+  double view_weight = 1;
   int norm_steps = 20;
   std::string activation = "sine";
   float omega = 1.5f;
@@ -97,6 +98,13 @@ struct TrainNetworkOptions {
          {.help = "how strongly the style may bend with colour; counts in the bound",
           .min = 0.01,
           .max = 100});
+    bind(
+        "style-view-weight", view_weight,
+        {.help = "what it costs that a point's style changes with the direction it is seen "
+                 "from: 0 follows a 2D method nearest that treats every view its own way, more "
+                 "is steadier",
+         .min = 0,
+         .max = 1e6});
     bind("style-norm-steps", norm_steps,
          {.unit = "steps",
           .help = "of the power iteration for each step of learning",

@@ -61,7 +61,8 @@ class DeviceLearning : public ::testing::Test {
     return batches;
   }
   static AggregationOptions Options() {
-    return {.min_weight = 1e-4f, .max_transmittance = 0.9f, .one_sided = true};
+    return {
+        .min_weight = 1e-4f, .max_transmittance = 0.9f, .one_sided = true, .view_weight = 0.5};
   }
   static double Difference(const std::vector<float>& a, const std::vector<float>& b,
                            const std::vector<float>& from) {

@@ -62,6 +62,14 @@ TEST(EtaEstimator, WithinAFactorOfTwoBehindTheFirstFifth) {
   EXPECT_LT(WorstFactor([](int i) { return i % 100 == 99 ? 3.0 : 0.1; }), 2);
 }
 
+TEST(EtaEstimator, PreparationsAreNotThePace) {
+  EtaEstimator eta;
+  eta.Add(6, 1, 300);  // six seconds of preparations and a step
+  EXPECT_FALSE(eta.Remaining());
+  eta.Add(6.1, 2, 300);
+  EXPECT_NEAR(eta.Remaining().value(), 29.8, 0.1);
+}
+
 TEST(EtaEstimator, SilentWhereItKnowsNothing) {
   EtaEstimator eta;
   EXPECT_FALSE(eta.Remaining());

@@ -14,7 +14,8 @@ using namespace testing;  // NOLINT: a test
 
 // Algorithm 1's loss and its gradient by the network's own parameters.
 double PlainGradient(const LipschitzNetwork& network, const RadianceField& field,
-                     const StyleRays& batch, double scale, std::vector<double>* gradient) {
+                     const StyleRays& batch, double scale, double view_weight,
+                     std::vector<double>* gradient) {
   const RayWeights weights = ComputeRayWeights(
       *field.geometry, {batch.rays.data(), static_cast<int64_t>(batch.rays.size())},
       MarchOptions{}, field.near_clip);
@@ -26,8 +27,8 @@ double PlainGradient(const LipschitzNetwork& network, const RadianceField& field
   DenseNetwork<double> d_effective;
   for (int l = 0; l < kNetworkLayers; ++l)
     d_effective.layers.emplace_back(LipschitzNetwork::Outputs(l), LipschitzNetwork::Inputs(l));
-  const double loss =
-      Algorithm1<double>(network, field, weights, directions, targets, scale, &d_effective);
+  const double loss = Algorithm1<double>(network, field, weights, directions, targets, scale,
+                                         view_weight, &d_effective);
   if (gradient != nullptr) network.AddGradient(d_effective, gradient);
   return loss;
 }
@@ -43,7 +44,7 @@ TEST(Algorithm1, H46_GradientAgainstRichardson) {
   network.data().has_base = true;
   network.data().base = SomeMap();
   std::vector<double> gradient = NoGradient();
-  PlainGradient(network, field, batch, 1.0, &gradient);
+  PlainGradient(network, field, batch, 1.0, 0.7, &gradient);
   // Parameters are float: steps are powers of two, so that both ends are exact. Every layer's
   // W, b and K; u and v stay, as in the adjoint.
   for (int l = 0; l < kNetworkLayers; ++l) {
@@ -54,12 +55,12 @@ TEST(Algorithm1, H46_GradientAgainstRichardson) {
       float& value = network.data().parameters[static_cast<size_t>(at)];
       const float before = value = std::ldexp(std::round(std::ldexp(value, 14)), -14);
       std::vector<double> analytic = NoGradient();
-      PlainGradient(network, field, batch, 1.0, &analytic);
+      PlainGradient(network, field, batch, 1.0, 0.7, &analytic);
       const auto central = [&](float h) {
         value = before + h;
-        const double plus = PlainGradient(network, field, batch, 1.0, nullptr);
+        const double plus = PlainGradient(network, field, batch, 1.0, 0.7, nullptr);
         value = before - h;
-        const double minus = PlainGradient(network, field, batch, 1.0, nullptr);
+        const double minus = PlainGradient(network, field, batch, 1.0, 0.7, nullptr);
         value = before;
         return (plus - minus) / (2 * static_cast<double>(h));
       };
@@ -77,27 +78,51 @@ TEST(Algorithm1, H46_GradientAgainstRichardson) {
   }
 }
 
+void ExpectAlgorithm1(const RadianceField& field, const LipschitzNetwork& network,
+                      double view_weight) {
+  const StyleRays batch = SomeRays(3, 12);
+  GradientAggregation aggregation(field, {.view_weight = view_weight});
+  std::vector<double> gradient = NoGradient(), expected = NoGradient();
+  const AggregationResult result = aggregation.Run(network, batch, &gradient);
+  const double scale = 1 / (3.0 * static_cast<double>(batch.rays.size()));
+  const double loss = PlainGradient(network, field, batch, scale, view_weight, &expected);
+  EXPECT_NEAR(result.loss, loss, 1e-5 * loss);
+  EXPECT_LE(RelativeDifference(gradient, expected),
+            testing::RecordDigits("by voxels against Algorithm 1 in double",
+                                  testing::Computed::kFloat,
+                                  RelativeDifference(gradient, expected), 1e-5))
+      << "basis " << field.appearance.basis << ", view weight " << view_weight;
+  EXPECT_LT(result.touched_voxels, field.geometry->num_voxels());
+  EXPECT_GT(result.touched_voxels, 0);
+}
+
 TEST(GradientAggregation, EqualsAlgorithm1) {
   for (const int basis : {9, 4, 1}) {
-    const RadianceField field = Ball(10, basis);
-    const StyleRays batch = SomeRays(3, 12);
     LipschitzNetwork network = RandomNetwork(91);
+    const RadianceField field = Ball(10, basis);
+    ExpectAlgorithm1(field, network, 0);
+    ExpectAlgorithm1(field, network, 0.7);
     network.data().has_base = true;
     network.data().base = SomeMap();
-    GradientAggregation aggregation(field, {});
-    std::vector<double> gradient = NoGradient(), expected = NoGradient();
-    const AggregationResult result = aggregation.Run(network, batch, &gradient);
-    const double scale = 1 / (3.0 * static_cast<double>(batch.rays.size()));
-    const double loss = PlainGradient(network, field, batch, scale, &expected);
-    EXPECT_NEAR(result.loss, loss, 1e-5 * loss);
-    EXPECT_LE(RelativeDifference(gradient, expected),
-              testing::RecordDigits("by voxels against Algorithm 1 in double",
-                                    testing::Computed::kFloat,
-                                    RelativeDifference(gradient, expected), 1e-5))
-        << "basis " << basis;
-    EXPECT_LT(result.touched_voxels, field.geometry->num_voxels());
-    EXPECT_GT(result.touched_voxels, 0);
+    ExpectAlgorithm1(field, network, 0.7);
   }
+}
+
+// The second term is no little thing beside the first, and is nothing where the network is.
+TEST(GradientAggregation, ViewPenaltyIsOfTheNetworkAlone) {
+  const RadianceField field = Ball(10);
+  const StyleRays batch = SomeRays(3, 12);
+  const auto loss = [&](const LipschitzNetwork& network, double view_weight) {
+    std::vector<double> gradient = NoGradient();
+    return GradientAggregation(field, {.view_weight = view_weight})
+        .Run(network, batch, &gradient)
+        .loss;
+  };
+  const LipschitzNetwork network = RandomNetwork(91), map = NetworkOfMap(SomeMap());
+  EXPECT_GT(loss(network, 1), 1.01 * loss(network, 0));
+  EXPECT_NEAR(loss(map, 1), loss(map, 0), 1e-9);
+  EXPECT_NEAR(loss(network, 3) - loss(network, 0), 3 * (loss(network, 1) - loss(network, 0)),
+              1e-9);
 }
 
 // A ball before background spheres: texels go through f as plain colours at their direction.
@@ -117,16 +142,16 @@ TEST(GradientAggregation, BackgroundSpheresAreInAlgorithm1sGradient) {
   network.data().base = SomeMap();
   std::vector<double> gradient = NoGradient(), expected = NoGradient(), box = NoGradient();
   const AggregationResult result =
-      GradientAggregation(field, {}).Run(network, batch, &gradient);
+      GradientAggregation(field, {.view_weight = 0.5}).Run(network, batch, &gradient);
   const double scale = 1 / (3.0 * static_cast<double>(batch.rays.size()));
-  const double loss = PlainGradient(network, field, batch, scale, &expected);
+  const double loss = PlainGradient(network, field, batch, scale, 0.5, &expected);
   EXPECT_NEAR(result.loss, loss, 1e-5 * loss);
   EXPECT_LE(RelativeDifference(gradient, expected),
             testing::RecordDigits("with spheres against Algorithm 1 in double",
                                   testing::Computed::kFloat,
                                   RelativeDifference(gradient, expected), 1e-5));
   // The layers have a say: the ball alone has another gradient.
-  PlainGradient(network, Ball(8), batch, scale, &box);
+  PlainGradient(network, Ball(8), batch, scale, 0.5, &box);
   EXPECT_GT(RelativeDifference(box, expected), 0.01);
 }
 

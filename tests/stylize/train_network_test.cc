@@ -74,6 +74,33 @@ TEST(TrainNetwork, BeatsTheLinearMapWhereTheStyleIsCurved) {
   EXPECT_GT(result.smallest_k, 0.01);          // H34
 }
 
+// Views that are styled brighter and darker by turns: what of it points follow is a function of
+// the direction, and EQ(view-penalty) is its price.
+TEST(TrainNetwork, ViewWeightKeepsPointsFromFollowingEachView) {
+  StyledBall ball(16, 6, 32, LinearStyle);
+  for (size_t v = 0; v < ball.targets.size(); ++v)
+    for (float& value : ball.targets[v].pixels) value += v % 2 == 0 ? 0.08f : -0.08f;
+  const SceneColorMap map = MapOf(ball);
+  double change[3], psnr[3];
+  for (int i = 0; i < 3; ++i) {
+    TrainNetworkOptions options = Quick(120);
+    options.view_weight = i == 0 ? 0 : i == 1 ? 0.3 : 10;
+    const TrainNetworkResult result =
+        TrainNetwork(ball.field, ball.views, map, {}, options, {});
+    const Appearance styled = ApplyNetwork(result.network, ball.field);
+    const Appearance mapped =
+        ApplyNetwork(NetworkOfMap(result.network.data().base), ball.field);
+    psnr[i] = result.psnr_db;
+    change[i] = 0;
+    for (int64_t k = 0; k < styled.sh.size(); ++k)
+      if (k % 9 > 0) change[i] += std::pow(double{styled.sh[k]} - double{mapped.sh[k]}, 2);
+  }
+  EXPECT_LT(change[1], 0.8 * change[0]);
+  EXPECT_LT(change[2], 0.1 * change[0]);
+  EXPECT_GT(psnr[0], psnr[1]);
+  EXPECT_GT(psnr[1], psnr[2]);
+}
+
 TEST(TrainNetwork, NeverLosesToTheLinearMap) {
   const StyledBall ball(16, 4, 32, LinearStyle);
   const TrainNetworkResult result =

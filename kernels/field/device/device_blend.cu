@@ -5,6 +5,7 @@
 #include "kernels/field/device/launch.h"
 #include "kernels/field/device/warp_item.h"
 #include "kernels/field/device/warp_shade.h"
+#include "kernels/field/view_penalty.h"
 
 namespace regrade {
 
@@ -112,9 +113,12 @@ __global__ void BlendColorsAdjointKernel(DeviceGridView grid, int basis,
   const Vec3f d = d_color[samples[i].ray];
   if (d.x == 0 && d.y == 0 && d.z == 0) return;
   const WarpSample warp(grid, basis, samples[i], slot_of_point, rays);
-  const int c = warp.lane / 9;
-  const float d_blend =
-      c < 3 && (bits >> c & 1) != 0 ? warp.sample.weight * d[c < 3 ? c : 0] * warp.gamma : 0.0f;
+  const bool is_mass = warp.lane >= kMassLane && warp.lane < kMassLane + 3;
+  const int c = is_mass ? warp.lane - kMassLane : warp.lane / 9;
+  float d_blend = 0;
+  if (c < 3 && (bits >> c & 1) != 0)
+    d_blend = warp.sample.weight *
+              (is_mass ? static_cast<float>(warp.sample.vertex >= 0) : d[c] * warp.gamma);
 #pragma unroll
   for (int k = 0; k < 8; ++k) {
     const int32_t at = __shfl_sync(kAllLanes, warp.slot, k);

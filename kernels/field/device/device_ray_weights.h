@@ -66,7 +66,7 @@ void LimitToRoom(int64_t slot_room, DeviceRayWeights* weights, DeviceSlots* slot
 void BlendColors(const DeviceGrid& grid, const DeviceRayWeights& weights,
                  const DeviceSlots& slots, const Ray* rays, const float* rows, Vec3f* color,
                  uint8_t* open);
-// Its adjoint: adds to d_rows [slots, kRowLanes].
+// Its adjoint: adds to d_rows [slots, kRowLanes], the masses of EQ(view-penalty) among them.
 void BlendColorsAdjoint(const DeviceGrid& grid, const DeviceRayWeights& weights,
                         const DeviceSlots& slots, const Ray* rays, const uint8_t* open,
                         const Vec3f* d_color, float* d_rows);

@@ -3,6 +3,7 @@
 #include "kernels/field/background_spheres.h"
 #include "kernels/field/device/device_rows.h"
 #include "kernels/field/device/warp_item.h"
+#include "kernels/field/view_penalty.h"
 
 namespace regrade {
 
@@ -59,6 +60,39 @@ __global__ void AddMappedRowsKernel(Mat3f matrix, Vec3f constant, const float* f
   rows[i * kRowLanes + lane] += value;
 }
 
+__global__ void AddViewPenaltyKernel(Mat3f matrix, const float* from, const float* rows,
+                                     int64_t n, const int32_t* counted, float view_weight,
+                                     float* d_rows, double* loss) {
+  __shared__ float of_warp[kThreads / 32];
+  const int lane = static_cast<int>(threadIdx.x & 31),
+            warp = static_cast<int>(threadIdx.x / 32);
+  const int64_t i = ItemOfWarp(n, counted);
+  float penalty = 0;
+  if (i >= 0) {
+    const float d = d_rows[i * kRowLanes + lane];
+    const int c = lane / 9, k = lane % 9;
+    const float mass = __shfl_sync(~0u, d, kMassLane + (c < 3 ? c : 0));
+    float sum = d;
+    if (c < 3 && k > 0) {
+      const float* row = from + i * kRowLanes;
+      float change = rows[i * kRowLanes + lane];
+      for (int other = 0; other < 3; ++other)
+        change -= matrix.row[c][other] * row[other * 9 + k];
+      const ViewPenalty<float> own = ViewPenaltyOf(mass, change);
+      penalty = own.value;
+      sum += view_weight * own.derivative;
+    }
+    d_rows[i * kRowLanes + lane] = lane < 27 ? sum : 0.0f;
+  }
+  for (int step = 16; step > 0; step /= 2) penalty += __shfl_down_sync(~0u, penalty, step);
+  if (lane == 0) of_warp[warp] = penalty;
+  __syncthreads();
+  if (threadIdx.x > 0) return;
+  double of_block = 0;
+  for (int w = 0; w < kThreads / 32; ++w) of_block += double{of_warp[w]};
+  if (of_block != 0) atomicAdd(loss, double{view_weight} * of_block);
+}
+
 __global__ void ScatterRowsKernel(const float* rows, int64_t first, int64_t n, int basis,
                                   DeviceGridView grid) {
   const int64_t i = ItemOfWarp(n, nullptr);
@@ -93,6 +127,14 @@ void AddMappedRows(const Mat3f& matrix, const Vec3f& constant, const float* from
   CheckLaunch("add_mapped_rows");
 }
 
+void AddViewPenalty(const Mat3f& matrix, const float* from, const float* rows, int64_t n,
+                    float view_weight, float* d_rows, double* loss, const int32_t* counted) {
+  if (n == 0) return;
+  AddViewPenaltyKernel<<<BlocksFor(32 * n), kThreads, 0, LaunchStream()>>>(
+      matrix, from, rows, n, counted, view_weight, d_rows, loss);
+  CheckLaunch("add_view_penalty");
+}
+
 void ScatterRows(const float* rows, int64_t first, int64_t n, DeviceGrid* grid) {
   if (n == 0) return;
   ScatterRowsKernel<<<BlocksFor(32 * n), kThreads, 0, LaunchStream()>>>(
@@ -108,6 +150,10 @@ void GatherRows(const DeviceGrid&, const int32_t*, int64_t, int64_t, float, floa
 }
 void AddMappedRows(const Mat3f&, const Vec3f&, const float*, int64_t, float*, const int32_t*) {
   DeviceWait("add_mapped_rows");
+}
+void AddViewPenalty(const Mat3f&, const float*, const float*, int64_t, float, float*, double*,
+                    const int32_t*) {
+  DeviceWait("add_view_penalty");
 }
 void ScatterRows(const float*, int64_t, int64_t, DeviceGrid*) { DeviceWait("scatter_rows"); }
 

@@ -22,6 +22,12 @@ void GatherRows(const DeviceGrid& grid, const int32_t* points, int64_t first, in
 // kRowLanes]
 void AddMappedRows(const Mat3f& matrix, const Vec3f& constant, const float* from, int64_t n,
                    float* rows, const int32_t* counted = nullptr);
+// Behind BlendColorsAdjoint, see EQ(view-penalty): the gradient of view_weight times it,
+// without its 1 / (3 Q), is added to d_rows, whose masses are cleared, and the penalty to *loss
+// on the device. `rows` are the map's and the network's of `from`. [n, kRowLanes]
+void AddViewPenalty(const Mat3f& matrix, const float* from, const float* rows, int64_t n,
+                    float view_weight, float* d_rows, double* loss,
+                    const int32_t* counted = nullptr);
 // The field's own colours from rows [n, kRowLanes] of points first, first + 1, ...
 void ScatterRows(const float* rows, int64_t first, int64_t n, DeviceGrid* grid);
 
