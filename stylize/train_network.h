@@ -98,13 +98,12 @@ struct TrainNetworkOptions {
          {.help = "how strongly the style may bend with colour; counts in the bound",
           .min = 0.01,
           .max = 100});
-    bind(
-        "style-view-weight", view_weight,
-        {.help = "what it costs that a point's style changes with the direction it is seen "
-                 "from: 0 follows a 2D method nearest that treats every view its own way, more "
-                 "is steadier",
-         .min = 0,
-         .max = 1e6});
+    bind("style-view-weight", view_weight,
+         {.help = "price of a style that changes with the direction a point is seen from: 0 is "
+                  "nearest to a 2D method that maps every view its own way, and flickers more; "
+                  "larger is steadier and less near",
+          .min = 0,
+          .max = 1e6});
     bind("style-norm-steps", norm_steps,
          {.unit = "steps",
           .help = "of the power iteration for each step of learning",
