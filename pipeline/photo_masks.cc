@@ -28,16 +28,26 @@ int StagePhotoMasks(const std::string& masks, const std::vector<StagedPhoto>& ph
     if (mask.width != photo.width || mask.height != photo.height)
       mask = Resize(mask, photo.width, photo.height);
     Image keep(photo.width, photo.height, 1);
+    bool keeps_any = false;
     const int colors = std::min(mask.channels, 3);
     for (int64_t p = 0; p < keep.num_pixels(); ++p) {
       float sum = 0;
       for (int c = 0; c < colors; ++c) sum += mask.pixels[p * mask.channels + c];
       keep.pixels[p] = sum < 0.5f * static_cast<float>(colors) ? 0.0f : 1.0f;
+      keeps_any |= keep.pixels[p] > 0;
     }
+    if (!keeps_any)
+      throw Error(ExitCode::kInput, "is black all over", paths[i],
+                  "leave the photo out, if nothing of it is to be used");
     WritePng8(folder + "/" + photo.name + ".png", keep);
     ++count;
   }
   return count;
+}
+
+std::string StagedMaskOf(const std::string& photo_path) {
+  const std::filesystem::path path(photo_path);
+  return (path.parent_path().parent_path() / "masks" / path.filename()).string() + ".png";
 }
 
 JsonValue PhotoMaskFiles(const std::string& masks) {

@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
+#include <limits>
 
 #include "kernels/base/error.h"
 #include "kernels/image/resize.h"
 #include "pipeline/files/image_file.h"
 #include "pipeline/photo_gains.h"
+#include "pipeline/photo_masks.h"
 
 namespace regrade {
 namespace {
@@ -47,6 +50,28 @@ Image ReadWorkingPhoto(const CaptureView& view, int longest_side, const PhotoGai
   if (width != photo.width || height != photo.height) photo = Resize(photo, width, height);
   UndoGain(gain, &photo);
   return photo;
+}
+
+Image ReadWorkingMask(const CaptureView& view, int longest_side) {
+  const std::string path = StagedMaskOf(view.path);
+  if (!std::filesystem::is_regular_file(path)) return {};
+  Image mask = ReadImage(path);
+  int width = 0, height = 0;
+  WorkingSize(mask.width, mask.height, longest_side, &width, &height);
+  if (width != mask.width || height != mask.height) mask = Resize(mask, width, height);
+  Image kept(width, height, 1);
+  constexpr float kWhole = 0.995f;  // less than a step of 8 bits below white
+  for (int64_t p = 0; p < kept.num_pixels(); ++p)
+    kept.pixels[p] = mask.pixels[p * mask.channels] > kWhole ? 1.0f : 0.0f;
+  return kept;
+}
+
+void LeaveOutMasked(const CaptureView& view, int longest_side, Image* photo) {
+  const Image kept = ReadWorkingMask(view, longest_side);
+  for (int64_t p = 0; p < kept.num_pixels(); ++p)
+    if (kept.pixels[p] < 0.5f)
+      std::fill_n(&photo->pixels[p * photo->channels], photo->channels,
+                  std::numeric_limits<float>::quiet_NaN());
 }
 
 std::vector<int> ViewIndices(const Capture& capture, int holdout, bool held_out) {

@@ -23,6 +23,13 @@ Camera WorkingCamera(const Camera& camera, int longest_side, const Similarity& f
 // The photo at the size of its working camera, 3 channels, rid of its gain (photo_gains.h).
 Image ReadWorkingPhoto(const CaptureView& view, int longest_side, const PhotoGain& gain);
 
+// What --photo-masks keeps of it: [H, W, 1], 1 where no part of a pixel is masked, else 0.
+// Empty (0 x 0) where the photo has no mask.
+Image ReadWorkingMask(const CaptureView& view, int longest_side);
+
+// NaN where the photo is masked: such pixels are neither fitted nor measured.
+void LeaveOutMasked(const CaptureView& view, int longest_side, Image* photo);
+
 // Indices of views that are fitted, or of those that are kept for measuring.
 std::vector<int> ViewIndices(const Capture& capture, int holdout, bool held_out);
 

@@ -25,7 +25,16 @@ TrainingView Smaller(const TrainingView& view, double scale, std::vector<Image>*
   return {view.camera.Resized(width, height), &photos->back()};
 }
 
-// Over all pixels of all views.
+// False where all of it is left out.
+bool HasColor(const Image& photo) {
+  for (int64_t p = 0; p < photo.num_pixels(); ++p) {
+    const float* const color = &photo.pixels[static_cast<size_t>(3 * p)];
+    if (AllFinite(Vec3f{color[0], color[1], color[2]})) return true;
+  }
+  return false;
+}
+
+// Over all pixels of all views that have a colour.
 double PsnrOn(const std::vector<TrainingView>& views, const RadianceField& field) {
   const FastGrid grid = MakeFastGrid(field);
   double squares = 0;
@@ -33,10 +42,11 @@ double PsnrOn(const std::vector<TrainingView>& views, const RadianceField& field
   for (const TrainingView& view : views) {
     const RenderedView rendered = RenderView(grid, view.camera, {field.step});
     for (size_t i = 0; i < view.photo->pixels.size(); ++i) {
+      if (!std::isfinite(view.photo->pixels[i])) continue;
       const double shown = std::clamp(rendered.color.pixels[i], 0.0f, 1.0f);
       squares += (shown - view.photo->pixels[i]) * (shown - view.photo->pixels[i]);
+      ++count;
     }
-    count += static_cast<int64_t>(view.photo->pixels.size());
   }
   // Exactly equal pictures are as good as finite figures get.
   return -10 * std::log10(std::max(squares / static_cast<double>(count), 1e-12));
@@ -57,8 +67,12 @@ DegreeTrial TryDegrees(const std::vector<TrainingView>& views, const SceneBox& b
   std::vector<Image> photos;
   photos.reserve(views.size());
   std::vector<TrainingView> fitted, kept;
-  for (size_t i = 0; i < views.size(); ++i)
-    (i % kFold == kFold / 2 ? kept : fitted).push_back(Smaller(views[i], scale, &photos));
+  for (size_t i = 0; i < views.size(); ++i) {
+    const TrainingView view = Smaller(views[i], scale, &photos);
+    // Of a photo that is all but masked nothing may be left at this size.
+    if (HasColor(*view.photo)) (i % kFold == kFold / 2 ? kept : fitted).push_back(view);
+  }
+  if (fitted.empty() || kept.empty()) return {std::numeric_limits<double>::infinity()};
 
   ProgressParts parts(progress, 2);
   const auto psnr_of_degree = [&](int degree) {

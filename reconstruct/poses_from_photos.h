@@ -69,7 +69,7 @@ struct PoseOptions {
           .choices = "auto|given"});
     bind("photo-masks", photo_masks,
          {.help = "folder of pictures by the photos' names, black on people, cars and whatever "
-                  "else moved, white elsewhere: what is black is not matched"});
+                  "else moved, white elsewhere: what is black is neither matched nor fitted"});
   }
 };
 

@@ -60,16 +60,33 @@ TrainingRays::TrainingRays(const std::vector<TrainingView>& views) {
                       {}};
     stored.color.resize(photo.pixels.size());
     Vec3d view_sum{};
-    for (size_t i = 0; i < photo.pixels.size(); ++i) {
-      const float value = std::clamp(photo.pixels[i], 0.0f, 1.0f);
-      stored.color[i] = static_cast<uint16_t>(std::lround(value * 65535.0f));
-      view_sum[static_cast<int>(i % 3)] += value;
+    for (int64_t pixel = 0; pixel < photo.num_pixels(); ++pixel) {
+      const float* const color = &photo.pixels[static_cast<size_t>(3 * pixel)];
+      if (!AllFinite(Vec3f{color[0], color[1], color[2]})) continue;
+      stored.drawn.push_back(static_cast<int32_t>(pixel));
+      for (int c = 0; c < 3; ++c) {
+        const float value = std::clamp(color[c], 0.0f, 1.0f);
+        stored.color[static_cast<size_t>(3 * pixel + c)] =
+            static_cast<uint16_t>(std::lround(value * 65535.0f));
+        view_sum[c] += value;
+      }
     }
+    if (stored.drawn.empty())
+      throw Error(ExitCode::kInput,
+                  "view " + std::to_string(views_.size()) + " has no pixel that is left to fit",
+                  "", "look at its mask");
     sum += view_sum;
-    total_ += photo.num_pixels();
+    total_ += static_cast<int64_t>(stored.drawn.size());
+    if (static_cast<int64_t>(stored.drawn.size()) == photo.num_pixels())
+      stored.drawn = std::vector<int32_t>();
     views_.push_back(std::move(stored));
   }
   mean_color_ = (sum / static_cast<double>(total_)).Cast<float>();
+}
+
+bool TrainingRays::StoredView::LeavesOut(int64_t pixel) const {
+  return !drawn.empty() &&
+         !std::binary_search(drawn.begin(), drawn.end(), static_cast<int32_t>(pixel));
 }
 
 Ray TrainingRays::RayOf(int view, int x, int y) const {
@@ -85,7 +102,8 @@ DeviceViews TrainingRays::ToDevice() const {
   std::vector<DeviceViewSource> sources;
   for (const StoredView& view : views_)
     sources.push_back({view.origin, view.world_from_camera, view.camera.ndc, view.camera.width,
-                       view.camera.height, view.direction_map, view.color.data()});
+                       view.camera.height, view.direction_map, view.color.data(),
+                       view.drawn.data(), static_cast<int32_t>(view.drawn.size())});
   return DeviceViews(direction_maps_, sources);
 }
 
@@ -94,6 +112,7 @@ void TrainingRays::Draw(uint64_t seed, uint64_t step, int patches, int patch,
   struct Corner {
     int view, x, y;
     uint64_t order;
+    int64_t pixel;  // within the square, not left out; -1 where nothing is
   };
   std::vector<Corner> corners(static_cast<size_t>(patches));
   // A random rotation of the views, then equal shares: no view is left out of a batch by
@@ -102,15 +121,22 @@ void TrainingRays::Draw(uint64_t seed, uint64_t step, int patches, int patch,
   for (int p = 0; p < patches; ++p) {
     const double position = (p + turn) / patches * num_views();
     const int view = static_cast<int>(position) % num_views();
-    const Camera& camera = views_[static_cast<size_t>(view)].camera;
+    const StoredView& stored = views_[static_cast<size_t>(view)];
     const uint64_t counter = 1 + 2 * static_cast<uint64_t>(p);
-    const int x = static_cast<int>(RandomIndex(
-        seed, step, counter, static_cast<uint64_t>(std::max(1, camera.width - patch + 1))));
-    const int y = static_cast<int>(
-        RandomIndex(seed, step, counter + 1,
-                    static_cast<uint64_t>(std::max(1, camera.height - patch + 1))));
+    const int columns = std::max(1, stored.camera.width - patch + 1);
+    const int rows = std::max(1, stored.camera.height - patch + 1);
+    int x, y;
+    int64_t pixel = -1;
+    if (stored.drawn.empty()) {
+      x = static_cast<int>(RandomIndex(seed, step, counter, static_cast<uint64_t>(columns)));
+      y = static_cast<int>(RandomIndex(seed, step, counter + 1, static_cast<uint64_t>(rows)));
+    } else {
+      pixel = stored.drawn[RandomIndex(seed, step, counter, stored.drawn.size())];
+      x = std::min(static_cast<int>(pixel % stored.camera.width), columns - 1);
+      y = std::min(static_cast<int>(pixel / stored.camera.width), rows - 1);
+    }
     corners[static_cast<size_t>(p)] = {
-        view, x, y, Morton(static_cast<uint32_t>(x), static_cast<uint32_t>(y))};
+        view, x, y, Morton(static_cast<uint32_t>(x), static_cast<uint32_t>(y)), pixel};
   }
   std::sort(corners.begin(), corners.end(), [](const Corner& a, const Corner& b) {
     return a.view != b.view ? a.view < b.view : a.order < b.order;
@@ -121,10 +147,13 @@ void TrainingRays::Draw(uint64_t seed, uint64_t step, int patches, int patch,
     const StoredView& view = views_[static_cast<size_t>(corner.view)];
     for (int dy = 0; dy < patch; ++dy)
       for (int dx = 0; dx < patch; ++dx) {
-        const int x = std::min(corner.x + dx, view.camera.width - 1);
-        const int y = std::min(corner.y + dy, view.camera.height - 1);
-        rays->push_back(RayOf(corner.view, x, y));
-        const uint16_t* c = &view.color[(static_cast<size_t>(y) * view.camera.width + x) * 3];
+        const int64_t width = view.camera.width;
+        int64_t pixel = std::min(corner.y + dy, view.camera.height - 1) * width +
+                        std::min(corner.x + dx, view.camera.width - 1);
+        if (view.LeavesOut(pixel)) pixel = corner.pixel;
+        rays->push_back(RayOf(corner.view, static_cast<int>(pixel % width),
+                              static_cast<int>(pixel / width)));
+        const uint16_t* c = &view.color[static_cast<size_t>(pixel) * 3];
         targets->push_back({c[0] / 65535.0f, c[1] / 65535.0f, c[2] / 65535.0f});
       }
   }

@@ -1,5 +1,5 @@
-// The pool of training rays: every pixel of every training view, drawn by counter so that any
-// thread count and any resume sees the same batches.
+// The pool of training rays: every pixel of every training view that has a colour, drawn by
+// counter so that any thread count and any resume sees the same batches.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,8 @@
 
 namespace regrade {
 
-// `photo` has the camera's size, 3 channels, sRGB. Cameras are in the field's frame.
+// `photo` has the camera's size, 3 channels, sRGB; a pixel with a value that is not finite is
+// left out: no ray is drawn there. Cameras are in the field's frame.
 struct TrainingView {
   Camera camera;
   const Image* photo = nullptr;
@@ -20,7 +21,7 @@ struct TrainingView {
 class TrainingRays {
  public:
   // Copies what it needs; 6 bytes a pixel (unorm16, exact for 8-bit photos) and one direction
-  // map a lens.
+  // map a lens. Throws Error(kInput) for a view without a pixel to draw.
   explicit TrainingRays(const std::vector<TrainingView>& views);
 
   int64_t num_rays() const { return total_; }
@@ -29,6 +30,7 @@ class TrainingRays {
 
   // Fills rays and targets with `patches` squares of patch x patch pixels, the same number from
   // every view give or take one, ordered by view and position so that neighbours share voxels.
+  // Where a pixel of a square is left out, another of the square is drawn twice.
   void Draw(uint64_t seed, uint64_t step, int patches, int patch, std::vector<Ray>* rays,
             std::vector<Vec3f>* targets) const;
 
@@ -44,6 +46,8 @@ class TrainingRays {
     Vec3f origin;
     Mat3f world_from_camera;
     std::vector<uint16_t> color;  // [H, W, 3]
+    std::vector<int32_t> drawn;   // pixels y W + x; empty where none is left out
+    bool LeavesOut(int64_t pixel) const;
   };
   std::vector<StoredView> views_;
   std::vector<std::vector<Vec3f>>

@@ -19,6 +19,9 @@ struct DeviceViewSource {
   int width = 0, height = 0;  // pixels
   int direction_map = 0;
   const uint16_t* color = nullptr;
+  // Pixels y W + x that rays are drawn of, where some are left out.
+  const int32_t* drawn = nullptr;
+  int32_t num_drawn = 0;  // 0: all
 };
 
 class DeviceViews {
@@ -40,7 +43,8 @@ class DeviceViews {
     Mat3f world_from_camera;
     NdcSpace ndc;
     int width, height;
-    int64_t direction_map, color;  // where they begin, in elements
+    int64_t direction_map, color, drawn;  // where they begin, in elements
+    int32_t num_drawn;
   };
 
  private:
@@ -48,6 +52,7 @@ class DeviceViews {
   DeviceBuffer<View> views_;
   DeviceBuffer<Vec3f> directions_;
   DeviceBuffer<uint16_t> colors_;
+  DeviceBuffer<int32_t> drawn_;
 };
 
 }  // namespace regrade

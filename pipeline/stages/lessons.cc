@@ -55,11 +55,16 @@ Lessons ReadLessons(RunContext* context, const Capture& capture, const StoredFie
     lesson.camera = WorkingCamera(view.camera, settings.scene.photo_size,
                                   stored.field_from_world, stored.ndc);
     lesson.name = "views_2d/" + FrameName(i);
+    Image kept = ReadWorkingMask(view, settings.scene.photo_size);
     if (object != nullptr) {
       Image mask = AgreedMask(object->Coverage(i, lesson.camera.width, lesson.camera.height),
                               agreed->Render(lesson.camera));
+      for (int64_t p = 0; p < kept.num_pixels(); ++p) mask.pixels[p] *= kept.pixels[p];
       if (!PartOfMask(mask, &lesson)) continue;
       lessons.masks.push_back(std::move(mask));
+      lesson.mask = &lessons.masks.back();
+    } else if (kept.num_pixels() > 0) {
+      lessons.masks.push_back(std::move(kept));
       lesson.mask = &lessons.masks.back();
     }
     lessons.targets.push_back(ReadImage(context->workspace->Path(lesson.name)));

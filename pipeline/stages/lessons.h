@@ -18,9 +18,9 @@ struct Lessons {
   std::vector<std::string> notices;  // of the map
 };
 
-// Of the views `indices` (see StyledViews). With `object`, the lessons are of the pixels where
-// a view's own mask and what all masks agreed on both say that the object is seen, and views
-// without such a pixel are left out; there may be none left.
+// Of the views `indices` (see StyledViews), without what --photo-masks masks. With `object`,
+// the lessons are of the pixels where a view's own mask and what all masks agreed on both say
+// that the object is seen, and views without such a pixel are left out; there may be none left.
 Lessons ReadLessons(RunContext* context, const Capture& capture, const StoredField& stored,
                     const std::vector<int>& indices, const ObjectMasks* object,
                     const ObjectShares* shares);

@@ -76,10 +76,13 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
   Capture capture;
   PoseOptions options = settings.pose;
   options.threads = settings.program.threads;
+  const std::string mask_folder = workspace.Path("poses/masks");
+  std::filesystem::remove_all(mask_folder);  // of an earlier run
   if (!options.photo_masks.empty()) {
-    options.mask_folder = workspace.Path(".regrade/work/pose/masks");
+    options.mask_folder = mask_folder;
     const int masks = StagePhotoMasks(options.photo_masks, ingest.photos, options.mask_folder);
-    context->console->Info("what " + std::to_string(masks) + " masks blacken is not matched");
+    context->console->Info("what " + std::to_string(masks) +
+                           " masks blacken is neither matched nor fitted");
     outcome.figures["photo_masks"] = masks;
   }
   if (source.kind == CaptureKind::kPhotos) {

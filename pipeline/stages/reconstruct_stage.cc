@@ -130,6 +130,7 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   for (const int i : fitted) {
     const CaptureView& view = capture.views[static_cast<size_t>(i)];
     photos.push_back(ReadWorkingPhoto(view, settings.scene.photo_size, profile.gains.Of(i)));
+    LeaveOutMasked(view, settings.scene.photo_size, &photos.back());
     views.push_back({WorkingCamera(view.camera, settings.scene.photo_size,
                                    scene.field_from_world, scene.ndc),
                      &photos.back()});

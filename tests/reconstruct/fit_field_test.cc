@@ -6,8 +6,10 @@
 #include <omp.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
+#include <map>
 #include <memory>
 #include <vector>
 
@@ -238,6 +240,52 @@ TEST_F(FitSpheres, ResamplingTheLayersKeepsConstants) {
     EXPECT_NEAR(fine.texels[4 * t + 3], 0.7f, 1e-6f);
     EXPECT_NEAR(0.5f + 0.28209479f * fine.texels[4 * t + 1], 0.75f, 1e-6f);
   }
+}
+
+// Pixels that are not finite are left out, whatever the size of the squares; the others are
+// drawn as often as one another, and batches stay as large.
+TEST_F(FitField, PixelsWithoutAColourAreNeverDrawn) {
+  Image masked = photos_[1];
+  int64_t left_out = 0;
+  const auto is_left_out = [&](int x, int y) {
+    return x > masked.width / 2 || (x + y) % 7 == 0;
+  };
+  for (int y = 0; y < masked.height; ++y)
+    for (int x = 0; x < masked.width; ++x)
+      if (is_left_out(x, y)) {
+        masked.at(x, y)[(x + y) % 3] = std::nanf("");
+        ++left_out;
+      }
+  ASSERT_GT(left_out, 0);
+  std::vector<TrainingView> views{{cameras_[1], &masked}, views_[1]};
+  const TrainingRays rays(views);
+  EXPECT_EQ(rays.num_rays(), 2 * masked.num_pixels() - left_out);
+  EXPECT_TRUE(AllFinite(rays.mean_color()));
+  for (const int patch : {1, 4}) {
+    std::map<std::array<float, 3>, int> times;  // by direction
+    for (uint64_t step = 0; step < 40; ++step) {
+      std::vector<Ray> batch;
+      std::vector<Vec3f> targets;
+      rays.Draw(3, step, 64, patch, &batch, &targets);
+      ASSERT_EQ(batch.size(), static_cast<size_t>(64 * patch * patch));
+      for (const Vec3f& target : targets) EXPECT_TRUE(AllFinite(target));
+      for (const Ray& ray : batch) ++times[{ray.direction.x, ray.direction.y, ray.direction.z}];
+    }
+    int drawn = 0;
+    for (int y = 0; y < masked.height; ++y)
+      for (int x = 0; x < masked.width; ++x) {
+        const Vec3f d = rays.RayOf(0, x, y).direction;
+        const auto found = times.find({d.x, d.y, d.z});
+        const int count = found == times.end() ? 0 : found->second;
+        if (is_left_out(x, y)) {
+          EXPECT_EQ(count, 0) << x << ", " << y << ", squares of " << patch;
+        }
+        drawn += count;
+      }
+    EXPECT_NEAR(drawn, 40 * 32 * patch * patch, 40 * patch * patch);  // half of the views
+  }
+  for (float& value : masked.pixels) value = std::nanf("");
+  EXPECT_THROW(TrainingRays{views}, Error);
 }
 
 TEST(ExponentialRate, RunsFromBeginToEnd) {
