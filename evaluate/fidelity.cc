@@ -69,7 +69,10 @@ FidelityRow MeasureFidelity(const NamedFrameSource& sequence, const FidelityTarg
       CheckSize(frame, target, "the 2D method's version", i, sequence);
       hues_2d.Add(target);
       if (targets.perceptual) {
-        sum_lpips += targets.perceptual(frame, target);
+        Image whole = target;  // a network sees all pixels: no difference where there is none
+        for (size_t v = 0; v < whole.pixels.size(); ++v)
+          if (!std::isfinite(whole.pixels[v])) whole.pixels[v] = frame.pixels[v];
+        sum_lpips += targets.perceptual(frame, whole);
         ++compared;
       }
       Image transmittance;

@@ -60,18 +60,24 @@ Image ReadWorkingMask(const CaptureView& view, int longest_side) {
   WorkingSize(mask.width, mask.height, longest_side, &width, &height);
   if (width != mask.width || height != mask.height) mask = Resize(mask, width, height);
   Image kept(width, height, 1);
-  constexpr float kWhole = 0.995f;  // less than a step of 8 bits below white
+  constexpr float kWhole = 1 - 1e-4f;  // and rounding
   for (int64_t p = 0; p < kept.num_pixels(); ++p)
     kept.pixels[p] = mask.pixels[p * mask.channels] > kWhole ? 1.0f : 0.0f;
   return kept;
 }
 
-void LeaveOutMasked(const CaptureView& view, int longest_side, Image* photo) {
+void LeaveOutMasked(const CaptureView& view, int longest_side, Image* picture) {
   const Image kept = ReadWorkingMask(view, longest_side);
   for (int64_t p = 0; p < kept.num_pixels(); ++p)
     if (kept.pixels[p] < 0.5f)
-      std::fill_n(&photo->pixels[p * photo->channels], photo->channels,
+      std::fill_n(&picture->pixels[p * picture->channels], picture->channels,
                   std::numeric_limits<float>::quiet_NaN());
+}
+
+Image ReadPhotoToFit(const CaptureView& view, int longest_side, const PhotoGain& gain) {
+  Image photo = ReadWorkingPhoto(view, longest_side, gain);
+  LeaveOutMasked(view, longest_side, &photo);
+  return HasColor(photo) ? photo : Image();
 }
 
 std::vector<int> ViewIndices(const Capture& capture, int holdout, bool held_out) {

@@ -27,8 +27,12 @@ Image ReadWorkingPhoto(const CaptureView& view, int longest_side, const PhotoGai
 // Empty (0 x 0) where the photo has no mask.
 Image ReadWorkingMask(const CaptureView& view, int longest_side);
 
-// NaN where the photo is masked: such pixels are neither fitted nor measured.
-void LeaveOutMasked(const CaptureView& view, int longest_side, Image* photo);
+// NaN where the photo is masked: such pixels are neither fitted nor measured. `picture` has the
+// working size.
+void LeaveOutMasked(const CaptureView& view, int longest_side, Image* picture);
+
+// ReadWorkingPhoto without what is masked; empty (0 x 0) where nothing is left of it.
+Image ReadPhotoToFit(const CaptureView& view, int longest_side, const PhotoGain& gain);
 
 // Indices of views that are fitted, or of those that are kept for measuring.
 std::vector<int> ViewIndices(const Capture& capture, int holdout, bool held_out);

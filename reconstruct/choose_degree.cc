@@ -25,15 +25,6 @@ TrainingView Smaller(const TrainingView& view, double scale, std::vector<Image>*
   return {view.camera.Resized(width, height), &photos->back()};
 }
 
-// False where all of it is left out.
-bool HasColor(const Image& photo) {
-  for (int64_t p = 0; p < photo.num_pixels(); ++p) {
-    const float* const color = &photo.pixels[static_cast<size_t>(3 * p)];
-    if (AllFinite(Vec3f{color[0], color[1], color[2]})) return true;
-  }
-  return false;
-}
-
 // Over all pixels of all views that have a colour.
 double PsnrOn(const std::vector<TrainingView>& views, const RadianceField& field) {
   const FastGrid grid = MakeFastGrid(field);

@@ -132,8 +132,14 @@ void TrainingRays::Draw(uint64_t seed, uint64_t step, int patches, int patch,
       y = static_cast<int>(RandomIndex(seed, step, counter + 1, static_cast<uint64_t>(rows)));
     } else {
       pixel = stored.drawn[RandomIndex(seed, step, counter, stored.drawn.size())];
-      x = std::min(static_cast<int>(pixel % stored.camera.width), columns - 1);
-      y = std::min(static_cast<int>(pixel / stored.camera.width), rows - 1);
+      // A square round it, wherever it lies in that.
+      const int within = static_cast<int>(
+          RandomIndex(seed, step, counter + 1,
+                      static_cast<uint64_t>(patch) * static_cast<uint64_t>(patch)));
+      x = std::clamp(static_cast<int>(pixel % stored.camera.width) - within % patch, 0,
+                     columns - 1);
+      y = std::clamp(static_cast<int>(pixel / stored.camera.width) - within / patch, 0,
+                     rows - 1);
     }
     corners[static_cast<size_t>(p)] = {
         view, x, y, Morton(static_cast<uint32_t>(x), static_cast<uint32_t>(y)), pixel};

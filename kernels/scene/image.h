@@ -2,6 +2,7 @@
 // 1].
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -32,5 +33,16 @@ struct Image {
   }
   bool SameSize(const Image& o) const { return width == o.width && height == o.height; }
 };
+
+// Whether any pixel has finite values in all channels.
+inline bool HasColor(const Image& image) {
+  for (int64_t p = 0; p < image.num_pixels(); ++p) {
+    bool finite = true;
+    for (int c = 0; c < image.channels; ++c)
+      finite &= std::isfinite(image.pixels[static_cast<size_t>(p * image.channels + c)]);
+    if (finite) return true;
+  }
+  return false;
+}
 
 }  // namespace regrade

@@ -95,6 +95,7 @@ struct Scene {
   std::vector<int> taught, shown;   // views
   std::vector<Camera> cameras;      // of all views
   std::vector<Image> photos;        // of all views that are taught or shown
+  std::vector<Image> kept;          // what --photo-masks leaves of each, or empty
 };
 
 Scene ReadScene(const Workspace& workspace, const SheetOptions& sheet, int holdout) {
@@ -116,6 +117,7 @@ Scene ReadScene(const Workspace& workspace, const SheetOptions& sheet, int holdo
     scene.cameras.push_back(WorkingCamera(view.camera, sheet.size,
                                           scene.stored.field_from_world, scene.stored.ndc));
     scene.photos.push_back(ReadWorkingPhoto(view, sheet.size, gains.Of(static_cast<int>(i))));
+    scene.kept.push_back(ReadWorkingMask(view, sheet.size));
   }
   return scene;
 }
@@ -162,15 +164,20 @@ void AddStyle(RunContext* context, const Scene& scene, const SheetOptions& sheet
   std::vector<ColorStatistics> before, after;
   for (const int i : scene.taught) {
     const size_t n = static_cast<size_t>(i);
-    if (!stylizer->Knows(i)) continue;
+    const Image& kept = scene.kept[n];
+    const bool masked = kept.num_pixels() > 0;
+    if (!stylizer->Knows(i) || (masked && std::find(kept.pixels.begin(), kept.pixels.end(),
+                                                    1.0f) == kept.pixels.end()))
+      continue;
     targets[n] = Clipped(stylizer->Stylize(scene.photos[n], i));
     StyledTrainingView view;
     view.camera = scene.cameras[n];
     view.target = &targets[n];
+    if (masked) view.mask = &kept;
     view.name = name + " on " + scene.capture.views[n].file;
     views.push_back(view);
-    before.push_back(MeasureColor(scene.photos[n]));
-    after.push_back(MeasureColor(targets[n]));
+    before.push_back(MeasureColor(scene.photos[n], view.mask));
+    after.push_back(MeasureColor(targets[n], view.mask));
   }
   if (views.empty())
     throw Error(ExitCode::kInput, "the 2D method knows none of the photos", picture);

@@ -52,6 +52,11 @@ void RunPack(const Command& command, const Arguments& arguments, Console* consol
     throw Error(ExitCode::kInput, "holds no poses", words[0],
                 "run `regrade pose CAPTURE --out " + words[0] + "` first");
   const Capture capture = ReadCapture(words[0] + "/poses");
+  for (const CaptureView& view : capture.views)
+    if (!ReadWorkingMask(view, scene.photo_size).empty())
+      throw Error(ExitCode::kInput,
+                  "was posed with --photo-masks, which a packed capture lacks", words[0],
+                  "pose it again without them");
   const SceneProfile profile = ProfileScene(capture, 2, run.effects);
   for (const EffectReport& effect : profile.effects) console->Info(EffectLine(effect));
   for (const std::string& notice : profile.notices) console->Info(notice);

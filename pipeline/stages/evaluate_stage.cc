@@ -138,7 +138,13 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   // Fidelity is measured on the views that the style was learned from, against what the 2D
   // method made of the renders, or else of the photos.
   const Image style = ReadStylePicture(settings.style.picture, nullptr);
-  const FrameSource of_photos = FramesOf(workspace.Path("views_2d"), taught);
+  const FrameSource of_photos{
+      static_cast<int>(taught.size()), [&](int k) {
+        const size_t i = static_cast<size_t>(taught[static_cast<size_t>(k)]);
+        Image picture = ReadImage(workspace.Path("views_2d/" + FrameName(static_cast<int>(i))));
+        LeaveOutMasked(capture.views[i], settings.scene.photo_size, &picture);
+        return picture;
+      }};
   const FidelityTargets targets{
       renders_styled ? frames("views_2d", taught) : of_photos, frames("transmittance", taught),
       &style, PerceptualDistance(settings.consistency.lpips), frames("source", taught)};

@@ -27,8 +27,8 @@ HeldOutFigures MeasureHeldOut(const Capture& capture, int holdout, int photo_siz
   HeldOutFigures figures;
   for (const int i : ViewIndices(capture, holdout, true)) {
     const CaptureView& view = capture.views[static_cast<size_t>(i)];
-    Image photo = ReadWorkingPhoto(view, photo_size, kAsTaken);
-    LeaveOutMasked(view, photo_size, &photo);
+    const Image photo = ReadPhotoToFit(view, photo_size, kAsTaken);
+    if (photo.empty()) continue;
     const Camera camera =
         WorkingCamera(view.camera, photo_size, stored.field_from_world, stored.ndc);
     Image rendered = renderer.Render(camera).color;

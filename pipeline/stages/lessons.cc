@@ -64,6 +64,8 @@ Lessons ReadLessons(RunContext* context, const Capture& capture, const StoredFie
       lessons.masks.push_back(std::move(mask));
       lesson.mask = &lessons.masks.back();
     } else if (kept.num_pixels() > 0) {
+      if (std::find(kept.pixels.begin(), kept.pixels.end(), 1.0f) == kept.pixels.end())
+        continue;
       lessons.masks.push_back(std::move(kept));
       lesson.mask = &lessons.masks.back();
     }

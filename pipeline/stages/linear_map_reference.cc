@@ -1,6 +1,7 @@
 #include "pipeline/stages/linear_map_reference.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "evaluate/fidelity.h"
 #include "kernels/base/error.h"
@@ -26,6 +27,7 @@ double SquaredError(const ColorMap& map, const FrameSource& source, const FrameS
     double frame_sum = 0;
     for (int64_t p = 0; p < from.num_pixels(); ++p) {
       const Vec3d mapped = map(ColorAt(from, p)), wanted = ColorAt(to, p);
+      if (!AllFinite(wanted)) continue;
       for (int c = 0; c < 3; ++c) {
         const double d = std::clamp(mapped[c], 0.0, 1.0) - wanted[c];
         frame_sum += d * d;
@@ -47,12 +49,17 @@ std::optional<double> LinearMapPsnr(const RadianceField& field,
   std::vector<ColorStatistics> before, after;
   LeastSquaresAccumulator accumulator;
   for (int i = 0; i < source.count; ++i) {
-    const Image from = source.frame(i), to = views_2d.frame(i);
+    Image from = source.frame(i);
+    const Image to = views_2d.frame(i);
+    if (!HasColor(to)) continue;
+    for (size_t v = 0; v < from.pixels.size(); ++v)
+      if (!std::isfinite(to.pixels[v])) from.pixels[v] = to.pixels[v];
     before.push_back(MeasureColor(from));
     after.push_back(MeasureColor(to));
     for (int64_t p = 0; p < from.num_pixels(); ++p)
-      accumulator.Add(ColorAt(from, p), ColorAt(to, p));
+      if (AllFinite(ColorAt(to, p))) accumulator.Add(ColorAt(from, p), ColorAt(to, p));
   }
+  if (before.empty()) return std::nullopt;
   const ColorMap mkl = ComputeMkl(Pool(before), Pool(after)).map;
   const ColorMap least_squares = accumulator.Solve();
   const ColorMap better =

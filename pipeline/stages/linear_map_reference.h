@@ -15,7 +15,8 @@ namespace regrade {
 // PSNR, as psnr_to_2d_db is taken, of the field under the better of two maps carried into its
 // coefficients (see EQ(sh-color-map)): the Monge-Kantorovich map between the pooled colours of
 // `source` and `views_2d`, and the least-squares map between their pixels. The better one is
-// found on the frames, and rendered at `cameras`.
+// found on the frames, and rendered at `cameras`. Pixels of `views_2d` that are not finite do
+// not count.
 std::optional<double> LinearMapPsnr(const RadianceField& field,
                                     const std::vector<Camera>& cameras,
                                     const FrameSource& source, const FrameSource& views_2d,

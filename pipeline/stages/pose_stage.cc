@@ -55,6 +55,15 @@ std::string PlannedTracks(const RunSettings& settings, const CaptureSource& sour
          PlanText(PlanTracks(photos, omp_get_max_threads()));
 }
 
+// The folder of masks: that of the options, or what another run of ours has staged.
+std::string MasksOf(const RunContext& context, const CaptureSource& source) {
+  const std::string& given = context.settings.pose.photo_masks;
+  if (!given.empty() || source.kind != CaptureKind::kPosed) return given;
+  const std::filesystem::path staged =
+      std::filesystem::path(source.photos).parent_path() / "masks";
+  return std::filesystem::is_directory(staged) ? staged.string() : "";
+}
+
 StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
                        const ProgressFunction& progress) {
   const RunSettings& settings = context->settings;
@@ -78,9 +87,9 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
   options.threads = settings.program.threads;
   const std::string mask_folder = workspace.Path("poses/masks");
   std::filesystem::remove_all(mask_folder);  // of an earlier run
-  if (!options.photo_masks.empty()) {
+  if (const std::string folder = MasksOf(*context, source); !folder.empty()) {
     options.mask_folder = mask_folder;
-    const int masks = StagePhotoMasks(options.photo_masks, ingest.photos, options.mask_folder);
+    const int masks = StagePhotoMasks(folder, ingest.photos, options.mask_folder);
     context->console->Info("what " + std::to_string(masks) +
                            " masks blacken is neither matched nor fitted");
     outcome.figures["photo_masks"] = masks;
@@ -145,8 +154,8 @@ Stage PoseStage(RunContext* context) {
   const auto wishes = ParseEffects(context->settings.run.effects);
   if (const auto wish = wishes.find(kPoseRefinement); wish != wishes.end())
     stage.inputs[kPoseRefinement] = wish->second;
-  if (!context->settings.pose.photo_masks.empty())
-    stage.inputs["photo_masks"] = PhotoMaskFiles(context->settings.pose.photo_masks);
+  if (const std::string folder = MasksOf(*context, source); !folder.empty())
+    stage.inputs["photo_masks"] = PhotoMaskFiles(folder);
   stage.refuse_changes = true;
   const int64_t photos = static_cast<int64_t>(stage.inputs.At("photos").AsObject().size());
   stage.plan =

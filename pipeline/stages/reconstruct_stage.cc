@@ -102,6 +102,9 @@ EffectReport ProfileViewDependence(const RunSettings& settings, const FitOptions
   if (views.size() < kLeastTrialViews)
     return row(true, Figure(), "too few photos to keep some from a trial");
   const DegreeTrial trial = TryDegrees(views, box, options, progress, backend);
+  if (!std::isfinite(trial.gain_db))
+    return row(true, Figure(),
+               "too little of the photos is not masked to keep some from a trial");
   return row(trial.Pays(), trial.gain_db,
              "decibels that harmonics of degree " + std::to_string(options.sh_degree) +
                  " gain over one colour for all directions, on a fifth of the views that a "
@@ -129,8 +132,12 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   std::vector<TrainingView> views;
   for (const int i : fitted) {
     const CaptureView& view = capture.views[static_cast<size_t>(i)];
-    photos.push_back(ReadWorkingPhoto(view, settings.scene.photo_size, profile.gains.Of(i)));
-    LeaveOutMasked(view, settings.scene.photo_size, &photos.back());
+    Image photo = ReadPhotoToFit(view, settings.scene.photo_size, profile.gains.Of(i));
+    if (photo.empty()) {
+      context->console->Info(view.file + ": its mask leaves nothing to fit");
+      continue;
+    }
+    photos.push_back(std::move(photo));
     views.push_back({WorkingCamera(view.camera, settings.scene.photo_size,
                                    scene.field_from_world, scene.ndc),
                      &photos.back()});
@@ -149,6 +156,10 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
     hooks.resume = &*resume;
     context->console->Info("reconstruct: goes on from its checkpoint");
   }
+  if (views.empty())
+    throw Error(ExitCode::kInput, "leave nothing to fit of any photo",
+                settings.pose.photo_masks.empty() ? "the masks" : settings.pose.photo_masks,
+                "make the masks' white parts larger");
   ProgressParts parts(progress, kTrial + 1 + kAfterFit);
   EffectReport& view_dependence =
       *std::find_if(profile.effects.begin(), profile.effects.end(),

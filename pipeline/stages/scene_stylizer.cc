@@ -79,9 +79,11 @@ std::unique_ptr<ViewStylizer> MakeSceneStylizer(RunContext* context, const Captu
   const Image style = ReadStylePicture(settings.style.picture, &notice);
   if (!notice.empty()) context->console->Info(notice);
   const PhotoGains gains = RecordedGains(*context->workspace, capture);
-  const auto photo = [&](size_t i) {
-    return ReadWorkingPhoto(capture.views[i], settings.scene.photo_size,
-                            gains.Of(static_cast<int>(i)));
+  const auto photo = [&](size_t i) -> std::optional<Image> {
+    Image picture = ReadPhotoToFit(capture.views[i], settings.scene.photo_size,
+                                   gains.Of(static_cast<int>(i)));
+    if (picture.empty()) return std::nullopt;
+    return picture;
   };
   if (masks == nullptr) return MakeMethod(context, capture, style, photo);
   std::vector<std::unique_ptr<ViewStylizer>> regions;
@@ -89,11 +91,12 @@ std::unique_ptr<ViewStylizer> MakeSceneStylizer(RunContext* context, const Captu
     const Image part = masks->StyleRegion(k, style.width, style.height);
     const auto photo_region = [&](size_t i) -> std::optional<Image> {
       if (!masks->Knows(static_cast<int>(i))) return std::nullopt;
-      const Image picture = photo(i);
-      const Image region = masks->Coverage(static_cast<int>(i), picture.width,
-                                           picture.height)[static_cast<size_t>(k)];
+      const std::optional<Image> picture = photo(i);
+      if (!picture) return std::nullopt;
+      const Image region = masks->Coverage(static_cast<int>(i), picture->width,
+                                           picture->height)[static_cast<size_t>(k)];
       if (!ShowsRegion(region)) return std::nullopt;
-      return WithRegion(picture, region);
+      return WithRegion(*picture, region);
     };
     regions.push_back(MakeMethod(context, capture,
                                  part.empty() ? style : WithRegion(style, part), photo_region));

@@ -178,7 +178,9 @@ const Bench::Photos& Bench::PhotosAt(int size) {
   p.pictures.reserve(fitted.size());
   for (const int i : fitted) {
     const CaptureView& view = p.capture.views[static_cast<size_t>(i)];
-    p.pictures.push_back(ReadWorkingPhoto(view, size, p.gains.Of(i)));
+    Image picture = ReadPhotoToFit(view, size, p.gains.Of(i));
+    if (picture.empty()) continue;
+    p.pictures.push_back(std::move(picture));
     p.views.push_back({WorkingCamera(view.camera, size, p.scene.field_from_world, p.scene.ndc),
                        &p.pictures.back()});
   }
@@ -236,12 +238,14 @@ void Bench::MeasureStyle(const Variant& variant, const ProgressFunction& progres
   std::vector<double> psnr;
   for (const int i :
        Spread(StyledViews(base, capture, base_->settings.run.holdout), kStyledViews)) {
+    const CaptureView& photo = capture.views[static_cast<size_t>(i)];
+    const int size = base_->settings.scene.photo_size;
     const Camera camera =
-        WorkingCamera(capture.views[static_cast<size_t>(i)].camera,
-                      base_->settings.scene.photo_size, styled.field_from_world, styled.ndc);
+        WorkingCamera(photo.camera, size, styled.field_from_world, styled.ndc);
     const RenderedView view = RenderView(grid, camera, MarchOptions{styled.field.step});
-    const Image target = ReadImage(
+    Image target = ReadImage(
         base.Path(std::string(of_renders ? "frames/views_2d/" : "views_2d/") + FrameName(i)));
+    if (!of_renders) LeaveOutMasked(photo, size, &target);
     if (const auto value = Psnr(view.color, target, &view.transmittance))
       psnr.push_back(*value);
   }

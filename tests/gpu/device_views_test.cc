@@ -60,10 +60,10 @@ TEST(DeviceViews, DrawsByTheRuleAndOnlyWhatIsNotLeftOut) {
     const int view = static_cast<int>((static_cast<double>(i) + turn) / kRays * 3) % 3;
     const uint64_t counter = 1 + 2 * static_cast<uint64_t>(i);
     const uint64_t pixel =
-        view == 1 ? static_cast<uint64_t>(
-                        drawn[RandomIndex(kSeed, kStep, counter, drawn.size())])
-                  : RandomIndex(kSeed, kStep, counter, kWidth) +
-                        kWidth * RandomIndex(kSeed, kStep, counter + 1, kHeight);
+        view == 1
+            ? static_cast<uint64_t>(drawn[RandomIndex(kSeed, kStep, counter, drawn.size())])
+            : RandomIndex(kSeed, kStep, counter, kWidth) +
+                  kWidth * RandomIndex(kSeed, kStep, counter + 1, kHeight);
     ASSERT_EQ(ray[i].origin.x, static_cast<float>(view)) << i;
     ASSERT_EQ(ray[i].direction.x, static_cast<float>(pixel)) << i;
     ASSERT_EQ(target[i].x, static_cast<float>(pixel) / 65535.0f) << i;

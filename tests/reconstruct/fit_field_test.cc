@@ -242,8 +242,8 @@ TEST_F(FitSpheres, ResamplingTheLayersKeepsConstants) {
   }
 }
 
-// Pixels that are not finite are left out, whatever the size of the squares; the others are
-// drawn as often as one another, and batches stay as large.
+// Pixels that are not finite are left out, whatever the size of the squares, and batches stay
+// as large; pixel by pixel the others are drawn as often as one another.
 TEST_F(FitField, PixelsWithoutAColourAreNeverDrawn) {
   Image masked = photos_[1];
   int64_t left_out = 0;
@@ -263,26 +263,32 @@ TEST_F(FitField, PixelsWithoutAColourAreNeverDrawn) {
   EXPECT_TRUE(AllFinite(rays.mean_color()));
   for (const int patch : {1, 4}) {
     std::map<std::array<float, 3>, int> times;  // by direction
-    for (uint64_t step = 0; step < 40; ++step) {
+    const int steps = patch == 1 ? 1600 : 40;
+    for (int step = 0; step < steps; ++step) {
       std::vector<Ray> batch;
       std::vector<Vec3f> targets;
-      rays.Draw(3, step, 64, patch, &batch, &targets);
+      rays.Draw(3, static_cast<uint64_t>(step), 64, patch, &batch, &targets);
       ASSERT_EQ(batch.size(), static_cast<size_t>(64 * patch * patch));
       for (const Vec3f& target : targets) EXPECT_TRUE(AllFinite(target));
       for (const Ray& ray : batch) ++times[{ray.direction.x, ray.direction.y, ray.direction.z}];
     }
     int drawn = 0;
+    const double mean =
+        32.0 * steps / static_cast<double>(masked.num_pixels() - left_out);  // if alike
     for (int y = 0; y < masked.height; ++y)
       for (int x = 0; x < masked.width; ++x) {
         const Vec3f d = rays.RayOf(0, x, y).direction;
         const auto found = times.find({d.x, d.y, d.z});
         const int count = found == times.end() ? 0 : found->second;
+        if (patch == 1 && !is_left_out(x, y)) {
+          EXPECT_NEAR(count, mean, 6 * std::sqrt(mean)) << x << ", " << y;
+        }
         if (is_left_out(x, y)) {
           EXPECT_EQ(count, 0) << x << ", " << y << ", squares of " << patch;
         }
         drawn += count;
       }
-    EXPECT_NEAR(drawn, 40 * 32 * patch * patch, 40 * patch * patch);  // half of the views
+    EXPECT_NEAR(drawn, steps * 32 * patch * patch, steps * patch * patch);  // of two views
   }
   for (float& value : masked.pixels) value = std::nanf("");
   EXPECT_THROW(TrainingRays{views}, Error);
@@ -346,6 +352,15 @@ TEST_F(FitField, H85_ResamplingKeepsConstantsAndRamps) {
 // A matte ball in voxels as fine as its photos: one colour a place is enough.
 TEST_F(FitField, AMatteSceneNeedsNoViewDependence) {
   const DegreeTrial trial = TryDegrees(views_, {}, options_, {}, Backend::kCpu);
+  EXPECT_FALSE(trial.Pays()) << trial.gain_db << " dB";
+}
+
+TEST_F(FitField, ATrialLeavesOutWhatIsMasked) {
+  for (Image& photo : photos_)
+    for (int y = 0; y < photo.height / 2; ++y)
+      for (int x = 0; x < photo.width / 3; ++x) photo.at(x, y)[1] = std::nanf("");
+  const DegreeTrial trial = TryDegrees(views_, {}, options_, {}, Backend::kCpu);
+  EXPECT_TRUE(std::isfinite(trial.gain_db));
   EXPECT_FALSE(trial.Pays()) << trial.gain_db << " dB";
 }
 
