@@ -74,6 +74,13 @@ void LeaveOutMasked(const CaptureView& view, int longest_side, Image* picture) {
                   std::numeric_limits<float>::quiet_NaN());
 }
 
+void FillMasked(const Image& kept, const Image& render, Image* photo) {
+  for (int64_t p = 0; p < kept.num_pixels(); ++p)
+    if (kept.pixels[p] < 0.5f)
+      for (int c = 0; c < 3; ++c)
+        photo->pixels[3 * p + c] = std::clamp(render.pixels[3 * p + c], 0.0f, 1.0f);
+}
+
 Image ReadPhotoToFit(const CaptureView& view, int longest_side, const PhotoGain& gain) {
   Image photo = ReadWorkingPhoto(view, longest_side, gain);
   LeaveOutMasked(view, longest_side, &photo);

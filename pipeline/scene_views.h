@@ -31,6 +31,10 @@ Image ReadWorkingMask(const CaptureView& view, int longest_side);
 // working size.
 void LeaveOutMasked(const CaptureView& view, int longest_side, Image* picture);
 
+// What a 2D method is given instead of a masked photo: `render`, of the same view, where `kept`
+// (ReadWorkingMask) is 0.
+void FillMasked(const Image& kept, const Image& render, Image* photo);
+
 // ReadWorkingPhoto without what is masked; empty (0 x 0) where nothing is left of it.
 Image ReadPhotoToFit(const CaptureView& view, int longest_side, const PhotoGain& gain);
 

@@ -169,7 +169,14 @@ void AddStyle(RunContext* context, const Scene& scene, const SheetOptions& sheet
     if (!stylizer->Knows(i) || (masked && std::find(kept.pixels.begin(), kept.pixels.end(),
                                                     1.0f) == kept.pixels.end()))
       continue;
-    targets[n] = Clipped(stylizer->Stylize(scene.photos[n], i));
+    Image photo = scene.photos[n];
+    if (masked)
+      FillMasked(kept,
+                 RenderView(scene.stored.field, scene.cameras[n],
+                            MarchOptions{scene.stored.field.step})
+                     .color,
+                 &photo);
+    targets[n] = Clipped(stylizer->Stylize(photo, i));
     StyledTrainingView view;
     view.camera = scene.cameras[n];
     view.target = &targets[n];

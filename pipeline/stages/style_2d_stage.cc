@@ -1,8 +1,12 @@
 // Stage "style_2d": what the 2D method makes of each photo that it knows, in views_2d/.
 #include <filesystem>
+#include <optional>
 
 #include "kernels/image/color_statistics.h"
 #include "pipeline/capture_store.h"
+#include "pipeline/device_choice.h"
+#include "pipeline/field_file.h"
+#include "pipeline/field_renderer.h"
 #include "pipeline/files/image_file.h"
 #include "pipeline/photo_gains.h"
 #include "pipeline/scene_views.h"
@@ -12,6 +16,32 @@
 
 namespace regrade {
 namespace {
+
+// The parts of photos that are masked, as the field shows them: neither the colours that a 2D
+// method measures nor its pictures know what moved.
+class MaskFiller {
+ public:
+  explicit MaskFiller(const RunContext* context) : context_(context) {}
+
+  void Fill(const CaptureView& view, Image* photo) {
+    const RunSettings& settings = context_->settings;
+    const Image kept = ReadWorkingMask(view, settings.scene.photo_size);
+    if (kept.empty()) return;
+    if (!stored_) {
+      stored_ = ReadFieldFile(context_->workspace->Path("field.npz"));
+      renderer_.emplace(stored_->field,
+                        ChooseBackend(settings.run.device, settings.run.reproducible));
+    }
+    const Camera camera = WorkingCamera(view.camera, settings.scene.photo_size,
+                                        stored_->field_from_world, stored_->ndc);
+    FillMasked(kept, renderer_->Render(camera).color, photo);
+  }
+
+ private:
+  const RunContext* context_;
+  std::optional<StoredField> stored_;
+  std::optional<FieldRenderer> renderer_;
+};
 
 StageOutcome StyleViews(RunContext* context, const ProgressFunction& progress) {
   const RunSettings& settings = context->settings;
@@ -30,14 +60,16 @@ StageOutcome StyleViews(RunContext* context, const ProgressFunction& progress) {
 
   const PhotoGains gains = RecordedGains(workspace, capture);
   std::filesystem::remove_all(workspace.Path("views_2d"));
+  MaskFiller filler(context);
   const int count = static_cast<int>(capture.views.size());
   int styled = 0;
   for (int i = 0; i < count; ++i) {
     if (Report(progress, i, count) == Verdict::kAbort) throw Interrupted();
     if (!stylizer->Knows(i) || (masks != nullptr && !masks->Knows(i))) continue;
     ++styled;
-    const Image photo = ReadWorkingPhoto(capture.views[static_cast<size_t>(i)],
-                                         settings.scene.photo_size, gains.Of(i));
+    const CaptureView& view = capture.views[static_cast<size_t>(i)];
+    Image photo = ReadWorkingPhoto(view, settings.scene.photo_size, gains.Of(i));
+    filler.Fill(view, &photo);
     WritePng8(workspace.NewPath("views_2d/" + FrameName(i)), stylizer->Stylize(photo, i));
   }
   StageOutcome outcome;
@@ -60,6 +92,8 @@ Stage Style2dStage(RunContext* context) {
   if (!files.IsNull()) stage.inputs["method_files"] = files;
   const JsonValue gains = RecordedGainRows(*context->workspace);
   if (!gains.IsNull()) stage.inputs["exposure"] = gains;
+  if (std::filesystem::is_directory(context->workspace->Path("poses/masks")))
+    stage.inputs["field"] = context->ResultOf("reconstruct");
   if (context->settings.object.On()) {
     stage.inputs["object"] = context->OptionsOf({"Object"});
     stage.inputs["masks"] = MaskFiles(context->settings.object);

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "evaluate/image_quality.h"
 #include "kernels/base/child_process.h"
 #include "pipeline/capture_store.h"
 #include "pipeline/files/image_file.h"
@@ -88,6 +89,16 @@ TEST(PhotoMasks, WhatTheyBlackenIsNeitherFittedNorMeasured) {
   // A square of a quarter of the picture before fitted and held-out photos alike costs many
   // decibels where it is fitted or measured.
   EXPECT_GT(HeldOutPsnr(folder / "with"), HeldOutPsnr(folder / "clean_out") - 2);
+
+  // Nor do 2D methods see it, which map a view by its own colours.
+  for (const char* out : {"with", "clean_out"})
+    Regrade({"stylize", folder / out, "--style", folder / "clean/images/00008.png",
+             "--style-steps", "1", "--path", "views"});
+  for (const char* name : {"00001.png", "00006.png"}) {
+    const Image seen = ReadImage(folder / (std::string("with/views_2d/") + name));
+    const Image clean = ReadImage(folder / (std::string("clean_out/views_2d/") + name));
+    EXPECT_GT(Psnr(seen, clean).value(), 20) << name;  // the square alone makes 10
+  }
 
   // Pixels that the mask's edge runs through are left out with it, and photos may have none.
   const Capture capture = ReadCapture(folder / "with/poses");
