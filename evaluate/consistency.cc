@@ -203,6 +203,26 @@ ConsistencyReport EvaluateConsistency(int frames, const PairMotionFunction& moti
   return report;
 }
 
+ConsistencyReport UndefinedConsistency(int frames,
+                                       const std::vector<NamedFrameSource>& sequences,
+                                       const ConsistencyOptions& options,
+                                       const std::string& why) {
+  ConsistencyReport report;
+  report.mode = options.mode;
+  report.flow = options.flow;
+  report.mask_formula = MaskFormula(options.mode);
+  for (const NamedFrameSource& sequence : sequences)
+    for (const int gap : options.gaps) {
+      ConsistencyRow row;
+      row.sequence = sequence.name;
+      row.gap = gap;
+      row.pairs = row.undefined_pairs = std::max(0, frames - gap);
+      row.why = why;
+      report.rows.push_back(std::move(row));
+    }
+  return report;
+}
+
 ConsistencyReport EvaluateConsistency(const FrameSource& reference,
                                       const std::vector<NamedFrameSource>& sequences,
                                       const ConsistencyOptions& options,

@@ -123,6 +123,13 @@ ConsistencyReport EvaluateConsistency(int frames, const PairMotionFunction& moti
                                       const ConsistencyOptions& options,
                                       const ProgressFunction& progress = {});
 
+// The report of frames that cannot be compared: every pair is counted as undefined, and `why`
+// is each row's reason.
+ConsistencyReport UndefinedConsistency(int frames,
+                                       const std::vector<NamedFrameSource>& sequences,
+                                       const ConsistencyOptions& options,
+                                       const std::string& why);
+
 // One pair on its own. `later` and `earlier` are frames of one sequence, sized as the flow.
 // Fills error, psnr_db, coverage and the counts.
 PairResult ComparePair(const Image& earlier, const Image& later, const PairMotion& motion);

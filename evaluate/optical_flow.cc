@@ -12,8 +12,6 @@
 namespace regrade {
 namespace {
 
-constexpr int kMinSize = 12;  // pixels; DIS's coarsest patch grid is empty below
-
 std::string SizeText(const Image& image) {
   return std::to_string(image.width) + " x " + std::to_string(image.height) + " px";
 }
@@ -90,7 +88,7 @@ FlowField ComputeFlow(const Image& from, const Image& to, const std::string& met
     throw Error(ExitCode::kInput,
                 "frames differ in size: " + SizeText(from) + " and " + SizeText(to), "",
                 "all frames of a sequence need one size");
-  if (from.width < kMinSize || from.height < kMinSize)
+  if (from.width < kLeastFlowSide || from.height < kLeastFlowSide)
     throw Error(ExitCode::kInput, "frames of " + SizeText(from) + " are too small for flow", "",
                 "give frames of at least 12 x 12 px");
   cv::Mat flow;

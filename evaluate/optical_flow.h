@@ -14,6 +14,9 @@ inline constexpr const char* kFlowMethods =
 // Of optflow.
 inline constexpr const char* kContributedFlowMethods = "deepflow|tvl1|pca-flow|rlof";
 
+// Pixels; below, the coarsest grid of patches of DIS is empty.
+inline constexpr int kLeastFlowSide = 12;
+
 // Motion from `from` to `to`, for every pixel of `from`. Both are turned to 8-bit grey as
 // OpenCV does it for 8-bit RGB files (an alpha channel is ignored), so the flow is the one that
 // any user of OpenCV gets for the same files. The result is the same for any number of threads.

@@ -5,15 +5,10 @@
 #include <numeric>
 
 #include "kernels/base/error.h"
+#include "kernels/scene/common_camera.h"
 
 namespace regrade {
 namespace {
-
-double Median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<long>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // The point nearest to all optical axes in the least squares sense; a weak pull towards a point
 // before the cameras decides where axes are parallel.
@@ -61,20 +56,6 @@ Camera LookingAlong(const Camera& model, const Vec3d& center, const Vec3d& forwa
   return camera;
 }
 
-Camera FilmCamera(const std::vector<Camera>& cameras) {
-  Camera film = cameras[0].Undistorted();
-  std::vector<double> fx, fy;
-  for (const Camera& camera : cameras) {
-    fx.push_back(camera.fx * film.width / camera.width);
-    fy.push_back(camera.fy * film.height / camera.height);
-  }
-  film.fx = Median(fx);
-  film.fy = Median(fy);
-  film.cx = 0.5 * film.width;
-  film.cy = 0.5 * film.height;
-  return film;
-}
-
 // How far apart two views look: distance, and the same again for a turn of one radian.
 double Jump(const Camera& a, const Camera& b, double unit) {
   const double turn = std::acos(std::clamp(Dot(a.Forward(), b.Forward()), -1.0, 1.0));
@@ -109,7 +90,7 @@ std::vector<Camera> SmoothPath(const std::vector<Camera>& cameras, int frames) {
                              cameras[static_cast<size_t>(order[i])], unit);
   const double length = at.back();
   const double width = std::max(1.5 * length / static_cast<double>(order.size()), 1e-9);
-  const Camera film = FilmCamera(cameras);
+  const Camera film = CommonCamera(cameras);
   std::vector<Camera> path;
   for (int f = 0; f < frames; ++f) {
     const double t = length * f / std::max(1, frames - 1);
@@ -145,7 +126,7 @@ std::vector<Camera> OrbitPath(const std::vector<Camera>& cameras, int frames) {
   Vec3d across = first - up * Dot(first, up);
   across = Norm(across) > 1e-9 ? Normalized(across) : Normalized(Cross(up, Vec3d{1, 0, 0.3}));
   const Vec3d side = Cross(up, across);
-  const Camera film = FilmCamera(cameras);
+  const Camera film = CommonCamera(cameras);
   std::vector<Camera> path;
   for (int f = 0; f < frames; ++f) {
     const double a = 2 * M_PI * f / frames;
@@ -168,7 +149,7 @@ std::vector<Camera> SpiralPath(const std::vector<Camera>& cameras, int frames) {
   }
   sway_x /= static_cast<double>(cameras.size());
   sway_y /= static_cast<double>(cameras.size());
-  const Camera film = FilmCamera(cameras);
+  const Camera film = CommonCamera(cameras);
   std::vector<Camera> path;
   for (int f = 0; f < frames; ++f) {
     const double a = 4 * M_PI * f / frames;
@@ -225,7 +206,7 @@ std::vector<int> SmoothOrder(const std::vector<Camera>& cameras) {
 std::vector<Camera> MakeCameraPath(const std::vector<Camera>& cameras,
                                    const PathOptions& options) {
   REGRADE_CHECK(!cameras.empty());
-  if (options.path == "views") return cameras;
+  if (options.path == "views") return WithCommonIntrinsics(cameras);
   if (options.path == "smooth") return SmoothPath(cameras, options.path_frames);
   if (options.path == "orbit") return OrbitPath(cameras, options.path_frames);
   if (options.path == "spiral") return SpiralPath(cameras, options.path_frames);

@@ -25,10 +25,9 @@ struct PathOptions {
   }
 };
 
-// `cameras` in any order, in one frame, z up; at least one. The path's cameras have the median
-// focal length, no distortion, a centred principal point and the first camera's size; for
-// "views" they are `cameras` themselves. "smooth" stays within the hull of neighbouring photos,
-// where the field is supported by photos.
+// `cameras` in any order, in one frame, z up; at least one. The path's cameras are CommonCamera
+// (kernels/scene/common_camera.h) elsewhere; for "views" WithCommonIntrinsics. "smooth" stays
+// within the hull of neighbouring photos, where the field is supported by photos.
 std::vector<Camera> MakeCameraPath(const std::vector<Camera>& cameras,
                                    const PathOptions& options);
 

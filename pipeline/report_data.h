@@ -110,12 +110,15 @@ struct RenderReport {
   double seconds = 0;
   int frames = 0;
   Figure frames_per_second;
+  int film_width = 0, film_height = 0;  // pixels
 };
 
 struct EvaluateReport {
   double seconds = 0;
   std::string flow;  // "dis-medium"
   std::string mask;  // "lai2018"
+  // On which frames neighbouring views were compared, where these are not the views' own.
+  std::string comparison_note;
 };
 
 // Only the stages that a command has run are there.

@@ -43,14 +43,20 @@ std::string FilmHtml(const char* file, const char* caption,
 std::string FilmsHtml(const ReportPictures& pictures, const ReportView* headline) {
   if (!pictures.has_styled_film && !pictures.has_wipe_film && !pictures.has_views_2d_film)
     return "";
-  const std::optional<ReportPicture> poster = headline ? headline->styled : std::nullopt;
+  const auto poster_or = [](const std::optional<ReportPicture>& film,
+                            const std::optional<ReportPicture>& view) {
+    return film ? film : view;
+  };
+  const std::optional<ReportPicture> poster =
+      poster_or(pictures.film_poster, headline ? headline->styled : std::nullopt);
   std::string html = "<h2>Films</h2><div class=films>";
   if (pictures.has_styled_film) html += FilmHtml("styled.mp4", "the styled scene", poster);
   if (pictures.has_wipe_film)
     html += FilmHtml("source_vs_styled.mp4", "before and styled, as a wipe", std::nullopt);
   if (pictures.has_views_2d_film)
-    html += FilmHtml("views_2d.mp4", "the 2D method, frame by frame",
-                     headline ? headline->views_2d : std::nullopt);
+    html += FilmHtml(
+        "views_2d.mp4", "the 2D method, frame by frame",
+        poster_or(pictures.film_poster_2d, headline ? headline->views_2d : std::nullopt));
   return html + "</div>";
 }
 

@@ -29,6 +29,9 @@ struct ReportPictures {
   std::optional<ReportPicture> style;  // the style picture
   std::vector<ReportView> views;       // the middle one is the headline
   std::vector<ReportHeatMap> heat_maps;
+  // A frame of the film's shape for styled.mp4 and views_2d.mp4 before they are played, where
+  // the headline view may have another shape; else the headline view is taken.
+  std::optional<ReportPicture> film_poster, film_poster_2d;
   bool has_styled_film = false;    // styled.mp4 lies beside the page
   bool has_wipe_film = false;      // source_vs_styled.mp4 does
   bool has_views_2d_film = false;  // views_2d.mp4 does

@@ -124,11 +124,17 @@ JsonValue StageJson(const StylizeReport& stage) {
 JsonValue StageJson(const RenderReport& stage) {
   Object object{{"seconds", stage.seconds}, {"frames", stage.frames}};
   Put(object, "frames_per_second", stage.frames_per_second);
+  if (stage.film_width > 0)
+    object.emplace_back("film",
+                        Object{{"width", stage.film_width}, {"height", stage.film_height}});
   return object;
 }
 
 JsonValue StageJson(const EvaluateReport& stage) {
-  return Object{{"seconds", stage.seconds}, {"flow", stage.flow}, {"mask", stage.mask}};
+  Object object{{"seconds", stage.seconds}, {"flow", stage.flow}, {"mask", stage.mask}};
+  if (!stage.comparison_note.empty())
+    object.emplace_back("comparison_note", stage.comparison_note);
+  return object;
 }
 
 JsonValue StagesJson(const RunReport& report) {

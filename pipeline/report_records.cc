@@ -249,10 +249,13 @@ RunReport ReportFromRecords(const Workspace& workspace) {
   }
   if (render)
     stages.render = {render->seconds, static_cast<int>(CountOf(render->figures, "frames")),
-                     FigureOf(render->figures, "frames_per_second")};
+                     FigureOf(render->figures, "frames_per_second"),
+                     static_cast<int>(CountOf(render->figures, "film_width")),
+                     static_cast<int>(CountOf(render->figures, "film_height"))};
   if (evaluate) {
     const JsonValue& f = evaluate->figures;
-    stages.evaluate = {evaluate->seconds, TextOf(f, "flow"), TextOf(f, "mask")};
+    stages.evaluate = {evaluate->seconds, TextOf(f, "flow"), TextOf(f, "mask"),
+                       TextOf(f, "comparison_note")};
     if (stages.stylize) {
       stages.stylize->psnr_to_2d_photos_db = FigureOf(f, "psnr_to_2d_photos_db");
       stages.stylize->linear_map_psnr_to_2d_db = FigureOf(f, "linear_map_psnr_to_2d_db");

@@ -148,6 +148,9 @@ std::vector<StageLine> StageLines(const StagesReport& stages) {
   if (const auto& s = stages.render) {
     std::string& said = add("render", s->seconds);
     Say(said, std::to_string(s->frames) + " frames");
+    if (s->film_width > 0)
+      Say(said, "film of " + std::to_string(s->film_width) + " × " +
+                    std::to_string(s->film_height) + " px");
     Say(said, FigureHtml(s->frames_per_second, 2, "frames/s"));
   }
   if (const auto& s = stages.evaluate) {
@@ -268,11 +271,14 @@ std::string ConsistencyHtml(const RunReport& report) {
       "class=n>coverage"
       "<th class=\"n beside\">PSNR to 2D, dB<th class=n>hue spread (2D)<th class=n>chroma (2D)"
       "<th class=n>distance to style</tr>";
+  const std::string& note =
+      report.stages.evaluate ? report.stages.evaluate->comparison_note : std::string();
   return Heading("Consistency, with fidelity beside it") +
          "<p>A grey film is consistent and a blurred one too, so read both halves of a row: "
          "how well frames agree "
          "along the motion between them, and how much of the 2D method's colour is still "
          "there.</p>" +
+         (note.empty() ? "" : "<p class=note>In this capture " + EscapeHtml(note) + ".</p>") +
          Table(head, body) + "<p class=note>" + meanings +
          ". In brackets: the 2D method's own figure. Structure: correlation of "
          "edges with the unstyled frames', 1 where none moved and no noise came. 95 %: block "

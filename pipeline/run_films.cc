@@ -50,8 +50,8 @@ void RunFilms::Begin(const Image& first, bool with_views_2d) {
 void RunFilms::Add(int index, const Image& source, const Image& styled, const Image* views_2d) {
   if (index == 0) Begin(styled, views_2d != nullptr);
   if (!why_none_.empty()) return;
-  if (styled.width != width_ || styled.height != height_)
-    return GiveUp("the photos have different sizes");
+  REGRADE_CHECK_EQ(styled.width, width_);
+  REGRADE_CHECK_EQ(styled.height, height_);
   try {
     film_->Add(styled);
     wipe_->Add(Wiped(source, styled, index, frames_));

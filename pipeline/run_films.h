@@ -18,7 +18,7 @@ class RunFilms {
   RunFilms(const Workspace& workspace, double frames_per_second, int frames);
 
   // Frame `index` of each; `views_2d` may be null, for all frames or for none. A machine
-  // without H.264, and frames of different sizes, make no films: see WhyNone.
+  // without H.264 makes no films: see why_none. All frames have one size.
   void Add(int index, const Image& source, const Image& styled, const Image* views_2d);
   // Puts the films in place and adds their names to `outputs`.
   void Finish(std::vector<std::string>* outputs);

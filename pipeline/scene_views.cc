@@ -36,6 +36,14 @@ Camera WorkingCamera(const Camera& camera, int longest_side, const Similarity& f
   return working;
 }
 
+std::vector<Camera> WorkingCameras(const Capture& capture, int longest_side,
+                                   const Similarity& field_from_world, const NdcSpace& ndc) {
+  std::vector<Camera> cameras;
+  for (const CaptureView& view : capture.views)
+    cameras.push_back(WorkingCamera(view.camera, longest_side, field_from_world, ndc));
+  return cameras;
+}
+
 Image ReadWorkingPhoto(const CaptureView& view, int longest_side, const PhotoGain& gain) {
   Image photo = ReadImage(view.path);
   if (photo.width != view.camera.width || photo.height != view.camera.height)
@@ -92,6 +100,13 @@ std::vector<int> ViewIndices(const Capture& capture, int holdout, bool held_out)
   for (size_t i = 0; i < capture.views.size(); ++i)
     if (IsHeldOut(i, holdout) == held_out) indices.push_back(static_cast<int>(i));
   return indices;
+}
+
+std::string ComparisonNote(const Camera& common) {
+  return "the photos differ in size or lens: neighbouring views are compared on frames of one "
+         "camera (" +
+         std::to_string(common.width) + "x" + std::to_string(common.height) +
+         " px) at each photo's place";
 }
 
 Image DepthAlongRays(const Camera& camera, Image depth) {

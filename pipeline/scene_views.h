@@ -20,6 +20,10 @@ inline constexpr double kDistortionThreshold = 0.5;
 Camera WorkingCamera(const Camera& camera, int longest_side, const Similarity& field_from_world,
                      const NdcSpace& ndc);
 
+// Working cameras of all views, in their order.
+std::vector<Camera> WorkingCameras(const Capture& capture, int longest_side,
+                                   const Similarity& field_from_world, const NdcSpace& ndc);
+
 // The photo at the size of its working camera, 3 channels, rid of its gain (photo_gains.h).
 Image ReadWorkingPhoto(const CaptureView& view, int longest_side, const PhotoGain& gain);
 
@@ -44,6 +48,14 @@ std::vector<int> ViewIndices(const Capture& capture, int holdout, bool held_out)
 // Sequences of the film's frames stand beside those of the photos' places: frames/path_source/,
 // ...
 inline constexpr char kPathPrefix[] = "path_";
+// Where photos differ in size or lens, frames/common_source/, ... hold the views' frames once
+// more, of one camera (kernels/scene/common_camera.h) at each photo's place: neighbouring views
+// are compared on these.
+inline constexpr char kCommonPrefix[] = "common_";
+
+// "the photos differ in size or lens: neighbouring views are compared on frames of one camera
+// (480x360 px) at each photo's place"
+std::string ComparisonNote(const Camera& common);
 
 // The renderer's depth is along the optical axis; the evaluator wants it along each ray.
 Image DepthAlongRays(const Camera& camera, Image depth);

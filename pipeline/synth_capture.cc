@@ -86,6 +86,9 @@ JsonValue DescribeCapture(const SynthOptions& options, const SynthEffects& effec
                                            {"highlights", highlights}};
   if (effects.masks)
     of_effects["masks"] = JsonValue::Object{{"on", true}, {"solid", MaskedSolid(scene)}};
+  if (effects.mixed_cameras)
+    of_effects["mixed_cameras"] = JsonValue::Object{
+        {"on", true}, {"second_size", kSynthSecondSize}, {"second_focal", kSynthSecondFocal}};
   if (effects.poses)
     of_effects["poses"] = JsonValue::Object{{"on", true},
                                             {"turn_degrees", kSynthPoseTurn},
@@ -148,7 +151,8 @@ void WriteSyntheticCapture(const std::string& out, const SynthOptions& options,
   const SynthEffects effects = ParseSynthEffects(options.effects);
   const SyntheticScene scene = MakeSyntheticScene(options.scene, options.seed);
   std::vector<Camera> cameras = SyntheticCameras(scene, options.views, width, height);
-  for (Camera& camera : cameras) camera = WithSynthLens(effects, camera);
+  for (int i = 0; i < options.views; ++i)
+    cameras[i] = WithSynthLens(effects, WithSynthBody(effects, i, cameras[i]));
   ClaimFolder(out, DescribeCapture(options, effects, scene), effects.masks);
 
   const fs::path truth = fs::path(out) / "truth";

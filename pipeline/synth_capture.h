@@ -30,7 +30,9 @@ struct SynthOptions {
         {.help =
              "what else to simulate, from exposure, noise, highlights, masks of one object, of "
              "which some are wrong, poses that come with tracks and are 0.3 degrees and 0.5 % "
-             "of the spread off, and a lens of distortion (mild), barrel (k1 = -0.2) or "
+             "of the spread off, mixed-cameras (three sizes, upright and across, from two "
+             "cameras), "
+             "and a lens of distortion (mild), barrel (k1 = -0.2) or "
              "fisheye; what is not named costs nothing"});
     bind("seed", seed, {.help = "draws the paint, the exposures and the noise"});
   }

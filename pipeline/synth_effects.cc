@@ -11,8 +11,8 @@ namespace regrade {
 
 SynthEffects ParseSynthEffects(const std::string& list) {
   constexpr char kHint[] =
-      "the effects are exposure, noise, highlights, masks, poses, and one lens of distortion, "
-      "barrel, fisheye";
+      "the effects are exposure, noise, highlights, masks, poses, mixed-cameras, and one lens "
+      "of distortion, barrel, fisheye";
   SynthEffects effects;
   size_t begin = 0;
   while (begin < list.size()) {
@@ -35,6 +35,8 @@ SynthEffects ParseSynthEffects(const std::string& list) {
       effects.masks = true;
     else if (name == "poses")
       effects.poses = true;
+    else if (name == "mixed-cameras")
+      effects.mixed_cameras = true;
     else if (name == "motion-blur" || name == "occluders")
       throw Error(ExitCode::kUsage, "the effect \"" + name + "\" is not in this version",
                   "--effects", kHint);
@@ -86,6 +88,23 @@ void ApplyNoise(uint64_t seed, uint64_t stream, double sigma, Image* color) {
     color->pixels[i] = static_cast<float>(
         std::clamp(color->pixels[i] + sigma * radius * std::cos(angle), 0.0, 1.0));
   }
+}
+
+Camera WithSynthBody(const SynthEffects& effects, int index, const Camera& camera) {
+  if (!effects.mixed_cameras) return camera;
+  Camera body = camera;
+  if (index % 4 == 1) {
+    std::swap(body.width, body.height);
+    std::swap(body.fx, body.fy);
+    std::swap(body.cx, body.cy);
+  }
+  if (index % 4 == 2) {
+    body = camera.Resized(static_cast<int>(std::lround(kSynthSecondSize * camera.width)),
+                          static_cast<int>(std::lround(kSynthSecondSize * camera.height)));
+    body.fx *= kSynthSecondFocal;
+    body.fy *= kSynthSecondFocal;
+  }
+  return body;
 }
 
 Camera WithSynthLens(const SynthEffects& effects, Camera camera) {

@@ -11,14 +11,15 @@
 namespace regrade {
 
 struct SynthEffects {
-  bool exposure = false;    // a gain per photo that drifts within +-30 %
-  bool noise = false;       // of the sensor
-  bool distortion = false;  // of the lens: a mild barrel
-  bool barrel = false;      // a strong one
-  bool fisheye = false;     // a lens that shows angles, not tangents
-  bool highlights = false;  // of the sun on glazed things
-  bool masks = false;       // of one object, some of them wrong
-  bool poses = false;       // handed over with tracks, and a little off
+  bool exposure = false;       // a gain per photo that drifts within +-30 %
+  bool noise = false;          // of the sensor
+  bool distortion = false;     // of the lens: a mild barrel
+  bool barrel = false;         // a strong one
+  bool fisheye = false;        // a lens that shows angles, not tangents
+  bool highlights = false;     // of the sun on glazed things
+  bool masks = false;          // of one object, some of them wrong
+  bool poses = false;          // handed over with tracks, and a little off
+  bool mixed_cameras = false;  // photos of three sizes, upright and across, from two cameras
 };
 
 inline constexpr double kSynthNoiseSigma = 2.0 / 255;  // of encoded values
@@ -49,6 +50,12 @@ void ApplyNoise(uint64_t seed, uint64_t stream, double sigma, Image* color);
 enum class MaskFault { kNone, kShifted, kEmpty, kSwollen };
 MaskFault SynthMaskFault(int index);
 Image FaultyMask(const Image& mask, MaskFault fault);
+
+// The camera of photo `index` where cameras are mixed: of every four photos the second is held
+// upright (height and width exchanged), the third is by a camera of kSynthSecondSize the size
+// and kSynthSecondFocal times the focal length in terms of its width. Otherwise `camera`.
+inline constexpr double kSynthSecondSize = 0.75, kSynthSecondFocal = 1.2;
+Camera WithSynthBody(const SynthEffects& effects, int index, const Camera& camera);
 
 // The same view through the simulated lens, if there is one.
 Camera WithSynthLens(const SynthEffects& effects, Camera camera);

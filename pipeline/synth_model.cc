@@ -72,12 +72,19 @@ ColmapModel TracksOf(const std::vector<Camera>& cameras, const std::vector<Image
                      const std::vector<std::string>& names, uint64_t seed) {
   ColmapModel model;
   if (cameras.empty()) return model;
-  // All photos are of one camera.
-  model.cameras.push_back({1, LensOf(cameras[0]), cameras[0]});
-  model.cameras[0].intrinsics.camera_from_world = {};
-  for (size_t v = 0; v < cameras.size(); ++v)
+  for (size_t v = 0; v < cameras.size(); ++v) {
+    const auto known = std::find_if(model.cameras.begin(), model.cameras.end(),
+                                    [&](const ColmapCamera& camera) {
+                                      return camera.intrinsics.SameIntrinsics(cameras[v]);
+                                    });
+    const uint32_t id = static_cast<uint32_t>(known - model.cameras.begin()) + 1;
+    if (known == model.cameras.end()) {
+      model.cameras.push_back({id, LensOf(cameras[v]), cameras[v]});
+      model.cameras.back().intrinsics.camera_from_world = {};
+    }
     model.images.push_back(
-        {static_cast<uint32_t>(v + 1), 1, names[v], cameras[v].camera_from_world, {}});
+        {static_cast<uint32_t>(v + 1), id, names[v], cameras[v].camera_from_world, {}});
+  }
   for (size_t v = 0; v < cameras.size(); ++v) {
     const Camera& camera = cameras[v];
     const int step = std::max(

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "kernels/base/error.h"
+#include "kernels/scene/common_camera.h"
 
 namespace regrade {
 namespace {
@@ -72,8 +73,10 @@ NormalizedScene NormalizeForwardFacing(const Capture& capture, const ForwardFaci
   s.scale = 1 / (kNearFactor * measured.nearest);
   s.translation = -(s.scale * (s.rotation * center));
 
-  const Camera& first = capture.views[0].camera;
-  result.ndc = {2 * first.fx / first.width, 2 * first.fy / first.height};
+  std::vector<Camera> cameras;
+  for (const CaptureView& view : capture.views) cameras.push_back(view.camera);
+  const Camera common = CommonCamera(cameras);
+  result.ndc = {2 * common.fx / common.width, 2 * common.fy / common.height};
   double radius_x = 1, radius_y = 1;
   for (const CaptureView& view : capture.views) {
     const Camera camera = view.camera.Transformed(s);

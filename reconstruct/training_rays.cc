@@ -9,11 +9,6 @@
 namespace regrade {
 namespace {
 
-bool SameLens(const Camera& a, const Camera& b) {
-  return a.width == b.width && a.height == b.height && a.fx == b.fx && a.fy == b.fy &&
-         a.cx == b.cx && a.cy == b.cy && a.lens == b.lens && a.distortion == b.distortion;
-}
-
 std::vector<Vec3f> DirectionMap(const Camera& camera) {
   std::vector<Vec3f> map(static_cast<size_t>(camera.width) * camera.height);
 #pragma omp parallel for schedule(static)
@@ -48,7 +43,7 @@ TrainingRays::TrainingRays(const std::vector<TrainingView>& views) {
     REGRADE_CHECK_EQ(photo.height, view.camera.height);
     REGRADE_CHECK_EQ(photo.channels, 3);
     size_t lens = 0;
-    while (lens < lenses.size() && !SameLens(lenses[lens], view.camera)) ++lens;
+    while (lens < lenses.size() && !lenses[lens].SameIntrinsics(view.camera)) ++lens;
     if (lens == lenses.size()) {
       lenses.push_back(view.camera);
       direction_maps_.push_back(DirectionMap(view.camera));

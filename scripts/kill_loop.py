@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Kills runs at random instants of every stage, starts them again until they are done, and compares what they made.
 
-  kill_loop.py REGRADE [--kills 1000] [--pose-kills 50] [--seed 0]      colmap for --pose-kills; about 3 s a kill on two cores
+  kill_loop.py REGRADE [--kills 1000] [--pose-kills 50] [--seed 0] [--effects mixed-cameras]      colmap for --pose-kills; about 3 s a kill on two cores
 
 Behind finished poses: a small synthetic capture is run once undisturbed in reproducible mode. Then copies of its poses
 are run, and killed with SIGKILL, SIGTERM or SIGINT a random time after a stage has begun, stage by stage, with one
@@ -67,12 +67,12 @@ def torn_files(folder):
 
 
 class Supervisor:
-    def __init__(self, regrade, scratch, seed):
+    def __init__(self, regrade, scratch, seed, effects):
         self.regrade, self.scratch, self.random = regrade, scratch, random.Random(seed)
         self.capture, self.work = os.path.join(scratch, "capture"), os.path.join(scratch, "work")
         self.kills, self.findings = collections.Counter(), []
         self.compared = self.starts = 0
-        self.posed_capture = make_capture(regrade, self.capture)
+        self.posed_capture = make_capture(regrade, self.capture, effects)
 
     def command(self, threads=2, more=()):
         return [self.regrade, "run", self.posed_capture, "--style", STYLE, "--out", self.work, *SMALL,
@@ -312,12 +312,13 @@ def main():
     parser.add_argument("--kills", type=int, default=1000, metavar="N", help="behind the poses (1000)")
     parser.add_argument("--pose-kills", type=int, default=50, metavar="N", help="inside COLMAP's stage (50)")
     parser.add_argument("--seed", type=int, default=0, help="draws stages, instants, signals and threads")
+    parser.add_argument("--effects", default="", help="of the synthetic capture, e.g. mixed-cameras")
     parser.add_argument("--compare-poses", metavar="PROGRAM", help="the test program compare_poses, for the tolerance")
     parser.add_argument("--control", choices=("none", "short", "all"), default="none",
                         help="see the supervisor catch what it must")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
-        supervisor = Supervisor(os.path.abspath(options.regrade), scratch, options.seed)
+        supervisor = Supervisor(os.path.abspath(options.regrade), scratch, options.seed, options.effects)
         if options.control != "none" or options.kills:
             supervisor.undisturbed()
         if options.control != "none":

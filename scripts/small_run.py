@@ -13,9 +13,9 @@ STYLE = os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 TIMES = {"seconds", "cpu_seconds", "frames_per_second", "peak_memory_mb"}  # of the report, and what else does not repeat
 
 
-def make_capture(regrade, folder):
-    """Eight photos in FOLDER/images; the folder that also has their true poses, so that no COLMAP is needed."""
-    subprocess.run([regrade, "synth", folder, "--scene", "table", "--views", "8", "--size", "256x192"], check=True,
+def make_capture(regrade, folder, effects=""):
+    """Eight photos in FOLDER/images, with effects of `regrade synth`; the folder that also has their true poses, so that no COLMAP is needed."""
+    subprocess.run([regrade, "synth", folder, "--scene", "table", "--views", "8", "--size", "256x192", "--effects", effects], check=True,
                    stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     return os.path.join(folder, "truth")
 

@@ -110,6 +110,12 @@ bool Camera::Project(const Vec3d& point_world, double* u, double* v, double* dep
   return true;
 }
 
+bool Camera::SameIntrinsics(const Camera& other) const {
+  return width == other.width && height == other.height && fx == other.fx && fy == other.fy &&
+         cx == other.cx && cy == other.cy && lens == other.lens &&
+         distortion == other.distortion;
+}
+
 Camera Camera::Resized(int new_width, int new_height) const {
   Camera result = *this;
   const double sx = static_cast<double>(new_width) / width;

@@ -85,6 +85,9 @@ struct Camera {
   // The same view in a world transformed by `target_from_world` (depths scale with its scale).
   Camera Transformed(const Similarity& target_from_world) const;
 
+  // True if size, focal lengths, principal point and distortion are the same to the bit.
+  bool SameIntrinsics(const Camera& other) const;
+
   // How far, in pixels, distortion moves the picture's corner that it moves most.
   double MaxCornerDistortion() const;
 };

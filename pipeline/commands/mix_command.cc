@@ -77,22 +77,27 @@ void MakeMixFolder(const fs::path& out) {
   if (error) throw Error(ExitCode::kResources, error.message(), out.string());
 }
 
-std::vector<Camera> FilmCameras(const std::string& folder, const StoredField& stored,
-                                const SceneOptions& scene, const RenderOptions& render) {
-  std::vector<Camera> views;
-  for (const CaptureView& view : ReadCapture(folder + "/poses").views)
-    views.push_back(
-        WorkingCamera(view.camera, scene.photo_size, stored.field_from_world, stored.ndc));
-  return MakeCameraPath(views, render.path);
+// Frames keep the shape of their photo where the path is the photos' places; a film has one
+// shape.
+struct MixCameras {
+  std::vector<Camera> frames, film;
+};
+
+MixCameras CamerasOf(const std::string& folder, const StoredField& stored,
+                     const SceneOptions& scene, const RenderOptions& render) {
+  const std::vector<Camera> views = WorkingCameras(
+      ReadCapture(folder + "/poses"), scene.photo_size, stored.field_from_world, stored.ndc);
+  const std::vector<Camera> film = MakeCameraPath(views, render.path);
+  return {render.path.path == "views" ? views : film, film};
 }
 
 void WriteMix(const std::string& out, const RadianceField& source,
               const std::vector<const RadianceField*>& styles, const MixKeys& keys,
-              const std::vector<float>* shares_of_voxels, const std::vector<Camera>& cameras,
-              double fps, Backend backend, Console* console) {
+              const std::vector<float>* shares_of_voxels, const MixCameras& cameras, double fps,
+              Backend backend, Console* console) {
   std::optional<VideoWriter> film;
   try {
-    film.emplace(out + "/mixed.mp4", cameras[0].width, cameras[0].height, fps);
+    film.emplace(out + "/mixed.mp4", cameras.film[0].width, cameras.film[0].height, fps);
   } catch (const Error& error) {
     if (error.code() != ExitCode::kExternalProgram) throw;
     console->Warn("no film: " + error.what_failed());
@@ -101,7 +106,7 @@ void WriteMix(const std::string& out, const RadianceField& source,
   const ProgressFunction progress = console->StageProgress();
   std::vector<double> shown;
   std::unique_ptr<FieldRenderer> renderer;
-  const int frames = static_cast<int>(cameras.size());
+  const int frames = static_cast<int>(cameras.film.size());
   for (int i = 0; i < frames; ++i) {
     if (Report(progress, i, frames) == Verdict::kAbort) throw Interrupted();
     const std::vector<double> shares =
@@ -112,13 +117,12 @@ void WriteMix(const std::string& out, const RadianceField& source,
           MixFields(source, styles, shares, shares_of_voxels), backend);
       shown = shares;
     }
-    const Image frame = renderer->Render(cameras[static_cast<size_t>(i)]).color;
+    const Camera& of_frame = cameras.frames[static_cast<size_t>(i)];
+    const Camera& of_film = cameras.film[static_cast<size_t>(i)];
+    const Image frame = renderer->Render(of_frame).color;
     WritePng8(out + "/frames/" + FrameName(i), frame);
-    if (film && (frame.width != cameras[0].width || frame.height != cameras[0].height)) {
-      console->Info("no film: the photos have different sizes");
-      film.reset();
-    }
-    if (film) film->Add(frame);
+    if (film)
+      film->Add(of_frame.SameIntrinsics(of_film) ? frame : renderer->Render(of_film).color);
   }
   if (film) film->Finish();
   console->EndStage();
@@ -159,11 +163,12 @@ void RunMix(const Command& command, const Arguments& arguments, Console* console
 
   StoredField stored = ReadFieldFile(folder + "/field.npz");
   const Backend backend = ChooseBackend(settings.device, false);
-  const std::vector<Camera> cameras = FilmCameras(folder, stored, scene, render);
+  const MixCameras cameras = CamerasOf(folder, stored, scene, render);
   if (settings.dry_run) {
-    console->Info(std::to_string(cameras.size()) + " frames of " +
-                  std::to_string(cameras[0].width) + "x" + std::to_string(cameras[0].height) +
-                  " along " + render.path.path + ", " + std::to_string(keys.points.size()) +
+    console->Info(std::to_string(cameras.film.size()) + " frames of " +
+                  std::to_string(cameras.film[0].width) + "x" +
+                  std::to_string(cameras.film[0].height) + " along " + render.path.path + ", " +
+                  std::to_string(keys.points.size()) +
                   (keys.points.size() == 1 ? " point" : " points") + " of " +
                   std::to_string(words.size()) + (words.size() == 1 ? " style" : " styles"));
     return;
@@ -208,7 +213,7 @@ void RunMix(const Command& command, const Arguments& arguments, Console* console
     mixed.field = MixFields(stored.field, fields, keys.points[0], within);
     WriteFieldFile(settings.out + "/mixed.npz", mixed);
   }
-  console->Info("wrote " + std::to_string(cameras.size()) + " frames to " + settings.out);
+  console->Info("wrote " + std::to_string(cameras.film.size()) + " frames to " + settings.out);
 }
 
 }  // namespace regrade

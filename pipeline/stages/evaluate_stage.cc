@@ -6,10 +6,12 @@
 #include "evaluate/consistency.h"
 #include "evaluate/fidelity.h"
 #include "evaluate/image_quality.h"
+#include "evaluate/optical_flow.h"
 #include "evaluate/pair_network.h"
 #include "evaluate/tables.h"
 #include "kernels/field/fast_rays.h"
 #include "kernels/field/render.h"
+#include "kernels/scene/common_camera.h"
 #include "pipeline/capture_store.h"
 #include "pipeline/field_file.h"
 #include "pipeline/files/image_file.h"
@@ -30,18 +32,44 @@ FrameSource FramesOf(const std::string& folder, const std::vector<int>& views) {
           }};
 }
 
-// Depth and camera of each view, rendered when they are asked for.
-GeometrySource GeometryOf(const RunSettings& settings, const Capture& capture,
-                          const StoredField& stored) {
-  const auto grid = std::make_shared<const FastGrid>(MakeFastGrid(stored.field));
-  return
-      [&settings, &capture, grid, step = stored.field.step,
-       field_from_world = stored.field_from_world, ndc = stored.ndc](int i) -> FrameGeometry {
-        const Camera camera = WorkingCamera(capture.views[static_cast<size_t>(i)].camera,
-                                            settings.scene.photo_size, field_from_world, ndc);
-        return {DepthAlongRays(camera, RenderView(*grid, camera, MarchOptions{step}).depth),
-                camera};
-      };
+// Depth at each camera, rendered when it is asked for.
+GeometrySource GeometryOf(const RadianceField& field, const std::vector<Camera>& cameras) {
+  const auto grid = std::make_shared<const FastGrid>(MakeFastGrid(field));
+  return [grid, cameras, step = field.step](int i) -> FrameGeometry {
+    const Camera& camera = cameras[static_cast<size_t>(i)];
+    return {DepthAlongRays(camera, RenderView(*grid, camera, MarchOptions{step}).depth),
+            camera};
+  };
+}
+
+// Why optical flow cannot be computed on frames of this camera; empty where it can.
+std::string TooSmallForFlow(const Camera& camera, const ConsistencyOptions& options) {
+  if (options.mode == "geometry" || options.flow.find(':') != std::string::npos) return "";
+  if (std::min(camera.width, camera.height) >= kLeastFlowSide) return "";
+  return "frames of " + std::to_string(camera.width) + " x " + std::to_string(camera.height) +
+         " px are too small for optical flow, which needs " + std::to_string(kLeastFlowSide) +
+         " px a side";
+}
+
+// The sequences of one set of frames compared, and heat maps of their worst pairs. The first
+// sequence is the unstyled one; `camera` is that of all frames; without `geometry` motion is
+// estimated.
+ConsistencyReport Compare(const Workspace& workspace,
+                          const std::vector<NamedFrameSource>& sequences, const Camera& camera,
+                          const GeometrySource& geometry, const ConsistencyOptions& options,
+                          const ProgressFunction& progress,
+                          std::vector<HeatMapFile>* heat_maps) {
+  const FrameSource& reference = sequences[0].frames;
+  if (const std::string why = TooSmallForFlow(camera, options); !why.empty())
+    return UndefinedConsistency(reference.count, sequences, options, why);
+  ConsistencyReport report =
+      EvaluateConsistency(reference, sequences, options, progress, geometry);
+  const std::vector<HeatMapFile> maps = WriteHeatMaps(
+      workspace,
+      geometry ? KnownMotion(geometry) : EstimatedMotion(reference, options.mode, options.flow),
+      sequences, options.gaps, report);
+  heat_maps->insert(heat_maps->end(), maps.begin(), maps.end());
+  return report;
 }
 
 // Seconds on two cores at 480 pixels, roughly: what makes the stage's time left come out right.
@@ -60,9 +88,9 @@ bool HasFilm(const RunSettings& settings) {
 
 // The film's frames, with flow and masks from its own unstyled ones. Its geometry is not on
 // disk, so "geometry" leaves it out.
-void AddFilm(RunContext* context, const Image& style, ProgressParts* parts,
-             ConsistencyReport* report, std::vector<FidelityRow>* fidelity,
-             std::vector<HeatMapFile>* heat_maps) {
+void AddFilm(RunContext* context, const Image& style, const Camera& camera,
+             ProgressParts* parts, ConsistencyReport* report,
+             std::vector<FidelityRow>* fidelity, std::vector<HeatMapFile>* heat_maps) {
   const RunSettings& settings = context->settings;
   if (!HasFilm(settings)) return;
   std::vector<int> all(static_cast<size_t>(settings.render.path.path_frames));
@@ -78,13 +106,8 @@ void AddFilm(RunContext* context, const Image& style, ProgressParts* parts,
     sequences.push_back({sequence, FramesOf(folder(name), all)});
   }
   const ConsistencyReport film =
-      EvaluateConsistency(sequences[0].frames, sequences, settings.consistency,
-                          parts->Next(PairWeight(settings, static_cast<int>(all.size()))), {});
-  const ConsistencyOptions& options = settings.consistency;
-  const std::vector<HeatMapFile> maps = WriteHeatMaps(
-      *context->workspace, EstimatedMotion(sequences[0].frames, options.mode, options.flow),
-      sequences, options.gaps, film);
-  heat_maps->insert(heat_maps->end(), maps.begin(), maps.end());
+      Compare(*context->workspace, sequences, camera, {}, settings.consistency,
+              parts->Next(PairWeight(settings, static_cast<int>(all.size()))), heat_maps);
   report->rows.insert(report->rows.end(), film.rows.begin(), film.rows.end());
   report->pairs.insert(report->pairs.end(), film.pairs.begin(), film.pairs.end());
   const FidelityTargets targets{renders_styled ? sequences[1].frames : FrameSource(),
@@ -108,6 +131,11 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
     return FramesOf(workspace.Path(std::string("frames/") + sequence), views);
   };
 
+  const std::vector<Camera> cameras =
+      WorkingCameras(capture, settings.scene.photo_size, stored.field_from_world, stored.ndc);
+  const bool same_camera = HaveSameIntrinsics(cameras);
+  const std::vector<Camera> compared = WithCommonIntrinsics(cameras);
+
   const double n = static_cast<double>(taught.size());
   const int film = HasFilm(settings) ? settings.render.path.path_frames : 0;
   double weight = PairWeight(settings, static_cast<int>(all.size())) +
@@ -115,25 +143,22 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   if (film > 0) weight += PairWeight(settings, film) + 3 * kFrameSeconds * film;
   ProgressParts parts(progress, weight);
 
-  const FrameSource source = frames("source", all);
   // A method that only knows pictures of photos made nothing of our renders.
   const bool renders_styled = std::filesystem::exists(workspace.Path("frames/views_2d"));
-  std::vector<NamedFrameSource> sequences = {{"source", source}};
-  if (renders_styled) sequences.push_back({"views_2d", frames("views_2d", all)});
-  sequences.push_back({"styled", frames("styled", all)});
-  const GeometrySource geometry = settings.consistency.mode == "geometry"
-                                      ? GeometryOf(settings, capture, stored)
-                                      : GeometrySource();
-  ConsistencyReport consistency = EvaluateConsistency(
-      source, sequences, settings.consistency,
-      parts.Next(PairWeight(settings, static_cast<int>(all.size()))), geometry);
-
+  std::vector<NamedFrameSource> sequences;
+  for (const char* name : {"source", "views_2d", "styled"}) {
+    if (name == std::string("views_2d") && !renders_styled) continue;
+    const std::string folder = (same_camera ? "" : kCommonPrefix) + std::string(name);
+    sequences.push_back({name, frames(folder.c_str(), all)});
+  }
   BeginHeatMaps(workspace);
-  std::vector<HeatMapFile> heat_maps = WriteHeatMaps(
-      workspace,
-      geometry ? KnownMotion(geometry)
-               : EstimatedMotion(source, settings.consistency.mode, settings.consistency.flow),
-      sequences, settings.consistency.gaps, consistency);
+  std::vector<HeatMapFile> heat_maps;
+  ConsistencyReport consistency =
+      Compare(workspace, sequences, compared[0],
+              settings.consistency.mode == "geometry" ? GeometryOf(stored.field, compared)
+                                                      : GeometrySource(),
+              settings.consistency,
+              parts.Next(PairWeight(settings, static_cast<int>(all.size()))), &heat_maps);
 
   // Fidelity is measured on the views that the style was learned from, against what the 2D
   // method made of the renders, or else of the photos.
@@ -152,29 +177,28 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   for (const NamedFrameSource& sequence : sequences)
     fidelity.push_back(MeasureFidelity({sequence.name, frames(sequence.name.c_str(), taught)},
                                        targets, parts.Next(n * kFrameSeconds)));
-  AddFilm(context, style, &parts, &consistency, &fidelity, &heat_maps);
+  AddFilm(context, style, CommonCamera(cameras), &parts, &consistency, &fidelity, &heat_maps);
   const FidelityTargets photo_targets{of_photos, targets.transmittance, nullptr, {}, {}};
   const FidelityRow to_photos = MeasureFidelity({"styled", frames("styled", taught)},
                                                 photo_targets, parts.Next(n * kFrameSeconds));
 
-  std::vector<Camera> cameras;
-  for (const int i : taught)
-    cameras.push_back(WorkingCamera(capture.views[static_cast<size_t>(i)].camera,
-                                    settings.scene.photo_size, stored.field_from_world,
-                                    stored.ndc));
+  std::vector<Camera> taught_cameras;
+  for (const int i : taught) taught_cameras.push_back(cameras[static_cast<size_t>(i)]);
   // One map for the whole scene is no yardstick of an object's style.
   std::optional<double> linear_map;
   if (!settings.object.On())
     linear_map =
-        LinearMapPsnr(stored.field, cameras, frames("source", taught), targets.views_2d,
+        LinearMapPsnr(stored.field, taught_cameras, frames("source", taught), targets.views_2d,
                       targets.transmittance, parts.Next(n * kLinearMapSeconds));
 
+  if (!same_camera) context->console->Info(ComparisonNote(compared[0]));
   context->console->Lines(FormatTables(consistency, fidelity));
   StageOutcome outcome;
   outcome.outputs = {kHeatMapFolder};
   outcome.figures = EvaluationRecord(consistency, fidelity, heat_maps);
   outcome.figures["flow"] = settings.consistency.flow;
   outcome.figures["mask"] = settings.consistency.mode;
+  if (!same_camera) outcome.figures["comparison_note"] = ComparisonNote(compared[0]);
   outcome.figures["psnr_to_2d_photos_db"] =
       to_photos.psnr_to_2d_db ? JsonValue(*to_photos.psnr_to_2d_db) : JsonValue();
   outcome.figures["linear_map_psnr_to_2d_db"] =

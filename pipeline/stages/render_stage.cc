@@ -1,9 +1,13 @@
 // Stage "render": frames of the field before and after, and what the 2D method makes of the
-// former, at the photos' places and along the film's way; and films.
+// former, at the photos' places and along the film's way; and films. Where the photos differ in
+// size or lens, the frames at their places are rendered once more with one common camera.
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <optional>
 
+#include "kernels/scene/common_camera.h"
 #include "pipeline/camera_path.h"
 #include "pipeline/capture_store.h"
 #include "pipeline/device_choice.h"
@@ -36,6 +40,56 @@ struct Frame {
   std::optional<Image> views_2d;  // of methods that can style a render
 };
 
+// Frames of one set of folders, frames/PREFIX{source, ...}.
+struct FrameSet {
+  std::string prefix;
+  std::vector<Camera> cameras;
+  bool of_photos = false;  // camera i stands where photo i was taken
+  bool of_film = false;
+};
+
+std::vector<FrameSet> FrameSetsOf(const std::vector<Camera>& views, const PathOptions& path) {
+  const bool same = HaveSameIntrinsics(views), film_of_views = path.path == "views";
+  std::vector<FrameSet> sets = {{"", views, true, film_of_views && same}};
+  if (!same) sets.push_back({kCommonPrefix, WithCommonIntrinsics(views), true, film_of_views});
+  if (!film_of_views) sets.push_back({kPathPrefix, MakeCameraPath(views, path), false, true});
+  return sets;
+}
+
+const FrameSet* CommonSet(const std::vector<FrameSet>& sets) {
+  const auto common = std::find_if(sets.begin(), sets.end(), [](const FrameSet& set) {
+    return set.prefix == kCommonPrefix;
+  });
+  return common == sets.end() ? nullptr : &*common;
+}
+
+// The sets before there is a field: poses in the capture's world, sizes as they will be.
+std::vector<FrameSet> PlannedSets(const RunContext& context) {
+  const Capture capture = ReadCapture(context.workspace->Path("poses"));
+  return FrameSetsOf(WorkingCameras(capture, context.settings.scene.photo_size, {}, {}),
+                     context.settings.render.path);
+}
+
+// "24 frames at the photos' places, 24 there of one camera (480x360), 60 of the film, about 53
+// MB of pictures".
+std::string PlanOf(const std::vector<FrameSet>& sets) {
+  constexpr double kBytesAPixel = 5;  // of three PNGs in colour and one in grey, measured
+  std::string text;
+  double pixels = 0;
+  for (const FrameSet& set : sets) {
+    text += std::to_string(set.cameras.size());
+    if (set.prefix == kCommonPrefix)
+      text += " there of one camera (" + std::to_string(set.cameras[0].width) + "x" +
+              std::to_string(set.cameras[0].height) + " px), ";
+    else
+      text += set.of_photos ? " frames at the photos' places, " : " of the film, ";
+    for (const Camera& camera : set.cameras)
+      pixels += static_cast<double>(camera.width) * camera.height;
+  }
+  return text + "about " + std::to_string(std::lround(pixels * kBytesAPixel * 1e-6)) +
+         " MB of pictures";
+}
+
 // As a camera of that gain shows the scene.
 Frame RenderFrame(RunContext* context, Studio* studio, const Camera& camera,
                   const PhotoGain& gain, int index) {
@@ -62,21 +116,23 @@ class FrameWriter {
       : workspace_(workspace), films_(films) {}
 
   // frames/<prefix>{source, styled, views_2d, transmittance}/<index>.png
-  void Write(const std::shared_ptr<const Frame>& frame, const std::string& prefix, int index,
-             bool of_film) {
+  void Write(const std::shared_ptr<const Frame>& frame, const FrameSet& set, int index) {
+    const std::string prefix = set.prefix;
     const auto write = [this, prefix, index](const char* sequence, const Image& image) {
       WritePng8(workspace_.NewPath("frames/" + prefix + sequence + "/" + FrameName(index)),
                 image);
     };
     before_.Do([=] {
       write("source", frame->source);
-      write("transmittance", frame->transmittance);  // evaluation looks away where it is high
+      // Fidelity, which is not measured on the common camera's frames, ignores pixels where it
+      // is high.
+      if (prefix != kCommonPrefix) write("transmittance", frame->transmittance);
     });
     after_.Do([=] {
       write("styled", frame->styled);
       if (frame->views_2d) write("views_2d", *frame->views_2d);
     });
-    if (!of_film) return;
+    if (!set.of_film) return;
     film_.Do([=, this] {
       films_->Add(index, frame->source, frame->styled,
                   frame->views_2d ? &*frame->views_2d : nullptr);
@@ -114,43 +170,44 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   studio.stylizer = MakeSceneStylizer(context, capture, masks.get(),
                                       [&](const Image&, int) { return studio.coverage; });
 
-  std::vector<Camera> views;
-  for (const CaptureView& view : capture.views)
-    views.push_back(WorkingCamera(view.camera, settings.scene.photo_size,
-                                  before.field_from_world, before.ndc));
-  const bool film_of_views = settings.render.path.path == "views";
-  const std::vector<Camera> way =
-      film_of_views ? std::vector<Camera>() : MakeCameraPath(views, settings.render.path);
+  const std::vector<FrameSet> sets = FrameSetsOf(
+      WorkingCameras(capture, settings.scene.photo_size, before.field_from_world, before.ndc),
+      settings.render.path);
+  int total = 0;
+  for (const FrameSet& set : sets) total += static_cast<int>(set.cameras.size());
+  const FrameSet& film =
+      *std::find_if(sets.begin(), sets.end(), [](const FrameSet& set) { return set.of_film; });
+  if (const FrameSet* common = CommonSet(sets))
+    context->console->Info(ComparisonNote(common->cameras[0]));
 
   const PhotoGains gains =
       settings.render.keep_exposure ? RecordedGains(workspace, capture) : PhotoGains();
   std::filesystem::remove_all(workspace.Path("frames"));
-  const int num_views = static_cast<int>(views.size()), num_way = static_cast<int>(way.size());
   StageOutcome outcome;
   outcome.outputs = {"frames"};
-  RunFilms films(workspace, settings.render.fps, film_of_views ? num_views : num_way);
+  RunFilms films(workspace, settings.render.fps, static_cast<int>(film.cameras.size()));
   {
     FrameWriter writer(workspace, &films);
-    for (int i = 0; i < num_views + num_way; ++i) {
-      if (Report(progress, i, num_views + num_way) == Verdict::kAbort) throw Interrupted();
-      const bool of_view = i < num_views;
-      const int index = of_view ? i : i - num_views;
-      const auto& cameras = of_view ? views : way;
-      writer.Write(std::make_shared<const Frame>(
-                       RenderFrame(context, &studio, cameras[static_cast<size_t>(index)],
-                                   of_view ? gains.Of(i) : kAsTaken, index)),
-                   of_view ? "" : kPathPrefix, index, of_view == film_of_views);
-    }
+    int done = 0;
+    for (const FrameSet& set : sets)
+      for (int i = 0; i < static_cast<int>(set.cameras.size()); ++i) {
+        if (Report(progress, done++, total) == Verdict::kAbort) throw Interrupted();
+        writer.Write(std::make_shared<const Frame>(
+                         RenderFrame(context, &studio, set.cameras[static_cast<size_t>(i)],
+                                     set.of_photos ? gains.Of(i) : kAsTaken, i)),
+                     set, i);
+      }
     writer.Finish();
   }
   films.Finish(&outcome.outputs);
   if (!films.why_none().empty()) context->console->Warn("no film: " + films.why_none());
-  const int frames = num_views + num_way;
   outcome.figures["device"] = DeviceName(backend);
-  outcome.figures["frames"] = frames;
-  outcome.figures["path_frames"] = num_way;
+  outcome.figures["frames"] = total;
+  outcome.figures["path_frames"] = film.of_photos ? 0 : static_cast<int>(film.cameras.size());
+  outcome.figures["film_width"] = film.cameras[0].width;
+  outcome.figures["film_height"] = film.cameras[0].height;
   outcome.figures["frames_per_second"] =
-      studio.styled_seconds > 0 ? JsonValue(frames / studio.styled_seconds) : JsonValue();
+      studio.styled_seconds > 0 ? JsonValue(total / studio.styled_seconds) : JsonValue();
   return outcome;
 }
 
@@ -164,6 +221,12 @@ Stage RenderStage(RunContext* context) {
                         {"styled", context->ResultOf("stylize")},
                         {"views_2d", context->ResultOf("style_2d")},
                         {"options", context->OptionsOf({"Scene", "Render", "2D method"})}};
+  if (context->workspace->Find("pose")) {
+    const std::vector<FrameSet> sets = PlannedSets(*context);
+    stage.plan = PlanOf(sets);
+    if (const FrameSet* common = CommonSet(sets))
+      stage.inputs["common_camera"] = ComparisonNote(common->cameras[0]);
+  }
   stage.work = [context](const ProgressFunction& progress) {
     return Render(context, progress);
   };

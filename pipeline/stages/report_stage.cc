@@ -74,6 +74,12 @@ ReportPictures PicturesOf(const RunContext& context, const Capture& capture,
     view.styled = PictureAt(workspace.Path("frames/styled/" + name));
     pictures.views.push_back(std::move(view));
   }
+  if (count > 0) {
+    const std::string middle = FrameName(count / 2);
+    const std::string common = std::string("frames/") + kCommonPrefix;
+    pictures.film_poster = PictureAt(workspace.Path(common + "styled/" + middle));
+    pictures.film_poster_2d = PictureAt(workspace.Path(common + "views_2d/" + middle));
+  }
   pictures.has_styled_film = std::filesystem::exists(workspace.Path("styled.mp4"));
   pictures.has_wipe_film = std::filesystem::exists(workspace.Path("source_vs_styled.mp4"));
   pictures.has_views_2d_film = std::filesystem::exists(workspace.Path("views_2d.mp4"));

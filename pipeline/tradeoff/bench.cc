@@ -12,6 +12,7 @@
 #include "kernels/base/error.h"
 #include "kernels/field/fast_rays.h"
 #include "kernels/field/render.h"
+#include "kernels/scene/common_camera.h"
 #include "pipeline/capture_store.h"
 #include "pipeline/cpu_time.h"
 #include "pipeline/field_file.h"
@@ -261,10 +262,11 @@ const Bench::Frames& Bench::BaseFrames() {
   f.stored = ReadFieldFile(base.Path("field.npz"));
   f.grid = MakeFastGrid(f.stored.field);
   const int count = std::min(kFrames, static_cast<int>(f.capture.views.size()));
+  // Flow is compared on frames of one size.
+  const std::vector<Camera> cameras = WithCommonIntrinsics(WorkingCameras(
+      f.capture, base_->settings.scene.photo_size, f.stored.field_from_world, f.stored.ndc));
   for (int i = 0; i < count; ++i) {
-    const Camera camera = WorkingCamera(f.capture.views[static_cast<size_t>(i)].camera,
-                                        base_->settings.scene.photo_size,
-                                        f.stored.field_from_world, f.stored.ndc);
+    const Camera& camera = cameras[static_cast<size_t>(i)];
     const RenderedView view = RenderView(f.grid, camera, MarchOptions{f.stored.field.step});
     f.cameras.push_back(camera);
     f.colors.push_back(view.color);

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "kernels/base/error.h"
+#include "kernels/scene/common_camera.h"
 #include "pipeline/scene_profile.h"
 #include "pipeline/scene_views.h"
 #include "reconstruct/choose_degree.h"
@@ -128,12 +129,19 @@ double AmountOf(const std::string& unit, const RunSettings& settings, const Capt
   if (unit == "style rays")
     return static_cast<double>(settings.network.steps) *
            (settings.network.rays_per_step > 0 ? settings.network.rays_per_step : frame);
-  if (unit == "frame pixels") return (photos + film) * frame;
-  if (unit == "pair pixels") {
+  if (unit == "frame pixels" || unit == "pair pixels") {
+    if (capture.views.empty()) return 0;
+    // Frames of the film, and of neighbouring views where these are compared at one camera.
+    const std::vector<Camera> views =
+        WorkingCameras(capture, settings.scene.photo_size, {}, {});
+    const Camera common = CommonCamera(views);
+    const double common_frame = static_cast<double>(common.width) * common.height;
+    if (unit == "frame pixels")
+      return pixels + (film + (HaveSameIntrinsics(views) ? 0 : photos)) * common_frame;
     double pairs = 0;
     for (const int gap : settings.consistency.gaps)
       pairs += std::max(0.0, photos - gap) + std::max(0.0, film - gap);
-    return pairs * frame;
+    return pairs * common_frame;
   }
   throw Error(ExitCode::kInput, "'" + unit + "' is no unit of work");
 }

@@ -11,6 +11,7 @@
 #include "pipeline/files/json_file.h"
 #include "pipeline/interrupt.h"
 #include "pipeline/workspace.h"
+#include "tests/support/spawn.h"
 #include "tests/support/temporary_folder.h"
 
 namespace regrade {
@@ -166,31 +167,9 @@ TEST(Program, DryRunTouchesNothing) {
   EXPECT_FALSE(std::filesystem::exists(folder / "out"));
 }
 
-// Starts the program with its output on `fd`; its exit status as a shell has it. Any `signal`
-// is sent once the file `when` exists.
 int Spawn(const std::vector<std::string>& arguments, int fd, int signal = 0,
           const std::string& when = "") {
-  const pid_t child = ::fork();
-  if (child == 0) {
-    ::dup2(fd, STDOUT_FILENO);
-    ::dup2(fd, STDERR_FILENO);
-    // A test that is itself a background job would hand its ignored signals down.
-    for (const int s : {SIGINT, SIGTERM}) ::signal(s, SIG_DFL);
-    std::vector<char*> argv = {const_cast<char*>(REGRADE_PROGRAM)};
-    for (const std::string& argument : arguments)
-      argv.push_back(const_cast<char*>(argument.c_str()));
-    argv.push_back(nullptr);
-    ::execv(REGRADE_PROGRAM, argv.data());
-    ::_exit(127);
-  }
-  if (signal != 0) {
-    for (int i = 0; i < 1000 && !std::filesystem::exists(when); ++i)
-      std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    ::kill(child, signal);
-  }
-  int status = 0;
-  ::waitpid(child, &status, 0);
-  return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  return testing::Spawn(REGRADE_PROGRAM, arguments, fd, signal, when);
 }
 
 TEST(Program, F24_ClosedOutputIsNoReasonToStop) {

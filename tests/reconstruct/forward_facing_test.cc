@@ -95,6 +95,25 @@ TEST(ForwardFacing, H88_EveryRayStaysInTheBoxAndMeetsTheScene) {
     EXPECT_GT((scene.field_from_world * point.position).z, 1);  // behind the near plane
 }
 
+// Device coordinates do not hang on which photo comes first.
+TEST(ForwardFacing, H159_PhotosOfTwoShapesInAnyOrder) {
+  Capture capture = WallCapture(10, 0.05);
+  for (const size_t i : {0, 5}) {
+    Camera& upright = capture.views[i].camera;
+    std::swap(upright.width, upright.height);
+    std::swap(upright.cx, upright.cy);
+  }
+  const NormalizedScene scene = NormalizeForwardFacing(capture, MeasureForwardFacing(capture));
+  EXPECT_DOUBLE_EQ(scene.ndc.a, 2 * 350.0 / 400);
+  EXPECT_DOUBLE_EQ(scene.ndc.b, 2 * 350.0 / 300);
+  // Half of an upright photo's height, 200 px, is 4 / 3 of what the common camera shows.
+  EXPECT_GT(scene.box.radius.y, 4.0 / 3);
+  std::swap(capture.views[0], capture.views[1]);
+  const NormalizedScene other = NormalizeForwardFacing(capture, MeasureForwardFacing(capture));
+  EXPECT_EQ(other.ndc.a, scene.ndc.a);
+  EXPECT_EQ(other.box.voxel_aspect, scene.box.voxel_aspect);
+}
+
 TEST(ForwardFacing, H89_ACameraThatLooksBackIsNamed) {
   Capture capture = WallCapture(10, 0.05);
   Camera& turned = capture.views[5].camera;

@@ -1,0 +1,79 @@
+#include "kernels/scene/common_camera.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include "kernels/base/error.h"
+
+namespace regrade {
+namespace {
+
+double Median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<long>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+bool IsPortrait(const Camera& camera) { return camera.height > camera.width; }
+
+bool IsNarrower(const Camera* a, const Camera* b) {
+  return static_cast<int64_t>(a->width) * b->height <
+         static_cast<int64_t>(b->width) * a->height;
+}
+
+// The cameras of the orientation that most have.
+std::vector<const Camera*> OfMainOrientation(const std::vector<Camera>& cameras) {
+  const size_t portraits =
+      static_cast<size_t>(std::count_if(cameras.begin(), cameras.end(), IsPortrait));
+  const bool portrait = 2 * portraits > cameras.size();
+  std::vector<const Camera*> chosen;
+  for (const Camera& camera : cameras)
+    if (IsPortrait(camera) == portrait) chosen.push_back(&camera);
+  return chosen;
+}
+
+}  // namespace
+
+bool HaveSameIntrinsics(const std::vector<Camera>& cameras) {
+  return std::all_of(cameras.begin(), cameras.end(),
+                     [&](const Camera& camera) { return camera.SameIntrinsics(cameras[0]); });
+}
+
+Camera CommonCamera(const std::vector<Camera>& cameras) {
+  REGRADE_CHECK(!cameras.empty());
+  Camera common = cameras[0].Undistorted();
+  if (!HaveSameIntrinsics(cameras)) {
+    std::vector<const Camera*> candidates = OfMainOrientation(cameras);
+    std::vector<double> aspects, focals;
+    for (const Camera* camera : candidates) aspects.push_back(camera->fy / camera->fx);
+    for (const Camera& camera : cameras)
+      focals.push_back(std::sqrt(camera.fx * camera.fy) /
+                       std::max(camera.width, camera.height));
+    std::stable_sort(candidates.begin(), candidates.end(), IsNarrower);
+    const Camera* middle = candidates[(candidates.size() - 1) / 2];
+    const Camera* shape =
+        *std::lower_bound(candidates.begin(), candidates.end(), middle, IsNarrower);
+    common.width = shape->width;
+    common.height = shape->height;
+    const double focal = Median(focals) * std::max(common.width, common.height);
+    double aspect = Median(aspects);
+    if (std::abs(aspect - 1) <= kSquarePixels) aspect = 1;
+    common.fx = focal / std::sqrt(aspect);
+    common.fy = focal * std::sqrt(aspect);
+  }
+  common.cx = 0.5 * common.width;
+  common.cy = 0.5 * common.height;
+  return common;
+}
+
+std::vector<Camera> WithCommonIntrinsics(const std::vector<Camera>& cameras) {
+  if (HaveSameIntrinsics(cameras)) return cameras;
+  const Camera common = CommonCamera(cameras);
+  std::vector<Camera> result(cameras.size(), common);
+  for (size_t i = 0; i < cameras.size(); ++i)
+    result[i].camera_from_world = cameras[i].camera_from_world;
+  return result;
+}
+
+}  // namespace regrade

@@ -1,0 +1,221 @@
+// Captures whose photos differ in size, orientation and lens, from photos to film and report.
+#include <fcntl.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <map>
+
+#include "pipeline/files/image_file.h"
+#include "pipeline/files/json_file.h"
+#include "pipeline/files/transforms_json.h"
+#include "pipeline/files/video_file.h"
+#include "tests/support/spawn.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/support/tiny_run.h"
+
+namespace regrade {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::ProgramOutcome;
+using testing::TemporaryFolder;
+
+const std::string kStyle = std::string(REGRADE_SOURCE_DIR) + "/assets/style_sunset.png";
+
+ProgramOutcome Regrade(const std::vector<std::string>& arguments) {
+  return testing::RunProgram(REGRADE_PROGRAM, arguments);
+}
+
+std::vector<std::string> RunOf(const std::string& capture, const std::string& out,
+                               const std::vector<std::string>& more = {}) {
+  std::vector<std::string> run{"run", capture, "--style", kStyle, "--out", out, "--reproducible"};
+  for (const std::string& flag : testing::TinyFlags()) run.push_back(flag);
+  run.insert(run.end(), more.begin(), more.end());
+  return run;
+}
+
+std::string SizeOf(const std::string& path) {
+  const Image image = ReadImage(path);
+  return std::to_string(image.width) + "x" + std::to_string(image.height);
+}
+
+// A number that JSON could not hold is null, and its reason stands beside it.
+void ExpectFiniteOrReason(const JsonValue& value, const std::string& name) {
+  if (value.IsArray())
+    for (const JsonValue& member : value.AsArray()) ExpectFiniteOrReason(member, name);
+  if (!value.IsObject()) return;
+  for (const auto& [key, member] : value.AsObject()) {
+    ExpectFiniteOrReason(member, name + "." + key);
+    const bool finite = !member.IsNumber() || std::isfinite(member.AsDouble());
+    const bool reason = !member.IsNull() || key == "why" ||
+                        value.Find(key + "_why") != nullptr || value.Find("why") != nullptr;
+    EXPECT_TRUE(finite && reason) << name << "." << key;
+  }
+}
+
+const JsonValue& RowOf(const JsonValue& report, const std::string& sequence, int gap) {
+  for (const JsonValue& row : report.At("consistency").AsArray())
+    if (row.At("sequence").AsString() == sequence && row.At("gap").AsInt() == gap) return row;
+  throw std::runtime_error("no row of " + sequence);
+}
+
+// The middle `width` x `height` pixels of photo `index` of a synthetic capture, camera to match.
+void CropPhoto(const std::string& capture, size_t index, int width, int height) {
+  const std::string file = capture + "/truth/transforms.json";
+  std::vector<TransformsFrame> frames = ReadTransformsJson(file).frames;
+  Camera& camera = frames[index].camera;
+  const std::string path = capture + "/truth/" + frames[index].file;
+  const Image photo = ReadImage(path);
+  const int left = (photo.width - width) / 2, top = (photo.height - height) / 2;
+  Image cropped(width, height);
+  for (int y = 0; y < height; ++y)
+    std::copy_n(photo.at(left, top + y), 3 * width, cropped.at(0, y));
+  WritePng8(path, cropped);
+  camera.width = width;
+  camera.height = height;
+  camera.cx -= left;
+  camera.cy -= top;
+  WriteTransformsJson(file, frames);
+}
+
+// name -> bytes of every file that a repeated run must make again.
+std::map<std::string, std::string> ResultsOf(const std::string& folder) {
+  std::map<std::string, std::string> results;
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    const std::string name = fs::relative(entry.path(), folder).string();
+    const std::string extension = entry.path().extension().string();
+    if (extension != ".npz" && extension != ".png") continue;
+    std::ifstream file(entry.path(), std::ios::binary);
+    results[name] = {std::istreambuf_iterator<char>(file), {}};
+  }
+  return results;
+}
+
+TEST(MixedSizes, H159_ThreeSizesOfTwoCamerasGoToFilmAndReport) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "128x96", "--effects",
+                     "mixed-cameras"})
+                .code,
+            0);
+  const ProgramOutcome done = Regrade(RunOf(folder / "s/truth", folder / "e"));
+  ASSERT_EQ(done.code, 0) << done.text;
+  EXPECT_NE(done.text.find("one camera (64x48 px) at each photo's place"), std::string::npos)
+      << done.text;
+
+  // Views keep their shape; what is compared, and the film, have one.
+  EXPECT_EQ(SizeOf(folder / "e/frames/styled/00000.png"), "64x48");
+  EXPECT_EQ(SizeOf(folder / "e/frames/styled/00001.png"), "48x64");
+  EXPECT_EQ(SizeOf(folder / "e/views_2d/00001.png"), "48x64");
+  for (const char* sequence : {"source", "views_2d", "styled"})
+    for (const char* frame : {"00000.png", "00001.png", "00002.png"})
+      EXPECT_EQ(SizeOf(folder / (std::string("e/frames/common_") + sequence + "/" + frame)),
+                "64x48");
+  EXPECT_FALSE(fs::exists(folder / "e/frames/common_transmittance"));
+  EXPECT_EQ(CountVideoFrames(folder / "e/styled.mp4"), 3);
+  for (const auto& map : fs::directory_iterator(folder / "e/heatmaps"))
+    EXPECT_EQ(SizeOf(map.path().string()), "64x48") << map.path();
+
+  const JsonValue report = ReadJsonFile(folder / "e/report.json");
+  ExpectFiniteOrReason(report, "report");
+  EXPECT_EQ(report.At("stages").At("render").At("frames").AsInt(), 6 + 6 + 3);
+  EXPECT_EQ(report.At("stages").At("render").At("film").At("width").AsInt(), 64);
+  EXPECT_NE(report.At("stages").At("evaluate").Find("comparison_note"), nullptr);
+  EXPECT_EQ(RowOf(report, "styled", 1).At("pairs").AsInt(), 5);
+  EXPECT_LT(RowOf(report, "styled", 1).At("undefined_pairs").AsInt(), 5);
+
+  // A run that was killed among the common frames goes on to the same bytes.
+  const int null = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
+  testing::Spawn(REGRADE_PROGRAM, RunOf(folder / "s/truth", folder / "k"), null, SIGKILL,
+                 folder / "k/frames/common_source/00001.png");
+  const ProgramOutcome again = Regrade(RunOf(folder / "s/truth", folder / "k"));
+  ::close(null);
+  ASSERT_EQ(again.code, 0) << again.text;
+  EXPECT_EQ(ResultsOf(folder / "k") == ResultsOf(folder / "e"), true);
+
+  // Exact motion and the film of the views use the common camera, too.
+  const ProgramOutcome exact =
+      Regrade({"evaluate", folder / "e", "--mode", "geometry", "--threads", "2"});
+  ASSERT_EQ(exact.code, 0) << exact.text;
+  const ProgramOutcome views = Regrade({"render", folder / "e", "--path", "views"});
+  ASSERT_EQ(views.code, 0) << views.text;
+  EXPECT_EQ(CountVideoFrames(folder / "e/styled.mp4"), 6);
+  EXPECT_FALSE(fs::exists(folder / "e/frames/path_source"));
+  const ProgramOutcome mix = Regrade(
+      {"mix", folder / "e", "--mix", "0:1", "--path", "views", "--out", folder / "m"});
+  ASSERT_EQ(mix.code, 0) << mix.text;
+  EXPECT_EQ(SizeOf(folder / "m/frames/00001.png"), "48x64");
+  EXPECT_EQ(CountVideoFrames(folder / "m/mixed.mp4"), 6);
+  const ProgramOutcome sheet = Regrade({"contact-sheet", folder / "e", kStyle, "--out",
+                                        folder / "sheet.png", "--steps", "2", "--size", "64"});
+  EXPECT_EQ(sheet.code, 0) << sheet.text;
+
+  // Frames of another program that differ in size are a mistake.
+  const ProgramOutcome foreign =
+      Regrade({"evaluate", "--frames", folder / "e/frames/styled", "--out", folder / "f"});
+  EXPECT_EQ(foreign.code, 3);
+  EXPECT_NE(foreign.text.find("48 x 64 px, 00000.png is 64 x 48 px"), std::string::npos)
+      << foreign.text;
+  EXPECT_NE(foreign.text.find("render all frames at one size"), std::string::npos);
+}
+
+TEST(MixedSizes, H159_OnePhotoOfAnotherShape) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "5", "--size", "128x96"}).code, 0);
+  CropPhoto(folder / "s", 0, 72, 96);  // the first photo does not decide for all
+  const ProgramOutcome done = Regrade(RunOf(folder / "s/truth", folder / "e"));
+  ASSERT_EQ(done.code, 0) << done.text;
+  EXPECT_EQ(SizeOf(folder / "e/frames/source/00000.png"), "48x64");
+  EXPECT_EQ(SizeOf(folder / "e/frames/common_source/00000.png"), "64x48");
+  EXPECT_EQ(SizeOf(folder / "e/frames/path_source/00000.png"), "64x48");
+  ExpectFiniteOrReason(ReadJsonFile(folder / "e/report.json"), "report");
+}
+
+TEST(MixedSizes, H159_OneOfEachAndAPanorama) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "4", "--size", "384x96"}).code, 0);
+  CropPhoto(folder / "s", 0, 128, 96);
+  CropPhoto(folder / "s", 1, 96, 96);
+  CropPhoto(folder / "s", 2, 72, 96);
+  const ProgramOutcome done = Regrade(RunOf(folder / "s/truth", folder / "e"));
+  ASSERT_EQ(done.code, 0) << done.text;
+  EXPECT_EQ(SizeOf(folder / "e/frames/source/00003.png"), "64x16");
+  EXPECT_EQ(SizeOf(folder / "e/frames/common_source/00003.png"), "64x48");
+  ExpectFiniteOrReason(ReadJsonFile(folder / "e/report.json"), "report");
+}
+
+// Frames too small for flow have no consistency, and the report says why.
+TEST(MixedSizes, H159_FramesBelowTheFlowsPyramidHaveAReason) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "4", "--size", "512x64"}).code, 0);
+  const ProgramOutcome done = Regrade(RunOf(folder / "s/truth", folder / "e"));
+  ASSERT_EQ(done.code, 0) << done.text;
+  EXPECT_EQ(SizeOf(folder / "e/frames/source/00000.png"), "64x8");
+  const JsonValue report = ReadJsonFile(folder / "e/report.json");
+  ExpectFiniteOrReason(report, "report");
+  const JsonValue& row = RowOf(report, "styled", 1);
+  EXPECT_EQ(row.At("undefined_pairs").AsInt(), 3);
+  EXPECT_TRUE(row.At("tc_psnr_mean_db").IsNull());
+  EXPECT_NE(row.At("tc_psnr_mean_db_why").AsString().find("too small for optical flow"),
+            std::string::npos);
+}
+
+// At the common camera the photos' labels do not fit: coverage is rendered from the field.
+TEST(MixedSizes, H159_MasksOfPhotosThatDiffer) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "5", "--size", "128x96", "--effects",
+                     "mixed-cameras,masks"})
+                .code,
+            0);
+  const ProgramOutcome done = Regrade(
+      RunOf(folder / "s/truth", folder / "e", {"--masks", folder / "s/truth/masks"}));
+  ASSERT_EQ(done.code, 0) << done.text;
+  EXPECT_EQ(SizeOf(folder / "e/frames/common_views_2d/00001.png"), "64x48");
+  ExpectFiniteOrReason(ReadJsonFile(folder / "e/report.json"), "report");
+}
+
+}  // namespace
+}  // namespace regrade
