@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "kernels/base/child_process.h"
 #include "kernels/base/error.h"
+#include "kernels/process/child_process.h"
 #include "pipeline/files/image_file.h"
 #include "pipeline/folder_stylizer.h"
 

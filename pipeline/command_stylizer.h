@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "stylize/view_stylizer.h"
+#include "stylize/image/view_stylizer.h"
 
 namespace regrade {
 

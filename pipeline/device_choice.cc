@@ -1,7 +1,7 @@
 #include "pipeline/device_choice.h"
 
-#include "kernels/base/device_memory.h"
 #include "kernels/base/error.h"
+#include "kernels/device/device_memory.h"
 
 namespace regrade {
 namespace {

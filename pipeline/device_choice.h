@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "kernels/base/for_each.h"
+#include "kernels/device/backend.h"
 
 namespace regrade {
 

@@ -1,6 +1,6 @@
 #include "pipeline/field_renderer.h"
 
-#include "kernels/field/device/device_rays.h"
+#include "kernels/field/cuda/device_rays.h"
 
 namespace regrade {
 

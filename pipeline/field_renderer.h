@@ -1,9 +1,9 @@
 // A field made ready to be rendered many times, on the processor that a run uses.
 #pragma once
 
-#include "kernels/base/for_each.h"
-#include "kernels/field/device/device_grid.h"
-#include "kernels/field/fast_rays.h"
+#include "kernels/device/backend.h"
+#include "kernels/field/cuda/device_grid.h"
+#include "kernels/field/packed_grid.h"
 #include "kernels/field/ray_march.h"
 #include "kernels/field/render.h"
 

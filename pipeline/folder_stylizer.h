@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "kernels/base/error.h"
-#include "stylize/view_stylizer.h"
+#include "stylize/image/view_stylizer.h"
 
 namespace regrade {
 

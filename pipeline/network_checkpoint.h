@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "stylize/train_network.h"
+#include "stylize/training/train_network.h"
 
 namespace regrade {
 

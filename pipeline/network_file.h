@@ -8,7 +8,7 @@
 
 #include <string>
 
-#include "stylize/lipschitz_network.h"
+#include "stylize/field/lipschitz_network.h"
 
 namespace regrade {
 

@@ -4,7 +4,7 @@
 #include <cstdio>
 
 #include "kernels/base/error.h"
-#include "kernels/field/fast_rays.h"
+#include "kernels/field/packed_grid.h"
 #include "kernels/field/spherical_harmonics.h"
 #include "pipeline/console.h"
 #include "reconstruct/resample_grid.h"

@@ -11,8 +11,8 @@
 #include "pipeline/run_options.h"
 #include "reconstruct/fit_options.h"
 #include "reconstruct/poses_from_photos.h"
-#include "stylize/style_options.h"
-#include "stylize/train_network.h"
+#include "stylize/image/style_options.h"
+#include "stylize/training/train_network.h"
 
 namespace regrade {
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "kernels/field/cpu/render_view.h"
 #include "kernels/field/render.h"
 #include "kernels/image/resize.h"
 

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "kernels/base/child_process.h"
+#include "kernels/process/child_process.h"
 
 namespace regrade {
 

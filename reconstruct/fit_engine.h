@@ -5,7 +5,7 @@
 #include <functional>
 #include <memory>
 
-#include "kernels/base/for_each.h"
+#include "kernels/device/backend.h"
 #include "kernels/field/render.h"
 #include "reconstruct/fit_field.h"
 

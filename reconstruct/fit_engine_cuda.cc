@@ -7,9 +7,9 @@
 
 #include "kernels/base/error.h"
 #include "kernels/base/random.h"
-#include "kernels/field/device/device_rays.h"
-#include "kernels/field/device/device_sphere_rays.h"
-#include "kernels/scene/device_views.h"
+#include "kernels/field/cuda/device_rays.h"
+#include "kernels/field/cuda/device_sphere_rays.h"
+#include "kernels/field/cuda/device_views.h"
 #include "reconstruct/fit_engine.h"
 #include "reconstruct/sphere_grid.h"
 

@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "kernels/base/for_each.h"
 #include "kernels/base/progress.h"
-#include "kernels/field/fast_rays.h"
+#include "kernels/device/backend.h"
+#include "kernels/field/packed_grid.h"
 #include "kernels/field/radiance_field.h"
 #include "reconstruct/fit_options.h"
 #include "reconstruct/scene_box.h"

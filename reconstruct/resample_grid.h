@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "kernels/field/fast_rays.h"
+#include "kernels/field/packed_grid.h"
 #include "reconstruct/training_rays.h"
 
 namespace regrade {

@@ -2,7 +2,7 @@
 // from coarse to fine.
 #pragma once
 
-#include "kernels/field/fast_spheres.h"
+#include "kernels/field/packed_grid.h"
 #include "kernels/field/radiance_field.h"
 #include "reconstruct/training_rays.h"
 

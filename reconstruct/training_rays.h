@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "kernels/field/cuda/device_views.h"
 #include "kernels/scene/camera.h"
-#include "kernels/scene/device_views.h"
 #include "kernels/scene/image.h"
 
 namespace regrade {

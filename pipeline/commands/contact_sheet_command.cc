@@ -5,8 +5,8 @@
 #include <filesystem>
 
 #include "kernels/base/error.h"
-#include "kernels/field/fast_rays.h"
-#include "kernels/field/render.h"
+#include "kernels/field/cpu/render_view.h"
+#include "kernels/field/packed_grid.h"
 #include "kernels/field/widened.h"
 #include "kernels/image/color_statistics.h"
 #include "kernels/image/resize.h"
@@ -22,10 +22,10 @@
 #include "pipeline/stages/run_context.h"
 #include "pipeline/stages/scene_stylizer.h"
 #include "pipeline/workspace.h"
-#include "stylize/apply_network.h"
+#include "stylize/field/apply_network.h"
+#include "stylize/image/monge_kantorovich.h"
 #include "stylize/linear_map.h"
-#include "stylize/monge_kantorovich.h"
-#include "stylize/train_network.h"
+#include "stylize/training/train_network.h"
 
 namespace regrade {
 namespace {

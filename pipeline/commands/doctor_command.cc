@@ -5,10 +5,10 @@
 #include <cstdio>
 #include <filesystem>
 
-#include "kernels/base/child_process.h"
-#include "kernels/base/device_memory.h"
 #include "kernels/base/error.h"
-#include "kernels/field/fast_rays.h"
+#include "kernels/device/device_memory.h"
+#include "kernels/field/cpu/rays.h"
+#include "kernels/process/child_process.h"
 #include "pipeline/chart_library.h"
 #include "pipeline/commands/command.h"
 #include "pipeline/memory.h"

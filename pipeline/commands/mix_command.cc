@@ -21,7 +21,7 @@
 #include "pipeline/scene_views.h"
 #include "pipeline/stages/object_edit.h"
 #include "pipeline/workspace.h"
-#include "stylize/blend_fields.h"
+#include "stylize/field/blend_fields.h"
 
 namespace regrade {
 namespace {

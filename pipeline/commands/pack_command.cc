@@ -12,7 +12,7 @@
 #include "pipeline/run_settings.h"
 #include "pipeline/scene_profile.h"
 #include "pipeline/scene_views.h"
-#include "stylize/view_stylizer.h"
+#include "stylize/image/view_stylizer.h"
 
 namespace regrade {
 namespace {

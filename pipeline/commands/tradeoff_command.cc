@@ -8,7 +8,7 @@
 
 #include "kernels/base/error.h"
 #include "kernels/base/hash.h"
-#include "kernels/field/fast_rays.h"
+#include "kernels/field/cpu/rays.h"
 #include "pipeline/capture_store.h"
 #include "pipeline/chart_library.h"
 #include "pipeline/commands/command.h"

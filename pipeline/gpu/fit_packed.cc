@@ -4,7 +4,7 @@
 #include <numeric>
 
 #include "evaluate/image_quality.h"
-#include "kernels/field/fast_rays.h"
+#include "kernels/field/packed_grid.h"
 #include "kernels/field/render.h"
 #include "pipeline/field_file.h"
 #include "pipeline/files/json_file.h"

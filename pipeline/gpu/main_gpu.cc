@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "kernels/base/device_memory.h"
 #include "kernels/base/error.h"
+#include "kernels/device/device_memory.h"
 #include "pipeline/gpu/gpu_commands.h"
 #include "pipeline/option_binding.h"
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "kernels/base/for_each.h"
+#include "kernels/device/backend.h"
 #include "kernels/scene/capture.h"
 #include "pipeline/field_file.h"
 #include "pipeline/photo_gains.h"

@@ -8,7 +8,7 @@
 #include "pipeline/files/image_file.h"
 #include "pipeline/photo_gains.h"
 #include "pipeline/scene_views.h"
-#include "stylize/monge_kantorovich.h"
+#include "stylize/image/monge_kantorovich.h"
 
 namespace regrade {
 namespace {

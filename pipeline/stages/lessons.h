@@ -7,7 +7,7 @@
 #include "pipeline/field_file.h"
 #include "pipeline/stages/object_edit.h"
 #include "pipeline/stages/run_context.h"
-#include "stylize/train_network.h"
+#include "stylize/training/train_network.h"
 
 namespace regrade {
 

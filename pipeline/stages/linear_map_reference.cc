@@ -5,11 +5,11 @@
 
 #include "evaluate/fidelity.h"
 #include "kernels/base/error.h"
-#include "kernels/field/fast_rays.h"
-#include "kernels/field/render.h"
+#include "kernels/field/cpu/render_view.h"
+#include "kernels/field/packed_grid.h"
 #include "kernels/image/color_statistics.h"
+#include "stylize/image/monge_kantorovich.h"
 #include "stylize/linear_map.h"
-#include "stylize/monge_kantorovich.h"
 
 namespace regrade {
 namespace {

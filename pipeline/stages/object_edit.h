@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "kernels/field/fast_rays.h"
+#include "kernels/field/packed_grid.h"
 #include "kernels/field/radiance_field.h"
 #include "kernels/scene/capture.h"
 #include "pipeline/object_masks.h"

@@ -6,7 +6,7 @@
 #include <functional>
 #include <string>
 
-#include "kernels/base/device_memory.h"
+#include "kernels/device/device_memory.h"
 #include "pipeline/capture_store.h"
 #include "pipeline/cpu_time.h"
 #include "pipeline/device_choice.h"

@@ -3,7 +3,7 @@
 #include <filesystem>
 
 #include "kernels/base/error.h"
-#include "kernels/field/fast_rays.h"
+#include "kernels/field/cpu/rays.h"
 #include "pipeline/capture_store.h"
 #include "pipeline/chart_library.h"
 #include "pipeline/equivalent_command.h"

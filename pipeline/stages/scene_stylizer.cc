@@ -15,9 +15,9 @@
 #include "pipeline/rehearsal.h"
 #include "pipeline/scene_views.h"
 #include "pipeline/stage_record.h"
-#include "stylize/color_transfer.h"
-#include "stylize/distribution_transfer.h"
-#include "stylize/onnx_stylizer.h"
+#include "stylize/image/color_transfer.h"
+#include "stylize/image/distribution_transfer.h"
+#include "stylize/image/onnx_stylizer.h"
 
 namespace regrade {
 namespace {

@@ -8,8 +8,8 @@
 #include "pipeline/files/json_file.h"
 #include "pipeline/object_masks.h"
 #include "pipeline/stages/run_context.h"
-#include "stylize/masked_stylizer.h"
-#include "stylize/view_stylizer.h"
+#include "stylize/image/masked_stylizer.h"
+#include "stylize/image/view_stylizer.h"
 
 namespace regrade {
 

@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <utility>
 
-#include "kernels/field/fast_rays.h"
+#include "kernels/field/packed_grid.h"
 #include "kernels/field/widened.h"
 #include "pipeline/capture_store.h"
 #include "pipeline/device_choice.h"
@@ -22,12 +22,12 @@
 #include "pipeline/stages/object_edit.h"
 #include "pipeline/stages/run_context.h"
 #include "pipeline/stages/scene_stylizer.h"
-#include "stylize/apply_network.h"
-#include "stylize/base_map.h"
-#include "stylize/blend_fields.h"
-#include "stylize/device_style.h"
-#include "stylize/monge_kantorovich.h"
-#include "stylize/volume_variance.h"
+#include "stylize/cuda/device_style.h"
+#include "stylize/field/apply_network.h"
+#include "stylize/field/base_map.h"
+#include "stylize/field/blend_fields.h"
+#include "stylize/field/volume_variance.h"
+#include "stylize/image/monge_kantorovich.h"
 
 namespace regrade {
 namespace {

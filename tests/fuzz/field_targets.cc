@@ -1,6 +1,7 @@
 // field.npz and a packed capture as wholes, and a look through what was accepted.
 #include <cmath>
 
+#include "kernels/field/cpu/render_view.h"
 #include "kernels/field/render.h"
 #include "pipeline/field_file.h"
 #include "pipeline/packed_capture.h"

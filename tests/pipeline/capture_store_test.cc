@@ -6,8 +6,8 @@
 #include <filesystem>
 #include <fstream>
 
-#include "kernels/base/child_process.h"
 #include "kernels/image/resize.h"
+#include "kernels/process/child_process.h"
 #include "pipeline/files/image_file.h"
 #include "pipeline/files/json_file.h"
 #include "tests/support/temporary_folder.h"

@@ -7,7 +7,7 @@
 #include <sstream>
 
 #include "evaluate/image_quality.h"
-#include "kernels/base/child_process.h"
+#include "kernels/process/child_process.h"
 #include "pipeline/capture_store.h"
 #include "pipeline/files/image_file.h"
 #include "pipeline/files/json_file.h"

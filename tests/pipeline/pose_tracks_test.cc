@@ -10,8 +10,8 @@
 #include <fstream>
 #include <sstream>
 
-#include "kernels/base/child_process.h"
 #include "kernels/base/error.h"
+#include "kernels/process/child_process.h"
 #include "pipeline/capture_store.h"
 #include "pipeline/files/image_file.h"
 #include "pipeline/files/json_file.h"

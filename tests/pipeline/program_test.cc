@@ -7,7 +7,7 @@
 #include <csignal>
 #include <thread>
 
-#include "kernels/base/child_process.h"
+#include "kernels/process/child_process.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/interrupt.h"
 #include "pipeline/workspace.h"

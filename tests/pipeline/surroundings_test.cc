@@ -4,7 +4,7 @@
 
 #include <filesystem>
 
-#include "kernels/base/device_memory.h"
+#include "kernels/device/device_memory.h"
 #include "pipeline/device_choice.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "kernels/base/error.h"
+#include "kernels/field/cpu/render_view.h"
 #include "kernels/field/render.h"
 #include "reconstruct/choose_degree.h"
 #include "reconstruct/resample_grid.h"
