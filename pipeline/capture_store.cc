@@ -10,7 +10,7 @@
 #include "pipeline/files/json_file.h"
 #include "pipeline/files/poses_bounds.h"
 #include "pipeline/files/transforms_json.h"
-#include "reconstruct/resized_model.h"
+#include "reconstruct/colmap/resized_model.h"
 
 namespace regrade {
 namespace {

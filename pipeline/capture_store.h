@@ -5,7 +5,7 @@
 #include <string>
 
 #include "kernels/scene/capture.h"
-#include "reconstruct/colmap_model.h"
+#include "reconstruct/colmap/colmap_model.h"
 
 namespace regrade {
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "reconstruct/fit_field.h"
+#include "reconstruct/fit/fit_field.h"
 
 namespace regrade {
 

@@ -11,7 +11,7 @@
 
 #include "kernels/scene/camera.h"
 #include "kernels/scene/image.h"
-#include "reconstruct/normalize_scene.h"
+#include "reconstruct/scene/normalize_scene.h"
 
 namespace regrade {
 

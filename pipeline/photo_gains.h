@@ -6,7 +6,7 @@
 #include "kernels/scene/capture.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/workspace.h"
-#include "reconstruct/exposure.h"
+#include "reconstruct/refinement/exposure.h"
 
 namespace regrade {
 

@@ -7,7 +7,7 @@
 #include "kernels/field/packed_grid.h"
 #include "kernels/field/spherical_harmonics.h"
 #include "pipeline/console.h"
-#include "reconstruct/resample_grid.h"
+#include "reconstruct/fit/resample_grid.h"
 
 namespace regrade {
 namespace {

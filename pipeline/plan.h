@@ -12,8 +12,8 @@
 #include <functional>
 #include <string>
 
-#include "reconstruct/fit_options.h"
-#include "reconstruct/scene_box.h"
+#include "reconstruct/fit/fit_options.h"
+#include "reconstruct/scene/scene_box.h"
 
 namespace regrade {
 

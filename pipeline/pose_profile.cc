@@ -5,7 +5,7 @@
 
 #include "kernels/base/error.h"
 #include "pipeline/scene_profile.h"
-#include "reconstruct/refine_poses.h"
+#include "reconstruct/refinement/refine_poses.h"
 
 namespace regrade {
 namespace {

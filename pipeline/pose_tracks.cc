@@ -7,7 +7,7 @@
 #include "kernels/base/error.h"
 #include "pipeline/cpu_time.h"
 #include "pipeline/scene_profile.h"
-#include "reconstruct/tracks_for_poses.h"
+#include "reconstruct/colmap/tracks_for_poses.h"
 
 namespace regrade {
 namespace {

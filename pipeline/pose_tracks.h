@@ -8,7 +8,7 @@
 #include "kernels/base/progress.h"
 #include "kernels/scene/capture.h"
 #include "pipeline/files/json_file.h"
-#include "reconstruct/poses_from_photos.h"
+#include "reconstruct/colmap/poses_from_photos.h"
 
 namespace regrade {
 

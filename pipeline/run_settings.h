@@ -9,8 +9,8 @@
 #include "pipeline/option_binding.h"
 #include "pipeline/photo_folder.h"
 #include "pipeline/run_options.h"
-#include "reconstruct/fit_options.h"
-#include "reconstruct/poses_from_photos.h"
+#include "reconstruct/colmap/poses_from_photos.h"
+#include "reconstruct/fit/fit_options.h"
 #include "stylize/image/style_options.h"
 #include "stylize/training/train_network.h"
 

@@ -8,8 +8,8 @@
 #include "pipeline/files/image_file.h"
 #include "pipeline/scene_views.h"
 #include "pipeline/track_colors.h"
-#include "reconstruct/forward_facing.h"
-#include "reconstruct/visual_hull.h"
+#include "reconstruct/scene/forward_facing.h"
+#include "reconstruct/scene/visual_hull.h"
 
 namespace regrade {
 namespace {

@@ -10,7 +10,7 @@
 #include "pipeline/files/json_file.h"
 #include "pipeline/photo_gains.h"
 #include "pipeline/report_data.h"
-#include "reconstruct/normalize_scene.h"
+#include "reconstruct/scene/normalize_scene.h"
 
 namespace regrade {
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "kernels/scene/image.h"
-#include "reconstruct/colmap_model.h"
+#include "reconstruct/colmap/colmap_model.h"
 
 namespace regrade {
 

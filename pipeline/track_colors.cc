@@ -5,7 +5,7 @@
 #include "kernels/base/error.h"
 #include "kernels/scene/srgb.h"
 #include "pipeline/files/image_file.h"
-#include "reconstruct/exposure_folds.h"
+#include "reconstruct/refinement/exposure_folds.h"
 
 namespace regrade {
 namespace {

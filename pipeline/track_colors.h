@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "kernels/scene/capture.h"
-#include "reconstruct/exposure.h"
+#include "reconstruct/refinement/exposure.h"
 
 namespace regrade {
 

@@ -6,7 +6,7 @@
 #include "pipeline/capture_store.h"
 #include "pipeline/commands/command.h"
 #include "pipeline/files/transforms_json.h"
-#include "reconstruct/colmap_text.h"
+#include "reconstruct/colmap/colmap_text.h"
 
 namespace regrade {
 namespace {

@@ -10,8 +10,8 @@
 #include "pipeline/files/json_file.h"
 #include "pipeline/gpu/gpu_commands.h"
 #include "pipeline/packed_capture.h"
-#include "reconstruct/fit_engine.h"
-#include "reconstruct/fit_field.h"
+#include "reconstruct/fit/fit_engine.h"
+#include "reconstruct/fit/fit_field.h"
 
 namespace regrade {
 namespace {

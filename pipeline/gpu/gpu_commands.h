@@ -7,7 +7,7 @@
 #include "kernels/field/cuda/half_grid.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/packed_capture.h"
-#include "reconstruct/fit_options.h"
+#include "reconstruct/fit/fit_options.h"
 #include "stylize/training/train_network.h"
 
 namespace regrade {

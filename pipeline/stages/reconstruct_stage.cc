@@ -18,8 +18,8 @@
 #include "pipeline/scene_views.h"
 #include "pipeline/stages/held_out.h"
 #include "pipeline/stages/run_context.h"
-#include "reconstruct/choose_degree.h"
-#include "reconstruct/fit_field.h"
+#include "reconstruct/fit/choose_degree.h"
+#include "reconstruct/fit/fit_field.h"
 
 namespace regrade {
 namespace {

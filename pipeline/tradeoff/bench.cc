@@ -21,7 +21,7 @@
 #include "pipeline/scene_views.h"
 #include "pipeline/stages/held_out.h"
 #include "pipeline/stages/scene_stylizer.h"
-#include "reconstruct/fit_field.h"
+#include "reconstruct/fit/fit_field.h"
 
 namespace regrade {
 namespace {

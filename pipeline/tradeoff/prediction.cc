@@ -6,7 +6,7 @@
 #include "kernels/base/error.h"
 #include "pipeline/scene_profile.h"
 #include "pipeline/scene_views.h"
-#include "reconstruct/choose_degree.h"
+#include "reconstruct/fit/choose_degree.h"
 
 namespace regrade {
 namespace {

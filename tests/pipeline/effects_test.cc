@@ -11,7 +11,7 @@
 #include "kernels/process/child_process.h"
 #include "pipeline/field_file.h"
 #include "pipeline/files/json_file.h"
-#include "reconstruct/colmap_model.h"
+#include "reconstruct/colmap/colmap_model.h"
 #include "tests/support/synthetic_photos.h"
 #include "tests/support/temporary_folder.h"
 

@@ -19,7 +19,7 @@
 #include "pipeline/files/json_file.h"
 #include "pipeline/files/transforms_json.h"
 #include "pipeline/synth_effects.h"
-#include "reconstruct/colmap_model.h"
+#include "reconstruct/colmap/colmap_model.h"
 
 namespace regrade {
 namespace {

@@ -4,8 +4,8 @@
 #include "kernels/base/error.h"
 #include "kernels/process/child_process.h"
 #include "pipeline/photo_folder.h"
-#include "reconstruct/poses_from_photos.h"
-#include "reconstruct/scene_checks.h"
+#include "reconstruct/colmap/poses_from_photos.h"
+#include "reconstruct/scene/scene_checks.h"
 #include "tests/support/data.h"
 #include "tests/support/temporary_folder.h"
 

@@ -12,7 +12,7 @@
 #include "pipeline/files/image_file.h"
 #include "pipeline/scene_views.h"
 #include "pipeline/synth_effects.h"
-#include "reconstruct/colmap_model.h"
+#include "reconstruct/colmap/colmap_model.h"
 
 namespace regrade::testing {
 

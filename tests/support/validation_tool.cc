@@ -4,7 +4,7 @@
 #include <cstdio>
 
 #include "pipeline/field_file.h"
-#include "reconstruct/colmap_model.h"
+#include "reconstruct/colmap/colmap_model.h"
 
 namespace {
 

@@ -1,5 +1,5 @@
 // Pruning and resampling on the device; the same rule as Resample in
-// reconstruct/resample_grid.h.
+// reconstruct/fit/resample_grid.h.
 #include <algorithm>
 
 #include "kernels/base/error.h"
