@@ -9,9 +9,9 @@
 #include "kernels/device/device_memory.h"
 #include "kernels/field/cpu/rays.h"
 #include "kernels/process/child_process.h"
-#include "pipeline/chart_library.h"
 #include "pipeline/commands/command.h"
-#include "pipeline/memory.h"
+#include "pipeline/program/memory.h"
+#include "pipeline/report/chart_library.h"
 
 namespace regrade {
 namespace {

@@ -5,8 +5,8 @@
 
 #include "kernels/base/options.h"
 #include "kernels/field/cuda/half_grid.h"
+#include "pipeline/capture/packed_capture.h"
 #include "pipeline/files/json_file.h"
-#include "pipeline/packed_capture.h"
 #include "reconstruct/fit/fit_options.h"
 #include "stylize/training/train_network.h"
 

@@ -8,7 +8,7 @@
 #include "kernels/field/cuda/device_rays.h"
 #include "kernels/field/packed_grid.h"
 #include "kernels/image/color_statistics.h"
-#include "pipeline/field_file.h"
+#include "pipeline/fields/field_file.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/gpu/gpu_commands.h"
 #include "stylize/cuda/device_style.h"

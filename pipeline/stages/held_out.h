@@ -7,8 +7,8 @@
 
 #include "kernels/device/backend.h"
 #include "kernels/scene/capture.h"
-#include "pipeline/field_file.h"
-#include "pipeline/photo_gains.h"
+#include "pipeline/capture/photo_gains.h"
+#include "pipeline/fields/field_file.h"
 
 namespace regrade {
 

@@ -4,8 +4,8 @@
 
 #include "kernels/base/error.h"
 #include "kernels/field/cpu/render_view.h"
+#include "pipeline/capture/working_views.h"
 #include "pipeline/files/npz_file.h"
-#include "pipeline/scene_views.h"
 #include "stylize/field/object_shares.h"
 
 namespace regrade {

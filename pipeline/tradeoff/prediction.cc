@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "kernels/base/error.h"
-#include "pipeline/scene_profile.h"
-#include "pipeline/scene_views.h"
+#include "pipeline/capture/scene_profile.h"
+#include "pipeline/capture/working_views.h"
 #include "reconstruct/fit/choose_degree.h"
 
 namespace regrade {

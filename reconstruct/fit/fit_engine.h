@@ -7,6 +7,7 @@
 
 #include "kernels/device/backend.h"
 #include "kernels/field/render.h"
+#include "kernels/optimize/rmsprop.h"
 #include "reconstruct/fit/fit_field.h"
 
 namespace regrade {

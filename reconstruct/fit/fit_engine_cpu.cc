@@ -7,6 +7,8 @@
 #include <vector>
 
 #include "kernels/base/random.h"
+#include "kernels/field/cpu/rays.h"
+#include "kernels/field/cpu/render_view.h"
 #include "reconstruct/fit/fit_engine.h"
 #include "reconstruct/fit/resample_grid.h"
 #include "reconstruct/fit/sphere_grid.h"

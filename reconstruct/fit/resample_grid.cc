@@ -7,6 +7,7 @@
 #include <string>
 
 #include "kernels/base/error.h"
+#include "kernels/field/cpu/rays.h"
 #include "kernels/field/trilinear.h"
 
 namespace regrade {

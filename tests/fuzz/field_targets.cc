@@ -3,8 +3,8 @@
 
 #include "kernels/field/cpu/render_view.h"
 #include "kernels/field/render.h"
-#include "pipeline/field_file.h"
-#include "pipeline/packed_capture.h"
+#include "pipeline/capture/packed_capture.h"
+#include "pipeline/fields/field_file.h"
 #include "tests/fuzz/fuzz_support.h"
 #include "tests/fuzz/stored_zip.h"
 #include "tests/support/small_field.h"

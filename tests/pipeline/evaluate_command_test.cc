@@ -7,8 +7,8 @@
 
 #include "evaluate/flow_file.h"
 #include "kernels/process/child_process.h"
-#include "pipeline/files/image_file.h"
 #include "pipeline/files/json_file.h"
+#include "pipeline/images/image_file.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/tiny_onnx.h"
 

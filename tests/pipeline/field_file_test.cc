@@ -1,4 +1,4 @@
-#include "pipeline/field_file.h"
+#include "pipeline/fields/field_file.h"
 
 #include <gtest/gtest.h>
 

@@ -9,8 +9,8 @@
 
 #include "kernels/process/child_process.h"
 #include "pipeline/files/json_file.h"
-#include "pipeline/interrupt.h"
-#include "pipeline/workspace.h"
+#include "pipeline/program/interrupt.h"
+#include "pipeline/workspace/workspace.h"
 #include "tests/support/temporary_folder.h"
 
 namespace regrade {

@@ -5,7 +5,7 @@
 #include <filesystem>
 
 #include "kernels/device/device_memory.h"
-#include "pipeline/device_choice.h"
+#include "pipeline/program/device_choice.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/tiny_run.h"

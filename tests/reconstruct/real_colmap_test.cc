@@ -3,7 +3,7 @@
 
 #include "kernels/base/error.h"
 #include "kernels/process/child_process.h"
-#include "pipeline/photo_folder.h"
+#include "pipeline/capture/ingest_photos.h"
 #include "reconstruct/colmap/poses_from_photos.h"
 #include "reconstruct/scene/scene_checks.h"
 #include "tests/support/data.h"

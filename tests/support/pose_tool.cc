@@ -5,7 +5,7 @@
 #include <filesystem>
 
 #include "kernels/base/error.h"
-#include "pipeline/photo_folder.h"
+#include "pipeline/capture/ingest_photos.h"
 #include "reconstruct/colmap/poses_from_photos.h"
 #include "reconstruct/scene/scene_checks.h"
 

@@ -3,7 +3,7 @@
 #include <chrono>
 #include <cstdio>
 
-#include "pipeline/field_file.h"
+#include "pipeline/fields/field_file.h"
 #include "reconstruct/colmap/colmap_model.h"
 
 namespace {
