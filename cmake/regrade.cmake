@@ -56,6 +56,17 @@ function(regrade_library name)
   endif()
 endfunction()
 
+# regrade_instruction_sets(name stem): STEM_avx2.cc and STEM_avx512.cc of library `name` get the flags of their
+# instruction set, and they alone: a global -march would change Eigen's memory layout between us and Debian's Ceres.
+function(regrade_instruction_sets name stem)
+  if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
+    target_compile_definitions(${name} PRIVATE REGRADE_X86)
+    set_source_files_properties(${stem}_avx2.cc PROPERTIES COMPILE_OPTIONS "-mavx2;-mfma;-mf16c")
+    set_source_files_properties(${stem}_avx512.cc PROPERTIES COMPILE_OPTIONS
+      "-mavx512f;-mavx512vl;-mavx512dq;-mavx512bw;-mfma;-mf16c;-mprefer-vector-width=512")
+  endif()
+endfunction()
+
 # regrade_test(name SOURCES... LINK libs...): one GoogleTest program, each case a CTest test.
 function(regrade_test name)
   cmake_parse_arguments(ARG "" "" "SOURCES;LINK" ${ARGN})

@@ -8,9 +8,9 @@
 
 #include "kernels/base/error.h"
 #include "pipeline/commands/command.h"
-#include "pipeline/console.h"
-#include "pipeline/interrupt.h"
-#include "pipeline/nearest_name.h"
+#include "pipeline/program/console.h"
+#include "pipeline/program/interrupt.h"
+#include "pipeline/program/nearest_name.h"
 
 namespace regrade {
 namespace {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <iterator>
 
+#include "pipeline/stages/stages.h"
+
 namespace regrade {
 namespace {
 

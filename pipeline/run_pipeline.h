@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "pipeline/stages/run_context.h"
+#include "pipeline/run/run_context.h"
 
 namespace regrade {
 

@@ -63,7 +63,7 @@ class Tree:
             for name in CTEST.findall(read(path)):
                 self.add(name, ())
         if glob.glob(os.path.join(root, "scripts", "check_*.py")):
-            for checker in ("check_floors", "check_equations"):  # made by a loop in CMake
+            for checker in ("check_layers", "check_equations"):  # made by a loop in CMake
                 self.add(checker, ())
         self.cases = json.loads(read(os.path.join(root, CASES)))
         self.cares = {}

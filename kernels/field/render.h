@@ -1,9 +1,9 @@
-// Rendering a field at a camera: colour, depth and what transmittance is left.
+// Rendering a field at a camera: colour, depth and what transmittance is left. The fast path is
+// in cpu/render_view.h.
 #pragma once
 
 #include <vector>
 
-#include "kernels/base/for_each.h"
 #include "kernels/field/radiance_field.h"
 #include "kernels/field/ray_march.h"
 #include "kernels/scene/camera.h"
@@ -18,18 +18,9 @@ struct RenderedView {
   Image transmittance;  // [H, W, 1]
 };
 
-struct FastGrid;
-
-// The fast path of this machine. Rays go through the camera's lens. For many views make the
-// grid once (MakeFastGrid in fast_rays.h).
-RenderedView RenderView(const FastGrid& grid, const Camera& camera,
-                        const MarchOptions& options);
-RenderedView RenderView(const RadianceField& field, const Camera& camera,
-                        const MarchOptions& options);
-
 // The plain body: the specification and the tests' oracle.
 RenderedView RenderViewPlain(const RadianceField& field, const Camera& camera,
-                             const MarchOptions& options, Backend backend = Backend::kCpu);
+                             const MarchOptions& options);
 
 // From raw sums to a view: colours clipped to [0, 1], ray lengths turned into depths along the
 // optical axis.

@@ -4,7 +4,7 @@
 // u and v from the power iteration (Miyato et al. 2018), held constant in the adjoint:
 //   d_W = s / sigma (d_A - <d_A, W / sigma> u v^T),   d_K = squareplus'(K) <d_A, W / sigma>.
 // sigma never exceeds ||W||_2, so ||A||_2 >= squareplus(K): the certificate needs exact
-// singular values (stylize/lipschitz_network.h). W is divided by its largest entry before
+// singular values (stylize/field/lipschitz_network.h). W is divided by its largest entry before
 // anything is squared, so that no scale of W over- or underflows.
 #pragma once
 

@@ -17,8 +17,8 @@ bool HaveSameIntrinsics(const std::vector<Camera>& cameras);
 //
 // Where all intrinsics are the same, size and focal lengths are theirs. Otherwise:
 // - size: that of one photo. Its orientation is that of most photos (a square counts as
-//   landscape, and landscape wins a tie); among these its aspect is the median (the lower one of
-//   two), and it is the first of that aspect.
+//   landscape, and landscape wins a tie); among these its aspect is the median (the lower one
+//   of two), and it is the first of that aspect.
 // - focal length: the median over all photos of the focal length divided by the longer side,
 //   times the longer side of that size. Photos with a common longer side give the median in
 //   pixels.
@@ -27,8 +27,8 @@ bool HaveSameIntrinsics(const std::vector<Camera>& cameras);
 inline constexpr double kSquarePixels = 0.01;
 Camera CommonCamera(const std::vector<Camera>& cameras);
 
-// `cameras` themselves where their intrinsics are the same; otherwise CommonCamera with the pose
-// of each.
+// `cameras` themselves where their intrinsics are the same; otherwise CommonCamera with the
+// pose of each.
 std::vector<Camera> WithCommonIntrinsics(const std::vector<Camera>& cameras);
 
 }  // namespace regrade

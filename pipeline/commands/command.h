@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/console.h"
-#include "pipeline/option_binding.h"
-#include "pipeline/run_options.h"
+#include "pipeline/program/console.h"
+#include "pipeline/program/option_binding.h"
+#include "pipeline/program/run_options.h"
 
 namespace regrade {
 

@@ -5,13 +5,13 @@
 #include <cstdio>
 #include <filesystem>
 
-#include "kernels/base/child_process.h"
-#include "kernels/base/device_memory.h"
 #include "kernels/base/error.h"
-#include "kernels/field/fast_rays.h"
-#include "pipeline/chart_library.h"
+#include "kernels/device/device_memory.h"
+#include "kernels/field/cpu/rays.h"
+#include "kernels/process/child_process.h"
 #include "pipeline/commands/command.h"
-#include "pipeline/memory.h"
+#include "pipeline/program/memory.h"
+#include "pipeline/report/chart_library.h"
 
 namespace regrade {
 namespace {

@@ -3,10 +3,10 @@
 #include <filesystem>
 
 #include "kernels/base/error.h"
-#include "pipeline/capture_store.h"
+#include "pipeline/capture/capture_store.h"
+#include "pipeline/capture/transforms_json.h"
 #include "pipeline/commands/command.h"
-#include "pipeline/files/transforms_json.h"
-#include "reconstruct/colmap_text.h"
+#include "reconstruct/colmap/colmap_text.h"
 
 namespace regrade {
 namespace {

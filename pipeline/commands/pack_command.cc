@@ -5,14 +5,14 @@
 
 #include "kernels/base/error.h"
 #include "kernels/image/resize.h"
-#include "pipeline/capture_store.h"
+#include "pipeline/capture/capture_store.h"
+#include "pipeline/capture/packed_capture.h"
+#include "pipeline/capture/scene_profile.h"
+#include "pipeline/capture/working_views.h"
 #include "pipeline/commands/command.h"
-#include "pipeline/files/image_file.h"
-#include "pipeline/packed_capture.h"
-#include "pipeline/run_settings.h"
-#include "pipeline/scene_profile.h"
-#include "pipeline/scene_views.h"
-#include "stylize/view_stylizer.h"
+#include "pipeline/images/image_file.h"
+#include "pipeline/run/run_settings.h"
+#include "stylize/image/view_stylizer.h"
 
 namespace regrade {
 namespace {

@@ -1,6 +1,6 @@
 // regrade synth: a synthetic capture with its exact truth.
 #include "pipeline/commands/command.h"
-#include "pipeline/synth_capture.h"
+#include "pipeline/synth/synth_capture.h"
 
 namespace regrade {
 

@@ -4,14 +4,14 @@
 #include <numeric>
 
 #include "evaluate/image_quality.h"
-#include "kernels/field/fast_rays.h"
+#include "kernels/field/packed_grid.h"
 #include "kernels/field/render.h"
-#include "pipeline/field_file.h"
+#include "pipeline/capture/packed_capture.h"
+#include "pipeline/fields/field_file.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/gpu/gpu_commands.h"
-#include "pipeline/packed_capture.h"
-#include "reconstruct/fit_engine.h"
-#include "reconstruct/fit_field.h"
+#include "reconstruct/fit/fit_engine.h"
+#include "reconstruct/fit/fit_field.h"
 
 namespace regrade {
 namespace {

@@ -4,11 +4,11 @@
 #include <string>
 
 #include "kernels/base/options.h"
-#include "kernels/field/device/half_grid.h"
+#include "kernels/field/cuda/half_grid.h"
+#include "pipeline/capture/packed_capture.h"
 #include "pipeline/files/json_file.h"
-#include "pipeline/packed_capture.h"
-#include "reconstruct/fit_options.h"
-#include "stylize/train_network.h"
+#include "reconstruct/fit/fit_options.h"
+#include "stylize/training/train_network.h"
 
 namespace regrade {
 

@@ -4,10 +4,10 @@
 #include <string>
 #include <vector>
 
-#include "kernels/base/device_memory.h"
 #include "kernels/base/error.h"
+#include "kernels/device/device_memory.h"
 #include "pipeline/gpu/gpu_commands.h"
-#include "pipeline/option_binding.h"
+#include "pipeline/program/option_binding.h"
 
 namespace regrade {
 namespace {

@@ -7,9 +7,9 @@
 #include <fstream>
 
 #include "kernels/base/error.h"
-#include "kernels/field/device/device_rays.h"
-#include "kernels/field/fast_rays.h"
-#include "pipeline/field_file.h"
+#include "kernels/field/cuda/device_rays.h"
+#include "kernels/field/packed_grid.h"
+#include "pipeline/fields/field_file.h"
 #include "pipeline/gpu/gpu_commands.h"
 
 namespace regrade {

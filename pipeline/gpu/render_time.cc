@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "evaluate/image_quality.h"
-#include "kernels/field/device/device_rays.h"
+#include "kernels/field/cuda/device_rays.h"
 #include "pipeline/gpu/gpu_commands.h"
 
 namespace regrade {

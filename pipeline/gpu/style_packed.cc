@@ -5,16 +5,16 @@
 #include <numeric>
 
 #include "kernels/base/error.h"
-#include "kernels/field/device/device_rays.h"
-#include "kernels/field/fast_rays.h"
+#include "kernels/field/cuda/device_rays.h"
+#include "kernels/field/packed_grid.h"
 #include "kernels/image/color_statistics.h"
-#include "pipeline/field_file.h"
+#include "pipeline/fields/field_file.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/gpu/gpu_commands.h"
-#include "stylize/apply_network.h"
-#include "stylize/color_transfer.h"
-#include "stylize/device_style.h"
-#include "stylize/monge_kantorovich.h"
+#include "stylize/cuda/device_style.h"
+#include "stylize/field/apply_network.h"
+#include "stylize/image/color_transfer.h"
+#include "stylize/image/monge_kantorovich.h"
 
 namespace regrade {
 namespace {

@@ -3,8 +3,8 @@
 #include <numeric>
 
 #include "evaluate/image_quality.h"
-#include "pipeline/field_renderer.h"
-#include "pipeline/scene_views.h"
+#include "pipeline/capture/working_views.h"
+#include "pipeline/fields/field_renderer.h"
 
 namespace regrade {
 namespace {

@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "kernels/base/for_each.h"
+#include "kernels/device/backend.h"
 #include "kernels/scene/capture.h"
-#include "pipeline/field_file.h"
-#include "pipeline/photo_gains.h"
+#include "pipeline/capture/photo_gains.h"
+#include "pipeline/fields/field_file.h"
 
 namespace regrade {
 

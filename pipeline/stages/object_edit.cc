@@ -3,10 +3,10 @@
 #include <algorithm>
 
 #include "kernels/base/error.h"
-#include "kernels/field/render.h"
+#include "kernels/field/cpu/render_view.h"
+#include "pipeline/capture/working_views.h"
 #include "pipeline/files/npz_file.h"
-#include "pipeline/scene_views.h"
-#include "stylize/object_shares.h"
+#include "stylize/field/object_shares.h"
 
 namespace regrade {
 namespace {

@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "kernels/field/fast_rays.h"
+#include "kernels/field/packed_grid.h"
 #include "kernels/field/radiance_field.h"
 #include "kernels/scene/capture.h"
-#include "pipeline/object_masks.h"
-#include "pipeline/stages/run_context.h"
+#include "pipeline/capture/object_masks.h"
+#include "pipeline/run/run_context.h"
 
 namespace regrade {
 

@@ -4,14 +4,15 @@
 
 #include <filesystem>
 
-#include "pipeline/capture_store.h"
-#include "pipeline/folder_listing.h"
-#include "pipeline/photo_masks.h"
-#include "pipeline/plan.h"
-#include "pipeline/pose_profile.h"
-#include "pipeline/pose_tracks.h"
-#include "pipeline/scene_profile.h"
-#include "pipeline/stages/run_context.h"
+#include "pipeline/capture/capture_store.h"
+#include "pipeline/capture/photo_masks.h"
+#include "pipeline/capture/pose_profile.h"
+#include "pipeline/capture/pose_tracks.h"
+#include "pipeline/capture/scene_profile.h"
+#include "pipeline/files/folder_listing.h"
+#include "pipeline/run/plan.h"
+#include "pipeline/run/run_context.h"
+#include "pipeline/stages/stages.h"
 
 namespace regrade {
 namespace {
@@ -117,8 +118,8 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
   if (!tracks.note.empty()) context->console->Info(tracks.note);
   if (!tracks.figures.IsNull()) outcome.figures["tracks"] = tracks.figures;
   const PoseProfile profile =
-      ProfilePoses(source.kind, settings, sparse_folder, ingest.photos, tracks.misfit_scale,
-                   &capture, parts.Next(shares.refinement));
+      ProfilePoses(source.kind, settings.pose, settings.run.effects, sparse_folder,
+                   ingest.photos, tracks.misfit_scale, &capture, parts.Next(shares.refinement));
   context->console->Info(EffectLine(profile.effect));
   outcome.figures["effects"] = EffectsRecord({profile.effect});
   if (!profile.figures.IsNull()) outcome.figures["pose_refinement"] = profile.figures;

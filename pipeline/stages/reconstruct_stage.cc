@@ -6,20 +6,21 @@
 #include <functional>
 #include <string>
 
-#include "kernels/base/device_memory.h"
-#include "pipeline/capture_store.h"
-#include "pipeline/cpu_time.h"
-#include "pipeline/device_choice.h"
-#include "pipeline/field_file.h"
-#include "pipeline/fit_checkpoint.h"
-#include "pipeline/memory.h"
-#include "pipeline/plan.h"
-#include "pipeline/scene_profile.h"
-#include "pipeline/scene_views.h"
+#include "kernels/device/device_memory.h"
+#include "pipeline/capture/capture_store.h"
+#include "pipeline/capture/scene_profile.h"
+#include "pipeline/capture/working_views.h"
+#include "pipeline/fields/field_file.h"
+#include "pipeline/fields/fit_checkpoint.h"
+#include "pipeline/program/cpu_time.h"
+#include "pipeline/program/device_choice.h"
+#include "pipeline/program/memory.h"
+#include "pipeline/run/plan.h"
+#include "pipeline/run/run_context.h"
 #include "pipeline/stages/held_out.h"
-#include "pipeline/stages/run_context.h"
-#include "reconstruct/choose_degree.h"
-#include "reconstruct/fit_field.h"
+#include "pipeline/stages/stages.h"
+#include "reconstruct/fit/choose_degree.h"
+#include "reconstruct/fit/fit_field.h"
 
 namespace regrade {
 namespace {

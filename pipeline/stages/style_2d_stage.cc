@@ -3,16 +3,18 @@
 #include <optional>
 
 #include "kernels/image/color_statistics.h"
-#include "pipeline/capture_store.h"
-#include "pipeline/device_choice.h"
-#include "pipeline/field_file.h"
-#include "pipeline/field_renderer.h"
-#include "pipeline/files/image_file.h"
-#include "pipeline/photo_gains.h"
-#include "pipeline/scene_views.h"
+#include "pipeline/capture/capture_store.h"
+#include "pipeline/capture/photo_gains.h"
+#include "pipeline/capture/working_views.h"
+#include "pipeline/fields/field_file.h"
+#include "pipeline/fields/field_renderer.h"
+#include "pipeline/images/image_file.h"
+#include "pipeline/program/device_choice.h"
+#include "pipeline/run/run_context.h"
+#include "pipeline/stages/make_stylizer.h"
 #include "pipeline/stages/object_edit.h"
-#include "pipeline/stages/run_context.h"
-#include "pipeline/stages/scene_stylizer.h"
+#include "pipeline/stages/stages.h"
+#include "pipeline/workspace/output_names.h"
 
 namespace regrade {
 namespace {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "pipeline/files/json_file.h"
-#include "pipeline/tradeoff/knobs.h"
+#include "pipeline/tradeoff/parameters.h"
 
 namespace regrade {
 

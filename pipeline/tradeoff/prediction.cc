@@ -5,9 +5,9 @@
 
 #include "kernels/base/error.h"
 #include "kernels/scene/common_camera.h"
-#include "pipeline/scene_profile.h"
-#include "pipeline/scene_views.h"
-#include "reconstruct/choose_degree.h"
+#include "pipeline/capture/scene_profile.h"
+#include "pipeline/capture/working_views.h"
+#include "reconstruct/fit/choose_degree.h"
 
 namespace regrade {
 namespace {

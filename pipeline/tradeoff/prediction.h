@@ -7,7 +7,7 @@
 
 #include "kernels/scene/capture.h"
 #include "pipeline/tradeoff/measurements.h"
-#include "pipeline/workspace.h"
+#include "pipeline/workspace/workspace.h"
 
 namespace regrade {
 

@@ -9,9 +9,11 @@
 #include <memory>
 #include <vector>
 
-#include "kernels/field/fast_rays.h"
-#include "kernels/field/ray_loss.h"
+#include "kernels/field/cpu/rays.h"
+#include "kernels/field/packed_grid.h"
 #include "kernels/field/ray_weights.h"
+#include "kernels/field/render_ray.h"
+#include "kernels/optimize/rmsprop.h"
 #include "tests/support/small_field.h"
 
 namespace regrade {

@@ -15,7 +15,7 @@
 #include "evaluate/flow_file.h"
 #include "evaluate/optical_flow.h"
 #include "kernels/base/error.h"
-#include "pipeline/files/image_file.h"
+#include "pipeline/images/image_file.h"
 
 namespace regrade {
 namespace {

@@ -3,8 +3,8 @@
 #include <filesystem>
 #include <limits>
 
-#include "reconstruct/colmap_model.h"
-#include "reconstruct/colmap_text.h"
+#include "reconstruct/colmap/colmap_model.h"
+#include "reconstruct/colmap/colmap_text.h"
 #include "tests/fuzz/fuzz_support.h"
 #include "tests/fuzz/mutate.h"
 #include "tests/support/synthetic_model.h"

@@ -1,10 +1,10 @@
 // What a person types: options, the template of a style command, and names that are shown.
 #include <algorithm>
 
-#include "pipeline/command_stylizer.h"
-#include "pipeline/console.h"
-#include "pipeline/html_text.h"
-#include "pipeline/run_settings.h"
+#include "pipeline/program/console.h"
+#include "pipeline/report/html_text.h"
+#include "pipeline/run/run_settings.h"
+#include "pipeline/stages/command_stylizer.h"
 #include "tests/fuzz/fuzz_support.h"
 #include "tests/fuzz/mutate.h"
 

@@ -1,9 +1,10 @@
 // field.npz and a packed capture as wholes, and a look through what was accepted.
 #include <cmath>
 
+#include "kernels/field/cpu/render_view.h"
 #include "kernels/field/render.h"
-#include "pipeline/field_file.h"
-#include "pipeline/packed_capture.h"
+#include "pipeline/capture/packed_capture.h"
+#include "pipeline/fields/field_file.h"
 #include "tests/fuzz/fuzz_support.h"
 #include "tests/fuzz/stored_zip.h"
 #include "tests/support/small_field.h"

@@ -1,5 +1,5 @@
 // The atoms of an MP4 file, whose index is moved to its front.
-#include "pipeline/files/mp4_faststart.h"
+#include "pipeline/images/mp4_faststart.h"
 #include "tests/fuzz/fuzz_support.h"
 #include "tests/fuzz/mutate.h"
 

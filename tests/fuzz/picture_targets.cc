@@ -3,10 +3,10 @@
 
 #include <cmath>
 
-#include "pipeline/files/image_file.h"
-#include "pipeline/files/image_format.h"
-#include "pipeline/files/picture_text.h"
-#include "pipeline/files/png_chunks.h"
+#include "pipeline/images/draw_text.h"
+#include "pipeline/images/image_file.h"
+#include "pipeline/images/image_format.h"
+#include "pipeline/images/png_chunks.h"
 #include "tests/fuzz/fuzz_support.h"
 #include "tests/fuzz/mutate.h"
 

@@ -1,8 +1,8 @@
 // poses_bounds.npy of LLFF captures.
 #include <cmath>
 
+#include "pipeline/capture/llff_poses.h"
 #include "pipeline/files/npy_header.h"
-#include "pipeline/files/poses_bounds.h"
 #include "tests/fuzz/fuzz_support.h"
 #include "tests/fuzz/mutate.h"
 #include "tests/fuzz/stored_zip.h"

@@ -2,11 +2,11 @@
 #include <cmath>
 #include <filesystem>
 
-#include "pipeline/capture_store.h"
+#include "pipeline/capture/capture_store.h"
+#include "pipeline/capture/transforms_json.h"
 #include "pipeline/files/json_file.h"
-#include "pipeline/files/transforms_json.h"
-#include "pipeline/run_file.h"
-#include "pipeline/stage_record.h"
+#include "pipeline/run/run_file.h"
+#include "pipeline/workspace/stage_record.h"
 #include "tests/fuzz/fuzz_support.h"
 #include "tests/fuzz/mutate.h"
 #include "tests/support/synthetic_model.h"

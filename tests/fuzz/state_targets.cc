@@ -2,9 +2,9 @@
 // stand outside of their bytes, so a mutant gets as far as any.
 #include <cmath>
 
-#include "pipeline/fit_checkpoint.h"
-#include "pipeline/network_checkpoint.h"
-#include "pipeline/network_file.h"
+#include "pipeline/fields/fit_checkpoint.h"
+#include "pipeline/fields/network_checkpoint.h"
+#include "pipeline/fields/network_file.h"
 #include "tests/fuzz/fuzz_support.h"
 #include "tests/fuzz/mutate.h"
 #include "tests/fuzz/stored_zip.h"

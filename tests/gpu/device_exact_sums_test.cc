@@ -7,7 +7,7 @@
 #include <limits>
 #include <vector>
 
-#include "kernels/field/device/device_rays.h"
+#include "kernels/field/cuda/device_rays.h"
 #include "tests/support/parity_row.h"
 #include "tests/support/small_field.h"
 

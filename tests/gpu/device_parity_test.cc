@@ -7,12 +7,13 @@
 #include <cmath>
 #include <vector>
 
-#include "kernels/field/device/device_rays.h"
-#include "kernels/field/fast_rays.h"
-#include "kernels/field/ray_loss.h"
+#include "kernels/field/cuda/device_rays.h"
+#include "kernels/field/cuda/device_views.h"
+#include "kernels/field/packed_grid.h"
 #include "kernels/field/render.h"
+#include "kernels/field/render_ray.h"
 #include "kernels/field/total_variation.h"
-#include "kernels/scene/device_views.h"
+#include "kernels/optimize/rmsprop.h"
 #include "tests/support/double_field.h"
 #include "tests/support/parity_row.h"
 #include "tests/support/small_field.h"

@@ -7,9 +7,9 @@
 #include <limits>
 #include <vector>
 
-#include "kernels/field/device/device_sphere_rays.h"
-#include "kernels/field/ray_loss.h"
+#include "kernels/field/cuda/device_sphere_rays.h"
 #include "kernels/field/render.h"
+#include "kernels/field/render_ray.h"
 #include "kernels/field/sphere_variation.h"
 #include "kernels/field/spherical_harmonics.h"
 #include "tests/support/double_field.h"

@@ -1,6 +1,6 @@
 // The parity table of learning a style: each device body against the plain body in double, or
 // against the CPU's path that is held to it. Without a device each test skips and says so.
-#include "stylize/device_style.h"
+#include "stylize/cuda/device_style.h"
 
 #include <gtest/gtest.h>
 
@@ -8,9 +8,9 @@
 #include <cmath>
 #include <vector>
 
-#include "kernels/base/device_memory.h"
-#include "kernels/field/fast_rays.h"
-#include "kernels/network/device_mlp.h"
+#include "kernels/device/device_memory.h"
+#include "kernels/field/packed_grid.h"
+#include "kernels/network/cuda/device_mlp.h"
 #include "tests/support/parity_row.h"
 #include "tests/support/small_field.h"
 #include "tests/support/styled_ball.h"

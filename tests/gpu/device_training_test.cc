@@ -1,6 +1,6 @@
 // Steps of learning that the device makes on its own, against the same steps made one by one
 // from the host. Without a device each test skips and says so.
-#include "stylize/device_training.h"
+#include "stylize/cuda/device_training.h"
 
 #include <gtest/gtest.h>
 
@@ -11,9 +11,9 @@
 
 #include "kernels/network/lipschitz_layer.h"
 #include "kernels/optimize/schedule.h"
-#include "stylize/device_style.h"
-#include "stylize/initial_network.h"
-#include "stylize/lipschitz_regularizer.h"
+#include "stylize/cuda/device_style.h"
+#include "stylize/training/initial_network.h"
+#include "stylize/training/lipschitz_regularizer.h"
 #include "tests/support/parity_row.h"
 #include "tests/support/small_field.h"
 #include "tests/support/styled_ball.h"

@@ -1,6 +1,6 @@
 // Training rays that are drawn on the device, against the rule that the host draws them by.
 // Without a device the test skips and says so.
-#include "kernels/scene/device_views.h"
+#include "kernels/field/cuda/device_views.h"
 
 #include <gtest/gtest.h>
 

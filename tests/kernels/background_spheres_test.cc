@@ -8,8 +8,9 @@
 #include <cmath>
 #include <vector>
 
-#include "kernels/field/fast_rays.h"
-#include "kernels/field/ray_loss.h"
+#include "kernels/field/cpu/rays.h"
+#include "kernels/field/packed_grid.h"
+#include "kernels/field/render_ray.h"
 #include "kernels/field/sphere_variation.h"
 #include "tests/support/double_field.h"
 #include "tests/support/record_error.h"

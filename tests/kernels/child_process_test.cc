@@ -1,5 +1,5 @@
 // Children that hang, flood, die, ignore signals or leave children of their own.
-#include "kernels/base/child_process.h"
+#include "kernels/process/child_process.h"
 
 #include <gtest/gtest.h>
 #include <sys/wait.h>

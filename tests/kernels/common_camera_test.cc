@@ -76,7 +76,8 @@ TEST(CommonCamera, ACircleStaysACircle) {
 }
 
 TEST(CommonCamera, FocalLengthIsTheMedianAndPixelsAreSquare) {
-  const Camera a = PhotoOf(480, 360, 380), b = PhotoOf(360, 480, 400), c = PhotoOf(480, 320, 900);
+  const Camera a = PhotoOf(480, 360, 380), b = PhotoOf(360, 480, 400),
+               c = PhotoOf(480, 320, 900);
   EXPECT_NEAR(CommonCamera({a, b, c}).fx, 400, 1e-9);
   // The same lens on a photo of half the size: its pixels count as half.
   EXPECT_NEAR(CommonCamera({a, PhotoOf(240, 180, 200), c}).fx, 400, 1e-9);

@@ -1,12 +1,12 @@
 // What the fast path of rays does its own way: opacities of many samples, and empty space.
-#include "kernels/field/fast_rays.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <vector>
 
-#include "kernels/field/ray_loss.h"
+#include "kernels/field/cpu/rays.h"
+#include "kernels/field/packed_grid.h"
+#include "kernels/field/render_ray.h"
 #include "tests/support/record_error.h"
 #include "tests/support/small_field.h"
 

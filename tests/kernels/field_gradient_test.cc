@@ -6,10 +6,12 @@
 #include <cmath>
 #include <vector>
 
-#include "kernels/field/fast_rays.h"
-#include "kernels/field/ray_loss.h"
+#include "kernels/field/cpu/rays.h"
+#include "kernels/field/cpu/render_view.h"
+#include "kernels/field/packed_grid.h"
 #include "kernels/field/ray_weights.h"
 #include "kernels/field/render.h"
+#include "kernels/field/render_ray.h"
 #include "tests/support/double_field.h"
 #include "tests/support/record_error.h"
 #include "tests/support/small_field.h"

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "kernels/field/brick_order.h"
+#include "kernels/field/cuda/brick_order.h"
 #include "kernels/scene/pinhole_rays.h"
 
 namespace regrade {

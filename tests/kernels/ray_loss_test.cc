@@ -1,7 +1,5 @@
 // The plain ray at its extremes: early stops, walls, clamped colours, far steps (hard cases
 // H53, H62, H65, H66).
-#include "kernels/field/ray_loss.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,6 +8,7 @@
 #include <memory>
 #include <vector>
 
+#include "kernels/field/render_ray.h"
 #include "tests/support/double_field.h"
 #include "tests/support/record_error.h"
 #include "tests/support/small_field.h"

@@ -5,7 +5,8 @@
 #include <vector>
 
 #include "kernels/base/hash.h"
-#include "kernels/field/fast_rays.h"
+#include "kernels/field/cpu/rays.h"
+#include "kernels/field/packed_grid.h"
 #include "tests/support/small_field.h"
 
 namespace regrade {

@@ -6,7 +6,8 @@
 
 #include <vector>
 
-#include "kernels/field/fast_rays.h"
+#include "kernels/field/cpu/rays.h"
+#include "kernels/field/packed_grid.h"
 #include "tests/support/record_error.h"
 #include "tests/support/small_field.h"
 

@@ -1,5 +1,5 @@
 // Paths of the film's camera: smooth, within the photos' hull, looking where they look.
-#include "pipeline/camera_path.h"
+#include "pipeline/fields/camera_path.h"
 
 #include <gtest/gtest.h>
 

@@ -1,15 +1,15 @@
 // Captures by their content: one of our own output folders is a capture, under the same poses.
-#include "pipeline/capture_store.h"
+#include "pipeline/capture/capture_store.h"
 
 #include <gtest/gtest.h>
 
 #include <filesystem>
 #include <fstream>
 
-#include "kernels/base/child_process.h"
 #include "kernels/image/resize.h"
-#include "pipeline/files/image_file.h"
+#include "kernels/process/child_process.h"
 #include "pipeline/files/json_file.h"
+#include "pipeline/images/image_file.h"
 #include "tests/support/temporary_folder.h"
 
 namespace regrade {

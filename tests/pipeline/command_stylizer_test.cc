@@ -1,4 +1,4 @@
-#include "pipeline/command_stylizer.h"
+#include "pipeline/stages/command_stylizer.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "pipeline/files/image_file.h"
+#include "pipeline/images/image_file.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"
 

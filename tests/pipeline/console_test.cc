@@ -1,9 +1,9 @@
-#include "pipeline/console.h"
+#include "pipeline/program/console.h"
 
 #include <gtest/gtest.h>
 
 #include "kernels/base/random.h"
-#include "pipeline/eta_estimator.h"
+#include "pipeline/program/eta_estimator.h"
 
 namespace regrade {
 namespace {

@@ -1,11 +1,11 @@
 // Pictures on one sheet: each in its place, words outside of them.
-#include "pipeline/contact_sheet.h"
+#include "pipeline/images/contact_sheet.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-#include "pipeline/files/picture_text.h"
+#include "pipeline/images/draw_text.h"
 
 namespace regrade {
 namespace {

@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
-#include "pipeline/files/image_file.h"
+#include "pipeline/images/image_file.h"
 #include "tests/pipeline/libjpeg_file.h"
 #include "tests/pipeline/picture_corpus.h"
 

@@ -4,13 +4,15 @@
 
 #include <cstdlib>
 
-#include "kernels/base/child_process.h"
 #include "kernels/base/hash.h"
-#include "kernels/field/fast_rays.h"
+#include "kernels/field/cpu/rays.h"
+#include "kernels/field/cpu/render_view.h"
 #include "kernels/field/render.h"
-#include "pipeline/field_file.h"
+#include "kernels/process/child_process.h"
+#include "pipeline/fields/field_file.h"
 #include "pipeline/files/json_file.h"
-#include "reconstruct/colmap_model.h"
+#include "pipeline/workspace/output_names.h"
+#include "reconstruct/colmap/colmap_model.h"
 #include "tests/support/synthetic_photos.h"
 #include "tests/support/temporary_folder.h"
 

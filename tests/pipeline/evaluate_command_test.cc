@@ -6,9 +6,9 @@
 #include <filesystem>
 
 #include "evaluate/flow_file.h"
-#include "kernels/base/child_process.h"
-#include "pipeline/files/image_file.h"
+#include "kernels/process/child_process.h"
 #include "pipeline/files/json_file.h"
+#include "pipeline/images/image_file.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/tiny_onnx.h"
 

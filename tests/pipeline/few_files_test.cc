@@ -4,9 +4,9 @@
 #include <sys/resource.h>
 
 #include "pipeline/files/atomic_file.h"
+#include "pipeline/files/folder_listing.h"
 #include "pipeline/files/npz_file.h"
-#include "pipeline/folder_listing.h"
-#include "pipeline/stage_record.h"
+#include "pipeline/workspace/stage_record.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"
 

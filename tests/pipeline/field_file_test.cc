@@ -1,4 +1,4 @@
-#include "pipeline/field_file.h"
+#include "pipeline/fields/field_file.h"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 
 #include "kernels/base/half.h"
 #include "kernels/base/random.h"
-#include "kernels/field/render.h"
+#include "kernels/field/cpu/render_view.h"
 #include "pipeline/files/npz_file.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/small_field.h"

@@ -1,4 +1,4 @@
-#include "pipeline/fit_checkpoint.h"
+#include "pipeline/fields/fit_checkpoint.h"
 
 #include <gtest/gtest.h>
 

@@ -1,10 +1,10 @@
-#include "pipeline/folder_stylizer.h"
+#include "pipeline/stages/folder_stylizer.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-#include "pipeline/files/image_file.h"
+#include "pipeline/images/image_file.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"
 

@@ -1,11 +1,11 @@
-#include "pipeline/frame_folder.h"
+#include "pipeline/commands/frame_folder.h"
 
 #include <gtest/gtest.h>
 
 #include <filesystem>
 
 #include "kernels/base/error.h"
-#include "pipeline/files/image_file.h"
+#include "pipeline/images/image_file.h"
 #include "tests/support/temporary_folder.h"
 
 namespace regrade {

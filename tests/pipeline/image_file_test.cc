@@ -1,4 +1,4 @@
-#include "pipeline/files/image_file.h"
+#include "pipeline/images/image_file.h"
 
 #include <OpenImageIO/imageio.h>
 #include <gtest/gtest.h>

@@ -7,7 +7,7 @@
 #include <fstream>
 #include <iterator>
 
-#include "pipeline/field_file.h"
+#include "pipeline/fields/field_file.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/tiny_run.h"
 

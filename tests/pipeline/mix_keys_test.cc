@@ -1,5 +1,5 @@
 // Shares of styles in time, as they are written on a command line.
-#include "pipeline/mix_keys.h"
+#include "pipeline/commands/mix_keys.h"
 
 #include <gtest/gtest.h>
 

@@ -9,10 +9,10 @@
 #include <iterator>
 #include <map>
 
-#include "pipeline/files/image_file.h"
+#include "pipeline/capture/transforms_json.h"
 #include "pipeline/files/json_file.h"
-#include "pipeline/files/transforms_json.h"
-#include "pipeline/files/video_file.h"
+#include "pipeline/images/image_file.h"
+#include "pipeline/images/video_writer.h"
 #include "tests/support/spawn.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/tiny_run.h"
@@ -32,7 +32,8 @@ ProgramOutcome Regrade(const std::vector<std::string>& arguments) {
 
 std::vector<std::string> RunOf(const std::string& capture, const std::string& out,
                                const std::vector<std::string>& more = {}) {
-  std::vector<std::string> run{"run", capture, "--style", kStyle, "--out", out, "--reproducible"};
+  std::vector<std::string> run{"run",   capture, "--style",       kStyle,
+                               "--out", out,     "--reproducible"};
   for (const std::string& flag : testing::TinyFlags()) run.push_back(flag);
   run.insert(run.end(), more.begin(), more.end());
   return run;
@@ -63,7 +64,8 @@ const JsonValue& RowOf(const JsonValue& report, const std::string& sequence, int
   throw std::runtime_error("no row of " + sequence);
 }
 
-// The middle `width` x `height` pixels of photo `index` of a synthetic capture, camera to match.
+// The middle `width` x `height` pixels of photo `index` of a synthetic capture, camera to
+// match.
 void CropPhoto(const std::string& capture, size_t index, int width, int height) {
   const std::string file = capture + "/truth/transforms.json";
   std::vector<TransformsFrame> frames = ReadTransformsJson(file).frames;
@@ -144,8 +146,8 @@ TEST(MixedSizes, H159_ThreeSizesOfTwoCamerasGoToFilmAndReport) {
   ASSERT_EQ(views.code, 0) << views.text;
   EXPECT_EQ(CountVideoFrames(folder / "e/styled.mp4"), 6);
   EXPECT_FALSE(fs::exists(folder / "e/frames/path_source"));
-  const ProgramOutcome mix = Regrade(
-      {"mix", folder / "e", "--mix", "0:1", "--path", "views", "--out", folder / "m"});
+  const ProgramOutcome mix =
+      Regrade({"mix", folder / "e", "--mix", "0:1", "--path", "views", "--out", folder / "m"});
   ASSERT_EQ(mix.code, 0) << mix.text;
   EXPECT_EQ(SizeOf(folder / "m/frames/00001.png"), "48x64");
   EXPECT_EQ(CountVideoFrames(folder / "m/mixed.mp4"), 6);
@@ -210,8 +212,8 @@ TEST(MixedSizes, H159_MasksOfPhotosThatDiffer) {
                      "mixed-cameras,masks"})
                 .code,
             0);
-  const ProgramOutcome done = Regrade(
-      RunOf(folder / "s/truth", folder / "e", {"--masks", folder / "s/truth/masks"}));
+  const ProgramOutcome done =
+      Regrade(RunOf(folder / "s/truth", folder / "e", {"--masks", folder / "s/truth/masks"}));
   ASSERT_EQ(done.code, 0) << done.text;
   EXPECT_EQ(SizeOf(folder / "e/frames/common_views_2d/00001.png"), "64x48");
   ExpectFiniteOrReason(ReadJsonFile(folder / "e/report.json"), "report");

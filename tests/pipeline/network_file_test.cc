@@ -1,4 +1,4 @@
-#include "pipeline/network_file.h"
+#include "pipeline/fields/network_file.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Masks of photos, found by name; labels of regions; and an object's style over a whole run.
-#include "pipeline/object_masks.h"
+#include "pipeline/capture/object_masks.h"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,8 @@
 #include <cmath>
 #include <filesystem>
 
-#include "pipeline/files/image_file.h"
 #include "pipeline/files/json_file.h"
+#include "pipeline/images/image_file.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/tiny_run.h"

@@ -1,12 +1,12 @@
-#include "pipeline/option_binding.h"
+#include "pipeline/program/option_binding.h"
 
 #include <gtest/gtest.h>
 
 #include <clocale>
 #include <locale>
 
-#include "pipeline/nearest_name.h"
-#include "pipeline/run_settings.h"
+#include "pipeline/program/nearest_name.h"
+#include "pipeline/run/run_settings.h"
 #include "tests/support/expect_error.h"
 
 namespace regrade {

@@ -1,5 +1,5 @@
 // Jobs that a second thread does: in order, few at a time, and with their errors.
-#include "pipeline/ordered_worker.h"
+#include "pipeline/program/ordered_worker.h"
 
 #include <gtest/gtest.h>
 

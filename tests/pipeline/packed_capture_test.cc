@@ -1,5 +1,5 @@
 // A packed capture reads back as it was written, and damage is named.
-#include "pipeline/packed_capture.h"
+#include "pipeline/capture/packed_capture.h"
 
 #include <gtest/gtest.h>
 

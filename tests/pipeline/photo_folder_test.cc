@@ -1,5 +1,3 @@
-#include "pipeline/photo_folder.h"
-
 #include <gtest/gtest.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
@@ -12,6 +10,7 @@
 
 #include "kernels/base/error.h"
 #include "kernels/base/natural_order.h"
+#include "pipeline/capture/ingest_photos.h"
 #include "pipeline/files/atomic_file.h"
 #include "tests/pipeline/picture_corpus.h"
 

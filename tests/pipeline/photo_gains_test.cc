@@ -1,5 +1,5 @@
 // Exposures of a synthetic capture, from its photos to the gains that are undone.
-#include "pipeline/photo_gains.h"
+#include "pipeline/capture/photo_gains.h"
 
 #include <gtest/gtest.h>
 
@@ -8,10 +8,10 @@
 
 #include "kernels/base/error.h"
 #include "kernels/scene/srgb.h"
-#include "pipeline/scene_profile.h"
-#include "pipeline/scene_views.h"
-#include "pipeline/synth_effects.h"
-#include "pipeline/track_colors.h"
+#include "pipeline/capture/scene_profile.h"
+#include "pipeline/capture/track_colors.h"
+#include "pipeline/capture/working_views.h"
+#include "pipeline/synth/synth_effects.h"
 #include "tests/support/synthetic_photos.h"
 
 namespace regrade {

@@ -7,11 +7,12 @@
 #include <sstream>
 
 #include "evaluate/image_quality.h"
-#include "kernels/base/child_process.h"
-#include "pipeline/capture_store.h"
-#include "pipeline/files/image_file.h"
+#include "kernels/process/child_process.h"
+#include "pipeline/capture/capture_store.h"
+#include "pipeline/capture/working_views.h"
 #include "pipeline/files/json_file.h"
-#include "pipeline/scene_views.h"
+#include "pipeline/images/image_file.h"
+#include "pipeline/workspace/output_names.h"
 #include "tests/support/temporary_folder.h"
 
 namespace regrade {

@@ -15,7 +15,7 @@
 #include "kernels/base/error.h"
 #include "kernels/base/random.h"
 #include "kernels/scene/image.h"
-#include "pipeline/files/image_file.h"
+#include "pipeline/images/image_file.h"
 #include "tests/support/record_error.h"
 
 namespace regrade::testing {

@@ -7,7 +7,7 @@
 
 #include <vector>
 
-#include "pipeline/files/image_file.h"
+#include "pipeline/images/image_file.h"
 #include "tests/pipeline/picture_corpus.h"
 
 namespace regrade {

@@ -1,6 +1,6 @@
 // Captures with poses and without points: what the installed COLMAP finds for them, and that
 // nothing is lost where there is none.
-#include "pipeline/pose_tracks.h"
+#include "pipeline/capture/pose_tracks.h"
 
 #include <gtest/gtest.h>
 
@@ -10,13 +10,13 @@
 #include <fstream>
 #include <sstream>
 
-#include "kernels/base/child_process.h"
 #include "kernels/base/error.h"
-#include "pipeline/capture_store.h"
-#include "pipeline/files/image_file.h"
+#include "kernels/process/child_process.h"
+#include "pipeline/capture/capture_store.h"
+#include "pipeline/capture/scene_profile.h"
 #include "pipeline/files/json_file.h"
-#include "pipeline/scene_profile.h"
-#include "pipeline/synth_effects.h"
+#include "pipeline/images/image_file.h"
+#include "pipeline/synth/synth_effects.h"
 #include "tests/support/temporary_folder.h"
 
 namespace regrade {

@@ -1,6 +1,4 @@
 // LLFF's camera file: what it says, and files that are damaged.
-#include "pipeline/files/poses_bounds.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -8,6 +6,7 @@
 #include <fstream>
 #include <limits>
 
+#include "pipeline/capture/llff_poses.h"
 #include "pipeline/files/npy_header.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"

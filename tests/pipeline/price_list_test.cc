@@ -1,11 +1,10 @@
 // Price lists: which variants there are, what is kept, what beats what, and what is predicted.
-#include "pipeline/tradeoff/price_list.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-#include "pipeline/tradeoff/guess.h"
+#include "pipeline/tradeoff/cost_table.h"
+#include "pipeline/tradeoff/duration_estimate.h"
 #include "pipeline/tradeoff/prediction.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"

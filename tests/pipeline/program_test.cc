@@ -7,10 +7,10 @@
 #include <csignal>
 #include <thread>
 
-#include "kernels/base/child_process.h"
+#include "kernels/process/child_process.h"
 #include "pipeline/files/json_file.h"
-#include "pipeline/interrupt.h"
-#include "pipeline/workspace.h"
+#include "pipeline/program/interrupt.h"
+#include "pipeline/workspace/workspace.h"
 #include "tests/support/spawn.h"
 #include "tests/support/temporary_folder.h"
 

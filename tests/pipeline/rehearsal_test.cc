@@ -1,6 +1,4 @@
 // Work that may crash, in a child first.
-#include "pipeline/rehearsal.h"
-
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
@@ -9,6 +7,7 @@
 #include <fstream>
 #include <thread>
 
+#include "pipeline/program/crash_probe.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/process_state.h"
 #include "tests/support/temporary_folder.h"

@@ -1,11 +1,11 @@
 // report.json: the keys of schema 1, in its order, and nulls that say why.
-#include "pipeline/report_json.h"
-
 #include <gtest/gtest.h>
 
 #include <limits>
 #include <string>
 #include <vector>
+
+#include "pipeline/report/json.h"
 
 namespace regrade {
 namespace {

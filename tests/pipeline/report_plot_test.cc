@@ -1,14 +1,13 @@
 // Drawings of the report page: what is drawn where, and what is left out.
-#include "pipeline/report_plot.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <filesystem>
 #include <limits>
 
-#include "pipeline/chart_library.h"
-#include "pipeline/report_camera_map.h"
+#include "pipeline/report/camera_map.h"
+#include "pipeline/report/chart_library.h"
+#include "pipeline/report/plot.h"
 #include "tests/support/temporary_folder.h"
 
 namespace regrade {

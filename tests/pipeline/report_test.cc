@@ -5,8 +5,8 @@
 #include <regex>
 #include <string>
 
-#include "pipeline/html_text.h"
-#include "pipeline/report_html.h"
+#include "pipeline/report/html.h"
+#include "pipeline/report/html_text.h"
 
 namespace regrade {
 namespace {

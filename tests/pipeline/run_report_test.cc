@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "pipeline/files/image_file.h"
 #include "pipeline/files/json_file.h"
+#include "pipeline/images/image_file.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/tiny_run.h"
 

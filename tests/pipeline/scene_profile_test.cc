@@ -1,11 +1,11 @@
-#include "pipeline/scene_profile.h"
+#include "pipeline/capture/scene_profile.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "pipeline/scene_views.h"
+#include "pipeline/capture/working_views.h"
 #include "tests/support/expect_error.h"
 
 namespace regrade {

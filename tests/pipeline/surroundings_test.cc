@@ -4,8 +4,8 @@
 
 #include <filesystem>
 
-#include "kernels/base/device_memory.h"
-#include "pipeline/device_choice.h"
+#include "kernels/device/device_memory.h"
+#include "pipeline/program/device_choice.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/tiny_run.h"

@@ -1,5 +1,5 @@
 // Synthetic captures on disk: complete, repeatable, and honest about what was simulated.
-#include "pipeline/synth_capture.h"
+#include "pipeline/synth/synth_capture.h"
 
 #include <gtest/gtest.h>
 #include <omp.h>
@@ -15,11 +15,11 @@
 #include "evaluate/flow_file.h"
 #include "kernels/base/error.h"
 #include "kernels/synthetic/ray_trace.h"
-#include "pipeline/files/image_file.h"
+#include "pipeline/capture/transforms_json.h"
 #include "pipeline/files/json_file.h"
-#include "pipeline/files/transforms_json.h"
-#include "pipeline/synth_effects.h"
-#include "reconstruct/colmap_model.h"
+#include "pipeline/images/image_file.h"
+#include "pipeline/synth/synth_effects.h"
+#include "reconstruct/colmap/colmap_model.h"
 
 namespace regrade {
 namespace {

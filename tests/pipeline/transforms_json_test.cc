@@ -1,6 +1,6 @@
 // transforms.json: what is written reads back, other programs' dialects are understood, hostile
 // files are refused with the place.
-#include "pipeline/files/transforms_json.h"
+#include "pipeline/capture/transforms_json.h"
 
 #include <gtest/gtest.h>
 

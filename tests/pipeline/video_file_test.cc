@@ -1,9 +1,8 @@
-#include "pipeline/files/video_file.h"
-
 #include <gtest/gtest.h>
 
 #include "kernels/base/error.h"
-#include "pipeline/files/mp4_faststart.h"
+#include "pipeline/images/mp4_faststart.h"
+#include "pipeline/images/video_writer.h"
 #include "tests/pipeline/picture_corpus.h"
 
 namespace regrade {

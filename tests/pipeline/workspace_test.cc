@@ -1,4 +1,4 @@
-#include "pipeline/workspace.h"
+#include "pipeline/workspace/workspace.h"
 
 #include <fcntl.h>
 #include <gtest/gtest.h>

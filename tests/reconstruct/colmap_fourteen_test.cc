@@ -9,7 +9,7 @@
 #include <limits>
 
 #include "kernels/base/error.h"
-#include "reconstruct/colmap_model.h"
+#include "reconstruct/colmap/colmap_model.h"
 #include "tests/support/synthetic_model.h"
 #include "tests/support/temporary_folder.h"
 

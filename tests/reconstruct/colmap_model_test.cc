@@ -1,6 +1,6 @@
 // Reader and writer of COLMAP models: round trips, and files that are damaged in every way that
 // makes COLMAP's own reader hang, abort or accept nonsense.
-#include "reconstruct/colmap_model.h"
+#include "reconstruct/colmap/colmap_model.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>

@@ -1,5 +1,5 @@
 // COLMAP's text models: read as the binary ones are, and damage is named with its line.
-#include "reconstruct/colmap_text.h"
+#include "reconstruct/colmap/colmap_text.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Exposures from the colours of shared points, against planted ones.
-#include "reconstruct/exposure.h"
+#include "reconstruct/refinement/exposure.h"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,8 @@
 #include <cmath>
 
 #include "kernels/base/random.h"
-#include "reconstruct/exposure_folds.h"
-#include "reconstruct/exposure_model.h"
+#include "reconstruct/refinement/exposure_folds.h"
+#include "reconstruct/refinement/exposure_model.h"
 #include "tests/support/record_error.h"
 
 namespace regrade {

@@ -1,6 +1,6 @@
 // Fitting: it learns, it is the same for any thread count and after a resume, and it refuses an
 // empty field.
-#include "reconstruct/fit_field.h"
+#include "reconstruct/fit/fit_field.h"
 
 #include <gtest/gtest.h>
 #include <omp.h>
@@ -14,10 +14,11 @@
 #include <vector>
 
 #include "kernels/base/error.h"
+#include "kernels/field/cpu/render_view.h"
 #include "kernels/field/render.h"
-#include "reconstruct/choose_degree.h"
-#include "reconstruct/resample_grid.h"
-#include "reconstruct/sphere_grid.h"
+#include "reconstruct/fit/choose_degree.h"
+#include "reconstruct/fit/resample_grid.h"
+#include "reconstruct/fit/sphere_grid.h"
 #include "tests/support/record_error.h"
 #include "tests/support/small_field.h"
 

@@ -1,6 +1,6 @@
 // Forward-facing captures: what tells them, and that their space holds every pixel's ray
 // (H87-H90).
-#include "reconstruct/forward_facing.h"
+#include "reconstruct/scene/forward_facing.h"
 
 #include <gtest/gtest.h>
 

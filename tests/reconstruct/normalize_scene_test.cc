@@ -1,6 +1,6 @@
 // Where the box is: cameras on a line, at one point, upside down, and the scene in other units
 // (H129-H131, H140).
-#include "reconstruct/normalize_scene.h"
+#include "reconstruct/scene/normalize_scene.h"
 
 #include <gtest/gtest.h>
 

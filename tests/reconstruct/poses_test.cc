@@ -10,11 +10,11 @@
 #include <fstream>
 
 #include "kernels/base/error.h"
-#include "reconstruct/colmap_ladder.h"
-#include "reconstruct/colmap_model.h"
-#include "reconstruct/colmap_output.h"
-#include "reconstruct/poses_from_photos.h"
-#include "reconstruct/refine_intrinsics.h"
+#include "reconstruct/colmap/colmap_ladder.h"
+#include "reconstruct/colmap/colmap_model.h"
+#include "reconstruct/colmap/colmap_output.h"
+#include "reconstruct/colmap/poses_from_photos.h"
+#include "reconstruct/colmap/refine_intrinsics.h"
 #include "tests/support/process_state.h"
 #include "tests/support/synthetic_model.h"
 

@@ -1,11 +1,11 @@
 // The installed COLMAP on the quickest real capture, from JPEG files to a judged Capture.
 #include <gtest/gtest.h>
 
-#include "kernels/base/child_process.h"
 #include "kernels/base/error.h"
-#include "pipeline/photo_folder.h"
-#include "reconstruct/poses_from_photos.h"
-#include "reconstruct/scene_checks.h"
+#include "kernels/process/child_process.h"
+#include "pipeline/capture/ingest_photos.h"
+#include "reconstruct/colmap/poses_from_photos.h"
+#include "reconstruct/scene/scene_checks.h"
 #include "tests/support/data.h"
 #include "tests/support/temporary_folder.h"
 

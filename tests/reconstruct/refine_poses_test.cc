@@ -1,5 +1,5 @@
 // Poses that are off, brought back by their tracks; and what must not be touched.
-#include "reconstruct/refine_poses.h"
+#include "reconstruct/refinement/refine_poses.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <cmath>
 
 #include "kernels/base/random.h"
-#include "reconstruct/bundle.h"
+#include "reconstruct/refinement/bundle.h"
 #include "tests/support/synthetic_model.h"
 
 namespace regrade {

@@ -1,4 +1,4 @@
-#include "reconstruct/scene_box.h"
+#include "reconstruct/scene/scene_box.h"
 
 #include <gtest/gtest.h>
 

@@ -1,11 +1,11 @@
 // Geometry that can be trusted, and geometry that cannot.
-#include "reconstruct/scene_checks.h"
+#include "reconstruct/scene/scene_checks.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "reconstruct/colmap_model.h"
+#include "reconstruct/colmap/colmap_model.h"
 #include "tests/support/record_error.h"
 #include "tests/support/synthetic_model.h"
 

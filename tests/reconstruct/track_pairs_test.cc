@@ -1,5 +1,5 @@
 // Pairs of photos that are worth matching under known poses.
-#include "reconstruct/track_pairs.h"
+#include "reconstruct/colmap/track_pairs.h"
 
 #include <gtest/gtest.h>
 

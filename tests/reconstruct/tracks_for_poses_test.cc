@@ -1,6 +1,6 @@
 // Tracks for poses that were given, by a colmap that numbers images as its database does, and
 // by ones that fail.
-#include "reconstruct/tracks_for_poses.h"
+#include "reconstruct/colmap/tracks_for_poses.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // The box of an object before a transparent background: as large as the object, wherever the
 // cameras are.
-#include "reconstruct/visual_hull.h"
+#include "reconstruct/scene/visual_hull.h"
 
 #include <gtest/gtest.h>
 

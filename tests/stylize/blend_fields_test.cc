@@ -1,5 +1,5 @@
 // Mixing styles: exact ends, linear between them, nothing beyond them.
-#include "stylize/blend_fields.h"
+#include "stylize/field/blend_fields.h"
 
 #include <cstring>
 

@@ -1,5 +1,5 @@
 // CCPL's transform, by tiny networks whose result is computed here in double.
-#include "stylize/ccpl_stylizer.h"
+#include "stylize/image/ccpl_stylizer.h"
 
 #include <gtest/gtest.h>
 
@@ -11,8 +11,8 @@
 #include <utility>
 #include <vector>
 
-#include "stylize/network_pictures.h"
-#include "stylize/onnx_stylizer.h"
+#include "stylize/image/network_pictures.h"
+#include "stylize/image/onnx_stylizer.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/tiny_onnx.h"

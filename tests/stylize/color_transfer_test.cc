@@ -1,4 +1,4 @@
-#include "stylize/color_transfer.h"
+#include "stylize/image/color_transfer.h"
 
 #include <gtest/gtest.h>
 

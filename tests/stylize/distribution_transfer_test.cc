@@ -1,4 +1,4 @@
-#include "stylize/distribution_transfer.h"
+#include "stylize/image/distribution_transfer.h"
 
 #include <gtest/gtest.h>
 

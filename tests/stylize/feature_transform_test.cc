@@ -1,4 +1,4 @@
-#include "stylize/feature_transform.h"
+#include "stylize/image/feature_transform.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "stylize/guided_filter.h"
+#include "stylize/image/guided_filter.h"
 
 #include <gtest/gtest.h>
 

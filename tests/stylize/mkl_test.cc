@@ -7,7 +7,7 @@
 
 #include "kernels/base/error.h"
 #include "kernels/base/random.h"
-#include "stylize/monge_kantorovich.h"
+#include "stylize/image/monge_kantorovich.h"
 #include "tests/support/floating_point_traps.h"
 #include "tests/support/record_error.h"
 

@@ -2,10 +2,10 @@
 // bits.
 #include <cstring>
 
-#include "kernels/field/render.h"
-#include "stylize/blend_fields.h"
-#include "stylize/masked_stylizer.h"
-#include "stylize/object_shares.h"
+#include "kernels/field/cpu/render_view.h"
+#include "stylize/field/blend_fields.h"
+#include "stylize/field/object_shares.h"
+#include "stylize/image/masked_stylizer.h"
 #include "tests/support/styled_ball.h"
 
 namespace regrade {

@@ -1,4 +1,4 @@
-#include "stylize/onnx_stylizer.h"
+#include "stylize/image/onnx_stylizer.h"
 
 #include <gtest/gtest.h>
 #include <omp.h>
@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "kernels/image/color_statistics.h"
-#include "stylize/onnx_network.h"
+#include "stylize/image/onnx_network.h"
 #include "tests/support/data.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"

@@ -1,5 +1,5 @@
 // LipRF's propositions under their own premises, and how a field that breaks them is reported.
-#include "stylize/volume_variance.h"
+#include "stylize/field/volume_variance.h"
 #include "tests/support/record_error.h"
 #include "tests/support/styled_ball.h"
 

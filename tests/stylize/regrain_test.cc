@@ -1,5 +1,5 @@
 // Taking back the grain that a transfer of colours made louder.
-#include "stylize/regrain.h"
+#include "stylize/image/regrain.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "kernels/base/random.h"
-#include "stylize/distribution_transfer.h"
+#include "stylize/image/distribution_transfer.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/floating_point_traps.h"
 

@@ -1,4 +1,4 @@
-#include "stylize/style_options.h"
+#include "stylize/image/style_options.h"
 
 #include <gtest/gtest.h>
 

@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "stylize/onnx_stylizer.h"
+#include "stylize/image/onnx_stylizer.h"
 
 namespace {
 

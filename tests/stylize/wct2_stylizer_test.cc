@@ -1,6 +1,6 @@
 // WCT2's way through its segments, with tiny networks whose result is computed here: Haar
 // pyramids of three channels, from which every picture comes back as it was.
-#include "stylize/wct2_stylizer.h"
+#include "stylize/image/wct2_stylizer.h"
 
 #include <gtest/gtest.h>
 
@@ -14,9 +14,9 @@
 
 #include "kernels/image/color_statistics.h"
 #include "kernels/image/resize.h"
-#include "stylize/feature_transform.h"
-#include "stylize/network_pictures.h"
-#include "stylize/onnx_stylizer.h"
+#include "stylize/image/feature_transform.h"
+#include "stylize/image/network_pictures.h"
+#include "stylize/image/onnx_stylizer.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/tiny_onnx.h"

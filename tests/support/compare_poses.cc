@@ -15,7 +15,7 @@
 #include <nlohmann/json.hpp>
 
 #include "kernels/base/error.h"
-#include "reconstruct/colmap_model.h"
+#include "reconstruct/colmap/colmap_model.h"
 
 namespace fs = std::filesystem;
 using Eigen::Matrix3d;

@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "reconstruct/colmap_model.h"
+#include "reconstruct/colmap/colmap_model.h"
 #include "tests/support/synthetic_model.h"
 
 namespace fs = std::filesystem;

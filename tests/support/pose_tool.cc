@@ -5,9 +5,9 @@
 #include <filesystem>
 
 #include "kernels/base/error.h"
-#include "pipeline/photo_folder.h"
-#include "reconstruct/poses_from_photos.h"
-#include "reconstruct/scene_checks.h"
+#include "pipeline/capture/ingest_photos.h"
+#include "reconstruct/colmap/poses_from_photos.h"
+#include "reconstruct/scene/scene_checks.h"
 
 namespace fs = std::filesystem;
 using namespace regrade;

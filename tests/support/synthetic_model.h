@@ -6,7 +6,7 @@
 #include <string>
 
 #include "kernels/base/random.h"
-#include "reconstruct/colmap_model.h"
+#include "reconstruct/colmap/colmap_model.h"
 
 namespace regrade::testing {
 

@@ -9,10 +9,11 @@
 #include <vector>
 
 #include "kernels/synthetic/ray_trace.h"
-#include "pipeline/files/image_file.h"
-#include "pipeline/scene_views.h"
-#include "pipeline/synth_effects.h"
-#include "reconstruct/colmap_model.h"
+#include "pipeline/capture/working_views.h"
+#include "pipeline/images/image_file.h"
+#include "pipeline/synth/synth_effects.h"
+#include "pipeline/workspace/output_names.h"
+#include "reconstruct/colmap/colmap_model.h"
 
 namespace regrade::testing {
 

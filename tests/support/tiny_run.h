@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "kernels/base/child_process.h"
+#include "kernels/process/child_process.h"
 
 namespace regrade::testing {
 

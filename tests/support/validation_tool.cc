@@ -3,8 +3,8 @@
 #include <chrono>
 #include <cstdio>
 
-#include "pipeline/field_file.h"
-#include "reconstruct/colmap_model.h"
+#include "pipeline/fields/field_file.h"
+#include "reconstruct/colmap/colmap_model.h"
 
 namespace {
 

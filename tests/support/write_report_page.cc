@@ -4,10 +4,10 @@
 #include <cstdio>
 #include <filesystem>
 
-#include "pipeline/chart_library.h"
 #include "pipeline/files/atomic_file.h"
-#include "pipeline/files/image_file.h"
-#include "pipeline/report_html.h"
+#include "pipeline/images/image_file.h"
+#include "pipeline/report/chart_library.h"
+#include "pipeline/report/html.h"
 
 namespace regrade {
 namespace {

@@ -1,0 +1,325 @@
+// Rendering, a warp a ray at a time.
+#include <vector>
+
+#include "kernels/base/error.h"
+#include "kernels/field/cuda/device_rays.h"
+#include "kernels/field/cuda/launch.h"
+#include "kernels/field/cuda/ray_shaders.h"
+#include "kernels/field/cuda/warp_layers.h"
+#include "kernels/field/resolve_pixel.h"
+#include "kernels/scene/pinhole_rays.h"
+
+namespace regrade {
+
+RenderedView RenderViewOnDevice(const DeviceGrid& grid, const Camera& camera,
+                                const MarchOptions& options, float opacity_step,
+                                const HalfGrid* half) {
+  const int64_t n = int64_t{camera.width} * camera.height;
+  DeviceBuffer<Vec3f> color(n, "colours of a view");
+  DeviceBuffer<float> depth(n, "depths of a view"),
+      transmittance(n, "transmittances of a view");
+  const DeviceRenderTarget target{color.data(), depth.data(), transmittance.data()};
+  RenderedView view{Image(camera.width, camera.height, 3),
+                    Image(camera.width, camera.height, 1),
+                    Image(camera.width, camera.height, 1)};
+  const auto take = [&] {
+    DeviceCopyOut(view.color.pixels.data(), color.data(), n * int64_t{sizeof(Vec3f)});
+    depth.CopyOut(view.depth.pixels.data(), n);
+    transmittance.CopyOut(view.transmittance.pixels.data(), n);
+  };
+  if (camera.lens == LensModel::kPinhole) {
+    RenderFrameOnDevice(grid, camera, options, target, opacity_step, half);
+    take();
+    return view;
+  }
+  std::vector<Ray> rays(static_cast<size_t>(n));
+#pragma omp parallel for schedule(static)
+  for (int y = 0; y < camera.height; ++y)
+    for (int x = 0; x < camera.width; ++x)
+      rays[static_cast<size_t>(y) * camera.width + x] = camera.PixelRay(x, y);
+  DeviceBuffer<Ray> device_rays(n, "rays of a view");
+  device_rays.CopyIn(rays.data(), n);
+  RenderOnDevice(grid, device_rays.data(), n, options, target, opacity_step);
+  take();
+  FinishView(camera, rays, &view);
+  return view;
+}
+
+#if defined(__CUDACC__)
+
+namespace {
+
+constexpr int kWarps = 4;     // a block
+constexpr int kRays = 8;      // a block; 16 are as fast, 32 lose what neighbours share
+constexpr int kWaiting = 64;  // samples that wait for their colours; a power of 2
+
+// Which lanes' colours are looked at, and what each of them weighs; see EQ(opacity-steps).
+class OpacitySteps {
+ public:
+  __device__ explicit OpacitySteps(float step) : inverse_(step > 0 ? 1 / step : 0) {}
+
+  // `before` and `after`: transmittances around a compositing lane's sample. Lanes that are
+  // looked at get a weight above 0.
+  __device__ unsigned Choose(bool composites, float before, float after, int lane,
+                             float* weight) {
+    const bool chosen = composites && (inverse_ == 0 || Steps(after) > Steps(before));
+    const unsigned all = __ballot_sync(kAllLanes, chosen);
+    const unsigned earlier = all & ((1u << lane) - 1);
+    const float last_of_batch =
+        __shfl_sync(kAllLanes, after, earlier == 0 ? 0 : 31 - __clz(earlier));
+    *weight = chosen ? (earlier == 0 ? seen_ : last_of_batch) - after : 0.0f;
+    if (all != 0) seen_ = __shfl_sync(kAllLanes, after, 31 - __clz(all));
+    return all;
+  }
+  // What the sum of the weights lacks at the ray's end, where `left` of the light is left.
+  __device__ float Scale(float left) const {
+    return seen_ < 1 ? (1 - left) / (1 - seen_) : 1.0f;
+  }
+
+ private:
+  // 2^23 + round((1 - transmittance) / step); see LocateCellIn.
+  __device__ float Steps(float transmittance) const {
+    return __fadd_rd((1 - transmittance) * inverse_ + 0.5f, 8388608.0f);
+  }
+
+  float inverse_;
+  float seen_ = 1;  // transmittance behind the last sample that was looked at
+};
+
+// Rays from a list; sums are left as they are. A block takes kRays of them.
+struct ListedRays {
+  const Ray* rays;
+  int64_t n;
+
+  // The index-th ray, and where its results go; false past the last.
+  __device__ bool Get(int64_t index, Ray* ray, int64_t* place) const {
+    *place = index;
+    if (index >= n) return false;
+    *ray = rays[*place];
+    return true;
+  }
+  __device__ void Finish(const Ray&, float, Vec3f*, float*) const {}
+  int64_t Blocks() const { return (n + kRays - 1) / kRays; }
+};
+
+// The rays of a frame. Warps that run at the same time stand for neighbouring pixels, which
+// read the same voxels: square tiles one after the other, Morton order within each.
+struct FrameRays {
+  static constexpr int kTile = 16, kPixels = kTile * kTile;
+  PinholeRays camera;
+  FinishPixel finish;
+
+  HD int Columns() const { return (camera.width + kTile - 1) / kTile; }
+  __device__ bool Get(int64_t index, Ray* ray, int64_t* place) const {
+    const int tile = static_cast<int>(index / kPixels);
+    int x = tile % Columns() * kTile, y = tile / Columns() * kTile;
+#pragma unroll
+    for (int bit = 0; bit < 4; ++bit) {
+      x += static_cast<int>(index >> (2 * bit) & 1) << bit;
+      y += static_cast<int>(index >> (2 * bit + 1) & 1) << bit;
+    }
+    if (x >= camera.width || y >= camera.height) return false;
+    *ray = camera.At(x, y);
+    *place = int64_t{y} * camera.width + x;
+    return true;
+  }
+  __device__ void Finish(const Ray& ray, float transmittance, Vec3f* color,
+                         float* depth) const {
+    finish(ray, transmittance, color, depth);
+  }
+  int64_t Blocks() const {
+    return int64_t{Columns()} * ((camera.height + kTile - 1) / kTile) * (kPixels / kRays);
+  }
+};
+
+// A ray as a warp follows it; one thread of the block makes it.
+struct PreparedRay {
+  GridRay<float> ray;
+  float basis[kMaxBasis];
+};
+
+// What a warp leaves of a ray.
+struct RaySums {
+  Vec3f color;
+  float depth, transmittance;
+};
+
+// A warp's samples that wait until every group of lanes has one.
+struct WaitingSamples {
+  float4 place[kWaiting];  // vertex (as bits), fraction
+  float weight[kWaiting];
+};
+
+template <typename Shader, typename View>
+__device__ RaySums FollowRay(const View& grid, const PreparedRay& prepared,
+                             const MarchOptions& options, float opacity_step,
+                             WaitingSamples* waiting) {
+  constexpr int kSamples = 32 / Shader::kGroup;
+  const int lane = static_cast<int>(threadIdx.x & 31);
+  Shader shader(grid, prepared.basis, lane);
+  WarpMarch<typename Shader::Space> march(shader.space(), prepared.ray, options);
+  LaneSample sample;
+  unsigned composited;
+  float depth = 0;
+  OpacitySteps steps(opacity_step);
+  int arrived = 0, shaded = 0;
+  const auto shade = [&] {
+    const int mine = shaded + lane / Shader::kGroup;
+    const bool valid = mine < arrived;
+    const float4 at = waiting->place[mine % kWaiting];
+    shader.Add(valid ? __float_as_int(at.x) : 0, {at.y, at.z, at.w}, valid,
+               valid ? waiting->weight[mine % kWaiting] : 0.0f);
+    shaded += kSamples;
+  };
+  while (march.Next(&sample, &composited)) {
+    const float alpha = sample.tau > 0 ? Shader::Space::Alpha(sample.tau) : 0.0f;
+    const float w = sample.transmittance_before * alpha;
+    depth += w * sample.t;
+    float seen;
+    const unsigned chosen = steps.Choose(sample.tau > 0, sample.transmittance_before,
+                                         sample.transmittance_before - w, lane, &seen);
+    if (chosen == 0) continue;
+    if (chosen >> lane & 1) {
+      const int at = (arrived + __popc(chosen & ((1u << lane) - 1))) % kWaiting;
+      const Vec3f& f = sample.cell.fraction;
+      waiting->place[at] = {__int_as_float(sample.cell.vertex), f.x, f.y, f.z};
+      waiting->weight[at] = opacity_step > 0 ? seen : w;
+    }
+    arrived += __popc(chosen);
+    __syncwarp();  // written by some lanes, read by others
+    while (arrived - shaded >= kSamples) shade();
+    __syncwarp();  // read before it is written again
+  }
+  if (arrived > shaded) shade();
+  __syncwarp();
+  const float left = expf(-march.optical_depth());
+  const float scale = opacity_step > 0 ? steps.Scale(left) : 1.0f;
+  return {shader.Sum() * scale + grid.background * left,
+          WarpSum(depth) * march.world_per_voxel(), left};
+}
+
+template <typename Shader, int kBasis, typename View, typename Rays>
+__global__ void __launch_bounds__(32 * kWarps, 5)
+    RenderRaysKernel(View grid, Rays rays, MarchOptions options, float opacity_step,
+                     DeviceRenderTarget target, bool finish) {
+  __shared__ PreparedRay prepared[kRays];
+  __shared__ RaySums sums[kRays];
+  __shared__ WaitingSamples waiting[kWarps];
+  const int thread = static_cast<int>(threadIdx.x), warp = thread / 32;
+  const int64_t index = blockIdx.x * int64_t{kRays} + thread;
+  Ray ray;
+  int64_t place;
+  if (thread < kRays) {
+    PreparedRay mine{};
+    if (rays.Get(index, &ray, &place)) {
+      mine.ray = ClipToGrid(grid.frame, ray, grid.near_clip, options.step);
+      ShBasis(kBasis, ray.direction, mine.basis);
+    }
+    prepared[thread] = mine;
+  }
+  __syncthreads();
+  for (int i = warp; i < kRays; i += kWarps) {
+    const RaySums result =
+        FollowRay<Shader>(grid, prepared[i], options, opacity_step, &waiting[warp]);
+    if (thread % 32 == 0) sums[i] = result;
+  }
+  __syncthreads();
+  if (thread >= kRays || !rays.Get(index, &ray, &place)) return;
+  RaySums mine = sums[thread];
+  if (finish) rays.Finish(ray, mine.transmittance, &mine.color, &mine.depth);
+  target.color[place] = mine.color;
+  target.depth[place] = mine.depth;
+  target.transmittance[place] = mine.transmittance;
+}
+
+// Goes on behind the box, where a field has layers there; a warp a ray.
+template <typename Rays>
+__global__ void RenderSpheresKernel(DeviceGridView grid, Rays rays, float stop,
+                                    DeviceRenderTarget target) {
+  Ray ray;
+  int64_t place;
+  if (!rays.Get((blockIdx.x * int64_t{blockDim.x} + threadIdx.x) / 32, &ray, &place)) return;
+  WarpLayers layers(grid, ray, target.transmittance[place], stop);
+  LaneLayer mine;
+  unsigned composited;
+  Vec3f color{};
+  float depth = 0;
+  while (layers.Next(&mine, &composited)) {
+    if (!(mine.tau > 0)) continue;
+    const float w = mine.Weight();
+    color += mine.Color() * w;
+    depth += w * mine.depth;
+  }
+  for (int c = 0; c < 3; ++c) color[c] = WarpSum(color[c]);
+  depth = target.depth[place] + WarpSum(depth);
+  if (layers.lane() != 0) return;
+  const float left = layers.left();
+  color += target.color[place] + grid.background * left;
+  rays.Finish(ray, left, &color, &depth);
+  target.color[place] = color;
+  target.depth[place] = depth;
+  target.transmittance[place] = left;
+}
+
+template <typename Rays>
+void RenderBlocks(const DeviceGrid& grid, const HalfGrid* half, const Rays& rays,
+                  const MarchOptions& options, float opacity_step,
+                  const DeviceRenderTarget& target) {
+  const auto blocks = static_cast<unsigned>(rays.Blocks());
+  if (blocks == 0) return;
+  const bool finish = !grid.spheres.on();
+  const auto render = [&](auto view, auto launch) {
+    if (!finish) view.background = {};  // the layers come first
+    launch(view);
+    CheckLaunch("render_rays");
+  };
+  if (half != nullptr && !half->empty()) {
+    render(half->view(grid), [&](const HalfGridView& view) {
+      RenderRaysKernel<HalfShader, 9>
+          <<<blocks, 32 * kWarps>>>(view, rays, options, opacity_step, target, finish);
+    });
+  } else {
+    ByBasis(grid.basis, [&](auto basis) {
+      render(grid.view(), [&](const DeviceGridView& view) {
+        RenderRaysKernel<FloatShader<basis.value>, basis.value>
+            <<<blocks, 32 * kWarps>>>(view, rays, options, opacity_step, target, finish);
+      });
+    });
+  }
+  if (finish) return;
+  RenderSpheresKernel<<<BlocksFor(int64_t{32} * kRays * blocks), kThreads>>>(
+      grid.view(), rays, options.stop_transmittance, target);
+  CheckLaunch("render_spheres");
+}
+
+}  // namespace
+
+void RenderOnDevice(const DeviceGrid& grid, const Ray* rays, int64_t n,
+                    const MarchOptions& options, const DeviceRenderTarget& target,
+                    float opacity_step) {
+  RenderBlocks(grid, nullptr, ListedRays{rays, n}, options, opacity_step, target);
+}
+
+void RenderFrameOnDevice(const DeviceGrid& grid, const Camera& camera,
+                         const MarchOptions& options, const DeviceRenderTarget& target,
+                         float opacity_step, const HalfGrid* half) {
+  REGRADE_CHECK(camera.lens == LensModel::kPinhole);
+  const DeviceRange range("frame");
+  RenderBlocks(grid, half, FrameRays{PinholeRays(camera), FinishPixel(camera)}, options,
+               opacity_step, target);
+}
+
+#else
+
+void RenderOnDevice(const DeviceGrid&, const Ray*, int64_t, const MarchOptions&,
+                    const DeviceRenderTarget&, float) {
+  DeviceWait("render_rays");
+}
+void RenderFrameOnDevice(const DeviceGrid&, const Camera&, const MarchOptions&,
+                         const DeviceRenderTarget&, float, const HalfGrid*) {
+  DeviceWait("render_rays");
+}
+
+#endif
+
+}  // namespace regrade

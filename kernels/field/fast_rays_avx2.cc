@@ -1,5 +1,0 @@
-// The fast path for processors with avx2 instructions (the build adds their flags to this file
-// alone).
-#define REGRADE_SIMD_NAMESPACE simd_avx2
-#define REGRADE_SIMD_NAME "avx2"
-#include "kernels/field/fast_rays_simd.h"

@@ -1,0 +1,137 @@
+#include "pipeline/capture/object_masks.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <utility>
+
+#include "kernels/base/error.h"
+#include "kernels/image/resize.h"
+#include "pipeline/capture/photo_names.h"
+#include "pipeline/files/folder_listing.h"
+#include "pipeline/images/image_file.h"
+#include "pipeline/workspace/stage_record.h"
+
+namespace regrade {
+namespace {
+
+// JPEG's ringing around a plain colour; labels must be further apart than twice that.
+constexpr float kSameLabel = 24.0f / 255;
+
+Vec3f ColorOf(const Image& image, int64_t pixel) {
+  const float* p = &image.pixels[static_cast<size_t>(pixel * image.channels)];
+  const float alpha = image.channels == 4 ? p[3] : 1;
+  const bool grey = image.channels < 3;
+  return Vec3f{p[0], p[grey ? 0 : 1], p[grey ? 0 : 2]} * alpha;
+}
+
+bool Same(const Vec3f& a, const Vec3f& b) {
+  return std::abs(a.x - b.x) <= kSameLabel && std::abs(a.y - b.y) <= kSameLabel &&
+         std::abs(a.z - b.z) <= kSameLabel;
+}
+
+// Plain colours but black, each on at least a thousandth of the picture: what lies between two
+// of them along an edge is less.
+std::vector<Vec3f> LabelsOf(const std::string& path) {
+  const Image mask = ReadImage(path);
+  std::vector<Vec3f> labels;
+  std::vector<int64_t> counts;
+  for (int64_t i = 0; i < mask.num_pixels(); ++i) {
+    const Vec3f color = ColorOf(mask, i);
+    if (Same(color, {0, 0, 0})) continue;
+    size_t k = 0;
+    while (k < labels.size() && !Same(labels[k], color)) ++k;
+    if (k == labels.size()) {
+      labels.push_back(color);
+      counts.push_back(0);
+      if (labels.size() > 4096) break;  // a photograph
+    }
+    ++counts[k];
+  }
+  std::vector<Vec3f> kept;
+  for (size_t k = 0; k < labels.size(); ++k)
+    if (counts[k] * 1000 >= mask.num_pixels()) kept.push_back(labels[k]);
+  if (kept.empty())
+    throw Error(ExitCode::kInput, "has no region: it is black all over", path,
+                "paint each region of the style in one plain colour");
+  if (kept.size() > ObjectMasks::kMostRegions)
+    throw Error(ExitCode::kInput,
+                "has " + std::to_string(kept.size()) + " colours, at most " +
+                    std::to_string(ObjectMasks::kMostRegions) + " are regions",
+                path, "paint each region in one plain colour, and save it as PNG");
+  return kept;
+}
+
+}  // namespace
+
+ObjectMasks::ObjectMasks(const MaskOptions& options, const std::vector<std::string>& photos)
+    : style_mask_(options.style_mask),
+      paths_(PicturesByPhotoName(options.masks, photos, "mask")) {
+  if (!style_mask_.empty()) labels_ = LabelsOf(style_mask_);
+}
+
+int ObjectMasks::num_known() const {
+  return static_cast<int>(std::count_if(paths_.begin(), paths_.end(),
+                                        [](const std::string& path) { return !path.empty(); }));
+}
+
+std::vector<Image> ObjectMasks::Regions(const std::string& path, int width, int height) const {
+  const Image mask = ReadImage(path);
+  CheckAspect(mask, width, height, path, ExitCode::kInput);
+  std::vector<Image> regions;
+  for (int k = 0; k < num_regions(); ++k) {
+    Image region(mask.width, mask.height, 1);
+    for (int64_t i = 0; i < mask.num_pixels(); ++i) {
+      const Vec3f color = ColorOf(mask, i);
+      float& m = region.pixels[static_cast<size_t>(i)];
+      if (labels_.empty())
+        m = (color.x + color.y + color.z) / 3;
+      else
+        m = Same(color, labels_[static_cast<size_t>(k)]) ? 1.0f : 0.0f;
+    }
+    regions.push_back(region.width == width && region.height == height
+                          ? std::move(region)
+                          : Resize(region, width, height));
+  }
+  // Labels nearer to each other than their tolerance would count a pixel twice.
+  for (int64_t i = 0; i < regions[0].num_pixels(); ++i) {
+    float sum = 0;
+    for (const Image& region : regions) sum += region.pixels[static_cast<size_t>(i)];
+    if (sum > 1)
+      for (Image& region : regions) region.pixels[static_cast<size_t>(i)] /= sum;
+  }
+  return regions;
+}
+
+std::vector<Image> ObjectMasks::Coverage(int view, int width, int height) const {
+  REGRADE_CHECK(Knows(view));
+  return Regions(paths_[static_cast<size_t>(view)], width, height);
+}
+
+Image ObjectMasks::StyleRegion(int region, int width, int height) const {
+  if (labels_.empty()) return {};
+  return Regions(style_mask_, width, height)[static_cast<size_t>(region)];
+}
+
+JsonValue MaskFiles(const MaskOptions& options) {
+  JsonValue hashes = JsonValue::Object();
+  for (const ListedFile& file : ListFolder(options.masks).files)
+    if (file.problem.empty()) hashes[file.name] = HashFile(file.path);
+  if (!options.style_mask.empty()) hashes["style mask"] = HashFile(options.style_mask);
+  return hashes;
+}
+
+void ProbeMasks(MaskOptions* options) {
+  namespace fs = std::filesystem;
+  for (const auto& [path, flag] :
+       {std::pair{&options->masks, "--masks"}, {&options->style_mask, "--style-mask"}}) {
+    if (path->empty()) continue;
+    std::error_code error;
+    if (!fs::exists(*path, error))
+      throw Error(ExitCode::kInput, "there is no such file or folder", *path,
+                  std::string("what ") + flag + " names must exist");
+    *path = fs::absolute(*path, error).lexically_normal().string();
+  }
+}
+
+}  // namespace regrade

@@ -1,0 +1,99 @@
+#include "pipeline/capture/photo_gains.h"
+
+#include <algorithm>
+
+#include "kernels/base/error.h"
+#include "kernels/scene/srgb.h"
+
+namespace regrade {
+namespace {
+
+constexpr double kNearlyClipped = 0.98;  // encoded
+
+JsonValue Triple(const Vec3d& v) { return JsonValue::Array{v.x, v.y, v.z}; }
+
+}  // namespace
+
+PhotoGains GainsOf(const ExposureEstimate& estimate, const std::vector<Vec3d>& clipped) {
+  PhotoGains gains;
+  double of_dark = 0, of_bright = 0;
+  int dark = 0, bright = 0;
+  for (size_t v = 0; v < estimate.photos.size(); ++v)
+    for (int c = 0; c < 3 && estimate.photos[v].known; ++c) {
+      const bool is_dark = estimate.photos[v].gain[c] < 1;
+      (is_dark ? of_dark : of_bright) += clipped[v][c];
+      ++(is_dark ? dark : bright);
+    }
+  // Of means, for there may be more photos of one kind.
+  const double share =
+      dark > 0 && of_bright > 0 ? std::min(1.0, of_dark / dark / (of_bright / bright)) : 0;
+  for (const PhotoExposure& photo : estimate.photos)
+    gains.of_view.push_back(photo.known ? PhotoGain{photo.gain, share} : kAsTaken);
+  return gains;
+}
+
+void UndoGain(const PhotoGain& gain, Image* photo) {
+  if (gain == kAsTaken) return;
+  for (size_t i = 0; i < photo->pixels.size(); ++i) {
+    float& value = photo->pixels[i];
+    const double factor = gain.light[static_cast<int>(i % 3)];
+    const double undone = SrgbFromLinear(std::min(1.0, LinearFromSrgb(value) / factor));
+    // A photo made smaller has values between at the rim of what was clipped.
+    const double t = std::clamp((value - kNearlyClipped) / (1 - kNearlyClipped), 0.0, 1.0);
+    const double up = factor > 1 ? gain.highlights * t * t * (3 - 2 * t) : 0;
+    value = static_cast<float>(undone + up * (1 - undone));
+  }
+}
+
+void PutGain(const PhotoGain& gain, Image* picture) {
+  if (gain == kAsTaken) return;
+  for (size_t i = 0; i < picture->pixels.size(); ++i) {
+    float& value = picture->pixels[i];
+    const double light =
+        LinearFromSrgb(std::clamp(value, 0.0f, 1.0f)) * gain.light[static_cast<int>(i % 3)];
+    value = static_cast<float>(SrgbFromLinear(std::min(1.0, light)));
+  }
+}
+
+JsonValue GainsRecord(const Capture& capture, const ExposureEstimate& estimate,
+                      const PhotoGains& gains) {
+  JsonValue::Array rows;
+  for (size_t v = 0; v < capture.views.size(); ++v) {
+    const PhotoExposure& photo = estimate.photos[v];
+    rows.push_back(JsonValue::Object{{"file", capture.views[v].file},
+                                     {"gain", Triple(photo.gain)},
+                                     {"highlights", gains.Of(static_cast<int>(v)).highlights},
+                                     {"log_error", Triple(photo.log_error)},
+                                     {"observations", photo.observations}});
+  }
+  return rows;
+}
+
+JsonValue RecordedGainRows(const Workspace& workspace) {
+  const auto record = workspace.Find("reconstruct");
+  const JsonValue* const rows = record ? record->figures.Find("exposure") : nullptr;
+  return rows ? *rows : JsonValue();
+}
+
+PhotoGains RecordedGains(const Workspace& workspace, const Capture& capture) {
+  const JsonValue rows = RecordedGainRows(workspace);
+  PhotoGains gains;
+  if (rows.IsNull()) return gains;
+  bool fits = rows.AsArray().size() == capture.views.size();
+  for (size_t v = 0; fits && v < capture.views.size(); ++v) {
+    const JsonValue& row = rows.AsArray()[v];
+    const JsonValue::Array& gain = row.At("gain").AsArray();
+    fits = row.At("file").AsString() == capture.views[v].file && gain.size() == 3 &&
+           std::all_of(gain.begin(), gain.end(),
+                       [](const JsonValue& value) { return value.AsDouble() > 0; });
+    if (fits)
+      gains.of_view.push_back({{gain[0].AsDouble(), gain[1].AsDouble(), gain[2].AsDouble()},
+                               row.At("highlights").AsDouble()});
+  }
+  if (!fits)
+    throw Error(ExitCode::kInput, "the recorded exposures are not those of its photos",
+                workspace.folder(), "use --restart-from reconstruct");
+  return gains;
+}
+
+}  // namespace regrade

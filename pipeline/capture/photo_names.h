@@ -1,0 +1,23 @@
+// Pictures that belong to photos by their names: masks, and styled pictures from elsewhere.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "kernels/base/error.h"
+#include "kernels/scene/image.h"
+
+namespace regrade {
+
+// The picture in `folder` for each photo, by the names' stems, the photo's own extension kept
+// or not (IMG_7.jpg.png); empty where there is none.
+// `what` names such pictures ("mask"). Throws as MakeFolderStylizer does.
+std::vector<std::string> PicturesByPhotoName(const std::string& folder,
+                                             const std::vector<std::string>& photos,
+                                             const std::string& what);
+
+// Throws Error(code) if the sides of `picture` have another ratio than width and height.
+void CheckAspect(const Image& picture, int width, int height, const std::string& where,
+                 ExitCode code);
+
+}  // namespace regrade

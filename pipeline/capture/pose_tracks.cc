@@ -1,0 +1,105 @@
+#include "pipeline/capture/pose_tracks.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+
+#include "kernels/base/error.h"
+#include "pipeline/capture/scene_profile.h"
+#include "pipeline/program/cpu_time.h"
+#include "reconstruct/colmap/tracks_for_poses.h"
+
+namespace regrade {
+namespace {
+
+constexpr char kUnjudged[] =
+    " Exposure and the poses stay unjudged, and the box is a guess from the cameras";
+
+std::string Summary(const FoundTracks& found, double seconds, double cpu_seconds) {
+  char text[256];
+  std::snprintf(text, sizeof text,
+                "the poses came without points: COLMAP %s found %zu, seen %lld times, %.2f px "
+                "from where the poses expect them in the median, in %.0f s (%.0f s of CPU); "
+                "--tracks given goes without",
+                found.colmap_version.c_str(), found.model.points.size(),
+                static_cast<long long>(found.sightings), found.median_px, seconds, cpu_seconds);
+  return text;
+}
+
+// Wrong poses find points, too: a match between two photos may fit them by chance, a third
+// photo's sighting besides hardly ever does.
+bool Believable(const FoundTracks& found) {
+  const double points = static_cast<double>(found.model.points.size());
+  return found.model.points.size() >= kFewestTracks &&
+         static_cast<double>(found.sightings) >= kFewestSightingsOfAPoint * points;
+}
+
+std::string DoubtText(const FoundTracks& found) {
+  char text[256];
+  std::snprintf(text, sizeof text,
+                "under the poses that were given COLMAP found %zu points, seen %.1f times on "
+                "average: little texture, or do the poses not belong to these photos?",
+                found.model.points.size(),
+                found.model.points.empty()
+                    ? 0.0
+                    : static_cast<double>(found.sightings) /
+                          static_cast<double>(found.model.points.size()));
+  return text + std::string(kUnjudged);
+}
+
+}  // namespace
+
+bool WantsTracks(const PoseOptions& options, const std::string& effects,
+                 const Capture& capture) {
+  if (options.tracks != "auto" || !capture.points.empty()) return false;
+  const auto wishes = ParseEffects(effects);
+  const auto alpha = wishes.find("alpha");
+  return alpha == wishes.end() ? !ShowsThroughPhotos(capture) : !alpha->second;
+}
+
+PoseTracks AddTracks(const PoseOptions& options, const std::string& effects,
+                     const std::string& sparse_folder, const std::vector<StagedPhoto>& photos,
+                     const std::string& work_folder, Capture* capture,
+                     const ProgressFunction& progress) {
+  PoseTracks result;
+  if (!WantsTracks(options, effects, *capture)) return result;
+  using Clock = std::chrono::steady_clock;
+  const Clock::time_point began = Clock::now();
+  const double cpu_before = CpuSeconds();
+  FoundTracks found;
+  try {
+    found =
+        TracksForPoses(ReadColmapModel(sparse_folder), photos, options, work_folder, progress);
+  } catch (const Error& error) {
+    if (error.code() != ExitCode::kExternalProgram) throw;
+    result.note =
+        "no tracks were found for the poses, for " + error.what_failed() + "." + kUnjudged;
+    result.figures = JsonValue::Object{{"points", 0}, {"failed", error.what_failed()}};
+    return result;
+  }
+  const double seconds = std::chrono::duration<double>(Clock::now() - began).count();
+  const double cpu_seconds = CpuSeconds() - cpu_before;
+  result.figures =
+      JsonValue::Object{{"points", static_cast<int64_t>(found.model.points.size())},
+                        {"sightings", found.sightings},
+                        {"median_px", found.median_px},
+                        {"pairs", found.pairs},
+                        {"colmap", found.colmap_version},
+                        {"seconds", seconds},
+                        {"cpu_seconds", cpu_seconds}};
+  if (!Believable(found)) {
+    result.note = DoubtText(found);
+    return result;
+  }
+  WriteColmapModel(found.model, sparse_folder);
+  Capture tracked = CaptureFromModel(found.model, photos, PhotoNames::kStaged);
+  capture->points = std::move(tracked.points);
+  capture->reprojection_px = tracked.reprojection_px;
+  int side = 0;
+  for (const StagedPhoto& photo : photos) side = std::max({side, photo.width, photo.height});
+  result.misfit_scale = std::max(1.0, static_cast<double>(side) / options.image_size);
+  result.note = Summary(found, seconds, cpu_seconds);
+  return result;
+}
+
+}  // namespace regrade

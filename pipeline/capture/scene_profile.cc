@@ -1,0 +1,235 @@
+#include "pipeline/capture/scene_profile.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+
+#include "kernels/base/error.h"
+#include "pipeline/capture/track_colors.h"
+#include "pipeline/capture/working_views.h"
+#include "pipeline/images/image_file.h"
+#include "reconstruct/scene/forward_facing.h"
+#include "reconstruct/scene/visual_hull.h"
+
+namespace regrade {
+namespace {
+
+constexpr int kOutlineSide = 512;
+constexpr double kAlphaShare = 0.02;  // of the pixels; less is a photo with a soft edge
+constexpr const char* kNames[] = {"ndc",      "alpha",         "background",
+                                  "exposure", kViewDependence, kPoseRefinement};
+
+EffectReport Row(const char* name, bool on, double value, double threshold,
+                 const std::string& evidence) {
+  return {name, on, evidence, value, threshold};
+}
+
+std::string Short(const Figure& figure) {
+  if (!figure.value) return figure.why;
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g", *figure.value);
+  return text;
+}
+
+std::string AlphaPath(const CaptureView& view) {
+  const size_t dot = view.path.rfind(".png");
+  return dot == std::string::npos ? "" : view.path.substr(0, dot) + ".alpha.png";
+}
+
+// An outline of at most kOutlineSide pixels, each the most opaque of those it stands for:
+// hundreds of large photos need not be in memory at once.
+Outline Reduced(const Outline& full) {
+  const int side = std::max(full.alpha.width, full.alpha.height);
+  const int factor = (side + kOutlineSide - 1) / kOutlineSide;
+  if (factor <= 1) return full;
+  const int width = full.alpha.width / factor, height = full.alpha.height / factor;
+  Outline small{full.camera.Resized(width, height), Image(width, height, 1)};
+  for (int y = 0; y < height * factor; ++y)
+    for (int x = 0; x < width * factor; ++x) {
+      float& most = *small.alpha.at(x / factor, y / factor);
+      most = std::max(most, *full.alpha.at(x, y));
+    }
+  return small;
+}
+
+// Outlines of all photos; empty unless each has one.
+std::vector<Outline> ReadOutlines(const Capture& capture) {
+  std::vector<Outline> outlines;
+  for (const CaptureView& view : capture.views)
+    if (!std::filesystem::is_regular_file(AlphaPath(view))) return {};
+  for (const CaptureView& view : capture.views)
+    outlines.push_back(Reduced({view.camera, ReadImage(AlphaPath(view))}));
+  return outlines;
+}
+
+double TransparentShare(const std::vector<Outline>& outlines) {
+  int64_t clear = 0, all = 0;
+  for (const Outline& outline : outlines) {
+    all += outline.alpha.num_pixels();
+    clear += std::count_if(outline.alpha.pixels.begin(), outline.alpha.pixels.end(),
+                           [](float a) { return a < 0.5f; });
+  }
+  return all > 0 ? static_cast<double>(clear) / static_cast<double>(all) : 0;
+}
+
+JsonValue NumberOrNull(const Figure& figure) {
+  return figure.value ? JsonValue(*figure.value) : JsonValue();
+}
+Figure FigureOrNone(const JsonValue& value) {
+  return value.IsNumber() ? Figure(value.AsDouble()) : Figure();
+}
+
+// The photos that keep their exposure for want of evidence.
+void NameUnknownPhotos(const Capture& capture, SceneProfile* profile) {
+  std::string names;
+  for (size_t v = 0; v < capture.views.size(); ++v)
+    if (!profile->exposure.photos[v].known)
+      names += (names.empty() ? "" : ", ") + capture.views[v].file;
+  if (!names.empty())
+    profile->notices.push_back("exposure: taken as they are, having fewer than " +
+                               std::to_string(kFewestColors) +
+                               " colours in common with other photos: " + names);
+}
+
+std::string GainsEvidence(const ExposureEstimate& exposure) {
+  char spread[96];
+  std::snprintf(spread, sizeof spread, "; gains spread by %.3g, known to %.2g; ",
+                exposure.spread, exposure.median_error);
+  return "share of the photos' disagreement about points' colours that gains found without "
+         "those points take away" +
+         std::string(spread) + "a spread up to " + Short(Figure{kExposureSpread}) +
+         " is left alone";
+}
+
+// The row "exposure", and where it is on the gains.
+void ProfileExposure(const Capture& capture, const std::map<std::string, bool>& wishes,
+                     bool alpha, SceneProfile* profile) {
+  const auto wish = wishes.find("exposure");
+  const bool asked_for = wish != wishes.end() && wish->second;
+  const auto leave_out = [&](const char* why) {
+    if (asked_for) throw Error(ExitCode::kScene, why, "--effects exposure=on");
+    profile->effects.push_back({"exposure", false, why, Figure(), kExposureSpread});
+  };
+  if (wish != wishes.end() && !wish->second) return leave_out("it was not wanted");
+  if (alpha) return leave_out("the white behind transparent photos has no exposure");
+  if (capture.points.empty())
+    return leave_out("the poses came without points to compare colours at");
+  const TrackColors colors = ReadTrackColors(capture);
+  profile->exposure =
+      EstimateExposure(static_cast<int>(capture.views.size()), colors.observations);
+  const ExposureEstimate& exposure = profile->exposure;
+  const bool on = asked_for || exposure.Pays();
+  profile->effects.push_back(
+      Row("exposure", on, exposure.explained, exposure.Threshold(), GainsEvidence(exposure)));
+  if (!on) return;
+  profile->gains = GainsOf(exposure, colors.clipped);
+  NameUnknownPhotos(capture, profile);
+}
+
+}  // namespace
+
+bool ShowsThroughPhotos(const Capture& capture) {
+  return TransparentShare(ReadOutlines(capture)) > kAlphaShare;
+}
+
+std::map<std::string, bool> ParseEffects(const std::string& text) {
+  std::map<std::string, bool> wishes;
+  for (size_t begin = 0; begin <= text.size();) {
+    const size_t end = std::min(text.find(',', begin), text.size());
+    const std::string word = text.substr(begin, end - begin);
+    begin = end + 1;
+    if (word == "auto") continue;
+    const size_t equals = word.find('=');
+    const std::string name = word.substr(0, equals);
+    const std::string wish = equals == std::string::npos ? "" : word.substr(equals + 1);
+    const bool known =
+        std::find(std::begin(kNames), std::end(kNames), name) != std::end(kNames);
+    if (!known || (wish != "on" && wish != "off"))
+      throw Error(ExitCode::kUsage, "'" + word + "' is not allowed", "--effects",
+                  "auto, or on|off of ndc, alpha, background, exposure, view-dependence and "
+                  "pose-refinement: ndc=on,exposure=off");
+    wishes[name] = wish == "on";
+  }
+  return wishes;
+}
+
+SceneProfile ProfileScene(const Capture& capture, int sh_degree, const std::string& effects) {
+  const std::map<std::string, bool> wishes = ParseEffects(effects);
+  const auto decided = [&wishes](const char* name, bool measured) {
+    const auto wish = wishes.find(name);
+    return wish == wishes.end() ? measured : wish->second;
+  };
+  SceneProfile profile;
+  double shift = 0;
+  for (const CaptureView& view : capture.views)
+    shift = std::max(shift, view.camera.MaxCornerDistortion());
+  profile.effects.push_back(
+      Row("distortion", shift > kDistortionThreshold, shift, kDistortionThreshold,
+          "largest shift of a picture's corner by the lens, over the cameras, in pixels"));
+
+  const std::vector<Outline> outlines = ReadOutlines(capture);
+  const double clear = TransparentShare(outlines);
+  const bool alpha = decided("alpha", clear > kAlphaShare);
+
+  const ForwardFacing forward = MeasureForwardFacing(capture);
+  const bool ndc = decided("ndc", forward.on && !alpha);
+  profile.effects.push_back(Row("ndc", ndc, forward.angle_deg, kForwardAngle,
+                                "on where all cameras look one way: largest angle of an "
+                                "optical axis to their mean, degrees"));
+  profile.effects.push_back(Row("alpha", alpha, clear, kAlphaShare,
+                                "share of transparent pixels, where every photo has some"));
+  const Surroundings surroundings = MeasureSurroundings(capture);
+  const bool background =
+      decided("background", surroundings.far_share > kFarShare && !ndc && !alpha);
+  if (background && (ndc || alpha))
+    throw Error(ExitCode::kUsage,
+                std::string("background spheres do not go with ") + (ndc ? "ndc" : "alpha"),
+                "--effects background=on", ndc ? "add ndc=off" : "add alpha=off");
+  profile.effects.push_back(Row("background", background, surroundings.far_share, kFarShare,
+                                "spheres behind the box, on where much is far all round: share "
+                                "of sightings of points beyond four times the cameras' reach"));
+  profile.effects.push_back(Row(kViewDependence, sh_degree > 0, sh_degree, 0,
+                                "spherical harmonics degree of the fit, as set"));
+
+  profile.scene = ndc          ? NormalizeForwardFacing(capture, forward)
+                  : background ? NormalizeSurrounded(capture, surroundings)
+                               : NormalizeScene(capture);
+  if (alpha && !outlines.empty()) {
+    if (!ndc) profile.scene = TightenToOutlines(profile.scene, outlines);
+    profile.scene.box.background = Vec3f{1, 1, 1};  // what transparent photos are laid over
+  }
+  ProfileExposure(capture, wishes, alpha, &profile);
+  return profile;
+}
+
+std::string EffectLine(const EffectReport& effect) {
+  if (!effect.value.value)
+    return effect.name + (effect.on ? " on: " : " off: ") + effect.value.why + " (" +
+           effect.evidence + ")";
+  return effect.name + (effect.on ? " on: " : " off: ") + Short(effect.value) +
+         (effect.threshold.value && *effect.value.value > *effect.threshold.value ? " > "
+                                                                                  : " <= ") +
+         Short(effect.threshold) + " (" + effect.evidence + ")";
+}
+
+JsonValue EffectsRecord(const std::vector<EffectReport>& effects) {
+  JsonValue::Array rows;
+  for (const EffectReport& effect : effects)
+    rows.push_back(JsonValue::Object{{"name", effect.name},
+                                     {"on", effect.on},
+                                     {"evidence", effect.evidence},
+                                     {"value", NumberOrNull(effect.value)},
+                                     {"threshold", NumberOrNull(effect.threshold)}});
+  return rows;
+}
+
+std::vector<EffectReport> EffectsOfRecord(const JsonValue& record) {
+  std::vector<EffectReport> effects;
+  for (const JsonValue& row : record.AsArray())
+    effects.push_back({row.At("name").AsString(), row.At("on").AsBool(),
+                       row.At("evidence").AsString(), FigureOrNone(row.At("value")),
+                       FigureOrNone(row.At("threshold"))});
+  return effects;
+}
+
+}  // namespace regrade

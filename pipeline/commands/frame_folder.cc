@@ -1,0 +1,129 @@
+#include "pipeline/commands/frame_folder.h"
+
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+#include <optional>
+#include <set>
+
+#include "kernels/base/error.h"
+#include "pipeline/files/folder_listing.h"
+#include "pipeline/images/image_file.h"
+
+namespace regrade {
+namespace {
+
+// "shot_00012.png": what stands before the last digits of the stem, and the digits.
+struct NumberedName {
+  std::string before, digits;
+  int64_t number = 0;
+};
+
+std::optional<NumberedName> SplitName(const std::string& name) {
+  std::string stem = std::filesystem::path(name).replace_extension().string();
+  const auto digit = [&](size_t i) {
+    return std::isdigit(static_cast<unsigned char>(stem[i])) != 0;
+  };
+  size_t end = stem.size();
+  while (end > 0 && !digit(end - 1)) --end;
+  size_t begin = end;
+  while (begin > 0 && digit(begin - 1)) --begin;
+  if (begin == end || end - begin > 15) return std::nullopt;  // 15 digits fit an int64
+  const std::string digits = stem.substr(begin, end - begin);
+  return NumberedName{stem.substr(0, begin), digits, std::stoll(digits)};
+}
+
+// Empty unless all names are one beginning and a number.
+std::vector<NumberedName> Numbers(const std::vector<std::string>& names) {
+  std::vector<NumberedName> numbers;
+  for (const std::string& name : names) {
+    const auto split = SplitName(name);
+    if (!split || (!numbers.empty() && split->before != numbers.front().before)) return {};
+    numbers.push_back(*split);
+  }
+  return numbers;
+}
+
+std::string Padded(int64_t number, size_t digits) {
+  const std::string text = std::to_string(number);
+  return std::string(digits > text.size() ? digits - text.size() : 0, '0') + text;
+}
+
+void CheckNumbers(const FrameFolder& frames) {
+  const std::vector<NumberedName> numbers = Numbers(frames.names);
+  if (numbers.size() < 2) return;
+  int64_t step = numbers[1].number - numbers[0].number;  // 2 where every other frame was kept
+  for (size_t i = 1; i < numbers.size(); ++i)
+    step = std::min(step, numbers[i].number - numbers[i - 1].number);
+  for (size_t i = 1; i < numbers.size(); ++i) {
+    const NumberedName &last = numbers[i - 1], &next = numbers[i];
+    const std::string both = frames.names[i - 1] + " and " + frames.names[i];
+    if (next.number == last.number)
+      throw Error(ExitCode::kInput, both + " have the same number", frames.folder,
+                  "keep one of them");
+    if (step > 0 && next.number != last.number + step)
+      throw Error(ExitCode::kInput,
+                  "frame " + Padded(last.number + step, last.digits.size()) +
+                      " is missing between " + both,
+                  frames.folder, "add it; if the jump is meant, number the frames without one");
+  }
+}
+
+std::string SizeText(const Image& image) {
+  return std::to_string(image.width) + " x " + std::to_string(image.height) + " px";
+}
+
+}  // namespace
+
+FrameSource FrameFolder::Source() const {
+  return {static_cast<int>(paths.size()),
+          [paths = paths](int i) { return ReadImage(paths.at(static_cast<size_t>(i))); }};
+}
+
+FrameFolder OpenFrameFolder(const std::string& folder, const ProgressFunction& progress) {
+  FrameFolder frames;
+  frames.folder = folder;
+  for (const ListedFile& file : ListFolder(folder).files) {
+    if (!file.problem.empty())
+      throw Error(ExitCode::kInput, "a frame cannot be opened: " + file.problem,
+                  folder + "/" + file.name, "the folder shall hold the frames and no more");
+    frames.paths.push_back(file.path);
+    frames.names.push_back(file.name);
+  }
+  if (frames.paths.empty()) throw Error(ExitCode::kInput, "there are no frames here", folder);
+  CheckNumbers(frames);
+  std::optional<Image> first;
+  for (size_t i = 0; i < frames.paths.size(); ++i) {
+    Image image = ReadImage(frames.paths[i]);
+    if (first && !image.SameSize(*first))
+      throw Error(ExitCode::kInput,
+                  "this frame is " + SizeText(image) + ", " + frames.names.front() + " is " +
+                      SizeText(*first),
+                  frames.paths[i], "render all frames at one size");
+    if (!first) first = std::move(image);
+    if (Report(progress, static_cast<double>(i + 1),
+               static_cast<double>(frames.paths.size())) == Verdict::kAbort)
+      throw Interrupted();
+  }
+  return frames;
+}
+
+void CheckSameFrames(const FrameFolder& reference, const FrameFolder& sequence) {
+  if (reference.paths.size() == sequence.paths.size()) return;
+  const bool more = reference.paths.size() > sequence.paths.size();
+  const FrameFolder &longer = more ? reference : sequence,
+                    &shorter = more ? sequence : reference;
+  std::string who;
+  const std::vector<NumberedName> have = Numbers(shorter.names), want = Numbers(longer.names);
+  std::set<int64_t> known;
+  for (const NumberedName& name : have) known.insert(name.number);
+  for (size_t i = 0; i < want.size() && !known.empty() && who.empty(); ++i)
+    if (!known.count(want[i].number))
+      who = "; " + longer.names[i] + " of " + longer.folder + " has no counterpart";
+  throw Error(ExitCode::kInput,
+              std::to_string(sequence.paths.size()) + " frames, the reference has " +
+                  std::to_string(reference.paths.size()) + who,
+              sequence.folder, "evaluate the same frames of each");
+}
+
+}  // namespace regrade

@@ -1,0 +1,135 @@
+// regrade run, pose, reconstruct: the road from photos, or a part of it.
+#include <omp.h>
+
+#include <filesystem>
+
+#include "kernels/base/error.h"
+#include "pipeline/capture/capture_store.h"
+#include "pipeline/capture/photo_masks.h"
+#include "pipeline/commands/command.h"
+#include "pipeline/images/image_file.h"
+#include "pipeline/program/device_choice.h"
+#include "pipeline/run/plan.h"
+#include "pipeline/run/run_file.h"
+#include "pipeline/run_pipeline.h"
+#include "pipeline/stages/evaluation_networks.h"
+#include "pipeline/stages/make_stylizer.h"
+#include "pipeline/stages/stages.h"
+
+namespace regrade {
+namespace {
+
+// Defaults, then the preset, then --config, then flags: each may be narrower than the last. A
+// preset given as a flag is stronger than a whole run.json.
+Arguments ReadSettings(const Arguments& arguments, RunContext* context) {
+  Arguments words = context->options.Parse(arguments);
+  const auto flag = context->options.Given("preset");
+  RunFile file;
+  if (const auto config = context->options.Given("config")) {
+    file = ReadRunFile(*config);
+    if (words.empty()) words = file.words;
+    const JsonValue* preset = file.options.Find("preset");
+    if (!flag && preset != nullptr && preset->IsString())
+      ApplyPreset(preset->AsString(), &context->settings);
+    context->options.ApplyConfig(file.options, *config);
+  }
+  if (flag) ApplyPreset(*flag, &context->settings);
+  ApplyRecipeFlag(&context->options, &context->settings);
+  context->options.ApplyFlags();
+  return words;
+}
+
+// All inputs are looked at before long work starts.
+void ProbeInputs(const std::string& last, RunContext* context) {
+  if (!std::filesystem::exists(context->source))
+    throw Error(ExitCode::kInput, "there is no such folder", context->source,
+                "name a folder of photos");
+  const std::filesystem::path out =
+      std::filesystem::weakly_canonical(context->settings.run.out);
+  const bool posed = DetectCapture(context->source).kind == CaptureKind::kPosed;
+  for (const std::filesystem::path& folder : {out, out / "poses"})
+    if (posed && std::filesystem::weakly_canonical(context->source) == folder)
+      throw Error(ExitCode::kUsage, "is the capture itself, and would be written over", "--out",
+                  "name another folder; to go on in this one, give the photos it was made of");
+  if (std::string& masks = context->settings.pose.photo_masks; !masks.empty()) {
+    PhotoMaskFiles(masks);
+    masks = std::filesystem::absolute(masks).lexically_normal().string();
+  }
+  if (last == "pose" || last == "reconstruct") return;
+  if (context->settings.style.picture.empty())
+    throw Error(ExitCode::kUsage, "its value is missing", "--style",
+                "name the picture whose colours the scene shall have");
+  ReadStylePicture(context->settings.style.picture, nullptr);
+  ProbeMethod(&context->settings.style_2d);
+  ProbeMasks(&context->settings.object);
+  ProbeEvaluationNetworks(context->settings.consistency);
+}
+
+// What a dry run can say of a folder that is not there yet: photos are taken as 4 : 3, the
+// scene's box as a cube.
+void PrintPlan(const std::string& last, RunContext* context) {
+  const RunSettings& settings = context->settings;
+  const Stage pose = PoseStage(context);
+  context->console->Info(settings.run.out + " is new: every stage would be done, from " +
+                         pose.plan);
+  if (last == "pose") return;
+  const int threads = omp_get_max_threads();
+  const int64_t photos = static_cast<int64_t>(pose.inputs.At("photos").AsObject().size());
+  const int64_t side = settings.scene.photo_size;
+  context->console->Info(
+      "reconstruct: " +
+      PlanText(ChooseBackend(settings.run.device, settings.run.reproducible) == Backend::kCuda
+                   ? PlanFitOnDevice(settings.fit, photos * side * side * 3 / 4, SceneBox())
+                   : PlanFit(settings.fit, photos * side * side * 3 / 4, SceneBox(), threads)));
+  if (last == "reconstruct") return;
+  context->console->Info("stylize: " + PlanText(PlanStyle(settings.network.steps, threads)));
+}
+
+std::string Absolute(const std::string& path) {
+  std::error_code error;
+  const auto absolute = std::filesystem::absolute(path, error);
+  if (error)
+    throw Error(ExitCode::kResources, "the working folder is gone: " + error.message(), path,
+                "start from a folder that exists");
+  return absolute.lexically_normal().string();
+}
+
+}  // namespace
+
+void RunRoad(const Command& command, const Arguments& arguments, Console* console) {
+  const std::string name = command.name;
+  const std::string last = name == "run" ? "report" : name;
+  RunContext context;
+  context.console = console;
+  context.settings.Bind(&context.options);
+  if (PrintedHelp(command, arguments, context.options)) return;
+  const Arguments words = ReadSettings(arguments, &context);
+  RunSettings& settings = context.settings;
+  CheckWords(command, words, 1, 1);
+  if (settings.run.out.empty())
+    throw Error(ExitCode::kUsage, "its value is missing", "--out",
+                "name the folder that the results shall go to");
+  CheckTogether(settings);
+  ChooseBackend(settings.run.device, settings.run.reproducible);
+  ApplyProgramOptions(settings.program);
+  context.source = Absolute(words[0]);
+  if (!settings.style.picture.empty())
+    settings.style.picture = Absolute(settings.style.picture);
+  settings.run.out = Absolute(settings.run.out);
+  ProbeInputs(last, &context);
+
+  if (settings.start.dry_run && !Workspace::Exists(settings.run.out)) {
+    PrintPlan(last, &context);
+    return;
+  }
+  Workspace workspace(settings.run.out, settings.start.break_lock);
+  context.workspace = &workspace;
+  console->OpenLog(workspace.Path(".regrade/log.txt"));
+  // Later commands over this folder start from its options, also after an interruption.
+  const bool first_start = !std::filesystem::exists(workspace.Path("run.json"));
+  if (first_start && !settings.start.dry_run) WriteRunFile(name, context);
+  RunPipeline("pose", last, &context);
+  if (!settings.start.dry_run) WriteRunFile(name, context);
+}
+
+}  // namespace regrade

@@ -1,0 +1,231 @@
+#include "pipeline/fields/field_file.h"
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "kernels/base/error.h"
+#include "kernels/base/half.h"
+#include "kernels/scene/camera_checks.h"
+#include "pipeline/files/npz_file.h"
+
+namespace regrade {
+namespace {
+
+constexpr int32_t kVersion = 1;
+constexpr int kStoredBasis = 9;
+constexpr int64_t kSphericalHarmonics = 1;  // svox2's basis_type
+
+Buffer<uint16_t> PackedColours(const Appearance& appearance, int64_t voxels) {
+  Buffer<uint16_t> packed(voxels * 3 * kStoredBasis);  // zero
+#pragma omp parallel for schedule(static)
+  for (int64_t i = 0; i < voxels; ++i)
+    for (int channel = 0; channel < 3; ++channel)
+      for (int k = 0; k < appearance.basis; ++k)
+        packed[(i * 3 + channel) * kStoredBasis + k] = HalfFromFloat(std::clamp(
+            appearance.sh[(i * 3 + channel) * appearance.basis + k], -kMaxHalf, kMaxHalf));
+  return packed;
+}
+
+float ValueAt(const NpzArray& array, int64_t i) {
+  return array.type == ArrayType::kF16 ? FloatFromHalf(array.As<uint16_t>()[i])
+                                       : array.As<float>()[i];
+}
+
+// Colour columns [first, first + 3 * stored) of `array`, of which the first `basis` harmonics
+// of each channel are kept.
+Buffer<float> UnpackedColours(const NpzArray& array, int64_t first, int stored, int basis) {
+  const int64_t voxels = array.shape[0], columns = array.shape[1];
+  Buffer<float> sh(voxels * 3 * basis);
+#pragma omp parallel for schedule(static)
+  for (int64_t i = 0; i < voxels; ++i)
+    for (int channel = 0; channel < 3; ++channel)
+      for (int k = 0; k < basis; ++k)
+        sh[(i * 3 + channel) * basis + k] =
+            ValueAt(array, i * columns + first + channel * stored + k);
+  return sh;
+}
+
+[[noreturn]] void Refuse(const std::string& path, const std::string& why,
+                         const std::string& hint = "") {
+  throw Error(ExitCode::kInput, why, path, hint);
+}
+
+Vec3f ReadVec3(NpzReader* file, const std::string& name) {
+  const NpzArray array = file->Read(name, ArrayType::kF32, {3});
+  const float* values = array.As<float>();
+  return {values[0], values[1], values[2]};
+}
+
+void CheckReadable(NpzReader* file) {
+  RefuseNewerFormat(file, kVersion);
+  if (file->Has("basis_type")) {
+    const NpzArray type = file->Read("basis_type");
+    const bool wide = type.type == ArrayType::kI64, narrow = type.type == ArrayType::kI32;
+    if (type.num_elements() != 1 || !(wide || narrow) ||
+        (wide ? *type.As<int64_t>() : *type.As<int32_t>()) != kSphericalHarmonics)
+      Refuse(file->path(), "its colours are not spherical harmonics",
+             "train the checkpoint with svox2's default basis");
+  }
+}
+
+// svox2's arrays: links [2R, R], and by column and layer red, green, blue, density.
+void AddSpheres(const RadianceField& field, std::vector<float>* texels, NpzWriter* file) {
+  const SphereGeometry& spheres = field.geometry->spheres;
+  if (!spheres.on()) return;
+  texels->resize(static_cast<size_t>(4 * spheres.num_texels()));
+  for (int64_t i = 0; i < spheres.num_texels(); ++i) {
+    float* const texel = texels->data() + 4 * i;
+    std::copy_n(field.appearance.sphere_color.data() + 3 * i, 3, texel);
+    texel[3] = spheres.density[i];
+  }
+  file->Add("background_links", {2 * spheres.resolution, spheres.resolution},
+            spheres.links.data(), NpzPacking::kDeflate);
+  file->Add("background_data", {spheres.num_columns(), spheres.layers, 4}, texels->data());
+}
+
+void ReadSpheres(NpzReader* file, SphereGeometry* spheres, Buffer<float>* color) {
+  if (!file->Has("background_links")) return;
+  const NpzArray links = file->Read("background_links", ArrayType::kI32, {-1, -1});
+  const NpzArray data = file->Read("background_data", ArrayType::kF32, {-1, -1, 4});
+  if (links.shape[0] != 2 * links.shape[1] || links.shape[1] > kMaxSphereResolution ||
+      data.shape[1] < 1 || data.shape[1] > kMaxLayers)
+    Refuse(
+        file->path(),
+        "a background of " + links.ShapeText() + " texels and " + data.ShapeText() + " values",
+        "the map is twice as wide as high, of at most " + std::to_string(kMaxSphereResolution) +
+            " and " + std::to_string(kMaxLayers) + " layers");
+  spheres->layers = static_cast<int>(data.shape[1]);
+  spheres->resolution = static_cast<int>(links.shape[1]);
+  spheres->links.Resize(links.num_elements());
+  for (int64_t i = 0; i < links.num_elements(); ++i)
+    spheres->links[i] = std::max(links.As<int32_t>()[i], -1);
+  const int64_t texels = data.shape[0] * data.shape[1];
+  spheres->density.Resize(texels);
+  color->Resize(3 * texels);
+  for (int64_t i = 0; i < texels; ++i) {
+    const float* const texel = data.As<float>() + 4 * i;
+    std::copy_n(texel, 3, color->data() + 3 * i);
+    spheres->density[i] = texel[3];
+  }
+}
+
+Geometry ReadGeometry(NpzReader* file) {
+  Geometry geometry;
+  geometry.frame.radius = ReadVec3(file, "radius");
+  geometry.frame.center = ReadVec3(file, "center");
+  const NpzArray links = file->Read("links", ArrayType::kI32, {-1, -1, -1});
+  for (int a = 0; a < 3; ++a) {
+    if (links.shape[a] > 4096)
+      Refuse(file->path(), "a grid of " + links.ShapeText() + " vertices",
+             "at most 4096 along an axis are read");
+    geometry.frame.resolution[a] = static_cast<int>(links.shape[a]);
+  }
+  if (geometry.frame.NumVertices() > INT32_MAX)
+    Refuse(file->path(), "a grid of " + links.ShapeText() + " vertices is too large");
+  geometry.links.Resize(links.num_elements());
+  // svox2 keeps distances to the next voxel below -1.
+  for (int64_t i = 0; i < links.num_elements(); ++i)
+    geometry.links[i] = std::max(links.As<int32_t>()[i], -1);
+  return geometry;
+}
+
+void ReadValues(NpzReader* file, Geometry* geometry, Appearance* appearance) {
+  const bool joined = file->Has("data");  // old checkpoints: [density, colours] by row
+  const NpzArray colours = file->Read(joined ? "data" : "sh_data");
+  const int64_t first = joined ? 1 : 0;
+  if (colours.shape.size() != 2 ||
+      (colours.type != ArrayType::kF16 && colours.type != ArrayType::kF32) ||
+      (colours.shape[1] != first + 27 && colours.shape[1] != first + 12 &&
+       colours.shape[1] != first + 3))
+    Refuse(file->path(), std::string("colours are ") + NameOf(colours.type) +
+                             colours.ShapeText() + "; 3, 12 or 27 columns are read");
+  const int stored = static_cast<int>((colours.shape[1] - first) / 3);
+  appearance->basis =
+      file->Has("regrade_basis") ? file->ReadScalar<int32_t>("regrade_basis") : stored;
+  const int basis = appearance->basis;
+  if ((basis != 1 && basis != 4 && basis != 9) || basis > stored)
+    Refuse(file->path(), "regrade_basis is " + std::to_string(basis) + " of " +
+                             std::to_string(stored) + " stored harmonics");
+  appearance->sh = UnpackedColours(colours, first, stored, basis);
+  geometry->density.Resize(colours.shape[0]);
+  if (joined) {
+    for (int64_t i = 0; i < colours.shape[0]; ++i)
+      geometry->density[i] = ValueAt(colours, i * colours.shape[1]);
+  } else {
+    const NpzArray density = file->Read("density_data", ArrayType::kF32, {colours.shape[0], 1});
+    std::copy_n(density.As<float>(), density.num_elements(), geometry->density.data());
+  }
+}
+
+}  // namespace
+
+void WriteFieldFile(const std::string& path, const StoredField& stored) {
+  const RadianceField& field = stored.field;
+  const Geometry& geometry = *field.geometry;
+  const int64_t voxels = geometry.num_voxels();
+  const Buffer<uint16_t> colours = PackedColours(field.appearance, voxels);
+  const Vec3i size = geometry.frame.resolution;
+  const Similarity& similarity = stored.field_from_world;
+  double placement[13] = {similarity.scale};
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) placement[1 + 3 * i + j] = similarity.rotation(i, j);
+    placement[10 + i] = similarity.translation[i];
+  }
+
+  NpzWriter file;
+  file.Add("radius", {3}, &geometry.frame.radius.x);
+  file.Add("center", {3}, &geometry.frame.center.x);
+  file.Add("links", {size.x, size.y, size.z}, geometry.links.data(), NpzPacking::kDeflate);
+  file.Add("density_data", {voxels, 1}, geometry.density.data());
+  file.Add("sh_data", {voxels, 3 * kStoredBasis}, colours.data(),
+           field.appearance.basis == kStoredBasis ? NpzPacking::kStore : NpzPacking::kDeflate);
+  file.AddScalar<int64_t>("basis_type", kSphericalHarmonics);
+  file.AddScalar<int32_t>("regrade_version", kVersion);
+  file.AddScalar<int32_t>("regrade_basis", field.appearance.basis);
+  file.Add("regrade_background", {3}, &field.background.x);
+  file.AddScalar<float>("regrade_near_clip", field.near_clip);
+  file.AddScalar<float>("regrade_step", field.step);
+  file.Add("regrade_field_from_world", {13}, placement);
+  if (stored.ndc.on()) file.Add("regrade_ndc", {2}, &stored.ndc.a);
+  std::vector<float> texels;  // the writer reads them when it writes
+  AddSpheres(field, &texels, &file);
+  file.WriteTo(path);
+}
+
+StoredField ReadFieldFile(const std::string& path, uint64_t budget) {
+  NpzReader file(path, budget);
+  CheckReadable(&file);
+  StoredField stored;
+  Geometry geometry = ReadGeometry(&file);
+  ReadValues(&file, &geometry, &stored.field.appearance);
+  ReadSpheres(&file, &geometry.spheres, &stored.field.appearance.sphere_color);
+  stored.field.geometry = std::make_shared<const Geometry>(std::move(geometry));
+  stored.field.background =
+      file.Has("regrade_background") ? ReadVec3(&file, "regrade_background") : Vec3f{1, 1, 1};
+  if (file.Has("regrade_near_clip"))
+    stored.field.near_clip = file.ReadScalar<float>("regrade_near_clip");
+  if (file.Has("regrade_step")) stored.field.step = file.ReadScalar<float>("regrade_step");
+  if (file.Has("regrade_field_from_world")) {
+    const NpzArray array = file.Read("regrade_field_from_world", ArrayType::kF64, {13});
+    const double* placement = array.As<double>();
+    stored.field_from_world.scale = placement[0];
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j)
+        stored.field_from_world.rotation(i, j) = placement[1 + 3 * i + j];
+      stored.field_from_world.translation[i] = placement[10 + i];
+    }
+    if (!IsSound(stored.field_from_world))
+      Refuse(path, "regrade_field_from_world is no scale, rotation and translation");
+  }
+  if (file.Has("regrade_ndc")) {
+    const NpzArray array = file.Read("regrade_ndc", ArrayType::kF64, {2});
+    stored.ndc = {array.As<double>()[0], array.As<double>()[1]};
+    if (!(stored.ndc.a > 0 && stored.ndc.a < 1e3 && stored.ndc.b > 0 && stored.ndc.b < 1e3))
+      Refuse(path, "regrade_ndc is not the shape of a picture's view");
+  }
+  Validate(stored.field, path.c_str());
+  return stored;
+}
+
+}  // namespace regrade

@@ -1,0 +1,99 @@
+#include "pipeline/fields/network_file.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "kernels/base/error.h"
+#include "pipeline/files/npz_file.h"
+
+namespace regrade {
+namespace {
+
+constexpr int32_t kVersion = 1;
+constexpr uint64_t kBudget = uint64_t{1} << 20;  // the arrays are 110 KB
+
+// The bound is a product of singular values in double: another machine's differ in their last
+// digits, a changed weight in the first ones.
+constexpr double kBoundTolerance = 1e-9;
+
+[[noreturn]] void Refuse(const std::string& path, const std::string& why) {
+  throw Error(ExitCode::kInput, why, path, "run regrade stylize again");
+}
+
+std::string Named(const char* array, int layer) {
+  return std::string(array) + "_" + std::to_string(layer);
+}
+
+// Calls visit(name, shape, data) for the arrays of each layer. `Network` is const for writing.
+template <typename Network, typename Visitor>
+void VisitLayers(Network* network, const Visitor& visit) {
+  auto* vectors = network->data().singular_vectors.data();
+  for (int l = 0; l < kNetworkLayers; ++l) {
+    const int64_t out = LipschitzNetwork::Outputs(l), in = LipschitzNetwork::Inputs(l);
+    visit(Named("weight", l), {out, in}, network->weight(l));
+    visit(Named("bias", l), {out}, network->bias(l));
+    visit(Named("k", l), {}, network->bias(l) + out);  // K stands behind the biases
+    visit(Named("u", l), {out}, vectors);
+    visit(Named("v", l), {in}, vectors + out);
+    vectors += out + in;
+  }
+}
+
+}  // namespace
+
+void WriteNetworkFile(const std::string& path, const StoredNetwork& stored) {
+  const LipschitzNetworkData& data = stored.network.data();
+  double matrix[9], offset[3];
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) matrix[3 * i + j] = data.base.matrix(i, j);
+    offset[i] = data.base.offset[i];
+  }
+  NpzWriter file;
+  VisitLayers(&stored.network,
+              [&file](const std::string& name, const std::vector<int64_t>& shape,
+                      const float* values) { file.Add(name, shape, values); });
+  file.AddText("activation", data.activation);
+  file.AddScalar<float>("omega", data.omega);
+  file.AddScalar<float>("sh_scale", data.sh_scale);
+  file.AddScalar<float>("position_scale", data.position_scale);
+  file.AddScalar<uint8_t>("has_base", data.has_base);
+  file.Add("base_matrix", {3, 3}, matrix);
+  file.Add("base_offset", {3}, offset);
+  file.AddScalar<double>("bound", stored.network.Bound());
+  file.AddScalar<double>("k_est", stored.k_est);
+  file.AddScalar<int32_t>("regrade_version", kVersion);
+  file.WriteTo(path);
+}
+
+StoredNetwork ReadNetworkFile(const std::string& path) {
+  NpzReader file(path, kBudget);
+  RefuseNewerFormat(&file, kVersion);
+  LipschitzNetwork network;
+  VisitLayers(&network, [&file](const std::string& name, const std::vector<int64_t>& shape,
+                                float* values) {
+    const NpzArray array = file.Read(name, ArrayType::kF32, shape);
+    std::copy_n(array.As<float>(), array.num_elements(), values);
+  });
+  LipschitzNetworkData data = std::move(network.data());
+  data.activation = file.ReadText("activation");
+  data.omega = file.ReadScalar<float>("omega");
+  data.sh_scale = file.ReadScalar<float>("sh_scale");
+  data.position_scale = file.ReadScalar<float>("position_scale");
+  data.has_base = file.ReadScalar<uint8_t>("has_base") != 0;
+  const NpzArray matrix = file.Read("base_matrix", ArrayType::kF64, {3, 3});
+  const NpzArray offset = file.Read("base_offset", ArrayType::kF64, {3});
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) data.base.matrix(i, j) = matrix.As<double>()[3 * i + j];
+    data.base.offset[i] = offset.As<double>()[i];
+  }
+  StoredNetwork stored{LipschitzNetwork(std::move(data)), file.ReadScalar<double>("k_est")};
+  if (!std::isfinite(stored.k_est)) Refuse(path, "k_est is not finite");
+  const double promised = file.ReadScalar<double>("bound"), bound = stored.network.Bound();
+  if (!(std::abs(promised - bound) <= kBoundTolerance * bound))
+    Refuse(path, "it promises the bound " + std::to_string(promised) + ", its weights have " +
+                     std::to_string(bound));
+  return stored;
+}
+
+}  // namespace regrade

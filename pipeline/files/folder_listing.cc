@@ -1,0 +1,105 @@
+#include "pipeline/files/folder_listing.h"
+
+#include <algorithm>
+#include <filesystem>
+
+#include "kernels/base/error.h"
+#include "kernels/base/natural_order.h"
+
+namespace regrade {
+namespace {
+
+namespace fs = std::filesystem;
+
+// What the machine lacks says nothing about the folder: its photos are not gone.
+bool IsLack(const std::error_code& error) {
+  return error == std::errc::io_error || error == std::errc::too_many_files_open ||
+         error == std::errc::too_many_files_open_in_system ||
+         error == std::errc::not_enough_memory;
+}
+
+[[noreturn]] void ThrowListError(const std::error_code& error, const fs::path& path) {
+  throw Error(IsLack(error) ? ExitCode::kResources : ExitCode::kInput,
+              "cannot list the folder: " + error.message(), path.string());
+}
+
+bool IsInside(const fs::path& path, const fs::path& root) {
+  return std::mismatch(root.begin(), root.end(), path.begin(), path.end()).first == root.end();
+}
+
+const char* ProblemOf(fs::file_type type) {
+  switch (type) {
+    case fs::file_type::regular:
+      return "";
+    case fs::file_type::fifo:
+      return "a named pipe, not a file";
+    case fs::file_type::socket:
+      return "a socket, not a file";
+    default:
+      return "a device, not a file";
+  }
+}
+
+// Resolves a link; its problem is empty when it shows a regular file inside of the folder.
+ListedFile ResolveLink(const std::string& name, const fs::path& link, const fs::path& root) {
+  std::error_code error;
+  const fs::path target = fs::canonical(link, error);
+  if (error) return {name, link.string(), "broken link: " + error.message()};
+  if (!IsInside(target, root))
+    return {name, link.string(), "a link that leads out of the folder (copy the file into it)"};
+  const fs::file_type type = fs::status(target, error).type();
+  if (type == fs::file_type::directory)
+    return {name, link.string(), "a link to a folder that is listed anyway"};
+  return {name, target.string(), ProblemOf(type)};
+}
+
+void ListInto(const fs::path& folder, const std::string& prefix, const fs::path& root,
+              FolderListing* listing) {
+  std::error_code error;
+  fs::directory_iterator entry(folder, error);
+  if (error) {
+    if (prefix.empty() || IsLack(error)) ThrowListError(error, folder);
+    listing->files.push_back({prefix, folder.string(), "cannot list it: " + error.message()});
+    return;
+  }
+  for (; entry != fs::directory_iterator(); entry.increment(error)) {
+    const std::string base = entry->path().filename().string();
+    if (base[0] == '.') {
+      ++listing->hidden;
+      continue;
+    }
+    const std::string name = prefix.empty() ? base : prefix + "/" + base;
+    std::error_code status_error;
+    const fs::file_type type = entry->symlink_status(status_error).type();
+    if (status_error)
+      listing->files.push_back({name, entry->path().string(), status_error.message()});
+    else if (type == fs::file_type::symlink)
+      listing->files.push_back(ResolveLink(name, entry->path(), root));
+    else if (type == fs::file_type::directory)
+      ListInto(entry->path(), name, root, listing);
+    else
+      listing->files.push_back({name, entry->path().string(), ProblemOf(type)});
+  }
+  if (error) ThrowListError(error, folder);
+}
+
+}  // namespace
+
+FolderListing ListFolder(const std::string& folder) {
+  std::error_code error;
+  const fs::path root = fs::canonical(folder, error);
+  if (error)
+    throw Error(ExitCode::kInput, "no such folder: " + error.message(), folder,
+                "give the folder that holds the photos");
+  if (!fs::is_directory(root, error))
+    throw Error(ExitCode::kInput, "this is a file, not a folder", folder,
+                "give the folder that holds the photos");
+  FolderListing listing;
+  ListInto(root, "", root, &listing);
+  std::sort(
+      listing.files.begin(), listing.files.end(),
+      [](const ListedFile& a, const ListedFile& b) { return NaturalLess(a.name, b.name); });
+  return listing;
+}
+
+}  // namespace regrade

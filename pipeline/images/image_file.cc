@@ -1,0 +1,326 @@
+#include "pipeline/images/image_file.h"
+
+#include <OpenImageIO/filesystem.h>
+#include <OpenImageIO/imageio.h>
+#include <OpenImageIO/tiffutils.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "kernels/base/error.h"
+#include "pipeline/files/atomic_file.h"
+#include "pipeline/images/image_format.h"
+#include "pipeline/images/jpeg_decoder.h"
+#include "pipeline/images/normalize_photo.h"
+#include "pipeline/images/png_chunks.h"
+#include "pipeline/images/png_decoder.h"
+
+namespace regrade {
+namespace {
+
+// Picture formats promise at most about 1000 decoded bytes for each stored one (DEFLATE's limit
+// is 1032); a header that claims far more than its file can hold is a trap or a wreck.
+constexpr int64_t kMaxExpansion = 2000, kExpansionSlack = 16 << 20;
+
+void CheckSize(int64_t width, int64_t height, int64_t pixel_bytes, int64_t file_bytes,
+               const DecodeLimits& limits, const std::string& where) {
+  const std::string size = std::to_string(width) + " x " + std::to_string(height) + " pixels";
+  if (width <= 0 || height <= 0) throw Error(ExitCode::kInput, "no pixels", where);
+  if (width > limits.max_pixels / height)
+    throw Error(ExitCode::kInput,
+                size + ", more than the limit of " +
+                    std::to_string(limits.max_pixels / 1'000'000) + " megapixels",
+                where, "scale it down or raise --max-megapixels");
+  if (width * height * pixel_bytes > kExpansionSlack + kMaxExpansion * file_bytes)
+    throw Error(ExitCode::kInput,
+                "the header claims " + size + ", but the file has only " +
+                    std::to_string(file_bytes) + " bytes",
+                where);
+  if (std::min(width, height) < limits.min_side)
+    throw Error(ExitCode::kInput,
+                size + ", less than " + std::to_string(limits.min_side) + " on a side", where);
+}
+
+void CheckRegularFile(const std::string& path) {
+  struct stat status;
+  if (::stat(path.c_str(), &status) != 0)
+    throw Error(ExitCode::kInput, std::strerror(errno), path);
+  const char* kind = S_ISREG(status.st_mode)    ? nullptr
+                     : S_ISDIR(status.st_mode)  ? "a folder"
+                     : S_ISFIFO(status.st_mode) ? "a named pipe"
+                     : S_ISSOCK(status.st_mode) ? "a socket"
+                                                : "a device";
+  if (kind) throw Error(ExitCode::kInput, std::string(kind) + ", not a picture file", path);
+}
+
+// What the file says about itself, in OpenImageIO's names.
+void TakeMetadata(const OIIO::ImageSpec& spec, StoredPicture* picture) {
+  const int orientation = spec.get_int_attribute("Orientation", 1);
+  picture->orientation = orientation >= 1 && orientation <= 8 ? orientation : 1;
+  picture->focal_mm = spec.get_float_attribute("Exif:FocalLength");
+  picture->focal_35mm = spec.get_float_attribute("Exif:FocalLengthIn35mmFilm");
+  picture->exif_width = spec.get_float_attribute("Exif:PixelXDimension");
+  // EXIF units: 2 inch (also the default), 3 cm, 4 mm, 5 um.
+  const int unit = spec.get_int_attribute("Exif:FocalPlaneResolutionUnit", 2);
+  const double unit_mm = unit == 3 ? 10 : unit == 4 ? 1 : unit == 5 ? 0.001 : 25.4;
+  picture->focal_plane_px_per_mm =
+      spec.get_float_attribute("Exif:FocalPlaneXResolution") / unit_mm;
+}
+
+void NoteProfile(std::string_view profile, StoredPicture* picture) {
+  if (profile.empty()) return;
+  OIIO::ImageSpec spec;
+  std::string error;
+  OIIO::decode_icc_profile(
+      OIIO::cspan<uint8_t>(reinterpret_cast<const uint8_t*>(profile.data()), profile.size()),
+      spec, error);
+  const std::string name = spec.get_string_attribute("ICCProfile:profile_description");
+  if (name.find("sRGB") != std::string::npos) return;
+  picture->notices.push_back("the colour profile" + (name.empty() ? "" : " \"" + name + "\"") +
+                             " is not applied: colours are taken as sRGB");
+}
+
+StoredPicture ReadJpeg(std::string_view bytes, const std::string& where,
+                       const DecodeLimits& limits) {
+  JpegPicture jpeg = DecodeJpeg(bytes, where, [&](int64_t w, int64_t h, int64_t pixel_bytes) {
+    CheckSize(w, h, pixel_bytes, static_cast<int64_t>(bytes.size()), limits, where);
+  });
+  StoredPicture picture;
+  picture.image = std::move(jpeg.image);
+  if (jpeg.damage_warnings > 0) {
+    const std::string what = "damaged JPEG (" + std::to_string(jpeg.damage_warnings) +
+                             " warnings, first: " + jpeg.first_warning + ")";
+    if (!limits.accept_damaged)
+      throw Error(ExitCode::kInput, what, where,
+                  "copy the file again from the camera, or keep it with --accept-damaged");
+    picture.notices.push_back(what);
+  }
+  OIIO::ImageSpec spec;
+  if (!jpeg.exif.empty()) OIIO::decode_exif(OIIO::string_view(jpeg.exif), spec);
+  TakeMetadata(spec, &picture);
+  if (jpeg.from_cmyk)
+    picture.notices.push_back(
+        "CMYK was converted without its profile: colours are approximate");
+  else
+    NoteProfile(jpeg.icc, &picture);
+  return picture;
+}
+
+StoredPicture ReadPng(std::string_view bytes, const std::string& where,
+                      const DecodeLimits& limits) {
+  PngPicture png = DecodePng(bytes, where, [&](int64_t w, int64_t h, int64_t pixel_bytes) {
+    CheckSize(w, h, pixel_bytes, static_cast<int64_t>(bytes.size()), limits, where);
+  });
+  StoredPicture picture;
+  picture.image = std::move(png.image);
+  picture.bits = png.bits;
+  picture.linear_light = png.linear_light;
+  OIIO::ImageSpec spec;
+  if (!png.exif.empty()) OIIO::decode_exif(OIIO::string_view(png.exif), spec);
+  TakeMetadata(spec, &picture);
+  NoteProfile(png.icc, &picture);
+  if (png.remarks > 0)
+    picture.notices.push_back("an odd PNG (" + std::to_string(png.remarks) +
+                              (png.remarks == 1 ? " remark: " : " remarks, first: ") +
+                              png.first_remark + ")");
+  return picture;
+}
+
+// Size of a PNG or GIF from its first bytes: these decoders allocate before they can be asked.
+std::optional<std::pair<int64_t, int64_t>> PeekSize(std::string_view decoder,
+                                                    std::string_view bytes) {
+  const auto byte = [&](size_t at) -> int64_t { return static_cast<unsigned char>(bytes[at]); };
+  const auto big32 = [&](size_t at) {
+    return byte(at) << 24 | byte(at + 1) << 16 | byte(at + 2) << 8 | byte(at + 3);
+  };
+  if (decoder == "png" && bytes.size() >= 24) return {{big32(16), big32(20)}};
+  if (decoder == "gif" && bytes.size() >= 10)
+    return {{byte(6) | byte(7) << 8, byte(8) | byte(9) << 8}};
+  return std::nullopt;
+}
+
+// Of the channels in a file, those we want (grey, RGB, or RGB + alpha), as exact quotients
+// value / max: every decoder gives the same float for the same integer.
+template <typename Value>
+bool ReadChannels(OIIO::ImageInput* input, const OIIO::ImageSpec& spec, float max,
+                  Image* image) {
+  const int stored = spec.nchannels;
+  const bool has_alpha = spec.alpha_channel >= 0 && spec.alpha_channel < stored && stored > 1;
+  const bool grey = stored - (has_alpha ? 1 : 0) < 3;
+  std::vector<Value> values(static_cast<size_t>(spec.width) * spec.height * stored);
+  if (!input->read_image(0, 0, 0, stored, OIIO::BaseTypeFromC<Value>::value, values.data()))
+    return false;
+  *image = Image(spec.width, spec.height, has_alpha ? 4 : grey ? 1 : 3);
+  for (int64_t i = 0; i < image->num_pixels(); ++i) {
+    const Value* from = &values[static_cast<size_t>(i) * stored];
+    float* to = &image->pixels[i * image->channels];
+    for (int c = 0; c < std::min(image->channels, 3); ++c)
+      to[c] = static_cast<float>(from[grey ? 0 : c]) / max;
+    if (has_alpha) to[3] = static_cast<float>(from[spec.alpha_channel]) / max;
+  }
+  return true;
+}
+
+StoredPicture ReadWithOiio(const ImageFormat& format, std::string_view bytes,
+                           const std::string& path, const DecodeLimits& limits) {
+  const auto refuse = [&](const std::string& why) {
+    throw Error(ExitCode::kInput, std::string("cannot read this ") + format.name + ": " + why,
+                path, format.remedy);
+  };
+  std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::create(format.decoder);
+  if (input == nullptr) {
+    OIIO::geterror();
+    refuse("this build has no decoder for it");
+  }
+  OIIO::ImageSpec spec, config;
+  config["oiio:UnassociatedAlpha"] = 1;
+  OIIO::Filesystem::IOMemReader memory(bytes.data(), bytes.size());
+  if (format.from_memory) input->set_ioproxy(&memory);
+  if (!input->open(path, spec, config)) refuse(input->geterror());
+  CheckSize(spec.width, spec.height, static_cast<int64_t>(spec.pixel_bytes(true)),
+            static_cast<int64_t>(bytes.size()), limits, path);
+  if (spec.deep || spec.depth > 1) refuse("it is not a flat picture");
+
+  StoredPicture picture;
+  bool whole = false;
+  if (spec.format == OIIO::TypeDesc::UINT8) {
+    whole = ReadChannels<uint8_t>(input.get(), spec, 255.f, &picture.image);
+  } else if (spec.format == OIIO::TypeDesc::UINT16) {
+    picture.bits = 16;
+    whole = ReadChannels<uint16_t>(input.get(), spec, 65535.f, &picture.image);
+  } else {
+    picture.bits = 32;
+    whole = ReadChannels<float>(input.get(), spec, 1.f, &picture.image);
+  }
+  if (!whole) refuse(input->geterror());
+  TakeMetadata(spec, &picture);
+  const OIIO::string_view space = spec.get_string_attribute("oiio:ColorSpace");
+  picture.linear_light = OIIO::Strutil::iequals(space, "linear");
+  picture.premultiplied = spec.get_int_attribute("oiio:UnassociatedAlpha") == 0;
+  if (const OIIO::ParamValue* profile = spec.find_attribute("ICCProfile"))
+    NoteProfile(
+        {static_cast<const char*>(profile->data()), static_cast<size_t>(profile->datasize())},
+        &picture);
+  if (input->seek_subimage(1, 0))
+    picture.notices.push_back("only the first picture of several is used");
+  return picture;
+}
+
+StoredPicture ReadStored(const std::string& path, const DecodeLimits& limits) {
+  CheckRegularFile(path);
+  // Sixteen bytes a pixel is the most that an uncompressed file needs.
+  const std::string bytes =
+      ReadWholeFile(path, static_cast<uint64_t>(limits.max_pixels) * 16 + (64 << 20));
+  if (bytes.empty()) throw Error(ExitCode::kInput, "empty file", path);
+  const ImageFormat* format = SniffImageFormat(bytes, path);
+  if (format == nullptr) throw Error(ExitCode::kInput, "not an image", path);
+  const std::string_view decoder = format->decoder;
+  if (decoder.empty())
+    throw Error(ExitCode::kInput, std::string(format->name) + " is not supported here", path,
+                format->remedy);
+  if (decoder == "png")
+    if (const std::string damage = FindPngDamage(bytes); !damage.empty())
+      throw Error(ExitCode::kInput, "damaged PNG: " + damage, path,
+                  "copy the file again from where it came");
+  if (const auto size = PeekSize(decoder, bytes))
+    CheckSize(size->first, size->second, 1, static_cast<int64_t>(bytes.size()), limits, path);
+  StoredPicture picture = decoder == "jpeg"  ? ReadJpeg(bytes, path, limits)
+                          : decoder == "png" ? ReadPng(bytes, path, limits)
+                                             : ReadWithOiio(*format, bytes, path, limits);
+  ApplyPhotoRules(&picture, path);
+  return picture;
+}
+
+Image ReplicateGrey(const Image& grey) {
+  if (grey.channels != 1) return grey;
+  Image result(grey.width, grey.height, 3);
+  for (int64_t i = 0; i < grey.num_pixels(); ++i)
+    std::fill_n(&result.pixels[3 * i], 3, grey.pixels[i]);
+  return result;
+}
+
+std::string Joined(const std::vector<std::string>& notices) {
+  std::string text;
+  for (const std::string& notice : notices) text += (text.empty() ? "" : "; ") + notice;
+  return text;
+}
+
+template <typename Value>
+std::string Encode(const char* format, const Image& image, OIIO::ImageSpec spec) {
+  constexpr float kMax = std::numeric_limits<Value>::max();
+  std::vector<Value> values(image.pixels.size());
+  std::transform(image.pixels.begin(), image.pixels.end(), values.begin(), [](float v) {
+    return v > 0 ? static_cast<Value>(std::min(v, 1.f) * kMax + 0.5f) : Value{0};
+  });
+  std::vector<unsigned char> bytes;
+  OIIO::Filesystem::IOVecOutput memory(bytes);
+  std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create(format);
+  REGRADE_CHECK(output != nullptr);
+  output->set_ioproxy(&memory);
+  const OIIO::TypeDesc type = OIIO::BaseTypeFromC<Value>::value;
+  if (!output->open(std::string("memory.") + format, spec) ||
+      !output->write_image(type, values.data()) || !output->close())
+    throw Error(ExitCode::kResources,
+                std::string("cannot encode ") + format + ": " + output->geterror());
+  return {bytes.begin(), bytes.end()};
+}
+
+template <typename Value>
+std::string EncodePng(const Image& image) {
+  OIIO::ImageSpec spec(image.width, image.height, image.channels,
+                       OIIO::BaseTypeFromC<Value>::value);
+  spec["oiio:UnassociatedAlpha"] = 1;
+  // Fast and nearly as small as the default of 6 on photographs.
+  spec["png:compressionLevel"] = 3;
+  return Encode<Value>("png", image, spec);
+}
+
+}  // namespace
+
+DecodedPhoto DecodePhoto(const std::string& path, const DecodeLimits& limits) {
+  StoredPicture stored = ReadStored(path, limits);
+  DecodedPhoto photo;
+  photo.exif_focal_px = FocalInPixels(stored);
+  photo.bits = stored.bits;
+  photo.notice = Joined(stored.notices);
+  photo.image = ReplicateGrey(stored.image);
+  return photo;
+}
+
+Image ReadImage(const std::string& path) {
+  return ReadStored(path, {.max_pixels = 1'000'000'000, .min_side = 1}).image;
+}
+
+Image ReadStylePicture(const std::string& path, std::string* notice) {
+  StoredPicture stored = ReadStored(path, {.min_side = 1});
+  if (stored.image.channels == 4)
+    stored.notices.push_back("its transparent parts are laid over white");
+  if (notice) *notice = Joined(stored.notices);
+  return CompositeOnWhite(ReplicateGrey(stored.image));
+}
+
+std::string EncodePng8(const Image& image) { return EncodePng<uint8_t>(image); }
+std::string EncodePng16(const Image& image) { return EncodePng<uint16_t>(image); }
+
+std::string EncodeJpeg(const Image& image, int quality) {
+  REGRADE_CHECK_LE(image.channels, 3);
+  OIIO::ImageSpec spec(image.width, image.height, image.channels, OIIO::TypeDesc::UINT8);
+  spec["Compression"] = "jpeg:" + std::to_string(quality);
+  return Encode<uint8_t>("jpeg", image, spec);
+}
+
+void WritePng8(const std::string& path, const Image& image) {
+  WriteFileAtomically(path, EncodePng8(image));
+}
+void WritePng16(const std::string& path, const Image& image) {
+  WriteFileAtomically(path, EncodePng16(image));
+}
+
+}  // namespace regrade

@@ -1,0 +1,33 @@
+#include "pipeline/program/device_choice.h"
+
+#include "kernels/base/error.h"
+#include "kernels/device/device_memory.h"
+
+namespace regrade {
+namespace {
+
+constexpr int kLeastCapability = 75;  // what the build is made for: Turing and later
+
+}  // namespace
+
+Backend ChooseBackend(const std::string& device, bool reproducible) {
+  if (device == "cpu") return Backend::kCpu;
+  if (device == "cuda" && reproducible)
+    throw Error(ExitCode::kUsage, "the GPU's sums have no fixed order",
+                "--device cuda --reproducible",
+                "use --device cpu, or leave out --reproducible");
+  if (reproducible) return Backend::kCpu;
+  const DeviceStatus status = ReadDeviceStatus();
+  if (status.found && status.compute_capability >= kLeastCapability) return Backend::kCuda;
+  if (device == "cuda")
+    throw Error(ExitCode::kResources,
+                status.found ? status.name + " is older than this build serves" : status.name,
+                "--device cuda", "use --device auto or cpu");
+  return Backend::kCpu;
+}
+
+std::string DeviceName(Backend backend) {
+  return backend == Backend::kCpu ? "cpu" : ReadDeviceStatus().name;
+}
+
+}  // namespace regrade

@@ -1,0 +1,58 @@
+#include "pipeline/program/eta_estimator.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace regrade {
+namespace {
+
+constexpr double kWindowShare = 0.1;   // of the work
+constexpr double kShortestWindow = 3;  // seconds
+constexpr size_t kMostPoints = 512;
+constexpr double kSmallFirstShare = 0.02;  // of the work: what came before it was preparation
+
+}  // namespace
+
+void EtaEstimator::Add(double seconds, double done, double total) {
+  total_ = total;
+  if (points_.empty()) {
+    start_ = {seconds, done};
+    if (done < total * kSmallFirstShare) {
+      points_.push_back(start_);
+      return;
+    }
+    points_.push_back({0, 0});
+  }
+  if (done < points_.back().done) {  // begun anew (a finer grid): the old pace says nothing
+    points_.assign(1, {seconds, done});
+    start_ = points_.front();
+    return;
+  }
+  points_.push_back({seconds, done});
+  while (points_.size() > 2 && points_[1].seconds <= seconds - kShortestWindow &&
+         points_[1].done <= done - total * kWindowShare)
+    points_.pop_front();
+  if (points_.size() > kMostPoints) {  // keep the ends and every other point between
+    std::deque<Point> thinned;
+    for (size_t i = 0; i < points_.size(); ++i)
+      if (i % 2 == 0 || i + 1 == points_.size()) thinned.push_back(points_[i]);
+    points_.swap(thinned);
+  }
+}
+
+std::optional<double> EtaEstimator::Remaining() const {
+  if (points_.size() < 2 || !(total_ > 0)) return std::nullopt;
+  const Point &first = points_.front(), &last = points_.back();
+  if (last.seconds < 1 || !(last.done > first.done) || !(last.seconds > first.seconds))
+    return std::nullopt;
+  double rate = (last.done - first.done) / (last.seconds - first.seconds);
+  // Where a unit of work is not always the same time, the pace of late and that of all so far
+  // err to both sides; a slow start must be forgotten all the same.
+  constexpr double kShareOfAll = 0.35;
+  if (last.seconds > start_.seconds && last.done > start_.done)
+    rate *= std::pow((last.done - start_.done) / (last.seconds - start_.seconds) / rate,
+                     kShareOfAll);
+  return std::max(0.0, (total_ - last.done) / rate);
+}
+
+}  // namespace regrade

@@ -1,0 +1,314 @@
+#include "pipeline/program/option_binding.h"
+
+#include <algorithm>
+#include <boost/program_options.hpp>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+
+#include "kernels/base/error.h"
+#include "pipeline/program/nearest_name.h"
+
+namespace regrade {
+namespace {
+
+namespace po = boost::program_options;
+using Words = std::vector<std::string>;
+
+// Shortest text that reads back as the same value, in no locale.
+template <typename T>
+std::string NumberText(T value) {
+  char text[64];
+  const auto result = std::to_chars(text, text + sizeof text, value);
+  return std::string(text, result.ptr);
+}
+
+std::string BoundsText(const OptionInfo& info) {
+  const bool low = std::isfinite(info.min), high = std::isfinite(info.max);
+  if (low && high) return NumberText(info.min) + " to " + NumberText(info.max);
+  if (low) return "at least " + NumberText(info.min);
+  if (high) return "at most " + NumberText(info.max);
+  return "a number";
+}
+
+std::vector<std::string> Split(const std::string& text, char separator) {
+  std::vector<std::string> parts;
+  size_t begin = 0;
+  for (size_t at = text.find(separator); at != std::string::npos;
+       at = text.find(separator, begin)) {
+    parts.push_back(text.substr(begin, at - begin));
+    begin = at + 1;
+  }
+  parts.push_back(text.substr(begin));
+  return parts;
+}
+
+[[noreturn]] void RefuseValue(const std::string& where, const std::string& text,
+                              const std::string& allowed) {
+  throw Error(ExitCode::kUsage, "'" + text + "' is not allowed", where, "allowed: " + allowed);
+}
+
+// The whole text must be one finite number within the bounds.
+template <typename T>
+T ParseNumber(const std::string& text, const OptionInfo& info, const std::string& where) {
+  T value{};
+  const char* end = text.data() + text.size();
+  const auto result = std::from_chars(text.data(), end, value);
+  const std::string allowed =
+      BoundsText(info) + (std::is_integral_v<T> ? ", a whole number" : "");
+  if (result.ec != std::errc() || result.ptr != end || text.empty())
+    RefuseValue(where, text, allowed);
+  if constexpr (std::is_floating_point_v<T>)
+    if (!std::isfinite(value)) RefuseValue(where, text, allowed);
+  // Bounds are doubles; whole numbers beyond 2^53 are compared after rounding.
+  if (!(static_cast<double>(value) >= info.min && static_cast<double>(value) <= info.max))
+    RefuseValue(where, text, allowed);
+  return value;
+}
+
+bool ParseSwitch(const std::string& text, const std::string& where) {
+  if (text == "true" || text == "on" || text == "yes") return true;
+  if (text == "false" || text == "off" || text == "no") return false;
+  RefuseValue(where, text, "true or false");
+}
+
+std::string ParseChoice(const std::string& text, const OptionInfo& info,
+                        const std::string& where) {
+  if (*info.choices == '\0') return text;
+  std::string listed;
+  for (const std::string& choice : Split(info.choices, '|')) {
+    if (choice == text) return text;
+    listed += (listed.empty() ? "" : ", ") + choice;
+  }
+  RefuseValue(where, text, listed);
+}
+
+// The text of a JSON value as a flag would have it.
+std::string FlagText(const JsonValue& value) {
+  if (value.IsString()) return value.AsString();
+  if (!value.IsArray()) return DumpJson(value, -1);
+  std::string text;
+  for (const JsonValue& element : value.AsArray()) {
+    if (!text.empty()) text += ',';
+    text += FlagText(element);
+  }
+  return text;
+}
+
+std::string Wrapped(const std::string& text, size_t indent, size_t width) {
+  std::string result;
+  size_t column = indent;
+  for (const std::string& word : Split(text, ' ')) {
+    if (word.empty()) continue;
+    if (column + word.size() + 1 > width && column > indent) {
+      result += "\n" + std::string(indent, ' ');
+      column = indent;
+    }
+    result += (column > indent ? " " : "") + word;
+    column += word.size() + (column > indent ? 1 : 0);
+  }
+  return result;
+}
+
+}  // namespace
+
+void OptionSet::AddEntry(Entry entry) {
+  REGRADE_CHECK(Find(entry.name) == nullptr);
+  entries_.push_back(std::move(entry));
+}
+
+const OptionSet::Entry* OptionSet::Find(const std::string& name) const {
+  for (const Entry& entry : entries_)
+    if (entry.name == name) return &entry;
+  return nullptr;
+}
+
+std::vector<std::string> OptionSet::Names() const {
+  std::vector<std::string> names = {"help"};
+  for (const Entry& entry : entries_) names.push_back(entry.name);
+  return names;
+}
+
+std::vector<std::string> OptionSet::Parse(const std::vector<std::string>& arguments) {
+  po::options_description description;
+  for (const Entry& entry : entries_) {
+    const bool is_switch = std::holds_alternative<bool*>(entry.target);
+    description.add_options()(entry.name.c_str(), new po::untyped_value(is_switch));
+    if (is_switch)
+      description.add_options()(("no-" + entry.name).c_str(), new po::untyped_value(true));
+  }
+  constexpr const char* kSeeHelp = "see --help";
+  const auto flags_end = std::find(arguments.begin(), arguments.end(), "--");
+  po::parsed_options parsed(&description);
+  try {
+    namespace style = po::command_line_style;
+    // Words that are no flags; without this line they would be refused.
+    po::positional_options_description positional;
+    positional.add("word", -1);
+    parsed = po::command_line_parser(Words(arguments.begin(), flags_end))
+                 .options(description)
+                 .positional(positional)
+                 .style(style::allow_long | style::long_allow_adjacent | style::long_allow_next)
+                 .run();
+  } catch (const po::unknown_option& error) {
+    std::string typed = error.get_option_name();
+    typed.erase(0, typed.find_first_not_of('-'));
+    typed.erase(std::min(typed.find('='), typed.size()));
+    const std::string nearest = NearestName(typed, Names());
+    throw Error(ExitCode::kUsage, "unknown option", "--" + typed,
+                nearest.empty() ? kSeeHelp : "did you mean --" + nearest + "?");
+  } catch (const po::error_with_option_name& error) {
+    std::string name = error.get_option_name();
+    name.erase(0, name.find_first_not_of('-'));
+    const Entry* entry = Find(name);
+    const bool is_switch = entry == nullptr || std::holds_alternative<bool*>(entry->target);
+    throw Error(ExitCode::kUsage, is_switch ? "takes no value" : "its value is missing",
+                "--" + name, kSeeHelp);
+  } catch (const po::error& error) {
+    throw Error(ExitCode::kUsage, error.what(), "", kSeeHelp);
+  }
+
+  std::vector<std::string> rest;
+  for (const po::option& option : parsed.options) {
+    if (option.position_key >= 0 || option.string_key.empty()) {
+      for (const std::string& word : option.value) {
+        if (word.size() > 1 && word[0] == '-')
+          throw Error(ExitCode::kUsage, "unknown option", word,
+                      "options begin with two dashes; a file of this name goes behind --");
+        rest.push_back(word);
+      }
+      continue;
+    }
+    Flag flag{option.string_key, option.value.empty() ? "true" : option.value[0]};
+    if (option.value.empty() && Find(flag.name) == nullptr)
+      flag = {flag.name.substr(std::strlen("no-")), "false"};
+    if (Given(flag.name))
+      throw Error(ExitCode::kUsage, "given twice", "--" + flag.name,
+                  "keep one of them: which one is meant?");
+    flags_.push_back(flag);
+  }
+  if (flags_end != arguments.end()) rest.insert(rest.end(), flags_end + 1, arguments.end());
+  return rest;
+}
+
+std::optional<std::string> OptionSet::Given(const std::string& name) const {
+  for (const Flag& flag : flags_)
+    if (flag.name == name) return flag.value;
+  return std::nullopt;
+}
+
+void OptionSet::Assign(const Entry& entry, const std::string& text, const std::string& where) {
+  const OptionInfo& info = entry.info;
+  std::visit(
+      [&](auto* target) {
+        using T = std::remove_pointer_t<decltype(target)>;
+        if constexpr (std::is_same_v<T, bool>) {
+          *target = ParseSwitch(text, where);
+        } else if constexpr (std::is_same_v<T, std::string>) {
+          *target = ParseChoice(text, info, where);
+        } else if constexpr (std::is_same_v<T, std::vector<int>>) {
+          std::vector<int> values;
+          for (const std::string& part : Split(text, ','))
+            values.push_back(ParseNumber<int>(part, info, where));
+          *target = values;
+        } else {
+          *target = ParseNumber<T>(text, info, where);
+        }
+      },
+      entry.target);
+}
+
+void OptionSet::ApplyConfig(const JsonValue& values, const std::string& where) {
+  const auto place = [&where](const JsonValue& value) {
+    return value.line() == 0 ? where
+                             : where + ":" + std::to_string(value.line()) + ":" +
+                                   std::to_string(value.column());
+  };
+  if (!values.IsObject())
+    throw Error(ExitCode::kUsage, "an object of options expected", place(values));
+  for (const auto& [name, value] : values.AsObject()) {
+    const Entry* entry = Find(name);
+    if (entry == nullptr) {
+      const std::string nearest = NearestName(name, Names());
+      throw Error(ExitCode::kUsage, "unknown option \"" + name + "\"", place(value),
+                  nearest.empty() ? "see --help" : "did you mean \"" + nearest + "\"?");
+    }
+    if (value.IsObject() || value.IsNull())
+      throw Error(ExitCode::kUsage, "a value expected for \"" + name + "\"", place(value));
+    Assign(*entry, FlagText(value), place(value) + ": " + name);
+  }
+}
+
+void OptionSet::ApplyFlags() {
+  for (const Flag& flag : flags_) Assign(*Find(flag.name), flag.value, "--" + flag.name);
+}
+
+JsonValue OptionSet::ValueOf(const Entry& entry) {
+  return std::visit(
+      [](auto* target) -> JsonValue {
+        using T = std::remove_pointer_t<decltype(target)>;
+        if constexpr (std::is_same_v<T, std::vector<int>>) {
+          JsonValue::Array array;
+          for (const int value : *target) array.emplace_back(value);
+          return array;
+        } else if constexpr (std::is_same_v<T, float>) {
+          // The double nearest to the float's shortest text: 0.1, not 0.10000000149.
+          double value = 0;
+          const std::string text = NumberText(*target);
+          std::from_chars(text.data(), text.data() + text.size(), value);
+          return value;
+        } else {
+          return *target;
+        }
+      },
+      entry.target);
+}
+
+JsonValue OptionSet::Values() const {
+  JsonValue values = JsonValue::Object();
+  for (const Entry& entry : entries_) values[entry.name] = ValueOf(entry);
+  return values;
+}
+
+JsonValue OptionSet::Values(const std::string& group) const {
+  JsonValue values = JsonValue::Object();
+  for (const Entry& entry : entries_)
+    if (entry.group == group) values[entry.name] = ValueOf(entry);
+  return values;
+}
+
+std::string OptionSet::Help() const {
+  std::string text, group;
+  for (const Entry& entry : entries_) {
+    if (entry.group != group || text.empty()) text += "\n" + entry.group + ":\n";
+    group = entry.group;
+    const bool is_switch = std::holds_alternative<bool*>(entry.target);
+    const bool is_text = std::holds_alternative<std::string*>(entry.target);
+    std::string head = "  --" + entry.name;
+    if (!is_switch)
+      head += " " + std::string(*entry.info.choices ? entry.info.choices
+                                : is_text           ? "TEXT"
+                                                    : "N");
+    std::string facts;
+    if (!is_switch && *entry.info.unit) facts += std::string(entry.info.unit) + ", ";
+    if (!is_switch && !is_text &&
+        (std::isfinite(entry.info.min) || std::isfinite(entry.info.max)))
+      facts += BoundsText(entry.info) + ", ";
+    const std::string value = FlagText(ValueOf(entry));
+    facts += "default " + (is_switch       ? (value == "true" ? "on" : "off")
+                           : value.empty() ? "none"
+                                           : value);
+    constexpr size_t kIndent = 28, kWidth = 96;
+    if (head.size() + 2 > kIndent) {
+      head += '\n';
+      head.append(kIndent, ' ');
+    } else {
+      head.resize(kIndent, ' ');
+    }
+    text += head + Wrapped(std::string(entry.info.help) + " (" + facts + ")", kIndent, kWidth) +
+            "\n";
+  }
+  return text;
+}
+
+}  // namespace regrade

@@ -1,0 +1,14 @@
+// The price list of a tradeoff.json, read back.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "pipeline/report/data.h"
+
+namespace regrade {
+
+// The rows of a tradeoff.json; none where there is no such file. Throws Error(kInput).
+std::vector<PriceRow> ReadPriceList(const std::string& path);
+
+}  // namespace regrade

@@ -1,0 +1,95 @@
+#include "pipeline/report/prices.h"
+
+#include <algorithm>
+#include <vector>
+
+#include "pipeline/report/html_text.h"
+#include "pipeline/report/plot.h"
+#include "pipeline/report/tables.h"
+
+namespace regrade {
+namespace {
+
+using Rows = std::vector<const PriceRow*>;
+
+std::string NameOf(const PriceRow& row) {
+  return row.knob.empty() ? row.setting : row.knob + " " + row.setting;
+}
+
+// Accuracy over processor time; what nothing beats is joined by a line.
+std::string FrontHtml(const Rows& rows) {
+  Plot plot;
+  plot.title = "accuracy over time, " + rows[0]->plane;
+  plot.x = "CPU seconds";
+  plot.y = rows[0]->unit;
+  plot.log_x = true;
+  PlotSeries beaten{"measured", {}, 0, true}, front{"on the front", {}, 2, true},
+      base{"the base", {}, 1, true}, line{"front", {}, 2};
+  for (const PriceRow* row : rows) {
+    if (!row->cpu_seconds.value || !row->accuracy.value) continue;
+    const PlotPoint point{*row->cpu_seconds.value, *row->accuracy.value, NameOf(*row)};
+    (row->knob.empty() ? base : row->on_front ? front : beaten).points.push_back(point);
+    if (row->on_front) line.points.push_back(point);
+  }
+  if (line.points.size() < 2) line.points.clear();
+  std::sort(line.points.begin(), line.points.end(),
+            [](const PlotPoint& a, const PlotPoint& b) { return a.x < b.x; });
+  for (PlotSeries* series : {&beaten, &front, &base, &line})
+    if (!series->points.empty()) plot.series.push_back(std::move(*series));
+  return PlotHtml(plot);
+}
+
+std::string SecondsHtml(const Figure& seconds, const Figure& spread) {
+  if (!seconds.value) return FigureHtml(seconds, 2);
+  const int decimals = *seconds.value < 1 ? 4 : *seconds.value < 100 ? 2 : 0;
+  return FigureHtml(seconds, decimals) +
+         (spread.value ? " <span class=soft>±" + FigureHtml(spread, decimals) + "</span>" : "");
+}
+
+std::string RowHtml(const PriceRow& row) {
+  const std::string verdict = row.on_front ? "<span class=on>front</span>"
+                              : row.dominated_by.empty()
+                                  ? ""
+                                  : "dominated by " + EscapeHtml(row.dominated_by);
+  return "<tr><td>" +
+         (row.knob.empty() ? "the base" : "<code>" + EscapeHtml(row.knob) + "</code>") +
+         "<td class=file>" + EscapeHtml(row.setting) + "<td class=n>" +
+         SecondsHtml(row.seconds, row.seconds_spread) + "<td class=n>" +
+         SecondsHtml(row.cpu_seconds, row.cpu_spread) + "<td class=n>" +
+         FigureHtml(row.accuracy, 3) + "<td class=n>" + FigureHtml(row.error, 3) +
+         "<td class=w>" + verdict + "</tr>";
+}
+
+std::string PlaneHtml(const Rows& rows) {
+  std::string body;
+  for (const PriceRow* row : rows) body += RowHtml(*row);
+  return "<h3>" + EscapeHtml(rows[0]->plane) +
+         "</h3><p>Accuracy: " + EscapeHtml(rows[0]->measure) + ", " +
+         EscapeHtml(rows[0]->unit) + ".</p>" + FrontHtml(rows) +
+         "<div class=scroll><table><thead><tr><th>knob<th>setting<th class=n>s<th class=n>CPU "
+         "s<th class=n>accuracy<th class=n>error<th></tr></thead><tbody>" +
+         body + "</tbody></table></div>";
+}
+
+}  // namespace
+
+std::string PricesHtml(const RunReport& report) {
+  if (report.prices.empty()) return "";
+  std::vector<Rows> planes;
+  for (const PriceRow& row : report.prices) {
+    auto plane = std::find_if(planes.begin(), planes.end(),
+                              [&row](const Rows& rows) { return rows[0]->plane == row.plane; });
+    if (plane == planes.end()) plane = planes.insert(planes.end(), Rows());
+    plane->push_back(&row);
+  }
+  std::string html;
+  for (const Rows& rows : planes) html += PlaneHtml(rows);
+  return "<h2>What accuracy costs here</h2><p>Measured on this machine with this capture; each "
+         "row changes one knob of the base. Medians, ± half of what lies between the least and "
+         "the most. The error is against the knob's accurate end. Nothing on the front is "
+         "beaten "
+         "in accuracy at its CPU time.</p>" +
+         html;
+}
+
+}  // namespace regrade

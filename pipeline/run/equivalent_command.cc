@@ -1,0 +1,46 @@
+#include "pipeline/run/equivalent_command.h"
+
+namespace regrade {
+namespace {
+
+void AddFlag(const std::string& name, const JsonValue& value, std::vector<std::string>* words) {
+  if (value.IsBool()) {
+    words->push_back((value.AsBool() ? "--" : "--no-") + name);
+    return;
+  }
+  std::string text;
+  if (value.IsString()) {
+    text = value.AsString();
+  } else if (value.IsArray()) {
+    for (const JsonValue& element : value.AsArray())
+      text += (text.empty() ? "" : ",") + DumpJson(element, -1);
+  } else {
+    text = DumpJson(value, -1);
+  }
+  words->push_back("--" + name);
+  words->push_back(text);
+}
+
+}  // namespace
+
+std::vector<std::string> EquivalentCommand(const RunContext& context) {
+  RunSettings plain;
+  OptionSet plain_options;
+  plain.Bind(&plain_options);
+  const std::string& preset = context.settings.run.preset;
+  ApplyPreset(preset, &plain);
+  const JsonValue before = plain_options.Values(), start = plain_options.Values("Start"),
+                  program = plain_options.Values("Program");
+  std::vector<std::string> words = {"regrade", "run"};
+  if (!context.source.empty()) words.push_back(context.source);
+  if (preset != RunSettings().run.preset) words.insert(words.end(), {"--preset", preset});
+  const JsonValue values = context.options.Values();
+  for (const auto& [name, value] : values.AsObject()) {
+    if (name == "preset" || start.Find(name) != nullptr || program.Find(name) != nullptr)
+      continue;
+    if (!(before.At(name) == value)) AddFlag(name, value, &words);
+  }
+  return words;
+}
+
+}  // namespace regrade

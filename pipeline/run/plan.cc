@@ -1,0 +1,134 @@
+#include "pipeline/run/plan.h"
+
+#include <algorithm>
+#include <cstdio>
+
+#include "kernels/base/error.h"
+#include "kernels/field/packed_grid.h"
+#include "kernels/field/spherical_harmonics.h"
+#include "pipeline/program/console.h"
+#include "reconstruct/fit/resample_grid.h"
+
+namespace regrade {
+namespace {
+
+constexpr double kGridBytes = 4 + 8;    // a vertex: link, and density with link again
+constexpr double kPixelBytes = 12 + 6;  // floats as read, 16 bits a channel as drawn
+constexpr double kSphereShare = 0.6;    // of a map's texels that photos see
+constexpr double kIndexBytes = 4;       // vertex of a voxel, slot of a voxel, and back
+
+// Rates are of two threads.
+double Shared(double seconds, int threads) { return seconds * 2 / std::max(threads, 1); }
+
+std::string MemoryText(double bytes) {
+  char text[32];
+  if (bytes < 1e8)
+    std::snprintf(text, sizeof text, "%.0f MB", bytes * 1e-6);
+  else
+    std::snprintf(text, sizeof text, "%.1f GB", bytes * 1e-9);
+  return text;
+}
+
+}  // namespace
+
+StagePlan PlanFit(const FitOptions& options, int64_t photo_pixels, const SceneBox& box,
+                  int threads) {
+  const double record = 4.0 * RecordLanes(BasisOfDegree(options.sh_degree));
+  const int arenas = options.shards > 0 ? options.shards : std::max(threads, 1);
+  double field = 0, seconds = 0;
+  for (size_t s = 0; s < options.resolutions.size(); ++s) {
+    const Vec3i n = ResolutionFor(box, options.resolutions[s]);
+    const double vertices = static_cast<double>(n.x) * n.y * n.z;
+    const double voxels = vertices * (s == 0 ? 1 : kStoredShare);
+    const double gradients = record + kIndexBytes + arenas * kIndexBytes;
+    field = std::max(
+        field, voxels * (4 * record + kIndexBytes + gradients) + vertices * 2 * kGridBytes);
+    const double rays = static_cast<double>(options.steps[s]) * options.rays_per_step;
+    seconds += rays / kRaysPerSecond * options.resolutions[s] / kRateResolution;
+  }
+  if (box.spheres) {
+    // Values, moments, and both packed, 16 bytes each; a slot in each arena. Time is about the
+    // same: the ball has fewer voxels than the box.
+    const double map = 2.0 * options.background_resolution * options.background_resolution;
+    field += map * (kIndexBytes +
+                    kSphereShare * options.background_layers * (4 * 16 + arenas * kIndexBytes));
+  }
+  const double photos = static_cast<double>(photo_pixels) * kPixelBytes;
+  return {static_cast<uint64_t>(kProgramBytes + field + photos), Shared(seconds, threads)};
+}
+
+StagePlan PlanFitOnDevice(const FitOptions& options, int64_t photo_pixels,
+                          const SceneBox& box) {
+  constexpr double kSampleStore = 1 << 30, kVertexBytes = 4 + 4 + 1 + 1, kSamplesPerRay = 40,
+                   kExactSumsSlower = 2;
+  const double record = 4.0 * RecordLanes(BasisOfDegree(options.sh_degree));
+  double peak = 0, coarser = 0, seconds = 0;
+  for (size_t s = 0; s < options.resolutions.size(); ++s) {
+    const Vec3i n = ResolutionFor(box, options.resolutions[s]);
+    const double vertices = static_cast<double>(n.x) * n.y * n.z;
+    const double voxels = vertices * (s == 0 ? 1 : kStoredShare);
+    // Values, gradients, moments; exact sums are twice as wide.
+    const double field = voxels * ((options.exact_sums ? 4 : 3) * record + kIndexBytes) +
+                         vertices * kVertexBytes;
+    peak = std::max(peak, field + coarser);
+    coarser = field + 4 * voxels;  // its weights say what is kept
+    seconds += static_cast<double>(options.steps[s]) * options.rays_per_step * kSamplesPerRay /
+               kDeviceSamplesPerSecond;
+  }
+  if (box.spheres) {  // values, gradients and moments
+    const double map = 2.0 * options.background_resolution * options.background_resolution;
+    peak += map * (kIndexBytes + kSphereShare * options.background_layers *
+                                     (options.exact_sums ? 4 : 3) * 16);
+  }
+  if (options.exact_sums) seconds *= kExactSumsSlower;
+  return {static_cast<uint64_t>(peak + kSampleStore + 6.0 * static_cast<double>(photo_pixels)),
+          seconds};
+}
+
+StagePlan PlanPoses(int64_t photos, int threads) {
+  return {0, Shared(kPoseSecondsPerPhoto * static_cast<double>(photos), threads)};
+}
+
+StagePlan PlanTracks(int64_t photos, int threads) {
+  return {0, Shared(kTrackSecondsPerPhoto * static_cast<double>(photos), threads)};
+}
+
+StagePlan PlanStyle(int64_t steps, int threads) {
+  return {0, Shared(kStyleSecondsPerStep * static_cast<double>(steps), threads)};
+}
+
+std::string PlanText(const StagePlan& plan) {
+  const std::string time = DurationText(plan.seconds);
+  if (plan.memory == 0) return "about " + time;
+  return "about " + MemoryText(static_cast<double>(plan.memory)) + " of memory and " + time;
+}
+
+uint64_t PlannedMemory(double max_memory_gb, uint64_t available) {
+  return max_memory_gb > 0 ? static_cast<uint64_t>(max_memory_gb * 1e9) : available;
+}
+
+void CheckFitsMemory(const StagePlan& plan, uint64_t limit, const char* memory) {
+  if (limit == 0 || plan.memory <= limit) return;
+  throw Error(ExitCode::kResources,
+              "the fit would take about " + MemoryText(static_cast<double>(plan.memory)) +
+                  " of " + memory + ", of " + MemoryText(static_cast<double>(limit)) +
+                  " that it may",
+              "reconstruct",
+              "use --preset draft or smaller --fit-resolutions; memory grows with their cube");
+}
+
+bool LowerToMemory(const std::function<StagePlan(const FitOptions&)>& plan_of, uint64_t limit,
+                   FitOptions* options) {
+  bool lowered = false;
+  while (limit > 0 && plan_of(*options).memory > limit) {
+    auto& sides = options->resolutions;
+    const int finest = *std::max_element(sides.begin(), sides.end());
+    if (finest <= kLeastResolution) break;
+    const int lower = std::max(kLeastResolution, finest - std::max(1, finest / 16));
+    for (int& side : sides) side = std::min(side, lower);
+    lowered = true;
+  }
+  return lowered;
+}
+
+}  // namespace regrade

@@ -1,0 +1,86 @@
+// Everything that can be set for a run over an output folder, stage by stage.
+#pragma once
+
+#include <string>
+
+#include "evaluate/consistency.h"
+#include "pipeline/capture/ingest_photos.h"
+#include "pipeline/capture/object_masks.h"
+#include "pipeline/fields/camera_path.h"
+#include "pipeline/program/option_binding.h"
+#include "pipeline/program/run_options.h"
+#include "reconstruct/colmap/poses_from_photos.h"
+#include "reconstruct/fit/fit_options.h"
+#include "stylize/image/style_options.h"
+#include "stylize/training/train_network.h"
+
+namespace regrade {
+
+struct SceneOptions {
+  int photo_size = 800;
+
+  template <typename Bind>
+  void Describe(Bind& bind) {
+    bind("photo-size", photo_size,
+         {.unit = "pixels",
+          .help = "longer side of the photos that the field is fitted to, and of the frames "
+                  "that are rendered; time grows with its square",
+          .min = 64,
+          .max = 16384});
+  }
+};
+
+struct StyleSource {
+  std::string picture;
+
+  template <typename Bind>
+  void Describe(Bind& bind) {
+    bind("style", picture, {.help = "the picture whose colours the scene shall have"});
+  }
+};
+
+struct RenderOptions {
+  double fps = 24;
+  bool keep_exposure = false;
+  PathOptions path;
+
+  template <typename Bind>
+  void Describe(Bind& bind) {
+    bind("fps", fps, {.unit = "frames/s", .help = "pace of the films", .min = 1, .max = 240});
+    bind("keep-exposure", keep_exposure,
+         {.help = "frames at the photos' places in the exposure and white balance of their "
+                  "photos, where these were undone"});
+    path.Describe(bind);
+  }
+};
+
+struct RunSettings {
+  ProgramOptions program;
+  StartOptions start;
+  RunOptions run;
+  IngestOptions ingest;
+  PoseOptions pose;
+  SceneOptions scene;
+  FitOptions fit;
+  StyleSource style;
+  StyleOptions style_2d;
+  MaskOptions object;
+  TrainNetworkOptions network;
+  RenderOptions render;
+  ConsistencyOptions consistency;
+
+  // Groups as they head the help and name parts of fingerprints.
+  void Bind(OptionSet* options);
+};
+
+// Sets what a preset and, within it, a recipe decide, before single options are read: "draft",
+// "standard", "paper", "best". Throws Error(kUsage) for another name.
+void ApplyPreset(const std::string& preset, RunSettings* settings);
+// --recipe, where it was given, decides every option of the network that other flags do not:
+// call it before ApplyFlags. Throws Error(kUsage) for a recipe that does not exist.
+void ApplyRecipeFlag(OptionSet* options, RunSettings* settings);
+
+// Options that are fine alone and contradict each other: Error(kUsage) naming both.
+void CheckTogether(const RunSettings& settings);
+
+}  // namespace regrade

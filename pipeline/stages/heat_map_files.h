@@ -1,0 +1,29 @@
+// Pictures of the worst pairs, written beside an evaluation's figures.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "evaluate/consistency.h"
+#include "pipeline/report/data.h"
+#include "pipeline/workspace/workspace.h"
+
+namespace regrade {
+
+inline constexpr char kHeatMapFolder[] = "heatmaps";
+
+// Makes the folder, and removes maps of an earlier evaluation from it.
+void BeginHeatMaps(const Workspace& workspace);
+
+// Writes heatmaps/NAME_gap1_00012.png for the pair with the largest error of each row, see
+// ErrorHeatMap; rows whose pairs are all perfect or undefined have none. Flow and masks of
+// these pairs are computed once more by `motion` (the evaluation keeps none of them).
+//
+// Errors: as EvaluateConsistency, and kResources from the disk.
+std::vector<HeatMapFile> WriteHeatMaps(const Workspace& workspace,
+                                       const PairMotionFunction& motion,
+                                       const std::vector<NamedFrameSource>& sequences,
+                                       const std::vector<int>& gaps,
+                                       const ConsistencyReport& report);
+
+}  // namespace regrade

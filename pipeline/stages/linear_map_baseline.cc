@@ -1,0 +1,85 @@
+#include "pipeline/stages/linear_map_baseline.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "evaluate/fidelity.h"
+#include "kernels/base/error.h"
+#include "kernels/field/cpu/render_view.h"
+#include "kernels/field/packed_grid.h"
+#include "kernels/image/color_statistics.h"
+#include "stylize/image/monge_kantorovich.h"
+#include "stylize/linear_map.h"
+
+namespace regrade {
+namespace {
+
+Vec3d ColorAt(const Image& image, int64_t pixel) {
+  const float* c = &image.pixels[static_cast<size_t>(pixel * image.channels)];
+  return {c[0], c[1], c[2]};
+}
+
+// Squared error of the map over the frames' pixels, clipped as frames are.
+double SquaredError(const ColorMap& map, const FrameSource& source, const FrameSource& target) {
+  double sum = 0;
+  for (int i = 0; i < source.count; ++i) {
+    const Image from = source.frame(i), to = target.frame(i);
+    double frame_sum = 0;
+    for (int64_t p = 0; p < from.num_pixels(); ++p) {
+      const Vec3d mapped = map(ColorAt(from, p)), wanted = ColorAt(to, p);
+      if (!AllFinite(wanted)) continue;
+      for (int c = 0; c < 3; ++c) {
+        const double d = std::clamp(mapped[c], 0.0, 1.0) - wanted[c];
+        frame_sum += d * d;
+      }
+    }
+    sum += frame_sum;
+  }
+  return sum;
+}
+
+}  // namespace
+
+std::optional<double> LinearMapPsnr(const RadianceField& field,
+                                    const std::vector<Camera>& cameras,
+                                    const FrameSource& source, const FrameSource& views_2d,
+                                    const FrameSource& transmittance,
+                                    const ProgressFunction& progress) {
+  if (source.count == 0) return std::nullopt;
+  std::vector<ColorStatistics> before, after;
+  LeastSquaresAccumulator accumulator;
+  for (int i = 0; i < source.count; ++i) {
+    Image from = source.frame(i);
+    const Image to = views_2d.frame(i);
+    if (!HasColor(to)) continue;
+    for (size_t v = 0; v < from.pixels.size(); ++v)
+      if (!std::isfinite(to.pixels[v])) from.pixels[v] = to.pixels[v];
+    before.push_back(MeasureColor(from));
+    after.push_back(MeasureColor(to));
+    for (int64_t p = 0; p < from.num_pixels(); ++p)
+      if (AllFinite(ColorAt(to, p))) accumulator.Add(ColorAt(from, p), ColorAt(to, p));
+  }
+  if (before.empty()) return std::nullopt;
+  const ColorMap mkl = ComputeMkl(Pool(before), Pool(after)).map;
+  const ColorMap least_squares = accumulator.Solve();
+  const ColorMap better =
+      SquaredError(mkl, source, views_2d) < SquaredError(least_squares, source, views_2d)
+          ? mkl
+          : least_squares;
+  RadianceField mapped = field;
+  mapped.appearance = ApplyColorMap(field.appearance, better);
+  const Vec3d background = better(field.background.Cast<double>());
+  for (int c = 0; c < 3; ++c)
+    mapped.background[c] = static_cast<float>(std::clamp(background[c], 0.0, 1.0));
+  const FastGrid grid = MakeFastGrid(mapped);
+  const FrameSource rendered{source.count, [&](int i) {
+                               return RenderView(grid, cameras[static_cast<size_t>(i)],
+                                                 MarchOptions{field.step})
+                                   .color;
+                             }};
+  return MeasureFidelity({"linear_map", rendered}, {views_2d, transmittance, nullptr, {}, {}},
+                         progress)
+      .psnr_to_2d_db;
+}
+
+}  // namespace regrade

@@ -1,0 +1,155 @@
+#include "pipeline/stages/make_stylizer.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <utility>
+
+#include "kernels/base/error.h"
+#include "pipeline/capture/photo_gains.h"
+#include "pipeline/capture/working_views.h"
+#include "pipeline/files/folder_listing.h"
+#include "pipeline/images/image_file.h"
+#include "pipeline/program/crash_probe.h"
+#include "pipeline/stages/command_stylizer.h"
+#include "pipeline/stages/folder_stylizer.h"
+#include "pipeline/workspace/output_names.h"
+#include "pipeline/workspace/stage_record.h"
+#include "stylize/image/color_transfer.h"
+#include "stylize/image/distribution_transfer.h"
+#include "stylize/image/onnx_stylizer.h"
+
+namespace regrade {
+namespace {
+
+// Colours of all photos, so that a scene-wide map does not depend on which are held out; of a
+// region, where `region` says which pixels are of it.
+using PhotoFunction = std::function<std::optional<Image>(size_t view)>;
+
+std::unique_ptr<ViewStylizer> MakeColorMethod(const RunSettings& settings, const Image& style,
+                                              const Capture& capture,
+                                              const PhotoFunction& photo) {
+  const StyleOptions& options = settings.style_2d;
+  if (options.method == "idt" || options.method == "histogram") {
+    if (!options.scene_wide) return MakeDistributionTransfer(options, style);
+    // As many colours in all as are taken of one view otherwise, but 256 of each at least.
+    const int64_t most = std::max<int64_t>(
+        256,
+        4 * kColorSample / std::max<int64_t>(1, static_cast<int64_t>(capture.views.size())));
+    std::vector<Vec3d> scene;
+    for (size_t i = 0; i < capture.views.size(); ++i)
+      if (const std::optional<Image> picture = photo(i))
+        for (const Vec3d& color : SampleColors(*picture, capture.views[i].path, most))
+          scene.push_back(color);
+    return MakeDistributionTransfer(options, style, &scene);
+  }
+  if (!options.scene_wide) return MakeColorTransfer(options, style);
+  std::vector<ColorStatistics> parts;
+  for (size_t i = 0; i < capture.views.size(); ++i)
+    if (const std::optional<Image> picture = photo(i))
+      parts.push_back(MeasureForMethod(options, *picture));
+  const ColorStatistics scene = Pool(parts);
+  return MakeColorTransfer(options, style, &scene);
+}
+
+std::unique_ptr<ViewStylizer> MakeMethod(RunContext* context, const Capture& capture,
+                                         const Image& style, const PhotoFunction& photo) {
+  const RunSettings& settings = context->settings;
+  const StyleMethod method = ParseStyleMethod(settings.style_2d);
+  if (method.kind == "onnx")
+    return MakeOnnxStylizer(method.argument, settings.style_2d.max_side, style);
+  if (method.kind == "folder") {
+    std::vector<std::string> photos;
+    for (const CaptureView& view : capture.views) photos.push_back(view.file);
+    return MakeFolderStylizer(method.argument, photos);
+  }
+  if (method.kind == "command")
+    return MakeCommandStylizer(method.argument, settings.style.picture,
+                               settings.style_2d.command_limit_s);
+  return MakeColorMethod(settings, style, capture, photo);
+}
+
+}  // namespace
+
+std::unique_ptr<ViewStylizer> MakeSceneStylizer(RunContext* context, const Capture& capture,
+                                                const ObjectMasks* masks,
+                                                const CoverageFunction& coverage) {
+  const RunSettings& settings = context->settings;
+  std::string notice;
+  const Image style = ReadStylePicture(settings.style.picture, &notice);
+  if (!notice.empty()) context->console->Info(notice);
+  const PhotoGains gains = RecordedGains(*context->workspace, capture);
+  const auto photo = [&](size_t i) -> std::optional<Image> {
+    Image picture = ReadPhotoToFit(capture.views[i], settings.scene.photo_size,
+                                   gains.Of(static_cast<int>(i)));
+    if (picture.empty()) return std::nullopt;
+    return picture;
+  };
+  if (masks == nullptr) return MakeMethod(context, capture, style, photo);
+  std::vector<std::unique_ptr<ViewStylizer>> regions;
+  for (int k = 0; k < masks->num_regions(); ++k) {
+    const Image part = masks->StyleRegion(k, style.width, style.height);
+    const auto photo_region = [&](size_t i) -> std::optional<Image> {
+      if (!masks->Knows(static_cast<int>(i))) return std::nullopt;
+      const std::optional<Image> picture = photo(i);
+      if (!picture) return std::nullopt;
+      const Image region = masks->Coverage(static_cast<int>(i), picture->width,
+                                           picture->height)[static_cast<size_t>(k)];
+      if (!ShowsRegion(region)) return std::nullopt;
+      return WithRegion(*picture, region);
+    };
+    regions.push_back(MakeMethod(context, capture,
+                                 part.empty() ? style : WithRegion(style, part), photo_region));
+  }
+  const std::string kind = ParseStyleMethod(settings.style_2d).kind;
+  const bool of_colors = kind != "onnx" && kind != "folder" && kind != "command";
+  return MakeMaskedStylizer(std::move(regions), of_colors, coverage);
+}
+
+void ProbeMethod(StyleOptions* options) {
+  namespace fs = std::filesystem;
+  const StyleMethod method = ParseStyleMethod(*options);
+  if (method.kind == "command") MakeCommandStylizer(method.argument, "", 0);
+  if (method.kind != "onnx" && method.kind != "folder") return;
+  std::error_code error;
+  if (!fs::exists(method.argument, error))
+    throw Error(ExitCode::kInput, "there is no such file or folder", method.argument,
+                "what follows \"" + method.kind + ":\" in --method must exist");
+  const fs::path absolute = fs::absolute(method.argument, error);
+  if (!error) options->method = method.kind + ":" + absolute.lexically_normal().string();
+  if (method.kind != "onnx") return;
+  const auto make = [&] { MakeOnnxStylizer(method.argument, 64, Image(64, 64)); };
+  Rehearse(make, method.argument);
+  make();  // a rehearsal keeps plain errors to itself
+}
+
+std::vector<int> StyledViews(const Workspace& workspace, const Capture& capture, int holdout) {
+  const auto with_picture = [&](const std::vector<int>& views) {
+    std::vector<int> kept;
+    for (const int i : views)
+      if (std::filesystem::exists(workspace.Path("views_2d/" + FrameName(i))))
+        kept.push_back(i);
+    return kept;
+  };
+  std::vector<int> views = with_picture(ViewIndices(capture, holdout, false));
+  if (views.empty()) views = with_picture(ViewIndices(capture, holdout, true));
+  if (views.empty())
+    throw Error(ExitCode::kInput, "no view has a styled picture", workspace.Path("views_2d"),
+                "use --restart-from style_2d");
+  return views;
+}
+
+JsonValue MethodFiles(const StyleOptions& options) {
+  const StyleMethod method = ParseStyleMethod(options);
+  if (method.kind != "onnx" && method.kind != "folder") return JsonValue();
+  std::error_code error;
+  if (std::filesystem::is_regular_file(method.argument, error))
+    return HashFile(method.argument);
+  JsonValue hashes = JsonValue::Object();
+  for (const ListedFile& file : ListFolder(method.argument).files)
+    if (file.problem.empty()) hashes[file.name] = HashFile(file.path);
+  return hashes;
+}
+
+}  // namespace regrade

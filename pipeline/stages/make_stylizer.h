@@ -1,0 +1,34 @@
+// The 2D method of a run, made once from the style picture and, where it asks for it, from the
+// colours of all photos.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "pipeline/capture/object_masks.h"
+#include "pipeline/files/json_file.h"
+#include "pipeline/run/run_context.h"
+#include "stylize/image/masked_stylizer.h"
+#include "stylize/image/view_stylizer.h"
+
+namespace regrade {
+
+std::unique_ptr<ViewStylizer> MakeSceneStylizer(RunContext* context, const Capture& capture,
+                                                const ObjectMasks* masks = nullptr,
+                                                const CoverageFunction& coverage = nullptr);
+
+// Looked at before long work starts: the method exists, and so does the folder or file that it
+// names, which is made absolute; a command has its placeholders. Throws Error(kUsage, kInput).
+void ProbeMethod(StyleOptions* options);
+
+// Views that the style is learned from and measured on: the fitted ones that have a picture in
+// views_2d/; where none of them has, all that do, held out or not. Throws Error(kInput) if
+// there is none at all.
+std::vector<int> StyledViews(const Workspace& workspace, const Capture& capture, int holdout);
+
+// Hashes of the files that the method itself reads, as part of a stage's inputs: networks, or
+// pictures of a folder. Null for other methods. Throws Error(kInput) for a file or folder that
+// is not there.
+JsonValue MethodFiles(const StyleOptions& options);
+
+}  // namespace regrade

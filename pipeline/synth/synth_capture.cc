@@ -1,0 +1,192 @@
+#include "pipeline/synth/synth_capture.h"
+
+#include <charconv>
+#include <cstdio>
+#include <filesystem>
+#include <string_view>
+#include <vector>
+
+#include "evaluate/flow_file.h"
+#include "kernels/base/error.h"
+#include "kernels/synthetic/ray_trace.h"
+#include "kernels/synthetic/synthetic_scene.h"
+#include "pipeline/capture/transforms_json.h"
+#include "pipeline/files/atomic_file.h"
+#include "pipeline/files/json_file.h"
+#include "pipeline/files/npy_header.h"
+#include "pipeline/images/image_file.h"
+#include "pipeline/synth/synth_effects.h"
+#include "pipeline/synth/synth_model.h"
+
+namespace regrade {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kMinSide = 16, kMaxSide = 8192;  // pixels
+
+std::string FrameName(int index, const char* extension) {
+  char name[32];
+  std::snprintf(name, sizeof(name), "%05d%s", index, extension);
+  return name;
+}
+
+void ParseSize(const std::string& size, int* width, int* height) {
+  const char* const end = size.data() + size.size();
+  const auto [x, bad_width] = std::from_chars(size.data(), end, *width);
+  if (bad_width == std::errc() && x != end && *x == 'x') {
+    const auto [rest, bad_height] = std::from_chars(x + 1, end, *height);
+    if (bad_height == std::errc() && rest == end && *width >= kMinSide && *width <= kMaxSide &&
+        *height >= kMinSide && *height <= kMaxSide)
+      return;
+  }
+  throw Error(ExitCode::kUsage, "\"" + size + "\" is not a size of pictures", "--size",
+              "write WIDTHxHEIGHT, each from 16 to 8192, e.g. 640x480");
+}
+
+JsonValue Vector(const Vec3d& v) { return JsonValue::Array{v.x, v.y, v.z}; }
+
+// The object that masks are of: the first ball.
+int MaskedSolid(const SyntheticScene& scene) {
+  for (size_t i = 0; i < scene.solids.size(); ++i)
+    if (scene.solids[i].shape == Shape::kSphere) return static_cast<int>(i);
+  return 0;
+}
+
+// What was asked for, and the parameters of what was simulated.
+JsonValue DescribeCapture(const SynthOptions& options, const SynthEffects& effects,
+                          const SyntheticScene& scene) {
+  const auto off = [] { return JsonValue(JsonValue::Object{{"on", false}}); };
+  JsonValue exposure = off(), noise = off(), distortion = off(), highlights = off();
+  if (effects.exposure) {
+    JsonValue::Array gains;
+    for (int i = 0; i < options.views; ++i)
+      gains.push_back(SynthGain(options.seed, i, options.views));
+    exposure = JsonValue::Object{{"on", true}, {"of", "linear light"}, {"gains", gains}};
+  }
+  if (effects.noise)
+    noise = JsonValue::Object{
+        {"on", true}, {"of", "encoded values in [0, 1]"}, {"sigma", kSynthNoiseSigma}};
+  if (effects.distortion)
+    distortion = JsonValue::Object{{"on", true},     {"model", "OPENCV"}, {"k1", kSynthK1},
+                                   {"k2", kSynthK2}, {"p1", 0.0},         {"p2", 0.0}};
+  if (effects.barrel)
+    distortion = JsonValue::Object{{"on", true}, {"model", "OPENCV"}, {"k1", kSynthBarrelK1},
+                                   {"k2", 0.0},  {"p1", 0.0},         {"p2", 0.0}};
+  if (effects.fisheye)
+    distortion = JsonValue::Object{{"on", true}, {"model", "OPENCV_FISHEYE"},
+                                   {"k1", 0.0},  {"k2", 0.0},
+                                   {"k3", 0.0},  {"k4", 0.0}};
+  if (effects.highlights)
+    highlights = JsonValue::Object{
+        {"on", true}, {"exponent", kSunSharpness}, {"to_sun", Vector(scene.to_sun)}};
+  JsonValue of_effects = JsonValue::Object{{"exposure", exposure},
+                                           {"noise", noise},
+                                           {"distortion", distortion},
+                                           {"highlights", highlights}};
+  if (effects.masks)
+    of_effects["masks"] = JsonValue::Object{{"on", true}, {"solid", MaskedSolid(scene)}};
+  if (effects.mixed_cameras)
+    of_effects["mixed_cameras"] = JsonValue::Object{
+        {"on", true}, {"second_size", kSynthSecondSize}, {"second_focal", kSynthSecondFocal}};
+  if (effects.poses)
+    of_effects["poses"] = JsonValue::Object{{"on", true},
+                                            {"turn_degrees", kSynthPoseTurn},
+                                            {"step_share", kSynthPoseStep},
+                                            {"track_sigma_px", kSynthTrackSigma}};
+  return JsonValue::Object{{"scene", options.scene},
+                           {"seed", options.seed},
+                           {"views", options.views},
+                           {"size", options.size},
+                           {"bounds_min", Vector(scene.bounds_min)},
+                           {"bounds_max", Vector(scene.bounds_max)},
+                           {"effects", of_effects}};
+}
+
+// A folder with photos is only written to if they are what the same options would write.
+void ClaimFolder(const fs::path& out, const JsonValue& description, bool with_masks) {
+  const fs::path record = out / "truth" / "effects.json";
+  std::error_code none;
+  const bool has_photos = fs::exists(out / "images") && !fs::is_empty(out / "images", none);
+  if (has_photos && !(fs::exists(record) && ReadJsonFile(record.string()) == description))
+    throw Error(ExitCode::kFolderInUse, "the folder holds photos of something else",
+                (out / "images").string(), "name another folder, or remove this one first");
+  for (const char* folder :
+       {"images", "truth/depth", "truth/flow", "truth/visible", "masks", "truth/masks"}) {
+    if (!with_masks && std::string(folder).ends_with("masks")) continue;
+    std::error_code error;
+    fs::create_directories(out / folder, error);
+    if (error)
+      throw Error(ExitCode::kResources, "cannot make a folder: " + error.message(),
+                  (out / folder).string());
+  }
+  WriteJsonFile(record.string(), description);
+}
+
+void WriteDepth(const std::string& path, const Image& depth) {
+  std::string bytes = MakeNpyHeader(ArrayType::kF32, {depth.height, depth.width});
+  bytes.append(reinterpret_cast<const char*>(depth.pixels.data()),
+               depth.pixels.size() * sizeof(float));
+  WriteFileAtomically(path, bytes);
+}
+
+void WriteMotion(const fs::path& truth, int index, SyntheticMotion motion) {
+  FlowField flow;
+  flow.width = motion.width;
+  flow.height = motion.height;
+  flow.uv = std::move(motion.uv);
+  const std::string name = FlowFileName(index, index + 1);
+  WriteFlowFile((truth / "flow" / name).string(), flow);
+  Image mask(motion.width, motion.height, 1);
+  for (size_t i = 0; i < motion.visible.size(); ++i) mask.pixels[i] = motion.visible[i];
+  WritePng8((truth / "visible" / fs::path(name).replace_extension(".png")).string(), mask);
+}
+
+}  // namespace
+
+void WriteSyntheticCapture(const std::string& out, const SynthOptions& options,
+                           const ProgressFunction& progress) {
+  int width = 0, height = 0;
+  ParseSize(options.size, &width, &height);
+  const SynthEffects effects = ParseSynthEffects(options.effects);
+  const SyntheticScene scene = MakeSyntheticScene(options.scene, options.seed);
+  std::vector<Camera> cameras = SyntheticCameras(scene, options.views, width, height);
+  for (int i = 0; i < options.views; ++i)
+    cameras[i] = WithSynthLens(effects, WithSynthBody(effects, i, cameras[i]));
+  ClaimFolder(out, DescribeCapture(options, effects, scene), effects.masks);
+
+  const fs::path truth = fs::path(out) / "truth";
+  std::vector<TransformsFrame> frames;
+  std::vector<Image> depths;  // of all views, where tracks are asked for
+  for (int i = 0; i < options.views; ++i) {
+    SyntheticView view = RenderSyntheticView(scene, cameras[i], effects.highlights);
+    if (effects.exposure) ApplyGain(SynthGain(options.seed, i, options.views), &view.color);
+    if (effects.noise) ApplyNoise(options.seed, i, kSynthNoiseSigma, &view.color);
+    const std::string name = FrameName(i, ".png");
+    WritePng8((fs::path(out) / "images" / name).string(), view.color);
+    WriteDepth((truth / "depth" / FrameName(i, ".npy")).string(), view.depth);
+    if (effects.masks) {
+      const Image mask = RenderSolidMask(scene, cameras[i], MaskedSolid(scene));
+      WritePng8((truth / "masks" / name).string(), mask);
+      WritePng8((fs::path(out) / "masks" / name).string(), FaultyMask(mask, SynthMaskFault(i)));
+    }
+    if (i + 1 < options.views)
+      WriteMotion(truth, i, TrueMotion(scene, cameras[i], cameras[i + 1]));
+    frames.push_back({"../images/" + name, cameras[i]});
+    if (effects.poses) depths.push_back(std::move(view.depth));
+    const Verdict verdict = Report(progress, i + 1, options.views, name);
+    if (verdict == Verdict::kAbort) throw Interrupted();
+    if (verdict == Verdict::kFinish) break;
+  }
+  WriteTransformsJson((truth / "transforms.json").string(), frames);
+  if (!effects.poses) return;
+  cameras.resize(depths.size());
+  std::vector<std::string> names;
+  for (size_t i = 0; i < depths.size(); ++i)
+    names.push_back(FrameName(static_cast<int>(i), ".png"));
+  fs::create_directories(fs::path(out) / "sparse" / "0");
+  WriteColmapModel(ShakenModel(TracksOf(cameras, depths, names, options.seed), options.seed),
+                   (fs::path(out) / "sparse" / "0").string());
+}
+
+}  // namespace regrade

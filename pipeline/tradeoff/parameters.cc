@@ -1,0 +1,159 @@
+#include "pipeline/tradeoff/parameters.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "kernels/base/error.h"
+
+namespace regrade {
+namespace {
+
+JsonValue Numbers(const std::vector<int>& values) {
+  return JsonValue::Array(values.begin(), values.end());
+}
+
+std::vector<int> Scaled(std::vector<int> values, double factor, int least) {
+  for (int& value : values)
+    value = std::max(least, static_cast<int>(std::lround(value * factor)));
+  return values;
+}
+
+std::string TextOf(const JsonValue& value) {
+  if (value.IsString()) return value.AsString();
+  if (!value.IsArray()) return DumpJson(value, -1);
+  std::string text;
+  for (const JsonValue& element : value.AsArray())
+    text += (text.empty() ? "" : ",") + DumpJson(element, -1);
+  return text;
+}
+
+// Options are floats: 1e-3 is 1e-3 whichever precision it has been through.
+bool Same(const JsonValue& a, const JsonValue& b) {
+  if (!a.IsNumber() || !b.IsNumber()) return a == b;
+  return std::abs(a.AsDouble() - b.AsDouble()) <= 1e-6 * std::abs(b.AsDouble());
+}
+
+class List {
+ public:
+  explicit List(const KnobChoice& choice) : choice_(choice) {}
+
+  void AddBase(const std::string& plane) { variants_.push_back({plane, "", ""}); }
+
+  // From cheap to accurate; the base's own value is measured already.
+  void Add(const std::string& plane, const std::string& knob, const JsonValue& own,
+           const std::vector<JsonValue>& values, bool last_is_accurate = true) {
+    names_.push_back(knob);
+    if (!choice_.only.empty() &&
+        std::find(choice_.only.begin(), choice_.only.end(), knob) == choice_.only.end())
+      return;
+    for (const JsonValue& value : values) {
+      if (Same(value, own)) continue;
+      Variant variant{plane, knob, TextOf(value)};
+      variant.options[knob] = value;
+      variant.accurate_end = last_is_accurate && &value == &values.back();
+      variants_.push_back(std::move(variant));
+    }
+  }
+
+  std::vector<Variant> Take() {
+    for (const std::string& name : choice_.only)
+      if (std::find(names_.begin(), names_.end(), name) == names_.end()) {
+        std::string known;
+        for (const std::string& knob : names_) known += (known.empty() ? "" : ", ") + knob;
+        throw Error(ExitCode::kUsage, "'" + name + "' has no price here", "--knobs",
+                    "knobs: " + known);
+      }
+    return std::move(variants_);
+  }
+
+ private:
+  const KnobChoice& choice_;
+  std::vector<Variant> variants_;
+  std::vector<std::string> names_;
+};
+
+void AddFitKnobs(const RunSettings& base, List* list) {
+  const FitOptions& fit = base.fit;
+  const auto steps = [&](double factor) { return Numbers(Scaled(fit.steps, factor, 1)); };
+  const auto grids = [&](double factor) {
+    return Numbers(Scaled(fit.resolutions, factor, 16));
+  };
+  const float step = fit.step, stop = fit.stop_transmittance;
+  list->Add("fit", "fit-steps", steps(1), {steps(0.25), steps(0.5), steps(1), steps(2)});
+  list->Add("fit", "fit-resolutions", grids(1), {grids(0.67), grids(1), grids(1.33)});
+  list->Add("fit", "fit-step-size", step, {2 * step, step, 0.5 * step});
+  list->Add("fit", "fit-stop", stop, {1e-2, 1e-3, 1e-4, 1e-6});
+  list->Add("fit", "sh-degree", fit.sh_degree, {0, 1, 2});
+  // No end of this one is the accurate one: errors are against the base.
+  list->Add("fit", "fit-view-bound", fit.view_bound, {0.1, 0.2, 0.4, 1e6}, false);
+  // Sums in a grouping that does not depend on threads.
+  list->Add("fit", "fit-shards", fit.shards, {0, 4});
+}
+
+void AddStyleKnobs(const RunSettings& base, List* list) {
+  const TrainNetworkOptions& network = base.network;
+  const auto steps = [&](double factor) {
+    return JsonValue(std::max(1, static_cast<int>(std::lround(network.steps * factor))));
+  };
+  list->Add("style", "style-steps", network.steps, {steps(1 / 3.0), steps(1), steps(3)});
+  list->Add("style", "style-patch", network.patch, {32, 8, 1});
+  list->Add("style", "style-min-weight", network.min_weight, {1e-2, 1e-3, 0.0});
+  list->Add("style", "style-view-weight", network.view_weight, {10.0, 1.0, 0.0});
+  list->Add("style", "style-norm-steps", network.norm_steps, {1, 5, 20});
+}
+
+}  // namespace
+
+const Plane& PlaneOf(const std::string& name) {
+  for (const Plane& plane : kPlanes)
+    if (name == plane.name) return plane;
+  throw Error(ExitCode::kInput, "'" + name + "' is no plane of prices");
+}
+
+JsonValue PresetOptions(const std::string& preset) {
+  RunSettings settings;
+  OptionSet options;
+  settings.Bind(&options);
+  ApplyPreset(preset, &settings);
+  JsonValue values = JsonValue::Object();
+  for (const char* group : {"Scene", "Fit"}) {
+    const JsonValue of_group = options.Values(group);
+    for (const auto& [name, value] : of_group.AsObject()) values[name] = value;
+  }
+  return values;
+}
+
+std::vector<Variant> VariantsOf(const RunSettings& base, const KnobChoice& choice) {
+  List list(choice);
+  if (choice.poses) {
+    list.AddBase("poses");
+    const int size = base.pose.image_size;
+    list.Add("poses", "pose-image-size", size, {size * 6 / 10, size, size * 16 / 10});
+  }
+  list.AddBase("fit");
+  AddFitKnobs(base, &list);
+  if (choice.style) {
+    list.AddBase("style");
+    AddStyleKnobs(base, &list);
+  }
+  list.AddBase("render");
+  // How rays are marched, not options of a run: films use the field's own step and 1e-4.
+  list.Add("render", "ray-stop", nullptr, {1e-2, 1e-3, 0.0});
+  list.Add("render", "ray-step", nullptr, {2.0, 0.5});
+  list.AddBase("flow");
+  list.Add("flow", "flow", base.consistency.flow,
+           {"dis-ultrafast", "dis-fast", "dis-medium", "farneback", "dis-tuned"});
+  std::vector<Variant> variants = list.Take();
+  for (const std::string& preset : choice.presets)
+    variants.push_back({"fit", "preset", preset, PresetOptions(preset)});
+  // A plane whose knobs were not asked for needs no base.
+  std::erase_if(variants, [&](const Variant& variant) {
+    return variant.knob.empty() &&
+           std::none_of(variants.begin(), variants.end(), [&](const Variant& other) {
+             return other.plane == variant.plane && !other.knob.empty();
+           });
+  });
+  return variants;
+}
+
+}  // namespace regrade

@@ -1,0 +1,336 @@
+#include "pipeline/tradeoff/variant_runner.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <numeric>
+#include <optional>
+
+#include "evaluate/image_quality.h"
+#include "evaluate/pair_motion.h"
+#include "kernels/base/error.h"
+#include "kernels/field/cpu/render_view.h"
+#include "kernels/field/packed_grid.h"
+#include "kernels/field/render.h"
+#include "kernels/scene/common_camera.h"
+#include "pipeline/capture/capture_store.h"
+#include "pipeline/capture/scene_profile.h"
+#include "pipeline/capture/working_views.h"
+#include "pipeline/fields/field_file.h"
+#include "pipeline/images/image_file.h"
+#include "pipeline/program/cpu_time.h"
+#include "pipeline/stages/held_out.h"
+#include "pipeline/stages/make_stylizer.h"
+#include "pipeline/stages/stages.h"
+#include "pipeline/workspace/output_names.h"
+#include "reconstruct/fit/fit_field.h"
+
+namespace regrade {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kStyledViews = 6;  // that a style is judged on
+constexpr int kFrames = 8;       // rendered for motion, and for the renderer's own prices
+constexpr int kRenderedFrames = 3;
+
+// Runs beside the work and tells what it took.
+class Clocks {
+ public:
+  explicit Clocks(Measurement* measurement) : measurement_(measurement) {}
+  void Stop(double count = 1) {
+    const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - begin_;
+    measurement_->seconds = wall.count() / count;
+    measurement_->cpu_seconds = (CpuSeconds() - cpu_begin_) / count;
+  }
+
+ private:
+  Measurement* measurement_;
+  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+  double cpu_begin_ = CpuSeconds();
+};
+
+// The base's options with the variant's over them, at work in a folder of its own.
+struct Trial {
+  RunContext context;
+  Workspace workspace;
+
+  Trial(const RunContext& base, const Variant& variant, const std::string& folder)
+      : workspace(folder) {
+    context.settings.Bind(&context.options);
+    context.options.ApplyConfig(base.options.Values(), "tradeoff");
+    context.options.ApplyConfig(variant.options, "tradeoff");
+    context.settings.run.out = folder;
+    context.source = base.source;
+    context.workspace = &workspace;
+    context.console = base.console;
+  }
+
+  // A file or folder of the base, without copying what is in it where the disk can do that.
+  void Take(const RunContext& base, const std::string& relative) {
+    const fs::path from = base.workspace->Path(relative), to = workspace.NewPath(relative);
+    std::error_code error;
+    fs::copy(from, to, fs::copy_options::recursive | fs::copy_options::create_hard_links,
+             error);
+    if (!error) return;
+    fs::remove_all(to);
+    fs::copy(from, to, fs::copy_options::recursive);
+  }
+  void TakeRecord(const RunContext& base, const std::string& stage) {
+    Take(base, ".regrade/stages/" + stage + ".json");
+  }
+};
+
+double NumberOf(const JsonValue& figures, const char* name) {
+  const JsonValue* value = figures.Find(name);
+  return value != nullptr && value->IsNumber() ? value->AsDouble() : std::nan("");
+}
+
+double Mean(const std::vector<double>& values) {
+  return values.empty() ? std::nan("")
+                        : std::accumulate(values.begin(), values.end(), 0.0) /
+                              static_cast<double>(values.size());
+}
+
+// `count` of `all`, evenly spread.
+std::vector<int> Spread(const std::vector<int>& all, int count) {
+  std::vector<int> some;
+  const int n = static_cast<int>(all.size()), k = std::min(count, n);
+  for (int i = 0; i < k; ++i)
+    some.push_back(all[static_cast<size_t>((2 * i + 1) * n / (2 * k))]);
+  return some;
+}
+
+}  // namespace
+
+struct Bench::Frames {
+  Capture capture;
+  StoredField stored;
+  FastGrid grid;
+  std::vector<Camera> cameras;
+  std::vector<Image> colors;
+  std::vector<FrameGeometry> geometry;
+  std::vector<PairMotion> truth;  // from each frame to the next
+  std::vector<Image> accurate;    // of the first few cameras, rays marched to the end
+};
+
+Bench::Bench(RunContext* base, const std::string& folder) : base_(base), folder_(folder) {}
+Bench::~Bench() = default;
+
+Measurement Bench::Measure(const Variant& variant, int repeat,
+                           const ProgressFunction& progress) {
+  Measurement m;
+  m.plane = variant.plane;
+  m.knob = variant.knob;
+  m.value = variant.value;
+  m.repeat = repeat;
+  fs::remove_all(folder_);  // what an interrupted measurement left would shorten this one
+  if (variant.plane == "poses")
+    MeasurePoses(variant, progress, &m);
+  else if (variant.plane == "fit")
+    MeasureFit(variant, progress, &m);
+  else if (variant.plane == "style")
+    MeasureStyle(variant, progress, &m);
+  else if (variant.plane == "render")
+    MeasureRender(variant, &m);
+  else
+    MeasureFlow(variant, &m);
+  fs::remove_all(folder_);
+  if (!std::isfinite(m.accuracy))
+    throw Error(ExitCode::kScene, "nothing to measure accuracy by", variant.plane,
+                variant.plane == "fit" ? "keep photos for measuring: --holdout 8"
+                                       : "leave its knobs out with --knobs");
+  return m;
+}
+
+void Bench::MeasurePoses(const Variant& variant, const ProgressFunction& progress,
+                         Measurement* m) {
+  Trial trial(*base_, variant, folder_);
+  const Stage stage = PoseStage(&trial.context);
+  Clocks clocks(m);
+  const StageOutcome outcome = stage.work(progress);
+  clocks.Stop();
+  m->accuracy = NumberOf(outcome.figures, "reprojection_px");
+  for (const char* name : {"registered", "points"}) m->work[name] = outcome.figures.At(name);
+}
+
+// Photos at one working size, as a fit of the base's capture sees them; read once, for their
+// reading is the same for all variants and is none of their price.
+struct Bench::Photos {
+  int size = 0;
+  Capture capture;
+  PhotoGains gains;
+  NormalizedScene scene;
+  std::vector<Image> pictures;
+  std::vector<TrainingView> views;
+};
+
+const Bench::Photos& Bench::PhotosAt(int size) {
+  if (photos_ != nullptr && photos_->size == size) return *photos_;
+  photos_ = std::make_unique<Photos>();
+  Photos& p = *photos_;
+  const RunOptions& run = base_->settings.run;
+  p.size = size;
+  p.capture = ReadCapture(base_->workspace->Path("poses"));
+  p.gains = RecordedGains(*base_->workspace, p.capture);
+  // Exposures have no say in the box, and are known already.
+  p.scene =
+      ProfileScene(p.capture, base_->settings.fit.sh_degree, run.effects + ",exposure=off")
+          .scene;
+  const std::vector<int> fitted = ViewIndices(p.capture, run.holdout, false);
+  p.pictures.reserve(fitted.size());
+  for (const int i : fitted) {
+    const CaptureView& view = p.capture.views[static_cast<size_t>(i)];
+    Image picture = ReadPhotoToFit(view, size, p.gains.Of(i));
+    if (picture.empty()) continue;
+    p.pictures.push_back(std::move(picture));
+    p.views.push_back({WorkingCamera(view.camera, size, p.scene.field_from_world, p.scene.ndc),
+                       &p.pictures.back()});
+  }
+  return p;
+}
+
+void Bench::MeasureFit(const Variant& variant, const ProgressFunction& progress,
+                       Measurement* m) {
+  RunSettings settings = base_->settings;
+  OptionSet set;
+  settings.Bind(&set);
+  set.ApplyConfig(variant.options, "tradeoff");
+  const Photos& photos = PhotosAt(settings.scene.photo_size);
+  FitOptions options = settings.fit;
+  options.seed = settings.run.seed + static_cast<uint64_t>(m->repeat);
+  // The degree that the base's trial has decided for, unless it is the knob.
+  const auto record = base_->workspace->Find("reconstruct");
+  if (record && variant.knob != "sh-degree")
+    options.sh_degree = static_cast<int>(record->figures.At("sh_degree").AsInt());
+  FitHooks hooks;
+  hooks.progress = progress;
+  Clocks clocks(m);
+  FitResult fit = FitField(photos.views, photos.scene.box, options, hooks);
+  clocks.Stop();
+  m->work["rays"] = fit.rays;
+  m->work["samples"] = fit.samples;
+  m->work["voxels"] = fit.voxels;
+  // All variants are measured at the base's size of photos, or they would not compare.
+  m->accuracy =
+      MeasureHeldOut(photos.capture, settings.run.holdout, base_->settings.scene.photo_size,
+                     photos.gains,
+                     {std::move(fit.field), photos.scene.field_from_world, photos.scene.ndc},
+                     Backend::kCpu)
+          .MeanPsnr()
+          .value_or(std::nan(""));
+}
+
+void Bench::MeasureStyle(const Variant& variant, const ProgressFunction& progress,
+                         Measurement* m) {
+  Trial trial(*base_, variant, folder_);
+  for (const char* path : {"poses", "field.npz", "views_2d"}) trial.Take(*base_, path);
+  for (const char* stage : {"reconstruct", "style_2d"}) trial.TakeRecord(*base_, stage);
+  trial.context.settings.run.seed += static_cast<uint64_t>(m->repeat);
+  const Stage stage = StylizeStage(&trial.context);
+  Clocks clocks(m);
+  const StageOutcome outcome = stage.work(progress);
+  clocks.Stop();
+  for (const char* name : {"steps", "k_est", "bound"}) m->work[name] = outcome.figures.At(name);
+
+  const Workspace& base = *base_->workspace;
+  const Capture capture = ReadCapture(base.Path("poses"));
+  const StoredField styled = ReadFieldFile(trial.workspace.Path("styled.npz"));
+  const FastGrid grid = MakeFastGrid(styled.field);
+  const bool of_renders = fs::exists(base.Path("frames/views_2d"));
+  std::vector<double> psnr;
+  for (const int i :
+       Spread(StyledViews(base, capture, base_->settings.run.holdout), kStyledViews)) {
+    const CaptureView& photo = capture.views[static_cast<size_t>(i)];
+    const int size = base_->settings.scene.photo_size;
+    const Camera camera =
+        WorkingCamera(photo.camera, size, styled.field_from_world, styled.ndc);
+    const RenderedView view = RenderView(grid, camera, MarchOptions{styled.field.step});
+    Image target = ReadImage(
+        base.Path(std::string(of_renders ? "frames/views_2d/" : "views_2d/") + FrameName(i)));
+    if (!of_renders) LeaveOutMasked(photo, size, &target);
+    if (const auto value = Psnr(view.color, target, &view.transmittance))
+      psnr.push_back(*value);
+  }
+  m->accuracy = Mean(psnr);
+}
+
+const Bench::Frames& Bench::BaseFrames() {
+  if (frames_ != nullptr) return *frames_;
+  frames_ = std::make_unique<Frames>();
+  Frames& f = *frames_;
+  const Workspace& base = *base_->workspace;
+  f.capture = ReadCapture(base.Path("poses"));
+  f.stored = ReadFieldFile(base.Path("field.npz"));
+  f.grid = MakeFastGrid(f.stored.field);
+  const int count = std::min(kFrames, static_cast<int>(f.capture.views.size()));
+  // Flow is compared on frames of one size.
+  const std::vector<Camera> cameras = WithCommonIntrinsics(WorkingCameras(
+      f.capture, base_->settings.scene.photo_size, f.stored.field_from_world, f.stored.ndc));
+  for (int i = 0; i < count; ++i) {
+    const Camera& camera = cameras[static_cast<size_t>(i)];
+    const RenderedView view = RenderView(f.grid, camera, MarchOptions{f.stored.field.step});
+    f.cameras.push_back(camera);
+    f.colors.push_back(view.color);
+    f.geometry.push_back({DepthAlongRays(camera, view.depth), camera});
+  }
+  const PairMotionFunction known =
+      KnownMotion([&f](int i) { return f.geometry[static_cast<size_t>(i)]; });
+  for (int i = 0; i + 1 < count; ++i) f.truth.push_back(known(i, i + 1));
+  for (int i = 0; i < std::min(kRenderedFrames, count); ++i)
+    f.accurate.push_back(RenderView(f.grid, f.cameras[static_cast<size_t>(i)],
+                                    MarchOptions{0.25f * f.stored.field.step, 0})
+                             .color);
+  return f;
+}
+
+void Bench::MeasureRender(const Variant& variant, Measurement* m) {
+  const Frames& f = BaseFrames();
+  MarchOptions march{f.stored.field.step};
+  if (const JsonValue* stop = variant.options.Find("ray-stop"))
+    march.stop_transmittance = static_cast<float>(stop->AsDouble());
+  if (const JsonValue* step = variant.options.Find("ray-step"))
+    march.step = static_cast<float>(step->AsDouble()) * f.stored.field.step;
+  std::vector<Image> frames;
+  Clocks clocks(m);
+  for (size_t i = 0; i < f.accurate.size(); ++i)
+    frames.push_back(RenderView(f.grid, f.cameras[i], march).color);
+  clocks.Stop(static_cast<double>(frames.size()));
+  std::vector<double> squared;
+  for (size_t i = 0; i < frames.size(); ++i)
+    if (const auto error = MeanSquaredError(frames[i], f.accurate[i]))
+      squared.push_back(*error);
+  m->accuracy = 255 * std::sqrt(Mean(squared));
+  m->work["pixels"] = frames.empty() ? int64_t{0} : frames[0].num_pixels();
+}
+
+void Bench::MeasureFlow(const Variant& variant, Measurement* m) {
+  const Frames& f = BaseFrames();
+  std::string method = base_->settings.consistency.flow;
+  if (const JsonValue* flow = variant.options.Find("flow")) method = flow->AsString();
+  const FrameSource source{static_cast<int>(f.colors.size()),
+                           [&f](int i) { return f.colors[static_cast<size_t>(i)]; }};
+  const std::string mode =
+      base_->settings.consistency.mode == "ruder2016" ? "ruder2016" : "lai2018";
+  const PairMotionFunction motion = EstimatedMotion(source, mode, method);
+  std::vector<PairMotion> estimated;
+  Clocks clocks(m);
+  for (size_t i = 0; i < f.truth.size(); ++i)
+    estimated.push_back(motion(static_cast<int>(i), static_cast<int>(i) + 1));
+  clocks.Stop(std::max<double>(1, static_cast<double>(f.truth.size())));
+  // Over the pixels whose true place is seen in the next frame.
+  double sum = 0, pixels = 0;
+  for (size_t i = 0; i < estimated.size(); ++i)
+    for (int y = 0; y < estimated[i].flow.height; ++y)
+      for (int x = 0; x < estimated[i].flow.width; ++x) {
+        if (*f.truth[i].mask.weight.at(x, y) < 0.5f) continue;
+        const float *a = estimated[i].flow.at(x, y), *b = f.truth[i].flow.at(x, y);
+        const double error = std::hypot(a[0] - b[0], a[1] - b[1]);
+        if (std::isfinite(error)) sum += error, ++pixels;
+      }
+  m->accuracy = pixels > 0 ? sum / pixels : std::nan("");
+  m->work["pairs"] = static_cast<int64_t>(estimated.size());
+}
+
+}  // namespace regrade

@@ -1,0 +1,126 @@
+#include "pipeline/workspace/folder_lock.h"
+
+#include <fcntl.h>
+#include <signal.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <ctime>
+#include <filesystem>
+
+#include "kernels/base/error.h"
+#include "pipeline/files/json_file.h"
+
+namespace regrade {
+namespace {
+
+constexpr uint64_t kMaxHolderBytes = 4096;
+
+std::string HostName() {
+  char name[256] = {};
+  ::gethostname(name, sizeof name - 1);
+  return name;
+}
+
+std::string HolderText() {
+  const std::time_t now = std::time(nullptr);
+  std::tm utc = {};
+  gmtime_r(&now, &utc);
+  char start[32];
+  std::strftime(start, sizeof start, "%Y-%m-%dT%H:%M:%SZ", &utc);
+  return DumpJson(JsonValue::Object{{"pid", static_cast<int64_t>(::getpid())},
+                                    {"host", HostName()},
+                                    {"start", start}},
+                  -1) +
+         "\n";
+}
+
+struct Holder {
+  int64_t pid = 0;
+  std::string host, start;
+
+  std::string Text() const {
+    if (pid == 0) return "another run (it has not written its name yet)";
+    return "process " + std::to_string(pid) + " on " + host + ", started " + start;
+  }
+  bool AliveHere() const {
+    return pid > 0 && host == HostName() &&
+           (::kill(static_cast<pid_t>(pid), 0) == 0 || errno == EPERM);
+  }
+};
+
+// What the holder wrote; empty if it is just writing, or something else stands there.
+Holder ReadHolder(int fd) {
+  Holder holder;
+  std::string text(kMaxHolderBytes, '\0');
+  const ssize_t size = ::pread(fd, text.data(), text.size(), 0);
+  text.resize(size > 0 ? static_cast<size_t>(size) : 0);
+  try {
+    const JsonValue value = ParseJson(text, "lock");
+    holder.host = value.At("host").AsString();
+    holder.start = value.At("start").AsString();
+    holder.pid = value.At("pid").AsInt();
+  } catch (const Error&) {
+  }
+  return holder;
+}
+
+// Between our open and our lock another run may have put a new file in place.
+bool StillInPlace(int fd, const std::string& path) {
+  struct stat ours, there;
+  return ::fstat(fd, &ours) == 0 && ::stat(path.c_str(), &there) == 0 &&
+         ours.st_dev == there.st_dev && ours.st_ino == there.st_ino;
+}
+
+}  // namespace
+
+FolderLock::FolderLock(const std::string& path, bool break_lock) {
+  const std::string folder = std::filesystem::path(path).parent_path().parent_path().string();
+  while (true) {
+    fd_ = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0644);
+    if (fd_ < 0)
+      throw Error(ExitCode::kResources,
+                  std::string("cannot write here: ") + std::strerror(errno), path,
+                  "choose another folder with --out, or mend its permissions");
+    int status;
+    do status = ::flock(fd_, LOCK_EX | LOCK_NB);
+    while (status != 0 && errno == EINTR);
+    if (status == 0 && StillInPlace(fd_, path)) break;
+    if (status != 0) {
+      const int error = errno;
+      const Holder holder = ReadHolder(fd_);
+      ::close(fd_);
+      if (error != EWOULDBLOCK)
+        throw Error(ExitCode::kResources,
+                    std::string("this file system cannot lock files: ") + std::strerror(error),
+                    path, "choose a folder on a local disk with --out");
+      const bool may_break = break_lock && !holder.AliveHere();
+      if (!may_break)
+        throw Error(ExitCode::kFolderInUse, "in use by " + holder.Text(), folder,
+                    break_lock ? "it is alive: end it first"
+                               : "wait for it or end it; if that run is surely dead (a network "
+                                 "drive can keep its lock), add --break-lock");
+      if (::unlink(path.c_str()) != 0 && errno != ENOENT)
+        throw Error(ExitCode::kResources,
+                    std::string("cannot remove the lock: ") + std::strerror(errno), path);
+      break_lock = false;
+      continue;
+    }
+    ::close(fd_);
+  }
+  const std::string text = HolderText();
+  if (::ftruncate(fd_, 0) != 0 ||
+      ::pwrite(fd_, text.data(), text.size(), 0) != static_cast<ssize_t>(text.size())) {
+    const int error = errno;
+    ::close(fd_);
+    throw Error(ExitCode::kResources, std::string("cannot write: ") + std::strerror(error),
+                path, "free some space, or choose another folder with --out");
+  }
+}
+
+FolderLock::~FolderLock() { ::close(fd_); }
+
+}  // namespace regrade

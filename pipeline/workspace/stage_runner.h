@@ -1,0 +1,61 @@
+// Does the stages of a run in order: finished ones are skipped, changed ones redone or refused,
+// and what is done is recorded.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "kernels/base/progress.h"
+#include "pipeline/program/console.h"
+#include "pipeline/workspace/workspace.h"
+
+namespace regrade {
+
+// The road, in order. A stage that is done again makes all later ones be done again.
+inline constexpr const char* kStageNames[] = {"pose",   "reconstruct", "style_2d", "stylize",
+                                              "render", "evaluate",    "report"};
+
+struct StageOutcome {
+  std::vector<std::string> outputs;  // files and folders, relative to the output folder
+  JsonValue figures = JsonValue::Object();
+};
+
+struct Stage {
+  std::string name;
+  JsonValue inputs;  // object: everything that the result depends on
+  // What to do when the recorded inputs are others: redo, or refuse with the difference (work
+  // that a typing mistake should not throw away).
+  bool refuse_changes = false;
+  std::string plan;  // a clause for --dry-run: sizes, memory, time where they are known
+  std::function<StageOutcome(const ProgressFunction&)> work;
+};
+
+class StageRunner {
+ public:
+  StageRunner(Workspace* workspace, Console* console)
+      : workspace_(workspace), console_(console) {}
+
+  // Forgets this stage and the later ones; an empty name forgets none.
+  void RestartFrom(const std::string& stage);
+  void SetDryRun(bool dry_run) { dry_run_ = dry_run; }
+
+  // False only in a dry run, when the stage would have to be done. Throws Error(kInput) for
+  // refused changes, Interrupted, and what the work throws; running out of memory becomes
+  // Error(kResources).
+  bool Run(const Stage& stage);
+
+  // For stages that this command does not do: it must be recorded, and its results unchanged.
+  // `how` names the command that makes it. Returns its record.
+  StageRecord Require(const std::string& stage, const std::string& how) const;
+
+ private:
+  void ForgetAfter(const std::string& stage);
+
+  Workspace* workspace_;
+  Console* console_;
+  bool dry_run_ = false;
+  std::string planned_restart_;  // in a dry run nothing is forgotten
+};
+
+}  // namespace regrade

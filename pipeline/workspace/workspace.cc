@@ -1,0 +1,188 @@
+#include "pipeline/workspace/workspace.h"
+
+#include <sys/statvfs.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+
+#include "kernels/base/error.h"
+#include "kernels/base/hash.h"
+#include "pipeline/files/atomic_file.h"
+
+namespace regrade {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr char kOwnFolder[] = "/.regrade";
+constexpr uint64_t kMaxRecord = 256 << 20;
+constexpr uint64_t kMaxCheckpoint = uint64_t{64} << 30;
+constexpr std::string_view kCheckpointMark = "regrade checkpoint 1\n";
+constexpr size_t kHashDigits = 16;
+// Names that we write at the top of an output folder.
+constexpr const char* kResultNames[] = {"run.json",    "poses",    "field.npz", "styled.npz",
+                                        "network.npz", "views_2d", "frames",    "report.json"};
+
+void RefuseForeignFolder(const std::string& folder) {
+  if (Workspace::Exists(folder)) return;
+  for (const char* name : kResultNames)
+    if (fs::exists(fs::path(folder) / name))
+      throw Error(ExitCode::kInput,
+                  std::string("holds '") + name + "', which regrade did not write", folder,
+                  "choose an empty or new folder with --out");
+}
+
+void MakeFolder(const std::string& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error || !fs::is_directory(folder))
+    throw Error(ExitCode::kResources,
+                error ? "cannot make this folder: " + error.message() : "is not a folder",
+                folder, "choose another folder with --out");
+}
+
+// Ours alone: the lock is held, so nobody is writing them.
+void RemoveTemporaries(const std::string& folder) {
+  std::vector<fs::path> found;
+  std::error_code error;
+  const std::string suffix = kTemporarySuffix;
+  for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end;
+       it.increment(error)) {
+    const std::string name = it->path().filename().string();
+    if (name.size() > suffix.size() &&
+        name.compare(name.size() - suffix.size(), suffix.size(), suffix) == 0)
+      found.push_back(it->path());
+  }
+  for (const fs::path& path : found) fs::remove_all(path, error);
+}
+
+}  // namespace
+
+bool Workspace::Exists(const std::string& folder) {
+  std::error_code error;
+  return fs::is_directory(folder + kOwnFolder, error);
+}
+
+Workspace::Workspace(const std::string& folder, bool break_lock) {
+  std::error_code error;
+  folder_ = fs::absolute(folder, error).lexically_normal().string();
+  if (error)
+    throw Error(ExitCode::kResources, "the working folder is gone: " + error.message(), folder,
+                "give an absolute path with --out");
+  while (folder_.size() > 1 && folder_.back() == '/') folder_.pop_back();
+  MakeFolder(folder_);
+  RefuseForeignFolder(folder_);
+  MakeFolder(folder_ + kOwnFolder);
+  lock_.emplace(folder_ + kOwnFolder + "/lock", break_lock);
+  MakeFolder(Path(".regrade/stages"));
+  MakeFolder(Path(".regrade/checkpoints"));
+  RemoveTemporaries(folder_);
+}
+
+std::string Workspace::NewPath(const std::string& relative) const {
+  const std::string path = Path(relative);
+  MakeFolder(fs::path(path).parent_path().string());
+  return path;
+}
+
+std::string Workspace::StagePath(const std::string& stage) const {
+  return Path(".regrade/stages/" + stage + ".json");
+}
+
+std::string Workspace::CheckpointPath(const std::string& stage) const {
+  return Path(".regrade/checkpoints/" + stage);
+}
+
+std::optional<StageRecord> Workspace::Find(const std::string& stage) const {
+  const std::string path = StagePath(stage);
+  if (!fs::exists(path)) return std::nullopt;
+  return StageRecordFromJson(ReadJsonFile(path, kMaxRecord), path);
+}
+
+StageStatus Workspace::Status(const std::string& stage, const JsonValue& inputs) const {
+  const std::optional<StageRecord> record = Find(stage);
+  if (!record) return {StageState::kNeverDone, {}};
+  std::vector<std::string> differences = Differences(record->inputs, inputs);
+  if (record->version != REGRADE_VERSION)
+    differences.push_back("made by regrade " + record->version + ", this is " REGRADE_VERSION);
+  if (!differences.empty()) return {StageState::kInputsDiffer, std::move(differences)};
+  std::vector<std::string> changed = ChangedOutputs(folder_, *record);
+  if (!changed.empty()) return {StageState::kResultsDiffer, std::move(changed)};
+  return {StageState::kDone, {}};
+}
+
+void Workspace::Record(const std::string& stage, const JsonValue& inputs,
+                       const std::vector<std::string>& outputs, double seconds,
+                       const JsonValue& figures, std::optional<double> cpu_seconds) {
+  StageRecord record;
+  record.version = REGRADE_VERSION;
+  record.inputs = inputs;
+  record.outputs = DescribeOutputs(folder_, outputs);
+  record.seconds = seconds;
+  record.cpu_seconds = cpu_seconds;
+  record.figures = figures;
+  WriteJsonFile(StagePath(stage), ToJson(record));
+  DropCheckpoint(stage);
+}
+
+void Workspace::Forget(const std::string& stage) {
+  std::error_code error;
+  fs::remove(StagePath(stage), error);
+  DropCheckpoint(stage);
+}
+
+std::vector<std::string> Workspace::FinishedStages() const {
+  std::vector<std::string> stages;
+  for (const auto& entry : fs::directory_iterator(Path(".regrade/stages")))
+    if (entry.path().extension() == ".json") stages.push_back(entry.path().stem().string());
+  std::sort(stages.begin(), stages.end());
+  return stages;
+}
+
+// Layout: mark, hash of the inputs, hash of the content, the content.
+void Workspace::SaveCheckpoint(const std::string& stage, const JsonValue& inputs,
+                               std::string_view bytes) const {
+  std::string head(kCheckpointMark);
+  head += HashText(HashOf(DumpJson(inputs, -1)));
+  head += HashText(HashOf(bytes));
+  WriteFileAtomically(CheckpointPath(stage), head, bytes);
+}
+
+std::optional<std::string> Workspace::LoadCheckpoint(const std::string& stage,
+                                                     const JsonValue& inputs) const {
+  const std::string path = CheckpointPath(stage);
+  if (!fs::is_regular_file(path)) return std::nullopt;
+  std::string blob = ReadWholeFile(path, kMaxCheckpoint);
+  const size_t header = kCheckpointMark.size() + 2 * kHashDigits;
+  if (blob.size() < header || blob.compare(0, kCheckpointMark.size(), kCheckpointMark) != 0)
+    return std::nullopt;
+  const std::string_view view = blob;
+  const std::string_view of_inputs = view.substr(kCheckpointMark.size(), kHashDigits);
+  const std::string_view of_bytes =
+      view.substr(kCheckpointMark.size() + kHashDigits, kHashDigits);
+  if (of_inputs != HashText(HashOf(DumpJson(inputs, -1))) ||
+      of_bytes != HashText(HashOf(view.substr(header))))
+    return std::nullopt;
+  blob.erase(0, header);
+  return blob;
+}
+
+void Workspace::DropCheckpoint(const std::string& stage) const {
+  std::error_code error;
+  fs::remove(CheckpointPath(stage), error);
+}
+
+void Workspace::RequireFreeSpace(uint64_t bytes, const std::string& for_what) const {
+  struct statvfs disk;
+  if (::statvfs(folder_.c_str(), &disk) != 0) return;  // unknown: the write itself will say
+  const uint64_t free = static_cast<uint64_t>(disk.f_bavail) * disk.f_frsize;
+  if (free >= bytes) return;
+  throw Error(ExitCode::kResources,
+              for_what + " needs about " + std::to_string(bytes >> 20) + " MB of disk, " +
+                  std::to_string(free >> 20) + " MB are free",
+              folder_, "free some space or choose another disk with --out");
+}
+
+}  // namespace regrade

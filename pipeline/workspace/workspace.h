@@ -1,0 +1,78 @@
+// The output folder of a run: locked, with a record of each finished stage and checkpoints of
+// the one in hand. All paths inside are relative, so the folder can be moved between runs.
+//
+//   .regrade/lock               who works here
+//   .regrade/stages/NAME.json   stage records
+//   .regrade/checkpoints/NAME   state of interrupted stages
+//   .regrade/log.txt            what was said
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "pipeline/workspace/folder_lock.h"
+#include "pipeline/workspace/stage_record.h"
+
+namespace regrade {
+
+enum class StageState {
+  kDone,           // recorded, from the same inputs, results as they were left
+  kNeverDone,      //
+  kInputsDiffer,   // finished from other inputs; `why` lists the differences
+  kResultsDiffer,  // a result was edited or deleted; `why` names it
+};
+
+struct StageStatus {
+  StageState state = StageState::kNeverDone;
+  std::vector<std::string> why;
+};
+
+class Workspace {
+ public:
+  // Makes the folder if it is new, locks it, and removes what an interrupted writer left.
+  // Throws before any work: Error(kResources) if it cannot be written or is not a folder,
+  // Error(kFolderInUse), Error(kInput) if it holds files under our names that we did not write.
+  explicit Workspace(const std::string& folder, bool break_lock = false);
+
+  // True if a run has worked here: asked before Workspace is made, nothing is touched.
+  static bool Exists(const std::string& folder);
+
+  const std::string& folder() const { return folder_; }
+  std::string Path(const std::string& relative) const { return folder_ + "/" + relative; }
+  // The same, with the folders above it made.
+  std::string NewPath(const std::string& relative) const;
+
+  StageStatus Status(const std::string& stage, const JsonValue& inputs) const;
+  std::optional<StageRecord> Find(const std::string& stage) const;
+  // Hashes the outputs and makes the record durable; drops the stage's checkpoint.
+  void Record(const std::string& stage, const JsonValue& inputs,
+              const std::vector<std::string>& outputs, double seconds, const JsonValue& figures,
+              std::optional<double> cpu_seconds = std::nullopt);
+  // As if the stage had never been done. Results stay until they are replaced.
+  void Forget(const std::string& stage);
+  // Names of the recorded stages.
+  std::vector<std::string> FinishedStages() const;
+
+  // A checkpoint belongs to the inputs it was made from; with other inputs, or damaged, it is
+  // as good as none.
+  void SaveCheckpoint(const std::string& stage, const JsonValue& inputs,
+                      std::string_view bytes) const;
+  std::optional<std::string> LoadCheckpoint(const std::string& stage,
+                                            const JsonValue& inputs) const;
+  void DropCheckpoint(const std::string& stage) const;
+
+  // Throws Error(kResources) with both numbers if the disk has less.
+  void RequireFreeSpace(uint64_t bytes, const std::string& for_what) const;
+
+ private:
+  std::string StagePath(const std::string& stage) const;
+  std::string CheckpointPath(const std::string& stage) const;
+
+  std::string folder_;  // absolute
+  std::optional<FolderLock> lock_;
+};
+
+}  // namespace regrade

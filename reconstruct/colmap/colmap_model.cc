@@ -1,0 +1,300 @@
+// The three files of a COLMAP model: little-endian records without padding, preceded by a count
+// (format: colmap/src/colmap/scene/reconstruction_io.cc). COLMAP's own reader hangs or aborts
+// on damaged files and keeps NaN poses, which is why this one exists.
+#include "reconstruct/colmap/colmap_model.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <set>
+#include <sstream>
+
+#include "kernels/base/checked_math.h"
+#include "kernels/base/error.h"
+#include "kernels/scene/camera_checks.h"
+#include "reconstruct/colmap/colmap_text.h"
+
+namespace regrade {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "the files are little-endian");
+
+constexpr size_t kLongestName = 4096;
+constexpr int64_t kLargestSide = 1 << 18;      // pixels
+constexpr double kLargestCoordinate = 1e12;    // world units: a camera at infinity is not one
+constexpr double kQuaternionTolerance = 1e-3;  // rounding in other programs, not damage
+
+constexpr const char* kDamagedHint =
+    "the file is damaged or was not written to its end; let COLMAP write the model again";
+
+// A file in memory with a place in it; every read checks that its bytes are there.
+class Reader {
+ public:
+  // Of `folder`/`name`.bin or, where there is only that, of the text file.
+  Reader(const std::string& folder, const std::string& name)
+      : path_(folder + "/" + name + ".bin") {
+    std::ifstream file(path_, std::ios::binary | std::ios::ate);
+    const bool text = !file;
+    if (text) file.open(folder + "/" + name + ".txt", std::ios::binary | std::ios::ate);
+    if (!file)
+      throw Error(ExitCode::kInput, "cannot open it", path_,
+                  "a COLMAP model needs cameras, images and points3D, as .bin or .txt");
+    bytes_.resize(static_cast<size_t>(std::max<std::streamoff>(0, file.tellg())));
+    file.seekg(0);
+    if (!bytes_.empty() &&
+        !file.read(bytes_.data(), static_cast<std::streamsize>(bytes_.size())))
+      throw Error(ExitCode::kInput, "cannot read it", path_);
+    if (!text) return;
+    path_ = folder + "/" + name + ".txt";
+    bytes_ = BinaryOfColmapText(name, bytes_, path_);
+  }
+
+  template <typename T>
+  T Read(const char* what) {
+    T value;
+    if (Left() < sizeof(T)) Fail(std::string("the file ends inside ") + what);
+    std::memcpy(&value, bytes_.data() + place_, sizeof(T));
+    place_ += sizeof(T);
+    return value;
+  }
+
+  double ReadFinite(const char* what) {
+    const double value = Read<double>(what);
+    if (!std::isfinite(value)) Fail(std::string(what) + " is not a finite number");
+    return value;
+  }
+
+  // A count of records that take at least `smallest` bytes each.
+  size_t ReadCount(const char* what, uint64_t smallest) {
+    const uint64_t count = Read<uint64_t>("a count");
+    const auto needed = CheckedMul(count, smallest);
+    if (!needed || *needed > Left())
+      Fail("it promises " + std::to_string(count) + " " + what + ", but only " +
+           std::to_string(Left()) + " bytes follow");
+    return static_cast<size_t>(count);
+  }
+
+  std::string ReadName() {
+    const size_t longest = std::min(Left(), kLongestName + 1);
+    const char* begin = bytes_.data() + place_;
+    const void* end = std::memchr(begin, 0, longest);
+    if (end == nullptr)
+      Fail(longest > kLongestName ? "an image name is longer than 4096 bytes"
+                                  : "the file ends inside an image name");
+    std::string name(begin, static_cast<const char*>(end));
+    place_ += name.size() + 1;
+    return name;
+  }
+
+  void ExpectEnd() const {
+    if (Left() > 0) Fail(std::to_string(Left()) + " bytes follow after the last record");
+  }
+
+  [[noreturn]] void Fail(const std::string& why) const {
+    throw Error(ExitCode::kInput, why + ", at byte " + std::to_string(place_), path_,
+                kDamagedHint);
+  }
+
+ private:
+  size_t Left() const { return bytes_.size() - place_; }
+
+  std::string path_, bytes_;
+  size_t place_ = 0;
+};
+
+std::string CameraText(uint32_t id) { return "camera " + std::to_string(id); }
+
+std::vector<ColmapCamera> ReadCameras(const std::string& folder) {
+  Reader reader(folder, "cameras");
+  const size_t count = reader.ReadCount("cameras", 4 + 4 + 8 + 8 + 3 * 8);
+  std::vector<ColmapCamera> cameras(count);
+  for (ColmapCamera& camera : cameras) {
+    camera.id = reader.Read<uint32_t>("a camera");
+    const int32_t lens = reader.Read<int32_t>("a camera");
+    if (lens < 0 || lens >= kNumColmapLenses)
+      reader.Fail(CameraText(camera.id) + " has the unknown camera model " +
+                  std::to_string(lens));
+    camera.lens = static_cast<ColmapLens>(lens);
+    const ColmapLensInfo& info = InfoOf(camera.lens);
+    if (info.focals == 0)
+      throw Error(ExitCode::kInput,
+                  CameraText(camera.id) + " has the camera model " + info.name +
+                      ", which is not supported",
+                  folder + "/cameras.bin",
+                  "run colmap image_undistorter, or pose the photos with OPENCV or "
+                  "OPENCV_FISHEYE");
+    Camera& c = camera.intrinsics;
+    const uint64_t width = reader.Read<uint64_t>("a camera");
+    const uint64_t height = reader.Read<uint64_t>("a camera");
+    if (width < 1 || height < 1 || width > kLargestSide || height > kLargestSide)
+      reader.Fail(CameraText(camera.id) + " has the picture size " + std::to_string(width) +
+                  " x " + std::to_string(height));
+    c.width = static_cast<int>(width);
+    c.height = static_cast<int>(height);
+    c.fx = reader.ReadFinite("a focal length");
+    c.fy = info.focals == 2 ? reader.ReadFinite("a focal length") : c.fx;
+    c.cx = reader.ReadFinite("a principal point");
+    c.cy = reader.ReadFinite("a principal point");
+    c.lens = info.lens;
+    for (int i = 0; i < info.coefficients; ++i)
+      c.distortion[i] = reader.ReadFinite("a distortion coefficient");
+    const std::string implausible = ImplausibleCamera(c);
+    if (!implausible.empty()) reader.Fail(CameraText(camera.id) + " has " + implausible);
+  }
+  reader.ExpectEnd();
+  return cameras;
+}
+
+double ReadCoordinate(Reader& reader, const char* what) {
+  const double value = reader.ReadFinite(what);
+  if (std::abs(value) > kLargestCoordinate) reader.Fail(std::string(what) + " is at infinity");
+  return value;
+}
+
+Vec3d ReadVector(Reader& reader, const char* what) {
+  Vec3d v;
+  for (int i = 0; i < 3; ++i) v[i] = ReadCoordinate(reader, what);
+  return v;
+}
+
+Mat3d RotationOf(double w, double x, double y, double z) {
+  return {{{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)},
+           {2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)},
+           {2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)}}};
+}
+
+Mat3d ReadRotation(Reader& reader, uint32_t image_id) {
+  double q[4], norm = 0;
+  for (double& component : q) {
+    component = reader.ReadFinite("a quaternion");
+    norm += component * component;
+  }
+  norm = std::sqrt(norm);
+  if (!(std::abs(norm - 1) <= kQuaternionTolerance)) {
+    std::ostringstream text;
+    text << "image " << image_id << " has a rotation quaternion of length " << norm;
+    reader.Fail(text.str());
+  }
+  for (double& component : q) component /= norm;
+  return RotationOf(q[0], q[1], q[2], q[3]);
+}
+
+std::vector<ColmapImage> ReadImages(const std::string& folder) {
+  Reader reader(folder, "images");
+  const size_t count = reader.ReadCount("images", 4 + 7 * 8 + 4 + 1 + 8);
+  std::vector<ColmapImage> images(count);
+  std::set<std::string> names;
+  for (ColmapImage& image : images) {
+    image.id = reader.Read<uint32_t>("an image");
+    image.camera_from_world.rotation = ReadRotation(reader, image.id);
+    image.camera_from_world.translation = ReadVector(reader, "a camera position");
+    image.camera_id = reader.Read<uint32_t>("an image");
+    image.name = reader.ReadName();
+    if (!names.insert(image.name).second)
+      reader.Fail("the image name " + image.name + " comes twice");
+    image.keypoints.resize(reader.ReadCount("keypoints", 3 * 8));
+    for (ColmapKeypoint& keypoint : image.keypoints) {
+      keypoint.u = ReadCoordinate(reader, "a keypoint");
+      keypoint.v = ReadCoordinate(reader, "a keypoint");
+      keypoint.point_id = reader.Read<uint64_t>("a keypoint");
+    }
+  }
+  reader.ExpectEnd();
+  return images;
+}
+
+std::vector<ColmapPoint> ReadPoints(const std::string& folder) {
+  Reader reader(folder, "points3D");
+  const size_t count = reader.ReadCount("points", 8 + 3 * 8 + 3 + 8 + 8);
+  std::vector<ColmapPoint> points(count);
+  for (ColmapPoint& point : points) {
+    point.id = reader.Read<uint64_t>("a point");
+    point.position = ReadVector(reader, "a point's position");
+    point.color = reader.Read<std::array<uint8_t, 3>>("a point");
+    point.error = reader.Read<double>("a point");
+    if (!std::isfinite(point.error)) point.error = -1;  // unknown; we compute our own
+    point.track.resize(reader.ReadCount("track elements", 4 + 4));
+    for (ColmapTrackElement& element : point.track) {
+      element.image_id = reader.Read<uint32_t>("a track");
+      element.keypoint = reader.Read<uint32_t>("a track");
+    }
+  }
+  reader.ExpectEnd();
+  return points;
+}
+
+template <typename Record>
+const Record* FindById(const std::vector<Record>& records, uint64_t id) {
+  const auto it =
+      std::lower_bound(records.begin(), records.end(), id,
+                       [](const Record& r, uint64_t value) { return r.id < value; });
+  return it != records.end() && it->id == id ? &*it : nullptr;
+}
+
+[[noreturn]] void FailLink(const std::string& folder, const char* file,
+                           const std::string& why) {
+  throw Error(ExitCode::kInput, why, folder + "/" + file, kDamagedHint);
+}
+
+template <typename Record>
+void SortById(std::vector<Record>& records, const std::string& folder, const char* file) {
+  std::stable_sort(records.begin(), records.end(),
+                   [](const Record& a, const Record& b) { return a.id < b.id; });
+  for (size_t i = 1; i < records.size(); ++i)
+    if (records[i].id == records[i - 1].id)
+      FailLink(folder, file, "the id " + std::to_string(records[i].id) + " comes twice");
+}
+
+void CheckLinks(const ColmapModel& model, const std::string& folder) {
+  for (const ColmapImage& image : model.images) {
+    if (model.FindCamera(image.camera_id) == nullptr)
+      FailLink(folder, "images.bin",
+               "image " + std::to_string(image.id) + " refers to camera " +
+                   std::to_string(image.camera_id) + ", which does not exist");
+    for (const ColmapKeypoint& keypoint : image.keypoints)
+      if (keypoint.point_id != kNoColmapPoint && model.FindPoint(keypoint.point_id) == nullptr)
+        FailLink(folder, "images.bin",
+                 "image " + std::to_string(image.id) + " refers to point " +
+                     std::to_string(keypoint.point_id) + ", which does not exist");
+  }
+  for (const ColmapPoint& point : model.points) {
+    for (const ColmapTrackElement& element : point.track) {
+      const ColmapImage* image = model.FindImage(element.image_id);
+      if (image == nullptr || element.keypoint >= image->keypoints.size())
+        FailLink(folder, "points3D.bin",
+                 "point " + std::to_string(point.id) + " refers to keypoint " +
+                     std::to_string(element.keypoint) + " of image " +
+                     std::to_string(element.image_id) + ", which does not exist");
+    }
+  }
+}
+
+}  // namespace
+
+const ColmapCamera* ColmapModel::FindCamera(uint32_t id) const { return FindById(cameras, id); }
+const ColmapImage* ColmapModel::FindImage(uint32_t id) const { return FindById(images, id); }
+const ColmapPoint* ColmapModel::FindPoint(uint64_t id) const { return FindById(points, id); }
+
+Camera ColmapModel::CameraOf(const ColmapImage& image) const {
+  const ColmapCamera* found = FindCamera(image.camera_id);
+  REGRADE_CHECK(found != nullptr);
+  Camera camera = found->intrinsics;
+  camera.camera_from_world = image.camera_from_world;
+  return camera;
+}
+
+ColmapModel ReadColmapModel(const std::string& folder) {
+  ColmapModel model;
+  model.cameras = ReadCameras(folder);
+  model.images = ReadImages(folder);
+  model.points = ReadPoints(folder);
+  SortById(model.cameras, folder, "cameras.bin");
+  SortById(model.images, folder, "images.bin");
+  SortById(model.points, folder, "points3D.bin");
+  CheckLinks(model, folder);
+  return model;
+}
+
+}  // namespace regrade

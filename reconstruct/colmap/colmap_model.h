@@ -1,0 +1,87 @@
+// COLMAP's sparse model as data: a bounded reader and a writer of cameras.bin, images.bin and
+// points3D.bin, and the way from there to a Capture.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "kernels/scene/capture.h"
+#include "reconstruct/colmap/colmap_lens.h"
+
+namespace regrade {
+
+struct ColmapCamera {
+  uint32_t id = 0;
+  ColmapLens lens = ColmapLens::kPinhole;
+  Camera intrinsics;  // its pose is not used
+};
+
+inline constexpr uint64_t kNoColmapPoint = ~uint64_t{0};
+
+struct ColmapKeypoint {
+  double u = 0, v = 0;  // pixels
+  uint64_t point_id = kNoColmapPoint;
+};
+
+struct ColmapImage {
+  uint32_t id = 0;
+  uint32_t camera_id = 0;
+  std::string name;  // a key to match with, never a path to open
+  RigidTransform camera_from_world;
+  std::vector<ColmapKeypoint> keypoints;
+};
+
+struct ColmapTrackElement {
+  uint32_t image_id = 0;
+  uint32_t keypoint = 0;  // index into ColmapImage::keypoints
+};
+
+struct ColmapPoint {
+  uint64_t id = 0;
+  Vec3d position;
+  std::array<uint8_t, 3> color{};
+  double error = -1;  // pixels, as stored: stale after colmap's bundle_adjuster
+  std::vector<ColmapTrackElement> track;
+};
+
+// Each list is sorted by id; every id that is referred to exists.
+struct ColmapModel {
+  std::vector<ColmapCamera> cameras;
+  std::vector<ColmapImage> images;
+  std::vector<ColmapPoint> points;
+
+  // nullptr if there is none.
+  const ColmapCamera* FindCamera(uint32_t id) const;
+  const ColmapImage* FindImage(uint32_t id) const;
+  const ColmapPoint* FindPoint(uint64_t id) const;
+
+  // The image's camera with its pose.
+  Camera CameraOf(const ColmapImage& image) const;
+};
+
+// Reads `folder`/{cameras,images,points3D}.bin, or .txt where there is no .bin. Nothing in the
+// files is trusted: counts are checked against the bytes left before memory is taken, every id
+// must resolve, numbers must be finite and plausible, nothing may follow. Throws Error(kInput)
+// that names the file, the place and the reason.
+ColmapModel ReadColmapModel(const std::string& folder);
+
+// The unit quaternion w x y z of a rotation, w >= 0.
+std::array<double, 4> QuaternionOf(const Mat3d& rotation);
+
+// Writes the three .bin files into `folder`, which exists. Throws Error(kResources) when they
+// do not fit. Reading them back gives the same numbers.
+void WriteColmapModel(const ColmapModel& model, const std::string& folder);
+
+// Which of our two names for a photo a model's image names mean.
+enum class PhotoNames { kStaged, kUser };
+
+// The photos that the model has poses for, matched by exact name, in the order of `photos`,
+// each with a verdict "used" or "unregistered"; points seen by at least two of them. Images of
+// the model without a photo get the verdict "skipped". Reprojection errors are computed here.
+// Throws Error(kInput) if no name matches or a photo has another size than its camera.
+Capture CaptureFromModel(const ColmapModel& model, const std::vector<StagedPhoto>& photos,
+                         PhotoNames names = PhotoNames::kStaged);
+
+}  // namespace regrade

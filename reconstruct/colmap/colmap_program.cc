@@ -1,0 +1,160 @@
+#include "reconstruct/colmap/colmap_program.h"
+
+#include <csignal>
+#include <cstdio>
+#include <filesystem>
+
+#include "kernels/base/error.h"
+
+namespace regrade {
+namespace {
+
+constexpr const char* kInstall =
+    "install COLMAP 3.7 or newer (Debian, Ubuntu: apt install colmap), or give its place with "
+    "--colmap PATH, or start from a capture that has poses";
+
+// COLMAP 3.12 and later moved options: {as in 3.8, as now}.
+constexpr std::pair<const char*, const char*> kRenamed[] = {
+    {"SiftExtraction.use_gpu", "FeatureExtraction.use_gpu"},
+    {"SiftExtraction.num_threads", "FeatureExtraction.num_threads"},
+    {"SiftExtraction.max_image_size", "FeatureExtraction.max_image_size"},
+    {"SiftMatching.use_gpu", "FeatureMatching.use_gpu"},
+    {"SiftMatching.num_threads", "FeatureMatching.num_threads"},
+    {"BundleAdjustment.function_tolerance", "BundleAdjustmentCeres.function_tolerance"},
+};
+
+// Without a display, COLMAP's use of Qt aborts; its log files would go to the system's folder
+// for temporary files, and stay there.
+const std::vector<std::pair<std::string, std::string>> kEnvironment = {
+    {"QT_QPA_PLATFORM", "offscreen"}, {"GLOG_logtostderr", "1"}};
+
+bool IsPathOption(const std::string& name) { return name.ends_with("_path"); }
+
+bool SpeaksOfFullDisk(const std::string& line) {
+  return line.find("disk is full") != std::string::npos ||
+         line.find("No space left on device") != std::string::npos ||
+         line.find("disk I/O error") != std::string::npos;
+}
+
+// A path that begins with a dash would read as an option.
+std::string Absolute(const std::string& path) {
+  return std::filesystem::absolute(path).string();
+}
+
+const char* LikelyCause(const ChildResult& result) {
+  if (result.TimedOut())
+    return "raise --pose-time-limit if the photos are many or the machine is slow";
+  if (result.signal == SIGKILL)
+    return "the system killed it, most likely for want of memory: close other programs, or "
+           "lower "
+           "--pose-image-size";
+  if (result.signal == SIGILL) return "this colmap was built for another kind of processor";
+  if (result.signal != 0 || result.exit_status >= 128)
+    return "this is a crash of COLMAP; its log says where";
+  return "its log may say why";
+}
+
+}  // namespace
+
+ColmapProgram::ColmapProgram(const std::string& program, const std::string& log_folder)
+    : program_(program.find('/') == std::string::npos ? program : Absolute(program)),
+      log_folder_(log_folder) {
+  ChildOptions options{
+      .argv = {program_, "help"}, .environment = kEnvironment, .wall_limit_s = 60};
+  options.log_path = LogPath("help");
+  int major = 0, minor = 0;
+  bool found = false;
+  const LineFunction read_version = [&](const std::string& line) {
+    found = found || std::sscanf(line.c_str(), "COLMAP %d.%d", &major, &minor) == 2;
+  };
+  ChildResult result;
+  try {
+    result = RunChild(options, read_version);
+  } catch (const Error& e) {
+    if (e.code() != ExitCode::kExternalProgram) throw;
+    throw Error(ExitCode::kExternalProgram, e.what_failed(), program, kInstall);
+  }
+  if (!found) {
+    const std::string first =
+        result.last_lines.empty() ? "it printed nothing" : "it printed: " + result.LastLines();
+    throw Error(
+        ExitCode::kExternalProgram,
+        "this is not COLMAP, or it does not work (" + result.Describe() + "; " + first + ")",
+        program, kInstall);
+  }
+  version_ = std::to_string(major) + "." + std::to_string(minor);
+  if (std::pair(major, minor) < std::pair(3, 7))
+    throw Error(ExitCode::kExternalProgram,
+                "COLMAP " + version_ + " is too old (3.7 and newer are supported)", program,
+                kInstall);
+}
+
+ChildResult ColmapProgram::Run(const std::string& command, const ColmapArguments& arguments,
+                               const std::string& log_name, const Limits& limits,
+                               const LineFunction& on_line,
+                               const KeepGoingFunction& keep_going) {
+  ChildOptions options;
+  options.argv = Spelled(command, arguments);
+  options.environment = kEnvironment;
+  options.wall_limit_s = limits.wall_s;
+  options.quiet_limit_s = limits.quiet_s;
+  options.log_path = LogPath(log_name);
+  bool disk_full = false;
+  const ChildResult result = RunChild(
+      options,
+      [&](const std::string& line) {
+        disk_full = disk_full || SpeaksOfFullDisk(line);
+        if (on_line) on_line(line);
+      },
+      keep_going);
+  if (result.end == ChildEnd::kStopped) throw Interrupted();
+  if (disk_full)
+    throw Error(ExitCode::kResources, "the disk is full (colmap " + command + ")", log_folder_,
+                "free some space; COLMAP needs about 1 MB a photo");
+  return result;
+}
+
+void ColmapProgram::Fail(const std::string& command, const ChildResult& result,
+                         const std::string& log_name) const {
+  std::string what = "colmap " + command + " failed: " + result.Describe();
+  if (!result.last_lines.empty()) what += "; its last lines were:\n" + result.LastLines();
+  throw Error(ExitCode::kExternalProgram, what, LogPath(log_name), LikelyCause(result));
+}
+
+const std::set<std::string>& ColmapProgram::OptionsOf(const std::string& command) {
+  const auto it = options_.find(command);
+  if (it != options_.end()) return it->second;
+  std::set<std::string>& names = options_[command];
+  ChildOptions options{
+      .argv = {program_, command, "-h"}, .environment = kEnvironment, .wall_limit_s = 60};
+  RunChild(options, [&](const std::string& line) {
+    const size_t begin = line.find("--");
+    if (begin == std::string::npos) return;
+    const size_t end = line.find_first_of(" =", begin);
+    names.insert(line.substr(begin + 2, end == std::string::npos ? end : end - begin - 2));
+  });
+  return names;
+}
+
+std::vector<std::string> ColmapProgram::Spelled(const std::string& command,
+                                                const ColmapArguments& arguments) {
+  const std::set<std::string>& known = OptionsOf(command);
+  std::vector<std::string> argv = {program_, command};
+  for (const auto& [name, value] : arguments) {
+    std::string spelled = name;
+    for (const auto& [before, now] : kRenamed)
+      if (name == before && known.count(name) == 0) spelled = now;
+    if (IsPathOption(name)) {
+      argv.insert(argv.end(), {"--" + name, Absolute(value)});
+    } else if (known.count(spelled) > 0) {
+      argv.insert(argv.end(), {"--" + spelled, value});
+    }
+  }
+  return argv;
+}
+
+std::string ColmapProgram::LogPath(const std::string& log_name) const {
+  return log_folder_ + "/" + log_name + ".log";
+}
+
+}  // namespace regrade

@@ -1,0 +1,94 @@
+#include "reconstruct/colmap/pose_verdicts.h"
+
+#include "kernels/base/error.h"
+
+namespace regrade {
+namespace {
+
+constexpr int kFewFeatures = 150;  // a photo with fewer has nothing to hold on to
+
+constexpr const char* kTakeMore =
+    "take 20 to 60 photos that overlap by two thirds, stepping sideways between them";
+
+std::string Photos(size_t n) { return std::to_string(n) + (n == 1 ? " photo" : " photos"); }
+
+std::string TooFew(size_t given, int least) {
+  return Photos(given) + " are too few for a scene in 3D (" + std::to_string(least) +
+         " at least)";
+}
+
+}  // namespace
+
+Reason WhyNoModel(const ColmapEvidence& evidence) {
+  const int features = evidence.MedianFeatures();
+  if (features < kFewFeatures)
+    return {"the photos show too little to hold on to (about " + std::to_string(features) +
+                " features each): they are blurred, or the scene is plain",
+            "take sharp photos, in good light, of something with texture"};
+  if (evidence.matched_pairs == 0)
+    return {"no two photos show the same things from two places",
+            "take photos of one scene that keeps still, each overlapping the one before by two "
+            "thirds"};
+  return {
+      "no two photos show the same things from clearly different places: the camera only "
+      "turned, or the scene moved",
+      "step sideways between photos instead of turning the camera, and keep the scene still"};
+}
+
+void ExplainUnregistered(const RungResult& rung, const std::vector<StagedPhoto>& photos,
+                         Capture* capture) {
+  for (size_t i = 0; i < photos.size(); ++i) {
+    PhotoVerdict& verdict = capture->verdicts[i];
+    if (verdict.verdict != "unregistered") continue;
+    const std::string& name = photos[i].name;
+    const auto features = rung.evidence.features.find(name);
+    if (features == rung.evidence.features.end()) {
+      verdict.why = "COLMAP did not read it";
+    } else if (features->second < kFewFeatures) {
+      verdict.why = "only " + std::to_string(features->second) +
+                    " features: blurred, or nothing with texture in it";
+    } else {
+      verdict.why = "it overlaps too little with the photos that were placed";
+    }
+    for (size_t k = 1; k < rung.models.size(); ++k)
+      for (const ColmapImage& image : rung.models[k].model.images)
+        if (image.name == name)
+          verdict.why = "it belongs to another group of " +
+                        Photos(rung.models[k].model.images.size()) +
+                        " that nothing connects to the main one";
+  }
+}
+
+std::string NoteOnOtherModels(const RungResult& rung) {
+  std::string others;
+  for (size_t k = 1; k < rung.models.size(); ++k)
+    others += (k == 1 ? "" : ", ") + std::to_string(rung.models[k].model.images.size());
+  return "the photos fall apart into " + std::to_string(rung.models.size()) +
+         " groups that nothing connects; the largest is used (the others have " + others + ")";
+}
+
+void Refuse(const Reason& reason, size_t photos_given, int min_photos) {
+  const bool few = static_cast<int>(photos_given) < min_photos;
+  throw Error(ExitCode::kScene,
+              (few ? TooFew(photos_given, min_photos) + "; besides, " : "") + reason.why, "",
+              reason.remedy);
+}
+
+void RefuseTooFew(size_t photos_given, int min_photos) {
+  throw Error(ExitCode::kScene, TooFew(photos_given, min_photos), "", kTakeMore);
+}
+
+void RefuseUnregistered(const Capture& capture) {
+  std::string names;
+  for (const PhotoVerdict& verdict : capture.verdicts)
+    if (verdict.verdict == "unregistered") names += "\n  " + verdict.file + ": " + verdict.why;
+  throw Error(ExitCode::kScene,
+              "only " + std::to_string(capture.views.size()) + " of " +
+                  Photos(capture.verdicts.size()) +
+                  " found their place in one scene; not these:" + names,
+              "",
+              "give photos of one scene that overlap by two thirds, or lower "
+              "--pose-min-registered to go on with what there is");
+}
+
+}  // namespace regrade

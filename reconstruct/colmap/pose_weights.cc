@@ -1,0 +1,34 @@
+#include "reconstruct/colmap/pose_weights.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace regrade {
+namespace {
+
+double Megapixels(const std::vector<StagedPhoto>& photos, int image_size) {
+  double sum = 0;
+  for (const StagedPhoto& photo : photos) {
+    const double longer = std::max({photo.width, photo.height, 1});
+    const double scale = std::min(1.0, image_size / longer);
+    sum += 1e-6 * photo.width * photo.height * scale * scale;
+  }
+  return sum;
+}
+
+}  // namespace
+
+// Fitted to six captures of 8 to 50 photos: features take what their pixels take (four times as
+// many from octave -1 on), matching the square of the features.
+PoseWeights EstimateWeights(const PoseRecipe& recipe, const std::vector<StagedPhoto>& photos,
+                            int image_size) {
+  const double n = static_cast<double>(photos.size());
+  const double pairs = recipe.all_pairs ? n * (n - 1) / 2 : std::min(10.0, n) * n;
+  const double size = recipe.max_features / 2048.0;
+  const double pixels = Megapixels(photos, image_size) * (recipe.first_octave < 0 ? 4 : 1);
+  return {recipe.keep_matches ? 0 : 0.27 * pixels,
+          recipe.keep_matches ? 0 : 0.07 * pairs * size * size, 0.4 * n * std::sqrt(size),
+          0.04 * n * std::sqrt(size)};
+}
+
+}  // namespace regrade

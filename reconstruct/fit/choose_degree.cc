@@ -1,0 +1,80 @@
+#include "reconstruct/fit/choose_degree.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "kernels/field/cpu/render_view.h"
+#include "kernels/field/render.h"
+#include "kernels/image/resize.h"
+
+namespace regrade {
+namespace {
+
+constexpr int kFold = 5;
+constexpr int kResolution = 48;    // voxels, the longest side; half of it to begin with
+constexpr int kSmallestSide = 24;  // pixels
+constexpr int kSteps[] = {100, 200}, kRays = 2048;
+
+// The view at a size that gives a voxel of the trial the pixels of one of the fit.
+TrainingView Smaller(const TrainingView& view, double scale, std::vector<Image>* photos) {
+  const double longest = std::max(view.camera.width, view.camera.height);
+  const double factor = std::min(1.0, std::max(scale, kSmallestSide / longest));
+  const int width = std::max(1, static_cast<int>(std::lround(view.camera.width * factor)));
+  const int height = std::max(1, static_cast<int>(std::lround(view.camera.height * factor)));
+  photos->push_back(Resize(*view.photo, width, height));
+  return {view.camera.Resized(width, height), &photos->back()};
+}
+
+// Over all pixels of all views that have a colour.
+double PsnrOn(const std::vector<TrainingView>& views, const RadianceField& field) {
+  const FastGrid grid = MakeFastGrid(field);
+  double squares = 0;
+  int64_t count = 0;
+  for (const TrainingView& view : views) {
+    const RenderedView rendered = RenderView(grid, view.camera, {field.step});
+    for (size_t i = 0; i < view.photo->pixels.size(); ++i) {
+      if (!std::isfinite(view.photo->pixels[i])) continue;
+      const double shown = std::clamp(rendered.color.pixels[i], 0.0f, 1.0f);
+      squares += (shown - view.photo->pixels[i]) * (shown - view.photo->pixels[i]);
+      ++count;
+    }
+  }
+  // Exactly equal pictures are as good as finite figures get.
+  return -10 * std::log10(std::max(squares / static_cast<double>(count), 1e-12));
+}
+
+}  // namespace
+
+DegreeTrial TryDegrees(const std::vector<TrainingView>& views, const SceneBox& box,
+                       const FitOptions& options, const ProgressFunction& progress,
+                       Backend backend) {
+  if (views.size() < kLeastTrialViews) return {std::numeric_limits<double>::infinity()};
+  FitOptions small = options;
+  const int resolution = std::min(kResolution, options.resolutions.back());
+  small.resolutions = {std::max(8, resolution / 2), resolution};
+  small.steps = {kSteps[0], kSteps[1]};
+  small.rays_per_step = std::min(kRays, options.rays_per_step);
+  const double scale = static_cast<double>(resolution) / options.resolutions.back();
+  std::vector<Image> photos;
+  photos.reserve(views.size());
+  std::vector<TrainingView> fitted, kept;
+  for (size_t i = 0; i < views.size(); ++i) {
+    const TrainingView view = Smaller(views[i], scale, &photos);
+    // Of a photo that is all but masked nothing may be left at this size.
+    if (HasColor(*view.photo)) (i % kFold == kFold / 2 ? kept : fitted).push_back(view);
+  }
+  if (fitted.empty() || kept.empty()) return {std::numeric_limits<double>::infinity()};
+
+  ProgressParts parts(progress, 2);
+  const auto psnr_of_degree = [&](int degree) {
+    small.sh_degree = degree;
+    FitHooks hooks;
+    hooks.progress = parts.Next(1);
+    return PsnrOn(kept, FitField(fitted, box, small, hooks, backend).field);
+  };
+  const double without = psnr_of_degree(0);
+  return {psnr_of_degree(options.sh_degree) - without};
+}
+
+}  // namespace regrade

@@ -1,0 +1,173 @@
+// Steps of a fit on a CUDA device: photos, field, gradients and moments live there; the host
+// only says what comes next. Float sums in no fixed order, so two runs differ in the last bits
+// unless sums are exact.
+#include <algorithm>
+#include <optional>
+#include <utility>
+
+#include "kernels/base/error.h"
+#include "kernels/base/random.h"
+#include "kernels/field/cuda/device_rays.h"
+#include "kernels/field/cuda/device_sphere_rays.h"
+#include "kernels/field/cuda/device_views.h"
+#include "reconstruct/fit/fit_engine.h"
+#include "reconstruct/fit/sphere_grid.h"
+
+namespace regrade {
+namespace {
+
+constexpr int64_t kSampleStoreBytes = int64_t{1} << 30;
+
+class CudaFitEngine : public FitEngine {
+ public:
+  CudaFitEngine(const TrainingRays* rays, uint64_t seed, bool exact_sums)
+      : seed_(seed), exact_sums_(exact_sums), views_(rays->ToDevice()) {}
+
+  void Take(FitState state) override {
+    grid_ = UploadGrid(state.grid, true, state.second_moment, exact_sums_, state.sphere_moment);
+    Renew();
+  }
+  void Show(const std::function<void(FitState*)>& use) override {
+    FitState state = Download();
+    use(&state);
+  }
+  void Change(const std::function<void(FitState*)>& use) override {
+    FitState state = Download();
+    use(&state);
+    Take(std::move(state));
+  }
+  int64_t num_voxels() const override { return grid_.num_voxels(); }
+  Vec3i resolution() const override { return grid_.frame.resolution; }
+
+  void Step(const FitStep& step) override {
+    const DeviceRange range("step of a fit");
+    if (!fitter_ || march_.step != step.march.step ||
+        march_.stop_transmittance != step.march.stop_transmittance) {
+      march_ = step.march;
+      fitter_.emplace(grid_.frame, march_, kSampleStoreBytes);
+    }
+    Reserve(step.rays);
+    views_.Draw(seed_, step.number, step.rays, rays_.data(), targets_.data());
+    fitter_->Accumulate(grid_, rays_.data(), targets_.data(), step.rays,
+                        1.0f / (3.0f * static_cast<float>(step.rays)), &touched_);
+    // The same expectation as the CPU's run of vertices: each stored voxel with the share's
+    // probability.
+    const int64_t voxels = grid_.num_voxels();
+    const int64_t run = static_cast<int64_t>(step.tv_share * static_cast<float>(voxels));
+    if (run > 0) {
+      const int64_t begin = static_cast<int64_t>(
+          RandomIndex(seed_ ^ 0x7476ull, step.number, 0, static_cast<uint64_t>(voxels)));
+      const float scale =
+          1.0f / (step.tv_share * static_cast<float>(grid_.frame.NumVertices()));
+      AddTotalVariation(grid_, begin, run, step.tv_density * scale, step.tv_sh * scale,
+                        &touched_);
+    }
+    StepOnDevice(&grid_, &touched_, step.optimizer, fitter_->sums());
+    if (grid_.spheres.on()) StepLayers(step);
+  }
+
+  FitSums TakeSums() override {
+    KeepSums();
+    return std::exchange(sums_, {});
+  }
+
+  RenderedView Render(const Camera& camera, const MarchOptions& march) override {
+    return RenderViewOnDevice(grid_, camera, march);
+  }
+
+  void Refine(const MarchOptions& march, float threshold, const Vec3i& resolution,
+              int sphere_resolution) override {
+    const DeviceRange range("pruning and resampling");
+    DeviceBuffer<float> weights(grid_.num_voxels(), "weights of voxels");
+    weights.Zero();
+    constexpr int kStride = 2;  // every other row and column of a view
+    for (int view = 0; view < views_.num_views(); ++view) {
+      Reserve(views_.RaysOf(view, kStride, nullptr));
+      const int64_t n = views_.RaysOf(view, kStride, rays_.data());
+      MaxWeightsOnDevice(grid_, rays_.data(), n, march, weights.data());
+    }
+    DeviceGrid next = ResampleOnDevice(grid_, weights, threshold, resolution);
+    if (next.num_voxels() == 0)
+      throw Error(ExitCode::kScene,
+                  "nothing of the scene is left: no voxel weighs more than " +
+                      std::to_string(threshold) + " in any view",
+                  "reconstruct", "check the poses, or lower --prune-weight");
+    next.spheres = Resampled(std::move(grid_.spheres), sphere_resolution);
+    grid_ = std::move(next);
+    Renew();
+  }
+
+ private:
+  FitState Download() const {
+    FitState state{DownloadGrid(grid_), DownloadSecondMoment(grid_), 0, 0};
+    if (grid_.spheres.on()) state.sphere_moment = grid_.spheres.second_moment.ToHost();
+    return state;
+  }
+
+  // A contiguous run of the map's texels is regularised, as on the CPU.
+  void StepLayers(const FitStep& step) {
+    const DeviceSpheres& spheres = grid_.spheres;
+    const int64_t map = spheres.links.size();
+    const int64_t run = static_cast<int64_t>(step.tv_sphere_share * static_cast<float>(map));
+    if (run > 0) {
+      const int64_t begin = static_cast<int64_t>(
+          RandomIndex(seed_ ^ 0x6d7369ull, step.number, 0, static_cast<uint64_t>(map)));
+      const float scale = 1.0f / (static_cast<float>(run) * static_cast<float>(spheres.layers));
+      AddSphereVariation(grid_, begin, run, step.tv_sphere_density * scale,
+                         step.tv_sphere_color * scale, &touched_);
+    }
+    StepSpheresOnDevice(&grid_, &touched_, step.optimizer, fitter_->sums());
+  }
+
+  // By the host, three times a fit: it takes a fraction of a second.
+  DeviceSpheres Resampled(DeviceSpheres spheres, int resolution) const {
+    if (!spheres.on()) return spheres;
+    FastSpheres host = DownloadSpheres(spheres);
+    spheres = {};
+    if (resolution != host.resolution) host = ResampleSpheres(host, resolution);
+    return UploadSpheres(host, true, {}, exact_sums_);
+  }
+
+  void KeepSums() {
+    if (!fitter_) return;
+    const DeviceFitSums sums = fitter_->TakeSums();
+    DeviceWait("a step of the fit");
+    sums_.squared_error += sums.squared_error;
+    sums_.samples += static_cast<int64_t>(sums.samples);
+    sums_.rejected_voxels += static_cast<int64_t>(sums.rejected_voxels);
+  }
+
+  // What belongs to the grid as it is now.
+  void Renew() {
+    KeepSums();
+    fitter_.reset();
+    touched_ = DeviceTouched(grid_);
+  }
+  void Reserve(int64_t rays) {
+    if (rays <= rays_.size()) return;
+    rays_ = DeviceBuffer<Ray>(rays, "rays");
+    targets_ = DeviceBuffer<Vec3f>(rays, "colours of rays");
+  }
+
+  uint64_t seed_;
+  bool exact_sums_;
+  DeviceViews views_;
+  DeviceGrid grid_;
+  DeviceTouched touched_;
+  MarchOptions march_;
+  std::optional<DeviceRayFitter> fitter_;
+  FitSums sums_;  // of fitters that are gone
+  DeviceBuffer<Ray> rays_;
+  DeviceBuffer<Vec3f> targets_;
+};
+
+}  // namespace
+
+std::unique_ptr<FitEngine> MakeCudaFitEngine(const TrainingRays* rays, uint64_t seed,
+                                             bool exact_sums) {
+  const DeviceStatus device = ReadDeviceStatus();
+  if (!device.found) throw Error(ExitCode::kResources, device.name, "GPU", "use --device cpu");
+  return std::make_unique<CudaFitEngine>(rays, seed, exact_sums);
+}
+
+}  // namespace regrade

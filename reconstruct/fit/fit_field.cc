@@ -1,0 +1,300 @@
+#include "reconstruct/fit/fit_field.h"
+
+#include <omp.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <utility>
+
+#include "kernels/base/error.h"
+#include "reconstruct/fit/fit_engine.h"
+#include "reconstruct/fit/resample_grid.h"
+#include "reconstruct/fit/sphere_grid.h"
+
+namespace regrade {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double SecondsSince(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+double PsnrOf(double squared_error, int64_t rays) {
+  return -10 *
+         std::log10(squared_error / (3.0 * static_cast<double>(std::max<int64_t>(rays, 1))));
+}
+
+class Fitter {
+ public:
+  Fitter(const std::vector<TrainingView>& views, const SceneBox& box, const FitOptions& options,
+         const FitHooks& hooks, Backend backend)
+      : rays_(views),
+        box_(box),
+        options_(options),
+        hooks_(hooks),
+        sums_each_step_(backend == Backend::kCpu) {
+    REGRADE_CHECK_EQ(options.resolutions.size(), options.steps.size());
+    for (size_t s = 0; s < options.steps.size(); ++s) {
+      total_steps_ += options.steps[s];
+      total_work_ += options.steps[s] * WorkOfStep(static_cast<int>(s));
+    }
+    if (backend == Backend::kCuda)
+      engine_ = MakeCudaFitEngine(&rays_, options.seed, options.exact_sums);
+    else
+      engine_ = MakeCpuFitEngine(&rays_, options.seed,
+                                 options.shards > 0 ? options.shards : omp_get_max_threads());
+  }
+
+  FitResult Run() {
+    FitState state;
+    if (hooks_.resume != nullptr) {
+      state = *hooks_.resume;
+    } else {
+      const GridFrame frame{ResolutionFor(box_, options_.resolutions[0]), box_.center,
+                            box_.radius};
+      state.grid = MakeInitialGrid(rays_, frame, BasisOf(options_.sh_degree),
+                                   options_.initial_density, box_.near_clip, 2, box_.spheres);
+      if (box_.background) state.grid.background = *box_.background;
+      if (state.grid.num_voxels() == 0)
+        throw Error(ExitCode::kScene, "no part of the scene's box is seen by two cameras",
+                    "reconstruct",
+                    "the poses do not fit together; photograph with more overlap");
+      if (box_.spheres) {
+        state.grid.spheres =
+            MakeInitialSpheres(rays_, frame, options_.background_layers, SphereResolution(0),
+                               options_.initial_background_density, state.grid.background);
+        // The background comes first: a box that may explain the far will do so, wrongly.
+        if (LeadSteps() > 0) SetDensities(0, &state.grid);
+      }
+    }
+    stage_ = state.stage;
+    step_ = state.step;
+    tally_ = std::move(state.tally);
+    engine_->Take(std::move(state));
+    start_ = last_checkpoint_ = Clock::now();
+    const int num_stages = static_cast<int>(options_.steps.size());
+    while (stage_ < num_stages) {
+      RunStage();
+      if (stage_ + 1 < num_stages) Measure();
+      if (finish_early_ || ++stage_ == num_stages) break;
+      Refine(options_.resolutions[static_cast<size_t>(stage_)]);
+      step_ = 0;
+      SaveCheckpoint();
+    }
+    // A last pruning without growth: what no training view sees does not belong into the
+    // result.
+    Refine(0);
+    result_.seconds = SecondsSince(start_) - idle_seconds_;
+    result_.voxels = engine_->num_voxels();
+    Measure();
+    if (hooks_.keep_field) {
+      engine_->Show([this](FitState* state) { result_.field = ToRadianceField(state->grid); });
+      result_.field.step = options_.step;
+    }
+    result_.psnr_train_db = PsnrOf(tally_.tail_error, tally_.tail_rays);
+    result_.rays = tally_.rays;
+    result_.samples = tally_.samples;
+    result_.rejected_voxels = tally_.rejected_voxels;
+    result_.curve = std::move(tally_.curve);
+    return std::move(result_);
+  }
+
+ private:
+  static void SetDensities(float density, FastGrid* grid) {
+    for (int64_t v = 0; v < grid->num_voxels(); ++v)
+      grid->records[v * grid->lanes() + DensityLane(grid->basis)] = density;
+    RefreshDerived(grid);
+  }
+
+  static int BasisOf(int degree) { return (degree + 1) * (degree + 1); }
+
+  int StepsBefore() const {
+    int steps = step_;
+    for (int s = 0; s < stage_; ++s) steps += options_.steps[static_cast<size_t>(s)];
+    return steps;
+  }
+
+  // A step costs what its samples cost, and a ray's samples grow with the resolution: progress
+  // in that unit makes the time left come out right while the stages are still coarse.
+  double WorkBefore() const {
+    double work = static_cast<double>(step_) * WorkOfStep(stage_);
+    for (int s = 0; s < stage_; ++s)
+      work += options_.steps[static_cast<size_t>(s)] * WorkOfStep(s);
+    return work;
+  }
+  double WorkOfStep(int stage) const {
+    return options_.resolutions[static_cast<size_t>(stage)];
+  }
+
+  void RunStage() {
+    const int steps = options_.steps[static_cast<size_t>(stage_)];
+    while (step_ < steps) {
+      if (box_.spheres && LeadSteps() > 0 && StepsBefore() == LeadSteps())
+        engine_->Change(
+            [this](FitState* state) { SetDensities(options_.initial_density, &state->grid); });
+      engine_->Step(NextStep());
+      ++step_;
+      if (sums_each_step_) TakeSums();
+      const int square = options_.patch * options_.patch;
+      tally_.window_rays += std::max(1, options_.rays_per_step / square) * square;
+      if (StepsBefore() % kWindow == 0 || step_ == steps) CloseWindow();
+      const Verdict verdict = Report(hooks_.progress, WorkBefore(), total_work_, note_);
+      if (verdict == Verdict::kAbort) {
+        SaveCheckpoint();
+        throw Interrupted();
+      }
+      if (verdict == Verdict::kFinish) {
+        finish_early_ = true;
+        return;
+      }
+      if (SecondsSince(last_checkpoint_) > 60) SaveCheckpoint();
+    }
+  }
+
+  FitStep NextStep() const {
+    FitStep step;
+    const int number = StepsBefore();
+    const double p = static_cast<double>(number) / total_steps_;
+    const float decay = std::pow(options_.tv_decay, static_cast<float>(stage_));
+    step.number = static_cast<uint64_t>(number);
+    step.rays = options_.rays_per_step;
+    step.patch = options_.patch;
+    step.march = {options_.step, options_.stop_transmittance};
+    step.optimizer.rate_sh = ExponentialRate(options_.rate_sh, options_.rate_sh_end, p);
+    step.optimizer.rate_density =
+        ExponentialRate(options_.rate_density, options_.rate_density_end, p) *
+        DelayFactor(number, options_.density_delay * static_cast<float>(total_steps_));
+    step.optimizer.view_bound = options_.view_bound;
+    step.tv_share = options_.tv_share;
+    step.tv_density = decay * options_.tv_density;
+    step.tv_sh = decay * options_.tv_sh;
+    if (!box_.spheres) return step;
+    step.optimizer.rate_sphere_density = ExponentialRate(
+        options_.rate_background_density, options_.rate_background_density_end, p);
+    step.optimizer.rate_sphere_color =
+        ExponentialRate(options_.rate_background_color, options_.rate_background_color_end, p);
+    step.tv_sphere_share = options_.tv_background_share;
+    step.tv_sphere_density = decay * options_.tv_background_density;
+    step.tv_sphere_color = decay * options_.tv_background_color;
+    return step;
+  }
+
+  int LeadSteps() const {
+    return static_cast<int>(options_.background_lead * static_cast<float>(options_.steps[0]));
+  }
+
+  int SphereResolution(int stage) const {
+    return SphereResolutionFor(options_.background_resolution,
+                               options_.resolutions[static_cast<size_t>(stage)],
+                               options_.resolutions.back());
+  }
+
+  // Prunes by weight and goes on at `longest` voxels a side; 0 keeps the resolution.
+  void Refine(int longest) {
+    const Vec3i now = engine_->resolution();
+    const float longest_now = static_cast<float>(std::max({now.x, now.y, now.z}));
+    const int last_stage = static_cast<int>(options_.resolutions.size()) - 1;
+    const Vec3i next = longest > 0 ? ResolutionFor(box_, longest) : now;
+    engine_->Refine({options_.step, options_.stop_transmittance},
+                    options_.prune_weight / longest_now, next,
+                    SphereResolution(std::min(stage_, last_stage)));
+  }
+
+  // A device's sums are read once in a while: it need not wait for the host at each step. The
+  // CPU's are read at each, so that a fit that was interrupted adds them up in the same order.
+  void CloseWindow() {
+    TakeSums();
+    const int done = StepsBefore();
+    tally_.rays += tally_.window_rays;
+    if (done > total_steps_ - total_steps_ / 10 - 1) {
+      tally_.tail_error += tally_.window_error;
+      tally_.tail_rays += tally_.window_rays;
+    }
+    const double psnr = PsnrOf(tally_.window_error, tally_.window_rays);
+    tally_.curve.push_back({tally_.rays, SecondsSince(start_) - idle_seconds_, psnr, done});
+    char text[96];
+    std::snprintf(text, sizeof text, "%d^3, %.2f M voxels, %.2f dB on training rays",
+                  options_.resolutions[static_cast<size_t>(stage_)],
+                  static_cast<double>(engine_->num_voxels()) * 1e-6, psnr);
+    note_ = text;
+    tally_.window_rays = 0;
+    tally_.window_error = 0;
+  }
+
+  void TakeSums() {
+    const FitSums sums = engine_->TakeSums();
+    tally_.window_error += sums.squared_error;
+    tally_.samples += sums.samples;
+    tally_.rejected_voxels += sums.rejected_voxels;
+    // A few bad voxels are skipped and counted; a flood means the field is broken.
+    if (sums.rejected_voxels > 1000)
+      throw Error(ExitCode::kBug,
+                  "the gradient of " + std::to_string(sums.rejected_voxels) +
+                      " voxels is not finite at step " + std::to_string(StepsBefore()),
+                  "reconstruct", "the last checkpoint has been kept");
+  }
+
+  void SaveCheckpoint() {
+    const Clock::time_point begin = Clock::now();
+    if (hooks_.checkpoint) {
+      TakeSums();  // the window goes on where the checkpoint is read
+      engine_->Show([this](FitState* state) {
+        state->stage = stage_;
+        state->step = step_;
+        state->tally = tally_;
+        hooks_.checkpoint(*state);
+      });
+    }
+    idle_seconds_ += SecondsSince(begin);
+    last_checkpoint_ = Clock::now();
+  }
+
+  void Measure() {
+    const Clock::time_point begin = Clock::now();
+    if (hooks_.measure) hooks_.measure(engine_.get());
+    idle_seconds_ += SecondsSince(begin);
+  }
+
+  static constexpr int kWindow = 20;  // steps
+
+  TrainingRays rays_;
+  SceneBox box_;
+  FitOptions options_;
+  FitHooks hooks_;
+  const bool sums_each_step_;
+  std::unique_ptr<FitEngine> engine_;
+  FitResult result_;
+  int stage_ = 0, step_ = 0;  // step within the stage
+  int total_steps_ = 0;
+  double total_work_ = 0;
+  bool finish_early_ = false;
+  FitTally tally_;
+  double idle_seconds_ = 0;
+  std::string note_;
+  Clock::time_point start_, last_checkpoint_;
+};
+
+}  // namespace
+
+float ExponentialRate(float begin, float end, double p) {
+  if (begin <= 0 || end <= 0) return 0;
+  return static_cast<float>(begin * std::pow(static_cast<double>(end) / begin, p));
+}
+
+// As in svox2, which begins at a hundredth.
+float DelayFactor(int step, float delay) {
+  if (static_cast<float>(step) >= delay) return 1;
+  constexpr float kLeast = 0.01f, kQuarterTurn = 1.57079633f;
+  return kLeast + (1 - kLeast) * std::sin(kQuarterTurn * static_cast<float>(step) / delay);
+}
+
+FitResult FitField(const std::vector<TrainingView>& views, const SceneBox& box,
+                   const FitOptions& options, const FitHooks& hooks, Backend backend) {
+  return Fitter(views, box, options, hooks, backend).Run();
+}
+
+}  // namespace regrade

@@ -1,0 +1,59 @@
+// The pool of training rays: every pixel of every training view that has a colour, drawn by
+// counter so that any thread count and any resume sees the same batches.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "kernels/field/cuda/device_views.h"
+#include "kernels/scene/camera.h"
+#include "kernels/scene/image.h"
+
+namespace regrade {
+
+// `photo` has the camera's size, 3 channels, sRGB; a pixel with a value that is not finite is
+// left out: no ray is drawn there. Cameras are in the field's frame.
+struct TrainingView {
+  Camera camera;
+  const Image* photo = nullptr;
+};
+
+class TrainingRays {
+ public:
+  // Copies what it needs; 6 bytes a pixel (unorm16, exact for 8-bit photos) and one direction
+  // map a lens. Throws Error(kInput) for a view without a pixel to draw.
+  explicit TrainingRays(const std::vector<TrainingView>& views);
+
+  int64_t num_rays() const { return total_; }
+  int num_views() const { return static_cast<int>(views_.size()); }
+  Vec3f mean_color() const { return mean_color_; }
+
+  // Fills rays and targets with `patches` squares of patch x patch pixels, the same number from
+  // every view give or take one, ordered by view and position so that neighbours share voxels.
+  // Where a pixel of a square is left out, another of the square is drawn twice.
+  void Draw(uint64_t seed, uint64_t step, int patches, int patch, std::vector<Ray>* rays,
+            std::vector<Vec3f>* targets) const;
+
+  Ray RayOf(int view, int x, int y) const;
+  // Everything on a CUDA device. Throws Error(kResources) if it does not fit, or without CUDA.
+  DeviceViews ToDevice() const;
+  const Camera& camera(int view) const { return views_[static_cast<size_t>(view)].camera; }
+
+ private:
+  struct StoredView {
+    Camera camera;
+    int direction_map;
+    Vec3f origin;
+    Mat3f world_from_camera;
+    std::vector<uint16_t> color;  // [H, W, 3]
+    std::vector<int32_t> drawn;   // pixels y W + x; empty where none is left out
+    bool LeavesOut(int64_t pixel) const;
+  };
+  std::vector<StoredView> views_;
+  std::vector<std::vector<Vec3f>>
+      direction_maps_;  // [H, W] unit directions in the camera's frame
+  int64_t total_ = 0;
+  Vec3f mean_color_{};
+};
+
+}  // namespace regrade

@@ -1,0 +1,189 @@
+#include "reconstruct/refinement/bundle.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include "kernels/base/error.h"
+#include "kernels/base/hash.h"
+#include "kernels/base/random.h"
+
+namespace regrade {
+namespace {
+
+constexpr double kHeldOutShare = 0.1;
+constexpr double kLeastSpread = 1e-4;  // of the points' distance: less shows no depth
+constexpr size_t kLeastKept = 3;       // sightings of a point that are not held out
+
+// Rodrigues' formula.
+Mat3d RotationOf(const double* w) {
+  const Eigen::Vector3d v(w[0], w[1], w[2]);
+  const double angle = v.norm();
+  Mat3d result;
+  if (angle == 0) return result;
+  const Eigen::Matrix3d m = Eigen::AngleAxisd(angle, v / angle).toRotationMatrix();
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) result(i, j) = m(i, j);
+  return result;
+}
+
+Vec3d CenterOf(const std::array<double, 6>& pose) { return {pose[3], pose[4], pose[5]}; }
+
+// Largest distance between two of them.
+double SpreadOf(const std::vector<Vec3d>& centers) {
+  double spread = 0;
+  for (size_t i = 0; i < centers.size(); ++i)
+    for (size_t j = 0; j < i; ++j) spread = std::max(spread, Norm(centers[i] - centers[j]));
+  return spread;
+}
+
+double MedianDistance(const std::vector<ColmapPoint>& points, const Vec3d& from) {
+  std::vector<double> distances;
+  for (const ColmapPoint& point : points) distances.push_back(Norm(point.position - from));
+  if (distances.empty()) return 0;
+  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+  std::nth_element(distances.begin(), middle, distances.end());
+  return *middle;
+}
+
+}  // namespace
+
+Bundle MakeBundle(const ColmapModel& model) {
+  Bundle bundle;
+  std::vector<Vec3d> centers;
+  std::map<uint32_t, size_t> view_of_image;
+  std::vector<uint64_t> numbers;
+  Vec3d mean;
+  for (const ColmapImage& image : model.images) {
+    view_of_image[image.id] = bundle.lenses.size();
+    const ColmapCamera* const camera = model.FindCamera(image.camera_id);
+    bundle.camera.push_back(static_cast<size_t>(camera - model.cameras.data()));
+    Camera lens = camera->intrinsics;
+    lens.camera_from_world = {};
+    bundle.lenses.push_back(lens);
+    bundle.rotations.push_back(image.camera_from_world.rotation);
+    centers.push_back(image.camera_from_world.Inverse().translation);
+    mean += centers.back() / static_cast<double>(model.images.size());
+    numbers.push_back(HashOf(image.name));
+  }
+  bundle.focal.resize(model.cameras.size());
+  double spread = SpreadOf(centers);
+  if (spread < kLeastSpread * MedianDistance(model.points, mean)) spread = 0;
+  const double scale = spread > 0 ? 1 / spread : 1;
+  bundle.spread = spread > 0 ? 1 : 0;
+  bundle.bundle_from_world = {scale, Mat3d(), -(mean * scale)};
+  for (const Vec3d& center : centers) {
+    const Vec3d c = bundle.bundle_from_world * center;
+    bundle.poses.push_back({0, 0, 0, c.x, c.y, c.z});
+  }
+
+  for (size_t p = 0; p < model.points.size(); ++p) {
+    const Vec3d x = bundle.bundle_from_world * model.points[p].position;
+    bundle.points.push_back({x.x, x.y, x.z});
+    std::vector<BundleSighting> seen;
+    for (const ColmapTrackElement& element : model.points[p].track) {
+      const ColmapImage& image = *model.FindImage(element.image_id);
+      const ColmapKeypoint& keypoint = image.keypoints[element.keypoint];
+      const BundleSighting sighting{view_of_image.at(image.id), p, keypoint.u, keypoint.v,
+                                    false};
+      if (std::isfinite(ReprojectionError(bundle, sighting))) seen.push_back(sighting);
+    }
+    if (seen.size() < 2) continue;
+    std::sort(seen.begin(), seen.end(), [&](const BundleSighting& a, const BundleSighting& b) {
+      return numbers[a.view] < numbers[b.view];
+    });
+    size_t kept = seen.size();
+    for (BundleSighting& sighting : seen) {
+      sighting.held_out =
+          kept > kLeastKept &&
+          RandomDouble(numbers[sighting.view], model.points[p].id, 0) < kHeldOutShare;
+      kept -= sighting.held_out;
+    }
+    bundle.sightings.insert(bundle.sightings.end(), seen.begin(), seen.end());
+  }
+  std::vector<size_t> count(bundle.lenses.size());
+  for (const BundleSighting& sighting : bundle.sightings)
+    count[sighting.view] += !sighting.held_out;
+  for (const size_t n : count) bundle.adjustable.push_back(n >= kFewestSightings);
+  return bundle;
+}
+
+double ReprojectionError(const Bundle& bundle, const BundleSighting& sighting) {
+  const std::array<double, 6>& pose = bundle.poses[sighting.view];
+  const std::array<double, 3>& x = bundle.points[sighting.point];
+  const Vec3d turned =
+      bundle.rotations[sighting.view] * (Vec3d{x[0], x[1], x[2]} - CenterOf(pose));
+  const Camera& lens = bundle.lenses[sighting.view];
+  double u = 0, v = 0;
+  if (!lens.Project(RotationOf(pose.data()) * turned, &u, &v))
+    return std::numeric_limits<double>::infinity();
+  const double factor = std::exp(bundle.focal[bundle.camera[sighting.view]]);
+  return std::hypot((u - lens.cx) * factor + lens.cx - sighting.u,
+                    (v - lens.cy) * factor + lens.cy - sighting.v);
+}
+
+double MedianError(const Bundle& bundle, bool held_out) {
+  std::vector<double> errors;
+  for (const BundleSighting& sighting : bundle.sightings)
+    if (sighting.held_out == held_out) errors.push_back(ReprojectionError(bundle, sighting));
+  if (errors.empty()) return 0;
+  const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
+  std::nth_element(errors.begin(), middle, errors.end());
+  return *middle;
+}
+
+ColmapModel ModelOfBundle(const Bundle& bundle, const ColmapModel& model) {
+  REGRADE_CHECK_EQ(bundle.poses.size(), model.images.size());
+  const size_t n = bundle.poses.size();
+  std::vector<Mat3d> rotations;
+  std::vector<Vec3d> before, after;
+  Vec3d mean_before, mean_after;
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+  for (size_t v = 0; v < n; ++v) {
+    rotations.push_back(RotationOf(bundle.poses[v].data()) * bundle.rotations[v]);
+    const Mat3d turn = bundle.rotations[v].Transposed() * rotations[v];
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) sum(i, j) += turn(i, j);
+    before.push_back(model.images[v].camera_from_world.Inverse().translation);
+    after.push_back(CenterOf(bundle.poses[v]));
+    mean_before += before[v] / static_cast<double>(n);
+    mean_after += after[v] / static_cast<double>(n);
+  }
+  // The rotation nearest to the mean of R_before^T R_after; turns are small, so it is one.
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Eigen::Matrix3d nearest = svd.matrixU() * svd.matrixV().transpose();
+  Similarity world_from_bundle;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) world_from_bundle.rotation(i, j) = nearest(i, j);
+  double across = 0, along = 0;
+  for (size_t v = 0; v < n; ++v) {
+    const Vec3d turned = world_from_bundle.rotation * (after[v] - mean_after);
+    across += Dot(turned, before[v] - mean_before);
+    along += Dot(turned, turned);
+  }
+  world_from_bundle.scale = across / along;
+  world_from_bundle.translation =
+      mean_before - world_from_bundle.rotation * mean_after * world_from_bundle.scale;
+
+  ColmapModel moved = model;
+  for (size_t v = 0; v < n; ++v) {
+    const Mat3d rotation = rotations[v] * world_from_bundle.rotation.Transposed();
+    moved.images[v].camera_from_world = {rotation,
+                                         -(rotation * (world_from_bundle * after[v]))};
+  }
+  for (size_t c = 0; c < bundle.focal.size(); ++c) {
+    moved.cameras[c].intrinsics.fx *= std::exp(bundle.focal[c]);
+    moved.cameras[c].intrinsics.fy *= std::exp(bundle.focal[c]);
+  }
+  std::vector<bool> in_bundle(model.points.size());
+  for (const BundleSighting& sighting : bundle.sightings) in_bundle[sighting.point] = true;
+  for (size_t p = 0; p < model.points.size(); ++p) {
+    const std::array<double, 3>& x = bundle.points[p];
+    if (in_bundle[p]) moved.points[p].position = world_from_bundle * Vec3d{x[0], x[1], x[2]};
+  }
+  return moved;
+}
+
+}  // namespace regrade

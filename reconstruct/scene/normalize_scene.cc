@@ -1,0 +1,291 @@
+#include "reconstruct/scene/normalize_scene.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "kernels/base/error.h"
+
+namespace regrade {
+namespace {
+
+constexpr size_t kMinPoints = 50;
+constexpr double kTail = 0.01;    // share of points left out at each end of an axis
+constexpr double kMargin = 0.08;  // of the extent, added on both sides
+constexpr double kNearestShare =
+    0.6;  // the scene begins at this share of the nearest points' distance
+// What a photo shows beside its points: its corners are taken to be as deep as this share of
+// its points, and all but this share of all photos' corners belong to the scene.
+constexpr double kCornerDepth = 0.25;
+constexpr double kCornerTail = 0.1;
+constexpr size_t kMinPointsOfView = 10;
+// Of a cube round the axes' common point: the cameras' median distance is this share of its
+// half side, and without points nothing is nearer to a camera than that share.
+constexpr double kReachOfCameras = 0.9;
+constexpr double kFewPointsNearest = 0.35;
+constexpr double kNearPoints = 0.1;    // the share of points that are near for cameras within
+constexpr double kMostNearClip = 0.5;  // half sides
+
+Eigen::Vector3d ToEigen(const Vec3d& v) { return {v.x, v.y, v.z}; }
+Vec3d FromEigen(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+
+double Quantile(std::vector<double>* values, double q) {
+  const size_t k = std::min(values->size() - 1,
+                            static_cast<size_t>(q * static_cast<double>(values->size())));
+  std::nth_element(values->begin(), values->begin() + static_cast<long>(k), values->end());
+  return (*values)[k];
+}
+
+// Sums in the order of sorted values, so that re-ordered photos give the same bits (H154).
+Vec3d OrderFreeMean(std::vector<Vec3d> values) {
+  Vec3d mean;
+  for (int a = 0; a < 3; ++a) {
+    std::vector<double> axis;
+    for (const Vec3d& v : values) axis.push_back(v[a]);
+    std::sort(axis.begin(), axis.end());
+    double sum = 0;
+    for (const double v : axis) sum += v;
+    mean[a] = sum / static_cast<double>(axis.size());
+  }
+  return mean;
+}
+
+// Makes the largest component positive: an eigenvector's sign must not depend on the solver.
+Eigen::Vector3d FixSign(Eigen::Vector3d v) {
+  Eigen::Index largest;
+  v.cwiseAbs().maxCoeff(&largest);
+  return v(largest) < 0 ? Eigen::Vector3d(-v) : v;
+}
+
+Eigen::Matrix3d Spread(const std::vector<Vec3d>& positions, const Vec3d& mean) {
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  for (const Vec3d& p : positions) {
+    const Eigen::Vector3d d = ToEigen(p - mean);
+    covariance += d * d.transpose();
+  }
+  return covariance;
+}
+
+Mat3d UprightRotation(const std::vector<Vec3d>& centers, const std::vector<Vec3d>& ups,
+                      const std::vector<Vec3d>& forwards, std::string* notice) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> spread(
+      Spread(centers, OrderFreeMean(centers)));
+  Eigen::Vector3d up = ToEigen(OrderFreeMean(ups));
+  if (up.norm() < 0.1) {
+    up = FixSign(spread.eigenvectors().col(0));
+    *notice =
+        "the photos disagree about up; the direction in which the cameras moved least is taken";
+  }
+  up.normalize();
+  Eigen::Vector3d heading = ToEigen(OrderFreeMean(forwards));
+  heading -= up * up.dot(heading);
+  if (heading.norm() < 0.1) {
+    // Photos look all round: take the direction in which the cameras moved most.
+    heading = FixSign(spread.eigenvectors().col(2));
+    heading -= up * up.dot(heading);
+  }
+  if (heading.norm() < 1e-6) heading = up.unitOrthogonal();
+  heading.normalize();
+  const Eigen::Vector3d right = heading.cross(up);
+  Mat3d rotation;
+  rotation.row[0] = FromEigen(right);
+  rotation.row[1] = FromEigen(heading);
+  rotation.row[2] = FromEigen(up);
+  return rotation;
+}
+
+// The point nearest to all optical axes; regularised, so that parallel axes give the cameras'
+// mean.
+Vec3d CommonPoint(const std::vector<Vec3d>& centers, const std::vector<Vec3d>& forwards) {
+  const Eigen::Vector3d mean = ToEigen(OrderFreeMean(centers));
+  Eigen::Matrix3d a = 1e-6 * static_cast<double>(centers.size()) * Eigen::Matrix3d::Identity();
+  Eigen::Vector3d b = a * mean;
+  for (size_t i = 0; i < centers.size(); ++i) {
+    const Eigen::Vector3d d = ToEigen(forwards[i]);
+    const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - d * d.transpose();
+    a += across;
+    b += across * ToEigen(centers[i]);
+  }
+  return FromEigen(a.ldlt().solve(b));
+}
+
+// Where the corners of the photos are, at the depth of the nearer points each sees. Points
+// alone would leave out what has no texture: a third of a picture of an object before a dark
+// room.
+std::vector<Vec3d> PhotoCorners(const Capture& capture) {
+  std::vector<std::vector<double>> depths(capture.views.size());
+  for (const ScenePoint& point : capture.points)
+    for (const int32_t view : point.views) {
+      const auto v = static_cast<size_t>(view);
+      const double depth = (capture.views[v].camera.camera_from_world * point.position).z;
+      if (depth > 0) depths[v].push_back(depth);
+    }
+  std::vector<Vec3d> corners;
+  for (size_t v = 0; v < depths.size(); ++v) {
+    if (depths[v].size() < kMinPointsOfView) continue;
+    const Camera& camera = capture.views[v].camera;
+    const double depth = Quantile(&depths[v], kCornerDepth);
+    for (const double x : {0.0, static_cast<double>(camera.width)})
+      for (const double y : {0.0, static_cast<double>(camera.height)}) {
+        const Vec3d ray = camera.CameraRay(x, y);
+        if (!(ray.z > 0.1)) continue;  // sideways through a fisheye lens
+        corners.push_back(camera.camera_from_world.Inverse() * (ray * (depth / ray.z)));
+      }
+  }
+  return corners;
+}
+
+// A distance below this is the rounding of where the cameras stand, through a matrix of
+// condition 1e6.
+double RoundingOf(const std::vector<Vec3d>& centers) {
+  double farthest = 0;
+  for (const Vec3d& c : centers) farthest = std::max(farthest, Norm(c));
+  return 1e-8 * farthest;
+}
+
+// Places and directions of all cameras.
+struct CameraPoses {
+  std::vector<Vec3d> centers, ups, forwards;
+
+  explicit CameraPoses(const Capture& capture) {
+    for (const CaptureView& view : capture.views) {
+      centers.push_back(view.camera.Center());
+      ups.push_back(view.camera.Up());
+      forwards.push_back(view.camera.Forward());
+    }
+  }
+};
+
+// World units: nothing is modelled nearer to a camera than a share of where the nearest points
+// are; 0 without points.
+double NearestDistance(const Capture& capture, const std::vector<Vec3d>& centers) {
+  std::vector<double> distances;
+  for (const ScenePoint& p : capture.points)
+    for (const int32_t view : p.views)
+      distances.push_back(Norm(p.position - centers[static_cast<size_t>(view)]));
+  return distances.empty() ? 0 : kNearestShare * Quantile(&distances, kTail);
+}
+
+}  // namespace
+
+NormalizedScene NormalizeScene(const Capture& capture) {
+  NormalizedScene result;
+  const CameraPoses poses(capture);
+  const auto& [centers, ups, forwards] = poses;
+  const Mat3d rotation = UprightRotation(centers, ups, forwards, &result.notice);
+
+  // Box and nearest distance in the rotated world.
+  Vec3d low, high;
+  double nearest = 0;
+  if (capture.points.size() >= kMinPoints) {
+    const std::vector<Vec3d> corners = PhotoCorners(capture);
+    for (int a = 0; a < 3; ++a) {
+      std::vector<double> along;
+      for (const ScenePoint& p : capture.points)
+        along.push_back(Dot(rotation.row[a], p.position));
+      low[a] = Quantile(&along, kTail);
+      high[a] = Quantile(&along, 1 - kTail);
+      if (corners.empty()) continue;
+      along.clear();
+      for (const Vec3d& corner : corners) along.push_back(Dot(rotation.row[a], corner));
+      low[a] = std::min(low[a], Quantile(&along, kCornerTail));
+      high[a] = std::max(high[a], Quantile(&along, 1 - kCornerTail));
+    }
+    nearest = NearestDistance(capture, centers);
+  } else {
+    const Vec3d common = CommonPoint(centers, forwards);
+    std::vector<double> distances;
+    for (const Vec3d& c : centers) distances.push_back(Norm(c - common));
+    double half = Quantile(&distances, 0.5) / kReachOfCameras;
+    std::string notice = "few points: the box is the cube round the cameras' common point";
+    if (!(half > RoundingOf(centers))) {
+      notice =
+          "few points, and the cameras stand at one place: the size of the box is "
+          "that of the points' distances, or 1";
+      std::vector<double> depths;
+      for (const ScenePoint& p : capture.points) depths.push_back(Norm(p.position - common));
+      half = depths.empty() ? 1 : Quantile(&depths, 0.5);
+      if (!(half > RoundingOf(centers))) half = 1;
+    }
+    result.notice += (result.notice.empty() ? "" : "; ") + notice;
+    for (int a = 0; a < 3; ++a) {
+      const double middle = Dot(rotation.row[a], common);
+      low[a] = middle - half;
+      high[a] = middle + half;
+    }
+    nearest = kFewPointsNearest * half;
+  }
+  Vec3d middle, half;
+  double longest = 0;
+  for (int a = 0; a < 3; ++a) {
+    middle[a] = 0.5 * (low[a] + high[a]);
+    half[a] = (0.5 + kMargin) * (high[a] - low[a]);
+    longest = std::max(longest, half[a]);
+  }
+  if (!(longest > 0)) longest = 1;
+  Similarity& s = result.field_from_world;
+  s.scale = 1 / longest;
+  s.rotation = rotation;
+  s.translation = -(s.scale * middle);
+  for (int a = 0; a < 3; ++a)  // a flat scene still gets a box with a volume
+    result.box.radius[a] = static_cast<float>(std::max(half[a] / longest, 0.05));
+  result.box.near_clip = static_cast<float>(nearest * s.scale);
+  return result;
+}
+
+Surroundings MeasureSurroundings(const Capture& capture) {
+  Surroundings result;
+  const CameraPoses poses(capture);
+  result.center = CommonPoint(poses.centers, poses.forwards);
+  std::vector<double> distances, ahead;
+  for (size_t i = 0; i < poses.centers.size(); ++i) {
+    const Vec3d to_center = result.center - poses.centers[i];
+    distances.push_back(Norm(to_center));
+    ahead.push_back(Dot(to_center, poses.forwards[i]));
+  }
+  const double reach = Quantile(&distances, 0.5) / kReachOfCameras;
+  if (!(reach > RoundingOf(poses.centers))) return result;
+  result.half = reach;
+  // Cameras that look outwards stand round nothing: what is near to them begins with the
+  // points.
+  if (Quantile(&ahead, 0.5) < 0 && capture.points.size() >= kMinPoints) {
+    std::vector<double> out;
+    for (const ScenePoint& p : capture.points) out.push_back(Norm(p.position - result.center));
+    result.half = std::max(reach, Quantile(&out, kNearPoints));
+  }
+  int64_t far = 0, all = 0;
+  for (const ScenePoint& p : capture.points) {
+    const auto views = static_cast<int64_t>(p.views.size());
+    all += views;
+    if (Norm(p.position - result.center) > kFarSides * result.half) far += views;
+  }
+  if (capture.points.size() >= kMinPoints && all > 0)
+    result.far_share = static_cast<double>(far) / static_cast<double>(all);
+  return result;
+}
+
+NormalizedScene NormalizeSurrounded(const Capture& capture, const Surroundings& surroundings) {
+  NormalizedScene result;
+  const CameraPoses poses(capture);
+  if (!(surroundings.half > 0))
+    throw Error(ExitCode::kScene, "the cameras stand at one place: there is no box to surround",
+                "--effects background=on", "leave the choice to auto");
+  const Mat3d upright =
+      UprightRotation(poses.centers, poses.ups, poses.forwards, &result.notice);
+  Similarity& s = result.field_from_world;
+  s.scale = 1 / surroundings.half;
+  s.rotation.row[0] = upright.row[0];
+  s.rotation.row[1] = upright.row[2];
+  s.rotation.row[2] = -upright.row[1];
+  s.translation = -(s.scale * (s.rotation * surroundings.center));
+  const double nearest = capture.points.size() >= kMinPoints
+                             ? NearestDistance(capture, poses.centers)
+                             : kFewPointsNearest * surroundings.half;
+  // Beyond the box nothing would be left of it.
+  result.box.near_clip = static_cast<float>(std::min(nearest * s.scale, kMostNearClip));
+  result.box.spheres = true;
+  return result;
+}
+
+}  // namespace regrade

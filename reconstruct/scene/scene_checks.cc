@@ -1,0 +1,150 @@
+#include "reconstruct/scene/scene_checks.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <iomanip>
+#include <sstream>
+
+namespace regrade {
+namespace {
+
+// Pairs of a long track are many and alike; this many of its views, evenly chosen, show the
+// largest angle well enough.
+constexpr size_t kViewsOfATrack = 32;
+
+double LargestAngle(const Vec3d& point, const std::vector<int32_t>& views,
+                    const std::vector<Vec3d>& centers) {
+  const size_t used = std::min(views.size(), kViewsOfATrack);
+  std::vector<Vec3d> rays(used);
+  for (size_t i = 0; i < used; ++i)
+    rays[i] = point - centers[views[used < 2 ? 0 : i * (views.size() - 1) / (used - 1)]];
+  double largest = 0;
+  for (size_t i = 0; i < used; ++i)
+    for (size_t j = i + 1; j < used; ++j)
+      // atan2 keeps small angles accurate, where acos of the scalar product does not.
+      largest =
+          std::max(largest, std::atan2(Norm(Cross(rays[i], rays[j])), Dot(rays[i], rays[j])));
+  return largest;
+}
+
+double Median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+std::vector<Vec3d> Centers(const Capture& capture) {
+  std::vector<Vec3d> centers;
+  for (const CaptureView& view : capture.views) centers.push_back(view.camera.Center());
+  return centers;
+}
+
+std::string Rounded(double value, int digits) {
+  std::ostringstream text;
+  text << std::fixed << std::setprecision(digits) << value;
+  return text.str();
+}
+
+}  // namespace
+
+double MedianTriangulationAngle(const Capture& capture) {
+  const std::vector<Vec3d> centers = Centers(capture);
+  std::vector<double> angles;
+  for (const ScenePoint& point : capture.points)
+    angles.push_back(LargestAngle(point.position, point.views, centers));
+  return Median(std::move(angles));
+}
+
+Vec3d PointExtents(const Capture& capture) {
+  if (capture.points.size() < 10) return {};
+  Vec3d median;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> values;
+    for (const ScenePoint& point : capture.points) values.push_back(point.position[axis]);
+    median[axis] = Median(std::move(values));
+  }
+  std::vector<Vec3d> offsets;
+  for (const ScenePoint& point : capture.points) offsets.push_back(point.position - median);
+  const size_t kept = offsets.size() * 9 / 10;
+  std::nth_element(offsets.begin(), offsets.begin() + static_cast<ptrdiff_t>(kept),
+                   offsets.end(),
+                   [](const Vec3d& a, const Vec3d& b) { return Dot(a, a) < Dot(b, b); });
+  offsets.resize(kept);
+
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const Vec3d& offset : offsets) mean += Eigen::Vector3d(offset.x, offset.y, offset.z);
+  mean /= static_cast<double>(kept);
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  for (const Vec3d& offset : offsets) {
+    const Eigen::Vector3d x = Eigen::Vector3d(offset.x, offset.y, offset.z) - mean;
+    covariance += x * x.transpose();
+  }
+  covariance /= static_cast<double>(kept);
+  const Eigen::Vector3d variances =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance, Eigen::EigenvaluesOnly)
+          .eigenvalues()
+          .cwiseMax(0);
+  return {std::sqrt(variances[2]), std::sqrt(variances[1]), std::sqrt(variances[0])};
+}
+
+double WorstPixelAspect(const Capture& capture) {
+  double worst = 1;
+  for (const CaptureView& view : capture.views) {
+    const double aspect = view.camera.fx / view.camera.fy;
+    if (std::abs(std::log(aspect)) > std::abs(std::log(worst))) worst = aspect;
+  }
+  return worst;
+}
+
+double CameraSpread(const Capture& capture) {
+  const std::vector<Vec3d> centers = Centers(capture);
+  double spread = 0;
+  for (size_t i = 0; i < centers.size(); ++i)
+    for (size_t j = i + 1; j < centers.size(); ++j)
+      spread = std::max(spread, Norm(centers[i] - centers[j]));
+  return spread;
+}
+
+SceneJudgement JudgeScene(const Capture& capture, const SceneLimits& limits) {
+  SceneJudgement judgement;
+  const auto refuse = [&](const std::string& why, const std::string& remedy) {
+    judgement.refusal = why;
+    judgement.remedy = remedy;
+    return judgement;
+  };
+  const int views = static_cast<int>(capture.views.size());
+  const double angle_deg = MedianTriangulationAngle(capture) * 180 / M_PI;
+  if (capture.points.empty())
+    return refuse("no point of the scene was found in two photos",
+                  "take sharper photos of something with texture");
+  if (angle_deg < limits.min_triangulation_angle_deg)
+    return refuse(
+        "the photos see the scene from nearly one place: half of the points are seen "
+        "under less than " +
+            Rounded(angle_deg, 2) +
+            " degrees (needed: " + Rounded(limits.min_triangulation_angle_deg, 1) + ")",
+        "a camera that only turns shows no depth: step sideways between photos");
+  const double aspect = WorstPixelAspect(capture);
+  if (std::max(aspect, 1 / aspect) > limits.max_pixel_aspect)
+    return refuse("the estimated camera has pixels that are not square (fx / fy = " +
+                      Rounded(aspect, 3) + "), so its geometry is not to be trusted",
+                  "take more photos, stepping sideways between them instead of only turning "
+                  "the camera, and keep the scene still");
+  if (views < limits.min_views)
+    return refuse("only " + std::to_string(views) +
+                      " photos could be placed, and a scene needs " +
+                      std::to_string(limits.min_views) + " at least",
+                  "take more photos that overlap by two thirds; 20 to 60 are a good number");
+  const Vec3d extents = PointExtents(capture);
+  if (extents.y > 0 && extents.z < limits.min_thickness * extents.y)
+    judgement.notes.push_back(
+        "the points lie nearly in one plane (thickness " +
+        Rounded(100 * extents.z / extents.y, 1) +
+        " % of its width), so the camera's focal length and the depth of the scene are weakly "
+        "known; photos from the sides help");
+  return judgement;
+}
+
+}  // namespace regrade

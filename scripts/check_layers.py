@@ -1,0 +1,445 @@
+#!/usr/bin/env python3
+"""Checks the layers: which folder includes which, which file includes which third-party library.
+
+  check_layers.py [--root DIR]   checks the tree; one line for each finding, exit status 1 if there is any
+  check_layers.py --self-test    plants each kind of violation in a scratch tree and sees it found
+"""
+
+import argparse
+import os
+import re
+import sys
+import tempfile
+
+# module -> the modules that its files may include beside their own
+MODULES = {
+    "kernels": (),
+    "reconstruct": ("kernels",),
+    "stylize": ("kernels",),
+    "evaluate": ("kernels",),
+    "pipeline": ("kernels", "reconstruct", "stylize", "evaluate"),
+    "tests": ("kernels", "reconstruct", "stylize", "evaluate", "pipeline"),
+}
+
+# folder -> its layer within its module: a file includes its own folder and folders of lower layers. A folder is one
+# library, named after it; a program's main file has a row of its own.
+LAYERS = {
+    "kernels/base": 0,
+    "kernels/process": 1,
+    "kernels/device": 1,
+    "kernels/scene": 1,
+    "kernels/optimize": 1,
+    "kernels/network": 1,
+    "kernels/image": 2,
+    "kernels/field": 2,
+    "kernels/synthetic": 2,
+    "kernels/network/cuda": 2,
+    "kernels/field/cpu": 3,
+    "kernels/field/cuda": 3,
+    "reconstruct/scene": 0,
+    "reconstruct/colmap": 1,
+    "reconstruct/fit": 1,
+    "reconstruct/refinement": 2,
+    "stylize": 0,
+    "stylize/image": 1,
+    "stylize/field": 1,
+    "stylize/cuda": 2,
+    "stylize/training": 3,
+    "evaluate": 0,
+    "pipeline/files": 0,
+    "pipeline/fields": 1,
+    "pipeline/program": 1,
+    "pipeline/images": 1,
+    "pipeline/workspace": 2,
+    "pipeline/capture": 3,
+    "pipeline/report": 3,
+    "pipeline/run": 4,
+    "pipeline/synth": 4,
+    "pipeline/gpu": 4,
+    "pipeline/stages": 5,
+    "pipeline/tradeoff": 6,
+    "pipeline": 6,
+    "pipeline/commands": 7,
+    "pipeline/main.cc": 8,
+}
+
+# library, how its headers look, and the files that may include it (regular expressions of paths).
+# Tests may include any library: they hold our code against it.
+ANY_MODULE_SOURCE = r"(reconstruct|stylize|evaluate)/.*\.(cc|cu)"
+ALLOWED = (
+    ("OpenCV", r"opencv2/",
+     (r"evaluate/(optical_flow|pair_network)\.cc", r"stylize/image/onnx_network\.cc",
+      r"pipeline/images/(video_writer|draw_text)\.cc")),
+    ("OpenImageIO", r"OpenImageIO/", (r"pipeline/images/image_file\.cc",)),
+    ("libjpeg-turbo", r"(jpeglib|jerror|jmorecfg|turbojpeg)\.h", (r"pipeline/images/jpeg_decoder\.cc",)),
+    ("libpng", r"(png|pngconf|pnglibconf)\.h", (r"pipeline/images/png_decoder\.cc",)),
+    ("Ceres", r"(ceres|glog)/", (r"reconstruct/refinement/(exposure|refine_poses)\.cc",)),
+    ("Boost", r"boost/", (r"pipeline/program/option_binding\.cc",)),
+    ("nlohmann-json", r"nlohmann/", (r"pipeline/files/[^/]*\.cc",)),
+    ("libzip", r"(zip|zipconf|zlib)\.h", (r"pipeline/files/[^/]*\.cc",)),
+    ("spdlog", r"(spdlog|fmt)/", (r"pipeline/program/console\.cc",)),
+    ("Eigen", r"(Eigen|unsupported/Eigen)/", (ANY_MODULE_SOURCE, r"kernels/image/color_statistics\.cc")),
+    ("CUDA", r"(cuda|cub/|thrust/|cooperative_groups|mma\.h|nvtx|curand|cublas)",
+     (r"kernels/device/.*", r"kernels/.*/cuda/.*", r"stylize/cuda/.*")),
+    ("OpenMP", r"omp\.h", (r".*\.(cc|cu)", r"kernels/.*")),
+    ("vector intrinsics", r"(immintrin|x86intrin)\.h", (r"kernels/.*",)),
+    ("GoogleTest", r"(gtest|gmock)/", ()),
+    ("Google Benchmark", r"benchmark/", ()),
+)
+
+# Standard C++ headers have no dot; these are C's and POSIX's (the latter in sources only).
+C_HEADERS = re.compile(r"(assert|errno|limits|math|signal|stddef|stdint|stdio|stdlib|string|time)\.h")
+POSIX_HEADERS = re.compile(
+    r"(sys|netinet|arpa)/[a-z_]+\.h|"
+    r"(dirent|dlfcn|fcntl|fnmatch|glob|langinfo|locale|poll|pthread|sched|spawn|strings|termios|unistd|wait)\.h")
+
+# Words that do not appear in code, with the reason a reader gets.
+FORBIDDEN = (
+    # system() takes one argument; a matrix of that name takes two.
+    (r"(?<![\w.>])(?:std\s*::\s*|::\s*)?system\s*\((?![^()]*,)", "system(): programs are started without a shell"),
+    (r"(?<![\w.>])(?:std\s*::\s*|::\s*)?popen\s*\(", "popen(): programs are started without a shell"),
+    (r"\bcomputeDirect\b", "computeDirect: a residual of 1e-8 where compute() has 3e-15"),
+    (r"/\s*\(\s*1(?:\.0*)?f?\s*-\s*alpha\b", "division by 1 - alpha: 0/0 at opaque samples"),
+)
+FORBIDDEN_FLAGS = (
+    (r"-ffast-math|-Ofast|-funsafe-math-optimizations|-ffinite-math-only|use_fast_math",
+     "fast math: it deletes the tests for NaN"),
+)
+
+SOURCE_SUFFIXES = (".h", ".cuh", ".cc", ".cu")
+FLAG_FILES = re.compile(r"(CMakeLists\.txt|.*\.cmake|CMakePresets\.json)$")
+MAX_LINES, MANY_LINES = 400, 300
+# Bodies of fast paths, included once for each instruction set under another name.
+COMPILED_OFTEN = "_simd.h"
+
+INCLUDE = re.compile(r'^\s*#\s*include\s*(<([^>]+)>|"([^"]+)")', re.M)
+# A comment, a string or a character: what the forbidden words are not looked for in.
+NOT_CODE = re.compile(r'//[^\n]*|/\*.*?\*/|R"([^(\s]*)\(.*?\)\1"|"(?:\\.|[^"\\\n])*"|(?<!\w)\'(?:\\.|[^\'\\\n])+\'',
+                      re.S)
+
+
+def code_only(text):
+    """The text with comments and strings blanked out; line numbers stay."""
+    return NOT_CODE.sub(lambda m: re.sub(r"[^\n]", " ", m.group(0)), text)
+
+
+def line_of(text, offset):
+    return text.count("\n", 0, offset) + 1
+
+
+def row_of(path, layers):
+    """The row of the table that speaks for a file: its own, or its folder's; None where there is none."""
+    for row in (path, os.path.dirname(path)):
+        if row in layers:
+            return row
+    return None
+
+
+def check_arrow(source, target, layers):
+    """The complaint about a row that uses another one, or None."""
+    module, other = source.split("/")[0], target.split("/")[0]
+    if module != other:
+        return None if other in MODULES[module] else f"{module} may not use {other}"
+    if source != target and layers[source] <= layers[target]:
+        return f"{source} (layer {layers[source]}) may not use {target} (layer {layers[target]}): not below it"
+    return None
+
+
+def check_own_include(root, path, target, layers):
+    """The complaint about a quoted include, or None."""
+    if not os.path.isfile(os.path.join(root, target)):
+        return f'"{target}": no such file; includes start at the root of the tree'
+    if path.startswith("tests/"):
+        return None
+    source, row = row_of(path, layers), row_of(target, layers)
+    if target.startswith("tests/"):
+        return f'"{target}": tests are used by tests only'
+    complaint = check_arrow(source, row, layers) if source and row else None
+    return f'"{target}": {complaint}' if complaint else None
+
+
+def circle_in(arrows):
+    """[a, b, ..., a] where a uses b and so on, of {user: set of used}; None where there is no circle."""
+    done = set()
+
+    def walk(node, path):
+        if node in path:
+            return path[path.index(node):] + [node]
+        if node in done:
+            return None
+        for used in sorted(arrows.get(node, ())):
+            circle = walk(used, path + [node])
+            if circle:
+                return circle
+        done.add(node)
+        return None
+
+    return next(filter(None, (walk(node, []) for node in sorted(arrows))), None)
+
+
+def check_circles(includes, layers):
+    """Findings of {path: includes of our own}: files, or folders, that include each other in a circle."""
+    files, folders = {}, {}
+    for path, targets in includes.items():
+        files[path] = set(targets)
+        for target in targets:
+            source, row = row_of(path, layers), row_of(target, layers)
+            if source and row and source != row:
+                folders.setdefault(source, set()).add(row)
+    return [(circle[0], 1, f"a circle of {what}: {' -> '.join(circle)}")
+            for what, circle in (("files", circle_in(files)), ("folders", circle_in(folders))) if circle]
+
+
+def check_library(root, row, layers):
+    """Findings of a row's CMakeLists.txt: what lives there, one library named after the folder, layers below it."""
+    path = row + "/CMakeLists.txt"
+    if not os.path.isfile(os.path.join(root, path)):
+        return [(path, 1, "missing: a folder is a library")]
+    with open(os.path.join(root, path), encoding="utf-8") as file:
+        text = file.read()
+    findings = []
+    if not text.startswith("# "):
+        findings.append((path, 1, "a folder opens with a comment that says what lives there"))
+    name = row.replace("/", "_")
+    libraries = re.findall(r"^\s*regrade_library\((\w+)", text, re.M)
+    if libraries != [name]:
+        findings.append((path, 1, f"one library, {name}, not {', '.join(libraries) or 'none'}"))
+    row_of_library = {folder.replace("/", "_"): folder for folder in layers}
+    for call in re.finditer(r"(?:regrade_library|target_link_libraries)\(" + name + r"\s([^)]*)\)", text):
+        links = call.group(1).split("LINK", 1)[-1] if "SOURCES" in call.group(1) else call.group(1)
+        for used in (row_of_library.get(word) for word in links.split()):
+            complaint = check_arrow(row, used, layers) if used else None
+            if complaint:
+                findings.append((path, line_of(text, call.start()), complaint))
+    return findings
+
+
+def check_foreign_include(path, target):
+    """The complaint about an include in angle brackets, or None."""
+    if re.fullmatch(r"[a-z0-9_]+", target) or C_HEADERS.fullmatch(target):
+        return None
+    is_header = path.endswith((".h", ".cuh"))
+    if POSIX_HEADERS.fullmatch(target):
+        return f"<{target}>: public headers show our own types only" if is_header else None
+    for library, pattern, allowed in ALLOWED:
+        if not re.match(pattern, target):
+            continue
+        if path.startswith("tests/"):
+            return None
+        if not any(re.fullmatch(file, path) for file in allowed):
+            where = f" (only in {', '.join(allowed)})" if allowed else ""
+            return f"<{target}>: {library} is not allowed here{where}"
+        if is_header and not path.startswith("kernels/"):
+            return f"<{target}>: public headers show our own types only"
+        return None
+    return f"<{target}>: unknown library; add it to ALLOWED in {os.path.basename(__file__)}"
+
+
+def check_source(root, path, text, layers):
+    findings = []
+    if not path.startswith("tests/") and not row_of(path, layers):
+        findings.append((1, f"{os.path.dirname(path)} has no row in LAYERS of {os.path.basename(__file__)}"))
+    for match in INCLUDE.finditer(text):
+        foreign, own = match.group(2), match.group(3)
+        complaint = check_own_include(root, path, own, layers) if own else check_foreign_include(path, foreign)
+        if complaint:
+            findings.append((line_of(text, match.start()), complaint))
+    code = code_only(text)
+    for pattern, reason in FORBIDDEN:
+        findings += [(line_of(code, m.start()), reason) for m in re.finditer(pattern, code)]
+    if path.endswith((".h", ".cuh")):
+        if not re.search(r"^#pragma once$", text, re.M) and not path.endswith(COMPILED_OFTEN):
+            findings.append((1, "no #pragma once"))
+        if not text.startswith(("//", "/*")):
+            findings.append((1, "a header opens with a sentence that says what it is"))
+    return findings
+
+
+def files_to_check(root):
+    """Paths below the root, with / in them: our sources, and what carries compiler flags."""
+    for folder, subfolders, names in os.walk(root):
+        relative = os.path.relpath(folder, root).replace(os.sep, "/")
+        relative = "" if relative == "." else relative + "/"
+        if not relative:
+            subfolders[:] = [s for s in subfolders if s in (*MODULES, "cmake")]
+        subfolders.sort()
+        for name in sorted(names):
+            if name.endswith(SOURCE_SUFFIXES) or FLAG_FILES.match(name):
+                yield relative + name
+
+
+def check_tree(root, layers):
+    """(findings, remarks), each a list of (path, line, text)."""
+    findings, remarks, includes = [], [], {}
+    for path in files_to_check(root):
+        with open(os.path.join(root, path), encoding="utf-8", errors="replace") as file:
+            text = file.read()
+        lines = text.count("\n")
+        if FLAG_FILES.match(path.rsplit("/", 1)[-1]):
+            without_comments = re.sub(r"#[^\n]*", "", text)
+            for pattern, reason in FORBIDDEN_FLAGS:
+                findings += [(path, line_of(without_comments, m.start()), reason)
+                             for m in re.finditer(pattern, without_comments)]
+            continue
+        findings += [(path, line, complaint) for line, complaint in check_source(root, path, text, layers)]
+        includes[path] = [own for _, _, own in INCLUDE.findall(text) if own]
+        if lines > MAX_LINES:
+            findings.append((path, lines, f"{lines} lines: above {MAX_LINES}, look for the second idea"))
+        elif lines > MANY_LINES:
+            remarks.append((path, lines, f"{lines} lines: above {MANY_LINES}"))
+    findings += check_circles(includes, layers)
+    for row in layers:
+        if not row.endswith(".cc"):
+            findings += check_library(root, row, layers)
+        elif not os.path.isfile(os.path.join(root, row)):
+            findings.append((row, 1, "no such file, but a row in the table of layers"))
+    return findings, remarks
+
+
+def self_test():
+    """Plants one violation at a time in a tidy tree; each must be found, and the tidy tree be clean."""
+    tidy = {
+        "kernels/base/vec.h": "// Vectors.\n#pragma once\n#include <cmath>\n",
+        "kernels/scene/camera.h": '// Cameras.\n#pragma once\n#include "kernels/base/vec.h"\n',
+        "kernels/field/grid.h": '// A grid.\n#pragma once\n#include "kernels/scene/camera.h"\n',
+        "reconstruct/colmap/model.h": '// A model.\n#pragma once\n#include "kernels/scene/camera.h"\n',
+        "reconstruct/fit/fit.h": '// Fits.\n#pragma once\n#include "kernels/field/grid.h"\n',
+        "reconstruct/refinement/exposure.cc": '#include <ceres/ceres.h>\n#include <Eigen/Core>\n'
+                                              '#include "reconstruct/colmap/model.h"\n',
+        "stylize/image/style.h": '// Styles; no system() here.\n#pragma once\n#include "kernels/base/vec.h"\n',
+        "stylize/field/loss.h": '// A loss.\n#pragma once\n#include "kernels/field/grid.h"\n',
+        "stylize/cuda/loss.cu": '#include <cuda_runtime.h>\n#include "stylize/field/loss.h"\n',
+        "evaluate/optical_flow.cc": "#include <opencv2/video.hpp>\n#include <unistd.h>\n",
+        "pipeline/files/json.h": "// JSON.\n#pragma once\n",
+        "pipeline/capture/store.h": '// Stores.\n#pragma once\n#include "pipeline/files/json.h"\n',
+        "pipeline/report/page.h": '// A page.\n#pragma once\n#include "pipeline/files/json.h"\n',
+        "pipeline/run/settings.h": '// Settings.\n#pragma once\n#include "pipeline/capture/store.h"\n',
+        "pipeline/commands/command.h": '// Commands.\n#pragma once\n#include "pipeline/run/settings.h"\n',
+        "pipeline/main.cc": '#include "pipeline/commands/command.h"\n#include "stylize/image/style.h"\n'
+                            'const char* k = "system(";  // popen( in a comment\n'
+                            "int n = ecosystem(1) + a.system(2) + system(i, j) + 1\'000;\n",
+        "tests/kernels/vec_test.cc": '#include <gtest/gtest.h>\n#include "kernels/base/vec.h"\n',
+        "CMakeLists.txt": "# -ffast-math is forbidden\nproject(x)\n",
+    }
+    layers = {row: layer for row, layer in LAYERS.items() if any(row_of(path, LAYERS) == row for path in tidy)}
+    for row in layers:
+        if not row.endswith(".cc"):
+            name = row.replace("/", "_")
+            tidy[row + "/CMakeLists.txt"] = f"# What lives here.\nregrade_library({name}\n  SOURCES a.cc)\n"
+
+    def header(include):
+        return f'// A.\n#pragma once\n#include "{include}"\n'
+
+    def library(name, rest):
+        return f"# What lives here.\nregrade_library({name}\n  SOURCES a.cc{rest}\n"
+
+    run_library = "pipeline/run/CMakeLists.txt"
+
+    planted = (
+        # Layers: between modules, between folders of a module, and circles.
+        ("kernels/base/a.h", header("kernels/scene/camera.h"), "not below it"),
+        ("kernels/scene/a.h", header("kernels/field/grid.h"), "not below it"),
+        ("kernels/field/a.cc", '#include "reconstruct/fit/fit.h"\n', "kernels may not use reconstruct"),
+        ("reconstruct/fit/a.cc", '#include "stylize/image/style.h"\n', "reconstruct may not use stylize"),
+        ("stylize/image/a.cc", '  #  include "reconstruct/fit/fit.h"\n', "stylize may not use reconstruct"),
+        ("evaluate/a.cc", '#include "stylize/image/style.h"\n', "evaluate may not use stylize"),
+        ("evaluate/a.cc", '#include "pipeline/files/json.h"\n', "evaluate may not use pipeline"),
+        ("reconstruct/fit/a.h", header("reconstruct/colmap/model.h"), "not below it"),
+        ("stylize/image/a.cc", '#include "stylize/field/loss.h"\n', "not below it"),
+        ("pipeline/files/a.h", header("pipeline/commands/command.h"), "not below it"),
+        ("pipeline/capture/a.cc", '#include "pipeline/run/settings.h"\n', "not below it"),
+        ("pipeline/capture/a.cc", '#include "pipeline/report/page.h"\n', "not below it"),
+        ("pipeline/capture/store.h", header("pipeline/run/settings.h"), "a circle of files"),
+        ("pipeline/capture/a.h", header("pipeline/run/settings.h"), "a circle of folders"),
+        ("stylize/field/loss.h", header("stylize/field/loss.h"), "a circle of files"),
+        ("kernels/base/a.h", header("tests/kernels/vec_test.cc"), "by tests only"),
+        ("stylize/image/a.cc", '#include "style.h"\n', "no such file"),
+        # Folders and their libraries.
+        ("pipeline/odd/a.cc", "int x;\n", "has no row"),
+        ("pipeline/a.cc", "int x;\n", "has no row"),
+        (run_library, "regrade_library(pipeline_run SOURCES a.cc)\n", "opens with a comment"),
+        (run_library, library("pipeline", ")"), "one library, pipeline_run"),
+        (run_library, library("pipeline_run", ")\nregrade_library(other SOURCES b.cc)"), "one library"),
+        (run_library, library("pipeline_run", "\n  LINK kernels_base pipeline_commands)"), "not below"),
+        ("stylize/field/CMakeLists.txt", library("stylize_field", "\n  LINK reconstruct_fit)"), "stylize may not use"),
+        ("kernels/base/CMakeLists.txt",
+         library("kernels_base", ")\ntarget_link_libraries(kernels_base PRIVATE kernels_scene)"), "not below it"),
+        # Third-party libraries.
+        ("evaluate/a.cc", "#include <opencv2/core.hpp>\n", "OpenCV is not allowed"),
+        ("pipeline/files/a.cc", "#include <OpenImageIO/imageio.h>\n", "OpenImageIO is not allowed"),
+        ("pipeline/files/a.cc", "#include <jpeglib.h>\n", "libjpeg-turbo is not allowed"),
+        ("reconstruct/fit/a.cc", "#include <ceres/ceres.h>\n", "Ceres is not allowed"),
+        ("pipeline/run/a.cc", "#include <boost/program_options.hpp>\n", "Boost is not allowed"),
+        ("pipeline/run/a.cc", "#include <nlohmann/json.hpp>\n", "nlohmann-json is not allowed"),
+        ("pipeline/run/a.cc", "#include <zip.h>\n", "libzip is not allowed"),
+        ("pipeline/run/a.cc", "#include <spdlog/spdlog.h>\n", "spdlog is not allowed"),
+        ("pipeline/run/a.cc", "#include <Eigen/Core>\n", "Eigen is not allowed"),
+        ("stylize/field/a.cc", "#include <cuda_runtime.h>\n", "CUDA is not allowed"),
+        ("kernels/field/a.cc", "#include <cuda_runtime.h>\n", "CUDA is not allowed"),
+        ("reconstruct/fit/a.h", "// A.\n#pragma once\n#include <Eigen/Core>\n", "Eigen is not allowed"),
+        ("pipeline/files/a.h", "// A.\n#pragma once\n#include <nlohmann/json.hpp>\n", "is not allowed"),
+        ("pipeline/run/a.h", "// A.\n#pragma once\n#include <unistd.h>\n", "own types"),
+        ("pipeline/run/a.cc", "#include <curl/curl.h>\n", "unknown library"),
+        # Words.
+        ("pipeline/run/a.cc", 'void F() { std::system("ls"); }\n', "system()"),
+        ("pipeline/run/a.cc", "int n = ::system(Join(a, b));\n", "system()"),
+        ("pipeline/run/a.cc", 'auto f = popen("ls", "r");\n', "popen()"),
+        ("kernels/field/a.cc", "solver.computeDirect(m);\n", "computeDirect"),
+        ("kernels/field/a.cc", "float g = w / (1.f - alpha);\n", "1 - alpha"),
+        ("kernels/field/a.h", "// A.\nint F();\n", "#pragma once"),
+        ("kernels/field/a.h", "#pragma once\nint F();\n", "opens with a sentence"),
+        ("kernels/field/a.cc", "int x;\n" * (MAX_LINES + 1), "second idea"),
+        ("cmake/CMakeLists.txt", "add_compile_options(-O3 -ffast-math)\n", "fast math"),
+        ("cmake/a.cmake", "add_compile_options(-Ofast)\n", "fast math"),
+    )
+    failures = 0
+
+    def findings_with(extra):
+        with tempfile.TemporaryDirectory() as root:
+            for path, text in {**tidy, **extra}.items():
+                if text is not None:
+                    os.makedirs(os.path.dirname(os.path.join(root, path)) or root, exist_ok=True)
+                    with open(os.path.join(root, path), "w", encoding="utf-8") as file:
+                        file.write(text)
+            return check_tree(root, layers)[0]
+
+    def expect(path, text, expected):
+        found = findings_with({path: text})
+        # An upward include that closes a circle is found as both.
+        others = [what for where, _, what in found if not (where == path and expected in what)]
+        if "circle" in expected:
+            found_it = any(expected in what for _, _, what in found)
+        else:
+            found_it = len(others) < len(found) and not [what for what in others if "a circle of folders" not in what]
+        if not found_it:
+            print(f"self-test: expected one finding '{expected}' in {path}, got {found}")
+        return 0 if found_it else 1
+
+    for finding in findings_with({}):
+        failures += 1
+        print("self-test: a tidy tree is blamed:", *finding)
+    failures += sum(expect(*violation) for violation in planted)
+    failures += expect(run_library, None, "missing: a folder is a library")
+    failures += expect("pipeline/main.cc", None, "no such file, but a row")
+    print(f"self-test: {len(planted) + 2} planted violations, {failures} failures")
+    return failures
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--root", default=os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+    parser.add_argument("--self-test", action="store_true")
+    arguments = parser.parse_args()
+    if arguments.self_test:
+        return 1 if self_test() else 0
+    findings, remarks = check_tree(arguments.root, LAYERS)
+    for path, line, text in remarks:
+        print(f"{path}:{line}: remark: {text}")
+    for path, line, text in findings:
+        print(f"{path}:{line}: {text}")
+    print(f"check_layers: {len(findings)} findings")
+    return 1 if findings else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,195 @@
+// Colours of rays blended from rows of the points that they touch, and the adjoint; a warp a
+// sample.
+#include "kernels/device/device_stream.h"
+#include "kernels/field/cuda/launch.h"
+#include "kernels/field/cuda/warp_shade.h"
+#include "stylize/cuda/device_ray_weights.h"
+#include "stylize/cuda/warp_item.h"
+#include "stylize/field/view_penalty.h"
+
+namespace regrade {
+
+#if defined(__CUDACC__)
+
+namespace {
+
+// The point at corner k < 8 of a sample's cell, or -1; see CornerPoints.
+__device__ int32_t CornerPoint(const DeviceGridView& grid, const DeviceWeightedSample& sample,
+                               int k) {
+  if (sample.vertex >= 0)
+    return grid.links[sample.vertex + GridSpace(grid).Steps(sample.vertex).To(k)];
+  if (k & 1) return -1;
+  const int r = grid.spheres.resolution, texel = ~sample.vertex;
+  const int layer = texel % grid.spheres.layers, at = texel / grid.spheres.layers;
+  const int x = at / r, y = at % r;
+  const int east = k & 4 ? (x + 1 < 2 * r ? x + 1 : 0) : x;
+  const int south = k & 2 ? min(y + 1, r - 1) : y;
+  const int32_t column = grid.spheres.links[int64_t{east} * r + south];
+  return column < 0 ? -1 : grid.first_texel() + column * grid.spheres.layers + layer;
+}
+
+// What a warp knows of its sample: lane c * 9 + k stands for coefficient k of channel c, lane j
+// < 8 for corner j.
+struct WarpSample {
+  DeviceWeightedSample sample;
+  int lane;
+  int32_t slot;  // of this lane's corner; -1 where nothing is stored
+  float corner;  // its trilinear weight
+  float gamma;   // this lane's basis function along the ray, 0 beyond the field's own
+
+  __device__ WarpSample(const DeviceGridView& grid, int basis, const DeviceWeightedSample& s,
+                        const int32_t* slot_of_point, const Ray* rays)
+      : sample(s), lane(static_cast<int>(threadIdx.x & 31)), slot(-1), corner(0), gamma(0) {
+    if (lane < 8) {
+      const int32_t point = CornerPoint(grid, sample, lane);
+      if (point >= 0) slot = slot_of_point[point];
+      corner = CornerWeight(sample.fraction, lane);
+    }
+    if (rays == nullptr) return;
+    if (sample.vertex < 0) basis = 1;  // background spheres have plain colours
+    float all[kMaxBasis];
+    ShBasis(kMaxBasis, rays[sample.ray].direction, all);
+#pragma unroll
+    for (int k = 0; k < kMaxBasis; ++k)
+      if (lane < 27 && lane % 9 == k && k < basis) gamma = all[k];
+  }
+
+  // This lane's value of the blended row.
+  __device__ float Blend(const float* rows) const {
+    float value = 0;
+#pragma unroll
+    for (int k = 0; k < 8; ++k) {
+      const int32_t at = __shfl_sync(kAllLanes, slot, k);
+      const float w = __shfl_sync(kAllLanes, corner, k);
+      if (at >= 0) value += w * rows[int64_t{at} * kRowLanes + lane];
+    }
+    return value;
+  }
+};
+
+// Value c * 9 + k in lane order; sums of a channel's nine lanes land on its first one.
+__device__ float ChannelSums(float value, int lane) {
+  const float ninth = __shfl_down_sync(kAllLanes, value, 8);
+  if (lane % 9 == 0) value += ninth;
+  value += __shfl_down_sync(kAllLanes, value, 4);
+  value += __shfl_down_sync(kAllLanes, value, 2);
+  return value + __shfl_down_sync(kAllLanes, value, 1);
+}
+
+__global__ void BeginColorsKernel(Vec3f background, const float* transmittance, int64_t n,
+                                  Vec3f* color) {
+  const int64_t r = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
+  if (r < n) color[r] = background * transmittance[r];
+}
+
+__global__ void BlendColorsKernel(DeviceGridView grid, int basis,
+                                  const DeviceWeightedSample* samples, int64_t n,
+                                  const int32_t* counted, const int32_t* slot_of_point,
+                                  const Ray* rays, const float* rows, Vec3f* color,
+                                  uint8_t* open) {
+  const int64_t i = ItemOfWarp(n, counted);
+  if (i < 0) return;
+  const WarpSample warp(grid, basis, samples[i], slot_of_point, rays);
+  const float sum = ChannelSums(warp.Blend(rows) * warp.gamma, warp.lane);
+  const float value = 0.5f + sum;  // of a channel on its first lane
+  const bool first = warp.lane < 27 && warp.lane % 9 == 0;
+  if (first && value > 0)
+    atomicAdd(&color[warp.sample.ray][warp.lane / 9], warp.sample.weight * value);
+  const unsigned above = __ballot_sync(kAllLanes, first && value > 0);
+  if (warp.lane == 0)
+    open[i] =
+        static_cast<uint8_t>((above & 1) | (above >> 9 & 1) << 1 | (above >> 18 & 1) << 2);
+}
+
+__global__ void BlendColorsAdjointKernel(DeviceGridView grid, int basis,
+                                         const DeviceWeightedSample* samples, int64_t n,
+                                         const int32_t* counted, const int32_t* slot_of_point,
+                                         const Ray* rays, const uint8_t* open,
+                                         const Vec3f* d_color, float* d_rows) {
+  const int64_t i = ItemOfWarp(n, counted);
+  if (i < 0) return;
+  const unsigned bits = open[i];
+  if (bits == 0) return;
+  const Vec3f d = d_color[samples[i].ray];
+  if (d.x == 0 && d.y == 0 && d.z == 0) return;
+  const WarpSample warp(grid, basis, samples[i], slot_of_point, rays);
+  const bool is_mass = warp.lane >= kMassLane && warp.lane < kMassLane + 3;
+  const int c = is_mass ? warp.lane - kMassLane : warp.lane / 9;
+  float d_blend = 0;
+  if (c < 3 && (bits >> c & 1) != 0)
+    d_blend = warp.sample.weight *
+              (is_mass ? static_cast<float>(warp.sample.vertex >= 0) : d[c] * warp.gamma);
+#pragma unroll
+  for (int k = 0; k < 8; ++k) {
+    const int32_t at = __shfl_sync(kAllLanes, warp.slot, k);
+    const float w = __shfl_sync(kAllLanes, warp.corner, k);
+    if (at >= 0 && d_blend != 0)
+      atomicAdd(&d_rows[int64_t{at} * kRowLanes + warp.lane], w * d_blend);
+  }
+}
+
+__global__ void BlendRowsKernel(DeviceGridView grid, const DeviceWeightedSample* samples,
+                                int64_t n, const int32_t* counted, const int32_t* slot_of_point,
+                                const float* rows, float* sums) {
+  const int64_t i = ItemOfWarp(n, counted);
+  if (i < 0) return;
+  const WarpSample warp(grid, 1, samples[i], slot_of_point, nullptr);
+  atomicAdd(&sums[int64_t{warp.sample.ray} * kRowLanes + warp.lane],
+            warp.sample.weight * warp.Blend(rows));
+}
+
+}  // namespace
+
+void BlendColors(const DeviceGrid& grid, const DeviceRayWeights& weights,
+                 const DeviceSlots& slots, const Ray* rays, const float* rows, Vec3f* color,
+                 uint8_t* open) {
+  if (weights.num_rays == 0) return;
+  BeginColorsKernel<<<BlocksFor(weights.num_rays), kThreads, 0, LaunchStream()>>>(
+      grid.background, weights.transmittance.data(), weights.num_rays, color);
+  CheckLaunch("begin_colors");
+  if (weights.num_samples == 0) return;
+  BlendColorsKernel<<<BlocksFor(32 * weights.num_samples), kThreads, 0, LaunchStream()>>>(
+      grid.view(), grid.basis, weights.samples.data(), weights.num_samples,
+      weights.counter.data(), slots.slot_of_point.data(), rays, rows, color, open);
+  CheckLaunch("blend_colors");
+}
+
+void BlendColorsAdjoint(const DeviceGrid& grid, const DeviceRayWeights& weights,
+                        const DeviceSlots& slots, const Ray* rays, const uint8_t* open,
+                        const Vec3f* d_color, float* d_rows) {
+  if (weights.num_samples == 0) return;
+  BlendColorsAdjointKernel<<<BlocksFor(32 * weights.num_samples), kThreads, 0,
+                             LaunchStream()>>>(
+      grid.view(), grid.basis, weights.samples.data(), weights.num_samples,
+      weights.counter.data(), slots.slot_of_point.data(), rays, open, d_color, d_rows);
+  CheckLaunch("blend_colors_adjoint");
+}
+
+void BlendRows(const DeviceGrid& grid, const DeviceRayWeights& weights,
+               const DeviceSlots& slots, const float* rows, float* sums) {
+  DeviceZero(sums, weights.num_rays * kRowLanes * int64_t{sizeof(float)});
+  if (weights.num_samples == 0) return;
+  BlendRowsKernel<<<BlocksFor(32 * weights.num_samples), kThreads, 0, LaunchStream()>>>(
+      grid.view(), weights.samples.data(), weights.num_samples, weights.counter.data(),
+      slots.slot_of_point.data(), rows, sums);
+  CheckLaunch("blend_rows");
+}
+
+#else
+
+void BlendColors(const DeviceGrid&, const DeviceRayWeights&, const DeviceSlots&, const Ray*,
+                 const float*, Vec3f*, uint8_t*) {
+  DeviceWait("blend_colors");
+}
+void BlendColorsAdjoint(const DeviceGrid&, const DeviceRayWeights&, const DeviceSlots&,
+                        const Ray*, const uint8_t*, const Vec3f*, float*) {
+  DeviceWait("blend_colors_adjoint");
+}
+void BlendRows(const DeviceGrid&, const DeviceRayWeights&, const DeviceSlots&, const float*,
+               float*) {
+  DeviceWait("blend_rows");
+}
+
+#endif
+
+}  // namespace regrade

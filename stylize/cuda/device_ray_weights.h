@@ -1,0 +1,77 @@
+// Sample weights of rays on a CUDA device, and colours blended from rows of the voxels that
+// they touch: ray_weights.h and LipRF's second stage there. Samples of many rays lie in one
+// list in no fixed order, each with its ray.
+#pragma once
+
+#include <cstdint>
+
+#include "kernels/field/cuda/device_grid.h"
+#include "kernels/field/cuda/device_rays.h"
+#include "stylize/cuda/device_rows.h"
+
+namespace regrade {
+
+// As WeightedSample.
+struct DeviceWeightedSample {
+  int32_t vertex;  // lowest corner of the cell; negative on a background sphere
+  Vec3f fraction;
+  float weight;
+  int32_t ray;
+};
+
+// The samples of a batch of rays that weigh more than min_weight, and which voxels they touch.
+struct DeviceRayWeights {
+  DeviceBuffer<DeviceWeightedSample> samples;
+  DeviceBuffer<float> transmittance;  // [rays]
+  DeviceBuffer<int32_t> counter;
+  int64_t num_rays = 0, num_samples = 0;
+
+  // Waits for the device, for the number of samples decides what comes next. Marks are added to
+  // `touched` unless it is null.
+  void March(const DeviceGrid& grid, const Ray* rays, int64_t n, const MarchOptions& options,
+             float min_weight, DeviceTouched* touched);
+
+  // The same without waiting, in the room that Reserve has made: num_samples is that room, and
+  // how many samples there are stays in `counter`, which may pass it.
+  void Reserve(int64_t rays, int64_t most_samples);
+  void Launch(const DeviceGrid& grid, const Ray* rays, int64_t n, const MarchOptions& options,
+              float min_weight, DeviceTouched* touched);
+};
+
+// Touched points (see DeviceGridView) in a dense list, near each other where the voxels are.
+struct DeviceSlots {
+  DeviceBuffer<int32_t> slot_of_point;  // only touched points' entries mean anything
+  DeviceBuffer<int32_t> point_of_slot;  // the first num_slots of it
+  DeviceBuffer<int32_t> counter;
+  int64_t num_slots = 0;
+
+  explicit DeviceSlots(const DeviceGrid& grid);
+  void Assign(DeviceTouched* touched);  // and forgets the marks; waits for the device
+  void Launch(DeviceTouched* touched);  // the same without waiting: num_slots is not known
+};
+
+// What a step that the host does not watch asked for, and whether there was room.
+struct DeviceRoom {
+  int32_t samples = 0, slots = 0;
+  int32_t short_of = 0;  // 1 from the first step on that did not fit
+};
+// Behind the two Launch: num_slots becomes `slot_room`. Where samples or slots have no room all
+// of them are dropped, and *room, which lies on the device, says so.
+void LimitToRoom(int64_t slot_room, DeviceRayWeights* weights, DeviceSlots* slots,
+                 DeviceRoom* room);
+
+// The colours of rays whose voxels have the rows of `slots` instead of their own: color [rays]
+// begins with the background and is not clipped at 1. open [samples]: bit c is set where the
+// clamp at 0 left channel c alone.
+void BlendColors(const DeviceGrid& grid, const DeviceRayWeights& weights,
+                 const DeviceSlots& slots, const Ray* rays, const float* rows, Vec3f* color,
+                 uint8_t* open);
+// Its adjoint: adds to d_rows [slots, kRowLanes], the masses of EQ(view-penalty) among them.
+void BlendColorsAdjoint(const DeviceGrid& grid, const DeviceRayWeights& weights,
+                        const DeviceSlots& slots, const Ray* rays, const uint8_t* open,
+                        const Vec3f* d_color, float* d_rows);
+// sums [rays, kRowLanes] = sum_i w_i of the blended rows themselves.
+void BlendRows(const DeviceGrid& grid, const DeviceRayWeights& weights,
+               const DeviceSlots& slots, const float* rows, float* sums);
+
+}  // namespace regrade

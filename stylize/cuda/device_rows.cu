@@ -1,0 +1,162 @@
+#include "kernels/device/device_stream.h"
+#include "kernels/device/launch_size.h"
+#include "kernels/field/background_spheres.h"
+#include "stylize/cuda/device_rows.h"
+#include "stylize/cuda/warp_item.h"
+#include "stylize/field/view_penalty.h"
+
+namespace regrade {
+
+#if defined(__CUDACC__)
+
+namespace {
+
+// A warp a point; see FillFeatures and FillTexelFeatures.
+__global__ void GatherRowsKernel(DeviceGridView grid, int basis, const int32_t* points,
+                                 int64_t first, int64_t n, const int32_t* counted,
+                                 float position_scale, float* rows) {
+  const int64_t i = ItemOfWarp(n, counted);
+  if (i < 0) return;
+  const int lane = static_cast<int>(threadIdx.x & 31);
+  const int64_t voxel = points != nullptr ? points[i] : first + i;
+  float value = 0;
+  if (voxel >= grid.num_voxels) {
+    const DeviceSpheresView& spheres = grid.spheres;
+    const int64_t texel = voxel - grid.first_texel();
+    if (lane < 27 && lane % 9 == 0) {
+      value = spheres.texels[4 * texel + lane / 9];
+    } else if (lane >= 27 && lane < 30) {
+      const int at = spheres.place_of_column[texel / spheres.layers];
+      value =
+          position_scale * TexelDirection<float>(spheres.resolution, at / spheres.resolution,
+                                                 at % spheres.resolution)[lane - 27];
+    }
+  } else if (lane < 27) {
+    if (lane % 9 < basis)
+      value = grid.records[voxel * grid.stride + lane / 9 * basis + lane % 9];
+  } else if (lane < 30) {
+    const Vec3i size = grid.frame.resolution;
+    const int32_t vertex = grid.vertex_of_voxel[voxel];
+    const int index = lane == 27   ? vertex / (size.y * size.z)
+                      : lane == 28 ? vertex / size.z % size.y
+                                   : vertex % size.z;
+    const int length = lane == 27 ? size.x : lane == 28 ? size.y : size.z;
+    value = position_scale *
+            (2 * (static_cast<float>(index) + 0.5f) / static_cast<float>(length) - 1);
+  }
+  rows[i * kRowLanes + lane] = value;
+}
+
+__global__ void AddMappedRowsKernel(Mat3f matrix, Vec3f constant, const float* from, int64_t n,
+                                    const int32_t* counted, float* rows) {
+  const int64_t i = ItemOfWarp(n, counted);
+  if (i < 0) return;
+  const int lane = static_cast<int>(threadIdx.x & 31);
+  if (lane >= 27) return;
+  const int c = lane / 9, k = lane % 9;
+  const float* row = from + i * kRowLanes;
+  float value = k == 0 ? constant[c] : 0.0f;
+  for (int other = 0; other < 3; ++other) value += matrix.row[c][other] * row[other * 9 + k];
+  rows[i * kRowLanes + lane] += value;
+}
+
+__global__ void AddViewPenaltyKernel(Mat3f matrix, const float* from, const float* rows,
+                                     int64_t n, const int32_t* counted, float view_weight,
+                                     float* d_rows, double* loss) {
+  __shared__ float of_warp[kThreads / 32];
+  const int lane = static_cast<int>(threadIdx.x & 31),
+            warp = static_cast<int>(threadIdx.x / 32);
+  const int64_t i = ItemOfWarp(n, counted);
+  float penalty = 0;
+  if (i >= 0) {
+    const float d = d_rows[i * kRowLanes + lane];
+    const int c = lane / 9, k = lane % 9;
+    const float mass = __shfl_sync(~0u, d, kMassLane + (c < 3 ? c : 0));
+    float sum = d;
+    if (c < 3 && k > 0) {
+      const float* row = from + i * kRowLanes;
+      float change = rows[i * kRowLanes + lane];
+      for (int other = 0; other < 3; ++other)
+        change -= matrix.row[c][other] * row[other * 9 + k];
+      const ViewPenalty<float> own = ViewPenaltyOf(mass, change);
+      penalty = own.value;
+      sum += view_weight * own.derivative;
+    }
+    d_rows[i * kRowLanes + lane] = lane < 27 ? sum : 0.0f;
+  }
+  for (int step = 16; step > 0; step /= 2) penalty += __shfl_down_sync(~0u, penalty, step);
+  if (lane == 0) of_warp[warp] = penalty;
+  __syncthreads();
+  if (threadIdx.x > 0) return;
+  double of_block = 0;
+  for (int w = 0; w < kThreads / 32; ++w) of_block += double{of_warp[w]};
+  if (of_block != 0) atomicAdd(loss, double{view_weight} * of_block);
+}
+
+__global__ void ScatterRowsKernel(const float* rows, int64_t first, int64_t n, int basis,
+                                  DeviceGridView grid) {
+  const int64_t i = ItemOfWarp(n, nullptr);
+  if (i < 0) return;
+  const int lane = static_cast<int>(threadIdx.x & 31);
+  const int64_t voxel = first + i;
+  if (lane >= 27) return;
+  const float value = rows[i * kRowLanes + lane];
+  if (voxel < grid.num_voxels) {
+    if (lane % 9 < basis)
+      grid.records[voxel * grid.stride + lane / 9 * basis + lane % 9] = value;
+  } else if (lane % 9 == 0) {
+    grid.spheres.texels[4 * (voxel - grid.first_texel()) + lane / 9] = value;
+  }
+}
+
+}  // namespace
+
+void GatherRows(const DeviceGrid& grid, const int32_t* points, int64_t first, int64_t n,
+                float position_scale, float* rows, const int32_t* counted) {
+  if (n == 0) return;
+  GatherRowsKernel<<<BlocksFor(32 * n), kThreads, 0, LaunchStream()>>>(
+      grid.view(), grid.basis, points, first, n, counted, position_scale, rows);
+  CheckLaunch("gather_rows");
+}
+
+void AddMappedRows(const Mat3f& matrix, const Vec3f& constant, const float* from, int64_t n,
+                   float* rows, const int32_t* counted) {
+  if (n == 0) return;
+  AddMappedRowsKernel<<<BlocksFor(32 * n), kThreads, 0, LaunchStream()>>>(
+      matrix, constant, from, n, counted, rows);
+  CheckLaunch("add_mapped_rows");
+}
+
+void AddViewPenalty(const Mat3f& matrix, const float* from, const float* rows, int64_t n,
+                    float view_weight, float* d_rows, double* loss, const int32_t* counted) {
+  if (n == 0) return;
+  AddViewPenaltyKernel<<<BlocksFor(32 * n), kThreads, 0, LaunchStream()>>>(
+      matrix, from, rows, n, counted, view_weight, d_rows, loss);
+  CheckLaunch("add_view_penalty");
+}
+
+void ScatterRows(const float* rows, int64_t first, int64_t n, DeviceGrid* grid) {
+  if (n == 0) return;
+  ScatterRowsKernel<<<BlocksFor(32 * n), kThreads, 0, LaunchStream()>>>(
+      rows, first, n, grid->basis, grid->view());
+  CheckLaunch("scatter_rows");
+}
+
+#else
+
+void GatherRows(const DeviceGrid&, const int32_t*, int64_t, int64_t, float, float*,
+                const int32_t*) {
+  DeviceWait("gather_rows");
+}
+void AddMappedRows(const Mat3f&, const Vec3f&, const float*, int64_t, float*, const int32_t*) {
+  DeviceWait("add_mapped_rows");
+}
+void AddViewPenalty(const Mat3f&, const float*, const float*, int64_t, float, float*, double*,
+                    const int32_t*) {
+  DeviceWait("add_view_penalty");
+}
+void ScatterRows(const float*, int64_t, int64_t, DeviceGrid*) { DeviceWait("scatter_rows"); }
+
+#endif
+
+}  // namespace regrade

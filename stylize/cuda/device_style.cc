@@ -1,0 +1,232 @@
+#include "stylize/cuda/device_style.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "kernels/base/error.h"
+#include "kernels/network/cuda/device_mlp.h"
+#include "stylize/cuda/device_color_loss.h"
+#include "stylize/cuda/device_ray_weights.h"
+#include "stylize/field/base_map.h"
+
+namespace regrade {
+namespace {
+
+static_assert(kRowLanes == kFeatureStride && kRowLanes == kMlpEndLanes);
+
+constexpr int64_t kBandRays = 1 << 16;
+
+void AddBaseMap(const LipschitzNetworkData& data, const float* features, int64_t n,
+                float* rows) {
+  if (!data.has_base) return;
+  const RowMap map = RowMapOf(data.base);
+  AddMappedRows(map.matrix, map.constant, features, n, rows);
+}
+
+// Grown, never shrunk: what one step needed the next one needs about as much of.
+template <typename T>
+void Reserve(int64_t size, const char* what, DeviceBuffer<T>* buffer) {
+  if (buffer->size() >= size) return;
+  *buffer = {};
+  *buffer = DeviceBuffer<T>(size + size / 4, what);
+}
+
+class DeviceStyleLoss : public StyleLoss {
+ public:
+  DeviceStyleLoss(const DeviceGrid* grid, const AggregationOptions& options)
+      : grid_(*grid),
+        options_(options),
+        touched_(*grid),
+        slots_(*grid),
+        sums_(1, "sums of a loss") {
+    REGRADE_CHECK(!grid->fitting);
+    sums_.Zero();
+  }
+
+  AggregationResult Run(const LipschitzNetwork& network, const StyleRays& batch,
+                        std::vector<double>* gradient) override {
+    const DeviceRange range("loss of a step of the style");
+    AggregationResult result = Touch(network, batch);
+    const MlpPrecision precision =
+        gradient != nullptr ? MlpPrecision::kTensor : MlpPrecision::kSplit;
+    Forward(network.Effective<float>(), precision);
+    AddBaseMap(network.data(), features_.data(), slots_.num_slots, rows_.data());
+    if (gradient != nullptr) {
+      Reserve(slots_.num_slots * kRowLanes, "gradients of styled voxels", &d_rows_);
+      DeviceZero(d_rows_.data(), slots_.num_slots * kRowLanes * int64_t{sizeof(float)});
+    }
+    sums_.Zero();
+    ForEachBand([&](int64_t begin, int64_t) {
+      BlendBand(begin);
+      if (gradient != nullptr)
+        BlendColorsAdjoint(grid_, weights_, slots_, rays_.data() + begin, open_.data(),
+                           d_color_.data(), d_rows_.data());
+    });
+    if (gradient != nullptr) {
+      AddViewPenalty(BaseOf(network.data()).matrix, features_.data(), rows_.data(),
+                     slots_.num_slots, static_cast<float>(options_.view_weight), d_rows_.data(),
+                     &sums_.data()->loss);
+    }
+    DeviceColorLoss sums;
+    sums_.CopyOut(&sums, 1);
+    result.rays = static_cast<int64_t>(sums.rays);
+    result.squared_error = sums.squared_error;
+    if (result.rays == 0) return result;
+    const double count = options_.divide_by_voxels ? static_cast<double>(grid_.num_voxels())
+                                                   : 3.0 * static_cast<double>(result.rays);
+    result.loss = sums.loss / count;
+    if (gradient == nullptr) return result;
+    mlp_->AddAdjoint(precision, features_.data(), d_rows_.data(), slots_.num_slots);
+    DenseNetwork<double> d_effective;
+    for (int l = 0; l < kNetworkLayers; ++l)
+      d_effective.layers.emplace_back(LipschitzNetwork::Outputs(l),
+                                      LipschitzNetwork::Inputs(l));
+    mlp_->TakeGradient(&d_effective);
+    std::vector<double> sum(gradient->size());
+    network.AddGradient(d_effective, &sum);
+    for (size_t i = 0; i < sum.size(); ++i) (*gradient)[i] += sum[i] / count;
+    return result;
+  }
+
+  HiddenSums SumHidden(const LipschitzNetwork& network, const StyleRays& batch) override {
+    Touch(network, batch);
+    const int64_t n = static_cast<int64_t>(batch.rays.size());
+    Forward(network.Effective<float>(), MlpPrecision::kSplit);
+    AddBaseMap(network.data(), features_.data(), slots_.num_slots, rows_.data());
+    std::vector<Vec3f> color(static_cast<size_t>(n));
+    std::vector<float> transmittance(static_cast<size_t>(n));
+    ForEachBand([&](int64_t begin, int64_t count) {
+      BlendBand(begin);
+      DeviceCopyOut(color.data() + begin, color_.data(), count * int64_t{sizeof(Vec3f)});
+      weights_.transmittance.CopyOut(transmittance.data() + begin, count);
+    });
+    HiddenSums sums;
+    std::vector<int64_t> counted;
+    for (int64_t r = 0; r < n; ++r) {
+      const Vec3f& target = batch.targets[static_cast<size_t>(r)];
+      const float left = transmittance[static_cast<size_t>(r)];
+      if (!AllFinite(target) || !(left <= options_.max_transmittance)) continue;
+      counted.push_back(r);
+      sums.opacity.push_back(1 - left);
+      for (int c = 0; c < 3; ++c)
+        sums.missing.push_back(target[c] - color[static_cast<size_t>(r)][c]);
+    }
+    sums.hidden.resize(counted.size() * kMlpHidden);
+    std::vector<float> band(static_cast<size_t>(n * kRowLanes));
+    DeviceBuffer<float> of_rays(std::min(n, kBandRays) * kRowLanes, "hidden sums of rays");
+    for (int half = 0; half < kMlpHidden; half += kRowLanes) {
+      Forward(HiddenUnits(network, half), MlpPrecision::kSplit);
+      ForEachBand([&](int64_t begin, int64_t count) {
+        BlendRows(grid_, weights_, slots_, rows_.data(), of_rays.data());
+        of_rays.CopyOut(band.data() + begin * kRowLanes, count * kRowLanes);
+      });
+      for (size_t i = 0; i < counted.size(); ++i)
+        std::copy_n(band.data() + counted[i] * kRowLanes, kRowLanes,
+                    sums.hidden.data() + i * kMlpHidden + static_cast<size_t>(half));
+    }
+    return sums;
+  }
+
+ private:
+  // Which voxels the rays touch, and their features.
+  AggregationResult Touch(const LipschitzNetwork& network, const StyleRays& batch) {
+    num_rays_ = static_cast<int64_t>(batch.rays.size());
+    Reserve(num_rays_, "rays", &rays_);
+    Reserve(num_rays_, "colours of rays", &targets_);
+    rays_.CopyIn(batch.rays.data(), num_rays_);
+    targets_.CopyIn(batch.targets.data(), num_rays_);
+    AggregationResult result;
+    if (options_.every_voxel) touched_.MarkAll();
+    for (int64_t begin = 0; begin < num_rays_; begin += kBandRays) {
+      March(begin, &touched_);
+      result.samples += weights_.num_samples;
+    }
+    slots_.Assign(&touched_);
+    result.touched_voxels = slots_.num_slots;
+    Reserve(slots_.num_slots * kRowLanes, "features of touched voxels", &features_);
+    Reserve(slots_.num_slots * kRowLanes, "styled voxels", &rows_);
+    GatherRows(grid_, slots_.point_of_slot.data(), 0, slots_.num_slots,
+               network.data().position_scale, features_.data());
+    return result;
+  }
+
+  void Forward(const DenseNetwork<float>& network, MlpPrecision precision) {
+    const FusedMlp fused = MakeFusedMlp(network);
+    if (mlp_ == nullptr)
+      mlp_ = std::make_unique<DeviceMlp>(fused);
+    else
+      mlp_->Set(fused);
+    mlp_->Forward(precision, features_.data(), slots_.num_slots, rows_.data());
+  }
+
+  void March(int64_t begin, DeviceTouched* touched) {
+    weights_.March(grid_, rays_.data() + begin, std::min(kBandRays, num_rays_ - begin),
+                   options_.march, options_.min_weight, touched);
+  }
+
+  // body(first ray, rays) with weights_ of each band; a single one has been marched already.
+  template <typename Body>
+  void ForEachBand(const Body& body) {
+    for (int64_t begin = 0; begin < num_rays_; begin += kBandRays) {
+      if (num_rays_ > kBandRays) March(begin, nullptr);
+      body(begin, weights_.num_rays);
+    }
+  }
+
+  // Colours, loss and what goes back for the band that begins at ray `begin`.
+  void BlendBand(int64_t begin) {
+    Reserve(weights_.num_rays, "colours of rays", &color_);
+    Reserve(weights_.num_rays, "gradients of colours", &d_color_);
+    Reserve(weights_.num_samples, "clamps of samples", &open_);
+    BlendColors(grid_, weights_, slots_, rays_.data() + begin, rows_.data(), color_.data(),
+                open_.data());
+    AddColorLoss(color_.data(), targets_.data() + begin, weights_.transmittance.data(),
+                 weights_.num_rays, {options_.max_transmittance, options_.one_sided},
+                 d_color_.data(), sums_.data());
+  }
+
+  const DeviceGrid& grid_;
+  AggregationOptions options_;
+  DeviceTouched touched_;
+  DeviceSlots slots_;
+  DeviceRayWeights weights_;
+  std::unique_ptr<DeviceMlp> mlp_;
+  int64_t num_rays_ = 0;
+  DeviceBuffer<Ray> rays_;
+  DeviceBuffer<Vec3f> targets_, color_, d_color_;
+  DeviceBuffer<uint8_t> open_;
+  DeviceBuffer<float> features_, rows_, d_rows_;  // [slots, kRowLanes]
+  DeviceBuffer<DeviceColorLoss> sums_;
+};
+
+}  // namespace
+
+std::unique_ptr<StyleLoss> MakeDeviceStyleLoss(const DeviceGrid* grid,
+                                               const AggregationOptions& options) {
+  return std::make_unique<DeviceStyleLoss>(grid, options);
+}
+
+void RestyleOnDevice(const LipschitzNetwork& network, DeviceGrid* grid) {
+  REGRADE_CHECK(!grid->fitting);
+  const DeviceRange range("restyling the field");
+  constexpr int64_t kChunk = 1 << 20;  // points; 256 MiB of features and results
+  const int64_t room =
+      std::min(std::max(grid->num_voxels(), grid->spheres.num_texels()), kChunk);
+  DeviceBuffer<float> features(room * kRowLanes, "features of voxels");
+  DeviceBuffer<float> rows(room * kRowLanes, "styled voxels");
+  const DeviceMlp mlp(MakeFusedMlp(network.Effective<float>()));
+  const auto restyle = [&](int64_t first, int64_t end) {
+    for (int64_t begin = first; begin < end; begin += kChunk) {
+      const int64_t count = std::min(kChunk, end - begin);
+      GatherRows(*grid, nullptr, begin, count, network.data().position_scale, features.data());
+      mlp.Forward(MlpPrecision::kSplit, features.data(), count, rows.data());
+      AddBaseMap(network.data(), features.data(), count, rows.data());
+      ScatterRows(rows.data(), begin, count, grid);
+    }
+  };
+  restyle(0, grid->num_voxels());
+  if (grid->spheres.on()) restyle(grid->first_texel(), grid->num_points());
+  DeviceWait("restyling the field");
+}
+
+}  // namespace regrade

@@ -1,0 +1,25 @@
+// Learning a style on a CUDA device: the loss and its gradient by the touched voxels, and the
+// network over a whole field. Held to gradient_aggregation.h and apply_network.h by the parity
+// table.
+#pragma once
+
+#include <memory>
+
+#include "kernels/field/cuda/device_grid.h"
+#include "stylize/field/gradient_aggregation.h"
+#include "stylize/field/lipschitz_network.h"
+
+namespace regrade {
+
+// `grid` is the field, not one that is being fitted; it stays with the caller. Gradients are of
+// TF32 products, loss and hidden sums as good as float's; float sums in no fixed order, so two
+// runs differ in the last bits. Throws Error(kResources) without a device, or where its memory
+// is too small.
+std::unique_ptr<StyleLoss> MakeDeviceStyleLoss(const DeviceGrid* grid,
+                                               const AggregationOptions& options);
+
+// The colours of every voxel, and of the background's layers, become what the network makes of
+// them.
+void RestyleOnDevice(const LipschitzNetwork& network, DeviceGrid* grid);
+
+}  // namespace regrade

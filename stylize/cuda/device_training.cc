@@ -1,0 +1,231 @@
+#include "stylize/cuda/device_training.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "kernels/base/error.h"
+#include "kernels/device/device_graph.h"
+#include "stylize/cuda/device_batches.h"
+#include "stylize/cuda/device_color_loss.h"
+#include "stylize/cuda/device_ray_weights.h"
+#include "stylize/field/base_map.h"
+
+namespace regrade {
+namespace {
+
+std::vector<std::pair<int, int>> LayerShapes() {
+  std::vector<std::pair<int, int>> shapes;
+  for (int l = 0; l < kNetworkLayers; ++l)
+    shapes.emplace_back(LipschitzNetwork::Outputs(l), LipschitzNetwork::Inputs(l));
+  return shapes;
+}
+
+}  // namespace
+
+class DeviceTraining::Recording {
+ public:
+  Recording(const DeviceGrid* grid, const AggregationOptions& options,
+            const LipschitzRule& rule, const LipschitzNetwork& network, int64_t rays_per_step,
+            int64_t most_steps)
+      : grid_(*grid),
+        options_(options),
+        position_scale_(network.data().position_scale),
+        has_base_(network.data().has_base),
+        base_(BaseOf(network.data())),
+        batches_(rays_per_step, most_steps),
+        touched_(*grid),
+        slots_(*grid),
+        mlp_(MakeFusedMlp(network.Effective<float>())),
+        weights_that_learn_(LayerShapes(), rule, mlp_),
+        rays_(rays_per_step, "rays"),
+        targets_(rays_per_step, "colours of rays"),
+        color_(rays_per_step, "colours of rays"),
+        d_color_(rays_per_step, "gradients of colours"),
+        sums_(1, "sums of a loss"),
+        room_(1, "what a step asked for"),
+        learned_(most_steps, "what steps were worth") {
+    learned_.Zero();
+    REGRADE_CHECK(!grid->fitting && !options.every_voxel);
+    REGRADE_CHECK(rays_per_step > 0 && rays_per_step <= kMostRays);
+  }
+
+  void Begin(int64_t first, const std::vector<StyleRays>& batches,
+             const LipschitzNetwork& network, const AdamState& adam) {
+    begun_from_ = first;
+    begun_ = static_cast<int64_t>(batches.size());
+    REGRADE_CHECK(begun_ > 0 && begun_ <= batches_.steps);
+    for (int64_t i = 0; i < begun_; ++i)
+      CopyBatch(batches[static_cast<size_t>(i)], (first + i) % batches_.steps);
+    weights_that_learn_.CopyIn(network.data().parameters, network.data().singular_vectors, adam,
+                               first, rejected_in_a_row_);
+    room_.Zero();
+    if (sample_room_ == 0) MakeRoom(batches.front());
+    Play(begun_);
+  }
+
+  Steps End(LipschitzNetwork* network, AdamState* adam) {
+    LearningState state;
+    for (;;) {
+      state = weights_that_learn_.CopyOut(&network->data().parameters,
+                                          &network->data().singular_vectors, adam);
+      DeviceRoom room;
+      room_.CopyOut(&room, 1);
+      if (room.short_of == 0) break;
+      ++regrown_;
+      SetRoom(std::max<int64_t>(sample_room_, room.samples + room.samples / 2),
+              std::max<int64_t>(slot_room_, room.slots + room.slots / 2));
+      room_.Zero();
+      Play(begun_from_ + begun_ - state.step);
+    }
+    rejected_in_a_row_ = state.rejected_in_a_row;
+    Steps steps;
+    steps.made = state.step - begun_from_;
+    steps.stopped = state.halted != 0;
+    if (steps.stopped) steps.gradient = weights_that_learn_.Gradient();
+    std::vector<LearnedStep> learned(static_cast<size_t>(learned_.size()));
+    learned_.CopyOut(learned.data(), learned_.size());
+    for (int64_t i = begun_from_; i < state.step; ++i) {
+      const LearnedStep& step = learned[static_cast<size_t>(i % learned_.size())];
+      steps.touched_voxels += step.touched;
+      if (i + 1 < state.step) continue;
+      steps.last = {step.loss, step.squared_error, static_cast<int64_t>(step.rays),
+                    step.touched, step.samples};
+      const double divisor = options_.divide_by_voxels ? static_cast<double>(grid_.num_voxels())
+                                                       : 3.0 * static_cast<double>(step.rays);
+      steps.last.loss = step.rays > 0 ? step.loss / divisor : 0;
+    }
+    return steps;
+  }
+
+  int64_t regrown() const { return regrown_; }
+
+  void SetRoom(int64_t samples, int64_t slots) {
+    sample_room_ = samples;
+    slot_room_ = std::min(slots, grid_.num_points());
+    weights_ = {};
+    weights_.Reserve(rays_.size(), sample_room_);
+    const int64_t floats = slot_room_ * kRowLanes;
+    features_ = {};
+    features_ = DeviceBuffer<float>(floats, "features of touched voxels");
+    rows_ = {};
+    rows_ = DeviceBuffer<float>(floats, "styled voxels");
+    d_rows_ = {};
+    d_rows_ = DeviceBuffer<float>(floats, "gradients of styled voxels");
+    open_ = {};
+    open_ = DeviceBuffer<uint8_t>(sample_room_, "clamps of samples");
+    mlp_.ReserveAdjoint(slot_room_);
+    graph_.Record([&] { Step(); });
+  }
+
+ private:
+  // One step, in the order of EQ(liprf-loss) and its adjoint.
+  void Step() {
+    const LearningState* state = weights_that_learn_.state();
+    TakeBatch(batches_, &state->step, rays_.data(), targets_.data());
+    weights_.Launch(grid_, rays_.data(), rays_.size(), options_.march, options_.min_weight,
+                    &touched_);
+    slots_.Launch(&touched_);
+    LimitToRoom(slot_room_, &weights_, &slots_, room_.data());
+    const int32_t* touched = slots_.counter.data();
+    GatherRows(grid_, slots_.point_of_slot.data(), 0, slot_room_, position_scale_,
+               features_.data(), touched);
+    weights_that_learn_.ActivateWeights(&mlp_);
+    mlp_.Forward(MlpPrecision::kTensor, features_.data(), slot_room_, rows_.data(), touched);
+    if (has_base_)
+      AddMappedRows(base_.matrix, base_.constant, features_.data(), slot_room_, rows_.data(),
+                    touched);
+    d_rows_.Zero();
+    sums_.Zero();
+    BlendColors(grid_, weights_, slots_, rays_.data(), rows_.data(), color_.data(),
+                open_.data());
+    AddColorLoss(color_.data(), targets_.data(), weights_.transmittance.data(), rays_.size(),
+                 {options_.max_transmittance, options_.one_sided}, d_color_.data(),
+                 sums_.data());
+    BlendColorsAdjoint(grid_, weights_, slots_, rays_.data(), open_.data(), d_color_.data(),
+                       d_rows_.data());
+    AddViewPenalty(base_.matrix, features_.data(), rows_.data(), slot_room_,
+                   static_cast<float>(options_.view_weight), d_rows_.data(),
+                   &sums_.data()->loss, touched);
+    mlp_.AddAdjoint(MlpPrecision::kTensor, features_.data(), d_rows_.data(), slot_room_,
+                    touched);
+    const DeviceColorLoss* sums = sums_.data();
+    weights_that_learn_.Learn(&mlp_,
+                              {&sums->loss, &sums->squared_error, &sums->rays,
+                               weights_.counter.data(), touched, &room_.data()->short_of},
+                              learned_);
+  }
+
+  void Play(int64_t steps) {
+    for (int64_t i = 0; i < steps; ++i) graph_.Play();
+  }
+
+  void CopyBatch(const StyleRays& batch, int64_t place) {
+    const int64_t n = static_cast<int64_t>(batch.rays.size());
+    REGRADE_CHECK(n > 0 && n <= batches_.per_step);
+    std::vector<Ray> rays = batch.rays;
+    std::vector<Vec3f> targets = batch.targets;
+    rays.resize(static_cast<size_t>(batches_.per_step), batch.rays.front());
+    targets.resize(static_cast<size_t>(batches_.per_step), Vec3f{NAN, NAN, NAN});
+    DeviceCopyIn(batches_.rays.data() + place * batches_.per_step, rays.data(),
+                 batches_.per_step * int64_t{sizeof(Ray)});
+    DeviceCopyIn(batches_.targets.data() + place * batches_.per_step, targets.data(),
+                 batches_.per_step * int64_t{sizeof(Vec3f)});
+  }
+
+  // Half as much again as a first batch needs.
+  void MakeRoom(const StyleRays& batch) {
+    rays_.CopyIn(batch.rays.data(), static_cast<int64_t>(batch.rays.size()));
+    DeviceRayWeights trial;
+    trial.March(grid_, rays_.data(), static_cast<int64_t>(batch.rays.size()), options_.march,
+                options_.min_weight, &touched_);
+    slots_.Assign(&touched_);
+    const int64_t samples = trial.num_samples, slots = slots_.num_slots;
+    trial = {};
+    SetRoom(std::max<int64_t>(1024, samples + samples / 2),
+            std::max<int64_t>(1024, slots + slots / 2));
+  }
+
+  const DeviceGrid& grid_;
+  AggregationOptions options_;
+  float position_scale_;
+  bool has_base_;
+  RowMap base_;
+  DeviceBatches batches_;
+  DeviceTouched touched_;
+  DeviceSlots slots_;
+  DeviceRayWeights weights_;
+  DeviceMlp mlp_;
+  DeviceLipschitz weights_that_learn_;
+  DeviceBuffer<Ray> rays_;
+  DeviceBuffer<Vec3f> targets_, color_, d_color_;
+  DeviceBuffer<DeviceColorLoss> sums_;
+  DeviceBuffer<DeviceRoom> room_;
+  DeviceBuffer<LearnedStep> learned_;
+  DeviceBuffer<uint8_t> open_;
+  DeviceBuffer<float> features_, rows_, d_rows_;  // [slot_room_, kRowLanes]
+  int64_t sample_room_ = 0, slot_room_ = 0;
+  int64_t begun_from_ = 0, begun_ = 0, regrown_ = 0;
+  int32_t rejected_in_a_row_ = 0;
+  DeviceGraph graph_;
+};
+
+DeviceTraining::DeviceTraining(const DeviceGrid* grid, const AggregationOptions& options,
+                               const LipschitzRule& rule, const LipschitzNetwork& network,
+                               int64_t rays_per_step, int64_t most_steps)
+    : recording_(std::make_unique<Recording>(grid, options, rule, network, rays_per_step,
+                                             most_steps)) {}
+DeviceTraining::~DeviceTraining() = default;
+
+void DeviceTraining::Begin(int64_t first, const std::vector<StyleRays>& batches,
+                           const LipschitzNetwork& network, const AdamState& adam) {
+  recording_->Begin(first, batches, network, adam);
+}
+DeviceTraining::Steps DeviceTraining::End(LipschitzNetwork* network, AdamState* adam) {
+  return recording_->End(network, adam);
+}
+int64_t DeviceTraining::regrown() const { return recording_->regrown(); }
+void DeviceTraining::ForgetRoom(int64_t samples, int64_t voxels) {
+  recording_->SetRoom(samples, voxels);
+}
+
+}  // namespace regrade

@@ -1,0 +1,53 @@
+#include "stylize/field/apply_network.h"
+
+#include <algorithm>
+
+#include "kernels/base/error.h"
+
+namespace regrade {
+
+Appearance ApplyNetwork(const LipschitzNetwork& network, const RadianceField& field,
+                        const ProgressFunction& progress) {
+  constexpr int64_t kChunk = 1 << 17;  // voxels; 32 MB of features and results
+  const std::vector<int32_t> vertex = VertexOfVoxel(*field.geometry);
+  const int64_t n = field.geometry->num_voxels();
+  Appearance styled = field.appearance;
+  const int basis = styled.basis;
+  const SphereGeometry& spheres = field.geometry->spheres;
+  const std::vector<int32_t> place = PlaceOfColumn(spheres);
+  const int64_t all = n + spheres.num_texels();
+  Buffer<float> features(std::min(all, kChunk) * kFeatureStride), output(features.size());
+  const float scale = network.data().position_scale;
+  for (int64_t begin = 0; begin < all; begin += kChunk) {
+    const int64_t count = std::min(kChunk, all - begin);
+#pragma omp parallel for schedule(static)
+    for (int64_t i = 0; i < count; ++i) {
+      float* const row = features.data() + i * kFeatureStride;
+      const int64_t point = begin + i, texel = point - n;
+      if (texel < 0)
+        FillFeatures(field, scale, point, vertex[static_cast<size_t>(point)], row);
+      else
+        FillTexelFeatures(field, scale, texel,
+                          place[static_cast<size_t>(texel / spheres.layers)], row);
+    }
+    network.Forward(features.data(), count, output.data());
+#pragma omp parallel for schedule(static)
+    for (int64_t i = 0; i < count; ++i) {
+      const int64_t point = begin + i, texel = point - n;
+      for (int c = 0; c < 3; ++c) {
+        const float* const row = output.data() + i * kFeatureStride + c * 9;
+        if (texel < 0)
+          std::copy_n(row, basis, styled.sh.data() + (point * 3 + c) * basis);
+        else
+          styled.sphere_color[3 * texel + c] = row[0];
+      }
+    }
+    const Verdict verdict =
+        Report(progress, static_cast<double>(begin + count), static_cast<double>(all));
+    if (verdict == Verdict::kAbort) throw Interrupted();
+    if (verdict == Verdict::kFinish) break;
+  }
+  return styled;
+}
+
+}  // namespace regrade

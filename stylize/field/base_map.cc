@@ -1,0 +1,90 @@
+#include "stylize/field/base_map.h"
+
+#include <algorithm>
+
+#include "kernels/field/background_spheres.h"
+#include "kernels/field/spherical_harmonics.h"
+#include "kernels/field/trilinear.h"
+
+namespace regrade {
+namespace {
+
+Vec3f SphereColor(const RadianceField& field, const WeightedSample& sample) {
+  const int64_t voxels = field.geometry->num_voxels();
+  int32_t points[8];
+  CornerPoints(*field.geometry, sample, points);
+  float value[3] = {};
+  for (int k = 0; k < 8; ++k) {
+    if (points[k] < 0) continue;
+    for (int c = 0; c < 3; ++c)
+      value[c] += CornerWeight(sample.fraction, k) *
+                  field.appearance.sphere_color[3 * (points[k] - voxels) + c];
+  }
+  return LayerColor(value);
+}
+
+}  // namespace
+
+ColorMap LeastSquaresMap(const RadianceField& field, const StyleRays& batch,
+                         const AggregationOptions& options) {
+  const Geometry& geometry = *field.geometry;
+  const int64_t n = static_cast<int64_t>(batch.rays.size());
+  const RayWeights weights = ComputeRayWeights(geometry, {batch.rays.data(), n}, options.march,
+                                               field.near_clip, options.min_weight);
+  const int basis = field.appearance.basis, stride = field.appearance.stride();
+  std::vector<Vec3f> foreground(static_cast<size_t>(n));
+#pragma omp parallel for schedule(dynamic, 64)
+  for (int64_t r = 0; r < n; ++r) {
+    float gamma[kMaxBasis];
+    ShBasis(basis, batch.rays[static_cast<size_t>(r)].direction, gamma);
+    for (int64_t i = weights.first[static_cast<size_t>(r)];
+         i < weights.first[static_cast<size_t>(r) + 1]; ++i) {
+      const WeightedSample& sample = weights.samples[static_cast<size_t>(i)];
+      if (sample.on_sphere()) {
+        foreground[static_cast<size_t>(r)] += SphereColor(field, sample) * sample.weight;
+        continue;
+      }
+      float sh[3 * kMaxBasis];
+      Interpolate(geometry.frame, geometry.links.data(), field.appearance.sh.data(), stride,
+                  stride, Cell<float>{sample.vertex, sample.fraction}, sh);
+      for (int c = 0; c < 3; ++c) {
+        float value = 0.5f;
+        for (int k = 0; k < basis; ++k) value += sh[c * basis + k] * gamma[k];
+        foreground[static_cast<size_t>(r)][c] += sample.weight * std::max(value, 0.0f);
+      }
+    }
+  }
+  LeastSquaresAccumulator sum;
+  for (int64_t r = 0; r < n; ++r) {
+    const Vec3f& target = batch.targets[static_cast<size_t>(r)];
+    const float transmittance = weights.transmittance[static_cast<size_t>(r)];
+    if (!AllFinite(target) || transmittance > options.max_transmittance) continue;
+    sum.Add(foreground[static_cast<size_t>(r)].Cast<double>(),
+            (target - field.background * transmittance).Cast<double>(), 1, 1 - transmittance);
+  }
+  return sum.Solve();
+}
+
+LipschitzNetwork NetworkOfMap(const ColorMap& map) {
+  LipschitzNetwork network;
+  network.data().has_base = true;
+  network.data().base = map;
+  return network;
+}
+
+RowMap RowMapOf(const ColorMap& map) {
+  const double zeros[kNetworkSh] = {};
+  double of_zero[kNetworkSh];
+  MapCoefficients(map, 9, zeros, of_zero);
+  RowMap rows;
+  for (int c = 0; c < 3; ++c) rows.matrix.row[c] = map.matrix.row[c].Cast<float>();
+  rows.constant = Vec3d{of_zero[0], of_zero[9], of_zero[18]}.Cast<float>();
+  return rows;
+}
+
+RowMap BaseOf(const LipschitzNetworkData& data) {
+  if (data.has_base) return RowMapOf(data.base);
+  return {.matrix = {.row = {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}}}, .constant = {0, 0, 0}};
+}
+
+}  // namespace regrade

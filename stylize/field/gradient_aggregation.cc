@@ -1,0 +1,364 @@
+#include "stylize/field/gradient_aggregation.h"
+
+#include <omp.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "kernels/field/spherical_harmonics.h"
+#include "kernels/field/trilinear.h"
+#include "stylize/field/base_map.h"
+#include "stylize/field/color_error.h"
+#include "stylize/field/view_penalty.h"
+
+namespace regrade {
+namespace {
+
+constexpr int64_t kBandRays = 16384;
+
+// Gamma(d) [9]; zero beyond the field's own basis, which is all that a restyled field keeps.
+void RayBasis(int basis, const Vec3f& direction, float* gamma) {
+  std::fill_n(gamma, kMaxBasis, 0.0f);
+  ShBasis(basis, direction, gamma);
+}
+
+}  // namespace
+
+DenseNetwork<float> HiddenUnits(const LipschitzNetwork& network, int first) {
+  DenseNetwork<float> hidden = network.Effective<float>();
+  hidden.layers.back() = DenseLayer<float>(kFeatureStride, kMlpHidden);
+  for (int o = 0; o < kFeatureStride; ++o)
+    hidden.layers.back().weight[static_cast<size_t>(o * kMlpHidden + first + o)] = 1;
+  return hidden;
+}
+
+// Rays [begin, end) of a batch and all that is derived of them.
+struct GradientAggregation::Band {
+  int64_t begin = 0, end = 0;
+  RayWeights weights;
+  std::vector<int32_t> slots;         // [samples, 8]; -1 at an empty corner
+  std::vector<uint8_t> open;          // [samples]: bit c is set where channel c is not clamped
+  std::vector<Vec3f> color, d_color;  // [rays]; d_color without the loss's normalisation
+};
+
+GradientAggregation::GradientAggregation(const RadianceField& field,
+                                         const AggregationOptions& options)
+    : field_(field),
+      options_(options),
+      vertex_of_voxel_(VertexOfVoxel(*field.geometry)),
+      place_of_column_(PlaceOfColumn(field.geometry->spheres)),
+      slot_of_point_(static_cast<size_t>(field.geometry->num_voxels() +
+                                         field.geometry->spheres.num_texels()),
+                     -1) {}
+
+// Slots in the order of first touch: a function of the rays alone.
+void GradientAggregation::Touch(Band* band) {
+  band->slots.resize(band->weights.samples.size() * 8);
+  int32_t* slot = band->slots.data();
+  for (const WeightedSample& sample : band->weights.samples) {
+    int32_t points[8];
+    CornerPoints(*field_.geometry, sample, points);
+    for (const int32_t point : points) {
+      if (point < 0) {
+        *slot++ = -1;
+        continue;
+      }
+      int32_t& known = slot_of_point_[static_cast<size_t>(point)];
+      if (known < 0) {
+        known = static_cast<int32_t>(touched_.size());
+        touched_.push_back(point);
+      }
+      *slot++ = known;
+    }
+  }
+}
+
+void GradientAggregation::TouchAll() {
+  touched_.resize(slot_of_point_.size());
+  for (size_t point = 0; point < touched_.size(); ++point)
+    slot_of_point_[point] = touched_[point] = static_cast<int32_t>(point);
+}
+
+namespace {
+
+// Background spheres have plain colours.
+int TermsOf(const WeightedSample& sample) { return sample.on_sphere() ? 1 : 9; }
+
+// Colours of a ray before the background, and which channels of which samples the clamp left
+// open.
+Vec3f RenderStyled(const WeightedSample* samples, const int32_t* slots, int64_t n,
+                   const float* gamma, const float* sh, uint8_t* open) {
+  Vec3f color{0, 0, 0};
+  for (int64_t i = 0; i < n; ++i) {
+    float blend[kFeatureStride] = {};
+    for (int corner = 0; corner < 8; ++corner) {
+      const int32_t slot = slots[i * 8 + corner];
+      if (slot < 0) continue;
+      const float w = CornerWeight(samples[i].fraction, corner);
+      const float* row = sh + static_cast<int64_t>(slot) * kFeatureStride;
+      for (int l = 0; l < kFeatureStride; ++l) blend[l] += w * row[l];
+    }
+    const int terms = TermsOf(samples[i]);
+    uint8_t bits = 0;
+    for (int c = 0; c < 3; ++c) {
+      float value = 0.5f;
+      for (int k = 0; k < terms; ++k) value += blend[c * 9 + k] * gamma[k];
+      if (!(value > 0)) continue;
+      bits = static_cast<uint8_t>(bits | (1 << c));
+      color[c] += samples[i].weight * value;
+    }
+    open[i] = bits;
+  }
+  return color;
+}
+
+// Adds the adjoint of RenderStyled to the rows of d_sh in [first, last), and the masses of
+// EQ(view-penalty).
+void ScatterStyled(const WeightedSample* samples, const int32_t* slots, int64_t n,
+                   const float* gamma, const uint8_t* open, const Vec3f& d_color, int32_t first,
+                   int32_t last, float* d_sh) {
+  // dL/d(blend) = w_i d_color[c] gamma[k] where open; w_i joins the corner's weight below.
+  float d_blend[kFeatureStride] = {};
+  for (int c = 0; c < 3; ++c)
+    for (int k = 0; k < 9; ++k) d_blend[c * 9 + k] = d_color[c] * gamma[k];
+  std::fill_n(d_blend + kMassLane, 3, 1.0f);
+  for (int64_t i = 0; i < n; ++i) {
+    const uint8_t bits = open[i];
+    if (bits == 0) continue;
+    float masked[kFeatureStride];
+    const float* d = d_blend;
+    const int terms = TermsOf(samples[i]);
+    if (bits != 7 || terms != 9) {
+      std::copy_n(d_blend, kFeatureStride, masked);
+      for (int c = 0; c < 3; ++c) {
+        const bool is_open = (bits & (1 << c)) != 0;
+        const int kept = is_open ? terms : 0;
+        std::fill_n(masked + c * 9 + kept, 9 - kept, 0.0f);
+        if (kept < 9) masked[kMassLane + c] = 0;
+      }
+      d = masked;
+    }
+    for (int corner = 0; corner < 8; ++corner) {
+      const int32_t slot = slots[i * 8 + corner];
+      if (slot < first || slot >= last) continue;
+      const float w = samples[i].weight * CornerWeight(samples[i].fraction, corner);
+      float* row = d_sh + static_cast<int64_t>(slot) * kFeatureStride;
+      for (int l = 0; l < kFeatureStride; ++l) row[l] += w * d[l];
+    }
+  }
+}
+
+}  // namespace
+
+void GradientAggregation::March(const StyleRays& batch, int64_t begin, int64_t end,
+                                Band* band) {
+  band->begin = begin;
+  band->end = end;
+  band->weights = ComputeRayWeights(*field_.geometry, {batch.rays.data() + begin, end - begin},
+                                    options_.march, field_.near_clip, options_.min_weight);
+  Touch(band);
+}
+
+void GradientAggregation::FillTouchedFeatures(float position_scale) {
+  const int64_t slots = static_cast<int64_t>(touched_.size());
+  const int64_t voxels = field_.geometry->num_voxels();
+  features_.Resize(slots * kFeatureStride);
+  sh_.Resize(slots * kFeatureStride);
+#pragma omp parallel for schedule(static)
+  for (int64_t s = 0; s < slots; ++s) {
+    const int32_t point = touched_[static_cast<size_t>(s)];
+    float* const row = features_.data() + s * kFeatureStride;
+    if (point < voxels) {
+      FillFeatures(field_, position_scale, point, vertex_of_voxel_[static_cast<size_t>(point)],
+                   row);
+    } else {
+      const int64_t texel = point - voxels;
+      const size_t column = static_cast<size_t>(texel / field_.geometry->spheres.layers);
+      FillTexelFeatures(field_, position_scale, texel, place_of_column_[column], row);
+    }
+  }
+}
+
+void GradientAggregation::RenderColors(const StyleRays& batch, Band* band) const {
+  const RayWeights& weights = band->weights;
+  band->open.resize(weights.samples.size());
+  band->color.resize(static_cast<size_t>(weights.num_rays()));
+#pragma omp parallel for schedule(dynamic, 64)
+  for (int64_t r = 0; r < weights.num_rays(); ++r) {
+    const int64_t first = weights.first[static_cast<size_t>(r)];
+    float gamma[kMaxBasis];
+    RayBasis(field_.appearance.basis,
+             batch.rays[static_cast<size_t>(band->begin + r)].direction, gamma);
+    band->color[static_cast<size_t>(r)] =
+        RenderStyled(weights.samples.data() + first, band->slots.data() + first * 8,
+                     weights.first[static_cast<size_t>(r) + 1] - first, gamma, sh_.data(),
+                     band->open.data() + first) +
+        field_.background * weights.transmittance[static_cast<size_t>(r)];
+  }
+}
+
+// Each range of slots walks all rays in their order, so a sum does not know who computed it.
+void GradientAggregation::Scatter(const StyleRays& batch, const Band& band) {
+  const RayWeights& weights = band.weights;
+  const int64_t slots = static_cast<int64_t>(touched_.size());
+  const int ranges = omp_get_max_threads();
+#pragma omp parallel for schedule(static, 1)
+  for (int t = 0; t < ranges; ++t) {
+    const int32_t begin = static_cast<int32_t>(slots * t / ranges);
+    const int32_t end = static_cast<int32_t>(slots * (t + 1) / ranges);
+    for (int64_t r = 0; r < weights.num_rays(); ++r) {
+      const Vec3f& d_color = band.d_color[static_cast<size_t>(r)];
+      if (d_color == Vec3f{0, 0, 0}) continue;
+      const int64_t first = weights.first[static_cast<size_t>(r)];
+      float gamma[kMaxBasis];
+      RayBasis(field_.appearance.basis,
+               batch.rays[static_cast<size_t>(band.begin + r)].direction, gamma);
+      ScatterStyled(weights.samples.data() + first, band.slots.data() + first * 8,
+                    weights.first[static_cast<size_t>(r) + 1] - first, gamma,
+                    band.open.data() + first, d_color, begin, end, d_sh_.data());
+    }
+  }
+}
+
+double GradientAggregation::AddViewPenalty(const LipschitzNetworkData& data) {
+  const int64_t slots = static_cast<int64_t>(touched_.size());
+  const RowMap map = BaseOf(data);
+  std::vector<double> sums(static_cast<size_t>(slots));  // summed up in order below
+#pragma omp parallel for schedule(static)
+  for (int64_t s = 0; s < slots; ++s) {
+    const float* const from = features_.data() + s * kFeatureStride;
+    const float* const styled = sh_.data() + s * kFeatureStride;
+    float* const d = d_sh_.data() + s * kFeatureStride;
+    for (int c = 0; c < 3; ++c) {
+      for (int k = 1; k < 9; ++k) {
+        const Vec3f source{from[k], from[9 + k], from[18 + k]};
+        const ViewPenalty<float> penalty =
+            ViewPenaltyOf(d[kMassLane + c], styled[c * 9 + k] - Dot(map.matrix.row[c], source));
+        sums[static_cast<size_t>(s)] += double{penalty.value};
+        d[c * 9 + k] += static_cast<float>(options_.view_weight) * penalty.derivative;
+      }
+      d[kMassLane + c] = 0;
+    }
+  }
+  return options_.view_weight * std::accumulate(sums.begin(), sums.end(), 0.0);
+}
+
+bool GradientAggregation::Counts(const StyleRays& batch, const Band& band, int64_t ray) const {
+  return AllFinite(batch.targets[static_cast<size_t>(band.begin + ray)]) &&
+         band.weights.transmittance[static_cast<size_t>(ray)] <= options_.max_transmittance;
+}
+
+void GradientAggregation::ForgetTouched() {
+  for (const int32_t point : touched_) slot_of_point_[static_cast<size_t>(point)] = -1;
+  touched_.clear();
+}
+
+AggregationResult GradientAggregation::Run(const LipschitzNetwork& network,
+                                           const StyleRays& batch,
+                                           std::vector<double>* gradient) {
+  const int64_t num_rays = static_cast<int64_t>(batch.rays.size());
+  const bool one_band = num_rays <= kBandRays;
+  AggregationResult result;
+  Band band;
+  if (options_.every_voxel) TouchAll();
+  // Which voxels are touched. The lists of a whole view are large: marched again below.
+  for (int64_t begin = 0; begin < num_rays; begin += kBandRays) {
+    March(batch, begin, std::min(num_rays, begin + kBandRays), &band);
+    result.samples += static_cast<int64_t>(band.weights.samples.size());
+  }
+  const int64_t slots = static_cast<int64_t>(touched_.size());
+  result.touched_voxels = slots;
+  FillTouchedFeatures(network.data().position_scale);
+  network.Forward(features_.data(), slots, sh_.data());
+  if (gradient != nullptr) {
+    d_sh_.Clear();
+    d_sh_.Resize(slots * kFeatureStride);
+  }
+
+  double loss_sum = 0;
+  for (int64_t begin = 0; begin < num_rays; begin += kBandRays) {
+    if (!one_band) March(batch, begin, std::min(num_rays, begin + kBandRays), &band);
+    RenderColors(batch, &band);
+    band.d_color.assign(band.color.size(), Vec3f{0, 0, 0});
+    for (int64_t r = 0; r < band.weights.num_rays(); ++r) {
+      if (!Counts(batch, band, r)) continue;
+      ++result.rays;
+      const Vec3f& target = batch.targets[static_cast<size_t>(begin + r)];
+      for (int c = 0; c < 3; ++c) {
+        const ColorError error =
+            ErrorOf(band.color[static_cast<size_t>(r)][c], target[c], options_.one_sided);
+        loss_sum += static_cast<double>(error.loss) * error.loss;
+        result.squared_error += static_cast<double>(error.shown) * error.shown;
+        band.d_color[static_cast<size_t>(r)][c] = 2 * error.loss;
+      }
+    }
+    if (gradient != nullptr) Scatter(batch, band);
+  }
+  if (gradient != nullptr) loss_sum += AddViewPenalty(network.data());
+  ForgetTouched();
+
+  const double count = options_.divide_by_voxels
+                           ? static_cast<double>(field_.geometry->num_voxels())
+                           : 3.0 * static_cast<double>(result.rays);
+  if (result.rays == 0) return result;
+  result.loss = loss_sum / count;
+  if (gradient == nullptr) return result;
+
+  DenseNetwork<double> d_effective;
+  for (int l = 0; l < kNetworkLayers; ++l)
+    d_effective.layers.emplace_back(LipschitzNetwork::Outputs(l), LipschitzNetwork::Inputs(l));
+  FusedAdjoint(MakeFusedMlp(network.Effective<float>()), features_.data(), d_sh_.data(), slots,
+               &d_effective);
+  std::vector<double> sum(gradient->size());
+  network.AddGradient(d_effective, &sum);
+  for (size_t i = 0; i < sum.size(); ++i) (*gradient)[i] += sum[i] / count;
+  return result;
+}
+
+StyleLoss::HiddenSums GradientAggregation::SumHidden(const LipschitzNetwork& network,
+                                                     const StyleRays& batch) {
+  HiddenSums sums;
+  const int64_t num_rays = static_cast<int64_t>(batch.rays.size());
+  Band band;
+  for (int64_t begin = 0; begin < num_rays; begin += kBandRays) {
+    March(batch, begin, std::min(num_rays, begin + kBandRays), &band);
+    const RayWeights& weights = band.weights;
+    const int64_t slots = static_cast<int64_t>(touched_.size());
+    FillTouchedFeatures(network.data().position_scale);
+    network.Forward(features_.data(), slots, sh_.data());
+    RenderColors(batch, &band);
+    const size_t row = sums.opacity.size();
+    for (int64_t r = 0; r < weights.num_rays(); ++r) {
+      if (!Counts(batch, band, r)) continue;
+      sums.opacity.push_back(1 - weights.transmittance[static_cast<size_t>(r)]);
+      for (int c = 0; c < 3; ++c)
+        sums.missing.push_back(batch.targets[static_cast<size_t>(begin + r)][c] -
+                               band.color[static_cast<size_t>(r)][c]);
+    }
+    sums.hidden.resize(sums.opacity.size() * kMlpHidden);
+    for (int half = 0; half < kMlpHidden; half += kFeatureStride) {
+      FusedForward(MakeFusedMlp(HiddenUnits(network, half)), features_.data(), slots,
+                   sh_.data());
+      size_t next = row;
+      for (int64_t r = 0; r < weights.num_rays(); ++r) {
+        if (!Counts(batch, band, r)) continue;
+        float* out = &sums.hidden[next++ * kMlpHidden + static_cast<size_t>(half)];
+        for (int64_t i = weights.first[static_cast<size_t>(r)];
+             i < weights.first[static_cast<size_t>(r) + 1]; ++i)
+          for (int corner = 0; corner < 8; ++corner) {
+            const int32_t slot = band.slots[static_cast<size_t>(i * 8 + corner)];
+            if (slot < 0) continue;
+            const WeightedSample& sample = weights.samples[static_cast<size_t>(i)];
+            const float w = sample.weight * CornerWeight(sample.fraction, corner);
+            const float* h = sh_.data() + static_cast<int64_t>(slot) * kFeatureStride;
+            for (int l = 0; l < kFeatureStride; ++l) out[l] += w * h[l];
+          }
+      }
+    }
+    ForgetTouched();
+  }
+  return sums;
+}
+
+}  // namespace regrade

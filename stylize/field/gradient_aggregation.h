@@ -1,0 +1,114 @@
+// The gradient of the style loss by way of the voxels that the rays touch.
+//
+// EQ(liprf-loss):  L_rec = 1 / (3 Q) sum over Q rays r and channels c of (C_r,c(f) -
+// target_r,c)^2,
+//   C_r = sum_i w_i max(0, Gamma(d_r) . s_i + 1/2) + T_r c_bg,   s_i = trilinear blend of
+//   f(voxel).
+// Geometry is frozen, so w_i and T_r are constants. LipRF's Algorithm 1 sends every voxel
+// through f; a voxel that no ray touches has gradient zero, so sending the touched ones alone
+// gives the same gradient. The paper's text also allows 1 / B in place of 1 / (3 Q), B the
+// number of voxels.
+//
+// With view_weight > 0 the loss has a second term, see EQ(view-penalty), and so has the
+// gradient.
+//
+// One-sided (the standard recipe): a colour at or above 1 whose target is 1, or at or below 0
+// whose target is 0, is no error, because a picture clips it.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "kernels/base/buffer.h"
+#include "kernels/field/radiance_field.h"
+#include "kernels/field/ray_march.h"
+#include "kernels/field/ray_weights.h"
+#include "stylize/field/lipschitz_network.h"
+
+namespace regrade {
+
+struct StyleRays {
+  std::vector<Ray> rays;
+  std::vector<Vec3f> targets;  // sRGB; a ray with a non-finite target is left out
+};
+
+struct AggregationOptions {
+  MarchOptions march;
+  float min_weight = 0;         // samples of less weight are dropped
+  float max_transmittance = 1;  // rays that let more light through are left out
+  bool one_sided = false;
+  double view_weight = 0;         // lambda_view of EQ(view-penalty)
+  bool divide_by_voxels = false;  // 1 / B instead of 1 / (3 Q)
+  bool every_voxel =
+      false;  // through f at each step, as Algorithm 1 has it: the same gradient, for timing
+};
+
+struct AggregationResult {
+  double loss = 0;           // see EQ(liprf-loss); with a gradient see EQ(view-penalty), too
+  double squared_error = 0;  // sum over rays and channels, colours clipped to [0, 1]
+  int64_t rays = 0;          // that count
+  int64_t touched_voxels = 0;
+  int64_t samples = 0;
+
+  double Mse() const {
+    return rays > 0 ? squared_error / (3.0 * static_cast<double>(rays)) : 0;
+  }
+};
+
+// What learning asks for at each step, on one processor or the other.
+class StyleLoss {
+ public:
+  virtual ~StyleLoss() = default;
+
+  // Adds the gradient of L_rec to `gradient` [LipschitzNetwork::NumParameters()] unless it is
+  // null. Rays are taken in bands, so memory grows with the touched voxels only.
+  virtual AggregationResult Run(const LipschitzNetwork& network, const StyleRays& batch,
+                                std::vector<double>* gradient) = 0;
+
+  // Along each ray that counts, sum_i w_i h(x_i) [rays, kMlpHidden] of the last hidden layer h,
+  // and what is missing to the target [rays, 3]: the last layer's weights enter a ray's colour
+  // linearly but for the clamp. `opacity` [rays] is 1 - T.
+  struct HiddenSums {
+    std::vector<float> hidden, missing, opacity;
+  };
+  virtual HiddenSums SumHidden(const LipschitzNetwork& network, const StyleRays& batch) = 0;
+};
+
+// `network` cut off behind its last hidden layer: units first ... first + kFeatureStride - 1 of
+// that are its outputs.
+DenseNetwork<float> HiddenUnits(const LipschitzNetwork& network, int first);
+
+// On the CPU. Results do not depend on the number of threads.
+class GradientAggregation : public StyleLoss {
+ public:
+  GradientAggregation(const RadianceField& field, const AggregationOptions& options);
+
+  AggregationResult Run(const LipschitzNetwork& network, const StyleRays& batch,
+                        std::vector<double>* gradient) override;
+  HiddenSums SumHidden(const LipschitzNetwork& network, const StyleRays& batch) override;
+
+ private:
+  struct Band;
+
+  void March(const StyleRays& batch, int64_t begin, int64_t end, Band* band);
+  void FillTouchedFeatures(float position_scale);
+  void RenderColors(const StyleRays& batch, Band* band) const;
+  void Scatter(const StyleRays& batch, const Band& band);
+  // Behind Scatter: EQ(view-penalty) times 3 Q. Adds its gradient, and clears the masses.
+  double AddViewPenalty(const LipschitzNetworkData& data);
+  bool Counts(const StyleRays& batch, const Band& band, int64_t ray) const;
+  void ForgetTouched();
+
+  void Touch(Band* band);
+  void TouchAll();
+
+  const RadianceField& field_;
+  AggregationOptions options_;
+  std::vector<int32_t> vertex_of_voxel_, place_of_column_;
+  // Of points, see CornerPoints: voxels, and then the texels of background spheres.
+  std::vector<int32_t> slot_of_point_;  // -1 between runs
+  std::vector<int32_t> touched_;        // point of slot
+  Buffer<float> features_, sh_, d_sh_;  // [slots, kFeatureStride]
+};
+
+}  // namespace regrade

@@ -1,0 +1,268 @@
+#include "stylize/field/lipschitz_network.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+#include "kernels/base/error.h"
+#include "kernels/field/background_spheres.h"
+#include "kernels/field/spherical_harmonics.h"
+#include "kernels/network/lipschitz_layer.h"
+
+namespace regrade {
+namespace {
+
+constexpr struct {
+  const char* name;
+  Activation activation;
+} kActivations[] = {{"sine", Activation::kSine},
+                    {"relu", Activation::kRelu},
+                    {"leaky-relu", Activation::kLeakyRelu},
+                    {"sigmoid", Activation::kSigmoid},
+                    {"tanh", Activation::kTanh}};
+
+int64_t WeightOffset(int layer) {
+  int64_t offset = 0;
+  for (int l = 0; l < layer; ++l)
+    offset +=
+        static_cast<int64_t>(LipschitzNetwork::Outputs(l)) * (LipschitzNetwork::Inputs(l) + 1) +
+        1;
+  return offset;
+}
+
+int64_t VectorOffset(int layer) {
+  int64_t offset = 0;
+  for (int l = 0; l < layer; ++l)
+    offset += LipschitzNetwork::Outputs(l) + LipschitzNetwork::Inputs(l);
+  return offset;
+}
+
+// A layer's W, u, v in another scalar, with the memory they live in.
+template <typename T>
+struct SpectralCopy {
+  std::vector<T> weight, u, v;
+
+  SpectralCopy(const LipschitzNetwork& network, int layer) {
+    const int outputs = LipschitzNetwork::Outputs(layer),
+              inputs = LipschitzNetwork::Inputs(layer);
+    const float* w = network.weight(layer);
+    weight.assign(w, w + static_cast<int64_t>(outputs) * inputs);
+    const float* vectors = network.data().singular_vectors.data() + VectorOffset(layer);
+    u.assign(vectors, vectors + outputs);
+    v.assign(vectors + outputs, vectors + outputs + inputs);
+  }
+  SpectralView<T> View() {
+    return {static_cast<int>(u.size()), static_cast<int>(v.size()), weight.data(), u.data(),
+            v.data()};
+  }
+};
+
+SpectralView<float> ViewOfLayer(LipschitzNetwork* network, int layer) {
+  const int outputs = LipschitzNetwork::Outputs(layer),
+            inputs = LipschitzNetwork::Inputs(layer);
+  float* vectors = network->data().singular_vectors.data() + VectorOffset(layer);
+  return {outputs, inputs, network->weight(layer), vectors, vectors + outputs};
+}
+
+double SpectralNorm(const std::vector<double>& matrix, int rows, int columns) {
+  const Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>
+      map(matrix.data(), rows, columns);
+  return Eigen::JacobiSVD<Eigen::MatrixXd>(map).singularValues()(0);
+}
+
+}  // namespace
+
+Activation ActivationByName(const std::string& name) {
+  for (const auto& entry : kActivations)
+    if (name == entry.name) return entry.activation;
+  throw Error(ExitCode::kUsage, "unknown activation '" + name + "'", "",
+              "use sine, relu, leaky-relu, sigmoid or tanh");
+}
+
+const char* NameOf(Activation activation) {
+  for (const auto& entry : kActivations)
+    if (activation == entry.activation) return entry.name;
+  return "";
+}
+
+int LipschitzNetwork::Outputs(int layer) {
+  return layer + 1 == kNetworkLayers ? kNetworkSh : kMlpHidden;
+}
+int LipschitzNetwork::Inputs(int layer) { return layer == 0 ? kNetworkInputs : kMlpHidden; }
+int64_t LipschitzNetwork::NumParameters() { return WeightOffset(kNetworkLayers); }
+
+LipschitzNetwork::LipschitzNetwork() {
+  data_.parameters.resize(static_cast<size_t>(NumParameters()));
+  data_.singular_vectors.resize(static_cast<size_t>(VectorOffset(kNetworkLayers)));
+}
+
+LipschitzNetwork::LipschitzNetwork(LipschitzNetworkData data) : data_(std::move(data)) {
+  const auto refuse = [](const std::string& what) {
+    throw Error(ExitCode::kInput, "not a network: " + what, "network.npz",
+                "run regrade stylize again");
+  };
+  if (std::none_of(std::begin(kActivations), std::end(kActivations),
+                   [this](const auto& entry) { return data_.activation == entry.name; }))
+    refuse("unknown activation '" + data_.activation + "'");
+  if (static_cast<int64_t>(data_.parameters.size()) != NumParameters())
+    refuse(std::to_string(data_.parameters.size()) + " parameters instead of " +
+           std::to_string(NumParameters()));
+  if (static_cast<int64_t>(data_.singular_vectors.size()) != VectorOffset(kNetworkLayers))
+    refuse("singular vectors of another shape");
+  bool finite = std::isfinite(data_.omega) && std::isfinite(data_.sh_scale) &&
+                std::isfinite(data_.position_scale) && AllFinite(data_.base.offset);
+  for (const auto& row : data_.base.matrix.row) finite &= AllFinite(row);
+  for (const float x : data_.parameters) finite &= std::isfinite(x);
+  for (const float x : data_.singular_vectors) finite &= std::isfinite(x);
+  if (!finite) refuse("a value is not finite");
+}
+
+float* LipschitzNetwork::weight(int layer) {
+  return data_.parameters.data() + WeightOffset(layer);
+}
+float* LipschitzNetwork::bias(int layer) {
+  return weight(layer) + static_cast<int64_t>(Outputs(layer)) * Inputs(layer);
+}
+float& LipschitzNetwork::k(int layer) { return bias(layer)[Outputs(layer)]; }
+
+void LipschitzNetwork::WarmUpNorms() {
+  for (int l = 0; l < kNetworkLayers; ++l) WarmUpPowerIteration(ViewOfLayer(this, l));
+}
+
+void LipschitzNetwork::StepNorms() {
+  for (int l = 0; l < kNetworkLayers; ++l) PowerStep(ViewOfLayer(this, l));
+}
+
+template <typename T>
+DenseNetwork<T> LipschitzNetwork::Effective() const {
+  DenseNetwork<T> network;
+  network.activation = ActivationByName(data_.activation);
+  network.omega = static_cast<T>(data_.omega);
+  for (int l = 0; l < kNetworkLayers; ++l) {
+    DenseLayer<T> layer(Outputs(l), Inputs(l));
+    SpectralCopy<T> copy(*this, l);
+    LipschitzWeight(copy.View(), static_cast<T>(k(l)), layer.weight.data());
+    std::copy_n(bias(l), Outputs(l), layer.bias.begin());
+    if (l == 0)
+      for (int o = 0; o < Outputs(l); ++o)
+        for (int i = 0; i < kNetworkSh; ++i)
+          layer.weight[static_cast<size_t>(o) * kNetworkInputs + i] *=
+              static_cast<T>(data_.sh_scale);
+    network.layers.push_back(std::move(layer));
+  }
+  return network;
+}
+
+template DenseNetwork<float> LipschitzNetwork::Effective<float>() const;
+template DenseNetwork<double> LipschitzNetwork::Effective<double>() const;
+
+void LipschitzNetwork::AddGradient(const DenseNetwork<double>& d_effective,
+                                   std::vector<double>* gradient) const {
+  REGRADE_CHECK_EQ(static_cast<int64_t>(gradient->size()), NumParameters());
+  for (int l = 0; l < kNetworkLayers; ++l) {
+    std::vector<double> d_a = d_effective.layers[static_cast<size_t>(l)].weight;
+    if (l == 0)
+      for (int o = 0; o < Outputs(l); ++o)
+        for (int i = 0; i < kNetworkSh; ++i)
+          d_a[static_cast<size_t>(o) * kNetworkInputs + i] *= data_.sh_scale;
+    double* d_weight = gradient->data() + WeightOffset(l);
+    double* d_bias = d_weight + static_cast<int64_t>(Outputs(l)) * Inputs(l);
+    for (int o = 0; o < Outputs(l); ++o)
+      d_bias[o] += d_effective.layers[static_cast<size_t>(l)].bias[static_cast<size_t>(o)];
+    SpectralCopy<double> copy(*this, l);
+    LipschitzWeightAdjoint(copy.View(), static_cast<double>(k(l)), d_a.data(), d_weight,
+                           d_bias + Outputs(l));
+  }
+}
+
+void LipschitzNetwork::Forward(const float* features, int64_t n, float* output) const {
+  FusedForward(MakeFusedMlp(Effective<float>()), features, n, output);
+  if (!data_.has_base) return;
+#pragma omp parallel for schedule(static)
+  for (int64_t r = 0; r < n; ++r)
+    AddBaseMap(data_.base, features + r * kFeatureStride, output + r * kFeatureStride);
+}
+
+void LipschitzNetwork::ForwardPlain(const double* features, double* output) const {
+  DenseForward(Effective<double>(), features, output);
+  if (data_.has_base) AddBaseMap(data_.base, features, output);
+}
+
+double LipschitzNetwork::BaseNorm() const {
+  return data_.has_base ? SpectralNorm(data_.base.matrix) : 0;
+}
+
+double LipschitzNetwork::ResidualBound() const {
+  const DenseNetwork<double> network = Effective<double>();
+  double bound =
+      std::pow(ActivationLipschitz(network.activation, network.omega), kNetworkLayers - 1);
+  for (const DenseLayer<double>& layer : network.layers)
+    bound *= SpectralNorm(layer.weight, layer.outputs, layer.inputs);
+  return bound;
+}
+
+double LipschitzNetwork::NormEstimate(int layer) const {
+  SpectralCopy<double> copy(*this, layer);
+  const double scale = LargestMagnitude(copy.View());
+  return scale * FrozenSigma(copy.View(), scale);
+}
+
+double LipschitzNetwork::NormDrift() const {
+  double drift = 0;
+  for (int l = 0; l < kNetworkLayers; ++l) {
+    const double estimate = NormEstimate(l);
+    const double exact =
+        SpectralNorm(SpectralCopy<double>(*this, l).weight, Outputs(l), Inputs(l));
+    if (estimate > 0) drift = std::max(drift, exact / estimate - 1);
+  }
+  return drift;
+}
+
+double LipschitzNetwork::SmallestK() const {
+  double smallest = Squareplus<double>(k(0));
+  for (int l = 1; l < kNetworkLayers; ++l)
+    smallest = std::min(smallest, Squareplus<double>(k(l)));
+  return smallest;
+}
+
+std::vector<int32_t> VertexOfVoxel(const Geometry& geometry) {
+  std::vector<int32_t> vertex(static_cast<size_t>(geometry.num_voxels()), -1);
+  for (int64_t i = 0; i < geometry.links.size(); ++i)
+    if (geometry.links[i] >= 0)
+      vertex[static_cast<size_t>(geometry.links[i])] = static_cast<int32_t>(i);
+  return vertex;
+}
+
+void FillFeatures(const RadianceField& field, float position_scale, int64_t voxel,
+                  int32_t vertex, float* row) {
+  const int basis = field.appearance.basis;
+  const float* sh = field.appearance.sh.data() + voxel * field.appearance.stride();
+  std::fill_n(row, kFeatureStride, 0.0f);
+  for (int c = 0; c < 3; ++c) std::copy_n(sh + c * basis, basis, row + c * 9);
+  const Vec3i n = field.geometry->frame.resolution;
+  const int index[3] = {vertex / (n.y * n.z), vertex / n.z % n.y, vertex % n.z};
+  for (int a = 0; a < 3; ++a)
+    row[kNetworkSh + a] =
+        position_scale *
+        (2 * (static_cast<float>(index[a]) + 0.5f) / static_cast<float>(n[a]) - 1);
+}
+
+void FillTexelFeatures(const RadianceField& field, float position_scale, int64_t texel,
+                       int32_t at, float* row) {
+  const int resolution = field.geometry->spheres.resolution;
+  std::fill_n(row, kFeatureStride, 0.0f);
+  for (int c = 0; c < 3; ++c) row[c * 9] = field.appearance.sphere_color[3 * texel + c];
+  const Vec3f direction = TexelDirection<float>(resolution, at / resolution, at % resolution);
+  for (int a = 0; a < 3; ++a) row[kNetworkSh + a] = position_scale * direction[a];
+}
+
+std::vector<int32_t> PlaceOfColumn(const SphereGeometry& spheres) {
+  std::vector<int32_t> place(static_cast<size_t>(spheres.num_columns()));
+  for (int64_t at = 0; at < spheres.links.size(); ++at)
+    if (spheres.links[at] >= 0)
+      place[static_cast<size_t>(spheres.links[at])] = static_cast<int32_t>(at);
+  return place;
+}
+
+}  // namespace regrade

@@ -1,0 +1,179 @@
+#include "stylize/field/observed_slope.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "kernels/base/random.h"
+
+namespace regrade {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+// f in double, with the network's matrices at hand.
+class Steepness {
+ public:
+  explicit Steepness(const LipschitzNetwork& network)
+      : data_(network.data()), network_(network.Effective<double>()) {
+    base_ = MatrixXd::Zero(kNetworkSh, kNetworkInputs);
+    if (!data_.has_base) return;
+    for (int c = 0; c < 3; ++c)
+      for (int d = 0; d < 3; ++d)
+        for (int k = 0; k < 9; ++k) base_(c * 9 + k, d * 9 + k) = data_.base.matrix(c, d);
+  }
+
+  // Columns are points. The base's offset is left out: it cancels in every difference.
+  MatrixXd Forward(const MatrixXd& points) const {
+    MatrixXd x = points;
+    for (size_t l = 0; l < network_.layers.size(); ++l) {
+      x = (Weight(l) * x).colwise() + Bias(l);
+      if (l + 1 < network_.layers.size())
+        x = x.unaryExpr(
+            [&](double v) { return Activate(network_.activation, network_.omega, v); });
+    }
+    return x + base_ * points;
+  }
+
+  MatrixXd Jacobian(const VectorXd& point) const {
+    MatrixXd jacobian = MatrixXd::Identity(kNetworkInputs, kNetworkInputs);
+    VectorXd x = point;
+    for (size_t l = 0; l < network_.layers.size(); ++l) {
+      const VectorXd sum = Weight(l) * x + Bias(l);
+      jacobian = Weight(l) * jacobian;
+      if (l + 1 == network_.layers.size()) break;
+      for (int i = 0; i < sum.size(); ++i)
+        jacobian.row(i) *= ActivateDerivative(network_.activation, network_.omega, sum(i));
+      x = sum.unaryExpr(
+          [&](double v) { return Activate(network_.activation, network_.omega, v); });
+    }
+    return jacobian + base_;
+  }
+
+  // ||J||_2 by the power iteration on J^T J: a lower bound, so it can never accuse the network
+  // wrongly. `direction` [inputs] is where it starts and ends.
+  double Slope(const VectorXd& point, VectorXd* direction) const {
+    const MatrixXd jacobian = Jacobian(point);
+    double slope = 0;
+    for (int i = 0; i < 30; ++i) {
+      const VectorXd image = jacobian * *direction;
+      slope = image.norm();
+      const VectorXd next = jacobian.transpose() * image;
+      if (!(next.norm() > 0)) break;
+      *direction = next.normalized();
+    }
+    return slope;
+  }
+
+ private:
+  Eigen::Map<const RowMajor> Weight(size_t l) const {
+    const auto& layer = network_.layers[l];
+    return {layer.weight.data(), layer.outputs, layer.inputs};
+  }
+  Eigen::Map<const VectorXd> Bias(size_t l) const {
+    return {network_.layers[l].bias.data(), network_.layers[l].outputs};
+  }
+
+  const LipschitzNetworkData& data_;
+  DenseNetwork<double> network_;
+  MatrixXd base_;
+};
+
+}  // namespace
+
+ObservedSlopes ObserveSlopes(const LipschitzNetwork& network, const RadianceField& field,
+                             const SlopeOptions& options) {
+  ObservedSlopes result;
+  const int64_t n = field.geometry->num_voxels();
+  if (n == 0) return result;
+  const Steepness f(network);
+  const std::vector<int32_t> vertex = VertexOfVoxel(*field.geometry);
+  const auto point_of = [&](uint64_t stream, int64_t i) {
+    const int64_t voxel = static_cast<int64_t>(
+        RandomIndex(options.seed, stream, static_cast<uint64_t>(i), static_cast<uint64_t>(n)));
+    float row[kFeatureStride];
+    FillFeatures(field, network.data().position_scale, voxel,
+                 vertex[static_cast<size_t>(voxel)], row);
+    VectorXd point(kNetworkInputs);
+    for (int k = 0; k < kNetworkInputs; ++k) point(k) = row[k];
+    return point;
+  };
+
+  constexpr int64_t kChunk = 1000;
+  for (int64_t begin = 0; begin < options.pairs; begin += kChunk) {
+    const int64_t count = std::min(kChunk, options.pairs - begin);
+    MatrixXd a(kNetworkInputs, count), b(kNetworkInputs, count);
+    for (int64_t i = 0; i < count; ++i) {
+      a.col(i) = point_of(1, begin + i);
+      b.col(i) = point_of(2, begin + i);
+    }
+    const MatrixXd difference = f.Forward(a) - f.Forward(b);
+    for (int64_t i = 0; i < count; ++i) {
+      const double distance = (a.col(i) - b.col(i)).norm();
+      if (distance >= options.min_distance)
+        result.pairs = std::max(result.pairs, difference.col(i).norm() / distance);
+    }
+  }
+
+  std::vector<std::pair<double, VectorXd>> steepest;
+  for (int64_t i = 0; i < options.jacobians; ++i) {
+    const VectorXd point = point_of(3, i);
+    VectorXd direction = VectorXd::Ones(kNetworkInputs).normalized();
+    steepest.emplace_back(f.Slope(point, &direction), point);
+  }
+  std::sort(steepest.begin(), steepest.end(),
+            [](const auto& a, const auto& b) { return a.first > b.first; });
+  if (!steepest.empty()) {
+    result.jacobians = steepest.front().first;
+    const MatrixXd jacobian = f.Jacobian(steepest.front().second);
+    const auto norm = [](const MatrixXd& m) { return m.jacobiSvd().singularValues()(0); };
+    result.along_coefficients = norm(jacobian.leftCols(kNetworkSh));
+    result.along_position = norm(jacobian.rightCols(kNetworkInputs - kNetworkSh));
+  }
+
+  // Climb: finite differences of the slope, a step of shrinking length along them.
+  result.ascent = result.jacobians;
+  const size_t starts = std::min<size_t>(4, steepest.size());
+  for (size_t s = 0; s < starts; ++s) {
+    VectorXd point = steepest[s].second;
+    double best = steepest[s].first, step = 0.2;
+    VectorXd direction = VectorXd::Ones(kNetworkInputs).normalized();
+    for (int i = 0; i < options.ascent_steps; ++i) {
+      f.Slope(point, &direction);
+      VectorXd gradient(kNetworkInputs);
+      const VectorXd frozen = direction;
+      constexpr double kH = 1e-5;
+      for (int k = 0; k < kNetworkInputs; ++k) {
+        VectorXd plus = point, minus = point;
+        plus(k) += kH, minus(k) -= kH;
+        gradient(k) =
+            ((f.Jacobian(plus) * frozen).norm() - (f.Jacobian(minus) * frozen).norm()) /
+            (2 * kH);
+      }
+      if (!(gradient.norm() > 0)) break;
+      const VectorXd next = point + step * gradient.normalized();
+      const double slope = f.Slope(next, &direction);
+      if (slope > best) {
+        best = slope;
+        point = next;
+      } else {
+        step /= 2;
+      }
+    }
+    result.ascent = std::max(result.ascent, best);
+    f.Slope(point, &direction);
+    MatrixXd ends(kNetworkInputs, 2);
+    ends << point - 0.5 * options.min_distance * direction,
+        point + 0.5 * options.min_distance * direction;
+    const MatrixXd images = f.Forward(ends);
+    result.summit_pair = std::max(result.summit_pair, (images.col(1) - images.col(0)).norm() /
+                                                          (ends.col(1) - ends.col(0)).norm());
+  }
+  return result;
+}
+
+}  // namespace regrade

@@ -1,0 +1,68 @@
+// How far apart the colours of two rays are before and after a style, against what LipRF's
+// propositions promise: measured on a field, with the reasons where the promise does not hold.
+//
+// EQ(vrr), LipRF eq. 5: vrr(r1, r2; F) = |C(r1; F) - C(r2; F)|.
+//
+// EQ(vrr-bound): for the field restyled by f = A + g, see EQ(liprf-network), where no colour is
+// clamped and the weights of either ray sum to 1,
+//   vrr' <= |A| vrr + |Gamma| K_g W1(mu_1, mu_2) + |sum_j mu_2j g_j| |Gamma(d_1) - Gamma(d_2)|.
+// mu_r are the weights that ray r gives to voxels: the linear part of a ray's colour is A C + o
+// Gamma_0 (Lemma 2), and o cancels. What g adds is (E_1 g - E_2 g) Gamma_1 + E_2 g (Gamma_1 -
+// Gamma_2); for any coupling pi of mu_1 and mu_2 the first is sum pi_jk (g_j - g_k) Gamma_1, at
+// most |Gamma| K_g sum pi_jk |x_j - x_k|. Here pi joins the rays' voxels in the order in which
+// light meets them, so the sum is W1's upper bound. |Gamma|^2 = 9 / (4 pi) for every direction.
+//
+// The propositions say K vrr, K = |A| + K_g: that holds for A alone (Prop. 1 and 3), and for g
+// under Prop. 2's premise that the rays' weighted colours agree sample by sample, which
+// neighbouring rays need not do.
+#pragma once
+
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "kernels/field/radiance_field.h"
+#include "kernels/field/ray_march.h"
+#include "kernels/scene/camera.h"
+#include "stylize/field/lipschitz_network.h"
+
+namespace regrade {
+
+using RayPair = std::pair<Ray, Ray>;
+
+struct VarianceGroup {
+  int64_t pairs = 0;
+  int64_t above = 0;          // vrr' > K vrr, and by more than kVarianceSlack
+  double largest_excess = 0;  // of vrr' over K vrr; white is sqrt(3)
+  double sum_styled = 0, sum_source = 0;
+
+  double Gain() const { return sum_source > 0 ? sum_styled / sum_source : 0; }  // of the mean
+};
+
+// A pair belongs to the first group whose reason it meets.
+struct VarianceReport {
+  double k = 0;          // |A| + K_g
+  VarianceGroup open;    // light is left behind a ray, or it passes cells with empty corners
+  VarianceGroup clamp;   // a sample's colour is clamped, before or after
+  VarianceGroup inside;  // every premise of the bound holds
+  double largest_share =
+      0;  // of vrr' in its bound, see EQ(vrr-bound), over `inside`; at most 1
+
+  int64_t Pairs() const { return open.pairs + clamp.pairs + inside.pairs; }
+  int64_t Above() const { return open.above + clamp.above + inside.above; }
+};
+
+inline constexpr double kVarianceSlack = 1e-5;      // float's rounding in a ray's colour
+inline constexpr double kOpenTransmittance = 1e-2;  // more than that is background
+
+// `styled` is `source` restyled by `network`. Colours are as rendered, but not clipped to [0,
+// 1]. Sums in double; the result does not depend on the number of threads.
+VarianceReport MeasureVariance(const RadianceField& source, const RadianceField& styled,
+                               const LipschitzNetwork& network,
+                               const std::vector<RayPair>& pairs, const MarchOptions& march);
+
+// `count` pixels of random views with the one to the right of or below each.
+std::vector<RayPair> NeighbouringPixels(const std::vector<Camera>& cameras, int64_t count,
+                                        uint64_t seed);
+
+}  // namespace regrade

@@ -1,0 +1,96 @@
+#include "stylize/training/style_rays.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "kernels/base/error.h"
+#include "kernels/base/random.h"
+
+namespace regrade {
+namespace {
+
+void AddPatch(const StyledTrainingView& view, int x0, int y0, int width, int height,
+              StyleRays* batch) {
+  for (int y = y0; y < y0 + height; ++y)
+    for (int x = x0; x < x0 + width; ++x) {
+      const float* t = view.target->at(x, y);
+      Vec3f target{t[0], t[1], t[2]};
+      if (view.mask != nullptr && !(*view.mask->at(x, y) >= 0.5f))
+        target.x = std::numeric_limits<float>::quiet_NaN();
+      // Pictures are clipped to [0, 1], and so is what they are compared with.
+      if (AllFinite(target))
+        for (int c = 0; c < 3; ++c) target[c] = std::clamp(target[c], 0.0f, 1.0f);
+      batch->rays.push_back(view.camera.PixelRay(x, y));
+      batch->targets.push_back(target);
+    }
+}
+
+}  // namespace
+
+StyleRays SampleStyleRays(const std::vector<StyledTrainingView>& views, int rays, int patch,
+                          uint64_t seed, uint64_t step) {
+  StyleRays batch;
+  const auto part_of = [](const StyledTrainingView& view) {
+    const bool all = view.x1 <= view.x0 || view.y1 <= view.y0;
+    struct Part {
+      int x0, y0, width, height;
+    };
+    return all ? Part{0, 0, view.camera.width, view.camera.height}
+               : Part{view.x0, view.y0, view.x1 - view.x0, view.y1 - view.y0};
+  };
+  if (rays <= 0) {
+    const auto& view = views[RandomIndex(seed, step, 0, views.size())];
+    const auto part = part_of(view);
+    AddPatch(view, part.x0, part.y0, part.width, part.height, &batch);
+    return batch;
+  }
+  const int patches = std::max(1, rays / (patch * patch));
+  for (int p = 0; p < patches; ++p) {
+    const uint64_t counter = 3 * static_cast<uint64_t>(p);
+    const auto& view = views[RandomIndex(seed, step, counter, views.size())];
+    const auto part = part_of(view);
+    const int width = std::min(patch, part.width);
+    const int height = std::min(patch, part.height);
+    const int x0 = static_cast<int>(
+        RandomIndex(seed, step, counter + 1, static_cast<uint64_t>(part.width - width + 1)));
+    const int y0 = static_cast<int>(
+        RandomIndex(seed, step, counter + 2, static_cast<uint64_t>(part.height - height + 1)));
+    AddPatch(view, part.x0 + x0, part.y0 + y0, width, height, &batch);
+  }
+  return batch;
+}
+
+int64_t ValidateViews(const std::vector<StyledTrainingView>& views) {
+  if (views.empty())
+    throw Error(ExitCode::kInput, "no styled view to learn from", "",
+                "keep some training views");
+  int64_t left_out = 0;
+  for (const StyledTrainingView& view : views) {
+    REGRADE_CHECK(view.target != nullptr);
+    const Image& target = *view.target;
+    if (target.width != view.camera.width || target.height != view.camera.height ||
+        target.channels != 3)
+      throw Error(ExitCode::kInput,
+                  "the styled view is " + std::to_string(target.width) + "x" +
+                      std::to_string(target.height) + ", its photo " +
+                      std::to_string(view.camera.width) + "x" +
+                      std::to_string(view.camera.height),
+                  view.name, "the 2D method must keep the picture's size");
+    if (view.mask != nullptr) REGRADE_CHECK(view.mask->SameSize(target));
+    int64_t bad = 0;
+    for (int64_t i = 0; i < target.num_pixels(); ++i) {
+      const float* p = &target.pixels[static_cast<size_t>(i) * 3];
+      bad += !(std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]));
+    }
+    if (bad * 100 > target.num_pixels())
+      throw Error(ExitCode::kInput,
+                  std::to_string(bad) + " of " + std::to_string(target.num_pixels()) +
+                      " pixels of the styled view are not finite",
+                  view.name, "the 2D method failed on this view");
+    left_out += bad;
+  }
+  return left_out;
+}
+
+}  // namespace regrade

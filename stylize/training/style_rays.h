@@ -1,0 +1,21 @@
+// Which rays a training step looks at: a pure function of seed and step.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "stylize/field/gradient_aggregation.h"
+#include "stylize/training/train_network.h"
+
+namespace regrade {
+
+// Patches of patch x patch neighbouring pixels at random places of random views, about `rays`
+// of them; neighbours share voxels, and a step costs what its voxels cost. rays = 0: one whole
+// view.
+StyleRays SampleStyleRays(const std::vector<StyledTrainingView>& views, int rays, int patch,
+                          uint64_t seed, uint64_t step);
+
+// Checks sizes and values; returns the number of pixels that are not finite.
+int64_t ValidateViews(const std::vector<StyledTrainingView>& views);
+
+}  // namespace regrade
