@@ -170,8 +170,7 @@ ConsistencyReport EvaluateConsistency(int frames, const PairMotionFunction& moti
   report.flow = options.mode == "geometry" ? "depth and cameras" : options.flow;
   report.mask_formula = MaskFormula(options.mode);
   int64_t done = 0;
-  bool stop = false;
-  for (int i = 0; i < frames && !stop; ++i)
+  for (int i = 0; i < frames; ++i)
     for (const int gap : options.gaps) {
       if (gap >= frames - i) continue;
       const PairMotion pair_motion = motion(i, i + gap);
@@ -187,15 +186,9 @@ ConsistencyReport EvaluateConsistency(int frames, const PairMotionFunction& moti
         result.low_coverage = result.coverage < options.min_coverage;
         report.pairs.push_back(std::move(result));
       }
-      const Verdict verdict =
+      const LoopControl control =
           Report(progress, static_cast<double>(++done), static_cast<double>(total));
-      if (verdict == Verdict::kAbort) throw Interrupted();
-      if (verdict == Verdict::kFinish && done < total) {
-        report.note =
-            "stopped after " + std::to_string(done) + " of " + std::to_string(total) + " pairs";
-        stop = true;
-        break;
-      }
+      if (control == LoopControl::kStop) throw Interrupted();
     }
   for (const NamedFrameSource& sequence : sequences)
     for (const int gap : options.gaps)

@@ -36,7 +36,7 @@ struct ConsistencyOptions {
     bind("flow", flow,
          {.help = "optical flow of the reference frames: dis-ultrafast, dis-fast, dis-medium, "
                   "dis-tuned, farneback (costs 1 : 1.3 : 5 : 25 : 16 in time, errors in "
-                  "PRICES.md), with OpenCV's optflow deepflow, tvl1, pca-flow, rlof; "
+                  "COSTS.md), with OpenCV's optflow deepflow, tvl1, pca-flow, rlof; "
                   "files:DIR with 00000_00001.flo both ways; onnx:FILE, a network with inputs "
                   "named first and second, RGB from -1 to 1"});
     bind("lpips", lpips,
@@ -100,7 +100,6 @@ struct ConsistencyReport {
   std::string mode, flow, mask_formula;
   std::vector<ConsistencyRow> rows;  // by sequence, then by gap, in the order given
   std::vector<PairResult> pairs;     // by first frame, gap, sequence
-  std::string note;                  // "stopped after 12 of 94 pairs"; else empty
 };
 
 // Compares frame i with frame i + gap of each sequence, for every i and gap. Flow and mask come
@@ -109,8 +108,7 @@ struct ConsistencyReport {
 // `geometry`. Few frames are held at a time.
 //
 // Errors: kUsage for unknown modes or a gap below 1; kInput when counts, sizes or channels of
-// the frames differ, or when frames are too small for flow. Progress counts pairs; kFinish ends
-// with what has been compared so far.
+// the frames differ, or when frames are too small for flow. Progress counts pairs.
 ConsistencyReport EvaluateConsistency(const FrameSource& reference,
                                       const std::vector<NamedFrameSource>& sequences,
                                       const ConsistencyOptions& options,

@@ -89,9 +89,8 @@ FidelityRow MeasureFidelity(const NamedFrameSource& sequence, const FidelityTarg
         ++perfect;
       }
     }
-    const Verdict verdict = Report(progress, i + 1, count);
-    if (verdict == Verdict::kAbort) throw Interrupted();
-    if (verdict == Verdict::kFinish) break;
+    const LoopControl control = Report(progress, i + 1, count);
+    if (control == LoopControl::kStop) throw Interrupted();
   }
 
   FidelityRow row;

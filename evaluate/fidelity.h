@@ -47,7 +47,7 @@ struct FidelityTargets {
 };
 
 // Errors (kInput): counts or sizes that differ. One frame of each source is held at a time.
-// Progress counts frames; kFinish ends with the figures of the frames so far.
+// Progress counts frames.
 FidelityRow MeasureFidelity(const NamedFrameSource& sequence, const FidelityTargets& targets,
                             const ProgressFunction& progress = {});
 

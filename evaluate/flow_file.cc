@@ -45,14 +45,14 @@ FlowField ReadFlowFile(const std::string& path, int64_t* unknown_pixels) {
     Refuse("the flow file claims " + std::to_string(header.width) + " x " +
                std::to_string(header.height) + " px",
            path);
-  const int64_t promised = static_cast<int64_t>(sizeof(header)) +
-                           static_cast<int64_t>(header.width) * header.height * 8;
-  if (size != promised)
-    Refuse("the flow file has " + std::to_string(size) + " bytes, its header promises " +
-               std::to_string(promised),
+  const int64_t guaranteed = static_cast<int64_t>(sizeof(header)) +
+                             static_cast<int64_t>(header.width) * header.height * 8;
+  if (size != guaranteed)
+    Refuse("the flow file has " + std::to_string(size) + " bytes, its header guarantees " +
+               std::to_string(guaranteed),
            path);
   FlowField flow(header.width, header.height);
-  if (!file.read(reinterpret_cast<char*>(flow.uv.data()), promised - sizeof(header)))
+  if (!file.read(reinterpret_cast<char*>(flow.uv.data()), guaranteed - sizeof(header)))
     Refuse("the flow file cannot be read to its end", path);
   int64_t unknown = 0;
   for (size_t i = 0; i < flow.uv.size(); i += 2) {

@@ -13,7 +13,7 @@ namespace regrade {
 // those that are not finite become NaN in both components of the pixel, and are counted.
 //
 // Errors (kInput): no file, wrong mark, a side outside [1, 2^15], fewer or more bytes than the
-// header promises. Nothing is allocated before the file's own size has confirmed the header.
+// header guarantees. Nothing is allocated before the file's own size has confirmed the header.
 FlowField ReadFlowFile(const std::string& path, int64_t* unknown_pixels = nullptr);
 
 // Unknown motion is written as 1e10. Throws Error (kResources) when the disk refuses.

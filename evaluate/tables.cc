@@ -60,7 +60,6 @@ std::string ConsistencyTable(const ConsistencyReport& report) {
       remarks += who + std::to_string(row.pairs_above_8bit_floor - row.perfect_pairs) +
                  " pair(s) above 58.9 dB, finer than 8-bit frames can tell\n";
   }
-  if (!report.note.empty()) remarks += report.note + "\n";
   return "Consistency: TC-PSNR, higher is steadier (mode " + report.mode + ", flow " +
          report.flow +
          ", error per pixel and channel; 95 %: block bootstrap of the mean of dB, runs of a "

@@ -8,7 +8,7 @@
 namespace regrade {
 namespace {
 
-struct Milestone {
+struct StageEntry {
   const char* name;
   Stage (*make)(RunContext*);
 };
@@ -17,15 +17,15 @@ struct Milestone {
 // capture + style --style_2d--> styled views;  field + styled views --stylize--> styled field
 // both fields --render--> frames, films --evaluate--> figures --report--> report.json,
 // report.html
-constexpr Milestone kRoad[] = {
+constexpr StageEntry kStages[] = {
     {"pose", PoseStage},       {"reconstruct", ReconstructStage}, {"style_2d", Style2dStage},
     {"stylize", StylizeStage}, {"render", RenderStage},           {"evaluate", EvaluateStage},
     {"report", ReportStage},
 };
 
-const Milestone* Find(const std::string& name) {
-  return std::find_if(std::begin(kRoad), std::end(kRoad),
-                      [&name](const Milestone& m) { return name == m.name; });
+const StageEntry* Find(const std::string& name) {
+  return std::find_if(std::begin(kStages), std::end(kStages),
+                      [&name](const StageEntry& m) { return name == m.name; });
 }
 
 }  // namespace
@@ -34,19 +34,19 @@ void RunPipeline(const std::string& first, const std::string& last, RunContext* 
   StageRunner runner(context->workspace, context->console);
   runner.SetDryRun(context->settings.start.dry_run);
   runner.RestartFrom(context->settings.start.restart_from);
-  for (const Milestone* before = std::begin(kRoad); before != Find(first); ++before)
+  for (const StageEntry* before = std::begin(kStages); before != Find(first); ++before)
     runner.Require(before->name, "regrade run");
-  for (const Milestone* milestone = Find(first); milestone != std::end(kRoad); ++milestone) {
+  for (const StageEntry* entry = Find(first); entry != std::end(kStages); ++entry) {
     // In a dry run the stages behind an undone one have no inputs to look at yet.
-    if (!runner.Run(milestone->make(context))) {
-      if (last == milestone->name) return;
-      for (++milestone; milestone != std::end(kRoad); ++milestone) {
-        context->console->Info(std::string(milestone->name) + ": would be done after it");
-        if (last == milestone->name) break;
+    if (!runner.Run(entry->make(context))) {
+      if (last == entry->name) return;
+      for (++entry; entry != std::end(kStages); ++entry) {
+        context->console->Info(std::string(entry->name) + ": would be done after it");
+        if (last == entry->name) break;
       }
       return;
     }
-    if (last == milestone->name) return;
+    if (last == entry->name) return;
   }
 }
 

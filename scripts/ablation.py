@@ -64,7 +64,7 @@ def copy_reconstruction(source, target):
             os.remove(os.path.join(stages, name))
 
 
-def figures_of(folder):
+def metrics_of(folder):
     with open(os.path.join(folder, "report.json"), encoding="utf-8") as file:
         report = json.load(file)
     stylize = report["stages"]["stylize"]
@@ -78,8 +78,8 @@ def figures_of(folder):
         "gaps": sorted(steady),
         "bound": stylize["bound"],
         "k_est": stylize["k_est"],
-        "slope": stylize["slope_observed"],
-        "slope_ascent": stylize.get("slope_ascent"),
+        "slope": stylize["local_lipschitz_sampled"],
+        "local_lipschitz_max": stylize.get("local_lipschitz_max"),
         "hue_std": faith["hue_std"],
         "hue_std_2d": faith["hue_std_2d"],
         "chroma": faith["chroma"],
@@ -104,7 +104,7 @@ def table(rows):
     lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
     for recipe, variant, f in rows:
         cells = [recipe, variant, number(f["psnr_to_2d_db"]), number(f["psnr_to_2d_photos_db"])] + [number(tc) for tc in f["tc"]]
-        cells += [number(f["bound"]), number(f["slope"]), number(f["slope_ascent"]), number(f["k_est"])]
+        cells += [number(f["bound"]), number(f["slope"]), number(f["local_lipschitz_max"]), number(f["k_est"])]
         cells += [ratio(f["hue_std"], f["hue_std_2d"]), ratio(f["chroma"], f["chroma_2d"]), number(f["seconds"], 0)]
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines)
@@ -203,7 +203,7 @@ def main():
             if status != 0:
                 print(f"{recipe}, {name}: regrade ended with {status}, see {log}", file=sys.stderr)
                 return 1
-            rows.append((recipe, name, figures_of(folder)))
+            rows.append((recipe, name, metrics_of(folder)))
             keep(options.work, rows)
     print(table(rows))
     if curves(rows):

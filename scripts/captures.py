@@ -60,17 +60,17 @@ def last_words(log):
     return words.removeprefix("regrade: ").split(" To do: ")[0]
 
 
-def figures_of(folder):
+def metrics_of(folder):
     pose, fit = record_of(folder, "pose"), record_of(folder, "reconstruct")
     figures = {"cpu_seconds": {"pose": pose.get("cpu_seconds"), "reconstruct": fit.get("cpu_seconds")}}
     for key in ("psnr_heldout_db", "psnr_train_db", "voxels", "sh_degree"):
-        figures[key] = fit.get("figures", {}).get(key)
+        figures[key] = fit.get("metrics", {}).get(key)
     index = os.path.join(folder, "poses", "photos.json")
     if os.path.exists(index):
         with open(index, encoding="utf-8") as file:
             figures["given"] = len(json.load(file)["photos"])
-    figures["placed"] = pose.get("figures", {}).get("registered")
-    figures["effects"] = pose.get("figures", {}).get("effects", []) + fit.get("figures", {}).get("effects", [])
+    figures["placed"] = pose.get("metrics", {}).get("registered")
+    figures["effects"] = pose.get("metrics", {}).get("effects", []) + fit.get("metrics", {}).get("effects", [])
     return figures
 
 
@@ -89,7 +89,7 @@ def measure(arguments, name, source, status):
     log, out = os.path.join(arguments.work, name + ".log"), os.path.join(arguments.work, name)
     ended = call([arguments.regrade, "reconstruct", source, "--out", out] + arguments.options, log)
     figures = {"name": name, "status": ended, "as_expected": ended == status, "words": last_words(log)}
-    figures.update(figures_of(out))
+    figures.update(metrics_of(out))
     if ended != 0 or not arguments.gains:
         return figures
     decided = {effect["name"]: "on" if effect["on"] else "off" for effect in figures["effects"]}
@@ -104,7 +104,7 @@ def measure(arguments, name, source, status):
         wish = ",".join(f"{key}={value}" for key, value in wishes.items())
         again = call([arguments.regrade, "reconstruct", source, "--out", without, "--effects", wish]
                      + arguments.options, log)
-        effect["without"] = figures_of(without) if again == 0 else {"why": last_words(log)}
+        effect["without"] = metrics_of(without) if again == 0 else {"why": last_words(log)}
     return figures
 
 

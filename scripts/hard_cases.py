@@ -13,7 +13,7 @@
 
 A test belongs to a case whose number is in its name ("Mkl.H7_H20_StyleOfOneColour"). tests/hard_cases/cases.json has the
 cases' titles, further tests ("tests": names with *, or of ctest), a sentence ("why") where there is none, and one ("unseen")
-where no care can be taken out. What is asserted, and whether it was seen to fail, is taken from care_outs.json and CARE_OUTS.md
+where no care can be taken out. What is asserted, and whether it was seen to fail, is taken from mutations.json and MUTATIONS.md
 beside it. Measured figures of merit, each with its command, stand in figures.json.
 """
 
@@ -30,14 +30,14 @@ import measured_errors
 
 FOLDER = os.path.join("tests", "hard_cases")
 CASES, CARES, SEEN, PAGE, FIGURES, MEASURED = (os.path.join(FOLDER, name) for name in (
-    "cases.json", "care_outs.json", "CARE_OUTS.md", "RESULTS.md", "figures.json", "measured.json"))
+    "cases.json", "mutations.json", "MUTATIONS.md", "RESULTS.md", "figures.json", "measured.json"))
 TEST = re.compile(r"\bTEST(?:_F|_P)?\(\s*(\w+)\s*,\s*(\w+)\s*\)")
 CTEST = re.compile(r"add_test\(NAME (\w+)")
 NUMBER = re.compile(r"(?<![A-Za-z0-9])([HF]\d+)(?![A-Za-z0-9])")
 HEAD = """# Hard cases and faults
 
 Every case that the design names, the tests that assert it, what they measured beside what they allow, and the care that was
-once taken out of the code to see one of them fail ([CARE_OUTS.md](CARE_OUTS.md)). Written by `scripts/hard_cases.py` from the
+once taken out of the code to see one of them fail ([MUTATIONS.md](MUTATIONS.md)). Written by `scripts/hard_cases.py` from the
 tests, from `cases.json` and `measured.json`; a test fails when this page is out of date, names a test that does not exist, or
 lacks a number that a test measures. Whether the tests pass is said by `ctest`. Digits are correct decimal digits: -log10 of the
 error over the size of what it is of, the worst of all that the test tries; float and double say what was computed in.
@@ -116,7 +116,7 @@ def other_numbers(measured, told):
     return "\n".join(["## Numbers of no case", "", "| test | measured |", "|---|---|", *rows]) if rows else ""
 
 
-def figures_table(figures):
+def metrics_table(figures):
     lines = ["## Figures of merit", "",
              "Measured by the commands beside them, which anyone can run.", "",
              "| figure | measured | with | commit, machine |", "|---|---|---|---|"]
@@ -164,7 +164,7 @@ def page(tree):
     summary = "\n\n".join(filter(None, (summary, measured_errors.summary(tree.measured))))
     tables += filter(None, [other_numbers(tree.measured, told)])
     if tree.figures:
-        tables.insert(0, figures_table(tree.figures))
+        tables.insert(0, metrics_table(tree.figures))
     return HEAD.format(summary=summary) + "\n" + "\n\n".join(tables) + "\n", complaints
 
 

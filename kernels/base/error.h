@@ -43,7 +43,7 @@ class Interrupted : public std::runtime_error {
   Interrupted() : std::runtime_error("interrupted") {}
 };
 
-// A broken promise of our own code. main turns it into exit code 1.
+// A broken guarantee of our own code. main turns it into exit code 1.
 class CheckFailure : public std::logic_error {
  public:
   using std::logic_error::logic_error;

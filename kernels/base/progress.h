@@ -8,10 +8,9 @@
 
 namespace regrade {
 
-enum class Verdict {
+enum class LoopControl {
   kContinue,
-  kFinish,  // stop early, but leave a usable result (a time budget is spent)
-  kAbort,   // save a checkpoint and leave: the loop throws Interrupted
+  kStop,  // save a checkpoint and leave: the loop throws Interrupted
 };
 
 struct Progress {
@@ -21,11 +20,11 @@ struct Progress {
 };
 
 // Called often (every step); cheap when there is nothing to print.
-using ProgressFunction = std::function<Verdict(const Progress&)>;
+using ProgressFunction = std::function<LoopControl(const Progress&)>;
 
-inline Verdict Report(const ProgressFunction& progress, double done, double total,
-                      const std::string& note = "") {
-  return progress ? progress({done, total, note}) : Verdict::kContinue;
+inline LoopControl Report(const ProgressFunction& progress, double done, double total,
+                          const std::string& note = "") {
+  return progress ? progress({done, total, note}) : LoopControl::kContinue;
 }
 
 // One progress for work in several parts, each of which reports its own from 0 to its total.

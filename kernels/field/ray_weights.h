@@ -36,8 +36,8 @@ struct RayWeights {
 };
 
 // Exact for min_weight = 0. Samples with 0 < w <= min_weight are dropped, an error of at most
-// their sum a channel: a knob with a price. `near_clip` in world units. Parallel over rays; the
-// result does not depend on threads.
+// their sum a channel: a parameter with a price. `near_clip` in world units. Parallel over
+// rays; the result does not depend on threads.
 RayWeights ComputeRayWeights(const Geometry& geometry, View<const Ray> rays,
                              const MarchOptions& options, float near_clip,
                              float min_weight = 0.0f);

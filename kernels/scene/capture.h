@@ -10,10 +10,10 @@
 
 namespace regrade {
 
-struct PhotoVerdict {
-  std::string file;     // as the user named it, relative to the given folder
-  std::string verdict;  // "used" | "skipped" | "unregistered"
-  std::string why;      // empty for "used", unless there is something to know
+struct PhotoStatus {
+  std::string file;    // as the user named it, relative to the given folder
+  std::string status;  // "used" | "skipped" | "unregistered"
+  std::string why;     // empty for "used", unless there is something to know
 };
 
 // A photo that was decoded and written beside the result as a plain 8-bit upright PNG, before
@@ -47,7 +47,7 @@ struct Capture {
   std::vector<CaptureView> views;  // in natural order of `file`
   std::vector<ScenePoint> points;  // empty when the poses came without points
   double nearest_depth = 0;        // of the scene, where the poses came with it; else 0
-  std::vector<PhotoVerdict> verdicts;
+  std::vector<PhotoStatus> statuses;
   double reprojection_px = 0;  // mean over observations, at the photos' size
   int models_found = 0;        // by COLMAP; 0 when the poses came from elsewhere
 };

@@ -167,7 +167,7 @@ SyntheticScene MakeSquare(uint64_t seed) {
   return b.Finish({-0.45, -0.55, 0.85}, {-dome, -dome, -dome}, {dome, dome, dome});
 }
 
-SyntheticScene MakeRoom(uint64_t seed) {
+SyntheticScene GrowBuffers(uint64_t seed) {
   SceneBuilder b("room", seed);
   const double x = 1.7, y = 1.5, h = 1.8, t = 0.06;  // half sides, height, thickness
   b.AddWall({-x, -y, -t}, {x, y, 0}, b.MakePaint(Pattern::kPlanks, 0.26, kOak));
@@ -267,7 +267,7 @@ Camera RoomCamera(double turn, int width, int height) {
 SyntheticScene MakeSyntheticScene(const std::string& name, uint64_t seed) {
   if (name == "table") return MakeTable(seed);
   if (name == "wall") return MakeWall(seed);
-  if (name == "room") return MakeRoom(seed);
+  if (name == "room") return GrowBuffers(seed);
   if (name == "square") return MakeSquare(seed);
   throw Error(ExitCode::kUsage, "there is no synthetic scene \"" + name + "\"", "--scene",
               std::string("choose one of ") + kSyntheticSceneNames);

@@ -121,32 +121,32 @@ ColmapModel ModelFromLlff(const CaptureSource& source, const std::vector<StagedP
 constexpr char kAbsent[] = "absent/";  // no staged photo's name has a slash
 constexpr char kNoPicture[] = "has a pose, but there is no such picture";
 
-void NoteMissing(const std::vector<PhotoVerdict>& verdicts, std::vector<std::string>* notes) {
+void NoteMissing(const std::vector<PhotoStatus>& statuses, std::vector<std::string>* notes) {
   std::string first;
   int count = 0;
-  for (const PhotoVerdict& verdict : verdicts)
+  for (const PhotoStatus& verdict : statuses)
     if (verdict.why == kNoPicture && count++ == 0) first = verdict.file;
   if (count > 0)
     notes->push_back("pictures of " + std::to_string(count) + " poses are not there: " + first +
                      (count > 1 ? " and others" : ""));
 }
 
-JsonValue VerdictsJson(const std::vector<PhotoVerdict>& verdicts) {
+JsonValue StatusesJson(const std::vector<PhotoStatus>& statuses) {
   JsonValue::Array array;
-  for (const PhotoVerdict& verdict : verdicts)
+  for (const PhotoStatus& verdict : statuses)
     array.push_back(JsonValue::Object{
-        {"file", verdict.file}, {"verdict", verdict.verdict}, {"why", verdict.why}});
+        {"file", verdict.file}, {"status", verdict.status}, {"why", verdict.why}});
   return array;
 }
 
 // Ingest's verdict stands, unless the photo was staged: then the poses decide.
-std::vector<PhotoVerdict> MergedVerdicts(const std::vector<PhotoVerdict>& ingest,
-                                         const std::vector<PhotoVerdict>& posed) {
-  std::vector<PhotoVerdict> merged = ingest;
-  for (PhotoVerdict& verdict : merged)
-    for (const PhotoVerdict& later : posed)
+std::vector<PhotoStatus> MergedStatuses(const std::vector<PhotoStatus>& ingest,
+                                        const std::vector<PhotoStatus>& posed) {
+  std::vector<PhotoStatus> merged = ingest;
+  for (PhotoStatus& verdict : merged)
+    for (const PhotoStatus& later : posed)
       if (later.file == verdict.file) {
-        verdict.verdict = later.verdict;
+        verdict.status = later.status;
         if (!later.why.empty()) verdict.why = later.why;
       }
   return merged;
@@ -197,7 +197,7 @@ CaptureSource DetectCapture(const std::string& folder) {
 }
 
 Capture ImportPoses(const CaptureSource& source, const std::vector<StagedPhoto>& photos,
-                    const std::vector<PhotoVerdict>& verdicts, const std::string& sparse_folder,
+                    const std::vector<PhotoStatus>& statuses, const std::string& sparse_folder,
                     std::vector<std::string>* notes) {
   ColmapModel model;
   double nearest_depth = 0;
@@ -226,13 +226,13 @@ Capture ImportPoses(const CaptureSource& source, const std::vector<StagedPhoto>&
   WriteColmapModel(model, sparse_folder);
   Capture capture = CaptureFromModel(model, photos, PhotoNames::kStaged);
   capture.nearest_depth = nearest_depth;
-  for (const PhotoVerdict& verdict : capture.verdicts)
-    if (verdict.verdict == "skipped")
+  for (const PhotoStatus& verdict : capture.statuses)
+    if (verdict.status == "skipped")
       missing.push_back(verdict.file.substr(std::string(kAbsent).size()));
-  capture.verdicts = MergedVerdicts(verdicts, capture.verdicts);
+  capture.statuses = MergedStatuses(statuses, capture.statuses);
   for (const std::string& file : missing)
-    capture.verdicts.push_back({file, "skipped", kNoPicture});
-  NoteMissing(capture.verdicts, notes);
+    capture.statuses.push_back({file, "skipped", kNoPicture});
+  NoteMissing(capture.statuses, notes);
   return capture;
 }
 
@@ -248,7 +248,7 @@ void WriteCaptureIndex(const std::string& folder, const Capture& capture,
   WriteJsonFile(folder + "/photos.json",
                 JsonValue::Object{{"schema", 1},
                                   {"photos", std::move(staged)},
-                                  {"verdicts", VerdictsJson(capture.verdicts)},
+                                  {"statuses", StatusesJson(capture.statuses)},
                                   {"reprojection_px", capture.reprojection_px},
                                   {"nearest_depth", capture.nearest_depth},
                                   {"models_found", capture.models_found}});
@@ -273,10 +273,10 @@ Capture ReadCapture(const std::string& folder) {
     }
     Capture capture =
         CaptureFromModel(ReadColmapModel(folder + "/sparse"), photos, PhotoNames::kStaged);
-    capture.verdicts.clear();
-    for (const JsonValue& verdict : index.At("verdicts").AsArray())
-      capture.verdicts.push_back({verdict.At("file").AsString(),
-                                  verdict.At("verdict").AsString(),
+    capture.statuses.clear();
+    for (const JsonValue& verdict : index.At("statuses").AsArray())
+      capture.statuses.push_back({verdict.At("file").AsString(),
+                                  verdict.At("status").AsString(),
                                   verdict.At("why").AsString()});
     capture.reprojection_px = index.At("reprojection_px").AsDouble();
     capture.nearest_depth = NearestDepth(index);

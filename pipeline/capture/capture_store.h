@@ -35,7 +35,7 @@ double NearestDepthOf(const CaptureSource& source);
 // `sparse_folder`. Photos that were resampled since get cameras of their size. `notes`:
 // sentences for a person. Throws Error(kInput) if photos and poses do not fit each other.
 Capture ImportPoses(const CaptureSource& source, const std::vector<StagedPhoto>& photos,
-                    const std::vector<PhotoVerdict>& verdicts, const std::string& sparse_folder,
+                    const std::vector<PhotoStatus>& statuses, const std::string& sparse_folder,
                     std::vector<std::string>* notes);
 
 // `folder` holds sparse/ and photos/ already; this adds photos.json.

@@ -124,11 +124,11 @@ class Notices {
 };
 
 // "2 x not an image, 1 x empty file": what became of the files that are not used.
-std::string CountReasons(const std::vector<PhotoVerdict>& verdicts) {
+std::string CountReasons(const std::vector<PhotoStatus>& statuses) {
   constexpr size_t kShown = 5;
   std::map<std::string, int> counts;
-  for (const PhotoVerdict& verdict : verdicts)
-    if (verdict.verdict != "used") ++counts[verdict.why];
+  for (const PhotoStatus& verdict : statuses)
+    if (verdict.status != "used") ++counts[verdict.why];
   std::vector<std::pair<int, std::string>> sorted;
   for (const auto& [why, count] : counts) sorted.emplace_back(-count, why);
   std::sort(sorted.begin(), sorted.end());
@@ -141,9 +141,9 @@ std::string CountReasons(const std::vector<PhotoVerdict>& verdicts) {
 }
 
 void RequireEnough(const IngestResult& result, const std::string& folder) {
-  const size_t usable = result.photos.size(), files = result.verdicts.size();
+  const size_t usable = result.photos.size(), files = result.statuses.size();
   if (usable >= kLeastPhotos) return;
-  std::string reasons = CountReasons(result.verdicts);
+  std::string reasons = CountReasons(result.statuses);
   if (!reasons.empty()) reasons = ": " + reasons;
   if (usable == 0)
     throw Error(ExitCode::kInput,
@@ -204,10 +204,10 @@ IngestResult IngestPhotos(const std::string& folder, const std::string& staging_
     next = decode_later(i + 1);
     const std::string& file = files[i].name;
     if (Report(progress, static_cast<double>(i), static_cast<double>(files.size()), file) !=
-        Verdict::kContinue)
+        LoopControl::kContinue)
       throw Interrupted();
     if (!candidate.problem.empty()) {
-      result.verdicts.push_back({file, "skipped", candidate.problem});
+      result.statuses.push_back({file, "skipped", candidate.problem});
       if (candidate.problem != "not an image")
         notices.Add("left out, " + candidate.problem, file);
       continue;
@@ -215,7 +215,7 @@ IngestResult IngestPhotos(const std::string& folder, const std::string& staging_
     const auto [twin, is_new] = file_of_pixels.try_emplace(candidate.pixel_hash, file);
     if (!is_new) {
       const std::string why = "the same picture as " + twin->second;
-      result.verdicts.push_back({file, "skipped", why});
+      result.statuses.push_back({file, "skipped", why});
       notices.Add("left out, " + why, file);
       continue;
     }
@@ -233,7 +233,7 @@ IngestResult IngestPhotos(const std::string& folder, const std::string& staging_
             std::string(notice.empty() ? "" : "; ") + "transparent parts are laid over white";
     }
     if (!notice.empty()) notices.Add(notice, file);
-    result.verdicts.push_back({file, "used", notice});
+    result.statuses.push_back({file, "used", notice});
     result.photos.push_back({file, name, path, candidate.rgb.width, candidate.rgb.height,
                              candidate.photo.exif_focal_px});
     fingerprint.Add(file + '\n' + HashText(candidate.pixel_hash) + '\n');

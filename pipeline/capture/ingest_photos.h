@@ -29,10 +29,10 @@ struct IngestOptions {
 };
 
 struct IngestResult {
-  std::vector<StagedPhoto> photos;     // in natural order of `file`
-  std::vector<PhotoVerdict> verdicts;  // one for each file that is not hidden, same order
-  std::vector<std::string> notices;    // for people, one for each kind of thing that happened
-  int hidden = 0;                      // files and folders whose name begins with a dot
+  std::vector<StagedPhoto> photos;    // in natural order of `file`
+  std::vector<PhotoStatus> statuses;  // one for each file that is not hidden, same order
+  std::vector<std::string> notices;   // for people, one for each kind of thing that happened
+  int hidden = 0;                     // files and folders whose name begins with a dot
   // Changes when a used photo's name or pixels change, or their order.
   std::string fingerprint;
 };

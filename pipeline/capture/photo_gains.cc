@@ -71,7 +71,7 @@ JsonValue GainsRecord(const Capture& capture, const ExposureEstimate& estimate,
 
 JsonValue RecordedGainRows(const Workspace& workspace) {
   const auto record = workspace.Find("reconstruct");
-  const JsonValue* const rows = record ? record->figures.Find("exposure") : nullptr;
+  const JsonValue* const rows = record ? record->metrics.Find("exposure") : nullptr;
   return rows ? *rows : JsonValue();
 }
 

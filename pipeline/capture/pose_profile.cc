@@ -21,11 +21,11 @@ __attribute__((format(printf, 1, 2))) std::string Text(const char* format, ...) 
 
 std::string Evidence(const PoseRefinement& refinement) {
   std::string text =
-      "median distance of sightings from their points, wherever these are put, in pixels";
+      "median distance of observations from their points, wherever these are put, in pixels";
   if (!refinement.tried) return text;
   if (refinement.held_out_after_px > 0)
     text += Text(
-        "; poses adjusted: %.2f, and %.2f instead of %.2f for %lld sightings without "
+        "; poses adjusted: %.2f, and %.2f instead of %.2f for %lld observations without "
         "a say",
         refinement.refined_px, refinement.held_out_after_px, refinement.held_out_before_px,
         static_cast<long long>(refinement.held_out));
@@ -42,8 +42,8 @@ JsonValue NumberOrNull(const std::optional<double>& number) {
   return number ? JsonValue(*number) : JsonValue();
 }
 
-JsonValue FiguresOf(const PoseRefinement& refinement) {
-  return JsonValue::Object{{"sightings", refinement.sightings},
+JsonValue MetricsOf(const PoseRefinement& refinement) {
+  return JsonValue::Object{{"observations", refinement.observations},
                            {"held_out", refinement.held_out},
                            {"misfit_px", refinement.misfit_px},
                            {"refined_px", refinement.refined_px},
@@ -70,7 +70,7 @@ PoseProfile ProfilePoses(CaptureKind kind, const PoseOptions& options,
   const auto leave_out = [asked_for, threshold](const char* why) -> PoseProfile {
     if (asked_for)
       throw Error(ExitCode::kScene, why, std::string("--effects ") + kPoseRefinement + "=on");
-    return {{kPoseRefinement, false, why, Figure(), threshold}, JsonValue()};
+    return {{kPoseRefinement, false, why, Metric(), threshold}, JsonValue()};
   };
   if (wish != wishes.end() && !asked_for) return leave_out("it was not wanted");
   if (capture->points.empty())
@@ -91,7 +91,7 @@ PoseProfile ProfilePoses(CaptureKind kind, const PoseOptions& options,
   }
   return {{kPoseRefinement, refinement.Accepted(), Evidence(refinement), refinement.misfit_px,
            threshold},
-          refinement.tried ? FiguresOf(refinement) : JsonValue()};
+          refinement.tried ? MetricsOf(refinement) : JsonValue()};
 }
 
 }  // namespace regrade

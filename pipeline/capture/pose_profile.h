@@ -14,7 +14,7 @@ namespace regrade {
 
 struct PoseProfile {
   EffectReport effect;  // "pose-refinement"
-  JsonValue figures;    // of the trial; null where there was none
+  JsonValue metrics;    // of the trial; null where there was none
 };
 
 // Poses that came with tracks are refined where reprojection says so (refine_poses.h); those

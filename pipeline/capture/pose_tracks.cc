@@ -22,16 +22,17 @@ std::string Summary(const FoundTracks& found, double seconds, double cpu_seconds
                 "from where the poses expect them in the median, in %.0f s (%.0f s of CPU); "
                 "--tracks given goes without",
                 found.colmap_version.c_str(), found.model.points.size(),
-                static_cast<long long>(found.sightings), found.median_px, seconds, cpu_seconds);
+                static_cast<long long>(found.observations), found.median_px, seconds,
+                cpu_seconds);
   return text;
 }
 
 // Wrong poses find points, too: a match between two photos may fit them by chance, a third
-// photo's sighting besides hardly ever does.
+// photo's observation besides hardly ever does.
 bool Believable(const FoundTracks& found) {
   const double points = static_cast<double>(found.model.points.size());
   return found.model.points.size() >= kFewestTracks &&
-         static_cast<double>(found.sightings) >= kFewestSightingsOfAPoint * points;
+         static_cast<double>(found.observations) >= kFewestObservationsOfAPoint * points;
 }
 
 std::string DoubtText(const FoundTracks& found) {
@@ -42,7 +43,7 @@ std::string DoubtText(const FoundTracks& found) {
                 found.model.points.size(),
                 found.model.points.empty()
                     ? 0.0
-                    : static_cast<double>(found.sightings) /
+                    : static_cast<double>(found.observations) /
                           static_cast<double>(found.model.points.size()));
   return text + std::string(kUnjudged);
 }
@@ -74,14 +75,14 @@ PoseTracks AddTracks(const PoseOptions& options, const std::string& effects,
     if (error.code() != ExitCode::kExternalProgram) throw;
     result.note =
         "no tracks were found for the poses, for " + error.what_failed() + "." + kUnjudged;
-    result.figures = JsonValue::Object{{"points", 0}, {"failed", error.what_failed()}};
+    result.metrics = JsonValue::Object{{"points", 0}, {"failed", error.what_failed()}};
     return result;
   }
   const double seconds = std::chrono::duration<double>(Clock::now() - began).count();
   const double cpu_seconds = CpuSeconds() - cpu_before;
-  result.figures =
+  result.metrics =
       JsonValue::Object{{"points", static_cast<int64_t>(found.model.points.size())},
-                        {"sightings", found.sightings},
+                        {"observations", found.observations},
                         {"median_px", found.median_px},
                         {"pairs", found.pairs},
                         {"colmap", found.colmap_version},

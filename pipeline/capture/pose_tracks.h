@@ -15,7 +15,7 @@ namespace regrade {
 // Fewer points than this say more against the poses than about the scene.
 inline constexpr size_t kFewestTracks = 50;
 // Likewise, on average: right poses have 4 to 10, those of other photos 2.3.
-inline constexpr double kFewestSightingsOfAPoint = 2.7;
+inline constexpr double kFewestObservationsOfAPoint = 2.7;
 
 // Would they be looked for? Not where poses came with points, not for transparent photos, whose
 // outlines say more (`effects`: --effects, which may say of alpha), and not against --tracks
@@ -24,7 +24,7 @@ bool WantsTracks(const PoseOptions& options, const std::string& effects,
                  const Capture& capture);
 
 struct PoseTracks {
-  JsonValue figures;        // null where none were looked for
+  JsonValue metrics;        // null where none were looked for
   std::string note;         // a sentence for a person; empty likewise
   double misfit_scale = 1;  // pixels of the photos that are one of those features were found in
 };

@@ -14,7 +14,7 @@
 namespace regrade {
 namespace {
 
-constexpr int kOutlineSide = 512;
+constexpr int kSilhouetteSide = 512;
 constexpr double kAlphaShare = 0.02;  // of the pixels; less is a photo with a soft edge
 constexpr const char* kNames[] = {"ndc",      "alpha",         "background",
                                   "exposure", kViewDependence, kPoseRefinement};
@@ -24,10 +24,10 @@ EffectReport Row(const char* name, bool on, double value, double threshold,
   return {name, on, evidence, value, threshold};
 }
 
-std::string Short(const Figure& figure) {
-  if (!figure.value) return figure.why;
+std::string Short(const Metric& metric) {
+  if (!metric.value) return metric.why;
   char text[32];
-  std::snprintf(text, sizeof text, "%.3g", *figure.value);
+  std::snprintf(text, sizeof text, "%.3g", *metric.value);
   return text;
 }
 
@@ -36,14 +36,14 @@ std::string AlphaPath(const CaptureView& view) {
   return dot == std::string::npos ? "" : view.path.substr(0, dot) + ".alpha.png";
 }
 
-// An outline of at most kOutlineSide pixels, each the most opaque of those it stands for:
+// An outline of at most kSilhouetteSide pixels, each the most opaque of those it stands for:
 // hundreds of large photos need not be in memory at once.
-Outline Reduced(const Outline& full) {
+Silhouette Reduced(const Silhouette& full) {
   const int side = std::max(full.alpha.width, full.alpha.height);
-  const int factor = (side + kOutlineSide - 1) / kOutlineSide;
+  const int factor = (side + kSilhouetteSide - 1) / kSilhouetteSide;
   if (factor <= 1) return full;
   const int width = full.alpha.width / factor, height = full.alpha.height / factor;
-  Outline small{full.camera.Resized(width, height), Image(width, height, 1)};
+  Silhouette small{full.camera.Resized(width, height), Image(width, height, 1)};
   for (int y = 0; y < height * factor; ++y)
     for (int x = 0; x < width * factor; ++x) {
       float& most = *small.alpha.at(x / factor, y / factor);
@@ -52,31 +52,31 @@ Outline Reduced(const Outline& full) {
   return small;
 }
 
-// Outlines of all photos; empty unless each has one.
-std::vector<Outline> ReadOutlines(const Capture& capture) {
-  std::vector<Outline> outlines;
+// Silhouettes of all photos; empty unless each has one.
+std::vector<Silhouette> ReadSilhouettes(const Capture& capture) {
+  std::vector<Silhouette> silhouettes;
   for (const CaptureView& view : capture.views)
     if (!std::filesystem::is_regular_file(AlphaPath(view))) return {};
   for (const CaptureView& view : capture.views)
-    outlines.push_back(Reduced({view.camera, ReadImage(AlphaPath(view))}));
-  return outlines;
+    silhouettes.push_back(Reduced({view.camera, ReadImage(AlphaPath(view))}));
+  return silhouettes;
 }
 
-double TransparentShare(const std::vector<Outline>& outlines) {
+double TransparentShare(const std::vector<Silhouette>& silhouettes) {
   int64_t clear = 0, all = 0;
-  for (const Outline& outline : outlines) {
-    all += outline.alpha.num_pixels();
-    clear += std::count_if(outline.alpha.pixels.begin(), outline.alpha.pixels.end(),
+  for (const Silhouette& silhouette : silhouettes) {
+    all += silhouette.alpha.num_pixels();
+    clear += std::count_if(silhouette.alpha.pixels.begin(), silhouette.alpha.pixels.end(),
                            [](float a) { return a < 0.5f; });
   }
   return all > 0 ? static_cast<double>(clear) / static_cast<double>(all) : 0;
 }
 
-JsonValue NumberOrNull(const Figure& figure) {
-  return figure.value ? JsonValue(*figure.value) : JsonValue();
+JsonValue NumberOrNull(const Metric& metric) {
+  return metric.value ? JsonValue(*metric.value) : JsonValue();
 }
-Figure FigureOrNone(const JsonValue& value) {
-  return value.IsNumber() ? Figure(value.AsDouble()) : Figure();
+Metric MetricOrNone(const JsonValue& value) {
+  return value.IsNumber() ? Metric(value.AsDouble()) : Metric();
 }
 
 // The photos that keep their exposure for want of evidence.
@@ -97,7 +97,7 @@ std::string GainsEvidence(const ExposureEstimate& exposure) {
                 exposure.spread, exposure.median_error);
   return "share of the photos' disagreement about points' colours that gains found without "
          "those points take away" +
-         std::string(spread) + "a spread up to " + Short(Figure{kExposureSpread}) +
+         std::string(spread) + "a spread up to " + Short(Metric{kExposureSpread}) +
          " is left alone";
 }
 
@@ -108,7 +108,7 @@ void ProfileExposure(const Capture& capture, const std::map<std::string, bool>& 
   const bool asked_for = wish != wishes.end() && wish->second;
   const auto leave_out = [&](const char* why) {
     if (asked_for) throw Error(ExitCode::kScene, why, "--effects exposure=on");
-    profile->effects.push_back({"exposure", false, why, Figure(), kExposureSpread});
+    profile->effects.push_back({"exposure", false, why, Metric(), kExposureSpread});
   };
   if (wish != wishes.end() && !wish->second) return leave_out("it was not wanted");
   if (alpha) return leave_out("the white behind transparent photos has no exposure");
@@ -129,7 +129,7 @@ void ProfileExposure(const Capture& capture, const std::map<std::string, bool>& 
 }  // namespace
 
 bool ShowsThroughPhotos(const Capture& capture) {
-  return TransparentShare(ReadOutlines(capture)) > kAlphaShare;
+  return TransparentShare(ReadSilhouettes(capture)) > kAlphaShare;
 }
 
 std::map<std::string, bool> ParseEffects(const std::string& text) {
@@ -167,8 +167,8 @@ SceneProfile ProfileScene(const Capture& capture, int sh_degree, const std::stri
       Row("distortion", shift > kDistortionThreshold, shift, kDistortionThreshold,
           "largest shift of a picture's corner by the lens, over the cameras, in pixels"));
 
-  const std::vector<Outline> outlines = ReadOutlines(capture);
-  const double clear = TransparentShare(outlines);
+  const std::vector<Silhouette> silhouettes = ReadSilhouettes(capture);
+  const double clear = TransparentShare(silhouettes);
   const bool alpha = decided("alpha", clear > kAlphaShare);
 
   const ForwardFacing forward = MeasureForwardFacing(capture);
@@ -185,17 +185,18 @@ SceneProfile ProfileScene(const Capture& capture, int sh_degree, const std::stri
     throw Error(ExitCode::kUsage,
                 std::string("background spheres do not go with ") + (ndc ? "ndc" : "alpha"),
                 "--effects background=on", ndc ? "add ndc=off" : "add alpha=off");
-  profile.effects.push_back(Row("background", background, surroundings.far_share, kFarShare,
-                                "spheres behind the box, on where much is far all round: share "
-                                "of sightings of points beyond four times the cameras' reach"));
+  profile.effects.push_back(
+      Row("background", background, surroundings.far_share, kFarShare,
+          "spheres behind the box, on where much is far all round: share "
+          "of observations of points beyond four times the cameras' reach"));
   profile.effects.push_back(Row(kViewDependence, sh_degree > 0, sh_degree, 0,
                                 "spherical harmonics degree of the fit, as set"));
 
   profile.scene = ndc          ? NormalizeForwardFacing(capture, forward)
                   : background ? NormalizeSurrounded(capture, surroundings)
                                : NormalizeScene(capture);
-  if (alpha && !outlines.empty()) {
-    if (!ndc) profile.scene = TightenToOutlines(profile.scene, outlines);
+  if (alpha && !silhouettes.empty()) {
+    if (!ndc) profile.scene = TightenToSilhouettes(profile.scene, silhouettes);
     profile.scene.box.background = Vec3f{1, 1, 1};  // what transparent photos are laid over
   }
   ProfileExposure(capture, wishes, alpha, &profile);
@@ -227,8 +228,8 @@ std::vector<EffectReport> EffectsOfRecord(const JsonValue& record) {
   std::vector<EffectReport> effects;
   for (const JsonValue& row : record.AsArray())
     effects.push_back({row.At("name").AsString(), row.At("on").AsBool(),
-                       row.At("evidence").AsString(), FigureOrNone(row.At("value")),
-                       FigureOrNone(row.At("threshold"))});
+                       row.At("evidence").AsString(), MetricOrNone(row.At("value")),
+                       MetricOrNone(row.At("threshold"))});
   return effects;
 }
 

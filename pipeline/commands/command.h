@@ -30,7 +30,7 @@ void CheckWords(const Command& command, const Arguments& words, size_t least, si
 // Before any work.
 void ApplyProgramOptions(const ProgramOptions& options);
 
-void RunRoad(const Command&, const Arguments&, Console*);    // run, pose, reconstruct
+void RunStages(const Command&, const Arguments&, Console*);  // run, pose, reconstruct
 void RunFolder(const Command&, const Arguments&, Console*);  // stylize, render
 void RunEvaluate(const Command&, const Arguments&, Console*);
 void RunContactSheet(const Command&, const Arguments&, Console*);

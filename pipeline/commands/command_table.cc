@@ -5,10 +5,10 @@ namespace regrade {
 const std::vector<Command>& AllCommands() {
   static const std::vector<Command> commands = {
       {"run", "PHOTOS|CAPTURE --style PICTURE --out DIR [OPTIONS]",
-       "photos and a style picture become a styled scene, with films and a report", RunRoad},
-      {"pose", "PHOTOS --out DIR [OPTIONS]", "finds where each photo was taken", RunRoad},
+       "photos and a style picture become a styled scene, with films and a report", RunStages},
+      {"pose", "PHOTOS --out DIR [OPTIONS]", "finds where each photo was taken", RunStages},
       {"reconstruct", "PHOTOS|CAPTURE --out DIR [OPTIONS]",
-       "fits a radiance field to the photos", RunRoad},
+       "fits a radiance field to the photos", RunStages},
       {"stylize", "DIR --style PICTURE [OPTIONS]",
        "gives a finished reconstruction another style, and measures it", RunFolder},
       {"render", "DIR [OPTIONS]", "renders and measures a styled scene again", RunFolder},
@@ -20,7 +20,7 @@ const std::vector<Command>& AllCommands() {
        "DIR [OPTIONS] | --frames DIR [--reference DIR] [--target DIR] [--style PICTURE]",
        "measures consistency and fidelity, of a run or of any program's frames", RunEvaluate},
       {"tradeoff", "PHOTOS|CAPTURE|DIR --out DIR [--style PICTURE] [OPTIONS] | --predict DIR",
-       "measures here what each knob costs in time and buys in accuracy", RunTradeoff},
+       "measures here what each parameter costs in time and buys in accuracy", RunTradeoff},
       {"synth", "OUT [OPTIONS]", "writes a synthetic capture with its exact truth", RunSynth},
       {"export", "DIR --out FOLDER [OPTIONS]",
        "photos and poses for other programs: COLMAP text or binary, transforms.json",

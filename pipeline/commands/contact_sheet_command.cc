@@ -7,7 +7,7 @@
 #include "kernels/base/error.h"
 #include "kernels/field/cpu/render_view.h"
 #include "kernels/field/packed_grid.h"
-#include "kernels/field/widened.h"
+#include "kernels/field/pad_sh_basis.h"
 #include "kernels/image/color_statistics.h"
 #include "kernels/image/resize.h"
 #include "pipeline/capture/capture_store.h"
@@ -91,11 +91,11 @@ std::string PsnrCaption(const Image& a, const Image& b, bool of_photos) {
 struct Scene {
   Capture capture;
   StoredField stored;
-  Backend backend = Backend::kCpu;  // where networks learn
-  std::vector<int> taught, shown;   // views
-  std::vector<Camera> cameras;      // of all views
-  std::vector<Image> photos;        // of all views that are taught or shown
-  std::vector<Image> kept;          // what --photo-masks leaves of each, or empty
+  Backend backend = Backend::kCpu;         // where networks learn
+  std::vector<int> training_views, shown;  // views
+  std::vector<Camera> cameras;             // of all views
+  std::vector<Image> photos;               // of all views that are taught or shown
+  std::vector<Image> kept;                 // what --photo-masks leaves of each, or empty
 };
 
 Scene ReadScene(const Workspace& workspace, const SheetOptions& sheet, int holdout) {
@@ -104,13 +104,15 @@ Scene ReadScene(const Workspace& workspace, const SheetOptions& sheet, int holdo
   scene.stored = ReadFieldFile(workspace.Path("field.npz"));
   // As a run does it: what differs from view to view needs directions.
   scene.stored.field.appearance =
-      Widened(std::move(scene.stored.field.appearance), kStyledBasis);
-  scene.taught = ViewIndices(scene.capture, holdout, false);
-  if (scene.taught.empty()) scene.taught = ViewIndices(scene.capture, holdout, true);
-  const int count = std::min(sheet.views, static_cast<int>(scene.taught.size()));
+      PadShBasis(std::move(scene.stored.field.appearance), kStyledBasis);
+  scene.training_views = ViewIndices(scene.capture, holdout, false);
+  if (scene.training_views.empty())
+    scene.training_views = ViewIndices(scene.capture, holdout, true);
+  const int count = std::min(sheet.views, static_cast<int>(scene.training_views.size()));
   for (int k = 0; k < count; ++k)
-    scene.shown.push_back(scene.taught[(2 * static_cast<size_t>(k) + 1) * scene.taught.size() /
-                                       (2 * static_cast<size_t>(count))]);
+    scene.shown.push_back(
+        scene.training_views[(2 * static_cast<size_t>(k) + 1) * scene.training_views.size() /
+                             (2 * static_cast<size_t>(count))]);
   const PhotoGains gains = RecordedGains(workspace, scene.capture);
   for (size_t i = 0; i < scene.capture.views.size(); ++i) {
     const CaptureView& view = scene.capture.views[i];
@@ -162,7 +164,7 @@ void AddStyle(RunContext* context, const Scene& scene, const SheetOptions& sheet
   std::vector<Image> targets(scene.photos.size());
   std::vector<StyledTrainingView> views;
   std::vector<ColorStatistics> before, after;
-  for (const int i : scene.taught) {
+  for (const int i : scene.training_views) {
     const size_t n = static_cast<size_t>(i);
     const Image& kept = scene.kept[n];
     const bool masked = kept.num_pixels() > 0;
@@ -268,7 +270,7 @@ void RunContactSheet(const Command& command, const Arguments& arguments, Console
   scene.backend = backend;
   const std::string plan = std::to_string(words.size() - 1) + " styles, " +
                            std::to_string(scene.shown.size()) + " views each, learned from " +
-                           std::to_string(scene.taught.size()) + " photos at " +
+                           std::to_string(scene.training_views.size()) + " photos at " +
                            std::to_string(sheet.size) + " pixels";
   console->Info(plan);
   if (sheet.dry_run) return;

@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "kernels/base/error.h"
-#include "kernels/field/widened.h"
+#include "kernels/field/pad_sh_basis.h"
 #include "pipeline/capture/capture_store.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/commands/command.h"
@@ -94,8 +94,8 @@ MixCameras CamerasOf(const std::string& folder, const StoredField& stored,
 
 void WriteMix(const std::string& out, const RadianceField& source,
               const std::vector<const RadianceField*>& styles, const MixKeys& keys,
-              const std::vector<float>* shares_of_voxels, const MixCameras& cameras, double fps,
-              Backend backend, Console* console) {
+              const std::vector<float>* weights_of_voxels, const MixCameras& cameras,
+              double fps, Backend backend, Console* console) {
   std::optional<VideoWriter> film;
   try {
     film.emplace(out + "/mixed.mp4", cameras.film[0].width, cameras.film[0].height, fps);
@@ -109,13 +109,13 @@ void WriteMix(const std::string& out, const RadianceField& source,
   std::unique_ptr<FieldRenderer> renderer;
   const int frames = static_cast<int>(cameras.film.size());
   for (int i = 0; i < frames; ++i) {
-    if (Report(progress, i, frames) == Verdict::kAbort) throw Interrupted();
+    if (Report(progress, i, frames) == LoopControl::kStop) throw Interrupted();
     const std::vector<double> shares =
         keys.At(static_cast<double>(i) / std::max(1, frames - 1));
     if (!renderer || shares != shown) {
       renderer.reset();  // one at a time: a field may be most of the memory
       renderer = std::make_unique<FieldRenderer>(
-          MixFields(source, styles, shares, shares_of_voxels), backend);
+          MixFields(source, styles, shares, weights_of_voxels), backend);
       shown = shares;
     }
     const Camera& of_frame = cameras.frames[static_cast<size_t>(i)];
@@ -188,12 +188,12 @@ void RunMix(const Command& command, const Arguments& arguments, Console* console
     basis = std::max(basis, field.appearance.basis);
   }
   // Styles of a field whose colours know no direction may know some.
-  stored.field.appearance = Widened(std::move(stored.field.appearance), basis);
+  stored.field.appearance = PadShBasis(std::move(stored.field.appearance), basis);
   for (StoredField& style : styles)
-    style.field.appearance = Widened(std::move(style.field.appearance), basis);
+    style.field.appearance = PadShBasis(std::move(style.field.appearance), basis);
   for (const StoredField& style : styles) fields.push_back(&style.field);
 
-  std::optional<ObjectShares> object;
+  std::optional<ObjectWeights> object;
   if (settings.object) {
     const std::string file = folder + "/object.npz";
     if (!fs::exists(file))

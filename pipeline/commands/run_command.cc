@@ -96,7 +96,7 @@ std::string Absolute(const std::string& path) {
 
 }  // namespace
 
-void RunRoad(const Command& command, const Arguments& arguments, Console* console) {
+void RunStages(const Command& command, const Arguments& arguments, Console* console) {
   const std::string name = command.name;
   const std::string last = name == "run" ? "report" : name;
   RunContext context;

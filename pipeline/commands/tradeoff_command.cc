@@ -1,5 +1,5 @@
-// regrade tradeoff: what each knob costs in time and buys in accuracy, measured on this machine
-// with a capture of one's own.
+// regrade tradeoff: what each parameter costs in time and buys in accuracy, measured on this
+// machine with a capture of one's own.
 #include <omp.h>
 
 #include <algorithm>
@@ -31,16 +31,18 @@ namespace {
 namespace fs = std::filesystem;
 
 struct TradeoffOptions {
-  std::string knobs, presets = "draft,standard", predict, prices;
+  std::string parameters, presets = "draft,standard", predict, costs;
   int repeats = 3;
   double budget = 0;
   bool with_poses = false;
 
   template <typename Bind>
   void Describe(Bind& bind) {
-    bind("knobs", knobs, {.help = "only these, with commas between; empty measures all"});
+    bind("parameters", parameters,
+         {.help = "only these, with commas between; empty measures all"});
     bind("presets", presets,
-         {.help = "measured as points beside the knobs, dear and last; none leaves them out"});
+         {.help =
+              "measured as points beside the parameters, dear and last; none leaves them out"});
     bind("repeats", repeats,
          {.unit = "measurements",
           .help = "of everything, in an order that turns from one to the next, each with "
@@ -54,12 +56,12 @@ struct TradeoffOptions {
                   "end",
           .min = 0,
           .max = 1e6});
-    bind("with-poses", with_poses,
-         {.help = "COLMAP's knobs too, where photos are given: its time is measured anew"});
     bind(
-        "predict", predict,
-        {.help = "a run's folder: what --prices say it should have taken, beside what it did"});
-    bind("prices", prices, {.help = "the tradeoff.json to predict from"});
+        "with-poses", with_poses,
+        {.help = "COLMAP's parameters too, where photos are given: its time is measured anew"});
+    bind("predict", predict,
+         {.help = "a run's folder: what --costs say it should have taken, beside what it did"});
+    bind("costs", costs, {.help = "the tradeoff.json to predict from"});
   }
 };
 
@@ -99,8 +101,8 @@ std::vector<Job> JobsOf(const std::vector<Variant>& variants, int repeats) {
 }
 
 std::string NameOf(const Variant& variant) {
-  if (variant.knob.empty()) return variant.plane + ": the base";
-  return variant.plane + ": " + variant.knob + " " + variant.value;
+  if (variant.parameter.empty()) return variant.plane + ": the base";
+  return variant.plane + ": " + variant.parameter + " " + variant.value;
 }
 
 // A preset that is the base is measured already.
@@ -134,13 +136,13 @@ std::string Fingerprint(const RunContext& base, const Workspace& workspace) {
 void WriteResults(const RunContext& base, const TradeoffOptions& tradeoff,
                   const std::string& folder, const std::vector<Variant>& variants,
                   const MeasurementStore& store, const std::string& base_name) {
-  const std::vector<PriceRow> rows = PriceList(variants, store.all(), base_name);
+  const std::vector<CostRow> rows = CostTable(variants, store.all(), base_name);
   const Capture capture = ReadCapture(base.workspace->Path("poses"));
-  JsonValue::Array prices, measured;
-  for (const PriceRow& row : rows) prices.push_back(PriceJson(row));
+  JsonValue::Array costs, measured;
+  for (const CostRow& row : rows) costs.push_back(CostJson(row));
   for (const Measurement& m : store.all()) measured.push_back(ToJson(m));
-  const std::vector<PriceTerm> terms =
-      LearnPrices(base.settings, capture, *base.workspace, variants, store.all());
+  const std::vector<CostTerm> terms =
+      LearnCosts(base.settings, capture, *base.workspace, variants, store.all());
   WriteJsonFile(folder + "/tradeoff.json",
                 JsonValue::Object{{"schema", 1},
                                   {"regrade", REGRADE_VERSION},
@@ -148,22 +150,22 @@ void WriteResults(const RunContext& base, const TradeoffOptions& tradeoff,
                                   {"repeats", tradeoff.repeats},
                                   {"threads", omp_get_max_threads()},
                                   {"instructions", FastRays().name},
-                                  {"prices", std::move(prices)},
-                                  {"unit_prices", ToJson(terms)},
+                                  {"costs", std::move(costs)},
+                                  {"unit_costs", ToJson(terms)},
                                   {"measurements", std::move(measured)}});
-  WriteFileAtomically(folder + "/tradeoff.csv", PriceListCsv(rows));
+  WriteFileAtomically(folder + "/tradeoff.csv", CostTableCsv(rows));
   RunReport report;
   report.version = REGRADE_VERSION;
   report.preset = base.settings.run.preset;
   report.device = "cpu";
-  report.prices = rows;
+  report.costs = rows;
   for (const Measurement& m : store.all()) report.seconds += m.seconds;
   ReportPictures pictures;
   pictures.title = "prices of " + fs::path(base.source).filename().string();
   pictures.chart_library = ReadChartLibrary();
   WriteFileAtomically(folder + "/tradeoff.html", ReportHtml(report, pictures));
-  base.console->Event("prices", JsonValue::Object{{"file", folder + "/tradeoff.json"}});
-  base.console->Lines(PriceListText(rows));
+  base.console->Event("costs", JsonValue::Object{{"file", folder + "/tradeoff.json"}});
+  base.console->Lines(CostTableText(rows));
 }
 
 // What is not measured yet, one at a time, until all is or the budget is spent.
@@ -174,8 +176,8 @@ void MeasureAll(RunContext* base, const TradeoffOptions& tradeoff, const std::st
   std::erase_if(
       jobs, [&](const Job& job) { return store->Find(*job.variant, job.repeat) != nullptr; });
   Console* console = base->console;
-  Guess guess(base->settings, store->all());
-  Bench bench(base, folder + "/work");
+  DurationEstimate guess(base->settings, store->all());
+  VariantRunner bench(base, folder + "/work");
   for (size_t i = 0; i < jobs.size(); ++i) {
     double left = 0;
     for (size_t k = i; k < jobs.size(); ++k) left += guess.Seconds(*jobs[k].variant);
@@ -219,11 +221,11 @@ void CheckOptions(const RunSettings& settings, const TradeoffOptions& tradeoff) 
 }
 
 void PrintPrediction(const TradeoffOptions& tradeoff, Console* console) {
-  if (tradeoff.prices.empty())
-    throw Error(ExitCode::kUsage, "its value is missing", "--prices",
+  if (tradeoff.costs.empty())
+    throw Error(ExitCode::kUsage, "its value is missing", "--costs",
                 "name the tradeoff.json that `regrade tradeoff` wrote");
-  const std::vector<PriceTerm> prices =
-      PricesFromJson(ReadJsonFile(tradeoff.prices), tradeoff.prices);
+  const std::vector<CostTerm> costs =
+      CostsFromJson(ReadJsonFile(tradeoff.costs), tradeoff.costs);
   if (!Workspace::Exists(tradeoff.predict))
     throw Error(ExitCode::kInput, "no run has worked in this folder", tradeoff.predict,
                 "make one with `regrade run`");
@@ -255,7 +257,7 @@ void PrintPrediction(const TradeoffOptions& tradeoff, Console* console) {
                                      {"predicted_cpu_seconds", said.cpu_seconds},
                                      {"cpu_seconds", was.cpu_seconds}});
   };
-  for (const StageTime& said : Predict(prices, run.settings, capture)) {
+  for (const StageTime& said : Predict(costs, run.settings, capture)) {
     const auto record = workspace.Find(said.stage);
     if (!record) continue;
     const StageTime was{said.stage, record->seconds, record->cpu_seconds.value_or(0)};
@@ -301,13 +303,13 @@ void RunTradeoff(const Command& command, const Arguments& arguments, Console* co
     ReadStylePicture(settings.style.picture, nullptr);
     ProbeMethod(&settings.style_2d);
   }
-  KnobChoice choice{Words(tradeoff.knobs),
-                    tradeoff.with_poses && source.kind == CaptureKind::kPhotos, style,
-                    Words(tradeoff.presets)};
+  ParameterChoice choice{Words(tradeoff.parameters),
+                         tradeoff.with_poses && source.kind == CaptureKind::kPhotos, style,
+                         Words(tradeoff.presets)};
   const std::string base_name = BaseName(settings, base.options, &choice.presets);
   const std::vector<Variant> variants = VariantsOf(settings, choice);
   if (settings.start.dry_run) {
-    const Guess guess(settings, {});
+    const DurationEstimate guess(settings, {});
     double all = 0;
     for (const Variant& variant : variants) {
       console->Info(NameOf(variant) + ", about " + DurationText(guess.Seconds(variant)));

@@ -62,7 +62,7 @@ double Jump(const Camera& a, const Camera& b, double unit) {
   return Norm(a.Center() - b.Center()) / unit + turn;
 }
 
-double MeanSpread(const std::vector<Camera>& cameras, const Vec3d& center) {
+double MeanExtent(const std::vector<Camera>& cameras, const Vec3d& center) {
   double sum = 0;
   for (const Camera& camera : cameras) sum += Norm(camera.Center() - center);
   return std::max(sum / static_cast<double>(cameras.size()), 1e-9);
@@ -83,7 +83,7 @@ Vec3d MeanUp(const std::vector<Camera>& cameras) {
 // Gaussian means of the photos' places and headings along the tour.
 std::vector<Camera> SmoothPath(const std::vector<Camera>& cameras, int frames) {
   const std::vector<int> order = SmoothOrder(cameras);
-  const double unit = MeanSpread(cameras, MeanCenter(cameras));
+  const double unit = MeanExtent(cameras, MeanCenter(cameras));
   std::vector<double> at(order.size(), 0.0);
   for (size_t i = 1; i < order.size(); ++i)
     at[i] = at[i - 1] + Jump(cameras[static_cast<size_t>(order[i - 1])],
@@ -178,7 +178,7 @@ std::vector<int> SmoothOrder(const std::vector<Camera>& cameras) {
   std::iota(natural.begin(), natural.end(), 0);
   constexpr size_t kMostToSort = 300;  // 2-opt is cubic at worst
   if (n < 4 || n > kMostToSort) return natural;
-  const double unit = MeanSpread(cameras, MeanCenter(cameras));
+  const double unit = MeanExtent(cameras, MeanCenter(cameras));
   const auto jump = [&](int a, int b) {
     return Jump(cameras[static_cast<size_t>(a)], cameras[static_cast<size_t>(b)], unit);
   };

@@ -89,10 +89,10 @@ StoredNetwork ReadNetworkFile(const std::string& path) {
   }
   StoredNetwork stored{LipschitzNetwork(std::move(data)), file.ReadScalar<double>("k_est")};
   if (!std::isfinite(stored.k_est)) Refuse(path, "k_est is not finite");
-  const double promised = file.ReadScalar<double>("bound"), bound = stored.network.Bound();
-  if (!(std::abs(promised - bound) <= kBoundTolerance * bound))
-    Refuse(path, "it promises the bound " + std::to_string(promised) + ", its weights have " +
-                     std::to_string(bound));
+  const double guaranteed = file.ReadScalar<double>("bound"), bound = stored.network.Bound();
+  if (!(std::abs(guaranteed - bound) <= kBoundTolerance * bound))
+    Refuse(path, "it guarantees the bound " + std::to_string(guaranteed) +
+                     ", its weights have " + std::to_string(bound));
   return stored;
 }
 

@@ -65,7 +65,7 @@ void FitPacked(const FitPackedOptions& settings, const FitOptions& options) {
       std::fprintf(stderr, "%3.0f %%  %.0f s  %s\n", 100 * progress.done / progress.total,
                    last_note, progress.note.c_str());
     }
-    return Verdict::kContinue;
+    return LoopControl::kContinue;
   };
   HeldOut measured;
   JsonValue::Array stages;
@@ -83,7 +83,7 @@ void FitPacked(const FitPackedOptions& settings, const FitOptions& options) {
                    {fit.field, capture.scene.field_from_world, capture.scene.ndc});
     if (backend == Backend::kCuda) {
       const DeviceGrid grid = UploadGrid(MakeFastGrid(fit.field));
-      render = RenderPrices(grid, capture, options.step);
+      render = RenderCosts(grid, capture, options.step);
     }
   }
 

@@ -61,7 +61,7 @@ double RenderMilliseconds(const DeviceGrid& grid, const PackedCapture& capture,
                           const HalfGrid* half = nullptr);
 // The same for a row of settings of the march and of opacity_step: milliseconds, and the error
 // against the first in dB.
-JsonValue RenderPrices(const DeviceGrid& grid, const PackedCapture& capture, float step);
+JsonValue RenderCosts(const DeviceGrid& grid, const PackedCapture& capture, float step);
 
 // The held-out views, exact, as pictures NAME_0.ppm, NAME_1.ppm, ...
 void RenderHeldOut(const DeviceGrid& grid, const PackedCapture& capture,

@@ -46,7 +46,7 @@ void RenderPacked(const RenderPackedOptions& settings) {
       JsonValue::Object{{"capture", settings.capture},
                         {"device", ReadDeviceStatus().name},
                         {"voxels", stored.field.geometry->num_voxels()},
-                        {"render", RenderPrices(grid, capture, stored.field.step)}};
+                        {"render", RenderCosts(grid, capture, stored.field.step)}};
   std::printf("%s\n", DumpJson(record, -1).c_str());
   std::fflush(stdout);
 }

@@ -47,7 +47,7 @@ double RenderMilliseconds(const DeviceGrid& grid, const PackedCapture& capture,
   return Median(milliseconds);
 }
 
-JsonValue RenderPrices(const DeviceGrid& grid, const PackedCapture& capture, float step) {
+JsonValue RenderCosts(const DeviceGrid& grid, const PackedCapture& capture, float step) {
   struct Setting {
     float stop, opacity_step, step;
     bool half;

@@ -36,28 +36,29 @@ class Stopwatch {
 };
 
 // What the 2D method made of the views that the field was fitted to.
-struct Lessons {
+struct StyleTargets {
   std::vector<Image> targets;
   std::vector<StyledTrainingView> views;
   SceneColorMap scene_map;
 };
 
-Lessons StyleViews(const PackedCapture& capture) {
-  Lessons lessons;
-  lessons.targets.reserve(capture.views.size());
+StyleTargets StyleViews(const PackedCapture& capture) {
+  StyleTargets style_targets;
+  style_targets.targets.reserve(capture.views.size());
   const std::unique_ptr<ViewStylizer> method = MakeColorTransfer(StyleOptions(), capture.style);
   std::vector<ColorStatistics> before, after;
   for (size_t i = 0; i < capture.views.size(); ++i) {
     const PackedView& view = capture.views[i];
     if (view.held_out) continue;
-    lessons.targets.push_back(method->Stylize(view.photo, static_cast<int>(i)));
-    lessons.views.push_back({view.camera, &lessons.targets.back(), nullptr, view.file});
+    style_targets.targets.push_back(method->Stylize(view.photo, static_cast<int>(i)));
+    style_targets.views.push_back(
+        {view.camera, &style_targets.targets.back(), nullptr, view.file});
     before.push_back(MeasureColor(view.photo));
-    after.push_back(MeasureColor(lessons.targets.back()));
+    after.push_back(MeasureColor(style_targets.targets.back()));
   }
   const MklMap mkl = ComputeMkl(Pool(before), Pool(after));
-  lessons.scene_map = {mkl.map, mkl.norm};
-  return lessons;
+  style_targets.scene_map = {mkl.map, mkl.norm};
+  return style_targets;
 }
 
 }  // namespace
@@ -72,9 +73,9 @@ void StylePacked(const StylePackedOptions& settings, const TrainNetworkOptions& 
   const MarchOptions march{stored.field.step};
   JsonValue record = JsonValue::Object{{"capture", settings.capture}};
   record["seconds_read"] = watch.Lap();
-  const Lessons lessons = StyleViews(capture);
+  const StyleTargets style_targets = StyleViews(capture);
   record["seconds_2d"] = watch.Lap();
-  const Vec3d background = lessons.scene_map.map(stored.field.background.Cast<double>());
+  const Vec3d background = style_targets.scene_map.map(stored.field.background.Cast<double>());
   for (int c = 0; c < 3; ++c)
     stored.field.background[c] = static_cast<float>(std::clamp(background[c], 0.0, 1.0));
 
@@ -95,11 +96,11 @@ void StylePacked(const StylePackedOptions& settings, const TrainNetworkOptions& 
     (reports++ == 0 ? seconds_start : seconds_steps) += steps.Lap();
     if (on_device && reports % 4 == 1)
       least_free = std::min(least_free, ReadDeviceStatus().free_bytes);
-    return Verdict::kContinue;
+    return LoopControl::kContinue;
   };
   const TrainNetworkResult trained =
-      TrainNetwork(stored.field, lessons.views, lessons.scene_map, march, options, hooks,
-                   nullptr, on_device ? &grid : nullptr);
+      TrainNetwork(stored.field, style_targets.views, style_targets.scene_map, march, options,
+                   hooks, nullptr, on_device ? &grid : nullptr);
   record["seconds_learn"] = watch.Lap();
   record["seconds_start_and_first_steps"] = seconds_start;
   record["seconds_other_steps"] = seconds_steps;
@@ -113,7 +114,7 @@ void StylePacked(const StylePackedOptions& settings, const TrainNetworkOptions& 
                                     [](const PackedView& view) { return view.held_out; });
     if (first != capture.views.end()) RenderViewOnDevice(grid, first->camera, march);
     record["seconds_first_frame"] = watch.Lap();
-    record["render"] = RenderPrices(grid, capture, march.step);
+    record["render"] = RenderCosts(grid, capture, march.step);
     if (!settings.frames.empty())
       RenderHeldOut(grid, capture, march, settings.frames, "styled");
   }
@@ -126,7 +127,7 @@ void StylePacked(const StylePackedOptions& settings, const TrainNetworkOptions& 
   record["linear_map_psnr_db"] = trained.linear_map_psnr_db;
   record["k_est"] = trained.k_est;
   record["bound"] = trained.bound;
-  record["slope_observed"] = trained.slope_observed;
+  record["local_lipschitz_sampled"] = trained.local_lipschitz_sampled;
   std::printf("%s\n", DumpJson(record, -1).c_str());
   std::fflush(stdout);
 }

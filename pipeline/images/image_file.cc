@@ -25,8 +25,8 @@
 namespace regrade {
 namespace {
 
-// Picture formats promise at most about 1000 decoded bytes for each stored one (DEFLATE's limit
-// is 1032); a header that claims far more than its file can hold is a trap or a wreck.
+// Picture formats guarantee at most about 1000 decoded bytes for each stored one (DEFLATE's
+// limit is 1032); a header that claims far more than its file can hold is a trap or a wreck.
 constexpr int64_t kMaxExpansion = 2000, kExpansionSlack = 16 << 20;
 
 void CheckSize(int64_t width, int64_t height, int64_t pixel_bytes, int64_t file_bytes,

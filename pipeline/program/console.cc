@@ -185,7 +185,7 @@ void Console::EndStage() {
 ProgressFunction Console::StageProgress() {
   return [this](const Progress& progress) {
     Draw(progress);
-    return StopRequested() ? Verdict::kAbort : Verdict::kContinue;
+    return StopRequested() ? LoopControl::kStop : LoopControl::kContinue;
   };
 }
 

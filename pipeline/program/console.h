@@ -52,7 +52,7 @@ class Console {
   void BeginStage(const std::string& stage);
   void EndStage();
   double StageSeconds() const;
-  // Draws, keeps the estimate, and says kAbort once a signal has asked us to stop.
+  // Draws, keeps the estimate, and says kStop once a signal has asked us to stop.
   ProgressFunction StageProgress();
 
  private:

@@ -32,7 +32,7 @@ void Limit(int64_t bytes) {
   ::setrlimit(RLIMIT_CORE, &no_core);
 }
 
-[[noreturn]] void RunChild(const std::function<void()>& work, const RehearsalLimits& limits,
+[[noreturn]] void RunChild(const std::function<void()>& work, const CrashProbeLimits& limits,
                            pid_t parent) {
   // It ends with us, also where we had ended before it could ask for that.
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
@@ -61,8 +61,8 @@ void Limit(int64_t bytes) {
 
 }  // namespace
 
-void Rehearse(const std::function<void()>& work, const std::string& where,
-              const RehearsalLimits& limits) {
+void RunCrashProbe(const std::function<void()>& work, const std::string& where,
+                   const CrashProbeLimits& limits) {
   const pid_t parent = ::getpid(), child = ::fork();
   if (child < 0)
     throw Error(ExitCode::kResources,

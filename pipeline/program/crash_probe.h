@@ -7,7 +7,7 @@
 
 namespace regrade {
 
-struct RehearsalLimits {
+struct CrashProbeLimits {
   double seconds = 300;                      // of the wall clock
   int64_t memory_bytes = int64_t{32} << 30;  // of address space; not kept by sanitizers' builds
 };
@@ -16,7 +16,7 @@ struct RehearsalLimits {
 // ended in whatever way a program may go on from, its own Errors included: the caller's own
 // call will tell them. Throws Error(kExternalProgram) naming `where` if the copy died by a
 // signal, and if it was ended because it took more time or memory than the limits.
-void Rehearse(const std::function<void()>& work, const std::string& where,
-              const RehearsalLimits& limits = {});
+void RunCrashProbe(const std::function<void()>& work, const std::string& where,
+                   const CrashProbeLimits& limits = {});
 
 }  // namespace regrade

@@ -11,7 +11,7 @@
 namespace regrade {
 namespace {
 
-bool OfFilm(const ConsistencyFigures& row) {
+bool OfFilm(const ConsistencyMetrics& row) {
   return row.sequence.starts_with(kPathPrefix) && row.sequence != kPathPrefix;
 }
 
@@ -32,7 +32,7 @@ PlotSeries Level(const std::string& name, double value, int64_t first, int64_t l
 
 std::string ConsistencyChart(const RunReport& report, bool film) {
   int gap = INT_MAX;
-  const auto wanted = [film](const ConsistencyFigures& row) {
+  const auto wanted = [film](const ConsistencyMetrics& row) {
     return OfFilm(row) == film && !row.tc_psnr_pairs_db.empty();
   };
   for (const auto& row : report.consistency)

@@ -3,10 +3,10 @@
 
 #include <algorithm>
 
+#include "pipeline/report/costs.h"
 #include "pipeline/report/html_text.h"
 #include "pipeline/report/page_assets.h"
 #include "pipeline/report/photos.h"
-#include "pipeline/report/prices.h"
 #include "pipeline/report/tables.h"
 
 namespace regrade {
@@ -119,8 +119,8 @@ std::string ReportHtml(const RunReport& report, const ReportPictures& pictures) 
       title + "</h1>" + FactsHtml(report) + "</header>\n";
   if (headline) html += CompareHtml(*headline);
   for (const std::string& section :
-       {HeadlineFiguresHtml(report), FilmsHtml(pictures, headline), ViewsHtml(pictures),
-        ConsistencyHtml(report), HeatMapsHtml(pictures), StagesHtml(report), PricesHtml(report),
+       {HeadlineMetricsHtml(report), FilmsHtml(pictures, headline), ViewsHtml(pictures),
+        ConsistencyHtml(report), HeatMapsHtml(pictures), StagesHtml(report), CostsHtml(report),
         EffectsHtml(report), PhotosHtml(report, pictures),
         RepeatHtml(report, pictures.run_json)}) {
     if (!section.empty()) html += "<section>" + section + "</section>\n";

@@ -10,12 +10,12 @@ constexpr int kSchema = 1;
 
 using Object = JsonValue::Object;
 
-void Put(Object& object, const std::string& key, const Figure& figure) {
-  if (figure.value) {
-    object.emplace_back(key, *figure.value);
+void Put(Object& object, const std::string& key, const Metric& metric) {
+  if (metric.value) {
+    object.emplace_back(key, *metric.value);
   } else {
     object.emplace_back(key, nullptr);
-    object.emplace_back(key + "_why", figure.why);
+    object.emplace_back(key + "_why", metric.why);
   }
 }
 
@@ -45,9 +45,9 @@ JsonValue PhotosJson(const PhotosReport& photos) {
   return Object{{"given", photos.given},
                 {"used", photos.used},
                 {"registered", photos.registered},
-                {"verdicts", List(photos.verdicts, [](const PhotoVerdict& photo) {
+                {"statuses", List(photos.statuses, [](const PhotoStatus& photo) {
                    return Object{{"file", photo.file},
-                                 {"verdict", photo.verdict},
+                                 {"status", photo.status},
                                  {"why", TextOrNull(photo.why)}};
                  })}};
 }
@@ -89,9 +89,9 @@ JsonValue StageJson(const Style2dReport& stage) {
   return object;
 }
 
-JsonValue VarianceJson(const VarianceFigures& variance) {
+JsonValue VarianceJson(const VarianceMetrics& variance) {
   Object object;
-  for (const VarianceFigures::Group& group : variance.groups) {
+  for (const VarianceMetrics::Group& group : variance.groups) {
     Object entry{{"pairs", group.pairs}, {"above", group.above}};
     Put(entry, "gain", group.gain);
     Put(entry, "largest_excess", group.largest_excess);
@@ -105,14 +105,14 @@ JsonValue StageJson(const StylizeReport& stage) {
   Object object{{"seconds", stage.seconds}, {"steps", stage.steps}};
   Put(object, "k_est", stage.k_est);
   Put(object, "bound", stage.bound);
-  Put(object, "slope_observed", stage.slope_observed);
+  Put(object, "local_lipschitz_sampled", stage.local_lipschitz_sampled);
   Put(object, "psnr_to_2d_db", stage.psnr_to_2d_db);
   Put(object, "psnr_to_2d_photos_db", stage.psnr_to_2d_photos_db);
   Put(object, "linear_map_psnr_to_2d_db", stage.linear_map_psnr_to_2d_db);
-  Put(object, "slope_ascent", stage.slope_ascent);
-  Put(object, "slope_of_map", stage.slope_of_map);
-  Put(object, "slope_along_coefficients", stage.slope_along_coefficients);
-  Put(object, "slope_along_position", stage.slope_along_position);
+  Put(object, "local_lipschitz_max", stage.local_lipschitz_max);
+  Put(object, "local_lipschitz_of_map", stage.local_lipschitz_of_map);
+  Put(object, "local_lipschitz_along_coefficients", stage.local_lipschitz_along_coefficients);
+  Put(object, "local_lipschitz_along_position", stage.local_lipschitz_along_position);
   if (!stage.bound_at_steps.empty())
     object.emplace_back("bound_at_steps", CurveJson(stage.bound_at_steps));
   if (stage.variance) object.emplace_back("variance", VarianceJson(*stage.variance));
@@ -156,7 +156,7 @@ JsonValue StagesJson(const RunReport& report) {
   return object;
 }
 
-JsonValue ConsistencyJson(const ConsistencyFigures& row) {
+JsonValue ConsistencyJson(const ConsistencyMetrics& row) {
   Object object{{"sequence", row.sequence},
                 {"gap", row.gap},
                 {"pairs", row.pairs},
@@ -171,14 +171,14 @@ JsonValue ConsistencyJson(const ConsistencyFigures& row) {
     object.emplace_back("heat_map_from", row.heat_map_from);
   }
   if (!row.tc_psnr_pairs_db.empty()) {
-    object.emplace_back("tc_psnr_pairs_db", List(row.tc_psnr_pairs_db, [](const Figure& pair) {
+    object.emplace_back("tc_psnr_pairs_db", List(row.tc_psnr_pairs_db, [](const Metric& pair) {
                           return pair.value ? JsonValue(*pair.value) : JsonValue();
                         }));
   }
   return object;
 }
 
-JsonValue PairJson(const PairFigures& pair) {
+JsonValue PairJson(const PairMetrics& pair) {
   Object object{{"sequence", pair.sequence},
                 {"gap", pair.to - pair.from},
                 {"from", pair.from},
@@ -195,7 +195,7 @@ JsonValue PairJson(const PairFigures& pair) {
   return object;
 }
 
-JsonValue FidelityJson(const FidelityFigures& row) {
+JsonValue FidelityJson(const FidelityMetrics& row) {
   Object object{{"sequence", row.sequence}};
   Put(object, "psnr_to_2d_db", row.psnr_to_2d_db);
   if (row.lpips_to_2d) object.emplace_back("lpips_to_2d", *row.lpips_to_2d);
@@ -210,18 +210,19 @@ JsonValue FidelityJson(const FidelityFigures& row) {
 
 }  // namespace
 
-JsonValue PriceJson(const PriceRow& price) {
-  Object object{{"plane", price.plane},     {"knob", price.knob}, {"setting", price.setting},
-                {"measure", price.measure}, {"unit", price.unit}, {"repeats", price.repeats}};
-  Put(object, "seconds", price.seconds);
-  Put(object, "seconds_spread", price.seconds_spread);
-  Put(object, "cpu_seconds", price.cpu_seconds);
-  Put(object, "cpu_spread", price.cpu_spread);
-  Put(object, "accuracy", price.accuracy);
-  Put(object, "accuracy_spread", price.accuracy_spread);
-  Put(object, "error", price.error);
-  object.emplace_back("on_front", price.on_front);
-  object.emplace_back("dominated_by", TextOrNull(price.dominated_by));
+JsonValue CostJson(const CostRow& cost) {
+  Object object{{"benchmark", cost.benchmark}, {"parameter", cost.parameter},
+                {"setting", cost.setting},     {"measure", cost.measure},
+                {"unit", cost.unit},           {"repeats", cost.repeats}};
+  Put(object, "seconds", cost.seconds);
+  Put(object, "seconds_spread", cost.seconds_spread);
+  Put(object, "cpu_seconds", cost.cpu_seconds);
+  Put(object, "cpu_spread", cost.cpu_spread);
+  Put(object, "accuracy", cost.accuracy);
+  Put(object, "accuracy_spread", cost.accuracy_spread);
+  Put(object, "error", cost.error);
+  object.emplace_back("on_pareto_front", cost.on_pareto_front);
+  object.emplace_back("dominated_by", TextOrNull(cost.dominated_by));
   return object;
 }
 
@@ -247,7 +248,7 @@ JsonValue ReportJson(const RunReport& report) {
       versions.emplace_back(version.name, version.value);
     object.emplace_back("versions", std::move(versions));
   }
-  if (!report.prices.empty()) object.emplace_back("prices", List(report.prices, PriceJson));
+  if (!report.costs.empty()) object.emplace_back("costs", List(report.costs, CostJson));
   return object;
 }
 

@@ -11,7 +11,7 @@ namespace regrade {
 // were measured.
 JsonValue ReportJson(const RunReport& report);
 
-JsonValue PriceJson(const PriceRow& price);
+JsonValue CostJson(const CostRow& cost);
 
 // {"schema": 1, "consistency": [...], "fidelity": [...], "consistency_pairs": [...]}: what
 // `regrade evaluate` writes for any program's frames; the pairs where there are any.

@@ -33,7 +33,7 @@ struct ReportPictures {
   bool has_styled_film = false;    // styled.mp4 lies beside the page
   bool has_wipe_film = false;      // source_vs_styled.mp4 does
   bool has_views_2d_film = false;  // views_2d.mp4 does
-  // Of the photos in the order of their verdicts; may be missing or fewer.
+  // Of the photos in the order of their statuses; may be missing or fewer.
   std::vector<std::optional<ReportPicture>> thumbnails;
   CameraMap cameras;
   std::string chart_library;  // see ReadChartLibrary; may be empty

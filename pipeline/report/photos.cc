@@ -17,16 +17,16 @@ std::string ThumbnailHtml(const ReportPicture* picture) {
 }
 
 // The verdict is a class of the style sheet where it is one that we know.
-std::string VerdictHtml(const std::string& verdict) {
+std::string StatusHtml(const std::string& verdict) {
   const bool known = verdict == "used" || verdict == "skipped" || verdict == "unregistered";
   return "<span" + (known ? " class=" + verdict : std::string()) + ">" + EscapeHtml(verdict) +
          "</span>";
 }
 
 // Photos that there is something to say about, one a line.
-std::string RemarkRow(const PhotoVerdict& photo, const ReportPicture* thumbnail) {
+std::string RemarkRow(const PhotoStatus& photo, const ReportPicture* thumbnail) {
   return "<tr><td>" + ThumbnailHtml(thumbnail) + "<td class=file>" + EscapeHtml(photo.file) +
-         "<td>" + VerdictHtml(photo.verdict) + "<td class=w>" + EscapeHtml(photo.why) + "</tr>";
+         "<td>" + StatusHtml(photo.status) + "<td class=w>" + EscapeHtml(photo.why) + "</tr>";
 }
 
 }  // namespace
@@ -35,10 +35,10 @@ std::string PhotosHtml(const RunReport& report, const ReportPictures& pictures) 
   if (!report.photos) return "";
   const PhotosReport& photos = *report.photos;
   std::string remarks, used, names;
-  for (size_t i = 0; i < photos.verdicts.size(); ++i) {
-    const PhotoVerdict& photo = photos.verdicts[i];
+  for (size_t i = 0; i < photos.statuses.size(); ++i) {
+    const PhotoStatus& photo = photos.statuses[i];
     const ReportPicture* thumbnail = ThumbnailOf(pictures, i);
-    if (photo.verdict != "used" || !photo.why.empty())
+    if (photo.status != "used" || !photo.why.empty())
       remarks += RemarkRow(photo, thumbnail);
     else if (thumbnail != nullptr)
       used += "<figure>" + ThumbnailHtml(thumbnail) + "<figcaption>" + EscapeHtml(photo.file) +

@@ -12,27 +12,27 @@ JsonValue Number(const std::optional<double>& value) {
 }
 
 // A figure and, under "<key>_why", the reason why there is none.
-Figure FigureOf(const JsonValue& figures, const std::string& key) {
-  const JsonValue* value = figures.Find(key);
+Metric MetricOf(const JsonValue& metrics, const std::string& key) {
+  const JsonValue* value = metrics.Find(key);
   if (value != nullptr && value->IsNumber()) return value->AsDouble();
-  const JsonValue* why = figures.Find(key + "_why");
-  return Figure::Undefined(why != nullptr && why->IsString() ? why->AsString()
+  const JsonValue* why = metrics.Find(key + "_why");
+  return Metric::Undefined(why != nullptr && why->IsString() ? why->AsString()
                                                              : "not measured");
 }
 
-int64_t CountOf(const JsonValue& figures, const std::string& key) {
-  const JsonValue* value = figures.Find(key);
+int64_t CountOf(const JsonValue& metrics, const std::string& key) {
+  const JsonValue* value = metrics.Find(key);
   return value != nullptr && value->IsNumber() ? value->AsInt() : 0;
 }
 
-std::string TextOf(const JsonValue& figures, const std::string& key) {
-  const JsonValue* value = figures.Find(key);
+std::string TextOf(const JsonValue& metrics, const std::string& key) {
+  const JsonValue* value = metrics.Find(key);
   return value != nullptr && value->IsString() ? value->AsString() : "";
 }
 
-std::vector<std::string> TextsOf(const JsonValue& figures, const std::string& key) {
+std::vector<std::string> TextsOf(const JsonValue& metrics, const std::string& key) {
   std::vector<std::string> texts;
-  if (const JsonValue* list = figures.Find(key))
+  if (const JsonValue* list = metrics.Find(key))
     for (const JsonValue& text : list->AsArray()) texts.push_back(text.AsString());
   return texts;
 }
@@ -48,32 +48,32 @@ void Put(JsonValue* row, const std::string& key, const std::optional<double>& va
                                         : "not defined";
 }
 
-ConsistencyFigures ConsistencyOf(const JsonValue& row) {
-  ConsistencyFigures figures;
-  figures.sequence = row.At("sequence").AsString();
-  figures.gap = static_cast<int>(row.At("gap").AsInt());
-  figures.pairs = static_cast<int>(row.At("pairs").AsInt());
-  figures.undefined_pairs = static_cast<int>(row.At("undefined_pairs").AsInt());
-  figures.tc_psnr_mean_db = FigureOf(row, "tc_psnr_mean_db");
-  figures.tc_psnr_of_mean_db = FigureOf(row, "tc_psnr_of_mean_db");
-  figures.coverage = FigureOf(row, "coverage");
-  figures.tc_psnr_low_db = FigureOf(row, "tc_psnr_low_db");
-  figures.tc_psnr_high_db = FigureOf(row, "tc_psnr_high_db");
-  figures.heat_map = TextOf(row, "heat_map");
-  figures.heat_map_from = static_cast<int>(CountOf(row, "heat_map_from"));
+ConsistencyMetrics ConsistencyOf(const JsonValue& row) {
+  ConsistencyMetrics metrics;
+  metrics.sequence = row.At("sequence").AsString();
+  metrics.gap = static_cast<int>(row.At("gap").AsInt());
+  metrics.pairs = static_cast<int>(row.At("pairs").AsInt());
+  metrics.undefined_pairs = static_cast<int>(row.At("undefined_pairs").AsInt());
+  metrics.tc_psnr_mean_db = MetricOf(row, "tc_psnr_mean_db");
+  metrics.tc_psnr_of_mean_db = MetricOf(row, "tc_psnr_of_mean_db");
+  metrics.coverage = MetricOf(row, "coverage");
+  metrics.tc_psnr_low_db = MetricOf(row, "tc_psnr_low_db");
+  metrics.tc_psnr_high_db = MetricOf(row, "tc_psnr_high_db");
+  metrics.heat_map = TextOf(row, "heat_map");
+  metrics.heat_map_from = static_cast<int>(CountOf(row, "heat_map_from"));
   for (const JsonValue& pair : row.At("tc_psnr_pairs_db").AsArray())
-    figures.tc_psnr_pairs_db.push_back(pair.IsNumber() ? Figure(pair.AsDouble())
-                                                       : Figure::Undefined("not defined"));
-  return figures;
+    metrics.tc_psnr_pairs_db.push_back(pair.IsNumber() ? Metric(pair.AsDouble())
+                                                       : Metric::Undefined("not defined"));
+  return metrics;
 }
 
-PairFigures PairOf(const JsonValue& row) {
-  PairFigures pair;
+PairMetrics PairOf(const JsonValue& row) {
+  PairMetrics pair;
   pair.sequence = row.At("sequence").AsString();
   pair.from = static_cast<int>(row.At("from").AsInt());
   pair.to = static_cast<int>(row.At("to").AsInt());
-  pair.error = FigureOf(row, "error");
-  pair.tc_psnr_db = FigureOf(row, "tc_psnr_db");
+  pair.error = MetricOf(row, "error");
+  pair.tc_psnr_db = MetricOf(row, "tc_psnr_db");
   pair.coverage = row.At("coverage").AsDouble();
   pair.low_coverage = row.At("low_coverage").AsBool();
   pair.flow_not_finite = CountOf(row, "flow_not_finite");
@@ -101,37 +101,37 @@ JsonValue RecordOf(const PairResult& pair) {
   return row;
 }
 
-FidelityFigures FidelityOf(const JsonValue& row) {
-  FidelityFigures figures;
-  figures.sequence = row.At("sequence").AsString();
-  figures.psnr_to_2d_db = FigureOf(row, "psnr_to_2d_db");
-  if (const JsonValue* lpips = row.Find("lpips_to_2d")) figures.lpips_to_2d = lpips->AsDouble();
-  if (const JsonValue* s = row.Find("structure")) figures.structure = s->AsDouble();
-  figures.hue_std = FigureOf(row, "hue_std");
-  figures.hue_std_2d = FigureOf(row, "hue_std_2d");
-  figures.chroma = FigureOf(row, "chroma");
-  figures.chroma_2d = FigureOf(row, "chroma_2d");
-  figures.sliced_wasserstein_to_style = FigureOf(row, "sliced_wasserstein_to_style");
-  return figures;
+FidelityMetrics FidelityOf(const JsonValue& row) {
+  FidelityMetrics metrics;
+  metrics.sequence = row.At("sequence").AsString();
+  metrics.psnr_to_2d_db = MetricOf(row, "psnr_to_2d_db");
+  if (const JsonValue* lpips = row.Find("lpips_to_2d")) metrics.lpips_to_2d = lpips->AsDouble();
+  if (const JsonValue* s = row.Find("structure")) metrics.structure = s->AsDouble();
+  metrics.hue_std = MetricOf(row, "hue_std");
+  metrics.hue_std_2d = MetricOf(row, "hue_std_2d");
+  metrics.chroma = MetricOf(row, "chroma");
+  metrics.chroma_2d = MetricOf(row, "chroma_2d");
+  metrics.sliced_wasserstein_to_style = MetricOf(row, "sliced_wasserstein_to_style");
+  return metrics;
 }
 
-VarianceFigures VarianceOf(const JsonValue& record) {
-  VarianceFigures variance;
+VarianceMetrics VarianceOf(const JsonValue& record) {
+  VarianceMetrics variance;
   for (const char* name : {"inside", "clamp", "open"}) {
     const JsonValue* group = record.Find(name);
     if (group == nullptr) continue;
     variance.groups.push_back({name, CountOf(*group, "pairs"), CountOf(*group, "above"),
-                               FigureOf(*group, "gain"), FigureOf(*group, "largest_excess")});
+                               MetricOf(*group, "gain"), MetricOf(*group, "largest_excess")});
   }
-  variance.largest_share = FigureOf(record, "largest_share");
+  variance.largest_share = MetricOf(record, "largest_share");
   return variance;
 }
 
 // Two arrays of a record, steps and what was measured at them.
-std::vector<std::pair<int64_t, double>> CurveOf(const JsonValue& figures, const char* at,
+std::vector<std::pair<int64_t, double>> CurveOf(const JsonValue& metrics, const char* at,
                                                 const char* of) {
   std::vector<std::pair<int64_t, double>> curve;
-  const JsonValue *steps = figures.Find(at), *values = figures.Find(of);
+  const JsonValue *steps = metrics.Find(at), *values = metrics.Find(of);
   if (steps == nullptr || values == nullptr) return curve;
   const size_t points = std::min(steps->AsArray().size(), values->AsArray().size());
   for (size_t i = 0; i < points; ++i)
@@ -189,27 +189,27 @@ JsonValue EvaluationRecord(const ConsistencyReport& consistency,
                            {"fidelity", std::move(fidelity_rows)}};
 }
 
-RunReport ReportOfEvaluation(const JsonValue& figures) {
+RunReport ReportOfEvaluation(const JsonValue& metrics) {
   RunReport report;
-  for (const JsonValue& row : figures.At("consistency").AsArray())
+  for (const JsonValue& row : metrics.At("consistency").AsArray())
     report.consistency.push_back(ConsistencyOf(row));
-  if (const JsonValue* pairs = figures.Find("consistency_pairs"))
+  if (const JsonValue* pairs = metrics.Find("consistency_pairs"))
     for (const JsonValue& pair : pairs->AsArray()) report.pairs.push_back(PairOf(pair));
-  for (const JsonValue& row : figures.At("fidelity").AsArray())
+  for (const JsonValue& row : metrics.At("fidelity").AsArray())
     report.fidelity.push_back(FidelityOf(row));
   return report;
 }
 
 RunReport ReportFromRecords(const Workspace& workspace) {
   const auto evaluate = workspace.Find("evaluate");
-  RunReport report = evaluate ? ReportOfEvaluation(evaluate->figures) : RunReport();
+  RunReport report = evaluate ? ReportOfEvaluation(evaluate->metrics) : RunReport();
   StagesReport& stages = report.stages;
   const auto pose = workspace.Find("pose"), reconstruct = workspace.Find("reconstruct"),
              style_2d = workspace.Find("style_2d"), stylize = workspace.Find("stylize"),
              render = workspace.Find("render");
   if (pose) {
-    const JsonValue& f = pose->figures;
-    stages.pose = {pose->seconds, FigureOf(f, "reprojection_px"), CountOf(f, "points"),
+    const JsonValue& f = pose->metrics;
+    stages.pose = {pose->seconds, MetricOf(f, "reprojection_px"), CountOf(f, "points"),
                    static_cast<int>(CountOf(f, "models_found"))};
     if (const JsonValue* tracks = f.Find("tracks"); tracks && tracks->Find("seconds")) {
       stages.pose->tracks_seconds = tracks->At("seconds").AsDouble();
@@ -217,49 +217,51 @@ RunReport ReportFromRecords(const Workspace& workspace) {
     }
   }
   if (reconstruct) {
-    const JsonValue& f = reconstruct->figures;
+    const JsonValue& f = reconstruct->metrics;
     stages.reconstruct = {reconstruct->seconds,         CountOf(f, "voxels"),
-                          FigureOf(f, "psnr_train_db"), FigureOf(f, "psnr_heldout_db"),
-                          FigureOf(f, "ssim_heldout"),  {}};
+                          MetricOf(f, "psnr_train_db"), MetricOf(f, "psnr_heldout_db"),
+                          MetricOf(f, "ssim_heldout"),  {}};
     stages.reconstruct->heldout = TextsOf(f, "heldout");
     stages.reconstruct->psnr_at_steps = CurveOf(f, "curve_steps", "curve_psnr_db");
     if (f.Find("rejected_voxels"))
       stages.reconstruct->rejected_voxels = CountOf(f, "rejected_voxels");
   }
   if (style_2d)
-    stages.style_2d = {style_2d->seconds, TextOf(style_2d->figures, "method"),
-                       TextsOf(style_2d->figures, "notices")};
+    stages.style_2d = {style_2d->seconds, TextOf(style_2d->metrics, "method"),
+                       TextsOf(style_2d->metrics, "notices")};
   if (stylize) {
-    const JsonValue& f = stylize->figures;
+    const JsonValue& f = stylize->metrics;
     stages.stylize.emplace();
     stages.stylize->seconds = stylize->seconds;
     stages.stylize->steps = static_cast<int>(CountOf(f, "steps"));
     if (f.Find("rejected_steps")) stages.stylize->rejected_steps = CountOf(f, "rejected_steps");
-    stages.stylize->k_est = FigureOf(f, "k_est");
-    stages.stylize->bound = FigureOf(f, "bound");
-    stages.stylize->slope_observed = FigureOf(f, "slope_observed");
-    stages.stylize->slope_ascent = FigureOf(f, "slope_ascent");
-    stages.stylize->slope_of_map = FigureOf(f, "slope_of_map");
-    stages.stylize->slope_along_coefficients = FigureOf(f, "slope_along_coefficients");
-    stages.stylize->slope_along_position = FigureOf(f, "slope_along_position");
+    stages.stylize->k_est = MetricOf(f, "k_est");
+    stages.stylize->bound = MetricOf(f, "bound");
+    stages.stylize->local_lipschitz_sampled = MetricOf(f, "local_lipschitz_sampled");
+    stages.stylize->local_lipschitz_max = MetricOf(f, "local_lipschitz_max");
+    stages.stylize->local_lipschitz_of_map = MetricOf(f, "local_lipschitz_of_map");
+    stages.stylize->local_lipschitz_along_coefficients =
+        MetricOf(f, "local_lipschitz_along_coefficients");
+    stages.stylize->local_lipschitz_along_position =
+        MetricOf(f, "local_lipschitz_along_position");
     stages.stylize->bound_at_steps = CurveOf(f, "bound_steps", "bound_at_steps");
     stages.stylize->notices = TextsOf(f, "notices");
     if (const JsonValue* variance = f.Find("variance"))
       stages.stylize->variance = VarianceOf(*variance);
   }
   if (render)
-    stages.render = {render->seconds, static_cast<int>(CountOf(render->figures, "frames")),
-                     FigureOf(render->figures, "frames_per_second"),
-                     static_cast<int>(CountOf(render->figures, "film_width")),
-                     static_cast<int>(CountOf(render->figures, "film_height"))};
+    stages.render = {render->seconds, static_cast<int>(CountOf(render->metrics, "frames")),
+                     MetricOf(render->metrics, "frames_per_second"),
+                     static_cast<int>(CountOf(render->metrics, "film_width")),
+                     static_cast<int>(CountOf(render->metrics, "film_height"))};
   if (evaluate) {
-    const JsonValue& f = evaluate->figures;
+    const JsonValue& f = evaluate->metrics;
     stages.evaluate = {evaluate->seconds, TextOf(f, "flow"), TextOf(f, "mask"),
                        TextOf(f, "comparison_note")};
     if (stages.stylize) {
-      stages.stylize->psnr_to_2d_photos_db = FigureOf(f, "psnr_to_2d_photos_db");
-      stages.stylize->linear_map_psnr_to_2d_db = FigureOf(f, "linear_map_psnr_to_2d_db");
-      for (const FidelityFigures& row : report.fidelity)
+      stages.stylize->psnr_to_2d_photos_db = MetricOf(f, "psnr_to_2d_photos_db");
+      stages.stylize->linear_map_psnr_to_2d_db = MetricOf(f, "linear_map_psnr_to_2d_db");
+      for (const FidelityMetrics& row : report.fidelity)
         if (row.sequence == "styled") stages.stylize->psnr_to_2d_db = row.psnr_to_2d_db;
     }
   }

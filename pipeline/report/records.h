@@ -17,7 +17,7 @@ JsonValue EvaluationRecord(const ConsistencyReport& consistency,
                            const std::vector<HeatMapFile>& heat_maps = {});
 
 // The two tables of such a record, and nothing else.
-RunReport ReportOfEvaluation(const JsonValue& figures);
+RunReport ReportOfEvaluation(const JsonValue& metrics);
 
 // Everything that the finished stages of a folder have measured. Options, command and times of
 // this start are for the caller to add.

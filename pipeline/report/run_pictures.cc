@@ -63,7 +63,7 @@ std::optional<ReportPicture> PictureAt(const std::string& path) {
 std::vector<ReportHeatMap> HeatMapPictures(const Workspace& workspace,
                                            const RunReport& report) {
   std::vector<ReportHeatMap> maps;
-  for (const ConsistencyFigures& row : report.consistency) {
+  for (const ConsistencyMetrics& row : report.consistency) {
     if (row.heat_map.empty()) continue;
     const auto picture = PictureAt(workspace.Path(row.heat_map));
     if (!picture) continue;
@@ -77,18 +77,18 @@ std::vector<ReportHeatMap> HeatMapPictures(const Workspace& workspace,
 std::vector<std::optional<ReportPicture>> Thumbnails(const Workspace& workspace,
                                                      const Capture& capture) {
   const std::map<std::string, std::string> staged = StagedPictures(workspace);
-  const int count = static_cast<int>(capture.verdicts.size());
-  std::vector<std::string> wanted(capture.verdicts.size());
+  const int count = static_cast<int>(capture.statuses.size());
+  std::vector<std::string> wanted(capture.statuses.size());
   int taken = 0;
   for (int i = 0; i < count; ++i) {
-    const PhotoVerdict& photo = capture.verdicts[static_cast<size_t>(i)];
+    const PhotoStatus& photo = capture.statuses[static_cast<size_t>(i)];
     const auto path = staged.find(photo.file);
     if (path == staged.end()) continue;
     // Evenly: as many as are due by now.
     const bool due = count <= kMostThumbnails ||
                      taken < (i + 1) * static_cast<int64_t>(kMostThumbnails) / count;
-    if (photo.verdict == "used" && !due) continue;
-    taken += photo.verdict == "used";
+    if (photo.status == "used" && !due) continue;
+    taken += photo.status == "used";
     wanted[static_cast<size_t>(i)] = path->second;
   }
   // Reading whole photos is what takes the time.

@@ -18,7 +18,7 @@ std::optional<ReportPicture> PictureAt(const std::string& path);
 // The maps that the rows of report.consistency name, those that are there.
 std::vector<ReportHeatMap> HeatMapPictures(const Workspace& workspace, const RunReport& report);
 
-// One for each of the photos' verdicts: of those left out, and of the others kMostThumbnails
+// One for each of the photos' statuses: of those left out, and of the others kMostThumbnails
 // evenly chosen. Photos that were never decoded have none.
 inline constexpr int kMostThumbnails = 60;
 std::vector<std::optional<ReportPicture>> Thumbnails(const Workspace& workspace,

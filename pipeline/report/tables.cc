@@ -24,9 +24,9 @@ std::string Cell(const std::string& html, const std::string& classes = "") {
   return classes.empty() ? "<td>" + html + "</td>"
                          : "<td class=\"" + classes + "\">" + html + "</td>";
 }
-std::string Number(const Figure& figure, int decimals, const std::string& unit = "",
+std::string Number(const Metric& metric, int decimals, const std::string& unit = "",
                    bool beside = false) {
-  return Cell(FigureHtml(figure, decimals, unit), beside ? "n beside" : "n");
+  return Cell(MetricHtml(metric, decimals, unit), beside ? "n beside" : "n");
 }
 std::string Text(const std::string& text, const std::string& classes = "") {
   return Cell(EscapeHtml(text), classes);
@@ -56,21 +56,21 @@ std::string Across(const std::string& html, size_t rows, const std::string& clas
   return "<td rowspan=" + std::to_string(rows) + " class=\"" + classes + "\">" + html + "</td>";
 }
 
-std::string IntervalHtml(const ConsistencyFigures& row) {
+std::string IntervalHtml(const ConsistencyMetrics& row) {
   if (!row.tc_psnr_low_db.value || !row.tc_psnr_high_db.value)
-    return FigureHtml(row.tc_psnr_low_db, 2);
-  return FigureHtml(row.tc_psnr_low_db, 2) + "–" + FigureHtml(row.tc_psnr_high_db, 2);
+    return MetricHtml(row.tc_psnr_low_db, 2);
+  return MetricHtml(row.tc_psnr_low_db, 2) + "–" + MetricHtml(row.tc_psnr_high_db, 2);
 }
 
 // The sequence's own figure with the 2D method's in brackets.
-std::string WithTarget(const Figure& value, const Figure& target, int decimals) {
-  std::string html = FigureHtml(value, decimals);
-  if (target.value) html += " <span class=soft>(" + FigureHtml(target, decimals) + ")</span>";
+std::string WithTarget(const Metric& value, const Metric& target, int decimals) {
+  std::string html = MetricHtml(value, decimals);
+  if (target.value) html += " <span class=soft>(" + MetricHtml(target, decimals) + ")</span>";
   return html;
 }
 
-const ConsistencyFigures* ShortestGap(const RunReport& report, const std::string& sequence) {
-  const ConsistencyFigures* best = nullptr;
+const ConsistencyMetrics* ShortestGap(const RunReport& report, const std::string& sequence) {
+  const ConsistencyMetrics* best = nullptr;
   for (const auto& row : report.consistency) {
     if (row.sequence == sequence && (best == nullptr || row.gap < best->gap)) best = &row;
   }
@@ -88,9 +88,9 @@ void Say(std::string& said, const std::string& clause) {
   said += (said.empty() ? "" : " · ") + clause;
 }
 
-// How neighbouring pixels came apart, by what the promise asks for and they lack.
-void SayVariance(const VarianceFigures& variance, std::string* said) {
-  for (const VarianceFigures::Group& group : variance.groups) {
+// How neighbouring pixels came apart, by what the guarantee asks for and they lack.
+void SayVariance(const VarianceMetrics& variance, std::string* said) {
+  for (const VarianceMetrics::Group& group : variance.groups) {
     if (group.pairs == 0) continue;
     const std::string where = group.name == "clamp"  ? "where a colour is clamped"
                               : group.name == "open" ? "where light passes the scene"
@@ -98,8 +98,8 @@ void SayVariance(const VarianceFigures& variance, std::string* said) {
     Say(*said, std::to_string(group.above) + " of " + std::to_string(group.pairs) +
                    " pairs of neighbouring pixels " + where +
                    " are further apart than bound times before, at most by " +
-                   FigureHtml(group.largest_excess, 3) + "; on the mean " +
-                   FigureHtml(group.gain, 2) + " times as far apart as before");
+                   MetricHtml(group.largest_excess, 3) + "; on the mean " +
+                   MetricHtml(group.gain, 2) + " times as far apart as before");
   }
 }
 
@@ -110,19 +110,19 @@ std::vector<StageLine> StageLines(const StagesReport& stages) {
   };
   if (const auto& s = stages.pose) {
     std::string& said = add("pose", s->seconds);
-    Say(said, "reprojection " + FigureHtml(s->reprojection_px, 2, "px"));
+    Say(said, "reprojection " + MetricHtml(s->reprojection_px, 2, "px"));
     Say(said, std::to_string(s->points) + " points");
     if (s->tracks_seconds)
       Say(said, "looked for under the poses that were given in " +
-                    FigureHtml(Figure(*s->tracks_seconds), 1, "s"));
+                    MetricHtml(Metric(*s->tracks_seconds), 1, "s"));
     if (s->models_found != 1) Say(said, std::to_string(s->models_found) + " models found");
   }
   if (const auto& s = stages.reconstruct) {
     std::string& said = add("reconstruct", s->seconds);
     Say(said, std::to_string(s->voxels) + " voxels");
-    Say(said, "PSNR train " + FigureHtml(s->psnr_train_db, 2, "dB"));
-    Say(said, "held out " + FigureHtml(s->psnr_heldout_db, 2, "dB"));
-    Say(said, "SSIM held out " + FigureHtml(s->ssim_heldout, 3));
+    Say(said, "PSNR train " + MetricHtml(s->psnr_train_db, 2, "dB"));
+    Say(said, "held out " + MetricHtml(s->psnr_heldout_db, 2, "dB"));
+    Say(said, "SSIM held out " + MetricHtml(s->ssim_heldout, 3));
     if (!s->heldout.empty())
       Say(said, std::to_string(s->heldout.size()) + " photos kept for measuring");
   }
@@ -134,14 +134,14 @@ std::vector<StageLine> StageLines(const StagesReport& stages) {
   if (const auto& s = stages.stylize) {
     std::string& said = add("stylize", s->seconds);
     Say(said, std::to_string(s->steps) + " steps");
-    Say(said, "PSNR to 2D " + FigureHtml(s->psnr_to_2d_db, 2, "dB"));
-    Say(said, "to 2D of the photos " + FigureHtml(s->psnr_to_2d_photos_db, 2, "dB"));
+    Say(said, "PSNR to 2D " + MetricHtml(s->psnr_to_2d_db, 2, "dB"));
+    Say(said, "to 2D of the photos " + MetricHtml(s->psnr_to_2d_photos_db, 2, "dB"));
     Say(said,
-        "a linear colour map reaches " + FigureHtml(s->linear_map_psnr_to_2d_db, 2, "dB"));
-    Say(said, "Lipschitz bound " + FigureHtml(s->bound, 2) + ", largest slope seen " +
-                  FigureHtml(s->slope_observed, 2) + ", climbed to " +
-                  FigureHtml(s->slope_ascent, 2) + ", estimated from the colours " +
-                  FigureHtml(s->k_est, 2));
+        "a linear colour map reaches " + MetricHtml(s->linear_map_psnr_to_2d_db, 2, "dB"));
+    Say(said, "Lipschitz bound " + MetricHtml(s->bound, 2) + ", largest slope seen " +
+                  MetricHtml(s->local_lipschitz_sampled, 2) + ", climbed to " +
+                  MetricHtml(s->local_lipschitz_max, 2) + ", estimated from the colours " +
+                  MetricHtml(s->k_est, 2));
     for (const std::string& notice : s->notices) Say(said, EscapeHtml(notice));
     if (s->variance) SayVariance(*s->variance, &said);
   }
@@ -151,7 +151,7 @@ std::vector<StageLine> StageLines(const StagesReport& stages) {
     if (s->film_width > 0)
       Say(said, "film of " + std::to_string(s->film_width) + " × " +
                     std::to_string(s->film_height) + " px");
-    Say(said, FigureHtml(s->frames_per_second, 2, "frames/s"));
+    Say(said, MetricHtml(s->frames_per_second, 2, "frames/s"));
   }
   if (const auto& s = stages.evaluate) {
     std::string& said = add("evaluate", s->seconds);
@@ -164,47 +164,47 @@ std::vector<StageLine> StageLines(const StagesReport& stages) {
 std::string CpuText(const RunReport& report, const std::string& stage) {
   for (const auto& [name, seconds] : report.cpu_seconds)
     if (name == stage) return Duration(seconds);
-  return FigureHtml(Figure(), 0);
+  return MetricHtml(Metric(), 0);
 }
 
 }  // namespace
 
-std::string FigureHtml(const Figure& figure, int decimals, const std::string& unit) {
-  if (figure.value)
-    return FixedNumber(*figure.value, decimals) + (unit.empty() ? "" : "&nbsp;" + unit);
-  return "<span class=none title=\"" + EscapeHtml(figure.why) + "\">–</span>";
+std::string MetricHtml(const Metric& metric, int decimals, const std::string& unit) {
+  if (metric.value)
+    return FixedNumber(*metric.value, decimals) + (unit.empty() ? "" : "&nbsp;" + unit);
+  return "<span class=none title=\"" + EscapeHtml(metric.why) + "\">–</span>";
 }
 
-std::string HeadlineFiguresHtml(const RunReport& report) {
+std::string HeadlineMetricsHtml(const RunReport& report) {
   std::string html;
   const auto card = [&](const std::string& name, const std::string& value) {
     html += "<div><dt>" + name + "</dt><dd>" + value + "</dd></div>";
   };
   if (const auto& s = report.stages.reconstruct) {
     card("held-out PSNR of the reconstruction",
-         FigureHtml(s->psnr_heldout_db, 2, "<small>dB</small>"));
+         MetricHtml(s->psnr_heldout_db, 2, "<small>dB</small>"));
   }
-  const ConsistencyFigures* styled = ShortestGap(report, "styled");
-  const ConsistencyFigures* views_2d = ShortestGap(report, "views_2d");
+  const ConsistencyMetrics* styled = ShortestGap(report, "styled");
+  const ConsistencyMetrics* views_2d = ShortestGap(report, "views_2d");
   if (styled != nullptr) {
-    std::string value = FigureHtml(styled->tc_psnr_mean_db, 2, "<small>dB</small>");
+    std::string value = MetricHtml(styled->tc_psnr_mean_db, 2, "<small>dB</small>");
     if (views_2d != nullptr && views_2d->gap == styled->gap) {
       value +=
-          " <small>frame by frame " + FigureHtml(views_2d->tc_psnr_mean_db, 2) + "</small>";
+          " <small>frame by frame " + MetricHtml(views_2d->tc_psnr_mean_db, 2) + "</small>";
     }
     card("consistency of the styled film (TC-PSNR)", value);
   }
   // Consistency is never shown without fidelity beside it.
   const auto fidelity =
       std::find_if(report.fidelity.begin(), report.fidelity.end(),
-                   [](const FidelityFigures& row) { return row.sequence == "styled"; });
+                   [](const FidelityMetrics& row) { return row.sequence == "styled"; });
   if (fidelity != report.fidelity.end()) {
     card("fidelity to the 2D method (PSNR)",
-         FigureHtml(fidelity->psnr_to_2d_db, 2, "<small>dB</small>"));
+         MetricHtml(fidelity->psnr_to_2d_db, 2, "<small>dB</small>"));
   } else if (styled != nullptr) {
-    card("fidelity to the 2D method (PSNR)", FigureHtml(Figure(), 2));
+    card("fidelity to the 2D method (PSNR)", MetricHtml(Metric(), 2));
   }
-  if (html.empty() && !report.prices.empty()) return "";  // a price list alone
+  if (html.empty() && !report.costs.empty()) return "";  // a price list alone
   card("time", Duration(report.seconds));
   return "<dl class=cards>" + html + "</dl>";
 }
@@ -221,19 +221,19 @@ std::string ConsistencyHtml(const RunReport& report) {
 
   std::string body, meanings;
   for (const std::string& sequence : sequences) {
-    std::vector<const ConsistencyFigures*> rows;
+    std::vector<const ConsistencyMetrics*> rows;
     for (const auto& row : report.consistency) {
       if (row.sequence == sequence) rows.push_back(&row);
     }
-    const FidelityFigures none;
-    const FidelityFigures* fidelity = &none;
+    const FidelityMetrics none;
+    const FidelityMetrics* fidelity = &none;
     for (const auto& row : report.fidelity) {
       if (row.sequence == sequence) fidelity = &row;
     }
-    const ConsistencyFigures unmeasured;
+    const ConsistencyMetrics unmeasured;
     if (rows.empty()) rows.push_back(&unmeasured);
     for (size_t i = 0; i < rows.size(); ++i) {
-      const ConsistencyFigures& row = *rows[i];
+      const ConsistencyMetrics& row = *rows[i];
       const bool measured = &row != &unmeasured;
       std::string pairs = measured ? std::to_string(row.pairs) : "–";
       if (row.undefined_pairs > 0)
@@ -247,15 +247,15 @@ std::string ConsistencyHtml(const RunReport& report) {
               Number(row.tc_psnr_mean_db, 2) + Cell(IntervalHtml(row), "n") +
               Number(row.tc_psnr_of_mean_db, 2) + Cell(pairs, "n") + Number(row.coverage, 2);
       if (i == 0) {
-        std::string near_2d = FigureHtml(fidelity->psnr_to_2d_db, 2);
+        std::string near_2d = MetricHtml(fidelity->psnr_to_2d_db, 2);
         if (fidelity->lpips_to_2d)
-          near_2d += "<br>LPIPS " + FigureHtml(*fidelity->lpips_to_2d, 3);
+          near_2d += "<br>LPIPS " + MetricHtml(*fidelity->lpips_to_2d, 3);
         if (fidelity->structure)
-          near_2d += "<br>structure " + FigureHtml(*fidelity->structure, 3);
+          near_2d += "<br>structure " + MetricHtml(*fidelity->structure, 3);
         body += Across(near_2d, n, "n beside") +
                 Across(WithTarget(fidelity->hue_std, fidelity->hue_std_2d, 3), n, "n") +
                 Across(WithTarget(fidelity->chroma, fidelity->chroma_2d, 1), n, "n") +
-                Across(FigureHtml(fidelity->sliced_wasserstein_to_style, 4), n, "n");
+                Across(MetricHtml(fidelity->sliced_wasserstein_to_style, 4), n, "n");
       }
       body += "</tr>";
     }

@@ -9,9 +9,9 @@
 namespace regrade {
 
 // The number, or a dash that tells why there is none.
-std::string FigureHtml(const Figure& figure, int decimals, const std::string& unit = "");
+std::string MetricHtml(const Metric& metric, int decimals, const std::string& unit = "");
 
-std::string HeadlineFiguresHtml(const RunReport& report);
+std::string HeadlineMetricsHtml(const RunReport& report);
 // Consistency with fidelity beside it in the same rows: a grey film is consistent, so neither
 // figure stands alone.
 std::string ConsistencyHtml(const RunReport& report);

@@ -128,7 +128,7 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   const StoredField stored = ReadFieldFile(workspace.Path("field.npz"));
   std::vector<int> all(capture.views.size());
   for (size_t i = 0; i < all.size(); ++i) all[i] = static_cast<int>(i);
-  const std::vector<int> taught = StyledViews(workspace, capture, settings.run.holdout);
+  const std::vector<int> training_views = StyledViews(workspace, capture, settings.run.holdout);
   const auto frames = [&](const char* sequence, const std::vector<int>& views) {
     return FramesOf(workspace.Path(std::string("frames/") + sequence), views);
   };
@@ -138,7 +138,7 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   const bool same_camera = HaveSameIntrinsics(cameras);
   const std::vector<Camera> compared = WithCommonIntrinsics(cameras);
 
-  const double n = static_cast<double>(taught.size());
+  const double n = static_cast<double>(training_views.size());
   const int film = HasFilm(settings) ? settings.render.path.path_frames : 0;
   double weight = PairWeight(settings, static_cast<int>(all.size())) +
                   n * (4 * kFrameSeconds + kLinearMapSeconds);
@@ -166,44 +166,47 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   // method made of the renders, or else of the photos.
   const Image style = ReadStylePicture(settings.style.picture, nullptr);
   const FrameSource of_photos{
-      static_cast<int>(taught.size()), [&](int k) {
-        const size_t i = static_cast<size_t>(taught[static_cast<size_t>(k)]);
+      static_cast<int>(training_views.size()), [&](int k) {
+        const size_t i = static_cast<size_t>(training_views[static_cast<size_t>(k)]);
         Image picture = ReadImage(workspace.Path("views_2d/" + FrameName(static_cast<int>(i))));
         LeaveOutMasked(capture.views[i], settings.scene.photo_size, &picture);
         return picture;
       }};
-  const FidelityTargets targets{
-      renders_styled ? frames("views_2d", taught) : of_photos, frames("transmittance", taught),
-      &style, PerceptualDistance(settings.consistency.lpips), frames("source", taught)};
+  const FidelityTargets targets{renders_styled ? frames("views_2d", training_views) : of_photos,
+                                frames("transmittance", training_views), &style,
+                                PerceptualDistance(settings.consistency.lpips),
+                                frames("source", training_views)};
   std::vector<FidelityRow> fidelity;
   for (const NamedFrameSource& sequence : sequences)
-    fidelity.push_back(MeasureFidelity({sequence.name, frames(sequence.name.c_str(), taught)},
-                                       targets, parts.Next(n * kFrameSeconds)));
+    fidelity.push_back(
+        MeasureFidelity({sequence.name, frames(sequence.name.c_str(), training_views)}, targets,
+                        parts.Next(n * kFrameSeconds)));
   AddFilm(context, style, CommonCamera(cameras), &parts, &consistency, &fidelity, &heat_maps);
   const FidelityTargets photo_targets{of_photos, targets.transmittance, nullptr, {}, {}};
-  const FidelityRow to_photos = MeasureFidelity({"styled", frames("styled", taught)},
+  const FidelityRow to_photos = MeasureFidelity({"styled", frames("styled", training_views)},
                                                 photo_targets, parts.Next(n * kFrameSeconds));
 
-  std::vector<Camera> taught_cameras;
-  for (const int i : taught) taught_cameras.push_back(cameras[static_cast<size_t>(i)]);
+  std::vector<Camera> training_cameras;
+  for (const int i : training_views)
+    training_cameras.push_back(cameras[static_cast<size_t>(i)]);
   // One map for the whole scene is no yardstick of an object's style.
   std::optional<double> linear_map;
   if (!settings.object.On())
-    linear_map =
-        LinearMapPsnr(stored.field, taught_cameras, frames("source", taught), targets.views_2d,
-                      targets.transmittance, parts.Next(n * kLinearMapSeconds));
+    linear_map = LinearMapPsnr(stored.field, training_cameras, frames("source", training_views),
+                               targets.views_2d, targets.transmittance,
+                               parts.Next(n * kLinearMapSeconds));
 
   if (!same_camera) context->console->Info(ComparisonNote(compared[0]));
   context->console->Lines(FormatTables(consistency, fidelity));
   StageOutcome outcome;
   outcome.outputs = {kHeatMapFolder};
-  outcome.figures = EvaluationRecord(consistency, fidelity, heat_maps);
-  outcome.figures["flow"] = settings.consistency.flow;
-  outcome.figures["mask"] = settings.consistency.mode;
-  if (!same_camera) outcome.figures["comparison_note"] = ComparisonNote(compared[0]);
-  outcome.figures["psnr_to_2d_photos_db"] =
+  outcome.metrics = EvaluationRecord(consistency, fidelity, heat_maps);
+  outcome.metrics["flow"] = settings.consistency.flow;
+  outcome.metrics["mask"] = settings.consistency.mode;
+  if (!same_camera) outcome.metrics["comparison_note"] = ComparisonNote(compared[0]);
+  outcome.metrics["psnr_to_2d_photos_db"] =
       to_photos.psnr_to_2d_db ? JsonValue(*to_photos.psnr_to_2d_db) : JsonValue();
-  outcome.figures["linear_map_psnr_to_2d_db"] =
+  outcome.metrics["linear_map_psnr_to_2d_db"] =
       linear_map ? JsonValue(*linear_map) : JsonValue();
   return outcome;
 }

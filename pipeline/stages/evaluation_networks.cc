@@ -7,7 +7,7 @@ namespace regrade {
 namespace {
 
 void Probe(const std::string& path) {
-  Rehearse(
+  RunCrashProbe(
       [&] {
         const Image picture(64, 64, 3);
         PairNetwork(path).Distance(picture, picture);

@@ -17,14 +17,14 @@ std::optional<double> Mean(const std::vector<double>& values) {
 
 }  // namespace
 
-std::optional<double> HeldOutFigures::MeanPsnr() const { return Mean(psnr); }
-std::optional<double> HeldOutFigures::MeanSsim() const { return Mean(ssim); }
+std::optional<double> HeldOutMetrics::MeanPsnr() const { return Mean(psnr); }
+std::optional<double> HeldOutMetrics::MeanSsim() const { return Mean(ssim); }
 
-HeldOutFigures MeasureHeldOut(const Capture& capture, int holdout, int photo_size,
+HeldOutMetrics MeasureHeldOut(const Capture& capture, int holdout, int photo_size,
                               const PhotoGains& gains, const StoredField& stored,
                               Backend backend) {
   const FieldRenderer renderer(stored.field, backend);
-  HeldOutFigures figures;
+  HeldOutMetrics metrics;
   for (const int i : ViewIndices(capture, holdout, true)) {
     const CaptureView& view = capture.views[static_cast<size_t>(i)];
     const Image photo = ReadPhotoToFit(view, photo_size, kAsTaken);
@@ -33,11 +33,11 @@ HeldOutFigures MeasureHeldOut(const Capture& capture, int holdout, int photo_siz
         WorkingCamera(view.camera, photo_size, stored.field_from_world, stored.ndc);
     Image rendered = renderer.Render(camera).color;
     PutGain(gains.Of(i), &rendered);
-    if (const auto value = Psnr(rendered, photo)) figures.psnr.push_back(*value);
-    if (const auto value = Ssim(rendered, photo)) figures.ssim.push_back(*value);
-    figures.files.push_back(view.file);
+    if (const auto value = Psnr(rendered, photo)) metrics.psnr.push_back(*value);
+    if (const auto value = Ssim(rendered, photo)) metrics.ssim.push_back(*value);
+    metrics.files.push_back(view.file);
   }
-  return figures;
+  return metrics;
 }
 
 }  // namespace regrade

@@ -12,7 +12,7 @@
 
 namespace regrade {
 
-struct HeldOutFigures {
+struct HeldOutMetrics {
   std::vector<std::string> files;  // the photos kept for measuring, the user's names
   std::vector<double> psnr, ssim;  // of those that have one
   std::optional<double> MeanPsnr() const;
@@ -22,7 +22,7 @@ struct HeldOutFigures {
 // Over the held-out photos as they were taken, at `photo_size` pixels: a render is given its
 // photo's gain, which is known from the colours of points that the photo shares with others.
 // What is masked does not count.
-HeldOutFigures MeasureHeldOut(const Capture& capture, int holdout, int photo_size,
+HeldOutMetrics MeasureHeldOut(const Capture& capture, int holdout, int photo_size,
                               const PhotoGains& gains, const StoredField& stored,
                               Backend backend);
 

@@ -120,7 +120,7 @@ void ProbeMethod(StyleOptions* options) {
   if (!error) options->method = method.kind + ":" + absolute.lexically_normal().string();
   if (method.kind != "onnx") return;
   const auto make = [&] { MakeOnnxStylizer(method.argument, 64, Image(64, 64)); };
-  Rehearse(make, method.argument);
+  RunCrashProbe(make, method.argument);
   make();  // a rehearsal keeps plain errors to itself
 }
 

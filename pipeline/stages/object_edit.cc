@@ -6,7 +6,7 @@
 #include "kernels/field/cpu/render_view.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/files/npz_file.h"
-#include "stylize/field/object_shares.h"
+#include "stylize/field/object_weights.h"
 
 namespace regrade {
 namespace {
@@ -33,16 +33,16 @@ std::unique_ptr<ObjectMasks> OpenObjectMasks(const RunSettings& settings,
   return std::make_unique<ObjectMasks>(settings.object, photos);
 }
 
-ObjectShares VoteForObject(const RunSettings& settings, const Capture& capture,
-                           const std::vector<int>& views, const ObjectMasks& masks,
-                           const RadianceField& field, const Similarity& field_from_world,
-                           const NdcSpace& ndc, const ProgressFunction& progress) {
+ObjectWeights VoteForObject(const RunSettings& settings, const Capture& capture,
+                            const std::vector<int>& views, const ObjectMasks& masks,
+                            const RadianceField& field, const Similarity& field_from_world,
+                            const NdcSpace& ndc, const ProgressFunction& progress) {
   std::vector<MaskVote> votes;
   for (int k = 0; k < masks.num_regions(); ++k)
     votes.emplace_back(*field.geometry, field.near_clip, MarchOptions{field.step});
   for (size_t n = 0; n < views.size(); ++n) {
     if (Report(progress, static_cast<double>(n), static_cast<double>(views.size()),
-               "masks vote") == Verdict::kAbort)
+               "masks vote") == LoopControl::kStop)
       throw Interrupted();
     const int i = views[n];
     if (!masks.Knows(i)) continue;
@@ -51,14 +51,14 @@ ObjectShares VoteForObject(const RunSettings& settings, const Capture& capture,
     const std::vector<Image> coverage = masks.Coverage(i, camera.width, camera.height);
     for (size_t k = 0; k < votes.size(); ++k) votes[k].Add(camera, coverage[k]);
   }
-  ObjectShares shares;
+  ObjectWeights shares;
   for (const MaskVote& vote : votes)
     shares.regions.push_back(vote.Shares(settings.object.vote, settings.object.edge));
   shares.all = SumOf(shares.regions);
   return shares;
 }
 
-void WriteObjectFile(const std::string& path, const ObjectShares& shares) {
+void WriteObjectFile(const std::string& path, const ObjectWeights& shares) {
   std::vector<float> values;
   for (const std::vector<float>& region : shares.regions)
     values.insert(values.end(), region.begin(), region.end());
@@ -71,7 +71,7 @@ void WriteObjectFile(const std::string& path, const ObjectShares& shares) {
   file.WriteTo(path);
 }
 
-ObjectShares ReadObjectFile(const std::string& path, int64_t voxels) {
+ObjectWeights ReadObjectFile(const std::string& path, int64_t voxels) {
   NpzReader file(path, uint64_t{16} << 30);
   RefuseNewerFormat(&file, 1);
   const NpzArray array = file.Read("shares", ArrayType::kF32, {-1, voxels});
@@ -79,7 +79,7 @@ ObjectShares ReadObjectFile(const std::string& path, int64_t voxels) {
   if (regions < 1 || regions > ObjectMasks::kMostRegions)
     throw Error(ExitCode::kInput, "holds " + std::to_string(regions) + " regions", path,
                 "run regrade stylize again");
-  ObjectShares shares;
+  ObjectWeights shares;
   for (int64_t k = 0; k < regions; ++k) {
     const float* first = array.As<float>() + k * voxels;
     shares.regions.emplace_back(first, first + voxels);
@@ -92,10 +92,10 @@ ObjectShares ReadObjectFile(const std::string& path, int64_t voxels) {
   return shares;
 }
 
-CoverageRenderer::CoverageRenderer(const RadianceField& field, const ObjectShares& shares)
+CoverageRenderer::CoverageRenderer(const RadianceField& field, const ObjectWeights& shares)
     : step_(field.step) {
   for (const std::vector<float>& region : shares.regions)
-    grids_.push_back(MakeFastGrid(ShareField(field, region)));
+    grids_.push_back(MakeFastGrid(WeightField(field, region)));
 }
 
 std::vector<Image> CoverageRenderer::Render(const Camera& camera) const {

@@ -19,26 +19,26 @@ std::unique_ptr<ObjectMasks> OpenObjectMasks(const RunSettings& settings,
                                              const Capture& capture);
 
 // Shares of each voxel: one list a region, and their sum.
-struct ObjectShares {
+struct ObjectWeights {
   std::vector<std::vector<float>> regions;
   std::vector<float> all;
 };
 
 // See EQ(mask-vote); the masks of `views` vote.
-ObjectShares VoteForObject(const RunSettings& settings, const Capture& capture,
-                           const std::vector<int>& views, const ObjectMasks& masks,
-                           const RadianceField& field, const Similarity& field_from_world,
-                           const NdcSpace& ndc, const ProgressFunction& progress);
+ObjectWeights VoteForObject(const RunSettings& settings, const Capture& capture,
+                            const std::vector<int>& views, const ObjectMasks& masks,
+                            const RadianceField& field, const Similarity& field_from_world,
+                            const NdcSpace& ndc, const ProgressFunction& progress);
 
 // object.npz: f32 "shares" [regions, voxels]. Reading throws Error(kInput) for a file that
 // does not fit the field.
-void WriteObjectFile(const std::string& path, const ObjectShares& shares);
-ObjectShares ReadObjectFile(const std::string& path, int64_t voxels);
+void WriteObjectFile(const std::string& path, const ObjectWeights& shares);
+ObjectWeights ReadObjectFile(const std::string& path, int64_t voxels);
 
 // What of each pixel of a render is of each region: masks for any camera, all of one mind.
 class CoverageRenderer {
  public:
-  CoverageRenderer(const RadianceField& field, const ObjectShares& shares);
+  CoverageRenderer(const RadianceField& field, const ObjectWeights& shares);
   std::vector<Image> Render(const Camera& camera) const;
 
  private:

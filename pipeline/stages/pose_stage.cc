@@ -31,7 +31,7 @@ struct StageShares {
   double ingest = 1, poses = 0, tracks = 0, refinement = 0.5;
 };
 
-StageShares EstimateShares(const CaptureSource& source) {
+StageShares EstimateObjectWeights(const CaptureSource& source) {
   double bytes = 0, photos = 0;
   for (const ListedFile& file : ListFolder(source.photos).files) {
     std::error_code none;
@@ -75,7 +75,7 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
   workspace.NewPath("poses/sparse/x");
   workspace.NewPath(".regrade/work/pose/x");
 
-  const StageShares shares = EstimateShares(source);
+  const StageShares shares = EstimateObjectWeights(source);
   ProgressParts parts(progress,
                       shares.ingest + shares.poses + shares.tracks + shares.refinement);
   const IngestResult ingest =
@@ -93,22 +93,22 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
     const int masks = StagePhotoMasks(folder, ingest.photos, options.mask_folder);
     context->console->Info("what " + std::to_string(masks) +
                            " masks blacken is neither matched nor fitted");
-    outcome.figures["photo_masks"] = masks;
+    outcome.metrics["photo_masks"] = masks;
   }
   if (source.kind == CaptureKind::kPhotos) {
     PoseReport report;
-    capture = PosesFromPhotos(ingest.photos, ingest.verdicts, options,
+    capture = PosesFromPhotos(ingest.photos, ingest.statuses, options,
                               workspace.Path(".regrade/work/pose"), sparse_folder,
                               parts.Next(shares.poses), &report);
     for (const std::string& note : report.notes) context->console->Info(note);
-    outcome.figures["colmap"] = report.colmap_version;
-    outcome.figures["recipe"] = report.recipe;
-    outcome.figures["lens"] = report.lens;
+    outcome.metrics["colmap"] = report.colmap_version;
+    outcome.metrics["recipe"] = report.recipe;
+    outcome.metrics["lens"] = report.lens;
   } else {
     std::vector<std::string> notes;
-    capture = ImportPoses(source, ingest.photos, ingest.verdicts, sparse_folder, &notes);
+    capture = ImportPoses(source, ingest.photos, ingest.statuses, sparse_folder, &notes);
     for (const std::string& note : notes) context->console->Info(note);
-    outcome.figures["recipe"] = "poses came with the photos: " + source.poses;
+    outcome.metrics["recipe"] = "poses came with the photos: " + source.poses;
   }
   PoseTracks tracks;
   if (source.kind != CaptureKind::kPhotos)
@@ -116,18 +116,18 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
                        workspace.Path(".regrade/work/pose/tracks"), &capture,
                        parts.Next(shares.tracks));
   if (!tracks.note.empty()) context->console->Info(tracks.note);
-  if (!tracks.figures.IsNull()) outcome.figures["tracks"] = tracks.figures;
+  if (!tracks.metrics.IsNull()) outcome.metrics["tracks"] = tracks.metrics;
   const PoseProfile profile =
       ProfilePoses(source.kind, settings.pose, settings.run.effects, sparse_folder,
                    ingest.photos, tracks.misfit_scale, &capture, parts.Next(shares.refinement));
   context->console->Info(EffectLine(profile.effect));
-  outcome.figures["effects"] = EffectsRecord({profile.effect});
-  if (!profile.figures.IsNull()) outcome.figures["pose_refinement"] = profile.figures;
+  outcome.metrics["effects"] = EffectsRecord({profile.effect});
+  if (!profile.metrics.IsNull()) outcome.metrics["pose_refinement"] = profile.metrics;
   WriteCaptureIndex(workspace.Path("poses"), capture, ingest.photos);
-  outcome.figures["registered"] = static_cast<int64_t>(capture.views.size());
-  outcome.figures["points"] = static_cast<int64_t>(capture.points.size());
-  outcome.figures["reprojection_px"] = capture.reprojection_px;
-  outcome.figures["models_found"] = capture.models_found;
+  outcome.metrics["registered"] = static_cast<int64_t>(capture.views.size());
+  outcome.metrics["points"] = static_cast<int64_t>(capture.points.size());
+  outcome.metrics["reprojection_px"] = capture.reprojection_px;
+  outcome.metrics["models_found"] = capture.models_found;
   outcome.outputs = {"poses"};
   context->console->Info("placed " + std::to_string(capture.views.size()) + " of " +
                          std::to_string(ingest.photos.size()) + " photos, " +

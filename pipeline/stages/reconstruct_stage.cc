@@ -33,13 +33,13 @@ constexpr int kReproducibleShards = 4;  // sums in a fixed grouping, whatever th
 // To a thousandth: what a drawing can show.
 double Rounded(double value) { return std::round(value * 1000) / 1000; }
 
-void RecordHeldOut(const HeldOutFigures& held_out, JsonValue* figures) {
+void RecordHeldOut(const HeldOutMetrics& held_out, JsonValue* metrics) {
   const auto number = [](const std::optional<double>& value) {
     return value ? JsonValue(*value) : JsonValue();
   };
-  (*figures)["heldout"] = JsonValue::Array(held_out.files.begin(), held_out.files.end());
-  (*figures)["psnr_heldout_db"] = number(held_out.MeanPsnr());
-  (*figures)["ssim_heldout"] = number(held_out.MeanSsim());
+  (*metrics)["heldout"] = JsonValue::Array(held_out.files.begin(), held_out.files.end());
+  (*metrics)["psnr_heldout_db"] = number(held_out.MeanPsnr());
+  (*metrics)["ssim_heldout"] = number(held_out.MeanSsim());
 }
 
 int Finest(const FitOptions& options) {
@@ -92,19 +92,19 @@ FitOptions OptionsForMemory(RunContext* context,
 EffectReport ProfileViewDependence(const RunSettings& settings, const FitOptions& options,
                                    const std::vector<TrainingView>& views, const SceneBox& box,
                                    const ProgressFunction& progress, Backend backend) {
-  const auto row = [](bool on, const Figure& value, const std::string& evidence) {
+  const auto row = [](bool on, const Metric& value, const std::string& evidence) {
     return EffectReport{kViewDependence, on, evidence, value, kDegreePays};
   };
   const auto wishes = ParseEffects(settings.run.effects);
   const auto wish = wishes.find(kViewDependence);
   const bool wanted = wish == wishes.end() || wish->second;
-  if (options.sh_degree == 0 || !wanted) return row(false, Figure(), "as asked for");
-  if (wish != wishes.end()) return row(true, Figure(), "as asked for");
+  if (options.sh_degree == 0 || !wanted) return row(false, Metric(), "as asked for");
+  if (wish != wishes.end()) return row(true, Metric(), "as asked for");
   if (views.size() < kLeastTrialViews)
-    return row(true, Figure(), "too few photos to keep some from a trial");
+    return row(true, Metric(), "too few photos to keep some from a trial");
   const DegreeTrial trial = TryDegrees(views, box, options, progress, backend);
   if (!std::isfinite(trial.gain_db))
-    return row(true, Figure(),
+    return row(true, Metric(),
                "too little of the photos is not masked to keep some from a trial");
   return row(trial.Pays(), trial.gain_db,
              "decibels that harmonics of degree " + std::to_string(options.sh_degree) +
@@ -181,30 +181,30 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   WriteFieldFile(workspace.Path("field.npz"), {fit.field, scene.field_from_world, scene.ndc});
   StageOutcome outcome;
   outcome.outputs = {"field.npz"};
-  outcome.figures["effects"] = EffectsRecord(profile.effects);
+  outcome.metrics["effects"] = EffectsRecord(profile.effects);
   if (!profile.gains.of_view.empty())
-    outcome.figures["exposure"] = GainsRecord(capture, profile.exposure, profile.gains);
+    outcome.metrics["exposure"] = GainsRecord(capture, profile.exposure, profile.gains);
   if (!resume && view_dependence.value.value) {  // what a prediction needs to know apart
-    outcome.figures["trial_seconds"] = trial_seconds;
-    outcome.figures["trial_cpu_seconds"] = trial_cpu_seconds;
+    outcome.metrics["trial_seconds"] = trial_seconds;
+    outcome.metrics["trial_cpu_seconds"] = trial_cpu_seconds;
   }
-  outcome.figures["device"] = DeviceName(backend);
-  outcome.figures["finest_grid"] = Finest(options);
-  outcome.figures["rays"] = fit.rays;
-  outcome.figures["sh_degree"] = options.sh_degree;
-  outcome.figures["voxels"] = fit.field.geometry->num_voxels();
+  outcome.metrics["device"] = DeviceName(backend);
+  outcome.metrics["finest_grid"] = Finest(options);
+  outcome.metrics["rays"] = fit.rays;
+  outcome.metrics["sh_degree"] = options.sh_degree;
+  outcome.metrics["voxels"] = fit.field.geometry->num_voxels();
   if (scene.box.spheres)
-    outcome.figures["background_texels"] = fit.field.geometry->spheres.num_texels();
-  outcome.figures["psnr_train_db"] = fit.psnr_train_db;
-  outcome.figures["rejected_voxels"] = fit.rejected_voxels;
+    outcome.metrics["background_texels"] = fit.field.geometry->spheres.num_texels();
+  outcome.metrics["psnr_train_db"] = fit.psnr_train_db;
+  outcome.metrics["rejected_voxels"] = fit.rejected_voxels;
   for (const FitCurvePoint& point : fit.curve) {
-    outcome.figures["curve_steps"].Append(point.step);
-    outcome.figures["curve_psnr_db"].Append(Rounded(point.psnr_train_db));
+    outcome.metrics["curve_steps"].Append(point.step);
+    outcome.metrics["curve_psnr_db"].Append(Rounded(point.psnr_train_db));
   }
   RecordHeldOut(
       MeasureHeldOut(capture, settings.run.holdout, settings.scene.photo_size, profile.gains,
                      ReadFieldFile(workspace.Path("field.npz")), backend),
-      &outcome.figures);
+      &outcome.metrics);
   return outcome;
 }
 

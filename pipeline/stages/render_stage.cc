@@ -28,7 +28,7 @@ namespace regrade {
 namespace {
 
 // The two fields and the 2D method that frames are made with.
-struct Studio {
+struct FrameRenderers {
   FieldRenderer source, styled;
   std::unique_ptr<ViewStylizer> stylizer;
   std::unique_ptr<CoverageRenderer> object;  // null where the whole scene is styled
@@ -93,20 +93,20 @@ std::string PlanOf(const std::vector<FrameSet>& sets) {
 }
 
 // As a camera of that gain shows the scene.
-Frame RenderFrame(RunContext* context, Studio* studio, const Camera& camera,
+Frame RenderFrame(RunContext* context, FrameRenderers* renderers, const Camera& camera,
                   const PhotoGain& gain, int index) {
   Frame frame;
-  RenderedView plain = studio->source.Render(camera);
+  RenderedView plain = renderers->source.Render(camera);
   const double begin = context->console->StageSeconds();
-  frame.styled = studio->styled.Render(camera).color;
-  studio->styled_seconds += context->console->StageSeconds() - begin;
+  frame.styled = renderers->styled.Render(camera).color;
+  renderers->styled_seconds += context->console->StageSeconds() - begin;
   frame.source = std::move(plain.color);
   frame.transmittance = std::move(plain.transmittance);
   PutGain(gain, &frame.source);
   PutGain(gain, &frame.styled);
-  if (studio->object != nullptr) studio->coverage = studio->object->Render(camera);
-  if (studio->stylizer->StylesAnything())
-    frame.views_2d = studio->stylizer->Stylize(frame.source, index);
+  if (renderers->object != nullptr) renderers->coverage = renderers->object->Render(camera);
+  if (renderers->stylizer->StylesAnything())
+    frame.views_2d = renderers->stylizer->Stylize(frame.source, index);
   return frame;
 }
 
@@ -159,18 +159,18 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   const StoredField before = ReadFieldFile(workspace.Path("field.npz"));
   const StoredField after = ReadFieldFile(workspace.Path("styled.npz"));
   const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
-  Studio studio{FieldRenderer(before.field, backend),
-                FieldRenderer(after.field, backend),
-                nullptr,
-                nullptr,
-                {}};
+  FrameRenderers renderers{FieldRenderer(before.field, backend),
+                           FieldRenderer(after.field, backend),
+                           nullptr,
+                           nullptr,
+                           {}};
   const std::unique_ptr<ObjectMasks> masks = OpenObjectMasks(settings, capture);
   if (masks != nullptr)
-    studio.object = std::make_unique<CoverageRenderer>(
+    renderers.object = std::make_unique<CoverageRenderer>(
         before.field,
         ReadObjectFile(workspace.Path("object.npz"), before.field.geometry->num_voxels()));
-  studio.stylizer = MakeSceneStylizer(context, capture, masks.get(),
-                                      [&](const Image&, int) { return studio.coverage; });
+  renderers.stylizer = MakeSceneStylizer(context, capture, masks.get(),
+                                         [&](const Image&, int) { return renderers.coverage; });
 
   const std::vector<FrameSet> sets = FrameSetsOf(
       WorkingCameras(capture, settings.scene.photo_size, before.field_from_world, before.ndc),
@@ -193,9 +193,9 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
     int done = 0;
     for (const FrameSet& set : sets)
       for (int i = 0; i < static_cast<int>(set.cameras.size()); ++i) {
-        if (Report(progress, done++, total) == Verdict::kAbort) throw Interrupted();
+        if (Report(progress, done++, total) == LoopControl::kStop) throw Interrupted();
         writer.Write(std::make_shared<const Frame>(
-                         RenderFrame(context, &studio, set.cameras[static_cast<size_t>(i)],
+                         RenderFrame(context, &renderers, set.cameras[static_cast<size_t>(i)],
                                      set.of_photos ? gains.Of(i) : kAsTaken, i)),
                      set, i);
       }
@@ -203,13 +203,13 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   }
   films.Finish(&outcome.outputs);
   if (!films.why_none().empty()) context->console->Warn("no film: " + films.why_none());
-  outcome.figures["device"] = DeviceName(backend);
-  outcome.figures["frames"] = total;
-  outcome.figures["path_frames"] = film.of_photos ? 0 : static_cast<int>(film.cameras.size());
-  outcome.figures["film_width"] = film.cameras[0].width;
-  outcome.figures["film_height"] = film.cameras[0].height;
-  outcome.figures["frames_per_second"] =
-      studio.styled_seconds > 0 ? JsonValue(total / studio.styled_seconds) : JsonValue();
+  outcome.metrics["device"] = DeviceName(backend);
+  outcome.metrics["frames"] = total;
+  outcome.metrics["path_frames"] = film.of_photos ? 0 : static_cast<int>(film.cameras.size());
+  outcome.metrics["film_width"] = film.cameras[0].width;
+  outcome.metrics["film_height"] = film.cameras[0].height;
+  outcome.metrics["frames_per_second"] =
+      renderers.styled_seconds > 0 ? JsonValue(total / renderers.styled_seconds) : JsonValue();
   return outcome;
 }
 

@@ -12,9 +12,9 @@
 #include "pipeline/images/image_file.h"
 #include "pipeline/program/memory.h"
 #include "pipeline/report/chart_library.h"
+#include "pipeline/report/cost_rows.h"
 #include "pipeline/report/html.h"
 #include "pipeline/report/json.h"
-#include "pipeline/report/price_rows.h"
 #include "pipeline/report/records.h"
 #include "pipeline/report/run_pictures.h"
 #include "pipeline/run/equivalent_command.h"
@@ -28,17 +28,17 @@ namespace {
 
 constexpr int kPagePictures = 5;  // viewpoints shown
 constexpr int kJpegQuality = 85;
-constexpr char kPriceList[] =
+constexpr char kCostTable[] =
     "tradeoff/tradeoff.json";  // of `regrade tradeoff DIR --out DIR/tradeoff`
 
 PhotosReport PhotosOf(const Capture& capture) {
   PhotosReport photos;
-  photos.given = static_cast<int>(capture.verdicts.size());
+  photos.given = static_cast<int>(capture.statuses.size());
   photos.registered = static_cast<int>(capture.views.size());
   photos.used = static_cast<int>(
-      std::count_if(capture.verdicts.begin(), capture.verdicts.end(),
-                    [](const PhotoVerdict& photo) { return photo.verdict == "used"; }));
-  photos.verdicts = capture.verdicts;
+      std::count_if(capture.statuses.begin(), capture.statuses.end(),
+                    [](const PhotoStatus& photo) { return photo.status == "used"; }));
+  photos.statuses = capture.statuses;
   return photos;
 }
 
@@ -48,7 +48,7 @@ std::vector<OptionValue> VersionsOf(const Workspace& workspace) {
                                        {"compiler", __VERSION__},
                                        {"instructions", FastRays().name}};
   if (const auto record = workspace.Find("pose"))
-    if (const JsonValue* colmap = record->figures.Find("colmap"))
+    if (const JsonValue* colmap = record->metrics.Find("colmap"))
       versions.push_back({"COLMAP", colmap->AsString()});
   return versions;
 }
@@ -104,7 +104,7 @@ StageOutcome WriteReport(RunContext* context) {
   report.preset = settings.run.preset;
   report.device = "cpu";
   if (const auto record = workspace.Find("reconstruct"))
-    if (const JsonValue* device = record->figures.Find("device"))
+    if (const JsonValue* device = record->metrics.Find("device"))
       report.device = device->AsString();
   report.seed = settings.run.seed;
   for (const char* stage : kStageNames)
@@ -113,13 +113,13 @@ StageOutcome WriteReport(RunContext* context) {
   report.photos = PhotosOf(capture);
   for (const char* stage : {"pose", "reconstruct"})
     if (const auto record = workspace.Find(stage))
-      if (const JsonValue* effects = record->figures.Find("effects"))
+      if (const JsonValue* effects = record->metrics.Find("effects"))
         for (const EffectReport& effect : EffectsOfRecord(*effects))
           report.effects.push_back(effect);
   try {
-    report.prices = ReadPriceList(workspace.Path(kPriceList));
+    report.costs = ReadCostTable(workspace.Path(kCostTable));
   } catch (const Error& error) {  // a report is worth having without it
-    context->console->Warn(std::string(kPriceList) + " is left out: " + error.what_failed());
+    context->console->Warn(std::string(kCostTable) + " is left out: " + error.what_failed());
   }
   const JsonValue options = context->options.Values();
   for (const auto& [name, value] : options.AsObject())
@@ -142,9 +142,9 @@ Stage ReportStage(RunContext* context) {
     if (std::string(earlier) != "report") stage.inputs[earlier] = context->ResultOf(earlier);
   // Stage "evaluate" leaves figures alone.
   if (const auto record = context->workspace->Find("evaluate"))
-    stage.inputs["evaluate"] = record->figures;
-  const std::string prices = context->workspace->Path(kPriceList);
-  if (std::filesystem::is_regular_file(prices)) stage.inputs["prices"] = HashFile(prices);
+    stage.inputs["evaluate"] = record->metrics;
+  const std::string costs = context->workspace->Path(kCostTable);
+  if (std::filesystem::is_regular_file(costs)) stage.inputs["costs"] = HashFile(costs);
   stage.work = [context](const ProgressFunction&) { return WriteReport(context); };
   return stage;
 }

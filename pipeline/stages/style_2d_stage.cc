@@ -66,7 +66,7 @@ StageOutcome StyleViews(RunContext* context, const ProgressFunction& progress) {
   const int count = static_cast<int>(capture.views.size());
   int styled = 0;
   for (int i = 0; i < count; ++i) {
-    if (Report(progress, i, count) == Verdict::kAbort) throw Interrupted();
+    if (Report(progress, i, count) == LoopControl::kStop) throw Interrupted();
     if (!stylizer->Knows(i) || (masks != nullptr && !masks->Knows(i))) continue;
     ++styled;
     const CaptureView& view = capture.views[static_cast<size_t>(i)];
@@ -76,9 +76,9 @@ StageOutcome StyleViews(RunContext* context, const ProgressFunction& progress) {
   }
   StageOutcome outcome;
   outcome.outputs = {"views_2d"};
-  outcome.figures["method"] = stylizer->Name();
-  outcome.figures["views"] = styled;
-  for (const std::string& notice : notices) outcome.figures["notices"].Append(notice);
+  outcome.metrics["method"] = stylizer->Name();
+  outcome.metrics["views"] = styled;
+  for (const std::string& notice : notices) outcome.metrics["notices"].Append(notice);
   return outcome;
 }
 

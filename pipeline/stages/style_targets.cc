@@ -39,50 +39,50 @@ bool PartOfMask(const Image& mask, StyledTrainingView* view) {
 
 }  // namespace
 
-Lessons ReadLessons(RunContext* context, const Capture& capture, const StoredField& stored,
-                    const std::vector<int>& indices, const ObjectMasks* object,
-                    const ObjectShares* shares) {
+StyleTargets ReadStyleTargets(RunContext* context, const Capture& capture,
+                              const StoredField& stored, const std::vector<int>& indices,
+                              const ObjectMasks* object, const ObjectWeights* shares) {
   const RunSettings& settings = context->settings;
-  Lessons lessons;
-  lessons.targets.reserve(indices.size());  // they are pointed to
-  lessons.masks.reserve(indices.size());
+  StyleTargets style_targets;
+  style_targets.targets.reserve(indices.size());  // they are pointed to
+  style_targets.masks.reserve(indices.size());
   std::optional<CoverageRenderer> agreed;
   if (object != nullptr) agreed.emplace(stored.field, *shares);
   const PhotoGains gains = RecordedGains(*context->workspace, capture);
   std::vector<ColorStatistics> before, after;
   for (const int i : indices) {
     const CaptureView& view = capture.views[static_cast<size_t>(i)];
-    StyledTrainingView lesson;
-    lesson.camera = WorkingCamera(view.camera, settings.scene.photo_size,
+    StyledTrainingView target;
+    target.camera = WorkingCamera(view.camera, settings.scene.photo_size,
                                   stored.field_from_world, stored.ndc);
-    lesson.name = "views_2d/" + FrameName(i);
+    target.name = "views_2d/" + FrameName(i);
     Image kept = ReadWorkingMask(view, settings.scene.photo_size);
     if (object != nullptr) {
-      Image mask = AgreedMask(object->Coverage(i, lesson.camera.width, lesson.camera.height),
-                              agreed->Render(lesson.camera));
+      Image mask = AgreedMask(object->Coverage(i, target.camera.width, target.camera.height),
+                              agreed->Render(target.camera));
       for (int64_t p = 0; p < kept.num_pixels(); ++p) mask.pixels[p] *= kept.pixels[p];
-      if (!PartOfMask(mask, &lesson)) continue;
-      lessons.masks.push_back(std::move(mask));
-      lesson.mask = &lessons.masks.back();
+      if (!PartOfMask(mask, &target)) continue;
+      style_targets.masks.push_back(std::move(mask));
+      target.mask = &style_targets.masks.back();
     } else if (kept.num_pixels() > 0) {
       if (std::find(kept.pixels.begin(), kept.pixels.end(), 1.0f) == kept.pixels.end())
         continue;
-      lessons.masks.push_back(std::move(kept));
-      lesson.mask = &lessons.masks.back();
+      style_targets.masks.push_back(std::move(kept));
+      target.mask = &style_targets.masks.back();
     }
-    lessons.targets.push_back(ReadImage(context->workspace->Path(lesson.name)));
-    lesson.target = &lessons.targets.back();
+    style_targets.targets.push_back(ReadImage(context->workspace->Path(target.name)));
+    target.target = &style_targets.targets.back();
     before.push_back(MeasureColor(
-        ReadWorkingPhoto(view, settings.scene.photo_size, gains.Of(i)), lesson.mask));
-    after.push_back(MeasureColor(lessons.targets.back(), lesson.mask));
-    lessons.views.push_back(std::move(lesson));
+        ReadWorkingPhoto(view, settings.scene.photo_size, gains.Of(i)), target.mask));
+    after.push_back(MeasureColor(style_targets.targets.back(), target.mask));
+    style_targets.views.push_back(std::move(target));
   }
-  if (lessons.views.empty()) return lessons;
+  if (style_targets.views.empty()) return style_targets;
   const MklMap mkl = ComputeMkl(Pool(before), Pool(after));
   for (const std::string& notice : mkl.notices) context->console->Info(notice);
-  lessons.notices = mkl.notices;
-  lessons.scene_map = {mkl.map, mkl.norm};
-  return lessons;
+  style_targets.notices = mkl.notices;
+  style_targets.scene_map = {mkl.map, mkl.norm};
+  return style_targets;
 }
 
 }  // namespace regrade

@@ -11,7 +11,7 @@
 
 namespace regrade {
 
-struct Lessons {
+struct StyleTargets {
   std::vector<Image> targets, masks;  // that `views` point to
   std::vector<StyledTrainingView> views;
   SceneColorMap scene_map;
@@ -21,8 +21,8 @@ struct Lessons {
 // Of the views `indices` (see StyledViews), without what --photo-masks masks. With `object`,
 // the lessons are of the pixels where a view's own mask and what all masks agreed on both say
 // that the object is seen, and views without such a pixel are left out; there may be none left.
-Lessons ReadLessons(RunContext* context, const Capture& capture, const StoredField& stored,
-                    const std::vector<int>& indices, const ObjectMasks* object,
-                    const ObjectShares* shares);
+StyleTargets ReadStyleTargets(RunContext* context, const Capture& capture,
+                              const StoredField& stored, const std::vector<int>& indices,
+                              const ObjectMasks* object, const ObjectWeights* shares);
 
 }  // namespace regrade

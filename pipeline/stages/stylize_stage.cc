@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "kernels/field/packed_grid.h"
-#include "kernels/field/widened.h"
+#include "kernels/field/pad_sh_basis.h"
 #include "pipeline/capture/capture_store.h"
 #include "pipeline/capture/photo_gains.h"
 #include "pipeline/capture/working_views.h"
@@ -44,7 +44,7 @@ Vec3f Mapped(const ColorMap& map, const Vec3f& color) {
   return mapped.Cast<float>();
 }
 
-// Pairs of neighbouring pixels, drawn for the measurement of what the propositions promise.
+// Pairs of neighbouring pixels, drawn for the measurement of what the propositions guarantee.
 constexpr int64_t kVariancePairs = 4000;
 
 JsonValue GroupRecord(const VarianceGroup& group) {
@@ -73,7 +73,7 @@ JsonValue VarianceRecord(const RadianceField& source, const RadianceField& style
 // Why the network is steeper than the colours' covariances tell, where it is.
 std::string WhySteep(const TrainNetworkResult& trained) {
   constexpr double kSteep = 1.5;
-  if (!(trained.slope_observed > kSteep * trained.k_est)) return "";
+  if (!(trained.local_lipschitz_sampled > kSteep * trained.k_est)) return "";
   const double of_map = trained.network.BaseNorm(),
                of_colors = trained.slopes.along_coefficients;
   const double of_places = trained.slopes.along_position;
@@ -87,14 +87,14 @@ std::string WhySteep(const TrainNetworkResult& trained) {
       text, sizeof text,
       "the largest slope seen, %.2f, is %.2f K_est: %s (the map alone %.2f; where it is "
       "steepest %.2f along coefficients and %.2f along positions)",
-      trained.slope_observed, trained.slope_observed / trained.k_est, reason, of_map, of_colors,
-      of_places);
+      trained.local_lipschitz_sampled, trained.local_lipschitz_sampled / trained.k_est, reason,
+      of_map, of_colors, of_places);
   return text;
 }
 
 // An object's style that no view shows.
 StageOutcome LeaveAsItWas(RunContext* context, const StoredField& stored,
-                          const ObjectShares& shares) {
+                          const ObjectWeights& shares) {
   const Workspace& workspace = *context->workspace;
   context->console->Warn(
       "the masks agree on no part of the scene: it stays as it was. Look at --masks, or lower "
@@ -104,7 +104,7 @@ StageOutcome LeaveAsItWas(RunContext* context, const StoredField& stored,
   WriteObjectFile(workspace.Path("object.npz"), shares);
   StageOutcome outcome;
   outcome.outputs = {"network.npz", "styled.npz", "object.npz"};
-  outcome.figures["steps"] = 0;
+  outcome.metrics["steps"] = 0;
   return outcome;
 }
 
@@ -116,22 +116,23 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
   StoredField stored = ReadFieldFile(workspace.Path("field.npz"));
   // A 2D method maps each view by itself, and what differs from view to view needs directions,
   // also where the scene's own colours do not.
-  stored.field.appearance = Widened(std::move(stored.field.appearance), kStyledBasis);
+  stored.field.appearance = PadShBasis(std::move(stored.field.appearance), kStyledBasis);
   ProgressParts parts(progress, 1 + kAfterTraining + (settings.object.On() ? kVoting : 0));
   const std::vector<int> indices = StyledViews(workspace, capture, settings.run.holdout);
   const std::unique_ptr<ObjectMasks> object = OpenObjectMasks(settings, capture);
-  ObjectShares shares;
+  ObjectWeights shares;
   if (object != nullptr)
     shares = VoteForObject(settings, capture, indices, *object, stored.field,
                            stored.field_from_world, stored.ndc, parts.Next(kVoting));
-  const Lessons lessons = ReadLessons(context, capture, stored, indices, object.get(), &shares);
-  if (lessons.views.empty()) return LeaveAsItWas(context, stored, shares);
+  const StyleTargets style_targets =
+      ReadStyleTargets(context, capture, stored, indices, object.get(), &shares);
+  if (style_targets.views.empty()) return LeaveAsItWas(context, stored, shares);
 
   // What a ray sees behind the box is a colour of the scene too, unless the paper's letter is
   // asked for.
   const Vec3f source_background = stored.field.background;
   if (settings.network.recipe != "paper" && object == nullptr)
-    stored.field.background = Mapped(lessons.scene_map.map, stored.field.background);
+    stored.field.background = Mapped(style_targets.scene_map.map, stored.field.background);
   TrainNetworkOptions options = settings.network;
   options.seed = settings.run.seed;
   TrainingHooks hooks;
@@ -146,9 +147,10 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
   const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
   DeviceGrid device_field;
   if (backend == Backend::kCuda) device_field = UploadGrid(MakeFastGrid(stored.field));
-  const TrainNetworkResult trained = TrainNetwork(
-      stored.field, lessons.views, lessons.scene_map, MarchOptions{stored.field.step}, options,
-      hooks, resume ? &*resume : nullptr, backend == Backend::kCuda ? &device_field : nullptr);
+  const TrainNetworkResult trained =
+      TrainNetwork(stored.field, style_targets.views, style_targets.scene_map,
+                   MarchOptions{stored.field.step}, options, hooks, resume ? &*resume : nullptr,
+                   backend == Backend::kCuda ? &device_field : nullptr);
   for (const std::string& warning : trained.warnings) context->console->Warn(warning);
 
   WriteNetworkFile(workspace.Path("network.npz"), {trained.network, trained.k_est});
@@ -169,37 +171,38 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
     stored.field = MixFields(source, {&styled}, {1}, &shares.all);
     WriteObjectFile(workspace.Path("object.npz"), shares);
     outcome.outputs.push_back("object.npz");
-    outcome.figures["object_voxels"] = static_cast<int64_t>(
+    outcome.metrics["object_voxels"] = static_cast<int64_t>(
         std::count_if(shares.all.begin(), shares.all.end(), [](float e) { return e > 0; }));
   } else {
     std::filesystem::remove(workspace.Path("object.npz"));  // of an earlier style
   }
   WriteFieldFile(workspace.Path("styled.npz"), stored);
-  outcome.figures["device"] = DeviceName(backend);
-  outcome.figures["steps"] = trained.steps;
-  outcome.figures["rejected_steps"] = trained.rejected_steps;
-  outcome.figures["k_est"] = trained.k_est;
-  outcome.figures["bound"] = trained.bound;
-  outcome.figures["slope_observed"] = trained.slope_observed;
+  outcome.metrics["device"] = DeviceName(backend);
+  outcome.metrics["steps"] = trained.steps;
+  outcome.metrics["rejected_steps"] = trained.rejected_steps;
+  outcome.metrics["k_est"] = trained.k_est;
+  outcome.metrics["bound"] = trained.bound;
+  outcome.metrics["local_lipschitz_sampled"] = trained.local_lipschitz_sampled;
   for (size_t i = 0; i < trained.history.steps.size(); ++i) {
-    outcome.figures["bound_steps"].Append(trained.history.steps[i]);
-    outcome.figures["bound_at_steps"].Append(trained.history.bounds[i]);
+    outcome.metrics["bound_steps"].Append(trained.history.steps[i]);
+    outcome.metrics["bound_at_steps"].Append(trained.history.bounds[i]);
   }
-  outcome.figures["slope_ascent"] = trained.slope_ascent;
-  outcome.figures["slope_of_map"] = trained.network.BaseNorm();
-  outcome.figures["slope_along_coefficients"] = trained.slopes.along_coefficients;
-  outcome.figures["slope_along_position"] = trained.slopes.along_position;
-  // A network's promise is about what it alone has made, and is measured on voxels.
+  outcome.metrics["local_lipschitz_max"] = trained.local_lipschitz_max;
+  outcome.metrics["local_lipschitz_of_map"] = trained.network.BaseNorm();
+  outcome.metrics["local_lipschitz_along_coefficients"] = trained.slopes.along_coefficients;
+  outcome.metrics["local_lipschitz_along_position"] = trained.slopes.along_position;
+  // A network's guarantee is about what it alone has made, and is measured on voxels.
   if (object == nullptr && !source.geometry->spheres.on())
-    outcome.figures["variance"] =
-        VarianceRecord(source, stored.field, trained.network, lessons.views, settings.run.seed);
-  outcome.figures["psnr_train_db"] = trained.psnr_db;
-  for (const std::string& notice : lessons.notices) outcome.figures["notices"].Append(notice);
+    outcome.metrics["variance"] = VarianceRecord(source, stored.field, trained.network,
+                                                 style_targets.views, settings.run.seed);
+  outcome.metrics["psnr_train_db"] = trained.psnr_db;
+  for (const std::string& notice : style_targets.notices)
+    outcome.metrics["notices"].Append(notice);
   for (const std::string& warning : trained.warnings)
-    outcome.figures["notices"].Append(warning);
+    outcome.metrics["notices"].Append(warning);
   if (const std::string why = WhySteep(trained); !why.empty()) {
     context->console->Info(why);
-    outcome.figures["notices"].Append(why);
+    outcome.metrics["notices"].Append(why);
   }
   return outcome;
 }

@@ -174,13 +174,11 @@ void WriteSyntheticCapture(const std::string& out, const SynthOptions& options,
       WriteMotion(truth, i, TrueMotion(scene, cameras[i], cameras[i + 1]));
     frames.push_back({"../images/" + name, cameras[i]});
     if (effects.poses) depths.push_back(std::move(view.depth));
-    const Verdict verdict = Report(progress, i + 1, options.views, name);
-    if (verdict == Verdict::kAbort) throw Interrupted();
-    if (verdict == Verdict::kFinish) break;
+    const LoopControl control = Report(progress, i + 1, options.views, name);
+    if (control == LoopControl::kStop) throw Interrupted();
   }
   WriteTransformsJson((truth / "transforms.json").string(), frames);
   if (!effects.poses) return;
-  cameras.resize(depths.size());
   std::vector<std::string> names;
   for (size_t i = 0; i < depths.size(); ++i)
     names.push_back(FrameName(static_cast<int>(i), ".png"));

@@ -48,8 +48,7 @@ struct SynthOptions {
 //   with `poses`: OUT/sparse/0/, a COLMAP model whose poses are off (synth_model.h)
 //   OUT/truth/effects.json                the options, and the parameters of what was simulated
 // The scene itself does not change with the effects. Same options, same bytes, for any number
-// of threads. Reports progress once a view; kFinish stops after the view at hand, with the list
-// of cameras cut to what was written.
+// of threads. Reports progress once a view.
 //
 // Errors: kUsage for a scene, size or effect that does not exist; kResources from the disk.
 void WriteSyntheticCapture(const std::string& out, const SynthOptions& options,

@@ -21,63 +21,63 @@ Spread Of(std::vector<double> values) {
 }
 
 // Larger is better, whatever the plane's unit.
-double Merit(const PriceRow& row) {
-  return PlaneOf(row.plane).more_is_better ? *row.accuracy.value : -*row.accuracy.value;
+double Merit(const CostRow& row) {
+  return BenchmarkOf(row.benchmark).more_is_better ? *row.accuracy.value : -*row.accuracy.value;
 }
 
-bool AtLeastAsGood(const PriceRow& a, const PriceRow& b) {
+bool AtLeastAsGood(const CostRow& a, const CostRow& b) {
   return Merit(a) >= Merit(b) && *a.cpu_seconds.value <= *b.cpu_seconds.value;
 }
 
-bool Beats(const PriceRow& a, const PriceRow& b) {
+bool Beats(const CostRow& a, const CostRow& b) {
   return AtLeastAsGood(a, b) && !AtLeastAsGood(b, a);
 }
 
-bool BeatsBeyondNoise(const PriceRow& a, const PriceRow& b) {
+bool BeatsBeyondNoise(const CostRow& a, const CostRow& b) {
   if (!Beats(a, b) || a.repeats < 2 || b.repeats < 2) return false;
   return *b.cpu_seconds.value - *a.cpu_seconds.value >
              *a.cpu_spread.value + *b.cpu_spread.value ||
          Merit(a) - Merit(b) > *a.accuracy_spread.value + *b.accuracy_spread.value;
 }
 
-std::string NameOf(const PriceRow& row) {
-  return row.knob.empty() ? row.setting : row.knob + " " + row.setting;
+std::string NameOf(const CostRow& row) {
+  return row.parameter.empty() ? row.setting : row.parameter + " " + row.setting;
 }
 
-// Against the accurate end of the same knob, which may be the base.
-void FillErrors(const std::vector<Variant>& variants, std::vector<PriceRow>* rows) {
-  for (PriceRow& row : *rows) {
-    if (row.knob.empty() || row.knob == "preset") continue;
+// Against the accurate end of the same parameter, which may be the base.
+void FillErrors(const std::vector<Variant>& variants, std::vector<CostRow>* rows) {
+  for (CostRow& row : *rows) {
+    if (row.parameter.empty() || row.parameter == "preset") continue;
     const auto end = std::find_if(variants.begin(), variants.end(), [&](const Variant& v) {
-      return v.plane == row.plane && v.knob == row.knob && v.accurate_end;
+      return v.benchmark == row.benchmark && v.parameter == row.parameter && v.accurate_end;
     });
-    const std::string knob = end == variants.end() ? "" : end->knob;
+    const std::string parameter = end == variants.end() ? "" : end->parameter;
     const std::string value = end == variants.end() ? "" : end->value;
-    for (const PriceRow& other : *rows)
-      if (other.plane == row.plane && other.knob == knob &&
-          (knob.empty() || other.setting == value))
+    for (const CostRow& other : *rows)
+      if (other.benchmark == row.benchmark && other.parameter == parameter &&
+          (parameter.empty() || other.setting == value))
         row.error = Merit(other) - Merit(row);
   }
 }
 
-void MarkFront(std::vector<PriceRow>* rows) {
-  for (PriceRow& row : *rows) {
-    row.on_front = true;
-    for (const PriceRow& other : *rows) {
-      if (other.plane != row.plane || &other == &row) continue;
-      if (Beats(other, row)) row.on_front = false;
+void MarkParetoFront(std::vector<CostRow>* rows) {
+  for (CostRow& row : *rows) {
+    row.on_pareto_front = true;
+    for (const CostRow& other : *rows) {
+      if (other.benchmark != row.benchmark || &other == &row) continue;
+      if (Beats(other, row)) row.on_pareto_front = false;
       if (row.dominated_by.empty() && BeatsBeyondNoise(other, row))
         row.dominated_by = NameOf(other);
     }
   }
 }
 
-std::string Cell(const Figure& figure, int decimals) {
-  return figure.value ? FixedNumber(*figure.value, decimals) : "-";
+std::string Cell(const Metric& metric, int decimals) {
+  return metric.value ? FixedNumber(*metric.value, decimals) : "-";
 }
 
 // Enough digits for milliseconds and for hours.
-int DecimalsFor(const Figure& seconds) { return seconds.value && *seconds.value < 1 ? 4 : 2; }
+int DecimalsFor(const Metric& seconds) { return seconds.value && *seconds.value < 1 ? 4 : 2; }
 
 std::string Quoted(const std::string& text) {
   std::string out = "\"";
@@ -87,27 +87,28 @@ std::string Quoted(const std::string& text) {
 
 }  // namespace
 
-std::vector<PriceRow> PriceList(const std::vector<Variant>& variants,
-                                const std::vector<Measurement>& measurements,
-                                const std::string& base) {
-  std::vector<PriceRow> rows;
+std::vector<CostRow> CostTable(const std::vector<Variant>& variants,
+                               const std::vector<Measurement>& measurements,
+                               const std::string& base) {
+  std::vector<CostRow> rows;
   for (const Variant& variant : variants) {
     std::vector<double> seconds, cpu, accuracy;
     for (const Measurement& m : measurements) {
-      if (m.plane != variant.plane || m.knob != variant.knob || m.value != variant.value)
+      if (m.benchmark != variant.benchmark || m.parameter != variant.parameter ||
+          m.value != variant.value)
         continue;
       seconds.push_back(m.seconds);
       cpu.push_back(m.cpu_seconds);
       accuracy.push_back(m.accuracy);
     }
     if (seconds.empty()) continue;
-    const Plane& plane = PlaneOf(variant.plane);
-    PriceRow row;
-    row.plane = variant.plane;
-    row.knob = variant.knob;
-    row.setting = variant.knob.empty() ? base : variant.value;
-    row.measure = plane.accuracy;
-    row.unit = plane.unit;
+    const Benchmark& benchmark = BenchmarkOf(variant.benchmark);
+    CostRow row;
+    row.benchmark = variant.benchmark;
+    row.parameter = variant.parameter;
+    row.setting = variant.parameter.empty() ? base : variant.value;
+    row.measure = benchmark.accuracy;
+    row.unit = benchmark.unit;
     row.repeats = static_cast<int>(seconds.size());
     row.seconds = Of(seconds).median;
     row.seconds_spread = Of(seconds).spread;
@@ -115,33 +116,33 @@ std::vector<PriceRow> PriceList(const std::vector<Variant>& variants,
     row.cpu_spread = Of(cpu).spread;
     row.accuracy = Of(accuracy).median;
     row.accuracy_spread = Of(accuracy).spread;
-    row.error = Figure::Undefined("it is not a value of one knob");
+    row.error = Metric::Undefined("it is not a value of one parameter");
     rows.push_back(std::move(row));
   }
   // Presets, measured last, stand with the other rows of their plane.
-  std::stable_sort(rows.begin(), rows.end(), [](const PriceRow& a, const PriceRow& b) {
-    return &PlaneOf(a.plane) < &PlaneOf(b.plane);
+  std::stable_sort(rows.begin(), rows.end(), [](const CostRow& a, const CostRow& b) {
+    return &BenchmarkOf(a.benchmark) < &BenchmarkOf(b.benchmark);
   });
   FillErrors(variants, &rows);
-  MarkFront(&rows);
+  MarkParetoFront(&rows);
   return rows;
 }
 
-std::string PriceListText(const std::vector<PriceRow>& rows) {
-  std::string text, plane;
+std::string CostTableText(const std::vector<CostRow>& rows) {
+  std::string text, benchmark;
   char line[256];
-  for (const PriceRow& row : rows) {
-    if (row.plane != plane) {
-      plane = row.plane;
-      text += (text.empty() ? "" : "\n") + plane + ": " + row.measure + ", " + row.unit +
-              "; time of " + PlaneOf(plane).time_of + "; * on the Pareto front\n";
+  for (const CostRow& row : rows) {
+    if (row.benchmark != benchmark) {
+      benchmark = row.benchmark;
+      text += (text.empty() ? "" : "\n") + benchmark + ": " + row.measure + ", " + row.unit +
+              "; time of " + BenchmarkOf(benchmark).time_of + "; * on the Pareto front\n";
       std::snprintf(line, sizeof line, "  %-40s %10s %10s %9s %10s %9s %9s\n", "", "s", "CPU s",
                     "+-", row.unit.c_str(), "+-", "error");
       text += line;
     }
     const int decimals = DecimalsFor(row.cpu_seconds);
     std::snprintf(line, sizeof line, "%s %-40s %10s %10s %9s %10s %9s %9s",
-                  row.on_front ? "*" : " ", NameOf(row).c_str(),
+                  row.on_pareto_front ? "*" : " ", NameOf(row).c_str(),
                   Cell(row.seconds, decimals).c_str(), Cell(row.cpu_seconds, decimals).c_str(),
                   Cell(row.cpu_spread, decimals).c_str(), Cell(row.accuracy, 3).c_str(),
                   Cell(row.accuracy_spread, 3).c_str(), Cell(row.error, 3).c_str());
@@ -152,19 +153,19 @@ std::string PriceListText(const std::vector<PriceRow>& rows) {
   return text;
 }
 
-std::string PriceListCsv(const std::vector<PriceRow>& rows) {
+std::string CostTableCsv(const std::vector<CostRow>& rows) {
   std::string text =
-      "plane,knob,setting,repeats,seconds,seconds_spread,cpu_seconds,cpu_spread,accuracy,"
-      "accuracy_spread,unit,error,on_front,dominated_by\n";
-  for (const PriceRow& row : rows) {
-    const auto number = [](const Figure& figure) {
-      return "," + (figure.value ? FixedNumber(*figure.value, 6) : std::string());
+      "plane,parameter,setting,repeats,seconds,seconds_spread,cpu_seconds,cpu_spread,accuracy,"
+      "accuracy_spread,unit,error,on_pareto_front,dominated_by\n";
+  for (const CostRow& row : rows) {
+    const auto number = [](const Metric& metric) {
+      return "," + (metric.value ? FixedNumber(*metric.value, 6) : std::string());
     };
-    text += row.plane + "," + Quoted(row.knob) + "," + Quoted(row.setting) + "," +
+    text += row.benchmark + "," + Quoted(row.parameter) + "," + Quoted(row.setting) + "," +
             std::to_string(row.repeats) + number(row.seconds) + number(row.seconds_spread) +
             number(row.cpu_seconds) + number(row.cpu_spread) + number(row.accuracy) +
             number(row.accuracy_spread) + "," + row.unit + number(row.error) + "," +
-            (row.on_front ? "yes" : "no") + "," + Quoted(row.dominated_by) + "\n";
+            (row.on_pareto_front ? "yes" : "no") + "," + Quoted(row.dominated_by) + "\n";
   }
   return text;
 }

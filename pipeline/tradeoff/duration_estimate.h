@@ -10,9 +10,9 @@
 
 namespace regrade {
 
-class Guess {
+class DurationEstimate {
  public:
-  Guess(const RunSettings& base, const std::vector<Measurement>& measured);
+  DurationEstimate(const RunSettings& base, const std::vector<Measurement>& measured);
 
   void Add(const Measurement& measurement);
   double Seconds(const Variant& variant) const;

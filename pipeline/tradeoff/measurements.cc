@@ -9,8 +9,8 @@ namespace {
 
 Measurement FromJson(const JsonValue& row) {
   Measurement measurement;
-  measurement.plane = row.At("plane").AsString();
-  measurement.knob = row.At("knob").AsString();
+  measurement.benchmark = row.At("benchmark").AsString();
+  measurement.parameter = row.At("parameter").AsString();
   measurement.value = row.At("value").AsString();
   measurement.repeat = static_cast<int>(row.At("repeat").AsInt());
   measurement.seconds = row.At("seconds").AsDouble();
@@ -24,10 +24,10 @@ Measurement FromJson(const JsonValue& row) {
 
 JsonValue ToJson(const Measurement& measurement) {
   return JsonValue::Object{
-      {"plane", measurement.plane},       {"knob", measurement.knob},
-      {"value", measurement.value},       {"repeat", measurement.repeat},
-      {"seconds", measurement.seconds},   {"cpu_seconds", measurement.cpu_seconds},
-      {"accuracy", measurement.accuracy}, {"work", measurement.work}};
+      {"benchmark", measurement.benchmark}, {"parameter", measurement.parameter},
+      {"value", measurement.value},         {"repeat", measurement.repeat},
+      {"seconds", measurement.seconds},     {"cpu_seconds", measurement.cpu_seconds},
+      {"accuracy", measurement.accuracy},   {"work", measurement.work}};
 }
 
 MeasurementStore::MeasurementStore(const std::string& path, const std::string& fingerprint)
@@ -46,8 +46,8 @@ MeasurementStore::MeasurementStore(const std::string& path, const std::string& f
 
 const Measurement* MeasurementStore::Find(const Variant& variant, int repeat) const {
   for (const Measurement& m : all_)
-    if (m.plane == variant.plane && m.knob == variant.knob && m.value == variant.value &&
-        m.repeat == repeat)
+    if (m.benchmark == variant.benchmark && m.parameter == variant.parameter &&
+        m.value == variant.value && m.repeat == repeat)
       return &m;
   return nullptr;
 }

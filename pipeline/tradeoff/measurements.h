@@ -12,7 +12,7 @@
 namespace regrade {
 
 struct Measurement {
-  std::string plane, knob, value;
+  std::string benchmark, parameter, value;
   int repeat = 0;
   double seconds = 0, cpu_seconds = 0;  // of what the plane says
   double accuracy = 0;                  // in the plane's unit

@@ -35,21 +35,21 @@ bool Same(const JsonValue& a, const JsonValue& b) {
 
 class List {
  public:
-  explicit List(const KnobChoice& choice) : choice_(choice) {}
+  explicit List(const ParameterChoice& choice) : choice_(choice) {}
 
-  void AddBase(const std::string& plane) { variants_.push_back({plane, "", ""}); }
+  void AddBase(const std::string& benchmark) { variants_.push_back({benchmark, "", ""}); }
 
   // From cheap to accurate; the base's own value is measured already.
-  void Add(const std::string& plane, const std::string& knob, const JsonValue& own,
+  void Add(const std::string& benchmark, const std::string& parameter, const JsonValue& own,
            const std::vector<JsonValue>& values, bool last_is_accurate = true) {
-    names_.push_back(knob);
+    names_.push_back(parameter);
     if (!choice_.only.empty() &&
-        std::find(choice_.only.begin(), choice_.only.end(), knob) == choice_.only.end())
+        std::find(choice_.only.begin(), choice_.only.end(), parameter) == choice_.only.end())
       return;
     for (const JsonValue& value : values) {
       if (Same(value, own)) continue;
-      Variant variant{plane, knob, TextOf(value)};
-      variant.options[knob] = value;
+      Variant variant{benchmark, parameter, TextOf(value)};
+      variant.options[parameter] = value;
       variant.accurate_end = last_is_accurate && &value == &values.back();
       variants_.push_back(std::move(variant));
     }
@@ -59,20 +59,21 @@ class List {
     for (const std::string& name : choice_.only)
       if (std::find(names_.begin(), names_.end(), name) == names_.end()) {
         std::string known;
-        for (const std::string& knob : names_) known += (known.empty() ? "" : ", ") + knob;
-        throw Error(ExitCode::kUsage, "'" + name + "' has no price here", "--knobs",
-                    "knobs: " + known);
+        for (const std::string& parameter : names_)
+          known += (known.empty() ? "" : ", ") + parameter;
+        throw Error(ExitCode::kUsage, "'" + name + "' has no price here", "--parameters",
+                    "parameters: " + known);
       }
     return std::move(variants_);
   }
 
  private:
-  const KnobChoice& choice_;
+  const ParameterChoice& choice_;
   std::vector<Variant> variants_;
   std::vector<std::string> names_;
 };
 
-void AddFitKnobs(const RunSettings& base, List* list) {
+void AddFitParameters(const RunSettings& base, List* list) {
   const FitOptions& fit = base.fit;
   const auto steps = [&](double factor) { return Numbers(Scaled(fit.steps, factor, 1)); };
   const auto grids = [&](double factor) {
@@ -90,7 +91,7 @@ void AddFitKnobs(const RunSettings& base, List* list) {
   list->Add("fit", "fit-shards", fit.shards, {0, 4});
 }
 
-void AddStyleKnobs(const RunSettings& base, List* list) {
+void AddStyleParameters(const RunSettings& base, List* list) {
   const TrainNetworkOptions& network = base.network;
   const auto steps = [&](double factor) {
     return JsonValue(std::max(1, static_cast<int>(std::lround(network.steps * factor))));
@@ -104,9 +105,9 @@ void AddStyleKnobs(const RunSettings& base, List* list) {
 
 }  // namespace
 
-const Plane& PlaneOf(const std::string& name) {
-  for (const Plane& plane : kPlanes)
-    if (name == plane.name) return plane;
+const Benchmark& BenchmarkOf(const std::string& name) {
+  for (const Benchmark& benchmark : kBenchmarks)
+    if (name == benchmark.name) return benchmark;
   throw Error(ExitCode::kInput, "'" + name + "' is no plane of prices");
 }
 
@@ -123,7 +124,7 @@ JsonValue PresetOptions(const std::string& preset) {
   return values;
 }
 
-std::vector<Variant> VariantsOf(const RunSettings& base, const KnobChoice& choice) {
+std::vector<Variant> VariantsOf(const RunSettings& base, const ParameterChoice& choice) {
   List list(choice);
   if (choice.poses) {
     list.AddBase("poses");
@@ -131,10 +132,10 @@ std::vector<Variant> VariantsOf(const RunSettings& base, const KnobChoice& choic
     list.Add("poses", "pose-image-size", size, {size * 6 / 10, size, size * 16 / 10});
   }
   list.AddBase("fit");
-  AddFitKnobs(base, &list);
+  AddFitParameters(base, &list);
   if (choice.style) {
     list.AddBase("style");
-    AddStyleKnobs(base, &list);
+    AddStyleParameters(base, &list);
   }
   list.AddBase("render");
   // How rays are marched, not options of a run: films use the field's own step and 1e-4.
@@ -146,11 +147,11 @@ std::vector<Variant> VariantsOf(const RunSettings& base, const KnobChoice& choic
   std::vector<Variant> variants = list.Take();
   for (const std::string& preset : choice.presets)
     variants.push_back({"fit", "preset", preset, PresetOptions(preset)});
-  // A plane whose knobs were not asked for needs no base.
+  // A plane whose parameters were not asked for needs no base.
   std::erase_if(variants, [&](const Variant& variant) {
-    return variant.knob.empty() &&
+    return variant.parameter.empty() &&
            std::none_of(variants.begin(), variants.end(), [&](const Variant& other) {
-             return other.plane == variant.plane && !other.knob.empty();
+             return other.benchmark == variant.benchmark && !other.parameter.empty();
            });
   });
   return variants;

@@ -12,12 +12,12 @@
 namespace regrade {
 namespace {
 
-// A stage and the units that its time is made of; the first is what its knobs change.
+// A stage and the units that its time is made of; the first is what its parameters change.
 struct StageUnits {
   const char* stage;
   std::vector<const char*> units;
-  const char* plane;  // whose variants teach more than the run itself
-  std::vector<const char*> knobs;
+  const char* benchmark;  // whose variants teach more than the run itself
+  std::vector<const char*> parameters;
 };
 
 const std::vector<StageUnits>& AllUnits() {
@@ -146,25 +146,27 @@ double AmountOf(const std::string& unit, const RunSettings& settings, const Capt
   throw Error(ExitCode::kInput, "'" + unit + "' is no unit of work");
 }
 
-std::vector<PriceTerm> LearnPrices(const RunSettings& base, const Capture& capture,
-                                   const Workspace& workspace,
-                                   const std::vector<Variant>& variants,
-                                   const std::vector<Measurement>& measurements) {
-  std::vector<PriceTerm> prices;
+std::vector<CostTerm> LearnCosts(const RunSettings& base, const Capture& capture,
+                                 const Workspace& workspace,
+                                 const std::vector<Variant>& variants,
+                                 const std::vector<Measurement>& measurements) {
+  std::vector<CostTerm> costs;
   for (StageUnits stage : AllUnits()) {
     const auto record = workspace.Find(stage.stage);
     // Photos whose poses came along are only read.
     if (stage.stage == std::string("pose") && record &&
-        record->figures.Find("colmap") == nullptr)
+        record->metrics.Find("colmap") == nullptr)
       stage.units = {"staged pixels"};
     std::vector<Observation> seen;
     for (const Measurement& m : measurements) {
       const bool teaches =
-          m.knob.empty() || std::any_of(stage.knobs.begin(), stage.knobs.end(),
-                                        [&m](const char* knob) { return m.knob == knob; });
-      if (m.plane != stage.plane || !teaches) continue;
+          m.parameter.empty() ||
+          std::any_of(stage.parameters.begin(), stage.parameters.end(),
+                      [&m](const char* parameter) { return m.parameter == parameter; });
+      if (m.benchmark != stage.benchmark || !teaches) continue;
       for (const Variant& variant : variants)
-        if (variant.plane == m.plane && variant.knob == m.knob && variant.value == m.value)
+        if (variant.benchmark == m.benchmark && variant.parameter == m.parameter &&
+            variant.value == m.value)
           seen.push_back(ObservationOf(stage, SettingsOf(base, variant), capture, m.seconds,
                                        m.cpu_seconds));
     }
@@ -175,33 +177,33 @@ std::vector<PriceTerm> LearnPrices(const RunSettings& base, const Capture& captu
     const std::vector<double> seconds = LeastSquares(seen, &Observation::seconds),
                               cpu = LeastSquares(seen, &Observation::cpu_seconds);
     for (size_t k = 0; k < stage.units.size(); ++k)
-      prices.push_back({stage.stage, stage.units[k], seconds[k], cpu[k]});
+      costs.push_back({stage.stage, stage.units[k], seconds[k], cpu[k]});
     if (stage.stage == std::string("reconstruct") && record) {
       const double amount = AmountOf("staged pixels", base, capture);
       const Observation own = ObservationOf(stage, base, capture, 0, 0);
-      const auto figure = [&record](const char* name) {
-        const JsonValue* value = record->figures.Find(name);
+      const auto metric = [&record](const char* name) {
+        const JsonValue* value = record->metrics.Find(name);
         return value != nullptr && value->IsNumber() ? value->AsDouble() : 0;
       };
-      const PriceTerm trial{stage.stage, "trials", figure("trial_seconds"),
-                            figure("trial_cpu_seconds")};
+      const CostTerm trial{stage.stage, "trials", metric("trial_seconds"),
+                           metric("trial_cpu_seconds")};
       const auto beside = [&](double whole, double factor, double of_trial) {
         const double left = whole - factor * own.amounts[0] - of_trial;
         return amount > 0 ? std::max(0.0, left) / amount : 0;
       };
-      if (trial.seconds > 0) prices.push_back(trial);
-      prices.push_back(
+      if (trial.seconds > 0) costs.push_back(trial);
+      costs.push_back(
           {stage.stage, "staged pixels", beside(record->seconds, seconds[0], trial.seconds),
            beside(record->cpu_seconds.value_or(record->seconds), cpu[0], trial.cpu_seconds)});
     }
   }
-  return prices;
+  return costs;
 }
 
-std::vector<StageTime> Predict(const std::vector<PriceTerm>& prices,
-                               const RunSettings& settings, const Capture& capture) {
+std::vector<StageTime> Predict(const std::vector<CostTerm>& costs, const RunSettings& settings,
+                               const Capture& capture) {
   std::vector<StageTime> times;
-  for (const PriceTerm& term : prices) {
+  for (const CostTerm& term : costs) {
     auto at = std::find_if(times.begin(), times.end(),
                            [&term](const StageTime& time) { return time.stage == term.stage; });
     if (at == times.end()) at = times.insert(times.end(), {term.stage, 0, 0});
@@ -212,9 +214,9 @@ std::vector<StageTime> Predict(const std::vector<PriceTerm>& prices,
   return times;
 }
 
-JsonValue ToJson(const std::vector<PriceTerm>& prices) {
+JsonValue ToJson(const std::vector<CostTerm>& costs) {
   JsonValue::Array rows;
-  for (const PriceTerm& term : prices)
+  for (const CostTerm& term : costs)
     rows.push_back(JsonValue::Object{{"stage", term.stage},
                                      {"unit", term.unit},
                                      {"seconds", term.seconds},
@@ -222,13 +224,13 @@ JsonValue ToJson(const std::vector<PriceTerm>& prices) {
   return rows;
 }
 
-std::vector<PriceTerm> PricesFromJson(const JsonValue& json, const std::string& where) {
+std::vector<CostTerm> CostsFromJson(const JsonValue& json, const std::string& where) {
   try {
-    std::vector<PriceTerm> prices;
-    for (const JsonValue& row : json.At("unit_prices").AsArray())
-      prices.push_back({row.At("stage").AsString(), row.At("unit").AsString(),
-                        row.At("seconds").AsDouble(), row.At("cpu_seconds").AsDouble()});
-    return prices;
+    std::vector<CostTerm> costs;
+    for (const JsonValue& row : json.At("unit_costs").AsArray())
+      costs.push_back({row.At("stage").AsString(), row.At("unit").AsString(),
+                       row.At("seconds").AsDouble(), row.At("cpu_seconds").AsDouble()});
+    return costs;
   } catch (const Error& error) {
     throw Error(ExitCode::kInput, error.what_failed(), where,
                 "give the tradeoff.json that `regrade tradeoff` wrote");

@@ -12,7 +12,7 @@
 namespace regrade {
 
 // A stage's time is a sum of terms, each so much a unit of work that is known before it begins.
-struct PriceTerm {
+struct CostTerm {
   std::string stage, unit;
   double seconds = 0, cpu_seconds = 0;  // a unit
 };
@@ -29,20 +29,20 @@ struct StageTime {
 //   frame pixels | pair pixels
 double AmountOf(const std::string& unit, const RunSettings& settings, const Capture& capture);
 
-// From the records of a finished run; where knobs of steps and grids were measured, by least
-// squares of relative errors over them. A fit's steps have a price of their own, and what the
-// stage took beside them and its trial of degrees (photos, held-out views) goes by staged
+// From the records of a finished run; where parameters of steps and grids were measured, by
+// least squares of relative errors over them. A fit's steps have a price of their own, and what
+// the stage took beside them and its trial of degrees (photos, held-out views) goes by staged
 // pixels.
-std::vector<PriceTerm> LearnPrices(const RunSettings& base, const Capture& capture,
-                                   const Workspace& workspace,
-                                   const std::vector<Variant>& variants,
-                                   const std::vector<Measurement>& measurements);
+std::vector<CostTerm> LearnCosts(const RunSettings& base, const Capture& capture,
+                                 const Workspace& workspace,
+                                 const std::vector<Variant>& variants,
+                                 const std::vector<Measurement>& measurements);
 
-std::vector<StageTime> Predict(const std::vector<PriceTerm>& prices,
-                               const RunSettings& settings, const Capture& capture);
+std::vector<StageTime> Predict(const std::vector<CostTerm>& costs, const RunSettings& settings,
+                               const Capture& capture);
 
-JsonValue ToJson(const std::vector<PriceTerm>& prices);
+JsonValue ToJson(const std::vector<CostTerm>& costs);
 // Throws Error(kInput).
-std::vector<PriceTerm> PricesFromJson(const JsonValue& json, const std::string& where);
+std::vector<CostTerm> CostsFromJson(const JsonValue& json, const std::string& where);
 
 }  // namespace regrade

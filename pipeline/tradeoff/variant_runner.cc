@@ -82,8 +82,8 @@ struct Trial {
   }
 };
 
-double NumberOf(const JsonValue& figures, const char* name) {
-  const JsonValue* value = figures.Find(name);
+double NumberOf(const JsonValue& metrics, const char* name) {
+  const JsonValue* value = metrics.Find(name);
   return value != nullptr && value->IsNumber() ? value->AsDouble() : std::nan("");
 }
 
@@ -104,7 +104,7 @@ std::vector<int> Spread(const std::vector<int>& all, int count) {
 
 }  // namespace
 
-struct Bench::Frames {
+struct VariantRunner::Frames {
   Capture capture;
   StoredField stored;
   FastGrid grid;
@@ -115,49 +115,50 @@ struct Bench::Frames {
   std::vector<Image> accurate;    // of the first few cameras, rays marched to the end
 };
 
-Bench::Bench(RunContext* base, const std::string& folder) : base_(base), folder_(folder) {}
-Bench::~Bench() = default;
+VariantRunner::VariantRunner(RunContext* base, const std::string& folder)
+    : base_(base), folder_(folder) {}
+VariantRunner::~VariantRunner() = default;
 
-Measurement Bench::Measure(const Variant& variant, int repeat,
-                           const ProgressFunction& progress) {
+Measurement VariantRunner::Measure(const Variant& variant, int repeat,
+                                   const ProgressFunction& progress) {
   Measurement m;
-  m.plane = variant.plane;
-  m.knob = variant.knob;
+  m.benchmark = variant.benchmark;
+  m.parameter = variant.parameter;
   m.value = variant.value;
   m.repeat = repeat;
   fs::remove_all(folder_);  // what an interrupted measurement left would shorten this one
-  if (variant.plane == "poses")
+  if (variant.benchmark == "poses")
     MeasurePoses(variant, progress, &m);
-  else if (variant.plane == "fit")
+  else if (variant.benchmark == "fit")
     MeasureFit(variant, progress, &m);
-  else if (variant.plane == "style")
+  else if (variant.benchmark == "style")
     MeasureStyle(variant, progress, &m);
-  else if (variant.plane == "render")
+  else if (variant.benchmark == "render")
     MeasureRender(variant, &m);
   else
     MeasureFlow(variant, &m);
   fs::remove_all(folder_);
   if (!std::isfinite(m.accuracy))
-    throw Error(ExitCode::kScene, "nothing to measure accuracy by", variant.plane,
-                variant.plane == "fit" ? "keep photos for measuring: --holdout 8"
-                                       : "leave its knobs out with --knobs");
+    throw Error(ExitCode::kScene, "nothing to measure accuracy by", variant.benchmark,
+                variant.benchmark == "fit" ? "keep photos for measuring: --holdout 8"
+                                           : "leave its parameters out with --parameters");
   return m;
 }
 
-void Bench::MeasurePoses(const Variant& variant, const ProgressFunction& progress,
-                         Measurement* m) {
+void VariantRunner::MeasurePoses(const Variant& variant, const ProgressFunction& progress,
+                                 Measurement* m) {
   Trial trial(*base_, variant, folder_);
   const Stage stage = PoseStage(&trial.context);
   Clocks clocks(m);
   const StageOutcome outcome = stage.work(progress);
   clocks.Stop();
-  m->accuracy = NumberOf(outcome.figures, "reprojection_px");
-  for (const char* name : {"registered", "points"}) m->work[name] = outcome.figures.At(name);
+  m->accuracy = NumberOf(outcome.metrics, "reprojection_px");
+  for (const char* name : {"registered", "points"}) m->work[name] = outcome.metrics.At(name);
 }
 
 // Photos at one working size, as a fit of the base's capture sees them; read once, for their
 // reading is the same for all variants and is none of their price.
-struct Bench::Photos {
+struct VariantRunner::Photos {
   int size = 0;
   Capture capture;
   PhotoGains gains;
@@ -166,7 +167,7 @@ struct Bench::Photos {
   std::vector<TrainingView> views;
 };
 
-const Bench::Photos& Bench::PhotosAt(int size) {
+const VariantRunner::Photos& VariantRunner::PhotosAt(int size) {
   if (photos_ != nullptr && photos_->size == size) return *photos_;
   photos_ = std::make_unique<Photos>();
   Photos& p = *photos_;
@@ -191,8 +192,8 @@ const Bench::Photos& Bench::PhotosAt(int size) {
   return p;
 }
 
-void Bench::MeasureFit(const Variant& variant, const ProgressFunction& progress,
-                       Measurement* m) {
+void VariantRunner::MeasureFit(const Variant& variant, const ProgressFunction& progress,
+                               Measurement* m) {
   RunSettings settings = base_->settings;
   OptionSet set;
   settings.Bind(&set);
@@ -200,10 +201,10 @@ void Bench::MeasureFit(const Variant& variant, const ProgressFunction& progress,
   const Photos& photos = PhotosAt(settings.scene.photo_size);
   FitOptions options = settings.fit;
   options.seed = settings.run.seed + static_cast<uint64_t>(m->repeat);
-  // The degree that the base's trial has decided for, unless it is the knob.
+  // The degree that the base's trial has decided for, unless it is the parameter.
   const auto record = base_->workspace->Find("reconstruct");
-  if (record && variant.knob != "sh-degree")
-    options.sh_degree = static_cast<int>(record->figures.At("sh_degree").AsInt());
+  if (record && variant.parameter != "sh-degree")
+    options.sh_degree = static_cast<int>(record->metrics.At("sh_degree").AsInt());
   FitHooks hooks;
   hooks.progress = progress;
   Clocks clocks(m);
@@ -222,8 +223,8 @@ void Bench::MeasureFit(const Variant& variant, const ProgressFunction& progress,
           .value_or(std::nan(""));
 }
 
-void Bench::MeasureStyle(const Variant& variant, const ProgressFunction& progress,
-                         Measurement* m) {
+void VariantRunner::MeasureStyle(const Variant& variant, const ProgressFunction& progress,
+                                 Measurement* m) {
   Trial trial(*base_, variant, folder_);
   for (const char* path : {"poses", "field.npz", "views_2d"}) trial.Take(*base_, path);
   for (const char* stage : {"reconstruct", "style_2d"}) trial.TakeRecord(*base_, stage);
@@ -232,7 +233,7 @@ void Bench::MeasureStyle(const Variant& variant, const ProgressFunction& progres
   Clocks clocks(m);
   const StageOutcome outcome = stage.work(progress);
   clocks.Stop();
-  for (const char* name : {"steps", "k_est", "bound"}) m->work[name] = outcome.figures.At(name);
+  for (const char* name : {"steps", "k_est", "bound"}) m->work[name] = outcome.metrics.At(name);
 
   const Workspace& base = *base_->workspace;
   const Capture capture = ReadCapture(base.Path("poses"));
@@ -256,7 +257,7 @@ void Bench::MeasureStyle(const Variant& variant, const ProgressFunction& progres
   m->accuracy = Mean(psnr);
 }
 
-const Bench::Frames& Bench::BaseFrames() {
+const VariantRunner::Frames& VariantRunner::BaseFrames() {
   if (frames_ != nullptr) return *frames_;
   frames_ = std::make_unique<Frames>();
   Frames& f = *frames_;
@@ -285,7 +286,7 @@ const Bench::Frames& Bench::BaseFrames() {
   return f;
 }
 
-void Bench::MeasureRender(const Variant& variant, Measurement* m) {
+void VariantRunner::MeasureRender(const Variant& variant, Measurement* m) {
   const Frames& f = BaseFrames();
   MarchOptions march{f.stored.field.step};
   if (const JsonValue* stop = variant.options.Find("ray-stop"))
@@ -305,7 +306,7 @@ void Bench::MeasureRender(const Variant& variant, Measurement* m) {
   m->work["pixels"] = frames.empty() ? int64_t{0} : frames[0].num_pixels();
 }
 
-void Bench::MeasureFlow(const Variant& variant, Measurement* m) {
+void VariantRunner::MeasureFlow(const Variant& variant, Measurement* m) {
   const Frames& f = BaseFrames();
   std::string method = base_->settings.consistency.flow;
   if (const JsonValue* flow = variant.options.Find("flow")) method = flow->AsString();

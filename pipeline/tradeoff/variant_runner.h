@@ -11,12 +11,12 @@
 
 namespace regrade {
 
-class Bench {
+class VariantRunner {
  public:
   // `base` has been run, in base->workspace, to "evaluate" where a style was given and to
   // "reconstruct" otherwise. `folder` is made for each variant and removed behind it.
-  Bench(RunContext* base, const std::string& folder);
-  ~Bench();
+  VariantRunner(RunContext* base, const std::string& folder);
+  ~VariantRunner();
 
   // Each repetition draws anew, so that the spread of accuracy is a seed's. Throws Interrupted,
   // and what the stages throw.

@@ -11,22 +11,22 @@ namespace regrade {
 
 // A number, or the reason why there is none. JSON has no NaN: a value that is not finite is a
 // figure without value.
-struct Figure {
+struct Metric {
   std::optional<double> value;
   std::string why = "not measured";  // read only while `value` is empty
 
-  Figure() = default;
-  Figure(double number) {  // NOLINT: a number is a figure
+  Metric() = default;
+  Metric(double number) {  // NOLINT: a number is a figure
     if (std::isfinite(number)) {
       value = number;
     } else {
       why = std::isnan(number) ? "not a number" : "infinite: no error at all";
     }
   }
-  static Figure Undefined(std::string why) {
-    Figure figure;
-    figure.why = std::move(why);
-    return figure;
+  static Metric Undefined(std::string why) {
+    Metric metric;
+    metric.why = std::move(why);
+    return metric;
   }
 };
 
@@ -35,8 +35,8 @@ struct EffectReport {
   std::string name;
   bool on = false;
   std::string evidence;  // a sentence for a person
-  Figure value;          // what was measured, in the unit that `evidence` names
-  Figure threshold;
+  Metric value;          // what was measured, in the unit that `evidence` names
+  Metric threshold;
 };
 
 }  // namespace regrade

@@ -145,7 +145,7 @@ JsonValue ToJson(const StageRecord& record) {
                                      {"outputs", std::move(outputs)},
                                      {"seconds", record.seconds}};
   if (record.cpu_seconds) json["cpu_seconds"] = *record.cpu_seconds;
-  json["figures"] = record.figures;
+  json["metrics"] = record.metrics;
   return json;
 }
 
@@ -169,7 +169,7 @@ StageRecord StageRecordFromJson(const JsonValue& value, const std::string& where
     }
     record.seconds = value.At("seconds").AsDouble();
     if (const JsonValue* cpu = value.Find("cpu_seconds")) record.cpu_seconds = cpu->AsDouble();
-    record.figures = value.At("figures");
+    record.metrics = value.At("metrics");
   } catch (const Error& error) {
     if (!error.hint().empty()) throw;
     throw Error(ExitCode::kInput, error.what_failed(), where,

@@ -23,7 +23,7 @@ struct StageRecord {
   std::vector<StageOutput> outputs;   // sorted by path
   double seconds = 0;                 // by the wall
   std::optional<double> cpu_seconds;  // of all threads and programs started; not in old records
-  JsonValue figures;                  // object, goes into the report
+  JsonValue metrics;                  // object, goes into the report
 
   // One hash of everything that came out: an input of the stages behind.
   std::string OutputHash() const;

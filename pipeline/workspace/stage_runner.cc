@@ -82,7 +82,7 @@ bool StageRunner::Run(const Stage& stage) {
                 "close other programs, take --preset draft, or set --max-memory");
   }
   const double seconds = console_->StageSeconds();
-  workspace_->Record(stage.name, stage.inputs, outcome.outputs, seconds, outcome.figures,
+  workspace_->Record(stage.name, stage.inputs, outcome.outputs, seconds, outcome.metrics,
                      CpuSeconds() - cpu_before);
   console_->EndStage();
   console_->SetKept(Joined(workspace_->FinishedStages(), ", "));

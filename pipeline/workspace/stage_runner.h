@@ -18,7 +18,7 @@ inline constexpr const char* kStageNames[] = {"pose",   "reconstruct", "style_2d
 
 struct StageOutcome {
   std::vector<std::string> outputs;  // files and folders, relative to the output folder
-  JsonValue figures = JsonValue::Object();
+  JsonValue metrics = JsonValue::Object();
 };
 
 struct Stage {

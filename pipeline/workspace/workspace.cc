@@ -115,14 +115,14 @@ StageStatus Workspace::Status(const std::string& stage, const JsonValue& inputs)
 
 void Workspace::Record(const std::string& stage, const JsonValue& inputs,
                        const std::vector<std::string>& outputs, double seconds,
-                       const JsonValue& figures, std::optional<double> cpu_seconds) {
+                       const JsonValue& metrics, std::optional<double> cpu_seconds) {
   StageRecord record;
   record.version = REGRADE_VERSION;
   record.inputs = inputs;
   record.outputs = DescribeOutputs(folder_, outputs);
   record.seconds = seconds;
   record.cpu_seconds = cpu_seconds;
-  record.figures = figures;
+  record.metrics = metrics;
   WriteJsonFile(StagePath(stage), ToJson(record));
   DropCheckpoint(stage);
 }

@@ -49,7 +49,7 @@ class Workspace {
   std::optional<StageRecord> Find(const std::string& stage) const;
   // Hashes the outputs and makes the record durable; drops the stage's checkpoint.
   void Record(const std::string& stage, const JsonValue& inputs,
-              const std::vector<std::string>& outputs, double seconds, const JsonValue& figures,
+              const std::vector<std::string>& outputs, double seconds, const JsonValue& metrics,
               std::optional<double> cpu_seconds = std::nullopt);
   // As if the stage had never been done. Results stay until they are replaced.
   void Forget(const std::string& stage);

@@ -39,12 +39,12 @@ Capture CaptureFromModel(const ColmapModel& model, const std::vector<StagedPhoto
   for (const StagedPhoto& photo : photos) {
     const auto it = image_of_name.find(names == PhotoNames::kStaged ? photo.name : photo.file);
     if (it == image_of_name.end()) {
-      capture.verdicts.push_back({photo.file, "unregistered", "the model has no pose for it"});
+      capture.statuses.push_back({photo.file, "unregistered", "the model has no pose for it"});
       continue;
     }
     view_of_image[it->second->id] = static_cast<int32_t>(capture.views.size());
     capture.views.push_back(ViewOf(model, *it->second, photo));
-    capture.verdicts.push_back({photo.file, "used", ""});
+    capture.statuses.push_back({photo.file, "used", ""});
   }
   if (capture.views.empty())
     throw Error(ExitCode::kInput, "none of the model's image names is the name of a photo", "",
@@ -53,7 +53,7 @@ Capture CaptureFromModel(const ColmapModel& model, const std::vector<StagedPhoto
                     : "the model's first image is \"" + model.images.front().name + "\"");
   for (const ColmapImage& image : model.images)
     if (view_of_image.count(image.id) == 0)
-      capture.verdicts.push_back(
+      capture.statuses.push_back(
           {image.name, "skipped", "in the model, but there is no photo"});
 
   double error_sum = 0;

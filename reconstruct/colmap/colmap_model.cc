@@ -71,7 +71,7 @@ class Reader {
     const uint64_t count = Read<uint64_t>("a count");
     const auto needed = CheckedMul(count, smallest);
     if (!needed || *needed > Left())
-      Fail("it promises " + std::to_string(count) + " " + what + ", but only " +
+      Fail("it guarantees " + std::to_string(count) + " " + what + ", but only " +
            std::to_string(Left()) + " bytes follow");
     return static_cast<size_t>(count);
   }

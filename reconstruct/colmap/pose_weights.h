@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "kernels/scene/capture.h"
-#include "reconstruct/colmap/colmap_ladder.h"
+#include "reconstruct/colmap/colmap_strategies.h"
 
 namespace regrade {
 

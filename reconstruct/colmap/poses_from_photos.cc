@@ -12,11 +12,11 @@
 #include <set>
 
 #include "kernels/base/error.h"
-#include "reconstruct/colmap/colmap_ladder.h"
 #include "reconstruct/colmap/colmap_model.h"
 #include "reconstruct/colmap/colmap_output.h"
 #include "reconstruct/colmap/colmap_program.h"
-#include "reconstruct/colmap/pose_verdicts.h"
+#include "reconstruct/colmap/colmap_strategies.h"
+#include "reconstruct/colmap/photo_statuses.h"
 #include "reconstruct/colmap/pose_weights.h"
 #include "reconstruct/colmap/refine_intrinsics.h"
 #include "reconstruct/scene/scene_checks.h"
@@ -57,7 +57,7 @@ class PoseFinder {
     PrepareFolders();
     colmap_.emplace(options_.colmap, work_folder_ + "/logs");
     report_.colmap_version = colmap_->version();
-    const RungResult best = Climb();
+    const AttemptResult best = Climb();
     if (best.models.empty())
       Refuse(WhyNoModel(best.evidence), photos_.size(), options_.min_photos);
     const RefinedModel refined = Refine(best.models.front().model);
@@ -95,31 +95,32 @@ class PoseFinder {
           work_folder_, "free some space, or choose another --out");
   }
 
-  // The best rung, or the last one's evidence without models.
-  RungResult Climb() {
-    std::vector<PoseRecipe> ladder = PoseLadder(photos_, options_.all_pairs_up_to);
-    // So few photos are refused whatever comes; one rung says whether more is wrong with them.
-    if (TooFewGiven()) ladder.resize(1);
-    RungResult best;
+  // The best attempt, or the last one's evidence without models.
+  AttemptResult Climb() {
+    std::vector<PoseRecipe> strategies = PoseStrategies(photos_, options_.all_pairs_up_to);
+    // So few photos are refused whatever comes; one attempt says whether more is wrong with
+    // them.
+    if (TooFewGiven()) strategies.resize(1);
+    AttemptResult best;
     const PoseRecipe* last = nullptr;  // the recipe before, if it found all features there are
-    for (const PoseRecipe& recipe : ladder) {
+    for (const PoseRecipe& recipe : strategies) {
       if (last != nullptr && IsSameSearch(*last, recipe)) continue;
-      std::optional<RungResult> rung;
+      std::optional<AttemptResult> attempt;
       try {
-        rung = RunRecipe(recipe);
+        attempt = RunRecipe(recipe);
       } catch (const Error& e) {
-        // What an earlier rung found is not lost with a later one.
+        // What an earlier attempt found is not lost with a later one.
         if (best.models.empty() || e.code() != ExitCode::kExternalProgram) throw;
         report_.notes.push_back("the recipe \"" + recipe.name +
                                 "\" failed: " + e.what_failed());
         break;
       }
-      ++report_.rungs_tried;
+      ++report_.attempts_made;
       const size_t before = Registered(best);
       const bool better =
-          best.models.empty() ||
-          (!rung->models.empty() && rung->models.front().Rank() > best.models.front().Rank());
-      if (better) best = std::move(*rung);
+          best.models.empty() || (!attempt->models.empty() &&
+                                  attempt->models.front().Rank() > best.models.front().Rank());
+      if (better) best = std::move(*attempt);
       const bool usable = !best.models.empty() && best.models.front().refusal.empty();
       const double share = Registered(best) / static_cast<double>(photos_.size());
       if (usable && share >= kGoodShare) break;
@@ -131,7 +132,7 @@ class PoseFinder {
       if (best.models.empty() && last != nullptr && recipe.all_pairs && pairs >= 0 &&
           pairs < static_cast<int>(photos_.size()) - 1)
         break;
-      if (finish_ || Now() > deadline_) break;
+      if (Now() > deadline_) break;
     }
     return best;
   }
@@ -146,11 +147,11 @@ class PoseFinder {
            next.focal_factor == last.focal_factor && next.init_angle_deg == last.init_angle_deg;
   }
 
-  static size_t Registered(const RungResult& rung) {
-    return rung.models.empty() ? 0 : rung.models.front().model.images.size();
+  static size_t Registered(const AttemptResult& attempt) {
+    return attempt.models.empty() ? 0 : attempt.models.front().model.images.size();
   }
 
-  RungResult RunRecipe(const PoseRecipe& recipe) {
+  AttemptResult RunRecipe(const PoseRecipe& recipe) {
     try {
       return TryRecipe(recipe);
     } catch (const Crash&) {
@@ -169,20 +170,21 @@ class PoseFinder {
     using Error::Error;
   };
 
-  RungResult TryRecipe(const PoseRecipe& recipe) {
+  AttemptResult TryRecipe(const PoseRecipe& recipe) {
     const PoseWeights weights = EstimateWeights(recipe, photos_, options_.image_size);
     planned_ = spent_ + weights.Sum();
-    const std::string rung_folder =
-        recipe.keep_matches ? rung_folder_
-                            : work_folder_ + "/rung_" + std::to_string(report_.rungs_tried + 1);
-    const ColmapPaths paths = {photo_folder_, rung_folder + "/database.db",
-                               rung_folder + "/images.txt", rung_folder + "/sparse",
+    const std::string attempt_folder =
+        recipe.keep_matches
+            ? attempt_folder_
+            : work_folder_ + "/attempt_" + std::to_string(report_.attempts_made + 1);
+    const ColmapPaths paths = {photo_folder_, attempt_folder + "/database.db",
+                               attempt_folder + "/images.txt", attempt_folder + "/sparse",
                                options_.mask_folder};
     if (!recipe.keep_matches) {
       // COLMAP skips what a database holds already, also when it was made with other options.
-      fs::remove_all(rung_folder);
-      fs::create_directories(rung_folder);
-      rung_folder_ = rung_folder;
+      fs::remove_all(attempt_folder);
+      fs::create_directories(attempt_folder);
+      attempt_folder_ = attempt_folder;
       for (const CameraGroup& group : groups_) Extract(recipe, group, paths, weights.extract);
       RunStage(MatchCommand(recipe), MatchArguments(recipe, threads_, paths), "matching",
                recipe.name, weights.match);
@@ -208,11 +210,11 @@ class PoseFinder {
                   colmap_->log_folder(), "its log may say why");
   }
 
-  RungResult Map(const PoseRecipe& recipe, const ColmapPaths& paths, double weight) {
+  AttemptResult Map(const PoseRecipe& recipe, const ColmapPaths& paths, double weight) {
     const ChildResult result = RunColmap(
         "mapper", MapArguments(recipe, static_cast<int>(photos_.size()), threads_, paths),
         "mapping", recipe.name, weight);
-    RungResult rung{recipe.name, {}, output_.evidence()};
+    AttemptResult attempt{recipe.name, {}, output_.evidence()};
     std::string damage;
     std::set<fs::path> folders;
     for (const auto& entry : fs::directory_iterator(paths.model))
@@ -229,13 +231,13 @@ class PoseFinder {
       }
       SceneLimits lenient = limits_;
       lenient.min_views = 2;
-      found.refusal = JudgeScene(found.capture, lenient).refusal;
-      rung.models.push_back(std::move(found));
+      found.refusal = AssessScene(found.capture, lenient).refusal;
+      attempt.models.push_back(std::move(found));
     }
-    std::stable_sort(rung.models.begin(), rung.models.end(),
+    std::stable_sort(attempt.models.begin(), attempt.models.end(),
                      [](const auto& a, const auto& b) { return a.Rank() > b.Rank(); });
     // A mapper that was ended by its time limit leaves models that are complete all the same.
-    if (!rung.models.empty()) return rung;
+    if (!attempt.models.empty()) return attempt;
     if (!damage.empty())
       throw Error(ExitCode::kExternalProgram,
                   "colmap mapper (" + result.Describe() + ") left a damaged model: " + damage,
@@ -246,7 +248,7 @@ class PoseFinder {
                   colmap_->log_folder() + "/mapper.log", "its log may say why");
     // Exit status 1 is how it says that it found no model.
     if (result.end != ChildEnd::kExited || result.exit_status != 1) FailStage("mapper", result);
-    return rung;
+    return attempt;
   }
 
   void RunStage(const std::string& command, const ColmapArguments& arguments,
@@ -274,9 +276,7 @@ class PoseFinder {
 
   // False when the user wants out.
   bool ReportAt(double done, const std::string& note) {
-    const Verdict verdict = Report(progress_, std::min(done, planned_), planned_, note);
-    finish_ = finish_ || verdict == Verdict::kFinish;
-    return verdict != Verdict::kAbort;
+    return Report(progress_, std::min(done, planned_), planned_, note) != LoopControl::kStop;
   }
 
   [[noreturn]] void FailStage(const std::string& command, const ChildResult& result) const {
@@ -304,16 +304,16 @@ class PoseFinder {
   void Judge(const Capture& capture) {
     SceneLimits limits = limits_;
     if (TooFewGiven()) limits.min_views = 0;  // said already, and better
-    const SceneJudgement judgement = JudgeScene(capture, limits);
-    if (!judgement.refusal.empty())
-      Refuse({judgement.refusal, judgement.remedy}, photos_.size(), options_.min_photos);
+    const SceneAssessment assessment = AssessScene(capture, limits);
+    if (!assessment.refusal.empty())
+      Refuse({assessment.refusal, assessment.remedy}, photos_.size(), options_.min_photos);
     if (TooFewGiven()) RefuseTooFew(photos_.size(), options_.min_photos);
     if (capture.views.size() < options_.min_registered * static_cast<double>(photos_.size()))
       RefuseUnregistered(capture);
-    report_.notes.insert(report_.notes.end(), judgement.notes.begin(), judgement.notes.end());
+    report_.notes.insert(report_.notes.end(), assessment.notes.begin(), assessment.notes.end());
   }
 
-  void Describe(const RungResult& best, const RefinedModel& refined) const {
+  void Describe(const AttemptResult& best, const RefinedModel& refined) const {
     report_.recipe = best.recipe;
     report_.lens = refined.lens;
     if (best.models.size() > 1) report_.notes.push_back(NoteOnOtherModels(best));
@@ -334,26 +334,25 @@ class PoseFinder {
   const std::vector<CameraGroup> groups_ = GroupByCamera(photos_);
   ColmapOutput output_;
   std::optional<ColmapProgram> colmap_;
-  std::string photo_folder_, rung_folder_;
+  std::string photo_folder_, attempt_folder_;
   SceneLimits limits_;
   int threads_;
   double deadline_ = 0;             // on Now()'s clock
   double spent_ = 0, planned_ = 0;  // estimated seconds
-  bool finish_ = false;
 };
 
-// The verdicts of both stages in the order of the first.
-std::vector<PhotoVerdict> Merged(const std::vector<PhotoVerdict>& ingest,
-                                 const std::vector<PhotoVerdict>& posed) {
-  std::vector<PhotoVerdict> merged = ingest;
-  for (const PhotoVerdict& verdict : posed) {
-    const auto same = [&](const PhotoVerdict& v) { return v.file == verdict.file; };
+// The statuses of both stages in the order of the first.
+std::vector<PhotoStatus> Merged(const std::vector<PhotoStatus>& ingest,
+                                const std::vector<PhotoStatus>& posed) {
+  std::vector<PhotoStatus> merged = ingest;
+  for (const PhotoStatus& verdict : posed) {
+    const auto same = [&](const PhotoStatus& v) { return v.file == verdict.file; };
     const auto it = std::find_if(merged.begin(), merged.end(), same);
     if (it == merged.end()) {
       merged.push_back(verdict);
       continue;
     }
-    it->verdict = verdict.verdict;
+    it->status = verdict.status;
     if (!verdict.why.empty()) it->why = verdict.why;
   }
   return merged;
@@ -362,7 +361,7 @@ std::vector<PhotoVerdict> Merged(const std::vector<PhotoVerdict>& ingest,
 }  // namespace
 
 Capture PosesFromPhotos(const std::vector<StagedPhoto>& photos,
-                        const std::vector<PhotoVerdict>& ingest_verdicts,
+                        const std::vector<PhotoStatus>& ingest_statuses,
                         const PoseOptions& options, const std::string& work_folder,
                         const std::string& sparse_output_folder,
                         const ProgressFunction& progress, PoseReport* report) {
@@ -370,7 +369,7 @@ Capture PosesFromPhotos(const std::vector<StagedPhoto>& photos,
   PoseFinder finder(photos, options, work_folder, progress, report ? report : &ignored);
   try {
     Capture capture = finder.Find(sparse_output_folder);
-    capture.verdicts = Merged(ingest_verdicts, capture.verdicts);
+    capture.statuses = Merged(ingest_statuses, capture.statuses);
     return capture;
   } catch (const fs::filesystem_error& e) {
     throw Error(ExitCode::kResources, e.what(), e.path1().string(),

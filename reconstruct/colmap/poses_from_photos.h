@@ -1,4 +1,4 @@
-// Photos in, a Capture out: COLMAP run as a program, climbing a ladder of recipes until one
+// Photos in, a Capture out: COLMAP run as a program, climbing a strategies of recipes until one
 // places the photos, its model checked, its camera fitted once more.
 #pragma once
 
@@ -76,22 +76,22 @@ struct PoseOptions {
 // What there is to say besides the Capture itself.
 struct PoseReport {
   std::string colmap_version;  // "3.8"
-  std::string recipe;          // the rung of the ladder that won
-  int rungs_tried = 0;
+  std::string recipe;          // the attempt of the strategies that won
+  int attempts_made = 0;
   std::string lens;                // what the last adjustment chose
   std::vector<std::string> notes;  // sentences for the user
 };
 
 // `photos`: staged PNGs, all in one folder; only these are used, whatever else lies there.
-// `ingest_verdicts`: what became of the files before, copied in front of ours (files that are
+// `ingest_statuses`: what became of the files before, copied in front of ours (files that are
 // named in `photos` get their verdict here). `work_folder` is ours to fill (database, logs) and
 // may be removed afterwards. The chosen model's three .bin files are copied to
-// `sparse_output_folder`. kFinish ends the ladder after the rung it is on.
+// `sparse_output_folder`.
 //
 // Throws Error: kScene when the photos do not give poses that can be trusted, kExternalProgram
-// when COLMAP is missing or fails, kResources when the disk is full; Interrupted on kAbort.
+// when COLMAP is missing or fails, kResources when the disk is full; Interrupted on kStop.
 Capture PosesFromPhotos(const std::vector<StagedPhoto>& photos,
-                        const std::vector<PhotoVerdict>& ingest_verdicts,
+                        const std::vector<PhotoStatus>& ingest_statuses,
                         const PoseOptions& options, const std::string& work_folder,
                         const std::string& sparse_output_folder,
                         const ProgressFunction& progress = {}, PoseReport* report = nullptr);

@@ -10,9 +10,9 @@
 #include <sstream>
 
 #include "kernels/base/error.h"
-#include "reconstruct/colmap/colmap_ladder.h"
 #include "reconstruct/colmap/colmap_output.h"
 #include "reconstruct/colmap/colmap_program.h"
+#include "reconstruct/colmap/colmap_strategies.h"
 #include "reconstruct/colmap/pose_weights.h"
 #include "reconstruct/colmap/track_pairs.h"
 
@@ -22,10 +22,10 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kFeatures = 768;   // a photo: hundreds of tracks are left of them
-constexpr int kSmallSide = 900;  // pixels; such photos are doubled first, as in the ladder
+constexpr int kSmallSide = 900;  // pixels; such photos are doubled first, as in the strategies
 // The matcher for lists of pairs says nothing until it is done: so many at a time.
 constexpr size_t kPairsAtATime = 200;
-// COLMAP's own limit for a sighting's distance from its point, pixels ...
+// COLMAP's own limit for a observation's distance from its point, pixels ...
 constexpr double kStrictLimit = 4;
 // ... and ours for poses that may be off, as a share of a photo's longer side.
 constexpr double kLooseShare = 0.01;
@@ -226,7 +226,7 @@ class TrackFinder {
           errors.push_back(std::hypot(u - keypoint.u, v - keypoint.v));
       }
     }
-    result_.sightings = static_cast<int64_t>(errors.size());
+    result_.observations = static_cast<int64_t>(errors.size());
     result_.median_px = 0;
     if (errors.empty()) return;
     const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
@@ -247,7 +247,8 @@ class TrackFinder {
         [&](const std::string& line) { output_.Line(line); },
         [&] {
           return Report(progress_, std::min(spent_ + weight * output_.fraction(), planned_),
-                        planned_, what + " (for the poses that were given)") != Verdict::kAbort;
+                        planned_,
+                        what + " (for the poses that were given)") != LoopControl::kStop;
         });
     spent_ += weight;
     if (!result.Succeeded()) colmap_->Fail(command, result, command);

@@ -18,7 +18,7 @@ namespace regrade {
 
 struct FoundTracks {
   ColmapModel model;  // as given, poses and lenses to the bit, with keypoints and points
-  int64_t sightings = 0;
+  int64_t observations = 0;
   double median_px = 0;  // their distance from their points, pixels of the photos
   int pairs = 0;         // of photos that were compared
   std::string colmap_version;
@@ -29,7 +29,7 @@ struct FoundTracks {
 // `work_folder` is ours to fill.
 //
 // Throws Error: kExternalProgram when COLMAP is missing or fails, kResources when the disk is
-// full; Interrupted on kAbort.
+// full; Interrupted on kStop.
 FoundTracks TracksForPoses(const ColmapModel& posed, const std::vector<StagedPhoto>& photos,
                            const PoseOptions& options, const std::string& work_folder,
                            const ProgressFunction& progress = {});

@@ -10,7 +10,7 @@ namespace regrade {
 // below what the choice of a seed does.
 inline constexpr double kDegreePays = 0.1;  // dB
 
-// A judgement, from one capture: of nine flash photos the trial kept two, and these spoke
+// A assessment, from one capture: of nine flash photos the trial kept two, and these spoke
 // against a view dependence that the other seven showed. How many views make it sure is not
 // measured.
 inline constexpr int kLeastTrialViews = 10;

@@ -80,7 +80,7 @@ class Fitter {
     while (stage_ < num_stages) {
       RunStage();
       if (stage_ + 1 < num_stages) Measure();
-      if (finish_early_ || ++stage_ == num_stages) break;
+      if (++stage_ == num_stages) break;
       Refine(options_.resolutions[static_cast<size_t>(stage_)]);
       step_ = 0;
       SaveCheckpoint();
@@ -142,14 +142,10 @@ class Fitter {
       const int square = options_.patch * options_.patch;
       tally_.window_rays += std::max(1, options_.rays_per_step / square) * square;
       if (StepsBefore() % kWindow == 0 || step_ == steps) CloseWindow();
-      const Verdict verdict = Report(hooks_.progress, WorkBefore(), total_work_, note_);
-      if (verdict == Verdict::kAbort) {
+      const LoopControl control = Report(hooks_.progress, WorkBefore(), total_work_, note_);
+      if (control == LoopControl::kStop) {
         SaveCheckpoint();
         throw Interrupted();
-      }
-      if (verdict == Verdict::kFinish) {
-        finish_early_ = true;
-        return;
       }
       if (SecondsSince(last_checkpoint_) > 60) SaveCheckpoint();
     }
@@ -271,7 +267,6 @@ class Fitter {
   int stage_ = 0, step_ = 0;  // step within the stage
   int total_steps_ = 0;
   double total_work_ = 0;
-  bool finish_early_ = false;
   FitTally tally_;
   double idle_seconds_ = 0;
   std::string note_;

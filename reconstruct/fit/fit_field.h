@@ -73,7 +73,7 @@ float ExponentialRate(float begin, float end, double p);
 // Rises along a sine from 1/100 at step 0 to 1 at step `delay`.
 float DelayFactor(int step, float delay);
 
-// Throws Error(kScene) if the field comes out empty, Interrupted after kAbort (the checkpoint
+// Throws Error(kScene) if the field comes out empty, Interrupted after kStop (the checkpoint
 // has been called).
 FitResult FitField(const std::vector<TrainingView>& views, const SceneBox& box,
                    const FitOptions& options, const FitHooks& hooks,

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kHeldOutShare = 0.1;
 constexpr double kLeastSpread = 1e-4;  // of the points' distance: less shows no depth
-constexpr size_t kLeastKept = 3;       // sightings of a point that are not held out
+constexpr size_t kLeastKept = 3;       // observations of a point that are not held out
 
 // Rodrigues' formula.
 Mat3d RotationOf(const double* w) {
@@ -82,52 +82,54 @@ Bundle MakeBundle(const ColmapModel& model) {
   for (size_t p = 0; p < model.points.size(); ++p) {
     const Vec3d x = bundle.bundle_from_world * model.points[p].position;
     bundle.points.push_back({x.x, x.y, x.z});
-    std::vector<BundleSighting> seen;
+    std::vector<BundleObservation> seen;
     for (const ColmapTrackElement& element : model.points[p].track) {
       const ColmapImage& image = *model.FindImage(element.image_id);
       const ColmapKeypoint& keypoint = image.keypoints[element.keypoint];
-      const BundleSighting sighting{view_of_image.at(image.id), p, keypoint.u, keypoint.v,
-                                    false};
-      if (std::isfinite(ReprojectionError(bundle, sighting))) seen.push_back(sighting);
+      const BundleObservation observation{view_of_image.at(image.id), p, keypoint.u, keypoint.v,
+                                          false};
+      if (std::isfinite(ReprojectionError(bundle, observation))) seen.push_back(observation);
     }
     if (seen.size() < 2) continue;
-    std::sort(seen.begin(), seen.end(), [&](const BundleSighting& a, const BundleSighting& b) {
-      return numbers[a.view] < numbers[b.view];
-    });
+    std::sort(seen.begin(), seen.end(),
+              [&](const BundleObservation& a, const BundleObservation& b) {
+                return numbers[a.view] < numbers[b.view];
+              });
     size_t kept = seen.size();
-    for (BundleSighting& sighting : seen) {
-      sighting.held_out =
+    for (BundleObservation& observation : seen) {
+      observation.held_out =
           kept > kLeastKept &&
-          RandomDouble(numbers[sighting.view], model.points[p].id, 0) < kHeldOutShare;
-      kept -= sighting.held_out;
+          RandomDouble(numbers[observation.view], model.points[p].id, 0) < kHeldOutShare;
+      kept -= observation.held_out;
     }
-    bundle.sightings.insert(bundle.sightings.end(), seen.begin(), seen.end());
+    bundle.observations.insert(bundle.observations.end(), seen.begin(), seen.end());
   }
   std::vector<size_t> count(bundle.lenses.size());
-  for (const BundleSighting& sighting : bundle.sightings)
-    count[sighting.view] += !sighting.held_out;
-  for (const size_t n : count) bundle.adjustable.push_back(n >= kFewestSightings);
+  for (const BundleObservation& observation : bundle.observations)
+    count[observation.view] += !observation.held_out;
+  for (const size_t n : count) bundle.adjustable.push_back(n >= kFewestObservations);
   return bundle;
 }
 
-double ReprojectionError(const Bundle& bundle, const BundleSighting& sighting) {
-  const std::array<double, 6>& pose = bundle.poses[sighting.view];
-  const std::array<double, 3>& x = bundle.points[sighting.point];
+double ReprojectionError(const Bundle& bundle, const BundleObservation& observation) {
+  const std::array<double, 6>& pose = bundle.poses[observation.view];
+  const std::array<double, 3>& x = bundle.points[observation.point];
   const Vec3d turned =
-      bundle.rotations[sighting.view] * (Vec3d{x[0], x[1], x[2]} - CenterOf(pose));
-  const Camera& lens = bundle.lenses[sighting.view];
+      bundle.rotations[observation.view] * (Vec3d{x[0], x[1], x[2]} - CenterOf(pose));
+  const Camera& lens = bundle.lenses[observation.view];
   double u = 0, v = 0;
   if (!lens.Project(RotationOf(pose.data()) * turned, &u, &v))
     return std::numeric_limits<double>::infinity();
-  const double factor = std::exp(bundle.focal[bundle.camera[sighting.view]]);
-  return std::hypot((u - lens.cx) * factor + lens.cx - sighting.u,
-                    (v - lens.cy) * factor + lens.cy - sighting.v);
+  const double factor = std::exp(bundle.focal[bundle.camera[observation.view]]);
+  return std::hypot((u - lens.cx) * factor + lens.cx - observation.u,
+                    (v - lens.cy) * factor + lens.cy - observation.v);
 }
 
 double MedianError(const Bundle& bundle, bool held_out) {
   std::vector<double> errors;
-  for (const BundleSighting& sighting : bundle.sightings)
-    if (sighting.held_out == held_out) errors.push_back(ReprojectionError(bundle, sighting));
+  for (const BundleObservation& observation : bundle.observations)
+    if (observation.held_out == held_out)
+      errors.push_back(ReprojectionError(bundle, observation));
   if (errors.empty()) return 0;
   const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
   std::nth_element(errors.begin(), middle, errors.end());
@@ -178,7 +180,8 @@ ColmapModel ModelOfBundle(const Bundle& bundle, const ColmapModel& model) {
     moved.cameras[c].intrinsics.fy *= std::exp(bundle.focal[c]);
   }
   std::vector<bool> in_bundle(model.points.size());
-  for (const BundleSighting& sighting : bundle.sightings) in_bundle[sighting.point] = true;
+  for (const BundleObservation& observation : bundle.observations)
+    in_bundle[observation.point] = true;
   for (size_t p = 0; p < model.points.size(); ++p) {
     const std::array<double, 3>& x = bundle.points[p];
     if (in_bundle[p]) moved.points[p].position = world_from_bundle * Vec3d{x[0], x[1], x[2]};

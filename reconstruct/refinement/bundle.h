@@ -10,10 +10,10 @@
 
 namespace regrade {
 
-// With fewer sightings a pose is left as it is.
-inline constexpr size_t kFewestSightings = 15;
+// With fewer observations a pose is left as it is.
+inline constexpr size_t kFewestObservations = 15;
 
-struct BundleSighting {
+struct BundleObservation {
   size_t view, point;
   double u, v;    // pixels
   bool held_out;  // to judge by
@@ -25,22 +25,22 @@ struct Bundle {
   std::vector<Mat3d> rotations;              // camera from world, as they came
   std::vector<std::array<double, 6>> poses;  // of each view: a further rotation vector, centre
   std::vector<std::array<double, 3>> points;
-  std::vector<double> focal;              // of each camera: log of a factor
-  std::vector<BundleSighting> sightings;  // those of a point side by side
-  std::vector<bool> adjustable;           // views with kFewestSightings
-  Similarity bundle_from_world;           //
-  double spread = 0;                      // largest distance between cameras, here
+  std::vector<double> focal;                    // of each camera: log of a factor
+  std::vector<BundleObservation> observations;  // those of a point side by side
+  std::vector<bool> adjustable;                 // views with kFewestObservations
+  Similarity bundle_from_world;                 //
+  double spread = 0;                            // largest distance between cameras, here
 };
 
-// Sightings behind their camera are left out, and so are points that fewer than two photos
-// see. Of points that four see at least, a tenth of the sightings are held out, drawn by the
+// Observations behind their camera are left out, and so are points that fewer than two photos
+// see. Of points that four see at least, a tenth of the observations are held out, drawn by the
 // names of photos and the number of the point. `spread` 0: all cameras stand at one place.
 Bundle MakeBundle(const ColmapModel& model);
 
 // Pixels; infinite behind the camera.
-double ReprojectionError(const Bundle& bundle, const BundleSighting& sighting);
+double ReprojectionError(const Bundle& bundle, const BundleObservation& observation);
 
-// Median over the sightings that are held out, or those that are not; 0 of none.
+// Median over the observations that are held out, or those that are not; 0 of none.
 double MedianError(const Bundle& bundle, bool held_out);
 
 // The model with the bundle's poses, points and focal lengths, moved by the similarity that

@@ -40,7 +40,7 @@ void Minimise(const ExposureData& data, LogColors* colors, LogColors* gains) {
   ceres::Problem problem(ownership);
   ceres::Solver::Options options;
   auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
-  for (const Sighting& s : data.sightings) {
+  for (const Observation& s : data.observations) {
     double* const color = &(*colors)[s.point].x;
     double* const gain = &(*gains)[s.view].x;
     problem.AddResidualBlock(new LogLightResidual(s.log_light), &loss, color, gain);
@@ -117,7 +117,7 @@ ExposureEstimate EstimateExposure(int num_views,
   ExposureEstimate estimate;
   estimate.photos.resize(static_cast<size_t>(num_views));
   const ExposureData data = ArrangeObservations(estimate.photos.size(), observations);
-  if (data.sightings.empty()) return estimate;
+  if (data.observations.empty()) return estimate;
   const LogColors gains = BestGains(data, estimate.photos.size());
 
   std::vector<LogColors> without;
@@ -129,7 +129,7 @@ ExposureEstimate EstimateExposure(int num_views,
   }
   Explain(Disagreement(data, LogColors(gains.size())), after, &estimate);
 
-  for (const Sighting& s : data.sightings) ++estimate.photos[s.view].observations;
+  for (const Observation& s : data.observations) ++estimate.photos[s.view].observations;
   double squares = 0;
   std::vector<double> errors;
   for (size_t v = 0; v < gains.size(); ++v) {

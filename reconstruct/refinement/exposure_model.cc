@@ -38,8 +38,8 @@ std::vector<size_t> GroupNumbers(size_t num_views, const ExposureData& data) {
   };
   for (size_t p = 0; p + 1 < data.tracks.size(); ++p)
     for (size_t i = data.tracks[p] + 1; i < data.tracks[p + 1]; ++i) {
-      const size_t a = root(data.sightings[i].view);
-      const size_t b = root(data.sightings[data.tracks[p]].view);
+      const size_t a = root(data.observations[i].view);
+      const size_t b = root(data.observations[data.tracks[p]].view);
       parent[std::max(a, b)] = std::min(a, b);
     }
   for (size_t v = 0; v < num_views; ++v) parent[v] = root(v);
@@ -52,7 +52,7 @@ Vec3d WeightedColor(const ExposureData& data, size_t point, const LogColors& gai
   Vec3d mean;
   *sum = 0;
   for (size_t i = data.tracks[point]; i < data.tracks[point + 1]; ++i) {
-    const Sighting& s = data.sightings[i];
+    const Observation& s = data.observations[i];
     mean += (s.log_light - gains[s.view]) * weights[i];
     *sum += weights[i];
   }
@@ -60,7 +60,7 @@ Vec3d WeightedColor(const ExposureData& data, size_t point, const LogColors& gai
 }
 
 // Normal equations of the gains, the points' colours eliminated exactly: of a point,
-// diag(w) - w w^T / sum w; the same for all channels, since a sighting has one weight.
+// diag(w) - w w^T / sum w; the same for all channels, since a observation has one weight.
 LogColors WeightedGains(const ExposureData& data, const std::vector<double>& weights,
                         size_t num_views) {
   const auto n = static_cast<Index>(num_views);
@@ -71,17 +71,17 @@ LogColors WeightedGains(const ExposureData& data, const std::vector<double>& wei
     double sum = 0;
     const Vec3d mean = WeightedColor(data, p, none, weights, &sum);
     for (size_t i = data.tracks[p]; i < data.tracks[p + 1] && sum > 0; ++i) {
-      const Sighting& s = data.sightings[i];
+      const Observation& s = data.observations[i];
       const auto row = static_cast<Index>(s.view);
       matrix(row, row) += weights[i];
       for (int c = 0; c < 3; ++c) right(row, c) += weights[i] * (s.log_light[c] - mean[c]);
       for (size_t j = data.tracks[p]; j < data.tracks[p + 1]; ++j)
-        matrix(row, static_cast<Index>(data.sightings[j].view)) -=
+        matrix(row, static_cast<Index>(data.observations[j].view)) -=
             weights[i] * weights[j] / sum;
     }
   }
-  // A group's common gain is not seen, nor is that of a photo whose sightings are left out: a
-  // mite on the diagonal holds them near nothing.
+  // A group's common gain is not seen, nor is that of a photo whose observations are left out:
+  // a mite on the diagonal holds them near nothing.
   matrix.diagonal().array() += 1e-9 * std::max(matrix.trace() / static_cast<double>(n), 1e-9);
   const Eigen::MatrixX3d solved = matrix.ldlt().solve(right);
   LogColors gains(num_views);
@@ -113,28 +113,29 @@ ExposureData ArrangeObservations(size_t num_views,
     REGRADE_CHECK(o.view >= 0 && static_cast<size_t>(o.view) < num_views && o.point >= 0);
     REGRADE_CHECK(o.fold >= 0 && o.fold < kExposureFolds);
     num_points = std::max(num_points, static_cast<size_t>(o.point) + 1);
-    data.sightings.push_back({static_cast<size_t>(o.view),
-                              static_cast<size_t>(o.point),
-                              {std::log(o.light.x), std::log(o.light.y), std::log(o.light.z)}});
+    data.observations.push_back(
+        {static_cast<size_t>(o.view),
+         static_cast<size_t>(o.point),
+         {std::log(o.light.x), std::log(o.light.y), std::log(o.light.z)}});
   }
   data.fold_of_point.resize(num_points);
   for (const ColorObservation& o : observations)
     data.fold_of_point[static_cast<size_t>(o.point)] = o.fold;
-  for (size_t before = data.sightings.size() + 1; data.sightings.size() < before;) {
-    before = data.sightings.size();
+  for (size_t before = data.observations.size() + 1; data.observations.size() < before;) {
+    before = data.observations.size();
     std::vector<int> of_view(num_views), of_point(num_points);
-    for (const Sighting& s : data.sightings) ++of_view[s.view], ++of_point[s.point];
-    std::erase_if(data.sightings, [&](const Sighting& s) {
+    for (const Observation& s : data.observations) ++of_view[s.view], ++of_point[s.point];
+    std::erase_if(data.observations, [&](const Observation& s) {
       return of_point[s.point] < 2 || of_view[s.view] < kFewestColors;
     });
   }
-  std::sort(data.sightings.begin(), data.sightings.end(),
-            [](const Sighting& a, const Sighting& b) {
+  std::sort(data.observations.begin(), data.observations.end(),
+            [](const Observation& a, const Observation& b) {
               return a.point != b.point ? a.point < b.point : a.view < b.view;
             });
   data.tracks.resize(num_points + 1);
   data.known.resize(num_views);
-  for (const Sighting& s : data.sightings)
+  for (const Observation& s : data.observations)
     ++data.tracks[s.point + 1], data.known[s.view] = true;
   std::partial_sum(data.tracks.begin(), data.tracks.end(), data.tracks.begin());
   const std::vector<size_t> numbers = GroupNumbers(num_views, data);
@@ -154,7 +155,7 @@ Vec3d RobustColor(const ExposureData& data, size_t point, const LogColors& gains
     Vec3d sum;
     double weights = 0;
     for (size_t i = begin; i < end; ++i) {
-      const Vec3d there = data.sightings[i].log_light - gains[data.sightings[i].view];
+      const Vec3d there = data.observations[i].log_light - gains[data.observations[i].view];
       const double w = step == 0 ? 1 : Weight(there - color);
       sum += there * w, weights += w;
     }
@@ -169,7 +170,7 @@ Vec3d RobustColor(const ExposureData& data, size_t point, const LogColors& gains
 LogColors ReweightedGains(const ExposureData& data, int without_fold, const LogColors& start) {
   std::vector<int> count(start.size());
   const auto left_out = [&](size_t p) { return data.fold_of_point[p] == without_fold; };
-  for (const Sighting& s : data.sightings) count[s.view] += !left_out(s.point);
+  for (const Observation& s : data.observations) count[s.view] += !left_out(s.point);
   std::vector<bool> used(start.size());
   LogColors gains(start.size());
   for (size_t v = 0; v < used.size(); ++v) {
@@ -180,10 +181,10 @@ LogColors ReweightedGains(const ExposureData& data, int without_fold, const LogC
   for (size_t p = 0; p < colors.size(); ++p)
     if (data.tracks[p] < data.tracks[p + 1]) colors[p] = RobustColor(data, p, gains);
 
-  std::vector<double> weights(data.sightings.size());
+  std::vector<double> weights(data.observations.size());
   for (int step = 0; step < kGainSteps; ++step) {
     for (size_t i = 0; i < weights.size(); ++i) {
-      const Sighting& s = data.sightings[i];
+      const Observation& s = data.observations[i];
       const bool counts = used[s.view] && !left_out(s.point);
       weights[i] = counts ? Weight(s.log_light - gains[s.view] - colors[s.point]) : 0;
     }
@@ -210,7 +211,7 @@ std::vector<double> Disagreement(const ExposureData& data, const LogColors& gain
     const Vec3d color = RobustColor(data, p, gains);
     double& sum = sums[static_cast<size_t>(data.fold_of_point[p])];
     for (size_t i = data.tracks[p]; i < data.tracks[p + 1]; ++i) {
-      const Sighting& s = data.sightings[i];
+      const Observation& s = data.observations[i];
       sum += Loss(s.log_light - gains[s.view] - color);
     }
   }

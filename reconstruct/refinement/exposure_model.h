@@ -16,17 +16,17 @@ inline constexpr double kExposureLossScale = 0.05;
 
 using LogColors = std::vector<Vec3d>;
 
-struct Sighting {
+struct Observation {
   size_t view, point;
   Vec3d log_light;
 };
 
 struct ExposureData {
-  std::vector<Sighting> sightings;           // useful ones, those of a point side by side
+  std::vector<Observation> observations;     // useful ones, those of a point side by side
   std::vector<size_t> tracks;                // point p has [tracks[p], tracks[p + 1])
   std::vector<int> fold_of_point;            //
   std::vector<std::vector<size_t>> members;  // photos that tracks tie together, per group
-  std::vector<bool> known;                   // photos with sightings
+  std::vector<bool> known;                   // photos with observations
 };
 
 // Keeps points that two photos see at least, in photos that have kFewestColors of them; each
@@ -37,7 +37,7 @@ ExposureData ArrangeObservations(size_t num_views,
 constexpr int kNoFold = -1;
 
 // The minimum over all points but those of a fold, from `start` on; photos that have fewer than
-// kFewestColors sightings then have gain 0. Each group's mean is that of `start`.
+// kFewestColors observations then have gain 0. Each group's mean is that of `start`.
 LogColors ReweightedGains(const ExposureData& data, int without_fold, const LogColors& start);
 
 // The least sum of rho that the points' colours reach at these gains, fold by fold.

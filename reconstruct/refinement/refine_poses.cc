@@ -20,7 +20,7 @@ constexpr double kLossScaleOfMedian = 2;    // errors of twice the median are ou
 constexpr double kRayleighMedian = 1.1774;  // of a distance in two coordinates of deviation 1
 
 // Differences of the camera's own projection: one body for all lenses.
-struct SightingError {
+struct ObservationError {
   const Camera* lens;
   const Mat3d* rotation;
   double u, v;
@@ -45,16 +45,9 @@ class Watcher final : public ceres::IterationCallback {
  public:
   explicit Watcher(const ProgressFunction& progress) : progress_(progress) {}
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& summary) override {
-    switch (Report(progress_, summary.iteration, kMostIterations, "adjusting the poses")) {
-      case Verdict::kAbort:
-        aborted_ = true;
-        return ceres::SOLVER_ABORT;
-      case Verdict::kFinish:
-        return ceres::SOLVER_TERMINATE_SUCCESSFULLY;
-      case Verdict::kContinue:
-        break;
-    }
-    return ceres::SOLVER_CONTINUE;
+    aborted_ = Report(progress_, summary.iteration, kMostIterations, "adjusting the poses") ==
+               LoopControl::kStop;
+    return aborted_ ? ceres::SOLVER_ABORT : ceres::SOLVER_CONTINUE;
   }
   bool aborted() const { return aborted_; }
 
@@ -76,8 +69,8 @@ struct Gauge {
 
 Gauge ChooseGauge(const Bundle& bundle) {
   std::vector<int64_t> count(bundle.poses.size());
-  for (const BundleSighting& sighting : bundle.sightings)
-    count[sighting.view] += !sighting.held_out;
+  for (const BundleObservation& observation : bundle.observations)
+    count[observation.view] += !observation.held_out;
   Gauge gauge;
   gauge.view =
       static_cast<size_t>(std::max_element(count.begin(), count.end()) - count.begin());
@@ -97,11 +90,12 @@ class Adjustment {
  public:
   Adjustment(Bundle* bundle, Freedom freedom, double loss_scale)
       : bundle_(bundle), loss_(loss_scale), problem_(Ownership()) {
-    for (const BundleSighting& s : bundle->sightings) {
+    for (const BundleObservation& s : bundle->observations) {
       if (s.held_out || !std::isfinite(ReprojectionError(*bundle, s))) continue;
       auto* const cost =
-          new ceres::NumericDiffCostFunction<SightingError, ceres::CENTRAL, 2, 6, 3, 1>(
-              new SightingError{&bundle->lenses[s.view], &bundle->rotations[s.view], s.u, s.v});
+          new ceres::NumericDiffCostFunction<ObservationError, ceres::CENTRAL, 2, 6, 3, 1>(
+              new ObservationError{&bundle->lenses[s.view], &bundle->rotations[s.view], s.u,
+                                   s.v});
       double* const pose = bundle->poses[s.view].data();
       double* const point = bundle->points[s.point].data();
       double* const focal = &bundle->focal[bundle->camera[s.view]];
@@ -140,7 +134,7 @@ class Adjustment {
   }
 
   // Medians of the poses' standard errors, radians and the bundle's lengths, where errors of
-  // sightings have this deviation in each coordinate; none where the covariance has no rank.
+  // observations have this deviation in each coordinate; none where the covariance has no rank.
   std::optional<std::pair<double, double>> StandardErrors(double deviation) {
     FLAGS_minloglevel = google::GLOG_FATAL;  // a rank that is too low is an answer, not news
     ceres::Covariance::Options options;
@@ -210,7 +204,7 @@ void MeasureCorrections(const ColmapModel& before, const ColmapModel& after, dou
 std::string Judge(const PoseRefinement& result, bool asked_for) {
   const double most = (asked_for ? 1 : 1 - kRefinementPays) * result.held_out_before_px;
   if (result.held_out_after_px < most) return "";
-  return "sightings that had no say are no nearer";
+  return "observations that had no say are no nearer";
 }
 
 }  // namespace
@@ -220,8 +214,8 @@ PoseRefinement RefinePoses(const ColmapModel& model, const RefinePosesOptions& o
   PoseRefinement result;
   result.model = model;
   Bundle bundle = MakeBundle(model);
-  result.sightings = static_cast<int64_t>(bundle.sightings.size());
-  for (const BundleSighting& s : bundle.sightings) result.held_out += s.held_out;
+  result.observations = static_cast<int64_t>(bundle.observations.size());
+  for (const BundleObservation& s : bundle.observations) result.held_out += s.held_out;
   result.left_alone =
       static_cast<int>(std::count(bundle.adjustable.begin(), bundle.adjustable.end(), false));
   ProgressParts parts(progress, 4);
@@ -233,7 +227,7 @@ PoseRefinement RefinePoses(const ColmapModel& model, const RefinePosesOptions& o
   if (result.held_out < kFewestHeldOut || bundle.spread == 0) {
     result.misfit_px = MedianError(bundle, false);
     return options.asked_for ? refuse(bundle.spread == 0 ? "all cameras are at one place"
-                                                         : "too few sightings to judge by")
+                                                         : "too few observations to judge by")
                              : result;
   }
   // Points that are put where they fit best only come nearer.

@@ -22,7 +22,7 @@ constexpr double kCornerTail = 0.1;
 constexpr size_t kMinPointsOfView = 10;
 // Of a cube round the axes' common point: the cameras' median distance is this share of its
 // half side, and without points nothing is nearer to a camera than that share.
-constexpr double kReachOfCameras = 0.9;
+constexpr double kCameraRange = 0.9;
 constexpr double kFewPointsNearest = 0.35;
 constexpr double kNearPoints = 0.1;    // the share of points that are near for cameras within
 constexpr double kMostNearClip = 0.5;  // half sides
@@ -197,7 +197,7 @@ NormalizedScene NormalizeScene(const Capture& capture) {
     const Vec3d common = CommonPoint(centers, forwards);
     std::vector<double> distances;
     for (const Vec3d& c : centers) distances.push_back(Norm(c - common));
-    double half = Quantile(&distances, 0.5) / kReachOfCameras;
+    double half = Quantile(&distances, 0.5) / kCameraRange;
     std::string notice = "few points: the box is the cube round the cameras' common point";
     if (!(half > RoundingOf(centers))) {
       notice =
@@ -244,7 +244,7 @@ Surroundings MeasureSurroundings(const Capture& capture) {
     distances.push_back(Norm(to_center));
     ahead.push_back(Dot(to_center, poses.forwards[i]));
   }
-  const double reach = Quantile(&distances, 0.5) / kReachOfCameras;
+  const double reach = Quantile(&distances, 0.5) / kCameraRange;
   if (!(reach > RoundingOf(poses.centers))) return result;
   result.half = reach;
   // Cameras that look outwards stand round nothing: what is near to them begins with the

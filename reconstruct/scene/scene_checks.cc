@@ -98,7 +98,7 @@ double WorstPixelAspect(const Capture& capture) {
   return worst;
 }
 
-double CameraSpread(const Capture& capture) {
+double CameraExtent(const Capture& capture) {
   const std::vector<Vec3d> centers = Centers(capture);
   double spread = 0;
   for (size_t i = 0; i < centers.size(); ++i)
@@ -107,12 +107,12 @@ double CameraSpread(const Capture& capture) {
   return spread;
 }
 
-SceneJudgement JudgeScene(const Capture& capture, const SceneLimits& limits) {
-  SceneJudgement judgement;
+SceneAssessment AssessScene(const Capture& capture, const SceneLimits& limits) {
+  SceneAssessment assessment;
   const auto refuse = [&](const std::string& why, const std::string& remedy) {
-    judgement.refusal = why;
-    judgement.remedy = remedy;
-    return judgement;
+    assessment.refusal = why;
+    assessment.remedy = remedy;
+    return assessment;
   };
   const int views = static_cast<int>(capture.views.size());
   const double angle_deg = MedianTriangulationAngle(capture) * 180 / M_PI;
@@ -139,12 +139,12 @@ SceneJudgement JudgeScene(const Capture& capture, const SceneLimits& limits) {
                   "take more photos that overlap by two thirds; 20 to 60 are a good number");
   const Vec3d extents = PointExtents(capture);
   if (extents.y > 0 && extents.z < limits.min_thickness * extents.y)
-    judgement.notes.push_back(
+    assessment.notes.push_back(
         "the points lie nearly in one plane (thickness " +
         Rounded(100 * extents.z / extents.y, 1) +
         " % of its width), so the camera's focal length and the depth of the scene are weakly "
         "known; photos from the sides help");
-  return judgement;
+  return assessment;
 }
 
 }  // namespace regrade

@@ -1,5 +1,5 @@
 // Does a posed capture hold a scene that can be reconstructed? Measures of its geometry as pure
-// functions, and the judgement that they lead to.
+// functions, and the assessment that they lead to.
 #pragma once
 
 #include <string>
@@ -23,7 +23,7 @@ Vec3d PointExtents(const Capture& capture);
 double WorstPixelAspect(const Capture& capture);
 
 // Largest distance between two camera centres, in world units.
-double CameraSpread(const Capture& capture);
+double CameraExtent(const Capture& capture);
 
 struct SceneLimits {
   int min_views = 5;
@@ -33,12 +33,12 @@ struct SceneLimits {
 };
 
 // Sentences for a photographer: what is wrong, the number, and what to do.
-struct SceneJudgement {
+struct SceneAssessment {
   std::string refusal;             // empty: the scene can be used
   std::string remedy;              // beside a refusal
   std::vector<std::string> notes;  // usable, but something to know
 };
 
-SceneJudgement JudgeScene(const Capture& capture, const SceneLimits& limits = {});
+SceneAssessment AssessScene(const Capture& capture, const SceneLimits& limits = {});
 
 }  // namespace regrade

@@ -56,11 +56,11 @@ bool InHull(const std::vector<Blocks>& views, const Vec3d& point) {
 
 }  // namespace
 
-NormalizedScene TightenToOutlines(const NormalizedScene& scene,
-                                  const std::vector<Outline>& outlines) {
+NormalizedScene TightenToSilhouettes(const NormalizedScene& scene,
+                                     const std::vector<Silhouette>& silhouettes) {
   std::vector<Blocks> views;
-  for (const Outline& outline : outlines)
-    views.emplace_back(outline.camera.Transformed(scene.field_from_world), outline.alpha);
+  for (const Silhouette& silhouette : silhouettes)
+    views.emplace_back(silhouette.camera.Transformed(scene.field_from_world), silhouette.alpha);
   Vec3d low{1e9, 1e9, 1e9}, high{-1e9, -1e9, -1e9};
   const Vec3d radius = scene.box.radius.Cast<double>();
   for (int i = 0; i < kSide; ++i)

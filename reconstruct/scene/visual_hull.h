@@ -12,7 +12,7 @@ namespace regrade {
 
 // A view's alpha: [H, W, 1] in [0, 1] at the camera's own size; the camera is in the capture's
 // world.
-struct Outline {
+struct Silhouette {
   Camera camera;
   Image alpha;
 };
@@ -20,7 +20,7 @@ struct Outline {
 // `scene`, its box shrunk to the visual hull (at 96 vertices a side, and one more round it),
 // scaled so that the longest half side is 1 again. Unchanged if the hull is empty: then the
 // outlines do not fit the poses.
-NormalizedScene TightenToOutlines(const NormalizedScene& scene,
-                                  const std::vector<Outline>& outlines);
+NormalizedScene TightenToSilhouettes(const NormalizedScene& scene,
+                                     const std::vector<Silhouette>& silhouettes);
 
 }  // namespace regrade

@@ -43,7 +43,7 @@ def rows_of(scene, style, method, report):
         if sequence == "styled":
             row.update({"to_2d_db": near.get("psnr_to_2d_db"), "linear_map_db": stylize.get("linear_map_psnr_to_2d_db"),
                         "k_est": stylize.get("k_est"), "bound": stylize.get("bound"),
-                        "slope": stylize.get("slope_observed"), "seconds": stylize.get("seconds")})
+                        "slope": stylize.get("local_lipschitz_sampled"), "seconds": stylize.get("seconds")})
         if near.get("hue_std_2d"):
             row["hue_spread"] = near["hue_std"] / near["hue_std_2d"]
             row["chroma"] = near["chroma"] / near["chroma_2d"]

@@ -17,7 +17,7 @@ namespace {
 __device__ int32_t CornerPoint(const DeviceGridView& grid, const DeviceWeightedSample& sample,
                                int k) {
   if (sample.vertex >= 0)
-    return grid.links[sample.vertex + GridSpace(grid).Steps(sample.vertex).To(k)];
+    return grid.links[sample.vertex + GridSampler(grid).Steps(sample.vertex).To(k)];
   if (k & 1) return -1;
   const int r = grid.spheres.resolution, texel = ~sample.vertex;
   const int layer = texel % grid.spheres.layers, at = texel / grid.spheres.layers;

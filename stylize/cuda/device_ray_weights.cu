@@ -52,7 +52,7 @@ __global__ void MarchWeightsKernel(DeviceGridView grid, const Ray* rays, int64_t
     if (at < 0) continue;
     list.samples[at] = {sample.cell.vertex, sample.cell.fraction, w, static_cast<int32_t>(r)};
     if (touched == nullptr) continue;
-    const NeighbourSteps steps = GridSpace(grid).Steps(sample.cell.vertex);
+    const NeighbourSteps steps = GridSampler(grid).Steps(sample.cell.vertex);
     for (int k = 0; k < 8; ++k) {
       const int32_t link = grid.links[sample.cell.vertex + steps.To(k)];
       if (link >= 0) Touch(touched, link);
@@ -118,11 +118,11 @@ __global__ void AssignSlotsKernel(uint32_t* touched, int64_t words, int32_t* slo
 }
 
 // What does not fit is not worked on: the step is made again with more room.
-__global__ void LimitToRoomKernel(int64_t sample_room, int64_t slot_room, int32_t* samples,
-                                  int32_t* slots, DeviceRoom* room) {
+__global__ void ClampToCapacityKernel(int64_t sample_capacity, int64_t slot_capacity,
+                                      int32_t* samples, int32_t* slots, BufferDemand* room) {
   room->samples = *samples;
   room->slots = *slots;
-  if (*samples <= sample_room && *slots <= slot_room) return;
+  if (*samples <= sample_capacity && *slots <= slot_capacity) return;
   room->short_of = 1;
   *samples = *slots = 0;
 }
@@ -189,12 +189,13 @@ void DeviceSlots::Assign(DeviceTouched* touched) {
   num_slots = count;
 }
 
-void LimitToRoom(int64_t slot_room, DeviceRayWeights* weights, DeviceSlots* slots,
-                 DeviceRoom* room) {
-  slots->num_slots = slot_room;
-  LimitToRoomKernel<<<1, 1, 0, LaunchStream()>>>(
-      weights->samples.size(), slot_room, weights->counter.data(), slots->counter.data(), room);
-  CheckLaunch("limit_to_room");
+void ClampToCapacity(int64_t slot_capacity, DeviceRayWeights* weights, DeviceSlots* slots,
+                     BufferDemand* room) {
+  slots->num_slots = slot_capacity;
+  ClampToCapacityKernel<<<1, 1, 0, LaunchStream()>>>(weights->samples.size(), slot_capacity,
+                                                     weights->counter.data(),
+                                                     slots->counter.data(), room);
+  CheckLaunch("clamp_to_capacity");
 }
 
 #else
@@ -210,8 +211,8 @@ void DeviceRayWeights::Launch(const DeviceGrid&, const Ray*, int64_t, const Marc
 }
 void DeviceSlots::Launch(DeviceTouched*) { DeviceWait("assign_slots"); }
 void DeviceSlots::Assign(DeviceTouched*) { DeviceWait("assign_slots"); }
-void LimitToRoom(int64_t, DeviceRayWeights*, DeviceSlots*, DeviceRoom*) {
-  DeviceWait("limit_to_room");
+void ClampToCapacity(int64_t, DeviceRayWeights*, DeviceSlots*, BufferDemand*) {
+  DeviceWait("clamp_to_capacity");
 }
 
 #endif

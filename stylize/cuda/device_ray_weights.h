@@ -51,14 +51,14 @@ struct DeviceSlots {
 };
 
 // What a step that the host does not watch asked for, and whether there was room.
-struct DeviceRoom {
+struct BufferDemand {
   int32_t samples = 0, slots = 0;
   int32_t short_of = 0;  // 1 from the first step on that did not fit
 };
-// Behind the two Launch: num_slots becomes `slot_room`. Where samples or slots have no room all
-// of them are dropped, and *room, which lies on the device, says so.
-void LimitToRoom(int64_t slot_room, DeviceRayWeights* weights, DeviceSlots* slots,
-                 DeviceRoom* room);
+// Behind the two Launch: num_slots becomes `slot_capacity`. Where samples or slots have no room
+// all of them are dropped, and *room, which lies on the device, says so.
+void ClampToCapacity(int64_t slot_capacity, DeviceRayWeights* weights, DeviceSlots* slots,
+                     BufferDemand* room);
 
 // The colours of rays whose voxels have the rows of `slots` instead of their own: color [rays]
 // begins with the background and is not clipped at 1. open [samples]: bit c is set where the

@@ -59,7 +59,7 @@ class DeviceTraining::Recording {
     weights_that_learn_.CopyIn(network.data().parameters, network.data().singular_vectors, adam,
                                first, rejected_in_a_row_);
     room_.Zero();
-    if (sample_room_ == 0) MakeRoom(batches.front());
+    if (sample_capacity_ == 0) GrowBuffers(batches.front());
     Play(begun_);
   }
 
@@ -68,12 +68,12 @@ class DeviceTraining::Recording {
     for (;;) {
       state = weights_that_learn_.CopyOut(&network->data().parameters,
                                           &network->data().singular_vectors, adam);
-      DeviceRoom room;
+      BufferDemand room;
       room_.CopyOut(&room, 1);
       if (room.short_of == 0) break;
       ++regrown_;
-      SetRoom(std::max<int64_t>(sample_room_, room.samples + room.samples / 2),
-              std::max<int64_t>(slot_room_, room.slots + room.slots / 2));
+      SetCapacity(std::max<int64_t>(sample_capacity_, room.samples + room.samples / 2),
+                  std::max<int64_t>(slot_capacity_, room.slots + room.slots / 2));
       room_.Zero();
       Play(begun_from_ + begun_ - state.step);
     }
@@ -99,12 +99,12 @@ class DeviceTraining::Recording {
 
   int64_t regrown() const { return regrown_; }
 
-  void SetRoom(int64_t samples, int64_t slots) {
-    sample_room_ = samples;
-    slot_room_ = std::min(slots, grid_.num_points());
+  void SetCapacity(int64_t samples, int64_t slots) {
+    sample_capacity_ = samples;
+    slot_capacity_ = std::min(slots, grid_.num_points());
     weights_ = {};
-    weights_.Reserve(rays_.size(), sample_room_);
-    const int64_t floats = slot_room_ * kRowLanes;
+    weights_.Reserve(rays_.size(), sample_capacity_);
+    const int64_t floats = slot_capacity_ * kRowLanes;
     features_ = {};
     features_ = DeviceBuffer<float>(floats, "features of touched voxels");
     rows_ = {};
@@ -112,8 +112,8 @@ class DeviceTraining::Recording {
     d_rows_ = {};
     d_rows_ = DeviceBuffer<float>(floats, "gradients of styled voxels");
     open_ = {};
-    open_ = DeviceBuffer<uint8_t>(sample_room_, "clamps of samples");
-    mlp_.ReserveAdjoint(slot_room_);
+    open_ = DeviceBuffer<uint8_t>(sample_capacity_, "clamps of samples");
+    mlp_.ReserveAdjoint(slot_capacity_);
     graph_.Record([&] { Step(); });
   }
 
@@ -125,15 +125,16 @@ class DeviceTraining::Recording {
     weights_.Launch(grid_, rays_.data(), rays_.size(), options_.march, options_.min_weight,
                     &touched_);
     slots_.Launch(&touched_);
-    LimitToRoom(slot_room_, &weights_, &slots_, room_.data());
+    ClampToCapacity(slot_capacity_, &weights_, &slots_, room_.data());
     const int32_t* touched = slots_.counter.data();
-    GatherRows(grid_, slots_.point_of_slot.data(), 0, slot_room_, position_scale_,
+    GatherRows(grid_, slots_.point_of_slot.data(), 0, slot_capacity_, position_scale_,
                features_.data(), touched);
     weights_that_learn_.ActivateWeights(&mlp_);
-    mlp_.Forward(MlpPrecision::kTensor, features_.data(), slot_room_, rows_.data(), touched);
+    mlp_.Forward(MlpPrecision::kTensor, features_.data(), slot_capacity_, rows_.data(),
+                 touched);
     if (has_base_)
-      AddMappedRows(base_.matrix, base_.constant, features_.data(), slot_room_, rows_.data(),
-                    touched);
+      AddMappedRows(base_.matrix, base_.constant, features_.data(), slot_capacity_,
+                    rows_.data(), touched);
     d_rows_.Zero();
     sums_.Zero();
     BlendColors(grid_, weights_, slots_, rays_.data(), rows_.data(), color_.data(),
@@ -143,10 +144,10 @@ class DeviceTraining::Recording {
                  sums_.data());
     BlendColorsAdjoint(grid_, weights_, slots_, rays_.data(), open_.data(), d_color_.data(),
                        d_rows_.data());
-    AddViewPenalty(base_.matrix, features_.data(), rows_.data(), slot_room_,
+    AddViewPenalty(base_.matrix, features_.data(), rows_.data(), slot_capacity_,
                    static_cast<float>(options_.view_weight), d_rows_.data(),
                    &sums_.data()->loss, touched);
-    mlp_.AddAdjoint(MlpPrecision::kTensor, features_.data(), d_rows_.data(), slot_room_,
+    mlp_.AddAdjoint(MlpPrecision::kTensor, features_.data(), d_rows_.data(), slot_capacity_,
                     touched);
     const DeviceColorLoss* sums = sums_.data();
     weights_that_learn_.Learn(&mlp_,
@@ -173,7 +174,7 @@ class DeviceTraining::Recording {
   }
 
   // Half as much again as a first batch needs.
-  void MakeRoom(const StyleRays& batch) {
+  void GrowBuffers(const StyleRays& batch) {
     rays_.CopyIn(batch.rays.data(), static_cast<int64_t>(batch.rays.size()));
     DeviceRayWeights trial;
     trial.March(grid_, rays_.data(), static_cast<int64_t>(batch.rays.size()), options_.march,
@@ -181,8 +182,8 @@ class DeviceTraining::Recording {
     slots_.Assign(&touched_);
     const int64_t samples = trial.num_samples, slots = slots_.num_slots;
     trial = {};
-    SetRoom(std::max<int64_t>(1024, samples + samples / 2),
-            std::max<int64_t>(1024, slots + slots / 2));
+    SetCapacity(std::max<int64_t>(1024, samples + samples / 2),
+                std::max<int64_t>(1024, slots + slots / 2));
   }
 
   const DeviceGrid& grid_;
@@ -199,11 +200,11 @@ class DeviceTraining::Recording {
   DeviceBuffer<Ray> rays_;
   DeviceBuffer<Vec3f> targets_, color_, d_color_;
   DeviceBuffer<DeviceColorLoss> sums_;
-  DeviceBuffer<DeviceRoom> room_;
+  DeviceBuffer<BufferDemand> room_;
   DeviceBuffer<LearnedStep> learned_;
   DeviceBuffer<uint8_t> open_;
-  DeviceBuffer<float> features_, rows_, d_rows_;  // [slot_room_, kRowLanes]
-  int64_t sample_room_ = 0, slot_room_ = 0;
+  DeviceBuffer<float> features_, rows_, d_rows_;  // [slot_capacity_, kRowLanes]
+  int64_t sample_capacity_ = 0, slot_capacity_ = 0;
   int64_t begun_from_ = 0, begun_ = 0, regrown_ = 0;
   int32_t rejected_in_a_row_ = 0;
   DeviceGraph graph_;
@@ -224,8 +225,8 @@ DeviceTraining::Steps DeviceTraining::End(LipschitzNetwork* network, AdamState* 
   return recording_->End(network, adam);
 }
 int64_t DeviceTraining::regrown() const { return recording_->regrown(); }
-void DeviceTraining::ForgetRoom(int64_t samples, int64_t voxels) {
-  recording_->SetRoom(samples, voxels);
+void DeviceTraining::ForgetCapacity(int64_t samples, int64_t voxels) {
+  recording_->SetCapacity(samples, voxels);
 }
 
 }  // namespace regrade

@@ -43,7 +43,7 @@ class DeviceTraining {
   // Times that the steps' memory was too small, and was made larger.
   int64_t regrown() const;
   // For tests: as if so few samples and voxels had been expected.
-  void ForgetRoom(int64_t samples, int64_t voxels);
+  void ForgetCapacity(int64_t samples, int64_t voxels);
 
  private:
   class Recording;

@@ -42,10 +42,9 @@ Appearance ApplyNetwork(const LipschitzNetwork& network, const RadianceField& fi
           styled.sphere_color[3 * texel + c] = row[0];
       }
     }
-    const Verdict verdict =
+    const LoopControl control =
         Report(progress, static_cast<double>(begin + count), static_cast<double>(all));
-    if (verdict == Verdict::kAbort) throw Interrupted();
-    if (verdict == Verdict::kFinish) break;
+    if (control == LoopControl::kStop) throw Interrupted();
   }
   return styled;
 }

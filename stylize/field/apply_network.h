@@ -7,8 +7,8 @@
 
 namespace regrade {
 
-// Of the field's own basis; texels of background spheres go through it as plain colours. On
-// kFinish the voxels not yet done keep their colours; on kAbort throws Interrupted.
+// Of the field's own basis; texels of background spheres go through it as plain colours. Throws
+// Interrupted on kStop.
 Appearance ApplyNetwork(const LipschitzNetwork& network, const RadianceField& field,
                         const ProgressFunction& progress = nullptr);
 

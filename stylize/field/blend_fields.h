@@ -7,7 +7,7 @@
 // a map of coefficients it is a convex mix of its parts, f = (1 - sum a_i) id + sum a_i f_i,
 // and its Lipschitz constant is at most theirs, mixed.
 //
-// With a share e_j in [0, 1] for each voxel (an object's, see object_shares.h), a_i e_j stands
+// With a share e_j in [0, 1] for each voxel (an object's, see object_weights.h), a_i e_j stands
 // in place of a_i: what is not of the object stays what it was.
 #pragma once
 

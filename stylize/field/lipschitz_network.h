@@ -1,4 +1,4 @@
-// The network that restyles a field's spherical harmonics, and the bound that is promised for
+// The network that restyles a field's spherical harmonics, and the bound that is guaranteed for
 // it.
 //
 // EQ(liprf-network):  f(s, q) = (A (x) I_9) s + o + g(s, q),

@@ -1,5 +1,6 @@
 // How far apart the colours of two rays are before and after a style, against what LipRF's
-// propositions promise: measured on a field, with the reasons where the promise does not hold.
+// propositions guarantee: measured on a field, with the reasons where the guarantee does not
+// hold.
 //
 // EQ(vrr), LipRF eq. 5: vrr(r1, r2; F) = |C(r1; F) - C(r2; F)|.
 //

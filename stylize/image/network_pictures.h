@@ -32,7 +32,7 @@ FeatureMap Cropped(const FeatureMap& map, int width, int height, int spare,
 // enlarged and meet the photo's own detail.
 Image WithEdgesOf(const Image& photo, const Image& small, const Image& styled);
 
-// What Stylize of view_stylizer.h promises, by a method that gives a picture of any size back
+// What Stylize of view_stylizer.h guarantees, by a method that gives a picture of any size back
 // at that size: a photo whose longer side is above `max_side` is restyled small, and
 // WithEdgesOf brings the result to its size.
 Image StyledAtWorkingSize(const Image& view, int view_index, int max_side,

@@ -39,7 +39,7 @@ class ViewStylizer {
 // `where`. The few below it leave every loss and every measure.
 int64_t CountNotFinite(const Image& image, const std::string& where);
 
-// What Stylize promises, for methods that are not ours: same size and channels, and
+// What Stylize guarantees, for methods that are not ours: same size and channels, and
 // CountNotFinite, which is returned. Throws Error(kExternalProgram) naming `where`.
 int64_t CheckStyledView(const Image& view, const Image& styled, const std::string& where);
 

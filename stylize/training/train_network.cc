@@ -13,7 +13,7 @@
 #include "stylize/cuda/device_training.h"
 #include "stylize/field/base_map.h"
 #include "stylize/field/gradient_aggregation.h"
-#include "stylize/field/observed_slope.h"
+#include "stylize/field/local_lipschitz.h"
 #include "stylize/training/initial_network.h"
 #include "stylize/training/lipschitz_regularizer.h"
 #include "stylize/training/style_rays.h"
@@ -306,14 +306,15 @@ TrainNetworkResult Training::Conclude() {
     network_.data().base = BetterMap(&mse);
     ClearLastLayer(&network_);
   }
-  // The power iteration's norms are a little low; the promise is about exact ones.
+  // The power iteration's norms are a little low; the guarantee is about exact ones.
   const double excess = network_.ResidualBound() / Budget();
   if (excess > 1) network_.k(kNetworkLayers - 1) *= static_cast<float>((1 - 1e-6) / excess);
   result_.bound = network_.Bound();
-  const ObservedSlopes slopes = ObserveSlopes(network_, field_, {.seed = options_.seed});
-  result_.slope_observed = slopes.OnData();
+  const LocalLipschitz slopes =
+      MeasureLocalLipschitz(network_, field_, {.seed = options_.seed});
+  result_.local_lipschitz_sampled = slopes.OnData();
   result_.slopes = slopes;
-  result_.slope_ascent = std::max(slopes.ascent, slopes.summit_pair);
+  result_.local_lipschitz_max = std::max(slopes.ascent, slopes.steepest_pair);
   result_.smallest_k = network_.SmallestK();
   if (result_.smallest_k < 10 * std::sqrt(kSquareplusB))
     result_.warnings.push_back("a layer's norm has vanished: the network is constant");
@@ -361,13 +362,14 @@ TrainNetworkResult TrainNetwork(const RadianceField& field,
     }
     char note[64];
     std::snprintf(note, sizeof note, "%.1f dB on this step's rays", Psnr(step.Mse()));
-    const Verdict verdict = Report(hooks.progress, static_cast<double>(training.steps_done()),
-                                   static_cast<double>(options.steps), note);
-    const bool last = verdict != Verdict::kContinue || training.steps_done() == options.steps;
+    const LoopControl control =
+        Report(hooks.progress, static_cast<double>(training.steps_done()),
+               static_cast<double>(options.steps), note);
+    const bool last =
+        control != LoopControl::kContinue || training.steps_done() == options.steps;
     if (hooks.checkpoint && (last || training.steps_done() % hooks.checkpoint_every == 0))
       hooks.checkpoint(training.Capture());
-    if (verdict == Verdict::kAbort) throw Interrupted();
-    if (verdict == Verdict::kFinish) break;
+    if (control == LoopControl::kStop) throw Interrupted();
   }
   return training.Conclude();
 }

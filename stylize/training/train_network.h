@@ -16,7 +16,7 @@
 #include "kernels/scene/camera.h"
 #include "kernels/scene/image.h"
 #include "stylize/field/lipschitz_network.h"
-#include "stylize/field/observed_slope.h"
+#include "stylize/field/local_lipschitz.h"
 #include "stylize/linear_map.h"
 
 namespace regrade {
@@ -162,7 +162,7 @@ struct SceneColorMap {
 
 inline constexpr int kBoundEvery = 25;  // steps between two looks at exact norms
 
-// How the promise goes while the network learns.
+// How the guarantee goes while the network learns.
 struct BoundHistory {
   std::vector<int64_t> steps;
   std::vector<double> bounds;  // LipschitzNetwork::Bound() before that step
@@ -186,16 +186,16 @@ struct TrainingHooks {
 
 struct TrainNetworkResult {
   LipschitzNetwork network;
-  int64_t steps = 0;          // taken
-  double k_est = 0;           // as used: cut at kLargestKEst
-  double bound = 0;           // LipschitzNetwork::Bound()
-  double slope_observed = 0;  // on the field's voxels
-  ObservedSlopes slopes;
-  double slope_ascent = 0;        // climbed to from there
-  double smallest_k = 0;          // of the layers; near 0 a layer is dead
-  double largest_norm_drift = 0;  // of the power iteration, seen while learning
-  double psnr_db = 0;             // of a fixed sample of training rays to the targets, clipped
-  double linear_map_psnr_db = 0;  // the same of linear_map; 0 without a base map
+  int64_t steps = 0;                   // taken
+  double k_est = 0;                    // as used: cut at kLargestKEst
+  double bound = 0;                    // LipschitzNetwork::Bound()
+  double local_lipschitz_sampled = 0;  // on the field's voxels
+  LocalLipschitz slopes;
+  double local_lipschitz_max = 0;  // climbed to from there
+  double smallest_k = 0;           // of the layers; near 0 a layer is dead
+  double largest_norm_drift = 0;   // of the power iteration, seen while learning
+  double psnr_db = 0;              // of a fixed sample of training rays to the targets, clipped
+  double linear_map_psnr_db = 0;   // the same of linear_map; 0 without a base map
   double mean_touched_voxels = 0;
   ColorMap linear_map;          // the nearer one to the targets, however steep
   int64_t rejected_steps = 0;   // not finite
@@ -206,9 +206,8 @@ struct TrainNetworkResult {
 
 // `resume`, unless null, is a state that a checkpoint hook was given, of the same inputs.
 // Throws Error(kInput) for a target of another size or with more than 1 % of pixels that are
-// not finite, Error(kScene) when two steps in a row are not finite. On kFinish the result so
-// far is returned. `device_field`, unless null, is the same field on a device, where the steps
-// are then made.
+// not finite, Error(kScene) when two steps in a row are not finite. `device_field`, unless
+// null, is the same field on a device, where the steps are then made.
 TrainNetworkResult TrainNetwork(const RadianceField& field,
                                 const std::vector<StyledTrainingView>& views,
                                 const SceneColorMap& scene_map, const MarchOptions& march,

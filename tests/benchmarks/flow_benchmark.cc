@@ -1,6 +1,6 @@
 // Prices the evaluator's flow methods against exact motion: how far off they are, which hidden
 // pixels their masks find, what they make of the consistency of frames that are consistent, and
-// how long they take. Prints tables for PRICES.md.
+// how long they take. Prints tables for COSTS.md.
 //
 //   flow_benchmark pairs DIR      DIR/00001_img1.ppm, 00001_img2.ppm, 00001_flow.flo, ...
 //   flow_benchmark capture DIR    what `regrade synth` wrote
@@ -95,7 +95,7 @@ struct MaskCount {
   Mean psnr_db;
 };
 
-struct MethodFigures {
+struct MethodMetrics {
   Mean error, trusted_error, milliseconds;
   MaskCount lai, ruder;
 };
@@ -113,26 +113,26 @@ void CountMask(const TruePair& pair, const PairMotion& motion, MaskCount* count)
   if (result.psnr_db && std::isfinite(*result.psnr_db)) count->psnr_db.Add(*result.psnr_db);
 }
 
-void MeasureMethod(const TruePair& pair, const std::string& method, MethodFigures* figures) {
+void MeasureMethod(const TruePair& pair, const std::string& method, MethodMetrics* metrics) {
   const double start = CpuMilliseconds();
   const FlowField forward = ComputeFlow(pair.earlier, pair.later, method);
   const FlowField backward = ComputeFlow(pair.later, pair.earlier, method);
-  figures->milliseconds.Add(CpuMilliseconds() - start);
+  metrics->milliseconds.Add(CpuMilliseconds() - start);
   const PairMotion lai{forward, MaskLai2018(forward, backward)},
       ruder{forward, MaskRuder2016(forward, backward)};
-  CountMask(pair, lai, &figures->lai);
-  CountMask(pair, ruder, &figures->ruder);
+  CountMask(pair, lai, &metrics->lai);
+  CountMask(pair, ruder, &metrics->ruder);
   for (int y = 0; y < forward.height; ++y)
     for (int x = 0; x < forward.width; ++x) {
       const float* truth = pair.truth.flow.at(x, y);
       if (*pair.truth.mask.weight.at(x, y) < 0.5f || !std::isfinite(truth[0])) continue;
       const double error = EndPointError(forward.at(x, y), truth);
-      figures->error.Add(error);
-      if (*lai.mask.weight.at(x, y) > 0) figures->trusted_error.Add(error);
+      metrics->error.Add(error);
+      if (*lai.mask.weight.at(x, y) > 0) metrics->trusted_error.Add(error);
     }
 }
 
-void PrintRow(const std::string& method, const MethodFigures& f) {
+void PrintRow(const std::string& method, const MethodMetrics& f) {
   std::printf("| %s | %.2f | %.2f ", method.c_str(), f.error.Value(), f.trusted_error.Value());
   for (const MaskCount* mask : {&f.lai, &f.ruder})
     std::printf("| %.2f / %.2f | %.2f | %.2f ", mask->both / mask->removed,
@@ -142,12 +142,12 @@ void PrintRow(const std::string& method, const MethodFigures& f) {
 }
 
 void MeasureCapture(const std::string& folder) {
-  std::vector<MethodFigures> figures(kMethods.size());
+  std::vector<MethodMetrics> metrics(kMethods.size());
   Mean true_psnr, motion, seen;
   for (int i = 0; std::filesystem::exists(folder + "/truth/flow/" + FlowFileName(i, i + 1));
        ++i) {
     const TruePair pair = ReadPair(folder, i);
-    for (size_t m = 0; m < kMethods.size(); ++m) MeasureMethod(pair, kMethods[m], &figures[m]);
+    for (size_t m = 0; m < kMethods.size(); ++m) MeasureMethod(pair, kMethods[m], &metrics[m]);
     const PairResult exact = ComparePair(pair.earlier, pair.later, pair.truth);
     true_psnr.Add(*exact.psnr_db);
     seen.Add(exact.coverage);
@@ -165,7 +165,7 @@ void MeasureCapture(const std::string& folder) {
       "| flow | error, px | of trusted | lai2018: precision / recall | kept | TC-PSNR "
       "| ruder2016: precision / recall | kept | TC-PSNR | ms a pair |\n"
       "|---|---|---|---|---|---|---|---|---|---|\n");
-  for (size_t m = 0; m < kMethods.size(); ++m) PrintRow(kMethods[m], figures[m]);
+  for (size_t m = 0; m < kMethods.size(); ++m) PrintRow(kMethods[m], metrics[m]);
 }
 
 }  // namespace

@@ -36,7 +36,7 @@ bool Has(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
 
-TEST(Tables, FiguresUndefinedOnesAndInfinity) {
+TEST(Tables, MetricsUndefinedOnesAndInfinity) {
   FidelityRow fidelity;
   fidelity.sequence = "styled";
   fidelity.psnr_to_2d_db = 27.456;

@@ -14,14 +14,14 @@
 
 namespace regrade::testing {
 
-// A promise that an accepted input has broken.
-class BrokenPromise : public std::logic_error {
+// A guarantee that an accepted input has broken.
+class BrokenPremise : public std::logic_error {
  public:
   using std::logic_error::logic_error;
 };
 
-inline void FuzzRequire(bool kept, const char* promise) {
-  if (!kept) throw BrokenPromise(std::string("accepted, but not so: ") + promise);
+inline void FuzzRequire(bool kept, const char* guarantee) {
+  if (!kept) throw BrokenPremise(std::string("accepted, but not so: ") + guarantee);
 }
 
 // True if `read` came to its end, false if it refused with an Error of one of the kinds that

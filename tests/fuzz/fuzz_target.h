@@ -30,7 +30,8 @@ struct FuzzTarget {
   // Inputs that must be accepted: the corpus begins with them.
   std::vector<std::string> (*seeds)();
   // Hands the bytes to the reader. True if they were accepted and what came out is as the
-  // reader promises, false if they were refused with an Error. Whatever is thrown is a finding.
+  // reader guarantees, false if they were refused with an Error. Whatever is thrown is a
+  // finding.
   bool (*read)(std::string_view bytes);
   // One mutant.
   std::string (*mutate)(std::string bytes, FuzzRandom* random);

@@ -102,7 +102,7 @@ std::vector<std::string> RecordSeeds() {
   record.version = "0.1.0";
   record.inputs = JsonValue::Object{{"photos", JsonValue::Object{{"a.jpg", "0123"}}}};
   record.outputs = {{"frames/styled/00000.png", 100, "89abcdef"}, {"field.npz", 5, "00"}};
-  record.figures = JsonValue::Object{{"voxels", 7}};
+  record.metrics = JsonValue::Object{{"voxels", 7}};
   return {DumpJson(ToJson(record))};
 }
 

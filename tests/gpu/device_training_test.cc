@@ -152,7 +152,7 @@ TEST_F(DeviceLearning, TooLittleRoomIsMadeAndNoStepIsLost) {
     LipschitzNetwork network = Start();
     AdamState adam;
     DeviceTraining training(&grid, Options(), Rule(5), network, kRays, 5);
-    if (little) training.ForgetRoom(64, 32);
+    if (little) training.ForgetCapacity(64, 32);
     training.Begin(0, batches, network, adam);
     const DeviceTraining::Steps made = training.End(&network, &adam);
     EXPECT_EQ(made.made, 5);

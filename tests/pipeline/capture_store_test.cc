@@ -98,9 +98,9 @@ TEST(CaptureStore, F61_PicturesThatAreMissingLendNobodyTheirPoses) {
     EXPECT_LE(Norm(some.views[i].camera.Center() - all.views[number[i]].camera.Center()), 1e-12)
         << "a quaternion's rounding";
   }
-  ASSERT_EQ(some.verdicts.size(), 6u);
-  EXPECT_EQ(some.verdicts[4].file, "00000.png");
-  EXPECT_EQ(some.verdicts[4].verdict, "skipped");
+  ASSERT_EQ(some.statuses.size(), 6u);
+  EXPECT_EQ(some.statuses[4].file, "00000.png");
+  EXPECT_EQ(some.statuses[4].status, "skipped");
   // And so as a capture of its own.
   EXPECT_EQ(Regrade({"pose", folder / "some", "--out", folder / "again", "--tracks", "given"}),
             0);
@@ -129,7 +129,7 @@ TEST(CaptureStore, H137_CamerasFollowPicturesThatWereResampled) {
   EXPECT_NEAR(capture.views[0].camera.fy, capture.views[1].camera.fy / 1.5, 1e-9);
   EXPECT_EQ(capture.views[1].camera.width, 200);
   EXPECT_GT(capture.points.size(), 100u);
-  EXPECT_LT(capture.reprojection_px, 3);  // sightings moved along
+  EXPECT_LT(capture.reprojection_px, 3);  // observations moved along
   // Another shape is no size.
   for (int i = 0; i < 6; ++i) {
     const std::string path = folder / ("s/images_4/0000" + std::to_string(i) + ".png");
@@ -160,9 +160,9 @@ TEST(CaptureStore, PicturesThatATransformsFileMissesAreTold) {
             0);
   const Capture capture = ReadCapture(folder / "out/poses");
   EXPECT_EQ(capture.views.size(), 5u);
-  ASSERT_EQ(capture.verdicts.size(), 6u);
-  EXPECT_EQ(capture.verdicts[5].file, "../images/00002.png");
-  EXPECT_EQ(capture.verdicts[5].verdict, "skipped");
+  ASSERT_EQ(capture.statuses.size(), 6u);
+  EXPECT_EQ(capture.statuses[5].file, "../images/00002.png");
+  EXPECT_EQ(capture.statuses[5].status, "skipped");
 }
 
 }  // namespace

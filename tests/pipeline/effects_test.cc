@@ -25,11 +25,11 @@ using testing::WriteSyntheticWorkspace;
 
 struct Reconstruction {
   StoredField stored;
-  JsonValue figures;
+  JsonValue metrics;
 
-  double heldout_db() const { return figures.At("psnr_heldout_db").AsDouble(); }
+  double heldout_db() const { return metrics.At("psnr_heldout_db").AsDouble(); }
   const JsonValue& effect(const std::string& name) const {
-    for (const JsonValue& row : figures.At("effects").AsArray())
+    for (const JsonValue& row : metrics.At("effects").AsArray())
       if (row.At("name").AsString() == name) return row;
     throw std::out_of_range(name);
   }
@@ -56,7 +56,7 @@ Reconstruction Reconstruct(const std::string& capture, const std::string& out,
   if (result.end != ChildEnd::kExited || result.exit_status != 0)
     throw std::runtime_error(text);
   return {ReadFieldFile(out + "/field.npz"),
-          ReadJsonFile(out + "/.regrade/stages/reconstruct.json").At("figures")};
+          ReadJsonFile(out + "/.regrade/stages/reconstruct.json").At("metrics")};
 }
 
 template <typename T>
@@ -111,7 +111,7 @@ TEST(EffectsOff, H155_ResultsAreThoseOfTheBuildWithoutThem) {
     GTEST_SKIP() << "another C library: its photos differ in the last bit already";
   // Measured, decided against, and nothing is left of it.
   EXPECT_FALSE(measured.effect("exposure").At("on").AsBool());
-  EXPECT_EQ(measured.figures.Find("exposure"), nullptr);
+  EXPECT_EQ(measured.metrics.Find("exposure"), nullptr);
   EXPECT_EQ(digest, kDigestField);
   const Reconstruction refused = Reconstruct(
       folder / "capture", folder / "refused", kCoarse,
@@ -138,7 +138,7 @@ TEST(EffectsOn, RefinedPosesGainDecibels) {
   EXPECT_GT(on.heldout_db(), off.heldout_db() + 1.5) << on.heldout_db();
   const auto pose = [&folder](const char* name) {
     return ReadJsonFile(folder / (std::string(name) + "/.regrade/stages/pose.json"))
-        .At("figures");
+        .At("metrics");
   };
   EXPECT_TRUE(pose("on").At("effects").AsArray()[0].At("on").AsBool());
   EXPECT_NEAR(pose("on").At("pose_refinement").At("turned_deg").AsDouble(), 0.3, 0.05);

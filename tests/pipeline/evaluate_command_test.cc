@@ -55,7 +55,7 @@ void WriteFrames(const std::string& folder, int count, float flicker = 0) {
     WriteText(folder + "/0000" + std::to_string(i) + ".png", EncodePng8(Frame(i, flicker)));
 }
 
-TEST(EvaluateCommand, WritesFiguresIntervalsAndHeatMaps) {
+TEST(EvaluateCommand, WritesMetricsIntervalsAndHeatMaps) {
   const TemporaryFolder folder;
   WriteFrames(folder / "source", 6);
   WriteFrames(folder / "styled", 6, 0.03f);

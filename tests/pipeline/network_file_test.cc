@@ -134,13 +134,13 @@ TEST_F(ChangedNetwork, F69_NonFiniteValues) {
 }
 
 TEST_F(ChangedNetwork, BoundIsOfTheWeights) {
-  const double promised = SmallNetwork().network.Bound() * 0.999;
-  EXPECT_REGRADE_ERROR(ReadWith("bound", {}, &promised), ExitCode::kInput,
-                       "promises the bound");
+  const double guaranteed = SmallNetwork().network.Bound() * 0.999;
+  EXPECT_REGRADE_ERROR(ReadWith("bound", {}, &guaranteed), ExitCode::kInput,
+                       "guarantees the bound");
   const float k = 7;
-  EXPECT_REGRADE_ERROR(ReadWith("k_4", {}, &k), ExitCode::kInput, "promises the bound");
+  EXPECT_REGRADE_ERROR(ReadWith("k_4", {}, &k), ExitCode::kInput, "guarantees the bound");
   const double none = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_REGRADE_ERROR(ReadWith("bound", {}, &none), ExitCode::kInput, "promises the bound");
+  EXPECT_REGRADE_ERROR(ReadWith("bound", {}, &none), ExitCode::kInput, "guarantees the bound");
 }
 
 TEST_F(ChangedNetwork, UnknownActivationAndNewerVersion) {

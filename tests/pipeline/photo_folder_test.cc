@@ -63,8 +63,8 @@ class PhotoFolder : public ::testing::Test {
     return files;
   }
   static std::string WhyNot(const IngestResult& result, const std::string& file) {
-    for (const PhotoVerdict& verdict : result.verdicts)
-      if (verdict.file == file) return verdict.verdict == "used" ? "used" : verdict.why;
+    for (const PhotoStatus& verdict : result.statuses)
+      if (verdict.file == file) return verdict.status == "used" ? "used" : verdict.why;
     return "not listed";
   }
 
@@ -141,7 +141,7 @@ TEST_F(PhotoFolder, BadFilesAreNamedAndLeftOut) {
   WriteBytes(folder_ + "/tiny.png", EncodePng8(Photo(16, 16, 1)));
   const IngestResult result = Ingest();
   EXPECT_EQ(result.photos.size(), 3u);
-  EXPECT_EQ(result.verdicts.size(), 7u);
+  EXPECT_EQ(result.statuses.size(), 7u);
   EXPECT_TRUE(Contains(WhyNot(result, "cut.jpg"), "damaged JPEG"));
   EXPECT_EQ(WhyNot(result, "empty.jpg"), "empty file");
   EXPECT_EQ(WhyNot(result, "notes.txt"), "not an image");
@@ -263,7 +263,7 @@ TEST_F(PhotoFolder, HiddenFilesAreIgnored) {
   PutPhoto(".p9.jpg", 9);
   PutPhoto(".trash/p8.jpg", 8);
   const IngestResult result = Ingest();
-  EXPECT_EQ(result.verdicts.size(), 3u);
+  EXPECT_EQ(result.statuses.size(), 3u);
   EXPECT_EQ(result.hidden, 2);
 }
 
@@ -332,7 +332,7 @@ TEST_F(PhotoFolder, AWishToStopIsObeyed) {
   PutPhotos(5);
   int calls = 0;
   const auto stop_at_third = [&](const Progress&) {
-    return ++calls == 3 ? Verdict::kAbort : Verdict::kContinue;
+    return ++calls == 3 ? LoopControl::kStop : LoopControl::kContinue;
   };
   EXPECT_THROW(IngestPhotos(folder_, staging_, {}, stop_at_third), Interrupted);
   EXPECT_EQ(calls, 3);
@@ -353,7 +353,7 @@ TEST_F(PhotoFolder, F14_ThousandsOfOtherFilesAreNoTrouble) {
   for (int i = 0; i < 3000; ++i) WriteBytes(folder_ + "/log/" + std::to_string(i), "x");
   const IngestResult result = Ingest();
   EXPECT_EQ(result.photos.size(), 3u);
-  EXPECT_EQ(result.verdicts.size(), 3003u);
+  EXPECT_EQ(result.statuses.size(), 3003u);
   EXPECT_TRUE(result.notices.empty());
 }
 

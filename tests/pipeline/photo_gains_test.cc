@@ -159,10 +159,10 @@ TEST(PhotoGains, StagesReadWhatTheRecordHas) {
   estimate.photos.resize(2);
   estimate.photos[1].gain = {1.1, 0.9, 1 / 3.0};
   estimate.photos[1].known = true;
-  JsonValue figures = JsonValue::Object();
-  figures["exposure"] =
+  JsonValue metrics = JsonValue::Object();
+  metrics["exposure"] =
       GainsRecord(capture, estimate, GainsOf(estimate, {{0.1, 0.1, 0.1}, {0.1, 0.1, 0.1}}));
-  workspace.Record("reconstruct", JsonValue::Object(), {}, 0, figures);
+  workspace.Record("reconstruct", JsonValue::Object(), {}, 0, metrics);
   EXPECT_EQ(RecordedGains(workspace, capture).Of(0), kAsTaken);
   EXPECT_EQ(RecordedGains(workspace, capture).Of(1), (PhotoGain{{1.1, 0.9, 1 / 3.0}, 1}));
   capture.views[1].file = "c.jpg";

@@ -69,7 +69,7 @@ void Reconstruct(const std::string& capture, const std::string& out, const std::
 
 double HeldOutPsnr(const std::string& out) {
   return ReadJsonFile(out + "/.regrade/stages/reconstruct.json")
-      .At("figures")
+      .At("metrics")
       .At("psnr_heldout_db")
       .AsDouble();
 }

@@ -55,8 +55,8 @@ void Synth(const std::string& out, const std::string& effects) {
   Regrade(words);
 }
 
-JsonValue PoseFigures(const std::string& out) {
-  return ReadJsonFile(out + "/.regrade/stages/pose.json").At("figures");
+JsonValue PoseMetrics(const std::string& out) {
+  return ReadJsonFile(out + "/.regrade/stages/pose.json").At("metrics");
 }
 
 std::string Bytes(const std::string& path) {
@@ -79,7 +79,7 @@ TEST(PoseTracks, WithoutColmapEverythingIsAsWithoutTracks) {
         << name;
   EXPECT_EQ(Bytes(folder / "given/poses/photos.json"),
             Bytes(folder / "none/poses/photos.json"));
-  EXPECT_EQ(PoseFigures(folder / "given").Find("tracks"), nullptr);
+  EXPECT_EQ(PoseMetrics(folder / "given").Find("tracks"), nullptr);
 }
 
 TEST(PoseTracks, TransparentPhotosAndOwnPointsAreNotSearched) {
@@ -164,17 +164,17 @@ TEST(PoseTracks, WhatMasksBlackenIsNotMatched) {
       {"pose", folder / "s/truth", "--out", folder / "out", "--photo-masks", folder / "masks"});
   const ColmapModel model = ReadColmapModel(folder / "out/poses/sparse");
   ASSERT_GE(model.points.size(), kFewestTracks);
-  int64_t sightings = 0, in_first = 0;
+  int64_t observations = 0, in_first = 0;
   for (const ColmapImage& image : model.images)
     for (const ColmapKeypoint& keypoint : image.keypoints) {
       if (image.name != "00000.png") {
         EXPECT_GE(keypoint.u, 139) << image.name;  // the mask's edge, to a pixel
-        ++sightings;
+        ++observations;
       } else if (keypoint.u < 139) {
         ++in_first;
       }
     }
-  EXPECT_GT(sightings, 500);
+  EXPECT_GT(observations, 500);
   EXPECT_GT(in_first, 20);
   // Other masks are other inputs; and a folder without a mask of a photo is a mistake.
   EXPECT_NE(

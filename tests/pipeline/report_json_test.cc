@@ -32,10 +32,10 @@ RunReport FullReport() {
   report.stages.reconstruct = ReconstructReport{2, 1000, 29, 26.5, 0.8, {"a.jpg"}};
   report.stages.style_2d = Style2dReport{3, "mkl"};
   report.stages.stylize = StylizeReport{4, 300, 1.5, 1.9, 1.2, 27, 25, 26};
-  report.stages.stylize->slope_ascent = 1.3;
-  report.stages.stylize->slope_of_map = 1.1;
-  report.stages.stylize->slope_along_coefficients = 1.2;
-  report.stages.stylize->slope_along_position = 0.1;
+  report.stages.stylize->local_lipschitz_max = 1.3;
+  report.stages.stylize->local_lipschitz_of_map = 1.1;
+  report.stages.stylize->local_lipschitz_along_coefficients = 1.2;
+  report.stages.stylize->local_lipschitz_along_position = 0.1;
   report.stages.render = RenderReport{5, 60, 12};
   report.stages.evaluate = EvaluateReport{6, "dis-medium", "lai2018"};
   report.consistency = {{"styled", 1, 49, 0, 29.8, 29.5, 0.8, {}, 29.1, 30.4, ""}};
@@ -60,9 +60,9 @@ TEST(ReportJson, HasTheKeysOfSchema1InOrder) {
             (Keys{"schema", "regrade", "command", "preset", "device", "seed", "seconds",
                   "peak_memory_mb", "photos", "effects", "stages", "consistency", "fidelity"}));
   EXPECT_EQ(json.At("schema").AsInt(), 1);
-  EXPECT_EQ(KeysOf(json.At("photos")), (Keys{"given", "used", "registered", "verdicts"}));
-  EXPECT_EQ(KeysOf(json.At("photos").At("verdicts").AsArray()[0]),
-            (Keys{"file", "verdict", "why"}));
+  EXPECT_EQ(KeysOf(json.At("photos")), (Keys{"given", "used", "registered", "statuses"}));
+  EXPECT_EQ(KeysOf(json.At("photos").At("statuses").AsArray()[0]),
+            (Keys{"file", "status", "why"}));
   EXPECT_EQ(KeysOf(json.At("effects").AsArray()[0]),
             (Keys{"name", "on", "evidence", "value", "threshold"}));
   const JsonValue& stages = json.At("stages");
@@ -75,9 +75,10 @@ TEST(ReportJson, HasTheKeysOfSchema1InOrder) {
                   "heldout"}));
   EXPECT_EQ(KeysOf(stages.At("style_2d")), (Keys{"seconds", "method"}));
   EXPECT_EQ(KeysOf(stages.At("stylize")),
-            (Keys{"seconds", "steps", "k_est", "bound", "slope_observed", "psnr_to_2d_db",
-                  "psnr_to_2d_photos_db", "linear_map_psnr_to_2d_db", "slope_ascent",
-                  "slope_of_map", "slope_along_coefficients", "slope_along_position"}));
+            (Keys{"seconds", "steps", "k_est", "bound", "local_lipschitz_sampled",
+                  "psnr_to_2d_db", "psnr_to_2d_photos_db", "linear_map_psnr_to_2d_db",
+                  "local_lipschitz_max", "local_lipschitz_of_map",
+                  "local_lipschitz_along_coefficients", "local_lipschitz_along_position"}));
   EXPECT_EQ(KeysOf(stages.At("render")), (Keys{"seconds", "frames", "frames_per_second"}));
   EXPECT_EQ(KeysOf(stages.At("evaluate")), (Keys{"seconds", "flow", "mask"}));
   EXPECT_EQ(KeysOf(json.At("consistency").AsArray()[0]),
@@ -88,11 +89,11 @@ TEST(ReportJson, HasTheKeysOfSchema1InOrder) {
                   "sliced_wasserstein_to_style"}));
 }
 
-TEST(ReportJson, UndefinedFiguresAreNullWithAWhy) {
+TEST(ReportJson, UndefinedMetricsAreNullWithAWhy) {
   RunReport report = FullReport();
-  report.stages.reconstruct->psnr_heldout_db = Figure::Undefined("holdout is 0");
+  report.stages.reconstruct->psnr_heldout_db = Metric::Undefined("holdout is 0");
   report.consistency[0].tc_psnr_mean_db = std::numeric_limits<double>::quiet_NaN();
-  report.consistency[0].tc_psnr_pairs_db = {30.0, Figure(), 31.0};
+  report.consistency[0].tc_psnr_pairs_db = {30.0, Metric(), 31.0};
   const JsonValue json = ReportJson(report);
   const JsonValue& stage = json.At("stages").At("reconstruct");
   EXPECT_TRUE(stage.At("psnr_heldout_db").IsNull());
@@ -109,7 +110,7 @@ TEST(ReportJson, SurvivesATripThroughText) {
   const std::string text = DumpJson(ReportJson(FullReport()));
   const JsonValue back = ParseJson(text, "report.json");
   EXPECT_EQ(DumpJson(back), text);  // also with a file name that is not UTF-8
-  EXPECT_TRUE(back.At("photos").At("verdicts").AsArray()[0].At("why").IsNull());
+  EXPECT_TRUE(back.At("photos").At("statuses").AsArray()[0].At("why").IsNull());
 }
 
 TEST(ReportJson, StagesThatDidNotRunAreAbsent) {

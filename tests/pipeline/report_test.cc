@@ -22,11 +22,11 @@ RunReport SomeReport() {
       PhotosReport{3, 2, 2, {{"a.jpg", "used", ""}, {"b.jpg", "skipped", "cut at 20 kB"}}};
   report.effects = {{"ndc", false, "corner rays spread too far", 0.41, 0.9}};
   report.stages.reconstruct = ReconstructReport{
-      60, 1000, 28.25, Figure::Undefined("holdout is 0"), Figure::Undefined("holdout is 0"),
+      60, 1000, 28.25, Metric::Undefined("holdout is 0"), Metric::Undefined("holdout is 0"),
       {}};
-  report.consistency = {{"styled", 1, 3, 1, 29.79, 29.5, 0.8, {30.0, Figure(), 29.5}}};
+  report.consistency = {{"styled", 1, 3, 1, 29.79, 29.5, 0.8, {30.0, Metric(), 29.5}}};
   report.fidelity = {{"styled", 24.5, 0.19, 0.2, 12, 13, 0.01}};
-  report.prices = {{"fit", "fit-steps", "5", "PSNR", "dB", 1, 1, 2, 3, 4, 5, 6, 7, true, ""}};
+  report.costs = {{"fit", "fit-steps", "5", "PSNR", "dB", 1, 1, 2, 3, 4, 5, 6, 7, true, ""}};
   return report;
 }
 
@@ -93,13 +93,13 @@ TEST(ReportHtml, HostileNamesStayText) {
   const std::string harmless = ReportHtml(report, pictures);
   report.version = report.preset = report.device = evil;
   report.command = {evil};
-  report.photos->verdicts = {{evil, "used", ""}, {evil, evil, evil}};
+  report.photos->statuses = {{evil, "used", ""}, {evil, evil, evil}};
   report.effects[0].name = report.effects[0].evidence = evil;
-  report.stages.reconstruct->psnr_heldout_db = Figure::Undefined(evil);
+  report.stages.reconstruct->psnr_heldout_db = Metric::Undefined(evil);
   report.stages.style_2d = Style2dReport{1, evil};
   report.stages.evaluate = EvaluateReport{1, evil, evil};
   report.consistency[0].sequence = report.fidelity[0].sequence = evil;
-  report.prices = {{"fit", evil, evil, evil, evil, 1, 1, 2, 3, 4, 5, 6, 7, true, evil}};
+  report.costs = {{"fit", evil, evil, evil, evil, 1, 1, 2, 3, 4, 5, 6, 7, true, evil}};
   report.options = {{evil, evil}};
   report.versions = {{evil, evil}};
   pictures.title = pictures.views[0].name = pictures.run_json = evil;
@@ -128,7 +128,7 @@ TEST(ReportHtml, FetchesNothing) {
                                  // poster, a thumbnail
 }
 
-TEST(ReportHtml, UndefinedFiguresSayWhy) {
+TEST(ReportHtml, UndefinedMetricsSayWhy) {
   const std::string page = ReportHtml(SomeReport(), SomePictures());
   EXPECT_NE(page.find("title=\"holdout is 0\""), std::string::npos);
   EXPECT_EQ(page.find("nan"), std::string::npos);
@@ -156,7 +156,7 @@ TEST(ReportHtml, TheBoundIsDrawnOverTheSteps) {
   EXPECT_NE(html.find("Lipschitz bound over steps"), std::string::npos);
   EXPECT_NE(html.find("K_est"), std::string::npos);
   EXPECT_EQ(html.find("nan"), std::string::npos);
-  report.stages.stylize->variance = VarianceFigures{{{"inside", 40, 3, 1.2, 0.01}}, 0.7};
+  report.stages.stylize->variance = VarianceMetrics{{{"inside", 40, 3, 1.2, 0.01}}, 0.7};
   EXPECT_NE(ReportHtml(report, {}).find("3 of 40 pairs"), std::string::npos);
 }
 
@@ -173,7 +173,7 @@ TEST(ReportHtml, TheFitIsDrawnOverTheSteps) {
 
 TEST(ReportHtml, AnEffectThatWasNotMeasuredSaysSo) {
   RunReport report = SomeReport();
-  report.effects = {{"exposure", false, "it was not wanted", Figure(), 0.1}};
+  report.effects = {{"exposure", false, "it was not wanted", Metric(), 0.1}};
   const std::string html = ReportHtml(report, {});
   EXPECT_NE(html.find("<td class=\"n soft\">not measured</td>"), std::string::npos);
 }
@@ -200,10 +200,10 @@ TEST(ReportHtml, AnEmptyReportIsAPage) {
   EXPECT_NE(page.find("</html>"), std::string::npos);
 }
 
-TEST(Figure, H111_NotFiniteIsUndefined) {
-  EXPECT_FALSE(Figure(std::numeric_limits<double>::quiet_NaN()).value.has_value());
-  EXPECT_FALSE(Figure(std::numeric_limits<double>::infinity()).value.has_value());
-  EXPECT_TRUE(Figure(0.0).value.has_value());
+TEST(Metric, H111_NotFiniteIsUndefined) {
+  EXPECT_FALSE(Metric(std::numeric_limits<double>::quiet_NaN()).value.has_value());
+  EXPECT_FALSE(Metric(std::numeric_limits<double>::infinity()).value.has_value());
+  EXPECT_TRUE(Metric(0.0).value.has_value());
 }
 
 }  // namespace

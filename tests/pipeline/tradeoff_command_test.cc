@@ -30,12 +30,12 @@ TEST(TradeoffCommand, MeasuresGoesOnAndPredicts) {
   const std::string style = std::string(REGRADE_SOURCE_DIR) + "/assets/style_sunset.png";
   ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}).code, 0);
   const auto tradeoff = [&](const std::vector<std::string>& more) {
-    std::vector<std::string> words{"tradeoff",  folder / "s/truth",
-                                   "--style",   style,
-                                   "--out",     folder / "t",
-                                   "--knobs",   "fit-steps,style-min-weight,flow,ray-stop",
-                                   "--presets", "none",
-                                   "--effects", "view-dependence=off,exposure=off"};
+    std::vector<std::string> words{"tradeoff",     folder / "s/truth",
+                                   "--style",      style,
+                                   "--out",        folder / "t",
+                                   "--parameters", "fit-steps,style-min-weight,flow,ray-stop",
+                                   "--presets",    "none",
+                                   "--effects",    "view-dependence=off,exposure=off"};
     for (const std::string& flag : testing::TinyFlags()) words.push_back(flag);
     words.insert(words.end(), more.begin(), more.end());
     return Regrade(words);
@@ -56,15 +56,15 @@ TEST(TradeoffCommand, MeasuresGoesOnAndPredicts) {
   ASSERT_EQ(outcome.code, 0) << outcome.text;
   const JsonValue list = ReadJsonFile(folder / "t/tradeoff.json");
   // Four bases, three values of the steps, two weights, four flows and three ends of a ray.
-  EXPECT_EQ(list.At("prices").AsArray().size(), 4u + 3 + 2 + 4 + 3);
+  EXPECT_EQ(list.At("costs").AsArray().size(), 4u + 3 + 2 + 4 + 3);
   EXPECT_EQ(Count(outcome.text, "] "), 16 - left);  // what was measured is not measured again
-  int on_front = 0;
-  for (const JsonValue& row : list.At("prices").AsArray()) {
+  int on_pareto_front = 0;
+  for (const JsonValue& row : list.At("costs").AsArray()) {
     EXPECT_TRUE(row.At("accuracy").IsNumber()) << DumpJson(row, -1);
     EXPECT_GT(row.At("cpu_seconds").AsDouble(), 0);
-    on_front += row.At("on_front").AsBool();
+    on_pareto_front += row.At("on_pareto_front").AsBool();
   }
-  EXPECT_GE(on_front, 4);  // each plane has at least its best
+  EXPECT_GE(on_pareto_front, 4);  // each plane has at least its best
   EXPECT_EQ(Count(testing::ReadText(folder / "t/tradeoff.csv"), "\n"), 17u);
   EXPECT_NE(testing::ReadText(folder / "t/tradeoff.html").find("accuracy over time, flow"),
             std::string::npos);
@@ -74,7 +74,7 @@ TEST(TradeoffCommand, MeasuresGoesOnAndPredicts) {
 
   // The base is a run like any other, and is predicted from the prices.
   outcome = Regrade(
-      {"tradeoff", "--predict", folder / "t/base", "--prices", folder / "t/tradeoff.json"});
+      {"tradeoff", "--predict", folder / "t/base", "--costs", folder / "t/tradeoff.json"});
   ASSERT_EQ(outcome.code, 0) << outcome.text;
   for (const char* stage : {"reconstruct", "stylize", "render", "evaluate", "all"})
     EXPECT_NE(outcome.text.find(std::string("\n") + stage), std::string::npos)
@@ -97,7 +97,8 @@ TEST(TradeoffCommand, SaysWhatWillNotDo) {
   const TemporaryFolder folder;
   std::filesystem::create_directories(folder / "photos");
   EXPECT_EQ(
-      Regrade({"tradeoff", folder / "photos", "--out", folder / "t", "--knobs", "stepz"}).code,
+      Regrade({"tradeoff", folder / "photos", "--out", folder / "t", "--parameters", "stepz"})
+          .code,
       2);
   EXPECT_EQ(
       Regrade({"tradeoff", folder / "photos", "--out", folder / "t", "--presets", "best,x"})
@@ -107,7 +108,7 @@ TEST(TradeoffCommand, SaysWhatWillNotDo) {
   EXPECT_EQ(Regrade({"tradeoff", "--predict", folder / "photos"}).code, 2);
   testing::WriteText(folder / "prices.json", "{}");
   EXPECT_EQ(
-      Regrade({"tradeoff", "--predict", folder / "photos", "--prices", folder / "prices.json"})
+      Regrade({"tradeoff", "--predict", folder / "photos", "--costs", folder / "prices.json"})
           .code,
       3);
   EXPECT_FALSE(std::filesystem::exists(folder / "t"));

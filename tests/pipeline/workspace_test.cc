@@ -63,7 +63,7 @@ TEST(Workspace, FinishedStagesAreKnownAgain) {
   }
   Workspace workspace(folder / "out");
   EXPECT_EQ(workspace.Status("pose", Inputs(1)).state, StageState::kDone);
-  EXPECT_EQ(workspace.Find("pose")->figures.At("points").AsInt(), 7);
+  EXPECT_EQ(workspace.Find("pose")->metrics.At("points").AsInt(), 7);
   EXPECT_EQ(workspace.FinishedStages(), std::vector<std::string>{"pose"});
   workspace.Forget("pose");
   EXPECT_EQ(workspace.Status("pose", Inputs(1)).state, StageState::kNeverDone);
@@ -154,7 +154,7 @@ TEST(Workspace, RecordsCannotLeadOutOfTheFolder) {
                           {"outputs", JsonValue::Array{JsonValue::Object{
                                           {"path", path}, {"bytes", 1}, {"hash", "0"}}}},
                           {"seconds", 1},
-                          {"figures", JsonValue::Object()}});
+                          {"metrics", JsonValue::Object()}});
     EXPECT_REGRADE_ERROR(workspace.Find("pose"), ExitCode::kInput, "leads out");
   }
 }

@@ -56,9 +56,9 @@ const Case kFourteen[] = {
        m->Write();
      },
      ""},
-    {"2^60 cameras", [](ModelFolder* m) { m->Patch("cameras.bin", 0, kHuge); }, "promises"},
-    {"2^60 images", [](ModelFolder* m) { m->Patch("images.bin", 0, kHuge); }, "promises"},
-    {"2^60 points", [](ModelFolder* m) { m->Patch("points3D.bin", 0, kHuge); }, "promises"},
+    {"2^60 cameras", [](ModelFolder* m) { m->Patch("cameras.bin", 0, kHuge); }, "guarantees"},
+    {"2^60 images", [](ModelFolder* m) { m->Patch("images.bin", 0, kHuge); }, "guarantees"},
+    {"2^60 points", [](ModelFolder* m) { m->Patch("points3D.bin", 0, kHuge); }, "guarantees"},
     {"2^59 keypoints in an image",
      [](ModelFolder* m) { m->Patch("images.bin", kName + 10, kHuge / 2); }, "keypoints"},
     {"the end inside of an image's name",

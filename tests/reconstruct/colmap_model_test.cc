@@ -142,7 +142,7 @@ TEST_F(ColmapModelFile, F58_HugeCountsTakeNoMemory) {
     for (const uint64_t count : {uint64_t{1} << 60, ~uint64_t{0}, uint64_t{1000}}) {
       const std::string whole = Bytes(name);
       Patch(name, 0, count);
-      ExpectRefusal("promises");
+      ExpectRefusal("guarantees");
       SetBytes(name, whole);
     }
 }
@@ -320,8 +320,8 @@ TEST_F(ColmapModelFile, F61_NamesAreKeysOnly) {
   const Capture capture = CaptureFromModel(read, PhotosOf(model_));
   ASSERT_EQ(capture.views.size(), 1u);  // only 00002.png has a photo of its name
   EXPECT_EQ(capture.views[0].path, "/photos/00002.png");
-  EXPECT_EQ(capture.verdicts[0].verdict, "unregistered");
-  EXPECT_EQ(capture.verdicts.back().verdict, "skipped");
+  EXPECT_EQ(capture.statuses[0].status, "unregistered");
+  EXPECT_EQ(capture.statuses.back().status, "skipped");
 }
 
 TEST(CaptureFromModel, ViewsPointsAndErrors) {
@@ -332,8 +332,8 @@ TEST(CaptureFromModel, ViewsPointsAndErrors) {
   ASSERT_EQ(capture.views.size(), 4u);
   EXPECT_EQ(capture.views[2].name, "00002.png");
   EXPECT_EQ(capture.views[2].file, "IMG 2.jpg");
-  EXPECT_EQ(capture.verdicts[4].file, "IMG 4.jpg");
-  EXPECT_EQ(capture.verdicts[4].verdict, "unregistered");
+  EXPECT_EQ(capture.statuses[4].file, "IMG 4.jpg");
+  EXPECT_EQ(capture.statuses[4].status, "unregistered");
   ASSERT_EQ(capture.points.size(), 20u);
   EXPECT_EQ(capture.points[5].views, (std::vector<int32_t>{0, 1, 2, 3}));
   // The stored errors say -1; ours are the mean over observations.

@@ -143,7 +143,7 @@ TEST(Exposure, GroupsThatShareNothingHaveAMeanEach) {
 }
 
 // Places that lie together err together: a part of the scene has an error of its own in each
-// photo, as a point beside its true place or a sheen has. Errors that took each sighting for
+// photo, as a point beside its true place or a sheen has. Errors that took each observation for
 // independent would be sqrt(25 points of a part a photo) times too small.
 TEST(Exposure, StandardErrorsHoldWhereNeighboursErrAlike) {
   const std::vector<Vec3d> truth = PlantedLogs(0.4);

@@ -133,7 +133,7 @@ TEST_F(FitField, H109_H110_AResumedFitIsTheUndisturbedOne) {
     FitHooks hooks;
     hooks.checkpoint = [&](const FitState& state) { saved = state; };
     hooks.progress = [&](const Progress&) {
-      return ++steps == stop_after ? Verdict::kAbort : Verdict::kContinue;
+      return ++steps == stop_after ? LoopControl::kStop : LoopControl::kContinue;
     };
     EXPECT_THROW(regrade::FitField(views_, box_, options_, hooks), Interrupted);
     ASSERT_GT(saved.grid.num_voxels(), 0) << "nothing was saved";
@@ -217,7 +217,7 @@ TEST_F(FitSpheres, H109_H110_AResumedFitIsTheUndisturbedOne) {
     FitHooks hooks;
     hooks.checkpoint = [&](const FitState& state) { saved = state; };
     hooks.progress = [&](const Progress&) {
-      return ++steps == stop_after ? Verdict::kAbort : Verdict::kContinue;
+      return ++steps == stop_after ? LoopControl::kStop : LoopControl::kContinue;
     };
     EXPECT_THROW(regrade::FitField(views_, box_, options_, hooks), Interrupted);
     FitHooks go_on;

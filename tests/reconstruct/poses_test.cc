@@ -10,9 +10,9 @@
 #include <fstream>
 
 #include "kernels/base/error.h"
-#include "reconstruct/colmap/colmap_ladder.h"
 #include "reconstruct/colmap/colmap_model.h"
 #include "reconstruct/colmap/colmap_output.h"
+#include "reconstruct/colmap/colmap_strategies.h"
 #include "reconstruct/colmap/poses_from_photos.h"
 #include "reconstruct/colmap/refine_intrinsics.h"
 #include "tests/support/process_state.h"
@@ -46,7 +46,7 @@ class Poses : public ::testing::Test {
     const fs::path link = folder_ / ("colmap-" + behaviour);
     if (!fs::exists(fs::symlink_status(link))) fs::create_symlink(FAKE_COLMAP, link);
     options_.colmap = link;
-    return PosesFromPhotos(Photos(photos), verdicts_, options_, folder_ / "work",
+    return PosesFromPhotos(Photos(photos), statuses_, options_, folder_ / "work",
                            folder_ / "sparse", progress, &report_);
   }
 
@@ -67,11 +67,11 @@ class Poses : public ::testing::Test {
   fs::path folder_;
   PoseOptions options_;
   PoseReport report_;
-  std::vector<PhotoVerdict> verdicts_;
+  std::vector<PhotoStatus> statuses_;
 };
 
-TEST_F(Poses, GoodCaptureComesWithModelAndVerdicts) {
-  verdicts_ = {{"IMG 0.jpg", "used", ""}, {"notes.txt", "skipped", "not a picture"}};
+TEST_F(Poses, GoodCaptureComesWithModelAndStatuses) {
+  statuses_ = {{"IMG 0.jpg", "used", ""}, {"notes.txt", "skipped", "not a picture"}};
   const Capture capture = Run("good");
   EXPECT_EQ(capture.views.size(), 10u);
   EXPECT_EQ(capture.points.size(), 60u);
@@ -79,9 +79,9 @@ TEST_F(Poses, GoodCaptureComesWithModelAndVerdicts) {
   EXPECT_LT(capture.reprojection_px, 1e-6);
   EXPECT_EQ(report_.colmap_version, "3.8");
   EXPECT_EQ(report_.recipe, "quick");
-  EXPECT_EQ(report_.rungs_tried, 1);
-  ASSERT_EQ(capture.verdicts.size(), 11u);
-  EXPECT_EQ(capture.verdicts[1].why, "not a picture");
+  EXPECT_EQ(report_.attempts_made, 1);
+  ASSERT_EQ(capture.statuses.size(), 11u);
+  EXPECT_EQ(capture.statuses[1].why, "not a picture");
   EXPECT_EQ(ReadColmapModel((folder_ / "sparse").string()).images.size(), 10u);
 }
 
@@ -93,16 +93,17 @@ TEST_F(Poses, ProgressGrowsToItsTotal) {
     EXPECT_FALSE(p.note.empty());
     last = p.done;
     most = std::max(most, p.done / p.total);
-    return Verdict::kContinue;
+    return LoopControl::kContinue;
   });
 }
 
 TEST_F(Poses, AbortEndsTheChild) {
   int asked = 0;
-  EXPECT_THROW(
-      Run("hang", 10,
-          [&](const Progress&) { return ++asked > 2 ? Verdict::kAbort : Verdict::kContinue; }),
-      Interrupted);
+  EXPECT_THROW(Run("hang", 10,
+                   [&](const Progress&) {
+                     return ++asked > 2 ? LoopControl::kStop : LoopControl::kContinue;
+                   }),
+               Interrupted);
 }
 
 TEST_F(Poses, F46_MissingProgram) {
@@ -233,7 +234,7 @@ TEST_F(Poses, H125_TooFewPhotos) {
 TEST_F(Poses, H127_CameraOnlyTurned) {
   ExpectError("turned", ExitCode::kScene, {"nearly one place", "step sideways"});
   ExpectError("nomodel", ExitCode::kScene, {"only turned", "step sideways"});
-  EXPECT_GT(report_.rungs_tried, 1);
+  EXPECT_GT(report_.attempts_made, 1);
 }
 
 TEST_F(Poses, H127_NothingMatches) {
@@ -244,7 +245,7 @@ TEST_F(Poses, H127_NothingMatches) {
 TEST_F(Poses, H128_PlanarSceneIsNoted) {
   Run("planar");
   ASSERT_EQ(report_.notes.size(), 1u);
-  EXPECT_NE(report_.notes[0].find("plane"), std::string::npos);
+  EXPECT_NE(report_.notes[0].find("benchmark"), std::string::npos);
 }
 
 TEST_F(Poses, H132_TheLargestModelWinsAndTheOthersAreTold) {
@@ -252,8 +253,8 @@ TEST_F(Poses, H132_TheLargestModelWinsAndTheOthersAreTold) {
   EXPECT_EQ(capture.views.size(), 9u);
   EXPECT_EQ(capture.models_found, 2);
   EXPECT_EQ(capture.views[0].name, "00004.png");
-  EXPECT_EQ(capture.verdicts[0].verdict, "unregistered");
-  EXPECT_NE(capture.verdicts[0].why.find("another group of 4 photos"), std::string::npos);
+  EXPECT_EQ(capture.statuses[0].status, "unregistered");
+  EXPECT_NE(capture.statuses[0].why.find("another group of 4 photos"), std::string::npos);
   ASSERT_FALSE(report_.notes.empty());
   EXPECT_NE(report_.notes.back().find("2 groups"), std::string::npos);
 }
@@ -264,7 +265,7 @@ TEST_F(Poses, H133_FewRegisteredAreRefusedByName) {
   options_.min_registered = 0.3;
   const Capture capture = Run("few");
   EXPECT_EQ(capture.views.size(), 4u);
-  EXPECT_EQ(capture.verdicts[9].verdict, "unregistered");
+  EXPECT_EQ(capture.statuses[9].status, "unregistered");
 }
 
 TEST_F(Poses, H134_PixelsThatAreNotSquare) {
@@ -277,34 +278,34 @@ TEST_F(Poses, H134_APrincipalPointThatRunsOffStaysInTheCentre) {
   EXPECT_NE(report_.lens.find("in the centre"), std::string::npos);
 }
 
-TEST_F(Poses, TheLadderIsClimbedUntilARungHolds) {
-  EXPECT_EQ(Run("ladder").views.size(), 10u);
+TEST_F(Poses, StrategiesAreTriedUntilOneSucceeds) {
+  EXPECT_EQ(Run("strategies").views.size(), 10u);
   EXPECT_EQ(report_.recipe, "more features");
-  EXPECT_EQ(report_.rungs_tried, 2);
+  EXPECT_EQ(report_.attempts_made, 2);
 }
 
-TEST_F(Poses, ARungThatWouldFindTheSameFeaturesAgainIsLeftOut) {
+TEST_F(Poses, AnAttemptThatWouldFindTheSameFeaturesAgainIsLeftOut) {
   EXPECT_THROW(Run("nomodel"), Error);
-  EXPECT_EQ(report_.rungs_tried, 3);  // all but "more features": there are no more
+  EXPECT_EQ(report_.attempts_made, 3);  // all but "more features": there are no more
   EXPECT_THROW(Run("nomatches"), Error);
-  EXPECT_EQ(report_.rungs_tried, 4);  // one more: without a match nothing further helps
+  EXPECT_EQ(report_.attempts_made, 4);  // one more: without a match nothing further helps
 }
 
-TEST(PoseLadder, CostGrowsUpwards) {
+TEST(PoseStrategies, CostGrowsUpwards) {
   std::vector<StagedPhoto> photos(50);
   for (StagedPhoto& photo : photos) photo.width = 1920, photo.height = 1080;
-  const std::vector<PoseRecipe> ladder = PoseLadder(photos, 30);
-  EXPECT_FALSE(ladder[0].all_pairs);
-  EXPECT_EQ(ladder[0].first_octave, 0);
-  EXPECT_GT(ladder[1].max_features, ladder[0].max_features);
-  EXPECT_TRUE(ladder[2].keep_matches);
-  EXPECT_TRUE(ladder.back().all_pairs);
+  const std::vector<PoseRecipe> strategies = PoseStrategies(photos, 30);
+  EXPECT_FALSE(strategies[0].all_pairs);
+  EXPECT_EQ(strategies[0].first_octave, 0);
+  EXPECT_GT(strategies[1].max_features, strategies[0].max_features);
+  EXPECT_TRUE(strategies[2].keep_matches);
+  EXPECT_TRUE(strategies.back().all_pairs);
   photos.resize(11);
-  EXPECT_TRUE(PoseLadder(photos, 30)[0].all_pairs);
-  EXPECT_EQ(PoseLadder(photos, 30)[0].lens, ColmapLens::kSimpleRadial);
+  EXPECT_TRUE(PoseStrategies(photos, 30)[0].all_pairs);
+  EXPECT_EQ(PoseStrategies(photos, 30)[0].lens, ColmapLens::kSimpleRadial);
 }
 
-TEST(PoseLadder, H148_MixedSizesAndFocalLengthsHaveTheirOwnCameras) {
+TEST(PoseStrategies, H148_MixedSizesAndFocalLengthsHaveTheirOwnCameras) {
   std::vector<StagedPhoto> photos = {{"a", "0", "", 640, 480, 0},
                                      {"b", "1", "", 480, 640, 0},
                                      {"c", "2", "", 640, 480, 0},

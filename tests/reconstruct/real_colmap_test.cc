@@ -28,7 +28,7 @@ TEST(RealColmap, Kermit) {
   const IngestResult ingest =
       IngestPhotos(testing::DataPath("kermit"), folder / "photos", {}, {});
   PoseReport report;
-  const Capture capture = PosesFromPhotos(ingest.photos, ingest.verdicts, {}, folder / "work",
+  const Capture capture = PosesFromPhotos(ingest.photos, ingest.statuses, {}, folder / "work",
                                           folder / "sparse", {}, &report);
   EXPECT_GE(capture.views.size(), 10u);  // of 11
   EXPECT_GT(capture.points.size(), 200u);

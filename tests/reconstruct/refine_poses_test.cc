@@ -22,7 +22,7 @@ double Normal(uint64_t stream, uint64_t counter) {
 }
 
 // Sixteen photos of 400 points, each keypoint off by half a pixel each way; where asked for,
-// one sighting in twenty shows another point.
+// one observation in twenty shows another point.
 ColmapModel Tracks(bool outliers = false, ColmapLens lens = ColmapLens::kOpenCv) {
   ColmapModel model = MakeSyntheticModel(
       {.images = 16, .points = 400, .arc_deg = 90, .thickness = 2, .lens = lens});
@@ -120,8 +120,8 @@ Distance DistanceOf(const ColmapModel& model, const ColmapModel& truth) {
   return largest;
 }
 
-// A camera of 600 px sees 0.3 degrees as 3 px; half a pixel in 400 sightings leaves a tenth of
-// that. The largest error of sixteen is held to three times the standard error that is
+// A camera of 600 px sees 0.3 degrees as 3 px; half a pixel in 400 observations leaves a tenth
+// of that. The largest error of sixteen is held to three times the standard error that is
 // reported, and the latter to what there was to find.
 TEST(RefinePoses, FindsThePosesThatTheTracksWereMadeOf) {
   for (const bool outliers : {false, true}) {
@@ -183,7 +183,7 @@ TEST(RefinePoses, PosesThatFitAreLeftAloneBitForBit) {
               truth.images[v].camera_from_world.translation);
 }
 
-// Tracks that are wrong all over speak against any poses, and no refinement brings sightings
+// Tracks that are wrong all over speak against any poses, and no refinement brings observations
 // nearer that it did not see.
 TEST(RefinePoses, WhatDoesNotHelpOthersIsRefused) {
   ColmapModel model = Tracks();

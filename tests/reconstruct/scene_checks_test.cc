@@ -36,26 +36,27 @@ TEST(SceneChecks, TriangulationAngleOfAnExactCase) {
   capture.points[0].views = {1, 2};
   EXPECT_NEAR(MedianTriangulationAngle(capture), M_PI / 4 - std::atan(0.5), 1e-12);
   EXPECT_EQ(MedianTriangulationAngle({}), 0);
-  EXPECT_NEAR(CameraSpread(capture), 2, 1e-12);
+  EXPECT_NEAR(CameraExtent(capture), 2, 1e-12);
 }
 
 TEST(SceneChecks, GoodCaptureIsAccepted) {
-  const SceneJudgement judgement = JudgeScene(CaptureOf({}));
-  EXPECT_EQ(judgement.refusal, "");
-  EXPECT_TRUE(judgement.notes.empty());
+  const SceneAssessment assessment = AssessScene(CaptureOf({}));
+  EXPECT_EQ(assessment.refusal, "");
+  EXPECT_TRUE(assessment.notes.empty());
 }
 
 TEST(SceneChecks, H127_CameraThatOnlyTurnsIsTold) {
-  const SceneJudgement judgement = JudgeScene(CaptureOf({.arc_deg = 0.4}));
-  EXPECT_NE(judgement.refusal.find("nearly one place"), std::string::npos) << judgement.refusal;
-  EXPECT_NE(judgement.remedy.find("sideways"), std::string::npos);
+  const SceneAssessment assessment = AssessScene(CaptureOf({.arc_deg = 0.4}));
+  EXPECT_NE(assessment.refusal.find("nearly one place"), std::string::npos)
+      << assessment.refusal;
+  EXPECT_NE(assessment.remedy.find("sideways"), std::string::npos);
 }
 
 TEST(SceneChecks, H128_PlaneIsANoteNotARefusal) {
-  const SceneJudgement judgement = JudgeScene(CaptureOf({.thickness = 0.001}));
-  EXPECT_EQ(judgement.refusal, "");
-  ASSERT_EQ(judgement.notes.size(), 1u);
-  EXPECT_NE(judgement.notes[0].find("plane"), std::string::npos);
+  const SceneAssessment assessment = AssessScene(CaptureOf({.thickness = 0.001}));
+  EXPECT_EQ(assessment.refusal, "");
+  ASSERT_EQ(assessment.notes.size(), 1u);
+  EXPECT_NE(assessment.notes[0].find("benchmark"), std::string::npos);
 }
 
 TEST(SceneChecks, H128_OneOutlierDoesNotHideThePlane) {
@@ -68,19 +69,19 @@ TEST(SceneChecks, H134_PixelsThatAreNotSquareAreRefused) {
   SyntheticModelOptions options{.lens = ColmapLens::kOpenCv};
   options.aspect = 0.7;
   EXPECT_NEAR(WorstPixelAspect(CaptureOf(options)), 0.7, 1e-12);
-  EXPECT_NE(JudgeScene(CaptureOf(options)).refusal.find("not square"), std::string::npos);
+  EXPECT_NE(AssessScene(CaptureOf(options)).refusal.find("not square"), std::string::npos);
   options.aspect = 1.04;
-  EXPECT_EQ(JudgeScene(CaptureOf(options)).refusal, "");
+  EXPECT_EQ(AssessScene(CaptureOf(options)).refusal, "");
 }
 
 TEST(SceneChecks, TooFewViewsAreRefused) {
-  EXPECT_NE(JudgeScene(CaptureOf({.images = 4})).refusal.find("only 4 photos"),
+  EXPECT_NE(AssessScene(CaptureOf({.images = 4})).refusal.find("only 4 photos"),
             std::string::npos);
-  EXPECT_EQ(JudgeScene(CaptureOf({.images = 5})).refusal, "");
+  EXPECT_EQ(AssessScene(CaptureOf({.images = 5})).refusal, "");
 }
 
 TEST(SceneChecks, EmptyCaptureIsRefusedWithoutDividingByZero) {
-  EXPECT_NE(JudgeScene({}).refusal, "");
+  EXPECT_NE(AssessScene({}).refusal, "");
   EXPECT_EQ(PointExtents({}), Vec3d{});
   EXPECT_EQ(WorstPixelAspect({}), 1);
 }
@@ -96,7 +97,7 @@ TEST(SceneChecks, H140_ScaleDoesNotMatter) {
     EXPECT_NEAR(MedianTriangulationAngle(capture), angle,
                 testing::RecordBound("the angle in other units", testing::Computed::kDouble,
                                      MedianTriangulationAngle(capture) - angle, 1e-9));
-    EXPECT_EQ(JudgeScene(capture).refusal, "");
+    EXPECT_EQ(AssessScene(capture).refusal, "");
   }
 }
 

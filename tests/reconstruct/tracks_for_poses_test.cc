@@ -58,10 +58,10 @@ TEST_F(Tracks, PointsUnderOurNumbersAndPosesToTheBit) {
   posed.images.back().name = "elsewhere.png";
   const FoundTracks found = Find("good", posed);
   EXPECT_EQ(found.model.points.size(), 60u);
-  EXPECT_EQ(found.sightings, 480);
+  EXPECT_EQ(found.observations, 480);
   EXPECT_EQ(found.pairs, 28);
   EXPECT_EQ(found.colmap_version, "3.8");
-  // A sighting under another image's number would lie elsewhere.
+  // A observation under another image's number would lie elsewhere.
   EXPECT_LT(found.median_px, 1e-9);
   ASSERT_EQ(found.model.images.size(), posed.images.size());
   for (size_t i = 0; i < posed.images.size(); ++i) {
@@ -102,7 +102,7 @@ TEST_F(Tracks, AbortEndsTheChild) {
   EXPECT_THROW(Find("hang", Posed(),
                     [&](const Progress& p) {
                       EXPECT_LE(p.done, p.total);
-                      return ++asked > 4 ? Verdict::kAbort : Verdict::kContinue;
+                      return ++asked > 4 ? LoopControl::kStop : LoopControl::kContinue;
                     }),
                Interrupted);
 }

@@ -11,14 +11,14 @@ namespace {
 
 // A ball of radius 0.5 round (1, 0, 0), seen from a circle; pictures show little more than the
 // ball.
-std::vector<Outline> BallOutlines(double empty_angle) {
-  std::vector<Outline> outlines;
+std::vector<Silhouette> BallSilhouettes(double empty_angle) {
+  std::vector<Silhouette> silhouettes;
   for (int i = 0; i < 12; ++i) {
     const double angle = 2 * M_PI * i / 12;
     const Vec3d ball{1, 0, 0};
     const Vec3d center = ball + Vec3d{4 * std::cos(angle), 4 * std::sin(angle), i % 3 - 1.0};
-    Outline outline;
-    Camera& camera = outline.camera;
+    Silhouette silhouette;
+    Camera& camera = silhouette.camera;
     camera.width = camera.height = 200;
     camera.fx = camera.fy = 500;
     camera.cx = camera.cy = 100;
@@ -28,16 +28,16 @@ std::vector<Outline> BallOutlines(double empty_angle) {
     camera.camera_from_world.rotation.row[1] = Cross(forward, right);
     camera.camera_from_world.rotation.row[2] = forward;
     camera.camera_from_world.translation = -(camera.camera_from_world.rotation * center);
-    outline.alpha = Image(200, 200, 1);
+    silhouette.alpha = Image(200, 200, 1);
     for (int y = 0; y < 200; ++y)
       for (int x = 0; x < 200; ++x) {
         const RayT<double> ray = camera.WorldRay(x + 0.5, y + 0.5);
         const Vec3d off = Cross(ball - ray.origin, ray.direction);
-        *outline.alpha.at(x, y) = Norm(off) < 0.5 && angle >= empty_angle ? 1.0f : 0.0f;
+        *silhouette.alpha.at(x, y) = Norm(off) < 0.5 && angle >= empty_angle ? 1.0f : 0.0f;
       }
-    outlines.push_back(std::move(outline));
+    silhouettes.push_back(std::move(silhouette));
   }
-  return outlines;
+  return silhouettes;
 }
 
 NormalizedScene CubeRoundTheCameras() {
@@ -50,10 +50,10 @@ NormalizedScene CubeRoundTheCameras() {
 }
 
 TEST(VisualHull, BoxIsTheObjects) {
-  const NormalizedScene tight = TightenToOutlines(CubeRoundTheCameras(), BallOutlines(0));
+  const NormalizedScene tight = TightenToSilhouettes(CubeRoundTheCameras(), BallSilhouettes(0));
   const double half = 1 / tight.field_from_world.scale;  // world units
   EXPECT_GE(half, 0.5);
-  // Widened by up to two blocks of pixels (0.13), and a vertex of the grid (0.126) on top of
+  // PadShBasis by up to two blocks of pixels (0.13), and a vertex of the grid (0.126) on top of
   // its rounding.
   EXPECT_LE(half, 0.5 + 0.13 + 2 * 12.0 / 95);
   const Vec3d middle = tight.field_from_world * Vec3d{1, 0, 0};
@@ -62,9 +62,9 @@ TEST(VisualHull, BoxIsTheObjects) {
               1e-5);  // the same length
 }
 
-TEST(VisualHull, OutlinesThatDisagreeLeaveTheBox) {
+TEST(VisualHull, SilhouettesThatDisagreeLeaveTheBox) {
   const NormalizedScene scene = CubeRoundTheCameras();
-  const NormalizedScene same = TightenToOutlines(scene, BallOutlines(4));
+  const NormalizedScene same = TightenToSilhouettes(scene, BallSilhouettes(4));
   EXPECT_EQ(same.field_from_world.scale, scene.field_from_world.scale);
 }
 

@@ -306,9 +306,9 @@ TEST(ApplyNetwork, EveryVoxelAsThePlainNetwork) {
 }
 
 TEST(ApplyNetwork, AbortIsHeeded) {
-  EXPECT_THROW(
-      ApplyNetwork(RandomNetwork(97), Ball(8), [](const Progress&) { return Verdict::kAbort; }),
-      Interrupted);
+  EXPECT_THROW(ApplyNetwork(RandomNetwork(97), Ball(8),
+                            [](const Progress&) { return LoopControl::kStop; }),
+               Interrupted);
 }
 
 }  // namespace

@@ -109,8 +109,8 @@ TEST(LipschitzNetwork, BaseMapCountsWithItsNorm) {
   const LipschitzNetwork network = NetworkOfMap(SomeMap());
   EXPECT_EQ(network.ResidualBound(), 0);
   EXPECT_NEAR(network.Bound(), SpectralNorm(SomeMap().matrix), 1e-12);
-  const ObservedSlopes slopes =
-      ObserveSlopes(network, Ball(12), {.pairs = 2000, .jacobians = 5});
+  const LocalLipschitz slopes =
+      MeasureLocalLipschitz(network, Ball(12), {.pairs = 2000, .jacobians = 5});
   EXPECT_LE(slopes.pairs, network.Bound() * (1 + 1e-12));
   EXPECT_NEAR(
       slopes.jacobians, network.Bound(),
@@ -119,12 +119,12 @@ TEST(LipschitzNetwork, BaseMapCountsWithItsNorm) {
                            1e-4));  // thirty steps of the power iteration
 }
 
-TEST(ObservedSlope, H36_ClimbingStaysBelowTheBound) {
+TEST(LocalLipschitz, H36_ClimbingStaysBelowTheBound) {
   LipschitzNetwork network = RandomNetwork(83);
   network.data().has_base = true;
   network.data().base = SomeMap();
-  const ObservedSlopes slopes =
-      ObserveSlopes(network, Ball(12), {.pairs = 100000, .jacobians = 100});
+  const LocalLipschitz slopes =
+      MeasureLocalLipschitz(network, Ball(12), {.pairs = 100000, .jacobians = 100});
   EXPECT_GT(slopes.pairs, 0);
   EXPECT_GE(slopes.jacobians, 0.5 * slopes.pairs);
   EXPECT_GE(slopes.ascent, slopes.jacobians);
@@ -136,19 +136,20 @@ TEST(ObservedSlope, H36_ClimbingStaysBelowTheBound) {
             network.Bound() * testing::RecordBound("steepest of 100 000 pairs over the bound",
                                                    testing::Computed::kDouble,
                                                    slopes.pairs / network.Bound(), 1));
-  EXPECT_LE(slopes.summit_pair, network.Bound());
+  EXPECT_LE(slopes.steepest_pair, network.Bound());
   // A chord of 1e-3 is shorter than the curve of a sine by its curvature squared.
-  EXPECT_NEAR(slopes.summit_pair / slopes.ascent, 1, 1e-3);
+  EXPECT_NEAR(slopes.steepest_pair / slopes.ascent, 1, 1e-3);
 }
 
-TEST(ObservedSlope, PairsNearerThanTheirDistanceHaveNoSay) {
+TEST(LocalLipschitz, PairsNearerThanTheirDistanceHaveNoSay) {
   const LipschitzNetwork network = RandomNetwork(85);
   RadianceField field = Ball(12);
   for (int64_t i = 0; i < field.appearance.sh.size(); ++i) field.appearance.sh[i] *= 1e-5f;
   // Positions are a twelfth of the box apart, times the network's scale of 1.
-  EXPECT_GT(ObserveSlopes(network, field, {.pairs = 3000, .jacobians = 1}).pairs, 0);
+  EXPECT_GT(MeasureLocalLipschitz(network, field, {.pairs = 3000, .jacobians = 1}).pairs, 0);
   EXPECT_EQ(
-      ObserveSlopes(network, field, {.pairs = 3000, .jacobians = 1, .min_distance = 4}).pairs,
+      MeasureLocalLipschitz(network, field, {.pairs = 3000, .jacobians = 1, .min_distance = 4})
+          .pairs,
       0);
 }
 

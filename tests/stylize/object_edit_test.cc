@@ -4,7 +4,7 @@
 
 #include "kernels/field/cpu/render_view.h"
 #include "stylize/field/blend_fields.h"
-#include "stylize/field/object_shares.h"
+#include "stylize/field/object_weights.h"
 #include "stylize/image/masked_stylizer.h"
 #include "tests/support/styled_ball.h"
 
@@ -22,7 +22,7 @@ struct MaskedBall {
   MaskedBall() {
     std::vector<float> upper(static_cast<size_t>(field.geometry->num_voxels()));
     for (size_t v = 0; v < upper.size(); ++v) upper[v] = Height(static_cast<int64_t>(v)) > 0;
-    const RadianceField truth = ShareField(field, upper);
+    const RadianceField truth = WeightField(field, upper);
     for (const Camera& camera : cameras) {
       const Image color = RenderView(truth, camera, MarchOptions{}).color;
       Image mask(camera.width, camera.height, 1);

@@ -142,7 +142,7 @@ double NormProduct(const DenseNetwork<double>& network) {
   return product;
 }
 
-// Premise and promise of Prop. 2: epsilon / T over the samples, and vrr' of the colours.
+// Premise and guarantee of Prop. 2: epsilon / T over the samples, and vrr' of the colours.
 struct SampleBySample {
   double epsilon = 0, styled = 0;
   SampleBySample(uint64_t seed, int samples, const DenseNetwork<double>& f) {
@@ -189,7 +189,7 @@ TEST(Propositions, Two_AReluNetworkOfSamplesThatAgreeOneByOne) {
         << trial;
     tightest = std::max(tightest, pair.styled / limit);
   }
-  EXPECT_GT(tightest, 0.05);  // norms of layers multiply up; it is no vacuous promise
+  EXPECT_GT(tightest, 0.05);  // norms of layers multiply up; it is no vacuous guarantee
 }
 
 TEST(Propositions, Two_NeedsNetworksWithoutHiddenBias) {
@@ -208,7 +208,7 @@ TEST(Propositions, Two_NeedsNetworksWithoutHiddenBias) {
       color[r] = mapped * first[r] + mapped_black * (1 - first[r]);
     }
     broken += Norm(color[0] - color[1]) > 1e-3;
-    // Without hidden biases the same pair keeps the promise: vrr' = 0.
+    // Without hidden biases the same pair keeps the guarantee: vrr' = 0.
     const DenseNetwork<double> plain = ColorNetwork(40 + 11 * trial);
     for (int r = 0; r < 2; ++r) {
       const Vec3d c = Vec3d{0.1, 0.2, 0.15} / first[r], black{};

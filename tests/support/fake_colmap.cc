@@ -83,7 +83,7 @@ int Extract() {
   for (std::string name; std::getline(list, name); ++i) {
     const int features = Is("plain")          ? 12
                          : Is("few") && i > 3 ? 80 + i
-                         : Is("ladder")
+                         : Is("strategies")
                              ? std::stoi(arguments["SiftExtraction.max_num_features"])
                              : 1500;
     std::printf("Processed file [%d/99]\n  Name:            %s\n  Features:        %d\n", i + 1,
@@ -140,7 +140,7 @@ int Map() {
   const bool too_small =
       static_cast<int>(names.size()) < std::stoi(arguments["Mapper.min_model_size"]);
   if (Is("nomodel") || Is("nomatches") || Is("plain") || too_small ||
-      (Is("ladder") && features != "8192")) {
+      (Is("strategies") && features != "8192")) {
     std::fprintf(stderr, "ERROR: failed to create sparse model\n");
     return 1;
   }

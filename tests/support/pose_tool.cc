@@ -30,14 +30,14 @@ int main(int argc, char** argv) {
         std::to_string(static_cast<int>(20 * p.done / p.total) * 5) + " % " + p.note;
     if (line != last) std::printf("%6.1f s  %s\n", seconds(), line.c_str());
     last = line;
-    return Verdict::kContinue;
+    return LoopControl::kContinue;
   };
   PoseReport report;
   try {
     const IngestResult ingest = IngestPhotos(argv[1], out / "photos", {}, {});
     std::printf("%zu photos after %.1f s, EXIF focal length %.1f px\n", ingest.photos.size(),
                 seconds(), ingest.photos[0].exif_focal_px);
-    const Capture capture = PosesFromPhotos(ingest.photos, ingest.verdicts, options,
+    const Capture capture = PosesFromPhotos(ingest.photos, ingest.statuses, options,
                                             out / "work", out / "sparse", progress, &report);
     const Vec3d extents = PointExtents(capture);
     const Camera& camera = capture.views[0].camera;
@@ -48,17 +48,17 @@ int main(int argc, char** argv) {
         "%.2f px, %.1f s\n",
         capture.views.size(), ingest.photos.size(), capture.points.size(),
         capture.reprojection_px, capture.models_found, report.recipe.c_str(),
-        report.rungs_tried, report.lens.c_str(), MedianTriangulationAngle(capture) * 180 / M_PI,
-        extents.x, extents.y, extents.z, camera.fx, camera.fy, camera.cx, camera.cy,
-        camera.MaxCornerDistortion(), seconds());
-    for (const PhotoVerdict& verdict : capture.verdicts)
-      if (verdict.verdict != "used")
-        std::printf("%s: %s: %s\n", verdict.file.c_str(), verdict.verdict.c_str(),
+        report.attempts_made, report.lens.c_str(),
+        MedianTriangulationAngle(capture) * 180 / M_PI, extents.x, extents.y, extents.z,
+        camera.fx, camera.fy, camera.cx, camera.cy, camera.MaxCornerDistortion(), seconds());
+    for (const PhotoStatus& verdict : capture.statuses)
+      if (verdict.status != "used")
+        std::printf("%s: %s: %s\n", verdict.file.c_str(), verdict.status.c_str(),
                     verdict.why.c_str());
     for (const std::string& note : report.notes) std::printf("note: %s\n", note.c_str());
   } catch (const Error& e) {
-    std::printf("exit %d after %.1f s, %d rungs: %s\n", static_cast<int>(e.code()), seconds(),
-                report.rungs_tried, e.what());
+    std::printf("exit %d after %.1f s, %d attempts: %s\n", static_cast<int>(e.code()),
+                seconds(), report.attempts_made, e.what());
     return static_cast<int>(e.code());
   }
   return 0;

@@ -10,8 +10,8 @@
 
 namespace regrade::testing {
 
-int Spawn(const char* program, const std::vector<std::string>& arguments, int fd,
-                 int signal, const std::string& when) {
+int Spawn(const char* program, const std::vector<std::string>& arguments, int fd, int signal,
+          const std::string& when) {
   const pid_t child = ::fork();
   if (child == 0) {
     ::dup2(fd, STDOUT_FILENO);

@@ -23,14 +23,14 @@ ReportPicture Picture(float red, int width = 320, int height = 240) {
   return {EncodeJpeg(image, 80), width, height};
 }
 
-RunReport EveryFigure(const std::string& evil) {
+RunReport EveryMetric(const std::string& evil) {
   RunReport report;
   report.version = "0.1.0";
   report.command = {"regrade", "run", evil, "--style", evil};
   report.photos = PhotosReport{4, 2, 2, {}};
   for (const char* verdict : {"used", "skipped", "unregistered", "used"})
-    report.photos->verdicts.push_back({evil + verdict, verdict, verdict[0] == 's' ? evil : ""});
-  report.effects = {{"exposure", false, "it was not wanted", Figure(), 0.1},
+    report.photos->statuses.push_back({evil + verdict, verdict, verdict[0] == 's' ? evil : ""});
+  report.effects = {{"exposure", false, "it was not wanted", Metric(), 0.1},
                     {"ndc", true, evil, 12.5, 25}};
   report.stages.reconstruct = ReconstructReport{60, 1000, 28.25, 27.5, 0.8, {evil}};
   report.stages.stylize = StylizeReport{4, 300, 1.5, 1.9, 1.2};
@@ -39,19 +39,19 @@ RunReport EveryFigure(const std::string& evil) {
     report.stages.stylize->bound_at_steps.emplace_back(10 * i, 1.9 + 2 * std::exp(-0.1 * i));
   }
   for (const char* sequence : {"source", "views_2d", "styled", "path_styled"}) {
-    ConsistencyFigures row;
+    ConsistencyMetrics row;
     row.sequence = sequence;
     row.pairs = 20;
     row.tc_psnr_mean_db = 30;
     for (int i = 0; i < 20; ++i)
-      row.tc_psnr_pairs_db.push_back(i == 7 ? Figure() : Figure(30 + std::sin(0.5 * i)));
+      row.tc_psnr_pairs_db.push_back(i == 7 ? Metric() : Metric(30 + std::sin(0.5 * i)));
     report.consistency.push_back(row);
   }
   report.fidelity = {{"styled", 24.5, 0.19, 0.2, 12, 13, 0.01}};
   for (int i = 0; i < 6; ++i)
     report.prices.push_back({"fit", i == 0 ? "" : "fit-steps", evil, "held-out PSNR", "dB", 3,
                              12.0 + i, 0.5, 20.0 + 3 * i, 1, 25 + std::sqrt(i), 0.1,
-                             i == 5 ? Figure() : Figure(0.1), i != 3, i == 3 ? evil : ""});
+                             i == 5 ? Metric() : Metric(0.1), i != 3, i == 3 ? evil : ""});
   report.options = {{"style", evil}};
   report.versions = {{"COLMAP", evil}};
   return report;
@@ -87,7 +87,7 @@ int main(int argc, char** argv) {
   std::filesystem::create_directories(argv[1]);
   const std::string page = std::string(argv[1]) + "/report.html";
   regrade::WriteFileAtomically(
-      page, regrade::ReportHtml(regrade::EveryFigure(evil), regrade::EveryPicture(evil)));
+      page, regrade::ReportHtml(regrade::EveryMetric(evil), regrade::EveryPicture(evil)));
   std::printf("%s\n", page.c_str());
   return 0;
 }

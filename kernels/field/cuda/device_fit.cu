@@ -66,7 +66,7 @@ __device__ void ScatterChunk(const DeviceGridView& grid, const LaneValues<kBasis
     for (int i = 0; i < Layout::kValues; ++i)
       own[i] = values.of[0][i] * d.x + values.of[1][i] * d.y + values.of[2][i] * d.z +
                values.density[i] * d_density;
-    const GroupLinks<Layout::kGroup> links(GridSpace(grid), vertex, valid, lane);
+    const GroupLinks<Layout::kGroup> links(GridSampler(grid), vertex, valid, lane);
     links.ForEachOwn([&](int32_t link) { Touch(gradient.touched, link); });
 #pragma unroll
     for (int k = 0; k < 8; ++k) {

@@ -24,7 +24,7 @@ __global__ void MaxWeightsKernel(DeviceGridView grid, const Ray* rays, int64_t n
   while (march.Next(&sample, &composited)) {
     if (!(sample.tau > 0)) continue;
     const float w = sample.transmittance_before * Opacity(sample.tau);
-    const NeighbourSteps steps = GridSpace(grid).Steps(sample.cell.vertex);
+    const NeighbourSteps steps = GridSampler(grid).Steps(sample.cell.vertex);
     for (int k = 0; k < 8; ++k) {
       const int32_t link = grid.links[sample.cell.vertex + steps.To(k)];
       if (link >= 0) RaiseTo(&weights[link], w);

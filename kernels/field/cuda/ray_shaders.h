@@ -2,7 +2,7 @@
 // records, or from a copy in half precision. Device code only.
 #pragma once
 
-#include "kernels/field/cuda/half_space.h"
+#include "kernels/field/cuda/half_grid_sampler.h"
 #include "kernels/field/cuda/warp_shade.h"
 
 #if defined(__CUDACC__)
@@ -13,7 +13,7 @@ namespace regrade {
 template <int kBasis>
 class FloatShader {
  public:
-  using Space = GridSpace;
+  using Space = GridSampler;
   static constexpr int kGroup = RecordLayout<kBasis>::kGroup;
 
   __device__ FloatShader(const DeviceGridView& grid, const float (&basis)[kMaxBasis], int lane)
@@ -39,7 +39,7 @@ class FloatShader {
 // coefficients of all.
 class HalfShader {
  public:
-  using Space = HalfSpace;
+  using Space = HalfGridSampler;
   static constexpr int kGroup = 4;
 
   __device__ HalfShader(const HalfGridView& grid, const float (&basis)[kMaxBasis], int lane)
@@ -57,7 +57,7 @@ class HalfShader {
       corner[k] =
           link < 0 ? uint4{} : *reinterpret_cast<const uint4*>(records_ + int64_t{link} * 32);
     }
-    __half2 halves[4] = {};  // blended as they are stored: what that loses is in PRICES.md
+    __half2 halves[4] = {};  // blended as they are stored: what that loses is in COSTS.md
 #pragma unroll
     for (int k = 0; k < 8; ++k) {
       const __half2 share = __float2half2_rn(CornerWeight(fraction, k));

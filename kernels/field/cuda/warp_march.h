@@ -56,9 +56,9 @@ struct NeighbourSteps {
 };
 
 // What a march looks at, in the grid's own arrays.
-class GridSpace {
+class GridSampler {
  public:
-  __device__ explicit GridSpace(const DeviceGridView& grid) : grid_(grid) {}
+  __device__ explicit GridSampler(const DeviceGridView& grid) : grid_(grid) {}
   __device__ const Vec3f& last() const { return grid_.last; }
   __device__ int Index(int x, int y, int z) const {
     return (x * grid_.frame.resolution.y + y) * grid_.frame.resolution.z + z;
@@ -101,7 +101,7 @@ __device__ Cell<float> LocateCellIn(const Space& space, const Vec3f& p) {
 }
 
 // The march of a warp's ray; every lane holds the same state but for its own sample.
-template <typename Space = GridSpace>
+template <typename Space = GridSampler>
 class WarpMarch {
  public:
   __device__ WarpMarch(const Space& space, const GridRay<float>& ray,
@@ -114,7 +114,7 @@ class WarpMarch {
     delta_ = options.step * ray_.world_per_voxel;
   }
   __device__ WarpMarch(const DeviceGridView& grid, const Ray& ray, const MarchOptions& options)
-      : WarpMarch(GridSpace(grid), ClipToGrid(grid.frame, ray, grid.near_clip, options.step),
+      : WarpMarch(GridSampler(grid), ClipToGrid(grid.frame, ray, grid.near_clip, options.step),
                   options) {}
 
   // Steps to the next 32 samples of which at least one composites; false at the ray's end.

@@ -75,7 +75,7 @@ template <int kBasis>
 __device__ Vec3f RawColor(const DeviceGridView& grid, const LaneValues<kBasis>& values,
                           int vertex, const Vec3f& fraction, bool valid, int lane) {
   using Layout = RecordLayout<kBasis>;
-  const GroupLinks<Layout::kGroup> links(GridSpace(grid), vertex, valid, lane);
+  const GroupLinks<Layout::kGroup> links(GridSampler(grid), vertex, valid, lane);
   const float* mine = grid.records + lane % Layout::kGroup * Layout::kValues;
   float4 corner[8];  // all on their way before the first is used
 #pragma unroll

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Runs with too little of something, and two at once: each must end with the right exit status, and go on afterwards.
 
-  tight_limits.py REGRADE [--pairs 100] [--sizes 6]        needs colmap; root for the full disks (others skip them, and say so)
+  resource_limits.py REGRADE [--pairs 100] [--sizes 6]        needs colmap; root for the full disks (others skip them, and say so)
 
   full disks     each stage, COLMAP's included, on small file systems of several sizes: exit status 5 that names the
                  disk, or 0 where it was enough; with room the same command finishes with the undisturbed run's results

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Lets each write of a run fail once, and requires a clear end, a folder that is whole, and the same result afterwards.
 
-  fail_each_write.py REGRADE LIBRARY [--runs 24] [--kinds ENOSPC,EIO,SHORT]     LIBRARY: libfailing_writes.so
+  write_fault_injection.py REGRADE LIBRARY [--runs 24] [--kinds ENOSPC,EIO,SHORT]     LIBRARY: libfailing_writes.so
 
 A small synthetic capture is run once undisturbed in reproducible mode. Then, beginning behind the poses and behind
 the reconstruction, a copy is run with its k-th write failing, for `--runs` values of k over all of them (0: every k).

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Takes the cares of tests/hard_cases/care_outs.json out of the code, one at a time, and sees a test fail each time.
+"""Takes the cares of tests/hard_cases/mutations.json out of the code, one at a time, and sees a test fail each time.
 
 An entry is {case, care, file, find, replace, target, tests}: `find` occurs once in `file`; with `replace` in its place
 the test program `target` is built and run with the GoogleTest filter `tests`. Without a target, `tests` is a regular
@@ -19,7 +19,7 @@ import subprocess
 import sys
 import tempfile
 
-ENTRIES, TABLE = "tests/hard_cases/care_outs.json", "tests/hard_cases/CARE_OUTS.md"
+ENTRIES, TABLE = "tests/hard_cases/mutations.json", "tests/hard_cases/MUTATIONS.md"
 # The cases that have an entry: the numbers that tests are named after.
 CASES = "H1-H68 H70-H159 F1-F26 F28-F42 F44-F55 F57-F78"
 KEYS = {"case", "care", "file", "find", "replace", "target", "tests"}
@@ -182,7 +182,7 @@ def write_table(root, rows):
     lines.sort(key=lambda line: order[line.split()[1]])
     write(path, "# Cares taken out\n\n"
           "Each care of the hard cases, and the test that failed when the code was built without it. Written by\n"
-          "`scripts/care_outs.py --write` from `care_outs.json`; every line has been run.\n\n"
+          "`scripts/mutation_tests.py --write` from `mutations.json`; every line has been run.\n\n"
           "| case | care taken out | test that failed | how it failed |\n|---|---|---|---|\n" + "\n".join(lines) + "\n")
 
 
@@ -230,14 +230,14 @@ def main():
     for complaint in complaints:
         print(f"{ENTRIES}: {complaint}")
     if arguments.check or complaints:
-        print(f"care_outs: {len(entries)} entries, {len(complaints)} findings")
+        print(f"mutation_tests: {len(entries)} entries, {len(complaints)} findings")
         return 1 if complaints else 0
     if arguments.only:
         entries = [entry for entry in entries if entry["case"] in arguments.only.split(",")]
     with tempfile.TemporaryDirectory() as scratch:
         rows = run_all(Workshop(arguments.root, os.path.abspath(arguments.build or scratch), arguments.jobs), entries)
     wrong = sum(verdict not in ("failed", "cannot arise") for _, verdict, _, _ in rows)
-    print(f"care_outs: {len(rows)} entries, {wrong} not seen to fail")
+    print(f"mutation_tests: {len(rows)} entries, {wrong} not seen to fail")
     if arguments.write:
         write_table(arguments.root, rows)
     return 1 if wrong else 0

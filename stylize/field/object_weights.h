@@ -39,6 +39,6 @@ class MaskVote {
 };
 
 // A field that renders, in each channel, how much of what a pixel sees is of the object.
-RadianceField ShareField(const RadianceField& field, const std::vector<float>& shares);
+RadianceField WeightField(const RadianceField& field, const std::vector<float>& shares);
 
 }  // namespace regrade

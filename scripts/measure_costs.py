@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Measures what each knob costs and changes: rows for PRICES.md.
+"""Measures what each parameter costs and changes: rows for COSTS.md.
 
-  price_knobs.py REGRADE PHOTOS STYLE WORK [--part pose|fit|style] [--preset draft] [--only KNOB] [-- BASE OPTIONS]
+  measure_costs.py REGRADE PHOTOS STYLE WORK [--part pose|fit|style] [--preset draft] [--only PARAMETER] [-- BASE OPTIONS]
 
 WORK keeps a base run (made if it is not there) and rows.tsv; rows that are there already are not measured again. Each
-row changes one knob of the base and nothing else. A fit is judged by its held-out views, a style by its distance from
+row changes one parameter of the base and nothing else. A fit is judged by its held-out views, a style by its distance from
 the 2D method and by its steadiness, poses by what they find. Seconds are of the stage by the wall; CPU seconds are of
 the whole command, all threads, and bear other work on the machine better.
 """
@@ -17,7 +17,7 @@ import shutil
 import subprocess
 import sys
 
-KNOBS = {
+PARAMETERS = {
     "pose": [
         ("pose-image-size", ["600", "1600"]), ("pose-all-pairs-up-to", ["60"]),
     ],
@@ -60,27 +60,27 @@ def stage(folder, name):
 
 def figures(part, folder):
     if part == "pose":
-        f = stage(folder, "pose")["figures"]
+        f = stage(folder, "pose")["metrics"]
         return stage(folder, "pose")["seconds"], [f["registered"], f["points"], round(f["reprojection_px"], 3)]
     if part == "fit":
         record = stage(folder, "reconstruct")
-        f = record["figures"]
+        f = record["metrics"]
         return record["seconds"], [round(f["psnr_train_db"], 2), round(f["psnr_heldout_db"], 2), f["voxels"]]
     with open(os.path.join(folder, "report.json")) as file:
         report = json.load(file)
     s = report["stages"]["stylize"]
     near = next(f for f in report["fidelity"] if f["sequence"] == "styled")
     steady = {c["gap"]: c["tc_psnr_mean_db"] for c in report["consistency"] if c["sequence"] == "styled"}
-    values = [s["psnr_to_2d_db"], steady[1], steady[5], s["k_est"], s["bound"], s["slope_observed"],
+    values = [s["psnr_to_2d_db"], steady[1], steady[5], s["k_est"], s["bound"], s["local_lipschitz_sampled"],
               near["hue_std"] / near["hue_std_2d"], near["chroma"] / near["chroma_2d"]]
     return s["seconds"], [round(v, 2) for v in values]
 
 
-def measure(part, arguments, base, knob, value):
+def measure(part, arguments, base, parameter, value):
     """A row: seconds of the stage, CPU seconds of the command, figures."""
     row = base + ".row"
     shutil.rmtree(row, ignore_errors=True)
-    option = [] if knob is None else ["--" + knob] + ([] if value is None else [value])
+    option = [] if parameter is None else ["--" + parameter] + ([] if value is None else [value])
     if part == "style":
         shutil.copytree(base, row)
         # The frames' way is the photos' places: the film costs time and says nothing here.
@@ -102,7 +102,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     for name in ["regrade", "photos", "style", "work"]:
         parser.add_argument(name)
-    parser.add_argument("--part", choices=list(KNOBS), action="append")
+    parser.add_argument("--part", choices=list(PARAMETERS), action="append")
     parser.add_argument("--preset", default="draft")
     parser.add_argument("--only", action="append")
     words = sys.argv[1:]
@@ -118,14 +118,14 @@ def main():
     if os.path.exists(table):
         with open(table) as file:
             done = {tuple(line.split("\t")[:2]) for line in file}
-    for part in arguments.part or list(KNOBS):
-        rows = [(None, None)] + [(knob, value) for knob, values in KNOBS[part] for value in values]
-        for knob, value in rows:
-            label = (part, "base" if knob is None else f"--{knob}" + (f" {value}" if value else ""))
-            if label in done or (arguments.only and knob not in arguments.only):
+    for part in arguments.part or list(PARAMETERS):
+        rows = [(None, None)] + [(parameter, value) for parameter, values in PARAMETERS[part] for value in values]
+        for parameter, value in rows:
+            label = (part, "base" if parameter is None else f"--{parameter}" + (f" {value}" if value else ""))
+            if label in done or (arguments.only and parameter not in arguments.only):
                 continue
             try:
-                seconds, cpu, values = measure(part, arguments, base, knob, value)
+                seconds, cpu, values = measure(part, arguments, base, parameter, value)
                 cells = [f"{seconds:.1f}", f"{cpu:.0f}"] + [str(v) for v in values]
             except RuntimeError as error:
                 cells = [str(error)]
@@ -139,11 +139,11 @@ def main():
 def print_tables(table):
     with open(table) as file:
         rows = [line.rstrip("\n").split("\t") for line in file]
-    for part in KNOBS:
+    for part in PARAMETERS:
         here = [row[1:] for row in rows if row[0] == part]
         if not here:
             continue
-        head = ["knob", "stage s", "CPU s"] + HEADS[part]
+        head = ["parameter", "stage s", "CPU s"] + HEADS[part]
         print("\n| " + " | ".join(head) + " |\n|" + "---|" * len(head))
         for row in here:
             print("| " + " | ".join(row) + " |")

@@ -1,4 +1,4 @@
-#include "stylize/field/observed_slope.h"
+#include "stylize/field/local_lipschitz.h"
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -85,9 +85,10 @@ class Steepness {
 
 }  // namespace
 
-ObservedSlopes ObserveSlopes(const LipschitzNetwork& network, const RadianceField& field,
-                             const SlopeOptions& options) {
-  ObservedSlopes result;
+LocalLipschitz MeasureLocalLipschitz(const LipschitzNetwork& network,
+                                     const RadianceField& field,
+                                     const LocalLipschitzOptions& options) {
+  LocalLipschitz result;
   const int64_t n = field.geometry->num_voxels();
   if (n == 0) return result;
   const Steepness f(network);
@@ -170,8 +171,9 @@ ObservedSlopes ObserveSlopes(const LipschitzNetwork& network, const RadianceFiel
     ends << point - 0.5 * options.min_distance * direction,
         point + 0.5 * options.min_distance * direction;
     const MatrixXd images = f.Forward(ends);
-    result.summit_pair = std::max(result.summit_pair, (images.col(1) - images.col(0)).norm() /
-                                                          (ends.col(1) - ends.col(0)).norm());
+    result.steepest_pair =
+        std::max(result.steepest_pair,
+                 (images.col(1) - images.col(0)).norm() / (ends.col(1) - ends.col(0)).norm());
   }
   return result;
 }

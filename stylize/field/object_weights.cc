@@ -1,4 +1,4 @@
-#include "stylize/field/object_shares.h"
+#include "stylize/field/object_weights.h"
 
 #include <algorithm>
 #include <atomic>
@@ -78,7 +78,7 @@ std::vector<float> MaskVote::Shares(double threshold, double edge) const {
   return shares;
 }
 
-RadianceField ShareField(const RadianceField& field, const std::vector<float>& shares) {
+RadianceField WeightField(const RadianceField& field, const std::vector<float>& shares) {
   REGRADE_CHECK_EQ(static_cast<int64_t>(shares.size()), field.geometry->num_voxels());
   RadianceField result;
   result.geometry = field.geometry;

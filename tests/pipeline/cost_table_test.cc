@@ -1,9 +1,10 @@
 // Price lists: which variants there are, what is kept, what beats what, and what is predicted.
+#include "pipeline/tradeoff/cost_table.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-#include "pipeline/tradeoff/cost_table.h"
 #include "pipeline/tradeoff/duration_estimate.h"
 #include "pipeline/tradeoff/prediction.h"
 #include "tests/support/expect_error.h"
@@ -15,28 +16,30 @@ namespace {
 using testing::TemporaryFolder;
 
 Measurement Of(const Variant& variant, double cpu, double accuracy, int repeat = 0) {
-  return {variant.plane, variant.knob, variant.value, repeat, 0.6 * cpu, cpu, accuracy};
+  return {variant.benchmark, variant.parameter, variant.value, repeat, 0.6 * cpu, cpu,
+          accuracy};
 }
 
-Variant FitVariant(const std::string& knob, const std::string& value, bool end = false) {
-  return {"fit", knob, value, JsonValue::Object(), end};
+Variant FitVariant(const std::string& parameter, const std::string& value, bool end = false) {
+  return {"fit", parameter, value, JsonValue::Object(), end};
 }
 
-const PriceRow& RowOf(const std::vector<PriceRow>& rows, const std::string& setting) {
+const CostRow& RowOf(const std::vector<CostRow>& rows, const std::string& setting) {
   return *std::find_if(rows.begin(), rows.end(),
-                       [&](const PriceRow& row) { return row.setting == setting; });
+                       [&](const CostRow& row) { return row.setting == setting; });
 }
 
-TEST(Knobs, ValuesFollowTheBase) {
+TEST(Parameters, ValuesFollowTheBase) {
   RunSettings base;
   base.fit.steps = {10, 20};
   base.fit.resolutions = {16, 24};
   const std::vector<Variant> variants =
       VariantsOf(base, {{"fit-steps", "sh-degree"}, false, true, {}});
   std::vector<std::string> said;
-  for (const Variant& variant : variants) said.push_back(variant.knob + "=" + variant.value);
+  for (const Variant& variant : variants)
+    said.push_back(variant.parameter + "=" + variant.value);
   // Half and a quarter of the base's steps and twice as many, not the base's own again; other
-  // planes have no knob here, and so no base.
+  // planes have no parameter here, and so no base.
   EXPECT_EQ(said, (std::vector<std::string>{"=", "fit-steps=3,5", "fit-steps=5,10",
                                             "fit-steps=20,40", "sh-degree=0", "sh-degree=1"}));
   EXPECT_TRUE(variants[3].accurate_end);
@@ -45,23 +48,23 @@ TEST(Knobs, ValuesFollowTheBase) {
                        "fit-stepz");
 }
 
-TEST(Knobs, EveryOptionIsOneOfARun) {
+TEST(Parameters, EveryOptionIsOneOfARun) {
   RunSettings base;
   OptionSet options;
   base.Bind(&options);
   for (const Variant& variant : VariantsOf(base, {{}, true, true, {"draft", "paper"}}))
-    if (variant.plane != "render") {
+    if (variant.benchmark != "render") {
       RunSettings settings = base;
       OptionSet set;
       settings.Bind(&set);
       set.ApplyConfig(variant.options, "here");  // throws for a name that is none
       EXPECT_EQ(DumpJson(set.Values(), -1) == DumpJson(options.Values(), -1),
-                variant.knob.empty())
-          << variant.knob << " " << variant.value;
+                variant.parameter.empty())
+          << variant.parameter << " " << variant.value;
     }
 }
 
-TEST(PriceList, MediansSpreadsAndErrorsAgainstTheAccurateEnd) {
+TEST(CostTable, MediansSpreadsAndErrorsAgainstTheAccurateEnd) {
   const std::vector<Variant> variants = {FitVariant("", ""), FitVariant("fit-steps", "5"),
                                          FitVariant("fit-steps", "20", true),
                                          FitVariant("sh-degree", "1")};
@@ -70,22 +73,22 @@ TEST(PriceList, MediansSpreadsAndErrorsAgainstTheAccurateEnd) {
   measured.push_back(Of(variants[0], 10, 26));
   measured.push_back(Of(variants[2], 20, 27));
   measured.push_back(Of(variants[3], 8, 25.75));
-  const std::vector<PriceRow> rows = PriceList(variants, measured, "preset draft");
+  const std::vector<CostRow> rows = CostTable(variants, measured, "preset draft");
   ASSERT_EQ(rows.size(), 4u);
-  const PriceRow& few = RowOf(rows, "5");
+  const CostRow& few = RowOf(rows, "5");
   EXPECT_EQ(*few.cpu_seconds.value, 5);
   EXPECT_EQ(*few.cpu_spread.value, 2.5);
   EXPECT_EQ(*few.accuracy.value, 24.5);
   EXPECT_EQ(*few.error.value, 2.5);                // against 20 steps
   EXPECT_EQ(*RowOf(rows, "1").error.value, 0.25);  // against the base
   EXPECT_FALSE(RowOf(rows, "preset draft").error.value);
-  EXPECT_NE(PriceListText(rows).find("* preset draft"), std::string::npos);
-  EXPECT_NE(PriceListCsv(rows).find("fit,\"fit-steps\",\"5\",3,3.000000,1.500000,5.000000"),
+  EXPECT_NE(CostTableText(rows).find("* preset draft"), std::string::npos);
+  EXPECT_NE(CostTableCsv(rows).find("fit,\"fit-steps\",\"5\",3,3.000000,1.500000,5.000000"),
             std::string::npos)
-      << PriceListCsv(rows);
+      << CostTableCsv(rows);
 }
 
-TEST(PriceList, TheFrontIsWhatNothingBeats) {
+TEST(CostTable, TheParetoFrontIsWhatNothingBeats) {
   const std::vector<Variant> variants = {FitVariant("", ""), FitVariant("a", "good"),
                                          FitVariant("a", "bad"), FitVariant("a", "twin")};
   std::vector<Measurement> measured;
@@ -96,25 +99,25 @@ TEST(PriceList, TheFrontIsWhatNothingBeats) {
     measured.push_back(Of(variants[2], 7 + noise, 25, repeat));
     measured.push_back(Of(variants[3], 5.5 + noise, 27, repeat));
   }
-  std::vector<PriceRow> rows = PriceList(variants, measured, "the base");
-  EXPECT_TRUE(RowOf(rows, "good").on_front);
+  std::vector<CostRow> rows = CostTable(variants, measured, "the base");
+  EXPECT_TRUE(RowOf(rows, "good").on_pareto_front);
   EXPECT_EQ(RowOf(rows, "the base").dominated_by, "a good");
   EXPECT_EQ(RowOf(rows, "bad").dominated_by, "a good");
   // Half a second is within the noise of half a second each: beaten, but not dominated.
-  EXPECT_FALSE(RowOf(rows, "twin").on_front);
+  EXPECT_FALSE(RowOf(rows, "twin").on_pareto_front);
   EXPECT_EQ(RowOf(rows, "twin").dominated_by, "");
   // Where less is better the front turns round.
-  for (const Variant& variant : variants) EXPECT_EQ(variant.plane, "fit");
+  for (const Variant& variant : variants) EXPECT_EQ(variant.benchmark, "fit");
   std::vector<Variant> flow = variants;
-  for (Variant& variant : flow) variant.plane = "flow";
-  for (Measurement& m : measured) m.plane = "flow";
-  rows = PriceList(flow, measured, "the base");
-  EXPECT_TRUE(RowOf(rows, "bad").on_front);
-  EXPECT_TRUE(RowOf(rows, "good").on_front);  // the fastest
+  for (Variant& variant : flow) variant.benchmark = "flow";
+  for (Measurement& m : measured) m.benchmark = "flow";
+  rows = CostTable(flow, measured, "the base");
+  EXPECT_TRUE(RowOf(rows, "bad").on_pareto_front);
+  EXPECT_TRUE(RowOf(rows, "good").on_pareto_front);  // the fastest
   EXPECT_EQ(RowOf(rows, "the base").dominated_by, "a bad");
   // One measurement of each says nothing about noise.
   std::erase_if(measured, [](const Measurement& m) { return m.repeat > 0; });
-  EXPECT_EQ(RowOf(PriceList(flow, measured, "the base"), "the base").dominated_by, "");
+  EXPECT_EQ(RowOf(CostTable(flow, measured, "the base"), "the base").dominated_by, "");
 }
 
 TEST(MeasurementStore, KeepsWhatIsOfTheSameFingerprint) {
@@ -170,7 +173,7 @@ TEST(Prediction, LearnsWhatAUnitCostsAndAppliesItElsewhere) {
     settings.Bind(&options);
     options.ApplyConfig(variant.options, "here");
     // What is no matter of work's amount must not teach anything.
-    const double odd = variant.knob == "fit-stop" ? 7 : 1;
+    const double odd = variant.parameter == "fit-stop" ? 7 : 1;
     measured.push_back(Of(variant, odd * truth(settings, capture), 26));
   }
   const TemporaryFolder folder;
@@ -178,13 +181,11 @@ TEST(Prediction, LearnsWhatAUnitCostsAndAppliesItElsewhere) {
   workspace.Record("reconstruct", JsonValue::Object(), {}, 0.6 * truth(base, capture) + 3,
                    JsonValue::Object{{"trial_seconds", 1}, {"trial_cpu_seconds", 1}},
                    truth(base, capture) + 4);
-  const std::vector<PriceTerm> prices =
-      LearnPrices(base, capture, workspace, variants, measured);
+  const std::vector<CostTerm> costs = LearnCosts(base, capture, workspace, variants, measured);
   RunSettings larger = base;
   larger.fit.steps = {700, 900};
-  const std::vector<StageTime> times =
-      Predict(PricesFromJson(JsonValue::Object{{"unit_prices", ToJson(prices)}}, "here"),
-              larger, other);
+  const std::vector<StageTime> times = Predict(
+      CostsFromJson(JsonValue::Object{{"unit_costs", ToJson(costs)}}, "here"), larger, other);
   ASSERT_EQ(times.size(), 1u);  // of what was never seen nothing is said
   EXPECT_EQ(times[0].stage, "reconstruct");
   // Three and a half times as many photos, and one trial (ten photos fitted are enough).
@@ -192,12 +193,12 @@ TEST(Prediction, LearnsWhatAUnitCostsAndAppliesItElsewhere) {
   EXPECT_NEAR(times[0].seconds, 0.6 * truth(larger, other) + 3.5 * 2 + 1, 1e-6);
 }
 
-TEST(Guess, GetsBetterWithTheFirstMeasurement) {
+TEST(DurationEstimate, GetsBetterWithTheFirstMeasurement) {
   RunSettings base;
   const Variant own = FitVariant("", "");
   Variant twice = FitVariant("fit-steps", "1600,4000,6000", true);
   twice.options["fit-steps"] = JsonValue::Array{1600, 4000, 6000};
-  Guess guess(base, {});
+  DurationEstimate guess(base, {});
   EXPECT_NEAR(guess.Seconds(twice), 2 * guess.Seconds(own), 1e-6 * guess.Seconds(own));
   guess.Add({"fit", "", "", 0, 10, 15, 26});
   EXPECT_NEAR(guess.Seconds(own), 10, 1e-9);

@@ -1,4 +1,4 @@
-#include "reconstruct/colmap/colmap_ladder.h"
+#include "reconstruct/colmap/colmap_strategies.h"
 
 #include <algorithm>
 #include <sstream>
@@ -43,8 +43,8 @@ std::vector<CameraGroup> GroupByCamera(const std::vector<StagedPhoto>& photos) {
   return groups;
 }
 
-std::vector<PoseRecipe> PoseLadder(const std::vector<StagedPhoto>& photos,
-                                   int all_pairs_up_to) {
+std::vector<PoseRecipe> PoseStrategies(const std::vector<StagedPhoto>& photos,
+                                       int all_pairs_up_to) {
   int side = 0;
   for (const StagedPhoto& photo : photos) side = std::max({side, photo.width, photo.height});
   const bool simple_lens = photos.size() < kFewPhotos || GroupByCamera(photos).size() > 1;

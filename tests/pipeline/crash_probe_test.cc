@@ -1,4 +1,6 @@
 // Work that may crash, in a child first.
+#include "pipeline/program/crash_probe.h"
+
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
@@ -7,7 +9,6 @@
 #include <fstream>
 #include <thread>
 
-#include "pipeline/program/crash_probe.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/process_state.h"
 #include "tests/support/temporary_folder.h"
@@ -15,19 +16,20 @@
 namespace regrade {
 namespace {
 
-TEST(Rehearsal, F73_ACrashBecomesAMessage) {
-  EXPECT_REGRADE_ERROR(Rehearse([] { ::raise(SIGSEGV); }, "net.onnx"),
+TEST(CrashProbe, F73_ACrashBecomesAMessage) {
+  EXPECT_REGRADE_ERROR(RunCrashProbe([] { ::raise(SIGSEGV); }, "net.onnx"),
                        ExitCode::kExternalProgram, "net.onnx");
-  EXPECT_REGRADE_ERROR(Rehearse([] { std::abort(); }, "net.onnx"), ExitCode::kExternalProgram,
-                       "crashes");
+  EXPECT_REGRADE_ERROR(RunCrashProbe([] { std::abort(); }, "net.onnx"),
+                       ExitCode::kExternalProgram, "crashes");
 }
 
-TEST(Rehearsal, F73_TimeAndMemoryHaveLimits) {
-  RehearsalLimits limits;
+TEST(CrashProbe, F73_TimeAndMemoryHaveLimits) {
+  CrashProbeLimits limits;
   limits.seconds = 0.1;
-  EXPECT_REGRADE_ERROR(Rehearse([] { std::this_thread::sleep_for(std::chrono::seconds(60)); },
-                                "slow.onnx", limits),
-                       ExitCode::kExternalProgram, "did not end");
+  EXPECT_REGRADE_ERROR(
+      RunCrashProbe([] { std::this_thread::sleep_for(std::chrono::seconds(60)); }, "slow.onnx",
+                    limits),
+      ExitCode::kExternalProgram, "did not end");
 #if !defined(__SANITIZE_ADDRESS__)
   limits.seconds = 60;
   limits.memory_bytes = int64_t{4} << 30;
@@ -36,15 +38,16 @@ TEST(Rehearsal, F73_TimeAndMemoryHaveLimits) {
     much[1] = 1;
     delete[] much;
   };
-  EXPECT_REGRADE_ERROR(Rehearse(greedy, "big.onnx", limits), ExitCode::kExternalProgram, "MiB");
+  EXPECT_REGRADE_ERROR(RunCrashProbe(greedy, "big.onnx", limits), ExitCode::kExternalProgram,
+                       "MiB");
 #endif
 }
 
-TEST(Rehearsal, F35_ACopyEndsWithAProcessThatIsKilled) {
+TEST(CrashProbe, F35_ACopyEndsWithAProcessThatIsKilled) {
   const testing::TemporaryFolder folder;
   const pid_t run = ::fork();
   if (run == 0) {
-    Rehearse(
+    RunCrashProbe(
         [&] {
           std::ofstream(folder / "copy") << ::getpid() << "\n";
           std::this_thread::sleep_for(std::chrono::seconds(60));
@@ -59,11 +62,11 @@ TEST(Rehearsal, F35_ACopyEndsWithAProcessThatIsKilled) {
   EXPECT_TRUE(testing::Ends(copy));
 }
 
-TEST(Rehearsal, WhatAProgramCanGoOnFromPasses) {
+TEST(CrashProbe, WhatAProgramCanGoOnFromPasses) {
   int touched = 0;
-  Rehearse([&] { touched = 1; }, "x");
+  RunCrashProbe([&] { touched = 1; }, "x");
   EXPECT_EQ(touched, 0);  // it was a copy
-  Rehearse([] { throw Error(ExitCode::kInput, "no", "y"); }, "x");
+  RunCrashProbe([] { throw Error(ExitCode::kInput, "no", "y"); }, "x");
 }
 
 }  // namespace

@@ -10,9 +10,9 @@
 
 namespace regrade {
 
-class HalfSpace {
+class HalfGridSampler {
  public:
-  __device__ explicit HalfSpace(const HalfGridView& grid) : grid_(grid) {}
+  __device__ explicit HalfGridSampler(const HalfGridView& grid) : grid_(grid) {}
   __device__ const Vec3f& last() const { return grid_.last; }
   __device__ int Index(int x, int y, int z) const { return grid_.order.Index(x, y, z); }
   // Across a brick's face the way leads to the next brick.

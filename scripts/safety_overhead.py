@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What care costs a run: writing so that nothing is torn, checksums, checks of what is read, staged photos, fixed sums.
 
-  price_of_safety.py REGRADE --library LIBRARY --tool TOOL [--views 24] [--size 640x480] [--preset draft]
+  safety_overhead.py REGRADE --library LIBRARY --tool TOOL [--views 24] [--size 640x480] [--preset draft]
                              [-- OPTION...]
 
 LIBRARY is libtimed_writes.so and TOOL validation_tool, both of the tests' build. A synthetic capture is run; then

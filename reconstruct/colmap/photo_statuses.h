@@ -1,5 +1,5 @@
-// What one rung of the ladder found, and the sentences that explain to a photographer why
-// photos could not be placed.
+// What one attempt of the strategies found, and the sentences that explain to a photographer
+// why photos could not be placed.
 #pragma once
 
 #include <string>
@@ -16,7 +16,7 @@ namespace regrade {
 struct FoundModel {
   ColmapModel model;
   Capture capture;
-  std::string refusal;  // by JudgeScene; empty: plausible
+  std::string refusal;  // by AssessScene; empty: plausible
 
   // Plausible before implausible, then more photos, then more points.
   auto Rank() const {
@@ -24,7 +24,7 @@ struct FoundModel {
   }
 };
 
-struct RungResult {
+struct AttemptResult {
   std::string recipe;
   std::vector<FoundModel> models;  // best first
   ColmapEvidence evidence;
@@ -37,13 +37,13 @@ struct Reason {
 // Why no recipe gave a model, as far as COLMAP's output tells.
 Reason WhyNoModel(const ColmapEvidence& evidence);
 
-// Fills in `why` of the unregistered photos; the first photos.size() verdicts of the capture
+// Fills in `why` of the unregistered photos; the first photos.size() statuses of the capture
 // are theirs. Says only what COLMAP's output proves.
-void ExplainUnregistered(const RungResult& rung, const std::vector<StagedPhoto>& photos,
+void ExplainUnregistered(const AttemptResult& attempt, const std::vector<StagedPhoto>& photos,
                          Capture* capture);
 
-// For a rung with several models: the sizes of those that are not used.
-std::string NoteOnOtherModels(const RungResult& rung);
+// For a attempt with several models: the sizes of those that are not used.
+std::string NoteOnOtherModels(const AttemptResult& attempt);
 
 // Throw Error(kScene). Refuse adds that the photos are too few, where they are.
 [[noreturn]] void Refuse(const Reason& reason, size_t photos_given, int min_photos);

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Kills runs at random instants of every stage, starts them again until they are done, and compares what they made.
 
-  kill_loop.py REGRADE [--kills 1000] [--pose-kills 50] [--seed 0] [--effects mixed-cameras]      colmap for --pose-kills; about 3 s a kill on two cores
+  crash_recovery.py REGRADE [--kills 1000] [--pose-kills 50] [--seed 0] [--effects mixed-cameras]      colmap for --pose-kills; about 3 s a kill on two cores
 
 Behind finished poses: a small synthetic capture is run once undisturbed in reproducible mode. Then copies of its poses
 are run, and killed with SIGKILL, SIGTERM or SIGINT a random time after a stage has begun, stage by stage, with one
@@ -192,7 +192,7 @@ class Supervisor:
     def check_poses(self, compare_poses):
         self.compared += 1
         with open(os.path.join(self.work, ".regrade/stages/pose.json"), encoding="utf-8") as file:
-            figures = json.load(file)["figures"]
+            figures = json.load(file)["metrics"]
         if figures["registered"] != 8:
             self.complain(f"{figures['registered']} of 8 photos placed")
         if not compare_poses:

@@ -10,7 +10,7 @@ namespace regrade {
 
 // The same colours with `basis` harmonics a channel, those beyond its own 0: it renders the
 // same to the bit. Nothing changes where it has as many.
-inline Appearance Widened(Appearance appearance, int basis) {
+inline Appearance PadShBasis(Appearance appearance, int basis) {
   const int own = appearance.basis;
   if (own >= basis) return appearance;
   const int64_t rows = appearance.sh.size() / own;

@@ -1,5 +1,5 @@
-// The ladder of recipes for COLMAP: the cheapest that works for most captures first, then the
-// ones that find poses where it fails, at a price.
+// The strategies of recipes for COLMAP: the cheapest that works for most captures first, then
+// the ones that find poses where it fails, at a price.
 #pragma once
 
 #include <string>
@@ -19,7 +19,7 @@ struct PoseRecipe {
       ColmapLens::kOpenCv;     // while the model grows; it is fitted again at the end
   double focal_factor = 1.2;   // first guess of focal length over the longer side, without EXIF
   bool all_pairs = true;       // otherwise each photo with those that follow it
-  bool keep_matches = false;   // features and matches of the rung before
+  bool keep_matches = false;   // features and matches of the attempt before
   double init_angle_deg = 16;  // least angle between the rays of the first two photos
   int init_inliers = 100;      // least matches between them
   int min_inliers = 30;        // least points that place a further photo
@@ -36,8 +36,9 @@ struct CameraGroup {
 std::vector<CameraGroup> GroupByCamera(const std::vector<StagedPhoto>& photos);
 
 // `all_pairs_up_to`: more photos than this are matched with their neighbours in the order of
-// names, except on the last rung.
-std::vector<PoseRecipe> PoseLadder(const std::vector<StagedPhoto>& photos, int all_pairs_up_to);
+// names, except on the last attempt.
+std::vector<PoseRecipe> PoseStrategies(const std::vector<StagedPhoto>& photos,
+                                       int all_pairs_up_to);
 
 struct ColmapPaths {
   std::string photos, database, image_list, model;

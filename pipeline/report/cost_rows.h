@@ -9,6 +9,6 @@
 namespace regrade {
 
 // The rows of a tradeoff.json; none where there is no such file. Throws Error(kInput).
-std::vector<PriceRow> ReadPriceList(const std::string& path);
+std::vector<CostRow> ReadCostTable(const std::string& path);
 
 }  // namespace regrade

@@ -1,4 +1,4 @@
-#include "reconstruct/colmap/pose_verdicts.h"
+#include "reconstruct/colmap/photo_statuses.h"
 
 #include "kernels/base/error.h"
 
@@ -35,14 +35,14 @@ Reason WhyNoModel(const ColmapEvidence& evidence) {
       "step sideways between photos instead of turning the camera, and keep the scene still"};
 }
 
-void ExplainUnregistered(const RungResult& rung, const std::vector<StagedPhoto>& photos,
+void ExplainUnregistered(const AttemptResult& attempt, const std::vector<StagedPhoto>& photos,
                          Capture* capture) {
   for (size_t i = 0; i < photos.size(); ++i) {
-    PhotoVerdict& verdict = capture->verdicts[i];
-    if (verdict.verdict != "unregistered") continue;
+    PhotoStatus& verdict = capture->statuses[i];
+    if (verdict.status != "unregistered") continue;
     const std::string& name = photos[i].name;
-    const auto features = rung.evidence.features.find(name);
-    if (features == rung.evidence.features.end()) {
+    const auto features = attempt.evidence.features.find(name);
+    if (features == attempt.evidence.features.end()) {
       verdict.why = "COLMAP did not read it";
     } else if (features->second < kFewFeatures) {
       verdict.why = "only " + std::to_string(features->second) +
@@ -50,20 +50,20 @@ void ExplainUnregistered(const RungResult& rung, const std::vector<StagedPhoto>&
     } else {
       verdict.why = "it overlaps too little with the photos that were placed";
     }
-    for (size_t k = 1; k < rung.models.size(); ++k)
-      for (const ColmapImage& image : rung.models[k].model.images)
+    for (size_t k = 1; k < attempt.models.size(); ++k)
+      for (const ColmapImage& image : attempt.models[k].model.images)
         if (image.name == name)
           verdict.why = "it belongs to another group of " +
-                        Photos(rung.models[k].model.images.size()) +
+                        Photos(attempt.models[k].model.images.size()) +
                         " that nothing connects to the main one";
   }
 }
 
-std::string NoteOnOtherModels(const RungResult& rung) {
+std::string NoteOnOtherModels(const AttemptResult& attempt) {
   std::string others;
-  for (size_t k = 1; k < rung.models.size(); ++k)
-    others += (k == 1 ? "" : ", ") + std::to_string(rung.models[k].model.images.size());
-  return "the photos fall apart into " + std::to_string(rung.models.size()) +
+  for (size_t k = 1; k < attempt.models.size(); ++k)
+    others += (k == 1 ? "" : ", ") + std::to_string(attempt.models[k].model.images.size());
+  return "the photos fall apart into " + std::to_string(attempt.models.size()) +
          " groups that nothing connects; the largest is used (the others have " + others + ")";
 }
 
@@ -80,11 +80,11 @@ void RefuseTooFew(size_t photos_given, int min_photos) {
 
 void RefuseUnregistered(const Capture& capture) {
   std::string names;
-  for (const PhotoVerdict& verdict : capture.verdicts)
-    if (verdict.verdict == "unregistered") names += "\n  " + verdict.file + ": " + verdict.why;
+  for (const PhotoStatus& verdict : capture.statuses)
+    if (verdict.status == "unregistered") names += "\n  " + verdict.file + ": " + verdict.why;
   throw Error(ExitCode::kScene,
               "only " + std::to_string(capture.views.size()) + " of " +
-                  Photos(capture.verdicts.size()) +
+                  Photos(capture.statuses.size()) +
                   " found their place in one scene; not these:" + names,
               "",
               "give photos of one scene that overlap by two thirds, or lower "

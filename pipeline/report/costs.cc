@@ -1,0 +1,102 @@
+#include "pipeline/report/costs.h"
+
+#include <algorithm>
+#include <vector>
+
+#include "pipeline/report/html_text.h"
+#include "pipeline/report/plot.h"
+#include "pipeline/report/tables.h"
+
+namespace regrade {
+namespace {
+
+using Rows = std::vector<const CostRow*>;
+
+std::string NameOf(const CostRow& row) {
+  return row.parameter.empty() ? row.setting : row.parameter + " " + row.setting;
+}
+
+// Accuracy over processor time; what nothing beats is joined by a line.
+std::string ParetoFrontHtml(const Rows& rows) {
+  Plot plot;
+  plot.title = "accuracy over time, " + rows[0]->benchmark;
+  plot.x = "CPU seconds";
+  plot.y = rows[0]->unit;
+  plot.log_x = true;
+  PlotSeries beaten{"measured", {}, 0, true}, front{"on the front", {}, 2, true},
+      base{"the base", {}, 1, true}, line{"front", {}, 2};
+  for (const CostRow* row : rows) {
+    if (!row->cpu_seconds.value || !row->accuracy.value) continue;
+    const PlotPoint point{*row->cpu_seconds.value, *row->accuracy.value, NameOf(*row)};
+    (row->parameter.empty() ? base
+     : row->on_pareto_front ? front
+                            : beaten)
+        .points.push_back(point);
+    if (row->on_pareto_front) line.points.push_back(point);
+  }
+  if (line.points.size() < 2) line.points.clear();
+  std::sort(line.points.begin(), line.points.end(),
+            [](const PlotPoint& a, const PlotPoint& b) { return a.x < b.x; });
+  for (PlotSeries* series : {&beaten, &front, &base, &line})
+    if (!series->points.empty()) plot.series.push_back(std::move(*series));
+  return PlotHtml(plot);
+}
+
+std::string SecondsHtml(const Metric& seconds, const Metric& spread) {
+  if (!seconds.value) return MetricHtml(seconds, 2);
+  const int decimals = *seconds.value < 1 ? 4 : *seconds.value < 100 ? 2 : 0;
+  return MetricHtml(seconds, decimals) +
+         (spread.value ? " <span class=soft>±" + MetricHtml(spread, decimals) + "</span>" : "");
+}
+
+std::string RowHtml(const CostRow& row) {
+  const std::string verdict = row.on_pareto_front ? "<span class=on>front</span>"
+                              : row.dominated_by.empty()
+                                  ? ""
+                                  : "dominated by " + EscapeHtml(row.dominated_by);
+  return "<tr><td>" +
+         (row.parameter.empty() ? "the base"
+                                : "<code>" + EscapeHtml(row.parameter) + "</code>") +
+         "<td class=file>" + EscapeHtml(row.setting) + "<td class=n>" +
+         SecondsHtml(row.seconds, row.seconds_spread) + "<td class=n>" +
+         SecondsHtml(row.cpu_seconds, row.cpu_spread) + "<td class=n>" +
+         MetricHtml(row.accuracy, 3) + "<td class=n>" + MetricHtml(row.error, 3) +
+         "<td class=w>" + verdict + "</tr>";
+}
+
+std::string BenchmarkHtml(const Rows& rows) {
+  std::string body;
+  for (const CostRow* row : rows) body += RowHtml(*row);
+  return "<h3>" + EscapeHtml(rows[0]->benchmark) +
+         "</h3><p>Accuracy: " + EscapeHtml(rows[0]->measure) + ", " +
+         EscapeHtml(rows[0]->unit) + ".</p>" + ParetoFrontHtml(rows) +
+         "<div class=scroll><table><thead><tr><th>parameter<th>setting<th class=n>s<th "
+         "class=n>CPU "
+         "s<th class=n>accuracy<th class=n>error<th></tr></thead><tbody>" +
+         body + "</tbody></table></div>";
+}
+
+}  // namespace
+
+std::string CostsHtml(const RunReport& report) {
+  if (report.costs.empty()) return "";
+  std::vector<Rows> benchmarks;
+  for (const CostRow& row : report.costs) {
+    auto benchmark =
+        std::find_if(benchmarks.begin(), benchmarks.end(),
+                     [&row](const Rows& rows) { return rows[0]->benchmark == row.benchmark; });
+    if (benchmark == benchmarks.end()) benchmark = benchmarks.insert(benchmarks.end(), Rows());
+    benchmark->push_back(&row);
+  }
+  std::string html;
+  for (const Rows& rows : benchmarks) html += BenchmarkHtml(rows);
+  return "<h2>What accuracy costs here</h2><p>Measured on this machine with this capture; each "
+         "row changes one parameter of the base. Medians, ± half of what lies between the "
+         "least and "
+         "the most. The error is against the parameter's accurate end. Nothing on the front is "
+         "beaten "
+         "in accuracy at its CPU time.</p>" +
+         html;
+}
+
+}  // namespace regrade
