@@ -34,7 +34,7 @@ FOLDER = os.path.join("tests", "hard_cases")
 CASES, MUTATIONS, SEEN, PAGE, METRICS, MEASURED = (os.path.join(FOLDER, name) for name in (
     "cases.json", "mutations.json", "MUTATIONS.md", "RESULTS.md", "metrics.json", "measured.json"))
 TEST = re.compile(r"\bTEST(?:_F|_P)?\(\s*(\w+)\s*,\s*(\w+)\s*\)")
-CTEST = re.compile(r"add_test\(NAME (\w+)")
+CTEST = re.compile(r"add_(?:test\(NAME|tree_check\() ?(\w+)")
 NUMBER = re.compile(r"(?<![A-Za-z0-9])([HF]\d+)(?![A-Za-z0-9])")
 HEAD = """# Hard cases and faults
 
