@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "kernels/field/packed_grid.h"
+#include "kernels/field/ray_march.h"
 #include "reconstruct/fit/training_rays.h"
 
 namespace regrade {
