@@ -67,8 +67,8 @@ class Tree:
             return any(fnmatch.fnmatchcase(known, path) for known in (*self.files, *self.folders))
         return path in self.folders or path in self.files
 
-    def missing(self, text, names=True):
-        """[(line, what)] of a text that names files, with `names` also without their folder."""
+    def missing(self, text, names=True, options=True):
+        """[(line, what)] of a text: paths, with `names` also files without their folder, and `options`."""
         found = []
         for number, line in enumerate(text.splitlines(), 1):
             line = FOREIGN.sub(" ", line).replace("$root/", "").replace("\"$root\"/", "").replace("\\.", ".")
@@ -81,6 +81,7 @@ class Tree:
                 found += [(number, one) for one in expanded(path) if not self.has(one)]
             if names:
                 found += [(number, name) for name in NAME.findall(line) if name not in self.names]
+            if options:
                 found += [(number, "option --" + name) for name in OPTION.findall(line) if name not in self.options]
         return found
 
@@ -103,7 +104,7 @@ class Tree:
             words = QUOTES.sub(" ", token.string)
             for number, line in enumerate(words.splitlines(), token.start[0] - 1):
                 (prose if is_prose else strings)[number] += " " + line
-        return self.missing("\n".join(strings), names=False) + self.missing("\n".join(prose))
+        return self.missing("\n".join(strings), False, False) + self.missing("\n".join(prose))
 
     def check(self):
         """[(path, line, what)]"""
@@ -117,7 +118,7 @@ class Tree:
             elif path.startswith("scripts/") and path.endswith(".py"):
                 findings = self.missing_in_python(text_of(self.root, path))
             elif OTHER_SCRIPTS.fullmatch(path):
-                findings = self.missing(text_of(self.root, path))
+                findings = self.missing(text_of(self.root, path), options=False)
             else:
                 continue
             found += [(path, *finding) for finding in sorted(set(findings))]
