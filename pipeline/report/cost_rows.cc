@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "pipeline/files/json_file.h"
+#include "kernels/base/error.h"
 
 namespace regrade {
 namespace {
@@ -38,10 +38,21 @@ CostRow RowOf(const JsonValue& row) {
 
 }  // namespace
 
+void CheckTradeoffSchema(const JsonValue& file, const std::string& path) {
+  const JsonValue* schema = file.IsObject() ? file.Find("schema") : nullptr;
+  if (schema != nullptr && *schema == JsonValue(kTradeoffSchema)) return;
+  throw Error(
+      ExitCode::kInput,
+      (schema == nullptr ? "it has no schema" : "it has schema " + DumpJson(*schema, -1)) +
+          ", and this version reads schema " + std::to_string(kTradeoffSchema),
+      path, "measure again with `regrade tradeoff`");
+}
+
 std::vector<CostRow> ReadCostTable(const std::string& path) {
   std::vector<CostRow> rows;
   if (!std::filesystem::is_regular_file(path)) return rows;
   const JsonValue file = ReadJsonFile(path);
+  CheckTradeoffSchema(file, path);
   for (const JsonValue& row : file.At("costs").AsArray()) rows.push_back(RowOf(row));
   return rows;
 }

@@ -102,7 +102,7 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
                               parts.Next(shares.poses), &report);
     for (const std::string& note : report.notes) context->console->Info(note);
     outcome.metrics["colmap"] = report.colmap_version;
-    outcome.metrics["recipe"] = report.recipe;
+    outcome.metrics["recipe"] = report.strategy;
     outcome.metrics["lens"] = report.lens;
   } else {
     std::vector<std::string> notes;
