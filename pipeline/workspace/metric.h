@@ -1,5 +1,4 @@
-// A measured number, and a decision that was made by one: what records keep and the report
-// shows.
+// Measured numbers, and decisions based on them, for records and the report.
 #pragma once
 
 #include <cmath>
@@ -9,14 +8,14 @@
 
 namespace regrade {
 
-// A number, or the reason why there is none. JSON has no NaN: a value that is not finite is a
-// figure without value.
+// A number, or the reason why there is none. JSON has no NaN: a number that is not finite
+// becomes a metric without value.
 struct Metric {
   std::optional<double> value;
   std::string why = "not measured";  // read only while `value` is empty
 
   Metric() = default;
-  Metric(double number) {  // NOLINT: a number is a figure
+  Metric(double number) {  // NOLINT: a number is a metric
     if (std::isfinite(number)) {
       value = number;
     } else {
@@ -34,8 +33,8 @@ struct Metric {
 struct EffectReport {
   std::string name;
   bool on = false;
-  std::string evidence;  // a sentence for a person
-  Metric value;          // what was measured, in the unit that `evidence` names
+  std::string evidence;  // a sentence
+  Metric value;          // the measurement, in the unit named by `evidence`
   Metric threshold;
 };
 
