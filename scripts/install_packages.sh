@@ -12,7 +12,6 @@ packages=(
   libopencv-dev                              # flow, networks of 2D methods, films
   libceres-dev libeigen3-dev
   colmap                                     # poses, started as a program
-  libjs-chart.js                             # drawings of the report that answer to a pointer
 )
 [[ "${1:-}" == "--dev" ]] && packages+=(clang-format clang-tidy chromium)
 

@@ -4,8 +4,8 @@
   look_at_report.py REPORT.html [--shots FOLDER] [--chromium PROGRAM]
 
 Checked at each width: nothing on the console, nothing asked of the network (films beside the page are files), no
-scrolling sideways, every picture decoded, the slider cuts the picture where it is pulled to, drawings are drawn by
-Chart.js where the page carries it; and without JavaScript the static drawings are seen and no script is missed.
+scrolling sideways, every picture decoded, every chart visible, the slider cuts the picture where it is pulled to; and
+without JavaScript the charts are visible, too.
 --shots keeps pictures of the whole page. Exit status 1 if anything is wrong, 77 if there is no Chromium.
 """
 
@@ -192,14 +192,10 @@ def check_page(page, width):
                         "try{await i.decode()}catch(e){n++}}return n})()")
     if broken:
         found.append(f"{broken} pictures do not decode")
-    plots, live = (page.value("document.querySelectorAll('.plot%s').length" % state) for state in ("", ".live"))
-    if page.value("typeof Chart") != "undefined" and live < plots:
-        found.append(f"{live} of {plots} drawings are drawn by the library")
-    hidden = page.value("[].filter.call(document.querySelectorAll('.plot'),function(p){"
-                        "var d=p.querySelector(p.classList.contains('live')?'canvas':'svg').getBoundingClientRect();"
-                        "return d.width<100||d.height<50}).length")
+    hidden = page.value("[].filter.call(document.querySelectorAll('.plot svg'),function(s){"
+                        "var d=s.getBoundingClientRect();return d.width<100||d.height<50}).length")
     if hidden:
-        found.append(f"{hidden} drawings are not seen")
+        found.append(f"{hidden} charts are not visible")
     return found + check_slider(page) + [c for c in page.complaints() if c not in found]
 
 
@@ -208,7 +204,7 @@ def check_without_script(page):
     shown = page.value("[].every.call(document.querySelectorAll('.plot svg'),function(s){"
                        "return s.getBoundingClientRect().height>50})")
     if not shown:
-        found.append("without JavaScript a drawing is not seen")
+        found.append("without JavaScript a chart is not visible")
     return found
 
 

@@ -14,9 +14,7 @@
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/program/interrupt.h"
-#include "pipeline/report/chart_library.h"
 #include "pipeline/report/html.h"
-#include "pipeline/report/json.h"
 #include "pipeline/run/run_file.h"
 #include "pipeline/run_pipeline.h"
 #include "pipeline/stages/make_stylizer.h"
@@ -24,6 +22,7 @@
 #include "pipeline/tradeoff/duration_estimate.h"
 #include "pipeline/tradeoff/prediction.h"
 #include "pipeline/tradeoff/variant_runner.h"
+#include "pipeline/workspace/metrics_json.h"
 
 namespace regrade {
 namespace {
@@ -139,7 +138,7 @@ void WriteResults(const RunContext& base, const TradeoffOptions& tradeoff,
   const std::vector<CostRow> rows = CostTable(variants, store.all(), base_name);
   const Capture capture = ReadCapture(base.workspace->Path("poses"));
   JsonValue::Array costs, measured;
-  for (const CostRow& row : rows) costs.push_back(CostJson(row));
+  for (const CostRow& row : rows) costs.push_back(MetricsToJson(row));
   for (const Measurement& m : store.all()) measured.push_back(ToJson(m));
   const std::vector<CostTerm> terms =
       LearnCosts(base.settings, capture, *base.workspace, variants, store.all());
@@ -162,7 +161,6 @@ void WriteResults(const RunContext& base, const TradeoffOptions& tradeoff,
   for (const Measurement& m : store.all()) report.seconds += m.seconds;
   ReportPictures pictures;
   pictures.title = "prices of " + fs::path(base.source).filename().string();
-  pictures.chart_library = ReadChartLibrary();
   WriteFileAtomically(folder + "/tradeoff.html", ReportHtml(report, pictures));
   base.console->Event("costs", JsonValue::Object{{"file", folder + "/tradeoff.json"}});
   base.console->Lines(CostTableText(rows));

@@ -1,4 +1,4 @@
-// The price list of a tradeoff.json, read back.
+// Reads the cost table of a tradeoff.json.
 #pragma once
 
 #include <string>

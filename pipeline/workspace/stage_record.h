@@ -23,7 +23,7 @@ struct StageRecord {
   std::vector<StageOutput> outputs;   // sorted by path
   double seconds = 0;                 // by the wall
   std::optional<double> cpu_seconds;  // of all threads and programs started; not in old records
-  JsonValue metrics;                  // object, goes into the report
+  JsonValue metrics;                  // object, see metric.h; goes into the report
 
   // One hash of everything that came out: an input of the stages behind.
   std::string OutputHash() const;
@@ -45,7 +45,9 @@ std::vector<std::string> Differences(const JsonValue& was, const JsonValue& now)
 std::vector<std::string> ChangedOutputs(const std::string& root, const StageRecord& record);
 
 JsonValue ToJson(const StageRecord& record);
-// Throws Error(kInput): damaged, or from a newer version than this program.
+// Throws Error(kInput) with the number of an older schema.
+void CheckRecordSchema(const JsonValue& value, const std::string& where);
+// Throws Error(kInput): damaged, or of an older or newer schema than this program's.
 StageRecord StageRecordFromJson(const JsonValue& value, const std::string& where);
 
 }  // namespace regrade

@@ -34,7 +34,8 @@ class Workspace {
  public:
   // Makes the folder if it is new, locks it, and removes what an interrupted writer left.
   // Throws before any work: Error(kResources) if it cannot be written or is not a folder,
-  // Error(kFolderInUse), Error(kInput) if it holds files under our names that we did not write.
+  // Error(kFolderInUse), Error(kInput) if it holds files under our names that we did not write,
+  // or stage records of an older schema.
   explicit Workspace(const std::string& folder, bool break_lock = false);
 
   // True if a run has worked here: asked before Workspace is made, nothing is touched.
@@ -53,6 +54,8 @@ class Workspace {
               std::optional<double> cpu_seconds = std::nullopt);
   // As if the stage had never been done. Results stay until they are replaced.
   void Forget(const std::string& stage);
+  // Of the stage's record.
+  std::string StagePath(const std::string& stage) const;
   // Names of the recorded stages.
   std::vector<std::string> FinishedStages() const;
 
@@ -68,7 +71,7 @@ class Workspace {
   void RequireFreeSpace(uint64_t bytes, const std::string& for_what) const;
 
  private:
-  std::string StagePath(const std::string& stage) const;
+  void RefuseOlderRecords() const;
   std::string CheckpointPath(const std::string& stage) const;
 
   std::string folder_;  // absolute
