@@ -51,7 +51,9 @@ std::pair<double, double> Range(std::vector<double> values, double outside) {
   return {at(outside), at(1 - outside)};
 }
 
-std::string Place(double x, double y) { return FixedNumber(x, 1) + "," + FixedNumber(y, 1); }
+std::string Coordinates(double x, double y) {
+  return FixedNumber(x, 1) + "," + FixedNumber(y, 1);
+}
 
 }  // namespace
 
@@ -102,7 +104,7 @@ std::string CameraMapHtml(const CameraMap& map) {
   std::string dots;
   for (const auto& [x, y] : map.points)
     if (px(x) > 0 && px(x) < width && py(y) > 0 && py(y) < height)
-      dots += "M" + Place(px(x), py(y)) + "h0";
+      dots += "M" + Coordinates(px(x), py(y)) + "h0";
   std::string marks;
   int held_out = 0;
   for (const CameraMap::Mark& camera : map.cameras) {
@@ -115,8 +117,8 @@ std::string CameraMapHtml(const CameraMap& map) {
     const double flat = std::hypot(camera.look_x, camera.look_y);
     const double sx = flat > 0 ? -ay / flat * side : 0, sy = flat > 0 ? ax / flat * side : 0;
     marks += std::string("<g class=") + (camera.held_out ? "kept" : "cam") + "><path d=\"M" +
-             Place(x, y) + "L" + Place(x + ax + sx, y + ay + sy) + "L" +
-             Place(x + ax - sx, y + ay - sy) + "z\"/><circle cx=" + FixedNumber(x, 1) +
+             Coordinates(x, y) + "L" + Coordinates(x + ax + sx, y + ay + sy) + "L" +
+             Coordinates(x + ax - sx, y + ay - sy) + "z\"/><circle cx=" + FixedNumber(x, 1) +
              " cy=" + FixedNumber(y, 1) + " r=3 /><title>" + EscapeHtml(camera.file) +
              "</title></g>";
   }

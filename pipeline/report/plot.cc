@@ -28,7 +28,7 @@ struct Axis {
   double Fraction(double value) const {
     return log ? std::log(value / low) / std::log(high / low) : (value - low) / (high - low);
   }
-  double Place(double value) const { return from + Fraction(value) * (to - from); }
+  double Position(double value) const { return from + Fraction(value) * (to - from); }
 };
 
 // 1, 2 or 5 times a power of ten; about kTicks of them make the span.
@@ -93,28 +93,29 @@ std::string AxesSvg(const Axis& x, const Axis& y, const Plot& plot) {
   std::string svg;
   const std::vector<double> rows = TicksOf(y), columns = TicksOf(x);
   for (const double value : rows)
-    svg += Line(kLeft, y.Place(value), kWidth - kRight, y.Place(value)) +
-           Label(kLeft - 6, y.Place(value) + 4, "end", TickText(value, rows));
+    svg += Line(kLeft, y.Position(value), kWidth - kRight, y.Position(value)) +
+           Label(kLeft - 6, y.Position(value) + 4, "end", TickText(value, rows));
   for (const double value : columns)
-    svg += Label(x.Place(value), kHeight - kBottom + 14, "middle", TickText(value, columns));
+    svg += Label(x.Position(value), kHeight - kBottom + 14, "middle", TickText(value, columns));
   return svg + Label(kWidth - kRight, kHeight - 4, "end", plot.x);
 }
 
 std::string SeriesSvg(const PlotSeries& series, const Axis& x, const Axis& y) {
   const std::string colour = std::to_string(series.colour % kColours);
-  std::string svg, places, tips;
+  std::string svg, positions, tips;
   const auto finish = [&] {
-    if (!places.empty())
-      svg += "<polyline class=k" + colour + " points=\"" + places + "\" style=\"fill:none\"/>";
-    places.clear();
+    if (!positions.empty())
+      svg +=
+          "<polyline class=k" + colour + " points=\"" + positions + "\" style=\"fill:none\"/>";
+    positions.clear();
   };
   for (const PlotPoint& point : series.points) {
     if (!point.y || !y.Accepts(*point.y) || !x.Accepts(point.x)) {
       finish();
       continue;
     }
-    const std::string px = FixedNumber(x.Place(point.x), 1),
-                      py = FixedNumber(y.Place(*point.y), 1);
+    const std::string px = FixedNumber(x.Position(point.x), 1),
+                      py = FixedNumber(y.Position(*point.y), 1);
     const auto circle = [&](const char* classes, const char* radius, const std::string& tip) {
       return std::string("<circle class=") + classes + " cx=" + px + " cy=" + py +
              " r=" + radius + "><title>" + tip + "</title></circle>";
@@ -123,7 +124,7 @@ std::string SeriesSvg(const PlotSeries& series, const Axis& x, const Axis& y) {
       svg += circle(("k" + colour).c_str(), "4", EscapeHtml(point.label));
       continue;
     }
-    places += px + "," + py + " ";
+    positions += px + "," + py + " ";
     if (!series.name.empty() && series.points.size() <= kMostTips)
       tips += circle("tip", "5",
                      EscapeHtml(series.name) + ", " + FixedNumber(point.x, 0) + ": " +

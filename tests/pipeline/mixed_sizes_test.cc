@@ -156,12 +156,12 @@ TEST(MixedSizes, H159_ThreeSizesOfTwoCamerasGoToFilmAndReport) {
   EXPECT_EQ(sheet.code, 0) << sheet.text;
 
   // Frames of another program that differ in size are a mistake.
-  const ProgramOutcome foreign =
+  const ProgramOutcome sizes_differ =
       Regrade({"evaluate", "--frames", folder / "e/frames/styled", "--out", folder / "f"});
-  EXPECT_EQ(foreign.code, 3);
-  EXPECT_NE(foreign.text.find("48 x 64 px, 00000.png is 64 x 48 px"), std::string::npos)
-      << foreign.text;
-  EXPECT_NE(foreign.text.find("render all frames at one size"), std::string::npos);
+  EXPECT_EQ(sizes_differ.code, 3);
+  EXPECT_NE(sizes_differ.text.find("48 x 64 px, 00000.png is 64 x 48 px"), std::string::npos)
+      << sizes_differ.text;
+  EXPECT_NE(sizes_differ.text.find("render all frames at one size"), std::string::npos);
 }
 
 TEST(MixedSizes, H159_OnePhotoOfAnotherShape) {
