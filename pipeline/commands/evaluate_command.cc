@@ -130,16 +130,13 @@ void RunEvaluate(const Command& command, const Arguments& arguments, Console* co
   options.Add("Frames", &frames);
   options.Add("Evaluation", &consistency);
   options.Add("Program", &program);
-  if (PrintedHelp(command, arguments, options)) return;
   // Without --frames it is a run's folder, with all of a run's options.
   const bool foreign = std::any_of(arguments.begin(), arguments.end(), [](const auto& word) {
     return word == "--frames" || word.compare(0, 9, "--frames=") == 0;
   });
-  if (!foreign) return ContinueRun(command, arguments, "evaluate", console);
-  const Arguments words = options.Parse(arguments);
-  options.ApplyFlags();
-  CheckWords(command, words, 0, 0);
-  ApplyProgramOptions(program);
+  if (!foreign && !AsksForHelp(arguments))
+    return ContinueRun(command, arguments, "evaluate", console);
+  if (!Prepare(command, arguments, {.least_words = 0, .most_words = 0}, &options)) return;
   EvaluateFrames(frames, consistency, console);
 }
 
