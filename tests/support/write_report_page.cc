@@ -49,7 +49,7 @@ RunReport EveryMetric(const std::string& evil) {
   }
   report.fidelity = {{"styled", 24.5, 0.19, 0.2, 12, 13, 0.01}};
   for (int i = 0; i < 6; ++i)
-    report.prices.push_back({"fit", i == 0 ? "" : "fit-steps", evil, "held-out PSNR", "dB", 3,
+    report.costs.push_back({"fit", i == 0 ? "" : "fit-steps", evil, "held-out PSNR", "dB", 3,
                              12.0 + i, 0.5, 20.0 + 3 * i, 1, 25 + std::sqrt(i), 0.1,
                              i == 5 ? Metric() : Metric(0.1), i != 3, i == 3 ? evil : ""});
   report.options = {{"style", evil}};
