@@ -55,11 +55,7 @@ void RunDoctor(const Command& command, const Arguments& arguments, Console* cons
   ProgramOptions program;
   OptionSet options;
   options.Add("Program", &program);
-  if (PrintedHelp(command, arguments, options)) return;
-  const Arguments words = options.Parse(arguments);
-  options.ApplyFlags();
-  CheckWords(command, words, 0, 0);
-  ApplyProgramOptions(program);
+  if (!Prepare(command, arguments, {.least_words = 0, .most_words = 0}, &options)) return;
 
   const auto gigabytes = [](uint64_t bytes) {
     char text[32];

@@ -129,16 +129,13 @@ void RunEvaluate(const Command& command, const Arguments& arguments, Console* co
   options.Add("Frames", &frames);
   options.Add("Evaluation", &consistency);
   options.Add("Program", &program);
-  if (PrintedHelp(command, arguments, options)) return;
   // Without --frames it evaluates the folder of a run, with all of a run's options.
   const bool has_frames = std::any_of(arguments.begin(), arguments.end(), [](const auto& word) {
     return word == "--frames" || word.compare(0, 9, "--frames=") == 0;
   });
-  if (!has_frames) return ContinueRun(command, arguments, "evaluate", console);
-  const Arguments words = options.Parse(arguments);
-  options.ApplyFlags();
-  CheckWords(command, words, 0, 0);
-  ApplyProgramOptions(program);
+  if (!has_frames && !AsksForHelp(arguments))
+    return ContinueRun(command, arguments, "evaluate", console);
+  if (!Prepare(command, arguments, {.least_words = 0, .most_words = 0}, &options)) return;
   EvaluateFrames(frames, consistency, console);
 }
 

@@ -15,6 +15,7 @@
 #include "pipeline/images/image_file.h"
 #include "pipeline/program/interrupt.h"
 #include "pipeline/report/html.h"
+#include "pipeline/run/resolve_settings.h"
 #include "pipeline/run/run_file.h"
 #include "pipeline/run_pipeline.h"
 #include "pipeline/stages/make_stylizer.h"
@@ -127,7 +128,8 @@ std::string Fingerprint(const RunContext& base, const Workspace& workspace) {
       all += HashText(HashOf(DumpJson(record->inputs, -1)));
   const JsonValue values = base.options.Values();
   for (const auto& [name, value] : values.AsObject())
-    if (name != "out" && name != "json" && base.options.Values("Start").Find(name) == nullptr)
+    if (name != "out" && name != "json" &&
+        OptionValues(base.settings.start).Find(name) == nullptr)
       all += name + DumpJson(value, -1);
   return HashText(HashOf(all));
 }
@@ -229,11 +231,7 @@ void PrintPrediction(const TradeoffOptions& tradeoff, Console* console) {
                 "make one with `regrade run`");
   RunContext run;
   run.settings.Bind(&run.options);
-  const std::string run_json = tradeoff.predict + "/run.json";
-  const RunFile file = ReadRunFile(run_json);
-  if (const JsonValue* preset = file.options.Find("preset"))
-    ApplyPreset(preset->AsString(), &run.settings);
-  run.options.ApplyConfig(file.options, run_json);
+  ResolveSettings({.run_json = tradeoff.predict + "/run.json"}, &run.options);
   Workspace workspace(tradeoff.predict);
   const Capture capture = ReadCapture(workspace.Path("poses"));
   char line[160];
@@ -275,17 +273,15 @@ void RunTradeoff(const Command& command, const Arguments& arguments, Console* co
   RunContext base;
   base.console = console;
   RunSettings& settings = base.settings;
-  ApplyPreset("draft", &settings);  // a price list of the standard preset takes hours
-  settings.Bind(&base.options);     // what a run has; flags are read with ours beside
+  settings.Bind(&base.options);  // what a run has; flags are read with ours beside
   OptionSet flags;
   settings.Bind(&flags);
   flags.Add("Tradeoff", &tradeoff);
-  if (PrintedHelp(command, arguments, flags)) return;
-  const Arguments words = flags.Parse(arguments);
-  if (const auto preset = flags.Given("preset")) ApplyPreset(*preset, &settings);
-  ApplyRecipeFlag(&flags, &settings);
-  flags.ApplyFlags();
-  ApplyProgramOptions(settings.program);
+  // Measuring the standard preset takes hours.
+  const auto prepared = Prepare(command, arguments,
+                                {.least_words = 0, .most_words = 1, .preset = "draft"}, &flags);
+  if (!prepared) return;
+  const Arguments& words = prepared->words;
   if (!tradeoff.predict.empty()) {
     CheckWords(command, words, 0, 0);
     return PrintPrediction(tradeoff, console);

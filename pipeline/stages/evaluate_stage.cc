@@ -219,7 +219,7 @@ Stage EvaluateStage(RunContext* context) {
                                    {"views_2d", context->ResultOf("style_2d")},
                                    {"style", HashFile(context->settings.style.picture)},
                                    {"holdout", context->settings.run.holdout},
-                                   {"options", context->OptionsOf({"Evaluation"})}};
+                                   {"options", OptionValues(context->settings.consistency)}};
   stage.work = [context](const ProgressFunction& progress) {
     return Evaluate(context, progress);
   };

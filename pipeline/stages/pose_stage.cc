@@ -145,8 +145,9 @@ Stage PoseStage(RunContext* context) {
   const CaptureSource source = DetectCapture(context->source);
   Stage stage;
   stage.name = "pose";
-  stage.inputs = JsonValue::Object{{"photos", PhotoSet(source)},
-                                   {"options", context->OptionsOf({"Photos", "Poses"})}};
+  stage.inputs = JsonValue::Object{
+      {"photos", PhotoSet(source)},
+      {"options", OptionValues(context->settings.ingest, context->settings.pose)}};
   if (source.kind == CaptureKind::kTransforms || source.kind == CaptureKind::kLlff)
     stage.inputs["poses"] = HashFile(source.poses);
   if (source.kind == CaptureKind::kColmap || source.kind == CaptureKind::kPosed)

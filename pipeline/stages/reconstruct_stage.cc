@@ -213,12 +213,13 @@ Stage ReconstructStage(RunContext* context) {
   const RunOptions& run = context->settings.run;
   Stage stage;
   stage.name = "reconstruct";
-  stage.inputs = JsonValue::Object{{"poses", context->ResultOf("pose")},
-                                   {"options", context->OptionsOf({"Scene", "Fit"})},
-                                   {"seed", run.seed},
-                                   {"holdout", run.holdout},
-                                   {"effects", run.effects},
-                                   {"reproducible", run.reproducible}};
+  stage.inputs = JsonValue::Object{
+      {"poses", context->ResultOf("pose")},
+      {"options", OptionValues(context->settings.scene, context->settings.fit)},
+      {"seed", run.seed},
+      {"holdout", run.holdout},
+      {"effects", run.effects},
+      {"reproducible", run.reproducible}};
   stage.refuse_changes = true;
   if (context->settings.start.dry_run) {
     const Capture capture = ReadCapture(context->workspace->Path("poses"));

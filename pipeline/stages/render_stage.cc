@@ -221,11 +221,12 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
 Stage RenderStage(RunContext* context) {
   Stage stage;
   stage.name = "render";
-  stage.inputs =
-      JsonValue::Object{{"field", context->ResultOf("reconstruct")},
-                        {"styled", context->ResultOf("stylize")},
-                        {"views_2d", context->ResultOf("style_2d")},
-                        {"options", context->OptionsOf({"Scene", "Render", "2D method"})}};
+  stage.inputs = JsonValue::Object{
+      {"field", context->ResultOf("reconstruct")},
+      {"styled", context->ResultOf("stylize")},
+      {"views_2d", context->ResultOf("style_2d")},
+      {"options", OptionValues(context->settings.scene, context->settings.render,
+                               context->settings.style_2d)}};
   if (context->workspace->Find("pose")) {
     const std::vector<FrameSet> sets = PlannedSets(*context);
     stage.plan = PlanOf(sets);

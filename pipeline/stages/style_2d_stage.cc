@@ -87,9 +87,10 @@ StageOutcome StyleViews(RunContext* context, const ProgressFunction& progress) {
 Stage Style2dStage(RunContext* context) {
   Stage stage;
   stage.name = "style_2d";
-  stage.inputs = JsonValue::Object{{"poses", context->ResultOf("pose")},
-                                   {"style", HashFile(context->settings.style.picture)},
-                                   {"options", context->OptionsOf({"Scene", "2D method"})}};
+  stage.inputs = JsonValue::Object{
+      {"poses", context->ResultOf("pose")},
+      {"style", HashFile(context->settings.style.picture)},
+      {"options", OptionValues(context->settings.scene, context->settings.style_2d)}};
   const JsonValue files = MethodFiles(context->settings.style_2d);
   if (!files.IsNull()) stage.inputs["method_files"] = files;
   const JsonValue gains = RecordedGainRows(*context->workspace);
@@ -97,7 +98,7 @@ Stage Style2dStage(RunContext* context) {
   if (std::filesystem::is_directory(context->workspace->Path("poses/masks")))
     stage.inputs["field"] = context->ResultOf("reconstruct");
   if (context->settings.object.On()) {
-    stage.inputs["object"] = context->OptionsOf({"Object"});
+    stage.inputs["object"] = OptionValues(context->settings.object);
     stage.inputs["masks"] = MaskFiles(context->settings.object);
   }
   stage.work = [context](const ProgressFunction& progress) {

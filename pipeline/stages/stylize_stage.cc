@@ -207,13 +207,14 @@ Stage StylizeStage(RunContext* context) {
   const RunOptions& run = context->settings.run;
   Stage stage;
   stage.name = "stylize";
-  stage.inputs = JsonValue::Object{{"field", context->ResultOf("reconstruct")},
-                                   {"views_2d", context->ResultOf("style_2d")},
-                                   {"options", context->OptionsOf({"Scene", "Network"})},
-                                   {"seed", run.seed},
-                                   {"holdout", run.holdout}};
+  stage.inputs = JsonValue::Object{
+      {"field", context->ResultOf("reconstruct")},
+      {"views_2d", context->ResultOf("style_2d")},
+      {"options", OptionValues(context->settings.scene, context->settings.network)},
+      {"seed", run.seed},
+      {"holdout", run.holdout}};
   if (context->settings.object.On()) {
-    stage.inputs["object"] = context->OptionsOf({"Object"});
+    stage.inputs["object"] = OptionValues(context->settings.object);
     stage.inputs["masks"] = MaskFiles(context->settings.object);
   }
   stage.plan = PlanText(PlanStyle(context->settings.network.steps, omp_get_max_threads()));
