@@ -73,7 +73,7 @@ ALLOWED = (
     ("OpenImageIO", r"OpenImageIO/", (r"pipeline/images/image_file\.cc",)),
     ("libjpeg-turbo", r"(jpeglib|jerror|jmorecfg|turbojpeg)\.h", (r"pipeline/images/jpeg_decoder\.cc",)),
     ("libpng", r"(png|pngconf|pnglibconf)\.h", (r"pipeline/images/png_decoder\.cc",)),
-    ("Ceres", r"(ceres|glog)/", (r"reconstruct/refinement/(exposure|refine_poses)\.cc",)),
+    ("Ceres", r"(ceres|glog)/", (r"reconstruct/refinement/(bundle|exposure|refine_poses)\.cc",)),
     ("Boost", r"boost/", (r"pipeline/program/option_binding\.cc",)),
     ("nlohmann-json", r"nlohmann/", (r"pipeline/files/[^/]*\.cc",)),
     ("libzip", r"(zip|zipconf|zlib)\.h", (r"pipeline/files/[^/]*\.cc",)),

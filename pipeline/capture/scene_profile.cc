@@ -174,13 +174,13 @@ SceneProfile ProfileScene(const Capture& capture, int sh_degree, const std::stri
                                 "share of transparent pixels, where every photo has some"));
   const Surroundings surroundings = MeasureSurroundings(capture);
   const bool background =
-      decided("background", surroundings.far_share > kFarShare && !ndc && !alpha);
+      decided("background", surroundings.far_fraction > kFarFraction && !ndc && !alpha);
   if (background && (ndc || alpha))
     throw Error(ExitCode::kUsage,
                 std::string("background spheres do not go with ") + (ndc ? "ndc" : "alpha"),
                 "--effects background=on", ndc ? "add ndc=off" : "add alpha=off");
   profile.effects.push_back(
-      Row("background", background, surroundings.far_share, kFarShare,
+      Row("background", background, surroundings.far_fraction, kFarFraction,
           "spheres behind the box, on where much is far all round: share "
           "of observations of points beyond four times the cameras' reach"));
   profile.effects.push_back(Row(kViewDependence, sh_degree > 0, sh_degree, 0,

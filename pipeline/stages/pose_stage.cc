@@ -105,7 +105,7 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
                               parts.Next(shares.poses), &report);
     for (const std::string& note : report.notes) context->console->Info(note);
     metrics.colmap = report.colmap_version;
-    metrics.strategy = report.recipe;
+    metrics.strategy = report.strategy;
     metrics.lens = report.lens;
   } else {
     std::vector<std::string> notes;
