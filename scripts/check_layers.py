@@ -58,7 +58,7 @@ LAYERS = {
     "pipeline/report": 3,
     "pipeline/run": 4,
     "pipeline/synth": 4,
-    "pipeline/gpu": 4,
+    "pipeline/gpu": 5,
     "pipeline/stages": 5,
     "pipeline/tradeoff": 6,
     "pipeline": 6,

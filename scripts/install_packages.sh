@@ -13,7 +13,6 @@ packages=(
   libavformat-dev libavcodec-dev libavutil-dev libswscale-dev   # films
   libceres-dev libeigen3-dev
   colmap                                     # poses, started as a program
-  libjs-chart.js                             # drawings of the report that answer to a pointer
 )
 [[ "${1:-}" == "--dev" ]] && packages+=(clang-format clang-tidy chromium)
 

@@ -14,10 +14,9 @@
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/program/interrupt.h"
-#include "pipeline/report/chart_library.h"
 #include "pipeline/report/cost_rows.h"
 #include "pipeline/report/html.h"
-#include "pipeline/report/json.h"
+#include "pipeline/run/resolve_settings.h"
 #include "pipeline/run/run_file.h"
 #include "pipeline/run_pipeline.h"
 #include "pipeline/stages/make_stylizer.h"
@@ -25,6 +24,7 @@
 #include "pipeline/tradeoff/duration_estimate.h"
 #include "pipeline/tradeoff/prediction.h"
 #include "pipeline/tradeoff/variant_runner.h"
+#include "pipeline/workspace/metrics_json.h"
 
 namespace regrade {
 namespace {
@@ -129,7 +129,8 @@ std::string Fingerprint(const RunContext& base, const Workspace& workspace) {
       all += HashText(HashOf(DumpJson(record->inputs, -1)));
   const JsonValue values = base.options.Values();
   for (const auto& [name, value] : values.AsObject())
-    if (name != "out" && name != "json" && base.options.Values("Start").Find(name) == nullptr)
+    if (name != "out" && name != "json" &&
+        OptionValues(base.settings.start).Find(name) == nullptr)
       all += name + DumpJson(value, -1);
   return HashText(HashOf(all));
 }
@@ -140,7 +141,7 @@ void WriteResults(const RunContext& base, const TradeoffOptions& tradeoff,
   const std::vector<CostRow> rows = CostTable(variants, store.all(), base_name);
   const Capture capture = ReadCapture(base.workspace->Path("poses"));
   JsonValue::Array costs, measured;
-  for (const CostRow& row : rows) costs.push_back(CostJson(row));
+  for (const CostRow& row : rows) costs.push_back(MetricsToJson(row));
   for (const Measurement& m : store.all()) measured.push_back(ToJson(m));
   const std::vector<CostTerm> terms =
       LearnCosts(base.settings, capture, *base.workspace, variants, store.all());
@@ -163,7 +164,6 @@ void WriteResults(const RunContext& base, const TradeoffOptions& tradeoff,
   for (const Measurement& m : store.all()) report.seconds += m.seconds;
   ReportPictures pictures;
   pictures.title = "costs of " + fs::path(base.source).filename().string();
-  pictures.chart_library = ReadChartLibrary();
   WriteFileAtomically(folder + "/tradeoff.html", ReportHtml(report, pictures));
   base.console->Event("costs", JsonValue::Object{{"file", folder + "/tradeoff.json"}});
   base.console->Lines(CostTableText(rows));
@@ -232,11 +232,7 @@ void PrintPrediction(const TradeoffOptions& tradeoff, Console* console) {
                 "make one with `regrade run`");
   RunContext run;
   run.settings.Bind(&run.options);
-  const std::string run_json = tradeoff.predict + "/run.json";
-  const RunFile file = ReadRunFile(run_json);
-  if (const JsonValue* preset = file.options.Find("preset"))
-    ApplyPreset(preset->AsString(), &run.settings);
-  run.options.ApplyConfig(file.options, run_json);
+  ResolveSettings({.run_json = tradeoff.predict + "/run.json"}, &run.options);
   Workspace workspace(tradeoff.predict);
   const Capture capture = ReadCapture(workspace.Path("poses"));
   char line[160];
@@ -279,17 +275,15 @@ void RunTradeoff(const Command& command, const Arguments& arguments, Console* co
   RunContext base;
   base.console = console;
   RunSettings& settings = base.settings;
-  ApplyPreset("draft", &settings);  // measuring the standard preset takes hours
-  settings.Bind(&base.options);     // a run's options; `flags` has those of tradeoff, too
+  settings.Bind(&base.options);  // a run's options; `flags` has those of tradeoff, too
   OptionSet flags;
   settings.Bind(&flags);
   flags.Add("Tradeoff", &tradeoff);
-  if (PrintedHelp(command, arguments, flags)) return;
-  const Arguments words = flags.Parse(arguments);
-  if (const auto preset = flags.Given("preset")) ApplyPreset(*preset, &settings);
-  ApplyRecipeFlag(&flags, &settings);
-  flags.ApplyFlags();
-  ApplyProgramOptions(settings.program);
+  // Measuring the standard preset takes hours.
+  const auto prepared = Prepare(command, arguments,
+                                {.least_words = 0, .most_words = 1, .preset = "draft"}, &flags);
+  if (!prepared) return;
+  const Arguments& words = prepared->words;
   if (!tradeoff.predict.empty()) {
     CheckWords(command, words, 0, 0);
     return PrintPrediction(tradeoff, console);

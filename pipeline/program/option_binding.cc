@@ -258,18 +258,11 @@ JsonValue OptionSet::Values() const {
   return values;
 }
 
-JsonValue OptionSet::Values(const std::string& group) const {
-  JsonValue values = JsonValue::Object();
-  for (const Entry& entry : entries_)
-    if (entry.group == group) values[entry.name] = ValueOf(entry);
-  return values;
-}
-
 std::string OptionSet::Help() const {
-  std::string text, group;
+  std::string text, heading;
   for (const Entry& entry : entries_) {
-    if (entry.group != group || text.empty()) text += "\n" + entry.group + ":\n";
-    group = entry.group;
+    if (entry.heading != heading || text.empty()) text += "\n" + entry.heading + ":\n";
+    heading = entry.heading;
     const bool is_switch = std::holds_alternative<bool*>(entry.target);
     const bool is_text = std::holds_alternative<std::string*>(entry.target);
     std::string head = "  --" + entry.name;

@@ -16,11 +16,11 @@ namespace regrade {
 
 class OptionSet {
  public:
-  // `options` must outlive the set. `group` heads its part of the help and names its part of a
-  // fingerprint. Flag names must be unique within the set (checked).
+  // `options` must outlive the set. `heading` is that of its part of the help, and nothing
+  // else. Flag names must be unique within the set (checked).
   template <typename T>
-  void Add(const std::string& group, T* options) {
-    Binder binder{this, group};
+  void Add(const std::string& heading, T* options) {
+    Binder binder{this, heading};
     options->Describe(binder);
   }
 
@@ -40,9 +40,8 @@ class OptionSet {
   // values outside it, and for texts that are no number: NaN, 1e999, 0x10, 12abc.
   void ApplyFlags();
 
-  // {"name": value, ...} of everything in effect, or of one group.
+  // {"name": value, ...} of everything in effect.
   JsonValue Values() const;
-  JsonValue Values(const std::string& group) const;
 
   // Names, units, effects, defaults and bounds. Call before flags are applied.
   std::string Help() const;
@@ -51,16 +50,16 @@ class OptionSet {
   using Target = std::variant<bool*, int*, int64_t*, uint64_t*, float*, double*, std::string*,
                               std::vector<int>*>;
   struct Entry {
-    std::string group, name;
+    std::string heading, name;
     Target target;
     OptionInfo info;
   };
   struct Binder {
     OptionSet* set;
-    std::string group;
+    std::string heading;
     template <typename T>
     void operator()(const char* name, T& member, const OptionInfo& info) {
-      set->AddEntry({group, name, &member, info});
+      set->AddEntry({heading, name, &member, info});
     }
   };
   struct Flag {
@@ -76,5 +75,13 @@ class OptionSet {
   std::vector<Entry> entries_;
   std::vector<Flag> flags_;
 };
+
+// {"name": value, ...} of option structs: what a stage's inputs hold of them.
+template <typename... Options>
+JsonValue OptionValues(Options... options) {
+  OptionSet set;
+  (set.Add("", &options), ...);
+  return set.Values();
+}
 
 }  // namespace regrade

@@ -1,4 +1,3 @@
-// Escaping and number formats of the report page.
 #include "pipeline/report/html_text.h"
 
 #include <algorithm>
@@ -11,7 +10,7 @@
 namespace regrade {
 namespace {
 
-// Characters that would let a name look like another one.
+// Characters that let a name look like another one.
 bool HidesOrReorders(uint32_t c) {
   return (c >= 0x80 && c < 0xA0) || c == 0xAD || (c >= 0x200B && c <= 0x200F) ||
          (c >= 0x2028 && c <= 0x202E) || (c >= 0x2060 && c <= 0x2069) || c == 0xFEFF;
@@ -94,6 +93,13 @@ std::string FixedNumber(double value, int decimals) {
   std::replace(out.begin(), out.end(), ',', '.');  // the locale's decimal comma
   if (out[0] == '-' && out.find_first_not_of("-0.") == std::string::npos) out.erase(0, 1);
   return out;
+}
+
+std::string GroupedNumber(int64_t value) {
+  std::string digits = std::to_string(value);
+  const size_t first = value < 0 ? 1 : 0;
+  for (size_t at = digits.size(); at > first + 3;) digits.insert(at -= 3, ",");
+  return digits;
 }
 
 std::string Duration(double seconds) {

@@ -1,5 +1,8 @@
 #include "pipeline/run/run_settings.h"
 
+#include <algorithm>
+#include <iterator>
+
 #include "kernels/base/error.h"
 
 namespace regrade {
@@ -18,6 +21,10 @@ void RunSettings::Bind(OptionSet* options) {
   options->Add("Render", &render);
   options->Add("Evaluation", &consistency);
   options->Add("Program", &program);
+}
+
+bool IsPreset(const std::string& name) {
+  return std::find(std::begin(kPresets), std::end(kPresets), name) != std::end(kPresets);
 }
 
 void ApplyPreset(const std::string& preset, RunSettings* settings) {
@@ -63,11 +70,6 @@ void ApplyPreset(const std::string& preset, RunSettings* settings) {
     throw Error(ExitCode::kUsage, "'" + preset + "' is not allowed", "--preset",
                 "allowed: draft, standard, paper, best");
   }
-}
-
-void ApplyRecipeFlag(OptionSet* options, RunSettings* settings) {
-  if (const auto recipe = options->Given("recipe"))
-    ApplyStyleRecipe(*recipe, &settings->network);
 }
 
 void CheckTogether(const RunSettings& settings) {

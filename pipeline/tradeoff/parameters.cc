@@ -113,15 +113,8 @@ const Benchmark& BenchmarkOf(const std::string& name) {
 
 JsonValue PresetOptions(const std::string& preset) {
   RunSettings settings;
-  OptionSet options;
-  settings.Bind(&options);
   ApplyPreset(preset, &settings);
-  JsonValue values = JsonValue::Object();
-  for (const char* group : {"Scene", "Fit"}) {
-    const JsonValue of_group = options.Values(group);
-    for (const auto& [name, value] : of_group.AsObject()) values[name] = value;
-  }
-  return values;
+  return OptionValues(settings.scene, settings.fit);
 }
 
 std::vector<Variant> VariantsOf(const RunSettings& base, const ParameterChoice& choice) {

@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int64_t kSchema = 1;
+constexpr int64_t kSchema = 2;
 constexpr size_t kNamedDifferences = 4;
 
 bool EndsWith(const std::string& text, const std::string& end) {
@@ -141,6 +141,14 @@ JsonValue ToJson(const StageRecord& record) {
   return json;
 }
 
+void CheckRecordSchema(const JsonValue& value, const std::string& where) {
+  const JsonValue* schema = value.Find("schema");
+  if (schema == nullptr || !schema->IsNumber() || schema->AsDouble() >= kSchema) return;
+  throw Error(ExitCode::kInput,
+              "made by an older regrade (schema " + DumpJson(*schema, -1) + ")", where,
+              "use another --out, or delete the output folder");
+}
+
 StageRecord StageRecordFromJson(const JsonValue& value, const std::string& where) {
   StageRecord record;
   try {
@@ -149,6 +157,7 @@ StageRecord StageRecordFromJson(const JsonValue& value, const std::string& where
       throw Error(ExitCode::kInput,
                   "written by regrade " + record.version + ", this is " REGRADE_VERSION, where,
                   "update regrade; nothing has been touched");
+    CheckRecordSchema(value, where);
     record.inputs = value.At("inputs");
     for (const JsonValue& output : value.At("outputs").AsArray()) {
       // Paths out of the folder are refused.

@@ -22,7 +22,7 @@ struct StageRecord {
   std::vector<StageOutput> outputs;   // sorted by path
   double seconds = 0;                 // wall clock
   std::optional<double> cpu_seconds;  // of all threads and programs started; not in old records
-  JsonValue metrics;                  // object, goes into the report
+  JsonValue metrics;                  // object, see metric.h; goes into the report
 
   // One hash of all outputs: an input of the following stages.
   std::string OutputHash() const;
@@ -44,7 +44,9 @@ std::vector<std::string> Differences(const JsonValue& was, const JsonValue& now)
 std::vector<std::string> ChangedOutputs(const std::string& root, const StageRecord& record);
 
 JsonValue ToJson(const StageRecord& record);
-// Throws Error(kInput) for records that are damaged or of a newer version.
+// Throws Error(kInput) with the number of an older schema.
+void CheckRecordSchema(const JsonValue& value, const std::string& where);
+// Throws Error(kInput): damaged, or of an older or newer schema than this program's.
 StageRecord StageRecordFromJson(const JsonValue& value, const std::string& where);
 
 }  // namespace regrade

@@ -74,6 +74,7 @@ Workspace::Workspace(const std::string& folder, bool break_lock) {
   lock_.emplace(folder_ + kOwnFolder + "/lock", break_lock);
   MakeFolder(Path(".regrade/stages"));
   MakeFolder(Path(".regrade/checkpoints"));
+  RefuseOlderRecords();
   RemoveTemporaries(folder_);
 }
 
@@ -81,6 +82,18 @@ std::string Workspace::NewPath(const std::string& relative) const {
   const std::string path = Path(relative);
   MakeFolder(fs::path(path).parent_path().string());
   return path;
+}
+
+void Workspace::RefuseOlderRecords() const {
+  for (const std::string& stage : FinishedStages()) {
+    JsonValue record;
+    try {
+      record = ReadJsonFile(StagePath(stage), kMaxRecord);
+    } catch (const Error&) {  // a damaged record is reported by whoever needs it
+      continue;
+    }
+    CheckRecordSchema(record, StagePath(stage));
+  }
 }
 
 std::string Workspace::StagePath(const std::string& stage) const {

@@ -34,8 +34,8 @@ class Workspace {
  public:
   // Creates the folder if it is new, locks it, and removes temporaries of interrupted writers.
   // Throws before any work: Error(kResources) if it cannot be written or is not a folder,
-  // Error(kFolderInUse), Error(kInput) if it holds files of these names that regrade did not
-  // write.
+  // Error(kFolderInUse), Error(kInput) if it holds files under our names that we did not write,
+  // or stage records of an older schema.
   explicit Workspace(const std::string& folder, bool break_lock = false);
 
   // True if a run has worked here. Changes nothing.
@@ -54,6 +54,8 @@ class Workspace {
               std::optional<double> cpu_seconds = std::nullopt);
   // Drops the stage's record and checkpoint. Results stay until they are replaced.
   void Forget(const std::string& stage);
+  // Of the stage's record.
+  std::string StagePath(const std::string& stage) const;
   // Names of the recorded stages.
   std::vector<std::string> FinishedStages() const;
 
@@ -65,7 +67,7 @@ class Workspace {
   void DropCheckpoint(const std::string& stage) const;
 
  private:
-  std::string StagePath(const std::string& stage) const;
+  void RefuseOlderRecords() const;
   std::string CheckpointPath(const std::string& stage) const;
 
   std::string folder_;  // absolute

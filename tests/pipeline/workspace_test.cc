@@ -142,13 +142,23 @@ TEST(Workspace, RecordsOfNewerVersionsAreRefused) {
   EXPECT_REGRADE_ERROR(workspace.Find("pose"), ExitCode::kInput, "written by regrade 7.0");
 }
 
+TEST(Workspace, FoldersOfOlderSchemasAreRefused) {
+  const TemporaryFolder folder;
+  const std::string record = folder / "out/.regrade/stages/pose.json";
+  WriteText(record, R"({"schema": 1, "regrade": "0.1.0"})");
+  EXPECT_REGRADE_ERROR(Workspace(folder / "out"), ExitCode::kInput, "regrade (schema 1)");
+  EXPECT_REGRADE_ERROR(Workspace(folder / "out"), ExitCode::kInput, "use another --out");
+  WriteText(record, "{ \"schema\"");  // a damaged record concerns its stage only
+  EXPECT_NO_THROW(Workspace(folder / "out"));
+}
+
 TEST(Workspace, RecordsCannotLeadOutOfTheFolder) {
   const TemporaryFolder folder;
   Workspace workspace(folder / "out");
   for (const char* path : {"../secret", "/etc/passwd", "a/../../b", "poses/"}) {
     WriteJsonFile(
         workspace.Path(".regrade/stages/pose.json"),
-        JsonValue::Object{{"schema", 1},
+        JsonValue::Object{{"schema", 2},
                           {"regrade", "x"},
                           {"inputs", JsonValue::Object()},
                           {"outputs", JsonValue::Array{JsonValue::Object{
