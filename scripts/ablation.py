@@ -68,13 +68,13 @@ def copy_reconstruction(source, target):
 def metrics_of(folder):
     with open(os.path.join(folder, "report.json"), encoding="utf-8") as file:
         report = json.load(file)
-    stylize = report["stages"]["stylize"]
+    stylize, evaluate = report["stages"]["stylize"], report["stages"]["evaluate"]
     steady = {row["gap"]: row["tc_psnr_mean_db"] for row in report["consistency"] if row["sequence"] == "styled"}
     faith = next(row for row in report["fidelity"] if row["sequence"] == "styled")
     return {
-        "psnr_to_2d_db": stylize["psnr_to_2d_db"],
-        "psnr_to_2d_photos_db": stylize.get("psnr_to_2d_photos_db"),
-        "linear_map_psnr_to_2d_db": stylize.get("linear_map_psnr_to_2d_db"),
+        "psnr_to_2d_db": faith["psnr_to_2d_db"],
+        "psnr_to_2d_photos_db": evaluate.get("psnr_to_2d_photos_db"),
+        "linear_map_psnr_to_2d_db": evaluate.get("linear_map_psnr_to_2d_db"),
         "tc": [steady[gap] for gap in sorted(steady)],
         "gaps": sorted(steady),
         "bound": stylize["bound"],

@@ -37,11 +37,11 @@ bundle() {
 settings_of() {
   case $1 in
     lego) echo "--fit-resolutions 128,256,512 --fit-steps 1500,4000,16000 --fit-rays 16384 --fit-step-size 0.5
-                --initial-density 0.1 --tv-density 1e-5 --tv-sh 1e-3 --tv-share 0.01 --tv-decay 1
+                --initial-density 0.1 --tv-density 1e-5 --tv-sh 1e-3 --tv-fraction 0.01 --tv-decay 1
                 --fit-rate-density 64 --fit-rate-density-end 4 --fit-density-delay 0.07 --fit-rate-sh-end 3e-4
                 --prune-weight 0.256" ;;
     fern) echo "--fit-resolutions 352,704,1408 --fit-steps 3000,7000,7000 --fit-rays 12288 --fit-step-size 0.5
-                --initial-density 0.1 --prune-weight 2.5 --tv-density 2e-3 --tv-sh 1e-2 --tv-share 0.01 --tv-decay 1
+                --initial-density 0.1 --prune-weight 2.5 --tv-density 2e-3 --tv-sh 1e-2 --tv-fraction 0.01 --tv-decay 1
                 --fit-rate-density 16 --fit-rate-density-end 3 --fit-density-delay 0.08 --fit-view-bound 0.3
                 --fit-rate-sh 5e-2 --fit-rate-sh-end 2e-3" ;;
     *) echo "--fit-resolutions 96,192,384 --fit-steps 600,1500,4000 --fit-rays 16384 --fit-rate-density 32

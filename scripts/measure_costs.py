@@ -72,7 +72,7 @@ def metrics_of(part, folder):
     s = report["stages"]["stylize"]
     near = next(f for f in report["fidelity"] if f["sequence"] == "styled")
     steady = {c["gap"]: c["tc_psnr_mean_db"] for c in report["consistency"] if c["sequence"] == "styled"}
-    values = [s["psnr_to_2d_db"], steady[1], steady[5], s["k_est"], s["bound"], s["local_lipschitz_sampled"],
+    values = [near["psnr_to_2d_db"], steady[1], steady[5], s["k_est"], s["bound"], s["local_lipschitz_sampled"],
               near["hue_std"] / near["hue_std_2d"], near["chroma"] / near["chroma_2d"]]
     return s["seconds"], [round(v, 2) for v in values]
 

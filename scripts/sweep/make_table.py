@@ -38,6 +38,7 @@ def rows_of(scene, style, method, report):
     tc = {(c["sequence"], c["gap"]): c["tc_psnr_mean_db"] for c in report["consistency"]}
     gaps = sorted({gap for _, gap in tc})
     stylize = report.get("stages", {}).get("stylize", {})
+    evaluate = report.get("stages", {}).get("evaluate", {})
     for sequence in dict.fromkeys(c["sequence"] for c in report["consistency"]):
         if sequence.startswith("path_"):
             continue
@@ -46,7 +47,7 @@ def rows_of(scene, style, method, report):
                "short_db": tc.get((sequence, gaps[0])), "long_db": tc.get((sequence, gaps[-1])),
                "distance_to_style": near.get("sliced_wasserstein_to_style")}
         if sequence == "styled":
-            row.update({"to_2d_db": near.get("psnr_to_2d_db"), "linear_map_db": stylize.get("linear_map_psnr_to_2d_db"),
+            row.update({"to_2d_db": near.get("psnr_to_2d_db"), "linear_map_db": evaluate.get("linear_map_psnr_to_2d_db"),
                         "k_est": stylize.get("k_est"), "bound": stylize.get("bound"),
                         "local_lipschitz_sampled": stylize.get("local_lipschitz_sampled"), "seconds": stylize.get("seconds")})
         if near.get("hue_std_2d"):

@@ -47,7 +47,7 @@ int main(int argc, char** argv) {
         "angle %.2f deg, extents %.3g %.3g %.3g, fx %.2f fy %.2f cx %.2f cy %.2f, corner moved "
         "%.2f px, %.1f s\n",
         capture.views.size(), ingest.photos.size(), capture.points.size(),
-        capture.reprojection_px, capture.models_found, report.recipe.c_str(),
+        capture.reprojection_px, capture.models_found, report.strategy.c_str(),
         report.attempts_made, report.lens.c_str(),
         MedianTriangulationAngle(capture) * 180 / M_PI, extents.x, extents.y, extents.z,
         camera.fx, camera.fy, camera.cx, camera.cy, camera.MaxCornerDistortion(), seconds());
