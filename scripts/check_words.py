@@ -37,8 +37,8 @@ RULES = (
     (r"(?i)\bknobs?\b|knobs?_|_knobs?\b", "parameter", ["every knob", "price_knobs"], ["knobbly"]),
     (r"(?i)\bprice(s|d)?\b|\bpricing\b|\bPrice[A-Z]|price_|_prices?\b", "cost",
      ["at the price of", "PriceRow", "PRICES.md", "price_list"], ["enterprise"]),
-    (r"[\"']planes?[\"']|--planes?\b|\b(variant|parameter)\.plane\b|PlaneOf", "benchmark", ["variant.plane", "--plane"],
-     ["the image plane", "features.plane(c)", "focal_plane"]),
+    (r"[\"']planes?[\"']\s*[:\]]|--planes?\b|\b(variant|parameter)\.plane\b|PlaneOf", "benchmark", ["variant.plane", "--plane", "row[\"plane\"]"],
+     ["the image plane", "features.plane(c)", "focal_plane", "\"a cloud\", \"plane\")"]),
     (r"(?i)yardstick", "baseline", ["no yardstick", "IsAYardstick"], []),
     # Styles and bounds.
     (r"\b[Ll]essons?\b|Lessons|\bLESSON", "training target, style_targets", ["struct Lessons", "no lesson"], ["lessen"]),
