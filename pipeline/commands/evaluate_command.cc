@@ -15,8 +15,8 @@
 #include "pipeline/report/records.h"
 #include "pipeline/report/run_pictures.h"
 #include "pipeline/run/run_settings.h"
-#include "pipeline/stages/evaluation_networks.h"
 #include "pipeline/stages/heat_map_files.h"
+#include "pipeline/stages/network_probe.h"
 #include "pipeline/workspace/metrics_json.h"
 
 namespace regrade {

@@ -5,29 +5,10 @@
 #include <cstdint>
 #include <cstdio>
 
+#include "pipeline/files/text.h"
+
 namespace regrade {
 namespace {
-
-struct CodePoint {
-  uint32_t value = 0;
-  size_t bytes = 0;  // 0: not UTF-8
-};
-
-CodePoint DecodeUtf8(std::string_view text) {
-  const auto byte = [&](size_t i) { return static_cast<uint8_t>(text[i]); };
-  const uint8_t first = byte(0);
-  if (first < 0x80) return {first, 1};
-  const size_t bytes = first >= 0xF0 ? 4 : first >= 0xE0 ? 3 : 2;
-  if (first < 0xC2 || first > 0xF4 || text.size() < bytes) return {};
-  uint32_t value = first & (0xFF >> (bytes + 1));
-  for (size_t i = 1; i < bytes; ++i) {
-    if ((byte(i) & 0xC0) != 0x80) return {};
-    value = value << 6 | (byte(i) & 0x3F);
-  }
-  const bool overlong = (bytes == 3 && value < 0x800) || (bytes == 4 && value < 0x10000);
-  if (overlong || value > 0x10FFFF || (value >= 0xD800 && value <= 0xDFFF)) return {};
-  return {value, bytes};
-}
 
 // Characters that let a name look like another one.
 bool HidesOrReorders(uint32_t c) {
@@ -41,7 +22,7 @@ std::string EscapeHtml(std::string_view text) {
   std::string out;
   char spelled[16];
   while (!text.empty()) {
-    const CodePoint c = DecodeUtf8(text);
+    const CodePoint c = FirstCodePoint(text);
     const size_t bytes = std::max<size_t>(c.bytes, 1);
     if (c.bytes == 0 || (c.value < 0x20 && c.value != '\n') || c.value == 0x7F) {
       std::snprintf(spelled, sizeof(spelled), "\\x%02x", static_cast<uint8_t>(text[0]));
@@ -123,18 +104,7 @@ std::string GroupedNumber(int64_t value) {
 
 std::string Duration(double seconds) {
   if (seconds < 9.95) return FixedNumber(seconds, 1) + " s";
-  const auto whole = static_cast<int64_t>(std::llround(std::min(seconds, 1e15)));
-  char text[64];
-  if (whole < 60) {
-    std::snprintf(text, sizeof(text), "%lld s", static_cast<long long>(whole));
-  } else if (whole < 3600) {
-    std::snprintf(text, sizeof(text), "%lld min %02lld s", static_cast<long long>(whole / 60),
-                  static_cast<long long>(whole % 60));
-  } else {
-    std::snprintf(text, sizeof(text), "%lld h %02lld min", static_cast<long long>(whole / 3600),
-                  static_cast<long long>(whole % 3600 / 60));
-  }
-  return text;
+  return DurationText(seconds);
 }
 
 }  // namespace regrade

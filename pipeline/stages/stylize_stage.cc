@@ -95,7 +95,8 @@ StageOutcome LeaveAsItWas(RunContext* context, const StoredField& stored,
   context->console->Warn(
       "the masks agree on no part of the scene: it stays as it was. Look at --masks, or lower "
       "--mask-vote");
-  WriteNetworkFile(workspace.Path("network.npz"), {NetworkOfMap({}), 0});
+  WriteNetworkFile(workspace.Path("network.npz"),
+                   {NetworkOfMap({}), 0, stored.field.background});
   WriteFieldFile(workspace.Path("styled.npz"), stored);
   WriteObjectFile(workspace.Path("object.npz"), shares);
   StageOutcome outcome;
@@ -149,7 +150,8 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
                    backend == Backend::kCuda ? &device_field : nullptr);
   for (const std::string& warning : trained.warnings) context->console->Warn(warning);
 
-  WriteNetworkFile(workspace.Path("network.npz"), {trained.network, trained.k_est});
+  WriteNetworkFile(workspace.Path("network.npz"),
+                   {trained.network, trained.k_est, stored.field.background});
   RadianceField source{
       stored.field.geometry, {}, source_background, stored.field.near_clip, stored.field.step};
   Appearance restyled;

@@ -229,14 +229,6 @@ TEST(Workspace, CheckpointsBelongToTheirInputs) {
   }
 }
 
-TEST(Workspace, FreeSpaceIsLookedAtFirst) {
-  const TemporaryFolder folder;
-  const Workspace workspace(folder / "out");
-  EXPECT_NO_THROW(workspace.RequireFreeSpace(1, "a test"));
-  EXPECT_REGRADE_ERROR(workspace.RequireFreeSpace(uint64_t{1} << 62, "a test"),
-                       ExitCode::kResources, "a test needs");
-}
-
 TEST(FolderLock, F38_SecondRunIsToldWho) {
   const TemporaryFolder folder;
   const Workspace workspace(folder / "out");
