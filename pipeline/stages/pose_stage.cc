@@ -129,7 +129,8 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
   WriteCaptureIndex(workspace.Path("poses"), capture, ingest.photos);
   metrics.registered = static_cast<int>(capture.views.size());
   metrics.points = static_cast<int64_t>(capture.points.size());
-  metrics.reprojection_px = capture.reprojection_px;
+  metrics.reprojection_px = capture.points.empty() ? Metric::Undefined("there are no points")
+                                                   : Metric(capture.reprojection_px);
   metrics.models_found = capture.models_found;
   PutMetrics(metrics, &outcome.metrics);
   outcome.outputs = {"poses"};
