@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int64_t kSchema = 1;
+constexpr int64_t kSchema = 2;
 constexpr size_t kNamedDifferences = 4;
 
 bool EndsWith(const std::string& text, const std::string& end) {
@@ -145,10 +145,16 @@ StageRecord StageRecordFromJson(const JsonValue& value, const std::string& where
   StageRecord record;
   try {
     record.version = value.At("regrade").AsString();
-    if (value.At("schema").AsInt() > kSchema)
+    const int64_t schema = value.At("schema").AsInt();
+    if (schema != kSchema)
       throw Error(ExitCode::kInput,
-                  "written by regrade " + record.version + ", this is " REGRADE_VERSION, where,
-                  "update regrade; nothing has been touched");
+                  "written by regrade " + record.version + " in format " +
+                      std::to_string(schema) +
+                      "; this is regrade " REGRADE_VERSION ", which reads format " +
+                      std::to_string(kSchema),
+                  where,
+                  schema > kSchema ? "update regrade; nothing has been changed"
+                                   : "choose another folder with --out, or delete this one");
     record.inputs = value.At("inputs");
     for (const JsonValue& output : value.At("outputs").AsArray()) {
       // Paths out of the folder are refused.

@@ -44,7 +44,7 @@ std::vector<std::string> Differences(const JsonValue& was, const JsonValue& now)
 std::vector<std::string> ChangedOutputs(const std::string& root, const StageRecord& record);
 
 JsonValue ToJson(const StageRecord& record);
-// Throws Error(kInput) for records that are damaged or of a newer version.
+// Throws Error(kInput) for records that are damaged or of another format.
 StageRecord StageRecordFromJson(const JsonValue& value, const std::string& where);
 
 }  // namespace regrade

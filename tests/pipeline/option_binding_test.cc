@@ -121,7 +121,7 @@ struct CommaDecimals : std::numpunct<char> {
 };
 
 TEST_F(Options, F20_ACommaLocaleChangesNothing) {
-  // C's locale where the system has one, and C++'s own in any case.
+  // C's locale where the system has one, and C++'s.
   for (const char* name : {"de_DE.UTF-8", "de_DE.utf8", "fr_FR.UTF-8"})
     if (std::setlocale(LC_ALL, name) != nullptr) break;
   const std::locale before = std::locale::global(std::locale(std::locale(), new CommaDecimals));
@@ -162,7 +162,7 @@ TEST_F(Options, F22_ConfigErrorsNameLineAndColumn) {
                        "an object");
 }
 
-TEST_F(Options, HelpTellsUnitDefaultAndBounds) {
+TEST_F(Options, HelpHasUnitDefaultAndBounds) {
   Parse({});
   const std::string help = set_.Help();
   EXPECT_NE(help.find("in a step (rays, 64 to 4194304, default 4096)"), std::string::npos)
@@ -190,7 +190,7 @@ TEST(RunSettings, AllOptionsBind) {
     RunSettings other;
     ApplyPreset(preset, &other);
     EXPECT_EQ(other.run.preset, preset);
-    // Presets stay within the bounds that users have.
+    // Presets stay within the bounds of the options.
     OptionSet bound;
     other.Bind(&bound);
     EXPECT_NO_THROW(bound.ApplyConfig(bound.Values(), preset)) << preset;
@@ -198,8 +198,8 @@ TEST(RunSettings, AllOptionsBind) {
   EXPECT_REGRADE_ERROR(ApplyPreset("fast", &settings), ExitCode::kUsage, "draft");
 }
 
-// The recipe alone brings all that it stands for, and other flags are stronger.
-TEST(RunSettings, RecipeDecidesWhatIsNotSaid) {
+// A recipe sets its options, and flags override it.
+TEST(RunSettings, FlagsOverrideTheRecipe) {
   RunSettings settings, paper;
   ApplyStyleRecipe("paper", &paper.network);
   OptionSet options;
