@@ -1,4 +1,4 @@
-// regrade doctor: what is installed, and what will run where.
+// regrade doctor: prints what is installed and which processor runs what.
 #include <omp.h>
 #include <unistd.h>
 
@@ -36,8 +36,7 @@ Finding FindColmap(const std::string& program) {
     return {"COLMAP", "not found: " + error.what_failed(),
             needed + "; install the package `colmap`"};
   }
-  return {"COLMAP", version.empty() ? "'" + program + "' does not call itself COLMAP" : version,
-          needed};
+  return {"COLMAP", version.empty() ? "'" + program + "' is not COLMAP" : version, needed};
 }
 
 Finding FindDevice() {
@@ -47,7 +46,7 @@ Finding FindDevice() {
   std::snprintf(text, sizeof text, "%s, sm_%d, %.1f GB free of %.1f GB", status.name.c_str(),
                 status.compute_capability, static_cast<double>(status.free_bytes) / (1u << 30),
                 static_cast<double>(status.total_bytes) / (1u << 30));
-  return {"GPU", text, "fits, restyling and frames are made there, the rest on the CPU"};
+  return {"GPU", text, "runs fits, restyling and frames; the CPU runs the rest"};
 }
 
 }  // namespace
@@ -77,7 +76,7 @@ void RunDoctor(const Command& command, const Arguments& arguments, Console* cons
       {"fast path", FastRays().name, "instruction set of rendering and fitting"},
       FindColmap("colmap"),
       {"Chart.js", ReadChartLibrary().empty() ? "not found" : "found",
-       "optional: drawings of the report that answer to a pointer; package `libjs-chart.js`"},
+       "optional: interactive charts of the report; package `libjs-chart.js`"},
   };
   console->Event("doctor", JsonValue::Object());
   for (const Finding& finding : findings) {

@@ -1,5 +1,4 @@
-// What every command, and every run over an output folder, can be told besides its stages'
-// options.
+// Options of every command, and of every run over an output folder, besides those of stages.
 #pragma once
 
 #include <cstdint>
@@ -16,8 +15,8 @@ struct ProgramOptions {
   template <typename Bind>
   void Describe(Bind& bind) {
     bind("threads", threads,
-         {.unit = "threads", .help = "0 takes one a core", .min = 0, .max = 4096});
-    bind("json", json, {.help = "progress and results as lines of JSON on stdout"});
+         {.unit = "threads", .help = "0 uses one per core", .min = 0, .max = 4096});
+    bind("json", json, {.help = "prints progress and results as lines of JSON on stdout"});
   }
 };
 
@@ -33,35 +32,36 @@ struct RunOptions {
 
   template <typename Bind>
   void Describe(Bind& bind) {
-    bind("out", out, {.help = "the output folder; the same command again goes on from it"});
+    bind("out", out,
+         {.help = "the output folder; the same command again continues what is in it"});
     bind("preset", preset,
-         {.help = "a point on the curve of accuracy over time; single options override it",
+         {.help = "trade-off between accuracy and time; single options override it",
           .choices = "draft|standard|paper|best"});
-    bind("device", device, {.help = "where arithmetic runs", .choices = "auto|cpu|cuda"});
-    bind("seed", seed, {.help = "draws everything that is random"});
+    bind("device", device,
+         {.help = "the processor for fits, restyling and frames", .choices = "auto|cpu|cuda"});
+    bind("seed", seed, {.help = "seed of all random numbers"});
     bind("holdout", holdout,
          {.unit = "photos",
-          .help = "every so many photos, in the order of names, one is kept for measuring; 0 "
-                  "fits all, and no held-out figure exists",
+          .help = "keeps every n-th photo, in the order of names, for measuring instead of "
+                  "fitting; 0 fits all, and held-out metrics do not exist",
           .min = 0,
           .max = 1000});
-    bind(
-        "effects", effects,
-        {.help = "what the scene calls for is decided by measurement (auto); ndc=on|off, "
-                 "alpha=on|off, background=on|off, exposure=on|off, view-dependence=on|off and "
-                 "pose-refinement=on|off, with commas between, decide instead"});
+    bind("effects", effects,
+         {.help = "effects to model: auto measures whether each is needed; a list such as "
+                  "ndc=off,exposure=on overrides that for ndc, alpha, background, exposure, "
+                  "view-dependence and pose-refinement"});
     bind("max-memory", max_memory_gb,
          {.unit = "GB",
-          .help = "memory to plan with; 0 takes what is free",
+          .help = "limit on planned memory, of 10^9 bytes; 0 takes what is free",
           .min = 0,
           .max = 1e6});
     bind("reproducible", reproducible,
-         {.help = "same bytes for any number of threads and any interruption, from finished "
-                  "poses on; slower"});
+         {.help = "gives the same bytes for any number of threads and any interruption, from "
+                  "finished poses on; slower"});
   }
 };
 
-// How this one start behaves; never part of a stage's inputs.
+// Options of one start of the program; never part of a stage's inputs.
 struct StartOptions {
   std::string config;
   std::string restart_from;
@@ -70,13 +70,14 @@ struct StartOptions {
 
   template <typename Bind>
   void Describe(Bind& bind) {
-    bind("config", config, {.help = "a run.json whose options and arguments are taken"});
+    bind("config", config,
+         {.help = "a run.json to take options and arguments from; flags override them"});
     bind("restart-from", restart_from,
-         {.help = "do this stage and the later ones again, whatever is there",
+         {.help = "repeats this stage and all later ones, even where they are done",
           .choices = "|pose|reconstruct|style_2d|stylize|render|evaluate|report"});
-    bind("dry-run", dry_run, {.help = "say what would be done, and do nothing"});
+    bind("dry-run", dry_run, {.help = "prints what would be done, and does nothing"});
     bind("break-lock", break_lock,
-         {.help = "take over a folder whose last run died on another machine"});
+         {.help = "takes over a folder whose last run died on another machine"});
   }
 };
 

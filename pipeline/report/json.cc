@@ -47,7 +47,7 @@ JsonValue PhotosJson(const PhotosReport& photos) {
                 {"registered", photos.registered},
                 {"statuses", List(photos.statuses, [](const PhotoStatus& photo) {
                    return Object{{"file", photo.file},
-                                 {"status", photo.status},
+                                 {"status", ToString(photo.status)},
                                  {"why", TextOrNull(photo.why)}};
                  })}};
 }

@@ -16,11 +16,10 @@ std::string ThumbnailHtml(const ReportPicture* picture) {
          " height=" + std::to_string(picture->height) + " src=\"" + DataUrl(*picture) + "\">";
 }
 
-// The verdict is a class of the style sheet where it is one that we know.
-std::string StatusHtml(const std::string& verdict) {
-  const bool known = verdict == "used" || verdict == "skipped" || verdict == "unregistered";
-  return "<span" + (known ? " class=" + verdict : std::string()) + ">" + EscapeHtml(verdict) +
-         "</span>";
+// The status is a class of the style sheet, too.
+std::string StatusHtml(PhotoState status) {
+  const std::string text = ToString(status);
+  return "<span class=" + text + ">" + text + "</span>";
 }
 
 // Photos that there is something to say about, one a line.
@@ -38,7 +37,7 @@ std::string PhotosHtml(const RunReport& report, const ReportPictures& pictures) 
   for (size_t i = 0; i < photos.statuses.size(); ++i) {
     const PhotoStatus& photo = photos.statuses[i];
     const ReportPicture* thumbnail = ThumbnailOf(pictures, i);
-    if (photo.status != "used" || !photo.why.empty())
+    if (photo.status != PhotoState::kUsed || !photo.why.empty())
       remarks += RemarkRow(photo, thumbnail);
     else if (thumbnail != nullptr)
       used += "<figure>" + ThumbnailHtml(thumbnail) + "<figcaption>" + EscapeHtml(photo.file) +

@@ -87,8 +87,8 @@ std::vector<std::optional<ReportPicture>> Thumbnails(const Workspace& workspace,
     // Evenly: as many as are due by now.
     const bool due = count <= kMostThumbnails ||
                      taken < (i + 1) * static_cast<int64_t>(kMostThumbnails) / count;
-    if (photo.status == "used" && !due) continue;
-    taken += photo.status == "used";
+    if (photo.status == PhotoState::kUsed && !due) continue;
+    taken += photo.status == PhotoState::kUsed;
     wanted[static_cast<size_t>(i)] = path->second;
   }
   // Reading whole photos is what takes the time.

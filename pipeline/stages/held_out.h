@@ -6,8 +6,7 @@
 #include <vector>
 
 #include "kernels/device/backend.h"
-#include "kernels/scene/capture.h"
-#include "pipeline/capture/photo_gains.h"
+#include "pipeline/capture/working_views.h"
 #include "pipeline/fields/field_file.h"
 
 namespace regrade {
@@ -19,11 +18,10 @@ struct HeldOutMetrics {
   std::optional<double> MeanSsim() const;
 };
 
-// Over the held-out photos as they were taken, at `photo_size` pixels: a render is given its
-// photo's gain, which is known from the colours of points that the photo shares with others.
-// What is masked does not count.
-HeldOutMetrics MeasureHeldOut(const Capture& capture, int holdout, int photo_size,
-                              const PhotoGains& gains, const StoredField& stored,
+// Over the held-out photos as they were taken: a render is given its photo's gain, which is
+// known from the colours of points that the photo shares with others. What is masked does not
+// count.
+HeldOutMetrics MeasureHeldOut(const WorkingViews& views, const StoredField& stored,
                               Backend backend);
 
 }  // namespace regrade

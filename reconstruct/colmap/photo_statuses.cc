@@ -39,7 +39,7 @@ void ExplainUnregistered(const AttemptResult& attempt, const std::vector<StagedP
                          Capture* capture) {
   for (size_t i = 0; i < photos.size(); ++i) {
     PhotoStatus& verdict = capture->statuses[i];
-    if (verdict.status != "unregistered") continue;
+    if (verdict.status != PhotoState::kUnregistered) continue;
     const std::string& name = photos[i].name;
     const auto features = attempt.evidence.features.find(name);
     if (features == attempt.evidence.features.end()) {
@@ -81,7 +81,8 @@ void RefuseTooFew(size_t photos_given, int min_photos) {
 void RefuseUnregistered(const Capture& capture) {
   std::string names;
   for (const PhotoStatus& verdict : capture.statuses)
-    if (verdict.status == "unregistered") names += "\n  " + verdict.file + ": " + verdict.why;
+    if (verdict.status == PhotoState::kUnregistered)
+      names += "\n  " + verdict.file + ": " + verdict.why;
   throw Error(ExitCode::kScene,
               "only " + std::to_string(capture.views.size()) + " of " +
                   Photos(capture.statuses.size()) +

@@ -28,8 +28,10 @@ RunReport EveryMetric(const std::string& evil) {
   report.version = "0.1.0";
   report.command = {"regrade", "run", evil, "--style", evil};
   report.photos = PhotosReport{4, 2, 2, {}};
-  for (const char* verdict : {"used", "skipped", "unregistered", "used"})
-    report.photos->statuses.push_back({evil + verdict, verdict, verdict[0] == 's' ? evil : ""});
+  for (const PhotoState state :
+       {PhotoState::kUsed, PhotoState::kSkipped, PhotoState::kUnregistered, PhotoState::kUsed})
+    report.photos->statuses.push_back(
+        {evil + ToString(state), state, state == PhotoState::kSkipped ? evil : ""});
   report.effects = {{"exposure", false, "it was not wanted", Metric(), 0.1},
                     {"ndc", true, evil, 12.5, 25}};
   report.stages.reconstruct = ReconstructReport{60, 1000, 28.25, 27.5, 0.8, {evil}};
@@ -50,8 +52,8 @@ RunReport EveryMetric(const std::string& evil) {
   report.fidelity = {{"styled", 24.5, 0.19, 0.2, 12, 13, 0.01}};
   for (int i = 0; i < 6; ++i)
     report.costs.push_back({"fit", i == 0 ? "" : "fit-steps", evil, "held-out PSNR", "dB", 3,
-                             12.0 + i, 0.5, 20.0 + 3 * i, 1, 25 + std::sqrt(i), 0.1,
-                             i == 5 ? Metric() : Metric(0.1), i != 3, i == 3 ? evil : ""});
+                            12.0 + i, 0.5, 20.0 + 3 * i, 1, 25 + std::sqrt(i), 0.1,
+                            i == 5 ? Metric() : Metric(0.1), i != 3, i == 3 ? evil : ""});
   report.options = {{"style", evil}};
   report.versions = {{"COLMAP", evil}};
   return report;
