@@ -10,8 +10,6 @@
 #include "kernels/field/pad_sh_basis.h"
 #include "kernels/image/color_statistics.h"
 #include "kernels/image/resize.h"
-#include "pipeline/capture/capture_store.h"
-#include "pipeline/capture/photo_gains.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/commands/command.h"
 #include "pipeline/fields/field_file.h"
@@ -94,37 +92,33 @@ std::string PsnrCaption(const Image& a, const Image& b, bool of_photos) {
 
 // Everything about the scene that all styles share.
 struct Scene {
-  Capture capture;
-  StoredField stored;
-  Backend backend = Backend::kCpu;         // where networks learn
-  std::vector<int> training_views, shown;  // views
-  std::vector<Camera> cameras;             // of all views
-  std::vector<Image> photos;               // of all views that are taught or shown
-  std::vector<Image> kept;                 // what --photo-masks leaves of each, or empty
+  WorkingViews views;
+  StoredField stored = {};
+  Backend backend = Backend::kCpu;                   // where networks learn
+  std::vector<int> training_views = {}, shown = {};  // views
+  std::vector<Camera> cameras = {};                  // of all views
+  std::vector<Image> photos = {};                    // of all views that are taught or shown
+  std::vector<Image> kept = {};  // what --photo-masks leaves of each, or empty
 };
 
 Scene ReadScene(const Workspace& workspace, const SheetOptions& sheet) {
-  Scene scene;
-  scene.capture = ReadCapture(workspace.Path("poses"));
+  Scene scene{ReadWorkingViews(workspace.Path("poses"), sheet.size, sheet.holdout)};
   scene.stored = ReadFieldFile(workspace.Path("field.npz"));
   // As a run does it: what differs from view to view needs directions.
   scene.stored.field.appearance =
       PadShBasis(std::move(scene.stored.field.appearance), kStyledBasis);
-  scene.training_views = ViewIndices(scene.capture, sheet.holdout, false);
-  if (scene.training_views.empty())
-    scene.training_views = ViewIndices(scene.capture, sheet.holdout, true);
+  scene.views = scene.views.InField(scene.stored.field_from_world, scene.stored.ndc);
+  scene.training_views = scene.views.Training();
+  if (scene.training_views.empty()) scene.training_views = scene.views.HeldOut();
   const int count = std::min(sheet.views, static_cast<int>(scene.training_views.size()));
   for (int k = 0; k < count; ++k)
     scene.shown.push_back(
         scene.training_views[(2 * static_cast<size_t>(k) + 1) * scene.training_views.size() /
                              (2 * static_cast<size_t>(count))]);
-  const PhotoGains gains = RecordedGains(workspace, scene.capture);
-  for (size_t i = 0; i < scene.capture.views.size(); ++i) {
-    const CaptureView& view = scene.capture.views[i];
-    scene.cameras.push_back(WorkingCamera(view.camera, sheet.size,
-                                          scene.stored.field_from_world, scene.stored.ndc));
-    scene.photos.push_back(ReadWorkingPhoto(view, sheet.size, gains.Of(static_cast<int>(i))));
-    scene.kept.push_back(ReadWorkingMask(view, sheet.size));
+  scene.cameras = scene.views.Cameras();
+  for (int i = 0; i < scene.views.count(); ++i) {
+    scene.photos.push_back(scene.views.Photo(i));
+    scene.kept.push_back(scene.views.Mask(i));
   }
   return scene;
 }
@@ -165,7 +159,7 @@ void AddStyle(RunContext* context, const Scene& scene, const SheetOptions& sheet
   const std::string name = fs::path(picture).filename().string();
   context->console->BeginStage(name);
   const ProgressFunction progress = context->console->StageProgress();
-  const std::unique_ptr<ViewStylizer> stylizer = MakeSceneStylizer(context, scene.capture);
+  const std::unique_ptr<ViewStylizer> stylizer = MakeSceneStylizer(context, scene.views);
   std::vector<Image> targets(scene.photos.size());
   std::vector<StyledTrainingView> views;
   std::vector<ColorStatistics> before, after;
@@ -188,7 +182,7 @@ void AddStyle(RunContext* context, const Scene& scene, const SheetOptions& sheet
     view.camera = scene.cameras[n];
     view.target = &targets[n];
     if (masked) view.mask = &kept;
-    view.name = name + " on " + scene.capture.views[n].file;
+    view.name = name + " on " + scene.views.capture().views[n].file;
     views.push_back(view);
     before.push_back(MeasureColor(scene.photos[n], view.mask));
     after.push_back(MeasureColor(targets[n], view.mask));
@@ -226,7 +220,7 @@ void AddStyle(RunContext* context, const Scene& scene, const SheetOptions& sheet
     const size_t n = static_cast<size_t>(scene.shown[k]);
     SheetRow row;
     if (k == 0) row.title = words;
-    row.cells.push_back({scene.photos[n], scene.capture.views[n].file});
+    row.cells.push_back({scene.photos[n], scene.views.capture().views[n].file});
     row.cells.push_back({targets[n], ""});
     const Image wanted =
         of_photos ? targets[n] : Clipped(stylizer->Stylize(renders[k], static_cast<int>(n)));

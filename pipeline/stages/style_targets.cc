@@ -5,8 +5,6 @@
 #include <utility>
 
 #include "kernels/image/color_statistics.h"
-#include "pipeline/capture/photo_gains.h"
-#include "pipeline/capture/working_views.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/workspace/output_names.h"
 #include "stylize/image/monge_kantorovich.h"
@@ -39,24 +37,20 @@ bool PartOfMask(const Image& mask, StyledTrainingView* view) {
 
 }  // namespace
 
-StyleTargets ReadStyleTargets(RunContext* context, const Capture& capture,
+StyleTargets ReadStyleTargets(RunContext* context, const WorkingViews& views,
                               const StoredField& stored, const std::vector<int>& indices,
                               const ObjectMasks* object, const ObjectWeights* shares) {
-  const RunSettings& settings = context->settings;
   StyleTargets style_targets;
   style_targets.targets.reserve(indices.size());  // they are pointed to
   style_targets.masks.reserve(indices.size());
   std::optional<CoverageRenderer> agreed;
   if (object != nullptr) agreed.emplace(stored.field, *shares);
-  const PhotoGains gains = RecordedGains(*context->workspace, capture);
   std::vector<ColorStatistics> before, after;
   for (const int i : indices) {
-    const CaptureView& view = capture.views[static_cast<size_t>(i)];
     StyledTrainingView target;
-    target.camera = WorkingCamera(view.camera, settings.scene.photo_size,
-                                  stored.field_from_world, stored.ndc);
+    target.camera = views.CameraOf(i);
     target.name = "views_2d/" + FrameName(i);
-    Image kept = ReadWorkingMask(view, settings.scene.photo_size);
+    Image kept = views.Mask(i);
     if (object != nullptr) {
       Image mask = AgreedMask(object->Coverage(i, target.camera.width, target.camera.height),
                               agreed->Render(target.camera));
@@ -72,8 +66,7 @@ StyleTargets ReadStyleTargets(RunContext* context, const Capture& capture,
     }
     style_targets.targets.push_back(ReadImage(context->workspace->Path(target.name)));
     target.target = &style_targets.targets.back();
-    before.push_back(MeasureColor(
-        ReadWorkingPhoto(view, settings.scene.photo_size, gains.Of(i)), target.mask));
+    before.push_back(MeasureColor(views.Photo(i), target.mask));
     after.push_back(MeasureColor(style_targets.targets.back(), target.mask));
     style_targets.views.push_back(std::move(target));
   }

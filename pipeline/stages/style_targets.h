@@ -21,7 +21,7 @@ struct StyleTargets {
 // Of the views `indices` (see StyledViews), without what --photo-masks masks. With `object`,
 // the lessons are of the pixels where a view's own mask and what all masks agreed on both say
 // that the object is seen, and views without such a pixel are left out; there may be none left.
-StyleTargets ReadStyleTargets(RunContext* context, const Capture& capture,
+StyleTargets ReadStyleTargets(RunContext* context, const WorkingViews& views,
                               const StoredField& stored, const std::vector<int>& indices,
                               const ObjectMasks* object, const ObjectWeights* shares);
 

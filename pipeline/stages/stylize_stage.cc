@@ -9,7 +9,6 @@
 
 #include "kernels/field/packed_grid.h"
 #include "kernels/field/pad_sh_basis.h"
-#include "pipeline/capture/capture_store.h"
 #include "pipeline/capture/photo_gains.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/fields/field_file.h"
@@ -109,20 +108,20 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
                      const ProgressFunction& progress) {
   const RunSettings& settings = context->settings;
   Workspace& workspace = *context->workspace;
-  const Capture capture = ReadCapture(workspace.Path("poses"));
   StoredField stored = ReadFieldFile(workspace.Path("field.npz"));
+  const WorkingViews views = context->Views().InField(stored.field_from_world, stored.ndc);
   // A 2D method maps each view by itself, and what differs from view to view needs directions,
   // also where the scene's own colours do not.
   stored.field.appearance = PadShBasis(std::move(stored.field.appearance), kStyledBasis);
   ProgressParts parts(progress, 1 + kAfterTraining + (settings.object.On() ? kVoting : 0));
-  const std::vector<int> indices = StyledViews(workspace, capture, settings.run.holdout);
-  const std::unique_ptr<ObjectMasks> object = OpenObjectMasks(settings, capture);
+  const std::vector<int> indices = StyledViews(workspace, views);
+  const std::unique_ptr<ObjectMasks> object = OpenObjectMasks(settings, views.capture());
   ObjectWeights shares;
   if (object != nullptr)
-    shares = VoteForObject(settings, capture, indices, *object, stored.field,
-                           stored.field_from_world, stored.ndc, parts.Next(kVoting));
+    shares =
+        VoteForObject(settings, views, indices, *object, stored.field, parts.Next(kVoting));
   const StyleTargets style_targets =
-      ReadStyleTargets(context, capture, stored, indices, object.get(), &shares);
+      ReadStyleTargets(context, views, stored, indices, object.get(), &shares);
   if (style_targets.views.empty()) return LeaveAsItWas(context, stored, shares);
 
   // What a ray sees behind the box is a colour of the scene too, unless the paper's letter is
