@@ -1,5 +1,5 @@
-// Stage "stylize": a network learns from views_2d/ how the field's colours change, and
-// styled.npz is the same geometry in those colours; network.npz keeps the network.
+// Stage "stylize": trains a network on the pictures of views_2d/ and writes it to network.npz,
+// and the field that it restyles to styled.npz.
 #include <omp.h>
 
 #include <algorithm>
@@ -7,7 +7,6 @@
 #include <filesystem>
 #include <utility>
 
-#include "kernels/field/packed_grid.h"
 #include "kernels/field/pad_sh_basis.h"
 #include "pipeline/capture/capture_store.h"
 #include "pipeline/capture/photo_gains.h"
@@ -23,28 +22,17 @@
 #include "pipeline/stages/object_edit.h"
 #include "pipeline/stages/stages.h"
 #include "pipeline/stages/style_targets.h"
-#include "stylize/cuda/device_style.h"
-#include "stylize/field/apply_network.h"
+#include "pipeline/workspace/output_names.h"
 #include "stylize/field/base_map.h"
-#include "stylize/field/blend_fields.h"
 #include "stylize/field/volume_variance.h"
-#include "stylize/image/monge_kantorovich.h"
+#include "stylize/training/restyle_field.h"
 
 namespace regrade {
 namespace {
 
-constexpr int kStyledBasis = 9;
-constexpr double kVoting = 0.2;  // of the steps' time, roughly
-constexpr double kAfterTraining =
-    0.15;  // conclusion, and the network over the field, of the steps' time
+constexpr double kVoting = 0.2;  // of the time of training and application, roughly
 
-Vec3f Mapped(const ColorMap& map, const Vec3f& color) {
-  Vec3d mapped = map(color.Cast<double>());
-  for (int c = 0; c < 3; ++c) mapped[c] = std::clamp(mapped[c], 0.0, 1.0);
-  return mapped.Cast<float>();
-}
-
-// Pairs of neighbouring pixels, drawn for the measurement of what the propositions guarantee.
+// Pairs of neighbouring pixels on which LipRF's propositions are checked.
 constexpr int64_t kVariancePairs = 4000;
 
 JsonValue GroupRecord(const VarianceGroup& group) {
@@ -70,42 +58,78 @@ JsonValue VarianceRecord(const RadianceField& source, const RadianceField& style
                            {"largest_share", report.largest_share}};
 }
 
-// Why the network is steeper than the colours' covariances tell, where it is.
+// Why the local Lipschitz constant is above what the colours' covariances predict, where it is.
 std::string WhySteep(const TrainNetworkResult& trained) {
   constexpr double kSteep = 1.5;
   if (!(trained.local_lipschitz_sampled > kSteep * trained.k_est)) return "";
   const double of_map = trained.network.BaseNorm(),
-               of_colors = trained.slopes.along_coefficients;
-  const double of_places = trained.slopes.along_position;
-  const char* reason = "the 2D method bends colours more than one map for all of them does";
+               of_colors = trained.local_lipschitz.along_coefficients;
+  const double of_places = trained.local_lipschitz.along_position;
+  const char* reason = "the 2D method varies more with colour than one colour map does";
   if (of_map > kSteep * trained.k_est)
-    reason = "a colour map that follows the 2D method is that steep by itself";
+    reason = "the colour map that follows the 2D method already has such a norm";
   else if (of_places > of_colors - of_map)
     reason = "the 2D method maps the same colours differently in different views and places";
-  char text[360];
-  std::snprintf(
-      text, sizeof text,
-      "the largest slope seen, %.2f, is %.2f K_est: %s (the map alone %.2f; where it is "
-      "steepest %.2f along coefficients and %.2f along positions)",
-      trained.local_lipschitz_sampled, trained.local_lipschitz_sampled / trained.k_est, reason,
-      of_map, of_colors, of_places);
+  char text[400];
+  std::snprintf(text, sizeof text,
+                "the largest local Lipschitz constant, %.2f, is %.2f K_est: %s (the map alone "
+                "%.2f; at its maximum %.2f along coefficients and %.2f along positions)",
+                trained.local_lipschitz_sampled,
+                trained.local_lipschitz_sampled / trained.k_est, reason, of_map, of_colors,
+                of_places);
   return text;
 }
 
-// An object's style that no view shows.
-StageOutcome LeaveAsItWas(RunContext* context, const StoredField& stored,
-                          const ObjectWeights& shares) {
+// Where no view shows the object: the scene keeps its colours.
+StageOutcome KeepColors(RunContext* context, StoredField stored, const ObjectWeights& weights) {
   const Workspace& workspace = *context->workspace;
   context->console->Warn(
-      "the masks agree on no part of the scene: it stays as it was. Look at --masks, or lower "
+      "the masks agree on no part of the scene: it keeps its colours. Check --masks, or lower "
       "--mask-vote");
+  stored.field.appearance = PadShBasis(std::move(stored.field.appearance), kStyledBasis);
   WriteNetworkFile(workspace.Path("network.npz"), {NetworkOfMap({}), 0});
   WriteFieldFile(workspace.Path("styled.npz"), stored);
-  WriteObjectFile(workspace.Path("object.npz"), shares);
+  WriteObjectFile(workspace.Path("object.npz"), weights);
   StageOutcome outcome;
   outcome.outputs = {"network.npz", "styled.npz", "object.npz"};
   outcome.metrics["steps"] = 0;
   return outcome;
+}
+
+// The views `indices` with their pictures in views_2d/.
+StyleTargets ReadStyleTargets(const RunContext& context, const Capture& capture,
+                              const StoredField& stored, const std::vector<int>& indices,
+                              const ObjectMasks* object, const ObjectWeights& weights) {
+  const int photo_size = context.settings.scene.photo_size;
+  const PhotoGains gains = RecordedGains(*context.workspace, capture);
+  StyleTargets targets(stored.field, object, &weights);
+  for (const int i : indices) {
+    const CaptureView& view = capture.views[static_cast<size_t>(i)];
+    const std::string name = "views_2d/" + FrameName(i);
+    targets.Add({i, WorkingCamera(view.camera, photo_size, stored.field_from_world, stored.ndc),
+                 name, ReadWorkingMask(view, photo_size),
+                 [&] { return ReadWorkingPhoto(view, photo_size, gains.Of(i)); },
+                 [&] { return ReadImage(context.workspace->Path(name)); }});
+  }
+  return targets;
+}
+
+void AddTrainingMetrics(const TrainNetworkResult& trained, JsonValue* metrics) {
+  JsonValue& m = *metrics;
+  m["steps"] = trained.steps;
+  m["rejected_steps"] = trained.rejected_steps;
+  m["k_est"] = trained.k_est;
+  m["bound"] = trained.bound;
+  m["local_lipschitz_sampled"] = trained.local_lipschitz_sampled;
+  for (size_t i = 0; i < trained.history.steps.size(); ++i) {
+    m["bound_steps"].Append(trained.history.steps[i]);
+    m["bound_at_steps"].Append(trained.history.bounds[i]);
+  }
+  m["local_lipschitz_max"] = trained.local_lipschitz_max;
+  m["local_lipschitz_of_map"] = trained.network.BaseNorm();
+  m["local_lipschitz_along_coefficients"] = trained.local_lipschitz.along_coefficients;
+  m["local_lipschitz_along_position"] = trained.local_lipschitz.along_position;
+  m["psnr_train_db"] = trained.psnr_db;
 }
 
 StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
@@ -114,90 +138,58 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
   Workspace& workspace = *context->workspace;
   const Capture capture = ReadCapture(workspace.Path("poses"));
   StoredField stored = ReadFieldFile(workspace.Path("field.npz"));
-  // A 2D method maps each view by itself, and what differs from view to view needs directions,
-  // also where the scene's own colours do not.
-  stored.field.appearance = PadShBasis(std::move(stored.field.appearance), kStyledBasis);
-  ProgressParts parts(progress, 1 + kAfterTraining + (settings.object.On() ? kVoting : 0));
+  ProgressParts parts(progress, 1 + (settings.object.On() ? kVoting : 0));
   const std::vector<int> indices = StyledViews(workspace, capture, settings.run.holdout);
   const std::unique_ptr<ObjectMasks> object = OpenObjectMasks(settings, capture);
-  ObjectWeights shares;
+  ObjectWeights weights;
   if (object != nullptr)
-    shares = VoteForObject(settings, capture, indices, *object, stored.field,
-                           stored.field_from_world, stored.ndc, parts.Next(kVoting));
-  const StyleTargets style_targets =
-      ReadStyleTargets(context, capture, stored, indices, object.get(), &shares);
-  if (style_targets.views.empty()) return LeaveAsItWas(context, stored, shares);
+    weights = VoteForObject(settings, capture, indices, *object, stored.field,
+                            stored.field_from_world, stored.ndc, parts.Next(kVoting));
+  const StyleTargets targets =
+      ReadStyleTargets(*context, capture, stored, indices, object.get(), weights);
+  if (targets.targets().empty()) return KeepColors(context, std::move(stored), weights);
 
-  // What a ray sees behind the box is a colour of the scene too, unless the paper's letter is
-  // asked for.
-  const Vec3f source_background = stored.field.background;
-  if (settings.network.recipe != "paper" && object == nullptr)
-    stored.field.background = Mapped(style_targets.scene_map.map, stored.field.background);
-  TrainNetworkOptions options = settings.network;
-  options.seed = settings.run.seed;
-  TrainingHooks hooks;
-  hooks.progress = parts.Next(1);
-  hooks.checkpoint = [&](const TrainingState& state) {
+  RestyleRequest request;
+  request.options = settings.network;
+  request.options.seed = settings.run.seed;
+  request.backend = ChooseBackend(settings.run.device, settings.run.reproducible);
+  if (object != nullptr) request.object_weights = &weights.all;
+  RestyleHooks hooks;
+  hooks.training.progress = parts.Next(1);
+  hooks.training.checkpoint = [&](const TrainingState& state) {
     workspace.SaveCheckpoint("stylize", inputs, PackTrainingState(state));
   };
   std::optional<TrainingState> resume;
   if (const auto bytes = workspace.LoadCheckpoint("stylize", inputs))
     resume = UnpackTrainingState(*bytes);
-  if (resume) context->console->Info("stylize: goes on from its checkpoint");
-  const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
-  DeviceGrid device_field;
-  if (backend == Backend::kCuda) device_field = UploadGrid(MakeFastGrid(stored.field));
-  const TrainNetworkResult trained =
-      TrainNetwork(stored.field, style_targets.views, style_targets.scene_map,
-                   MarchOptions{stored.field.step}, options, hooks, resume ? &*resume : nullptr,
-                   backend == Backend::kCuda ? &device_field : nullptr);
+  if (resume) context->console->Info("stylize: continues from its checkpoint");
+  request.resume = resume ? &*resume : nullptr;
+  RestyledField restyled = Restyle(std::move(stored.field), targets.targets(), request, hooks);
+  const TrainNetworkResult& trained = restyled.trained;
+  for (const std::string& notice : restyled.notices) context->console->Info(notice);
   for (const std::string& warning : trained.warnings) context->console->Warn(warning);
 
   WriteNetworkFile(workspace.Path("network.npz"), {trained.network, trained.k_est});
-  RadianceField source{
-      stored.field.geometry, {}, source_background, stored.field.near_clip, stored.field.step};
-  Appearance restyled;
-  if (backend == Backend::kCuda) {
-    RestyleOnDevice(trained.network, &device_field);
-    restyled = ToRadianceField(DownloadGrid(device_field)).appearance;
-  } else {
-    restyled = ApplyNetwork(trained.network, stored.field, parts.Next(kAfterTraining));
-  }
-  source.appearance = std::exchange(stored.field.appearance, std::move(restyled));
   StageOutcome outcome;
   outcome.outputs = {"network.npz", "styled.npz"};
   if (object != nullptr) {
-    const RadianceField styled = std::move(stored.field);
-    stored.field = MixFields(source, {&styled}, {1}, &shares.all);
-    WriteObjectFile(workspace.Path("object.npz"), shares);
+    WriteObjectFile(workspace.Path("object.npz"), weights);
     outcome.outputs.push_back("object.npz");
     outcome.metrics["object_voxels"] = static_cast<int64_t>(
-        std::count_if(shares.all.begin(), shares.all.end(), [](float e) { return e > 0; }));
+        std::count_if(weights.all.begin(), weights.all.end(), [](float e) { return e > 0; }));
   } else {
     std::filesystem::remove(workspace.Path("object.npz"));  // of an earlier style
   }
-  WriteFieldFile(workspace.Path("styled.npz"), stored);
-  outcome.metrics["device"] = DeviceName(backend);
-  outcome.metrics["steps"] = trained.steps;
-  outcome.metrics["rejected_steps"] = trained.rejected_steps;
-  outcome.metrics["k_est"] = trained.k_est;
-  outcome.metrics["bound"] = trained.bound;
-  outcome.metrics["local_lipschitz_sampled"] = trained.local_lipschitz_sampled;
-  for (size_t i = 0; i < trained.history.steps.size(); ++i) {
-    outcome.metrics["bound_steps"].Append(trained.history.steps[i]);
-    outcome.metrics["bound_at_steps"].Append(trained.history.bounds[i]);
-  }
-  outcome.metrics["local_lipschitz_max"] = trained.local_lipschitz_max;
-  outcome.metrics["local_lipschitz_of_map"] = trained.network.BaseNorm();
-  outcome.metrics["local_lipschitz_along_coefficients"] = trained.slopes.along_coefficients;
-  outcome.metrics["local_lipschitz_along_position"] = trained.slopes.along_position;
   // A network's guarantee is about what it alone has made, and is measured on voxels.
-  if (object == nullptr && !source.geometry->spheres.on())
-    outcome.metrics["variance"] = VarianceRecord(source, stored.field, trained.network,
-                                                 style_targets.views, settings.run.seed);
-  outcome.metrics["psnr_train_db"] = trained.psnr_db;
-  for (const std::string& notice : style_targets.notices)
-    outcome.metrics["notices"].Append(notice);
+  if (object == nullptr && !restyled.source.geometry->spheres.on())
+    outcome.metrics["variance"] =
+        VarianceRecord(restyled.source, restyled.styled, trained.network,
+                       targets.targets().views(), settings.run.seed);
+  stored.field = std::move(restyled.styled);
+  WriteFieldFile(workspace.Path("styled.npz"), stored);
+  outcome.metrics["device"] = DeviceName(request.backend);
+  AddTrainingMetrics(trained, &outcome.metrics);
+  for (const std::string& notice : restyled.notices) outcome.metrics["notices"].Append(notice);
   for (const std::string& warning : trained.warnings)
     outcome.metrics["notices"].Append(warning);
   if (const std::string why = WhySteep(trained); !why.empty()) {
