@@ -19,7 +19,6 @@
 #include "pipeline/images/image_file.h"
 #include "pipeline/program/device_choice.h"
 #include "pipeline/run/run_context.h"
-#include "pipeline/run/run_file.h"
 #include "pipeline/stages/make_stylizer.h"
 #include "pipeline/stages/object_edit.h"
 #include "pipeline/stages/style_targets.h"
@@ -38,6 +37,7 @@ struct SheetOptions {
   int views = 3;
   int size = 320;
   int steps = 0;
+  int holdout = 8;
   std::string device = "auto";
   bool dry_run = false;
 
@@ -60,6 +60,11 @@ struct SheetOptions {
           .help = "training steps of each network; 0 takes those of its recipe",
           .min = 0,
           .max = 1e6});
+    bind("holdout", holdout,
+         {.unit = "photos",
+          .help = "as in `regrade run`, by default as in the run of DIR",
+          .min = 0,
+          .max = 1000});
     bind("device", device, {.help = "where networks are trained", .choices = "auto|cpu|cuda"});
     bind("dry-run", dry_run, {.help = "prints what would be done, and does nothing"});
   }
@@ -104,16 +109,15 @@ struct Scene {
 
 Scene ReadScene(const Workspace& workspace, const SheetOptions& sheet,
                 const RunSettings& settings) {
-  const int holdout = settings.run.holdout;
   Scene scene;
   scene.capture = ReadCapture(workspace.Path("poses"));
   scene.stored = ReadFieldFile(workspace.Path("field.npz"));
   // As Restyle does it, for the linear map.
   scene.stored.field.appearance =
       PadShBasis(std::move(scene.stored.field.appearance), kStyledBasis);
-  scene.training_views = ViewIndices(scene.capture, holdout, false);
+  scene.training_views = ViewIndices(scene.capture, sheet.holdout, false);
   if (scene.training_views.empty())
-    scene.training_views = ViewIndices(scene.capture, holdout, true);
+    scene.training_views = ViewIndices(scene.capture, sheet.holdout, true);
   const int count = std::min(sheet.views, static_cast<int>(scene.training_views.size()));
   for (int k = 0; k < count; ++k)
     scene.shown.push_back(
@@ -270,19 +274,6 @@ void AddStyle(RunContext* context, const Scene& scene, const SheetOptions& sheet
   context->console->EndStage();
 }
 
-// The options of the run in `folder` that the sheet shares with it.
-void ApplyRunsOptions(const std::string& folder, RunSettings* settings) {
-  OptionSet options;
-  options.Add("Run", &settings->run);
-  options.Add("Object", &settings->object);
-  const std::string run_json = folder + "/run.json";
-  const RunFile file = ReadRunFile(run_json);
-  JsonValue taken = JsonValue::Object();
-  for (const char* name : {"holdout", "masks", "mask-vote", "mask-edge"})
-    if (const JsonValue* value = file.options.Find(name)) taken[name] = *value;
-  options.ApplyConfig(taken, run_json);
-}
-
 }  // namespace
 
 void RunContactSheet(const Command& command, const Arguments& arguments, Console* console) {
@@ -295,17 +286,20 @@ void RunContactSheet(const Command& command, const Arguments& arguments, Console
   options.Add("2D method", &settings.style_2d);
   options.Add("Object", &settings.object);
   options.Add("Program", &settings.program);
-  if (PrintedHelp(command, arguments, options)) return;
-  const Arguments words = options.Parse(arguments);
   constexpr size_t kMostStyles = 64;
-  CheckWords(command, words, 2, 1 + kMostStyles);
+  const auto prepared =
+      Prepare(command, arguments,
+              {.least_words = 2,
+               .most_words = 1 + kMostStyles,
+               .continues_run = true,
+               .taken = {"holdout", "masks", "mask-vote", "mask-edge"}},
+              &options);
+  if (!prepared) return;
+  const Arguments& words = prepared->words;
   const std::string& folder = words[0];
-  if (!fs::exists(folder + "/field.npz") || !Workspace::Exists(folder))
+  if (!fs::exists(folder + "/field.npz"))
     throw Error(ExitCode::kInput, "holds no reconstruction", folder,
                 "make one with `regrade run` or `regrade reconstruct`");
-  ApplyRunsOptions(folder, &settings);
-  options.ApplyFlags();
-  ApplyProgramOptions(settings.program);
   if (sheet.out.empty() && !sheet.dry_run)
     throw Error(ExitCode::kUsage, "its value is missing", "--out",
                 "name the PNG file to write");

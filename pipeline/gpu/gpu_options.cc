@@ -1,6 +1,7 @@
 #include "pipeline/gpu/gpu_options.h"
 
 #include "kernels/base/error.h"
+#include "pipeline/run/resolve_settings.h"
 
 namespace regrade {
 
@@ -19,15 +20,12 @@ bool GpuSettings::Bind(const std::string& command, OptionSet* options) {
   return true;
 }
 
-void ReadFlags(const std::vector<std::string>& arguments, OptionSet* options,
-               GpuSettings* settings) {
+void ReadFlags(const std::vector<std::string>& arguments, OptionSet* options) {
   const std::vector<std::string> words = options->Parse(arguments);
   if (!words.empty())
     throw Error(ExitCode::kUsage, "unexpected argument", words[0],
                 "options begin with two dashes");
-  if (const auto recipe = options->Given("recipe"))
-    ApplyStyleRecipe(*recipe, &settings->network);
-  options->ApplyFlags();
+  ResolveSettings({}, options);
 }
 
 }  // namespace regrade

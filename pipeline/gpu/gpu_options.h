@@ -20,9 +20,8 @@ struct GpuSettings {
   bool Bind(const std::string& command, OptionSet* options);
 };
 
-// Reads what stands behind the command, in the precedence of a run: defaults, --recipe, other
-// flags. Throws Error(kUsage), also for words that are no flag.
-void ReadFlags(const std::vector<std::string>& arguments, OptionSet* options,
-               GpuSettings* settings);
+// Reads the arguments behind the command into the options that are bound; see ResolveSettings.
+// Throws Error(kUsage), also for words that are no flag.
+void ReadFlags(const std::vector<std::string>& arguments, OptionSet* options);
 
 }  // namespace regrade

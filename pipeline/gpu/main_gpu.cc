@@ -49,7 +49,7 @@ bool Run(const std::vector<std::string>& arguments) {
     std::printf("%s\n%s", kUsage, options.Help().c_str());
     return true;
   }
-  ReadFlags(rest, &options, &settings);
+  ReadFlags(rest, &options);
   if (command == "fit")
     FitPacked(settings.fit_packed, settings.fit);
   else if (command == "render")

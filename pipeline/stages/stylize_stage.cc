@@ -16,12 +16,14 @@
 #include "pipeline/fields/network_file.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/program/device_choice.h"
+#include "pipeline/report/stage_metrics.h"
 #include "pipeline/run/plan.h"
 #include "pipeline/run/run_context.h"
 #include "pipeline/stages/make_stylizer.h"
 #include "pipeline/stages/object_edit.h"
 #include "pipeline/stages/stages.h"
 #include "pipeline/stages/style_targets.h"
+#include "pipeline/workspace/metrics_json.h"
 #include "pipeline/workspace/output_names.h"
 #include "stylize/field/base_map.h"
 #include "stylize/field/volume_variance.h"
@@ -35,27 +37,21 @@ constexpr double kVoting = 0.2;  // of the time of training and application, rou
 // Pairs of neighbouring pixels on which LipRF's propositions are checked.
 constexpr int64_t kVariancePairs = 4000;
 
-JsonValue GroupRecord(const VarianceGroup& group) {
-  JsonValue record = JsonValue::Object{{"pairs", group.pairs}, {"above", group.above}};
-  if (group.pairs > 0) {
-    record["gain"] = group.Gain();
-    record["largest_excess"] = group.largest_excess;
-  }
-  return record;
+VarianceGroupMetrics MetricsOfGroup(const VarianceGroup& group) {
+  if (group.pairs == 0) return {};
+  return {group.pairs, group.above, group.Gain(), group.largest_excess};
 }
 
-JsonValue VarianceRecord(const RadianceField& source, const RadianceField& styled,
-                         const LipschitzNetwork& network,
-                         const std::vector<StyledTrainingView>& views, uint64_t seed) {
+VarianceMetrics MetricsOfVariance(const RadianceField& source, const RadianceField& styled,
+                                  const LipschitzNetwork& network,
+                                  const std::vector<StyledTrainingView>& views, uint64_t seed) {
   std::vector<Camera> cameras;
   for (const StyledTrainingView& view : views) cameras.push_back(view.camera);
   const VarianceReport report = MeasureVariance(
       source, styled, network, NeighbouringPixels(cameras, kVariancePairs, seed),
       MarchOptions{source.step});
-  return JsonValue::Object{{"inside", GroupRecord(report.inside)},
-                           {"clamp", GroupRecord(report.clamp)},
-                           {"open", GroupRecord(report.open)},
-                           {"largest_share", report.largest_share}};
+  return {MetricsOfGroup(report.inside), MetricsOfGroup(report.clamp),
+          MetricsOfGroup(report.open), report.largest_share};
 }
 
 // Why the local Lipschitz constant is above what the colours' covariances predict, where it is.
@@ -87,12 +83,13 @@ StageOutcome KeepColors(RunContext* context, StoredField stored, const ObjectWei
       "the masks agree on no part of the scene: it keeps its colours. Check --masks, or lower "
       "--mask-vote");
   stored.field.appearance = PadShBasis(std::move(stored.field.appearance), kStyledBasis);
-  WriteNetworkFile(workspace.Path("network.npz"), {NetworkOfMap({}), 0});
+  WriteNetworkFile(workspace.Path("network.npz"),
+                   {NetworkOfMap({}), 0, stored.field.background});
   WriteFieldFile(workspace.Path("styled.npz"), stored);
   WriteObjectFile(workspace.Path("object.npz"), weights);
   StageOutcome outcome;
   outcome.outputs = {"network.npz", "styled.npz", "object.npz"};
-  outcome.metrics["steps"] = 0;
+  PutMetrics(StylizeReport(), &outcome.metrics);
   return outcome;
 }
 
@@ -114,22 +111,21 @@ StyleTargets ReadStyleTargets(const RunContext& context, const Capture& capture,
   return targets;
 }
 
-void AddTrainingMetrics(const TrainNetworkResult& trained, JsonValue* metrics) {
-  JsonValue& m = *metrics;
-  m["steps"] = trained.steps;
-  m["rejected_steps"] = trained.rejected_steps;
-  m["k_est"] = trained.k_est;
-  m["bound"] = trained.bound;
-  m["local_lipschitz_sampled"] = trained.local_lipschitz_sampled;
-  for (size_t i = 0; i < trained.history.steps.size(); ++i) {
-    m["bound_steps"].Append(trained.history.steps[i]);
-    m["bound_at_steps"].Append(trained.history.bounds[i]);
-  }
-  m["local_lipschitz_max"] = trained.local_lipschitz_max;
-  m["local_lipschitz_of_map"] = trained.network.BaseNorm();
-  m["local_lipschitz_along_coefficients"] = trained.local_lipschitz.along_coefficients;
-  m["local_lipschitz_along_position"] = trained.local_lipschitz.along_position;
-  m["psnr_train_db"] = trained.psnr_db;
+StylizeReport MetricsOfTraining(const TrainNetworkResult& trained) {
+  StylizeReport metrics;
+  metrics.steps = trained.steps;
+  metrics.rejected_steps = trained.rejected_steps;
+  metrics.k_est = trained.k_est;
+  metrics.bound = trained.bound;
+  metrics.local_lipschitz_sampled = trained.local_lipschitz_sampled;
+  for (size_t i = 0; i < trained.history.steps.size(); ++i)
+    metrics.bound_at_steps.emplace_back(trained.history.steps[i], trained.history.bounds[i]);
+  metrics.local_lipschitz_max = trained.local_lipschitz_max;
+  metrics.local_lipschitz_of_map = trained.network.BaseNorm();
+  metrics.local_lipschitz_along_coefficients = trained.local_lipschitz.along_coefficients;
+  metrics.local_lipschitz_along_position = trained.local_lipschitz.along_position;
+  metrics.psnr_train_db = trained.psnr_db;
+  return metrics;
 }
 
 StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
@@ -169,33 +165,33 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
   for (const std::string& notice : restyled.notices) context->console->Info(notice);
   for (const std::string& warning : trained.warnings) context->console->Warn(warning);
 
-  WriteNetworkFile(workspace.Path("network.npz"), {trained.network, trained.k_est});
+  WriteNetworkFile(workspace.Path("network.npz"),
+                   {trained.network, trained.k_est, restyled.styled.background});
   StageOutcome outcome;
+  StylizeReport metrics = MetricsOfTraining(trained);
   outcome.outputs = {"network.npz", "styled.npz"};
   if (object != nullptr) {
     WriteObjectFile(workspace.Path("object.npz"), weights);
     outcome.outputs.push_back("object.npz");
-    outcome.metrics["object_voxels"] = static_cast<int64_t>(
-        std::count_if(weights.all.begin(), weights.all.end(), [](float e) { return e > 0; }));
+    metrics.object_voxels = static_cast<int64_t>(std::count_if(
+        weights.all.begin(), weights.all.end(), [](float e) { return e > 0; }));
   } else {
     std::filesystem::remove(workspace.Path("object.npz"));  // of an earlier style
   }
   // A network's guarantee is about what it alone has made, and is measured on voxels.
   if (object == nullptr && !restyled.source.geometry->spheres.on())
-    outcome.metrics["variance"] =
-        VarianceRecord(restyled.source, restyled.styled, trained.network,
-                       targets.targets().views(), settings.run.seed);
+    metrics.variance = MetricsOfVariance(restyled.source, restyled.styled, trained.network,
+                                         targets.targets().views(), settings.run.seed);
   stored.field = std::move(restyled.styled);
   WriteFieldFile(workspace.Path("styled.npz"), stored);
-  outcome.metrics["device"] = DeviceName(request.backend);
-  AddTrainingMetrics(trained, &outcome.metrics);
-  for (const std::string& notice : restyled.notices) outcome.metrics["notices"].Append(notice);
-  for (const std::string& warning : trained.warnings)
-    outcome.metrics["notices"].Append(warning);
+  metrics.device = DeviceName(request.backend);
+  metrics.notices = restyled.notices;
+  for (const std::string& warning : trained.warnings) metrics.notices.push_back(warning);
   if (const std::string why = WhySteep(trained); !why.empty()) {
     context->console->Info(why);
-    outcome.metrics["notices"].Append(why);
+    metrics.notices.push_back(why);
   }
+  PutMetrics(metrics, &outcome.metrics);
   return outcome;
 }
 
@@ -205,13 +201,14 @@ Stage StylizeStage(RunContext* context) {
   const RunOptions& run = context->settings.run;
   Stage stage;
   stage.name = "stylize";
-  stage.inputs = JsonValue::Object{{"field", context->ResultOf("reconstruct")},
-                                   {"views_2d", context->ResultOf("style_2d")},
-                                   {"options", context->OptionsOf({"Scene", "Network"})},
-                                   {"seed", run.seed},
-                                   {"holdout", run.holdout}};
+  stage.inputs = JsonValue::Object{
+      {"field", context->ResultOf("reconstruct")},
+      {"views_2d", context->ResultOf("style_2d")},
+      {"options", OptionValues(context->settings.scene, context->settings.network)},
+      {"seed", run.seed},
+      {"holdout", run.holdout}};
   if (context->settings.object.On()) {
-    stage.inputs["object"] = context->OptionsOf({"Object"});
+    stage.inputs["object"] = OptionValues(context->settings.object);
     stage.inputs["masks"] = MaskFiles(context->settings.object);
   }
   stage.plan = PlanText(PlanStyle(context->settings.network.steps, omp_get_max_threads()));

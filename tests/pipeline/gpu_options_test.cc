@@ -12,7 +12,7 @@ TrainNetworkOptions Read(const std::vector<std::string>& arguments) {
   GpuSettings settings;
   OptionSet options;
   EXPECT_TRUE(settings.Bind("style", &options));
-  ReadFlags(arguments, &options, &settings);
+  ReadFlags(arguments, &options);
   return settings.network;
 }
 
