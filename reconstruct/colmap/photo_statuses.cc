@@ -80,7 +80,8 @@ void RefuseTooFew(size_t photos_given, int min_photos) {
 void RefuseUnregistered(const Capture& capture) {
   std::string names;
   for (const PhotoStatus& photo : capture.statuses)
-    if (photo.status == PhotoState::kUnregistered) names += "\n  " + photo.file + ": " + photo.why;
+    if (photo.status == PhotoState::kUnregistered)
+      names += "\n  " + photo.file + ": " + photo.why;
   throw Error(ExitCode::kScene,
               "only " + std::to_string(capture.views.size()) + " of " +
                   Photos(capture.statuses.size()) +
