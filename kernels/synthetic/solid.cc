@@ -48,7 +48,7 @@ double MeetBox(const Vec3d& o, const Vec3d& d, const Vec3d& half, double after) 
   return enter > after ? enter : leave > after ? leave : kNever;
 }
 
-// The wall of an upright cylinder; a part of it may be cut away (local y <= min_y).
+// The wall of an upright cylinder without its part at local y <= min_y.
 double MeetTube(const Vec3d& o, const Vec3d& d, double radius, double half_height, double min_y,
                 double after) {
   double roots[2];
@@ -85,7 +85,7 @@ double Meet(const Solid& solid, const Vec3d& o, const Vec3d& d, double after) {
   return kNever;
 }
 
-// Whether the line of the ray passes the solid by: the quick test that most pairs end with.
+// A quick rejection test: true if the ray's line misses the solid.
 inline bool PassesBy(const Solid& solid, const RayT<double>& ray) {
   if (solid.shape == Shape::kBackdrop) return false;
   const Vec3d offset = ray.origin - solid.center;
@@ -93,7 +93,7 @@ inline bool PassesBy(const Solid& solid, const RayT<double>& ray) {
   return Dot(offset, offset) - along * along > Dot(solid.half, solid.half) * (1 + 1e-9);
 }
 
-// Distance along the ray; *o and *d are the ray in the solid's own frame.
+// Distance along the ray; *o and *d are the ray in the solid's frame.
 double Distance(const Solid& solid, const RayT<double>& ray, double after, Vec3d* o, Vec3d* d) {
   *o = TurnedBy(ray.origin - solid.center, solid.cos_yaw, -solid.sin_yaw);
   *d = TurnedBy(ray.direction, solid.cos_yaw, -solid.sin_yaw);
@@ -105,7 +105,7 @@ void Dress(const Solid& solid, const Vec3d& p, Vec3d* normal, double* u, double*
   const Vec3d& half = solid.half;
   if (solid.shape == Shape::kSphere) {
     *normal = p / half.x;
-    // Lambert's equal-area map seen from the top: no pole but the hidden lowest point.
+    // Lambert's equal-area map seen from the top: its only pole is the hidden lowest point.
     const double stretch = std::sqrt(2 / std::max(1e-6, 1 + normal->z));
     *u = p.x * stretch, *v = p.y * stretch;
     return;
@@ -119,7 +119,7 @@ void Dress(const Solid& solid, const Vec3d& p, Vec3d* normal, double* u, double*
     }
     *normal = {};
     (*normal)[axis] = p[axis] > 0 ? 1 : -1;
-    // Sides unfold into a strip; each face has a stretch of paint of its own.
+    // Sides unfold into a strip; each face has another part of the paint.
     const double shift = 17.0 * axis + (p[axis] > 0 ? 7.0 : 0.0);
     *u = (axis == 0 ? p.y : p.x) + shift;
     *v = axis == 2 ? p.y : p.z;
@@ -132,7 +132,7 @@ void Dress(const Solid& solid, const Vec3d& p, Vec3d* normal, double* u, double*
     return;
   }
   *normal = {p.x / half.x, p.y / half.x, 0};
-  // A pot's seam is at its back, a backdrop's in the part cut away.
+  // The seam of a pot is at its back, that of a backdrop in the removed part.
   *u =
       half.x * (solid.shape == Shape::kBackdrop ? std::atan2(p.x, p.y) : std::atan2(p.x, -p.y));
   *v = p.z;

@@ -70,7 +70,7 @@ class CpuFitEngine : public FitEngine {
  private:
   void ResetArenas() {
     for (GradientArena& arena : arenas_) {
-      arena.Reset(state_.grid.num_voxels(), state_.grid.lanes());
+      arena.Reset(state_.grid.num_voxels());
       arena.spheres.Reset(state_.grid.spheres.num_texels());
     }
   }

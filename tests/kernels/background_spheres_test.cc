@@ -258,7 +258,7 @@ TEST_P(FastSpheresParity, GradientsAsThePlainAdjointInDouble) {
   const std::vector<Vec3f> targets(rays_.size(), Vec3f{0.4f, 0.5f, 0.2f});
   const MarchOptions options{0.5f, 1e-4f};
   GradientArena arena;
-  arena.Reset(grid.num_voxels(), grid.lanes());
+  arena.Reset(grid.num_voxels());
   arena.spheres.Reset(grid.spheres.num_texels());
   const float scale = 1.0f / 1200;
   functions_->accumulate(grid,

@@ -115,7 +115,7 @@ TEST_P(FastRaysParity, GradientsAsThePlainAdjointInDouble) {
   const std::vector<Vec3f> targets(rays.size(), Vec3f{0.4f, 0.5f, 0.2f});
   const MarchOptions options{0.5f, 1e-4f};
   GradientArena arena;
-  arena.Reset(grid.num_voxels(), grid.lanes());
+  arena.Reset(grid.num_voxels());
   const float scale = 1.0f / 600;
   const FitStepResult step = functions()->accumulate(
       grid, {rays.data(), targets.data(), static_cast<int64_t>(rays.size())}, options, scale,
@@ -165,7 +165,7 @@ TEST_P(FastRaysParity, H103_H104_StepIsSparseAndRefusesNan) {
   const FastGrid before = grid;
   const int lanes = grid.lanes();
   std::vector<GradientArena> arenas(2);
-  for (auto& arena : arenas) arena.Reset(grid.num_voxels(), lanes);
+  for (auto& arena : arenas) arena.Reset(grid.num_voxels());
   const auto touch = [&](int arena, int32_t voxel, float value) {
     GradientArena& a = arenas[static_cast<size_t>(arena)];
     const int64_t slot = a.voxel_of_slot.size();
@@ -234,7 +234,7 @@ TEST_P(FastRaysParity, StepIsProjected) {
     FastGrid grid = MakeFastGrid(RandomField({3, 3, 3}, basis(), 1.0, 52));
     const int lanes = grid.lanes();
     GradientArena arena;
-    arena.Reset(grid.num_voxels(), lanes);
+    arena.Reset(grid.num_voxels());
     arena.slot_of_voxel[4] = 0;
     arena.voxel_of_slot.Resize(1);
     arena.voxel_of_slot[0] = 4;

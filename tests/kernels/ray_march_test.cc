@@ -215,7 +215,7 @@ TEST(Trilinear, H82_H83_AdjointAndEmptyCorners) {
       y[c] = testing::Uniform(10, 3 * i + static_cast<uint64_t>(c), -1, 1);
       ax_y += out[c] * y[c];
     }
-    InterpolateAdjoint(g.frame, g.links.data(), 3, 3, cell, y, at_y.data());
+    InterpolateAdjoint(g.frame, g.links.data(), 3, 3, cell, y, at_y.data(), PlainAdd());
   }
   double x_aty = 0;
   for (size_t i = 0; i < x.size(); ++i) x_aty += x[i] * at_y[i];

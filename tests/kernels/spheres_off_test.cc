@@ -17,7 +17,7 @@ uint64_t DigestOfSteps(const FastRayFunctions& functions) {
   FastGrid grid = MakeFastGrid(testing::RandomField({12, 11, 13}, 9, 0.5, 71));
   Buffer<float> moments(grid.records.size());
   GradientArena arena;
-  arena.Reset(grid.num_voxels(), grid.lanes());
+  arena.Reset(grid.num_voxels());
   const std::vector<Ray> rays = testing::RandomRays(500, 72);
   const int64_t n = static_cast<int64_t>(rays.size());
   const std::vector<Vec3f> targets(rays.size(), Vec3f{0.4f, 0.5f, 0.2f});

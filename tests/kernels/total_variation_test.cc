@@ -75,7 +75,7 @@ TEST(TotalVariation, FastPathEqualsThePlainOne) {
     for (const int basis : {1, 4, 9}) {
       const FastGrid grid = MakeFastGrid(testing::RandomField({7, 5, 6}, basis, 0.6, 93));
       GradientArena arena;
-      arena.Reset(grid.num_voxels(), grid.lanes());
+      arena.Reset(grid.num_voxels());
       const int64_t begin = 13, end = 190;
       functions->total_variation(grid, begin, end, 0.7f, 0.2f, &arena);
       std::vector<float> plain(static_cast<size_t>(grid.records.size()));
