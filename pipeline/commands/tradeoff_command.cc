@@ -101,8 +101,8 @@ std::vector<Job> JobsOf(const std::vector<Variant>& variants, int repeats) {
 }
 
 std::string NameOf(const Variant& variant) {
-  if (variant.parameter.empty()) return variant.plane + ": the base";
-  return variant.plane + ": " + variant.parameter + " " + variant.value;
+  if (variant.parameter.empty()) return variant.benchmark + ": the base";
+  return variant.benchmark + ": " + variant.parameter + " " + variant.value;
 }
 
 // A preset that is the base is measured already.
