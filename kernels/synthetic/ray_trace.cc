@@ -132,13 +132,13 @@ Image RenderSolidMask(const SyntheticScene& scene, const Camera& camera, int sol
 #pragma omp parallel for schedule(dynamic)
   for (int y = 0; y < camera.height; ++y)
     for (int x = 0; x < camera.width; ++x) {
-      int met = 0;
+      int hits = 0;
       for (int k = 0; k < kSide * kSide; ++k)
-        met +=
+        hits +=
             FindHit(scene.solids,
                     rays(x + (k % kSide + 0.5) / kSide, y + (k / kSide + 0.5) / kSide), kOffset)
                 .solid == solid;
-      *mask.at(x, y) = static_cast<float>(met) / (kSide * kSide);
+      *mask.at(x, y) = static_cast<float>(hits) / (kSide * kSide);
     }
   return mask;
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "kernels/base/random.h"
+#include "kernels/base/random_streams.h"
 #include "kernels/field/cpu/rays.h"
 #include "kernels/field/cpu/render_view.h"
 #include "reconstruct/fit/fit_engine.h"
@@ -84,8 +85,8 @@ class CpuFitEngine : public FitEngine {
     // run alone, scaled so that its expectation is lambda times the mean over all voxels.
     const int64_t vertices = state_.grid.frame.NumVertices();
     const int64_t run = static_cast<int64_t>(step.tv_share * static_cast<float>(vertices));
-    const int64_t run_begin = static_cast<int64_t>(
-        RandomIndex(seed_ ^ 0x7476ull, step.number, 0, static_cast<uint64_t>(vertices)));
+    const int64_t run_begin = static_cast<int64_t>(RandomIndex(
+        seed_ ^ kRandomTotalVariation, step.number, 0, static_cast<uint64_t>(vertices)));
     const float tv_scale = run > 0 ? 1.0f / static_cast<float>(run) : 0.0f;
 
 #pragma omp parallel for schedule(dynamic, 1)
@@ -117,8 +118,8 @@ class CpuFitEngine : public FitEngine {
     const int64_t map = spheres.links.size();
     const int64_t run = static_cast<int64_t>(step.tv_sphere_share * static_cast<float>(map));
     if (run == 0) return;
-    const int64_t first = static_cast<int64_t>(
-        RandomIndex(seed_ ^ 0x6d7369ull, step.number, 0, static_cast<uint64_t>(map)));
+    const int64_t first = static_cast<int64_t>(RandomIndex(
+        seed_ ^ kRandomSphereVariation, step.number, 0, static_cast<uint64_t>(map)));
     const float scale = 1.0f / (static_cast<float>(run) * static_cast<float>(spheres.layers));
     for (int64_t v = run * shard / shards; v < run * (shard + 1) / shards;) {
       const int64_t from = (first + v) % map;

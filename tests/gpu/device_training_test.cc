@@ -1,5 +1,5 @@
-// Steps of learning that the device makes on its own, against the same steps made one by one
-// from the host. Without a device each test skips and says so.
+// Captured training steps on the device against the same steps issued one by one from the host.
+// Every test is skipped without a device.
 #include "stylize/cuda/device_training.h"
 
 #include <gtest/gtest.h>
@@ -23,11 +23,11 @@ namespace {
 
 using namespace testing;  // NOLINT: a test
 
-class DeviceLearning : public ::testing::Test {
+class DeviceStyleTraining : public ::testing::Test {
  protected:
   void SetUp() override {
     const DeviceStatus status = ReadDeviceStatus();
-    if (!status.found) GTEST_SKIP() << "no GPU here: " << status.name;
+    if (!status.found) GTEST_SKIP() << "no GPU: " << status.name;
   }
 
   static LipschitzNetwork Start() {
@@ -51,7 +51,7 @@ class DeviceLearning : public ::testing::Test {
   }
   static constexpr int kViews = 3, kSide = 13;
   static constexpr int64_t kRays = int64_t{kViews} * kSide * kSide;
-  // The same rays with other targets each time.
+  // The same rays with different targets each time.
   static std::vector<StyleRays> Batches(int n) {
     std::vector<StyleRays> batches(static_cast<size_t>(n), SomeRays(kViews, kSide));
     for (size_t i = 0; i < batches.size(); ++i)
@@ -75,7 +75,7 @@ class DeviceLearning : public ::testing::Test {
   }
 };
 
-// What train_network.cc does in a step, with the loss of the device's path.
+// One step of train_network.cc, with the loss of the device path.
 bool StepFromHost(const LipschitzRule& rule, StyleLoss* loss, const StyleRays& batch,
                   int64_t step, LipschitzNetwork* network, AdamState* adam,
                   AggregationResult* result) {
@@ -100,9 +100,9 @@ bool StepFromHost(const LipschitzRule& rule, StyleLoss* loss, const StyleRays& b
   return true;
 }
 
-// Adam divides a gradient by its own size, so where a gradient is little more than rounding the
-// two ways may step to opposite sides: what is compared is the whole way that the weights went.
-TEST_F(DeviceLearning, StepsAreThoseOfTheHost) {
+// Adam normalises a gradient by its magnitude, so a gradient close to rounding error may step
+// in either direction: the comparison is of the total path of the weights.
+TEST_F(DeviceStyleTraining, StepsAreThoseOfTheHost) {
   RadianceField field = Ball(14, 9);
   AddSpheres(40, 9, 0.7, 5, &field);
   const DeviceGrid grid = UploadGrid(MakeFastGrid(field));
@@ -129,13 +129,13 @@ TEST_F(DeviceLearning, StepsAreThoseOfTheHost) {
       EXPECT_EQ(made.last.touched_voxels, host_result.touched_voxels);
       EXPECT_EQ(device_adam.steps, host_adam.steps);
       const std::string what = std::to_string(steps) + " steps";
-      ParityRow("learning, last loss", what, "steps from the host, relative",
+      ParityRow("training, last loss", what, "steps from the host, relative",
                 std::abs(made.last.loss - host_result.loss) / host_result.loss, 1e-4);
-      ParityRow("learning, first moments", what, "steps from the host, norms",
+      ParityRow("training, first moments", what, "steps from the host, norms",
                 Difference(device_adam.first_moment, host_adam.first_moment,
                            std::vector<float>(device_adam.first_moment.size())),
                 2e-3);
-      ParityRow("learning, weights", what, "steps from the host, of the way they went",
+      ParityRow("training, weights", what, "steps from the host, of the path length",
                 Difference(by_device.data().parameters, by_host.data().parameters,
                            start.data().parameters),
                 5e-2);
@@ -143,7 +143,7 @@ TEST_F(DeviceLearning, StepsAreThoseOfTheHost) {
   }
 }
 
-TEST_F(DeviceLearning, TooLittleRoomIsMadeAndNoStepIsLost) {
+TEST_F(DeviceStyleTraining, BuffersGrowAndNoStepIsLost) {
   const RadianceField field = Ball(14, 9);
   const DeviceGrid grid = UploadGrid(MakeFastGrid(field));
   const std::vector<StyleRays> batches = Batches(5);
@@ -163,14 +163,14 @@ TEST_F(DeviceLearning, TooLittleRoomIsMadeAndNoStepIsLost) {
   EXPECT_NEAR(loss[1] / loss[0], 1, 1e-4);
 }
 
-// A target that is not finite leaves the loss; weights that are not finite stop it, also where
-// two calls share the two steps.
-TEST_F(DeviceLearning, TwoStepsInARowThatAreNotFiniteStop) {
+// A non-finite target is excluded from the loss; non-finite weights stop training, also if the
+// two steps are in different calls.
+TEST_F(DeviceStyleTraining, TwoConsecutiveNonFiniteStepsStop) {
   const RadianceField field = Ball(14, 9);
   const DeviceGrid grid = UploadGrid(MakeFastGrid(field));
   std::vector<StyleRays> batches = Batches(4);
   batches[1].targets[7].x = std::nanf("");
-  batches[2].rays.resize(100);  // fewer are filled up
+  batches[2].rays.resize(100);  // a smaller batch is padded
   batches[2].targets.resize(100);
   LipschitzNetwork network = Start();
   AdamState adam;
@@ -194,7 +194,7 @@ TEST_F(DeviceLearning, TwoStepsInARowThatAreNotFiniteStop) {
   EXPECT_EQ(made.made, 1);
   EXPECT_EQ(adam.rejected, 2);
   EXPECT_EQ(made.gradient.size(), finite.size());
-  EXPECT_EQ(network.weight(0)[0], finite[0]);  // nothing has moved
+  EXPECT_EQ(network.weight(0)[0], finite[0]);  // unchanged
 }
 
 }  // namespace

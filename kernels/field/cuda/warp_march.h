@@ -134,7 +134,7 @@ class WarpMarch {
         // Occupied space usually continues: do not wait for the distance to load densities.
         if (was_in_occupied) density = DensityAt(sample->cell);
       }
-      in_occupied_ = __any_sync(kAllLanes, inside && distance == 0);
+      in_occupied_ = __any_sync(kAllLanes, in_range && distance == 0);
       if (!in_occupied_) {
         // All 32 samples are empty; each lane's distance bounds how far the ray stays empty.
         const int skip =
