@@ -264,7 +264,7 @@ const VariantRunner::Frames& VariantRunner::BaseFrames() {
     f.geometry.push_back({DepthAlongRays(camera, view.depth), camera});
   }
   const PairMotionFunction known =
-      KnownMotion([&f](int i) { return f.geometry[static_cast<size_t>(i)]; });
+      GeometricMotion([&f](int i) { return f.geometry[static_cast<size_t>(i)]; });
   for (int i = 0; i + 1 < count; ++i) f.truth.push_back(known(i, i + 1));
   for (int i = 0; i < std::min(kRenderedFrames, count); ++i)
     f.accurate.push_back(RenderView(f.grid, f.cameras[static_cast<size_t>(i)],

@@ -127,7 +127,7 @@ class DeviceTraining::CapturedSteps {
     unclamped_ = {};
     unclamped_ = DeviceBuffer<uint8_t>(sample_capacity_, "clamps of samples");
     mlp_.ReserveAdjoint(slot_capacity_);
-    graph_.Record([&] { Step(); });
+    graph_.Capture([&] { Step(); });
   }
 
  private:
@@ -170,7 +170,7 @@ class DeviceTraining::CapturedSteps {
   }
 
   void Launch(int64_t steps) {
-    for (int64_t i = 0; i < steps; ++i) graph_.Play();
+    for (int64_t i = 0; i < steps; ++i) graph_.Launch();
   }
 
   void CopyBatch(const StyleRays& batch, int64_t place) {
