@@ -121,7 +121,7 @@ bool Draw(std::string_view bytes) {
 
 std::vector<FuzzTarget> PictureTargets() {
   return {{"image_format", FormatSeeds, ReadFormat, Mutate, 100000},
-          {"photo", PhotoSeeds, ReadPhoto, MutatePhoto, 6000},
+          {"photo", PhotoSeeds, ReadPhoto, MutatePhoto, 40000},
           {"picture_text", TextSeeds, Draw, Mutate, 8000}};
 }
 

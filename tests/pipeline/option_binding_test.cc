@@ -77,7 +77,7 @@ TEST_F(Options, SwitchesDoNotSwallowWords) {
 TEST_F(Options, TwoDashesEndTheFlags) {
   EXPECT_EQ(Parse({"--flag", "--", "--rays", "-x"}),
             (std::vector<std::string>{"--rays", "-x"}));
-  EXPECT_REGRADE_ERROR(Parse({"-x"}), ExitCode::kUsage, "behind --");
+  EXPECT_REGRADE_ERROR(Parse({"-x"}), ExitCode::kUsage, "after --");
 }
 
 TEST_F(Options, F18_UnknownNamesSuggestTheNearest) {

@@ -312,7 +312,8 @@ TEST(FolderLock, F39_BreakLock) {
   const TemporaryFolder folder;
   const Workspace workspace(folder / "out");
   // The lock of a living process is not broken.
-  EXPECT_REGRADE_ERROR(Workspace(folder / "out", true), ExitCode::kFolderInUse, "alive");
+  EXPECT_REGRADE_ERROR(Workspace(folder / "out", true), ExitCode::kFolderInUse,
+                       "still running");
   // The lock of an unknown process, as on a network drive, is.
   WriteText(folder / "out/.regrade/lock",
             R"({"pid": 1, "host": "elsewhere", "start": "2001-01-01T00:00:00Z"})");
