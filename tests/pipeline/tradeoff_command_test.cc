@@ -87,7 +87,9 @@ TEST(TradeoffCommand, MeasuresContinuesAndPredicts) {
                      "{\"schema\": 1, \"costs\": [{}]}");
   outcome = Regrade({"evaluate", folder / "t/base"});
   ASSERT_EQ(outcome.code, 0) << outcome.text;
-  EXPECT_NE(outcome.text.find("the report does without tradeoff/tradeoff.json"), std::string::npos) << outcome.text;
+  EXPECT_NE(outcome.text.find("the report does without tradeoff/tradeoff.json"),
+            std::string::npos)
+      << outcome.text;
   EXPECT_NE(outcome.text.find("schema 1"), std::string::npos) << outcome.text;
   EXPECT_EQ(page().find("Accuracy and cost"), std::string::npos);
   testing::WriteText(folder / "t/base/tradeoff/tradeoff.json",
