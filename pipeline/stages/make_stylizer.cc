@@ -7,8 +7,6 @@
 #include <utility>
 
 #include "kernels/base/error.h"
-#include "pipeline/capture/photo_gains.h"
-#include "pipeline/capture/working_views.h"
 #include "pipeline/files/folder_listing.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/stages/command_stylizer.h"
@@ -72,17 +70,16 @@ std::unique_ptr<ViewStylizer> MakeMethod(RunContext* context, const Capture& cap
 
 }  // namespace
 
-std::unique_ptr<ViewStylizer> MakeSceneStylizer(RunContext* context, const Capture& capture,
+std::unique_ptr<ViewStylizer> MakeSceneStylizer(RunContext* context, const WorkingViews& views,
                                                 const ObjectMasks* masks,
                                                 const CoverageFunction& coverage) {
   const RunSettings& settings = context->settings;
   std::string notice;
   const Image style = ReadStylePicture(settings.style.picture, &notice);
   if (!notice.empty()) context->console->Info(notice);
-  const PhotoGains gains = RecordedGains(*context->workspace, capture);
+  const Capture& capture = views.capture();
   const auto photo = [&](size_t i) -> std::optional<Image> {
-    Image picture = ReadPhotoToFit(capture.views[i], settings.scene.photo_size,
-                                   gains.Of(static_cast<int>(i)));
+    Image picture = views.PhotoToFit(static_cast<int>(i));
     if (picture.empty()) return std::nullopt;
     return picture;
   };
@@ -122,7 +119,7 @@ void ProbeMethod(StyleOptions* options) {
   ProbeStyleNetwork(method.argument);
 }
 
-std::vector<int> StyledViews(const Workspace& workspace, const Capture& capture, int holdout) {
+std::vector<int> StyledViews(const Workspace& workspace, const WorkingViews& working_views) {
   const auto with_picture = [&](const std::vector<int>& views) {
     std::vector<int> kept;
     for (const int i : views)
@@ -130,8 +127,8 @@ std::vector<int> StyledViews(const Workspace& workspace, const Capture& capture,
         kept.push_back(i);
     return kept;
   };
-  std::vector<int> views = with_picture(ViewIndices(capture, holdout, false));
-  if (views.empty()) views = with_picture(ViewIndices(capture, holdout, true));
+  std::vector<int> views = with_picture(working_views.Training());
+  if (views.empty()) views = with_picture(working_views.HeldOut());
   if (views.empty())
     throw Error(ExitCode::kInput, "no view has a styled picture", workspace.Path("views_2d"),
                 "use --restart-from style_2d");

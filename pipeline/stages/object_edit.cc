@@ -4,7 +4,6 @@
 
 #include "kernels/base/error.h"
 #include "kernels/field/cpu/render_view.h"
-#include "pipeline/capture/working_views.h"
 #include "pipeline/files/npz_file.h"
 #include "stylize/field/object_weights.h"
 
@@ -33,10 +32,9 @@ std::unique_ptr<ObjectMasks> OpenObjectMasks(const RunSettings& settings,
   return std::make_unique<ObjectMasks>(settings.object, photos);
 }
 
-ObjectWeights VoteForObject(const RunSettings& settings, const Capture& capture,
+ObjectWeights VoteForObject(const RunSettings& settings, const WorkingViews& working_views,
                             const std::vector<int>& views, const ObjectMasks& masks,
-                            const RadianceField& field, const Similarity& field_from_world,
-                            const NdcSpace& ndc, const ProgressFunction& progress) {
+                            const RadianceField& field, const ProgressFunction& progress) {
   std::vector<MaskVote> votes;
   for (int k = 0; k < masks.num_regions(); ++k)
     votes.emplace_back(*field.geometry, field.near_clip, MarchOptions{field.step});
@@ -46,8 +44,7 @@ ObjectWeights VoteForObject(const RunSettings& settings, const Capture& capture,
       throw Interrupted();
     const int i = views[n];
     if (!masks.Knows(i)) continue;
-    const Camera camera = WorkingCamera(capture.views[static_cast<size_t>(i)].camera,
-                                        settings.scene.photo_size, field_from_world, ndc);
+    const Camera camera = working_views.CameraOf(i);
     const std::vector<Image> coverage = masks.Coverage(i, camera.width, camera.height);
     for (size_t k = 0; k < votes.size(); ++k) votes[k].Add(camera, coverage[k]);
   }

@@ -25,10 +25,9 @@ struct ObjectWeights {
 };
 
 // See EQ(mask-vote); the masks of `views` vote.
-ObjectWeights VoteForObject(const RunSettings& settings, const Capture& capture,
+ObjectWeights VoteForObject(const RunSettings& settings, const WorkingViews& working_views,
                             const std::vector<int>& views, const ObjectMasks& masks,
-                            const RadianceField& field, const Similarity& field_from_world,
-                            const NdcSpace& ndc, const ProgressFunction& progress);
+                            const RadianceField& field, const ProgressFunction& progress);
 
 // object.npz: f32 "shares" [regions, voxels]. Reading throws Error(kInput) for a file that
 // does not fit the field.

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "kernels/base/random.h"
+#include "kernels/base/random_streams.h"
 #include "pipeline/synth/synth_effects.h"
 
 namespace regrade {
@@ -13,8 +14,9 @@ constexpr double kSameDepth = 0.01;  // of the depth: a larger difference is an 
 
 // Box and Muller 1958; 1 - u is in (0, 1].
 double Normal(uint64_t seed, uint64_t stream, uint64_t counter) {
-  return std::sqrt(-2 * std::log(1 - RandomDouble(seed ^ 0x7a11, stream, 2 * counter))) *
-         std::cos(2 * M_PI * RandomDouble(seed ^ 0x7a11, stream, 2 * counter + 1));
+  return std::sqrt(-2 *
+                   std::log(1 - RandomDouble(seed ^ kRandomSynthModel, stream, 2 * counter))) *
+         std::cos(2 * M_PI * RandomDouble(seed ^ kRandomSynthModel, stream, 2 * counter + 1));
 }
 
 Vec3d Direction(uint64_t seed, uint64_t stream, uint64_t counter) {

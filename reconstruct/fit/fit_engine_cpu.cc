@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "kernels/base/random.h"
+#include "kernels/base/random_streams.h"
 #include "kernels/field/cpu/rays.h"
 #include "kernels/field/cpu/render_view.h"
 #include "reconstruct/fit/fit_engine.h"
@@ -70,7 +71,7 @@ class CpuFitEngine : public FitEngine {
  private:
   void ResetArenas() {
     for (GradientArena& arena : arenas_) {
-      arena.Reset(state_.grid.num_voxels(), state_.grid.lanes());
+      arena.Reset(state_.grid.num_voxels());
       arena.spheres.Reset(state_.grid.spheres.num_texels());
     }
   }
@@ -84,8 +85,8 @@ class CpuFitEngine : public FitEngine {
     // start, wrapping around, scaled so that the expectation is lambda times the mean over all.
     const int64_t vertices = state_.grid.frame.NumVertices();
     const int64_t run = static_cast<int64_t>(step.tv_fraction * static_cast<float>(vertices));
-    const int64_t run_begin = static_cast<int64_t>(
-        RandomIndex(seed_ ^ 0x7476ull, step.number, 0, static_cast<uint64_t>(vertices)));
+    const int64_t run_begin = static_cast<int64_t>(RandomIndex(
+        seed_ ^ kRandomTotalVariation, step.number, 0, static_cast<uint64_t>(vertices)));
     const float tv_scale = run > 0 ? 1.0f / static_cast<float>(run) : 0.0f;
 
 #pragma omp parallel for schedule(dynamic, 1)
@@ -117,8 +118,8 @@ class CpuFitEngine : public FitEngine {
     const int64_t map = spheres.links.size();
     const int64_t run = static_cast<int64_t>(step.tv_sphere_fraction * static_cast<float>(map));
     if (run == 0) return;
-    const int64_t first = static_cast<int64_t>(
-        RandomIndex(seed_ ^ 0x6d7369ull, step.number, 0, static_cast<uint64_t>(map)));
+    const int64_t first = static_cast<int64_t>(RandomIndex(
+        seed_ ^ kRandomSphereVariation, step.number, 0, static_cast<uint64_t>(map)));
     const float scale = 1.0f / (static_cast<float>(run) * static_cast<float>(spheres.layers));
     for (int64_t v = run * shard / shards; v < run * (shard + 1) / shards;) {
       const int64_t from = (first + v) % map;

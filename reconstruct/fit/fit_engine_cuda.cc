@@ -7,6 +7,7 @@
 
 #include "kernels/base/error.h"
 #include "kernels/base/random.h"
+#include "kernels/base/random_streams.h"
 #include "kernels/field/cuda/device_rays.h"
 #include "kernels/field/cuda/device_sphere_rays.h"
 #include "kernels/field/cuda/device_views.h"
@@ -55,8 +56,8 @@ class CudaFitEngine : public FitEngine {
     const int64_t voxels = grid_.num_voxels();
     const int64_t run = static_cast<int64_t>(step.tv_fraction * static_cast<float>(voxels));
     if (run > 0) {
-      const int64_t begin = static_cast<int64_t>(
-          RandomIndex(seed_ ^ 0x7476ull, step.number, 0, static_cast<uint64_t>(voxels)));
+      const int64_t begin = static_cast<int64_t>(RandomIndex(
+          seed_ ^ kRandomTotalVariation, step.number, 0, static_cast<uint64_t>(voxels)));
       const float scale =
           1.0f / (step.tv_fraction * static_cast<float>(grid_.frame.NumVertices()));
       AddTotalVariation(grid_, begin, run, step.tv_density * scale, step.tv_sh * scale,
@@ -110,8 +111,8 @@ class CudaFitEngine : public FitEngine {
     const int64_t map = spheres.links.size();
     const int64_t run = static_cast<int64_t>(step.tv_sphere_fraction * static_cast<float>(map));
     if (run > 0) {
-      const int64_t begin = static_cast<int64_t>(
-          RandomIndex(seed_ ^ 0x6d7369ull, step.number, 0, static_cast<uint64_t>(map)));
+      const int64_t begin = static_cast<int64_t>(RandomIndex(
+          seed_ ^ kRandomSphereVariation, step.number, 0, static_cast<uint64_t>(map)));
       const float scale = 1.0f / (static_cast<float>(run) * static_cast<float>(spheres.layers));
       AddSphereVariation(grid_, begin, run, step.tv_sphere_density * scale,
                          step.tv_sphere_color * scale, &touched_);

@@ -69,7 +69,7 @@ TEST(FieldFile, RoundTripIsExactUpToHalfColours) {
     EXPECT_EQ(in.field_from_world.rotation(0, 1), 0.6);
     EXPECT_EQ(in.field_from_world.translation.z, 3);
     EXPECT_EQ(in.field.geometry->frame.radius, out.field.geometry->frame.radius);
-    // What a reader gets, written again, is the same file.
+    // Written again after reading, it is the same file.
     WriteFieldFile(folder / "again.npz", in);
     EXPECT_EQ(ReadText(folder / "again.npz"), ReadText(folder / "field.npz"));
   }
@@ -85,7 +85,7 @@ TEST(FieldFile, LayoutIsSvox2s) {
   file.Read("density_data", ArrayType::kF32, {17, 1});
   const NpzArray colours = file.Read("sh_data", ArrayType::kF16, {17, 27});
   EXPECT_EQ(file.ReadScalar<int64_t>("basis_type"), 1);
-  // Degree 1 in the places of degree 2: channel-major, the rest zero.
+  // Degree 1 in the layout of degree 2: channel-major, the rest zero.
   const StoredField out = SmallField(4);
   for (int channel = 0; channel < 3; ++channel)
     for (int k = 0; k < 9; ++k)
@@ -121,7 +121,7 @@ TEST(FieldFile, BackgroundSpheresAreSvox2sArrays) {
   // Without spheres there are no such arrays.
   WriteFieldFile(folder / "without.npz", SmallField(4));
   EXPECT_FALSE(NpzReader(folder / "without.npz", 1 << 20).Has("background_links"));
-  // A link that points nowhere is refused.
+  // A link out of range is refused.
   auto damaged = std::make_shared<Geometry>(*out.field.geometry);
   damaged->spheres.links[0] = 1000;
   out.field.geometry = damaged;
@@ -140,7 +140,7 @@ TEST(FieldFile, TooBrightColoursSaturate) {
   EXPECT_EQ(in.field.appearance.sh[1], -kMaxHalf);
 }
 
-// svox2's own files: distance codes below -1, no arrays of ours, the joined array of old.
+// svox2's files: distance codes below -1, none of our arrays, the older joined array.
 TEST(FieldFile, ReadsForeignFiles) {
   const TemporaryFolder folder;
   const float radius[3] = {1, 1, 1}, center[3] = {0, 0, 0};
@@ -199,10 +199,10 @@ float LargestDifference(const Image& a, const Image& b) {
   return largest;
 }
 
-// Read, rendered, written, read again, rendered: of svox2's checkpoints no bit is lost, for
-// their colours have been halves before; a field of ours loses what halves lose, once. 1e-3 is
-// asked for, 1.2e-4 were seen.
-TEST(FieldFile, SurvivesTheWayThroughSvox2sLayout) {
+// Read, rendered, written, read again, rendered: svox2's checkpoints lose no bit, because their
+// colours are halves already; a field of ours is rounded to halves once. Measured: 1.2e-4,
+// required: 1e-3.
+TEST(FieldFile, RoundTripInSvox2sLayoutKeepsRenders) {
   const TemporaryFolder folder;
   Camera camera;
   camera.width = 64, camera.height = 48;
@@ -286,7 +286,7 @@ TEST_F(Changed, F69_NonFiniteValuesAreCounted) {
                        "2 values are not finite");
 }
 
-TEST_F(Changed, F69_APlaceThatIsNone) {
+TEST_F(Changed, F69_FieldFromWorldMustBeASimilarity) {
   double placement[13] = {1, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
   for (const auto& [at, value] :
        std::vector<std::pair<int, double>>{{0, 0},
@@ -315,7 +315,7 @@ TEST_F(Changed, F66_ShapesThatDisagree) {
   EXPECT_REGRADE_ERROR(ReadWith("regrade_basis", {}, &basis), ExitCode::kInput, "16 of 9");
 }
 
-TEST_F(Changed, WhatCannotBeRenderedIsNamed) {
+TEST_F(Changed, UnsupportedFieldsAreNamed) {
   const int64_t learned = 4;
   EXPECT_REGRADE_ERROR(ReadWith("basis_type", {}, &learned), ExitCode::kInput,
                        "not spherical harmonics");

@@ -74,8 +74,8 @@ RunReport FullReport() {
   report.command = {"regrade", "run"};
   report.seed = std::numeric_limits<uint64_t>::max();
   report.peak_memory_mb = 900;
-  report.photos =
-      PhotosReport{2, 1, 1, {{"a.jpg", "used", ""}, {"\xFF.jpg", "skipped", "text"}}};
+  report.photos = PhotosReport{
+      2, 1, 1, {{"a.jpg", PhotoState::kUsed, ""}, {"\xFF.jpg", PhotoState::kSkipped, "text"}}};
   report.effects = {{"ndc", false, "corner rays", 0.41, 0.9}};
   report.stages.pose = PoseStageReport{
       .time = {1, {}}, .registered = 2, .points = 12775, .reprojection_px = 0.9};
