@@ -85,7 +85,9 @@ int64_t PeakMemory() {
     if (line.starts_with("VmHWM:")) return std::stoll(line.substr(6)) << 10;
   return 0;
 }
-bool ResetPeak() { return static_cast<bool>(std::ofstream("/proc/self/clear_refs") << "5\n" << std::flush); }
+bool ResetPeak() {
+  return static_cast<bool>(std::ofstream("/proc/self/clear_refs") << "5\n" << std::flush);
+}
 
 // The file is 59 MB; 6 MB were seen. An archive in memory took three times the file.
 TEST(FieldFile, WritingNeedsAFewMegabytesOfMemory) {
