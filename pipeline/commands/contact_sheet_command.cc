@@ -287,13 +287,12 @@ void RunContactSheet(const Command& command, const Arguments& arguments, Console
   options.Add("Object", &settings.object);
   options.Add("Program", &settings.program);
   constexpr size_t kMostStyles = 64;
-  const auto prepared =
-      Prepare(command, arguments,
-              {.least_words = 2,
-               .most_words = 1 + kMostStyles,
-               .continues_run = true,
-               .taken = {"holdout", "masks", "mask-vote", "mask-edge"}},
-              &options);
+  const auto prepared = Prepare(command, arguments,
+                                {.least_words = 2,
+                                 .most_words = 1 + kMostStyles,
+                                 .continues_run = true,
+                                 .taken = {"holdout", "masks", "mask-vote", "mask-edge"}},
+                                &options);
   if (!prepared) return;
   const Arguments& words = prepared->words;
   const std::string& folder = words[0];

@@ -50,8 +50,8 @@ VarianceMetrics MetricsOfVariance(const RadianceField& source, const RadianceFie
   const VarianceReport report = MeasureVariance(
       source, styled, network, NeighbouringPixels(cameras, kVariancePairs, seed),
       MarchOptions{source.step});
-  return {MetricsOfGroup(report.inside), MetricsOfGroup(report.clamp),
-          MetricsOfGroup(report.open), report.largest_share};
+  return {MetricsOfGroup(report.valid), MetricsOfGroup(report.clamped),
+          MetricsOfGroup(report.transparent), report.largest_fraction};
 }
 
 // Why the local Lipschitz constant is above what the colours' covariances predict, where it is.
@@ -173,8 +173,8 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
   if (object != nullptr) {
     WriteObjectFile(workspace.Path("object.npz"), weights);
     outcome.outputs.push_back("object.npz");
-    metrics.object_voxels = static_cast<int64_t>(std::count_if(
-        weights.all.begin(), weights.all.end(), [](float e) { return e > 0; }));
+    metrics.object_voxels = static_cast<int64_t>(
+        std::count_if(weights.all.begin(), weights.all.end(), [](float e) { return e > 0; }));
   } else {
     std::filesystem::remove(workspace.Path("object.npz"));  // of an earlier style
   }
