@@ -25,11 +25,10 @@ namespace {
 // region, where `region` says which pixels are of it.
 using PhotoFunction = std::function<std::optional<Image>(size_t view)>;
 
-std::unique_ptr<ViewStylizer> MakeColorMethod(const RunSettings& settings, const Image& style,
-                                              const Capture& capture,
+std::unique_ptr<ViewStylizer> MakeColorMethod(StyleMethodKind kind, const StyleOptions& options,
+                                              const Image& style, const Capture& capture,
                                               const PhotoFunction& photo) {
-  const StyleOptions& options = settings.style_2d;
-  if (options.method == "idt" || options.method == "histogram") {
+  if (kind == StyleMethodKind::kIdt || kind == StyleMethodKind::kHistogram) {
     if (!options.scene_wide) return MakeDistributionTransfer(options, style);
     // As many colours in all as are taken of one view otherwise, but 256 of each at least.
     const int64_t most = std::max<int64_t>(
@@ -55,17 +54,20 @@ std::unique_ptr<ViewStylizer> MakeMethod(RunContext* context, const Capture& cap
                                          const Image& style, const PhotoFunction& photo) {
   const RunSettings& settings = context->settings;
   const StyleMethod method = ParseStyleMethod(settings.style_2d);
-  if (method.kind == "onnx")
-    return MakeOnnxStylizer(method.argument, settings.style_2d.max_side, style);
-  if (method.kind == "folder") {
-    std::vector<std::string> photos;
-    for (const CaptureView& view : capture.views) photos.push_back(view.file);
-    return MakeFolderStylizer(method.argument, photos);
+  switch (method.kind) {
+    case StyleMethodKind::kOnnx:
+      return MakeOnnxStylizer(method.argument, settings.style_2d.max_side, style);
+    case StyleMethodKind::kFolder: {
+      std::vector<std::string> photos;
+      for (const CaptureView& view : capture.views) photos.push_back(view.file);
+      return MakeFolderStylizer(method.argument, photos);
+    }
+    case StyleMethodKind::kCommand:
+      return MakeCommandStylizer(method.argument, settings.style.picture,
+                                 settings.style_2d.command_limit_s);
+    default:
+      return MakeColorMethod(method.kind, settings.style_2d, style, capture, photo);
   }
-  if (method.kind == "command")
-    return MakeCommandStylizer(method.argument, settings.style.picture,
-                               settings.style_2d.command_limit_s);
-  return MakeColorMethod(settings, style, capture, photo);
 }
 
 }  // namespace
@@ -99,23 +101,22 @@ std::unique_ptr<ViewStylizer> MakeSceneStylizer(RunContext* context, const Worki
     regions.push_back(MakeMethod(context, capture,
                                  part.empty() ? style : WithRegion(style, part), photo_region));
   }
-  const std::string kind = ParseStyleMethod(settings.style_2d).kind;
-  const bool of_colors = kind != "onnx" && kind != "folder" && kind != "command";
+  const bool of_colors = MapsColors(ParseStyleMethod(settings.style_2d).kind);
   return MakeMaskedStylizer(std::move(regions), of_colors, coverage);
 }
 
 void ProbeMethod(StyleOptions* options) {
   namespace fs = std::filesystem;
   const StyleMethod method = ParseStyleMethod(*options);
-  if (method.kind == "command") MakeCommandStylizer(method.argument, "", 0);
-  if (method.kind != "onnx" && method.kind != "folder") return;
+  if (method.kind == StyleMethodKind::kCommand) MakeCommandStylizer(method.argument, "", 0);
+  if (!ReadsFiles(method.kind)) return;
   std::error_code error;
   if (!fs::exists(method.argument, error))
     throw Error(ExitCode::kInput, "there is no such file or folder", method.argument,
-                "what follows \"" + method.kind + ":\" in --method must exist");
+                "what follows \"" + method.name + ":\" in --method must exist");
   const fs::path absolute = fs::absolute(method.argument, error);
-  if (!error) options->method = method.kind + ":" + absolute.lexically_normal().string();
-  if (method.kind != "onnx") return;
+  if (!error) options->method = method.name + ":" + absolute.lexically_normal().string();
+  if (method.kind != StyleMethodKind::kOnnx) return;
   ProbeStyleNetwork(method.argument);
 }
 
@@ -137,7 +138,7 @@ std::vector<int> StyledViews(const Workspace& workspace, const WorkingViews& wor
 
 JsonValue MethodFiles(const StyleOptions& options) {
   const StyleMethod method = ParseStyleMethod(options);
-  if (method.kind != "onnx" && method.kind != "folder") return JsonValue();
+  if (!ReadsFiles(method.kind)) return JsonValue();
   std::error_code error;
   if (std::filesystem::is_regular_file(method.argument, error))
     return HashFile(method.argument);

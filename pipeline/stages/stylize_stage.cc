@@ -48,8 +48,8 @@ VarianceMetrics MetricsOfVariance(const RadianceField& source, const RadianceFie
   const VarianceReport report = MeasureVariance(
       source, styled, network, NeighbouringPixels(cameras, kVariancePairs, seed),
       MarchOptions{source.step});
-  return {MetricsOfGroup(report.inside), MetricsOfGroup(report.clamp),
-          MetricsOfGroup(report.open), report.largest_share};
+  return {MetricsOfGroup(report.valid), MetricsOfGroup(report.clamped),
+          MetricsOfGroup(report.transparent), report.largest_fraction};
 }
 
 // Why the local Lipschitz constant is above what the colours' covariances predict, where it is.

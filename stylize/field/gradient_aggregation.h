@@ -82,7 +82,7 @@ struct AggregationResult {
   }
 };
 
-// What learning asks for at each step, on one processor or the other.
+// Loss and gradient of a training step, on the CPU or a device.
 class StyleLoss {
  public:
   virtual ~StyleLoss() = default;
