@@ -218,7 +218,7 @@ TEST(ColorTransfer, H30_ASceneWideMapIsTheSameInAllViews) {
   }
 }
 
-TEST(ColorTransfer, AlphaStaysAndTransparentColoursHaveNoSay) {
+TEST(ColorTransfer, AlphaStaysAndTransparentColoursAreIgnored) {
   const Image photo = Photo();
   Image rgba(photo.width, photo.height, 4);
   for (int64_t i = 0; i < photo.num_pixels(); ++i) {

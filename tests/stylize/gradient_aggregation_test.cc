@@ -150,7 +150,7 @@ TEST(GradientAggregation, BackgroundSpheresAreInAlgorithm1sGradient) {
             testing::RecordDigits("with spheres against Algorithm 1 in double",
                                   testing::Computed::kFloat,
                                   RelativeDifference(gradient, expected), 1e-5));
-  // The layers have a say: the ball alone has another gradient.
+  // The layers contribute: the ball alone has another gradient.
   PlainGradient(network, Ball(8), batch, scale, 0.5, &box);
   EXPECT_GT(RelativeDifference(box, expected), 0.01);
 }

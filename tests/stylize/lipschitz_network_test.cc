@@ -119,7 +119,7 @@ TEST(LipschitzNetwork, BaseMapCountsWithItsNorm) {
                            1e-4));  // thirty steps of the power iteration
 }
 
-TEST(LocalLipschitz, H36_ClimbingStaysBelowTheBound) {
+TEST(LocalLipschitz, H36_GradientAscentStaysBelowTheBound) {
   LipschitzNetwork network = RandomNetwork(83);
   network.data().has_base = true;
   network.data().base = SomeMap();
@@ -129,7 +129,7 @@ TEST(LocalLipschitz, H36_ClimbingStaysBelowTheBound) {
   EXPECT_GE(slopes.jacobians, 0.5 * slopes.pairs);
   EXPECT_GE(slopes.ascent, slopes.jacobians);
   EXPECT_LE(slopes.ascent,
-            network.Bound() * testing::RecordBound("found by climbing, over the bound",
+            network.Bound() * testing::RecordBound("maximum by gradient ascent, over the bound",
                                                    testing::Computed::kDouble,
                                                    slopes.ascent / network.Bound(), 1));
   EXPECT_LE(slopes.pairs,
@@ -141,7 +141,7 @@ TEST(LocalLipschitz, H36_ClimbingStaysBelowTheBound) {
   EXPECT_NEAR(slopes.steepest_pair / slopes.ascent, 1, 1e-3);
 }
 
-TEST(LocalLipschitz, PairsNearerThanTheirDistanceHaveNoSay) {
+TEST(LocalLipschitz, PairsNearerThanTheirDistanceAreIgnored) {
   const LipschitzNetwork network = RandomNetwork(85);
   RadianceField field = Ball(12);
   for (int64_t i = 0; i < field.appearance.sh.size(); ++i) field.appearance.sh[i] *= 1e-5f;

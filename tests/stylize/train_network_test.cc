@@ -75,7 +75,7 @@ TEST(TrainNetwork, BeatsTheLinearMapWhereTheStyleIsCurved) {
 }
 
 // Views that are styled brighter and darker by turns: what of it points follow is a function of
-// the direction, and EQ(view-penalty) is its price.
+// the direction, and EQ(view-penalty) is its cost.
 TEST(TrainNetwork, ViewWeightKeepsPointsFromFollowingEachView) {
   StyledBall ball(16, 6, 32, LinearStyle);
   for (size_t v = 0; v < ball.targets.size(); ++v)
@@ -108,7 +108,7 @@ TEST(TrainNetwork, NeverLosesToTheLinearMap) {
   EXPECT_GE(result.psnr_db, result.linear_map_psnr_db);
 }
 
-TEST(TrainNetwork, AMapSteeperThanTheScenesIsAYardstickButNoStart) {
+TEST(TrainNetwork, AMapSteeperThanTheScenesIsABaselineButNoStart) {
   const StyledBall ball(16, 4, 32, CurvedStyle);
   const SceneColorMap steep = MapOf(ball);
   SceneColorMap flat = steep;
