@@ -6,16 +6,15 @@
 #include <cstdio>
 
 #include "kernels/base/error.h"
+#include "pipeline/run/resolve_settings.h"
+#include "pipeline/workspace/workspace.h"
 
 namespace regrade {
 
-bool PrintedHelp(const Command& command, const Arguments& arguments, const OptionSet& options) {
+bool AsksForHelp(const Arguments& arguments) {
   const auto flags_end = std::find(arguments.begin(), arguments.end(), "--");
-  const auto asks = [](const std::string& word) { return word == "--help" || word == "-h"; };
-  if (std::none_of(arguments.begin(), flags_end, asks)) return false;
-  std::printf("regrade %s %s\n%s\n%s", command.name, command.usage, command.summary,
-              options.Help().c_str());
-  return true;
+  return std::any_of(arguments.begin(), flags_end,
+                     [](const std::string& word) { return word == "--help" || word == "-h"; });
 }
 
 void CheckWords(const Command& command, const Arguments& words, size_t least, size_t most) {
@@ -27,8 +26,36 @@ void CheckWords(const Command& command, const Arguments& words, size_t least, si
               std::string("usage: regrade ") + command.name + " " + command.usage);
 }
 
-void ApplyProgramOptions(const ProgramOptions& options) {
-  if (options.threads > 0) omp_set_num_threads(options.threads);
+std::optional<Prepared> Prepare(const Command& command, const Arguments& arguments,
+                                const Preparation& preparation, OptionSet* options) {
+  SettingsSources sources;
+  sources.preset = preparation.preset;
+  sources.taken = preparation.taken;
+  if (AsksForHelp(arguments)) {
+    ResolveSettings(sources, options);
+    std::printf("regrade %s %s\n%s\n%s", command.name, command.usage, command.summary,
+                options->Help().c_str());
+    return std::nullopt;
+  }
+  Prepared prepared;
+  prepared.words = options->Parse(arguments);
+  const auto check_words = [&] {
+    CheckWords(command, prepared.words, preparation.least_words, preparation.most_words);
+  };
+  if (preparation.continues_run) {
+    check_words();
+    const std::string& folder = prepared.words[0];
+    if (!Workspace::Exists(folder))
+      throw Error(ExitCode::kInput, "no run has worked in this folder", folder,
+                  "make one with `regrade run` or `regrade reconstruct`");
+    sources.run_json = folder + "/run.json";
+  }
+  prepared.run_words = ResolveSettings(sources, options);
+  if (prepared.words.empty() && options->Given("config")) prepared.words = prepared.run_words;
+  check_words();
+  const int threads = static_cast<int>(options->Values().At("threads").AsInt());
+  if (threads > 0) omp_set_num_threads(threads);
+  return prepared;
 }
 
 }  // namespace regrade

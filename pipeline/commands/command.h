@@ -1,6 +1,7 @@
 // The program's commands: a name, what it takes, what it does.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,14 +22,33 @@ struct Command {
 
 const std::vector<Command>& AllCommands();
 
-// Prints usage and options on stdout if --help is among the arguments, and says so.
-bool PrintedHelp(const Command& command, const Arguments& arguments, const OptionSet& options);
+// What Prepare is to read.
+struct Preparation {
+  size_t least_words = 1, most_words = 1;
+  // The first word is the folder of a run, and its run.json sets options: those named in
+  // `taken`, or all.
+  bool continues_run = false;
+  std::vector<std::string> taken = {};
+  std::string preset = "standard";  // where none is given
+};
+
+struct Prepared {
+  Arguments words;      // what is not a flag; those of --config where none are typed
+  Arguments run_words;  // of the run that is continued: PHOTOS or CAPTURE
+};
+
+// The beginning of every command. --help prints usage and options and returns nothing.
+// Otherwise parses the arguments, sets the options (ResolveSettings) and the number of threads.
+// `options` has ProgramOptions among others. Throws Error(kUsage) for a wrong number of words,
+// Error(kInput) for a folder without a run.
+std::optional<Prepared> Prepare(const Command& command, const Arguments& arguments,
+                                const Preparation& preparation, OptionSet* options);
+
+// Is --help or -h among the flags?
+bool AsksForHelp(const Arguments& arguments);
 
 // Throws Error(kUsage) unless there are between `least` and `most` words.
 void CheckWords(const Command& command, const Arguments& words, size_t least, size_t most);
-
-// Before any work.
-void ApplyProgramOptions(const ProgramOptions& options);
 
 void RunStages(const Command&, const Arguments&, Console*);  // run, pose, reconstruct
 void RunFolder(const Command&, const Arguments&, Console*);  // stylize, render

@@ -19,7 +19,6 @@
 #include "pipeline/images/image_file.h"
 #include "pipeline/program/device_choice.h"
 #include "pipeline/run/run_context.h"
-#include "pipeline/run/run_file.h"
 #include "pipeline/stages/make_stylizer.h"
 #include "pipeline/workspace/workspace.h"
 #include "stylize/field/apply_network.h"
@@ -37,6 +36,7 @@ struct SheetOptions {
   int views = 3;
   int size = 320;
   int steps = 0;
+  int holdout = 8;
   std::string device = "auto";
   bool dry_run = false;
 
@@ -56,6 +56,11 @@ struct SheetOptions {
           .help = "of each network; 0 takes those of its recipe",
           .min = 0,
           .max = 1e6});
+    bind("holdout", holdout,
+         {.unit = "photos",
+          .help = "as in `regrade run`, by default as in the run of DIR",
+          .min = 0,
+          .max = 1000});
     bind("device", device, {.help = "where networks learn", .choices = "auto|cpu|cuda"});
     bind("dry-run", dry_run, {.help = "say what would be done, and do nothing"});
   }
@@ -98,16 +103,16 @@ struct Scene {
   std::vector<Image> kept;                 // what --photo-masks leaves of each, or empty
 };
 
-Scene ReadScene(const Workspace& workspace, const SheetOptions& sheet, int holdout) {
+Scene ReadScene(const Workspace& workspace, const SheetOptions& sheet) {
   Scene scene;
   scene.capture = ReadCapture(workspace.Path("poses"));
   scene.stored = ReadFieldFile(workspace.Path("field.npz"));
   // As a run does it: what differs from view to view needs directions.
   scene.stored.field.appearance =
       PadShBasis(std::move(scene.stored.field.appearance), kStyledBasis);
-  scene.training_views = ViewIndices(scene.capture, holdout, false);
+  scene.training_views = ViewIndices(scene.capture, sheet.holdout, false);
   if (scene.training_views.empty())
-    scene.training_views = ViewIndices(scene.capture, holdout, true);
+    scene.training_views = ViewIndices(scene.capture, sheet.holdout, true);
   const int count = std::min(sheet.views, static_cast<int>(scene.training_views.size()));
   for (int k = 0; k < count; ++k)
     scene.shown.push_back(
@@ -244,19 +249,19 @@ void RunContactSheet(const Command& command, const Arguments& arguments, Console
   options.Add("Sheet", &sheet);
   options.Add("2D method", &settings.style_2d);
   options.Add("Program", &settings.program);
-  if (PrintedHelp(command, arguments, options)) return;
-  const Arguments words = options.Parse(arguments);
   constexpr size_t kMostStyles = 64;
-  CheckWords(command, words, 2, 1 + kMostStyles);
+  const auto prepared = Prepare(command, arguments,
+                                {.least_words = 2,
+                                 .most_words = 1 + kMostStyles,
+                                 .continues_run = true,
+                                 .taken = {"holdout"}},
+                                &options);
+  if (!prepared) return;
+  const Arguments& words = prepared->words;
   const std::string& folder = words[0];
-  if (!fs::exists(folder + "/field.npz") || !Workspace::Exists(folder))
+  if (!fs::exists(folder + "/field.npz"))
     throw Error(ExitCode::kInput, "holds no reconstruction", folder,
                 "make one with `regrade run` or `regrade reconstruct`");
-  const RunFile file = ReadRunFile(folder + "/run.json");
-  if (const JsonValue* holdout = file.options.Find("holdout"))
-    settings.run.holdout = static_cast<int>(holdout->AsInt());
-  options.ApplyFlags();
-  ApplyProgramOptions(settings.program);
   if (sheet.out.empty() && !sheet.dry_run)
     throw Error(ExitCode::kUsage, "its value is missing", "--out",
                 "name the PNG file to write");
@@ -266,7 +271,7 @@ void RunContactSheet(const Command& command, const Arguments& arguments, Console
   Workspace workspace(folder);
   context.workspace = &workspace;
   const Backend backend = ChooseBackend(sheet.device, false);  // before work begins
-  Scene scene = ReadScene(workspace, sheet, settings.run.holdout);
+  Scene scene = ReadScene(workspace, sheet);
   scene.backend = backend;
   const std::string plan = std::to_string(words.size() - 1) + " styles, " +
                            std::to_string(scene.shown.size()) + " views each, learned from " +

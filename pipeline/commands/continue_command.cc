@@ -15,23 +15,11 @@ void ContinueRun(const Command& command, const Arguments& arguments, const std::
   RunContext context;
   context.console = console;
   context.settings.Bind(&context.options);
-  if (PrintedHelp(command, arguments, context.options)) return;
-  const Arguments words = context.options.Parse(arguments);
-  CheckWords(command, words, 1, 1);
-  const std::string& folder = words[0];
-  if (!Workspace::Exists(folder))
-    throw Error(ExitCode::kInput, "no run has worked in this folder", folder,
-                "make one with `regrade run` or `regrade reconstruct`");
-  const std::string run_json = folder + "/run.json";
-  const RunFile file = ReadRunFile(run_json);
-  context.options.ApplyConfig(file.options, run_json);
-  if (const auto preset = context.options.Given("preset"))
-    ApplyPreset(*preset, &context.settings);
-  ApplyRecipeFlag(&context.options, &context.settings);
-  context.options.ApplyFlags();
+  const auto prepared = Prepare(command, arguments, {.continues_run = true}, &context.options);
+  if (!prepared) return;
+  const std::string& folder = prepared->words[0];
   RunSettings& settings = context.settings;
-  ApplyProgramOptions(settings.program);
-  if (!file.words.empty()) context.source = file.words[0];
+  if (!prepared->run_words.empty()) context.source = prepared->run_words[0];
   settings.run.out = std::filesystem::absolute(folder).lexically_normal().string();
   if (settings.style.picture.empty())
     throw Error(ExitCode::kUsage, "its value is missing", "--style",

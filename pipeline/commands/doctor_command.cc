@@ -11,7 +11,6 @@
 #include "kernels/process/child_process.h"
 #include "pipeline/commands/command.h"
 #include "pipeline/program/memory.h"
-#include "pipeline/report/chart_library.h"
 
 namespace regrade {
 namespace {
@@ -56,11 +55,7 @@ void RunDoctor(const Command& command, const Arguments& arguments, Console* cons
   ProgramOptions program;
   OptionSet options;
   options.Add("Program", &program);
-  if (PrintedHelp(command, arguments, options)) return;
-  const Arguments words = options.Parse(arguments);
-  options.ApplyFlags();
-  CheckWords(command, words, 0, 0);
-  ApplyProgramOptions(program);
+  if (!Prepare(command, arguments, {.least_words = 0, .most_words = 0}, &options)) return;
 
   const auto gigabytes = [](uint64_t bytes) {
     char text[32];
@@ -80,8 +75,6 @@ void RunDoctor(const Command& command, const Arguments& arguments, Console* cons
        "limit with --max-memory"},
       {"fast path", FastRays().name, "instruction set of rendering and fitting"},
       FindColmap("colmap"),
-      {"Chart.js", ReadChartLibrary().empty() ? "not found" : "found",
-       "optional: drawings of the report that answer to a pointer; package `libjs-chart.js`"},
   };
   console->Event("doctor", JsonValue::Object());
   for (const Finding& finding : findings) {

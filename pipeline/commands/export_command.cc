@@ -62,17 +62,15 @@ void RunExport(const Command& command, const Arguments& arguments, Console* cons
   OptionSet options;
   options.Add("Export", &settings);
   options.Add("Program", &program);
-  if (PrintedHelp(command, arguments, options)) return;
-  const Arguments words = options.Parse(arguments);
-  options.ApplyFlags();
-  CheckWords(command, words, 1, 1);
-  ApplyProgramOptions(program);
+  const auto prepared = Prepare(command, arguments, {}, &options);
+  if (!prepared) return;
+  const std::string& folder = prepared->words[0];
   if (settings.out.empty())
     throw Error(ExitCode::kUsage, "its value is missing", "--out", "name the folder to write");
-  if (!fs::exists(words[0] + "/poses/photos.json"))
-    throw Error(ExitCode::kInput, "holds no poses", words[0],
-                "run `regrade pose PHOTOS --out " + words[0] + "` first");
-  const Capture capture = ReadCapture(words[0] + "/poses");
+  if (!fs::exists(folder + "/poses/photos.json"))
+    throw Error(ExitCode::kInput, "holds no poses", folder,
+                "run `regrade pose PHOTOS --out " + folder + "` first");
+  const Capture capture = ReadCapture(folder + "/poses");
   MakeEmptyFolder(settings.out);
   for (const CaptureView& view : capture.views) {
     std::error_code error;
@@ -80,7 +78,7 @@ void RunExport(const Command& command, const Arguments& arguments, Console* cons
     if (error)
       throw Error(ExitCode::kResources, error.message(), settings.out + "/images/" + view.name);
   }
-  WritePoses(settings, words[0], capture);
+  WritePoses(settings, folder, capture);
   console->Info("wrote " + std::to_string(capture.views.size()) +
                 " photos and their poses to " + settings.out);
 }

@@ -17,7 +17,6 @@
 #include "pipeline/images/image_file.h"
 #include "pipeline/images/video_writer.h"
 #include "pipeline/program/device_choice.h"
-#include "pipeline/run/run_file.h"
 #include "pipeline/run/run_settings.h"
 #include "pipeline/stages/object_edit.h"
 #include "pipeline/workspace/output_names.h"
@@ -52,16 +51,6 @@ struct MixOptions {
     bind("dry-run", dry_run, {.help = "say what would be done, and do nothing"});
   }
 };
-
-// What the run in `folder` was done with, where no flag says otherwise.
-void TakeRunsOptions(const std::string& folder, OptionSet* options) {
-  const std::string run_json = folder + "/run.json";
-  const RunFile file = ReadRunFile(run_json);
-  JsonValue taken = JsonValue::Object();
-  for (const char* name : {"photo-size", "fps", "path", "path-frames"})
-    if (const JsonValue* value = file.options.Find(name)) taken[name] = *value;
-  options->ApplyConfig(taken, run_json);
-}
 
 std::string StyleFile(const std::string& word) {
   std::error_code error;
@@ -141,17 +130,15 @@ void RunMix(const Command& command, const Arguments& arguments, Console* console
   options.Add("Scene", &scene);
   options.Add("Render", &render);
   options.Add("Program", &program);
-  if (PrintedHelp(command, arguments, options)) return;
-  const Arguments words = options.Parse(arguments);
   constexpr size_t kMostStyles = 16;
-  CheckWords(command, words, 1, kMostStyles);
+  const auto prepared = Prepare(command, arguments,
+                                {.most_words = kMostStyles,
+                                 .continues_run = true,
+                                 .taken = {"photo-size", "fps", "path", "path-frames"}},
+                                &options);
+  if (!prepared) return;
+  const Arguments& words = prepared->words;
   const std::string& folder = words[0];
-  if (!Workspace::Exists(folder))
-    throw Error(ExitCode::kInput, "no run has worked in this folder", folder,
-                "make one with `regrade run`");
-  TakeRunsOptions(folder, &options);
-  options.ApplyFlags();
-  ApplyProgramOptions(program);
   const MixKeys keys = ParseMixKeys(settings.mix, static_cast<int>(words.size()));
   if (settings.out.empty() && !settings.dry_run)
     throw Error(ExitCode::kUsage, "its value is missing", "--out", "name the folder to write");

@@ -40,22 +40,20 @@ void RunPack(const Command& command, const Arguments& arguments, Console* consol
   options.Add("Scene", &scene);
   options.Add("Style", &style);
   options.Add("Program", &program);
-  if (PrintedHelp(command, arguments, options)) return;
-  const Arguments words = options.Parse(arguments);
-  options.ApplyFlags();
-  CheckWords(command, words, 1, 1);
-  ApplyProgramOptions(program);
+  const auto prepared = Prepare(command, arguments, {}, &options);
+  if (!prepared) return;
+  const std::string& folder = prepared->words[0];
   if (run.out.empty())
     throw Error(ExitCode::kUsage, "its value is missing", "--out",
                 "name the .npz file to write");
-  if (!std::filesystem::exists(words[0] + "/poses/photos.json"))
-    throw Error(ExitCode::kInput, "holds no poses", words[0],
-                "run `regrade pose CAPTURE --out " + words[0] + "` first");
-  const Capture capture = ReadCapture(words[0] + "/poses");
+  if (!std::filesystem::exists(folder + "/poses/photos.json"))
+    throw Error(ExitCode::kInput, "holds no poses", folder,
+                "run `regrade pose CAPTURE --out " + folder + "` first");
+  const Capture capture = ReadCapture(folder + "/poses");
   for (const CaptureView& view : capture.views)
     if (!ReadWorkingMask(view, scene.photo_size).empty())
       throw Error(ExitCode::kInput,
-                  "was posed with --photo-masks, which a packed capture lacks", words[0],
+                  "was posed with --photo-masks, which a packed capture lacks", folder,
                   "pose it again without them");
   const SceneProfile profile = ProfileScene(capture, 2, run.effects);
   for (const EffectReport& effect : profile.effects) console->Info(EffectLine(effect));

@@ -12,32 +12,12 @@
 #include "pipeline/run/plan.h"
 #include "pipeline/run/run_file.h"
 #include "pipeline/run_pipeline.h"
-#include "pipeline/stages/evaluation_networks.h"
 #include "pipeline/stages/make_stylizer.h"
+#include "pipeline/stages/network_probe.h"
 #include "pipeline/stages/stages.h"
 
 namespace regrade {
 namespace {
-
-// Defaults, then the preset, then --config, then flags: each may be narrower than the last. A
-// preset given as a flag is stronger than a whole run.json.
-Arguments ReadSettings(const Arguments& arguments, RunContext* context) {
-  Arguments words = context->options.Parse(arguments);
-  const auto flag = context->options.Given("preset");
-  RunFile file;
-  if (const auto config = context->options.Given("config")) {
-    file = ReadRunFile(*config);
-    if (words.empty()) words = file.words;
-    const JsonValue* preset = file.options.Find("preset");
-    if (!flag && preset != nullptr && preset->IsString())
-      ApplyPreset(preset->AsString(), &context->settings);
-    context->options.ApplyConfig(file.options, *config);
-  }
-  if (flag) ApplyPreset(*flag, &context->settings);
-  ApplyRecipeFlag(&context->options, &context->settings);
-  context->options.ApplyFlags();
-  return words;
-}
 
 // All inputs are looked at before long work starts.
 void ProbeInputs(const std::string& last, RunContext* context) {
@@ -102,17 +82,15 @@ void RunStages(const Command& command, const Arguments& arguments, Console* cons
   RunContext context;
   context.console = console;
   context.settings.Bind(&context.options);
-  if (PrintedHelp(command, arguments, context.options)) return;
-  const Arguments words = ReadSettings(arguments, &context);
+  const auto prepared = Prepare(command, arguments, {}, &context.options);
+  if (!prepared) return;
   RunSettings& settings = context.settings;
-  CheckWords(command, words, 1, 1);
   if (settings.run.out.empty())
     throw Error(ExitCode::kUsage, "its value is missing", "--out",
                 "name the folder that the results shall go to");
   CheckTogether(settings);
   ChooseBackend(settings.run.device, settings.run.reproducible);
-  ApplyProgramOptions(settings.program);
-  context.source = Absolute(words[0]);
+  context.source = Absolute(prepared->words[0]);
   if (!settings.style.picture.empty())
     settings.style.picture = Absolute(settings.style.picture);
   settings.run.out = Absolute(settings.run.out);

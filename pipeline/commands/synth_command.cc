@@ -10,15 +10,13 @@ void RunSynth(const Command& command, const Arguments& arguments, Console* conso
   OptionSet options;
   options.Add("Capture", &synth);
   options.Add("Program", &program);
-  if (PrintedHelp(command, arguments, options)) return;
-  const Arguments words = options.Parse(arguments);
-  options.ApplyFlags();
-  CheckWords(command, words, 1, 1);
-  ApplyProgramOptions(program);
+  const auto prepared = Prepare(command, arguments, {}, &options);
+  if (!prepared) return;
+  const std::string& folder = prepared->words[0];
   console->BeginStage("synth");
-  WriteSyntheticCapture(words[0], synth, console->StageProgress());
+  WriteSyntheticCapture(folder, synth, console->StageProgress());
   console->EndStage();
-  console->Info("wrote " + words[0] + "/images and " + words[0] + "/truth");
+  console->Info("wrote " + folder + "/images and " + folder + "/truth");
 }
 
 }  // namespace regrade

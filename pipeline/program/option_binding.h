@@ -1,4 +1,5 @@
-// Option structs become flags: parsing, range checks, help and run.json from one description.
+// Turns option structs into flags: parsing, range checks, help and run.json from one
+// description.
 #pragma once
 
 #include <cstdint>
@@ -15,51 +16,50 @@ namespace regrade {
 
 class OptionSet {
  public:
-  // `options` must outlive the set. `group` heads its part of the help and names its part of a
-  // fingerprint. Flag names must be unique within the set (checked).
+  // `options` must outlive the set. `heading` is that of its part of the help, and nothing
+  // else. Flag names must be unique within the set (checked).
   template <typename T>
-  void Add(const std::string& group, T* options) {
-    Binder binder{this, group};
+  void Add(const std::string& heading, T* options) {
+    Binder binder{this, heading};
     options->Describe(binder);
   }
 
-  // Reads flags and leaves the structs alone; returns what is not a flag. Forms: "--name
-  // value",
-  // "--name=value"; for switches "--name" and "--no-name"; "--" ends flags. Throws
-  // Error(kUsage): unknown names (with the nearest known one), a missing value, a flag twice.
+  // Reads flags without changing the structs; returns the words that are no flags. Forms:
+  // "--name value", "--name=value"; for switches "--name" and "--no-name"; "--" ends flags.
+  // Throws Error(kUsage) for unknown names (with the nearest known one), a missing value, and a
+  // flag given twice.
   std::vector<std::string> Parse(const std::vector<std::string>& arguments);
 
-  // What --name was given on the command line.
+  // The value of --name on the command line.
   std::optional<std::string> Given(const std::string& name) const;
 
   // Writes the values of a JSON object {"name": value, ...} into the structs. Throws
   // Error(kUsage) with line and column for unknown names and bad values.
   void ApplyConfig(const JsonValue& values, const std::string& where);
   // Writes the parsed flags into the structs. Throws Error(kUsage) with the allowed range for
-  // values outside it, and for whatever is not wholly a number: NaN, 1e999, 0x10, 12abc.
+  // values outside it, and for texts that are no number: NaN, 1e999, 0x10, 12abc.
   void ApplyFlags();
 
-  // {"name": value, ...} of everything in effect, or of one group.
+  // {"name": value, ...} of everything in effect.
   JsonValue Values() const;
-  JsonValue Values(const std::string& group) const;
 
-  // Names, units, what they do, defaults and bounds. Call before flags are applied.
+  // Names, units, effects, defaults and bounds. Call before flags are applied.
   std::string Help() const;
 
  private:
   using Target = std::variant<bool*, int*, int64_t*, uint64_t*, float*, double*, std::string*,
                               std::vector<int>*>;
   struct Entry {
-    std::string group, name;
+    std::string heading, name;
     Target target;
     OptionInfo info;
   };
   struct Binder {
     OptionSet* set;
-    std::string group;
+    std::string heading;
     template <typename T>
     void operator()(const char* name, T& member, const OptionInfo& info) {
-      set->AddEntry({group, name, &member, info});
+      set->AddEntry({heading, name, &member, info});
     }
   };
   struct Flag {
@@ -75,5 +75,13 @@ class OptionSet {
   std::vector<Entry> entries_;
   std::vector<Flag> flags_;
 };
+
+// {"name": value, ...} of option structs: what a stage's inputs hold of them.
+template <typename... Options>
+JsonValue OptionValues(Options... options) {
+  OptionSet set;
+  (set.Add("", &options), ...);
+  return set.Values();
+}
 
 }  // namespace regrade

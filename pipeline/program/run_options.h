@@ -1,5 +1,4 @@
-// What every command, and every run over an output folder, can be told besides its stages'
-// options.
+// Options of every command and of every run over an output folder.
 #pragma once
 
 #include <cstdint>
@@ -16,8 +15,11 @@ struct ProgramOptions {
   template <typename Bind>
   void Describe(Bind& bind) {
     bind("threads", threads,
-         {.unit = "threads", .help = "0 takes one a core", .min = 0, .max = 4096});
-    bind("json", json, {.help = "progress and results as lines of JSON on stdout"});
+         {.unit = "threads",
+          .help = "how many run at once; 0: one per core",
+          .min = 0,
+          .max = 4096});
+    bind("json", json, {.help = "prints progress and results as lines of JSON on stdout"});
   }
 };
 
@@ -33,35 +35,36 @@ struct RunOptions {
 
   template <typename Bind>
   void Describe(Bind& bind) {
-    bind("out", out, {.help = "the output folder; the same command again goes on from it"});
+    bind("out", out, {.help = "the output folder; the same command again continues from it"});
     bind("preset", preset,
-         {.help = "a point on the curve of accuracy over time; single options override it",
+         {.help = "trades accuracy for time; single options override it",
           .choices = "draft|standard|paper|best"});
-    bind("device", device, {.help = "where arithmetic runs", .choices = "auto|cpu|cuda"});
-    bind("seed", seed, {.help = "draws everything that is random"});
+    bind("device", device,
+         {.help = "processor of the computations", .choices = "auto|cpu|cuda"});
+    bind("seed", seed, {.help = "of all random numbers"});
     bind("holdout", holdout,
          {.unit = "photos",
-          .help = "every so many photos, in the order of names, one is kept for measuring; 0 "
-                  "fits all, and no held-out figure exists",
+          .help = "of every so many photos, in the order of names, one is not fitted but kept "
+                  "for measuring; 0 fits all photos and measures none",
           .min = 0,
           .max = 1000});
     bind(
         "effects", effects,
-        {.help = "what the scene calls for is decided by measurement (auto); ndc=on|off, "
+        {.help = "models of scene and camera: auto decides by measurement; ndc=on|off, "
                  "alpha=on|off, background=on|off, exposure=on|off, view-dependence=on|off and "
-                 "pose-refinement=on|off, with commas between, decide instead"});
+                 "pose-refinement=on|off, separated by commas, override single decisions"});
     bind("max-memory", max_memory_gb,
          {.unit = "GB",
-          .help = "memory to plan with; 0 takes what is free",
+          .help = "limits the memory that the run plans with; 0: the free memory",
           .min = 0,
           .max = 1e6});
     bind("reproducible", reproducible,
-         {.help = "same bytes for any number of threads and any interruption, from finished "
-                  "poses on; slower"});
+         {.help = "gives the same bytes for any number of threads and any interruption, from "
+                  "finished poses on; slower"});
   }
 };
 
-// How this one start behaves; never part of a stage's inputs.
+// Options of one start of the program; never part of a stage's inputs.
 struct StartOptions {
   std::string config;
   std::string restart_from;
@@ -70,13 +73,13 @@ struct StartOptions {
 
   template <typename Bind>
   void Describe(Bind& bind) {
-    bind("config", config, {.help = "a run.json whose options and arguments are taken"});
+    bind("config", config, {.help = "a run.json; its options and arguments are used"});
     bind("restart-from", restart_from,
-         {.help = "do this stage and the later ones again, whatever is there",
+         {.help = "runs this stage and all later ones again, even if they are done",
           .choices = "|pose|reconstruct|style_2d|stylize|render|evaluate|report"});
-    bind("dry-run", dry_run, {.help = "say what would be done, and do nothing"});
+    bind("dry-run", dry_run, {.help = "prints what would be done, and does nothing"});
     bind("break-lock", break_lock,
-         {.help = "take over a folder whose last run died on another machine"});
+         {.help = "takes over a folder whose last run died on another machine"});
   }
 };
 

@@ -16,14 +16,14 @@ std::string ThumbnailHtml(const ReportPicture* picture) {
          " height=" + std::to_string(picture->height) + " src=\"" + DataUrl(*picture) + "\">";
 }
 
-// The verdict is a class of the style sheet where it is one that we know.
-std::string StatusHtml(const std::string& verdict) {
-  const bool known = verdict == "used" || verdict == "skipped" || verdict == "unregistered";
-  return "<span" + (known ? " class=" + verdict : std::string()) + ">" + EscapeHtml(verdict) +
+// A known status is a class of the style sheet.
+std::string StatusHtml(const std::string& status) {
+  const bool known = status == "used" || status == "skipped" || status == "unregistered";
+  return "<span" + (known ? " class=" + status : std::string()) + ">" + EscapeHtml(status) +
          "</span>";
 }
 
-// Photos that there is something to say about, one a line.
+// A photo that is not used, or has a remark.
 std::string RemarkRow(const PhotoStatus& photo, const ReportPicture* thumbnail) {
   return "<tr><td>" + ThumbnailHtml(thumbnail) + "<td class=file>" + EscapeHtml(photo.file) +
          "<td>" + StatusHtml(photo.status) + "<td class=w>" + EscapeHtml(photo.why) + "</tr>";
@@ -52,11 +52,11 @@ std::string PhotosHtml(const RunReport& report, const ReportPictures& pictures) 
                      CameraMapHtml(pictures.cameras);
   if (!remarks.empty())
     html +=
-        "<div class=scroll><table><thead><tr><th><th>photo<th>verdict<th>why</tr></thead>"
+        "<div class=scroll><table><thead><tr><th><th>photo<th>status<th>reason</tr></thead>"
         "<tbody>" +
         remarks + "</tbody></table></div>";
   if (used.empty() && names.empty()) return html;
-  html += "<details open><summary>photos used without remark</summary>";
+  html += "<details open><summary>photos used</summary>";
   if (!used.empty()) html += "<div class=thumbs>" + used + "</div>";
   if (!names.empty())
     html += "<p class=note>" + std::string(used.empty() ? "" : "and ") + names + "</p>";

@@ -29,8 +29,8 @@ std::vector<std::string> EquivalentCommand(const RunContext& context) {
   plain.Bind(&plain_options);
   const std::string& preset = context.settings.run.preset;
   ApplyPreset(preset, &plain);
-  const JsonValue before = plain_options.Values(), start = plain_options.Values("Start"),
-                  program = plain_options.Values("Program");
+  const JsonValue before = plain_options.Values(), start = OptionValues(plain.start),
+                  program = OptionValues(plain.program);
   std::vector<std::string> words = {"regrade", "run"};
   if (!context.source.empty()) words.push_back(context.source);
   if (preset != RunSettings().run.preset) words.insert(words.end(), {"--preset", preset});

@@ -16,15 +16,6 @@ struct RunContext {
   Workspace* workspace = nullptr;
   Console* console = nullptr;
 
-  // The options of one or more groups, as part of a stage's inputs.
-  JsonValue OptionsOf(const std::vector<std::string>& groups) const {
-    JsonValue values = JsonValue::Object();
-    for (const std::string& group : groups) {
-      const JsonValue of_group = options.Values(group);
-      for (const auto& [name, value] : of_group.AsObject()) values[name] = value;
-    }
-    return values;
-  }
   // What a finished stage has made, as an input of later ones; null before it is done.
   JsonValue ResultOf(const std::string& stage) const {
     const auto record = workspace->Find(stage);

@@ -37,7 +37,7 @@ JsonValue RunFileJson(const std::string& command, const RunContext& context) {
   if (!context.source.empty()) words.Append(context.source);
   JsonValue options = context.options.Values();
   // How one start behaves is not repeated.
-  const JsonValue start = context.options.Values("Start");
+  const JsonValue start = OptionValues(context.settings.start);
   JsonValue kept = JsonValue::Object();
   for (const auto& [name, value] : options.AsObject())
     if (start.Find(name) == nullptr) kept[name] = value;

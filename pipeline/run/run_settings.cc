@@ -1,5 +1,8 @@
 #include "pipeline/run/run_settings.h"
 
+#include <algorithm>
+#include <iterator>
+
 #include "kernels/base/error.h"
 
 namespace regrade {
@@ -18,6 +21,10 @@ void RunSettings::Bind(OptionSet* options) {
   options->Add("Render", &render);
   options->Add("Evaluation", &consistency);
   options->Add("Program", &program);
+}
+
+bool IsPreset(const std::string& name) {
+  return std::find(std::begin(kPresets), std::end(kPresets), name) != std::end(kPresets);
 }
 
 void ApplyPreset(const std::string& preset, RunSettings* settings) {
@@ -49,7 +56,7 @@ void ApplyPreset(const std::string& preset, RunSettings* settings) {
     settings->fit.rate_sh = 1e-2f;
     settings->fit.rate_sh_end = 4e-4f;
     settings->fit.tv_density = settings->fit.tv_sh = 5e-3f;
-    settings->fit.tv_share = 0.01f;
+    settings->fit.tv_fraction = 0.01f;
     settings->fit.prune_weight = 1.28f;
     settings->fit.initial_density = 0.1f;
     // Rates end where svox2's course over 250000 steps is after 102400.
@@ -63,11 +70,6 @@ void ApplyPreset(const std::string& preset, RunSettings* settings) {
     throw Error(ExitCode::kUsage, "'" + preset + "' is not allowed", "--preset",
                 "allowed: draft, standard, paper, best");
   }
-}
-
-void ApplyRecipeFlag(OptionSet* options, RunSettings* settings) {
-  if (const auto recipe = options->Given("recipe"))
-    ApplyStyleRecipe(*recipe, &settings->network);
 }
 
 void CheckTogether(const RunSettings& settings) {

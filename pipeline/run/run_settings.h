@@ -69,16 +69,16 @@ struct RunSettings {
   RenderOptions render;
   ConsistencyOptions consistency;
 
-  // Groups as they head the help and name parts of fingerprints.
+  // Under the headings of the help.
   void Bind(OptionSet* options);
 };
 
-// Sets what a preset and, within it, a recipe decide, before single options are read: "draft",
-// "standard", "paper", "best". Throws Error(kUsage) for another name.
+inline constexpr const char* kPresets[] = {"draft", "standard", "paper", "best"};
+bool IsPreset(const std::string& name);
+
+// Changes default settings to those of a preset. Throws Error(kUsage) for a name that is not in
+// kPresets.
 void ApplyPreset(const std::string& preset, RunSettings* settings);
-// --recipe, where it was given, decides every option of the network that other flags do not:
-// call it before ApplyFlags. Throws Error(kUsage) for a recipe that does not exist.
-void ApplyRecipeFlag(OptionSet* options, RunSettings* settings);
 
 // Options that are fine alone and contradict each other: Error(kUsage) naming both.
 void CheckTogether(const RunSettings& settings);

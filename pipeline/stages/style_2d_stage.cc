@@ -10,10 +10,12 @@
 #include "pipeline/fields/field_renderer.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/program/device_choice.h"
+#include "pipeline/report/stage_metrics.h"
 #include "pipeline/run/run_context.h"
 #include "pipeline/stages/make_stylizer.h"
 #include "pipeline/stages/object_edit.h"
 #include "pipeline/stages/stages.h"
+#include "pipeline/workspace/metrics_json.h"
 #include "pipeline/workspace/output_names.h"
 
 namespace regrade {
@@ -76,9 +78,7 @@ StageOutcome StyleViews(RunContext* context, const ProgressFunction& progress) {
   }
   StageOutcome outcome;
   outcome.outputs = {"views_2d"};
-  outcome.metrics["method"] = stylizer->Name();
-  outcome.metrics["views"] = styled;
-  for (const std::string& notice : notices) outcome.metrics["notices"].Append(notice);
+  PutMetrics(Style2dReport{{}, stylizer->Name(), styled, notices}, &outcome.metrics);
   return outcome;
 }
 
@@ -87,9 +87,10 @@ StageOutcome StyleViews(RunContext* context, const ProgressFunction& progress) {
 Stage Style2dStage(RunContext* context) {
   Stage stage;
   stage.name = "style_2d";
-  stage.inputs = JsonValue::Object{{"poses", context->ResultOf("pose")},
-                                   {"style", HashFile(context->settings.style.picture)},
-                                   {"options", context->OptionsOf({"Scene", "2D method"})}};
+  stage.inputs = JsonValue::Object{
+      {"poses", context->ResultOf("pose")},
+      {"style", HashFile(context->settings.style.picture)},
+      {"options", OptionValues(context->settings.scene, context->settings.style_2d)}};
   const JsonValue files = MethodFiles(context->settings.style_2d);
   if (!files.IsNull()) stage.inputs["method_files"] = files;
   const JsonValue gains = RecordedGainRows(*context->workspace);
@@ -97,7 +98,7 @@ Stage Style2dStage(RunContext* context) {
   if (std::filesystem::is_directory(context->workspace->Path("poses/masks")))
     stage.inputs["field"] = context->ResultOf("reconstruct");
   if (context->settings.object.On()) {
-    stage.inputs["object"] = context->OptionsOf({"Object"});
+    stage.inputs["object"] = OptionValues(context->settings.object);
     stage.inputs["masks"] = MaskFiles(context->settings.object);
   }
   stage.work = [context](const ProgressFunction& progress) {

@@ -17,12 +17,14 @@
 #include "pipeline/fields/network_file.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/program/device_choice.h"
+#include "pipeline/report/stage_metrics.h"
 #include "pipeline/run/plan.h"
 #include "pipeline/run/run_context.h"
 #include "pipeline/stages/make_stylizer.h"
 #include "pipeline/stages/object_edit.h"
 #include "pipeline/stages/stages.h"
 #include "pipeline/stages/style_targets.h"
+#include "pipeline/workspace/metrics_json.h"
 #include "stylize/cuda/device_style.h"
 #include "stylize/field/apply_network.h"
 #include "stylize/field/base_map.h"
@@ -47,27 +49,21 @@ Vec3f Mapped(const ColorMap& map, const Vec3f& color) {
 // Pairs of neighbouring pixels, drawn for the measurement of what the propositions guarantee.
 constexpr int64_t kVariancePairs = 4000;
 
-JsonValue GroupRecord(const VarianceGroup& group) {
-  JsonValue record = JsonValue::Object{{"pairs", group.pairs}, {"above", group.above}};
-  if (group.pairs > 0) {
-    record["gain"] = group.Gain();
-    record["largest_excess"] = group.largest_excess;
-  }
-  return record;
+VarianceGroupMetrics MetricsOfGroup(const VarianceGroup& group) {
+  if (group.pairs == 0) return {};
+  return {group.pairs, group.above, group.Gain(), group.largest_excess};
 }
 
-JsonValue VarianceRecord(const RadianceField& source, const RadianceField& styled,
-                         const LipschitzNetwork& network,
-                         const std::vector<StyledTrainingView>& views, uint64_t seed) {
+VarianceMetrics MetricsOfVariance(const RadianceField& source, const RadianceField& styled,
+                                  const LipschitzNetwork& network,
+                                  const std::vector<StyledTrainingView>& views, uint64_t seed) {
   std::vector<Camera> cameras;
   for (const StyledTrainingView& view : views) cameras.push_back(view.camera);
   const VarianceReport report = MeasureVariance(
       source, styled, network, NeighbouringPixels(cameras, kVariancePairs, seed),
       MarchOptions{source.step});
-  return JsonValue::Object{{"inside", GroupRecord(report.inside)},
-                           {"clamp", GroupRecord(report.clamp)},
-                           {"open", GroupRecord(report.open)},
-                           {"largest_share", report.largest_share}};
+  return {MetricsOfGroup(report.inside), MetricsOfGroup(report.clamp),
+          MetricsOfGroup(report.open), report.largest_share};
 }
 
 // Why the network is steeper than the colours' covariances tell, where it is.
@@ -99,12 +95,13 @@ StageOutcome LeaveAsItWas(RunContext* context, const StoredField& stored,
   context->console->Warn(
       "the masks agree on no part of the scene: it stays as it was. Look at --masks, or lower "
       "--mask-vote");
-  WriteNetworkFile(workspace.Path("network.npz"), {NetworkOfMap({}), 0});
+  WriteNetworkFile(workspace.Path("network.npz"),
+                   {NetworkOfMap({}), 0, stored.field.background});
   WriteFieldFile(workspace.Path("styled.npz"), stored);
   WriteObjectFile(workspace.Path("object.npz"), shares);
   StageOutcome outcome;
   outcome.outputs = {"network.npz", "styled.npz", "object.npz"};
-  outcome.metrics["steps"] = 0;
+  PutMetrics(StylizeReport(), &outcome.metrics);
   return outcome;
 }
 
@@ -153,7 +150,8 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
                    backend == Backend::kCuda ? &device_field : nullptr);
   for (const std::string& warning : trained.warnings) context->console->Warn(warning);
 
-  WriteNetworkFile(workspace.Path("network.npz"), {trained.network, trained.k_est});
+  WriteNetworkFile(workspace.Path("network.npz"),
+                   {trained.network, trained.k_est, stored.field.background});
   RadianceField source{
       stored.field.geometry, {}, source_background, stored.field.near_clip, stored.field.step};
   Appearance restyled;
@@ -165,45 +163,43 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
   }
   source.appearance = std::exchange(stored.field.appearance, std::move(restyled));
   StageOutcome outcome;
+  StylizeReport metrics;
   outcome.outputs = {"network.npz", "styled.npz"};
   if (object != nullptr) {
     const RadianceField styled = std::move(stored.field);
     stored.field = MixFields(source, {&styled}, {1}, &shares.all);
     WriteObjectFile(workspace.Path("object.npz"), shares);
     outcome.outputs.push_back("object.npz");
-    outcome.metrics["object_voxels"] = static_cast<int64_t>(
+    metrics.object_voxels = static_cast<int64_t>(
         std::count_if(shares.all.begin(), shares.all.end(), [](float e) { return e > 0; }));
   } else {
     std::filesystem::remove(workspace.Path("object.npz"));  // of an earlier style
   }
   WriteFieldFile(workspace.Path("styled.npz"), stored);
-  outcome.metrics["device"] = DeviceName(backend);
-  outcome.metrics["steps"] = trained.steps;
-  outcome.metrics["rejected_steps"] = trained.rejected_steps;
-  outcome.metrics["k_est"] = trained.k_est;
-  outcome.metrics["bound"] = trained.bound;
-  outcome.metrics["local_lipschitz_sampled"] = trained.local_lipschitz_sampled;
-  for (size_t i = 0; i < trained.history.steps.size(); ++i) {
-    outcome.metrics["bound_steps"].Append(trained.history.steps[i]);
-    outcome.metrics["bound_at_steps"].Append(trained.history.bounds[i]);
-  }
-  outcome.metrics["local_lipschitz_max"] = trained.local_lipschitz_max;
-  outcome.metrics["local_lipschitz_of_map"] = trained.network.BaseNorm();
-  outcome.metrics["local_lipschitz_along_coefficients"] = trained.slopes.along_coefficients;
-  outcome.metrics["local_lipschitz_along_position"] = trained.slopes.along_position;
+  metrics.device = DeviceName(backend);
+  metrics.steps = trained.steps;
+  metrics.rejected_steps = trained.rejected_steps;
+  metrics.k_est = trained.k_est;
+  metrics.bound = trained.bound;
+  metrics.local_lipschitz_sampled = trained.local_lipschitz_sampled;
+  for (size_t i = 0; i < trained.history.steps.size(); ++i)
+    metrics.bound_at_steps.emplace_back(trained.history.steps[i], trained.history.bounds[i]);
+  metrics.local_lipschitz_max = trained.local_lipschitz_max;
+  metrics.local_lipschitz_of_map = trained.network.BaseNorm();
+  metrics.local_lipschitz_along_coefficients = trained.slopes.along_coefficients;
+  metrics.local_lipschitz_along_position = trained.slopes.along_position;
   // A network's guarantee is about what it alone has made, and is measured on voxels.
   if (object == nullptr && !source.geometry->spheres.on())
-    outcome.metrics["variance"] = VarianceRecord(source, stored.field, trained.network,
-                                                 style_targets.views, settings.run.seed);
-  outcome.metrics["psnr_train_db"] = trained.psnr_db;
-  for (const std::string& notice : style_targets.notices)
-    outcome.metrics["notices"].Append(notice);
-  for (const std::string& warning : trained.warnings)
-    outcome.metrics["notices"].Append(warning);
+    metrics.variance = MetricsOfVariance(source, stored.field, trained.network,
+                                         style_targets.views, settings.run.seed);
+  metrics.psnr_train_db = trained.psnr_db;
+  metrics.notices = style_targets.notices;
+  for (const std::string& warning : trained.warnings) metrics.notices.push_back(warning);
   if (const std::string why = WhySteep(trained); !why.empty()) {
     context->console->Info(why);
-    outcome.metrics["notices"].Append(why);
+    metrics.notices.push_back(why);
   }
+  PutMetrics(metrics, &outcome.metrics);
   return outcome;
 }
 
@@ -213,13 +209,14 @@ Stage StylizeStage(RunContext* context) {
   const RunOptions& run = context->settings.run;
   Stage stage;
   stage.name = "stylize";
-  stage.inputs = JsonValue::Object{{"field", context->ResultOf("reconstruct")},
-                                   {"views_2d", context->ResultOf("style_2d")},
-                                   {"options", context->OptionsOf({"Scene", "Network"})},
-                                   {"seed", run.seed},
-                                   {"holdout", run.holdout}};
+  stage.inputs = JsonValue::Object{
+      {"field", context->ResultOf("reconstruct")},
+      {"views_2d", context->ResultOf("style_2d")},
+      {"options", OptionValues(context->settings.scene, context->settings.network)},
+      {"seed", run.seed},
+      {"holdout", run.holdout}};
   if (context->settings.object.On()) {
-    stage.inputs["object"] = context->OptionsOf({"Object"});
+    stage.inputs["object"] = OptionValues(context->settings.object);
     stage.inputs["masks"] = MaskFiles(context->settings.object);
   }
   stage.plan = PlanText(PlanStyle(context->settings.network.steps, omp_get_max_threads()));

@@ -39,13 +39,13 @@ SynthEffects ParseSynthEffects(const std::string& list) {
     else if (name == "mixed-cameras")
       effects.mixed_cameras = true;
     else if (name == "motion-blur" || name == "occluders")
-      throw Error(ExitCode::kUsage, "the effect \"" + name + "\" is not in this version",
-                  "--effects", kHint);
+      throw Error(ExitCode::kUsage, "the effect \"" + name + "\" is not supported", "--effects",
+                  kHint);
     else
       throw Error(ExitCode::kUsage, "there is no effect \"" + name + "\"", "--effects", kHint);
   }
   if (effects.distortion + effects.barrel + effects.fisheye > 1)
-    throw Error(ExitCode::kUsage, "a camera has one lens", "--effects", kHint);
+    throw Error(ExitCode::kUsage, "only one lens is possible", "--effects", kHint);
   return effects;
 }
 
@@ -59,7 +59,7 @@ double SynthGain(uint64_t seed, int index, int views) {
 
 MaskFault SynthMaskFault(int index) {
   constexpr MaskFault kFaults[] = {MaskFault::kNone,  MaskFault::kNone, MaskFault::kShifted,
-                                   MaskFault::kEmpty, MaskFault::kNone, MaskFault::kSwollen};
+                                   MaskFault::kEmpty, MaskFault::kNone, MaskFault::kEnlarged};
   return kFaults[index % 6];
 }
 

@@ -43,7 +43,7 @@ struct Holder {
   std::string host, start;
 
   std::string Text() const {
-    if (pid == 0) return "another run (it has not written its name yet)";
+    if (pid == 0) return "another run (it has not identified itself yet)";
     return "process " + std::to_string(pid) + " on " + host + ", started " + start;
   }
   bool AliveHere() const {
@@ -52,7 +52,7 @@ struct Holder {
   }
 };
 
-// What the holder wrote; empty if it is just writing, or something else stands there.
+// The holder's record; empty if it is incomplete or something else.
 Holder ReadHolder(int fd) {
   Holder holder;
   std::string text(kMaxHolderBytes, '\0');
@@ -68,7 +68,7 @@ Holder ReadHolder(int fd) {
   return holder;
 }
 
-// Between our open and our lock another run may have put a new file in place.
+// Another run may have replaced the file between open and flock.
 bool StillInPlace(int fd, const std::string& path) {
   struct stat ours, there;
   return ::fstat(fd, &ours) == 0 && ::stat(path.c_str(), &there) == 0 &&
@@ -84,7 +84,7 @@ FolderLock::FolderLock(const std::string& path, bool break_lock) {
     if (fd_ < 0)
       throw Error(ExitCode::kResources,
                   std::string("cannot write here: ") + std::strerror(errno), path,
-                  "choose another folder with --out, or mend its permissions");
+                  "choose another folder with --out, or correct its permissions");
     int status;
     do status = ::flock(fd_, LOCK_EX | LOCK_NB);
     while (status != 0 && errno == EINTR);
@@ -100,9 +100,9 @@ FolderLock::FolderLock(const std::string& path, bool break_lock) {
       const bool may_break = break_lock && !holder.AliveHere();
       if (!may_break)
         throw Error(ExitCode::kFolderInUse, "in use by " + holder.Text(), folder,
-                    break_lock ? "it is alive: end it first"
-                               : "wait for it or end it; if that run is surely dead (a network "
-                                 "drive can keep its lock), add --break-lock");
+                    break_lock ? "it is still running: end it first"
+                               : "wait for it or end it; if that run has certainly ended (a "
+                                 "network drive can keep its lock), add --break-lock");
       if (::unlink(path.c_str()) != 0 && errno != ENOENT)
         throw Error(ExitCode::kResources,
                     std::string("cannot remove the lock: ") + std::strerror(errno), path);

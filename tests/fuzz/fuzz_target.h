@@ -49,7 +49,6 @@ std::vector<FuzzTarget> CommandLineTargets();
 std::vector<FuzzTarget> FieldTargets();
 std::vector<FuzzTarget> FlowTargets();
 std::vector<FuzzTarget> JsonTargets();
-std::vector<FuzzTarget> MovieTargets();
 std::vector<FuzzTarget> PictureTargets();
 std::vector<FuzzTarget> PoseTableTargets();
 std::vector<FuzzTarget> RecordTargets();
@@ -66,7 +65,7 @@ std::vector<FuzzTarget> Joined(Lists... lists) {
 // Readers that need little of the program to be built, and the others.
 inline std::vector<FuzzTarget> ReaderTargets() {
   return Joined(ColmapTargets, ArchiveTargets, FieldTargets, JsonTargets, PoseTableTargets,
-                PictureTargets, MovieTargets);
+                PictureTargets);
 }
 inline std::vector<FuzzTarget> ProgramTargets() {
   return Joined(RecordTargets, FlowTargets, StateTargets, CommandLineTargets);

@@ -6,7 +6,6 @@
 #include "pipeline/images/draw_text.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/images/image_format.h"
-#include "pipeline/images/png_chunks.h"
 #include "tests/fuzz/fuzz_support.h"
 #include "tests/fuzz/mutate.h"
 
@@ -50,16 +49,6 @@ std::string Mutate(std::string bytes, FuzzRandom* random) {
 // --- PNG's chunks
 
 constexpr size_t kSignature = 8;
-
-std::vector<std::string> PngSeeds() {
-  return {EncodePng8(Waves(8, 6)), EncodePng16(Waves(3, 2))};
-}
-
-bool ReadChunks(std::string_view bytes) {
-  if (bytes.size() < kSignature) return false;
-  const std::vector<char> own(bytes.begin(), bytes.end());
-  return FindPngDamage({own.data(), own.size()}).empty();
-}
 
 // Puts the checksums of all chunks right, as far as their lengths lead.
 std::string MutatePng(std::string bytes, FuzzRandom* random) {
@@ -132,7 +121,6 @@ bool Draw(std::string_view bytes) {
 
 std::vector<FuzzTarget> PictureTargets() {
   return {{"image_format", FormatSeeds, ReadFormat, Mutate, 100000},
-          {"png_chunks", PngSeeds, ReadChunks, MutatePng, 100000},
           {"photo", PhotoSeeds, ReadPhoto, MutatePhoto, 6000},
           {"picture_text", TextSeeds, Draw, Mutate, 8000}};
 }

@@ -296,7 +296,7 @@ TEST_F(Changed, F69_APlaceThatIsNone) {
                                            {12, INFINITY}}) {
     const double good = std::exchange(placement[at], value);
     EXPECT_REGRADE_ERROR(ReadWith("regrade_field_from_world", {13}, placement),
-                         ExitCode::kInput, "no scale, rotation and translation");
+                         ExitCode::kInput, "not a similarity");
     placement[at] = good;
   }
   ReadWith("regrade_field_from_world", {13}, placement);

@@ -6,7 +6,6 @@
 #include <locale>
 
 #include "pipeline/program/nearest_name.h"
-#include "pipeline/run/run_settings.h"
 #include "tests/support/expect_error.h"
 
 namespace regrade {
@@ -178,40 +177,6 @@ TEST(NearestName, EditsAndBeginnings) {
   EXPECT_EQ(NearestName("recon", {"run", "reconstruct", "render"}), "reconstruct");
   EXPECT_EQ(NearestName("psoe", {"pose", "run"}), "pose");
   EXPECT_EQ(NearestName("zzzzzz", {"pose", "run"}), "");
-}
-
-// Every flag of the program is unique: binding checks it.
-TEST(RunSettings, AllOptionsBind) {
-  RunSettings settings;
-  OptionSet options;
-  settings.Bind(&options);
-  EXPECT_NE(options.Help().find("--photo-size"), std::string::npos);
-  for (const char* preset : {"draft", "standard", "paper", "best"}) {
-    RunSettings other;
-    ApplyPreset(preset, &other);
-    EXPECT_EQ(other.run.preset, preset);
-    // Presets stay within the bounds that users have.
-    OptionSet bound;
-    other.Bind(&bound);
-    EXPECT_NO_THROW(bound.ApplyConfig(bound.Values(), preset)) << preset;
-  }
-  EXPECT_REGRADE_ERROR(ApplyPreset("fast", &settings), ExitCode::kUsage, "draft");
-}
-
-// The recipe alone brings all that it stands for, and other flags are stronger.
-TEST(RunSettings, RecipeDecidesWhatIsNotSaid) {
-  RunSettings settings, paper;
-  ApplyStyleRecipe("paper", &paper.network);
-  OptionSet options;
-  settings.Bind(&options);
-  options.Parse({"--recipe", "paper", "--style-rays", "1024"});
-  ApplyRecipeFlag(&options, &settings);
-  options.ApplyFlags();
-  EXPECT_EQ(settings.network.recipe, "paper");
-  EXPECT_EQ(settings.network.base, paper.network.base);
-  EXPECT_EQ(settings.network.rate_first, paper.network.rate_first);
-  EXPECT_EQ(settings.network.norm_steps, paper.network.norm_steps);
-  EXPECT_EQ(settings.network.rays_per_step, 1024);
 }
 
 }  // namespace

@@ -142,13 +142,23 @@ TEST(Workspace, RecordsOfNewerVersionsAreRefused) {
   EXPECT_REGRADE_ERROR(workspace.Find("pose"), ExitCode::kInput, "written by regrade 7.0");
 }
 
+TEST(Workspace, FoldersOfOlderSchemasAreRefused) {
+  const TemporaryFolder folder;
+  const std::string record = folder / "out/.regrade/stages/pose.json";
+  WriteText(record, R"({"schema": 1, "regrade": "0.1.0"})");
+  EXPECT_REGRADE_ERROR(Workspace(folder / "out"), ExitCode::kInput, "regrade (schema 1)");
+  EXPECT_REGRADE_ERROR(Workspace(folder / "out"), ExitCode::kInput, "use another --out");
+  WriteText(record, "{ \"schema\"");  // a damaged record concerns its stage only
+  EXPECT_NO_THROW(Workspace(folder / "out"));
+}
+
 TEST(Workspace, RecordsCannotLeadOutOfTheFolder) {
   const TemporaryFolder folder;
   Workspace workspace(folder / "out");
   for (const char* path : {"../secret", "/etc/passwd", "a/../../b", "poses/"}) {
     WriteJsonFile(
         workspace.Path(".regrade/stages/pose.json"),
-        JsonValue::Object{{"schema", 1},
+        JsonValue::Object{{"schema", 2},
                           {"regrade", "x"},
                           {"inputs", JsonValue::Object()},
                           {"outputs", JsonValue::Array{JsonValue::Object{
@@ -217,14 +227,6 @@ TEST(Workspace, CheckpointsBelongToTheirInputs) {
     WriteText(path, blob.substr(0, i));
     EXPECT_EQ(workspace.LoadCheckpoint("reconstruct", Inputs(1)), std::nullopt) << i;
   }
-}
-
-TEST(Workspace, FreeSpaceIsLookedAtFirst) {
-  const TemporaryFolder folder;
-  const Workspace workspace(folder / "out");
-  EXPECT_NO_THROW(workspace.RequireFreeSpace(1, "a test"));
-  EXPECT_REGRADE_ERROR(workspace.RequireFreeSpace(uint64_t{1} << 62, "a test"),
-                       ExitCode::kResources, "a test needs");
 }
 
 TEST(FolderLock, F38_SecondRunIsToldWho) {

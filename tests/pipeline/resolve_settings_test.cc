@@ -1,0 +1,144 @@
+#include "pipeline/run/resolve_settings.h"
+
+#include <gtest/gtest.h>
+
+#include "pipeline/run/run_settings.h"
+#include "tests/support/expect_error.h"
+#include "tests/support/temporary_folder.h"
+
+namespace regrade {
+namespace {
+
+using testing::TemporaryFolder;
+using testing::WriteText;
+
+struct Resolved {
+  RunSettings settings;
+  std::vector<std::string> words;
+};
+
+Resolved Resolve(const std::vector<std::string>& flags, const SettingsSources& sources = {}) {
+  Resolved resolved;
+  OptionSet options;
+  resolved.settings.Bind(&options);
+  options.Parse(flags);
+  resolved.words = ResolveSettings(sources, &options);
+  return resolved;
+}
+
+// Every flag of the program is unique: binding checks it.
+TEST(RunSettings, AllOptionsBind) {
+  RunSettings settings;
+  OptionSet options;
+  settings.Bind(&options);
+  EXPECT_NE(options.Help().find("--photo-size"), std::string::npos);
+  for (const char* preset : kPresets) {
+    RunSettings other;
+    ApplyPreset(preset, &other);
+    EXPECT_EQ(other.run.preset, preset);
+    // Presets stay within the bounds that users have.
+    OptionSet bound;
+    other.Bind(&bound);
+    EXPECT_NO_THROW(bound.ApplyConfig(bound.Values(), preset)) << preset;
+  }
+  EXPECT_REGRADE_ERROR(ApplyPreset("fast", &settings), ExitCode::kUsage, "draft");
+}
+
+TEST(ResolveSettings, PresetsGiveTheirValues) {
+  for (const char* preset : kPresets) {
+    RunSettings expected;
+    ApplyPreset(preset, &expected);
+    OptionSet bound;
+    expected.Bind(&bound);
+    RunSettings settings;
+    OptionSet options;
+    settings.Bind(&options);
+    options.Parse({"--preset", preset});
+    ResolveSettings({}, &options);
+    EXPECT_EQ(DumpJson(options.Values()), DumpJson(bound.Values())) << preset;
+  }
+  EXPECT_REGRADE_ERROR(Resolve({"--preset", "fast"}), ExitCode::kUsage, "draft");
+  EXPECT_EQ(Resolve({}, {.preset = "draft"}).settings.scene.photo_size, 480);
+  EXPECT_EQ(Resolve({"--preset=standard"}, {.preset = "draft"}).settings.scene.photo_size, 800);
+}
+
+TEST(ResolveSettings, LaterSourcesOverrideEarlierOnes) {
+  const TemporaryFolder folder;
+  const std::string run = folder / "run.json", config = folder / "config.json";
+  WriteText(run, R"({"arguments": ["/photos"], "options":
+                 {"preset": "draft", "photo-size": 300, "fps": 12, "style-rays": 7}})");
+  WriteText(config,
+            R"({"arguments": ["/more"], "options": {"fps": 30, "recipe": "standard"}})");
+  const SettingsSources sources{.run_json = run};
+
+  Resolved r = Resolve({}, sources);
+  EXPECT_EQ(r.words, std::vector<std::string>{"/photos"});
+  EXPECT_EQ(r.settings.fit.resolutions, (std::vector<int>{64, 128, 192}));  // its preset
+  EXPECT_EQ(r.settings.scene.photo_size, 300);  // its option over its preset
+  EXPECT_EQ(r.settings.network.rays_per_step, 7);
+
+  r = Resolve({"--config", config}, sources);
+  EXPECT_EQ(r.words, std::vector<std::string>{"/more"});
+  EXPECT_EQ(r.settings.render.fps, 30);
+  EXPECT_EQ(r.settings.scene.photo_size, 300);
+
+  // A preset as a flag overrides all that presets set, and nothing else.
+  r = Resolve({"--preset", "standard"}, sources);
+  EXPECT_EQ(r.settings.scene.photo_size, 800);
+  EXPECT_EQ(r.settings.fit.resolutions, FitOptions().resolutions);
+  EXPECT_EQ(r.settings.network.rays_per_step, TrainNetworkOptions().rays_per_step);
+  EXPECT_EQ(r.settings.render.fps, 12);
+
+  r = Resolve({"--preset", "best", "--photo-size", "320", "--recipe", "paper"}, sources);
+  EXPECT_EQ(r.settings.scene.photo_size, 320);
+  EXPECT_EQ(r.settings.network.recipe, "paper");
+  EXPECT_EQ(r.settings.network.steps, 300);  // of the recipe, not of the preset
+
+  r = Resolve({"--photo-size=64"}, {.run_json = run, .taken = {"fps"}});
+  EXPECT_EQ(r.settings.render.fps, 12);
+  EXPECT_EQ(r.settings.scene.photo_size, 64);
+  EXPECT_EQ(r.settings.fit.resolutions, FitOptions().resolutions);
+}
+
+TEST(ResolveSettings, RecipeSetsEveryOptionOfTheNetwork) {
+  TrainNetworkOptions paper;
+  ApplyStyleRecipe("paper", &paper);
+  for (const std::vector<std::string>& flags :
+       {std::vector<std::string>{"--recipe", "paper", "--style-rays", "1024"},
+        std::vector<std::string>{"--recipe=paper", "--style-rays=1024"}}) {
+    // A command may bind the network's options alone.
+    TrainNetworkOptions network;
+    OptionSet options;
+    options.Add("Network", &network);
+    options.Parse(flags);
+    ResolveSettings({}, &options);
+    EXPECT_EQ(network.recipe, "paper");
+    EXPECT_EQ(network.base, paper.base);
+    EXPECT_EQ(network.rate_first, paper.rate_first);
+    EXPECT_EQ(network.norm_steps, paper.norm_steps);
+    EXPECT_EQ(network.rays_per_step, 1024);
+  }
+  EXPECT_REGRADE_ERROR(Resolve({"--recipe=fast"}), ExitCode::kUsage, "--recipe");
+}
+
+TEST(ResolveSettings, F22_ErrorsOfAFileNameTheLine) {
+  const TemporaryFolder folder;
+  WriteText(folder / "run.json", "{\"arguments\": [],\n\"options\": {\n\"preset\": \"fast\"}}");
+  EXPECT_REGRADE_ERROR(Resolve({"--config", folder / "run.json"}), ExitCode::kUsage,
+                       "run.json:3:");
+}
+
+// Headings are for readers; a stage's inputs hold names and values alone.
+TEST(OptionValues, AreFreeOfHeadings) {
+  SceneOptions scene;
+  FitOptions fit;
+  OptionSet reworded;
+  reworded.Add("Photos and frames", &scene);
+  reworded.Add("Reconstruction", &fit);
+  EXPECT_EQ(DumpJson(OptionValues(scene, fit)), DumpJson(reworded.Values()));
+  EXPECT_EQ(OptionValues(scene).AsObject().size(), 1u);
+  EXPECT_EQ(OptionValues(scene).At("photo-size").AsInt(), 800);
+}
+
+}  // namespace
+}  // namespace regrade
