@@ -13,15 +13,26 @@ struct StageEntry {
   Stage (*make)(RunContext*);
 };
 
-// photos --pose--> capture --reconstruct--> field
-// capture + style --style_2d--> styled views;  field + styled views --stylize--> styled field
-// both fields --render--> frames, films --evaluate--> figures --report--> report.json,
-// report.html
+// The stages of a run, in order; each reads the results of earlier ones from the output folder.
+// clang-format off
 constexpr StageEntry kStages[] = {
-    {"pose", PoseStage},       {"reconstruct", ReconstructStage}, {"style_2d", Style2dStage},
-    {"stylize", StylizeStage}, {"render", RenderStage},           {"evaluate", EvaluateStage},
+    // photos -> poses/: cameras and points by COLMAP or as given (reconstruct/colmap)
+    {"pose", PoseStage},
+    // poses/ -> field.npz: density and colour fitted to the photos (reconstruct/fit)
+    {"reconstruct", ReconstructStage},
+    // photos + style picture -> views_2d/: each photo styled in 2D (stylize/image)
+    {"style_2d", Style2dStage},
+    // field.npz + views_2d/ -> styled.npz: the field's colours mapped by a network of bounded
+    // Lipschitz constant (stylize/training, stylize/field)
+    {"stylize", StylizeStage},
+    // field.npz + styled.npz -> frames/, films (kernels/field)
+    {"render", RenderStage},
+    // frames/ -> consistency and fidelity metrics, heatmaps/ (evaluate)
+    {"evaluate", EvaluateStage},
+    // all records -> report.json, report.html (pipeline/report)
     {"report", ReportStage},
 };
+// clang-format on
 
 const StageEntry* Find(const std::string& name) {
   return std::find_if(std::begin(kStages), std::end(kStages),
@@ -37,11 +48,11 @@ void RunPipeline(const std::string& first, const std::string& last, RunContext* 
   for (const StageEntry* before = std::begin(kStages); before != Find(first); ++before)
     runner.Require(before->name, "regrade run");
   for (const StageEntry* entry = Find(first); entry != std::end(kStages); ++entry) {
-    // In a dry run the stages behind an undone one have no inputs to look at yet.
+    // In a dry run the stages after an undone one have no inputs yet.
     if (!runner.Run(entry->make(context))) {
       if (last == entry->name) return;
       for (++entry; entry != std::end(kStages); ++entry) {
-        context->console->Info(std::string(entry->name) + ": would be done after it");
+        context->console->Info(std::string(entry->name) + ": would follow");
         if (last == entry->name) break;
       }
       return;

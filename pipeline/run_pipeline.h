@@ -1,4 +1,4 @@
-// The whole road from photos to a report, stage by stage.
+// Runs the stages of a run in their order, from photos to a report.
 #pragma once
 
 #include <string>
@@ -7,8 +7,8 @@
 
 namespace regrade {
 
-// Does the stages from `first` to `last` (names of kStageNames), each from the results of the
-// one before on disk. Stages before `first` must have been done. Throws what stages throw.
+// Runs the stages from `first` to `last` (names of kStageNames); each reads the results of
+// earlier ones from disk. Stages before `first` must be done. Throws what stages throw.
 void RunPipeline(const std::string& first, const std::string& last, RunContext* context);
 
 }  // namespace regrade

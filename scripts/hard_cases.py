@@ -65,7 +65,7 @@ class Tree:
             for name in CTEST.findall(read(path)):
                 self.add(name, ())
         if glob.glob(os.path.join(root, "scripts", "check_*.py")):
-            for checker in ("check_layers", "check_equations", "check_words", "check_paths"):  # added by a loop in CMake
+            for checker in ("check_layers", "check_equations", "check_words", "check_names"):  # added by a loop in CMake
                 self.add(checker, ())
         self.cases = json.loads(read(os.path.join(root, CASES)))
         self.safeguards = {}

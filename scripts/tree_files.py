@@ -1,4 +1,4 @@
-"""Lists the files of the source tree; a module of check_words.py and check_paths.py."""
+"""Lists the files of the source tree; a module of check_words.py and check_names.py."""
 
 import os
 import subprocess

@@ -1,4 +1,4 @@
-// A capture: photos with cameras, sparse points, and the status of each input file.
+// A capture: photos with cameras, sparse points, and the status of each given file.
 #pragma once
 
 #include <cstdint>
@@ -7,24 +7,20 @@
 
 #include "kernels/scene/camera.h"
 #include "kernels/scene/image.h"
+#include "kernels/scene/photo_status.h"
 
 namespace regrade {
 
-struct PhotoStatus {
-  std::string file;    // as given by the user, relative to the input folder
-  std::string status;  // "used" | "skipped" | "unregistered"
-  std::string why;     // reason or remark; may be empty for "used"
-};
-
-// A photo that was decoded and written to the workspace as a plain 8-bit upright PNG, before
-// poses are known.
+// A photo that was decoded and written beside the result as an upright RGB PNG, before poses
+// are known.
 struct StagedPhoto {
-  std::string file;  // as given by the user, relative to the input folder
-  std::string name;  // staged name: "00007.png", numbered in natural order of `file`
+  std::string file;  // the user's name, relative to the given folder
+  std::string name;  // ours: "00007.png", numbered in natural order of `file`
   std::string path;  // absolute path of the PNG
   int width = 0;     // pixels, after EXIF orientation
   int height = 0;
   double exif_focal_px = 0;  // focal length in pixels from EXIF; 0 where unknown
+  int bits = 8;              // of a value in the PNG: 8 or 16
 };
 
 // A registered photo. `name` is the staged name ("00007.png"); `file` the user's.

@@ -47,7 +47,7 @@ fs::path CommonFolder(const fs::path& folder, const TransformsFile& file) {
 fs::path PictureFolder(const fs::path& root) {
   if (fs::is_directory(root / "images")) return root / "images";
   std::vector<std::string> names;
-  std::error_code error;  // a folder that cannot be listed is told of by whoever needs it
+  std::error_code error;  // the caller reports a folder that cannot be listed
   for (fs::directory_iterator it(root, error), end; !error && it != end; it.increment(error))
     if (const std::string name = it->path().filename().string();
         name.starts_with("images_") && fs::is_directory(it->path(), error))
@@ -70,7 +70,7 @@ ColmapLens LensOf(const Camera& camera) {
   return ColmapLens::kPinhole;
 }
 
-// A model with one camera an image and no points, under our own names.
+// A model with one camera per image and no points, with staged names.
 ColmapModel ModelFromTransforms(const CaptureSource& source,
                                 const std::vector<StagedPhoto>& photos,
                                 std::vector<std::string>* missing) {
@@ -89,7 +89,7 @@ ColmapModel ModelFromTransforms(const CaptureSource& source,
   *missing = file.missing;
   for (const TransformsFrame& frame : file.frames) {
     const auto found = by_path.find(fs::weakly_canonical(folder / frame.file).string());
-    if (found == by_path.end()) continue;  // left out at ingest, with a verdict
+    if (found == by_path.end()) continue;  // left out at ingest, with a reason
     const uint32_t id = static_cast<uint32_t>(model.images.size()) + 1;
     model.cameras.push_back({id, LensOf(frame.camera), frame.camera});
     model.images.push_back({id, id, found->second->name, frame.camera.camera_from_world, {}});
@@ -97,7 +97,7 @@ ColmapModel ModelFromTransforms(const CaptureSource& source,
   return model;
 }
 
-// Poses of an LLFF file belong to the pictures of its folder in natural order, all of them.
+// An LLFF file has one pose for each picture of its folder, in natural order.
 ColmapModel ModelFromLlff(const CaptureSource& source, const std::vector<StagedPhoto>& photos,
                           double* nearest_depth) {
   const LlffPoses poses = ReadPosesBounds(source.poses);
@@ -106,7 +106,7 @@ ColmapModel ModelFromLlff(const CaptureSource& source, const std::vector<StagedP
                 std::to_string(poses.cameras.size()) + " poses, but " +
                     std::to_string(photos.size()) + " usable photos in " + source.photos,
                 source.poses,
-                "an LLFF file names no photos: all of its pictures must be there");
+                "an LLFF file has no photo names: all of its pictures must be present");
   *nearest_depth = poses.nearest;
   ColmapModel model;
   for (size_t i = 0; i < photos.size(); ++i) {
@@ -118,42 +118,42 @@ ColmapModel ModelFromLlff(const CaptureSource& source, const std::vector<StagedP
   return model;
 }
 
+constexpr int64_t kSchema = 2;         // of photos.json
 constexpr char kAbsent[] = "absent/";  // no staged photo's name has a slash
-constexpr char kNoPicture[] = "has a pose, but there is no such picture";
+constexpr char kNoPicture[] = "has a pose, but the picture is missing";
 
 void NoteMissing(const std::vector<PhotoStatus>& statuses, std::vector<std::string>* notes) {
   std::string first;
   int count = 0;
-  for (const PhotoStatus& verdict : statuses)
-    if (verdict.why == kNoPicture && count++ == 0) first = verdict.file;
+  for (const PhotoStatus& photo : statuses)
+    if (photo.why == kNoPicture && count++ == 0) first = photo.file;
   if (count > 0)
-    notes->push_back("pictures of " + std::to_string(count) + " poses are not there: " + first +
-                     (count > 1 ? " and others" : ""));
+    notes->push_back("the pictures of " + std::to_string(count) +
+                     " poses are missing: " + first + (count > 1 ? " and others" : ""));
 }
 
 JsonValue StatusesJson(const std::vector<PhotoStatus>& statuses) {
   JsonValue::Array array;
-  for (const PhotoStatus& verdict : statuses)
+  for (const PhotoStatus& photo : statuses)
     array.push_back(JsonValue::Object{
-        {"file", verdict.file}, {"status", verdict.status}, {"why", verdict.why}});
+        {"file", photo.file}, {"status", ToString(photo.status)}, {"why", photo.why}});
   return array;
-}
-
-// Ingest's verdict stands, unless the photo was staged: then the poses decide.
-std::vector<PhotoStatus> MergedStatuses(const std::vector<PhotoStatus>& ingest,
-                                        const std::vector<PhotoStatus>& posed) {
-  std::vector<PhotoStatus> merged = ingest;
-  for (PhotoStatus& verdict : merged)
-    for (const PhotoStatus& later : posed)
-      if (later.file == verdict.file) {
-        verdict.status = later.status;
-        if (!later.why.empty()) verdict.why = later.why;
-      }
-  return merged;
 }
 
 std::string IndexOf(const CaptureSource& posed) {
   return (fs::path(posed.poses).parent_path() / "photos.json").string();
+}
+
+// photos.json. Throws Error(kInput) for one of another schema.
+JsonValue ReadIndex(const std::string& path) {
+  JsonValue index = ReadJsonFile(path);
+  const JsonValue* const schema = index.IsObject() ? index.Find("schema") : nullptr;
+  if (schema == nullptr || !(*schema == JsonValue(kSchema)))
+    throw Error(ExitCode::kInput,
+                "is of schema " + (schema == nullptr ? "0" : DumpJson(*schema, -1)) +
+                    ", this version of regrade reads schema " + std::to_string(kSchema),
+                path, "start a new folder with `regrade run`, or use --restart-from pose");
+  return index;
 }
 
 double NearestDepth(const JsonValue& index) {
@@ -164,7 +164,7 @@ double NearestDepth(const JsonValue& index) {
 }  // namespace
 
 double NearestDepthOf(const CaptureSource& source) {
-  return source.kind == CaptureKind::kPosed ? NearestDepth(ReadJsonFile(IndexOf(source))) : 0;
+  return source.kind == CaptureKind::kPosed ? NearestDepth(ReadIndex(IndexOf(source))) : 0;
 }
 
 CaptureSource DetectCapture(const std::string& folder) {
@@ -209,8 +209,8 @@ Capture ImportPoses(const CaptureSource& source, const std::vector<StagedPhoto>&
   } else {
     model = ReadColmapModel(source.poses);
     nearest_depth = NearestDepthOf(source);
-    // The model goes on under our names. An image without a staged photo gets one that no photo
-    // has: its own may be the name under which another was staged.
+    // Images get staged names. An image without a staged photo gets a name that no photo has:
+    // its own may be the staged name of another.
     std::map<std::string, std::string> name_of;
     for (const StagedPhoto& photo : photos) name_of[photo.file] = photo.name;
     for (ColmapImage& image : model.images)
@@ -220,18 +220,22 @@ Capture ImportPoses(const CaptureSource& source, const std::vector<StagedPhoto>&
         image.name = kAbsent + image.name;
   }
   if (const int resized = ResizeToPhotos(photos, &model); resized > 0)
-    notes->push_back(std::to_string(resized) +
-                     " photos have another size than their cameras and the same shape: the "
-                     "cameras follow");
+    notes->push_back(
+        std::to_string(resized) +
+        " photos differ from their cameras in size, not in aspect: the cameras were "
+        "resized");
   WriteColmapModel(model, sparse_folder);
   Capture capture = CaptureFromModel(model, photos, PhotoNames::kStaged);
   capture.nearest_depth = nearest_depth;
-  for (const PhotoStatus& verdict : capture.statuses)
-    if (verdict.status == "skipped")
-      missing.push_back(verdict.file.substr(std::string(kAbsent).size()));
-  capture.statuses = MergedStatuses(statuses, capture.statuses);
+  std::vector<PhotoStatus> posed;
+  for (const PhotoStatus& photo : capture.statuses)
+    if (photo.status == PhotoState::kSkipped)
+      missing.push_back(photo.file.substr(std::string(kAbsent).size()));
+    else
+      posed.push_back(photo);
+  capture.statuses = MergeStatuses(statuses, posed);
   for (const std::string& file : missing)
-    capture.statuses.push_back({file, "skipped", kNoPicture});
+    capture.statuses.push_back({file, PhotoState::kSkipped, kNoPicture});
   NoteMissing(capture.statuses, notes);
   return capture;
 }
@@ -246,7 +250,7 @@ void WriteCaptureIndex(const std::string& folder, const Capture& capture,
                                        {"height", photo.height},
                                        {"exif_focal_px", photo.exif_focal_px}});
   WriteJsonFile(folder + "/photos.json",
-                JsonValue::Object{{"schema", 1},
+                JsonValue::Object{{"schema", kSchema},
                                   {"photos", std::move(staged)},
                                   {"statuses", StatusesJson(capture.statuses)},
                                   {"reprojection_px", capture.reprojection_px},
@@ -256,7 +260,7 @@ void WriteCaptureIndex(const std::string& folder, const Capture& capture,
 
 Capture ReadCapture(const std::string& folder) {
   const std::string path = folder + "/photos.json";
-  const JsonValue index = ReadJsonFile(path);
+  const JsonValue index = ReadIndex(path);
   try {
     std::vector<StagedPhoto> photos;
     for (const JsonValue& entry : index.At("photos").AsArray()) {
@@ -274,10 +278,14 @@ Capture ReadCapture(const std::string& folder) {
     Capture capture =
         CaptureFromModel(ReadColmapModel(folder + "/sparse"), photos, PhotoNames::kStaged);
     capture.statuses.clear();
-    for (const JsonValue& verdict : index.At("statuses").AsArray())
-      capture.statuses.push_back({verdict.At("file").AsString(),
-                                  verdict.At("status").AsString(),
-                                  verdict.At("why").AsString()});
+    for (const JsonValue& photo : index.At("statuses").AsArray()) {
+      const auto state = PhotoStateOf(photo.At("status").AsString());
+      if (!state)
+        throw Error(ExitCode::kInput,
+                    "'" + photo.At("status").AsString() + "' is not a photo's status");
+      capture.statuses.push_back(
+          {photo.At("file").AsString(), *state, photo.At("why").AsString()});
+    }
     capture.reprojection_px = index.At("reprojection_px").AsDouble();
     capture.nearest_depth = NearestDepth(index);
     capture.models_found = static_cast<int>(index.At("models_found").AsInt());

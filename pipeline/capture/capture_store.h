@@ -1,5 +1,5 @@
-// A capture on disk: poses/ in the output folder, with COLMAP's model, the staged photos, and
-// photos.json for what neither of them says.
+// A capture on disk: folder poses/ with COLMAP's model, the staged photos, and photos.json with
+// the rest.
 #pragma once
 
 #include <string>
@@ -9,10 +9,10 @@
 
 namespace regrade {
 
-// What the poses of a capture were known by before.
+// Where the poses of a capture come from.
 enum class CaptureKind {
-  kPhotos,      // not at all
-  kPosed,       // an output folder of ours, or its poses/: photos.json, photos/ and sparse/
+  kPhotos,      // none: COLMAP finds them
+  kPosed,       // an output folder of regrade, or its poses/: photos.json, photos/ and sparse/
   kColmap,      // a folder of pictures beside sparse/ or sparse/0/
   kTransforms,  // transforms.json, or transforms_train.json of a Blender capture
   kLlff,        // poses_bounds.npy beside a folder of pictures, or among them
@@ -24,16 +24,16 @@ struct CaptureSource {
   std::string poses;   // folder of the model, or the file of poses; empty for kPhotos
 };
 
-// Tells by content. A folder of pictures beside the poses is images/, or else the first of
-// images_2/, images_4/ and the like. Throws Error(kInput) if there is no such folder.
+// Decides by content. The folder of pictures beside poses is images/, or else the first of
+// images_2/, images_4/ and so on. Throws Error(kInput) if there is no such folder.
 CaptureSource DetectCapture(const std::string& folder);
 
-// What photos.json of a kPosed capture says of Capture::nearest_depth; 0 of others.
+// Capture::nearest_depth by the photos.json of a kPosed capture; 0 for others.
 double NearestDepthOf(const CaptureSource& source);
 
-// Poses that came with the photos, for those that were staged; the model is written to
-// `sparse_folder`. Photos that were resampled since get cameras of their size. `notes`:
-// sentences for a person. Throws Error(kInput) if photos and poses do not fit each other.
+// Reads given poses of the staged photos and writes the model to `sparse_folder`. Photos that
+// were resampled since get cameras of their size. `notes`: sentences for the user. Throws
+// Error(kInput) if photos and poses do not fit each other.
 Capture ImportPoses(const CaptureSource& source, const std::vector<StagedPhoto>& photos,
                     const std::vector<PhotoStatus>& statuses, const std::string& sparse_folder,
                     std::vector<std::string>* notes);
@@ -42,7 +42,7 @@ Capture ImportPoses(const CaptureSource& source, const std::vector<StagedPhoto>&
 void WriteCaptureIndex(const std::string& folder, const Capture& capture,
                        const std::vector<StagedPhoto>& photos);
 
-// Reads it all back. Throws Error(kInput).
+// Throws Error(kInput); for a photos.json of another schema, too.
 Capture ReadCapture(const std::string& folder);
 
 }  // namespace regrade

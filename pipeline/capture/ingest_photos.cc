@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
 #include <future>
+#include <limits>
 #include <map>
 #include <regex>
 #include <set>
@@ -30,27 +32,29 @@ struct Candidate {
   std::string problem;
 };
 
-// Of what is staged: size and 8-bit values, so that a photo and its staged PNG agree.
+// Of size and values as integers, so that a photo and its staged PNG agree.
+template <typename Value>
 uint64_t PixelHash(const Image& image) {
   Hasher hasher;
   const int shape[3] = {image.width, image.height, image.channels};
   hasher.Add(shape, sizeof shape);
-  std::vector<uint8_t> bytes(image.pixels.size());
-  std::transform(image.pixels.begin(), image.pixels.end(), bytes.begin(), [](float v) {
-    return static_cast<uint8_t>(std::clamp(v, 0.f, 1.f) * 255.f + 0.5f);
+  constexpr float kMax = std::numeric_limits<Value>::max();
+  std::vector<Value> values(image.pixels.size());
+  std::transform(image.pixels.begin(), image.pixels.end(), values.begin(), [](float v) {
+    return static_cast<Value>(std::clamp(v, 0.f, 1.f) * kMax + 0.5f);
   });
-  hasher.Add(bytes.data(), bytes.size());
+  hasher.Add(values.data(), values.size() * sizeof(Value));
   return hasher.Value();
 }
 
-// Faults of a file become its problem; faults of a disk go on as errors.
+// Errors of a file become its problem; errors of a disk are thrown.
 Candidate Decode(const ListedFile& file, const DecodeLimits& limits) {
   Candidate candidate;
   candidate.problem = file.problem;
   if (!candidate.problem.empty()) return candidate;
   try {
     candidate.photo = DecodePhoto(file.path, limits);
-    candidate.pixel_hash = PixelHash(candidate.photo.image);
+    candidate.pixel_hash = PixelHash<uint8_t>(candidate.photo.image);
     candidate.rgb = CompositeOnWhite(candidate.photo.image);
   } catch (const Error& error) {
     if (error.code() != ExitCode::kInput) throw;
@@ -66,22 +70,37 @@ Image AlphaOf(const Image& rgba) {
   return alpha;
 }
 
-bool ShowsThrough(const Image& rgba) {
+bool HasTransparentPixels(const Image& rgba) {
   for (int64_t i = 0; i < rgba.num_pixels(); ++i)
     if (rgba.pixels[4 * i + 3] < 1) return true;
   return false;
 }
 
-// Writes the picture unless the file already holds these very pixels.
-void Stage(const std::string& path, const Image& image) {
+int StagedBits(const DecodedPhoto& photo) { return photo.bits > 8 ? 16 : 8; }
+
+// Bit depth of a PNG by its header; 0 if the file ends before.
+int PngDepth(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  file.seekg(24);
+  char depth = 0;
+  return file.get(depth) ? depth : 0;
+}
+
+// Writes the picture unless the file already holds these pixels at this depth.
+void Stage(const std::string& path, const Image& image, int bits) {
   if (fs::exists(path)) {
     try {
-      if (PixelHash(ReadImage(path)) == PixelHash(image)) return;
+      if (PngDepth(path) == bits &&
+          PixelHash<uint16_t>(ReadImage(path)) == PixelHash<uint16_t>(image))
+        return;
     } catch (const Error&) {
       // Damaged or something else: written anew.
     }
   }
-  WritePng8(path, image);
+  if (bits == 16)
+    WritePng16(path, image);
+  else
+    WritePng8(path, image);
 }
 
 void RemoveLeftovers(const std::string& folder, const std::set<std::string>& staged) {
@@ -95,7 +114,7 @@ void RemoveLeftovers(const std::string& folder, const std::set<std::string>& sta
   for (const fs::path& path : leftovers) fs::remove(path);
 }
 
-// Like things are told once: "12 photos: <what> (the first is a.jpg)".
+// Reports each kind once: "12 photos: <what> (the first is a.jpg)".
 class Notices {
  public:
   void Add(const std::string& what, const std::string& file) {
@@ -123,12 +142,12 @@ class Notices {
   std::vector<std::string> order_;
 };
 
-// "2 x not an image, 1 x empty file": what became of the files that are not used.
+// "2 x not an image, 1 x empty file": why files are not used.
 std::string CountReasons(const std::vector<PhotoStatus>& statuses) {
   constexpr size_t kShown = 5;
   std::map<std::string, int> counts;
-  for (const PhotoStatus& verdict : statuses)
-    if (verdict.status != "used") ++counts[verdict.why];
+  for (const PhotoStatus& photo : statuses)
+    if (photo.status != PhotoState::kUsed) ++counts[photo.why];
   std::vector<std::pair<int, std::string>> sorted;
   for (const auto& [why, count] : counts) sorted.emplace_back(-count, why);
   std::sort(sorted.begin(), sorted.end());
@@ -149,7 +168,7 @@ void RequireEnough(const IngestResult& result, const std::string& folder) {
     throw Error(ExitCode::kInput,
                 files == 0
                     ? "the folder is empty" +
-                          (result.hidden > 0 ? " (but for " + std::to_string(result.hidden) +
+                          (result.hidden > 0 ? " (except for " + std::to_string(result.hidden) +
                                                    " hidden entries)"
                                              : std::string())
                     : std::to_string(files) + (files == 1 ? " file" : " files") +
@@ -158,7 +177,7 @@ void RequireEnough(const IngestResult& result, const std::string& folder) {
   throw Error(ExitCode::kScene,
               std::to_string(usable) + (usable == 1 ? " photo" : " photos") + " of " +
                   std::to_string(files) +
-                  " files: a scene needs at least 3, better 20, taken from different places" +
+                  " files: a scene needs at least 3, better 20, from different viewpoints" +
                   reasons,
               folder);
 }
@@ -191,8 +210,8 @@ IngestResult IngestPhotos(const std::string& folder, const std::string& staging_
   std::unordered_map<uint64_t, std::string> file_of_pixels;
   std::set<std::string> staged_names;
   const auto& files = listing.files;
-  // The next file is decoded while this one is encoded. A future waits for its thread when it
-  // goes, also on errors.
+  // The next file is decoded while this one is encoded. A future's destructor waits for its
+  // thread, also on errors.
   const auto decode_later = [&](size_t i) {
     return i < files.size()
                ? std::async(std::launch::async, Decode, std::cref(files[i]), limits)
@@ -207,7 +226,7 @@ IngestResult IngestPhotos(const std::string& folder, const std::string& staging_
         LoopControl::kContinue)
       throw Interrupted();
     if (!candidate.problem.empty()) {
-      result.statuses.push_back({file, "skipped", candidate.problem});
+      result.statuses.push_back({file, PhotoState::kSkipped, candidate.problem});
       if (candidate.problem != "not an image")
         notices.Add("left out, " + candidate.problem, file);
       continue;
@@ -215,27 +234,28 @@ IngestResult IngestPhotos(const std::string& folder, const std::string& staging_
     const auto [twin, is_new] = file_of_pixels.try_emplace(candidate.pixel_hash, file);
     if (!is_new) {
       const std::string why = "the same picture as " + twin->second;
-      result.statuses.push_back({file, "skipped", why});
+      result.statuses.push_back({file, PhotoState::kSkipped, why});
       notices.Add("left out, " + why, file);
       continue;
     }
     const std::string name = StagedName(result.photos.size(), ".png");
     const std::string path = staging + "/" + name;
-    Stage(path, candidate.rgb);
+    const int bits = StagedBits(candidate.photo);
+    Stage(path, candidate.rgb, bits);
     staged_names.insert(name);
     std::string notice = candidate.photo.notice;
     if (candidate.photo.image.channels == 4) {
       const std::string alpha = StagedName(result.photos.size(), ".alpha.png");
-      Stage(staging + "/" + alpha, AlphaOf(candidate.photo.image));
+      Stage(staging + "/" + alpha, AlphaOf(candidate.photo.image), 8);
       staged_names.insert(alpha);
-      if (ShowsThrough(candidate.photo.image))
-        notice +=
-            std::string(notice.empty() ? "" : "; ") + "transparent parts are laid over white";
+      if (HasTransparentPixels(candidate.photo.image))
+        notice += std::string(notice.empty() ? "" : "; ") +
+                  "transparent parts are composited on white";
     }
     if (!notice.empty()) notices.Add(notice, file);
-    result.statuses.push_back({file, "used", notice});
+    result.statuses.push_back({file, PhotoState::kUsed, notice});
     result.photos.push_back({file, name, path, candidate.rgb.width, candidate.rgb.height,
-                             candidate.photo.exif_focal_px});
+                             candidate.photo.exif_focal_px, bits});
     fingerprint.Add(file + '\n' + HashText(candidate.pixel_hash) + '\n');
   }
   Report(progress, static_cast<double>(files.size()), static_cast<double>(files.size()));

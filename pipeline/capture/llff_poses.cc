@@ -19,7 +19,7 @@ constexpr double kRigidTolerance = 1e-2;
 
 [[noreturn]] void Refuse(const std::string& path, size_t row, const std::string& what) {
   throw Error(ExitCode::kInput, "pose " + std::to_string(row) + ": " + what, path,
-              "the file is damaged, or of another program");
+              "the file is damaged, or was written by another program");
 }
 
 Camera CameraOf(const std::string& path, size_t row, const double* v) {
@@ -27,7 +27,7 @@ Camera CameraOf(const std::string& path, size_t row, const double* v) {
   Camera camera;
   const double height = at(0, 4), width = at(1, 4), focal = at(2, 4);
   if (!(width >= 1 && width <= kMaxSide && height >= 1 && height <= kMaxSide && focal > 0))
-    Refuse(path, row, "no size or focal length of a picture");
+    Refuse(path, row, "its size or focal length is implausible");
   camera.width = static_cast<int>(std::lround(width));
   camera.height = static_cast<int>(std::lround(height));
   camera.fx = camera.fy = focal;
@@ -63,7 +63,7 @@ LlffPoses ReadPosesBounds(const std::string& path) {
   if (header.type != ArrayType::kF64 || header.shape.size() != 2 ||
       header.shape[1] != kColumns || header.shape[0] < 1 ||
       header.data_bytes != bytes.size() - header.data_offset)
-    throw Error(ExitCode::kInput, "is no table of 17 doubles a pose", path,
+    throw Error(ExitCode::kInput, "is not a table of 17 doubles per pose", path,
                 "poses_bounds.npy is written by LLFF's imgs2poses.py");
   std::vector<double> values(header.data_bytes / sizeof(double));
   std::memcpy(values.data(), bytes.data() + header.data_offset, header.data_bytes);

@@ -15,7 +15,7 @@
 namespace regrade {
 namespace {
 
-// JPEG's ringing around a plain colour; labels must be further apart than twice that.
+// JPEG's ringing around a plain colour; labels must differ by more than twice that.
 constexpr float kSameLabel = 24.0f / 255;
 
 Vec3f ColorOf(const Image& image, int64_t pixel) {
@@ -30,8 +30,8 @@ bool Same(const Vec3f& a, const Vec3f& b) {
          std::abs(a.z - b.z) <= kSameLabel;
 }
 
-// Plain colours but black, each on at least a thousandth of the picture: what lies between two
-// of them along an edge is less.
+// Plain colours except black, each on at least a thousandth of the picture: mixtures along
+// edges are fewer.
 std::vector<Vec3f> LabelsOf(const std::string& path) {
   const Image mask = ReadImage(path);
   std::vector<Vec3f> labels;
@@ -52,7 +52,7 @@ std::vector<Vec3f> LabelsOf(const std::string& path) {
   for (size_t k = 0; k < labels.size(); ++k)
     if (counts[k] * 1000 >= mask.num_pixels()) kept.push_back(labels[k]);
   if (kept.empty())
-    throw Error(ExitCode::kInput, "has no region: it is black all over", path,
+    throw Error(ExitCode::kInput, "has no region: it is entirely black", path,
                 "paint each region of the style in one plain colour");
   if (kept.size() > ObjectMasks::kMostRegions)
     throw Error(ExitCode::kInput,
@@ -93,7 +93,7 @@ std::vector<Image> ObjectMasks::Regions(const std::string& path, int width, int 
                           ? std::move(region)
                           : Resize(region, width, height));
   }
-  // Labels nearer to each other than their tolerance would count a pixel twice.
+  // Labels closer than their tolerance would count a pixel twice.
   for (int64_t i = 0; i < regions[0].num_pixels(); ++i) {
     float sum = 0;
     for (const Image& region : regions) sum += region.pixels[static_cast<size_t>(i)];
@@ -129,7 +129,7 @@ void ProbeMasks(MaskOptions* options) {
     std::error_code error;
     if (!fs::exists(*path, error))
       throw Error(ExitCode::kInput, "there is no such file or folder", *path,
-                  std::string("what ") + flag + " names must exist");
+                  std::string("correct ") + flag);
     *path = fs::absolute(*path, error).lexically_normal().string();
   }
 }

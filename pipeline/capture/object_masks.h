@@ -1,5 +1,5 @@
-// Masks of an object, one for each photo that has one, and what parts of the style picture
-// belong to it.
+// --masks: masks of an object in the photos, and the regions of the style picture that belong
+// to them.
 #pragma once
 
 #include <string>
@@ -22,21 +22,21 @@ struct MaskOptions {
   template <typename Bind>
   void Describe(Bind& bind) {
     bind("masks", masks,
-         {.help = "folder of pictures by the photos' names, white where the object is that "
-                  "shall be restyled and black elsewhere; grey is a soft edge. They may be "
-                  "rough, disagree, or be missing for some photos. Empty restyles the whole "
-                  "scene"});
+         {.help = "folder of masks by the photos' names: white for the object to restyle, "
+                  "black elsewhere, grey for soft edges. They may be rough, disagree, or be "
+                  "missing for some photos. Empty restyles the whole scene"});
     bind("style-mask", style_mask,
-         {.help = "labels of the style picture, one plain colour for each region; the masks "
-                  "then have the same colours, each region takes the style of its own, and "
-                  "black stays as it is"});
+         {.help = "labels of the style picture, one plain colour per region; masks then use "
+                  "the same colours, each region gets the style of its label, and black stays "
+                  "unchanged"});
     bind("mask-vote", vote,
-         {.help = "share of the photos' votes at which a voxel is half of the object; lower "
-                  "reaches further, and believes single masks",
+         {.help = "fraction of the photos' votes at which a voxel has object weight 0.5; "
+                  "lower values extend the object and rely on fewer masks",
           .min = 0.01,
           .max = 0.99});
     bind("mask-edge", edge,
-         {.help = "half the width of the soft edge, in votes; 0 cuts hard",
+         {.unit = "fraction of votes",
+          .help = "half the width of the object's soft edge; 0 makes a hard edge",
           .min = 0,
           .max = 0.5});
   }
@@ -44,7 +44,7 @@ struct MaskOptions {
 
 class ObjectMasks {
  public:
-  // `photos` are the views' files as the user named them. Throws Error(kInput) for a missing
+  // `photos`: the user's names of the views' files. Throws Error(kInput) for a missing
   // folder, one without a picture of a photo's name, a style mask without colours or with more
   // than kMostRegions.
   ObjectMasks(const MaskOptions& options, const std::vector<std::string>& photos);
@@ -65,14 +65,14 @@ class ObjectMasks {
   std::vector<Image> Regions(const std::string& path, int width, int height) const;
 
   std::string style_mask_;
-  std::vector<std::string> paths_;  // one for each photo; empty where there is none
+  std::vector<std::string> paths_;  // one for each photo; empty without a mask
   std::vector<Vec3f> labels_;       // of the style mask, in order of appearance
 };
 
-// Hashes of all that the options name, as part of a stage's inputs.
+// Hashes of the files that the options name, as part of a stage's inputs.
 JsonValue MaskFiles(const MaskOptions& options);
 
-// Makes the paths absolute; Error(kInput) for one that does not exist.
+// Makes the paths absolute. Throws Error(kInput) for one that does not exist.
 void ProbeMasks(MaskOptions* options);
 
 }  // namespace regrade

@@ -46,7 +46,7 @@ Camera UnpackCamera(const double* v, const std::string& where) {
   for (int i = 0; i < 3; ++i) camera.camera_from_world.translation[i] = v[24 + i];
   const RigidTransform& pose = camera.camera_from_world;
   if (!ImplausibleCamera(camera).empty() || !IsSound({1, pose.rotation, pose.translation}))
-    throw Error(ExitCode::kInput, "a camera that none can be", where, "pack the capture again");
+    throw Error(ExitCode::kInput, "a camera is implausible", where, "pack the capture again");
   return camera;
 }
 
@@ -76,7 +76,7 @@ Image UnpackPixels(const uint8_t* from, int width, int height) {
   return photo;
 }
 
-// Throws for a placement that a fit would stumble over.
+// Throws for a frame or box that a fit cannot use.
 void CheckScene(const NormalizedScene& scene, const std::string& path) {
   const SceneBox& box = scene.box;
   bool sound = IsSound(scene.field_from_world) && std::isfinite(box.near_clip) &&
@@ -87,7 +87,7 @@ void CheckScene(const NormalizedScene& scene, const std::string& path) {
   for (const double side : {scene.ndc.a, scene.ndc.b})
     sound = sound && side >= 0 && side < 1e3 && (side > 0) == (scene.ndc.a > 0);
   if (!sound)
-    throw Error(ExitCode::kInput, "its box or its place is none that a capture can have", path,
+    throw Error(ExitCode::kInput, "its box or frame is not that of a capture", path,
                 "pack the capture again");
 }
 

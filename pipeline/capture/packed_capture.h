@@ -1,9 +1,9 @@
-// A capture in one file, for a machine that has a GPU and nothing else: decoded photos at
-// working size, cameras in the field's frame, the box, and which views are kept for measuring.
+// A capture in one file for bare GPU machines: decoded photos at working size, cameras in the
+// field's frame, the box, and which views are held out.
 //
-// The file is a deflated .npz. Pixels are 8 bits a channel, each row stored as differences
-// (modulo 256) to the pixel on the left, which deflates to two thirds; photos that were scaled
-// down lose what lies below a level.
+// The file is a deflated .npz. Pixels have 8 bits a channel, each row stored as differences
+// (modulo 256) to the pixel on the left, which deflates to two thirds. Photos that were scaled
+// down or have more than 8 bits are rounded.
 #pragma once
 
 #include <string>
@@ -16,7 +16,7 @@
 namespace regrade {
 
 struct PackedView {
-  std::string file;  // as the user named it
+  std::string file;  // the user's name
   bool held_out = false;
   Camera camera;  // in the field's frame, at the photo's size
   Image photo;    // [H, W, 3] sRGB
@@ -25,12 +25,12 @@ struct PackedView {
 struct PackedCapture {
   NormalizedScene scene;
   std::vector<PackedView> views;
-  Image style;  // [H, W, 3] sRGB, or empty: the picture whose colours the scene shall have
+  Image style;  // [H, W, 3] sRGB, or empty: the style picture
 };
 
 // Throws Error(kResources).
 void WritePackedCapture(const std::string& path, const PackedCapture& capture);
-// Throws Error(kInput) naming file and array for anything that is not whole and sound.
+// Throws Error(kInput) naming file and array for a damaged file.
 PackedCapture ReadPackedCapture(const std::string& path);
 
 }  // namespace regrade

@@ -1,6 +1,8 @@
 #include "pipeline/capture/photo_gains.h"
 
 #include <algorithm>
+#include <filesystem>
+#include <utility>
 
 #include "kernels/base/error.h"
 #include "kernels/scene/srgb.h"
@@ -8,6 +10,7 @@
 namespace regrade {
 namespace {
 
+constexpr int64_t kSchema = 1;
 constexpr double kNearlyClipped = 0.98;  // encoded
 
 JsonValue Triple(const Vec3d& v) { return JsonValue::Array{v.x, v.y, v.z}; }
@@ -24,11 +27,11 @@ PhotoGains GainsOf(const ExposureEstimate& estimate, const std::vector<Vec3d>& c
       (is_dark ? of_dark : of_bright) += clipped[v][c];
       ++(is_dark ? dark : bright);
     }
-  // Of means, for there may be more photos of one kind.
-  const double share =
+  // Of means: there may be more photos of one kind.
+  const double highlights =
       dark > 0 && of_bright > 0 ? std::min(1.0, of_dark / dark / (of_bright / bright)) : 0;
   for (const PhotoExposure& photo : estimate.photos)
-    gains.of_view.push_back(photo.known ? PhotoGain{photo.gain, share} : kAsTaken);
+    gains.of_view.push_back(photo.known ? PhotoGain{photo.gain, highlights} : kAsTaken);
   return gains;
 }
 
@@ -38,7 +41,7 @@ void UndoGain(const PhotoGain& gain, Image* photo) {
     float& value = photo->pixels[i];
     const double factor = gain.light[static_cast<int>(i % 3)];
     const double undone = SrgbFromLinear(std::min(1.0, LinearFromSrgb(value) / factor));
-    // A photo made smaller has values between at the rim of what was clipped.
+    // A reduced photo has values in between at the edge of what was clipped.
     const double t = std::clamp((value - kNearlyClipped) / (1 - kNearlyClipped), 0.0, 1.0);
     const double up = factor > 1 ? gain.highlights * t * t * (3 - 2 * t) : 0;
     value = static_cast<float>(undone + up * (1 - undone));
@@ -55,8 +58,13 @@ void PutGain(const PhotoGain& gain, Image* picture) {
   }
 }
 
-JsonValue GainsRecord(const Capture& capture, const ExposureEstimate& estimate,
-                      const PhotoGains& gains) {
+void WriteGains(const std::string& poses, const Capture& capture,
+                const ExposureEstimate& estimate, const PhotoGains& gains) {
+  const std::string path = poses + "/" + kExposureFile;
+  if (gains.of_view.empty()) {
+    std::filesystem::remove(path);
+    return;
+  }
   JsonValue::Array rows;
   for (size_t v = 0; v < capture.views.size(); ++v) {
     const PhotoExposure& photo = estimate.photos[v];
@@ -66,17 +74,22 @@ JsonValue GainsRecord(const Capture& capture, const ExposureEstimate& estimate,
                                      {"log_error", Triple(photo.log_error)},
                                      {"observations", photo.observations}});
   }
-  return rows;
+  WriteJsonFile(path, JsonValue::Object{{"schema", kSchema}, {"photos", std::move(rows)}});
 }
 
-JsonValue RecordedGainRows(const Workspace& workspace) {
-  const auto record = workspace.Find("reconstruct");
-  const JsonValue* const rows = record ? record->metrics.Find("exposure") : nullptr;
-  return rows ? *rows : JsonValue();
+JsonValue StoredGainRows(const std::string& poses) {
+  const std::string path = poses + "/" + kExposureFile;
+  if (!std::filesystem::exists(path)) return JsonValue();
+  const JsonValue file = ReadJsonFile(path);
+  const JsonValue* const schema = file.IsObject() ? file.Find("schema") : nullptr;
+  if (schema == nullptr || !(*schema == JsonValue(kSchema)))
+    throw Error(ExitCode::kInput, "is not of schema " + std::to_string(kSchema), path,
+                "use --restart-from reconstruct");
+  return file.At("photos");
 }
 
-PhotoGains RecordedGains(const Workspace& workspace, const Capture& capture) {
-  const JsonValue rows = RecordedGainRows(workspace);
+PhotoGains ReadGains(const std::string& poses, const Capture& capture) {
+  const JsonValue rows = StoredGainRows(poses);
   PhotoGains gains;
   if (rows.IsNull()) return gains;
   bool fits = rows.AsArray().size() == capture.views.size();
@@ -91,8 +104,8 @@ PhotoGains RecordedGains(const Workspace& workspace, const Capture& capture) {
                                row.At("highlights").AsDouble()});
   }
   if (!fits)
-    throw Error(ExitCode::kInput, "the recorded exposures are not those of its photos",
-                workspace.folder(), "use --restart-from reconstruct");
+    throw Error(ExitCode::kInput, "the stored exposures are not those of its photos",
+                poses + "/" + kExposureFile, "use --restart-from reconstruct");
   return gains;
 }
 

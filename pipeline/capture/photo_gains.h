@@ -1,11 +1,12 @@
-// The gains that photos are rid of before anything looks at them, and where stages read them.
+// Gains of photos by exposure and white balance: undone where photos are read, and stored
+// beside the poses.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "kernels/scene/capture.h"
 #include "pipeline/files/json_file.h"
-#include "pipeline/workspace/workspace.h"
 #include "reconstruct/refinement/exposure.h"
 
 namespace regrade {
@@ -13,14 +14,14 @@ namespace regrade {
 // What a camera's exposure and white balance made of one photo.
 struct PhotoGain {
   Vec3d light{1, 1, 1};  // its linear light is this times that of the capture's mean photo
-  // What is clipped was this bright at least. How much of the way from there to white it is
-  // shown, in [0, 1]: the share of what bright photos clip that is clipped in dark ones, too.
+  // Clipped values were at least this bright. They are moved this fraction of the way from
+  // there to white: the part of what bright photos clip that dark photos clip, too.
   double highlights = 0;
 
   bool operator==(const PhotoGain&) const = default;
 };
 
-// A photo is left as it was taken, bit for bit.
+// Leaves a photo unchanged, bit for bit.
 inline const PhotoGain kAsTaken{};
 
 // One for each view of the capture, or none at all where exposure is off.
@@ -32,23 +33,23 @@ struct PhotoGains {
   }
 };
 
-// `clipped`: for each view the share of its pixels that are clipped, by channel.
+// `clipped`: for each view the fraction of its pixels that are clipped, by channel.
 PhotoGains GainsOf(const ExposureEstimate& estimate, const std::vector<Vec3d>& clipped);
 
-// The photo as the capture's mean exposure would show it: linear values over gain, clipped to
-// [0, 1].
+// Converts the photo to the capture's mean exposure: linear values over gain, clipped to [0,
+// 1].
 void UndoGain(const PhotoGain& gain, Image* photo);
-// The other way: what a camera of that gain would make of a render.
+// The inverse: the render as a camera of that gain would show it.
 void PutGain(const PhotoGain& gain, Image* picture);
 
-// For the record of stage "reconstruct", one row a photo.
-JsonValue GainsRecord(const Capture& capture, const ExposureEstimate& estimate,
-                      const PhotoGains& gains);
-// The record's rows as they stand, an input of stages that read photos; null where exposure is
-// off.
-JsonValue RecordedGainRows(const Workspace& workspace);
-// The gains that the field was fitted with. Throws Error(kInput) where they are not this
-// capture's.
-PhotoGains RecordedGains(const Workspace& workspace, const Capture& capture);
+// exposure.json in the folder poses/: one row a photo, with the evidence. Removes the file
+// where there are no gains.
+inline constexpr char kExposureFile[] = "exposure.json";
+void WriteGains(const std::string& poses, const Capture& capture,
+                const ExposureEstimate& estimate, const PhotoGains& gains);
+// The file's rows, an input of stages that read photos; null where there is no file.
+JsonValue StoredGainRows(const std::string& poses);
+// The gains that the field was fitted with. Throws Error(kInput) for those of another capture.
+PhotoGains ReadGains(const std::string& poses, const Capture& capture);
 
 }  // namespace regrade

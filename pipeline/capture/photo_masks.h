@@ -1,4 +1,5 @@
-// Masks of what moved while the photos were taken: their parts are neither matched nor fitted.
+// --photo-masks: masks of what moved between photos; masked parts are neither matched nor
+// fitted.
 #pragma once
 
 #include <string>
@@ -9,15 +10,15 @@
 
 namespace regrade {
 
-// Writes `folder`/00007.png.png for each photo that `masks` has a picture for, by name less
-// extension (or with it: IMG_7.jpg.png), of the photo's size, as COLMAP wants them: black where
-// no feature is looked for, white elsewhere; what is nearer to black is black. Returns their
-// number. Throws Error(kInput) for a missing folder, one without a mask of a photo, a mask of
-// another shape than its photo, and one that is black all over.
+// Writes `folder`/00007.png.png, of the photo's size, for each photo that has a picture in
+// `masks`, by its name without or with extension (IMG_7.png, IMG_7.jpg.png). As COLMAP needs
+// them: black where no feature is extracted, white elsewhere, split at mid-grey. Returns their
+// number. Throws Error(kInput) for a missing folder, one without a mask of any photo, a mask of
+// another aspect than its photo, and one that is entirely black.
 int StagePhotoMasks(const std::string& masks, const std::vector<StagedPhoto>& photos,
                     const std::string& folder);
 
-// Where the mask of a staged photo lies, if it has one: poses/masks/00007.png.png for
+// Path of the mask of a staged photo, if it has one: poses/masks/00007.png.png for
 // poses/photos/00007.png.
 std::string StagedMaskOf(const std::string& photo_path);
 

@@ -17,7 +17,7 @@ std::string StemOf(const std::string& name) {
   return std::filesystem::path(name).stem().string();
 }
 
-bool NamesAPicture(const std::string& path) {
+bool HasPictureName(const std::string& path) {
   std::string extension = std::filesystem::path(path).extension().string();
   for (char& c : extension)
     if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
@@ -26,10 +26,9 @@ bool NamesAPicture(const std::string& path) {
   return false;
 }
 
-// By content; a name that says picture is taken at its word, so that a damaged one is not
-// passed over in silence.
-bool MeansAPicture(const std::string& path) {
-  if (NamesAPicture(path)) return true;
+// By content or name, so that a damaged picture is reported rather than ignored.
+bool IsMeantAsPicture(const std::string& path) {
+  if (HasPictureName(path)) return true;
   std::string begin(4096, '\0');
   std::ifstream file(path, std::ios::binary);
   file.read(begin.data(), static_cast<std::streamsize>(begin.size()));
@@ -45,7 +44,7 @@ std::string SizeOf(const Image& image) {
 
 void CheckAspect(const Image& picture, int width, int height, const std::string& where,
                  ExitCode code) {
-  // Each side scaled by the other's ratio must come out to a pixel of the smaller picture.
+  // The ratios of the sides may differ by one pixel of the smaller picture.
   const double ratio_x = static_cast<double>(picture.width) / width;
   const double ratio_y = static_cast<double>(picture.height) / height;
   const double larger = std::max(ratio_x, ratio_y);
@@ -54,7 +53,7 @@ void CheckAspect(const Image& picture, int width, int height, const std::string&
     throw Error(code,
                 "has " + SizeOf(picture) + " pixels, its view " + std::to_string(width) +
                     " x " + std::to_string(height),
-                where, "keep the photo's aspect: no cropping, no turning");
+                where, "keep the photo's aspect: do not crop or rotate");
 }
 
 std::vector<std::string> PicturesByPhotoName(const std::string& folder,
@@ -64,17 +63,17 @@ std::vector<std::string> PicturesByPhotoName(const std::string& folder,
   for (size_t i = 0; i < photos.size(); ++i)
     if (!view_of.emplace(StemOf(photos[i]), i).second)
       throw Error(ExitCode::kInput, "two photos have the name \"" + StemOf(photos[i]) + "\"",
-                  photos[i], what + "s are found by name: give photos names of their own");
+                  photos[i], what + "s are found by name: give the photos different names");
   std::vector<std::string> paths(photos.size());
   bool any = false;
   for (const ListedFile& file : ListFolder(folder).files) {
     auto match = view_of.find(StemOf(file.name));
     // IMG_7.jpg.png, as COLMAP names masks.
-    if (match == view_of.end() && NamesAPicture(StemOf(file.name)))
+    if (match == view_of.end() && HasPictureName(StemOf(file.name)))
       match = view_of.find(StemOf(StemOf(file.name)));
     if (match == view_of.end()) continue;
     if (!file.problem.empty()) throw Error(ExitCode::kInput, file.problem, file.path);
-    if (!MeansAPicture(file.path)) continue;
+    if (!IsMeantAsPicture(file.path)) continue;
     std::string& path = paths[match->second];
     if (!path.empty())
       throw Error(ExitCode::kInput, "two " + what + "s for the photo " + photos[match->second],
@@ -83,7 +82,7 @@ std::vector<std::string> PicturesByPhotoName(const std::string& folder,
     any = true;
   }
   if (!any)
-    throw Error(ExitCode::kInput, "no picture in it has the name of a photo", folder,
+    throw Error(ExitCode::kInput, "has no picture with the name of a photo", folder,
                 photos.empty() ? "" : "expected are names like " + StemOf(photos[0]) + ".png");
   return paths;
 }

@@ -1,4 +1,4 @@
-// Pictures that belong to photos by their names: masks, and styled pictures from elsewhere.
+// Pictures that belong to photos by their names: masks, and styled pictures of other programs.
 #pragma once
 
 #include <string>

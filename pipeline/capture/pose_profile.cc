@@ -20,20 +20,19 @@ __attribute__((format(printf, 1, 2))) std::string Text(const char* format, ...) 
 }
 
 std::string Evidence(const PoseRefinement& refinement) {
-  std::string text =
-      "median distance of observations from their points, wherever these are put, in pixels";
+  std::string text = "median reprojection error after optimal triangulation, in pixels";
   if (!refinement.tried) return text;
   if (refinement.held_out_after_px > 0)
     text += Text(
-        "; poses adjusted: %.2f, and %.2f instead of %.2f for %lld observations without "
-        "a say",
+        "; after bundle adjustment: %.2f, and %.2f instead of %.2f for %lld held-out "
+        "observations",
         refinement.refined_px, refinement.held_out_after_px, refinement.held_out_before_px,
         static_cast<long long>(refinement.held_out));
   if (!refinement.Accepted()) return text + "; refused: " + refinement.refused;
-  text += Text("; they turned by %.2g deg and moved by %.2g %% of the cameras' spread",
+  text += Text("; cameras turned by %.2g deg and moved by %.2g %% of their extent",
                refinement.turned_deg, 100 * refinement.moved_fraction);
   if (refinement.turn_error_deg)
-    text += Text(", known to %.2g deg and %.2g %%", *refinement.turn_error_deg,
+    text += Text(", standard errors %.2g deg and %.2g %%", *refinement.turn_error_deg,
                  100 * *refinement.moved_error);
   return text;
 }
@@ -63,24 +62,23 @@ PoseProfile ProfilePoses(CaptureKind kind, const PoseOptions& options,
                          const std::string& effects, const std::string& sparse_folder,
                          const std::vector<StagedPhoto>& photos, double misfit_scale,
                          Capture* capture, const ProgressFunction& progress) {
-  const auto wishes = ParseEffects(effects);
-  const auto wish = wishes.find(kPoseRefinement);
-  const bool asked_for = wish != wishes.end() && wish->second;
+  const auto overrides = ParseEffects(effects);
+  const auto override = overrides.find(kPoseRefinement);
+  const bool requested = override != overrides.end() && override->second;
   const double threshold = kPoseMisfit * misfit_scale;
-  const auto leave_out = [asked_for, threshold](const char* why) -> PoseProfile {
-    if (asked_for)
+  const auto leave_out = [requested, threshold](const char* why) -> PoseProfile {
+    if (requested)
       throw Error(ExitCode::kScene, why, std::string("--effects ") + kPoseRefinement + "=on");
     return {{kPoseRefinement, false, why, Metric(), threshold}, JsonValue()};
   };
-  if (wish != wishes.end() && !asked_for) return leave_out("it was not wanted");
-  if (capture->points.empty())
-    return leave_out("the poses came without tracks to hold them to");
-  if (kind == CaptureKind::kPhotos && !asked_for)
-    return leave_out("COLMAP has just adjusted them to their tracks");
+  if (override != overrides.end() && !requested) return leave_out("off by --effects");
+  if (capture->points.empty()) return leave_out("the poses are without tracks");
+  if (kind == CaptureKind::kPhotos && !requested)
+    return leave_out("COLMAP has just adjusted them");
 
   const PoseRefinement refinement = RefinePoses(
       ReadColmapModel(sparse_folder),
-      {.asked_for = asked_for, .misfit_px = threshold, .free_focal = options.free_focal},
+      {.asked_for = requested, .misfit_px = threshold, .free_focal = options.free_focal},
       progress);
   if (refinement.Accepted()) {
     WriteColmapModel(refinement.model, sparse_folder);

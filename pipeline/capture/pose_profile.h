@@ -1,4 +1,4 @@
-// Whether the poses of a capture are refined by its tracks, with the evidence.
+// Decides whether the poses of a capture are refined by its tracks, and does it.
 #pragma once
 
 #include <string>
@@ -14,14 +14,14 @@ namespace regrade {
 
 struct PoseProfile {
   EffectReport effect;  // "pose-refinement"
-  JsonValue metrics;    // of the trial; null where there was none
+  JsonValue metrics;    // of the trial; null without one
 };
 
-// Poses that came with tracks are refined where reprojection says so (refine_poses.h); those
-// that COLMAP has just found and adjusted only if asked for. Where it pays, the model in
-// `sparse_folder` and `capture` are rewritten; otherwise nothing is touched. `misfit_scale`:
-// pixels of the photos that are one of those that features were found in. Throws
-// Error(kScene) where refinement was asked for and there is nothing to refine by, Interrupted.
+// Given poses with tracks are refined if reprojection errors ask for it (refine_poses.h); poses
+// that COLMAP has just adjusted only if requested. If held-out observations improve, the model
+// in `sparse_folder` and `capture` are rewritten; otherwise both stay unchanged.
+// `misfit_scale`: see PoseTracks. Throws Error(kScene) if refinement was requested and there
+// are no tracks, Interrupted.
 PoseProfile ProfilePoses(CaptureKind kind, const PoseOptions& options,
                          const std::string& effects, const std::string& sparse_folder,
                          const std::vector<StagedPhoto>& photos, double misfit_scale,

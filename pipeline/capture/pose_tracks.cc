@@ -12,24 +12,25 @@
 namespace regrade {
 namespace {
 
-constexpr char kUnjudged[] =
-    " Exposure and the poses stay unjudged, and the box is a guess from the cameras";
+constexpr char kWithoutPoints[] =
+    " Without points, exposure and pose errors are not measured, and the box is estimated from "
+    "the cameras";
 
 std::string Summary(const FoundTracks& found, double seconds, double cpu_seconds) {
   char text[256];
-  std::snprintf(text, sizeof text,
-                "the poses came without points: COLMAP %s found %zu, seen %lld times, %.2f px "
-                "from where the poses expect them in the median, in %.0f s (%.0f s of CPU); "
-                "--tracks given goes without",
-                found.colmap_version.c_str(), found.model.points.size(),
-                static_cast<long long>(found.observations), found.median_px, seconds,
-                cpu_seconds);
+  std::snprintf(
+      text, sizeof text,
+      "the poses are without points: COLMAP %s triangulated %zu with %lld observations, "
+      "median reprojection error %.2f px, in %.0f s (%.0f s of CPU); --tracks given "
+      "skips this",
+      found.colmap_version.c_str(), found.model.points.size(),
+      static_cast<long long>(found.observations), found.median_px, seconds, cpu_seconds);
   return text;
 }
 
-// Wrong poses find points, too: a match between two photos may fit them by chance, a third
-// photo's observation besides hardly ever does.
-bool Believable(const FoundTracks& found) {
+// Wrong poses give points, too: a match between two photos may fit by chance, but a third
+// observation hardly ever does.
+bool Plausible(const FoundTracks& found) {
   const double points = static_cast<double>(found.model.points.size());
   return found.model.points.size() >= kFewestTracks &&
          static_cast<double>(found.observations) >= kFewestObservationsOfAPoint * points;
@@ -37,15 +38,15 @@ bool Believable(const FoundTracks& found) {
 
 std::string DoubtText(const FoundTracks& found) {
   char text[256];
-  std::snprintf(text, sizeof text,
-                "under the poses that were given COLMAP found %zu points, seen %.1f times on "
-                "average: little texture, or do the poses not belong to these photos?",
-                found.model.points.size(),
-                found.model.points.empty()
-                    ? 0.0
-                    : static_cast<double>(found.observations) /
-                          static_cast<double>(found.model.points.size()));
-  return text + std::string(kUnjudged);
+  std::snprintf(
+      text, sizeof text,
+      "with the given poses COLMAP triangulated %zu points, %.1f observations of each "
+      "on average: too little texture, or poses of other photos.",
+      found.model.points.size(),
+      found.model.points.empty() ? 0.0
+                                 : static_cast<double>(found.observations) /
+                                       static_cast<double>(found.model.points.size()));
+  return text + std::string(kWithoutPoints);
 }
 
 }  // namespace
@@ -53,9 +54,9 @@ std::string DoubtText(const FoundTracks& found) {
 bool WantsTracks(const PoseOptions& options, const std::string& effects,
                  const Capture& capture) {
   if (options.tracks != "auto" || !capture.points.empty()) return false;
-  const auto wishes = ParseEffects(effects);
-  const auto alpha = wishes.find("alpha");
-  return alpha == wishes.end() ? !ShowsThroughPhotos(capture) : !alpha->second;
+  const auto overrides = ParseEffects(effects);
+  const auto alpha = overrides.find("alpha");
+  return alpha == overrides.end() ? !ShowsThroughPhotos(capture) : !alpha->second;
 }
 
 PoseTracks AddTracks(const PoseOptions& options, const std::string& effects,
@@ -74,7 +75,7 @@ PoseTracks AddTracks(const PoseOptions& options, const std::string& effects,
   } catch (const Error& error) {
     if (error.code() != ExitCode::kExternalProgram) throw;
     result.note =
-        "no tracks were found for the poses, for " + error.what_failed() + "." + kUnjudged;
+        "COLMAP found no tracks for the poses: " + error.what_failed() + "." + kWithoutPoints;
     result.metrics = JsonValue::Object{{"points", 0}, {"failed", error.what_failed()}};
     return result;
   }
@@ -88,7 +89,7 @@ PoseTracks AddTracks(const PoseOptions& options, const std::string& effects,
                         {"colmap", found.colmap_version},
                         {"seconds", seconds},
                         {"cpu_seconds", cpu_seconds}};
-  if (!Believable(found)) {
+  if (!Plausible(found)) {
     result.note = DoubtText(found);
     return result;
   }

@@ -1,5 +1,4 @@
-// Tracks for a capture whose poses came without: whether they are looked for, and what that
-// took.
+// Triangulates tracks with COLMAP for a capture whose poses came without points.
 #pragma once
 
 #include <string>
@@ -12,27 +11,26 @@
 
 namespace regrade {
 
-// Fewer points than this say more against the poses than about the scene.
+// Fewer points than this mean wrong poses rather than a plain scene.
 inline constexpr size_t kFewestTracks = 50;
 // Likewise, on average: right poses have 4 to 10, those of other photos 2.3.
 inline constexpr double kFewestObservationsOfAPoint = 2.7;
 
-// Would they be looked for? Not where poses came with points, not for transparent photos, whose
-// outlines say more (`effects`: --effects, which may say of alpha), and not against --tracks
-// given. Reads outlines, where every photo has one.
+// False if poses came with points, for transparent photos, whose silhouettes give a better box
+// (`effects`: --effects, which may override alpha), and with --tracks given. Reads silhouettes
+// if every photo has one.
 bool WantsTracks(const PoseOptions& options, const std::string& effects,
                  const Capture& capture);
 
 struct PoseTracks {
-  JsonValue metrics;        // null where none were looked for
-  std::string note;         // a sentence for a person; empty likewise
-  double misfit_scale = 1;  // pixels of the photos that are one of those features were found in
+  JsonValue metrics;        // null if not tried
+  std::string note;         // a sentence for the user; empty likewise
+  double misfit_scale = 1;  // photo pixels per pixel of the pictures that features came from
 };
 
-// Finds them (tracks_for_poses.h) and writes the model in `sparse_folder`, which holds the
-// poses, and `capture` anew; where that fails, or finds points that are not to be believed,
-// both stay as they are, and the note says why. Throws Interrupted, and Error(kResources) when
-// the disk is full.
+// Finds tracks (tracks_for_poses.h) and rewrites `capture` and the model in `sparse_folder`,
+// which holds the poses. If that fails, or the points are implausible, both stay unchanged, and
+// the note says why. Throws Interrupted, and Error(kResources) when the disk is full.
 PoseTracks AddTracks(const PoseOptions& options, const std::string& effects,
                      const std::string& sparse_folder, const std::vector<StagedPhoto>& photos,
                      const std::string& work_folder, Capture* capture,

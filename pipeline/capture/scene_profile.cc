@@ -16,7 +16,7 @@ namespace regrade {
 namespace {
 
 constexpr int kSilhouetteSide = 512;
-constexpr double kAlphaShare = 0.02;  // of the pixels; less is a photo with a soft edge
+constexpr double kAlphaFraction = 0.02;  // of the pixels; less is a photo with a soft edge
 constexpr const char* kNames[] = {"ndc",      "alpha",         "background",
                                   "exposure", kViewDependence, kPoseRefinement};
 
@@ -37,8 +37,8 @@ std::string AlphaPath(const CaptureView& view) {
   return dot == std::string::npos ? "" : view.path.substr(0, dot) + ".alpha.png";
 }
 
-// An outline of at most kSilhouetteSide pixels, each the most opaque of those it stands for:
-// hundreds of large photos need not be in memory at once.
+// A silhouette of at most kSilhouetteSide pixels a side, each the most opaque of those it
+// replaces, so that hundreds of large photos need not be in memory at once.
 Silhouette Reduced(const Silhouette& full) {
   const int side = std::max(full.alpha.width, full.alpha.height);
   const int factor = (side + kSilhouetteSide - 1) / kSilhouetteSide;
@@ -63,7 +63,7 @@ std::vector<Silhouette> ReadSilhouettes(const Capture& capture) {
   return silhouettes;
 }
 
-double TransparentShare(const std::vector<Silhouette>& silhouettes) {
+double TransparentFraction(const std::vector<Silhouette>& silhouettes) {
   int64_t clear = 0, all = 0;
   for (const Silhouette& silhouette : silhouettes) {
     all += silhouette.alpha.num_pixels();
@@ -73,46 +73,46 @@ double TransparentShare(const std::vector<Silhouette>& silhouettes) {
   return all > 0 ? static_cast<double>(clear) / static_cast<double>(all) : 0;
 }
 
-// The photos that keep their exposure for want of evidence.
+// Names the photos whose exposure is left unchanged: too few observations.
 void NameUnknownPhotos(const Capture& capture, SceneProfile* profile) {
   std::string names;
   for (size_t v = 0; v < capture.views.size(); ++v)
     if (!profile->exposure.photos[v].known)
       names += (names.empty() ? "" : ", ") + capture.views[v].file;
   if (!names.empty())
-    profile->notices.push_back("exposure: taken as they are, having fewer than " +
+    profile->notices.push_back("exposure: left unchanged, for fewer than " +
                                std::to_string(kFewestColors) +
                                " colours in common with other photos: " + names);
 }
 
 std::string GainsEvidence(const ExposureEstimate& exposure) {
   char spread[96];
-  std::snprintf(spread, sizeof spread, "; gains spread by %.3g, known to %.2g; ",
+  std::snprintf(spread, sizeof spread, "; spread of the gains %.3g, standard error %.2g; ",
                 exposure.spread, exposure.median_error);
-  return "share of the photos' disagreement about points' colours that gains found without "
-         "those points take away" +
+  return "fraction of the photos' colour differences at held-out points that the gains "
+         "explain" +
          std::string(spread) + "a spread up to " + Short(Metric{kExposureSpread}) +
-         " is left alone";
+         " is not corrected";
 }
 
-// The row "exposure", and where it is on the gains.
-void ProfileExposure(const Capture& capture, const std::map<std::string, bool>& wishes,
+// The row "exposure", and the gains if it is on.
+void ProfileExposure(const Capture& capture, const std::map<std::string, bool>& overrides,
                      bool alpha, SceneProfile* profile) {
-  const auto wish = wishes.find("exposure");
-  const bool asked_for = wish != wishes.end() && wish->second;
+  const auto override = overrides.find("exposure");
+  const bool requested = override != overrides.end() && override->second;
   const auto leave_out = [&](const char* why) {
-    if (asked_for) throw Error(ExitCode::kScene, why, "--effects exposure=on");
+    if (requested) throw Error(ExitCode::kScene, why, "--effects exposure=on");
     profile->effects.push_back({"exposure", false, why, Metric(), kExposureSpread});
   };
-  if (wish != wishes.end() && !wish->second) return leave_out("it was not wanted");
-  if (alpha) return leave_out("the white behind transparent photos has no exposure");
+  if (override != overrides.end() && !requested) return leave_out("off by --effects");
+  if (alpha) return leave_out("the white background of transparent photos has no exposure");
   if (capture.points.empty())
-    return leave_out("the poses came without points to compare colours at");
+    return leave_out("the poses are without points to compare colours at");
   const TrackColors colors = ReadTrackColors(capture);
   profile->exposure =
       EstimateExposure(static_cast<int>(capture.views.size()), colors.observations);
   const ExposureEstimate& exposure = profile->exposure;
-  const bool on = asked_for || exposure.Pays();
+  const bool on = requested || exposure.Pays();
   profile->effects.push_back(
       Row("exposure", on, exposure.explained, exposure.Threshold(), GainsEvidence(exposure)));
   if (!on) return;
@@ -123,11 +123,11 @@ void ProfileExposure(const Capture& capture, const std::map<std::string, bool>& 
 }  // namespace
 
 bool ShowsThroughPhotos(const Capture& capture) {
-  return TransparentShare(ReadSilhouettes(capture)) > kAlphaShare;
+  return TransparentFraction(ReadSilhouettes(capture)) > kAlphaFraction;
 }
 
 std::map<std::string, bool> ParseEffects(const std::string& text) {
-  std::map<std::string, bool> wishes;
+  std::map<std::string, bool> overrides;
   for (size_t begin = 0; begin <= text.size();) {
     const size_t end = std::min(text.find(',', begin), text.size());
     const std::string word = text.substr(begin, end - begin);
@@ -135,23 +135,23 @@ std::map<std::string, bool> ParseEffects(const std::string& text) {
     if (word == "auto") continue;
     const size_t equals = word.find('=');
     const std::string name = word.substr(0, equals);
-    const std::string wish = equals == std::string::npos ? "" : word.substr(equals + 1);
+    const std::string value = equals == std::string::npos ? "" : word.substr(equals + 1);
     const bool known =
         std::find(std::begin(kNames), std::end(kNames), name) != std::end(kNames);
-    if (!known || (wish != "on" && wish != "off"))
+    if (!known || (value != "on" && value != "off"))
       throw Error(ExitCode::kUsage, "'" + word + "' is not allowed", "--effects",
                   "auto, or on|off of ndc, alpha, background, exposure, view-dependence and "
                   "pose-refinement: ndc=on,exposure=off");
-    wishes[name] = wish == "on";
+    overrides[name] = value == "on";
   }
-  return wishes;
+  return overrides;
 }
 
 SceneProfile ProfileScene(const Capture& capture, int sh_degree, const std::string& effects) {
-  const std::map<std::string, bool> wishes = ParseEffects(effects);
-  const auto decided = [&wishes](const char* name, bool measured) {
-    const auto wish = wishes.find(name);
-    return wish == wishes.end() ? measured : wish->second;
+  const std::map<std::string, bool> overrides = ParseEffects(effects);
+  const auto decided = [&overrides](const char* name, bool measured) {
+    const auto override = overrides.find(name);
+    return override == overrides.end() ? measured : override->second;
   };
   SceneProfile profile;
   double shift = 0;
@@ -162,38 +162,40 @@ SceneProfile ProfileScene(const Capture& capture, int sh_degree, const std::stri
           "largest shift of a picture's corner by the lens, over the cameras, in pixels"));
 
   const std::vector<Silhouette> silhouettes = ReadSilhouettes(capture);
-  const double clear = TransparentShare(silhouettes);
-  const bool alpha = decided("alpha", clear > kAlphaShare);
+  const double clear = TransparentFraction(silhouettes);
+  const bool alpha = decided("alpha", clear > kAlphaFraction);
 
   const ForwardFacing forward = MeasureForwardFacing(capture);
   const bool ndc = decided("ndc", forward.on && !alpha);
   profile.effects.push_back(Row("ndc", ndc, forward.angle_deg, kForwardAngle,
-                                "on where all cameras look one way: largest angle of an "
-                                "optical axis to their mean, degrees"));
-  profile.effects.push_back(Row("alpha", alpha, clear, kAlphaShare,
-                                "share of transparent pixels, where every photo has some"));
+                                "forward-facing cameras: largest angle of an optical axis "
+                                "to their mean, degrees"));
+  profile.effects.push_back(Row("alpha", alpha, clear, kAlphaFraction,
+                                "fraction of transparent pixels, if every photo has some"));
   const Surroundings surroundings = MeasureSurroundings(capture);
   const bool background =
       decided("background", surroundings.far_fraction > kFarFraction && !ndc && !alpha);
   if (background && (ndc || alpha))
-    throw Error(ExitCode::kUsage,
-                std::string("background spheres do not go with ") + (ndc ? "ndc" : "alpha"),
-                "--effects background=on", ndc ? "add ndc=off" : "add alpha=off");
+    throw Error(
+        ExitCode::kUsage,
+        std::string("background spheres cannot be combined with ") + (ndc ? "ndc" : "alpha"),
+        "--effects background=on", ndc ? "add ndc=off" : "add alpha=off");
   profile.effects.push_back(
       Row("background", background, surroundings.far_fraction, kFarFraction,
-          "spheres behind the box, on where much is far all round: share "
-          "of observations of points beyond four times the cameras' reach"));
+          "spheres around the box, for scenes with much far background: fraction of "
+          "observations of points beyond four times the cameras' extent"));
   profile.effects.push_back(Row(kViewDependence, sh_degree > 0, sh_degree, 0,
-                                "spherical harmonics degree of the fit, as set"));
+                                "degree of the fit's spherical harmonics, as set"));
 
   profile.scene = ndc          ? NormalizeForwardFacing(capture, forward)
                   : background ? NormalizeSurrounded(capture, surroundings)
                                : NormalizeScene(capture);
   if (alpha && !silhouettes.empty()) {
     if (!ndc) profile.scene = TightenToSilhouettes(profile.scene, silhouettes);
-    profile.scene.box.background = Vec3f{1, 1, 1};  // what transparent photos are laid over
+    profile.scene.box.background =
+        Vec3f{1, 1, 1};  // transparent photos are composited on white
   }
-  ProfileExposure(capture, wishes, alpha, &profile);
+  ProfileExposure(capture, overrides, alpha, &profile);
   return profile;
 }
 

@@ -1,5 +1,4 @@
-// What the scene calls for, decided from what was measured of its capture, and the space that
-// follows from it.
+// Decides from measurements of a capture which effects to model, and the field's frame and box.
 #pragma once
 
 #include <map>
@@ -14,42 +13,45 @@
 
 namespace regrade {
 
-// What the user decided instead: "auto", or "ndc=off,alpha=on" and the like. Throws
-// Error(kUsage) naming the word for anything else.
+// Parses --effects: "auto", or overrides such as "ndc=off,alpha=on". Throws Error(kUsage)
+// naming the word for anything else.
 std::map<std::string, bool> ParseEffects(const std::string& text);
 
-// The row that a fit's trial decides (choose_degree.h).
+// Decided by the fit's trial (choose_degree.h).
 inline constexpr char kViewDependence[] = "view-dependence";
-// The row that stage "pose" decides (pose_profile.h).
+// Decided by stage "pose" (pose_profile.h).
 inline constexpr char kPoseRefinement[] = "pose-refinement";
 
 struct SceneProfile {
-  // One row an effect. "distortion": the lens is followed where it moves a picture's corner by
-  // more than kDistortionThreshold (working_views.h). "ndc": all cameras look one way
-  // (forward_facing.h). "alpha": all photos have transparent parts; white is behind them and
-  // the box is the object's. "background": much is far beyond what the cameras stand round
-  // (normalize_scene.h); it is on spheres behind a box round the latter. "view-dependence":
-  // colours change with the direction, as `sh_degree` was set; the fit's trial has the last
-  // word. "exposure": photos differ in brightness or white balance by more than noise explains,
-  // and undoing that pays on points that had no say in it (exposure.h).
+  // One row per effect:
+  // "distortion": the lens moves a picture's corner by more than kDistortionThreshold
+  //   (working_views.h), and is modelled.
+  // "ndc": forward-facing cameras (forward_facing.h).
+  // "alpha": all photos have transparent parts; the background is white, the box the object's.
+  // "background": much of the scene is far beyond what the cameras surround
+  //   (normalize_scene.h); it is modelled on spheres outside the box.
+  // "view-dependence": colours change with direction, up to `sh_degree`; the fit's trial
+  // decides. "exposure": photos differ in brightness or white balance by more than noise
+  // explains, and
+  //   undoing that improves held-out points (exposure.h).
   std::vector<EffectReport> effects;
   NormalizedScene scene;
-  ExposureEstimate exposure;         // empty where it was not measured
-  PhotoGains gains;                  // to be undone; none where exposure is off
-  std::vector<std::string> notices;  // sentences for a person
+  ExposureEstimate exposure;         // empty if not measured
+  PhotoGains gains;                  // to be undone; none if exposure is off
+  std::vector<std::string> notices;  // sentences for the user
 };
 
-// Has every photo transparent parts, and more of them than a soft edge has?
+// True if every photo has transparent parts, more than a soft edge has.
 bool ShowsThroughPhotos(const Capture& capture);
 
-// Free of the photos' order (H154). Reads every photo, unless "exposure=off". Throws
-// Error(kScene) where an effect was asked for that the capture does not allow.
+// Independent of the photos' order (H154). Reads every photo, unless "exposure=off". Throws
+// Error(kScene) for a requested effect that the capture does not allow.
 SceneProfile ProfileScene(const Capture& capture, int sh_degree, const std::string& effects);
 
-// "distortion on: 12.3 > 0.5 (pixels, ...)"
+// "distortion on: 12.3 > 0.5 (largest shift ...)"
 std::string EffectLine(const EffectReport& effect);
 
-// For the record of a stage, and back.
+// To and from the record of a stage.
 JsonValue EffectsRecord(const std::vector<EffectReport>& effects);
 std::vector<EffectReport> EffectsOfRecord(const JsonValue& record);
 

@@ -1,4 +1,4 @@
-// What the scene's tracked points look like in each photo that sees them.
+// Colours of the scene's tracked points in each photo that observes them.
 #pragma once
 
 #include <vector>
@@ -8,17 +8,16 @@
 
 namespace regrade {
 
-// Linear light at the point (u, v), in pixels, of an sRGB photo: the mean of a window of 5 x 5
-// pixels round it, which lies between pixels (bilinear). False where the window leaves the
-// photo, or holds a pixel that is near black or white: there light was clipped, or is mostly
-// rounding.
+// Linear light at (u, v), in pixels, of an sRGB photo: the mean of a window of 5 x 5 pixels
+// around it, bilinearly interpolated. False if the window leaves the photo, or has a pixel near
+// black or white, where light was clipped or is mostly rounding.
 bool WindowLight(const Image& photo, double u, double v, Vec3d* light);
 
 struct TrackColors {
-  // One entry for each point and photo that sees it and shows it unclipped; `point` is the
-  // index into capture.points.
+  // One entry for each point and photo that observes it unclipped; `point` is the index into
+  // capture.points.
   std::vector<ColorObservation> observations;
-  std::vector<Vec3d> clipped;  // of each view: the share of its pixels that are, by channel
+  std::vector<Vec3d> clipped;  // fraction of clipped pixels of each view, by channel
 };
 
 // Reads every photo once. Throws Error(kInput).

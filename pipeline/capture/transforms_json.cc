@@ -110,11 +110,12 @@ RigidTransform ReadPose(const std::string& path, const JsonValue& frame) {
   RigidTransform world_from_gl;
   for (int i = 0; i < 3; ++i) {
     if (!rows[i].IsArray() || rows[i].AsArray().size() != 4)
-      Refuse(path, rows[i], "a row of transform_matrix has not 4 numbers");
+      Refuse(path, rows[i], "a row of transform_matrix does not have 4 numbers");
     for (int j = 0; j < 4; ++j) {
       const JsonValue& value = rows[i].AsArray()[j];
       const double number = value.IsNumber() ? value.AsDouble() : NAN;
-      if (!std::isfinite(number)) Refuse(path, value, "transform_matrix holds no number here");
+      if (!std::isfinite(number))
+        Refuse(path, value, "this element of transform_matrix is not a number");
       if (j < 3)
         world_from_gl.rotation(i, j) = number;
       else
@@ -128,7 +129,7 @@ RigidTransform ReadPose(const std::string& path, const JsonValue& frame) {
   if (!(off < kRigidTolerance) || !(world_from_gl.rotation.Determinant() > 0))
     Refuse(path, *matrix, "transform_matrix is not a rotation and a translation");
   world_from_gl.rotation = Orthonormal(world_from_gl.rotation);
-  // y and z of the camera turn around.
+  // y and z of the camera change sign.
   RigidTransform world_from_camera = world_from_gl;
   for (int i = 0; i < 3; ++i)
     for (const int j : {1, 2}) world_from_camera.rotation(i, j) = -world_from_gl.rotation(i, j);
@@ -202,7 +203,7 @@ TransformsFile ReadTransformsJson(const std::string& path, const PictureSizeFunc
   const JsonValue top = ReadJsonFile(path);
   const JsonValue* frames = top.Find("frames");
   if (frames == nullptr || !frames->IsArray())
-    Refuse(path, top, "this is no transforms.json: there is no list \"frames\"");
+    Refuse(path, top, "this is not a transforms.json: it has no list \"frames\"");
   const fs::path folder = fs::path(path).parent_path();
   TransformsFile result;
   std::set<std::string> seen;

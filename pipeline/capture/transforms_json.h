@@ -23,26 +23,25 @@ struct TransformsFile {
   std::vector<std::string> missing;     // listed, but not there
 };
 
-// Size in pixels of a picture on disk, for files that leave out "w" and "h". Where it says 0,
-// cameras are read without knowing their size, and without a look at whether they can be.
+// Size in pixels of a picture on disk, for files that leave out "w" and "h". If it gives 0,
+// cameras are read without their size, and are not checked for plausibility.
 using PictureSizeFunction =
     std::function<void(const std::string& path, int* width, int* height)>;
 
-// Reads "frames" with "file_path" and "transform_matrix" (4x4 or 3x4); intrinsics stand at the
+// Reads "frames" with "file_path" and "transform_matrix" (4x4 or 3x4); intrinsics are at the
 // top or in a frame: fl_x, fl_y, cx, cy, w, h, or camera_angle_x [, camera_angle_y]; k1 k2 p1
 // p2 k3 for perspective lenses, k1..k4 for OPENCV_FISHEYE. Rotations are made orthonormal to
 // double precision. A file_path without extension means .png, .jpg or .jpeg, as in Blender
 // captures.
 //
-// Throws Error (kInput) with the place in the file: JSON that ParseJson refuses, more than 64
-// MiB, values that are missing, out of range or not finite, a matrix that is no rigid motion, a
-// camera that none can be, an unknown lens, a picture listed twice, or no picture at all on
-// disk.
+// Throws Error(kInput) with the place in the file: JSON that ParseJson refuses, more than 64
+// MiB, values that are missing, out of range or not finite, a matrix that is no rigid motion,
+// an implausible camera, an unknown lens, a picture listed twice, or no picture on disk.
 TransformsFile ReadTransformsJson(const std::string& path,
                                   const PictureSizeFunction& size_of = {});
 
-// Intrinsics go to the top where all cameras share them. Numbers read back exactly. Cameras
-// whose lens the format cannot say (kFullOpenCv beyond k3): Error (kInput).
+// Intrinsics are written at the top if all cameras share them. Numbers read back exactly.
+// Throws Error(kInput) for lenses that the format cannot express (kFullOpenCv beyond k3).
 void WriteTransformsJson(const std::string& path, const std::vector<TransformsFrame>& frames);
 
 }  // namespace regrade

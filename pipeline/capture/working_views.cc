@@ -5,10 +5,11 @@
 #include <cstdio>
 #include <filesystem>
 #include <limits>
+#include <utility>
 
 #include "kernels/base/error.h"
 #include "kernels/image/resize.h"
-#include "pipeline/capture/photo_gains.h"
+#include "pipeline/capture/capture_store.h"
 #include "pipeline/capture/photo_masks.h"
 #include "pipeline/images/image_file.h"
 
@@ -21,6 +22,13 @@ void WorkingSize(int width, int height, int longest_side, int* new_width, int* n
       std::min(1.0, static_cast<double>(longest_side) / std::max(width, height));
   *new_width = std::max(1, static_cast<int>(std::lround(width * scale)));
   *new_height = std::max(1, static_cast<int>(std::lround(height * scale)));
+}
+
+Image AtWorkingSize(Image image, int longest_side) {
+  int width = 0, height = 0;
+  WorkingSize(image.width, image.height, longest_side, &width, &height);
+  if (width == image.width && height == image.height) return image;
+  return Resize(image, width, height);
 }
 
 }  // namespace
@@ -36,15 +44,50 @@ Camera WorkingCamera(const Camera& camera, int longest_side, const Similarity& f
   return working;
 }
 
-std::vector<Camera> WorkingCameras(const Capture& capture, int longest_side,
-                                   const Similarity& field_from_world, const NdcSpace& ndc) {
+WorkingViews::WorkingViews(Capture capture, int photo_size, int holdout)
+    : capture_(std::make_shared<const Capture>(std::move(capture))),
+      photo_size_(photo_size),
+      holdout_(holdout) {}
+
+WorkingViews WorkingViews::InField(const Similarity& field_from_world,
+                                   const NdcSpace& ndc) const {
+  WorkingViews views = *this;
+  views.field_from_world_ = field_from_world;
+  views.ndc_ = ndc;
+  return views;
+}
+
+WorkingViews WorkingViews::WithGains(PhotoGains gains) const {
+  WorkingViews views = *this;
+  views.gains_ = std::move(gains);
+  return views;
+}
+
+WorkingViews WorkingViews::AtSize(int photo_size) const {
+  WorkingViews views = *this;
+  views.photo_size_ = photo_size;
+  return views;
+}
+
+std::vector<int> WorkingViews::Indices(bool held_out) const {
+  std::vector<int> indices;
+  for (int i = 0; i < count(); ++i)
+    if (IsHeldOut(static_cast<size_t>(i), holdout_) == held_out) indices.push_back(i);
+  return indices;
+}
+
+Camera WorkingViews::CameraOf(int i) const {
+  return WorkingCamera(View(i).camera, photo_size_, field_from_world_, ndc_);
+}
+
+std::vector<Camera> WorkingViews::Cameras() const {
   std::vector<Camera> cameras;
-  for (const CaptureView& view : capture.views)
-    cameras.push_back(WorkingCamera(view.camera, longest_side, field_from_world, ndc));
+  for (int i = 0; i < count(); ++i) cameras.push_back(CameraOf(i));
   return cameras;
 }
 
-Image ReadWorkingPhoto(const CaptureView& view, int longest_side, const PhotoGain& gain) {
+Image WorkingViews::Photo(int i) const {
+  const CaptureView& view = View(i);
   Image photo = ReadImage(view.path);
   if (photo.width != view.camera.width || photo.height != view.camera.height)
     throw Error(ExitCode::kInput,
@@ -53,33 +96,40 @@ Image ReadWorkingPhoto(const CaptureView& view, int longest_side, const PhotoGai
                     std::to_string(view.camera.height),
                 view.path, "the staged photo was changed: use --restart-from pose");
   if (photo.channels != 3) throw Error(ExitCode::kInput, "not an RGB picture", view.path);
-  int width = 0, height = 0;
-  WorkingSize(photo.width, photo.height, longest_side, &width, &height);
-  if (width != photo.width || height != photo.height) photo = Resize(photo, width, height);
-  UndoGain(gain, &photo);
+  photo = AtWorkingSize(std::move(photo), photo_size_);
+  UndoGain(gains_.Of(i), &photo);
   return photo;
 }
 
-Image ReadWorkingMask(const CaptureView& view, int longest_side) {
-  const std::string path = StagedMaskOf(view.path);
+Image WorkingViews::Mask(int i) const {
+  const std::string path = StagedMaskOf(View(i).path);
   if (!std::filesystem::is_regular_file(path)) return {};
-  Image mask = ReadImage(path);
-  int width = 0, height = 0;
-  WorkingSize(mask.width, mask.height, longest_side, &width, &height);
-  if (width != mask.width || height != mask.height) mask = Resize(mask, width, height);
-  Image kept(width, height, 1);
+  const Image mask = AtWorkingSize(ReadImage(path), photo_size_);
+  Image kept(mask.width, mask.height, 1);
   constexpr float kWhole = 1 - 1e-4f;  // and rounding
   for (int64_t p = 0; p < kept.num_pixels(); ++p)
     kept.pixels[p] = mask.pixels[p * mask.channels] > kWhole ? 1.0f : 0.0f;
   return kept;
 }
 
-void LeaveOutMasked(const CaptureView& view, int longest_side, Image* picture) {
-  const Image kept = ReadWorkingMask(view, longest_side);
+void WorkingViews::LeaveOutMasked(int i, Image* picture) const {
+  const Image kept = Mask(i);
   for (int64_t p = 0; p < kept.num_pixels(); ++p)
     if (kept.pixels[p] < 0.5f)
       std::fill_n(&picture->pixels[p * picture->channels], picture->channels,
                   std::numeric_limits<float>::quiet_NaN());
+}
+
+Image WorkingViews::PhotoToFit(int i) const {
+  Image photo = Photo(i);
+  LeaveOutMasked(i, &photo);
+  return HasColor(photo) ? photo : Image();
+}
+
+WorkingViews ReadWorkingViews(const std::string& poses, int photo_size, int holdout) {
+  Capture capture = ReadCapture(poses);
+  PhotoGains gains = ReadGains(poses, capture);
+  return WorkingViews(std::move(capture), photo_size, holdout).WithGains(std::move(gains));
 }
 
 void FillMasked(const Image& kept, const Image& render, Image* photo) {
@@ -87,19 +137,6 @@ void FillMasked(const Image& kept, const Image& render, Image* photo) {
     if (kept.pixels[p] < 0.5f)
       for (int c = 0; c < 3; ++c)
         photo->pixels[3 * p + c] = std::clamp(render.pixels[3 * p + c], 0.0f, 1.0f);
-}
-
-Image ReadPhotoToFit(const CaptureView& view, int longest_side, const PhotoGain& gain) {
-  Image photo = ReadWorkingPhoto(view, longest_side, gain);
-  LeaveOutMasked(view, longest_side, &photo);
-  return HasColor(photo) ? photo : Image();
-}
-
-std::vector<int> ViewIndices(const Capture& capture, int holdout, bool held_out) {
-  std::vector<int> indices;
-  for (size_t i = 0; i < capture.views.size(); ++i)
-    if (IsHeldOut(i, holdout) == held_out) indices.push_back(static_cast<int>(i));
-  return indices;
 }
 
 std::string ComparisonNote(const Camera& common) {

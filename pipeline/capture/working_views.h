@@ -1,6 +1,8 @@
-// The capture as the later stages use it: photos at working size, cameras to match.
+// The capture as stages after "pose" use it: photos at working size without their gains,
+// cameras to match, and masks.
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -10,46 +12,73 @@
 namespace regrade {
 
 // A lens that moves no corner of its photo by more than this, in pixels, is taken as a pinhole:
-// less than half a pixel is below what poses are known to, and rays without a lens model need
-// no Newton steps.
+// less than half a pixel is below the accuracy of poses, and rays without a lens model need no
+// Newton steps.
 inline constexpr double kDistortionThreshold = 0.5;
 
-// The camera of a photo whose longer side is cut to `longest_side` pixels (never enlarged), in
-// a world transformed by `field_from_world`, its pixel rays in `ndc` where that is on. Its lens
-// is a pinhole up to kDistortionThreshold.
+// The camera of a photo whose longer side is reduced to `longest_side` pixels (never enlarged),
+// in a world transformed by `field_from_world`, its pixel rays in `ndc` where that is on. Its
+// lens is a pinhole up to kDistortionThreshold.
 Camera WorkingCamera(const Camera& camera, int longest_side, const Similarity& field_from_world,
                      const NdcSpace& ndc);
 
-// Working cameras of all views, in their order.
-std::vector<Camera> WorkingCameras(const Capture& capture, int longest_side,
-                                   const Similarity& field_from_world, const NdcSpace& ndc);
+// Indices below are those of Capture::views. Copies share the capture.
+class WorkingViews {
+ public:
+  // Photos as taken, cameras in the capture's world. `holdout`: see IsHeldOut.
+  WorkingViews(Capture capture, int photo_size, int holdout);
 
-// The photo at the size of its working camera, 3 channels, rid of its gain (photo_gains.h).
-Image ReadWorkingPhoto(const CaptureView& view, int longest_side, const PhotoGain& gain);
+  WorkingViews InField(const Similarity& field_from_world, const NdcSpace& ndc) const;
+  WorkingViews WithGains(PhotoGains gains) const;
+  WorkingViews AsTaken() const { return WithGains({}); }
+  WorkingViews AtSize(int photo_size) const;
 
-// What --photo-masks keeps of it: [H, W, 1], 1 where no part of a pixel is masked, else 0.
-// Empty (0 x 0) where the photo has no mask.
-Image ReadWorkingMask(const CaptureView& view, int longest_side);
+  const Capture& capture() const { return *capture_; }
+  const CaptureView& View(int i) const { return capture_->views[static_cast<size_t>(i)]; }
+  int count() const { return static_cast<int>(capture_->views.size()); }
+  int photo_size() const { return photo_size_; }
+  PhotoGain Gain(int i) const { return gains_.Of(i); }
 
-// NaN where the photo is masked: such pixels are neither fitted nor measured. `picture` has the
-// working size.
-void LeaveOutMasked(const CaptureView& view, int longest_side, Image* picture);
+  // Indices of the views that are fitted, and of those kept for measuring.
+  std::vector<int> Training() const { return Indices(false); }
+  std::vector<int> HeldOut() const { return Indices(true); }
 
-// What a 2D method is given instead of a masked photo: `render`, of the same view, where `kept`
-// (ReadWorkingMask) is 0.
+  Camera CameraOf(int i) const;
+  std::vector<Camera> Cameras() const;
+
+  // The photo at the size of its camera, 3 channels, its gain undone. Throws Error(kInput).
+  Image Photo(int i) const;
+  // [H, W, 1]: 1 where no part of a pixel is masked (--photo-masks), else 0. Empty (0 x 0)
+  // where the photo has no mask.
+  Image Mask(int i) const;
+  // Sets masked pixels of a picture of that size to NaN: they are neither fitted nor measured.
+  void LeaveOutMasked(int i, Image* picture) const;
+  // Photo without what is masked; empty (0 x 0) where nothing is left of it.
+  Image PhotoToFit(int i) const;
+
+ private:
+  std::vector<int> Indices(bool held_out) const;
+
+  std::shared_ptr<const Capture> capture_;
+  int photo_size_, holdout_;
+  PhotoGains gains_;
+  Similarity field_from_world_;
+  NdcSpace ndc_;
+};
+
+// Of a folder poses/ with the gains that are stored there (ReadGains), cameras in the capture's
+// world. Throws Error(kInput).
+WorkingViews ReadWorkingViews(const std::string& poses, int photo_size, int holdout);
+
+// Replaces masked pixels of a photo that a 2D method is given by those of `render`, of the same
+// view. `kept` as of WorkingViews::Mask.
 void FillMasked(const Image& kept, const Image& render, Image* photo);
-
-// ReadWorkingPhoto without what is masked; empty (0 x 0) where nothing is left of it.
-Image ReadPhotoToFit(const CaptureView& view, int longest_side, const PhotoGain& gain);
-
-// Indices of views that are fitted, or of those that are kept for measuring.
-std::vector<int> ViewIndices(const Capture& capture, int holdout, bool held_out);
 
 // "the photos differ in size or lens: neighbouring views are compared on frames of one camera
 // (480x360 px) at each photo's place"
 std::string ComparisonNote(const Camera& common);
 
-// The renderer's depth is along the optical axis; the evaluator wants it along each ray.
+// The renderer's depth is along the optical axis; the evaluator needs it along each ray.
 Image DepthAlongRays(const Camera& camera, Image depth);
 
 }  // namespace regrade

@@ -15,7 +15,7 @@ using Arguments = std::vector<std::string>;
 
 struct Command {
   const char* name;
-  const char* usage;    // what stands behind the name
+  const char* usage;    // arguments and options behind the name
   const char* summary;  // one line
   void (*run)(const Command& command, const Arguments& arguments, Console* console);
 };

@@ -22,8 +22,7 @@ void ContinueRun(const Command& command, const Arguments& arguments, const std::
   if (!prepared->run_words.empty()) context.source = prepared->run_words[0];
   settings.run.out = std::filesystem::absolute(folder).lexically_normal().string();
   if (settings.style.picture.empty())
-    throw Error(ExitCode::kUsage, "its value is missing", "--style",
-                "name the picture whose colours the scene shall have");
+    throw Error(ExitCode::kUsage, "its value is missing", "--style", "name the style picture");
   settings.style.picture =
       std::filesystem::absolute(settings.style.picture).lexically_normal().string();
   ReadStylePicture(settings.style.picture, nullptr);

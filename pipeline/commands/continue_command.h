@@ -1,4 +1,4 @@
-// Commands over a folder in which a run has worked: its options hold until they are overridden.
+// Commands that continue a run: its options hold unless flags override them.
 #pragma once
 
 #include <string>
@@ -7,8 +7,8 @@
 
 namespace regrade {
 
-// Opens `folder`, takes the options of its run.json, lets the flags override
-// them, and does the stages from `first` to the report.
+// Opens the folder among `arguments`, takes the options of its run.json, overridden by flags,
+// and runs the stages from `first` to the report.
 void ContinueRun(const Command& command, const Arguments& arguments, const std::string& first,
                  Console* console);
 

@@ -1,4 +1,4 @@
-// regrade doctor: what is installed, and what will run where.
+// regrade doctor: prints what is installed and which processor runs what.
 #include <omp.h>
 #include <unistd.h>
 
@@ -35,8 +35,7 @@ Finding FindColmap(const std::string& program) {
     return {"COLMAP", "not found: " + error.what_failed(),
             needed + "; install the package `colmap`"};
   }
-  return {"COLMAP", version.empty() ? "'" + program + "' does not call itself COLMAP" : version,
-          needed};
+  return {"COLMAP", version.empty() ? "'" + program + "' is not COLMAP" : version, needed};
 }
 
 Finding FindDevice() {
@@ -46,7 +45,7 @@ Finding FindDevice() {
   std::snprintf(text, sizeof text, "%s, sm_%d, %.1f GB free of %.1f GB", status.name.c_str(),
                 status.compute_capability, static_cast<double>(status.free_bytes) / (1u << 30),
                 static_cast<double>(status.total_bytes) / (1u << 30));
-  return {"GPU", text, "fits, restyling and frames are made there, the rest on the CPU"};
+  return {"GPU", text, "runs fits, restyling and frames; the CPU runs the rest"};
 }
 
 }  // namespace

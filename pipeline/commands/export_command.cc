@@ -1,5 +1,5 @@
-// regrade export: the photos and poses of an output folder, as other programs read them.
-// (field.npz and styled.npz are svox2's format already.)
+// regrade export: writes photos and poses of an output folder in formats of other programs.
+// (field.npz and styled.npz are in svox2's format already.)
 #include <filesystem>
 
 #include "kernels/base/error.h"
@@ -19,11 +19,10 @@ struct ExportOptions {
 
   template <typename Bind>
   void Describe(Bind& bind) {
-    bind("out", out, {.help = "the folder to write, which is made and must be empty"});
+    bind("out", out, {.help = "the folder to write: a new or empty one"});
     bind("format", format,
-         {.help = "colmap-text and colmap: images/ and sparse/; transforms: images/ and a "
-                  "transforms.json "
-                  "as nerfstudio and instant-ngp read it",
+         {.help = "colmap-text and colmap write images/ and sparse/; transforms writes images/ "
+                  "and transforms.json for nerfstudio and instant-ngp",
           .choices = "colmap-text|colmap|transforms"});
   }
 };
@@ -68,7 +67,7 @@ void RunExport(const Command& command, const Arguments& arguments, Console* cons
   if (settings.out.empty())
     throw Error(ExitCode::kUsage, "its value is missing", "--out", "name the folder to write");
   if (!fs::exists(folder + "/poses/photos.json"))
-    throw Error(ExitCode::kInput, "holds no poses", folder,
+    throw Error(ExitCode::kInput, "has no poses", folder,
                 "run `regrade pose PHOTOS --out " + folder + "` first");
   const Capture capture = ReadCapture(folder + "/poses");
   MakeEmptyFolder(settings.out);

@@ -1,5 +1,5 @@
-// regrade mix: a film that turns from the scene as it was into its style, or from one style
-// into another, and the field half way.
+// regrade mix: a film that blends from the unstyled scene into its style, or from one style
+// into another, and the field of a constant blend.
 #include <algorithm>
 #include <filesystem>
 #include <memory>
@@ -7,7 +7,6 @@
 
 #include "kernels/base/error.h"
 #include "kernels/field/pad_sh_basis.h"
-#include "pipeline/capture/capture_store.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/commands/command.h"
 #include "pipeline/commands/mix_keys.h"
@@ -37,18 +36,20 @@ struct MixOptions {
 
   template <typename Bind>
   void Describe(Bind& bind) {
-    bind("out", out, {.help = "the folder to write; must be new, or hold an earlier mix"});
-    bind("mix", mix,
-         {.help =
-              "shares of the style in time, 0 the scene as it was and 1 the style: 0:1 turns "
-              "from one into the other, 0:1:0 and back, 0.5 stays half way and also writes "
-              "mixed.npz. With several styles a share for each: 1,0:0,1 turns the first into "
-              "the second. Without it, all styles in order"});
+    bind("out", out, {.help = "the folder to write: a new one, or that of an earlier mix"});
+    bind(
+        "mix", mix,
+        {.help =
+             "weight of the style over time, 0 for the unstyled scene and 1 for the style: 0:1 "
+             "blends from one to the other, 0:1:0 and back; 0.5 is constant, and also writes "
+             "mixed.npz. With several styles one weight for each: 1,0:0,1 blends the first "
+             "into the second. By default through all styles in order"});
     bind("object", object,
-         {.help = "only the object changes whose masks DIR was styled with, the rest stays as "
-                  "it was; styles of the whole scene may be named"});
-    bind("device", device, {.help = "where arithmetic runs", .choices = "auto|cpu|cuda"});
-    bind("dry-run", dry_run, {.help = "say what would be done, and do nothing"});
+         {.help = "blends only the object whose masks DIR was styled with; styles of the whole "
+                  "scene are possible, too"});
+    bind("device", device,
+         {.help = "the processor that renders frames", .choices = "auto|cpu|cuda"});
+    bind("dry-run", dry_run, {.help = "prints what would be done, and does nothing"});
   }
 };
 
@@ -67,24 +68,24 @@ void MakeMixFolder(const fs::path& out) {
   if (error) throw Error(ExitCode::kResources, error.message(), out.string());
 }
 
-// Frames keep the shape of their photo where the path is the photos' places; a film has one
-// shape.
+// On the path "views" frames have the sizes of their photos; a film has one size.
 struct MixCameras {
   std::vector<Camera> frames, film;
 };
 
 MixCameras CamerasOf(const std::string& folder, const StoredField& stored,
                      const SceneOptions& scene, const RenderOptions& render) {
-  const std::vector<Camera> views = WorkingCameras(
-      ReadCapture(folder + "/poses"), scene.photo_size, stored.field_from_world, stored.ndc);
+  const std::vector<Camera> views = ReadWorkingViews(folder + "/poses", scene.photo_size, 0)
+                                        .InField(stored.field_from_world, stored.ndc)
+                                        .Cameras();
   const std::vector<Camera> film = MakeCameraPath(views, render.path);
   return {render.path.path == "views" ? views : film, film};
 }
 
 void WriteMix(const std::string& out, const RadianceField& source,
               const std::vector<const RadianceField*>& styles, const MixKeys& keys,
-              const std::vector<float>* weights_of_voxels, const MixCameras& cameras,
-              double fps, Backend backend, Console* console) {
+              const std::vector<float>* object_weights, const MixCameras& cameras, double fps,
+              Backend backend, Console* console) {
   std::optional<VideoWriter> film;
   try {
     film.emplace(out + "/mixed.mp4", cameras.film[0].width, cameras.film[0].height, fps);
@@ -94,18 +95,18 @@ void WriteMix(const std::string& out, const RadianceField& source,
   }
   console->BeginStage("mix");
   const ProgressFunction progress = console->StageProgress();
-  std::vector<double> shown;
+  std::vector<double> rendered;
   std::unique_ptr<FieldRenderer> renderer;
   const int frames = static_cast<int>(cameras.film.size());
   for (int i = 0; i < frames; ++i) {
     if (Report(progress, i, frames) == LoopControl::kStop) throw Interrupted();
-    const std::vector<double> shares =
+    const std::vector<double> weights =
         keys.At(static_cast<double>(i) / std::max(1, frames - 1));
-    if (!renderer || shares != shown) {
-      renderer.reset();  // one at a time: a field may be most of the memory
+    if (!renderer || weights != rendered) {
+      renderer.reset();  // first: a field may need most of the memory
       renderer = std::make_unique<FieldRenderer>(
-          MixFields(source, styles, shares, weights_of_voxels), backend);
-      shown = shares;
+          MixFields(source, styles, weights, object_weights), backend);
+      rendered = weights;
     }
     const Camera& of_frame = cameras.frames[static_cast<size_t>(i)];
     const Camera& of_film = cameras.film[static_cast<size_t>(i)];
@@ -146,8 +147,8 @@ void RunMix(const Command& command, const Arguments& arguments, Console* console
   for (const std::string& word : words)
     if (!fs::is_regular_file(StyleFile(word)))
       throw Error(ExitCode::kInput, "there is no styled field", StyleFile(word),
-                  "make it with `regrade stylize`, and keep a copy of styled.npz before the "
-                  "next style takes its place");
+                  "make it with `regrade stylize`, and copy styled.npz before making the next "
+                  "style");
 
   StoredField stored = ReadFieldFile(folder + "/field.npz");
   const Backend backend = ChooseBackend(settings.device, false);
@@ -169,12 +170,12 @@ void RunMix(const Command& command, const Arguments& arguments, Console* console
     RadianceField& field = styles.back().field;
     if (!SameGeometry(*field.geometry, *stored.field.geometry))
       throw Error(ExitCode::kInput, "is a style of another reconstruction", StyleFile(word),
-                  "styles that are mixed restyle one field: make them with `regrade stylize " +
+                  "mixed styles must restyle the same field: make them with `regrade stylize " +
                       folder + "`");
     field.geometry = stored.field.geometry;
     basis = std::max(basis, field.appearance.basis);
   }
-  // Styles of a field whose colours know no direction may know some.
+  // Styles of a field without view dependence may have some.
   stored.field.appearance = PadShBasis(std::move(stored.field.appearance), basis);
   for (StoredField& style : styles)
     style.field.appearance = PadShBasis(std::move(style.field.appearance), basis);
@@ -188,17 +189,17 @@ void RunMix(const Command& command, const Arguments& arguments, Console* console
                   "make it with `regrade stylize " + folder + " --masks FOLDER`");
     object = ReadObjectFile(file, stored.field.geometry->num_voxels());
   }
-  const std::vector<float>* within = object ? &object->all : nullptr;
+  const std::vector<float>* object_weights = object ? &object->all : nullptr;
 
   MakeMixFolder(settings.out);
   JsonValue record = JsonValue::Object{{"field", folder}, {"options", options.Values()}};
   for (const std::string& word : words) record["styles"].Append(StyleFile(word));
   WriteJsonFile(settings.out + "/mix.json", record);
-  WriteMix(settings.out, stored.field, fields, keys, within, cameras, render.fps, backend,
-           console);
+  WriteMix(settings.out, stored.field, fields, keys, object_weights, cameras, render.fps,
+           backend, console);
   if (keys.IsConstant()) {
     StoredField mixed = stored;
-    mixed.field = MixFields(stored.field, fields, keys.points[0], within);
+    mixed.field = MixFields(stored.field, fields, keys.points[0], object_weights);
     WriteFieldFile(settings.out + "/mixed.npz", mixed);
   }
   console->Info("wrote " + std::to_string(cameras.film.size()) + " frames to " + settings.out);

@@ -13,40 +13,40 @@ namespace {
 std::vector<double> ParsePoint(const std::string& text, int styles) {
   const auto refuse = [&](const std::string& why) {
     throw Error(ExitCode::kUsage, "\"" + text + "\" " + why, "--mix",
-                styles == 1 ? "write shares of the style with colons between, like 0:1"
-                            : "write a share for each of the " + std::to_string(styles) +
-                                  " styles with commas between, and colons between the "
-                                  "points, like 1,0:0,1 for two");
+                styles == 1 ? "write weights of the style separated by colons, such as 0:1"
+                            : "write a weight for each of the " + std::to_string(styles) +
+                                  " styles separated by commas, and points separated by "
+                                  "colons, such as 1,0:0,1 for two");
   };
-  std::vector<double> shares;
+  std::vector<double> weights;
   double sum = 0;
   for (const std::string& word : Split(text, ',')) {
-    double share = 0;
+    double weight = 0;
     const char* const end = word.data() + word.size();
-    const auto [rest, bad] = std::from_chars(word.data(), end, share);
-    if (bad != std::errc() || rest != end || !std::isfinite(share)) refuse("is not a number");
-    if (share < 0 || share > 1) refuse("is not between 0 and 1");
-    shares.push_back(share);
-    sum += share;
+    const auto [rest, bad] = std::from_chars(word.data(), end, weight);
+    if (bad != std::errc() || rest != end || !std::isfinite(weight)) refuse("is not a number");
+    if (weight < 0 || weight > 1) refuse("is not between 0 and 1");
+    weights.push_back(weight);
+    sum += weight;
   }
-  if (static_cast<int>(shares.size()) != styles)
-    refuse("has " + std::to_string(shares.size()) + " shares for " + std::to_string(styles) +
+  if (static_cast<int>(weights.size()) != styles)
+    refuse("has " + std::to_string(weights.size()) + " weights for " + std::to_string(styles) +
            (styles == 1 ? " style" : " styles"));
   if (sum > 1 + 1e-9) refuse("adds up to more than 1");
-  return shares;
+  return weights;
 }
 
 }  // namespace
 
 std::vector<double> MixKeys::At(double time) const {
-  const double place = time * static_cast<double>(points.size() - 1);
-  const size_t before = std::min(static_cast<size_t>(place), points.size() - 1);
-  const double part = place - static_cast<double>(before);
-  if (part == 0 || before + 1 == points.size()) return points[before];
-  std::vector<double> shares = points[before];
-  for (size_t i = 0; i < shares.size(); ++i)
-    shares[i] = (1 - part) * points[before][i] + part * points[before + 1][i];
-  return shares;
+  const double position = time * static_cast<double>(points.size() - 1);
+  const size_t before = std::min(static_cast<size_t>(position), points.size() - 1);
+  const double fraction = position - static_cast<double>(before);
+  if (fraction == 0 || before + 1 == points.size()) return points[before];
+  std::vector<double> weights = points[before];
+  for (size_t i = 0; i < weights.size(); ++i)
+    weights[i] = (1 - fraction) * points[before][i] + fraction * points[before + 1][i];
+  return weights;
 }
 
 bool MixKeys::IsConstant() const {

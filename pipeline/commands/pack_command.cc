@@ -17,7 +17,7 @@
 namespace regrade {
 namespace {
 
-// Colours matter of a style picture, not its pixels.
+// A style picture is needed for its colours only.
 constexpr int kStyleSide = 512;
 
 Image SmallPicture(const std::string& path) {
@@ -47,13 +47,14 @@ void RunPack(const Command& command, const Arguments& arguments, Console* consol
     throw Error(ExitCode::kUsage, "its value is missing", "--out",
                 "name the .npz file to write");
   if (!std::filesystem::exists(folder + "/poses/photos.json"))
-    throw Error(ExitCode::kInput, "holds no poses", folder,
+    throw Error(ExitCode::kInput, "has no poses", folder,
                 "run `regrade pose CAPTURE --out " + folder + "` first");
   const Capture capture = ReadCapture(folder + "/poses");
-  for (const CaptureView& view : capture.views)
-    if (!ReadWorkingMask(view, scene.photo_size).empty())
+  const WorkingViews as_taken(capture, scene.photo_size, run.holdout);
+  for (int i = 0; i < as_taken.count(); ++i)
+    if (!as_taken.Mask(i).empty())
       throw Error(ExitCode::kInput,
-                  "was posed with --photo-masks, which a packed capture lacks", folder,
+                  "was posed with --photo-masks, which a packed capture cannot hold", folder,
                   "pose it again without them");
   const SceneProfile profile = ProfileScene(capture, 2, run.effects);
   for (const EffectReport& effect : profile.effects) console->Info(EffectLine(effect));
@@ -61,12 +62,11 @@ void RunPack(const Command& command, const Arguments& arguments, Console* consol
   PackedCapture packed;
   if (!style.picture.empty()) packed.style = SmallPicture(style.picture);
   packed.scene = profile.scene;
-  for (size_t i = 0; i < capture.views.size(); ++i)
-    packed.views.push_back({capture.views[i].file, IsHeldOut(i, run.holdout),
-                            WorkingCamera(capture.views[i].camera, scene.photo_size,
-                                          packed.scene.field_from_world, packed.scene.ndc),
-                            ReadWorkingPhoto(capture.views[i], scene.photo_size,
-                                             profile.gains.Of(static_cast<int>(i)))});
+  const WorkingViews views = as_taken.WithGains(profile.gains)
+                                 .InField(packed.scene.field_from_world, packed.scene.ndc);
+  for (int i = 0; i < views.count(); ++i)
+    packed.views.push_back({views.View(i).file, IsHeldOut(static_cast<size_t>(i), run.holdout),
+                            views.CameraOf(i), views.Photo(i)});
   WritePackedCapture(run.out, packed);
   console->Info("wrote " + run.out + ": " + std::to_string(packed.views.size()) + " views, " +
                 std::to_string(std::filesystem::file_size(run.out) >> 20) + " MiB");

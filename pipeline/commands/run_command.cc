@@ -1,4 +1,4 @@
-// regrade run, pose, reconstruct: the road from photos, or a part of it.
+// regrade run, pose, reconstruct: runs the pipeline from photos up to a given stage.
 #include <omp.h>
 
 #include <filesystem>
@@ -19,7 +19,7 @@
 namespace regrade {
 namespace {
 
-// All inputs are looked at before long work starts.
+// Checks all inputs before long work starts.
 void ProbeInputs(const std::string& last, RunContext* context) {
   if (!std::filesystem::exists(context->source))
     throw Error(ExitCode::kInput, "there is no such folder", context->source,
@@ -29,28 +29,26 @@ void ProbeInputs(const std::string& last, RunContext* context) {
   const bool posed = DetectCapture(context->source).kind == CaptureKind::kPosed;
   for (const std::filesystem::path& folder : {out, out / "poses"})
     if (posed && std::filesystem::weakly_canonical(context->source) == folder)
-      throw Error(ExitCode::kUsage, "is the capture itself, and would be written over", "--out",
-                  "name another folder; to go on in this one, give the photos it was made of");
+      throw Error(ExitCode::kUsage, "is the capture itself, and would be overwritten", "--out",
+                  "name another folder; to continue this one, give the photos it was made of");
   if (std::string& masks = context->settings.pose.photo_masks; !masks.empty()) {
     PhotoMaskFiles(masks);
     masks = std::filesystem::absolute(masks).lexically_normal().string();
   }
   if (last == "pose" || last == "reconstruct") return;
   if (context->settings.style.picture.empty())
-    throw Error(ExitCode::kUsage, "its value is missing", "--style",
-                "name the picture whose colours the scene shall have");
+    throw Error(ExitCode::kUsage, "its value is missing", "--style", "name the style picture");
   ReadStylePicture(context->settings.style.picture, nullptr);
   ProbeMethod(&context->settings.style_2d);
   ProbeMasks(&context->settings.object);
   ProbeEvaluationNetworks(context->settings.consistency);
 }
 
-// What a dry run can say of a folder that is not there yet: photos are taken as 4 : 3, the
-// scene's box as a cube.
+// The plan of a dry run for a new folder: photos are assumed to be 4:3, the scene's box a cube.
 void PrintPlan(const std::string& last, RunContext* context) {
   const RunSettings& settings = context->settings;
   const Stage pose = PoseStage(context);
-  context->console->Info(settings.run.out + " is new: every stage would be done, from " +
+  context->console->Info(settings.run.out + " is new: every stage would run, from " +
                          pose.plan);
   if (last == "pose") return;
   const int threads = omp_get_max_threads();
@@ -69,8 +67,8 @@ std::string Absolute(const std::string& path) {
   std::error_code error;
   const auto absolute = std::filesystem::absolute(path, error);
   if (error)
-    throw Error(ExitCode::kResources, "the working folder is gone: " + error.message(), path,
-                "start from a folder that exists");
+    throw Error(ExitCode::kResources, "the current folder does not exist: " + error.message(),
+                path, "start in an existing folder");
   return absolute.lexically_normal().string();
 }
 
@@ -86,8 +84,7 @@ void RunStages(const Command& command, const Arguments& arguments, Console* cons
   if (!prepared) return;
   RunSettings& settings = context.settings;
   if (settings.run.out.empty())
-    throw Error(ExitCode::kUsage, "its value is missing", "--out",
-                "name the folder that the results shall go to");
+    throw Error(ExitCode::kUsage, "its value is missing", "--out", "name the output folder");
   CheckTogether(settings);
   ChooseBackend(settings.run.device, settings.run.reproducible);
   context.source = Absolute(prepared->words[0]);
@@ -103,7 +100,7 @@ void RunStages(const Command& command, const Arguments& arguments, Console* cons
   Workspace workspace(settings.run.out, settings.start.break_lock);
   context.workspace = &workspace;
   console->OpenLog(workspace.Path(".regrade/log.txt"));
-  // Later commands over this folder start from its options, also after an interruption.
+  // Later commands take their options from it, also after an interruption.
   const bool first_start = !std::filesystem::exists(workspace.Path("run.json"));
   if (first_start && !settings.start.dry_run) WriteRunFile(name, context);
   RunPipeline("pose", last, &context);

@@ -1,4 +1,4 @@
-// regrade synth: a synthetic capture with its exact truth.
+// regrade synth: writes a synthetic capture with its exact ground truth.
 #include "pipeline/commands/command.h"
 #include "pipeline/synth/synth_capture.h"
 

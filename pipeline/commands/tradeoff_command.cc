@@ -47,8 +47,8 @@ struct TradeoffOptions {
               "omits them"});
     bind("repeats", repeats,
          {.unit = "repetitions",
-          .help = "measures everything so often, each time with another seed and in another "
-                  "order; tables have medians, and spreads for 2 or more",
+          .help = "of each measurement, with another seed each time; tables show medians, and "
+                  "spreads for 2 or more",
           .min = 1,
           .max = 100});
     bind(

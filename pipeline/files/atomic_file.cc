@@ -105,7 +105,7 @@ void WriteFileAtomically(const std::string& path, std::string_view head,
 
 void SyncFile(const std::string& path) {
   const FileDescriptor fd(::open(path.c_str(), O_WRONLY | O_CLOEXEC));
-  if (fd.get() < 0) ThrowWriteError(path, "open", 0);
+  if (fd.get() < 0) ThrowWriteError(path, "open again", 0);
   if (::fsync(fd.get()) != 0) ThrowWriteError(path, "flush to disk", 0);
 }
 

@@ -100,7 +100,10 @@ NpzReader::NpzReader(const std::string& path, uint64_t budget)
   FileDescriptor fd(OpenToRead(path, &size));
   int code = 0;
   archive_->zip = zip_fdopen(fd.get(), ZIP_CHECKCONS, &code);
-  if (archive_->zip == nullptr) RefuseArchive(path, OpenProblem(code));
+  if (archive_->zip == nullptr) {
+    if (code == ZIP_ER_READ || code == ZIP_ER_OPEN) ThrowReadError(path);  // libzip sets errno
+    RefuseArchive(path, OpenProblem(code));
+  }
   fd.Release();
   archive_->members = CheckedMembers(archive_->zip, size, path);
 }

@@ -25,7 +25,7 @@ void RunProbeCommand(const std::vector<std::string>& command, const std::string&
   else if (result.end == ChildEnd::kSignal)
     problem =
         std::string("crashes the library that reads it (") + ::strsignal(result.signal) + ")";
-  else if (result.exit_status == static_cast<int>(ExitCode::kResources))
+  else if (result.exit_status == kProbeOutOfMemory)
     problem = "needs more than " + std::to_string(limits.memory_bytes >> 20) + " MiB";
   if (!problem.empty())
     throw Error(ExitCode::kExternalProgram, problem, file,

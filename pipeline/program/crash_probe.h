@@ -15,6 +15,8 @@ struct CrashProbeLimits {
 // First argument of the hidden form of the program that a probe runs:
 // `regrade --probe MEMORY KIND FILE`, where MEMORY is the limit in bytes.
 inline constexpr char kProbeFlag[] = "--probe";
+// Exit status of a probe whose memory does not suffice.
+inline constexpr int kProbeOutOfMemory = 99;
 
 // Runs this program as `--probe MEMORY KIND FILE`. Returns if the child exits by itself, also
 // with an error status: the caller then opens the file and reports the error. Throws

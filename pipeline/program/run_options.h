@@ -1,4 +1,4 @@
-// Options of every command and of every run over an output folder.
+// Options of every command, and of every run over an output folder, besides those of stages.
 #pragma once
 
 #include <cstdint>
@@ -15,10 +15,7 @@ struct ProgramOptions {
   template <typename Bind>
   void Describe(Bind& bind) {
     bind("threads", threads,
-         {.unit = "threads",
-          .help = "how many run at once; 0: one per core",
-          .min = 0,
-          .max = 4096});
+         {.unit = "threads", .help = "0 uses one per core", .min = 0, .max = 4096});
     bind("json", json, {.help = "prints progress and results as lines of JSON on stdout"});
   }
 };
@@ -35,27 +32,27 @@ struct RunOptions {
 
   template <typename Bind>
   void Describe(Bind& bind) {
-    bind("out", out, {.help = "the output folder; the same command again continues from it"});
+    bind("out", out,
+         {.help = "the output folder; the same command again continues what is in it"});
     bind("preset", preset,
-         {.help = "trades accuracy for time; single options override it",
+         {.help = "trade-off between accuracy and time; single options override it",
           .choices = "draft|standard|paper|best"});
     bind("device", device,
-         {.help = "processor of the computations", .choices = "auto|cpu|cuda"});
-    bind("seed", seed, {.help = "of all random numbers"});
+         {.help = "the processor for fits, restyling and frames", .choices = "auto|cpu|cuda"});
+    bind("seed", seed, {.help = "seed of all random numbers"});
     bind("holdout", holdout,
          {.unit = "photos",
-          .help = "of every so many photos, in the order of names, one is not fitted but kept "
-                  "for measuring; 0 fits all photos and measures none",
+          .help = "keeps every n-th photo, in the order of names, for measuring instead of "
+                  "fitting; 0 fits all, and held-out metrics do not exist",
           .min = 0,
           .max = 1000});
-    bind(
-        "effects", effects,
-        {.help = "models of scene and camera: auto decides by measurement; ndc=on|off, "
-                 "alpha=on|off, background=on|off, exposure=on|off, view-dependence=on|off and "
-                 "pose-refinement=on|off, separated by commas, override single decisions"});
+    bind("effects", effects,
+         {.help = "effects to model: auto measures whether each is needed; a list such as "
+                  "ndc=off,exposure=on overrides that for ndc, alpha, background, exposure, "
+                  "view-dependence and pose-refinement"});
     bind("max-memory", max_memory_gb,
          {.unit = "GB",
-          .help = "limits the memory that the run plans with; 0: the free memory",
+          .help = "limit on planned memory, of 10^9 bytes; 0 takes what is free",
           .min = 0,
           .max = 1e6});
     bind("reproducible", reproducible,
@@ -73,9 +70,10 @@ struct StartOptions {
 
   template <typename Bind>
   void Describe(Bind& bind) {
-    bind("config", config, {.help = "a run.json; its options and arguments are used"});
+    bind("config", config,
+         {.help = "a run.json to take options and arguments from; flags override them"});
     bind("restart-from", restart_from,
-         {.help = "runs this stage and all later ones again, even if they are done",
+         {.help = "repeats this stage and all later ones, even where they are done",
           .choices = "|pose|reconstruct|style_2d|stylize|render|evaluate|report"});
     bind("dry-run", dry_run, {.help = "prints what would be done, and does nothing"});
     bind("break-lock", break_lock,

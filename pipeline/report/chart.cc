@@ -5,6 +5,7 @@
 
 #include "pipeline/report/html_text.h"
 #include "pipeline/report/plot.h"
+#include "pipeline/report/sequence_names.h"
 #include "pipeline/workspace/output_names.h"
 
 namespace regrade {
@@ -40,7 +41,7 @@ std::string ConsistencyChart(const EvaluationMetrics& metrics, bool film) {
   for (const auto& row : metrics.consistency) {
     if (!is_shown(row) || row.gap != gap) continue;
     PlotSeries series;
-    series.name = row.sequence;
+    series.name = SequenceLabel(row.sequence);
     series.colour = ColourOf(row.sequence, plot.series.size());
     for (size_t i = 0; i < row.tc_psnr_pairs_db.size(); ++i)
       series.points.push_back({static_cast<double>(i), row.tc_psnr_pairs_db[i].value, ""});

@@ -16,7 +16,7 @@ JsonValue PhotosJson(const PhotosReport& photos) {
   JsonValue::Array statuses;
   for (const PhotoStatus& photo : photos.statuses)
     statuses.push_back(Object{{"file", photo.file},
-                              {"status", photo.status},
+                              {"status", ToString(photo.status)},
                               {"why", photo.why.empty() ? JsonValue() : photo.why}});
   return Object{{"given", photos.given},
                 {"used", photos.used},

@@ -16,11 +16,10 @@ std::string ThumbnailHtml(const ReportPicture* picture) {
          " height=" + std::to_string(picture->height) + " src=\"" + DataUrl(*picture) + "\">";
 }
 
-// A known status is a class of the style sheet.
-std::string StatusHtml(const std::string& status) {
-  const bool known = status == "used" || status == "skipped" || status == "unregistered";
-  return "<span" + (known ? " class=" + status : std::string()) + ">" + EscapeHtml(status) +
-         "</span>";
+// The status is a class of the style sheet, too.
+std::string StatusHtml(PhotoState status) {
+  const std::string text = ToString(status);
+  return "<span class=" + text + ">" + text + "</span>";
 }
 
 // A photo that is not used, or has a remark.
@@ -38,7 +37,7 @@ std::string PhotosHtml(const RunReport& report, const ReportPictures& pictures) 
   for (size_t i = 0; i < photos.statuses.size(); ++i) {
     const PhotoStatus& photo = photos.statuses[i];
     const ReportPicture* thumbnail = ThumbnailOf(pictures, i);
-    if (photo.status != "used" || !photo.why.empty())
+    if (photo.status != PhotoState::kUsed || !photo.why.empty())
       remarks += RemarkRow(photo, thumbnail);
     else if (thumbnail != nullptr)
       used += "<figure>" + ThumbnailHtml(thumbnail) + "<figcaption>" + EscapeHtml(photo.file) +

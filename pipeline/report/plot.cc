@@ -8,8 +8,8 @@
 namespace regrade {
 namespace {
 
-constexpr double kWidth = 560, kHeight = 230;
-constexpr double kLeft = 40, kRight = 12, kTop = 8, kBottom = 34;
+constexpr double kWidth = 560, kHeight = 246;
+constexpr double kLeft = 40, kRight = 12, kTop = 24, kBottom = 34;
 constexpr int kColours = 4;
 constexpr int kTicks = 5;          // aimed at on a linear axis
 constexpr size_t kMostTips = 200;  // points of a line with a number to hover over
@@ -97,7 +97,8 @@ std::string AxesSvg(const Axis& x, const Axis& y, const Plot& plot) {
            Label(kLeft - 6, y.Position(value) + 4, "end", TickText(value, rows));
   for (const double value : columns)
     svg += Label(x.Position(value), kHeight - kBottom + 14, "middle", TickText(value, columns));
-  return svg + Label(kWidth - kRight, kHeight - 4, "end", plot.x);
+  return svg + Label(kWidth - kRight, kHeight - 4, "end", plot.x) +
+         Label(0, 11, "start", plot.y);
 }
 
 std::string SeriesSvg(const PlotSeries& series, const Axis& x, const Axis& y) {

@@ -88,8 +88,8 @@ std::vector<std::optional<ReportPicture>> Thumbnails(const Workspace& workspace,
     // Evenly spaced.
     const bool due = count <= kMostThumbnails ||
                      taken < (i + 1) * static_cast<int64_t>(kMostThumbnails) / count;
-    if (photo.status == "used" && !due) continue;
-    taken += photo.status == "used";
+    if (photo.status == PhotoState::kUsed && !due) continue;
+    taken += photo.status == PhotoState::kUsed;
     wanted[static_cast<size_t>(i)] = path->second;
   }
   // Decoding photos takes most of the time.

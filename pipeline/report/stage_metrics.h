@@ -56,7 +56,7 @@ struct PoseStageReport {
     visit("registered", registered, {.label = "registered photos"});
     visit("points", points, {.label = "points"});
     visit("reprojection_px", reprojection_px, {.label = "reprojection error", .unit = "px"});
-    visit("models_found", models_found, {.label = "models"});
+    visit("models_found", models_found);
     visit("tracks", tracks);
   }
 };
@@ -187,8 +187,8 @@ struct FilmSize {
 
   template <typename Visit>
   void Describe(Visit& visit) {
-    visit("width", width, {.label = "film width", .unit = "px"});
-    visit("height", height, {.label = "film height", .unit = "px"});
+    visit("width", width);
+    visit("height", height);
   }
 };
 

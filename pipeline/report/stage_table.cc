@@ -70,7 +70,7 @@ std::string MeasurementsHtml(const Stage& stage) {
   Stage members = stage;
   members.Describe(row);
   if constexpr (std::is_same_v<Stage, PoseStageReport>)
-    if (stage.models_found != 1)
+    if (stage.models_found > 1)
       row.Add(std::to_string(stage.models_found) + " separate models found");
   if constexpr (std::is_same_v<Stage, RenderReport>)
     row.Add("film <b>" + std::to_string(stage.film.width) + " × " +

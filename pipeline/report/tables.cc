@@ -135,8 +135,8 @@ std::string ConsistencyHtml(const RunReport& report) {
     }
     const std::string meaning = SequenceMeaning(report, sequence);
     if (!meaning.empty())
-      meanings += EscapeHtml(SequenceLabel(sequence)) + " (<code>" + EscapeHtml(sequence) +
-                  "</code>): " + meaning + ". ";
+      meanings += "<b>" + EscapeHtml(SequenceLabel(sequence)) + "</b> (<code>" +
+                  EscapeHtml(sequence) + "</code>): " + meaning + ". ";
   }
   const std::string head =
       "<tr><th rowspan=2>sequence<th colspan=6>consistency<th class=divider "

@@ -1,4 +1,4 @@
-// The command that does what a run did: every option that is not what its preset says.
+// The command that repeats a run: every option that differs from its preset.
 #pragma once
 
 #include <string>
@@ -8,7 +8,7 @@
 
 namespace regrade {
 
-// {"regrade", "run", SOURCE, "--out", ...}. How one start behaves is no part of it.
+// {"regrade", "run", SOURCE, "--out", ...}, without StartOptions and ProgramOptions.
 std::vector<std::string> EquivalentCommand(const RunContext& context);
 
 }  // namespace regrade

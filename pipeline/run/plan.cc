@@ -12,13 +12,13 @@
 namespace regrade {
 namespace {
 
-constexpr double kGridBytes = 4 + 8;    // a vertex: link, and density with link again
-constexpr double kPixelBytes = 12 + 6;  // floats as read, 16 bits a channel as drawn
-constexpr double kSphereShare = 0.6;    // of a map's texels that photos see
-constexpr double kIndexBytes = 4;       // vertex of a voxel, slot of a voxel, and back
+constexpr double kGridBytes = 4 + 8;     // per vertex: link, and density with link again
+constexpr double kPixelBytes = 12 + 6;   // floats as read, 16 bits a channel as drawn
+constexpr double kSphereFraction = 0.6;  // of a map's texels are visible in photos
+constexpr double kIndexBytes = 4;        // vertex of a voxel, slot of a voxel, and back
 
-// Rates are of two threads.
-double Shared(double seconds, int threads) { return seconds * 2 / std::max(threads, 1); }
+// Rates are for two threads.
+double SecondsWith(double seconds, int threads) { return seconds * 2 / std::max(threads, 1); }
 
 std::string MemoryText(double bytes) {
   char text[32];
@@ -39,7 +39,7 @@ StagePlan PlanFit(const FitOptions& options, int64_t photo_pixels, const SceneBo
   for (size_t s = 0; s < options.resolutions.size(); ++s) {
     const Vec3i n = ResolutionFor(box, options.resolutions[s]);
     const double vertices = static_cast<double>(n.x) * n.y * n.z;
-    const double voxels = vertices * (s == 0 ? 1 : kStoredShare);
+    const double voxels = vertices * (s == 0 ? 1 : kStoredFraction);
     const double gradients = record + kIndexBytes + arenas * kIndexBytes;
     field = std::max(
         field, voxels * (4 * record + kIndexBytes + gradients) + vertices * 2 * kGridBytes);
@@ -50,11 +50,11 @@ StagePlan PlanFit(const FitOptions& options, int64_t photo_pixels, const SceneBo
     // Values, moments, and both packed, 16 bytes each; a slot in each arena. Time is about the
     // same: the ball has fewer voxels than the box.
     const double map = 2.0 * options.background_resolution * options.background_resolution;
-    field += map * (kIndexBytes +
-                    kSphereShare * options.background_layers * (4 * 16 + arenas * kIndexBytes));
+    field += map * (kIndexBytes + kSphereFraction * options.background_layers *
+                                      (4 * 16 + arenas * kIndexBytes));
   }
   const double photos = static_cast<double>(photo_pixels) * kPixelBytes;
-  return {static_cast<uint64_t>(kProgramBytes + field + photos), Shared(seconds, threads)};
+  return {static_cast<uint64_t>(kProgramBytes + field + photos), SecondsWith(seconds, threads)};
 }
 
 StagePlan PlanFitOnDevice(const FitOptions& options, int64_t photo_pixels,
@@ -66,18 +66,18 @@ StagePlan PlanFitOnDevice(const FitOptions& options, int64_t photo_pixels,
   for (size_t s = 0; s < options.resolutions.size(); ++s) {
     const Vec3i n = ResolutionFor(box, options.resolutions[s]);
     const double vertices = static_cast<double>(n.x) * n.y * n.z;
-    const double voxels = vertices * (s == 0 ? 1 : kStoredShare);
+    const double voxels = vertices * (s == 0 ? 1 : kStoredFraction);
     // Values, gradients, moments; exact sums are twice as wide.
     const double field = voxels * ((options.exact_sums ? 4 : 3) * record + kIndexBytes) +
                          vertices * kVertexBytes;
     peak = std::max(peak, field + coarser);
-    coarser = field + 4 * voxels;  // its weights say what is kept
+    coarser = field + 4 * voxels;  // with weights, which decide what is kept
     seconds += static_cast<double>(options.steps[s]) * options.rays_per_step * kSamplesPerRay /
                kDeviceSamplesPerSecond;
   }
   if (box.spheres) {  // values, gradients and moments
     const double map = 2.0 * options.background_resolution * options.background_resolution;
-    peak += map * (kIndexBytes + kSphereShare * options.background_layers *
+    peak += map * (kIndexBytes + kSphereFraction * options.background_layers *
                                      (options.exact_sums ? 4 : 3) * 16);
   }
   if (options.exact_sums) seconds *= kExactSumsSlower;
@@ -86,15 +86,15 @@ StagePlan PlanFitOnDevice(const FitOptions& options, int64_t photo_pixels,
 }
 
 StagePlan PlanPoses(int64_t photos, int threads) {
-  return {0, Shared(kPoseSecondsPerPhoto * static_cast<double>(photos), threads)};
+  return {0, SecondsWith(kPoseSecondsPerPhoto * static_cast<double>(photos), threads)};
 }
 
 StagePlan PlanTracks(int64_t photos, int threads) {
-  return {0, Shared(kTrackSecondsPerPhoto * static_cast<double>(photos), threads)};
+  return {0, SecondsWith(kTrackSecondsPerPhoto * static_cast<double>(photos), threads)};
 }
 
 StagePlan PlanStyle(int64_t steps, int threads) {
-  return {0, Shared(kStyleSecondsPerStep * static_cast<double>(steps), threads)};
+  return {0, SecondsWith(kStyleSecondsPerStep * static_cast<double>(steps), threads)};
 }
 
 std::string PlanText(const StagePlan& plan) {
@@ -111,8 +111,7 @@ void CheckFitsMemory(const StagePlan& plan, uint64_t limit, const char* memory) 
   if (limit == 0 || plan.memory <= limit) return;
   throw Error(ExitCode::kResources,
               "the fit would take about " + MemoryText(static_cast<double>(plan.memory)) +
-                  " of " + memory + ", of " + MemoryText(static_cast<double>(limit)) +
-                  " that it may",
+                  " of " + memory + ", the limit is " + MemoryText(static_cast<double>(limit)),
               "reconstruct",
               "use --preset draft or smaller --fit-resolutions; memory grows with their cube");
 }

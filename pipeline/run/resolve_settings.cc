@@ -78,7 +78,7 @@ std::vector<std::string> ResolveSettings(const SettingsSources& sources, OptionS
   if (const auto config = options->Given("config")) {
     const RunFile file = ReadRunFile(*config);
     ApplyRunFile(file, *config, {}, options);
-    words = file.words;
+    if (sources.run_json.empty()) words = file.words;
   }
   if (const auto preset = options->Given("preset"))
     ApplyKnown(PresetValues(*preset), "--preset", options);

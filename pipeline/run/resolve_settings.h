@@ -23,7 +23,7 @@ struct SettingsSources {
 //   4. --recipe, for all options of the style network
 //   5. single flags
 // Options of presets and recipes that are not in the set are skipped. Returns the arguments of
-// the last run.json that was read. Throws Error(kUsage).
+// `sources.run_json`, or else of --config. Throws Error(kUsage).
 std::vector<std::string> ResolveSettings(const SettingsSources& sources, OptionSet* options);
 
 }  // namespace regrade

@@ -1,9 +1,10 @@
-// What every stage is given: the settings, the output folder, and who to talk to.
+// What every stage gets: the settings, the output folder and the console.
 #pragma once
 
 #include <string>
 
 #include "kernels/scene/capture.h"
+#include "pipeline/capture/working_views.h"
 #include "pipeline/run/run_settings.h"
 #include "pipeline/workspace/stage_runner.h"
 
@@ -16,7 +17,13 @@ struct RunContext {
   Workspace* workspace = nullptr;
   Console* console = nullptr;
 
-  // What a finished stage has made, as an input of later ones; null before it is done.
+  // Of the finished stage "pose", with the gains of "reconstruct"; cameras in the capture's
+  // world.
+  WorkingViews Views() const {
+    return ReadWorkingViews(workspace->Path("poses"), settings.scene.photo_size,
+                            settings.run.holdout);
+  }
+  // Hash of a finished stage's outputs, an input of later stages; null before it is done.
   JsonValue ResultOf(const std::string& stage) const {
     const auto record = workspace->Find(stage);
     return record ? JsonValue(record->OutputHash()) : JsonValue();

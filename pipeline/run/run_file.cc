@@ -36,7 +36,7 @@ JsonValue RunFileJson(const std::string& command, const RunContext& context) {
   JsonValue words = JsonValue::Array();
   if (!context.source.empty()) words.Append(context.source);
   JsonValue options = context.options.Values();
-  // How one start behaves is not repeated.
+  // Options of one start are not repeated.
   const JsonValue start = OptionValues(context.settings.start);
   JsonValue kept = JsonValue::Object();
   for (const auto& [name, value] : options.AsObject())

@@ -1,4 +1,4 @@
-// run.json: every option in effect, so that feeding it back repeats the run.
+// run.json: every option in effect; --config run.json repeats the run.
 #pragma once
 
 #include <string>
@@ -9,14 +9,14 @@
 namespace regrade {
 
 struct RunFile {
-  std::vector<std::string> words;  // what stood behind the command, paths absolute
+  std::vector<std::string> words;  // arguments that are not options, paths absolute
   JsonValue options;               // object
 };
 
 // Throws Error(kUsage) with line and column for what is not such a file.
 RunFile ReadRunFile(const std::string& path);
 
-// What `command` would write, with the fingerprints of the stages that are finished.
+// The content for `command`, with the fingerprints of finished stages.
 JsonValue RunFileJson(const std::string& command, const RunContext& context);
 
 void WriteRunFile(const std::string& command, const RunContext& context);

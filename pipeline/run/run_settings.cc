@@ -30,7 +30,7 @@ bool IsPreset(const std::string& name) {
 void ApplyPreset(const std::string& preset, RunSettings* settings) {
   settings->run.preset = preset;
   ApplyStyleRecipe(preset == "paper" ? "paper" : "standard", &settings->network);
-  if (preset == "standard") return;  // what the structs say themselves
+  if (preset == "standard") return;  // the defaults of the structs
   if (preset == "draft") {
     settings->scene.photo_size = 480;
     settings->fit.resolutions = {64, 128, 192};
@@ -42,7 +42,7 @@ void ApplyPreset(const std::string& preset, RunSettings* settings) {
     settings->fit.steps = {2000, 3000, 4000};
     settings->network.steps = 600;
   } else if (preset == "paper") {
-    // svox2's configuration for captures of one's own; LipRF's recipe for the style.
+    // svox2's configuration for custom captures; LipRF's recipe for the style.
     settings->scene.photo_size = 1280;
     settings->fit.resolutions = {128, 256, 512};
     settings->fit.steps = {25600, 25600, 51200};
@@ -59,7 +59,7 @@ void ApplyPreset(const std::string& preset, RunSettings* settings) {
     settings->fit.tv_fraction = 0.01f;
     settings->fit.prune_weight = 1.28f;
     settings->fit.initial_density = 0.1f;
-    // Rates end where svox2's course over 250000 steps is after 102400.
+    // Final rates are those of svox2's schedule of 250000 steps after 102400.
     settings->fit.background_resolution = 1024;
     settings->fit.background_lead = 0.04f;
     settings->fit.rate_background_density = 3;
@@ -76,11 +76,11 @@ void CheckTogether(const RunSettings& settings) {
   const size_t grids = settings.fit.resolutions.size(), steps = settings.fit.steps.size();
   if (grids != steps)
     throw Error(ExitCode::kUsage,
-                std::to_string(grids) + " stages against " + std::to_string(steps),
+                std::to_string(grids) + " and " + std::to_string(steps) + " stages",
                 "--fit-resolutions and --fit-steps", "give both the same number of stages");
   ParseStyleMethod(settings.style_2d);
   if (!settings.object.style_mask.empty() && !settings.object.On())
-    throw Error(ExitCode::kUsage, "labels of the style need labels of the photos",
+    throw Error(ExitCode::kUsage, "labels of the style picture need labels of the photos",
                 "--style-mask and --masks", "give --masks, a folder of labels for the photos");
 }
 

@@ -1,4 +1,4 @@
-// Everything that can be set for a run over an output folder, stage by stage.
+// All options of a run over an output folder, stage by stage.
 #pragma once
 
 #include <string>
@@ -23,8 +23,8 @@ struct SceneOptions {
   void Describe(Bind& bind) {
     bind("photo-size", photo_size,
          {.unit = "pixels",
-          .help = "longer side of the photos that the field is fitted to, and of the frames "
-                  "that are rendered; time grows with its square",
+          .help = "longer side of the photos that the field is fitted to, and of rendered "
+                  "frames; time grows with its square",
           .min = 64,
           .max = 16384});
   }
@@ -35,7 +35,7 @@ struct StyleSource {
 
   template <typename Bind>
   void Describe(Bind& bind) {
-    bind("style", picture, {.help = "the picture whose colours the scene shall have"});
+    bind("style", picture, {.help = "the style picture: the scene gets its colours"});
   }
 };
 
@@ -46,10 +46,11 @@ struct RenderOptions {
 
   template <typename Bind>
   void Describe(Bind& bind) {
-    bind("fps", fps, {.unit = "frames/s", .help = "pace of the films", .min = 1, .max = 240});
+    bind("fps", fps,
+         {.unit = "frames/s", .help = "frame rate of the films", .min = 1, .max = 240});
     bind("keep-exposure", keep_exposure,
-         {.help = "frames at the photos' places in the exposure and white balance of their "
-                  "photos, where these were undone"});
+         {.help = "renders frames at the photos' viewpoints with the exposure and white "
+                  "balance of their photos, where these were undone"});
     path.Describe(bind);
   }
 };
@@ -80,7 +81,7 @@ bool IsPreset(const std::string& name);
 // kPresets.
 void ApplyPreset(const std::string& preset, RunSettings* settings);
 
-// Options that are fine alone and contradict each other: Error(kUsage) naming both.
+// Throws Error(kUsage), naming both, for options that contradict each other.
 void CheckTogether(const RunSettings& settings);
 
 }  // namespace regrade

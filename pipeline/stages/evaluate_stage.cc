@@ -12,7 +12,6 @@
 #include "kernels/field/cpu/render_view.h"
 #include "kernels/field/packed_grid.h"
 #include "kernels/scene/common_camera.h"
-#include "pipeline/capture/capture_store.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/fields/field_file.h"
 #include "pipeline/images/image_file.h"
@@ -126,17 +125,16 @@ void AddFilm(RunContext* context, const Image& style, const Camera& camera,
 StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   const RunSettings& settings = context->settings;
   Workspace& workspace = *context->workspace;
-  const Capture capture = ReadCapture(workspace.Path("poses"));
   const StoredField stored = ReadFieldFile(workspace.Path("field.npz"));
-  std::vector<int> all(capture.views.size());
+  const WorkingViews views = context->Views().InField(stored.field_from_world, stored.ndc);
+  std::vector<int> all(static_cast<size_t>(views.count()));
   for (size_t i = 0; i < all.size(); ++i) all[i] = static_cast<int>(i);
-  const std::vector<int> training_views = StyledViews(workspace, capture, settings.run.holdout);
+  const std::vector<int> training_views = StyledViews(workspace, views);
   const auto frames = [&](const char* sequence, const std::vector<int>& views) {
     return FramesOf(workspace.Path(std::string("frames/") + sequence), views);
   };
 
-  const std::vector<Camera> cameras =
-      WorkingCameras(capture, settings.scene.photo_size, stored.field_from_world, stored.ndc);
+  const std::vector<Camera> cameras = views.Cameras();
   const bool same_camera = HaveSameIntrinsics(cameras);
   const std::vector<Camera> compared = WithCommonIntrinsics(cameras);
 
@@ -167,13 +165,13 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   // Fidelity is measured on the training views of the style, against the 2D method applied to
   // the rendered frames, or else to the photos.
   const Image style = ReadStylePicture(settings.style.picture, nullptr);
-  const FrameSource of_photos{
-      static_cast<int>(training_views.size()), [&](int k) {
-        const size_t i = static_cast<size_t>(training_views[static_cast<size_t>(k)]);
-        Image picture = ReadImage(workspace.Path("views_2d/" + FrameName(static_cast<int>(i))));
-        LeaveOutMasked(capture.views[i], settings.scene.photo_size, &picture);
-        return picture;
-      }};
+  const FrameSource of_photos{static_cast<int>(training_views.size()), [&](int k) {
+                                const int i = training_views[static_cast<size_t>(k)];
+                                Image picture =
+                                    ReadImage(workspace.Path("views_2d/" + FrameName(i)));
+                                views.LeaveOutMasked(i, &picture);
+                                return picture;
+                              }};
   const FidelityTargets targets{renders_styled ? frames("views_2d", training_views) : of_photos,
                                 frames("transmittance", training_views), &style,
                                 PerceptualDistance(settings.consistency.lpips),

@@ -3,7 +3,6 @@
 #include <numeric>
 
 #include "evaluate/image_quality.h"
-#include "pipeline/capture/working_views.h"
 #include "pipeline/fields/field_renderer.h"
 
 namespace regrade {
@@ -20,22 +19,19 @@ std::optional<double> Mean(const std::vector<double>& values) {
 std::optional<double> HeldOutMetrics::MeanPsnr() const { return Mean(psnr); }
 std::optional<double> HeldOutMetrics::MeanSsim() const { return Mean(ssim); }
 
-HeldOutMetrics MeasureHeldOut(const Capture& capture, int holdout, int photo_size,
-                              const PhotoGains& gains, const StoredField& stored,
+HeldOutMetrics MeasureHeldOut(const WorkingViews& views, const StoredField& stored,
                               Backend backend) {
+  const WorkingViews as_taken = views.AsTaken().InField(stored.field_from_world, stored.ndc);
   const FieldRenderer renderer(stored.field, backend);
   HeldOutMetrics metrics;
-  for (const int i : ViewIndices(capture, holdout, true)) {
-    const CaptureView& view = capture.views[static_cast<size_t>(i)];
-    const Image photo = ReadPhotoToFit(view, photo_size, kAsTaken);
+  for (const int i : views.HeldOut()) {
+    const Image photo = as_taken.PhotoToFit(i);
     if (photo.empty()) continue;
-    const Camera camera =
-        WorkingCamera(view.camera, photo_size, stored.field_from_world, stored.ndc);
-    Image rendered = renderer.Render(camera).color;
-    PutGain(gains.Of(i), &rendered);
+    Image rendered = renderer.Render(as_taken.CameraOf(i)).color;
+    PutGain(views.Gain(i), &rendered);
     if (const auto value = Psnr(rendered, photo)) metrics.psnr.push_back(*value);
     if (const auto value = Ssim(rendered, photo)) metrics.ssim.push_back(*value);
-    metrics.files.push_back(view.file);
+    metrics.files.push_back(views.View(i).file);
   }
   return metrics;
 }

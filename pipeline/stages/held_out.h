@@ -6,8 +6,7 @@
 #include <vector>
 
 #include "kernels/device/backend.h"
-#include "kernels/scene/capture.h"
-#include "pipeline/capture/photo_gains.h"
+#include "pipeline/capture/working_views.h"
 #include "pipeline/fields/field_file.h"
 
 namespace regrade {
@@ -19,11 +18,9 @@ struct HeldOutMetrics {
   std::optional<double> MeanSsim() const;
 };
 
-// Compares renders with the held-out photos at `photo_size` pixels. A render gets its photo's
-// gain, which is estimated from the colours of points shared with other photos. Masked pixels
-// do not count.
-HeldOutMetrics MeasureHeldOut(const Capture& capture, int holdout, int photo_size,
-                              const PhotoGains& gains, const StoredField& stored,
+// Compares renders with the held-out photos. A render gets its photo's gain, which is estimated
+// from the colours of points shared with other photos. Masked pixels do not count.
+HeldOutMetrics MeasureHeldOut(const WorkingViews& views, const StoredField& stored,
                               Backend backend);
 
 }  // namespace regrade

@@ -7,8 +7,6 @@
 #include <utility>
 
 #include "kernels/base/error.h"
-#include "pipeline/capture/photo_gains.h"
-#include "pipeline/capture/working_views.h"
 #include "pipeline/files/folder_listing.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/stages/command_stylizer.h"
@@ -27,11 +25,10 @@ namespace {
 // region, where `region` says which pixels are of it.
 using PhotoFunction = std::function<std::optional<Image>(size_t view)>;
 
-std::unique_ptr<ViewStylizer> MakeColorMethod(const RunSettings& settings, const Image& style,
-                                              const Capture& capture,
+std::unique_ptr<ViewStylizer> MakeColorMethod(StyleMethodKind kind, const StyleOptions& options,
+                                              const Image& style, const Capture& capture,
                                               const PhotoFunction& photo) {
-  const StyleOptions& options = settings.style_2d;
-  if (options.method == "idt" || options.method == "histogram") {
+  if (kind == StyleMethodKind::kIdt || kind == StyleMethodKind::kHistogram) {
     if (!options.scene_wide) return MakeDistributionTransfer(options, style);
     // As many colours in all as are taken of one view otherwise, but 256 of each at least.
     const int64_t most = std::max<int64_t>(
@@ -57,32 +54,34 @@ std::unique_ptr<ViewStylizer> MakeMethod(RunContext* context, const Capture& cap
                                          const Image& style, const PhotoFunction& photo) {
   const RunSettings& settings = context->settings;
   const StyleMethod method = ParseStyleMethod(settings.style_2d);
-  if (method.kind == "onnx")
-    return MakeOnnxStylizer(method.argument, settings.style_2d.max_side, style);
-  if (method.kind == "folder") {
-    std::vector<std::string> photos;
-    for (const CaptureView& view : capture.views) photos.push_back(view.file);
-    return MakeFolderStylizer(method.argument, photos);
+  switch (method.kind) {
+    case StyleMethodKind::kOnnx:
+      return MakeOnnxStylizer(method.argument, settings.style_2d.max_side, style);
+    case StyleMethodKind::kFolder: {
+      std::vector<std::string> photos;
+      for (const CaptureView& view : capture.views) photos.push_back(view.file);
+      return MakeFolderStylizer(method.argument, photos);
+    }
+    case StyleMethodKind::kCommand:
+      return MakeCommandStylizer(method.argument, settings.style.picture,
+                                 settings.style_2d.command_limit_s);
+    default:
+      return MakeColorMethod(method.kind, settings.style_2d, style, capture, photo);
   }
-  if (method.kind == "command")
-    return MakeCommandStylizer(method.argument, settings.style.picture,
-                               settings.style_2d.command_limit_s);
-  return MakeColorMethod(settings, style, capture, photo);
 }
 
 }  // namespace
 
-std::unique_ptr<ViewStylizer> MakeSceneStylizer(RunContext* context, const Capture& capture,
+std::unique_ptr<ViewStylizer> MakeSceneStylizer(RunContext* context, const WorkingViews& views,
                                                 const ObjectMasks* masks,
                                                 const CoverageFunction& coverage) {
   const RunSettings& settings = context->settings;
   std::string notice;
   const Image style = ReadStylePicture(settings.style.picture, &notice);
   if (!notice.empty()) context->console->Info(notice);
-  const PhotoGains gains = RecordedGains(*context->workspace, capture);
+  const Capture& capture = views.capture();
   const auto photo = [&](size_t i) -> std::optional<Image> {
-    Image picture = ReadPhotoToFit(capture.views[i], settings.scene.photo_size,
-                                   gains.Of(static_cast<int>(i)));
+    Image picture = views.PhotoToFit(static_cast<int>(i));
     if (picture.empty()) return std::nullopt;
     return picture;
   };
@@ -102,27 +101,26 @@ std::unique_ptr<ViewStylizer> MakeSceneStylizer(RunContext* context, const Captu
     regions.push_back(MakeMethod(context, capture,
                                  part.empty() ? style : WithRegion(style, part), photo_region));
   }
-  const std::string kind = ParseStyleMethod(settings.style_2d).kind;
-  const bool of_colors = kind != "onnx" && kind != "folder" && kind != "command";
+  const bool of_colors = MapsColors(ParseStyleMethod(settings.style_2d).kind);
   return MakeMaskedStylizer(std::move(regions), of_colors, coverage);
 }
 
 void ProbeMethod(StyleOptions* options) {
   namespace fs = std::filesystem;
   const StyleMethod method = ParseStyleMethod(*options);
-  if (method.kind == "command") MakeCommandStylizer(method.argument, "", 0);
-  if (method.kind != "onnx" && method.kind != "folder") return;
+  if (method.kind == StyleMethodKind::kCommand) MakeCommandStylizer(method.argument, "", 0);
+  if (!ReadsFiles(method.kind)) return;
   std::error_code error;
   if (!fs::exists(method.argument, error))
     throw Error(ExitCode::kInput, "there is no such file or folder", method.argument,
-                "what follows \"" + method.kind + ":\" in --method must exist");
+                "what follows \"" + method.name + ":\" in --method must exist");
   const fs::path absolute = fs::absolute(method.argument, error);
-  if (!error) options->method = method.kind + ":" + absolute.lexically_normal().string();
-  if (method.kind != "onnx") return;
+  if (!error) options->method = method.name + ":" + absolute.lexically_normal().string();
+  if (method.kind != StyleMethodKind::kOnnx) return;
   ProbeStyleNetwork(method.argument);
 }
 
-std::vector<int> StyledViews(const Workspace& workspace, const Capture& capture, int holdout) {
+std::vector<int> StyledViews(const Workspace& workspace, const WorkingViews& working_views) {
   const auto with_picture = [&](const std::vector<int>& views) {
     std::vector<int> kept;
     for (const int i : views)
@@ -130,8 +128,8 @@ std::vector<int> StyledViews(const Workspace& workspace, const Capture& capture,
         kept.push_back(i);
     return kept;
   };
-  std::vector<int> views = with_picture(ViewIndices(capture, holdout, false));
-  if (views.empty()) views = with_picture(ViewIndices(capture, holdout, true));
+  std::vector<int> views = with_picture(working_views.Training());
+  if (views.empty()) views = with_picture(working_views.HeldOut());
   if (views.empty())
     throw Error(ExitCode::kInput, "no view has a styled picture", workspace.Path("views_2d"),
                 "use --restart-from style_2d");
@@ -140,7 +138,7 @@ std::vector<int> StyledViews(const Workspace& workspace, const Capture& capture,
 
 JsonValue MethodFiles(const StyleOptions& options) {
   const StyleMethod method = ParseStyleMethod(options);
-  if (method.kind != "onnx" && method.kind != "folder") return JsonValue();
+  if (!ReadsFiles(method.kind)) return JsonValue();
   std::error_code error;
   if (std::filesystem::is_regular_file(method.argument, error))
     return HashFile(method.argument);

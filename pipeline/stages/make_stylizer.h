@@ -13,7 +13,7 @@
 
 namespace regrade {
 
-std::unique_ptr<ViewStylizer> MakeSceneStylizer(RunContext* context, const Capture& capture,
+std::unique_ptr<ViewStylizer> MakeSceneStylizer(RunContext* context, const WorkingViews& views,
                                                 const ObjectMasks* masks = nullptr,
                                                 const CoverageFunction& coverage = nullptr);
 
@@ -24,7 +24,7 @@ void ProbeMethod(StyleOptions* options);
 // Views that the style is learned from and measured on: the fitted ones that have a picture in
 // views_2d/; where none of them has, all that do, held out or not. Throws Error(kInput) if
 // there is none at all.
-std::vector<int> StyledViews(const Workspace& workspace, const Capture& capture, int holdout);
+std::vector<int> StyledViews(const Workspace& workspace, const WorkingViews& views);
 
 // Hashes of the files that the method itself reads, as part of a stage's inputs: networks, or
 // pictures of a folder. Null for other methods. Throws Error(kInput) for a file or folder that

@@ -1,6 +1,8 @@
 #include "pipeline/stages/network_probe.h"
 
 #include <charconv>
+#include <cstdlib>
+#include <new>
 
 #include "evaluate/pair_network.h"
 #include "kernels/base/error.h"
@@ -39,14 +41,17 @@ void RunNetworkProbe(const std::vector<std::string>& arguments) {
   if (memory <= 0) throw Error(ExitCode::kUsage, "expects MEMORY KIND FILE", kProbeFlag);
   ApplyProbeLimits(memory);
   const std::string &kind = arguments[1], &path = arguments[2];
-  if (kind == kStyle) {
-    OpenStyleNetwork(path);
-  } else if (kind == kPair) {
-    const Image picture(64, 64, 3);
-    PairNetwork(path).Distance(picture, picture);
-  } else {
-    throw Error(ExitCode::kUsage, "unknown kind of probe", kind);
+  try {
+    if (kind == kStyle) return OpenStyleNetwork(path);
+    if (kind == kPair) {
+      const Image picture(64, 64, 3);
+      PairNetwork(path).Distance(picture, picture);
+      return;
+    }
+  } catch (const std::bad_alloc&) {
+    std::_Exit(kProbeOutOfMemory);
   }
+  throw Error(ExitCode::kUsage, "unknown kind of probe", kind);
 }
 
 }  // namespace regrade

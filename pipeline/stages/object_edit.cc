@@ -4,7 +4,6 @@
 
 #include "kernels/base/error.h"
 #include "kernels/field/cpu/render_view.h"
-#include "pipeline/capture/working_views.h"
 #include "pipeline/files/npz_file.h"
 #include "stylize/field/object_weights.h"
 
@@ -33,10 +32,9 @@ std::unique_ptr<ObjectMasks> OpenObjectMasks(const RunSettings& settings,
   return std::make_unique<ObjectMasks>(settings.object, photos);
 }
 
-ObjectWeights VoteForObject(const RunSettings& settings, const Capture& capture,
+ObjectWeights VoteForObject(const RunSettings& settings, const WorkingViews& working_views,
                             const std::vector<int>& views, const ObjectMasks& masks,
-                            const RadianceField& field, const Similarity& field_from_world,
-                            const NdcSpace& ndc, const ProgressFunction& progress) {
+                            const RadianceField& field, const ProgressFunction& progress) {
   std::vector<MaskVote> votes;
   for (int k = 0; k < masks.num_regions(); ++k)
     votes.emplace_back(*field.geometry, field.near_clip, MarchOptions{field.step});
@@ -46,55 +44,54 @@ ObjectWeights VoteForObject(const RunSettings& settings, const Capture& capture,
       throw Interrupted();
     const int i = views[n];
     if (!masks.Knows(i)) continue;
-    const Camera camera = WorkingCamera(capture.views[static_cast<size_t>(i)].camera,
-                                        settings.scene.photo_size, field_from_world, ndc);
+    const Camera camera = working_views.CameraOf(i);
     const std::vector<Image> coverage = masks.Coverage(i, camera.width, camera.height);
     for (size_t k = 0; k < votes.size(); ++k) votes[k].Add(camera, coverage[k]);
   }
-  ObjectWeights shares;
+  ObjectWeights weights;
   for (const MaskVote& vote : votes)
-    shares.regions.push_back(vote.Shares(settings.object.vote, settings.object.edge));
-  shares.all = SumOf(shares.regions);
-  return shares;
+    weights.regions.push_back(vote.Weights(settings.object.vote, settings.object.edge));
+  weights.all = SumOf(weights.regions);
+  return weights;
 }
 
-void WriteObjectFile(const std::string& path, const ObjectWeights& shares) {
+void WriteObjectFile(const std::string& path, const ObjectWeights& weights) {
   std::vector<float> values;
-  for (const std::vector<float>& region : shares.regions)
+  for (const std::vector<float>& region : weights.regions)
     values.insert(values.end(), region.begin(), region.end());
   NpzWriter file;
   file.Add(
-      "shares",
-      {static_cast<int64_t>(shares.regions.size()), static_cast<int64_t>(shares.all.size())},
+      "weights",
+      {static_cast<int64_t>(weights.regions.size()), static_cast<int64_t>(weights.all.size())},
       values.data(), NpzPacking::kDeflate);
-  file.AddScalar<int32_t>("regrade_version", 1);
+  file.AddScalar<int32_t>("regrade_version", 2);
   file.WriteTo(path);
 }
 
 ObjectWeights ReadObjectFile(const std::string& path, int64_t voxels) {
   NpzReader file(path, uint64_t{16} << 30);
-  RefuseNewerFormat(&file, 1);
-  const NpzArray array = file.Read("shares", ArrayType::kF32, {-1, voxels});
+  RefuseNewerFormat(&file, 2);
+  const NpzArray array = file.Read("weights", ArrayType::kF32, {-1, voxels});
   const int64_t regions = array.shape[0];
   if (regions < 1 || regions > ObjectMasks::kMostRegions)
     throw Error(ExitCode::kInput, "holds " + std::to_string(regions) + " regions", path,
                 "run regrade stylize again");
-  ObjectWeights shares;
+  ObjectWeights weights;
   for (int64_t k = 0; k < regions; ++k) {
     const float* first = array.As<float>() + k * voxels;
-    shares.regions.emplace_back(first, first + voxels);
+    weights.regions.emplace_back(first, first + voxels);
   }
-  for (const std::vector<float>& region : shares.regions)
+  for (const std::vector<float>& region : weights.regions)
     if (!std::all_of(region.begin(), region.end(), [](float e) { return e >= 0 && e <= 1; }))
-      throw Error(ExitCode::kInput, "holds a share outside [0, 1]", path,
+      throw Error(ExitCode::kInput, "holds a weight outside [0, 1]", path,
                   "run regrade stylize again");
-  shares.all = SumOf(shares.regions);
-  return shares;
+  weights.all = SumOf(weights.regions);
+  return weights;
 }
 
-CoverageRenderer::CoverageRenderer(const RadianceField& field, const ObjectWeights& shares)
+CoverageRenderer::CoverageRenderer(const RadianceField& field, const ObjectWeights& weights)
     : step_(field.step) {
-  for (const std::vector<float>& region : shares.regions)
+  for (const std::vector<float>& region : weights.regions)
     grids_.push_back(MakeFastGrid(WeightField(field, region)));
 }
 

@@ -1,5 +1,5 @@
-// A style for an object alone: masks of photos become shares of voxels, and everything that a
-// stage needs to know of them.
+// Styles of an object alone: object weights of voxels from masks of photos, their file, and
+// masks rendered from them.
 #pragma once
 
 #include <memory>
@@ -18,27 +18,26 @@ namespace regrade {
 std::unique_ptr<ObjectMasks> OpenObjectMasks(const RunSettings& settings,
                                              const Capture& capture);
 
-// Shares of each voxel: one list a region, and their sum.
+// Object weights [voxels] of each region, and their sum.
 struct ObjectWeights {
   std::vector<std::vector<float>> regions;
   std::vector<float> all;
 };
 
 // See EQ(mask-vote); the masks of `views` vote.
-ObjectWeights VoteForObject(const RunSettings& settings, const Capture& capture,
+ObjectWeights VoteForObject(const RunSettings& settings, const WorkingViews& working_views,
                             const std::vector<int>& views, const ObjectMasks& masks,
-                            const RadianceField& field, const Similarity& field_from_world,
-                            const NdcSpace& ndc, const ProgressFunction& progress);
+                            const RadianceField& field, const ProgressFunction& progress);
 
-// object.npz: f32 "shares" [regions, voxels]. Reading throws Error(kInput) for a file that
+// object.npz: f32 "weights" [regions, voxels]. Reading throws Error(kInput) for a file that
 // does not fit the field.
-void WriteObjectFile(const std::string& path, const ObjectWeights& shares);
+void WriteObjectFile(const std::string& path, const ObjectWeights& weights);
 ObjectWeights ReadObjectFile(const std::string& path, int64_t voxels);
 
-// What of each pixel of a render is of each region: masks for any camera, all of one mind.
+// Renders the consensus masks from any camera: how much of each pixel belongs to each region.
 class CoverageRenderer {
  public:
-  CoverageRenderer(const RadianceField& field, const ObjectWeights& shares);
+  CoverageRenderer(const RadianceField& field, const ObjectWeights& weights);
   std::vector<Image> Render(const Camera& camera) const;
 
  private:

@@ -1,10 +1,12 @@
-// Stage "pose": a folder of photos becomes poses/, a capture with a camera for each photo that
-// found its place.
+// Stage "pose": a folder of photos becomes poses/, a capture with a camera for each registered
+// photo.
 #include <omp.h>
 
 #include <filesystem>
 
 #include "pipeline/capture/capture_store.h"
+#include "pipeline/capture/colmap_photos.h"
+#include "pipeline/capture/photo_gains.h"
 #include "pipeline/capture/photo_masks.h"
 #include "pipeline/capture/pose_profile.h"
 #include "pipeline/capture/pose_tracks.h"
@@ -19,7 +21,9 @@
 namespace regrade {
 namespace {
 
-// Which files, with which contents: what F40's difference is listed from.
+constexpr char kColmapPhotos[] = ".regrade/work/pose_photos";
+
+// Names and hashes of the files (F40).
 JsonValue PhotoSet(const CaptureSource& source) {
   JsonValue files = JsonValue::Object();
   for (const ListedFile& file : ListFolder(source.photos).files)
@@ -27,13 +31,12 @@ JsonValue PhotoSet(const CaptureSource& source) {
   return files;
 }
 
-// Seconds on two cores, roughly: photos take what their bytes take to read, and their number to
-// place.
-struct StageShares {
+// Rough seconds on two cores: ingest grows with the bytes, poses with the number of photos.
+struct StageSeconds {
   double ingest = 1, poses = 0, tracks = 0, refinement = 0.5;
 };
 
-StageShares EstimateObjectWeights(const CaptureSource& source) {
+StageSeconds EstimateSeconds(const CaptureSource& source) {
   double bytes = 0, photos = 0;
   for (const ListedFile& file : ListFolder(source.photos).files) {
     std::error_code none;
@@ -43,22 +46,23 @@ StageShares EstimateObjectWeights(const CaptureSource& source) {
   const double ingest = 0.5e-6 * bytes + 0.1;
   if (source.kind == CaptureKind::kPhotos)
     return {ingest, 0.75 * kPoseSecondsPerPhoto * photos, 0, 0};
-  // Whether tracks are looked for is known later.
+  // Whether tracks are needed is known later.
   if (source.kind == CaptureKind::kTransforms || source.kind == CaptureKind::kLlff)
     return {ingest, 0, kTrackSecondsPerPhoto * photos, 0.1 * photos};
   return {ingest, 0, 0, 0.1 * photos};
 }
 
-// What a dry run says of tracks, which may be looked for.
+// The clause of a dry run about tracks, which may be needed.
 std::string PlannedTracks(const RunSettings& settings, const CaptureSource& source,
                           int64_t photos) {
-  const bool may = source.kind == CaptureKind::kTransforms || source.kind == CaptureKind::kLlff;
-  if (!may || settings.pose.tracks != "auto") return "";
+  const bool without_points =
+      source.kind == CaptureKind::kTransforms || source.kind == CaptureKind::kLlff;
+  if (!without_points || settings.pose.tracks != "auto") return "";
   return "; points by COLMAP, unless photos are transparent: " +
          PlanText(PlanTracks(photos, omp_get_max_threads()));
 }
 
-// The folder of masks: that of the options, or what another run of ours has staged.
+// The folder of masks: that of the options, or of the run that the poses come from.
 std::string MasksOf(const RunContext& context, const CaptureSource& source) {
   const std::string& given = context.settings.pose.photo_masks;
   if (!given.empty() || source.kind != CaptureKind::kPosed) return given;
@@ -77,12 +81,14 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
   workspace.NewPath("poses/sparse/x");
   workspace.NewPath(".regrade/work/pose/x");
 
-  const StageShares shares = EstimateObjectWeights(source);
+  const StageSeconds seconds = EstimateSeconds(source);
   ProgressParts parts(progress,
-                      shares.ingest + shares.poses + shares.tracks + shares.refinement);
+                      seconds.ingest + seconds.poses + seconds.tracks + seconds.refinement);
   const IngestResult ingest =
-      IngestPhotos(source.photos, photo_folder, settings.ingest, parts.Next(shares.ingest));
+      IngestPhotos(source.photos, photo_folder, settings.ingest, parts.Next(seconds.ingest));
   for (const std::string& notice : ingest.notices) context->console->Info(notice);
+  const std::vector<StagedPhoto> colmap_photos =
+      PhotosForColmap(ingest.photos, workspace.Path(kColmapPhotos));
 
   StageOutcome outcome;
   PoseStageReport metrics;
@@ -91,18 +97,19 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
   options.threads = settings.program.threads;
   const std::string mask_folder = workspace.Path("poses/masks");
   std::filesystem::remove_all(mask_folder);  // of an earlier run
+  std::filesystem::remove(workspace.Path("poses") + "/" + kExposureFile);
   if (const std::string folder = MasksOf(*context, source); !folder.empty()) {
     options.mask_folder = mask_folder;
     const int masks = StagePhotoMasks(folder, ingest.photos, options.mask_folder);
-    context->console->Info("what " + std::to_string(masks) +
-                           " masks blacken is neither matched nor fitted");
+    context->console->Info(std::to_string(masks) +
+                           " masks: their black parts are neither matched nor fitted");
     metrics.photo_masks = masks;
   }
   if (source.kind == CaptureKind::kPhotos) {
     PoseReport report;
-    capture = PosesFromPhotos(ingest.photos, ingest.statuses, options,
+    capture = PosesFromPhotos(colmap_photos, ingest.statuses, options,
                               workspace.Path(".regrade/work/pose"), sparse_folder,
-                              parts.Next(shares.poses), &report);
+                              parts.Next(seconds.poses), &report);
     for (const std::string& note : report.notes) context->console->Info(note);
     metrics.colmap = report.colmap_version;
     metrics.strategy = report.strategy;
@@ -115,25 +122,28 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
   }
   PoseTracks tracks;
   if (source.kind != CaptureKind::kPhotos)
-    tracks = AddTracks(options, settings.run.effects, sparse_folder, ingest.photos,
+    tracks = AddTracks(options, settings.run.effects, sparse_folder, colmap_photos,
                        workspace.Path(".regrade/work/pose/tracks"), &capture,
-                       parts.Next(shares.tracks));
+                       parts.Next(seconds.tracks));
   if (!tracks.note.empty()) context->console->Info(tracks.note);
   if (!tracks.metrics.IsNull()) outcome.metrics["tracks"] = tracks.metrics;
-  const PoseProfile profile =
-      ProfilePoses(source.kind, settings.pose, settings.run.effects, sparse_folder,
-                   ingest.photos, tracks.misfit_scale, &capture, parts.Next(shares.refinement));
+  for (CaptureView& view : capture.views) view.path = photo_folder + "/" + view.name;
+  const PoseProfile profile = ProfilePoses(source.kind, settings.pose, settings.run.effects,
+                                           sparse_folder, ingest.photos, tracks.misfit_scale,
+                                           &capture, parts.Next(seconds.refinement));
   context->console->Info(EffectLine(profile.effect));
   outcome.metrics["effects"] = EffectsRecord({profile.effect});
   if (!profile.metrics.IsNull()) outcome.metrics["pose_refinement"] = profile.metrics;
   WriteCaptureIndex(workspace.Path("poses"), capture, ingest.photos);
+  std::filesystem::remove_all(workspace.Path(kColmapPhotos));
   metrics.registered = static_cast<int>(capture.views.size());
   metrics.points = static_cast<int64_t>(capture.points.size());
-  metrics.reprojection_px = capture.reprojection_px;
+  metrics.reprojection_px = capture.points.empty() ? Metric::Undefined("there are no points")
+                                                   : Metric(capture.reprojection_px);
   metrics.models_found = capture.models_found;
   PutMetrics(metrics, &outcome.metrics);
   outcome.outputs = {"poses"};
-  context->console->Info("placed " + std::to_string(capture.views.size()) + " of " +
+  context->console->Info("registered " + std::to_string(capture.views.size()) + " of " +
                          std::to_string(ingest.photos.size()) + " photos, " +
                          std::to_string(capture.points.size()) + " points");
   return outcome;
@@ -157,9 +167,9 @@ Stage PoseStage(RunContext* context) {
         stage.inputs["poses"][part] = HashFile(source.poses + "/" + part);
   if (source.kind == CaptureKind::kPosed)
     stage.inputs["poses"]["nearest_depth"] = NearestDepthOf(source);
-  const auto wishes = ParseEffects(context->settings.run.effects);
-  if (const auto wish = wishes.find(kPoseRefinement); wish != wishes.end())
-    stage.inputs[kPoseRefinement] = wish->second;
+  const auto overrides = ParseEffects(context->settings.run.effects);
+  if (const auto refine = overrides.find(kPoseRefinement); refine != overrides.end())
+    stage.inputs[kPoseRefinement] = refine->second;
   if (const std::string folder = MasksOf(*context, source); !folder.empty())
     stage.inputs["photo_masks"] = PhotoMaskFiles(folder);
   stage.refuse_changes = true;

@@ -1,4 +1,4 @@
-// Stage "reconstruct": the capture becomes field.npz, measured on the photos it has not seen.
+// Stage "reconstruct": fits field.npz to the capture, and measures it on held-out photos.
 #include <omp.h>
 
 #include <algorithm>
@@ -28,11 +28,11 @@ namespace regrade {
 namespace {
 
 constexpr double kAfterFit =
-    0.08;  // pruning, writing and measuring, as a share of the steps' time
+    0.08;  // pruning, writing and measuring, as a fraction of the steps' time
 constexpr double kTrial = 0.08;         // the trial of degrees, likewise
-constexpr int kReproducibleShards = 4;  // sums in a fixed grouping, whatever the threads
+constexpr int kReproducibleShards = 4;  // sums grouped independently of the threads
 
-// To a thousandth: what a drawing can show.
+// To a thousandth, for charts.
 double Rounded(double value) { return std::round(value * 1000) / 1000; }
 
 void SetHeldOut(const HeldOutMetrics& held_out, ReconstructReport* metrics) {
@@ -46,14 +46,12 @@ int Finest(const FitOptions& options) {
   return *std::max_element(options.resolutions.begin(), options.resolutions.end());
 }
 
-// What a fit of this capture's photos takes, by its options.
-std::function<StagePlan(const FitOptions&)> PlannerOf(const RunSettings& settings,
-                                                      const Capture& capture,
+// Memory and time of a fit of these views, by its options.
+std::function<StagePlan(const FitOptions&)> PlannerOf(const WorkingViews& views,
                                                       const SceneBox& box, Backend backend) {
   int64_t pixels = 0;
-  for (const int i : ViewIndices(capture, settings.run.holdout, false)) {
-    const Camera camera = WorkingCamera(capture.views[static_cast<size_t>(i)].camera,
-                                        settings.scene.photo_size, {}, {});
+  for (const int i : views.Training()) {
+    const Camera camera = views.CameraOf(i);
     pixels += int64_t{camera.width} * camera.height;
   }
   return [pixels, box, backend](const FitOptions& options) {
@@ -62,7 +60,7 @@ std::function<StagePlan(const FitOptions&)> PlannerOf(const RunSettings& setting
   };
 }
 
-// The fit's options, their resolutions lowered where memory asks for it: said, and recorded.
+// The fit's options, with resolutions lowered to fit into memory, which is reported.
 FitOptions OptionsForMemory(RunContext* context,
                             const std::function<StagePlan(const FitOptions&)>& plan_of,
                             Backend backend) {
@@ -74,79 +72,78 @@ FitOptions OptionsForMemory(RunContext* context,
                               : ReadMemoryStatus().available);
   FitOptions options = settings.fit;
   options.seed = settings.run.seed;
-  // What happens to be free must not decide about the bytes of a reproducible run.
+  // Free memory must not change the result of a reproducible run.
   if ((!settings.run.reproducible || settings.run.max_memory_gb > 0) &&
       LowerToMemory(plan_of, limit, &options))
-    context->console->Info(
-        "the finest grid has " + std::to_string(Finest(options)) +
-        " voxels a side instead of " + std::to_string(Finest(settings.fit)) +
-        ": more would not fit into " +
-        (settings.run.max_memory_gb > 0 ? "--max-memory" : "the memory that is free"));
+    context->console->Info("the finest grid has " + std::to_string(Finest(options)) +
+                           " voxels a side instead of " + std::to_string(Finest(settings.fit)) +
+                           " to fit into " +
+                           (settings.run.max_memory_gb > 0 ? "--max-memory" : "free memory"));
   const StagePlan plan = plan_of(options);
   context->console->Info("the fit will take " + PlanText(plan));
   CheckFitsMemory(plan, limit, on_device ? "GPU memory" : "memory");
   return options;
 }
 
-// Whether the fit keeps its spherical harmonics, and the row that says why.
+// Decides whether the fit keeps its spherical harmonics, with the evidence.
 EffectReport ProfileViewDependence(const RunSettings& settings, const FitOptions& options,
                                    const std::vector<TrainingView>& views, const SceneBox& box,
                                    const ProgressFunction& progress, Backend backend) {
   const auto row = [](bool on, const Metric& value, const std::string& evidence) {
     return EffectReport{kViewDependence, on, evidence, value, kDegreePays};
   };
-  const auto wishes = ParseEffects(settings.run.effects);
-  const auto wish = wishes.find(kViewDependence);
-  const bool wanted = wish == wishes.end() || wish->second;
-  if (options.sh_degree == 0 || !wanted) return row(false, Metric(), "as asked for");
-  if (wish != wishes.end()) return row(true, Metric(), "as asked for");
+  const auto overrides = ParseEffects(settings.run.effects);
+  const auto override = overrides.find(kViewDependence);
+  const bool allowed = override == overrides.end() || override->second;
+  if (options.sh_degree == 0 || !allowed) return row(false, Metric(), "set by options");
+  if (override != overrides.end()) return row(true, Metric(), "set by options");
   if (views.size() < kLeastTrialViews)
-    return row(true, Metric(), "too few photos to keep some from a trial");
+    return row(true, Metric(), "too few photos for a trial with held-out ones");
   const DegreeTrial trial = TryDegrees(views, box, options, progress, backend);
   if (!std::isfinite(trial.gain_db))
-    return row(true, Metric(),
-               "too little of the photos is not masked to keep some from a trial");
-  return row(trial.Pays(), trial.gain_db,
-             "decibels that harmonics of degree " + std::to_string(options.sh_degree) +
-                 " gain over one colour for all directions, on a fifth of the views that a "
-                 "small trial did not see");
+    return row(true, Metric(), "too few unmasked pixels for a trial with held-out photos");
+  return row(
+      trial.Pays(), trial.gain_db,
+      "dB that harmonics of degree " + std::to_string(options.sh_degree) +
+          " gain over one colour for all directions, in a small trial on a held-out fifth "
+          "of the views");
 }
 
 StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
                          const ProgressFunction& progress) {
   const RunSettings& settings = context->settings;
   Workspace& workspace = *context->workspace;
-  const Capture capture = ReadCapture(workspace.Path("poses"));
+  const WorkingViews as_taken(ReadCapture(workspace.Path("poses")), settings.scene.photo_size,
+                              settings.run.holdout);
+  const Capture& capture = as_taken.capture();
   SceneProfile profile = ProfileScene(capture, settings.fit.sh_degree, settings.run.effects);
   const NormalizedScene& scene = profile.scene;
+  const WorkingViews views =
+      as_taken.WithGains(profile.gains).InField(scene.field_from_world, scene.ndc);
   if (!scene.notice.empty()) context->console->Info(scene.notice);
   for (const EffectReport& effect : profile.effects)
     if (effect.name != kViewDependence) context->console->Info(EffectLine(effect));
   for (const std::string& notice : profile.notices) context->console->Info(notice);
   const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
-  FitOptions options =
-      OptionsForMemory(context, PlannerOf(settings, capture, scene.box, backend), backend);
+  FitOptions options = OptionsForMemory(context, PlannerOf(views, scene.box, backend), backend);
 
-  const std::vector<int> fitted = ViewIndices(capture, settings.run.holdout, false);
+  const std::vector<int> fitted = views.Training();
   std::vector<Image> photos;
   photos.reserve(fitted.size());
-  std::vector<TrainingView> views;
+  std::vector<TrainingView> training_views;
   for (const int i : fitted) {
-    const CaptureView& view = capture.views[static_cast<size_t>(i)];
-    Image photo = ReadPhotoToFit(view, settings.scene.photo_size, profile.gains.Of(i));
+    Image photo = views.PhotoToFit(i);
     if (photo.empty()) {
-      context->console->Info(view.file + ": its mask leaves nothing to fit");
+      context->console->Info(views.View(i).file + ": its mask leaves nothing to fit");
       continue;
     }
     photos.push_back(std::move(photo));
-    views.push_back({WorkingCamera(view.camera, settings.scene.photo_size,
-                                   scene.field_from_world, scene.ndc),
-                     &photos.back()});
+    training_views.push_back({views.CameraOf(i), &photos.back()});
   }
 
   if (settings.run.reproducible && options.shards == 0) options.shards = kReproducibleShards;
   FitHooks hooks;
-  std::string measured;  // the row of view dependence: an interruption must not change it
+  std::string measured;  // the row of view dependence: must survive an interruption
   hooks.checkpoint = [&](const FitState& state) {
     workspace.SaveCheckpoint("reconstruct", inputs, PackFitState(state, measured));
   };
@@ -155,10 +152,10 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
     resume = UnpackFitState(*bytes, &measured);
   if (resume) {
     hooks.resume = &*resume;
-    context->console->Info("reconstruct: goes on from its checkpoint");
+    context->console->Info("reconstruct: continues from its checkpoint");
   }
-  if (views.empty())
-    throw Error(ExitCode::kInput, "leave nothing to fit of any photo",
+  if (training_views.empty())
+    throw Error(ExitCode::kInput, "leave nothing of any photo to fit",
                 settings.pose.photo_masks.empty() ? "the masks" : settings.pose.photo_masks,
                 "make the masks' white parts larger");
   ProgressParts parts(progress, kTrial + 1 + kAfterFit);
@@ -167,23 +164,24 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
                     [](const EffectReport& effect) { return effect.name == kViewDependence; });
   const ProgressFunction trial = parts.Next(kTrial);
   const double trial_begin = context->console->StageSeconds(), trial_cpu_begin = CpuSeconds();
-  view_dependence =
-      resume ? EffectsOfRecord(ParseJson(measured, "checkpoint")).at(0)
-             : ProfileViewDependence(settings, options, views, scene.box, trial, backend);
+  view_dependence = resume ? EffectsOfRecord(ParseJson(measured, "checkpoint")).at(0)
+                           : ProfileViewDependence(settings, options, training_views, scene.box,
+                                                   trial, backend);
   measured = DumpJson(EffectsRecord({view_dependence}), -1);
   const double trial_seconds = context->console->StageSeconds() - trial_begin,
                trial_cpu_seconds = CpuSeconds() - trial_cpu_begin;
   context->console->Info(EffectLine(view_dependence));
   if (!view_dependence.on) options.sh_degree = 0;
   hooks.progress = parts.Next(1);
-  const FitResult fit = FitField(views, scene.box, options, hooks, backend);
+  const FitResult fit = FitField(training_views, scene.box, options, hooks, backend);
 
   WriteFieldFile(workspace.Path("field.npz"), {fit.field, scene.field_from_world, scene.ndc});
   StageOutcome outcome;
   outcome.outputs = {"field.npz"};
   outcome.metrics["effects"] = EffectsRecord(profile.effects);
+  WriteGains(workspace.Path("poses"), capture, profile.exposure, profile.gains);
   if (!profile.gains.of_view.empty())
-    outcome.metrics["exposure"] = GainsRecord(capture, profile.exposure, profile.gains);
+    outcome.outputs.push_back(std::string("poses/") + kExposureFile);
   ReconstructReport metrics;
   if (!resume && view_dependence.value.value) {  // a prediction needs them apart
     metrics.trial_seconds = trial_seconds;
@@ -200,8 +198,7 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   for (const FitCurvePoint& point : fit.curve)
     if (std::isfinite(point.psnr_train_db))
       metrics.psnr_at_steps.emplace_back(point.step, Rounded(point.psnr_train_db));
-  SetHeldOut(MeasureHeldOut(capture, settings.run.holdout, settings.scene.photo_size,
-                            profile.gains, ReadFieldFile(workspace.Path("field.npz")), backend),
+  SetHeldOut(MeasureHeldOut(views, ReadFieldFile(workspace.Path("field.npz")), backend),
              &metrics);
   PutMetrics(metrics, &outcome.metrics);
   return outcome;
@@ -222,14 +219,13 @@ Stage ReconstructStage(RunContext* context) {
       {"reproducible", run.reproducible}};
   stage.refuse_changes = true;
   if (context->settings.start.dry_run) {
-    const Capture capture = ReadCapture(context->workspace->Path("poses"));
-    // Exposures have no say in the box, and measuring them would read every photo.
-    const SceneProfile profile =
-        ProfileScene(capture, context->settings.fit.sh_degree, run.effects + ",exposure=off");
-    const SceneBox& box = profile.scene.box;
+    const WorkingViews views(ReadCapture(context->workspace->Path("poses")),
+                             context->settings.scene.photo_size, run.holdout);
+    // The box does not depend on exposures, and measuring them would read every photo.
+    const SceneProfile profile = ProfileScene(views.capture(), context->settings.fit.sh_degree,
+                                              run.effects + ",exposure=off");
     const Backend backend = ChooseBackend(run.device, run.reproducible);
-    stage.plan =
-        PlanText(PlannerOf(context->settings, capture, box, backend)(context->settings.fit));
+    stage.plan = PlanText(PlannerOf(views, profile.scene.box, backend)(context->settings.fit));
   }
   stage.work = [context, inputs = stage.inputs](const ProgressFunction& progress) {
     return Reconstruct(context, inputs, progress);

@@ -9,7 +9,6 @@
 #include <optional>
 
 #include "kernels/scene/common_camera.h"
-#include "pipeline/capture/capture_store.h"
 #include "pipeline/capture/photo_gains.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/fields/camera_path.h"
@@ -70,9 +69,7 @@ const FrameSet* CommonSet(const std::vector<FrameSet>& sets) {
 
 // The sets before there is a field: poses in the capture's world, final sizes.
 std::vector<FrameSet> PlannedSets(const RunContext& context) {
-  const Capture capture = ReadCapture(context.workspace->Path("poses"));
-  return FrameSetsOf(WorkingCameras(capture, context.settings.scene.photo_size, {}, {}),
-                     context.settings.render.path);
+  return FrameSetsOf(context.Views().Cameras(), context.settings.render.path);
 }
 
 // "24 frames at the photos' positions, 24 there with one camera (480x360 px), 60 of the film,
@@ -158,8 +155,8 @@ class FrameWriter {
 StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   const RunSettings& settings = context->settings;
   Workspace& workspace = *context->workspace;
-  const Capture capture = ReadCapture(workspace.Path("poses"));
   const StoredField before = ReadFieldFile(workspace.Path("field.npz"));
+  const WorkingViews views = context->Views().InField(before.field_from_world, before.ndc);
   const StoredField after = ReadFieldFile(workspace.Path("styled.npz"));
   const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
   FrameRenderers renderers{FieldRenderer(before.field, backend),
@@ -167,17 +164,15 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
                            nullptr,
                            nullptr,
                            {}};
-  const std::unique_ptr<ObjectMasks> masks = OpenObjectMasks(settings, capture);
+  const std::unique_ptr<ObjectMasks> masks = OpenObjectMasks(settings, views.capture());
   if (masks != nullptr)
     renderers.object = std::make_unique<CoverageRenderer>(
         before.field,
         ReadObjectFile(workspace.Path("object.npz"), before.field.geometry->num_voxels()));
-  renderers.stylizer = MakeSceneStylizer(context, capture, masks.get(),
+  renderers.stylizer = MakeSceneStylizer(context, views, masks.get(),
                                          [&](const Image&, int) { return renderers.coverage; });
 
-  const std::vector<FrameSet> sets = FrameSetsOf(
-      WorkingCameras(capture, settings.scene.photo_size, before.field_from_world, before.ndc),
-      settings.render.path);
+  const std::vector<FrameSet> sets = FrameSetsOf(views.Cameras(), settings.render.path);
   int total = 0;
   for (const FrameSet& set : sets) total += static_cast<int>(set.cameras.size());
   const FrameSet& film =
@@ -185,8 +180,6 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   if (const FrameSet* common = CommonSet(sets))
     context->console->Info(ComparisonNote(common->cameras[0]));
 
-  const PhotoGains gains =
-      settings.render.keep_exposure ? RecordedGains(workspace, capture) : PhotoGains();
   std::filesystem::remove_all(workspace.Path("frames"));
   StageOutcome outcome;
   outcome.outputs = {"frames"};
@@ -197,10 +190,11 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
     for (const FrameSet& set : sets)
       for (int i = 0; i < static_cast<int>(set.cameras.size()); ++i) {
         if (Report(progress, done++, total) == LoopControl::kStop) throw Interrupted();
-        writer.Write(std::make_shared<const Frame>(
-                         RenderFrame(context, &renderers, set.cameras[static_cast<size_t>(i)],
-                                     set.of_photos ? gains.Of(i) : kAsTaken, i)),
-                     set, i);
+        writer.Write(
+            std::make_shared<const Frame>(RenderFrame(
+                context, &renderers, set.cameras[static_cast<size_t>(i)],
+                set.of_photos && settings.render.keep_exposure ? views.Gain(i) : kAsTaken, i)),
+            set, i);
       }
     writer.Finish();
   }

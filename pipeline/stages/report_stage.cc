@@ -35,9 +35,9 @@ PhotosReport PhotosOf(const Capture& capture) {
   PhotosReport photos;
   photos.given = static_cast<int>(capture.statuses.size());
   photos.registered = static_cast<int>(capture.views.size());
-  photos.used = static_cast<int>(
-      std::count_if(capture.statuses.begin(), capture.statuses.end(),
-                    [](const PhotoStatus& photo) { return photo.status == "used"; }));
+  photos.used = static_cast<int>(std::count_if(
+      capture.statuses.begin(), capture.statuses.end(),
+      [](const PhotoStatus& photo) { return photo.status == PhotoState::kUsed; }));
   photos.statuses = capture.statuses;
   return photos;
 }
@@ -84,8 +84,9 @@ std::vector<ReportFilm> FilmsOf(const Workspace& workspace, const RunReport& rep
   return films;
 }
 
-ReportPictures PicturesOf(const RunContext& context, const Capture& capture,
-                          const RunReport& report) {
+ReportPictures PicturesOf(const RunContext& context, const RunReport& report) {
+  const WorkingViews as_taken = context.Views().AsTaken();
+  const Capture& capture = as_taken.capture();
   const Workspace& workspace = *context.workspace;
   ReportPictures pictures;
   pictures.title = std::filesystem::path(workspace.folder()).filename().string();
@@ -97,7 +98,7 @@ ReportPictures PicturesOf(const RunContext& context, const Capture& capture,
     const int i = shown < 2 ? 0 : k * (count - 1) / (shown - 1);
     const CaptureView& photo = capture.views[static_cast<size_t>(i)];
     const std::string name = FrameName(i);
-    const Image picture = ReadWorkingPhoto(photo, context.settings.scene.photo_size, kAsTaken);
+    const Image picture = as_taken.Photo(i);
     ReportView view;
     view.name = name.substr(0, 5) + ", " + photo.file;
     view.photo = Encoded(picture);
@@ -145,7 +146,7 @@ StageOutcome WriteReport(RunContext* context) {
     report.options.push_back({name, value.IsString() ? value.AsString() : DumpJson(value, -1)});
   WriteJsonFile(workspace.Path("report.json"), ReportJson(report));
   WriteFileAtomically(workspace.Path("report.html"),
-                      ReportHtml(report, PicturesOf(*context, capture, report)));
+                      ReportHtml(report, PicturesOf(*context, report)));
   StageOutcome outcome;
   outcome.outputs = {"report.json", "report.html"};
   return outcome;

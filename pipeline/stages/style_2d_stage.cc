@@ -3,7 +3,6 @@
 #include <optional>
 
 #include "kernels/image/color_statistics.h"
-#include "pipeline/capture/capture_store.h"
 #include "pipeline/capture/photo_gains.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/fields/field_file.h"
@@ -25,24 +24,25 @@ namespace {
 // method measures nor its pictures know what moved.
 class MaskFiller {
  public:
-  explicit MaskFiller(const RunContext* context) : context_(context) {}
+  MaskFiller(const RunContext* context, const WorkingViews& views)
+      : context_(context), views_(views) {}
 
-  void Fill(const CaptureView& view, Image* photo) {
+  void Fill(int i, Image* photo) {
     const RunSettings& settings = context_->settings;
-    const Image kept = ReadWorkingMask(view, settings.scene.photo_size);
+    const Image kept = views_.Mask(i);
     if (kept.empty()) return;
     if (!stored_) {
       stored_ = ReadFieldFile(context_->workspace->Path("field.npz"));
       renderer_.emplace(stored_->field,
                         ChooseBackend(settings.run.device, settings.run.reproducible));
     }
-    const Camera camera = WorkingCamera(view.camera, settings.scene.photo_size,
-                                        stored_->field_from_world, stored_->ndc);
+    const Camera camera = views_.InField(stored_->field_from_world, stored_->ndc).CameraOf(i);
     FillMasked(kept, renderer_->Render(camera).color, photo);
   }
 
  private:
   const RunContext* context_;
+  const WorkingViews& views_;
   std::optional<StoredField> stored_;
   std::optional<FieldRenderer> renderer_;
 };
@@ -50,10 +50,11 @@ class MaskFiller {
 StageOutcome StyleViews(RunContext* context, const ProgressFunction& progress) {
   const RunSettings& settings = context->settings;
   Workspace& workspace = *context->workspace;
-  const Capture capture = ReadCapture(workspace.Path("poses"));
+  const WorkingViews views = context->Views();
+  const Capture& capture = views.capture();
   const std::unique_ptr<ObjectMasks> masks = OpenObjectMasks(settings, capture);
   const std::unique_ptr<ViewStylizer> stylizer = MakeSceneStylizer(
-      context, capture, masks.get(),
+      context, views, masks.get(),
       [&](const Image& view, int i) { return masks->Coverage(i, view.width, view.height); });
   if (masks != nullptr && masks->num_known() < static_cast<int>(capture.views.size()))
     context->console->Info(std::to_string(masks->num_known()) + " of " +
@@ -62,18 +63,16 @@ StageOutcome StyleViews(RunContext* context, const ProgressFunction& progress) {
   const std::vector<std::string> notices = stylizer->Notices();
   for (const std::string& notice : notices) context->console->Info(notice);
 
-  const PhotoGains gains = RecordedGains(workspace, capture);
   std::filesystem::remove_all(workspace.Path("views_2d"));
-  MaskFiller filler(context);
+  MaskFiller filler(context, views);
   const int count = static_cast<int>(capture.views.size());
   int styled = 0;
   for (int i = 0; i < count; ++i) {
     if (Report(progress, i, count) == LoopControl::kStop) throw Interrupted();
     if (!stylizer->Knows(i) || (masks != nullptr && !masks->Knows(i))) continue;
     ++styled;
-    const CaptureView& view = capture.views[static_cast<size_t>(i)];
-    Image photo = ReadWorkingPhoto(view, settings.scene.photo_size, gains.Of(i));
-    filler.Fill(view, &photo);
+    Image photo = views.Photo(i);
+    filler.Fill(i, &photo);
     WritePng8(workspace.NewPath("views_2d/" + FrameName(i)), stylizer->Stylize(photo, i));
   }
   StageOutcome outcome;
@@ -93,7 +92,7 @@ Stage Style2dStage(RunContext* context) {
       {"options", OptionValues(context->settings.scene, context->settings.style_2d)}};
   const JsonValue files = MethodFiles(context->settings.style_2d);
   if (!files.IsNull()) stage.inputs["method_files"] = files;
-  const JsonValue gains = RecordedGainRows(*context->workspace);
+  const JsonValue gains = StoredGainRows(context->workspace->Path("poses"));
   if (!gains.IsNull()) stage.inputs["exposure"] = gains;
   if (std::filesystem::is_directory(context->workspace->Path("poses/masks")))
     stage.inputs["field"] = context->ResultOf("reconstruct");

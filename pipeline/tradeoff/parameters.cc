@@ -98,8 +98,8 @@ void AddStyleParameters(const RunSettings& base, VariantList* list) {
   };
   list->Add("style", "style-steps", network.steps, {steps(1 / 3.0), steps(1), steps(3)});
   list->Add("style", "style-patch", network.patch, {32, 8, 1});
-  list->Add("style", "style-min-weight", network.min_weight, {1e-2, 1e-3, 0.0});
-  list->Add("style", "style-view-weight", network.view_weight, {10.0, 1.0, 0.0});
+  list->Add("style", "style-min-weight", network.loss.min_weight, {1e-2, 1e-3, 0.0});
+  list->Add("style", "style-view-weight", network.loss.view_weight, {10.0, 1.0, 0.0});
   list->Add("style", "style-norm-steps", network.norm_steps, {1, 5, 20});
 }
 

@@ -109,7 +109,9 @@ double AmountOf(const std::string& unit, const RunSettings& settings, const Capt
   if (unit == "photo pixels") return pixels;
   if (unit == "trials") {
     const int fitted =
-        static_cast<int>(ViewIndices(capture, settings.run.holdout, false).size());
+        static_cast<int>(WorkingViews(capture, settings.scene.photo_size, settings.run.holdout)
+                             .Training()
+                             .size());
     return settings.fit.sh_degree > 0 && fitted >= kLeastTrialViews &&
            settings.run.effects.find(kViewDependence) == std::string::npos;
   }
@@ -134,7 +136,7 @@ double AmountOf(const std::string& unit, const RunSettings& settings, const Capt
     if (capture.views.empty()) return 0;
     // Frames of the film, and of the views where they are compared with common intrinsics.
     const std::vector<Camera> views =
-        WorkingCameras(capture, settings.scene.photo_size, {}, {});
+        WorkingViews(capture, settings.scene.photo_size, 0).Cameras();
     const Camera common = CommonCamera(views);
     const double common_frame = static_cast<double>(common.width) * common.height;
     if (unit == "frame pixels")

@@ -105,7 +105,6 @@ std::vector<int> EvenlySpaced(const std::vector<int>& all, int count) {
 }  // namespace
 
 struct VariantRunner::Frames {
-  Capture capture;
   StoredField stored;
   FastGrid grid;
   std::vector<Camera> cameras;
@@ -160,35 +159,28 @@ void VariantRunner::MeasurePoses(const Variant& variant, const ProgressFunction&
 // The photos of a fit at one working size. Read once, and not timed: reading is the same for
 // all variants.
 struct VariantRunner::Photos {
-  int size = 0;
-  Capture capture;
-  PhotoGains gains;
-  NormalizedScene scene;
-  std::vector<Image> pictures;
-  std::vector<TrainingView> views;
+  WorkingViews working_views;
+  NormalizedScene scene = {};
+  std::vector<Image> pictures = {};
+  std::vector<TrainingView> views = {};
 };
 
 const VariantRunner::Photos& VariantRunner::PhotosAt(int size) {
-  if (photos_ != nullptr && photos_->size == size) return *photos_;
-  photos_ = std::make_unique<Photos>();
+  if (photos_ != nullptr && photos_->working_views.photo_size() == size) return *photos_;
+  photos_ = std::make_unique<Photos>(Photos{base_->Views().AtSize(size)});
   Photos& p = *photos_;
-  const RunOptions& run = base_->settings.run;
-  p.size = size;
-  p.capture = ReadCapture(base_->workspace->Path("poses"));
-  p.gains = RecordedGains(*base_->workspace, p.capture);
-  // Exposures do not affect the box, and the gains are known.
-  p.scene =
-      ProfileScene(p.capture, base_->settings.fit.sh_degree, run.effects + ",exposure=off")
-          .scene;
-  const std::vector<int> fitted = ViewIndices(p.capture, run.holdout, false);
+  // The box does not depend on exposures, which are known already.
+  p.scene = ProfileScene(p.working_views.capture(), base_->settings.fit.sh_degree,
+                         base_->settings.run.effects + ",exposure=off")
+                .scene;
+  p.working_views = p.working_views.InField(p.scene.field_from_world, p.scene.ndc);
+  const std::vector<int> fitted = p.working_views.Training();
   p.pictures.reserve(fitted.size());
   for (const int i : fitted) {
-    const CaptureView& view = p.capture.views[static_cast<size_t>(i)];
-    Image picture = ReadPhotoToFit(view, size, p.gains.Of(i));
+    Image picture = p.working_views.PhotoToFit(i);
     if (picture.empty()) continue;
     p.pictures.push_back(std::move(picture));
-    p.views.push_back({WorkingCamera(view.camera, size, p.scene.field_from_world, p.scene.ndc),
-                       &p.pictures.back()});
+    p.views.push_back({p.working_views.CameraOf(i), &p.pictures.back()});
   }
   return p;
 }
@@ -216,8 +208,7 @@ void VariantRunner::MeasureFit(const Variant& variant, const ProgressFunction& p
   m->work["voxels"] = fit.voxels;
   // Measured at the base's photo size for all variants, for comparable values.
   m->accuracy =
-      MeasureHeldOut(photos.capture, settings.run.holdout, base_->settings.scene.photo_size,
-                     photos.gains,
+      MeasureHeldOut(photos.working_views.AtSize(base_->settings.scene.photo_size),
                      {std::move(fit.field), photos.scene.field_from_world, photos.scene.ndc},
                      Backend::kCpu)
           .MeanPsnr()
@@ -237,21 +228,17 @@ void VariantRunner::MeasureStyle(const Variant& variant, const ProgressFunction&
   for (const char* name : {"steps", "k_est", "bound"}) m->work[name] = outcome.metrics.At(name);
 
   const Workspace& base = *base_->workspace;
-  const Capture capture = ReadCapture(base.Path("poses"));
   const StoredField styled = ReadFieldFile(trial.workspace.Path("styled.npz"));
+  const WorkingViews views = base_->Views().InField(styled.field_from_world, styled.ndc);
   const FastGrid grid = MakeFastGrid(styled.field);
   const bool of_renders = fs::exists(base.Path("frames/views_2d"));
   std::vector<double> psnr;
-  for (const int i :
-       EvenlySpaced(StyledViews(base, capture, base_->settings.run.holdout), kStyledViews)) {
-    const CaptureView& photo = capture.views[static_cast<size_t>(i)];
-    const int size = base_->settings.scene.photo_size;
-    const Camera camera =
-        WorkingCamera(photo.camera, size, styled.field_from_world, styled.ndc);
-    const RenderedView view = RenderView(grid, camera, MarchOptions{styled.field.step});
+  for (const int i : EvenlySpaced(StyledViews(base, views), kStyledViews)) {
+    const RenderedView view =
+        RenderView(grid, views.CameraOf(i), MarchOptions{styled.field.step});
     Image target = ReadImage(
         base.Path(std::string(of_renders ? "frames/views_2d/" : "views_2d/") + FrameName(i)));
-    if (!of_renders) LeaveOutMasked(photo, size, &target);
+    if (!of_renders) views.LeaveOutMasked(i, &target);
     if (const auto value = Psnr(view.color, target, &view.transmittance))
       psnr.push_back(*value);
   }
@@ -263,13 +250,12 @@ const VariantRunner::Frames& VariantRunner::BaseFrames() {
   frames_ = std::make_unique<Frames>();
   Frames& f = *frames_;
   const Workspace& base = *base_->workspace;
-  f.capture = ReadCapture(base.Path("poses"));
   f.stored = ReadFieldFile(base.Path("field.npz"));
   f.grid = MakeFastGrid(f.stored.field);
-  const int count = std::min(kFrames, static_cast<int>(f.capture.views.size()));
+  const WorkingViews views = base_->Views().InField(f.stored.field_from_world, f.stored.ndc);
+  const int count = std::min(kFrames, views.count());
   // Flow is compared on frames of one size.
-  const std::vector<Camera> cameras = WithCommonIntrinsics(WorkingCameras(
-      f.capture, base_->settings.scene.photo_size, f.stored.field_from_world, f.stored.ndc));
+  const std::vector<Camera> cameras = WithCommonIntrinsics(views.Cameras());
   for (int i = 0; i < count; ++i) {
     const Camera& camera = cameras[static_cast<size_t>(i)];
     const RenderedView view = RenderView(f.grid, camera, MarchOptions{f.stored.field.step});

@@ -80,19 +80,18 @@ bool StillInPlace(int fd, const std::string& path) {
 FolderLock::FolderLock(const std::string& path, bool break_lock) {
   const std::string folder = std::filesystem::path(path).parent_path().parent_path().string();
   while (true) {
-    fd_ = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0644);
-    if (fd_ < 0)
+    fd_.Reset(::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0644));
+    if (fd_.get() < 0)
       throw Error(ExitCode::kResources,
                   std::string("cannot write here: ") + std::strerror(errno), path,
                   "choose another folder with --out, or correct its permissions");
     int status;
-    do status = ::flock(fd_, LOCK_EX | LOCK_NB);
+    do status = ::flock(fd_.get(), LOCK_EX | LOCK_NB);
     while (status != 0 && errno == EINTR);
-    if (status == 0 && StillInPlace(fd_, path)) break;
+    if (status == 0 && StillInPlace(fd_.get(), path)) break;
     if (status != 0) {
       const int error = errno;
-      const Holder holder = ReadHolder(fd_);
-      ::close(fd_);
+      const Holder holder = ReadHolder(fd_.get());
       if (error != EWOULDBLOCK)
         throw Error(ExitCode::kResources,
                     std::string("this file system cannot lock files: ") + std::strerror(error),
@@ -107,20 +106,14 @@ FolderLock::FolderLock(const std::string& path, bool break_lock) {
         throw Error(ExitCode::kResources,
                     std::string("cannot remove the lock: ") + std::strerror(errno), path);
       break_lock = false;
-      continue;
     }
-    ::close(fd_);
   }
   const std::string text = HolderText();
-  if (::ftruncate(fd_, 0) != 0 ||
-      ::pwrite(fd_, text.data(), text.size(), 0) != static_cast<ssize_t>(text.size())) {
-    const int error = errno;
-    ::close(fd_);
-    throw Error(ExitCode::kResources, std::string("cannot write: ") + std::strerror(error),
+  if (::ftruncate(fd_.get(), 0) != 0 ||
+      ::pwrite(fd_.get(), text.data(), text.size(), 0) != static_cast<ssize_t>(text.size())) {
+    throw Error(ExitCode::kResources, std::string("cannot write: ") + std::strerror(errno),
                 path, "free some space, or choose another folder with --out");
   }
 }
-
-FolderLock::~FolderLock() { ::close(fd_); }
 
 }  // namespace regrade

@@ -3,6 +3,8 @@
 
 #include <string>
 
+#include "kernels/base/file_descriptor.h"
+
 namespace regrade {
 
 // Holds flock on `path`, a file that is created and stays; its text names pid, host and start
@@ -13,12 +15,9 @@ class FolderLock {
   // written. `break_lock` replaces the file of a lock that was not released (by a network
   // drive); it is refused while the holder is alive on this machine.
   FolderLock(const std::string& path, bool break_lock);
-  ~FolderLock();
-  FolderLock(const FolderLock&) = delete;
-  FolderLock& operator=(const FolderLock&) = delete;
 
  private:
-  int fd_ = -1;
+  FileDescriptor fd_;
 };
 
 }  // namespace regrade

@@ -153,7 +153,8 @@ StageRecord StageRecordFromJson(const JsonValue& value, const std::string& where
   StageRecord record;
   try {
     record.version = value.At("regrade").AsString();
-    if (value.At("schema").AsInt() > kSchema)
+    const int64_t schema = value.At("schema").AsInt();
+    if (schema > kSchema)
       throw Error(ExitCode::kInput,
                   "written by regrade " + record.version + ", this is " REGRADE_VERSION, where,
                   "update regrade; nothing has been touched");

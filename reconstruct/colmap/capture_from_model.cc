@@ -40,12 +40,13 @@ Capture CaptureFromModel(const ColmapModel& model, const std::vector<StagedPhoto
   for (const StagedPhoto& photo : photos) {
     const auto it = image_of_name.find(names == PhotoNames::kStaged ? photo.name : photo.file);
     if (it == image_of_name.end()) {
-      capture.statuses.push_back({photo.file, "unregistered", "the model has no pose for it"});
+      capture.statuses.push_back(
+          {photo.file, PhotoState::kUnregistered, "the model has no pose for it"});
       continue;
     }
     view_of_image[it->second->id] = static_cast<int32_t>(capture.views.size());
     capture.views.push_back(ViewOf(model, *it->second, photo));
-    capture.statuses.push_back({photo.file, "used", ""});
+    capture.statuses.push_back({photo.file, PhotoState::kUsed, ""});
   }
   if (capture.views.empty())
     throw Error(ExitCode::kInput, "no image name of the model is the name of a photo", "",
@@ -55,7 +56,7 @@ Capture CaptureFromModel(const ColmapModel& model, const std::vector<StagedPhoto
   for (const ColmapImage& image : model.images)
     if (view_of_image.count(image.id) == 0)
       capture.statuses.push_back(
-          {image.name, "skipped", "in the model, but there is no such photo"});
+          {image.name, PhotoState::kSkipped, "in the model, but there is no such photo"});
 
   double error_sum = 0;
   int64_t observations = 0;

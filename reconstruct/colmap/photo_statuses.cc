@@ -38,7 +38,7 @@ void ExplainUnregistered(const AttemptResult& attempt, const std::vector<StagedP
                          Capture* capture) {
   for (size_t i = 0; i < photos.size(); ++i) {
     PhotoStatus& photo = capture->statuses[i];
-    if (photo.status != "unregistered") continue;
+    if (photo.status != PhotoState::kUnregistered) continue;
     const std::string& name = photos[i].name;
     const auto features = attempt.evidence.features.find(name);
     if (features == attempt.evidence.features.end()) {
@@ -80,7 +80,8 @@ void RefuseTooFew(size_t photos_given, int min_photos) {
 void RefuseUnregistered(const Capture& capture) {
   std::string names;
   for (const PhotoStatus& photo : capture.statuses)
-    if (photo.status == "unregistered") names += "\n  " + photo.file + ": " + photo.why;
+    if (photo.status == PhotoState::kUnregistered)
+      names += "\n  " + photo.file + ": " + photo.why;
   throw Error(ExitCode::kScene,
               "only " + std::to_string(capture.views.size()) + " of " +
                   Photos(capture.statuses.size()) +

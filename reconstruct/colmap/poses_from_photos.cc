@@ -340,23 +340,6 @@ class PoseFinder {
   double spent_ = 0, planned_ = 0;  // estimated seconds
 };
 
-// The statuses of both stages, in the order of the first.
-std::vector<PhotoStatus> Merged(const std::vector<PhotoStatus>& ingest,
-                                const std::vector<PhotoStatus>& posed) {
-  std::vector<PhotoStatus> merged = ingest;
-  for (const PhotoStatus& photo : posed) {
-    const auto same = [&](const PhotoStatus& other) { return other.file == photo.file; };
-    const auto it = std::find_if(merged.begin(), merged.end(), same);
-    if (it == merged.end()) {
-      merged.push_back(photo);
-      continue;
-    }
-    it->status = photo.status;
-    if (!photo.why.empty()) it->why = photo.why;
-  }
-  return merged;
-}
-
 }  // namespace
 
 Capture PosesFromPhotos(const std::vector<StagedPhoto>& photos,
@@ -368,7 +351,7 @@ Capture PosesFromPhotos(const std::vector<StagedPhoto>& photos,
   PoseFinder finder(photos, options, work_folder, progress, report ? report : &ignored);
   try {
     Capture capture = finder.Find(sparse_output_folder);
-    capture.statuses = Merged(ingest_statuses, capture.statuses);
+    capture.statuses = MergeStatuses(ingest_statuses, capture.statuses);
     return capture;
   } catch (const fs::filesystem_error& e) {
     throw Error(ExitCode::kResources, e.what(), e.path1().string(),

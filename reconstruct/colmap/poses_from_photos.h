@@ -68,7 +68,7 @@ struct PoseOptions {
           .choices = "auto|given"});
     bind("photo-masks", photo_masks,
          {.help = "folder of masks named like the photos: black pixels (people, cars, anything "
-                  "that moved) are neither matched nor fitted, white ones are"});
+                  "that moved) are neither matched nor fitted"});
   }
 };
 

@@ -35,7 +35,7 @@ struct PoseRefinement {
   double refined_px = 0;                                 // median, poses and points adjusted
   double held_out_before_px = 0, held_out_after_px = 0;  // medians
   double turned_deg = 0, moved_fraction = 0;             // medians of the corrections ...
-  std::optional<double> turn_error_deg, moved_error;     // ... and of their errors
+  std::optional<double> turn_error_deg, moved_error;     // ... and their standard errors
   int left_alone = 0;   // photos with too few observations to adjust
   std::string refused;  // why the result was rejected
   ColmapModel model;    // the given model unless `Accepted()`

@@ -86,7 +86,7 @@ __global__ void BlendColorsKernel(DeviceGridView grid, int basis,
                                   const DeviceWeightedSample* samples, int64_t n,
                                   const int32_t* counted, const int32_t* slot_of_point,
                                   const Ray* rays, const float* rows, Vec3f* color,
-                                  uint8_t* open) {
+                                  uint8_t* unclamped) {
   const int64_t i = ItemOfWarp(n, counted);
   if (i < 0) return;
   const WarpSample warp(grid, basis, samples[i], slot_of_point, rays);
@@ -97,18 +97,18 @@ __global__ void BlendColorsKernel(DeviceGridView grid, int basis,
     atomicAdd(&color[warp.sample.ray][warp.lane / 9], warp.sample.weight * value);
   const unsigned above = __ballot_sync(kAllLanes, first && value > 0);
   if (warp.lane == 0)
-    open[i] =
+    unclamped[i] =
         static_cast<uint8_t>((above & 1) | (above >> 9 & 1) << 1 | (above >> 18 & 1) << 2);
 }
 
 __global__ void BlendColorsAdjointKernel(DeviceGridView grid, int basis,
                                          const DeviceWeightedSample* samples, int64_t n,
                                          const int32_t* counted, const int32_t* slot_of_point,
-                                         const Ray* rays, const uint8_t* open,
+                                         const Ray* rays, const uint8_t* unclamped,
                                          const Vec3f* d_color, float* d_rows) {
   const int64_t i = ItemOfWarp(n, counted);
   if (i < 0) return;
-  const unsigned bits = open[i];
+  const unsigned bits = unclamped[i];
   if (bits == 0) return;
   const Vec3f d = d_color[samples[i].ray];
   if (d.x == 0 && d.y == 0 && d.z == 0) return;
@@ -142,7 +142,7 @@ __global__ void BlendRowsKernel(DeviceGridView grid, const DeviceWeightedSample*
 
 void BlendColors(const DeviceGrid& grid, const DeviceRayWeights& weights,
                  const DeviceSlots& slots, const Ray* rays, const float* rows, Vec3f* color,
-                 uint8_t* open) {
+                 uint8_t* unclamped) {
   if (weights.num_rays == 0) return;
   BeginColorsKernel<<<BlocksFor(weights.num_rays), kThreads, 0, LaunchStream()>>>(
       grid.background, weights.transmittance.data(), weights.num_rays, color);
@@ -150,18 +150,18 @@ void BlendColors(const DeviceGrid& grid, const DeviceRayWeights& weights,
   if (weights.num_samples == 0) return;
   BlendColorsKernel<<<BlocksFor(32 * weights.num_samples), kThreads, 0, LaunchStream()>>>(
       grid.view(), grid.basis, weights.samples.data(), weights.num_samples,
-      weights.counter.data(), slots.slot_of_point.data(), rays, rows, color, open);
+      weights.counter.data(), slots.slot_of_point.data(), rays, rows, color, unclamped);
   CheckLaunch("blend_colors");
 }
 
 void BlendColorsAdjoint(const DeviceGrid& grid, const DeviceRayWeights& weights,
-                        const DeviceSlots& slots, const Ray* rays, const uint8_t* open,
+                        const DeviceSlots& slots, const Ray* rays, const uint8_t* unclamped,
                         const Vec3f* d_color, float* d_rows) {
   if (weights.num_samples == 0) return;
   BlendColorsAdjointKernel<<<BlocksFor(32 * weights.num_samples), kThreads, 0,
                              LaunchStream()>>>(
       grid.view(), grid.basis, weights.samples.data(), weights.num_samples,
-      weights.counter.data(), slots.slot_of_point.data(), rays, open, d_color, d_rows);
+      weights.counter.data(), slots.slot_of_point.data(), rays, unclamped, d_color, d_rows);
   CheckLaunch("blend_colors_adjoint");
 }
 

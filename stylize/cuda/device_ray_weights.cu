@@ -123,7 +123,7 @@ __global__ void ClampToCapacityKernel(int64_t sample_capacity, int64_t slot_capa
   room->samples = *samples;
   room->slots = *slots;
   if (*samples <= sample_capacity && *slots <= slot_capacity) return;
-  room->short_of = 1;
+  room->overflowed = 1;
   *samples = *slots = 0;
 }
 

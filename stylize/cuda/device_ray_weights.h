@@ -53,7 +53,7 @@ struct DeviceSlots {
 // What a step that the host does not watch asked for, and whether there was room.
 struct BufferDemand {
   int32_t samples = 0, slots = 0;
-  int32_t short_of = 0;  // 1 from the first step on that did not fit
+  int32_t overflowed = 0;  // 1 from the first step on that did not fit
 };
 // Behind the two Launch: num_slots becomes `slot_capacity`. Where samples or slots have no room
 // all of them are dropped, and *room, which lies on the device, says so.
@@ -61,14 +61,14 @@ void ClampToCapacity(int64_t slot_capacity, DeviceRayWeights* weights, DeviceSlo
                      BufferDemand* room);
 
 // The colours of rays whose voxels have the rows of `slots` instead of their own: color [rays]
-// begins with the background and is not clipped at 1. open [samples]: bit c is set where the
-// clamp at 0 left channel c alone.
+// begins with the background and is not clipped at 1. unclamped [samples]: bit c is set where
+// the clamp at 0 left channel c alone.
 void BlendColors(const DeviceGrid& grid, const DeviceRayWeights& weights,
                  const DeviceSlots& slots, const Ray* rays, const float* rows, Vec3f* color,
-                 uint8_t* open);
+                 uint8_t* unclamped);
 // Its adjoint: adds to d_rows [slots, kRowLanes], the masses of EQ(view-penalty) among them.
 void BlendColorsAdjoint(const DeviceGrid& grid, const DeviceRayWeights& weights,
-                        const DeviceSlots& slots, const Ray* rays, const uint8_t* open,
+                        const DeviceSlots& slots, const Ray* rays, const uint8_t* unclamped,
                         const Vec3f* d_color, float* d_rows);
 // sums [rays, kRowLanes] = sum_i w_i of the blended rows themselves.
 void BlendRows(const DeviceGrid& grid, const DeviceRayWeights& weights,

@@ -59,7 +59,7 @@ class DeviceStyleLoss : public StyleLoss {
     ForEachBand([&](int64_t begin, int64_t) {
       BlendBand(begin);
       if (gradient != nullptr)
-        BlendColorsAdjoint(grid_, weights_, slots_, rays_.data() + begin, open_.data(),
+        BlendColorsAdjoint(grid_, weights_, slots_, rays_.data() + begin, unclamped_.data(),
                            d_color_.data(), d_rows_.data());
     });
     if (gradient != nullptr) {
@@ -177,9 +177,9 @@ class DeviceStyleLoss : public StyleLoss {
   void BlendBand(int64_t begin) {
     Reserve(weights_.num_rays, "colours of rays", &color_);
     Reserve(weights_.num_rays, "gradients of colours", &d_color_);
-    Reserve(weights_.num_samples, "clamps of samples", &open_);
+    Reserve(weights_.num_samples, "clamps of samples", &unclamped_);
     BlendColors(grid_, weights_, slots_, rays_.data() + begin, rows_.data(), color_.data(),
-                open_.data());
+                unclamped_.data());
     AddColorLoss(color_.data(), targets_.data() + begin, weights_.transmittance.data(),
                  weights_.num_rays, {options_.max_transmittance, options_.one_sided},
                  d_color_.data(), sums_.data());
@@ -194,7 +194,7 @@ class DeviceStyleLoss : public StyleLoss {
   int64_t num_rays_ = 0;
   DeviceBuffer<Ray> rays_;
   DeviceBuffer<Vec3f> targets_, color_, d_color_;
-  DeviceBuffer<uint8_t> open_;
+  DeviceBuffer<uint8_t> unclamped_;
   DeviceBuffer<float> features_, rows_, d_rows_;  // [slots, kRowLanes]
   DeviceBuffer<DeviceColorLoss> sums_;
 };

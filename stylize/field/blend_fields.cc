@@ -17,13 +17,13 @@ double CheckWeights(const std::vector<double>& weights) {
   double sum = 0;
   for (const double weight : weights) {
     if (!(weight >= 0 && weight <= 1))
-      throw Error(ExitCode::kUsage, std::to_string(weight) + " is not a share", "--mix",
-                  "shares lie between 0 (the scene as it was) and 1 (the whole style)");
+      throw Error(ExitCode::kUsage, std::to_string(weight) + " is not a fraction", "--mix",
+                  "fractions lie between 0 (the unstyled scene) and 1 (the whole style)");
     sum += weight;
   }
   if (sum > 1 + kSumSlack)
-    throw Error(ExitCode::kUsage, "shares add up to " + std::to_string(sum), "--mix",
-                "they may add up to 1; what is missing to 1 is the scene as it was");
+    throw Error(ExitCode::kUsage, "fractions add up to " + std::to_string(sum), "--mix",
+                "they may add up to 1; the rest is the unstyled scene");
   return sum;
 }
 
@@ -66,7 +66,8 @@ bool SameGeometry(const Geometry& a, const Geometry& b) {
 
 RadianceField MixFields(const RadianceField& source,
                         const std::vector<const RadianceField*>& styles,
-                        const std::vector<double>& weights, const std::vector<float>* shares) {
+                        const std::vector<double>& weights,
+                        const std::vector<float>* object_weights) {
   REGRADE_CHECK_EQ(styles.size(), weights.size());
   const double sum = CheckWeights(weights);
   for (size_t i = 0; i < styles.size(); ++i)
@@ -77,7 +78,8 @@ RadianceField MixFields(const RadianceField& source,
                   "styles that are mixed restyle one field: make them with `regrade stylize`");
   const int64_t voxels = source.geometry->num_voxels();
   const int stride = source.appearance.stride();
-  if (shares != nullptr) REGRADE_CHECK_EQ(static_cast<int64_t>(shares->size()), voxels);
+  if (object_weights != nullptr)
+    REGRADE_CHECK_EQ(static_cast<int64_t>(object_weights->size()), voxels);
 
   std::vector<double> part_weights{std::abs(1 - sum) <= kSumSlack ? 0 : 1 - sum};
   part_weights.insert(part_weights.end(), weights.begin(), weights.end());
@@ -86,7 +88,7 @@ RadianceField MixFields(const RadianceField& source,
   mixed.near_clip = source.near_clip;
   mixed.step = source.step;
   mixed.background = source.background;
-  if (shares == nullptr) {
+  if (object_weights == nullptr) {
     std::vector<const float*> backgrounds{&source.background.x};
     for (const RadianceField* style : styles) backgrounds.push_back(&style->background.x);
     MixVoxel(backgrounds, part_weights.data(), 3, &mixed.background.x);
@@ -102,21 +104,21 @@ RadianceField MixFields(const RadianceField& source,
       parts[0] = source.appearance.sh.data() + v * stride;
       for (size_t i = 0; i < styles.size(); ++i)
         parts[i + 1] = styles[i]->appearance.sh.data() + v * stride;
-      if (shares != nullptr) {
-        const double share = (*shares)[static_cast<size_t>(v)];
+      if (object_weights != nullptr) {
+        const double object_weight = (*object_weights)[static_cast<size_t>(v)];
         double left = 1;
         for (size_t i = 1; i < here.size(); ++i) {
-          here[i] = share * part_weights[i];
+          here[i] = object_weight * part_weights[i];
           left -= here[i];
         }
-        here[0] = share == 1 ? part_weights[0] : share == 0 ? 1 : left;
+        here[0] = object_weight == 1 ? part_weights[0] : object_weight == 0 ? 1 : left;
       }
       MixVoxel(parts, here.data(), stride, mixed.appearance.sh.data() + v * stride);
     }
   }
-  // Surroundings on spheres are no voxels, and of no object.
+  // Background spheres have no voxels and belong to no object.
   mixed.appearance.sphere_color = source.appearance.sphere_color;
-  if (shares == nullptr) {
+  if (object_weights == nullptr) {
     std::vector<const float*> parts(styles.size() + 1);
     for (int64_t t = 0; t < mixed.appearance.sphere_color.size(); t += 3) {
       parts[0] = source.appearance.sphere_color.data() + t;

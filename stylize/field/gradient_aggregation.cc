@@ -38,7 +38,7 @@ struct GradientAggregation::Band {
   int64_t begin = 0, end = 0;
   RayWeights weights;
   std::vector<int32_t> slots;         // [samples, 8]; -1 at an empty corner
-  std::vector<uint8_t> open;          // [samples]: bit c is set where channel c is not clamped
+  std::vector<uint8_t> unclamped;     // [samples]: bit c is set where channel c is not clamped
   std::vector<Vec3f> color, d_color;  // [rays]; d_color without the loss's normalisation
 };
 
@@ -86,9 +86,9 @@ namespace {
 int TermsOf(const WeightedSample& sample) { return sample.on_sphere() ? 1 : 9; }
 
 // Colours of a ray before the background, and which channels of which samples the clamp left
-// open.
+// unclamped.
 Vec3f RenderStyled(const WeightedSample* samples, const int32_t* slots, int64_t n,
-                   const float* gamma, const float* sh, uint8_t* open) {
+                   const float* gamma, const float* sh, uint8_t* unclamped) {
   Vec3f color{0, 0, 0};
   for (int64_t i = 0; i < n; ++i) {
     float blend[kFeatureStride] = {};
@@ -108,7 +108,7 @@ Vec3f RenderStyled(const WeightedSample* samples, const int32_t* slots, int64_t 
       bits = static_cast<uint8_t>(bits | (1 << c));
       color[c] += samples[i].weight * value;
     }
-    open[i] = bits;
+    unclamped[i] = bits;
   }
   return color;
 }
@@ -116,15 +116,15 @@ Vec3f RenderStyled(const WeightedSample* samples, const int32_t* slots, int64_t 
 // Adds the adjoint of RenderStyled to the rows of d_sh in [first, last), and the masses of
 // EQ(view-penalty).
 void ScatterStyled(const WeightedSample* samples, const int32_t* slots, int64_t n,
-                   const float* gamma, const uint8_t* open, const Vec3f& d_color, int32_t first,
-                   int32_t last, float* d_sh) {
-  // dL/d(blend) = w_i d_color[c] gamma[k] where open; w_i joins the corner's weight below.
+                   const float* gamma, const uint8_t* unclamped, const Vec3f& d_color,
+                   int32_t first, int32_t last, float* d_sh) {
+  // dL/d(blend) = w_i d_color[c] gamma[k] where unclamped; w_i joins the corner's weight below.
   float d_blend[kFeatureStride] = {};
   for (int c = 0; c < 3; ++c)
     for (int k = 0; k < 9; ++k) d_blend[c * 9 + k] = d_color[c] * gamma[k];
   std::fill_n(d_blend + kMassLane, 3, 1.0f);
   for (int64_t i = 0; i < n; ++i) {
-    const uint8_t bits = open[i];
+    const uint8_t bits = unclamped[i];
     if (bits == 0) continue;
     float masked[kFeatureStride];
     const float* d = d_blend;
@@ -132,8 +132,8 @@ void ScatterStyled(const WeightedSample* samples, const int32_t* slots, int64_t 
     if (bits != 7 || terms != 9) {
       std::copy_n(d_blend, kFeatureStride, masked);
       for (int c = 0; c < 3; ++c) {
-        const bool is_open = (bits & (1 << c)) != 0;
-        const int kept = is_open ? terms : 0;
+        const bool is_unclamped = (bits & (1 << c)) != 0;
+        const int kept = is_unclamped ? terms : 0;
         std::fill_n(masked + c * 9 + kept, 9 - kept, 0.0f);
         if (kept < 9) masked[kMassLane + c] = 0;
       }
@@ -182,7 +182,7 @@ void GradientAggregation::FillTouchedFeatures(float position_scale) {
 
 void GradientAggregation::RenderColors(const StyleRays& batch, Band* band) const {
   const RayWeights& weights = band->weights;
-  band->open.resize(weights.samples.size());
+  band->unclamped.resize(weights.samples.size());
   band->color.resize(static_cast<size_t>(weights.num_rays()));
 #pragma omp parallel for schedule(dynamic, 64)
   for (int64_t r = 0; r < weights.num_rays(); ++r) {
@@ -193,7 +193,7 @@ void GradientAggregation::RenderColors(const StyleRays& batch, Band* band) const
     band->color[static_cast<size_t>(r)] =
         RenderStyled(weights.samples.data() + first, band->slots.data() + first * 8,
                      weights.first[static_cast<size_t>(r) + 1] - first, gamma, sh_.data(),
-                     band->open.data() + first) +
+                     band->unclamped.data() + first) +
         field_.background * weights.transmittance[static_cast<size_t>(r)];
   }
 }
@@ -216,7 +216,7 @@ void GradientAggregation::Scatter(const StyleRays& batch, const Band& band) {
                batch.rays[static_cast<size_t>(band.begin + r)].direction, gamma);
       ScatterStyled(weights.samples.data() + first, band.slots.data() + first * 8,
                     weights.first[static_cast<size_t>(r) + 1] - first, gamma,
-                    band.open.data() + first, d_color, begin, end, d_sh_.data());
+                    band.unclamped.data() + first, d_color, begin, end, d_sh_.data());
     }
   }
 }

@@ -56,17 +56,17 @@ class Steepness {
 
   // ||J||_2 by the power iteration on J^T J: a lower bound, so it can never accuse the network
   // wrongly. `direction` [inputs] is where it starts and ends.
-  double Slope(const VectorXd& point, VectorXd* direction) const {
+  double NormAt(const VectorXd& point, VectorXd* direction) const {
     const MatrixXd jacobian = Jacobian(point);
-    double slope = 0;
+    double norm = 0;
     for (int i = 0; i < 30; ++i) {
       const VectorXd image = jacobian * *direction;
-      slope = image.norm();
+      norm = image.norm();
       const VectorXd next = jacobian.transpose() * image;
       if (!(next.norm() > 0)) break;
       *direction = next.normalized();
     }
-    return slope;
+    return norm;
   }
 
  private:
@@ -124,7 +124,7 @@ LocalLipschitz MeasureLocalLipschitz(const LipschitzNetwork& network,
   for (int64_t i = 0; i < options.jacobians; ++i) {
     const VectorXd point = point_of(3, i);
     VectorXd direction = VectorXd::Ones(kNetworkInputs).normalized();
-    steepest.emplace_back(f.Slope(point, &direction), point);
+    steepest.emplace_back(f.NormAt(point, &direction), point);
   }
   std::sort(steepest.begin(), steepest.end(),
             [](const auto& a, const auto& b) { return a.first > b.first; });
@@ -136,7 +136,7 @@ LocalLipschitz MeasureLocalLipschitz(const LipschitzNetwork& network,
     result.along_position = norm(jacobian.rightCols(kNetworkInputs - kNetworkSh));
   }
 
-  // Climb: finite differences of the slope, a step of shrinking length along them.
+  // Gradient ascent: finite differences of the norm, steps of shrinking length along them.
   result.ascent = result.jacobians;
   const size_t starts = std::min<size_t>(4, steepest.size());
   for (size_t s = 0; s < starts; ++s) {
@@ -144,7 +144,7 @@ LocalLipschitz MeasureLocalLipschitz(const LipschitzNetwork& network,
     double best = steepest[s].first, step = 0.2;
     VectorXd direction = VectorXd::Ones(kNetworkInputs).normalized();
     for (int i = 0; i < options.ascent_steps; ++i) {
-      f.Slope(point, &direction);
+      f.NormAt(point, &direction);
       VectorXd gradient(kNetworkInputs);
       const VectorXd frozen = direction;
       constexpr double kH = 1e-5;
@@ -157,16 +157,16 @@ LocalLipschitz MeasureLocalLipschitz(const LipschitzNetwork& network,
       }
       if (!(gradient.norm() > 0)) break;
       const VectorXd next = point + step * gradient.normalized();
-      const double slope = f.Slope(next, &direction);
-      if (slope > best) {
-        best = slope;
+      const double norm = f.NormAt(next, &direction);
+      if (norm > best) {
+        best = norm;
         point = next;
       } else {
         step /= 2;
       }
     }
     result.ascent = std::max(result.ascent, best);
-    f.Slope(point, &direction);
+    f.NormAt(point, &direction);
     MatrixXd ends(kNetworkInputs, 2);
     ends << point - 0.5 * options.min_distance * direction,
         point + 0.5 * options.min_distance * direction;

@@ -57,39 +57,40 @@ void MaskVote::Add(const Camera& camera, const Image& mask) {
           const uint64_t steps = static_cast<uint64_t>(weight * kStep);
           if (steps == 0) continue;
           AddTo(&all_[static_cast<size_t>(voxel)], steps);
-          const uint64_t for_it =
+          const uint64_t in_favour =
               static_cast<uint64_t>(votes[static_cast<size_t>(r)] * static_cast<double>(steps));
-          if (for_it > 0) AddTo(&yes_[static_cast<size_t>(voxel)], for_it);
+          if (in_favour > 0) AddTo(&yes_[static_cast<size_t>(voxel)], in_favour);
         }
       }
   }
 }
 
-std::vector<float> MaskVote::Shares(double threshold, double edge) const {
+std::vector<float> MaskVote::Weights(double threshold, double edge) const {
   const double half = std::min({edge, threshold, 1 - threshold});
-  std::vector<float> shares(yes_.size(), 0.0f);
-  for (size_t v = 0; v < shares.size(); ++v) {
+  std::vector<float> weights(yes_.size(), 0.0f);
+  for (size_t v = 0; v < weights.size(); ++v) {
     if (all_[v] == 0) continue;
     const double vote = static_cast<double>(yes_[v]) / static_cast<double>(all_[v]);
-    const double share = half > 0 ? std::clamp((vote - threshold + half) / (2 * half), 0.0, 1.0)
-                                  : (vote > threshold ? 1.0 : 0.0);
-    shares[v] = static_cast<float>(share);
+    const double weight = half > 0
+                              ? std::clamp((vote - threshold + half) / (2 * half), 0.0, 1.0)
+                              : (vote > threshold ? 1.0 : 0.0);
+    weights[v] = static_cast<float>(weight);
   }
-  return shares;
+  return weights;
 }
 
-RadianceField WeightField(const RadianceField& field, const std::vector<float>& shares) {
-  REGRADE_CHECK_EQ(static_cast<int64_t>(shares.size()), field.geometry->num_voxels());
+RadianceField WeightField(const RadianceField& field, const std::vector<float>& weights) {
+  REGRADE_CHECK_EQ(static_cast<int64_t>(weights.size()), field.geometry->num_voxels());
   RadianceField result;
   result.geometry = field.geometry;
   result.near_clip = field.near_clip;
   result.step = field.step;
   result.appearance.basis = 1;
-  result.appearance.sh.Resize(static_cast<int64_t>(shares.size()) * 3);
-  for (size_t v = 0; v < shares.size(); ++v)
+  result.appearance.sh.Resize(static_cast<int64_t>(weights.size()) * 3);
+  for (size_t v = 0; v < weights.size(); ++v)
     for (size_t c = 0; c < 3; ++c)
       result.appearance.sh[static_cast<int64_t>(3 * v + c)] =
-          static_cast<float>((shares[v] - 0.5) / kSh0);
+          static_cast<float>((weights[v] - 0.5) / kSh0);
   return result;
 }
 

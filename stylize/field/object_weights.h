@@ -1,13 +1,12 @@
-// From masks of photos, which need not agree, to the share that each voxel of a field has in an
-// object.
+// Object weights of a field's voxels, by a vote of masks of photos that need not agree.
 //
 // EQ(mask-vote): v_j = sum_r m_r W_rj / sum_r W_rj over the rays r of all masked photos, m_r
 // what the mask says of the ray's pixel and W_rj = sum_i w_i b_ij the weight with which the ray
-// sees voxel j (for w_i see EQ(composite), for b_ij see EQ(trilinear)). The share is
+// sees voxel j (for w_i see EQ(composite), for b_ij see EQ(trilinear)). The object weight is
 //   e_j = clamp((v_j - t + h) / (2 h), 0, 1),  h <= t and h <= 1 - t:
-// t the vote that half belongs, h half the width of the edge. A voxel that no mask votes for
-// has v_j = 0 and so e_j = 0, exactly, as has one that only a few wrong masks hit; one that
-// nobody has seen has e_j = 0.
+// t the vote at which the weight is 1/2, h half the width of the edge. A voxel that no mask
+// votes for has v_j = 0 and so e_j = 0, exactly, as does one that only a few wrong masks hit; a
+// voxel that no ray sees has e_j = 0.
 #pragma once
 
 #include <cstdint>
@@ -29,7 +28,7 @@ class MaskVote {
   void Add(const Camera& camera, const Image& mask);
 
   // [voxels]. `threshold` in (0, 1); `edge` is cut to what fits beside it.
-  std::vector<float> Shares(double threshold, double edge) const;
+  std::vector<float> Weights(double threshold, double edge) const;
 
  private:
   const Geometry& geometry_;
@@ -39,6 +38,6 @@ class MaskVote {
 };
 
 // A field that renders, in each channel, how much of what a pixel sees is of the object.
-RadianceField WeightField(const RadianceField& field, const std::vector<float>& shares);
+RadianceField WeightField(const RadianceField& field, const std::vector<float>& weights);
 
 }  // namespace regrade

@@ -1,4 +1,4 @@
-// What it costs that a restyled point changes its colour with the direction it is seen from.
+// View-dependence penalty of the residual.
 //
 // EQ(view-penalty):  L_view = lambda_view / (3 Q) sum_v,c m_v,c / (4 pi) sum_{k >= 1} g_vck^2.
 //
@@ -6,9 +6,9 @@
 // channel-major coefficients of orthonormal spherical harmonics, so the inner sum over 4 pi is
 // the mean over all directions of the squared deviation of that addition from its own mean.
 // m_v,c is the weight with which the rays of a step see the point: the sum over samples of w_i
-// and the corner's trilinear weight, where the loss has a say (the ray errs and the clamp at 0
-// left channel c alone). It is held constant. Background texels have no directions, and no
-// mass.
+// and the corner's trilinear weight, where the loss has a gradient (the ray has an error and
+// channel c is not clamped at 0). It is held constant. Background texels have no directions,
+// and no mass.
 //
 // A 2D method maps each view its own way; what a point can follow of that is a function of the
 // direction, and a film shows it as flicker.

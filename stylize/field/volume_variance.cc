@@ -25,7 +25,7 @@ struct Seen {
   Vec3d source{}, styled{};                // as rendered
   Vec3d closed_source{}, closed_styled{};  // with mu for weights, nothing clamped
   double gamma[kMaxBasis] = {};
-  bool open = false, clamp = false;
+  bool transparent = false, clamped = false;
 };
 
 class Observer {
@@ -52,7 +52,7 @@ class Observer {
     const double left = weights.transmittance[static_cast<size_t>(ray)];
     seen.source = source_.background.Cast<double>() * left;
     seen.styled = styled_.background.Cast<double>() * left;
-    double inside = 0;
+    double inside_weight = 0;
     for (int64_t i = weights.first[static_cast<size_t>(ray)];
          i < weights.first[static_cast<size_t>(ray) + 1]; ++i) {
       const WeightedSample& sample = weights.samples[static_cast<size_t>(i)];
@@ -60,22 +60,22 @@ class Observer {
       for (int corner = 0; corner < 8; ++corner) {
         const int32_t voxel =
             source_.geometry->links[CornerVertex(frame, sample.vertex, corner)];
-        const double share = CornerWeight(sample.fraction, corner);
-        if (voxel < 0 || share == 0) continue;
-        before += ColorOf(source_.appearance, voxel, seen.gamma) * share;
-        after += ColorOf(styled_.appearance, voxel, seen.gamma) * share;
-        seen.atoms.push_back({voxel, share * sample.weight});
-        inside += share * sample.weight;
+        const double fraction = CornerWeight(sample.fraction, corner);
+        if (voxel < 0 || fraction == 0) continue;
+        before += ColorOf(source_.appearance, voxel, seen.gamma) * fraction;
+        after += ColorOf(styled_.appearance, voxel, seen.gamma) * fraction;
+        seen.atoms.push_back({voxel, fraction * sample.weight});
+        inside_weight += fraction * sample.weight;
       }
       for (int c = 0; c < 3; ++c) {
-        seen.clamp |= before[c] < 0 || after[c] < 0;
+        seen.clamped |= before[c] < 0 || after[c] < 0;
         seen.source[c] += sample.weight * std::max(before[c], 0.0);
         seen.styled[c] += sample.weight * std::max(after[c], 0.0);
       }
     }
-    seen.open = !(inside > 1 - kOpenTransmittance);
+    seen.transparent = !(inside_weight > 1 - kTransparentTransmittance);
     for (Atom& atom : seen.atoms) {
-      atom.weight /= inside;
+      atom.weight /= inside_weight;
       seen.closed_source += ColorOf(source_.appearance, atom.voxel, seen.gamma) * atom.weight;
       seen.closed_styled += ColorOf(styled_.appearance, atom.voxel, seen.gamma) * atom.weight;
     }
@@ -186,8 +186,8 @@ VarianceReport MeasureVariance(const RadianceField& source, const RadianceField&
                         march, source.near_clip);
   const Observer observer(source, styled, network);
   struct Result {
-    double source, styled, share;
-    bool open, clamp;
+    double source, styled, fraction;
+    bool transparent, clamped;
   };
   std::vector<Result> results(pairs.size());
 #pragma omp parallel for schedule(dynamic, 16)
@@ -196,20 +196,21 @@ VarianceReport MeasureVariance(const RadianceField& source, const RadianceField&
     const Seen a = observer.Look(pairs[i].first.direction, weights, ray);
     const Seen b = observer.Look(pairs[i].second.direction, weights, ray + 1);
     Result& result = results[i];
-    result = {Norm(a.source - b.source), Norm(a.styled - b.styled), 0, a.open || b.open,
-              a.clamp || b.clamp};
-    if (result.open || result.clamp) continue;
+    result = {Norm(a.source - b.source), Norm(a.styled - b.styled), 0,
+              a.transparent || b.transparent, a.clamped || b.clamped};
+    if (result.transparent || result.clamped) continue;
     const double bound = observer.Bound(a, b);
-    if (bound > kVarianceSlack) result.share = Norm(a.closed_styled - b.closed_styled) / bound;
+    if (bound > kVarianceSlack)
+      result.fraction = Norm(a.closed_styled - b.closed_styled) / bound;
   }
   VarianceReport report;
   report.k = observer.k();
   for (const Result& result : results) {
     Add(result.source, result.styled, report.k,
-        result.open    ? &report.open
-        : result.clamp ? &report.clamp
-                       : &report.inside);
-    report.largest_share = std::max(report.largest_share, result.share);
+        result.transparent ? &report.transparent
+        : result.clamped   ? &report.clamped
+                           : &report.valid);
+    report.largest_fraction = std::max(report.largest_fraction, result.fraction);
   }
   return report;
 }

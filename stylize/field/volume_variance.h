@@ -1,6 +1,5 @@
-// How far apart the colours of two rays are before and after a style, against what LipRF's
-// propositions guarantee: measured on a field, with the reasons where the guarantee does not
-// hold.
+// Differences of two rays' colours before and after restyling, against LipRF's bound, grouped
+// by the premise of the bound that is violated.
 //
 // EQ(vrr), LipRF eq. 5: vrr(r1, r2; F) = |C(r1; F) - C(r2; F)|.
 //
@@ -40,21 +39,20 @@ struct VarianceGroup {
   double Gain() const { return sum_source > 0 ? sum_styled / sum_source : 0; }  // of the mean
 };
 
-// A pair belongs to the first group whose reason it meets.
+// A pair is counted in the first group whose condition it meets.
 struct VarianceReport {
-  double k = 0;          // |A| + K_g
-  VarianceGroup open;    // light is left behind a ray, or it passes cells with empty corners
-  VarianceGroup clamp;   // a sample's colour is clamped, before or after
-  VarianceGroup inside;  // every premise of the bound holds
-  double largest_share =
-      0;  // of vrr' in its bound, see EQ(vrr-bound), over `inside`; at most 1
+  double k = 0;                 // |A| + K_g
+  VarianceGroup transparent;    // a ray transmits light, or passes cells with empty corners
+  VarianceGroup clamped;        // a sample's colour is clamped, before or after
+  VarianceGroup valid;          // every premise of the bound holds
+  double largest_fraction = 0;  // of the bound, see EQ(vrr-bound), over `valid`; at most 1
 
-  int64_t Pairs() const { return open.pairs + clamp.pairs + inside.pairs; }
-  int64_t Above() const { return open.above + clamp.above + inside.above; }
+  int64_t Pairs() const { return transparent.pairs + clamped.pairs + valid.pairs; }
+  int64_t Above() const { return transparent.above + clamped.above + valid.above; }
 };
 
-inline constexpr double kVarianceSlack = 1e-5;      // float's rounding in a ray's colour
-inline constexpr double kOpenTransmittance = 1e-2;  // more than that is background
+inline constexpr double kVarianceSlack = 1e-5;             // float's rounding in a ray's colour
+inline constexpr double kTransparentTransmittance = 1e-2;  // more than that is background
 
 // `styled` is `source` restyled by `network`. Colours are as rendered, but not clipped to [0,
 // 1]. Sums in double; the result does not depend on the number of threads.

@@ -39,7 +39,9 @@ Image MapColors(const Image& view, const Map& map) {
 class ColorTransfer : public ViewStylizer {
  public:
   ColorTransfer(const StyleOptions& options, const Image& style, const ColorStatistics* scene)
-      : options_(options), style_(MeasureForMethod(options, style)) {
+      : options_(options),
+        is_mkl_(ParseStyleMethod(options).kind == StyleMethodKind::kMkl),
+        style_(MeasureForMethod(options, style)) {
     if (options.scene_wide) scene_ = *scene;
   }
 
@@ -47,7 +49,7 @@ class ColorTransfer : public ViewStylizer {
     const std::string where = "view " + std::to_string(view_index);
     CountNotFinite(view, where);
     const ColorStatistics source = scene_ ? *scene_ : Measure(view, where);
-    if (options_.method == "mkl") return MapColors(view, ComputeMkl(source, style_).map);
+    if (is_mkl_) return MapColors(view, ComputeMkl(source, style_).map);
     const ChannelMap map = ComputeReinhard(source, style_);
     return MapColors(view, [&](const Vec3d& rgb) {
       Vec3d lab = LabFromSrgb(rgb);
@@ -59,8 +61,8 @@ class ColorTransfer : public ViewStylizer {
   std::string Name() const override { return options_.method; }
 
   std::vector<std::string> Notices() const override {
-    if (options_.method == "mkl" && scene_) return ComputeMkl(*scene_, style_).notices;
-    const double rounding = options_.method == "mkl" ? kRoundingVariance : kLabRoundingVariance;
+    if (is_mkl_ && scene_) return ComputeMkl(*scene_, style_).notices;
+    const double rounding = is_mkl_ ? kRoundingVariance : kLabRoundingVariance;
     const Mat3d& c = style_.covariance;
     if (std::max({c(0, 0), c(1, 1), c(2, 2)}) <= rounding) return {kFlatStyleNotice};
     return {};
@@ -74,6 +76,7 @@ class ColorTransfer : public ViewStylizer {
   }
 
   StyleOptions options_;
+  bool is_mkl_;
   ColorStatistics style_;
   std::optional<ColorStatistics> scene_;
 };
@@ -93,14 +96,14 @@ ChannelMap ComputeReinhard(const ColorStatistics& source_lab,
 }
 
 ColorStatistics MeasureForMethod(const StyleOptions& options, const Image& image) {
-  if (options.method == "mkl") return MeasureColor(image);
-  REGRADE_CHECK(options.method == "reinhard");
+  const StyleMethodKind kind = ParseStyleMethod(options).kind;
+  if (kind == StyleMethodKind::kMkl) return MeasureColor(image);
+  REGRADE_CHECK(kind == StyleMethodKind::kReinhard);
   return MeasureColor(image, LabFromSrgb);
 }
 
 std::unique_ptr<ViewStylizer> MakeColorTransfer(const StyleOptions& options, const Image& style,
                                                 const ColorStatistics* scene) {
-  REGRADE_CHECK(options.method == "mkl" || options.method == "reinhard");
   if (options.scene_wide) REGRADE_CHECK(scene != nullptr);
   return std::make_unique<ColorTransfer>(options, style, scene);
 }

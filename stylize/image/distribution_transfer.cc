@@ -18,14 +18,14 @@ constexpr int kQuantiles = 512;
 constexpr double kSameColor = 0.5 / 255;  // half a step of 8 bits
 constexpr uint64_t kRotationSeed = 0x1d7;
 
-// The value below which the share (i + 1/2) / kQuantiles lies, between neighbours linear.
+// The value below which the fraction (i + 1/2) / kQuantiles lies, between neighbours linear.
 double Quantile(const std::vector<double>& sorted, int i) {
   const double place = (i + 0.5) / kQuantiles * static_cast<double>(sorted.size()) - 0.5;
   const double clamped = std::clamp(place, 0.0, static_cast<double>(sorted.size() - 1));
   const size_t below = static_cast<size_t>(clamped);
   const size_t above = std::min(below + 1, sorted.size() - 1);
-  const double share = clamped - static_cast<double>(below);
-  return sorted[below] + share * (sorted[above] - sorted[below]);
+  const double fraction = clamped - static_cast<double>(below);
+  return sorted[below] + fraction * (sorted[above] - sorted[below]);
 }
 
 // Uniform over all rotations: of a unit quaternion, Shoemake 1992.
@@ -69,7 +69,9 @@ class DistributionTransfer : public ViewStylizer {
                        const std::vector<Vec3d>* scene)
       : name_(options.method),
         regrain_(options.regrain),
-        iterations_(options.method == "histogram" ? 1 : options.iterations),
+        iterations_(ParseStyleMethod(options).kind == StyleMethodKind::kHistogram
+                        ? 1
+                        : options.iterations),
         style_(MeasureTurns(SampleColors(style, "the style picture"), iterations_)) {
     const Mat3d& c = MeasureColor(style).covariance;
     flat_ = std::max({c(0, 0), c(1, 1), c(2, 2)}) <= kRoundingVariance;
@@ -196,7 +198,8 @@ std::vector<Vec3d> SampleColors(const Image& image, const std::string& where, in
 std::unique_ptr<ViewStylizer> MakeDistributionTransfer(const StyleOptions& options,
                                                        const Image& style,
                                                        const std::vector<Vec3d>* scene) {
-  REGRADE_CHECK(options.method == "idt" || options.method == "histogram");
+  const StyleMethodKind kind = ParseStyleMethod(options).kind;
+  REGRADE_CHECK(kind == StyleMethodKind::kIdt || kind == StyleMethodKind::kHistogram);
   if (options.scene_wide) REGRADE_CHECK(scene != nullptr);
   return std::make_unique<DistributionTransfer>(options, style, scene);
 }

@@ -3,6 +3,21 @@
 #include "kernels/base/error.h"
 
 namespace regrade {
+namespace {
+
+struct NamedKind {
+  const char* name;
+  StyleMethodKind kind;
+};
+constexpr NamedKind kColorMethods[] = {{"mkl", StyleMethodKind::kMkl},
+                                       {"reinhard", StyleMethodKind::kReinhard},
+                                       {"idt", StyleMethodKind::kIdt},
+                                       {"histogram", StyleMethodKind::kHistogram}};
+constexpr NamedKind kMethodsWithArgument[] = {{"onnx", StyleMethodKind::kOnnx},
+                                              {"folder", StyleMethodKind::kFolder},
+                                              {"command", StyleMethodKind::kCommand}};
+
+}  // namespace
 
 StyleMethod ParseStyleMethod(const StyleOptions& options) {
   const std::string& text = options.method;
@@ -10,20 +25,20 @@ StyleMethod ParseStyleMethod(const StyleOptions& options) {
   if (options.regrain && text != "idt" && text != "histogram")
     throw Error(ExitCode::kUsage, "\"" + text + "\" makes no grain louder",
                 "--method and --style-regrain",
-                "leave it away, or add --no-style-regrain where an earlier run asked for it");
-  for (const char* kind : {"mkl", "reinhard", "idt", "histogram"})
-    if (text == kind) return {kind, ""};
-  for (const char* kind : {"onnx", "folder", "command"}) {
-    const std::string prefix = std::string(kind) + ":";
+                "leave it out, or add --no-style-regrain where an earlier run asked for it");
+  for (const auto& [name, kind] : kColorMethods)
+    if (text == name) return {kind, name, ""};
+  for (const auto& [name, kind] : kMethodsWithArgument) {
+    const std::string prefix = std::string(name) + ":";
     if (!text.starts_with(prefix)) continue;
     const std::string argument = text.substr(prefix.size());
     if (argument.find_first_not_of(" \t") == std::string::npos)
       throw Error(ExitCode::kUsage, "nothing follows \"" + prefix + "\"", "--method", hint);
     if (options.scene_wide)
-      throw Error(ExitCode::kUsage, "\"" + std::string(kind) + "\" styles each view by itself",
+      throw Error(ExitCode::kUsage, "\"" + std::string(name) + "\" styles each view by itself",
                   "--method and --scene-wide",
-                  "leave it away, or add --no-scene-wide where an earlier run asked for it");
-    return {kind, argument};
+                  "leave it out, or add --no-scene-wide where an earlier run asked for it");
+    return {kind, name, argument};
   }
   throw Error(ExitCode::kUsage, "there is no 2D method \"" + text + "\"", "--method", hint);
 }

@@ -1,4 +1,4 @@
-// What can be set of the 2D method that styles each view.
+// Options of the 2D method that styles each view.
 #pragma once
 
 #include <string>
@@ -7,7 +7,7 @@
 
 namespace regrade {
 
-// What stands in hints; --method has no `choices`, for four of its values go on after a colon.
+// For hints; --method has no `choices`, because three of its values continue after a colon.
 inline constexpr char kStyleMethods[] =
     "mkl, reinhard, idt, histogram, onnx:DIR, folder:DIR or command:\"PROGRAM ...\"";
 
@@ -59,14 +59,26 @@ struct StyleOptions {
   }
 };
 
-// The kind of a method, "onnx" of "onnx:DIR", and what follows the colon.
+enum class StyleMethodKind { kMkl, kReinhard, kIdt, kHistogram, kOnnx, kFolder, kCommand };
+
+// Reads networks or pictures from the disk.
+inline bool ReadsFiles(StyleMethodKind kind) {
+  return kind == StyleMethodKind::kOnnx || kind == StyleMethodKind::kFolder;
+}
+// Maps colours alone, whatever their place in the picture.
+inline bool MapsColors(StyleMethodKind kind) {
+  return !ReadsFiles(kind) && kind != StyleMethodKind::kCommand;
+}
+
+// "onnx:DIR" and the like: the kind, its name before the colon, and what follows that.
 struct StyleMethod {
-  std::string kind;
+  StyleMethodKind kind = StyleMethodKind::kMkl;
+  std::string name;
   std::string argument;
 };
 
-// Error(kUsage) that lists the methods for one that does not exist, or lacks what it needs
-// behind the colon, or does not go with --scene-wide.
+// Throws Error(kUsage) that lists the methods for one that does not exist, has no argument
+// behind the colon, or does not support --scene-wide.
 StyleMethod ParseStyleMethod(const StyleOptions& options);
 
 }  // namespace regrade

@@ -125,7 +125,7 @@ class Wct2 : public ViewStylizer {
   bool cat5_;
   int max_side_;
   std::vector<OnnxNetwork> encoders_, decoders_;    // [level - 1]
-  std::map<std::string, FeatureStatistics> style_;  // of the places that `at` is told
+  std::map<std::string, FeatureStatistics> style_;  // of the places that `at` is given
 };
 
 }  // namespace

@@ -17,7 +17,7 @@ using namespace regrade::testing;
 
 using Plane = std::vector<std::vector<double>>;  // [y][x]
 
-Plane PlaneOf(const float* values, int width, int height, int channels, int channel) {
+Plane ChannelOf(const float* values, int width, int height, int channels, int channel) {
   Plane plane(height, std::vector<double>(width));
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x)
@@ -26,7 +26,7 @@ Plane PlaneOf(const float* values, int width, int height, int channels, int chan
 }
 
 Plane Component(const FlowField& flow, int c) {
-  return PlaneOf(flow.uv.data(), flow.width, flow.height, 2, c);
+  return ChannelOf(flow.uv.data(), flow.width, flow.height, 2, c);
 }
 
 // Bilinear with each index clamped separately, weights from the unclamped position.
@@ -110,8 +110,8 @@ double LiteralError(const Plane& mask, const Image& a, const Image& b, const Flo
   const Plane fu = Component(flow, 0), fv = Component(flow, 1);
   double numerator = 0, denominator = 0;
   for (int c = 0; c < 3; ++c) {
-    const Plane pa = PlaneOf(a.pixels.data(), a.width, a.height, 3, c);
-    const Plane pb = PlaneOf(b.pixels.data(), b.width, b.height, 3, c);
+    const Plane pa = ChannelOf(a.pixels.data(), a.width, a.height, 3, c);
+    const Plane pb = ChannelOf(b.pixels.data(), b.width, b.height, 3, c);
     for (int y = 0; y < a.height; ++y)
       for (int x = 0; x < a.width; ++x) {
         const double d = Lookup(pb, x + fu[y][x], y + fv[y][x]) - pa[y][x];

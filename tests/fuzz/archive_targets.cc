@@ -1,4 +1,4 @@
-// Archives and arrays: whole .npz files, and the header of .npy.
+// Fuzz targets: .npz files and .npy headers.
 #include "pipeline/files/npz_file.h"
 #include "tests/fuzz/fuzz_support.h"
 #include "tests/fuzz/mutate.h"
@@ -10,7 +10,7 @@ namespace {
 
 constexpr uint64_t kBudget = 4 << 20;
 
-// The second is not packed: mutants of what is inside keep right checksums.
+// The second is not compressed: mutants of its arrays keep correct checksums.
 std::vector<std::string> ArchiveSeeds() {
   const std::string archive = SmallArchive();
   return {archive, StoredCopyOfNpz(FuzzFile("seed.npz", archive))};

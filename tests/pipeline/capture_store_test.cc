@@ -10,6 +10,7 @@
 #include "kernels/process/child_process.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/images/image_file.h"
+#include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"
 
 namespace regrade {
@@ -69,7 +70,42 @@ TEST(CaptureStore, ANearestDepthThatChangedIsAnotherCapture) {
       Regrade({"pose", folder / "first", "--out", folder / "second", "--tracks", "given"}), 3);
 }
 
-// Without tracks there is nothing to refine by: said where it was asked for.
+TEST(CaptureStore, AFolderOfAnotherSchemaIsRefused) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}), 0);
+  ASSERT_EQ(
+      Regrade({"pose", folder / "s/truth", "--out", folder / "first", "--tracks", "given"}), 0);
+  const std::string index = folder / "first/poses/photos.json";
+  JsonValue json = ReadJsonFile(index);
+  json["schema"] = 1;
+  WriteJsonFile(index, json);
+  EXPECT_REGRADE_ERROR(ReadCapture(folder / "first/poses"), ExitCode::kInput,
+                       "is of schema 1, this version of regrade reads schema 2");
+  EXPECT_REGRADE_ERROR(ReadCapture(folder / "first/poses"), ExitCode::kInput,
+                       "--restart-from pose");
+  EXPECT_EQ(Regrade({"pose", folder / "first", "--out", folder / "second"}), 3);
+}
+
+TEST(PhotoStatuses, LaterOnesDecide) {
+  const std::vector<PhotoStatus> merged =
+      MergeStatuses({{"a", PhotoState::kUsed, "grey"},
+                     {"b", PhotoState::kSkipped, "damaged"},
+                     {"c", PhotoState::kUsed, ""}},
+                    {{"a", PhotoState::kUsed, ""},
+                     {"c", PhotoState::kUnregistered, "blurred"},
+                     {"d", PhotoState::kSkipped, "not there"}});
+  ASSERT_EQ(merged.size(), 4u);
+  EXPECT_EQ(merged[0].why, "grey");
+  EXPECT_EQ(merged[1].status, PhotoState::kSkipped);
+  EXPECT_EQ(merged[2].status, PhotoState::kUnregistered);
+  EXPECT_EQ(merged[2].why, "blurred");
+  EXPECT_EQ(merged[3].file, "d");
+  for (const PhotoStatus& photo : merged)
+    EXPECT_EQ(PhotoStateOf(ToString(photo.status)), photo.status);
+  EXPECT_FALSE(PhotoStateOf("placed"));
+}
+
+// Refinement needs tracks: an error where it was requested.
 TEST(CaptureStore, PosesWithoutTracksCannotBeRefined) {
   const TemporaryFolder folder;
   ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}), 0);
@@ -80,7 +116,7 @@ TEST(CaptureStore, PosesWithoutTracksCannotBeRefined) {
 
 // Of a COLMAP workspace in which pictures are missing the others are staged under names that
 // the missing ones have in the model: no photo may get another's pose.
-TEST(CaptureStore, F61_PicturesThatAreMissingLendNobodyTheirPoses) {
+TEST(CaptureStore, F61_PosesOfMissingPicturesAreUnused) {
   const TemporaryFolder folder;
   ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}), 0);
   ASSERT_EQ(Regrade({"pose", folder / "s/truth", "--out", folder / "all", "--tracks", "given"}),
@@ -100,7 +136,7 @@ TEST(CaptureStore, F61_PicturesThatAreMissingLendNobodyTheirPoses) {
   }
   ASSERT_EQ(some.statuses.size(), 6u);
   EXPECT_EQ(some.statuses[4].file, "00000.png");
-  EXPECT_EQ(some.statuses[4].status, "skipped");
+  EXPECT_EQ(some.statuses[4].status, PhotoState::kSkipped);
   // And so as a capture of its own.
   EXPECT_EQ(Regrade({"pose", folder / "some", "--out", folder / "again", "--tracks", "given"}),
             0);
@@ -152,7 +188,7 @@ TEST(CaptureStore, PicturesOfAnLlffFile) {
 }
 
 // A list of poses that names pictures which are not there.
-TEST(CaptureStore, PicturesThatATransformsFileMissesAreTold) {
+TEST(CaptureStore, MissingPicturesOfATransformsFileAreReported) {
   const TemporaryFolder folder;
   ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}), 0);
   std::filesystem::remove(folder / "s/images/00002.png");
@@ -162,7 +198,7 @@ TEST(CaptureStore, PicturesThatATransformsFileMissesAreTold) {
   EXPECT_EQ(capture.views.size(), 5u);
   ASSERT_EQ(capture.statuses.size(), 6u);
   EXPECT_EQ(capture.statuses[5].file, "../images/00002.png");
-  EXPECT_EQ(capture.statuses[5].status, "skipped");
+  EXPECT_EQ(capture.statuses[5].status, PhotoState::kSkipped);
 }
 
 }  // namespace

@@ -84,7 +84,7 @@ std::string DigestOf(const StoredField& stored, const Camera& camera) {
 constexpr char kDigestPhotos[] = "79c3bcff9820f832";
 constexpr char kDigestField[] = "966c0aaaa3442581";
 
-TEST(EffectsOff, H155_ResultsAreThoseOfTheBuildWithoutThem) {
+TEST(EffectsOff, H155_ResultsAreThoseWithoutThem) {
 #if !defined(NDEBUG) || !defined(__GNUC__) || defined(__clang__) || __GNUC__ != 12
   GTEST_SKIP() << "digests are those of a release build by g++ 12";
 #endif

@@ -10,7 +10,7 @@ namespace {
 
 using Shares = std::vector<double>;
 
-TEST(MixKeys, OneStyleTurnsOnAndOff) {
+TEST(MixKeys, OneStyleBlendsInAndOut) {
   const MixKeys keys = ParseMixKeys("0:1:0.25", 1);
   EXPECT_EQ(keys.At(0), Shares{0});
   EXPECT_EQ(keys.At(0.25), Shares{0.5});
@@ -21,7 +21,7 @@ TEST(MixKeys, OneStyleTurnsOnAndOff) {
   EXPECT_EQ(ParseMixKeys("0.5", 1).At(0.7), Shares{0.5});
 }
 
-TEST(MixKeys, SeveralStylesHaveAShareEach) {
+TEST(MixKeys, SeveralStylesHaveAWeightEach) {
   const MixKeys keys = ParseMixKeys("1,0:0,1", 2);
   EXPECT_EQ(keys.At(0.25), (Shares{0.75, 0.25}));
   EXPECT_EQ(keys.At(1), (Shares{0, 1}));
@@ -32,7 +32,7 @@ TEST(MixKeys, SeveralStylesHaveAShareEach) {
   EXPECT_EQ(all.At(1), (Shares{0, 1}));
 }
 
-TEST(MixKeys, H49_WhatIsNoShareIsRefusedByName) {
+TEST(MixKeys, H49_InvalidWeightsAreRefusedByName) {
   for (const char* text : {"1.1", "-0.1", "nan", "", ":", "0:x", "0:1e999", "0x1", "1,0"})
     if (*text != 0) EXPECT_REGRADE_ERROR(ParseMixKeys(text, 1), ExitCode::kUsage, "--mix");
   EXPECT_REGRADE_ERROR(ParseMixKeys("0.7,0.7", 2), ExitCode::kUsage, "more than 1");

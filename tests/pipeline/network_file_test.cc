@@ -21,7 +21,7 @@ float Random(uint64_t stream, size_t i) {
   return static_cast<float>(RandomDouble(5, stream, i) - 0.5);
 }
 
-// No value is like its neighbours, so that none can change places unseen.
+// All values differ, so that exchanged ones are detected.
 StoredNetwork SmallNetwork() {
   LipschitzNetworkData data = LipschitzNetwork().data();
   for (size_t i = 0; i < data.parameters.size(); ++i) data.parameters[i] = Random(1, i);
@@ -69,7 +69,7 @@ TEST(NetworkFile, RoundTripKeepsAllBits) {
   EXPECT_EQ(ReadText(folder / "again.npz"), ReadText(folder / "network.npz"));
 }
 
-TEST(NetworkFile, ArraysSayWhatTheyAre) {
+TEST(NetworkFile, ArraysHaveTheirNames) {
   const TemporaryFolder folder;
   const StoredNetwork out = SmallNetwork();
   WriteNetworkFile(folder / "network.npz", out);
@@ -79,7 +79,7 @@ TEST(NetworkFile, ArraysSayWhatTheyAre) {
   file.Read("weight_0", ArrayType::kF32, {64, 30});
   file.Read("u_5", ArrayType::kF32, {27});
   EXPECT_EQ(file.ReadScalar<float>("k_3"), out.network.k(3));
-  // u and v belong to their weight: u^T W v is the norm that the network works with.
+  // u^T W v is the norm that the network uses.
   const NpzArray u = file.Read("u_1", ArrayType::kF32, {64}),
                  v = file.Read("v_1", ArrayType::kF32, {64}),
                  w = file.Read("weight_1", ArrayType::kF32, {64, 64});

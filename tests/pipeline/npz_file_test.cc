@@ -66,7 +66,7 @@ TEST(Npz, EmptyArrays) {
   EXPECT_EQ(reader.Read("none").shape, (std::vector<int64_t>{0, 27}));
 }
 
-// Rows that are made while the file is written, in pieces of several megabytes.
+// Rows are made while the file is written, in pieces of several megabytes.
 TEST(Npz, FilledRowsAreTheArray) {
   const TemporaryFolder folder;
   constexpr int64_t kRows = 2'500'000, kColumns = 3;
@@ -94,7 +94,7 @@ TEST(Npz, FilledRowsAreTheArray) {
   }
 }
 
-// What a fill function throws comes out of WriteTo, and the old file stays.
+// WriteTo rethrows the exception of a fill function, and the old file stays.
 TEST(Npz, AFailureWhileWritingKeepsTheOldFile) {
   const TemporaryFolder folder;
   WriteText(folder / "a.npz", "old");
@@ -126,7 +126,7 @@ TEST(Npz, AFullDiskNamesTheFile) {
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
 }
 
-// Cut anywhere, the archive is refused and never believed.
+// An archive that is cut anywhere is refused.
 TEST(Npz, F71_TruncatedAnywhere) {
   const TemporaryFolder folder;
   const std::string bytes = SmallArchive();
@@ -136,8 +136,8 @@ TEST(Npz, F71_TruncatedAnywhere) {
   }
 }
 
-// One flipped bit of the packed data is found by the checksum; of the rest it is found, or
-// changes nothing that we use. Nothing else than Error may come out.
+// The checksum detects a flipped bit of the data; any other bit is detected or does not matter.
+// Only Error may be thrown.
 TEST(Npz, F70_FlippedBits) {
   const TemporaryFolder folder;
   const std::string bytes = SmallArchive();
@@ -179,7 +179,7 @@ TEST(Npz, F71_DeflateRatioAndStoredSizes) {
   const size_t central = bytes.find("PK\x01\x02");
   const size_t second = bytes.find("PK\x01\x02", central + 4);
   const size_t second_local = bytes.find("PK\x03\x04", 4);
-  // Both descriptions agree on a size that deflate cannot reach.
+  // Both headers agree on a size that deflate cannot reach.
   std::string bomb = Patched(bytes, second + 24, 1u << 30, 4);
   bomb = Patched(bomb, second_local + 22, 1u << 30, 4);
   WriteText(folder / "a.npz", bomb);
@@ -187,7 +187,7 @@ TEST(Npz, F71_DeflateRatioAndStoredSizes) {
                        "more than deflate can do");
   WriteText(folder / "a.npz", Patched(Patched(bytes, central + 24, 1000, 4), 22, 1000, 4));
   EXPECT_REGRADE_ERROR(ReadEverything(folder / "a.npz"), ExitCode::kInput, "sizes differ");
-  // Only one of them says so.
+  // The two headers disagree.
   WriteText(folder / "a.npz", Patched(bytes, second_local + 22, 4000, 4));
   EXPECT_REGRADE_ERROR(ReadEverything(folder / "a.npz"), ExitCode::kInput, "disagree");
 }

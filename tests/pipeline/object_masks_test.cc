@@ -69,7 +69,7 @@ TEST(ObjectMasks, H50_LabelsOfSeveralRegionsSumToAtMostOne) {
   EXPECT_EQ(*masks.StyleRegion(0, 60, 10).at(5, 5), 1);
   EXPECT_EQ(*masks.StyleRegion(1, 60, 10).at(5, 5), 0);
   WriteBands(folder / "style.png", 60, 10, {});
-  EXPECT_REGRADE_ERROR(ObjectMasks(options, {"a.jpg"}), ExitCode::kInput, "black all over");
+  EXPECT_REGRADE_ERROR(ObjectMasks(options, {"a.jpg"}), ExitCode::kInput, "entirely black");
 }
 
 // Mean of |a - b| over the pixels within 8 of the object, or farther.

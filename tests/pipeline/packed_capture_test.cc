@@ -84,7 +84,7 @@ TEST(PackedCapture, F71_DamageIsNamed) {
   EXPECT_REGRADE_ERROR(ReadPackedCapture(folder / "b.npz"), ExitCode::kInput, "cameras");
 }
 
-TEST(PackedCapture, F69_H134_WhatNoCaptureHas) {
+TEST(PackedCapture, F69_H134_ImplausibleValues) {
   const testing::TemporaryFolder folder;
   const auto refuse = [&folder](const PackedCapture& capture, const char* part) {
     WritePackedCapture(folder / "a.npz", capture);
@@ -92,19 +92,19 @@ TEST(PackedCapture, F69_H134_WhatNoCaptureHas) {
   };
   PackedCapture capture = SmallCapture();
   capture.views[1].camera.fx = 1e9;
-  refuse(capture, "a camera that none can be");
+  refuse(capture, "a camera is implausible");
   capture = SmallCapture();
   capture.views[1].camera.camera_from_world.rotation(0, 0) = 2;
-  refuse(capture, "a camera that none can be");
+  refuse(capture, "a camera is implausible");
   capture = SmallCapture();
   capture.scene.field_from_world.scale = 0;
-  refuse(capture, "its box or its place");
+  refuse(capture, "its box or frame");
   capture = SmallCapture();
   capture.scene.box.radius.y = -1;
-  refuse(capture, "its box or its place");
+  refuse(capture, "its box or frame");
   capture = SmallCapture();
   capture.scene.ndc = {1.5, 0};
-  refuse(capture, "its box or its place");
+  refuse(capture, "its box or frame");
 }
 
 }  // namespace

@@ -63,8 +63,8 @@ class PhotoFolder : public ::testing::Test {
     return files;
   }
   static std::string WhyNot(const IngestResult& result, const std::string& file) {
-    for (const PhotoStatus& verdict : result.statuses)
-      if (verdict.file == file) return verdict.status == "used" ? "used" : verdict.why;
+    for (const PhotoStatus& photo : result.statuses)
+      if (photo.file == file) return photo.status == PhotoState::kUsed ? "used" : photo.why;
     return "not listed";
   }
 
@@ -251,7 +251,7 @@ TEST_F(PhotoFolder, F13_MissingFileEmptyOrWithoutPhotos) {
   }
 }
 
-TEST_F(PhotoFolder, OneOrTwoPhotosAreNoScene) {
+TEST_F(PhotoFolder, OneOrTwoPhotosAreRefused) {
   PutPhotos(2);
   const Error error = Failure();
   EXPECT_EQ(error.code(), ExitCode::kScene);
@@ -267,7 +267,7 @@ TEST_F(PhotoFolder, HiddenFilesAreIgnored) {
   EXPECT_EQ(result.hidden, 2);
 }
 
-TEST_F(PhotoFolder, H146_AlphaIsLaidOverWhiteAndKeptBeside) {
+TEST_F(PhotoFolder, H146_AlphaIsCompositedOnWhiteAndStaged) {
   PutPhotos(3);
   Image cut_out = Photo(80, 70, 5, 4);
   for (int i = 0; i < 80 * 70; ++i) cut_out.pixels[4 * i + 3] = i % 2 ? 1.f : 0.f;
@@ -328,7 +328,7 @@ TEST_F(PhotoFolder, F15_FingerprintSeesAChangedPixelAndAName) {
   EXPECT_NE(Ingest().fingerprint, before);
 }
 
-TEST_F(PhotoFolder, AWishToStopIsObeyed) {
+TEST_F(PhotoFolder, StopsOnRequest) {
   PutPhotos(5);
   int calls = 0;
   const auto stop_at_third = [&](const Progress&) {
@@ -348,7 +348,7 @@ TEST_F(PhotoFolder, F14_AVanishedDriveIsNotADamagedPhoto) {
   EXPECT_TRUE(Contains(error.what_failed(), "Input/output error")) << error.what();
 }
 
-TEST_F(PhotoFolder, F14_ThousandsOfOtherFilesAreNoTrouble) {
+TEST_F(PhotoFolder, F14_ThousandsOfOtherFiles) {
   PutPhotos(3);
   for (int i = 0; i < 3000; ++i) WriteBytes(folder_ + "/log/" + std::to_string(i), "x");
   const IngestResult result = Ingest();

@@ -12,7 +12,9 @@
 #include "pipeline/capture/track_colors.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/synth/synth_effects.h"
+#include "tests/support/expect_error.h"
 #include "tests/support/synthetic_photos.h"
+#include "tests/support/temporary_folder.h"
 
 namespace regrade {
 namespace {
@@ -56,7 +58,7 @@ TEST_F(SyntheticExposure, GainsOfTheSimulationAreFoundWithinTwoPercent) {
           << "photo " << v << " channel " << c;
 }
 
-TEST_F(SyntheticExposure, EqualPhotosAreTakenAsTheyAre) {
+TEST_F(SyntheticExposure, EqualPhotosStayUnchanged) {
   const SceneProfile profile = ProfileScene(MakeCapture(false), 2, "auto");
   EXPECT_FALSE(profile.effects.back().on) << EffectLine(profile.effects.back());
   // Measured, and nothing: the disagreement that is left is noise.
@@ -65,7 +67,7 @@ TEST_F(SyntheticExposure, EqualPhotosAreTakenAsTheyAre) {
   EXPECT_TRUE(profile.gains.of_view.empty());
 }
 
-TEST_F(SyntheticExposure, TheUserDecides) {
+TEST_F(SyntheticExposure, OptionsOverrideMeasurements) {
   const Capture capture = MakeCapture(true);
   EXPECT_TRUE(ProfileScene(capture, 2, "exposure=off").gains.of_view.empty());
   Capture without = capture;
@@ -83,11 +85,15 @@ TEST_F(SyntheticExposure, TheUserDecides) {
   EXPECT_NE(asked_for.notices[0].find("photo of 00003.png"), std::string::npos);
 }
 
-TEST_F(SyntheticExposure, AGainIsUndoneWhereAPhotoIsRead) {
+TEST_F(SyntheticExposure, GainsAreUndoneOnReading) {
   const Capture capture = MakeCapture(false);
-  const CaptureView& view = capture.views[0];
-  const Image plain = ReadWorkingPhoto(view, 100, kAsTaken);
-  const Image undone = ReadWorkingPhoto(view, 100, PhotoGain{{0.5, 1, 2}});
+  const WorkingViews views(capture, 100, 0);
+  const Image plain = views.Photo(0);
+  PhotoGains gains;
+  gains.of_view.assign(capture.views.size(), PhotoGain{{0.5, 1, 2}});
+  const WorkingViews corrected = views.WithGains(gains);
+  const Image undone = corrected.Photo(0);
+  EXPECT_EQ(corrected.AsTaken().Photo(0).pixels, plain.pixels);
   EXPECT_EQ(plain.width, 100);
   for (int y = 0; y < plain.height; ++y)
     for (int x = 0; x < plain.width; ++x) {
@@ -97,7 +103,7 @@ TEST_F(SyntheticExposure, AGainIsUndoneWhereAPhotoIsRead) {
     }
 }
 
-TEST(PhotoGains, ClippedIsShownAsBrightAsItWasAtLeast) {
+TEST(PhotoGains, ClippedValuesAreLowerBounds) {
   ExposureEstimate estimate;
   estimate.photos.resize(3);
   for (PhotoExposure& photo : estimate.photos) photo.known = true;
@@ -146,31 +152,38 @@ TEST(PhotoGains, H155_AsTakenIsBitForBit) {
   EXPECT_EQ(PhotoGains().Of(17), kAsTaken);
 }
 
-TEST(PhotoGains, StagesReadWhatTheRecordHas) {
+TEST(PhotoGains, AreStoredBesideThePoses) {
   const fs::path folder = fs::path(::testing::TempDir()) / "photo_gains_record";
   fs::remove_all(folder);
-  Workspace workspace(folder.string());
+  fs::create_directories(folder);
+  const std::string poses = folder.string(), file = poses + "/exposure.json";
   Capture capture;
   capture.views.resize(2);
   capture.views[0].file = "a.jpg", capture.views[1].file = "b.jpg";
-  EXPECT_TRUE(RecordedGains(workspace, capture).of_view.empty());
+  EXPECT_TRUE(ReadGains(poses, capture).of_view.empty());
+  EXPECT_TRUE(StoredGainRows(poses).IsNull());
 
   ExposureEstimate estimate;
   estimate.photos.resize(2);
   estimate.photos[1].gain = {1.1, 0.9, 1 / 3.0};
   estimate.photos[1].known = true;
-  JsonValue metrics = JsonValue::Object();
-  metrics["exposure"] =
-      GainsRecord(capture, estimate, GainsOf(estimate, {{0.1, 0.1, 0.1}, {0.1, 0.1, 0.1}}));
-  workspace.Record("reconstruct", JsonValue::Object(), {}, 0, metrics);
-  EXPECT_EQ(RecordedGains(workspace, capture).Of(0), kAsTaken);
-  EXPECT_EQ(RecordedGains(workspace, capture).Of(1), (PhotoGain{{1.1, 0.9, 1 / 3.0}, 1}));
+  const PhotoGains gains = GainsOf(estimate, {{0.1, 0.1, 0.1}, {0.1, 0.1, 0.1}});
+  WriteGains(poses, capture, estimate, gains);
+  EXPECT_EQ(ReadJsonFile(file).At("schema").AsInt(), 1);
+  EXPECT_EQ(StoredGainRows(poses).AsArray().size(), 2u);
+  EXPECT_EQ(ReadGains(poses, capture).Of(0), kAsTaken);
+  EXPECT_EQ(ReadGains(poses, capture).Of(1), (PhotoGain{{1.1, 0.9, 1 / 3.0}, 1}));
   capture.views[1].file = "c.jpg";
-  EXPECT_THROW(RecordedGains(workspace, capture), Error);
+  EXPECT_REGRADE_ERROR(ReadGains(poses, capture), ExitCode::kInput,
+                       "--restart-from reconstruct");
+  testing::WriteText(file, R"({"schema": 9, "photos": []})");
+  EXPECT_REGRADE_ERROR(ReadGains(poses, capture), ExitCode::kInput, "schema 1");
+  WriteGains(poses, capture, estimate, {});
+  EXPECT_FALSE(fs::exists(file));
   fs::remove_all(folder);
 }
 
-TEST(TrackColors, WindowIsTheMeanLightRoundAPoint) {
+TEST(TrackColors, WindowIsTheMeanLightAroundAPoint) {
   Image photo(16, 16);
   for (int y = 0; y < 16; ++y)
     for (int x = 0; x < 16; ++x)

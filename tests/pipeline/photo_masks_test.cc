@@ -23,17 +23,17 @@ using testing::TemporaryFolder;
 
 constexpr int kViews = 17, kWidth = 160, kHeight = 120, kThing = 60;
 
-// What it said; it has to end with `exit_code`.
+// Its output; it has to end with `exit_code`.
 std::string Regrade(std::vector<std::string> arguments, int exit_code = 0) {
   ChildOptions options;
   options.argv = {REGRADE_PROGRAM};
   options.argv.insert(options.argv.end(), arguments.begin(), arguments.end());
   options.wall_limit_s = 240;
-  std::string said;
+  std::string output;
   const ChildResult result =
-      RunChild(options, [&said](const std::string& line) { said += line + "\n"; });
-  EXPECT_EQ(result.exit_status, exit_code) << said;
-  return said;
+      RunChild(options, [&output](const std::string& line) { output += line + "\n"; });
+  EXPECT_EQ(result.exit_status, exit_code) << output;
+  return output;
 }
 
 // A synthetic capture with its poses; in a copy of it a magenta square stands before all photos
@@ -81,7 +81,7 @@ std::string Bytes(const std::string& path) {
   return bytes.str();
 }
 
-TEST(PhotoMasks, WhatTheyBlackenIsNeitherFittedNorMeasured) {
+TEST(PhotoMasks, MaskedPixelsAreNeitherFittedNorMeasured) {
   const TemporaryFolder folder;
   SynthWithAThing(folder);
   Reconstruct(folder / "s/truth", folder / "with", "100,200",
@@ -100,20 +100,21 @@ TEST(PhotoMasks, WhatTheyBlackenIsNeitherFittedNorMeasured) {
     const Image seen = ReadImage(folder / ("with/views_2d/" + FrameName(i)));
     const Image clean = ReadImage(folder / ("clean_out/views_2d/" + FrameName(i)));
     // Of the masked part alone.
-    const Image kept = ReadWorkingMask(capture.views[static_cast<size_t>(i)], kWidth);
+    const Image kept = WorkingViews(capture, kWidth, 0).Mask(i);
     EXPECT_GT(Psnr(seen, clean, &kept).value(), 17) << FrameName(i);  // the square has 13
   }
 
   // Pixels that the mask's edge runs through are left out with it, and photos may have none.
-  EXPECT_TRUE(ReadWorkingMask(capture.views.back(), 80).empty());
-  const Image kept = ReadWorkingMask(capture.views[1], 80);  // the square begins at 37, 23
+  EXPECT_TRUE(
+      WorkingViews(capture, 80, 0).Mask(static_cast<int>(capture.views.size()) - 1).empty());
+  const Image kept = WorkingViews(capture, 80, 0).Mask(1);  // the square begins at 37, 23
   ASSERT_EQ(kept.width, 80);
   for (int x : {18, 19, 47, 48}) EXPECT_EQ(*kept.at(x, 20), 0) << x;
   for (int x : {17, 49}) EXPECT_EQ(*kept.at(x, 20), 1) << x;
-  EXPECT_TRUE(ReadWorkingMask(ReadCapture(folder / "clean_out/poses").views[1], 80).empty());
+  EXPECT_TRUE(ReadWorkingViews(folder / "clean_out/poses", 80, 0).Mask(1).empty());
 }
 
-TEST(PhotoMasks, LaterStagesAndRunsKnowThemWhereverTheirFolderWent) {
+TEST(PhotoMasks, LaterStagesAndRunsUseTheStagedMasks) {
   const TemporaryFolder folder;
   SynthWithAThing(folder);
   Reconstruct(folder / "s/truth", folder / "out", "50,50", {"--photo-masks", folder / "masks"});
@@ -126,13 +127,14 @@ TEST(PhotoMasks, LaterStagesAndRunsKnowThemWhereverTheirFolderWent) {
   for (int k = 0; k < 2; ++k) {
     const std::string styled = folder / ("styled" + std::to_string(k));
     fs::create_directories(styled);
-    for (const CaptureView& view : capture.views) {
-      Image picture = ReadImage(view.path);
-      const Image kept = ReadWorkingMask(view, kWidth);
+    const WorkingViews views(capture, kWidth, 0);
+    for (int i = 0; i < views.count(); ++i) {
+      Image picture = views.Photo(i);
+      const Image kept = views.Mask(i);
       for (int64_t p = 0; p < kept.num_pixels(); ++p)
         if (kept.pixels[p] < 0.5f)
           for (int c = 0; c < 3; ++c) picture.pixels[3 * p + c] = static_cast<float>(k);
-      WritePng8(styled + "/" + view.name, picture);
+      WritePng8(styled + "/" + views.View(i).name, picture);
     }
     const std::string out = folder / ("out" + std::to_string(k));
     fs::copy(folder / "out", out, fs::copy_options::recursive);
@@ -150,17 +152,17 @@ TEST(PhotoMasks, LaterStagesAndRunsKnowThemWhereverTheirFolderWent) {
   EXPECT_EQ(psnr[0], psnr[1]);
   // A run that starts from these poses has their masks.
   Regrade({"pose", folder / "out", "--out", folder / "again", "--tracks", "given"});
-  EXPECT_FALSE(ReadWorkingMask(ReadCapture(folder / "again/poses").views[1], kWidth).empty());
+  EXPECT_FALSE(ReadWorkingViews(folder / "again/poses", kWidth, 0).Mask(1).empty());
 }
 
-TEST(PhotoMasks, OneThatLeavesNothingIsRefused) {
+TEST(PhotoMasks, AnEntirelyBlackMaskIsRefused) {
   const TemporaryFolder folder;
   SynthWithAThing(folder);
   WritePng8(folder / "masks/00003.png", Image(kWidth, kHeight, 1));
-  const std::string said = Regrade({"pose", folder / "s/truth", "--out", folder / "out",
-                                    "--tracks", "given", "--photo-masks", folder / "masks"},
-                                   3);
-  EXPECT_NE(said.find("00003.png"), std::string::npos) << said;
+  const std::string output = Regrade({"pose", folder / "s/truth", "--out", folder / "out",
+                                      "--tracks", "given", "--photo-masks", folder / "masks"},
+                                     3);
+  EXPECT_NE(output.find("00003.png"), std::string::npos) << output;
 }
 
 }  // namespace

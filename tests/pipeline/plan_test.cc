@@ -25,7 +25,7 @@ TEST(Plan, MemoryOfOneStageByHand) {
   EXPECT_EQ(plan.memory, kProgram + 1000000u * (5 * 128 + 4 * 4 + 2 * 12) + 18000u);
 }
 
-TEST(Plan, LaterStagesStoreAShare) {
+TEST(Plan, LaterStagesStoreAFraction) {
   // 200^3 at two fifths outweighs 100^3 in full.
   const StagePlan plan = PlanFit(Fit({100, 200}, {10, 10}), 0, kCube, 2);
   EXPECT_EQ(plan.memory, kProgram + 3200000u * (5 * 128 + 4 * 4) + 8000000u * 2 * 12);

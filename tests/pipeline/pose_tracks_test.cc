@@ -35,17 +35,17 @@ bool HaveColmap() {
   }
 }
 
-// What it said, after it ended well.
+// Its output; it must succeed.
 std::string Regrade(std::vector<std::string> arguments) {
   ChildOptions options;
   options.argv = {REGRADE_PROGRAM};
   options.argv.insert(options.argv.end(), arguments.begin(), arguments.end());
   options.wall_limit_s = 240;
-  std::string said;
+  std::string output;
   const ChildResult result =
-      RunChild(options, [&said](const std::string& line) { said += line + "\n"; });
-  EXPECT_TRUE(result.Succeeded()) << said;
-  return said;
+      RunChild(options, [&output](const std::string& line) { output += line + "\n"; });
+  EXPECT_TRUE(result.Succeeded()) << output;
+  return output;
 }
 
 void Synth(const std::string& out, const std::string& effects) {
@@ -66,13 +66,13 @@ std::string Bytes(const std::string& path) {
   return bytes.str();
 }
 
-TEST(PoseTracks, WithoutColmapEverythingIsAsWithoutTracks) {
+TEST(PoseTracks, WithoutColmapResultsAreThoseWithoutTracks) {
   const TemporaryFolder folder;
   Synth(folder / "s", "");
   Regrade({"pose", folder / "s/truth", "--out", folder / "given", "--tracks", "given"});
-  const std::string said = Regrade({"pose", folder / "s/truth", "--out", folder / "none",
-                                    "--colmap", folder / "no-such-colmap"});
-  EXPECT_NE(said.find("no tracks were found"), std::string::npos) << said;
+  const std::string output = Regrade({"pose", folder / "s/truth", "--out", folder / "none",
+                                      "--colmap", folder / "no-such-colmap"});
+  EXPECT_NE(output.find("COLMAP found no tracks"), std::string::npos) << output;
   for (const char* name : {"cameras.bin", "images.bin", "points3D.bin"})
     EXPECT_EQ(Bytes(folder / (std::string("given/poses/sparse/") + name)),
               Bytes(folder / (std::string("none/poses/sparse/") + name)))
@@ -82,7 +82,7 @@ TEST(PoseTracks, WithoutColmapEverythingIsAsWithoutTracks) {
   EXPECT_EQ(PoseMetrics(folder / "given").Find("tracks"), nullptr);
 }
 
-TEST(PoseTracks, TransparentPhotosAndOwnPointsAreNotSearched) {
+TEST(PoseTracks, NotForTransparentPhotosOrGivenPoints) {
   const TemporaryFolder folder;
   PoseOptions options;
   Capture capture;
@@ -127,7 +127,7 @@ TEST(PoseTracks, ExposureOfGivenPosesIsFoundWithinTwoPerCent) {
 }
 
 // Poses of the right photos in the wrong order: COLMAP finds points for them, by chance.
-TEST(PoseTracks, PosesOfOtherPhotosAreDoubted) {
+TEST(PoseTracks, PosesOfOtherPhotosAreRejected) {
   if (!HaveColmap()) GTEST_SKIP() << "no colmap here";
   const TemporaryFolder folder;
   Synth(folder / "s", "");
@@ -140,14 +140,14 @@ TEST(PoseTracks, PosesOfOtherPhotosAreDoubted) {
     frames[i]["transform_matrix"] = poses[(5 * i + 3) % poses.size()];
   json["frames"] = frames;
   WriteJsonFile(path, json);
-  const std::string said = Regrade({"pose", folder / "s/truth", "--out", folder / "out"});
-  EXPECT_NE(said.find("do the poses not belong"), std::string::npos) << said;
+  const std::string output = Regrade({"pose", folder / "s/truth", "--out", folder / "out"});
+  EXPECT_NE(output.find("poses of other photos"), std::string::npos) << output;
   EXPECT_TRUE(ReadCapture(folder / "out/poses").points.empty());
 }
 
 // Masks by the names of photos, with their extension or without, of half the size: what they
 // blacken is not matched.
-TEST(PoseTracks, WhatMasksBlackenIsNotMatched) {
+TEST(PoseTracks, MaskedPixelsAreNotMatched) {
   if (!HaveColmap()) GTEST_SKIP() << "no colmap here";
   const TemporaryFolder folder;
   Synth(folder / "s", "");
@@ -186,14 +186,14 @@ TEST(PoseTracks, WhatMasksBlackenIsNotMatched) {
 }
 
 // Poses 0.3 degrees and 0.5 % of the spread off, handed over without their tracks.
-TEST(PoseTracks, ShakenPosesAreRefined) {
+TEST(PoseTracks, PerturbedPosesAreRefined) {
   if (!HaveColmap()) GTEST_SKIP() << "no colmap here";
   const TemporaryFolder folder;
   Synth(folder / "s", "poses");
   Regrade({"pose", folder / "s", "--out", folder / "off", "--effects", "pose-refinement=off"});
   Regrade({"export", folder / "off", "--format", "transforms", "--out", folder / "shaken"});
-  const std::string said = Regrade({"pose", folder / "shaken", "--out", folder / "out"});
-  ASSERT_NE(said.find("pose-refinement on"), std::string::npos) << said;
+  const std::string output = Regrade({"pose", folder / "shaken", "--out", folder / "out"});
+  ASSERT_NE(output.find("pose-refinement on"), std::string::npos) << output;
   Regrade({"pose", folder / "s/truth", "--out", folder / "truth", "--tracks", "given"});
   const Capture truth = ReadCapture(folder / "truth/poses"),
                 before = ReadCapture(folder / "off/poses"),

@@ -91,7 +91,7 @@ TEST(Program, F21_ContradictionsNameBoth) {
   EXPECT_SAYS(outcome, "--fit-steps");
 }
 
-TEST(Program, TheStyleMethodIsLookedAtBeforeAnyWork) {
+TEST(Program, TheStyleMethodIsCheckedBeforeAnyWork) {
   const TemporaryFolder folder;
   WriteText(folder / "photos/a.png", "x");
   const std::string style = std::string(REGRADE_SOURCE_DIR) + "/assets/style_sunset.png";
@@ -131,7 +131,7 @@ TEST(Program, F13_MissingFolderExitsWith3) {
   EXPECT_EQ(Regrade({"pose", folder / "empty", "--out", folder / "out"}).code, 3);
 }
 
-TEST(Program, F16_StyleIsLookedAtFirst) {
+TEST(Program, F16_StyleIsCheckedFirst) {
   const TemporaryFolder folder;
   WriteText(folder / "photos/a.png", "x");
   WriteText(folder / "style.jpg", "not a picture");
@@ -185,7 +185,7 @@ int Spawn(const std::vector<std::string>& arguments, int fd, int signal = 0,
   return testing::Spawn(REGRADE_PROGRAM, arguments, fd, signal, when);
 }
 
-TEST(Program, F24_ClosedOutputIsNoReasonToStop) {
+TEST(Program, F24_ClosedOutputDoesNotStopTheProgram) {
   const TemporaryFolder folder;
   int ends[2];
   ASSERT_EQ(::pipe(ends), 0);
@@ -216,7 +216,7 @@ TEST(Interrupt, F34_TheSecondSignalEndsTheProcessAtOnce) {
     for (const int s : {SIGINT, SIGTERM}) ::signal(s, SIG_DFL);  // whatever was handed down
     InstallSignalHandling();
     ::raise(SIGINT);
-    if (StopSignal() != SIGINT) ::_exit(1);  // the first is a wish
+    if (StopSignal() != SIGINT) ::_exit(1);  // the first is a request
     ::raise(SIGTERM);
     ::_exit(2);
   }

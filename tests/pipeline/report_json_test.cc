@@ -7,8 +7,10 @@
 #include <vector>
 
 #include "pipeline/report/json.h"
+#include "pipeline/report/records.h"
 #include "pipeline/workspace/metrics_json.h"
 #include "tests/support/expect_error.h"
+#include "tests/support/temporary_folder.h"
 
 namespace regrade {
 namespace {
@@ -72,8 +74,8 @@ RunReport FullReport() {
   report.command = {"regrade", "run"};
   report.seed = std::numeric_limits<uint64_t>::max();
   report.peak_memory_mb = 900;
-  report.photos =
-      PhotosReport{2, 1, 1, {{"a.jpg", "used", ""}, {"\xFF.jpg", "skipped", "text"}}};
+  report.photos = PhotosReport{
+      2, 1, 1, {{"a.jpg", PhotoState::kUsed, ""}, {"\xFF.jpg", PhotoState::kSkipped, "text"}}};
   report.effects = {{"ndc", false, "corner rays", 0.41, 0.9}};
   report.stages.pose = PoseStageReport{
       .time = {1, {}}, .registered = 2, .points = 12775, .reprojection_px = 0.9};
@@ -236,6 +238,26 @@ TEST(MetricsJson, AMissingNumberIsNoZero) {
   EXPECT_REGRADE_ERROR(read(without("4, ", "5000000000, ")), ExitCode::kInput, "\"width\"");
   EXPECT_REGRADE_ERROR(read(without(R"(, "frames_per_second_why": "not measured")")),
                        ExitCode::kInput, "null with a reason in \"frames_per_second_why\"");
+}
+
+TEST(ReportFromRecords, ReadsWhatStagesRecordAndNamesFileAndKeyOfWhatIsMissing) {
+  const testing::TemporaryFolder folder;
+  Workspace workspace(folder / "out");
+  JsonValue metrics = JsonValue::Object();
+  RenderReport render;
+  render.frames = 48;
+  PutMetrics(render, &metrics);
+  workspace.Record("render", JsonValue::Object(), {}, 5, metrics, 9);
+  const RunReport report = ReportFromRecords(workspace);
+  EXPECT_EQ(report.stages.render->frames, 48);
+  EXPECT_EQ(report.stages.render->time.seconds, 5);
+  EXPECT_EQ(report.stages.render->time.cpu_seconds, 9);
+  EXPECT_FALSE(report.stages.pose.has_value());
+
+  workspace.Record("render", JsonValue::Object(), {}, 5, JsonValue::Object{{"device", "cpu"}});
+  EXPECT_REGRADE_ERROR(ReportFromRecords(workspace), ExitCode::kInput, "\"frames\" is missing");
+  EXPECT_REGRADE_ERROR(ReportFromRecords(workspace), ExitCode::kInput,
+                       ".regrade/stages/render.json");
 }
 
 }  // namespace

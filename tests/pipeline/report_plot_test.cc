@@ -26,8 +26,8 @@ Plot PlotOf(std::vector<PlotPoint> points) {
 TEST(ReportPlot, ALineLiesWhereItsNumbersAre) {
   // Linear axes span whole steps: x as given, y from 0 to 10.
   const std::string html = PlotHtml(PlotOf({{0, 0.0, ""}, {100, 10.0, ""}}));
-  EXPECT_NE(html.find("points=\"40.0,196.0 548.0,8.0 \""), std::string::npos) << html;
-  EXPECT_EQ(Count(html, "<text"), 6u + 6u + 1u);  // ticks of both, and the name of the axis
+  EXPECT_NE(html.find("points=\"40.0,212.0 548.0,24.0 \""), std::string::npos) << html;
+  EXPECT_EQ(Count(html, "<text"), 6u + 6u + 2u);  // ticks and names of both axes
 }
 
 TEST(ReportPlot, PointsOfALineShowTheirNumbersUnderThePointer) {

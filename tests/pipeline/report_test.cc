@@ -19,8 +19,11 @@ RunReport SomeReport() {
   report.version = "0.1.0";
   report.command = {"regrade", "run", "my photos", "--style", "it's.png"};
   report.seconds = 95;
-  report.photos =
-      PhotosReport{3, 2, 2, {{"a.jpg", "used", ""}, {"b.jpg", "skipped", "cut at 20 kB"}}};
+  report.photos = PhotosReport{
+      3,
+      2,
+      2,
+      {{"a.jpg", PhotoState::kUsed, ""}, {"b.jpg", PhotoState::kSkipped, "cut at 20 kB"}}};
   report.effects = {{"ndc", false, "corner rays spread too far", 0.41, 0.9}};
   report.stages.reconstruct = ReconstructReport{
       .time = {60, {}},
@@ -112,7 +115,7 @@ TEST(ReportHtml, HostileNamesStayText) {
   const std::string harmless = ReportHtml(report, pictures);
   report.version = report.preset = report.device = evil;
   report.command = {evil};
-  report.photos->statuses = {{evil, "used", ""}, {evil, evil, evil}};
+  report.photos->statuses = {{evil, PhotoState::kUsed, ""}, {evil, PhotoState::kSkipped, evil}};
   report.effects[0].name = report.effects[0].evidence = evil;
   report.stages.reconstruct->psnr_heldout_db = Metric::Undefined(evil);
   report.stages.reconstruct->device = evil;

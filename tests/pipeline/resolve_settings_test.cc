@@ -78,7 +78,8 @@ TEST(ResolveSettings, LaterSourcesOverrideEarlierOnes) {
   EXPECT_EQ(r.settings.network.rays_per_step, 7);
 
   r = Resolve({"--config", config}, sources);
-  EXPECT_EQ(r.words, std::vector<std::string>{"/more"});
+  EXPECT_EQ(r.words, std::vector<std::string>{"/photos"});
+  EXPECT_EQ(Resolve({"--config", config}).words, std::vector<std::string>{"/more"});
   EXPECT_EQ(r.settings.render.fps, 30);
   EXPECT_EQ(r.settings.scene.photo_size, 300);
 

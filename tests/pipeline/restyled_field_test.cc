@@ -17,7 +17,7 @@ using testing::TemporaryFolder;
 // Stylises a synthetic capture with further flags in folder / "e".
 void Stylize(const TemporaryFolder& folder, const std::vector<std::string>& synth_flags,
              const std::vector<std::string>& flags) {
-  std::vector<std::string> synth{"synth", folder / "s", "--views", "8", "--size", "64x48"};
+  std::vector<std::string> synth{"synth", folder / "s", "--views", "8", "--size", "96x72"};
   synth.insert(synth.end(), synth_flags.begin(), synth_flags.end());
   ASSERT_EQ(testing::RunProgram(REGRADE_PROGRAM, synth).code, 0);
   std::vector<std::string> run{

@@ -49,7 +49,7 @@ TEST(RunReport, ShowsEveryPartOfTheRun) {
   for (const std::string& flag : testing::TinyFlags()) run.push_back(flag);
   const testing::ProgramOutcome done = Regrade(run);
   ASSERT_EQ(done.code, 0) << done.text;
-  EXPECT_NE(done.text.find("exposure off: not measured (it was not wanted)"), std::string::npos)
+  EXPECT_NE(done.text.find("exposure off: not measured (off by --effects)"), std::string::npos)
       << done.text;
 
   // Three sequences at the photos' positions and three along the film's path, at gaps 1 and 5;

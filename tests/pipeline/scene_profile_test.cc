@@ -68,17 +68,17 @@ TEST(SceneEffects, H153_RowsCarryTheNumbersOfTheDecision) {
   EXPECT_EQ(EffectLine(off[0]).substr(0, 26), "distortion off: 0.3 <= 0.5");
 }
 
-TEST(SceneProfile, WishesAreReadAndNonsenseIsNamed) {
+TEST(SceneProfile, OverridesAreParsedAndErrorsNamed) {
   EXPECT_TRUE(ParseEffects("auto").empty());
-  const auto wishes = ParseEffects("ndc=off,alpha=on");
-  EXPECT_FALSE(wishes.at("ndc"));
-  EXPECT_TRUE(wishes.at("alpha"));
+  const auto overrides = ParseEffects("ndc=off,alpha=on");
+  EXPECT_FALSE(overrides.at("ndc"));
+  EXPECT_TRUE(overrides.at("alpha"));
   for (const char* text : {"fog", "ndc", "ndc=maybe", "distortion=on", ","})
     EXPECT_REGRADE_ERROR(ParseEffects(text), ExitCode::kUsage, "is not allowed");
 }
 
-// Cameras side by side that look one way: NDC by itself, the box when that is wished.
-TEST(SceneProfile, ForwardFacingCapturesGetTheirSpace) {
+// Cameras side by side that look one way: NDC by itself, the box when an override asks for it.
+TEST(SceneProfile, ForwardFacingCapturesUseNdc) {
   Capture capture = CaptureWithShifts({0, 0, 0, 0});
   for (size_t i = 0; i < capture.views.size(); ++i)
     capture.views[i].camera.camera_from_world.translation = {0.1 * static_cast<double>(i), 0,
@@ -119,7 +119,7 @@ Capture CaptureSeenAllRound(int far) {
 }
 
 // H153, H156: layers where much is far all round, measured, and no trace of them elsewhere.
-TEST(SceneProfile, H153_H156_FarSurroundingsCallForSpheres) {
+TEST(SceneProfile, H153_H156_FarSurroundingsUseSpheres) {
   const SceneProfile near = ProfileScene(CaptureSeenAllRound(0), 2, "exposure=off");
   EXPECT_FALSE(near.scene.box.spheres);
   EXPECT_EQ(near.effects[3].name, "background");
@@ -131,7 +131,7 @@ TEST(SceneProfile, H153_H156_FarSurroundingsCallForSpheres) {
   EXPECT_EQ(far.scene.box.radius, (Vec3f{1, 1, 1}));
   EXPECT_NEAR(far.scene.field_from_world.scale, 0.9 / std::hypot(2.0, 0.3), 1e-3);
   EXPECT_NEAR(far.scene.field_from_world.rotation(1, 2), 1, 1e-9);
-  // A wish decides, and one that contradicts another is named.
+  // An override decides; contradictions are named.
   EXPECT_FALSE(
       ProfileScene(CaptureSeenAllRound(5), 2, "background=off,exposure=off").scene.box.spheres);
   EXPECT_TRUE(
@@ -141,8 +141,8 @@ TEST(SceneProfile, H153_H156_FarSurroundingsCallForSpheres) {
       ExitCode::kUsage, "alpha");
 }
 
-// H154: the photos' order has no say.
-TEST(SceneProfile, H154_BackgroundDoesNotKnowThePhotosOrder) {
+// H154: the photos' order does not matter.
+TEST(SceneProfile, H154_BackgroundIsIndependentOfThePhotosOrder) {
   Capture capture = CaptureSeenAllRound(2);
   const double value = *ProfileScene(capture, 2, "exposure=off").effects[3].value.value;
   std::reverse(capture.points.begin(), capture.points.end());

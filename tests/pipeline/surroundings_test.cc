@@ -73,7 +73,7 @@ TEST(Surroundings, F26_AClockThatJumpsChangesNothing) {
             ReadText(folder / "plain/poses/sparse/images.bin"));
 }
 
-TEST(Surroundings, F27_AWorkingFolderThatIsGone) {
+TEST(Surroundings, F27_TheCurrentFolderWasDeleted) {
   const TemporaryFolder folder;
   const std::string capture = Synthetic(folder), gone = folder / "gone";
   const std::string leave = "mkdir \"$1\" && cd \"$1\" && rmdir \"$1\" && shift && exec \"$@\"";
@@ -83,7 +83,7 @@ TEST(Surroundings, F27_AWorkingFolderThatIsGone) {
   };
   const ProgramOutcome relative = run_gone("out");
   EXPECT_EQ(relative.code, 5) << relative.text;
-  EXPECT_NE(relative.text.find("the working folder is gone"), std::string::npos)
+  EXPECT_NE(relative.text.find("the current folder does not exist"), std::string::npos)
       << relative.text;
   EXPECT_EQ(run_gone(folder / "out").code, 0);
 }

@@ -87,13 +87,15 @@ TEST(TradeoffCommand, MeasuresContinuesAndPredicts) {
                      "{\"schema\": 1, \"costs\": [{}]}");
   outcome = Regrade({"evaluate", folder / "t/base"});
   ASSERT_EQ(outcome.code, 0) << outcome.text;
-  EXPECT_NE(outcome.text.find("tradeoff.json is left out"), std::string::npos) << outcome.text;
+  EXPECT_NE(outcome.text.find("the report does without tradeoff/tradeoff.json"),
+            std::string::npos)
+      << outcome.text;
   EXPECT_NE(outcome.text.find("schema 1"), std::string::npos) << outcome.text;
-  EXPECT_EQ(page().find("What accuracy costs here"), std::string::npos);
+  EXPECT_EQ(page().find("Accuracy and cost"), std::string::npos);
   testing::WriteText(folder / "t/base/tradeoff/tradeoff.json",
                      testing::ReadText(folder / "t/tradeoff.json"));
   EXPECT_EQ(Regrade({"evaluate", folder / "t/base"}).code, 0);
-  EXPECT_NE(page().find("What accuracy costs here"), std::string::npos);
+  EXPECT_NE(page().find("Accuracy and cost"), std::string::npos);
 }
 
 TEST(TradeoffCommand, RefusesInvalidArguments) {

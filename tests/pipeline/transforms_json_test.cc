@@ -120,7 +120,7 @@ TEST_F(TransformsJson, BlenderDialect) {
   EXPECT_EQ(file.frames[0].camera.cy, 300);
 }
 
-TEST_F(TransformsJson, H134_WhatNoCameraHas) {
+TEST_F(TransformsJson, H134_ImplausibleCameras) {
   EXPECT_NE(Refusal(OneFrame(R"("fl_x":1e9,"w":64,"h":48)")).find("focal length"),
             std::string::npos);
   EXPECT_NE(Refusal(OneFrame(R"("fl_x":60,"cx":-5,"w":64,"h":48)")).find("principal point"),
@@ -197,7 +197,7 @@ TEST_F(TransformsJson, ValuesOutOfRangeAreRefusedWithTheLine) {
             std::string::npos);
 }
 
-TEST_F(TransformsJson, LensThatTheFormatCannotSayIsRefused) {
+TEST_F(TransformsJson, LensesThatTheFormatCannotExpressAreRefused) {
   Camera camera = SyntheticCameras(MakeSyntheticScene("wall", 0), 1, 64, 48)[0];
   camera.lens = LensModel::kFullOpenCv;
   camera.distortion[5] = 0.1;

@@ -320,8 +320,8 @@ TEST_F(ColmapModelFile, F61_NamesAreKeysOnly) {
   const Capture capture = CaptureFromModel(read, PhotosOf(model_));
   ASSERT_EQ(capture.views.size(), 1u);  // only 00002.png has a photo with that name
   EXPECT_EQ(capture.views[0].path, "/photos/00002.png");
-  EXPECT_EQ(capture.statuses[0].status, "unregistered");
-  EXPECT_EQ(capture.statuses.back().status, "skipped");
+  EXPECT_EQ(capture.statuses[0].status, PhotoState::kUnregistered);
+  EXPECT_EQ(capture.statuses.back().status, PhotoState::kSkipped);
 }
 
 TEST(CaptureFromModel, ViewsPointsAndErrors) {
@@ -333,7 +333,7 @@ TEST(CaptureFromModel, ViewsPointsAndErrors) {
   EXPECT_EQ(capture.views[2].name, "00002.png");
   EXPECT_EQ(capture.views[2].file, "IMG 2.jpg");
   EXPECT_EQ(capture.statuses[4].file, "IMG 4.jpg");
-  EXPECT_EQ(capture.statuses[4].status, "unregistered");
+  EXPECT_EQ(capture.statuses[4].status, PhotoState::kUnregistered);
   ASSERT_EQ(capture.points.size(), 20u);
   EXPECT_EQ(capture.points[5].views, (std::vector<int32_t>{0, 1, 2, 3}));
   // The stored errors are -1; ours are means over observations.

@@ -70,7 +70,8 @@ class Poses : public ::testing::Test {
 };
 
 TEST_F(Poses, GoodCaptureComesWithModelAndStatuses) {
-  statuses_ = {{"IMG 0.jpg", "used", ""}, {"notes.txt", "skipped", "not a picture"}};
+  statuses_ = {{"IMG 0.jpg", PhotoState::kUsed, ""},
+               {"notes.txt", PhotoState::kSkipped, "not a picture"}};
   const Capture capture = Run("good");
   EXPECT_EQ(capture.views.size(), 10u);
   EXPECT_EQ(capture.points.size(), 60u);
@@ -252,7 +253,7 @@ TEST_F(Poses, H132_TheLargestModelIsUsedAndTheOthersAreReported) {
   EXPECT_EQ(capture.views.size(), 9u);
   EXPECT_EQ(capture.models_found, 2);
   EXPECT_EQ(capture.views[0].name, "00004.png");
-  EXPECT_EQ(capture.statuses[0].status, "unregistered");
+  EXPECT_EQ(capture.statuses[0].status, PhotoState::kUnregistered);
   EXPECT_NE(capture.statuses[0].why.find("another group of 4 photos"), std::string::npos);
   ASSERT_FALSE(report_.notes.empty());
   EXPECT_NE(report_.notes.back().find("2 groups"), std::string::npos);
@@ -264,7 +265,7 @@ TEST_F(Poses, H133_FewRegisteredAreRefusedByName) {
   options_.min_registered = 0.3;
   const Capture capture = Run("few");
   EXPECT_EQ(capture.views.size(), 4u);
-  EXPECT_EQ(capture.statuses[9].status, "unregistered");
+  EXPECT_EQ(capture.statuses[9].status, PhotoState::kUnregistered);
 }
 
 TEST_F(Poses, H134_PixelsThatAreNotSquare) {

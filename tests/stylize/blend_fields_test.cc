@@ -123,16 +123,16 @@ TEST(MixFields, SurroundingsAreMixedToo) {
   for (const float x : mixed.appearance.sphere_color)
     EXPECT_NEAR(x, 0.25 * 0.2 + 0.5 * 0.8 + 0.25 * 0.1, 1e-7);
   EXPECT_EQ(MixFields(s.source, {&s.day}, {1}).appearance.sphere_color[5], 0.8f);
-  const std::vector<float> shares(static_cast<size_t>(s.source.geometry->num_voxels()), 1.0f);
-  EXPECT_EQ(MixFields(s.source, {&s.day}, {1}, &shares).appearance.sphere_color[0], 0.2f);
+  const std::vector<float> weights(static_cast<size_t>(s.source.geometry->num_voxels()), 1.0f);
+  EXPECT_EQ(MixFields(s.source, {&s.day}, {1}, &weights).appearance.sphere_color[0], 0.2f);
 }
 
 TEST(MixFields, H50_SharesKeepWhatIsNotTheirs) {
   const Styles s;
   const int64_t n = s.source.geometry->num_voxels();
-  std::vector<float> shares(static_cast<size_t>(n), 0.0f);
-  for (int64_t v = 0; v < n; v += 2) shares[static_cast<size_t>(v)] = v % 4 == 0 ? 1.0f : 0.5f;
-  const RadianceField mixed = MixFields(s.source, {&s.day}, {1}, &shares);
+  std::vector<float> weights(static_cast<size_t>(n), 0.0f);
+  for (int64_t v = 0; v < n; v += 2) weights[static_cast<size_t>(v)] = v % 4 == 0 ? 1.0f : 0.5f;
+  const RadianceField mixed = MixFields(s.source, {&s.day}, {1}, &weights);
   EXPECT_EQ(std::memcmp(&mixed.background, &s.source.background, sizeof mixed.background), 0);
   for (int64_t v = 0; v < n; ++v)
     for (int k = 0; k < 27; ++k) {

@@ -15,12 +15,12 @@ namespace regrade {
 namespace {
 
 // Two clusters of colours: a distribution that no moments describe.
-Image Clusters(uint64_t seed, const Vec3d& one, const Vec3d& two, double share,
+Image Clusters(uint64_t seed, const Vec3d& one, const Vec3d& two, double fraction,
                double spread = 0.1) {
   Image image(96, 80);
   for (int64_t i = 0; i < image.num_pixels(); ++i) {
     const uint64_t n = static_cast<uint64_t>(i);
-    const Vec3d center = RandomDouble(seed, 0, n) < share ? one : two;
+    const Vec3d center = RandomDouble(seed, 0, n) < fraction ? one : two;
     for (int c = 0; c < 3; ++c)
       image.pixels[3 * i + c] = static_cast<float>(
           center[c] + spread * (RandomDouble(seed, static_cast<uint64_t>(c) + 1, n) - 0.5));

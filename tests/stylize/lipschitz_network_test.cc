@@ -60,10 +60,10 @@ TEST(LipschitzNetwork, H36_SineUnderManyArbitraryPairs) {
   double steepest = 0;
   for (int n = 0; n < networks; ++n) {
     const LipschitzNetwork network = RandomNetwork(81 + 1000 * static_cast<uint64_t>(n));
-    const double share = SteepestPair(network, kPairs) / network.Bound();
-    EXPECT_LE(share, RecordBound("steepest of 20 000 pairs over the bound", Computed::kDouble,
-                                 share, 1));
-    steepest = std::max(steepest, share);
+    const double fraction = SteepestPair(network, kPairs) / network.Bound();
+    EXPECT_LE(fraction, RecordBound("steepest of 20 000 pairs over the bound",
+                                    Computed::kDouble, fraction, 1));
+    steepest = std::max(steepest, fraction);
   }
   EXPECT_GT(steepest, 0.02);  // the attack is not idle
 }

@@ -40,13 +40,13 @@ struct MaskedBall {
   std::vector<float> Vote(const std::vector<Image>& given) const {
     MaskVote vote(*field.geometry, 0, MarchOptions{});
     for (size_t i = 0; i < cameras.size(); ++i) vote.Add(cameras[i], given[i]);
-    return vote.Shares(0.5, 0.25);
+    return vote.Weights(0.5, 0.25);
   }
-  RadianceField Edited(const std::vector<float>& shares) const {
+  RadianceField Edited(const std::vector<float>& weights) const {
     RadianceField styled = field;
     styled.appearance = ApplyColorMap(field.appearance, SomeMap());
     styled.background = {1, 0, 0};  // must not show
-    return MixFields(field, {&styled}, {1}, &shares);
+    return MixFields(field, {&styled}, {1}, &weights);
   }
 };
 
@@ -60,13 +60,13 @@ int Differing(const Image& a, const Image& b) {
 
 TEST(ObjectEdit, H50_OutsideTheObjectEveryPixelIsTheSources) {
   const MaskedBall ball;
-  const std::vector<float> shares = ball.Vote(ball.masks);
-  const RadianceField edited = ball.Edited(shares);
+  const std::vector<float> weights = ball.Vote(ball.masks);
+  const RadianceField edited = ball.Edited(weights);
   int inside = 0, outside = 0;
   for (const Camera& camera : ball.cameras) {
     const Image before = RenderView(ball.field, camera, MarchOptions{}).color,
                 after = RenderView(edited, camera, MarchOptions{}).color;
-    // Where no sample has a share: the same rays, without any voxel of the object in reach.
+    // Where no sample has a weight: the same rays, without any voxel of the object in reach.
     for (int y = 0; y < camera.height; ++y)
       for (int x = 0; x < camera.width; ++x) {
         const Ray ray = camera.PixelRay(x, y);
@@ -78,7 +78,7 @@ TEST(ObjectEdit, H50_OutsideTheObjectEveryPixelIsTheSources) {
             const int32_t voxel =
                 ball.field.geometry
                     ->links[CornerVertex(ball.field.geometry->frame, sample.vertex, corner)];
-            if (voxel >= 0) touches |= shares[static_cast<size_t>(voxel)] > 0;
+            if (voxel >= 0) touches |= weights[static_cast<size_t>(voxel)] > 0;
           }
         }
         const bool same = std::memcmp(before.at(x, y), after.at(x, y), 3 * sizeof(float)) == 0;
@@ -100,7 +100,7 @@ TEST(ObjectEdit, H50_WrongMasksAreOutvoted) {
   std::vector<Image> given = ball.masks;
   std::fill(given[1].pixels.begin(), given[1].pixels.end(), 0.0f);  // forgotten
   for (float& m : given[4].pixels) m = 1 - m;                       // the wrong way round
-  const std::vector<float> shares = ball.Vote(given);
+  const std::vector<float> weights = ball.Vote(given);
   double wrong = 0, seen = 0;
   for (int64_t v = 0; v < ball.field.geometry->num_voxels(); ++v) {
     // Away from the seam, and where the ball's skin is: inside nobody looks.
@@ -108,15 +108,15 @@ TEST(ObjectEdit, H50_WrongMasksAreOutvoted) {
     const float truth = ball.Height(v) > 0;
     if (right[static_cast<size_t>(v)] != truth) continue;  // unseen from all sides
     seen += 1;
-    wrong += std::abs(shares[static_cast<size_t>(v)] - truth);
+    wrong += std::abs(weights[static_cast<size_t>(v)] - truth);
   }
   EXPECT_GT(seen, 500);
   EXPECT_LT(wrong / seen, 0.2);
   // Voxels that two wrong photos alone vote for stay exactly what they were.
-  const RadianceField edited = ball.Edited(shares);
+  const RadianceField edited = ball.Edited(weights);
   int kept = 0;
   for (int64_t v = 0; v < ball.field.geometry->num_voxels(); ++v)
-    if (shares[static_cast<size_t>(v)] == 0) {
+    if (weights[static_cast<size_t>(v)] == 0) {
       ASSERT_EQ(std::memcmp(&edited.appearance.sh[v * 27], &ball.field.appearance.sh[v * 27],
                             27 * sizeof(float)),
                 0);
@@ -129,7 +129,7 @@ TEST(ObjectEdit, H50_EmptyAndFullMasks) {
   const MaskedBall ball;
   std::vector<Image> masks = ball.masks;
   for (Image& mask : masks) std::fill(mask.pixels.begin(), mask.pixels.end(), 0.0f);
-  for (const float share : ball.Vote(masks)) ASSERT_EQ(share, 0);
+  for (const float weight : ball.Vote(masks)) ASSERT_EQ(weight, 0);
   const RadianceField none = ball.Edited(ball.Vote(masks));
   EXPECT_EQ(Differing(RenderView(none, ball.cameras[0], {}).color,
                       RenderView(ball.field, ball.cameras[0], {}).color),
@@ -137,9 +137,9 @@ TEST(ObjectEdit, H50_EmptyAndFullMasks) {
   for (Image& mask : masks) std::fill(mask.pixels.begin(), mask.pixels.end(), 1.0f);
   const std::vector<float> all = ball.Vote(masks);
   int64_t seen = 0;
-  for (const float share : all) {
-    ASSERT_TRUE(share == 0 || share == 1) << share;  // 0: no photo shows it
-    seen += share == 1;
+  for (const float weight : all) {
+    ASSERT_TRUE(weight == 0 || weight == 1) << weight;  // 0: no photo shows it
+    seen += weight == 1;
   }
   EXPECT_GT(seen, 1000);
 }
@@ -147,10 +147,10 @@ TEST(ObjectEdit, H50_EmptyAndFullMasks) {
 TEST(ObjectEdit, VotesDoNotDependOnTheirOrderOrOnThreads) {
   const MaskedBall ball;
   MaskVote backwards(*ball.field.geometry, 0, MarchOptions{});
-  const std::vector<float> shares = ball.Vote(ball.masks);
+  const std::vector<float> weights = ball.Vote(ball.masks);
   const Threads single(1);
   for (size_t i = ball.cameras.size(); i-- > 0;) backwards.Add(ball.cameras[i], ball.masks[i]);
-  EXPECT_EQ(backwards.Shares(0.5, 0.25), shares);
+  EXPECT_EQ(backwards.Weights(0.5, 0.25), weights);
 }
 
 TEST(ObjectEdit, H50_EdgesAreSoftAndAnEdgeOfZeroIsHard) {
@@ -158,14 +158,14 @@ TEST(ObjectEdit, H50_EdgesAreSoftAndAnEdgeOfZeroIsHard) {
   MaskVote vote(*ball.field.geometry, 0, MarchOptions{});
   for (size_t i = 0; i < ball.cameras.size(); ++i) vote.Add(ball.cameras[i], ball.masks[i]);
   int between = 0;
-  for (const float share : vote.Shares(0.5, 0.25)) between += share > 0 && share < 1;
+  for (const float weight : vote.Weights(0.5, 0.25)) between += weight > 0 && weight < 1;
   EXPECT_GT(between, 20);
-  for (const float share : vote.Shares(0.5, 0)) ASSERT_TRUE(share == 0 || share == 1);
+  for (const float weight : vote.Weights(0.5, 0)) ASSERT_TRUE(weight == 0 || weight == 1);
   // An edge wider than the threshold is cut: a vote of 0 stays 0.
   MaskVote nobody(*ball.field.geometry, 0, MarchOptions{});
   for (const Camera& camera : ball.cameras)
     nobody.Add(camera, Image(camera.width, camera.height, 1));
-  for (const float share : nobody.Shares(0.1, 0.5)) ASSERT_EQ(share, 0);
+  for (const float weight : nobody.Weights(0.1, 0.5)) ASSERT_EQ(weight, 0);
 }
 
 // --- by region in 2D

@@ -284,13 +284,13 @@ TEST(VolumeVariance, NoPairInsideThePremisesExceedsItsBound) {
   const StyledField field(0.3f);
   const VarianceReport report = field.Measure(3000);
   EXPECT_EQ(report.Pairs(), 3000);
-  EXPECT_GT(report.inside.pairs, 300);
+  EXPECT_GT(report.valid.pairs, 300);
   // float's rounding of the restyled coefficients, 27 of them about 1
-  EXPECT_LE(report.largest_share,
+  EXPECT_LE(report.largest_fraction,
             testing::RecordBound("largest share of its bound, 3 000 pairs",
-                                 testing::Computed::kFloat, report.largest_share, 1 + 1e-4));
-  EXPECT_GT(report.largest_share, 0.2);
-  EXPECT_GT(report.open.pairs, 100);  // the ball's rim and what is beside it
+                                 testing::Computed::kFloat, report.largest_fraction, 1 + 1e-4));
+  EXPECT_GT(report.largest_fraction, 0.2);
+  EXPECT_GT(report.transparent.pairs, 100);  // the ball's rim and what is beside it
 }
 
 TEST(VolumeVariance, AnUnfaithfulFieldIsFound) {
@@ -299,8 +299,8 @@ TEST(VolumeVariance, AnUnfaithfulFieldIsFound) {
     field.styled.appearance.sh[i] +=
         4 * static_cast<float>(Random(9, static_cast<uint64_t>(i)));
   const VarianceReport report = field.Measure(3000);
-  EXPECT_GT(report.inside.above, 0);
-  EXPECT_GT(report.inside.largest_excess, 0.01);
+  EXPECT_GT(report.valid.above, 0);
+  EXPECT_GT(report.valid.largest_excess, 0.01);
 }
 
 TEST(VolumeVariance, AMapAloneStaysBelowItsNormInsideThePremises) {
@@ -309,15 +309,15 @@ TEST(VolumeVariance, AMapAloneStaysBelowItsNormInsideThePremises) {
   field.styled.appearance = ApplyNetwork(field.network, field.source);
   const VarianceReport report = field.Measure(3000);
   EXPECT_NEAR(report.k, SpectralNorm(SomeMap().matrix), 1e-12);
-  EXPECT_LE(report.largest_share, 1 + 1e-4);
-  EXPECT_GT(report.largest_share, 0.8);  // Prop. 1 is tight
+  EXPECT_LE(report.largest_fraction, 1 + 1e-4);
+  EXPECT_GT(report.largest_fraction, 0.8);  // Prop. 1 is tight
 }
 
 TEST(VolumeVariance, ClampedColoursAreSetApart) {
   const VarianceReport strong = StyledField(2.0f).Measure(2000),
                        weak = StyledField(0.1f).Measure(2000);
-  EXPECT_GT(strong.clamp.pairs, 500);
-  EXPECT_EQ(weak.clamp.pairs, 0);
+  EXPECT_GT(strong.clamped.pairs, 500);
+  EXPECT_EQ(weak.clamped.pairs, 0);
 }
 
 TEST(VolumeVariance, TheSameForAnyNumberOfThreads) {
@@ -328,8 +328,8 @@ TEST(VolumeVariance, TheSameForAnyNumberOfThreads) {
   }();
   const VarianceReport many = field.Measure(500);
   EXPECT_TRUE(testing::RecordSameBits("1 and more threads", testing::Computed::kDouble,
-                                      one.inside.sum_styled == many.inside.sum_styled));
-  EXPECT_EQ(one.largest_share, many.largest_share);
+                                      one.valid.sum_styled == many.valid.sum_styled));
+  EXPECT_EQ(one.largest_fraction, many.largest_fraction);
 }
 
 }  // namespace

@@ -108,7 +108,7 @@ TEST(Regrain, OtherMethodsRefuseIt) {
   options.regrain = true;
   EXPECT_REGRADE_ERROR(ParseStyleMethod(options), ExitCode::kUsage, "--style-regrain");
   options.method = "idt";
-  EXPECT_EQ(ParseStyleMethod(options).kind, "idt");
+  EXPECT_EQ(ParseStyleMethod(options).kind, StyleMethodKind::kIdt);
 }
 
 TEST(Regrain, OffIsTheTransferItself) {

@@ -15,9 +15,10 @@ StyleOptions Method(const std::string& method, bool scene_wide = false) {
 }
 
 TEST(StyleMethod, KindAndWhatFollowsTheColon) {
-  EXPECT_EQ(ParseStyleMethod(Method("mkl", true)).kind, "mkl");
+  EXPECT_EQ(ParseStyleMethod(Method("mkl", true)).kind, StyleMethodKind::kMkl);
   const StyleMethod method = ParseStyleMethod(Method("command:/opt/style -x {input}"));
-  EXPECT_EQ(method.kind, "command");
+  EXPECT_EQ(method.kind, StyleMethodKind::kCommand);
+  EXPECT_EQ(method.name, "command");
   EXPECT_EQ(method.argument, "/opt/style -x {input}");
   EXPECT_EQ(ParseStyleMethod(Method("folder:a:b")).argument, "a:b");
 }

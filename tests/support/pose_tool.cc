@@ -52,8 +52,8 @@ int main(int argc, char** argv) {
         MedianTriangulationAngle(capture) * 180 / M_PI, extents.x, extents.y, extents.z,
         camera.fx, camera.fy, camera.cx, camera.cy, camera.MaxCornerDistortion(), seconds());
     for (const PhotoStatus& photo : capture.statuses)
-      if (photo.status != "used")
-        std::printf("%s: %s: %s\n", photo.file.c_str(), photo.status.c_str(),
+      if (photo.status != PhotoState::kUsed)
+        std::printf("%s: %s: %s\n", photo.file.c_str(), ToString(photo.status),
                     photo.why.c_str());
     for (const std::string& note : report.notes) std::printf("note: %s\n", note.c_str());
   } catch (const Error& e) {

@@ -18,9 +18,9 @@
 #include "stylize/field/base_map.h"
 #include "stylize/field/gradient_aggregation.h"
 #include "stylize/field/lipschitz_network.h"
+#include "stylize/field/lipschitz_regularizer.h"
 #include "stylize/field/local_lipschitz.h"
 #include "stylize/training/initial_network.h"
-#include "stylize/training/lipschitz_regularizer.h"
 #include "stylize/training/style_rays.h"
 #include "stylize/training/train_network.h"
 

@@ -27,8 +27,10 @@ RunReport EveryMetric(const std::string& evil) {
   report.version = "0.1.0";
   report.command = {"regrade", "run", evil, "--style", evil};
   report.photos = PhotosReport{4, 2, 2, {}};
-  for (const char* status : {"used", "skipped", "unregistered", "used"})
-    report.photos->statuses.push_back({evil + status, status, status[0] == 's' ? evil : ""});
+  for (const PhotoState state :
+       {PhotoState::kUsed, PhotoState::kSkipped, PhotoState::kUnregistered, PhotoState::kUsed})
+    report.photos->statuses.push_back(
+        {evil + ToString(state), state, state == PhotoState::kSkipped ? evil : ""});
   report.effects = {{"exposure", false, "it was not wanted", Metric(), 0.1},
                     {"ndc", true, evil, 12.5, 25}};
   report.stages.reconstruct = ReconstructReport{.time = {60, 100},

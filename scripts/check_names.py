@@ -1,13 +1,14 @@
 #!/usr/bin/env python3
-"""Checks that every file and folder of the tree that a Markdown file or a script names exists.
+"""Checks that the files, folders and options that Markdown files and scripts name exist.
 
-  check_paths.py [--root DIR]   checks Markdown files, scripts, .ci/run and CMakePresets.json; prints FILE:LINE and the path
-  check_paths.py --self-test    plants names of missing files, and checks what is found
+  check_names.py [--root DIR]   checks Markdown files, scripts, .ci/run and CMakePresets.json; prints FILE:LINE and the name
+  check_names.py --self-test    plants names that do not exist, and checks what is found
 
 Checked are paths that begin with a top folder of the tree (also as patterns: {a,b}, *, regular expressions), targets of
-Markdown links, and names of sources, scripts and Markdown files. Words in capitals are placeholders (tests/fuzz/TARGET).
-Not checked: CHANGELOG.md, MUTATIONS.md (recorded messages), check_words.py (retired names) and functions named
-self_test. Exit status: 0, or 1 if there is a finding.
+Markdown links, names of sources, scripts and Markdown files, and, in Markdown and in comments of scripts, options: a
+source or script must contain "name" or "--name". Words in capitals are placeholders (tests/fuzz/TARGET). Not checked:
+CHANGELOG.md, MUTATIONS.md (recorded messages), check_words.py (retired names) and functions named self_test.
+Exit status: 0, or 1 if there is a finding.
 """
 
 import argparse
@@ -22,13 +23,17 @@ import tokenize
 
 from tree_files import text_of, tree_files
 
-EXEMPT = ("CHANGELOG.md", "tests/hard_cases/MUTATIONS.md", "scripts/check_paths.py", "scripts/check_words.py")
+EXEMPT = ("CHANGELOG.md", "tests/hard_cases/MUTATIONS.md", "scripts/check_names.py", "scripts/check_words.py")
 OTHER_SCRIPTS = re.compile(r"scripts/.*(\.sh|\.yaml|Snakefile)|\.ci/run|CMakePresets\.json")
 LINK = re.compile(r"\]\(([^)#\s]+)(?:#[^)]*)?\)")
 FOREIGN = re.compile(r"https?://\S+|github\.com/\S+")
 QUOTES = re.compile("^[a-zA-Z]*(\"{3}|'{3}|\"|')|(\"{3}|'{3}|\"|')$")
 # A file named without its folder; one that another folder or a variable precedes is not one of ours.
 NAME = re.compile(r"(?<![\w./$*{}\"'-])\w[\w-]*\.(?:py|sh|md|cc|cu|cuh|h)(?![\w/.]\w|\w)")
+
+
+OPTION = re.compile(r"(?<![\w-])--([a-z][a-z0-9-]+)")
+OTHER_PROGRAMS_OPTIONS = {"cores", "profile", "configfile", "retries"}  # of snakemake
 
 
 def expanded(pattern):
@@ -49,14 +54,21 @@ class Tree:
         self.path = re.compile(r"(?<![\w./$}>*-])((?:" + "|".join(map(re.escape, top or ["/"])) + r")/(?:[\w./*+-]|\{[\w./,*+-]*\})*)")
         self.placeholder = re.compile(r"/[A-Z]{2,}(?=/|$).*")
 
+        self.options = set(OTHER_PROGRAMS_OPTIONS)
+        for path in self.files:
+            if path.endswith((".cc", ".h", ".py")) and path not in EXEMPT:
+                self.options.update(re.findall(r"\"(?:--)?([a-z][a-z0-9-]+)[\"=]", text_of(root, path)))
+            elif path.endswith(".sh"):
+                self.options.update(OPTION.findall(text_of(root, path)))
+
     def has(self, path):
         path = path.rstrip("/")
         if "*" in path:
             return any(fnmatch.fnmatchcase(known, path) for known in (*self.files, *self.folders))
         return path in self.folders or path in self.files
 
-    def missing(self, text, names=True):
-        """[(line, what)] of a text that names files, with `names` also without their folder."""
+    def missing(self, text, names=True, options=True):
+        """[(line, what)] of a text: paths, with `names` also files without their folder, and `options`."""
         found = []
         for number, line in enumerate(text.splitlines(), 1):
             line = FOREIGN.sub(" ", line).replace("$root/", "").replace("\"$root\"/", "").replace("\\.", ".")
@@ -69,6 +81,8 @@ class Tree:
                 found += [(number, one) for one in expanded(path) if not self.has(one)]
             if names:
                 found += [(number, name) for name in NAME.findall(line) if name not in self.names]
+            if options:
+                found += [(number, "option --" + name) for name in OPTION.findall(line) if name not in self.options]
         return found
 
     def missing_links(self, path, text):
@@ -90,7 +104,7 @@ class Tree:
             words = QUOTES.sub(" ", token.string)
             for number, line in enumerate(words.splitlines(), token.start[0] - 1):
                 (prose if is_prose else strings)[number] += " " + line
-        return self.missing("\n".join(strings), names=False) + self.missing("\n".join(prose))
+        return self.missing("\n".join(strings), False, False) + self.missing("\n".join(prose))
 
     def check(self):
         """[(path, line, what)]"""
@@ -104,7 +118,7 @@ class Tree:
             elif path.startswith("scripts/") and path.endswith(".py"):
                 findings = self.missing_in_python(text_of(self.root, path))
             elif OTHER_SCRIPTS.fullmatch(path):
-                findings = self.missing(text_of(self.root, path))
+                findings = self.missing(text_of(self.root, path), options=False)
             else:
                 continue
             found += [(path, *finding) for finding in sorted(set(findings))]
@@ -117,9 +131,10 @@ def self_test():
         "CHANGELOG.md": "`kernels/old.h` went\n",
         "scripts/run.py": "\"\"\"Reads kernels/base/vec.h; see run.py.\"\"\"\nX = r\"kernels/base/(vec|view)\\.h\"\n"
                           "Y = r\"kernels/.*\\.h\", \"omp.h\"\n\n\ndef self_test():\n    return \"kernels/a.h\"  # kernels/b.h\n",
-        "scripts/all.sh": "\"$root/scripts/run.py\"\nkernels=$build/kernels/x out=build/cpu/tests/x\n",
+        "pipeline/a.cc": "bind(\"fit-steps\", steps);\n",
+        "scripts/all.sh": "\"$root/scripts/run.py\"\nkernels=$build/kernels/x --out build/cpu/tests/x\n",
         "README.md": "`kernels/base/{vec,view}.h`, `kernels/base/`, `scripts/*.py`, [results](tests/hard/RESULTS.md#a), "
-                     "https://x.org/kernels/x.h, vec.h, report.html. In kernels/base. To tests/hard/TARGET/.\n",
+                     "https://x.org/kernels/x.h, vec.h, report.html. In kernels/base. To tests/hard/TARGET/. With --fit-steps 3, --out.\n",
     }
     planted = (
         ("README.md", "`kernels/base/{vec,wide}.h`\n", "kernels/base/wide.h"),
@@ -128,6 +143,8 @@ def self_test():
         ("README.md", "see [there](tests/RESULTS.md)\n", "tests/RESULTS.md"),
         ("tests/hard/MORE.md", "see [there](WORSE.md)\n", "WORSE.md"),
         ("README.md", "`jump.py` runs\n", "jump.py"),
+        ("README.md", "With\n`--fit-stairs 3`, --fit-steps 2\n", "option --fit-stairs"),
+        ("scripts/a.py", "\"\"\"a.py --gone\"\"\"\nx = \"--there\"  # --there\n", "option --gone"),
         ("scripts/a.py", "\"\"\"Reads kernels/none.h.\"\"\"\n", "kernels/none.h"),
         ("scripts/a.py", "x = 1  # see other.py\n", "other.py"),
         ("scripts/a.py", "X = (r\"reach/.*\",\n     r\"kernels/base/none\\.h\")\n", "kernels/base/none.h"),
@@ -142,7 +159,7 @@ def self_test():
                 with open(os.path.join(root, name), "w", encoding="utf-8") as file:
                     file.write(content)
             found = Tree(root).check()
-        line = text[:text.find(expected.split("/")[-1])].count("\n") + 1
+        line = text[:text.find(re.split("[/ ]", expected)[-1])].count("\n") + 1
         if found != ([(path, line, expected)] if expected else []):
             failures += 1
             print(f"self-test: expected '{expected}', got {found}")
@@ -160,7 +177,7 @@ def main():
     findings = Tree(arguments.root).check()
     for path, line, what in findings:
         print(f"{path}:{line}: there is no {what}")
-    print(f"check_paths: {len(findings)} findings")
+    print(f"check_names: {len(findings)} findings")
     return 1 if findings else 0
 
 
