@@ -20,7 +20,7 @@ namespace {
 
 using namespace testing;  // NOLINT: a test
 
-class DeviceLearning : public ::testing::Test {
+class DeviceStyleTraining : public ::testing::Test {
  protected:
   void SetUp() override {
     const DeviceStatus status = ReadDeviceStatus();
@@ -71,7 +71,7 @@ class DeviceLearning : public ::testing::Test {
 
 // Adam divides a gradient by its own size, so where a gradient is little more than rounding the
 // two ways may step to opposite sides: what is compared is the whole way that the weights went.
-TEST_F(DeviceLearning, StepsAreThoseOfTheHost) {
+TEST_F(DeviceStyleTraining, StepsAreThoseOfTheHost) {
   RadianceField field = Ball(14, 9);
   AddSpheres(40, 9, 0.7, 5, &field);
   const DeviceGrid grid = UploadGrid(MakeFastGrid(field));
@@ -103,13 +103,13 @@ TEST_F(DeviceLearning, StepsAreThoseOfTheHost) {
       EXPECT_EQ(made.last.touched_voxels, host_result.touched_voxels);
       EXPECT_EQ(device_adam.steps, host_adam.steps);
       const std::string what = std::to_string(steps) + " steps";
-      ParityRow("learning, last loss", what, "steps from the host, relative",
+      ParityRow("training, last loss", what, "steps from the host, relative",
                 std::abs(made.last.loss - host_result.loss) / host_result.loss, 1e-4);
-      ParityRow("learning, first moments", what, "steps from the host, norms",
+      ParityRow("training, first moments", what, "steps from the host, norms",
                 Difference(device_adam.first_moment, host_adam.first_moment,
                            std::vector<float>(device_adam.first_moment.size())),
                 2e-3);
-      ParityRow("learning, weights", what, "steps from the host, of the way they went",
+      ParityRow("training, weights", what, "steps from the host, of the path length",
                 Difference(by_device.data().parameters, by_host.data().parameters,
                            start.data().parameters),
                 5e-2);
@@ -117,7 +117,7 @@ TEST_F(DeviceLearning, StepsAreThoseOfTheHost) {
   }
 }
 
-TEST_F(DeviceLearning, TooLittleRoomIsMadeAndNoStepIsLost) {
+TEST_F(DeviceStyleTraining, BuffersGrowAndNoStepIsLost) {
   const RadianceField field = Ball(14, 9);
   const DeviceGrid grid = UploadGrid(MakeFastGrid(field));
   const std::vector<StyleRays> batches = Batches(5);
@@ -139,7 +139,7 @@ TEST_F(DeviceLearning, TooLittleRoomIsMadeAndNoStepIsLost) {
 
 // A target that is not finite leaves the loss; weights that are not finite stop it, also where
 // two calls share the two steps.
-TEST_F(DeviceLearning, TwoStepsInARowThatAreNotFiniteStop) {
+TEST_F(DeviceStyleTraining, TwoConsecutiveNonFiniteStepsStop) {
   const RadianceField field = Ball(14, 9);
   const DeviceGrid grid = UploadGrid(MakeFastGrid(field));
   std::vector<StyleRays> batches = Batches(4);
