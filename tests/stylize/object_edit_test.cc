@@ -60,8 +60,8 @@ int Differing(const Image& a, const Image& b) {
 
 TEST(ObjectEdit, H50_OutsideTheObjectEveryPixelIsTheSources) {
   const MaskedBall ball;
-  const std::vector<float> weights = ball.Vote(ball.masks);
-  const RadianceField edited = ball.Edited(weights);
+  const std::vector<float> object_weights = ball.Vote(ball.masks);
+  const RadianceField edited = ball.Edited(object_weights);
   int inside = 0, outside = 0;
   for (const Camera& camera : ball.cameras) {
     const Image before = RenderView(ball.field, camera, MarchOptions{}).color,
@@ -78,7 +78,7 @@ TEST(ObjectEdit, H50_OutsideTheObjectEveryPixelIsTheSources) {
             const int32_t voxel =
                 ball.field.geometry
                     ->links[CornerVertex(ball.field.geometry->frame, sample.vertex, corner)];
-            if (voxel >= 0) touches |= weights[static_cast<size_t>(voxel)] > 0;
+            if (voxel >= 0) touches |= object_weights[static_cast<size_t>(voxel)] > 0;
           }
         }
         const bool same = std::memcmp(before.at(x, y), after.at(x, y), 3 * sizeof(float)) == 0;
