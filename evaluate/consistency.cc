@@ -14,7 +14,7 @@
 namespace regrade {
 namespace {
 
-// Rounding to bytes is an error of mean square (1/255)^2 / 12: 58.9 dB.
+// Rounding to 8 bits has a mean square error of (1/255)^2 / 12: 58.9 dB.
 const double kByteFloorDb = -10 * std::log10(1.0 / 12 / (255.0 * 255.0));
 
 constexpr int64_t kCacheBytes = 512ll << 20;  // for all sequences together
@@ -136,7 +136,7 @@ ConsistencyRow Summarize(const std::string& sequence, int gap,
   if (row.pairs == 0)
     row.why = "no pair of frames is " + std::to_string(gap) + " apart";
   else if (defined == 0)
-    row.why = "no pair has a pixel that can be compared";
+    row.why = "no pair has a comparable pixel";
   else if (finite_db.empty())
     row.why = "all compared pairs are identical: infinite";
   return row;
@@ -168,7 +168,6 @@ ConsistencyReport EvaluateConsistency(int frames, const PairMotionFunction& moti
   ConsistencyReport report;
   report.mode = options.mode;
   report.flow = options.mode == "geometry" ? "depth and cameras" : options.flow;
-  report.mask_formula = MaskFormula(options.mode);
   int64_t done = 0;
   for (int i = 0; i < frames; ++i)
     for (const int gap : options.gaps) {
@@ -203,7 +202,6 @@ ConsistencyReport UndefinedConsistency(int frames,
   ConsistencyReport report;
   report.mode = options.mode;
   report.flow = options.flow;
-  report.mask_formula = MaskFormula(options.mode);
   for (const NamedFrameSource& sequence : sequences)
     for (const int gap : options.gaps) {
       ConsistencyRow row;
@@ -225,10 +223,10 @@ ConsistencyReport EvaluateConsistency(const FrameSource& reference,
     if (!geometry)
       throw Error(ExitCode::kUsage, "mode geometry needs depth and cameras of the frames", "",
                   "evaluate a run's folder, or choose lai2018 or ruder2016");
-    return EvaluateConsistency(reference.count, KnownMotion(geometry), sequences, options,
+    return EvaluateConsistency(reference.count, GeometricMotion(geometry), sequences, options,
                                progress);
   }
-  // Both neighbours of a pair are used again by the next pairs.
+  // Both frames of a pair are used again by later pairs.
   const int max_gap =
       options.gaps.empty() ? 1 : *std::max_element(options.gaps.begin(), options.gaps.end());
   const auto cache = std::make_shared<FrameCache>(

@@ -1,5 +1,5 @@
-// Temporal consistency: how well each frame agrees with a later one, moved along the true
-// motion.
+// Temporal consistency: the PSNR between each frame and a later one, aligned by the motion
+// between them.
 #pragma once
 
 #include <cstdint>
@@ -26,30 +26,32 @@ struct ConsistencyOptions {
   void Describe(Bind& bind) {
     bind("gaps", gaps,
          {.unit = "frames",
-          .help = "distances of the compared frames; 1 is the paper's short range, 5 its long",
+          .help = "distances between compared frames; 1 is the short range of the paper, 5 the "
+                  "long range",
           .min = 1,
           .max = 100000});
     bind("mode", mode,
-         {.help = "which pixels are compared: estimated flow with the mask of Lai 2018 or of "
-                  "Ruder 2016, or exact flow from depth and cameras",
+         {.help = "source of motion and mask: lai2018 and ruder2016 use estimated optical flow "
+                  "with the mask of the named paper, geometry uses exact flow from depth and "
+                  "cameras",
           .choices = "lai2018|ruder2016|geometry"});
     bind("flow", flow,
-         {.help = "optical flow of the reference frames: dis-ultrafast, dis-fast, dis-medium, "
-                  "dis-tuned, farneback (costs 1 : 1.3 : 5 : 25 : 16 in time, errors in "
-                  "COSTS.md), with OpenCV's optflow deepflow, tvl1, pca-flow, rlof; "
-                  "files:DIR with 00000_00001.flo both ways; onnx:FILE, a network with inputs "
-                  "named first and second, RGB from -1 to 1"});
+         {.help = "optical flow method for the reference frames: dis-ultrafast, dis-fast, "
+                  "dis-medium, dis-tuned, farneback (relative times 1 : 1.3 : 5 : 25 : 16, "
+                  "errors in COSTS.md); with OpenCV's optflow module deepflow, tvl1, pca-flow, "
+                  "rlof; files:DIR reads 00000_00001.flo and 00001_00000.flo; onnx:FILE runs a "
+                  "network with inputs named first and second, RGB from -1 to 1"});
     bind("lpips", lpips,
-         {.help = "ONNX file of a network that says how different two pictures look, with "
-                  "inputs as --flow onnx:FILE has them; measured between a sequence and the "
-                  "2D method's frames"});
-    bind("min-coverage", min_coverage,
-         {.unit = "share of pixels",
-          .help =
-              "pairs with fewer comparable pixels are flagged; unrelated pictures reach 0.35, "
-              "neighbouring views of a scene 0.8",
-          .min = 0,
-          .max = 1});
+         {.help = "ONNX file of a perceptual distance network (LPIPS), with the inputs of "
+                  "--flow onnx:FILE; compares each sequence with the 2D method's frames"});
+    bind(
+        "min-coverage", min_coverage,
+        {.unit = "fraction of pixels",
+         .help =
+             "flags pairs with a smaller fraction of comparable pixels; unrelated images reach "
+             "0.35, neighbouring views of a scene 0.8",
+         .min = 0,
+         .max = 1});
   }
 };
 
@@ -58,81 +60,82 @@ struct PairResult {
   std::string sequence;
   int from = 0, to = 0;  // frame indices
 
-  // EQ(tc-psnr): e = sum_x M(x) |O_to(x + f(x)) - O_from(x)|^2 / (C sum_x M(x)), the squared
-  // error averaged over trusted pixels AND the C = 3 colour channels (Lai et al. 2018); f and M
-  // are flow and mask of the reference frames; bilinear, border repeated, values as given (not
-  // clipped). Summing channels instead would lower every figure by 4.77 dB. Empty where no
-  // pixel can be compared.
+  // EQ(tc-psnr), Lai et al. 2018: e = sum_x M(x) |O_to(x + f(x)) - O_from(x)|^2 / (C sum_x
+  // M(x)), the mean squared error over trusted pixels x and the C = 3 colour channels. f and M
+  // are flow and mask of the reference frames; O is sampled bilinearly with repeated border,
+  // values as given (white = 1, not clipped). Summing over channels instead would lower every
+  // value by 4.77 dB. Empty if no pixel can be compared.
   std::optional<double> error;
-  // -10 log10(e), white = 1; +inf for identical frames; empty as `error` is.
+  // -10 log10(e) in dB; +inf for identical frames; empty if `error` is.
   std::optional<double> psnr_db;
 
-  double coverage = 0;        // share of the frame that was compared, in [0, 1]
+  double coverage = 0;        // fraction of the frame that was compared, in [0, 1]
   bool low_coverage = false;  // below ConsistencyOptions::min_coverage
-  // Pixels, see OcclusionMask.
+  // Numbers of pixels, see OcclusionMask.
   int64_t flow_not_finite = 0, out_of_frame = 0, disoccluded = 0, motion_boundary = 0;
-  int64_t colour_not_finite = 0;  // left out because a colour of this sequence is NaN or inf
+  int64_t colour_not_finite = 0;  // excluded: a colour of this sequence is NaN or inf
 };
 
-// All pairs of one sequence at one gap: one line of the table.
+// The summary of all pairs of one sequence at one gap: one row of the table.
 struct ConsistencyRow {
   std::string sequence;
   int gap = 0;
-  int pairs = 0;            // looked at, undefined ones included
-  int undefined_pairs = 0;  // nothing to compare: in no mean
-  int perfect_pairs = 0;    // identical, infinite dB: not in the mean of dB
+  int pairs = 0;            // all, including undefined ones
+  int undefined_pairs = 0;  // without comparable pixels: excluded from all means
+  int perfect_pairs = 0;    // identical frames (infinite dB): excluded from the mean of dB
   int low_coverage_pairs = 0;
-  int pairs_above_8bit_floor = 0;  // above 58.9 dB, finer than frames of 8 bits can tell
+  int pairs_above_8bit_floor =
+      0;  // above 58.9 dB, below the quantisation error of 8-bit frames
 
-  // Mean over pairs of the pairs' dB, without perfect ones; the headline figure.
+  // Mean over pairs of psnr_db, without perfect pairs; the headline metric.
   std::optional<double> tc_psnr_mean_db;
-  // In which 95 % of such means would lie, see EQ(block-bootstrap), runs as long as the gap;
-  // over the pairs that are in the mean. Empty below two runs.
+  // 95 % confidence interval of that mean over the same pairs, see EQ(block-bootstrap), with
+  // runs as long as the gap. Empty for fewer than two runs.
   std::optional<Interval> tc_psnr_interval_db;
-  // dB of the mean error over all defined pairs, perfect ones included (+inf if all are). Never
-  // above the mean of dB when no pair is perfect (Jensen).
+  // -10 log10 of the mean error over all defined pairs, including perfect ones (+inf if all are
+  // perfect). At most the mean of dB if no pair is perfect (Jensen).
   std::optional<double> tc_psnr_of_mean_db;
-  double coverage = 0;  // mean over pairs
-  std::string why;      // why a figure is missing or infinite; else empty
+  double coverage = 0;  // mean over pairs, in [0, 1]
+  std::string why;      // why a metric is missing or infinite; else empty
 };
 
 struct ConsistencyReport {
-  std::string mode, flow, mask_formula;
+  std::string mode, flow;
   std::vector<ConsistencyRow> rows;  // by sequence, then by gap, in the order given
   std::vector<PairResult> pairs;     // by first frame, gap, sequence
 };
 
-// Compares frame i with frame i + gap of each sequence, for every i and gap. Flow and mask come
-// from the reference frames (the unstyled ones, never a styled sequence), once for each pair,
-// so that all sequences are judged on the same pixels; mode "geometry" takes them from
-// `geometry`. Few frames are held at a time.
+// Compares frame i with frame i + gap of each sequence, for every i and gap. Flow and mask are
+// estimated once per pair from the reference frames (the unstyled ones), so all sequences are
+// measured on the same pixels; mode "geometry" takes them from `geometry`. Only a few frames
+// are in memory at a time.
 //
-// Errors: kUsage for unknown modes or a gap below 1; kInput when counts, sizes or channels of
-// the frames differ, or when frames are too small for flow. Progress counts pairs.
+// Errors: kUsage for an unknown mode or a gap below 1; kInput if counts, sizes or channels of
+// the frames differ, or if frames are too small for flow. Progress counts pairs.
 ConsistencyReport EvaluateConsistency(const FrameSource& reference,
                                       const std::vector<NamedFrameSource>& sequences,
                                       const ConsistencyOptions& options,
                                       const ProgressFunction& progress = {},
                                       const GeometrySource& geometry = {});
 
-// The same with motion from anywhere; options.mode and options.flow are only carried along.
+// The same with motion from any source; options.mode and options.flow are only reported.
 ConsistencyReport EvaluateConsistency(int frames, const PairMotionFunction& motion,
                                       const std::vector<NamedFrameSource>& sequences,
                                       const ConsistencyOptions& options,
                                       const ProgressFunction& progress = {});
 
-// The report of frames that cannot be compared: every pair is counted as undefined, and `why`
-// is each row's reason.
+// The report for frames that cannot be compared: every pair counts as undefined, and `why` is
+// each row's reason.
 ConsistencyReport UndefinedConsistency(int frames,
                                        const std::vector<NamedFrameSource>& sequences,
                                        const ConsistencyOptions& options,
                                        const std::string& why);
 
-// One pair on its own. `later` and `earlier` are frames of one sequence, sized as the flow.
+// Compares one pair. `later` and `earlier` are frames of one sequence, of the flow's size.
 // Fills error, psnr_db, coverage and the counts.
 PairResult ComparePair(const Image& earlier, const Image& later, const PairMotion& motion);
 
-// One row from the pairs of one sequence and gap.
+// Summarises the pairs of one sequence and gap.
 ConsistencyRow Summarize(const std::string& sequence, int gap,
                          const std::vector<PairResult>& pairs);
 

@@ -13,7 +13,8 @@ namespace regrade {
 namespace {
 
 Image Clipped(Image image) {
-  // std::clamp would turn NaN into a colour or not by the order of its comparisons; NaN stays.
+  // Not std::clamp, whose result for NaN depends on the order of its comparisons: NaN stays
+  // NaN.
   for (float& p : image.pixels)
     if (!std::isnan(p)) p = std::clamp(p, 0.0f, 1.0f);
   return image;
@@ -25,7 +26,7 @@ void CheckCount(const NamedFrameSource& sequence, const FrameSource& other,
   throw Error(ExitCode::kInput,
               "the sequence has " + std::to_string(sequence.frames.count) + " frames, " + what +
                   " " + std::to_string(other.count),
-              sequence.name, "fidelity compares frame by frame");
+              sequence.name, "fidelity needs the same number of frames");
 }
 
 void CheckSize(const Image& frame, const Image& other, const std::string& what, int index,
@@ -69,7 +70,7 @@ FidelityRow MeasureFidelity(const NamedFrameSource& sequence, const FidelityTarg
       CheckSize(frame, target, "the 2D method's version", i, sequence);
       hues_2d.Add(target);
       if (targets.perceptual) {
-        Image whole = target;  // a network sees all pixels: no difference where there is none
+        Image whole = target;  // excluded pixels are copied: they add no difference
         for (size_t v = 0; v < whole.pixels.size(); ++v)
           if (!std::isfinite(whole.pixels[v])) whole.pixels[v] = frame.pixels[v];
         sum_lpips += targets.perceptual(frame, whole);

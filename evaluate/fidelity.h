@@ -1,4 +1,5 @@
-// Whether a styled sequence still has the style: consistency alone is won by a grey video.
+// Fidelity of a styled sequence to its style; temporal consistency alone would rank a grey
+// video best.
 #pragma once
 
 #include <functional>
@@ -10,43 +11,44 @@
 
 namespace regrade {
 
-// One line of the fidelity table. A figure is empty when what it compares with was not given.
+// One row of the fidelity table. A metric is empty if its reference was not given.
 struct FidelityRow {
   std::string sequence;
 
-  // Mean over frames of the frames' PSNR against what the 2D method made of the same frame;
-  // both clipped to [0, 1]; identical frames are left out of the mean (all identical: +inf).
+  // Mean over frames of the PSNR (dB) to the 2D method's version of the frame, both clipped to
+  // [0, 1]; identical frames are excluded from the mean (+inf if all are identical).
   std::optional<double> psnr_to_2d_db;
 
-  // Mean over frames of how different they look from the 2D method's (LPIPS), by the network
-  // that was given; 0 for the same pictures.
+  // Mean over frames of the perceptual distance (LPIPS, Zhang et al. 2018) to the 2D method's
+  // version; 0 for identical images.
   std::optional<double> lpips_to_2d;
 
-  // Mean over frames of GradientCorrelation with the unstyled frame: 1 where edges are where
-  // they were and none came to them, as noise does.
+  // Mean over frames of GradientCorrelation with the unstyled frame, in [-1, 1]: 1 if all edges
+  // are preserved and none (such as noise) is added.
   std::optional<double> structure;
 
   // Circular standard deviation of the CIELAB hue weighted by chroma (radians), and mean chroma
-  // (CIELAB units), over all pixels of all frames: see kernels/image/hue_chroma.h. hue_std is
-  // empty for grey.
+  // (CIELAB units), over all pixels of all frames: see EQ(hue-chroma). hue_std is empty for
+  // grey.
   std::optional<double> hue_std, hue_std_2d;  // of the sequence, of the 2D method's frames
-  std::optional<double> chroma, chroma_2d;    // likewise
+  std::optional<double> chroma, chroma_2d;    // the same
 
-  // Distance of the colours of all frames to the style picture's, see sliced_wasserstein.h.
+  // Distance between the colours of all frames and of the style picture, in [0, 1] RGB units:
+  // see EQ(sliced-wasserstein).
   std::optional<double> sliced_wasserstein_to_style;
 };
 
-// What a sequence is measured against; each member may be left empty (null, count 0).
+// References for the metrics of a sequence; each may be empty (null, count 0).
 struct FidelityTargets {
-  FrameSource views_2d;          // the 2D method's version, frame for frame
-  FrameSource transmittance;     // one channel: pixels above 0.5 show no scene and are left
-                                 // out of psnr_to_2d_db
+  FrameSource views_2d;          // the 2D method's version of each frame
+  FrameSource transmittance;     // one channel: pixels above 0.5 show no scene and are excluded
+                                 // from psnr_to_2d_db
   const Image* style = nullptr;  // the style picture
   std::function<double(const Image&, const Image&)> perceptual;  // see PairNetwork::Distance
-  FrameSource unstyled = {};  // what was styled, frame for frame
+  FrameSource unstyled = {};                                     // each frame before styling
 };
 
-// Errors (kInput): counts or sizes that differ. One frame of each source is held at a time.
+// Errors (kInput): counts or sizes that differ. At most one frame of each source is in memory.
 // Progress counts frames.
 FidelityRow MeasureFidelity(const NamedFrameSource& sequence, const FidelityTargets& targets,
                             const ProgressFunction& progress = {});

@@ -1,4 +1,4 @@
-// A dense motion field: where each pixel of one picture lies in another.
+// A dense motion field: the position of each pixel of one image in another.
 #pragma once
 
 #include <cstddef>
@@ -6,8 +6,8 @@
 
 namespace regrade {
 
-// Shape [height, width, 2]: the pixel (x, y) of the first picture is seen at (x + u, y + v) in
-// the second; unit pixels. Values that are not finite mean "unknown".
+// Shape [height, width, 2]: the pixel (x, y) of the first image is at (x + u, y + v) in the
+// second; in pixels. A value that is not finite means "unknown".
 struct FlowField {
   int width = 0;
   int height = 0;

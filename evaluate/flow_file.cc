@@ -48,15 +48,15 @@ FlowField ReadFlowFile(const std::string& path, int64_t* unknown_pixels) {
   const int64_t guaranteed = static_cast<int64_t>(sizeof(header)) +
                              static_cast<int64_t>(header.width) * header.height * 8;
   if (size != guaranteed)
-    Refuse("the flow file has " + std::to_string(size) + " bytes, its header guarantees " +
+    Refuse("the flow file has " + std::to_string(size) + " bytes, its header specifies " +
                std::to_string(guaranteed),
            path);
   FlowField flow(header.width, header.height);
   if (!file.read(reinterpret_cast<char*>(flow.uv.data()), guaranteed - sizeof(header)))
-    Refuse("the flow file cannot be read to its end", path);
+    Refuse("reading the flow file failed", path);
   int64_t unknown = 0;
   for (size_t i = 0; i < flow.uv.size(); i += 2) {
-    // Written so that NaN counts as unknown.
+    // The comparisons are false for NaN, which counts as unknown.
     const bool known =
         std::abs(flow.uv[i]) <= kUnknownAbove && std::abs(flow.uv[i + 1]) <= kUnknownAbove;
     if (known) continue;

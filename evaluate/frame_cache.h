@@ -1,5 +1,5 @@
-// The frames around the place where a sweep through a sequence is, so that neighbouring pairs
-// decode each frame once.
+// Caches the most recent frames of a sequential pass, so that neighbouring pairs decode each
+// frame once.
 #pragma once
 
 #include <cstdint>
@@ -13,12 +13,12 @@ namespace regrade {
 
 class FrameCache {
  public:
-  // Keeps at most `frames` frames and, beyond two of them, at most `bytes` of pixels.
+  // Keeps at most `frames` frames and, if there are more than two, at most `bytes` of pixels.
   FrameCache(FrameSource source, int64_t frames, int64_t bytes)
       : source_(std::move(source)), max_frames_(frames), max_bytes_(bytes) {}
 
-  // Fetches the frame unless it is kept. Beyond the limits the lowest frames go first: pairs
-  // are visited by ascending first frame and do not come back to it.
+  // Returns the cached frame or loads it. Beyond the limits the lowest frames are removed
+  // first: pairs are visited by ascending first frame.
   std::shared_ptr<const Image> Get(int index) {
     const auto found = kept_.find(index);
     if (found != kept_.end()) return found->second;

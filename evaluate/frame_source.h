@@ -1,4 +1,4 @@
-// Frames that are fetched one at a time, so that a long sequence never has to fit in memory.
+// A frame sequence loaded one frame at a time, so that it need not fit in memory.
 #pragma once
 
 #include <functional>
@@ -8,7 +8,7 @@
 
 namespace regrade {
 
-// `frame(i)` for i in [0, count) gives frame i; it may decode a file and may throw Error.
+// `frame(i)` for i in [0, count) returns frame i; it may decode a file and may throw Error.
 struct FrameSource {
   int count = 0;
   std::function<Image(int)> frame;

@@ -9,8 +9,8 @@
 namespace regrade {
 namespace {
 
-constexpr double kTapTolerance = 0.05;    // share of the depth
-constexpr double kPointTolerance = 0.01;  // share of the depth
+constexpr double kTapTolerance = 0.05;    // fraction of the depth
+constexpr double kPointTolerance = 0.01;  // fraction of the depth
 
 BilinearTaps FlowTaps(const FlowField& flow, int x, int y) {
   const float* f = flow.at(x, y);
@@ -26,7 +26,7 @@ void CheckDepth(const Image& depth, const Camera& camera) {
   REGRADE_CHECK_EQ(depth.height, camera.height);
 }
 
-// 1 / z in the camera's frame for each pixel; 0 where nothing is there.
+// 1 / z in the camera's frame for each pixel; 0 without a surface.
 std::vector<double> InverseZ(const Image& depth, const Camera& camera) {
   std::vector<double> inverse(depth.pixels.size(), 0.0);
 #pragma omp parallel for schedule(static)
@@ -47,7 +47,7 @@ bool DepthAgrees(const BilinearTaps& taps, const std::vector<double>& inverse_z,
     for (int i = 0; i < 2; ++i) {
       const size_t index =
           static_cast<size_t>(j ? taps.y1 : taps.y0) * width + (i ? taps.x1 : taps.x0);
-      const double ratio = inverse_z[index] * z;  // 1 for the same depth, 0 for nothing there
+      const double ratio = inverse_z[index] * z;  // 1 for the same depth, 0 without a surface
       if (!(std::abs(ratio - 1) <= kTapTolerance)) return false;
       sum += ratio * (i ? taps.ax : 1 - taps.ax) * (j ? taps.ay : 1 - taps.ay);
     }
@@ -83,7 +83,7 @@ FlowField GeometricFlow(const Image& depth_i, const Camera& camera_i, const Imag
       f[0] = static_cast<float>(u - 0.5 - x);
       f[1] = static_cast<float>(v - 0.5 - y);
       if (visible == nullptr) continue;
-      // From the rounded flow, so that whoever warps with it finds the same taps.
+      // From the rounded flow, so that warping with it uses the same taps.
       const BilinearTaps taps = FlowTaps(flow, x, y);
       if (taps.four_taps && DepthAgrees(taps, inverse_z, width, z)) *visible->at(x, y) = 1;
     }

@@ -13,7 +13,7 @@ namespace {
 
 using Colour = std::array<float, 3>;
 
-// White, yellow, red, dark red; lightness falls all the way.
+// White, yellow, red, dark red; lightness decreases monotonically.
 constexpr Colour kRamp[] = {{1, 1, 1}, {1, 0.85f, 0.3f}, {0.9f, 0.25f, 0.1f}, {0.4f, 0, 0.2f}};
 constexpr float kMaskedBrightness = 0.25f;
 

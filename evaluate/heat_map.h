@@ -1,4 +1,4 @@
-// The error of one pair of frames as a picture: where in the frame it comes from.
+// Renders the error of one pair of frames as an image.
 #pragma once
 
 #include <string>
@@ -8,21 +8,22 @@
 
 namespace regrade {
 
-// Colours of the map, white to black red through yellow and red, in dB of a pixel's error.
+// Ends of the colour scale, from white through yellow and red to dark red, in dB of a pixel's
+// error.
 inline constexpr double kHeatWhiteDb = 50, kHeatDarkDb = 10;
 
-// RGB, sized as the earlier frame. Trusted pixels show their squared error averaged over
-// channels (the e of EQ(tc-psnr) for one pixel): white at 50 dB and better, dark red at 10 dB
-// and worse, even steps of dB between. Pixels of weight below 1/2, or with a colour that is not
-// finite, show the earlier frame in grey at a quarter of its brightness. The scale is fixed, so
-// maps of two methods may be laid side by side.
+// RGB, of the earlier frame's size. Trusted pixels show their squared error averaged over
+// channels (the e of EQ(tc-psnr) for one pixel): white at 50 dB and above, dark red at 10 dB
+// and below, linear in dB between. Pixels of weight below 1/2, or with a non-finite colour,
+// show the earlier frame in grey at a quarter of its brightness. The scale is fixed, so maps of
+// two methods are comparable.
 Image ErrorHeatMap(const Image& earlier, const Image& later, const PairMotion& motion);
 
-// The pair of one sequence and gap with the largest error; null if no pair has one.
+// The pair of one sequence and gap with the largest error; null if no pair has an error.
 const PairResult* WorstPair(const std::string& sequence, int gap,
                             const std::vector<PairResult>& pairs);
 
-// "NAME_gap1_00012.png" for the pair that begins with frame 12.
+// "NAME_gap1_00012.png" for the pair whose first frame is 12.
 std::string HeatMapFileName(const PairResult& pair);
 
 }  // namespace regrade

@@ -59,7 +59,7 @@ double ForwardDifferenceEnergy(const FlowField& flow, int x, int y) {
 int Mirror(int i, int size) {
   if (i < 0) i = -1 - i;
   if (i >= size) i = 2 * size - 1 - i;
-  return std::clamp(i, 0, size - 1);  // pictures narrower than the filter
+  return std::clamp(i, 0, size - 1);  // for images narrower than the filter
 }
 
 double CentralDifferenceEnergy(const FlowField& flow, int x, int y) {
@@ -190,20 +190,6 @@ OcclusionMask MaskRuder2016(const FlowField& forward, const FlowField& backward)
   for (size_t i = 0; i < usable.size(); ++i)
     if (!usable[i]) weight.pixels[i] = 0;
   return MakeMask(std::move(weight), counts);
-}
-
-std::string MaskFormula(const std::string& mode) {
-  if (mode == "lai2018")
-    return "weight 0 where |w+f|^2 > 0.01 (|w|^2+|f|^2) + 0.5 or |grad f|^2 > 0.01 |f|^2 + "
-           "0.002 (forward differences), else 1; f forward flow, w backward flow at x+f, "
-           "border "
-           "repeated";
-  if (mode == "ruder2016")
-    return "-1 where |w+f|^2 >= 0.01 (|w|^2+|f|^2) + 0.5, 0 where a tap leaves the frame or "
-           "|grad f|^2 > 0.01 |f|^2 + 0.002 (central differences), else 1; Gaussian sigma 0.8; "
-           "clipped to [0,1]; 0 where the target is out of frame";
-  return "weight 1 where all four taps around the target lie in the frame, their depths within "
-         "5 % and the interpolated depth within 1 % of the point's depth, else 0";
 }
 
 }  // namespace regrade

@@ -87,12 +87,12 @@ FlowField ComputeFlow(const Image& from, const Image& to, const std::string& met
   if (!from.SameSize(to))
     throw Error(ExitCode::kInput,
                 "frames differ in size: " + SizeText(from) + " and " + SizeText(to), "",
-                "all frames of a sequence need one size");
+                "all frames of a sequence must have one size");
   if (from.width < kLeastFlowSide || from.height < kLeastFlowSide)
     throw Error(ExitCode::kInput, "frames of " + SizeText(from) + " are too small for flow", "",
-                "give frames of at least 12 x 12 px");
+                "use frames of at least 12 x 12 px");
   cv::Mat flow;
-  const bool in_colour = method == "rlof";  // it takes nothing else
+  const bool in_colour = method == "rlof";  // the only method that needs colour
   algorithm->calc(Bytes(from, in_colour), Bytes(to, in_colour), flow);
   REGRADE_CHECK_EQ(flow.cols, from.width);
   REGRADE_CHECK_EQ(flow.rows, from.height);

@@ -22,8 +22,8 @@ OcclusionMask MakeMask(const std::string& mode, const FlowField& forward,
               "choose lai2018, ruder2016 or geometry (which needs depth and cameras)");
 }
 
-// The motion from frame i to frame j as somebody else has computed it; `frame` is any of them.
-FlowField FlowOfFrames(const std::string& folder, int i, int j, const Image& frame) {
+// Reads the precomputed motion from frame i to frame j; `frame` is any frame of the sequence.
+FlowField ReadPairFlow(const std::string& folder, int i, int j, const Image& frame) {
   const std::string path = folder + "/" + FlowFileName(i, j);
   if (!std::filesystem::exists(path))
     throw Error(ExitCode::kInput,
@@ -36,7 +36,7 @@ FlowField FlowOfFrames(const std::string& folder, int i, int j, const Image& fra
                 "the flow is " + std::to_string(flow.width) + " x " +
                     std::to_string(flow.height) + " px, the frames " +
                     std::to_string(frame.width) + " x " + std::to_string(frame.height) + " px",
-                path, "compute it at the frames' size, or scale it with its vectors");
+                path, "compute it at the frames' size");
   return flow;
 }
 
@@ -44,14 +44,14 @@ FlowField FlowOfFrames(const std::string& folder, int i, int j, const Image& fra
 
 PairMotionFunction EstimatedMotion(const FrameSource& frames, const std::string& mode,
                                    const std::string& flow) {
-  MakeMask(mode, FlowField(1, 1), FlowField(1, 1));  // an unknown mode is refused before work
+  MakeMask(mode, FlowField(1, 1), FlowField(1, 1));  // rejects an unknown mode early
   if (flow.starts_with(kFilesPrefix)) {
     const std::string folder = flow.substr(sizeof(kFilesPrefix) - 1);
     return [=](int i, int j) {
       const Image frame = frames.frame(i);
       PairMotion motion;
-      motion.flow = FlowOfFrames(folder, i, j, frame);
-      motion.mask = MakeMask(mode, motion.flow, FlowOfFrames(folder, j, i, frame));
+      motion.flow = ReadPairFlow(folder, i, j, frame);
+      motion.mask = MakeMask(mode, motion.flow, ReadPairFlow(folder, j, i, frame));
       return motion;
     };
   }
@@ -71,7 +71,7 @@ PairMotionFunction EstimatedMotion(const FrameSource& frames, const std::string&
   };
 }
 
-PairMotionFunction KnownMotion(const GeometrySource& geometry) {
+PairMotionFunction GeometricMotion(const GeometrySource& geometry) {
   return [=](int i, int j) {
     const FrameGeometry a = geometry(i), b = geometry(j);
     if (!a.depth.SameSize(b.depth))

@@ -1,5 +1,4 @@
-// Flow and mask of one pair of frames, computed once and shared by every sequence that is
-// compared.
+// Flow and occlusion mask of a frame pair, computed once for all sequences that are compared.
 #pragma once
 
 #include <functional>
@@ -12,28 +11,29 @@
 
 namespace regrade {
 
-// From frame i to frame j, on frame i's grid.
+// From frame i to frame j, on frame i's grid; flow in pixels.
 struct PairMotion {
   FlowField flow;
   OcclusionMask mask;
 };
 using PairMotionFunction = std::function<PairMotion(int i, int j)>;
 
-// What mode "geometry" needs to know of a frame: depth along the ray (see geometric_flow.h).
+// Input of mode "geometry" for a frame: depth along the ray in world units (see
+// geometric_flow.h), and the camera.
 struct FrameGeometry {
   Image depth;
   Camera camera;
 };
 using GeometrySource = std::function<FrameGeometry(int)>;
 
-// Motion estimated from pictures. `mode` is lai2018 or ruder2016; `flow` one of
-// optical_flow.h's methods, or "files:DIR", where DIR holds 00003_00004.flo and 00004_00003.flo
+// Motion estimated from frames. `mode` is lai2018 or ruder2016 (see occlusion.h); `flow` is a
+// method of optical_flow.h, or "files:DIR", where DIR holds 00003_00004.flo and 00004_00003.flo
 // for the pair (3, 4), or "onnx:FILE", a network (see pair_network.h). Files must have the
 // frames' size. Errors: kUsage for unknown names, kInput from flow and files.
 PairMotionFunction EstimatedMotion(const FrameSource& frames, const std::string& mode,
                                    const std::string& flow);
 
-// Motion known from depth and cameras.
-PairMotionFunction KnownMotion(const GeometrySource& geometry);
+// Motion from depth and cameras, see EQ(geometric-flow). Errors: kInput if sizes differ.
+PairMotionFunction GeometricMotion(const GeometrySource& geometry);
 
 }  // namespace regrade

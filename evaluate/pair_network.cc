@@ -12,7 +12,7 @@
 namespace regrade {
 namespace {
 
-// OpenCV prints what it throws; a person shall read it once, in our message.
+// Suppresses OpenCV's own error output: the message is reported once, by Error.
 class QuietOpenCv {
  public:
   QuietOpenCv()
@@ -28,7 +28,7 @@ class QuietOpenCv {
   cv::utils::logging::LogLevel level_;
 };
 
-// [1, 3, height, width] from -1 to 1; a value that is not finite becomes black.
+// [1, 3, height, width] from -1 to 1; non-finite values become black.
 cv::Mat BlobOf(const Image& image) {
   const int shape[] = {1, 3, image.height, image.width};
   cv::Mat blob(4, shape, CV_32F);
@@ -53,7 +53,7 @@ struct PairNetwork::Implementation {
     throw Error(ExitCode::kExternalProgram, what, path, hint);
   }
 
-  // At most 1 GiB, from memory: such a file can name no other.
+  // Reads at most 1 GiB and parses from memory: the network cannot reference external files.
   std::string ReadBytes() const {
     std::error_code error;
     if (!std::filesystem::is_regular_file(path, error))
@@ -64,13 +64,13 @@ struct PairNetwork::Implementation {
     std::string bytes(static_cast<size_t>(size), '\0');
     std::ifstream file(path, std::ios::binary);
     if (!file.read(bytes.data(), static_cast<std::streamsize>(size)))
-      Fail("the file cannot be read", "look at its permissions");
+      Fail("the file cannot be read", "check its permissions");
     return bytes;
   }
 
   cv::Mat Run(const Image& first, const Image& second) const {
     if (!first.SameSize(second))
-      Fail("two pictures differ in size", "give pictures of one size");
+      Fail("two pictures differ in size", "use pictures of one size");
     const std::lock_guard lock(mutex);
     cv::Mat output;
     try {
@@ -84,7 +84,7 @@ struct PairNetwork::Implementation {
            "1, and take pictures of any size");
     }
     if (output.type() != CV_32F || !cv::checkRange(output))
-      Fail("its output has values that are not finite numbers",
+      Fail("its output has non-finite values",
            "the weights may be damaged: copy the file again");
     return output;
   }
@@ -112,9 +112,9 @@ FlowField PairNetwork::Flow(const Image& from, const Image& to) const {
   const cv::Mat output = implementation_->Run(from, to);
   if (output.dims != 4 || output.size[1] != 2 || output.size[2] != from.height ||
       output.size[3] != from.width)
-    implementation_->Fail("its output is no motion of " + std::to_string(from.width) + " x " +
-                              std::to_string(from.height) + " pixels",
-                          "expected is [1, 2, height, width]");
+    implementation_->Fail("its output is not a motion field of " + std::to_string(from.width) +
+                              " x " + std::to_string(from.height) + " pixels",
+                          "expected: [1, 2, height, width]");
   FlowField flow(from.width, from.height);
   for (int y = 0; y < from.height; ++y)
     for (int x = 0; x < from.width; ++x)

@@ -12,9 +12,9 @@ namespace {
 constexpr int kDirections = 64;
 constexpr int kBins = 4096;
 constexpr int kLevels = 1024;
-constexpr int64_t kMaxPixels = 65536;  // of one picture
+constexpr int64_t kMaxPixels = 65536;  // per image
 constexpr uint64_t kSeed = 2023;
-const double kReach = std::sqrt(3.0);  // |d . rgb| for rgb in the unit cube
+const double kExtent = std::sqrt(3.0);  // |d . rgb| for rgb in the unit cube
 
 // Uniform on the sphere: z and the angle around it are uniform (Archimedes).
 std::array<Vec3d, kDirections> MakeDirections() {
@@ -57,7 +57,7 @@ void ColourSlices::Add(const Image& image) {
     const Vec3d direction = Directions()[d];
     int64_t* bins = &bins_[static_cast<size_t>(d) * kBins];
     for (const Vec3d& rgb : colours) {
-      const double position = (Dot(direction, rgb) + kReach) / (2 * kReach) * kBins;
+      const double position = (Dot(direction, rgb) + kExtent) / (2 * kExtent) * kBins;
       ++bins[std::clamp(static_cast<int>(position), 0, kBins - 1)];
     }
   }
@@ -73,8 +73,8 @@ std::vector<double> ColourSlices::Quantiles(int direction) const {
     const double rank = (k + 0.5) / kLevels * static_cast<double>(count_);
     while (bin + 1 < kBins && static_cast<double>(below + bins[bin]) < rank)
       below += bins[bin++];
-    const double inside = (rank - static_cast<double>(below)) / static_cast<double>(bins[bin]);
-    quantiles[k] = (bin + inside) / kBins * 2 * kReach - kReach;
+    const double within = (rank - static_cast<double>(below)) / static_cast<double>(bins[bin]);
+    quantiles[k] = (bin + within) / kBins * 2 * kExtent - kExtent;
   }
   return quantiles;
 }

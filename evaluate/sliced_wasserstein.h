@@ -1,4 +1,4 @@
-// Distance between the colours of two sets of pictures, wherever in the pictures they are.
+// Distance between the colour distributions of two sets of images.
 #pragma once
 
 #include <cstdint>
@@ -10,12 +10,12 @@
 
 namespace regrade {
 
-// Distribution of RGB values, clipped to [0, 1], along 64 fixed directions. Holds counts only,
-// so any number of pixels fits and their order does not matter.
+// Histograms of RGB values, clipped to [0, 1], along 64 fixed directions. Only counts are
+// stored, so memory is constant and the order of images does not matter.
 class ColourSlices {
  public:
   ColourSlices();
-  // Pixels that are not finite are skipped. A picture above 65536 pixels is sampled on a
+  // Pixels with non-finite values are skipped. An image above 65536 pixels is sampled on a
   // regular grid of at most that many.
   void Add(const Image& image);
   int64_t count() const { return count_; }
@@ -28,11 +28,11 @@ class ColourSlices {
   int64_t count_ = 0;
 };
 
-// EQ(sliced-wasserstein): sqrt(mean over directions d and levels q of (Q_a,d(q) - Q_b,d(q))^2),
-// the sliced 2-Wasserstein distance in units of the [0, 1] range, by matching quantiles Q at
-// 1024 levels (k + 1/2) / 1024 of the projections d . rgb. The 64 unit directions are uniform
-// on the sphere with a fixed seed. Projections are binned to 1 / 1182, linear inside a bin. Two
-// colours at distance r alone give about r / sqrt(3). Empty when either set is empty.
+// EQ(sliced-wasserstein), the sliced 2-Wasserstein distance: sqrt(mean over directions d and
+// levels q of (Q_a,d(q) - Q_b,d(q))^2) in units of the [0, 1] range, with quantiles Q of the
+// projections d . rgb at 1024 levels (k + 1/2) / 1024. The 64 unit directions are uniform on
+// the sphere with a fixed seed. Projections are binned to 1 / 1182, linear inside a bin. Two
+// single colours at distance r give about r / sqrt(3). Empty if either set is empty.
 std::optional<double> SlicedWasserstein(const ColourSlices& a, const ColourSlices& b);
 
 }  // namespace regrade

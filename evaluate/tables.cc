@@ -22,7 +22,7 @@ std::string Range(const std::optional<Interval>& interval) {
 
 using Cells = std::vector<std::string>;
 
-// Columns as wide as their widest cell; the first is set flush left, figures flush right.
+// Columns as wide as their widest cell; the first is left-aligned, numbers are right-aligned.
 std::string Align(const std::vector<Cells>& rows) {
   std::vector<size_t> widths(rows.front().size(), 0);
   for (const Cells& row : rows)
@@ -48,22 +48,22 @@ std::string ConsistencyTable(const ConsistencyReport& report) {
                     std::to_string(row.undefined_pairs), Number(row.tc_psnr_mean_db, 2),
                     Range(row.tc_psnr_interval_db), Number(row.tc_psnr_of_mean_db, 2),
                     Number(100 * row.coverage, 1) + " %"});
-    const std::string who = row.sequence + ", gap " + std::to_string(row.gap) + ": ";
-    if (!row.why.empty()) remarks += who + row.why + "\n";
+    const std::string prefix = row.sequence + ", gap " + std::to_string(row.gap) + ": ";
+    if (!row.why.empty()) remarks += prefix + row.why + "\n";
     if (row.perfect_pairs > 0)
-      remarks += who + std::to_string(row.perfect_pairs) +
+      remarks += prefix + std::to_string(row.perfect_pairs) +
                  " identical pair(s) at inf dB, not in the mean of dB\n";
     if (row.low_coverage_pairs > 0)
-      remarks += who + std::to_string(row.low_coverage_pairs) +
+      remarks += prefix + std::to_string(row.low_coverage_pairs) +
                  " pair(s) with few comparable pixels\n";
     if (row.pairs_above_8bit_floor > row.perfect_pairs)
-      remarks += who + std::to_string(row.pairs_above_8bit_floor - row.perfect_pairs) +
-                 " pair(s) above 58.9 dB, finer than 8-bit frames can tell\n";
+      remarks += prefix + std::to_string(row.pairs_above_8bit_floor - row.perfect_pairs) +
+                 " pair(s) above 58.9 dB, beyond the precision of 8-bit frames\n";
   }
-  return "Consistency: TC-PSNR, higher is steadier (mode " + report.mode + ", flow " +
+  return "Consistency: TC-PSNR, higher is better (mode " + report.mode + ", flow " +
          report.flow +
-         ", error per pixel and channel; 95 %: block bootstrap of the mean of dB, runs of a "
-         "gap's length)\n" +
+         ", error per pixel and channel; 95 %: block bootstrap of the mean of dB, runs of "
+         "the gap's length)\n" +
          Align(rows) + remarks;
 }
 
@@ -99,8 +99,8 @@ std::string FidelityTable(const ConsistencyReport& consistency,
     if (structure) rows.back().push_back("-");
     remarks +=
         row.sequence +
-        ": fidelity was not measured, so its consistency may be bought with its colours; "
-        "give the 2D method's frames and the style picture\n";
+        ": fidelity was not measured; high consistency may come from lost colours; give the 2D "
+        "method's frames and the style picture\n";
   }
   return "Fidelity: closeness to the 2D method's frames and to the style's colours\n" +
          Align(rows) + remarks;

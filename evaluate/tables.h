@@ -1,4 +1,4 @@
-// The evaluation as plain text for a terminal or a paper's appendix.
+// Formats the evaluation as plain text.
 #pragma once
 
 #include <string>
@@ -9,10 +9,9 @@
 
 namespace regrade {
 
-// Both tables, always together: a consistency figure means nothing without fidelity beside it,
-// so there is no function for one alone. A sequence that was not measured for fidelity has a
-// row of dashes and a line that says so. Figures that are not defined are printed as "-" with
-// the reason below, infinite ones as "inf".
+// Both tables, always together, because consistency is meaningful only with fidelity. A
+// sequence without fidelity has a row of dashes and a remark. Undefined metrics are printed as
+// "-" with the reason below, infinite ones as "inf".
 std::string FormatTables(const ConsistencyReport& consistency,
                          const std::vector<FidelityRow>& fidelity);
 

@@ -1,5 +1,4 @@
-// The program's entrance: finds the command, and turns what it throws into a message and an
-// exit code.
+// Entry point: runs the command, and turns its exceptions into a message and an exit code.
 #include <algorithm>
 #include <cstdio>
 #include <new>
@@ -9,14 +8,13 @@
 #include "kernels/base/error.h"
 #include "pipeline/commands/command.h"
 #include "pipeline/program/console.h"
+#include "pipeline/program/crash_probe.h"
 #include "pipeline/program/interrupt.h"
 #include "pipeline/program/nearest_name.h"
+#include "pipeline/stages/network_probe.h"
 
 namespace regrade {
 namespace {
-
-// Named in the plans, not built yet: better said than "unknown".
-constexpr const char* kLater[] = {"tradeoff", "import"};
 
 void PrintHelp() {
   std::printf(
@@ -35,14 +33,14 @@ void Dispatch(const Arguments& arguments, Console* console) {
     std::printf("regrade " REGRADE_VERSION "\n");
     return;
   }
+  if (name == kProbeFlag)
+    return RunNetworkProbe(Arguments(arguments.begin() + 1, arguments.end()));
   std::vector<std::string> names = {"help"};
   for (const Command& command : AllCommands()) {
     if (name == command.name)
       return command.run(command, Arguments(arguments.begin() + 1, arguments.end()), console);
     names.push_back(command.name);
   }
-  if (std::find(std::begin(kLater), std::end(kLater), name) != std::end(kLater))
-    throw Error(ExitCode::kUsage, "this command is not in this version", name);
   const std::string nearest = NearestName(name, names);
   throw Error(
       ExitCode::kUsage, "unknown command", name,
@@ -61,13 +59,13 @@ int Run(const Arguments& arguments) {
     console.Fail(error);
     code = error.code();
   } catch (const Interrupted&) {
-    console.Info("stopped; what was finished is kept, and the same command goes on from there");
+    console.Info("stopped; finished work is kept, and the same command continues from there");
     DieBySignal(StopSignal());
   } catch (const std::bad_alloc&) {
     code = ExitCode::kResources;
-    console.Fail("out of memory. To do: close other programs, or take --preset draft", code);
+    console.Fail("out of memory. To do: close other programs, or use --preset draft", code);
   } catch (const std::exception& error) {
-    console.Fail(std::string("a bug of ours: ") + error.what() +
+    console.Fail(std::string("internal error: ") + error.what() +
                      ". To do: please report it with the command and this line",
                  code);
   }

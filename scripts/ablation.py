@@ -1,16 +1,17 @@
 #!/usr/bin/env python3
-"""Restyles a finished output folder with LipRF's parts taken out one at a time, and tabulates what each was worth.
+"""Restyles a finished output folder with parts of LipRF removed one at a time, and tabulates the effect of each.
 
   ablation.py REGRADE DIR --work FOLDER [--readings] [--style PICTURE] [--steps N] [--recipes paper,standard]
-              [--only NAME ...] [-- FLAGS...]
+              [--only NAME ...] [-- OPTIONS OF stylize]
 
-DIR is left alone: the reconstruction is copied to FOLDER/NAME for each variant, and `regrade stylize` runs there; a
-variant that is finished is not done again. Printed is a table in Markdown, which is FOLDER/ablation.md, too; FOLDER/ablation.json holds the figures and
-FOLDER/bound.svg the Lipschitz bound over the steps, one line a variant, on a logarithmic scale.
+DIR is not changed: the reconstruction is copied to FOLDER/NAME for each variant, and `regrade stylize` runs there; a
+finished variant is skipped. Prints a table in Markdown and writes FOLDER/ablation.md, FOLDER/ablation.json (the
+metrics) and FOLDER/bound.svg (the Lipschitz bound over the steps, on a logarithmic scale). Exit status: 0, or 1 if a
+run failed.
 
-Variants are of LipRF's Sec. 5.3: the activation, without K_est, without regularisation, with spectral normalisation
-to 1. They are taken of each recipe; what a variant trades is in `regrade stylize --help`. With --readings they are the
-readings of the paper's text instead: what its B counts, and steps, rates, starts and seeds.
+The variants follow LipRF's Sec. 5.3: the activation, without K_est, without regularisation, with spectral normalisation
+to 1, each for every recipe. With --readings they are interpretations of the paper's text instead: what its B counts,
+steps, rates, starts and seeds.
 """
 
 import argparse
@@ -31,7 +32,7 @@ VARIANTS = (
     ("without regularisation", ("--style-no-regularisation",)),
     ("spectral normalisation", ("--style-spectral-normalisation",)),
 )
-# How the paper's text can be read, and what it leaves open.
+# Interpretations of the paper's text, and choices that it does not specify.
 READINGS = (
     ("as it is", ()),
     ("B counts voxels", ("--style-loss", "sum-over-voxels")),
@@ -50,7 +51,7 @@ COLOURS = ("#1b6ca8", "#c8553d", "#588157", "#8d6a9f", "#b08900", "#2a9d8f", "#7
 
 
 def copy_reconstruction(source, target):
-    """Poses and field with their records: what every variant begins from."""
+    """Copies poses and field with their records, from which every variant starts."""
     os.makedirs(target)
     for name in KEPT:
         path = os.path.join(source, name)
@@ -67,18 +68,18 @@ def copy_reconstruction(source, target):
 def metrics_of(folder):
     with open(os.path.join(folder, "report.json"), encoding="utf-8") as file:
         report = json.load(file)
-    stylize = report["stages"]["stylize"]
+    stylize, evaluate = report["stages"]["stylize"], report["stages"]["evaluate"]
     steady = {row["gap"]: row["tc_psnr_mean_db"] for row in report["consistency"] if row["sequence"] == "styled"}
     faith = next(row for row in report["fidelity"] if row["sequence"] == "styled")
     return {
-        "psnr_to_2d_db": stylize["psnr_to_2d_db"],
-        "psnr_to_2d_photos_db": stylize.get("psnr_to_2d_photos_db"),
-        "linear_map_psnr_to_2d_db": stylize.get("linear_map_psnr_to_2d_db"),
+        "psnr_to_2d_db": faith["psnr_to_2d_db"],
+        "psnr_to_2d_photos_db": evaluate.get("psnr_to_2d_photos_db"),
+        "linear_map_psnr_to_2d_db": evaluate.get("linear_map_psnr_to_2d_db"),
         "tc": [steady[gap] for gap in sorted(steady)],
         "gaps": sorted(steady),
         "bound": stylize["bound"],
         "k_est": stylize["k_est"],
-        "slope": stylize["local_lipschitz_sampled"],
+        "local_lipschitz_sampled": stylize["local_lipschitz_sampled"],
         "local_lipschitz_max": stylize.get("local_lipschitz_max"),
         "hue_std": faith["hue_std"],
         "hue_std_2d": faith["hue_std_2d"],
@@ -100,18 +101,18 @@ def ratio(value, whole):
 def table(rows):
     gaps = rows[0][2]["gaps"]
     head = ["recipe", "variant", "styled to 2D, dB", "to 2D of the photos, dB"] + [f"TC-PSNR gap {gap}, dB" for gap in gaps]
-    head += ["bound", "steepest seen", "climbed to", "K_est", "hue spread kept", "chroma kept", "s"]
+    head += ["bound", "local Lipschitz, sampled", "maximum by gradient ascent", "K_est", "hue spread kept", "chroma kept", "s"]
     lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
     for recipe, variant, f in rows:
         cells = [recipe, variant, number(f["psnr_to_2d_db"]), number(f["psnr_to_2d_photos_db"])] + [number(tc) for tc in f["tc"]]
-        cells += [number(f["bound"]), number(f["slope"]), number(f["local_lipschitz_max"]), number(f["k_est"])]
+        cells += [number(f["bound"]), number(f["local_lipschitz_sampled"]), number(f["local_lipschitz_max"]), number(f["k_est"])]
         cells += [ratio(f["hue_std"], f["hue_std_2d"]), ratio(f["chroma"], f["chroma_2d"]), number(f["seconds"], 0)]
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines)
 
 
 def curves(rows):
-    """SVG text: the bound over the steps."""
+    """The bound over the steps, as SVG text."""
     width, height, left, right, top, bottom = 860, 420, 60, 240, 16, 36
     lines = [(f"{recipe}, {variant}", f["bound_at_steps"]) for recipe, variant, f in rows]
     points = [p for _, line in lines for p in line if p[1] > 0]
@@ -147,8 +148,8 @@ def curves(rows):
     return "".join(svg) + "</svg>\n"
 
 
-def keep(work, rows):
-    """Writes what is there so far, so that an end halfway costs the rest alone."""
+def save(work, rows):
+    """Writes the results so far, so that an interrupted run loses only the rest."""
     with open(os.path.join(work, "ablation.json"), "w", encoding="utf-8") as file:
         json.dump([{"recipe": r, "variant": v, **f} for r, v, f in rows], file, indent=1)
     with open(os.path.join(work, "ablation.md"), "w", encoding="utf-8") as file:
@@ -166,12 +167,12 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("regrade")
     parser.add_argument("folder")
-    parser.add_argument("--work", required=True, help="where the variants are made")
-    parser.add_argument("--style", help="default: the one that DIR was styled with")
-    parser.add_argument("--steps", type=int, help="of each training; default: the recipe's")
-    parser.add_argument("--recipes", default="paper", help="paper, standard, or both with a comma between")
-    parser.add_argument("--readings", action="store_true", help="readings of the paper's text for variants")
-    parser.add_argument("--only", action="append", help="the name of a variant; may be given more than once")
+    parser.add_argument("--work", required=True, help="folder for the variants")
+    parser.add_argument("--style", help="style picture; default: the one of DIR")
+    parser.add_argument("--steps", type=int, help="training steps; default: those of the recipe")
+    parser.add_argument("--recipes", default="paper", help="paper, standard, or both separated by a comma")
+    parser.add_argument("--readings", action="store_true", help="interpretations of the paper's text as variants")
+    parser.add_argument("--only", action="append", help="name of a variant; may be given more than once")
     options = parser.parse_args(own)
     for name in KEPT:
         if not os.path.exists(os.path.join(options.folder, name)):
@@ -204,7 +205,7 @@ def main():
                 print(f"{recipe}, {name}: regrade ended with {status}, see {log}", file=sys.stderr)
                 return 1
             rows.append((recipe, name, metrics_of(folder)))
-            keep(options.work, rows)
+            save(options.work, rows)
     print(table(rows))
     if curves(rows):
         print(f"\nthe bound over the steps: {os.path.join(options.work, 'bound.svg')}")

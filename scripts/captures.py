@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""Reconstructs every capture at hand with no option that decides about effects, and tabulates what was decided.
+"""Reconstructs every capture with the automatic choice of effects, and tabulates what was chosen.
 
   captures.py REGRADE DATA --work FOLDER [--gains] [--only NAME,...] [-- OPTIONS OF reconstruct]
 
-DATA is a folder of real captures (those that are missing are left out); synthetic ones, one for each effect, are made
-in FOLDER. With --gains each effect that was chosen is taken out once (`--effects NAME=off`, the same poses unless they
-are what is taken out), and the table says what it gained in held-out PSNR and cost in CPU seconds of the fit. OPTIONS
-default to `--preset draft`. What is finished is not done again. Printed is a table in Markdown; FOLDER/captures.json
-holds the figures, FOLDER/NAME.log what was said. Exit status 1 if a capture ended otherwise than it should.
+DATA is a folder of real captures (missing ones are skipped); synthetic ones, one for each effect, are made in FOLDER.
+With --gains each chosen effect is switched off once (`--effects NAME=off`, with the same poses unless the effect changes
+them), and the table shows its gain in held-out PSNR and its cost in CPU seconds of the fit. OPTIONS default to
+`--preset draft`. Finished runs are skipped. Prints a table in Markdown; FOLDER/captures.json has the metrics,
+FOLDER/NAME.log the output of the program. Exit status: 0, or 1 if a capture ended with an unexpected exit status.
 """
 
 import argparse
@@ -17,25 +17,25 @@ import shutil
 import subprocess
 import sys
 
-# name, path in DATA, exit status that is right
+# name, path in DATA, expected exit status
 REAL = (("kermit", "kermit", 0), ("sceaux_castle", "sceaux_castle", 0),
         ("fountain-P11", "strecha/fountain-P11/images", 0),
         ("Herz-Jesus-P8", "strecha/Herz-Jesus-P8/images", 0), ("fox", "fox/images", 0),
         ("fox_given", "fox", 0), ("llff_fern", "llff_fern", 0),
         ("lego", "lego", 0), ("pure_rotation", "hard/pure_rotation", 6), ("three_photos", "hard/three_photos", 6),
         ("no_rigid_scene", "hard/no_rigid_scene", 6))
-# name, options of synth, what of it is the capture
+# name, options of synth, folder of the capture in its output
 SMALL = ("--size", "320x240")
 SYNTHETIC = (("matte", ("--scene", "table"), "images"),
              ("highlights", ("--scene", "table", "--effects", "highlights"), "images"),
              ("wall", ("--scene", "wall"), "images"), ("square", ("--scene", "square", "--views", "40"), "images"),
              ("exposure", ("--scene", "table", "--effects", "exposure"), "images"),
-             # With their true poses in a transforms.json, and no points.
+             # With true poses in a transforms.json, without points.
              ("exposure_given", ("--scene", "table", "--effects", "exposure"), "truth"),
              ("wall_given", ("--scene", "wall"), "truth"),
              ("barrel", ("--scene", "table", "--effects", "barrel"), "images"),
              ("poses", ("--scene", "table", "--effects", "poses"), ""))
-NO_SWITCH = ("distortion",)  # photos are followed through their lens or not: nothing to choose
+NO_SWITCH = ("distortion",)  # cannot be switched off
 
 
 def call(command, log):
@@ -53,29 +53,29 @@ def record_of(folder, stage):
         return json.load(file)
 
 
-def last_words(log):
+def last_message(log):
     with open(log, encoding="utf-8", errors="replace") as file:
         lines = [line.strip() for line in file if line.strip()]
-    words = next((line for line in reversed(lines) if "error" in line.lower()), lines[-1] if lines else "")
-    return words.removeprefix("regrade: ").split(" To do: ")[0]
+    message = next((line for line in reversed(lines) if "error" in line.lower()), lines[-1] if lines else "")
+    return message.removeprefix("regrade: ").split(" To do: ")[0]
 
 
 def metrics_of(folder):
     pose, fit = record_of(folder, "pose"), record_of(folder, "reconstruct")
-    figures = {"cpu_seconds": {"pose": pose.get("cpu_seconds"), "reconstruct": fit.get("cpu_seconds")}}
+    metrics = {"cpu_seconds": {"pose": pose.get("cpu_seconds"), "reconstruct": fit.get("cpu_seconds")}}
     for key in ("psnr_heldout_db", "psnr_train_db", "voxels", "sh_degree"):
-        figures[key] = fit.get("metrics", {}).get(key)
+        metrics[key] = fit.get("metrics", {}).get(key)
     index = os.path.join(folder, "poses", "photos.json")
     if os.path.exists(index):
         with open(index, encoding="utf-8") as file:
-            figures["given"] = len(json.load(file)["photos"])
-    figures["placed"] = pose.get("metrics", {}).get("registered")
-    figures["effects"] = pose.get("metrics", {}).get("effects", []) + fit.get("metrics", {}).get("effects", [])
-    return figures
+            metrics["photos"] = len(json.load(file)["photos"])
+    metrics["registered"] = pose.get("metrics", {}).get("registered")
+    metrics["effects"] = pose.get("metrics", {}).get("effects", []) + fit.get("metrics", {}).get("effects", [])
+    return metrics
 
 
 def copy_poses(source, target):
-    """The finished first stage of one folder, for another: it is not done again."""
+    """Copies the finished stage pose from one folder to another."""
     stages = os.path.join(".regrade", "stages")
     if os.path.exists(os.path.join(target, stages, "pose.json")):
         return
@@ -85,34 +85,34 @@ def copy_poses(source, target):
 
 
 def measure(arguments, name, source, status):
-    """The figures of one capture, and of it without each effect that was chosen."""
+    """The metrics of one capture, and those without each chosen effect."""
     log, out = os.path.join(arguments.work, name + ".log"), os.path.join(arguments.work, name)
     ended = call([arguments.regrade, "reconstruct", source, "--out", out] + arguments.options, log)
-    figures = {"name": name, "status": ended, "as_expected": ended == status, "words": last_words(log)}
-    figures.update(metrics_of(out))
+    metrics = {"name": name, "status": ended, "as_expected": ended == status, "message": last_message(log)}
+    metrics.update(metrics_of(out))
     if ended != 0 or not arguments.gains:
-        return figures
-    decided = {effect["name"]: "on" if effect["on"] else "off" for effect in figures["effects"]}
-    for effect in figures["effects"]:
+        return metrics
+    decided = {effect["name"]: "on" if effect["on"] else "off" for effect in metrics["effects"]}
+    for effect in metrics["effects"]:
         if not effect["on"] or effect["name"] in NO_SWITCH:
             continue
         without = out + ".without." + effect["name"]
-        # The trial of view dependence has had its say: what is compared differs in one thing.
-        wishes = {"view-dependence": decided.get("view-dependence", "on"), effect["name"]: "off"}
+        # View dependence as the trial decided it, so that the two runs differ in one effect only.
+        overrides = {"view-dependence": decided.get("view-dependence", "on"), effect["name"]: "off"}
         if effect["name"] != "pose-refinement":
             copy_poses(out, without)
-        wish = ",".join(f"{key}={value}" for key, value in wishes.items())
-        again = call([arguments.regrade, "reconstruct", source, "--out", without, "--effects", wish]
+        overrides = ",".join(f"{key}={value}" for key, value in overrides.items())
+        again = call([arguments.regrade, "reconstruct", source, "--out", without, "--effects", overrides]
                      + arguments.options, log)
-        effect["without"] = metrics_of(without) if again == 0 else {"why": last_words(log)}
-    return figures
+        effect["without"] = metrics_of(without) if again == 0 else {"why": last_message(log)}
+    return metrics
 
 
 def number(value, form="{:.2f}"):
     return "–" if value is None else form.format(value)
 
 
-def chosen(effect, figures):
+def chosen(effect, metrics):
     value, threshold = effect.get("value"), effect.get("threshold")
     text = effect["name"]
     if value is not None and threshold is not None:
@@ -122,24 +122,24 @@ def chosen(effect, figures):
     without = effect.get("without", {})
     if without.get("psnr_heldout_db") is not None:
         stage = "pose" if effect["name"] == "pose-refinement" else "reconstruct"
-        text += f": {figures['psnr_heldout_db'] - without['psnr_heldout_db']:+.2f} dB"
-        if figures["cpu_seconds"][stage] is not None and without["cpu_seconds"][stage] is not None:
-            text += f", {figures['cpu_seconds'][stage] - without['cpu_seconds'][stage]:+.0f} s"
+        text += f": {metrics['psnr_heldout_db'] - without['psnr_heldout_db']:+.2f} dB"
+        if metrics["cpu_seconds"][stage] is not None and without["cpu_seconds"][stage] is not None:
+            text += f", {metrics['cpu_seconds'][stage] - without['cpu_seconds'][stage]:+.0f} s"
     elif "why" in without:
-        text += ": does not work without"
+        text += ": fails without it"
     return text
 
 
 def table_of(rows):
-    lines = ["| capture | photos placed | chosen (measured, threshold): what it gained and cost | held-out PSNR "
+    lines = ["| capture | photos registered | chosen (measured, threshold): gain and cost | held-out PSNR "
              "| CPU s |", "|---|---|---|---|---|"]
     for row in rows:
         seconds = row["cpu_seconds"]["reconstruct"]
         if row["status"] != 0:
-            lines.append(f"| {row['name']} | | refused, exit status {row['status']}: {row['words']} | | |")
+            lines.append(f"| {row['name']} | | refused, exit status {row['status']}: {row['message']} | | |")
             continue
         on = "; ".join(chosen(effect, row) for effect in row["effects"] if effect["on"]) or "nothing"
-        lines.append(f"| {row['name']} | {row['placed']}/{row['given']} | {on} | "
+        lines.append(f"| {row['name']} | {row['registered']}/{row['photos']} | {on} | "
                      f"{number(row['psnr_heldout_db'])} dB | {number(seconds, '{:.0f}')} |")
     return "\n".join(lines)
 
@@ -163,7 +163,7 @@ def main():
         folder = os.path.join(arguments.work, "synthetic", name)
         log = os.path.join(arguments.work, name + ".log")
         if call([arguments.regrade, "synth", folder, *SMALL, *options], log) != 0:
-            sys.exit(f"captures.py: no synthetic capture {name}, see its log")
+            sys.exit(f"captures.py: the synthetic capture {name} failed, see {log}")
         captures.append(("synthetic: " + name, os.path.join(folder, part), 0))
     rows = []
     for name, source, status in captures:

@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
-"""Checks that each equation has one home in the sources, one row in EQUATIONS.md, and a test that exists.
+"""Checks that each equation is stated once in the sources, has one row in EQUATIONS.md, and a test that exists.
 
-A home is a comment with EQ(tag) followed by a comma or a colon; elsewhere one writes "see EQ(tag)".
+  check_equations.py [--root DIR]   checks the tree; one line for each finding
+  check_equations.py --self-test    plants each kind of mistake in a temporary tree and checks that it is found
 
-  check_equations.py [--root DIR]   checks the tree; one line for each finding, exit status 1 if there is any
-  check_equations.py --self-test    plants each kind of mistake in a scratch tree and sees it found
+An equation is stated in a comment with EQ(tag) followed by a comma or a colon; other places write "see EQ(tag)".
+Exit status: 0, or 1 if there is a finding.
 """
 
 import argparse
@@ -13,15 +14,15 @@ import re
 import sys
 import tempfile
 
-ROOMS = ("kernels", "reconstruct", "stylize", "evaluate", "pipeline")
+MODULES = ("kernels", "reconstruct", "stylize", "evaluate", "pipeline")
 TAG = re.compile(r"(?<![A-Za-z0-9_])EQ\(([a-z][a-z0-9-]*)\)")
 TEST = re.compile(r"\bTEST(?:_F|_P)?\(\s*(\w+)\s*,\s*(\w+)\s*\)|\bTYPED_TEST(?:_P)?\(\s*(\w+)\s*,\s*(\w+)\s*\)")
 TABLE_COLUMNS = 5  # tag, equation, source, file, tests
 
 
-def source_files(root, rooms):
-    for room in rooms:
-        for folder, subfolders, names in os.walk(os.path.join(root, room)):
+def source_files(root, modules):
+    for module in modules:
+        for folder, subfolders, names in os.walk(os.path.join(root, module)):
             subfolders.sort()
             for name in sorted(names):
                 if name.endswith((".h", ".cuh", ".cc", ".cu")):
@@ -31,15 +32,15 @@ def source_files(root, rooms):
 
 
 def homes_and_references(root):
-    """({tag: [where]}, {tag: [where]}): where an equation is stated, and where it is pointed at."""
+    """({tag: [(path, line)]}, {tag: [(path, line)]}): where an equation is stated, and where it is referred to."""
     homes, references = {}, {}
-    for path, text in source_files(root, ROOMS + ("tests",)):
+    for path, text in source_files(root, MODULES + ("tests",)):
         for number, line in enumerate(text.splitlines(), 1):
             for match in TAG.finditer(line):
                 in_comment = re.search(r"//|/\*|^\s*\*", line[:match.start()]) is not None
                 stated = line[match.end():].startswith((",", ":"))
-                pointed = re.search(r"\bsee $", line[:match.start()], re.I) is not None
-                is_home = in_comment and stated and not pointed and not path.startswith("tests/")
+                referred = re.search(r"\bsee $", line[:match.start()], re.I) is not None
+                is_home = in_comment and stated and not referred and not path.startswith("tests/")
                 (homes if is_home else references).setdefault(match.group(1), []).append((path, number))
     return homes, references
 
@@ -54,7 +55,7 @@ def test_names(root):
 
 
 def table_rows(root):
-    """[(line, tag, file, [tests])] of EQUATIONS.md; raises ValueError on a row that is not one."""
+    """[(line, tag, file, [tests])] of EQUATIONS.md; raises ValueError on a malformed row."""
     rows = []
     with open(os.path.join(root, "EQUATIONS.md"), encoding="utf-8") as file:
         for number, line in enumerate(file, 1):
@@ -85,7 +86,7 @@ def check_tree(root):
             findings.append(f"{places[0][0]}:{places[0][1]}: EQ({tag}) has no row in EQUATIONS.md")
     for tag, places in sorted(references.items()):
         if tag not in homes:
-            findings.append(f"{places[0][0]}:{places[0][1]}: EQ({tag}) is stated nowhere")
+            findings.append(f"{places[0][0]}:{places[0][1]}: EQ({tag}) is not stated")
 
     seen = set()
     for number, tag, path, row_tests in rows:
@@ -94,7 +95,7 @@ def check_tree(root):
             findings.append(f"{where} has a second row")
         seen.add(tag)
         if tag not in homes:
-            findings.append(f"{where} is stated nowhere in the sources")
+            findings.append(f"{where} is not stated in the sources")
         elif path != homes[tag][0][0]:
             findings.append(f"{where} lives in {homes[tag][0][0]}, not in {path}")
         if not row_tests:
@@ -117,8 +118,8 @@ def self_test():
     planted = (
         ({"kernels/field/b.h": "// EQ(one): x = y.\n"}, "2 homes"),
         ({"kernels/field/b.h": "// EQ(three): z.\n"}, "no row"),
-        ({"kernels/field/b.h": "// see EQ(four).\n"}, "stated nowhere"),
-        ({"EQUATIONS.md": table + "| `five` | x | us | `kernels/field/a.h` | `A.One` |\n"}, "stated nowhere"),
+        ({"kernels/field/b.h": "// see EQ(four).\n"}, "is not stated"),
+        ({"EQUATIONS.md": table + "| `five` | x | us | `kernels/field/a.h` | `A.One` |\n"}, "is not stated"),
         ({"EQUATIONS.md": table + table.splitlines()[2] + "\n"}, "second row"),
         ({"EQUATIONS.md": table.replace("a.h` | `A.One` |", "z.h` | `A.One` |")}, "lives in"),
         ({"EQUATIONS.md": table.replace("`A.Two`", "`A.Three`")}, "no test A.Three"),
@@ -137,7 +138,7 @@ def self_test():
 
     for finding in findings_with({}):
         failures += 1
-        print("self-test: a tidy tree is blamed:", finding)
+        print("self-test: a finding in a correct tree:", finding)
     for extra, expected in planted:
         found = findings_with(extra)
         if len(found) != 1 or expected not in found[0]:
@@ -148,7 +149,7 @@ def self_test():
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--root", default=os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
     parser.add_argument("--self-test", action="store_true")
     arguments = parser.parse_args()

@@ -1,19 +1,21 @@
 #!/usr/bin/env python3
-"""Turns published weights of WCT2 or CCPL (PyTorch) into the ONNX files that `--method onnx:DIR` reads.
+"""Converts published PyTorch weights of WCT2 or CCPL to the ONNX files that `--method onnx:DIR` reads.
 
   convert_networks.py wct2 --encoder wave_encoder_cat5_l4.pth --decoder wave_decoder_cat5_l4.pth --out DIR
   convert_networks.py ccpl --vgg vgg_normalised.pth --sct SCT.pth.tar --decoder DECODER.pth.tar --out DIR
 
-The weights are their authors' (github.com/clovaai/WCT2, github.com/JarrentWu1031/CCPL): download them there; whether
-their licences allow what you want is for you to read. Of WCT2 both versions are known, cat5 and sum, of CCPL the
-photorealistic model and the artistic one: what a file holds tells which. Needs Debian's python3-torch and python3-onnx
-(run it with /usr/bin/python3). Files are read as weights alone: no code of theirs runs.
+Download the weights from their authors (github.com/clovaai/WCT2, github.com/JarrentWu1031/CCPL) and read their licences.
+Supported are both versions of WCT2, cat5 and sum, and CCPL's photorealistic and artistic models; the version is detected
+from the file. Needs Debian's python3-torch and python3-onnx (run it with /usr/bin/python3). Files are loaded as weights
+only: no code in them is executed.
 
-  --random SEED    first makes files of those names with random weights of the right shapes in DIR (--version cat5, sum,
-                   photo or art), and converts these
-  --check PROGRAM  then styles two pictures with PROGRAM (build/cpu/tests/stylize/style_picture) and with a PyTorch
-                   forward of its own (reference_networks.py), prints the largest difference of both, and beside it what
-                   leaving the transforms out would be; exit status 1 above 1e-4 of white
+  --random SEED    first writes files with random weights of the right shapes to DIR (--version cat5, sum, photo or art),
+                   and converts these
+  --check PROGRAM  then styles two pictures with PROGRAM (build/cpu/tests/stylize/style_picture) and with a separate
+                   PyTorch implementation (reference_networks.py), and prints the largest difference, and the difference
+                   without the feature transforms
+
+Exit status: 0, or 1 if an input is wrong or --check finds a difference above 1e-4 of white.
 """
 
 import argparse
@@ -25,7 +27,7 @@ BANDS = ("lh", "hl", "hh")
 
 
 class Segment:
-    """One ONNX file: opset 11, float32, height and width of any size."""
+    """Builds one ONNX file: opset 11, float32, any height and width."""
 
     def __init__(self, **inputs):
         import onnx.numpy_helper
@@ -45,10 +47,10 @@ class Segment:
         return name
 
     def conv(self, x, state, key, out=None, relu=True, pad=True):
-        """Reflects one pixel at each edge where `pad` says so, then a convolution without padding, then max(0, x)."""
+        """With `pad` reflects one pixel at each edge; then convolves without padding; with `relu` applies max(0, x)."""
         weight, bias = state.take(key)
         if weight.shape[1] != self.channels[x]:
-            sys.exit(f"{state.path}: {key} takes {weight.shape[1]} channels, {self.channels[x]} come in")
+            sys.exit(f"{state.path}: {key} takes {weight.shape[1]} channels, the input has {self.channels[x]}")
         if pad:
             edges = self.constant([0, 0, 1, 1, 0, 0, 1, 1], "int64")
             x = self.add("Pad", [x, edges], self.channels[x], mode="reflect")
@@ -92,13 +94,13 @@ class State:
         import torch
         self.path = path
         if not os.path.isfile(path):
-            sys.exit(f"{path}: there is no such file; download it from the authors")
+            sys.exit(f"{path}: no such file; download it from the authors")
         try:
             self.tensors = torch.load(path, map_location="cpu", weights_only=True)
-        except Exception:  # torch's own words tell people to trust the file
-            sys.exit(f"{path}: torch finds no weights in it; download it again")
+        except Exception:  # torch's own message recommends to trust the file
+            sys.exit(f"{path}: torch cannot read weights from it; download it again")
         if not isinstance(self.tensors, dict):
-            sys.exit(f"{path}: holds no table of tensors")
+            sys.exit(f"{path}: does not contain a table of tensors")
 
     def __contains__(self, key):
         return f"{key}.weight" in self.tensors
@@ -111,23 +113,23 @@ class State:
 
 
 def check_haar(state):
-    """Published files carry the fixed wavelets too; other ones would be another method."""
+    """Checks the wavelets in a published file, which must be Haar's."""
     import numpy
     for key, value in state.tensors.items():
         parts = key.split(".")
         if len(parts) == 3 and parts[1].lower() in HAAR:
             expected = numpy.array(HAAR[parts[1].lower()]).reshape(2, 2) / 2
             if abs(value.numpy() - expected).max() > 1e-6:
-                sys.exit(f"{state.path}: {key} is no Haar wavelet")
+                sys.exit(f"{state.path}: {key} is not a Haar wavelet")
 
 
 def wct2_files(encoder, decoder):
-    """Yoo et al. 2019, Fig. 3, and the layers of clovaai/WCT2: where features are transformed, a file ends."""
+    """The network of Yoo et al. 2019, Fig. 3, with the layers of clovaai/WCT2, split where features are transformed."""
     for state in (encoder, decoder):
         check_haar(state)
     version = "cat5" if "conv3_4_2" in decoder else "sum"
     cat5, two = version == "cat5", "_2" if version == "cat5" else ""
-    # With cat5 the features after the first layer of each size are transformed, with sum those after each pooling.
+    # cat5 transforms the features after the first layer of each size, sum those after each pooling.
     stages = ([["conv0", "conv1_1"], ["conv1_2", "|", "conv2_1"], ["conv2_2", "|", "conv3_1"],
                ["conv3_2", "conv3_3", "conv3_4", "|", "conv4_1"]] if cat5 else
               [["conv0", "conv1_1", "conv1_2", "|"], ["conv2_1", "conv2_2", "|"],
@@ -174,7 +176,7 @@ def wct2_files(encoder, decoder):
 
 
 def ccpl_files(vgg, sct, decoder):
-    """Wu et al. 2022, Fig. 3, and the layers of JarrentWu1031/CCPL, which torch numbers."""
+    """The networks of Wu et al. 2022, Fig. 3, with the layer numbers of JarrentWu1031/CCPL."""
     count = sct.take("uncompress")[0].shape[0]
     if count not in (256, 512):
         sys.exit(f"{sct.path}: {count} channels are neither the photorealistic model (256) nor the artistic one (512)")
@@ -196,7 +198,7 @@ def ccpl_files(vgg, sct, decoder):
     segment = Segment(code=sct.take("uncompress")[0].shape[1])
     segment.conv("code", sct, "uncompress", "feat", relu=False, pad=False)
     yield segment.file("ccpl_expand", ["feat"])
-    # The photorealistic decoder is the artistic one from its tenth part on; files of it number either way.
+    # The photorealistic decoder is the artistic one from its tenth part on; files use either numbering.
     first = 0 if artistic or "28" in decoder else 10
     layers = [1, "|", 5, 8] if artistic else []
     layers += [11, 14, "|", 18, 21, "|", 25, 28]
@@ -214,7 +216,7 @@ def main():
     for name, text in (("encoder", "WCT2's encoder"), ("decoder", "WCT2's or CCPL's decoder"),
                        ("vgg", "CCPL's VGG-19"), ("sct", "CCPL's SCT module")):
         parser.add_argument(f"--{name}", metavar="FILE", help=text)
-    parser.add_argument("--out", metavar="DIR", required=True, help="folder for the ONNX files; made if it is missing")
+    parser.add_argument("--out", metavar="DIR", required=True, help="folder for the ONNX files, created if missing")
     parser.add_argument("--random", metavar="SEED", type=int, help="convert random weights, see above")
     parser.add_argument("--version", choices=["cat5", "sum", "photo", "art"], help="which model --random makes")
     parser.add_argument("--check", metavar="PROGRAM", help="compare with a PyTorch forward, see above")
@@ -236,9 +238,9 @@ def main():
         reference_networks.write_random(options.random, version, paths)
     missing = [name for name in names if not paths[name]]
     if missing:
-        parser.error("of " + options.method + " are missing: " + ", ".join(f"--{name}" for name in missing))
+        parser.error(options.method + " also needs " + ", ".join(f"--{name}" for name in missing))
     states = {name: State(path) for name, path in paths.items()}
-    files = list({"wct2": wct2_files, "ccpl": ccpl_files}[options.method](**states))  # all of them, or none is written
+    files = list({"wct2": wct2_files, "ccpl": ccpl_files}[options.method](**states))  # all, before any is written
     for name, content in files:
         with open(os.path.join(options.out, name), "wb") as file:
             file.write(content)

@@ -1,22 +1,24 @@
 #!/usr/bin/env python3
-"""Kills runs at random instants of every stage, starts them again until they are done, and compares what they made.
+"""Kills runs at random times, restarts them until they finish, and compares the results with those of an unkilled run.
 
-  crash_recovery.py REGRADE [--kills 1000] [--pose-kills 50] [--seed 0] [--effects mixed-cameras]      colmap for --pose-kills; about 3 s a kill on two cores
+  crash_recovery.py REGRADE [--kills 1000] [--pose-kills 50] [--seed 0] [--effects mixed-cameras]
 
-Behind finished poses: a small synthetic capture is run once undisturbed in reproducible mode. Then copies of its poses
-are run, and killed with SIGKILL, SIGTERM or SIGINT a random time after a stage has begun, stage by stage, with one
-thread or two, until they are done. After each kill every file must be whole, and the next start must not redo a stage
-that had ended. The finished folder must hold the undisturbed run's fields, network and frames byte for byte, and its
-report but for times. COLMAP's own stage does not repeat: `regrade pose` is killed (SIGKILL hits it alone and leaves
-COLMAP behind), started again until done, and its model must have every photo and lie within 0.5 degrees and 1 % of the
-camera spread of the truth.
+After the poses: a small synthetic capture is run once without kills in reproducible mode (the baseline). Then copies of
+its poses are run and killed with SIGKILL, SIGTERM or SIGINT at a random time after a stage has begun, stage by stage,
+with one thread or two, until they finish. After each kill every file must be complete, and the next start must not
+repeat a stage that had ended. The finished folder must have the baseline's fields, network and frames byte for byte, and
+its report except for times.
 
-  --control all   whether the supervisor can see anything: between two starts a checkpoint is exchanged for that of a
-                  run with another seed, a frame is cut short, the record of a finished stage is removed. Each must be
-                  caught. One bit of a checkpoint is changed, too: the program itself must see that, and come out with
-                  the same result. "short" is the first of these.
+COLMAP's stage is not reproducible: `regrade pose` is killed (SIGKILL is sent to it alone, not to COLMAP) and restarted
+until it finishes. Its model must have every photo and lie within 0.5 degrees and 1 % of the camera extent of the truth.
+--pose-kills needs colmap. A kill takes about 3 s on two cores.
 
-Exit status 1 for any finding.
+  --control all   checks that this script finds errors: between two starts a checkpoint is exchanged for that of a run
+                  with another seed, a frame is truncated, the record of a finished stage is removed. Each must be found.
+                  One bit of a checkpoint is flipped, too: the program itself must detect that, and finish with the same
+                  result. "short" is the first of these.
+
+Exit status: 0, or 1 if there is a finding.
 """
 
 import argparse
@@ -39,31 +41,31 @@ SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
 CHECKPOINT_HEAD, HASH_DIGITS = b"regrade checkpoint 1\n", 16
 
 
-def torn_files(folder):
-    """Files under their final names that are not whole."""
-    torn = []
+def incomplete_files(folder):
+    """Files under their final names that are incomplete."""
+    found = []
     for place, _, names in os.walk(folder):
         if os.sep + "work" in place[len(folder):]:
-            continue  # COLMAP's own, used by nobody after it has ended
+            continue  # COLMAP's own files, not read after it has ended
         for name in names:
             path = os.path.join(place, name)
             try:
                 if name.endswith(".npz"):
                     with zipfile.ZipFile(path) as archive:
-                        whole = archive.testzip() is None
+                        complete = archive.testzip() is None
                 elif name.endswith(".png"):
                     with open(path, "rb") as file:
-                        whole = file.read()[-8:-4] == b"IEND"
+                        complete = file.read()[-8:-4] == b"IEND"
                 elif name.endswith(".json"):
                     with open(path, encoding="utf-8") as file:
-                        whole = json.load(file) is not None
+                        complete = json.load(file) is not None
                 else:
                     continue
             except (ValueError, zipfile.BadZipFile):
-                whole = False
-            if not whole:
-                torn.append(os.path.relpath(path, folder))
-    return torn
+                complete = False
+            if not complete:
+                found.append(os.path.relpath(path, folder))
+    return found
 
 
 class Supervisor:
@@ -81,20 +83,20 @@ class Supervisor:
     def pose_command(self):
         return [self.regrade, "pose", os.path.join(self.capture, "images"), "--out", self.work, "--photo-size", "256"]
 
-    def complain(self, text):
+    def report(self, text):
         self.findings.append(text)
         print("FINDING: " + text, flush=True)
 
-    def fresh(self, begin=None):
+    def reset(self, begin=None):
         shutil.rmtree(self.work, ignore_errors=True)
         if begin:
             shutil.copytree(begin, self.work)
 
-    def undisturbed(self):
-        """Runs once; learns the results and how long each stage takes."""
+    def run_baseline(self):
+        """Runs once without kills; stores the results and the duration of each stage."""
         if Run([self.regrade, "pose", self.posed_capture, "--out", self.work, "--photo-size", "96",
                 "--tracks", "given"]).finish() != 0:
-            sys.exit("the undisturbed run's poses failed")
+            sys.exit("the poses of the baseline run failed")
         self.posed = shutil.copytree(self.work, os.path.join(self.scratch, "posed"))
         run, self.duration, last = Run(self.command()), {}, time.monotonic()
         for stage in STAGES[1:]:
@@ -103,13 +105,13 @@ class Supervisor:
             now = time.monotonic()
             self.duration[stage], last = now - last, now
         if run.finish() != 0:
-            sys.exit("the undisturbed run failed")
+            sys.exit("the baseline run failed")
         starts = [self.duration[stage] for stage in STAGES[1:]] + [time.monotonic() - last]
         self.startup = starts[0]
         self.duration = dict(zip(STAGES[1:], starts[1:]))
         self.expected = results(self.work)
         if not any(name.endswith("styled.npz") for name in self.expected):
-            sys.exit("the undisturbed run left no styled field")
+            sys.exit("the baseline run wrote no styled field")
 
     def start(self, command, finished, group=True):
         self.starts += 1
@@ -117,33 +119,33 @@ class Supervisor:
         run.finished_before = list(finished)
         return run
 
-    def judge(self, run, finished, killed_by=None):
-        """Checks a run that is over, and learns which stages have ended."""
+    def check(self, run, finished, killed_by=None):
+        """Checks a run that has ended, and adds its ended stages to `finished`."""
         for stage in run.finished_before:
             if stage in run.began:
-                self.complain(f"{stage} had ended, and was done again")
+                self.report(f"{stage} had ended, and ran again")
         finished += [stage for stage in run.ended if stage not in finished]
         if killed_by is not None:
-            for name in torn_files(self.work):
-                self.complain(f"{name} is torn after {killed_by.name}")
+            for name in incomplete_files(self.work):
+                self.report(f"{name} is incomplete after {killed_by.name}")
 
-    def strike(self, command, finished, stage, delay, group=True):
-        """Starts, kills `delay` after `stage` began (None: after the start). Exit status."""
+    def start_and_kill(self, command, finished, stage, delay, group=True):
+        """Starts, and kills `delay` seconds after `stage` began (None: after the start). Returns the exit status."""
         number = self.random.choice(SIGNALS)
         run = self.start(command, finished, group)
         if stage is None or run.wait_for(stage):
             time.sleep(delay)
-            where = run.open or ("between two stages" if run.began else "the start")
+            where = run.stage or ("between two stages" if run.began else "the start")
             status = run.kill(number)
         else:
             status = run.finish()
-        self.judge(run, finished, number)
+        self.check(run, finished, number)
         if status == -number:
             self.kills[where, number.name] += 1
         elif status is None:
-            self.complain(f"not gone 60 s after {number.name} in {where}")
+            self.report(f"still running 60 s after {number.name} in {where}")
         elif status != 0:
-            self.complain(f"exit status {status} after {number.name} in {where}")
+            self.report(f"exit status {status} after {number.name} in {where}")
         return status
 
     def total(self):
@@ -153,38 +155,38 @@ class Supervisor:
         changed = different(results(self.work), self.expected)
         self.compared += 1
         if changed:
-            self.complain(f"{what}: {len(changed)} results differ from the undisturbed run's: {changed[:4]}")
+            self.report(f"{what}: {len(changed)} results differ from the baseline run: {changed[:4]}")
 
     def complete(self, command, finished):
         run = self.start(command, finished)
         status = run.finish()
-        self.judge(run, finished)
+        self.check(run, finished)
         if status != 0:
-            self.complain(f"the last start ended with exit status {status}")
+            self.report(f"the last start ended with exit status {status}")
 
-    def one_life(self, most):
-        """A copy of the poses, killed a few times in each stage, until it is done."""
-        self.fresh(self.posed)
+    def run_with_kills(self, most):
+        """Runs on a copy of the poses, with a few kills in each stage, until it is finished."""
+        self.reset(self.posed)
         finished, limit = ["pose"], self.total() + most
         for stage in (None,) + STAGES[1:]:
             length = self.startup if stage is None else self.duration[stage]
             for _ in range(self.random.choice((0, 1, 2, 3))):
                 if self.total() >= limit or stage in finished:
                     break
-                # Mostly inside of the stage, now and then at its end or in the next one.
+                # Mostly within the stage, sometimes at its end or in the next one.
                 most = length * (0.85 if self.random.random() < 0.8 else 1.3)
-                status = self.strike(self.command(self.random.choice((1, 2))), finished, stage,
+                status = self.start_and_kill(self.command(self.random.choice((1, 2))), finished, stage,
                                      self.random.uniform(0, most))
-                if status == 0 and stage:  # it was over before; it is faster than it was undisturbed
+                if status == 0 and stage:  # it ended before the kill: faster than in the baseline run
                     self.duration[stage] *= 0.6
         self.complete(self.command(self.random.choice((1, 2))), finished)
         self.compare("a killed run")
 
-    def pose_life(self, seconds, most, compare_poses):
-        """`regrade pose` from photos, killed a few times anywhere, until it is done."""
-        self.fresh()
+    def pose_with_kills(self, seconds, most, compare_poses):
+        """`regrade pose` from photos, with a few kills at any time, until it is finished."""
+        self.reset()
         for _ in range(self.random.randint(1, most)):
-            if self.strike(self.pose_command(), [], None, self.random.uniform(0, 1.1 * seconds), group=False) == 0:
+            if self.start_and_kill(self.pose_command(), [], None, self.random.uniform(0, 1.1 * seconds), group=False) == 0:
                 break
         self.complete(self.pose_command(), [])
         self.check_poses(compare_poses)
@@ -192,9 +194,9 @@ class Supervisor:
     def check_poses(self, compare_poses):
         self.compared += 1
         with open(os.path.join(self.work, ".regrade/stages/pose.json"), encoding="utf-8") as file:
-            figures = json.load(file)["metrics"]
-        if figures["registered"] != 8:
-            self.complain(f"{figures['registered']} of 8 photos placed")
+            metrics = json.load(file)["metrics"]
+        if metrics["registered"] != 8:
+            self.report(f"{metrics['registered']} of 8 photos registered")
         if not compare_poses:
             return
         done = subprocess.run([compare_poses, os.path.join(self.work, "poses/sparse"),
@@ -202,22 +204,22 @@ class Supervisor:
                                os.path.join(self.capture, "images")], stdout=subprocess.PIPE, text=True)
         worst = [float(line.split("largest")[1]) for line in done.stdout.splitlines() if "largest" in line]
         if done.returncode != 0 or len(worst) != 2 or worst[0] > 0.5 or worst[1] > 1:
-            self.complain("poses after kills: " + " ".join(done.stdout.split()))
+            self.report("poses after kills: " + " ".join(done.stdout.split()))
 
     def pose_kills(self, kills, compare_poses):
-        self.fresh()
+        self.reset()
         begin = time.monotonic()
         self.complete(self.pose_command(), [])
         seconds = time.monotonic() - begin
         self.check_poses(compare_poses)
         goal = self.total() + kills
         while self.total() < goal:
-            self.pose_life(seconds, min(4, goal - self.total()), compare_poses)
+            self.pose_with_kills(seconds, min(4, goal - self.total()), compare_poses)
         deadline = time.monotonic() + 30
         while time.monotonic() < deadline and self.left_behind():
             time.sleep(0.5)
         for line in self.left_behind():
-            self.complain("a process was left behind: " + line)
+            self.report("a process was left behind: " + line)
 
     def left_behind(self):
         found = []
@@ -232,27 +234,27 @@ class Supervisor:
         return found
 
     def kill_in_fit(self, more=()):
-        """A run that was asked to stop half way through the fit; the path of its checkpoint."""
-        self.fresh(self.posed)
+        """Stops a run within the fit; returns the path of its checkpoint."""
+        self.reset(self.posed)
         path = os.path.join(self.work, ".regrade/checkpoints/reconstruct")
-        for share in (0.5, 0.4, 0.3, 0.2, 0.1, 0.0):
+        for fraction in (0.5, 0.4, 0.3, 0.2, 0.1, 0.0):
             run = Run(self.command(more=more))
             if run.wait_for("reconstruct"):
-                time.sleep(share * self.duration["reconstruct"])
+                time.sleep(fraction * self.duration["reconstruct"])
             run.kill(signal.SIGTERM)
             if os.path.isfile(path):
                 return path
-            self.fresh(self.posed)
+            self.reset(self.posed)
         sys.exit("no checkpoint after SIGTERM in the fit")
 
-    def caught(self, what, wanted, change):
-        """Changes something between two starts; the supervisor must complain, or must not."""
+    def expect_finding(self, what, wanted, change):
+        """Changes something between two starts; there must be a finding, or must not be one."""
         before, self.findings = self.findings, []
         print(f"control: {what}; this {'must' if wanted else 'must not'} be found", flush=True)
         change()
         seen, self.findings = bool(self.findings), before
         if seen != wanted:
-            self.complain(f"control: {what}: {'not caught' if wanted else 'was not healed'}")
+            self.report(f"control: {what}: {'not found' if wanted else 'not recovered from'}")
 
     def control(self, short):
         def exchange():
@@ -278,25 +280,25 @@ class Supervisor:
             self.compare("with a changed checkpoint")
 
         def cut():
-            self.fresh(self.posed)
+            self.reset(self.posed)
             self.complete(self.command(), ["pose"])
             frame = os.path.join(self.work, "frames/styled/00001.png")
             os.truncate(frame, os.path.getsize(frame) // 2)
-            for name in torn_files(self.work):
-                self.complain(f"{name} is torn")
+            for name in incomplete_files(self.work):
+                self.report(f"{name} is incomplete")
 
         def forget():
-            self.fresh(self.posed)
+            self.reset(self.posed)
             self.complete(self.command(), ["pose"])
             os.remove(os.path.join(self.work, ".regrade/stages/render.json"))
             self.complete(self.command(), list(STAGES))
 
-        self.caught("a checkpoint of another seed", True, exchange)
+        self.expect_finding("a checkpoint of another seed", True, exchange)
         if short:
             return
-        self.caught("one bit of a checkpoint", False, flip)
-        self.caught("a frame cut short", True, cut)
-        self.caught("a stage's record removed", True, forget)
+        self.expect_finding("one bit of a checkpoint", False, flip)
+        self.expect_finding("a frame cut short", True, cut)
+        self.expect_finding("a stage's record removed", True, forget)
 
     def table(self):
         print(f"{'killed in':20}" + "".join(f"{number.name:>9}" for number in SIGNALS))
@@ -309,26 +311,26 @@ class Supervisor:
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("regrade")
-    parser.add_argument("--kills", type=int, default=1000, metavar="N", help="behind the poses (1000)")
-    parser.add_argument("--pose-kills", type=int, default=50, metavar="N", help="inside COLMAP's stage (50)")
-    parser.add_argument("--seed", type=int, default=0, help="draws stages, instants, signals and threads")
-    parser.add_argument("--effects", default="", help="of the synthetic capture, e.g. mixed-cameras")
-    parser.add_argument("--compare-poses", metavar="PROGRAM", help="the test program compare_poses, for the tolerance")
+    parser.add_argument("--kills", type=int, default=1000, metavar="N", help="kills after the poses (1000)")
+    parser.add_argument("--pose-kills", type=int, default=50, metavar="N", help="kills within COLMAP's stage (50)")
+    parser.add_argument("--seed", type=int, default=0, help="seed of stages, times, signals and threads")
+    parser.add_argument("--effects", default="", help="effects of the synthetic capture, e.g. mixed-cameras")
+    parser.add_argument("--compare-poses", metavar="PROGRAM", help="the test program compare_poses, to check poses against the truth")
     parser.add_argument("--control", choices=("none", "short", "all"), default="none",
-                        help="see the supervisor catch what it must")
+                        help="check that planted errors are found")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
         supervisor = Supervisor(os.path.abspath(options.regrade), scratch, options.seed, options.effects)
         if options.control != "none" or options.kills:
-            supervisor.undisturbed()
+            supervisor.run_baseline()
         if options.control != "none":
             supervisor.control(options.control == "short")
         begin = supervisor.total()
-        said = 0
+        printed = 0
         while supervisor.total() - begin < options.kills:
-            supervisor.one_life(options.kills - supervisor.total() + begin)
-            if supervisor.total() // 100 > said:
-                said = supervisor.total() // 100
+            supervisor.run_with_kills(options.kills - supervisor.total() + begin)
+            if supervisor.total() // 100 > printed:
+                printed = supervisor.total() // 100
                 print(f"{supervisor.total()} kills, {supervisor.compared} results compared", flush=True)
         if options.pose_kills:
             supervisor.pose_kills(options.pose_kills, options.compare_poses)

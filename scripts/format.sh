@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Formats the sources as .clang-format says; with --check it changes nothing and fails on what it would change.
+# Formats the sources with clang-format; with --check it changes nothing and fails if a file is not formatted.
 set -euo pipefail
 
 cd "$(dirname "${BASH_SOURCE[0]}")/.."

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# Attacks every reader with libFuzzer under the address and undefined-behaviour sanitizers, and prints a table.
+# Fuzzes every reader with libFuzzer under the address and undefined-behaviour sanitizers, and prints a table.
 #   fuzz.sh [SECONDS] [TARGET...]     30 s for each target by default; needs clang and libomp-dev
-# What is found lies in build/fuzz/finds, the inputs that reached something new in build/fuzz/corpus. An input may take
-# 5 s and the process 512 MB, the sanitizers' own memory included. Exit status 1 if anything was found.
+# Failing inputs are written to build/fuzz/finds, inputs that reached new code to build/fuzz/corpus. Limits are 5 s for an
+# input and 512 MB for the process, sanitizers included. Exit status: 0, or 1 if there is a failing input.
 set -euo pipefail
 case "${1:-}" in
 -h | --help)
@@ -32,7 +32,7 @@ mkdir -p "$finds"
 scratch=$(mktemp -d -p "$([[ -w /dev/shm ]] && echo /dev/shm || echo "${TMPDIR:-/tmp}")")
 trap 'rm -rf "$scratch"' EXIT
 export TMPDIR=$scratch
-# Freed memory is kept back no longer than it takes to see its next use.
+# A small quarantine: freed memory is reused early.
 export ASAN_OPTIONS=quarantine_size_mb=8:allocator_may_return_null=1:detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1
 
 mapfile -t targets < <("$fuzzer" --list)
@@ -54,7 +54,7 @@ for target in "${targets[@]}"; do
     >"$scratch/log" 2>&1 </dev/null || cp "$scratch/log" "$finds/$target.log"
   count() { find "$finds" -name "$target-$1-*" -newer "$scratch/seeds" -type f | wc -l; }
   executions=$(sed -n 's/^stat::number_of_executed_units: *//p' "$scratch/log")
-  # A fuzzer that was stopped by a find prints no statistics: its last line of progress has the number.
+  # A fuzzer that stopped at a failing input prints no statistics: its last progress line has the number.
   [[ -n $executions ]] || executions=$(sed -n 's/^#\([0-9]*\)\s.*/\1/p' "$scratch/log" | tail -1)
   peak=$(sed -n 's/^stat::peak_rss_mb: *//p' "$scratch/log")
   edges=$(sed -n 's/.* cov: \([0-9]*\) .*/\1/p' "$scratch/log" | tail -1)
@@ -69,5 +69,5 @@ for target in "${targets[@]}"; do
     found=$((found + 1))
   fi
 done
-echo "$total executions of ${#targets[@]} targets, $found found"
+echo "$total executions of ${#targets[@]} targets, $found failing inputs"
 ((found == 0))

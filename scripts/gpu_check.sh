@@ -1,20 +1,22 @@
 #!/usr/bin/env bash
 # Checks and measures the GPU parts of regrade.
 #
-#   gpu_check.sh bundle DIR [FILE.npz...]   on the machine that builds: the programs for sm_90 (REGRADE_CUDA_ARCH says
-#                                           otherwise), the libraries they need beyond glibc, and packed captures
-#   gpu_check.sh run DIR [OUT]              on the machine with the GPU, which needs a CUDA driver and nothing else;
-#                                           with compute-sanitizer on its PATH, small scenes run under its four tools,
+#   gpu_check.sh bundle DIR [FILE.npz...]   on the build machine: writes to DIR the programs (for sm_90, or for
+#                                           REGRADE_CUDA_ARCH), their libraries beyond glibc, and packed captures
+#   gpu_check.sh run DIR [OUT]              on the machine with the GPU, which needs only a CUDA driver; with
+#                                           compute-sanitizer on its PATH, small scenes run under its four tools;
 #                                           with ncu, the kernels of one small fit, restyling and frame are measured
 #
-# REGRADE_RECIPES="standard" leaves the paper's recipes out.
-# `run` prints the parity table, fits each packed capture (by the settings below that bear its name, or the last ones),
-# restyles the field by both recipes if the capture was packed with a style, and leaves one JSON file, OUT/gpu_check.json (default: DIR). Exit status 1 if a tolerance is missed or a sanitizer finds anything.
+# `run` prints the parity table, fits each packed capture (with the settings below for its name, or the last ones),
+# restyles the field with each recipe if the capture was packed with a style, and writes OUT/gpu_check.json (default
+# for OUT: DIR). REGRADE_RECIPES="standard" leaves out the paper's recipes.
+# Exit status: 0, or 1 if a tolerance is exceeded or a sanitizer finds an error.
 set -euo pipefail
 exec </dev/null
 
-usage() { sed -n '2,14s/^# \{0,1\}//p' "${BASH_SOURCE[0]}" >&2; exit 2; }
-[[ $# -ge 2 ]] || usage
+usage() { sed -n '2,15s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"; }
+[[ "${1:-}" != --help ]] || { usage; exit 0; }
+[[ $# -ge 2 ]] || { usage >&2; exit 2; }
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 mkdir -p "$2"
 dir=$(cd "$2" && pwd)
@@ -31,15 +33,15 @@ bundle() {
   du -sh "$dir"
 }
 
-# Settings of the README's table; what is not named here is fitted as its phone capture is.
+# Settings of the README's table; other names are fitted with the settings of the phone capture.
 settings_of() {
   case $1 in
     lego) echo "--fit-resolutions 128,256,512 --fit-steps 1500,4000,16000 --fit-rays 16384 --fit-step-size 0.5
-                --initial-density 0.1 --tv-density 1e-5 --tv-sh 1e-3 --tv-share 0.01 --tv-decay 1
+                --initial-density 0.1 --tv-density 1e-5 --tv-sh 1e-3 --tv-fraction 0.01 --tv-decay 1
                 --fit-rate-density 64 --fit-rate-density-end 4 --fit-density-delay 0.07 --fit-rate-sh-end 3e-4
                 --prune-weight 0.256" ;;
     fern) echo "--fit-resolutions 352,704,1408 --fit-steps 3000,7000,7000 --fit-rays 12288 --fit-step-size 0.5
-                --initial-density 0.1 --prune-weight 2.5 --tv-density 2e-3 --tv-sh 1e-2 --tv-share 0.01 --tv-decay 1
+                --initial-density 0.1 --prune-weight 2.5 --tv-density 2e-3 --tv-sh 1e-2 --tv-fraction 0.01 --tv-decay 1
                 --fit-rate-density 16 --fit-rate-density-end 3 --fit-density-delay 0.08 --fit-view-bound 0.3
                 --fit-rate-sh 5e-2 --fit-rate-sh-end 2e-3" ;;
     *) echo "--fit-resolutions 96,192,384 --fit-steps 600,1500,4000 --fit-rays 16384 --fit-rate-density 32
@@ -47,8 +49,8 @@ settings_of() {
   esac
 }
 
-# What each kernel moves and does, of a small fit of a capture packed with a style: bytes of memory and of the second
-# cache, instructions of warps, those of the tensor cores among them.
+# Time, bytes of memory and of the L2 cache, warp instructions and tensor-core instructions of each kernel, in a small
+# fit of a capture packed with a style.
 measure_kernels() {
   local capture=$1 field=$2/kernels_field.npz
   local metrics=gpu__time_duration.sum,dram__bytes.sum,lts__t_bytes.sum,smsp__inst_executed.sum
@@ -57,12 +59,12 @@ measure_kernels() {
   local profile="ncu --clock-control none --csv --metrics $metrics"
   # shellcheck disable=SC2086  # words
   "$dir/regrade_gpu" $fit 600,600 --field "$field" >/dev/null 2>&1 || return 1
-  # The last steps of the finer grid: every kernel of a step once.
+  # The last steps of the finer grid, each kernel once.
   # shellcheck disable=SC2086
   $profile -k 'regex:FitRays|StepKernel|TotalVariation|DrawKernel' --launch-skip 2000 --launch-count 4 \
     "$dir/regrade_gpu" $fit 600,600 | grep '^"'
   # shellcheck disable=SC2086
-  # Every kernel of a step of the style; the network's adjoint comes once for 65536 voxels.
+  # Each kernel of a style step; the network's adjoint runs once for 65536 voxels.
   $profile -k 'regex:MarchWeights|GatherRows|AddMapped|ForwardKernel|AdjointRows|OuterProducts|Blend|ColorLoss|AssignSlots|ActivateWeights|GradientKernel|UpdateKernel' \
     --launch-skip 300 --launch-count 40 \
     "$dir/regrade_gpu" style --capture "$capture" --field "$field" --style-steps 30 | grep '^"'
@@ -78,7 +80,7 @@ run() {
   export LD_LIBRARY_PATH=$dir${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}
   : >"$out/parity.txt"
   for test in device_{parity,style,training}_test; do
-    # `hard_cases.py --measured OUT/*.xml` takes what these have measured into the page of hard cases.
+    # `hard_cases.py --measured OUT/*.xml` adds these numbers to RESULTS.md.
     "$dir/$test" --gtest_output="xml:$out/$test.xml" >>"$out/parity.txt" || status=1
   done
   grep -E '^parity|PASSED|FAILED|SKIPPED' "$out/parity.txt"
@@ -118,9 +120,9 @@ run() {
       echo "$name: the fit failed"
       continue
     fi
-    for recipe in ${REGRADE_RECIPES:-standard paper letter}; do  # letter: every voxel at every step, ten steps of it
+    for recipe in ${REGRADE_RECIPES:-standard paper every-voxel}; do  # every-voxel: ten steps of all voxels
       local options="--recipe $recipe"
-      [[ $recipe == letter ]] && options="--recipe paper --style-every-voxel --style-steps 10"
+      [[ $recipe == every-voxel ]] && options="--recipe paper --style-every-voxel --style-steps 10"
       # shellcheck disable=SC2086  # options are words
       if record=$("$dir/regrade_gpu" style --capture "$capture" --field "$out/field.npz" $options 2>"$out/style.txt"); then
         printf ',\n"style_%s_%s": %s' "$name" "$recipe" "$record" >>"$out/gpu_check.json"
@@ -128,7 +130,7 @@ run() {
       else
         grep -q "holds no style picture" "$out/style.txt" && break
         status=1
-        echo "$name: learning the style failed ($recipe)"; cat "$out/style.txt"
+        echo "$name: style training failed ($recipe)"; cat "$out/style.txt"
       fi
     done
     rm -f "$out/field.npz"
@@ -140,5 +142,5 @@ run() {
 case $1 in
   bundle) shift 2; bundle "$@" ;;
   run) shift 2; run "$@" ;;
-  *) usage ;;
+  *) usage >&2; exit 2 ;;
 esac

@@ -1,20 +1,22 @@
 #!/usr/bin/env python3
-"""Writes tests/hard_cases/RESULTS.md: for each hard case and fault what is asserted, by which test, and whether that was seen.
+"""Writes tests/hard_cases/RESULTS.md: each hard case with its tests, what they measured, and the safeguards removed.
 
   hard_cases.py             writes the page
-  hard_cases.py --check     changes nothing; exit status 1 if the page is not what would be written, if a test that is
-                            named does not exist, or if a case has neither a test nor a sentence why
+  hard_cases.py --check     writes nothing; fails if the page is out of date, if a named test does not exist, or if a case
+                            has neither a test nor a reason
   hard_cases.py --measured build/cpu
-                            runs the tests of numbers in a build, keeps what they measured (measured.json), and writes the page
+                            runs the tests that measure numbers, stores the results (measured.json), writes the page
   hard_cases.py --measured REPORT.xml...
-                            the same from GoogleTest's reports or folders of them: of tests that have begun to measure, and of
+                            the same from GoogleTest's reports or folders of them: for tests that began to measure, and for
                             device_parity_test and device_style_test --gtest_output=xml:FILE on a machine with a GPU
-  hard_cases.py --self-test plants mistakes and sees --check find them
+  hard_cases.py --self-test plants mistakes and checks that --check finds them
 
-A test belongs to a case whose number is in its name ("Mkl.H7_H20_StyleOfOneColour"). tests/hard_cases/cases.json has the
-cases' titles, further tests ("tests": names with *, or of ctest), a sentence ("why") where there is none, and one ("unseen")
-where no care can be taken out. What is asserted, and whether it was seen to fail, is taken from mutations.json and MUTATIONS.md
-beside it. Measured figures of merit, each with its command, stand in figures.json.
+Exit status: 0, or 1 if there is a finding.
+
+A test belongs to the case whose number is in its name ("Mkl.H7_H20_StyleOfOneColour"). tests/hard_cases/cases.json has the
+cases' titles, further tests ("tests": names with *, or names of ctest), a reason ("why") where there is no test, and a
+reason ("unseen") where no safeguard can be removed. The safeguards and the tests that failed without them come from
+mutations.json and MUTATIONS.md. Metrics, each with its command, are in metrics.json.
 """
 
 import argparse
@@ -29,18 +31,18 @@ import tempfile
 import measured_errors
 
 FOLDER = os.path.join("tests", "hard_cases")
-CASES, CARES, SEEN, PAGE, FIGURES, MEASURED = (os.path.join(FOLDER, name) for name in (
-    "cases.json", "mutations.json", "MUTATIONS.md", "RESULTS.md", "figures.json", "measured.json"))
+CASES, MUTATIONS, SEEN, PAGE, METRICS, MEASURED = (os.path.join(FOLDER, name) for name in (
+    "cases.json", "mutations.json", "MUTATIONS.md", "RESULTS.md", "metrics.json", "measured.json"))
 TEST = re.compile(r"\bTEST(?:_F|_P)?\(\s*(\w+)\s*,\s*(\w+)\s*\)")
-CTEST = re.compile(r"add_test\(NAME (\w+)")
+CTEST = re.compile(r"add_(?:test\(NAME|tree_check\() ?(\w+)")
 NUMBER = re.compile(r"(?<![A-Za-z0-9])([HF]\d+)(?![A-Za-z0-9])")
 HEAD = """# Hard cases and faults
 
-Every case that the design names, the tests that assert it, what they measured beside what they allow, and the care that was
-once taken out of the code to see one of them fail ([MUTATIONS.md](MUTATIONS.md)). Written by `scripts/hard_cases.py` from the
-tests, from `cases.json` and `measured.json`; a test fails when this page is out of date, names a test that does not exist, or
-lacks a number that a test measures. Whether the tests pass is said by `ctest`. Digits are correct decimal digits: -log10 of the
-error over the size of what it is of, the worst of all that the test tries; float and double say what was computed in.
+Every hard case, the tests that assert it, what they measured and what they allow, and the safeguard whose removal made one
+of them fail ([MUTATIONS.md](MUTATIONS.md)). Written by `scripts/hard_cases.py` from the tests, `cases.json`, `measured.json`
+and `metrics.json`; a test fails when this page is out of date, names a test that does not exist, or lacks a number that a
+test measures. `ctest` shows whether the tests pass. Digits are correct decimal digits, -log10 of the relative error, the
+worst of all inputs of the test; float and double are the precision of the computation.
 
 {summary}
 """
@@ -63,16 +65,16 @@ class Tree:
             for name in CTEST.findall(read(path)):
                 self.add(name, ())
         if glob.glob(os.path.join(root, "scripts", "check_*.py")):
-            for checker in ("check_layers", "check_equations"):  # made by a loop in CMake
+            for checker in ("check_layers", "check_equations", "check_words", "check_names"):  # added by a loop in CMake
                 self.add(checker, ())
         self.cases = json.loads(read(os.path.join(root, CASES)))
-        self.cares = {}
-        for entry in json.loads(read(os.path.join(root, CARES))):
-            self.cares.setdefault(entry["case"], []).append(entry)
+        self.safeguards = {}
+        for entry in json.loads(read(os.path.join(root, MUTATIONS))):
+            self.safeguards.setdefault(entry["case"], []).append(entry)
         self.seen = read(os.path.join(root, SEEN))
-        self.figures, self.measured = (json.loads(read(os.path.join(root, path)))
+        self.metrics, self.measured = (json.loads(read(os.path.join(root, path)))
                                        if os.path.isfile(os.path.join(root, path)) else nothing
-                                       for path, nothing in ((FIGURES, []), (MEASURED, {})))
+                                       for path, nothing in ((METRICS, []), (MEASURED, {})))
 
     def add(self, test, cases):
         self.tests.add(test)
@@ -80,7 +82,7 @@ class Tree:
             self.of_case.setdefault(case, []).append(test)
 
     def tests_of(self, case, complaints):
-        """Names, those with * resolved to be there."""
+        """Names; a pattern with * must match a test."""
         names = sorted(self.of_case.get(case, []))
         for pattern in self.cases[case].get("tests", ()):
             if not fnmatch.filter(self.tests, pattern):
@@ -95,7 +97,7 @@ def cell(text):
 
 
 def shown(tests):
-    """Test names; of a suite's later ones only what is behind its name."""
+    """Test names; after the first of a suite, without the suite."""
     words, last = [], ""
     for test in tests:
         suite, _, name = test.partition(".")
@@ -105,66 +107,66 @@ def shown(tests):
 
 
 def measured_by(measured, tests):
-    """What these tests measured, in words."""
-    return "; ".join(measured_errors.told(row) for test in measured
+    """What these tests measured, as text."""
+    return "; ".join(measured_errors.describe(row) for test in measured
                      if any(fnmatch.fnmatchcase(test, pattern) for pattern in tests) for row in measured[test])
 
 
-def other_numbers(measured, told):
+def other_numbers(measured, listed):
     """What tests measured that belong to no case."""
-    rows = [f"| `{test}` | {cell(measured_by(measured, [test]))} |" for test in measured if test not in told]
-    return "\n".join(["## Numbers of no case", "", "| test | measured |", "|---|---|", *rows]) if rows else ""
+    rows = [f"| `{test}` | {cell(measured_by(measured, [test]))} |" for test in measured if test not in listed]
+    return "\n".join(["## Other measured numbers", "", "| test | measured |", "|---|---|", *rows]) if rows else ""
 
 
-def metrics_table(figures):
-    lines = ["## Figures of merit", "",
-             "Measured by the commands beside them, which anyone can run.", "",
-             "| figure | measured | with | commit, machine |", "|---|---|---|---|"]
-    lines += [f"| {cell(row['figure'])} | {cell(row['measured'])} | `{row['with']}` | {cell(row['at'])} |" for row in figures]
+def metrics_table(metrics):
+    lines = ["## Metrics", "",
+             "Measured by the commands in the third column.", "",
+             "| metric | measured | with | commit, machine |", "|---|---|---|---|"]
+    lines += [f"| {cell(row['metric'])} | {cell(row['measured'])} | `{row['with']}` | {cell(row['at'])} |" for row in metrics]
     return "\n".join(lines)
 
 
 def page(tree):
     """(text, complaints)"""
-    complaints, tables, told = [], [], set()
+    complaints, tables, listed = [], [], set()
     count = {"tested": 0, "seen": 0, "cannot": 0, "untested": 0}
     for case in sorted(tree.of_case):
         if case not in tree.cases:
             complaints.append(f"{case}: a test has this number, {CASES} has not: {tree.of_case[case][0]}")
     for title, letter in PARTS:
-        lines = [f"## {title}", "", "| case | | tests | measured | care that was taken out, and seen to be missed |",
+        lines = [f"## {title}", "", "| case | | tests | measured | safeguard whose removal made a test fail |",
                  "|---|---|---|---|---|"]
         for case in (case for case in tree.cases if case[0] == letter):
             tests = tree.tests_of(case, complaints)
-            cares = tree.cares.get(case, [])
-            cannot = [entry["cannot_arise"] for entry in cares if "cannot_arise" in entry]
+            safeguards = tree.safeguards.get(case, [])
+            cannot = [entry["cannot_arise"] for entry in safeguards if "cannot_arise" in entry]
             why = cannot[0] if cannot else tree.cases[case].get("why", "")
-            said = "; ".join(entry["care"] for entry in cares
-                             if "care" in entry and f"| {case} | {entry['care']} |" in tree.seen)
+            removed = "; ".join(entry["safeguard"] for entry in safeguards
+                                if "safeguard" in entry and f"| {case} | {entry['safeguard']} |" in tree.seen)
             unseen = tree.cases[case].get("unseen", "")
-            told.update(test for test in tree.measured if any(fnmatch.fnmatchcase(test, name) for name in tests))
-            if tests and not said and not unseen:
-                complaints.append(f"{case}: no test was seen to fail, and no sentence says why")
-            if said and unseen:
-                complaints.append(f"{case}: a test was seen to fail, and a sentence why none can be")
+            listed.update(test for test in tree.measured if any(fnmatch.fnmatchcase(test, name) for name in tests))
+            if tests and not removed and not unseen:
+                complaints.append(f"{case}: no safeguard was removed, and no reason is given")
+            if removed and unseen:
+                complaints.append(f"{case}: a safeguard was removed, and a reason why none can be")
             if not tests and not why:
-                complaints.append(f"{case}: neither a test nor a sentence why there is none")
+                complaints.append(f"{case}: neither a test nor a reason why there is none")
             if tests and why:
-                complaints.append(f"{case}: a test, and a sentence why there is none")
+                complaints.append(f"{case}: a test, and a reason why there is none")
             arises = not (cannot or why.startswith("cannot arise"))
             count["tested" if tests else "untested" if arises else "cannot"] += 1
-            count["seen"] += bool(tests and said)
+            count["seen"] += bool(tests and removed)
             if cannot:
                 why = "cannot arise: " + why
             lines.append(f"| {case} | {cell(tree.cases[case]['title'])} | {shown(tests) or cell(why)} | "
-                         f"{cell(measured_by(tree.measured, tests))} | {cell(said or unseen)} |")
+                         f"{cell(measured_by(tree.measured, tests))} | {cell(removed or unseen)} |")
         tables.append("\n".join(lines))
-    summary = (f"{len(tree.cases)} cases: {count['tested']} have a test, {count['seen']} of these were seen to fail without their "
-               f"care; {count['cannot']} cannot arise here; {count['untested']} are not tested, and it is said why.")
+    summary = (f"{len(tree.cases)} cases: {count['tested']} have a test, and for {count['seen']} of these a test failed when a "
+               f"safeguard was removed; {count['cannot']} cannot arise; {count['untested']} are not tested, with the reason.")
     summary = "\n\n".join(filter(None, (summary, measured_errors.summary(tree.measured))))
-    tables += filter(None, [other_numbers(tree.measured, told)])
-    if tree.figures:
-        tables.insert(0, metrics_table(tree.figures))
+    tables += filter(None, [other_numbers(tree.measured, listed)])
+    if tree.metrics:
+        tables.insert(0, metrics_table(tree.metrics))
     return HEAD.format(summary=summary) + "\n" + "\n\n".join(tables) + "\n", complaints
 
 
@@ -180,7 +182,7 @@ def check(root):
 
 
 def keep(root, reports):
-    """Of tests that ran what they measured now, of others what is kept, as long as they are there."""
+    """Stores what the tests of these reports measured; of other tests that still exist the old numbers stay."""
     tree = Tree(root)
     build = os.path.isfile(os.path.join(reports[0], "CMakeCache.txt"))
     known = set(tree.measured) | set(measured_errors.in_sources(root)[0])
@@ -195,25 +197,25 @@ def keep(root, reports):
 def self_test():
     tidy = {"H1": {"title": "one"}, "F1": {"title": "two", "tests": ["S.*", "by_ctest"], "unseen": "no"},
             "F2": {"title": "three", "why": "not tested: no"}}
-    cares = [{"case": "H1", "care": "c"}]
+    safeguards = [{"case": "H1", "safeguard": "c"}]
     row = {"what": "sums", "kind": "digits", "where": "double CPU", "measured": "1e-15", "allowed": "1e-14"}
     good = {"S.H1_C": [row]}
     planted = [({}, good, ""),
                ({"F1": {"title": "two", "tests": ["T.*"], "unseen": "no"}}, good, "no test is called T.*"),
                ({"F2": {"title": "three"}}, good, "neither a test"),
-               ({"H1": {"title": "one", "why": "no"}}, good, "a test, and a sentence why there"),
-               ({"H1": {"title": "one", "unseen": "no"}}, good, "a sentence why none can be"),
-               ({"F1": {"title": "two", "tests": ["S.*"]}}, good, "no sentence says why"),
+               ({"H1": {"title": "one", "why": "no"}}, good, "a test, and a reason why there"),
+               ({"H1": {"title": "one", "unseen": "no"}}, good, "a reason why none can be"),
+               ({"F1": {"title": "two", "tests": ["S.*"]}}, good, "no reason is given"),
                ({"H1": None}, good, "a test has this number"),
-               ({}, {}, "S.H1_C measures, and stands in no"),
-               ({}, {**good, "S.Gone": [row]}, "which no test is called"),
-               ({}, {"S.H1_C": [row, {**row, "what": "means"}]}, "does not measure it"),
+               ({}, {}, "S.H1_C measures, but is not in"),
+               ({}, {**good, "S.Gone": [row]}, "but there is no such test"),
+               ({}, {"S.H1_C": [row, {**row, "what": "means"}]}, "does not measure"),
                ({}, {"S.H1_C": [{**row, "what": "su"}]}, "which measured.json does not have")]
     failures = 0
     for change, measured, expected in planted:
         with tempfile.TemporaryDirectory() as root:
             cases = {case: row for case, row in {**tidy, **change}.items() if row}
-            files = {CASES: json.dumps(cases), CARES: json.dumps(cares), SEEN: "| H1 | c | S.H1_C | no |",
+            files = {CASES: json.dumps(cases), MUTATIONS: json.dumps(safeguards), SEEN: "| H1 | c | S.H1_C | no |",
                      MEASURED: json.dumps(measured), "tests/CMakeLists.txt": "add_test(NAME by_ctest COMMAND x)",
                      "tests/s_test.cc": "TEST(S, H1_C) {\n  RecordDigits(\"sums\", 1);\n}\n"}
             for path, text in files.items():
@@ -238,7 +240,7 @@ def main():
     parser.add_argument("--root", default=os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
     parser.add_argument("--check", action="store_true")
     parser.add_argument("--self-test", action="store_true")
-    parser.add_argument("--measured", nargs="+", metavar="REPORT", help="gather what tests measured, and keep it")
+    parser.add_argument("--measured", nargs="+", metavar="REPORT", help="store what tests measured")
     arguments = parser.parse_args()
     if arguments.self_test:
         return 1 if self_test() else 0

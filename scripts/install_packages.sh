@@ -7,12 +7,12 @@ packages=(
   g++ cmake ninja-build pkg-config python3   # to build
   libgtest-dev libbenchmark-dev python3-numpy   # to test and to measure
   libboost-program-options-dev               # command line
-  nlohmann-json3-dev libzip-dev libspdlog-dev
+  nlohmann-json3-dev libzip-dev libutfcpp-dev
   libopenimageio-dev libjpeg62-turbo-dev libpng-dev   # pictures
-  libopencv-dev                              # flow, networks of 2D methods, films
+  libopencv-dev                              # flow, networks of 2D methods
+  libavformat-dev libavcodec-dev libavutil-dev libswscale-dev   # films
   libceres-dev libeigen3-dev
   colmap                                     # poses, started as a program
-  libjs-chart.js                             # drawings of the report that answer to a pointer
 )
 [[ "${1:-}" == "--dev" ]] && packages+=(clang-format clang-tidy chromium)
 

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Opens a report page in headless Chromium as a phone and as a desktop would, and checks that it behaves.
+"""Opens a report page in headless Chromium at the sizes of a phone and a desktop, and checks it.
 
   look_at_report.py REPORT.html [--shots FOLDER] [--chromium PROGRAM]
 
 Checked at each width: nothing on the console, nothing asked of the network (films beside the page are files), no
-scrolling sideways, every picture decoded, the slider cuts the picture where it is pulled to, drawings are drawn by
-Chart.js where the page carries it; and without JavaScript the static drawings are seen and no script is missed.
+scrolling sideways, every picture decoded, every chart visible, the slider cuts the picture where it is pulled to; and
+without JavaScript the charts are visible, too.
 --shots keeps pictures of the whole page. Exit status 1 if anything is wrong, 77 if there is no Chromium.
 """
 
@@ -22,19 +22,19 @@ from urllib.parse import urlparse
 from urllib.request import pathname2url
 
 SIZES = {"phone": (390, 844), "desktop": (1280, 900)}
-NO_CHROMIUM = 77  # what the test driver takes for "skipped"
-PATIENCE = 60  # seconds for any answer
+NO_CHROMIUM = 77  # ctest reports "skipped"
+TIMEOUT_S = 60  # for any answer
 
 
 class Browser:
-    """Chromium on two pipes: messages of JSON that end with a zero byte."""
+    """Chromium controlled over two pipes; messages are JSON and end with a zero byte."""
 
     def __init__(self, program, profile):
         to_browser, self.send_fd = os.pipe()
         self.read_fd, from_browser = os.pipe()
 
         def connect():
-            # The numbers that the browser expects; the pipes may have them already, crosswise.
+            # The browser expects descriptors 3 and 4; the pipes may already have these numbers, swapped.
             read, write = os.dup(to_browser), os.dup(from_browser)
             os.dup2(read, 3)
             os.dup2(write, 4)
@@ -61,7 +61,7 @@ class Browser:
                 time.sleep(0.01)
                 continue
             if not piece:
-                raise RuntimeError("Chromium has gone")
+                raise RuntimeError("Chromium has ended")
             self.buffer += piece
         text, self.buffer = self.buffer.split(b"\0", 1)
         return json.loads(text)
@@ -74,7 +74,7 @@ class Browser:
         data = json.dumps(message).encode() + b"\0"
         while data:
             data = data[os.write(self.send_fd, data):]
-        deadline = time.monotonic() + PATIENCE
+        deadline = time.monotonic() + TIMEOUT_S
         while True:
             answer = self._message(deadline)
             if answer.get("id") == self.number:
@@ -84,7 +84,7 @@ class Browser:
             self.events.append(answer)
 
     def wait_for(self, method):
-        deadline = time.monotonic() + PATIENCE
+        deadline = time.monotonic() + TIMEOUT_S
         while not any(event.get("method") == method for event in self.events):
             self.events.append(self._message(deadline))
 
@@ -101,7 +101,7 @@ class Browser:
 
 
 class Page:
-    """One tab at one size, on the report."""
+    """The report in one tab of one size."""
 
     def __init__(self, browser, path, size, script=True):
         self.browser, self.path = browser, path
@@ -140,7 +140,7 @@ class Page:
         self.browser.call("Target.closeTarget", targetId=self.target)
 
     def complaints(self):
-        """What the page said on the console or asked of the network."""
+        """Messages on the console and network requests of the page."""
         found, folder = [], os.path.dirname(os.path.abspath(self.path))
         for event in self.browser.events:
             about, method = event.get("params", {}), event.get("method")
@@ -152,28 +152,28 @@ class Page:
                 found.append("log: " + about["entry"]["text"] + " " + about["entry"].get("url", ""))
             elif method == "Network.requestWillBeSent":
                 address = urlparse(about["request"]["url"])
-                beside = address.scheme == "file" and os.path.dirname(address.path) == pathname2url(folder)
-                if address.scheme not in ("data", "about", "blob") and not beside:
-                    found.append("asks for " + about["request"]["url"][:200])
+                in_folder = address.scheme == "file" and os.path.dirname(address.path) == pathname2url(folder)
+                if address.scheme not in ("data", "about", "blob") and not in_folder:
+                    found.append("requests " + about["request"]["url"][:200])
         return found
 
 
 def check_slider(page):
-    """Pulls the first slider to a quarter and to three quarters of its picture."""
+    """Moves the first slider to a quarter and to three quarters of its picture."""
     box = page.value("(function(){var c=document.querySelector('.compare input');if(!c)return null;"
                      "c.scrollIntoView({block:'center'});var r=c.getBoundingClientRect();"
                      "return [r.left,r.top,r.width,r.height]})()")
     if box is None:
         return []
     cuts = []
-    for share in (0.25, 0.75):
-        page.click(box[0] + share * box[2], box[1] + box[3] / 2)
+    for fraction in (0.25, 0.75):
+        page.click(box[0] + fraction * box[2], box[1] + box[3] / 2)
         cuts.append(page.value("parseFloat(document.querySelector('.compare').style.getPropertyValue('--cut'))"))
         shown = page.value("getComputedStyle(document.querySelector('.compare figure+figure')).clipPath")
         if "%" not in (shown or ""):
-            return ["the slider cuts nothing: clip-path is " + str(shown)]
+            return ["the slider clips nothing: clip-path is " + str(shown)]
     good = all(cut is not None and abs(cut - want) < 6 for cut, want in zip(cuts, (25, 75)))
-    return [] if good else [f"the slider went to {cuts} where it was pulled to 25 and 75 percent"]
+    return [] if good else [f"the slider is at {cuts} after clicks at 25 and 75 percent"]
 
 
 def check_page(page, width):
@@ -184,22 +184,18 @@ def check_page(page, width):
                              "document.querySelectorAll('main *').forEach(function(e){if(!n&&!e.closest('.scroll')&&"
                              "e.getBoundingClientRect().right>w+1)n=e.outerHTML.slice(0,120)});return n})()")
         found.append(f"scrolls sideways: {wide} pixels wide at {width}, by {culprit}")
-    # Pictures that wait until they are seen are asked for now.
-    # Hostile names on test pages would set the title if they were run.
+    # Hostile names on test pages set the title if they are executed.
     if page.value("document.title") == "run":
-        found.append("a name on the page was run as a script")
+        found.append("a name on the page was executed as a script")
+    # Pictures that load lazily are loaded now.
     broken = page.value("(async function(){var n=0;for(var i of document.images){i.loading='eager';"
                         "try{await i.decode()}catch(e){n++}}return n})()")
     if broken:
         found.append(f"{broken} pictures do not decode")
-    plots, live = (page.value("document.querySelectorAll('.plot%s').length" % state) for state in ("", ".live"))
-    if page.value("typeof Chart") != "undefined" and live < plots:
-        found.append(f"{live} of {plots} drawings are drawn by the library")
-    hidden = page.value("[].filter.call(document.querySelectorAll('.plot'),function(p){"
-                        "var d=p.querySelector(p.classList.contains('live')?'canvas':'svg').getBoundingClientRect();"
-                        "return d.width<100||d.height<50}).length")
+    hidden = page.value("[].filter.call(document.querySelectorAll('.plot svg'),function(s){"
+                        "var d=s.getBoundingClientRect();return d.width<100||d.height<50}).length")
     if hidden:
-        found.append(f"{hidden} drawings are not seen")
+        found.append(f"{hidden} charts are not visible")
     return found + check_slider(page) + [c for c in page.complaints() if c not in found]
 
 
@@ -208,11 +204,11 @@ def check_without_script(page):
     shown = page.value("[].every.call(document.querySelectorAll('.plot svg'),function(s){"
                        "return s.getBoundingClientRect().height>50})")
     if not shown:
-        found.append("without JavaScript a drawing is not seen")
+        found.append("without JavaScript a chart is not visible")
     return found
 
 
-def look(browser, arguments):
+def check_report(browser, arguments):
     found = []
     for name, size in SIZES.items():
         page = Page(browser, arguments.report, size)
@@ -230,26 +226,26 @@ def look(browser, arguments):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("report", help="the page")
-    parser.add_argument("--shots", help="folder for pictures of the page")
+    parser.add_argument("report", help="the report page")
+    parser.add_argument("--shots", help="folder for screenshots of the page")
     parser.add_argument("--chromium", default=shutil.which("chromium") or shutil.which("chromium-browser"))
     arguments = parser.parse_args()
     if not arguments.chromium:
-        print("skipped: there is no Chromium here (Debian package chromium)")
+        print("skipped: Chromium is not installed (Debian package chromium)")
         return NO_CHROMIUM
     if not os.path.isfile(arguments.report):
-        parser.error(arguments.report + " is no file")
+        parser.error(arguments.report + " is not a file")
     if arguments.shots:
         os.makedirs(arguments.shots, exist_ok=True)
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
         browser = Browser(arguments.chromium, profile)
         try:
-            found = look(browser, arguments)
+            found = check_report(browser, arguments)
         finally:
             browser.close()
     for complaint in found:
         print(complaint)
-    print("the page behaves" if not found else f"{len(found)} complaints")
+    print(f"look_at_report: {len(found)} findings")
     return 1 if found else 0
 
 

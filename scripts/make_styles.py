@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
-"""Draws the style pictures in assets/, hills and water in made-up lights: style_sunset.png, which is the quickstart's,
-style_night.png and style_autumn.png."""
+"""Draws the style pictures of assets/: style_sunset.png (used by quickstart.sh), style_night.png and style_autumn.png.
+
+  make_styles.py [--out FOLDER]
+"""
 
 import argparse
 import math
@@ -14,7 +16,7 @@ HILLS = ((0.50, 0.045, 9.0, 1.3), (0.54, 0.035, 15.0, 4.1))
 
 
 class Light:
-    """Colours of a picture: of the sky from top to horizon, clouds, the glow about the sun and the sun, hills, water."""
+    """Colours of a picture: sky from top to horizon, clouds, glow around the sun, sun, hills, water, glint."""
 
     def __init__(self, sky, cloud, glow, sun, hills, water, glint):
         self.sky, self.cloud, self.glow, self.sun = sky, cloud, glow, sun
@@ -86,7 +88,7 @@ def draw(light, path):
 def main():
     root = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", default=os.path.join(root, "assets"), help="folder; default: assets/")
+    parser.add_argument("--out", default=os.path.join(root, "assets"), help="output folder; default: assets/")
     out = parser.parse_args().out
     os.makedirs(out, exist_ok=True)
     for name, light in LIGHTS.items():

@@ -3,10 +3,10 @@
 
   measure_costs.py REGRADE PHOTOS STYLE WORK [--part pose|fit|style] [--preset draft] [--only PARAMETER] [-- BASE OPTIONS]
 
-WORK keeps a base run (made if it is not there) and rows.tsv; rows that are there already are not measured again. Each
-row changes one parameter of the base and nothing else. A fit is judged by its held-out views, a style by its distance from
-the 2D method and by its steadiness, poses by what they find. Seconds are of the stage by the wall; CPU seconds are of
-the whole command, all threads, and bear other work on the machine better.
+WORK has a base run (made if it is missing) and rows.tsv; rows that exist are not measured again. Each row changes one
+parameter of the base. A fit is measured on its held-out views, a style by its distance to the 2D method and by its
+temporal consistency, poses by the number of registered photos and points. Seconds are wall time of the stage; CPU
+seconds are of the whole command, all threads, and depend less on other load. Exit status: 0.
 """
 
 import argparse
@@ -37,9 +37,9 @@ PARAMETERS = {
     ],
 }
 HEADS = {
-    "pose": ["placed", "points", "reprojection px"],
+    "pose": ["registered", "points", "reprojection px"],
     "fit": ["train dB", "held-out dB", "voxels"],
-    "style": ["styled to 2D dB", "TC gap 1", "TC gap 5", "K_est", "bound", "slope", "hue spread", "chroma"],
+    "style": ["styled to 2D dB", "TC gap 1", "TC gap 5", "K_est", "bound", "local Lipschitz, sampled", "hue spread", "chroma"],
 }
 
 
@@ -58,7 +58,8 @@ def stage(folder, name):
         return json.load(file)
 
 
-def figures(part, folder):
+def metrics_of(part, folder):
+    """(seconds of the stage, values in the order of HEADS)"""
     if part == "pose":
         f = stage(folder, "pose")["metrics"]
         return stage(folder, "pose")["seconds"], [f["registered"], f["points"], round(f["reprojection_px"], 3)]
@@ -71,19 +72,19 @@ def figures(part, folder):
     s = report["stages"]["stylize"]
     near = next(f for f in report["fidelity"] if f["sequence"] == "styled")
     steady = {c["gap"]: c["tc_psnr_mean_db"] for c in report["consistency"] if c["sequence"] == "styled"}
-    values = [s["psnr_to_2d_db"], steady[1], steady[5], s["k_est"], s["bound"], s["local_lipschitz_sampled"],
+    values = [near["psnr_to_2d_db"], steady[1], steady[5], s["k_est"], s["bound"], s["local_lipschitz_sampled"],
               near["hue_std"] / near["hue_std_2d"], near["chroma"] / near["chroma_2d"]]
     return s["seconds"], [round(v, 2) for v in values]
 
 
 def measure(part, arguments, base, parameter, value):
-    """A row: seconds of the stage, CPU seconds of the command, figures."""
+    """A row: seconds of the stage, CPU seconds of the command, metrics."""
     row = base + ".row"
     shutil.rmtree(row, ignore_errors=True)
     option = [] if parameter is None else ["--" + parameter] + ([] if value is None else [value])
     if part == "style":
         shutil.copytree(base, row)
-        # The frames' way is the photos' places: the film costs time and says nothing here.
+        # Frames at the photos' poses only: a film would cost time and adds no metric.
         command = [arguments.regrade, "stylize", row, "--style", arguments.style, "--path", "views"]
     else:
         if part == "fit":
@@ -93,7 +94,7 @@ def measure(part, arguments, base, parameter, value):
         if part == "fit":
             command += ["--restart-from", "reconstruct"]
     cpu = run(command + option, base + ".log")
-    seconds, values = figures(part, row)
+    seconds, values = metrics_of(part, row)
     shutil.rmtree(row)
     return seconds, cpu, values
 

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""What tests of numbers measured, gathered from GoogleTest's reports, and told in words.
+"""Reads the numbers that tests measured from GoogleTest's reports and writes them as text; a module of hard_cases.py.
 
-Tests measure with tests/support/record_error.h. hard_cases.py --measured gathers and keeps it in
+Tests record numbers with tests/support/record_error.h. hard_cases.py --measured stores them in
 tests/hard_cases/measured.json: {test: [{what, kind, where, measured, allowed}]}, of a test with parameters the worst.
-Kinds: "count" is how many there were, "digits" is an error relative to the size of what it is of, "bound" anything that stays below what is allowed,
-"bits" 0 where two results are the same to the last bit. A number may differ by machine and compiler in its last digits:
-what is compared with the sources is which tests measure, and what.
+Kinds: "count" is a number of inputs, "digits" a relative error, "bound" a number with an upper limit, "bits" 0 where two
+results are bitwise equal. The last digits depend on machine and compiler: the check against the sources compares which
+tests record which quantities, not the numbers.
 """
 
 import glob
@@ -21,14 +21,14 @@ RECORD = re.compile(r"\bRecord(?:Digits|Bound|SameBits)\(\s*(?:\"((?:[^\"\\]|\\.
 KEY = "measured: "
 
 
-def share(row):
-    """How near to what is allowed; of bits, whether any differs."""
+def fraction_of_limit(row):
+    """measured / allowed; of bits, whether any differs."""
     measured, allowed = float(row["measured"]), float(row["allowed"])
     return measured / allowed if allowed > 0 else measured
 
 
 def gather(paths):
-    """{test: rows} of reports, or of folders of reports; a report that is not whole is an error."""
+    """{test: rows} of reports, or of folders of reports; an incomplete report is an error."""
     found = {}
     for path in paths:
         for report in sorted(glob.glob(os.path.join(path, "*.xml"))) if os.path.isdir(path) else [path]:
@@ -40,13 +40,13 @@ def gather(paths):
                     row = {"what": what, "kind": kind, "where": f"{number} {place}", "measured": measured,
                            "allowed": allowed}
                     last = found.setdefault(test, {}).get(what)
-                    if last is None or share(row) > share(last):
+                    if last is None or fraction_of_limit(row) > fraction_of_limit(last):
                         found[test][what] = row
     return {test: [rows[what] for what in sorted(rows)] for test, rows in sorted(found.items())}
 
 
 def run(build, tests):
-    """Runs those of a build's test programs that have some of these tests, and gathers; a test that fails is an error."""
+    """Runs these tests in the test programs of a build and gathers; a failing test is an error."""
     with tempfile.TemporaryDirectory() as reports:
         for program in sorted(glob.glob(os.path.join(build, "tests", "*", "*_test"))):
             listed = subprocess.run([program, "--gtest_list_tests"], check=True, capture_output=True, text=True).stdout
@@ -61,7 +61,7 @@ def run(build, tests):
 
 
 def in_sources(root):
-    """({test: [beginning of what it measures]}, {tests that need a GPU}); helpers of tests have none of their own."""
+    """({test: [beginning of each quantity's name]}, {tests that need a GPU}); helper functions are not searched."""
     recorded, on_gpu = {}, set()
     for path in sorted(glob.glob(os.path.join(root, "tests", "**", "*_test.cc"), recursive=True)):
         with open(path, encoding="utf-8") as file:
@@ -77,22 +77,22 @@ def in_sources(root):
 
 
 def complaints(root, measured, tests):
-    """Where sources and measured.json disagree about what is measured."""
+    """Differences between the sources and measured.json in what is measured."""
     recorded, on_gpu = in_sources(root)
-    found = [f"{test} measures, and stands in no measured.json: see hard_cases.py --measured"
+    found = [f"{test} measures, but is not in measured.json: see hard_cases.py --measured"
              for test in recorded if test not in measured and test not in on_gpu]
-    found += [f"measured.json has {test}, which no test is called" for test in measured if test not in tests]
+    found += [f"measured.json has {test}, but there is no such test" for test in measured if test not in tests]
     for test in set(recorded) & set(measured):
         whats = [row["what"] for row in measured[test]]
         found += [f"{test} measures '{begin}', which measured.json does not have" for begin in recorded[test]
                   if not any(what.startswith(begin) for what in whats)]
-        found += [f"measured.json has '{what}' of {test}, which does not measure it" for what in whats
+        found += [f"measured.json has '{what}', which {test} does not measure" for what in whats
                   if not any(what.startswith(begin) for begin in recorded[test])]
     return sorted(found)
 
 
 def digits(row):
-    """Correct decimal digits; None where that is not what is measured."""
+    """Correct decimal digits; None for other kinds and for an error of 0."""
     measured = float(row["measured"])
     return -math.log10(measured) if row["kind"] == "digits" and measured > 0 else None
 
@@ -102,21 +102,21 @@ def number(text):
     return f"{value:.2g}" if value == 0 or 1e-2 <= abs(value) < 1e4 else f"{value:.1e}"
 
 
-def told(row):
-    """One row in words."""
+def describe(row):
+    """One row as text."""
     if row["kind"] == "count":
         return f"{row['what']}: {row['measured']}"
     if row["kind"] == "bits":
-        return f"{row['what']}: no bit differs ({row['where']})"
+        return f"{row['what']}: bitwise equal ({row['where']})"
     if row["kind"] == "digits":
-        asked = -math.log10(float(row["allowed"]))
+        required = -math.log10(float(row["allowed"]))
         right = "exact" if digits(row) is None else f"{digits(row):.1f} digits"
-        return f"{row['what']}: {right} ({asked:.1f} asked; {row['where']})"
+        return f"{row['what']}: {right} ({required:.1f} required; {row['where']})"
     return f"{row['what']}: {number(row['measured'])} ({number(row['allowed'])} allowed; {row['where']})"
 
 
 def summary(measured):
-    """How many numbers, and the fewest and mean digits of each precision; '' of nothing."""
+    """The count of numbers, and the least and mean digits of each precision; '' without numbers."""
     rows = [row for rows in measured.values() for row in rows]
     if not rows:
         return ""
@@ -124,9 +124,9 @@ def summary(measured):
     for where in ("double CPU", "float CPU", "float GPU"):
         of = [digits(row) for row in rows if row["where"] == where and digits(row) is not None]
         if of:
-            words.append(f"in {where.replace(' CPU', '').replace(' GPU', ' on the GPU')} {min(of):.1f} digits at least "
+            words.append(f"in {where.replace(' CPU', '').replace(' GPU', ' on the GPU')} at least {min(of):.1f} digits "
                          f"and {sum(of) / len(of):.1f} on average over {len(of)} errors")
     same = sum(row["kind"] == "bits" for row in rows)
     bounds = sum(row["kind"] == "bound" for row in rows)
     return (f"Tests measured {len(rows)} numbers: " + "; ".join(words) +
-            f"; {bounds} that stay below a bound; {same} results that agree to the last bit.")
+            f"; {bounds} below a bound; {same} pairs of bitwise equal results.")

@@ -1,12 +1,15 @@
 #!/usr/bin/env python3
-"""Prints the headline figures of a report.json: print_headline.py FILE"""
+"""Prints the main metrics of a run.
+
+  print_headline.py REPORT.json
+"""
 
 import json
 import sys
 
 
 def shown(holder, key, unit="dB"):
-    """The figure, or why there is none."""
+    """The metric, or the reason why it is missing."""
     value = (holder or {}).get(key)
     if value is None:
         return f"– ({(holder or {}).get(key + '_why', 'not measured')})"
@@ -14,6 +17,9 @@ def shown(holder, key, unit="dB"):
 
 
 def main():
+    if len(sys.argv) != 2 or sys.argv[1] == "--help":
+        print(__doc__)
+        return 0 if "--help" in sys.argv else 2
     with open(sys.argv[1], encoding="utf-8") as file:
         report = json.load(file)
     consistency = {(row["sequence"], row["gap"]): row for row in report["consistency"]}
@@ -24,7 +30,8 @@ def main():
     print(f"consistency, the styled scene         {shown(consistency.get(('styled', gap)), 'tc_psnr_mean_db')}")
     print(f"fidelity of the styled scene to 2D    {shown(fidelity.get('styled'), 'psnr_to_2d_db')}")
     print(f"time                                  {report['seconds']:.0f} s")
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -1,12 +1,16 @@
 #!/usr/bin/env bash
-# From a fresh checkout to a styled film.
-#   quickstart.sh                 makes a synthetic capture and styles it with a picture of ours
-#   quickstart.sh PHOTOS STYLE    styles a folder of photographs with a picture
-# Results are in regrade_out/ of the folder it is started in, those of the synthetic capture in regrade_demo/. The build is for the CPU; with REGRADE_CUDA=AUTO in the
-# environment it also builds for the GPU if nvcc is found, which takes minutes longer.
+# Installs packages, builds regrade and makes a styled film.
+#   quickstart.sh                 styles a synthetic capture with assets/style_sunset.png; results in ./regrade_demo/
+#   quickstart.sh PHOTOS STYLE    styles a folder of photographs with a picture; results in ./regrade_out/
+# Builds for the CPU; with REGRADE_CUDA=AUTO in the environment also for the GPU if nvcc is found, which takes minutes
+# longer. Exit status: that of the step that failed.
 set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+if [[ "${1:-}" == --help ]]; then
+  sed -n '2,6s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"
+  exit 0
+fi
 if [[ $# -ne 0 && $# -ne 2 ]]; then
   echo "usage: quickstart.sh [PHOTOS STYLE]" >&2
   exit 2

@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
-"""Temporal consistency of a film in numpy, from the definitions alone: a second opinion on `regrade evaluate`.
+"""Measures the temporal consistency of frames in numpy, as an independent check of `regrade evaluate`.
 
   reference_evaluator.py --frames DIR --flow DIR [--mode lai2018|ruder2016] [--gaps 1,5] [--as-published]
 
-DIR of --frames holds PNG or PPM files of 8 bits in natural order, DIR of --flow the files 00000_00001.flo (motion
-from frame 0 to frame 1) and 00001_00000.flo (back). Prints one JSON object. It shares no code with the program.
+The DIR of --frames has 8-bit PNG or PPM files in natural order, the DIR of --flow the files 00000_00001.flo (motion from
+frame 0 to frame 1) and 00001_00000.flo (backward). Prints one JSON object. Shares no code with the program.
 
-Three departures of the program from the published definitions are followed here, unless --as-published is given:
-pairs without a trusted pixel are undefined (Lai et al.: error 0); flow that is not finite is not trusted; in mode
-ruder2016 a pixel whose target leaves the frame stays at weight 0 after the smoothing.
+The program differs from the published definitions in three points, which are followed here unless --as-published is
+given: pairs without a trusted pixel are undefined (Lai et al.: error 0); non-finite flow is not trusted; in mode
+ruder2016 a pixel whose target is outside the frame keeps weight 0 after the smoothing. Exit status: 0.
 """
 
 import argparse
@@ -78,7 +78,7 @@ def read_frames(folder):
 
 
 def read_flow(folder, i, j):
-    """[height, width, 2], pixels; NaN where the file says that the motion is unknown."""
+    """[height, width, 2], pixels; NaN where the file marks the motion as unknown."""
     with open(os.path.join(folder, f"{i:05d}_{j:05d}.flo"), "rb") as file:
         mark, width, height = struct.unpack("<fii", file.read(12))
         flow = numpy.fromfile(file, "<f4").astype(float).reshape(height, width, 2)
@@ -90,7 +90,7 @@ def read_flow(folder, i, j):
 
 
 def targets(flow):
-    """Where each pixel of the first frame lies in the second: (x, y)."""
+    """The positions (x, y) of the first frame's pixels in the second frame."""
     height, width = flow.shape[:2]
     y, x = numpy.mgrid[0:height, 0:width]
     return x + flow[:, :, 0], y + flow[:, :, 1]
@@ -100,14 +100,14 @@ def bilinear(values, x, y):
     """values[y, x] between pixels, tap indices clamped to the border; NaN at positions that are NaN."""
     height, width = values.shape[:2]
     known = numpy.isfinite(x) & numpy.isfinite(y)
-    # An index far outside is the border's own; a bound keeps the conversion to integers defined.
+    # Indices are clamped to the border below; this bound keeps the conversion to integers defined.
     x, y = (numpy.clip(numpy.where(known, p, 0), -9, side + 9) for p, side in ((x, width), (y, height)))
     left, top = numpy.floor(x).astype(int), numpy.floor(y).astype(int)
     total = 0
     for row, column, weight in ((0, 0, (1 - (x - left)) * (1 - (y - top))), (0, 1, (x - left) * (1 - (y - top))),
                                 (1, 0, (1 - (x - left)) * (y - top)), (1, 1, (x - left) * (y - top))):
         tap = values[numpy.clip(top + row, 0, height - 1), numpy.clip(left + column, 0, width - 1)]
-        # A tap of weight 0 says nothing, not even NaN.
+        # A tap of weight 0 is ignored, even if it is NaN.
         total = total + numpy.where(weight[:, :, None] > 0, tap, 0) * weight[:, :, None]
     return numpy.where(known[:, :, None], total, numpy.nan)
 
@@ -164,8 +164,8 @@ MASKS = {"lai2018": mask_lai2018, "ruder2016": mask_ruder2016}
 
 
 def compare(earlier, later, forward, mask, as_published):
-    """(error, coverage): the mean squared error of a trusted pixel and channel, and how many there are."""
-    # The colour of a pixel without weight has no say, also where its target is unknown.
+    """(mean squared error over trusted pixels and channels, fraction of trusted pixels)"""
+    # Pixels of weight 0 are ignored, even if their target is unknown.
     warped = numpy.where(mask[:, :, None] > 0, bilinear(later, *targets(forward)), earlier)
     total = (mask[:, :, None] * (warped - earlier) ** 2).sum()
     if mask.sum() == 0:
@@ -192,11 +192,11 @@ def evaluate(frames, flow_folder, mode, gaps, as_published):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--frames", required=True)
-    parser.add_argument("--flow", required=True)
+    parser.add_argument("--frames", required=True, metavar="DIR", help="8-bit PNG or PPM files")
+    parser.add_argument("--flow", required=True, metavar="DIR", help="files 00000_00001.flo and 00001_00000.flo")
     parser.add_argument("--mode", choices=sorted(MASKS), default="lai2018")
-    parser.add_argument("--gaps", default="1,5")
-    parser.add_argument("--as-published", action="store_true")
+    parser.add_argument("--gaps", default="1,5", help="distances between compared frames (1,5)")
+    parser.add_argument("--as-published", action="store_true", help="without the three differences above")
     options = parser.parse_args()
     gaps = [int(gap) for gap in options.gaps.split(",")]
     pairs = evaluate(read_frames(options.frames), options.flow, options.mode, gaps, options.as_published)

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""WCT2 and CCPL in PyTorch, in double and from their papers: what scripts/convert_networks.py --check compares with.
+"""WCT2 and CCPL in PyTorch in double, written from the papers: the reference of convert_networks.py --check.
 
-Not run by itself: `convert_networks.py --help` says how. It shares nothing with the conversion but the weights.
+Not a program: see `convert_networks.py --help`. It shares no code with the conversion.
 """
 
 import os
@@ -22,12 +22,12 @@ WAVE_NAMES = ("conv0", "conv1_1", "conv1_2", "conv2_1", "conv2_2", "conv3_1", "c
 DECODER = [(1, 512, 256, 3), (5, 256, 256, 3), (8, 256, 256, 3), (11, 256, 256, 3), (14, 256, 128, 3),
            (18, 128, 128, 3), (21, 128, 64, 3), (25, 64, 64, 3), (28, 64, 3, 3)]
 
-# Of the four pixels of a block in a Haar wavelet's low, LH, HL and HH part.
+# Signs of a block's four pixels in a Haar wavelet's low, LH, HL and HH part.
 SIGNS = ((1, 1, 1, 1), (-1, 1, -1, 1), (-1, -1, 1, 1), (1, -1, -1, 1))
 
 
 def layers_of(version):
-    """By file."""
+    """{file: layers} of a version."""
     if version in ("cat5", "sum"):
         many, two = (5, "_2") if version == "cat5" else (1, "")
         encoder = [(name, *layer[1:]) for name, layer in zip(WAVE_NAMES, VGG)]
@@ -47,7 +47,7 @@ def layers_of(version):
 
 
 def write_random(seed, version, paths):
-    """Weights that keep the size of what they pass, features of some tens, and pictures of a middle grey."""
+    """Writes weights that preserve magnitudes: features of some tens, pictures around middle grey."""
     random = torch.Generator().manual_seed(seed)
     for file, layers in layers_of(version).items():
         tensors = {}
@@ -61,12 +61,12 @@ def write_random(seed, version, paths):
                 factor = 0.2
             tensors[f"{name}.weight"] = torch.randn(outputs, inputs, side, side, generator=random) * spread * factor
             tensors[f"{name}.bias"] = torch.randn(outputs, generator=random) * 0.05 + (0.5 if last else 0)
-        if version in ("cat5", "sum"):  # the fixed wavelets are in the published files, too
+        if version in ("cat5", "sum"):  # the published files contain the fixed wavelets
             for level, count in enumerate((64, 128, 256), 1):
                 name = f"pool{level}" if file == "encoder" else f"recon_block{level}"
                 for part, signs in zip(("LL", "LH", "HL", "HH"), SIGNS):
                     tensors[f"{name}.{part}.weight"] = torch.tensor(signs).reshape(2, 2).repeat(count, 1, 1, 1) / 2
-        # In the older of torch's two formats, for WCT2's files are older than torch 1.6.
+        # In torch's older format, as WCT2's files, which are older than torch 1.6.
         torch.save(tensors, paths[file], _use_new_zipfile_serialization=False)
 
 
@@ -87,13 +87,13 @@ class Layers:
 
 
 def haar(x):
-    """The four halves of a picture by sums and differences of its 2 x 2 blocks."""
+    """The four half-size bands of a picture: sums and differences of its 2 x 2 blocks."""
     a, b, c, d = x[..., ::2, ::2], x[..., ::2, 1::2], x[..., 1::2, ::2], x[..., 1::2, 1::2]
     return (a + b + c + d) / 2, (b - a + d - c) / 2, (c - a + d - b) / 2, (a - b - c + d) / 2
 
 
-def spread_out(part, signs):
-    """What one of the four contributes to the picture: its value at each of the block's pixels, with a sign."""
+def inverse_haar(part, signs):
+    """The contribution of one band to the picture: its value at each pixel of the block, with a sign."""
     whole = part.new_zeros(*part.shape[:2], 2 * part.shape[2], 2 * part.shape[3])
     for i, sign in enumerate(signs):
         whole[..., i // 2::2, i % 2::2] = sign * part / 2
@@ -130,7 +130,7 @@ def wct2(states, photo, style, transform):
 
         def unpool(x, level):
             bands, whole = over[level]
-            parts = [spread_out(part, signs) for part, signs in zip([x, *bands], SIGNS)]
+            parts = [inverse_haar(part, signs) for part, signs in zip([x, *bands], SIGNS)]
             return torch.cat([*parts, whole], 1) if cat5 else sum(parts)
         x = encode(encode(x, "conv0", pad=False, relu=False), "conv1_1")
         if cat5:
@@ -202,9 +202,9 @@ def picture(height, width, tint, seed):
     """Soft waves, an edge and grain, in [0, 1]: [1, 3, height, width]."""
     y, x = numpy.mgrid[:height, :width]
     grain = numpy.random.default_rng(seed).random((3, height, width)) - 0.5
-    planes = [t * (0.5 + 0.25 * numpy.sin(0.11 * x + c) + 0.2 * numpy.cos(0.07 * y - c) + 0.15 * (x + y > width))
+    channels = [t * (0.5 + 0.25 * numpy.sin(0.11 * x + c) + 0.2 * numpy.cos(0.07 * y - c) + 0.15 * (x + y > width))
               for c, t in enumerate(tint)]
-    return torch.from_numpy(numpy.clip(numpy.array(planes) + 0.06 * grain, 0, 1).astype("float32"))[None]
+    return torch.from_numpy(numpy.clip(numpy.array(channels) + 0.06 * grain, 0, 1).astype("float32"))[None]
 
 
 def write_picture(path, values):
@@ -221,7 +221,7 @@ def read_picture(path):
 
 
 def check(method, states, folder, program):
-    """0 if the program's pictures are this file's to 1e-4 of white."""
+    """Returns 0 if the program's pictures agree with this implementation to 1e-4 of white, otherwise 1."""
     forward = {"wct2": wct2, "ccpl": ccpl}[method]
     style = picture(64, 96, (1.0, 0.6, 0.35), 2)
     worst = 0.0

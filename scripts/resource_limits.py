@@ -1,18 +1,19 @@
 #!/usr/bin/env python3
-"""Runs with too little of something, and two at once: each must end with the right exit status, and go on afterwards.
+"""Runs regrade with too little disk, memory or open files, and two runs at once; checks exit status and recovery.
 
-  resource_limits.py REGRADE [--pairs 100] [--sizes 6]        needs colmap; root for the full disks (others skip them, and say so)
+  resource_limits.py REGRADE [--pairs 100] [--sizes 6]        needs colmap; root for the full disks, which are skipped otherwise
 
-  full disks     each stage, COLMAP's included, on small file systems of several sizes: exit status 5 that names the
-                 disk, or 0 where it was enough; with room the same command finishes with the undisturbed run's results
+  full disks     each stage, COLMAP's included, on small file systems of several sizes: exit status 5 and a message that
+                 names the disk, or 0 if the size was enough; with enough space the same command finishes with the
+                 results of an unlimited run
   read-only      exit status 5 before any work
-  ulimit -f      files of limited size: 5, and the same command finishes without the limit
+  ulimit -f      limited file size: 5, and the same command finishes without the limit
   ulimit -n      few open files: 0 or 5
-  ulimit -v      little address space, but enough for the program's libraries to load: 0 or 5, and the same command
-                 finishes without the limit
+  ulimit -v      little address space, but enough for the program to start: 0 or 5, and the same command finishes
+                 without the limit
   two at once    pairs started together on one folder: one does the work, the other exits with 7
 
-Exit status 1 for any finding.
+Exit status: 0, or 1 if there is a finding.
 """
 
 import argparse
@@ -27,7 +28,7 @@ from small_run import SMALL, STAGES, STYLE, call, different, make_capture, resul
 
 
 def size_of(folder):
-    """Bytes as a file system in memory counts them: whole pages, folders too."""
+    """Bytes as a tmpfs counts them: in whole pages, folders included."""
     total = 0
     for place, folders, names in os.walk(folder):
         total += 4096 * len(folders)
@@ -48,7 +49,7 @@ class Trials:
         return [self.regrade, "run", self.posed_capture, "--style", STYLE, "--out", self.work, *SMALL]
 
     def pose(self):
-        """From photos, by COLMAP."""
+        """The command that estimates poses from photos with COLMAP."""
         return [self.regrade, "pose", os.path.join(self.capture, "images"), "--out", self.work, "--photo-size", "256"]
 
     def expect(self, what, outcome, allowed, words=()):
@@ -60,27 +61,27 @@ class Trials:
             print(f"FINDING: {what}: exit status {status}, not {allowed}: {text[-300:]}", flush=True)
         elif status == 5 and words and not any(word in text for word in words):
             self.findings += 1
-            print(f"FINDING: {what}: the message names neither of {words}: {text[-300:]}", flush=True)
+            print(f"FINDING: {what}: the message has none of {words}: {text[-300:]}", flush=True)
 
     def finishes(self, what, command, expected):
-        """Without the limit, the same command comes to its end, with the results that it should have."""
-        self.expect(what + ", then without", call(command), (0,))
+        """Without the limit, the same command finishes with the expected results."""
+        self.expect(what + ", then without the limit", call(command), (0,))
         changed = different(results(self.work), expected) if expected else []
         if changed:
             self.findings += 1
             print(f"FINDING: {what}: afterwards {len(changed)} results differ: {changed[:4]}", flush=True)
 
-    def undisturbed(self):
-        """Runs once, and keeps the folder as it is before each stage."""
+    def run_baseline(self):
+        """Runs once without limits, and keeps a copy of the folder before each stage."""
         for name, command in (("reconstruct", "pose"), ("style_2d", "reconstruct")):
             status, words = call([self.regrade, command, self.posed_capture, "--out", self.work, *SMALL])
             if status != 0:
-                sys.exit(f"the undisturbed {command} failed: {words}")
+                sys.exit(f"{command} failed without limits: {words}")
             self.begins[name] = shutil.copytree(self.work, os.path.join(self.scratch, name))
         if call(self.command())[0] != 0:
-            sys.exit("the undisturbed run failed")
+            sys.exit("the baseline run failed")
         self.expected = results(self.work)
-        # Before a later stage: the finished folder without the records, and without what it makes.
+        # Before a later stage: the finished folder without the records and outputs of this stage and later ones.
         makes = {"stylize": ("styled.npz", "network.npz"), "render": ("frames", "styled.mp4", "source_vs_styled.mp4"),
                  "evaluate": (), "report": ("report.html", "report.json")}
         for number, name in enumerate(STAGES):
@@ -93,7 +94,7 @@ class Trials:
                     shutil.rmtree(path) if os.path.isdir(path) else os.path.exists(path) and os.remove(path)
         self.finished = size_of(self.work)
 
-    def fresh(self, begin):
+    def reset(self, begin):
         shutil.rmtree(self.work, ignore_errors=True)
         if begin:
             shutil.copytree(self.begins[begin], self.work)
@@ -131,10 +132,10 @@ class Trials:
                 self.on_disk_of(name, name, begin + room * (2 * i + 1) // (2 * sizes), self.command(), self.expected)
         if short:
             return
-        self.fresh("")
+        self.reset("")
         status, words = call(self.pose())
         if status != 0:
-            sys.exit("poses from photos failed undisturbed: " + words)
+            sys.exit("poses from photos failed without limits: " + words)
         whole = size_of(self.work)
         for i in range(sizes):
             self.on_disk_of("pose", "", whole * (2 * i + 1) // (2 * sizes), self.pose(), None)
@@ -150,7 +151,7 @@ class Trials:
     # --- limits
 
     def limited(self, what, begin, limit, value, allowed):
-        self.fresh(begin)
+        self.reset(begin)
         self.expect(f"{what} {value}", call(self.command(), preexec_fn=lambda: resource.setrlimit(limit, (value, value))),
                     allowed)
         self.finishes(f"{what} {value}", self.command(), self.expected)
@@ -166,7 +167,7 @@ class Trials:
             self.limited("bytes of address space, at most", begin, resource.RLIMIT_AS, least + (more << 20), (0, 5))
 
     def least_memory(self):
-        """Address space in which the program's libraries load at all."""
+        """The least address space in which the program starts."""
         for value in range(100 << 20, 4 << 30, 10 << 20):
             if call([self.regrade, "--version"],
                     preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (value, value)))[0] == 0:
@@ -183,31 +184,31 @@ class Trials:
             shutil.rmtree(self.work, ignore_errors=True)
             runs = [subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
                                      stderr=subprocess.PIPE, text=True) for _ in range(2)]
-            said = [run.communicate(timeout=120)[1] for run in runs]
+            messages = [run.communicate(timeout=120)[1] for run in runs]
             status = sorted(run.returncode for run in runs)
             self.trials += 1
-            # Started a moment late, the second finds everything done.
-            late = status == [0, 0] and any("done before" in words for words in said)
+            # If the second starts late, it finds the work finished.
+            late = status == [0, 0] and any("done before" in words for words in messages)
             both += late
             if status != [0, 7] and not late:
                 self.findings += 1
-                print(f"FINDING: two at once, pair {number}: exit status {status}: {said}", flush=True)
-        print(f"two at once: {count} pairs, in {both} of them the second came when all was done", flush=True)
+                print(f"FINDING: two at once, pair {number}: exit status {status}: {messages}", flush=True)
+        print(f"two at once: {count} pairs, in {both} of them the second started after the first had finished", flush=True)
         if count >= 5 and both == count:
             self.findings += 1
-            print("FINDING: no pair met")
+            print("FINDING: no two runs overlapped")
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("regrade")
-    parser.add_argument("--pairs", type=int, default=100, metavar="N", help="of runs on one folder (100)")
-    parser.add_argument("--sizes", type=int, default=6, metavar="N", help="of disks, for each stage (6)")
+    parser.add_argument("--pairs", type=int, default=100, metavar="N", help="pairs of runs on one folder (100)")
+    parser.add_argument("--sizes", type=int, default=6, metavar="N", help="disk sizes for each stage (6)")
     parser.add_argument("--short", action="store_true", help="one limit of each kind, and disks for two stages")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
         trials = Trials(os.path.abspath(options.regrade), scratch)
-        trials.undisturbed()
+        trials.run_baseline()
         trials.pairs(options.pairs)
         trials.limits(options.short)
         if os.geteuid() == 0:
@@ -223,7 +224,7 @@ def main():
             trials.read_only()
             trials.full_disks(options.sizes, options.short)
         else:
-            print("SKIPPED: full disks and read-only folders, which need root that may mount", flush=True)
+            print("SKIPPED: full disks and read-only folders, which need root with permission to mount", flush=True)
         print(f"{trials.trials} trials, {trials.ended} ended by their limit, {trials.findings} findings")
         return 1 if trials.findings else 0
 

@@ -1,9 +1,12 @@
 #!/usr/bin/env python3
-"""How far two runs of the same command lie apart: in the fast mode, and with --reproducible, where nothing may differ.
+"""Measures how much two runs of the same command differ, in fast mode and with --reproducible.
+
+  run_to_run.py REGRADE [--runs 3]
 
 Makes a small synthetic capture (true poses, no COLMAP), runs it several times on the CPU in each mode, with the same
 number of threads and with another, and compares fields, networks and frames with the first run of the mode. Prints a
-table; exit status 1 if a reproducible run differs by a byte. Takes a minute or two.
+table of the number of results that differ and the largest differences of fields and decibels. Takes a minute or two.
+Exit status: 0, or 1 if a reproducible run differs by a byte.
 """
 
 import argparse
@@ -18,7 +21,7 @@ from small_run import SMALL, STYLE, call, different, make_capture, results
 
 
 def arrays(path):
-    """name -> numbers of each array of floats in an .npz file."""
+    """name -> values of each float array in an .npz file."""
     found = {}
     with zipfile.ZipFile(path) as archive:
         for name in archive.namelist():
@@ -31,8 +34,8 @@ def arrays(path):
     return found
 
 
-def apart(one, other):
-    """Largest difference of fields and networks, over the root mean square of the array; of sizes that differ, inf."""
+def largest_difference(one, other):
+    """Largest difference of fields and networks, relative to the RMS of the array; inf if sizes differ."""
     largest = 0.0
     for name in ("field.npz", "styled.npz", "network.npz"):
         before, after = arrays(os.path.join(one, name)), arrays(os.path.join(other, name))
@@ -46,28 +49,28 @@ def apart(one, other):
     return largest
 
 
-def figures(found):
-    """Of a run's results the decibels of its report."""
+def decibels_of(found):
+    """The decibel values among the results of a run."""
     return {name: value for name, value in found.items() if name.endswith("_db") and isinstance(value, float)}
 
 
 def run_all(regrade, capture, scratch, runs, mode):
-    """[(threads, files and figures that differ, how far fields are apart, largest difference of decibels)]"""
+    """[(threads, number of different results, number of results, difference of fields, largest difference in dB)]"""
     rows, first = [], None
     options = [word for word in SMALL if word != "--reproducible"] + (["--reproducible"] if mode == "reproducible" else [])
     for index, threads in enumerate([1] + [2] * runs):
         out = os.path.join(scratch, f"{mode}{index}")
-        status, said = call([regrade, "run", capture, "--style", STYLE, "--out", out, "--threads", str(threads),
+        status, message = call([regrade, "run", capture, "--style", STYLE, "--out", out, "--threads", str(threads),
                              "--device", "cpu", *options])
         if status != 0:
-            sys.exit(said)
+            sys.exit(message)
         now = results(out)
         if first is None:
             first = (out, now)
             continue
-        before, after = figures(first[1]), figures(now)
+        before, after = decibels_of(first[1]), decibels_of(now)
         decibels = max((abs(before[name] - after[name]) for name in before if name in after), default=0.0)
-        rows.append((threads, len(different(now, first[1])), len(now), apart(first[0], out), decibels))
+        rows.append((threads, len(different(now, first[1])), len(now), largest_difference(first[0], out), decibels))
         if threads == 2 and index == 1:
             first = (out, now)
     return rows
@@ -79,7 +82,7 @@ def main():
     parser.add_argument("--runs", type=int, default=3, metavar="N", help="runs with two threads in each mode (3)")
     arguments = parser.parse_args()
     wrong = 0
-    print(f"{'mode':14} {'compared':34} {'differ':>12} {'fields apart':>13} {'decibels apart':>15}")
+    print(f"{'mode':14} {'compared':34} {'differ':>12} {'fields':>13} {'decibels':>15}")
     with tempfile.TemporaryDirectory() as scratch:
         capture = make_capture(os.path.abspath(arguments.regrade), os.path.join(scratch, "capture"))
         for mode in ("fast", "reproducible"):

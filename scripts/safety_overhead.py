@@ -1,19 +1,21 @@
 #!/usr/bin/env python3
-"""What care costs a run: writing so that nothing is torn, checksums, checks of what is read, staged photos, fixed sums.
+"""Measures the overhead of durable writes, checksums, validation of inputs, staged photos and reproducible sums.
 
   safety_overhead.py REGRADE --library LIBRARY --tool TOOL [--views 24] [--size 640x480] [--preset draft]
-                             [-- OPTION...]
+                             [-- OPTIONS OF run]
 
-LIBRARY is libtimed_writes.so and TOOL validation_tool, both of the tests' build. A synthetic capture is run; then
+LIBRARY is libtimed_writes.so and TOOL validation_tool, both built with the tests. A synthetic capture is run; then the
+overheads are printed as percentages of the run's wall or CPU seconds:
 
-  durable writes   wall seconds inside of fsync and rename, timed by the preloaded library
-  checksums        CPU seconds of the same command again, which looks at every file of the run once, less those of
-                   `regrade --version`; a run itself computes each checksum once, when its stage ends
-  checks           of a field that is read (links, values, sizes), times the stages that read one, and of COLMAP's model
-  staging          CPU seconds of `regrade pose` from photos with poses: each is decoded, judged and written again
-  fixed sums       CPU seconds of the fit and the rest with --reproducible, against without
+  durable writes   wall seconds in fsync and rename, timed by the preloaded library
+  checksums        CPU seconds of the same command again, which reads every file of the run once, less those of
+                   `regrade --version`; a run computes each checksum once, when its stage ends
+  checks           validation of a field that is read (links, values, sizes), times the stages that read one, and
+                   reading COLMAP's model
+  staging          CPU seconds of `regrade pose` from photos with poses: each is decoded, checked and written again
+  fixed sums       CPU seconds of the run with --reproducible, less those without
 
-as shares of the run's wall or CPU seconds. Wall seconds mean something on a quiet machine only. OPTIONs go to the runs.
+Wall seconds are meaningful only on an otherwise idle machine. Exit status: 0, or 1 if a command failed.
 """
 
 import argparse
@@ -40,7 +42,7 @@ def measured(command, environment=None):
     return wall, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
-def row(name, what, seconds, of, whole):
+def print_row(name, what, seconds, of, whole):
     print(f"{name:16} {seconds:10.3f} s {100 * seconds / whole:8.2f} % of {of} {whole:.1f} s   {what}", flush=True)
 
 
@@ -72,19 +74,19 @@ def main():
                 name, count, spent = line.split()
                 calls[name] = calls.get(name, 0) + int(count)
                 seconds[name] = seconds.get(name, 0) + float(spent)
-        row("durable writes", f"{calls['fsync']} fsync, {calls['rename']} rename", sum(seconds.values()), "wall", wall)
+        print_row("durable writes", f"{calls['fsync']} fsync, {calls['rename']} rename", sum(seconds.values()), "wall", wall)
         again, start = measured(run("plain"))[1], measured([regrade, "--version"])[1]
-        row("checksums", "every file of the run once", max(0, again - start), "CPU", cpu)
-        figures = dict(line.split() for line in subprocess.run(
+        print_row("checksums", "every file of the run once", max(0, again - start), "CPU", cpu)
+        timings = dict(line.split() for line in subprocess.run(
             [options.tool, os.path.join(scratch, "plain/field.npz"), os.path.join(scratch, "plain/poses/sparse")],
             check=True, stdout=subprocess.PIPE, text=True).stdout.splitlines())
-        row("checks", f"{figures['checks']} s a field; COLMAP's model read in {figures['model']} s",
-            FIELD_READS * float(figures["checks"]) + float(figures["model"]), "CPU", cpu)
+        print_row("checks", f"{timings['checks']} s a field; COLMAP's model read in {timings['model']} s",
+                  FIELD_READS * float(timings["checks"]) + float(timings["model"]), "CPU", cpu)
         pose = measured([regrade, "pose", os.path.join(capture, "truth"), "--tracks", "given",
                          "--out", os.path.join(scratch, "posed")])[1]
-        row("staging", f"{options.views} photos", max(0, pose - start), "CPU", cpu)
+        print_row("staging", f"{options.views} photos", max(0, pose - start), "CPU", cpu)
         fixed = measured(run("fixed", "--reproducible"))[1]
-        row("fixed sums", "--reproducible, against without", fixed - cpu, "CPU", cpu)
+        print_row("fixed sums", "--reproducible, against without", fixed - cpu, "CPU", cpu)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""The small run that scripts disturb: a synthetic capture, options that make it take seconds, and what it leaves."""
+"""A synthetic capture and options for a run of seconds, and a comparison of its results; a module of other scripts."""
 
 import hashlib
 import json
@@ -10,25 +10,26 @@ SMALL = ["--photo-size", "96", "--fit-resolutions", "24,32", "--fit-steps", "60,
          "--holdout", "0", "--tracks", "given"]
 STAGES = ("pose", "reconstruct", "style_2d", "stylize", "render", "evaluate", "report")
 STYLE = os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "assets", "style_sunset.png")
-TIMES = {"seconds", "cpu_seconds", "frames_per_second", "peak_memory_mb"}  # of the report, and what else does not repeat
+# Keys of the report that differ from run to run.
+TIMES = {"seconds", "cpu_seconds", "trial_seconds", "trial_cpu_seconds", "frames_per_second", "peak_memory_mb"}
 
 
 def make_capture(regrade, folder, effects=""):
-    """Eight photos in FOLDER/images, with effects of `regrade synth`; the folder that also has their true poses, so that no COLMAP is needed."""
+    """Makes eight photos in FOLDER/images; returns the folder that also has their true poses, which needs no COLMAP."""
     subprocess.run([regrade, "synth", folder, "--scene", "table", "--views", "8", "--size", "256x192", "--effects", effects], check=True,
                    stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     return os.path.join(folder, "truth")
 
 
 def call(command, **more):
-    """(exit status, what was said)"""
+    """(exit status, standard error)"""
     done = subprocess.run(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
                           text=True, errors="replace", timeout=600, **more)
     return done.returncode, done.stderr.strip()
 
 
 def leaves(value, name=""):
-    """path -> value of each figure that is no time."""
+    """path -> value of each number and text of a report except times."""
     if not isinstance(value, (dict, list)):
         return {name: value}
     found = {}
@@ -39,7 +40,7 @@ def leaves(value, name=""):
 
 
 def results(folder):
-    """name -> digest of every field, network and frame, and each figure of the report."""
+    """name -> digest of every field, network and frame, and each value of the report except times."""
     found = {}
     for place, _, names in os.walk(folder):
         relative = os.path.relpath(place, folder)

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The whole test: a build with warnings as errors, every test, then kernels and readers once more under the address and
-# undefined-behaviour sanitizers. Asks nothing; exit status 0 means that all is well.
+# Runs all tests: a build with warnings as errors, every test, then kernels and readers again under the address and
+# undefined-behaviour sanitizers. Not interactive. Exit status: 0 if everything passed.
 set -euo pipefail
 exec </dev/null
 
@@ -8,7 +8,7 @@ root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 cd "$root"
 jobs=$(nproc)
 
-# Test programs that meet hostile bytes or do pointer arithmetic.
+# Test programs that read hostile input or do pointer arithmetic.
 sanitized=(
   child_process_test kernels_bits_test kernels_color_test kernels_field_test kernels_network_test resize_test
   colmap_model_test pipeline_files_test pipeline_report_test readers_replay_test
@@ -30,5 +30,5 @@ cmake --build --preset sanitize --parallel "$jobs" --target "${sanitized[@]}"
 echo "== tests under sanitizers"
 export ASAN_OPTIONS=allocator_may_return_null=1 UBSAN_OPTIONS=print_stacktrace=1
 export LSAN_OPTIONS=suppressions=$root/tests/support/leaks.supp,print_suppressions=0
-# Programs that were not built here announce themselves as NAME_NOT_BUILT; the checks of the tree have run above.
+# CTest lists programs that were not built as NAME_NOT_BUILT; the checks of the tree have run above.
 ctest --test-dir build/sanitize --output-on-failure --no-tests=error -j2 -E '_NOT_BUILT$|^check_|^(write_report_page|look_at_report)$'

@@ -1,4 +1,4 @@
-"""A started regrade whose events are read as they come, and which can be killed at any of them."""
+"""Runs regrade, follows its events and can kill it at any of them; a module of crash_recovery.py."""
 
 import json
 import os
@@ -7,20 +7,20 @@ import subprocess
 import threading
 
 
-def listen_to_signals():
-    """A supervisor in the background would hand the signals that it ignores down."""
+def reset_signals():
+    """A background process ignores SIGINT, and children would inherit that."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_DFL)
 
 
 class Run:
-    """A started regrade whose events are read as they come."""
+    """A started regrade whose events a thread reads."""
 
     def __init__(self, command, group=True):
-        self.group, self.open, self.ended, self.began, self.done_before = group, None, [], [], []
+        self.group, self.stage, self.ended, self.began, self.finished_before = group, None, [], [], []
         self.changed = threading.Condition()
         self.child = subprocess.Popen(command + ["--json"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
-                                      stdin=subprocess.DEVNULL, start_new_session=True, preexec_fn=listen_to_signals)
+                                      stdin=subprocess.DEVNULL, start_new_session=True, preexec_fn=reset_signals)
         self.reader = threading.Thread(target=self.read, daemon=True)
         self.reader.start()
 
@@ -32,17 +32,15 @@ class Run:
                 continue
             with self.changed:
                 if event.get("event") == "stage_begin":
-                    self.open = event["stage"]
-                    self.began.append(self.open)
+                    self.stage = event["stage"]
+                    self.began.append(self.stage)
                 elif event.get("event") == "stage_end":
                     self.ended.append(event["stage"])
-                    self.open = None
-                elif event.get("event") == "info" and event["text"].endswith(": done before"):
-                    self.done_before.append(event["text"].split(":")[0])
+                    self.stage = None
                 self.changed.notify_all()
 
     def wait_for(self, stage):
-        """True once `stage` has begun; False if the run ended without."""
+        """True once `stage` has begun; False if the run ended before."""
         while self.child.poll() is None:
             with self.changed:
                 if stage in self.began:
@@ -56,7 +54,7 @@ class Run:
         return status
 
     def kill(self, number):
-        """Exit status; None if the program did not go within 60 s."""
+        """Returns the exit status; None if the program did not end within 60 s."""
         try:
             if self.group and number == signal.SIGKILL:
                 os.killpg(self.child.pid, number)
@@ -68,5 +66,5 @@ class Run:
         except subprocess.TimeoutExpired:
             os.killpg(self.child.pid, signal.SIGKILL)
             return None
-        self.reader.join(timeout=5)  # COLMAP, left behind, may hold the pipe
+        self.reader.join(timeout=5)  # COLMAP may still hold the pipe
         return status

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Lets each write of a run fail once, and requires a clear end, a folder that is whole, and the same result afterwards.
+"""Lets single writes of a run fail, and checks the exit status, the message and the results of a second start.
 
   write_fault_injection.py REGRADE LIBRARY [--runs 24] [--kinds ENOSPC,EIO,SHORT]     LIBRARY: libfailing_writes.so
 
-A small synthetic capture is run once undisturbed in reproducible mode. Then, beginning behind the poses and behind
-the reconstruction, a copy is run with its k-th write failing, for `--runs` values of k over all of them (0: every k).
-A failed write must end the run with exit status 5 and a message that names a file (a short one must change nothing);
-the same command again must finish, with the undisturbed run's fields and frames byte for byte. Exit status 1 otherwise.
+A small synthetic capture is run once without failures in reproducible mode (the baseline). Then, after the poses and
+after the reconstruction, a copy is run with its k-th write failing, for `--runs` values of k (0: every k). A failed
+write must end the run with exit status 5 and a message that names a file (a short write must change nothing); the same
+command must then finish with the baseline's fields and frames byte for byte. Exit status: 0, or 1 if there is a finding.
 """
 
 import argparse
@@ -31,9 +31,9 @@ def call(command, failing=None):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("regrade")
-    parser.add_argument("library")
-    parser.add_argument("--runs", type=int, default=24)
-    parser.add_argument("--kinds", default="ENOSPC,EIO,SHORT")
+    parser.add_argument("library", help="libfailing_writes.so")
+    parser.add_argument("--runs", type=int, default=24, metavar="N", help="failing writes in each part; 0 is all (24)")
+    parser.add_argument("--kinds", default="ENOSPC,EIO,SHORT", help="kinds of failure, in turn (ENOSPC,EIO,SHORT)")
     options = parser.parse_args()
     regrade, library = os.path.abspath(options.regrade), os.path.abspath(options.library)
     failures = tried = ended = 0
@@ -45,17 +45,17 @@ def main():
         for name, command in (("poses", "pose"), ("reconstruction", "reconstruct")):
             status, words = call([regrade, command, capture, "--out", work] + FLAGS)
             if status != 0:
-                sys.exit(f"{command} of the undisturbed run: exit status {status}: {words}")
+                sys.exit(f"{command} of the baseline run: exit status {status}: {words}")
             begins[name] = shutil.copytree(work, os.path.join(scratch, name))
         if call(run)[0] != 0:
-            sys.exit("the undisturbed run failed")
+            sys.exit("the baseline run failed")
         expected = results(work)
         for name, begin in begins.items():
-            def fresh():
+            def reset():
                 shutil.rmtree(work)
                 shutil.copytree(begin, work)
 
-            fresh()
+            reset()
             count_file = os.path.join(scratch, "count")
             base = {"LD_PRELOAD": library, "FAILING_WRITES_UNDER": work, "FAILING_WRITES_COUNT": count_file}
             call(run, base)
@@ -63,21 +63,21 @@ def main():
                 count = int(file.read())
             wanted = count if options.runs == 0 else min(options.runs, count)
             kinds = options.kinds.split(",")
-            print(f"behind the {name}: {count} operations that write, {wanted} of them fail in turn", flush=True)
+            print(f"after the {name}: {count} write operations, {wanted} of them fail in turn", flush=True)
             for i in range(wanted):
                 k, kind = 1 + i * count // wanted, kinds[i % len(kinds)]
-                fresh()
+                reset()
                 status, words = call(run, dict(base, FAILING_WRITES_AT=str(k), FAILING_WRITES_KIND=kind))
                 problem = None
                 last = words.splitlines()[-1] if words else ""
                 if status not in ((0,) if kind == "SHORT" else (0, 5)):
                     problem = f"exit status {status}: {last}"
                 elif status == 5 and scratch not in words and "/" not in last:
-                    problem = f"no file is named: {last}"
+                    problem = f"the message names no file: {last}"
                 else:
                     again, words = call(run)
                     if again != 0:
-                        problem = f"the same command again: exit status {again}: {words[-200:]}"
+                        problem = f"second start: exit status {again}: {words[-200:]}"
                     elif different(results(work), expected):
                         problem = f"differs: {different(results(work), expected)[:5]}"
                 tried += 1
@@ -85,7 +85,7 @@ def main():
                 if problem:
                     failures += 1
                     print(f"  {kind} at {k} of {count}: {problem}", flush=True)
-    print(f"{tried} runs, {ended} of them ended by the failed write, {failures} findings")
+    print(f"{tried} runs, {ended} of them ended because of the failed write, {failures} findings")
     if ended == 0 and set(options.kinds.split(",")) != {"SHORT"}:
         print("no write failed: is the library preloaded?")
         failures += 1

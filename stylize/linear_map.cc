@@ -1,6 +1,7 @@
 #include "stylize/linear_map.h"
 
 #include <Eigen/Dense>
+#include <algorithm>
 
 #include "kernels/base/error.h"
 
@@ -21,6 +22,12 @@ Appearance ApplyColorMap(const Appearance& appearance, const ColorMap& map) {
     MapCoefficients(map, 1, color, color);
   }
   return result;
+}
+
+Vec3f MapBackground(const ColorMap& map, const Vec3f& background) {
+  Vec3d mapped = map(background.Cast<double>());
+  for (int c = 0; c < 3; ++c) mapped[c] = std::clamp(mapped[c], 0.0, 1.0);
+  return mapped.Cast<float>();
 }
 
 double SpectralNorm(const Mat3d& m) {

@@ -36,6 +36,9 @@ void MapCoefficients(const ColorMap& map, int basis, const T* sh, T* mapped) {
 // is no coefficient: it stays, as in the paper.
 Appearance ApplyColorMap(const Appearance& appearance, const ColorMap& map);
 
+// That constant colour mapped all the same, and clipped as pictures are.
+Vec3f MapBackground(const ColorMap& map, const Vec3f& background);
+
 // Largest singular value, ||m||_2.
 double SpectralNorm(const Mat3d& m);
 

@@ -1,4 +1,4 @@
-// Owner of a block of memory, aligned to a cache line so that vector loads never split one.
+// An owner of memory aligned to a cache line, so that vector loads never straddle two lines.
 #pragma once
 
 #include <cstdint>

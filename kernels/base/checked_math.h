@@ -1,4 +1,4 @@
-// Sizes from files are hostile: products and sums that refuse to wrap around.
+// Products and sums of sizes read from files: an overflow gives no value instead of wrapping.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// Errors for people (Error, with an exit code and a remedy) and checks for our own mistakes
+// User-facing errors (Error, with an exit code and a remedy) and checks of internal invariants
 // (CHECK).
 #pragma once
 
@@ -8,7 +8,7 @@
 
 namespace regrade {
 
-// The program's exit codes; a death by signal n is 128 + n and not listed here.
+// The program's exit codes. Termination by signal n is 128 + n and not listed here.
 enum class ExitCode {
   kDone = 0,
   kBug = 1,
@@ -20,8 +20,8 @@ enum class ExitCode {
   kFolderInUse = 7,
 };
 
-// Something a person can mend. `what` failed, `where` (file, photo, option; may be empty), and
-// a `hint` with the remedy. Thrown from any floor, printed once by main, which exits with
+// A recoverable user-facing error. `what` failed, `where` (file, photo, option; may be empty),
+// and a `hint` with the remedy. Thrown from any layer, printed once by main, which exits with
 // `code`.
 class Error : public std::runtime_error {
  public:
@@ -37,13 +37,13 @@ class Error : public std::runtime_error {
   std::string what_, where_, hint_;
 };
 
-// Work was ended early at the user's wish (a signal); state has been saved where the stage can.
+// The user cancelled the work (by a signal); the stage has saved its state if it can.
 class Interrupted : public std::runtime_error {
  public:
   Interrupted() : std::runtime_error("interrupted") {}
 };
 
-// A broken guarantee of our own code. main turns it into exit code 1.
+// A violated internal invariant. main turns it into exit code 1.
 class CheckFailure : public std::logic_error {
  public:
   using std::logic_error::logic_error;

@@ -1,5 +1,5 @@
-// IEEE 754 half precision as bit patterns, converted without help from the processor, so that
-// every machine stores the same bytes.
+// IEEE 754 half precision as bit patterns, converted in integer arithmetic, so that every
+// machine stores the same bytes.
 #pragma once
 
 #include <cstdint>
@@ -11,15 +11,15 @@ namespace regrade {
 
 inline constexpr float kMaxHalf = 65504.0f;
 
-// Rounds to nearest, ties to even. Too large becomes infinity, NaN stays NaN.
+// Rounds to nearest, ties to even. Values out of range become infinity, NaN stays NaN.
 HD inline uint16_t HalfFromFloat(float value) {
   uint32_t bits;
   memcpy(&bits, &value, sizeof bits);
   const uint16_t sign = static_cast<uint16_t>((bits >> 16) & 0x8000u);
   const uint32_t magnitude = bits & 0x7fffffffu;
   if (magnitude > 0x7f800000u) return sign | 0x7e00u;   // NaN
-  if (magnitude >= 0x477ff000u) return sign | 0x7c00u;  // 65520 and more round to infinity
-  if (magnitude < 0x33000001u) return sign;             // 2^-25 and less round to zero
+  if (magnitude >= 0x477ff000u) return sign | 0x7c00u;  // 65520 and above round to infinity
+  if (magnitude < 0x33000001u) return sign;             // 2^-25 and below round to zero
   const int exponent = static_cast<int>(magnitude >> 23) - 127;
   const uint32_t mantissa = (magnitude & 0x7fffffu) | 0x800000u;
   // Bits to drop: 13 for normal halves, more for subnormal ones.
@@ -27,8 +27,7 @@ HD inline uint16_t HalfFromFloat(float value) {
   const uint32_t kept = mantissa >> shift;
   const uint32_t rest = mantissa & ((1u << shift) - 1), tie = 1u << (shift - 1);
   const uint32_t rounded = kept + (rest > tie || (rest == tie && (kept & 1)) ? 1 : 0);
-  // A normal half has its leading one in `rounded`: it adds 1 to the exponent field, as does a
-  // carry.
+  // The leading one of a normal half is in `rounded`: like a carry, it adds 1 to the exponent.
   const uint32_t base = exponent >= -14 ? static_cast<uint32_t>(exponent + 14) << 10 : 0;
   return static_cast<uint16_t>(sign | (base + rounded));
 }

@@ -1,5 +1,5 @@
-// A fast 64-bit content hash: tells whether a file or a set of options is what it was. It
-// guards against accidents, not against people who look for collisions.
+// A fast 64-bit content hash that detects changed files and options. It is not cryptographic:
+// it does not resist deliberate collisions.
 #pragma once
 
 #include <cstddef>
@@ -12,7 +12,7 @@
 
 namespace regrade {
 
-// The value depends on the bytes alone, never on how they were cut into calls.
+// The value depends on the bytes alone, not on how they are split over calls.
 class Hasher {
  public:
   void Add(const void* data, size_t size) {
@@ -42,7 +42,7 @@ class Hasher {
   uint64_t Value() const { return MixBits(MixBits(state_ ^ tail_) ^ length_); }
 
  private:
-  // Multiply and fold (as in wyhash): one multiplication a word, every bit reaches every bit.
+  // Multiply and fold (as in wyhash): one multiplication per word, full avalanche.
   void Mix(uint64_t word) {
     const unsigned __int128 product =
         static_cast<unsigned __int128>(state_ ^ word ^ 0xa0761d6478bd642full) *

@@ -1,5 +1,4 @@
-// One body for two processors: HD marks a function that both the host and a CUDA device may
-// run.
+// HD marks a function that both the host and a CUDA device may run.
 #pragma once
 
 #if defined(__CUDACC__)
@@ -8,8 +7,9 @@
 #define HD
 #endif
 
-// For functions that files with instruction-set flags share with others: an out-of-line copy
-// made there could be the one the linker keeps for all, and end older processors.
+// For functions shared with files that are compiled with instruction-set flags: the linker
+// might keep the out-of-line copy made there for all callers, and it would crash on older
+// processors.
 #if defined(__CUDACC__)
 #define REGRADE_ALWAYS_INLINE
 #else

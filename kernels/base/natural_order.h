@@ -1,4 +1,4 @@
-// The order in which a person counts files: "view2" comes before "view10".
+// Natural order of file names: "view2" comes before "view10".
 #pragma once
 
 #include <string>
@@ -6,9 +6,9 @@
 
 namespace regrade {
 
-// A strict total order of byte strings. Runs of digits compare by their value, of any length;
-// ASCII letters compare without case; a folder's files stay together ('/' comes first). Names
-// equal in all that ("a1", "A01") are ordered by their bytes.
+// A strict total order of byte strings. Runs of digits compare by value, at any length; ASCII
+// letters compare without case; '/' comes first, so that a folder's files stay together. Names
+// that are equal by these rules ("a1", "A01") are ordered by their bytes.
 inline bool NaturalLess(std::string_view a, std::string_view b) {
   const auto digit = [](char c) { return c >= '0' && c <= '9'; };
   const auto rank = [](char c) -> int {

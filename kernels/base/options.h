@@ -1,5 +1,5 @@
-// Options describe themselves: name, default, unit, bounds and effect are written once, beside
-// the member, and become command-line flag, help text, run.json entry and range check.
+// Options that describe themselves: name, default, unit, bounds and effect are written once,
+// beside the member, and become command-line flag, help text, run.json entry and range check.
 //
 //   struct FitOptions {
 //     float step = 0.5f;

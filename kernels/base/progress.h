@@ -1,4 +1,4 @@
-// How a long loop reports where it is and learns whether to go on.
+// Progress reports of long loops, and the decision whether to continue.
 #pragma once
 
 #include <algorithm>
@@ -10,7 +10,7 @@ namespace regrade {
 
 enum class LoopControl {
   kContinue,
-  kStop,  // save a checkpoint and leave: the loop throws Interrupted
+  kStop,  // save a checkpoint and return: the loop throws Interrupted
 };
 
 struct Progress {
@@ -19,7 +19,7 @@ struct Progress {
   std::string note;  // one short clause for the progress line, e.g. "24.1 dB on training rays"
 };
 
-// Called often (every step); cheap when there is nothing to print.
+// Called often (every step); must be cheap when there is nothing to print.
 using ProgressFunction = std::function<LoopControl(const Progress&)>;
 
 inline LoopControl Report(const ProgressFunction& progress, double done, double total,
@@ -27,22 +27,22 @@ inline LoopControl Report(const ProgressFunction& progress, double done, double 
   return progress ? progress({done, total, note}) : LoopControl::kContinue;
 }
 
-// One progress for work in several parts, each of which reports its own from 0 to its total.
-// `whole` is told the weights of the parts before plus the share of the present one, so that
-// the time left is that of all.
+// Combines the progress of several parts, each reporting from 0 to its own total. `whole` gets
+// the weights of the finished parts plus the finished fraction of the current one, so that the
+// remaining time covers all parts.
 class ProgressParts {
  public:
-  // total_weight: the sum of the weights that Next will be called with; seconds make good
-  // weights.
+  // total_weight: the sum of the weights passed to Next; expected seconds are suitable weights.
   ProgressParts(ProgressFunction whole, double total_weight)
       : whole_(std::move(whole)), total_(total_weight) {}
 
-  // The progress function of the next part; those handed out before must not be used any more.
+  // The progress function of the next part; earlier ones must not be used any more.
   ProgressFunction Next(double weight) {
     begun_ += weight;
     return [this, begin = begun_ - weight, weight](const Progress& part) {
-      const double share = part.total > 0 ? std::clamp(part.done / part.total, 0.0, 1.0) : 0.0;
-      return Report(whole_, std::min(begin + weight * share, total_), total_, part.note);
+      const double fraction =
+          part.total > 0 ? std::clamp(part.done / part.total, 0.0, 1.0) : 0.0;
+      return Report(whole_, std::min(begin + weight * fraction, total_), total_, part.note);
     };
   }
 

@@ -1,5 +1,5 @@
-// Counter-based random numbers: a value is a pure function of (seed, stream, counter), so any
-// thread count and any resume draws the same numbers.
+// Counter-based random numbers: a value is a pure function of (seed, stream, counter), so the
+// numbers do not depend on the number of threads or on where a run was resumed.
 #pragma once
 
 #include <cstdint>

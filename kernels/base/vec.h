@@ -52,7 +52,7 @@ HD T Norm(const Vec3<T>& v) {
   return sqrt(Dot(v, v));
 }
 
-// The caller answers for v != 0.
+// v must not be 0.
 template <typename T>
 HD Vec3<T> Normalized(const Vec3<T>& v) {
   return v / Norm(v);
@@ -64,7 +64,7 @@ HD bool AllFinite(const Vec3<T>& v) {
   return isfinite(v.x) && isfinite(v.y) && isfinite(v.z);
 }
 
-// A 3x3 matrix by rows.
+// A 3x3 matrix, stored by rows.
 template <typename T>
 struct Mat3 {
   Vec3<T> row[3] = {{T(1), T(0), T(0)}, {T(0), T(1), T(0)}, {T(0), T(0), T(1)}};

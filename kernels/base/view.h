@@ -1,5 +1,4 @@
-// A view of memory that somebody else owns: pointer and length, for kernel bodies on either
-// processor.
+// A non-owning view of memory (pointer and length) for kernels on either processor.
 #pragma once
 
 #include <cstdint>

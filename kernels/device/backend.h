@@ -1,4 +1,4 @@
-// The processor that does the work.
+// The processor that runs a computation.
 #pragma once
 
 namespace regrade {

@@ -9,7 +9,7 @@ namespace regrade {
 
 namespace {
 
-thread_local cudaStream_t recording = nullptr;
+thread_local cudaStream_t capturing = nullptr;
 
 void Require(cudaError_t status, const char* what) {
   if (status == cudaSuccess) return;
@@ -17,27 +17,29 @@ void Require(cudaError_t status, const char* what) {
               "GPU", "use --device cpu");
 }
 
-// A stream that records; whatever happens, what is launched afterwards runs again.
-class Recorder {
+// A capturing stream. Its destructor ends the capture in every case, so that later launches
+// run.
+class CaptureScope {
  public:
-  Recorder() {
-    Require(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), "a stream to record");
+  CaptureScope() {
+    Require(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking),
+            "creating a stream for capture");
     const cudaError_t status =
         cudaStreamBeginCapture(stream_, cudaStreamCaptureModeThreadLocal);
     if (status != cudaSuccess) cudaStreamDestroy(stream_);
-    Require(status, "recording");
-    recording = stream_;
+    Require(status, "capturing");
+    capturing = stream_;
   }
-  cudaGraph_t Take() {
+  cudaGraph_t End() {
     cudaGraph_t graph = nullptr;
-    recording = nullptr;
-    taken_ = true;
-    Require(cudaStreamEndCapture(stream_, &graph), "what was recorded");
+    capturing = nullptr;
+    ended_ = true;
+    Require(cudaStreamEndCapture(stream_, &graph), "capturing a step");
     return graph;
   }
-  ~Recorder() {
-    recording = nullptr;
-    if (!taken_) {
+  ~CaptureScope() {
+    capturing = nullptr;
+    if (!ended_) {
       cudaGraph_t graph = nullptr;
       cudaStreamEndCapture(stream_, &graph);
       if (graph != nullptr) cudaGraphDestroy(graph);
@@ -47,38 +49,39 @@ class Recorder {
 
  private:
   cudaStream_t stream_ = nullptr;
-  bool taken_ = false;
+  bool ended_ = false;
 };
 
 }  // namespace
 
-cudaStream_t LaunchStream() { return recording; }
+cudaStream_t LaunchStream() { return capturing; }
 
-void DeviceGraph::Record(const std::function<void()>& body) {
+void DeviceGraph::Capture(const std::function<void()>& body) {
   Forget();
-  Recorder recorder;
+  CaptureScope scope;
   body();
-  cudaGraph_t graph = recorder.Take();
-  cudaGraphExec_t playable = nullptr;
-  const cudaError_t status = cudaGraphInstantiate(&playable, graph, 0);
+  cudaGraph_t graph = scope.End();
+  cudaGraphExec_t executable = nullptr;
+  const cudaError_t status = cudaGraphInstantiate(&executable, graph, 0);
   cudaGraphDestroy(graph);
-  Require(status, "what was recorded");
-  playable_ = playable;
+  Require(status, "capturing a step");
+  executable_ = executable;
 }
 
-void DeviceGraph::Play() const {
-  Require(cudaGraphLaunch(static_cast<cudaGraphExec_t>(playable_), nullptr), "a recorded step");
+void DeviceGraph::Launch() const {
+  Require(cudaGraphLaunch(static_cast<cudaGraphExec_t>(executable_), nullptr),
+          "launching a captured step");
 }
 
 void DeviceGraph::Forget() noexcept {
-  if (playable_ != nullptr) cudaGraphExecDestroy(static_cast<cudaGraphExec_t>(playable_));
-  playable_ = nullptr;
+  if (executable_ != nullptr) cudaGraphExecDestroy(static_cast<cudaGraphExec_t>(executable_));
+  executable_ = nullptr;
 }
 
 #else
 
-void DeviceGraph::Record(const std::function<void()>&) { DeviceWait("recording"); }
-void DeviceGraph::Play() const { DeviceWait("a recorded step"); }
+void DeviceGraph::Capture(const std::function<void()>&) { DeviceWait("capturing"); }
+void DeviceGraph::Launch() const { DeviceWait("launching a captured step"); }
 void DeviceGraph::Forget() noexcept {}
 
 #endif

@@ -1,5 +1,5 @@
-// Work on a CUDA device that is recorded once and then played without the host: a step of many
-// short kernels costs what they cost, not what launching them does.
+// A CUDA graph: a step of many short kernels is captured once and launched as one unit, which
+// removes the launch overhead of each kernel.
 #pragma once
 
 #include <functional>
@@ -14,17 +14,17 @@ class DeviceGraph {
   DeviceGraph(const DeviceGraph&) = delete;
   DeviceGraph& operator=(const DeviceGraph&) = delete;
 
-  // Kernels that `body` launches through LaunchStream(), DeviceZero and DeviceCopyWithin are
-  // recorded and not run. `body` must not allocate, free, wait, or copy to or from the host.
-  // What was recorded before is forgotten. Throws Error(kResources).
-  void Record(const std::function<void()>& body);
-  bool recorded() const { return playable_ != nullptr; }
-  // Behind what was launched before; does not wait.
-  void Play() const;
+  // Captures, without running them, the kernels that `body` launches through LaunchStream() and
+  // the calls of DeviceZero and DeviceCopyWithin. `body` must not allocate, free, wait, or copy
+  // to or from the host. Replaces the previous capture. Throws Error(kResources).
+  void Capture(const std::function<void()>& body);
+  bool captured() const { return executable_ != nullptr; }
+  // Enqueued after all earlier launches; does not wait.
+  void Launch() const;
 
  private:
   void Forget() noexcept;
-  void* playable_ = nullptr;  // cudaGraphExec_t
+  void* executable_ = nullptr;  // cudaGraphExec_t
 };
 
 }  // namespace regrade

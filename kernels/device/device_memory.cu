@@ -31,7 +31,7 @@ DeviceStatus ReadDeviceStatus() {
   size_t free_bytes = 0, total_bytes = 0;
   if (error == cudaSuccess && count > 0) error = cudaMemGetInfo(&free_bytes, &total_bytes);
   if (error != cudaSuccess || count == 0) {
-    cudaGetLastError();  // a missing driver is no failure of what comes next
+    cudaGetLastError();  // clear it: a missing driver must not fail the next call
     status.name = error != cudaSuccess ? cudaGetErrorString(error) : "no CUDA device";
     return status;
   }
@@ -53,7 +53,7 @@ void* DeviceAllocate(int64_t bytes, const char* what) {
   cudaMemGetInfo(&free_bytes, &total_bytes);
   throw Error(ExitCode::kResources,
               std::string(what) + ": " + Mebibytes(bytes) +
-                  " of GPU memory are not to be had (" +
+                  " of GPU memory could not be allocated (" +
                   Mebibytes(static_cast<int64_t>(free_bytes)) + " of " +
                   Mebibytes(static_cast<int64_t>(total_bytes)) +
                   " free): " + cudaGetErrorString(status),

@@ -1,5 +1,5 @@
-// Memory of a CUDA device: owners, copies and errors with names. Builds without CUDA have the
-// same interface; there every call throws Error(kResources).
+// Memory of a CUDA device: owners, copies and errors that name the memory. Builds without CUDA
+// have the same interface, and every call throws Error(kResources).
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@ namespace regrade {
 
 struct DeviceStatus {
   bool found = false;
-  std::string name;            // "NVIDIA H200", or why there is none
+  std::string name;            // "NVIDIA H200", or why no device is available
   int compute_capability = 0;  // 90 for 9.0
   int multiprocessors = 0;
   int64_t free_bytes = 0;
@@ -23,23 +23,23 @@ struct DeviceStatus {
 DeviceStatus ReadDeviceStatus();
 
 // `what` names the memory in errors ("gradients of 5600000 voxels"). Throws Error(kResources)
-// with what was asked for and what is free.
+// with the requested and the free size.
 void* DeviceAllocate(int64_t bytes, const char* what);
 void DeviceFree(void* pointer) noexcept;
 void DeviceCopyIn(void* device, const void* host, int64_t bytes);
 void DeviceCopyOut(void* host, const void* device, int64_t bytes);  // waits for running kernels
-// Rows of `bytes` each, that begin `to_pitch` and `from_pitch` bytes apart, in any direction.
+// Copies rows of `bytes` each; rows begin `to_pitch` and `from_pitch` bytes apart. Any
+// direction.
 void DeviceCopyRows(void* to, int64_t to_pitch, const void* from, int64_t from_pitch,
                     int64_t bytes, int64_t rows);
 void DeviceCopyWithin(void* to, const void* from, int64_t bytes);
 void DeviceZero(void* device, int64_t bytes);
-// Waits; throws Error(kResources) with the first failure of the kernels so far.
+// Waits; throws Error(kResources) with the first failure of any earlier kernel.
 void DeviceWait(const char* what);
-// To be called right after a launch: a launch that could not start is reported by its kernel's
-// name.
+// Call it right after a launch: reports a launch that could not start, by its kernel's name.
 void CheckLaunch(const char* kernel);
 
-// A stretch of work with a name, which Nsight shows (NVTX); nothing without a profiler.
+// A named range of work for Nsight (NVTX); does nothing without a profiler.
 class DeviceRange {
  public:
   explicit DeviceRange(const char* name);

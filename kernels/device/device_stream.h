@@ -1,5 +1,5 @@
-// Where device code launches its kernels: the stream that is being recorded, or the default
-// one. Device code only.
+// The stream on which device code launches kernels: the capturing one, or the default one.
+// Device code only.
 #pragma once
 
 #if defined(__CUDACC__)

@@ -1,22 +1,22 @@
-// What lies beyond the box: layers of colour and density on concentric spheres (a multi-sphere
-// image), which take up the light that the box lets through, plainly.
+// The background beyond the box: layers of colour and density on concentric spheres (a
+// multi-sphere image), composited behind the box. The plain specification.
 //
-// Coordinates: the box is stretched to the cube [-1, 1]^3, so that the unit sphere lies inside
-// it, as in svox2. Radii are kept as inverse radii u = 1 / r: nothing is large, and u = 0 is
+// Coordinates: the box is scaled to the cube [-1, 1]^3, so that the unit sphere lies inside it,
+// as in svox2. Radii are stored as inverse radii u = 1 / r: no value is large, and u = 0 is
 // infinity.
 //
 // EQ(sphere-crossing): with p the ray's point nearest to the centre, d its direction and
 // h = |p|, the ray leaves the sphere 1 / u at x = p + d sqrt(r^2 - h^2), and
 //   u x = u p + sqrt(1 - (h u)^2) d,
 // a unit vector that needs no radius and does not cancel (H91-H93; the roots of the quadratic
-// lose 1e-3 r from a hundred radii away). Only what lies ahead of the ray's origin o counts:
+// lose 1e-3 r from a hundred radii away). Only crossings ahead of the ray's origin o count:
 // sqrt(1 - (h u)^2) > u o.d.
 //
-// EQ(background-layers): layer i of L lies at u_i = 1 - (i + 1/2) / L, where svox2 has it too,
-// and takes 1 / L of inverse radius: tau_i = max(0, sigma_i) s / L with s the world length of a
-// unit along the ray, c_i = max(0, 1/2 + Gamma_0 a_i); sigma_i and a_i are bilinear in the
-// layer's map of longitudes and latitudes, an empty texel counting as 0. They continue the sums
-// of EQ(composite) behind the box. svox2 takes 2 L + 2 samples and blends between layers.
+// EQ(background-layers): layer i of L lies at u_i = 1 - (i + 1/2) / L, as in svox2, and covers
+// 1 / L of inverse radius: tau_i = max(0, sigma_i) s / L with s the world length of a unit
+// along the ray, c_i = max(0, 1/2 + Gamma_0 a_i); sigma_i and a_i are bilinear in the layer's
+// map of longitudes and latitudes, an empty texel counting as 0. They continue the sums of
+// EQ(composite) behind the box. svox2 takes 2 L + 2 samples and blends between layers.
 #pragma once
 
 #include <cmath>
@@ -32,10 +32,10 @@ namespace regrade {
 
 template <typename T>
 struct SphereRay {
-  Vec3<T> nearest;       // to the centre, and perpendicular to the direction
+  Vec3<T> nearest;       // point nearest to the centre, perpendicular to the direction
   Vec3<T> direction;     // unit
   T along = 0;           // origin = nearest + along * direction
-  T world_per_unit = 0;  // 0: not a ray
+  T world_per_unit = 0;  // 0: not a valid ray
 };
 
 template <typename T>
@@ -52,7 +52,7 @@ HD SphereRay<T> ToSphereRay(const GridFrame& frame, const RayT<T>& ray) {
   result.direction = direction / units_per_world;
   result.along = Dot(origin, result.direction);
   result.nearest = origin - result.direction * result.along;
-  // Once more: what rounding left of the direction in it.
+  // Repeated to remove the component along the direction left by rounding.
   const T rest = Dot(result.nearest, result.direction);
   result.nearest = result.nearest - result.direction * rest;
   result.along += rest;
@@ -61,13 +61,14 @@ HD SphereRay<T> ToSphereRay(const GridFrame& frame, const RayT<T>& ray) {
 }
 
 // See EQ(sphere-crossing): `place` is the unit vector, `ahead` the distance from the ray's
-// origin in units of the sphere's radius. False where the ray misses the sphere or has left it.
+// origin in units of the sphere's radius. False if the ray misses the sphere or starts beyond
+// it.
 template <typename T>
 HD bool CrossSphere(const SphereRay<T>& ray, T inverse_radius, Vec3<T>* place, T* ahead) {
   using std::sqrt;
-  const T share = Dot(ray.nearest, ray.nearest) * inverse_radius * inverse_radius;
-  if (!(share < 1)) return false;
-  const T root = sqrt(1 - share);
+  const T squared = Dot(ray.nearest, ray.nearest) * inverse_radius * inverse_radius;
+  if (!(squared < 1)) return false;
+  const T root = sqrt(1 - squared);
   *ahead = root - ray.along * inverse_radius;
   *place = ray.nearest * inverse_radius + ray.direction * root;
   return *ahead > 0;
@@ -78,8 +79,8 @@ HD T InverseRadius(int layer, int layers) {
   return 1 - (T(layer) + T(0.5)) / T(layers);
 }
 
-// Four texels x * R + y around a direction, as svox2 numbers them: y runs from the north pole
-// (0, 1, 0) to the south pole in R steps, x eastwards once round in 2 R.
+// The four texels x * R + y around a direction, numbered as in svox2: y runs from the north
+// pole (0, 1, 0) to the south pole in R steps, x eastwards around the sphere in 2 R.
 template <typename T>
 struct TexelCell {
   int32_t texel[4];
@@ -118,7 +119,7 @@ HD Vec3<T> TexelDirection(int resolution, int x, int y) {
   return {cos(latitude) * sin(longitude), sin(latitude), cos(latitude) * cos(longitude)};
 }
 
-// What a ray meets of one layer: value [4] = a_red, a_green, a_blue, sigma.
+// A layer's value at a ray's crossing: value [4] = a_red, a_green, a_blue, sigma.
 template <typename T>
 HD void SampleLayer(const SpheresView<T>& spheres, const TexelCell<T>& cell, int layer,
                     T* value) {
@@ -144,12 +145,12 @@ HD Vec3<T> LayerColor(const T* value) {
 
 template <typename T>
 struct SpheresResult {
-  T optical_depth = 0;  // of the layers alone
+  T optical_depth = 0;  // of the layers only
   T depth = 0;          // sum w t of the layers, world units
   int last_layer = -1;
 };
 
-// Goes on from what the box left; stops as the box does.
+// Continues compositing behind the box, with the same stopping rule as the box.
 template <typename T>
 HD SpheresResult<T> CompositeSpheres(const GridFrame& frame, const SpheresView<T>& spheres,
                                      const RayT<T>& world_ray, T stop_transmittance,
@@ -175,9 +176,9 @@ HD SpheresResult<T> CompositeSpheres(const GridFrame& frame, const SpheresView<T
   return result;
 }
 
-// EQ(composite-adjoint) over the layers, last to first. `behind` is c_bg on entry and what the
-// box has behind it on return; depth_before: optical depth of the box. The gradients
-// have the shapes of density and color.
+// EQ(composite-adjoint) over the layers, last to first. `behind` is c_bg on entry and the
+// radiance behind the box on return; depth_before: optical depth of the box. The gradients have
+// the shapes of density and color.
 template <typename T, typename Add>
 HD void CompositeSpheresAdjoint(const GridFrame& frame, const SpheresView<T>& spheres,
                                 const RayT<T>& world_ray, const SpheresResult<T>& result,

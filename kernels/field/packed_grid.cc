@@ -79,7 +79,7 @@ RadianceField ToRadianceField(const FastGrid& grid) {
 namespace {
 
 // Two sweeps along one axis: distance <= neighbour + 1. Three axes give the Chebyshev distance
-// when each pass takes the minimum over max(distance, steps along the axis); done here by
+// if each pass takes the minimum over max(distance, steps along the axis); computed here by
 // separable dilation counts.
 void SpreadAxis(const Vec3i& n, int axis, Buffer<uint8_t>* distance) {
   const int64_t strides[3] = {static_cast<int64_t>(n.y) * n.z, n.z, 1};
@@ -92,7 +92,7 @@ void SpreadAxis(const Vec3i& n, int axis, Buffer<uint8_t>* distance) {
     for (int b = 0; b < n[v]; ++b) {
       uint8_t* p = distance->data() + a * strides[u] + b * strides[v];
       for (int i = 0; i < length; ++i) line[static_cast<size_t>(i)] = p[i * stride];
-      // out(i) = min over j of max(line(j), |i - j|): grow the radius until it covers the
+      // out(i) = min over j of max(line(j), |i - j|): increase the radius until it covers the
       // smallest value found.
       for (int i = 0; i < length; ++i) {
         int best = line[static_cast<size_t>(i)];
@@ -132,7 +132,7 @@ void RefreshDerived(FastGrid* grid) {
         grid->vertex_of_voxel[link] = static_cast<int32_t>(vertex);
         grid->probes[vertex] = {
             grid->records[static_cast<int64_t>(link) * lanes + DensityLane(grid->basis)], link};
-        // A vertex is a corner of the cells whose lowest corners lie up to one below it.
+        // A vertex is a corner of the cells whose lowest corners are at most one below it.
         for (int bx = std::max(x - 1, 0) / kBrick; bx <= x / kBrick; ++bx)
           for (int by = std::max(y - 1, 0) / kBrick; by <= y / kBrick; ++by)
             for (int bz = std::max(z - 1, 0) / kBrick; bz <= z / kBrick; ++bz)

@@ -1,9 +1,9 @@
-// A field as fitting, rendering and the copies on a device store it: a voxel's values in one
-// record, the background's layers with a texel's colour and density side by side.
+// The packed layout of a field for fitting, rendering and device copies: a voxel's values in
+// one record, and a background texel's colour and density side by side.
 //
-// A voxel's values sit in one record of `lanes` floats that fills whole cache lines:
-//   basis 9: 32 lanes, basis 4: 16 lanes, basis 1: 4 lanes; sh [3, basis] first, density right
-//   behind them.
+// A voxel's values are one record of `lanes` floats that fills whole cache lines:
+//   basis 9: 32 lanes, basis 4: 16 lanes, basis 1: 4 lanes; sh [3, basis] first, directly
+//   followed by the density.
 #pragma once
 
 #include <cstdint>
@@ -31,31 +31,31 @@ void ToSphereGeometry(const FastSpheres& spheres, SphereGeometry* geometry,
 constexpr int RecordLanes(int basis) { return basis == 9 ? 32 : basis == 4 ? 16 : 4; }
 constexpr int DensityLane(int basis) { return 3 * basis; }
 
-// Where empty space ends is kept for bricks of cells: their map stays in cache, and a ray that
-// skips must wait for each look into it.
+// Empty-space distances are stored per brick of cells: the smaller map stays in the cache, and
+// each skip has to wait for one lookup in it.
 inline constexpr int kBrick = 4;  // cells along an edge
 
-// What a ray reads at every vertex it passes: dense, so that there is no indirection, and side
-// by side, so that both come in one cache line.
+// The data a ray reads at every vertex it passes: a dense array, without indirection, both
+// values in one cache line.
 struct Probe {
   float density;  // 0 where nothing is stored
   int32_t link;   // voxel, or -1
 };
 
-// Owner of what the fast path reads.
+// A field in the packed layout, with the arrays derived from it.
 struct FastGrid {
   GridFrame frame;
   Buffer<int32_t> links;            // [X, Y, Z]
   Buffer<Probe> probes;             // [X, Y, Z]
   Buffer<uint8_t> brick_distance;   // bricks of kBrick^3 cells, [X, Y, Z / kBrick rounded up]:
-                                    // Chebyshev distance in bricks to the nearest one that has
-                                    // a cell with a stored corner, 0 for such bricks
+                                    // Chebyshev distance in bricks to the nearest brick with a
+                                    // stored corner, 0 for such bricks
   Buffer<int32_t> vertex_of_voxel;  // [N]
   Buffer<float> records;            // [N, lanes]
   int basis = 9;
   Vec3f background{0, 0, 0};
   float near_clip = 0;  // world units
-  FastSpheres spheres;  // behind the box, where a scene has them
+  FastSpheres spheres;  // background layers, if any
 
   Vec3i bricks() const {
     return {(frame.resolution.x + kBrick - 1) / kBrick,

@@ -1,4 +1,4 @@
-// An appearance with room for more spherical harmonics than it has.
+// Pads an appearance to a higher spherical-harmonics basis.
 #pragma once
 
 #include <algorithm>
@@ -8,8 +8,8 @@
 
 namespace regrade {
 
-// The same colours with `basis` harmonics a channel, those beyond its own 0: it renders the
-// same to the bit. Nothing changes where it has as many.
+// The same colours with `basis` harmonics per channel; the added coefficients are 0, and
+// renders are bit-identical. Returns the input unchanged if it already has that many.
 inline Appearance PadShBasis(Appearance appearance, int basis) {
   const int own = appearance.basis;
   if (own >= basis) return appearance;

@@ -31,8 +31,8 @@ void CheckFrame(const GridFrame& frame, const char* name) {
   }
 }
 
-// One pass: a link out of range would be an access out of bounds, and a voxel that two vertices
-// share would be stepped twice.
+// One pass: a link out of range would be an access out of bounds, and a voxel shared by two
+// vertices would be stepped twice.
 void CheckLinks(const Geometry& geometry, const char* name) {
   const int64_t voxels = geometry.num_voxels();
   std::vector<bool> taken(static_cast<size_t>(voxels), false);
@@ -52,7 +52,7 @@ void CheckSpheres(const Geometry& geometry, const Buffer<float>& color, const ch
   const SphereGeometry& spheres = geometry.spheres;
   if (!spheres.on()) {
     if (spheres.layers < 0 || spheres.density.size() > 0 || color.size() > 0)
-      Refuse(name, "there is a background without layers");
+      Refuse(name, "the background has no layers");
     return;
   }
   if (spheres.layers > kMaxLayers || spheres.resolution < 2 ||
@@ -60,13 +60,13 @@ void CheckSpheres(const Geometry& geometry, const Buffer<float>& color, const ch
     Refuse(name, "a background of " + std::to_string(spheres.layers) + " layers and " +
                      std::to_string(spheres.resolution) +
                      " texels from pole to pole; at most " + std::to_string(kMaxLayers) +
-                     " and " + std::to_string(kMaxSphereResolution) + " are known");
+                     " and " + std::to_string(kMaxSphereResolution) + " are supported");
   const int64_t map = int64_t{2} * spheres.resolution * spheres.resolution;
   if (map * spheres.layers > INT32_MAX ||
       geometry.num_voxels() + spheres.density.size() > INT32_MAX ||
       spheres.links.size() != map || spheres.density.size() % spheres.layers != 0 ||
       color.size() != 3 * spheres.density.size())
-    Refuse(name, "the background's arrays do not fit together");
+    Refuse(name, "the sizes of the background's arrays disagree");
   for (const int32_t link : spheres.links)
     if (link < -1 || link >= spheres.num_columns())
       Refuse(name, "a background texel links to column " + std::to_string(link) + " of " +
@@ -78,7 +78,7 @@ void CheckSpheres(const Geometry& geometry, const Buffer<float>& color, const ch
 }  // namespace
 
 void Validate(const RadianceField& field, const char* name) {
-  if (field.geometry == nullptr) Refuse(name, "there is no grid");
+  if (field.geometry == nullptr) Refuse(name, "the grid is missing");
   const Geometry& geometry = *field.geometry;
   CheckFrame(geometry.frame, name);
   if (geometry.links.size() != geometry.frame.NumVertices())
@@ -86,7 +86,7 @@ void Validate(const RadianceField& field, const char* name) {
                      std::to_string(geometry.frame.NumVertices()) + " vertices");
   const int basis = field.appearance.basis;
   if (basis != 1 && basis != 4 && basis != 9)
-    Refuse(name, std::to_string(basis) + " harmonics a channel; 1, 4 or 9 are known");
+    Refuse(name, std::to_string(basis) + " harmonics a channel; 1, 4 or 9 are supported");
   const int64_t expected = geometry.num_voxels() * field.appearance.stride();
   if (field.appearance.sh.size() != expected)
     Refuse(name, std::to_string(field.appearance.sh.size()) + " colour coefficients, " +
@@ -99,10 +99,10 @@ void Validate(const RadianceField& field, const char* name) {
                      std::to_string(geometry.num_voxels() * (1 + field.appearance.stride())) +
                      ")");
   if (!AllFinite(field.background) || !std::isfinite(field.near_clip) || field.near_clip < 0)
-    Refuse(name, "the background colour or the near distance is not a usable number");
+    Refuse(name, "the background colour or the near distance is not valid");
   if (!(field.step >= 0.01f && field.step <= 16))
     Refuse(name,
-           "the step is " + std::to_string(field.step) + " voxels, 0.01 to 16 are usable");
+           "the step is " + std::to_string(field.step) + " voxels, 0.01 to 16 are supported");
 }
 
 FieldView<float> ViewOf(const RadianceField& field) {

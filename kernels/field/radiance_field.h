@@ -1,5 +1,5 @@
-// A Plenoxel field: a sparse voxel grid of densities (Geometry, frozen once fitted) and of
-// spherical harmonics (Appearance, what a style may change).
+// A Plenoxel field: a sparse voxel grid of densities (Geometry, frozen once fitted) and
+// spherical harmonics (Appearance, which a style changes).
 #pragma once
 
 #include <cstdint>
@@ -10,8 +10,8 @@
 
 namespace regrade {
 
-// Where values live: vertex (i, j, k) of a box. EQ(grid-from-world), svox2's cell-centred
-// mapping:
+// The grid's coordinate frame: values are at vertices (i, j, k) of a box. EQ(grid-from-world),
+// svox2's cell-centred mapping:
 //   g = p * N / (2 radius) + (1 - center / radius) * N / 2 - 1/2, so the box spans [-1/2, N -
 //   1/2].
 struct GridFrame {
@@ -45,8 +45,8 @@ struct GridFrame {
 inline constexpr int kMaxLayers = 512;
 inline constexpr int kMaxSphereResolution = 4096;
 
-// Where the background's layers have matter, see background_spheres.h. Nothing is allocated
-// where a scene has none.
+// The geometry of the background's layers, see background_spheres.h. Nothing is allocated for a
+// scene without them.
 struct SphereGeometry {
   int layers = 0;         // L; 0: no background spheres
   int resolution = 0;     // R: a layer's map has 2R x R texels
@@ -70,21 +70,21 @@ struct Geometry {
 struct Appearance {
   int basis = 9;               // spherical harmonics per channel: 1, 4 or 9
   Buffer<float> sh;            // [N, 3, basis]: channel-major, R then G then B
-  Buffer<float> sphere_color;  // [columns, L, 3]: of degree 0, where there are spheres
+  Buffer<float> sphere_color;  // [columns, L, 3]: of degree 0; empty without spheres
 
   int stride() const { return 3 * basis; }
 };
 
-// Geometry is shared and const: a restyled field has the same one, by type.
+// Geometry is shared and const, so a restyled field has the same geometry by type.
 struct RadianceField {
   std::shared_ptr<const Geometry> geometry;
   Appearance appearance;
-  Vec3f background{0, 0, 0};  // sRGB, seen where transmittance is left
-  float near_clip = 0;        // world units along the ray, at render as at fit
-  float step = 0.5f;          // voxels between samples of a ray, at render as at fit
+  Vec3f background{0, 0, 0};  // sRGB, visible where transmittance remains
+  float near_clip = 0;        // world units along the ray, for rendering and fitting
+  float step = 0.5f;          // voxels between samples of a ray, for rendering and fitting
 };
 
-// Throws Error(kInput) naming the defect: sizes that disagree, a link out of range (F68),
+// Throws Error(kInput) naming the defect: inconsistent sizes, a link out of range (F68),
 // non-finite values (F69).
 void Validate(const RadianceField& field, const char* name);
 
@@ -97,7 +97,7 @@ struct SpheresView {
   const T* color = nullptr;
 };
 
-// What kernel bodies see: no owners, any scalar.
+// A non-owning view for kernel bodies, with any scalar type.
 template <typename T>
 struct FieldView {
   GridFrame frame;

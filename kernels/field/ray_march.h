@@ -1,4 +1,4 @@
-// Where along a ray the field is sampled: the box interval, and positions t_i = t_0 + i * step.
+// Sample positions along a ray: the box interval, and positions t_i = t_0 + i * step.
 #pragma once
 
 #include <cmath>
@@ -11,9 +11,8 @@
 namespace regrade {
 
 struct MarchOptions {
-  float step = 0.5f;  // voxels
-  float stop_transmittance =
-      1e-4f;  // a ray ends below it; at most this much light is lost a channel
+  float step = 0.5f;                 // voxels
+  float stop_transmittance = 1e-4f;  // a ray ends below it; bounds the lost light per channel
 };
 
 inline constexpr int64_t kMaxSteps = 1 << 20;
@@ -24,14 +23,14 @@ struct GridRay {
   Vec3<T> origin, direction;  // grid; direction has unit length
   T world_per_voxel = 0;      // world length of one unit along the ray
   T t_begin = 0;
-  int64_t num_steps = 0;  // 0: the ray misses the box, or is not a ray (zero or non-finite)
+  int64_t num_steps = 0;  // 0: the ray misses the box or is invalid (zero or non-finite)
 
   HD Vec3<T> At(T t) const { return origin + direction * t; }
 };
 
 // Slab test with half-open faces [lo, hi): a ray parallel to a slab and outside it misses;
 // parallel and inside ignores that slab (svox2 counts the former as inside and clamps its
-// samples to the face: not ported).
+// samples to the face, which is not reproduced here).
 template <typename T>
 HD REGRADE_ALWAYS_INLINE GridRay<T> ClipToGrid(const GridFrame& frame, const RayT<T>& ray,
                                                T near_clip, T step) {

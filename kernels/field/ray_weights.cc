@@ -10,7 +10,7 @@
 namespace regrade {
 namespace {
 
-// The density half of CompositeSpheres.
+// CompositeSpheres without colours.
 void MarchSpheres(const Geometry& geometry, const Ray& world_ray, float stop, float min_weight,
                   CompositeState<float>* state, std::vector<WeightedSample>* out) {
   const SphereGeometry& spheres = geometry.spheres;
@@ -38,8 +38,7 @@ void MarchSpheres(const Geometry& geometry, const Ray& world_ray, float stop, fl
   }
 }
 
-// The density half of RenderRay; the same arithmetic, so that weights agree bit for bit with
-// it.
+// RenderRay without colours: the same arithmetic, so that weights agree bit for bit.
 float MarchDensity(const Geometry& geometry, const Ray& ray, const MarchOptions& options,
                    float near_clip, float min_weight, std::vector<WeightedSample>* out) {
   const GridFrame& frame = geometry.frame;

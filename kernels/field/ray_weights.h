@@ -1,6 +1,6 @@
-// The geometry is frozen while a style is learned, so a ray's sample weights are constants:
-// they are marched on density alone and kept as lists. Everything LipRF's second stage needs of
-// a ray is here.
+// Sample weights of rays. The geometry is frozen during style training, so a ray's weights are
+// constants: they are marched on density alone and stored as lists, which are the only ray data
+// that LipRF's second stage needs.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@
 
 namespace regrade {
 
-// One of the box, or, where `vertex` is negative, of a background sphere.
+// A sample of the box, or of a background sphere if `vertex` is negative.
 struct WeightedSample {
   int32_t vertex;  // lowest corner of the sample's cell, linear index into links; of a sphere
                    // ~((x R + y) L + layer), see TexelCell
@@ -22,22 +22,22 @@ struct WeightedSample {
   bool on_sphere() const { return vertex < 0; }
 };
 
-// What a sample blends with CornerWeight(fraction, k), k = 0..7: points, which are first the
-// voxels and then the texels of the spheres; -1 where nothing is stored.
+// The points a sample blends with CornerWeight(fraction, k), k = 0..7. Points number the voxels
+// first and then the texels of the spheres; -1 if nothing is stored.
 void CornerPoints(const Geometry& geometry, const WeightedSample& sample, int32_t* point);
 
 // Lists for a batch of rays, concatenated in the rays' order.
 struct RayWeights {
   std::vector<int64_t> first;  // [rays + 1]: samples of ray r are first[r] .. first[r + 1] - 1
   std::vector<WeightedSample> samples;  // front to back; zero weights are left out
-  std::vector<float> transmittance;     // [rays]: what is left behind the last sample
+  std::vector<float> transmittance;     // [rays]: behind the last sample
 
   int64_t num_rays() const { return static_cast<int64_t>(transmittance.size()); }
 };
 
-// Exact for min_weight = 0. Samples with 0 < w <= min_weight are dropped, an error of at most
-// their sum a channel: a parameter with a price. `near_clip` in world units. Parallel over
-// rays; the result does not depend on threads.
+// Exact for min_weight = 0. Samples with 0 < w <= min_weight are dropped, with an error of at
+// most their sum per channel. `near_clip` in world units. Parallel over rays; the result does
+// not depend on the number of threads.
 RayWeights ComputeRayWeights(const Geometry& geometry, View<const Ray> rays,
                              const MarchOptions& options, float near_clip,
                              float min_weight = 0.0f);

@@ -1,5 +1,5 @@
-// Rendering a field at a camera: colour, depth and what transmittance is left. The fast path is
-// in cpu/render_view.h.
+// Renders a field at a camera: colour, depth and remaining transmittance. The fast path is in
+// cpu/render_view.h.
 #pragma once
 
 #include <vector>
@@ -18,12 +18,12 @@ struct RenderedView {
   Image transmittance;  // [H, W, 1]
 };
 
-// The plain body: the specification and the tests' oracle.
+// The plain specification, which the tests compare with.
 RenderedView RenderViewPlain(const RadianceField& field, const Camera& camera,
                              const MarchOptions& options);
 
-// From raw sums to a view: colours clipped to [0, 1], ray lengths turned into depths along the
-// optical axis.
+// Converts raw sums to a view: colours clipped to [0, 1], ray lengths converted to depths along
+// the optical axis.
 void FinishView(const Camera& camera, const std::vector<Ray>& rays, RenderedView* view);
 
 }  // namespace regrade

@@ -1,4 +1,4 @@
-// Plain rendering, a pixel at a time.
+// Plain rendering, pixel by pixel.
 #include <vector>
 
 #include "kernels/field/render.h"
@@ -30,11 +30,11 @@ RenderedView RenderViewPlain(const RadianceField& field, const Camera& camera,
 }
 
 void FinishView(const Camera& camera, const std::vector<Ray>& rays, RenderedView* view) {
-  const FinishPixel finish(camera);
+  const ResolvePixel resolve(camera);
   for (size_t i = 0; i < rays.size(); ++i) {
     float* pixel = &view->color.pixels[3 * i];
     Vec3f color{pixel[0], pixel[1], pixel[2]};
-    finish(rays[i], view->transmittance.pixels[i], &color, &view->depth.pixels[i]);
+    resolve(rays[i], view->transmittance.pixels[i], &color, &view->depth.pixels[i]);
     for (int c = 0; c < 3; ++c) pixel[c] = color[c];
   }
 }

@@ -1,11 +1,10 @@
-// One ray through the field, forward and adjoint, plainly: the specification of rendering and
-// of fitting.
+// One ray through the field, forward and adjoint: the plain specification of rendering and
+// fitting.
 //
 // EQ(fit-loss): L = 1 / (3 Q) sum over the batch's Q rays and 3 channels of (C - C_photo)^2
 // (svox2's gradient 2 / (3 Q) (C - C_photo)); the scale 1 / (3 Q) is passed in. The adjoint
-// walks the same samples back to front (see EQ(composite-adjoint)) and recovers T_{i+1} =
-// exp(-sum_{j<=i} tau_j) from the running optical depth, so it stores nothing and divides by
-// nothing.
+// visits the same samples back to front (see EQ(composite-adjoint)) and recovers T_{i+1} =
+// exp(-sum_{j<=i} tau_j) from the running optical depth: it needs no storage and no division.
 #pragma once
 
 #include <cmath>
@@ -24,9 +23,9 @@ struct RayResult {
   Vec3<T> color{};           // not clipped
   T transmittance = 1;       // behind the last sample
   T depth = 0;               // sum w t, t in world units along the ray
-  T optical_depth = 0;       // sum tau, of the box
+  T optical_depth = 0;       // sum tau of the box
   int64_t last_step = -1;    // index of the last sample that was composited
-  SpheresResult<T> spheres;  // what the background's layers added to the above
+  SpheresResult<T> spheres;  // contribution of the background's layers, included above
 };
 
 // See EQ(sh-basis): raw [3] is before the clamp at 0.
@@ -81,8 +80,8 @@ HD RayResult<T> RenderRay(const FieldView<T>& field, const RayT<T>& ray,
 }
 
 // Adds dL/d(density), dL/d(sh) for dL/dC = d_color to the gradients, which have the field's
-// shapes; those of the background's layers are needed only where it has some. `result` is
-// RenderRay's of the same arguments. `Add(pointer, value)` is a plain or an atomic +=.
+// shapes; the sphere gradients may be null for a field without layers. `result` is RenderRay's
+// of the same arguments. `Add(pointer, value)` is a plain or an atomic +=.
 template <typename T, typename Add>
 HD void RenderRayAdjoint(const FieldView<T>& field, const RayT<T>& ray,
                          const MarchOptions& options, const RayResult<T>& result,
@@ -114,27 +113,14 @@ HD void RenderRayAdjoint(const FieldView<T>& field, const RayT<T>& ray,
     const T w = exp(-(depth_after - tau)) * Opacity(tau);
     T d_sigma = CompositeAdjoint(delta, tau, transmittance_after, color, d_color, &behind);
     if (!(density < T(kMaxDensity)) || !(density * delta < T(kMaxOpticalDepth))) d_sigma = 0;
-    for (int corner = 0; corner < 8; ++corner) {
-      const int32_t link = field.links[CornerVertex(field.frame, cell.vertex, corner)];
-      if (link < 0) continue;
-      const T corner_weight = CornerWeight(cell.fraction, corner);
-      add(&d_density[link], corner_weight * d_sigma);
-      for (int c = 0; c < 3; ++c) {
-        if (!(raw[c] > 0)) continue;  // subgradient 0 of the clamp
-        for (int k = 0; k < field.basis; ++k)
-          add(&d_sh[static_cast<int64_t>(link) * stride + c * field.basis + k],
-              corner_weight * w * d_color[c] * gamma[k]);
-      }
-    }
+    T d_sample[3 * kMaxBasis];
+    for (int c = 0; c < 3; ++c)
+      for (int k = 0; k < field.basis; ++k)  // subgradient 0 of the clamp
+        d_sample[c * field.basis + k] = raw[c] > 0 ? w * d_color[c] * gamma[k] : T(0);
+    InterpolateAdjoint(field.frame, field.links, 1, 1, cell, &d_sigma, d_density, add);
+    InterpolateAdjoint(field.frame, field.links, stride, stride, cell, d_sample, d_sh, add);
     depth_after -= tau;
   }
 }
-
-struct PlainAdd {
-  template <typename T>
-  HD void operator()(T* target, T value) const {
-    *target += value;
-  }
-};
 
 }  // namespace regrade

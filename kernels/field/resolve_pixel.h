@@ -1,5 +1,5 @@
-// From a ray's raw sums to a pixel: the colour clipped, the length along the ray turned into
-// the depth along the optical axis.
+// Converts a ray's raw sums to a pixel: clips the colour and converts the length along the ray
+// to the depth along the optical axis.
 #pragma once
 
 #include "kernels/base/vec.h"
@@ -7,17 +7,17 @@
 
 namespace regrade {
 
-struct FinishPixel {
+struct ResolvePixel {
   Vec3d axis;         // world direction of the optical axis
   double offset = 0;  // depth of a world point p is Dot(axis, p) + offset
   NdcSpace ndc;
 
-  explicit FinishPixel(const Camera& camera)
+  explicit ResolvePixel(const Camera& camera)
       : axis(camera.Forward()),
         offset(camera.camera_from_world.translation.z),
         ndc(camera.ndc) {}
 
-  // `depth` comes as sum w t. Where less than half of the light is lost there is no depth: 0.
+  // On entry `depth` is sum w t. It becomes 0 (undefined) if sum w < 1/2.
   HD void operator()(const Ray& ray, float transmittance, Vec3f* color, float* depth) const {
     for (int c = 0; c < 3; ++c) {
       float& value = (*color)[c];
@@ -33,7 +33,7 @@ struct FinishPixel {
   }
 
  private:
-  // Of the point at `length` along a ray in NDC. Infinity is set at z = 1e4 near planes.
+  // Depth of the point at `length` along a ray in NDC. Infinity becomes z = 1e4 near planes.
   HD float NdcDepth(const Ray& ray, float length) const {
     Vec3d p = (ray.origin + ray.direction * length).Cast<double>();
     if (p.z > 1 - 2e-4) p.z = 1 - 2e-4;

@@ -1,7 +1,7 @@
 // Total variation of the background's layers, value and gradient.
 //
 // EQ(sphere-variation): TV = sum over stored texels of sqrt(1e-9 + sum_a (v(next_a) - v)^2),
-// each value for itself; next_a is the neighbour to the east (once round), to the south (none
+// separately for each value; next_a is the neighbour to the east (cyclic), to the south (none
 // beyond the last row) and on the next layer outwards. An empty neighbour counts as the texel's
 // own value.
 #pragma once
@@ -13,8 +13,8 @@
 
 namespace regrade {
 
-// values [columns, layers, stride], the one at `index` of each texel. Returns the sum over the
-// map's texels [begin, end), unscaled; add(texel, value) is called for scale * gradient.
+// values [columns, layers, stride]: the value at `index` of each texel. Returns the unscaled
+// sum over the map's texels [begin, end); calls add(texel, value) with scale * gradient.
 template <typename T, typename Add>
 T SphereVariation(int layers, int resolution, const int32_t* links, const T* values, int stride,
                   int index, int64_t begin, int64_t end, T scale, const Add& add) {
@@ -31,12 +31,12 @@ T SphereVariation(int layers, int resolution, const int32_t* links, const T* val
                                south >= 0 ? south * layers + i : own,
                                i + 1 < layers ? own + 1 : own};
       const T value = values[int64_t{own} * stride + index];
-      T difference[3], inside = T(kVariationEpsilon);
+      T difference[3], radicand = T(kVariationEpsilon);
       for (int a = 0; a < 3; ++a) {
         difference[a] = values[int64_t{next[a]} * stride + index] - value;
-        inside += difference[a] * difference[a];
+        radicand += difference[a] * difference[a];
       }
-      const T root = std::sqrt(inside);
+      const T root = std::sqrt(radicand);
       sum += root;
       if (scale == 0) continue;
       T d_own = 0;

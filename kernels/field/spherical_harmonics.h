@@ -1,7 +1,8 @@
-// Real spherical harmonics of degree 0..2 as Cartesian polynomials (no pole, no trigonometry).
+// Real spherical harmonics of degree 0..2 as Cartesian polynomials, without poles or
+// trigonometry.
 //
 // EQ(sh-basis): c(d) = max(0, sum_k sh_k Gamma_k(d) + 1/2), d a unit vector. A zero field is
-// mid-grey. Constants and signs are svox2's, so that checkpoints can be exchanged.
+// mid-grey. Constants and signs are svox2's, so that checkpoints are interchangeable.
 #pragma once
 
 #include "kernels/base/vec.h"
@@ -14,8 +15,8 @@ inline constexpr double kSh0 = 0.28209479177387814;  // 1 / (2 sqrt(pi))
 // Degree 0, 1, 2 have 1, 4, 9 functions.
 HD constexpr int BasisOfDegree(int degree) { return (degree + 1) * (degree + 1); }
 
-// gamma [basis]; `basis` is 1, 4 or 9; `d` has unit length (a length s scales band l by s^l:
-// normalise once, where the ray is made).
+// gamma [basis]; `basis` is 1, 4 or 9; `d` has unit length (a length s would scale band l by
+// s^l).
 template <typename T>
 HD REGRADE_ALWAYS_INLINE void ShBasis(int basis, const Vec3<T>& d, T* gamma) {
   gamma[0] = T(kSh0);

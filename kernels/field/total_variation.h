@@ -1,12 +1,11 @@
-// Total variation of a sparse grid, value and gradient, plainly: the specification of the fast
-// path's.
+// Total variation of a sparse grid, value and gradient: the plain specification.
 //
 // EQ(total-variation): TV = sum over stored vertices of sqrt(1e-9 + sum_a (N_a / 256)^2 (v(p +
-// e_a) - v(p))^2), each value for itself (svox2's weighting per axis; H98: voxels that are not
-// cubes are weighted by N_a). Beyond the box nothing is compared. An empty neighbour counts as
-// 0 for densities (a surface has an edge there) and as the voxel's own value for colours (no
-// edge). One function gives value and gradient: svox2's differ in their epsilon and in where
-// the axis weight stands.
+// e_a) - v(p))^2), separately for each value (svox2's weighting per axis; H98: voxels that are
+// not cubes are weighted by N_a). No difference is taken across the box's border. An empty
+// neighbour counts as 0 for densities (a surface is an edge) and as the voxel's own value for
+// colours (no edge). One function gives value and gradient; svox2's differ in their epsilon and
+// in the position of the axis weight.
 #pragma once
 
 #include <cmath>
@@ -17,8 +16,8 @@ namespace regrade {
 
 inline constexpr double kVariationEpsilon = 1e-9;
 
-// values [N, stride], the one at `index` of each voxel. Adds scale * gradient to d_values if it
-// is not null; returns the sum over vertices [begin, end), unscaled.
+// values [N, stride]: the value at `index` of each voxel. Adds scale * gradient to d_values if
+// it is not null; returns the unscaled sum over vertices [begin, end).
 template <typename T>
 T TotalVariation(const GridFrame& frame, const int32_t* links, const T* values, int stride,
                  int index, bool empty_is_zero, int64_t begin, int64_t end, T scale,
@@ -33,7 +32,7 @@ T TotalVariation(const GridFrame& frame, const int32_t* links, const T* values, 
     const T own = values[static_cast<int64_t>(link) * stride + index];
     int32_t neighbour[3];
     T weighted[3];  // N_a / 256 times the difference
-    T inside = T(kVariationEpsilon);
+    T radicand = T(kVariationEpsilon);
     for (int a = 0; a < 3; ++a) {
       const bool in_box = at[a] + 1 < n[a];
       neighbour[a] = in_box ? links[vertex + strides[a]] : -1;
@@ -43,9 +42,9 @@ T TotalVariation(const GridFrame& frame, const int32_t* links, const T* values, 
       else if (in_box && empty_is_zero)
         other = 0;
       weighted[a] = T(n[a]) / T(256) * (other - own);
-      inside += weighted[a] * weighted[a];
+      radicand += weighted[a] * weighted[a];
     }
-    const T root = std::sqrt(inside);
+    const T root = std::sqrt(radicand);
     sum += root;
     if (d_values == nullptr) continue;
     for (int a = 0; a < 3; ++a) {

@@ -61,18 +61,26 @@ HD void Interpolate(const GridFrame& frame, const int32_t* links, const T* value
   }
 }
 
-// Adjoint of Interpolate: d_values += its transpose applied to d_out. Not for concurrent use on
-// shared voxels.
-template <typename T>
+// Adjoint of Interpolate: adds its transpose, applied to d_out [channels], to d_values
+// [N, stride]. `Add(pointer, value)` is a plain or an atomic +=.
+template <typename T, typename Add>
 HD void InterpolateAdjoint(const GridFrame& frame, const int32_t* links, int stride,
-                           int channels, const Cell<T>& cell, const T* d_out, T* d_values) {
+                           int channels, const Cell<T>& cell, const T* d_out, T* d_values,
+                           const Add& add) {
   for (int corner = 0; corner < 8; ++corner) {
     const int32_t link = links[CornerVertex(frame, cell.vertex, corner)];
     if (link < 0) continue;
     const T w = CornerWeight(cell.fraction, corner);
     T* d_v = d_values + static_cast<int64_t>(link) * stride;
-    for (int c = 0; c < channels; ++c) d_v[c] += w * d_out[c];
+    for (int c = 0; c < channels; ++c) add(&d_v[c], w * d_out[c]);
   }
 }
+
+struct PlainAdd {
+  template <typename T>
+  HD void operator()(T* target, T value) const {
+    *target += value;
+  }
+};
 
 }  // namespace regrade

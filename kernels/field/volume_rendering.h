@@ -8,7 +8,7 @@
 // R_{i+1},
 //   dC/dsigma_i = delta_i T_{i+1} (c_i - R_{i+1}),   dC/dc_i = w_i,   dC/dc_bg = T_N.
 // No division by 1 - alpha, every factor bounded; total-minus-prefix has the wrong sign on 2-3
-// % of well hidden samples in float.
+// % of strongly occluded samples in float.
 #pragma once
 
 #include <cmath>
@@ -19,11 +19,11 @@
 namespace regrade {
 
 inline constexpr double kMaxDensity =
-    1e9;  // per world unit: clamp sigma before it meets delta = 0
+    1e9;  // per world unit: bounds sigma, so that sigma * delta is defined for delta = 0
 inline constexpr double kMaxOpticalDepth = 104;  // expf(-104) is 0
 
-// Optical depth of one sample; negative or NaN density gives 0 (NaN is counted where parameters
-// are stepped).
+// Optical depth of one sample; negative or NaN density gives 0 (the optimizer's step counts
+// NaNs).
 template <typename T>
 HD T OpticalDepth(T density, T delta) {
   const T sigma = density > 0 ? (density < T(kMaxDensity) ? density : T(kMaxDensity)) : T(0);
@@ -53,9 +53,9 @@ HD T Composite(T tau, const Vec3<T>& color, CompositeState<T>* state) {
   return w;
 }
 
-// The backward walk: call once a sample, last to first. `behind` starts as c_bg and is R_{i+1}
-// on entry. Returns dL/dsigma_i for dL/dC = d_color; T_{i+1} is the transmittance after the
-// sample.
+// One step of the backward pass: call it per sample, last to first. `behind` starts as c_bg and
+// is R_{i+1} on entry, R_i on return. Returns dL/dsigma_i for dL/dC = d_color; T_{i+1} is the
+// transmittance after the sample.
 template <typename T>
 HD T CompositeAdjoint(T delta, T tau, T transmittance_after, const Vec3<T>& color,
                       const Vec3<T>& d_color, Vec3<T>* behind) {

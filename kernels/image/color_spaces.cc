@@ -26,7 +26,7 @@ Mat3d Inverse(const Mat3d& m) {
   return inverse;
 }
 
-// The curve on positive values, its mirror image on negative ones; NaN stays NaN.
+// The curve on positive values, continued as an odd function; NaN stays NaN.
 template <typename Curve>
 Vec3d Odd(const Curve& curve, const Vec3d& v) {
   Vec3d result;

@@ -33,12 +33,12 @@ void CheckMask(const Image& image, const Image* mask) {
                 "the mask is " + std::to_string(mask->width) + "x" +
                     std::to_string(mask->height) + ", its picture " +
                     std::to_string(image.width) + "x" + std::to_string(image.height),
-                "", "masks need the size of their pictures");
+                "", "a mask must have the size of its picture");
 }
 
 [[noreturn]] void ThrowNoPixel() {
   throw Error(ExitCode::kInput, "mask selects no pixel", "",
-              "colours are taken where the mask is above 1/2, the picture is opaque and its "
+              "colours are measured where the mask is above 1/2, the picture is opaque and its "
               "values are finite");
 }
 
@@ -87,7 +87,7 @@ struct IntegerSums {
     for (int i = 0; i < 3; ++i) {
       result.mean[i] = static_cast<double>(sum[i]) / (255.0 * n);
       for (int j = i; j < 3; ++j) {
-        // n sum xy - sum x sum y: the difference that cancels is taken in integers.
+        // n sum xy - sum x sum y: the difference that cancels is computed in integers.
         const __int128 difference = static_cast<__int128>(count) * product[i][j] -
                                     static_cast<__int128>(sum[i]) * sum[j];
         result.covariance(i, j) = result.covariance(j, i) =
@@ -180,7 +180,7 @@ ColorStatistics Pool(const std::vector<ColorStatistics>& parts) {
   }
   if (result.count == 0) ThrowNoPixel();
   const double n = static_cast<double>(result.count);
-  // From the first mean on, so that equal means pool to exactly themselves.
+  // Relative to the first mean, so that equal means pool to exactly the same value.
   Vec3d shift{};
   for (const ColorStatistics& part : parts)
     shift += (part.mean - origin) * static_cast<double>(part.count);

@@ -50,7 +50,7 @@ std::optional<double> HueChroma::MeanChroma() const {
 std::optional<double> HueChroma::HueStd() const {
   if (count_ == 0 || !(*MeanChroma() >= 1e-4)) return std::nullopt;
   const double r = std::min(1.0, std::hypot(sum_a_, sum_b_) / sum_chroma_);
-  return std::sqrt(-2 * std::log(std::max(r, 1e-12)));  // hues that cancel: finite, 7.4
+  return std::sqrt(-2 * std::log(std::max(r, 1e-12)));  // finite (7.4) for hues that cancel
 }
 
 }  // namespace regrade

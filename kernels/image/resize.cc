@@ -23,8 +23,8 @@ std::vector<Taps> AxisTaps(int old_size, int new_size) {
     if (new_size == old_size) {
       t = {i, {1.0}};
     } else if (new_size < old_size) {
-      // Borders as integers over new_size: neighbours share them exactly and weights are exact
-      // fractions.
+      // Borders as integers in units of 1 / new_size: neighbours share them exactly, and
+      // weights are exact fractions.
       const int64_t begin = static_cast<int64_t>(i) * old_size, end = begin + old_size;
       t.first = static_cast<int>(begin / new_size);
       for (int64_t x = t.first; x * new_size < end; ++x) {
@@ -43,7 +43,7 @@ std::vector<Taps> AxisTaps(int old_size, int new_size) {
   return taps;
 }
 
-// Adds weight * row to the sums; colours of a picture with alpha go in multiplied by it.
+// Adds weight * row to the sums; with an alpha channel, colours are premultiplied by it.
 void AddRow(const Image& source, int y, double weight, std::vector<double>* sums) {
   const float* row = source.at(0, y);
   const size_t n = sums->size();

@@ -1,4 +1,4 @@
-// Sums over the rows of a picture, in parallel, with the same result for any number of threads.
+// Sums over the rows of an image, in parallel, with the same result for any number of threads.
 #pragma once
 
 #include <vector>

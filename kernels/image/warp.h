@@ -1,4 +1,4 @@
-// Bilinear sampling of a picture at real positions: the one rule that every warp here shares.
+// Bilinear sampling of an image at real positions, used by every warp in the project.
 //
 // Positions are pixel indices: (0, 0) is the centre of the first pixel, so an image point (u,
 // v) in the camera convention (centres at +0.5) is the position (u - 0.5, v - 0.5).
@@ -11,25 +11,25 @@
 
 namespace regrade {
 
-// The four pixels around a position with their weights. Outside the picture the border is
+// The four pixels around a position with their weights. Outside the image the border is
 // repeated.
 struct BilinearTaps {
   int x0 = 0, x1 = 0, y0 = 0, y1 = 0;  // always valid indices
   double ax = 0, ay = 0;               // weight of x1 and of y1
-  // The position lies within the outermost pixel centres: no border was repeated.
+  // The position lies within the outermost pixel centres: no border is repeated.
   bool in_frame = false;
-  // All four taps are pixels of their own, also those of weight 0: floor(x) + 1 is in the
+  // All four taps are distinct pixels, including those of weight 0: floor(x) + 1 is in the
   // frame.
   bool four_taps = false;
 };
 
-// Any position is allowed; one that is not finite has in_frame = four_taps = false. Pictures
-// have at least one pixel.
+// Any position is allowed; a non-finite one has in_frame = four_taps = false. The image needs
+// at least one pixel.
 HD inline BilinearTaps TapsAt(double x, double y, int width, int height) {
   using std::floor;
   BilinearTaps taps;
   taps.in_frame = x >= 0 && x <= width - 1 && y >= 0 && y <= height - 1;
-  // Clamped before the cast: a huge or undefined float-to-int conversion is undefined
+  // Clamped before the cast: converting a huge or non-finite float to int is undefined
   // behaviour.
   const double cx = x >= 0 ? (x <= width - 1 ? x : width - 1) : 0;
   const double cy = y >= 0 ? (y <= height - 1 ? y : height - 1) : 0;
@@ -44,7 +44,7 @@ HD inline BilinearTaps TapsAt(double x, double y, int width, int height) {
 }
 
 // Value of one channel of interleaved rows [height, width, channels]. A tap of weight 0 has no
-// influence, whatever it holds.
+// influence, whatever its value.
 inline double Sample(const BilinearTaps& taps, const float* pixels, int width, int channels,
                      int channel) {
   const auto value = [&](int x, int y) -> double {

@@ -1,4 +1,4 @@
-// The activations a Lipschitz network may use: value, derivative and Lipschitz constant.
+// The activations of a Lipschitz network: value, derivative and Lipschitz constant.
 #pragma once
 
 #include <cmath>
@@ -30,7 +30,7 @@ HD T Activate(Activation activation, T omega, T x) {
   return x;
 }
 
-// At the kink of the two rectifiers: the slope from the left, as PyTorch has it.
+// At the kink of the two rectifiers: the left derivative, as in PyTorch.
 template <typename T>
 HD T ActivateDerivative(Activation activation, T omega, T x) {
   using std::cos, std::exp, std::tanh;

@@ -3,7 +3,7 @@
 namespace regrade {
 namespace {
 
-// before[l] is the sum of layer l ahead of its activation, x[l] its input.
+// before[l] is the input of layer l's activation, x[l] the input of the layer.
 template <typename T>
 void Trace(const DenseNetwork<T>& network, const T* input, std::vector<std::vector<T>>* x,
            std::vector<std::vector<T>>* before) {

@@ -1,4 +1,4 @@
-// A dense network, plainly, for any scalar: the specification that the fused path is held to.
+// A dense network for any scalar: the plain specification of the fused path.
 //
 // EQ(mlp): x_0 = input, x_l = act(A_l x_{l-1} + b_l) for all but the last layer, which has no
 // activation; the adjoint is the chain rule, layer by layer.

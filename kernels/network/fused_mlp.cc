@@ -34,8 +34,8 @@ const FusedMlpFunctions* FusedMlpFor(const char* name) {
 
 namespace {
 
-constexpr int64_t kRowsPerTask = 960;  // forward: ten blocks, so that starting one pays
-constexpr int kGroups = 64;            // adjoint: partial sums, whatever the number of threads
+constexpr int64_t kRowsPerTask = 960;  // forward: ten blocks, to amortise starting a task
+constexpr int kGroups = 64;            // adjoint: partial sums, for any number of threads
 
 const FusedMlpFunctions* Best() {
   for (const char* name : {"avx512", "avx2"})
@@ -68,7 +68,7 @@ int64_t FusedMlp::NumParameters() const { return Offset(layers.size()); }
 int64_t FusedMlp::WorkspaceSize() const {
   int64_t lanes = kMlpEndLanes + 2 * kMlpHidden + 1;
   for (const Layer& layer : layers) lanes += 2 * layer.inputs;
-  return kMlpBlock * lanes;  // the last lane is a row of zeros
+  return kMlpBlock * lanes;  // the last one is a row of zeros
 }
 
 void ActivateRowsPlain(Activation activation, float omega, int n, float* x, float* slope) {
@@ -91,7 +91,7 @@ FusedMlp MakeFusedMlp(const DenseNetwork<float>& network) {
     layer.outputs = l + 1 == network.layers.size() ? kMlpEndLanes : kMlpHidden;
     REGRADE_CHECK_LE(dense.inputs, layer.inputs);
     REGRADE_CHECK_LE(dense.outputs, layer.outputs);
-    // A padded hidden neuron would put act(0) into the next layer and take bias gradients.
+    // A padded hidden neuron would feed act(0) to the next layer and receive bias gradients.
     if (l > 0) REGRADE_CHECK_EQ(dense.inputs, kMlpHidden);
     layer.weight.Resize(static_cast<int64_t>(layer.outputs) * layer.inputs);
     layer.transposed.Resize(layer.weight.size());

@@ -1,8 +1,8 @@
 // The CPU's fast path through a narrow network for many voxels: blocks of rows stay in the
-// caches from the first layer to the last and back. Held to dense_layer.h by the tests.
+// caches for all layers, forward and back. Tests compare it with dense_layer.h.
 //
 // Rows are padded: inputs and outputs to kMlpEndLanes, hidden layers are kMlpHidden wide.
-// Weights and rows of the padding are zero, so it costs time and changes nothing.
+// Padding weights and values are zero, so padding costs time and does not change results.
 #pragma once
 
 #include <cstdint>
@@ -20,7 +20,7 @@ inline constexpr int kMlpMaxLayers = 8;
 inline constexpr int kMlpBlock =
     96;  // voxels: six layers and their slopes are 250 KB, an L2 cache
 
-// A dense network with padded layers, each matrix kept in both orders.
+// A dense network with padded layers, each matrix stored in both orders.
 struct FusedMlp {
   struct Layer {
     int outputs = 0, inputs = 0;  // padded
@@ -32,45 +32,45 @@ struct FusedMlp {
   float omega = 1;
   std::vector<Layer> layers;
 
-  // Sizes of all padded weights and biases, and where layer l's begin: weight first, then bias.
+  // Number of all padded weights and biases, and offset of layer l: weights first, then biases.
   int64_t NumParameters() const;
   int64_t Offset(size_t layer) const;
-  // Floats of working memory a thread needs.
+  // Floats of working memory per thread.
   int64_t WorkspaceSize() const;
 };
 
-// The network needs at least two layers, hidden ones kMlpHidden wide, ends of at
-// most kMlpEndLanes, and at most kMlpMaxLayers of them.
+// The network must have at least two and at most kMlpMaxLayers layers, hidden ones kMlpHidden
+// wide, inputs and outputs of at most kMlpEndLanes.
 FusedMlp MakeFusedMlp(const DenseNetwork<float>& network);
 
 // output [n, kMlpEndLanes] of input [n, kMlpEndLanes].
 void FusedForward(const FusedMlp& mlp, const float* input, int64_t n, float* output);
 
 // Adds to `gradient` (the unpadded shapes) the adjoint of FusedForward for d_output
-// [n, kMlpEndLanes]. The forward pass is done again a block at a time, so memory does not grow
+// [n, kMlpEndLanes]. The forward pass is recomputed block by block, so memory does not grow
 // with n. Sums have a fixed order: the result does not depend on the number of threads.
 void FusedAdjoint(const FusedMlp& mlp, const float* input, const float* d_output, int64_t n,
                   DenseNetwork<double>* gradient);
 
-// One set of functions an instruction set.
+// One set of functions per instruction set.
 struct FusedMlpFunctions {
   const char* name;
   // Rows [0, n) of input and output, on the calling thread; `workspace` [WorkspaceSize()].
   void (*forward)(const FusedMlp&, const float* input, int64_t n, float* output,
                   float* workspace);
-  // The same, and adds to partial [NumParameters()].
+  // The same, and adds the gradient to partial [NumParameters()].
   void (*adjoint)(const FusedMlp&, const float* input, const float* d_output, int64_t n,
                   float* partial, float* workspace);
   // sine [n] and cosine [n] of x [n]: absolute error <= 2e-7 for |x| <= 50, std::sin beyond.
   void (*sine_cosine)(const float* x, int64_t n, float* sine, float* cosine);
 };
 
-// x [n] becomes act(x); slope [n], unless null, act'(x). The rare activations of all sets.
+// x [n] becomes act(x); slope [n], unless null, act'(x). The activations without a vector form.
 void ActivateRowsPlain(Activation activation, float omega, int n, float* x, float* slope);
 
-// For tests and benchmarks: "baseline", "avx2", "avx512"; nullptr where the processor lacks it.
+// For tests and benchmarks: "baseline", "avx2", "avx512"; nullptr if the processor lacks it.
 const FusedMlpFunctions* FusedMlpFor(const char* name);
-// The best of this processor; `name` null returns to it. Tests choose another.
+// Selects a set for tests; `name` null selects the processor's best.
 void UseFusedMlp(const char* name);
 
 }  // namespace regrade

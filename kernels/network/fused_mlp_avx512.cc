@@ -1,5 +1,5 @@
-// The fused network for processors with avx512 instructions (the build adds their flags to this
-// file alone).
+// The fused network compiled for AVX-512 (the build adds the instruction-set flags to this file
+// only).
 #define REGRADE_SIMD_NAMESPACE simd_avx512
 #define REGRADE_SIMD_NAME "avx512"
 #include "kernels/network/fused_mlp_simd.h"

@@ -1,10 +1,10 @@
-// Body of the fused network, compiled once an instruction set: define REGRADE_SIMD_NAMESPACE
-// and REGRADE_SIMD_NAME before including. Only GCC's vector types are used.
+// Body of the fused network, compiled once per instruction set: define REGRADE_SIMD_NAMESPACE
+// and REGRADE_SIMD_NAME before including it. It uses GCC's vector types only.
 //
 // Rows are voxels and lanes are neurons, so that forward (X A^T), input gradient (D A) and
-// weight gradient (D^T X) are one and the same small matrix product.
+// weight gradient (D^T X) are the same small matrix product.
 //
-// Nothing here may instantiate a template or call an inline function that the linker could
+// No code here may instantiate a template or call an inline function that the linker could
 // share with other files: the shared copy might be the one compiled for a newer processor. So
 // memory comes from the caller, and only trivial accessors are used.
 #include <cmath>
@@ -127,7 +127,8 @@ void ActivateRows(Activation activation, float omega, int n, float* x, float* sl
   }
 }
 
-// The caller's memory, cut up: every layer's input and the slopes of the activation before it.
+// The caller's memory, partitioned: every layer's input, and the derivatives of the activation
+// before it.
 struct Workspace {
   float* input[kMlpMaxLayers];
   float* slope[kMlpMaxLayers];

@@ -5,7 +5,7 @@
 //   d_W = s / sigma (d_A - <d_A, W / sigma> u v^T),   d_K = squareplus'(K) <d_A, W / sigma>.
 // sigma never exceeds ||W||_2, so ||A||_2 >= squareplus(K): the certificate needs exact
 // singular values (stylize/field/lipschitz_network.h). W is divided by its largest entry before
-// anything is squared, so that no scale of W over- or underflows.
+// any squaring, so that no scale of W over- or underflows.
 #pragma once
 
 #include <algorithm>
@@ -21,7 +21,7 @@ namespace regrade {
 inline constexpr double kSquareplusB = 1e-12;
 
 // EQ(squareplus), Barron 2021: (x + sqrt(x^2 + b)) / 2. The textbook form cancels for x < 0 (in
-// float it is exactly 0 below -0.0039 for b = 1e-12, a dead layer); this one never does.
+// float it is exactly 0 below -0.0039 for b = 1e-12, a dead layer); this form does not.
 template <typename T>
 HD T Squareplus(T x, T b = T(kSquareplusB)) {
   using std::hypot, std::sqrt;
@@ -54,7 +54,7 @@ T LargestMagnitude(const SpectralView<T>& w) {
   return largest;
 }
 
-// Makes `x` a unit vector; returns its former length and leaves a zero vector as it is.
+// Normalises `x`; returns its former length and leaves a zero vector unchanged.
 template <typename T>
 T NormalizeInPlace(T* x, int n) {
   T sum = 0;
@@ -78,7 +78,7 @@ T LeftFromRight(const SpectralView<T>& w, T scale) {
 }
 
 // Starts from W's longest column, so that sigma >= ||W||_F / sqrt(inputs) from the first step
-// on, whatever W is: a random start can be orthogonal to the top singular vector.
+// for any W: a random start can be orthogonal to the top singular vector.
 template <typename T>
 void StartPowerIteration(const SpectralView<T>& w) {
   std::fill_n(w.u, w.outputs, T(0));
@@ -100,7 +100,7 @@ void StartPowerIteration(const SpectralView<T>& w) {
 }
 
 // One step: v from u, then u from v. Returns u^T W v / LargestMagnitude(W); 0 for W = 0.
-// Restarts when u has lost the range of W.
+// Restarts if u is orthogonal to the range of W.
 template <typename T>
 T PowerStep(const SpectralView<T>& w) {
   const T scale = LargestMagnitude(w);
@@ -118,8 +118,8 @@ T PowerStep(const SpectralView<T>& w) {
   return LeftFromRight(w, scale);
 }
 
-// Start, then steps until sigma changes by less than 1e-6 of itself (at most 200 steps): a
-// single step after a random start is off by up to a half.
+// Start, then steps until sigma changes by less than 1e-6 of its value (at most 200 steps): a
+// single step after a random start is off by up to a factor of two.
 template <typename T>
 T WarmUpPowerIteration(const SpectralView<T>& w) {
   StartPowerIteration(w);
@@ -133,7 +133,7 @@ T WarmUpPowerIteration(const SpectralView<T>& w) {
   return sigma;
 }
 
-// sigma / LargestMagnitude(W) with u, v as they are.
+// sigma / LargestMagnitude(W) with the current u, v.
 template <typename T>
 T FrozenSigma(const SpectralView<T>& w, T scale) {
   if (!(scale > 0)) return 0;
@@ -157,7 +157,8 @@ void LipschitzWeight(const SpectralView<T>& w, T k, T* a) {
   for (int64_t i = 0; i < n; ++i) a[i] = factor * (w.weight[i] / scale);
 }
 
-// Adds to d_weight [outputs, inputs] and d_k what d_a [outputs, inputs] says. W = 0 takes none.
+// Adds to d_weight [outputs, inputs] and d_k the gradient for d_a [outputs, inputs]. W = 0
+// contributes nothing.
 template <typename T>
 void LipschitzWeightAdjoint(const SpectralView<T>& w, T k, const T* d_a, T* d_weight, T* d_k) {
   const int64_t n = static_cast<int64_t>(w.outputs) * w.inputs;

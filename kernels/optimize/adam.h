@@ -2,8 +2,8 @@
 //
 // EQ(adam), Kingma and Ba 2015:  m = b1 m + (1 - b1) g,  v = b2 v + (1 - b2) g^2,
 //   x -= rate (m / (1 - b1^t)) / (sqrt(v / (1 - b2^t)) + epsilon),   t = 1, 2, ...
-// epsilon stands outside the root: a gradient that has always been 0 moves nothing, and one
-// whose square underflows takes a tiny step, not an infinite one.
+// epsilon is outside the root: a gradient that has always been 0 moves nothing, and one whose
+// square underflows takes a tiny step, not an infinite one.
 #pragma once
 
 #include <cmath>
@@ -27,7 +27,7 @@ HD inline double AdamBiasCorrection(double beta, int64_t t) {
   return -expm1(static_cast<double>(t) * log(beta));
 }
 
-// A gradient of this size or more, whose square is not finite, is not stepped along.
+// Gradients of this magnitude or more, whose square is not finite, are rejected.
 inline constexpr float kLargestGradient = 1e19f;
 
 template <typename T>
@@ -40,16 +40,16 @@ HD void AdamUpdate(T gradient, T beta1, T beta2, T epsilon, T rate_over_correcti
             (sqrt(*second_moment * inverse_correction2) + epsilon);
 }
 
-// All that a resumed run needs.
+// The state a resumed run needs.
 struct AdamState {
   std::vector<float> first_moment, second_moment;
   int64_t steps = 0;     // taken
-  int64_t rejected = 0;  // not taken
+  int64_t rejected = 0;  // steps
 };
 
 // One step. A gradient that is not finite, or whose square is not (|g| >= 1e19 would freeze its
-// weight for ever), changes no value and no moment: the step is counted as rejected and false
-// returned.
+// weight permanently), changes no value and no moment: the step is counted as rejected and the
+// function returns false.
 bool AdamStep(const AdamOptions& options, double rate, View<const float> gradient,
               View<float> values, AdamState* state);
 

@@ -1,20 +1,20 @@
-// RMSprop, by which fitting steps a field's parameters.
+// RMSprop, the optimizer of a field's parameters.
 #pragma once
 
 namespace regrade {
 
-// How parameters are stepped. EQ(rmsprop), svox2's: v = g^2 at first touch, then v = beta v +
-// (1 - beta) g^2; x -= rate g / (sqrt(v) + epsilon), no bias correction; untouched voxels keep
-// value and state bit for bit.
+// EQ(rmsprop), as in svox2: v = g^2 at first touch, then v = beta v + (1 - beta) g^2;
+// x -= rate g / (sqrt(v) + epsilon), without bias correction; untouched voxels keep value and
+// state bit for bit.
 struct RmspropOptions {
   float beta = 0.95f;
   float epsilon = 1e-8f;
   float rate_sh = 1e-2f;
   float rate_density = 30.0f;
-  // Colours are then projected: a voxel's mean colour (degree 0) into [0, 1], its
-  // view-dependent coefficients into
-  // [-view_bound, view_bound]. What the colour clamp hides would otherwise wander off, and come
-  // to light under a colour map: clamping does not commute with it.
+  // After each step, a voxel's mean colour (degree 0) is projected into [0, 1] and its
+  // view-dependent coefficients into [-view_bound, view_bound]. Without this, coefficients
+  // hidden by the colour clamp drift, and a colour map reveals them: clamping does not commute
+  // with it.
   float view_bound = 0.2f;
   float rate_sphere_density = 3.0f;  // of the background's layers
   float rate_sphere_color = 0.1f;

@@ -1,4 +1,4 @@
-// posix_spawn, one pipe for both outputs, and a loop that drains it and watches the clock.
+// posix_spawn, one pipe for both outputs, and a loop that reads it and checks the time limits.
 #include "kernels/process/child_process.h"
 
 #include <fcntl.h>
@@ -17,6 +17,7 @@
 #include <deque>
 
 #include "kernels/base/error.h"
+#include "kernels/base/file_descriptor.h"
 #include "kernels/process/process_guard.h"
 
 namespace regrade {
@@ -35,38 +36,24 @@ double Now() {
   throw Error(ExitCode::kResources, what + ": " + std::strerror(code));
 }
 
-// A file descriptor that closes itself.
-struct Descriptor {
-  int value = -1;
-  Descriptor() = default;
-  explicit Descriptor(int value) : value(value) {}
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  ~Descriptor() { Close(); }
-  void Close() {
-    if (value >= 0) close(value);
-    value = -1;
-  }
-};
-
 // Keeps the beginning of the output in a file, up to the cap, and the end in memory.
 class Log {
  public:
   Log(const std::string& path, int64_t cap) : path_(path), left_(cap) {
     if (path.empty()) return;
-    file_.value = open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-    if (file_.value < 0) ThrowNoResources("cannot write the log " + path, errno);
+    file_.Reset(open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666));
+    if (file_.get() < 0) ThrowNoResources("cannot write the log " + path, errno);
   }
 
   void Append(const char* data, size_t size) {
-    if (file_.value < 0) return;
+    if (file_.get() < 0) return;
     const size_t kept = std::min<int64_t>(left_, static_cast<int64_t>(size));
     Write(data, kept);
     left_ -= static_cast<int64_t>(kept);
     cut_ |= kept < size;
   }
 
-  // What follows the cap matters most when something failed: the last lines close the file.
+  // The last lines explain a failure best: they are appended after the cut.
   void Finish(const std::deque<std::string>& last_lines) {
     if (!cut_) return;
     std::string end = "\n[... log cut here; the last lines were:]\n";
@@ -75,10 +62,10 @@ class Log {
   }
 
  private:
-  // A log that cannot be written any further (full disk) must not hold the child up.
+  // A log that cannot be written (full disk) must not stop the child.
   void Write(const char* data, size_t size) {
     while (size > 0) {
-      const ssize_t written = write(file_.value, data, size);
+      const ssize_t written = write(file_.get(), data, size);
       if (written < 0 && errno == EINTR) continue;
       if (written <= 0) return;
       data += written;
@@ -87,7 +74,7 @@ class Log {
   }
 
   std::string path_;
-  Descriptor file_;
+  FileDescriptor file_;
   int64_t left_;
   bool cut_ = false;
 };
@@ -139,8 +126,8 @@ std::vector<char*> Pointers(const std::vector<std::string>& strings) {
   return pointers;
 }
 
-// Owns a started child: whatever happens, its group is killed and it is reaped; if it is we who
-// are killed, the group's guard sees to that.
+// Owns a started child: the destructor kills its group and reaps it; if this process is killed,
+// the group's guard kills the group.
 class Child {
  public:
   Child(const ChildOptions& options, int output) {
@@ -154,7 +141,7 @@ class Child {
     posix_spawn_file_actions_addclosefrom_np(&actions, STDERR_FILENO + 1);
     if (!options.working_folder.empty())
       posix_spawn_file_actions_addchdir_np(&actions, options.working_folder.c_str());
-    // Our own signal handlers and masks are none of the child's business.
+    // The child gets default signal handlers and an empty mask.
     sigset_t none, all;
     sigemptyset(&none);
     sigfillset(&all);
@@ -183,13 +170,13 @@ class Child {
 
   void Signal(int signal) const { guard_.Signal(signal); }
 
-  // True once the child is over.
-  bool Over() const {
+  // True once the child has ended.
+  bool Ended() const {
     siginfo_t info{};
     return waitid(P_PID, pid_, &info, WEXITED | WNOHANG | WNOWAIT) != 0 || info.si_pid == pid_;
   }
 
-  // Ends what is left of the group, then takes the child's status.
+  // Kills the rest of the group and returns the child's status.
   int Reap() {
     Signal(SIGKILL);
     int status = 0;
@@ -200,7 +187,7 @@ class Child {
   }
 
  private:
-  ProcessGuard guard_;  // keeps the group's number taken as long as the child is wanted
+  ProcessGuard guard_;  // keeps the group's number in use while the child is
   pid_t pid_ = -1;
 };
 
@@ -221,7 +208,7 @@ std::string ChildResult::Describe() const {
       return "ended because it printed nothing for too long (it ran for " +
              std::to_string(std::lround(seconds)) + " s)";
     case ChildEnd::kStopped:
-      return "stopped at your wish";
+      return "cancelled by the user";
   }
   return "";
 }
@@ -237,41 +224,41 @@ ChildResult RunChild(const ChildOptions& options, const LineFunction& on_line,
   REGRADE_CHECK(!options.argv.empty());
   int ends[2];
   if (pipe2(ends, O_CLOEXEC) != 0) ThrowNoResources("cannot make a pipe", errno);
-  Descriptor input(ends[0]), output(ends[1]);
-  fcntl(input.value, F_SETFL, O_NONBLOCK);
+  FileDescriptor input(ends[0]), output(ends[1]);
+  fcntl(input.get(), F_SETFL, O_NONBLOCK);
   Log log(options.log_path, options.log_cap_bytes);
   std::deque<std::string> last;
   Lines lines(on_line, &last);
 
   const double start = Now();
-  Child child(options, output.value);
+  Child child(options, output.get());
   output.Close();
 
   ChildResult result;
-  double heard = start, asked = start, told_to_end = 0, over_since = 0;
+  double heard = start, asked = start, asked_to_end = 0, ended_since = 0;
   char bytes[1 << 16];
   while (true) {
     const double now = Now();
-    if (over_since == 0 && child.Over()) {
-      child.Signal(SIGKILL);  // whoever is left of its group
-      over_since = now;
+    if (ended_since == 0 && child.Ended()) {
+      child.Signal(SIGKILL);  // the rest of its group
+      ended_since = now;
     }
-    pollfd wait{input.value, POLLIN, 0};
-    const bool readable = poll(&wait, 1, over_since > 0 ? 0 : kPollMs) > 0;
-    const ssize_t size = readable ? read(input.value, bytes, sizeof(bytes)) : 0;
+    pollfd wait{input.get(), POLLIN, 0};
+    const bool readable = poll(&wait, 1, ended_since > 0 ? 0 : kPollMs) > 0;
+    const ssize_t size = readable ? read(input.get(), bytes, sizeof(bytes)) : 0;
     if (size > 0) {
       heard = now;
       log.Append(bytes, static_cast<size_t>(size));
       lines.Append(bytes, static_cast<size_t>(size));
     }
-    if (over_since > 0) {
-      // A grandchild outside the group may hold the pipe open, or flood it, for ever.
-      if (size <= 0 || now - over_since > 1) break;
+    if (ended_since > 0) {
+      // A grandchild outside the group may keep the pipe open or fill it forever.
+      if (size <= 0 || now - ended_since > 1) break;
       continue;
     }
     if (readable && size <= 0) usleep(kPollMs * 100);  // closed its outputs, but still runs
-    if (told_to_end > 0) {
-      if (now - told_to_end > options.grace_s) child.Signal(SIGKILL);
+    if (asked_to_end > 0) {
+      if (now - asked_to_end > options.grace_s) child.Signal(SIGKILL);
       continue;
     }
     if (keep_going && now - asked >= 1e-3 * kPollMs) {
@@ -282,9 +269,9 @@ ChildResult RunChild(const ChildOptions& options, const LineFunction& on_line,
       result.end = ChildEnd::kWallLimit;
     if (options.quiet_limit_s > 0 && now - heard > options.quiet_limit_s)
       result.end = ChildEnd::kQuietLimit;
-    if (result.end == ChildEnd::kExited) continue;  // nobody wants it ended
+    if (result.end == ChildEnd::kExited) continue;  // no reason to end it
     child.Signal(SIGTERM);
-    told_to_end = now;
+    asked_to_end = now;
   }
   const int status = child.Reap();
   lines.End();

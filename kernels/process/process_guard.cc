@@ -1,5 +1,5 @@
-// The guard reads a pipe whose other end nobody but us holds: the kernel closes it when we die,
-// and closing is what the guard waits for.
+// The guard reads a pipe whose other end only the parent holds: the kernel closes it when the
+// parent dies, and the read returns.
 #include "kernels/process/process_guard.h"
 
 #include <fcntl.h>
@@ -17,7 +17,8 @@
 namespace regrade {
 namespace {
 
-// A copy of a process with many threads: system calls alone are safe in it.
+// Runs in a forked copy of a process with many threads: only async-signal-safe functions may be
+// called (setpgid, close_range, read, kill, _exit).
 [[noreturn]] void WaitForTheEnd(int end) {
   setpgid(0, 0);
   if (end > 0) close_range(0, static_cast<unsigned>(end) - 1, 0);
@@ -25,7 +26,7 @@ namespace {
   char nothing;
   while (read(end, &nothing, 1) < 0 && errno == EINTR) {
   }
-  kill(0, SIGKILL);  // the guard is of its group
+  kill(0, SIGKILL);  // the guard is in its group
   _exit(0);
 }
 
@@ -35,11 +36,11 @@ ProcessGuard::ProcessGuard() {
   int ends[2];
   if (pipe2(ends, O_CLOEXEC) != 0)
     throw Error(ExitCode::kResources, std::string("cannot make a pipe: ") + strerror(errno));
-  // Signals that end or stop us are for us to answer; the copy is born deaf to them.
+  // The guard blocks all signals: only the parent reacts to them.
   sigset_t all, before;
   sigfillset(&all);
   pthread_sigmask(SIG_SETMASK, &all, &before);
-  leader_ = _Fork();  // runs nobody's handlers for forks
+  leader_ = _Fork();  // runs no atfork handlers
   if (leader_ == 0) WaitForTheEnd(ends[0]);
   const int why = errno;
   pthread_sigmask(SIG_SETMASK, &before, nullptr);
@@ -49,7 +50,7 @@ ProcessGuard::ProcessGuard() {
     throw Error(ExitCode::kResources, std::string("cannot start a process: ") + strerror(why));
   }
   life_ = ends[1];
-  setpgid(leader_, leader_);  // whoever comes first: the group is there for its programs
+  setpgid(leader_, leader_);  // also here: the group must exist before its programs start
 }
 
 ProcessGuard::~ProcessGuard() {

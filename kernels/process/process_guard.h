@@ -1,13 +1,13 @@
-// Ends a group of processes when this one dies, however it dies: also by SIGKILL.
+// Kills a group of processes when this process dies, also by SIGKILL.
 #pragma once
 
 namespace regrade {
 
-// A small process that leads a new process group and waits for our end. Programs that are
-// started into its group end with us, and all that they have started: what PR_SET_PDEATHSIG
-// would do for one process alone, and at the end of the thread that started it. Nothing else of
-// ours stays open in it, no lock, no pipe. Throws Error kResources if there is no process or
-// pipe left.
+// A small process that leads a new process group and waits for the end of its parent. Programs
+// that are started into its group, and their children, end with the parent; PR_SET_PDEATHSIG
+// would cover one process only, and would fire at the end of the starting thread. The guard
+// keeps no other file of the parent open. Throws Error(kResources) if processes or pipes run
+// out.
 class ProcessGuard {
  public:
   ProcessGuard();
@@ -16,11 +16,11 @@ class ProcessGuard {
   ProcessGuard& operator=(const ProcessGuard&) = delete;
 
   int group() const { return leader_; }
-  void Signal(int signal) const;  // to the whole group; the guard itself heeds SIGKILL alone
+  void Signal(int signal) const;  // to the whole group; the guard itself blocks all but SIGKILL
 
  private:
   int leader_ = -1;
-  int life_ = -1;  // the end of a pipe that is open as long as we live
+  int life_ = -1;  // write end of the guard's pipe
 };
 
 }  // namespace regrade

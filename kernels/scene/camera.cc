@@ -81,7 +81,7 @@ Vec3d Camera::CameraRay(double u, double v) const {
     Distort(*this, x, y - h, &bx, &by);
     const double j01 = (ax - bx) / (2 * h), j11 = (ay - by) / (2 * h);
     const double det = j00 * j11 - j01 * j10;
-    if (!(det > 1e-3)) break;  // the lens folds over beyond here
+    if (!(det > 1e-3)) break;  // the distortion folds over beyond this point
     x -= (j11 * ex - j01 * ey) / det;
     y -= (-j10 * ex + j00 * ey) / det;
   }

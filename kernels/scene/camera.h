@@ -58,16 +58,16 @@ struct Camera {
   LensModel lens = LensModel::kPinhole;
   std::array<double, 8> distortion{};  // meaning by `lens`; unused entries are 0
   RigidTransform camera_from_world;
-  NdcSpace ndc;  // where it is on, pixel rays are in that space
+  NdcSpace ndc;  // if on, pixel rays are in NDC
 
   Vec3d Center() const { return camera_from_world.Inverse().translation; }
   // World directions of the optical axis (z) and of "up" in the picture (-y).
   Vec3d Forward() const { return camera_from_world.rotation.row[2]; }
   Vec3d Up() const { return -camera_from_world.rotation.row[1]; }
 
-  // Direction in camera coordinates, z = 1 (unit length for a fisheye lens), of image point (u,
-  // v) in pixels. The lens is inverted by Newton steps to 1e-10; where it folds over, the last
-  // monotone point is used.
+  // Direction in camera coordinates of image point (u, v) in pixels, with z = 1 (unit length
+  // for a fisheye lens). The distortion is inverted by Newton steps to 1e-10; beyond the point
+  // where it folds over, the last monotone point is used.
   Vec3d CameraRay(double u, double v) const;
   // World ray through (u, v) pixels. Its direction is unit to double precision before rounding.
   RayT<double> WorldRay(double u, double v) const;
@@ -78,7 +78,7 @@ struct Camera {
   // frame.
   bool Project(const Vec3d& point_world, double* u, double* v, double* depth = nullptr) const;
 
-  // The same camera for a picture resampled to width x height.
+  // The same camera for an image resampled to width x height.
   Camera Resized(int new_width, int new_height) const;
   // The same view through a lens without distortion.
   Camera Undistorted() const;
@@ -88,7 +88,7 @@ struct Camera {
   // True if size, focal lengths, principal point and distortion are the same to the bit.
   bool SameIntrinsics(const Camera& other) const;
 
-  // How far, in pixels, distortion moves the picture's corner that it moves most.
+  // The largest displacement of an image corner by distortion, in pixels.
   double MaxCornerDistortion() const;
 };
 

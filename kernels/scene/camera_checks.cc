@@ -7,7 +7,7 @@
 namespace regrade {
 
 std::string ImplausibleCamera(const Camera& camera) {
-  constexpr double kLargestTranslation = 1e12;  // world units: a camera at infinity is not one
+  constexpr double kLargestTranslation = 1e12;  // world units
   const double side = std::max(camera.width, camera.height);
   for (const double f : {camera.fx, camera.fy})
     if (!(f > 0.05 * side && f < 100 * side)) {
@@ -23,7 +23,7 @@ std::string ImplausibleCamera(const Camera& camera) {
     if (!std::isfinite(coefficient)) return "a distortion that is not a finite number";
   for (int i = 0; i < 3; ++i)
     if (!(std::abs(camera.camera_from_world.translation[i]) <= kLargestTranslation))
-      return "its place at infinity";
+      return "a position at infinity";
   return "";
 }
 

@@ -1,5 +1,4 @@
-// What every reader of cameras asks of them, whatever the file: numbers that a lens and a place
-// can have.
+// Plausibility checks of cameras read from any file format.
 #pragma once
 
 #include <string>
@@ -8,13 +7,13 @@
 
 namespace regrade {
 
-// What no camera has, in words behind "the camera has"; empty if there is nothing. The window
-// is wide enough for any lens and sensor, and narrow enough to catch damage: focal lengths of
-// 1/20 to 100 times the longer side, a principal point in the picture, a translation of at most
-// 1e12 world units, everything finite.
+// The first implausible property, worded to follow "the camera has"; empty if there is none.
+// The limits admit any lens and sensor and still catch damage: focal lengths of 1/20 to 100
+// times the longer side, a principal point inside the image, a translation of at most 1e12
+// world units, everything finite.
 std::string ImplausibleCamera(const Camera& camera);
 
-// Finite, a positive scale, and a rotation (to what files round it to).
+// Finite, with a positive scale and a rotation matrix (up to the rounding of text files).
 bool IsSound(const Similarity& similarity);
 
 }  // namespace regrade

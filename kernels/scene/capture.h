@@ -23,11 +23,11 @@ struct StagedPhoto {
   int bits = 8;              // of a value in the PNG: 8 or 16
 };
 
-// A registered photo. `name` is our staged name ("00007.png"); `file` the user's.
+// A registered photo. `name` is the staged name ("00007.png"); `file` the user's.
 struct CaptureView {
   std::string name;
   std::string file;
-  std::string path;  // where the pixels are, absolute
+  std::string path;  // of the image file, absolute
   Camera camera;     // at the photo's own size
 };
 
@@ -41,15 +41,15 @@ struct ScenePoint {
 
 struct Capture {
   std::vector<CaptureView> views;  // in natural order of `file`
-  std::vector<ScenePoint> points;  // empty when the poses came without points
-  double nearest_depth = 0;        // of the scene, where the poses came with it; else 0
+  std::vector<ScenePoint> points;  // empty for poses without points
+  double nearest_depth = 0;        // of the scene, if given with the poses; else 0
   std::vector<PhotoStatus> statuses;
   double reprojection_px = 0;  // mean over observations, at the photos' size
-  int models_found = 0;        // by COLMAP; 0 when the poses came from elsewhere
+  int models_found = 0;        // by COLMAP; 0 for poses from another source
 };
 
-// True for views kept for measuring: every `holdout`-th in order, starting with the first;
-// holdout 0 keeps none.
+// True for held-out views: every `holdout`-th in order, starting with the first; holdout 0
+// keeps none.
 inline bool IsHeldOut(size_t view_index, int holdout) {
   return holdout > 0 && view_index % static_cast<size_t>(holdout) == 0;
 }

@@ -22,7 +22,7 @@ bool IsNarrower(const Camera* a, const Camera* b) {
          static_cast<int64_t>(b->width) * a->height;
 }
 
-// The cameras of the orientation that most have.
+// The cameras with the orientation of the majority.
 std::vector<const Camera*> OfMainOrientation(const std::vector<Camera>& cameras) {
   const size_t portraits =
       static_cast<size_t>(std::count_if(cameras.begin(), cameras.end(), IsPortrait));

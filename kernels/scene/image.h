@@ -1,5 +1,4 @@
-// A picture in memory: row-major, channels interleaved, sRGB-encoded values nominally in [0,
-// 1].
+// An image in memory: row-major, interleaved channels, sRGB-encoded values nominally in [0, 1].
 #pragma once
 
 #include <cmath>

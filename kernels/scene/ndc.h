@@ -1,12 +1,12 @@
-// Normalised device coordinates: the space of forward-facing captures, in which everything from
-// a near plane to infinity is a box.
+// Normalised device coordinates: the space of forward-facing captures, which maps everything
+// from a near plane to infinity into a box.
 //
 // EQ(ndc), Mildenhall et al. 2020, appendix C, with z forward and near plane z = 1: a point (x,
 // y, z) goes to
 //   (a x / z, b y / z, 1 - 2 / z),   a = 2 f_x / W, b = 2 f_y / H,
 // a ray's origin is first moved to z = 1, and its direction (a (dx/dz - ox/oz), b (dy/dz -
-// oy/oz), 2 / oz) is normalised, as svox2 has it (NeRF does not). A ray that does not run
-// forward has no image here: its direction becomes 0, which no march follows.
+// oy/oz), 2 / oz) is normalised, as in svox2 (NeRF does not). A ray that does not run forward
+// has no image in NDC: its direction becomes 0, and the march skips it.
 #pragma once
 
 #include "kernels/base/vec.h"
@@ -32,12 +32,12 @@ HD void NdcRay(const NdcSpace& space, Vec3<T>* origin, Vec3<T>* direction) {
   *direction = Normalized(Vec3<T>{a * (d.x / d.z - x), b * (d.y / d.z - y), T(2)});
 }
 
-// Height over width, in NDC, of what is as high as wide in a picture with square pixels.
+// Height over width, in NDC, of an extent that is a square in an image with square pixels.
 HD inline float VoxelAspect(const NdcSpace& space) {
   return space.on() ? static_cast<float>(space.b / space.a) : 1.0f;
 }
 
-// z < 1 in NDC; z = 1 is infinitely far.
+// z < 1 in NDC; z = 1 is at infinity.
 template <typename T>
 HD Vec3<T> WorldFromNdc(const NdcSpace& space, const Vec3<T>& p) {
   const T z = T(2) / (T(1) - p.z);

@@ -1,5 +1,5 @@
-// The rays through a frame's pixels, for any processor: what Camera::PixelRay gives for a
-// camera without distortion, to the bit.
+// The rays through a frame's pixels, on host or device: bit-identical to Camera::PixelRay for
+// a camera without distortion.
 #pragma once
 
 #include "kernels/base/vec.h"

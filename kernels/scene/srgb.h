@@ -1,4 +1,4 @@
-// The sRGB transfer curve (IEC 61966-2-1), for the few places that compute with light.
+// The sRGB transfer curve (IEC 61966-2-1), for computations in linear light.
 #pragma once
 
 #include <cmath>

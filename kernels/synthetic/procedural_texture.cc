@@ -64,7 +64,7 @@ Nearest FindNearest(uint64_t seed, double u, double v) {
   return best;
 }
 
-// One of the palette's four colours beside the ground.
+// One of the palette's four colours other than the ground.
 const Vec3d& Accent(const Paint& paint, double part) {
   return paint.palette[1 + static_cast<int>(part * 4)];
 }
@@ -80,7 +80,7 @@ Vec3d Terrazzo(const Paint& paint, double u, double v) {
   return paint.palette[0];
 }
 
-// Motifs live in a, b in [-1, 1].
+// Coordinates a, b are in [-1, 1].
 bool InMotif(int motif, double a, double b) {
   switch (motif) {
     case 0:
@@ -130,7 +130,7 @@ Vec3d Cloth(const Paint& paint, double u, double v) {
   const Vec3d warp = paint.palette[static_cast<int>(5 * Part(CellBits(paint.seed, i, 1), 1))];
   const Vec3d weft = paint.palette[static_cast<int>(5 * Part(CellBits(paint.seed, j, 2), 1))];
   const uint64_t bits = CellBits(paint.seed + 6, i, j);
-  // Now and then a patch of its own: no two crossings look alike.
+  // Some patches get an accent colour, so that no two crossings look alike.
   if (Part(bits, 0) < 0.12) return Accent(paint, Part(bits, 1));
   return Mix(warp, weft, 0.35 + 0.3 * Part(bits, 2));
 }

@@ -1,5 +1,5 @@
-// Paint for synthetic scenes: patterns that never repeat, with corners at several scales, so
-// that features can be matched from view to view.
+// Paint for synthetic scenes: aperiodic patterns with corners at several scales, so that
+// features can be matched between views.
 #pragma once
 
 #include <array>
@@ -12,7 +12,7 @@ namespace regrade {
 enum class Pattern {
   kPlain,     // one colour
   kTerrazzo,  // polygonal chips of two sizes in a ground
-  kTiles,     // square tiles, each with a motif of its own
+  kTiles,     // square tiles, each with another motif
   kCloth,     // crossing bands of irregular widths
   kPainting,  // contours of a warped noise
   kDots,      // round spots on a glaze
@@ -29,8 +29,8 @@ struct Paint {
 // Linear RGB of an 0xRRGGBB sRGB colour.
 Vec3d LinearFromHex(uint32_t hex);
 
-// Reflectance in [0, 1], linear RGB, at surface coordinates (u, v) in world units. Besides the
-// pattern there is a mottle of a few per cent down to kFinestDetail, for feature detectors.
+// Reflectance in [0, 1], linear RGB, at surface coordinates (u, v) in world units. A mottle of
+// a few per cent, down to kFinestDetail, is added to the pattern for feature detectors.
 Vec3d Albedo(const Paint& paint, double u, double v);
 
 // Size of the smallest blobs, world units: a few pixels in the default captures.

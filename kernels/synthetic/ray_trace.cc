@@ -10,22 +10,22 @@
 namespace regrade {
 namespace {
 
-constexpr double kOffset = 1e-7;  // world units: a point does not meet its own surface
-// Side of the square over which a pixel gathers light, pixels: a lens is a little softer than
-// its sensor.
+constexpr double kOffset = 1e-7;  // world units: avoids self-intersection
+// Side of the square over which a pixel integrates light, in pixels: a lens is slightly softer
+// than its sensor.
 constexpr double kFootprint = 1.6;
 
-// The order in which a pixel's 4x4 sub-cells are visited: four that have one in each row and
-// each column come first, so that their mean is already exact for a linear ramp.
+// The order in which a pixel's 4x4 sub-cells are sampled: the first four have one in each row
+// and each column, so that their mean is already exact for a linear ramp.
 constexpr int kFirstCells = 4, kCells = 16;
 constexpr int kCellOrder[kCells] = {4, 13, 2, 11, 0, 1, 3, 5, 6, 7, 8, 9, 10, 12, 14, 15};
 // A pixel is flat if its first samples differ by less than this, in linear light.
 constexpr double kFlat = 0.02;
 
-// Light from the sky that nearby balls and pots hide, for a disc of radius r at distance d in
-// direction n: about cos * (r / d)^2. Grounds the objects on what they stand on.
-double OpenSky(const SyntheticScene& scene, const Hit& hit) {
-  double open = 1;
+// Fraction of sky light not occluded by nearby balls and pots; each hides about cos * (r / d)^2
+// for a disc of radius r at distance d in direction n. Gives contact shadows.
+double SkyVisibility(const SyntheticScene& scene, const Hit& hit) {
+  double visibility = 1;
   for (size_t i = 0; i < scene.solids.size(); ++i) {
     const Solid& solid = scene.solids[i];
     if (static_cast<int>(i) == hit.solid || solid.shape == Shape::kBackdrop ||
@@ -33,15 +33,15 @@ double OpenSky(const SyntheticScene& scene, const Hit& hit) {
       continue;
     const Vec3d to = solid.center - hit.point;
     const double d2 = Dot(to, to);
-    const double reach = std::max({solid.half.x, solid.half.y, solid.half.z});
-    if (d2 > 16 * reach * reach || reach > 0.4) continue;
+    const double radius = std::max({solid.half.x, solid.half.y, solid.half.z});
+    if (d2 > 16 * radius * radius || radius > 0.4) continue;
     const double facing = std::max(0.0, Dot(hit.normal, to)) / std::sqrt(d2);
-    open *= 1 - 0.7 * facing * std::min(1.0, reach * reach / d2);
+    visibility *= 1 - 0.7 * facing * std::min(1.0, radius * radius / d2);
   }
-  return open;
+  return visibility;
 }
 
-// Linear RGB that leaves the scene against the ray.
+// Linear RGB radiance towards the ray's origin.
 Vec3d Light(const SyntheticScene& scene, const Vec3d& direction, const Hit& hit,
             bool highlights) {
   if (hit.solid < 0) return {};
@@ -52,8 +52,8 @@ Vec3d Light(const SyntheticScene& scene, const Vec3d& direction, const Hit& hit,
   if (facing > 0 &&
       !IsShadowed(scene.solids, {hit.point + hit.normal * kOffset, scene.to_sun}, kOffset))
     sun = facing * scene.sun;
-  const double sky = scene.ambient * (0.8 + 0.2 * hit.normal.z) * OpenSky(scene, hit);
-  // The sun is a little warm, the sky a little cold.
+  const double sky = scene.ambient * (0.8 + 0.2 * hit.normal.z) * SkyVisibility(scene, hit);
+  // The sun is slightly warm, the sky slightly cold.
   const Vec3d light = Vec3d{1.04, 1.0, 0.93} * sun + Vec3d{0.95, 1.0, 1.08} * sky;
   Vec3d result = {albedo.x * light.x, albedo.y * light.y, albedo.z * light.z};
   if (highlights && sun > 0 && solid.gloss > 0) {
@@ -64,7 +64,7 @@ Vec3d Light(const SyntheticScene& scene, const Vec3d& direction, const Hit& hit,
   return result;
 }
 
-// Rays of one camera, whose centre is worked out once.
+// Rays of one camera; its centre is computed once.
 class RaySource {
  public:
   explicit RaySource(const Camera& camera)
@@ -132,13 +132,13 @@ Image RenderSolidMask(const SyntheticScene& scene, const Camera& camera, int sol
 #pragma omp parallel for schedule(dynamic)
   for (int y = 0; y < camera.height; ++y)
     for (int x = 0; x < camera.width; ++x) {
-      int met = 0;
+      int hits = 0;
       for (int k = 0; k < kSide * kSide; ++k)
-        met +=
+        hits +=
             FindHit(scene.solids,
                     rays(x + (k % kSide + 0.5) / kSide, y + (k / kSide + 0.5) / kSide), kOffset)
                 .solid == solid;
-      *mask.at(x, y) = static_cast<float>(met) / (kSide * kSide);
+      *mask.at(x, y) = static_cast<float>(hits) / (kSide * kSide);
     }
   return mask;
 }

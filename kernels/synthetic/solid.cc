@@ -25,13 +25,13 @@ bool SolveQuadratic(double a, double b, double c, double* t0, double* t1) {
   return true;
 }
 
-double MeetSphere(const Vec3d& o, const Vec3d& d, double radius, double after) {
+double IntersectSphere(const Vec3d& o, const Vec3d& d, double radius, double after) {
   double t0, t1;
   if (!SolveQuadratic(1, Dot(o, d), Dot(o, o) - radius * radius, &t0, &t1)) return kNever;
   return t0 > after ? t0 : t1 > after ? t1 : kNever;
 }
 
-double MeetBox(const Vec3d& o, const Vec3d& d, const Vec3d& half, double after) {
+double IntersectBox(const Vec3d& o, const Vec3d& d, const Vec3d& half, double after) {
   double enter = -kNever, leave = kNever;
   for (int a = 0; a < 3; ++a) {
     if (d[a] == 0) {
@@ -48,9 +48,9 @@ double MeetBox(const Vec3d& o, const Vec3d& d, const Vec3d& half, double after) 
   return enter > after ? enter : leave > after ? leave : kNever;
 }
 
-// The wall of an upright cylinder; a part of it may be cut away (local y <= min_y).
-double MeetTube(const Vec3d& o, const Vec3d& d, double radius, double half_height, double min_y,
-                double after) {
+// The wall of an upright cylinder without its part at local y <= min_y.
+double IntersectTube(const Vec3d& o, const Vec3d& d, double radius, double half_height,
+                     double min_y, double after) {
   double roots[2];
   if (!SolveQuadratic(d.x * d.x + d.y * d.y, o.x * d.x + o.y * d.y,
                       o.x * o.x + o.y * o.y - radius * radius, &roots[0], &roots[1]))
@@ -60,8 +60,8 @@ double MeetTube(const Vec3d& o, const Vec3d& d, double radius, double half_heigh
   return kNever;
 }
 
-double MeetCylinder(const Vec3d& o, const Vec3d& d, const Vec3d& half, double after) {
-  double best = MeetTube(o, d, half.x, half.z, -kNever, after);
+double IntersectCylinder(const Vec3d& o, const Vec3d& d, const Vec3d& half, double after) {
+  double best = IntersectTube(o, d, half.x, half.z, -kNever, after);
   if (d.z != 0)
     for (const double z : {-half.z, half.z}) {
       const double t = (z - o.z) / d.z;
@@ -71,41 +71,41 @@ double MeetCylinder(const Vec3d& o, const Vec3d& d, const Vec3d& half, double af
   return best;
 }
 
-double Meet(const Solid& solid, const Vec3d& o, const Vec3d& d, double after) {
+double Intersect(const Solid& solid, const Vec3d& o, const Vec3d& d, double after) {
   switch (solid.shape) {
     case Shape::kSphere:
-      return MeetSphere(o, d, solid.half.x, after);
+      return IntersectSphere(o, d, solid.half.x, after);
     case Shape::kBox:
-      return MeetBox(o, d, solid.half, after);
+      return IntersectBox(o, d, solid.half, after);
     case Shape::kCylinder:
-      return MeetCylinder(o, d, solid.half, after);
+      return IntersectCylinder(o, d, solid.half, after);
     case Shape::kBackdrop:
-      return MeetTube(o, d, solid.half.x, solid.half.z, solid.half.y, after);
+      return IntersectTube(o, d, solid.half.x, solid.half.z, solid.half.y, after);
   }
   return kNever;
 }
 
-// Whether the line of the ray passes the solid by: the quick test that most pairs end with.
-inline bool PassesBy(const Solid& solid, const RayT<double>& ray) {
+// A quick rejection test: true if the ray's line misses the solid.
+inline bool Misses(const Solid& solid, const RayT<double>& ray) {
   if (solid.shape == Shape::kBackdrop) return false;
   const Vec3d offset = ray.origin - solid.center;
   const double along = Dot(offset, ray.direction);
   return Dot(offset, offset) - along * along > Dot(solid.half, solid.half) * (1 + 1e-9);
 }
 
-// Distance along the ray; *o and *d are the ray in the solid's own frame.
+// Distance along the ray; *o and *d are the ray in the solid's frame.
 double Distance(const Solid& solid, const RayT<double>& ray, double after, Vec3d* o, Vec3d* d) {
   *o = TurnedBy(ray.origin - solid.center, solid.cos_yaw, -solid.sin_yaw);
   *d = TurnedBy(ray.direction, solid.cos_yaw, -solid.sin_yaw);
-  return Meet(solid, *o, *d, after);
+  return Intersect(solid, *o, *d, after);
 }
 
 // Outward normal and paint coordinates at local point p.
-void Dress(const Solid& solid, const Vec3d& p, Vec3d* normal, double* u, double* v) {
+void SetSurface(const Solid& solid, const Vec3d& p, Vec3d* normal, double* u, double* v) {
   const Vec3d& half = solid.half;
   if (solid.shape == Shape::kSphere) {
     *normal = p / half.x;
-    // Lambert's equal-area map seen from the top: no pole but the hidden lowest point.
+    // Lambert's equal-area map seen from the top: its only pole is the hidden lowest point.
     const double stretch = std::sqrt(2 / std::max(1e-6, 1 + normal->z));
     *u = p.x * stretch, *v = p.y * stretch;
     return;
@@ -119,7 +119,7 @@ void Dress(const Solid& solid, const Vec3d& p, Vec3d* normal, double* u, double*
     }
     *normal = {};
     (*normal)[axis] = p[axis] > 0 ? 1 : -1;
-    // Sides unfold into a strip; each face has a stretch of paint of its own.
+    // Sides unfold into a strip; each face has another part of the paint.
     const double shift = 17.0 * axis + (p[axis] > 0 ? 7.0 : 0.0);
     *u = (axis == 0 ? p.y : p.x) + shift;
     *v = axis == 2 ? p.y : p.z;
@@ -132,7 +132,7 @@ void Dress(const Solid& solid, const Vec3d& p, Vec3d* normal, double* u, double*
     return;
   }
   *normal = {p.x / half.x, p.y / half.x, 0};
-  // A pot's seam is at its back, a backdrop's in the part cut away.
+  // The seam of a pot is at its back, that of a backdrop in the removed part.
   *u =
       half.x * (solid.shape == Shape::kBackdrop ? std::atan2(p.x, p.y) : std::atan2(p.x, -p.y));
   *v = p.z;
@@ -145,7 +145,7 @@ Hit FindHit(const std::vector<Solid>& solids, const RayT<double>& ray, double mi
   hit.distance = kNever;
   Vec3d local;
   for (size_t i = 0; i < solids.size(); ++i) {
-    if (PassesBy(solids[i], ray)) continue;
+    if (Misses(solids[i], ray)) continue;
     Vec3d o, d;
     const double t = Distance(solids[i], ray, min_distance, &o, &d);
     if (!(t < hit.distance)) continue;
@@ -157,7 +157,7 @@ Hit FindHit(const std::vector<Solid>& solids, const RayT<double>& ray, double mi
   const Solid& solid = solids[hit.solid];
   hit.point = ray.origin + ray.direction * hit.distance;
   Vec3d normal;
-  Dress(solid, local, &normal, &hit.u, &hit.v);
+  SetSurface(solid, local, &normal, &hit.u, &hit.v);
   hit.normal = TurnedBy(normal, solid.cos_yaw, solid.sin_yaw);
   if (Dot(hit.normal, ray.direction) > 0) hit.normal = -hit.normal;
   return hit;
@@ -167,7 +167,7 @@ bool IsShadowed(const std::vector<Solid>& solids, const RayT<double>& ray,
                 double min_distance) {
   Vec3d o, d;
   for (const Solid& solid : solids)
-    if (solid.casts_shadow && !PassesBy(solid, ray) &&
+    if (solid.casts_shadow && !Misses(solid, ray) &&
         Distance(solid, ray, min_distance, &o, &d) < kNever)
       return true;
   return false;

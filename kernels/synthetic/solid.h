@@ -1,4 +1,4 @@
-// The shapes of synthetic scenes and where rays meet them, in double precision.
+// The shapes of synthetic scenes and their intersections with rays, in double precision.
 #pragma once
 
 #include <string>
@@ -22,10 +22,10 @@ struct Solid {
   Shape shape = Shape::kSphere;
   Vec3d center;                     // world
   Vec3d half;                       // world units, meaning by `shape`
-  double cos_yaw = 1, sin_yaw = 0;  // turned about the world's z axis
+  double cos_yaw = 1, sin_yaw = 0;  // rotation about the world's z axis
   Paint paint;
   double gloss = 0;          // strength of the highlight, where highlights are simulated
-  bool casts_shadow = true;  // off for walls: the light comes from outside
+  bool casts_shadow = true;  // false for walls: the light comes from outside
 };
 
 struct Hit {
@@ -33,13 +33,13 @@ struct Hit {
   Vec3d point;          // world
   Vec3d normal;         // world, unit, towards the ray's origin
   double u = 0, v = 0;  // the paint's coordinates, world units
-  int solid = -1;       // index; -1: nothing was met
+  int solid = -1;       // index; -1: no hit
 };
 
 // The nearest solid in front of the ray's origin, farther than `min_distance`.
 Hit FindHit(const std::vector<Solid>& solids, const RayT<double>& ray, double min_distance);
 
-// Whether something that casts a shadow lies ahead of the ray.
+// True if a shadow-casting solid lies ahead on the ray.
 bool IsShadowed(const std::vector<Solid>& solids, const RayT<double>& ray, double min_distance);
 
 }  // namespace regrade

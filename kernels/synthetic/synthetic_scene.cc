@@ -9,7 +9,7 @@
 namespace regrade {
 namespace {
 
-// Places solids and gives each paint a stream of its own.
+// Places solids and gives each paint another random stream.
 class SceneBuilder {
  public:
   SceneBuilder(const std::string& name, uint64_t seed) : seed_(seed) { scene_.name = name; }
@@ -45,7 +45,7 @@ class SceneBuilder {
   void AddBlock(double x, double y, double z, Vec3d size, double yaw_degrees, Paint paint) {
     Add(Shape::kBox, {x, y, z + size.z / 2}, size / 2, paint, yaw_degrees);
   }
-  // A slab between two corners that lets the light through.
+  // A slab between two corners that casts no shadow.
   void AddWall(Vec3d low, Vec3d high, Paint paint) {
     Add(Shape::kBox, (low + high) / 2, (high - low) / 2, paint).casts_shadow = false;
   }
@@ -108,7 +108,7 @@ SyntheticScene MakeWall(uint64_t seed) {
   SceneBuilder b("wall", seed);
   b.AddWall({-2.3, 0, -1.75}, {2.3, 0.08, 1.75},
             b.MakePaint(Pattern::kPainting, 0.26, kPlaster));
-  // Two shelves with things on them.
+  // Two shelves with objects.
   b.AddBlock(-0.55, -0.17, -0.42, {1.7, 0.34, 0.07}, 0,
              b.MakePaint(Pattern::kPlanks, 0.16, kOak));
   b.AddBlock(0.95, -0.15, 0.28, {1.3, 0.3, 0.07}, 0, b.MakePaint(Pattern::kPlanks, 0.16, kOak));
@@ -130,7 +130,7 @@ SyntheticScene MakeWall(uint64_t seed) {
   b.AddBlock(-1.75, -0.05, -0.25, {0.5, 0.1, 0.95}, 0,
              b.MakePaint(Pattern::kTerrazzo, 0.18, kPlum));
   b.AddBlock(1.85, -0.06, 0.3, {0.4, 0.12, 0.9}, 0, b.MakePaint(Pattern::kCloth, 0.16, kTeal));
-  // A chest in front, and what stands on it.
+  // A chest in front with objects on it.
   b.AddBlock(-0.5, -0.42, -1.6, {1.5, 0.5, 0.75}, 0, b.MakePaint(Pattern::kPlanks, 0.22, kOak));
   b.AddBall(-0.9, -0.45, -0.85, 0.16, b.MakePaint(Pattern::kPainting, 0.14, kMustard));
   b.AddBlock(-0.45, -0.45, -0.85, {0.34, 0.26, 0.12}, -18,
@@ -142,7 +142,7 @@ SyntheticScene MakeWall(uint64_t seed) {
 
 SyntheticScene MakeSquare(uint64_t seed) {
   SceneBuilder b("square", seed);
-  // The near: a pedestal and what stands on it.
+  // Near: a pedestal with objects.
   b.AddPot(0, 0, -0.5, 0.95, 0.5, b.MakePaint(Pattern::kTerrazzo, 0.21, kStone));
   b.AddBall(-0.4, -0.3, 0, 0.24, b.MakePaint(Pattern::kDots, 0.18, kCoral));
   b.AddBlock(0.35, -0.3, 0, {0.4, 0.34, 0.3}, -24, b.MakePaint(Pattern::kCloth, 0.13, kTeal));
@@ -150,7 +150,7 @@ SyntheticScene MakeSquare(uint64_t seed) {
   b.AddPot(0.05, 0.35, 0, 0.17, 0.66, b.MakePaint(Pattern::kPainting, 0.18, kPlum));
   b.AddBlock(-0.5, 0.3, 0, {0.3, 0.3, 0.48}, 31, b.MakePaint(Pattern::kTiles, 0.2, kSky));
   b.AddBall(0.55, 0.3, 0, 0.16, b.MakePaint(Pattern::kPainting, 0.14, kLeaf));
-  // The far: paving, houses at 12 to 20, a dome of hills and clouds at 100.
+  // Far: paving, houses at 12 to 20, a dome of hills and clouds at 100.
   b.Add(Shape::kCylinder, {0, 0, -0.6}, {30, 0, 0.1}, b.MakePaint(Pattern::kTiles, 2.6, kStone))
       .casts_shadow = false;
   const std::array<uint32_t, 5> walls[] = {kCoral, kLinen, kTeal, kMustard, kPlum, kAzulejo};
@@ -167,7 +167,7 @@ SyntheticScene MakeSquare(uint64_t seed) {
   return b.Finish({-0.45, -0.55, 0.85}, {-dome, -dome, -dome}, {dome, dome, dome});
 }
 
-SyntheticScene GrowBuffers(uint64_t seed) {
+SyntheticScene MakeRoom(uint64_t seed) {
   SceneBuilder b("room", seed);
   const double x = 1.7, y = 1.5, h = 1.8, t = 0.06;  // half sides, height, thickness
   b.AddWall({-x, -y, -t}, {x, y, 0}, b.MakePaint(Pattern::kPlanks, 0.26, kOak));
@@ -203,7 +203,7 @@ SyntheticScene GrowBuffers(uint64_t seed) {
              b.MakePaint(Pattern::kTerrazzo, 0.22, kTeal));
   SyntheticScene scene =
       b.Finish({-0.35, -0.5, 0.8}, {-x - t, -y - t, -t}, {x + t, y + t, h + t});
-  scene.sun = 0.7;  // a ceiling and walls light each other
+  scene.sun = 0.7;  // light reflected between ceiling and walls
   scene.ambient = 0.6;
   return scene;
 }
@@ -225,8 +225,8 @@ Camera LookAt(const Vec3d& center, const Vec3d& target, double focal_over_width,
   return camera;
 }
 
-// Two heights of an arc, low from the middle to the right, back high from right to left, and
-// home: `turn` in [0, 1).
+// Two heights of an arc: low from the middle to the right, back high from right to left, and
+// back to the start: `turn` in [0, 1).
 Camera TableCamera(double turn, int width, int height) {
   const double sway = turn < 0.25 ? 4 * turn : turn < 0.75 ? 2 - 4 * turn : 4 * turn - 4;
   const double azimuth = sway * 40 * M_PI / 180;
@@ -238,15 +238,15 @@ Camera TableCamera(double turn, int width, int height) {
 }
 
 // A closed Lissajous figure fills a rectangle of a plane, shifted so that no two of 24 or 96
-// places coincide. The cameras turn in by a few degrees: views that differ by a shift alone
-// leave the focal length undetermined.
+// positions coincide. The cameras turn inwards by a few degrees: views that differ by a
+// translation alone leave the focal length undetermined.
 Camera WallCamera(double turn, int width, int height) {
   const Vec3d center = {0.6 * std::sin(4 * M_PI * turn + 0.2), -2.7,
                         0.4 * std::sin(6 * M_PI * turn + 0.3)};
   return LookAt(center, {0.25 * center.x, 0, 0.25 * center.z}, 1.1, width, height);
 }
 
-// Once round and three times up and down.
+// Once around and three times up and down.
 Camera SquareCamera(double turn, int width, int height) {
   const double angle = 2 * M_PI * turn, distance = 2.2;
   const Vec3d center = {distance * std::sin(angle), -distance * std::cos(angle),
@@ -267,7 +267,7 @@ Camera RoomCamera(double turn, int width, int height) {
 SyntheticScene MakeSyntheticScene(const std::string& name, uint64_t seed) {
   if (name == "table") return MakeTable(seed);
   if (name == "wall") return MakeWall(seed);
-  if (name == "room") return GrowBuffers(seed);
+  if (name == "room") return MakeRoom(seed);
   if (name == "square") return MakeSquare(seed);
   throw Error(ExitCode::kUsage, "there is no synthetic scene \"" + name + "\"", "--scene",
               std::string("choose one of ") + kSyntheticSceneNames);

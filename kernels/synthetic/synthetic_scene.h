@@ -1,7 +1,7 @@
-// Analytic scenes with known truth, and the cameras that photograph them.
+// Analytic scenes with known ground truth, and the cameras that photograph them.
 //
-// World: z is up, lengths are about those of furniture in metres. Everything that a default
-// camera sees lies inside the scene's bounds.
+// World: z is up, lengths are about those of furniture in metres. Everything visible from a
+// default camera lies inside the scene's bounds.
 #pragma once
 
 #include <cstdint>
@@ -17,26 +17,25 @@ struct SyntheticScene {
   std::string name;
   std::vector<Solid> solids;
   Vec3d to_sun;           // unit
-  double sun = 0.95;      // reflected share of full light facing the sun
+  double sun = 0.95;      // fraction of full light reflected by a surface facing the sun
   double ambient = 0.45;  // and in the shade
   Vec3d bounds_min, bounds_max;
 };
 
-// "table|wall|room|square", for the help text and for errors.
+// For the help text and errors.
 inline constexpr char kSyntheticSceneNames[] = "table|wall|room|square";
 
-// The shapes are fixed; `seed` draws the paint. Throws Error (kUsage) for an unknown name,
+// The shapes are fixed; `seed` determines the paint. Throws Error (kUsage) for an unknown name,
 // listing the known ones.
-//   table: a still life before a curved tiled wall, seen from an arc of 80 degrees
-//   wall:  a wall with shelves and reliefs, cameras on a small plane, facing it
-//   room:  a furnished room, cameras on a loop inside, each looking across to the far side
-//   square: a still life on a pedestal seen all round, houses and hills up to 45 times as far
-//   away
-//          as the cameras are
+//   table:  a still life before a curved tiled wall, seen from an arc of 80 degrees
+//   wall:   a wall with shelves and reliefs, cameras on a small plane facing it
+//   room:   a furnished room, cameras on a loop inside, each facing the far side
+//   square: a still life on a pedestal seen from all around, with houses and hills up to 45
+//           times as far away as the cameras
 SyntheticScene MakeSyntheticScene(const std::string& name, uint64_t seed);
 
 // `views` cameras on a closed smooth path: neighbours in the list are neighbours in space, and
-// the first is in the midst of the others (a held-out view is never at the rim). Pinhole, focal
+// the first is surrounded by others (a held-out view is never at the rim). Pinhole, focal
 // length 0.9 to 1.15 times the width, principal point at the centre.
 std::vector<Camera> SyntheticCameras(const SyntheticScene& scene, int views, int width,
                                      int height);

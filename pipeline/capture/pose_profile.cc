@@ -30,10 +30,10 @@ std::string Evidence(const PoseRefinement& refinement) {
         static_cast<long long>(refinement.held_out));
   if (!refinement.Accepted()) return text + "; refused: " + refinement.refused;
   text += Text("; cameras turned by %.2g deg and moved by %.2g %% of their extent",
-               refinement.turned_deg, 100 * refinement.moved_share);
+               refinement.turned_deg, 100 * refinement.moved_fraction);
   if (refinement.turn_error_deg)
     text += Text(", standard errors %.2g deg and %.2g %%", *refinement.turn_error_deg,
-                 100 * *refinement.place_error_share);
+                 100 * *refinement.moved_error);
   return text;
 }
 
@@ -49,9 +49,9 @@ JsonValue MetricsOf(const PoseRefinement& refinement) {
                            {"held_out_before_px", refinement.held_out_before_px},
                            {"held_out_after_px", refinement.held_out_after_px},
                            {"turned_deg", refinement.turned_deg},
-                           {"moved_share", refinement.moved_share},
+                           {"moved_fraction", refinement.moved_fraction},
                            {"turn_error_deg", NumberOrNull(refinement.turn_error_deg)},
-                           {"place_error_share", NumberOrNull(refinement.place_error_share)},
+                           {"moved_error", NumberOrNull(refinement.moved_error)},
                            {"left_alone", refinement.left_alone},
                            {"refused", refinement.refused}};
 }

@@ -8,6 +8,7 @@
 #include "pipeline/capture/track_colors.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/images/image_file.h"
+#include "pipeline/workspace/metrics_json.h"
 #include "reconstruct/scene/forward_facing.h"
 #include "reconstruct/scene/visual_hull.h"
 
@@ -70,13 +71,6 @@ double TransparentFraction(const std::vector<Silhouette>& silhouettes) {
                            [](float a) { return a < 0.5f; });
   }
   return all > 0 ? static_cast<double>(clear) / static_cast<double>(all) : 0;
-}
-
-JsonValue NumberOrNull(const Metric& metric) {
-  return metric.value ? JsonValue(*metric.value) : JsonValue();
-}
-Metric MetricOrNone(const JsonValue& value) {
-  return value.IsNumber() ? Metric(value.AsDouble()) : Metric();
 }
 
 // Names the photos whose exposure is left unchanged: too few observations.
@@ -180,14 +174,14 @@ SceneProfile ProfileScene(const Capture& capture, int sh_degree, const std::stri
                                 "fraction of transparent pixels, if every photo has some"));
   const Surroundings surroundings = MeasureSurroundings(capture);
   const bool background =
-      decided("background", surroundings.far_share > kFarShare && !ndc && !alpha);
+      decided("background", surroundings.far_fraction > kFarFraction && !ndc && !alpha);
   if (background && (ndc || alpha))
     throw Error(
         ExitCode::kUsage,
         std::string("background spheres cannot be combined with ") + (ndc ? "ndc" : "alpha"),
         "--effects background=on", ndc ? "add ndc=off" : "add alpha=off");
   profile.effects.push_back(
-      Row("background", background, surroundings.far_share, kFarShare,
+      Row("background", background, surroundings.far_fraction, kFarFraction,
           "spheres around the box, for scenes with much far background: fraction of "
           "observations of points beyond four times the cameras' extent"));
   profile.effects.push_back(Row(kViewDependence, sh_degree > 0, sh_degree, 0,
@@ -216,23 +210,11 @@ std::string EffectLine(const EffectReport& effect) {
 }
 
 JsonValue EffectsRecord(const std::vector<EffectReport>& effects) {
-  JsonValue::Array rows;
-  for (const EffectReport& effect : effects)
-    rows.push_back(JsonValue::Object{{"name", effect.name},
-                                     {"on", effect.on},
-                                     {"evidence", effect.evidence},
-                                     {"value", NumberOrNull(effect.value)},
-                                     {"threshold", NumberOrNull(effect.threshold)}});
-  return rows;
+  return MetricsToJson(effects);
 }
 
 std::vector<EffectReport> EffectsOfRecord(const JsonValue& record) {
-  std::vector<EffectReport> effects;
-  for (const JsonValue& row : record.AsArray())
-    effects.push_back({row.At("name").AsString(), row.At("on").AsBool(),
-                       row.At("evidence").AsString(), MetricOrNone(row.At("value")),
-                       MetricOrNone(row.At("threshold"))});
-  return effects;
+  return MetricsFromJson<std::vector<EffectReport>>(record);
 }
 
 }  // namespace regrade

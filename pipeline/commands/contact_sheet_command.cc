@@ -1,15 +1,15 @@
-// regrade contact-sheet: what each way of styling makes of a reconstruction, on one picture.
+// regrade contact-sheet: one picture that compares 2D method, linear map and both recipes.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <memory>
+#include <optional>
 
 #include "kernels/base/error.h"
 #include "kernels/field/cpu/render_view.h"
 #include "kernels/field/packed_grid.h"
 #include "kernels/field/pad_sh_basis.h"
-#include "kernels/image/color_statistics.h"
-#include "kernels/image/resize.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/commands/command.h"
 #include "pipeline/fields/field_file.h"
@@ -18,11 +18,12 @@
 #include "pipeline/program/device_choice.h"
 #include "pipeline/run/run_context.h"
 #include "pipeline/stages/make_stylizer.h"
+#include "pipeline/stages/object_edit.h"
+#include "pipeline/stages/style_targets.h"
 #include "pipeline/workspace/workspace.h"
-#include "stylize/field/apply_network.h"
-#include "stylize/image/monge_kantorovich.h"
+#include "stylize/field/blend_fields.h"
 #include "stylize/linear_map.h"
-#include "stylize/training/train_network.h"
+#include "stylize/training/restyle_field.h"
 
 namespace regrade {
 namespace {
@@ -42,16 +43,19 @@ struct SheetOptions {
   void Describe(Bind& bind) {
     bind("out", out, {.help = "the picture to write, a PNG file"});
     bind("views", views,
-         {.unit = "photos", .help = "of each style, evenly spread", .min = 1, .max = 100});
+         {.unit = "photos",
+          .help = "photos shown of each style, evenly spaced",
+          .min = 1,
+          .max = 100});
     bind("size", size,
          {.unit = "pixels",
-          .help = "longer side of each picture on the sheet, and of those that are learned "
-                  "from; time grows with its square",
+          .help = "longer side of each picture on the sheet, and of the training pictures; "
+                  "time grows with its square",
           .min = 64,
           .max = 4096});
     bind("steps", steps,
          {.unit = "steps",
-          .help = "of each network; 0 takes those of its recipe",
+          .help = "training steps of each network; 0 takes those of its recipe",
           .min = 0,
           .max = 1e6});
     bind("holdout", holdout,
@@ -59,12 +63,10 @@ struct SheetOptions {
           .help = "as in `regrade run`, by default as in the run of DIR",
           .min = 0,
           .max = 1000});
-    bind("device", device, {.help = "where networks learn", .choices = "auto|cpu|cuda"});
-    bind("dry-run", dry_run, {.help = "say what would be done, and do nothing"});
+    bind("device", device, {.help = "where networks are trained", .choices = "auto|cpu|cuda"});
+    bind("dry-run", dry_run, {.help = "prints what would be done, and does nothing"});
   }
 };
-
-constexpr int kStyledBasis = 9;
 
 const std::vector<std::string> kColumns = {"photo", "2D method", "linear map", "paper recipe",
                                            "standard recipe"};
@@ -74,8 +76,8 @@ Image Clipped(Image image) {
   return image;
 }
 
-// What the 2D method makes of our renders is what a frame of the styled field should be; of
-// photos, where it knows these alone.
+// The target of a styled frame is what the 2D method makes of the render, or of the photo where
+// it can only style photos.
 std::string PsnrCaption(const Image& a, const Image& b, bool of_photos) {
   double sum = 0;
   int64_t count = 0;
@@ -94,17 +96,20 @@ std::string PsnrCaption(const Image& a, const Image& b, bool of_photos) {
 struct Scene {
   WorkingViews views;
   StoredField stored = {};
-  Backend backend = Backend::kCpu;                   // where networks learn
+  Backend backend = Backend::kCpu;                   // where networks are trained
   std::vector<int> training_views = {}, shown = {};  // views
   std::vector<Camera> cameras = {};                  // of all views
-  std::vector<Image> photos = {};                    // of all views that are taught or shown
-  std::vector<Image> kept = {};  // what --photo-masks leaves of each, or empty
+  std::vector<Image> photos = {};                    // of all views
+  std::vector<Image> kept = {};              // what --photo-masks leaves of each, or empty
+  std::unique_ptr<ObjectMasks> object = {};  // null where the whole scene is styled
+  ObjectWeights weights = {};                // of the object
 };
 
-Scene ReadScene(const Workspace& workspace, const SheetOptions& sheet) {
+Scene ReadScene(const Workspace& workspace, const SheetOptions& sheet,
+                const RunSettings& settings) {
   Scene scene{ReadWorkingViews(workspace.Path("poses"), sheet.size, sheet.holdout)};
   scene.stored = ReadFieldFile(workspace.Path("field.npz"));
-  // As a run does it: what differs from view to view needs directions.
+  // As Restyle does it, for the linear map.
   scene.stored.field.appearance =
       PadShBasis(std::move(scene.stored.field.appearance), kStyledBasis);
   scene.views = scene.views.InField(scene.stored.field_from_world, scene.stored.ndc);
@@ -120,6 +125,10 @@ Scene ReadScene(const Workspace& workspace, const SheetOptions& sheet) {
     scene.photos.push_back(scene.views.Photo(i));
     scene.kept.push_back(scene.views.Mask(i));
   }
+  scene.object = OpenObjectMasks(settings, scene.views.capture());
+  if (scene.object != nullptr)
+    scene.weights = VoteForObject(settings, scene.views, scene.training_views, *scene.object,
+                                  scene.stored.field, nullptr);
   return scene;
 }
 
@@ -134,99 +143,126 @@ std::vector<Image> Shown(const Scene& scene, const RadianceField& field) {
   return frames;
 }
 
-TrainNetworkResult Train(const Scene& scene, const RadianceField& field,
-                         const std::vector<StyledTrainingView>& views, const SceneColorMap& map,
-                         const std::string& recipe, int steps, uint64_t seed,
-                         const ProgressFunction& progress) {
-  TrainNetworkOptions options;
-  ApplyStyleRecipe(recipe, &options);
-  options.seed = seed;
-  if (steps > 0) options.steps = steps;
-  TrainingHooks hooks;
-  hooks.progress = progress;
-  const bool on_device = scene.backend == Backend::kCuda;
-  DeviceGrid grid;
-  if (on_device) grid = UploadGrid(MakeFastGrid(field));
-  return TrainNetwork(field, views, map, MarchOptions{scene.stored.field.step}, options, hooks,
-                      nullptr, on_device ? &grid : nullptr);
+// The pictures that the 2D method makes of the photos.
+struct StyledPhotos {
+  StyleTargets targets;
+  std::vector<Image> pictures;  // [views]; empty where a view is not trained on
+};
+
+StyledPhotos StylePhotos(const Scene& scene, ViewStylizer* stylizer, const std::string& name) {
+  const RadianceField& field = scene.stored.field;
+  StyledPhotos styled{{field, scene.object.get(), &scene.weights}, {}};
+  styled.pictures.resize(scene.photos.size());
+  for (const int i : scene.training_views) {
+    const size_t n = static_cast<size_t>(i);
+    if (!stylizer->Knows(i) || (scene.object != nullptr && !scene.object->Knows(i))) continue;
+    const auto target = [&] {
+      Image photo = scene.photos[n];
+      if (!scene.kept[n].empty())
+        FillMasked(scene.kept[n],
+                   RenderView(field, scene.cameras[n], MarchOptions{field.step}).color, &photo);
+      return styled.pictures[n] = Clipped(stylizer->Stylize(photo, i));
+    };
+    styled.targets.Add({i, scene.cameras[n],
+                        name + " on " + scene.views.capture().views[n].file, scene.kept[n],
+                        [&] { return scene.photos[n]; }, target});
+  }
+  return styled;
+}
+
+RestyledField RestyleByRecipe(const Scene& scene, const TrainingTargets& targets,
+                              const std::string& recipe, int steps, uint64_t seed,
+                              const ProgressFunction& progress) {
+  RestyleRequest request;
+  ApplyStyleRecipe(recipe, &request.options);
+  request.options.seed = seed;
+  if (steps > 0) request.options.steps = steps;
+  request.backend = scene.backend;
+  if (scene.object != nullptr) request.object_weights = &scene.weights.all;
+  RestyleHooks hooks;
+  hooks.training.progress = progress;
+  return Restyle(scene.stored.field, targets, request, hooks);
+}
+
+// The standard recipe's field with its linear map in place of the network.
+RadianceField MapColors(const Scene& scene, const RestyledField& standard) {
+  RadianceField mapped = scene.stored.field;
+  mapped.appearance = ApplyColorMap(mapped.appearance, standard.trained.linear_map);
+  if (scene.object != nullptr)
+    return MixFields(scene.stored.field, {&mapped}, {1}, &scene.weights.all);
+  mapped.background = standard.styled.background;
+  return mapped;
+}
+
+// What the 2D method makes of renders of the shown views; empty where it can only style photos.
+std::vector<Image> StyleRenders(RunContext* context, const Scene& scene,
+                                ViewStylizer* of_photos) {
+  if (!of_photos->StylesAnything()) return {};
+  std::unique_ptr<ViewStylizer> of_renders;
+  std::optional<CoverageRenderer> object;
+  std::vector<Image> coverage;
+  if (scene.object != nullptr) {
+    object.emplace(scene.stored.field, scene.weights);
+    of_renders = MakeSceneStylizer(context, scene.views, scene.object.get(),
+                                   [&](const Image&, int) { return coverage; });
+  }
+  std::vector<Image> styled = Shown(scene, scene.stored.field);
+  for (size_t k = 0; k < styled.size(); ++k) {
+    const int view = scene.shown[k];
+    if (object) coverage = object->Render(scene.cameras[static_cast<size_t>(view)]);
+    ViewStylizer* const stylizer = of_renders ? of_renders.get() : of_photos;
+    styled[k] = Clipped(stylizer->Stylize(styled[k], view));
+  }
+  return styled;
 }
 
 void AddStyle(RunContext* context, const Scene& scene, const SheetOptions& sheet,
               const std::string& picture, std::vector<SheetRow>* rows) {
   RunSettings& settings = context->settings;
   settings.style.picture = picture;
-  settings.scene.photo_size = sheet.size;
   const std::string name = fs::path(picture).filename().string();
   context->console->BeginStage(name);
   const ProgressFunction progress = context->console->StageProgress();
-  const std::unique_ptr<ViewStylizer> stylizer = MakeSceneStylizer(context, scene.views);
-  std::vector<Image> targets(scene.photos.size());
-  std::vector<StyledTrainingView> views;
-  std::vector<ColorStatistics> before, after;
-  for (const int i : scene.training_views) {
-    const size_t n = static_cast<size_t>(i);
-    const Image& kept = scene.kept[n];
-    const bool masked = kept.num_pixels() > 0;
-    if (!stylizer->Knows(i) || (masked && std::find(kept.pixels.begin(), kept.pixels.end(),
-                                                    1.0f) == kept.pixels.end()))
-      continue;
-    Image photo = scene.photos[n];
-    if (masked)
-      FillMasked(kept,
-                 RenderView(scene.stored.field, scene.cameras[n],
-                            MarchOptions{scene.stored.field.step})
-                     .color,
-                 &photo);
-    targets[n] = Clipped(stylizer->Stylize(photo, i));
-    StyledTrainingView view;
-    view.camera = scene.cameras[n];
-    view.target = &targets[n];
-    if (masked) view.mask = &kept;
-    view.name = name + " on " + scene.views.capture().views[n].file;
-    views.push_back(view);
-    before.push_back(MeasureColor(scene.photos[n], view.mask));
-    after.push_back(MeasureColor(targets[n], view.mask));
-  }
-  if (views.empty())
-    throw Error(ExitCode::kInput, "the 2D method knows none of the photos", picture);
-  const MklMap mkl = ComputeMkl(Pool(before), Pool(after));
-  const SceneColorMap map{mkl.map, mkl.norm};
+  const ObjectMasks* masks = scene.object.get();
+  const std::unique_ptr<ViewStylizer> stylizer = MakeSceneStylizer(
+      context, scene.views, masks,
+      [&](const Image& view, int i) { return masks->Coverage(i, view.width, view.height); });
+  const StyledPhotos styled = StylePhotos(scene, stylizer.get(), name);
+  const TrainingTargets& targets = styled.targets.targets();
+  if (targets.empty())
+    throw Error(ExitCode::kInput,
+                scene.object != nullptr
+                    ? "the masks and the 2D method agree on no part of the photos"
+                    : "the 2D method has a picture of none of the photos",
+                picture);
 
   ProgressParts parts(progress, 2);
-  const RadianceField& source = scene.stored.field;
-  RadianceField paper = source, standard = source, linear = source;
-  const Vec3d background = mkl.map(source.background.Cast<double>());
-  for (int c = 0; c < 3; ++c)
-    standard.background[c] = static_cast<float>(std::clamp(background[c], 0.0, 1.0));
-  linear.background = standard.background;
-  const TrainNetworkResult by_standard = Train(scene, standard, views, map, "standard",
-                                               sheet.steps, settings.run.seed, parts.Next(1));
-  const TrainNetworkResult by_paper =
-      Train(scene, paper, views, map, "paper", sheet.steps, settings.run.seed, parts.Next(1));
-  linear.appearance = ApplyColorMap(source.appearance, by_standard.linear_map);
-  standard.appearance = ApplyNetwork(by_standard.network, standard);
-  paper.appearance = ApplyNetwork(by_paper.network, paper);
-  const std::vector<Image> columns[] = {Shown(scene, linear), Shown(scene, paper),
-                                        Shown(scene, standard)};
-  const bool of_photos = !stylizer->StylesAnything();
-  const std::vector<Image> renders = of_photos ? std::vector<Image>() : Shown(scene, source);
-  char words[160];
-  std::snprintf(words, sizeof words,
+  const uint64_t seed = settings.run.seed;
+  const RestyledField standard =
+      RestyleByRecipe(scene, targets, "standard", sheet.steps, seed, parts.Next(1));
+  const RestyledField paper =
+      RestyleByRecipe(scene, targets, "paper", sheet.steps, seed, parts.Next(1));
+  const std::vector<Image> columns[] = {Shown(scene, MapColors(scene, standard)),
+                                        Shown(scene, paper.styled),
+                                        Shown(scene, standard.styled)};
+  const std::vector<Image> renders_2d = StyleRenders(context, scene, stylizer.get());
+  const bool of_photos = renders_2d.empty();
+  char title[160];
+  std::snprintf(title, sizeof title,
                 "%s, %s: K_est %.2f, bounds %.2f (standard, %d steps), %.2f (paper, %d steps)",
-                name.c_str(), stylizer->Name().c_str(), by_standard.k_est, by_standard.bound,
-                static_cast<int>(by_standard.steps), by_paper.bound,
-                static_cast<int>(by_paper.steps));
+                name.c_str(), stylizer->Name().c_str(), standard.trained.k_est,
+                standard.trained.bound, static_cast<int>(standard.trained.steps),
+                paper.trained.bound, static_cast<int>(paper.trained.steps));
   for (size_t k = 0; k < scene.shown.size(); ++k) {
     const size_t n = static_cast<size_t>(scene.shown[k]);
     SheetRow row;
-    if (k == 0) row.title = words;
+    if (k == 0) row.title = title;
     row.cells.push_back({scene.photos[n], scene.views.capture().views[n].file});
-    row.cells.push_back({targets[n], ""});
-    const Image wanted =
-        of_photos ? targets[n] : Clipped(stylizer->Stylize(renders[k], static_cast<int>(n)));
+    row.cells.push_back({styled.pictures[n], ""});
+    const Image& reference = of_photos ? styled.pictures[n] : renders_2d[k];
     for (const std::vector<Image>& column : columns)
       row.cells.push_back(
-          {column[k], wanted.empty() ? "" : PsnrCaption(column[k], wanted, of_photos)});
+          {column[k], reference.empty() ? "" : PsnrCaption(column[k], reference, of_photos)});
     rows->push_back(std::move(row));
   }
   context->console->EndStage();
@@ -242,13 +278,14 @@ void RunContactSheet(const Command& command, const Arguments& arguments, Console
   OptionSet& options = context.options;
   options.Add("Sheet", &sheet);
   options.Add("2D method", &settings.style_2d);
+  options.Add("Object", &settings.object);
   options.Add("Program", &settings.program);
   constexpr size_t kMostStyles = 64;
   const auto prepared = Prepare(command, arguments,
                                 {.least_words = 2,
                                  .most_words = 1 + kMostStyles,
                                  .continues_run = true,
-                                 .taken = {"holdout"}},
+                                 .taken = {"holdout", "masks", "mask-vote", "mask-edge"}},
                                 &options);
   if (!prepared) return;
   const Arguments& words = prepared->words;
@@ -261,14 +298,16 @@ void RunContactSheet(const Command& command, const Arguments& arguments, Console
                 "name the PNG file to write");
   for (size_t i = 1; i < words.size(); ++i) ReadStylePicture(words[i], nullptr);
   ProbeMethod(&settings.style_2d);
+  ProbeMasks(&settings.object);
 
   Workspace workspace(folder);
   context.workspace = &workspace;
+  settings.scene.photo_size = sheet.size;
   const Backend backend = ChooseBackend(sheet.device, false);  // before work begins
-  Scene scene = ReadScene(workspace, sheet);
+  Scene scene = ReadScene(workspace, sheet, settings);
   scene.backend = backend;
   const std::string plan = std::to_string(words.size() - 1) + " styles, " +
-                           std::to_string(scene.shown.size()) + " views each, learned from " +
+                           std::to_string(scene.shown.size()) + " views each, trained on " +
                            std::to_string(scene.training_views.size()) + " photos at " +
                            std::to_string(sheet.size) + " pixels";
   console->Info(plan);

@@ -11,7 +11,6 @@
 #include "kernels/process/child_process.h"
 #include "pipeline/commands/command.h"
 #include "pipeline/program/memory.h"
-#include "pipeline/report/chart_library.h"
 
 namespace regrade {
 namespace {
@@ -75,8 +74,6 @@ void RunDoctor(const Command& command, const Arguments& arguments, Console* cons
        "limit with --max-memory"},
       {"fast path", FastRays().name, "instruction set of rendering and fitting"},
       FindColmap("colmap"),
-      {"Chart.js", ReadChartLibrary().empty() ? "not found" : "found",
-       "optional: interactive charts of the report; package `libjs-chart.js`"},
   };
   console->Event("doctor", JsonValue::Object());
   for (const Finding& finding : findings) {

@@ -1,4 +1,4 @@
-// regrade evaluate: the figures of a run, or of frames that any program has made.
+// regrade evaluate: metrics of a run, or of frames of any program.
 #include <algorithm>
 #include <filesystem>
 #include <optional>
@@ -10,14 +10,14 @@
 #include "pipeline/commands/frame_folder.h"
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/images/image_file.h"
-#include "pipeline/report/chart_library.h"
 #include "pipeline/report/html.h"
 #include "pipeline/report/json.h"
 #include "pipeline/report/records.h"
 #include "pipeline/report/run_pictures.h"
 #include "pipeline/run/run_settings.h"
-#include "pipeline/stages/evaluation_networks.h"
 #include "pipeline/stages/heat_map_files.h"
+#include "pipeline/stages/network_probe.h"
+#include "pipeline/workspace/metrics_json.h"
 
 namespace regrade {
 namespace {
@@ -27,38 +27,38 @@ struct FramesOptions {
 
   template <typename Bind>
   void Describe(Bind& bind) {
-    bind(
-        "frames", frames,
-        {.help = "folder of the styled frames, in natural order of names; nothing else in it"});
+    bind("frames", frames,
+         {.help =
+              "folder with the styled frames and no other files; sorted by name, 9 before 10"});
     bind("reference", reference,
-         {.help = "folder of the same frames without style: motion and masks come from them"});
+         {.help =
+              "folder with the same frames before styling; motion and masks come from them"});
     bind("target", target,
-         {.help = "folder of what the 2D method made of each frame, for fidelity"});
-    bind("style", style, {.help = "the style picture, for fidelity"});
-    bind(
-        "out", out,
-        {.help =
-             "folder for report.html, report.json and heatmaps/, pictures of the worst pairs"});
+         {.help = "folder with the 2D method's version of each frame, for fidelity"});
+    bind("style", style, {.help = "style picture, for fidelity"});
+    bind("out", out,
+         {.help = "folder for report.html, report.json and heatmaps/ of the worst pairs"});
   }
 };
 
-// The figures and the pictures of the worst pairs on one page.
-void WriteEvaluation(const Workspace& workspace, const JsonValue& record, double seconds) {
-  RunReport report = ReportOfEvaluation(record);
+// Writes report.json, and a page with the metrics and the heat maps.
+void WriteEvaluation(const Workspace& workspace, const EvaluationMetrics& metrics,
+                     double seconds) {
+  RunReport report;
+  report.evaluation = metrics;
   ReportPictures pictures;
   pictures.title = std::filesystem::path(workspace.folder()).filename().string();
-  pictures.chart_library = ReadChartLibrary();
-  pictures.heat_maps = HeatMapPictures(workspace, report);
+  pictures.heat_maps = HeatMapPictures(workspace, metrics);
   report.version = REGRADE_VERSION;
   report.seconds = seconds;
-  WriteJsonFile(workspace.Path("report.json"), EvaluationJson(report));
+  WriteJsonFile(workspace.Path("report.json"), EvaluationJson(metrics));
   WriteFileAtomically(workspace.Path("report.html"), ReportHtml(report, pictures));
 }
 
 void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& options,
                     Console* console) {
   if (options.mode == "geometry")
-    throw Error(ExitCode::kUsage, "geometry is known of our own runs only", "--mode",
+    throw Error(ExitCode::kUsage, "geometry is known only for runs of regrade", "--mode",
                 "use lai2018 or ruder2016 for frames of other programs");
   ProbeEvaluationNetworks(options);
   const bool has_reference = !frames.reference.empty();
@@ -72,7 +72,7 @@ void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& optio
   const FrameFolder reference_folder = has_reference ? open(frames.reference) : styled_folder;
   CheckSameFrames(reference_folder, styled_folder);
   if (styled_folder.paths.size() == 1)
-    console->Warn("one frame only: consistency compares two and more, so it is not defined");
+    console->Warn("there is one frame only: consistency compares pairs, so it is not defined");
   const NamedFrameSource styled{"styled", styled_folder.Source()};
   const FrameSource reference = reference_folder.Source();
   std::vector<NamedFrameSource> sequences;
@@ -95,8 +95,7 @@ void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& optio
   sequences.push_back(styled);
   targets.perceptual = PerceptualDistance(options.lpips);
   console->EndStage();
-  std::optional<Workspace>
-      workspace;  // before the work: a folder that cannot be used is told now
+  std::optional<Workspace> workspace;  // before the work: the folder may be unusable
   if (!frames.out.empty()) workspace.emplace(frames.out);
 
   console->BeginStage("evaluate");
@@ -114,9 +113,9 @@ void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& optio
         WriteHeatMaps(*workspace, EstimatedMotion(reference, options.mode, options.flow),
                       sequences, options.gaps, consistency);
   }
-  const JsonValue record = EvaluationRecord(consistency, fidelity, heat_maps);
-  if (workspace) WriteEvaluation(*workspace, record, seconds);
-  console->Event("evaluation", record);
+  const EvaluationMetrics metrics = MetricsOf(consistency, fidelity, heat_maps);
+  if (workspace) WriteEvaluation(*workspace, metrics, seconds);
+  console->Event("evaluation", MetricsToJson(metrics));
   console->Lines(FormatTables(consistency, fidelity));
 }
 
@@ -130,11 +129,11 @@ void RunEvaluate(const Command& command, const Arguments& arguments, Console* co
   options.Add("Frames", &frames);
   options.Add("Evaluation", &consistency);
   options.Add("Program", &program);
-  // Without --frames it is a run's folder, with all of a run's options.
-  const bool foreign = std::any_of(arguments.begin(), arguments.end(), [](const auto& word) {
+  // Without --frames it evaluates the folder of a run, with all of a run's options.
+  const bool has_frames = std::any_of(arguments.begin(), arguments.end(), [](const auto& word) {
     return word == "--frames" || word.compare(0, 9, "--frames=") == 0;
   });
-  if (!foreign && !AsksForHelp(arguments))
+  if (!has_frames && !AsksForHelp(arguments))
     return ContinueRun(command, arguments, "evaluate", console);
   if (!Prepare(command, arguments, {.least_words = 0, .most_words = 0}, &options)) return;
   EvaluateFrames(frames, consistency, console);

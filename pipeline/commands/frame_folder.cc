@@ -13,7 +13,7 @@
 namespace regrade {
 namespace {
 
-// "shot_00012.png": what stands before the last digits of the stem, and the digits.
+// "shot_00012.png": the text before the last digits of the stem, and the digits.
 struct NumberedName {
   std::string before, digits;
   int64_t number = 0;
@@ -33,7 +33,7 @@ std::optional<NumberedName> SplitName(const std::string& name) {
   return NumberedName{stem.substr(0, begin), digits, std::stoll(digits)};
 }
 
-// Empty unless all names are one beginning and a number.
+// Empty unless all names are one prefix and a number.
 std::vector<NumberedName> Numbers(const std::vector<std::string>& names) {
   std::vector<NumberedName> numbers;
   for (const std::string& name : names) {
@@ -65,7 +65,7 @@ void CheckNumbers(const FrameFolder& frames) {
       throw Error(ExitCode::kInput,
                   "frame " + Padded(last.number + step, last.digits.size()) +
                       " is missing between " + both,
-                  frames.folder, "add it; if the jump is meant, number the frames without one");
+                  frames.folder, "add it, or renumber the frames without a gap");
   }
 }
 
@@ -86,7 +86,7 @@ FrameFolder OpenFrameFolder(const std::string& folder, const ProgressFunction& p
   for (const ListedFile& file : ListFolder(folder).files) {
     if (!file.problem.empty())
       throw Error(ExitCode::kInput, "a frame cannot be opened: " + file.problem,
-                  folder + "/" + file.name, "the folder shall hold the frames and no more");
+                  folder + "/" + file.name, "keep only the frames in this folder");
     frames.paths.push_back(file.path);
     frames.names.push_back(file.name);
   }
@@ -113,16 +113,16 @@ void CheckSameFrames(const FrameFolder& reference, const FrameFolder& sequence) 
   const bool more = reference.paths.size() > sequence.paths.size();
   const FrameFolder &longer = more ? reference : sequence,
                     &shorter = more ? sequence : reference;
-  std::string who;
-  const std::vector<NumberedName> have = Numbers(shorter.names), want = Numbers(longer.names);
+  std::string missing;
+  const std::vector<NumberedName> some = Numbers(shorter.names), all = Numbers(longer.names);
   std::set<int64_t> known;
-  for (const NumberedName& name : have) known.insert(name.number);
-  for (size_t i = 0; i < want.size() && !known.empty() && who.empty(); ++i)
-    if (!known.count(want[i].number))
-      who = "; " + longer.names[i] + " of " + longer.folder + " has no counterpart";
+  for (const NumberedName& name : some) known.insert(name.number);
+  for (size_t i = 0; i < all.size() && !known.empty() && missing.empty(); ++i)
+    if (!known.count(all[i].number))
+      missing = "; " + longer.names[i] + " of " + longer.folder + " has no counterpart";
   throw Error(ExitCode::kInput,
               std::to_string(sequence.paths.size()) + " frames, the reference has " +
-                  std::to_string(reference.paths.size()) + who,
+                  std::to_string(reference.paths.size()) + missing,
               sequence.folder, "evaluate the same frames of each");
 }
 

@@ -1,4 +1,4 @@
-// A folder of frames that any program may have written, looked through before work begins.
+// Opens a folder of frames of any program and checks them before work begins.
 #pragma once
 
 #include <string>
@@ -17,17 +17,16 @@ struct FrameFolder {
   FrameSource Source() const;
 };
 
-// Lists the folder and decodes each frame once, so that a bad one is told now and not after an
-// hour: a damaged or unreadable file, frames of different sizes, a number that is missing from
-// names that otherwise count evenly (the pairs across the hole would be further apart than
-// their gap says), a number that two files share. Names without a common beginning and a number
-// are not counted. Reports progress by frames.
+// Lists the folder and decodes each frame once, so that errors appear early: a damaged or
+// unreadable file, frames of different sizes, a number missing from evenly numbered names (the
+// pairs across it would be further apart than their gap), a number that two files share. Only
+// names that are a common prefix and a number are checked for numbers. Progress counts frames.
 //
 // Errors: kInput, with the file.
 FrameFolder OpenFrameFolder(const std::string& folder, const ProgressFunction& progress = {});
 
-// Throws Error(kInput) unless both have as many frames; names the first one that has no
-// counterpart where the names' numbers tell.
+// Throws Error(kInput) unless both have the same number of frames; names the first one without
+// a counterpart if names are numbered.
 void CheckSameFrames(const FrameFolder& reference, const FrameFolder& sequence);
 
 }  // namespace regrade

@@ -5,20 +5,10 @@
 #include <cmath>
 
 #include "kernels/base/error.h"
+#include "pipeline/files/text.h"
 
 namespace regrade {
 namespace {
-
-std::vector<std::string> Split(const std::string& text, char separator) {
-  std::vector<std::string> parts(1);
-  for (const char c : text) {
-    if (c == separator)
-      parts.emplace_back();
-    else
-      parts.back() += c;
-  }
-  return parts;
-}
 
 std::vector<double> ParsePoint(const std::string& text, int styles) {
   const auto refuse = [&](const std::string& why) {

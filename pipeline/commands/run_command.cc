@@ -12,8 +12,8 @@
 #include "pipeline/run/plan.h"
 #include "pipeline/run/run_file.h"
 #include "pipeline/run_pipeline.h"
-#include "pipeline/stages/evaluation_networks.h"
 #include "pipeline/stages/make_stylizer.h"
+#include "pipeline/stages/network_probe.h"
 #include "pipeline/stages/stages.h"
 
 namespace regrade {

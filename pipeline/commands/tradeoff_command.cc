@@ -1,5 +1,5 @@
-// regrade tradeoff: what each parameter costs in time and buys in accuracy, measured on this
-// machine with a capture of one's own.
+// regrade tradeoff: measures the cost of each parameter in time and its gain in accuracy, on
+// this machine with a given capture.
 #include <omp.h>
 
 #include <algorithm>
@@ -14,9 +14,8 @@
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/program/interrupt.h"
-#include "pipeline/report/chart_library.h"
+#include "pipeline/report/cost_rows.h"
 #include "pipeline/report/html.h"
-#include "pipeline/report/json.h"
 #include "pipeline/run/resolve_settings.h"
 #include "pipeline/run/run_file.h"
 #include "pipeline/run_pipeline.h"
@@ -25,6 +24,7 @@
 #include "pipeline/tradeoff/duration_estimate.h"
 #include "pipeline/tradeoff/prediction.h"
 #include "pipeline/tradeoff/variant_runner.h"
+#include "pipeline/workspace/metrics_json.h"
 
 namespace regrade {
 namespace {
@@ -40,28 +40,28 @@ struct TradeoffOptions {
   template <typename Bind>
   void Describe(Bind& bind) {
     bind("parameters", parameters,
-         {.help = "only these, with commas between; empty measures all"});
+         {.help = "measure only these, comma-separated; empty measures all"});
     bind("presets", presets,
          {.help =
-              "measured as points beside the parameters, dear and last; none leaves them out"});
+              "presets to measure as well, comma-separated; expensive and measured last; none "
+              "omits them"});
     bind("repeats", repeats,
-         {.unit = "measurements",
-          .help = "of everything, in an order that turns from one to the next, each with "
-                  "another seed; medians are printed, and with one alone there is no spread",
+         {.unit = "repetitions",
+          .help = "of each measurement, with another seed each time; tables show medians, and "
+                  "spreads for 2 or more",
           .min = 1,
           .max = 100});
-    bind("budget", budget,
-         {.unit = "minutes",
-          .help = "after it no measurement begins but the first; the same command again goes "
-                  "on; 0 has no "
-                  "end",
-          .min = 0,
-          .max = 1e6});
     bind(
-        "with-poses", with_poses,
-        {.help = "COLMAP's parameters too, where photos are given: its time is measured anew"});
+        "budget", budget,
+        {.unit = "minutes",
+         .help = "starts no further measurement after this time; the same command continues; 0 "
+                 "has no limit",
+         .min = 0,
+         .max = 1e6});
+    bind("with-poses", with_poses,
+         {.help = "also measure COLMAP's parameters, if photos without poses are given"});
     bind("predict", predict,
-         {.help = "a run's folder: what --costs say it should have taken, beside what it did"});
+         {.help = "folder of a run: prints its time predicted from --costs and its real time"});
     bind("costs", costs, {.help = "the tradeoff.json to predict from"});
   }
 };
@@ -83,14 +83,14 @@ double SecondsSince(Clock::time_point begin) {
   return std::chrono::duration<double>(Clock::now() - begin).count();
 }
 
-// One measurement that is to be made.
+// A measurement to make.
 struct Job {
   const Variant* variant;
   int repeat;
 };
 
-// Each repetition begins elsewhere in the list, so that what the machine does meanwhile falls
-// on all variants alike.
+// Each repetition starts at another variant, so that other load on the machine affects all
+// variants equally.
 std::vector<Job> JobsOf(const std::vector<Variant>& variants, int repeats) {
   std::vector<Job> jobs;
   const size_t n = variants.size();
@@ -106,7 +106,7 @@ std::string NameOf(const Variant& variant) {
   return variant.benchmark + ": " + variant.parameter + " " + variant.value;
 }
 
-// A preset that is the base is measured already.
+// Names the base, and removes a preset that equals it from `presets`.
 std::string BaseName(const RunSettings& settings, const OptionSet& options,
                      std::vector<std::string>* presets) {
   const auto same = [&](const std::string& preset) {
@@ -141,12 +141,12 @@ void WriteResults(const RunContext& base, const TradeoffOptions& tradeoff,
   const std::vector<CostRow> rows = CostTable(variants, store.all(), base_name);
   const Capture capture = ReadCapture(base.workspace->Path("poses"));
   JsonValue::Array costs, measured;
-  for (const CostRow& row : rows) costs.push_back(CostJson(row));
+  for (const CostRow& row : rows) costs.push_back(MetricsToJson(row));
   for (const Measurement& m : store.all()) measured.push_back(ToJson(m));
   const std::vector<CostTerm> terms =
       LearnCosts(base.settings, capture, *base.workspace, variants, store.all());
   WriteJsonFile(folder + "/tradeoff.json",
-                JsonValue::Object{{"schema", 1},
+                JsonValue::Object{{"schema", kTradeoffSchema},
                                   {"regrade", REGRADE_VERSION},
                                   {"base", base_name},
                                   {"repeats", tradeoff.repeats},
@@ -163,14 +163,13 @@ void WriteResults(const RunContext& base, const TradeoffOptions& tradeoff,
   report.costs = rows;
   for (const Measurement& m : store.all()) report.seconds += m.seconds;
   ReportPictures pictures;
-  pictures.title = "prices of " + fs::path(base.source).filename().string();
-  pictures.chart_library = ReadChartLibrary();
+  pictures.title = "costs of " + fs::path(base.source).filename().string();
   WriteFileAtomically(folder + "/tradeoff.html", ReportHtml(report, pictures));
   base.console->Event("costs", JsonValue::Object{{"file", folder + "/tradeoff.json"}});
   base.console->Lines(CostTableText(rows));
 }
 
-// What is not measured yet, one at a time, until all is or the budget is spent.
+// Makes the missing measurements, one at a time, until the budget is spent.
 void MeasureAll(RunContext* base, const TradeoffOptions& tradeoff, const std::string& folder,
                 const std::vector<Variant>& variants, Clock::time_point begin,
                 MeasurementStore* store) {
@@ -178,15 +177,15 @@ void MeasureAll(RunContext* base, const TradeoffOptions& tradeoff, const std::st
   std::erase_if(
       jobs, [&](const Job& job) { return store->Find(*job.variant, job.repeat) != nullptr; });
   Console* console = base->console;
-  DurationEstimate guess(base->settings, store->all());
-  VariantRunner bench(base, folder + "/work");
+  DurationEstimate estimate(base->settings, store->all());
+  VariantRunner runner(base, folder + "/work");
   for (size_t i = 0; i < jobs.size(); ++i) {
     double left = 0;
-    for (size_t k = i; k < jobs.size(); ++k) left += guess.Seconds(*jobs[k].variant);
+    for (size_t k = i; k < jobs.size(); ++k) left += estimate.Seconds(*jobs[k].variant);
     if (i > 0 && tradeoff.budget > 0 && SecondsSince(begin) > 60 * tradeoff.budget) {
       console->Warn("the budget is spent: " + std::to_string(jobs.size() - i) +
-                    " measurements are left, about " + DurationText(left) +
-                    "; the same command goes on");
+                    " measurements remain, about " + DurationText(left) +
+                    "; the same command continues");
       return;
     }
     console->Info("[" + std::to_string(i + 1) + "/" + std::to_string(jobs.size()) + "] " +
@@ -194,42 +193,42 @@ void MeasureAll(RunContext* base, const TradeoffOptions& tradeoff, const std::st
     console->SetQuiet(true);
     Measurement m;
     try {
-      m = bench.Measure(*jobs[i].variant, jobs[i].repeat, console->StageProgress());
+      m = runner.Measure(*jobs[i].variant, jobs[i].repeat, console->StageProgress());
     } catch (...) {
       console->SetQuiet(false);
       throw;
     }
     console->SetQuiet(false);
     store->Add(m);
-    guess.Add(m);
+    estimate.Add(m);
     if (StopRequested()) throw Interrupted();
   }
 }
 
-// The options of the base's run: everything but what stages of a trial are not given.
+// Refuses options that do not apply to measurements.
 void CheckOptions(const RunSettings& settings, const TradeoffOptions& tradeoff) {
   if (settings.run.out.empty())
     throw Error(ExitCode::kUsage, "its value is missing", "--out",
-                "name the folder that the prices shall go to");
+                "name the folder for the results");
   if (settings.object.On())
-    throw Error(ExitCode::kUsage, "prices are of whole scenes", "--masks", "leave it out");
+    throw Error(ExitCode::kUsage, "costs are measured for whole scenes", "--masks", "omit it");
   if (settings.run.device == "cuda")
-    throw Error(ExitCode::kUsage, "prices are the processor's so far", "--device",
-                "take --device cpu");
+    throw Error(ExitCode::kUsage, "costs are measured on the CPU only", "--device",
+                "use --device cpu");
   if (!settings.start.config.empty() || !settings.start.restart_from.empty())
-    throw Error(ExitCode::kUsage, "has no meaning here", "--config and --restart-from",
-                "leave them out; remove the folder to begin anew");
+    throw Error(ExitCode::kUsage, "not supported by tradeoff", "--config and --restart-from",
+                "omit them; remove the folder to start over");
   for (const std::string& preset : Words(tradeoff.presets)) PresetOptions(preset);
 }
 
 void PrintPrediction(const TradeoffOptions& tradeoff, Console* console) {
   if (tradeoff.costs.empty())
     throw Error(ExitCode::kUsage, "its value is missing", "--costs",
-                "name the tradeoff.json that `regrade tradeoff` wrote");
+                "name a tradeoff.json from `regrade tradeoff`");
   const std::vector<CostTerm> costs =
       CostsFromJson(ReadJsonFile(tradeoff.costs), tradeoff.costs);
   if (!Workspace::Exists(tradeoff.predict))
-    throw Error(ExitCode::kInput, "no run has worked in this folder", tradeoff.predict,
+    throw Error(ExitCode::kInput, "this is not the folder of a run", tradeoff.predict,
                 "make one with `regrade run`");
   RunContext run;
   run.settings.Bind(&run.options);
@@ -242,26 +241,27 @@ void PrintPrediction(const TradeoffOptions& tradeoff, Console* console) {
   console->Lines(line);
   JsonValue::Array rows;
   StageTime all{"all", 0, 0}, took{"all", 0, 0};
-  const auto print = [&](const StageTime& said, const StageTime& was) {
-    const double wall = was.seconds > 0 ? said.seconds / was.seconds : 0,
-                 cpu = was.cpu_seconds > 0 ? said.cpu_seconds / was.cpu_seconds : 0;
+  const auto print = [&](const StageTime& predicted, const StageTime& measured) {
+    const double wall = measured.seconds > 0 ? predicted.seconds / measured.seconds : 0,
+                 cpu = measured.cpu_seconds > 0 ? predicted.cpu_seconds / measured.cpu_seconds
+                                                : 0;
     std::snprintf(line, sizeof line, "%-12s %12.1f %12.1f %7.2f %12.1f %12.1f %7.2f",
-                  said.stage.c_str(), said.seconds, was.seconds, wall, said.cpu_seconds,
-                  was.cpu_seconds, cpu);
+                  predicted.stage.c_str(), predicted.seconds, measured.seconds, wall,
+                  predicted.cpu_seconds, measured.cpu_seconds, cpu);
     console->Lines(line);
-    rows.push_back(JsonValue::Object{{"stage", said.stage},
-                                     {"predicted_seconds", said.seconds},
-                                     {"seconds", was.seconds},
-                                     {"predicted_cpu_seconds", said.cpu_seconds},
-                                     {"cpu_seconds", was.cpu_seconds}});
+    rows.push_back(JsonValue::Object{{"stage", predicted.stage},
+                                     {"predicted_seconds", predicted.seconds},
+                                     {"seconds", measured.seconds},
+                                     {"predicted_cpu_seconds", predicted.cpu_seconds},
+                                     {"cpu_seconds", measured.cpu_seconds}});
   };
-  for (const StageTime& said : Predict(costs, run.settings, capture)) {
-    const auto record = workspace.Find(said.stage);
+  for (const StageTime& predicted : Predict(costs, run.settings, capture)) {
+    const auto record = workspace.Find(predicted.stage);
     if (!record) continue;
-    const StageTime was{said.stage, record->seconds, record->cpu_seconds.value_or(0)};
-    print(said, was);
-    all.seconds += said.seconds, all.cpu_seconds += said.cpu_seconds;
-    took.seconds += was.seconds, took.cpu_seconds += was.cpu_seconds;
+    const StageTime measured{predicted.stage, record->seconds, record->cpu_seconds.value_or(0)};
+    print(predicted, measured);
+    all.seconds += predicted.seconds, all.cpu_seconds += predicted.cpu_seconds;
+    took.seconds += measured.seconds, took.cpu_seconds += measured.cpu_seconds;
   }
   print(all, took);
   console->Event("prediction", JsonValue::Object{{"stages", std::move(rows)}});
@@ -275,7 +275,7 @@ void RunTradeoff(const Command& command, const Arguments& arguments, Console* co
   RunContext base;
   base.console = console;
   RunSettings& settings = base.settings;
-  settings.Bind(&base.options);  // what a run has; flags are read with ours beside
+  settings.Bind(&base.options);  // a run's options; `flags` has those of tradeoff, too
   OptionSet flags;
   settings.Bind(&flags);
   flags.Add("Tradeoff", &tradeoff);
@@ -305,15 +305,15 @@ void RunTradeoff(const Command& command, const Arguments& arguments, Console* co
   const std::string base_name = BaseName(settings, base.options, &choice.presets);
   const std::vector<Variant> variants = VariantsOf(settings, choice);
   if (settings.start.dry_run) {
-    const DurationEstimate guess(settings, {});
+    const DurationEstimate estimate(settings, {});
     double all = 0;
     for (const Variant& variant : variants) {
-      console->Info(NameOf(variant) + ", about " + DurationText(guess.Seconds(variant)));
-      all += guess.Seconds(variant);
+      console->Info(NameOf(variant) + ", about " + DurationText(estimate.Seconds(variant)));
+      all += estimate.Seconds(variant);
     }
     console->Info(std::to_string(variants.size()) + " variants, " +
                   std::to_string(tradeoff.repeats) + " times each: about " +
-                  DurationText(all * tradeoff.repeats) + ", and the base before");
+                  DurationText(all * tradeoff.repeats) + ", and a run of the base");
     return;
   }
   settings.run.device = "cpu";

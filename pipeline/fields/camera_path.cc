@@ -10,8 +10,8 @@
 namespace regrade {
 namespace {
 
-// The point nearest to all optical axes in the least squares sense; a weak pull towards a point
-// before the cameras decides where axes are parallel.
+// The point nearest to all optical axes in the least squares sense; a weak term towards a point
+// in front of the cameras decides where the axes are parallel.
 Vec3d LookAtPoint(const std::vector<Camera>& cameras, const Vec3d& center) {
   double spread = 0;
   Vec3d heading{};
@@ -56,7 +56,7 @@ Camera LookingAlong(const Camera& model, const Vec3d& center, const Vec3d& forwa
   return camera;
 }
 
-// How far apart two views look: distance, and the same again for a turn of one radian.
+// Dissimilarity of two views: their distance, and as much again for a turn of one radian.
 double Jump(const Camera& a, const Camera& b, double unit) {
   const double turn = std::acos(std::clamp(Dot(a.Forward(), b.Forward()), -1.0, 1.0));
   return Norm(a.Center() - b.Center()) / unit + turn;
@@ -80,7 +80,7 @@ Vec3d MeanUp(const std::vector<Camera>& cameras) {
   return Norm(up) > 0.1 * static_cast<double>(cameras.size()) ? Normalized(up) : Vec3d{0, 0, 1};
 }
 
-// Gaussian means of the photos' places and headings along the tour.
+// Gaussian means of the photos' positions and orientations along the tour.
 std::vector<Camera> SmoothPath(const std::vector<Camera>& cameras, int frames) {
   const std::vector<int> order = SmoothOrder(cameras);
   const double unit = MeanExtent(cameras, MeanCenter(cameras));
@@ -187,7 +187,7 @@ std::vector<int> SmoothOrder(const std::vector<Camera>& cameras) {
     better = false;
     for (size_t i = 0; i + 1 < n; ++i)
       for (size_t j = i + 1; j < n; ++j) {
-        // Turning tour[i .. j] around changes the links at its two ends only.
+        // Reversing tour[i .. j] changes only the links at its two ends.
         double change = 0;
         if (i > 0) change += jump(tour[i - 1], tour[j]) - jump(tour[i - 1], tour[i]);
         if (j + 1 < n) change += jump(tour[i], tour[j + 1]) - jump(tour[j], tour[j + 1]);
@@ -198,7 +198,7 @@ std::vector<int> SmoothOrder(const std::vector<Camera>& cameras) {
         }
       }
   }
-  // A capture that was walked keeps its order, unless that costs real jumps.
+  // The order of the photos is kept unless it has large jumps.
   return TourLength(cameras, tour, unit) < 0.8 * TourLength(cameras, natural, unit) ? tour
                                                                                     : natural;
 }

@@ -1,4 +1,4 @@
-// Where the film's camera goes: a smooth flight past the photos' places, an orbit, or a spiral.
+// Camera path of the film: a smooth flight past the photos' positions, an orbit, or a spiral.
 #pragma once
 
 #include <string>
@@ -17,22 +17,26 @@ struct PathOptions {
   void Describe(Bind& bind) {
     bind("path", path,
          {.help =
-              "the film's way: smooth flies past the photos' places, views jumps from photo to "
-              "photo, orbit circles what they look at, spiral sways before it",
+              "camera path of the film: smooth flies past the photos' positions, views shows "
+              "them one by one, orbit circles the point they look at, spiral moves in front of "
+              "it",
           .choices = "smooth|views|orbit|spiral"});
     bind("path-frames", path_frames,
-         {.unit = "frames", .help = "of the film; not for views", .min = 2, .max = 100000});
+         {.unit = "frames",
+          .help = "length of the film; not for views",
+          .min = 2,
+          .max = 100000});
   }
 };
 
-// `cameras` in any order, in one frame, z up; at least one. The path's cameras are CommonCamera
-// (kernels/scene/common_camera.h) elsewhere; for "views" WithCommonIntrinsics. "smooth" stays
-// within the hull of neighbouring photos, where the field is supported by photos.
+// `cameras` in any order, in one frame, z up; at least one. All cameras of the path have the
+// intrinsics of CommonCamera (kernels/scene/common_camera.h), those of "views" of
+// WithCommonIntrinsics. "smooth" stays within the hull of neighbouring photos, where photos
+// support the field.
 std::vector<Camera> MakeCameraPath(const std::vector<Camera>& cameras,
                                    const PathOptions& options);
 
-// An order of the cameras without jumps: natural order, or a shorter tour by 2-opt where one is
-// found.
+// An order of the cameras without jumps: the natural order, or a shorter tour found by 2-opt.
 std::vector<int> SmoothOrder(const std::vector<Camera>& cameras);
 
 }  // namespace regrade

@@ -16,15 +16,16 @@ constexpr int32_t kVersion = 1;
 constexpr int kStoredBasis = 9;
 constexpr int64_t kSphericalHarmonics = 1;  // svox2's basis_type
 
-Buffer<uint16_t> PackedColours(const Appearance& appearance, int64_t voxels) {
-  Buffer<uint16_t> packed(voxels * 3 * kStoredBasis);  // zero
+// Colours of voxels [first, first + voxels) in half precision, 27 values each.
+void PackColours(const Appearance& appearance, int64_t first, int64_t voxels, uint16_t* to) {
+  std::fill_n(to, voxels * 3 * kStoredBasis, uint16_t{0});
 #pragma omp parallel for schedule(static)
   for (int64_t i = 0; i < voxels; ++i)
     for (int channel = 0; channel < 3; ++channel)
       for (int k = 0; k < appearance.basis; ++k)
-        packed[(i * 3 + channel) * kStoredBasis + k] = HalfFromFloat(std::clamp(
-            appearance.sh[(i * 3 + channel) * appearance.basis + k], -kMaxHalf, kMaxHalf));
-  return packed;
+        to[(i * 3 + channel) * kStoredBasis + k] = HalfFromFloat(
+            std::clamp(appearance.sh[((first + i) * 3 + channel) * appearance.basis + k],
+                       -kMaxHalf, kMaxHalf));
 }
 
 float ValueAt(const NpzArray& array, int64_t i) {
@@ -164,7 +165,6 @@ void WriteFieldFile(const std::string& path, const StoredField& stored) {
   const RadianceField& field = stored.field;
   const Geometry& geometry = *field.geometry;
   const int64_t voxels = geometry.num_voxels();
-  const Buffer<uint16_t> colours = PackedColours(field.appearance, voxels);
   const Vec3i size = geometry.frame.resolution;
   const Similarity& similarity = stored.field_from_world;
   double placement[13] = {similarity.scale};
@@ -178,8 +178,12 @@ void WriteFieldFile(const std::string& path, const StoredField& stored) {
   file.Add("center", {3}, &geometry.frame.center.x);
   file.Add("links", {size.x, size.y, size.z}, geometry.links.data(), NpzPacking::kDeflate);
   file.Add("density_data", {voxels, 1}, geometry.density.data());
-  file.Add("sh_data", {voxels, 3 * kStoredBasis}, colours.data(),
-           field.appearance.basis == kStoredBasis ? NpzPacking::kStore : NpzPacking::kDeflate);
+  file.AddFilled<uint16_t>(
+      "sh_data", {voxels, 3 * kStoredBasis},
+      [&field](int64_t first, int64_t count, uint16_t* to) {
+        PackColours(field.appearance, first, count, to);
+      },
+      field.appearance.basis == kStoredBasis ? NpzPacking::kStore : NpzPacking::kDeflate);
   file.AddScalar<int64_t>("basis_type", kSphericalHarmonics);
   file.AddScalar<int32_t>("regrade_version", kVersion);
   file.AddScalar<int32_t>("regrade_basis", field.appearance.basis);
@@ -188,7 +192,7 @@ void WriteFieldFile(const std::string& path, const StoredField& stored) {
   file.AddScalar<float>("regrade_step", field.step);
   file.Add("regrade_field_from_world", {13}, placement);
   if (stored.ndc.on()) file.Add("regrade_ndc", {2}, &stored.ndc.a);
-  std::vector<float> texels;  // the writer reads them when it writes
+  std::vector<float> texels;  // read by the writer in WriteTo
   AddSpheres(field, &texels, &file);
   file.WriteTo(path);
 }
@@ -216,13 +220,13 @@ StoredField ReadFieldFile(const std::string& path, uint64_t budget) {
       stored.field_from_world.translation[i] = placement[10 + i];
     }
     if (!IsSound(stored.field_from_world))
-      Refuse(path, "regrade_field_from_world is no scale, rotation and translation");
+      Refuse(path, "regrade_field_from_world is not a similarity");
   }
   if (file.Has("regrade_ndc")) {
     const NpzArray array = file.Read("regrade_ndc", ArrayType::kF64, {2});
     stored.ndc = {array.As<double>()[0], array.As<double>()[1]};
     if (!(stored.ndc.a > 0 && stored.ndc.a < 1e3 && stored.ndc.b > 0 && stored.ndc.b < 1e3))
-      Refuse(path, "regrade_ndc is not the shape of a picture's view");
+      Refuse(path, "regrade_ndc is not the field of view of a picture");
   }
   Validate(stored.field, path.c_str());
   return stored;

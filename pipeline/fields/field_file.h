@@ -1,11 +1,11 @@
-// field.npz and styled.npz: a radiance field on disk, in the layout of svox2's checkpoints with
-// a few named arrays of our own beside theirs.
+// Reads and writes field.npz and styled.npz: a radiance field in the layout of svox2's
+// checkpoints, with additional arrays.
 //
-// Theirs: radius f32[3], center f32[3], links i32[X,Y,Z], density_data f32[N,1], sh_data
+// svox2's: radius f32[3], center f32[3], links i32[X,Y,Z], density_data f32[N,1], sh_data
 // f16[N,27], basis_type i64 (1: spherical harmonics); with background spheres
 // background_links i32[2R,R], background_data f32[columns,L,4]. Colours of a lower degree are
-// padded with zeros to 9 harmonics a channel. Ours: regrade_version i32, regrade_basis i32,
-// regrade_background f32[3], regrade_near_clip f32, regrade_step f32 (voxels),
+// padded with zeros to 9 harmonics a channel. Additional: regrade_version i32, regrade_basis
+// i32, regrade_background f32[3], regrade_near_clip f32, regrade_step f32 (voxels),
 // regrade_field_from_world f64[13] (scale, rotation by rows, translation), regrade_ndc f64[2]
 // where the field is in normalised device coordinates (ndc.h).
 #pragma once
@@ -26,15 +26,15 @@ struct StoredField {
 };
 
 // Colours are rounded to half precision (to nearest, ties to even; beyond its range to the
-// largest half): read the file back before using the field further, so that every stage sees
-// what a later run would see. Equal fields give equal bytes. Throws Error(kResources).
+// largest half): read the file back before using the field further, so that every stage gets
+// the values that a later run would get. Equal fields give equal bytes. Needs a few megabytes
+// of memory besides the field. Throws Error(kResources).
 void WriteFieldFile(const std::string& path, const StoredField& stored);
 
-// Reads our files and svox2's (its `data` key of old, and links below -1, included). A foreign
-// field gets a white background, svox2's default, as its file has no entry for it. Throws
+// Reads our files and svox2's (with its older key `data` and links below -1, too). A field of
+// svox2 gets a white background, svox2's default: its file has no entry for it. Throws
 // Error(kInput) for files that are damaged, larger than `budget` bytes, from a newer version of
-// this program, or hold what we cannot render (learned bases). The field
-// has passed Validate.
+// this program, or not renderable (learned bases). The field has passed Validate.
 StoredField ReadFieldFile(const std::string& path, uint64_t budget = uint64_t{64} << 30);
 
 }  // namespace regrade

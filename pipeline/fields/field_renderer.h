@@ -1,4 +1,4 @@
-// A field made ready to be rendered many times, on the processor that a run uses.
+// Prepares a field for many renders on the processor of the run.
 #pragma once
 
 #include "kernels/device/backend.h"

@@ -71,7 +71,7 @@ std::string PackFitState(const FitState& state, const std::string& note) {
   const FastGrid& grid = state.grid;
   BytePacker packer;
   const size_t head =
-      256 + note.size() + sizeof(FitCurvePoint) * state.tally.curve.size();  // generously
+      256 + note.size() + sizeof(FitCurvePoint) * state.tally.curve.size();  // upper bound
   packer.Reserve(head + sizeof(int32_t) * static_cast<size_t>(grid.links.size()) +
                  sizeof(float) * static_cast<size_t>(
                                      grid.records.size() + state.second_moment.size() +

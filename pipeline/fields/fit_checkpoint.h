@@ -1,4 +1,4 @@
-// A fit's state as bytes, so that an interrupted fit goes on as if it had never stopped.
+// Packs a fit's state into bytes: a resumed fit gives the same result as an uninterrupted one.
 #pragma once
 
 #include <optional>
@@ -9,10 +9,10 @@
 
 namespace regrade {
 
-// Floats keep all their bits. `note`: what else the fit's stage wants back.
+// Floats keep all their bits. `note`: further data of the fit's stage.
 std::string PackFitState(const FitState& state, const std::string& note = "");
 
-// Empty for bytes that are no such state.
+// Empty if the bytes are not such a state.
 std::optional<FitState> UnpackFitState(std::string_view bytes, std::string* note = nullptr);
 
 }  // namespace regrade

@@ -7,7 +7,7 @@ namespace {
 
 constexpr uint32_t kVersion = 2;
 
-// One list of members for both directions.
+// Lists the members once for both directions.
 template <typename Visitor, typename State>
 void Visit(Visitor* visit, State* state) {
   auto& network = state->network;

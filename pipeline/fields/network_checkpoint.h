@@ -1,5 +1,5 @@
-// The state of a network's training as bytes, so that an interrupted training goes on as if it
-// had never stopped.
+// Packs the state of a network's training into bytes: a resumed training gives the same result
+// as an uninterrupted one.
 #pragma once
 
 #include <optional>
@@ -13,7 +13,7 @@ namespace regrade {
 // Floats keep all their bits.
 std::string PackTrainingState(const TrainingState& state);
 
-// Empty for bytes that are no such state.
+// Empty if the bytes are not such a state.
 std::optional<TrainingState> UnpackTrainingState(std::string_view bytes);
 
 }  // namespace regrade

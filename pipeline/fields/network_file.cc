@@ -10,10 +10,10 @@
 namespace regrade {
 namespace {
 
-constexpr int32_t kVersion = 1;
+constexpr int32_t kVersion = 2;
 constexpr uint64_t kBudget = uint64_t{1} << 20;  // the arrays are 110 KB
 
-// The bound is a product of singular values in double: another machine's differ in their last
+// The bound is a product of singular values in double: another machine differs in the last
 // digits, a changed weight in the first ones.
 constexpr double kBoundTolerance = 1e-9;
 
@@ -33,7 +33,7 @@ void VisitLayers(Network* network, const Visitor& visit) {
     const int64_t out = LipschitzNetwork::Outputs(l), in = LipschitzNetwork::Inputs(l);
     visit(Named("weight", l), {out, in}, network->weight(l));
     visit(Named("bias", l), {out}, network->bias(l));
-    visit(Named("k", l), {}, network->bias(l) + out);  // K stands behind the biases
+    visit(Named("k", l), {}, network->bias(l) + out);  // K follows the biases
     visit(Named("u", l), {out}, vectors);
     visit(Named("v", l), {in}, vectors + out);
     vectors += out + in;
@@ -62,6 +62,7 @@ void WriteNetworkFile(const std::string& path, const StoredNetwork& stored) {
   file.Add("base_offset", {3}, offset);
   file.AddScalar<double>("bound", stored.network.Bound());
   file.AddScalar<double>("k_est", stored.k_est);
+  file.Add("background", {3}, &stored.background.x);
   file.AddScalar<int32_t>("regrade_version", kVersion);
   file.WriteTo(path);
 }
@@ -69,6 +70,9 @@ void WriteNetworkFile(const std::string& path, const StoredNetwork& stored) {
 StoredNetwork ReadNetworkFile(const std::string& path) {
   NpzReader file(path, kBudget);
   RefuseNewerFormat(&file, kVersion);
+  if (const int32_t version = file.ReadScalar<int32_t>("regrade_version"); version < kVersion)
+    Refuse(path, "format " + std::to_string(version) + ", older than " +
+                     std::to_string(kVersion) + ", the only one that is read");
   LipschitzNetwork network;
   VisitLayers(&network, [&file](const std::string& name, const std::vector<int64_t>& shape,
                                 float* values) {
@@ -87,8 +91,14 @@ StoredNetwork ReadNetworkFile(const std::string& path) {
     for (int j = 0; j < 3; ++j) data.base.matrix(i, j) = matrix.As<double>()[3 * i + j];
     data.base.offset[i] = offset.As<double>()[i];
   }
-  StoredNetwork stored{LipschitzNetwork(std::move(data)), file.ReadScalar<double>("k_est")};
+  const NpzArray background = file.Read("background", ArrayType::kF32, {3});
+  const float* const color = background.As<float>();
+  StoredNetwork stored{LipschitzNetwork(std::move(data)),
+                       file.ReadScalar<double>("k_est"),
+                       {color[0], color[1], color[2]}};
   if (!std::isfinite(stored.k_est)) Refuse(path, "k_est is not finite");
+  for (int c = 0; c < 3; ++c)
+    if (!std::isfinite(color[c])) Refuse(path, "the background is not finite");
   const double guaranteed = file.ReadScalar<double>("bound"), bound = stored.network.Bound();
   if (!(std::abs(guaranteed - bound) <= kBoundTolerance * bound))
     Refuse(path, "it guarantees the bound " + std::to_string(guaranteed) +

@@ -4,6 +4,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
@@ -13,24 +14,7 @@
 namespace regrade {
 namespace {
 
-class FileDescriptor {
- public:
-  explicit FileDescriptor(int fd) : fd_(fd) {}
-  ~FileDescriptor() {
-    if (fd_ >= 0) ::close(fd_);
-  }
-  FileDescriptor(const FileDescriptor&) = delete;
-  FileDescriptor& operator=(const FileDescriptor&) = delete;
-  int get() const { return fd_; }
-  int Close() {
-    const int fd = fd_;
-    fd_ = -1;
-    return ::close(fd);
-  }
-
- private:
-  int fd_;
-};
+constexpr size_t kPending = 1 << 20;  // bytes
 
 [[noreturn]] void ThrowWriteError(const std::string& path, const char* step, uint64_t bytes) {
   const int error = errno;
@@ -53,34 +37,76 @@ void SyncFolder(const std::string& folder) {
 
 }  // namespace
 
+AtomicFile::AtomicFile(const std::string& path, uint64_t bytes)
+    : path_(path), temporary_(path + kTemporarySuffix), bytes_(bytes) {
+  fd_.Reset(
+      ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0644));
+  if (fd_.get() < 0) ThrowWriteError(path_, "create", bytes_);
+}
+
+AtomicFile::~AtomicFile() {
+  if (!committed_) ::unlink(temporary_.c_str());
+}
+
+void AtomicFile::WriteThrough(const char* data, size_t size) {
+  for (size_t done = 0; done < size;) {
+    const ssize_t n = ::write(fd_.get(), data + done, size - done);
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) ThrowWriteError(path_, "write", bytes_);
+    done += static_cast<size_t>(n);
+  }
+}
+
+void AtomicFile::Flush() {
+  WriteThrough(pending_.data(), pending_.size());
+  pending_.clear();
+}
+
+void AtomicFile::Write(const void* data, size_t size) {
+  const char* const bytes = static_cast<const char*>(data);
+  if (pending_.size() + size > kPending) Flush();
+  if (size > kPending)
+    WriteThrough(bytes, size);
+  else
+    pending_.append(bytes, size);
+  position_ += size;
+  size_ = std::max(size_, position_);
+}
+
+void AtomicFile::Seek(uint64_t position) {
+  if (position == position_) return;
+  Flush();
+  if (::lseek(fd_.get(), static_cast<off_t>(position), SEEK_SET) < 0)
+    ThrowWriteError(path_, "seek", bytes_);
+  position_ = position;
+}
+
+void AtomicFile::Commit() {
+  Flush();
+  if (::fsync(fd_.get()) != 0) ThrowWriteError(path_, "flush to disk", bytes_);
+  if (fd_.Close() != 0) ThrowWriteError(path_, "close", bytes_);
+  if (::rename(temporary_.c_str(), path_.c_str()) != 0)
+    ThrowWriteError(path_, "rename into place", bytes_);
+  committed_ = true;
+  SyncFolder(std::filesystem::path(path_).parent_path().string());
+}
+
 void WriteFileAtomically(const std::string& path, std::string_view bytes) {
   WriteFileAtomically(path, {}, bytes);
 }
 
 void WriteFileAtomically(const std::string& path, std::string_view head,
                          std::string_view bytes) {
-  const size_t size = head.size() + bytes.size();
-  const std::string temporary = path + kTemporarySuffix;
-  try {
-    FileDescriptor fd(
-        ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0644));
-    if (fd.get() < 0) ThrowWriteError(path, "create", size);
-    for (const std::string_view part : {head, bytes})
-      for (size_t done = 0; done < part.size();) {
-        const ssize_t n = ::write(fd.get(), part.data() + done, part.size() - done);
-        if (n < 0 && errno == EINTR) continue;
-        if (n <= 0) ThrowWriteError(path, "write", size);
-        done += static_cast<size_t>(n);
-      }
-    if (::fsync(fd.get()) != 0) ThrowWriteError(path, "flush to disk", size);
-    if (fd.Close() != 0) ThrowWriteError(path, "close", size);
-    if (::rename(temporary.c_str(), path.c_str()) != 0)
-      ThrowWriteError(path, "rename into place", size);
-  } catch (...) {
-    ::unlink(temporary.c_str());
-    throw;
-  }
-  SyncFolder(std::filesystem::path(path).parent_path().string());
+  AtomicFile file(path, head.size() + bytes.size());
+  file.Write(head.data(), head.size());
+  file.Write(bytes.data(), bytes.size());
+  file.Commit();
+}
+
+void SyncFile(const std::string& path) {
+  const FileDescriptor fd(::open(path.c_str(), O_WRONLY | O_CLOEXEC));
+  if (fd.get() < 0) ThrowWriteError(path, "open again", 0);
+  if (::fsync(fd.get()) != 0) ThrowWriteError(path, "flush to disk", 0);
 }
 
 void RenameDurably(const std::string& from, const std::string& to) {
@@ -99,18 +125,24 @@ void ThrowReadError(const std::string& path) {
   throw Error(ExitCode::kInput, std::strerror(error), path);
 }
 
-std::string ReadWholeFile(const std::string& path, uint64_t max_bytes) {
+int OpenToRead(const std::string& path, uint64_t* size) {
   FileDescriptor fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
-  if (fd.get() < 0) ThrowReadError(path);
   struct stat status;
-  if (::fstat(fd.get(), &status) != 0) ThrowReadError(path);
+  if (fd.get() < 0 || ::fstat(fd.get(), &status) != 0) ThrowReadError(path);
   if (!S_ISREG(status.st_mode)) throw Error(ExitCode::kInput, "not a regular file", path);
-  if (static_cast<uint64_t>(status.st_size) > max_bytes)
-    throw Error(ExitCode::kInput,
-                std::to_string(status.st_size) + " bytes, more than the limit of " +
-                    std::to_string(max_bytes),
-                path);
-  std::string bytes(static_cast<size_t>(status.st_size), '\0');
+  if (size != nullptr) *size = static_cast<uint64_t>(status.st_size);
+  return fd.Release();
+}
+
+std::string ReadWholeFile(const std::string& path, uint64_t max_bytes) {
+  uint64_t size = 0;
+  const FileDescriptor fd(OpenToRead(path, &size));
+  if (size > max_bytes)
+    throw Error(
+        ExitCode::kInput,
+        std::to_string(size) + " bytes, more than the limit of " + std::to_string(max_bytes),
+        path);
+  std::string bytes(size, '\0');
   size_t done = 0;
   while (done < bytes.size()) {
     const ssize_t n = ::read(fd.get(), bytes.data() + done, bytes.size() - done);

@@ -1,31 +1,64 @@
-// The one layer that writes result files: a reader sees the old file or the new one, never a
-// torn one.
+// Writes result files so that a reader sees the old file or the new one, never a part of it.
 #pragma once
 
 #include <cstdint>
 #include <string>
 #include <string_view>
 
+#include "kernels/base/file_descriptor.h"
+
 namespace regrade {
 
-// Writes beside `path`, fsyncs, renames over it, fsyncs the folder. Throws Error(kResources)
-// with the file, the bytes needed and the errno text; then the old file is untouched and the
-// temporary removed.
+// A file under construction. Bytes go to a temporary beside `path`; Commit() makes them durable
+// and renames the temporary over `path`. Without Commit() the old file stays and the temporary
+// is removed. All calls throw Error(kResources) with the file, `bytes` (the size to expect) and
+// the errno text.
+class AtomicFile {
+ public:
+  AtomicFile(const std::string& path, uint64_t bytes);
+  ~AtomicFile();
+
+  void Write(const void* data, size_t size);
+  void Seek(uint64_t position);  // where the next Write begins
+  uint64_t position() const { return position_; }
+  uint64_t size() const { return size_; }
+  // Flushes, fsyncs, closes, renames, and fsyncs the folder.
+  void Commit();
+
+ private:
+  void WriteThrough(const char* data, size_t size);
+  void Flush();
+
+  std::string path_, temporary_;
+  uint64_t bytes_;
+  FileDescriptor fd_;
+  uint64_t position_ = 0, size_ = 0;
+  std::string pending_;  // bytes before position_ that are not written yet
+  bool committed_ = false;
+};
+
+// Whole contents at once, through an AtomicFile.
 void WriteFileAtomically(const std::string& path, std::string_view bytes);
-// The same for `head` and `bytes` behind it: what is large need not be copied to stand behind a
-// few words.
+// `head` followed by `bytes`, without a copy that joins them.
 void WriteFileAtomically(const std::string& path, std::string_view head,
                          std::string_view bytes);
+
+// Makes a finished file durable. Throws Error(kResources).
+void SyncFile(const std::string& path);
 
 // Moves a finished file or folder of the same file system into place and makes that durable.
 void RenameDurably(const std::string& from, const std::string& to);
 
-// Throws what errno says of reading `path`: Error(kResources) if the drive failed or went away,
-// else Error(kInput).
+// Throws an Error for a failed read of `path`, by errno: kResources if the drive failed or went
+// away or a limit of the system was met, else kInput.
 [[noreturn]] void ThrowReadError(const std::string& path);
 
-// Whole file into memory. Throws Error(kInput) if it is missing, not a regular file, or above
-// `max_bytes`.
+// Opens a regular file for reading; a named pipe or device is never waited for. Throws
+// Error(kInput) if it is missing or not a regular file, kResources as ThrowReadError. `size`
+// (may be null) gets its size.
+int OpenToRead(const std::string& path, uint64_t* size);
+
+// Whole file into memory. Throws as OpenToRead, and Error(kInput) if it is above `max_bytes`.
 std::string ReadWholeFile(const std::string& path, uint64_t max_bytes);
 
 // Suffix of our temporaries, which a later run may delete: "<name>.regrade-tmp".

@@ -1,5 +1,5 @@
-// Values and arrays one behind the other in a string, for checkpoints: our own bytes, checked
-// by a hash before they get here, and still never read beyond their end.
+// Packs values and arrays into a string, for checkpoints. Reading never goes beyond the end,
+// although a hash has already been checked.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@ namespace regrade {
 
 class BytePacker {
  public:
-  // A string that grows by itself holds up to three times what it ends with.
+  // Without it, the growing string needs up to three times its final size.
   void Reserve(size_t bytes) { bytes_.reserve(bytes); }
 
   template <typename T>
@@ -23,7 +23,7 @@ class BytePacker {
     static_assert(std::is_arithmetic_v<T>);
     bytes_.append(reinterpret_cast<const char*>(&value), sizeof value);
   }
-  // Anything with data() and size() of numbers.
+  // Any array of numbers with data() and size().
   template <typename Array>
   void Values(const Array& array) {
     Value(static_cast<int64_t>(array.size()));
@@ -36,7 +36,7 @@ class BytePacker {
   std::string bytes_;
 };
 
-// After a read that did not fit, everything reads as zero or empty and ok() is false.
+// After a read beyond the end, all values read as zero or empty and ok() is false.
 class ByteUnpacker {
  public:
   explicit ByteUnpacker(std::string_view bytes) : left_(bytes) {}
@@ -49,7 +49,7 @@ class ByteUnpacker {
     std::memcpy(value, left_.data(), sizeof *value);
     left_.remove_prefix(sizeof *value);
   }
-  // `resize(n)` makes room in `array`.
+  // `resize(n)` resizes `array`.
   template <typename Array, typename Resize>
   void Values(Array* array, const Resize& resize) {
     int64_t size = 0;

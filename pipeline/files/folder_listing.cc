@@ -11,7 +11,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What the machine lacks says nothing about the folder: its photos are not gone.
+// Limits of the machine are no problem of the folder: its photos are not missing.
 bool IsLack(const std::error_code& error) {
   return error == std::errc::io_error || error == std::errc::too_many_files_open ||
          error == std::errc::too_many_files_open_in_system ||
@@ -40,7 +40,7 @@ const char* ProblemOf(fs::file_type type) {
   }
 }
 
-// Resolves a link; its problem is empty when it shows a regular file inside of the folder.
+// Resolves a link; its problem is empty if the target is a regular file inside the folder.
 ListedFile ResolveLink(const std::string& name, const fs::path& link, const fs::path& root) {
   std::error_code error;
   const fs::path target = fs::canonical(link, error);

@@ -1,5 +1,4 @@
-// Lists what lies in a folder that somebody else filled, without being led astray by links,
-// pipes or loops.
+// Lists the files of an untrusted folder: links, pipes and loops are reported, not followed.
 #pragma once
 
 #include <string>
@@ -8,7 +7,7 @@
 namespace regrade {
 
 struct ListedFile {
-  std::string name;     // relative to the folder, with '/', bytes as they are
+  std::string name;     // relative to the folder, with '/', raw bytes
   std::string path;     // absolute, links resolved
   std::string problem;  // empty for a regular file that may be opened; otherwise why not
 };
@@ -18,8 +17,8 @@ struct FolderListing {
   int hidden = 0;                 // entries whose name begins with a dot: not entered
 };
 
-// All files below the folder. Links to files inside of it are files; links to folders are not
-// entered (what they show is listed where it is, so a loop ends); links that lead out, broken
+// All files below the folder. Links to files inside it count as files. Links to folders are not
+// entered: their target is listed at its own place, and loops end. Links that lead out, broken
 // links, named pipes, sockets, devices and unreadable folders are listed with their problem.
 // Throws Error(kInput) if the folder is missing, not a folder or unreadable, Error(kResources)
 // when its disk fails.

@@ -16,7 +16,7 @@ struct Position {
   int line = 1, column = 0;  // of the byte read last
 };
 
-// Reads the text byte by byte and keeps count of lines.
+// Reads the text byte by byte and counts lines.
 struct CountingIterator {
   using iterator_category = std::input_iterator_tag;
   using value_type = char;
@@ -73,7 +73,7 @@ class Builder : public nlohmann::json_sax<nlohmann::json> {
   }
   bool parse_error(size_t, const std::string&,
                    const nlohmann::detail::exception& error) override {
-    // The library's own text ends in what went wrong, behind its last ": ".
+    // The library's text ends with the reason, after ": ".
     const std::string text = error.what();
     const size_t cut = text.find("parse error at ");
     const size_t colon = cut == std::string::npos ? cut : text.find(": ", cut);
@@ -83,7 +83,7 @@ class Builder : public nlohmann::json_sax<nlohmann::json> {
  private:
   struct Level {
     JsonValue value;
-    std::string key;  // under which it goes into its parent
+    std::string key;  // in its parent
     std::set<std::string> keys;
   };
 
@@ -98,7 +98,7 @@ class Builder : public nlohmann::json_sax<nlohmann::json> {
       root_ = std::move(value);
     else if (levels_.back().value.IsArray())
       levels_.back().value.Append(std::move(value));
-    else  // the key is known to be new
+    else  // key() has checked that the key is new
       const_cast<JsonValue::Object&>(levels_.back().value.AsObject())
           .emplace_back(std::move(key_), std::move(value));
     return true;

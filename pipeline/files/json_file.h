@@ -1,4 +1,4 @@
-// JSON as a value of our own: objects keep their order, parsed values know their line.
+// JSON values: objects keep their order, parsed values keep their line and column.
 #pragma once
 
 #include <cstdint>
@@ -37,26 +37,26 @@ class JsonValue {
   bool IsObject() const { return std::holds_alternative<Object>(value_); }
   bool IsBool() const { return std::holds_alternative<bool>(value_); }
 
-  // These throw Error(kInput) with the line where the value stands if it is something else.
+  // These throw Error(kInput) with the value's line if it has another type.
   bool AsBool() const;
   int64_t AsInt() const;  // whole numbers in range
   double AsDouble() const;
   const std::string& AsString() const;
   const Array& AsArray() const;
   const Object& AsObject() const;
-  // The member, which must be there.
+  // The member; throws Error(kInput) if it is missing.
   const JsonValue& At(std::string_view key) const;
 
-  // Null pointer where it is not an object or has no such member.
+  // Null if this is not an object or has no such member.
   const JsonValue* Find(std::string_view key) const;
   // Makes an object of null; adds the member if it is new.
   JsonValue& operator[](std::string_view key);
   void Append(JsonValue element);  // makes an array of null
 
-  // Values alone are compared; 1 and 1.0 are the same number.
+  // Positions are ignored; 1 equals 1.0.
   bool operator==(const JsonValue& other) const;
 
-  int line() const { return line_; }  // 1-based, where it was parsed; 0: it was not
+  int line() const { return line_; }  // 1-based; 0: not parsed from a text
   int column() const { return column_; }
   void SetPosition(int line, int column) { line_ = line, column_ = column; }
 
@@ -70,16 +70,16 @@ class JsonValue {
   int line_ = 0, column_ = 0;
 };
 
-// UTF-8 text; a byte order mark is skipped. Refused with "line:column": syntax, invalid UTF-8,
-// numbers out of range, keys that appear twice, more than 64 levels. `where` names the text;
-// `code` is what the Error carries (configuration is usage, data is input).
+// Parses UTF-8 text; a byte order mark is skipped. Throws Error(`code`) with "line:column" for
+// bad syntax, invalid UTF-8, numbers out of range, duplicate keys and more than 64 levels.
+// `where` names the text in errors.
 JsonValue ParseJson(std::string_view text, const std::string& where,
                     ExitCode code = ExitCode::kInput);
 JsonValue ReadJsonFile(const std::string& path, uint64_t max_bytes = 64 << 20,
                        ExitCode code = ExitCode::kInput);
 
-// Doubles in the shortest form that reads back exactly. indent < 0: everything on one line.
-// Strings that are not UTF-8 come out with replacement characters.
+// Doubles get the shortest text that reads back exactly. indent < 0: everything on one line.
+// Invalid UTF-8 becomes replacement characters.
 std::string DumpJson(const JsonValue& value, int indent = 1);
 void WriteJsonFile(const std::string& path, const JsonValue& value);  // atomically
 

@@ -23,8 +23,7 @@ constexpr TypeRow kTypes[] = {{ArrayType::kU8, "|u1", 1},  {ArrayType::kI32, "<i
                               {ArrayType::kI64, "<i8", 8}, {ArrayType::kF16, "<f2", 2},
                               {ArrayType::kF32, "<f4", 4}, {ArrayType::kF64, "<f8", 8}};
 
-// The header is a Python dictionary literal with three known keys; this reads no more of Python
-// than that.
+// Parses the header: a Python dictionary literal with three known keys, and nothing else.
 class LiteralReader {
  public:
   LiteralReader(std::string_view text, const std::string& where) : text_(text), where_(where) {}

@@ -1,5 +1,5 @@
-// The header of a NumPy array file (.npy, formats 1.0 to 3.0): element type and shape, nothing
-// executed, every product checked.
+// Reads and writes the header of a NumPy array file (.npy, formats 1.0 to 3.0): element type
+// and shape. Nothing is executed, and products are checked for overflow.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@ namespace regrade {
 
 enum class ArrayType { kU8, kI32, kI64, kF16, kF32, kF64 };
 
-int64_t SizeOf(ArrayType type);      // bytes an element
+int64_t SizeOf(ArrayType type);      // bytes per element
 const char* NameOf(ArrayType type);  // NumPy's: "<f4", "|u1", ...
 
 struct NpyHeader {
@@ -21,9 +21,9 @@ struct NpyHeader {
   uint64_t data_bytes = 0;     // product of the shape and the element's size
 };
 
-// `bytes` is the beginning of a .npy file (headers above 64 KiB are refused), `where` names it
-// in errors. Refused by name: big-endian, object and structured types, Fortran order of more
-// than one axis, negative or overflowing shapes. Throws Error(kInput).
+// `bytes` is the beginning of a .npy file, `where` names it in errors. Throws Error(kInput) for
+// headers above 64 KiB, big-endian, object and structured types, Fortran order of more than one
+// axis, and negative or overflowing shapes.
 NpyHeader ParseNpyHeader(std::string_view bytes, const std::string& where);
 
 // Header bytes, padded so that the data starts at a multiple of 64.

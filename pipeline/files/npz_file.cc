@@ -1,112 +1,79 @@
 #include "pipeline/files/npz_file.h"
 
-#include <fcntl.h>
-#include <sys/stat.h>
-#include <unistd.h>
 #include <zip.h>
 
 #include <algorithm>
-#include <array>
-#include <cerrno>
 #include <cstring>
 
 #include "kernels/base/error.h"
+#include "kernels/base/file_descriptor.h"
 #include "pipeline/files/atomic_file.h"
-#include "pipeline/files/zip_directory.h"
 
 namespace regrade {
 namespace {
 
 constexpr char kSuffix[] = ".npy";
-constexpr zip_uint16_t kFirstZipDay = (0 << 9) | (1 << 5) | 1;  // 1980-01-01
+constexpr zip_int64_t kMaxMembers = 10000;
+constexpr uint64_t kMaxRatio = 1032;  // of deflate
 
-// Any failure here is ours or the machine's memory: nothing has touched the disk yet.
-void RequireZip(bool ok, const char* step) {
-  if (!ok)
-    throw Error(ExitCode::kResources, std::string("cannot ") + step + " an archive in memory");
+[[noreturn]] void RefuseArchive(const std::string& path, const std::string& why) {
+  throw Error(ExitCode::kInput, "zip archive: " + why, path,
+              "the file is damaged or malicious: make it again or get it from its source");
+}
+
+std::string OpenProblem(int code) {
+  if (code == ZIP_ER_INCONS) return "its directory and its members' headers disagree";
+  if (code == ZIP_ER_EXISTS) return "a member's name appears twice";
+  if (code == ZIP_ER_NOZIP) return "it has no valid directory";
+  zip_error_t error;
+  zip_error_init_with_code(&error, code);
+  const std::string text = zip_error_strerror(&error);
+  zip_error_fini(&error);
+  return text;
+}
+
+struct ZipMember {
+  zip_uint64_t index = 0;
+  std::string name;
+  uint64_t bytes = 0;  // as declared
+};
+
+// libzip has compared the directory with the members' headers; this adds what it does not
+// check.
+std::vector<ZipMember> CheckedMembers(zip_t* zip, uint64_t file_bytes,
+                                      const std::string& path) {
+  const zip_int64_t count = zip_get_num_entries(zip, 0);
+  if (count > kMaxMembers)
+    RefuseArchive(path,
+                  std::to_string(count) + " members, more than " + std::to_string(kMaxMembers));
+  std::vector<ZipMember> members;
+  uint64_t packed = 0;
+  for (zip_uint64_t i = 0; i < static_cast<zip_uint64_t>(count); ++i) {
+    zip_stat_t status;
+    constexpr zip_uint64_t kNeeded = ZIP_STAT_NAME | ZIP_STAT_SIZE | ZIP_STAT_COMP_SIZE |
+                                     ZIP_STAT_COMP_METHOD | ZIP_STAT_ENCRYPTION_METHOD;
+    if (zip_stat_index(zip, i, 0, &status) != 0 || (status.valid & kNeeded) != kNeeded)
+      RefuseArchive(path, "member " + std::to_string(i) + " is not described");
+    const std::string name = "'" + std::string(status.name) + "'";
+    if (status.encryption_method != ZIP_EM_NONE) RefuseArchive(path, name + " is encrypted");
+    const bool stored = status.comp_method == ZIP_CM_STORE;
+    if (!stored && status.comp_method != ZIP_CM_DEFLATE)
+      RefuseArchive(path, name + " is packed by method " + std::to_string(status.comp_method) +
+                              "; 0 and 8 are supported");
+    if (stored && status.size != status.comp_size)
+      RefuseArchive(path, name + " is stored, but its two sizes differ");
+    if (status.size / kMaxRatio > status.comp_size)
+      RefuseArchive(path, name + " claims " + std::to_string(status.size) + " bytes out of " +
+                              std::to_string(status.comp_size) + ", more than deflate can do");
+    if (status.comp_size > file_bytes - packed)
+      RefuseArchive(path, "its members share bytes: they claim more than the file has");
+    packed += status.comp_size;
+    members.push_back({i, status.name, status.size});
+  }
+  return members;
 }
 
 }  // namespace
-
-struct NpzWriter::Member {
-  std::string name;
-  std::string header;
-  std::string copy;  // when the data is ours
-  const void* data;  // null: `copy`
-  uint64_t size;
-  NpzPacking packing;
-};
-
-NpzWriter::NpzWriter() = default;
-NpzWriter::~NpzWriter() = default;
-
-void NpzWriter::AddBytes(const std::string& name, ArrayType type,
-                         const std::vector<int64_t>& shape, const void* data,
-                         NpzPacking packing) {
-  uint64_t size = static_cast<uint64_t>(SizeOf(type));
-  for (const int64_t axis : shape) size *= static_cast<uint64_t>(axis);
-  members_.push_back({name, MakeNpyHeader(type, shape), "", data, size, packing});
-}
-
-void NpzWriter::AddCopy(const std::string& name, ArrayType type,
-                        const std::vector<int64_t>& shape, const void* data, size_t size) {
-  members_.push_back({name, MakeNpyHeader(type, shape),
-                      std::string(static_cast<const char*>(data), size), nullptr, size,
-                      NpzPacking::kStore});
-}
-
-std::string NpzWriter::Bytes() const {
-  zip_error_t error;
-  zip_error_init(&error);
-  zip_source_t* target = zip_source_buffer_create(nullptr, 0, 0, &error);
-  RequireZip(target != nullptr, "begin");
-  zip_source_keep(target);
-  const std::unique_ptr<zip_source_t, decltype(&zip_source_free)> target_owner(
-      target, &zip_source_free);
-  zip_t* archive = zip_open_from_source(target, ZIP_TRUNCATE, &error);
-  if (archive == nullptr) zip_source_free(target);
-  RequireZip(archive != nullptr, "open");
-  std::unique_ptr<zip_t, decltype(&zip_discard)> archive_owner(archive, &zip_discard);
-
-  for (const Member& member : members_) {
-    const void* data = member.data != nullptr ? member.data : member.copy.data();
-    std::array<zip_buffer_fragment_t, 2> parts{};
-    parts[0].data = reinterpret_cast<zip_uint8_t*>(const_cast<char*>(member.header.data()));
-    parts[0].length = member.header.size();
-    parts[1].data = static_cast<zip_uint8_t*>(const_cast<void*>(data));
-    parts[1].length = member.size;
-    zip_source_t* source =
-        zip_source_buffer_fragment(archive, parts.data(), member.size > 0 ? 2 : 1, 0);
-    RequireZip(source != nullptr, "fill");
-    const zip_int64_t index =
-        zip_file_add(archive, (member.name + kSuffix).c_str(), source, ZIP_FL_ENC_UTF_8);
-    if (index < 0) zip_source_free(source);
-    RequireZip(index >= 0, "fill");
-    const auto position = static_cast<zip_uint64_t>(index);
-    const bool deflate = member.packing == NpzPacking::kDeflate;
-    RequireZip(
-        zip_set_file_compression(archive, position, deflate ? ZIP_CM_DEFLATE : ZIP_CM_STORE,
-                                 deflate ? 1 : 0) == 0 &&
-            zip_file_set_dostime(archive, position, 0, kFirstZipDay, 0) == 0,
-        "describe a member of");
-  }
-  RequireZip(zip_close(archive) == 0, "finish");
-  archive_owner.release();
-
-  zip_stat_t status;
-  RequireZip(zip_source_stat(target, &status) == 0 && zip_source_open(target) == 0, "read");
-  std::string bytes(status.size, '\0');
-  uint64_t done = 0;
-  while (done < bytes.size()) {
-    const zip_int64_t n = zip_source_read(target, bytes.data() + done, bytes.size() - done);
-    RequireZip(n > 0, "read");
-    done += static_cast<uint64_t>(n);
-  }
-  zip_source_close(target);
-  return bytes;
-}
-
-void NpzWriter::WriteTo(const std::string& path) const { WriteFileAtomically(path, Bytes()); }
 
 std::string NpzArray::ShapeText() const {
   std::string text = "(";
@@ -129,33 +96,16 @@ struct NpzReader::Archive {
 
 NpzReader::NpzReader(const std::string& path, uint64_t budget)
     : path_(path), budget_(budget), archive_(std::make_unique<Archive>()) {
-  const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-  if (fd < 0) ThrowReadError(path);
-  const std::unique_ptr<const int, void (*)(const int*)> closer(
-      &fd, [](const int* f) { ::close(*f); });
-  struct stat status;
-  if (::fstat(fd, &status) != 0) ThrowReadError(path);
-  if (!S_ISREG(status.st_mode)) throw Error(ExitCode::kInput, "not a regular file", path);
-  const ReadAt read_at = [fd, &path](uint64_t offset, void* to, size_t size) {
-    size_t done = 0;
-    while (done < size) {
-      const ssize_t n = ::pread(fd, static_cast<char*>(to) + done, size - done,
-                                static_cast<off_t>(offset + done));
-      if (n < 0 && errno == EINTR) continue;
-      if (n <= 0)
-        throw Error(ExitCode::kInput, n < 0 ? std::strerror(errno) : "the file ends too early",
-                    path);
-      done += static_cast<size_t>(n);
-    }
-  };
-  archive_->members = ReadZipDirectory(static_cast<uint64_t>(status.st_size), read_at, path);
-  int error = 0;
-  const int own = ::fcntl(fd, F_DUPFD_CLOEXEC, 0);
-  archive_->zip = own < 0 ? nullptr : zip_fdopen(own, 0, &error);
+  uint64_t size = 0;
+  FileDescriptor fd(OpenToRead(path, &size));
+  int code = 0;
+  archive_->zip = zip_fdopen(fd.get(), ZIP_CHECKCONS, &code);
   if (archive_->zip == nullptr) {
-    if (own >= 0) ::close(own);
-    throw Error(ExitCode::kInput, "this zip archive cannot be opened", path);
+    if (code == ZIP_ER_READ || code == ZIP_ER_OPEN) ThrowReadError(path);  // libzip sets errno
+    RefuseArchive(path, OpenProblem(code));
   }
+  fd.Release();
+  archive_->members = CheckedMembers(archive_->zip, size, path);
 }
 
 NpzReader::~NpzReader() = default;
@@ -183,10 +133,8 @@ NpzArray NpzReader::Read(const std::string& name) {
                 where, "give more memory with --max-memory");
   budget_ -= member->bytes;
 
-  const zip_int64_t index = zip_name_locate(archive_->zip, member->name.c_str(), 0);
   const std::unique_ptr<zip_file_t, decltype(&zip_fclose)> file(
-      index < 0 ? nullptr : zip_fopen_index(archive_->zip, static_cast<zip_uint64_t>(index), 0),
-      &zip_fclose);
+      zip_fopen_index(archive_->zip, member->index, 0), &zip_fclose);
   if (file == nullptr) throw Error(ExitCode::kInput, "cannot be unpacked", where);
   uint64_t left = member->bytes;
   const auto read = [&](void* to, uint64_t size) {
@@ -202,7 +150,7 @@ NpzArray NpzReader::Read(const std::string& name) {
     left -= size;
   };
 
-  // The fixed part tells how long the header is, the header how long the data.
+  // The fixed part gives the header's length, the header the length of the data.
   std::string head(std::min<uint64_t>(12, left), '\0');
   read(head.data(), head.size());
   const size_t prefix = head.size() == 12 && head[6] > 1 ? 12 : 10;
@@ -218,7 +166,8 @@ NpzArray NpzReader::Read(const std::string& name) {
     }
   }
   const NpyHeader header = ParseNpyHeader(head, where);
-  const uint64_t surplus = head.size() - header.data_offset;  // only for tiny, odd headers
+  const uint64_t surplus =
+      head.size() - header.data_offset;  // of headers shorter than the fixed part
   if (header.data_bytes != left + surplus)
     throw Error(ExitCode::kInput,
                 "its shape asks for " + std::to_string(header.data_bytes) + " bytes, it has " +
@@ -228,7 +177,7 @@ NpzArray NpzReader::Read(const std::string& name) {
   array.bytes.Resize(static_cast<int64_t>(header.data_bytes));
   if (surplus > 0) std::memcpy(array.bytes.data(), &head[header.data_offset], surplus);
   read(array.bytes.data() + surplus, left);
-  // The checksum is compared when the end is met.
+  // libzip compares the checksum at the end of the member.
   char beyond;
   if (zip_fread(file.get(), &beyond, 1) != 0)
     throw Error(ExitCode::kInput, "its checksum or length is wrong", where,
@@ -262,7 +211,7 @@ void RefuseNewerFormat(NpzReader* file, int32_t known) {
   const int32_t version = file->ReadScalar<int32_t>("regrade_version");
   if (version > known)
     throw Error(ExitCode::kInput,
-                "written in format " + std::to_string(version) + ", this program knows up to " +
+                "written in format " + std::to_string(version) + ", this program reads up to " +
                     std::to_string(known),
                 file->path(), "update regrade; the file has not been touched");
 }

@@ -1,10 +1,11 @@
-// Named arrays in one file: NumPy's .npz, a zip archive of .npy members.
+// Reads and writes NumPy's .npz: a zip archive of .npy members.
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
-#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "kernels/base/buffer.h"
@@ -29,9 +30,9 @@ struct ArrayTypeOf<double> : std::integral_constant<ArrayType, ArrayType::kF64> 
 
 enum class NpzPacking { kStore, kDeflate };
 
-// Collects arrays by reference: what `data` points to must stay until WriteTo or Bytes. The
-// same arrays give the same bytes on any day. uint16_t holds the bit pattern of a half
-// (half.h).
+// Collects arrays by reference and writes them straight to disk: what `data` points to must
+// stay valid until WriteTo. Equal arrays give equal bytes on any day. uint16_t holds the bit
+// pattern of a half (half.h).
 class NpzWriter {
  public:
   NpzWriter();
@@ -41,6 +42,19 @@ class NpzWriter {
   void Add(const std::string& name, const std::vector<int64_t>& shape, const T* data,
            NpzPacking packing = NpzPacking::kStore) {
     AddBytes(name, ArrayTypeOf<T>::value, shape, data, packing);
+  }
+  // `fill(first, rows, to)` makes rows [first, first + rows) of the first axis while the file
+  // is written: the array never exists as a whole.
+  template <typename T>
+  void AddFilled(const std::string& name, const std::vector<int64_t>& shape,
+                 std::function<void(int64_t first, int64_t rows, T* to)> fill,
+                 NpzPacking packing = NpzPacking::kStore) {
+    AddRows(
+        name, ArrayTypeOf<T>::value, shape,
+        [fill = std::move(fill)](int64_t first, int64_t rows, void* to) {
+          fill(first, rows, static_cast<T*>(to));
+        },
+        packing);
   }
   // A copy is kept.
   template <typename T>
@@ -52,12 +66,16 @@ class NpzWriter {
             text.size());
   }
 
-  std::string Bytes() const;  // the archive
-  // Atomically. Throws Error(kResources).
+  // Atomically (see AtomicFile); takes a few megabytes of memory, whatever the arrays' sizes.
+  // Throws Error(kResources), or what a fill function throws.
   void WriteTo(const std::string& path) const;
 
  private:
   struct Member;
+  struct MemberSource;
+  using RowFunction = std::function<void(int64_t first, int64_t rows, void* to)>;
+  void AddRows(const std::string& name, ArrayType type, const std::vector<int64_t>& shape,
+               RowFunction fill, NpzPacking packing);
   void AddBytes(const std::string& name, ArrayType type, const std::vector<int64_t>& shape,
                 const void* data, NpzPacking packing);
   void AddCopy(const std::string& name, ArrayType type, const std::vector<int64_t>& shape,
@@ -78,8 +96,8 @@ struct NpzArray {
   std::string ShapeText() const;  // "(3, 4)"
 };
 
-// Reads members by name, never to disk. Throws Error(kInput) naming file and array. `budget` is
-// the most memory that all arrays read through this reader may take.
+// Reads members by name into memory. Throws Error(kInput) naming file and array. `budget`: the
+// most bytes that all arrays read through this reader may have together.
 class NpzReader {
  public:
   NpzReader(const std::string& path, uint64_t budget);
@@ -87,9 +105,9 @@ class NpzReader {
 
   std::vector<std::string> names() const;  // without ".npy"
   bool Has(const std::string& name) const;
-  // Any of our types.
+  // Of any supported type.
   NpzArray Read(const std::string& name);
-  // Exactly this type and shape; -1 in `shape` stands for any length.
+  // Exactly this type and shape; -1 in `shape` is any length.
   NpzArray Read(const std::string& name, ArrayType type, const std::vector<int64_t>& shape);
   template <typename T>
   T ReadScalar(const std::string& name) {
@@ -105,8 +123,8 @@ class NpzReader {
   std::unique_ptr<Archive> archive_;
 };
 
-// Throws Error(kInput) if the file's array "regrade_version" is there and larger than `known`:
-// a newer program wrote it.
+// Throws Error(kInput) if the file's array "regrade_version" exists and is larger than `known`:
+// a newer program wrote the file.
 void RefuseNewerFormat(NpzReader* file, int32_t known);
 
 }  // namespace regrade

@@ -1,4 +1,4 @@
-// regrade_gpu: the parts of regrade that need a GPU and neither COLMAP nor pictures' formats.
+// regrade_gpu: the parts of regrade that need a GPU and neither COLMAP nor image files.
 #include <algorithm>
 #include <cstdio>
 #include <string>
@@ -6,8 +6,7 @@
 
 #include "kernels/base/error.h"
 #include "kernels/device/device_memory.h"
-#include "pipeline/gpu/gpu_commands.h"
-#include "pipeline/program/option_binding.h"
+#include "pipeline/gpu/gpu_options.h"
 
 namespace regrade {
 namespace {
@@ -15,15 +14,15 @@ namespace {
 constexpr char kUsage[] =
     "regrade_gpu " REGRADE_VERSION
     ": regrade on a machine with nothing but a CUDA driver\n\n"
-    "usage: regrade_gpu device                       what the card is\n"
-    "       regrade_gpu fit --capture FILE [OPTIONS]   a field from a file of `regrade pack`\n"
+    "usage: regrade_gpu device                       prints the card's name and memory\n"
+    "       regrade_gpu fit --capture FILE [OPTIONS]   fits a field to a file of `regrade "
+    "pack`\n"
     "       regrade_gpu style --capture FILE --field FILE [OPTIONS]\n"
-    "                                                that field in the colours of the file's "
-    "style picture\n"
+    "                                                restyles it after the file's style "
+    "picture\n"
     "       regrade_gpu render --capture FILE --field FILE\n"
-    "                                                what frames of it cost, and what "
-    "exactness "
-    "costs\n";
+    "                                                measures frame times and errors of "
+    "faster settings\n";
 
 void PrintDevice() {
   const DeviceStatus status = ReadDeviceStatus();
@@ -33,35 +32,16 @@ void PrintDevice() {
       static_cast<long long>(status.free_bytes >> 20));
 }
 
-// It decides the defaults of the options that are read after it.
-std::string RecipeOf(const std::vector<std::string>& arguments) {
-  for (size_t i = 0; i + 1 < arguments.size(); ++i)
-    if (arguments[i] == "--recipe") return arguments[i + 1];
-  return "standard";
-}
-
 bool Run(const std::vector<std::string>& arguments) {
   const std::string command = arguments.empty() ? "help" : arguments[0];
   const std::vector<std::string> rest(arguments.begin() + !arguments.empty(), arguments.end());
-  FitPackedOptions fit_packed;
-  FitOptions fit;
-  StylePackedOptions style_packed;
-  RenderPackedOptions render_packed;
-  TrainNetworkOptions network;
-  OptionSet options;
-  if (command == "fit") {
-    options.Add("Capture", &fit_packed);
-    options.Add("Fit", &fit);
-  } else if (command == "style") {
-    ApplyStyleRecipe(RecipeOf(rest), &network);
-    options.Add("Capture", &style_packed);
-    options.Add("Network", &network);
-  } else if (command == "render") {
-    options.Add("Capture", &render_packed);
-  } else if (command == "device") {
+  if (command == "device") {
     PrintDevice();
     return true;
-  } else {
+  }
+  GpuSettings settings;
+  OptionSet options;
+  if (!settings.Bind(command, &options)) {
     std::printf("%s", kUsage);
     return command == "help" || command == "--help";
   }
@@ -69,14 +49,13 @@ bool Run(const std::vector<std::string>& arguments) {
     std::printf("%s\n%s", kUsage, options.Help().c_str());
     return true;
   }
-  options.Parse(rest);
-  options.ApplyFlags();
+  ReadFlags(rest, &options);
   if (command == "fit")
-    FitPacked(fit_packed, fit);
+    FitPacked(settings.fit_packed, settings.fit);
   else if (command == "render")
-    RenderPacked(render_packed);
+    RenderPacked(settings.render_packed);
   else
-    StylePacked(style_packed, network);
+    StylePacked(settings.style_packed, settings.network);
   return true;
 }
 

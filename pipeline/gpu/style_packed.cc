@@ -1,20 +1,17 @@
-// regrade_gpu style: a packed capture's field learns the colours of its style picture.
+// regrade_gpu style: restyles a packed capture's field after its style picture.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
-#include <numeric>
+#include <utility>
 
 #include "kernels/base/error.h"
 #include "kernels/field/cuda/device_rays.h"
 #include "kernels/field/packed_grid.h"
-#include "kernels/image/color_statistics.h"
 #include "pipeline/fields/field_file.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/gpu/gpu_commands.h"
-#include "stylize/cuda/device_style.h"
-#include "stylize/field/apply_network.h"
 #include "stylize/image/color_transfer.h"
-#include "stylize/image/monge_kantorovich.h"
+#include "stylize/training/restyle_field.h"
 
 namespace regrade {
 namespace {
@@ -35,30 +32,31 @@ class Stopwatch {
   Clock::time_point last_ = Clock::now();
 };
 
-// What the 2D method made of the views that the field was fitted to.
-struct StyleTargets {
-  std::vector<Image> targets;
-  std::vector<StyledTrainingView> views;
-  SceneColorMap scene_map;
-};
-
-StyleTargets StyleViews(const PackedCapture& capture) {
-  StyleTargets style_targets;
-  style_targets.targets.reserve(capture.views.size());
+// What MKL makes of the views that the field was fitted to.
+TrainingTargets StyleViews(const PackedCapture& capture) {
+  TrainingTargets targets;
   const std::unique_ptr<ViewStylizer> method = MakeColorTransfer(StyleOptions(), capture.style);
-  std::vector<ColorStatistics> before, after;
   for (size_t i = 0; i < capture.views.size(); ++i) {
     const PackedView& view = capture.views[i];
-    if (view.held_out) continue;
-    style_targets.targets.push_back(method->Stylize(view.photo, static_cast<int>(i)));
-    style_targets.views.push_back(
-        {view.camera, &style_targets.targets.back(), nullptr, view.file});
-    before.push_back(MeasureColor(view.photo));
-    after.push_back(MeasureColor(style_targets.targets.back()));
+    if (!view.held_out)
+      targets.Add({.camera = view.camera, .name = view.file}, view.photo,
+                  method->Stylize(view.photo, static_cast<int>(i)));
   }
-  const MklMap mkl = ComputeMkl(Pool(before), Pool(after));
-  style_targets.scene_map = {mkl.map, mkl.norm};
-  return style_targets;
+  return targets;
+}
+
+// Renders the held-out views and measures frame times, of a field that is uploaded for that.
+void MeasureFrames(const RadianceField& field, const PackedCapture& capture,
+                   const std::string& frames, JsonValue* record) {
+  const MarchOptions march{field.step};
+  const DeviceGrid grid = UploadGrid(MakeFastGrid(field));
+  Stopwatch watch;
+  const auto first = std::find_if(capture.views.begin(), capture.views.end(),
+                                  [](const PackedView& view) { return view.held_out; });
+  if (first != capture.views.end()) RenderViewOnDevice(grid, first->camera, march);
+  (*record)["seconds_first_frame"] = watch.Lap();
+  (*record)["render"] = RenderCosts(grid, capture, march.step);
+  if (!frames.empty()) RenderHeldOut(grid, capture, march, frames, "styled");
 }
 
 }  // namespace
@@ -70,56 +68,44 @@ void StylePacked(const StylePackedOptions& settings, const TrainNetworkOptions& 
     throw Error(ExitCode::kInput, "holds no style picture", settings.capture,
                 "pack it with --style PICTURE");
   StoredField stored = ReadFieldFile(settings.field);
-  const MarchOptions march{stored.field.step};
+  const int64_t voxels = stored.field.geometry->num_voxels();
   JsonValue record = JsonValue::Object{{"capture", settings.capture}};
   record["seconds_read"] = watch.Lap();
-  const StyleTargets style_targets = StyleViews(capture);
+  const TrainingTargets targets = StyleViews(capture);
   record["seconds_2d"] = watch.Lap();
-  const Vec3d background = style_targets.scene_map.map(stored.field.background.Cast<double>());
-  for (int c = 0; c < 3; ++c)
-    stored.field.background[c] = static_cast<float>(std::clamp(background[c], 0.0, 1.0));
-
-  const bool on_device = settings.device == "cuda";
-  DeviceGrid grid;
-  if (on_device) grid = UploadGrid(MakeFastGrid(stored.field));
-  const int64_t free_before = ReadDeviceStatus().free_bytes;
-  int64_t least_free = free_before;
-  record["seconds_upload"] = watch.Lap();
+  RestyleRequest request;
+  request.options = options;
+  request.backend = settings.device == "cuda" ? Backend::kCuda : Backend::kCpu;
+  const bool on_device = request.backend == Backend::kCuda;
   if (on_device && !settings.frames.empty())
-    RenderHeldOut(grid, capture, march, settings.frames, "source");
+    RenderHeldOut(UploadGrid(MakeFastGrid(stored.field)), capture, {stored.field.step},
+                  settings.frames, "source");
   watch.Lap();
-  TrainingHooks hooks;
+
+  int64_t free_before = 0, least_free = 0;  // bytes on the device, beside the field
+  RestyleHooks hooks;
+  hooks.finished = [&](RestyleHooks::Part part) {
+    const char* const names[] = {"seconds_upload", "seconds_learn", "seconds_restyle"};
+    record[names[static_cast<int>(part)]] = watch.Lap();
+    if (on_device && part == RestyleHooks::Part::kUpload)
+      free_before = least_free = ReadDeviceStatus().free_bytes;
+  };
   Stopwatch steps;
   double seconds_start = 0, seconds_steps = 0;
   int reports = 0;
-  hooks.progress = [&](const Progress&) {
+  hooks.training.progress = [&](const Progress&) {
     (reports++ == 0 ? seconds_start : seconds_steps) += steps.Lap();
     if (on_device && reports % 4 == 1)
       least_free = std::min(least_free, ReadDeviceStatus().free_bytes);
     return LoopControl::kContinue;
   };
-  const TrainNetworkResult trained =
-      TrainNetwork(stored.field, style_targets.views, style_targets.scene_map, march, options,
-                   hooks, nullptr, on_device ? &grid : nullptr);
-  record["seconds_learn"] = watch.Lap();
+  const RestyledField restyled = Restyle(std::move(stored.field), targets, request, hooks);
+  const TrainNetworkResult& trained = restyled.trained;
   record["seconds_start_and_first_steps"] = seconds_start;
   record["seconds_other_steps"] = seconds_steps;
-  if (on_device)
-    RestyleOnDevice(trained.network, &grid);
-  else
-    stored.field.appearance = ApplyNetwork(trained.network, stored.field);
-  record["seconds_restyle"] = watch.Lap();
-  if (on_device) {
-    const auto first = std::find_if(capture.views.begin(), capture.views.end(),
-                                    [](const PackedView& view) { return view.held_out; });
-    if (first != capture.views.end()) RenderViewOnDevice(grid, first->camera, march);
-    record["seconds_first_frame"] = watch.Lap();
-    record["render"] = RenderCosts(grid, capture, march.step);
-    if (!settings.frames.empty())
-      RenderHeldOut(grid, capture, march, settings.frames, "styled");
-  }
+  if (on_device) MeasureFrames(restyled.styled, capture, settings.frames, &record);
   record["device"] = on_device ? ReadDeviceStatus().name : "cpu";
-  record["voxels"] = stored.field.geometry->num_voxels();
+  record["voxels"] = voxels;
   record["steps"] = trained.steps;
   record["mean_touched_voxels"] = trained.mean_touched_voxels;
   record["mib_beyond_the_field"] = static_cast<double>(free_before - least_free) / (1 << 20);

@@ -1,4 +1,4 @@
-// Pictures side by side with words under them, as one picture.
+// Draws a table of captioned pictures as one picture.
 #pragma once
 
 #include <string>
@@ -14,12 +14,12 @@ struct SheetCell {
 };
 
 struct SheetRow {
-  std::string title;  // of a block that begins here; empty goes on with the last one
+  std::string title;  // of the block that begins with this row; empty: the last block goes on
   std::vector<SheetCell> cells;
 };
 
-// Every cell is as wide as the widest picture; a row is as high as its highest. `columns` are
-// the words above each block's cells.
+// All cells are as wide as the widest picture; a row is as high as its highest one. `columns`:
+// headings above the cells of each block.
 Image MakeContactSheet(const std::vector<std::string>& columns,
                        const std::vector<SheetRow>& rows);
 

@@ -11,7 +11,7 @@ namespace regrade {
 namespace {
 
 constexpr int kFont = cv::FONT_HERSHEY_SIMPLEX;
-constexpr double kScale = 0.5, kSmallest = 0.5;  // smaller is illegible
+constexpr double kScale = 0.5, kSmallest = 0.5;  // below, text is illegible
 
 }  // namespace
 

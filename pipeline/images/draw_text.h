@@ -1,4 +1,4 @@
-// Words in pictures.
+// Draws text into pictures.
 #pragma once
 
 #include <string>
@@ -7,12 +7,12 @@
 
 namespace regrade {
 
-// Height of a line of text of this size, pixels, with room above and below.
+// Height of a line of text of this size with its margins, pixels.
 int TextLineHeight(double size);
 
-// Writes `text` in grey of the given brightness into an RGB picture, its line from (x, y) down;
-// what is longer than `width` pixels is drawn smaller, down to half, and then cut. Only ASCII
-// is drawn, other bytes as '?'. `size` 1 is about 11 pixels for a capital.
+// Draws `text` in grey of the given brightness into an RGB picture, from (x, y) down. A text
+// wider than `width` pixels is drawn smaller, down to half, and then cut. Bytes that are not
+// ASCII are drawn as '?'. At `size` 1 a capital is about 11 pixels high.
 void DrawText(Image* picture, int x, int y, int width, const std::string& text, double size,
               float brightness);
 

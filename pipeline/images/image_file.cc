@@ -10,23 +10,22 @@
 #include <cstring>
 #include <limits>
 #include <memory>
-#include <optional>
 #include <utility>
 #include <vector>
 
 #include "kernels/base/error.h"
 #include "pipeline/files/atomic_file.h"
+#include "pipeline/files/text.h"
 #include "pipeline/images/image_format.h"
 #include "pipeline/images/jpeg_decoder.h"
 #include "pipeline/images/normalize_photo.h"
-#include "pipeline/images/png_chunks.h"
 #include "pipeline/images/png_decoder.h"
 
 namespace regrade {
 namespace {
 
 // Picture formats guarantee at most about 1000 decoded bytes for each stored one (DEFLATE's
-// limit is 1032); a header that claims far more than its file can hold is a trap or a wreck.
+// limit is 1032); a header that claims far more than its file can hold is malicious or corrupt.
 constexpr int64_t kMaxExpansion = 2000, kExpansionSlack = 16 << 20;
 
 void CheckSize(int64_t width, int64_t height, int64_t pixel_bytes, int64_t file_bytes,
@@ -60,7 +59,7 @@ void CheckRegularFile(const std::string& path) {
   if (kind) throw Error(ExitCode::kInput, std::string(kind) + ", not a picture file", path);
 }
 
-// What the file says about itself, in OpenImageIO's names.
+// Metadata under OpenImageIO's names.
 void TakeMetadata(const OIIO::ImageSpec& spec, StoredPicture* picture) {
   const int orientation = spec.get_int_attribute("Orientation", 1);
   picture->orientation = orientation >= 1 && orientation <= 8 ? orientation : 1;
@@ -133,21 +132,12 @@ StoredPicture ReadPng(std::string_view bytes, const std::string& where,
   return picture;
 }
 
-// Size of a PNG or GIF from its first bytes: these decoders allocate before they can be asked.
-std::optional<std::pair<int64_t, int64_t>> PeekSize(std::string_view decoder,
-                                                    std::string_view bytes) {
-  const auto byte = [&](size_t at) -> int64_t { return static_cast<unsigned char>(bytes[at]); };
-  const auto big32 = [&](size_t at) {
-    return byte(at) << 24 | byte(at + 1) << 16 | byte(at + 2) << 8 | byte(at + 3);
-  };
-  if (decoder == "png" && bytes.size() >= 24) return {{big32(16), big32(20)}};
-  if (decoder == "gif" && bytes.size() >= 10)
-    return {{byte(6) | byte(7) << 8, byte(8) | byte(9) << 8}};
-  return std::nullopt;
+int64_t Little16(std::string_view bytes, size_t at) {
+  return static_cast<unsigned char>(bytes[at]) | static_cast<unsigned char>(bytes[at + 1]) << 8;
 }
 
-// Of the channels in a file, those we want (grey, RGB, or RGB + alpha), as exact quotients
-// value / max: every decoder gives the same float for the same integer.
+// Reads grey, RGB, or RGB + alpha of the file's channels, as exact quotients value / max: every
+// decoder gives the same float for the same integer.
 template <typename Value>
 bool ReadChannels(OIIO::ImageInput* input, const OIIO::ImageSpec& spec, float max,
                   Image* image) {
@@ -215,7 +205,7 @@ StoredPicture ReadWithOiio(const ImageFormat& format, std::string_view bytes,
 
 StoredPicture ReadStored(const std::string& path, const DecodeLimits& limits) {
   CheckRegularFile(path);
-  // Sixteen bytes a pixel is the most that an uncompressed file needs.
+  // An uncompressed file has at most sixteen bytes a pixel.
   const std::string bytes =
       ReadWholeFile(path, static_cast<uint64_t>(limits.max_pixels) * 16 + (64 << 20));
   if (bytes.empty()) throw Error(ExitCode::kInput, "empty file", path);
@@ -225,12 +215,10 @@ StoredPicture ReadStored(const std::string& path, const DecodeLimits& limits) {
   if (decoder.empty())
     throw Error(ExitCode::kInput, std::string(format->name) + " is not supported here", path,
                 format->remedy);
-  if (decoder == "png")
-    if (const std::string damage = FindPngDamage(bytes); !damage.empty())
-      throw Error(ExitCode::kInput, "damaged PNG: " + damage, path,
-                  "copy the file again from where it came");
-  if (const auto size = PeekSize(decoder, bytes))
-    CheckSize(size->first, size->second, 1, static_cast<int64_t>(bytes.size()), limits, path);
+  // OpenImageIO's GIF decoder allocates the picture when it opens the file.
+  if (decoder == "gif" && bytes.size() >= 10)
+    CheckSize(Little16(bytes, 6), Little16(bytes, 8), 1, static_cast<int64_t>(bytes.size()),
+              limits, path);
   StoredPicture picture = decoder == "jpeg"  ? ReadJpeg(bytes, path, limits)
                           : decoder == "png" ? ReadPng(bytes, path, limits)
                                              : ReadWithOiio(*format, bytes, path, limits);
@@ -244,12 +232,6 @@ Image ReplicateGrey(const Image& grey) {
   for (int64_t i = 0; i < grey.num_pixels(); ++i)
     std::fill_n(&result.pixels[3 * i], 3, grey.pixels[i]);
   return result;
-}
-
-std::string Joined(const std::vector<std::string>& notices) {
-  std::string text;
-  for (const std::string& notice : notices) text += (text.empty() ? "" : "; ") + notice;
-  return text;
 }
 
 template <typename Value>
@@ -289,7 +271,7 @@ DecodedPhoto DecodePhoto(const std::string& path, const DecodeLimits& limits) {
   DecodedPhoto photo;
   photo.exif_focal_px = FocalInPixels(stored);
   photo.bits = stored.bits;
-  photo.notice = Joined(stored.notices);
+  photo.notice = Join(stored.notices, "; ");
   photo.image = ReplicateGrey(stored.image);
   return photo;
 }
@@ -302,7 +284,7 @@ Image ReadStylePicture(const std::string& path, std::string* notice) {
   StoredPicture stored = ReadStored(path, {.min_side = 1});
   if (stored.image.channels == 4)
     stored.notices.push_back("its transparent parts are laid over white");
-  if (notice) *notice = Joined(stored.notices);
+  if (notice) *notice = Join(stored.notices, "; ");
   return CompositeOnWhite(ReplicateGrey(stored.image));
 }
 

@@ -84,7 +84,7 @@ bool TiffIsCameraRaw(std::string_view bytes, const std::string& path) {
   return false;
 }
 
-// Files of the ISO base media family say what they are in their first box.
+// The first box of a file of the ISO base media family names its format.
 const ImageFormat* SniffBrand(std::string_view bytes) {
   const std::string_view brand = bytes.substr(8, 4);
   for (const char* heic : {"heic", "heix", "heim", "heis", "hevc", "mif1", "msf1"})

@@ -1,4 +1,4 @@
-// What a file is, told by its first bytes: the name a person knows it by, and who decodes it.
+// Recognises picture formats by the first bytes of a file.
 #pragma once
 
 #include <string>
@@ -8,15 +8,14 @@ namespace regrade {
 
 struct ImageFormat {
   const char* name;         // "JPEG", "HEIC", "camera raw", ...
-  const char* decoder;      // OpenImageIO's name of the format; empty when nobody here reads it
-  bool from_memory = true;  // the decoder takes bytes; otherwise it opens the file by path
-  // What a person can do when it cannot be decoded; empty for formats that everybody reads.
+  const char* decoder;      // OpenImageIO's name of the format; empty if it is not supported
+  bool from_memory = true;  // the decoder takes bytes; else it opens the file by its path
+  // What the user can do if it cannot be decoded; empty for common formats.
   const char* remedy = "";
 };
 
-// The format of a file that begins with `bytes`, or nullptr when it is not a picture (nor
-// something a person may take for one). The extension of `path` matters in one case only:
-// camera raw files that look like TIFF.
+// The format of a file that begins with `bytes`, or nullptr if it is no picture or video. The
+// extension of `path` matters only for camera raw files that look like TIFF.
 const ImageFormat* SniffImageFormat(std::string_view bytes, const std::string& path);
 
 }  // namespace regrade

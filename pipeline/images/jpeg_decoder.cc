@@ -18,7 +18,7 @@ namespace {
 
 constexpr unsigned int kMarkerBytes = 65533;  // the longest body a marker can have
 
-// What libjpeg calls back. `base` comes first: libjpeg hands us pointers to it.
+// State of libjpeg's callbacks. `base` comes first: libjpeg passes pointers to it.
 struct ErrorState {
   jpeg_error_mgr base;
   jmp_buf jump;
@@ -36,7 +36,7 @@ ErrorState& StateOf(j_common_ptr info) { return *reinterpret_cast<ErrorState*>(i
   longjmp(state.jump, 1);
 }
 
-// Odd headers that cost no pixel; common in files from cameras and phones.
+// Odd headers that affect no pixel; common in files from cameras and phones.
 bool IsRemark(int code) {
   return code == JWRN_NOT_SEQUENTIAL || code == JWRN_ADOBE_XFORM || code == JWRN_JFIF_MAJOR;
 }
@@ -69,8 +69,8 @@ class Decompressor {
   Decompressor(const Decompressor&) = delete;
   Decompressor& operator=(const Decompressor&) = delete;
 
-  // The methods below call libjpeg, which leaves them by longjmp: they hold nothing that has a
-  // destructor. False: see state().
+  // On an error libjpeg leaves the methods below by longjmp: they hold no object with a
+  // destructor. They return false then, and state() has the reason.
   bool ReadHeader(std::string_view bytes) {
     if (setjmp(state_.jump)) return false;
     jpeg_create_decompress(&info_);
@@ -86,13 +86,13 @@ class Decompressor {
     return true;
   }
 
-  // `profile` is to be freed.
+  // The caller frees `profile`.
   bool ReadIccProfile(JOCTET** profile, unsigned int* size) {
     if (setjmp(state_.jump)) return false;
     return jpeg_read_icc_profile(&info_, profile, size);
   }
 
-  // `row` has room for one row of bytes.
+  // `row` holds one row of bytes.
   bool ReadPixels(unsigned char* row, Image* image) {
     if (setjmp(state_.jump)) return false;
     jpeg_start_decompress(&info_);

@@ -1,4 +1,4 @@
-// Decodes JPEG files and counts what libjpeg only warns about: it returns a full-size picture
+// Decodes JPEG files with libjpeg and counts its warnings: it returns a full-size picture even
 // for half a file.
 #pragma once
 
@@ -16,17 +16,17 @@ struct JpegPicture {
   bool from_cmyk = false;
   std::string exif;  // the block "Exif\0\0..."; empty if there is none
   std::string icc;   // the colour profile; empty if there is none
-  // Warnings that mean lost or invented pixels. Remarks about odd headers are not counted.
+  // Warnings about lost or invented pixels. Warnings about odd headers are not counted.
   int64_t damage_warnings = 0;
   std::string first_warning;
 };
 
-// Called with width, height and bytes per pixel from the header, before any pixel is allocated;
-// throws to refuse.
+// Gets width, height and bytes per pixel from the header, before pixels are allocated; throws
+// to refuse the file.
 using SizeCheck = std::function<void(int64_t width, int64_t height, int64_t pixel_bytes)>;
 
-// Throws Error(kInput) for what is no JPEG, is unsupported (12 bits) or has more than
-// kMaxJpegScans scans, each of which would cost a pass over the whole picture.
+// Throws Error(kInput) for files that are no JPEG, are unsupported (12 bits) or have more than
+// kMaxJpegScans scans: each scan costs a pass over the whole picture.
 JpegPicture DecodeJpeg(std::string_view bytes, const std::string& where,
                        const SizeCheck& check);
 

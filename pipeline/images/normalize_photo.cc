@@ -33,7 +33,7 @@ void EncodeSrgb(Image* image) {
   for (int64_t i = 0; i < image->num_pixels(); ++i)
     for (int c = 0; c < colors; ++c) {
       float& v = image->pixels[i * image->channels + c];
-      // Above 1 the curve goes on, so that the clamp below sees and counts it.
+      // Above 1 the curve continues, so that the clamp below counts those values.
       if (v > 0) v = static_cast<float>(SrgbFromLinear(v));
     }
 }
@@ -130,7 +130,7 @@ double FocalInPixels(const StoredPicture& picture) {
   };
   const double from_35mm = picture.focal_35mm * std::hypot(w, h) / std::hypot(36.0, 24.0);
   if (plausible(from_35mm)) return from_35mm;
-  // The picture may be turned and may have been scaled since the camera wrote the tags.
+  // The picture may have been turned or scaled after the camera wrote the tags.
   const double stored_width = picture.orientation >= 5 ? h : w;
   const double scale = picture.exif_width > 0 ? stored_width / picture.exif_width : 1.0;
   const double from_sensor = picture.focal_mm * picture.focal_plane_px_per_mm * scale;

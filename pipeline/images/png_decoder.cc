@@ -15,8 +15,8 @@
 namespace regrade {
 namespace {
 
-// libpng, and what it calls back. The methods that call it are left by longjmp where it gives
-// up: they hold nothing that has a destructor, and return false.
+// libpng with its callbacks. On an error libpng leaves the methods that call it by longjmp:
+// they hold no object with a destructor, and return false.
 class Decoder {
  public:
   explicit Decoder(std::string_view bytes) : left_(bytes) {
@@ -31,6 +31,8 @@ class Decoder {
   bool ReadHeader() {
     if (info_ == nullptr || setjmp(png_jmpbuf(png_))) return false;
     png_set_read_fn(png_, this, OnRead);
+    // By default only some chunks' checksums are compared.
+    png_set_crc_action(png_, PNG_CRC_ERROR_QUIT, PNG_CRC_ERROR_QUIT);
     png_read_info(png_, info_);
     png_set_expand(png_);
     if constexpr (std::endian::native == std::endian::little) png_set_swap(png_);
@@ -39,12 +41,12 @@ class Decoder {
     return true;
   }
 
-  // The texts point into what libpng keeps.
+  // The views point into memory of libpng.
   bool ReadColours(bool* linear, std::string_view* exif, std::string_view* icc) {
     if (setjmp(png_jmpbuf(png_))) return false;
     int intent = 0;
     double gamma = 0;
-    // Told to be sRGB, or to have any other curve than none: encoded.
+    // Marked as sRGB, or any gamma but 1: encoded.
     if (!png_get_sRGB(png_, info_, &intent) && png_get_gAMA(png_, info_, &gamma))
       *linear = std::abs(gamma - 1) < 0.005;
     png_bytep block = nullptr;
@@ -61,6 +63,7 @@ class Decoder {
   bool ReadRows(png_bytep* rows) {
     if (setjmp(png_jmpbuf(png_))) return false;
     png_read_image(png_, rows);
+    png_read_end(png_, nullptr);  // the last chunks may be damaged or missing
     return true;
   }
 
@@ -86,7 +89,7 @@ class Decoder {
   }
   static void OnRead(png_structp png, png_bytep to, size_t size) {
     Decoder& decoder = *static_cast<Decoder*>(png_get_io_ptr(png));
-    if (size > decoder.left_.size()) png_error(png, "the file ends too early");
+    if (size > decoder.left_.size()) png_error(png, "truncated: the file ends too early");
     std::memcpy(to, decoder.left_.data(), size);
     decoder.left_.remove_prefix(size);
   }
@@ -120,7 +123,8 @@ PngPicture DecodePng(std::string_view bytes, const std::string& where,
                      const PngSizeCheck& check) {
   Decoder png(bytes);
   const auto refuse = [&] {
-    throw Error(ExitCode::kInput, std::string("cannot read this PNG: ") + png.failure(), where);
+    throw Error(ExitCode::kInput, std::string("cannot read this PNG: ") + png.failure(), where,
+                "copy the file again from its source");
   };
   PngPicture picture;
   std::string_view exif, icc;

@@ -1,5 +1,4 @@
-// Decodes PNG files with libpng's remarks in hand: left to itself it prints them on the
-// terminal.
+// Decodes PNG files with libpng; its warnings are returned instead of printed.
 #pragma once
 
 #include <cstdint>
@@ -14,18 +13,19 @@ namespace regrade {
 struct PngPicture {
   Image image;  // as stored: 1 channel, 3, or 4 with straight alpha
   int bits = 8;
-  bool linear_light = false;  // the file says that its values are light
+  bool linear_light = false;  // the file marks its values as linear
   std::string exif;           // a TIFF block; empty if there is none
   std::string icc;            // the colour profile; empty if there is none
-  int64_t remarks = 0;        // of the decoder, none of which costs a pixel
+  int64_t remarks = 0;        // warnings of the decoder; no pixel is affected
   std::string first_remark;
 };
 
-// Called with width, height and bytes per pixel from the header, before any pixel is allocated;
-// throws to refuse.
+// Gets width, height and bytes per pixel from the header, before pixels are allocated; throws
+// to refuse the file.
 using PngSizeCheck = std::function<void(int64_t width, int64_t height, int64_t pixel_bytes)>;
 
-// Throws Error(kInput) for what libpng cannot decode.
+// Every chunk up to IEND must be whole and have the right checksum; bytes after IEND are
+// ignored. Throws Error(kInput) otherwise, and for files that libpng cannot decode.
 PngPicture DecodePng(std::string_view bytes, const std::string& where,
                      const PngSizeCheck& check);
 

@@ -1,31 +1,68 @@
+// Calls FFmpeg's libraries: libswscale converts the frames, libavcodec (libx264) encodes them,
+// libavformat writes the MP4 file.
 #include "pipeline/images/video_writer.h"
 
-#include <stdlib.h>
+#include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
-#include <filesystem>
-#include <opencv2/core/utils/logger.hpp>
-#include <opencv2/videoio.hpp>
+#include <cstdint>
+#include <vector>
+
+extern "C" {
+#include <libavcodec/avcodec.h>
+#include <libavformat/avformat.h>
+#include <libavutil/log.h>
+#include <libavutil/opt.h>
+#include <libswscale/swscale.h>
+}
 
 #include "kernels/base/error.h"
 #include "pipeline/files/atomic_file.h"
-#include "pipeline/images/mp4_faststart.h"
 #include "pipeline/images/normalize_photo.h"
 
 namespace regrade {
 namespace {
 
-constexpr uint64_t kMaxVideoBytes = uint64_t{4} << 30;
+// x264's output depends on the number of threads: a fixed one gives the same film anywhere.
+constexpr int kEncoderThreads = 4;
 
-// OpenCV and FFmpeg talk on stderr about things that we find out and report ourselves. A level
-// that the user has set stays.
-void QuietLibraries() {
-  ::setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);  // AV_LOG_QUIET
-  if (::getenv("OPENCV_LOG_LEVEL") == nullptr)
-    cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+// A deleter for FFmpeg's functions that take a pointer to the pointer.
+template <auto Function>
+struct Free {
+  template <typename T>
+  void operator()(T* pointer) const {
+    Function(&pointer);
+  }
+};
+using Packet = std::unique_ptr<AVPacket, Free<av_packet_free>>;
+using Frame = std::unique_ptr<AVFrame, Free<av_frame_free>>;
+using Codec = std::unique_ptr<AVCodecContext, Free<avcodec_free_context>>;
+using Input = std::unique_ptr<AVFormatContext, Free<avformat_close_input>>;
+
+struct OutputCloser {
+  void operator()(AVFormatContext* output) const {
+    avio_closep(&output->pb);
+    avformat_free_context(output);
+  }
+};
+struct ScalerFree {
+  void operator()(SwsContext* scaler) const { sws_freeContext(scaler); }
+};
+
+template <typename T>
+T* Allocated(T* pointer) {
+  if (pointer == nullptr) throw std::bad_alloc();
+  return pointer;
 }
+
+std::string ErrorText(int code) {
+  char text[AV_ERROR_MAX_STRING_SIZE] = "";
+  av_strerror(code, text, sizeof text);
+  return text;
+}
+
+// FFmpeg takes what stands before a colon for a protocol.
+std::string Url(const std::string& path) { return "file:" + path; }
 
 uint8_t Byte(float value) {  // as in our PNG files
   return value > 0 ? static_cast<uint8_t>(std::min(value, 1.f) * 255.f + 0.5f) : 0;
@@ -34,112 +71,189 @@ uint8_t Byte(float value) {  // as in our PNG files
 }  // namespace
 
 struct VideoWriter::State {
-  std::string path, folder, temporary;
-  int width, height;
-  int frames = 0;
-  cv::VideoWriter writer;
-  cv::Mat padded;  // BGR bytes at the even size
+  std::string path, temporary;
+  int width, height;         // of the frames
+  int64_t frames = 0;        // given to the encoder
+  std::vector<uint8_t> rgb;  // a frame at the even size
+  std::unique_ptr<AVFormatContext, OutputCloser> output;
+  AVStream* stream = nullptr;
+  Codec encoder;
+  std::unique_ptr<SwsContext, ScalerFree> scaler;
+  Frame yuv{Allocated(av_frame_alloc())};
+  Packet packet{Allocated(av_packet_alloc())};
+
+  ~State() {
+    output.reset();
+    if (!temporary.empty()) ::unlink(temporary.c_str());
+  }
+
+  void CheckEncoder(int code, const char* step) const {
+    if (code < 0)
+      throw Error(ExitCode::kExternalProgram,
+                  std::string("H.264 encoder: cannot ") + step + ": " + ErrorText(code), path,
+                  "install FFmpeg's libavcodec with libx264, or go without the video");
+  }
+  void CheckWrite(int code) const {
+    if (code >= 0 && output->pb != nullptr) code = output->pb->error;
+    if (code < 0)
+      throw Error(ExitCode::kResources, "cannot write the video: " + ErrorText(code), path,
+                  "free some space, then run the same command again");
+  }
+
+  void OpenEncoder(double frames_per_second) {
+    const AVCodec* codec = avcodec_find_encoder_by_name("libx264");
+    CheckEncoder(codec == nullptr ? AVERROR_ENCODER_NOT_FOUND : 0, "find libx264");
+    encoder.reset(Allocated(avcodec_alloc_context3(codec)));
+    encoder->width = width + width % 2;
+    encoder->height = height + height % 2;
+    encoder->framerate = av_d2q(frames_per_second, 100000);
+    encoder->time_base = av_inv_q(encoder->framerate);
+    encoder->pix_fmt = AV_PIX_FMT_YUV420P;
+    encoder->color_range = AVCOL_RANGE_MPEG;
+    encoder->colorspace = AVCOL_SPC_BT709;
+    encoder->color_primaries = AVCOL_PRI_BT709;
+    encoder->color_trc = AVCOL_TRC_IEC61966_2_1;  // sRGB
+    encoder->thread_count = kEncoderThreads;
+    encoder->flags |= AV_CODEC_FLAG_BITEXACT;
+    if ((output->oformat->flags & AVFMT_GLOBALHEADER) != 0)
+      encoder->flags |= AV_CODEC_FLAG_GLOBAL_HEADER;
+    CheckEncoder(av_opt_set_int(encoder->priv_data, "crf", kVideoCrf, 0), "set the quality");
+    CheckEncoder(avcodec_open2(encoder.get(), codec, nullptr), "open it");
+  }
+
+  void OpenScaler() {
+    const int w = encoder->width, h = encoder->height;
+    scaler.reset(
+        Allocated(sws_getContext(w, h, AV_PIX_FMT_RGB24, w, h, AV_PIX_FMT_YUV420P,
+                                 SWS_BICUBIC | SWS_ACCURATE_RND, nullptr, nullptr, nullptr)));
+    const int* matrix = sws_getCoefficients(SWS_CS_ITU709);
+    sws_setColorspaceDetails(scaler.get(), matrix, 1, matrix, 0, 0, 1 << 16, 1 << 16);
+    yuv->format = AV_PIX_FMT_YUV420P;
+    yuv->width = w;
+    yuv->height = h;
+    CheckEncoder(av_frame_get_buffer(yuv.get(), 0), "allocate a frame");
+    rgb.resize(static_cast<size_t>(3) * w * h);
+  }
+
+  void OpenFile() {
+    stream = Allocated(avformat_new_stream(output.get(), nullptr));
+    CheckEncoder(avcodec_parameters_from_context(stream->codecpar, encoder.get()),
+                 "describe the stream");
+    stream->time_base = encoder->time_base;
+    stream->avg_frame_rate = encoder->framerate;
+    CheckWrite(avio_open(&output->pb, Url(temporary).c_str(), AVIO_FLAG_WRITE));
+    AVDictionary* options = nullptr;
+    av_dict_set(&options, "movflags", "+faststart", 0);
+    const int code = avformat_write_header(output.get(), &options);
+    av_dict_free(&options);
+    CheckWrite(code);
+  }
+
+  // Encodes `frame` (null: the rest) and writes what the encoder gives out.
+  void Encode(const AVFrame* frame) {
+    CheckEncoder(avcodec_send_frame(encoder.get(), frame), "take a frame");
+    for (;;) {
+      const int code = avcodec_receive_packet(encoder.get(), packet.get());
+      if (code == AVERROR(EAGAIN) || code == AVERROR_EOF) return;
+      CheckEncoder(code, "encode a frame");
+      packet->duration = 1;
+      av_packet_rescale_ts(packet.get(), encoder->time_base, stream->time_base);
+      packet->stream_index = stream->index;
+      CheckWrite(av_interleaved_write_frame(output.get(), packet.get()));
+    }
+  }
 };
 
-// FFmpeg chooses the format by the name, which must end in .mp4: so the temporary is a folder.
 VideoWriter::VideoWriter(const std::string& path, int width, int height,
                          double frames_per_second)
     : state_(std::make_unique<State>()) {
   REGRADE_CHECK_GT(width, 0);
   REGRADE_CHECK_GT(height, 0);
   REGRADE_CHECK_GT(frames_per_second, 0);
-  QuietLibraries();
+  av_log_set_level(AV_LOG_QUIET);  // errors come back as codes
   State& s = *state_;
   s.path = path;
-  s.folder = path + ".video" + kTemporarySuffix;
-  s.temporary = s.folder + "/frames.mp4";
   s.width = width;
   s.height = height;
-  s.padded.create(height + height % 2, width + width % 2, CV_8UC3);
-  std::error_code error;
-  std::filesystem::create_directory(s.folder, error);
-  if (error)
-    throw Error(ExitCode::kResources,
-                "cannot create a folder for the video: " + error.message(), s.folder,
-                "check the folder's permissions and the free space");
-  try {
-    s.writer.open(s.temporary, cv::CAP_FFMPEG, cv::VideoWriter::fourcc('a', 'v', 'c', '1'),
-                  frames_per_second, s.padded.size(), true);
-  } catch (const cv::Exception&) {
-    // Reported below.
-  }
-  if (!s.writer.isOpened()) {
-    std::filesystem::remove_all(s.folder, error);
-    throw Error(ExitCode::kExternalProgram,
-                "OpenCV cannot write H.264 video (avc1, " + std::to_string(s.padded.cols) +
-                    " x " + std::to_string(s.padded.rows) + ")",
-                path, "install OpenCV with FFmpeg and libx264, or go without the video");
-  }
+  s.temporary = path + kTemporarySuffix;
+  AVFormatContext* output = nullptr;
+  // The muxer opens the file by this name again to move the index to the front.
+  const int code =
+      avformat_alloc_output_context2(&output, nullptr, "mp4", Url(s.temporary).c_str());
+  s.output.reset(output);
+  s.CheckEncoder(code, "make an MP4 file");
+  s.output->flags |= AVFMT_FLAG_BITEXACT;  // no dates, no version
+  s.OpenEncoder(frames_per_second);
+  s.OpenScaler();
+  s.OpenFile();
 }
 
-VideoWriter::~VideoWriter() {
-  if (state_->folder.empty()) return;
-  state_->writer.release();
-  std::error_code ignored;
-  std::filesystem::remove_all(state_->folder, ignored);
-}
+VideoWriter::~VideoWriter() = default;
 
 void VideoWriter::Add(const Image& frame) {
   State& s = *state_;
   REGRADE_CHECK_EQ(frame.width, s.width);
   REGRADE_CHECK_EQ(frame.height, s.height);
   const Image picture = CompositeOnWhite(frame);
-  for (int y = 0; y < s.padded.rows; ++y)
-    for (int x = 0; x < s.padded.cols; ++x) {
+  const bool grey = picture.channels == 1;
+  uint8_t* to = s.rgb.data();
+  for (int y = 0; y < s.yuv->height; ++y)
+    for (int x = 0; x < s.yuv->width; ++x) {
       const float* from = picture.at(std::min(x, s.width - 1), std::min(y, s.height - 1));
-      const bool grey = picture.channels == 1;
-      s.padded.at<cv::Vec3b>(y, x) = {Byte(from[grey ? 0 : 2]), Byte(from[grey ? 0 : 1]),
-                                      Byte(from[0])};
+      for (int c = 0; c < 3; ++c) *to++ = Byte(from[grey ? 0 : c]);
     }
-  try {
-    s.writer.write(s.padded);
-  } catch (const cv::Exception& e) {
-    throw Error(ExitCode::kExternalProgram, "cannot encode a frame: " + e.err, s.path);
-  }
-  ++s.frames;
+  const uint8_t* const rows[] = {s.rgb.data()};
+  const int stride[] = {3 * s.yuv->width};
+  s.CheckEncoder(av_frame_make_writable(s.yuv.get()), "allocate a frame");
+  sws_scale(s.scaler.get(), rows, stride, 0, s.yuv->height, s.yuv->data, s.yuv->linesize);
+  s.yuv->pts = s.frames++;
+  s.Encode(s.yuv.get());
 }
 
 void VideoWriter::Finish() {
   State& s = *state_;
-  s.writer.release();
-  std::string movie;
-  try {
-    movie = MoveIndexFirst(ReadWholeFile(s.temporary, kMaxVideoBytes));
-  } catch (const Error& e) {
-    throw Error(ExitCode::kResources,
-                "the video encoder left no whole file: " + e.what_failed(), s.path,
-                "free some space, then run the same command again");
-  }
-  // The encoder does not report a full disk; only what can be read back counts.
-  WriteFileAtomically(s.temporary, movie);
+  s.Encode(nullptr);
+  s.CheckWrite(av_write_trailer(s.output.get()));
+  avio_flush(s.output->pb);
+  s.CheckWrite(0);
+  s.CheckWrite(avio_closep(&s.output->pb));
+  SyncFile(s.temporary);
   const int readable = CountVideoFrames(s.temporary);
   if (readable != s.frames)
     throw Error(ExitCode::kResources,
-                "the video has " + std::to_string(readable) + " frames that can be read, of " +
-                    std::to_string(s.frames),
-                s.path, "free some space, then run the same command again");
+                std::to_string(readable) + " of " + std::to_string(s.frames) +
+                    " frames of the video can be read back",
+                s.path, "check the disk, then run the same command again");
   RenameDurably(s.temporary, s.path);
-  std::error_code ignored;
-  std::filesystem::remove_all(s.folder, ignored);
-  s.folder.clear();
+  s.temporary.clear();
 }
 
 int CountVideoFrames(const std::string& path) {
-  QuietLibraries();
-  try {
-    cv::VideoCapture capture(path, cv::CAP_FFMPEG);
-    if (!capture.isOpened()) return -1;
-    int frames = 0;
-    while (capture.grab()) ++frames;
-    return frames;
-  } catch (const cv::Exception&) {
+  av_log_set_level(AV_LOG_QUIET);
+  AVFormatContext* opened = nullptr;
+  if (avformat_open_input(&opened, Url(path).c_str(), nullptr, nullptr) < 0) return -1;
+  const Input input(opened);
+  const AVCodec* codec = nullptr;
+  if (avformat_find_stream_info(opened, nullptr) < 0) return -1;
+  const int index = av_find_best_stream(opened, AVMEDIA_TYPE_VIDEO, -1, -1, &codec, 0);
+  if (index < 0 || codec == nullptr) return -1;
+  const Codec decoder(Allocated(avcodec_alloc_context3(codec)));
+  if (avcodec_parameters_to_context(decoder.get(), opened->streams[index]->codecpar) < 0 ||
+      avcodec_open2(decoder.get(), codec, nullptr) < 0)
     return -1;
+  const Packet packet(Allocated(av_packet_alloc()));
+  const Frame frame(Allocated(av_frame_alloc()));
+  int frames = 0;
+  const auto decode = [&](const AVPacket* bytes) {
+    if (avcodec_send_packet(decoder.get(), bytes) < 0) return;
+    while (avcodec_receive_frame(decoder.get(), frame.get()) >= 0) ++frames;
+  };
+  while (av_read_frame(opened, packet.get()) >= 0) {
+    if (packet->stream_index == index) decode(packet.get());
+    av_packet_unref(packet.get());
   }
+  decode(nullptr);
+  return frames;
 }
 
 }  // namespace regrade

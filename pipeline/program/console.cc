@@ -1,14 +1,14 @@
 #include "pipeline/program/console.h"
 
-#include <spdlog/logger.h>
-#include <spdlog/sinks/basic_file_sink.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <cmath>
+#include <cerrno>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
+#include <ctime>
 
 #include "pipeline/program/interrupt.h"
 
@@ -21,27 +21,7 @@ double Seconds(Clock::duration duration) {
   return std::chrono::duration<double>(duration).count();
 }
 
-// Bytes of the UTF-8 character at `at`, or 0 if there is none or it controls the terminal.
-size_t PrintableBytes(const std::string& text, size_t at) {
-  const auto byte = [&](size_t i) { return static_cast<unsigned char>(text[i]); };
-  const unsigned lead = byte(at);
-  if (lead < 0x80) return lead >= 0x20 && lead != 0x7f ? 1 : 0;
-  const size_t size = lead >= 0xf0 && lead < 0xf5   ? 4
-                      : lead >= 0xe0 && lead < 0xf0 ? 3
-                      : lead >= 0xc2 && lead < 0xe0 ? 2
-                                                    : 0;
-  if (size == 0 || at + size > text.size()) return 0;
-  for (size_t i = 1; i < size; ++i)
-    if ((byte(at + i) & 0xc0) != 0x80) return 0;
-  const unsigned second = byte(at + 1);
-  const bool overlong = (lead == 0xe0 && second < 0xa0) || (lead == 0xf0 && second < 0x90);
-  const bool out_of_range =
-      (lead == 0xed && second >= 0xa0) || (lead == 0xf4 && second >= 0x90);
-  const bool control = lead == 0xc2 && second < 0xa0;  // U+0080 to U+009F
-  return overlong || out_of_range || control ? 0 : size;
-}
-
-// A closed stream is no reason to stop working: what cannot be printed is dropped.
+// A closed stream does not stop the work: the text is dropped.
 void Put(std::FILE* stream, const std::string& text) {
   std::fwrite(text.data(), 1, text.size(), stream);
   std::fflush(stream);
@@ -50,37 +30,6 @@ void Put(std::FILE* stream, const std::string& text) {
 
 }  // namespace
 
-std::string Printable(const std::string& text) {
-  std::string result;
-  for (size_t at = 0; at < text.size();) {
-    const size_t size = PrintableBytes(text, at);
-    if (size > 0) {
-      result.append(text, at, size);
-      at += size;
-      continue;
-    }
-    char escaped[8];
-    std::snprintf(escaped, sizeof escaped, "\\x%02x", static_cast<unsigned char>(text[at]));
-    result += escaped;
-    ++at;
-  }
-  return result;
-}
-
-std::string DurationText(double seconds) {
-  const int64_t whole = static_cast<int64_t>(std::lround(std::min(seconds, 3.6e8)));
-  char text[64];
-  if (whole >= 3600)
-    std::snprintf(text, sizeof text, "%lld h %02lld min", static_cast<long long>(whole / 3600),
-                  static_cast<long long>(whole / 60 % 60));
-  else if (whole >= 60)
-    std::snprintf(text, sizeof text, "%lld min %02lld s", static_cast<long long>(whole / 60),
-                  static_cast<long long>(whole % 60));
-  else
-    std::snprintf(text, sizeof text, "%lld s", static_cast<long long>(whole));
-  return text;
-}
-
 std::string MessageFor(const Error& error, const std::string& kept) {
   std::string text = error.where().empty() ? "" : error.where() + ": ";
   text += error.what_failed();
@@ -88,10 +37,6 @@ std::string MessageFor(const Error& error, const std::string& kept) {
   if (!kept.empty()) text += ". Kept: " + kept;
   return Printable(text);
 }
-
-struct Console::Log {
-  spdlog::logger logger;
-};
 
 Console::Console(bool json) : json_(json) {
   terminal_ = ::isatty(STDERR_FILENO) == 1;
@@ -105,16 +50,21 @@ Console::Console(bool json) : json_(json) {
 Console::~Console() { Erase(); }
 
 void Console::OpenLog(const std::string& path) {
-  try {
-    auto sink = std::make_shared<spdlog::sinks::basic_file_sink_mt>(path);
-    sink->set_pattern("%Y-%m-%dT%H:%M:%S%z %l %v");
-    log_ = std::make_unique<Log>(Log{spdlog::logger("regrade", sink)});
-    log_->logger.flush_on(spdlog::level::info);
-    log_->logger.set_error_handler([](const std::string&) {});  // a full disk is said elsewhere
-  } catch (const spdlog::spdlog_ex& error) {
-    log_.reset();
-    Warn(std::string("no log is kept: ") + error.what());
-  }
+  log_.close();
+  log_.clear();
+  log_.open(path, std::ios::app);
+  if (!log_) Warn("no log is kept: cannot write " + path + ": " + std::strerror(errno));
+}
+
+void Console::Log(const char* level, const std::string& line) {
+  if (!log_.is_open()) return;
+  const std::time_t now = std::time(nullptr);
+  std::tm local{};
+  char time[32] = "";
+  if (::localtime_r(&now, &local) != nullptr)
+    std::strftime(time, sizeof time, "%Y-%m-%dT%H:%M:%S%z", &local);
+  log_ << time << ' ' << level << ' ' << line << std::endl;
+  log_.clear();  // a full disk is reported by the writers of results
 }
 
 void Console::Say(const std::string& text, bool warning) {
@@ -124,9 +74,7 @@ void Console::Say(const std::string& text, bool warning) {
   const char* end = warning && color_ ? "\033[0m" : "";
   if (!quiet_ || warning)
     Put(stderr, std::string(begin) + (warning ? "warning: " : "") + line + end + "\n");
-  if (log_ != nullptr)
-    log_->logger.log(warning ? spdlog::level::warn : spdlog::level::info,
-                     spdlog::string_view_t(line.data(), line.size()));
+  Log(warning ? "warning" : "info", line);
 }
 
 void Console::Info(const std::string& text) {
@@ -155,8 +103,7 @@ void Console::Fail(const std::string& text, ExitCode code) {
   const std::string line = Printable(text);
   Put(stderr, std::string(color_ ? "\033[31m" : "") + "regrade: " + line +
                   (color_ ? "\033[0m" : "") + "\n");
-  if (log_ != nullptr)
-    log_->logger.log(spdlog::level::err, spdlog::string_view_t(line.data(), line.size()));
+  Log("error", line);
   Event("error", JsonValue::Object{{"text", text}, {"exit_code", static_cast<int>(code)}});
 }
 

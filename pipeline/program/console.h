@@ -1,23 +1,18 @@
-// What the program says: messages and a progress line on stderr, machine-readable lines on
-// stdout with --json, and everything in the output folder's log.
+// The program's messages: text and a progress line on stderr, JSON lines on stdout with --json,
+// and all messages in the output folder's log.
 #pragma once
 
 #include <chrono>
-#include <memory>
+#include <fstream>
 #include <string>
 
 #include "kernels/base/error.h"
 #include "kernels/base/progress.h"
 #include "pipeline/files/json_file.h"
+#include "pipeline/files/text.h"
 #include "pipeline/program/eta_estimator.h"
 
 namespace regrade {
-
-// Control bytes and what is not UTF-8 as \xNN, so that a file name cannot steer a terminal.
-std::string Printable(const std::string& text);
-
-// "2 h 03 min", "4 min 12 s", "8 s".
-std::string DurationText(double seconds);
 
 // "WHERE: WHAT. HINT. Kept: KEPT." on one line, printable.
 std::string MessageFor(const Error& error, const std::string& kept);
@@ -25,7 +20,7 @@ std::string MessageFor(const Error& error, const std::string& kept);
 class Console {
  public:
   // `json`: events as lines of JSON on stdout. The progress line is drawn in place on a
-  // terminal and printed now and then elsewhere; colour obeys NO_COLOR and TERM=dumb.
+  // terminal and printed every few seconds elsewhere; colour obeys NO_COLOR and TERM=dumb.
   explicit Console(bool json);
   ~Console();
   Console(const Console&) = delete;
@@ -36,15 +31,14 @@ class Console {
   void OpenLog(const std::string& path);
 
   void Info(const std::string& text);
-  // A text of our own making with line breaks, such as a table.
+  // A text of several lines, for example a table.
   void Lines(const std::string& text);
   void Warn(const std::string& text);
   void Fail(const Error& error);
   void Fail(const std::string& text, ExitCode code);
-  // While it is quiet, messages and progress go to the log only; warnings and failures are
-  // said.
+  // While quiet, messages and progress go to the log only; warnings and failures are printed.
   void SetQuiet(bool quiet) { quiet_ = quiet; }
-  // What survives a failure from now on; part of the message.
+  // What a failure from now on leaves intact; part of its message.
   void SetKept(const std::string& kept) { kept_ = kept; }
   // A line of JSON {"event": name, ...members} with --json, nothing without.
   void Event(const std::string& name, const JsonValue& members);
@@ -52,11 +46,11 @@ class Console {
   void BeginStage(const std::string& stage);
   void EndStage();
   double StageSeconds() const;
-  // Draws, keeps the estimate, and says kStop once a signal has asked us to stop.
+  // Draws the progress line, updates the estimate, and returns kStop after a signal.
   ProgressFunction StageProgress();
 
  private:
-  struct Log;
+  void Log(const char* level, const std::string& line);
   void Say(const std::string& text, bool warning);
   void Draw(const Progress& progress);
   void Erase();
@@ -66,7 +60,7 @@ class Console {
   bool color_ = false;
   bool line_drawn_ = false;
   bool quiet_ = false;
-  std::unique_ptr<Log> log_;
+  std::ofstream log_;
   std::string stage_, kept_;
   EtaEstimator eta_;
   std::chrono::steady_clock::time_point stage_begin_, last_drawn_;

@@ -1,9 +1,9 @@
-// How much processor time this program has used: what a stage cost, whoever else was at work.
+// CPU seconds of this process and its children.
 #pragma once
 
 namespace regrade {
 
-// Of all threads of this process and of the programs that it has started and seen end, seconds.
+// Of all threads of this process and of all child processes that have ended.
 double CpuSeconds();
 
 }  // namespace regrade

@@ -1,22 +1,36 @@
-// Work that a stranger's file may crash, tried in a child process first.
+// Tries the parsing of an untrusted file in a child process first.
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <string>
+#include <vector>
 
 namespace regrade {
 
 struct CrashProbeLimits {
-  double seconds = 300;                      // of the wall clock
-  int64_t memory_bytes = int64_t{32} << 30;  // of address space; not kept by sanitizers' builds
+  double seconds = 300;                      // wall clock
+  int64_t memory_bytes = int64_t{32} << 30;  // of address space; not set under sanitizers
 };
 
-// Runs `work` in a copy of this process that has one thread and says nothing. Returns if it
-// ended in whatever way a program may go on from, its own Errors included: the caller's own
-// call will tell them. Throws Error(kExternalProgram) naming `where` if the copy died by a
-// signal, and if it was ended because it took more time or memory than the limits.
-void RunCrashProbe(const std::function<void()>& work, const std::string& where,
+// First argument of the hidden form of the program that a probe runs:
+// `regrade --probe MEMORY KIND FILE`, where MEMORY is the limit in bytes.
+inline constexpr char kProbeFlag[] = "--probe";
+// Exit status of a probe whose memory does not suffice.
+inline constexpr int kProbeOutOfMemory = 99;
+
+// Runs this program as `--probe MEMORY KIND FILE`. Returns if the child exits by itself, also
+// with an error status: the caller then opens the file and reports the error. Throws
+// Error(kExternalProgram) naming `file` if the child dies by a signal, runs out of memory, or
+// exceeds the time limit; Interrupted if the user stops the program.
+void RunCrashProbe(const std::string& kind, const std::string& file,
                    const CrashProbeLimits& limits = {});
+
+// The same with a command of any program, for tests.
+void RunProbeCommand(const std::vector<std::string>& command, const std::string& file,
+                     const CrashProbeLimits& limits);
+
+// Called in the child before it opens the file: limits the address space and forbids core
+// dumps.
+void ApplyProbeLimits(int64_t memory_bytes);
 
 }  // namespace regrade

@@ -6,7 +6,7 @@
 namespace regrade {
 namespace {
 
-constexpr int kLeastCapability = 75;  // what the build is made for: Turing and later
+constexpr int kLeastCapability = 75;  // of this build: Turing and later
 
 }  // namespace
 
@@ -21,7 +21,7 @@ Backend ChooseBackend(const std::string& device, bool reproducible) {
   if (status.found && status.compute_capability >= kLeastCapability) return Backend::kCuda;
   if (device == "cuda")
     throw Error(ExitCode::kResources,
-                status.found ? status.name + " is older than this build serves" : status.name,
+                status.found ? status.name + " is older than this build supports" : status.name,
                 "--device cuda", "use --device auto or cpu");
   return Backend::kCpu;
 }

@@ -1,4 +1,4 @@
-// Which processor a run uses.
+// Chooses the processor that a run uses.
 #pragma once
 
 #include <string>
@@ -7,9 +7,9 @@
 
 namespace regrade {
 
-// `device`: "auto", "cpu" or "cuda". auto takes the GPU where there is one, and the CPU for a
-// reproducible run: the GPU's sums have no fixed order. Throws Error(kResources) if "cuda" was
-// asked for and there is none, Error(kUsage) if it was asked for together with `reproducible`.
+// `device`: "auto", "cpu" or "cuda". auto chooses the GPU where there is one, and the CPU for a
+// reproducible run, because the GPU's sums have no fixed order. Throws Error(kResources) for
+// "cuda" without a GPU, Error(kUsage) for "cuda" together with `reproducible`.
 Backend ChooseBackend(const std::string& device, bool reproducible);
 
 // "cpu", or the GPU's name.

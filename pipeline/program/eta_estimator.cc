@@ -6,10 +6,10 @@
 namespace regrade {
 namespace {
 
-constexpr double kWindowShare = 0.1;   // of the work
-constexpr double kShortestWindow = 3;  // seconds
+constexpr double kWindowFraction = 0.1;  // of the work
+constexpr double kShortestWindow = 3;    // seconds
 constexpr size_t kMostPoints = 512;
-constexpr double kSmallFirstShare = 0.02;  // of the work: what came before it was preparation
+constexpr double kSmallFirstFraction = 0.02;  // of the work: before it were preparations
 
 }  // namespace
 
@@ -17,20 +17,20 @@ void EtaEstimator::Add(double seconds, double done, double total) {
   total_ = total;
   if (points_.empty()) {
     start_ = {seconds, done};
-    if (done < total * kSmallFirstShare) {
+    if (done < total * kSmallFirstFraction) {
       points_.push_back(start_);
       return;
     }
     points_.push_back({0, 0});
   }
-  if (done < points_.back().done) {  // begun anew (a finer grid): the old pace says nothing
+  if (done < points_.back().done) {  // restarted (a finer grid): the old rate is obsolete
     points_.assign(1, {seconds, done});
     start_ = points_.front();
     return;
   }
   points_.push_back({seconds, done});
   while (points_.size() > 2 && points_[1].seconds <= seconds - kShortestWindow &&
-         points_[1].done <= done - total * kWindowShare)
+         points_[1].done <= done - total * kWindowFraction)
     points_.pop_front();
   if (points_.size() > kMostPoints) {  // keep the ends and every other point between
     std::deque<Point> thinned;
@@ -46,8 +46,8 @@ std::optional<double> EtaEstimator::Remaining() const {
   if (last.seconds < 1 || !(last.done > first.done) || !(last.seconds > first.seconds))
     return std::nullopt;
   double rate = (last.done - first.done) / (last.seconds - first.seconds);
-  // Where a unit of work is not always the same time, the pace of late and that of all so far
-  // err to both sides; a slow start must be forgotten all the same.
+  // Where units of work differ in cost, the recent rate and the mean rate err to opposite
+  // sides; a slow start must still be forgotten.
   constexpr double kShareOfAll = 0.35;
   if (last.seconds > start_.seconds && last.done > start_.done)
     rate *= std::pow((last.done - start_.done) / (last.seconds - start_.seconds) / rate,

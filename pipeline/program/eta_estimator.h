@@ -1,4 +1,4 @@
-// How long a stage will still take, from how fast it has been going lately.
+// Estimates how long a stage will still take.
 #pragma once
 
 #include <deque>
@@ -6,10 +6,10 @@
 
 namespace regrade {
 
-// The rate is measured over a window (a tenth of the work, at least 3 s), so that a slow start
-// and a change of pace are forgotten, and single slow steps are not noticed; the pace since the
-// start has a third of the say. A first report of a small share of the work ends preparations,
-// which say nothing of the pace.
+// The rate is measured over a window (a tenth of the work, at least 3 s): a slow start and a
+// change of pace are forgotten, and single slow steps are averaged out. The rate since the
+// start has a weight of a third. A first report of a small fraction of the work ends
+// preparations, whose rate is ignored.
 class EtaEstimator {
  public:
   // `seconds` since the stage began, from a clock that never goes back; `done` of `total`.
@@ -22,7 +22,7 @@ class EtaEstimator {
     double seconds, done;
   };
   std::deque<Point> points_;
-  Point start_{0, 0};  // the first that was told: a resumed stage does not begin at 0
+  Point start_{0, 0};  // the first report: a resumed stage does not begin at 0
   double total_ = 0;
 };
 

@@ -10,7 +10,7 @@
 namespace regrade {
 namespace {
 
-// The number behind "Name:" in kB, as bytes.
+// The number after "Name:", in kB, as bytes.
 uint64_t Entry(const std::string& line, const std::string& name) {
   if (line.compare(0, name.size(), name) != 0) return 0;
   const size_t digits = line.find_first_of("0123456789");

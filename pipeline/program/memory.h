@@ -1,4 +1,4 @@
-// How much memory there is, and how much of it we may use.
+// Total, available and used memory.
 #pragma once
 
 #include <cstdint>
@@ -6,13 +6,12 @@
 namespace regrade {
 
 struct MemoryStatus {
-  uint64_t total = 0;      // bytes, of the machine or of the limit we run under
-  uint64_t available = 0;  // bytes that can be had without pushing others out
-  uint64_t peak_used = 0;  // bytes, the most that this process has had
+  uint64_t total = 0;      // bytes, of the machine or of the limit of this process
+  uint64_t available = 0;  // bytes that can be used without swapping
+  uint64_t peak_used = 0;  // bytes, maximum of this process
 };
 
-// From /proc/meminfo, the control group and the process's own limit; zeros where nothing is
-// known.
+// From /proc/meminfo, the control group and the process's own limit; zero where unknown.
 MemoryStatus ReadMemoryStatus();
 
 }  // namespace regrade

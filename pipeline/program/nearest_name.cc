@@ -24,7 +24,7 @@ int EditDistance(const std::string& a, const std::string& b) {
 std::string NearestName(const std::string& typed, const std::vector<std::string>& names) {
   std::string nearest;
   int fewest = std::max(2, static_cast<int>(typed.size()) / 3) + 1;
-  if (typed.size() > 200) return nearest;  // nobody mistypes that
+  if (typed.size() > 200) return nearest;  // not a typing mistake
   for (const std::string& name : names) {
     const bool begins = typed.size() >= 3 && name.compare(0, typed.size(), typed) == 0;
     const int edits = begins ? 1 : EditDistance(typed, name);

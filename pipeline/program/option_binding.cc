@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "kernels/base/error.h"
+#include "pipeline/files/text.h"
 #include "pipeline/program/nearest_name.h"
 
 namespace regrade {
@@ -15,7 +16,7 @@ namespace {
 namespace po = boost::program_options;
 using Words = std::vector<std::string>;
 
-// Shortest text that reads back as the same value, in no locale.
+// The shortest text that reads back as the same value, independent of the locale.
 template <typename T>
 std::string NumberText(T value) {
   char text[64];
@@ -29,18 +30,6 @@ std::string BoundsText(const OptionInfo& info) {
   if (low) return "at least " + NumberText(info.min);
   if (high) return "at most " + NumberText(info.max);
   return "a number";
-}
-
-std::vector<std::string> Split(const std::string& text, char separator) {
-  std::vector<std::string> parts;
-  size_t begin = 0;
-  for (size_t at = text.find(separator); at != std::string::npos;
-       at = text.find(separator, begin)) {
-    parts.push_back(text.substr(begin, at - begin));
-    begin = at + 1;
-  }
-  parts.push_back(text.substr(begin));
-  return parts;
 }
 
 [[noreturn]] void RefuseValue(const std::string& where, const std::string& text,
@@ -83,7 +72,7 @@ std::string ParseChoice(const std::string& text, const OptionInfo& info,
   RefuseValue(where, text, listed);
 }
 
-// The text of a JSON value as a flag would have it.
+// The text of a JSON value as a flag's value.
 std::string FlagText(const JsonValue& value) {
   if (value.IsString()) return value.AsString();
   if (!value.IsArray()) return DumpJson(value, -1);
@@ -142,7 +131,7 @@ std::vector<std::string> OptionSet::Parse(const std::vector<std::string>& argume
   po::parsed_options parsed(&description);
   try {
     namespace style = po::command_line_style;
-    // Words that are no flags; without this line they would be refused.
+    // Accepts words that are no flags.
     po::positional_options_description positional;
     positional.add("word", -1);
     parsed = po::command_line_parser(Words(arguments.begin(), flags_end))
@@ -174,7 +163,7 @@ std::vector<std::string> OptionSet::Parse(const std::vector<std::string>& argume
       for (const std::string& word : option.value) {
         if (word.size() > 1 && word[0] == '-')
           throw Error(ExitCode::kUsage, "unknown option", word,
-                      "options begin with two dashes; a file of this name goes behind --");
+                      "options begin with two dashes; write a file of this name after --");
         rest.push_back(word);
       }
       continue;
@@ -183,8 +172,7 @@ std::vector<std::string> OptionSet::Parse(const std::vector<std::string>& argume
     if (option.value.empty() && Find(flag.name) == nullptr)
       flag = {flag.name.substr(std::strlen("no-")), "false"};
     if (Given(flag.name))
-      throw Error(ExitCode::kUsage, "given twice", "--" + flag.name,
-                  "keep one of them: which one is meant?");
+      throw Error(ExitCode::kUsage, "given twice", "--" + flag.name, "keep one of them");
     flags_.push_back(flag);
   }
   if (flags_end != arguments.end()) rest.insert(rest.end(), flags_end + 1, arguments.end());

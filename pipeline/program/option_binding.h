@@ -1,4 +1,5 @@
-// Option structs become flags: parsing, range checks, help and run.json from one description.
+// Turns option structs into flags: parsing, range checks, help and run.json from one
+// description.
 #pragma once
 
 #include <cstdint>
@@ -23,26 +24,26 @@ class OptionSet {
     options->Describe(binder);
   }
 
-  // Reads flags and leaves the structs alone; returns what is not a flag. Forms: "--name
-  // value",
-  // "--name=value"; for switches "--name" and "--no-name"; "--" ends flags. Throws
-  // Error(kUsage): unknown names (with the nearest known one), a missing value, a flag twice.
+  // Reads flags without changing the structs; returns the words that are no flags. Forms:
+  // "--name value", "--name=value"; for switches "--name" and "--no-name"; "--" ends flags.
+  // Throws Error(kUsage) for unknown names (with the nearest known one), a missing value, and a
+  // flag given twice.
   std::vector<std::string> Parse(const std::vector<std::string>& arguments);
 
-  // What --name was given on the command line.
+  // The value of --name on the command line.
   std::optional<std::string> Given(const std::string& name) const;
 
   // Writes the values of a JSON object {"name": value, ...} into the structs. Throws
   // Error(kUsage) with line and column for unknown names and bad values.
   void ApplyConfig(const JsonValue& values, const std::string& where);
   // Writes the parsed flags into the structs. Throws Error(kUsage) with the allowed range for
-  // values outside it, and for whatever is not wholly a number: NaN, 1e999, 0x10, 12abc.
+  // values outside it, and for texts that are no number: NaN, 1e999, 0x10, 12abc.
   void ApplyFlags();
 
   // {"name": value, ...} of everything in effect.
   JsonValue Values() const;
 
-  // Names, units, what they do, defaults and bounds. Call before flags are applied.
+  // Names, units, effects, defaults and bounds. Call before flags are applied.
   std::string Help() const;
 
  private:

@@ -43,7 +43,7 @@ void OrderedWorker::Work() {
     std::function<void()> job = std::move(waiting_.front());
     waiting_.pop_front();
     at_work_ = true;
-    changed_.notify_all();  // there is room in the line
+    changed_.notify_all();  // the queue has room
     lock.unlock();
     std::exception_ptr failure;
     try {
@@ -51,7 +51,7 @@ void OrderedWorker::Work() {
     } catch (...) {
       failure = std::current_exception();
     }
-    job = nullptr;  // what it holds goes before others are let in
+    job = nullptr;  // frees its memory before another job is enqueued
     lock.lock();
     at_work_ = false;
     changed_.notify_all();

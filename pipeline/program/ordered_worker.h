@@ -1,5 +1,5 @@
-// A thread that does jobs one after the other while its owner makes the next: files and films
-// are written while frames are rendered.
+// Runs jobs one after the other in a thread: files and films are written while the next frames
+// are rendered.
 #pragma once
 
 #include <condition_variable>
@@ -13,17 +13,17 @@ namespace regrade {
 
 class OrderedWorker {
  public:
-  // Jobs wait in a line of at most `most_waiting`, which bounds the memory that they hold.
+  // At most `most_waiting` jobs are queued, which bounds their memory.
   explicit OrderedWorker(size_t most_waiting = 2);
-  // Waits for the job at hand; those behind it are dropped, unless Finish was called.
+  // Waits for the current job and drops the queued ones, unless Finish was called.
   ~OrderedWorker();
   OrderedWorker(const OrderedWorker&) = delete;
   OrderedWorker& operator=(const OrderedWorker&) = delete;
 
-  // Takes its place in the line; waits while that is full. Throws what an earlier job has
-  // thrown, after which no other job is done.
+  // Enqueues; blocks while the queue is full. Rethrows an exception of an earlier job, after
+  // which no other job is run.
   void Do(std::function<void()> job);
-  // Waits for all jobs; throws what one of them has thrown.
+  // Waits for all jobs; rethrows the exception of one of them.
   void Finish();
 
  private:
@@ -36,7 +36,7 @@ class OrderedWorker {
   std::deque<std::function<void()>> waiting_;
   bool at_work_ = false, stop_ = false;
   std::exception_ptr failure_;
-  std::thread thread_;  // last: it uses the others
+  std::thread thread_;  // last: it uses the other members
 };
 
 }  // namespace regrade

@@ -10,14 +10,14 @@ namespace {
 
 constexpr size_t kMostPoints = 1500;
 constexpr double kSide = 560, kMargin = 24;
-constexpr double kFarPoints = 0.05;  // share of the points at each end that may lie outside
+constexpr double kFarPoints = 0.05;  // fraction of the points at each end that may be cropped
 
 Vec3d Unit(const Vec3d& v) {
   const double length = std::sqrt(Dot(v, v));
   return length > 0 ? v * (1 / length) : v;
 }
 
-// Directions of the plan's axes in the world: right and up the page.
+// Directions of the map's axes in the world: right and up on the page.
 struct Page {
   Vec3d right, up;
 };
@@ -34,8 +34,7 @@ Page PageOf(const Capture& capture) {
     above = above + view.camera.Up();
     look = look + view.camera.Forward();
   }
-  // Cameras turned every way, as photos from all sides of an object from below and above: the
-  // first one's up is as good as any.
+  // Cameras around an object, above and below it, may have no common up vector.
   const double some = 0.1 * static_cast<double>(capture.views.size());
   above = std::sqrt(Dot(above, above)) < some ? capture.views[0].camera.Up() : Unit(above);
   look = look - above * Dot(look, above);
@@ -43,16 +42,18 @@ Page PageOf(const Capture& capture) {
   return {Cross(up, above), up};
 }
 
-// The span that holds all of `values` but a share at each end.
-std::pair<double, double> Span(std::vector<double> values, double outside) {
+// The range of `values` without the fraction `outside` at each end.
+std::pair<double, double> Range(std::vector<double> values, double outside) {
   std::sort(values.begin(), values.end());
-  const auto at = [&](double share) {
-    return values[static_cast<size_t>(share * static_cast<double>(values.size() - 1))];
+  const auto at = [&](double fraction) {
+    return values[static_cast<size_t>(fraction * static_cast<double>(values.size() - 1))];
   };
   return {at(outside), at(1 - outside)};
 }
 
-std::string Place(double x, double y) { return FixedNumber(x, 1) + "," + FixedNumber(y, 1); }
+std::string Coordinates(double x, double y) {
+  return FixedNumber(x, 1) + "," + FixedNumber(y, 1);
+}
 
 }  // namespace
 
@@ -83,12 +84,12 @@ std::string CameraMapHtml(const CameraMap& map) {
     xs.push_back(camera.x);
     ys.push_back(camera.y);
   }
-  auto [left, right] = Span(xs, 0);
-  auto [low, high] = Span(ys, 0);
+  auto [left, right] = Range(xs, 0);
+  auto [low, high] = Range(ys, 0);
   if (map.points.size() >= 20) {
     xs.clear(), ys.clear();
     for (const auto& [x, y] : map.points) xs.push_back(x), ys.push_back(y);
-    const auto across = Span(xs, kFarPoints), along = Span(ys, kFarPoints);
+    const auto across = Range(xs, kFarPoints), along = Range(ys, kFarPoints);
     left = std::min(left, across.first), right = std::max(right, across.second);
     low = std::min(low, along.first), high = std::max(high, along.second);
   }
@@ -103,12 +104,12 @@ std::string CameraMapHtml(const CameraMap& map) {
   std::string dots;
   for (const auto& [x, y] : map.points)
     if (px(x) > 0 && px(x) < width && py(y) > 0 && py(y) < height)
-      dots += "M" + Place(px(x), py(y)) + "h0";
+      dots += "M" + Coordinates(px(x), py(y)) + "h0";
   std::string marks;
   int held_out = 0;
   for (const CameraMap::Mark& camera : map.cameras) {
     held_out += camera.held_out;
-    // A wedge as wide as the angle of view, foreshortened where the camera looks up or down.
+    // A wedge as wide as the field of view, foreshortened where the camera looks up or down.
     constexpr double kLength = 20;
     const double x = px(camera.x), y = py(camera.y);
     const double ax = camera.look_x * kLength, ay = -camera.look_y * kLength;
@@ -116,18 +117,18 @@ std::string CameraMapHtml(const CameraMap& map) {
     const double flat = std::hypot(camera.look_x, camera.look_y);
     const double sx = flat > 0 ? -ay / flat * side : 0, sy = flat > 0 ? ax / flat * side : 0;
     marks += std::string("<g class=") + (camera.held_out ? "kept" : "cam") + "><path d=\"M" +
-             Place(x, y) + "L" + Place(x + ax + sx, y + ay + sy) + "L" +
-             Place(x + ax - sx, y + ay - sy) + "z\"/><circle cx=" + FixedNumber(x, 1) +
+             Coordinates(x, y) + "L" + Coordinates(x + ax + sx, y + ay + sy) + "L" +
+             Coordinates(x + ax - sx, y + ay - sy) + "z\"/><circle cx=" + FixedNumber(x, 1) +
              " cy=" + FixedNumber(y, 1) + " r=3 /><title>" + EscapeHtml(camera.file) +
              "</title></g>";
   }
-  return "<figure class=map><svg role=img aria-label=\"where the photos were taken, seen from "
+  return "<figure class=map><svg role=img aria-label=\"positions of the cameras, seen from "
          "above\" viewBox=\"0 0 " +
          FixedNumber(width, 0) + " " + FixedNumber(height, 0) + "\"><path class=points d=\"" +
          dots + "\"/>" + marks +
          "</svg><figcaption>Seen from above: " + std::to_string(map.cameras.size()) +
-         " cameras and which way they look" +
-         (held_out > 0 ? ", " + std::to_string(held_out) + " of them kept for measuring" : "") +
+         " cameras and their viewing directions" +
+         (held_out > 0 ? ", " + std::to_string(held_out) + " of them held out" : "") +
          (map.points.empty() ? "" : "; dots are points of the scene") +
          ".</figcaption></figure>";
 }

@@ -1,5 +1,4 @@
-// A plan of the capture: where each photo was taken from and which way it looks, seen from
-// above.
+// A map of the capture from above: positions and viewing directions of the cameras.
 #pragma once
 
 #include <string>
@@ -12,22 +11,22 @@ namespace regrade {
 
 struct CameraMap {
   struct Mark {
-    double x = 0, y = 0;  // of the plan, its own unit
+    double x = 0, y = 0;  // on the map, in units of the world
     double look_x = 0,
-           look_y = 0;        // of a unit vector along the optical axis, as seen from above
+           look_y = 0;        // the unit vector along the optical axis, projected
     double half_width = 0.5;  // tangent of half the angle of view
     bool held_out = false;
     std::string file;  // the user's name
   };
   std::vector<Mark> cameras;
-  std::vector<std::pair<double, double>> points;  // of the scene, some of them
+  std::vector<std::pair<double, double>> points;  // of the scene, a selection
 };
 
-// "Above" is the mean of what the cameras call up, and up the page is where they look on the
-// whole; where cameras are turned every way, the first one's up.
+// "Above" is the mean up vector of the cameras, and the top of the page is their mean viewing
+// direction; where these cancel, the first camera's up vector and any direction across it.
 CameraMap MapCameras(const Capture& capture, int holdout);
 
-// A <figure> with the plan; "" without cameras. File names may be hostile.
+// A <figure> with the map; "" without cameras. File names may be hostile.
 std::string CameraMapHtml(const CameraMap& map);
 
 }  // namespace regrade

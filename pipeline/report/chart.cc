@@ -1,4 +1,3 @@
-// Chooses what each drawing of the report shows.
 #include "pipeline/report/chart.h"
 
 #include <algorithm>
@@ -6,42 +5,43 @@
 
 #include "pipeline/report/html_text.h"
 #include "pipeline/report/plot.h"
+#include "pipeline/report/sequence_names.h"
 #include "pipeline/workspace/output_names.h"
 
 namespace regrade {
 namespace {
 
-bool OfFilm(const ConsistencyMetrics& row) {
+bool IsOfFilm(const ConsistencyMetrics& row) {
   return row.sequence.starts_with(kPathPrefix) && row.sequence != kPathPrefix;
 }
 
-// The sequence's colour is the same in every drawing.
-int ColourOf(std::string sequence, size_t place) {
+// A sequence has the same colour in every chart.
+int ColourOf(std::string sequence, size_t index) {
   if (sequence.starts_with(kPathPrefix)) sequence.erase(0, std::string(kPathPrefix).size());
   const char* known[] = {"source", "views_2d", "styled", "photos"};
   for (int k = 0; k < 4; ++k)
     if (sequence == known[k]) return k;
-  return static_cast<int>(place % 4);
+  return static_cast<int>(index % 4);
 }
 
-// Levels that a curve is compared with are drawn from its first step to its last.
+// A constant that a curve is compared with, from its first step to its last.
 PlotSeries Level(const std::string& name, double value, int64_t first, int64_t last,
                  int colour) {
   return {name, {{double(first), value, ""}, {double(last), value, ""}}, colour};
 }
 
-std::string ConsistencyChart(const RunReport& report, bool film) {
+std::string ConsistencyChart(const EvaluationMetrics& metrics, bool film) {
   int gap = INT_MAX;
-  const auto wanted = [film](const ConsistencyMetrics& row) {
-    return OfFilm(row) == film && !row.tc_psnr_pairs_db.empty();
+  const auto is_shown = [film](const ConsistencyMetrics& row) {
+    return IsOfFilm(row) == film && !row.tc_psnr_pairs_db.empty();
   };
-  for (const auto& row : report.consistency)
-    if (wanted(row)) gap = std::min(gap, row.gap);
+  for (const auto& row : metrics.consistency)
+    if (is_shown(row)) gap = std::min(gap, row.gap);
   Plot plot;
-  for (const auto& row : report.consistency) {
-    if (!wanted(row) || row.gap != gap) continue;
+  for (const auto& row : metrics.consistency) {
+    if (!is_shown(row) || row.gap != gap) continue;
     PlotSeries series;
-    series.name = row.sequence;
+    series.name = SequenceLabel(row.sequence);
     series.colour = ColourOf(row.sequence, plot.series.size());
     for (size_t i = 0; i < row.tc_psnr_pairs_db.size(); ++i)
       series.points.push_back({static_cast<double>(i), row.tc_psnr_pairs_db[i].value, ""});
@@ -52,15 +52,17 @@ std::string ConsistencyChart(const RunReport& report, bool film) {
       film ? "TC-PSNR of each pair of the film's frames" : "TC-PSNR of each pair of frames";
   plot.x = "first frame of the pair";
   plot.y = "dB";
-  plot.note = "TC-PSNR in dB of each pair of frames " + std::to_string(gap) + " apart, " +
-              (film ? "along the film's way." : "in order of time.");
+  const std::string pairs =
+      gap == 1 ? "consecutive frames" : "frames " + std::to_string(gap) + " apart";
+  plot.note = "TC-PSNR of " + pairs + (film ? " of the film" : " at the photos' positions") +
+              ", in dB; higher is steadier.";
   return PlotHtml(plot);
 }
 
 }  // namespace
 
-std::string ConsistencyChartHtml(const RunReport& report) {
-  return ConsistencyChart(report, false) + ConsistencyChart(report, true);
+std::string ConsistencyChartHtml(const EvaluationMetrics& metrics) {
+  return ConsistencyChart(metrics, false) + ConsistencyChart(metrics, true);
 }
 
 std::string FitChartHtml(const ReconstructReport& stage) {
@@ -70,15 +72,15 @@ std::string FitChartHtml(const ReconstructReport& stage) {
   plot.title = "PSNR of the fit over steps";
   plot.x = "steps";
   plot.y = "dB";
-  PlotSeries series{"PSNR on the rays of the last steps", {}, 1};
+  PlotSeries series{"training rays", {}, 1};
   for (const auto& [step, psnr] : curve)
     series.points.push_back({static_cast<double>(step), psnr, ""});
   plot.series.push_back(std::move(series));
   if (stage.psnr_heldout_db.value)
     plot.series.push_back(Level("held-out photos, at the end", *stage.psnr_heldout_db.value,
                                 curve.front().first, curve.back().first, 2));
-  plot.note = "The fit, to step " + std::to_string(curve.back().first) +
-              "; a bend is where the grid becomes finer.";
+  plot.note = "PSNR of the reconstruction over " + std::to_string(curve.back().first) +
+              " steps, in dB; it bends where the voxel grid is refined.";
   return PlotHtml(plot);
 }
 
@@ -95,11 +97,11 @@ std::string BoundChartHtml(const StylizeReport& stage) {
     series.points.push_back({static_cast<double>(step), bound, ""});
   plot.series.push_back(std::move(series));
   if (stage.k_est.value && *stage.k_est.value > 0)
-    plot.series.push_back(Level("K_est, the colours' own", *stage.k_est.value,
+    plot.series.push_back(Level("K_est, estimated from the colours", *stage.k_est.value,
                                 curve.front().first, curve.back().first, 1));
-  plot.note = "From step " + std::to_string(curve.front().first) + " to " +
-              std::to_string(curve.back().first) +
-              " of the style's network, from exact singular values.";
+  plot.note = "Lipschitz bound of the style network from step " +
+              std::to_string(curve.front().first) + " to " +
+              std::to_string(curve.back().first) + ", from exact singular values.";
   return PlotHtml(plot);
 }
 

@@ -1,5 +1,5 @@
-// The drawings of report.html: how consistent each pair of frames is, sequence by sequence, how
-// the fit learned, and how the network's Lipschitz bound went.
+// The charts of report.html: consistency of each pair of frames, PSNR while the field is
+// fitted, and the network's Lipschitz bound while it is trained.
 #pragma once
 
 #include <string>
@@ -8,14 +8,14 @@
 
 namespace regrade {
 
-// tc_psnr_pairs_db at the smallest gap; gaps in a line are undefined pairs. Frames at the
-// photos' places and those of the film's way have a drawing each. "" without pairs.
-std::string ConsistencyChartHtml(const RunReport& report);
+// tc_psnr_pairs_db at the smallest gap; a line breaks at undefined pairs. The frames at the
+// photos' positions and those of the film have a chart each. "" without pairs.
+std::string ConsistencyChartHtml(const EvaluationMetrics& metrics);
 
-// psnr_at_steps, with the held-out figure beside it. "" without two points.
+// psnr_at_steps, with the held-out PSNR as a level. "" without two points.
 std::string FitChartHtml(const ReconstructReport& stage);
 
-// bound_at_steps, with K_est beside it, on a logarithmic scale. "" without two points.
+// bound_at_steps, with K_est as a level, on a logarithmic scale. "" without two points.
 std::string BoundChartHtml(const StylizeReport& stage);
 
 }  // namespace regrade

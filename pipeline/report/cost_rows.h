@@ -1,12 +1,17 @@
-// The price list of a tradeoff.json, read back.
+// Reads the cost table of a tradeoff.json.
 #pragma once
 
 #include <string>
 #include <vector>
 
+#include "pipeline/files/json_file.h"
 #include "pipeline/report/data.h"
 
 namespace regrade {
+
+inline constexpr int kTradeoffSchema = 2;  // of tradeoff.json
+// Throws Error(kInput) if `file`, read from `path`, has another schema.
+void CheckTradeoffSchema(const JsonValue& file, const std::string& path);
 
 // The rows of a tradeoff.json; none where there is no such file. Throws Error(kInput).
 std::vector<CostRow> ReadCostTable(const std::string& path);

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <vector>
 
+#include "pipeline/report/html_table.h"
 #include "pipeline/report/html_text.h"
 #include "pipeline/report/plot.h"
-#include "pipeline/report/tables.h"
 
 namespace regrade {
 namespace {
@@ -16,28 +16,28 @@ std::string NameOf(const CostRow& row) {
   return row.parameter.empty() ? row.setting : row.parameter + " " + row.setting;
 }
 
-// Accuracy over processor time; what nothing beats is joined by a line.
+// Accuracy over CPU time; a line joins the Pareto front.
 std::string ParetoFrontHtml(const Rows& rows) {
   Plot plot;
   plot.title = "accuracy over time, " + rows[0]->benchmark;
   plot.x = "CPU seconds";
   plot.y = rows[0]->unit;
   plot.log_x = true;
-  PlotSeries beaten{"measured", {}, 0, true}, front{"on the front", {}, 2, true},
-      base{"the base", {}, 1, true}, line{"front", {}, 2};
+  PlotSeries dominated{"dominated", {}, 0, true}, front{"Pareto front", {}, 2, true},
+      baseline{"baseline", {}, 1, true}, line{"", {}, 2};
   for (const CostRow* row : rows) {
     if (!row->cpu_seconds.value || !row->accuracy.value) continue;
     const PlotPoint point{*row->cpu_seconds.value, *row->accuracy.value, NameOf(*row)};
-    (row->parameter.empty() ? base
+    (row->parameter.empty() ? baseline
      : row->on_pareto_front ? front
-                            : beaten)
+                            : dominated)
         .points.push_back(point);
     if (row->on_pareto_front) line.points.push_back(point);
   }
   if (line.points.size() < 2) line.points.clear();
   std::sort(line.points.begin(), line.points.end(),
             [](const PlotPoint& a, const PlotPoint& b) { return a.x < b.x; });
-  for (PlotSeries* series : {&beaten, &front, &base, &line})
+  for (PlotSeries* series : {&dominated, &front, &baseline, &line})
     if (!series->points.empty()) plot.series.push_back(std::move(*series));
   return PlotHtml(plot);
 }
@@ -50,18 +50,18 @@ std::string SecondsHtml(const Metric& seconds, const Metric& spread) {
 }
 
 std::string RowHtml(const CostRow& row) {
-  const std::string verdict = row.on_pareto_front ? "<span class=on>front</span>"
-                              : row.dominated_by.empty()
-                                  ? ""
-                                  : "dominated by " + EscapeHtml(row.dominated_by);
+  const std::string comparison = row.on_pareto_front ? "<span class=on>Pareto front</span>"
+                                 : row.dominated_by.empty()
+                                     ? ""
+                                     : "dominated by " + EscapeHtml(row.dominated_by);
   return "<tr><td>" +
-         (row.parameter.empty() ? "the base"
+         (row.parameter.empty() ? "baseline"
                                 : "<code>" + EscapeHtml(row.parameter) + "</code>") +
          "<td class=file>" + EscapeHtml(row.setting) + "<td class=n>" +
          SecondsHtml(row.seconds, row.seconds_spread) + "<td class=n>" +
          SecondsHtml(row.cpu_seconds, row.cpu_spread) + "<td class=n>" +
          MetricHtml(row.accuracy, 3) + "<td class=n>" + MetricHtml(row.error, 3) +
-         "<td class=w>" + verdict + "</tr>";
+         "<td class=w>" + comparison + "</tr>";
 }
 
 std::string BenchmarkHtml(const Rows& rows) {
@@ -70,9 +70,8 @@ std::string BenchmarkHtml(const Rows& rows) {
   return "<h3>" + EscapeHtml(rows[0]->benchmark) +
          "</h3><p>Accuracy: " + EscapeHtml(rows[0]->measure) + ", " +
          EscapeHtml(rows[0]->unit) + ".</p>" + ParetoFrontHtml(rows) +
-         "<div class=scroll><table><thead><tr><th>parameter<th>setting<th class=n>s<th "
-         "class=n>CPU "
-         "s<th class=n>accuracy<th class=n>error<th></tr></thead><tbody>" +
+         "<div class=scroll><table><thead><tr><th>parameter<th>value<th class=n>time, s<th "
+         "class=n>CPU time, s<th class=n>accuracy<th class=n>error<th></tr></thead><tbody>" +
          body + "</tbody></table></div>";
 }
 
@@ -90,12 +89,10 @@ std::string CostsHtml(const RunReport& report) {
   }
   std::string html;
   for (const Rows& rows : benchmarks) html += BenchmarkHtml(rows);
-  return "<h2>What accuracy costs here</h2><p>Measured on this machine with this capture; each "
-         "row changes one parameter of the base. Medians, ± half of what lies between the "
-         "least and "
-         "the most. The error is against the parameter's accurate end. Nothing on the front is "
-         "beaten "
-         "in accuracy at its CPU time.</p>" +
+  return "<h2>Accuracy and cost</h2><p>Measured on this machine with this capture. Each row "
+         "changes one parameter of the baseline. Medians, ± half the range. The error is the "
+         "loss against the parameter's most accurate value. No row of the Pareto front is "
+         "beaten in accuracy at its CPU time.</p>" +
          html;
 }
 

@@ -1,5 +1,5 @@
-// The price list's part of a page: what each parameter's values cost and buy, as a drawing and
-// a table for each plane of accuracy over time.
+// The cost table's section of a page: a chart of accuracy over time and a table for each
+// benchmark.
 #pragma once
 
 #include <string>
@@ -8,7 +8,7 @@
 
 namespace regrade {
 
-// "" without prices. Settings may be hostile.
+// "" without costs. Settings may be hostile.
 std::string CostsHtml(const RunReport& report);
 
 }  // namespace regrade

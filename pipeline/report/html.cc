@@ -1,4 +1,3 @@
-// Puts the report page together: head, headline pictures, films, views, and the tables.
 #include "pipeline/report/html.h"
 
 #include <algorithm>
@@ -12,51 +11,36 @@
 namespace regrade {
 namespace {
 
-// Nothing is fetched but the films beside the page; a reader's browser enforces it.
+// The browser enforces it: nothing is fetched but the films beside the page.
 constexpr char kPolicy[] =
     "default-src 'none'; img-src data:; media-src 'self' file:; style-src 'unsafe-inline'; "
     "script-src 'unsafe-inline'; base-uri 'none'; form-action 'none'";
 
-// Two pictures side by side; with script, one over the other with a sliding edge.
+// Two pictures side by side; with JavaScript, one over the other with a sliding edge.
 std::string CompareHtml(const ReportView& view) {
   const auto& before = view.source ? view.source : view.photo;
   if (!before || !view.styled)
     return PictureHtml(view.styled ? view.styled : before, view.name);
-  // As wide as it may be without growing taller than a screen.
+  // As wide as possible without being taller than a screen.
   const double aspect =
       static_cast<double>(std::max(1, before->width)) / std::max(1, before->height);
   return "<div class=compare style=\"--fit:calc(min(80vh, 42rem) * " + FixedNumber(aspect, 3) +
          ")\">" + PictureHtml(before, view.source ? "before" : "photo") +
          PictureHtml(view.styled, "styled") +
-         "<input type=range min=0 max=100 step=0.1 value=50 aria-label=\"share of the picture "
+         "<input type=range min=0 max=100 step=0.1 value=50 aria-label=\"fraction of the "
+         "picture "
          "before styling\"></div>";
 }
 
-std::string FilmHtml(const char* file, const char* caption,
-                     const std::optional<ReportPicture>& poster) {
-  return std::string("<figure><video controls loop muted playsinline preload=metadata src=\"") +
-         file + "\"" + (poster ? " poster=\"" + DataUrl(*poster) + "\"" : "") +
-         "></video><figcaption>" + caption + ", <code>" + file +
-         "</code></figcaption></figure>";
-}
-
-std::string FilmsHtml(const ReportPictures& pictures, const ReportView* headline) {
-  if (!pictures.has_styled_film && !pictures.has_wipe_film && !pictures.has_views_2d_film)
-    return "";
-  const auto poster_or = [](const std::optional<ReportPicture>& film,
-                            const std::optional<ReportPicture>& view) {
-    return film ? film : view;
-  };
-  const std::optional<ReportPicture> poster =
-      poster_or(pictures.film_poster, headline ? headline->styled : std::nullopt);
+std::string FilmsHtml(const ReportPictures& pictures) {
+  if (pictures.films.empty()) return "";
   std::string html = "<h2>Films</h2><div class=films>";
-  if (pictures.has_styled_film) html += FilmHtml("styled.mp4", "the styled scene", poster);
-  if (pictures.has_wipe_film)
-    html += FilmHtml("source_vs_styled.mp4", "before and styled, as a wipe", std::nullopt);
-  if (pictures.has_views_2d_film)
-    html += FilmHtml(
-        "views_2d.mp4", "the 2D method, frame by frame",
-        poster_or(pictures.film_poster_2d, headline ? headline->views_2d : std::nullopt));
+  for (const ReportFilm& film : pictures.films)
+    html += "<figure><video controls loop muted playsinline preload=metadata src=\"" +
+            EscapeHtml(film.file) + "\"" +
+            (film.poster ? " poster=\"" + DataUrl(*film.poster) + "\"" : "") +
+            "></video><figcaption>" + EscapeHtml(film.caption) + ", <code>" +
+            EscapeHtml(film.file) + "</code></figcaption></figure>";
   return html + "</div>";
 }
 
@@ -64,9 +48,9 @@ std::string ViewsHtml(const ReportPictures& pictures) {
   std::string html;
   for (const ReportView& view : pictures.views) {
     const std::string row = PictureHtml(view.photo, "photo") +
-                            PictureHtml(view.source, "source: our render") +
-                            PictureHtml(view.views_2d, "views_2d: the 2D method on it") +
-                            PictureHtml(view.styled, "styled: the restyled field");
+                            PictureHtml(view.source, "reconstruction") +
+                            PictureHtml(view.views_2d, "2D method on the reconstruction") +
+                            PictureHtml(view.styled, "styled scene");
     if (!row.empty()) {
       html += "<div><div class=view>" + row + "</div><p class=note>" + EscapeHtml(view.name) +
               "</p></div>";
@@ -75,7 +59,7 @@ std::string ViewsHtml(const ReportPictures& pictures) {
   if (html.empty() && !pictures.style) return "";
   html = "<h2>Views</h2><div class=views>" + html + "</div>";
   if (pictures.style) {
-    html += "<details><summary>the style picture</summary><div class=view>" +
+    html += "<details><summary>style picture</summary><div class=view>" +
             PictureHtml(pictures.style, "style") + "</div></details>";
   }
   return html;
@@ -86,15 +70,17 @@ std::string HeatMapsHtml(const ReportPictures& pictures) {
   for (const ReportHeatMap& map : pictures.heat_maps)
     html += PictureHtml(map.picture, map.caption);
   if (html.empty()) return "";
-  return "<h2>Where the worst pairs err</h2><p class=note>White: 50 dB and better for the "
-         "pixel, dark red: 10 dB and worse. Dark and grey: not compared.</p><div class=view>" +
+  return "<h2>Largest errors</h2><p class=note>The two frames that agree least, of each "
+         "sequence "
+         "and gap. White: the error of the pixel is 50 dB or better; dark red: 10 dB or worse; "
+         "dark grey: not compared.</p><div class=view>" +
          html + "</div>";
 }
 
 std::string FactsHtml(const RunReport& report) {
   std::string facts = "regrade " + EscapeHtml(report.version);
   if (!report.preset.empty()) facts += " · preset " + EscapeHtml(report.preset);
-  if (!report.device.empty()) facts += " · on " + EscapeHtml(report.device);
+  if (!report.device.empty()) facts += " · device " + EscapeHtml(report.device);
   facts += " · " + Duration(report.seconds);
   if (report.peak_memory_mb.value)
     facts += " · peak memory " + FixedNumber(*report.peak_memory_mb.value, 0) + " MB";
@@ -119,18 +105,13 @@ std::string ReportHtml(const RunReport& report, const ReportPictures& pictures) 
       title + "</h1>" + FactsHtml(report) + "</header>\n";
   if (headline) html += CompareHtml(*headline);
   for (const std::string& section :
-       {HeadlineMetricsHtml(report), FilmsHtml(pictures, headline), ViewsHtml(pictures),
+       {HeadlineMetricsHtml(report), FilmsHtml(pictures), ViewsHtml(pictures),
         ConsistencyHtml(report), HeatMapsHtml(pictures), StagesHtml(report), CostsHtml(report),
         EffectsHtml(report), PhotosHtml(report, pictures),
         RepeatHtml(report, pictures.run_json)}) {
     if (!section.empty()) html += "<section>" + section + "</section>\n";
   }
-  html += "</main>";
-  // Last, so that the page is there before a script is read.
-  if (!pictures.chart_library.empty())
-    html += "<script>" + pictures.chart_library + "</script>\n<script>" + kReportPlotScript +
-            "</script>";
-  return html + "</body></html>\n";
+  return html + "</main></body></html>\n";
 }
 
 }  // namespace regrade

@@ -1,5 +1,4 @@
-// report.html: one page that a person can keep, mail and open anywhere. It fetches nothing; its
-// only neighbours are the films in the same folder.
+// report.html: one self-contained page. It fetches nothing but the films in its folder.
 #pragma once
 
 #include <string>
@@ -9,7 +8,7 @@
 
 namespace regrade {
 
-// The whole page, UTF-8. Every string in the arguments may be hostile.
+// The whole page, UTF-8. All strings in the arguments may be hostile.
 std::string ReportHtml(const RunReport& report, const ReportPictures& pictures);
 
 }  // namespace regrade

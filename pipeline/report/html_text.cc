@@ -1,4 +1,3 @@
-// Escaping and number formats of the report page.
 #include "pipeline/report/html_text.h"
 
 #include <algorithm>
@@ -6,31 +5,12 @@
 #include <cstdint>
 #include <cstdio>
 
+#include "pipeline/files/text.h"
+
 namespace regrade {
 namespace {
 
-struct CodePoint {
-  uint32_t value = 0;
-  size_t bytes = 0;  // 0: what stands here is not UTF-8
-};
-
-CodePoint DecodeUtf8(std::string_view text) {
-  const auto byte = [&](size_t i) { return static_cast<uint8_t>(text[i]); };
-  const uint8_t first = byte(0);
-  if (first < 0x80) return {first, 1};
-  const size_t bytes = first >= 0xF0 ? 4 : first >= 0xE0 ? 3 : 2;
-  if (first < 0xC2 || first > 0xF4 || text.size() < bytes) return {};
-  uint32_t value = first & (0xFF >> (bytes + 1));
-  for (size_t i = 1; i < bytes; ++i) {
-    if ((byte(i) & 0xC0) != 0x80) return {};
-    value = value << 6 | (byte(i) & 0x3F);
-  }
-  const bool overlong = (bytes == 3 && value < 0x800) || (bytes == 4 && value < 0x10000);
-  if (overlong || value > 0x10FFFF || (value >= 0xD800 && value <= 0xDFFF)) return {};
-  return {value, bytes};
-}
-
-// Characters that would let a name look like another one.
+// Characters that let a name look like another one.
 bool HidesOrReorders(uint32_t c) {
   return (c >= 0x80 && c < 0xA0) || c == 0xAD || (c >= 0x200B && c <= 0x200F) ||
          (c >= 0x2028 && c <= 0x202E) || (c >= 0x2060 && c <= 0x2069) || c == 0xFEFF;
@@ -42,7 +22,7 @@ std::string EscapeHtml(std::string_view text) {
   std::string out;
   char spelled[16];
   while (!text.empty()) {
-    const CodePoint c = DecodeUtf8(text);
+    const CodePoint c = FirstCodePoint(text);
     const size_t bytes = std::max<size_t>(c.bytes, 1);
     if (c.bytes == 0 || (c.value < 0x20 && c.value != '\n') || c.value == 0x7F) {
       std::snprintf(spelled, sizeof(spelled), "\\x%02x", static_cast<uint8_t>(text[0]));
@@ -115,20 +95,16 @@ std::string FixedNumber(double value, int decimals) {
   return out;
 }
 
+std::string GroupedNumber(int64_t value) {
+  std::string digits = std::to_string(value);
+  const size_t first = value < 0 ? 1 : 0;
+  for (size_t at = digits.size(); at > first + 3;) digits.insert(at -= 3, ",");
+  return digits;
+}
+
 std::string Duration(double seconds) {
   if (seconds < 9.95) return FixedNumber(seconds, 1) + " s";
-  const auto whole = static_cast<int64_t>(std::llround(std::min(seconds, 1e15)));
-  char text[64];
-  if (whole < 60) {
-    std::snprintf(text, sizeof(text), "%lld s", static_cast<long long>(whole));
-  } else if (whole < 3600) {
-    std::snprintf(text, sizeof(text), "%lld min %02lld s", static_cast<long long>(whole / 60),
-                  static_cast<long long>(whole % 60));
-  } else {
-    std::snprintf(text, sizeof(text), "%lld h %02lld min", static_cast<long long>(whole / 3600),
-                  static_cast<long long>(whole % 3600 / 60));
-  }
-  return text;
+  return DurationText(seconds);
 }
 
 }  // namespace regrade

@@ -1,12 +1,9 @@
-// The look of the report page: its style sheet and the few lines of script that it can do
-// without.
+// The style sheet and the script of the report page, embedded by CMake.
 #pragma once
 
 namespace regrade {
 
-extern const char kReportCss[];
-extern const char kReportScript[];
-// Draws every plot of the page by Chart.js, which must be there.
-extern const char kReportPlotScript[];
+extern const char kReportCss[];     // page.css
+extern const char kReportScript[];  // page.js
 
 }  // namespace regrade

@@ -22,7 +22,7 @@ std::string StatusHtml(PhotoState status) {
   return "<span class=" + text + ">" + text + "</span>";
 }
 
-// Photos that there is something to say about, one a line.
+// A photo that is not used, or has a remark.
 std::string RemarkRow(const PhotoStatus& photo, const ReportPicture* thumbnail) {
   return "<tr><td>" + ThumbnailHtml(thumbnail) + "<td class=file>" + EscapeHtml(photo.file) +
          "<td>" + StatusHtml(photo.status) + "<td class=w>" + EscapeHtml(photo.why) + "</tr>";
@@ -51,11 +51,11 @@ std::string PhotosHtml(const RunReport& report, const ReportPictures& pictures) 
                      CameraMapHtml(pictures.cameras);
   if (!remarks.empty())
     html +=
-        "<div class=scroll><table><thead><tr><th><th>photo<th>verdict<th>why</tr></thead>"
+        "<div class=scroll><table><thead><tr><th><th>photo<th>status<th>reason</tr></thead>"
         "<tbody>" +
         remarks + "</tbody></table></div>";
   if (used.empty() && names.empty()) return html;
-  html += "<details open><summary>photos used without remark</summary>";
+  html += "<details open><summary>photos used</summary>";
   if (!used.empty()) html += "<div class=thumbs>" + used + "</div>";
   if (!names.empty())
     html += "<p class=note>" + std::string(used.empty() ? "" : "and ") + names + "</p>";

@@ -1,5 +1,5 @@
-// The photos' part of the report page: what became of each, with a thumbnail, and where they
-// were taken.
+// The photos' section of the report page: the status of each, thumbnails, and a map of the
+// cameras.
 #pragma once
 
 #include <string>

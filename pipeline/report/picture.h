@@ -1,4 +1,4 @@
-// Pictures that a page carries inside itself.
+// Encoded pictures embedded in a page.
 #pragma once
 
 #include <optional>
@@ -6,7 +6,6 @@
 
 namespace regrade {
 
-// An encoded picture, carried inside the page.
 struct ReportPicture {
   std::string bytes;  // of a whole JPEG or PNG file
   int width = 0, height = 0;

@@ -2,37 +2,36 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
-#include "pipeline/files/json_file.h"
 #include "pipeline/report/html_text.h"
 
 namespace regrade {
 namespace {
 
-constexpr double kWidth = 560, kHeight = 230;
-constexpr double kLeft = 40, kRight = 12, kTop = 8, kBottom = 34;
+constexpr double kWidth = 560, kHeight = 246;
+constexpr double kLeft = 40, kRight = 12, kTop = 24, kBottom = 34;
 constexpr int kColours = 4;
-constexpr int kTicks = 5;  // wanted on an axis of even steps
+constexpr int kTicks = 5;          // aimed at on a linear axis
+constexpr size_t kMostTips = 200;  // points of a line with a number to hover over
 
-// One axis: what it spans, and where values lie on the drawing.
+// One axis: the range of its values, and their positions in the drawing.
 struct Axis {
   double low = INFINITY, high = -INFINITY;
   bool log = false;
-  double from = 0, to = 0;  // on the drawing
+  double from = 0, to = 0;  // in the drawing
 
-  bool Takes(double value) const { return std::isfinite(value) && (!log || value > 0); }
-  void See(double value) {
+  bool Accepts(double value) const { return std::isfinite(value) && (!log || value > 0); }
+  void Include(double value) {
     low = std::min(low, value);
     high = std::max(high, value);
   }
-  double Share(double value) const {
+  double Fraction(double value) const {
     return log ? std::log(value / low) / std::log(high / low) : (value - low) / (high - low);
   }
-  double Place(double value) const { return from + Share(value) * (to - from); }
+  double Position(double value) const { return from + Fraction(value) * (to - from); }
 };
 
-// 1, 2 or 5 times a power of ten, so that about kTicks of them make the span.
+// 1, 2 or 5 times a power of ten; about kTicks of them make the span.
 double EvenStep(double span) {
   const double raw = span / kTicks, power = std::pow(10, std::floor(std::log10(raw)));
   for (const double step : {1.0, 2.0, 5.0})
@@ -56,7 +55,7 @@ std::vector<double> TicksOf(const Axis& axis) {
   return ticks;
 }
 
-// As few decimals as tell the ticks apart.
+// With the fewest decimals that distinguish the ticks.
 std::string TickText(double value, const std::vector<double>& ticks) {
   double step = std::abs(value);
   for (size_t i = 1; i < ticks.size(); ++i) step = std::min(step, ticks[i] - ticks[i - 1]);
@@ -66,7 +65,7 @@ std::string TickText(double value, const std::vector<double>& ticks) {
   return FixedNumber(value, decimals);
 }
 
-// A little room, and whole steps on even axes, so that lines do not lie on the frame.
+// Adds a margin, and whole steps on linear axes, so that lines do not touch the frame.
 void Widen(Axis* axis) {
   if (axis->log) {
     const double room = std::pow(axis->high / axis->low, 0.05) * 1.02;
@@ -85,7 +84,7 @@ std::string Line(double x1, double y1, double x2, double y2) {
          " x2=" + FixedNumber(x2, 1) + " y2=" + FixedNumber(y2, 1) + " />";
 }
 
-std::string Word(double x, double y, const char* anchor, const std::string& text) {
+std::string Label(double x, double y, const char* anchor, const std::string& text) {
   return "<text x=" + FixedNumber(x, 1) + " y=" + FixedNumber(y, 1) + " text-anchor=" + anchor +
          ">" + EscapeHtml(text) + "</text>";
 }
@@ -94,79 +93,46 @@ std::string AxesSvg(const Axis& x, const Axis& y, const Plot& plot) {
   std::string svg;
   const std::vector<double> rows = TicksOf(y), columns = TicksOf(x);
   for (const double value : rows)
-    svg += Line(kLeft, y.Place(value), kWidth - kRight, y.Place(value)) +
-           Word(kLeft - 6, y.Place(value) + 4, "end", TickText(value, rows));
+    svg += Line(kLeft, y.Position(value), kWidth - kRight, y.Position(value)) +
+           Label(kLeft - 6, y.Position(value) + 4, "end", TickText(value, rows));
   for (const double value : columns)
-    svg += Word(x.Place(value), kHeight - kBottom + 14, "middle", TickText(value, columns));
-  return svg + Word(kWidth - kRight, kHeight - 4, "end", plot.x);
+    svg += Label(x.Position(value), kHeight - kBottom + 14, "middle", TickText(value, columns));
+  return svg + Label(kWidth - kRight, kHeight - 4, "end", plot.x) +
+         Label(0, 11, "start", plot.y);
 }
 
 std::string SeriesSvg(const PlotSeries& series, const Axis& x, const Axis& y) {
   const std::string colour = std::to_string(series.colour % kColours);
-  std::string svg, places;
+  std::string svg, positions, tips;
   const auto finish = [&] {
-    if (!places.empty())
-      svg += "<polyline class=k" + colour + " points=\"" + places + "\" style=\"fill:none\"/>";
-    places.clear();
+    if (!positions.empty())
+      svg +=
+          "<polyline class=k" + colour + " points=\"" + positions + "\" style=\"fill:none\"/>";
+    positions.clear();
   };
   for (const PlotPoint& point : series.points) {
-    if (!point.y || !y.Takes(*point.y) || !x.Takes(point.x)) {
+    if (!point.y || !y.Accepts(*point.y) || !x.Accepts(point.x)) {
       finish();
       continue;
     }
-    const std::string px = FixedNumber(x.Place(point.x), 1),
-                      py = FixedNumber(y.Place(*point.y), 1);
-    if (series.dots)
-      svg += "<circle class=k" + colour + " cx=" + px + " cy=" + py + " r=4><title>" +
-             EscapeHtml(point.label) + "</title></circle>";
-    else
-      places += px + "," + py + " ";
+    const std::string px = FixedNumber(x.Position(point.x), 1),
+                      py = FixedNumber(y.Position(*point.y), 1);
+    const auto circle = [&](const char* classes, const char* radius, const std::string& tip) {
+      return std::string("<circle class=") + classes + " cx=" + px + " cy=" + py +
+             " r=" + radius + "><title>" + tip + "</title></circle>";
+    };
+    if (series.dots) {
+      svg += circle(("k" + colour).c_str(), "4", EscapeHtml(point.label));
+      continue;
+    }
+    positions += px + "," + py + " ";
+    if (!series.name.empty() && series.points.size() <= kMostTips)
+      tips += circle("tip", "5",
+                     EscapeHtml(series.name) + ", " + FixedNumber(point.x, 0) + ": " +
+                         FixedNumber(*point.y, 2));
   }
   finish();
-  return svg;
-}
-
-// JSON for a <script>: nothing that could end it, or mean anything to HTML.
-std::string ScriptJson(const JsonValue& value) {
-  std::string text;
-  for (const char c : DumpJson(value, -1)) {
-    if (c == '<' || c == '>' || c == '&' || c == '\'') {
-      char spelled[8];
-      std::snprintf(spelled, sizeof spelled, "\\u%04x", static_cast<unsigned>(c));
-      text += spelled;
-    } else {
-      text += c;
-    }
-  }
-  return text;
-}
-
-JsonValue DataOf(const Plot& plot) {
-  JsonValue data = JsonValue::Object{{"x", plot.x},
-                                     {"y", plot.y},
-                                     {"log_x", plot.log_x},
-                                     {"log_y", plot.log_y},
-                                     {"series", JsonValue::Array{}}};
-  for (const PlotSeries& series : plot.series) {
-    JsonValue::Array points, labels;
-    for (const PlotPoint& point : series.points) {
-      const bool drawn = point.y && std::isfinite(*point.y) && std::isfinite(point.x);
-      points.push_back(
-          JsonValue::Array{std::isfinite(point.x) ? JsonValue(point.x) : JsonValue(),
-                           drawn ? JsonValue(*point.y) : JsonValue()});
-      labels.push_back(point.label);
-    }
-    const bool labelled =
-        std::any_of(series.points.begin(), series.points.end(),
-                    [](const PlotPoint& point) { return !point.label.empty(); });
-    JsonValue entry = JsonValue::Object{{"name", series.name},
-                                        {"colour", series.colour % kColours},
-                                        {"dots", series.dots},
-                                        {"points", std::move(points)}};
-    if (labelled) entry["labels"] = std::move(labels);
-    data["series"].Append(std::move(entry));
-  }
-  return data;
+  return svg + tips;
 }
 
 }  // namespace
@@ -177,9 +143,9 @@ std::string PlotHtml(const Plot& plot) {
   int drawn = 0;
   for (const PlotSeries& series : plot.series)
     for (const PlotPoint& point : series.points) {
-      if (!point.y || !x.Takes(point.x) || !y.Takes(*point.y)) continue;
-      x.See(point.x);
-      y.See(*point.y);
+      if (!point.y || !x.Accepts(point.x) || !y.Accepts(*point.y)) continue;
+      x.Include(point.x);
+      y.Include(*point.y);
       ++drawn;
     }
   if (drawn < 2) return "";
@@ -193,11 +159,11 @@ std::string PlotHtml(const Plot& plot) {
   std::string legend;
   for (const PlotSeries& series : plot.series) {
     svg += SeriesSvg(series, x, y);
-    legend += "<span><i class=k" + std::to_string(series.colour % kColours) + "></i>" +
-              EscapeHtml(series.name) + "</span>";
+    if (!series.name.empty())
+      legend += "<span><i class=k" + std::to_string(series.colour % kColours) + "></i>" +
+                EscapeHtml(series.name) + "</span>";
   }
-  return "<figure class=plot>" + svg + "</svg><div class=legend>" + legend +
-         "</div><script type=\"application/json\">" + ScriptJson(DataOf(plot)) + "</script>" +
+  return "<figure class=plot>" + svg + "</svg><div class=legend>" + legend + "</div>" +
          (plot.note.empty() ? "" : "<p class=note>" + plot.note + "</p>") + "</figure>";
 }
 

@@ -1,4 +1,4 @@
-// From stage records to the report's structs, and the evaluation as a record keeps it.
+// Reads the metrics of stage records into the report's structs.
 #pragma once
 
 #include <vector>
@@ -10,17 +10,14 @@
 
 namespace regrade {
 
-// The figures of stage "evaluate":
-// {"consistency": [...], "consistency_pairs": [...], "fidelity": [...]}.
-JsonValue EvaluationRecord(const ConsistencyReport& consistency,
-                           const std::vector<FidelityRow>& fidelity,
-                           const std::vector<HeatMapFile>& heat_maps = {});
+EvaluationMetrics MetricsOf(const ConsistencyReport& consistency,
+                            const std::vector<FidelityRow>& fidelity,
+                            const std::vector<HeatMapFile>& heat_maps = {});
 
-// The two tables of such a record, and nothing else.
-RunReport ReportOfEvaluation(const JsonValue& metrics);
-
-// Everything that the finished stages of a folder have measured. Options, command and times of
-// this start are for the caller to add.
+// Everything that the finished stages of a folder have measured. The caller adds options,
+// command and times of this start.
+//
+// Throws Error(kInput), which names the record and the key, where a metric is missing.
 RunReport ReportFromRecords(const Workspace& workspace);
 
 }  // namespace regrade

@@ -9,26 +9,16 @@
 #include "kernels/image/resize.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/images/image_file.h"
+#include "pipeline/report/sequence_names.h"
 
 namespace regrade {
 namespace {
 
 constexpr int kJpegQuality = 85, kThumbnailQuality = 70;
-constexpr int kThumbnailSide = 112;  // pixels, the longer one
+constexpr int kThumbnailSide = 112;  // pixels, longer side
 
 ReportPicture Encoded(const Image& image, int quality) {
   return {EncodeJpeg(image, quality), image.width, image.height};
-}
-
-// A page is worth having without one of its pictures.
-std::optional<Image> ImageAt(const std::string& path) {
-  if (!std::filesystem::exists(path)) return std::nullopt;
-  try {
-    Image image = ReadImage(path);
-    if (image.channels == 3) return image;
-  } catch (const std::exception&) {  // none leaves a parallel loop
-  }
-  return std::nullopt;
 }
 
 std::optional<ReportPicture> ThumbnailAt(const std::string& path) {
@@ -42,7 +32,7 @@ std::optional<ReportPicture> ThumbnailAt(const std::string& path) {
   return Encoded(Resize(*image, side(image->width), side(image->height)), kThumbnailQuality);
 }
 
-// The staged picture of each photo, by the user's name of it.
+// Paths of the staged photos, by the user's file names.
 std::map<std::string, std::string> StagedPictures(const Workspace& workspace) {
   std::map<std::string, std::string> paths;
   const JsonValue index = ReadJsonFile(workspace.Path("poses/photos.json"));
@@ -54,6 +44,16 @@ std::map<std::string, std::string> StagedPictures(const Workspace& workspace) {
 
 }  // namespace
 
+std::optional<Image> ImageAt(const std::string& path) {
+  if (!std::filesystem::exists(path)) return std::nullopt;
+  try {
+    Image image = ReadImage(path);
+    if (image.channels == 3) return image;
+  } catch (const std::exception&) {  // the page does without; none leaves a parallel loop
+  }
+  return std::nullopt;
+}
+
 std::optional<ReportPicture> PictureAt(const std::string& path) {
   const std::optional<Image> image = ImageAt(path);
   if (!image) return std::nullopt;
@@ -61,14 +61,15 @@ std::optional<ReportPicture> PictureAt(const std::string& path) {
 }
 
 std::vector<ReportHeatMap> HeatMapPictures(const Workspace& workspace,
-                                           const RunReport& report) {
+                                           const EvaluationMetrics& metrics) {
   std::vector<ReportHeatMap> maps;
-  for (const ConsistencyMetrics& row : report.consistency) {
+  for (const ConsistencyMetrics& row : metrics.consistency) {
     if (row.heat_map.empty()) continue;
     const auto picture = PictureAt(workspace.Path(row.heat_map));
     if (!picture) continue;
-    maps.push_back({row.sequence + ", frames " + std::to_string(row.heat_map_from) + " and " +
-                        std::to_string(row.heat_map_from + row.gap),
+    const int from = row.heat_map_from.value_or(0);
+    maps.push_back({SequenceLabel(row.sequence) + ", frames " + std::to_string(from) + " and " +
+                        std::to_string(from + row.gap),
                     *picture});
   }
   return maps;
@@ -84,14 +85,14 @@ std::vector<std::optional<ReportPicture>> Thumbnails(const Workspace& workspace,
     const PhotoStatus& photo = capture.statuses[static_cast<size_t>(i)];
     const auto path = staged.find(photo.file);
     if (path == staged.end()) continue;
-    // Evenly: as many as are due by now.
+    // Evenly spaced.
     const bool due = count <= kMostThumbnails ||
                      taken < (i + 1) * static_cast<int64_t>(kMostThumbnails) / count;
     if (photo.status == PhotoState::kUsed && !due) continue;
     taken += photo.status == PhotoState::kUsed;
     wanted[static_cast<size_t>(i)] = path->second;
   }
-  // Reading whole photos is what takes the time.
+  // Decoding photos takes most of the time.
   std::vector<std::optional<ReportPicture>> thumbnails(wanted.size());
 #pragma omp parallel for schedule(dynamic)
   for (int i = 0; i < count; ++i)

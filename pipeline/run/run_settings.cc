@@ -56,7 +56,7 @@ void ApplyPreset(const std::string& preset, RunSettings* settings) {
     settings->fit.rate_sh = 1e-2f;
     settings->fit.rate_sh_end = 4e-4f;
     settings->fit.tv_density = settings->fit.tv_sh = 5e-3f;
-    settings->fit.tv_share = 0.01f;
+    settings->fit.tv_fraction = 0.01f;
     settings->fit.prune_weight = 1.28f;
     settings->fit.initial_density = 0.1f;
     // Final rates are those of svox2's schedule of 250000 steps after 102400.

@@ -1,5 +1,5 @@
-// Stage "evaluate": temporal consistency of the rendered sequences, and beside it how much of
-// the style they kept.
+// Stage "evaluate": temporal consistency of the rendered sequences and their fidelity to the 2D
+// method.
 #include <filesystem>
 #include <optional>
 
@@ -21,19 +21,20 @@
 #include "pipeline/stages/linear_map_baseline.h"
 #include "pipeline/stages/make_stylizer.h"
 #include "pipeline/stages/stages.h"
+#include "pipeline/workspace/metrics_json.h"
 #include "pipeline/workspace/output_names.h"
 
 namespace regrade {
 namespace {
 
-// Pictures `folder`/00000.png, ..., of the given views.
+// The pictures `folder`/00000.png, ... of the given views.
 FrameSource FramesOf(const std::string& folder, const std::vector<int>& views) {
   return {static_cast<int>(views.size()), [folder, views](int i) {
             return ReadImage(folder + "/" + FrameName(views[static_cast<size_t>(i)]));
           }};
 }
 
-// Depth at each camera, rendered when it is asked for.
+// Depth at each camera, rendered on demand.
 GeometrySource GeometryOf(const RadianceField& field, const std::vector<Camera>& cameras) {
   const auto grid = std::make_shared<const FastGrid>(MakeFastGrid(field));
   return [grid, cameras, step = field.step](int i) -> FrameGeometry {
@@ -52,8 +53,8 @@ std::string TooSmallForFlow(const Camera& camera, const ConsistencyOptions& opti
          " px a side";
 }
 
-// The sequences of one set of frames compared, and heat maps of their worst pairs. The first
-// sequence is the unstyled one; `camera` is that of all frames; without `geometry` motion is
+// Compares the sequences of one set of frames and writes heat maps of their worst pairs. The
+// first sequence is the unstyled one; all frames have `camera`; without `geometry` motion is
 // estimated.
 ConsistencyReport Compare(const Workspace& workspace,
                           const std::vector<NamedFrameSource>& sequences, const Camera& camera,
@@ -65,15 +66,16 @@ ConsistencyReport Compare(const Workspace& workspace,
     return UndefinedConsistency(reference.count, sequences, options, why);
   ConsistencyReport report =
       EvaluateConsistency(reference, sequences, options, progress, geometry);
-  const std::vector<HeatMapFile> maps = WriteHeatMaps(
-      workspace,
-      geometry ? KnownMotion(geometry) : EstimatedMotion(reference, options.mode, options.flow),
-      sequences, options.gaps, report);
+  const std::vector<HeatMapFile> maps =
+      WriteHeatMaps(workspace,
+                    geometry ? GeometricMotion(geometry)
+                             : EstimatedMotion(reference, options.mode, options.flow),
+                    sequences, options.gaps, report);
   heat_maps->insert(heat_maps->end(), maps.begin(), maps.end());
   return report;
 }
 
-// Seconds on two cores at 480 pixels, roughly: what makes the stage's time left come out right.
+// Rough seconds on two cores at 480 pixels, for the estimate of the remaining time.
 constexpr double kPairSeconds = 0.085, kFrameSeconds = 0.07, kLinearMapSeconds = 0.23;
 
 double PairWeight(const RunSettings& settings, int frames) {
@@ -87,8 +89,8 @@ bool HasFilm(const RunSettings& settings) {
   return settings.render.path.path != "views" && settings.consistency.mode != "geometry";
 }
 
-// The film's frames, with flow and masks from its own unstyled ones. Its geometry is not on
-// disk, so "geometry" leaves it out.
+// Evaluates the film's frames, with flow and masks from its own unstyled ones. Mode "geometry"
+// leaves the film out: its geometry is not on disk.
 void AddFilm(RunContext* context, const Image& style, const Camera& camera,
              ProgressParts* parts, ConsistencyReport* report,
              std::vector<FidelityRow>* fidelity, std::vector<HeatMapFile>* heat_maps) {
@@ -143,7 +145,7 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   if (film > 0) weight += PairWeight(settings, film) + 3 * kFrameSeconds * film;
   ProgressParts parts(progress, weight);
 
-  // A method that only knows pictures of photos made nothing of our renders.
+  // A method that styles photos only has no pictures of rendered frames.
   const bool renders_styled = std::filesystem::exists(workspace.Path("frames/views_2d"));
   std::vector<NamedFrameSource> sequences;
   for (const char* name : {"source", "views_2d", "styled"}) {
@@ -160,8 +162,8 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
               settings.consistency,
               parts.Next(PairWeight(settings, static_cast<int>(all.size()))), &heat_maps);
 
-  // Fidelity is measured on the views that the style was learned from, against what the 2D
-  // method made of the renders, or else of the photos.
+  // Fidelity is measured on the training views of the style, against the 2D method applied to
+  // the rendered frames, or else to the photos.
   const Image style = ReadStylePicture(settings.style.picture, nullptr);
   const FrameSource of_photos{static_cast<int>(training_views.size()), [&](int k) {
                                 const int i = training_views[static_cast<size_t>(k)];
@@ -187,25 +189,23 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   std::vector<Camera> training_cameras;
   for (const int i : training_views)
     training_cameras.push_back(cameras[static_cast<size_t>(i)]);
-  // One map for the whole scene is no yardstick of an object's style.
-  std::optional<double> linear_map;
-  if (!settings.object.On())
-    linear_map = LinearMapPsnr(stored.field, training_cameras, frames("source", training_views),
-                               targets.views_2d, targets.transmittance,
-                               parts.Next(n * kLinearMapSeconds));
-
-  if (!same_camera) context->console->Info(ComparisonNote(compared[0]));
+  EvaluateReport report;
+  report.flow = settings.consistency.flow;
+  report.mask = settings.consistency.mode;
+  if (!same_camera) report.comparison_note = ComparisonNote(compared[0]);
+  report.psnr_to_2d_photos_db = Metric(to_photos.psnr_to_2d_db);
+  report.linear_map_psnr_to_2d_db =
+      settings.object.On()
+          ? Metric::Undefined("one map of the whole scene does not compare with an object's")
+          : Metric(LinearMapPsnr(stored.field, training_cameras,
+                                 frames("source", training_views), targets.views_2d,
+                                 targets.transmittance, parts.Next(n * kLinearMapSeconds)));
+  if (!same_camera) context->console->Info(report.comparison_note);
   context->console->Lines(FormatTables(consistency, fidelity));
   StageOutcome outcome;
   outcome.outputs = {kHeatMapFolder};
-  outcome.metrics = EvaluationRecord(consistency, fidelity, heat_maps);
-  outcome.metrics["flow"] = settings.consistency.flow;
-  outcome.metrics["mask"] = settings.consistency.mode;
-  if (!same_camera) outcome.metrics["comparison_note"] = ComparisonNote(compared[0]);
-  outcome.metrics["psnr_to_2d_photos_db"] =
-      to_photos.psnr_to_2d_db ? JsonValue(*to_photos.psnr_to_2d_db) : JsonValue();
-  outcome.metrics["linear_map_psnr_to_2d_db"] =
-      linear_map ? JsonValue(*linear_map) : JsonValue();
+  PutMetrics(MetricsOf(consistency, fidelity, heat_maps), &outcome.metrics);
+  PutMetrics(report, &outcome.metrics);
   return outcome;
 }
 

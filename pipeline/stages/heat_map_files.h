@@ -1,11 +1,11 @@
-// Pictures of the worst pairs, written beside an evaluation's figures.
+// Writes heat maps of the pairs with the largest errors.
 #pragma once
 
 #include <string>
 #include <vector>
 
 #include "evaluate/consistency.h"
-#include "pipeline/report/data.h"
+#include "pipeline/report/evaluation_metrics.h"
 #include "pipeline/workspace/workspace.h"
 
 namespace regrade {
@@ -16,10 +16,10 @@ inline constexpr char kHeatMapFolder[] = "heatmaps";
 void BeginHeatMaps(const Workspace& workspace);
 
 // Writes heatmaps/NAME_gap1_00012.png for the pair with the largest error of each row, see
-// ErrorHeatMap; rows whose pairs are all perfect or undefined have none. Flow and masks of
-// these pairs are computed once more by `motion` (the evaluation keeps none of them).
+// ErrorHeatMap; rows whose pairs are all perfect or undefined have none. `motion` computes flow
+// and masks of these pairs again (the evaluation does not keep them).
 //
-// Errors: as EvaluateConsistency, and kResources from the disk.
+// Errors: as EvaluateConsistency, and kResources for a full disk.
 std::vector<HeatMapFile> WriteHeatMaps(const Workspace& workspace,
                                        const PairMotionFunction& motion,
                                        const std::vector<NamedFrameSource>& sequences,

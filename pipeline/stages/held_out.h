@@ -1,4 +1,4 @@
-// How well a field shows photos that it has not seen.
+// Measures a field on photos that were held out of the fit.
 #pragma once
 
 #include <optional>
@@ -12,15 +12,14 @@
 namespace regrade {
 
 struct HeldOutMetrics {
-  std::vector<std::string> files;  // the photos kept for measuring, the user's names
-  std::vector<double> psnr, ssim;  // of those that have one
+  std::vector<std::string> files;  // the held-out photos, the user's names
+  std::vector<double> psnr, ssim;  // of those where it is defined
   std::optional<double> MeanPsnr() const;
   std::optional<double> MeanSsim() const;
 };
 
-// Over the held-out photos as they were taken: a render is given its photo's gain, which is
-// known from the colours of points that the photo shares with others. What is masked does not
-// count.
+// Compares renders with the held-out photos. A render gets its photo's gain, which is estimated
+// from the colours of points shared with other photos. Masked pixels do not count.
 HeldOutMetrics MeasureHeldOut(const WorkingViews& views, const StoredField& stored,
                               Backend backend);
 

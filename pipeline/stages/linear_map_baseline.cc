@@ -26,10 +26,10 @@ double SquaredError(const ColorMap& map, const FrameSource& source, const FrameS
     const Image from = source.frame(i), to = target.frame(i);
     double frame_sum = 0;
     for (int64_t p = 0; p < from.num_pixels(); ++p) {
-      const Vec3d mapped = map(ColorAt(from, p)), wanted = ColorAt(to, p);
-      if (!AllFinite(wanted)) continue;
+      const Vec3d mapped = map(ColorAt(from, p)), target_color = ColorAt(to, p);
+      if (!AllFinite(target_color)) continue;
       for (int c = 0; c < 3; ++c) {
-        const double d = std::clamp(mapped[c], 0.0, 1.0) - wanted[c];
+        const double d = std::clamp(mapped[c], 0.0, 1.0) - target_color[c];
         frame_sum += d * d;
       }
     }
@@ -68,9 +68,7 @@ std::optional<double> LinearMapPsnr(const RadianceField& field,
           : least_squares;
   RadianceField mapped = field;
   mapped.appearance = ApplyColorMap(field.appearance, better);
-  const Vec3d background = better(field.background.Cast<double>());
-  for (int c = 0; c < 3; ++c)
-    mapped.background[c] = static_cast<float>(std::clamp(background[c], 0.0, 1.0));
+  mapped.background = MapBackground(better, field.background);
   const FastGrid grid = MakeFastGrid(mapped);
   const FrameSource rendered{source.count, [&](int i) {
                                return RenderView(grid, cameras[static_cast<size_t>(i)],

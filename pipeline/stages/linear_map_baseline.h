@@ -1,5 +1,4 @@
-// What a linear map of colours alone would have given: the yardstick that the network must not
-// fall short of.
+// The PSNR that a linear colour map alone reaches: the baseline that the network must beat.
 #pragma once
 
 #include <optional>
@@ -12,10 +11,10 @@
 
 namespace regrade {
 
-// PSNR, as psnr_to_2d_db is taken, of the field under the better of two maps carried into its
+// PSNR, measured as psnr_to_2d_db, of the field under the better of two maps carried into its
 // coefficients (see EQ(sh-color-map)): the Monge-Kantorovich map between the pooled colours of
 // `source` and `views_2d`, and the least-squares map between their pixels. The better one is
-// found on the frames, and rendered at `cameras`. Pixels of `views_2d` that are not finite do
+// chosen on the frames, and rendered at `cameras`. Pixels of `views_2d` that are not finite do
 // not count.
 std::optional<double> LinearMapPsnr(const RadianceField& field,
                                     const std::vector<Camera>& cameras,

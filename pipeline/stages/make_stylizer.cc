@@ -9,9 +9,9 @@
 #include "kernels/base/error.h"
 #include "pipeline/files/folder_listing.h"
 #include "pipeline/images/image_file.h"
-#include "pipeline/program/crash_probe.h"
 #include "pipeline/stages/command_stylizer.h"
 #include "pipeline/stages/folder_stylizer.h"
+#include "pipeline/stages/network_probe.h"
 #include "pipeline/workspace/output_names.h"
 #include "pipeline/workspace/stage_record.h"
 #include "stylize/image/color_transfer.h"
@@ -116,9 +116,7 @@ void ProbeMethod(StyleOptions* options) {
   const fs::path absolute = fs::absolute(method.argument, error);
   if (!error) options->method = method.kind + ":" + absolute.lexically_normal().string();
   if (method.kind != "onnx") return;
-  const auto make = [&] { MakeOnnxStylizer(method.argument, 64, Image(64, 64)); };
-  RunCrashProbe(make, method.argument);
-  make();  // a rehearsal keeps plain errors to itself
+  ProbeStyleNetwork(method.argument);
 }
 
 std::vector<int> StyledViews(const Workspace& workspace, const WorkingViews& working_views) {

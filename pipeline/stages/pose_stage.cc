@@ -12,9 +12,11 @@
 #include "pipeline/capture/pose_tracks.h"
 #include "pipeline/capture/scene_profile.h"
 #include "pipeline/files/folder_listing.h"
+#include "pipeline/report/stage_metrics.h"
 #include "pipeline/run/plan.h"
 #include "pipeline/run/run_context.h"
 #include "pipeline/stages/stages.h"
+#include "pipeline/workspace/metrics_json.h"
 
 namespace regrade {
 namespace {
@@ -89,6 +91,7 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
       PhotosForColmap(ingest.photos, workspace.Path(kColmapPhotos));
 
   StageOutcome outcome;
+  PoseStageReport metrics;
   Capture capture;
   PoseOptions options = settings.pose;
   options.threads = settings.program.threads;
@@ -100,7 +103,7 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
     const int masks = StagePhotoMasks(folder, ingest.photos, options.mask_folder);
     context->console->Info(std::to_string(masks) +
                            " masks: their black parts are neither matched nor fitted");
-    outcome.metrics["photo_masks"] = masks;
+    metrics.photo_masks = masks;
   }
   if (source.kind == CaptureKind::kPhotos) {
     PoseReport report;
@@ -108,14 +111,14 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
                               workspace.Path(".regrade/work/pose"), sparse_folder,
                               parts.Next(seconds.poses), &report);
     for (const std::string& note : report.notes) context->console->Info(note);
-    outcome.metrics["colmap"] = report.colmap_version;
-    outcome.metrics["recipe"] = report.recipe;
-    outcome.metrics["lens"] = report.lens;
+    metrics.colmap = report.colmap_version;
+    metrics.strategy = report.strategy;
+    metrics.lens = report.lens;
   } else {
     std::vector<std::string> notes;
     capture = ImportPoses(source, ingest.photos, ingest.statuses, sparse_folder, &notes);
     for (const std::string& note : notes) context->console->Info(note);
-    outcome.metrics["recipe"] = "given poses: " + source.poses;
+    metrics.given_poses = source.poses;
   }
   PoseTracks tracks;
   if (source.kind != CaptureKind::kPhotos)
@@ -133,10 +136,12 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
   if (!profile.metrics.IsNull()) outcome.metrics["pose_refinement"] = profile.metrics;
   WriteCaptureIndex(workspace.Path("poses"), capture, ingest.photos);
   std::filesystem::remove_all(workspace.Path(kColmapPhotos));
-  outcome.metrics["registered"] = static_cast<int64_t>(capture.views.size());
-  outcome.metrics["points"] = static_cast<int64_t>(capture.points.size());
-  outcome.metrics["reprojection_px"] = capture.reprojection_px;
-  outcome.metrics["models_found"] = capture.models_found;
+  metrics.registered = static_cast<int>(capture.views.size());
+  metrics.points = static_cast<int64_t>(capture.points.size());
+  metrics.reprojection_px = capture.points.empty() ? Metric::Undefined("there are no points")
+                                                   : Metric(capture.reprojection_px);
+  metrics.models_found = capture.models_found;
+  PutMetrics(metrics, &outcome.metrics);
   outcome.outputs = {"poses"};
   context->console->Info("registered " + std::to_string(capture.views.size()) + " of " +
                          std::to_string(ingest.photos.size()) + " photos, " +

@@ -15,10 +15,12 @@
 #include "pipeline/program/cpu_time.h"
 #include "pipeline/program/device_choice.h"
 #include "pipeline/program/memory.h"
+#include "pipeline/report/stage_metrics.h"
 #include "pipeline/run/plan.h"
 #include "pipeline/run/run_context.h"
 #include "pipeline/stages/held_out.h"
 #include "pipeline/stages/stages.h"
+#include "pipeline/workspace/metrics_json.h"
 #include "reconstruct/fit/choose_degree.h"
 #include "reconstruct/fit/fit_field.h"
 
@@ -33,13 +35,11 @@ constexpr int kReproducibleShards = 4;  // sums grouped independently of the thr
 // To a thousandth, for charts.
 double Rounded(double value) { return std::round(value * 1000) / 1000; }
 
-void RecordHeldOut(const HeldOutMetrics& held_out, JsonValue* metrics) {
-  const auto number = [](const std::optional<double>& value) {
-    return value ? JsonValue(*value) : JsonValue();
-  };
-  (*metrics)["heldout"] = JsonValue::Array(held_out.files.begin(), held_out.files.end());
-  (*metrics)["psnr_heldout_db"] = number(held_out.MeanPsnr());
-  (*metrics)["ssim_heldout"] = number(held_out.MeanSsim());
+void SetHeldOut(const HeldOutMetrics& held_out, ReconstructReport* metrics) {
+  const char* why = held_out.files.empty() ? "no photo was held out" : "";
+  metrics->heldout = held_out.files;
+  metrics->psnr_heldout_db = Metric(held_out.MeanPsnr(), why);
+  metrics->ssim_heldout = Metric(held_out.MeanSsim(), why);
 }
 
 int Finest(const FitOptions& options) {
@@ -182,25 +182,25 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   WriteGains(workspace.Path("poses"), capture, profile.exposure, profile.gains);
   if (!profile.gains.of_view.empty())
     outcome.outputs.push_back(std::string("poses/") + kExposureFile);
-  if (!resume && view_dependence.value.value) {  // for predictions
-    outcome.metrics["trial_seconds"] = trial_seconds;
-    outcome.metrics["trial_cpu_seconds"] = trial_cpu_seconds;
+  ReconstructReport metrics;
+  if (!resume && view_dependence.value.value) {  // a prediction needs them apart
+    metrics.trial_seconds = trial_seconds;
+    metrics.trial_cpu_seconds = trial_cpu_seconds;
   }
-  outcome.metrics["device"] = DeviceName(backend);
-  outcome.metrics["finest_grid"] = Finest(options);
-  outcome.metrics["rays"] = fit.rays;
-  outcome.metrics["sh_degree"] = options.sh_degree;
-  outcome.metrics["voxels"] = fit.field.geometry->num_voxels();
-  if (scene.box.spheres)
-    outcome.metrics["background_texels"] = fit.field.geometry->spheres.num_texels();
-  outcome.metrics["psnr_train_db"] = fit.psnr_train_db;
-  outcome.metrics["rejected_voxels"] = fit.rejected_voxels;
-  for (const FitCurvePoint& point : fit.curve) {
-    outcome.metrics["curve_steps"].Append(point.step);
-    outcome.metrics["curve_psnr_db"].Append(Rounded(point.psnr_train_db));
-  }
-  RecordHeldOut(MeasureHeldOut(views, ReadFieldFile(workspace.Path("field.npz")), backend),
-                &outcome.metrics);
+  metrics.device = DeviceName(backend);
+  metrics.finest_grid = Finest(options);
+  metrics.rays = fit.rays;
+  metrics.sh_degree = options.sh_degree;
+  metrics.voxels = fit.field.geometry->num_voxels();
+  if (scene.box.spheres) metrics.background_texels = fit.field.geometry->spheres.num_texels();
+  metrics.psnr_train_db = fit.psnr_train_db;
+  metrics.rejected_voxels = fit.rejected_voxels;
+  for (const FitCurvePoint& point : fit.curve)
+    if (std::isfinite(point.psnr_train_db))
+      metrics.psnr_at_steps.emplace_back(point.step, Rounded(point.psnr_train_db));
+  SetHeldOut(MeasureHeldOut(views, ReadFieldFile(workspace.Path("field.npz")), backend),
+             &metrics);
+  PutMetrics(metrics, &outcome.metrics);
   return outcome;
 }
 

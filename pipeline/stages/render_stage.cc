@@ -1,6 +1,7 @@
-// Stage "render": frames of the field before and after, and what the 2D method makes of the
-// former, at the photos' places and along the film's way; and films. Where the photos differ in
-// size or lens, the frames at their places are rendered once more with one common camera.
+// Stage "render": frames of the field before and after styling, and of the 2D method applied to
+// the former, at the photos' positions and along the film's camera path; and the films. Where
+// photos differ in size or lens, the frames at their positions are rendered again with one
+// common camera.
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -16,26 +17,28 @@
 #include "pipeline/images/image_file.h"
 #include "pipeline/program/device_choice.h"
 #include "pipeline/program/ordered_worker.h"
+#include "pipeline/report/stage_metrics.h"
 #include "pipeline/run/run_context.h"
 #include "pipeline/stages/make_stylizer.h"
 #include "pipeline/stages/object_edit.h"
 #include "pipeline/stages/stages.h"
 #include "pipeline/stages/videos.h"
+#include "pipeline/workspace/metrics_json.h"
 #include "pipeline/workspace/output_names.h"
 
 namespace regrade {
 namespace {
 
-// The two fields and the 2D method that frames are made with.
+// The two fields and the 2D method.
 struct FrameRenderers {
   FieldRenderer source, styled;
   std::unique_ptr<ViewStylizer> stylizer;
   std::unique_ptr<CoverageRenderer> object;  // null where the whole scene is styled
-  std::vector<Image> coverage;               // of the frame at hand
-  double styled_seconds = 0;                 // spent in rendering the restyled field
+  std::vector<Image> coverage;               // of the current frame
+  double styled_seconds = 0;                 // of rendering the restyled field
 };
 
-// A camera's frames as they are written.
+// The frames of one camera.
 struct Frame {
   Image source, styled, transmittance;
   std::optional<Image> views_2d;  // of methods that can style a render
@@ -45,7 +48,7 @@ struct Frame {
 struct FrameSet {
   std::string prefix;
   std::vector<Camera> cameras;
-  bool of_photos = false;  // camera i stands where photo i was taken
+  bool of_photos = false;  // camera i is at photo i's position
   bool of_film = false;
 };
 
@@ -64,32 +67,32 @@ const FrameSet* CommonSet(const std::vector<FrameSet>& sets) {
   return common == sets.end() ? nullptr : &*common;
 }
 
-// The sets before there is a field: poses in the capture's world, sizes as they will be.
+// The sets before there is a field: poses in the capture's world, final sizes.
 std::vector<FrameSet> PlannedSets(const RunContext& context) {
   return FrameSetsOf(context.Views().Cameras(), context.settings.render.path);
 }
 
-// "24 frames at the photos' places, 24 there of one camera (480x360), 60 of the film, about 53
-// MB of pictures".
+// "24 frames at the photos' positions, 24 there with one camera (480x360 px), 60 of the film,
+// about 53 MB of pictures".
 std::string PlanOf(const std::vector<FrameSet>& sets) {
-  constexpr double kBytesAPixel = 5;  // of three PNGs in colour and one in grey, measured
+  constexpr double kBytesPerPixel = 5;  // of three PNGs in colour and one in grey, measured
   std::string text;
   double pixels = 0;
   for (const FrameSet& set : sets) {
     text += std::to_string(set.cameras.size());
     if (set.prefix == kCommonPrefix)
-      text += " there of one camera (" + std::to_string(set.cameras[0].width) + "x" +
+      text += " there with one camera (" + std::to_string(set.cameras[0].width) + "x" +
               std::to_string(set.cameras[0].height) + " px), ";
     else
-      text += set.of_photos ? " frames at the photos' places, " : " of the film, ";
+      text += set.of_photos ? " frames at the photos' positions, " : " of the film, ";
     for (const Camera& camera : set.cameras)
       pixels += static_cast<double>(camera.width) * camera.height;
   }
-  return text + "about " + std::to_string(std::lround(pixels * kBytesAPixel * 1e-6)) +
+  return text + "about " + std::to_string(std::lround(pixels * kBytesPerPixel * 1e-6)) +
          " MB of pictures";
 }
 
-// As a camera of that gain shows the scene.
+// The scene as a camera of that gain records it.
 Frame RenderFrame(RunContext* context, FrameRenderers* renderers, const Camera& camera,
                   const PhotoGain& gain, int index) {
   Frame frame;
@@ -107,8 +110,8 @@ Frame RenderFrame(RunContext* context, FrameRenderers* renderers, const Camera& 
   return frame;
 }
 
-// Writes files and films while the next frames are rendered, on a thread for each half of the
-// pictures and one for the films, which a GPU's frames would wait for.
+// Writes files and films while the next frames are rendered: one thread for each half of the
+// pictures and one for the films, so that a GPU does not wait for them.
 class FrameWriter {
  public:
   FrameWriter(const Workspace& workspace, RunFilms* films)
@@ -123,8 +126,8 @@ class FrameWriter {
     };
     before_.Do([=] {
       write("source", frame->source);
-      // Fidelity, which is not measured on the common camera's frames, ignores pixels where it
-      // is high.
+      // Fidelity, which is not measured on the common camera's frames, ignores pixels of high
+      // transmittance.
       if (prefix != kCommonPrefix) write("transmittance", frame->transmittance);
     });
     after_.Do([=] {
@@ -197,13 +200,13 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   }
   films.Finish(&outcome.outputs);
   if (!films.why_none().empty()) context->console->Warn("no film: " + films.why_none());
-  outcome.metrics["device"] = DeviceName(backend);
-  outcome.metrics["frames"] = total;
-  outcome.metrics["path_frames"] = film.of_photos ? 0 : static_cast<int>(film.cameras.size());
-  outcome.metrics["film_width"] = film.cameras[0].width;
-  outcome.metrics["film_height"] = film.cameras[0].height;
-  outcome.metrics["frames_per_second"] =
-      renderers.styled_seconds > 0 ? JsonValue(total / renderers.styled_seconds) : JsonValue();
+  RenderReport report;
+  report.device = DeviceName(backend);
+  report.frames = total;
+  report.path_frames = film.of_photos ? 0 : static_cast<int>(film.cameras.size());
+  report.film = {film.cameras[0].width, film.cameras[0].height};
+  if (renderers.styled_seconds > 0) report.frames_per_second = total / renderers.styled_seconds;
+  PutMetrics(report, &outcome.metrics);
   return outcome;
 }
 

@@ -1,4 +1,4 @@
-// Stage "report": report.json with every number, and one page to look at.
+// Stage "report": report.json with every number, and report.html.
 #include <algorithm>
 #include <filesystem>
 
@@ -11,7 +11,6 @@
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/program/memory.h"
-#include "pipeline/report/chart_library.h"
 #include "pipeline/report/cost_rows.h"
 #include "pipeline/report/html.h"
 #include "pipeline/report/json.h"
@@ -21,6 +20,7 @@
 #include "pipeline/run/run_context.h"
 #include "pipeline/run/run_file.h"
 #include "pipeline/stages/stages.h"
+#include "pipeline/stages/videos.h"
 #include "pipeline/workspace/output_names.h"
 
 namespace regrade {
@@ -42,15 +42,46 @@ PhotosReport PhotosOf(const Capture& capture) {
   return photos;
 }
 
-// Of what made the results: this program's parts, and the programs that it started.
-std::vector<OptionValue> VersionsOf(const Workspace& workspace) {
+// Of this program, its compiler and instruction set, and the programs that it started.
+std::vector<OptionValue> VersionsOf(const StagesReport& stages) {
   std::vector<OptionValue> versions = {{"regrade", REGRADE_VERSION},
                                        {"compiler", __VERSION__},
                                        {"instructions", FastRays().name}};
-  if (const auto record = workspace.Find("pose"))
-    if (const JsonValue* colmap = record->metrics.Find("colmap"))
-      versions.push_back({"COLMAP", colmap->AsString()});
+  if (stages.pose && !stages.pose->colmap.empty())
+    versions.push_back({"COLMAP", stages.pose->colmap});
   return versions;
+}
+
+ReportPicture Encoded(const Image& image) {
+  return {EncodeJpeg(image, kJpegQuality), image.width, image.height};
+}
+
+// The films in the folder; the middle frame is the poster, of the wipe half before styling.
+std::vector<ReportFilm> FilmsOf(const Workspace& workspace, const RunReport& report,
+                                int views) {
+  const int path_frames = report.stages.render ? report.stages.render->path_frames : 0;
+  const bool common = std::filesystem::exists(
+      workspace.Path(std::string("frames/") + kCommonPrefix + "styled"));
+  const std::string prefix = path_frames > 0 ? kPathPrefix : common ? kCommonPrefix : "";
+  const std::string middle = FrameName((path_frames > 0 ? path_frames : views) / 2);
+  const auto frame = [&](const char* sequence) {
+    return ImageAt(workspace.Path("frames/" + prefix + sequence + "/" + middle));
+  };
+  std::vector<ReportFilm> films;
+  const auto add = [&](const char* file, const char* caption,
+                       const std::optional<Image>& poster) {
+    if (!std::filesystem::exists(workspace.Path(file))) return;
+    films.push_back({file, caption, {}});
+    if (poster) films.back().poster = Encoded(*poster);
+  };
+  const std::optional<Image> source = frame("source"), styled = frame("styled");
+  std::optional<Image> wipe;
+  if (source && styled && source->SameSize(*styled))
+    wipe = Wipe(*source, *styled, styled->width / 2);
+  add(kStyledFilm, "the styled scene", styled);
+  add(kWipeFilm, "before and after, with a moving border", wipe);
+  add(kViews2dFilm, "the 2D method, frame by frame", frame("views_2d"));
+  return films;
 }
 
 ReportPictures PicturesOf(const RunContext& context, const RunReport& report) {
@@ -60,7 +91,7 @@ ReportPictures PicturesOf(const RunContext& context, const RunReport& report) {
   ReportPictures pictures;
   pictures.title = std::filesystem::path(workspace.folder()).filename().string();
   const Image style = ReadStylePicture(context.settings.style.picture, nullptr);
-  pictures.style = ReportPicture{EncodeJpeg(style, kJpegQuality), style.width, style.height};
+  pictures.style = Encoded(style);
   const int count = static_cast<int>(capture.views.size());
   const int shown = std::min(count, kPagePictures);
   for (int k = 0; k < shown; ++k) {
@@ -70,26 +101,16 @@ ReportPictures PicturesOf(const RunContext& context, const RunReport& report) {
     const Image picture = as_taken.Photo(i);
     ReportView view;
     view.name = name.substr(0, 5) + ", " + photo.file;
-    view.photo =
-        ReportPicture{EncodeJpeg(picture, kJpegQuality), picture.width, picture.height};
+    view.photo = Encoded(picture);
     view.source = PictureAt(workspace.Path("frames/source/" + name));
     view.views_2d = PictureAt(workspace.Path("frames/views_2d/" + name));
     view.styled = PictureAt(workspace.Path("frames/styled/" + name));
     pictures.views.push_back(std::move(view));
   }
-  if (count > 0) {
-    const std::string middle = FrameName(count / 2);
-    const std::string common = std::string("frames/") + kCommonPrefix;
-    pictures.film_poster = PictureAt(workspace.Path(common + "styled/" + middle));
-    pictures.film_poster_2d = PictureAt(workspace.Path(common + "views_2d/" + middle));
-  }
-  pictures.has_styled_film = std::filesystem::exists(workspace.Path("styled.mp4"));
-  pictures.has_wipe_film = std::filesystem::exists(workspace.Path("source_vs_styled.mp4"));
-  pictures.has_views_2d_film = std::filesystem::exists(workspace.Path("views_2d.mp4"));
-  pictures.heat_maps = HeatMapPictures(workspace, report);
+  pictures.films = FilmsOf(workspace, report, count);
+  pictures.heat_maps = HeatMapPictures(workspace, report.evaluation);
   pictures.thumbnails = Thumbnails(workspace, capture);
   pictures.cameras = MapCameras(capture, context.settings.run.holdout);
-  pictures.chart_library = ReadChartLibrary();
   pictures.run_json = DumpJson(RunFileJson("run", context), 1);
   return pictures;
 }
@@ -101,12 +122,9 @@ StageOutcome WriteReport(RunContext* context) {
   RunReport report = ReportFromRecords(workspace);
   report.version = REGRADE_VERSION;
   report.command = EquivalentCommand(*context);
-  report.versions = VersionsOf(workspace);
+  report.versions = VersionsOf(report.stages);
   report.preset = settings.run.preset;
-  report.device = "cpu";
-  if (const auto record = workspace.Find("reconstruct"))
-    if (const JsonValue* device = record->metrics.Find("device"))
-      report.device = device->AsString();
+  if (report.stages.reconstruct) report.device = report.stages.reconstruct->device;
   report.seed = settings.run.seed;
   for (const char* stage : kStageNames)
     if (const auto record = workspace.Find(stage)) report.seconds += record->seconds;
@@ -119,8 +137,9 @@ StageOutcome WriteReport(RunContext* context) {
           report.effects.push_back(effect);
   try {
     report.costs = ReadCostTable(workspace.Path(kCostTable));
-  } catch (const Error& error) {  // a report is worth having without it
-    context->console->Warn(std::string(kCostTable) + " is left out: " + error.what_failed());
+  } catch (const Error& error) {
+    context->console->Warn("the report does without " + std::string(kCostTable) + ": " +
+                           error.what_failed());
   }
   const JsonValue options = context->options.Values();
   for (const auto& [name, value] : options.AsObject())
@@ -141,7 +160,7 @@ Stage ReportStage(RunContext* context) {
   stage.inputs = JsonValue::Object();
   for (const char* earlier : kStageNames)
     if (std::string(earlier) != "report") stage.inputs[earlier] = context->ResultOf(earlier);
-  // Stage "evaluate" leaves figures alone.
+  // The results of stage "evaluate" are its metrics.
   if (const auto record = context->workspace->Find("evaluate"))
     stage.inputs["evaluate"] = record->metrics;
   const std::string costs = context->workspace->Path(kCostTable);

@@ -6,7 +6,7 @@
 
 namespace regrade {
 
-// Each makes the description of its stage, work included; nothing is done yet.
+// Each describes its stage, including its work; nothing is executed yet.
 Stage PoseStage(RunContext* context);
 Stage ReconstructStage(RunContext* context);
 Stage Style2dStage(RunContext* context);

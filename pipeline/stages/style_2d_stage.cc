@@ -9,10 +9,12 @@
 #include "pipeline/fields/field_renderer.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/program/device_choice.h"
+#include "pipeline/report/stage_metrics.h"
 #include "pipeline/run/run_context.h"
 #include "pipeline/stages/make_stylizer.h"
 #include "pipeline/stages/object_edit.h"
 #include "pipeline/stages/stages.h"
+#include "pipeline/workspace/metrics_json.h"
 #include "pipeline/workspace/output_names.h"
 
 namespace regrade {
@@ -75,9 +77,7 @@ StageOutcome StyleViews(RunContext* context, const ProgressFunction& progress) {
   }
   StageOutcome outcome;
   outcome.outputs = {"views_2d"};
-  outcome.metrics["method"] = stylizer->Name();
-  outcome.metrics["views"] = styled;
-  for (const std::string& notice : notices) outcome.metrics["notices"].Append(notice);
+  PutMetrics(Style2dReport{{}, stylizer->Name(), styled, notices}, &outcome.metrics);
   return outcome;
 }
 

@@ -1,28 +1,42 @@
-// What the style's network learns from: views, what the 2D method made of them, and the colour
-// map between the two.
+// Training targets of a style, from photos, what a 2D method made of them, and masks.
 #pragma once
 
+#include <functional>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "pipeline/fields/field_file.h"
-#include "pipeline/run/run_context.h"
 #include "pipeline/stages/object_edit.h"
-#include "stylize/training/train_network.h"
+#include "stylize/training/training_targets.h"
 
 namespace regrade {
 
-struct StyleTargets {
-  std::vector<Image> targets, masks;  // that `views` point to
-  std::vector<StyledTrainingView> views;
-  SceneColorMap scene_map;
-  std::vector<std::string> notices;  // of the map
+// Pictures of one view, all of the size of its camera.
+struct StyleView {
+  int index = 0;  // in the capture
+  Camera camera;
+  std::string name;               // for messages
+  Image kept;                     // see ReadWorkingMask; empty: all pixels
+  std::function<Image()> photo;   // [H, W, 3]
+  std::function<Image()> target;  // [H, W, 3]: what the 2D method made of the photo
 };
 
-// Of the views `indices` (see StyledViews), without what --photo-masks masks. With `object`,
-// the lessons are of the pixels where a view's own mask and what all masks agreed on both say
-// that the object is seen, and views without such a pixel are left out; there may be none left.
-StyleTargets ReadStyleTargets(RunContext* context, const WorkingViews& views,
-                              const StoredField& stored, const std::vector<int>& indices,
-                              const ObjectMasks* object, const ObjectWeights* shares);
+// Without what `kept` masks. With `object`, targets cover pixels inside both the view's mask
+// and the consensus mask, which `weights` render. Views without such a pixel are skipped,
+// before their pictures are read; none may be left.
+class StyleTargets {
+ public:
+  StyleTargets(const RadianceField& field, const ObjectMasks* object,
+               const ObjectWeights* weights);
+
+  bool Add(const StyleView& view);  // false: skipped
+  const TrainingTargets& targets() const { return targets_; }
+
+ private:
+  const ObjectMasks* object_;
+  std::optional<CoverageRenderer> consensus_;
+  TrainingTargets targets_;
+};
 
 }  // namespace regrade

@@ -8,14 +8,15 @@
 namespace regrade {
 namespace {
 
-constexpr const char *kFilm = "styled.mp4", *kWipe = "source_vs_styled.mp4",
-                     *kFrameByFrame = "views_2d.mp4";
-
-// Left of the border the one, right of it the other; the border crosses the frame and returns.
-Image Wiped(const Image& left, const Image& right, int frame, int frames) {
+// The border crosses the frame and returns.
+int WipeBorder(int width, int frame, int frames) {
   const double phase = 2.0 * frame / std::max(1, frames - 1);
-  const double share = phase <= 1 ? phase : 2 - phase;
-  const int border = static_cast<int>(share * left.width);
+  return static_cast<int>((phase <= 1 ? phase : 2 - phase) * width);
+}
+
+}  // namespace
+
+Image Wipe(const Image& left, const Image& right, int border) {
   Image mixed = left;
   for (int y = 0; y < left.height; ++y)
     for (int x = border; x < left.width; ++x)
@@ -23,12 +24,10 @@ Image Wiped(const Image& left, const Image& right, int frame, int frames) {
   return mixed;
 }
 
-}  // namespace
-
 RunFilms::RunFilms(const Workspace& workspace, double frames_per_second, int frames)
     : workspace_(workspace), frames_per_second_(frames_per_second), frames_(frames) {
-  // Of a method that could style renders; what comes now may not.
-  std::filesystem::remove(workspace.Path(kFrameByFrame));
+  // An earlier film: this run's 2D method may not be able to style rendered frames.
+  std::filesystem::remove(workspace.Path(kViews2dFilm));
 }
 
 void RunFilms::Begin(const Image& first, bool with_views_2d) {
@@ -38,9 +37,9 @@ void RunFilms::Begin(const Image& first, bool with_views_2d) {
     writer->emplace(workspace_.Path(name), width_, height_, frames_per_second_);
   };
   try {
-    open(kFilm, &film_);
-    open(kWipe, &wipe_);
-    if (with_views_2d) open(kFrameByFrame, &frame_by_frame_);
+    open(kStyledFilm, &film_);
+    open(kWipeFilm, &wipe_);
+    if (with_views_2d) open(kViews2dFilm, &frame_by_frame_);
   } catch (const Error& error) {
     if (error.code() != ExitCode::kExternalProgram) throw;
     GiveUp(error.what_failed());
@@ -54,7 +53,7 @@ void RunFilms::Add(int index, const Image& source, const Image& styled, const Im
   REGRADE_CHECK_EQ(styled.height, height_);
   try {
     film_->Add(styled);
-    wipe_->Add(Wiped(source, styled, index, frames_));
+    wipe_->Add(Wipe(source, styled, WipeBorder(width_, index, frames_)));
     if (frame_by_frame_ && views_2d != nullptr) frame_by_frame_->Add(*views_2d);
   } catch (const Error& error) {
     if (error.code() != ExitCode::kExternalProgram) throw;
@@ -73,10 +72,10 @@ void RunFilms::Finish(std::vector<std::string>* outputs) {
   if (!film_) return;
   film_->Finish();
   wipe_->Finish();
-  outputs->insert(outputs->end(), {kFilm, kWipe});
+  outputs->insert(outputs->end(), {kStyledFilm, kWipeFilm});
   if (!frame_by_frame_) return;
   frame_by_frame_->Finish();
-  outputs->push_back(kFrameByFrame);
+  outputs->push_back(kViews2dFilm);
 }
 
 }  // namespace regrade

@@ -1,5 +1,5 @@
-// The films of a run, written as their frames come: the restyled scene, the wipe between before
-// and after, and the 2D method frame by frame.
+// Writes the films of a run while frames are rendered: the restyled scene, a wipe between
+// before and after, and the 2D method frame by frame.
 #pragma once
 
 #include <optional>
@@ -12,18 +12,24 @@
 
 namespace regrade {
 
+inline constexpr char kStyledFilm[] = "styled.mp4", kWipeFilm[] = "source_vs_styled.mp4",
+                      kViews2dFilm[] = "views_2d.mp4";
+
+// `left` up to column `border`, and `right` from there on.
+Image Wipe(const Image& left, const Image& right, int border);
+
 class RunFilms {
  public:
-  // `frames`: how many will come, at most one for each camera of the film's way.
+  // `frames`: their number, at most one for each camera of the film's path.
   RunFilms(const Workspace& workspace, double frames_per_second, int frames);
 
-  // Frame `index` of each; `views_2d` may be null, for all frames or for none. A machine
-  // without H.264 makes no films: see why_none. All frames have one size.
+  // Frame `index` of each film; `views_2d` is null for all frames or for none. All frames have
+  // one size. Without an H.264 encoder there are no films: see why_none.
   void Add(int index, const Image& source, const Image& styled, const Image* views_2d);
-  // Puts the films in place and adds their names to `outputs`.
+  // Completes the films and adds their names to `outputs`.
   void Finish(std::vector<std::string>* outputs);
 
-  // Empty, or why there are no films, to be told to the user.
+  // Empty, or the reason why there are no films.
   const std::string& why_none() const { return why_none_; }
 
  private:

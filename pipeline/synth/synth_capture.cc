@@ -40,20 +40,20 @@ void ParseSize(const std::string& size, int* width, int* height) {
         *height >= kMinSide && *height <= kMaxSide)
       return;
   }
-  throw Error(ExitCode::kUsage, "\"" + size + "\" is not a size of pictures", "--size",
+  throw Error(ExitCode::kUsage, "\"" + size + "\" is not an image size", "--size",
               "write WIDTHxHEIGHT, each from 16 to 8192, e.g. 640x480");
 }
 
 JsonValue Vector(const Vec3d& v) { return JsonValue::Array{v.x, v.y, v.z}; }
 
-// The object that masks are of: the first ball.
+// The masked object: the first ball.
 int MaskedSolid(const SyntheticScene& scene) {
   for (size_t i = 0; i < scene.solids.size(); ++i)
     if (scene.solids[i].shape == Shape::kSphere) return static_cast<int>(i);
   return 0;
 }
 
-// What was asked for, and the parameters of what was simulated.
+// The options and the parameters of the effects.
 JsonValue DescribeCapture(const SynthOptions& options, const SynthEffects& effects,
                           const SyntheticScene& scene) {
   const auto off = [] { return JsonValue(JsonValue::Object{{"on", false}}); };
@@ -92,7 +92,7 @@ JsonValue DescribeCapture(const SynthOptions& options, const SynthEffects& effec
   if (effects.poses)
     of_effects["poses"] = JsonValue::Object{{"on", true},
                                             {"turn_degrees", kSynthPoseTurn},
-                                            {"step_share", kSynthPoseStep},
+                                            {"step_fraction", kSynthPoseStep},
                                             {"track_sigma_px", kSynthTrackSigma}};
   return JsonValue::Object{{"scene", options.scene},
                            {"seed", options.seed},
@@ -103,13 +103,13 @@ JsonValue DescribeCapture(const SynthOptions& options, const SynthEffects& effec
                            {"effects", of_effects}};
 }
 
-// A folder with photos is only written to if they are what the same options would write.
+// Creates the folders. Throws Error(kFolderInUse) if there are photos made with other options.
 void ClaimFolder(const fs::path& out, const JsonValue& description, bool with_masks) {
   const fs::path record = out / "truth" / "effects.json";
   std::error_code none;
   const bool has_photos = fs::exists(out / "images") && !fs::is_empty(out / "images", none);
   if (has_photos && !(fs::exists(record) && ReadJsonFile(record.string()) == description))
-    throw Error(ExitCode::kFolderInUse, "the folder holds photos of something else",
+    throw Error(ExitCode::kFolderInUse, "the folder contains other photos",
                 (out / "images").string(), "name another folder, or remove this one first");
   for (const char* folder :
        {"images", "truth/depth", "truth/flow", "truth/visible", "masks", "truth/masks"}) {
@@ -117,7 +117,7 @@ void ClaimFolder(const fs::path& out, const JsonValue& description, bool with_ma
     std::error_code error;
     fs::create_directories(out / folder, error);
     if (error)
-      throw Error(ExitCode::kResources, "cannot make a folder: " + error.message(),
+      throw Error(ExitCode::kResources, "cannot create a folder: " + error.message(),
                   (out / folder).string());
   }
   WriteJsonFile(record.string(), description);
@@ -157,7 +157,7 @@ void WriteSyntheticCapture(const std::string& out, const SynthOptions& options,
 
   const fs::path truth = fs::path(out) / "truth";
   std::vector<TransformsFrame> frames;
-  std::vector<Image> depths;  // of all views, where tracks are asked for
+  std::vector<Image> depths;  // of all views, with effect poses
   for (int i = 0; i < options.views; ++i) {
     SyntheticView view = RenderSyntheticView(scene, cameras[i], effects.highlights);
     if (effects.exposure) ApplyGain(SynthGain(options.seed, i, options.views), &view.color);
@@ -183,7 +183,7 @@ void WriteSyntheticCapture(const std::string& out, const SynthOptions& options,
   for (size_t i = 0; i < depths.size(); ++i)
     names.push_back(FrameName(static_cast<int>(i), ".png"));
   fs::create_directories(fs::path(out) / "sparse" / "0");
-  WriteColmapModel(ShakenModel(TracksOf(cameras, depths, names, options.seed), options.seed),
+  WriteColmapModel(PerturbedModel(TracksOf(cameras, depths, names, options.seed), options.seed),
                    (fs::path(out) / "sparse" / "0").string());
 }
 

@@ -5,6 +5,7 @@
 
 #include "kernels/base/error.h"
 #include "kernels/base/random.h"
+#include "kernels/base/random_streams.h"
 #include "kernels/scene/srgb.h"
 
 namespace regrade {
@@ -38,26 +39,27 @@ SynthEffects ParseSynthEffects(const std::string& list) {
     else if (name == "mixed-cameras")
       effects.mixed_cameras = true;
     else if (name == "motion-blur" || name == "occluders")
-      throw Error(ExitCode::kUsage, "the effect \"" + name + "\" is not in this version",
-                  "--effects", kHint);
+      throw Error(ExitCode::kUsage, "the effect \"" + name + "\" is not supported", "--effects",
+                  kHint);
     else
       throw Error(ExitCode::kUsage, "there is no effect \"" + name + "\"", "--effects", kHint);
   }
   if (effects.distortion + effects.barrel + effects.fisheye > 1)
-    throw Error(ExitCode::kUsage, "a camera has one lens", "--effects", kHint);
+    throw Error(ExitCode::kUsage, "only one lens is possible", "--effects", kHint);
   return effects;
 }
 
 double SynthGain(uint64_t seed, int index, int views) {
-  const double phase = RandomDouble(seed, 0x6a1, 0);
+  const double phase = RandomDouble(seed, kStreamSynthGainPhase, 0);
   const double swing = std::sin(2 * M_PI * (phase + 1.5 * index / views));
-  const double jump = 2 * RandomDouble(seed, 0x6a2, static_cast<uint64_t>(index)) - 1;
+  const double jump =
+      2 * RandomDouble(seed, kStreamSynthGainJump, static_cast<uint64_t>(index)) - 1;
   return 1 + kSynthGainRange * (0.75 * swing + 0.25 * jump);
 }
 
 MaskFault SynthMaskFault(int index) {
   constexpr MaskFault kFaults[] = {MaskFault::kNone,  MaskFault::kNone, MaskFault::kShifted,
-                                   MaskFault::kEmpty, MaskFault::kNone, MaskFault::kSwollen};
+                                   MaskFault::kEmpty, MaskFault::kNone, MaskFault::kEnlarged};
   return kFaults[index % 6];
 }
 
@@ -83,8 +85,8 @@ void ApplyNoise(uint64_t seed, uint64_t stream, double sigma, Image* color) {
   for (size_t i = 0; i < color->pixels.size(); ++i) {
     // Box and Muller 1958; 1 - u is in (0, 1].
     const double radius =
-        std::sqrt(-2 * std::log(1 - RandomDouble(seed ^ 0x5e4507, stream, 2 * i)));
-    const double angle = 2 * M_PI * RandomDouble(seed ^ 0x5e4507, stream, 2 * i + 1);
+        std::sqrt(-2 * std::log(1 - RandomDouble(seed ^ kRandomSynthNoise, stream, 2 * i)));
+    const double angle = 2 * M_PI * RandomDouble(seed ^ kRandomSynthNoise, stream, 2 * i + 1);
     color->pixels[i] = static_cast<float>(
         std::clamp(color->pixels[i] + sigma * radius * std::cos(angle), 0.0, 1.0));
   }

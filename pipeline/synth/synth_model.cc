@@ -4,17 +4,19 @@
 #include <cmath>
 
 #include "kernels/base/random.h"
+#include "kernels/base/random_streams.h"
 #include "pipeline/synth/synth_effects.h"
 
 namespace regrade {
 namespace {
 
-constexpr double kSameDepth = 0.01;  // of the depth: the same point, not what hides it
+constexpr double kSameDepth = 0.01;  // of the depth: a larger difference is an occluder
 
 // Box and Muller 1958; 1 - u is in (0, 1].
 double Normal(uint64_t seed, uint64_t stream, uint64_t counter) {
-  return std::sqrt(-2 * std::log(1 - RandomDouble(seed ^ 0x7a11, stream, 2 * counter))) *
-         std::cos(2 * M_PI * RandomDouble(seed ^ 0x7a11, stream, 2 * counter + 1));
+  return std::sqrt(-2 *
+                   std::log(1 - RandomDouble(seed ^ kRandomSynthModel, stream, 2 * counter))) *
+         std::cos(2 * M_PI * RandomDouble(seed ^ kRandomSynthModel, stream, 2 * counter + 1));
 }
 
 Vec3d Direction(uint64_t seed, uint64_t stream, uint64_t counter) {
@@ -22,17 +24,17 @@ Vec3d Direction(uint64_t seed, uint64_t stream, uint64_t counter) {
                           Normal(seed, stream + 2, counter)});
 }
 
-// About a unit axis, by Rodrigues' formula.
-Mat3d Turn(const Vec3d& axis, double angle) {
-  Mat3d turn;
+// Rotation about a unit axis (Rodrigues' formula).
+Mat3d RotationAbout(const Vec3d& axis, double angle) {
+  Mat3d rotation;
   for (int i = 0; i < 3; ++i) {
     Vec3d unit;
     unit[i] = 1;
     const Vec3d column = unit * std::cos(angle) + Cross(axis, unit) * std::sin(angle) +
                          axis * (Dot(axis, unit) * (1 - std::cos(angle)));
-    for (int j = 0; j < 3; ++j) turn(j, i) = column[j];
+    for (int j = 0; j < 3; ++j) rotation(j, i) = column[j];
   }
-  return turn;
+  return rotation;
 }
 
 ColmapLens LensOf(const Camera& camera) {
@@ -40,7 +42,7 @@ ColmapLens LensOf(const Camera& camera) {
   return camera.lens == LensModel::kOpenCv ? ColmapLens::kOpenCv : ColmapLens::kPinhole;
 }
 
-// The point's keypoints where it is seen; without two of them it is dropped.
+// Adds the point and its keypoints in the views that see it; omits points with fewer than two.
 void AddTrack(const std::vector<Camera>& cameras, const std::vector<Image>& depths,
               const Vec3d& position, uint64_t seed, ColmapModel* model) {
   ColmapPoint point{model->points.size() + 1, position, {128, 128, 128}, 0, {}};
@@ -88,7 +90,7 @@ ColmapModel TracksOf(const std::vector<Camera>& cameras, const std::vector<Image
   for (size_t v = 0; v < cameras.size(); ++v) {
     const Camera& camera = cameras[v];
     const int step = std::max(
-        1, static_cast<int>(std::sqrt(1.0 * camera.width * camera.height / kTracksAView)));
+        1, static_cast<int>(std::sqrt(1.0 * camera.width * camera.height / kTracksPerView)));
     for (int y = step / 2; y < camera.height; y += step)
       for (int x = step / 2; x < camera.width; x += step) {
         const double depth = *depths[v].at(x, y);
@@ -102,21 +104,22 @@ ColmapModel TracksOf(const std::vector<Camera>& cameras, const std::vector<Image
   return model;
 }
 
-ColmapModel ShakenModel(const ColmapModel& model, uint64_t seed) {
-  ColmapModel shaken = model;
-  double spread = 0;
+ColmapModel PerturbedModel(const ColmapModel& model, uint64_t seed) {
+  ColmapModel perturbed = model;
+  double extent = 0;
   for (const ColmapImage& a : model.images)
     for (const ColmapImage& b : model.images)
-      spread = std::max(spread, Norm(a.camera_from_world.Inverse().translation -
+      extent = std::max(extent, Norm(a.camera_from_world.Inverse().translation -
                                      b.camera_from_world.Inverse().translation));
-  for (ColmapImage& image : shaken.images) {
+  for (ColmapImage& image : perturbed.images) {
     const Vec3d center = image.camera_from_world.Inverse().translation +
-                         Direction(seed, 20, image.id) * (kSynthPoseStep * spread);
-    const Mat3d rotation = Turn(Direction(seed, 10, image.id), kSynthPoseTurn * M_PI / 180) *
-                           image.camera_from_world.rotation;
+                         Direction(seed, 20, image.id) * (kSynthPoseStep * extent);
+    const Mat3d rotation =
+        RotationAbout(Direction(seed, 10, image.id), kSynthPoseTurn * M_PI / 180) *
+        image.camera_from_world.rotation;
     image.camera_from_world = {rotation, -(rotation * center)};
   }
-  return shaken;
+  return perturbed;
 }
 
 }  // namespace regrade

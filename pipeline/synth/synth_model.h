@@ -1,5 +1,4 @@
-// A COLMAP model of a synthetic capture: tracks as features give them, and poses as people hand
-// them over.
+// A COLMAP model of a synthetic capture, with noisy tracks and pose errors.
 #pragma once
 
 #include <cstdint>
@@ -11,14 +10,15 @@
 
 namespace regrade {
 
-// The true cameras, some kTracksAView points on what each of them sees, and for each point the
-// keypoints of all views whose depth agrees, off by kSynthTrackSigma pixels each way.
-inline constexpr int kTracksAView = 150;
+// The true cameras, about kTracksPerView visible points for each, and the keypoints of each
+// point in all views whose depth agrees, with noise of kSynthTrackSigma pixels in each
+// coordinate.
+inline constexpr int kTracksPerView = 150;
 ColmapModel TracksOf(const std::vector<Camera>& cameras, const std::vector<Image>& depths,
                      const std::vector<std::string>& names, uint64_t seed);
 
-// The same with every camera turned by kSynthPoseTurn about an axis of its own and moved by
-// kSynthPoseStep in a direction of its own.
-ColmapModel ShakenModel(const ColmapModel& model, uint64_t seed);
+// The model with every camera rotated by kSynthPoseTurn about a random axis and moved by
+// kSynthPoseStep in a random direction.
+ColmapModel PerturbedModel(const ColmapModel& model, uint64_t seed);
 
 }  // namespace regrade

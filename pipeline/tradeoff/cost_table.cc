@@ -8,7 +8,7 @@
 namespace regrade {
 namespace {
 
-// Median, and half of what lies between the least and the most.
+// Median, and half of the range.
 struct Spread {
   double median = 0, spread = 0;
 };
@@ -20,7 +20,7 @@ Spread Of(std::vector<double> values) {
   return {median, 0.5 * (values.back() - values.front())};
 }
 
-// Larger is better, whatever the plane's unit.
+// Larger is better, for every benchmark.
 double Merit(const CostRow& row) {
   return BenchmarkOf(row.benchmark).more_is_better ? *row.accuracy.value : -*row.accuracy.value;
 }
@@ -44,7 +44,7 @@ std::string NameOf(const CostRow& row) {
   return row.parameter.empty() ? row.setting : row.parameter + " " + row.setting;
 }
 
-// Against the accurate end of the same parameter, which may be the base.
+// Relative to the accurate end of the same parameter, which may be the base.
 void FillErrors(const std::vector<Variant>& variants, std::vector<CostRow>* rows) {
   for (CostRow& row : *rows) {
     if (row.parameter.empty() || row.parameter == "preset") continue;
@@ -116,10 +116,10 @@ std::vector<CostRow> CostTable(const std::vector<Variant>& variants,
     row.cpu_spread = Of(cpu).spread;
     row.accuracy = Of(accuracy).median;
     row.accuracy_spread = Of(accuracy).spread;
-    row.error = Metric::Undefined("it is not a value of one parameter");
+    row.error = Metric::Undefined("not a value of a single parameter");
     rows.push_back(std::move(row));
   }
-  // Presets, measured last, stand with the other rows of their plane.
+  // Presets are measured last: groups them with the other rows of their benchmark.
   std::stable_sort(rows.begin(), rows.end(), [](const CostRow& a, const CostRow& b) {
     return &BenchmarkOf(a.benchmark) < &BenchmarkOf(b.benchmark);
   });
@@ -155,7 +155,8 @@ std::string CostTableText(const std::vector<CostRow>& rows) {
 
 std::string CostTableCsv(const std::vector<CostRow>& rows) {
   std::string text =
-      "plane,parameter,setting,repeats,seconds,seconds_spread,cpu_seconds,cpu_spread,accuracy,"
+      "benchmark,parameter,setting,repeats,seconds,seconds_spread,cpu_seconds,cpu_spread,"
+      "accuracy,"
       "accuracy_spread,unit,error,on_pareto_front,dominated_by\n";
   for (const CostRow& row : rows) {
     const auto number = [](const Metric& metric) {

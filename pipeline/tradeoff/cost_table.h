@@ -1,5 +1,5 @@
-// From measurements to a price list: medians, spreads, errors against the accurate end, and
-// which variants nothing beats.
+// Makes the cost table from measurements: medians, spreads, errors relative to the accurate
+// end, and the Pareto front of each benchmark.
 #pragma once
 
 #include <string>
@@ -10,17 +10,17 @@
 
 namespace regrade {
 
-// A row for each variant that was measured at least once, plane by plane in the variants'
-// order. `base` names the base ("preset draft"). See CostRow for what is in a row.
+// A row (see CostRow) for each variant that was measured at least once, grouped by benchmark,
+// in the variants' order. `base` names the base ("preset draft").
 //
-// A variant is on the front where no other of its plane is at least as accurate in no more CPU
-// time, and better in one of the two. It is dominated where the other one is better by more
-// than the spreads of both: with one repetition, or within the noise, nothing is.
+// A variant is on the Pareto front if no other of its benchmark is at least as accurate in no
+// more CPU time, and better in one of the two. It is dominated if another one is better by more
+// than the spreads of both; never with a single repetition.
 std::vector<CostRow> CostTable(const std::vector<Variant>& variants,
                                const std::vector<Measurement>& measurements,
                                const std::string& base);
 
-// The list as text for a terminal, and as CSV with a head.
+// The table as text for a terminal, and as CSV with a header.
 std::string CostTableText(const std::vector<CostRow>& rows);
 std::string CostTableCsv(const std::vector<CostRow>& rows);
 

@@ -21,23 +21,23 @@ DurationEstimate::DurationEstimate(const RunSettings& base,
 }
 
 void DurationEstimate::Add(const Measurement& m) {
-  // Planes of frames and pairs are measured a piece; their few seconds do not matter.
+  // These are seconds per frame or pair; the total is a few seconds and does not matter.
   if (m.benchmark == "render" || m.benchmark == "flow") return;
   last_[KeyOf(m.benchmark, m.parameter, m.value)] = m.seconds;
   if (!m.parameter.empty()) return;
-  Sum& sum = planes_[m.benchmark];
-  sum.took += m.seconds;
+  Sum& sum = benchmarks_[m.benchmark];
+  sum.measured += m.seconds;
   sum.rough += Rough({m.benchmark, "", ""});
 }
 
 double DurationEstimate::Seconds(const Variant& variant) const {
   const auto last = last_.find(KeyOf(variant.benchmark, variant.parameter, variant.value));
   if (last != last_.end()) return last->second;
-  const auto benchmark = planes_.find(variant.benchmark);
-  const double off = benchmark != planes_.end() && benchmark->second.rough > 0
-                         ? benchmark->second.took / benchmark->second.rough
-                         : 1;
-  return off * Rough(variant);
+  const auto benchmark = benchmarks_.find(variant.benchmark);
+  const double correction = benchmark != benchmarks_.end() && benchmark->second.rough > 0
+                                ? benchmark->second.measured / benchmark->second.rough
+                                : 1;
+  return correction * Rough(variant);
 }
 
 double DurationEstimate::Rough(const Variant& variant) const {

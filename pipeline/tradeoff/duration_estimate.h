@@ -1,5 +1,4 @@
-// How long a measurement will take: from rough rates at first, and from what has been measured
-// as soon as there is something.
+// Estimates the duration of measurements from rough rates, corrected by what has been measured.
 #pragma once
 
 #include <map>
@@ -19,13 +18,13 @@ class DurationEstimate {
 
  private:
   struct Sum {
-    double took = 0, rough = 0;
+    double measured = 0, rough = 0;
   };
   double Rough(const Variant& variant) const;
 
   RunSettings base_;
-  std::map<std::string, Sum> planes_;   // what rough rates are off by
-  std::map<std::string, double> last_;  // seconds of a variant when it was measured
+  std::map<std::string, Sum> benchmarks_;  // measured and estimated seconds of the base
+  std::map<std::string, double> last_;     // last measured seconds of each variant
 };
 
 }  // namespace regrade

@@ -7,6 +7,8 @@
 namespace regrade {
 namespace {
 
+constexpr int kSchema = 2;
+
 Measurement FromJson(const JsonValue& row) {
   Measurement measurement;
   measurement.benchmark = row.At("benchmark").AsString();
@@ -35,12 +37,16 @@ MeasurementStore::MeasurementStore(const std::string& path, const std::string& f
   if (!std::filesystem::is_regular_file(path)) return;
   try {
     const JsonValue file = ReadJsonFile(path);
+    if (const int64_t schema = file.At("schema").AsInt(); schema != kSchema)
+      throw Error(ExitCode::kInput, "it has schema " + std::to_string(schema) +
+                                        ", and this version reads schema " +
+                                        std::to_string(kSchema));
     if (file.At("fingerprint").AsString() != fingerprint) return;
     for (const JsonValue& row : file.At("measurements").AsArray())
       all_.push_back(FromJson(row));
   } catch (const Error& error) {
     throw Error(ExitCode::kInput, error.what_failed(), path,
-                "delete this file: what it held will be measured again");
+                "delete this file: its measurements will be repeated");
   }
 }
 
@@ -56,7 +62,7 @@ void MeasurementStore::Add(const Measurement& measurement) {
   all_.push_back(measurement);
   JsonValue::Array rows;
   for (const Measurement& m : all_) rows.push_back(ToJson(m));
-  WriteJsonFile(path_, JsonValue::Object{{"schema", 1},
+  WriteJsonFile(path_, JsonValue::Object{{"schema", kSchema},
                                          {"fingerprint", fingerprint_},
                                          {"measurements", std::move(rows)}});
 }

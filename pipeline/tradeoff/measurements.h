@@ -1,5 +1,4 @@
-// What has been measured, kept on disk measurement by measurement, so that an interruption
-// costs no more than the one in hand.
+// Stores measurements on disk one by one, so that an interruption loses only the current one.
 #pragma once
 
 #include <optional>
@@ -14,20 +13,21 @@ namespace regrade {
 struct Measurement {
   std::string benchmark, parameter, value;
   int repeat = 0;
-  double seconds = 0, cpu_seconds = 0;  // of what the plane says
-  double accuracy = 0;                  // in the plane's unit
-  // What the work was, for predictions: {"rays": ..., "voxels": ...}.
+  double seconds = 0, cpu_seconds = 0;  // see Benchmark::time_of
+  double accuracy = 0;                  // in the benchmark's unit
+  // Amount of work, for information: {"rays": ..., "voxels": ...}.
   JsonValue work = JsonValue::Object();
 };
 
 class MeasurementStore {
  public:
-  // Reads what is there. Measurements of another fingerprint (other photos, other base options,
-  // another program) are as good as none, and are dropped with the next one that is added.
+  // Reads the file at `path`, if any. Ignores measurements with another fingerprint (other
+  // photos, other base options, another program); the next Add drops them. Throws Error(kInput)
+  // for a damaged file or another schema.
   MeasurementStore(const std::string& path, const std::string& fingerprint);
 
   const Measurement* Find(const Variant& variant, int repeat) const;
-  // Durable when it returns.
+  // Durable on return.
   void Add(const Measurement& measurement);
   const std::vector<Measurement>& all() const { return all_; }
 

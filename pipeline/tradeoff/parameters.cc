@@ -27,19 +27,19 @@ std::string TextOf(const JsonValue& value) {
   return text;
 }
 
-// Options are floats: 1e-3 is 1e-3 whichever precision it has been through.
+// With a tolerance, because options are floats: 1e-3 differs between float and double.
 bool Same(const JsonValue& a, const JsonValue& b) {
   if (!a.IsNumber() || !b.IsNumber()) return a == b;
   return std::abs(a.AsDouble() - b.AsDouble()) <= 1e-6 * std::abs(b.AsDouble());
 }
 
-class List {
+class VariantList {
  public:
-  explicit List(const ParameterChoice& choice) : choice_(choice) {}
+  explicit VariantList(const ParameterChoice& choice) : choice_(choice) {}
 
   void AddBase(const std::string& benchmark) { variants_.push_back({benchmark, "", ""}); }
 
-  // From cheap to accurate; the base's own value is measured already.
+  // Adds values from cheap to accurate, except the base's `own`, which is measured as the base.
   void Add(const std::string& benchmark, const std::string& parameter, const JsonValue& own,
            const std::vector<JsonValue>& values, bool last_is_accurate = true) {
     names_.push_back(parameter);
@@ -61,8 +61,8 @@ class List {
         std::string known;
         for (const std::string& parameter : names_)
           known += (known.empty() ? "" : ", ") + parameter;
-        throw Error(ExitCode::kUsage, "'" + name + "' has no price here", "--parameters",
-                    "parameters: " + known);
+        throw Error(ExitCode::kUsage, "'" + name + "' is not a measured parameter",
+                    "--parameters", "parameters: " + known);
       }
     return std::move(variants_);
   }
@@ -73,7 +73,7 @@ class List {
   std::vector<std::string> names_;
 };
 
-void AddFitParameters(const RunSettings& base, List* list) {
+void AddFitParameters(const RunSettings& base, VariantList* list) {
   const FitOptions& fit = base.fit;
   const auto steps = [&](double factor) { return Numbers(Scaled(fit.steps, factor, 1)); };
   const auto grids = [&](double factor) {
@@ -85,21 +85,21 @@ void AddFitParameters(const RunSettings& base, List* list) {
   list->Add("fit", "fit-step-size", step, {2 * step, step, 0.5 * step});
   list->Add("fit", "fit-stop", stop, {1e-2, 1e-3, 1e-4, 1e-6});
   list->Add("fit", "sh-degree", fit.sh_degree, {0, 1, 2});
-  // No end of this one is the accurate one: errors are against the base.
+  // Neither end is the accurate one: errors are relative to the base.
   list->Add("fit", "fit-view-bound", fit.view_bound, {0.1, 0.2, 0.4, 1e6}, false);
-  // Sums in a grouping that does not depend on threads.
+  // 4: sums do not depend on the number of threads.
   list->Add("fit", "fit-shards", fit.shards, {0, 4});
 }
 
-void AddStyleParameters(const RunSettings& base, List* list) {
+void AddStyleParameters(const RunSettings& base, VariantList* list) {
   const TrainNetworkOptions& network = base.network;
   const auto steps = [&](double factor) {
     return JsonValue(std::max(1, static_cast<int>(std::lround(network.steps * factor))));
   };
   list->Add("style", "style-steps", network.steps, {steps(1 / 3.0), steps(1), steps(3)});
   list->Add("style", "style-patch", network.patch, {32, 8, 1});
-  list->Add("style", "style-min-weight", network.min_weight, {1e-2, 1e-3, 0.0});
-  list->Add("style", "style-view-weight", network.view_weight, {10.0, 1.0, 0.0});
+  list->Add("style", "style-min-weight", network.loss.min_weight, {1e-2, 1e-3, 0.0});
+  list->Add("style", "style-view-weight", network.loss.view_weight, {10.0, 1.0, 0.0});
   list->Add("style", "style-norm-steps", network.norm_steps, {1, 5, 20});
 }
 
@@ -108,7 +108,7 @@ void AddStyleParameters(const RunSettings& base, List* list) {
 const Benchmark& BenchmarkOf(const std::string& name) {
   for (const Benchmark& benchmark : kBenchmarks)
     if (name == benchmark.name) return benchmark;
-  throw Error(ExitCode::kInput, "'" + name + "' is no plane of prices");
+  throw Error(ExitCode::kInput, "'" + name + "' is not a benchmark");
 }
 
 JsonValue PresetOptions(const std::string& preset) {
@@ -118,7 +118,7 @@ JsonValue PresetOptions(const std::string& preset) {
 }
 
 std::vector<Variant> VariantsOf(const RunSettings& base, const ParameterChoice& choice) {
-  List list(choice);
+  VariantList list(choice);
   if (choice.poses) {
     list.AddBase("poses");
     const int size = base.pose.image_size;
@@ -131,7 +131,7 @@ std::vector<Variant> VariantsOf(const RunSettings& base, const ParameterChoice& 
     AddStyleParameters(base, &list);
   }
   list.AddBase("render");
-  // How rays are marched, not options of a run: films use the field's own step and 1e-4.
+  // Ray marching, which has no options in a run: films use the field's step and 1e-4.
   list.Add("render", "ray-stop", nullptr, {1e-2, 1e-3, 0.0});
   list.Add("render", "ray-step", nullptr, {2.0, 0.5});
   list.AddBase("flow");
@@ -140,7 +140,7 @@ std::vector<Variant> VariantsOf(const RunSettings& base, const ParameterChoice& 
   std::vector<Variant> variants = list.Take();
   for (const std::string& preset : choice.presets)
     variants.push_back({"fit", "preset", preset, PresetOptions(preset)});
-  // A plane whose parameters were not asked for needs no base.
+  // Removes the base of benchmarks without a chosen parameter.
   std::erase_if(variants, [&](const Variant& variant) {
     return variant.parameter.empty() &&
            std::none_of(variants.begin(), variants.end(), [&](const Variant& other) {

@@ -1,5 +1,4 @@
-// The parameters that have a price: which option, at which values, and on which plane of
-// accuracy over time they are compared.
+// The parameters to measure: option, values, and the benchmark in which they are compared.
 #pragma once
 
 #include <string>
@@ -10,45 +9,45 @@
 
 namespace regrade {
 
-// Where variants compare with each other: they have one measure of accuracy and one of time.
+// Variants are compared within a benchmark, which has one measure of accuracy and one of time.
 struct Benchmark {
   const char* name;      // "fit"
-  const char* accuracy;  // what is measured, "held-out PSNR"
-  const char* unit;      // of it
+  const char* accuracy;  // its measure, "held-out PSNR"
+  const char* unit;      // of accuracy
   bool more_is_better;
-  const char* time_of;  // what the seconds are of
+  const char* time_of;  // the work that is timed
 };
 
 inline constexpr Benchmark kBenchmarks[] = {
     {"poses", "reprojection error", "px", false, "finding the poses"},
-    {"fit", "held-out PSNR", "dB", true, "a fit's steps, photos read before"},
-    {"style", "PSNR to the 2D method on the renders", "dB", true, "learning a style"},
-    {"render", "RMS difference to the accurate end, of 255 levels", "levels", false, "a frame"},
-    {"flow", "mean end-point error against exact motion", "px", false, "a pair, both ways"},
+    {"fit", "held-out PSNR", "dB", true, "a fit's steps, without reading photos"},
+    {"style", "PSNR to the 2D method on the renders", "dB", true, "training a style"},
+    {"render", "RMS difference to the accurate end, in 255 levels", "levels", false, "a frame"},
+    {"flow", "mean end-point error against exact motion", "px", false,
+     "a pair, both directions"},
 };
 
 const Benchmark& BenchmarkOf(const std::string& name);
 
-// One thing to measure: options that differ from the base's.
+// A set of options to measure, as differences from the base.
 struct Variant {
-  std::string benchmark, parameter,
-      value;  // parameter "" is the base itself, "preset" a whole preset
+  std::string benchmark, parameter, value;  // parameter "": the base; "preset": a whole preset
   JsonValue options = JsonValue::Object();
-  bool accurate_end = false;  // what the parameter's errors are measured against
+  bool accurate_end = false;  // errors of the parameter are relative to it
 };
 
 struct ParameterChoice {
-  std::vector<std::string> only;  // of these parameters; empty for all
+  std::vector<std::string> only;  // these parameters; empty: all
   bool poses = false, style = false;
   std::vector<std::string> presets;
 };
 
-// The base of each plane, then each parameter's values from cheap to accurate. Values follow
-// the base's own: half its steps and twice as many, a coarser grid and a finer one. Throws
-// Error(kUsage) for a name in `only` that is no parameter.
+// The base of each benchmark, then each parameter's values from cheap to accurate. Values are
+// relative to the base's: half and twice its steps, a coarser and a finer grid. Throws
+// Error(kUsage) for an unknown name in `only`.
 std::vector<Variant> VariantsOf(const RunSettings& base, const ParameterChoice& choice);
 
-// The options of groups Scene and Fit that a preset sets.
+// A preset's values of the options in the groups Scene and Fit.
 JsonValue PresetOptions(const std::string& preset);
 
 }  // namespace regrade

@@ -7,16 +7,17 @@
 #include "kernels/scene/common_camera.h"
 #include "pipeline/capture/scene_profile.h"
 #include "pipeline/capture/working_views.h"
+#include "pipeline/report/cost_rows.h"
 #include "reconstruct/fit/choose_degree.h"
 
 namespace regrade {
 namespace {
 
-// A stage and the units that its time is made of; the first is what its parameters change.
+// The units of a stage's time; its parameters change the first one.
 struct StageUnits {
   const char* stage;
   std::vector<const char*> units;
-  const char* benchmark;  // whose variants teach more than the run itself
+  const char* benchmark;  // its measurements determine the costs; "": the run's records do
   std::vector<const char*> parameters;
 };
 
@@ -41,26 +42,26 @@ double PhotoPixels(const RunSettings& settings, const Capture& capture) {
   return pixels;
 }
 
-// One observation: how much of each unit there was, and what it took.
+// A measured time and the amount of each unit.
 struct Observation {
   std::vector<double> amounts;
   double seconds = 0, cpu_seconds = 0;
 };
 
-// The factors, none negative, that make sum_i (sum_k f_k a_ik / y_i - 1)^2 least; for one unit
-// or two.
-std::vector<double> LeastSquares(const std::vector<Observation>& seen,
+// The non-negative factors f that minimise sum_i (sum_k f_k a_ik / y_i - 1)^2, for one or two
+// units.
+std::vector<double> LeastSquares(const std::vector<Observation>& observations,
                                  double Observation::*time) {
-  const size_t units = seen[0].amounts.size();
+  const size_t units = observations[0].amounts.size();
   double a00 = 0, a01 = 0, a11 = 0, b0 = 0, b1 = 0;
-  for (const Observation& o : seen) {
+  for (const Observation& o : observations) {
     const double y = std::max(o.*time, 1e-9);
     const double x0 = o.amounts[0] / y, x1 = units > 1 ? o.amounts[1] / y : 0;
     a00 += x0 * x0, a01 += x0 * x1, a11 += x1 * x1, b0 += x0, b1 += x1;
   }
   const double first = a00 > 0 ? b0 / a00 : 0;
   if (units == 1) return {first};
-  // With one observation, or all alike, the two cannot be told apart.
+  // With proportional observations the two factors are undetermined.
   const double determinant = a00 * a11 - a01 * a01;
   if (determinant > 1e-9 * a00 * a11) {
     const double f0 = (b0 * a11 - b1 * a01) / determinant;
@@ -73,13 +74,13 @@ std::vector<double> LeastSquares(const std::vector<Observation>& seen,
 
 Observation ObservationOf(const StageUnits& stage, const RunSettings& settings,
                           const Capture& capture, double seconds, double cpu_seconds) {
-  Observation seen{{}, seconds, cpu_seconds};
+  Observation observation{{}, seconds, cpu_seconds};
   for (const char* unit : stage.units)
-    seen.amounts.push_back(AmountOf(unit, settings, capture));
-  return seen;
+    observation.amounts.push_back(AmountOf(unit, settings, capture));
+  return observation;
 }
 
-// The base's settings with a variant's options over them.
+// The base's settings with a variant's options.
 RunSettings SettingsOf(const RunSettings& base, const Variant& variant) {
   RunSettings settings = base;
   OptionSet options;
@@ -133,7 +134,7 @@ double AmountOf(const std::string& unit, const RunSettings& settings, const Capt
            (settings.network.rays_per_step > 0 ? settings.network.rays_per_step : frame);
   if (unit == "frame pixels" || unit == "pair pixels") {
     if (capture.views.empty()) return 0;
-    // Frames of the film, and of neighbouring views where these are compared at one camera.
+    // Frames of the film, and of the views where they are compared with common intrinsics.
     const std::vector<Camera> views =
         WorkingViews(capture, settings.scene.photo_size, 0).Cameras();
     const Camera common = CommonCamera(views);
@@ -145,7 +146,7 @@ double AmountOf(const std::string& unit, const RunSettings& settings, const Capt
       pairs += std::max(0.0, photos - gap) + std::max(0.0, film - gap);
     return pairs * common_frame;
   }
-  throw Error(ExitCode::kInput, "'" + unit + "' is no unit of work");
+  throw Error(ExitCode::kInput, "'" + unit + "' is not a unit of work");
 }
 
 std::vector<CostTerm> LearnCosts(const RunSettings& base, const Capture& capture,
@@ -155,29 +156,29 @@ std::vector<CostTerm> LearnCosts(const RunSettings& base, const Capture& capture
   std::vector<CostTerm> costs;
   for (StageUnits stage : AllUnits()) {
     const auto record = workspace.Find(stage.stage);
-    // Photos whose poses came along are only read.
+    // Photos with given poses are only read.
     if (stage.stage == std::string("pose") && record &&
         record->metrics.Find("colmap") == nullptr)
       stage.units = {"staged pixels"};
-    std::vector<Observation> seen;
+    std::vector<Observation> observations;
     for (const Measurement& m : measurements) {
-      const bool teaches =
+      const bool relevant =
           m.parameter.empty() ||
           std::any_of(stage.parameters.begin(), stage.parameters.end(),
                       [&m](const char* parameter) { return m.parameter == parameter; });
-      if (m.benchmark != stage.benchmark || !teaches) continue;
+      if (m.benchmark != stage.benchmark || !relevant) continue;
       for (const Variant& variant : variants)
         if (variant.benchmark == m.benchmark && variant.parameter == m.parameter &&
             variant.value == m.value)
-          seen.push_back(ObservationOf(stage, SettingsOf(base, variant), capture, m.seconds,
-                                       m.cpu_seconds));
+          observations.push_back(ObservationOf(stage, SettingsOf(base, variant), capture,
+                                               m.seconds, m.cpu_seconds));
     }
-    if (seen.empty() && record)
-      seen.push_back(ObservationOf(stage, base, capture, record->seconds,
-                                   record->cpu_seconds.value_or(record->seconds)));
-    if (seen.empty()) continue;
-    const std::vector<double> seconds = LeastSquares(seen, &Observation::seconds),
-                              cpu = LeastSquares(seen, &Observation::cpu_seconds);
+    if (observations.empty() && record)
+      observations.push_back(ObservationOf(stage, base, capture, record->seconds,
+                                           record->cpu_seconds.value_or(record->seconds)));
+    if (observations.empty()) continue;
+    const std::vector<double> seconds = LeastSquares(observations, &Observation::seconds),
+                              cpu = LeastSquares(observations, &Observation::cpu_seconds);
     for (size_t k = 0; k < stage.units.size(); ++k)
       costs.push_back({stage.stage, stage.units[k], seconds[k], cpu[k]});
     if (stage.stage == std::string("reconstruct") && record) {
@@ -189,14 +190,14 @@ std::vector<CostTerm> LearnCosts(const RunSettings& base, const Capture& capture
       };
       const CostTerm trial{stage.stage, "trials", metric("trial_seconds"),
                            metric("trial_cpu_seconds")};
-      const auto beside = [&](double whole, double factor, double of_trial) {
+      const auto rest = [&](double whole, double factor, double of_trial) {
         const double left = whole - factor * own.amounts[0] - of_trial;
         return amount > 0 ? std::max(0.0, left) / amount : 0;
       };
       if (trial.seconds > 0) costs.push_back(trial);
       costs.push_back(
-          {stage.stage, "staged pixels", beside(record->seconds, seconds[0], trial.seconds),
-           beside(record->cpu_seconds.value_or(record->seconds), cpu[0], trial.cpu_seconds)});
+          {stage.stage, "staged pixels", rest(record->seconds, seconds[0], trial.seconds),
+           rest(record->cpu_seconds.value_or(record->seconds), cpu[0], trial.cpu_seconds)});
     }
   }
   return costs;
@@ -227,6 +228,7 @@ JsonValue ToJson(const std::vector<CostTerm>& costs) {
 }
 
 std::vector<CostTerm> CostsFromJson(const JsonValue& json, const std::string& where) {
+  CheckTradeoffSchema(json, where);
   try {
     std::vector<CostTerm> costs;
     for (const JsonValue& row : json.At("unit_costs").AsArray())
@@ -235,7 +237,7 @@ std::vector<CostTerm> CostsFromJson(const JsonValue& json, const std::string& wh
     return costs;
   } catch (const Error& error) {
     throw Error(ExitCode::kInput, error.what_failed(), where,
-                "give the tradeoff.json that `regrade tradeoff` wrote");
+                "give a tradeoff.json from `regrade tradeoff`");
   }
 }
 

@@ -1,5 +1,5 @@
-// What a run will cost on another capture, from what one was seen to cost: seconds of a stage
-// for each unit of its work.
+// Predicts the time of a run on another capture from measured seconds per unit of work of each
+// stage.
 #pragma once
 
 #include <string>
@@ -11,10 +11,10 @@
 
 namespace regrade {
 
-// A stage's time is a sum of terms, each so much a unit of work that is known before it begins.
+// One term of a stage's time, proportional to an amount of work that is known in advance.
 struct CostTerm {
   std::string stage, unit;
-  double seconds = 0, cpu_seconds = 0;  // a unit
+  double seconds = 0, cpu_seconds = 0;  // per unit
 };
 
 struct StageTime {
@@ -22,17 +22,17 @@ struct StageTime {
   double seconds = 0, cpu_seconds = 0;
 };
 
-// How much of `unit` a run of these settings does:
+// The amount of `unit` in a run with these settings:
 //   trials: of view dependence, 1 or 0, the same work for every capture |
 //   photo megapixels: at matching size | ray voxels: rays times the grid's side, over the fit |
-//   photo pixels: at working size | staged pixels: as they were given | style rays |
+//   photo pixels: at working size | staged pixels: at the original size | style rays |
 //   frame pixels | pair pixels
 double AmountOf(const std::string& unit, const RunSettings& settings, const Capture& capture);
 
-// From the records of a finished run; where parameters of steps and grids were measured, by
-// least squares of relative errors over them. A fit's steps have a price of their own, and what
-// the stage took beside them and its trial of degrees (photos, held-out views) goes by staged
-// pixels.
+// Costs from the records of a finished run, or by least squares of relative errors over
+// measured numbers of steps and grid sizes. The rest of the reconstruct stage, without a fit's
+// steps and the trial of degrees (that is, reading photos and held-out views), is per staged
+// pixel.
 std::vector<CostTerm> LearnCosts(const RunSettings& base, const Capture& capture,
                                  const Workspace& workspace,
                                  const std::vector<Variant>& variants,
@@ -42,7 +42,7 @@ std::vector<StageTime> Predict(const std::vector<CostTerm>& costs, const RunSett
                                const Capture& capture);
 
 JsonValue ToJson(const std::vector<CostTerm>& costs);
-// Throws Error(kInput).
+// The unit costs of a tradeoff.json. Throws Error(kInput).
 std::vector<CostTerm> CostsFromJson(const JsonValue& json, const std::string& where);
 
 }  // namespace regrade

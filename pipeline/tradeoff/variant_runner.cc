@@ -31,11 +31,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kStyledViews = 6;  // that a style is judged on
-constexpr int kFrames = 8;       // rendered for motion, and for the renderer's own prices
+constexpr int kStyledViews = 6;  // for the accuracy of a style
+constexpr int kFrames = 8;       // rendered for the benchmarks of flow and of rendering
 constexpr int kRenderedFrames = 3;
 
-// Runs beside the work and tells what it took.
+// Measures wall-clock and CPU time.
 class Clocks {
  public:
   explicit Clocks(Measurement* measurement) : measurement_(measurement) {}
@@ -51,7 +51,7 @@ class Clocks {
   double cpu_begin_ = CpuSeconds();
 };
 
-// The base's options with the variant's over them, at work in a folder of its own.
+// A run in a separate folder with the base's options and the variant's.
 struct Trial {
   RunContext context;
   Workspace workspace;
@@ -67,8 +67,8 @@ struct Trial {
     context.console = base.console;
   }
 
-  // A file or folder of the base, without copying what is in it where the disk can do that.
-  void Take(const RunContext& base, const std::string& relative) {
+  // Links a file or folder of the base, or copies it if the disk has no hard links.
+  void Link(const RunContext& base, const std::string& relative) {
     const fs::path from = base.workspace->Path(relative), to = workspace.NewPath(relative);
     std::error_code error;
     fs::copy(from, to, fs::copy_options::recursive | fs::copy_options::create_hard_links,
@@ -77,8 +77,8 @@ struct Trial {
     fs::remove_all(to);
     fs::copy(from, to, fs::copy_options::recursive);
   }
-  void TakeRecord(const RunContext& base, const std::string& stage) {
-    Take(base, ".regrade/stages/" + stage + ".json");
+  void LinkRecord(const RunContext& base, const std::string& stage) {
+    Link(base, ".regrade/stages/" + stage + ".json");
   }
 };
 
@@ -93,8 +93,8 @@ double Mean(const std::vector<double>& values) {
                               static_cast<double>(values.size());
 }
 
-// `count` of `all`, evenly spread.
-std::vector<int> Spread(const std::vector<int>& all, int count) {
+// `count` evenly spaced elements of `all`.
+std::vector<int> EvenlySpaced(const std::vector<int>& all, int count) {
   std::vector<int> some;
   const int n = static_cast<int>(all.size()), k = std::min(count, n);
   for (int i = 0; i < k; ++i)
@@ -125,7 +125,7 @@ Measurement VariantRunner::Measure(const Variant& variant, int repeat,
   m.parameter = variant.parameter;
   m.value = variant.value;
   m.repeat = repeat;
-  fs::remove_all(folder_);  // what an interrupted measurement left would shorten this one
+  fs::remove_all(folder_);  // results of an interrupted measurement would be reused
   if (variant.benchmark == "poses")
     MeasurePoses(variant, progress, &m);
   else if (variant.benchmark == "fit")
@@ -138,8 +138,9 @@ Measurement VariantRunner::Measure(const Variant& variant, int repeat,
     MeasureFlow(variant, &m);
   fs::remove_all(folder_);
   if (!std::isfinite(m.accuracy))
-    throw Error(ExitCode::kScene, "nothing to measure accuracy by", variant.benchmark,
-                variant.benchmark == "fit" ? "keep photos for measuring: --holdout 8"
+    throw Error(ExitCode::kScene, "there is nothing to measure accuracy with",
+                variant.benchmark,
+                variant.benchmark == "fit" ? "hold out photos: --holdout 8"
                                            : "leave its parameters out with --parameters");
   return m;
 }
@@ -155,8 +156,8 @@ void VariantRunner::MeasurePoses(const Variant& variant, const ProgressFunction&
   for (const char* name : {"registered", "points"}) m->work[name] = outcome.metrics.At(name);
 }
 
-// Photos at one working size, as a fit of the base's capture sees them; read once, for their
-// reading is the same for all variants and is none of their price.
+// The photos of a fit at one working size. Read once, and not timed: reading is the same for
+// all variants.
 struct VariantRunner::Photos {
   WorkingViews working_views;
   NormalizedScene scene = {};
@@ -193,7 +194,7 @@ void VariantRunner::MeasureFit(const Variant& variant, const ProgressFunction& p
   const Photos& photos = PhotosAt(settings.scene.photo_size);
   FitOptions options = settings.fit;
   options.seed = settings.run.seed + static_cast<uint64_t>(m->repeat);
-  // The degree that the base's trial has decided for, unless it is the parameter.
+  // The degree chosen by the base's trial, unless it is the parameter.
   const auto record = base_->workspace->Find("reconstruct");
   if (record && variant.parameter != "sh-degree")
     options.sh_degree = static_cast<int>(record->metrics.At("sh_degree").AsInt());
@@ -205,7 +206,7 @@ void VariantRunner::MeasureFit(const Variant& variant, const ProgressFunction& p
   m->work["rays"] = fit.rays;
   m->work["samples"] = fit.samples;
   m->work["voxels"] = fit.voxels;
-  // All variants are measured at the base's size of photos, or they would not compare.
+  // Measured at the base's photo size for all variants, for comparable values.
   m->accuracy =
       MeasureHeldOut(photos.working_views.AtSize(base_->settings.scene.photo_size),
                      {std::move(fit.field), photos.scene.field_from_world, photos.scene.ndc},
@@ -217,8 +218,8 @@ void VariantRunner::MeasureFit(const Variant& variant, const ProgressFunction& p
 void VariantRunner::MeasureStyle(const Variant& variant, const ProgressFunction& progress,
                                  Measurement* m) {
   Trial trial(*base_, variant, folder_);
-  for (const char* path : {"poses", "field.npz", "views_2d"}) trial.Take(*base_, path);
-  for (const char* stage : {"reconstruct", "style_2d"}) trial.TakeRecord(*base_, stage);
+  for (const char* path : {"poses", "field.npz", "views_2d"}) trial.Link(*base_, path);
+  for (const char* stage : {"reconstruct", "style_2d"}) trial.LinkRecord(*base_, stage);
   trial.context.settings.run.seed += static_cast<uint64_t>(m->repeat);
   const Stage stage = StylizeStage(&trial.context);
   Clocks clocks(m);
@@ -232,7 +233,7 @@ void VariantRunner::MeasureStyle(const Variant& variant, const ProgressFunction&
   const FastGrid grid = MakeFastGrid(styled.field);
   const bool of_renders = fs::exists(base.Path("frames/views_2d"));
   std::vector<double> psnr;
-  for (const int i : Spread(StyledViews(base, views), kStyledViews)) {
+  for (const int i : EvenlySpaced(StyledViews(base, views), kStyledViews)) {
     const RenderedView view =
         RenderView(grid, views.CameraOf(i), MarchOptions{styled.field.step});
     Image target = ReadImage(
@@ -263,7 +264,7 @@ const VariantRunner::Frames& VariantRunner::BaseFrames() {
     f.geometry.push_back({DepthAlongRays(camera, view.depth), camera});
   }
   const PairMotionFunction known =
-      KnownMotion([&f](int i) { return f.geometry[static_cast<size_t>(i)]; });
+      GeometricMotion([&f](int i) { return f.geometry[static_cast<size_t>(i)]; });
   for (int i = 0; i + 1 < count; ++i) f.truth.push_back(known(i, i + 1));
   for (int i = 0; i < std::min(kRenderedFrames, count); ++i)
     f.accurate.push_back(RenderView(f.grid, f.cameras[static_cast<size_t>(i)],
@@ -306,7 +307,7 @@ void VariantRunner::MeasureFlow(const Variant& variant, Measurement* m) {
   for (size_t i = 0; i < f.truth.size(); ++i)
     estimated.push_back(motion(static_cast<int>(i), static_cast<int>(i) + 1));
   clocks.Stop(std::max<double>(1, static_cast<double>(f.truth.size())));
-  // Over the pixels whose true place is seen in the next frame.
+  // Over the pixels that are visible in the next frame.
   double sum = 0, pixels = 0;
   for (size_t i = 0; i < estimated.size(); ++i)
     for (int y = 0; y < estimated[i].flow.height; ++y)

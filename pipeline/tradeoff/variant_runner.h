@@ -1,5 +1,4 @@
-// Measures one variant: the same fit and the same stages that a run does, with a clock beside
-// them.
+// Runs and times one variant with the same fit and stages as a run.
 #pragma once
 
 #include <memory>
@@ -13,18 +12,18 @@ namespace regrade {
 
 class VariantRunner {
  public:
-  // `base` has been run, in base->workspace, to "evaluate" where a style was given and to
-  // "reconstruct" otherwise. `folder` is made for each variant and removed behind it.
+  // `base` must have been run in base->workspace, to "evaluate" with a style and to
+  // "reconstruct" without. Each measurement creates `folder` and removes it.
   VariantRunner(RunContext* base, const std::string& folder);
   ~VariantRunner();
 
-  // Each repetition draws anew, so that the spread of accuracy is a seed's. Throws Interrupted,
-  // and what the stages throw.
+  // Each repetition uses another seed, so that the spread of accuracy includes the seed's.
+  // Throws Interrupted, and what the stages throw.
   Measurement Measure(const Variant& variant, int repeat, const ProgressFunction& progress);
 
  private:
-  struct Photos;  // read once, for the plane "fit"
-  struct Frames;  // rendered once, for the planes "render" and "flow"
+  struct Photos;  // read once, for the benchmark "fit"
+  struct Frames;  // rendered once, for the benchmarks "render" and "flow"
 
   void MeasurePoses(const Variant& variant, const ProgressFunction& progress, Measurement* m);
   void MeasureFit(const Variant& variant, const ProgressFunction& progress, Measurement* m);

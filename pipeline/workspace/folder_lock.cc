@@ -43,7 +43,7 @@ struct Holder {
   std::string host, start;
 
   std::string Text() const {
-    if (pid == 0) return "another run (it has not written its name yet)";
+    if (pid == 0) return "another run (it has not identified itself yet)";
     return "process " + std::to_string(pid) + " on " + host + ", started " + start;
   }
   bool AliveHere() const {
@@ -52,7 +52,7 @@ struct Holder {
   }
 };
 
-// What the holder wrote; empty if it is just writing, or something else stands there.
+// The holder's record; empty if it is incomplete or something else.
 Holder ReadHolder(int fd) {
   Holder holder;
   std::string text(kMaxHolderBytes, '\0');
@@ -68,7 +68,7 @@ Holder ReadHolder(int fd) {
   return holder;
 }
 
-// Between our open and our lock another run may have put a new file in place.
+// Another run may have replaced the file between open and flock.
 bool StillInPlace(int fd, const std::string& path) {
   struct stat ours, there;
   return ::fstat(fd, &ours) == 0 && ::stat(path.c_str(), &there) == 0 &&
@@ -80,19 +80,18 @@ bool StillInPlace(int fd, const std::string& path) {
 FolderLock::FolderLock(const std::string& path, bool break_lock) {
   const std::string folder = std::filesystem::path(path).parent_path().parent_path().string();
   while (true) {
-    fd_ = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0644);
-    if (fd_ < 0)
+    fd_.Reset(::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0644));
+    if (fd_.get() < 0)
       throw Error(ExitCode::kResources,
                   std::string("cannot write here: ") + std::strerror(errno), path,
-                  "choose another folder with --out, or mend its permissions");
+                  "choose another folder with --out, or correct its permissions");
     int status;
-    do status = ::flock(fd_, LOCK_EX | LOCK_NB);
+    do status = ::flock(fd_.get(), LOCK_EX | LOCK_NB);
     while (status != 0 && errno == EINTR);
-    if (status == 0 && StillInPlace(fd_, path)) break;
+    if (status == 0 && StillInPlace(fd_.get(), path)) break;
     if (status != 0) {
       const int error = errno;
-      const Holder holder = ReadHolder(fd_);
-      ::close(fd_);
+      const Holder holder = ReadHolder(fd_.get());
       if (error != EWOULDBLOCK)
         throw Error(ExitCode::kResources,
                     std::string("this file system cannot lock files: ") + std::strerror(error),
@@ -100,27 +99,21 @@ FolderLock::FolderLock(const std::string& path, bool break_lock) {
       const bool may_break = break_lock && !holder.AliveHere();
       if (!may_break)
         throw Error(ExitCode::kFolderInUse, "in use by " + holder.Text(), folder,
-                    break_lock ? "it is alive: end it first"
-                               : "wait for it or end it; if that run is surely dead (a network "
-                                 "drive can keep its lock), add --break-lock");
+                    break_lock ? "it is still running: end it first"
+                               : "wait for it or end it; if that run has certainly ended (a "
+                                 "network drive can keep its lock), add --break-lock");
       if (::unlink(path.c_str()) != 0 && errno != ENOENT)
         throw Error(ExitCode::kResources,
                     std::string("cannot remove the lock: ") + std::strerror(errno), path);
       break_lock = false;
-      continue;
     }
-    ::close(fd_);
   }
   const std::string text = HolderText();
-  if (::ftruncate(fd_, 0) != 0 ||
-      ::pwrite(fd_, text.data(), text.size(), 0) != static_cast<ssize_t>(text.size())) {
-    const int error = errno;
-    ::close(fd_);
-    throw Error(ExitCode::kResources, std::string("cannot write: ") + std::strerror(error),
+  if (::ftruncate(fd_.get(), 0) != 0 ||
+      ::pwrite(fd_.get(), text.data(), text.size(), 0) != static_cast<ssize_t>(text.size())) {
+    throw Error(ExitCode::kResources, std::string("cannot write: ") + std::strerror(errno),
                 path, "free some space, or choose another folder with --out");
   }
 }
-
-FolderLock::~FolderLock() { ::close(fd_); }
 
 }  // namespace regrade

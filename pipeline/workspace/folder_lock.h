@@ -1,26 +1,23 @@
-// One run at a time works in an output folder: a lock that the kernel releases when its holder
-// dies, however it dies.
+// Locks an output folder for one run; the kernel releases the lock when the process ends.
 #pragma once
 
 #include <string>
 
+#include "kernels/base/file_descriptor.h"
+
 namespace regrade {
 
-// Holds `path` (a file that is created and stays) with flock on an open descriptor; the file's
-// text names pid, host and start time for the next who asks.
+// Holds flock on `path`, a file that is created and stays; its text names pid, host and start
+// time of the holder.
 class FolderLock {
  public:
-  // Throws Error(kFolderInUse) naming the holder, Error(kResources) where nothing can be
-  // written. `break_lock` takes a lock whose holder cannot be asked (a network drive that has
-  // forgotten to release it) by putting a new file in its place; it is refused while the holder
-  // is alive on this machine.
+  // Throws Error(kFolderInUse) naming the holder, Error(kResources) if the file cannot be
+  // written. `break_lock` replaces the file of a lock that was not released (by a network
+  // drive); it is refused while the holder is alive on this machine.
   FolderLock(const std::string& path, bool break_lock);
-  ~FolderLock();
-  FolderLock(const FolderLock&) = delete;
-  FolderLock& operator=(const FolderLock&) = delete;
 
  private:
-  int fd_ = -1;
+  FileDescriptor fd_;
 };
 
 }  // namespace regrade

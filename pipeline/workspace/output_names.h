@@ -1,4 +1,4 @@
-// How files in the output folder are called.
+// Names of files in the output folder.
 #pragma once
 
 #include <cstdio>
@@ -6,11 +6,11 @@
 
 namespace regrade {
 
-// Sequences of the film's frames stand beside those of the photos' places: frames/path_source/,
-// ...
+// Prefix of the film's frame sequences, beside those at the photos' positions:
+// frames/path_source/, ...
 inline constexpr char kPathPrefix[] = "path_";
-// Where photos differ in size or lens, frames/common_source/, ... hold the views' frames once
-// more, of one camera (kernels/scene/common_camera.h) at each photo's place: neighbouring views
+// Where photos differ in size or lens, frames/common_source/, ... hold the views' frames again,
+// with one camera (kernels/scene/common_camera.h) at each photo's position: neighbouring views
 // are compared on these.
 inline constexpr char kCommonPrefix[] = "common_";
 

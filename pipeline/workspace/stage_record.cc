@@ -1,15 +1,13 @@
 #include "pipeline/workspace/stage_record.h"
 
-#include <fcntl.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <filesystem>
-#include <memory>
 
 #include "kernels/base/error.h"
+#include "kernels/base/file_descriptor.h"
 #include "kernels/base/hash.h"
 #include "pipeline/files/atomic_file.h"
 
@@ -18,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int64_t kSchema = 1;
+constexpr int64_t kSchema = 2;
 constexpr size_t kNamedDifferences = 4;
 
 bool EndsWith(const std::string& text, const std::string& end) {
@@ -68,17 +66,11 @@ std::string StageRecord::OutputHash() const {
 }
 
 std::string HashFile(const std::string& path) {
-  const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-  if (fd < 0) ThrowReadError(path);
-  const std::unique_ptr<const int, void (*)(const int*)> closer(
-      &fd, [](const int* f) { ::close(*f); });
-  struct stat status;
-  if (::fstat(fd, &status) != 0) ThrowReadError(path);
-  if (!S_ISREG(status.st_mode)) throw Error(ExitCode::kInput, "not a regular file", path);
+  const FileDescriptor fd(OpenToRead(path, nullptr));
   Hasher hasher;
   std::vector<char> piece(1 << 20);
   while (true) {
-    const ssize_t n = ::read(fd, piece.data(), piece.size());
+    const ssize_t n = ::read(fd.get(), piece.data(), piece.size());
     if (n < 0 && errno == EINTR) continue;
     if (n < 0) ThrowReadError(path);
     if (n == 0) break;
@@ -149,17 +141,27 @@ JsonValue ToJson(const StageRecord& record) {
   return json;
 }
 
+void CheckRecordSchema(const JsonValue& value, const std::string& where) {
+  const JsonValue* schema = value.Find("schema");
+  if (schema == nullptr || !schema->IsNumber() || schema->AsDouble() >= kSchema) return;
+  throw Error(ExitCode::kInput,
+              "made by an older regrade (schema " + DumpJson(*schema, -1) + ")", where,
+              "use another --out, or delete the output folder");
+}
+
 StageRecord StageRecordFromJson(const JsonValue& value, const std::string& where) {
   StageRecord record;
   try {
     record.version = value.At("regrade").AsString();
-    if (value.At("schema").AsInt() > kSchema)
+    const int64_t schema = value.At("schema").AsInt();
+    if (schema > kSchema)
       throw Error(ExitCode::kInput,
                   "written by regrade " + record.version + ", this is " REGRADE_VERSION, where,
                   "update regrade; nothing has been touched");
+    CheckRecordSchema(value, where);
     record.inputs = value.At("inputs");
     for (const JsonValue& output : value.At("outputs").AsArray()) {
-      // A path that leads out of the folder is never followed.
+      // Paths out of the folder are refused.
       const fs::path path = output.At("path").AsString();
       if (path.is_absolute() || path.lexically_normal() != path ||
           EndsWith(path.string(), "/") || *path.begin() == "..")

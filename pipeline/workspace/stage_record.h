@@ -1,5 +1,4 @@
-// What a finished stage leaves behind: from which inputs, which files with which contents, how
-// long it took and what it measured.
+// Record of a finished stage: inputs, outputs with their hashes, duration and metrics.
 #pragma once
 
 #include <cstdint>
@@ -18,14 +17,14 @@ struct StageOutput {
 };
 
 struct StageRecord {
-  std::string version;                // of the program that made it
-  JsonValue inputs;                   // object: options and hashes of what went in
+  std::string version;                // of the program
+  JsonValue inputs;                   // object: options and hashes of the inputs
   std::vector<StageOutput> outputs;   // sorted by path
-  double seconds = 0;                 // by the wall
+  double seconds = 0;                 // wall clock
   std::optional<double> cpu_seconds;  // of all threads and programs started; not in old records
-  JsonValue metrics;                  // object, goes into the report
+  JsonValue metrics;                  // object, see metric.h; goes into the report
 
-  // One hash of everything that came out: an input of the stages behind.
+  // One hash of all outputs: an input of the following stages.
   std::string OutputHash() const;
 };
 
@@ -37,15 +36,17 @@ std::string HashFile(const std::string& path);
 std::vector<StageOutput> DescribeOutputs(const std::string& root,
                                          const std::vector<std::string>& paths);
 
-// One sentence for each difference: "fit-rays: was 4096, now 8192"; many in one object are
-// counted and the first few named.
+// One sentence for each difference: "fit-rays: was 4096, now 8192"; of many in one object the
+// first few are named and the others counted.
 std::vector<std::string> Differences(const JsonValue& was, const JsonValue& now);
 
-// One sentence for each output that is not what was recorded: missing, or changed.
+// One sentence for each output that is missing or changed.
 std::vector<std::string> ChangedOutputs(const std::string& root, const StageRecord& record);
 
 JsonValue ToJson(const StageRecord& record);
-// Throws Error(kInput): damaged, or from a newer version than this program.
+// Throws Error(kInput) with the number of an older schema.
+void CheckRecordSchema(const JsonValue& value, const std::string& where);
+// Throws Error(kInput): damaged, or of an older or newer schema than this program's.
 StageRecord StageRecordFromJson(const JsonValue& value, const std::string& where);
 
 }  // namespace regrade

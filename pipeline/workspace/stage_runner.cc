@@ -5,19 +5,11 @@
 #include <new>
 
 #include "kernels/base/error.h"
+#include "pipeline/files/text.h"
 #include "pipeline/program/cpu_time.h"
 
 namespace regrade {
 namespace {
-
-std::string Joined(const std::vector<std::string>& parts, const char* separator) {
-  std::string text;
-  for (const std::string& part : parts) {
-    if (!text.empty()) text += separator;
-    text += part;
-  }
-  return text;
-}
 
 size_t PlaceOf(const std::string& stage) {
   const auto* found = std::find(std::begin(kStageNames), std::end(kStageNames), stage);
@@ -53,13 +45,13 @@ bool StageRunner::Run(const Stage& stage) {
     return true;
   }
   if (status.state == StageState::kInputsDiffer && stage.refuse_changes)
-    throw Error(ExitCode::kInput,
-                "stage " + stage.name + " was done from other inputs (" +
-                    Joined(status.why, "; ") + ")",
-                workspace_->folder(),
-                "use the old ones, another --out, or --restart-from " + stage.name +
-                    " to replace what is there");
-  const std::string why = status.why.empty() ? "" : " (" + Joined(status.why, "; ") + ")";
+    throw Error(
+        ExitCode::kInput,
+        "stage " + stage.name + " was done from other inputs (" + Join(status.why, "; ") + ")",
+        workspace_->folder(),
+        "use the old ones, another --out, or --restart-from " + stage.name +
+            " to replace what is there");
+  const std::string why = status.why.empty() ? "" : " (" + Join(status.why, "; ") + ")";
   if (dry_run_) {
     console_->Info(stage.name + ": would be done" + why +
                    (stage.plan.empty() ? "" : ": " + stage.plan));
@@ -67,10 +59,10 @@ bool StageRunner::Run(const Stage& stage) {
   }
   if (!why.empty()) console_->Info(stage.name + ": is done again" + why);
 
-  // From here on the later stages are out of date; their checkpoints know it by their inputs.
+  // The later stages are out of date now; the inputs of their checkpoints differ.
   if (status.state != StageState::kNeverDone) workspace_->Forget(stage.name);
   ForgetAfter(stage.name);
-  console_->SetKept(Joined(workspace_->FinishedStages(), ", "));
+  console_->SetKept(Join(workspace_->FinishedStages(), ", "));
   console_->BeginStage(stage.name);
   const double cpu_before = CpuSeconds();
   StageOutcome outcome;
@@ -79,13 +71,13 @@ bool StageRunner::Run(const Stage& stage) {
   } catch (const std::bad_alloc&) {
     throw Error(ExitCode::kResources, "out of memory in stage " + stage.name,
                 workspace_->folder(),
-                "close other programs, take --preset draft, or set --max-memory");
+                "close other programs, use --preset draft, or set --max-memory");
   }
   const double seconds = console_->StageSeconds();
   workspace_->Record(stage.name, stage.inputs, outcome.outputs, seconds, outcome.metrics,
                      CpuSeconds() - cpu_before);
   console_->EndStage();
-  console_->SetKept(Joined(workspace_->FinishedStages(), ", "));
+  console_->SetKept(Join(workspace_->FinishedStages(), ", "));
   console_->Info(stage.name + ": done in " + DurationText(seconds));
   return true;
 }
@@ -97,7 +89,7 @@ StageRecord StageRunner::Require(const std::string& stage, const std::string& ho
                 workspace_->folder(), "run `" + how + "` first");
   const std::vector<std::string> changed = ChangedOutputs(workspace_->folder(), *record);
   if (!changed.empty())
-    throw Error(ExitCode::kInput, Joined(changed, "; "), workspace_->folder(),
+    throw Error(ExitCode::kInput, Join(changed, "; "), workspace_->folder(),
                 "run `" + how + "` again: it will redo that stage");
   return *record;
 }

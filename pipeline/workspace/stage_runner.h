@@ -1,5 +1,5 @@
-// Does the stages of a run in order: finished ones are skipped, changed ones redone or refused,
-// and what is done is recorded.
+// Runs the stages in order: finished ones are skipped, changed ones redone or refused, and each
+// finished stage is recorded.
 #pragma once
 
 #include <functional>
@@ -12,7 +12,7 @@
 
 namespace regrade {
 
-// The road, in order. A stage that is done again makes all later ones be done again.
+// All stages, in order. A stage that runs again causes all later ones to run again.
 inline constexpr const char* kStageNames[] = {"pose",   "reconstruct", "style_2d", "stylize",
                                               "render", "evaluate",    "report"};
 
@@ -23,9 +23,9 @@ struct StageOutcome {
 
 struct Stage {
   std::string name;
-  JsonValue inputs;  // object: everything that the result depends on
-  // What to do when the recorded inputs are others: redo, or refuse with the difference (work
-  // that a typing mistake should not throw away).
+  JsonValue inputs;  // object: all inputs of the result
+  // If the recorded inputs differ: redo the stage, or refuse with the difference (for work that
+  // a typing mistake should not discard).
   bool refuse_changes = false;
   std::string plan;  // a clause for --dry-run: sizes, memory, time where they are known
   std::function<StageOutcome(const ProgressFunction&)> work;
@@ -45,8 +45,8 @@ class StageRunner {
   // Error(kResources).
   bool Run(const Stage& stage);
 
-  // For stages that this command does not do: it must be recorded, and its results unchanged.
-  // `how` names the command that makes it. Returns its record.
+  // For stages that this command does not run: returns the record. Throws Error(kInput) if
+  // there is none or a result was changed; `how` names the command that runs the stage.
   StageRecord Require(const std::string& stage, const std::string& how) const;
 
  private:

@@ -1,10 +1,6 @@
 #include "pipeline/workspace/workspace.h"
 
-#include <sys/statvfs.h>
-
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
 #include <filesystem>
 
 #include "kernels/base/error.h"
@@ -21,7 +17,7 @@ constexpr uint64_t kMaxRecord = 256 << 20;
 constexpr uint64_t kMaxCheckpoint = uint64_t{64} << 30;
 constexpr std::string_view kCheckpointMark = "regrade checkpoint 1\n";
 constexpr size_t kHashDigits = 16;
-// Names that we write at the top of an output folder.
+// Results at the top of an output folder.
 constexpr const char* kResultNames[] = {"run.json",    "poses",    "field.npz", "styled.npz",
                                         "network.npz", "views_2d", "frames",    "report.json"};
 
@@ -43,7 +39,7 @@ void MakeFolder(const std::string& folder) {
                 folder, "choose another folder with --out");
 }
 
-// Ours alone: the lock is held, so nobody is writing them.
+// The lock is held: no other run is writing them.
 void RemoveTemporaries(const std::string& folder) {
   std::vector<fs::path> found;
   std::error_code error;
@@ -78,6 +74,7 @@ Workspace::Workspace(const std::string& folder, bool break_lock) {
   lock_.emplace(folder_ + kOwnFolder + "/lock", break_lock);
   MakeFolder(Path(".regrade/stages"));
   MakeFolder(Path(".regrade/checkpoints"));
+  RefuseOlderRecords();
   RemoveTemporaries(folder_);
 }
 
@@ -85,6 +82,18 @@ std::string Workspace::NewPath(const std::string& relative) const {
   const std::string path = Path(relative);
   MakeFolder(fs::path(path).parent_path().string());
   return path;
+}
+
+void Workspace::RefuseOlderRecords() const {
+  for (const std::string& stage : FinishedStages()) {
+    JsonValue record;
+    try {
+      record = ReadJsonFile(StagePath(stage), kMaxRecord);
+    } catch (const Error&) {  // a damaged record is reported by whoever needs it
+      continue;
+    }
+    CheckRecordSchema(record, StagePath(stage));
+  }
 }
 
 std::string Workspace::StagePath(const std::string& stage) const {
@@ -172,17 +181,6 @@ std::optional<std::string> Workspace::LoadCheckpoint(const std::string& stage,
 void Workspace::DropCheckpoint(const std::string& stage) const {
   std::error_code error;
   fs::remove(CheckpointPath(stage), error);
-}
-
-void Workspace::RequireFreeSpace(uint64_t bytes, const std::string& for_what) const {
-  struct statvfs disk;
-  if (::statvfs(folder_.c_str(), &disk) != 0) return;  // unknown: the write itself will say
-  const uint64_t free = static_cast<uint64_t>(disk.f_bavail) * disk.f_frsize;
-  if (free >= bytes) return;
-  throw Error(ExitCode::kResources,
-              for_what + " needs about " + std::to_string(bytes >> 20) + " MB of disk, " +
-                  std::to_string(free >> 20) + " MB are free",
-              folder_, "free some space or choose another disk with --out");
 }
 
 }  // namespace regrade

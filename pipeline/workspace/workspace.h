@@ -1,10 +1,10 @@
-// The output folder of a run: locked, with a record of each finished stage and checkpoints of
-// the one in hand. All paths inside are relative, so the folder can be moved between runs.
+// The output folder of a run: locked, with a record of each finished stage and a checkpoint of
+// the current one. All paths inside are relative: the folder can be moved between runs.
 //
-//   .regrade/lock               who works here
+//   .regrade/lock               process that holds the folder
 //   .regrade/stages/NAME.json   stage records
 //   .regrade/checkpoints/NAME   state of interrupted stages
-//   .regrade/log.txt            what was said
+//   .regrade/log.txt            messages
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,7 @@
 namespace regrade {
 
 enum class StageState {
-  kDone,           // recorded, from the same inputs, results as they were left
+  kDone,           // recorded, with the same inputs and unchanged results
   kNeverDone,      //
   kInputsDiffer,   // finished from other inputs; `why` lists the differences
   kResultsDiffer,  // a result was edited or deleted; `why` names it
@@ -32,17 +32,18 @@ struct StageStatus {
 
 class Workspace {
  public:
-  // Makes the folder if it is new, locks it, and removes what an interrupted writer left.
+  // Creates the folder if it is new, locks it, and removes temporaries of interrupted writers.
   // Throws before any work: Error(kResources) if it cannot be written or is not a folder,
-  // Error(kFolderInUse), Error(kInput) if it holds files under our names that we did not write.
+  // Error(kFolderInUse), Error(kInput) if it holds files under our names that we did not write,
+  // or stage records of an older schema.
   explicit Workspace(const std::string& folder, bool break_lock = false);
 
-  // True if a run has worked here: asked before Workspace is made, nothing is touched.
+  // True if a run has worked here. Changes nothing.
   static bool Exists(const std::string& folder);
 
   const std::string& folder() const { return folder_; }
   std::string Path(const std::string& relative) const { return folder_ + "/" + relative; }
-  // The same, with the folders above it made.
+  // The same; creates the folders above it.
   std::string NewPath(const std::string& relative) const;
 
   StageStatus Status(const std::string& stage, const JsonValue& inputs) const;
@@ -51,24 +52,22 @@ class Workspace {
   void Record(const std::string& stage, const JsonValue& inputs,
               const std::vector<std::string>& outputs, double seconds, const JsonValue& metrics,
               std::optional<double> cpu_seconds = std::nullopt);
-  // As if the stage had never been done. Results stay until they are replaced.
+  // Drops the stage's record and checkpoint. Results stay until they are replaced.
   void Forget(const std::string& stage);
+  // Of the stage's record.
+  std::string StagePath(const std::string& stage) const;
   // Names of the recorded stages.
   std::vector<std::string> FinishedStages() const;
 
-  // A checkpoint belongs to the inputs it was made from; with other inputs, or damaged, it is
-  // as good as none.
+  // A checkpoint belongs to its inputs: with other inputs, or damaged, it is ignored.
   void SaveCheckpoint(const std::string& stage, const JsonValue& inputs,
                       std::string_view bytes) const;
   std::optional<std::string> LoadCheckpoint(const std::string& stage,
                                             const JsonValue& inputs) const;
   void DropCheckpoint(const std::string& stage) const;
 
-  // Throws Error(kResources) with both numbers if the disk has less.
-  void RequireFreeSpace(uint64_t bytes, const std::string& for_what) const;
-
  private:
-  std::string StagePath(const std::string& stage) const;
+  void RefuseOlderRecords() const;
   std::string CheckpointPath(const std::string& stage) const;
 
   std::string folder_;  // absolute

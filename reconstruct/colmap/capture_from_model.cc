@@ -1,5 +1,6 @@
-// From COLMAP's model to a Capture: names matched, sizes compared, reprojection errors computed
-// anew, because those stored in the file are stale after colmap's bundle_adjuster.
+// Converts a COLMAP model to a Capture: matches names, compares sizes, and computes
+// reprojection errors, because those stored in the file are stale after colmap's
+// bundle_adjuster.
 #include <algorithm>
 #include <cmath>
 #include <unordered_map>
@@ -23,7 +24,7 @@ CaptureView ViewOf(const ColmapModel& model, const ColmapImage& image,
                     " pixels, its camera in the model " + SizeText(camera.width, camera.height),
                 photo.file,
                 "the poses belong to pictures of another size or orientation (COLMAP ignores "
-                "EXIF orientation); use those pictures, or pose the photos anew");
+                "EXIF orientation); use those pictures, or compute poses for the photos");
   return {photo.name, photo.file, photo.path, camera};
 }
 
@@ -48,14 +49,14 @@ Capture CaptureFromModel(const ColmapModel& model, const std::vector<StagedPhoto
     capture.statuses.push_back({photo.file, PhotoState::kUsed, ""});
   }
   if (capture.views.empty())
-    throw Error(ExitCode::kInput, "none of the model's image names is the name of a photo", "",
+    throw Error(ExitCode::kInput, "no image name of the model is the name of a photo", "",
                 model.images.empty()
                     ? "the model has no images"
                     : "the model's first image is \"" + model.images.front().name + "\"");
   for (const ColmapImage& image : model.images)
     if (view_of_image.count(image.id) == 0)
       capture.statuses.push_back(
-          {image.name, PhotoState::kSkipped, "in the model, but there is no photo"});
+          {image.name, PhotoState::kSkipped, "in the model, but there is no such photo"});
 
   double error_sum = 0;
   int64_t observations = 0;

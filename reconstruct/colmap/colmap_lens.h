@@ -1,4 +1,4 @@
-// COLMAP's camera models, and how their parameters map to ours.
+// COLMAP's camera models, and the mapping of their parameters to ours.
 #pragma once
 
 #include <cstdint>
@@ -16,16 +16,16 @@ enum class ColmapLens : int32_t {
   kOpenCv = 4,
   kOpenCvFisheye = 5,
   kFullOpenCv = 6,
-  kFov = 7,  // refused
+  kFov = 7,  // not supported
   kSimpleRadialFisheye = 8,
   kRadialFisheye = 9,
-  kThinPrismFisheye = 10,  // refused
+  kThinPrismFisheye = 10,  // not supported
 };
 
 inline constexpr int kNumColmapLenses = 11;
 
-// In the file stand the focal lengths (one for both, or two), then the centre, then the
-// distortion coefficients: the first `coefficients` of ours in the same order.
+// The file has the focal lengths (one or two), then the centre, then the distortion
+// coefficients: the first `coefficients` of ours in the same order.
 struct ColmapLensInfo {
   const char* name;
   int focals;  // 1 or 2; 0: not supported

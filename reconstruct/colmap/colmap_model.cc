@@ -1,8 +1,9 @@
-// The three files of a COLMAP model: little-endian records without padding, preceded by a count
-// (format: colmap/src/colmap/scene/reconstruction_io.cc). COLMAP's own reader hangs or aborts
-// on damaged files and keeps NaN poses, which is why this one exists.
+// Reads the three files of a COLMAP model: little-endian records without padding, preceded by a
+// count (format: colmap/src/colmap/scene/reconstruction_io.cc). COLMAP's own reader hangs or
+// aborts on damaged files and accepts NaN poses.
 #include "reconstruct/colmap/colmap_model.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -23,16 +24,16 @@ static_assert(std::endian::native == std::endian::little, "the files are little-
 
 constexpr size_t kLongestName = 4096;
 constexpr int64_t kLargestSide = 1 << 18;      // pixels
-constexpr double kLargestCoordinate = 1e12;    // world units: a camera at infinity is not one
-constexpr double kQuaternionTolerance = 1e-3;  // rounding in other programs, not damage
+constexpr double kLargestCoordinate = 1e12;    // world units
+constexpr double kQuaternionTolerance = 1e-3;  // rounding in other programs
 
 constexpr const char* kDamagedHint =
     "the file is damaged or was not written to its end; let COLMAP write the model again";
 
-// A file in memory with a place in it; every read checks that its bytes are there.
+// A file in memory with a read position; every read checks the remaining bytes.
 class Reader {
  public:
-  // Of `folder`/`name`.bin or, where there is only that, of the text file.
+  // Reads `folder`/`name`.bin or, if it does not exist, the text file.
   Reader(const std::string& folder, const std::string& name)
       : path_(folder + "/" + name + ".bin") {
     std::ifstream file(path_, std::ios::binary | std::ios::ate);
@@ -55,8 +56,8 @@ class Reader {
   T Read(const char* what) {
     T value;
     if (Left() < sizeof(T)) Fail(std::string("the file ends inside ") + what);
-    std::memcpy(&value, bytes_.data() + place_, sizeof(T));
-    place_ += sizeof(T);
+    std::memcpy(&value, bytes_.data() + position_, sizeof(T));
+    position_ += sizeof(T);
     return value;
   }
 
@@ -71,20 +72,20 @@ class Reader {
     const uint64_t count = Read<uint64_t>("a count");
     const auto needed = CheckedMul(count, smallest);
     if (!needed || *needed > Left())
-      Fail("it guarantees " + std::to_string(count) + " " + what + ", but only " +
-           std::to_string(Left()) + " bytes follow");
+      Fail("the count of " + std::string(what) + " is " + std::to_string(count) +
+           ", but only " + std::to_string(Left()) + " bytes follow");
     return static_cast<size_t>(count);
   }
 
   std::string ReadName() {
     const size_t longest = std::min(Left(), kLongestName + 1);
-    const char* begin = bytes_.data() + place_;
+    const char* begin = bytes_.data() + position_;
     const void* end = std::memchr(begin, 0, longest);
     if (end == nullptr)
       Fail(longest > kLongestName ? "an image name is longer than 4096 bytes"
                                   : "the file ends inside an image name");
     std::string name(begin, static_cast<const char*>(end));
-    place_ += name.size() + 1;
+    position_ += name.size() + 1;
     return name;
   }
 
@@ -93,15 +94,15 @@ class Reader {
   }
 
   [[noreturn]] void Fail(const std::string& why) const {
-    throw Error(ExitCode::kInput, why + ", at byte " + std::to_string(place_), path_,
+    throw Error(ExitCode::kInput, why + ", at byte " + std::to_string(position_), path_,
                 kDamagedHint);
   }
 
  private:
-  size_t Left() const { return bytes_.size() - place_; }
+  size_t Left() const { return bytes_.size() - position_; }
 
   std::string path_, bytes_;
-  size_t place_ = 0;
+  size_t position_ = 0;
 };
 
 std::string CameraText(uint32_t id) { return "camera " + std::to_string(id); }
@@ -159,26 +160,20 @@ Vec3d ReadVector(Reader& reader, const char* what) {
   return v;
 }
 
-Mat3d RotationOf(double w, double x, double y, double z) {
-  return {{{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)},
-           {2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)},
-           {2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)}}};
-}
-
 Mat3d ReadRotation(Reader& reader, uint32_t image_id) {
-  double q[4], norm = 0;
-  for (double& component : q) {
-    component = reader.ReadFinite("a quaternion");
-    norm += component * component;
-  }
-  norm = std::sqrt(norm);
+  double wxyz[4];
+  for (double& component : wxyz) component = reader.ReadFinite("a quaternion");
+  const Eigen::Quaterniond q(wxyz[0], wxyz[1], wxyz[2], wxyz[3]);
+  const double norm = q.norm();
   if (!(std::abs(norm - 1) <= kQuaternionTolerance)) {
     std::ostringstream text;
     text << "image " << image_id << " has a rotation quaternion of length " << norm;
     reader.Fail(text.str());
   }
-  for (double& component : q) component /= norm;
-  return RotationOf(q[0], q[1], q[2], q[3]);
+  Mat3d rotation;
+  Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(&rotation(0, 0)) =
+      q.normalized().toRotationMatrix();
+  return rotation;
 }
 
 std::vector<ColmapImage> ReadImages(const std::string& folder) {
@@ -193,7 +188,7 @@ std::vector<ColmapImage> ReadImages(const std::string& folder) {
     image.camera_id = reader.Read<uint32_t>("an image");
     image.name = reader.ReadName();
     if (!names.insert(image.name).second)
-      reader.Fail("the image name " + image.name + " comes twice");
+      reader.Fail("the image name " + image.name + " occurs twice");
     image.keypoints.resize(reader.ReadCount("keypoints", 3 * 8));
     for (ColmapKeypoint& keypoint : image.keypoints) {
       keypoint.u = ReadCoordinate(reader, "a keypoint");
@@ -214,7 +209,7 @@ std::vector<ColmapPoint> ReadPoints(const std::string& folder) {
     point.position = ReadVector(reader, "a point's position");
     point.color = reader.Read<std::array<uint8_t, 3>>("a point");
     point.error = reader.Read<double>("a point");
-    if (!std::isfinite(point.error)) point.error = -1;  // unknown; we compute our own
+    if (!std::isfinite(point.error)) point.error = -1;  // unknown
     point.track.resize(reader.ReadCount("track elements", 4 + 4));
     for (ColmapTrackElement& element : point.track) {
       element.image_id = reader.Read<uint32_t>("a track");
@@ -244,7 +239,7 @@ void SortById(std::vector<Record>& records, const std::string& folder, const cha
                    [](const Record& a, const Record& b) { return a.id < b.id; });
   for (size_t i = 1; i < records.size(); ++i)
     if (records[i].id == records[i - 1].id)
-      FailLink(folder, file, "the id " + std::to_string(records[i].id) + " comes twice");
+      FailLink(folder, file, "the id " + std::to_string(records[i].id) + " occurs twice");
 }
 
 void CheckLinks(const ColmapModel& model, const std::string& folder) {

@@ -1,5 +1,5 @@
-// COLMAP's sparse model as data: a bounded reader and a writer of cameras.bin, images.bin and
-// points3D.bin, and the way from there to a Capture.
+// COLMAP's sparse model: reads and writes cameras.bin, images.bin and points3D.bin, and
+// converts to a Capture.
 #pragma once
 
 #include <array>
@@ -28,7 +28,7 @@ struct ColmapKeypoint {
 struct ColmapImage {
   uint32_t id = 0;
   uint32_t camera_id = 0;
-  std::string name;  // a key to match with, never a path to open
+  std::string name;  // a key for matching, never opened as a path
   RigidTransform camera_from_world;
   std::vector<ColmapKeypoint> keypoints;
 };
@@ -46,13 +46,13 @@ struct ColmapPoint {
   std::vector<ColmapTrackElement> track;
 };
 
-// Each list is sorted by id; every id that is referred to exists.
+// Each list is sorted by id; all references are valid.
 struct ColmapModel {
   std::vector<ColmapCamera> cameras;
   std::vector<ColmapImage> images;
   std::vector<ColmapPoint> points;
 
-  // nullptr if there is none.
+  // nullptr if there is no such id.
   const ColmapCamera* FindCamera(uint32_t id) const;
   const ColmapImage* FindImage(uint32_t id) const;
   const ColmapPoint* FindPoint(uint64_t id) const;
@@ -61,26 +61,26 @@ struct ColmapModel {
   Camera CameraOf(const ColmapImage& image) const;
 };
 
-// Reads `folder`/{cameras,images,points3D}.bin, or .txt where there is no .bin. Nothing in the
-// files is trusted: counts are checked against the bytes left before memory is taken, every id
-// must resolve, numbers must be finite and plausible, nothing may follow. Throws Error(kInput)
-// that names the file, the place and the reason.
+// Reads `folder`/{cameras,images,points3D}.bin, or .txt where there is no .bin. Validates
+// untrusted files: counts are checked against the remaining bytes before allocation, all ids
+// must exist, numbers must be finite and plausible, and no bytes may follow. Throws
+// Error(kInput) with the file, the position and the reason.
 ColmapModel ReadColmapModel(const std::string& folder);
 
 // The unit quaternion w x y z of a rotation, w >= 0.
 std::array<double, 4> QuaternionOf(const Mat3d& rotation);
 
-// Writes the three .bin files into `folder`, which exists. Throws Error(kResources) when they
-// do not fit. Reading them back gives the same numbers.
+// Writes the three .bin files into the existing `folder`. Throws Error(kResources) if the disk
+// is full. Reading them back gives the same numbers, rotations up to rounding.
 void WriteColmapModel(const ColmapModel& model, const std::string& folder);
 
-// Which of our two names for a photo a model's image names mean.
+// Whether a model's image names are staged names or the user's file names.
 enum class PhotoNames { kStaged, kUser };
 
-// The photos that the model has poses for, matched by exact name, in the order of `photos`,
-// each with a verdict "used" or "unregistered"; points seen by at least two of them. Images of
-// the model without a photo get the verdict "skipped". Reprojection errors are computed here.
-// Throws Error(kInput) if no name matches or a photo has another size than its camera.
+// The photos with a pose in the model, matched by exact name, in the order of `photos`, and the
+// points seen by at least two of them. Photos get the status "used" or "unregistered", images
+// of the model without a photo "skipped". Computes the reprojection errors. Throws
+// Error(kInput) if no name matches or a photo has another size than its camera.
 Capture CaptureFromModel(const ColmapModel& model, const std::vector<StagedPhoto>& photos,
                          PhotoNames names = PhotoNames::kStaged);
 

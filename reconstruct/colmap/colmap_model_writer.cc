@@ -1,31 +1,18 @@
-// The writing half of COLMAP's model files.
+// Writes the three files of a COLMAP model.
+#include <Eigen/Geometry>
 #include <array>
-#include <cmath>
 #include <fstream>
 
 #include "kernels/base/error.h"
 #include "reconstruct/colmap/colmap_model.h"
 
 namespace regrade {
-// Starts from its largest component, which
-// is the well-conditioned one.
-std::array<double, 4> QuaternionOf(const Mat3d& r) {
-  const double trace = r(0, 0) + r(1, 1) + r(2, 2);
-  // 4 q_a q_b for all pairs, from the matrix; row a of it is 4 q_a q.
-  const double product[4][4] = {
-      {1 + trace, r(2, 1) - r(1, 2), r(0, 2) - r(2, 0), r(1, 0) - r(0, 1)},
-      {r(2, 1) - r(1, 2), 1 + 2 * r(0, 0) - trace, r(0, 1) + r(1, 0), r(0, 2) + r(2, 0)},
-      {r(0, 2) - r(2, 0), r(0, 1) + r(1, 0), 1 + 2 * r(1, 1) - trace, r(1, 2) + r(2, 1)},
-      {r(1, 0) - r(0, 1), r(0, 2) + r(2, 0), r(1, 2) + r(2, 1), 1 + 2 * r(2, 2) - trace}};
-  int largest = 0;
-  for (int a = 1; a < 4; ++a)
-    if (product[a][a] > product[largest][largest]) largest = a;
-  std::array<double, 4> q;
-  double norm = 0;
-  for (int a = 0; a < 4; ++a) norm += product[largest][a] * product[largest][a];
-  norm = std::copysign(std::sqrt(norm), product[largest][0]);
-  for (int a = 0; a < 4; ++a) q[a] = product[largest][a] / norm;
-  return q;
+
+std::array<double, 4> QuaternionOf(const Mat3d& rotation) {
+  const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> matrix(&rotation(0, 0));
+  Eigen::Quaterniond q = Eigen::Quaterniond(matrix).normalized();
+  if (q.w() < 0) q.coeffs() *= -1;
+  return {q.w(), q.x(), q.y(), q.z()};
 }
 
 namespace {

@@ -8,13 +8,13 @@
 namespace regrade {
 namespace {
 
-// Reads numbers after `key`, which may stand anywhere in the line (newer versions put the time
-// in front). Returns how many were read.
+// Reads numbers after `key`, anywhere in the line (newer versions print a timestamp first).
+// Returns the count of numbers read.
 template <typename... Numbers>
 int Scan(const std::string& line, const char* key, const char* format, Numbers... numbers) {
-  const size_t place = line.find(key);
-  if (place == std::string::npos) return 0;
-  return std::sscanf(line.c_str() + place + std::string(key).size(), format, numbers...);
+  const size_t position = line.find(key);
+  if (position == std::string::npos) return 0;
+  return std::sscanf(line.c_str() + position + std::string(key).size(), format, numbers...);
 }
 
 }  // namespace

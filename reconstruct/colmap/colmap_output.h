@@ -1,5 +1,5 @@
-// What COLMAP's printed lines tell: how far a command is, and evidence for why photos do not
-// fit together.
+// Parses COLMAP's output: progress of a command, and evidence of why photos were not
+// registered.
 #pragma once
 
 #include <map>
@@ -14,10 +14,10 @@ struct ColmapEvidence {
   int MedianFeatures() const;  // 0 without photos
 };
 
-// Feed it the lines of one command after the other.
+// Parses the output of the commands of one reconstruction, line by line.
 class ColmapOutput {
  public:
-  // `num_photos` is what mapper's count of registered images is compared with.
+  // `num_photos`: the total for mapper's count of registered images.
   explicit ColmapOutput(int num_photos) : num_photos_(num_photos) {}
 
   void StartCommand() { fraction_ = 0; }

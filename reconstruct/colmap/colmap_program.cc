@@ -10,10 +10,10 @@ namespace regrade {
 namespace {
 
 constexpr const char* kInstall =
-    "install COLMAP 3.7 or newer (Debian, Ubuntu: apt install colmap), or give its place with "
+    "install COLMAP 3.7 or newer (Debian, Ubuntu: apt install colmap), or give its path with "
     "--colmap PATH, or start from a capture that has poses";
 
-// COLMAP 3.12 and later moved options: {as in 3.8, as now}.
+// Options renamed by COLMAP 3.12: {in 3.8, since 3.12}.
 constexpr std::pair<const char*, const char*> kRenamed[] = {
     {"SiftExtraction.use_gpu", "FeatureExtraction.use_gpu"},
     {"SiftExtraction.num_threads", "FeatureExtraction.num_threads"},
@@ -23,35 +23,33 @@ constexpr std::pair<const char*, const char*> kRenamed[] = {
     {"BundleAdjustment.function_tolerance", "BundleAdjustmentCeres.function_tolerance"},
 };
 
-// Without a display, COLMAP's use of Qt aborts; its log files would go to the system's folder
-// for temporary files, and stay there.
+// COLMAP's Qt aborts without a display. Its log files would otherwise remain in the system's
+// temporary folder.
 const std::vector<std::pair<std::string, std::string>> kEnvironment = {
     {"QT_QPA_PLATFORM", "offscreen"}, {"GLOG_logtostderr", "1"}};
 
 bool IsPathOption(const std::string& name) { return name.ends_with("_path"); }
 
-bool SpeaksOfFullDisk(const std::string& line) {
+bool ReportsFullDisk(const std::string& line) {
   return line.find("disk is full") != std::string::npos ||
          line.find("No space left on device") != std::string::npos ||
          line.find("disk I/O error") != std::string::npos;
 }
 
-// A path that begins with a dash would read as an option.
+// Absolute, because a path that begins with a dash would be parsed as an option.
 std::string Absolute(const std::string& path) {
   return std::filesystem::absolute(path).string();
 }
 
 const char* LikelyCause(const ChildResult& result) {
   if (result.TimedOut())
-    return "raise --pose-time-limit if the photos are many or the machine is slow";
+    return "raise --pose-time-limit if there are many photos or the machine is slow";
   if (result.signal == SIGKILL)
-    return "the system killed it, most likely for want of memory: close other programs, or "
-           "lower "
-           "--pose-image-size";
+    return "the system killed it, probably because memory ran out: close other programs, or "
+           "lower --pose-image-size";
   if (result.signal == SIGILL) return "this colmap was built for another kind of processor";
-  if (result.signal != 0 || result.exit_status >= 128)
-    return "this is a crash of COLMAP; its log says where";
-  return "its log may say why";
+  if (result.signal != 0 || result.exit_status >= 128) return "COLMAP crashed; see its log";
+  return "see its log";
 }
 
 }  // namespace
@@ -94,7 +92,7 @@ ChildResult ColmapProgram::Run(const std::string& command, const ColmapArguments
                                const LineFunction& on_line,
                                const KeepGoingFunction& keep_going) {
   ChildOptions options;
-  options.argv = Spelled(command, arguments);
+  options.argv = CommandLine(command, arguments);
   options.environment = kEnvironment;
   options.wall_limit_s = limits.wall_s;
   options.quiet_limit_s = limits.quiet_s;
@@ -103,14 +101,14 @@ ChildResult ColmapProgram::Run(const std::string& command, const ColmapArguments
   const ChildResult result = RunChild(
       options,
       [&](const std::string& line) {
-        disk_full = disk_full || SpeaksOfFullDisk(line);
+        disk_full = disk_full || ReportsFullDisk(line);
         if (on_line) on_line(line);
       },
       keep_going);
   if (result.end == ChildEnd::kStopped) throw Interrupted();
   if (disk_full)
     throw Error(ExitCode::kResources, "the disk is full (colmap " + command + ")", log_folder_,
-                "free some space; COLMAP needs about 1 MB a photo");
+                "free some space; COLMAP needs about 1 MB per photo");
   return result;
 }
 
@@ -136,18 +134,18 @@ const std::set<std::string>& ColmapProgram::OptionsOf(const std::string& command
   return names;
 }
 
-std::vector<std::string> ColmapProgram::Spelled(const std::string& command,
-                                                const ColmapArguments& arguments) {
+std::vector<std::string> ColmapProgram::CommandLine(const std::string& command,
+                                                    const ColmapArguments& arguments) {
   const std::set<std::string>& known = OptionsOf(command);
   std::vector<std::string> argv = {program_, command};
   for (const auto& [name, value] : arguments) {
-    std::string spelled = name;
+    std::string option = name;
     for (const auto& [before, now] : kRenamed)
-      if (name == before && known.count(name) == 0) spelled = now;
+      if (name == before && known.count(name) == 0) option = now;
     if (IsPathOption(name)) {
       argv.insert(argv.end(), {"--" + name, Absolute(value)});
-    } else if (known.count(spelled) > 0) {
-      argv.insert(argv.end(), {"--" + spelled, value});
+    } else if (known.count(option) > 0) {
+      argv.insert(argv.end(), {"--" + option, value});
     }
   }
   return argv;

@@ -1,5 +1,5 @@
-// The colmap program as we use it: found, its version checked, its options spelled as the
-// installed version spells them, its last words turned into an error that helps.
+// Runs the colmap program: checks its version, translates option names, and turns failures into
+// errors with the end of its log.
 #pragma once
 
 #include <map>
@@ -12,7 +12,7 @@
 
 namespace regrade {
 
-// Names without the leading dashes, as COLMAP 3.8 knows them.
+// Option names of COLMAP 3.8 without the leading dashes, and values.
 using ColmapArguments = std::vector<std::pair<std::string, std::string>>;
 
 class ColmapProgram {
@@ -29,22 +29,22 @@ class ColmapProgram {
   const std::string& version() const { return version_; }  // "3.8"
   const std::string& log_folder() const { return log_folder_; }
 
-  // Runs one command; its log is `log_folder`/`log_name`.log. Options that this version has
-  // under another name are renamed, tuning options that it does not have are left out. Throws
-  // Error(kResources) when the log speaks of a full disk (COLMAP exits with 0 then); every
-  // other outcome is returned.
+  // Runs one command; its log is `log_folder`/`log_name`.log. Renames options to the installed
+  // version's names and omits tuning options that it does not have. Throws Error(kResources) if
+  // the log reports a full disk (COLMAP exits with 0 then), Interrupted if `keep_going` returns
+  // false; returns all other outcomes.
   ChildResult Run(const std::string& command, const ColmapArguments& arguments,
                   const std::string& log_name, const Limits& limits,
                   const LineFunction& on_line = {}, const KeepGoingFunction& keep_going = {});
 
-  // The error for a command that failed, with the end of its log.
+  // Throws the error for a failed command, with the end of its log.
   [[noreturn]] void Fail(const std::string& command, const ChildResult& result,
                          const std::string& log_name) const;
 
  private:
   const std::set<std::string>& OptionsOf(const std::string& command);
-  std::vector<std::string> Spelled(const std::string& command,
-                                   const ColmapArguments& arguments);
+  std::vector<std::string> CommandLine(const std::string& command,
+                                       const ColmapArguments& arguments);
   std::string LogPath(const std::string& log_name) const;
 
   std::string program_, log_folder_, version_;

@@ -7,14 +7,13 @@ namespace regrade {
 namespace {
 
 constexpr int kOverlap = 10;   // neighbours on each side, when not all pairs are matched
-constexpr int kBlockSize = 8;  // photos a block: a line of output for every 64 pairs at most
-// Below this longer side, pictures have few features at their own size.
+constexpr int kBlockSize = 8;  // photos per block: COLMAP prints a line for at most 64 pairs
+// Photos with a shorter longer side have few features at their original size.
 constexpr int kSmallSide = 900;
-// Fewer photos than this do not hold four free distortion coefficients while the model is
-// small.
+// With fewer photos, four distortion coefficients are underdetermined while the model is small.
 constexpr size_t kFewPhotos = 20;
-// Up to this many photos more features cost little, and the finer ones are placed better: on
-// strecha/fountain-P11 they bring the rotation error from 0.17 to 0.05 degrees.
+// Up to this many photos, more features cost little, and the finer ones are more accurate: on
+// strecha/fountain-P11 they reduce the rotation error from 0.17 to 0.05 degrees.
 constexpr size_t kFewPairs = 15;
 // The cost of matching all pairs grows with the square.
 constexpr size_t kMostForAllPairs = 150;
@@ -43,31 +42,31 @@ std::vector<CameraGroup> GroupByCamera(const std::vector<StagedPhoto>& photos) {
   return groups;
 }
 
-std::vector<PoseRecipe> PoseStrategies(const std::vector<StagedPhoto>& photos,
-                                       int all_pairs_up_to) {
+std::vector<PoseStrategy> PoseStrategies(const std::vector<StagedPhoto>& photos,
+                                         int all_pairs_up_to) {
   int side = 0;
   for (const StagedPhoto& photo : photos) side = std::max({side, photo.width, photo.height});
   const bool simple_lens = photos.size() < kFewPhotos || GroupByCamera(photos).size() > 1;
 
-  PoseRecipe quick{.name = "quick"};
+  PoseStrategy quick{.name = "quick"};
   if (photos.size() <= kFewPairs) quick.max_features = 4096;
   quick.first_octave = side < kSmallSide || photos.size() <= kFewPairs ? -1 : 0;
   quick.lens = simple_lens ? ColmapLens::kSimpleRadial : ColmapLens::kOpenCv;
   quick.all_pairs = static_cast<int>(photos.size()) <= all_pairs_up_to;
 
-  PoseRecipe finer = quick;
+  PoseStrategy finer = quick;
   finer.name = "more features";
   finer.max_features = 8192;
   finer.first_octave = -1;
 
-  PoseRecipe relaxed = finer;
+  PoseStrategy relaxed = finer;
   relaxed.name = "narrower first pair";
   relaxed.keep_matches = true;
   relaxed.init_angle_deg = 5;
   relaxed.init_inliers = 50;
   relaxed.min_inliers = 20;
 
-  PoseRecipe thorough = relaxed;
+  PoseStrategy thorough = relaxed;
   thorough.name = "all pairs, wider lens";
   thorough.keep_matches = false;
   thorough.max_features = quick.all_pairs ? 8192 : 4096;
@@ -77,66 +76,66 @@ std::vector<PoseRecipe> PoseStrategies(const std::vector<StagedPhoto>& photos,
   return {quick, finer, relaxed, thorough};
 }
 
-ColmapArguments ExtractArguments(const PoseRecipe& recipe, const CameraGroup& group,
+ColmapArguments ExtractArguments(const PoseStrategy& strategy, const CameraGroup& group,
                                  int max_image_size, int threads, const ColmapPaths& paths) {
   ColmapArguments arguments = {
       {"database_path", paths.database},
       {"image_path", paths.photos},
       {"image_list_path", paths.image_list},
       {"ImageReader.single_camera", "1"},
-      {"ImageReader.camera_model", ColmapLensName(recipe.lens)},
-      {"ImageReader.default_focal_length_factor", Text(recipe.focal_factor)},
+      {"ImageReader.camera_model", ColmapLensName(strategy.lens)},
+      {"ImageReader.default_focal_length_factor", Text(strategy.focal_factor)},
       {"SiftExtraction.use_gpu", "0"},
       {"SiftExtraction.num_threads", std::to_string(threads > 0 ? threads : -1)},
       {"SiftExtraction.max_image_size", std::to_string(max_image_size)},
-      {"SiftExtraction.max_num_features", std::to_string(recipe.max_features)},
-      {"SiftExtraction.first_octave", std::to_string(recipe.first_octave)},
+      {"SiftExtraction.max_num_features", std::to_string(strategy.max_features)},
+      {"SiftExtraction.first_octave", std::to_string(strategy.first_octave)},
   };
   if (!paths.masks.empty()) arguments.push_back({"ImageReader.mask_path", paths.masks});
   if (group.focal_px > 0) {
     const std::string f = Text(group.focal_px);
-    std::string parameters = recipe.lens == ColmapLens::kOpenCv ? f + "," + f : f;
+    std::string parameters = strategy.lens == ColmapLens::kOpenCv ? f + "," + f : f;
     parameters += "," + Text(group.width / 2.0) + "," + Text(group.height / 2.0);
-    parameters += recipe.lens == ColmapLens::kOpenCv ? ",0,0,0,0" : ",0";
+    parameters += strategy.lens == ColmapLens::kOpenCv ? ",0,0,0,0" : ",0";
     arguments.push_back({"ImageReader.camera_params", parameters});
   }
   return arguments;
 }
 
-std::string MatchCommand(const PoseRecipe& recipe) {
-  return recipe.all_pairs ? "exhaustive_matcher" : "sequential_matcher";
+std::string MatchCommand(const PoseStrategy& strategy) {
+  return strategy.all_pairs ? "exhaustive_matcher" : "sequential_matcher";
 }
 
-ColmapArguments MatchArguments(const PoseRecipe& recipe, int threads,
+ColmapArguments MatchArguments(const PoseStrategy& strategy, int threads,
                                const ColmapPaths& paths) {
   ColmapArguments arguments = {
       {"database_path", paths.database},
       {"SiftMatching.use_gpu", "0"},
       {"SiftMatching.num_threads", std::to_string(threads > 0 ? threads : -1)},
   };
-  if (recipe.all_pairs)
+  if (strategy.all_pairs)
     arguments.push_back({"ExhaustiveMatching.block_size", std::to_string(kBlockSize)});
   else
     arguments.push_back({"SequentialMatching.overlap", std::to_string(kOverlap)});
   return arguments;
 }
 
-ColmapArguments MapArguments(const PoseRecipe& recipe, int num_photos, int threads,
+ColmapArguments MapArguments(const PoseStrategy& strategy, int num_photos, int threads,
                              const ColmapPaths& paths) {
   return {
       {"database_path", paths.database},
       {"image_path", paths.photos},
       {"output_path", paths.model},
       {"Mapper.num_threads", std::to_string(threads > 0 ? threads : -1)},
-      // The defaults of 0 run every bundle adjustment to its cap of iterations; the poses are
-      // the same and a third of the time is saved.
+      // With the defaults of 0 every bundle adjustment runs to its iteration limit. These
+      // values give the same poses in two thirds of the time.
       {"Mapper.ba_local_function_tolerance", "1e-6"},
       {"Mapper.ba_global_function_tolerance", "1e-6"},
-      // Smaller models are dropped without a word, and small captures with them.
+      // COLMAP silently drops smaller models; its default would drop small captures.
       {"Mapper.min_model_size", std::to_string(std::clamp(num_photos / 4, 3, 10))},
-      {"Mapper.init_min_tri_angle", Text(recipe.init_angle_deg)},
-      {"Mapper.init_min_num_inliers", std::to_string(recipe.init_inliers)},
-      {"Mapper.abs_pose_min_num_inliers", std::to_string(recipe.min_inliers)},
+      {"Mapper.init_min_tri_angle", Text(strategy.init_angle_deg)},
+      {"Mapper.init_min_num_inliers", std::to_string(strategy.init_inliers)},
+      {"Mapper.abs_pose_min_num_inliers", std::to_string(strategy.min_inliers)},
   };
 }
 

@@ -1,5 +1,5 @@
-// The strategies of recipes for COLMAP: the cheapest that works for most captures first, then
-// the ones that find poses where it fails, at a price.
+// COLMAP strategies, cheapest first: the first one works for most captures, the others for the
+// rest at a higher cost.
 #pragma once
 
 #include <string>
@@ -11,18 +11,17 @@
 
 namespace regrade {
 
-struct PoseRecipe {
+struct PoseStrategy {
   std::string name;
-  int max_features = 2048;  // a photo
-  int first_octave = 0;     // -1 doubles the picture first: more and finer features
-  ColmapLens lens =
-      ColmapLens::kOpenCv;     // while the model grows; it is fitted again at the end
-  double focal_factor = 1.2;   // first guess of focal length over the longer side, without EXIF
-  bool all_pairs = true;       // otherwise each photo with those that follow it
-  bool keep_matches = false;   // features and matches of the attempt before
+  int max_features = 2048;  // per photo
+  int first_octave = 0;     // -1 upsamples the photo by 2: more and finer features
+  ColmapLens lens = ColmapLens::kOpenCv;  // of the mapper; the final lens is fitted later
+  double focal_factor = 1.2;   // initial focal length over the longer side, without EXIF
+  bool all_pairs = true;       // otherwise each photo with its successors
+  bool keep_matches = false;   // reuse features and matches of the previous attempt
   double init_angle_deg = 16;  // least angle between the rays of the first two photos
   int init_inliers = 100;      // least matches between them
-  int min_inliers = 30;        // least points that place a further photo
+  int min_inliers = 30;        // least points to register a further photo
 };
 
 // Photos taken with one lens and one picture size: one camera in the model.
@@ -35,22 +34,23 @@ struct CameraGroup {
 // In the order of their first photo. Photos share a camera if size and EXIF focal length agree.
 std::vector<CameraGroup> GroupByCamera(const std::vector<StagedPhoto>& photos);
 
-// `all_pairs_up_to`: more photos than this are matched with their neighbours in the order of
-// names, except on the last attempt.
-std::vector<PoseRecipe> PoseStrategies(const std::vector<StagedPhoto>& photos,
-                                       int all_pairs_up_to);
+// With more than `all_pairs_up_to` photos, each is matched with its neighbours in the order of
+// names, except in the last strategy.
+std::vector<PoseStrategy> PoseStrategies(const std::vector<StagedPhoto>& photos,
+                                         int all_pairs_up_to);
 
 struct ColmapPaths {
   std::string photos, database, image_list, model;
   std::string masks;  // folder; empty: none
 };
 
-// The command lines of one recipe. `threads` 0 leaves the number to COLMAP.
-ColmapArguments ExtractArguments(const PoseRecipe& recipe, const CameraGroup& group,
+// The command lines of one strategy. `threads` 0: COLMAP chooses.
+ColmapArguments ExtractArguments(const PoseStrategy& strategy, const CameraGroup& group,
                                  int max_image_size, int threads, const ColmapPaths& paths);
-std::string MatchCommand(const PoseRecipe& recipe);
-ColmapArguments MatchArguments(const PoseRecipe& recipe, int threads, const ColmapPaths& paths);
-ColmapArguments MapArguments(const PoseRecipe& recipe, int num_photos, int threads,
+std::string MatchCommand(const PoseStrategy& strategy);
+ColmapArguments MatchArguments(const PoseStrategy& strategy, int threads,
+                               const ColmapPaths& paths);
+ColmapArguments MapArguments(const PoseStrategy& strategy, int num_photos, int threads,
                              const ColmapPaths& paths);
 
 }  // namespace regrade

@@ -1,6 +1,6 @@
-// Format: colmap.github.io/format.html. Lines that begin with '#' are comments. An image takes
-// two lines, the second (its keypoints) may be empty; an image's name may hold spaces and ends
-// the first.
+// Format: colmap.github.io/format.html. Lines that begin with '#' are comments. An image has
+// two lines: the first ends with its name, which may contain spaces; the second, its keypoints,
+// may be empty.
 #include "reconstruct/colmap/colmap_text.h"
 
 #include <algorithm>
@@ -17,13 +17,13 @@ class LineReader {
  public:
   LineReader(const std::string& text, const std::string& path) : text_(text), path_(path) {}
 
-  // The next line that is no comment; blank lines count only where `blank_counts`. False at the
-  // end.
+  // Moves to the next line that is not a comment; skips blank lines unless `blank_counts`.
+  // False at the end.
   bool Next(bool blank_counts) {
-    while (place_ < text_.size()) {
-      const size_t end = std::min(text_.find('\n', place_), text_.size());
-      line_ = std::string_view(text_).substr(place_, end - place_);
-      place_ = end + 1;
+    while (position_ < text_.size()) {
+      const size_t end = std::min(text_.find('\n', position_), text_.size());
+      line_ = std::string_view(text_).substr(position_, end - position_);
+      position_ = end + 1;
       ++number_;
       if (!line_.empty() && line_.back() == '\r') line_.remove_suffix(1);
       if (!line_.empty() && line_[0] == '#') continue;
@@ -44,7 +44,7 @@ class LineReader {
     line_.remove_prefix(word.size());
     return word;
   }
-  // What is left of the line, without blanks around it.
+  // The rest of the line, trimmed.
   std::string Rest(const char* what) {
     if (!HasWord()) Fail(std::string("ends before ") + what);
     return std::string(line_.substr(0, line_.find_last_not_of(" \t") + 1));
@@ -67,7 +67,7 @@ class LineReader {
   const std::string& text_;
   std::string path_;
   std::string_view line_;
-  size_t place_ = 0;
+  size_t position_ = 0;
   int64_t number_ = 0;
 };
 

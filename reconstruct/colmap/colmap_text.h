@@ -1,4 +1,4 @@
-// COLMAP's text models: cameras.txt, images.txt and points3D.txt.
+// Reads and writes COLMAP's text models: cameras.txt, images.txt and points3D.txt.
 #pragma once
 
 #include <string>
@@ -7,15 +7,15 @@
 
 namespace regrade {
 
-// The bytes that `name`.bin would hold for the text of `name`.txt ("cameras", "images" or
-// "points3D"), so that one reader judges both. `path` names the file in errors. Throws
-// Error(kInput) with the line for a word that is no number, a line that ends too early, or an
-// unknown camera model.
+// Converts the text of `name`.txt ("cameras", "images" or "points3D") to the bytes of
+// `name`.bin, so that one reader validates both. `path` names the file in errors. Throws
+// Error(kInput) with the line for an invalid number, an incomplete line, or an unknown camera
+// model.
 std::string BinaryOfColmapText(const std::string& name, const std::string& text,
                                const std::string& path);
 
-// Writes the three text files into `folder`, which exists; numbers read back exactly. Throws
-// Error(kResources) when they do not fit.
+// Writes the three text files into the existing `folder`; numbers are read back exactly. Throws
+// Error(kResources) if the disk is full.
 void WriteColmapText(const ColmapModel& model, const std::string& folder);
 
 }  // namespace regrade

@@ -5,7 +5,7 @@
 namespace regrade {
 namespace {
 
-constexpr int kFewFeatures = 150;  // a photo with fewer has nothing to hold on to
+constexpr int kFewFeatures = 150;  // a photo with fewer can hardly be matched
 
 constexpr const char* kTakeMore =
     "take 20 to 60 photos that overlap by two thirds, stepping sideways between them";
@@ -22,13 +22,12 @@ std::string TooFew(size_t given, int least) {
 Reason WhyNoModel(const ColmapEvidence& evidence) {
   const int features = evidence.MedianFeatures();
   if (features < kFewFeatures)
-    return {"the photos show too little to hold on to (about " + std::to_string(features) +
-                " features each): they are blurred, or the scene is plain",
+    return {"the photos have too few features to match (about " + std::to_string(features) +
+                " each): they are blurred, or the scene has no texture",
             "take sharp photos, in good light, of something with texture"};
   if (evidence.matched_pairs == 0)
     return {"no two photos show the same things from two places",
-            "take photos of one scene that keeps still, each overlapping the one before by two "
-            "thirds"};
+            "take photos of one static scene, each overlapping the previous one by two thirds"};
   return {
       "no two photos show the same things from clearly different places: the camera only "
       "turned, or the scene moved",
@@ -38,24 +37,24 @@ Reason WhyNoModel(const ColmapEvidence& evidence) {
 void ExplainUnregistered(const AttemptResult& attempt, const std::vector<StagedPhoto>& photos,
                          Capture* capture) {
   for (size_t i = 0; i < photos.size(); ++i) {
-    PhotoStatus& verdict = capture->statuses[i];
-    if (verdict.status != PhotoState::kUnregistered) continue;
+    PhotoStatus& photo = capture->statuses[i];
+    if (photo.status != PhotoState::kUnregistered) continue;
     const std::string& name = photos[i].name;
     const auto features = attempt.evidence.features.find(name);
     if (features == attempt.evidence.features.end()) {
-      verdict.why = "COLMAP did not read it";
+      photo.why = "COLMAP did not read it";
     } else if (features->second < kFewFeatures) {
-      verdict.why = "only " + std::to_string(features->second) +
-                    " features: blurred, or nothing with texture in it";
+      photo.why =
+          "only " + std::to_string(features->second) + " features: blurred, or without texture";
     } else {
-      verdict.why = "it overlaps too little with the photos that were placed";
+      photo.why = "it overlaps too little with the registered photos";
     }
     for (size_t k = 1; k < attempt.models.size(); ++k)
       for (const ColmapImage& image : attempt.models[k].model.images)
         if (image.name == name)
-          verdict.why = "it belongs to another group of " +
-                        Photos(attempt.models[k].model.images.size()) +
-                        " that nothing connects to the main one";
+          photo.why = "it belongs to another group of " +
+                      Photos(attempt.models[k].model.images.size()) +
+                      " without common points with the main group";
   }
 }
 
@@ -63,8 +62,8 @@ std::string NoteOnOtherModels(const AttemptResult& attempt) {
   std::string others;
   for (size_t k = 1; k < attempt.models.size(); ++k)
     others += (k == 1 ? "" : ", ") + std::to_string(attempt.models[k].model.images.size());
-  return "the photos fall apart into " + std::to_string(attempt.models.size()) +
-         " groups that nothing connects; the largest is used (the others have " + others + ")";
+  return "the photos form " + std::to_string(attempt.models.size()) +
+         " groups without common points; the largest is used (the others have " + others + ")";
 }
 
 void Refuse(const Reason& reason, size_t photos_given, int min_photos) {
@@ -80,16 +79,16 @@ void RefuseTooFew(size_t photos_given, int min_photos) {
 
 void RefuseUnregistered(const Capture& capture) {
   std::string names;
-  for (const PhotoStatus& verdict : capture.statuses)
-    if (verdict.status == PhotoState::kUnregistered)
-      names += "\n  " + verdict.file + ": " + verdict.why;
+  for (const PhotoStatus& photo : capture.statuses)
+    if (photo.status == PhotoState::kUnregistered)
+      names += "\n  " + photo.file + ": " + photo.why;
   throw Error(ExitCode::kScene,
               "only " + std::to_string(capture.views.size()) + " of " +
                   Photos(capture.statuses.size()) +
-                  " found their place in one scene; not these:" + names,
+                  " were registered in one scene; the others:" + names,
               "",
               "give photos of one scene that overlap by two thirds, or lower "
-              "--pose-min-registered to go on with what there is");
+              "--pose-min-registered to continue with the registered ones");
 }
 
 }  // namespace regrade

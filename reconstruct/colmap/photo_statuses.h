@@ -1,5 +1,5 @@
-// What one attempt of the strategies found, and the sentences that explain to a photographer
-// why photos could not be placed.
+// The result of one pose attempt, and messages for a photographer about photos that could not
+// be registered.
 #pragma once
 
 #include <string>
@@ -12,20 +12,20 @@
 
 namespace regrade {
 
-// One model that COLMAP wrote and our reader accepted.
+// A model written by COLMAP and accepted by our reader.
 struct FoundModel {
   ColmapModel model;
   Capture capture;
-  std::string refusal;  // by AssessScene; empty: plausible
+  std::string refusal;  // from AssessScene; empty: plausible
 
-  // Plausible before implausible, then more photos, then more points.
+  // Order: plausible, then number of photos, then number of points.
   auto Rank() const {
     return std::tuple(refusal.empty(), model.images.size(), model.points.size());
   }
 };
 
 struct AttemptResult {
-  std::string recipe;
+  std::string strategy;
   std::vector<FoundModel> models;  // best first
   ColmapEvidence evidence;
 };
@@ -34,18 +34,18 @@ struct Reason {
   std::string why, remedy;
 };
 
-// Why no recipe gave a model, as far as COLMAP's output tells.
+// Why no strategy gave a model, according to COLMAP's output.
 Reason WhyNoModel(const ColmapEvidence& evidence);
 
-// Fills in `why` of the unregistered photos; the first photos.size() statuses of the capture
-// are theirs. Says only what COLMAP's output proves.
+// Sets `why` of the unregistered photos, according to COLMAP's output; the first photos.size()
+// statuses of the capture belong to `photos`.
 void ExplainUnregistered(const AttemptResult& attempt, const std::vector<StagedPhoto>& photos,
                          Capture* capture);
 
-// For a attempt with several models: the sizes of those that are not used.
+// For an attempt with several models: a note with the sizes of the unused ones.
 std::string NoteOnOtherModels(const AttemptResult& attempt);
 
-// Throw Error(kScene). Refuse adds that the photos are too few, where they are.
+// Throw Error(kScene). Refuse adds that there are too few photos, if so.
 [[noreturn]] void Refuse(const Reason& reason, size_t photos_given, int min_photos);
 [[noreturn]] void RefuseTooFew(size_t photos_given, int min_photos);
 [[noreturn]] void RefuseUnregistered(const Capture& capture);

@@ -18,16 +18,16 @@ double Megapixels(const std::vector<StagedPhoto>& photos, int image_size) {
 
 }  // namespace
 
-// Fitted to six captures of 8 to 50 photos: features take what their pixels take (four times as
-// many from octave -1 on), matching the square of the features.
-PoseWeights EstimateWeights(const PoseRecipe& recipe, const std::vector<StagedPhoto>& photos,
-                            int image_size) {
+// Fitted to six captures of 8 to 50 photos: extraction is proportional to the pixels (four
+// times as many from octave -1 on), matching to the square of the features.
+PoseWeights EstimateWeights(const PoseStrategy& strategy,
+                            const std::vector<StagedPhoto>& photos, int image_size) {
   const double n = static_cast<double>(photos.size());
-  const double pairs = recipe.all_pairs ? n * (n - 1) / 2 : std::min(10.0, n) * n;
-  const double size = recipe.max_features / 2048.0;
-  const double pixels = Megapixels(photos, image_size) * (recipe.first_octave < 0 ? 4 : 1);
-  return {recipe.keep_matches ? 0 : 0.27 * pixels,
-          recipe.keep_matches ? 0 : 0.07 * pairs * size * size, 0.4 * n * std::sqrt(size),
+  const double pairs = strategy.all_pairs ? n * (n - 1) / 2 : std::min(10.0, n) * n;
+  const double size = strategy.max_features / 2048.0;
+  const double pixels = Megapixels(photos, image_size) * (strategy.first_octave < 0 ? 4 : 1);
+  return {strategy.keep_matches ? 0 : 0.27 * pixels,
+          strategy.keep_matches ? 0 : 0.07 * pairs * size * size, 0.4 * n * std::sqrt(size),
           0.04 * n * std::sqrt(size)};
 }
 

@@ -1,4 +1,4 @@
-// What the parts of finding poses take, so that progress and the time left mean something.
+// Estimates the relative time of the pose steps, for progress.
 #pragma once
 
 #include <vector>
@@ -8,14 +8,14 @@
 
 namespace regrade {
 
-// Seconds on two cores, roughly.
+// Approximate seconds on two cores.
 struct PoseWeights {
   double extract, match, map, refine;
   double Sum() const { return extract + match + map + refine; }
 };
 
-// image_size: longer side at which features are found, pixels.
-PoseWeights EstimateWeights(const PoseRecipe& recipe, const std::vector<StagedPhoto>& photos,
-                            int image_size);
+// image_size: longer side at which features are extracted, pixels.
+PoseWeights EstimateWeights(const PoseStrategy& strategy,
+                            const std::vector<StagedPhoto>& photos, int image_size);
 
 }  // namespace regrade

@@ -1,5 +1,5 @@
-// The climb: for each recipe extract, match, map; read what came out with our own reader; stop
-// when enough photos are placed; then adjust, judge and hand over, or refuse with a reason.
+// For each strategy: extracts, matches and maps with COLMAP and reads the models, until enough
+// photos are registered. Then refines and checks the best model, or refuses with a reason.
 #include "reconstruct/colmap/poses_from_photos.h"
 
 #include <algorithm>
@@ -26,8 +26,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kGoodShare = 0.95;     // of the photos: no need to climb further
-constexpr double kBytesPerPhoto = 3e6;  // database and logs, generously
+constexpr double kGoodFraction = 0.95;  // of the photos: enough to stop
+constexpr double kBytesPerPhoto = 3e6;  // upper bound of database and logs
 
 double Now() {
   using Clock = std::chrono::steady_clock;
@@ -57,14 +57,14 @@ class PoseFinder {
     PrepareFolders();
     colmap_.emplace(options_.colmap, work_folder_ + "/logs");
     report_.colmap_version = colmap_->version();
-    const AttemptResult best = Climb();
+    const AttemptResult best = TryStrategies();
     if (best.models.empty())
       Refuse(WhyNoModel(best.evidence), photos_.size(), options_.min_photos);
     const RefinedModel refined = Refine(best.models.front().model);
     Capture capture = CaptureFromModel(refined.model, photos_);
     capture.models_found = static_cast<int>(best.models.size());
     ExplainUnregistered(best, photos_, &capture);
-    Judge(capture);
+    Check(capture);
     Describe(best, refined);
     CopyModel(refined.folder, sparse_output_folder);
     return capture;
@@ -90,28 +90,27 @@ class PoseFinder {
     if (available < needed)
       throw Error(
           ExitCode::kResources,
-          "too little space on the disk: " + std::to_string(std::lround(available / 1e6)) +
+          "too little free disk space: " + std::to_string(std::lround(available / 1e6)) +
               " MB free, about " + std::to_string(std::lround(needed / 1e6)) + " MB needed",
           work_folder_, "free some space, or choose another --out");
   }
 
-  // The best attempt, or the last one's evidence without models.
-  AttemptResult Climb() {
-    std::vector<PoseRecipe> strategies = PoseStrategies(photos_, options_.all_pairs_up_to);
-    // So few photos are refused whatever comes; one attempt says whether more is wrong with
-    // them.
+  // The best attempt, or the last one without models.
+  AttemptResult TryStrategies() {
+    std::vector<PoseStrategy> strategies = PoseStrategies(photos_, options_.all_pairs_up_to);
+    // Too few photos are refused in any case; one attempt finds further problems.
     if (TooFewGiven()) strategies.resize(1);
     AttemptResult best;
-    const PoseRecipe* last = nullptr;  // the recipe before, if it found all features there are
-    for (const PoseRecipe& recipe : strategies) {
-      if (last != nullptr && IsSameSearch(*last, recipe)) continue;
+    const PoseStrategy* last = nullptr;  // the previous one, if it found all features
+    for (const PoseStrategy& strategy : strategies) {
+      if (last != nullptr && IsSameSearch(*last, strategy)) continue;
       std::optional<AttemptResult> attempt;
       try {
-        attempt = RunRecipe(recipe);
+        attempt = RunStrategy(strategy);
       } catch (const Error& e) {
-        // What an earlier attempt found is not lost with a later one.
+        // A later failure does not discard an earlier result.
         if (best.models.empty() || e.code() != ExitCode::kExternalProgram) throw;
-        report_.notes.push_back("the recipe \"" + recipe.name +
+        report_.notes.push_back("the strategy \"" + strategy.name +
                                 "\" failed: " + e.what_failed());
         break;
       }
@@ -122,14 +121,14 @@ class PoseFinder {
                                   attempt->models.front().Rank() > best.models.front().Rank());
       if (better) best = std::move(*attempt);
       const bool usable = !best.models.empty() && best.models.front().refusal.empty();
-      const double share = Registered(best) / static_cast<double>(photos_.size());
-      if (usable && share >= kGoodShare) break;
-      // More features and more pairs placed no further photo: neither will what follows.
-      if (usable && share >= options_.min_registered && Registered(best) <= before) break;
-      last = FoundAllFeatures(recipe, output_.evidence()) ? &recipe : nullptr;
-      // Too few pairs to connect the photos, and no more features to find pairs with.
+      const double fraction = Registered(best) / static_cast<double>(photos_.size());
+      if (usable && fraction >= kGoodFraction) break;
+      // More features and more pairs registered no further photo, so later strategies will not.
+      if (usable && fraction >= options_.min_registered && Registered(best) <= before) break;
+      last = FoundAllFeatures(strategy, output_.evidence()) ? &strategy : nullptr;
+      // Too few pairs connect the photos, and there are no more features.
       const int pairs = output_.evidence().matched_pairs;
-      if (best.models.empty() && last != nullptr && recipe.all_pairs && pairs >= 0 &&
+      if (best.models.empty() && last != nullptr && strategy.all_pairs && pairs >= 0 &&
           pairs < static_cast<int>(photos_.size()) - 1)
         break;
       if (Now() > deadline_) break;
@@ -137,12 +136,12 @@ class PoseFinder {
     return best;
   }
 
-  static bool FoundAllFeatures(const PoseRecipe& recipe, const ColmapEvidence& evidence) {
-    return recipe.first_octave < 0 && evidence.MedianFeatures() < 0.9 * recipe.max_features;
+  static bool FoundAllFeatures(const PoseStrategy& strategy, const ColmapEvidence& evidence) {
+    return strategy.first_octave < 0 && evidence.MedianFeatures() < 0.9 * strategy.max_features;
   }
 
-  // Would `next` find again what `last` found, which had all the features that there are?
-  static bool IsSameSearch(const PoseRecipe& last, const PoseRecipe& next) {
+  // True if `next` would repeat the search of `last`, which found all features.
+  static bool IsSameSearch(const PoseStrategy& last, const PoseStrategy& next) {
     return !next.keep_matches && next.all_pairs == last.all_pairs && next.lens == last.lens &&
            next.focal_factor == last.focal_factor && next.init_angle_deg == last.init_angle_deg;
   }
@@ -151,70 +150,70 @@ class PoseFinder {
     return attempt.models.empty() ? 0 : attempt.models.front().model.images.size();
   }
 
-  AttemptResult RunRecipe(const PoseRecipe& recipe) {
+  AttemptResult RunStrategy(const PoseStrategy& strategy) {
     try {
-      return TryRecipe(recipe);
+      return TryStrategy(strategy);
     } catch (const Crash&) {
-      // Threads multiply COLMAP's memory; one is the safest way to run it.
+      // COLMAP's memory grows with its threads, so one thread may succeed.
       if (threads_ == 1) throw;
       threads_ = 1;
-      report_.notes.push_back("COLMAP crashed and was started again with one thread");
-      PoseRecipe again = recipe;
+      report_.notes.push_back("COLMAP crashed and was restarted with one thread");
+      PoseStrategy again = strategy;
       again.keep_matches = false;
-      return TryRecipe(again);
+      return TryStrategy(again);
     }
   }
 
-  // A failure that a second start with less memory may get past.
+  // A crash, after which a restart with less memory may succeed.
   struct Crash : Error {
     using Error::Error;
   };
 
-  AttemptResult TryRecipe(const PoseRecipe& recipe) {
-    const PoseWeights weights = EstimateWeights(recipe, photos_, options_.image_size);
+  AttemptResult TryStrategy(const PoseStrategy& strategy) {
+    const PoseWeights weights = EstimateWeights(strategy, photos_, options_.image_size);
     planned_ = spent_ + weights.Sum();
     const std::string attempt_folder =
-        recipe.keep_matches
+        strategy.keep_matches
             ? attempt_folder_
             : work_folder_ + "/attempt_" + std::to_string(report_.attempts_made + 1);
     const ColmapPaths paths = {photo_folder_, attempt_folder + "/database.db",
                                attempt_folder + "/images.txt", attempt_folder + "/sparse",
                                options_.mask_folder};
-    if (!recipe.keep_matches) {
-      // COLMAP skips what a database holds already, also when it was made with other options.
+    if (!strategy.keep_matches) {
+      // COLMAP keeps existing entries of a database, even if they were made with other options.
       fs::remove_all(attempt_folder);
       fs::create_directories(attempt_folder);
       attempt_folder_ = attempt_folder;
-      for (const CameraGroup& group : groups_) Extract(recipe, group, paths, weights.extract);
-      RunStage(MatchCommand(recipe), MatchArguments(recipe, threads_, paths), "matching",
-               recipe.name, weights.match);
+      for (const CameraGroup& group : groups_) Extract(strategy, group, paths, weights.extract);
+      RunStage(MatchCommand(strategy), MatchArguments(strategy, threads_, paths), "matching",
+               strategy.name, weights.match);
     }
     fs::remove_all(paths.model);
     fs::create_directories(paths.model);
-    return Map(recipe, paths, weights.map);
+    return Map(strategy, paths, weights.map);
   }
 
-  void Extract(const PoseRecipe& recipe, const CameraGroup& group, const ColmapPaths& paths,
+  void Extract(const PoseStrategy& strategy, const CameraGroup& group, const ColmapPaths& paths,
                double weight) {
     std::ofstream list(paths.image_list, std::ios::trunc);
     for (const std::string& name : group.names) list << name << "\n";
     list.close();
-    const double share = static_cast<double>(group.names.size()) / photos_.size();
+    const double fraction = static_cast<double>(group.names.size()) / photos_.size();
     RunStage("feature_extractor",
-             ExtractArguments(recipe, group, options_.image_size, threads_, paths), "features",
-             recipe.name, weight * share);
+             ExtractArguments(strategy, group, options_.image_size, threads_, paths),
+             "features", strategy.name, weight * fraction);
     std::error_code none;
     if (fs::file_size(paths.database, none) == 0 || none)
       throw Error(ExitCode::kExternalProgram,
                   "colmap feature_extractor ended without an error, but wrote no database",
-                  colmap_->log_folder(), "its log may say why");
+                  colmap_->log_folder(), "see its log");
   }
 
-  AttemptResult Map(const PoseRecipe& recipe, const ColmapPaths& paths, double weight) {
+  AttemptResult Map(const PoseStrategy& strategy, const ColmapPaths& paths, double weight) {
     const ChildResult result = RunColmap(
-        "mapper", MapArguments(recipe, static_cast<int>(photos_.size()), threads_, paths),
-        "mapping", recipe.name, weight);
-    AttemptResult attempt{recipe.name, {}, output_.evidence()};
+        "mapper", MapArguments(strategy, static_cast<int>(photos_.size()), threads_, paths),
+        "mapping", strategy.name, weight);
+    AttemptResult attempt{strategy.name, {}, output_.evidence()};
     std::string damage;
     std::set<fs::path> folders;
     for (const auto& entry : fs::directory_iterator(paths.model))
@@ -236,7 +235,7 @@ class PoseFinder {
     }
     std::stable_sort(attempt.models.begin(), attempt.models.end(),
                      [](const auto& a, const auto& b) { return a.Rank() > b.Rank(); });
-    // A mapper that was ended by its time limit leaves models that are complete all the same.
+    // A mapper that was stopped by its time limit may still have written complete models.
     if (!attempt.models.empty()) return attempt;
     if (!damage.empty())
       throw Error(ExitCode::kExternalProgram,
@@ -245,26 +244,26 @@ class PoseFinder {
     if (result.Succeeded())
       throw Error(ExitCode::kExternalProgram,
                   "colmap mapper ended without an error, but wrote no model",
-                  colmap_->log_folder() + "/mapper.log", "its log may say why");
-    // Exit status 1 is how it says that it found no model.
+                  colmap_->log_folder() + "/mapper.log", "see its log");
+    // mapper exits with 1 if it found no model.
     if (result.end != ChildEnd::kExited || result.exit_status != 1) FailStage("mapper", result);
     return attempt;
   }
 
   void RunStage(const std::string& command, const ColmapArguments& arguments,
-                const std::string& what, const std::string& recipe, double weight) {
-    const ChildResult result = RunColmap(command, arguments, what, recipe, weight);
-    // The matchers abort on a database without a single feature; mapper then says the rest.
+                const std::string& what, const std::string& strategy, double weight) {
+    const ChildResult result = RunColmap(command, arguments, what, strategy, weight);
+    // The matchers abort on a database without features; mapper then reports it.
     const bool no_features = output_.evidence().MedianFeatures() == 0;
     if (!result.Succeeded() && !(command != "feature_extractor" && no_features))
       FailStage(command, result);
   }
 
   ChildResult RunColmap(const std::string& command, const ColmapArguments& arguments,
-                        const std::string& what, const std::string& recipe, double weight) {
+                        const std::string& what, const std::string& strategy, double weight) {
     output_.StartCommand();
     const auto tick = [&] {
-      return ReportAt(spent_ + weight * output_.fraction(), what + " (" + recipe + ")");
+      return ReportAt(spent_ + weight * output_.fraction(), what + " (" + strategy + ")");
     };
     const ChildResult result = colmap_->Run(
         command, arguments, command,
@@ -274,7 +273,7 @@ class PoseFinder {
     return result;
   }
 
-  // False when the user wants out.
+  // False if the user cancelled.
   bool ReportAt(double done, const std::string& note) {
     return Report(progress_, std::min(done, planned_), planned_, note) != LoopControl::kStop;
   }
@@ -300,10 +299,10 @@ class PoseFinder {
 
   bool TooFewGiven() const { return static_cast<int>(photos_.size()) < options_.min_photos; }
 
-  // Throws the refusal, if there is one.
-  void Judge(const Capture& capture) {
+  // Throws if the capture is refused.
+  void Check(const Capture& capture) {
     SceneLimits limits = limits_;
-    if (TooFewGiven()) limits.min_views = 0;  // said already, and better
+    if (TooFewGiven()) limits.min_views = 0;  // RefuseTooFew has a better message
     const SceneAssessment assessment = AssessScene(capture, limits);
     if (!assessment.refusal.empty())
       Refuse({assessment.refusal, assessment.remedy}, photos_.size(), options_.min_photos);
@@ -314,7 +313,7 @@ class PoseFinder {
   }
 
   void Describe(const AttemptResult& best, const RefinedModel& refined) const {
-    report_.recipe = best.recipe;
+    report_.strategy = best.strategy;
     report_.lens = refined.lens;
     if (best.models.size() > 1) report_.notes.push_back(NoteOnOtherModels(best));
   }

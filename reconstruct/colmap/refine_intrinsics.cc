@@ -14,9 +14,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kLeastGain = 0.03;        // of the mean squared error, for four more unknowns
+constexpr double kLeastGain = 0.03;  // of the mean squared error, for four more parameters
 constexpr double kLeastCornerShift = 0.5;  // pixels
-constexpr double kMostDistortion = 15;     // pixels at a corner; beyond, PINHOLE is not tried
+constexpr double kMostDistortion = 15;     // pixels at a corner; above, skips PINHOLE
 constexpr double kMostCenterShift = 0.1;   // of the picture's side
 constexpr double kMostAspect = 1.05;       // fx / fy
 // Times the median error; about three standard deviations where errors are normal.
@@ -28,7 +28,7 @@ std::string NameOf(const LensAttempt& attempt) {
          (attempt.free_center ? ", free principal point" : ", principal point in the centre");
 }
 
-// COLMAP keeps its result also when the adjustment ran away; such a model must not win.
+// False for a diverged adjustment, which COLMAP writes all the same.
 bool IsPlausible(const ColmapModel& model) {
   for (const ColmapCamera& camera : model.cameras) {
     const Camera& c = camera.intrinsics;
@@ -46,7 +46,7 @@ double LargestCornerShift(const ColmapModel& model) {
   return largest;
 }
 
-// A few photos cannot tell a shifted centre from a turned camera.
+// A few photos cannot distinguish a shifted centre from a rotated camera.
 bool EnoughImagesForACenter(const ColmapModel& model) {
   for (const ColmapCamera& camera : model.cameras) {
     size_t images = 0;
@@ -56,7 +56,7 @@ bool EnoughImagesForACenter(const ColmapModel& model) {
   return true;
 }
 
-// Pixels; a point behind the camera is infinitely wrong.
+// In pixels; infinite behind the camera.
 double ErrorOf(const Camera& camera, const ColmapKeypoint& keypoint, const ColmapPoint& point) {
   double u, v;
   if (!camera.Project(point.position, &u, &v)) return std::numeric_limits<double>::infinity();
@@ -81,16 +81,17 @@ double MeanSquaredReprojection(const ColmapModel& model) {
   return count > 0 ? sum / static_cast<double>(count) : 0;
 }
 
-ColmapModel WithoutOutliers(const ColmapModel& grown, const ColmapModel& judge, double factor) {
-  REGRADE_CHECK_EQ(grown.images.size(), judge.images.size());
-  ColmapModel result = grown;
-  std::vector<std::vector<double>> errors(grown.images.size());
+ColmapModel WithoutOutliers(const ColmapModel& model, const ColmapModel& reference,
+                            double factor) {
+  REGRADE_CHECK_EQ(model.images.size(), reference.images.size());
+  ColmapModel result = model;
+  std::vector<std::vector<double>> errors(model.images.size());
   std::vector<double> all;
-  for (size_t i = 0; i < grown.images.size(); ++i) {
-    const Camera camera = judge.CameraOf(judge.images[i]);
-    for (const ColmapKeypoint& keypoint : grown.images[i].keypoints) {
-      // A point that the judge has dropped was wrong everywhere.
-      const ColmapPoint* point = judge.FindPoint(keypoint.point_id);
+  for (size_t i = 0; i < model.images.size(); ++i) {
+    const Camera camera = reference.CameraOf(reference.images[i]);
+    for (const ColmapKeypoint& keypoint : model.images[i].keypoints) {
+      // All observations of a point that the reference dropped are outliers.
+      const ColmapPoint* point = reference.FindPoint(keypoint.point_id);
       errors[i].push_back(point ? ErrorOf(camera, keypoint, *point)
                                 : std::numeric_limits<double>::infinity());
       if (point != nullptr) all.push_back(errors[i].back());
@@ -104,12 +105,12 @@ ColmapModel WithoutOutliers(const ColmapModel& grown, const ColmapModel& judge, 
   std::erase_if(result.points, [&](ColmapPoint& point) {
     std::erase_if(point.track, [&](const ColmapTrackElement& element) {
       const size_t i =
-          static_cast<size_t>(grown.FindImage(element.image_id) - &grown.images[0]);
+          static_cast<size_t>(model.FindImage(element.image_id) - &model.images[0]);
       return errors[i][element.keypoint] > limit;
     });
     return point.track.size() < 2;
   });
-  // Keypoints point back at what is left of the tracks.
+  // Relinks the keypoints to the remaining tracks.
   for (ColmapImage& image : result.images)
     for (ColmapKeypoint& keypoint : image.keypoints) keypoint.point_id = kNoColmapPoint;
   for (const ColmapPoint& point : result.points)
@@ -134,7 +135,7 @@ ColmapModel WithLens(const ColmapModel& model, ColmapLens lens) {
   return result;
 }
 
-RefinedModel RefineIntrinsics(ColmapProgram& colmap, const ColmapModel& grown,
+RefinedModel RefineIntrinsics(ColmapProgram& colmap, const ColmapModel& mapped,
                               const std::string& work_folder,
                               const ColmapProgram::Limits& limits,
                               const std::function<void(int, int)>& on_step,
@@ -163,40 +164,41 @@ RefinedModel RefineIntrinsics(ColmapProgram& colmap, const ColmapModel& grown,
     try {
       refined.model = ReadColmapModel(after);
     } catch (const Error&) {
-      // A runaway adjustment fails our reader's plausibility; a crash leaves nothing to read.
+      // The reader rejects a diverged adjustment; a crash leaves nothing to read.
       return std::nullopt;
     }
-    if (!result.Succeeded() || refined.model.images.size() != grown.images.size() ||
+    if (!result.Succeeded() || refined.model.images.size() != mapped.images.size() ||
         (attempt.free_center && !IsPlausible(refined.model)))
       return std::nullopt;
     refined.mean_squared_px = MeanSquaredReprojection(refined.model);
     return refined;
   };
-  const auto simpler_unless_worth_it = [&](const ColmapModel& start, bool free_center) {
+  const auto choose_lens = [&](const ColmapModel& start, bool free_center) {
     std::optional<RefinedModel> opencv = adjust(start, {ColmapLens::kOpenCv, free_center});
     if (opencv && LargestCornerShift(opencv->model) > kMostDistortion) return opencv;
     std::optional<RefinedModel> pinhole = adjust(start, {ColmapLens::kPinhole, free_center});
     if (!pinhole || !opencv) return pinhole ? pinhole : opencv;
-    const bool worth_it = LargestCornerShift(opencv->model) > kLeastCornerShift &&
-                          opencv->mean_squared_px < (1 - kLeastGain) * pinhole->mean_squared_px;
-    return worth_it ? opencv : pinhole;
+    const bool distorted =
+        LargestCornerShift(opencv->model) > kLeastCornerShift &&
+        opencv->mean_squared_px < (1 - kLeastGain) * pinhole->mean_squared_px;
+    return distorted ? opencv : pinhole;
   };
 
-  const ColmapModel start = WithoutOutliers(grown, grown, kOutlierFactor);
+  const ColmapModel start = WithoutOutliers(mapped, mapped, kOutlierFactor);
   std::optional<RefinedModel> chosen;
-  if (EnoughImagesForACenter(grown)) chosen = simpler_unless_worth_it(start, true);
-  if (!chosen) chosen = simpler_unless_worth_it(start, false);
+  if (EnoughImagesForACenter(mapped)) chosen = choose_lens(start, true);
+  if (!chosen) chosen = choose_lens(start, false);
   if (chosen) {
-    // The mapper's fixed principal point made some observations look wrong, and some right.
-    const ColmapModel again = WithoutOutliers(grown, chosen->model, kOutlierFactor);
+    // Determines the outliers again: the mapper's fixed principal point misjudged some.
+    const ColmapModel again = WithoutOutliers(mapped, chosen->model, kOutlierFactor);
     const std::optional<RefinedModel> better = adjust(again, chosen->attempt);
     return better ? *better : *chosen;
   }
-  // No adjustment held: what the mapper found goes on to be judged as it is.
-  const std::string as_grown = work_folder + "/as_grown";
-  fs::create_directories(as_grown);
-  WriteColmapModel(grown, as_grown);
-  return {as_grown, grown, {}, "as the mapper found it", MeanSquaredReprojection(grown)};
+  // No adjustment succeeded: returns the mapper's model.
+  const std::string as_mapped = work_folder + "/as_mapped";
+  fs::create_directories(as_mapped);
+  WriteColmapModel(mapped, as_mapped);
+  return {as_mapped, mapped, {}, "from the mapper", MeanSquaredReprojection(mapped)};
 }
 
 }  // namespace regrade

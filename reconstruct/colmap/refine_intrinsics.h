@@ -1,5 +1,5 @@
-// The last bundle adjustment: frees what COLMAP's mapper keeps fixed (the principal point) and
-// finds the simplest lens that explains the photos.
+// The final bundle adjustment: frees the principal point, which COLMAP's mapper keeps fixed,
+// and chooses the simplest lens that explains the photos.
 #pragma once
 
 #include <functional>
@@ -12,7 +12,7 @@ namespace regrade {
 
 struct LensAttempt {
   ColmapLens lens = ColmapLens::kPinhole;
-  bool free_center = false;  // is the principal point adjusted?
+  bool free_center = false;  // adjust the principal point
 };
 
 struct RefinedModel {
@@ -26,24 +26,26 @@ struct RefinedModel {
 // Mean squared reprojection error, pixels^2, over the observations in front of their cameras.
 double MeanSquaredReprojection(const ColmapModel& model);
 
-// The same model with another lens: focal lengths and centre are kept, the coefficients that
-// both lenses have as well. `lens` is kPinhole or kOpenCv.
+// The model with another lens: keeps focal lengths, centre, and the coefficients that both
+// lenses have. `lens` is kPinhole or kOpenCv.
 ColmapModel WithLens(const ColmapModel& model, ColmapLens lens);
 
-// `grown` without the observations whose error under `judge` (the same images, cameras and
-// points, perhaps adjusted) exceeds `factor` times the median error, and without points that
-// are seen fewer than two times then. COLMAP's adjustment has no robust loss and its mapper
-// admits 4 pixels: on strecha/fountain-P11 the outliers alone turn all cameras by half a
+// `model` without observations whose error in `reference` (the same images, cameras and points,
+// possibly adjusted) exceeds `factor` times the median error, and without points with fewer
+// than two remaining observations. COLMAP's adjustment has no robust loss and its mapper
+// accepts 4 pixels: on strecha/fountain-P11 the outliers alone rotate all cameras by half a
 // degree.
-ColmapModel WithoutOutliers(const ColmapModel& grown, const ColmapModel& judge, double factor);
+ColmapModel WithoutOutliers(const ColmapModel& model, const ColmapModel& reference,
+                            double factor);
 
-// Adjusts `grown`, outliers removed, with PINHOLE and with OPENCV lenses, principal point free,
-// and keeps PINHOLE unless OPENCV moves a corner of a picture by more than half a pixel and
-// lowers the mean squared error by more than 3 %; then once more with the outliers told by the
-// result. Where a principal point runs off by more than a tenth of the picture or the pixels
-// cease to be square, the principal point stays in the centre. COLMAP's results go to folders
-// under `work_folder`. `on_step(i, n)` comes before adjustment i of n at most.
-RefinedModel RefineIntrinsics(ColmapProgram& colmap, const ColmapModel& grown,
+// Adjusts the mapper's model `mapped` without outliers, with PINHOLE and OPENCV lenses and a
+// free principal point. Chooses PINHOLE unless OPENCV moves a corner of a picture by more than
+// half a pixel and reduces the mean squared error by more than 3 %. Adjusts once more with the
+// outliers determined by the result. If a principal point moves by more than a tenth of the
+// picture or the pixels are not square, the principal point stays in the centre. COLMAP's
+// results go to folders under `work_folder`. Calls `on_step(i, n)` before adjustment i of at
+// most n.
+RefinedModel RefineIntrinsics(ColmapProgram& colmap, const ColmapModel& mapped,
                               const std::string& work_folder,
                               const ColmapProgram::Limits& limits,
                               const std::function<void(int, int)>& on_step,

@@ -10,8 +10,8 @@
 namespace regrade {
 namespace {
 
-// Sides are rounded to whole pixels, each for itself.
-bool SameShape(const Camera& camera, int width, int height) {
+// Tolerates that each side is rounded to whole pixels.
+bool SameAspect(const Camera& camera, int width, int height) {
   const double w = camera.width, h = camera.height;
   return std::abs(width - height * w / h) < 1 || std::abs(height - width * h / w) < 1;
 }
@@ -31,7 +31,7 @@ int ResizeToPhotos(const std::vector<StagedPhoto>& photos, ColmapModel* model) {
     const int width = found->second->width, height = found->second->height;
     const ColmapCamera camera = *model->FindCamera(image.camera_id);
     const Camera& lens = camera.intrinsics;
-    if ((lens.width == width && lens.height == height) || !SameShape(lens, width, height))
+    if ((lens.width == width && lens.height == height) || !SameAspect(lens, width, height))
       continue;
     const auto [entry, is_new] = resized.try_emplace({camera.id, width, height}, next);
     if (is_new) model->cameras.push_back({next++, camera.lens, lens.Resized(width, height)});

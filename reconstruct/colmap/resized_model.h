@@ -1,5 +1,4 @@
-// A model whose pictures have been resampled since it was made: its cameras at the sizes that
-// the photos have now.
+// Adapts a model's cameras to photos that were resized after the model was made.
 #pragma once
 
 #include <vector>
@@ -9,9 +8,9 @@
 
 namespace regrade {
 
-// Images whose photo (by staged name) has another size than their camera, but its shape to a
-// pixel, get a camera of that size, and keypoints to match. Returns their number. Photos of
-// another shape are left: CaptureFromModel refuses them.
+// Gives images whose photo (by staged name) has another size than their camera, but the same
+// aspect ratio to a pixel, a camera of that size and scaled keypoints. Returns the number of
+// those images. Skips photos of another aspect ratio: CaptureFromModel refuses them.
 int ResizeToPhotos(const std::vector<StagedPhoto>& photos, ColmapModel* model);
 
 }  // namespace regrade

@@ -7,16 +7,16 @@
 namespace regrade {
 namespace {
 
-// Photos that look more than this apart hardly show the same side of anything.
+// Photos at a larger angle hardly show the same surfaces.
 constexpr double kWidestAngle = 75 * M_PI / 180;
-// As far apart as these are, matches get rare; a distance counts as a share of the largest.
+// Scales at which matches become rare; distances are fractions of the largest.
 constexpr double kAngleScale = 30 * M_PI / 180, kDistanceScale = 0.25;
-// Places in the order of nearness.
+// Ranks in the order of distance.
 constexpr size_t kRanks[kPartners] = {0, 1, 2, 4, 7, 12};
 
 }  // namespace
 
-std::vector<std::pair<size_t, size_t>> PairsWorthMatching(const std::vector<Camera>& cameras) {
+std::vector<std::pair<size_t, size_t>> PairsToMatch(const std::vector<Camera>& cameras) {
   const size_t n = cameras.size();
   std::set<std::pair<size_t, size_t>> pairs;
   if (n <= 2 * kPartners) {
@@ -29,16 +29,16 @@ std::vector<std::pair<size_t, size_t>> PairsWorthMatching(const std::vector<Came
     centers.push_back(camera.Center());
     forwards.push_back(camera.Forward());
   }
-  double spread = 0;
+  double extent = 0;
   for (const Vec3d& a : centers)
-    for (const Vec3d& b : centers) spread = std::max(spread, Norm(a - b));
+    for (const Vec3d& b : centers) extent = std::max(extent, Norm(a - b));
   for (size_t i = 0; i < n; ++i) {
     std::vector<std::pair<double, size_t>> by_distance;
     for (size_t j = 0; j < n; ++j) {
       if (j == i) continue;
       const double angle = std::acos(std::clamp(Dot(forwards[i], forwards[j]), -1.0, 1.0));
       if (angle > kWidestAngle) continue;
-      const double apart = spread > 0 ? Norm(centers[i] - centers[j]) / spread : 0;
+      const double apart = extent > 0 ? Norm(centers[i] - centers[j]) / extent : 0;
       by_distance.emplace_back(std::hypot(apart / kDistanceScale, angle / kAngleScale), j);
     }
     std::sort(by_distance.begin(), by_distance.end());

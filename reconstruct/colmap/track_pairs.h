@@ -1,4 +1,4 @@
-// Which photos are worth matching, where their poses are known.
+// Selects the pairs of photos to match when their poses are known.
 #pragma once
 
 #include <cstddef>
@@ -9,10 +9,10 @@
 
 namespace regrade {
 
-// Pairs (i, j), i < j, without repeats, in ascending order: each photo with up to kPartners
-// that stand near and look the same way, the nearest few, and ever fewer of those farther off,
-// for the width of their angles. Of up to 2 kPartners photos, all pairs.
+// Unique pairs (i, j), i < j, in ascending order: each photo with up to kPartners similar
+// views, mostly the nearest, and some farther away for wider triangulation angles. All pairs
+// for up to 2 kPartners photos.
 inline constexpr size_t kPartners = 6;
-std::vector<std::pair<size_t, size_t>> PairsWorthMatching(const std::vector<Camera>& cameras);
+std::vector<std::pair<size_t, size_t>> PairsToMatch(const std::vector<Camera>& cameras);
 
 }  // namespace regrade

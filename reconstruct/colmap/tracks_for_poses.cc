@@ -21,16 +21,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kFeatures = 768;   // a photo: hundreds of tracks are left of them
-constexpr int kSmallSide = 900;  // pixels; such photos are doubled first, as in the strategies
-// The matcher for lists of pairs says nothing until it is done: so many at a time.
+constexpr int kFeatures = 768;   // per photo: give hundreds of tracks
+constexpr int kSmallSide = 900;  // pixels; upsamples smaller photos, as in the strategies
+// Batches, because the matcher for lists of pairs prints nothing until it ends.
 constexpr size_t kPairsAtATime = 200;
-// COLMAP's own limit for a observation's distance from its point, pixels ...
+// COLMAP's own limit of the reprojection error, pixels ...
 constexpr double kStrictLimit = 4;
-// ... and ours for poses that may be off, as a share of a photo's longer side.
-constexpr double kLooseShare = 0.01;
-constexpr double kLimitOfMedian = 6;  // strict enough where this many medians are below it
-// For verifying matches, lenses whose focal lengths agree so far are one.
+// ... and ours for inaccurate poses, as a fraction of a photo's longer side.
+constexpr double kLooseFraction = 0.01;
+constexpr double kLimitOfMedian = 6;  // a limit of this many medians is strict enough
+// For verifying matches, lenses with focal lengths within this fraction are the same.
 constexpr double kSameFocal = 0.01;
 
 // Photos through one lens, for COLMAP's features.
@@ -46,7 +46,7 @@ bool SameLens(const ColmapCamera& a, const ColmapCamera& b) {
          near(a.intrinsics.fy, b.intrinsics.fy);
 }
 
-// As COLMAP lists a camera's parameters on its command line.
+// A camera's parameters in the format of COLMAP's command line.
 std::string ParametersOf(const ColmapCamera& camera) {
   const ColmapLensInfo& info = InfoOf(camera.lens);
   const Camera& c = camera.intrinsics;
@@ -85,24 +85,24 @@ class TrackFinder {
   FoundTracks Find() {
     if (photos_.size() < 2) return result_;
     const std::string start = work_folder_ + "/start", logs = work_folder_ + "/logs";
-    fs::remove_all(work_folder_);  // what an interrupted run left would be skipped, not redone
+    fs::remove_all(work_folder_);  // COLMAP would reuse the database of an interrupted run
     fs::create_directories(start);
     fs::create_directories(logs);
     colmap_.emplace(options_.colmap, logs);
     result_.colmap_version = colmap_->version();
-    PoseRecipe recipe{.max_features = kFeatures};
-    recipe.first_octave = LongerSide() < kSmallSide ? -1 : 0;
-    const PoseWeights weights = EstimateWeights(recipe, photos_, options_.image_size);
+    PoseStrategy strategy{.max_features = kFeatures};
+    strategy.first_octave = LongerSide() < kSmallSide ? -1 : 0;
+    const PoseWeights weights = EstimateWeights(strategy, photos_, options_.image_size);
     planned_ = weights.extract + weights.match + weights.refine;
-    Extract(recipe, weights.extract);
+    Extract(strategy, weights.extract);
     Match(weights.match);
     WriteColmapModel(start_, start);
-    const double loose = std::max(kStrictLimit, kLooseShare * LongerSide());
-    TakeTracks(Triangulate(start, loose, weights.refine / 2));
-    // Poses that are right deserve tracks without the strays that a wide limit lets in.
+    const double loose = std::max(kStrictLimit, kLooseFraction * LongerSide());
+    SetTracks(Triangulate(start, loose, weights.refine / 2));
+    // If the poses are accurate, triangulates again with the strict limit.
     if (loose > kStrictLimit && kLimitOfMedian * result_.median_px < loose) {
       const double strict = std::max(kStrictLimit, kLimitOfMedian * result_.median_px);
-      TakeTracks(Triangulate(start, strict, weights.refine / 2));
+      SetTracks(Triangulate(start, strict, weights.refine / 2));
     }
     return result_;
   }
@@ -131,15 +131,15 @@ class TrackFinder {
     return groups;
   }
 
-  void Extract(PoseRecipe recipe, double weight) {
+  void Extract(PoseStrategy strategy, double weight) {
     const std::string list = work_folder_ + "/images.txt";
     for (const LensGroup& group : GroupByLens()) {
       std::ofstream file(list, std::ios::trunc);
       for (const std::string& name : group.photos.names) file << name << "\n";
       file.close();
-      recipe.lens = group.camera.lens;
+      strategy.lens = group.camera.lens;
       ColmapArguments arguments =
-          ExtractArguments(recipe, group.photos, options_.image_size, options_.threads,
+          ExtractArguments(strategy, group.photos, options_.image_size, options_.threads,
                            {PhotoFolder(), Database(), list, "", options_.mask_folder});
       arguments.push_back({"ImageReader.camera_params", ParametersOf(group.camera)});
       RunColmap("feature_extractor", arguments, "features",
@@ -151,7 +151,7 @@ class TrackFinder {
   void Match(double weight) {
     std::vector<Camera> cameras;
     for (const ColmapImage& image : start_.images) cameras.push_back(start_.CameraOf(image));
-    const auto pairs = PairsWorthMatching(cameras);
+    const auto pairs = PairsToMatch(cameras);
     result_.pairs = static_cast<int>(pairs.size());
     const std::string list = work_folder_ + "/pairs.txt";
     for (size_t begin = 0; begin < pairs.size(); begin += kPairsAtATime) {
@@ -176,7 +176,7 @@ class TrackFinder {
     fs::create_directories(out);
     std::ostringstream limit;
     limit << limit_px;
-    // With clear_points images get the database's numbers, by their names.
+    // With clear_points, images get the database's ids, by name.
     RunColmap("point_triangulator",
               {{"database_path", Database()},
                {"image_path", PhotoFolder()},
@@ -188,34 +188,33 @@ class TrackFinder {
                {"Mapper.filter_max_reproj_error", limit.str()},
                {"Mapper.tri_complete_max_reproj_error", limit.str()},
                {"Mapper.tri_merge_max_reproj_error", limit.str()}},
-              "placing points", weight);
+              "triangulating points", weight);
     try {
       return ReadColmapModel(out);
     } catch (const Error& error) {
-      throw Error(
-          ExitCode::kExternalProgram,
-          "colmap point_triangulator left no model that can be read: " + error.what_failed(),
-          colmap_->log_folder());
+      throw Error(ExitCode::kExternalProgram,
+                  "colmap point_triangulator wrote no readable model: " + error.what_failed(),
+                  colmap_->log_folder());
     }
   }
 
-  // Keypoints and points of COLMAP's model, under the numbers of ours.
-  void TakeTracks(const ColmapModel& found) {
+  // Copies keypoints and points of COLMAP's model, with our image ids.
+  void SetTracks(const ColmapModel& found) {
     std::map<std::string, ColmapImage*> by_name;
     for (ColmapImage& image : result_.model.images) {
       image.keypoints.clear();
       by_name[image.name] = &image;
     }
-    std::map<uint32_t, uint32_t> number_of;
+    std::map<uint32_t, uint32_t> id_of;
     for (const ColmapImage& image : found.images)
       if (const auto own = by_name.find(image.name); own != by_name.end()) {
         own->second->keypoints = image.keypoints;
-        number_of[image.id] = own->second->id;
+        id_of[image.id] = own->second->id;
       }
     result_.model.points = found.points;
     for (ColmapPoint& point : result_.model.points)
       for (ColmapTrackElement& element : point.track)
-        element.image_id = number_of.at(element.image_id);
+        element.image_id = id_of.at(element.image_id);
     std::vector<double> errors;
     for (const ColmapImage& image : result_.model.images) {
       const Camera camera = result_.model.CameraOf(image);
@@ -247,8 +246,7 @@ class TrackFinder {
         [&](const std::string& line) { output_.Line(line); },
         [&] {
           return Report(progress_, std::min(spent_ + weight * output_.fraction(), planned_),
-                        planned_,
-                        what + " (for the poses that were given)") != LoopControl::kStop;
+                        planned_, what + " (for given poses)") != LoopControl::kStop;
         });
     spent_ += weight;
     if (!result.Succeeded()) colmap_->Fail(command, result, command);
@@ -268,7 +266,7 @@ class TrackFinder {
   ColmapOutput output_;
   const Clock::time_point began_;
   std::vector<StagedPhoto> photos_;  // of start_.images
-  ColmapModel start_;                // what takes part
+  ColmapModel start_;                // images that have a photo
   FoundTracks result_;
   std::optional<ColmapProgram> colmap_;
   double spent_ = 0, planned_ = 1;  // estimated seconds

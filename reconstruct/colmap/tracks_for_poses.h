@@ -1,8 +1,7 @@
-// Tracks for poses that came without any: what the photos see in common, found and matched by
-// COLMAP, and put where the poses say.
+// Finds tracks for given poses without points: COLMAP extracts, matches and triangulates.
 //
-// Without them nothing can be measured of exposure, of the poses themselves, or of how far the
-// scene reaches. The costly half of COLMAP, finding poses, is not run.
+// Tracks are needed to measure exposure, pose errors and the scene's extent. The expensive half
+// of COLMAP, the mapper, is not run.
 #pragma once
 
 #include <cstdint>
@@ -17,19 +16,19 @@
 namespace regrade {
 
 struct FoundTracks {
-  ColmapModel model;  // as given, poses and lenses to the bit, with keypoints and points
+  ColmapModel model;  // the given poses and lenses (bitwise) with keypoints and points
   int64_t observations = 0;
-  double median_px = 0;  // their distance from their points, pixels of the photos
-  int pairs = 0;         // of photos that were compared
+  double median_px = 0;  // reprojection error, pixels of the photos
+  int pairs = 0;         // of photos that were matched
   std::string colmap_version;
 };
 
-// `posed` has images under the staged names of `photos`; images that have no photo, and photos
-// without an image, take no part. Points that it has are not looked at, and replaced.
-// `work_folder` is ours to fill.
+// `posed` has images with the staged names of `photos`; images without a photo and photos
+// without an image are ignored. Replaces its points. `work_folder` receives database, logs and
+// models.
 //
-// Throws Error: kExternalProgram when COLMAP is missing or fails, kResources when the disk is
-// full; Interrupted on kStop.
+// Throws Error: kExternalProgram if COLMAP is missing or fails, kResources if the disk is full;
+// Interrupted on kStop.
 FoundTracks TracksForPoses(const ColmapModel& posed, const std::vector<StagedPhoto>& photos,
                            const PoseOptions& options, const std::string& work_folder,
                            const ProgressFunction& progress = {});

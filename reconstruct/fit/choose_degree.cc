@@ -12,11 +12,11 @@ namespace regrade {
 namespace {
 
 constexpr int kFold = 5;
-constexpr int kResolution = 48;    // voxels, the longest side; half of it to begin with
+constexpr int kResolution = 48;    // voxels along the longest side; the first stage has half
 constexpr int kSmallestSide = 24;  // pixels
 constexpr int kSteps[] = {100, 200}, kRays = 2048;
 
-// The view at a size that gives a voxel of the trial the pixels of one of the fit.
+// The view scaled so that a voxel of the trial covers as many pixels as one of the full fit.
 TrainingView Smaller(const TrainingView& view, double scale, std::vector<Image>* photos) {
   const double longest = std::max(view.camera.width, view.camera.height);
   const double factor = std::min(1.0, std::max(scale, kSmallestSide / longest));
@@ -26,7 +26,7 @@ TrainingView Smaller(const TrainingView& view, double scale, std::vector<Image>*
   return {view.camera.Resized(width, height), &photos->back()};
 }
 
-// Over all pixels of all views that have a colour.
+// Over all pixels of all views that have a colour; masked ones are NaN.
 double PsnrOn(const std::vector<TrainingView>& views, const RadianceField& field) {
   const FastGrid grid = MakeFastGrid(field);
   double squares = 0;
@@ -35,12 +35,12 @@ double PsnrOn(const std::vector<TrainingView>& views, const RadianceField& field
     const RenderedView rendered = RenderView(grid, view.camera, {field.step});
     for (size_t i = 0; i < view.photo->pixels.size(); ++i) {
       if (!std::isfinite(view.photo->pixels[i])) continue;
-      const double shown = std::clamp(rendered.color.pixels[i], 0.0f, 1.0f);
-      squares += (shown - view.photo->pixels[i]) * (shown - view.photo->pixels[i]);
+      const double value = std::clamp(rendered.color.pixels[i], 0.0f, 1.0f);
+      squares += (value - view.photo->pixels[i]) * (value - view.photo->pixels[i]);
       ++count;
     }
   }
-  // Exactly equal pictures are as good as finite figures get.
+  // Identical images get 120 dB instead of infinity.
   return -10 * std::log10(std::max(squares / static_cast<double>(count), 1e-12));
 }
 
@@ -58,20 +58,20 @@ DegreeTrial TryDegrees(const std::vector<TrainingView>& views, const SceneBox& b
   const double scale = static_cast<double>(resolution) / options.resolutions.back();
   std::vector<Image> photos;
   photos.reserve(views.size());
-  std::vector<TrainingView> fitted, kept;
+  std::vector<TrainingView> fitted, held_out;
   for (size_t i = 0; i < views.size(); ++i) {
     const TrainingView view = Smaller(views[i], scale, &photos);
-    // Of a photo that is all but masked nothing may be left at this size.
-    if (HasColor(*view.photo)) (i % kFold == kFold / 2 ? kept : fitted).push_back(view);
+    // A photo that is almost fully masked may have no pixel left at this size.
+    if (HasColor(*view.photo)) (i % kFold == kFold / 2 ? held_out : fitted).push_back(view);
   }
-  if (fitted.empty() || kept.empty()) return {std::numeric_limits<double>::infinity()};
+  if (fitted.empty() || held_out.empty()) return {std::numeric_limits<double>::infinity()};
 
   ProgressParts parts(progress, 2);
   const auto psnr_of_degree = [&](int degree) {
     small.sh_degree = degree;
     FitHooks hooks;
     hooks.progress = parts.Next(1);
-    return PsnrOn(kept, FitField(fitted, box, small, hooks, backend).field);
+    return PsnrOn(held_out, FitField(fitted, box, small, hooks, backend).field);
   };
   const double without = psnr_of_degree(0);
   return {psnr_of_degree(options.sh_degree) - without};

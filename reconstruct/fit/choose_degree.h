@@ -1,29 +1,29 @@
-// Whether a scene's colours change enough with the direction to be worth the memory: a trial
-// that fits it small, with and without.
+// Decides by a small trial fit whether view-dependent colour is worth its memory.
 #pragma once
 
 #include "reconstruct/fit/fit_field.h"
 
 namespace regrade {
 
-// View dependence pays if it gains this much on views that were kept from the trial. Less is
-// below what the choice of a seed does.
+// View dependence pays if it gains this much on held-out views. Another seed changes the result
+// by as much as a smaller gain.
 inline constexpr double kDegreePays = 0.1;  // dB
 
-// A assessment, from one capture: of nine flash photos the trial kept two, and these spoke
-// against a view dependence that the other seven showed. How many views make it sure is not
-// measured.
+// Chosen from one capture: of nine flash photos the trial held out two, and these rejected a
+// view dependence that the other seven showed. The number of views for a reliable decision has
+// not been measured.
 inline constexpr int kLeastTrialViews = 10;
 
 struct DegreeTrial {
-  double gain_db = 0;  // of `options.sh_degree` over degree 0, on every fifth view
+  double gain_db = 0;  // of `options.sh_degree` over degree 0, on every fifth view (held out)
   bool Pays() const { return gain_db > kDegreePays; }
 };
 
-// Fits with the voxels as large in pixels as they will be, for a wrong place that a few pixels
-// of a voxel leave to colours is what view dependence serves, too, even where all surfaces are
-// matte. Free of the number of threads where options.shards is set. Throws as FitField does.
-// With fewer than kLeastTrialViews nothing is tried, and it pays.
+// Fits degree 0 and `options.sh_degree` to photos scaled so that a voxel covers as many pixels
+// as in the full fit: view dependence also compensates for surfaces misplaced within a voxel,
+// even in matte scenes. Independent of the number of threads if options.shards is set. Throws
+// as FitField does. With fewer than kLeastTrialViews views there is no trial, and gain_db is
+// infinite.
 DegreeTrial TryDegrees(const std::vector<TrainingView>& views, const SceneBox& box,
                        const FitOptions& options, const ProgressFunction& progress,
                        Backend backend);

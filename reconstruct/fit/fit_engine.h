@@ -1,4 +1,4 @@
-// What a fit does at each step, on one processor or the other; FitField holds the schedule.
+// Optimizer steps of a fit on the CPU or on CUDA; FitField has the schedule.
 #pragma once
 
 #include <cstdint>
@@ -14,17 +14,19 @@ namespace regrade {
 
 // One optimizer step.
 struct FitStep {
-  uint64_t number = 0;  // since the fit began: what random draws depend on
+  uint64_t number = 0;  // since the fit began; seeds the random draws
   int rays = 0;
   int patch = 1;
   MarchOptions march;
   RmspropOptions optimizer;
-  // Total variation: the share of the voxels regularised, and the weights of its mean over all.
-  float tv_share = 0;
+  // Total variation, with weights of its mean over all voxels. Each step regularises one
+  // contiguous sampling run from a random start: tv_fraction of all grid vertices on the CPU,
+  // tv_fraction of the stored voxels on the GPU; the expected gradient is the same.
+  float tv_fraction = 0;
   float tv_density = 0;
   float tv_sh = 0;
-  // The same of the background's layers, where there are some.
-  float tv_sphere_share = 0;
+  // The same for the background spheres, if any; runs are of texel columns on both.
+  float tv_sphere_fraction = 0;
   float tv_sphere_density = 0;
   float tv_sphere_color = 0;
 };
@@ -39,26 +41,26 @@ class FitEngine {
  public:
   virtual ~FitEngine() = default;
 
-  virtual void Take(FitState state) = 0;  // goes on from it
-  // Shows grid and moments; a processor that has them in the host's memory copies nothing.
-  // `use` may set stage and step.
-  virtual void Show(const std::function<void(FitState*)>& use) = 0;
-  // The same, and goes on from what `use` has made of them.
-  virtual void Change(const std::function<void(FitState*)>& use) = 0;
+  virtual void SetState(FitState state) = 0;
+  // Calls `read` with the grid and the moments, without a copy where they are in host memory.
+  // `read` may set stage, step and tally, and nothing else.
+  virtual void ReadState(const std::function<void(FitState*)>& read) = 0;
+  // Calls `edit` in the same way and continues from the edited state.
+  virtual void EditState(const std::function<void(FitState*)>& edit) = 0;
   virtual int64_t num_voxels() const = 0;
   virtual Vec3i resolution() const = 0;
   virtual void Step(const FitStep& step) = 0;
-  virtual FitSums TakeSums() = 0;  // since the last call; may wait for steps to finish
-  // The field as it is now, colours clipped. Nothing of it leaves the device but the picture.
+  virtual FitSums TakeSums() = 0;  // since the last call; may wait for queued steps
+  // Renders the current field, colours clipped. Copies only the image to the host.
   virtual RenderedView Render(const Camera& camera, const MarchOptions& march) = 0;
-  // Prunes voxels that weigh less than `threshold` in every view and resamples; the optimizer's
-  // state starts anew, as in svox2. Background layers, where there are some, get maps of
+  // Prunes voxels whose rendering weight is below `threshold` in every view and resamples;
+  // resets the optimizer's state, as in svox2. Background spheres, if any, get maps of
   // `sphere_resolution` and are not pruned.
   virtual void Refine(const MarchOptions& march, float threshold, const Vec3i& resolution,
                       int sphere_resolution) = 0;
 };
 
-// `rays` and what it was made from stay with the caller. shards: gradient arenas of the CPU.
+// `rays` and the photos behind it must outlive the engine. shards: gradient arenas of the CPU.
 std::unique_ptr<FitEngine> MakeCpuFitEngine(const TrainingRays* rays, uint64_t seed,
                                             int shards);
 // Throws Error(kResources) without CUDA. exact_sums: see FitOptions.

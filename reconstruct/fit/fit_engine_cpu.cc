@@ -1,5 +1,5 @@
-// Steps of a fit on the CPU's fast path: gradients gathered in private arenas, stepped in a
-// fixed order.
+// Fit steps on the CPU: gradients are accumulated in one arena per shard and added in a fixed
+// order.
 #include <omp.h>
 
 #include <algorithm>
@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "kernels/base/random.h"
+#include "kernels/base/random_streams.h"
 #include "kernels/field/cpu/rays.h"
 #include "kernels/field/cpu/render_view.h"
 #include "reconstruct/fit/fit_engine.h"
@@ -16,7 +17,7 @@
 namespace regrade {
 namespace {
 
-constexpr int64_t kChunk = 2048;   // slots a task
+constexpr int64_t kChunk = 2048;   // slots per task
 constexpr int kPruningStride = 2;  // every other row and column of a view
 
 class CpuFitEngine : public FitEngine {
@@ -24,7 +25,7 @@ class CpuFitEngine : public FitEngine {
   CpuFitEngine(const TrainingRays* rays, uint64_t seed, int shards)
       : rays_(rays), seed_(seed), arenas_(static_cast<size_t>(shards)) {}
 
-  void Take(FitState state) override {
+  void SetState(FitState state) override {
     state_ = std::move(state);
     if (state_.second_moment.size() != state_.grid.records.size())
       state_.second_moment = Buffer<float>(state_.grid.records.size());
@@ -32,8 +33,8 @@ class CpuFitEngine : public FitEngine {
       state_.sphere_moment = Buffer<float>(state_.grid.spheres.texels.size());
     ResetArenas();
   }
-  void Show(const std::function<void(FitState*)>& use) override { use(&state_); }
-  void Change(const std::function<void(FitState*)>& use) override { use(&state_); }
+  void ReadState(const std::function<void(FitState*)>& read) override { read(&state_); }
+  void EditState(const std::function<void(FitState*)>& edit) override { edit(&state_); }
   int64_t num_voxels() const override { return state_.grid.num_voxels(); }
   Vec3i resolution() const override { return state_.grid.frame.resolution; }
 
@@ -70,7 +71,7 @@ class CpuFitEngine : public FitEngine {
  private:
   void ResetArenas() {
     for (GradientArena& arena : arenas_) {
-      arena.Reset(state_.grid.num_voxels(), state_.grid.lanes());
+      arena.Reset(state_.grid.num_voxels());
       arena.spheres.Reset(state_.grid.spheres.num_texels());
     }
   }
@@ -80,12 +81,12 @@ class CpuFitEngine : public FitEngine {
     const float scale = 1.0f / (3.0f * static_cast<float>(n));
     const int shards = static_cast<int>(arenas_.size());
     std::vector<FitStepResult> results(arenas_.size());
-    // A contiguous run of vertices is regularised, from a random start, wrapping around; of the
-    // run alone, scaled so that its expectation is lambda times the mean over all voxels.
+    // The sampling run of total variation (see FitStep): contiguous vertices from a random
+    // start, wrapping around, scaled so that the expectation is lambda times the mean over all.
     const int64_t vertices = state_.grid.frame.NumVertices();
-    const int64_t run = static_cast<int64_t>(step.tv_share * static_cast<float>(vertices));
-    const int64_t run_begin = static_cast<int64_t>(
-        RandomIndex(seed_ ^ 0x7476ull, step.number, 0, static_cast<uint64_t>(vertices)));
+    const int64_t run = static_cast<int64_t>(step.tv_fraction * static_cast<float>(vertices));
+    const int64_t run_begin = static_cast<int64_t>(RandomIndex(
+        seed_ ^ kRandomTotalVariation, step.number, 0, static_cast<uint64_t>(vertices)));
     const float tv_scale = run > 0 ? 1.0f / static_cast<float>(run) : 0.0f;
 
 #pragma omp parallel for schedule(dynamic, 1)
@@ -111,14 +112,14 @@ class CpuFitEngine : public FitEngine {
     }
   }
 
-  // A contiguous run of the map's texels, as of the vertices.
+  // A sampling run of the map's texel columns (see FitStep).
   void RegularizeLayers(const FitStep& step, int shard, int shards, SphereArena* arena) const {
     const FastSpheres& spheres = state_.grid.spheres;
     const int64_t map = spheres.links.size();
-    const int64_t run = static_cast<int64_t>(step.tv_sphere_share * static_cast<float>(map));
+    const int64_t run = static_cast<int64_t>(step.tv_sphere_fraction * static_cast<float>(map));
     if (run == 0) return;
-    const int64_t first = static_cast<int64_t>(
-        RandomIndex(seed_ ^ 0x6d7369ull, step.number, 0, static_cast<uint64_t>(map)));
+    const int64_t first = static_cast<int64_t>(RandomIndex(
+        seed_ ^ kRandomSphereVariation, step.number, 0, static_cast<uint64_t>(map)));
     const float scale = 1.0f / (static_cast<float>(run) * static_cast<float>(spheres.layers));
     for (int64_t v = run * shard / shards; v < run * (shard + 1) / shards;) {
       const int64_t from = (first + v) % map;

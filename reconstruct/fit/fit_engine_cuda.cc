@@ -1,12 +1,13 @@
-// Steps of a fit on a CUDA device: photos, field, gradients and moments live there; the host
-// only says what comes next. Float sums in no fixed order, so two runs differ in the last bits
-// unless sums are exact.
+// Fit steps on a CUDA device, which holds photos, field, gradients and moments; the host only
+// launches. Float sums have no fixed order, so two runs differ in the last bits unless
+// exact_sums is set.
 #include <algorithm>
 #include <optional>
 #include <utility>
 
 #include "kernels/base/error.h"
 #include "kernels/base/random.h"
+#include "kernels/base/random_streams.h"
 #include "kernels/field/cuda/device_rays.h"
 #include "kernels/field/cuda/device_sphere_rays.h"
 #include "kernels/field/cuda/device_views.h"
@@ -23,18 +24,18 @@ class CudaFitEngine : public FitEngine {
   CudaFitEngine(const TrainingRays* rays, uint64_t seed, bool exact_sums)
       : seed_(seed), exact_sums_(exact_sums), views_(rays->ToDevice()) {}
 
-  void Take(FitState state) override {
+  void SetState(FitState state) override {
     grid_ = UploadGrid(state.grid, true, state.second_moment, exact_sums_, state.sphere_moment);
     Renew();
   }
-  void Show(const std::function<void(FitState*)>& use) override {
+  void ReadState(const std::function<void(FitState*)>& read) override {
     FitState state = Download();
-    use(&state);
+    read(&state);
   }
-  void Change(const std::function<void(FitState*)>& use) override {
+  void EditState(const std::function<void(FitState*)>& edit) override {
     FitState state = Download();
-    use(&state);
-    Take(std::move(state));
+    edit(&state);
+    SetState(std::move(state));
   }
   int64_t num_voxels() const override { return grid_.num_voxels(); }
   Vec3i resolution() const override { return grid_.frame.resolution; }
@@ -50,15 +51,15 @@ class CudaFitEngine : public FitEngine {
     views_.Draw(seed_, step.number, step.rays, rays_.data(), targets_.data());
     fitter_->Accumulate(grid_, rays_.data(), targets_.data(), step.rays,
                         1.0f / (3.0f * static_cast<float>(step.rays)), &touched_);
-    // The same expectation as the CPU's run of vertices: each stored voxel with the share's
-    // probability.
+    // The sampling run of total variation is over stored voxels (see FitStep): each is chosen
+    // with probability tv_fraction, so the expectation equals the CPU's.
     const int64_t voxels = grid_.num_voxels();
-    const int64_t run = static_cast<int64_t>(step.tv_share * static_cast<float>(voxels));
+    const int64_t run = static_cast<int64_t>(step.tv_fraction * static_cast<float>(voxels));
     if (run > 0) {
-      const int64_t begin = static_cast<int64_t>(
-          RandomIndex(seed_ ^ 0x7476ull, step.number, 0, static_cast<uint64_t>(voxels)));
+      const int64_t begin = static_cast<int64_t>(RandomIndex(
+          seed_ ^ kRandomTotalVariation, step.number, 0, static_cast<uint64_t>(voxels)));
       const float scale =
-          1.0f / (step.tv_share * static_cast<float>(grid_.frame.NumVertices()));
+          1.0f / (step.tv_fraction * static_cast<float>(grid_.frame.NumVertices()));
       AddTotalVariation(grid_, begin, run, step.tv_density * scale, step.tv_sh * scale,
                         &touched_);
     }
@@ -89,7 +90,7 @@ class CudaFitEngine : public FitEngine {
     DeviceGrid next = ResampleOnDevice(grid_, weights, threshold, resolution);
     if (next.num_voxels() == 0)
       throw Error(ExitCode::kScene,
-                  "nothing of the scene is left: no voxel weighs more than " +
+                  "no voxel of the scene is left: none has a rendering weight above " +
                       std::to_string(threshold) + " in any view",
                   "reconstruct", "check the poses, or lower --prune-weight");
     next.spheres = Resampled(std::move(grid_.spheres), sphere_resolution);
@@ -104,14 +105,14 @@ class CudaFitEngine : public FitEngine {
     return state;
   }
 
-  // A contiguous run of the map's texels is regularised, as on the CPU.
+  // A sampling run of the map's texel columns is regularised, as on the CPU.
   void StepLayers(const FitStep& step) {
     const DeviceSpheres& spheres = grid_.spheres;
     const int64_t map = spheres.links.size();
-    const int64_t run = static_cast<int64_t>(step.tv_sphere_share * static_cast<float>(map));
+    const int64_t run = static_cast<int64_t>(step.tv_sphere_fraction * static_cast<float>(map));
     if (run > 0) {
-      const int64_t begin = static_cast<int64_t>(
-          RandomIndex(seed_ ^ 0x6d7369ull, step.number, 0, static_cast<uint64_t>(map)));
+      const int64_t begin = static_cast<int64_t>(RandomIndex(
+          seed_ ^ kRandomSphereVariation, step.number, 0, static_cast<uint64_t>(map)));
       const float scale = 1.0f / (static_cast<float>(run) * static_cast<float>(spheres.layers));
       AddSphereVariation(grid_, begin, run, step.tv_sphere_density * scale,
                          step.tv_sphere_color * scale, &touched_);
@@ -119,7 +120,7 @@ class CudaFitEngine : public FitEngine {
     StepSpheresOnDevice(&grid_, &touched_, step.optimizer, fitter_->sums());
   }
 
-  // By the host, three times a fit: it takes a fraction of a second.
+  // On the host: three times per fit, a fraction of a second each.
   DeviceSpheres Resampled(DeviceSpheres spheres, int resolution) const {
     if (!spheres.on()) return spheres;
     FastSpheres host = DownloadSpheres(spheres);
@@ -137,7 +138,7 @@ class CudaFitEngine : public FitEngine {
     sums_.rejected_voxels += static_cast<int64_t>(sums.rejected_voxels);
   }
 
-  // What belongs to the grid as it is now.
+  // Renews all buffers that depend on the grid.
   void Renew() {
     KeepSums();
     fitter_.reset();
@@ -156,7 +157,7 @@ class CudaFitEngine : public FitEngine {
   DeviceTouched touched_;
   MarchOptions march_;
   std::optional<DeviceRayFitter> fitter_;
-  FitSums sums_;  // of fitters that are gone
+  FitSums sums_;  // of previous fitters
   DeviceBuffer<Ray> rays_;
   DeviceBuffer<Vec3f> targets_;
 };

@@ -61,20 +61,19 @@ class Fitter {
       if (box_.background) state.grid.background = *box_.background;
       if (state.grid.num_voxels() == 0)
         throw Error(ExitCode::kScene, "no part of the scene's box is seen by two cameras",
-                    "reconstruct",
-                    "the poses do not fit together; photograph with more overlap");
+                    "reconstruct", "the poses are inconsistent; take photos with more overlap");
       if (box_.spheres) {
         state.grid.spheres =
             MakeInitialSpheres(rays_, frame, options_.background_layers, SphereResolution(0),
                                options_.initial_background_density, state.grid.background);
-        // The background comes first: a box that may explain the far will do so, wrongly.
+        // The background is fitted first, because the box would model distant surfaces wrongly.
         if (LeadSteps() > 0) SetDensities(0, &state.grid);
       }
     }
     stage_ = state.stage;
     step_ = state.step;
     tally_ = std::move(state.tally);
-    engine_->Take(std::move(state));
+    engine_->SetState(std::move(state));
     start_ = last_checkpoint_ = Clock::now();
     const int num_stages = static_cast<int>(options_.steps.size());
     while (stage_ < num_stages) {
@@ -85,14 +84,14 @@ class Fitter {
       step_ = 0;
       SaveCheckpoint();
     }
-    // A last pruning without growth: what no training view sees does not belong into the
-    // result.
+    // Prunes once more without resampling: removes voxels that no training view sees.
     Refine(0);
     result_.seconds = SecondsSince(start_) - idle_seconds_;
     result_.voxels = engine_->num_voxels();
     Measure();
     if (hooks_.keep_field) {
-      engine_->Show([this](FitState* state) { result_.field = ToRadianceField(state->grid); });
+      engine_->ReadState(
+          [this](FitState* state) { result_.field = ToRadianceField(state->grid); });
       result_.field.step = options_.step;
     }
     result_.psnr_train_db = PsnrOf(tally_.tail_error, tally_.tail_rays);
@@ -118,8 +117,8 @@ class Fitter {
     return steps;
   }
 
-  // A step costs what its samples cost, and a ray's samples grow with the resolution: progress
-  // in that unit makes the time left come out right while the stages are still coarse.
+  // The time of a step grows with its samples per ray, thus with the resolution. Progress in
+  // this unit predicts the remaining time well in the coarse stages, too.
   double WorkBefore() const {
     double work = static_cast<double>(step_) * WorkOfStep(stage_);
     for (int s = 0; s < stage_; ++s)
@@ -134,7 +133,7 @@ class Fitter {
     const int steps = options_.steps[static_cast<size_t>(stage_)];
     while (step_ < steps) {
       if (box_.spheres && LeadSteps() > 0 && StepsBefore() == LeadSteps())
-        engine_->Change(
+        engine_->EditState(
             [this](FitState* state) { SetDensities(options_.initial_density, &state->grid); });
       engine_->Step(NextStep());
       ++step_;
@@ -165,7 +164,7 @@ class Fitter {
         ExponentialRate(options_.rate_density, options_.rate_density_end, p) *
         DelayFactor(number, options_.density_delay * static_cast<float>(total_steps_));
     step.optimizer.view_bound = options_.view_bound;
-    step.tv_share = options_.tv_share;
+    step.tv_fraction = options_.tv_fraction;
     step.tv_density = decay * options_.tv_density;
     step.tv_sh = decay * options_.tv_sh;
     if (!box_.spheres) return step;
@@ -173,7 +172,7 @@ class Fitter {
         options_.rate_background_density, options_.rate_background_density_end, p);
     step.optimizer.rate_sphere_color =
         ExponentialRate(options_.rate_background_color, options_.rate_background_color_end, p);
-    step.tv_sphere_share = options_.tv_background_share;
+    step.tv_sphere_fraction = options_.tv_background_fraction;
     step.tv_sphere_density = decay * options_.tv_background_density;
     step.tv_sphere_color = decay * options_.tv_background_color;
     return step;
@@ -189,7 +188,7 @@ class Fitter {
                                options_.resolutions.back());
   }
 
-  // Prunes by weight and goes on at `longest` voxels a side; 0 keeps the resolution.
+  // Prunes by weight and resamples to `longest` voxels a side; 0 keeps the resolution.
   void Refine(int longest) {
     const Vec3i now = engine_->resolution();
     const float longest_now = static_cast<float>(std::max({now.x, now.y, now.z}));
@@ -200,8 +199,8 @@ class Fitter {
                     SphereResolution(std::min(stage_, last_stage)));
   }
 
-  // A device's sums are read once in a while: it need not wait for the host at each step. The
-  // CPU's are read at each, so that a fit that was interrupted adds them up in the same order.
+  // A device's sums are read once per window, so that it need not wait for the host at each
+  // step. The CPU's are read at each step, so that a resumed fit adds them in the same order.
   void CloseWindow() {
     TakeSums();
     const int done = StepsBefore();
@@ -226,7 +225,7 @@ class Fitter {
     tally_.window_error += sums.squared_error;
     tally_.samples += sums.samples;
     tally_.rejected_voxels += sums.rejected_voxels;
-    // A few bad voxels are skipped and counted; a flood means the field is broken.
+    // A few non-finite gradients are skipped and counted; many mean that the field is broken.
     if (sums.rejected_voxels > 1000)
       throw Error(ExitCode::kBug,
                   "the gradient of " + std::to_string(sums.rejected_voxels) +
@@ -237,8 +236,8 @@ class Fitter {
   void SaveCheckpoint() {
     const Clock::time_point begin = Clock::now();
     if (hooks_.checkpoint) {
-      TakeSums();  // the window goes on where the checkpoint is read
-      engine_->Show([this](FitState* state) {
+      TakeSums();  // a resumed fit continues the window
+      engine_->ReadState([this](FitState* state) {
         state->stage = stage_;
         state->step = step_;
         state->tally = tally_;
@@ -280,7 +279,7 @@ float ExponentialRate(float begin, float end, double p) {
   return static_cast<float>(begin * std::pow(static_cast<double>(end) / begin, p));
 }
 
-// As in svox2, which begins at a hundredth.
+// As in svox2, which starts at a hundredth.
 float DelayFactor(int step, float delay) {
   if (static_cast<float>(step) >= delay) return 1;
   constexpr float kLeast = 0.01f, kQuarterTurn = 1.57079633f;

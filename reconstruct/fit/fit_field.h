@@ -1,6 +1,6 @@
-// Fitting a Plenoxel field to posed photos: coarse to fine, RMSProp on touched voxels, total
-// variation, pruning by rendering weight (Fridovich-Keil et al., CVPR 2022, and the recipe of
-// its public code).
+// Fits a Plenoxel field to posed photos: coarse to fine, RMSProp on touched voxels, total
+// variation, pruning by rendering weight (Fridovich-Keil et al., CVPR 2022, with the settings
+// of its public code).
 #pragma once
 
 #include <functional>
@@ -25,8 +25,8 @@ struct FitCurvePoint {
   int64_t step = 0;          // steps done
 };
 
-// What a fit has counted so far: of its rays since the last point of the curve, and of the last
-// tenth of all.
+// Running sums of a fit: window_* since the last point of the curve, tail_* over the last tenth
+// of all steps.
 struct FitTally {
   double window_error = 0, tail_error = 0;  // squared, over channels
   int64_t window_rays = 0, tail_rays = 0;
@@ -34,13 +34,13 @@ struct FitTally {
   std::vector<FitCurvePoint> curve;
 };
 
-// Everything a fit needs to go on as if it had never stopped (H110).
+// Everything needed to resume a fit with the same result as without a stop (H110).
 struct FitState {
   FastGrid grid;
   Buffer<float> second_moment;  // [N, lanes]
   int stage = 0;
   int step = 0;                 // within the stage
-  Buffer<float> sphere_moment;  // [columns, L, 4], where there are background spheres
+  Buffer<float> sphere_moment;  // [columns, L, 4]; empty without background spheres
   FitTally tally;
 };
 
@@ -50,8 +50,8 @@ struct FitResult {
   int64_t voxels = 0;
   int64_t rays = 0;
   int64_t samples = 0;
-  int64_t rejected_voxels = 0;  // steps refused for a non-finite gradient
-  double seconds = 0;           // this call's, without checkpoints
+  int64_t rejected_voxels = 0;  // voxel updates skipped for a non-finite gradient
+  double seconds = 0;           // of this call, without checkpoints
   std::vector<FitCurvePoint> curve;
 };
 
@@ -59,8 +59,7 @@ class FitEngine;
 
 struct FitHooks {
   ProgressFunction progress;
-  // Called when a stage's steps are done and when all is done, before the field leaves its
-  // device.
+  // Called at the end of each stage and of the fit, while the field is still on its device.
   std::function<void(FitEngine*)> measure;
   bool keep_field = true;  // false: FitResult::field stays empty
   const FitState* resume = nullptr;
@@ -68,13 +67,14 @@ struct FitHooks {
   std::function<void(const FitState&)> checkpoint;
 };
 
-// EQ(exponential-rate): rate(p) = begin^(1 - p) end^p, p in [0, 1] the share of all steps done.
+// EQ(exponential-rate): rate(p) = begin^(1 - p) end^p, p in [0, 1] the fraction of all steps
+// done.
 float ExponentialRate(float begin, float end, double p);
 // Rises along a sine from 1/100 at step 0 to 1 at step `delay`.
 float DelayFactor(int step, float delay);
 
-// Throws Error(kScene) if the field comes out empty, Interrupted after kStop (the checkpoint
-// has been called).
+// Throws Error(kScene) if the field becomes empty, Interrupted after kStop (after calling
+// `checkpoint`).
 FitResult FitField(const std::vector<TrainingView>& views, const SceneBox& box,
                    const FitOptions& options, const FitHooks& hooks,
                    Backend backend = Backend::kCpu);

@@ -1,4 +1,4 @@
-// What fitting a radiance field can be told.
+// Options of fitting a radiance field.
 #pragma once
 
 #include <cstdint>
@@ -25,7 +25,7 @@ struct FitOptions {
   float tv_density = 1e-2f;
   float tv_sh = 1e-2f;
   float tv_decay = 0.5f;
-  float tv_share = 0.03f;
+  float tv_fraction = 0.03f;
   float prune_weight = 0.5f;
   float initial_density = 0.5f;
   int background_layers = 64;
@@ -36,7 +36,7 @@ struct FitOptions {
   float rate_background_color_end = 5e-3f;
   float tv_background_density = 5e-3f;
   float tv_background_color = 5e-3f;
-  float tv_background_share = 0.01f;
+  float tv_background_fraction = 0.01f;
   float initial_background_density = 0.1f;
   float background_lead = 0.9f;
   int shards = 0;
@@ -57,49 +57,49 @@ struct FitOptions {
           .min = 1,
           .max = 1000000});
     bind("fit-rays", rays_per_step,
-         {.unit = "rays", .help = "rays in a step", .min = 64, .max = 1 << 22});
+         {.unit = "rays", .help = "rays per step", .min = 64, .max = 1 << 22});
     bind("fit-patch", patch,
          {.unit = "pixels",
-          .help = "side of the little squares rays are drawn in: larger is faster (rays share "
-                  "voxels in cache) and learns less from a ray; a GPU draws single pixels",
+          .help = "side of the pixel squares that rays are drawn in: larger is faster (rays "
+                  "share cached voxels) but less accurate; a GPU draws single pixels",
           .min = 1,
           .max = 32});
     bind("sh-degree", sh_degree,
-         {.help = "view dependence: spherical harmonics degree 0, 1 or 2 (1, 4, 9 values a "
-                  "channel); a "
-                  "small trial falls back to 0 where that loses nothing",
+         {.help = "view dependence: spherical harmonics degree 0, 1 or 2 (1, 4, 9 values per "
+                  "channel); a small trial falls back to 0 where that loses nothing",
           .min = 0,
           .max = 2});
     bind("fit-view-bound", view_bound,
-         {.help = "largest view-dependent coefficient; a larger one lets colours wander where "
-                  "the clamp hides them, and styles then show it",
+         {.help = "largest view-dependent coefficient; limits coefficients that are hidden by "
+                  "clamping and would appear after restyling",
           .min = 0,
           .max = 1e6});
     bind("fit-step-size", step,
          {.unit = "voxels",
-          .help = "distance of samples along a ray; 0.5 doubles the time of 1 and gained "
+          .help = "distance of samples along a ray; 0.5 takes twice as long as 1 and gained "
                   "nothing on real photos",
           .min = 0.1,
           .max = 4});
     bind("fit-stop", stop_transmittance,
-         {.help = "a ray ends when less light than this is left; the error a channel is at "
-                  "most this",
+         {.help = "transmittance at which a ray ends; the error per channel is at most this",
           .min = 0,
           .max = 0.1});
     bind("fit-rate-density", rate_density,
-         {.help = "RMSProp rate of densities at the start", .min = 0, .max = 1e4});
+         {.help = "RMSProp learning rate of densities at the start", .min = 0, .max = 1e4});
     bind("fit-rate-density-end", rate_density_end,
-         {.help = "the same at the end (exponential in between)", .min = 0, .max = 1e4});
+         {.help = "learning rate of densities at the end (exponential in between)",
+          .min = 0,
+          .max = 1e4});
     bind("fit-density-delay", density_delay,
-         {.unit = "share of all steps",
-          .help = "the rate of densities rises to its course meanwhile, along a sine from a "
-                  "hundredth of it: colours "
-                  "settle before surfaces do, and less fog is left",
+         {.unit = "fraction of all steps",
+          .help = "raises the learning rate of densities along a sine, from a hundredth to its "
+                  "full value: colours settle before surfaces, and less fog remains",
           .min = 0,
           .max = 1});
     bind("fit-rate-sh", rate_sh,
-         {.help = "RMSProp rate of colours at the start", .min = 0, .max = 10});
-    bind("fit-rate-sh-end", rate_sh_end, {.help = "the same at the end", .min = 0, .max = 10});
+         {.help = "RMSProp learning rate of colours at the start", .min = 0, .max = 10});
+    bind("fit-rate-sh-end", rate_sh_end,
+         {.help = "learning rate of colours at the end", .min = 0, .max = 10});
     bind("tv-density", tv_density,
          {.help =
               "weight of the total variation of densities: smoother surfaces, fewer floaters",
@@ -108,39 +108,44 @@ struct FitOptions {
     bind("tv-sh", tv_sh,
          {.help = "weight of the total variation of colours", .min = 0, .max = 10});
     bind("tv-decay", tv_decay,
-         {.help = "factor on both weights at each finer stage", .min = 0, .max = 1});
-    bind("tv-share", tv_share,
-         {.help = "share of the voxels regularised in a step", .min = 0, .max = 1});
+         {.help = "factor on the weights of total variation at each finer stage",
+          .min = 0,
+          .max = 1});
+    bind("tv-fraction", tv_fraction,
+         {.help = "fraction of the voxels regularised in a step", .min = 0, .max = 1});
     bind("prune-weight", prune_weight,
-         {.help = "voxels that weigh less than this / resolution in every view are dropped "
-                  "between stages",
+         {.help = "removes voxels between stages whose rendering weight is below this / "
+                  "resolution in every view",
           .min = 0,
           .max = 100});
     bind("initial-density", initial_density,
-         {.unit = "1/radius", .help = "density everywhere at the start", .min = 0, .max = 100});
+         {.unit = "1/radius", .help = "initial density everywhere", .min = 0, .max = 100});
     bind("background-layers", background_layers,
          {.unit = "spheres",
-          .help = "of the background, where the scene calls for it; time and memory grow with "
+          .help = "layers of the background, if the scene needs one; time and memory grow with "
                   "them",
           .min = 2,
           .max = 512});
     bind("background-resolution", background_resolution,
          {.unit = "texels",
-          .help = "from pole to pole of a background sphere at the last stage; memory grows "
-                  "with its square",
+          .help = "texels from pole to pole of a background sphere in the last stage; memory "
+                  "grows with its square",
           .min = 16,
           .max = 4096});
     bind("background-rate-density", rate_background_density,
-         {.help = "RMSProp rate of the background's densities at the start",
+         {.help = "RMSProp learning rate of the background's densities at the start",
           .min = 0,
           .max = 1e4});
     bind("background-rate-density-end", rate_background_density_end,
-         {.help = "the same at the end", .min = 0, .max = 1e4});
-    bind(
-        "background-rate-color", rate_background_color,
-        {.help = "RMSProp rate of the background's colours at the start", .min = 0, .max = 10});
+         {.help = "learning rate of the background's densities at the end",
+          .min = 0,
+          .max = 1e4});
+    bind("background-rate-color", rate_background_color,
+         {.help = "RMSProp learning rate of the background's colours at the start",
+          .min = 0,
+          .max = 10});
     bind("background-rate-color-end", rate_background_color_end,
-         {.help = "the same at the end", .min = 0, .max = 10});
+         {.help = "learning rate of the background's colours at the end", .min = 0, .max = 10});
     bind("background-tv-density", tv_background_density,
          {.help = "weight of the total variation of the background's densities",
           .min = 0,
@@ -149,22 +154,22 @@ struct FitOptions {
          {.help = "weight of the total variation of the background's colours",
           .min = 0,
           .max = 10});
-    bind("background-tv-share", tv_background_share,
-         {.help = "share of the background regularised in a step", .min = 0, .max = 1});
+    bind("background-tv-fraction", tv_background_fraction,
+         {.help = "fraction of the background regularised in a step", .min = 0, .max = 1});
     bind("background-initial-density", initial_background_density,
-         {.help = "density of all layers at the start", .min = 0, .max = 100});
+         {.help = "initial density of all background layers", .min = 0, .max = 100});
     bind("background-lead", background_lead,
-         {.unit = "share of the first stage",
-          .help = "meanwhile the background alone is fitted",
+         {.unit = "fraction of the first stage",
+          .help = "time in which only the background is fitted",
           .min = 0,
           .max = 0.9});
     bind("fit-shards", shards,
-         {.help = "gradient arenas; 0: one a thread, or 4 with --reproducible",
+         {.help = "gradient arenas; 0: one per thread, or 4 with --reproducible",
           .min = 0,
           .max = 64});
     bind("fit-exact-sums", exact_sums,
-         {.help = "GPU: gradients are summed as integers, so that two fits of the same photos "
-                  "are the same to the bit; slower, and a third more memory"});
+         {.help = "GPU: sums gradients as integers, so that two fits of the same photos are "
+                  "bitwise equal; slower, and a third more memory"});
   }
 };
 

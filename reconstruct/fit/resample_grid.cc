@@ -13,7 +13,8 @@
 namespace regrade {
 namespace {
 
-// Vertices of the old grid whose weight passes, grown by one in each direction.
+// Vertices of the old grid with at least the threshold weight, dilated by one in each
+// direction.
 std::vector<uint8_t> KeptVertices(const FastGrid& grid, const Buffer<float>& weights,
                                   float threshold) {
   const GridFrame& frame = grid.frame;
@@ -35,7 +36,7 @@ std::vector<uint8_t> KeptVertices(const FastGrid& grid, const Buffer<float>& wei
   return keep;
 }
 
-// To within a cell's diagonal, as in svox2: the cells that the sphere cuts are whole.
+// With a margin of a cell's diagonal, as in svox2: includes all cells that the sphere cuts.
 bool InsideBall(const GridFrame& frame, const Vec3f& p) {
   Vec3f q;
   for (int a = 0; a < 3; ++a) q[a] = (p[a] - frame.center[a]) / frame.radius[a];
@@ -69,7 +70,7 @@ FastGrid MakeInitialGrid(const TrainingRays& rays, const GridFrame& frame, int b
           const Vec3d point = camera.ndc.on() ? WorldFromNdc(camera.ndc, p) : p;
           if (Norm(point - camera.Center()) < near_clip || !camera.Project(point, &u, &w))
             continue;
-          // One voxel at the border may project just outside and still be a corner of a seen
+          // A vertex may project just outside the image and still be a corner of a visible
           // cell.
           const double margin_x = 0.02 * camera.width, margin_y = 0.02 * camera.height;
           views += u >= -margin_x && u <= camera.width + margin_x && w >= -margin_y &&
@@ -123,7 +124,7 @@ FastGrid Resample(const FastGrid& grid, const Buffer<float>& weights, float thre
   const GridFrame& frame = result.frame;
   const int64_t vertices = frame.NumVertices();
   const Vec3f old_scale = grid.frame.Scale(), old_offset = grid.frame.Offset();
-  // Position of a new vertex among the old ones; a vertex is kept if its nearest old vertex is.
+  // Position of a new vertex in the old grid. A vertex is kept if its nearest old vertex is.
   const auto old_position = [&](int64_t vertex) {
     const Vec3f at{
         static_cast<float>(vertex / (static_cast<int64_t>(resolution.y) * resolution.z)),
@@ -150,7 +151,7 @@ FastGrid Resample(const FastGrid& grid, const Buffer<float>& weights, float thre
   }
   if (count == 0)
     throw Error(ExitCode::kScene,
-                "nothing of the scene is left: no voxel weighs more than " +
+                "no voxel of the scene is left: none has a rendering weight above " +
                     std::to_string(threshold) + " in any view (largest " +
                     std::to_string(weights.empty()
                                        ? 0.0f

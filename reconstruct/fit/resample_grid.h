@@ -1,5 +1,4 @@
-// Growing a field from coarse to fine: which voxels are worth keeping, and their values on a
-// finer grid.
+// Refines a grid from coarse to fine: prunes voxels by rendering weight and resamples the rest.
 #pragma once
 
 #include <cstdint>
@@ -11,20 +10,20 @@
 
 namespace regrade {
 
-// A grid that stores every vertex seen by at least `min_views` cameras beyond near_clip, at
-// `density`, mid-grey. With `ball`, only within the unit sphere of the box: the rest is the
-// background's.
+// A mid-grey grid of one density that stores every vertex seen by at least `min_views` cameras
+// beyond near_clip. With `ball`, only vertices within the box's unit sphere: the background
+// spheres model the rest.
 FastGrid MakeInitialGrid(const TrainingRays& rays, const GridFrame& frame, int basis,
                          float density, float near_clip, int min_views, bool ball = false);
 
-// Largest rendering weight each voxel has in any training view; every `stride`-th pixel both
-// ways is looked at.
+// Largest rendering weight of each voxel in any training view, from every `stride`-th row and
+// column.
 Buffer<float> MaxWeightsOverViews(const FastGrid& grid, const TrainingRays& rays,
                                   const MarchOptions& options, int stride);
 
-// The field on a grid of `resolution`, trilinearly, keeping vertices within one voxel of an old
-// voxel whose weight is at least `threshold`. Throws Error(kScene) naming the threshold and the
-// largest weight if nothing would be left (H85).
+// The field interpolated trilinearly on a grid of `resolution`; keeps vertices within one voxel
+// of an old voxel whose weight is at least `threshold`. Throws Error(kScene) naming the
+// threshold and the largest weight if no voxel would remain (H85).
 FastGrid Resample(const FastGrid& grid, const Buffer<float>& weights, float threshold,
                   const Vec3i& resolution);
 

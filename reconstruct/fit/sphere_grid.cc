@@ -14,10 +14,10 @@ namespace regrade {
 namespace {
 
 constexpr int kPixelStride = 4, kLayerStride = 2;
-constexpr int kGrow = 2;  // texels: what the strides leave out at the rim
+constexpr int kDilation = 2;  // texels: the strides miss some at the border
 
-// Grows what is set by one texel each way: round in longitude, to the poles in latitude.
-void Grow(int resolution, std::vector<uint8_t>* seen) {
+// Dilates by one texel; wraps around in longitude, clamps at the poles.
+void Dilate(int resolution, std::vector<uint8_t>* seen) {
   const int columns = 2 * resolution;
   const std::vector<uint8_t> before = *seen;
   for (int x = 0; x < columns; ++x)
@@ -46,10 +46,10 @@ std::vector<uint8_t> SeenTexels(const TrainingRays& rays, const GridFrame& frame
         const SphereRay<float> ray = ToSphereRay(frame, rays.RayOf(view, x, y));
         if (!(ray.world_per_unit > 0)) continue;
         for (int i = 0; i < layers; i += kLayerStride) {
-          Vec3f place;
+          Vec3f position;
           float ahead;
-          if (!CrossSphere(ray, InverseRadius<float>(i, layers), &place, &ahead)) continue;
-          for (const int32_t texel : LocateTexel(resolution, place).texel)
+          if (!CrossSphere(ray, InverseRadius<float>(i, layers), &position, &ahead)) continue;
+          for (const int32_t texel : LocateTexel(resolution, position).texel)
             seen[static_cast<size_t>(texel)] = 1;
         }
       }
@@ -57,11 +57,11 @@ std::vector<uint8_t> SeenTexels(const TrainingRays& rays, const GridFrame& frame
   std::vector<uint8_t> seen = std::move(partial[0]);
   for (size_t t = 1; t < partial.size(); ++t)
     for (size_t i = 0; i < map; ++i) seen[i] |= partial[t][i];
-  for (int i = 0; i < kGrow; ++i) Grow(resolution, &seen);
+  for (int i = 0; i < kDilation; ++i) Dilate(resolution, &seen);
   return seen;
 }
 
-// Numbers the columns of the texels that `stored` names.
+// Assigns consecutive numbers to the columns for which `stored` is true.
 template <typename Stored>
 void LinkColumns(FastSpheres* spheres, const Stored& stored) {
   const int64_t map = int64_t{2} * spheres->resolution * spheres->resolution;
@@ -69,7 +69,7 @@ void LinkColumns(FastSpheres* spheres, const Stored& stored) {
   int64_t columns = 0;
   for (int64_t i = 0; i < map; ++i)
     spheres->links[i] = stored(i) ? static_cast<int32_t>(columns++) : -1;
-  constexpr int64_t kMost = 1 << 30;  // beside the voxels
+  constexpr int64_t kMost = 1 << 30;  // in addition to the voxels
   if (map * spheres->layers > kMost)
     throw Error(
         ExitCode::kResources,
@@ -106,7 +106,7 @@ FastSpheres ResampleSpheres(const FastSpheres& spheres, int resolution) {
   result.resolution = resolution;
   const int old = spheres.resolution, layers = spheres.layers;
   const float ratio = static_cast<float>(old) / static_cast<float>(resolution);
-  // A new texel lies among four old ones; the south-western of the map is its own neighbour.
+  // The four old texels around a new one; longitude wraps around.
   const auto corners = [&](int64_t i, int32_t* column, float* weight) {
     const float x = static_cast<float>(i / resolution) * ratio;
     const float y = static_cast<float>(i % resolution) * ratio;
@@ -122,7 +122,7 @@ FastSpheres ResampleSpheres(const FastSpheres& spheres, int resolution) {
       weight[k] = column[k] >= 0 ? weights[k] : 0;
       sum += weight[k];
     }
-    // Empty corners have no say: a column at the rim keeps its values.
+    // Empty corners are ignored, so that columns at the border keep their values.
     for (int k = 0; k < 4 && sum > 0; ++k) weight[k] /= sum;
     return sum > 0;
   };

@@ -1,5 +1,5 @@
-// Background spheres for a fit: which texels the photos can say anything about, and growing
-// from coarse to fine.
+// Background spheres for a fit: allocates the texels that photos see and resamples from coarse
+// to fine.
 #pragma once
 
 #include "kernels/field/packed_grid.h"
@@ -8,16 +8,16 @@
 
 namespace regrade {
 
-// Texels from pole to pole at a stage whose grid has `stage` voxels along its longest side,
-// where the last stage's has `last`.
+// Texels from pole to pole at a stage whose grid has `stage` voxels along its longest side;
+// `resolution` texels belong to the last stage, with `last` voxels.
 int SphereResolutionFor(int resolution, int stage, int last);
 
-// Layers whose columns some training ray comes by, of one density and colour (sRGB). Throws
-// Error(kResources) if there are too many texels to number.
+// Layers of one density and colour (sRGB), with the texel columns that training rays cross.
+// Throws Error(kResources) if there are too many texels to index.
 FastSpheres MakeInitialSpheres(const TrainingRays& rays, const GridFrame& frame, int layers,
                                int resolution, float density, const Vec3f& color);
 
-// The layers on maps of `resolution`, bilinearly.
+// The layers interpolated bilinearly on maps of `resolution`.
 FastSpheres ResampleSpheres(const FastSpheres& spheres, int resolution);
 
 }  // namespace regrade

@@ -19,7 +19,7 @@ std::vector<Vec3f> DirectionMap(const Camera& camera) {
   return map;
 }
 
-// Interleaves the bits of x and y: near in the plane is near in the order.
+// Interleaves the bits of x and y: pixels that are close in the image are close in the order.
 uint64_t Morton(uint32_t x, uint32_t y) {
   const auto spread = [](uint64_t v) {
     v = (v | (v << 16)) & 0x0000ffff0000ffffull;
@@ -68,8 +68,8 @@ TrainingRays::TrainingRays(const std::vector<TrainingView>& views) {
     }
     if (stored.drawn.empty())
       throw Error(ExitCode::kInput,
-                  "view " + std::to_string(views_.size()) + " has no pixel that is left to fit",
-                  "", "look at its mask");
+                  "view " + std::to_string(views_.size()) + " has no unmasked pixel to fit", "",
+                  "check its mask");
     sum += view_sum;
     total_ += static_cast<int64_t>(stored.drawn.size());
     if (static_cast<int64_t>(stored.drawn.size()) == photo.num_pixels())
@@ -79,7 +79,7 @@ TrainingRays::TrainingRays(const std::vector<TrainingView>& views) {
   mean_color_ = (sum / static_cast<double>(total_)).Cast<float>();
 }
 
-bool TrainingRays::StoredView::LeavesOut(int64_t pixel) const {
+bool TrainingRays::StoredView::IsMasked(int64_t pixel) const {
   return !drawn.empty() &&
          !std::binary_search(drawn.begin(), drawn.end(), static_cast<int32_t>(pixel));
 }
@@ -107,11 +107,10 @@ void TrainingRays::Draw(uint64_t seed, uint64_t step, int patches, int patch,
   struct Corner {
     int view, x, y;
     uint64_t order;
-    int64_t pixel;  // within the square, not left out; -1 where nothing is
+    int64_t pixel;  // an unmasked pixel within the square; -1 if the view has no mask
   };
   std::vector<Corner> corners(static_cast<size_t>(patches));
-  // A random rotation of the views, then equal shares: no view is left out of a batch by
-  // chance.
+  // Stratified over the views from a random start, so that every view is in every batch.
   const double turn = RandomDouble(seed, step, 0);
   for (int p = 0; p < patches; ++p) {
     const double position = (p + turn) / patches * num_views();
@@ -127,7 +126,7 @@ void TrainingRays::Draw(uint64_t seed, uint64_t step, int patches, int patch,
       y = static_cast<int>(RandomIndex(seed, step, counter + 1, static_cast<uint64_t>(rows)));
     } else {
       pixel = stored.drawn[RandomIndex(seed, step, counter, stored.drawn.size())];
-      // A square round it, wherever it lies in that.
+      // A square that contains the pixel at a random position.
       const int within = static_cast<int>(
           RandomIndex(seed, step, counter + 1,
                       static_cast<uint64_t>(patch) * static_cast<uint64_t>(patch)));
@@ -151,7 +150,7 @@ void TrainingRays::Draw(uint64_t seed, uint64_t step, int patches, int patch,
         const int64_t width = view.camera.width;
         int64_t pixel = std::min(corner.y + dy, view.camera.height - 1) * width +
                         std::min(corner.x + dx, view.camera.width - 1);
-        if (view.LeavesOut(pixel)) pixel = corner.pixel;
+        if (view.IsMasked(pixel)) pixel = corner.pixel;
         rays->push_back(RayOf(corner.view, static_cast<int>(pixel % width),
                               static_cast<int>(pixel / width)));
         const uint16_t* c = &view.color[static_cast<size_t>(pixel) * 3];

@@ -1,5 +1,5 @@
-// The pool of training rays: every pixel of every training view that has a colour, drawn by
-// counter so that any thread count and any resume sees the same batches.
+// The pool of training rays: all unmasked pixels of all training views, drawn by counter so
+// that batches depend neither on the number of threads nor on a resume.
 #pragma once
 
 #include <cstdint>
@@ -11,8 +11,8 @@
 
 namespace regrade {
 
-// `photo` has the camera's size, 3 channels, sRGB; a pixel with a value that is not finite is
-// left out: no ray is drawn there. Cameras are in the field's frame.
+// `photo` has the camera's size, 3 channels, sRGB. Pixels with a non-finite value are masked:
+// no ray is drawn there. Cameras are in the field's frame.
 struct TrainingView {
   Camera camera;
   const Image* photo = nullptr;
@@ -20,22 +20,23 @@ struct TrainingView {
 
 class TrainingRays {
  public:
-  // Copies what it needs; 6 bytes a pixel (unorm16, exact for 8-bit photos) and one direction
-  // map a lens. Throws Error(kInput) for a view without a pixel to draw.
+  // Copies the pixels (6 bytes each: unorm16, exact for 8-bit photos) and stores one direction
+  // map per lens. Throws Error(kInput) for a view without an unmasked pixel.
   explicit TrainingRays(const std::vector<TrainingView>& views);
 
   int64_t num_rays() const { return total_; }
   int num_views() const { return static_cast<int>(views_.size()); }
   Vec3f mean_color() const { return mean_color_; }
 
-  // Fills rays and targets with `patches` squares of patch x patch pixels, the same number from
-  // every view give or take one, ordered by view and position so that neighbours share voxels.
-  // Where a pixel of a square is left out, another of the square is drawn twice.
+  // Fills rays and targets with `patches` squares of patch x patch pixels, the same number
+  // (+-1) from every view, ordered by view and position so that neighbours share voxels. A
+  // masked pixel of a square is replaced by an unmasked one of the square.
   void Draw(uint64_t seed, uint64_t step, int patches, int patch, std::vector<Ray>* rays,
             std::vector<Vec3f>* targets) const;
 
   Ray RayOf(int view, int x, int y) const;
-  // Everything on a CUDA device. Throws Error(kResources) if it does not fit, or without CUDA.
+  // Copies all views to a CUDA device. Throws Error(kResources) if it does not fit, or without
+  // CUDA.
   DeviceViews ToDevice() const;
   const Camera& camera(int view) const { return views_[static_cast<size_t>(view)].camera; }
 
@@ -46,8 +47,8 @@ class TrainingRays {
     Vec3f origin;
     Mat3f world_from_camera;
     std::vector<uint16_t> color;  // [H, W, 3]
-    std::vector<int32_t> drawn;   // pixels y W + x; empty where none is left out
-    bool LeavesOut(int64_t pixel) const;
+    std::vector<int32_t> drawn;   // unmasked pixels y W + x; empty if none is masked
+    bool IsMasked(int64_t pixel) const;
   };
   std::vector<StoredView> views_;
   std::vector<std::vector<Vec3f>>

@@ -1,5 +1,7 @@
 #include "reconstruct/refinement/bundle.h"
 
+#include <ceres/rotation.h>
+
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
@@ -13,30 +15,24 @@
 namespace regrade {
 namespace {
 
-constexpr double kHeldOutShare = 0.1;
-constexpr double kLeastSpread = 1e-4;  // of the points' distance: less shows no depth
+constexpr double kHeldOutFraction = 0.1;
+constexpr double kLeastExtent = 1e-4;  // of the points' distance: less shows no depth
 constexpr size_t kLeastKept = 3;       // observations of a point that are not held out
 
-// Rodrigues' formula.
-Mat3d RotationOf(const double* w) {
-  const Eigen::Vector3d v(w[0], w[1], w[2]);
-  const double angle = v.norm();
-  Mat3d result;
-  if (angle == 0) return result;
-  const Eigen::Matrix3d m = Eigen::AngleAxisd(angle, v / angle).toRotationMatrix();
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) result(i, j) = m(i, j);
-  return result;
+Mat3d RotationOf(const double* angle_axis) {
+  Mat3d rotation;
+  ceres::AngleAxisToRotationMatrix(angle_axis, ceres::RowMajorAdapter3x3(&rotation(0, 0)));
+  return rotation;
 }
 
 Vec3d CenterOf(const std::array<double, 6>& pose) { return {pose[3], pose[4], pose[5]}; }
 
-// Largest distance between two of them.
-double SpreadOf(const std::vector<Vec3d>& centers) {
-  double spread = 0;
+// Largest distance between two centres.
+double ExtentOf(const std::vector<Vec3d>& centers) {
+  double extent = 0;
   for (size_t i = 0; i < centers.size(); ++i)
-    for (size_t j = 0; j < i; ++j) spread = std::max(spread, Norm(centers[i] - centers[j]));
-  return spread;
+    for (size_t j = 0; j < i; ++j) extent = std::max(extent, Norm(centers[i] - centers[j]));
+  return extent;
 }
 
 double MedianDistance(const std::vector<ColmapPoint>& points, const Vec3d& from) {
@@ -69,10 +65,10 @@ Bundle MakeBundle(const ColmapModel& model) {
     numbers.push_back(HashOf(image.name));
   }
   bundle.focal.resize(model.cameras.size());
-  double spread = SpreadOf(centers);
-  if (spread < kLeastSpread * MedianDistance(model.points, mean)) spread = 0;
-  const double scale = spread > 0 ? 1 / spread : 1;
-  bundle.spread = spread > 0 ? 1 : 0;
+  double extent = ExtentOf(centers);
+  if (extent < kLeastExtent * MedianDistance(model.points, mean)) extent = 0;
+  const double scale = extent > 0 ? 1 / extent : 1;
+  bundle.extent = extent > 0 ? 1 : 0;
   bundle.bundle_from_world = {scale, Mat3d(), -(mean * scale)};
   for (const Vec3d& center : centers) {
     const Vec3d c = bundle.bundle_from_world * center;
@@ -99,7 +95,7 @@ Bundle MakeBundle(const ColmapModel& model) {
     for (BundleObservation& observation : seen) {
       observation.held_out =
           kept > kLeastKept &&
-          RandomDouble(numbers[observation.view], model.points[p].id, 0) < kHeldOutShare;
+          RandomDouble(numbers[observation.view], model.points[p].id, 0) < kHeldOutFraction;
       kept -= observation.held_out;
     }
     bundle.observations.insert(bundle.observations.end(), seen.begin(), seen.end());
@@ -114,11 +110,11 @@ Bundle MakeBundle(const ColmapModel& model) {
 double ReprojectionError(const Bundle& bundle, const BundleObservation& observation) {
   const std::array<double, 6>& pose = bundle.poses[observation.view];
   const std::array<double, 3>& x = bundle.points[observation.point];
-  const Vec3d turned =
+  const Vec3d rotated =
       bundle.rotations[observation.view] * (Vec3d{x[0], x[1], x[2]} - CenterOf(pose));
   const Camera& lens = bundle.lenses[observation.view];
   double u = 0, v = 0;
-  if (!lens.Project(RotationOf(pose.data()) * turned, &u, &v))
+  if (!lens.Project(RotationOf(pose.data()) * rotated, &u, &v))
     return std::numeric_limits<double>::infinity();
   const double factor = std::exp(bundle.focal[bundle.camera[observation.view]]);
   return std::hypot((u - lens.cx) * factor + lens.cx - observation.u,
@@ -145,15 +141,16 @@ ColmapModel ModelOfBundle(const Bundle& bundle, const ColmapModel& model) {
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
   for (size_t v = 0; v < n; ++v) {
     rotations.push_back(RotationOf(bundle.poses[v].data()) * bundle.rotations[v]);
-    const Mat3d turn = bundle.rotations[v].Transposed() * rotations[v];
+    const Mat3d correction = bundle.rotations[v].Transposed() * rotations[v];
     for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j) sum(i, j) += turn(i, j);
+      for (int j = 0; j < 3; ++j) sum(i, j) += correction(i, j);
     before.push_back(model.images[v].camera_from_world.Inverse().translation);
     after.push_back(CenterOf(bundle.poses[v]));
     mean_before += before[v] / static_cast<double>(n);
     mean_after += after[v] / static_cast<double>(n);
   }
-  // The rotation nearest to the mean of R_before^T R_after; turns are small, so it is one.
+  // The orthogonal matrix nearest to the sum of R_before^T R_after; its determinant is 1
+  // because the corrections are small.
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const Eigen::Matrix3d nearest = svd.matrixU() * svd.matrixV().transpose();
   Similarity world_from_bundle;
@@ -161,9 +158,9 @@ ColmapModel ModelOfBundle(const Bundle& bundle, const ColmapModel& model) {
     for (int j = 0; j < 3; ++j) world_from_bundle.rotation(i, j) = nearest(i, j);
   double across = 0, along = 0;
   for (size_t v = 0; v < n; ++v) {
-    const Vec3d turned = world_from_bundle.rotation * (after[v] - mean_after);
-    across += Dot(turned, before[v] - mean_before);
-    along += Dot(turned, turned);
+    const Vec3d rotated = world_from_bundle.rotation * (after[v] - mean_after);
+    across += Dot(rotated, before[v] - mean_before);
+    along += Dot(rotated, rotated);
   }
   world_from_bundle.scale = across / along;
   world_from_bundle.translation =

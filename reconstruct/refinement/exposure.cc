@@ -32,7 +32,7 @@ class LogLightResidual final : public ceres::SizedCostFunction<3, 3, 3> {
   Vec3d log_light_;
 };
 
-// Least squares see no group's common gain: its first photo is held where it is.
+// A group's common gain is undetermined, so the gain of its first photo is fixed.
 void Minimise(const ExposureData& data, LogColors* colors, LogColors* gains) {
   ceres::SoftLOneLoss loss(kExposureLossScale);
   ceres::Problem::Options ownership;
@@ -53,9 +53,8 @@ void Minimise(const ExposureData& data, LogColors* colors, LogColors* gains) {
   options.linear_solver_type = ceres::SPARSE_SCHUR;
   options.num_threads = 1;  // the same sums every time
   options.max_num_iterations = 50;
-  // Where two photos disagree about a point by much more than the loss's scale, any colour
-  // between is nearly as good, and the minimiser creeps there; the gains stand still long
-  // before.
+  // Where two photos disagree about a point by much more than the loss's scale, all colours in
+  // between cost nearly the same, and the solver converges slowly there, long after the gains.
   options.function_tolerance = 1e-8;
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
@@ -63,7 +62,7 @@ void Minimise(const ExposureData& data, LogColors* colors, LogColors* gains) {
   REGRADE_CHECK(summary.IsSolutionUsable());
 }
 
-// Moves each group's mean into the colours, where it belongs.
+// Shifts each group's log gains to mean 0.
 void FixGauge(const ExposureData& data, LogColors* gains) {
   for (const std::vector<size_t>& group : data.members) {
     Vec3d sum;
@@ -74,7 +73,7 @@ void FixGauge(const ExposureData& data, LogColors* gains) {
 }
 
 LogColors BestGains(const ExposureData& data, size_t num_views) {
-  // Reweighting comes near the minimum at a tenth of the price; Ceres has the last word.
+  // Reweighting approaches the minimum in a tenth of the time; Ceres finishes.
   LogColors gains = ReweightedGains(data, kNoFold, LogColors(num_views));
   LogColors colors(data.fold_of_point.size());
   for (size_t p = 0; p < colors.size(); ++p)
@@ -109,7 +108,7 @@ void Explain(const std::vector<double>& before, const std::vector<double>& after
 }  // namespace
 
 double ExposureEstimate::Threshold() const {
-  return std::max(kExposurePays, kExposureSurety * explained_error);
+  return std::max(kExposurePays, kExposureSigmas * explained_error);
 }
 
 ExposureEstimate EstimateExposure(int num_views,

@@ -1,4 +1,4 @@
-// Parts of a scene that err together, for a check that leaves them out in turn.
+// Divides a scene into spatial parts for cross-validation.
 #pragma once
 
 #include <vector>
@@ -7,9 +7,9 @@
 
 namespace regrade {
 
-// A part's number in [0, 2^levels) for each place: cut at the median of the widest axis (from
-// the tenth to the ninetieth percentile, so that strays have no say), and again each half. Free
-// of the places' order, up to the names of parts and places that coincide.
-std::vector<int> SpatialFolds(const std::vector<Vec3d>& places, int levels);
+// The part of each position, in [0, 2^levels): splits at the median of the widest axis
+// (measured from the 10th to the 90th percentile, to ignore outliers), recursively. Independent
+// of the order of positions, except for those that coincide.
+std::vector<int> SpatialFolds(const std::vector<Vec3d>& positions, int levels);
 
 }  // namespace regrade

@@ -11,10 +11,10 @@ namespace regrade {
 namespace {
 
 constexpr double kSquaredScale = kExposureLossScale * kExposureLossScale;
-// Steps of reweighting: each takes a good half of what is left, and a thousandth of a gain is
-// less than what noise leaves of it.
+// Reweighting steps: each removes more than half of the remaining error, and a thousandth of a
+// gain is below its noise.
 constexpr int kColorSteps = 20, kGainSteps = 60;
-constexpr double kStill = 1e-5;  // of a log gain
+constexpr double kConverged = 1e-5;  // change of a log gain
 
 using Index = Eigen::Index;
 
@@ -28,7 +28,7 @@ double Loss(const Vec3d& residual) {
   return 2 * s / (std::sqrt(1 + s / kSquaredScale) + 1);
 }
 
-// Photos that tracks tie together have one number, their least index.
+// The group of each photo connected by tracks: the least index of its photos.
 std::vector<size_t> GroupNumbers(size_t num_views, const ExposureData& data) {
   std::vector<size_t> parent(num_views);
   std::iota(parent.begin(), parent.end(), size_t{0});
@@ -46,7 +46,7 @@ std::vector<size_t> GroupNumbers(size_t num_views, const ExposureData& data) {
   return parent;
 }
 
-// The weighted mean of a point's colours at given gains; what has no weight has no say.
+// The weighted mean of a point's log colours at given gains.
 Vec3d WeightedColor(const ExposureData& data, size_t point, const LogColors& gains,
                     const std::vector<double>& weights, double* sum) {
   Vec3d mean;
@@ -59,8 +59,8 @@ Vec3d WeightedColor(const ExposureData& data, size_t point, const LogColors& gai
   return *sum > 0 ? mean / *sum : mean;
 }
 
-// Normal equations of the gains, the points' colours eliminated exactly: of a point,
-// diag(w) - w w^T / sum w; the same for all channels, since a observation has one weight.
+// Solves the normal equations of the gains with the points' colours eliminated: each point adds
+// diag(w) - w w^T / sum w, the same for all channels, since an observation has one weight.
 LogColors WeightedGains(const ExposureData& data, const std::vector<double>& weights,
                         size_t num_views) {
   const auto n = static_cast<Index>(num_views);
@@ -80,8 +80,8 @@ LogColors WeightedGains(const ExposureData& data, const std::vector<double>& wei
             weights[i] * weights[j] / sum;
     }
   }
-  // A group's common gain is not seen, nor is that of a photo whose observations are left out:
-  // a mite on the diagonal holds them near nothing.
+  // A group's common gain is undetermined, and so is that of a photo whose observations are
+  // left out: a small term on the diagonal keeps them near 0.
   matrix.diagonal().array() += 1e-9 * std::max(matrix.trace() / static_cast<double>(n), 1e-9);
   const Eigen::MatrixX3d solved = matrix.ldlt().solve(right);
   LogColors gains(num_views);
@@ -90,14 +90,14 @@ LogColors WeightedGains(const ExposureData& data, const std::vector<double>& wei
   return gains;
 }
 
-// Moves each group's mean to that of `like`.
-void FixMeans(const ExposureData& data, const std::vector<bool>& used, const LogColors& like,
-              LogColors* gains) {
+// Shifts each group's mean to that of `reference`.
+void FixMeans(const ExposureData& data, const std::vector<bool>& used,
+              const LogColors& reference, LogColors* gains) {
   for (const std::vector<size_t>& group : data.members) {
     Vec3d shift;
     int count = 0;
     for (const size_t v : group)
-      if (used[v]) shift += like[v] - (*gains)[v], ++count;
+      if (used[v]) shift += reference[v] - (*gains)[v], ++count;
     for (const size_t v : group)
       if (used[v]) (*gains)[v] += shift / count;
   }
@@ -155,14 +155,14 @@ Vec3d RobustColor(const ExposureData& data, size_t point, const LogColors& gains
     Vec3d sum;
     double weights = 0;
     for (size_t i = begin; i < end; ++i) {
-      const Vec3d there = data.observations[i].log_light - gains[data.observations[i].view];
-      const double w = step == 0 ? 1 : Weight(there - color);
-      sum += there * w, weights += w;
+      const Vec3d seen = data.observations[i].log_light - gains[data.observations[i].view];
+      const double w = step == 0 ? 1 : Weight(seen - color);
+      sum += seen * w, weights += w;
     }
     const Vec3d next = sum / weights;
     const double moved = Norm(next - color);
     color = next;
-    if (step > 0 && moved < kStill) break;
+    if (step > 0 && moved < kConverged) break;
   }
   return color;
 }
@@ -199,7 +199,7 @@ LogColors ReweightedGains(const ExposureData& data, int without_fold, const LogC
     double sum = 0;
     for (size_t p = 0; p < colors.size(); ++p)
       colors[p] = WeightedColor(data, p, gains, weights, &sum);
-    if (moved < kStill) break;
+    if (moved < kConverged) break;
   }
   return gains;
 }

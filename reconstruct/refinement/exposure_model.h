@@ -1,5 +1,5 @@
-// The two-way model of log colours (see EQ(exposure)): its data, and its minimum by reweighted
-// least squares with parts of the scene left out.
+// The two-way model of log colours (see EQ(exposure)): its data, and its minimum by iteratively
+// reweighted least squares with parts of the scene left out.
 #pragma once
 
 #include <array>
@@ -10,8 +10,8 @@
 
 namespace regrade {
 
-// Colours of one point differ by a few percent between photos for the texture beside it and the
-// lens; what differs by much more than this is another surface, or a highlight.
+// Colours of a point differ by a few percent between photos because of the texture around it
+// and the lens. A much larger difference is another surface or a highlight.
 inline constexpr double kExposureLossScale = 0.05;
 
 using LogColors = std::vector<Vec3d>;
@@ -22,28 +22,29 @@ struct Observation {
 };
 
 struct ExposureData {
-  std::vector<Observation> observations;     // useful ones, those of a point side by side
-  std::vector<size_t> tracks;                // point p has [tracks[p], tracks[p + 1])
-  std::vector<int> fold_of_point;            //
-  std::vector<std::vector<size_t>> members;  // photos that tracks tie together, per group
+  std::vector<Observation> observations;  // used ones, grouped by point
+  std::vector<size_t> tracks;             // point p has [tracks[p], tracks[p + 1])
+  std::vector<int> fold_of_point;
+  std::vector<std::vector<size_t>> members;  // photos connected by tracks, per group
   std::vector<bool> known;                   // photos with observations
 };
 
-// Keeps points that two photos see at least, in photos that have kFewestColors of them; each
-// rule may undo the other, so until nothing changes.
+// Keeps points seen by at least two photos, and photos with at least kFewestColors points;
+// repeats until neither rule removes any.
 ExposureData ArrangeObservations(size_t num_views,
                                  const std::vector<ColorObservation>& observations);
 
 constexpr int kNoFold = -1;
 
-// The minimum over all points but those of a fold, from `start` on; photos that have fewer than
-// kFewestColors observations then have gain 0. Each group's mean is that of `start`.
+// The minimum over all points except those of a fold, starting at `start`. Photos with fewer
+// than kFewestColors remaining observations get log gain 0. Each group's mean is that of
+// `start`.
 LogColors ReweightedGains(const ExposureData& data, int without_fold, const LogColors& start);
 
-// The least sum of rho that the points' colours reach at these gains, fold by fold.
+// The least sum of rho over the points' colours at these gains, for each fold.
 std::vector<double> Disagreement(const ExposureData& data, const LogColors& gains);
 
-// Of a point at given gains: the colour with the least sum of rho.
+// The log colour of a point with the least sum of rho at given gains.
 Vec3d RobustColor(const ExposureData& data, size_t point, const LogColors& gains);
 
 }  // namespace regrade

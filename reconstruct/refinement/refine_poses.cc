@@ -13,13 +13,13 @@
 namespace regrade {
 namespace {
 
-constexpr int64_t kFewestHeldOut = 100;  // to judge by: their median is known to a tenth
+constexpr int64_t kFewestHeldOut = 100;  // for validation: gives the median to 10 %
 constexpr int kMostIterations = 50;
 constexpr double kLeastLossScale = 0.5;     // pixels
-constexpr double kLossScaleOfMedian = 2;    // errors of twice the median are outliers' already
-constexpr double kRayleighMedian = 1.1774;  // of a distance in two coordinates of deviation 1
+constexpr double kLossScaleOfMedian = 2;    // errors above twice the median are outliers
+constexpr double kRayleighMedian = 1.1774;  // median length of a 2D normal vector, sigma 1
 
-// Differences of the camera's own projection: one body for all lenses.
+// Residual through the camera's own projection, with numeric derivatives, for all lenses.
 struct ObservationError {
   const Camera* lens;
   const Mat3d* rotation;
@@ -30,10 +30,10 @@ struct ObservationError {
     const Vec3d p =
         *rotation * Vec3d{point[0] - pose[3], point[1] - pose[4], point[2] - pose[5]};
     const double before[3] = {p.x, p.y, p.z};
-    double turned[3];
-    ceres::AngleAxisRotatePoint(pose, before, turned);
+    double rotated[3];
+    ceres::AngleAxisRotatePoint(pose, before, rotated);
     double x = 0, y = 0;
-    if (!lens->Project({turned[0], turned[1], turned[2]}, &x, &y)) return false;
+    if (!lens->Project({rotated[0], rotated[1], rotated[2]}, &x, &y)) return false;
     const double factor = std::exp(*focal);
     residual[0] = (x - lens->cx) * factor + lens->cx - u;
     residual[1] = (y - lens->cy) * factor + lens->cy - v;
@@ -41,9 +41,9 @@ struct ObservationError {
   }
 };
 
-class Watcher final : public ceres::IterationCallback {
+class ProgressCallback final : public ceres::IterationCallback {
  public:
-  explicit Watcher(const ProgressFunction& progress) : progress_(progress) {}
+  explicit ProgressCallback(const ProgressFunction& progress) : progress_(progress) {}
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& summary) override {
     aborted_ = Report(progress_, summary.iteration, kMostIterations, "adjusting the poses") ==
                LoopControl::kStop;
@@ -56,15 +56,15 @@ class Watcher final : public ceres::IterationCallback {
   bool aborted_ = false;
 };
 
-// What is free besides the points.
+// The parameters to adjust besides the points.
 struct Freedom {
   bool poses = false, focal = false;
 };
 
 struct Gauge {
-  size_t view = 0;      // keeps its pose
-  size_t far_view = 0;  // keeps ...
-  int coordinate = 0;   // ... this one of its centre
+  size_t view = 0;      // its pose is fixed
+  size_t far_view = 0;  // one coordinate of its centre is fixed
+  int coordinate = 0;
 };
 
 Gauge ChooseGauge(const Bundle& bundle) {
@@ -115,28 +115,29 @@ class Adjustment {
                            new ceres::SubsetManifold(6, {3 + gauge.coordinate}));
   }
 
-  // False where there is nothing that can be used.
+  // False if Ceres finds no usable solution.
   bool Solve(bool points_alone, const ProgressFunction& progress) {
     ceres::Solver::Options options;
     options.linear_solver_type =
         points_alone ? ceres::SPARSE_NORMAL_CHOLESKY : ceres::SPARSE_SCHUR;
     if (!points_alone) options.linear_solver_ordering = ordering_;
-    options.num_threads = 1;  // the same sums every time
+    options.num_threads = 1;  // a fixed order of sums
     options.max_num_iterations = kMostIterations;
     options.function_tolerance = 1e-7;
     options.logging_type = ceres::SILENT;
-    Watcher watcher(progress);
-    options.callbacks = {&watcher};
+    ProgressCallback callback(progress);
+    options.callbacks = {&callback};
     ceres::Solver::Summary summary;
     ceres::Solve(options, &problem_, &summary);
-    if (watcher.aborted()) throw Interrupted();
+    if (callback.aborted()) throw Interrupted();
     return summary.IsSolutionUsable();
   }
 
-  // Medians of the poses' standard errors, radians and the bundle's lengths, where errors of
-  // observations have this deviation in each coordinate; none where the covariance has no rank.
+  // Medians of the standard errors of rotations (radians) and centres (bundle units), for
+  // observations with this standard deviation in each coordinate; none if the covariance is
+  // rank deficient.
   std::optional<std::pair<double, double>> StandardErrors(double deviation) {
-    FLAGS_minloglevel = google::GLOG_FATAL;  // a rank that is too low is an answer, not news
+    FLAGS_minloglevel = google::GLOG_FATAL;  // Ceres warns about rank deficiency
     ceres::Covariance::Options options;
     options.algorithm_type = ceres::SPARSE_QR;
     options.num_threads = 1;
@@ -147,14 +148,14 @@ class Adjustment {
           !problem_.IsParameterBlockConstant(pose.data()))
         blocks.emplace_back(pose.data(), pose.data());
     if (blocks.empty() || !covariance.Compute(blocks, &problem_)) return std::nullopt;
-    std::vector<double> turns, places;
+    std::vector<double> rotations, centers;
     for (const auto& [pose, same] : blocks) {
       double block[36];
       if (!covariance.GetCovarianceBlock(pose, same, block)) return std::nullopt;
-      turns.push_back(deviation * std::sqrt(block[0] + block[7] + block[14]));
-      places.push_back(deviation * std::sqrt(block[21] + block[28] + block[35]));
+      rotations.push_back(deviation * std::sqrt(block[0] + block[7] + block[14]));
+      centers.push_back(deviation * std::sqrt(block[21] + block[28] + block[35]));
     }
-    return std::pair(Median(turns), Median(places));
+    return std::pair(Median(rotations), Median(centers));
   }
 
   static double Median(std::vector<double> values) {
@@ -183,28 +184,28 @@ double LossScale(const Bundle& bundle) {
                                : kLeastLossScale;
 }
 
-// By how much the model's poses differ from those that came.
-void MeasureCorrections(const ColmapModel& before, const ColmapModel& after, double per_spread,
+// Medians of the differences between the refined and the given poses.
+void MeasureCorrections(const ColmapModel& before, const ColmapModel& after, double per_extent,
                         PoseRefinement* result) {
   std::vector<double> turned, moved;
   for (size_t v = 0; v < before.images.size(); ++v) {
     const RigidTransform& old = before.images[v].camera_from_world;
     const RigidTransform& now = after.images[v].camera_from_world;
     const Mat3d turn = now.rotation * old.rotation.Transposed();
-    // From its antisymmetric part: small angles keep their digits.
+    // From the antisymmetric part, which is accurate for small angles.
     const Vec3d axis{turn(2, 1) - turn(1, 2), turn(0, 2) - turn(2, 0), turn(1, 0) - turn(0, 1)};
     turned.push_back(std::atan2(Norm(axis), turn(0, 0) + turn(1, 1) + turn(2, 2) - 1) * 180 /
                      M_PI);
-    moved.push_back(Norm(now.Inverse().translation - old.Inverse().translation) * per_spread);
+    moved.push_back(Norm(now.Inverse().translation - old.Inverse().translation) * per_extent);
   }
   result->turned_deg = Adjustment::Median(turned);
-  result->moved_share = Adjustment::Median(moved);
+  result->moved_fraction = Adjustment::Median(moved);
 }
 
-std::string Judge(const PoseRefinement& result, bool asked_for) {
+std::string WhyRejected(const PoseRefinement& result, bool asked_for) {
   const double most = (asked_for ? 1 : 1 - kRefinementPays) * result.held_out_before_px;
   if (result.held_out_after_px < most) return "";
-  return "observations that had no say are no nearer";
+  return "held-out observations do not fit better";
 }
 
 }  // namespace
@@ -224,13 +225,13 @@ PoseRefinement RefinePoses(const ColmapModel& model, const RefinePosesOptions& o
     result.refused = why;
     return result;
   };
-  if (result.held_out < kFewestHeldOut || bundle.spread == 0) {
+  if (result.held_out < kFewestHeldOut || bundle.extent == 0) {
     result.misfit_px = MedianError(bundle, false);
-    return options.asked_for ? refuse(bundle.spread == 0 ? "all cameras are at one place"
-                                                         : "too few observations to judge by")
+    return options.asked_for ? refuse(bundle.extent == 0 ? "all cameras are at one place"
+                                                         : "too few observations to validate")
                              : result;
   }
-  // Points that are put where they fit best only come nearer.
+  // Adjusting the points can only reduce the error.
   result.misfit_px = MedianError(bundle, false);
   if (!options.asked_for && !(result.misfit_px > options.misfit_px)) return result;
   if (!Adjustment(&bundle, {}, LossScale(bundle)).Solve(true, parts.Next(1)))
@@ -241,20 +242,20 @@ PoseRefinement RefinePoses(const ColmapModel& model, const RefinePosesOptions& o
 
   result.tried = true;
   const Freedom freedom{true, options.free_focal};
-  // From afar with a wide loss, then with one as wide as the errors that are left.
+  // First with a wide loss, then with one scaled to the remaining errors.
   if (!Adjustment(&bundle, freedom, LossScale(bundle)).Solve(false, parts.Next(1)))
     return refuse("the poses could not be adjusted");
   Adjustment last(&bundle, freedom, LossScale(bundle));
   if (!last.Solve(false, parts.Next(1))) return refuse("the poses could not be adjusted");
   result.refined_px = MedianError(bundle, false);
   result.held_out_after_px = MedianError(bundle, true);
-  result.refused = Judge(result, options.asked_for);
+  result.refused = WhyRejected(result, options.asked_for);
   if (!result.refused.empty()) return result;
   const ColmapModel refined = ModelOfBundle(bundle, model);
   MeasureCorrections(model, refined, bundle.bundle_from_world.scale, &result);
   if (const auto errors = last.StandardErrors(result.refined_px / kRayleighMedian)) {
     result.turn_error_deg = errors->first * 180 / M_PI;
-    result.place_error_share = errors->second;
+    result.moved_error = errors->second;
   }
   parts.Next(1);
   result.model = refined;

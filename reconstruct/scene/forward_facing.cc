@@ -10,11 +10,10 @@
 namespace regrade {
 namespace {
 
-constexpr double kNearestTail =
-    0.01;                             // share of observations that may be nearer: wrong matches
-constexpr double kNearFactor = 0.75;  // the near plane, as a share of the nearest depth
-constexpr int kLayers = 128;          // along z, as svox2's LLFF configuration has
-constexpr double kLargestRadius = 2;  // half side in NDC; 1 is what the mean camera sees
+constexpr double kNearestTail = 0.01;  // fraction of observations that may be nearer: outliers
+constexpr double kNearFactor = 0.75;   // the near plane, as a fraction of the nearest depth
+constexpr int kLayers = 128;           // along z, as in svox2's LLFF configuration
+constexpr double kLargestRadius = 2;   // half side in NDC; the mean camera sees 1
 
 Vec3d MeanForward(const Capture& capture) {
   Vec3d sum{};
@@ -23,7 +22,7 @@ Vec3d MeanForward(const Capture& capture) {
 }
 
 double NearestDepth(const Capture& capture) {
-  if (capture.nearest_depth > 0) return capture.nearest_depth;  // said, not estimated
+  if (capture.nearest_depth > 0) return capture.nearest_depth;  // given, not estimated
   std::vector<double> depths;
   for (const ScenePoint& point : capture.points)
     for (const int32_t v : point.views) {
@@ -50,18 +49,18 @@ ForwardFacing MeasureForwardFacing(const Capture& capture) {
     high = std::max(high, Dot(view.camera.Center(), forward));
   }
   result.nearest = NearestDepth(capture);
-  result.depth_share = result.nearest > 0 ? (high - low) / result.nearest : 1e9;
+  result.depth_fraction = result.nearest > 0 ? (high - low) / result.nearest : 1e9;
   result.on = capture.views.size() >= 3 && result.angle_deg <= kForwardAngle &&
-              result.depth_share <= kForwardDepthShare;
+              result.depth_fraction <= kForwardDepthFraction;
   return result;
 }
 
 NormalizedScene NormalizeForwardFacing(const Capture& capture, const ForwardFacing& measured) {
   Vec3d up{}, center{};
-  const double share = 1.0 / static_cast<double>(capture.views.size());
+  const double weight = 1.0 / static_cast<double>(capture.views.size());
   for (const CaptureView& view : capture.views) {
     up += view.camera.Up();
-    center += view.camera.Center() * share;
+    center += view.camera.Center() * weight;
   }
   NormalizedScene result;
   Similarity& s = result.field_from_world;
@@ -81,14 +80,14 @@ NormalizedScene NormalizeForwardFacing(const Capture& capture, const ForwardFaci
   for (const CaptureView& view : capture.views) {
     const Camera camera = view.camera.Transformed(s);
     if (!(camera.Center().z < 1))
-      throw Error(ExitCode::kScene, "stands in front of the near plane of its capture",
+      throw Error(ExitCode::kScene, "its camera is in front of the near plane of the capture",
                   view.file, "leave this photo out");
     for (const double u : {0.5, camera.width - 0.5})
       for (const double v : {0.5, camera.height - 0.5}) {
         RayT<double> ray = camera.WorldRay(u, v);
         NdcRay(result.ndc, &ray.origin, &ray.direction);
         if (!(ray.direction.z > 0))
-          throw Error(ExitCode::kScene, "looks sideways or backwards", view.file,
+          throw Error(ExitCode::kScene, "its camera looks sideways or backwards", view.file,
                       "leave this photo out");
         const Vec3d far = ray.origin + ray.direction * (2 / ray.direction.z);
         radius_x = std::max({radius_x, std::abs(ray.origin.x), std::abs(far.x)});

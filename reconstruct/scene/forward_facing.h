@@ -1,4 +1,4 @@
-// Captures whose cameras all look one way: what tells them, and the space that suits them.
+// Detects captures whose cameras all look one way, and gives them a scene in NDC.
 #pragma once
 
 #include "kernels/scene/capture.h"
@@ -6,23 +6,23 @@
 
 namespace regrade {
 
-// NDC is chosen where both hold; every threshold has a margin to where the space fails (a ray
-// must run forward, and a camera must stand behind the near plane).
+// NDC is chosen if both limits hold. They have a margin to where NDC fails: rays must run
+// forward, and cameras must be behind the near plane.
 inline constexpr double kForwardAngle = 25;  // degrees
-inline constexpr double kForwardDepthShare = 0.3;
+inline constexpr double kForwardDepthFraction = 0.3;
 
 struct ForwardFacing {
-  double angle_deg = 0;    // largest angle between an optical axis and their mean
-  double depth_share = 0;  // spread of the cameras along that mean, over the nearest depth
-  // Of the scene, world units: as it came with the poses, or of the nearest points; 0 unknown.
+  double angle_deg = 0;       // largest angle between an optical axis and their mean
+  double depth_fraction = 0;  // extent of the cameras along that mean, over the nearest depth
+  // The scene's nearest depth, world units: given with the poses, or from points; 0 if unknown.
   double nearest = 0;
   bool on = false;
 };
 ForwardFacing MeasureForwardFacing(const Capture& capture);
 
 // The frame of the mean camera, scaled so that the nearest depth is 4/3 (LLFF's factor 0.75),
-// and the box in NDC that every pixel's ray stays in. See EQ(ndc). Throws Error(kScene) with a
-// camera's name where the space is not valid (H87-H90).
+// and the box in NDC that contains every pixel's ray. See EQ(ndc). Throws Error(kScene) with a
+// photo's name if NDC is not valid for it (H87-H90).
 NormalizedScene NormalizeForwardFacing(const Capture& capture, const ForwardFacing& measured);
 
 }  // namespace regrade

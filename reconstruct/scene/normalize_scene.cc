@@ -11,20 +11,19 @@ namespace regrade {
 namespace {
 
 constexpr size_t kMinPoints = 50;
-constexpr double kTail = 0.01;    // share of points left out at each end of an axis
-constexpr double kMargin = 0.08;  // of the extent, added on both sides
-constexpr double kNearestShare =
-    0.6;  // the scene begins at this share of the nearest points' distance
-// What a photo shows beside its points: its corners are taken to be as deep as this share of
-// its points, and all but this share of all photos' corners belong to the scene.
+constexpr double kTail = 0.01;            // fraction of points omitted at each end of an axis
+constexpr double kMargin = 0.08;          // of the extent, added on both sides
+constexpr double kNearestFraction = 0.6;  // near clip over the distance of the nearest points
+// A photo also shows regions without points: its corners get this quantile of its points'
+// depths, and the box omits the tail of all photos' corners.
 constexpr double kCornerDepth = 0.25;
 constexpr double kCornerTail = 0.1;
 constexpr size_t kMinPointsOfView = 10;
-// Of a cube round the axes' common point: the cameras' median distance is this share of its
-// half side, and without points nothing is nearer to a camera than that share.
+// Of the half side of a cube around the axes' common point: the cameras' median distance, and
+// the near clip without points.
 constexpr double kCameraRange = 0.9;
 constexpr double kFewPointsNearest = 0.35;
-constexpr double kNearPoints = 0.1;    // the share of points that are near for cameras within
+constexpr double kNearPoints = 0.1;    // quantile of the points' distances, for cameras inside
 constexpr double kMostNearClip = 0.5;  // half sides
 
 Eigen::Vector3d ToEigen(const Vec3d& v) { return {v.x, v.y, v.z}; }
@@ -58,7 +57,7 @@ Eigen::Vector3d FixSign(Eigen::Vector3d v) {
   return v(largest) < 0 ? Eigen::Vector3d(-v) : v;
 }
 
-Eigen::Matrix3d Spread(const std::vector<Vec3d>& positions, const Vec3d& mean) {
+Eigen::Matrix3d Scatter(const std::vector<Vec3d>& positions, const Vec3d& mean) {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   for (const Vec3d& p : positions) {
     const Eigen::Vector3d d = ToEigen(p - mean);
@@ -69,20 +68,20 @@ Eigen::Matrix3d Spread(const std::vector<Vec3d>& positions, const Vec3d& mean) {
 
 Mat3d UprightRotation(const std::vector<Vec3d>& centers, const std::vector<Vec3d>& ups,
                       const std::vector<Vec3d>& forwards, std::string* notice) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> spread(
-      Spread(centers, OrderFreeMean(centers)));
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> scatter(
+      Scatter(centers, OrderFreeMean(centers)));
   Eigen::Vector3d up = ToEigen(OrderFreeMean(ups));
   if (up.norm() < 0.1) {
-    up = FixSign(spread.eigenvectors().col(0));
+    up = FixSign(scatter.eigenvectors().col(0));
     *notice =
-        "the photos disagree about up; the direction in which the cameras moved least is taken";
+        "the photos disagree about up; the direction in which the cameras moved least is used";
   }
   up.normalize();
   Eigen::Vector3d heading = ToEigen(OrderFreeMean(forwards));
   heading -= up * up.dot(heading);
   if (heading.norm() < 0.1) {
-    // Photos look all round: take the direction in which the cameras moved most.
-    heading = FixSign(spread.eigenvectors().col(2));
+    // Photos in all directions: uses the direction in which the cameras moved most.
+    heading = FixSign(scatter.eigenvectors().col(2));
     heading -= up * up.dot(heading);
   }
   if (heading.norm() < 1e-6) heading = up.unitOrthogonal();
@@ -110,9 +109,8 @@ Vec3d CommonPoint(const std::vector<Vec3d>& centers, const std::vector<Vec3d>& f
   return FromEigen(a.ldlt().solve(b));
 }
 
-// Where the corners of the photos are, at the depth of the nearer points each sees. Points
-// alone would leave out what has no texture: a third of a picture of an object before a dark
-// room.
+// The corners of the photos at the depth of their nearer points. Points alone would omit
+// regions without texture: a third of a picture of an object in front of a dark room.
 std::vector<Vec3d> PhotoCorners(const Capture& capture) {
   std::vector<std::vector<double>> depths(capture.views.size());
   for (const ScenePoint& point : capture.points)
@@ -136,7 +134,7 @@ std::vector<Vec3d> PhotoCorners(const Capture& capture) {
   return corners;
 }
 
-// A distance below this is the rounding of where the cameras stand, through a matrix of
+// Distances below this are rounding errors of the camera centres, amplified by a matrix of
 // condition 1e6.
 double RoundingOf(const std::vector<Vec3d>& centers) {
   double farthest = 0;
@@ -144,7 +142,7 @@ double RoundingOf(const std::vector<Vec3d>& centers) {
   return 1e-8 * farthest;
 }
 
-// Places and directions of all cameras.
+// Centres and directions of all cameras.
 struct CameraPoses {
   std::vector<Vec3d> centers, ups, forwards;
 
@@ -157,14 +155,13 @@ struct CameraPoses {
   }
 };
 
-// World units: nothing is modelled nearer to a camera than a share of where the nearest points
-// are; 0 without points.
+// The near clip in world units: a fraction of the nearest points' distance; 0 without points.
 double NearestDistance(const Capture& capture, const std::vector<Vec3d>& centers) {
   std::vector<double> distances;
   for (const ScenePoint& p : capture.points)
     for (const int32_t view : p.views)
       distances.push_back(Norm(p.position - centers[static_cast<size_t>(view)]));
-  return distances.empty() ? 0 : kNearestShare * Quantile(&distances, kTail);
+  return distances.empty() ? 0 : kNearestFraction * Quantile(&distances, kTail);
 }
 
 }  // namespace
@@ -198,11 +195,11 @@ NormalizedScene NormalizeScene(const Capture& capture) {
     std::vector<double> distances;
     for (const Vec3d& c : centers) distances.push_back(Norm(c - common));
     double half = Quantile(&distances, 0.5) / kCameraRange;
-    std::string notice = "few points: the box is the cube round the cameras' common point";
+    std::string notice = "few points: the box is the cube around the cameras' common point";
     if (!(half > RoundingOf(centers))) {
       notice =
-          "few points, and the cameras stand at one place: the size of the box is "
-          "that of the points' distances, or 1";
+          "few points, and the cameras are at one place: the box has the size of the points' "
+          "distances, or 1";
       std::vector<double> depths;
       for (const ScenePoint& p : capture.points) depths.push_back(Norm(p.position - common));
       half = depths.empty() ? 1 : Quantile(&depths, 0.5);
@@ -244,15 +241,14 @@ Surroundings MeasureSurroundings(const Capture& capture) {
     distances.push_back(Norm(to_center));
     ahead.push_back(Dot(to_center, poses.forwards[i]));
   }
-  const double reach = Quantile(&distances, 0.5) / kCameraRange;
-  if (!(reach > RoundingOf(poses.centers))) return result;
-  result.half = reach;
-  // Cameras that look outwards stand round nothing: what is near to them begins with the
-  // points.
+  const double half = Quantile(&distances, 0.5) / kCameraRange;
+  if (!(half > RoundingOf(poses.centers))) return result;
+  result.half = half;
+  // Cameras that look outwards surround nothing: the near region extends to the nearer points.
   if (Quantile(&ahead, 0.5) < 0 && capture.points.size() >= kMinPoints) {
     std::vector<double> out;
     for (const ScenePoint& p : capture.points) out.push_back(Norm(p.position - result.center));
-    result.half = std::max(reach, Quantile(&out, kNearPoints));
+    result.half = std::max(half, Quantile(&out, kNearPoints));
   }
   int64_t far = 0, all = 0;
   for (const ScenePoint& p : capture.points) {
@@ -261,7 +257,7 @@ Surroundings MeasureSurroundings(const Capture& capture) {
     if (Norm(p.position - result.center) > kFarSides * result.half) far += views;
   }
   if (capture.points.size() >= kMinPoints && all > 0)
-    result.far_share = static_cast<double>(far) / static_cast<double>(all);
+    result.far_fraction = static_cast<double>(far) / static_cast<double>(all);
   return result;
 }
 
@@ -269,7 +265,7 @@ NormalizedScene NormalizeSurrounded(const Capture& capture, const Surroundings& 
   NormalizedScene result;
   const CameraPoses poses(capture);
   if (!(surroundings.half > 0))
-    throw Error(ExitCode::kScene, "the cameras stand at one place: there is no box to surround",
+    throw Error(ExitCode::kScene, "the cameras are at one place: they surround no box",
                 "--effects background=on", "leave the choice to auto");
   const Mat3d upright =
       UprightRotation(poses.centers, poses.ups, poses.forwards, &result.notice);
@@ -282,7 +278,7 @@ NormalizedScene NormalizeSurrounded(const Capture& capture, const Surroundings& 
   const double nearest = capture.points.size() >= kMinPoints
                              ? NearestDistance(capture, poses.centers)
                              : kFewPointsNearest * surroundings.half;
-  // Beyond the box nothing would be left of it.
+  // A larger near clip would leave nothing of the box.
   result.box.near_clip = static_cast<float>(std::min(nearest * s.scale, kMostNearClip));
   result.box.spheres = true;
   return result;

@@ -1,5 +1,4 @@
-// Where the scene is: a similarity that puts it upright into a box of half size 1, and how near
-// a camera it begins.
+// Places the scene upright in a box of half size 1, and finds its near clip.
 #pragma once
 
 #include <string>
@@ -11,35 +10,34 @@
 namespace regrade {
 
 struct NormalizedScene {
-  Similarity field_from_world;  // the field's frame: z up, y the cameras' mean heading as far
-                                // as one exists
+  Similarity field_from_world;  // the field's frame: z up, y the cameras' mean heading if any
   NdcSpace ndc;                 // on: the box is in normalised device coordinates of that frame
   SceneBox box;                 // in the field's frame; its longest half side is 1
-  std::string notice;           // what was fallen back on, if anything
+  std::string notice;           // the fallback that was used, if any
 };
 
-// From camera poses and triangulated points, order-free. The box holds all but the outermost
-// hundredth of the points on each side, and most corners of the photos at the depth of their
-// nearer points; with fewer than 50 points it is the cube round the optical axes' common point
-// that reaches the cameras. It survives collinear cameras (H129), cameras at one point (H130)
-// and ups that cancel (H131).
+// From camera poses and triangulated points, in any order. The box contains the points except
+// the outermost hundredth on each side, and most corners of the photos at the depth of their
+// nearer points. With fewer than 50 points it is a cube around the optical axes' common point
+// that extends to the cameras. Valid for collinear cameras (H129), cameras at one point (H130)
+// and up vectors that cancel (H131).
 NormalizedScene NormalizeScene(const Capture& capture);
 
-// What the cameras stand round, and how much of what they see lies far beyond it.
+// The region that the cameras surround, and how much of the scene is far outside of it.
 struct Surroundings {
-  Vec3d center;          // world: the optical axes' common point
-  double half = 0;       // world: half side of the cube that reaches the cameras; 0: unknown
-  double far_share = 0;  // of all observations of points: farther out than kFarSides halves
+  Vec3d center;     // world: the optical axes' common point
+  double half = 0;  // world: half side of the cube that extends to the cameras; 0: unknown
+  double far_fraction = 0;  // of all observations: farther out than kFarSides half sides
 };
-// Beyond this many half sides of that cube, a box round everything would leave what the cameras
-// stand round less than a quarter of its voxels a side.
+// A box that contains points beyond this many half sides would leave the surrounded region less
+// than a quarter of the voxels along each side.
 inline constexpr double kFarSides = 4;
-inline constexpr double kFarShare = 0.05;  // more than this, and the scene has a background
-// Free of the photos' order. A capture without points has no far share.
+inline constexpr double kFarFraction = 0.05;  // above it, the scene has a background
+// Independent of the order of photos. far_fraction is 0 without points.
 Surroundings MeasureSurroundings(const Capture& capture);
 
-// The cube as the box, for a scene whose background is on spheres: the field's frame has y up,
-// so that the spheres' poles are where few photos look.
+// Uses the cube as the box, for a scene with background spheres. The field's frame has y up, so
+// that few photos see the spheres' poles.
 NormalizedScene NormalizeSurrounded(const Capture& capture, const Surroundings& surroundings);
 
 }  // namespace regrade

@@ -1,4 +1,4 @@
-// The part of a field's frame that is modelled, and how finely.
+// The modelled box in the field's frame, and the resolution of its grid.
 #pragma once
 
 #include <optional>
@@ -11,18 +11,16 @@ struct SceneBox {
   Vec3f center{0, 0, 0};
   Vec3f radius{1, 1, 1};
   float near_clip = 0;  // nothing is modelled nearer to a camera than this
-  int layers = 0;       // most vertices along z; 0: as many as the radius asks for
-  // Height (y) of a voxel over its width (x), in the box's units: 1 but in NDC, whose x and y
-  // are the picture's sides, whatever their lengths.
+  int layers = 0;       // limit of vertices along z; 0: proportional to the radius
+  // Height (y) of a voxel over its width (x), in the box's units: 1 except in NDC, where a
+  // picture is as high as wide.
   float voxel_aspect = 1;
-  std::optional<Vec3f>
-      background;        // sRGB behind everything; not given: the photos' mean colour
-  bool spheres = false;  // what lies beyond the box is fitted on background spheres
+  std::optional<Vec3f> background;  // sRGB behind everything; default: the photos' mean colour
+  bool spheres = false;             // fits background spheres outside of the box
 };
 
-// Vertices per axis where the longest side gets `longest`; voxels are cubes to within rounding.
-// With `layers`, z gets that many at most, x and y share the rest, and a voxel is as many
-// pixels wide as high.
+// Vertices per axis, `longest` on the longest side; voxels are cubes up to rounding. With
+// `layers`, z has at most that many, and a voxel is as many pixels wide as high.
 Vec3i ResolutionFor(const SceneBox& box, int longest);
 
 }  // namespace regrade

@@ -9,8 +9,8 @@
 namespace regrade {
 namespace {
 
-// Pairs of a long track are many and alike; this many of its views, evenly chosen, show the
-// largest angle well enough.
+// The number of pairs grows with the square of a track's length; this many evenly chosen views
+// approximate the largest angle well.
 constexpr size_t kViewsOfATrack = 32;
 
 double LargestAngle(const Vec3d& point, const std::vector<int32_t>& views,
@@ -22,7 +22,7 @@ double LargestAngle(const Vec3d& point, const std::vector<int32_t>& views,
   double largest = 0;
   for (size_t i = 0; i < used; ++i)
     for (size_t j = i + 1; j < used; ++j)
-      // atan2 keeps small angles accurate, where acos of the scalar product does not.
+      // atan2 is accurate for small angles; acos of the scalar product is not.
       largest =
           std::max(largest, std::atan2(Norm(Cross(rays[i], rays[j])), Dot(rays[i], rays[j])));
   return largest;
@@ -100,11 +100,11 @@ double WorstPixelAspect(const Capture& capture) {
 
 double CameraExtent(const Capture& capture) {
   const std::vector<Vec3d> centers = Centers(capture);
-  double spread = 0;
+  double extent = 0;
   for (size_t i = 0; i < centers.size(); ++i)
     for (size_t j = i + 1; j < centers.size(); ++j)
-      spread = std::max(spread, Norm(centers[i] - centers[j]));
-  return spread;
+      extent = std::max(extent, Norm(centers[i] - centers[j]));
+  return extent;
 }
 
 SceneAssessment AssessScene(const Capture& capture, const SceneLimits& limits) {
@@ -121,29 +121,29 @@ SceneAssessment AssessScene(const Capture& capture, const SceneLimits& limits) {
                   "take sharper photos of something with texture");
   if (angle_deg < limits.min_triangulation_angle_deg)
     return refuse(
-        "the photos see the scene from nearly one place: half of the points are seen "
-        "under less than " +
+        "the photos were taken from nearly one place: half of the points are seen under less "
+        "than " +
             Rounded(angle_deg, 2) +
             " degrees (needed: " + Rounded(limits.min_triangulation_angle_deg, 1) + ")",
         "a camera that only turns shows no depth: step sideways between photos");
   const double aspect = WorstPixelAspect(capture);
   if (std::max(aspect, 1 / aspect) > limits.max_pixel_aspect)
     return refuse("the estimated camera has pixels that are not square (fx / fy = " +
-                      Rounded(aspect, 3) + "), so its geometry is not to be trusted",
+                      Rounded(aspect, 3) + "), so its geometry is unreliable",
                   "take more photos, stepping sideways between them instead of only turning "
                   "the camera, and keep the scene still");
   if (views < limits.min_views)
     return refuse("only " + std::to_string(views) +
-                      " photos could be placed, and a scene needs " +
-                      std::to_string(limits.min_views) + " at least",
+                      " photos could be registered, and a scene needs at least " +
+                      std::to_string(limits.min_views),
                   "take more photos that overlap by two thirds; 20 to 60 are a good number");
   const Vec3d extents = PointExtents(capture);
   if (extents.y > 0 && extents.z < limits.min_thickness * extents.y)
     assessment.notes.push_back(
         "the points lie nearly in one plane (thickness " +
         Rounded(100 * extents.z / extents.y, 1) +
-        " % of its width), so the camera's focal length and the depth of the scene are weakly "
-        "known; photos from the sides help");
+        " % of its width), so the camera's focal length and the scene's depth are uncertain; "
+        "photos from the sides help");
   return assessment;
 }
 

@@ -1,5 +1,4 @@
-// Does a posed capture hold a scene that can be reconstructed? Measures of its geometry as pure
-// functions, and the assessment that they lead to.
+// Checks whether a posed capture can be reconstructed, by measures of its geometry.
 #pragma once
 
 #include <string>
@@ -10,16 +9,16 @@
 namespace regrade {
 
 // Median over the points of the largest angle, in radians, between two rays that see the point.
-// 0 without points. Small angles mean that depth is a guess.
+// 0 without points. Small angles mean inaccurate depth.
 double MedianTriangulationAngle(const Capture& capture);
 
 // Root-mean-square extents of the points along their principal axes, largest first, in world
-// units, without the tenth of the points that lies farthest from the median (outliers and sky).
+// units, without the tenth of the points farthest from the median (outliers and sky).
 // Zero with fewer than ten points.
 Vec3d PointExtents(const Capture& capture);
 
 // The view whose ratio fx / fy is farthest from 1 (as |log|); its ratio. 1 without views.
-// Self-calibration that failed shows here first: sensors have square pixels.
+// Detects failed self-calibration, since sensors have square pixels.
 double WorstPixelAspect(const Capture& capture);
 
 // Largest distance between two camera centres, in world units.
@@ -32,11 +31,11 @@ struct SceneLimits {
   double min_thickness = 0.02;     // third extent over second; below: nearly a plane
 };
 
-// Sentences for a photographer: what is wrong, the number, and what to do.
+// Messages for a photographer: the problem, the number, and the remedy.
 struct SceneAssessment {
-  std::string refusal;             // empty: the scene can be used
-  std::string remedy;              // beside a refusal
-  std::vector<std::string> notes;  // usable, but something to know
+  std::string refusal;             // empty: the scene is usable
+  std::string remedy;              // of the refusal
+  std::vector<std::string> notes;  // warnings about a usable scene
 };
 
 SceneAssessment AssessScene(const Capture& capture, const SceneLimits& limits = {});

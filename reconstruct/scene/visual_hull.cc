@@ -8,9 +8,9 @@ namespace {
 
 constexpr int kSide = 96;
 constexpr float kOpaque = 0.02f;  // alpha above which a pixel belongs to the object
-constexpr int kBlock = 8;  // pixels: an outline is looked up in blocks, widened by one block
+constexpr int kBlock = 8;         // pixels: silhouettes are stored in blocks
 
-// Blocks of an outline that hold a pixel of the object, widened by one.
+// Blocks of a silhouette that contain a pixel of the object, dilated by one.
 struct Blocks {
   Camera camera;  // in the field's frame
   int columns, rows;
@@ -31,27 +31,27 @@ struct Blocks {
       }
   }
 
-  enum class Answer { kOutside, kHeld, kUnseen };
-  Answer Ask(const Vec3d& point) const {
+  enum class Coverage { kOutside, kInside, kUnseen };
+  Coverage At(const Vec3d& point) const {
     double u, v;
-    if (!camera.Project(point, &u, &v)) return Answer::kUnseen;
-    if (!(u >= 0 && u < camera.width && v >= 0 && v < camera.height)) return Answer::kUnseen;
+    if (!camera.Project(point, &u, &v)) return Coverage::kUnseen;
+    if (!(u >= 0 && u < camera.width && v >= 0 && v < camera.height)) return Coverage::kUnseen;
     const size_t block =
         static_cast<size_t>(v / kBlock) * columns + static_cast<size_t>(u / kBlock);
-    return object[block] != 0 ? Answer::kHeld : Answer::kOutside;
+    return object[block] != 0 ? Coverage::kInside : Coverage::kOutside;
   }
 };
 
-// No view that sees the point denies it, and half of the views see it: what stands beside all
-// pictures is no part of the object.
+// True if the point is inside all silhouettes of views that see it, and at least half of the
+// views see it: points outside of all pictures are not part of the object.
 bool InHull(const std::vector<Blocks>& views, const Vec3d& point) {
-  size_t held = 0;
+  size_t inside = 0;
   for (const Blocks& view : views) {
-    const Blocks::Answer answer = view.Ask(point);
-    if (answer == Blocks::Answer::kOutside) return false;
-    held += answer == Blocks::Answer::kHeld;
+    const Blocks::Coverage coverage = view.At(point);
+    if (coverage == Blocks::Coverage::kOutside) return false;
+    inside += coverage == Blocks::Coverage::kInside;
   }
-  return 2 * held >= views.size();
+  return 2 * inside >= views.size();
 }
 
 }  // namespace

@@ -1,5 +1,4 @@
-// The box of an object on a transparent background: what lies inside of its outline in every
-// view.
+// Shrinks the scene's box to the visual hull of an object on a transparent background.
 #pragma once
 
 #include <vector>
@@ -10,16 +9,15 @@
 
 namespace regrade {
 
-// A view's alpha: [H, W, 1] in [0, 1] at the camera's own size; the camera is in the capture's
-// world.
+// A view's alpha: [H, W, 1] in [0, 1] at the camera's size; the camera is in world coordinates.
 struct Silhouette {
   Camera camera;
   Image alpha;
 };
 
-// `scene`, its box shrunk to the visual hull (at 96 vertices a side, and one more round it),
-// scaled so that the longest half side is 1 again. Unchanged if the hull is empty: then the
-// outlines do not fit the poses.
+// `scene` with its box shrunk to the visual hull (sampled at 96 vertices a side, plus one
+// around it) and scaled so that the longest half side is 1 again. Unchanged if the hull is
+// empty, that is, if the silhouettes are inconsistent with the poses.
 NormalizedScene TightenToSilhouettes(const NormalizedScene& scene,
                                      const std::vector<Silhouette>& silhouettes);
 

@@ -1,6 +1,11 @@
 #!/usr/bin/env python3
-"""Tables of a sweep: make_table.py WORK reads runs/SCENE/STYLE/METHOD/report.json and foreign/..., and writes table.csv
-with every figure, table.tex and table.html with the means over styles in the paper's form."""
+"""Writes the tables of a sweep from the reports of its runs.
+
+  make_table.py WORK
+
+Reads WORK/runs/SCENE/STYLE/METHOD/report.json and WORK/foreign/...; writes table.csv with all metrics, and table.tex and
+table.html with means over the styles in the form of the paper's table. Exit status: 0, or 1 without a finished run.
+"""
 
 import csv
 import html
@@ -9,8 +14,8 @@ import os
 import sys
 
 COLUMNS = ["scene", "style", "method", "short_db", "long_db", "to_2d_db", "linear_map_db", "hue_spread", "chroma",
-           "distance_to_style", "k_est", "bound", "slope", "seconds"]
-# Of the scene fern in LipRF's paper (the table of short and long consistency on LLFF): short, long.
+           "distance_to_style", "k_est", "bound", "local_lipschitz_sampled", "seconds"]
+# Scene fern in LipRF's paper (table of short and long consistency on LLFF): short, long.
 PAPER = [("MKL", 28.4, 25.6), ("WCT2", 24.0, 22.1), ("WCT2 w/ Lip", 29.5, 26.7), ("CCPL", 22.0, 20.5),
          ("CCPL w/ Lip", 26.7, 24.1), ("UPST", 27.6, 24.8)]
 
@@ -33,6 +38,7 @@ def rows_of(scene, style, method, report):
     tc = {(c["sequence"], c["gap"]): c["tc_psnr_mean_db"] for c in report["consistency"]}
     gaps = sorted({gap for _, gap in tc})
     stylize = report.get("stages", {}).get("stylize", {})
+    evaluate = report.get("stages", {}).get("evaluate", {})
     for sequence in dict.fromkeys(c["sequence"] for c in report["consistency"]):
         if sequence.startswith("path_"):
             continue
@@ -41,9 +47,9 @@ def rows_of(scene, style, method, report):
                "short_db": tc.get((sequence, gaps[0])), "long_db": tc.get((sequence, gaps[-1])),
                "distance_to_style": near.get("sliced_wasserstein_to_style")}
         if sequence == "styled":
-            row.update({"to_2d_db": near.get("psnr_to_2d_db"), "linear_map_db": stylize.get("linear_map_psnr_to_2d_db"),
+            row.update({"to_2d_db": near.get("psnr_to_2d_db"), "linear_map_db": evaluate.get("linear_map_psnr_to_2d_db"),
                         "k_est": stylize.get("k_est"), "bound": stylize.get("bound"),
-                        "slope": stylize.get("local_lipschitz_sampled"), "seconds": stylize.get("seconds")})
+                        "local_lipschitz_sampled": stylize.get("local_lipschitz_sampled"), "seconds": stylize.get("seconds")})
         if near.get("hue_std_2d"):
             row["hue_spread"] = near["hue_std"] / near["hue_std_2d"]
             row["chroma"] = near["chroma"] / near["chroma_2d"]
@@ -93,19 +99,22 @@ def page(scenes, table, rows):
 <style>body{{font:15px/1.5 system-ui,sans-serif;margin:2rem;max-width:80rem}}table{{border-collapse:collapse;margin:1rem 0}}
 td,th{{padding:.2rem .7rem;text-align:right;border-bottom:1px solid #ddd}}td:first-child,th:first-child{{text-align:left}}</style>
 <h1>Consistency and fidelity</h1>
-<p>TC-PSNR in dB between frames 1 and 5 apart, means over styles; beside it how far the styled frames are from the 2D
-method's own. A grey film is consistent and a blurred one too: read both.</p>
+<p>TC-PSNR in dB between frames 1 and 5 apart, means over styles, and PSNR of the styled frames to those of the 2D method.
+Grey or blurred films are also consistent: read both.</p>
 <table>{line(head, "th")}{"".join(body)}</table>
 <h2>As published</h2>
 <p>The scene fern in LipRF's own table. Its flow, masks, frames and styles are not published, and 2D methods were
-applied to photos or to renders that are not ours: the order of the rows can be compared, their heights cannot.</p>
+applied to photos or to other renders: the order of the rows can be compared, the values cannot.</p>
 <table>{line(["method", "short", "long"], "th")}{"".join(published)}</table>
 <h2>Every run</h2><table>{line(COLUMNS, "th")}{"".join(all_rows)}</table>
 """
 
 
 def main():
-    work = sys.argv[1] if len(sys.argv) == 2 else sys.exit(__doc__)
+    if len(sys.argv) != 2 or sys.argv[1] == "--help":
+        print(__doc__)
+        return 0 if "--help" in sys.argv else 2
+    work = sys.argv[1]
     rows, seen = [], set()
     for kind in ("runs", "foreign"):
         for scene, style, method, report in reports(work, kind):

@@ -3,22 +3,21 @@
 #include "kernels/base/error.h"
 #include "kernels/device/device_stream.h"
 #include "kernels/network/lipschitz_layer.h"
-#include "kernels/optimize/schedule.h"
 #include "stylize/cuda/device_lipschitz.h"
 
 namespace regrade {
 
 struct DeviceLipschitz::View {
   Shape shape;
-  LipschitzRule rule;
+  TrainingParams params;
   float *parameters, *vectors, *first_moment, *second_moment, *gradient;
-  LearningState* state;
+  OptimizerState* state;
   int32_t* not_finite;
 };
 
 DeviceLipschitz::View DeviceLipschitz::GetView() const {
   return {shape_,
-          rule_,
+          params_,
           parameters_.data(),
           vectors_.data(),
           first_moment_.data(),
@@ -32,8 +31,8 @@ DeviceLipschitz::View DeviceLipschitz::GetView() const {
 
 namespace {
 
-constexpr int kLayerThreads = 256;    // of the block that has a layer
-constexpr int kUpdateThreads = 1024;  // of the one block that has all
+constexpr int kLayerThreads = 256;    // of a layer's block
+constexpr int kUpdateThreads = 1024;  // of the one block of all layers
 constexpr int kSide = 64;             // no layer is wider
 constexpr int kSideStride = kSide + 1;
 
@@ -86,7 +85,7 @@ __device__ float MultiplyAndNormalize(SharedLayer* layer, int rows, int columns,
   return length;
 }
 
-// See StartPowerIteration; so seldom that one thread does it.
+// See StartPowerIteration; rare enough for one thread.
 __device__ void StartAtLongestColumn(SharedLayer* layer, int outputs, int inputs) {
   if (threadIdx.x == 0) {
     int longest = 0;
@@ -129,7 +128,7 @@ __global__ void __launch_bounds__(kLayerThreads)
   if (thread < outputs) layer.u[thread] = u[thread];
   if (thread < inputs) layer.v[thread] = v[thread];
   __syncthreads();
-  for (int step = 0; step < all.rule.norm_steps && scale > 0; ++step) {
+  for (int step = 0; step < all.params.update.options.norm_steps && scale > 0; ++step) {
     const float length = MultiplyAndNormalize<true>(&layer, inputs, outputs, layer.u, layer.v);
     if (!(length > FLT_EPSILON * sqrtf(square))) StartAtLongestColumn(&layer, outputs, inputs);
     MultiplyAndNormalize<false>(&layer, outputs, inputs, layer.v, layer.u);
@@ -144,7 +143,7 @@ __global__ void __launch_bounds__(kLayerThreads)
   const int stride = all.shape.mlp_inputs[l];
   for (int i = thread; i < size; i += kLayerThreads) {
     const int o = i / inputs, c = i % inputs;
-    const float in = l == 0 && c < all.rule.scaled_inputs ? all.rule.input_scale : 1.0f;
+    const float in = l == 0 && c < all.params.scaled_inputs ? all.params.input_scale : 1.0f;
     to[o * stride + c] = factor * layer.matrix[o * kSideStride + c] * in;
   }
   if (thread < outputs) {
@@ -168,10 +167,10 @@ __global__ void __launch_bounds__(kLayerThreads)
   const float *u = all.vectors + all.shape.vectors[l], *v = u + outputs;
   const double* from = d_mlp + all.shape.mlp[l];
   const double divisor =
-      all.rule.loss_divisor > 0 ? all.rule.loss_divisor : 3 * static_cast<double>(*rays);
-  const double share = *rays > 0 ? 1 / divisor : 0.0;
+      all.params.loss_divisor > 0 ? all.params.loss_divisor : 3 * static_cast<double>(*rays);
+  const double loss_factor = *rays > 0 ? 1 / divisor : 0.0;
   const auto d_a = [&](int o, int c) {
-    const double in = l == 0 && c < all.rule.scaled_inputs ? all.rule.input_scale : 1.0;
+    const double in = l == 0 && c < all.params.scaled_inputs ? all.params.input_scale : 1.0;
     return from[o * stride + c] * in;
   };
   float largest = 0;
@@ -194,39 +193,36 @@ __global__ void __launch_bounds__(kLayerThreads)
   };
   for (int i = thread; i < size; i += kLayerThreads) {
     const int o = i / inputs, c = i % inputs;
-    give(i, share * factor * (d_a(o, c) - inner * u[o] * v[c]));
+    give(i, loss_factor * factor * (d_a(o, c) - inner * u[o] * v[c]));
   }
   if (thread < outputs)
-    give(size + thread, share * from[all.shape.mlp_outputs[l] * stride + thread]);
+    give(size + thread, loss_factor * from[all.shape.mlp_outputs[l] * stride + thread]);
   if (thread != 0) return;
-  const double pull = all.rule.lambda * SquareplusDerivative(k - all.rule.layer_target);
   give(size + outputs,
-       all.rule.fixed_norms ? 0.0 : share * SquareplusDerivative(k) * inner + pull);
+       all.params.update.NormGradient(k, loss_factor * SquareplusDerivative(k) * inner));
 }
 
-// See LimitProduct in stylize/training/train_network.cc.
+// See LimitBound in stylize/field/weight_update.h.
 template <typename View>
-__device__ void LimitProduct(const View& all) {
-  double product = 1;
+__device__ void LimitBound(const View& all) {
+  double bound = all.params.update.fixed_factor;
   const auto at = [&](int l) -> float& {
     return all.parameters[all.shape.parameters[l + 1] - 1];
   };
-  for (int l = 0; l < all.shape.layers; ++l) product *= Squareplus<double>(at(l));
-  if (!(product > all.rule.product_limit)) return;
-  const double factor = pow(all.rule.product_limit / product, 1.0 / all.shape.layers);
+  for (int l = 0; l < all.shape.layers; ++l) bound *= Squareplus<double>(at(l));
+  const double factor = all.params.update.LimitFactor(bound, all.shape.layers);
   for (int l = 0; l < all.shape.layers; ++l) at(l) *= static_cast<float>(factor);
 }
 
 // One block.
 template <typename View>
 __global__ void __launch_bounds__(kUpdateThreads)
-    UpdateKernel(View all, DeviceLipschitz::Step step, LearnedStep* steps, int64_t room) {
-  LearningState& state = *all.state;
+    UpdateKernel(View all, DeviceLipschitz::Step step, StepStats* stats, int64_t capacity) {
+  OptimizerState& state = *all.state;
   const bool made = *step.skip == 0 && state.halted == 0, bad = *all.not_finite != 0;
   const int64_t t = state.adam_steps + 1;
-  const AdamOptions adam = all.rule.adam;
-  const double rate =
-      CosineAnnealing(state.step, all.rule.steps, all.rule.rate_first, all.rule.rate_last);
+  const AdamOptions adam = all.params.update.adam;
+  const double rate = all.params.update.Rate(state.step);
   const float forward = static_cast<float>(rate / AdamBiasCorrection(adam.beta1, t));
   const float inverse = static_cast<float>(1 / AdamBiasCorrection(adam.beta2, t));
   const int size = all.shape.parameters[all.shape.layers];
@@ -237,8 +233,8 @@ __global__ void __launch_bounds__(kUpdateThreads)
   if (threadIdx.x != 0) return;
   *all.not_finite = 0;
   if (!made) return;
-  steps[state.step % room] = {*step.loss, *step.squared_error, *step.rays, *step.samples,
-                              *step.touched};
+  stats[state.step % capacity] = {*step.loss, *step.squared_error, *step.rays, *step.samples,
+                                  *step.touched};
   ++state.step;
   if (bad) {
     ++state.rejected;
@@ -247,7 +243,7 @@ __global__ void __launch_bounds__(kUpdateThreads)
   }
   state.rejected_in_a_row = 0;
   ++state.adam_steps;
-  if (!all.rule.fixed_norms) LimitProduct(all);
+  LimitBound(all);
 }
 
 }  // namespace
@@ -258,13 +254,13 @@ void DeviceLipschitz::ActivateWeights(DeviceMlp* mlp) {
   CheckLaunch("activate_weights");
 }
 
-void DeviceLipschitz::Learn(DeviceMlp* mlp, const Step& step,
-                            const DeviceBuffer<LearnedStep>& steps) {
+void DeviceLipschitz::Update(DeviceMlp* mlp, const Step& step,
+                             const DeviceBuffer<StepStats>& stats) {
   GradientKernel<<<static_cast<unsigned>(shape_.layers), kLayerThreads, 0, LaunchStream()>>>(
       GetView(), mlp->gradient().data(), step.rays);
   CheckLaunch("lipschitz_gradient");
-  UpdateKernel<<<1, kUpdateThreads, 0, LaunchStream()>>>(GetView(), step, steps.data(),
-                                                         steps.size());
+  UpdateKernel<<<1, kUpdateThreads, 0, LaunchStream()>>>(GetView(), step, stats.data(),
+                                                         stats.size());
   CheckLaunch("lipschitz_update");
   DeviceZero(mlp->gradient().data(), mlp->gradient().size() * int64_t{sizeof(double)});
 }
@@ -272,15 +268,15 @@ void DeviceLipschitz::Learn(DeviceMlp* mlp, const Step& step,
 #else
 
 void DeviceLipschitz::ActivateWeights(DeviceMlp*) { DeviceWait("activate_weights"); }
-void DeviceLipschitz::Learn(DeviceMlp*, const Step&, const DeviceBuffer<LearnedStep>&) {
+void DeviceLipschitz::Update(DeviceMlp*, const Step&, const DeviceBuffer<StepStats>&) {
   DeviceWait("lipschitz_update");
 }
 
 #endif
 
 DeviceLipschitz::DeviceLipschitz(const std::vector<std::pair<int, int>>& shapes,
-                                 const LipschitzRule& rule, const DeviceMlp& mlp)
-    : rule_(rule), state_(1, "where learning stands"), not_finite_(1, "a flag") {
+                                 const TrainingParams& params, const DeviceMlp& mlp)
+    : params_(params), state_(1, "the optimizer's state"), not_finite_(1, "a flag") {
   REGRADE_CHECK(static_cast<int>(shapes.size()) <= kMaxLayers);
   shape_.layers = static_cast<int>(shapes.size());
   int parameters = 0, vectors = 0;
@@ -299,7 +295,7 @@ DeviceLipschitz::DeviceLipschitz(const std::vector<std::pair<int, int>>& shapes,
   }
   shape_.parameters[shape_.layers] = parameters;
   shape_.vectors[shape_.layers] = vectors;
-  parameters_ = DeviceBuffer<float>(parameters, "weights that learn");
+  parameters_ = DeviceBuffer<float>(parameters, "trained weights");
   vectors_ = DeviceBuffer<float>(vectors, "singular vectors");
   first_moment_ = DeviceBuffer<float>(parameters, "moments of weights");
   second_moment_ = DeviceBuffer<float>(parameters, "moments of weights");
@@ -321,7 +317,7 @@ void DeviceLipschitz::CopyIn(const std::vector<float>& parameters,
     first_moment_.CopyIn(adam.first_moment.data(), first_moment_.size());
     second_moment_.CopyIn(adam.second_moment.data(), second_moment_.size());
   }
-  LearningState state;
+  OptimizerState state;
   state.step = step;
   state.adam_steps = adam.steps;
   state.rejected = adam.rejected;
@@ -329,9 +325,9 @@ void DeviceLipschitz::CopyIn(const std::vector<float>& parameters,
   state_.CopyIn(&state, 1);
 }
 
-LearningState DeviceLipschitz::CopyOut(std::vector<float>* parameters,
-                                       std::vector<float>* vectors, AdamState* adam) const {
-  LearningState state;
+OptimizerState DeviceLipschitz::CopyOut(std::vector<float>* parameters,
+                                        std::vector<float>* vectors, AdamState* adam) const {
+  OptimizerState state;
   state_.CopyOut(&state, 1);
   const size_t size = static_cast<size_t>(parameters_.size());
   parameters->resize(size);

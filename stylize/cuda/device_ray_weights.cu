@@ -87,7 +87,7 @@ __global__ void MarchSpheresKernel(DeviceGridView grid, const Ray* rays, int64_t
         Touch(touched, grid.first_texel() + column * spheres.layers + mine.layer);
     }
   }
-  if (layers.lane() == 0) transmittance[r] = layers.left();
+  if (layers.lane() == 0) transmittance[r] = layers.transmittance();
 }
 
 // A lane a word of marks; a warp takes its slots at once.
@@ -123,7 +123,7 @@ __global__ void ClampToCapacityKernel(int64_t sample_capacity, int64_t slot_capa
   room->samples = *samples;
   room->slots = *slots;
   if (*samples <= sample_capacity && *slots <= slot_capacity) return;
-  room->short_of = 1;
+  room->overflowed = 1;
   *samples = *slots = 0;
 }
 

@@ -53,7 +53,7 @@ struct DeviceSlots {
 // What a step that the host does not watch asked for, and whether there was room.
 struct BufferDemand {
   int32_t samples = 0, slots = 0;
-  int32_t short_of = 0;  // 1 from the first step on that did not fit
+  int32_t overflowed = 0;  // 1 from the first step on that did not fit
 };
 // Behind the two Launch: num_slots becomes `slot_capacity`. Where samples or slots have no room
 // all of them are dropped, and *room, which lies on the device, says so.

@@ -20,13 +20,26 @@ std::vector<std::pair<int, int>> LayerShapes() {
   return shapes;
 }
 
+// What a summed loss is divided by, of voxels; 0: three times the rays that count.
+double LossDivisor(const DeviceGrid& grid, const AggregationOptions& options) {
+  return options.divide_by_voxels ? static_cast<double>(grid.num_voxels()) : 0;
+}
+
+TrainingParams ParamsOf(const DeviceGrid& grid, const AggregationOptions& options,
+                        const WeightUpdate& update, const LipschitzNetworkData& network) {
+  return {.update = update,
+          .input_scale = network.sh_scale,
+          .scaled_inputs = kNetworkSh,
+          .loss_divisor = LossDivisor(grid, options)};
+}
+
 }  // namespace
 
-class DeviceTraining::Recording {
+class DeviceTraining::CapturedSteps {
  public:
-  Recording(const DeviceGrid* grid, const AggregationOptions& options,
-            const LipschitzRule& rule, const LipschitzNetwork& network, int64_t rays_per_step,
-            int64_t most_steps)
+  CapturedSteps(const DeviceGrid* grid, const AggregationOptions& options,
+                const WeightUpdate& update, const LipschitzNetwork& network,
+                int64_t rays_per_step, int64_t most_steps)
       : grid_(*grid),
         options_(options),
         position_scale_(network.data().position_scale),
@@ -36,15 +49,15 @@ class DeviceTraining::Recording {
         touched_(*grid),
         slots_(*grid),
         mlp_(MakeFusedMlp(network.Effective<float>())),
-        weights_that_learn_(LayerShapes(), rule, mlp_),
+        optimizer_(LayerShapes(), ParamsOf(*grid, options, update, network.data()), mlp_),
         rays_(rays_per_step, "rays"),
         targets_(rays_per_step, "colours of rays"),
         color_(rays_per_step, "colours of rays"),
         d_color_(rays_per_step, "gradients of colours"),
         sums_(1, "sums of a loss"),
-        room_(1, "what a step asked for"),
-        learned_(most_steps, "what steps were worth") {
-    learned_.Zero();
+        demand_(1, "buffer sizes that a step needed"),
+        stats_(most_steps, "statistics of steps") {
+    stats_.Zero();
     REGRADE_CHECK(!grid->fitting && !options.every_voxel);
     REGRADE_CHECK(rays_per_step > 0 && rays_per_step <= kMostRays);
   }
@@ -56,42 +69,42 @@ class DeviceTraining::Recording {
     REGRADE_CHECK(begun_ > 0 && begun_ <= batches_.steps);
     for (int64_t i = 0; i < begun_; ++i)
       CopyBatch(batches[static_cast<size_t>(i)], (first + i) % batches_.steps);
-    weights_that_learn_.CopyIn(network.data().parameters, network.data().singular_vectors, adam,
-                               first, rejected_in_a_row_);
-    room_.Zero();
+    optimizer_.CopyIn(network.data().parameters, network.data().singular_vectors, adam, first,
+                      rejected_in_a_row_);
+    demand_.Zero();
     if (sample_capacity_ == 0) GrowBuffers(batches.front());
-    Play(begun_);
+    Launch(begun_);
   }
 
   Steps End(LipschitzNetwork* network, AdamState* adam) {
-    LearningState state;
+    OptimizerState state;
     for (;;) {
-      state = weights_that_learn_.CopyOut(&network->data().parameters,
-                                          &network->data().singular_vectors, adam);
-      BufferDemand room;
-      room_.CopyOut(&room, 1);
-      if (room.short_of == 0) break;
+      state = optimizer_.CopyOut(&network->data().parameters, &network->data().singular_vectors,
+                                 adam);
+      BufferDemand demand;
+      demand_.CopyOut(&demand, 1);
+      if (demand.overflowed == 0) break;
       ++regrown_;
-      SetCapacity(std::max<int64_t>(sample_capacity_, room.samples + room.samples / 2),
-                  std::max<int64_t>(slot_capacity_, room.slots + room.slots / 2));
-      room_.Zero();
-      Play(begun_from_ + begun_ - state.step);
+      SetCapacity(std::max<int64_t>(sample_capacity_, demand.samples + demand.samples / 2),
+                  std::max<int64_t>(slot_capacity_, demand.slots + demand.slots / 2));
+      demand_.Zero();
+      Launch(begun_from_ + begun_ - state.step);
     }
     rejected_in_a_row_ = state.rejected_in_a_row;
     Steps steps;
     steps.made = state.step - begun_from_;
     steps.stopped = state.halted != 0;
-    if (steps.stopped) steps.gradient = weights_that_learn_.Gradient();
-    std::vector<LearnedStep> learned(static_cast<size_t>(learned_.size()));
-    learned_.CopyOut(learned.data(), learned_.size());
+    if (steps.stopped) steps.gradient = optimizer_.Gradient();
+    std::vector<StepStats> stats(static_cast<size_t>(stats_.size()));
+    stats_.CopyOut(stats.data(), stats_.size());
     for (int64_t i = begun_from_; i < state.step; ++i) {
-      const LearnedStep& step = learned[static_cast<size_t>(i % learned_.size())];
+      const StepStats& step = stats[static_cast<size_t>(i % stats_.size())];
       steps.touched_voxels += step.touched;
       if (i + 1 < state.step) continue;
       steps.last = {step.loss, step.squared_error, static_cast<int64_t>(step.rays),
                     step.touched, step.samples};
-      const double divisor = options_.divide_by_voxels ? static_cast<double>(grid_.num_voxels())
-                                                       : 3.0 * static_cast<double>(step.rays);
+      const double voxels = LossDivisor(grid_, options_);
+      const double divisor = voxels > 0 ? voxels : 3.0 * static_cast<double>(step.rays);
       steps.last.loss = step.rays > 0 ? step.loss / divisor : 0;
     }
     return steps;
@@ -111,25 +124,25 @@ class DeviceTraining::Recording {
     rows_ = DeviceBuffer<float>(floats, "styled voxels");
     d_rows_ = {};
     d_rows_ = DeviceBuffer<float>(floats, "gradients of styled voxels");
-    open_ = {};
-    open_ = DeviceBuffer<uint8_t>(sample_capacity_, "clamps of samples");
+    unclamped_ = {};
+    unclamped_ = DeviceBuffer<uint8_t>(sample_capacity_, "clamps of samples");
     mlp_.ReserveAdjoint(slot_capacity_);
-    graph_.Record([&] { Step(); });
+    graph_.Capture([&] { Step(); });
   }
 
  private:
   // One step, in the order of EQ(liprf-loss) and its adjoint.
   void Step() {
-    const LearningState* state = weights_that_learn_.state();
+    const OptimizerState* state = optimizer_.state();
     TakeBatch(batches_, &state->step, rays_.data(), targets_.data());
     weights_.Launch(grid_, rays_.data(), rays_.size(), options_.march, options_.min_weight,
                     &touched_);
     slots_.Launch(&touched_);
-    ClampToCapacity(slot_capacity_, &weights_, &slots_, room_.data());
+    ClampToCapacity(slot_capacity_, &weights_, &slots_, demand_.data());
     const int32_t* touched = slots_.counter.data();
     GatherRows(grid_, slots_.point_of_slot.data(), 0, slot_capacity_, position_scale_,
                features_.data(), touched);
-    weights_that_learn_.ActivateWeights(&mlp_);
+    optimizer_.ActivateWeights(&mlp_);
     mlp_.Forward(MlpPrecision::kTensor, features_.data(), slot_capacity_, rows_.data(),
                  touched);
     if (has_base_)
@@ -138,26 +151,26 @@ class DeviceTraining::Recording {
     d_rows_.Zero();
     sums_.Zero();
     BlendColors(grid_, weights_, slots_, rays_.data(), rows_.data(), color_.data(),
-                open_.data());
+                unclamped_.data());
     AddColorLoss(color_.data(), targets_.data(), weights_.transmittance.data(), rays_.size(),
                  {options_.max_transmittance, options_.one_sided}, d_color_.data(),
                  sums_.data());
-    BlendColorsAdjoint(grid_, weights_, slots_, rays_.data(), open_.data(), d_color_.data(),
-                       d_rows_.data());
+    BlendColorsAdjoint(grid_, weights_, slots_, rays_.data(), unclamped_.data(),
+                       d_color_.data(), d_rows_.data());
     AddViewPenalty(base_.matrix, features_.data(), rows_.data(), slot_capacity_,
                    static_cast<float>(options_.view_weight), d_rows_.data(),
                    &sums_.data()->loss, touched);
     mlp_.AddAdjoint(MlpPrecision::kTensor, features_.data(), d_rows_.data(), slot_capacity_,
                     touched);
     const DeviceColorLoss* sums = sums_.data();
-    weights_that_learn_.Learn(&mlp_,
-                              {&sums->loss, &sums->squared_error, &sums->rays,
-                               weights_.counter.data(), touched, &room_.data()->short_of},
-                              learned_);
+    optimizer_.Update(&mlp_,
+                      {&sums->loss, &sums->squared_error, &sums->rays, weights_.counter.data(),
+                       touched, &demand_.data()->overflowed},
+                      stats_);
   }
 
-  void Play(int64_t steps) {
-    for (int64_t i = 0; i < steps; ++i) graph_.Play();
+  void Launch(int64_t steps) {
+    for (int64_t i = 0; i < steps; ++i) graph_.Launch();
   }
 
   void CopyBatch(const StyleRays& batch, int64_t place) {
@@ -196,13 +209,13 @@ class DeviceTraining::Recording {
   DeviceSlots slots_;
   DeviceRayWeights weights_;
   DeviceMlp mlp_;
-  DeviceLipschitz weights_that_learn_;
+  DeviceLipschitz optimizer_;
   DeviceBuffer<Ray> rays_;
   DeviceBuffer<Vec3f> targets_, color_, d_color_;
   DeviceBuffer<DeviceColorLoss> sums_;
-  DeviceBuffer<BufferDemand> room_;
-  DeviceBuffer<LearnedStep> learned_;
-  DeviceBuffer<uint8_t> open_;
+  DeviceBuffer<BufferDemand> demand_;
+  DeviceBuffer<StepStats> stats_;
+  DeviceBuffer<uint8_t> unclamped_;
   DeviceBuffer<float> features_, rows_, d_rows_;  // [slot_capacity_, kRowLanes]
   int64_t sample_capacity_ = 0, slot_capacity_ = 0;
   int64_t begun_from_ = 0, begun_ = 0, regrown_ = 0;
@@ -211,22 +224,22 @@ class DeviceTraining::Recording {
 };
 
 DeviceTraining::DeviceTraining(const DeviceGrid* grid, const AggregationOptions& options,
-                               const LipschitzRule& rule, const LipschitzNetwork& network,
+                               const WeightUpdate& update, const LipschitzNetwork& network,
                                int64_t rays_per_step, int64_t most_steps)
-    : recording_(std::make_unique<Recording>(grid, options, rule, network, rays_per_step,
+    : steps_(std::make_unique<CapturedSteps>(grid, options, update, network, rays_per_step,
                                              most_steps)) {}
 DeviceTraining::~DeviceTraining() = default;
 
 void DeviceTraining::Begin(int64_t first, const std::vector<StyleRays>& batches,
                            const LipschitzNetwork& network, const AdamState& adam) {
-  recording_->Begin(first, batches, network, adam);
+  steps_->Begin(first, batches, network, adam);
 }
 DeviceTraining::Steps DeviceTraining::End(LipschitzNetwork* network, AdamState* adam) {
-  return recording_->End(network, adam);
+  return steps_->End(network, adam);
 }
-int64_t DeviceTraining::regrown() const { return recording_->regrown(); }
+int64_t DeviceTraining::regrown() const { return steps_->regrown(); }
 void DeviceTraining::ForgetCapacity(int64_t samples, int64_t voxels) {
-  recording_->SetCapacity(samples, voxels);
+  steps_->SetCapacity(samples, voxels);
 }
 
 }  // namespace regrade

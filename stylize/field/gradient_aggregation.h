@@ -35,12 +35,39 @@ struct StyleRays {
 struct AggregationOptions {
   MarchOptions march;
   float min_weight = 0;         // samples of less weight are dropped
-  float max_transmittance = 1;  // rays that let more light through are left out
+  float max_transmittance = 1;  // rays that transmit more light are left out
   bool one_sided = false;
   double view_weight = 0;         // lambda_view of EQ(view-penalty)
   bool divide_by_voxels = false;  // 1 / B instead of 1 / (3 Q)
-  bool every_voxel =
-      false;  // through f at each step, as Algorithm 1 has it: the same gradient, for timing
+  bool every_voxel = false;       // through f at each step, as in Algorithm 1: same gradient
+
+  // Without `march`, which is the field's, and divide_by_voxels, see TrainNetworkOptions.
+  template <typename Bind>
+  void Describe(Bind& bind) {
+    bind("style-min-weight", min_weight,
+         {.help = "samples of less weight are dropped in training: faster, and off by at most "
+                  "the sum of their weights",
+          .min = 0,
+          .max = 0.1});
+    bind("style-max-transmittance", max_transmittance,
+         {.help = "rays that transmit more light than this are left out of training; 1 keeps "
+                  "all",
+          .min = 0,
+          .max = 1});
+    bind("style-one-sided", one_sided,
+         {.help = "a colour beyond 0 or 1 is no error where its target is 0 or 1: pictures "
+                  "clip both"});
+    bind("style-view-weight", view_weight,
+         {.help = "penalty on restyled colours that change with the viewing direction: 0 "
+                  "follows a 2D method that maps each view differently, and flickers more; "
+                  "larger values are steadier and less faithful",
+          .min = 0,
+          .max = 1e6});
+    bind("style-every-voxel", every_voxel,
+         {.help = "sends every voxel through the network at each step, as the paper's "
+                  "Algorithm 1, instead of those that the step's rays touch: same result, "
+                  "slower; for timing"});
+  }
 };
 
 struct AggregationResult {

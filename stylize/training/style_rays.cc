@@ -61,6 +61,12 @@ StyleRays SampleStyleRays(const std::vector<StyledTrainingView>& views, int rays
   return batch;
 }
 
+int64_t RaysPerStep(int rays, int patch) {
+  if (rays <= 0) return 0;
+  const int64_t square = int64_t{patch} * patch;
+  return std::max<int64_t>(1, rays / square) * square;
+}
+
 int64_t ValidateViews(const std::vector<StyledTrainingView>& views) {
   if (views.empty())
     throw Error(ExitCode::kInput, "no styled view to learn from", "",

@@ -1,4 +1,4 @@
-// Which rays a training step looks at: a pure function of seed and step.
+// The rays of a training step: a pure function of seed and step.
 #pragma once
 
 #include <cstdint>
@@ -14,6 +14,9 @@ namespace regrade {
 // view.
 StyleRays SampleStyleRays(const std::vector<StyledTrainingView>& views, int rays, int patch,
                           uint64_t seed, uint64_t step);
+
+// Rays of a step of patches; 0 for one of a whole view.
+int64_t RaysPerStep(int rays, int patch);
 
 // Checks sizes and values; returns the number of pixels that are not finite.
 int64_t ValidateViews(const std::vector<StyledTrainingView>& views);

@@ -158,7 +158,7 @@ void BM_FitFast(benchmark::State& state) {
   const std::vector<Vec3f> targets(rays.size(), Vec3f{0.5f, 0.4f, 0.3f});
   const int shards = static_cast<int>(state.range(1));
   std::vector<GradientArena> arenas(static_cast<size_t>(shards));
-  for (auto& arena : arenas) arena.Reset(grid.num_voxels(), grid.lanes());
+  for (auto& arena : arenas) arena.Reset(grid.num_voxels());
   int64_t samples = 0;
   const RmspropOptions optimizer{.rate_sh = 1e-6f, .rate_density = 1e-6f};
   for (auto _ : state) {

@@ -1,6 +1,6 @@
-// Prices the evaluator's flow methods against exact motion: how far off they are, which hidden
-// pixels their masks find, what they make of the consistency of frames that are consistent, and
-// how long they take. Prints tables for COSTS.md.
+// Measures the evaluator's flow methods against exact motion: how far off they are, which
+// hidden pixels their masks find, what they make of the consistency of frames that are
+// consistent, and how long they take. Prints tables for COSTS.md.
 //
 //   flow_benchmark pairs DIR      DIR/00001_img1.ppm, 00001_img2.ppm, 00001_flow.flo, ...
 //   flow_benchmark capture DIR    what `regrade synth` wrote

@@ -9,8 +9,7 @@
 namespace regrade {
 namespace {
 
-// Sums of `together` neighbouring uniform numbers: mean together / 2; neighbours rise and fall
-// together.
+// Sums of `together` consecutive uniform numbers: mean together / 2; neighbours are correlated.
 std::vector<double> Film(int length, int together, uint64_t seed) {
   std::vector<double> values;
   for (int i = 0; i < length; ++i) {
@@ -22,26 +21,26 @@ std::vector<double> Film(int length, int together, uint64_t seed) {
   return values;
 }
 
-// In how many of 200 films the interval holds the mean that the films were drawn with.
-int Held(int length, int together, int block) {
-  int held = 0;
+// The number of 200 films whose interval covers the true mean.
+int Covered(int length, int together, int block) {
+  int covered = 0;
   for (uint64_t seed = 0; seed < 200; ++seed) {
     const auto interval = BootstrapMean(Film(length, together, seed), block, seed);
-    held += interval->low <= together / 2.0 && together / 2.0 <= interval->high;
+    covered += interval->low <= together / 2.0 && together / 2.0 <= interval->high;
   }
-  return held;
+  return covered;
 }
 
-TEST(Bootstrap, HoldsTheMeanInNineteenOfTwenty) {
-  // 190 expected of 200; four standard deviations (3.1 each) below, and 60 values cost a
-  // little.
-  EXPECT_GE(Held(60, 1, 1), 177);
+TEST(Bootstrap, CoversTheMeanInNineteenOfTwenty) {
+  // 190 of 200 expected; four standard deviations (3.1 each) below, and slightly fewer because
+  // of only 60 values.
+  EXPECT_GE(Covered(60, 1, 1), 177);
 }
 
 TEST(Bootstrap, RunsKeepOverlappingPairsTogether) {
-  const int in_runs = Held(60, 5, 5), one_by_one = Held(60, 5, 1);
-  // 167 and 124 expected, from 400 films in numpy; standard deviations 5 and 7. Runs of 5 cut
-  // half of the ties of what lasts 5, so they fall short of 190, too.
+  const int in_runs = Covered(60, 5, 5), one_by_one = Covered(60, 5, 1);
+  // 167 and 124 expected, from 400 films in numpy; standard deviations 5 and 7. Runs of 5 break
+  // half of the correlations of length 5, so they are also below 190.
   EXPECT_GE(in_runs, 152);
   EXPECT_LE(one_by_one, 145);
 }

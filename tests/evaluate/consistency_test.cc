@@ -53,8 +53,8 @@ TEST(Consistency, H111_EmptyMaskIsUndefinedAndCounted) {
   EXPECT_EQ(row.pairs, 3);
   EXPECT_EQ(row.undefined_pairs, 1);
   EXPECT_FALSE(report.pairs.at(1).error || report.pairs.at(1).psnr_db);
-  EXPECT_NEAR(*row.tc_psnr_mean_db, 20, 1e-4);     // as if the pair were not there
-  EXPECT_NEAR(*row.tc_psnr_of_mean_db, 20, 1e-4);  // neither an error of 0
+  EXPECT_NEAR(*row.tc_psnr_mean_db, 20, 1e-4);     // the undefined pair has no influence
+  EXPECT_NEAR(*row.tc_psnr_of_mean_db, 20, 1e-4);  // it does not count as an error of 0
   EXPECT_NEAR(row.coverage, 2.0 / 3, 1e-12);
 
   const auto none = EvaluateConsistency(2, Still(0), {{"s", Levels({0, 1})}}, Gaps({1}));
@@ -101,7 +101,7 @@ TEST(Consistency, H114_ErrorIsPerPixelAndChannel) {
               testing::RecordBound("squared error of one channel", testing::Computed::kDouble,
                                    *pair.error - 0.01 / 3,
                                    1e-8));  // summed over channels it would be 4.77 dB lower
-  // An alpha channel is no colour; grey has one channel.
+  // An alpha channel is not a colour; grey has one channel.
   EXPECT_NEAR(*ComparePair(ConstantImage(kW, kH, 0.5f, 1), ConstantImage(kW, kH, 0.6f, 1),
                            StillMotion(kW, kH))
                    .error,
@@ -111,26 +111,26 @@ TEST(Consistency, H114_ErrorIsPerPixelAndChannel) {
   EXPECT_EQ(*ComparePair(a, b, StillMotion(kW, kH)).error, 0);
 }
 
-TEST(Consistency, H115_FinerThanBytesIsMarked) {
-  // A step of 1/1000 is 60 dB, of 1/500 54 dB; bytes cannot tell above 58.9 dB.
+TEST(Consistency, H115_PairsAboveThe8BitFloorAreCounted) {
+  // A step of 1/1000 is 60 dB, of 1/500 54 dB; 8 bits resolve up to 58.9 dB.
   const auto report =
       EvaluateConsistency(3, Still(), {{"s", Levels({0.25f, 0.251f, 0.253f})}}, Gaps({1}));
   EXPECT_EQ(report.rows.at(0).pairs_above_8bit_floor, 1);
 }
 
-TEST(Consistency, H116_ColoursThatAreNotFiniteAreLeftOutAndCounted) {
+TEST(Consistency, H116_NonFiniteColoursAreExcludedAndCounted) {
   Image a = ConstantImage(kW, kH, 0.5f), b = ConstantImage(kW, kH, 0.6f);
   a.at(3, 3)[1] = kNan;
   b.at(9, 9)[0] = std::numeric_limits<float>::infinity();
   const PairResult pair = ComparePair(a, b, StillMotion(kW, kH));
   EXPECT_EQ(pair.colour_not_finite, 2);
   EXPECT_NEAR(*pair.error, 0.01,
-              testing::RecordBound("error beside colours that are none",
-                                   testing::Computed::kDouble, *pair.error - 0.01, 1e-8));
+              testing::RecordBound("error with non-finite colours", testing::Computed::kDouble,
+                                   *pair.error - 0.01, 1e-8));
   EXPECT_NEAR(pair.coverage, 1 - 2.0 / (kW * kH), 1e-12);
 }
 
-// A flow of half a pixel mixes two columns: the one without a finite colour must not leak.
+// A flow of half a pixel mixes two columns: the one without a finite colour must be excluded.
 TEST(Consistency, H117_EveryTapOfAWarpedColourMustBeFinite) {
   PairMotion motion = StillMotion(kW, kH);
   motion.flow = ConstantFlow(kW, kH, 0.5f, 0.5f);
@@ -139,8 +139,8 @@ TEST(Consistency, H117_EveryTapOfAWarpedColourMustBeFinite) {
   const PairResult pair = ComparePair(ConstantImage(kW, kH, 0.5f), later, motion);
   EXPECT_EQ(pair.colour_not_finite, 4);
   EXPECT_NEAR(*pair.error, 0.01,
-              testing::RecordBound("error beside a tap that is none",
-                                   testing::Computed::kDouble, *pair.error - 0.01, 1e-8));
+              testing::RecordBound("error with a non-finite tap", testing::Computed::kDouble,
+                                   *pair.error - 0.01, 1e-8));
 }
 
 TEST(Consistency, H118_LowCoverageIsFlagged) {
@@ -157,8 +157,8 @@ TEST(Consistency, H118_LowCoverageIsFlagged) {
 }
 
 TEST(Consistency, H118_UnrelatedNoiseCoversLessThanOneSurface) {
-  // Flow always returns something, smooth enough here that a third of it agrees both ways; the
-  // coverage beside each figure and the bound on it are what gives it away.
+  // Flow is always finite, and here smooth enough that a third of it agrees in both directions;
+  // the low coverage and its threshold reveal it.
   const FrameSource noise = Frames({NoiseImage(96, 96, 1), NoiseImage(96, 96, 2)});
   const FrameSource waves = Frames({WaveImage(96, 96, 0, 0), WaveImage(96, 96, 2, 1)});
   for (const char* mode : {"lai2018", "ruder2016"}) {
@@ -190,12 +190,12 @@ TEST(Consistency, H120_MotionComesFromTheReferenceOnceForAllSequences) {
     EXPECT_EQ(a.coverage, b.coverage);
     EXPECT_GT(a.coverage, 0.5);
     EXPECT_EQ(a.disoccluded, b.disoccluded);
-    // The waves' own motion explains nearly all of what moves; another's would not.
+    // The waves' own motion explains nearly all of the change; another motion would not.
     EXPECT_LT(*a.error,
               0.1 * *ComparePair(waves[static_cast<size_t>(a.from)],
                                  waves[static_cast<size_t>(a.to)], StillMotion(64, 48))
                          .error);
-    EXPECT_EQ(*b.error, 0);  // grey is perfectly consistent, whatever its flow would have been
+    EXPECT_EQ(*b.error, 0);  // grey is perfectly consistent for any flow
   }
   int calls = 0;
   const auto counted = [&](int, int) {
@@ -223,7 +223,7 @@ TEST(Consistency, H121_GapsLongerThanTheSequenceAreUndefined) {
   }
 }
 
-TEST(Consistency, H122_SequencesThatDoNotFitAreClearErrors) {
+TEST(Consistency, H122_MismatchedSequencesAreClearErrors) {
   const FrameSource reference = Frames({WaveImage(40, 30, 0, 0), WaveImage(40, 30, 1, 0)});
   const FrameSource short_one = Frames({WaveImage(40, 30, 0, 0)});
   const FrameSource wide = Frames({WaveImage(41, 30, 0, 0), WaveImage(41, 30, 1, 0)});
@@ -254,8 +254,7 @@ TEST(Consistency, H122_SequencesThatDoNotFitAreClearErrors) {
 }
 
 TEST(Consistency, H123_SumsOfManyPixelsDoNotStall) {
-  // 4 M equal terms of 0.01: added one by one in float they give a quarter too much or too
-  // little.
+  // 4 M equal terms of 0.01: summed one by one in float the result would be off by a quarter.
   const Image a = ConstantImage(2048, 2048, 0, 1), b = ConstantImage(2048, 2048, 0.1f, 1);
   const PairResult pair = ComparePair(a, b, StillMotion(2048, 2048));
   const double exact = static_cast<double>(0.1f) * 0.1f;

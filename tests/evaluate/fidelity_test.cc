@@ -43,7 +43,7 @@ TEST(HueChroma, PublishedLabValuesOfPureColours) {
   EXPECT_NEAR(*blue.MeanChroma(), std::hypot(79.19, -107.86), 0.02);
   EXPECT_NEAR(*red.HueStd(), 0, 1e-6);
 
-  // Both side by side: R from the vectors themselves.
+  // Both side by side: R from the vectors.
   HueChroma both;
   both.Add(SideBySide(Colour(4, 4, 1, 0, 0), Colour(4, 4, 0, 0, 1)));
   const double r = std::hypot(80.09 + 79.19, 67.20 - 107.86) /
@@ -51,7 +51,7 @@ TEST(HueChroma, PublishedLabValuesOfPureColours) {
   EXPECT_NEAR(*both.HueStd(), std::sqrt(-2 * std::log(r)), 1e-4);
 }
 
-TEST(HueChroma, GreyHasNoHueAndNanNoSay) {
+TEST(HueChroma, GreyHasNoHueAndNanIsIgnored) {
   HueChroma grey;
   EXPECT_FALSE(grey.HueStd() || grey.MeanChroma());
   grey.Add(Colour(5, 5, 0.3f, 0.3f, 0.3f));
@@ -68,7 +68,7 @@ TEST(SlicedWasserstein, KnownDistances) {
   ColourSlices a, same, moved;
   const Image noise = NoiseImage(64, 64, 1);
   a.Add(noise);
-  Image shuffled = noise;  // places do not matter
+  Image shuffled = noise;  // positions do not matter
   for (int i = 0; i < 32 * 64; ++i)
     for (int c = 0; c < 3; ++c)
       std::swap(shuffled.pixels[3 * i + c], shuffled.pixels[3 * (64 * 64 - 1 - i) + c]);
@@ -100,12 +100,12 @@ TEST(SlicedWasserstein, LargePicturesAreSampledEvenly) {
   small.Add(picture(8, 10));
   EXPECT_LE(large.count(), 65536);
   EXPECT_GT(large.count(), 20000);
-  // A column more or less of one colour is 1/267 of the picture at distance sqrt(2): 0.05. The
-  // first 65536 pixels alone are all red: 0.4.
+  // One column of one colour is 1/267 of the picture at distance sqrt(2): 0.05. The first 65536
+  // pixels alone are all red: 0.4.
   EXPECT_NEAR(*SlicedWasserstein(large, small), 0, 0.06);
 }
 
-TEST(Fidelity, GreyVideoIsFoundOut) {
+TEST(Fidelity, GreyVideoScoresPoorly) {
   const Image style =
       SideBySide(Colour(20, 40, 0.9f, 0.5f, 0.1f), Colour(20, 40, 0, 0.3f, 0.7f));
   const FrameSource target = Frames({style, style});
@@ -143,7 +143,7 @@ TEST(Fidelity, StructureIsLostToNoiseAndNotToColour) {
   EXPECT_LT(*MeasureFidelity({"s", Frames({noisy})}, targets).structure, 0.9);
 }
 
-TEST(Fidelity, PsnrClipsBothAndLeavesEmptySpaceOut) {
+TEST(Fidelity, PsnrClipsBothAndExcludesEmptySpace) {
   Image frame = ConstantImage(20, 20, 1.7f), target = ConstantImage(20, 20, 0.9f);
   Image transmittance(20, 20, 1);
   frame.at(2, 2)[0] = -5;
@@ -151,7 +151,7 @@ TEST(Fidelity, PsnrClipsBothAndLeavesEmptySpaceOut) {
   FidelityTargets targets;
   targets.views_2d = Frames({target, target});
   targets.transmittance = Frames({transmittance, transmittance});
-  // The second frame is perfect: left out of the mean, which would be infinite.
+  // The second frame is perfect: excluded from the mean, which would be infinite.
   const FidelityRow row = MeasureFidelity({"s", Frames({frame, target})}, targets);
   EXPECT_NEAR(*row.psnr_to_2d_db, 20, 1e-4);
   EXPECT_FALSE(row.sliced_wasserstein_to_style);

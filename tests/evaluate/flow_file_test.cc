@@ -75,8 +75,8 @@ TEST_F(FlowFile, HostileFilesAreRefused) {
   bad[0] ^= 1;
   WriteBytes(bad);
   EXPECT_EQ(ReadCode(), ExitCode::kInput);
-  // A header of 60000 x 60000 in a small file must not allocate 28 GB first; nor may a negative
-  // side or a product that wraps around pass.
+  // A header of 60000 x 60000 in a small file must not allocate 28 GB first; a negative side or
+  // an overflowing product must not pass.
   for (const int32_t side : {60000, -5, 0, 0x7fffffff}) {
     bad = good;
     std::memcpy(&bad[4], &side, 4);

@@ -34,7 +34,7 @@ Camera CameraAt(Vec3d center, double turn) {
 }
 
 // Distance along each pixel's ray to the plane z = 4 + 0.3 x, and to the square |x|, |y| < 0.4
-// at z = 2 before it where `square` is set.
+// at z = 2 in front of it if `square` is set.
 Image DepthOf(const Camera& camera, bool square) {
   Image depth(kW, kH, 1);
   for (int y = 0; y < kH; ++y)
@@ -53,7 +53,7 @@ Image DepthOf(const Camera& camera, bool square) {
 TEST(GeometricFlow, H124_PlaneLeavesTheInterpolationErrorOnly) {
   const Camera a = CameraAt({0, 0, 0}, 0), b = CameraAt({0.25, 0.1, -0.1}, 0.03);
   const Image depth_a = DepthOf(a, false), depth_b = DepthOf(b, false);
-  // Colours are a function of the point's place in picture b, so picture b is exact and its
+  // Colours are a function of the point's position in picture b, so picture b is exact and its
   // second derivatives are known: 0.3 (k1^2 + k2^2) in each direction at most.
   const double k1 = 0.21, k2 = 0.17;
   const auto colour = [&](double u, double v) {
@@ -91,11 +91,11 @@ TEST(GeometricFlow, H124_PlaneLeavesTheInterpolationErrorOnly) {
   const double bound = 2 * 0.3 * (k1 + k2) * (k1 + k2) / 8;
   const PairResult pair = ComparePair(picture_a, picture_b, motion);
   EXPECT_LT(*pair.error, bound * bound *
-                             testing::RecordBound("squared error over interpolation's own",
+                             testing::RecordBound("squared error over the interpolation error",
                                                   testing::Computed::kDouble,
                                                   *pair.error / (bound * bound), 1));
   EXPECT_GT(*pair.error, 1e-4 * bound * bound);
-  // A pixel-centre slip of half a pixel would be seen.
+  // A shift of half a pixel would be detected.
   PairMotion slipped = motion;
   for (float& value : slipped.flow.uv) value += 0.5f;
   EXPECT_GT(*ComparePair(picture_a, picture_b, slipped).error, bound * bound);
@@ -118,8 +118,8 @@ TEST(GeometricFlow, HiddenPointsFailTheDepthTest) {
   const Camera a = CameraAt({0, 0, 0}, 0), b = CameraAt({0.5, 0, 0}, 0);
   Image visible;
   const FlowField flow = GeometricFlow(DepthOf(a, true), a, DepthOf(b, true), b, &visible);
-  // Straight left of the square in a, the wall is hidden by the square in b; on the square and
-  // far from it nothing is hidden. The tests ask b itself by a ray.
+  // Directly left of the square in a, the wall is hidden by the square in b; on the square and
+  // far from it nothing is hidden. The test checks with a ray of b.
   int wrong = 0, hidden = 0;
   const Image depth_a = DepthOf(a, true);
   for (int y = 0; y < kH; ++y)
@@ -130,7 +130,7 @@ TEST(GeometricFlow, HiddenPointsFailTheDepthTest) {
       const Vec3d crossing = p + to_b * ((2 - p.z) / (b.Center().z - p.z));
       const bool on_square = p.z < 2.001;
       const double side = std::max(std::abs(crossing.x), std::abs(crossing.y));
-      if (on_square || std::abs(side - 0.4) < 0.04) continue;  // silhouettes may go either way
+      if (on_square || std::abs(side - 0.4) < 0.04) continue;  // undefined at silhouettes
       if (side < 0.4) {
         ++hidden;
         wrong += *visible.at(x, y) != 0;
@@ -144,7 +144,7 @@ TEST(GeometricFlow, HiddenPointsFailTheDepthTest) {
                 GeometricMask(flow, visible).out_of_frame);
 }
 
-// The wall z = `z(x)` as camera a sees it.
+// The wall z = `z(x)` as seen by camera a.
 Image DepthOfColumns(const Camera& camera, const std::function<double(int)>& z) {
   Image depth(kW, kH, 1);
   for (int y = 0; y < kH; ++y)
@@ -165,7 +165,7 @@ TEST(GeometricFlow, DepthsOfTheSameSurfaceAgreeWithinOnePercent) {
 
 TEST(GeometricFlow, H117_TapsOnTwoSurfacesAreNoSurface) {
   // Half a pixel to the side: each target lies between a near and a far column whose mean 1/z
-  // is the point's own by chance.
+  // happens to equal the point's.
   const Camera a = CameraAt({0, 0, 0}, 0);
   Camera b = a;
   b.cx += 0.5;
@@ -176,7 +176,7 @@ TEST(GeometricFlow, H117_TapsOnTwoSurfacesAreNoSurface) {
   EXPECT_EQ(std::count(visible.pixels.begin(), visible.pixels.end(), 1.f), 0);
 }
 
-TEST(GeometricFlow, H116_NothingThereIsUnknown) {
+TEST(GeometricFlow, H116_NoSurfaceIsUnknown) {
   const Camera a = CameraAt({0, 0, 0}, 0);
   Image depth = DepthOf(a, false);
   *depth.at(5, 6) = 0;

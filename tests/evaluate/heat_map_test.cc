@@ -21,7 +21,7 @@ TEST(HeatMap, DarkerWithTheErrorAndWhiteWithout) {
   const Image map = ErrorHeatMap(earlier, later, StillMotion(32, 4));
   EXPECT_EQ(Brightness(map, 0, 0), 3);
   EXPECT_EQ(Brightness(map, 0, 1), 3);
-  for (int x = 1; x + 1 < 27; ++x)  // up to 10 dB, where the scale ends
+  for (int x = 1; x + 1 < 27; ++x)  // up to 10 dB, the end of the scale
     EXPECT_LT(Brightness(map, x + 1, 1), Brightness(map, x, 1)) << x;
   EXPECT_EQ(Brightness(map, 31, 1), Brightness(map, 30, 1));
 }
@@ -35,7 +35,7 @@ TEST(HeatMap, MaskedPixelsAreDark) {
   EXPECT_GT(map.at(2, 5)[0], map.at(2, 5)[1]);  // an error has a colour, the mask has none
 }
 
-TEST(HeatMap, H116_WhatIsNotFiniteIsDarkToo) {
+TEST(HeatMap, H116_NonFinitePixelsAreDark) {
   Image earlier = ConstantImage(8, 8, 1);
   earlier.at(1, 1)[2] = kNan;
   PairMotion motion = StillMotion(8, 8);

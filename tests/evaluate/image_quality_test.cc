@@ -35,7 +35,7 @@ TEST(Psnr, H123_SumsAreDouble) {
                                     *MeanSquaredError(a, b) - exact, 1e-10, exact));
 }
 
-// One window, straight from the definition.
+// One window, directly from the definition.
 double LiteralSsim(const Image& a, const Image& b) {
   double norm = 0, ma = 0, mb = 0, va = 0, vb = 0, cov = 0;
   const auto weight = [](int x, int y) {

@@ -61,7 +61,7 @@ TEST(OpticalFlow, FollowsAKnownShift) {
     for (int y = 20; y < 60; ++y)
       for (int x = 20; x < 76; ++x)
         worst = std::max(worst, std::hypot(flow.at(x, y)[0] - 2.5, flow.at(x, y)[1] + 1.25));
-    // A third of a pixel: a method that did not follow at all is off by 2.8 px.
+    // A third of a pixel: a method that does not follow at all is off by 2.8 px.
     EXPECT_LT(worst, 0.34) << method;
   }
 }
@@ -106,8 +106,8 @@ TEST(OpticalFlow, SameForAnyNumberOfThreads) {
   cv::setNumThreads(threads);
 }
 
-// Bounds a fifth above what was measured (no motion at all: 4.31, 2.11, 4.77 px); a swap of u
-// and v or of the frames is off by pixels.
+// Bounds are a fifth above the measured errors (no motion at all: 4.31, 2.11, 4.77 px); a swap
+// of u and v or of the frames is off by pixels.
 TEST(OpticalFlow, EndPointErrorOnPublishedTruth) {
   REGRADE_NEED_DATA("flow_truth/00001_flow.flo");
   struct Bound {

@@ -1,4 +1,4 @@
-// Networks that are given two pictures: which comes first, what they see, and what is refused.
+// Networks with two input images: input order, input range, and refused files.
 #include "evaluate/pair_network.h"
 
 #include <gtest/gtest.h>
@@ -30,7 +30,7 @@ TEST(PairNetwork, MotionIsFromTheFirstToTheSecondInPixels) {
   testing::WriteText(folder / "flow.onnx", testing::FlowNetwork(24, 32));
   const PairNetwork network(folder / "flow.onnx");
   const Image dark = Plain(0.2f, 0.5f, 0.1f), bright = Plain(0.6f, 0.5f, 0.1f);
-  // Pictures go in from -1 to 1: 0.4 more red is 0.8 there.
+  // Inputs are scaled to -1 to 1: a difference of 0.4 in red becomes 0.8.
   const FlowField there = network.Flow(dark, bright), back = network.Flow(bright, dark);
   for (const auto& [x, y] : {std::pair{0, 0}, {31, 23}, {7, 20}}) {
     EXPECT_NEAR(there.at(x, y)[0], 10 + 1.5f * 0.8f, 1e-5);
@@ -39,7 +39,7 @@ TEST(PairNetwork, MotionIsFromTheFirstToTheSecondInPixels) {
   }
 }
 
-TEST(PairNetwork, EvaluationTakesItsMotion) {
+TEST(PairNetwork, EvaluationUsesItsMotion) {
   const TemporaryFolder folder;
   testing::WriteText(folder / "flow.onnx", testing::FlowNetwork(24, 32));
   const FrameSource frames{
@@ -50,7 +50,7 @@ TEST(PairNetwork, EvaluationTakesItsMotion) {
   EXPECT_NEAR(motion(1, 0).flow.at(3, 3)[0], 8.8f, 1e-5);
 }
 
-TEST(PairNetwork, DistanceIsWhatTheNetworkSays) {
+TEST(PairNetwork, DistanceIsTheNetworkOutput) {
   const TemporaryFolder folder;
   testing::WriteText(folder / "distance.onnx", testing::DistanceNetwork(24, 32));
   const auto distance = PerceptualDistance(folder / "distance.onnx");
@@ -81,12 +81,12 @@ TEST(PairNetwork, RefusalsNameTheFile) {
   testing::WriteText(folder / "distance.onnx", testing::DistanceNetwork(24, 32));
   const PairNetwork distance(folder / "distance.onnx");
   const Image a = Plain(0, 0, 0);
-  EXPECT_REGRADE_ERROR(distance.Flow(a, a), ExitCode::kExternalProgram, "no motion");
+  EXPECT_REGRADE_ERROR(distance.Flow(a, a), ExitCode::kExternalProgram, "not a motion field");
   EXPECT_REGRADE_ERROR(distance.Distance(a, Image(8, 8, 3)), ExitCode::kExternalProgram,
                        "size");
 }
 
-// Where OpenCV's contributed module is installed its flows find a shift; elsewhere they are
+// If OpenCV's contributed module is installed, its flows find a shift; otherwise they are
 // refused with the package's name.
 TEST(OpticalFlow, ContributedMethodsFindAShiftOrNameTheirPackage) {
   Image from(96, 72, 3), to(96, 72, 3);
@@ -114,7 +114,8 @@ TEST(OpticalFlow, ContributedMethodsFindAShiftOrNameTheirPackage) {
     for (int y = 16; y < 56; ++y)
       for (int x = 16; x < 80; ++x, ++count)
         off += std::hypot(flow.at(x, y)[0] - 2, flow.at(x, y)[1] + 1);
-    EXPECT_LT(off / count, 0.6) << name;  // of a motion of 2.2 px; the worst is PCA-flow's
+    EXPECT_LT(off / count, 0.6)
+        << name;  // for a motion of 2.2 px; PCA-flow has the largest error
   }
 }
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Holds `regrade evaluate` to scripts/reference_evaluator.py: same frames, same flow, the same figure for each pair.
+"""Compares `regrade evaluate` with scripts/reference_evaluator.py: same frames, same flow, same metric for each pair.
 
   reference_evaluator_test.py REGRADE      exit status 77 (skipped) without numpy
 """
@@ -12,23 +12,23 @@ import sys
 import tempfile
 import zlib
 
-DEBIANS = "/usr/bin/python3"  # the interpreter that Debian's python3-numpy belongs to
+SYSTEM_PYTHON = "/usr/bin/python3"  # the interpreter of Debian's python3-numpy
 try:
     import numpy
 except ImportError:
-    if os.path.exists(DEBIANS) and "REGRADE_NUMPY_SOUGHT" not in os.environ:
-        os.execve(DEBIANS, [DEBIANS] + sys.argv, {**os.environ, "REGRADE_NUMPY_SOUGHT": "1"})
-    print("SKIPPED: there is no numpy (Debian: python3-numpy), so the evaluator has no second opinion")
+    if os.path.exists(SYSTEM_PYTHON) and "REGRADE_NUMPY_RETRIED" not in os.environ:
+        os.execve(SYSTEM_PYTHON, [SYSTEM_PYTHON] + sys.argv, {**os.environ, "REGRADE_NUMPY_RETRIED": "1"})
+    print("SKIPPED: numpy is missing (Debian: python3-numpy)")
     sys.exit(77)
 
 WIDTH, HEIGHT, FRAMES = 61, 47, 7
 GAPS = (1, 3)
-TOLERANCE_DB = 1e-4  # frames are the same bytes and flow the same floats: what is left is the order of sums
+TOLERANCE_DB = 1e-4  # frames and flow are identical: only the order of sums differs
 REFERENCE = os.path.join(os.path.dirname(os.path.abspath(__file__)), "../../scripts/reference_evaluator.py")
 
 
 def write_png(path, pixels):
-    """RGB of 8 bits; rows take turns with the filters None, Sub and Up."""
+    """8-bit RGB; rows alternate between the filters None, Sub and Up."""
     rows, above = [], numpy.zeros_like(pixels[0])
     for y, row in enumerate(pixels):
         left = numpy.concatenate([numpy.zeros_like(row[:1]), row[:-1]])
@@ -58,7 +58,7 @@ def make_frames(folder, random, flicker):
 
 
 def make_flow(folder, random):
-    """Flow with every reason for distrust in it: a jump, disagreement, exits over all borders, unknown patches."""
+    """Flow with every reason for masking: a discontinuity, disagreement, exits at all borders, unknown patches."""
     os.makedirs(folder)
     y, x = numpy.mgrid[0:HEIGHT, 0:WIDTH]
     for i in range(FRAMES):
@@ -70,7 +70,7 @@ def make_flow(folder, random):
                                    -0.6 * gap + 3 * numpy.cos(0.05 * x - 0.07 * y + phase)], axis=2)
             backward = -forward + 0.9 * numpy.stack([numpy.sin(0.2 * y + phase), numpy.cos(0.15 * x)], axis=2)
             forward += 0.02 * random.standard_normal(forward.shape)
-            forward[5:8, 10:13] = 1e10     # unknown motion, as .flo files write it
+            forward[5:8, 10:13] = 1e10     # unknown motion in .flo files
             backward[20:22, 30:33] = 1e10
             forward[30, 7] = numpy.nan
             forward[40, 50] = (1e6, -1e6)
@@ -78,7 +78,7 @@ def make_flow(folder, random):
             forward[46, 60] = forward[0, 0] = 0  # targets in the frame's corners
             write_flow(os.path.join(folder, f"{i:05d}_{i + gap:05d}.flo"), forward)
             write_flow(os.path.join(folder, f"{i + gap:05d}_{i:05d}.flo"), backward)
-    # Nothing of the pair 0, 1 can be trusted: its figure is not defined.
+    # No pixel of the pair 0, 1 is trusted: its metric is undefined.
     for name in ("00000_00001.flo", "00001_00000.flo"):
         write_flow(os.path.join(folder, name), numpy.full((HEIGHT, WIDTH, 2), 9.0))
 
@@ -108,14 +108,14 @@ def complaints_of(regrade, work, mode):
             have = ours.get((want["from"], want["to"]), {})
             a, b = have.get("tc_psnr_db"), want["tc_psnr_db"]
             apart = 0 if a is None and b is None else abs(a - b) if None not in (a, b) else float("inf")
-            shares = abs(have.get("coverage", -1) - want["coverage"])
+            coverage_difference = abs(have.get("coverage", -1) - want["coverage"])
             compared, worst = compared + (b is not None), max(worst, apart)
-            if apart > TOLERANCE_DB or shares > 1e-6:
+            if apart > TOLERANCE_DB or coverage_difference > 1e-6:
                 complaints.append(f"{mode}, {sequence}, {want['from']} to {want['to']}: {a} dB of "
                                   f"{have.get('coverage')}, the reference {b} dB of {want['coverage']}")
-    print(f"{mode}: {compared} pairs with a figure, at most {worst:.2e} dB apart")
+    print(f"{mode}: {compared} pairs with a metric, maximum difference {worst:.2e} dB")
     if compared != 2 * (len(expected) - 1):
-        complaints.append(f"{mode}: {compared} pairs have a figure, one of each sequence was made to have none")
+        complaints.append(f"{mode}: {compared} pairs have a metric; one of each sequence must be undefined")
     return complaints
 
 

@@ -25,7 +25,7 @@ inline Image NoiseImage(int width, int height, uint64_t seed, int channels = 3) 
   return image;
 }
 
-// A texture that flow can follow: waves of several lengths, shifted by (dx, dy) pixels.
+// A texture that optical flow can track: waves of several lengths, shifted by (dx, dy) pixels.
 inline Image WaveImage(int width, int height, double dx, double dy) {
   Image image(width, height, 3);
   for (int y = 0; y < height; ++y)
@@ -46,8 +46,8 @@ inline FlowField ConstantFlow(int width, int height, float u, float v) {
   return flow;
 }
 
-// Smooth flow with a jump in it, and a backward flow that undoes it up to a smooth error, so
-// that every branch of a mask is taken somewhere.
+// Smooth flow with a discontinuity, and a backward flow that inverts it up to a smooth error,
+// so that every branch of a mask is taken somewhere.
 inline std::pair<FlowField, FlowField> MixedFlows(int width, int height, uint64_t seed) {
   FlowField forward(width, height), backward(width, height);
   const double phase = 6.28 * RandomDouble(seed, 1, 0), tilt = RandomDouble(seed, 1, 1);

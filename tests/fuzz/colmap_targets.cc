@@ -1,5 +1,5 @@
-// COLMAP's cameras, images and points, binary and as text: one file is attacked, the two others
-// are those of a small model.
+// Fuzz targets: COLMAP's cameras, images and points, binary and text. One file is mutated, the
+// two others are those of a small model.
 #include <filesystem>
 #include <limits>
 
@@ -17,7 +17,7 @@ constexpr const char* kNames[] = {"cameras", "images", "points3D"};
 
 ColmapModel SmallModel() { return MakeSyntheticModel({.images = 3, .points = 4}); }
 
-// A folder with the small model, but for the file under attack.
+// A folder with the small model, without the mutated file.
 const std::string& Folder(File file, bool text) {
   static std::string folders[3][2];
   std::string& folder = folders[file][text];
@@ -41,7 +41,7 @@ std::string BytesOf(const ColmapModel& model, File file, bool text) {
   return ReadText(folder + "/" + kNames[file] + (text ? ".txt" : ".bin"));
 }
 
-// What stands in colmap_model.h about a model that was accepted.
+// The guarantees of colmap_model.h for an accepted model.
 void CheckModel(const ColmapModel& model) {
   for (const ColmapImage& image : model.images) {
     const Camera camera = model.CameraOf(image);  // exists
@@ -67,7 +67,7 @@ bool ReadIt(std::string_view bytes) {
   return Accepts([] {
     const ColmapModel model = ReadColmapModel(Folder(file, text));
     CheckModel(model);
-    // What was accepted once is so again after it was written.
+    // An accepted model is accepted again after it was written.
     const std::string again = FuzzFolder() + "/again";
     std::filesystem::create_directories(again);
     WriteColmapModel(model, again);
@@ -120,7 +120,7 @@ double AnyDouble(FuzzRandom* random) {
   return values[random->Below(std::size(values))];
 }
 
-// A change that makes sense as a model, and gets past counts and lengths.
+// A mutation that is consistent with counts and lengths.
 void ChangeModel(ColmapModel* model, FuzzRandom* random) {
   const auto any = [random](auto& list) -> auto& { return list[random->Below(list.size())]; };
   if (model->cameras.empty() || model->images.empty() || model->points.empty()) return;

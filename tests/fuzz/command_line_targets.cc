@@ -1,4 +1,4 @@
-// What a person types: options, the template of a style command, and names that are shown.
+// Fuzz targets: options, the template of a style command, and printed names.
 #include <algorithm>
 
 #include "pipeline/program/console.h"
@@ -11,7 +11,7 @@
 namespace regrade::testing {
 namespace {
 
-// Words stand on lines of their own.
+// One word per line.
 std::vector<std::string> Words(std::string_view bytes) {
   std::vector<std::string> words(1);
   for (const char c : bytes) c == '\n' ? words.emplace_back() : words.back() += c;
@@ -92,7 +92,7 @@ std::vector<std::string> NameSeeds() {
           "\xff\xc3"};
 }
 
-// Every name can be shown.
+// Every name can be printed.
 bool ShowName(std::string_view bytes) {
   const std::vector<char> own(bytes.begin(), bytes.end());
   const std::string_view name(own.data(), own.size());

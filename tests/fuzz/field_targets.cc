@@ -1,4 +1,4 @@
-// field.npz and a packed capture as wholes, and a look through what was accepted.
+// Fuzz targets: field.npz and packed captures; accepted fields are rendered.
 #include <cmath>
 
 #include "kernels/field/cpu/render_view.h"

@@ -1,4 +1,4 @@
-// Flow files of other programs.
+// Fuzz targets: flow files of other programs.
 #include <cmath>
 
 #include "evaluate/flow_file.h"

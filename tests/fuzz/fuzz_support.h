@@ -1,4 +1,4 @@
-// What the bodies of fuzz targets share: a file to read from, and what counts as an answer.
+// Shared by fuzz targets: a file to read, and the check of the result.
 #pragma once
 
 #include <stdlib.h>
@@ -14,7 +14,7 @@
 
 namespace regrade::testing {
 
-// A guarantee that an accepted input has broken.
+// Thrown where an accepted input breaks a guarantee.
 class BrokenPremise : public std::logic_error {
  public:
   using std::logic_error::logic_error;
@@ -24,8 +24,8 @@ inline void FuzzRequire(bool kept, const char* guarantee) {
   if (!kept) throw BrokenPremise(std::string("accepted, but not so: ") + guarantee);
 }
 
-// True if `read` came to its end, false if it refused with an Error of one of the kinds that
-// bad input can have, and said why.
+// True if `read` returned, false if it threw an Error with a reason and an exit code of bad
+// input.
 template <typename Read>
 bool Accepts(const Read& read) {
   try {
@@ -39,8 +39,8 @@ bool Accepts(const Read& read) {
   }
 }
 
-// A file in a folder of this process, with the bytes given; the folder goes when it ends. It
-// lies in memory where it can: a disk would be what is measured.
+// A file with the given bytes in a folder of this process, which is removed at its end. It is
+// in memory if possible: a disk would dominate the time.
 inline const std::string& FuzzFolder() {
   static const TemporaryFolder folder = [] {
     if (std::filesystem::is_directory("/dev/shm")) ::setenv("TMPDIR", "/dev/shm", 0);

@@ -1,5 +1,5 @@
-// What a fuzz target is: a reader of ours, inputs that it must accept, and a way to change them
-// that gets past the reader's first checks.
+// A fuzz target: a reader, inputs that it must accept, and mutations that pass its first
+// checks.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@
 
 namespace regrade::testing {
 
-// Draws that are the same everywhere for the same seed.
+// Random numbers that depend on the seed only.
 class FuzzRandom {
  public:
   explicit FuzzRandom(uint64_t seed) : seed_(seed) {}
@@ -27,29 +27,27 @@ class FuzzRandom {
 
 struct FuzzTarget {
   const char* name;
-  // Inputs that must be accepted: the corpus begins with them.
+  // The first inputs of the corpus; they must be accepted.
   std::vector<std::string> (*seeds)();
-  // Hands the bytes to the reader. True if they were accepted and what came out is as the
-  // reader guarantees, false if they were refused with an Error. Whatever is thrown is a
-  // finding.
+  // Runs the reader. True if it accepted the bytes and its guarantees hold, false if it threw
+  // an Error. Any exception is a finding.
   bool (*read)(std::string_view bytes);
   // One mutant.
   std::string (*mutate)(std::string bytes, FuzzRandom* random);
-  int mutants = 12000;  // that the replay test tries: half a second or so
+  int mutants = 12000;  // in the replay test: about half a second
 };
 
 inline std::ostream& operator<<(std::ostream& out, const FuzzTarget& target) {
   return out << target.name;
 }
 
-// By kind of file; each list stands in the file of its name.
+// By kind of file; each list is in the file of its name.
 std::vector<FuzzTarget> ArchiveTargets();
 std::vector<FuzzTarget> ColmapTargets();
 std::vector<FuzzTarget> CommandLineTargets();
 std::vector<FuzzTarget> FieldTargets();
 std::vector<FuzzTarget> FlowTargets();
 std::vector<FuzzTarget> JsonTargets();
-std::vector<FuzzTarget> MovieTargets();
 std::vector<FuzzTarget> PictureTargets();
 std::vector<FuzzTarget> PoseTableTargets();
 std::vector<FuzzTarget> RecordTargets();
@@ -63,10 +61,10 @@ std::vector<FuzzTarget> Joined(Lists... lists) {
   return all;
 }
 
-// Readers that need little of the program to be built, and the others.
+// Readers that link few libraries, and the others.
 inline std::vector<FuzzTarget> ReaderTargets() {
   return Joined(ColmapTargets, ArchiveTargets, FieldTargets, JsonTargets, PoseTableTargets,
-                PictureTargets, MovieTargets);
+                PictureTargets);
 }
 inline std::vector<FuzzTarget> ProgramTargets() {
   return Joined(RecordTargets, FlowTargets, StateTargets, CommandLineTargets);

@@ -1,4 +1,4 @@
-// JSON of any kind.
+// Fuzz target: JSON.
 #include "pipeline/files/json_file.h"
 #include "tests/fuzz/fuzz_support.h"
 #include "tests/fuzz/mutate.h"

@@ -1,7 +1,7 @@
-// libFuzzer's way in: one program for all targets.
+// Entry point of libFuzzer: one program for all targets.
 //
 //   fuzz_readers --list                       their names
-//   fuzz_readers --target=NAME --seeds=DIR    writes the inputs to begin with, and ends
+//   fuzz_readers --target=NAME --seeds=DIR    writes the seeds and ends
 //   fuzz_readers --target=NAME [libFuzzer's flags and folders]
 #include <omp.h>
 
@@ -63,8 +63,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   return 0;
 }
 
-// The library's own mutations, which know what the last ones have reached, and ours, which know
-// the format.
+// Mixes the library's mutations, which use coverage, with ours, which use the format.
 extern "C" size_t LLVMFuzzerCustomMutator(uint8_t* data, size_t size, size_t max_size,
                                           unsigned int seed) {
   FuzzRandom random(seed);

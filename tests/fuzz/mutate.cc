@@ -1,5 +1,5 @@
-// What changes are made, and how often: small ones mostly, for a reader that refuses at once
-// shows nothing of what lies behind its first check.
+// Mutations and their frequencies: mostly small ones, so that mutants pass a reader's first
+// checks.
 #include "tests/fuzz/mutate.h"
 
 #include <algorithm>
@@ -43,7 +43,7 @@ void SetEdge(std::string* bytes, FuzzRandom* random) {
   for (size_t i = 0; i < width; ++i, value >>= 8) (*bytes)[place(i)] = static_cast<char>(value);
 }
 
-// A piece [begin, begin + length), short ones mostly.
+// A piece [begin, begin + length), mostly short.
 void AnyPiece(const std::string& bytes, FuzzRandom* random, size_t* begin, size_t* length) {
   *begin = random->Below(bytes.size());
   const size_t left = bytes.size() - *begin;

@@ -1,4 +1,4 @@
-// Changes to bytes and texts that readers have been known to trip over.
+// Mutations of bytes and texts that often break readers.
 #pragma once
 
 #include <string>
@@ -8,18 +8,18 @@
 
 namespace regrade::testing {
 
-// A few of: a count or size set to an edge (0, 1, a little more or less, powers of two, all
-// ones) at any width in either byte order, flipped bits, a piece cut out, doubled or moved, the
-// end cut off, zeros put in.
+// Some of: a count or size set to an edge case (0, 1, slightly more or less, powers of two, all
+// ones) of any width and byte order, flipped bits, a piece removed, doubled or moved, the end
+// cut off, zeros inserted.
 std::string MutateBytes(std::string bytes, FuzzRandom* random);
 
-// The same for words and numbers: a number becomes an edge or no number at all, a piece between
-// separators goes, comes twice or changes places, brackets pile up, a word of `dictionary` is
-// put in.
+// The same for words and numbers: a number becomes an edge case or invalid, a piece between
+// separators is removed, doubled or moved, brackets are nested, a word of `dictionary` is
+// inserted.
 std::string MutateText(std::string text, const std::vector<std::string>& dictionary,
                        FuzzRandom* random);
 
-// Of JSON, with the words of our files.
+// Of JSON, with the keys of our files.
 std::string MutateJson(std::string text, FuzzRandom* random);
 
 }  // namespace regrade::testing

@@ -1,4 +1,4 @@
-// poses_bounds.npy of LLFF captures.
+// Fuzz target: poses_bounds.npy of LLFF captures.
 #include <cmath>
 
 #include "pipeline/capture/llff_poses.h"

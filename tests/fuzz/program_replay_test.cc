@@ -1,5 +1,4 @@
-// What the program reads besides: its own records and states, JSON with a meaning, command
-// lines.
+// Replays the fuzz targets of records, checkpoints, flow files and command lines.
 #include "tests/fuzz/replay.h"
 
 namespace regrade::testing {

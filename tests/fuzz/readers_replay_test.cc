@@ -1,4 +1,4 @@
-// The readers of files, under mutants that are the same everywhere.
+// Replays the fuzz targets of the file readers.
 #include "tests/fuzz/replay.h"
 
 namespace regrade::testing {
@@ -9,7 +9,7 @@ TEST_P(FuzzReplay, SeedsFindsAndMutants) { ReadSeedsFindsAndMutants(); }
 INSTANTIATE_TEST_SUITE_P(Readers, FuzzReplay, ::testing::ValuesIn(ReaderTargets()),
                          [](const auto& info) { return std::string(info.param.name); });
 
-// A reader that guarantees too much is seen, and so is one that throws what is no Error.
+// The replay detects a broken guarantee and an exception that is no Error.
 TEST(FuzzReplayItself, AFindIsAFind) {
   EXPECT_THROW(Accepts([] { FuzzRequire(false, "a guarantee"); }), BrokenPremise);
   EXPECT_THROW(Accepts([] { throw Error(ExitCode::kBug, "odd"); }), BrokenPremise);

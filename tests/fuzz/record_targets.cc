@@ -1,4 +1,4 @@
-// What is said in JSON: transforms.json, run.json, stage records, the index of a capture.
+// Fuzz targets: transforms.json, run.json, stage records, the index of a capture.
 #include <cmath>
 #include <filesystem>
 

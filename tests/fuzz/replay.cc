@@ -1,4 +1,4 @@
-// Seeds, what was found before, and mutants; inputs as text, and what the process has taken.
+// Runs seeds, earlier findings and mutants; reads inputs as text, and measures memory.
 #include "tests/fuzz/replay.h"
 
 #include <sys/resource.h>
@@ -8,7 +8,7 @@
 namespace regrade::testing {
 namespace {
 
-constexpr size_t kShown = 300;  // bytes of an input that a failure shows
+constexpr size_t kShown = 300;  // bytes of an input in a failure's message
 
 }  // namespace
 
@@ -67,7 +67,7 @@ void FuzzReplay::ReadSeedsFindsAndMutants() {
     else
       kept[seeds + random.Below(kKept)] = std::move(mutant);
   }
-  // Mutants that are all refused would show the reader's first line only.
+  // If all mutants were refused, only the reader's first check would be tested.
   EXPECT_GT(accepted, target.mutants / 100) << "of " << target.mutants;
 #if !defined(__SANITIZE_ADDRESS__)
   EXPECT_LT(PeakMemory(), kMostMemory);

@@ -1,5 +1,5 @@
-// A fuzz target without a fuzzer: its seeds, what was found before, and some thousand mutants
-// that are the same everywhere.
+// Runs a fuzz target without a fuzzer: its seeds, earlier findings, and some thousand
+// deterministic mutants.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -14,20 +14,20 @@ namespace regrade::testing {
 
 inline constexpr double kLongest = 5;     // seconds an input may take
 inline constexpr long kMostMemory = 512;  // MiB
-inline constexpr size_t kKept = 64;       // accepted mutants that further ones are made of
+inline constexpr size_t kKept = 64;       // accepted mutants that are mutated further
 
 // The first bytes as hexadecimal digits.
 std::string Hex(const std::string& bytes);
-// Of lines of hexadecimal digits; '#' begins a line of words.
+// Parses lines of hexadecimal digits; '#' begins a comment.
 std::string FromHex(const std::string& text);
-// The largest memory that this process has had, MiB.
+// Maximum memory of this process, MiB.
 long PeakMemory();
 
 class FuzzReplay : public ::testing::TestWithParam<FuzzTarget> {
  protected:
   void SetUp() override { omp_set_num_threads(1); }
 
-  // Whether the input was accepted; anything but yes and no fails the test.
+  // True if the input was accepted; an exception fails the test.
   bool Read(const std::string& bytes, const std::string& name) {
     const auto begin = std::chrono::steady_clock::now();
     bool accepted = false;
@@ -42,7 +42,7 @@ class FuzzReplay : public ::testing::TestWithParam<FuzzTarget> {
     EXPECT_LT(took.count(), kLongest) << name << "\n" << Hex(bytes);
     return accepted;
   }
-  // The body of the test that each program of targets has.
+  // The body of the replay test.
   void ReadSeedsFindsAndMutants();
 };
 

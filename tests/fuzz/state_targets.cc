@@ -1,5 +1,5 @@
-// The network, and states of an interrupted fit and training. The checksums of these states
-// stand outside of their bytes, so a mutant gets as far as any.
+// Fuzz targets: network.npz, and checkpoints of fit and training. The checksums of checkpoints
+// are not part of these bytes.
 #include <cmath>
 
 #include "pipeline/fields/fit_checkpoint.h"

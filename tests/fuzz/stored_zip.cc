@@ -1,4 +1,4 @@
-// Only as much of the format as it takes: APPNOTE.TXT 6.3.9, sections 4.3.7, 4.3.12, 4.3.16.
+// A subset of the format: APPNOTE.TXT 6.3.9, sections 4.3.7, 4.3.12, 4.3.16.
 #include "tests/fuzz/stored_zip.h"
 
 #include <zlib.h>

@@ -1,5 +1,5 @@
-// Zip archives of members that are not packed, taken apart and put together with right sizes
-// and checksums, so that mutants of what is inside get past both.
+// Takes zip archives of uncompressed members apart and builds them with correct sizes and
+// checksums: mutants of the members pass these checks.
 #pragma once
 
 #include <optional>
@@ -15,15 +15,15 @@ struct ZipPart {
 };
 
 std::string BuildStoredZip(const std::vector<ZipPart>& parts);
-// Nothing for what BuildStoredZip would not have made; checksums are not looked at.
+// Empty for archives of another form than BuildStoredZip's; checksums are ignored.
 std::optional<std::vector<ZipPart>> TakeStoredZip(const std::string& bytes);
 
-// The arrays of an .npz as members that are not packed.
+// The arrays of an .npz as uncompressed members.
 std::string StoredCopyOfNpz(const std::string& path);
 
-// Mutants of an .npy file: of its header, whose length is put right, or of its data.
+// Mutates an .npy file: its header, with a corrected length, or its data.
 std::string MutateNpy(std::string bytes, FuzzRandom* random);
-// Mutants of an .npz: of one array, of names and order, or of the archive's own bytes.
+// Mutates an .npz: one array, names and order, or the archive's bytes.
 std::string MutateNpz(std::string bytes, FuzzRandom* random);
 
 }  // namespace regrade::testing

@@ -1,5 +1,5 @@
-// Gradients summed as integers: the same bits in any order, and the floats' sums but for
-// rounding. Without a device each test skips and says so.
+// Gradients summed as integers: bit-identical in any order, and equal to float sums up to
+// rounding. Every test is skipped without a device.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -21,11 +21,11 @@ class DeviceExactSums : public ::testing::TestWithParam<int> {
  protected:
   void SetUp() override {
     const DeviceStatus status = ReadDeviceStatus();
-    if (!status.found) GTEST_SKIP() << "no GPU here: " << status.name;
+    if (!status.found) GTEST_SKIP() << "no GPU: " << status.name;
   }
 
-  // A step's gradient of the rays in this order, total variation included, and the field after
-  // it.
+  // A step's gradient of the rays in the given order, including total variation, and the field
+  // after the step.
   struct Step {
     Buffer<float> gradient, records;
   };
@@ -41,7 +41,7 @@ class DeviceExactSums : public ::testing::TestWithParam<int> {
     targets.CopyIn(grey.data(), 600);
     DeviceTouched touched(grid);
     DeviceRayFitter fitter(grid.frame, {0.5f, 1e-4f}, 64 << 20);
-    // All at once and in two parts: other warps meet.
+    // All at once or in two parts: other warps run concurrently.
     const int64_t first = backwards ? 250 : 600;
     fitter.Accumulate(grid, device_rays.data(), targets.data(), first, 1.0f / 1800, &touched);
     if (first < 600)
@@ -67,7 +67,7 @@ TEST_P(DeviceExactSums, TheSameBitsInAnyOrder) {
     ASSERT_EQ(one.records[i], other.records[i]) << i;
 }
 
-TEST_P(DeviceExactSums, TheFloatsSumsButForRounding) {
+TEST_P(DeviceExactSums, EqualFloatSumsUpToRounding) {
   const Step exact = Make(true, false), floats = Make(false, false);
   double off = 0, largest = 0;
   for (int64_t i = 0; i < exact.gradient.size(); ++i) {
@@ -78,8 +78,8 @@ TEST_P(DeviceExactSums, TheFloatsSumsButForRounding) {
                      "float sums, of the largest", off / largest, 1e-5);
 }
 
-// H104 on integers: a gradient that is not finite leaves its voxel as it is.
-TEST_P(DeviceExactSums, WhatIsNotFiniteIsNotStepped) {
+// H104 for integers: a voxel with a non-finite gradient does not change.
+TEST_P(DeviceExactSums, NonFiniteGradientsAreNotStepped) {
   const FastGrid before = MakeFastGrid(RandomField({4, 4, 4}, GetParam(), 1.0, 51));
   DeviceGrid grid = UploadGrid(before, true, {}, true);
   DeviceTouched touched(grid);

@@ -1,6 +1,6 @@
-// The parity table: each device body against the plain body in float and in double. It links
-// kernels and GoogleTest alone, so the program runs on a bare machine with a CUDA driver;
-// without a device each test skips and says so.
+// The parity table: each device function against the plain specification in float and double.
+// The program links kernels and GoogleTest only, so it runs on a bare machine with a CUDA
+// driver; every test is skipped without a device.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -29,7 +29,7 @@ class DeviceParity : public ::testing::TestWithParam<int> {
  protected:
   void SetUp() override {
     const DeviceStatus status = ReadDeviceStatus();
-    if (!status.found) GTEST_SKIP() << "no GPU here: " << status.name;
+    if (!status.found) GTEST_SKIP() << "no GPU: " << status.name;
   }
   int basis() const { return GetParam(); }
 };
@@ -38,8 +38,8 @@ void Row(const char* body, int basis, const char* against, double error, double 
   testing::ParityRow(body, "basis " + std::to_string(basis), against, error, tolerance);
 }
 
-// H70: 2e-5 a pixel against the plain body in float and in double; H84: skipping empty space
-// leaves the picture as it is.
+// H70: 2e-5 per pixel against the plain ray in float and in double; H84: skipping empty space
+// does not change the picture.
 TEST_P(DeviceParity, Render) {
   for (const double fill : {0.003, 0.05, 0.9}) {
     const RadianceField field = RandomField({33, 27, 41}, basis(), fill, 31);
@@ -48,16 +48,17 @@ TEST_P(DeviceParity, Render) {
     Buffer<Ray> rays(2000);
     const std::vector<Ray> drawn = RandomRays(static_cast<int>(rays.size()), 32);
     std::copy(drawn.begin(), drawn.end(), rays.begin());
-    rays[0].direction = {0, 0, 0};  // no ray at all: the background
+    rays[0].direction = {0, 0, 0};  // an invalid ray: the background
     rays[1].origin.x = std::nanf("");
     const MarchOptions options{0.5f, 1e-4f};
     const DeviceBuffer<Ray> on_device = DeviceBuffer<Ray>::Of(rays, "rays");
     DeviceBuffer<Vec3f> color(rays.size(), "colours");
-    DeviceBuffer<float> depth(rays.size(), "depths"), left(rays.size(), "transmittances");
+    DeviceBuffer<float> depth(rays.size(), "depths"),
+        transmittance(rays.size(), "transmittances");
     RenderOnDevice(grid, on_device.data(), rays.size(), options,
-                   {color.data(), depth.data(), left.data()});
+                   {color.data(), depth.data(), transmittance.data()});
     const Buffer<Vec3f> colors = color.ToHost();
-    const Buffer<float> depths = depth.ToHost(), lefts = left.ToHost();
+    const Buffer<float> depths = depth.ToHost(), transmittances = transmittance.ToHost();
     double against_float = 0, against_double = 0, depth_error = 0;
     for (int64_t r = 0; r < rays.size(); ++r) {
       const RayResult<float> plain = RenderRay(ViewOf(field), rays[r], options);
@@ -69,19 +70,20 @@ TEST_P(DeviceParity, Render) {
         against_float = std::max(against_float, std::abs(value - plain.color[c]));
         against_double = std::max(against_double, std::abs(value - exact.color[c]));
       }
-      against_float = std::max(against_float, std::abs(double{lefts[r]} - plain.transmittance));
+      against_float =
+          std::max(against_float, std::abs(double{transmittances[r]} - plain.transmittance));
       depth_error = std::max(depth_error, std::abs(double{depths[r]} - plain.depth));
     }
-    // Colours at steps of the opacity: within a step of the exact ones, these fields' colours
-    // lie within [-1, 2].
+    // Colours with opacity steps: within a step of the exact ones; the colours of these fields
+    // are in [-1, 2].
     constexpr float kOpacityStep = 1.0f / 64;
     RenderOnDevice(grid, on_device.data(), rays.size(), options,
-                   {color.data(), depth.data(), left.data()}, kOpacityStep);
+                   {color.data(), depth.data(), transmittance.data()}, kOpacityStep);
     const Buffer<Vec3f> stepped = color.ToHost();
-    const Buffer<float> stepped_lefts = left.ToHost();
+    const Buffer<float> stepped_transmittances = transmittance.ToHost();
     double step_error = 0;
     for (int64_t r = 0; r < rays.size(); ++r) {
-      ASSERT_EQ(stepped_lefts[r], lefts[r]);
+      ASSERT_EQ(stepped_transmittances[r], transmittances[r]);
       for (int c = 0; c < 3; ++c)
         step_error =
             std::max(step_error, std::abs(double{stepped[r][c]} - double{colors[r][c]}));
@@ -89,7 +91,7 @@ TEST_P(DeviceParity, Render) {
     Row("render in opacity steps", basis(), "every sample", step_error, 3 * kOpacityStep);
     Row("render", basis(), "plain float", against_float, 2e-5);
     Row("render", basis(), "plain double", against_double,
-        1e-4);  // a sample more or less at the stop
+        1e-4);  // one sample more or less at the stop
     Row("depth", basis(), "plain float", depth_error, 1e-4);
   }
 }
@@ -106,9 +108,9 @@ Camera SmallCamera(bool ndc) {
   return camera;
 }
 
-// Frames are what the plain body shows, pixel for pixel; in half precision, what is lost stays
-// below half a step of an 8-bit picture: values up to 1 are rounded by 2^-12, nine of them and
-// the density enter a colour.
+// Frames equal the plain ray's pixels; in half precision the error stays below half a step of
+// an 8-bit picture: values up to 1 are rounded by 2^-12, and a colour depends on nine of them
+// and the density.
 TEST_P(DeviceParity, Frame) {
   const RadianceField field = RandomField({33, 27, 41}, basis(), 0.5, 31);
   const DeviceGrid grid = UploadGrid(MakeFastGrid(field));
@@ -128,7 +130,7 @@ TEST_P(DeviceParity, Frame) {
     }
     for (size_t i = 0; i < plain.depth.pixels.size(); ++i) {
       seen += plain.depth.pixels[i] > 0;
-      // Relative: an NDC ray's depths go to infinity.
+      // Relative: depths of NDC rays go to infinity.
       depth_error =
           std::max(depth_error, std::abs(double{view.depth.pixels[i]} - plain.depth.pixels[i]) /
                                     std::max(1.0f, plain.depth.pixels[i]));
@@ -142,7 +144,7 @@ TEST_P(DeviceParity, Frame) {
   }
 }
 
-// Pruned and resampled voxels against the rule told one vertex at a time.
+// Pruned and resampled voxels against the rule, applied one vertex at a time.
 TEST_P(DeviceParity, Resample) {
   const RadianceField field = RandomField({9, 7, 11}, basis(), 0.4, 61);
   const FastGrid before = MakeFastGrid(field);
@@ -263,7 +265,7 @@ TEST_P(DeviceParity, TotalVariation) {
   const DeviceGrid grid = UploadGrid(host, true);
   DeviceTouched touched(grid);
   const int64_t n = host.num_voxels(), begin = n / 3;
-  // All voxels, beginning somewhere: the run wraps around.
+  // All voxels from an arbitrary start: the run wraps around.
   AddTotalVariation(grid, begin, n, 0.3f, 0.2f, &touched);
   DeviceWait("total variation");
   const Buffer<float> g = DownloadGradient(grid);
@@ -282,7 +284,7 @@ TEST_P(DeviceParity, TotalVariation) {
   Row("total variation", basis(), "plain double", off, 2e-6);
 }
 
-// H103, H104: steps are sparse, bounded, and refuse what is not finite.
+// H103, H104: steps are sparse, bounded, and skip non-finite gradients.
 TEST_P(DeviceParity, Step) {
   const FastGrid before = MakeFastGrid(RandomField({4, 4, 4}, basis(), 1.0, 51));
   DeviceGrid grid = UploadGrid(before, true);
@@ -335,7 +337,7 @@ TEST_P(DeviceParity, Step) {
   for (const uint32_t rest : marks.bits.ToHost()) ASSERT_EQ(rest, 0u);
 }
 
-// Up, down: links, records and what follows from them are the host's.
+// Upload and download: links, records and derived arrays equal the host's.
 TEST_P(DeviceParity, UploadAndDownload) {
   const FastGrid host = MakeFastGrid(RandomField({21, 9, 17}, basis(), 0.02, 3));
   const DeviceGrid grid = UploadGrid(host);

@@ -1,5 +1,5 @@
-// The parity table of background layers: each device body against the plain body in float and
-// in double. Without a device each test skips and says so.
+// The parity table of background layers: each device function against the plain specification
+// in float and double. Every test is skipped without a device.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -25,7 +25,7 @@ using testing::ParityRow;
 using testing::RandomField;
 using testing::RandomRays;
 
-// 70 layers: more than two looks of a warp, and no whole number of them.
+// 70 layers: more than two blocks of a warp, and not a multiple of 32.
 RadianceField WithLayers(int basis, double fill) {
   RadianceField field = RandomField({19, 18, 21}, basis, fill, 41);
   AddSpheres(70, 12, 0.8, 43, &field);
@@ -49,7 +49,7 @@ class DeviceSpheresParity : public ::testing::TestWithParam<int> {
  protected:
   void SetUp() override {
     const DeviceStatus status = ReadDeviceStatus();
-    if (!status.found) GTEST_SKIP() << "no GPU here: " << status.name;
+    if (!status.found) GTEST_SKIP() << "no GPU: " << status.name;
   }
   int basis() const { return GetParam(); }
   void Row(const char* body, const char* against, double error, double tolerance) const {
@@ -57,24 +57,25 @@ class DeviceSpheresParity : public ::testing::TestWithParam<int> {
   }
 };
 
-// A box that is nearly empty, and one that hides most of what is behind it.
+// A nearly empty box, and one that hides most of the background.
 TEST_P(DeviceSpheresParity, Render) {
   for (const double fill : {0.02, 0.6}) {
     const RadianceField field = WithLayers(basis(), fill);
     const DoubleField in_double(field);
     const DeviceGrid grid = UploadGrid(MakeFastGrid(field));
     Buffer<Ray> rays = Rays(2000, 32);
-    rays[0].direction = {0, 0, 0};  // no ray at all: the background
+    rays[0].direction = {0, 0, 0};  // an invalid ray: the background
     rays[1].origin.x = std::nanf("");
     rays[2].origin = {1e12f, 0, 0};
     const MarchOptions options{0.5f, 1e-4f};
     const DeviceBuffer<Ray> on_device = DeviceBuffer<Ray>::Of(rays, "rays");
     DeviceBuffer<Vec3f> color(rays.size(), "colours");
-    DeviceBuffer<float> depth(rays.size(), "depths"), left(rays.size(), "transmittances");
+    DeviceBuffer<float> depth(rays.size(), "depths"),
+        transmittance(rays.size(), "transmittances");
     RenderOnDevice(grid, on_device.data(), rays.size(), options,
-                   {color.data(), depth.data(), left.data()});
+                   {color.data(), depth.data(), transmittance.data()});
     const Buffer<Vec3f> colors = color.ToHost();
-    const Buffer<float> depths = depth.ToHost(), lefts = left.ToHost();
+    const Buffer<float> depths = depth.ToHost(), transmittances = transmittance.ToHost();
     double against_float = 0, against_double = 0, depth_error = 0, from_layers = 0;
     for (int64_t r = 0; r < rays.size(); ++r) {
       const RayResult<float> plain = RenderRay(ViewOf(field), rays[r], options);
@@ -87,8 +88,9 @@ TEST_P(DeviceSpheresParity, Render) {
         against_float = std::max(against_float, std::abs(value - plain.color[c]));
         if (r > 2) against_double = std::max(against_double, std::abs(value - exact.color[c]));
       }
-      against_float = std::max(against_float, std::abs(double{lefts[r]} - plain.transmittance));
-      // Relative: layers lie up to 140 radii away.
+      against_float =
+          std::max(against_float, std::abs(double{transmittances[r]} - plain.transmittance));
+      // Relative: layers are up to 140 radii away.
       depth_error = std::max(
           depth_error, std::abs(double{depths[r]} - plain.depth) / std::max(1.0f, plain.depth));
     }
@@ -133,7 +135,7 @@ TEST_P(DeviceSpheresParity, Frame) {
   Row("frame before layers in half precision", "plain float", half_error, 0.5 / 255);
 }
 
-// What a batch of rays makes of loss and gradients.
+// Loss and gradients of a batch of rays.
 struct Gradients {
   DeviceFitSums sums;
   Buffer<float> voxels, texels;
@@ -156,9 +158,9 @@ Gradients Accumulated(const DeviceGrid& grid, const Buffer<Ray>& rays, const Vec
           DownloadGradient(grid.spheres, grid.exact_sums), touched.bits.ToHost()};
 }
 
-// Against the plain adjoint in double, 1e-4 of the largest entry as for the box alone. Rays are
-// not stopped: how far they are followed behind the box differs, and the row below has by how
-// much.
+// Against the plain adjoint in double, 1e-4 of the largest entry as for the box alone. One row
+// is without early stops; the other measures the difference in how far rays are marched behind
+// the box.
 TEST_P(DeviceSpheresParity, FitGradient) {
   const RadianceField field = WithLayers(basis(), 0.25);
   const DoubleField in_double(field);
@@ -202,7 +204,7 @@ TEST_P(DeviceSpheresParity, FitGradient) {
       ASSERT_NE(is.touched[point / 32] & (1u << point % 32), 0u) << t;
     }
     EXPECT_GT(with_gradient, 1000);
-    // A ray that stops leaves at most `stop` of its light, of colours that differ by 3 at most.
+    // A stopped ray loses at most `stop` of its light, of colours that differ by 3 at most.
     const double most = 1e-4 + 3 * static_cast<double>(stop);
     const char* against = stop > 0 ? "plain double, of the largest, rays stopped"
                                    : "plain double, of the largest";
@@ -248,7 +250,7 @@ TEST_P(DeviceSpheresParity, SphereVariation) {
   for (const bool exact : {false, true}) {
     const DeviceGrid grid = UploadGrid(host, true, {}, exact);
     DeviceTouched touched(grid);
-    // All texels, beginning somewhere: the run wraps around.
+    // All texels from an arbitrary start: the run wraps around.
     AddSphereVariation(grid, map / 3, map, 0.3f, 0.2f, &touched);
     const Buffer<float> is = DownloadGradient(grid.spheres, exact);
     double off = 0;
@@ -258,7 +260,7 @@ TEST_P(DeviceSpheresParity, SphereVariation) {
   }
 }
 
-// H103, H104 on layers: steps are sparse, bounded, and refuse what is not finite.
+// H103, H104 on layers: steps are sparse, bounded, and skip non-finite gradients.
 TEST_P(DeviceSpheresParity, Step) {
   const FastGrid before = MakeFastGrid(WithLayers(basis(), 0.25));
   DeviceGrid grid = UploadGrid(before, true);

@@ -1,5 +1,6 @@
-// The parity table of learning a style: each device body against the plain body in double, or
-// against the CPU's path that is held to it. Without a device each test skips and says so.
+// The parity table of style training: each device function against the plain specification in
+// double, or against the CPU path that is tested with it. Every test is skipped without a
+// device.
 #include "stylize/cuda/device_style.h"
 
 #include <gtest/gtest.h>
@@ -24,7 +25,7 @@ class DeviceStyle : public ::testing::Test {
  protected:
   void SetUp() override {
     const DeviceStatus status = ReadDeviceStatus();
-    if (!status.found) GTEST_SKIP() << "no GPU here: " << status.name;
+    if (!status.found) GTEST_SKIP() << "no GPU: " << status.name;
   }
 };
 
@@ -41,8 +42,8 @@ DenseNetwork<double> InDouble(const DenseNetwork<float>& network) {
   return exact;
 }
 
-// TF32 rounds each factor to 10 bits of mantissa: 5e-4 a factor, through six layers. Split
-// factors are as good as floats, and held to what the CPU's fast path is.
+// TF32 rounds each factor to 10 bits of mantissa: 5e-4 per factor, through six layers. Split
+// factors are as accurate as floats, with the tolerances of the CPU's fast path.
 struct Tolerances {
   MlpPrecision precision;
   const char* name;
@@ -55,7 +56,7 @@ bool HasKink(const std::string& activation) {
   return activation == "relu" || activation == "leaky-relu";
 }
 
-// n rows through the network and back, by each activation and precision.
+// n rows through the network, forward and adjoint, for each activation and precision.
 void CheckMlp(int64_t n) {
   for (const char* activation : {"sine", "relu", "leaky-relu", "sigmoid", "tanh"}) {
     LipschitzNetwork random = RandomNetwork(17);
@@ -101,9 +102,9 @@ void CheckMlp(int64_t n) {
                 tolerances.forward);
 
       mlp.AddAdjoint(tolerances.precision, x.data(), d_y.data(), n);
-      // The slope of a rectifier jumps: a unit that rounding takes over the kink has another
-      // slope, and as the rows' gradients here are random and nearly cancel, each such unit
-      // shows.
+      // The derivative of a rectifier is discontinuous: a unit that rounding moves across the
+      // kink has another derivative, and because the gradients of these random rows nearly
+      // cancel, each such unit is visible.
       if (HasKink(activation) && (n > 100 || tolerances.precision == MlpPrecision::kTensor))
         continue;
       DenseNetwork<double> gradient;
@@ -134,15 +135,15 @@ TEST_F(DeviceStyle, MlpLessThanATile) { CheckMlp(1); }
 TEST_F(DeviceStyle, MlpNoWholeTiles) { CheckMlp(37); }
 TEST_F(DeviceStyle, LargeMlpOfTwoChunks) { CheckMlp(70001); }
 
-// A ball, and one before background layers.
+// A ball, and one in front of background layers.
 RadianceField BallBefore(bool layers, int n, int basis) {
   RadianceField field = Ball(n, basis);
   if (layers) AddSpheres(40, 9, 0.7, 5, &field);
   return field;
 }
 
-// Loss, gradient and counts of the device's path against the CPU's, which the tests hold to
-// Algorithm 1 in double.
+// Loss, gradient and counts of the device path against the CPU's, which other tests compare
+// with Algorithm 1 in double.
 void CheckLossAndGradient(int side, bool layers) {
   for (const int basis : {9, 4, 1}) {
     const RadianceField field = BallBefore(layers, 14, basis);

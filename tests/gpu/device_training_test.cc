@@ -1,5 +1,5 @@
-// Steps of learning that the device makes on its own, against the same steps made one by one
-// from the host. Without a device each test skips and says so.
+// Training steps that run on the device without the host, against the same steps made one by
+// one from the host. Without a device each test skips and says so.
 #include "stylize/cuda/device_training.h"
 
 #include <gtest/gtest.h>
@@ -9,11 +9,8 @@
 #include <limits>
 #include <vector>
 
-#include "kernels/network/lipschitz_layer.h"
-#include "kernels/optimize/schedule.h"
 #include "stylize/cuda/device_style.h"
-#include "stylize/training/initial_network.h"
-#include "stylize/training/lipschitz_regularizer.h"
+#include "stylize/training/host_steps.h"
 #include "tests/support/parity_row.h"
 #include "tests/support/small_field.h"
 #include "tests/support/styled_ball.h"
@@ -38,16 +35,13 @@ class DeviceLearning : public ::testing::Test {
     network.WarmUpNorms();
     return network;
   }
-  static LipschitzRule Rule(int64_t steps) {
-    return {.steps = steps,
-            .rate_first = 1e-3,
-            .rate_last = 1e-4,
-            .norm_steps = 3,
-            .lambda = 2e-2,
-            .layer_target = 0.9,
-            .product_limit = std::numeric_limits<double>::infinity(),
-            .input_scale = 2,
-            .scaled_inputs = kNetworkSh};
+  static WeightUpdate Update(int steps) {
+    return {.options = {.steps = steps,
+                        .rate_first = 1e-3,
+                        .rate_last = 1e-4,
+                        .lambda = 2e-2,
+                        .norm_steps = 3},
+            .layer_target = 0.9};
   }
   static constexpr int kViews = 3, kSide = 13;
   static constexpr int64_t kRays = int64_t{kViews} * kSide * kSide;
@@ -75,31 +69,6 @@ class DeviceLearning : public ::testing::Test {
   }
 };
 
-// What train_network.cc does in a step, with the loss of the device's path.
-bool StepFromHost(const LipschitzRule& rule, StyleLoss* loss, const StyleRays& batch,
-                  int64_t step, LipschitzNetwork* network, AdamState* adam,
-                  AggregationResult* result) {
-  for (int i = 0; i < rule.norm_steps; ++i) network->StepNorms();
-  std::vector<double> gradient(static_cast<size_t>(LipschitzNetwork::NumParameters()));
-  *result = loss->Run(*network, batch, &gradient);
-  for (int l = 0; l < kNetworkLayers; ++l)
-    gradient[static_cast<size_t>(&network->k(l) - network->weight(0))] +=
-        rule.lambda * LipschitzPenaltyDerivative(network->k(l), rule.layer_target);
-  const std::vector<float> narrow(gradient.begin(), gradient.end());
-  std::vector<float>& values = network->data().parameters;
-  const int64_t size = static_cast<int64_t>(values.size());
-  if (!AdamStep(rule.adam, CosineAnnealing(step, rule.steps, rule.rate_first, rule.rate_last),
-                {narrow.data(), size}, {values.data(), size}, adam))
-    return false;
-  double product = 1;
-  for (int l = 0; l < kNetworkLayers; ++l) product *= Squareplus<double>(network->k(l));
-  if (product > rule.product_limit)
-    for (int l = 0; l < kNetworkLayers; ++l)
-      network->k(l) *=
-          static_cast<float>(std::pow(rule.product_limit / product, 1.0 / kNetworkLayers));
-  return true;
-}
-
 // Adam divides a gradient by its own size, so where a gradient is little more than rounding the
 // two ways may step to opposite sides: what is compared is the whole way that the weights went.
 TEST_F(DeviceLearning, StepsAreThoseOfTheHost) {
@@ -109,17 +78,22 @@ TEST_F(DeviceLearning, StepsAreThoseOfTheHost) {
   const std::unique_ptr<StyleLoss> loss = MakeDeviceStyleLoss(&grid, Options());
   for (const double limit : {std::numeric_limits<double>::infinity(), 1e-3}) {
     for (const int steps : {1, 12}) {
-      LipschitzRule rule = Rule(12);
-      rule.product_limit = limit;
+      WeightUpdate update = Update(12);
+      update.bound_limit = limit;
       const std::vector<StyleRays> batches = Batches(steps);
       LipschitzNetwork by_host = Start(), by_device = Start();
       const LipschitzNetwork start = Start();
       AdamState host_adam, device_adam;
       AggregationResult host_result;
+      HostSteps from_host;
       for (int i = 0; i < steps; ++i)
-        ASSERT_TRUE(StepFromHost(rule, loss.get(), batches[static_cast<size_t>(i)], i, &by_host,
-                                 &host_adam, &host_result));
-      DeviceTraining training(&grid, Options(), rule, by_device, kRays, 12);
+        host_result =
+            from_host
+                .Make(update, {.first = i, .batches = {batches[static_cast<size_t>(i)]}},
+                      loss.get(), &by_host, &host_adam)
+                .last;
+      ASSERT_EQ(host_adam.steps, steps);
+      DeviceTraining training(&grid, Options(), update, by_device, kRays, 12);
       training.Begin(0, batches, by_device, device_adam);
       const DeviceTraining::Steps made = training.End(&by_device, &device_adam);
       EXPECT_EQ(made.made, steps);
@@ -151,7 +125,7 @@ TEST_F(DeviceLearning, TooLittleRoomIsMadeAndNoStepIsLost) {
   for (const bool little : {false, true}) {
     LipschitzNetwork network = Start();
     AdamState adam;
-    DeviceTraining training(&grid, Options(), Rule(5), network, kRays, 5);
+    DeviceTraining training(&grid, Options(), Update(5), network, kRays, 5);
     if (little) training.ForgetCapacity(64, 32);
     training.Begin(0, batches, network, adam);
     const DeviceTraining::Steps made = training.End(&network, &adam);
@@ -174,7 +148,7 @@ TEST_F(DeviceLearning, TwoStepsInARowThatAreNotFiniteStop) {
   batches[2].targets.resize(100);
   LipschitzNetwork network = Start();
   AdamState adam;
-  DeviceTraining training(&grid, Options(), Rule(40), network, kRays, 4);
+  DeviceTraining training(&grid, Options(), Update(40), network, kRays, 4);
   training.Begin(0, batches, network, adam);
   DeviceTraining::Steps made = training.End(&network, &adam);
   EXPECT_EQ(made.made, 4);

@@ -1,5 +1,5 @@
-// Training rays that are drawn on the device, against the rule that the host draws them by.
-// Without a device the test skips and says so.
+// Training rays drawn on the device against the host's rule. The test is skipped without a
+// device.
 #include "kernels/field/cuda/device_views.h"
 
 #include <gtest/gtest.h>
@@ -14,7 +14,7 @@ namespace {
 
 constexpr int kWidth = 23, kHeight = 17, kPixels = kWidth * kHeight;
 
-// A view whose colours tell it and the pixel; directions tell the pixel too.
+// Colours encode view and pixel; directions encode the pixel.
 std::vector<uint16_t> ColorsOf(int view) {
   std::vector<uint16_t> colors;
   for (int i = 0; i < kPixels; ++i) {
@@ -25,9 +25,9 @@ std::vector<uint16_t> ColorsOf(int view) {
   return colors;
 }
 
-TEST(DeviceViews, DrawsByTheRuleAndOnlyWhatIsNotLeftOut) {
+TEST(DeviceViews, DrawsLikeTheHostAndOnlyAllowedPixels) {
   const DeviceStatus status = ReadDeviceStatus();
-  if (!status.found) GTEST_SKIP() << "no GPU here: " << status.name;
+  if (!status.found) GTEST_SKIP() << "no GPU: " << status.name;
   std::vector<Vec3f> directions;
   for (int i = 0; i < kPixels; ++i) directions.push_back({static_cast<float>(i), 0, 1});
   std::vector<int32_t> drawn;

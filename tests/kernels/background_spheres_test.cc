@@ -1,5 +1,5 @@
-// Background spheres: where rays cross them, the adjoint against derivatives, the fast paths
-// against the plain body.
+// Background spheres: ray crossings, the adjoint against derivatives, and the fast paths
+// against the plain specification.
 #include "kernels/field/background_spheres.h"
 
 #include <gtest/gtest.h>
@@ -32,8 +32,8 @@ Vec3d RandomDirection(uint64_t seed, uint64_t counter) {
   return {r * std::cos(a), r * std::sin(a), z};
 }
 
-// Distance of the crossing from that of the quadratic's larger root in long double, over the
-// radius. -1: not crossed ahead, by either.
+// Difference between the crossing and the quadratic's larger root in long double, relative to
+// the radius. -1: neither finds a crossing ahead.
 double CrossingError(const Vec3f& origin, const Vec3f& direction, double radius) {
   const GridFrame unit{{2, 2, 2}, {0, 0, 0}, {1, 1, 1}};
   const SphereRay<float> ray = ToSphereRay(unit, Ray{origin, direction});
@@ -43,13 +43,13 @@ double CrossingError(const Vec3f& origin, const Vec3f& direction, double radius)
   using L = long double;
   const Vec3<L> o = origin.Cast<L>(), d = direction.Cast<L>();
   const L a = Dot(d, d), b = Dot(o, d), c = Dot(o, o) - L(radius) * L(radius);
-  const L inside = b * b - a * c;
-  const L t = inside < 0 ? L(-1) : (-b + std::sqrt(inside)) / a;
+  const L discriminant = b * b - a * c;
+  const L t = discriminant < 0 ? L(-1) : (-b + std::sqrt(discriminant)) / a;
   if (!crossed || t <= 0) return -1;
   return static_cast<double>(Norm((o + d * t) / L(radius) - place.Cast<L>()));
 }
 
-// From inside any form is good; what is left is float's rounding.
+// From inside every form is accurate; only float rounding remains.
 TEST(BackgroundSpheres, H91_CrossingsFromInside) {
   for (int i = 0; i < 20000; ++i) {
     const uint64_t n = static_cast<uint64_t>(i);
@@ -58,7 +58,8 @@ TEST(BackgroundSpheres, H91_CrossingsFromInside) {
     const double error =
         CrossingError(origin.Cast<float>(), RandomDirection(2, n).Cast<float>(), radius);
     ASSERT_GE(error, 0) << i;
-    // A radius is kept as its inverse: 6e-8 of it moves a crossing that grazes by more.
+    // The stored inverse radius has a relative error of 6e-8, which moves a grazing crossing
+    // more.
     ASSERT_LT(error, testing::RecordBound("a crossing, over the radius",
                                           testing::Computed::kFloat, error, 6e-6))
         << i;
@@ -66,7 +67,8 @@ TEST(BackgroundSpheres, H91_CrossingsFromInside) {
 }
 
 // From a hundred radii away rounding of the input alone is 6e-6 R; the quadratic's root loses
-// 1.4e-3 R. Rays through the inner half: grazing ones magnify the input's own rounding.
+// 1.4e-3 R. Rays pass through the inner half, because grazing ones magnify the input's
+// rounding.
 TEST(BackgroundSpheres, H92_CrossingsFromFarOutside) {
   double worst = 0;
   for (int i = 0; i < 20000; ++i) {
@@ -86,28 +88,28 @@ TEST(BackgroundSpheres, H93_OutsideTheInnerSpheresAndAtInfinity) {
   const GridFrame unit{{2, 2, 2}, {0, 0, 0}, {1, 1, 1}};
   Vec3d place;
   double ahead;
-  // At infinity, r = 1 / 0, a ray has no place but its direction.
+  // At infinity, r = 1 / 0, the crossing depends on the ray's direction only.
   const SphereRay<double> inside =
       ToSphereRay(unit, RayT<double>{{0.3, -0.2, 0.6}, {0.6, 0, 0.8}});
   ASSERT_TRUE(CrossSphere(inside, 0.0, &place, &ahead));
   EXPECT_NEAR(Norm(place - Vec3d{0.6, 0, 0.8}), 0,
-              testing::RecordDigits("the place at infinity", testing::Computed::kDouble,
+              testing::RecordDigits("the crossing at infinity", testing::Computed::kDouble,
                                     Norm(place - Vec3d{0.6, 0, 0.8}), 1e-15));
-  // From three radii away, looking out: what is nearer lies behind the camera.
+  // From three radii away, facing outwards: nearer spheres are behind the camera.
   const SphereRay<double> out = ToSphereRay(unit, RayT<double>{{3, 0.1, 0}, {1, 0, 0}});
   EXPECT_FALSE(CrossSphere(out, 1.0, &place, &ahead));
   EXPECT_FALSE(CrossSphere(out, 1 / 2.9, &place, &ahead));
   ASSERT_TRUE(CrossSphere(out, 1 / 3.1, &place, &ahead));
   EXPECT_NEAR(ahead * 3.1, std::sqrt(3.1 * 3.1 - 0.01) - 3, 1e-12);
-  // Looking in: all spheres that the ray meets, at their far side.
+  // Facing inwards: all spheres that the ray crosses, at their far side.
   const SphereRay<double> in = ToSphereRay(unit, RayT<double>{{3, 0.1, 0}, {-1, 0, 0}});
   ASSERT_TRUE(CrossSphere(in, 1.0, &place, &ahead));
   EXPECT_LT(place.x, -0.99);
-  // Past them: the inner ones are missed, the outer ones met.
+  // Past the centre: the inner spheres are missed, the outer ones crossed.
   const SphereRay<double> past = ToSphereRay(unit, RayT<double>{{3, 2, 0}, {-1, 0, 0}});
   EXPECT_FALSE(CrossSphere(past, 1.0, &place, &ahead));
   EXPECT_TRUE(CrossSphere(past, 0.4, &place, &ahead));
-  // Layers of a camera far outside: finite, nothing behind it.
+  // Layers seen by a camera far outside: finite, nothing in front of it.
   RadianceField field = RandomField({4, 4, 4}, 1, 0.0, 3);
   AddSpheres(16, 8, 1.0, 5, &field);
   for (const float away : {0.0f, 3.0f, 1e3f, 1e12f, 1e30f}) {
@@ -134,7 +136,7 @@ TEST(BackgroundSpheres, TexelsAndDirectionsAreInverse) {
       EXPECT_NEAR(here, 1, 1e-9) << x << " " << y;
       EXPECT_NEAR(sum, 1, 1e-12);
     }
-  // Across the seam and over the poles nothing leaves the map.
+  // Across the seam and over the poles all texels are in the map.
   for (const Vec3f& d : {Vec3f{0, 1, 0}, Vec3f{0, -1, 0}, Vec3f{0, 0, -1}, Vec3f{-0.0f, 0, -1},
                          Vec3f{1e-20f, -1, 1e-20f}})
     for (const int32_t texel : LocateTexel(r, d).texel) {
@@ -143,12 +145,12 @@ TEST(BackgroundSpheres, TexelsAndDirectionsAreInverse) {
     }
 }
 
-// The sums go on behind the box: white before white is white, whatever the densities.
+// Compositing continues behind the box: white before white is white for any densities.
 TEST(BackgroundSpheres, WeightsOfBoxAndLayersSumToOne) {
   RadianceField field = RandomField({6, 6, 6}, 1, 0.7, 11);
   AddSpheres(24, 12, 1.0, 12, &field);
   std::fill(field.appearance.sh.begin(), field.appearance.sh.end(), 0.0f);
-  // Blends of stored corners alone are white; an empty one darkens.
+  // Only blends of stored corners are white; an empty corner darkens.
   auto geometry = std::make_shared<Geometry>(*field.geometry);
   for (float& density : geometry->density) density = -1;
   field.geometry = geometry;
@@ -162,7 +164,7 @@ TEST(BackgroundSpheres, WeightsOfBoxAndLayersSumToOne) {
   }
 }
 
-// As FieldGradient.AdjointEqualsDerivativeInDouble, over all that a field with layers has.
+// As FieldGradient.AdjointEqualsDerivativeInDouble, for all values of a field with layers.
 TEST(BackgroundSpheres, AdjointEqualsDerivativeInDouble) {
   RadianceField field = RandomField({4, 4, 4}, 4, 0.3, 21);
   AddSpheres(6, 4, 0.9, 22, &field);
@@ -189,7 +191,7 @@ TEST(BackgroundSpheres, AdjointEqualsDerivativeInDouble) {
         return (up - down) / (2 * h);
       };
       const double fine = central(1e-4), coarse = central(2e-4);
-      if (std::abs(fine - coarse) > 1e-6) return 0;  // a kink between the two
+      if (std::abs(fine - coarse) > 1e-6) return 0;  // a kink between the two steps
       const double numeric = (4 * fine - coarse) / 3;
       EXPECT_NEAR(numeric, gradient,
                   testing::RecordDigits("gradient of a pixel before spheres",
@@ -215,9 +217,9 @@ class FastSpheresParity : public ::testing::TestWithParam<std::tuple<const char*
     if (functions_ == nullptr)
       GTEST_SKIP() << "this processor lacks " << std::get<0>(GetParam());
     field_ = RandomField({9, 8, 10}, std::get<1>(GetParam()), 0.2, 41);
-    AddSpheres(37, 16, 0.9, 42, &field_);  // layers that fill no vector
+    AddSpheres(37, 16, 0.9, 42, &field_);  // not a multiple of the vector width
     rays_ = RandomRays(300, 43);
-    for (int i = 0; i < 100; ++i)  // and from within, outwards
+    for (int i = 0; i < 100; ++i)  // and rays from inside, outwards
       rays_.push_back({(RandomDirection(7, static_cast<uint64_t>(i)) * 0.8).Cast<float>(),
                        RandomDirection(8, static_cast<uint64_t>(i)).Cast<float>()});
   }
@@ -227,8 +229,8 @@ class FastSpheresParity : public ::testing::TestWithParam<std::tuple<const char*
   std::vector<Ray> rays_;
 };
 
-// 2e-5 a pixel, as of the box; texels that differ by 4 over a sixteenth of a half turn turn
-// 3e-7 of angle into 1e-5.
+// 2e-5 per pixel, as for the box; neighbouring texels that differ by 4 over a sixteenth of half
+// a turn amplify an angle of 3e-7 to 1e-5.
 TEST_P(FastSpheresParity, RendersAsThePlainRay) {
   const FastGrid grid = MakeFastGrid(field_);
   const MarchOptions options{0.5f, 1e-4f};
@@ -258,7 +260,7 @@ TEST_P(FastSpheresParity, GradientsAsThePlainAdjointInDouble) {
   const std::vector<Vec3f> targets(rays_.size(), Vec3f{0.4f, 0.5f, 0.2f});
   const MarchOptions options{0.5f, 1e-4f};
   GradientArena arena;
-  arena.Reset(grid.num_voxels(), grid.lanes());
+  arena.Reset(grid.num_voxels());
   arena.spheres.Reset(grid.spheres.num_texels());
   const float scale = 1.0f / 1200;
   functions_->accumulate(grid,
@@ -293,7 +295,7 @@ TEST_P(FastSpheresParity, GradientsAsThePlainAdjointInDouble) {
       ASSERT_NEAR(g ? g[c] : 0, d_sphere_color[static_cast<size_t>(3 * t + c)],
                   1e-4 * most_color);
   }
-  // What lies behind the box enters the densities of the box.
+  // The radiance behind the box enters the gradients of the box's densities.
   for (int64_t v = 0; v < grid.num_voxels(); ++v) {
     const int32_t slot = arena.slot_of_voxel[v];
     const float* g = slot < 0 ? nullptr : arena.gradient.data() + slot * grid.lanes();
@@ -333,8 +335,8 @@ TEST(SphereVariation, GradientIsTheValuesDerivative) {
                 testing::RecordDigits("gradient", testing::Computed::kDouble,
                                       numeric - gradient[i], 1e-8));  // see H97
   }
-  // A constant background has no edge, not even beside empty texels: the roots of epsilon
-  // alone.
+  // A constant background has no edge, also beside empty texels: only the roots of epsilon
+  // remain.
   std::fill(values.begin(), values.end(), 3.0);
   EXPECT_NEAR(value(0.0, nothing), std::sqrt(1e-9) * static_cast<double>(values.size()), 1e-9);
 }

@@ -1,4 +1,4 @@
-// Children that hang, flood, die, ignore signals or leave children of their own.
+// Child processes that hang, flood, crash, ignore signals or leave children.
 #include "kernels/process/child_process.h"
 
 #include <gtest/gtest.h>
@@ -19,8 +19,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What the child does is said in sh, so that a test reads as a sentence. All that hang end by
-// themselves after a while: nothing may be left of a test that fails.
+// The child's behaviour is written in sh. All hanging scripts end after a while, so that a
+// failing test leaves no process behind.
 ChildOptions Shell(const std::string& script) { return {.argv = {"/bin/sh", "-c", script}}; }
 
 std::vector<std::string> LinesOf(const ChildOptions& options) {
@@ -69,7 +69,7 @@ TEST(ChildProcess, F45_NoZombieStays) {
   pid_t pid = 0;
   RunChild(Shell("echo $$"), [&](const std::string& line) { pid = std::atoi(line.c_str()); });
   ASSERT_GT(pid, 1);
-  EXPECT_EQ(kill(pid, 0), -1);  // a zombie would still be there
+  EXPECT_EQ(kill(pid, 0), -1);  // a zombie would still exist
 }
 
 TEST(ChildProcess, F49_DeathBySignalIsNamed) {
@@ -119,8 +119,8 @@ TEST(ChildProcess, F50_GrandchildrenEndWithTheGroup) {
   EXPECT_TRUE(testing::Ends(pid));
 }
 
-// SIGKILL leaves nobody time to say goodbye: the child, deaf to SIGTERM and silent, and its own
-// child end all the same, and nothing of ours stays behind.
+// SIGKILL allows no clean-up: a child that ignores SIGTERM, and its own child, end
+// nevertheless, and no process of the group remains.
 TEST(ChildProcess, F35_ChildrenEndWithAProcessThatIsKilled) {
   const fs::path child_file = TemporaryFile("child"), grandchild_file = TemporaryFile("grand");
   const pid_t copy = fork();
@@ -141,15 +141,16 @@ TEST(ChildProcess, F35_ChildrenEndWithAProcessThatIsKilled) {
   EXPECT_TRUE(testing::Ends(child));
   EXPECT_TRUE(testing::Ends(grandchild));
   EXPECT_TRUE(testing::Ends(group));  // the guard, whose number the group has
-  kill(-group, SIGKILL);              // nothing may be left of a test that fails
+  kill(-group, SIGKILL);              // leave no process behind if the test fails
   fs::remove_all(child_file.parent_path());
 }
 
-// The guard holds nothing of ours open: a lock or a pipe of a process that was killed is free.
-TEST(ChildProcess, F35_TheGuardHoldsNoFileOfOurs) {
+// The guard holds no inherited descriptor open: locks and pipes of a killed process are
+// released.
+TEST(ChildProcess, F35_TheGuardHoldsNoInheritedFile) {
   int ends[2];
   ASSERT_EQ(pipe(ends), 0);
-  // The group's number is the guard's; a guard that has just been born has a moment to close.
+  // The group's number is the guard's pid; a new guard needs a moment to close descriptors.
   EXPECT_EQ(LinesOf(Shell("guard=$(cut -d' ' -f5 /proc/$$/stat); for i in $(seq 100); do "
                           "n=$(ls /proc/$guard/fd | wc -l); [ $n = 1 ] && break; sleep 0.05; "
                           "done; echo $n")),
@@ -158,7 +159,7 @@ TEST(ChildProcess, F35_TheGuardHoldsNoFileOfOurs) {
   close(ends[1]);
 }
 
-TEST(ChildProcess, StopsWhenNobodyWantsItAnyMore) {
+TEST(ChildProcess, StopsWhenCancelled) {
   int asked = 0;
   const ChildResult result = RunChild(Shell("exec sleep 30"), {}, [&] { return ++asked < 3; });
   EXPECT_EQ(result.end, ChildEnd::kStopped);
@@ -236,9 +237,9 @@ TEST(ChildProcess, F57_EnvironmentIsMinimal) {
 
 TEST(ChildProcess, F57_InheritsNoOpenFile) {
   int ends[2];
-  ASSERT_EQ(pipe(ends), 0);  // without O_CLOEXEC, as careless libraries do
+  ASSERT_EQ(pipe(ends), 0);  // without O_CLOEXEC, as some libraries do
   for (const std::string& line : LinesOf(Shell("ls /proc/self/fd")))
-    EXPECT_LE(std::atoi(line.c_str()), 3) << line;  // 3 is the folder that ls itself reads
+    EXPECT_LE(std::atoi(line.c_str()), 3) << line;  // 3 is the folder that ls reads
   close(ends[0]);
   close(ends[1]);
 }

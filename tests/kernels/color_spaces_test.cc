@@ -24,9 +24,9 @@ TEST(ColorSpaces, H149_AllGreyValuesSurviveEverySpace) {
          {SrgbFromLinear(linear), SrgbFromLinear(LinearFromXyz(XyzFromLinear(linear))),
           SrgbFromLab(LabFromSrgb(srgb))}) {
       for (int c = 0; c < 3; ++c) EXPECT_EQ(std::lround(255 * back[c]), v);
-      // The two pieces of the standard's curve meet to 3e-8 only.
+      // The two pieces of the standard's curve differ by 3e-8 where they meet.
       EXPECT_LE(LargestDifference(back, srgb),
-                testing::RecordDigits("greys there and back", testing::Computed::kDouble,
+                testing::RecordDigits("greys, round trip", testing::Computed::kDouble,
                                       LargestDifference(back, srgb), 1e-7));
     }
     const Vec3d lab = LabFromSrgb(srgb);
@@ -42,7 +42,7 @@ TEST(ColorSpaces, H24_ColourCubeAndBlackSurviveLab) {
         const Vec3d srgb{r / 255.0, g / 255.0, b / 255.0};
         const Vec3d back = SrgbFromLab(LabFromSrgb(srgb));
         ASSERT_LE(LargestDifference(back, srgb), 0.5 / 255) << r << ' ' << g << ' ' << b;
-        // Much better than half a step, in fact: the curve's seam is what is left.
+        // Much better than half a step: only the error at the curve's seam remains.
         ASSERT_LE(
             LargestDifference(back, srgb),
             testing::RecordDigits("the colour cube through Lab", testing::Computed::kDouble,

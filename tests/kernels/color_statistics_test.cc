@@ -62,7 +62,7 @@ void ExpectMatchesReference(const Image& image, const ColorStatistics& s, double
 }
 
 TEST(ColorStatistics, MatchesALongDoubleReference) {
-  // 8-bit values are snapped to v / 255, which floats hold to 3e-8.
+  // 8-bit values are snapped to v / 255, which float represents to 3e-8.
   const Image bytes = RandomImage(61, 47, 1, true);
   ExpectMatchesReference(bytes, MeasureColor(bytes), 1e-7);
   const Image floats = RandomImage(61, 47, 2, false);
@@ -129,7 +129,8 @@ TEST(ColorStatistics, MaskAlphaAndNanLeavePixelsOut) {
 }
 
 TEST(ColorStatistics, H17_AHundredMillionConstantPixelsHaveNoVariance) {
-  // 100 pictures of a million pixels, of which one is kept: sums of 1e8 pixels are Pool's.
+  // 100 pictures of a million pixels, of which one is stored: Pool gives the sums of 1e8
+  // pixels.
   Image image(1000, 1000);
   for (size_t i = 0; i < image.pixels.size(); ++i) image.pixels[i] = 0.1f * (1 + i % 3);
   const ColorStatistics floats = MeasureColor(image);
@@ -139,7 +140,7 @@ TEST(ColorStatistics, H17_AHundredMillionConstantPixelsHaveNoVariance) {
   EXPECT_EQ(pooled.count, 100000000);
   EXPECT_EQ(pooled.mean, bytes.mean);
   for (int i = 0; i < 3; ++i) EXPECT_EQ(pooled.covariance.row[i], Vec3d{});
-  // Floats: the mean of 1e6 equal values is off by their sum's rounding at most.
+  // Float: the mean of 1e6 equal values is off by at most the rounding of their sum.
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j)
       EXPECT_LE(std::abs(floats.covariance(i, j)),
@@ -177,8 +178,8 @@ TEST(ColorStatistics, H17_SameBitsForAnyNumberOfThreads) {
 }
 
 TEST(ColorStatistics, H18_SmallSpreadAroundALargeMean) {
-  // One pass, E[x^2] - E[x]^2, is off by 1e4^2 * 1e-16 = 1e-8 even in double, of a variance of
-  // 9e-5, and by everything in float. Two are off by roundings of squares near 1e-4.
+  // One pass, E[x^2] - E[x]^2, is off by 1e4^2 * 1e-16 = 1e-8 even in double, for a variance of
+  // 9e-5, and useless in float. Two passes are off by roundings of squares near 1e-4.
   Image image(400, 300);
   for (int64_t i = 0; i < image.num_pixels(); ++i) {
     const float step = static_cast<float>(RandomIndex(9, 0, static_cast<uint64_t>(i), 33)) - 16;
@@ -197,7 +198,7 @@ TEST(ColorStatistics, PoolIsTheStatisticsOfAllPixels) {
       std::copy_n(whole.at(0, first), part.pixels.size(), part.pixels.begin());
       parts.push_back(MeasureColor(part));
     }
-    parts.push_back({});  // a view without pixels has no say
+    parts.push_back({});  // a view without pixels is ignored
     const ColorStatistics pooled = Pool(parts), all = MeasureColor(whole);
     EXPECT_EQ(pooled.count, all.count);
     for (int i = 0; i < 3; ++i) {
@@ -244,7 +245,7 @@ TEST(SymmetricEigen, H15_NanAndInfinityAreRefused) {
 }
 
 TEST(SymmetricEigen, H16_ResidualOfTheIterativeSolver) {
-  // Two nearly equal eigenvalues beside another are where the closed form loses eight digits.
+  // The closed form loses eight digits for two nearly equal eigenvalues beside another.
   double worst = 0;
   for (uint64_t seed = 0; seed < 20000; ++seed) {
     Vec3d axes[3];

@@ -1,4 +1,4 @@
-// The one camera that stands for photos of several sizes: its size, orientation and lens.
+// The common camera for photos of several sizes: its size, orientation and lens.
 #include "kernels/scene/common_camera.h"
 
 #include <gtest/gtest.h>
@@ -23,7 +23,7 @@ std::string SizeOf(const Camera& camera) {
   return std::to_string(camera.width) + "x" + std::to_string(camera.height);
 }
 
-TEST(CommonCamera, OfOneCameraIsThatCamera) {
+TEST(CommonCamera, OneCameraIsReturnedUnchanged) {
   Camera camera = PhotoOf(480, 360, 410.125);
   camera.fy = 433.0625;  // pixels that are not square stay so
   camera.cx = 231.5;
@@ -33,7 +33,7 @@ TEST(CommonCamera, OfOneCameraIsThatCamera) {
   EXPECT_EQ(common.fy, camera.fy);
   EXPECT_EQ(common.cx, 240);
   const std::vector<Camera> same = WithCommonIntrinsics({camera, camera});
-  EXPECT_TRUE(same[1].SameIntrinsics(camera)) << "frames at the photos' places keep their lens";
+  EXPECT_TRUE(same[1].SameIntrinsics(camera)) << "frames at the photos' poses keep their lens";
 }
 
 TEST(CommonCamera, OrientationIsThatOfMostPhotos) {
@@ -55,8 +55,8 @@ TEST(CommonCamera, AspectIsTheMedianAndThePhotoTheFirstOfIt) {
   EXPECT_EQ(SizeOf(CommonCamera({panorama, common, small, wide, small})), "480x360");
 }
 
-// A portrait photo among landscape ones shows the same circle: focal lengths do not take each
-// side's own ratio.
+// A portrait photo among landscape ones shows the same circle: focal lengths are not scaled by
+// each side's ratio.
 TEST(CommonCamera, ACircleStaysACircle) {
   const Camera across = PhotoOf(480, 360, 400), upright = PhotoOf(360, 480, 400);
   for (const std::vector<Camera>& photos :
@@ -65,7 +65,7 @@ TEST(CommonCamera, ACircleStaysACircle) {
     EXPECT_EQ(common.fx, common.fy);
     EXPECT_NEAR(common.fx, 400, 1e-9);
   }
-  // A ball straight ahead: as wide as it is high.
+  // A ball straight ahead has the same width and height.
   const Camera common = CommonCamera({upright, across, across});
   double left, top, right, bottom, middle;
   ASSERT_TRUE(common.Project({-0.5, 0, 2}, &left, &middle));
@@ -79,9 +79,10 @@ TEST(CommonCamera, FocalLengthIsTheMedianAndPixelsAreSquare) {
   const Camera a = PhotoOf(480, 360, 380), b = PhotoOf(360, 480, 400),
                c = PhotoOf(480, 320, 900);
   EXPECT_NEAR(CommonCamera({a, b, c}).fx, 400, 1e-9);
-  // The same lens on a photo of half the size: its pixels count as half.
+  // The same lens on a photo of half the size: its focal length is scaled accordingly.
   EXPECT_NEAR(CommonCamera({a, PhotoOf(240, 180, 200), c}).fx, 400, 1e-9);
-  // Rounding of sizes moves fx and fy apart by a part in a thousand; that is no lens.
+  // Rounding of sizes changes fx / fy by a part in a thousand, which is not a property of a
+  // lens.
   Camera rounded = a;
   rounded.fy *= 1.002;
   const Camera square = CommonCamera({rounded, rounded, b});

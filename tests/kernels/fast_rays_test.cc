@@ -1,4 +1,5 @@
-// What the fast path of rays does its own way: opacities of many samples, and empty space.
+// Parts of the fast path that differ from the specification: vectorised opacities, and
+// skipping.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -16,9 +17,9 @@ namespace {
 using testing::RandomField;
 using testing::RandomRays;
 
-// H52: many samples' opacities at once are as accurate as expm1 and exp of one: two units
-// of the last place, from the smallest optical depth to the largest.
-TEST(FastRays, OpacityAndDecayKeepTheirDigits) {
+// H52: vectorised opacities are as accurate as expm1 and exp: two units of the last place, from
+// the smallest optical depth to the largest.
+TEST(FastRays, OpacityAndDecayAreAccurate) {
   std::vector<float> tau = {0.0f, 1e-38f, 86.99f, 87.0f, 104.0f};
   for (double t = 1e-35; t < 104; t *= 1.0007) tau.push_back(static_cast<float>(t));
   for (float t = 0.001f; t < 90; t += 0.0037f) tau.push_back(t);
@@ -35,15 +36,15 @@ TEST(FastRays, OpacityAndDecayKeepTheirDigits) {
                   testing::RecordDigits("opacity", testing::Computed::kFloat,
                                         alpha[i] - exact_alpha, 2.4e-7, exact_alpha))
           << name << " at " << tau[i];
-      // Below 1.7e-38, at the end of the normal numbers, it is 0.
+      // Below 1.7e-38, near the smallest normal number, it is 0.
       ASSERT_NEAR(decay[i], exact_decay, 2.4e-7 * exact_decay + 1.7e-38)
           << name << " at " << tau[i];
     }
   }
 }
 
-// A cube of empty bricks is left at the first step that may see matter: fields with isolated
-// voxels, whose rays skip in every direction, axis-parallel rays among them.
+// Skipping ends at the first step that may be occupied: fields with isolated voxels, with rays
+// that skip in every direction, including axis-parallel ones.
 TEST(FastRays, H84_SkippingLosesNoVoxel) {
   const RadianceField field = RandomField({37, 41, 33}, 1, 0.0005, 33);
   const FastGrid grid = MakeFastGrid(field);

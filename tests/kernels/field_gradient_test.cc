@@ -76,7 +76,7 @@ class FastRaysParity : public ::testing::TestWithParam<std::tuple<const char*, i
   int basis() const { return std::get<1>(GetParam()); }
 };
 
-// H70: 2e-5 a pixel; H84: skipping empty space leaves the picture as it is.
+// H70: 2e-5 per pixel; H84: skipping empty space does not change the picture.
 TEST_P(FastRaysParity, RendersAsThePlainRay) {
   if (functions() == nullptr)
     GTEST_SKIP() << "this processor lacks " << std::get<0>(GetParam());
@@ -115,7 +115,7 @@ TEST_P(FastRaysParity, GradientsAsThePlainAdjointInDouble) {
   const std::vector<Vec3f> targets(rays.size(), Vec3f{0.4f, 0.5f, 0.2f});
   const MarchOptions options{0.5f, 1e-4f};
   GradientArena arena;
-  arena.Reset(grid.num_voxels(), grid.lanes());
+  arena.Reset(grid.num_voxels());
   const float scale = 1.0f / 600;
   const FitStepResult step = functions()->accumulate(
       grid, {rays.data(), targets.data(), static_cast<int64_t>(rays.size())}, options, scale,
@@ -157,7 +157,7 @@ TEST_P(FastRaysParity, GradientsAsThePlainAdjointInDouble) {
 }
 
 // H103: an untouched voxel keeps its value and state bit for bit. H104: a non-finite gradient
-// is counted and leaves the voxel as it was.
+// is counted and does not change the voxel.
 TEST_P(FastRaysParity, H103_H104_StepIsSparseAndRefusesNan) {
   if (functions() == nullptr)
     GTEST_SKIP() << "this processor lacks " << std::get<0>(GetParam());
@@ -165,7 +165,7 @@ TEST_P(FastRaysParity, H103_H104_StepIsSparseAndRefusesNan) {
   const FastGrid before = grid;
   const int lanes = grid.lanes();
   std::vector<GradientArena> arenas(2);
-  for (auto& arena : arenas) arena.Reset(grid.num_voxels(), lanes);
+  for (auto& arena : arenas) arena.Reset(grid.num_voxels());
   const auto touch = [&](int arena, int32_t voxel, float value) {
     GradientArena& a = arenas[static_cast<size_t>(arena)];
     const int64_t slot = a.voxel_of_slot.size();
@@ -194,8 +194,7 @@ TEST_P(FastRaysParity, H103_H104_StepIsSparseAndRefusesNan) {
     for (int l = 0; l <= DensityLane(basis()); ++l) {
       const float old_value = before.records[v * lanes + l],
                   value = grid.records[v * lanes + l];
-      if (v ==
-          5) {  // first touch: v = g^2, so the step is the rate, whatever the gradient's size
+      if (v == 5) {  // first touch: v = g^2, so the step is the rate for any gradient
         const float rate = l == DensityLane(basis()) ? 2.0f : 0.1f;
         EXPECT_NEAR(value, old_value - rate,
                     testing::RecordBound("a first step of RMSProp", testing::Computed::kFloat,
@@ -211,7 +210,7 @@ TEST_P(FastRaysParity, H103_H104_StepIsSparseAndRefusesNan) {
   EXPECT_EQ(grid.probes[grid.vertex_of_voxel[5]].density,
             grid.records[5 * lanes + DensityLane(basis())]);
 
-  // The next step: what only the last one touched keeps its bits, what is touched again moves.
+  // The next step: voxels not touched again keep their bits, the others move.
   for (auto& arena : arenas) arena.Forget();
   const FastGrid second = grid;
   touch(1, 5, 0.5f);
@@ -226,7 +225,7 @@ TEST_P(FastRaysParity, H103_H104_StepIsSparseAndRefusesNan) {
   }
 }
 
-// The mean colour stays in [0, 1] and view dependence within its bound, however long the step.
+// The mean colour stays in [0, 1] and view dependence within its bound, for any step size.
 TEST_P(FastRaysParity, StepIsProjected) {
   if (functions() == nullptr)
     GTEST_SKIP() << "this processor lacks " << std::get<0>(GetParam());
@@ -234,7 +233,7 @@ TEST_P(FastRaysParity, StepIsProjected) {
     FastGrid grid = MakeFastGrid(RandomField({3, 3, 3}, basis(), 1.0, 52));
     const int lanes = grid.lanes();
     GradientArena arena;
-    arena.Reset(grid.num_voxels(), lanes);
+    arena.Reset(grid.num_voxels());
     arena.slot_of_voxel[4] = 0;
     arena.voxel_of_slot.Resize(1);
     arena.voxel_of_slot[0] = 4;
@@ -252,7 +251,7 @@ TEST_P(FastRaysParity, StepIsProjected) {
       }
     }
     EXPECT_GT(std::abs(grid.records[4 * lanes + DensityLane(basis())]),
-              80);  // densities are free
+              80);  // densities are not bounded
   }
 }
 
@@ -294,7 +293,7 @@ TEST(RayWeights, GiveTheRenderedColour) {
   }
 }
 
-// H67: a pixel does not depend on how the picture is cut into work.
+// H67: a pixel does not depend on the partition of the picture into tiles.
 TEST(RenderView, H67_TilesAndThePlainBodyAgree) {
   const RadianceField field = RandomField({16, 16, 16}, 9, 0.5, 81);
   Camera camera;

@@ -20,7 +20,7 @@ TEST(Half, EveryHalfSurvivesTheRoundTrip) {
   }
 }
 
-// Between two neighbouring halves the nearer one wins, and the even one at the middle.
+// Between two neighbouring halves, the nearer one is chosen, and the even one at the middle.
 TEST(Half, RoundsToNearestTiesToEven) {
   for (uint16_t half = 0; half < 0x7bff; ++half) {
     const double low = FloatFromHalf(half), high = FloatFromHalf(half + 1);

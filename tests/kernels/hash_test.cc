@@ -7,7 +7,7 @@
 namespace regrade {
 namespace {
 
-TEST(Hasher, IndependentOfHowTheBytesAreCut) {
+TEST(Hasher, IndependentOfHowTheBytesAreSplit) {
   std::string text;
   for (int i = 0; i < 100; ++i) text += static_cast<char>(i * 37);
   const uint64_t whole = HashOf(text);

@@ -47,7 +47,7 @@ TEST(LipschitzLayer, H37_WarmedUpSigmaIsTheNorm) {
   double longer = sigma;
   for (int i = 0; i < 5000; ++i) longer = PowerStep(r.View());
   EXPECT_GE(sigma / longer,
-            1 - testing::RecordBound("short of the norm after the warm-up",
+            1 - testing::RecordBound("deficit of the norm after the warm-up",
                                      testing::Computed::kDouble, 1 - sigma / longer, 1e-3));
   EXPECT_LE(sigma / longer, 1 + 1e-12);
 }
@@ -75,7 +75,7 @@ TEST(LipschitzLayer, H40_RankOneIsFoundWhereverItsVectorPoints) {
                 testing::RecordDigits("norm of rank one", testing::Computed::kDouble,
                                       norm - 2.5, 4e-13, 2.5));
   }
-  // A vector u that has lost the range of W restarts instead of staying at zero.
+  // A vector u orthogonal to the range of W restarts instead of staying at zero.
   Matrix<double> m(2, 2, 4, 0.0);
   m.weight = {1, 0, 0, 0};
   m.u = {0, 1};
@@ -101,7 +101,7 @@ TEST(LipschitzLayer, H42_ScaleOfWDoesNotMatter) {
     Matrix<float> m(8, 6, 6, static_cast<float>(std::pow(10.0, e)));
     WarmUpPowerIteration(m.View());
     LipschitzWeight(m.View(), 1.5f, scaled.data());
-    // Scaling rounds W itself by half an ulp; sigma repeats that at most sqrt(48) / 2 times.
+    // Scaling rounds W by half an ulp; sigma amplifies that by at most sqrt(48) / 2.
     for (int i = 0; i < 48; ++i)
       EXPECT_NEAR(scaled[i], a[i],
                   testing::RecordDigits("weights at any scale", testing::Computed::kFloat,
@@ -152,8 +152,8 @@ TEST(LipschitzLayer, H46_H47_GradientWithFrozenVectors) {
                                       d_w[i] - numeric, 1e-8))
         << i;
   }
-  // Also where squareplus bends, at the root of b: steps of a hundredth of it leave an error of
-  // 1e-8 of the result by the method, and 1e-8 by rounding.
+  // Also near squareplus' bend, at the root of b: a step of a hundredth of it has a relative
+  // truncation error of 1e-8 and a rounding error of 1e-8.
   for (const double at : {0.8, 1e-6, 0.0, -1e-6}) {
     k = at;
     d_k = 0;

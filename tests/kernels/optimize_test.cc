@@ -1,4 +1,4 @@
-// Adam and the learning rate's schedule (hard cases H99 to H102, H105, H106).
+// Adam and the learning rate schedule (hard cases H99 to H102, H105, H106).
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -55,8 +55,8 @@ TEST(Adam, H101_H106_HugeAndNonFiniteGradientsAreRejected) {
 }
 
 TEST(Adam, H102_BiasCorrection) {
-  // 0.999 as a double is 0.999 (1 + d), |d| < 1.2e-16: its complement differs by 1.2e-13 of
-  // itself.
+  // 0.999 as a double is 0.999 (1 + d), |d| < 1.2e-16: its complement has a relative error of
+  // 1.2e-13.
   EXPECT_NEAR(AdamBiasCorrection(0.999, 1) / 0.001, 1,
               testing::RecordDigits("first correction of 0.999", testing::Computed::kDouble,
                                     AdamBiasCorrection(0.999, 1) / 0.001 - 1, 2e-13));
@@ -64,7 +64,7 @@ TEST(Adam, H102_BiasCorrection) {
               testing::RecordDigits("third correction of 0.9", testing::Computed::kDouble,
                                     AdamBiasCorrection(0.9, 3) / 0.271 - 1, 1e-14));
   EXPECT_EQ(AdamBiasCorrection(0.999, 2000000), 1.0);
-  // The first step has the length of the rate, whatever the gradient's scale.
+  // The length of the first step is the rate, for any scale of the gradient.
   for (const float scale : {1e-3f, 1.0f, 1e6f}) {
     AdamState state;
     std::vector<float> x = {0.0f}, g = {scale};

@@ -1,4 +1,4 @@
-// Rays and orders that frames on a GPU are made with, checked where there is none.
+// Rays and orders used to render frames on a GPU, tested on the host.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -10,8 +10,8 @@
 namespace regrade {
 namespace {
 
-// The same operations in the same order: not a bit apart.
-TEST(PinholeRays, AreTheCamerasOwn) {
+// The same operations in the same order: bit-identical.
+TEST(PinholeRays, EqualTheCamerasRays) {
   Camera camera;
   camera.width = 40;
   camera.height = 30;
@@ -35,8 +35,8 @@ TEST(PinholeRays, AreTheCamerasOwn) {
   }
 }
 
-// Every vertex has its place, and no two the same.
-TEST(BrickOrder, NamesEveryVertexOnce) {
+// Every vertex has a place, and no two have the same.
+TEST(BrickOrder, IndexesEveryVertexOnce) {
   for (const Vec3i n : {Vec3i{5, 7, 9}, Vec3i{4, 8, 4}, Vec3i{2, 3, 13}}) {
     const BrickOrder order(n);
     std::vector<bool> taken(static_cast<size_t>(order.size));

@@ -1,4 +1,4 @@
-// The plain ray at its extremes: early stops, walls, clamped colours, far steps (hard cases
+// The plain ray in extreme cases: early stops, walls, clamped colours, many steps (hard cases
 // H53, H62, H65, H66).
 #include <gtest/gtest.h>
 
@@ -38,21 +38,21 @@ TEST(RayLoss, H62_EarlyStopIsWithinItsBound) {
     }
 }
 
-// What is not followed counts as background: a scene of one colour keeps it, however early rays
-// stop. (Giving that light to nobody would stay within the bound, and darken the picture.)
-TEST(RayLoss, H62_LightThatIsNotFollowedIsTheBackgrounds) {
+// Light beyond an early stop counts as background: a scene of one colour keeps it. (Dropping
+// the light would stay within the bound, but darken the picture.)
+TEST(RayLoss, H62_LightBeyondAStopIsTheBackground) {
   RadianceField field = RandomField({16, 16, 16}, 4, 0.9, 63);
   std::fill(field.appearance.sh.begin(), field.appearance.sh.end(), 0.0f);  // mid-grey
   field.background = {0.5f, 0.5f, 0.5f};
   for (const Ray& ray : RandomRays(300, 64))
-    // Some fifty samples, each with a rounding of its weight and one of the transmittance.
+    // About fifty samples, each with a rounding of its weight and one of the transmittance.
     ASSERT_NEAR(
         RenderRay(ViewOf(field), ray, {0.5f, 0.1f}).color.x, 0.5,
         testing::RecordBound("a scene of one colour", testing::Computed::kFloat,
                              RenderRay(ViewOf(field), ray, {0.5f, 0.1f}).color.x - 0.5, 1e-5));
 }
 
-// A row of vertices along x, a world unit apart: the box is [0, n) x [0, 2) x [0, 2).
+// A row of vertices along x, one world unit apart: the box is [0, n) x [0, 2) x [0, 2).
 RadianceField RowOfVertices(int n, const std::function<float(int)>& density_at) {
   auto geometry = std::make_shared<Geometry>();
   const float half = 0.5f * static_cast<float>(n);
@@ -72,7 +72,7 @@ RadianceField RowOfVertices(int n, const std::function<float(int)>& density_at) 
   return field;
 }
 
-// The clamp's gradient is tested on both sides of it: a channel just below 0 takes none.
+// Tests the clamp's gradient on both sides: a channel just below 0 has none.
 TEST(RayLoss, H65_AClampedChannelTakesNoGradient) {
   RadianceField field = RandomField({6, 6, 6}, 1, 1.0, 65);
   for (const double side : {-1e-3, 1e-3}) {
@@ -94,8 +94,9 @@ TEST(RayLoss, H65_AClampedChannelTakesNoGradient) {
   }
 }
 
-// An opaque wall's optical depth, 1e8 and more, would swallow that of the mist before it in the
-// running sum from which the adjoint recovers its weights: depths end at 104, where exp is 0.
+// An opaque wall's optical depth, 1e8 and more, would absorb the digits of the mist before it
+// in the running sum from which the adjoint recovers weights: depths end at 104, where exp is
+// 0.
 TEST(RayLoss, H53_MistBeforeAWallKeepsItsGradient) {
   const RadianceField field = RowOfVertices(40, [](int x) {
     return x < 5 ? 0.0f : x < 20 ? 0.05f : 1e9f;
@@ -113,7 +114,8 @@ TEST(RayLoss, H53_MistBeforeAWallKeepsItsGradient) {
                    exact_sh.data(), PlainAdd());
   EXPECT_NEAR(result.color.x, exact.color.x, 1e-5);
   for (int v = 0; v < 4 * 19; ++v) {
-    // Float's rounding of a sum of 104 is 4e-6 of each weight; 1e-4 leaves room for its parts.
+    // Float rounding of a sum of 104 is 4e-6 of each weight; 1e-4 leaves a margin for its
+    // parts.
     EXPECT_NEAR(
         d_density[v], exact_density[v],
         testing::RecordBound("gradient of mist before a wall", testing::Computed::kFloat,
@@ -123,9 +125,9 @@ TEST(RayLoss, H53_MistBeforeAWallKeepsItsGradient) {
   }
 }
 
-// t_i = t_0 + i step: of two thousand steps of 0.1 the last is within 3e-5 of its place, so the
-// first sample in a wall is the one it should be. Adding up steps drifts 0.003.
-TEST(RayLoss, H66_TheTwoThousandthStepIsWhereItBelongs) {
+// t_i = t_0 + i step: the last of two thousand steps of 0.1 is off by at most 3e-5, so the
+// first sample in a wall has the right index. Accumulating steps would drift by 0.003.
+TEST(RayLoss, H66_TwoThousandStepsDoNotDrift) {
   const RadianceField field = RowOfVertices(202, [](int x) { return x < 200 ? 0.0f : 1e9f; });
   for (int phase = 0; phase < 50; ++phase) {  // never within 1e-3 of the wall
     const float x = 0.201f + 0.002f * static_cast<float>(phase);

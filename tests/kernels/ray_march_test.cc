@@ -52,7 +52,7 @@ TEST(RayMarch, H73_StartInsideBeginsAtTheOriginOrTheNearClip) {
   EXPECT_EQ(ClipToGrid<float>(UnitFrame(8), ray, 100.0f, 0.5f).num_steps, 0);
 }
 
-TEST(RayMarch, H75_NotARayIsRefused) {
+TEST(RayMarch, H75_AnInvalidRayIsRefused) {
   const float nan = std::nanf(""), inf = std::numeric_limits<float>::infinity();
   EXPECT_EQ(Steps({4, 4, 4}, {0, 0, 0}), 0);
   EXPECT_EQ(Steps({4, 4, 4}, {nan, 0, 1}), 0);
@@ -62,11 +62,11 @@ TEST(RayMarch, H75_NotARayIsRefused) {
 
 TEST(RayMarch, H76_NegativeZeroIsZero) {
   EXPECT_EQ(Steps({4, -5, 4}, {-0.0f, 1, -0.0f}), Steps({4, -5, 4}, {0.0f, 1, 0.0f}));
-  // On a face, where 0 / -0 would be met.
+  // On a face, where 0 / -0 would occur.
   EXPECT_EQ(Steps({0, -5, 4}, {-0.0f, 1, 0}), Steps({0, -5, 4}, {0.0f, 1, 0}));
 }
 
-// Halves of the box share the whole box's rays: none slips between them (H74, H77).
+// Halves of the box cover all rays of the whole box: none is lost between them (H74, H77).
 TEST(RayMarch, H74_TwoHalvesCoverTheBox) {
   const GridFrame whole = UnitFrame(8);
   GridFrame low = whole, high = whole;
@@ -91,14 +91,14 @@ TEST(RayMarch, H74_TwoHalvesCoverTheBox) {
   EXPECT_GT(hits, 90000);
 }
 
-// Rays that graze an edge: where the interval is not empty in long double, it is not in float.
+// Rays that graze an edge: an interval that is not empty in long double is not empty in float.
 TEST(RayMarch, H77_NoGrazingRayIsLost) {
   int grazing = 0;
   for (uint64_t i = 0; i < 100000; ++i) {
     const auto u = [&](int k) { return RandomDouble(7, 1, 8 * i + static_cast<uint64_t>(k)); };
     Vec3d target{8 * u(0), 8 * u(1), 8 * u(2)};
     const int along = static_cast<int>(i % 3);
-    // Beyond one face and inside the other by the same sliver: the ray cuts the edge's corner.
+    // Outside one face and inside the other by the same sliver: the ray cuts the edge's corner.
     const double sliver = std::pow(10.0, -9 + 4 * u(3));
     target[(along + 1) % 3] = sliver;
     target[(along + 2) % 3] = sliver;
@@ -131,7 +131,7 @@ TEST(GridFrame, WorldAndGridAreInverse) {
     for (int a = 0; a < 3; ++a)
       EXPECT_NEAR(world[a] * frame.Scale()[a] + frame.Offset()[a], g[a], 1e-5);
   }
-  // The box's faces lie half a voxel outside the outermost vertices.
+  // The box's faces are half a voxel outside the outermost vertices.
   EXPECT_NEAR(frame.WorldOf({-0.5f, 0, 0}).x, -0.5, 1e-6);
   EXPECT_NEAR(frame.WorldOf({4.5f, 0, 0}).x, 1.5, 1e-6);
 }
@@ -142,11 +142,11 @@ TEST(RayMarch, H66_FarOriginNeitherLoopsNorDrifts) {
   EXPECT_LE(ray.num_steps, kMaxSteps);
   const GridRay<float> near =
       ClipToGrid<float>(UnitFrame(8), {{-1, 4, 4}, {1, 0, 0}}, 0.0f, 0.001f);
-  // t_i = t_0 + i step: the last sample is within a rounding of where it belongs; t += step
-  // drifts 0.016.
+  // t_i = t_0 + i step: the last sample is accurate to a rounding; t += step would drift by
+  // 0.016.
   const float last = near.t_begin + static_cast<float>(near.num_steps - 1) * 0.001f;
   EXPECT_NEAR(last, 1.0 + (near.num_steps - 1) * 0.001,
-              testing::RecordBound("place of the last sample", testing::Computed::kFloat,
+              testing::RecordBound("position of the last sample", testing::Computed::kFloat,
                                    last - (1.0 + (near.num_steps - 1) * 0.001), 1e-5));
   // A step below any rounding ends at the cap, not in a cast of 8e30 to an integer.
   EXPECT_EQ(ClipToGrid<float>(UnitFrame(8), {{-1, 4, 4}, {1, 0, 0}}, 0.0f, 1e-30f).num_steps,
@@ -177,7 +177,7 @@ TEST(Trilinear, H81_WeightsSumToOneAndReproduceLinearFields) {
     values[static_cast<size_t>(i)] = 2.0 * (i / 16) - 3.0 * (i / 4 % 4) + 0.5 * (i % 4) + 1;
   }
   for (uint64_t i = 0; i < 1000; ++i) {
-    // The box reaches half a voxel beyond its vertices; there the nearest face's values hold.
+    // The box extends half a voxel beyond its vertices; there the nearest face's values apply.
     Vec3d p{4 * RandomDouble(4, 0, 3 * i) - 0.5, 4 * RandomDouble(4, 0, 3 * i + 1) - 0.5,
             4 * RandomDouble(4, 0, 3 * i + 2) - 0.5};
     const Cell<double> cell = LocateCell(frame, p);
@@ -215,7 +215,7 @@ TEST(Trilinear, H82_H83_AdjointAndEmptyCorners) {
       y[c] = testing::Uniform(10, 3 * i + static_cast<uint64_t>(c), -1, 1);
       ax_y += out[c] * y[c];
     }
-    InterpolateAdjoint(g.frame, g.links.data(), 3, 3, cell, y, at_y.data());
+    InterpolateAdjoint(g.frame, g.links.data(), 3, 3, cell, y, at_y.data(), PlainAdd());
   }
   double x_aty = 0;
   for (size_t i = 0; i < x.size(); ++i) x_aty += x[i] * at_y[i];
@@ -252,8 +252,8 @@ TEST(SphericalHarmonics, H94_BandsHaveConstantPower) {
 }
 
 TEST(SphericalHarmonics, H95_RaysOfEveryLensAreUnit) {
-  // The basis is of unit directions: a length of 1.001 scales band 2 by 1.002. Rays are made
-  // unit once, where a camera makes them; rounding to float leaves 2e-7 of a square.
+  // The basis expects unit directions: a length of 1.001 scales band 2 by 1.002. The camera
+  // normalises rays once; rounding to float leaves an error of 2e-7 in the square.
   for (const LensModel lens : {LensModel::kPinhole, LensModel::kOpenCv, LensModel::kFisheye})
     for (const bool ndc : {false, true}) {
       Camera camera;

@@ -37,7 +37,7 @@ TEST(Resize, ShrinkingByCoverageIsExact) {
 TEST(Resize, ShrinkingKeepsTheMean) {
   const Image image = Noise(101, 67, 3);
   for (const auto& [w, h] : {std::pair{50, 67}, {7, 5}, {1, 1}, {100, 66}})
-    // Float rounding of independent pixels: far below 1e-7 a pixel in the mean.
+    // Float rounding of independent pixels: far below 1e-7 in the mean.
     EXPECT_NEAR(Mean(Resize(image, w, h)), Mean(image), 1e-7) << w << "x" << h;
 }
 

@@ -31,8 +31,8 @@ TEST(Squareplus, H31_AgreesWithLongDouble) {
             << x;
       }
   EXPECT_DOUBLE_EQ(Squareplus(0.0), 0.5e-6);
-  // In float as well, where a square overflows from 1.9e19 on: four roundings of 6e-8, and one
-  // to a subnormal number.
+  // In float as well, where a square overflows from 1.9e19: four roundings of 6e-8, and one to
+  // a subnormal number.
   for (const float x : {-1e30f, -1e19f, -1.0f, -1e-4f, 1e-4f, 1.0f, 1e19f, 1e30f}) {
     const long double exact = ExactSquareplus(x, static_cast<float>(kSquareplusB));
     EXPECT_NEAR(Squareplus(x), static_cast<double>(exact),
@@ -45,14 +45,15 @@ TEST(Squareplus, H31_AgreesWithLongDouble) {
 
 TEST(Squareplus, H32_DerivativeWithoutCancellation) {
   for (const double x : {-3.0, -0.2, -1e-3, -1e-6, 0.0, 1e-6, 0.4, 5.0}) {
-    // b = 1e-2 so that finite differences see the bend; the formula is the same.
+    // b = 1e-2 so that finite differences resolve the bend; the formula is the same.
     const double numeric = Derivative([](double y) { return Squareplus(y, 1e-2); }, x, 1e-3);
     EXPECT_NEAR(
         SquareplusDerivative(x, 1e-2), numeric,
         testing::RecordDigits("derivative against differences", testing::Computed::kDouble,
                               SquareplusDerivative(x, 1e-2) - numeric, 1e-9))
         << x;
-    // Of the real b the digits are counted: squareplus' roundings, the root's and a quotient's.
+    // For the actual b digits are counted: the roundings of squareplus, the root and a
+    // quotient.
     const long double b = kSquareplusB;
     const long double exact =
         ExactSquareplus(x, b) / sqrtl(static_cast<long double>(x) * x + b);
@@ -64,7 +65,7 @@ TEST(Squareplus, H32_DerivativeWithoutCancellation) {
   EXPECT_EQ(SquareplusDerivative(0.0, 0.0), 0.5);
 }
 
-TEST(Squareplus, H33_FloatStaysAliveWhereTheTextbookFormDies) {
+TEST(Squareplus, H33_FloatIsPositiveWhereTheTextbookFormIsZero) {
   const float x = -0.01f, b = static_cast<float>(kSquareplusB);
   EXPECT_EQ(0.5f * (x + std::sqrt(x * x + b)), 0.0f);
   EXPECT_NEAR(Squareplus(x), 2.5e-11f,

@@ -1,5 +1,5 @@
-// Synthetic scenes: their truth is exact, their pictures repeat, their cameras see only what
-// the bounds hold.
+// Synthetic scenes: exact ground truth, reproducible pictures, and bounds that contain all that
+// cameras see.
 #include "kernels/synthetic/synthetic_scene.h"
 
 #include <gtest/gtest.h>
@@ -51,8 +51,8 @@ TEST_P(EveryScene, SeedRepaintsButDoesNotMoveAnything) {
   EXPECT_NE(in_a.color.pixels, in_b.color.pixels);
 }
 
-// The same photo twice would be left out as a duplicate.
-TEST_P(EveryScene, NoTwoViewsShareAPlace) {
+// A second view at the same position would be skipped as a duplicate.
+TEST_P(EveryScene, NoTwoViewsShareAPosition) {
   const SyntheticScene scene = MakeSyntheticScene(GetParam(), 0);
   for (const int views : {12, 24, 50, 96}) {
     const std::vector<Camera> cameras = SyntheticCameras(scene, views, 64, 48);
@@ -63,8 +63,8 @@ TEST_P(EveryScene, NoTwoViewsShareAPlace) {
   }
 }
 
-// A grid over the bounds must be able to explain every pixel of every default view.
-TEST_P(EveryScene, BoundsHoldAllThatCamerasSee) {
+// A grid over the bounds must be able to represent every pixel of every default view.
+TEST_P(EveryScene, BoundsContainAllThatCamerasSee) {
   const SyntheticScene scene = MakeSyntheticScene(GetParam(), 0);
   for (const Camera& camera : SyntheticCameras(scene, 24, 640, 480))
     for (int y = 0; y < 480; y += 16)
@@ -78,7 +78,7 @@ TEST_P(EveryScene, BoundsHoldAllThatCamerasSee) {
       }
 }
 
-TEST_P(EveryScene, DepthIsWhereTheMotionSaysItIs) {
+TEST_P(EveryScene, DepthAgreesWithTheMotion) {
   const SyntheticScene scene = MakeSyntheticScene(GetParam(), 0);
   const std::vector<Camera> cameras = SyntheticCameras(scene, 24, 80, 60);
   const SyntheticView view = RenderSyntheticView(scene, cameras[2]);
@@ -97,9 +97,9 @@ TEST_P(EveryScene, DepthIsWhereTheMotionSaysItIs) {
     }
 }
 
-// Without highlights surfaces look the same from everywhere, so view i + 1 carried back by the
-// exact motion is view i up to the error of interpolation. Where the mask is wrong, whole
-// objects differ.
+// Without highlights surfaces look the same from everywhere, so view i + 1 warped by the exact
+// motion equals view i up to the interpolation error. Where the mask is wrong, whole objects
+// differ.
 TEST_P(EveryScene, H124_WarpingByTrueMotionLeavesInterpolationErrorOnly) {
   const SyntheticScene scene = MakeSyntheticScene(GetParam(), 0);
   const std::vector<Camera> cameras = SyntheticCameras(scene, 24, 320, 240);
@@ -127,16 +127,14 @@ TEST_P(EveryScene, H124_WarpingByTrueMotionLeavesInterpolationErrorOnly) {
     ASSERT_GT(count, 320 * 240 / 2);
     const double psnr = -10 * std::log10(sum / (3.0 * count));
     // Edges of paint and of objects cover a few per cent of the pixels; there bilinear
-    // interpolation of two pictures with different pixel grids may be off by a third of the
-    // contrast.
+    // interpolation between different pixel grids may be off by a third of the contrast.
     EXPECT_GT(psnr, 30) << "views " << i << ", " << i + 1;
     EXPECT_LT(static_cast<double>(wrong) / count, 0.005);
   }
 }
 
-TEST(SyntheticScene, VisibleMeansNothingStandsBefore) {
-  // A ball before a wall: the other camera, to the left, cannot see the wall to the ball's
-  // right.
+TEST(SyntheticScene, VisibleMeansUnoccluded) {
+  // A ball before a wall: the other camera, to the left, cannot see the wall right of the ball.
   SyntheticScene scene;
   Solid wall, ball;
   wall.shape = Shape::kBox;
@@ -161,7 +159,7 @@ TEST(SyntheticScene, VisibleMeansNothingStandsBefore) {
   EXPECT_FALSE(at(73, 50));  // wall just to the right of the ball
   EXPECT_TRUE(at(25, 50));   // wall just to its left
   EXPECT_FALSE(at(95, 50));  // outside the other picture
-  // The motion itself: f * baseline / depth for the ball's front at depth 1.6.
+  // The motion: f * baseline / depth for the ball's front at depth 1.6.
   EXPECT_NEAR(motion.uv[2 * (100 * 50 + 50)], 100 * 0.5 / 1.6, 0.01);
 }
 

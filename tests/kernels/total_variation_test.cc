@@ -1,5 +1,4 @@
-// Total variation: one function for value and gradient, and the fast path's beside it (H97,
-// H98).
+// Total variation: value and gradient of one function, and the fast path (H97, H98).
 #include "kernels/field/total_variation.h"
 
 #include <gtest/gtest.h>
@@ -16,7 +15,7 @@ namespace {
 
 TEST(TotalVariation, H97_GradientIsTheValuesDerivative) {
   const RadianceField field =
-      testing::RandomField({5, 6, 7}, 1, 0.7, 91);  // voxels are no cubes (H98)
+      testing::RandomField({5, 6, 7}, 1, 0.7, 91);  // voxels are not cubes (H98)
   const Geometry& g = *field.geometry;
   for (const bool empty_is_zero : {false, true}) {
     std::vector<double> values(g.density.begin(), g.density.end());
@@ -58,7 +57,7 @@ TEST(TotalVariation, H97_ConstantAndShiftedFields) {
               testing::RecordDigits("a constant field", testing::Computed::kDouble,
                                     flat - roots, 1e-9));
   for (const double d : gradient) EXPECT_EQ(d, 0.0);
-  // A bump in the inside weighs the same wherever it is.
+  // A bump inside the box weighs the same at every position.
   const auto bump_at = [&](int x, int y, int z) {
     std::vector<double> bump(static_cast<size_t>(n));
     bump[static_cast<size_t>(g.links[g.frame.Vertex(x, y, z)])] = 1;
@@ -75,7 +74,7 @@ TEST(TotalVariation, FastPathEqualsThePlainOne) {
     for (const int basis : {1, 4, 9}) {
       const FastGrid grid = MakeFastGrid(testing::RandomField({7, 5, 6}, basis, 0.6, 93));
       GradientArena arena;
-      arena.Reset(grid.num_voxels(), grid.lanes());
+      arena.Reset(grid.num_voxels());
       const int64_t begin = 13, end = 190;
       functions->total_variation(grid, begin, end, 0.7f, 0.2f, &arena);
       std::vector<float> plain(static_cast<size_t>(grid.records.size()));
@@ -100,8 +99,8 @@ TEST(TotalVariation, FastPathEqualsThePlainOne) {
 }
 
 TEST(TotalVariation, H98_AxesAreWeightedByTheirVoxels) {
-  // Twice the vertices along an axis of the same box: voxels are half as long there, and a
-  // slope that is the same in the world is half as steep from voxel to voxel.
+  // Twice the vertices along an axis of the same box: voxels are half as long, and the same
+  // world gradient is half as large between neighbouring voxels.
   const auto slope = [](const Vec3i& resolution, int axis) {
     const RadianceField field = testing::RandomField(resolution, 1, 1.0, 94);
     const Geometry& g = *field.geometry;
@@ -113,7 +112,7 @@ TEST(TotalVariation, H98_AxesAreWeightedByTheirVoxels) {
           values[static_cast<size_t>(g.links[g.frame.Vertex(x, y, z)])] =
               100.0 * at[axis] / resolution[axis];
         }
-    // One vertex in the midst, where no neighbour is missing.
+    // One vertex in the middle, with all neighbours.
     const int64_t middle = g.frame.Vertex(resolution.x / 2, resolution.y / 2, resolution.z / 2);
     return TotalVariation<double>(g.frame, g.links.data(), values.data(), 1, 0, false, middle,
                                   middle + 1, 1.0, nullptr);

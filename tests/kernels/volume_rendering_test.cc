@@ -41,7 +41,7 @@ TEST(VolumeRendering, H52_TinyOpticalDepthKeepsItsLastBit) {
   EXPECT_NEAR(static_cast<double>(ratio), 1.0,
               testing::RecordDigits("opacity of a thin sample", testing::Computed::kFloat,
                                     static_cast<double>(ratio - 1), kFloatEpsilon));
-  // What 1 - exp(-tau) would give: 0 at 1e-8.
+  // 1 - exp(-tau) would give 0 at 1e-8.
   EXPECT_EQ(1.0f - std::exp(-1e-8f), 0.0f);
 }
 
@@ -139,7 +139,7 @@ TEST(VolumeRendering, H58_H61_AdjointEqualsDerivative) {
   }
 }
 
-// Well hidden samples keep the sign of their gradient in float, as double has it.
+// Strongly occluded samples have the right sign of their gradient in float.
 TEST(VolumeRendering, H59_SuffixFormKeepsSignsInFloat) {
   int wrong = 0, counted = 0;
   for (uint64_t ray = 0; ray < 400; ++ray) {
@@ -174,7 +174,7 @@ TEST(VolumeRendering, H59_SuffixFormKeepsSignsInFloat) {
   }
   EXPECT_GT(counted, 1000);
   EXPECT_LE(wrong,
-            counted * testing::RecordBound("share of wrong signs", testing::Computed::kFloat,
+            counted * testing::RecordBound("fraction of wrong signs", testing::Computed::kFloat,
                                            static_cast<double>(wrong) / counted, 1e-4));
 }
 

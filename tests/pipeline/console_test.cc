@@ -20,7 +20,7 @@ TEST(Printable, ControlBytesAreEscaped) {
   EXPECT_EQ(Printable("\xe2\x82"), "\\xe2\\x82");
 }
 
-TEST(MessageFor, SaysAllOnOneLine) {
+TEST(MessageFor, IsOneLine) {
   EXPECT_EQ(MessageFor(Error(ExitCode::kInput, "empty file", "a\nb.jpg", "remove it"), "pose"),
             "a\\x0ab.jpg: empty file. To do: remove it. Kept: pose");
 }
@@ -31,8 +31,8 @@ TEST(DurationText, ReadsWell) {
   EXPECT_EQ(DurationText(7400), "2 h 03 min");
 }
 
-// Seconds left against the truth at many moments behind the first fifth; `cost(i)` is what step
-// i of 1000 takes.
+// Worst ratio of estimated and true seconds left after the first fifth; `cost(i)` is the time
+// of step i of 1000.
 template <typename Cost>
 double WorstFactor(const Cost& cost) {
   constexpr int kSteps = 1000;
@@ -50,7 +50,7 @@ double WorstFactor(const Cost& cost) {
   return worst;
 }
 
-TEST(EtaEstimator, WithinAFactorOfTwoBehindTheFirstFifth) {
+TEST(EtaEstimator, WithinAFactorOfTwoAfterTheFirstFifth) {
   EXPECT_LT(WorstFactor([](int) { return 0.1; }), 1.01);
   // Steps that differ by ten.
   EXPECT_LT(WorstFactor([](int i) { return 0.02 + 0.2 * RandomDouble(1, 2, i); }), 2);
@@ -58,11 +58,11 @@ TEST(EtaEstimator, WithinAFactorOfTwoBehindTheFirstFifth) {
   EXPECT_LT(WorstFactor([](int i) { return i < 100 ? 1.0 : 0.1; }), 2);
   // Steps that grow to three times their cost, as a scene gets denser.
   EXPECT_LT(WorstFactor([](int i) { return 0.1 + 0.2 * i / 1000; }), 2);
-  // A stall for a checkpoint, now and then.
+  // Occasional pauses for a checkpoint.
   EXPECT_LT(WorstFactor([](int i) { return i % 100 == 99 ? 3.0 : 0.1; }), 2);
 }
 
-TEST(EtaEstimator, PreparationsAreNotThePace) {
+TEST(EtaEstimator, PreparationsAreIgnored) {
   EtaEstimator eta;
   eta.Add(6, 1, 300);  // six seconds of preparations and a step
   EXPECT_FALSE(eta.Remaining());
@@ -70,7 +70,7 @@ TEST(EtaEstimator, PreparationsAreNotThePace) {
   EXPECT_NEAR(eta.Remaining().value(), 29.8, 0.1);
 }
 
-TEST(EtaEstimator, SilentWhereItKnowsNothing) {
+TEST(EtaEstimator, EmptyWithoutData) {
   EtaEstimator eta;
   EXPECT_FALSE(eta.Remaining());
   eta.Add(0.5, 1, 10);
@@ -79,7 +79,7 @@ TEST(EtaEstimator, SilentWhereItKnowsNothing) {
   EXPECT_FALSE(eta.Remaining());  // no total
   eta.Add(6, 2, 10);
   EXPECT_TRUE(eta.Remaining());
-  eta.Add(7, 0, 10);  // begun anew
+  eta.Add(7, 0, 10);  // restarted
   EXPECT_FALSE(eta.Remaining());
 }
 

@@ -1,4 +1,4 @@
-// Pictures on one sheet: each in its place, words outside of them.
+// Contact sheets: every picture in its cell, text outside the pictures.
 #include "pipeline/images/contact_sheet.h"
 
 #include <gtest/gtest.h>
@@ -29,7 +29,7 @@ TEST(ContactSheet, EveryPictureIsThereWhole) {
   EXPECT_GE(quarter, 40 * 30);
   EXPECT_GE(half, 30 * 30);
   EXPECT_GE(three, 40 * 20);
-  EXPECT_LE(quarter, 40 * 30 + 100);  // and not more than some of the letters' edges
+  EXPECT_LE(quarter, 40 * 30 + 100);  // only edges of letters may be in it
   EXPECT_GT(ink, 20);                 // the title
   EXPECT_GT(sheet.width, 80);
   EXPECT_EQ(MakeContactSheet({"one"}, {}).channels, 3);
@@ -47,11 +47,11 @@ TEST(PictureText, StaysWithinItsWidthAndThePicture) {
   EXPECT_EQ(left, 0);
   EXPECT_GT(inside, 10);
   EXPECT_EQ(right, 0);
-  DrawText(&image, 50, 25, 500, "\xF0\x9F\x98\x80 beyond", 2, 0);  // no crash at the rim
+  DrawText(&image, 50, 25, 500, "\xF0\x9F\x98\x80 beyond", 2, 0);  // no crash at the border
   DrawText(&image, -5, -5, 50, "x", 1, 0);
 }
 
-// What comes last of a line that is too long, as of a title over narrow columns.
+// The end of a line that is too long, for example a title over narrow columns.
 TEST(PictureText, ALineThatIsTooLongIsDrawnSmaller) {
   const auto ink_at = [](const std::string& text) {
     Image image = Plain(120, 30, 1);

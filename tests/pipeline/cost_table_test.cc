@@ -1,10 +1,11 @@
-// Price lists: which variants there are, what is kept, what beats what, and what is predicted.
+// Cost tables: variants, stored measurements, the Pareto front, and predictions.
 #include "pipeline/tradeoff/cost_table.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
+#include "pipeline/report/cost_rows.h"
 #include "pipeline/tradeoff/duration_estimate.h"
 #include "pipeline/tradeoff/prediction.h"
 #include "tests/support/expect_error.h"
@@ -35,20 +36,20 @@ TEST(Parameters, ValuesFollowTheBase) {
   base.fit.resolutions = {16, 24};
   const std::vector<Variant> variants =
       VariantsOf(base, {{"fit-steps", "sh-degree"}, false, true, {}});
-  std::vector<std::string> said;
+  std::vector<std::string> names;
   for (const Variant& variant : variants)
-    said.push_back(variant.parameter + "=" + variant.value);
-  // Half and a quarter of the base's steps and twice as many, not the base's own again; other
-  // planes have no parameter here, and so no base.
-  EXPECT_EQ(said, (std::vector<std::string>{"=", "fit-steps=3,5", "fit-steps=5,10",
-                                            "fit-steps=20,40", "sh-degree=0", "sh-degree=1"}));
+    names.push_back(variant.parameter + "=" + variant.value);
+  // A quarter, half and twice the base's steps, without the base's own value. Other benchmarks
+  // have no chosen parameter, thus no base.
+  EXPECT_EQ(names, (std::vector<std::string>{"=", "fit-steps=3,5", "fit-steps=5,10",
+                                             "fit-steps=20,40", "sh-degree=0", "sh-degree=1"}));
   EXPECT_TRUE(variants[3].accurate_end);
-  EXPECT_FALSE(variants[5].accurate_end);  // the base is
+  EXPECT_FALSE(variants[5].accurate_end);  // the base is the accurate end
   EXPECT_REGRADE_ERROR(VariantsOf(base, {{"fit-stepz"}, false, true, {}}), ExitCode::kUsage,
                        "fit-stepz");
 }
 
-TEST(Parameters, EveryOptionIsOneOfARun) {
+TEST(Parameters, EveryOptionIsAnOptionOfARun) {
   RunSettings base;
   OptionSet options;
   base.Bind(&options);
@@ -57,7 +58,7 @@ TEST(Parameters, EveryOptionIsOneOfARun) {
       RunSettings settings = base;
       OptionSet set;
       settings.Bind(&set);
-      set.ApplyConfig(variant.options, "here");  // throws for a name that is none
+      set.ApplyConfig(variant.options, "here");  // throws for an unknown name
       EXPECT_EQ(DumpJson(set.Values(), -1) == DumpJson(options.Values(), -1),
                 variant.parameter.empty())
           << variant.parameter << " " << variant.value;
@@ -79,8 +80,8 @@ TEST(CostTable, MediansSpreadsAndErrorsAgainstTheAccurateEnd) {
   EXPECT_EQ(*few.cpu_seconds.value, 5);
   EXPECT_EQ(*few.cpu_spread.value, 2.5);
   EXPECT_EQ(*few.accuracy.value, 24.5);
-  EXPECT_EQ(*few.error.value, 2.5);                // against 20 steps
-  EXPECT_EQ(*RowOf(rows, "1").error.value, 0.25);  // against the base
+  EXPECT_EQ(*few.error.value, 2.5);                // relative to 20 steps
+  EXPECT_EQ(*RowOf(rows, "1").error.value, 0.25);  // relative to the base
   EXPECT_FALSE(RowOf(rows, "preset draft").error.value);
   EXPECT_NE(CostTableText(rows).find("* preset draft"), std::string::npos);
   EXPECT_NE(CostTableCsv(rows).find("fit,\"fit-steps\",\"5\",3,3.000000,1.500000,5.000000"),
@@ -88,7 +89,7 @@ TEST(CostTable, MediansSpreadsAndErrorsAgainstTheAccurateEnd) {
       << CostTableCsv(rows);
 }
 
-TEST(CostTable, TheParetoFrontIsWhatNothingBeats) {
+TEST(CostTable, TheParetoFrontHasTheVariantsThatNoneBeats) {
   const std::vector<Variant> variants = {FitVariant("", ""), FitVariant("a", "good"),
                                          FitVariant("a", "bad"), FitVariant("a", "twin")};
   std::vector<Measurement> measured;
@@ -103,10 +104,10 @@ TEST(CostTable, TheParetoFrontIsWhatNothingBeats) {
   EXPECT_TRUE(RowOf(rows, "good").on_pareto_front);
   EXPECT_EQ(RowOf(rows, "the base").dominated_by, "a good");
   EXPECT_EQ(RowOf(rows, "bad").dominated_by, "a good");
-  // Half a second is within the noise of half a second each: beaten, but not dominated.
+  // A difference of half a second is within the spreads: beaten, but not dominated.
   EXPECT_FALSE(RowOf(rows, "twin").on_pareto_front);
   EXPECT_EQ(RowOf(rows, "twin").dominated_by, "");
-  // Where less is better the front turns round.
+  // If less is better, the front is reversed.
   for (const Variant& variant : variants) EXPECT_EQ(variant.benchmark, "fit");
   std::vector<Variant> flow = variants;
   for (Variant& variant : flow) variant.benchmark = "flow";
@@ -115,12 +116,12 @@ TEST(CostTable, TheParetoFrontIsWhatNothingBeats) {
   EXPECT_TRUE(RowOf(rows, "bad").on_pareto_front);
   EXPECT_TRUE(RowOf(rows, "good").on_pareto_front);  // the fastest
   EXPECT_EQ(RowOf(rows, "the base").dominated_by, "a bad");
-  // One measurement of each says nothing about noise.
+  // Single measurements have no spread.
   std::erase_if(measured, [](const Measurement& m) { return m.repeat > 0; });
   EXPECT_EQ(RowOf(CostTable(flow, measured, "the base"), "the base").dominated_by, "");
 }
 
-TEST(MeasurementStore, KeepsWhatIsOfTheSameFingerprint) {
+TEST(MeasurementStore, KeepsMeasurementsOfTheSameFingerprint) {
   const TemporaryFolder folder;
   const std::string path = folder / "measurements.json";
   const Variant variant = FitVariant("fit-steps", "5");
@@ -136,7 +137,9 @@ TEST(MeasurementStore, KeepsWhatIsOfTheSameFingerprint) {
   EXPECT_EQ(again.Find(variant, 1)->work.At("rays").AsInt(), int64_t{1} << 40);
   EXPECT_EQ(again.Find(variant, 0), nullptr);
   EXPECT_TRUE(MeasurementStore(path, "other").all().empty());
-  testing::WriteText(path, "{\"fingerprint\": \"one\", \"measurements\": [{}]}");
+  testing::WriteText(path, R"({"schema": 1, "fingerprint": "one", "measurements": []})");
+  EXPECT_REGRADE_ERROR(MeasurementStore(path, "one"), ExitCode::kInput, "schema 1");
+  testing::WriteText(path, R"({"schema": 2, "fingerprint": "one", "measurements": [{}]})");
   EXPECT_REGRADE_ERROR(MeasurementStore(path, "one"), ExitCode::kInput, "measurements.json");
 }
 
@@ -152,9 +155,8 @@ Capture Photos(int count) {
   return capture;
 }
 
-TEST(Prediction, LearnsWhatAUnitCostsAndAppliesItElsewhere) {
-  // A machine that needs 2e-9 s a ray voxel, exactly, and where the whole stage took 3 s more,
-  // one of them for its trial.
+TEST(Prediction, AppliesMeasuredUnitCostsToAnotherCapture) {
+  // Exactly 2e-9 s per ray voxel, and 3 s for the rest of the stage, 1 s of it for the trial.
   RunSettings base;
   base.fit.steps = {100, 100};
   base.fit.resolutions = {50, 100};
@@ -172,9 +174,9 @@ TEST(Prediction, LearnsWhatAUnitCostsAndAppliesItElsewhere) {
     OptionSet options;
     settings.Bind(&options);
     options.ApplyConfig(variant.options, "here");
-    // What is no matter of work's amount must not teach anything.
-    const double odd = variant.parameter == "fit-stop" ? 7 : 1;
-    measured.push_back(Of(variant, odd * truth(settings, capture), 26));
+    // A parameter that does not change the amount of work must be ignored.
+    const double factor = variant.parameter == "fit-stop" ? 7 : 1;
+    measured.push_back(Of(variant, factor * truth(settings, capture), 26));
   }
   const TemporaryFolder folder;
   Workspace workspace(folder / "w");
@@ -184,25 +186,37 @@ TEST(Prediction, LearnsWhatAUnitCostsAndAppliesItElsewhere) {
   const std::vector<CostTerm> costs = LearnCosts(base, capture, workspace, variants, measured);
   RunSettings larger = base;
   larger.fit.steps = {700, 900};
-  const std::vector<StageTime> times = Predict(
-      CostsFromJson(JsonValue::Object{{"unit_costs", ToJson(costs)}}, "here"), larger, other);
-  ASSERT_EQ(times.size(), 1u);  // of what was never seen nothing is said
+  const std::vector<StageTime> times =
+      Predict(CostsFromJson(
+                  JsonValue::Object{{"schema", kTradeoffSchema}, {"unit_costs", ToJson(costs)}},
+                  "here"),
+              larger, other);
+  ASSERT_EQ(times.size(), 1u);  // stages without a record are not predicted
   EXPECT_EQ(times[0].stage, "reconstruct");
-  // Three and a half times as many photos, and one trial (ten photos fitted are enough).
+  // 3.5 times as many photos, and one trial (ten training views are enough).
   EXPECT_NEAR(times[0].cpu_seconds, truth(larger, other) + 3.5 * 3 + 1, 1e-6);
   EXPECT_NEAR(times[0].seconds, 0.6 * truth(larger, other) + 3.5 * 2 + 1, 1e-6);
 }
 
-TEST(DurationEstimate, GetsBetterWithTheFirstMeasurement) {
+TEST(Prediction, RefusesCostsOfAnotherSchema) {
+  EXPECT_REGRADE_ERROR(
+      CostsFromJson(JsonValue::Object{{"schema", 1}, {"unit_costs", JsonValue::Array{}}},
+                    "a.json"),
+      ExitCode::kInput, "schema 1, and this version reads schema 2");
+  EXPECT_REGRADE_ERROR(CostsFromJson(JsonValue::Object{}, "a.json"), ExitCode::kInput,
+                       "no schema");
+}
+
+TEST(DurationEstimate, ImprovesWithTheFirstMeasurement) {
   RunSettings base;
   const Variant own = FitVariant("", "");
   Variant twice = FitVariant("fit-steps", "1600,4000,6000", true);
   twice.options["fit-steps"] = JsonValue::Array{1600, 4000, 6000};
-  DurationEstimate guess(base, {});
-  EXPECT_NEAR(guess.Seconds(twice), 2 * guess.Seconds(own), 1e-6 * guess.Seconds(own));
-  guess.Add({"fit", "", "", 0, 10, 15, 26});
-  EXPECT_NEAR(guess.Seconds(own), 10, 1e-9);
-  EXPECT_NEAR(guess.Seconds(twice), 20, 1e-6);
+  DurationEstimate estimate(base, {});
+  EXPECT_NEAR(estimate.Seconds(twice), 2 * estimate.Seconds(own), 1e-6 * estimate.Seconds(own));
+  estimate.Add({"fit", "", "", 0, 10, 15, 26});
+  EXPECT_NEAR(estimate.Seconds(own), 10, 1e-9);
+  EXPECT_NEAR(estimate.Seconds(twice), 20, 1e-6);
 }
 
 }  // namespace

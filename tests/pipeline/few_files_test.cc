@@ -1,5 +1,4 @@
-// Where the machine has no file descriptor left, nothing is said about the files: they are not
-// gone, and not damaged.
+// If no file descriptor is left, the error is about the limit, not about the files.
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
@@ -13,7 +12,7 @@
 namespace regrade {
 namespace {
 
-// No further file can be opened while it lives.
+// No further file can be opened during its lifetime.
 class NoFilesLeft {
  public:
   NoFilesLeft() {

@@ -28,7 +28,7 @@ TEST(FitCheckpoint, BackgroundSpheresComeBackBitForBit) {
   testing::AddSpheres(6, 5, 0.6, 2, &field);
   const FitState state = StateOf(field);
   const std::string with = PackFitState(state);
-  // The section is there only where there are spheres, behind all else.
+  // The last section exists only with spheres.
   EXPECT_EQ(with.substr(0, without.size()), without);
   EXPECT_GT(with.size(), without.size());
   ASSERT_TRUE(UnpackFitState(without));
@@ -49,7 +49,7 @@ TEST(FitCheckpoint, BackgroundSpheresComeBackBitForBit) {
   EXPECT_TRUE(std::equal(a.texels.begin(), a.texels.end(), b.texels.begin(), b.texels.end()));
   EXPECT_TRUE(std::equal(back->sphere_moment.begin(), back->sphere_moment.end(),
                          state.sphere_moment.begin(), state.sphere_moment.end()));
-  // Cut short, it is no state.
+  // Truncated bytes are refused.
   for (const size_t size : {without.size() + 1, without.size() + 8, with.size() - 1})
     EXPECT_FALSE(UnpackFitState(std::string_view(with).substr(0, size))) << size;
 }

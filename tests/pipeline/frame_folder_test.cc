@@ -23,8 +23,8 @@ FrameFolder Open(const std::string& folder, const std::vector<std::string>& name
   return OpenFrameFolder(folder);
 }
 
-// What is said when the folder is opened; "" if nothing is wrong.
-std::string Complaint(const std::string& folder, const std::vector<std::string>& names) {
+// The error on opening the folder; "" if there is none.
+std::string ErrorOf(const std::string& folder, const std::vector<std::string>& names) {
   try {
     Open(folder, names);
   } catch (const Error& error) {
@@ -44,22 +44,22 @@ TEST(FrameFolder, NaturalOrderAndEvenNumbers) {
   EXPECT_EQ(Open(folder / "a", {"f10.png", "f9.png", "f11.png"}).names,
             (std::vector<std::string>{"f9.png", "f10.png", "f11.png"}));
   EXPECT_EQ(Open(folder / "b", {"00000.png", "00002.png", "00004.png"}).Source().count, 3);
-  EXPECT_EQ(Complaint(folder / "c", {"left.png", "right.png", "top.png"}), "");
-  EXPECT_EQ(Complaint(folder / "d", {"a_1.png", "b_7.png", "c_99.png"}), "");
-  EXPECT_EQ(Complaint(folder / "e", {"take 2, 1.png", "take 2, 2.png"}), "");
+  EXPECT_EQ(ErrorOf(folder / "c", {"left.png", "right.png", "top.png"}), "");
+  EXPECT_EQ(ErrorOf(folder / "d", {"a_1.png", "b_7.png", "c_99.png"}), "");
+  EXPECT_EQ(ErrorOf(folder / "e", {"take 2, 1.png", "take 2, 2.png"}), "");
 }
 
 TEST(FrameFolder, AMissingNumberIsNamed) {
   const TemporaryFolder folder;
-  const std::string inside = Complaint(folder / "a", {"00000.png", "00001.png", "00003.png"});
+  const std::string inside = ErrorOf(folder / "a", {"00000.png", "00001.png", "00003.png"});
   EXPECT_TRUE(Has(inside, "frame 00002 is missing between 00001.png and 00003.png")) << inside;
-  const std::string first = Complaint(folder / "b", {"8.png", "10.png", "11.png"});
+  const std::string first = ErrorOf(folder / "b", {"8.png", "10.png", "11.png"});
   EXPECT_TRUE(Has(first, "frame 9 is missing")) << first;
 }
 
 TEST(FrameFolder, ANumberTwiceIsNamed) {
   const TemporaryFolder folder;
-  const std::string text = Complaint(folder / "a", {"1.png", "01.png", "2.png"});
+  const std::string text = ErrorOf(folder / "a", {"1.png", "01.png", "2.png"});
   EXPECT_TRUE(Has(text, "1.png")) << text;
   EXPECT_TRUE(Has(text, "have the same number")) << text;
 }
@@ -67,7 +67,7 @@ TEST(FrameFolder, ANumberTwiceIsNamed) {
 TEST(FrameFolder, MixedSizesNameTheFileAndBothSizes) {
   const TemporaryFolder folder;
   WriteText(folder / "00002.png", EncodePng8(Image(20, 12, 3)));
-  const std::string text = Complaint(folder.path(), {"00000.png", "00001.png"});
+  const std::string text = ErrorOf(folder.path(), {"00000.png", "00001.png"});
   EXPECT_TRUE(Has(text, "00002.png")) << text;
   EXPECT_TRUE(Has(text, "20 x 12 px")) << text;
   EXPECT_TRUE(Has(text, "16 x 12 px")) << text;
@@ -89,17 +89,17 @@ TEST(FrameFolder, DamagedFramesAreNamedBeforeWorkBegins) {
         jpeg.substr(0, jpeg.size() / 2)}) {
     const std::string here = folder / std::to_string(number++);
     WriteText(here + "/00002.png", bytes);
-    EXPECT_TRUE(Has(Complaint(here, names), "00002.png")) << number;
+    EXPECT_TRUE(Has(ErrorOf(here, names), "00002.png")) << number;
   }
   std::filesystem::create_directories(folder / "linked");
   std::filesystem::create_symlink("/nowhere", folder / "linked/00002.png");
-  EXPECT_TRUE(Has(Complaint(folder / "linked", names), "00002.png"));
+  EXPECT_TRUE(Has(ErrorOf(folder / "linked", names), "00002.png"));
 }
 
 TEST(FrameFolder, NoFramesAndNoFolder) {
   const TemporaryFolder folder;
-  EXPECT_TRUE(Has(Complaint(folder.path(), {}), "no frames"));
-  EXPECT_NE(Complaint(folder / "none", {}), "");
+  EXPECT_TRUE(Has(ErrorOf(folder.path(), {}), "no frames"));
+  EXPECT_NE(ErrorOf(folder / "none", {}), "");
 }
 
 TEST(FrameFolder, DifferentNumbersOfFramesNameTheOdd) {
@@ -109,7 +109,7 @@ TEST(FrameFolder, DifferentNumbersOfFramesNameTheOdd) {
   EXPECT_NO_THROW(CheckSameFrames(reference, reference));
   try {
     CheckSameFrames(reference, fewer);
-    FAIL() << "3 frames and 2 were taken for the same";
+    FAIL() << "3 frames and 2 frames were accepted";
   } catch (const Error& error) {
     const std::string text = error.what();
     EXPECT_TRUE(Has(text, "2 frames, the reference has 3")) << text;

@@ -29,7 +29,7 @@ TEST(Json, F75_DepthIsLimited) {
   const std::string fits = std::string(64, '[') + std::string(64, ']');
   EXPECT_NO_THROW(ParseJson(fits, "text"));
   EXPECT_REGRADE_ERROR(ParseJson("\n[" + fits + "]", "text"), ExitCode::kInput, "text:2:65");
-  // Far deeper than a stack.
+  // Deeper than the stack.
   EXPECT_REGRADE_ERROR(ParseJson(std::string(1000000, '['), "text"), ExitCode::kInput,
                        "64 levels");
 }

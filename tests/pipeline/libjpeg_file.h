@@ -1,4 +1,4 @@
-// JPEG files that our own encoder does not write: inks, and scans without end.
+// JPEG files that our encoder does not write: CMYK, and thousands of scans.
 #pragma once
 
 #include <stdlib.h>
@@ -12,7 +12,7 @@
 
 namespace regrade::testing {
 
-// A JPEG straight from libjpeg, for what our own encoder does not write.
+// A JPEG written with libjpeg.
 inline std::string LibjpegFile(const std::vector<unsigned char>& samples, int width, int height,
                                J_COLOR_SPACE space, int channels, int extra_scans) {
   jpeg_compress_struct info;
@@ -27,7 +27,7 @@ inline std::string LibjpegFile(const std::vector<unsigned char>& samples, int wi
   info.input_components = channels;
   info.in_color_space = space;
   jpeg_set_defaults(&info);
-  // One scan for the mean, then each coefficient in a scan of its own, twice.
+  // One scan for the mean, then one scan for each coefficient, twice.
   std::vector<jpeg_scan_info> scans;
   if (extra_scans > 0) {
     scans.push_back({1, {0}, 0, 0, 0, 0});

@@ -44,7 +44,7 @@ std::string SizeOf(const std::string& path) {
   return std::to_string(image.width) + "x" + std::to_string(image.height);
 }
 
-// A number that JSON could not hold is null, and its reason stands beside it.
+// A number that is not finite is null, and its reason stands beside it.
 void ExpectFiniteOrReason(const JsonValue& value, const std::string& name) {
   if (value.IsArray())
     for (const JsonValue& member : value.AsArray()) ExpectFiniteOrReason(member, name);
@@ -84,7 +84,7 @@ void CropPhoto(const std::string& capture, size_t index, int width, int height) 
   WriteTransformsJson(file, frames);
 }
 
-// name -> bytes of every file that a repeated run must make again.
+// name -> bytes of every file that a repeated run must reproduce.
 std::map<std::string, std::string> ResultsOf(const std::string& folder) {
   std::map<std::string, std::string> results;
   for (const auto& entry : fs::recursive_directory_iterator(folder)) {
@@ -108,7 +108,7 @@ TEST(MixedSizes, H159_ThreeSizesOfTwoCamerasGoToFilmAndReport) {
   EXPECT_NE(done.text.find("one camera (64x48 px) at each photo's place"), std::string::npos)
       << done.text;
 
-  // Views keep their shape; what is compared, and the film, have one.
+  // Views keep their shape; compared frames and the film have a common one.
   EXPECT_EQ(SizeOf(folder / "e/frames/styled/00000.png"), "64x48");
   EXPECT_EQ(SizeOf(folder / "e/frames/styled/00001.png"), "48x64");
   EXPECT_EQ(SizeOf(folder / "e/views_2d/00001.png"), "48x64");
@@ -156,18 +156,18 @@ TEST(MixedSizes, H159_ThreeSizesOfTwoCamerasGoToFilmAndReport) {
   EXPECT_EQ(sheet.code, 0) << sheet.text;
 
   // Frames of another program that differ in size are a mistake.
-  const ProgramOutcome foreign =
+  const ProgramOutcome sizes_differ =
       Regrade({"evaluate", "--frames", folder / "e/frames/styled", "--out", folder / "f"});
-  EXPECT_EQ(foreign.code, 3);
-  EXPECT_NE(foreign.text.find("48 x 64 px, 00000.png is 64 x 48 px"), std::string::npos)
-      << foreign.text;
-  EXPECT_NE(foreign.text.find("render all frames at one size"), std::string::npos);
+  EXPECT_EQ(sizes_differ.code, 3);
+  EXPECT_NE(sizes_differ.text.find("48 x 64 px, 00000.png is 64 x 48 px"), std::string::npos)
+      << sizes_differ.text;
+  EXPECT_NE(sizes_differ.text.find("render all frames at one size"), std::string::npos);
 }
 
 TEST(MixedSizes, H159_OnePhotoOfAnotherShape) {
   const TemporaryFolder folder;
   ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "5", "--size", "128x96"}).code, 0);
-  CropPhoto(folder / "s", 0, 72, 96);  // the first photo does not decide for all
+  CropPhoto(folder / "s", 0, 72, 96);  // the first photo does not determine the common camera
   const ProgramOutcome done = Regrade(RunOf(folder / "s/truth", folder / "e"));
   ASSERT_EQ(done.code, 0) << done.text;
   EXPECT_EQ(SizeOf(folder / "e/frames/source/00000.png"), "48x64");
@@ -205,7 +205,7 @@ TEST(MixedSizes, H159_FramesBelowTheFlowsPyramidHaveAReason) {
             std::string::npos);
 }
 
-// At the common camera the photos' labels do not fit: coverage is rendered from the field.
+// The photos' masks do not fit the common camera: coverage is rendered from the field.
 TEST(MixedSizes, H159_MasksOfPhotosThatDiffer) {
   const TemporaryFolder folder;
   ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "5", "--size", "128x96", "--effects",

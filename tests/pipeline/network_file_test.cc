@@ -21,7 +21,7 @@ float Random(uint64_t stream, size_t i) {
   return static_cast<float>(RandomDouble(5, stream, i) - 0.5);
 }
 
-// No value is like its neighbours, so that none can change places unseen.
+// All values differ, so that exchanged ones are detected.
 StoredNetwork SmallNetwork() {
   LipschitzNetworkData data = LipschitzNetwork().data();
   for (size_t i = 0; i < data.parameters.size(); ++i) data.parameters[i] = Random(1, i);
@@ -36,7 +36,7 @@ StoredNetwork SmallNetwork() {
     for (int j = 0; j < 3; ++j) data.base.matrix(i, j) = 1.0 / (1 + 3 * i + j);
     data.base.offset[i] = -0.1 * (i + 1);
   }
-  StoredNetwork stored{LipschitzNetwork(data), 1.0 / 3};
+  StoredNetwork stored{LipschitzNetwork(data), 1.0 / 3, {0.25f, 0.5f, 0.75f}};
   stored.network.WarmUpNorms();
   for (int l = 0; l < kNetworkLayers; ++l)
     stored.network.k(l) = 1 + 0.1f * static_cast<float>(l);
@@ -69,7 +69,7 @@ TEST(NetworkFile, RoundTripKeepsAllBits) {
   EXPECT_EQ(ReadText(folder / "again.npz"), ReadText(folder / "network.npz"));
 }
 
-TEST(NetworkFile, ArraysSayWhatTheyAre) {
+TEST(NetworkFile, ArraysHaveTheirNames) {
   const TemporaryFolder folder;
   const StoredNetwork out = SmallNetwork();
   WriteNetworkFile(folder / "network.npz", out);
@@ -79,7 +79,7 @@ TEST(NetworkFile, ArraysSayWhatTheyAre) {
   file.Read("weight_0", ArrayType::kF32, {64, 30});
   file.Read("u_5", ArrayType::kF32, {27});
   EXPECT_EQ(file.ReadScalar<float>("k_3"), out.network.k(3));
-  // u and v belong to their weight: u^T W v is the norm that the network works with.
+  // u^T W v is the norm that the network uses.
   const NpzArray u = file.Read("u_1", ArrayType::kF32, {64}),
                  v = file.Read("v_1", ArrayType::kF32, {64}),
                  w = file.Read("weight_1", ArrayType::kF32, {64, 64});
@@ -131,6 +131,8 @@ TEST_F(ChangedNetwork, F69_NonFiniteValues) {
   EXPECT_REGRADE_ERROR(ReadWith("bias_2", {64}, bias.data()), ExitCode::kInput, "not finite");
   const double k_est = std::numeric_limits<double>::infinity();
   EXPECT_REGRADE_ERROR(ReadWith("k_est", {}, &k_est), ExitCode::kInput, "k_est");
+  const float black_hole[] = {0, std::numeric_limits<float>::quiet_NaN(), 0};
+  EXPECT_REGRADE_ERROR(ReadWith("background", {3}, black_hole), ExitCode::kInput, "background");
 }
 
 TEST_F(ChangedNetwork, BoundIsOfTheWeights) {
@@ -143,13 +145,14 @@ TEST_F(ChangedNetwork, BoundIsOfTheWeights) {
   EXPECT_REGRADE_ERROR(ReadWith("bound", {}, &none), ExitCode::kInput, "guarantees the bound");
 }
 
-TEST_F(ChangedNetwork, UnknownActivationAndNewerVersion) {
+TEST_F(ChangedNetwork, UnknownActivationAndOtherVersions) {
   const std::string name = "swish";
   const auto* bytes = reinterpret_cast<const uint8_t*>(name.data());
   EXPECT_REGRADE_ERROR(ReadWith("activation", {5}, bytes), ExitCode::kInput, "swish");
-  const int32_t version = 99;
-  EXPECT_REGRADE_ERROR(ReadWith("regrade_version", {}, &version), ExitCode::kInput,
-                       "format 99");
+  const int32_t newer = 99, older = 1;
+  EXPECT_REGRADE_ERROR(ReadWith("regrade_version", {}, &newer), ExitCode::kInput, "format 99");
+  EXPECT_REGRADE_ERROR(ReadWith("regrade_version", {}, &older), ExitCode::kInput,
+                       "run regrade stylize again");
 }
 
 TEST(NetworkFile, F71_CutOffAnywhereIsRefused) {

@@ -1,11 +1,14 @@
 #include "pipeline/files/npz_file.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <cmath>
+#include <csignal>
+#include <filesystem>
 
 #include "kernels/base/random.h"
-#include "pipeline/files/zip_directory.h"
+#include "pipeline/files/atomic_file.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/small_archive.h"
 #include "tests/support/temporary_folder.h"
@@ -13,6 +16,7 @@
 namespace regrade {
 namespace {
 
+using testing::BytesOf;
 using testing::SmallArchive;
 using testing::TemporaryFolder;
 using testing::WriteText;
@@ -62,7 +66,67 @@ TEST(Npz, EmptyArrays) {
   EXPECT_EQ(reader.Read("none").shape, (std::vector<int64_t>{0, 27}));
 }
 
-// Cut anywhere, the archive is refused and never believed.
+// Rows are made while the file is written, in pieces of several megabytes.
+TEST(Npz, FilledRowsAreTheArray) {
+  const TemporaryFolder folder;
+  constexpr int64_t kRows = 2'500'000, kColumns = 3;
+  std::vector<float> whole(kRows * kColumns);
+  for (size_t i = 0; i < whole.size(); ++i) whole[i] = static_cast<float>(i % 1000);
+  for (const NpzPacking packing : {NpzPacking::kStore, NpzPacking::kDeflate}) {
+    int64_t next = 0;
+    NpzWriter filled, plain;
+    filled.AddFilled<float>(
+        "a", {kRows, kColumns},
+        [&](int64_t first, int64_t rows, float* to) {
+          EXPECT_EQ(first, next);
+          next = first + rows;
+          std::copy_n(whole.data() + first * kColumns, rows * kColumns, to);
+        },
+        packing);
+    filled.AddFilled<float>("none", {0, 4}, [](int64_t, int64_t, float*) { FAIL(); });
+    plain.Add("a", {kRows, kColumns}, whole.data(), packing);
+    plain.Add<float>("none", {0, 4}, nullptr);
+    filled.WriteTo(folder / "filled.npz");
+    plain.WriteTo(folder / "plain.npz");
+    EXPECT_EQ(next, kRows);
+    EXPECT_EQ(ReadWholeFile(folder / "filled.npz", 1 << 30),
+              ReadWholeFile(folder / "plain.npz", 1 << 30));
+  }
+}
+
+// WriteTo rethrows the exception of a fill function, and the old file stays.
+TEST(Npz, AFailureWhileWritingKeepsTheOldFile) {
+  const TemporaryFolder folder;
+  WriteText(folder / "a.npz", "old");
+  NpzWriter writer;
+  writer.AddFilled<float>("a", {4}, [](int64_t, int64_t, float*) {
+    throw Error(ExitCode::kInput, "no such row", "there");
+  });
+  EXPECT_REGRADE_ERROR(writer.WriteTo(folder / "a.npz"), ExitCode::kInput, "no such row");
+  EXPECT_EQ(ReadWholeFile(folder / "a.npz", 100), "old");
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1);
+  EXPECT_REGRADE_ERROR(writer.WriteTo(folder / "none/a.npz"), ExitCode::kResources,
+                       "none/a.npz");
+}
+
+// A full disk: the error names the file, and neither it nor a temporary is left.
+TEST(Npz, AFullDiskNamesTheFile) {
+  const TemporaryFolder folder;
+  const std::vector<float> values(1 << 20, 1.f);
+  NpzWriter writer;
+  writer.Add("a", {1 << 20}, values.data());
+  rlimit before;
+  ::getrlimit(RLIMIT_FSIZE, &before);
+  const auto handler = ::signal(SIGXFSZ, SIG_IGN);
+  const rlimit small{1 << 20, before.rlim_max};
+  ::setrlimit(RLIMIT_FSIZE, &small);
+  EXPECT_REGRADE_ERROR(writer.WriteTo(folder / "a.npz"), ExitCode::kResources, "a.npz");
+  ::setrlimit(RLIMIT_FSIZE, &before);
+  ::signal(SIGXFSZ, handler);
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+}
+
+// An archive that is cut anywhere is refused.
 TEST(Npz, F71_TruncatedAnywhere) {
   const TemporaryFolder folder;
   const std::string bytes = SmallArchive();
@@ -72,8 +136,8 @@ TEST(Npz, F71_TruncatedAnywhere) {
   }
 }
 
-// One flipped bit of the packed data is found by the checksum; of the rest it is found, or
-// changes nothing that we use. Nothing else than Error may come out.
+// The checksum detects a flipped bit of the data; any other bit is detected or does not matter.
+// Only Error may be thrown.
 TEST(Npz, F70_FlippedBits) {
   const TemporaryFolder folder;
   const std::string bytes = SmallArchive();
@@ -115,38 +179,44 @@ TEST(Npz, F71_DeflateRatioAndStoredSizes) {
   const size_t central = bytes.find("PK\x01\x02");
   const size_t second = bytes.find("PK\x01\x02", central + 4);
   const size_t second_local = bytes.find("PK\x03\x04", 4);
-  // Both descriptions agree on a size that deflate cannot reach.
+  // Both headers agree on a size that deflate cannot reach.
   std::string bomb = Patched(bytes, second + 24, 1u << 30, 4);
   bomb = Patched(bomb, second_local + 22, 1u << 30, 4);
   WriteText(folder / "a.npz", bomb);
   EXPECT_REGRADE_ERROR(ReadEverything(folder / "a.npz"), ExitCode::kInput,
                        "more than deflate can do");
-  WriteText(folder / "a.npz", Patched(bytes, central + 24, 1000, 4));
+  WriteText(folder / "a.npz", Patched(Patched(bytes, central + 24, 1000, 4), 22, 1000, 4));
   EXPECT_REGRADE_ERROR(ReadEverything(folder / "a.npz"), ExitCode::kInput, "sizes differ");
-  // Only one of them says so.
+  // The two headers disagree.
   WriteText(folder / "a.npz", Patched(bytes, second_local + 22, 4000, 4));
   EXPECT_REGRADE_ERROR(ReadEverything(folder / "a.npz"), ExitCode::kInput, "disagree");
 }
 
 TEST(Npz, F67_OverlappingMembers) {
   const TemporaryFolder folder;
-  // Two names for one member, both descriptions agreeing: only the byte ranges tell.
+  // Two names for one member.
   static const float values[6] = {1, 2, 3, 4, 5, 6};
   NpzWriter writer;
-  writer.Add("a", {6}, values);
-  writer.Add("b", {6}, values);
-  std::string bytes = writer.Bytes();
+  for (const char* name : {"a", "b", "c"}) writer.Add(name, {6}, values);
+  const std::string whole = BytesOf(writer);
+  std::string bytes = whole;
   const size_t central = bytes.find("PK\x01\x02", bytes.find("PK\x01\x02") + 4);
   bytes = Patched(bytes, central + 42, 0, 4);  // b's local header is a's
   bytes[central + 46] = 'a';
   WriteText(folder / "a.npz", bytes);
   EXPECT_REGRADE_ERROR(ReadEverything(folder / "a.npz"), ExitCode::kInput, "twice");
-  // The overlap itself: the first member claims the second's bytes too.
-  bytes = writer.Bytes();
-  const size_t first = bytes.find("PK\x01\x02");
-  const size_t whole = bytes.find("PK\x03\x04", 4) + 100 - bytes.find("\x93NUMPY");
-  for (const size_t at : {first + 20, first + 24, size_t{18}, size_t{22}})
-    bytes = Patched(bytes, at, whole, 4);
+  // Each member claims the bytes of all that follow it, and all headers agree.
+  bytes = whole;
+  const size_t directory = bytes.find("PK\x01\x02");
+  size_t local = 0, entry = directory;
+  for (int i = 0; i < 3; ++i) {
+    constexpr size_t kLocalHeader = 30, kName = 5;
+    const size_t size = directory - local - kLocalHeader - kName;
+    for (const size_t at : {local + 18, local + 22, entry + 20, entry + 24})
+      bytes = Patched(bytes, at, size, 4);
+    local = whole.find("PK\x03\x04", local + 4);
+    entry = whole.find("PK\x01\x02", entry + 4);
+  }
   WriteText(folder / "a.npz", bytes);
   EXPECT_REGRADE_ERROR(ReadEverything(folder / "a.npz"), ExitCode::kInput, "share bytes");
 }

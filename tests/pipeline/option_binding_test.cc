@@ -77,7 +77,7 @@ TEST_F(Options, SwitchesDoNotSwallowWords) {
 TEST_F(Options, TwoDashesEndTheFlags) {
   EXPECT_EQ(Parse({"--flag", "--", "--rays", "-x"}),
             (std::vector<std::string>{"--rays", "-x"}));
-  EXPECT_REGRADE_ERROR(Parse({"-x"}), ExitCode::kUsage, "behind --");
+  EXPECT_REGRADE_ERROR(Parse({"-x"}), ExitCode::kUsage, "after --");
 }
 
 TEST_F(Options, F18_UnknownNamesSuggestTheNearest) {
@@ -120,7 +120,7 @@ struct CommaDecimals : std::numpunct<char> {
 };
 
 TEST_F(Options, F20_ACommaLocaleChangesNothing) {
-  // C's locale where the system has one, and C++'s own in any case.
+  // C's locale where the system has one, and C++'s.
   for (const char* name : {"de_DE.UTF-8", "de_DE.utf8", "fr_FR.UTF-8"})
     if (std::setlocale(LC_ALL, name) != nullptr) break;
   const std::locale before = std::locale::global(std::locale(std::locale(), new CommaDecimals));
@@ -161,7 +161,7 @@ TEST_F(Options, F22_ConfigErrorsNameLineAndColumn) {
                        "an object");
 }
 
-TEST_F(Options, HelpTellsUnitDefaultAndBounds) {
+TEST_F(Options, HelpHasUnitDefaultAndBounds) {
   Parse({});
   const std::string help = set_.Help();
   EXPECT_NE(help.find("in a step (rays, 64 to 4194304, default 4096)"), std::string::npos)

@@ -1,4 +1,4 @@
-// Jobs that a second thread does: in order, few at a time, and with their errors.
+// Jobs of a worker thread: their order, number and errors.
 #include "pipeline/program/ordered_worker.h"
 
 #include <gtest/gtest.h>
@@ -23,7 +23,7 @@ TEST(OrderedWorker, DoesAllJobsInOrder) {
   for (int i = 0; i < 100; ++i) EXPECT_EQ(done[static_cast<size_t>(i)], i);
 }
 
-// What jobs hold is bounded: those that wait, one at work, and the one that is offered.
+// The number of jobs in memory is bounded: queued ones, the running one, and the offered one.
 TEST(OrderedWorker, HoldsFewJobs) {
   std::atomic<int> held = 0, most = 0;
   struct Load {
@@ -44,7 +44,7 @@ TEST(OrderedWorker, HoldsFewJobs) {
   EXPECT_EQ(held, 0);
 }
 
-TEST(OrderedWorker, AnErrorComesBackAndNothingIsDoneAfterIt) {
+TEST(OrderedWorker, AnErrorIsRethrownAndLaterJobsAreDropped) {
   std::atomic<int> done = 0;
   OrderedWorker worker;
   worker.Do([&done] { ++done; });
@@ -59,8 +59,8 @@ TEST(OrderedWorker, AnErrorComesBackAndNothingIsDoneAfterIt) {
   EXPECT_THROW(worker.Finish(), std::runtime_error);
 }
 
-// The first job ends only when the ones behind it are gone: were they kept, this would hang.
-TEST(OrderedWorker, WhoLeavesDropsWhatWaits) {
+// The first job ends only when the queued ones are dropped: otherwise this would hang.
+TEST(OrderedWorker, TheDestructorDropsQueuedJobs) {
   std::atomic<int> done = 0;
   std::atomic<bool> dropped = false;
   struct Dropped {

@@ -1,5 +1,4 @@
-// Pictures and files that a test makes for itself: textured photos, EXIF blocks, scratch
-// folders.
+// Pictures and files made by tests: textured photos, EXIF blocks, scratch folders.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -93,7 +92,7 @@ inline std::string ExifBlock(int orientation, int focal_35mm, int focal_mm = 0,
   return std::string("Exif\0\0", 6) + tiff;
 }
 
-// A JPEG with the segment put behind its first two bytes.
+// A JPEG with the segment inserted after its first two bytes.
 inline std::string WithSegment(const std::string& jpeg, int marker, const std::string& body) {
   std::string segment = "\xff";
   segment += static_cast<char>(marker);
@@ -117,7 +116,7 @@ inline std::string FloatTiff(const Image& image) {
   return tiff + data;
 }
 
-// What a person would be told; "" if the photo was decoded.
+// The reason of a refusal; "" if the photo was decoded.
 inline std::string Refusal(const std::string& path, const DecodeLimits& limits = {}) {
   static std::map<std::string, int> count;  // of this test
   const std::string test = ::testing::UnitTest::GetInstance()->current_test_info()->name();
@@ -146,7 +145,7 @@ inline double MaxDifference(const Image& a, const Image& b) {
   return worst;
 }
 
-// A test with a folder of its own.
+// A test with a scratch folder.
 class PictureTest : public ::testing::Test {
  protected:
   std::string Put(const std::string& name, const std::string& bytes) {

@@ -70,6 +70,19 @@ TEST(Program, F18_UsageErrorsExitWith2) {
   EXPECT_EQ(Regrade({"synth", "x", "--scene", "moon"}).code, 2);
 }
 
+// The child process of crash_probe.h.
+TEST(Program, F73_ProbesReadOneFileAndReport) {
+  const TemporaryFolder folder;
+  WriteText(folder / "diary.onnx", "Dear diary,");
+  for (const char* kind : {"style", "pair"}) {
+    const Outcome outcome = Regrade({"--probe", "30000000000", kind, folder / "diary.onnx"});
+    EXPECT_EQ(outcome.code, 4);
+    EXPECT_SAYS(outcome, "diary.onnx");
+  }
+  EXPECT_EQ(Regrade({"--probe", "30000000000", "novel", "x"}).code, 2);
+  EXPECT_EQ(Regrade({"--probe", "style", "x"}).code, 2);
+}
+
 TEST(Program, F21_ContradictionsNameBoth) {
   const Outcome outcome = Regrade(
       {"reconstruct", "x", "--out", "y", "--fit-resolutions", "32", "--fit-steps", "9,9"});

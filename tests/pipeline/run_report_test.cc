@@ -1,5 +1,4 @@
-// What a whole run leaves to look at: heat maps, curves, costs, and the command that repeats
-// it.
+// The report of a whole run: heat maps, curves, posters, and the command that repeats it.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -26,7 +25,7 @@ int HeatMapFiles(const std::string& folder) {
   return files;
 }
 
-// Each row of a sequence that errs names a map that is there.
+// The number of rows that name a heat map; each must exist.
 int HeatMapsNamed(const std::string& folder) {
   int maps = 0;
   const JsonValue report = ReadJsonFile(folder + "/report.json");
@@ -40,7 +39,7 @@ int HeatMapsNamed(const std::string& folder) {
   return maps;
 }
 
-TEST(RunReport, ShowsWhatTheRunWasLike) {
+TEST(RunReport, ShowsEveryPartOfTheRun) {
   const TemporaryFolder folder;
   const std::string style = std::string(REGRADE_SOURCE_DIR) + "/assets/style_sunset.png";
   ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}).code, 0);
@@ -53,8 +52,8 @@ TEST(RunReport, ShowsWhatTheRunWasLike) {
   EXPECT_NE(done.text.find("exposure off: not measured (off by --effects)"), std::string::npos)
       << done.text;
 
-  // Three sequences at the photos' places and three along the way, at gaps 1 and 5; the way has
-  // three frames, so no pair 5 apart.
+  // Three sequences at the photos' positions and three along the film's path, at gaps 1 and 5;
+  // the path has three frames, so no pair is 5 apart.
   EXPECT_EQ(HeatMapsNamed(folder / "e"), 9);
   EXPECT_EQ(HeatMapFiles(folder / "e"), 9);
   const JsonValue report = ReadJsonFile(folder / "e/report.json");
@@ -63,12 +62,17 @@ TEST(RunReport, ShowsWhatTheRunWasLike) {
   EXPECT_GT(fit.At("cpu_seconds").AsDouble(), 0);
   EXPECT_TRUE(std::filesystem::exists(folder / "e/views_2d.mp4"));
   const std::string page = testing::ReadText(folder / "e/report.html");
-  for (const char* part : {"PSNR of the fit over steps", "Lipschitz bound over steps",
-                           "where the photos were taken", "styled, frames ", "views_2d.mp4",
-                           "<td class=\"n soft\">not measured"})
+  for (const char* part :
+       {"PSNR of the fit over steps", "Lipschitz bound over steps", "positions of the cameras",
+        "styled scene, frames ", "views_2d.mp4", "<td class=\"n soft\">not measured"})
     EXPECT_NE(page.find(part), std::string::npos) << part;
+  size_t posters = 0;
+  for (size_t at = page.find(" poster=\"data:image/jpeg"); at != std::string::npos;
+       at = page.find(" poster=\"data:image/jpeg", at + 1))
+    ++posters;
+  EXPECT_EQ(posters, 3u);
 
-  // The command that the report names asks for the same options.
+  // The command in the report results in the same options.
   std::vector<std::string> again;
   for (const JsonValue& word : report.At("command").AsArray()) again.push_back(word.AsString());
   ASSERT_EQ(again[0], "regrade");
@@ -83,15 +87,15 @@ TEST(RunReport, ShowsWhatTheRunWasLike) {
       EXPECT_EQ(DumpJson(value, -1), DumpJson(are.At(name), -1)) << name;
     }
 
-  // Measured again, with other pairs: the earlier ones' maps are gone.
+  // Evaluated again with other pairs: the maps of the earlier ones are gone.
   const testing::ProgramOutcome measured = Regrade({"evaluate", folder / "e", "--gaps", "2"});
   ASSERT_EQ(measured.code, 0) << measured.text;
   EXPECT_EQ(HeatMapsNamed(folder / "e"), 6);
   EXPECT_EQ(HeatMapFiles(folder / "e"), 6);
 }
 
-// A picture of one colour has no spread to give: said on the terminal, in report.json and on
-// the page. H158: before that, up to the field, nobody has looked for motion.
+// H157: a style picture of one colour is reported on the terminal, in report.json and on the
+// page. H158: up to the field, no optical flow is computed.
 TEST(RunReport, H157_H158_AGreyStyleIsNamedAndWithoutEvaluationNothingMoves) {
   const TemporaryFolder folder;
   Image grey(32, 24, 3);
@@ -117,9 +121,9 @@ TEST(RunReport, H157_H158_AGreyStyleIsNamedAndWithoutEvaluationNothingMoves) {
   const JsonValue stages = ReadJsonFile(folder / "e/report.json").At("stages");
   const JsonValue* notices = stages.At("style_2d").Find("notices");
   ASSERT_NE(notices, nullptr);
-  const std::string said = notices->AsArray()[0].AsString();
-  EXPECT_NE(said.find("single colour"), std::string::npos) << said;
-  EXPECT_NE(done.text.find(said), std::string::npos);
+  const std::string notice = notices->AsArray()[0].AsString();
+  EXPECT_NE(notice.find("single colour"), std::string::npos) << notice;
+  EXPECT_NE(done.text.find(notice), std::string::npos);
   EXPECT_NE(testing::ReadText(folder / "e/report.html").find("single colour"),
             std::string::npos);
 }

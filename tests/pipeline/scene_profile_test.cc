@@ -70,14 +70,14 @@ TEST(SceneEffects, H153_RowsCarryTheNumbersOfTheDecision) {
 
 TEST(SceneProfile, OverridesAreParsedAndErrorsNamed) {
   EXPECT_TRUE(ParseEffects("auto").empty());
-  const auto wishes = ParseEffects("ndc=off,alpha=on");
-  EXPECT_FALSE(wishes.at("ndc"));
-  EXPECT_TRUE(wishes.at("alpha"));
+  const auto overrides = ParseEffects("ndc=off,alpha=on");
+  EXPECT_FALSE(overrides.at("ndc"));
+  EXPECT_TRUE(overrides.at("alpha"));
   for (const char* text : {"fog", "ndc", "ndc=maybe", "distortion=on", ","})
     EXPECT_REGRADE_ERROR(ParseEffects(text), ExitCode::kUsage, "is not allowed");
 }
 
-// Cameras side by side that look one way: NDC by itself, the box when that is wished.
+// Cameras side by side that look one way: NDC by itself, the box when an override asks for it.
 TEST(SceneProfile, ForwardFacingCapturesUseNdc) {
   Capture capture = CaptureWithShifts({0, 0, 0, 0});
   for (size_t i = 0; i < capture.views.size(); ++i)
@@ -141,7 +141,7 @@ TEST(SceneProfile, H153_H156_FarSurroundingsUseSpheres) {
       ExitCode::kUsage, "alpha");
 }
 
-// H154: the photos' order has no say.
+// H154: the photos' order does not matter.
 TEST(SceneProfile, H154_BackgroundIsIndependentOfThePhotosOrder) {
   Capture capture = CaptureSeenAllRound(2);
   const double value = *ProfileScene(capture, 2, "exposure=off").effects[3].value.value;

@@ -1,4 +1,4 @@
-// Synthetic captures on disk: complete, repeatable, and honest about what was simulated.
+// Synthetic captures on disk: complete, repeatable, and with exact ground truth.
 #include "pipeline/synth/synth_capture.h"
 
 #include <gtest/gtest.h>
@@ -100,7 +100,7 @@ TEST_F(SynthCapture, WritesPhotosAndTruth) {
   EXPECT_EQ(names, expected);
 }
 
-TEST_F(SynthCapture, TruthOnDiskIsTheScenes) {
+TEST_F(SynthCapture, TruthOnDiskIsThatOfTheScene) {
   const fs::path out = Write("a");
   const SyntheticScene scene = MakeSyntheticScene("table", 0);
   const std::vector<Camera> cameras = SyntheticCameras(scene, 3, 64, 48);
@@ -133,8 +133,7 @@ TEST_F(SynthCapture, SameBytesForAnyNumberOfThreadsAndEveryTime) {
   EXPECT_EQ(three, AllBytes(Write("three", "exposure,noise,distortion,highlights")));
 }
 
-// Each effect changes what it claims to change and nothing else; without it the files are those
-// of a capture that never heard of it.
+// Each effect changes only its own files.
 TEST_F(SynthCapture, EffectsThatAreOffLeaveNoTrace) {
   const auto plain = AllBytes(Write("plain"));
   for (const char* effect : {"exposure", "noise", "highlights", "distortion"}) {
@@ -148,7 +147,7 @@ TEST_F(SynthCapture, EffectsThatAreOffLeaveNoTrace) {
   }
 }
 
-TEST_F(SynthCapture, EachEffectLeavesItsExactTruth) {
+TEST_F(SynthCapture, EachEffectRecordsItsParameters) {
   const fs::path out = Write("all", "exposure,noise,distortion,highlights");
   const JsonValue effects = ReadJsonFile((out / "truth/effects.json").string()).At("effects");
   const JsonValue::Array& gains = effects.At("exposure").At("gains").AsArray();
@@ -169,8 +168,8 @@ TEST_F(SynthCapture, EachEffectLeavesItsExactTruth) {
     EXPECT_FALSE(none.At(name).At("on").AsBool());
 }
 
-// Tracks are true to half a pixel, poses are off by what is stated, and photos do not change.
-TEST_F(SynthCapture, PosesThatAreOffComeWithTracks) {
+// Tracks have noise of half a pixel, poses have the stated errors, and photos do not change.
+TEST_F(SynthCapture, InaccuratePosesComeWithTracks) {
   const fs::path out = Write("poses", "poses", {}, 5), plain = Write("plain", "", {}, 5);
   EXPECT_EQ(Bytes(out / "images/00003.png"), Bytes(plain / "images/00003.png"));
   const ColmapModel model = ReadColmapModel((out / "sparse/0").string());
@@ -236,7 +235,7 @@ TEST_F(SynthCapture, RefusesUnknownEffectsScenesAndSizes) {
        {"fog", "noise,,exposure", "noise ", "motion-blur", "occluders", "barrel,fisheye"}) {
     SynthOptions options;
     options.effects = effects;
-    EXPECT_NE(refusal(options).find("exposure, noise, highlights, masks, poses, and one lens"),
+    EXPECT_NE(refusal(options).find("masks, poses, mixed-cameras, and one lens"),
               std::string::npos);
   }
   for (const char* size : {"", "640", "640x", "x480", "640x480x3", "0x0", "8x8", "99999x2",

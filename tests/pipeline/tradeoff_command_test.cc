@@ -1,5 +1,4 @@
-// regrade tradeoff over a tiny capture: what it writes, that it goes on where it stopped, and
-// what it predicts.
+// regrade tradeoff with a tiny capture: its outputs, continuation and predictions.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -25,7 +24,7 @@ size_t Count(const std::string& text, const std::string& what) {
   return count;
 }
 
-TEST(TradeoffCommand, MeasuresGoesOnAndPredicts) {
+TEST(TradeoffCommand, MeasuresContinuesAndPredicts) {
   const TemporaryFolder folder;
   const std::string style = std::string(REGRADE_SOURCE_DIR) + "/assets/style_sunset.png";
   ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}).code, 0);
@@ -45,7 +44,7 @@ TEST(TradeoffCommand, MeasuresGoesOnAndPredicts) {
   EXPECT_NE(outcome.text.find("flow: flow dis-ultrafast, about"), std::string::npos);
   EXPECT_FALSE(std::filesystem::exists(folder / "t"));
 
-  // Without a minute to spend, one measurement is made and the rest is told.
+  // With no budget, makes one measurement and reports the number of the others.
   outcome = tradeoff({"--repeats", "1", "--budget", "1e-9"});
   ASSERT_EQ(outcome.code, 0) << outcome.text;
   EXPECT_NE(outcome.text.find("the budget is spent"), std::string::npos) << outcome.text;
@@ -54,17 +53,18 @@ TEST(TradeoffCommand, MeasuresGoesOnAndPredicts) {
 
   outcome = tradeoff({"--repeats", "1"});
   ASSERT_EQ(outcome.code, 0) << outcome.text;
-  const JsonValue list = ReadJsonFile(folder / "t/tradeoff.json");
+  const JsonValue result = ReadJsonFile(folder / "t/tradeoff.json");
   // Four bases, three values of the steps, two weights, four flows and three ends of a ray.
-  EXPECT_EQ(list.At("costs").AsArray().size(), 4u + 3 + 2 + 4 + 3);
-  EXPECT_EQ(Count(outcome.text, "] "), 16 - left);  // what was measured is not measured again
+  EXPECT_EQ(result.At("schema").AsInt(), 2);
+  EXPECT_EQ(result.At("costs").AsArray().size(), 4u + 3 + 2 + 4 + 3);
+  EXPECT_EQ(Count(outcome.text, "] "), 16 - left);  // measurements are not repeated
   int on_pareto_front = 0;
-  for (const JsonValue& row : list.At("costs").AsArray()) {
+  for (const JsonValue& row : result.At("costs").AsArray()) {
     EXPECT_TRUE(row.At("accuracy").IsNumber()) << DumpJson(row, -1);
     EXPECT_GT(row.At("cpu_seconds").AsDouble(), 0);
     on_pareto_front += row.At("on_pareto_front").AsBool();
   }
-  EXPECT_GE(on_pareto_front, 4);  // each plane has at least its best
+  EXPECT_GE(on_pareto_front, 4);  // at least one per benchmark
   EXPECT_EQ(Count(testing::ReadText(folder / "t/tradeoff.csv"), "\n"), 17u);
   EXPECT_NE(testing::ReadText(folder / "t/tradeoff.html").find("accuracy over time, flow"),
             std::string::npos);
@@ -72,7 +72,7 @@ TEST(TradeoffCommand, MeasuresGoesOnAndPredicts) {
   outcome = tradeoff({"--repeats", "1"});
   EXPECT_EQ(Count(outcome.text, "] "), 0u) << outcome.text;
 
-  // The base is a run like any other, and is predicted from the prices.
+  // The base is an ordinary run, and its time is predicted from the costs.
   outcome = Regrade(
       {"tradeoff", "--predict", folder / "t/base", "--costs", folder / "t/tradeoff.json"});
   ASSERT_EQ(outcome.code, 0) << outcome.text;
@@ -80,20 +80,25 @@ TEST(TradeoffCommand, MeasuresGoesOnAndPredicts) {
     EXPECT_NE(outcome.text.find(std::string("\n") + stage), std::string::npos)
         << stage << outcome.text;
 
-  // Beside a run the list becomes part of its report; a damaged one is left out, and said.
+  // In the folder of a run the table becomes part of its report; a damaged one or one of
+  // another schema is omitted with a warning.
   const auto page = [&] { return testing::ReadText(folder / "t/base/report.html"); };
-  testing::WriteText(folder / "t/base/tradeoff/tradeoff.json", "{\"prices\": [{}]}");
+  testing::WriteText(folder / "t/base/tradeoff/tradeoff.json",
+                     "{\"schema\": 1, \"costs\": [{}]}");
   outcome = Regrade({"evaluate", folder / "t/base"});
   ASSERT_EQ(outcome.code, 0) << outcome.text;
-  EXPECT_NE(outcome.text.find("tradeoff.json is left out"), std::string::npos) << outcome.text;
-  EXPECT_EQ(page().find("What accuracy costs here"), std::string::npos);
+  EXPECT_NE(outcome.text.find("the report does without tradeoff/tradeoff.json"),
+            std::string::npos)
+      << outcome.text;
+  EXPECT_NE(outcome.text.find("schema 1"), std::string::npos) << outcome.text;
+  EXPECT_EQ(page().find("Accuracy and cost"), std::string::npos);
   testing::WriteText(folder / "t/base/tradeoff/tradeoff.json",
                      testing::ReadText(folder / "t/tradeoff.json"));
   EXPECT_EQ(Regrade({"evaluate", folder / "t/base"}).code, 0);
-  EXPECT_NE(page().find("What accuracy costs here"), std::string::npos);
+  EXPECT_NE(page().find("Accuracy and cost"), std::string::npos);
 }
 
-TEST(TradeoffCommand, SaysWhatWillNotDo) {
+TEST(TradeoffCommand, RefusesInvalidArguments) {
   const TemporaryFolder folder;
   std::filesystem::create_directories(folder / "photos");
   EXPECT_EQ(
@@ -106,9 +111,9 @@ TEST(TradeoffCommand, SaysWhatWillNotDo) {
       2);
   EXPECT_EQ(Regrade({"tradeoff", folder / "photos"}).code, 2);
   EXPECT_EQ(Regrade({"tradeoff", "--predict", folder / "photos"}).code, 2);
-  testing::WriteText(folder / "prices.json", "{}");
+  testing::WriteText(folder / "costs.json", "{}");
   EXPECT_EQ(
-      Regrade({"tradeoff", "--predict", folder / "photos", "--costs", folder / "prices.json"})
+      Regrade({"tradeoff", "--predict", folder / "photos", "--costs", folder / "costs.json"})
           .code,
       3);
   EXPECT_FALSE(std::filesystem::exists(folder / "t"));

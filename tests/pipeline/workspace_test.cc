@@ -16,7 +16,7 @@
 #include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"
 
-// What this program asks of the disk while somebody listens.
+// Records the program's calls to the disk.
 static std::vector<std::string>* disk_calls = nullptr;
 
 extern "C" int fsync(int fd) {
@@ -104,7 +104,7 @@ TEST(Workspace, F41_EditedAndDeletedResults) {
   WriteText(workspace.Path("poses/a.bin"), "abc");
   WriteText(workspace.Path("poses/b.bin"), "def");
   workspace.Record("pose", Inputs(1), {"poses"}, 1, JsonValue::Object());
-  // Same length, and the time stamp of before: only the content tells.
+  // Same length and time stamp: only the content differs.
   const auto time = fs::last_write_time(workspace.Path("poses/a.bin"));
   WriteText(workspace.Path("poses/a.bin"), "abd");
   fs::last_write_time(workspace.Path("poses/a.bin"), time);
@@ -135,11 +135,26 @@ TEST(Workspace, F42_TheFolderCanMove) {
   EXPECT_EQ(workspace.LoadCheckpoint("reconstruct", Inputs(2)), "state");
 }
 
-TEST(Workspace, RecordsOfNewerVersionsAreRefused) {
+TEST(Workspace, RecordsOfOtherFormatsAreRefused) {
   const TemporaryFolder folder;
   Workspace workspace(folder / "out");
-  WriteText(workspace.Path(".regrade/stages/pose.json"), R"({"schema": 99, "regrade": "7.0"})");
+  const std::string path = workspace.Path(".regrade/stages/pose.json");
+  WriteText(path, R"({"schema": 99, "regrade": "7.0"})");
   EXPECT_REGRADE_ERROR(workspace.Find("pose"), ExitCode::kInput, "written by regrade 7.0");
+  EXPECT_REGRADE_ERROR(workspace.Find("pose"), ExitCode::kInput, "update regrade");
+  WriteText(path, R"({"schema": 1, "regrade": "0.1.0"})");
+  EXPECT_REGRADE_ERROR(workspace.Find("pose"), ExitCode::kInput, "in format 1; this is");
+  EXPECT_REGRADE_ERROR(workspace.Find("pose"), ExitCode::kInput, "--out");
+}
+
+TEST(Workspace, FoldersOfOlderSchemasAreRefused) {
+  const TemporaryFolder folder;
+  const std::string record = folder / "out/.regrade/stages/pose.json";
+  WriteText(record, R"({"schema": 1, "regrade": "0.1.0"})");
+  EXPECT_REGRADE_ERROR(Workspace(folder / "out"), ExitCode::kInput, "regrade (schema 1)");
+  EXPECT_REGRADE_ERROR(Workspace(folder / "out"), ExitCode::kInput, "use another --out");
+  WriteText(record, "{ \"schema\"");  // a damaged record concerns its stage only
+  EXPECT_NO_THROW(Workspace(folder / "out"));
 }
 
 TEST(Workspace, RecordsCannotLeadOutOfTheFolder) {
@@ -148,7 +163,7 @@ TEST(Workspace, RecordsCannotLeadOutOfTheFolder) {
   for (const char* path : {"../secret", "/etc/passwd", "a/../../b", "poses/"}) {
     WriteJsonFile(
         workspace.Path(".regrade/stages/pose.json"),
-        JsonValue::Object{{"schema", 1},
+        JsonValue::Object{{"schema", 2},
                           {"regrade", "x"},
                           {"inputs", JsonValue::Object()},
                           {"outputs", JsonValue::Array{JsonValue::Object{
@@ -175,7 +190,7 @@ TEST(Workspace, F33_UnusableFoldersAtStart) {
   WriteText(folder / "file", "x");
   EXPECT_REGRADE_ERROR(Workspace(folder / "file"), ExitCode::kResources, "file");
   EXPECT_REGRADE_ERROR(Workspace(folder / "file/below"), ExitCode::kResources, "cannot make");
-  // Root writes anywhere: the rest is for others.
+  // Root may write anywhere: the rest is for other users.
   if (::geteuid() == 0) {
     const int code = InChild([&folder] {
       ::chmod(folder.path().c_str(), 0555);
@@ -219,15 +234,7 @@ TEST(Workspace, CheckpointsBelongToTheirInputs) {
   }
 }
 
-TEST(Workspace, FreeSpaceIsLookedAtFirst) {
-  const TemporaryFolder folder;
-  const Workspace workspace(folder / "out");
-  EXPECT_NO_THROW(workspace.RequireFreeSpace(1, "a test"));
-  EXPECT_REGRADE_ERROR(workspace.RequireFreeSpace(uint64_t{1} << 62, "a test"),
-                       ExitCode::kResources, "a test needs");
-}
-
-TEST(FolderLock, F38_SecondRunIsToldWho) {
+TEST(FolderLock, F38_ASecondRunGetsTheHolder) {
   const TemporaryFolder folder;
   const Workspace workspace(folder / "out");
   try {
@@ -240,7 +247,8 @@ TEST(FolderLock, F38_SecondRunIsToldWho) {
   }
 }
 
-// Twenty processes wait for one starting signal; each that gets in stays until all have tried.
+// Twenty processes wait for a start signal; each that gets the lock keeps it until all have
+// tried.
 TEST(FolderLock, F38_OfTwentyAtOnceOneWins) {
   const TemporaryFolder folder;
   for (int round = 0; round < 5; ++round) {
@@ -303,9 +311,10 @@ TEST(FolderLock, F38_DeathReleasesIt) {
 TEST(FolderLock, F39_BreakLock) {
   const TemporaryFolder folder;
   const Workspace workspace(folder / "out");
-  // A holder that lives here is not robbed.
-  EXPECT_REGRADE_ERROR(Workspace(folder / "out", true), ExitCode::kFolderInUse, "alive");
-  // One that nobody can ask, as on a network drive, is.
+  // The lock of a living process is not broken.
+  EXPECT_REGRADE_ERROR(Workspace(folder / "out", true), ExitCode::kFolderInUse,
+                       "still running");
+  // The lock of an unknown process, as on a network drive, is.
   WriteText(folder / "out/.regrade/lock",
             R"({"pid": 1, "host": "elsewhere", "start": "2001-01-01T00:00:00Z"})");
   EXPECT_REGRADE_ERROR(Workspace(folder / "out"), ExitCode::kFolderInUse, "--break-lock");
@@ -314,13 +323,13 @@ TEST(FolderLock, F39_BreakLock) {
 
 constexpr size_t kPayload = 2 << 20;
 
-// What is at `path` is one of the payloads, whole.
+// Whether `path` is one of the payloads, whole.
 bool Whole(const std::string& path) {
   const std::string text = ReadText(path);
   return text.size() == kPayload && text.find_first_not_of(text[0]) == std::string::npos;
 }
 
-// Kills a process that rewrites a file for ever, at a random instant; how often it was torn.
+// Kills a process that rewrites a file in a loop, at random instants; counts torn files.
 template <typename WriteOnce>
 int TornAfterKills(const std::string& path, int kills, const WriteOnce& write_once) {
   WriteFileAtomically(path, std::string(kPayload, 'a'));
@@ -345,7 +354,7 @@ TEST(AtomicFile, F35_KilledAtAnyInstantNothingIsTorn) {
                              WriteFileAtomically(path, text);
                            }),
             0);
-  // The same loop catches a writer that rewrites in place.
+  // The same loop detects a writer that rewrites in place.
   EXPECT_GT(TornAfterKills(folder / "b", 40,
                            [](const std::string& path, const std::string& text) {
                              WriteText(path, text);
@@ -353,7 +362,7 @@ TEST(AtomicFile, F35_KilledAtAnyInstantNothingIsTorn) {
             0);
 }
 
-// After a power loss a name must not show a file that had not reached the disk, nor be lost.
+// After a power loss a name must not refer to an incomplete file, and must not be lost.
 TEST(AtomicFile, F36_ContentIsOnDiskBeforeItsNameAndThenTheNameIs) {
   const TemporaryFolder folder;
   std::vector<std::string> calls;

@@ -1,5 +1,5 @@
-// Reader and writer of COLMAP models: round trips, and files that are damaged in every way that
-// makes COLMAP's own reader hang, abort or accept nonsense.
+// Reader and writer of COLMAP models: round trips, and damaged files on which COLMAP's own
+// reader hangs, aborts or returns nonsense.
 #include "reconstruct/colmap/colmap_model.h"
 
 #include <gtest/gtest.h>
@@ -25,7 +25,7 @@ using testing::PhotosOf;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-// A folder with a small model on disk, whose bytes can be changed.
+// A folder with a small model whose bytes can be changed.
 class ColmapModelFile : public ::testing::Test {
  protected:
   ColmapModelFile()
@@ -45,14 +45,14 @@ class ColmapModelFile : public ::testing::Test {
     std::ofstream(folder_ + "/" + name, std::ios::binary | std::ios::trunc) << bytes;
   }
   template <typename T>
-  void Patch(const std::string& name, size_t place, T value) const {
+  void Patch(const std::string& name, size_t offset, T value) const {
     std::string bytes = Bytes(name);
-    ASSERT_LE(place + sizeof(T), bytes.size());
-    std::memcpy(bytes.data() + place, &value, sizeof(T));
+    ASSERT_LE(offset + sizeof(T), bytes.size());
+    std::memcpy(bytes.data() + offset, &value, sizeof(T));
     SetBytes(name, bytes);
   }
 
-  // The message of the refusal; fails the test when the model is accepted.
+  // The message of the refusal; fails the test if the model is accepted.
   std::string Refusal() const {
     try {
       ReadColmapModel(folder_);
@@ -93,7 +93,7 @@ TEST_F(ColmapModelFile, RoundTripKeepsEveryNumber) {
     EXPECT_EQ(read.images[i].camera_from_world.translation,
               model_.images[i].camera_from_world.translation);
     for (int row = 0; row < 3; ++row)
-      for (int column = 0; column < 3; ++column)  // through a quaternion and back
+      for (int column = 0; column < 3; ++column)  // via a quaternion
         EXPECT_NEAR(read.images[i].camera_from_world.rotation(row, column),
                     model_.images[i].camera_from_world.rotation(row, column), 1e-15);
     EXPECT_EQ(read.images[i].keypoints[2].u, model_.images[i].keypoints[2].u);
@@ -101,7 +101,7 @@ TEST_F(ColmapModelFile, RoundTripKeepsEveryNumber) {
   EXPECT_EQ(read.points[3].position, model_.points[3].position);
   EXPECT_EQ(read.points[3].color, model_.points[3].color);
   EXPECT_EQ(read.points[3].track[1].image_id, 2u);
-  // Writing what was read changes no byte: the file is a fixed point from the second time on.
+  // Writing a model that was read keeps the bytes, up to rounding of rotations.
   WriteColmapModel(read, folder_);
   const std::string images = Bytes("images.bin"), points = Bytes("points3D.bin");
   WriteColmapModel(ReadColmapModel(folder_), folder_);
@@ -109,8 +109,8 @@ TEST_F(ColmapModelFile, RoundTripKeepsEveryNumber) {
   EXPECT_EQ(Bytes("images.bin").size(), images.size());
 }
 
-TEST_F(ColmapModelFile, RotationsSurviveTheQuaternionInEveryOctant) {
-  // Half turns make one quaternion component zero after the other.
+TEST_F(ColmapModelFile, RotationsAreKeptByQuaternionsInEveryOctant) {
+  // Half turns make each quaternion component zero in turn.
   const Mat3d turns[] = {{{{1, 0, 0}, {0, -1, 0}, {0, 0, -1}}},
                          {{{-1, 0, 0}, {0, 1, 0}, {0, 0, -1}}},
                          {{{-1, 0, 0}, {0, -1, 0}, {0, 0, 1}}},
@@ -142,7 +142,7 @@ TEST_F(ColmapModelFile, F58_HugeCountsTakeNoMemory) {
     for (const uint64_t count : {uint64_t{1} << 60, ~uint64_t{0}, uint64_t{1000}}) {
       const std::string whole = Bytes(name);
       Patch(name, 0, count);
-      ExpectRefusal("guarantees");
+      ExpectRefusal("the count of");
       SetBytes(name, whole);
     }
 }
@@ -192,16 +192,16 @@ TEST_F(ColmapModelFile, MissingFileIsNamed) {
 TEST_F(ColmapModelFile, F62_DuplicateIds) {
   const ColmapModel good = model_;
   model_.images[1].id = 1;
-  ExpectRewrittenRefusal("comes twice");
+  ExpectRewrittenRefusal("occurs twice");
   model_ = good;
   model_.points[2].id = 1;
-  ExpectRewrittenRefusal("comes twice");
+  ExpectRewrittenRefusal("occurs twice");
   model_ = good;
   model_.cameras.push_back(model_.cameras[0]);
-  ExpectRewrittenRefusal("comes twice");
+  ExpectRewrittenRefusal("occurs twice");
   model_ = good;
   model_.images[1].name = model_.images[0].name;
-  ExpectRewrittenRefusal("comes twice");
+  ExpectRewrittenRefusal("occurs twice");
 }
 
 TEST_F(ColmapModelFile, F62_DanglingIds) {
@@ -242,7 +242,7 @@ TEST_F(ColmapModelFile, H135_Quaternions) {
   ExpectRefusal("image 1 has a rotation quaternion of length 0");
   Patch("images.bin", kImageQuaternion, 1.01);
   ExpectRefusal("length 1.01");
-  // Off by rounding: mended. A quarter turn about x, so that the length matters.
+  // A small error of the length is corrected. A quarter turn about x, so that it matters.
   for (int i = 0; i < 2; ++i) Patch("images.bin", kImageQuaternion + 8 * i, 0.7075);
   const Mat3d rotation = ReadColmapModel(folder_).images[0].camera_from_world.rotation;
   EXPECT_NEAR(rotation.Determinant(), 1, 1e-14);
@@ -296,7 +296,7 @@ TEST_F(ColmapModelFile, H136_EveryCameraModelNumber) {
     EXPECT_EQ(camera.cy, 241);
     for (int i = 0; i < 8; ++i)
       EXPECT_EQ(camera.distortion[i], i < c.coefficients ? 0.01 * (i + 1) : 0) << c.lens;
-    // And back: the same bytes.
+    // Writing gives the same bytes.
     WriteColmapModel(ReadColmapModel(folder_), folder_);
     EXPECT_EQ(Bytes("cameras.bin"), bytes) << c.lens;
   }
@@ -318,7 +318,7 @@ TEST_F(ColmapModelFile, F61_NamesAreKeysOnly) {
   WriteColmapModel(model_, folder_);
   const ColmapModel read = ReadColmapModel(folder_);
   const Capture capture = CaptureFromModel(read, PhotosOf(model_));
-  ASSERT_EQ(capture.views.size(), 1u);  // only 00002.png has a photo of its name
+  ASSERT_EQ(capture.views.size(), 1u);  // only 00002.png has a photo with that name
   EXPECT_EQ(capture.views[0].path, "/photos/00002.png");
   EXPECT_EQ(capture.statuses[0].status, PhotoState::kUnregistered);
   EXPECT_EQ(capture.statuses.back().status, PhotoState::kSkipped);
@@ -336,7 +336,7 @@ TEST(CaptureFromModel, ViewsPointsAndErrors) {
   EXPECT_EQ(capture.statuses[4].status, PhotoState::kUnregistered);
   ASSERT_EQ(capture.points.size(), 20u);
   EXPECT_EQ(capture.points[5].views, (std::vector<int32_t>{0, 1, 2, 3}));
-  // The stored errors say -1; ours are the mean over observations.
+  // The stored errors are -1; ours are means over observations.
   EXPECT_NEAR(capture.points[5].reprojection_error, 5.0 / 4, 1e-9);
   EXPECT_NEAR(capture.reprojection_px, 5.0 / 80, 1e-9);
   EXPECT_FLOAT_EQ(capture.points[5].color.x, 5 / 255.0f);
@@ -345,7 +345,7 @@ TEST(CaptureFromModel, ViewsPointsAndErrors) {
 TEST(CaptureFromModel, H137_SizeMismatchIsRefused) {
   const ColmapModel model = MakeSyntheticModel({.images = 3});
   std::vector<StagedPhoto> photos = PhotosOf(model);
-  std::swap(photos[1].width, photos[1].height);  // what a forgotten EXIF orientation does
+  std::swap(photos[1].width, photos[1].height);  // as with an ignored EXIF orientation
   try {
     CaptureFromModel(model, photos);
     FAIL();
@@ -360,11 +360,11 @@ TEST(CaptureFromModel, UserNamesForForeignModels) {
   ColmapModel model = MakeSyntheticModel({.images = 3});
   for (int i = 0; i < 3; ++i) model.images[i].name = "IMG " + std::to_string(2 - i) + ".jpg";
   const std::vector<StagedPhoto> photos = PhotosOf(model);
-  EXPECT_THROW(CaptureFromModel(model, photos), Error);  // no staged name in it
+  EXPECT_THROW(CaptureFromModel(model, photos), Error);  // it has no staged names
   const Capture capture = CaptureFromModel(model, photos, PhotoNames::kUser);
   ASSERT_EQ(capture.views.size(), 3u);
   EXPECT_EQ(capture.views[0].file, "IMG 0.jpg");
-  // Views follow the photos, not the model: photo 0 is the model's last image.
+  // Views have the order of the photos: photo 0 is the model's last image.
   EXPECT_EQ(capture.views[0].camera.camera_from_world.rotation(0, 2),
             model.images[2].camera_from_world.rotation(0, 2));
 }

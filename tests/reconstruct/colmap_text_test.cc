@@ -1,4 +1,4 @@
-// COLMAP's text models: read as the binary ones are, and damage is named with its line.
+// COLMAP's text models: read like binary ones; errors name the line.
 #include "reconstruct/colmap/colmap_text.h"
 
 #include <gtest/gtest.h>
@@ -18,7 +18,7 @@ class ColmapText : public ::testing::Test {
  protected:
   ColmapText() : model_(testing::MakeSyntheticModel({.images = 3, .points = 4})) {}
 
-  // The message of the refusal; fails the test when the model is accepted.
+  // The message of the refusal; fails the test if the model is accepted.
   std::string Refusal() const {
     try {
       ReadColmapModel(folder_);
@@ -35,9 +35,9 @@ class ColmapText : public ::testing::Test {
   ColmapModel model_;
 };
 
-// The same model as text, which the one reader takes where there is no .bin; numbers are the
-// same to the bit, but for the quaternion's own rounding.
-TEST_F(ColmapText, TextIsReadAsBinaryIs) {
+// Text files are read where there is no .bin; numbers are bitwise equal, up to rounding of the
+// quaternions.
+TEST_F(ColmapText, TextIsReadLikeBinary) {
   for (ColmapImage& image : model_.images) image.name = "a name with spaces/" + image.name;
   WriteColmapModel(model_, folder_);
   const ColmapModel binary = ReadColmapModel(folder_);
@@ -66,7 +66,7 @@ TEST_F(ColmapText, TextIsReadAsBinaryIs) {
   }
 }
 
-TEST_F(ColmapText, F58_TextThatIsDamagedIsRefusedWithItsLine) {
+TEST_F(ColmapText, F58_DamagedTextIsRefusedWithItsLine) {
   WriteColmapText(model_, folder_);
   for (const char* name : {"cameras", "images", "points3D"})
     fs::remove(folder_ + "/" + name + ".bin");
@@ -82,8 +82,8 @@ TEST_F(ColmapText, F58_TextThatIsDamagedIsRefusedWithItsLine) {
   Refusal();
   testing::WriteText(folder_ + "/cameras.txt", cameras);
   const std::string images = testing::ReadText(folder_ + "/images.txt");
-  for (size_t cut = 0; cut < images.size();
-       cut += 7) {  // anywhere: an error or fewer images, never a crash
+  // Truncated anywhere: an error or fewer images, never a crash.
+  for (size_t cut = 0; cut < images.size(); cut += 7) {
     testing::WriteText(folder_ + "/images.txt", images.substr(0, cut));
     try {
       ReadColmapModel(folder_);

@@ -1,4 +1,4 @@
-// Exposures from the colours of shared points, against planted ones.
+// Exposures estimated from the colours of shared points, compared with known ones.
 #include "reconstruct/refinement/exposure.h"
 
 #include <gtest/gtest.h>
@@ -22,7 +22,7 @@ double Normal(uint64_t stream, uint64_t counter) {
 }
 
 // Log gains within +- `range`, zero on average in each channel.
-std::vector<Vec3d> PlantedLogs(double range) {
+std::vector<Vec3d> KnownLogs(double range) {
   std::vector<Vec3d> logs(kViews);
   Vec3d mean;
   for (int v = 0; v < kViews; ++v) {
@@ -35,9 +35,8 @@ std::vector<Vec3d> PlantedLogs(double range) {
   return logs;
 }
 
-// Each point is seen by kTrack photos in a row, with `sigma` of noise in each log channel; a
-// tenth of the observations, where asked for, shows something up to four times as bright or
-// dark.
+// Each point is seen by kTrack successive photos, with noise `sigma` in each log channel. With
+// `outliers`, a tenth of the observations is up to four times as bright or dark.
 std::vector<ColorObservation> Observations(const std::vector<Vec3d>& logs, double sigma,
                                            bool outliers) {
   std::vector<ColorObservation> observations;
@@ -59,8 +58,8 @@ std::vector<ColorObservation> Observations(const std::vector<Vec3d>& logs, doubl
   return observations;
 }
 
-TEST(Exposure, RecoversPlantedGainsAmongOutliers) {
-  const std::vector<Vec3d> truth = PlantedLogs(0.4);
+TEST(Exposure, RecoversKnownGainsWithOutliers) {
+  const std::vector<Vec3d> truth = KnownLogs(0.4);
   const ExposureEstimate estimate =
       EstimateExposure(kViews, Observations(truth, 0.03, /*outliers=*/true));
   double chi_squared = 0;
@@ -72,13 +71,14 @@ TEST(Exposure, RecoversPlantedGainsAmongOutliers) {
       EXPECT_LT(std::abs(error), testing::RecordBound("log gain among outliers",
                                                       testing::Computed::kDouble, error, 0.02))
           << "photo " << v << " channel " << c;
-      // 0.03 / sqrt(167 observations) = 0.0023, and more for the colours being unknown.
-      // A jackknife over 16 parts is known to 18 %: twice that, and half again.
+      // 0.03 / sqrt(167 observations) = 0.0023, and more because the colours are unknown.
+      // A jackknife over 16 parts has an error of 18 %; the bounds allow a factor of 2 and
+      // more.
       EXPECT_GT(photo.log_error[c], 0.0012);
       EXPECT_LT(photo.log_error[c], 0.007);
       chi_squared += error * error / (photo.log_error[c] * photo.log_error[c]);
     }
-  // Standard errors tell the errors: 1 on average; a factor of 1.5 for chance (36 values) and
+  // Errors over standard errors: 1 on average; a factor of 1.5 for chance (36 values) and
   // outliers.
   EXPECT_GT(std::sqrt(chi_squared / (3 * kViews)), 1 / 1.5);
   EXPECT_LT(std::sqrt(chi_squared / (3 * kViews)), 1.5);
@@ -87,8 +87,9 @@ TEST(Exposure, RecoversPlantedGainsAmongOutliers) {
 }
 
 TEST(Exposure, LogGainsHaveMeanZeroInEachChannel) {
-  std::vector<Vec3d> logs = PlantedLogs(0.4);
-  for (Vec3d& log : logs) log += Vec3d{0.5, -0.2, 0.1};  // a brighter scene, to whoever looks
+  std::vector<Vec3d> logs = KnownLogs(0.4);
+  for (Vec3d& log : logs)
+    log += Vec3d{0.5, -0.2, 0.1};  // indistinguishable from a brighter scene
   const ExposureEstimate estimate = EstimateExposure(kViews, Observations(logs, 0.03, true));
   for (int c = 0; c < 3; ++c) {
     double sum = 0;
@@ -99,11 +100,11 @@ TEST(Exposure, LogGainsHaveMeanZeroInEachChannel) {
 
 TEST(Exposure, EqualPhotosStayUnderTheThreshold) {
   const ExposureEstimate estimate =
-      EstimateExposure(kViews, Observations(PlantedLogs(0), 0.03, true));
+      EstimateExposure(kViews, Observations(KnownLogs(0), 0.03, true));
   EXPECT_FALSE(estimate.Pays());
   EXPECT_LT(std::abs(estimate.explained), 0.01);
-  // Few observations and much noise: what spreads is noise, and other points tell.
-  std::vector<ColorObservation> few = Observations(PlantedLogs(0), 0.3, false);
+  // Few observations and much noise: the spread is noise, as the points left out show.
+  std::vector<ColorObservation> few = Observations(KnownLogs(0), 0.3, false);
   std::erase_if(few, [](const ColorObservation& o) { return o.point >= 60; });
   const ExposureEstimate noisy = EstimateExposure(kViews, few);
   EXPECT_GT(noisy.spread, kExposureSpread);
@@ -112,7 +113,7 @@ TEST(Exposure, EqualPhotosStayUnderTheThreshold) {
 }
 
 TEST(Exposure, PhotoWithoutObservationsKeepsItsExposure) {
-  std::vector<ColorObservation> observations = Observations(PlantedLogs(0.4), 0.03, false);
+  std::vector<ColorObservation> observations = Observations(KnownLogs(0.4), 0.03, false);
   std::erase_if(observations, [](const ColorObservation& o) { return o.view == 4; });
   for (int p = 0; p < kFewestColors - 1; ++p)
     observations.push_back({4, p, {0.2, 0.2, 0.2}, p % kExposureFolds});
@@ -126,12 +127,12 @@ TEST(Exposure, PhotoWithoutObservationsKeepsItsExposure) {
   EXPECT_EQ(EstimateExposure(3, {}).spread, 0);
 }
 
-TEST(Exposure, GroupsThatShareNothingHaveAMeanEach) {
-  const std::vector<Vec3d> truth = PlantedLogs(0.4);
+TEST(Exposure, EachGroupWithoutCommonPointsHasMeanZero) {
+  const std::vector<Vec3d> truth = KnownLogs(0.4);
   std::vector<ColorObservation> twice = Observations(truth, 0.01, false);
   for (ColorObservation o : Observations(truth, 0.01, false)) {
     o.view += kViews, o.point += kPoints;
-    o.light = 3.0 * o.light;  // no track tells that from a brighter scene
+    o.light = 3.0 * o.light;  // indistinguishable from a brighter scene
     twice.push_back(o);
   }
   const ExposureEstimate estimate = EstimateExposure(2 * kViews, twice);
@@ -142,11 +143,11 @@ TEST(Exposure, GroupsThatShareNothingHaveAMeanEach) {
     }
 }
 
-// Places that lie together err together: a part of the scene has an error of its own in each
-// photo, as a point beside its true place or a sheen has. Errors that took each observation for
-// independent would be sqrt(25 points of a part a photo) times too small.
+// Errors of neighbouring points are correlated, as with misplaced points or reflections: here
+// each part of the scene has one error in each photo. Errors computed for independent
+// observations would be too small by sqrt(25 points per part and photo).
 TEST(Exposure, StandardErrorsHoldWhereNeighboursErrAlike) {
-  const std::vector<Vec3d> truth = PlantedLogs(0.4);
+  const std::vector<Vec3d> truth = KnownLogs(0.4);
   std::vector<ColorObservation> observations = Observations(truth, 0.01, false);
   for (ColorObservation& o : observations)
     for (int c = 0; c < 3; ++c)
@@ -160,61 +161,62 @@ TEST(Exposure, StandardErrorsHoldWhereNeighboursErrAlike) {
       const double error = std::log(photo.gain[c]) - truth[v][c];
       chi_squared += error * error / (photo.log_error[c] * photo.log_error[c]);
     }
-  // 1 on average; jackknifed errors of 16 parts are known to 18 % each.
+  // 1 on average; jackknife errors of 16 parts have an error of 18 % each.
   EXPECT_GT(std::sqrt(chi_squared / (3 * kViews)), 1 / 1.5);
   EXPECT_LT(std::sqrt(chi_squared / (3 * kViews)), 1.5);
   EXPECT_TRUE(estimate.Pays());
 }
 
-// A third of the scene shines brighter and darker by a half as the camera goes round; the other
-// parts do not, and gains that follow the sheen make them worse.
+// The brightness of a third of the scene varies by a half around the camera path, as
+// reflections do. Gains that follow it make the other parts worse.
 TEST(Exposure, H139_WhatShinesIsNoExposure) {
-  std::vector<ColorObservation> observations = Observations(PlantedLogs(0), 0.03, false);
+  std::vector<ColorObservation> observations = Observations(KnownLogs(0), 0.03, false);
   for (ColorObservation& o : observations)
     if (o.fold < 5) o.light = std::exp(0.5 * std::sin(2 * M_PI * o.view / kViews)) * o.light;
   const ExposureEstimate estimate = EstimateExposure(kViews, observations);
-  EXPECT_GT(estimate.spread, kExposureSpread);  // there is something to mistake
+  EXPECT_GT(estimate.spread, kExposureSpread);  // it looks like exposure
   EXPECT_LT(estimate.explained, kExposurePays);
   EXPECT_FALSE(estimate.Pays());
 }
 
 TEST(Exposure, ReweightingFindsTheMinimumOfCeres) {
-  const std::vector<ColorObservation> observations = Observations(PlantedLogs(0.4), 0.03, true);
+  const std::vector<ColorObservation> observations = Observations(KnownLogs(0.4), 0.03, true);
   const ExposureEstimate estimate = EstimateExposure(kViews, observations);
   const LogColors gains =
       ReweightedGains(ArrangeObservations(kViews, observations), kNoFold, LogColors(kViews));
   for (size_t v = 0; v < kViews; ++v)
-    for (int c = 0; c < 3; ++c)  // each stops within a thousandth of a standard error or so
+    for (int c = 0; c < 3; ++c)  // each converges to about a thousandth of a standard error
       EXPECT_NEAR(gains[v][c], std::log(estimate.photos[v].gain[c]), 2e-4);
 }
 
-TEST(ExposureFolds, PartsAreEquallyLargeAndLieTogether) {
-  std::vector<Vec3d> places;
+TEST(ExposureFolds, PartsHaveEqualSizeAndAreCompact) {
+  std::vector<Vec3d> positions;
   for (uint64_t i = 0; i < 1600; ++i)
-    places.push_back({4 * RandomDouble(5, 0, i), RandomDouble(5, 1, i), RandomDouble(5, 2, i)});
-  const std::vector<int> folds = SpatialFolds(places, 4);
+    positions.push_back(
+        {4 * RandomDouble(5, 0, i), RandomDouble(5, 1, i), RandomDouble(5, 2, i)});
+  const std::vector<int> folds = SpatialFolds(positions, 4);
   for (int fold = 0; fold < 16; ++fold) {
     EXPECT_EQ(std::count(folds.begin(), folds.end(), fold), 100);
     double low = 4, high = 0;
-    for (size_t i = 0; i < places.size(); ++i)
+    for (size_t i = 0; i < positions.size(); ++i)
       if (folds[i] == fold)
-        low = std::min(low, places[i].x), high = std::max(high, places[i].x);
-    EXPECT_LT(high - low, 1.2);  // a quarter of the length, and chance
+        low = std::min(low, positions[i].x), high = std::max(high, positions[i].x);
+    EXPECT_LT(high - low, 1.2);  // a quarter of the length, plus chance
   }
   EXPECT_EQ(SpatialFolds({}, 4).size(), 0u);
   EXPECT_EQ(SpatialFolds({{1, 2, 3}}, 4).size(), 1u);
 }
 
-// Photos and points in another order: the same minimum, to where the minimiser stops.
+// Photos and points in another order give the same minimum, to the solver's tolerance.
 TEST(Exposure, H154_OrderOfPhotosDoesNotMatter) {
-  const std::vector<ColorObservation> observations = Observations(PlantedLogs(0.4), 0.03, true);
-  std::vector<ColorObservation> turned;
+  const std::vector<ColorObservation> observations = Observations(KnownLogs(0.4), 0.03, true);
+  std::vector<ColorObservation> permuted;
   for (const ColorObservation& o : observations)
-    turned.push_back({(5 * o.view + 3) % kViews, kPoints - 1 - o.point, o.light, o.fold});
-  std::stable_sort(turned.begin(), turned.end(),
+    permuted.push_back({(5 * o.view + 3) % kViews, kPoints - 1 - o.point, o.light, o.fold});
+  std::stable_sort(permuted.begin(), permuted.end(),
                    [](const auto& a, const auto& b) { return a.view < b.view; });
   const ExposureEstimate one = EstimateExposure(kViews, observations);
-  const ExposureEstimate other = EstimateExposure(kViews, turned);
+  const ExposureEstimate other = EstimateExposure(kViews, permuted);
   EXPECT_NEAR(one.spread, other.spread,
               testing::RecordBound("spread of reordered photos", testing::Computed::kDouble,
                                    one.spread - other.spread, 1e-6));

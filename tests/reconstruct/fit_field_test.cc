@@ -1,5 +1,5 @@
-// Fitting: it learns, it is the same for any thread count and after a resume, and it refuses an
-// empty field.
+// Fitting: converges, gives the same result for any number of threads and after a resume, and
+// refuses an empty field.
 #include "reconstruct/fit/fit_field.h"
 
 #include <gtest/gtest.h>
@@ -25,8 +25,7 @@
 namespace regrade {
 namespace {
 
-// Twelve views of a coloured ball in a grid field, and the photos the plain renderer makes of
-// it.
+// Twelve views of a coloured ball in a grid field, rendered by the reference renderer.
 class FitField : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -101,14 +100,14 @@ class FitField : public ::testing::Test {
   SceneBox box_;
 };
 
-TEST_F(FitField, LearnsAViewItHasNotSeen) {
+TEST_F(FitField, ReproducesAHeldOutView) {
   const FitResult result = regrade::FitField(views_, box_, options_, {});
   RadianceField empty = result.field;
   auto geometry = std::make_shared<Geometry>(*empty.geometry);
   for (float& density : geometry->density) density = -1;
   empty.geometry = geometry;
-  // Six decibels halve the error of the mean colour alone; a fit with a wrong pose or gradient
-  // does not get there.
+  // 6 dB is half of the error of the mean colour; a fit with a wrong pose or gradient does not
+  // reach it.
   EXPECT_GT(HeldOutPsnr(result.field), HeldOutPsnr(empty) + 6.0);
   EXPECT_EQ(result.rejected_voxels, 0);
   EXPECT_EQ(result.rays, 120 * 1024);
@@ -137,13 +136,13 @@ TEST_F(FitField, H109_H110_AResumedFitIsTheUndisturbedOne) {
     };
     EXPECT_THROW(regrade::FitField(views_, box_, options_, hooks), Interrupted);
     ASSERT_GT(saved.grid.num_voxels(), 0) << "nothing was saved";
-    FitHooks go_on;
-    go_on.resume = &saved;
-    const FitResult resumed = regrade::FitField(views_, box_, options_, go_on);
+    FitHooks resume;
+    resume.resume = &saved;
+    const FitResult resumed = regrade::FitField(views_, box_, options_, resume);
     EXPECT_TRUE(testing::RecordSameBits("resumed and straight", testing::Computed::kFloat,
                                         SameBits(straight.field, resumed.field)))
         << stop_after;
-    // What was counted before the interruption counts, to the bit.
+    // Metrics include the steps before the interruption, bitwise.
     EXPECT_EQ(resumed.psnr_train_db, straight.psnr_train_db) << stop_after;
     EXPECT_EQ(resumed.rays, straight.rays);
     ASSERT_EQ(resumed.curve.size(), straight.curve.size());
@@ -154,18 +153,18 @@ TEST_F(FitField, H109_H110_AResumedFitIsTheUndisturbedOne) {
   }
 }
 
-// The same ball before far surroundings: each photo's background follows the ray's direction
-// alone, so that no flat colour and no box explains it.
+// The same ball in front of distant surroundings: the background of each photo depends on the
+// ray's direction only, which neither a constant colour nor a box can model.
 class FitSpheres : public FitField {
  protected:
   void SetUp() override {
-    focal_ = 30;  // so wide that other views see all directions of the one that is kept
+    focal_ = 30;  // so wide that other views see all directions of the held-out one
     FitField::SetUp();
     for (size_t v = 0; v < cameras_.size(); ++v) {
       for (int y = 0; y < cameras_[v].height; ++y)
         for (int x = 0; x < cameras_[v].width; ++x) {
           float* pixel = photos_[v].at(x, y);
-          // Where the flat background was seen, to rounding.
+          // Pixels of the constant background.
           if (std::abs(pixel[0] - 0.2f) + std::abs(pixel[2] - 0.6f) > 1e-3f) continue;
           const Vec3f d = cameras_[v].PixelRay(x, y).direction;
           for (int c = 0; c < 3; ++c)
@@ -176,20 +175,20 @@ class FitSpheres : public FitField {
     options_.background_layers = 16;
     options_.background_resolution = 32;
     options_.steps = {150, 150};
-    // A small map learns in few steps: larger colour steps, and a run of texels that is one.
+    // A small map in few steps: larger learning rates, and a sampling run of many texels.
     options_.rate_background_color = 0.3f;
     options_.rate_background_density = 3;
-    options_.tv_background_share = 0.3f;
+    options_.tv_background_fraction = 0.3f;
   }
 };
 
-TEST_F(FitSpheres, FarSurroundingsAreLearned) {
+TEST_F(FitSpheres, DistantSurroundingsAreFitted) {
   const double without = HeldOutPsnr(regrade::FitField(views_, box_, options_, {}).field);
   box_.spheres = true;
   const FitResult with = regrade::FitField(views_, box_, options_, {});
   EXPECT_TRUE(with.field.geometry->spheres.on());
   EXPECT_EQ(with.rejected_voxels, 0);
-  // Three decibels are half of the squared error; 11.8 were measured.
+  // 3 dB is half of the squared error; 11.8 dB was measured.
   EXPECT_GT(HeldOutPsnr(with.field), without + 3);
 }
 
@@ -210,7 +209,7 @@ TEST_F(FitSpheres, H109_H110_AResumedFitIsTheUndisturbedOne) {
   omp_set_num_threads(1);
   const FitResult straight = regrade::FitField(views_, box_, options_, {});
   omp_set_num_threads(3);
-  // Before, at and after the step at which the box begins; the stage's end; later.
+  // Before, at and after the first step of the box; at the end of the stage; later.
   for (const int stop_after : {10, 20, 21, 40, 55}) {
     FitState saved;
     int steps = 0;
@@ -220,11 +219,11 @@ TEST_F(FitSpheres, H109_H110_AResumedFitIsTheUndisturbedOne) {
       return ++steps == stop_after ? LoopControl::kStop : LoopControl::kContinue;
     };
     EXPECT_THROW(regrade::FitField(views_, box_, options_, hooks), Interrupted);
-    FitHooks go_on;
-    go_on.resume = &saved;
+    FitHooks resume;
+    resume.resume = &saved;
     EXPECT_TRUE(testing::RecordSameBits(
         "resumed and straight, before spheres", testing::Computed::kFloat,
-        same(straight, regrade::FitField(views_, box_, options_, go_on))))
+        same(straight, regrade::FitField(views_, box_, options_, resume))))
         << stop_after;
   }
   omp_set_num_threads(before);
@@ -243,24 +242,22 @@ TEST_F(FitSpheres, ResamplingTheLayersKeepsConstants) {
   }
 }
 
-// Pixels that are not finite are left out, whatever the size of the squares, and batches stay
-// as large; pixel by pixel the others are drawn as often as one another.
-TEST_F(FitField, PixelsWithoutAColourAreNeverDrawn) {
+// Masked pixels (non-finite) are never drawn, for any square size, and batches keep their size.
+// Single pixels are drawn with equal frequency.
+TEST_F(FitField, MaskedPixelsAreNeverDrawn) {
   Image masked = photos_[1];
-  int64_t left_out = 0;
-  const auto is_left_out = [&](int x, int y) {
-    return x > masked.width / 2 || (x + y) % 7 == 0;
-  };
+  int64_t masked_count = 0;
+  const auto is_masked = [&](int x, int y) { return x > masked.width / 2 || (x + y) % 7 == 0; };
   for (int y = 0; y < masked.height; ++y)
     for (int x = 0; x < masked.width; ++x)
-      if (is_left_out(x, y)) {
+      if (is_masked(x, y)) {
         masked.at(x, y)[(x + y) % 3] = std::nanf("");
-        ++left_out;
+        ++masked_count;
       }
-  ASSERT_GT(left_out, 0);
+  ASSERT_GT(masked_count, 0);
   std::vector<TrainingView> views{{cameras_[1], &masked}, views_[1]};
   const TrainingRays rays(views);
-  EXPECT_EQ(rays.num_rays(), 2 * masked.num_pixels() - left_out);
+  EXPECT_EQ(rays.num_rays(), 2 * masked.num_pixels() - masked_count);
   EXPECT_TRUE(AllFinite(rays.mean_color()));
   for (const int patch : {1, 4}) {
     std::map<std::array<float, 3>, int> times;  // by direction
@@ -275,16 +272,16 @@ TEST_F(FitField, PixelsWithoutAColourAreNeverDrawn) {
     }
     int drawn = 0;
     const double mean =
-        32.0 * steps / static_cast<double>(masked.num_pixels() - left_out);  // if alike
+        32.0 * steps / static_cast<double>(masked.num_pixels() - masked_count);  // if equal
     for (int y = 0; y < masked.height; ++y)
       for (int x = 0; x < masked.width; ++x) {
         const Vec3f d = rays.RayOf(0, x, y).direction;
         const auto found = times.find({d.x, d.y, d.z});
         const int count = found == times.end() ? 0 : found->second;
-        if (patch == 1 && !is_left_out(x, y)) {
+        if (patch == 1 && !is_masked(x, y)) {
           EXPECT_NEAR(count, mean, 6 * std::sqrt(mean)) << x << ", " << y;
         }
-        if (is_left_out(x, y)) {
+        if (is_masked(x, y)) {
           EXPECT_EQ(count, 0) << x << ", " << y << ", squares of " << patch;
         }
         drawn += count;
@@ -333,12 +330,12 @@ TEST_F(FitField, H85_ResamplingKeepsConstantsAndRamps) {
   ASSERT_GT(fine.num_voxels(), 1000);
   int whole = 0;
   for (int64_t v = 0; v < fine.num_voxels(); ++v) {
-    // Next to unseen vertices values fade towards 0; inside they are constant.
+    // Values fade towards 0 next to empty vertices and are constant elsewhere.
     const float density = fine.records[v * fine.lanes() + DensityLane(4)];
     EXPECT_LE(density, 0.3f + 1e-6f);
     const bool inside = std::abs(density - 0.3f) < 1e-6f;
     whole += inside;
-    // Vertex k of 17 lies at (k + 1/2) 9 / 17 - 1/2 of 9, and ramps end at the last vertices.
+    // Vertex k of 17 is at (k + 1/2) 9 / 17 - 1/2 of 9, and ramps end at the last vertices.
     const float z =
         std::clamp((fine.vertex_of_voxel[v] % 17 + 0.5f) * 9 / 17 - 0.5f, 0.0f, 8.0f);
     if (inside) {
@@ -350,13 +347,13 @@ TEST_F(FitField, H85_ResamplingKeepsConstantsAndRamps) {
   EXPECT_GT(whole, fine.num_voxels() / 2);
 }
 
-// A matte ball in voxels as fine as its photos: one colour a place is enough.
+// A matte ball in voxels as small as its pixels: one colour per position is enough.
 TEST_F(FitField, AMatteSceneNeedsNoViewDependence) {
   const DegreeTrial trial = TryDegrees(views_, {}, options_, {}, Backend::kCpu);
   EXPECT_FALSE(trial.Pays()) << trial.gain_db << " dB";
 }
 
-TEST_F(FitField, ATrialLeavesOutWhatIsMasked) {
+TEST_F(FitField, ATrialIgnoresMaskedPixels) {
   for (Image& photo : photos_)
     for (int y = 0; y < photo.height / 2; ++y)
       for (int x = 0; x < photo.width / 3; ++x) photo.at(x, y)[1] = std::nanf("");
@@ -365,8 +362,8 @@ TEST_F(FitField, ATrialLeavesOutWhatIsMasked) {
   EXPECT_FALSE(trial.Pays()) << trial.gain_db << " dB";
 }
 
-// The same ball, brighter from one side than from the other whatever it shows there.
-TEST_F(FitField, ColoursThatChangeWithTheDirectionNeedIt) {
+// The same ball, brighter when seen from one side.
+TEST_F(FitField, AShinySceneNeedsViewDependence) {
   RadianceField shiny = truth_;
   shiny.appearance.basis = 4;
   shiny.appearance.sh = Buffer<float>(4 * truth_.appearance.sh.size());
@@ -379,7 +376,7 @@ TEST_F(FitField, ColoursThatChangeWithTheDirectionNeedIt) {
     photos_[i] = RenderViewPlain(shiny, cameras_[i], {0.5f, 1e-4f}).color;
   const DegreeTrial trial = TryDegrees(views_, {}, options_, {}, Backend::kCpu);
   EXPECT_TRUE(trial.Pays()) << trial.gain_db << " dB";
-  views_.resize(kLeastTrialViews - 1);  // too few to judge by those that are kept
+  views_.resize(kLeastTrialViews - 1);  // too few for held-out views
   EXPECT_TRUE(TryDegrees(views_, {}, options_, {}, Backend::kCpu).Pays());
 }
 

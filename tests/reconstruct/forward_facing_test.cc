@@ -1,4 +1,4 @@
-// Forward-facing captures: what tells them, and that their space holds every pixel's ray
+// Forward-facing captures: their detection, and that their NDC box contains every pixel's ray
 // (H87-H90).
 #include "reconstruct/scene/forward_facing.h"
 
@@ -13,9 +13,8 @@
 namespace regrade {
 namespace {
 
-// Cameras on a wall, looking along +y of a world with z up; the scene lies from 3 to 40 before
-// them.
-Capture WallCapture(double turn_deg, double forth) {
+// Cameras on a wall that look along +y, z up; the scene has depths from 3 to 40.
+Capture WallCapture(double turn_deg, double forward_step) {
   Capture capture;
   for (int i = 0; i < 9; ++i) {
     Camera camera;
@@ -28,7 +27,7 @@ Capture WallCapture(double turn_deg, double forth) {
     camera.camera_from_world.rotation.row[0] = right;
     camera.camera_from_world.rotation.row[1] = Vec3d{0, 0, -1};
     camera.camera_from_world.rotation.row[2] = forward;
-    const Vec3d center{0.3 * (i % 3), forth * (i / 3), 0.2 * (i / 3)};
+    const Vec3d center{0.3 * (i % 3), forward_step * (i / 3), 0.2 * (i / 3)};
     camera.camera_from_world.translation = -(camera.camera_from_world.rotation * center);
     capture.views.push_back({"", "photo" + std::to_string(i), "", camera});
   }
@@ -43,18 +42,18 @@ Capture WallCapture(double turn_deg, double forth) {
   return capture;
 }
 
-TEST(ForwardFacing, H87_IsToldFromCapturesThatTurn) {
+TEST(ForwardFacing, H87_IsDistinguishedFromTurningCaptures) {
   EXPECT_TRUE(MeasureForwardFacing(WallCapture(10, 0.05)).on);
   EXPECT_FALSE(MeasureForwardFacing(WallCapture(40, 0.05)).on);
-  EXPECT_FALSE(MeasureForwardFacing(WallCapture(10, 1)).on);  // walks into the scene
+  EXPECT_FALSE(MeasureForwardFacing(WallCapture(10, 1)).on);  // moves into the scene
   Capture two = WallCapture(0, 0);
   two.views.resize(2);
   two.points.clear();
   EXPECT_FALSE(MeasureForwardFacing(two).on);
 }
 
-// What came with the poses is not estimated again from points that are found later.
-TEST(ForwardFacing, ADepthThatWasSaidStands) {
+// A depth given with the poses is not replaced by an estimate from points.
+TEST(ForwardFacing, AGivenDepthIsUsed) {
   Capture capture = WallCapture(10, 0.05);
   EXPECT_NE(MeasureForwardFacing(capture).nearest, 2.5);
   capture.nearest_depth = 2.5;
@@ -73,8 +72,8 @@ TEST(ForwardFacing, H88_EveryRayStaysInTheBoxAndMeetsTheScene) {
         const Ray ray = camera.PixelRay(x, y);
         EXPECT_NEAR(Norm(ray.direction), 1, 1e-6);
         EXPECT_EQ(ray.origin.z, -1.0f);
-        for (const float share : {0.0f, 0.5f, 1.0f}) {
-          const Vec3f p = ray.origin + ray.direction * (share * 2 / ray.direction.z);
+        for (const float fraction : {0.0f, 0.5f, 1.0f}) {
+          const Vec3f p = ray.origin + ray.direction * (fraction * 2 / ray.direction.z);
           EXPECT_LE(std::abs(p.x), scene.box.radius.x * 1.0001f);
           EXPECT_LE(std::abs(p.y), scene.box.radius.y * 1.0001f);
         }
@@ -95,7 +94,7 @@ TEST(ForwardFacing, H88_EveryRayStaysInTheBoxAndMeetsTheScene) {
     EXPECT_GT((scene.field_from_world * point.position).z, 1);  // behind the near plane
 }
 
-// Device coordinates do not hang on which photo comes first.
+// NDC does not depend on which photo is first.
 TEST(ForwardFacing, H159_PhotosOfTwoShapesInAnyOrder) {
   Capture capture = WallCapture(10, 0.05);
   for (const size_t i : {0, 5}) {
@@ -106,7 +105,7 @@ TEST(ForwardFacing, H159_PhotosOfTwoShapesInAnyOrder) {
   const NormalizedScene scene = NormalizeForwardFacing(capture, MeasureForwardFacing(capture));
   EXPECT_DOUBLE_EQ(scene.ndc.a, 2 * 350.0 / 400);
   EXPECT_DOUBLE_EQ(scene.ndc.b, 2 * 350.0 / 300);
-  // Half of an upright photo's height, 200 px, is 4 / 3 of what the common camera shows.
+  // Half of a portrait photo's height, 200 px, is 4 / 3 of the common camera's.
   EXPECT_GT(scene.box.radius.y, 4.0 / 3);
   std::swap(capture.views[0], capture.views[1]);
   const NormalizedScene other = NormalizeForwardFacing(capture, MeasureForwardFacing(capture));
@@ -116,11 +115,12 @@ TEST(ForwardFacing, H159_PhotosOfTwoShapesInAnyOrder) {
 
 TEST(ForwardFacing, H89_ACameraThatLooksBackIsNamed) {
   Capture capture = WallCapture(10, 0.05);
-  Camera& turned = capture.views[5].camera;
-  const Vec3d center = turned.Center();
+  Camera& backward = capture.views[5].camera;
+  const Vec3d center = backward.Center();
   for (const int axis : {0, 2})
-    turned.camera_from_world.rotation.row[axis] = -turned.camera_from_world.rotation.row[axis];
-  turned.camera_from_world.translation = -(turned.camera_from_world.rotation * center);
+    backward.camera_from_world.rotation.row[axis] =
+        -backward.camera_from_world.rotation.row[axis];
+  backward.camera_from_world.translation = -(backward.camera_from_world.rotation * center);
   ForwardFacing measured = MeasureForwardFacing(WallCapture(10, 0.05));
   try {
     NormalizeForwardFacing(capture, measured);
@@ -145,7 +145,7 @@ TEST(ForwardFacing, H90_InfinitelyFarIsTheFarFace) {
   NdcRay(space, &origin, &direction);
   const Vec3d far = origin + direction * (2 / direction.z);  // z = 1
   EXPECT_NEAR(far.z, 1, 1e-12);
-  // A point at a depth of 1e12 lies there, to 2e-12; and the space is finite all the way.
+  // A point at a depth of 1e12 is there up to 2e-12, and all coordinates are finite.
   const Vec3d p = from + towards * (1e12 / towards.z);
   EXPECT_NEAR(far.x, space.a * p.x / p.z,
               testing::RecordBound("a point at a depth of 1e12", testing::Computed::kDouble,

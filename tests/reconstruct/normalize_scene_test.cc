@@ -1,4 +1,4 @@
-// Where the box is: cameras on a line, at one point, upside down, and the scene in other units
+// The scene's box for cameras on a line, at one point, upside down, and in other units
 // (H129-H131, H140).
 #include "reconstruct/scene/normalize_scene.h"
 
@@ -46,9 +46,8 @@ Capture ArcCapture(bool points) {
   return capture;
 }
 
-// Every proper box: a rotation (H96), finite numbers, half sizes in (0, 1], a near clip in
-// front of nothing.
-void ExpectProper(const NormalizedScene& scene) {
+// A valid box has a rotation (H96), finite numbers, half sizes in (0, 1], and a near clip >= 0.
+void ExpectValid(const NormalizedScene& scene) {
   EXPECT_NEAR(scene.field_from_world.rotation.Determinant(), 1, 1e-12);
   EXPECT_TRUE(std::isfinite(scene.field_from_world.scale));
   EXPECT_GT(scene.field_from_world.scale, 0);
@@ -61,10 +60,10 @@ void ExpectProper(const NormalizedScene& scene) {
   EXPECT_GE(scene.box.near_clip, 0);
 }
 
-TEST(NormalizeScene, BoxHoldsThePointsUpright) {
+TEST(NormalizeScene, BoxContainsThePointsUpright) {
   const Capture capture = ArcCapture(true);
   const NormalizedScene scene = NormalizeScene(capture);
-  ExpectProper(scene);
+  ExpectValid(scene);
   int inside = 0;
   for (const ScenePoint& p : capture.points) {
     const Vec3d q = scene.field_from_world * p.position;
@@ -72,17 +71,17 @@ TEST(NormalizeScene, BoxHoldsThePointsUpright) {
               std::abs(q.z) <= scene.box.radius.z;
   }
   EXPECT_GE(inside, 390);
-  // z is up: the world's up stays up to the cameras' tilt.
+  // z is up, up to the cameras' tilt.
   EXPECT_GT((scene.field_from_world.rotation * Vec3d{0, 0, 1}).z, 0.9);
 }
 
-// A textured thing before a bare wall: the points are a sixth of the picture, the box takes in
-// all that the photos show at its depth.
-TEST(NormalizeScene, BoxHoldsWhatPhotosShowBesideThePoints) {
+// A textured object in front of a wall without texture: the points cover a sixth of the
+// pictures, and the box contains everything that the photos show at that depth.
+TEST(NormalizeScene, BoxContainsRegionsWithoutPoints) {
   Capture capture = ArcCapture(true);
   for (ScenePoint& p : capture.points) p.position = p.position * 0.4;
   const NormalizedScene scene = NormalizeScene(capture);
-  ExpectProper(scene);
+  ExpectValid(scene);
   int inside = 0;
   for (const CaptureView& view : capture.views)
     for (const double x : {64.0, 320.0, 576.0})
@@ -132,11 +131,11 @@ TEST(NormalizeScene, H154_OrderOfPhotosDoesNotMatter) {
 
 TEST(NormalizeScene, H129_CollinearCameras) {
   Capture capture;
-  const Vec3d up{0, -0.6, 0.8};  // not an axis: a line's other directions are as good as any
+  const Vec3d up{0, -0.6, 0.8};  // not a coordinate axis
   for (int i = 0; i < 6; ++i)
     capture.views.push_back({"", "", "", LookAt({0.3 * i, 0, 0}, {0.3 * i, 4, 3}, up)});
   const NormalizedScene scene = NormalizeScene(capture);
-  ExpectProper(scene);
+  ExpectValid(scene);
   const double upright = (scene.field_from_world.rotation * up).z;
   EXPECT_NEAR(upright, 1,
               testing::RecordDigits("up", testing::Computed::kDouble, upright - 1, 1e-12));
@@ -147,11 +146,12 @@ TEST(NormalizeScene, H130_CamerasAtOnePoint) {
   for (int i = 0; i < 4; ++i)
     capture.views.push_back(
         {"", "", "", LookAt({1, 2, 3}, {1 + std::cos(i), 2 + std::sin(i), 3}, {0, 0, 1})});
-  // Distances that are rounding are no unit: without any other the box is the cube of radius 1.
+  // Rounding errors are not used as the unit; without another one the box is a cube of
+  // radius 1.
   const auto expect_scale = [&](double scale) {
     const NormalizedScene scene = NormalizeScene(capture);
-    ExpectProper(scene);
-    EXPECT_NEAR(scene.field_from_world.scale, scale, 0.2 * scale);  // 8 % of margin
+    ExpectValid(scene);
+    EXPECT_NEAR(scene.field_from_world.scale, scale, 0.2 * scale);  // 8 % margin
     EXPECT_NE(scene.notice.find("one place"), std::string::npos) << scene.notice;
   };
   expect_scale(1);
@@ -171,8 +171,8 @@ TEST(NormalizeScene, H131_UpsThatCancel) {
         {"", "", "",
          LookAt({3 * std::cos(i), 3 * std::sin(i), 0}, {0, 0, 0}, {0, 0, i % 2 ? 1.0 : -1.0})});
   const NormalizedScene scene = NormalizeScene(capture);
-  ExpectProper(scene);
-  // The cameras' circle lies level; which side of it is up is a rule of ours.
+  ExpectValid(scene);
+  // The cameras' circle is horizontal; which side is up is a convention.
   const double level = scene.field_from_world.rotation.row[2].z;
   EXPECT_NEAR(level, 1,
               testing::RecordDigits("the circle's normal", testing::Computed::kDouble,

@@ -1,5 +1,4 @@
-// Poses from photos against a colmap that misbehaves in every way we know of, and once against
-// the real one.
+// Poses from photos with a fake colmap that fails in all known ways.
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -40,7 +39,7 @@ class Poses : public ::testing::Test {
     return photos;
   }
 
-  // Runs with the fake whose name says how it behaves.
+  // Runs with the fake colmap, which gets its behaviour from its name.
   Capture Run(const std::string& behaviour, int photos = 10,
               const ProgressFunction& progress = {}) {
     const fs::path link = folder_ / ("colmap-" + behaviour);
@@ -50,7 +49,7 @@ class Poses : public ::testing::Test {
                            folder_ / "sparse", progress, &report_);
   }
 
-  // Expects an error of this kind whose text contains all parts.
+  // Expects an error with this code whose text contains all parts.
   void ExpectError(const std::string& behaviour, ExitCode code,
                    const std::vector<std::string>& parts, int photos = 10) {
     try {
@@ -61,7 +60,7 @@ class Poses : public ::testing::Test {
       for (const std::string& part : parts)
         EXPECT_NE(std::string(e.what()).find(part), std::string::npos) << e.what();
     }
-    EXPECT_FALSE(fs::exists(folder_ / "sparse")) << "a refused model was handed over";
+    EXPECT_FALSE(fs::exists(folder_ / "sparse")) << "a refused model was returned";
   }
 
   fs::path folder_;
@@ -79,7 +78,7 @@ TEST_F(Poses, GoodCaptureComesWithModelAndStatuses) {
   EXPECT_EQ(capture.models_found, 1);
   EXPECT_LT(capture.reprojection_px, 1e-6);
   EXPECT_EQ(report_.colmap_version, "3.8");
-  EXPECT_EQ(report_.recipe, "quick");
+  EXPECT_EQ(report_.strategy, "quick");
   EXPECT_EQ(report_.attempts_made, 1);
   ASSERT_EQ(capture.statuses.size(), 11u);
   EXPECT_EQ(capture.statuses[1].why, "not a picture");
@@ -99,10 +98,10 @@ TEST_F(Poses, ProgressGrowsToItsTotal) {
 }
 
 TEST_F(Poses, AbortEndsTheChild) {
-  int asked = 0;
+  int calls = 0;
   EXPECT_THROW(Run("hang", 10,
                    [&](const Progress&) {
-                     return ++asked > 2 ? LoopControl::kStop : LoopControl::kContinue;
+                     return ++calls > 2 ? LoopControl::kStop : LoopControl::kContinue;
                    }),
                Interrupted);
 }
@@ -123,7 +122,7 @@ TEST_F(Poses, F46_MissingProgram) {
 TEST_F(Poses, F47_Versions) {
   ExpectError("old", ExitCode::kExternalProgram, {"COLMAP 2.0 is too old"});
   ExpectError("something-else", ExitCode::kExternalProgram, {"not COLMAP", "hello, world"});
-  // A later version has other names for some options, and refuses the old ones.
+  // A later version has new names for some options and refuses the old ones.
   EXPECT_EQ(Run("new").views.size(), 10u);
   EXPECT_EQ(report_.colmap_version, "9.9");
 }
@@ -131,7 +130,7 @@ TEST_F(Poses, F47_Versions) {
 TEST_F(Poses, F49_CrashIsReportedWithTheLog) {
   ExpectError("crash", ExitCode::kExternalProgram, {"mapper", "signal 6", "mapper.log"});
   ASSERT_FALSE(report_.notes.empty());
-  EXPECT_NE(report_.notes[0].find("again with one thread"), std::string::npos);
+  EXPECT_NE(report_.notes[0].find("restarted with one thread"), std::string::npos);
 }
 
 TEST_F(Poses, F49_KilledForMemoryIsTriedAgainWithOneThread) {
@@ -240,16 +239,16 @@ TEST_F(Poses, H127_CameraOnlyTurned) {
 
 TEST_F(Poses, H127_NothingMatches) {
   ExpectError("nomatches", ExitCode::kScene, {"no two photos show the same"});
-  ExpectError("plain", ExitCode::kScene, {"about 12 features", "sharp photos"});
+  ExpectError("plain", ExitCode::kScene, {"about 12 each", "sharp photos"});
 }
 
 TEST_F(Poses, H128_PlanarSceneIsNoted) {
   Run("planar");
   ASSERT_EQ(report_.notes.size(), 1u);
-  EXPECT_NE(report_.notes[0].find("benchmark"), std::string::npos);
+  EXPECT_NE(report_.notes[0].find("plane"), std::string::npos);
 }
 
-TEST_F(Poses, H132_TheLargestModelWinsAndTheOthersAreTold) {
+TEST_F(Poses, H132_TheLargestModelIsUsedAndTheOthersAreReported) {
   const Capture capture = Run("two", 13);
   EXPECT_EQ(capture.views.size(), 9u);
   EXPECT_EQ(capture.models_found, 2);
@@ -273,7 +272,7 @@ TEST_F(Poses, H134_PixelsThatAreNotSquare) {
   ExpectError("aspect", ExitCode::kScene, {"not square", "1.300"});
 }
 
-TEST_F(Poses, H134_APrincipalPointThatRunsOffStaysInTheCentre) {
+TEST_F(Poses, H134_ADivergingPrincipalPointStaysInTheCentre) {
   const Capture capture = Run("runaway");
   EXPECT_EQ(capture.views[0].camera.cx, 320);
   EXPECT_NE(report_.lens.find("in the centre"), std::string::npos);
@@ -281,21 +280,21 @@ TEST_F(Poses, H134_APrincipalPointThatRunsOffStaysInTheCentre) {
 
 TEST_F(Poses, StrategiesAreTriedUntilOneSucceeds) {
   EXPECT_EQ(Run("strategies").views.size(), 10u);
-  EXPECT_EQ(report_.recipe, "more features");
+  EXPECT_EQ(report_.strategy, "more features");
   EXPECT_EQ(report_.attempts_made, 2);
 }
 
-TEST_F(Poses, AnAttemptThatWouldFindTheSameFeaturesAgainIsLeftOut) {
+TEST_F(Poses, AnAttemptThatWouldFindTheSameFeaturesIsSkipped) {
   EXPECT_THROW(Run("nomodel"), Error);
-  EXPECT_EQ(report_.attempts_made, 3);  // all but "more features": there are no more
+  EXPECT_EQ(report_.attempts_made, 3);  // all except "more features": there are no more
   EXPECT_THROW(Run("nomatches"), Error);
-  EXPECT_EQ(report_.attempts_made, 4);  // one more: without a match nothing further helps
+  EXPECT_EQ(report_.attempts_made, 4);  // one more: nothing helps without matches
 }
 
-TEST(PoseStrategies, CostGrowsUpwards) {
+TEST(PoseStrategies, CostIncreases) {
   std::vector<StagedPhoto> photos(50);
   for (StagedPhoto& photo : photos) photo.width = 1920, photo.height = 1080;
-  const std::vector<PoseRecipe> strategies = PoseStrategies(photos, 30);
+  const std::vector<PoseStrategy> strategies = PoseStrategies(photos, 30);
   EXPECT_FALSE(strategies[0].all_pairs);
   EXPECT_EQ(strategies[0].first_octave, 0);
   EXPECT_GT(strategies[1].max_features, strategies[0].max_features);
@@ -339,14 +338,15 @@ TEST(ColmapOutput, ReadsProgressAndEvidence) {
   EXPECT_EQ(output.evidence().matched_pairs, 41);
 }
 
-TEST(RefineIntrinsics, OutliersLoseTheirObservationsAndEmptyPointsGo) {
+TEST(RefineIntrinsics, RemovesOutliersAndPointsWithoutObservations) {
   ColmapModel model = MakeSyntheticModel({.images = 5, .points = 30});
   for (ColmapImage& image : model.images)
-    for (ColmapKeypoint& keypoint : image.keypoints) keypoint.u += 0.2;  // the common error
+    for (ColmapKeypoint& keypoint : image.keypoints) keypoint.u += 0.2;  // an error of all
   model.images[2].keypoints[7].v += 3;
   for (int i = 0; i < 4; ++i) model.images[i].keypoints[9].v += 3;
   const ColmapModel cleaned = WithoutOutliers(model, model, 2.5);
-  EXPECT_EQ(cleaned.points.size(), 29u);  // point 10 keeps one observation, so none
+  EXPECT_EQ(cleaned.points.size(),
+            29u);  // point 10 would keep one observation, so it is removed
   EXPECT_EQ(cleaned.FindPoint(10), nullptr);
   EXPECT_EQ(cleaned.FindPoint(8)->track.size(), 4u);
   EXPECT_EQ(cleaned.images[2].keypoints[7].point_id, kNoColmapPoint);
@@ -355,7 +355,7 @@ TEST(RefineIntrinsics, OutliersLoseTheirObservationsAndEmptyPointsGo) {
   EXPECT_NEAR(MeanSquaredReprojection(cleaned), 0.04, 1e-9);
 }
 
-TEST(RefineIntrinsics, WithLensKeepsWhatBothLensesHave) {
+TEST(RefineIntrinsics, WithLensKeepsCommonCoefficients) {
   ColmapModel model = MakeSyntheticModel({});
   model.cameras[0].intrinsics.distortion[0] = 0.1;
   EXPECT_EQ(WithLens(model, ColmapLens::kOpenCv).cameras[0].intrinsics.distortion[0], 0.1);

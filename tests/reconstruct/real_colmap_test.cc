@@ -1,4 +1,4 @@
-// The installed COLMAP on the quickest real capture, from JPEG files to a judged Capture.
+// The installed COLMAP on a small real capture, from JPEG files to a Capture.
 #include <gtest/gtest.h>
 
 #include "kernels/base/error.h"
@@ -20,7 +20,7 @@ bool HaveColmap() {
   }
 }
 
-// COLMAP does not repeat itself, so the bounds are wide: what a good result must have.
+// COLMAP is not deterministic, so the bounds are wide.
 TEST(RealColmap, Kermit) {
   REGRADE_NEED_DATA("kermit");
   if (!HaveColmap()) GTEST_SKIP() << "no colmap here";
@@ -34,7 +34,7 @@ TEST(RealColmap, Kermit) {
   EXPECT_GT(capture.points.size(), 200u);
   EXPECT_LT(capture.reprojection_px, 0.5);
   EXPECT_GT(MedianTriangulationAngle(capture), 0.2);
-  // The EXIF focal length, about 660 px, is right to some per cent.
+  // The EXIF focal length, about 660 px, is accurate to a few percent.
   EXPECT_NEAR(capture.views[0].camera.fx, 680, 70);
 }
 

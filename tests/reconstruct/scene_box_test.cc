@@ -1,3 +1,4 @@
+// The resolution of a scene's grid.
 #include "reconstruct/scene/scene_box.h"
 
 #include <gtest/gtest.h>
@@ -18,8 +19,8 @@ TEST(SceneBox, EveryAxisHasACell) {
   EXPECT_EQ(ResolutionFor({.radius = {1, 1, 1e-6f}}, 16).z, 2);
 }
 
-// H98: in NDC a picture is 2 wide and 2 high, whatever its sides. A voxel that is as many
-// pixels wide as high does not waste a third of the grid on the shorter side.
+// H98: in NDC a picture is 2 wide and 2 high. Voxels that are as many pixels wide as high do
+// not waste a third of the grid on the shorter side.
 TEST(SceneBox, H98_VoxelsOfNdcAreAsManyPixelsWideAsHigh) {
   const double focal = 900;
   for (const auto& [width, height] : {std::pair{1008, 756}, std::pair{540, 960}}) {
@@ -31,8 +32,8 @@ TEST(SceneBox, H98_VoxelsOfNdcAreAsManyPixelsWideAsHigh) {
     const double pixels_high = box.radius.y * height / n.y;
     EXPECT_EQ(std::max(n.x, n.y), 1408);
     EXPECT_EQ(n.z, 128);
-    EXPECT_NEAR(pixels_wide, pixels_high,
-                2e-3);  // a side is rounded to whole voxels: 1 in 1000
+    // Sides are rounded to whole voxels: 1 in 1000.
+    EXPECT_NEAR(pixels_wide, pixels_high, 2e-3);
   }
   EXPECT_EQ(VoxelAspect(NdcSpace()), 1.0f);
 }

@@ -1,4 +1,4 @@
-// Geometry that can be trusted, and geometry that cannot.
+// Checks of reliable and unreliable scene geometry.
 #include "reconstruct/scene/scene_checks.h"
 
 #include <gtest/gtest.h>
@@ -31,8 +31,8 @@ TEST(SceneChecks, TriangulationAngleOfAnExactCase) {
   point.position = {0, 0, 1};
   point.views = {0, 1, 2};
   capture.points = {point};
-  EXPECT_NEAR(MedianTriangulationAngle(capture), M_PI / 2,
-              1e-12);  // the outer two, at 45 degrees
+  // The outer two, at 45 degrees.
+  EXPECT_NEAR(MedianTriangulationAngle(capture), M_PI / 2, 1e-12);
   capture.points[0].views = {1, 2};
   EXPECT_NEAR(MedianTriangulationAngle(capture), M_PI / 4 - std::atan(0.5), 1e-12);
   EXPECT_EQ(MedianTriangulationAngle({}), 0);
@@ -45,7 +45,7 @@ TEST(SceneChecks, GoodCaptureIsAccepted) {
   EXPECT_TRUE(assessment.notes.empty());
 }
 
-TEST(SceneChecks, H127_CameraThatOnlyTurnsIsTold) {
+TEST(SceneChecks, H127_CameraThatOnlyTurnsIsRefused) {
   const SceneAssessment assessment = AssessScene(CaptureOf({.arc_deg = 0.4}));
   EXPECT_NE(assessment.refusal.find("nearly one place"), std::string::npos)
       << assessment.refusal;
@@ -56,7 +56,7 @@ TEST(SceneChecks, H128_PlaneIsANoteNotARefusal) {
   const SceneAssessment assessment = AssessScene(CaptureOf({.thickness = 0.001}));
   EXPECT_EQ(assessment.refusal, "");
   ASSERT_EQ(assessment.notes.size(), 1u);
-  EXPECT_NE(assessment.notes[0].find("benchmark"), std::string::npos);
+  EXPECT_NE(assessment.notes[0].find("plane"), std::string::npos);
 }
 
 TEST(SceneChecks, H128_OneOutlierDoesNotHideThePlane) {
@@ -86,7 +86,7 @@ TEST(SceneChecks, EmptyCaptureIsRefusedWithoutDividingByZero) {
   EXPECT_EQ(WorstPixelAspect({}), 1);
 }
 
-// H140: the measures are angles and ratios, so they do not depend on the world's scale.
+// H140: the measures are angles and ratios, independent of the world's scale.
 TEST(SceneChecks, H140_ScaleDoesNotMatter) {
   for (const double scale : {1e-6, 1e6}) {
     Capture capture = CaptureOf({});

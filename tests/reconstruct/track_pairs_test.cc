@@ -1,4 +1,4 @@
-// Pairs of photos that are worth matching under known poses.
+// Selection of the pairs of photos to match for known poses.
 #include "reconstruct/colmap/track_pairs.h"
 
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 namespace regrade {
 namespace {
 
-// Looks from `angle` of a circle to its middle.
+// A camera at `angle` on a circle that looks at its centre.
 Camera OnCircle(double angle) {
   const double s = std::sin(angle), k = std::cos(angle);
   Camera camera;
@@ -25,9 +25,9 @@ std::vector<Camera> Circle(size_t count) {
   return cameras;
 }
 
-TEST(TrackPairs, NeighboursAndSomeFartherOff) {
+TEST(TrackPairs, NeighboursAndSomeFartherAway) {
   const size_t n = 60;
-  const auto pairs = PairsWorthMatching(Circle(n));
+  const auto pairs = PairsToMatch(Circle(n));
   EXPECT_LE(pairs.size(), kPartners * n);
   EXPECT_TRUE(std::is_sorted(pairs.begin(), pairs.end()));
   EXPECT_EQ(std::adjacent_find(pairs.begin(), pairs.end()), pairs.end());
@@ -37,21 +37,21 @@ TEST(TrackPairs, NeighboursAndSomeFartherOff) {
     ASSERT_LT(i, j);
     const size_t steps = std::min(j - i, n - (j - i));
     widest = std::max(widest, steps);
-    EXPECT_LE(360 * steps, 75 * n) << "they look at other sides";
+    EXPECT_LE(360 * steps, 75 * n) << "they see different sides";
     ++partners[i], ++partners[j];
   }
   EXPECT_GE(*std::min_element(partners.begin(), partners.end()), kPartners);
   EXPECT_GE(widest, 6u) << "36 degrees: enough for depth";
-  for (size_t i = 0; i < n; ++i)  // one next to the other, all round
+  for (size_t i = 0; i < n; ++i)  // all neighbours on the circle
     EXPECT_TRUE(std::binary_search(pairs.begin(), pairs.end(),
                                    std::pair<size_t, size_t>(std::minmax(i, (i + 1) % n))));
 }
 
 TEST(TrackPairs, FewPhotosAndOnePlace) {
-  EXPECT_TRUE(PairsWorthMatching({}).empty());
-  EXPECT_TRUE(PairsWorthMatching(Circle(1)).empty());
+  EXPECT_TRUE(PairsToMatch({}).empty());
+  EXPECT_TRUE(PairsToMatch(Circle(1)).empty());
   const std::vector<Camera> same(3, OnCircle(1));
-  EXPECT_EQ(PairsWorthMatching(same).size(), 3u);
+  EXPECT_EQ(PairsToMatch(same).size(), 3u);
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
-// Tracks for poses that were given, by a colmap that numbers images as its database does, and
-// by ones that fail.
+// Tracks for given poses, with a fake colmap that uses its database's image ids, and with
+// failing ones.
 #include "reconstruct/colmap/tracks_for_poses.h"
 
 #include <gtest/gtest.h>
@@ -19,7 +19,7 @@ class Tracks : public ::testing::Test {
  protected:
   Tracks() { fs::create_directories(folder_ / "photos"); }
 
-  // Nine photos, and the poses of eight: the first has none.
+  // Nine photos; the first one has no pose.
   std::vector<StagedPhoto> Photos() const {
     std::vector<StagedPhoto> photos;
     for (int i = 0; i < 9; ++i) {
@@ -50,9 +50,9 @@ class Tracks : public ::testing::Test {
   const testing::TemporaryFolder folder_;
 };
 
-TEST_F(Tracks, PointsUnderOurNumbersAndPosesToTheBit) {
+TEST_F(Tracks, PointsHaveOurImageIdsAndPosesAreBitwiseEqual) {
   ColmapModel posed = Posed();
-  // A turn that a quaternion's rounding would change, and an image that has no photo.
+  // An image that has no photo.
   posed.images.push_back(posed.images[0]);
   posed.images.back().id = 40;
   posed.images.back().name = "elsewhere.png";
@@ -61,7 +61,7 @@ TEST_F(Tracks, PointsUnderOurNumbersAndPosesToTheBit) {
   EXPECT_EQ(found.observations, 480);
   EXPECT_EQ(found.pairs, 28);
   EXPECT_EQ(found.colmap_version, "3.8");
-  // A observation under another image's number would lie elsewhere.
+  // An observation with another image's id would have a large error.
   EXPECT_LT(found.median_px, 1e-9);
   ASSERT_EQ(found.model.images.size(), posed.images.size());
   for (size_t i = 0; i < posed.images.size(); ++i) {
@@ -76,7 +76,7 @@ TEST_F(Tracks, PointsUnderOurNumbersAndPosesToTheBit) {
   EXPECT_LT(capture.reprojection_px, 1e-6);
 }
 
-TEST_F(Tracks, WhatAnEarlierRunLeftIsNotInTheWay) {
+TEST_F(Tracks, FilesOfAnEarlierRunAreReplaced) {
   fs::create_directories(folder_ / "work/triangulated");
   const FoundTracks first = Find("good", Posed()), again = Find("good", Posed());
   EXPECT_EQ(first.model.points.size(), again.model.points.size());
@@ -93,16 +93,16 @@ TEST_F(Tracks, FailuresAreErrorsOfTheProgram) {
   }
 }
 
-TEST_F(Tracks, NoCommonPointIsAnAnswer) {
+TEST_F(Tracks, NoCommonPointIsNotAnError) {
   EXPECT_TRUE(Find("sparse", Posed()).model.points.empty());
 }
 
 TEST_F(Tracks, AbortEndsTheChild) {
-  int asked = 0;
+  int calls = 0;
   EXPECT_THROW(Find("hang", Posed(),
                     [&](const Progress& p) {
                       EXPECT_LE(p.done, p.total);
-                      return ++asked > 4 ? LoopControl::kStop : LoopControl::kContinue;
+                      return ++calls > 4 ? LoopControl::kStop : LoopControl::kContinue;
                     }),
                Interrupted);
 }

@@ -1,5 +1,5 @@
-// The box of an object before a transparent background: as large as the object, wherever the
-// cameras are.
+// The box of an object on a transparent background has the object's size, wherever the cameras
+// are.
 #include "reconstruct/scene/visual_hull.h"
 
 #include <gtest/gtest.h>
@@ -9,8 +9,8 @@
 namespace regrade {
 namespace {
 
-// A ball of radius 0.5 round (1, 0, 0), seen from a circle; pictures show little more than the
-// ball.
+// A ball of radius 0.5 around (1, 0, 0), seen from a circle; it nearly fills the pictures.
+// Silhouettes of cameras below `empty_angle` are empty.
 std::vector<Silhouette> BallSilhouettes(double empty_angle) {
   std::vector<Silhouette> silhouettes;
   for (int i = 0; i < 12; ++i) {
@@ -40,30 +40,31 @@ std::vector<Silhouette> BallSilhouettes(double empty_angle) {
   return silhouettes;
 }
 
-NormalizedScene CubeRoundTheCameras() {
+NormalizedScene CubeAroundTheCameras() {
   NormalizedScene scene;
-  scene.field_from_world = {1 / 6.0, Mat3d(),
-                            Vec3d{-1 / 6.0, 0, 0}};  // half side 6 round the ball
+  // Half side 6 around the ball.
+  scene.field_from_world = {1 / 6.0, Mat3d(), Vec3d{-1 / 6.0, 0, 0}};
   scene.box.radius = {1, 1, 1};
   scene.box.near_clip = 0.1f;
   return scene;
 }
 
-TEST(VisualHull, BoxIsTheObjects) {
-  const NormalizedScene tight = TightenToSilhouettes(CubeRoundTheCameras(), BallSilhouettes(0));
+TEST(VisualHull, BoxFitsTheObject) {
+  const NormalizedScene tight =
+      TightenToSilhouettes(CubeAroundTheCameras(), BallSilhouettes(0));
   const double half = 1 / tight.field_from_world.scale;  // world units
   EXPECT_GE(half, 0.5);
-  // PadShBasis by up to two blocks of pixels (0.13), and a vertex of the grid (0.126) on top of
+  // Enlarged by up to two blocks of pixels (0.13), and by one vertex of the grid (0.126) plus
   // its rounding.
   EXPECT_LE(half, 0.5 + 0.13 + 2 * 12.0 / 95);
   const Vec3d middle = tight.field_from_world * Vec3d{1, 0, 0};
   EXPECT_NEAR(Norm(middle), 0, 0.2);
-  EXPECT_NEAR(tight.box.near_clip / tight.field_from_world.scale, 0.6,
-              1e-5);  // the same length
+  // The same length in world units.
+  EXPECT_NEAR(tight.box.near_clip / tight.field_from_world.scale, 0.6, 1e-5);
 }
 
-TEST(VisualHull, SilhouettesThatDisagreeLeaveTheBox) {
-  const NormalizedScene scene = CubeRoundTheCameras();
+TEST(VisualHull, InconsistentSilhouettesDoNotChangeTheBox) {
+  const NormalizedScene scene = CubeAroundTheCameras();
   const NormalizedScene same = TightenToSilhouettes(scene, BallSilhouettes(4));
   EXPECT_EQ(same.field_from_world.scale, scene.field_from_world.scale);
 }

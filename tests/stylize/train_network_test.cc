@@ -84,7 +84,7 @@ TEST(TrainNetwork, ViewWeightKeepsPointsFromFollowingEachView) {
   double change[3], psnr[3];
   for (int i = 0; i < 3; ++i) {
     TrainNetworkOptions options = Quick(120);
-    options.view_weight = i == 0 ? 0 : i == 1 ? 0.3 : 10;
+    options.loss.view_weight = i == 0 ? 0 : i == 1 ? 0.3 : 10;
     const TrainNetworkResult result =
         TrainNetwork(ball.field, ball.views, map, {}, options, {});
     const Appearance styled = ApplyNetwork(result.network, ball.field);
@@ -118,7 +118,8 @@ TEST(TrainNetwork, AMapSteeperThanTheScenesIsAYardstickButNoStart) {
   EXPECT_GT(SpectralNorm(result.linear_map.matrix), SpectralNorm(flat.map.matrix));
   EXPECT_EQ(result.network.BaseNorm(), SpectralNorm(flat.map.matrix));
   EXPECT_GT(result.psnr_db, result.linear_map_psnr_db);  // that of the steep one
-  EXPECT_LE(std::max(result.slopes.along_coefficients, result.slopes.along_position),
+  EXPECT_LE(std::max(result.local_lipschitz.along_coefficients,
+                     result.local_lipschitz.along_position),
             result.local_lipschitz_sampled * (1 + 1e-9));
   // Less steep than the scene's own it is the start.
   SceneColorMap steeper = steep;

@@ -1,11 +1,11 @@
-// compare_poses SPARSE TRUTH PHOTOS: how far the poses of a COLMAP model are from the truth.
+// compare_poses SPARSE TRUTH PHOTOS: prints the errors of a COLMAP model's poses.
 //
 // TRUTH is a transforms.json (OpenGL axes), or a folder of Strecha's NAME.camera files. PHOTOS
-// is the folder that was posed: its k-th picture in the order of names is the model's
-// "0000k.png"; models with the pictures' own names work as well. The two worlds are aligned by
-// the similarity that is best for the camera centres (Umeyama, 1991); printed are the angles
-// between the rotations and the distances between the centres, these as a share of the largest
-// distance between two cameras.
+// is the folder that was posed: its k-th picture in the order of names is "0000k.png" in the
+// model; models with the original names work as well. The two worlds are aligned by the
+// similarity that fits the camera centres best (Umeyama, 1991). Printed are the angles between
+// the rotations, and the distances between the centres as a fraction of the largest distance
+// between two cameras.
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cstdio>
@@ -110,10 +110,10 @@ int Compare(const std::string& sparse, const std::string& truth_path,
   const Eigen::Matrix4d similarity = Eigen::umeyama(from, to, true);
   const double scale = std::cbrt(similarity.topLeftCorner<3, 3>().determinant());
   const Matrix3d rotation = similarity.topLeftCorner<3, 3>() / scale;
-  double spread = 0;
+  double extent = 0;
   for (Eigen::Index i = 0; i < to.cols(); ++i)
     for (Eigen::Index j = 0; j < i; ++j)
-      spread = std::max(spread, (to.col(i) - to.col(j)).norm());
+      extent = std::max(extent, (to.col(i) - to.col(j)).norm());
   std::vector<double> angles, distances;
   for (const auto& [mine, theirs] : pairs) {
     const Matrix3d difference =
@@ -121,10 +121,10 @@ int Compare(const std::string& sparse, const std::string& truth_path,
     angles.push_back(std::abs(Eigen::AngleAxisd(difference).angle()) * 180 / M_PI);
     const Vector3d center =
         similarity.topLeftCorner<3, 3>() * mine.center + similarity.topRightCorner<3, 1>();
-    distances.push_back(100 * (center - theirs.center).norm() / spread);
+    distances.push_back(100 * (center - theirs.center).norm() / extent);
   }
   PrintMedianAndMax("rotation error, degrees", angles);
-  PrintMedianAndMax("position error, % of the camera spread", distances);
+  PrintMedianAndMax("position error, % of the camera extent", distances);
   return 0;
 }
 

@@ -1,5 +1,5 @@
-// Where real captures for tests are: REGRADE_DATA, or ../shared/data beside the source tree.
-// Tests skip without it.
+// The folder of real captures for tests: REGRADE_DATA, or ../shared/data beside the source
+// tree. Tests skip without it.
 #pragma once
 
 #include <cstdlib>

@@ -1,5 +1,4 @@
-// A field's values in double, for bodies that are checked against themselves in higher
-// precision.
+// A field's values in double, for code that is compared with itself in higher precision.
 #pragma once
 
 #include <vector>
@@ -38,7 +37,7 @@ struct DoubleField {
   std::vector<double> sphere_density, sphere_color;
 };
 
-// Normalised anew: a float direction is a unit one to 1e-7 only.
+// Normalised again: a float direction has unit length only to 1e-7.
 inline RayT<double> ToDouble(const Ray& ray) {
   return {ray.origin.Cast<double>(), Normalized(ray.direction.Cast<double>())};
 }

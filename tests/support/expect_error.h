@@ -1,4 +1,4 @@
-// EXPECT that a statement throws Error with a code, and that its message names something.
+// EXPECT that a statement throws Error with a code, and that its message contains a text.
 #pragma once
 
 #include <gtest/gtest.h>

@@ -1,11 +1,10 @@
-// A library to be preloaded: the k-th operation that writes below a folder fails, once or from
-// then on.
+// A library to preload: the k-th write operation below a folder fails, once or from then on.
 //
 //   FAILING_WRITES_UNDER   the folder, absolute
-//   FAILING_WRITES_AT      k, from 1; 0 or nothing: none fails, they are only counted
-//   FAILING_WRITES_KIND    ENOSPC, EIO, or SHORT (a write takes half of its bytes, which is no
-//   error) FAILING_WRITES_ALWAYS  if set, every later one fails too, as on a disk that stays
-//   full FAILING_WRITES_COUNT   file that gets the number of operations when the program ends
+//   FAILING_WRITES_AT      k, from 1; 0 or unset: none fails, operations are only counted
+//   FAILING_WRITES_KIND    ENOSPC, EIO, or SHORT (writes half of its bytes, without an error)
+//   FAILING_WRITES_ALWAYS  if set, every later operation fails too, as on a full disk
+//   FAILING_WRITES_COUNT   file for the number of operations, written when the program ends
 //
 // Operations are: opening for writing, write, pwrite, writev, fsync, fdatasync, rename, mkdir.
 #include <dlfcn.h>
@@ -52,7 +51,7 @@ bool IsShort() {
   return kind != nullptr && strcmp(kind, "SHORT") == 0;
 }
 
-// Counts an operation; true if it is to fail, and errno says why.
+// Counts an operation; true, with errno set, if it must fail.
 bool Fails() {
   const long number = ++operations;
   const char* at = getenv("FAILING_WRITES_AT");
@@ -74,7 +73,7 @@ void Watch(int fd, bool on) {
 
 bool ForWriting(int flags) { return (flags & O_ACCMODE) != O_RDONLY; }
 
-__attribute__((destructor)) void SayCount() {
+__attribute__((destructor)) void WriteCount() {
   const char* path = getenv("FAILING_WRITES_COUNT");
   if (path == nullptr) return;
   const int fd =

@@ -1,5 +1,5 @@
-// A program that behaves like colmap on the command line, and badly in the way that its own
-// file name says: "colmap-hang" hangs. It poses photos on an arc around a cloud of points.
+// A program with colmap's command line that misbehaves as its file name says: "colmap-hang"
+// hangs. It poses photos on an arc around a cloud of points.
 #include <unistd.h>
 
 #include <algorithm>
@@ -57,7 +57,7 @@ std::vector<std::string> KnownOptions() {
           "Mapper.filter_max_reproj_error"};
 }
 
-// As the real one aborts without a display, when it is not told to leave the GPU alone.
+// COLMAP aborts without a display unless use_gpu is 0.
 void NeedsNoGpu(const char* kind) {
   if (arguments[(Is("new") ? "Feature" : "Sift") + std::string(kind) + ".use_gpu"] != "0")
     std::abort();
@@ -103,7 +103,7 @@ void Write(ColmapModel model, const std::vector<std::string>& names,
 
 int Map() {
   if (Is("hang")) HangForEver();
-  if (Is("family")) {  // says who it and its child are
+  if (Is("family")) {  // writes its process id and its child's
     const std::string work = arguments["output_path"] + "/../../";
     const pid_t child = fork();
     if (child > 0) {
@@ -126,7 +126,7 @@ int Map() {
   if (Is("flood-at-the-end"))
     for (int i = 0; i < 300000; ++i) std::printf("%0100d\n", i);
   if (Is("endless")) {
-    // Never silent, never done, and not to be asked to go.
+    // Prints forever and ignores SIGTERM.
     std::signal(SIGTERM, SIG_IGN);
     while (true) std::printf("still working\n");
   }
@@ -164,8 +164,8 @@ int Map() {
     return 0;
   }
   if (Is("grandchildren")) {
-    // Outlives its parent and holds the pipe open. Who it is the parent says: it may be ended
-    // before it has run at all.
+    // Outlives its parent and keeps the pipe open. The parent writes its process id, since it
+    // may be killed before it runs.
     const pid_t grandchild = fork();
     if (grandchild == 0) HangForEver();
     std::ofstream(arguments["output_path"] + "/../../grandchild") << grandchild << "\n";
@@ -173,25 +173,25 @@ int Map() {
   Write(testing::MakeSyntheticModel(options), names, out + "/0");
   if (Is("half"))
     fs::resize_file(out + "/0/points3D.bin", fs::file_size(out + "/0/points3D.bin") / 2);
-  // Killed by a time limit, the real mapper has written its model before as well.
+  // Hangs after the model is written, as COLMAP's mapper does when a time limit kills it.
   if (Is("late")) HangForEver();
   return 0;
 }
 
 int Adjust() {
   ColmapModel model = ReadColmapModel(arguments["input_path"]);
-  // A principal point that runs off, wherever it may.
+  // A principal point that diverges if it may be refined.
   if (Is("runaway") && arguments["BundleAdjustment.refine_principal_point"] == "1")
     model.cameras[0].intrinsics.cx = 500;
   WriteColmapModel(model, arguments["output_path"]);
   return 0;
 }
 
-// Points where the synthetic model has them, for the images of the input that features were
-// extracted of, under the numbers that a database might give them.
+// The synthetic model's points for the images of the input that features were extracted
+// from, with the ids that a database might assign.
 int Triangulate() {
   if (Is("hang")) HangForEver();
-  if (arguments["clear_points"] != "1") return 1;  // numbers would not be the database's
+  if (arguments["clear_points"] != "1") return 1;  // ids would not be the database's
   const ColmapModel posed = ReadColmapModel(arguments["input_path"]);
   std::set<std::string> extracted;
   std::ifstream database(arguments["database_path"]);
@@ -203,7 +203,7 @@ int Triangulate() {
     model.images[i].name = posed.images[i].name;
     model.images[i].id = static_cast<uint32_t>(1000 - i);
   }
-  std::reverse(model.images.begin(), model.images.end());  // by number
+  std::reverse(model.images.begin(), model.images.end());  // by id
   for (ColmapPoint& point : model.points)
     for (ColmapTrackElement& element : point.track) element.image_id = 1001 - element.image_id;
   if (Is("sparse")) model.points.clear();
@@ -232,9 +232,9 @@ int main(int argc, char** argv) {
                                                                                   : "3.8");
     return 0;
   }
-  const char* platform = std::getenv("QT_QPA_PLATFORM");  // the real one's Qt aborts, too
+  const char* platform = std::getenv("QT_QPA_PLATFORM");  // COLMAP's Qt aborts, too
   if (platform == nullptr || std::string(platform) != "offscreen") std::abort();
-  // The real one leaves logs in the system's folder for temporary files otherwise.
+  // Otherwise COLMAP leaves logs in the system's temporary folder.
   if (std::getenv("GLOG_logtostderr") == nullptr) std::abort();
   const std::vector<std::string> known = KnownOptions();
   for (int i = 2; i < argc; ++i) {

@@ -1,5 +1,5 @@
-// A thread inherits the traps of the one that starts it, and OpenMP's stay for later tests:
-// what is switched is switched in all of them.
+// A thread inherits the traps of the thread that starts it, and OpenMP's threads live on for
+// later tests: traps are switched in all of them.
 #include "tests/support/floating_point_traps.h"
 
 #include <gtest/gtest.h>

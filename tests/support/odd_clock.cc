@@ -1,5 +1,5 @@
-// A library to be preloaded: the wall clock stands in the year 2106 and jumps back and forth by
-// days between two looks at it. The monotonic clock is left alone.
+// A library to preload: the wall clock is in the year 2106 and jumps back and forth by days
+// between two readings. The monotonic clock is unchanged.
 #include <dlfcn.h>
 #include <sys/time.h>
 #include <time.h>
@@ -9,11 +9,11 @@
 namespace {
 
 constexpr long kYear2106 = 4294967296;  // seconds: beyond 32 bits
-std::atomic<long> looks{0};
+std::atomic<long> readings{0};
 
 long OddSeconds() {
-  const long look = ++looks;
-  return kYear2106 + (look % 2 == 0 ? 1 : -1) * look * 86400;
+  const long reading = ++readings;
+  return kYear2106 + (reading % 2 == 0 ? 1 : -1) * reading * 86400;
 }
 
 }  // namespace

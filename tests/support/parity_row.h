@@ -1,4 +1,4 @@
-// One row of the parity table, for people and for scripts.
+// Prints and checks one row of the parity table (CPU against GPU).
 #pragma once
 
 #include <gtest/gtest.h>

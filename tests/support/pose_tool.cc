@@ -1,5 +1,5 @@
-// pose_tool PHOTOS OUT [colmap]: stages a folder of pictures and finds their poses, for
-// measuring by hand. OUT gets photos/, work/ and sparse/.
+// pose_tool PHOTOS OUT [colmap]: stages a folder of pictures and estimates their poses, for
+// manual measurements. Writes photos/, work/ and sparse/ to OUT.
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
@@ -47,14 +47,14 @@ int main(int argc, char** argv) {
         "angle %.2f deg, extents %.3g %.3g %.3g, fx %.2f fy %.2f cx %.2f cy %.2f, corner moved "
         "%.2f px, %.1f s\n",
         capture.views.size(), ingest.photos.size(), capture.points.size(),
-        capture.reprojection_px, capture.models_found, report.recipe.c_str(),
+        capture.reprojection_px, capture.models_found, report.strategy.c_str(),
         report.attempts_made, report.lens.c_str(),
         MedianTriangulationAngle(capture) * 180 / M_PI, extents.x, extents.y, extents.z,
         camera.fx, camera.fy, camera.cx, camera.cy, camera.MaxCornerDistortion(), seconds());
-    for (const PhotoStatus& verdict : capture.statuses)
-      if (verdict.status != PhotoState::kUsed)
-        std::printf("%s: %s: %s\n", verdict.file.c_str(), ToString(verdict.status),
-                    verdict.why.c_str());
+    for (const PhotoStatus& photo : capture.statuses)
+      if (photo.status != PhotoState::kUsed)
+        std::printf("%s: %s: %s\n", photo.file.c_str(), ToString(photo.status),
+                    photo.why.c_str());
     for (const std::string& note : report.notes) std::printf("note: %s\n", note.c_str());
   } catch (const Error& e) {
     std::printf("exit %d after %.1f s, %d attempts: %s\n", static_cast<int>(e.code()),

@@ -1,4 +1,4 @@
-// Whether a process is still at work, for tests of what ends with what.
+// Whether a process is alive, for tests of processes that end together.
 #pragma once
 
 #include <chrono>
@@ -9,7 +9,7 @@
 
 namespace regrade::testing {
 
-// It may stay a zombie until init takes it; alive it is no longer.
+// A zombie, which init has not yet collected, counts as dead.
 inline bool IsAlive(int pid) {
   std::ifstream stat("/proc/" + std::to_string(pid) + "/stat");
   std::string number, name, state;
@@ -24,7 +24,7 @@ inline bool Ends(int pid) {
   return !IsAlive(pid);
 }
 
-// A number that another process writes into a file and renames; 0 after ten seconds without it.
+// The number in a file that another process writes and renames; 0 after ten seconds without it.
 inline int NumberIn(const std::filesystem::path& file) {
   int number = 0;
   for (int i = 0; i < 1000 && number == 0; ++i, Moment()) std::ifstream(file) >> number;

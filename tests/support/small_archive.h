@@ -5,9 +5,17 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/files/atomic_file.h"
 #include "pipeline/files/npz_file.h"
+#include "tests/support/temporary_folder.h"
 
 namespace regrade::testing {
+
+inline std::string BytesOf(const NpzWriter& writer) {
+  const TemporaryFolder folder;
+  writer.WriteTo(folder / "a.npz");
+  return ReadWholeFile(folder / "a.npz", 1 << 20);
+}
 
 inline std::string SmallArchive() {
   static const float values[6] = {1, 2, 3, 4, 5, 6};
@@ -17,7 +25,7 @@ inline std::string SmallArchive() {
   writer.Add("ramp", {1000}, ramp.data(), NpzPacking::kDeflate);
   writer.AddScalar<double>("pi", 3.25);
   writer.AddText("note", "h\xc3\xa9llo");
-  return writer.Bytes();
+  return BytesOf(writer);
 }
 
 }  // namespace regrade::testing

@@ -15,8 +15,8 @@ inline double Uniform(uint64_t seed, uint64_t counter, double lo, double hi) {
   return lo + (hi - lo) * RandomDouble(seed, 77, counter);
 }
 
-// About `fill` of the vertices are stored; densities in [-2, 10), so that some are empty by
-// ReLU.
+// About a fraction `fill` of the vertices is stored; densities are in [-2, 10), so ReLU makes
+// some of them empty.
 inline RadianceField RandomField(const Vec3i& resolution, int basis, double fill,
                                  uint64_t seed) {
   auto geometry = std::make_shared<Geometry>();
@@ -40,7 +40,7 @@ inline RadianceField RandomField(const Vec3i& resolution, int basis, double fill
   return field;
 }
 
-// Background layers behind it, of which about `fill` of the columns are stored.
+// Adds background layers; about a fraction `fill` of their columns is stored.
 inline void AddSpheres(int layers, int resolution, double fill, uint64_t seed,
                        RadianceField* field) {
   auto geometry = std::make_shared<Geometry>(*field->geometry);

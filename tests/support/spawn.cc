@@ -16,7 +16,7 @@ int Spawn(const char* program, const std::vector<std::string>& arguments, int fd
   if (child == 0) {
     ::dup2(fd, STDOUT_FILENO);
     ::dup2(fd, STDERR_FILENO);
-    // A test that is itself a background job would hand its ignored signals down.
+    // A test that runs as a background job ignores these signals, and children inherit that.
     for (const int s : {SIGINT, SIGTERM}) ::signal(s, SIG_DFL);
     std::vector<char*> argv = {const_cast<char*>(program)};
     for (const std::string& argument : arguments)

@@ -1,4 +1,4 @@
-// A painted ball, views of it in made-up styles, and random networks, for tests of LipRF.
+// A painted ball, views of it in synthetic styles, and random networks, for tests of LipRF.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -18,9 +18,9 @@
 #include "stylize/field/base_map.h"
 #include "stylize/field/gradient_aggregation.h"
 #include "stylize/field/lipschitz_network.h"
+#include "stylize/field/lipschitz_regularizer.h"
 #include "stylize/field/local_lipschitz.h"
 #include "stylize/training/initial_network.h"
-#include "stylize/training/lipschitz_regularizer.h"
 #include "stylize/training/style_rays.h"
 #include "stylize/training/train_network.h"
 
@@ -86,7 +86,7 @@ inline std::vector<Camera> Ring(int views, int size) {
   return cameras;
 }
 
-// What a network makes of the field, seen along rays: rendering without a renderer.
+// Colours of a field along rays, computed from ray weights without the renderer.
 inline std::vector<Vec3f> Render(const RadianceField& field, const std::vector<Ray>& rays) {
   const RayWeights weights = ComputeRayWeights(
       *field.geometry, {rays.data(), static_cast<int64_t>(rays.size())}, MarchOptions{}, 0);
@@ -112,10 +112,10 @@ inline std::vector<Vec3f> Render(const RadianceField& field, const std::vector<R
   return colors;
 }
 
-// The ball's views, each colour sent through a style.
+// Views of the ball with a style applied to each colour.
 struct StyledBall {
   RadianceField field;
-  std::vector<Image> targets, masks;  // a mask leaves out what the background shines through
+  std::vector<Image> targets, masks;  // a mask is 0 where the background is visible
   std::vector<StyledTrainingView> views;
 
   template <typename Style>
@@ -146,7 +146,7 @@ inline Vec3f LinearStyle(const Vec3f& c) {
 
 inline Vec3f CurvedStyle(const Vec3f& c) {
   const float luma = 0.3f * c.x + 0.6f * c.y + 0.1f * c.z;
-  const float s = 4 * (luma - 0.5f) * (luma - 0.5f);  // shadows and lights alike
+  const float s = 4 * (luma - 0.5f) * (luma - 0.5f);  // for shadows and highlights
   return {0.2f + 0.3f * c.x + 0.4f * s, 0.3f * c.y + 0.5f * s, 0.5f + 0.3f * c.z - 0.4f * s};
 }
 

@@ -1,4 +1,4 @@
-// A COLMAP model with exact geometry: cameras on an arc that look at a cloud of points.
+// A COLMAP model with exact geometry: cameras on an arc around a cloud of points.
 #pragma once
 
 #include <cmath>
@@ -42,8 +42,8 @@ inline ColmapModel MakeSyntheticModel(const SyntheticModelOptions& options = {})
     image.id = static_cast<uint32_t>(i + 1);
     image.camera_id = 1;
     image.name = StagedName(i);
-    const double share = options.images > 1 ? i / (options.images - 1.0) - 0.5 : 0;
-    const double angle = share * options.arc_deg * M_PI / 180;
+    const double position = options.images > 1 ? i / (options.images - 1.0) - 0.5 : 0;
+    const double angle = position * options.arc_deg * M_PI / 180;
     const double s = std::sin(angle), k = std::cos(angle);
     image.camera_from_world = {{{{k, 0, -s}, {0, 1, 0}, {s, 0, k}}}, {0, 0, 6}};
     model.images.push_back(image);
@@ -66,7 +66,7 @@ inline ColmapModel MakeSyntheticModel(const SyntheticModelOptions& options = {})
   return model;
 }
 
-// The photos that belong to the model, plus `more` that it does not know.
+// The photos of the model, and `more` that are not in it.
 inline std::vector<StagedPhoto> PhotosOf(const ColmapModel& model, int more = 0) {
   std::vector<StagedPhoto> photos;
   const int known = static_cast<int>(model.images.size());

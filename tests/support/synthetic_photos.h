@@ -1,5 +1,5 @@
-// Photos of a synthetic scene with true poses, and points as a pose estimate would have them:
-// what pixels of a grid show, seen wherever the depths agree.
+// Photos of a synthetic scene with true poses, and points as from a pose estimate: the surface
+// points of a pixel grid, observed by each view whose depth agrees.
 #pragma once
 
 #include <cmath>
@@ -21,7 +21,7 @@ struct SyntheticPhotos {
   std::string scene = "table";
   int views = 8, width = 200, height = 150;
   uint64_t seed = 4;
-  int pixels_a_point = 10;  // each way
+  int pixels_a_point = 10;  // in x and in y
   SynthEffects effects{.noise = true};
 };
 
@@ -43,7 +43,7 @@ inline void AddPoint(const std::vector<Image>& depths, size_t view, int x, int y
   if (point.views.size() >= 2) capture->points.push_back(point);
 }
 
-// Photos go to `folder`, which exists.
+// Writes the photos to `folder`, which must exist.
 inline Capture MakeSyntheticPhotos(const SyntheticPhotos& options, const std::string& folder) {
   const SyntheticScene scene = MakeSyntheticScene(options.scene, options.seed);
   Capture capture;

@@ -1,4 +1,4 @@
-// A fresh folder for a test, gone at its end.
+// A new folder for a test, removed at its end.
 #pragma once
 
 #include <stdlib.h>

@@ -1,7 +1,6 @@
-// A library to be preloaded: counts and times what makes writing safe, to say what it costs.
+// A library to preload: counts and times the calls that make writes durable.
 //
-//   TIMED_WRITES_REPORT   file that gets a line "NAME CALLS SECONDS" for each, added at the end
-//   of each process
+//   TIMED_WRITES_REPORT   file; each process appends a line "NAME CALLS SECONDS" for each call
 //
 // Operations are: fsync and fdatasync (of files and folders), rename.
 #include <dlfcn.h>

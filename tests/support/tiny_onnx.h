@@ -1,5 +1,5 @@
 // ONNX files of two or three operators, written byte by byte (Protocol Buffers' wire format;
-// the numbers are the fields of onnx.proto3), for tests of what runs networks.
+// the numbers are the fields of onnx.proto3), for tests of code that runs networks.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@ namespace regrade::testing {
 
 class TinyOnnx {
  public:
-  // Nothing yet; pictures of any size are said by Input and Output.
+  // Empty; Input and Output add pictures of any size.
   TinyOnnx() = default;
   // Two pictures [1, 3, height, width] go in as "first" and "second".
   TinyOnnx(int height, int width) {
@@ -89,8 +89,8 @@ class TinyOnnx {
   std::string graph_, outputs_, last_;
 };
 
-// The mean of the squared difference of both pictures as the network sees them: 4 times that
-// of pictures from 0 to 1.
+// The mean squared difference of both pictures in the network's range [-1, 1]: 4 times that
+// of pictures in [0, 1].
 inline std::string DistanceNetwork(int height, int width) {
   TinyOnnx network(height, width);
   network.Node("Sub", {"first", "second"}, "difference");

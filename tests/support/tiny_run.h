@@ -1,4 +1,4 @@
-// The built program at work on a synthetic capture so small that a whole run takes seconds.
+// Runs the built program on a synthetic capture so small that a whole run takes seconds.
 #pragma once
 
 #include <string>
@@ -26,7 +26,7 @@ inline ProgramOutcome RunProgram(const std::string& program,
   return outcome;
 }
 
-// Flags that make fit, style and film as small as they go.
+// Options for the smallest possible fit, style and film.
 inline std::vector<std::string> TinyFlags() {
   return {"--photo-size",  "64",   "--fit-resolutions", "24", "--fit-steps", "30",
           "--style-steps", "3",    "--path-frames",     "3",  "--threads",   "2",

@@ -1,4 +1,4 @@
-// Small pictures of soft waves with an edge and some grain: what a small photo is made of.
+// Small pictures with smooth waves, an edge and some grain, like small photos.
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// Writes a report page with everything on it, and hostile names wherever a name can be:
+// Writes a report page with every section, and hostile text wherever a name can be:
 // write_report_page FOLDER. For tests that open it in a browser.
 #include <cmath>
 #include <cstdio>
@@ -6,7 +6,6 @@
 
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/images/image_file.h"
-#include "pipeline/report/chart_library.h"
 #include "pipeline/report/html.h"
 
 namespace regrade {
@@ -34,8 +33,14 @@ RunReport EveryMetric(const std::string& evil) {
         {evil + ToString(state), state, state == PhotoState::kSkipped ? evil : ""});
   report.effects = {{"exposure", false, "it was not wanted", Metric(), 0.1},
                     {"ndc", true, evil, 12.5, 25}};
-  report.stages.reconstruct = ReconstructReport{60, 1000, 28.25, 27.5, 0.8, {evil}};
-  report.stages.stylize = StylizeReport{4, 300, 1.5, 1.9, 1.2};
+  report.stages.reconstruct = ReconstructReport{.time = {60, 100},
+                                                .voxels = 1000,
+                                                .psnr_train_db = 28.25,
+                                                .psnr_heldout_db = 27.5,
+                                                .ssim_heldout = 0.8,
+                                                .heldout = {evil}};
+  report.stages.stylize =
+      StylizeReport{.steps = 300, .k_est = 1.5, .bound = 1.9, .notices = {evil}};
   for (int i = 1; i <= 40; ++i) {
     report.stages.reconstruct->psnr_at_steps.emplace_back(20 * i, 28 - 12.0 / i);
     report.stages.stylize->bound_at_steps.emplace_back(10 * i, 1.9 + 2 * std::exp(-0.1 * i));
@@ -47,9 +52,15 @@ RunReport EveryMetric(const std::string& evil) {
     row.tc_psnr_mean_db = 30;
     for (int i = 0; i < 20; ++i)
       row.tc_psnr_pairs_db.push_back(i == 7 ? Metric() : Metric(30 + std::sin(0.5 * i)));
-    report.consistency.push_back(row);
+    report.evaluation.consistency.push_back(row);
   }
-  report.fidelity = {{"styled", 24.5, 0.19, 0.2, 12, 13, 0.01}};
+  report.evaluation.fidelity = {{.sequence = "styled",
+                                 .psnr_to_2d_db = 24.5,
+                                 .hue_std = 0.19,
+                                 .hue_std_2d = 0.2,
+                                 .chroma = 12,
+                                 .chroma_2d = 13,
+                                 .sliced_wasserstein_to_style = 0.01}};
   for (int i = 0; i < 6; ++i)
     report.costs.push_back({"fit", i == 0 ? "" : "fit-steps", evil, "held-out PSNR", "dB", 3,
                             12.0 + i, 0.5, 20.0 + 3 * i, 1, 25 + std::sqrt(i), 0.1,
@@ -73,7 +84,6 @@ ReportPictures EveryPicture(const std::string& evil) {
                                         -std::cos(0.5 * i), -std::sin(0.5 * i), 0.5, i % 8 == 0,
                                         evil});
   pictures.run_json = "{\"style\": \"" + evil + "\"}";
-  pictures.chart_library = ReadChartLibrary();
   return pictures;
 }
 

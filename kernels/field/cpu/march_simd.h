@@ -1,9 +1,8 @@
-// Density along a ray, many steps at once, compiled once an instruction set.
+// Marches the density along a ray, many steps at once; compiled once per instruction set.
 //
-// Between skips through empty space a ray is walked in blocks of kWide steps: positions,
+// Between skips through empty space a ray is marched in blocks of kWide steps: positions,
 // corner weights, density and opacity are vectors over the steps, and only the transmittance
-// goes from one to the next. A block may run through empty cells: their density is an exact
-// zero.
+// is sequential. A block may include empty cells: their density is exactly zero.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +17,7 @@
 namespace regrade::REGRADE_SIMD_NAMESPACE {
 namespace {
 
-// Consecutive steps, a lane each.
+// Consecutive steps, one per lane.
 struct alignas(64) StepBlock {
   float corner_weight[8][kWide];
   int32_t vertex[kWide];  // lowest corner of the cell
@@ -26,20 +25,20 @@ struct alignas(64) StepBlock {
   float t[kWide];  // voxels
   float alpha[kWide];
   float decay[kWide];  // exp(-tau)
-  float slope[kWide];  // dtau/dsigma, world units; 0 where sigma or tau is at its bound
+  float slope[kWide];  // dtau/dsigma, world units; 0 if sigma or tau is clamped
   float transmittance_before[kWide];
 };
 
-// A step that composites.
+// A sample that composites.
 struct Sample {
   Quad raw;  // colour before the clamp at 0; the last lane is t, in voxels
   int32_t block, lane;
-  int32_t corner[8];  // voxels, -1 where empty; when gradients are scattered, their slots
+  int32_t corner[8];  // voxels, -1 if empty; their gradient slots during the adjoint
 };
 
 struct Marched {
   std::vector<StepBlock> blocks;
-  std::vector<Sample> samples;  // room; the first num_samples are this ray's
+  std::vector<Sample> samples;  // capacity; the first num_samples are this ray's
   int64_t num_samples = 0;
   float world_per_voxel = 0;
   float transmittance = 1;
@@ -53,7 +52,7 @@ struct Marched {
   }
 };
 
-// Distances in memory between the corners of a cell.
+// Offsets in memory between the corners of a cell.
 struct CornerOffsets {
   int32_t y, x;
   explicit CornerOffsets(const GridFrame& frame)
@@ -90,7 +89,7 @@ struct StepPlaces {
   }
 };
 
-// Everything about steps [first, first + kWide) but the transmittance.
+// Everything about steps [first, first + kWide) except the transmittance.
 inline void MarchBlock(const FastGrid& grid, const GridRay<float>& march, float step,
                        int64_t first, StepBlock* block) {
   const StepPlaces places(grid.frame, march, step, first);
@@ -130,8 +129,8 @@ inline void MarchBlock(const FastGrid& grid, const GridRay<float>& march, float 
   std::memcpy(block->slope, &slope, sizeof(t));
 }
 
-// Walks the density and keeps the samples that composite. Skipping steps through cells without
-// stored corners leaves out exact zeros only.
+// Marches the density and keeps the samples that composite. Skipped steps, through cells
+// without stored corners, would contribute exact zeros.
 inline void March(const FastGrid& grid, const Ray& ray, const MarchOptions& options,
                   Marched* result) {
   const GridRay<float> march = ClipToGrid(grid.frame, ray, grid.near_clip, options.step);
@@ -160,9 +159,9 @@ inline void March(const FastGrid& grid, const Ray& ray, const MarchOptions& opti
     for (int lane = 0; lane < kWide; ++lane) {
       next->block = block_index;
       next->lane = lane;
-      next -= block.composited[lane];  // a comparison that holds is -1
+      next -= block.composited[lane];  // a true comparison is -1
       block.transmittance_before[lane] = transmittance;
-      transmittance *= block.decay[lane];  // 1 where nothing is composited
+      transmittance *= block.decay[lane];  // 1 for a sample that does not composite
       if (transmittance < options.stop_transmittance && block.composited[lane] != 0) {
         stopped = true;
         break;

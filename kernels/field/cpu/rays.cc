@@ -38,13 +38,12 @@ const FastRayFunctions& FastRays() {
   return *kBest;
 }
 
-void GradientArena::Reset(int64_t num_voxels, int lanes) {
+void GradientArena::Reset(int64_t num_voxels) {
   slot_of_voxel = Buffer<int32_t>(num_voxels);
   std::fill(slot_of_voxel.begin(), slot_of_voxel.end(), -1);
   voxel_of_slot = Buffer<int32_t>();
   gradient = Buffer<float>();
   gradient_capacity = 0;
-  (void)lanes;
 }
 
 void GradientArena::Forget() {

@@ -1,6 +1,6 @@
 // The CPU's fast path for rays: vectors over the values of a voxel, density marched first,
-// colours after, and gradients gathered in small private arenas. Held to render_ray.h by the
-// parity tests.
+// colours after, and gradients accumulated in small private arenas. Parity tests compare it
+// with render_ray.h.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@
 
 namespace regrade {
 
-// Sparse gradient of one share of a batch: only touched voxels have a record.
+// Sparse gradient of one part of a batch: only touched voxels have a record.
 struct GradientArena {
   Buffer<int32_t> slot_of_voxel;  // [N]: -1 where untouched
   Buffer<int32_t> voxel_of_slot;  // [slots]
@@ -21,8 +21,8 @@ struct GradientArena {
   int64_t gradient_capacity = 0;  // floats reserved in `gradient`
   SphereArena spheres;
 
-  void Reset(int64_t num_voxels, int lanes);  // allocate and forget
-  void Forget();                              // untouch, in time proportional to the slots
+  void Reset(int64_t num_voxels);  // allocates, untouched
+  void Forget();                   // marks all untouched, in time proportional to the slots
 };
 
 struct RayBatch {
@@ -33,21 +33,21 @@ struct RayBatch {
 
 struct FitStepResult {
   double squared_error = 0;     // sum over rays and channels
-  int64_t samples = 0;          // that were composited
-  int64_t rejected_voxels = 0;  // with a non-finite gradient: kept as they were
+  int64_t samples = 0;          // composited
+  int64_t rejected_voxels = 0;  // not stepped: non-finite gradient
 };
 
-// One set of functions an instruction set; FastRays() picks the best the processor has.
+// One set of functions per instruction set; FastRays() picks the best the processor supports.
 struct FastRayFunctions {
   const char* name;
   // color [n, 3] unclipped, depth [n] = sum w t (world), transmittance [n].
   void (*render)(const FastGrid&, const Ray*, int64_t n, const MarchOptions&, float* color,
                  float* depth, float* transmittance);
   // Renders, and adds the gradient of scale * sum (C - target)^2 to the arena. Returns squared
-  // error and samples.
+  // error and number of samples.
   FitStepResult (*accumulate)(const FastGrid&, const RayBatch&, const MarchOptions&,
                               float scale, GradientArena*);
-  // Largest w_i that any ray gives a sample at each voxel's corners; weights [N] hold running
+  // Largest w_i that any ray gives a sample at each voxel's corners; weights [N] are running
   // maxima.
   void (*max_weights)(const FastGrid&, const Ray*, int64_t n, const MarchOptions&,
                       float* weights);
@@ -55,17 +55,17 @@ struct FastRayFunctions {
   // total_variation.h.
   void (*total_variation)(const FastGrid&, int64_t begin, int64_t end, float scale_density,
                           float scale_sh, GradientArena*);
-  // Steps slots [begin, end) of arena `self`, summing all arenas in order; a voxel belongs to
-  // its first arena.
+  // Steps slots [begin, end) of arena `self` by the sum over all arenas in order; a voxel
+  // belongs to the first arena that has it.
   int64_t (*step)(FastGrid*, float* second_moment, const GradientArena* arenas, int num_arenas,
                   int self, int64_t begin, int64_t end, const RmspropOptions&);
-  // alpha [n] = 1 - exp(-tau), decay [n] = exp(-tau), for tau in [0, kMaxOpticalDepth]: what
-  // the marches use, for tests.
+  // alpha [n] = 1 - exp(-tau), decay [n] = exp(-tau), for tau in [0, kMaxOpticalDepth]: the
+  // functions the marches use, for tests.
   void (*opacity)(const float* tau, int64_t n, float* alpha, float* decay);
 };
 
 const FastRayFunctions& FastRays();
-// For tests and benchmarks: "baseline", "avx2", "avx512"; nullptr where the processor lacks it.
+// For tests and benchmarks: "baseline", "avx2", "avx512"; nullptr if the processor lacks it.
 const FastRayFunctions* FastRaysFor(const char* name);
 
 }  // namespace regrade

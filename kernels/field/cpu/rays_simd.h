@@ -1,6 +1,6 @@
-// Body of the fast path, compiled once an instruction set: define REGRADE_SIMD_NAMESPACE before
-// including. Nearly all of it is GCC's vector types, so the same text becomes SSE, AVX2 or
-// AVX-512.
+// Body of the fast path, compiled once per instruction set: define REGRADE_SIMD_NAMESPACE
+// before including it. It uses GCC's vector types nearly everywhere, so the same source
+// compiles to SSE, AVX2 or AVX-512.
 #include <algorithm>
 
 #include "kernels/field/cpu/march_simd.h"
@@ -22,14 +22,14 @@ void RenderRays(const FastGrid& grid, const Ray* rays, int64_t n, const MarchOpt
     March(grid, rays[r], options, &marched);
     Quad sums = Shade(grid, RayBasis<kBasis>(rays[r].direction), &marched);
     sums[3] *= marched.world_per_voxel;
-    float left = marched.transmittance;
+    float remaining = marched.transmittance;
     if (spheres) {
-      sums += ShadeSpheres(grid, rays[r], options.stop_transmittance, left, spheres.get());
-      left = spheres->transmittance;
+      sums += ShadeSpheres(grid, rays[r], options.stop_transmittance, remaining, spheres.get());
+      remaining = spheres->transmittance;
     }
-    for (int a = 0; a < 3; ++a) color[3 * r + a] = sums[a] + grid.background[a] * left;
+    for (int a = 0; a < 3; ++a) color[3 * r + a] = sums[a] + grid.background[a] * remaining;
     depth[r] = sums[3];
-    transmittance[r] = left;
+    transmittance[r] = remaining;
   }
 }
 
@@ -43,16 +43,16 @@ FitStepResult Accumulate(const FastGrid& grid, const RayBatch& batch,
     March(grid, batch.rays[r], options, &marched);
     const RayBasis<kBasis> basis(batch.rays[r].direction);
     Quad sums = Shade(grid, basis, &marched);
-    float left = marched.transmittance;
+    float remaining = marched.transmittance;
     if (spheres) {
-      sums +=
-          ShadeSpheres(grid, batch.rays[r], options.stop_transmittance, left, spheres.get());
-      left = spheres->transmittance;
+      sums += ShadeSpheres(grid, batch.rays[r], options.stop_transmittance, remaining,
+                           spheres.get());
+      remaining = spheres->transmittance;
       result.samples += spheres->num_samples;
     }
     Vec3f error;
     for (int a = 0; a < 3; ++a)
-      error[a] = sums[a] + grid.background[a] * left - batch.targets[r][a];
+      error[a] = sums[a] + grid.background[a] * remaining - batch.targets[r][a];
     result.squared_error += Dot(error, error);
     result.samples += marched.num_samples;
     const Vec3f d_color = error * (2 * scale);

@@ -1,4 +1,4 @@
-// A voxel's record as vectors, compiled once an instruction set inside rays_simd.h's
+// A voxel's record as vectors; compiled once per instruction set inside rays_simd.h's
 // namespace.
 #pragma once
 
@@ -11,7 +11,7 @@
 namespace regrade::REGRADE_SIMD_NAMESPACE {
 namespace {
 
-// `kWidth` floats an operation, `kCount` of them a record.
+// `kWidth` floats per vector, `kCount` vectors per record.
 template <int kBasis>
 struct RecordShape {
   static constexpr int kLanes = RecordLanes(kBasis);
@@ -46,7 +46,7 @@ struct Record {
   }
 };
 
-// Asks for the record at `index`, which may be -1: an address is all that a prefetch needs.
+// Prefetches the record at `index`, which may be -1: a prefetch does not access the address.
 template <int kBasis>
 inline void PrefetchRecord(const float* records, int32_t index, bool for_writing = false) {
   constexpr int64_t kBytes = RecordLanes(kBasis) * sizeof(float);
@@ -59,7 +59,8 @@ inline void PrefetchRecord(const float* records, int32_t index, bool for_writing
   }
 }
 
-// Slot of a voxel in the arena, made and zeroed at its first touch. Room has been reserved.
+// Slot of a voxel in the arena, created and zeroed at its first touch. Capacity is reserved
+// beforehand.
 inline int32_t SlotOf(GradientArena* arena, int32_t voxel, int lanes) {
   int32_t slot = arena->slot_of_voxel[voxel];
   if (slot < 0) {

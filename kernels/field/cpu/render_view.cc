@@ -1,4 +1,4 @@
-// Tile by tile, so that rays share the voxels in cache.
+// Renders tile by tile, so that rays share cached voxels.
 #include "kernels/field/cpu/render_view.h"
 
 #include <algorithm>

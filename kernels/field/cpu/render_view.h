@@ -1,4 +1,4 @@
-// Rendering a field at a camera on the CPU's fast path.
+// Renders a field at a camera on the CPU's fast path.
 #pragma once
 
 #include "kernels/field/packed_grid.h"
@@ -8,8 +8,8 @@
 
 namespace regrade {
 
-// The fast path of this machine. Rays go through the camera's lens. For many views make the
-// grid once (MakeFastGrid in packed_grid.h).
+// Renders with the fast path of this processor. Rays include the lens distortion. For many
+// views create the grid once (MakeFastGrid in packed_grid.h).
 RenderedView RenderView(const FastGrid& grid, const Camera& camera,
                         const MarchOptions& options);
 RenderedView RenderView(const RadianceField& field, const Camera& camera,

@@ -1,5 +1,5 @@
-// The adjoint of a ray's colour, added to the gradients of the voxels it read, compiled once an
-// instruction set.
+// The adjoint of a ray's colour, added to the gradients of the voxels it read; compiled once
+// per instruction set.
 #pragma once
 
 #include <algorithm>
@@ -30,7 +30,7 @@ inline void FindSlots(Marched* marched, GradientArena* arena) {
 }
 
 // Adds dL/d(record) of all samples for dL/dC = d_color, last sample to first; `behind` is the
-// colour that the box has behind it. See EQ(composite-adjoint).
+// radiance behind the box. See EQ(composite-adjoint).
 template <int kBasis>
 inline void ScatterRay(const RayBasis<kBasis>& basis, const Vec3f& d_color, Quad behind,
                        Marched* marched, GradientArena* arena) {
@@ -45,7 +45,8 @@ inline void ScatterRay(const RayBasis<kBasis>& basis, const Vec3f& d_color, Quad
     return gradient + static_cast<int64_t>(slot) * kLanes;
   };
   constexpr int64_t kAhead = 6;
-  const Quad d_quad{d_color.x, d_color.y, d_color.z, 0};  // the last lane of raw is no colour
+  const Quad d_quad{d_color.x, d_color.y, d_color.z,
+                    0};  // the last lane of raw is not a colour
   for (int64_t i = marched->num_samples; i-- > 0;) {
     if (i >= kAhead) {
       const Sample& ahead = marched->samples[static_cast<size_t>(i - kAhead)];

@@ -1,4 +1,4 @@
-// Colours of a ray's samples, and their sum, compiled once an instruction set.
+// Colours of a ray's samples, and their sum; compiled once per instruction set.
 #pragma once
 
 #include <algorithm>
@@ -12,8 +12,8 @@
 namespace regrade::REGRADE_SIMD_NAMESPACE {
 namespace {
 
-// Gamma of a ray's direction in the lanes of one channel and 0 in all others, for each channel:
-// a record times it holds that channel's terms alone.
+// For each channel, Gamma of a ray's direction in the lanes of that channel and 0 in all
+// others: its product with a record has only that channel's terms.
 template <int kBasis>
 struct RayBasis {
   Record<kBasis> channel[3];
@@ -48,9 +48,9 @@ inline Record<kBasis> Blend(const float* records, const float* weight, int strid
   return sum;
 }
 
-// The same where some corners, but not all, may be empty; `weight` is one lane of
-// StepBlock::corner_weight. An empty corner reads another's record with weight 0: choosing
-// among records costs less than branching over them.
+// The same if some corners, but not all, may be empty; `weight` is one lane of
+// StepBlock::corner_weight. An empty corner reads another corner's record with weight 0:
+// selecting records is faster than branching.
 template <int kBasis>
 inline Record<kBasis> InterpolateRecord(const float* records, const float* weight,
                                         const int32_t* link) {
@@ -68,12 +68,12 @@ inline Record<kBasis> InterpolateRecord(const float* records, const float* weigh
   return Blend<kBasis>(records, some_weight, 1, some_link);
 }
 
-// Fills raw of all samples. Returns the sums of w max(raw, 0), without the background, and in
-// the last lane of w t, in voxels.
+// Fills raw of all samples. Returns the sum of w max(raw, 0), without the background, and in
+// the last lane the sum of w t, in voxels.
 template <int kBasis>
 inline Quad Shade(const FastGrid& grid, const RayBasis<kBasis>& basis, Marched* marched) {
   using Vector = typename Record<kBasis>::Vector;
-  const Vector one{1};  // in the first lane: writing a lane of a vector goes through memory
+  const Vector one{1};  // in the first lane: assigning a lane of a vector goes through memory
   constexpr int64_t kAhead = 8;
   const CornerOffsets offsets(grid.frame);
   const int64_t n = marched->num_samples;

@@ -1,4 +1,4 @@
-// Skipping empty space along a ray: from one cube of empty bricks to the next, compiled once an
+// Skips empty space along a ray, from one cube of empty bricks to the next; compiled once per
 // instruction set.
 #pragma once
 
@@ -21,8 +21,8 @@ struct EmptySpace {
     for (int a = 0; a < 3; ++a) inverse[a] = direction[a] != 0 ? 1 / direction[a] : 0.0f;
   }
 
-  // How many steps from the one at `p` on lie in empty cells; 0 if the brick of `p` is not
-  // empty.
+  // The number of steps in empty cells, counted from the one at `p`; 0 if the brick of `p` is
+  // not empty.
   int64_t StepsFrom(const Vec3f& p) const {
     int32_t brick[3];
     for (int a = 0; a < 3; ++a) {
@@ -32,7 +32,7 @@ struct EmptySpace {
     const int32_t index = (brick[0] * bricks.y + brick[1]) * bricks.z + brick[2];
     const int32_t distance = grid.brick_distance[index];
     if (distance == 0) return 0;
-    // All bricks nearer than `distance` are empty: a cube. It is left a little before its
+    // All bricks nearer than `distance` are empty: a cube. The skip ends slightly before its
     // face, so that rounding cannot carry a skipped step beyond it.
     constexpr float kMargin = 1e-3f;
     float length = 3.4e38f;

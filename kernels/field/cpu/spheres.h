@@ -1,5 +1,5 @@
 // The background's layers on the CPU's fast path: sparse gradients and the optimizer's step.
-// Held to background_spheres.h by the parity tests.
+// Parity tests compare it with background_spheres.h.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace regrade {
 
-// Sparse gradient of one share of a batch, as GradientArena is for voxels.
+// Sparse gradient of one part of a batch, as GradientArena is for voxels.
 struct SphereArena {
   Buffer<int32_t> slot_of_texel;  // [texels]: -1 where untouched
   Buffer<int32_t> texel_of_slot;  // [slots]
@@ -18,7 +18,7 @@ struct SphereArena {
 
   void Reset(int64_t num_texels);
   void Forget();
-  // Of a texel, made and zeroed at its first touch.
+  // Slot of a texel, created and zeroed at its first touch.
   int32_t SlotOf(int32_t texel) {
     int32_t slot = slot_of_texel[texel];
     if (slot >= 0) return slot;
@@ -41,9 +41,9 @@ struct SphereArena {
 void SphereVariationGradient(const FastSpheres& spheres, int64_t begin, int64_t end,
                              float scale_density, float scale_color, SphereArena* arena);
 
-// See EQ(rmsprop). Steps slots [begin, end) of arena `self`, summing all in order; a texel
-// belongs to its first arena. Colours are projected into [0, 1]. Returns how many texels had a
-// gradient that is not finite: they are kept as they were.
+// See EQ(rmsprop). Steps slots [begin, end) of arena `self` by the sum over all arenas in
+// order; a texel belongs to the first arena that has it. Colours are projected into [0, 1].
+// Returns the number of texels with a non-finite gradient, which are not stepped.
 int64_t StepSpheres(FastSpheres* spheres, float* second_moment,
                     const SphereArena* const* arenas, int num_arenas, int self, int64_t begin,
                     int64_t end, const RmspropOptions& options);

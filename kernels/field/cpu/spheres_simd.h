@@ -1,6 +1,5 @@
-// A ray through the background's layers and its adjoint, compiled once an instruction set
-// inside rays_simd.h's namespace: where the layers are crossed is worked out for many of
-// them at once.
+// A ray through the background's layers and its adjoint, with many crossings computed at once;
+// compiled once per instruction set inside rays_simd.h's namespace.
 #pragma once
 
 #include <algorithm>
@@ -41,7 +40,7 @@ inline Wide ArcTangent2(Wide y, Wide x) {
   return y < Wide{} ? -half : half;
 }
 
-// Consecutive layers, a lane each.
+// Consecutive layers, one per lane.
 struct alignas(64) LayerBlock {
   float weight[4][kWide];
   int32_t texel[4][kWide];  // of the map
@@ -54,8 +53,8 @@ inline void CrossLayers(const SphereRay<float>& ray, int layers, int resolution,
                         LayerBlock* block) {
   const Wide index = Ramp() + static_cast<float>(first);
   const Wide u = 1.0f - (index + 0.5f) / static_cast<float>(layers);
-  const Wide share = Dot(ray.nearest, ray.nearest) * u * u;
-  const Wide below = 1.0f - share;
+  const Wide squared = Dot(ray.nearest, ray.nearest) * u * u;
+  const Wide below = 1.0f - squared;
   const Wide root = SquareRoot(below > Wide{} ? below : Wide{});
   const Wide ahead = root - ray.along * u;
   const WideInt crossed =
@@ -91,24 +90,24 @@ inline void CrossLayers(const SphereRay<float>& ray, int layers, int resolution,
 // A layer that composites.
 struct LayerSample {
   Quad raw;           // colour before the clamp at 0; the last lane is the depth
-  int32_t corner[4];  // texels of the columns, -1 where empty
+  int32_t corner[4];  // texels of the columns, -1 if empty
   float weight[4];
-  float alpha, decay, slope;   // as StepBlock has them
-  float transmittance_before;  // of box and nearer layers
+  float alpha, decay, slope;   // as in StepBlock
+  float transmittance_before;  // of the box and nearer layers
 };
 
 struct MarchedSpheres {
   LayerSample samples[kMaxLayers];
   int num_samples = 0;
-  float transmittance = 1;  // what is left behind all layers
+  float transmittance = 1;  // behind all layers
 };
 
-// Nothing where the field has no spheres.
+// Null if the field has no spheres.
 inline std::unique_ptr<MarchedSpheres> MakeMarchedSpheres(const FastGrid& grid) {
   return grid.spheres.on() ? std::make_unique<MarchedSpheres>() : nullptr;
 }
 
-// Returns the sums of w max(raw, 0), and of w depth in the last lane.
+// Returns the sum of w max(raw, 0), and the sum of w depth in the last lane.
 inline Quad ShadeSpheres(const FastGrid& grid, const Ray& world_ray, float stop,
                          float transmittance, MarchedSpheres* result) {
   const FastSpheres& spheres = grid.spheres;
@@ -172,7 +171,7 @@ inline Quad ShadeSpheres(const FastGrid& grid, const Ray& world_ray, float stop,
 }
 
 // Adds dL/d(texel) of all layers for dL/dC = d_color, last to first; `behind` is c_bg on entry
-// and what the box has behind it on return. See EQ(composite-adjoint).
+// and the radiance behind the box on return. See EQ(composite-adjoint).
 inline void ScatterSpheres(const MarchedSpheres& marched, const Vec3f& d_color, Quad* behind,
                            SphereArena* arena) {
   const Quad d_quad{d_color.x, d_color.y, d_color.z, 0};

@@ -1,4 +1,4 @@
-// Total variation and the optimizer's step over voxel records, compiled once an instruction
+// Total variation and the optimizer's step over voxel records; compiled once per instruction
 // set.
 #pragma once
 
@@ -19,8 +19,8 @@ inline void AddToSlot(const Record<kBasis>& more, int32_t slot, GradientArena* a
   sum.Store(at);
 }
 
-// See EQ(total-variation) in total_variation.h. Lanes run side by side; the density lane sees
-// an empty neighbour as 0, the others see their own value there.
+// See EQ(total-variation). All values of a record at once; an empty neighbour counts as 0 in
+// the density lane and as the voxel's own value in the others.
 template <int kBasis>
 void TotalVariation(const FastGrid& grid, int64_t begin, int64_t end, float scale_density,
                     float scale_sh, GradientArena* arena) {
@@ -44,8 +44,8 @@ void TotalVariation(const FastGrid& grid, int64_t begin, int64_t end, float scal
     int32_t neighbour[3];
     R difference[3];
     for (int a = 0; a < 3; ++a) {
-      const bool inside = at[a] + 1 < n[a];
-      neighbour[a] = inside ? grid.links[vertex + strides[a]] : -1;
+      const bool in_box = at[a] + 1 < n[a];
+      neighbour[a] = in_box ? grid.links[vertex + strides[a]] : -1;
       const float axis = static_cast<float>(n[a]) / 256.0f;
       if (neighbour[a] >= 0) {
         const R other =
@@ -53,8 +53,8 @@ void TotalVariation(const FastGrid& grid, int64_t begin, int64_t end, float scal
         for (int i = 0; i < Shape::kCount; ++i)
           difference[a].v[i] = axis * (other.v[i] - own.v[i]);
       } else {
-        // Beyond the box nothing is compared; an empty voxel inside has density 0.
-        const float missing = inside ? -axis : 0.0f;
+        // No difference is taken across the box's border; an empty voxel in it has density 0.
+        const float missing = in_box ? -axis : 0.0f;
         for (int i = 0; i < Shape::kCount; ++i)
           difference[a].v[i] = missing * only_density.v[i] * own.v[i];
       }
@@ -102,7 +102,7 @@ int64_t Step(FastGrid* grid, float* second_moment, const GradientArena* arenas, 
   }
   const R low = R::Load(low_lanes), high = R::Load(high_lanes);
   int64_t rejected = 0;
-  constexpr int64_t kAhead = 8;  // slots follow the rays, so that voxels are anywhere in memory
+  constexpr int64_t kAhead = 8;  // slots are in ray order, so voxels are scattered in memory
   for (int64_t slot = begin; slot < end; ++slot) {
     if (slot + 2 * kAhead < end)
       __builtin_prefetch(&grid->vertex_of_voxel[arenas[self].voxel_of_slot[slot + 2 * kAhead]]);
@@ -125,7 +125,7 @@ int64_t Step(FastGrid* grid, float* second_moment, const GradientArena* arenas, 
           R::Load(arenas[other].gradient.data() + static_cast<int64_t>(other_slot) * kLanes);
       for (int i = 0; i < Shape::kCount; ++i) g.v[i] += more.v[i];
     }
-    // One sum is finite only if all lanes and their squares are.
+    // The sum is finite only if all lanes and their squares are.
     Vector check{};
     for (int i = 0; i < Shape::kCount; ++i) check += g.v[i] * g.v[i];
     if (!std::isfinite(SumOf(FoldToQuad(check)))) {

@@ -1,5 +1,5 @@
-// The vectors of one instruction set and the few operations on them that plain arithmetic does
-// not give, compiled once an instruction set.
+// The vectors of one instruction set, and operations on them that plain arithmetic lacks;
+// compiled once per instruction set.
 #pragma once
 
 #include <cmath>
@@ -15,8 +15,8 @@
 namespace regrade::REGRADE_SIMD_NAMESPACE {
 namespace {
 
-// Floats in the widest register. Wider vector types would work too, but the compiler takes
-// their shuffles and selections apart lane by lane.
+// Floats in the widest register. Wider vector types also compile, but the compiler splits their
+// shuffles and selections into lanes.
 #if defined(__AVX512F__)
 constexpr int kWide = 16;
 #elif defined(__AVX2__)
@@ -41,8 +41,8 @@ inline Wide Ramp() {
 #endif
 }
 
-// first[l] and second[l]: the densities at vertex at[l] and at its neighbour along z, which
-// come in one load of four words with their links between them.
+// first[l] and second[l]: the densities at vertex at[l] and at its neighbour along z. One load
+// of four words has both, with their links in between.
 inline void GatherDensities(const Probe* base, const int32_t* at, Wide* first, Wide* second) {
   const auto probes = [&](int l) {
     Quad words;
@@ -90,7 +90,7 @@ inline void GatherDensities(const Probe* base, const int32_t* at, Wide* first, W
 #endif
 }
 
-// Within each four lanes: a0 b0 a1 b1, and a2 b2 a3 b3. FoldToQuad sums the lanes four apart.
+// Within each four lanes: a0 b0 a1 b1, and a2 b2 a3 b3. FoldToQuad sums lanes four apart.
 inline Quad ZipLow(Quad a, Quad b) { return __builtin_shufflevector(a, b, 0, 4, 1, 5); }
 inline Quad ZipHigh(Quad a, Quad b) { return __builtin_shufflevector(a, b, 2, 6, 3, 7); }
 inline Quad FoldToQuad(Quad v) { return v; }
@@ -133,7 +133,7 @@ inline float SumOf(Quad v) {
   return pairs[0] + pairs[1];
 }
 
-// std::sqrt may set errno, which keeps the compiler from using one instruction for all lanes.
+// std::sqrt may set errno, which prevents the compiler from vectorising it.
 inline Quad SquareRoot(Quad v) {
 #if defined(__SSE2__)
   return _mm_sqrt_ps(v);
@@ -145,7 +145,7 @@ inline Quad SquareRoot(Quad v) {
 inline Octet SquareRoot(Octet v) { return _mm256_sqrt_ps(v); }
 #endif
 #if defined(__AVX512F__)
-// GCC 12 warns of an uninitialized value inside _mm512_sqrt_ps.
+// GCC 12 warns about an uninitialized value inside _mm512_sqrt_ps.
 inline Wide SquareRoot(Wide v) { return _mm512_maskz_sqrt_ps(0xFFFF, v); }
 #endif
 

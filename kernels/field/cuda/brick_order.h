@@ -1,5 +1,5 @@
-// An order of a grid's vertices in which neighbours lie together along every axis: rays cross x
-// as often as z, and in [X, Y, Z] a step along x is megabytes long.
+// An order of a grid's vertices that keeps neighbours along every axis close in memory: rays
+// cross x as often as z, and in [X, Y, Z] a step along x is megabytes long.
 #pragma once
 
 #include <cstdint>
@@ -9,11 +9,11 @@
 
 namespace regrade {
 
-// Vertices by bricks of 4 x 4 x 4, z fastest within a brick and among bricks.
+// Vertices in bricks of 4 x 4 x 4, z fastest within a brick and among bricks.
 struct BrickOrder {
   int32_t row = 0;   // from a brick to the next along y
-  int32_t slab = 0;  // and along x
-  int64_t size = 0;  // vertices, those that fill up the last bricks included
+  int32_t slab = 0;  // from a brick to the next along x
+  int64_t size = 0;  // vertices, including those that pad the last bricks
 
   BrickOrder() = default;
   explicit BrickOrder(const Vec3i& resolution)

@@ -1,4 +1,4 @@
-// Fitting's forward, loss and adjoint, a warp a ray.
+// The forward pass, loss and adjoint of fitting, one warp per ray.
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -7,7 +7,7 @@
 #include "kernels/field/cuda/device_sphere_rays.h"
 #include "kernels/field/cuda/gradient_view.h"
 #include "kernels/field/cuda/launch.h"
-#include "kernels/field/cuda/warp_chain.h"
+#include "kernels/field/cuda/warp_adjoint_scan.h"
 #include "kernels/field/cuda/warp_shade.h"
 
 namespace regrade {
@@ -36,7 +36,7 @@ namespace {
 constexpr int kFloatsPerSample = 9;
 constexpr int kWarpsPerBlock = 4;
 
-// A ray's composited samples, front to back, kept for the way back: [capacity] of each.
+// A ray's composited samples, front to back, stored for the adjoint: [capacity] of each.
 struct SampleStore {
   float4* place;    // vertex (as bits), fraction
   float4* raw_tau;  // colour before the clamp, optical depth
@@ -85,7 +85,7 @@ __device__ void ScatterChunk(const DeviceGridView& grid, const LaneValues<kBasis
   }
 }
 
-// The way back along a ray; see EQ(composite-adjoint). `behind` is what is seen through all
+// The backward pass along a ray; see EQ(composite-adjoint). `behind` is the radiance behind all
 // samples.
 template <int kBasis, bool kExact>
 __device__ void WalkBack(const DeviceGridView& grid, const LaneValues<kBasis>& values,
@@ -111,9 +111,9 @@ __device__ void WalkBack(const DeviceGridView& grid, const LaneValues<kBasis>& v
       d_raw = {raw_tau.x > 0 ? w * d_color.x : 0.0f, raw_tau.y > 0 ? w * d_color.y : 0.0f,
                raw_tau.z > 0 ? w * d_color.z : 0.0f};
     }
-    const Vec3f seen_behind = SeenBehind(a, b, lane, &behind);
+    const Vec3f radiance_behind = BackgroundRadiance(a, b, lane, &behind);
     if (mine >= 0 && tau < static_cast<float>(kMaxOpticalDepth))
-      d_sigma = delta * before * a * Dot(color - seen_behind, d_color);
+      d_sigma = delta * before * a * Dot(color - radiance_behind, d_color);
     ScatterChunk<kBasis, kExact>(grid, values, place, d_raw, d_sigma, min(32, end), gradient,
                                  lane);
     __syncwarp();
@@ -148,7 +148,7 @@ __global__ void FitRaysKernel(DeviceGridView grid, const Ray* rays, const Vec3f*
     unsigned composited;
     Vec3f color{};
     int count = 0, shaded = 0;
-    // A sample of those that the store holds from `shaded` on for each group of lanes.
+    // Shades the next stored samples from `shaded` on, one per group of lanes.
     const auto shade = [&] {
       const int at = shaded + lane / Layout::kGroup;
       const bool valid = at < count;
@@ -174,16 +174,18 @@ __global__ void FitRaysKernel(DeviceGridView grid, const Ray* rays, const Vec3f*
       while (count - shaded >= Layout::kSamples) shade();
     }
     if (count > shaded) shade();
-    const float left = expf(-march.optical_depth());
-    const bool sees_layers = behind_rays != nullptr && left >= options.stop_transmittance;
+    const float transmittance = expf(-march.optical_depth());
+    const bool sees_layers =
+        behind_rays != nullptr && transmittance >= options.stop_transmittance;
     const Vec3f behind = sees_layers ? behind_rays[r] : grid.background;
     Vec3f error;
-    for (int c = 0; c < 3; ++c) error[c] = WarpSum(color[c]) + behind[c] * left - targets[r][c];
+    for (int c = 0; c < 3; ++c)
+      error[c] = WarpSum(color[c]) + behind[c] * transmittance - targets[r][c];
     if (d_behind_rays != nullptr && lane == 0)
-      d_behind_rays[r] = error * (sees_layers ? 2 * scale * left : 0.0f);
+      d_behind_rays[r] = error * (sees_layers ? 2 * scale * transmittance : 0.0f);
     squared_error += static_cast<double>(Dot(error, error));
     samples += static_cast<unsigned>(count);
-    __syncwarp();  // colours were written by some lanes and are read by others now
+    __syncwarp();  // colours were written by some lanes and are read by others
     WalkBack<kBasis, kExact>(grid, values, store, count, march.delta(), behind,
                              error * (2 * scale), gradient, lane);
   }
@@ -200,7 +202,7 @@ DeviceRayFitter::DeviceRayFitter(const GridFrame& frame, const MarchOptions& opt
     : options_(options), next_ray_(1, "a counter of rays"), sums_(1, "sums of a fit") {
   sums_.Zero();
   const Vec3f n = frame.resolution.Cast<float>();
-  // The longest way through the box; a multiple of 4, so that the parts of a store are aligned.
+  // The longest path through the box; a multiple of 4 aligns the parts of a store.
   capacity_ = (static_cast<int64_t>(Norm(n) / options.step) + 8) / 4 * 4;
   const int64_t bytes_a_warp =
       capacity_ * kFloatsPerSample * static_cast<int64_t>(sizeof(float));
@@ -219,10 +221,10 @@ void DeviceRayFitter::Accumulate(const DeviceGrid& grid, const Ray* rays, const 
   const bool spheres = grid.spheres.on();
   if (spheres) {
     if (behind_.size() < n) {
-      behind_ = DeviceBuffer<Vec3f>(n, "what rays see behind the box");
-      d_behind_ = DeviceBuffer<Vec3f>(n, "gradients of what is behind the box");
+      behind_ = DeviceBuffer<Vec3f>(n, "radiance behind the box");
+      d_behind_ = DeviceBuffer<Vec3f>(n, "gradients of the radiance behind the box");
     }
-    SeeSpheres(grid, rays, n, options_, behind_.data());
+    SphereRadiance(grid, rays, n, options_, behind_.data());
   }
   ByBasis(grid.basis, grid.exact_sums, [&](auto basis, auto exact) {
     FitRaysKernel<basis.value, exact.value>
@@ -233,7 +235,7 @@ void DeviceRayFitter::Accumulate(const DeviceGrid& grid, const Ray* rays, const 
   });
   CheckLaunch("fit_rays");
   if (spheres)
-    SeeSpheresAdjoint(grid, rays, d_behind_.data(), n, options_, touched, sums_.data());
+    SphereRadianceAdjoint(grid, rays, d_behind_.data(), n, options_, touched, sums_.data());
 }
 
 DeviceFitSums DeviceRayFitter::TakeSums() {

@@ -1,4 +1,4 @@
-// Upload, download, and what follows from links and records.
+// Upload and download of a grid, and the arrays derived from links and records.
 #include "kernels/field/cuda/device_grid.h"
 #include "kernels/field/cuda/gradient_view.h"
 #include "kernels/field/cuda/launch.h"
@@ -89,7 +89,7 @@ FastGrid DownloadGrid(const DeviceGrid& device) {
 
 namespace {
 
-constexpr uint8_t kFar = 16;  // a warp looks 32 samples ahead anyway
+constexpr uint8_t kFar = 16;  // sufficient: a warp advances 32 samples anyway
 
 __global__ void ScatterVoxels(DeviceGridView grid, int density_lane, int64_t vertices,
                               int32_t* vertex_of_voxel, uint8_t* distance) {
@@ -99,7 +99,7 @@ __global__ void ScatterVoxels(DeviceGridView grid, int density_lane, int64_t ver
   grid.dense_density[vertex] =
       link < 0 ? 0.0f : grid.records[link * grid.stride + density_lane];
   if (link >= 0) vertex_of_voxel[link] = static_cast<int32_t>(vertex);
-  // Is a corner of the cell above this vertex stored?
+  // True if a corner of the cell above this vertex is stored.
   const Vec3i n = grid.frame.resolution;
   const int at[3] = {static_cast<int>(vertex / (static_cast<int64_t>(n.y) * n.z)),
                      static_cast<int>(vertex / n.z % n.y), static_cast<int>(vertex % n.z)};
@@ -113,7 +113,7 @@ __global__ void ScatterVoxels(DeviceGridView grid, int density_lane, int64_t ver
   distance[vertex] = stored ? 0 : kFar;
 }
 
-// One axis of the Chebyshev distance: the least of max(distance, steps along the axis).
+// One axis of the Chebyshev distance: the minimum of max(distance, steps along the axis).
 __global__ void SpreadAlongAxis(Vec3i n, int axis, int64_t vertices, const uint8_t* from,
                                 uint8_t* to) {
   const int64_t vertex = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
@@ -148,12 +148,12 @@ void RefreshDerived(DeviceGrid* grid, int64_t num_voxels) {
     CheckLaunch("spread_along_axis");
     std::swap(grid->empty_distance, other);
   }
-  DeviceWait("empty space");
+  DeviceWait("distances through empty space");
 }
 
 #else
 
-void RefreshDerived(DeviceGrid*, int64_t) { DeviceWait("empty space"); }
+void RefreshDerived(DeviceGrid*, int64_t) { DeviceWait("distances through empty space"); }
 
 #endif
 

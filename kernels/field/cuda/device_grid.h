@@ -1,6 +1,6 @@
-// The field on a CUDA device, laid out as the CPU's fast path has it (rays.h): one record
-// of RecordLanes(basis) floats a voxel, density behind the colours and again in a dense array,
-// so that a march along a ray touches no record until something is seen.
+// The field on a CUDA device, in the layout of packed_grid.h: one record of RecordLanes(basis)
+// floats per voxel, and the density also in a dense array, so that a march along a ray reads
+// records only for samples that composite.
 #pragma once
 
 #include <cstdint>
@@ -11,22 +11,22 @@
 
 namespace regrade {
 
-// What kernels see. Shapes as in FastGrid.
+// A non-owning view for kernels. Shapes as in FastGrid.
 struct DeviceGridView {
   GridFrame frame;
   const int32_t* links = nullptr;            // [X, Y, Z]
   float* dense_density = nullptr;            // [X, Y, Z]
   const uint8_t* empty_distance = nullptr;   // [X, Y, Z]
   const int32_t* vertex_of_voxel = nullptr;  // [N]
-  float* records = nullptr;                  // [N, stride], the first `lanes` of each
+  float* records = nullptr;                  // [N, stride], the first `lanes` of each are used
   int64_t stride = 0;                        // floats from a record to the next
   int32_t num_voxels = 0;
   Vec3f background{};
   float near_clip = 0;
-  Vec3f last{};  // the frame's resolution less 1
+  Vec3f last{};  // the frame's resolution minus 1
   DeviceSpheresView spheres;
 
-  // Points are the voxels, and from the next multiple of 32 on the texels of the background.
+  // Points number the voxels, and from the next multiple of 32 the texels of the background.
   HD int32_t first_texel() const { return (num_voxels + 31) / 32 * 32; }
 };
 
@@ -37,11 +37,11 @@ struct DeviceGrid {
   DeviceBuffer<uint8_t> empty_distance;
   DeviceBuffer<int32_t> vertex_of_voxel;
   DeviceBuffer<float> records;  // [N, stride]
-  // A field that is being fitted keeps a voxel's gradient and moment behind its values: what
-  // one step touches lies together, on one page of memory.
+  // In a field that is being fitted, a voxel's gradient and moment follow its values: the data
+  // of one step is on one page of memory.
   bool fitting = false;
-  // Its gradients are 64-bit integers (AddExact in gradient_view.h), and a fit is the same to
-  // the bit each time.
+  // Gradients are 64-bit integers (AddExact in gradient_view.h), so a fit is bitwise
+  // reproducible.
   bool exact_sums = false;
   int basis = 9;
   Vec3f background{0, 0, 0};
@@ -57,13 +57,12 @@ struct DeviceGrid {
     return spheres.on() ? first_texel() + spheres.num_texels() : num_voxels();
   }
   DeviceGridView view() const;
-  // Where gradients and moments begin, with the same stride; only of a field that is being
-  // fitted.
+  // Gradients, and then moments, with the same stride; only of a field that is being fitted.
   float* gradient() const { return records.data() + lanes(); }
   float* second_moment() const { return records.data() + (stride() - lanes()); }
 };
 
-// `second_moment` [N, lanes], or empty for zeros; `sphere_moment` as the layers' texels.
+// `second_moment` [N, lanes], or empty for zeros; `sphere_moment` has the texels' shape.
 DeviceGrid UploadGrid(const FastGrid& grid, bool fitting = false,
                       const Buffer<float>& second_moment = {}, bool exact_sums = false,
                       const Buffer<float>& sphere_moment = {});
@@ -72,14 +71,14 @@ Buffer<float> DownloadGradient(const DeviceGrid& grid);
 Buffer<float> DownloadSecondMoment(const DeviceGrid& grid);
 FastGrid DownloadGrid(const DeviceGrid& grid);
 
-// Recomputes dense_density, vertex_of_voxel and empty_distance from links and records, which
-// are there already; `num_voxels` is the number of non-negative links.
+// Recomputes dense_density, vertex_of_voxel and empty_distance from the existing links and
+// records; `num_voxels` is the number of non-negative links.
 void RefreshDerived(DeviceGrid* grid, int64_t num_voxels);
 
 // Prunes and resamples as Resample in resample_grid.h does: a new vertex is kept if the old
-// vertex nearest to it, or one of that one's 26 neighbours, weighs at least `threshold`.
-// weights [N]. Gradients and moments of a field that is being fitted become 0. Returns an empty
-// grid (no voxels) if nothing is left. Background layers stay with `grid`.
+// vertex nearest to it, or one of that vertex's 26 neighbours, has a weight of at least
+// `threshold`. weights [N]. Gradients and moments of a field that is being fitted become 0.
+// Returns an empty grid (no voxels) if nothing is left. Background layers stay with `grid`.
 DeviceGrid ResampleOnDevice(const DeviceGrid& grid, const DeviceBuffer<float>& weights,
                             float threshold, const Vec3i& resolution);
 

@@ -1,4 +1,4 @@
-// The largest weight that any ray gives a voxel: what pruning goes by.
+// The largest weight that any ray gives a voxel, the criterion for pruning.
 #include "kernels/field/cuda/device_rays.h"
 #include "kernels/field/cuda/launch.h"
 #include "kernels/field/cuda/warp_march.h"
@@ -9,7 +9,7 @@ namespace regrade {
 
 namespace {
 
-// Positive floats are ordered as their bits.
+// Positive floats are ordered like their bits.
 __device__ void RaiseTo(float* target, float value) {
   if (*target < value) atomicMax(reinterpret_cast<int*>(target), __float_as_int(value));
 }

@@ -1,4 +1,4 @@
-// Rendering, a warp a ray at a time.
+// Rendering, one warp per ray at a time.
 #include <vector>
 
 #include "kernels/base/error.h"
@@ -49,17 +49,17 @@ RenderedView RenderViewOnDevice(const DeviceGrid& grid, const Camera& camera,
 
 namespace {
 
-constexpr int kWarps = 4;     // a block
-constexpr int kRays = 8;      // a block; 16 are as fast, 32 lose what neighbours share
-constexpr int kWaiting = 64;  // samples that wait for their colours; a power of 2
+constexpr int kWarps = 4;     // per block
+constexpr int kRays = 8;      // per block; 16 are as fast, 32 lose what neighbours share
+constexpr int kPending = 64;  // samples waiting to be shaded; a power of 2
 
-// Which lanes' colours are looked at, and what each of them weighs; see EQ(opacity-steps).
+// Selects the samples to shade and their weights; see EQ(opacity-steps).
 class OpacitySteps {
  public:
   __device__ explicit OpacitySteps(float step) : inverse_(step > 0 ? 1 / step : 0) {}
 
-  // `before` and `after`: transmittances around a compositing lane's sample. Lanes that are
-  // looked at get a weight above 0.
+  // `before` and `after`: transmittances around a compositing lane's sample. Selected lanes get
+  // a weight above 0.
   __device__ unsigned Choose(bool composites, float before, float after, int lane,
                              float* weight) {
     const bool chosen = composites && (inverse_ == 0 || Steps(after) > Steps(before));
@@ -67,13 +67,13 @@ class OpacitySteps {
     const unsigned earlier = all & ((1u << lane) - 1);
     const float last_of_batch =
         __shfl_sync(kAllLanes, after, earlier == 0 ? 0 : 31 - __clz(earlier));
-    *weight = chosen ? (earlier == 0 ? seen_ : last_of_batch) - after : 0.0f;
-    if (all != 0) seen_ = __shfl_sync(kAllLanes, after, 31 - __clz(all));
+    *weight = chosen ? (earlier == 0 ? shaded_ : last_of_batch) - after : 0.0f;
+    if (all != 0) shaded_ = __shfl_sync(kAllLanes, after, 31 - __clz(all));
     return all;
   }
-  // What the sum of the weights lacks at the ray's end, where `left` of the light is left.
-  __device__ float Scale(float left) const {
-    return seen_ < 1 ? (1 - left) / (1 - seen_) : 1.0f;
+  // Normalises the sum of the weights to 1 - transmittance at the ray's end.
+  __device__ float Scale(float transmittance) const {
+    return shaded_ < 1 ? (1 - transmittance) / (1 - shaded_) : 1.0f;
   }
 
  private:
@@ -83,31 +83,31 @@ class OpacitySteps {
   }
 
   float inverse_;
-  float seen_ = 1;  // transmittance behind the last sample that was looked at
+  float shaded_ = 1;  // transmittance after the last selected sample
 };
 
-// Rays from a list; sums are left as they are. A block takes kRays of them.
+// Rays from a list; sums are stored unchanged. A block processes kRays of them.
 struct ListedRays {
   const Ray* rays;
   int64_t n;
 
-  // The index-th ray, and where its results go; false past the last.
+  // The index-th ray and the index of its results; false past the last.
   __device__ bool Get(int64_t index, Ray* ray, int64_t* place) const {
     *place = index;
     if (index >= n) return false;
     *ray = rays[*place];
     return true;
   }
-  __device__ void Finish(const Ray&, float, Vec3f*, float*) const {}
+  __device__ void Resolve(const Ray&, float, Vec3f*, float*) const {}
   int64_t Blocks() const { return (n + kRays - 1) / kRays; }
 };
 
-// The rays of a frame. Warps that run at the same time stand for neighbouring pixels, which
-// read the same voxels: square tiles one after the other, Morton order within each.
+// The rays of a frame. Concurrent warps process neighbouring pixels, which read the same
+// voxels: square tiles one after the other, Morton order within each.
 struct FrameRays {
   static constexpr int kTile = 16, kPixels = kTile * kTile;
   PinholeRays camera;
-  FinishPixel finish;
+  ResolvePixel resolve;
 
   HD int Columns() const { return (camera.width + kTile - 1) / kTile; }
   __device__ bool Get(int64_t index, Ray* ray, int64_t* place) const {
@@ -123,41 +123,41 @@ struct FrameRays {
     *place = int64_t{y} * camera.width + x;
     return true;
   }
-  __device__ void Finish(const Ray& ray, float transmittance, Vec3f* color,
-                         float* depth) const {
-    finish(ray, transmittance, color, depth);
+  __device__ void Resolve(const Ray& ray, float transmittance, Vec3f* color,
+                          float* depth) const {
+    resolve(ray, transmittance, color, depth);
   }
   int64_t Blocks() const {
     return int64_t{Columns()} * ((camera.height + kTile - 1) / kTile) * (kPixels / kRays);
   }
 };
 
-// A ray as a warp follows it; one thread of the block makes it.
+// A ray prepared by one thread of the block for a warp.
 struct PreparedRay {
   GridRay<float> ray;
   float basis[kMaxBasis];
 };
 
-// What a warp leaves of a ray.
+// A warp's results for a ray.
 struct RaySums {
   Vec3f color;
   float depth, transmittance;
 };
 
-// A warp's samples that wait until every group of lanes has one.
-struct WaitingSamples {
-  float4 place[kWaiting];  // vertex (as bits), fraction
-  float weight[kWaiting];
+// A warp's samples waiting until every group of lanes has one.
+struct PendingSamples {
+  float4 place[kPending];  // vertex (as bits), fraction
+  float weight[kPending];
 };
 
 template <typename Shader, typename View>
-__device__ RaySums FollowRay(const View& grid, const PreparedRay& prepared,
-                             const MarchOptions& options, float opacity_step,
-                             WaitingSamples* waiting) {
+__device__ RaySums MarchRay(const View& grid, const PreparedRay& prepared,
+                            const MarchOptions& options, float opacity_step,
+                            PendingSamples* pending) {
   constexpr int kSamples = 32 / Shader::kGroup;
   const int lane = static_cast<int>(threadIdx.x & 31);
   Shader shader(grid, prepared.basis, lane);
-  WarpMarch<typename Shader::Space> march(shader.space(), prepared.ray, options);
+  WarpMarch<typename Shader::Sampler> march(shader.sampler(), prepared.ray, options);
   LaneSample sample;
   unsigned composited;
   float depth = 0;
@@ -166,13 +166,13 @@ __device__ RaySums FollowRay(const View& grid, const PreparedRay& prepared,
   const auto shade = [&] {
     const int mine = shaded + lane / Shader::kGroup;
     const bool valid = mine < arrived;
-    const float4 at = waiting->place[mine % kWaiting];
+    const float4 at = pending->place[mine % kPending];
     shader.Add(valid ? __float_as_int(at.x) : 0, {at.y, at.z, at.w}, valid,
-               valid ? waiting->weight[mine % kWaiting] : 0.0f);
+               valid ? pending->weight[mine % kPending] : 0.0f);
     shaded += kSamples;
   };
   while (march.Next(&sample, &composited)) {
-    const float alpha = sample.tau > 0 ? Shader::Space::Alpha(sample.tau) : 0.0f;
+    const float alpha = sample.tau > 0 ? Shader::Sampler::Alpha(sample.tau) : 0.0f;
     const float w = sample.transmittance_before * alpha;
     depth += w * sample.t;
     float seen;
@@ -180,31 +180,31 @@ __device__ RaySums FollowRay(const View& grid, const PreparedRay& prepared,
                                          sample.transmittance_before - w, lane, &seen);
     if (chosen == 0) continue;
     if (chosen >> lane & 1) {
-      const int at = (arrived + __popc(chosen & ((1u << lane) - 1))) % kWaiting;
+      const int at = (arrived + __popc(chosen & ((1u << lane) - 1))) % kPending;
       const Vec3f& f = sample.cell.fraction;
-      waiting->place[at] = {__int_as_float(sample.cell.vertex), f.x, f.y, f.z};
-      waiting->weight[at] = opacity_step > 0 ? seen : w;
+      pending->place[at] = {__int_as_float(sample.cell.vertex), f.x, f.y, f.z};
+      pending->weight[at] = opacity_step > 0 ? seen : w;
     }
     arrived += __popc(chosen);
     __syncwarp();  // written by some lanes, read by others
     while (arrived - shaded >= kSamples) shade();
-    __syncwarp();  // read before it is written again
+    __syncwarp();  // all reads precede the next writes
   }
   if (arrived > shaded) shade();
   __syncwarp();
-  const float left = expf(-march.optical_depth());
-  const float scale = opacity_step > 0 ? steps.Scale(left) : 1.0f;
-  return {shader.Sum() * scale + grid.background * left,
-          WarpSum(depth) * march.world_per_voxel(), left};
+  const float transmittance = expf(-march.optical_depth());
+  const float scale = opacity_step > 0 ? steps.Scale(transmittance) : 1.0f;
+  return {shader.Sum() * scale + grid.background * transmittance,
+          WarpSum(depth) * march.world_per_voxel(), transmittance};
 }
 
 template <typename Shader, int kBasis, typename View, typename Rays>
 __global__ void __launch_bounds__(32 * kWarps, 5)
     RenderRaysKernel(View grid, Rays rays, MarchOptions options, float opacity_step,
-                     DeviceRenderTarget target, bool finish) {
+                     DeviceRenderTarget target, bool resolve) {
   __shared__ PreparedRay prepared[kRays];
   __shared__ RaySums sums[kRays];
-  __shared__ WaitingSamples waiting[kWarps];
+  __shared__ PendingSamples pending[kWarps];
   const int thread = static_cast<int>(threadIdx.x), warp = thread / 32;
   const int64_t index = blockIdx.x * int64_t{kRays} + thread;
   Ray ray;
@@ -220,19 +220,19 @@ __global__ void __launch_bounds__(32 * kWarps, 5)
   __syncthreads();
   for (int i = warp; i < kRays; i += kWarps) {
     const RaySums result =
-        FollowRay<Shader>(grid, prepared[i], options, opacity_step, &waiting[warp]);
+        MarchRay<Shader>(grid, prepared[i], options, opacity_step, &pending[warp]);
     if (thread % 32 == 0) sums[i] = result;
   }
   __syncthreads();
   if (thread >= kRays || !rays.Get(index, &ray, &place)) return;
   RaySums mine = sums[thread];
-  if (finish) rays.Finish(ray, mine.transmittance, &mine.color, &mine.depth);
+  if (resolve) rays.Resolve(ray, mine.transmittance, &mine.color, &mine.depth);
   target.color[place] = mine.color;
   target.depth[place] = mine.depth;
   target.transmittance[place] = mine.transmittance;
 }
 
-// Goes on behind the box, where a field has layers there; a warp a ray.
+// Continues behind the box for a field with layers; one warp per ray.
 template <typename Rays>
 __global__ void RenderSpheresKernel(DeviceGridView grid, Rays rays, float stop,
                                     DeviceRenderTarget target) {
@@ -253,12 +253,12 @@ __global__ void RenderSpheresKernel(DeviceGridView grid, Rays rays, float stop,
   for (int c = 0; c < 3; ++c) color[c] = WarpSum(color[c]);
   depth = target.depth[place] + WarpSum(depth);
   if (layers.lane() != 0) return;
-  const float left = layers.left();
-  color += target.color[place] + grid.background * left;
-  rays.Finish(ray, left, &color, &depth);
+  const float transmittance = layers.transmittance();
+  color += target.color[place] + grid.background * transmittance;
+  rays.Resolve(ray, transmittance, &color, &depth);
   target.color[place] = color;
   target.depth[place] = depth;
-  target.transmittance[place] = left;
+  target.transmittance[place] = transmittance;
 }
 
 template <typename Rays>
@@ -267,26 +267,26 @@ void RenderBlocks(const DeviceGrid& grid, const HalfGrid* half, const Rays& rays
                   const DeviceRenderTarget& target) {
   const auto blocks = static_cast<unsigned>(rays.Blocks());
   if (blocks == 0) return;
-  const bool finish = !grid.spheres.on();
+  const bool resolve = !grid.spheres.on();
   const auto render = [&](auto view, auto launch) {
-    if (!finish) view.background = {};  // the layers come first
+    if (!resolve) view.background = {};  // the layers are composited before it
     launch(view);
     CheckLaunch("render_rays");
   };
   if (half != nullptr && !half->empty()) {
     render(half->view(grid), [&](const HalfGridView& view) {
       RenderRaysKernel<HalfShader, 9>
-          <<<blocks, 32 * kWarps>>>(view, rays, options, opacity_step, target, finish);
+          <<<blocks, 32 * kWarps>>>(view, rays, options, opacity_step, target, resolve);
     });
   } else {
     ByBasis(grid.basis, [&](auto basis) {
       render(grid.view(), [&](const DeviceGridView& view) {
         RenderRaysKernel<FloatShader<basis.value>, basis.value>
-            <<<blocks, 32 * kWarps>>>(view, rays, options, opacity_step, target, finish);
+            <<<blocks, 32 * kWarps>>>(view, rays, options, opacity_step, target, resolve);
       });
     });
   }
-  if (finish) return;
+  if (resolve) return;
   RenderSpheresKernel<<<BlocksFor(int64_t{32} * kRays * blocks), kThreads>>>(
       grid.view(), rays, options.stop_transmittance, target);
   CheckLaunch("render_spheres");
@@ -305,7 +305,7 @@ void RenderFrameOnDevice(const DeviceGrid& grid, const Camera& camera,
                          float opacity_step, const HalfGrid* half) {
   REGRADE_CHECK(camera.lens == LensModel::kPinhole);
   const DeviceRange range("frame");
-  RenderBlocks(grid, half, FrameRays{PinholeRays(camera), FinishPixel(camera)}, options,
+  RenderBlocks(grid, half, FrameRays{PinholeRays(camera), ResolvePixel(camera)}, options,
                opacity_step, target);
 }
 

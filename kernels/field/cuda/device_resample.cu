@@ -1,4 +1,4 @@
-// Pruning and resampling on the device; the same rule as Resample in
+// Pruning and resampling on the device, by the rule of Resample in
 // reconstruct/fit/resample_grid.h.
 #include <algorithm>
 
@@ -48,7 +48,7 @@ __device__ Vec3f OldPosition(const GridFrame& frame, const GridFrame& old, const
   return p;
 }
 
-// The vertex at a place of the order; false where the place only fills up a brick.
+// The vertex at a place of the order; false for the padding of a brick.
 __device__ bool VertexAt(const GridFrame& frame, const BrickOrder& order, int64_t place,
                          Vec3i* at) {
   if (place >= order.size) return false;
@@ -70,7 +70,7 @@ __global__ void MarkKept(GridFrame frame, GridFrame old, BrickOrder order, const
   marks[place] = mark;
 }
 
-// `ranks` holds the number of kept vertices before each place, `marks` whether its own is kept.
+// `ranks` holds the number of kept vertices before each place, `marks` whether a place is kept.
 __global__ void NumberKept(GridFrame frame, BrickOrder order, const int32_t* marks,
                            const int32_t* ranks, int32_t* links) {
   const int64_t place = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
@@ -122,7 +122,7 @@ DeviceGrid ResampleOnDevice(const DeviceGrid& grid, const DeviceBuffer<float>& w
   result.basis = grid.basis;
   result.background = grid.background;
   result.near_clip = grid.near_clip;
-  // Voxels are numbered by bricks: what a ray passes then lies together.
+  // Voxels are numbered by bricks, so that neighbours are close in memory.
   const BrickOrder order(resolution);
   REGRADE_CHECK(order.size <= INT32_MAX);
   DeviceBuffer<int32_t> marks(order.size, "marks of new voxels");

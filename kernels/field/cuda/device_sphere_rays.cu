@@ -1,7 +1,7 @@
 #include "kernels/field/cuda/device_sphere_rays.h"
 #include "kernels/field/cuda/gradient_view.h"
 #include "kernels/field/cuda/launch.h"
-#include "kernels/field/cuda/warp_chain.h"
+#include "kernels/field/cuda/warp_adjoint_scan.h"
 #include "kernels/field/cuda/warp_layers.h"
 
 namespace regrade {
@@ -10,9 +10,9 @@ namespace regrade {
 
 namespace {
 
-// A warp a ray.
-__global__ void SeeSpheresKernel(DeviceGridView grid, const Ray* rays, int64_t n, float stop,
-                                 Vec3f* behind) {
+// One warp per ray.
+__global__ void SphereRadianceKernel(DeviceGridView grid, const Ray* rays, int64_t n,
+                                     float stop, Vec3f* behind) {
   const int64_t r = (blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x) / 32;
   if (r >= n) return;
   WarpLayers layers(grid, rays[r], 1.0f, stop);
@@ -22,7 +22,7 @@ __global__ void SeeSpheresKernel(DeviceGridView grid, const Ray* rays, int64_t n
   while (layers.Next(&mine, &composited))
     if (mine.tau > 0) color += mine.Color() * mine.Weight();
   for (int c = 0; c < 3; ++c) color[c] = WarpSum(color[c]);
-  if (layers.lane() == 0) behind[r] = color + grid.background * layers.left();
+  if (layers.lane() == 0) behind[r] = color + grid.background * layers.transmittance();
 }
 
 __device__ inline float Reversed(float value) { return __shfl_xor_sync(kAllLanes, value, 31); }
@@ -46,9 +46,9 @@ __device__ void ScatterLayer(const DeviceSpheresView& spheres, const LaneLayer& 
 }
 
 template <bool kExact>
-__global__ void SeeSpheresAdjointKernel(DeviceGridView grid, const Ray* rays,
-                                        const Vec3f* d_behind, int64_t n, float stop,
-                                        GradientView gradient, DeviceFitSums* sums) {
+__global__ void SphereRadianceAdjointKernel(DeviceGridView grid, const Ray* rays,
+                                            const Vec3f* d_behind, int64_t n, float stop,
+                                            GradientView gradient, DeviceFitSums* sums) {
   const int64_t r = (blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x) / 32;
   if (r >= n) return;
   const Vec3f d = d_behind[r];
@@ -57,28 +57,29 @@ __global__ void SeeSpheresAdjointKernel(DeviceGridView grid, const Ray* rays,
   const int lane = layers.lane();
   LaneLayer mine;
   unsigned composited;
-  // The way there: lane i keeps the optical depth before the i-th 32 layers.
+  // Forward: lane i stores the optical depth before the i-th 32 layers.
   static_assert(kMaxLayers <= 32 * 32);
   float depth_before = 0, depth = 0;
-  int looked = 0, samples = 0;
-  for (; 32 * looked < grid.spheres.layers && layers.is_ray(); ++looked) {
-    if (lane == looked) depth_before = depth;
+  int blocks = 0, samples = 0;
+  for (; 32 * blocks < grid.spheres.layers && layers.is_ray(); ++blocks) {
+    if (lane == blocks) depth_before = depth;
     if (!(expf(-depth) >= stop)) break;
-    layers.Look(32 * looked, &depth, &composited);
+    layers.Evaluate(32 * blocks, &depth, &composited);
     samples += __popc(composited);
   }
   Vec3f behind = grid.background;
-  for (int i = looked - 1; i >= 0; --i) {
+  for (int i = blocks - 1; i >= 0; --i) {
     float before = __shfl_sync(kAllLanes, depth_before, i);
-    mine = layers.Look(32 * i, &before, &composited);
+    mine = layers.Evaluate(32 * i, &before, &composited);
     if (composited == 0) continue;
     const Vec3f color = mine.tau > 0 ? mine.Color() : Vec3f{};
     const float a = expf(-mine.tau);
-    const Vec3f seen =
-        Reversed(SeenBehind(Reversed(a), Reversed(color * Opacity(mine.tau)), lane, &behind));
+    const Vec3f radiance_behind = Reversed(
+        BackgroundRadiance(Reversed(a), Reversed(color * Opacity(mine.tau)), lane, &behind));
     if (!(mine.tau > 0)) continue;
     const float w = mine.Weight() * static_cast<float>(kSh0);
-    float d_sigma = layers.delta() * mine.transmittance_before * a * Dot(color - seen, d);
+    float d_sigma =
+        layers.delta() * mine.transmittance_before * a * Dot(color - radiance_behind, d);
     if (!(mine.value.w < static_cast<float>(kMaxDensity)) ||
         !(mine.value.w * layers.delta() < static_cast<float>(kMaxOpticalDepth)))
       d_sigma = 0;
@@ -93,37 +94,37 @@ __global__ void SeeSpheresAdjointKernel(DeviceGridView grid, const Ray* rays,
 
 }  // namespace
 
-void SeeSpheres(const DeviceGrid& grid, const Ray* rays, int64_t n, const MarchOptions& options,
-                Vec3f* behind) {
+void SphereRadiance(const DeviceGrid& grid, const Ray* rays, int64_t n,
+                    const MarchOptions& options, Vec3f* behind) {
   if (n == 0) return;
-  SeeSpheresKernel<<<BlocksFor(32 * n), kThreads>>>(grid.view(), rays, n,
-                                                    options.stop_transmittance, behind);
-  CheckLaunch("see_spheres");
+  SphereRadianceKernel<<<BlocksFor(32 * n), kThreads>>>(grid.view(), rays, n,
+                                                        options.stop_transmittance, behind);
+  CheckLaunch("sphere_radiance");
 }
 
-void SeeSpheresAdjoint(const DeviceGrid& grid, const Ray* rays, const Vec3f* d_behind,
-                       int64_t n, const MarchOptions& options, DeviceTouched* touched,
-                       DeviceFitSums* sums) {
+void SphereRadianceAdjoint(const DeviceGrid& grid, const Ray* rays, const Vec3f* d_behind,
+                           int64_t n, const MarchOptions& options, DeviceTouched* touched,
+                           DeviceFitSums* sums) {
   REGRADE_CHECK(grid.fitting);
   if (n == 0) return;
   const GradientView gradient = TexelGradient(grid, touched);
   if (grid.exact_sums)
-    SeeSpheresAdjointKernel<true><<<BlocksFor(32 * n), kThreads>>>(
+    SphereRadianceAdjointKernel<true><<<BlocksFor(32 * n), kThreads>>>(
         grid.view(), rays, d_behind, n, options.stop_transmittance, gradient, sums);
   else
-    SeeSpheresAdjointKernel<false><<<BlocksFor(32 * n), kThreads>>>(
+    SphereRadianceAdjointKernel<false><<<BlocksFor(32 * n), kThreads>>>(
         grid.view(), rays, d_behind, n, options.stop_transmittance, gradient, sums);
-  CheckLaunch("see_spheres_adjoint");
+  CheckLaunch("sphere_radiance_adjoint");
 }
 
 #else
 
-void SeeSpheres(const DeviceGrid&, const Ray*, int64_t, const MarchOptions&, Vec3f*) {
-  DeviceWait("see_spheres");
+void SphereRadiance(const DeviceGrid&, const Ray*, int64_t, const MarchOptions&, Vec3f*) {
+  DeviceWait("sphere_radiance");
 }
-void SeeSpheresAdjoint(const DeviceGrid&, const Ray*, const Vec3f*, int64_t,
-                       const MarchOptions&, DeviceTouched*, DeviceFitSums*) {
-  DeviceWait("see_spheres_adjoint");
+void SphereRadianceAdjoint(const DeviceGrid&, const Ray*, const Vec3f*, int64_t,
+                           const MarchOptions&, DeviceTouched*, DeviceFitSums*) {
+  DeviceWait("sphere_radiance_adjoint");
 }
 
 #endif

@@ -13,7 +13,7 @@ namespace regrade {
 
 namespace {
 
-// A thread a texel of one layer; see SphereVariation.
+// One thread per texel of a layer; see SphereVariation.
 template <bool kExact>
 __global__ void SphereVariationKernel(DeviceSpheresView spheres, int64_t begin, int64_t count,
                                       float scale_density, float scale_color,
@@ -34,13 +34,13 @@ __global__ void SphereVariationKernel(DeviceSpheresView spheres, int64_t begin, 
 #pragma unroll
   for (int v = 0; v < 4; ++v) {
     const float value = spheres.texels[int64_t{own} * 4 + v];
-    float inside = static_cast<float>(kVariationEpsilon);
+    float radicand = static_cast<float>(kVariationEpsilon);
 #pragma unroll
     for (int a = 0; a < 3; ++a) {
       difference[a][v] = spheres.texels[int64_t{next[a]} * 4 + v] - value;
-      inside += difference[a][v] * difference[a][v];
+      radicand += difference[a][v] * difference[a][v];
     }
-    const float scale = (v == 3 ? scale_density : scale_color) / sqrtf(inside);
+    const float scale = (v == 3 ? scale_density : scale_color) / sqrtf(radicand);
 #pragma unroll
     for (int a = 0; a < 3; ++a) {
       if (next[a] != own) d[a][v] = scale * difference[a][v];
@@ -48,14 +48,14 @@ __global__ void SphereVariationKernel(DeviceSpheresView spheres, int64_t begin, 
     }
   }
   const auto add = [&](int32_t texel, const float(&v)[4]) {
-    if (v[0] != 0 || v[1] != 0 || v[2] != 0 || v[3] != 0)  // NaN is not 0 either
+    if (v[0] != 0 || v[1] != 0 || v[2] != 0 || v[3] != 0)  // true for NaN, too
       AddTexel<kExact>(gradient, texel, {v[0], v[1], v[2], v[3]});
   };
   for (int a = 0; a < 3; ++a) add(next[a], d[a]);
   add(own, d_own);
 }
 
-// A lane a texel of one word of marks. See StepSpheres.
+// One lane per texel of one word of marks. See StepSpheres.
 template <bool kExact>
 __global__ void StepSpheresKernel(DeviceSpheresView spheres, float* gradient,
                                   float* second_moment, uint32_t* __restrict__ touched,

@@ -18,8 +18,8 @@ DeviceSpheres UploadSpheres(const FastSpheres& spheres, bool fitting,
   Buffer<int32_t> places(spheres.num_texels() / spheres.layers);
   for (int64_t at = 0; at < spheres.links.size(); ++at)
     if (spheres.links[at] >= 0) places[spheres.links[at]] = static_cast<int32_t>(at);
-  device.place_of_column = DeviceBuffer<int32_t>::Of(places, "columns of the background");
-  device.texels = DeviceBuffer<float>::Of(spheres.texels, "the background");
+  device.place_of_column = DeviceBuffer<int32_t>::Of(places, "background columns");
+  device.texels = DeviceBuffer<float>::Of(spheres.texels, "background texels");
   if (!fitting) return device;
   const int64_t values = spheres.texels.size();
   device.gradient =

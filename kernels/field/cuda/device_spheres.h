@@ -1,5 +1,5 @@
-// Background layers on a CUDA device, laid out as FastSpheres has them; and what a fit does
-// with them. Held to background_spheres.h and sphere_variation.h by the parity table.
+// Background layers on a CUDA device, in the layout of FastSpheres, with the state of a fit.
+// The parity table compares it with background_spheres.h and sphere_variation.h.
 #pragma once
 
 #include <cstdint>
@@ -9,12 +9,12 @@
 
 namespace regrade {
 
-// What kernels see.
+// A non-owning view for kernels.
 struct DeviceSpheresView {
   int layers = 0;  // L; 0: no background spheres
   int resolution = 0;
   const int32_t* links = nullptr;            // [2R, R]
-  const int32_t* place_of_column = nullptr;  // [columns]: where a column lies in links
+  const int32_t* place_of_column = nullptr;  // [columns]: a column's index in links
   float* texels = nullptr;                   // [columns, L, 4]: colour, density
 
   HD bool on() const { return layers > 0; }
@@ -25,7 +25,7 @@ struct DeviceSpheres {
   int resolution = 0;
   DeviceBuffer<int32_t> links, place_of_column;
   DeviceBuffer<float> texels;
-  // Of a field that is being fitted, as texels; 64-bit integers in the gradient's place where
+  // Only of a field that is being fitted, shaped as texels; the gradient is 64-bit integers if
   // sums are exact (AddExact in gradient_view.h).
   DeviceBuffer<float> gradient, second_moment;
 
@@ -34,11 +34,11 @@ struct DeviceSpheres {
   DeviceSpheresView view() const;
 };
 
-// `second_moment` as texels, or empty for zeros.
+// `second_moment` has the texels' shape, or is empty for zeros.
 DeviceSpheres UploadSpheres(const FastSpheres& spheres, bool fitting,
                             const Buffer<float>& second_moment, bool exact_sums);
 FastSpheres DownloadSpheres(const DeviceSpheres& spheres);
-// [texels, 4], of spheres that are being fitted.
+// [texels, 4], of a field that is being fitted.
 Buffer<float> DownloadGradient(const DeviceSpheres& spheres, bool exact_sums);
 
 }  // namespace regrade

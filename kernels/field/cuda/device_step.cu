@@ -1,5 +1,5 @@
-// Total variation and the optimizer's step on touched voxels; the lanes of a group stand for
-// the values of one record.
+// Total variation and the optimizer's step on touched voxels; the lanes of a group hold the
+// values of one record.
 #include <algorithm>
 
 #include "kernels/field/cuda/device_rays.h"
@@ -15,7 +15,7 @@ namespace regrade {
 namespace {
 
 // See EQ(total-variation): an empty neighbour counts as 0 for densities and as the voxel's own
-// value for colours; beyond the box nothing is compared.
+// value for colours; no difference is taken across the box's border.
 template <int kBasis, bool kExact>
 __global__ void TotalVariationKernel(DeviceGridView grid, int64_t begin, int64_t count,
                                      float scale_density, float scale_sh,
@@ -32,7 +32,7 @@ __global__ void TotalVariationKernel(DeviceGridView grid, int64_t begin, int64_t
   const bool is_density = value == DensityLane(kBasis);
   const float own = grid.records[voxel * grid.stride + value];
   int32_t neighbour[3];
-  float weighted[3], inside = 1e-9f;
+  float weighted[3], radicand = 1e-9f;
 #pragma unroll
   for (int a = 0; a < 3; ++a) {
     const bool in_box = at[a] + 1 < n[a];
@@ -43,10 +43,10 @@ __global__ void TotalVariationKernel(DeviceGridView grid, int64_t begin, int64_t
     else if (in_box && is_density)
       other = 0;
     weighted[a] = static_cast<float>(n[a]) / 256.0f * (other - own);
-    inside += weighted[a] * weighted[a];
+    radicand += weighted[a] * weighted[a];
   }
   const float scale = is_density ? scale_density : value < 3 * kBasis ? scale_sh : 0.0f;
-  const float inverse = scale * rsqrtf(inside);
+  const float inverse = scale * rsqrtf(radicand);
   const auto add = [&](int64_t to, float d) {
     float* const row = gradient.gradient + to * grid.stride;
     if constexpr (kExact)
@@ -67,7 +67,7 @@ __global__ void TotalVariationKernel(DeviceGridView grid, int64_t begin, int64_t
   if (value == 0) Touch(gradient.touched, static_cast<int32_t>(voxel));
 }
 
-// What a lane of the step kernel stands for: four neighbouring values of a record.
+// Update rules of a lane's four consecutive values of a record in the step kernel.
 template <int kBasis>
 struct StepRules {
   float rate[4], bound[4];
@@ -87,9 +87,9 @@ struct StepRules {
   }
 };
 
-// One voxel's share of a lane, between loading and storing.
+// A lane's values of one voxel, between loading and storing.
 struct StepQuad {
-  float4* at = nullptr;  // values; gradient and moment follow; null where the lane has no voxel
+  float4* at = nullptr;  // values; gradient and moment follow; null if the lane has no voxel
   float4 value, gradient, moment;
   int64_t voxel;
 };
@@ -104,9 +104,9 @@ __device__ inline float NextMoment(float old, float g, float beta) {
   return old == 0 ? g * g : beta * old + (1 - beta) * g * g;
 }
 
-// A warp takes the 32 voxels of one word of marks. A lane stands for four neighbouring values,
-// and kTurns sets of records are on their way at once; lanes stay together, for a warp that
-// splits waits for each part's loads in turn.
+// A warp processes the 32 voxels of one word of marks. A lane holds four consecutive values,
+// and kTurns sets of records are loaded at once. Lanes do not diverge: a divergent warp would
+// wait for each branch's loads in turn.
 template <int kBasis, bool kExact>
 __global__ void StepKernel(DeviceGridView grid, uint32_t* __restrict__ touched, int64_t words,
                            RmspropOptions options, DeviceFitSums* sums) {
@@ -118,7 +118,7 @@ __global__ void StepKernel(DeviceGridView grid, uint32_t* __restrict__ touched, 
       kQuads == 32 ? kAllLanes : ((1u << kQuads) - 1) << (group * kQuads);
   constexpr int kMoment = (kExact ? 3 : 2) * kQuads;  // quads from a value to its moment
   const auto clear = [&](StepQuad* of) {
-    if constexpr (kExact) {  // twice as wide
+    if constexpr (kExact) {  // integers are twice as wide
       float4* const row = of->at - quad + kQuads;
       row[2 * quad] = row[2 * quad + 1] = make_float4(0, 0, 0, 0);
     } else {
@@ -137,7 +137,7 @@ __global__ void StepKernel(DeviceGridView grid, uint32_t* __restrict__ touched, 
       StepQuad q[kTurns];
 #pragma unroll
       for (int i = 0; i < kTurns; ++i) {
-        unsigned mine = marks;  // with the marks of the groups before this one taken away
+        unsigned mine = marks;  // without the marks of the groups before this one
         for (int g = 0; g < group; ++g) mine &= mine - 1;
         for (int g = 0; g < kGroups; ++g) marks &= marks - 1;
         q[i].gradient = make_float4(0, 0, 0, 0);
@@ -159,7 +159,7 @@ __global__ void StepKernel(DeviceGridView grid, uint32_t* __restrict__ touched, 
         const float4 g = q[i].gradient;
         const bool finite = isfinite(g.x * g.x) && isfinite(g.y * g.y) && isfinite(g.z * g.z) &&
                             isfinite(g.w * g.w);
-        // A voxel of whose gradient any part is not finite stays as it is.
+        // A voxel with any non-finite gradient value is not stepped.
         const bool good = (__ballot_sync(kAllLanes, finite) & group_lanes) == group_lanes;
         if (q[i].at == nullptr) continue;
         clear(&q[i]);

@@ -23,7 +23,7 @@ __global__ void DrawKernel(const DeviceViews::View* views, int num_views,
                            Ray* rays, Vec3f* targets) {
   const int64_t i = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
   if (i >= n) return;
-  // Equal shares of the views behind a random turn, so that chance leaves none out of a batch.
+  // Stratified over the views with a random offset, so that a batch covers all views evenly.
   const double turn = RandomDouble(seed, step, 0);
   const double position = (static_cast<double>(i) + turn) / static_cast<double>(n) * num_views;
   const DeviceViews::View view = views[static_cast<int>(position) % num_views];

@@ -1,5 +1,4 @@
-// Photos and cameras on a CUDA device: where training rays are drawn and a view's rays are
-// made.
+// Photos and cameras on a CUDA device, for drawing training rays and generating a view's rays.
 #pragma once
 
 #include <cstdint>
@@ -10,8 +9,7 @@
 
 namespace regrade {
 
-// A view as it is handed over. `color` [H, W, 3] unorm16 may be null where only rays are
-// wanted.
+// Input for one view. `color` [H, W, 3] unorm16 may be null if only rays are needed.
 struct DeviceViewSource {
   Vec3f origin;             // field
   Mat3f world_from_camera;  // rotation
@@ -19,31 +17,31 @@ struct DeviceViewSource {
   int width = 0, height = 0;  // pixels
   int direction_map = 0;
   const uint16_t* color = nullptr;
-  // Pixels y W + x that rays are drawn of, where some are left out.
+  // Pixels y W + x from which rays are drawn, if some are excluded.
   const int32_t* drawn = nullptr;
   int32_t num_drawn = 0;  // 0: all
 };
 
 class DeviceViews {
  public:
-  // direction_maps: [H, W] unit directions in the camera's frame, one for each lens and size.
+  // direction_maps: [H, W] unit directions in the camera's frame, one per lens and size.
   DeviceViews(const std::vector<std::vector<Vec3f>>& direction_maps,
               const std::vector<DeviceViewSource>& views);
 
   // The same rays and targets as TrainingRays::Draw with patches of one pixel, unordered.
   void Draw(uint64_t seed, uint64_t step, int64_t n, Ray* rays, Vec3f* targets) const;
   // Rays of every `stride`-th pixel of a view, row by row; returns their number. rays may be
-  // null.
+  // null to count only.
   int64_t RaysOf(int view, int stride, Ray* rays) const;
   int num_views() const { return static_cast<int>(host_views_.size()); }
 
-  // What kernels see of a view.
+  // A view as kernels see it.
   struct View {
     Vec3f origin;
     Mat3f world_from_camera;
     NdcSpace ndc;
     int width, height;
-    int64_t direction_map, color, drawn;  // where they begin, in elements
+    int64_t direction_map, color, drawn;  // first elements
     int32_t num_drawn;
   };
 

@@ -1,4 +1,4 @@
-// What kernels see of a gradient: a voxel's rows have the grid's stride, a texel's four values.
+// A gradient as kernels see it: rows of the grid's stride per voxel, four values per texel.
 #pragma once
 
 #include <cmath>
@@ -8,8 +8,8 @@
 
 namespace regrade {
 
-// Sums that do not depend on their order: 64-bit integers in units of 2^-44. A fit's gradients
-// are far below the 5e5 that fit in; what is not finite leaves a mark that no sum reaches.
+// Order-independent sums: 64-bit integers in units of 2^-44. A fit's gradients are far below
+// the range of 5e5; a non-finite value leaves a mark that no sum reaches.
 inline constexpr float kExactUnit = 0x1p-44f;
 inline constexpr long long kNotFinite = 1ll << 62;
 
@@ -18,7 +18,7 @@ struct GradientView {
   uint32_t* touched;
 };
 
-// Of the background's layers, of a field that is being fitted.
+// The gradient of the background's layers, of a field that is being fitted.
 inline GradientView TexelGradient(const DeviceGrid& grid, DeviceTouched* touched) {
   return {grid.spheres.gradient.data(), touched->bits.data() + grid.first_texel() / 32};
 }
@@ -35,7 +35,7 @@ __device__ inline void AddExact(float* gradient, int value, float v) {
     atomicAdd(sum, static_cast<unsigned long long>(
                        llrint(static_cast<double>(v) * (1.0 / double{kExactUnit}))));
   else
-    atomicExch(sum, static_cast<unsigned long long>(kNotFinite));  // added, marks would cancel
+    atomicExch(sum, static_cast<unsigned long long>(kNotFinite));  // adding marks would cancel
 }
 __device__ inline float ExactSum(const float* gradient, int value) {
   const long long units = reinterpret_cast<const long long*>(gradient)[value];
@@ -46,7 +46,7 @@ __device__ inline float ExactSum(const float* gradient, int value) {
 __device__ inline void Touch(uint32_t* touched, int32_t voxel) {
   uint32_t* word = touched + (voxel >> 5);
   const uint32_t bit = 1u << (voxel & 31);
-  if ((*word & bit) == 0) atomicOr(word, bit);  // most have been marked by another ray already
+  if ((*word & bit) == 0) atomicOr(word, bit);  // most are already marked by another ray
 }
 
 __device__ inline void AddQuad(float* target, const float4& v) {
@@ -60,7 +60,7 @@ __device__ inline void AddQuad(float* target, const float4& v) {
 #endif
 }
 
-// Adds to a texel's four values and marks it.
+// Adds to a texel's four values and marks the texel.
 template <bool kExact>
 __device__ void AddTexel(const GradientView& gradient, int32_t texel, const float4& v) {
   if constexpr (kExact) {

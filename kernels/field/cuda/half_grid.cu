@@ -19,7 +19,7 @@ HalfGridView HalfGrid::view(const DeviceGrid& grid) const {
 namespace {
 
 constexpr int kBasis = 9, kValues = 32;  // of a record in half precision
-constexpr uint8_t kOutside = 255;        // vertices that only fill up bricks: no cell is there
+constexpr uint8_t kOutside = 255;        // padding of a brick: no cell
 
 __device__ uint32_t HalfDensity(float density) {
   return HalfFromFloat(fminf(density, kMaxHalf));
@@ -30,17 +30,17 @@ __global__ void OrderByBricks(DeviceGridView grid, BrickOrder order, int32_t* ma
   const int64_t i = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
   if (i >= order.size) return;
   const Vec3i n = grid.frame.resolution, at = order.At(static_cast<int32_t>(i));
-  const bool inside = at.x < n.x && at.y < n.y && at.z < n.z;
-  const int64_t vertex = inside ? grid.frame.Vertex(at.x, at.y, at.z) : 0;
-  marks[i] = inside && grid.links[vertex] >= 0;
-  empty_distance[i] = inside ? grid.empty_distance[vertex] : kOutside;
+  const bool in_grid = at.x < n.x && at.y < n.y && at.z < n.z;
+  const int64_t vertex = in_grid ? grid.frame.Vertex(at.x, at.y, at.z) : 0;
+  marks[i] = in_grid && grid.links[vertex] >= 0;
+  empty_distance[i] = in_grid ? grid.empty_distance[vertex] : kOutside;
   density_pairs[i] =
-      inside ? HalfDensity(grid.dense_density[vertex]) |
-                   (at.z + 1 < n.z ? HalfDensity(grid.dense_density[vertex + 1]) << 16 : 0u)
-             : 0u;
+      in_grid ? HalfDensity(grid.dense_density[vertex]) |
+                    (at.z + 1 < n.z ? HalfDensity(grid.dense_density[vertex + 1]) << 16 : 0u)
+              : 0u;
 }
 
-// `links` holds the number of stored vertices before each. A warp a vertex of 32 values.
+// `links` holds the number of stored vertices before each. One warp per vertex, of 32 values.
 __global__ void FillRecords(DeviceGridView grid, BrickOrder order, const int32_t* marks,
                             int32_t* links, uint16_t* records) {
   const int64_t thread = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;

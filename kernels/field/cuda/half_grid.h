@@ -1,6 +1,5 @@
-// What frames of a field read on a CUDA device at interactive rates: colours and densities in
-// half precision, half the bytes, and everything ordered by bricks, so that what a ray passes
-// lies together whichever way it runs. It stands beside the DeviceGrid that it was made from.
+// A copy of a DeviceGrid for interactive rendering: colours and densities in half precision, in
+// half the bytes, ordered by bricks, so that a ray in any direction reads nearby memory.
 #pragma once
 
 #include "kernels/field/cuda/brick_order.h"
@@ -8,11 +7,11 @@
 
 namespace regrade {
 
-// What kernels see.
+// A non-owning view for kernels.
 struct HalfGridView {
   BrickOrder order;
   GridFrame frame;
-  Vec3f last{};  // the frame's resolution less 1
+  Vec3f last{};  // the frame's resolution minus 1
   const int32_t* links = nullptr;
   const uint32_t* density_pairs = nullptr;
   const uint8_t* empty_distance = nullptr;
@@ -21,16 +20,16 @@ struct HalfGridView {
   float near_clip = 0;
 };
 
-// Only of fields of degree 2; of others it stays empty, their records are small already.
+// Only for fields of degree 2; for others it stays empty, because their records are small.
 struct HalfGrid {
   BrickOrder order;
   DeviceBuffer<int32_t> links;           // [order.size]: records, or -1
   DeviceBuffer<uint8_t> empty_distance;  // [order.size]
-  // [order.size]: the density of a vertex in the low half, of its neighbour along z in the high
-  // one; at most 65504 a world unit.
+  // [order.size]: the density of a vertex in the low half, that of its neighbour along z in the
+  // high half; at most 65504 per world unit.
   DeviceBuffer<uint32_t> density_pairs;
   // [N, 4, 8]: the first eight coefficients of each channel, then the ninth of all three.
-  // Values beyond 65504 would become infinite; colours never are.
+  // Values beyond 65504 would become infinite; colours stay below.
   DeviceBuffer<uint16_t> records;
 
   bool empty() const { return records.empty(); }

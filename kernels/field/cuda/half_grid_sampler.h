@@ -1,4 +1,4 @@
-// A HalfGrid as a march looks at it. Device code only.
+// Samples a HalfGrid during a march. Device code only.
 #pragma once
 
 #include "kernels/field/cuda/half_grid.h"
@@ -15,15 +15,15 @@ class HalfGridSampler {
   __device__ explicit HalfGridSampler(const HalfGridView& grid) : grid_(grid) {}
   __device__ const Vec3f& last() const { return grid_.last; }
   __device__ int Index(int x, int y, int z) const { return grid_.order.Index(x, y, z); }
-  // Across a brick's face the way leads to the next brick.
+  // At a brick's face the step leads into the next brick.
   __device__ NeighbourSteps Steps(int vertex) const {
     return {(vertex >> 4 & 3) == 3 ? grid_.order.slab - 48 : 16,
             (vertex >> 2 & 3) == 3 ? grid_.order.row - 12 : 4, (vertex & 3) == 3 ? 61 : 1};
   }
   __device__ int Distance(int vertex) const { return grid_.empty_distance[vertex]; }
   __device__ int32_t Link(int vertex) const { return grid_.links[vertex]; }
-  // The card's own exponential: its relative error, 2^-21 within these depths, and that of a
-  // difference from 1 lie far below what half precision loses.
+  // The GPU's fast exponential: its relative error, 2^-21 for these depths, and that of its
+  // difference from 1 are far below the error of half precision.
   __device__ static float Exp(float x) { return __expf(x); }
   __device__ static float Alpha(float tau) { return 1 - __expf(-tau); }
   __device__ float DensityBetween(int vertex, float fraction) const {

@@ -1,4 +1,4 @@
-// The choice of a device kernel's template by the field's basis, and by a flag.
+// Selects a device kernel's template instance by the field's basis, and by a flag.
 #pragma once
 
 #include <type_traits>

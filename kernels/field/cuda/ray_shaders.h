@@ -1,5 +1,5 @@
-// Where a warp's samples get their colours from when rays are rendered: from the grid's own
-// records, or from a copy in half precision. Device code only.
+// Sources of a warp's sample colours for rendering: the grid's own records, or a copy in half
+// precision. Device code only.
 #pragma once
 
 #include "kernels/field/cuda/half_grid_sampler.h"
@@ -13,12 +13,12 @@ namespace regrade {
 template <int kBasis>
 class FloatShader {
  public:
-  using Space = GridSampler;
+  using Sampler = GridSampler;
   static constexpr int kGroup = RecordLayout<kBasis>::kGroup;
 
   __device__ FloatShader(const DeviceGridView& grid, const float (&basis)[kMaxBasis], int lane)
       : grid_(grid), values_(lane, basis), lane_(lane) {}
-  __device__ Space space() const { return Space(grid_); }
+  __device__ Sampler sampler() const { return Sampler(grid_); }
   __device__ void Add(int vertex, const Vec3f& fraction, bool valid, float weight) {
     const Vec3f raw = RawColor(grid_, values_, vertex, fraction, valid, lane_);
     if (lane_ % kGroup != 0) return;
@@ -35,11 +35,11 @@ class FloatShader {
   Vec3f color_{};
 };
 
-// Colours from a HalfGrid: lane c of four stands for channel c, the last one for the ninth
-// coefficients of all.
+// Colours from a HalfGrid: lane c of four computes channel c, the last one the ninth
+// coefficients of all channels.
 class HalfShader {
  public:
-  using Space = HalfGridSampler;
+  using Sampler = HalfGridSampler;
   static constexpr int kGroup = 4;
 
   __device__ HalfShader(const HalfGridView& grid, const float (&basis)[kMaxBasis], int lane)
@@ -47,9 +47,9 @@ class HalfShader {
 #pragma unroll
     for (int i = 0; i < 8; ++i) gamma_[i] = basis[lane % kGroup == 3 ? 8 : i];
   }
-  __device__ Space space() const { return Space(grid_); }
+  __device__ Sampler sampler() const { return Sampler(grid_); }
   __device__ void Add(int vertex, const Vec3f& fraction, bool valid, float weight) {
-    const GroupLinks<kGroup> links(space(), vertex, valid, lane_);
+    const GroupLinks<kGroup> links(sampler(), vertex, valid, lane_);
     uint4 corner[8];
 #pragma unroll
     for (int k = 0; k < 8; ++k) {
@@ -57,14 +57,14 @@ class HalfShader {
       corner[k] =
           link < 0 ? uint4{} : *reinterpret_cast<const uint4*>(records_ + int64_t{link} * 32);
     }
-    __half2 halves[4] = {};  // blended as they are stored: what that loses is in COSTS.md
+    __half2 halves[4] = {};  // blended in half precision; the error is listed in COSTS.md
 #pragma unroll
     for (int k = 0; k < 8; ++k) {
-      const __half2 share = __float2half2_rn(CornerWeight(fraction, k));
+      const __half2 weight = __float2half2_rn(CornerWeight(fraction, k));
       const uint32_t words[4] = {corner[k].x, corner[k].y, corner[k].z, corner[k].w};
 #pragma unroll
       for (int i = 0; i < 4; ++i)
-        halves[i] = __hfma2(share, *reinterpret_cast<const __half2*>(&words[i]), halves[i]);
+        halves[i] = __hfma2(weight, *reinterpret_cast<const __half2*>(&words[i]), halves[i]);
     }
     float sum[8];
 #pragma unroll

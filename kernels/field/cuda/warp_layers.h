@@ -1,5 +1,5 @@
-// A warp's walk through the background's layers: its lanes look at 32 of them at a time, from
-// the nearest outwards. Device code only.
+// Composites the background's layers with a warp, 32 layers at a time, from the nearest
+// outwards. Device code only.
 #pragma once
 
 #include "kernels/field/background_spheres.h"
@@ -9,13 +9,13 @@
 
 namespace regrade {
 
-// What a lane knows of its layer.
+// Per-lane state of one layer.
 struct LaneLayer {
   int layer = 0;
   TexelCell<float> cell;
-  float4 value;     // as SampleLayer has it: colour's coefficients, density
+  float4 value;     // as SampleLayer returns it: colour coefficients, density
   float depth = 0;  // of the crossing, world units from the ray's origin
-  float tau = 0;    // optical depth; 0 where nothing is composited
+  float tau = 0;    // optical depth; 0 if the layer does not composite
   float transmittance_before = 0;
 
   __device__ Vec3f Color() const {
@@ -25,8 +25,8 @@ struct LaneLayer {
   __device__ float Weight() const { return transmittance_before * Opacity(tau); }
 };
 
-// See EQ(background-layers). `entry` is the light that the box has left; the ray ends as
-// CompositeSpheres ends it.
+// See EQ(background-layers). `entry` is the transmittance of the box; the ray ends by the rule
+// of CompositeSpheres.
 class WarpLayers {
  public:
   __device__ WarpLayers(const DeviceGridView& grid, const Ray& ray, float entry, float stop)
@@ -39,22 +39,22 @@ class WarpLayers {
     stopped_ = !(entry >= stop) || !(ray_.world_per_unit > 0);
   }
 
-  // Goes to the next 32 layers of which at least one composites; false at the ray's end. Lanes
-  // that composite get mine->tau > 0.
+  // Advances to the next 32 layers of which at least one composites; false at the ray's end.
+  // Lanes that composite get mine->tau > 0.
   __device__ bool Next(LaneLayer* mine, unsigned* composited) {
     while (first_ < spheres_.layers && !stopped_) {
-      *mine = Look(first_, &depth_, composited);
+      *mine = Evaluate(first_, &depth_, composited);
       first_ += 32;
       if (*composited == 0) continue;
-      stopped_ = !(left() >= stop_);
+      stopped_ = !(transmittance() >= stop_);
       return true;
     }
     return false;
   }
 
-  // Layers first + lane; *depth is the optical depth of the layers before them, and then of
-  // those, too.
-  __device__ LaneLayer Look(int first, float* depth, unsigned* composited) const {
+  // Layers first + lane. *depth is the optical depth of the layers before them on entry, and
+  // includes them on return.
+  __device__ LaneLayer Evaluate(int first, float* depth, unsigned* composited) const {
     LaneLayer mine;
     mine.layer = first + lane_;
     mine.value = make_float4(0, 0, 0, 0);
@@ -76,7 +76,7 @@ class WarpLayers {
     return mine;
   }
 
-  __device__ float left() const { return entry_ * expf(-depth_); }
+  __device__ float transmittance() const { return entry_ * expf(-depth_); }
   __device__ bool is_ray() const { return ray_.world_per_unit > 0; }
   __device__ float delta() const { return delta_; }
   __device__ int lane() const { return lane_; }

@@ -1,5 +1,4 @@
-// One ray, one warp: its 32 lanes look at 32 consecutive samples of the march. Device code
-// only.
+// Marches one ray with one warp, 32 consecutive samples at a time. Device code only.
 #pragma once
 
 #include "kernels/field/cuda/device_grid.h"
@@ -13,7 +12,7 @@ namespace regrade {
 
 inline constexpr unsigned kAllLanes = 0xffffffffu;
 
-// Sum over the lanes up to and including one's own.
+// Sum over this lane and all lower ones.
 __device__ inline float InclusiveSum(float value, int lane) {
 #pragma unroll
   for (int d = 1; d < 32; d *= 2) {
@@ -39,15 +38,15 @@ __device__ inline int WarpMax(int value) {
 #endif
 }
 
-// What a lane knows of its sample.
+// Per-lane sample state.
 struct LaneSample {
   Cell<float> cell;
   float t = 0;    // voxels along the ray
-  float tau = 0;  // optical depth; 0 where nothing is composited
+  float tau = 0;  // optical depth; 0 if the sample does not composite
   float transmittance_before = 0;
 };
 
-// Steps through an array to a vertex's neighbours along each axis.
+// Array offsets from a vertex to its neighbours along each axis.
 struct NeighbourSteps {
   int x, y, z;
   __device__ int To(int corner) const {
@@ -55,7 +54,7 @@ struct NeighbourSteps {
   }
 };
 
-// What a march looks at, in the grid's own arrays.
+// Samples the grid's own arrays during a march.
 class GridSampler {
  public:
   __device__ explicit GridSampler(const DeviceGridView& grid) : grid_(grid) {}
@@ -70,7 +69,7 @@ class GridSampler {
   __device__ int32_t Link(int vertex) const { return grid_.links[vertex]; }
   __device__ static float Exp(float x) { return expf(x); }
   __device__ static float Alpha(float tau) { return Opacity(tau); }
-  // Of a vertex and its neighbour along z.
+  // Interpolated between a vertex and its neighbour along z.
   __device__ float DensityBetween(int vertex, float fraction) const {
     const float* d = grid_.dense_density + vertex;
     return d[0] * (1 - fraction) + d[1] * fraction;
@@ -80,33 +79,33 @@ class GridSampler {
   const DeviceGridView& grid_;
 };
 
-// LocateCell of trilinear.h, to the bit, without conversions between integers and floats, which
-// are slow on a GPU: adding 2^23 and rounding down leaves the integer in the low bits. The
-// cell's vertex is the space's index.
-template <typename Space>
-__device__ Cell<float> LocateCellIn(const Space& space, const Vec3f& p) {
+// LocateCell of trilinear.h, bit for bit, without conversions between integers and floats,
+// which are slow on a GPU: adding 2^23 and rounding down leaves the integer in the low bits.
+// The cell's vertex is the sampler's index.
+template <typename Sampler>
+__device__ Cell<float> LocateCellIn(const Sampler& sampler, const Vec3f& p) {
   constexpr float kShift = 8388608.0f;
   Cell<float> cell;
   int base[3];
 #pragma unroll
   for (int a = 0; a < 3; ++a) {
-    const float last = space.last()[a];
+    const float last = sampler.last()[a];
     const float clamped = fminf(fmaxf(p[a], 0.0f), last);  // NaN goes to 0
     const float shifted = fminf(__fadd_rd(clamped, kShift), last - 1 + kShift);
     base[a] = __float_as_int(shifted) & 0x7fffff;
     cell.fraction[a] = clamped - (shifted - kShift);
   }
-  cell.vertex = space.Index(base[0], base[1], base[2]);
+  cell.vertex = sampler.Index(base[0], base[1], base[2]);
   return cell;
 }
 
-// The march of a warp's ray; every lane holds the same state but for its own sample.
-template <typename Space = GridSampler>
+// The march of a warp's ray; all lanes hold the same state except for their sample.
+template <typename Sampler = GridSampler>
 class WarpMarch {
  public:
-  __device__ WarpMarch(const Space& space, const GridRay<float>& ray,
+  __device__ WarpMarch(const Sampler& sampler, const GridRay<float>& ray,
                        const MarchOptions& options)
-      : space_(space),
+      : sampler_(sampler),
         options_(options),
         ray_(ray),
         lane_(static_cast<int>(threadIdx.x & 31)),
@@ -117,29 +116,29 @@ class WarpMarch {
       : WarpMarch(GridSampler(grid), ClipToGrid(grid.frame, ray, grid.near_clip, options.step),
                   options) {}
 
-  // Steps to the next 32 samples of which at least one composites; false at the ray's end.
-  // Lanes that composite get sample->tau > 0; they come in the order of the ray, and the first
-  // of them follows the last of the call before. See EQ(composite); the ray ends behind the
-  // sample that leaves less than stop_transmittance.
+  // Advances to the next 32 samples of which at least one composites; false at the ray's end.
+  // Lanes that composite get sample->tau > 0. They are in the order of the ray and follow those
+  // of the previous call. See EQ(composite); the ray ends after the sample that leaves less
+  // than stop_transmittance.
   __device__ bool Next(LaneSample* sample, unsigned* composited) {
     while (step_ < num_steps_ && !stopped_) {
-      const bool was_in_matter = in_matter_;
+      const bool was_in_occupied = in_occupied_;
       const int mine = step_ + lane_;
-      const bool inside = mine < num_steps_;
+      const bool in_range = mine < num_steps_;
       sample->t = ray_.t_begin + static_cast<float>(mine) * options_.step;
       int distance = 255;
       float density = 0;
-      if (inside) {
-        sample->cell = LocateCellIn(space_, ray_.At(sample->t));
-        distance = space_.Distance(sample->cell.vertex);
-        // Where matter was, there is more: its densities need not wait for the distance.
-        if (was_in_matter) density = DensityAt(sample->cell);
+      if (in_range) {
+        sample->cell = LocateCellIn(sampler_, ray_.At(sample->t));
+        distance = sampler_.Distance(sample->cell.vertex);
+        // Occupied space usually continues: do not wait for the distance to load densities.
+        if (was_in_occupied) density = DensityAt(sample->cell);
       }
-      in_matter_ = __any_sync(kAllLanes, inside && distance == 0);
-      if (!in_matter_) {
-        // Nothing is stored at these 32. Each lane knows how far it stays so.
+      in_occupied_ = __any_sync(kAllLanes, in_range && distance == 0);
+      if (!in_occupied_) {
+        // All 32 samples are empty; each lane's distance bounds how far the ray stays empty.
         const int skip =
-            inside
+            in_range
                 ? lane_ +
                       max(1, static_cast<int>(static_cast<float>(distance - 1) / options_.step))
                 : 32;
@@ -148,16 +147,16 @@ class WarpMarch {
       }
       step_ += 32;
       sample->tau = 0;
-      if (!was_in_matter && inside && distance == 0) density = DensityAt(sample->cell);
+      if (!was_in_occupied && in_range && distance == 0) density = DensityAt(sample->cell);
       if (density > 0) sample->tau = OpticalDepth(density, delta_);
       const float before = depth_ + InclusiveSum(sample->tau, lane_) - sample->tau;
-      sample->transmittance_before = Space::Exp(-before);
+      sample->transmittance_before = Sampler::Exp(-before);
       if (!(sample->transmittance_before >= options_.stop_transmittance)) sample->tau = 0;
       *composited = __ballot_sync(kAllLanes, sample->tau > 0);
       if (*composited == 0) continue;
       const float after = __shfl_sync(kAllLanes, before + sample->tau, 31 - __clz(*composited));
       depth_ = after;
-      stopped_ = !(Space::Exp(-after) >= options_.stop_transmittance);
+      stopped_ = !(Sampler::Exp(-after) >= options_.stop_transmittance);
       return true;
     }
     return false;
@@ -170,23 +169,23 @@ class WarpMarch {
 
  private:
   __device__ float DensityAt(const Cell<float>& cell) const {
-    const NeighbourSteps steps = space_.Steps(cell.vertex);
+    const NeighbourSteps steps = sampler_.Steps(cell.vertex);
     const Vec3f& f = cell.fraction;
-    const auto along_z = [&](int vertex) { return space_.DensityBetween(vertex, f.z); };
+    const auto along_z = [&](int vertex) { return sampler_.DensityBetween(vertex, f.z); };
     const float x0 = along_z(cell.vertex) * (1 - f.y) + along_z(cell.vertex + steps.y) * f.y;
     const float x1 = along_z(cell.vertex + steps.x) * (1 - f.y) +
                      along_z(cell.vertex + steps.x + steps.y) * f.y;
     return x0 * (1 - f.x) + x1 * f.x;
   }
 
-  Space space_;
+  Sampler sampler_;
   const MarchOptions& options_;
   GridRay<float> ray_;
-  int lane_, num_steps_;  // kMaxSteps and less
+  int lane_, num_steps_;  // num_steps_ <= kMaxSteps
   float delta_ = 0;
   int step_ = 0;
-  float depth_ = 0;  // optical depth of what has been composited
-  bool in_matter_ = false, stopped_ = false;
+  float depth_ = 0;  // optical depth composited so far
+  bool in_occupied_ = false, stopped_ = false;
 };
 
 }  // namespace regrade

@@ -1,6 +1,6 @@
-// Colours and gradients of samples, a group of lanes a sample: a lane reads 16 bytes of each of
-// the eight corners' records, so that one instruction fetches several whole records and a sum
-// over a group takes few exchanges. Device code only.
+// Colours and gradients of samples, one group of lanes per sample: a lane reads 16 bytes of
+// each of the eight corners' records, so that one instruction loads several whole records and a
+// sum over a group needs few shuffles. Device code only.
 #pragma once
 
 #include "kernels/field/cuda/warp_march.h"
@@ -10,16 +10,16 @@
 
 namespace regrade {
 
-// Which values of a record a lane stands for: kValues neighbouring ones.
+// Assigns the values of a record to lanes: kValues consecutive ones each.
 template <int kBasis>
 struct RecordLayout {
   static constexpr int kValues = 4;
-  static constexpr int kGroup = RecordLanes(kBasis) / kValues;  // lanes a record: 8, 4 or 1
-  static constexpr int kSamples = 32 / kGroup;                  // side by side in a warp
+  static constexpr int kGroup = RecordLanes(kBasis) / kValues;  // lanes per record: 8, 4 or 1
+  static constexpr int kSamples = 32 / kGroup;                  // concurrent samples of a warp
 };
 
-// What a lane's values of a record mean along one ray: basis functions of the three channels,
-// and which of them is the density.
+// The meaning, for one ray, of a lane's values of a record: basis functions of the three
+// channels, and which value is the density.
 template <int kBasis>
 struct LaneValues {
   using Layout = RecordLayout<kBasis>;
@@ -38,21 +38,21 @@ struct LaneValues {
   }
 };
 
-// The links of the corners of a group's sample; each lane of the group looks some of them up.
+// The links of the corners of a group's sample; each lane of the group loads some of them.
 template <int kGroup>
 class GroupLinks {
  public:
-  template <typename Space>
-  __device__ GroupLinks(const Space& space, int vertex, bool valid, int lane) {
-    const NeighbourSteps steps = space.Steps(vertex);
+  template <typename Sampler>
+  __device__ GroupLinks(const Sampler& sampler, int vertex, bool valid, int lane) {
+    const NeighbourSteps steps = sampler.Steps(vertex);
 #pragma unroll
     for (int i = 0; i < kOwn; ++i)
-      own_[i] = valid ? space.Link(vertex + steps.To(lane % kGroup + kGroup * i)) : -1;
+      own_[i] = valid ? sampler.Link(vertex + steps.To(lane % kGroup + kGroup * i)) : -1;
   }
   __device__ int32_t Of(int corner) const {
     return __shfl_sync(kAllLanes, own_[corner / kGroup], corner % kGroup, kGroup);
   }
-  // body(link) for the stored corners, each by one lane.
+  // Calls body(link) for the stored corners, each in one lane.
   template <typename Body>
   __device__ void ForEachOwn(const Body& body) const {
 #pragma unroll
@@ -69,15 +69,15 @@ __device__ inline float4 LoadQuad(const float* from) {
   return *reinterpret_cast<const float4*>(from);
 }
 
-// The colour, before the clamp, of the sample of the lane's group; every lane of the warp takes
-// part, those of a group with the same sample, and get the same colour. See EQ(sh-basis).
+// The colour, before the clamp, of the sample of the lane's group. All lanes of the warp take
+// part; the lanes of a group have the same sample and get the same colour. See EQ(sh-basis).
 template <int kBasis>
 __device__ Vec3f RawColor(const DeviceGridView& grid, const LaneValues<kBasis>& values,
                           int vertex, const Vec3f& fraction, bool valid, int lane) {
   using Layout = RecordLayout<kBasis>;
   const GroupLinks<Layout::kGroup> links(GridSampler(grid), vertex, valid, lane);
   const float* mine = grid.records + lane % Layout::kGroup * Layout::kValues;
-  float4 corner[8];  // all on their way before the first is used
+  float4 corner[8];  // all loads are issued before the first is used
 #pragma unroll
   for (int k = 0; k < 8; ++k) {
     const int32_t link = links.Of(k);

@@ -1,6 +1,6 @@
-// See EQ(mlp). The adjoint is two kernels: the first walks each row down and up again and
-// leaves every layer's input x_{l-1} and dL/d(A_l x_{l-1} + b_l); the second sums their outer
-// products over the rows, one block for a share of the rows and a layer.
+// See EQ(mlp). The adjoint is two kernels: the first runs each row forward and back and stores
+// every layer's input x_{l-1} and dL/d(A_l x_{l-1} + b_l); the second sums their outer products
+// over the rows, one block for a part of the rows and a layer.
 #include <algorithm>
 #include <vector>
 
@@ -18,7 +18,7 @@ namespace {
 
 constexpr int64_t kChunk = 1 << 16;  // rows of the adjoint at a time
 
-// Layer inputs and slopes of a chunk: [layers - 1, chunk, kMlpHidden] of each.
+// Layer inputs and derivatives of a chunk: [layers - 1, chunk, kMlpHidden] of each.
 struct Scratch {
   float *inputs, *slopes;
   int64_t rows;
@@ -47,7 +47,7 @@ __device__ void WalkDown(const MlpView& mlp, const Weights& weights, const float
   }
 }
 
-// How many rows there are: n, or fewer if that is counted on the device. `begin`: of a chunk.
+// Number of rows: n, or fewer if counted on the device. `begin`: first row of a chunk.
 struct RowCount {
   int64_t n;
   const int32_t* counted;  // may be null
@@ -91,7 +91,7 @@ __global__ void __launch_bounds__(kThreads)
   for (int64_t row = WarpOfGrid() * kRows; row < n; row += warps * kRows) {
     Tile d_hidden[kHiddenTiles], slope[kHiddenTiles];
     WalkDown<kSplit, true>(mlp, weights, input, row, n, scratch,
-                           d_hidden);  // what it holds is kept already
+                           d_hidden);  // its contents are already stored
     Tile d_last[kEndTiles];
     LoadRows(d_output, kMlpEndLanes, row, n, d_last);
     DenseAdjointRows<kSplit>(weights, mlp.layers - 1, d_last, d_hidden);
@@ -108,7 +108,7 @@ __global__ void __launch_bounds__(kThreads)
   }
 }
 
-// Blocks (x: share of the rows, y: layer) of four warps, each of them 16 outputs.
+// Blocks (x: part of the rows, y: layer) of four warps, each computing 16 outputs.
 constexpr int kOuterRows = 32, kOuterStride = kMlpHidden + 4, kOuterThreads = 128;
 
 __device__ inline void StageRows(const float* from, int width, int64_t row, int64_t n,
@@ -187,7 +187,7 @@ MlpView ViewOf(const FusedMlp& shape, const DeviceBuffer<float>& parameters) {
           shape.omega};
 }
 
-// How a kernel that walks rows is launched: weights in shared memory where they fit.
+// Launch configuration of kernels over rows: weights are in shared memory if they fit.
 struct WalkLaunch {
   bool stage;
   unsigned blocks, bytes;
@@ -248,7 +248,7 @@ void DeviceMlp::ReserveAdjoint(int64_t n) {
   const int64_t kept =
       (static_cast<int64_t>(shape_.layers.size()) - 1) * std::min(n, kChunk) * kMlpHidden;
   if (scratch_.size() < 2 * kept)
-    scratch_ = DeviceBuffer<float>(2 * kept, "layers of the style's network");
+    scratch_ = DeviceBuffer<float>(2 * kept, "layer values of the style network");
 }
 
 void DeviceMlp::AddAdjoint(MlpPrecision precision, const float* input, const float* d_output,
@@ -280,8 +280,8 @@ void DeviceMlp::AddAdjoint(MlpPrecision, const float*, const float*, int64_t, co
 #endif
 
 DeviceMlp::DeviceMlp(const FusedMlp& mlp)
-    : parameters_(mlp.NumParameters(), "weights of the style's network"),
-      gradient_(mlp.NumParameters(), "gradient of the style's network") {
+    : parameters_(mlp.NumParameters(), "weights of the style network"),
+      gradient_(mlp.NumParameters(), "gradient of the style network") {
   gradient_.Zero();
   Set(mlp);
 }

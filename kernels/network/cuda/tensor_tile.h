@@ -2,10 +2,10 @@
 //
 // A warp holds 16 rows of K values as tiles of 8 columns, four registers a lane: lane 4 g + t
 // has, of tile j, rows g (first two) and g + 8 (last two) at columns 8 j + 2 t and 8 j + 2 t
-// + 1. That is how the tensor cores leave a product (mma.m16n8). They take a left factor in
-// another order, columns t and t + 4; but the sum over k may be taken in any order, so column 2
-// t stands in for t and 2 t + 1 for t + 4, in both factors, and what one layer leaves is what
-// the next one takes.
+// + 1. This is the layout in which the tensor cores return a product (mma.m16n8). They expect
+// the left factor in another order, columns t and t + 4; but the order of the sum over k is
+// free, so column 2 t is used for t and 2 t + 1 for t + 4, in both factors, and one layer's
+// output is the next one's input without a shuffle.
 #pragma once
 
 #include <cstdint>
@@ -45,7 +45,7 @@ __device__ inline void Multiply(Tile* sum, const Tile& left, const float (&right
   for (int i = 0; i < 4; ++i) a[i] = RoundToTensor(in_order[i]);
 #pragma unroll
   for (int i = 0; i < 2; ++i) b[i] = RoundToTensor(right[i]);
-  if constexpr (kSplit) {  // what rounding left over, multiplied first: small terms before
+  if constexpr (kSplit) {  // the rounding residuals, multiplied first: small terms before
                            // large ones
     uint32_t rest_a[4], rest_b[2];
 #pragma unroll
@@ -60,7 +60,7 @@ __device__ inline void Multiply(Tile* sum, const Tile& left, const float (&right
 
 #else
 
-// Without TF32: the same sums by shuffles, slowly.
+// Without TF32: the same sums by shuffles, slower.
 template <bool kSplit>
 __device__ inline void Multiply(Tile* sum, const Tile& left, const float (&right)[2]) {
   const int lane = static_cast<int>(threadIdx.x & 31), g = lane / 4, t = lane % 4;

@@ -11,10 +11,10 @@ namespace regrade {
 inline constexpr int kRows = 16;                    // a warp's tile
 inline constexpr int kEndTiles = kMlpEndLanes / 8;  // columns of a tile are 8
 inline constexpr int kHiddenTiles = kMlpHidden / 8;
-inline constexpr int kPad = 8;  // floats behind a row of weights: no two lanes ask one bank
+inline constexpr int kPad = 8;  // floats after a row of weights: avoids bank conflicts
 
 struct MlpView {
-  const float* parameters;  // as FusedMlp::Offset says
+  const float* parameters;  // in the layout of FusedMlp::Offset
   int layers;
   Activation activation;
   float omega;
@@ -30,7 +30,7 @@ struct MlpView {
   }
 };
 
-// Weights in shared memory, or where they are if that is too small.
+// Weights in shared memory, or in global memory if they do not fit.
 class Weights {
  public:
   __device__ Weights(const MlpView& mlp, float* shared) : mlp_(mlp), shared_(shared) {
@@ -152,7 +152,7 @@ __device__ void DenseAdjointRows(const Weights& weights, int layer, const Tile (
   }
 }
 
-// x becomes act(x); slope, if wanted, act'(x).
+// x becomes act(x); slope becomes act'(x) if kWantSlope.
 template <bool kWantSlope>
 __device__ void ActivateRows(const MlpView& mlp, Tile (&x)[kHiddenTiles],
                              Tile (&slope)[kHiddenTiles]) {

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "kernels/base/error.h"
+#include "kernels/base/host_device.h"
 #include "kernels/network/lipschitz_layer.h"
 
 namespace regrade {
@@ -24,8 +25,8 @@ inline double LayerTarget(double k_est, int layers, bool* capped = nullptr) {
   return k_est > 0 ? std::pow(std::min(k_est, kLargestKEst), 1.0 / layers) : 0.0;
 }
 
-inline double LipschitzPenalty(double k, double target) { return Squareplus(k - target); }
-inline double LipschitzPenaltyDerivative(double k, double target) {
+HD inline double LipschitzPenalty(double k, double target) { return Squareplus(k - target); }
+HD inline double LipschitzPenaltyDerivative(double k, double target) {
   return SquareplusDerivative(k - target);
 }
 

@@ -1,4 +1,4 @@
-// The way back of EQ(composite-adjoint) over the samples of a warp. Device code only.
+// Backward scan of EQ(composite-adjoint) over the samples of a warp. Device code only.
 #pragma once
 
 #include "kernels/field/cuda/warp_march.h"
@@ -7,11 +7,11 @@
 
 namespace regrade {
 
-// What is seen behind each lane's sample, lane 0's being the farthest: the recursion R_i =
-// alpha_i c_i + (1 - alpha_i) R_{i+1} is a chain of maps x -> b + a x; 32 of them are composed
-// by a scan, and as all a and b are positive nothing cancels. *behind is R behind lane 0 on
-// entry, and from lane 31 on on return.
-__device__ inline Vec3f SeenBehind(float a, Vec3f b, int lane, Vec3f* behind) {
+// The radiance behind each lane's sample, with lane 0 the farthest. The recursion R_i =
+// alpha_i c_i + (1 - alpha_i) R_{i+1} composes maps x -> b + a x; 32 of them are composed by a
+// scan. All a and b are non-negative, so nothing cancels. *behind is the radiance behind lane 0
+// on entry and the radiance R of lane 31 on return.
+__device__ inline Vec3f BackgroundRadiance(float a, Vec3f b, int lane, Vec3f* behind) {
 #pragma unroll
   for (int d = 1; d < 32; d *= 2) {
     const float other_a = __shfl_up_sync(kAllLanes, a, d);
@@ -22,7 +22,7 @@ __device__ inline Vec3f SeenBehind(float a, Vec3f b, int lane, Vec3f* behind) {
       a *= other_a;
     }
   }
-  // The chain of the lanes before this one, which are the samples behind its own.
+  // The composition of all lanes before this one, whose samples are farther away.
   float up_a = __shfl_up_sync(kAllLanes, a, 1);
   Vec3f up_b;
   for (int c = 0; c < 3; ++c) up_b[c] = __shfl_up_sync(kAllLanes, b[c], 1);

@@ -1,0 +1,72 @@
+#include "pipeline/files/text.h"
+
+#include <utf8cpp/utf8.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+namespace regrade {
+
+CodePoint FirstCodePoint(std::string_view text) {
+  const char* at = text.data();
+  // At most four bytes: an invalid one later in the text does not matter.
+  const char* const end = at + std::min<size_t>(text.size(), 4);
+  try {
+    const uint32_t value = utf8::next(at, end);
+    return {value, static_cast<size_t>(at - text.data())};
+  } catch (const utf8::exception&) {
+    return {};
+  }
+}
+
+std::string Printable(std::string_view text) {
+  std::string result;
+  while (!text.empty()) {
+    const CodePoint c = FirstCodePoint(text);
+    const bool control = c.value < 0x20 || (c.value >= 0x7f && c.value < 0xa0);
+    if (c.bytes > 0 && !control) {
+      result += text.substr(0, c.bytes);
+      text.remove_prefix(c.bytes);
+      continue;
+    }
+    char escaped[8];
+    std::snprintf(escaped, sizeof escaped, "\\x%02x", static_cast<unsigned char>(text[0]));
+    result += escaped;
+    text.remove_prefix(1);
+  }
+  return result;
+}
+
+std::string DurationText(double seconds) {
+  const long long whole = std::llround(std::min(seconds, 1e15));
+  char text[64];
+  if (whole >= 3600)
+    std::snprintf(text, sizeof text, "%lld h %02lld min", whole / 3600, whole / 60 % 60);
+  else if (whole >= 60)
+    std::snprintf(text, sizeof text, "%lld min %02lld s", whole / 60, whole % 60);
+  else
+    std::snprintf(text, sizeof text, "%lld s", whole);
+  return text;
+}
+
+std::vector<std::string> Split(std::string_view text, char separator) {
+  std::vector<std::string> parts(1);
+  for (const char c : text)
+    if (c == separator)
+      parts.emplace_back();
+    else
+      parts.back() += c;
+  return parts;
+}
+
+std::string Join(const std::vector<std::string>& parts, std::string_view separator) {
+  std::string text;
+  for (size_t i = 0; i < parts.size(); ++i) {
+    if (i > 0) text += separator;
+    text += parts[i];
+  }
+  return text;
+}
+
+}  // namespace regrade

@@ -1,0 +1,120 @@
+// What an evaluation measures: consistency, fidelity, and each pair of frames.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pipeline/workspace/metric.h"
+
+namespace regrade {
+
+// Temporal consistency of a sequence over frames `gap` apart.
+struct ConsistencyMetrics {
+  std::string
+      sequence;  // "source" | "views_2d" | "styled" | "photos", or path_ and one of them
+  int gap = 1;
+  int pairs = 0;                           // undefined ones included
+  int undefined_pairs = 0;                 // nothing to compare; in no mean
+  Metric tc_psnr_mean_db;                  // mean of the pairs' dB
+  Metric tc_psnr_of_mean_db;               // dB of the pairs' mean squared error
+  Metric tc_psnr_low_db, tc_psnr_high_db;  // 95 % interval of the mean of dB
+  Metric coverage;                         // mean fraction of compared pixels
+  std::vector<Metric> tc_psnr_pairs_db;    // one for each pair in order of time
+  std::string heat_map;  // picture of the worst pair, relative to the folder; may be empty
+  std::optional<int> heat_map_from;  // first frame of that pair
+
+  template <typename Visit>
+  void Describe(Visit& visit) {
+    visit("sequence", sequence);
+    visit("gap", gap);
+    visit("pairs", pairs);
+    visit("undefined_pairs", undefined_pairs);
+    visit("tc_psnr_mean_db", tc_psnr_mean_db);
+    visit("tc_psnr_of_mean_db", tc_psnr_of_mean_db);
+    visit("tc_psnr_low_db", tc_psnr_low_db);
+    visit("tc_psnr_high_db", tc_psnr_high_db);
+    visit("coverage", coverage);
+    visit("tc_psnr_pairs_db", tc_psnr_pairs_db);
+    visit("heat_map", heat_map, {.optional = true});
+    visit("heat_map_from", heat_map_from);
+  }
+};
+
+// One pair of one sequence, and how many of its pixels were left out for which reason.
+struct PairMetrics {
+  std::string sequence;
+  int from = 0, to = 0;  // frames, counted from 0
+  Metric error;          // mean square over compared pixels and channels, white = 1
+  Metric tc_psnr_db;
+  double coverage = 0;        // fraction of the frame that was compared
+  bool low_coverage = false;  // too little for a reliable number
+  int64_t flow_not_finite = 0, out_of_frame = 0, disoccluded = 0, motion_boundary = 0,
+          colour_not_finite = 0;
+
+  template <typename Visit>
+  void Describe(Visit& visit) {
+    int gap = to - from;  // written for readers of the file
+    visit("sequence", sequence);
+    visit("gap", gap);
+    visit("from", from);
+    visit("to", to);
+    visit("error", error);
+    visit("tc_psnr_db", tc_psnr_db);
+    visit("coverage", coverage);
+    visit("low_coverage", low_coverage);
+    visit("flow_not_finite", flow_not_finite);
+    visit("out_of_frame", out_of_frame);
+    visit("disoccluded", disoccluded);
+    visit("motion_boundary", motion_boundary);
+    visit("colour_not_finite", colour_not_finite);
+  }
+};
+
+// How close a sequence is to the 2D method's pictures, and how much colour it has kept.
+struct FidelityMetrics {
+  std::string sequence;
+  Metric psnr_to_2d_db;
+  std::optional<double> lpips_to_2d;  // where a network was given
+  std::optional<double> structure;    // where the unstyled frames are known
+  Metric hue_std, hue_std_2d;         // radians
+  Metric chroma, chroma_2d;           // CIELAB
+  Metric sliced_wasserstein_to_style;
+
+  template <typename Visit>
+  void Describe(Visit& visit) {
+    visit("sequence", sequence);
+    visit("psnr_to_2d_db", psnr_to_2d_db);
+    visit("lpips_to_2d", lpips_to_2d);
+    visit("structure", structure);
+    visit("hue_std", hue_std);
+    visit("hue_std_2d", hue_std_2d);
+    visit("chroma", chroma);
+    visit("chroma_2d", chroma_2d);
+    visit("sliced_wasserstein_to_style", sliced_wasserstein_to_style);
+  }
+};
+
+// What an evaluation measures of sequences of frames.
+struct EvaluationMetrics {
+  std::vector<ConsistencyMetrics> consistency;
+  std::vector<FidelityMetrics> fidelity;
+  std::vector<PairMetrics> pairs;  // of all sequences, by first frame
+
+  template <typename Visit>
+  void Describe(Visit& visit) {
+    visit("consistency", consistency);
+    visit("fidelity", fidelity);
+    visit("consistency_pairs", pairs);
+  }
+};
+
+// A picture of the pair with the largest error, written beside the metrics of an evaluation.
+struct HeatMapFile {
+  std::string sequence;
+  int gap = 0, from = 0, to = 0;
+  std::string path;  // relative to the output folder
+};
+
+}  // namespace regrade

@@ -1,0 +1,255 @@
+// What each stage measures: the stage fills its struct, its record stores it and the report
+// shows it. See pipeline/workspace/metric.h.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "pipeline/workspace/metric.h"
+
+namespace regrade {
+
+// Values over steps.
+using Curve = std::vector<std::pair<int64_t, double>>;
+
+// Time of a stage, from its record.
+struct RecordedTime {
+  double seconds = 0;
+  // All threads and the programs started; of the last start of a stage that was interrupted.
+  std::optional<double> cpu_seconds;
+};
+
+// Time of the search for points under given poses.
+struct TracksMetrics {
+  std::optional<double> seconds, cpu_seconds;
+
+  template <typename Visit>
+  void Describe(Visit& visit) {
+    visit("seconds", seconds, {.label = "search for points", .unit = "s", .decimals = 1});
+    visit("cpu_seconds", cpu_seconds);
+  }
+};
+
+struct PoseStageReport {
+  RecordedTime time;
+  std::string given_poses;  // the file of given poses; empty where COLMAP found them
+  // Of COLMAP: its version, the strategy that succeeded, its camera model. Empty for given
+  // poses.
+  std::string colmap, strategy, lens;
+  std::optional<int> photo_masks;
+  int registered = 0;
+  int64_t points = 0;
+  Metric reprojection_px;
+  int models_found = 1;
+  std::optional<TracksMetrics> tracks;
+
+  template <typename Visit>
+  void Describe(Visit& visit) {
+    visit("given_poses", given_poses, {.label = "given poses", .optional = true});
+    visit("colmap", colmap, {.label = "COLMAP", .optional = true});
+    visit("strategy", strategy, {.label = "strategy", .optional = true});
+    visit("lens", lens, {.label = "camera model", .optional = true});
+    visit("photo_masks", photo_masks, {.label = "masks"});
+    visit("registered", registered, {.label = "registered photos"});
+    visit("points", points, {.label = "points"});
+    visit("reprojection_px", reprojection_px, {.label = "reprojection error", .unit = "px"});
+    visit("models_found", models_found);
+    visit("tracks", tracks);
+  }
+};
+
+struct ReconstructReport {
+  RecordedTime time;
+  std::string device;
+  int finest_grid = 0;  // voxels a side
+  int64_t rays = 0;
+  int sh_degree = 0;
+  int64_t voxels = 0;
+  std::optional<int64_t> background_texels;
+  Metric psnr_train_db;
+  int64_t rejected_voxels = 0;  // updates of voxels that were refused: gradient not finite
+  Metric psnr_heldout_db, ssim_heldout;
+  std::vector<std::string> heldout;  // the user's file names
+  Curve psnr_at_steps;               // dB on the rays of the last steps
+  // Of the trial that decides for or against view dependence.
+  std::optional<double> trial_seconds, trial_cpu_seconds;
+
+  template <typename Visit>
+  void Describe(Visit& visit) {
+    visit("device", device);
+    visit("finest_grid", finest_grid);
+    visit("rays", rays);
+    visit("sh_degree", sh_degree, {.label = "degree of view dependence"});
+    visit("voxels", voxels, {.label = "voxels"});
+    visit("background_texels", background_texels, {.label = "background texels"});
+    visit("psnr_train_db", psnr_train_db, {.label = "PSNR, training", .unit = "dB"});
+    visit("rejected_voxels", rejected_voxels);
+    visit("psnr_heldout_db", psnr_heldout_db, {.label = "PSNR, held out", .unit = "dB"});
+    visit("ssim_heldout", ssim_heldout, {.label = "SSIM, held out", .decimals = 3});
+    visit("heldout", heldout, {.label = "photos held out"});
+    visit("psnr_at_steps", psnr_at_steps);
+    visit("trial_seconds", trial_seconds);
+    visit("trial_cpu_seconds", trial_cpu_seconds);
+  }
+};
+
+struct Style2dReport {
+  RecordedTime time;
+  std::string method;
+  int views = 0;                     // that it has styled
+  std::vector<std::string> notices;  // for the user: for example a grey style picture
+
+  template <typename Visit>
+  void Describe(Visit& visit) {
+    visit("method", method, {.label = "method"});
+    visit("views", views, {.label = "views"});
+    visit("notices", notices);
+  }
+};
+
+// Differences of neighbouring pixels before and after styling; see stylize's volume_variance.h.
+struct VarianceGroupMetrics {
+  int64_t pairs = 0;
+  int64_t above = 0;  // pairs that differ by more than the bound times their difference before
+  Metric gain;        // mean difference after over mean difference before
+  Metric largest_excess;  // over the bound
+
+  template <typename Visit>
+  void Describe(Visit& visit) {
+    visit("pairs", pairs);
+    visit("above", above);
+    visit("gain", gain);
+    visit("largest_excess", largest_excess);
+  }
+};
+
+// Grouped by which premise of the guarantee is violated.
+struct VarianceMetrics {
+  VarianceGroupMetrics valid;        // none
+  VarianceGroupMetrics clamped;      // a colour is clamped
+  VarianceGroupMetrics transparent;  // light passes through the scene
+  Metric largest_fraction_of_bound;  // among the valid ones; at most 1
+
+  template <typename Visit>
+  void Describe(Visit& visit) {
+    visit("valid", valid);
+    visit("clamped", clamped);
+    visit("transparent", transparent);
+    visit("largest_fraction_of_bound", largest_fraction_of_bound);
+  }
+};
+
+struct StylizeReport {
+  RecordedTime time;
+  std::string device;  // empty if there was nothing to train
+  int steps = 0;
+  int64_t rejected_steps = 0;  // steps that were refused: gradient not finite
+  Metric psnr_train_db;
+  // Lipschitz constants in the space of SH coefficients and scaled position: estimated from
+  // colour statistics; the network's certified bound; the largest local constant among sampled
+  // voxels, and after gradient ascent from there.
+  Metric k_est, bound, local_lipschitz_sampled, local_lipschitz_max;
+  // Of the initial colour map; and at the steepest voxel with the position held fixed and with
+  // the coefficients held fixed.
+  Metric local_lipschitz_of_map, local_lipschitz_along_coefficients,
+      local_lipschitz_along_position;
+  Curve bound_at_steps;
+  std::optional<int64_t> object_voxels;
+  std::optional<VarianceMetrics> variance;
+  std::vector<std::string> notices;  // about the colour map and the training
+
+  template <typename Visit>
+  void Describe(Visit& visit) {
+    visit("device", device, {.optional = true});
+    visit("steps", steps, {.label = "steps"});
+    visit("rejected_steps", rejected_steps);
+    visit("psnr_train_db", psnr_train_db, {.label = "PSNR, training", .unit = "dB"});
+    visit("bound", bound, {.label = "Lipschitz bound"});
+    visit("local_lipschitz_sampled", local_lipschitz_sampled,
+          {.label = "largest local Lipschitz constant, sampled"});
+    visit("local_lipschitz_max", local_lipschitz_max, {.label = "after gradient ascent"});
+    visit("k_est", k_est, {.label = "K_est, from the colours"});
+    visit("local_lipschitz_of_map", local_lipschitz_of_map);
+    visit("local_lipschitz_along_coefficients", local_lipschitz_along_coefficients);
+    visit("local_lipschitz_along_position", local_lipschitz_along_position);
+    visit("bound_at_steps", bound_at_steps);
+    visit("object_voxels", object_voxels, {.label = "voxels of the object"});
+    visit("variance", variance);
+    visit("notices", notices);
+  }
+};
+
+struct FilmSize {
+  int width = 0, height = 0;  // pixels
+
+  template <typename Visit>
+  void Describe(Visit& visit) {
+    visit("width", width);
+    visit("height", height);
+  }
+};
+
+struct RenderReport {
+  RecordedTime time;
+  std::string device;
+  int frames = 0;
+  int path_frames = 0;  // of these, along the film's camera path
+  FilmSize film;
+  Metric frames_per_second;
+
+  template <typename Visit>
+  void Describe(Visit& visit) {
+    visit("device", device);
+    visit("frames", frames, {.label = "frames"});
+    visit("path_frames", path_frames);
+    visit("film", film);
+    visit("frames_per_second", frames_per_second, {.label = "speed", .unit = "frames/s"});
+  }
+};
+
+struct EvaluateReport {
+  RecordedTime time;
+  std::string flow;  // "dis-medium"
+  std::string mask;  // "lai2018"
+  // Which frames stand for neighbouring views that differ in size or lens; else empty.
+  std::string comparison_note;
+  Metric psnr_to_2d_photos_db;      // styled frames against the 2D method on the photos
+  Metric linear_map_psnr_to_2d_db;  // of the better of two linear colour maps
+
+  template <typename Visit>
+  void Describe(Visit& visit) {
+    visit("flow", flow, {.label = "optical flow"});
+    visit("mask", mask, {.label = "mask"});
+    visit("comparison_note", comparison_note, {.optional = true});
+    visit("psnr_to_2d_photos_db", psnr_to_2d_photos_db,
+          {.label = "PSNR to the styled photos", .unit = "dB"});
+    visit("linear_map_psnr_to_2d_db", linear_map_psnr_to_2d_db,
+          {.label = "PSNR of the best linear colour map", .unit = "dB"});
+  }
+};
+
+// Only the finished stages are there.
+struct StagesReport {
+  std::optional<PoseStageReport> pose;
+  std::optional<ReconstructReport> reconstruct;
+  std::optional<Style2dReport> style_2d;
+  std::optional<StylizeReport> stylize;
+  std::optional<RenderReport> render;
+  std::optional<EvaluateReport> evaluate;
+
+  // Calls visit(name, optional stage) in the order of the run.
+  template <typename Visit>
+  void ForEach(Visit&& visit) {
+    visit("pose", pose);
+    visit("reconstruct", reconstruct);
+    visit("style_2d", style_2d);
+    visit("stylize", stylize);
+    visit("render", render);
+    visit("evaluate", evaluate);
+  }
+};
+
+}  // namespace regrade
