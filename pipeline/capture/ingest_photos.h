@@ -37,13 +37,13 @@ struct IngestResult {
   std::string fingerprint;
 };
 
-// Photos of `folder` and its subfolders, told by content, as `staging_folder`/00000.png, ... in
-// natural order of names: with 16 bits a channel where the file has more than 8, else with 8. A
-// photo with alpha is composited on white; its alpha is written as 00007.alpha.png. Files that
-// are no photo, damaged, or the same picture (in 8 bits) as an earlier one are left out, with a
-// status that says why. Staged files of an earlier call that are not of this one are deleted;
-// those that already hold the right pixels are not written again. Three photos are in memory at
-// a time. Throws Error(kInput) when there is no usable photo, Error(kScene) for 1
+// Photos of `folder` and its subfolders, recognized by content, as `staging_folder`/00000.png,
+// ... in natural order of names: with 16 bits a channel where the file has more than 8, else
+// with 8. A photo with alpha is composited on white; its alpha is written as 00007.alpha.png.
+// Files that are no photo, damaged, or the same picture (in 8 bits) as an earlier one are left
+// out, with a status that says why. Staged files of an earlier call that are not of this one
+// are deleted; those that already hold the right pixels are not written again. Three photos are
+// in memory at a time. Throws Error(kInput) when there is no usable photo, Error(kScene) for 1
 // or 2, Error(kResources) when a disk fails, Interrupted.
 IngestResult IngestPhotos(const std::string& folder, const std::string& staging_folder,
                           const IngestOptions& options, const ProgressFunction& progress);

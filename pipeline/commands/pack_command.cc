@@ -1,5 +1,4 @@
-// regrade pack: a posed capture in one file, for `regrade_gpu` on a machine that has nothing
-// else.
+// regrade pack: writes a posed capture as one file, for `regrade_gpu` on bare GPU machines.
 #include <algorithm>
 #include <filesystem>
 
