@@ -143,7 +143,7 @@ TEST(PhotoMasks, LaterStagesAndRunsUseTheStagedMasks) {
     networks[k] = Bytes(out + "/network.npz");
     psnr[k] = ReadJsonFile(out + "/report.json")
                   .At("stages")
-                  .At("stylize")
+                  .At("evaluate")
                   .At("psnr_to_2d_photos_db")
                   .AsDouble();
   }

@@ -143,7 +143,8 @@ TEST(Workspace, RecordsOfOtherFormatsAreRefused) {
   EXPECT_REGRADE_ERROR(workspace.Find("pose"), ExitCode::kInput, "written by regrade 7.0");
   EXPECT_REGRADE_ERROR(workspace.Find("pose"), ExitCode::kInput, "update regrade");
   WriteText(path, R"({"schema": 1, "regrade": "0.1.0"})");
-  EXPECT_REGRADE_ERROR(workspace.Find("pose"), ExitCode::kInput, "in format 1; this is");
+  EXPECT_REGRADE_ERROR(workspace.Find("pose"), ExitCode::kInput,
+                       "made by an older regrade (schema 1)");
   EXPECT_REGRADE_ERROR(workspace.Find("pose"), ExitCode::kInput, "--out");
 }
 
