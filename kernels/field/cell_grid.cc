@@ -72,14 +72,15 @@ void BuildTree(const Vec3i& voxels, CellGrid* grid) {
   const auto entry = [&](int level, CellKey key) -> int32_t& {
     if (level == 0) return grid->top[top_index(key)];
     const auto& parents = nodes[static_cast<size_t>(level) - 1];
-    const auto parent = std::lower_bound(parents.begin(), parents.end(), key >> 3) - parents.begin();
+    const auto parent =
+        std::lower_bound(parents.begin(), parents.end(), key >> 3) - parents.begin();
     return grid->nodes[8 * (first[static_cast<size_t>(level) - 1] + parent) +
                        static_cast<int64_t>(key & 7)];
   };
   for (int level = 0; level < finest; ++level)
     for (size_t i = 0; i < nodes[static_cast<size_t>(level)].size(); ++i)
-      entry(level, nodes[static_cast<size_t>(level)][i]) =
-          EntryOfNode(static_cast<int32_t>(first[static_cast<size_t>(level)] + static_cast<int64_t>(i)));
+      entry(level, nodes[static_cast<size_t>(level)][i]) = EntryOfNode(
+          static_cast<int32_t>(first[static_cast<size_t>(level)] + static_cast<int64_t>(i)));
   for (int64_t c = 0; c < grid->num_cells(); ++c)
     entry(grid->level[c], Ancestor(*grid, c, grid->level[c])) = static_cast<int32_t>(c);
 }

@@ -1,8 +1,8 @@
 // The cells of an adaptive field: leaves of an octree, with values at their corners.
 //
-// Leaves of any levels may be neighbours. A vertex is a place, whatever cells have it as a corner: cells of two levels
-// share the values at the places that both have as corners. A finer cell's corner in the middle of a coarser cell's face
-// is a vertex of its own.
+// Leaves of any levels may be neighbours. A vertex is a place, whatever cells have it as a
+// corner: cells of two levels share the values at the places that both have as corners. A finer
+// cell's corner in the middle of a coarser cell's face is a vertex of its own.
 #pragma once
 
 #include <cstdint>
@@ -35,8 +35,8 @@ struct CellGrid {
   int64_t num_vertices() const { return vertex_key.size(); }
 };
 
-// Finds the vertices and the tree of cells that have keys and levels, in order. `voxels`: those of the box along each
-// axis, multiples of 2^finest.
+// Finds the vertices and the tree of cells that have keys and levels, in order. `voxels`: those
+// of the box along each axis, multiples of 2^finest.
 void FindVertices(CellGrid* grid);
 void BuildTree(const Vec3i& voxels, CellGrid* grid);
 
@@ -54,16 +54,19 @@ struct CellsView {
 };
 CellsView ViewOf(const CellGrid& grid, const Vec3i& voxels);
 
-// What is at the voxel `at`: the cell or kNoCell, and the width in voxels of the cell, or of the largest empty cube of
-// the tree there.
+// What is at the voxel `at`: the cell or kNoCell, and the width in voxels of the cell, or of
+// the largest empty cube of the tree there.
 HD inline int32_t CellAt(const CellsView& cells, const Vec3i& at, int* width) {
   int shift = cells.finest;
-  int32_t entry = cells.top[((at.x >> shift) * cells.top_size.y + (at.y >> shift)) * cells.top_size.z +
-                            (at.z >> shift)];
+  int32_t entry =
+      cells.top[((at.x >> shift) * cells.top_size.y + (at.y >> shift)) * cells.top_size.z +
+                (at.z >> shift)];
   while (IsNode(entry)) {
     --shift;
-    entry = cells.nodes[int64_t{NodeOf(entry)} * 8 + ((at.x >> shift & 1) << 2 | (at.y >> shift & 1) << 1 |
-                                                      (at.z >> shift & 1))];
+    entry =
+        cells
+            .nodes[int64_t{NodeOf(entry)} * 8 +
+                   ((at.x >> shift & 1) << 2 | (at.y >> shift & 1) << 1 | (at.z >> shift & 1))];
   }
   *width = 1 << shift;
   return entry;

@@ -1,9 +1,10 @@
 // Where the cells of an adaptive field lie: levels of halved cells over one box.
 //
-// EQ(cell-lattice): the box of a frame with N_a voxels along axis a is divided into N_a / 2^L cells of level 0; a cell
-// of level l is 2^(L - l) voxels wide and has eight children of level l + 1. Positions in voxels count from the box's
-// corner; a vertex has integer ones, 0 to N_a. Sums along rays use positions that count from the box's centre: there
-// floats are finest, and cameras look there.
+// EQ(cell-lattice): the box of a frame with N_a voxels along axis a is divided into N_a / 2^L
+// cells of level 0; a cell of level l is 2^(L - l) voxels wide and has eight children of level
+// l + 1. Positions in voxels count from the box's corner; a vertex has integer ones, 0 to N_a.
+// Sums along rays use positions that count from the box's centre: there floats are finest, and
+// cameras look there.
 #pragma once
 
 #include <cstdint>
@@ -14,10 +15,12 @@
 namespace regrade {
 
 inline constexpr int kMaxCellLevel = 16;
-inline constexpr int kMaxLattice = 1 << 20;  // voxels along an axis: three positions of 21 bits fit in a key
+inline constexpr int kMaxLattice =
+    1 << 20;  // voxels along an axis: three positions of 21 bits fit in a key
 
-// A key interleaves the bits of a position, x highest: cells and vertices in the order of their keys follow Morton's
-// curve, so that neighbours are near in memory, and the bits above 3 (L - l) name the ancestor of level l.
+// A key interleaves the bits of a position, x highest: cells and vertices in the order of their
+// keys follow Morton's curve, so that neighbours are near in memory, and the bits above 3 (L -
+// l) name the ancestor of level l.
 using CellKey = uint64_t;
 
 HD inline CellKey SpreadBits(uint64_t x) {

@@ -1,8 +1,9 @@
 // Total variation of an adaptive field, value and gradient: the plain specification.
 //
-// EQ(cell-variation): TV = sum over cells of sqrt(1e-9 + sum_a d_a^2), separately for each value; d_a is the mean of the
-// four differences along axis a between the cell's corners. A density counts in optical depth: times the cell's width in
-// world units. A cell knows nothing of its neighbours, so the sum has no faces between levels.
+// EQ(cell-variation): TV = sum over cells of sqrt(1e-9 + sum_a d_a^2), separately for each
+// value; d_a is the mean of the four differences along axis a between the cell's corners. A
+// density counts in optical depth: times the cell's width in world units. A cell knows nothing
+// of its neighbours, so the sum has no faces between levels.
 #pragma once
 
 #include <cmath>
@@ -19,11 +20,12 @@ HD inline float WorldWidth(const GridFrame& frame, int voxels) {
   return static_cast<float>(voxels) / std::cbrt(scale.x * scale.y * scale.z);
 }
 
-// values [V, stride]: the value at `index` of each vertex, times `unit` [levels] of the cell's level. Adds scale *
-// gradient to d_values if it is not null; returns the unscaled sum over cells [begin, end).
+// values [V, stride]: the value at `index` of each vertex, times `unit` [levels] of the cell's
+// level. Adds scale * gradient to d_values if it is not null; returns the unscaled sum over
+// cells [begin, end).
 template <typename T>
-T CellVariation(const CellsView& cells, const T* values, int stride, int index, const T* unit, int64_t begin,
-                int64_t end, T scale, T* d_values) {
+T CellVariation(const CellsView& cells, const T* values, int stride, int index, const T* unit,
+                int64_t begin, int64_t end, T scale, T* d_values) {
   T sum = 0;
   for (int64_t c = begin; c < end; ++c) {
     const int32_t* corner = cells.corner + 8 * c;

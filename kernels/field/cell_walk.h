@@ -1,9 +1,10 @@
 // A ray's way through the cells of an adaptive field.
 //
-// EQ(cell-march): a ray crosses each cell in one interval, between the planes of the cell's faces; its sample is at the
-// interval's middle, and the interval's length is delta in EQ(composite). The intervals of all cells and empty cubes
-// join without gap or overlap, for the next cube is found by its integer position, never by a rounded one: the plane
-// that ends an interval begins the next. Their lengths sum to the ray's length in the box.
+// EQ(cell-march): a ray crosses each cell in one interval, between the planes of the cell's
+// faces; its sample is at the interval's middle, and the interval's length is delta in
+// EQ(composite). The intervals of all cells and empty cubes join without gap or overlap, for
+// the next cube is found by its integer position, never by a rounded one: the plane that ends
+// an interval begins the next. Their lengths sum to the ray's length in the box.
 #pragma once
 
 #include <cmath>
@@ -24,11 +25,12 @@ struct CellSample {
   T delta;           // length of the interval, world units
 };
 
-// Calls body(sample) front to back for each cell and empty cube on the ray beyond near_clip (world units); it returns
-// false to end the ray. A ray with a zero or non-finite direction or origin has no samples.
+// Calls body(sample) front to back for each cell and empty cube on the ray beyond near_clip
+// (world units); it returns false to end the ray. A ray with a zero or non-finite direction or
+// origin has no samples.
 template <typename T, typename Body>
-HD void WalkCells(const GridFrame& frame, const CellsView& cells, const RayT<T>& ray, T near_clip,
-                  const Body& body) {
+HD void WalkCells(const GridFrame& frame, const CellsView& cells, const RayT<T>& ray,
+                  T near_clip, const Body& body) {
   using std::floor;
   if (!AllFinite(ray.origin) || !AllFinite(ray.direction)) return;
   const Vec3f scale = frame.Scale();
@@ -56,8 +58,9 @@ HD void WalkCells(const GridFrame& frame, const CellsView& cells, const RayT<T>&
   const auto voxel_at = [&](int a, T t, int low, int width) {
     const T from_corner = floor(origin[a] + direction[a] * t) + T(frame.resolution[a] / 2);
     const int highest = low + width - 1;
-    return from_corner >= T(low) ? (from_corner <= T(highest) ? static_cast<int>(from_corner) : highest)
-                                 : low;
+    return from_corner >= T(low)
+               ? (from_corner <= T(highest) ? static_cast<int>(from_corner) : highest)
+               : low;
   };
   Vec3i at;
   for (int a = 0; a < 3; ++a) at[a] = voxel_at(a, begin, 0, frame.resolution[a]);
@@ -78,8 +81,9 @@ HD void WalkCells(const GridFrame& frame, const CellsView& cells, const RayT<T>&
     sample.delta = next - t;
     sample.t = t + sample.delta / 2;
     for (int a = 0; a < 3; ++a) {
-      const T inside = (origin[a] + direction[a] * sample.t - T(low[a] - frame.resolution[a] / 2)) /
-                       T(sample.width);
+      const T inside =
+          (origin[a] + direction[a] * sample.t - T(low[a] - frame.resolution[a] / 2)) /
+          T(sample.width);
       sample.fraction[a] = inside >= 0 ? (inside <= 1 ? inside : T(1)) : T(0);
     }
     if (!body(sample) || axis < 0 || !(next < end)) return;

@@ -6,13 +6,16 @@
 
 namespace regrade {
 
-CellGrid ChangeCells(const CellGrid& old, const Vec3i& voxels, const std::vector<CellChange>& change,
+CellGrid ChangeCells(const CellGrid& old, const Vec3i& voxels,
+                     const std::vector<CellChange>& change,
                      std::vector<VertexSource>* sources) {
   CellGrid grid;
   grid.finest = old.finest;
   const auto children = [&](int64_t c) {
     const CellChange what = change[static_cast<size_t>(c)];
-    return what == CellChange::kRemove ? 0 : what == CellChange::kSplit && old.level[c] < old.finest ? 8 : 1;
+    return what == CellChange::kRemove                               ? 0
+           : what == CellChange::kSplit && old.level[c] < old.finest ? 8
+                                                                     : 1;
   };
   int64_t count = 0;
   for (int64_t c = 0; c < old.num_cells(); ++c) count += children(c);
@@ -40,8 +43,9 @@ CellGrid ChangeCells(const CellGrid& old, const Vec3i& voxels, const std::vector
   return grid;
 }
 
-void MoveValues(const CellGrid& from, const CellGrid& to, const std::vector<VertexSource>& sources,
-                const float* values, int lanes, float* out) {
+void MoveValues(const CellGrid& from, const CellGrid& to,
+                const std::vector<VertexSource>& sources, const float* values, int lanes,
+                float* out) {
 #pragma omp parallel for schedule(static)
   for (int64_t v = 0; v < to.num_vertices(); ++v) {
     const VertexSource& source = sources[static_cast<size_t>(v)];

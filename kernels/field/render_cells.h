@@ -1,4 +1,5 @@
-// One ray through an adaptive field, forward and adjoint: the plain specification. See EQ(cell-march), EQ(composite).
+// One ray through an adaptive field, forward and adjoint: the plain specification. See
+// EQ(cell-march), EQ(composite).
 #pragma once
 
 #include <vector>
@@ -11,10 +12,11 @@
 
 namespace regrade {
 
-// The trilinear blend of the values [V, stride] at a cell's corners; EQ(trilinear) without empty corners.
+// The trilinear blend of the values [V, stride] at a cell's corners; EQ(trilinear) without
+// empty corners.
 template <typename T>
-HD void InterpolateInCell(const CellsView& cells, const CellSample<T>& sample, const T* values, int stride,
-                          int channels, T* out) {
+HD void InterpolateInCell(const CellsView& cells, const CellSample<T>& sample, const T* values,
+                          int stride, int channels, T* out) {
   for (int c = 0; c < channels; ++c) out[c] = T(0);
   for (int k = 0; k < 8; ++k) {
     const T* v = values + int64_t{cells.corner[8 * int64_t{sample.cell} + k]} * stride;
@@ -24,8 +26,9 @@ HD void InterpolateInCell(const CellsView& cells, const CellSample<T>& sample, c
 }
 
 template <typename T, typename Add>
-HD void InterpolateInCellAdjoint(const CellsView& cells, const CellSample<T>& sample, int stride, int channels,
-                                 const T* d_out, T* d_values, const Add& add) {
+HD void InterpolateInCellAdjoint(const CellsView& cells, const CellSample<T>& sample,
+                                 int stride, int channels, const T* d_out, T* d_values,
+                                 const Add& add) {
   for (int k = 0; k < 8; ++k) {
     T* d_v = d_values + int64_t{cells.corner[8 * int64_t{sample.cell} + k]} * stride;
     const T w = CornerWeight(sample.fraction, k);
@@ -40,11 +43,11 @@ struct CompositedCell {
   T density, tau, transmittance_before;
 };
 
-// The samples of a ray that composite, front to back, up to the one that leaves less than `stop`; returns the
-// transmittance behind them.
+// The samples of a ray that composite, front to back, up to the one that leaves less than
+// `stop`; returns the transmittance behind them.
 template <typename T>
-T MarchCells(const GridFrame& frame, const CellsView& cells, const T* density, const RayT<T>& ray, T near_clip,
-             T stop, std::vector<CompositedCell<T>>* samples) {
+T MarchCells(const GridFrame& frame, const CellsView& cells, const T* density,
+             const RayT<T>& ray, T near_clip, T stop, std::vector<CompositedCell<T>>* samples) {
   samples->clear();
   T depth = 0, transmittance = 1;
   WalkCells(frame, cells, ray, near_clip, [&](const CellSample<T>& place) {
@@ -80,10 +83,11 @@ Vec3<T> ClampedColor(const Vec3<T>& raw) {
   return {raw.x > 0 ? raw.x : T(0), raw.y > 0 ? raw.y : T(0), raw.z > 0 ? raw.z : T(0)};
 }
 
-// Colour and depth of the composited samples, without what is behind them; depth is sum w t in world units.
+// Colour and depth of the composited samples, without what is behind them; depth is sum w t in
+// world units.
 template <typename T>
-Vec3<T> ShadeCells(const FieldView<T>& field, const RayT<T>& ray, const std::vector<CompositedCell<T>>& samples,
-                   T* depth) {
+Vec3<T> ShadeCells(const FieldView<T>& field, const RayT<T>& ray,
+                   const std::vector<CompositedCell<T>>& samples, T* depth) {
   T gamma[kMaxBasis];
   ShBasis(field.basis, ray.direction, gamma);
   Vec3<T> color{};
@@ -96,11 +100,12 @@ Vec3<T> ShadeCells(const FieldView<T>& field, const RayT<T>& ray, const std::vec
   return color;
 }
 
-// Adds dL/d(density) and dL/d(sh) for dL/dC = d_color; `behind` is the radiance behind the samples. See
-// EQ(composite-adjoint).
+// Adds dL/d(density) and dL/d(sh) for dL/dC = d_color; `behind` is the radiance behind the
+// samples. See EQ(composite-adjoint).
 template <typename T, typename Add>
-void ShadeCellsAdjoint(const FieldView<T>& field, const RayT<T>& ray, const std::vector<CompositedCell<T>>& samples,
-                       Vec3<T> behind, const Vec3<T>& d_color, T* d_density, T* d_sh, const Add& add) {
+void ShadeCellsAdjoint(const FieldView<T>& field, const RayT<T>& ray,
+                       const std::vector<CompositedCell<T>>& samples, Vec3<T> behind,
+                       const Vec3<T>& d_color, T* d_density, T* d_sh, const Add& add) {
   T gamma[kMaxBasis];
   ShBasis(field.basis, ray.direction, gamma);
   const int stride = 3 * field.basis;
@@ -109,9 +114,10 @@ void ShadeCellsAdjoint(const FieldView<T>& field, const RayT<T>& ray, const std:
     const T delta = s.place.delta;
     const Vec3<T> raw = RawColorInCell(field, s.place, gamma);
     const T w = s.transmittance_before * Opacity(s.tau);
-    T d_sigma = CompositeAdjoint(delta, s.tau, s.transmittance_before * std::exp(-s.tau), ClampedColor(raw), d_color,
-                                 &behind);
-    if (!(s.density < T(kMaxDensity)) || !(s.density * delta < T(kMaxOpticalDepth))) d_sigma = 0;
+    T d_sigma = CompositeAdjoint(delta, s.tau, s.transmittance_before * std::exp(-s.tau),
+                                 ClampedColor(raw), d_color, &behind);
+    if (!(s.density < T(kMaxDensity)) || !(s.density * delta < T(kMaxOpticalDepth)))
+      d_sigma = 0;
     T d_sample[3 * kMaxBasis];
     for (int c = 0; c < 3; ++c)
       for (int k = 0; k < field.basis; ++k)  // subgradient 0 of the clamp

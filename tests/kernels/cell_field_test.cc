@@ -1,4 +1,6 @@
 // Adaptive fields: the tree, the walk of rays through it, and the changes of cells.
+#include "tests/support/cell_field.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -11,7 +13,6 @@
 #include "kernels/field/packed_grid.h"
 #include "kernels/field/refine_cells.h"
 #include "kernels/field/render_ray.h"
-#include "tests/support/cell_field.h"
 #include "tests/support/double_field.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/record_error.h"
@@ -61,11 +62,13 @@ T WalkedLength(const GridFrame& frame, const CellsView& cells, const RayT<T>& ra
 }
 
 TEST(CellLattice, KeysKeepPlacesAndOrder) {
-  const Vec3i places[] = {{0, 0, 0}, {1, 2, 3}, {1 << 20, 0, 1 << 20}, {12345, 999999, 1048576}};
+  const Vec3i places[] = {
+      {0, 0, 0}, {1, 2, 3}, {1 << 20, 0, 1 << 20}, {12345, 999999, 1048576}};
   for (const Vec3i& at : places) EXPECT_EQ(PlaceOf(KeyOf(at)), at);
   // The eight children of a cell follow it in the order of their corners' numbers.
   for (int k = 0; k < 8; ++k)
-    EXPECT_EQ(KeyOf(CornerOf({8, 16, 24}, 4, k)), KeyOf({8, 16, 24}) + (static_cast<CellKey>(k) << 6));
+    EXPECT_EQ(KeyOf(CornerOf({8, 16, 24}, 4, k)),
+              KeyOf({8, 16, 24}) + (static_cast<CellKey>(k) << 6));
 }
 
 TEST(CellGrid, EveryVoxelIsFoundInItsCell) {
@@ -87,16 +90,19 @@ TEST(CellGrid, EveryVoxelIsFoundInItsCell) {
       }
   EXPECT_EQ(widths.size(), 4u);  // all levels occur
   int64_t volume = 0;
-  for (int64_t c = 0; c < grid.num_cells(); ++c) volume += int64_t{1} << (3 * (grid.finest - grid.level[c]));
+  for (int64_t c = 0; c < grid.num_cells(); ++c)
+    volume += int64_t{1} << (3 * (grid.finest - grid.level[c]));
   EXPECT_EQ(covered, volume);
   // A vertex is a place: cells of two levels share those that both have as corners.
   for (int64_t i = 0; i < grid.corner.size(); ++i)
     EXPECT_EQ(PlaceOf(grid.vertex_key[grid.corner[i]]),
-              CornerOf(PlaceOf(grid.key[i / 8]), 1 << (grid.finest - grid.level[i / 8]), static_cast<int>(i % 8)));
+              CornerOf(PlaceOf(grid.key[i / 8]), 1 << (grid.finest - grid.level[i / 8]),
+                       static_cast<int>(i % 8)));
 }
 
-// The intervals' sum is the length in the box: in double to rounding, and in float to a few units in the last place of
-// the box's size, at every depth of the tree. Rays include those in a face, along an edge, and through corners.
+// The intervals' sum is the length in the box: in double to rounding, and in float to a few
+// units in the last place of the box's size, at every depth of the tree. Rays include those in
+// a face, along an edge, and through corners.
 TEST(CellWalk, H162_NoLengthIsCountedTwiceOrLeftOutSixteenLevelsDeep) {
   for (const int finest : {0, 1, 4, 16}) {
     CellGrid grid = TopCells({2, 2, 2}, finest);
@@ -108,23 +114,27 @@ TEST(CellWalk, H162_NoLengthIsCountedTwiceOrLeftOutSixteenLevelsDeep) {
             PlaceOf(grid.key[c]).x + (1 << (finest - grid.level[c])) > voxels.x / 3 &&
             PlaceOf(grid.key[c]).y <= voxels.y / 2 &&
             PlaceOf(grid.key[c]).y + (1 << (finest - grid.level[c])) > voxels.y / 2)
-          change[static_cast<size_t>(c)] = grid.num_cells() < 40000 ? CellChange::kSplit : CellChange::kKeep;
+          change[static_cast<size_t>(c)] =
+              grid.num_cells() < 40000 ? CellChange::kSplit : CellChange::kKeep;
       std::vector<VertexSource> sources;
       grid = ChangeCells(grid, voxels, change, &sources);
     }
     const GridFrame frame{voxels, {0.1f, -0.2f, 0.05f}, {1.0f, 1.0f, 1.0f}};
     const CellsView cells = ViewOf(grid, voxels);
     std::vector<Ray> rays = RandomRays(200, 7);
-    rays.push_back({{-3, -0.2f, 0.05f}, {1, 0, 0}});            // along an edge of level 0
-    rays.push_back({{0.1f, -3, 0.3f}, {0, 1, 0}});              // in a face
-    rays.push_back({{-0.9f, -1.2f, -0.95f}, Normalized(Vec3f{1, 1, 1})});  // through the corners
+    rays.push_back({{-3, -0.2f, 0.05f}, {1, 0, 0}});  // along an edge of level 0
+    rays.push_back({{0.1f, -3, 0.3f}, {0, 1, 0}});    // in a face
+    rays.push_back(
+        {{-0.9f, -1.2f, -0.95f}, Normalized(Vec3f{1, 1, 1})});  // through the corners
     int widths = 0;
     for (const Ray& ray : rays) {
       const RayT<double> exact = ToDouble(ray);
       const double length = LengthInBox(frame, exact, 0.01);
       EXPECT_NEAR(WalkedLength<double>(frame, cells, exact, 0.01), length,
-                  testing::RecordDigits("length of a ray in cells", testing::Computed::kDouble, 1e-12, length, length));
-      EXPECT_NEAR(WalkedLength<float>(frame, cells, ray, 0.01f, &widths), length, 4e-6 * (1 + length));
+                  testing::RecordDigits("length of a ray in cells", testing::Computed::kDouble,
+                                        1e-12, length, length));
+      EXPECT_NEAR(WalkedLength<float>(frame, cells, ray, 0.01f, &widths), length,
+                  4e-6 * (1 + length));
     }
     if (finest == 4) {
       EXPECT_EQ(widths, 31);  // the rays cross cells of every level
@@ -136,8 +146,9 @@ TEST(CellWalk, RaysThatMissOrAreInvalidHaveNoSamples) {
   const RadianceField field = RandomCellField({2, 2, 2}, 2, 1, 3);
   const CellsView cells = ViewOf(field.geometry->cells, VoxelsOf(field));
   const float nan = std::numeric_limits<float>::quiet_NaN();
-  for (const Ray& ray : {Ray{{5, 5, 5}, {1, 0, 0}}, Ray{{0, 0, 0}, {0, 0, 0}}, Ray{{nan, 0, 0}, {1, 0, 0}},
-                         Ray{{0, 0, 0}, {0, nan, 0}}, Ray{{-5, 0, 0}, {-1, 0, 0}}})
+  for (const Ray& ray :
+       {Ray{{5, 5, 5}, {1, 0, 0}}, Ray{{0, 0, 0}, {0, 0, 0}}, Ray{{nan, 0, 0}, {1, 0, 0}},
+        Ray{{0, 0, 0}, {0, nan, 0}}, Ray{{-5, 0, 0}, {-1, 0, 0}}})
     WalkCells(field.geometry->frame, cells, ray, 0.0f, [](const CellSample<float>&) {
       ADD_FAILURE();
       return true;
@@ -169,14 +180,16 @@ TEST(CellRender, H163_AConstantFieldIsTheSameOnMixedLevels) {
   }
 }
 
-// A cell wholly inside of a constant medium: delta is the interval's length, and the sample is at its middle.
+// A cell wholly inside of a constant medium: delta is the interval's length, and the sample is
+// at its middle.
 TEST(CellRender, OneCellIsOneInterval) {
   RadianceField field = CellField(TopCells({1, 1, 1}, 0), {2, 2, 2}, 1, 1);
   auto geometry = std::make_shared<Geometry>(*field.geometry);
   geometry->frame = {{1, 1, 1}, {0, 0, 0}, {1, 1, 1}};
   std::fill(geometry->density.begin(), geometry->density.end(), 0.7f);
   field.geometry = geometry;
-  const auto result = RenderRay(DoubleField(field).view(), RayT<double>{{-5, 0, 0}, {1, 0, 0}}, {0.5f, 0});
+  const auto result =
+      RenderRay(DoubleField(field).view(), RayT<double>{{-5, 0, 0}, {1, 0, 0}}, {0.5f, 0});
   EXPECT_NEAR(result.transmittance, std::exp(-2.0 * double{0.7f}), 1e-12);
   EXPECT_NEAR(result.depth, 5 * (1 - result.transmittance), 1e-11);
 }

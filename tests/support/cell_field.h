@@ -29,15 +29,19 @@ inline CellGrid TopCells(const Vec3i& top, int finest) {
   return grid;
 }
 
-// Cells of all levels in random places; a fraction `removed` of them is taken out after each split.
+// Cells of all levels in random places; a fraction `removed` of them is taken out after each
+// split.
 inline CellGrid RandomCells(const Vec3i& top, int finest, double removed, uint64_t seed) {
   CellGrid grid = TopCells(top, finest);
   const Vec3i voxels{top.x << finest, top.y << finest, top.z << finest};
   for (int level = 0; level < finest; ++level) {
     std::vector<CellChange> change;
     for (int64_t c = 0; c < grid.num_cells(); ++c) {
-      const double u = RandomDouble(seed, static_cast<uint64_t>(level), static_cast<uint64_t>(c));
-      change.push_back(u < removed ? CellChange::kRemove : u < 0.5 ? CellChange::kSplit : CellChange::kKeep);
+      const double u =
+          RandomDouble(seed, static_cast<uint64_t>(level), static_cast<uint64_t>(c));
+      change.push_back(u < removed ? CellChange::kRemove
+                       : u < 0.5   ? CellChange::kSplit
+                                   : CellChange::kKeep);
     }
     std::vector<VertexSource> sources;
     grid = ChangeCells(grid, voxels, change, &sources);
@@ -56,17 +60,19 @@ inline RadianceField CellField(CellGrid cells, const Vec3i& voxels, int basis, u
   field.appearance.basis = basis;
   field.appearance.sh.Resize(n * field.appearance.stride());
   for (int64_t i = 0; i < n; ++i)
-    geometry->density[i] = static_cast<float>(Uniform(seed, static_cast<uint64_t>(i), -2.0, 10.0));
+    geometry->density[i] =
+        static_cast<float>(Uniform(seed, static_cast<uint64_t>(i), -2.0, 10.0));
   for (int64_t i = 0; i < field.appearance.sh.size(); ++i)
-    field.appearance.sh[i] = static_cast<float>(Uniform(seed + 1, static_cast<uint64_t>(i), -0.6, 0.9));
+    field.appearance.sh[i] =
+        static_cast<float>(Uniform(seed + 1, static_cast<uint64_t>(i), -0.6, 0.9));
   field.geometry = std::move(geometry);
   field.background = {0.3f, 0.6f, 0.2f};
   return field;
 }
 
 inline RadianceField RandomCellField(const Vec3i& top, int finest, int basis, uint64_t seed) {
-  return CellField(RandomCells(top, finest, 0.15, seed), {top.x << finest, top.y << finest, top.z << finest}, basis,
-                   seed);
+  return CellField(RandomCells(top, finest, 0.15, seed),
+                   {top.x << finest, top.y << finest, top.z << finest}, basis, seed);
 }
 
 }  // namespace regrade::testing

@@ -1,7 +1,7 @@
 // Marches the density of an adaptive field along a ray; compiled once per instruction set.
 //
-// The walk from cell to cell is scalar. What it finds is collected kWide cells at a time, and their densities and
-// opacities are vectors, as in march_simd.h.
+// The walk from cell to cell is scalar. What it finds is collected kWide cells at a time, and
+// their densities and opacities are vectors, as in march_simd.h.
 #pragma once
 
 #include "kernels/field/cell_walk.h"
