@@ -57,7 +57,9 @@ struct RunOptions {
           .max = 1e6});
     bind("reproducible", reproducible,
          {.help = "gives the same bytes for any number of threads and any interruption, from "
-                  "finished poses on; slower"});
+                  "finished poses on; slower. --device auto then means the CPU; with --device "
+                  "cuda --fit-exact-sums and --style-exact-sums are on, and the bytes are those "
+                  "of this card and build"});
   }
 };
 
