@@ -8,9 +8,9 @@
 
 namespace regrade {
 
-// Order-independent sums: 64-bit integers in units of 2^-44. Gradients and colours are far below
-// the range of 1.3e5; a value that is not finite or beyond kExactLimit leaves a mark that no sum
-// reaches.
+// Order-independent sums: 64-bit integers in units of 2^-44. Gradients and colours are far
+// below the range of 1.3e5; a value that is not finite or beyond kExactLimit leaves a mark that
+// no sum reaches.
 inline constexpr float kExactUnit = 0x1p-44f, kExactLimit = 0x1p18f;
 inline constexpr long long kNotFinite = 1ll << 62;
 

@@ -1,7 +1,7 @@
-// See EQ(mlp). The adjoint is three kernels: the first runs each row forward and back and stores
-// every layer's input x_{l-1} and dL/d(A_l x_{l-1} + b_l); the second sums their outer products
-// over the rows, one block for a part of the rows and a layer; the third adds the parts in their
-// order.
+// See EQ(mlp). The adjoint is three kernels: the first runs each row forward and back and
+// stores every layer's input x_{l-1} and dL/d(A_l x_{l-1} + b_l); the second sums their outer
+// products over the rows, one block for a part of the rows and a layer; the third adds the
+// parts in their order.
 #include <algorithm>
 #include <vector>
 
@@ -110,7 +110,8 @@ __global__ void __launch_bounds__(kThreads)
 }
 
 // Blocks (x: part of the rows, y: layer) of four warps, each computing 16 outputs.
-constexpr int kOuterParts = 256, kOuterRows = 32, kOuterStride = kMlpHidden + 4, kOuterThreads = 128;
+constexpr int kOuterParts = 256, kOuterRows = 32, kOuterStride = kMlpHidden + 4,
+              kOuterThreads = 128;
 
 __device__ inline void StageRows(const float* from, int width, int64_t row, int64_t n,
                                  float* to) {
@@ -266,7 +267,8 @@ void DeviceMlp::ReserveAdjoint(int64_t n) {
   if (scratch_.size() < 2 * kept)
     scratch_ = DeviceBuffer<float>(2 * kept, "layer values of the style network");
   if (parts_.empty())
-    parts_ = DeviceBuffer<float>(kOuterParts * gradient_.size(), "parts of the style's gradient");
+    parts_ =
+        DeviceBuffer<float>(kOuterParts * gradient_.size(), "parts of the style's gradient");
 }
 
 void DeviceMlp::AddAdjoint(MlpPrecision precision, const float* input, const float* d_output,

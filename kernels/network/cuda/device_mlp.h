@@ -42,9 +42,9 @@ class DeviceMlp {
   int64_t ParameterOffset(size_t layer) const { return shape_.Offset(layer); }
 
  private:
-  FusedMlp shape_;                  // its weights are unused
-  DeviceBuffer<float> parameters_;  // in the layout of FusedMlp::Offset
-  DeviceBuffer<double> gradient_;   // the same
+  FusedMlp shape_;                       // its weights are unused
+  DeviceBuffer<float> parameters_;       // in the layout of FusedMlp::Offset
+  DeviceBuffer<double> gradient_;        // the same
   DeviceBuffer<float> scratch_, parts_;  // see device_mlp.cu
 };
 
