@@ -16,12 +16,14 @@ struct FitPackedOptions {
   std::string capture;  // packed
   std::string field;    // .npz to write; empty: none
   std::string device = "cuda";
+  bool reproducible = false;  // see RunOptions
 
   template <typename Bind>
   void Describe(Bind& bind) {
     bind("capture", capture, {.help = "a file of `regrade pack`"});
     bind("field", field, {.help = "the .npz file that the field is written to"});
     bind("device", device, {.help = "where arithmetic runs", .choices = "cpu|cuda"});
+    bind("reproducible", reproducible, {.help = "two fits give the same bytes"});
   }
 };
 
@@ -29,7 +31,10 @@ struct StylePackedOptions {
   std::string capture;  // packed with a style
   std::string field;    // .npz
   std::string frames;   // folder for pictures; empty: none
+  std::string styled;   // .npz to write; empty: none
+  std::string network;  // likewise
   std::string device = "cuda";
+  bool reproducible = false;  // see RunOptions
 
   template <typename Bind>
   void Describe(Bind& bind) {
@@ -37,7 +42,10 @@ struct StylePackedOptions {
     bind("field", field, {.help = "the .npz file that `regrade_gpu fit --field` wrote"});
     bind("frames", frames,
          {.help = "a folder for .ppm pictures of the held-out views before and after"});
+    bind("styled", styled, {.help = "the .npz file that the restyled field is written to"});
+    bind("network", network, {.help = "the .npz file that the network is written to"});
     bind("device", device, {.help = "where arithmetic runs", .choices = "cpu|cuda"});
+    bind("reproducible", reproducible, {.help = "two trainings give the same bytes"});
   }
 };
 
