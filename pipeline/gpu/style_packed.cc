@@ -101,6 +101,9 @@ void StylePacked(const StylePackedOptions& settings, const TrainNetworkOptions& 
   };
   const RestyledField restyled = Restyle(std::move(stored.field), targets, request, hooks);
   const TrainNetworkResult& trained = restyled.trained;
+  if (!settings.styled.empty())
+    WriteFieldFile(settings.styled,
+                   {restyled.styled, capture.scene.field_from_world, capture.scene.ndc});
   record["seconds_start_and_first_steps"] = seconds_start;
   record["seconds_other_steps"] = seconds_steps;
   if (on_device) MeasureFrames(restyled.styled, capture, settings.frames, &record);
