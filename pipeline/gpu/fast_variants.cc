@@ -1,6 +1,6 @@
-// regrade_gpu render --compare: the film's fast renderer and its variants against the exact one,
-// on all training views and along a film. Renderers take turns at each frame, so that they meet
-// the same clock and temperature of the card.
+// regrade_gpu render --compare: the film's fast renderer and its variants against the exact
+// one, on all training views and along a film. Renderers take turns at each frame, so that they
+// meet the same clock and temperature of the card.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -27,8 +27,8 @@ struct Variant {
   bool half;
   float stop, opacity_step;
   std::vector<double> views_db = {}, film_db = {};  // before rounding to 8 bits
-  std::vector<double> kernel_ms = {};  // from the camera to pixels on the device
-  std::vector<double> frame_ms = {};   // to pixels on the host
+  std::vector<double> kernel_ms = {};               // from the camera to pixels on the device
+  std::vector<double> frame_ms = {};                // to pixels on the host
 };
 
 // The first one is exact, the second one the film's.
