@@ -74,7 +74,7 @@ class Comparison {
       : grid_(grid), half_(MakeHalfGrid(grid)), step_(step), variants_(Variants()) {}
 
   void AddView(const Camera& camera) { Add(camera, &Variant::views_db, ""); }
-  // `picture`: the path of the frame's .ppm behind the renderer's name; empty: none.
+  // `folder`: for pictures exact/`picture` and fast/`picture`; empty: none.
   void AddFrame(const Camera& camera, const std::string& folder, const std::string& picture) {
     Add(camera, &Variant::film_db, folder.empty() ? "" : folder + "/", picture);
   }
@@ -139,8 +139,8 @@ class Comparison {
       (variants_[at].*errors)
           .push_back(std::min(kMostDb, Psnr(images[at], images[0]).value_or(kMostDb)));
     if (folder.empty()) return;
-    WritePpm(folder + "exact_" + picture, images[0]);
-    WritePpm(folder + "fast_" + picture, images[1]);
+    WritePpm(folder + "exact/" + picture, images[0]);
+    WritePpm(folder + "fast/" + picture, images[1]);
   }
 
   const DeviceGrid& grid_;
@@ -156,7 +156,9 @@ JsonValue CompareRenderers(const DeviceGrid& grid, const PackedCapture& capture,
                            const RenderPackedOptions& settings) {
   std::vector<Camera> cameras;  // half precision is for rays without distortion
   for (const PackedView& view : capture.views) cameras.push_back(view.camera.Undistorted());
-  if (!settings.frames.empty()) std::filesystem::create_directories(settings.frames);
+  if (!settings.frames.empty())
+    for (const char* renderer : {"/exact", "/fast"})
+      std::filesystem::create_directories(settings.frames + renderer);
   Comparison(grid, step).AddView(cameras[0]);  // the first frames of a process are slower
   Comparison comparison(grid, step);
   for (size_t i = 0; i < cameras.size(); ++i)
