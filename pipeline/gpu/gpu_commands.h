@@ -30,8 +30,8 @@ struct FitPackedOptions {
 struct StylePackedOptions {
   std::string capture;  // packed with a style
   std::string field;    // .npz
-  std::string frames;   // folder for pictures; empty: none
   std::string styled;   // .npz to write; empty: none
+  std::string frames;   // folder for pictures; empty: none
   std::string network;  // likewise
   std::string device = "cuda";
   bool reproducible = false;  // see RunOptions
@@ -40,9 +40,9 @@ struct StylePackedOptions {
   void Describe(Bind& bind) {
     bind("capture", capture, {.help = "a file of `regrade pack --style`"});
     bind("field", field, {.help = "the .npz file that `regrade_gpu fit --field` wrote"});
+    bind("styled", styled, {.help = "the .npz file that the restyled field is written to"});
     bind("frames", frames,
          {.help = "a folder for .ppm pictures of the held-out views before and after"});
-    bind("styled", styled, {.help = "the .npz file that the restyled field is written to"});
     bind("network", network, {.help = "the .npz file that the network is written to"});
     bind("device", device, {.help = "where arithmetic runs", .choices = "cpu|cuda"});
     bind("reproducible", reproducible, {.help = "two trainings give the same bytes"});
@@ -53,12 +53,21 @@ struct RenderPackedOptions {
   std::string capture;  // packed
   std::string field;    // .npz
   std::string frames;   // folder for pictures; empty: none
+  bool compare = false;
+  int path_frames = 24;
 
   template <typename Bind>
   void Describe(Bind& bind) {
     bind("capture", capture, {.help = "a file of `regrade pack`, for its held-out cameras"});
     bind("field", field, {.help = "an .npz file with svox2's layout"});
-    bind("frames", frames, {.help = "a folder for .ppm pictures of the held-out views"});
+    bind("frames", frames,
+         {.help = "a folder for .ppm pictures of the held-out views; with --compare, of the "
+                  "film by the exact and by the fast renderer"});
+    bind("compare", compare,
+         {.help = "compares the film's fast renderer and its variants with the exact one, on "
+                  "all training views and frames of a film"});
+    bind("path-frames", path_frames,
+         {.unit = "frames", .help = "length of the film to compare", .min = 2, .max = 10000});
   }
 };
 
@@ -75,6 +84,13 @@ JsonValue RenderCosts(const DeviceGrid& grid, const PackedCapture& capture, floa
 void RenderHeldOut(const DeviceGrid& grid, const PackedCapture& capture,
                    const MarchOptions& march, const std::string& folder,
                    const std::string& name);
+
+// Writes an 8-bit picture. Throws Error(kResources).
+void WritePpm(const std::string& path, const Image& image);
+
+// The film's fast renderer and its variants against the exact one (see fast_variants.cc).
+JsonValue CompareRenderers(const DeviceGrid& grid, const PackedCapture& capture, float step,
+                           const RenderPackedOptions& settings);
 
 // Prints one line of JSON: what frames of a field cost at which accuracy.
 void RenderPacked(const RenderPackedOptions& settings);

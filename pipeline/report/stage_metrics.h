@@ -198,6 +198,7 @@ struct RenderReport {
   int frames = 0;
   int path_frames = 0;  // of these, along the film's camera path
   FilmSize film;
+  std::string film_renderer;  // which renderer made the film, and why if it is the exact one
   Metric frames_per_second;
 
   template <typename Visit>
@@ -206,6 +207,7 @@ struct RenderReport {
     visit("frames", frames, {.label = "frames"});
     visit("path_frames", path_frames);
     visit("film", film);
+    visit("film_renderer", film_renderer, {.label = "renderer of the film", .optional = true});
     visit("frames_per_second", frames_per_second, {.label = "speed", .unit = "frames/s"});
   }
 };

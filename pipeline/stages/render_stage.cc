@@ -1,7 +1,8 @@
 // Stage "render": frames of the field before and after styling, and of the 2D method applied to
 // the former, at the photos' positions and along the film's camera path; and the films. Where
 // photos differ in size or lens, the frames at their positions are rendered again with one
-// common camera.
+// common camera. Frames along the film's path may come from the fast renderer; all others are
+// exact.
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -19,6 +20,7 @@
 #include "pipeline/program/ordered_worker.h"
 #include "pipeline/report/stage_metrics.h"
 #include "pipeline/run/run_context.h"
+#include "pipeline/stages/film_renderer.h"
 #include "pipeline/stages/make_stylizer.h"
 #include "pipeline/stages/object_edit.h"
 #include "pipeline/stages/stages.h"
@@ -36,6 +38,7 @@ struct FrameRenderers {
   std::unique_ptr<CoverageRenderer> object;  // null where the whole scene is styled
   std::vector<Image> coverage;               // of the current frame
   double styled_seconds = 0;                 // of rendering the restyled field
+  bool fast_film = false;                    // both renderers are prepared for it
 };
 
 // The frames of one camera.
@@ -94,11 +97,14 @@ std::string PlanOf(const std::vector<FrameSet>& sets) {
 
 // The scene as a camera of that gain records it.
 Frame RenderFrame(RunContext* context, FrameRenderers* renderers, const Camera& camera,
-                  const PhotoGain& gain, int index) {
+                  const PhotoGain& gain, int index, bool fast) {
+  const auto render = [&](const FieldRenderer& field) {
+    return fast ? field.RenderFast(camera) : field.Render(camera);
+  };
   Frame frame;
-  RenderedView plain = renderers->source.Render(camera);
+  RenderedView plain = render(renderers->source);
   const double begin = context->console->StageSeconds();
-  frame.styled = renderers->styled.Render(camera).color;
+  frame.styled = render(renderers->styled).color;
   renderers->styled_seconds += context->console->StageSeconds() - begin;
   frame.source = std::move(plain.color);
   frame.transmittance = std::move(plain.transmittance);
@@ -180,6 +186,11 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   if (const FrameSet* common = CommonSet(sets))
     context->console->Info(ComparisonNote(common->cameras[0]));
 
+  const std::string why_exact =
+      PrepareFilm(settings, backend, film.of_photos, &renderers.source, &renderers.styled);
+  renderers.fast_film = why_exact.empty();
+  context->console->Info("renderer of the film: " + FilmRendererText(why_exact));
+
   std::filesystem::remove_all(workspace.Path("frames"));
   StageOutcome outcome;
   outcome.outputs = {"frames"};
@@ -193,7 +204,8 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
         writer.Write(
             std::make_shared<const Frame>(RenderFrame(
                 context, &renderers, set.cameras[static_cast<size_t>(i)],
-                set.of_photos && settings.render.keep_exposure ? views.Gain(i) : kAsTaken, i)),
+                set.of_photos && settings.render.keep_exposure ? views.Gain(i) : kAsTaken, i,
+                renderers.fast_film && !set.of_photos)),
             set, i);
       }
     writer.Finish();
@@ -205,6 +217,7 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   report.frames = total;
   report.path_frames = film.of_photos ? 0 : static_cast<int>(film.cameras.size());
   report.film = {film.cameras[0].width, film.cameras[0].height};
+  report.film_renderer = FilmRendererText(why_exact);
   if (renderers.styled_seconds > 0) report.frames_per_second = total / renderers.styled_seconds;
   PutMetrics(report, &outcome.metrics);
   return outcome;
@@ -219,6 +232,7 @@ Stage RenderStage(RunContext* context) {
       {"field", context->ResultOf("reconstruct")},
       {"styled", context->ResultOf("stylize")},
       {"views_2d", context->ResultOf("style_2d")},
+      {"exact_film", WantsExactFilm(context->settings)},
       {"options", OptionValues(context->settings.scene, context->settings.render,
                                context->settings.style_2d)}};
   if (context->workspace->Find("pose")) {

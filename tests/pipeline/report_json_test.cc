@@ -91,7 +91,7 @@ RunReport FullReport() {
                                                 .heldout = {"a.jpg"}};
   report.stages.style_2d = Style2dReport{.time = {3, {}}, .method = "mkl", .views = 7};
   report.stages.stylize = MeasuredStyle();
-  report.stages.render = RenderReport{{5, {}}, "cpu", 60, 36, {640, 480}, 12};
+  report.stages.render = RenderReport{{5, {}}, "cpu", 60, 36, {640, 480}, "exact", 12};
   report.stages.evaluate = EvaluateReport{{6, {}}, "dis-medium", "lai2018", "", 25, 26};
   report.evaluation = MeasuredEvaluation();
   return report;
@@ -124,8 +124,8 @@ TEST(ReportJson, HasTheKeysOfSchema2InOrder) {
             "local_lipschitz_sampled", "local_lipschitz_max", "k_est", "local_lipschitz_of_map",
             "local_lipschitz_along_coefficients", "local_lipschitz_along_position",
             "bound_at_steps", "notices", "cpu_seconds"}));
-  EXPECT_EQ(KeysOf(stages.At("render")),
-            (Keys{"seconds", "device", "frames", "path_frames", "film", "frames_per_second"}));
+  EXPECT_EQ(KeysOf(stages.At("render")), (Keys{"seconds", "device", "frames", "path_frames",
+                                               "film", "film_renderer", "frames_per_second"}));
   EXPECT_EQ(
       KeysOf(stages.At("evaluate")),
       (Keys{"seconds", "flow", "mask", "psnr_to_2d_photos_db", "linear_map_psnr_to_2d_db"}));
