@@ -39,6 +39,8 @@ struct PoseStageReport {
   // Of COLMAP: its version, the strategy that succeeded, its camera model. Empty for given
   // poses.
   std::string colmap, strategy, lens;
+  std::vector<std::string> attempts;  // COLMAP's runs, each with its outcome
+  std::vector<std::string> notices;   // for the user: for example that the lens was simplified
   std::optional<int> photo_masks;
   int registered = 0;
   int64_t points = 0;
@@ -52,6 +54,8 @@ struct PoseStageReport {
     visit("colmap", colmap, {.label = "COLMAP", .optional = true});
     visit("strategy", strategy, {.label = "strategy", .optional = true});
     visit("lens", lens, {.label = "camera model", .optional = true});
+    visit("attempts", attempts, {.label = "attempts"});
+    visit("notices", notices);
     visit("photo_masks", photo_masks, {.label = "masks"});
     visit("registered", registered, {.label = "registered photos"});
     visit("points", points, {.label = "points"});

@@ -1,5 +1,6 @@
 // For each strategy: extracts, matches and maps with COLMAP and reads the models, until enough
-// photos are registered. Then refines and checks the best model, or refuses with a reason.
+// photos are registered. Then refines and checks the best model. Where its lens is implausible,
+// maps again with simpler lenses. Refuses with a reason.
 #include "reconstruct/colmap/poses_from_photos.h"
 
 #include <algorithm>
@@ -19,6 +20,7 @@
 #include "reconstruct/colmap/photo_statuses.h"
 #include "reconstruct/colmap/pose_weights.h"
 #include "reconstruct/colmap/refine_intrinsics.h"
+#include "reconstruct/colmap/simpler_lens.h"
 #include "reconstruct/scene/scene_checks.h"
 
 namespace regrade {
@@ -57,11 +59,15 @@ class PoseFinder {
     PrepareFolders();
     colmap_.emplace(options_.colmap, work_folder_ + "/logs");
     report_.colmap_version = colmap_->version();
-    const AttemptResult best = TryStrategies();
+    AttemptResult best = TryStrategies();
     if (best.models.empty())
       Refuse(WhyNoModel(best.evidence), photos_.size(), options_.min_photos);
-    const RefinedModel refined = Refine(best.models.front().model);
-    Capture capture = CaptureFromModel(refined.model, photos_);
+    RefinedModel refined;
+    Capture capture;
+    do {
+      refined = Refine(best);
+      capture = CaptureFromModel(refined.model, photos_);
+    } while (Simplify(AssessScene(capture, limits_).lens, &best));
     capture.models_found = static_cast<int>(best.models.size());
     ExplainUnregistered(best, photos_, &capture);
     Check(capture);
@@ -107,6 +113,9 @@ class PoseFinder {
       std::optional<AttemptResult> attempt;
       try {
         attempt = RunStrategy(strategy);
+        Record(*attempt);
+        while (!attempt->models.empty() && Simplify(attempt->models.front().lens, &*attempt)) {
+        }
       } catch (const Error& e) {
         // A later failure does not discard an earlier result.
         if (best.models.empty() || e.code() != ExitCode::kExternalProgram) throw;
@@ -114,7 +123,6 @@ class PoseFinder {
                                 "\" failed: " + e.what_failed());
         break;
       }
-      ++report_.attempts_made;
       const size_t before = Registered(best);
       const bool better =
           best.models.empty() || (!attempt->models.empty() &&
@@ -175,10 +183,8 @@ class PoseFinder {
     const std::string attempt_folder =
         strategy.keep_matches
             ? attempt_folder_
-            : work_folder_ + "/attempt_" + std::to_string(report_.attempts_made + 1);
-    const ColmapPaths paths = {photo_folder_, attempt_folder + "/database.db",
-                               attempt_folder + "/images.txt", attempt_folder + "/sparse",
-                               options_.mask_folder};
+            : work_folder_ + "/attempt_" + std::to_string(report_.attempts.size() + 1);
+    const ColmapPaths paths = PathsOf(attempt_folder);
     if (!strategy.keep_matches) {
       // COLMAP keeps existing entries of a database, even if they were made with other options.
       fs::remove_all(attempt_folder);
@@ -188,9 +194,69 @@ class PoseFinder {
       RunStage(MatchCommand(strategy), MatchArguments(strategy, threads_, paths), "matching",
                strategy.name, weights.match);
     }
-    fs::remove_all(paths.model);
-    fs::create_directories(paths.model);
-    return Map(strategy, paths, weights.map);
+    return Map(AttemptResult{strategy, LensFreedom::kFull, attempt_folder, {}, {}}, weights.map);
+  }
+
+  // Tries again with the next simpler lens that gives a model, if `why` says that the attempt's
+  // lens is implausible. False if the attempt remains as it is.
+  bool Simplify(const std::string& why, AttemptResult* attempt) {
+    if (why.empty()) return false;
+    lens_failures_.push_back(attempt->Name() + ": " + why);
+    for (int next = static_cast<int>(attempt->freedom) + 1;
+         next <= static_cast<int>(LensFreedom::kHeldFocal) && Now() <= deadline_; ++next) {
+      AttemptResult simpler = {
+          attempt->strategy, static_cast<LensFreedom>(next), attempt->folder, {}, {}};
+      const bool mapped_so = simpler.freedom == LensFreedom::kSquarePixels &&
+                             InfoOf(attempt->strategy.lens).focals == 1;
+      if (mapped_so && !attempt->models.front().lens.empty()) continue;  // the same again
+      report_.notes.push_back(
+          lens_failures_.back() + "; trying again with " +
+          (simpler.freedom == LensFreedom::kHeldFocal
+               ? "the focal length held at " + HeldFocalText(groups_)
+               : "one focal length for both directions"));
+      if (mapped_so) {
+        simpler.models = attempt->models;
+        simpler.evidence = attempt->evidence;
+      } else {
+        simpler = MapAgain(simpler);
+      }
+      Record(simpler);
+      if (!simpler.models.empty()) {
+        *attempt = std::move(simpler);
+        return true;
+      }
+      lens_failures_.push_back(simpler.Name() + ": no model");
+    }
+    return false;
+  }
+
+  // With the attempt's features and matches. Without models where COLMAP fails.
+  AttemptResult MapAgain(const AttemptResult& attempt) {
+    const PoseWeights weights = EstimateWeights(attempt.strategy, photos_, options_.image_size);
+    planned_ = spent_ + weights.map + weights.refine;
+    try {
+      return Map(attempt, weights.map);
+    } catch (const Error& e) {
+      if (e.code() != ExitCode::kExternalProgram) throw;
+      report_.notes.push_back("that failed: " + e.what_failed());
+      return attempt;
+    }
+  }
+
+  void Record(const AttemptResult& attempt) {
+    std::string outcome = "no model";
+    if (!attempt.models.empty()) {
+      const FoundModel& found = attempt.models.front();
+      outcome = std::to_string(found.model.images.size()) + " of " +
+                std::to_string(photos_.size()) + " photos" +
+                (found.refusal.empty() ? "" : "; " + found.refusal);
+    }
+    report_.attempts.push_back(attempt.Name() + ": " + outcome);
+  }
+
+  ColmapPaths PathsOf(const std::string& attempt_folder) const {
+    return {photo_folder_, attempt_folder + "/database.db", attempt_folder + "/images.txt",
+            attempt_folder + "/sparse", options_.mask_folder};
   }
 
   void Extract(const PoseStrategy& strategy, const CameraGroup& group, const ColmapPaths& paths,
@@ -209,15 +275,27 @@ class PoseFinder {
                   colmap_->log_folder(), "see its log");
   }
 
-  AttemptResult Map(const PoseStrategy& strategy, const ColmapPaths& paths, double weight) {
-    const ChildResult result = RunColmap(
-        "mapper", MapArguments(strategy, static_cast<int>(photos_.size()), threads_, paths),
-        "mapping", strategy.name, weight);
-    AttemptResult attempt{strategy.name, {}, output_.evidence()};
+  // The attempt with the models that are found with its lens.
+  AttemptResult Map(AttemptResult attempt, double weight) {
+    const ColmapPaths paths = PathsOf(attempt.folder);
+    ColmapArguments arguments = MapArguments(
+        attempt.strategy, static_cast<int>(photos_.size()), threads_, paths);
+    fs::remove_all(paths.model);
+    fs::create_directories(paths.model);
+    if (attempt.freedom != LensFreedom::kFull) {
+      const std::string start = attempt.folder + "/start", output = paths.model + "/0";
+      fs::create_directories(start);
+      fs::create_directories(output);
+      WriteColmapModel(StartOf(groups_, attempt.strategy, attempt.freedom), start);
+      MapFrom(start, output, attempt.freedom, &arguments);
+    }
+    const ChildResult result =
+        RunColmap("mapper", arguments, "mapping", attempt.Name(), weight);
+    attempt.evidence = output_.evidence();
     std::string damage;
     std::set<fs::path> folders;
     for (const auto& entry : fs::directory_iterator(paths.model))
-      if (entry.is_directory()) folders.insert(entry.path());
+      if (entry.is_directory() && !fs::is_empty(entry.path())) folders.insert(entry.path());
     for (const fs::path& folder : folders) {
       FoundModel found;
       try {
@@ -230,7 +308,9 @@ class PoseFinder {
       }
       SceneLimits lenient = limits_;
       lenient.min_views = 2;
-      found.refusal = AssessScene(found.capture, lenient).refusal;
+      const SceneAssessment assessment = AssessScene(found.capture, lenient);
+      found.refusal = assessment.refusal;
+      found.lens = assessment.lens;
       attempt.models.push_back(std::move(found));
     }
     std::stable_sort(attempt.models.begin(), attempt.models.end(),
@@ -288,13 +368,16 @@ class PoseFinder {
     }
   }
 
-  RefinedModel Refine(const ColmapModel& grown) {
+  RefinedModel Refine(const AttemptResult& attempt) {
     const double weight = planned_ - spent_;
     double done = spent_;
     const auto on_step = [&](int step, int steps) { done = spent_ + weight * step / steps; };
-    return RefineIntrinsics(*colmap_, grown, work_folder_,
-                            {std::max(60.0, deadline_ - Now()), 60 * options_.quiet_limit_min},
-                            on_step, [&] { return ReportAt(done, "adjusting"); });
+    RefinedModel refined = RefineIntrinsics(
+        *colmap_, attempt.models.front().model, attempt.freedom, work_folder_,
+        {std::max(60.0, deadline_ - Now()), 60 * options_.quiet_limit_min}, on_step,
+        [&] { return ReportAt(done, "adjusting"); });
+    spent_ = planned_;
+    return refined;
   }
 
   bool TooFewGiven() const { return static_cast<int>(photos_.size()) < options_.min_photos; }
@@ -304,8 +387,13 @@ class PoseFinder {
     SceneLimits limits = limits_;
     if (TooFewGiven()) limits.min_views = 0;  // RefuseTooFew has a better message
     const SceneAssessment assessment = AssessScene(capture, limits);
+    std::string tried;
+    if (!assessment.lens.empty())
+      for (const std::string& failure : lens_failures_) tried += "\n  " + failure;
+    if (!tried.empty()) tried = ". Simpler lenses were tried, too:" + tried;
     if (!assessment.refusal.empty())
-      Refuse({assessment.refusal, assessment.remedy}, photos_.size(), options_.min_photos);
+      Refuse({assessment.refusal + tried, assessment.remedy}, photos_.size(),
+             options_.min_photos);
     if (TooFewGiven()) RefuseTooFew(photos_.size(), options_.min_photos);
     if (capture.views.size() < options_.min_registered * static_cast<double>(photos_.size()))
       RefuseUnregistered(capture);
@@ -313,7 +401,11 @@ class PoseFinder {
   }
 
   void Describe(const AttemptResult& best, const RefinedModel& refined) const {
-    report_.strategy = best.strategy;
+    report_.strategy = best.Name();
+    if (best.freedom == LensFreedom::kHeldFocal)
+      report_.notes.push_back("the photos do not determine the lens: its focal length is held at " +
+                              HeldFocalText(groups_) +
+                              ", and the scene's depth is as wrong as that is");
     report_.lens = refined.lens;
     if (best.models.size() > 1) report_.notes.push_back(NoteOnOtherModels(best));
   }
@@ -334,6 +426,7 @@ class PoseFinder {
   ColmapOutput output_;
   std::optional<ColmapProgram> colmap_;
   std::string photo_folder_, attempt_folder_;
+  std::vector<std::string> lens_failures_;  // "quick, one focal length: no model"
   SceneLimits limits_;
   int threads_;
   double deadline_ = 0;             // on Now()'s clock

@@ -76,7 +76,7 @@ struct PoseOptions {
 struct PoseReport {
   std::string colmap_version;  // "3.8"
   std::string strategy;        // of the attempt that was used
-  int attempts_made = 0;
+  std::vector<std::string> attempts;  // each COLMAP run: "quick, one focal length: no model"
   std::string lens;                // chosen by the last adjustment
   std::vector<std::string> notes;  // sentences for the user
 };

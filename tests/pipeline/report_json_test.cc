@@ -112,7 +112,8 @@ TEST(ReportJson, HasTheKeysOfSchema2InOrder) {
   EXPECT_EQ(KeysOf(stages),
             (Keys{"pose", "reconstruct", "style_2d", "stylize", "render", "evaluate"}));
   EXPECT_EQ(KeysOf(stages.At("pose")),
-            (Keys{"seconds", "registered", "points", "reprojection_px", "models_found"}));
+            (Keys{"seconds", "attempts", "notices", "registered", "points", "reprojection_px",
+                  "models_found"}));
   EXPECT_EQ(KeysOf(stages.At("reconstruct")),
             (Keys{"seconds", "device", "finest_grid", "rays", "sh_degree", "voxels",
                   "psnr_train_db", "rejected_voxels", "psnr_heldout_db", "ssim_heldout",

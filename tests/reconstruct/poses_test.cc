@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
@@ -35,7 +36,7 @@ class Poses : public ::testing::Test {
     std::vector<StagedPhoto> photos;
     for (int i = 0; i < count; ++i)
       photos.push_back({"IMG " + std::to_string(i) + ".jpg", StagedName(i),
-                        folder_ / "photos" / StagedName(i), 640, 480, 0});
+                        folder_ / "photos" / StagedName(i), 640, 480, exif_focal_px_});
     return photos;
   }
 
@@ -64,6 +65,7 @@ class Poses : public ::testing::Test {
   }
 
   fs::path folder_;
+  double exif_focal_px_ = 0;
   PoseOptions options_;
   PoseReport report_;
   std::vector<PhotoStatus> statuses_;
@@ -79,7 +81,7 @@ TEST_F(Poses, GoodCaptureComesWithModelAndStatuses) {
   EXPECT_LT(capture.reprojection_px, 1e-6);
   EXPECT_EQ(report_.colmap_version, "3.8");
   EXPECT_EQ(report_.strategy, "quick");
-  EXPECT_EQ(report_.attempts_made, 1);
+  EXPECT_EQ(report_.attempts.size(), 1u);
   ASSERT_EQ(capture.statuses.size(), 11u);
   EXPECT_EQ(capture.statuses[1].why, "not a picture");
   EXPECT_EQ(ReadColmapModel((folder_ / "sparse").string()).images.size(), 10u);
@@ -234,12 +236,13 @@ TEST_F(Poses, H125_TooFewPhotos) {
 TEST_F(Poses, H127_CameraOnlyTurned) {
   ExpectError("turned", ExitCode::kScene, {"nearly one place", "step sideways"});
   ExpectError("nomodel", ExitCode::kScene, {"only turned", "step sideways"});
-  EXPECT_GT(report_.attempts_made, 1);
+  EXPECT_GT(report_.attempts.size(), 1u);
 }
 
 TEST_F(Poses, H127_NothingMatches) {
   ExpectError("nomatches", ExitCode::kScene, {"no two photos show the same"});
   ExpectError("plain", ExitCode::kScene, {"about 12 each", "sharp photos"});
+  ExpectError("apart", ExitCode::kScene, {"only 3 pairs of the 10 photos", "two thirds"});
 }
 
 TEST_F(Poses, H128_PlanarSceneIsNoted) {
@@ -278,17 +281,73 @@ TEST_F(Poses, H134_ADivergingPrincipalPointStaysInTheCentre) {
   EXPECT_NE(report_.lens.find("in the centre"), std::string::npos);
 }
 
+TEST_F(Poses, H160_PixelsThatAreNotSquareAreTriedAgainWithOneFocalLength) {
+  const Capture capture = Run("skewed");  // by the adjustment; the mapper's lens is simple
+  EXPECT_EQ(capture.views[0].camera.fx, capture.views[0].camera.fy);
+  EXPECT_EQ(report_.strategy, "quick, one focal length");
+  EXPECT_EQ(report_.lens, "SIMPLE_RADIAL, principal point in the centre");
+  EXPECT_EQ(report_.attempts, (std::vector<std::string>{
+                                  "quick: 10 of 10 photos",
+                                  "quick, one focal length: 10 of 10 photos"}));
+  ASSERT_EQ(report_.notes.size(), 1u);
+  EXPECT_NE(report_.notes[0].find("fx / fy = 0.913"), std::string::npos);
+  EXPECT_NE(report_.notes[0].find("trying again with one focal length"), std::string::npos);
+}
+
+TEST_F(Poses, H160_ASimplerLensIsMappedFromTheSameFeaturesAndMatches) {
+  Run("skewed-map", 24);  // enough photos that the mapper has two focal lengths
+  EXPECT_EQ(report_.strategy, "quick, one focal length");
+  ASSERT_EQ(report_.attempts.size(), 2u);
+  EXPECT_NE(report_.attempts[0].find("fx / fy = 1.300"), std::string::npos);
+  EXPECT_TRUE(fs::exists(folder_ / "work/attempt_1/database.db"));
+  EXPECT_FALSE(fs::exists(folder_ / "work/attempt_2")) << "features were extracted again";
+}
+
+TEST_F(Poses, H160_AFoldedDistortionIsTriedAgain) {
+  EXPECT_EQ(Run("folded").views[0].camera.distortion[1], 0);
+  EXPECT_EQ(report_.strategy, "quick, one focal length");
+  EXPECT_NE(report_.notes[0].find("folds"), std::string::npos);
+}
+
+TEST_F(Poses, H161_TheFocalLengthIsHeldAtThatOfExif) {
+  exif_focal_px_ = 700;
+  const Camera camera = Run("focal").views[0].camera;
+  EXPECT_EQ(camera.fx, 700);
+  EXPECT_EQ(camera.fy, 700);
+  EXPECT_EQ(camera.MaxCornerDistortion(), 0);
+  EXPECT_EQ(report_.strategy, "quick, focal length held");
+  EXPECT_EQ(report_.attempts.size(), 3u);
+  EXPECT_NE(report_.notes.back().find("held at that of EXIF"), std::string::npos);
+}
+
+TEST_F(Poses, H161_WithoutExifTheFocalLengthIsThatOfAUsualLens) {
+  const Camera camera = Run("focal").views[0].camera;
+  // The longer side of 640 px under 50 degrees.
+  EXPECT_NEAR(2 * std::atan(320 / camera.fx) * 180 / M_PI, 50, 1e-9);
+  EXPECT_NE(report_.notes.back().find("50 degrees along the picture's longer side"),
+            std::string::npos);
+}
+
+TEST_F(Poses, H162_ARefusalNamesEveryLensThatFailed) {
+  ExpectError("no-lens", ExitCode::kScene,
+              {"quick: pixels that are not square (fx / fy = 0.913)",
+               "quick, one focal length: a focal length of 20.00 times",
+               "quick, focal length held: no model", "keep their EXIF data"});
+  EXPECT_EQ(report_.attempts.size(), 3u);
+  EXPECT_EQ(report_.notes.size(), 2u);  // which the console shows: one for each further lens
+}
+
 TEST_F(Poses, StrategiesAreTriedUntilOneSucceeds) {
   EXPECT_EQ(Run("strategies").views.size(), 10u);
   EXPECT_EQ(report_.strategy, "more features");
-  EXPECT_EQ(report_.attempts_made, 2);
+  EXPECT_EQ(report_.attempts.size(), 2u);
 }
 
 TEST_F(Poses, AnAttemptThatWouldFindTheSameFeaturesIsSkipped) {
   EXPECT_THROW(Run("nomodel"), Error);
-  EXPECT_EQ(report_.attempts_made, 3);  // all except "more features": there are no more
+  EXPECT_EQ(report_.attempts.size(), 3u);  // all except "more features": there are no more
   EXPECT_THROW(Run("nomatches"), Error);
-  EXPECT_EQ(report_.attempts_made, 4);  // one more: nothing helps without matches
+  EXPECT_EQ(report_.attempts.size(), 4u);  // one more: nothing helps without matches
 }
 
 TEST(PoseStrategies, CostIncreases) {
