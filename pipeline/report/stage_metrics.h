@@ -196,6 +196,26 @@ struct FilmSize {
   }
 };
 
+// Fractions, in [0, 1], of pixels with a surface that fewer than three fitted photos see; see
+// evaluate's seen_by_few.h.
+struct SeenByFewMetrics {
+  Metric film;                 // mean over its frames
+  Metric worst_frame;          // of the film
+  int worst_frame_number = 0;  // its index
+  std::vector<Metric> photos;  // at each photo's position
+
+  // "seen by fewer than three photos: 41 % of the film (72 % of frame 12)"; empty without `film`.
+  std::string Sentence() const;
+
+  template <typename Visit>
+  void Describe(Visit& visit) {
+    visit("film", film);
+    visit("worst_frame", worst_frame);
+    visit("worst_frame_number", worst_frame_number);
+    visit("photos", photos);
+  }
+};
+
 struct RenderReport {
   RecordedTime time;
   std::string device;
@@ -203,6 +223,7 @@ struct RenderReport {
   int path_frames = 0;  // of these, along the film's camera path
   FilmSize film;
   Metric frames_per_second;
+  SeenByFewMetrics seen_by_few;
 
   template <typename Visit>
   void Describe(Visit& visit) {
@@ -211,6 +232,7 @@ struct RenderReport {
     visit("path_frames", path_frames);
     visit("film", film);
     visit("frames_per_second", frames_per_second, {.label = "speed", .unit = "frames/s"});
+    visit("seen_by_few", seen_by_few);
   }
 };
 
