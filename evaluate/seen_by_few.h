@@ -11,8 +11,8 @@
 
 namespace regrade {
 
-inline constexpr int kDepthStride = 4;    // pixels between samples of a view's depth
-inline constexpr int kFewestPhotos = 3;   // fewer are few: two photos cannot contradict a point
+inline constexpr int kDepthStride = 4;   // pixels between samples of a view's depth
+inline constexpr int kFewestPhotos = 3;  // fewer are few: two photos cannot contradict a point
 
 // A view's depth at every kDepthStride-th pixel, from the middle of the first such block.
 struct SampledView {
@@ -21,12 +21,12 @@ struct SampledView {
                   // units; 0: no surface; negative: masked
 };
 
-// `depth` as RenderedView::depth, of the camera's size. `kept` is [H, W, 1], 0 where the photo is
-// masked, or empty.
+// `depth` as RenderedView::depth, of the camera's size. `kept` is [H, W, 1], 0 where the photo
+// is masked, or empty.
 SampledView SampleView(const Camera& camera, const Image& depth, const Image& kept = {});
 
-// The fraction, in [0, 1], of the view's surface points that fewer than kFewestPhotos photos see,
-// over every second sample in x and y. Empty where the view shows no surface.
+// The fraction, in [0, 1], of the view's surface points that fewer than kFewestPhotos photos
+// see, over every second sample in x and y. Empty where the view shows no surface.
 //
 // A photo sees a point that lies at least `near` (world units) before it, in its frame, at a
 // sample that is not masked, and not more than 5 % behind the farthest of the four samples

@@ -204,7 +204,8 @@ struct SeenByFewMetrics {
   int worst_frame_number = 0;  // its index
   std::vector<Metric> photos;  // at each photo's position
 
-  // "seen by fewer than three photos: 41 % of the film (72 % of frame 12)"; empty without `film`.
+  // "seen by fewer than three photos: 41 % of the film (72 % of frame 12)"; empty without
+  // `film`.
   std::string Sentence() const;
 
   template <typename Visit>

@@ -44,7 +44,7 @@ struct FrameRenderers {
 // The frames of one camera.
 struct Frame {
   Image source, styled, transmittance;
-  Image depth;  // of the source
+  Image depth;                    // of the source
   std::optional<Image> views_2d;  // of methods that can style a render
 };
 
@@ -149,7 +149,8 @@ class SeenByFewRecorder {
       metrics_.worst_frame = *share;
       metrics_.worst_frame_number = static_cast<int>(i);
     }
-    metrics_.film = count > 0 ? Metric(sum / count) : Metric::Undefined("no frame shows a surface");
+    metrics_.film =
+        count > 0 ? Metric(sum / count) : Metric::Undefined("no frame shows a surface");
     if (count == 0) metrics_.worst_frame = metrics_.film;
   }
 

@@ -35,7 +35,8 @@ Reason WhyNoModel(const ColmapEvidence& evidence) {
   const int photos = static_cast<int>(evidence.features.size());
   if (evidence.matched_pairs > 0 && evidence.matched_pairs < photos - 1)
     return {"only " + std::to_string(evidence.matched_pairs) + " pairs of the " +
-                Photos(evidence.features.size()) + " show the same things: they overlap too little",
+                Photos(evidence.features.size()) +
+                " show the same things: they overlap too little",
             kTakeMore};
   return {
       "no two photos show the same things from clearly different places: the camera only "

@@ -46,8 +46,8 @@ ColmapModel WithoutOutliers(const ColmapModel& model, const ColmapModel& referen
 // half a pixel and reduces the mean squared error by more than 3 %. Adjusts once more with the
 // outliers determined by the result. If a principal point moves by more than a tenth of the
 // picture or the pixels are not square, the principal point stays in the centre. With less
-// than full `freedom` there is one lens instead: SIMPLE_RADIAL, or SIMPLE_PINHOLE that keeps its
-// focal length, in the centre. COLMAP's results go to folders under `work_folder`. Calls
+// than full `freedom` there is one lens instead: SIMPLE_RADIAL, or SIMPLE_PINHOLE that keeps
+// its focal length, in the centre. COLMAP's results go to folders under `work_folder`. Calls
 // `on_step(i, n)` before adjustment i of at most n.
 RefinedModel RefineIntrinsics(ColmapProgram& colmap, const ColmapModel& mapped,
                               LensFreedom freedom, const std::string& work_folder,

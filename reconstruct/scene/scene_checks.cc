@@ -170,11 +170,11 @@ SceneAssessment AssessScene(const Capture& capture, const SceneLimits& limits) {
         "a camera that only turns shows no depth: step sideways between photos");
   assessment.lens = ImplausibleLens(capture, limits.max_pixel_aspect);
   if (!assessment.lens.empty())
-    return refuse("the estimated camera has " + assessment.lens +
-                      ", so its geometry is unreliable",
-                  "the photos do not determine the lens: take some from further to the sides "
-                  "and at other distances, all at one zoom setting; do not crop or stretch "
-                  "them, and keep their EXIF data, which has the focal length");
+    return refuse(
+        "the estimated camera has " + assessment.lens + ", so its geometry is unreliable",
+        "the photos do not determine the lens: take some from further to the sides "
+        "and at other distances, all at one zoom setting; do not crop or stretch "
+        "them, and keep their EXIF data, which has the focal length");
   if (views < limits.min_views)
     return refuse("only " + std::to_string(views) +
                       " photos could be registered, and a scene needs at least " +

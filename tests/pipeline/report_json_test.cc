@@ -91,8 +91,8 @@ RunReport FullReport() {
                                                 .heldout = {"a.jpg"}};
   report.stages.style_2d = Style2dReport{.time = {3, {}}, .method = "mkl", .views = 7};
   report.stages.stylize = MeasuredStyle();
-  report.stages.render = RenderReport{
-      {5, {}}, "cpu", 60, 36, {640, 480}, 12, {0.41, 0.72, 12, {0.5, 0.25}}};
+  report.stages.render =
+      RenderReport{{5, {}}, "cpu", 60, 36, {640, 480}, 12, {0.41, 0.72, 12, {0.5, 0.25}}};
   report.stages.evaluate = EvaluateReport{{6, {}}, "dis-medium", "lai2018", "", 25, 26};
   report.evaluation = MeasuredEvaluation();
   return report;
@@ -112,9 +112,8 @@ TEST(ReportJson, HasTheKeysOfSchema2InOrder) {
   const JsonValue& stages = json.At("stages");
   EXPECT_EQ(KeysOf(stages),
             (Keys{"pose", "reconstruct", "style_2d", "stylize", "render", "evaluate"}));
-  EXPECT_EQ(KeysOf(stages.At("pose")),
-            (Keys{"seconds", "attempts", "notices", "registered", "points", "reprojection_px",
-                  "models_found"}));
+  EXPECT_EQ(KeysOf(stages.At("pose")), (Keys{"seconds", "attempts", "notices", "registered",
+                                             "points", "reprojection_px", "models_found"}));
   EXPECT_EQ(KeysOf(stages.At("reconstruct")),
             (Keys{"seconds", "device", "finest_grid", "rays", "sh_degree", "voxels",
                   "psnr_train_db", "rejected_voxels", "psnr_heldout_db", "ssim_heldout",
@@ -126,9 +125,8 @@ TEST(ReportJson, HasTheKeysOfSchema2InOrder) {
             "local_lipschitz_sampled", "local_lipschitz_max", "k_est", "local_lipschitz_of_map",
             "local_lipschitz_along_coefficients", "local_lipschitz_along_position",
             "bound_at_steps", "notices", "cpu_seconds"}));
-  EXPECT_EQ(KeysOf(stages.At("render")),
-            (Keys{"seconds", "device", "frames", "path_frames", "film", "frames_per_second",
-                  "seen_by_few"}));
+  EXPECT_EQ(KeysOf(stages.At("render")), (Keys{"seconds", "device", "frames", "path_frames",
+                                               "film", "frames_per_second", "seen_by_few"}));
   EXPECT_EQ(KeysOf(stages.At("render").At("seen_by_few")),
             (Keys{"film", "worst_frame", "worst_frame_number", "photos"}));
   EXPECT_EQ(

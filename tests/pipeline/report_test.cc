@@ -212,9 +212,10 @@ TEST(ReportHtml, StagesHaveTheirCpuTime) {
 TEST(ReportHtml, RowsOfStagesComeFromLabels) {
   RunReport report = SomeReport();
   report.stages.reconstruct->voxels = 2234881;
-  report.stages.render =
-      RenderReport{.frames = 48, .film = {640, 480}, .frames_per_second = 0.9,
-                   .seen_by_few = {0.414, 0.72, 12, {}}};
+  report.stages.render = RenderReport{.frames = 48,
+                                      .film = {640, 480},
+                                      .frames_per_second = 0.9,
+                                      .seen_by_few = {0.414, 0.72, 12, {}}};
   const std::string html = ReportHtml(report, {});
   for (const char* part :
        {"voxels <b>2,234,881</b>", "PSNR, training <b>28.25&nbsp;dB</b>", "frames <b>48</b>",

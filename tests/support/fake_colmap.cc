@@ -205,7 +205,8 @@ int Adjust() {
   const ColmapLensInfo& info = InfoOf(model.cameras[0].lens);
   const bool one_focal = info.focals == 1;
   Camera& c = model.cameras[0].intrinsics;
-  if ((Is("skewed") || Is("focal") || Is("no-lens")) && !held && !one_focal) c.fx = 0.913 * c.fy;
+  if ((Is("skewed") || Is("focal") || Is("no-lens")) && !held && !one_focal)
+    c.fx = 0.913 * c.fy;
   if ((Is("focal") || Is("no-lens")) && !held && one_focal) c.fx = c.fy = 20 * c.width;
   if (Is("folded") && info.coefficients > 1) c.distortion[1] = -8;
   WriteColmapModel(model, arguments["output_path"]);
