@@ -138,7 +138,7 @@ class PoseFinder {
                              InfoOf(attempt->strategy.lens).focals == 1;
       if (mapped_so && !attempt->models.front().lens.empty()) continue;  // the same again
       report_.notes.push_back(
-          lens_failures_.back() + "; trying again with " +
+          "the lens is implausible (" + lens_failures_.back() + "); trying again with " +
           (simpler.freedom == LensFreedom::kHeldFocal
                ? "the focal length held at " + HeldFocalText(runner_->groups())
                : "one focal length for both directions"));

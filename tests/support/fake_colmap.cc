@@ -160,8 +160,9 @@ int Map() {
     const ColmapModel start = ReadColmapModel(arguments["input_path"]);
     const bool held = arguments["Mapper.ba_refine_focal_length"] == "0";
     if (!start.images.empty() || start.cameras.size() != 1) std::abort();
-    if (held && Is("no-lens")) return 1;
-    if (!Is("aspect")) options.aspect = 1, options.lens = start.cameras[0].lens;
+    if (Is("aspect") || (held && Is("no-lens"))) return 1;
+    options.aspect = 1;
+    options.lens = start.cameras[0].lens;
     if (held) options.focal = start.cameras[0].intrinsics.fx;
     Write(testing::MakeSyntheticModel(options), names, out);
     return 0;
