@@ -27,7 +27,7 @@ SampledView WallFrom(double x, const Image& kept = {}) {
   return SampleView(CameraAt(x), depth, kept);
 }
 
-TEST(SeenByFew, H163_ASideThatTwoPhotosSeeIsCounted) {
+TEST(SeenByFew, H173_ASideThatTwoPhotosSeeIsCounted) {
   // The last two photos are moved by half a picture, so only its right half is in three.
   const std::vector<SampledView> photos = {WallFrom(0), WallFrom(2), WallFrom(2)};
   EXPECT_NEAR(SeenByFew(photos[0], photos, 0).value(), 0.5, 1e-12);
@@ -36,7 +36,7 @@ TEST(SeenByFew, H163_ASideThatTwoPhotosSeeIsCounted) {
   EXPECT_EQ(SeenByFew(photos[0], {}, 0).value(), 1);
 }
 
-TEST(SeenByFew, H163_WhatIsHiddenInAPhotoIsNotSeenByIt) {
+TEST(SeenByFew, H173_WhatIsHiddenInAPhotoIsNotSeenByIt) {
   // An object before the left quarter of the third photo.
   Image depth(kW, kH, 1);
   for (int y = 0; y < kH; ++y)
@@ -48,7 +48,7 @@ TEST(SeenByFew, H163_WhatIsHiddenInAPhotoIsNotSeenByIt) {
   EXPECT_EQ(SeenByFew(wall, {wall, wall, empty}, 0).value(), 0);
 }
 
-TEST(SeenByFew, H163_WhatIsMaskedInAPhotoIsNotSeenByIt) {
+TEST(SeenByFew, H173_WhatIsMaskedInAPhotoIsNotSeenByIt) {
   Image kept(kW, kH, 1);
   for (int y = 0; y < kH; ++y)
     for (int x = kW / 2; x < kW; ++x) *kept.at(x, y) = 1;
@@ -56,7 +56,7 @@ TEST(SeenByFew, H163_WhatIsMaskedInAPhotoIsNotSeenByIt) {
   EXPECT_NEAR(SeenByFew(wall, {wall, wall, WallFrom(0, kept)}, 0).value(), 0.5, 1e-12);
 }
 
-TEST(SeenByFew, H163_BehindAPhotoOrNearerThanItsLimitIsNotSeen) {
+TEST(SeenByFew, H173_BehindAPhotoOrNearerThanItsLimitIsNotSeen) {
   const SampledView wall = WallFrom(0);
   Image any(kW, kH, 1);
   const SampledView beyond = SampleView(CameraAt(0, kWall + 1), any);
@@ -65,7 +65,7 @@ TEST(SeenByFew, H163_BehindAPhotoOrNearerThanItsLimitIsNotSeen) {
   EXPECT_EQ(SeenByFew(wall, {wall, wall, wall}, kWall + 0.01).value(), 1);
 }
 
-TEST(SeenByFew, H163_AViewWithoutSurfacesHasNoShare) {
+TEST(SeenByFew, H173_AViewWithoutSurfacesHasNoShare) {
   const SampledView empty = SampleView(CameraAt(0), Image(kW, kH, 1));
   EXPECT_FALSE(SeenByFew(empty, {WallFrom(0)}, 0).has_value());
 }

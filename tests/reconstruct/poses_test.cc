@@ -278,7 +278,7 @@ TEST_F(Poses, H134_ADivergingPrincipalPointStaysInTheCentre) {
   EXPECT_NE(report_.lens.find("in the centre"), std::string::npos);
 }
 
-TEST_F(Poses, H160_PixelsThatAreNotSquareAreTriedAgainWithOneFocalLength) {
+TEST_F(Poses, H170_PixelsThatAreNotSquareAreTriedAgainWithOneFocalLength) {
   const Capture capture = Run("skewed");  // by the adjustment; the mapper's lens is simple
   EXPECT_EQ(capture.views[0].camera.fx, capture.views[0].camera.fy);
   EXPECT_EQ(report_.strategy, "quick, one focal length");
@@ -291,7 +291,7 @@ TEST_F(Poses, H160_PixelsThatAreNotSquareAreTriedAgainWithOneFocalLength) {
   EXPECT_NE(report_.notes[0].find("trying again with one focal length"), std::string::npos);
 }
 
-TEST_F(Poses, H160_ASimplerLensIsMappedFromTheSameFeaturesAndMatches) {
+TEST_F(Poses, H170_ASimplerLensIsMappedFromTheSameFeaturesAndMatches) {
   Run("skewed-map", 24);  // enough photos that the mapper has two focal lengths
   EXPECT_EQ(report_.strategy, "quick, one focal length");
   ASSERT_EQ(report_.attempts.size(), 2u);
@@ -300,13 +300,13 @@ TEST_F(Poses, H160_ASimplerLensIsMappedFromTheSameFeaturesAndMatches) {
   EXPECT_FALSE(fs::exists(folder_ / "work/attempt_2")) << "features were extracted again";
 }
 
-TEST_F(Poses, H160_AFoldedDistortionIsTriedAgain) {
+TEST_F(Poses, H170_AFoldedDistortionIsTriedAgain) {
   EXPECT_EQ(Run("folded").views[0].camera.distortion[1], 0);
   EXPECT_EQ(report_.strategy, "quick, one focal length");
   EXPECT_NE(report_.notes[0].find("folds"), std::string::npos);
 }
 
-TEST_F(Poses, H161_TheFocalLengthIsHeldAtThatOfExif) {
+TEST_F(Poses, H171_TheFocalLengthIsHeldAtThatOfExif) {
   exif_focal_px_ = 700;
   const Camera camera = Run("focal").views[0].camera;
   EXPECT_EQ(camera.fx, 700);
@@ -317,7 +317,7 @@ TEST_F(Poses, H161_TheFocalLengthIsHeldAtThatOfExif) {
   EXPECT_NE(report_.notes.back().find("held at that of EXIF"), std::string::npos);
 }
 
-TEST_F(Poses, H161_WithoutExifTheFocalLengthIsThatOfAUsualLens) {
+TEST_F(Poses, H171_WithoutExifTheFocalLengthIsThatOfAUsualLens) {
   const Camera camera = Run("focal").views[0].camera;
   // The longer side of 640 px under 50 degrees.
   EXPECT_NEAR(2 * std::atan(320 / camera.fx) * 180 / M_PI, 50, 1e-9);
@@ -325,7 +325,7 @@ TEST_F(Poses, H161_WithoutExifTheFocalLengthIsThatOfAUsualLens) {
             std::string::npos);
 }
 
-TEST_F(Poses, H162_ARefusalNamesEveryLensThatFailed) {
+TEST_F(Poses, H172_ARefusalNamesEveryLensThatFailed) {
   ExpectError("no-lens", ExitCode::kScene,
               {"quick: pixels that are not square (fx / fy = 0.913)",
                "quick, one focal length: a focal length of 20.00 times",

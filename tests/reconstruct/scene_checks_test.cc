@@ -74,7 +74,7 @@ TEST(SceneChecks, H134_PixelsThatAreNotSquareAreRefused) {
   EXPECT_EQ(AssessScene(CaptureOf(options)).refusal, "");
 }
 
-TEST(SceneChecks, H162_LensesThatNoCameraHas) {
+TEST(SceneChecks, H172_LensesThatNoCameraHas) {
   const auto lens_of = [](double focal, double k1, double k2) {
     Capture capture = CaptureOf({.lens = ColmapLens::kOpenCv});
     for (CaptureView& view : capture.views) {
