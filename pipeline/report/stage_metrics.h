@@ -39,6 +39,8 @@ struct PoseStageReport {
   // Of COLMAP: its version, the strategy that succeeded, its camera model. Empty for given
   // poses.
   std::string colmap, strategy, lens;
+  std::vector<std::string> attempts;  // COLMAP's runs, each with its outcome
+  std::vector<std::string> notices;   // for the user: for example that the lens was simplified
   std::optional<int> photo_masks;
   int registered = 0;
   int64_t points = 0;
@@ -52,6 +54,8 @@ struct PoseStageReport {
     visit("colmap", colmap, {.label = "COLMAP", .optional = true});
     visit("strategy", strategy, {.label = "strategy", .optional = true});
     visit("lens", lens, {.label = "camera model", .optional = true});
+    visit("attempts", attempts, {.label = "attempts"});
+    visit("notices", notices);
     visit("photo_masks", photo_masks, {.label = "masks"});
     visit("registered", registered, {.label = "registered photos"});
     visit("points", points, {.label = "points"});
@@ -192,6 +196,27 @@ struct FilmSize {
   }
 };
 
+// Fractions, in [0, 1], of pixels with a surface that fewer than three fitted photos see; see
+// evaluate's seen_by_few.h.
+struct SeenByFewMetrics {
+  Metric film;                 // mean over its frames
+  Metric worst_frame;          // of the film
+  int worst_frame_number = 0;  // its index
+  std::vector<Metric> photos;  // at each photo's position
+
+  // "seen by fewer than three photos: 41 % of the film (72 % of frame 12)"; empty without
+  // `film`.
+  std::string Sentence() const;
+
+  template <typename Visit>
+  void Describe(Visit& visit) {
+    visit("film", film);
+    visit("worst_frame", worst_frame);
+    visit("worst_frame_number", worst_frame_number);
+    visit("photos", photos);
+  }
+};
+
 struct RenderReport {
   RecordedTime time;
   std::string device;
@@ -200,6 +225,7 @@ struct RenderReport {
   FilmSize film;
   std::string film_renderer;  // which renderer made the film, and why if it is the exact one
   Metric frames_per_second;
+  SeenByFewMetrics seen_by_few;
 
   template <typename Visit>
   void Describe(Visit& visit) {
@@ -209,6 +235,7 @@ struct RenderReport {
     visit("film", film);
     visit("film_renderer", film_renderer, {.label = "renderer of the film", .optional = true});
     visit("frames_per_second", frames_per_second, {.label = "speed", .unit = "frames/s"});
+    visit("seen_by_few", seen_by_few);
   }
 };
 

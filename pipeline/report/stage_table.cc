@@ -75,6 +75,9 @@ std::string MeasurementsHtml(const Stage& stage) {
   if constexpr (std::is_same_v<Stage, RenderReport>)
     row.Add("film <b>" + std::to_string(stage.film.width) + " × " +
             std::to_string(stage.film.height) + "&nbsp;px</b>");
+  if constexpr (std::is_same_v<Stage, RenderReport>)
+    if (const std::string sentence = stage.seen_by_few.Sentence(); !sentence.empty())
+      row.Add(EscapeHtml(sentence));
   if constexpr (std::is_same_v<Stage, StylizeReport>)
     if (stage.variance) AddVariance(*stage.variance, &row);
   if constexpr (requires { stage.notices; })

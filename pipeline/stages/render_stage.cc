@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 
+#include "evaluate/seen_by_few.h"
 #include "kernels/scene/common_camera.h"
 #include "pipeline/capture/photo_gains.h"
 #include "pipeline/capture/working_views.h"
@@ -31,6 +32,8 @@
 namespace regrade {
 namespace {
 
+constexpr double kMuchSeenByFew = 0.2;  // of the film: worth a warning
+
 // The two fields and the 2D method.
 struct FrameRenderers {
   FieldRenderer source, styled;
@@ -44,6 +47,7 @@ struct FrameRenderers {
 // The frames of one camera.
 struct Frame {
   Image source, styled, transmittance;
+  Image depth;                    // of the source
   std::optional<Image> views_2d;  // of methods that can style a render
 };
 
@@ -108,6 +112,7 @@ Frame RenderFrame(RunContext* context, FrameRenderers* renderers, const Camera& 
   renderers->styled_seconds += context->console->StageSeconds() - begin;
   frame.source = std::move(plain.color);
   frame.transmittance = std::move(plain.transmittance);
+  frame.depth = std::move(plain.depth);
   PutGain(gain, &frame.source);
   PutGain(gain, &frame.styled);
   if (renderers->object != nullptr) renderers->coverage = renderers->object->Render(camera);
@@ -115,6 +120,51 @@ Frame RenderFrame(RunContext* context, FrameRenderers* renderers, const Camera& 
     frame.views_2d = renderers->stylizer->Stylize(frame.source, index);
   return frame;
 }
+
+// Gathers how much of each view few photos see. The frames at the photos' positions come first.
+class SeenByFewRecorder {
+ public:
+  SeenByFewRecorder(const WorkingViews& views, double near) : views_(views), near_(near) {}
+
+  void Add(const FrameSet& set, int index, const Image& depth) {
+    const bool photo = set.prefix.empty();
+    const Camera& camera = set.cameras[static_cast<size_t>(index)];
+    current_.push_back(SampleView(camera, depth, photo ? views_.Mask(index) : Image()));
+  }
+  void Finish(const FrameSet& set) {
+    if (set.prefix.empty())
+      for (const int i : views_.Training()) photos_.push_back(current_[static_cast<size_t>(i)]);
+    std::vector<Metric> shares;
+    for (const SampledView& view : current_)
+      shares.push_back(Metric(SeenByFew(view, photos_, near_), "the view shows no surface"));
+    current_.clear();
+    if (set.of_film) SetFilm(shares);
+    if (set.prefix.empty()) metrics_.photos = std::move(shares);
+  }
+  const SeenByFewMetrics& metrics() const { return metrics_; }
+
+ private:
+  void SetFilm(const std::vector<Metric>& shares) {
+    double sum = 0;
+    int count = 0;
+    for (size_t i = 0; i < shares.size(); ++i) {
+      const std::optional<double>& share = shares[i].value;
+      if (!share) continue;
+      sum += *share, ++count;
+      if (count > 1 && *share <= *metrics_.worst_frame.value) continue;
+      metrics_.worst_frame = *share;
+      metrics_.worst_frame_number = static_cast<int>(i);
+    }
+    metrics_.film =
+        count > 0 ? Metric(sum / count) : Metric::Undefined("no frame shows a surface");
+    if (count == 0) metrics_.worst_frame = metrics_.film;
+  }
+
+  const WorkingViews& views_;
+  const double near_;
+  std::vector<SampledView> photos_, current_;
+  SeenByFewMetrics metrics_;
+};
 
 // Writes files and films while the next frames are rendered: one thread for each half of the
 // pictures and one for the films, so that a GPU does not wait for them.
@@ -195,19 +245,23 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   StageOutcome outcome;
   outcome.outputs = {"frames"};
   RunFilms films(workspace, settings.render.fps, static_cast<int>(film.cameras.size()));
+  // In NDC the field's limit is no distance.
+  SeenByFewRecorder seen(views, before.ndc.on() ? 0 : before.field.near_clip);
   {
     FrameWriter writer(workspace, &films);
     int done = 0;
-    for (const FrameSet& set : sets)
+    for (const FrameSet& set : sets) {
       for (int i = 0; i < static_cast<int>(set.cameras.size()); ++i) {
         if (Report(progress, done++, total) == LoopControl::kStop) throw Interrupted();
-        writer.Write(
-            std::make_shared<const Frame>(RenderFrame(
-                context, &renderers, set.cameras[static_cast<size_t>(i)],
-                set.of_photos && settings.render.keep_exposure ? views.Gain(i) : kAsTaken, i,
-                renderers.fast_film && !set.of_photos)),
-            set, i);
+        const auto frame = std::make_shared<const Frame>(RenderFrame(
+            context, &renderers, set.cameras[static_cast<size_t>(i)],
+            set.of_photos && settings.render.keep_exposure ? views.Gain(i) : kAsTaken, i,
+            renderers.fast_film && !set.of_photos));
+        seen.Add(set, i, frame->depth);
+        writer.Write(frame, set, i);
       }
+      seen.Finish(set);
+    }
     writer.Finish();
   }
   films.Finish(&outcome.outputs);
@@ -219,6 +273,10 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   report.film = {film.cameras[0].width, film.cameras[0].height};
   report.film_renderer = FilmRendererText(why_exact);
   if (renderers.styled_seconds > 0) report.frames_per_second = total / renderers.styled_seconds;
+  report.seen_by_few = seen.metrics();
+  if (report.seen_by_few.film.value.value_or(0) > kMuchSeenByFew)
+    context->console->Warn(report.seen_by_few.Sentence() +
+                           ": it may look wrong there; more photos of these parts help");
   PutMetrics(report, &outcome.metrics);
   return outcome;
 }

@@ -21,6 +21,12 @@ Vec3d PointExtents(const Capture& capture);
 // Detects failed self-calibration, since sensors have square pixels.
 double WorstPixelAspect(const Capture& capture);
 
+// What is implausible about the views' lenses, worded to follow "the estimated camera has";
+// empty if there is nothing. Photos that do not determine a lens give pixels that are not
+// square, a focal length far from any lens's, or a distortion that maps two rays to one image
+// point.
+std::string ImplausibleLens(const Capture& capture, double max_pixel_aspect);
+
 // Largest distance between two camera centres, in world units.
 double CameraExtent(const Capture& capture);
 
@@ -35,6 +41,7 @@ struct SceneLimits {
 struct SceneAssessment {
   std::string refusal;             // empty: the scene is usable
   std::string remedy;              // of the refusal
+  std::string lens;                // ImplausibleLens, if that is why; else empty
   std::vector<std::string> notes;  // warnings about a usable scene
 };
 

@@ -60,6 +60,13 @@ TEST(RunReport, ShowsEveryPartOfTheRun) {
   const JsonValue& fit = report.At("stages").At("reconstruct");
   EXPECT_EQ(fit.At("psnr_at_steps").AsArray().back().AsArray()[0].AsInt(), 30);
   EXPECT_GT(fit.At("cpu_seconds").AsDouble(), 0);
+  const JsonValue& few = report.At("stages").At("render").At("seen_by_few");
+  ASSERT_EQ(few.At("photos").AsArray().size(), 6u);
+  for (const JsonValue& share : few.At("photos").AsArray()) {
+    if (share.IsNull()) continue;  // the view shows no surface
+    EXPECT_GE(share.AsDouble(), 0);
+    EXPECT_LE(share.AsDouble(), 1);
+  }
   EXPECT_TRUE(std::filesystem::exists(folder / "e/views_2d.mp4"));
   const std::string page = testing::ReadText(folder / "e/report.html");
   for (const char* part :
