@@ -33,8 +33,7 @@ std::vector<double> TapsOf(double sigma) {
 }
 
 // Sum of taps times the values of a line, `count` of them `stride` apart.
-Luma Blurred(const std::vector<double>& taps, const Luma* line, int at, int count,
-             int stride) {
+Luma Blurred(const std::vector<double>& taps, const Luma* line, int at, int count, int stride) {
   const int radius = static_cast<int>(taps.size()) - 1;
   Luma sum;
   for (int k = std::max(at - radius, 0); k <= std::min(at + radius, count - 1); ++k) {

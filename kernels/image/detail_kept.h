@@ -7,9 +7,9 @@
 
 namespace regrade {
 
-// EQ(detail-kept): with Y = 0.2126 R + 0.7152 G + 0.0722 B of the encoded values, G_s a Gaussian
-// of s pixels, the photo's fine band p = Y - G_1.4 Y, and the same band of the render in two
-// parts, r_1 = Y - G_0.7 Y and r_2 = G_0.7 Y - G_1.4 Y,
+// EQ(detail-kept): with Y = 0.2126 R + 0.7152 G + 0.0722 B of the encoded values, G_s a
+// Gaussian of s pixels, the photo's fine band p = Y - G_1.4 Y, and the same band of the render
+// in two parts, r_1 = Y - G_0.7 Y and r_2 = G_0.7 Y - G_1.4 Y,
 //   kept = sum_w E_w / sum_w <p, p>_w,
 //   E_w = max over x_1, x_2 >= 0 of 2 sum_i x_i <r_i, p>_w - sum_ij x_i x_j <r_i, r_j>_w
 //                                   - n_w v (x_1^2 + x_2^2),
@@ -27,8 +27,9 @@ namespace regrade {
 // for 1 pixel. A measure that is 1 for the photo and falls with every blur cannot avoid the
 // last: sharpening can be the inverse of the blur, and then returns the photo.
 struct FineDetail {
-  std::optional<double> kept;    // [0, 1]; empty if no window counts
-  std::optional<double> levels;  // RMS of r_1 + r_2 - p in 1 / 255 of white; empty without pixels
+  std::optional<double> kept;  // [0, 1]; empty if no window counts
+  std::optional<double>
+      levels;  // RMS of r_1 + r_2 - p in 1 / 255 of white; empty without pixels
 };
 
 // Compares the colour channels of two images of one size (another one fails a check); one

@@ -31,7 +31,7 @@ double Mean(const std::vector<double>& values) {
 struct HeldOut {
   double psnr = 0, ssim = 0;
   JsonValue detail_kept, detail_error;  // null without a view that has fine detail
-  double transmittance = 0;  // what the field lets through, of all that is seen
+  double transmittance = 0;             // what the field lets through, of all that is seen
 };
 
 HeldOut MeasureHeldOut(FitEngine* engine, const PackedCapture& capture,

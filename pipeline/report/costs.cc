@@ -53,7 +53,9 @@ std::string SecondsHtml(const Metric& seconds, const Metric& spread) {
 
 // What stands beside a PSNR to photos.
 constexpr std::pair<const char*, std::optional<double> CostRow::*> kBeside[] = {
-    {"SSIM", &CostRow::ssim}, {"detail kept", &CostRow::detail_kept}, {"LPIPS", &CostRow::lpips}};
+    {"SSIM", &CostRow::ssim},
+    {"detail kept", &CostRow::detail_kept},
+    {"LPIPS", &CostRow::lpips}};
 
 bool Measured(const Rows& rows, std::optional<double> CostRow::*member) {
   return std::any_of(rows.begin(), rows.end(),
@@ -88,8 +90,7 @@ std::string BenchmarkHtml(const Rows& rows) {
          EscapeHtml(rows[0]->unit) + ".</p>" + ParetoFrontHtml(rows) +
          "<div class=scroll><table><thead><tr><th>parameter<th>value<th class=n>time, s<th "
          "class=n>CPU time, s<th class=n>accuracy<th class=n>error" +
-         beside + "<th></tr></thead><tbody>" +
-         body + "</tbody></table></div>";
+         beside + "<th></tr></thead><tbody>" + body + "</tbody></table></div>";
 }
 
 }  // namespace

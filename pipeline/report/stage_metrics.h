@@ -74,7 +74,7 @@ struct ReconstructReport {
   Metric ssim_train, detail_kept_train, detail_error_train;
   int64_t rejected_voxels = 0;  // updates of voxels that were refused: gradient not finite
   Metric psnr_heldout_db, ssim_heldout, detail_kept_heldout, detail_error_heldout;
-  std::string sharpness;  // SharpnessWord of detail_kept, held out, or else training
+  std::string sharpness;             // SharpnessWord of detail_kept, held out, or else training
   std::vector<std::string> heldout;  // the user's file names
   Curve psnr_at_steps;               // dB on the rays of the last steps
   // Of the trial that decides for or against view dependence.

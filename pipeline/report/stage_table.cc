@@ -136,7 +136,8 @@ std::string StagesHtml(const RunReport& report) {
          Table("<tr><th>stage<th class=n>time<th class=n>CPU time<th>measurements</tr>", body) +
          "<p class=note>CPU time includes all threads and the programs that a stage started. A "
          "stage that was interrupted counts from its last start.</p>" +
-         (report.stages.reconstruct ? kDetailNote + FitChartHtml(*report.stages.reconstruct) : "") +
+         (report.stages.reconstruct ? kDetailNote + FitChartHtml(*report.stages.reconstruct)
+                                    : "") +
          (report.stages.stylize ? BoundChartHtml(*report.stages.stylize) : "");
 }
 

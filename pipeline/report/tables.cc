@@ -65,9 +65,9 @@ std::string HeadlineMetricsHtml(const RunReport& report) {
     const Metric& kept = held_out ? s->detail_kept_heldout : s->detail_kept_train;
     card(std::string("sharpness of the reconstruction (detail kept of the ") +
              (held_out ? "held-out" : "training") + " photos)",
-         s->sharpness.empty() ? MetricHtml(kept, 2)
-                              : EscapeHtml(s->sharpness) + " <small>" + MetricHtml(kept, 2) +
-                                    " of 1</small>");
+         s->sharpness.empty()
+             ? MetricHtml(kept, 2)
+             : EscapeHtml(s->sharpness) + " <small>" + MetricHtml(kept, 2) + " of 1</small>");
   }
   const EvaluationMetrics& evaluation = report.evaluation;
   const ConsistencyMetrics* styled = ShortestGap(evaluation, "styled");

@@ -14,10 +14,10 @@ namespace regrade {
 
 // A value for each photo for which it is defined.
 struct PhotoMetrics {
-  std::vector<std::string> files;                // the photos compared, the user's names
-  std::vector<double> psnr, ssim;                // dB; see Ssim
+  std::vector<std::string> files;                 // the photos compared, the user's names
+  std::vector<double> psnr, ssim;                 // dB; see Ssim
   std::vector<double> detail_kept, detail_error;  // see FineDetail
-  std::vector<double> lpips;                     // where there is a `perceptual`
+  std::vector<double> lpips;                      // where there is a `perceptual`
 };
 
 std::optional<double> MeanOf(const std::vector<double>& values);
@@ -28,8 +28,7 @@ std::optional<double> MeanOf(const std::vector<double>& values);
 // render's own there.
 PhotoMetrics MeasureOnPhotos(
     const WorkingViews& views, const std::vector<int>& of, const StoredField& stored,
-    Backend backend,
-    const std::function<double(const Image&, const Image&)>& perceptual = {});
+    Backend backend, const std::function<double(const Image&, const Image&)>& perceptual = {});
 
 // Eight training views, evenly spaced, or all if they are fewer: enough for a mean, and few to
 // render.

@@ -154,9 +154,8 @@ std::string CostTableText(const std::vector<CostRow>& rows) {
                   Cell(row.cpu_spread, decimals).c_str(), Cell(row.accuracy, 3).c_str(),
                   Cell(row.accuracy_spread, 3).c_str(), Cell(row.error, 3).c_str());
     text += line;
-    for (const auto& [name, value] : {std::pair{"SSIM", row.ssim},
-                                      {"detail kept", row.detail_kept},
-                                      {"LPIPS", row.lpips}})
+    for (const auto& [name, value] :
+         {std::pair{"SSIM", row.ssim}, {"detail kept", row.detail_kept}, {"LPIPS", row.lpips}})
       if (value) text += std::string("  ") + name + " " + FixedNumber(*value, 3);
     if (!row.dominated_by.empty()) text += "  dominated by " + row.dominated_by;
     text += "\n";

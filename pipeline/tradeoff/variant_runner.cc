@@ -208,11 +208,11 @@ void VariantRunner::MeasureFit(const Variant& variant, const ProgressFunction& p
   m->work["samples"] = fit.samples;
   m->work["voxels"] = fit.voxels;
   // Measured at the base's photo size for all variants, for comparable values.
-  const PhotoMetrics held_out = MeasureOnPhotos(
-      photos.working_views.AtSize(base_->settings.scene.photo_size),
-      photos.working_views.HeldOut(),
-      {std::move(fit.field), photos.scene.field_from_world, photos.scene.ndc}, Backend::kCpu,
-      PerceptualDistance(base_->settings.consistency.lpips));
+  const PhotoMetrics held_out =
+      MeasureOnPhotos(photos.working_views.AtSize(base_->settings.scene.photo_size),
+                      photos.working_views.HeldOut(),
+                      {std::move(fit.field), photos.scene.field_from_world, photos.scene.ndc},
+                      Backend::kCpu, PerceptualDistance(base_->settings.consistency.lpips));
   m->accuracy = MeanOf(held_out.psnr).value_or(std::nan(""));
   m->ssim = MeanOf(held_out.ssim);
   m->detail_kept = MeanOf(held_out.detail_kept);

@@ -147,12 +147,12 @@ TEST(DetailKept, AgreesWithTheDefinition) {
     }
   EXPECT_GT(on_axis, 0);
   const FineDetail detail = MeasureFineDetail(render, photo);
-  EXPECT_NEAR(*detail.kept, kept / energy,
-              testing::RecordDigits("detail kept against its definition",
-                                    testing::Computed::kDouble, *detail.kept - kept / energy,
-                                    1e-12));
-  EXPECT_NEAR(*detail.levels, 255 * std::sqrt(squares / static_cast<double>(photo.num_pixels())),
-              1e-10);
+  EXPECT_NEAR(
+      *detail.kept, kept / energy,
+      testing::RecordDigits("detail kept against its definition", testing::Computed::kDouble,
+                            *detail.kept - kept / energy, 1e-12));
+  EXPECT_NEAR(*detail.levels,
+              255 * std::sqrt(squares / static_cast<double>(photo.num_pixels())), 1e-10);
 }
 
 TEST(DetailKept, BlurLowersIt) {
@@ -181,7 +181,7 @@ TEST(DetailKept, WordsFollowBlur) {
 }
 
 // Energy in the fine band is no detail: <r, r> / <p, p> would rise at every one of these.
-TEST(DetailKept, NoiseDoesNotRaiseIt) {
+TEST(DetailKept, H164_NoiseDoesNotRaiseIt) {
   const Image photo = Leaves(1);
   for (const double sigma : {0.0, 0.5, 1.0, 2.0}) {
     const Image render = sigma > 0 ? Blur(photo, sigma) : photo;
@@ -211,7 +211,7 @@ Image SoftRender(const Image& photo, double sigma, float misplaced, uint64_t see
   return render;
 }
 
-TEST(DetailKept, UnsharpMaskingDoesNotRaiseIt) {
+TEST(DetailKept, H164_UnsharpMaskingDoesNotRaiseIt) {
   for (const uint64_t seed : {1, 2, 3}) {
     const Image photo = Leaves(seed);
     const std::pair<const char*, Image> renders[] = {
@@ -250,7 +250,7 @@ TEST(DetailKept, SharpeningABlurredPhotoGainsLittle) {
 
 // Contrast of the band is no detail, nor is the lack of it, until rounding ends it. What is
 // inverted is not kept.
-TEST(DetailKept, ContrastCountsOnlyBelowRounding) {
+TEST(DetailKept, H164_ContrastCountsOnlyBelowRounding) {
   const Image photo = Leaves(2), render = WithNoise(Blur(photo, 0.7), 2, 3);
   const auto scaled = [&](float gain) {
     Image out = render;
@@ -282,7 +282,7 @@ TEST(DetailKept, EachWindowHasItsLimit) {
   EXPECT_LT(Kept(half, photo), left / (left + right) + 0.1);
 }
 
-TEST(DetailKept, UndefinedWithoutAFineBand) {
+TEST(DetailKept, H164_UndefinedWithoutAFineBand) {
   Image flat(64, 48, 3), noisy(64, 48, 3);
   for (float& p : flat.pixels) p = 0.5f;
   noisy = WithNoise(flat, 5, 1);
@@ -299,7 +299,7 @@ TEST(DetailKept, UndefinedWithoutAFineBand) {
   EXPECT_NEAR(*MeasureFineDetail(flat, Leaves(1, 64, 48)).kept, 0, 1e-12);
 }
 
-TEST(DetailKept, NonFiniteValuesAreLeftOutOfBoth) {
+TEST(DetailKept, H164_NonFiniteValuesAreLeftOutOfBoth) {
   const Image photo = Leaves(5), render = Blur(photo, 0.6);
   Image masked = photo, spoiled = render;
   for (int y = 30; y < 70; ++y)

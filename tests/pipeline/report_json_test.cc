@@ -119,12 +119,12 @@ TEST(ReportJson, HasTheKeysOfSchema2InOrder) {
             (Keys{"pose", "reconstruct", "style_2d", "stylize", "render", "evaluate"}));
   EXPECT_EQ(KeysOf(stages.At("pose")),
             (Keys{"seconds", "registered", "points", "reprojection_px", "models_found"}));
-  EXPECT_EQ(KeysOf(stages.At("reconstruct")),
-            (Keys{"seconds", "device", "finest_grid", "rays", "sh_degree", "voxels",
-                  "psnr_train_db", "ssim_train", "detail_kept_train", "detail_error_train",
-                  "rejected_voxels", "psnr_heldout_db", "ssim_heldout", "detail_kept_heldout",
-                  "detail_error_heldout", "sharpness", "heldout", "psnr_at_steps",
-                  "cpu_seconds"}));
+  EXPECT_EQ(
+      KeysOf(stages.At("reconstruct")),
+      (Keys{"seconds", "device", "finest_grid", "rays", "sh_degree", "voxels", "psnr_train_db",
+            "ssim_train", "detail_kept_train", "detail_error_train", "rejected_voxels",
+            "psnr_heldout_db", "ssim_heldout", "detail_kept_heldout", "detail_error_heldout",
+            "sharpness", "heldout", "psnr_at_steps", "cpu_seconds"}));
   EXPECT_EQ(KeysOf(stages.At("style_2d")), (Keys{"seconds", "method", "views", "notices"}));
   EXPECT_EQ(
       KeysOf(stages.At("stylize")),
@@ -134,10 +134,9 @@ TEST(ReportJson, HasTheKeysOfSchema2InOrder) {
             "bound_at_steps", "notices", "cpu_seconds"}));
   EXPECT_EQ(KeysOf(stages.At("render")),
             (Keys{"seconds", "device", "frames", "path_frames", "film", "frames_per_second"}));
-  EXPECT_EQ(
-      KeysOf(stages.At("evaluate")),
-      (Keys{"seconds", "flow", "mask", "psnr_to_2d_photos_db", "linear_map_psnr_to_2d_db",
-            "lpips_heldout"}));
+  EXPECT_EQ(KeysOf(stages.At("evaluate")),
+            (Keys{"seconds", "flow", "mask", "psnr_to_2d_photos_db", "linear_map_psnr_to_2d_db",
+                  "lpips_heldout"}));
   EXPECT_EQ(KeysOf(json.At("consistency").AsArray()[0]),
             (Keys{"sequence", "gap", "pairs", "undefined_pairs", "tc_psnr_mean_db",
                   "tc_psnr_of_mean_db", "tc_psnr_low_db", "tc_psnr_high_db", "coverage",

@@ -70,7 +70,8 @@ RunReport EveryMetric(const std::string& evil) {
   for (int i = 0; i < 6; ++i)
     report.costs.push_back({"fit", i == 0 ? "" : "fit-steps", evil, "held-out PSNR", "dB", 3,
                             12.0 + i, 0.5, 20.0 + 3 * i, 1, 25 + std::sqrt(i), 0.1,
-                            i == 5 ? Metric() : Metric(0.1), i != 3, i == 3 ? evil : "", 0.8, 0.6 + 0.01 * i});
+                            i == 5 ? Metric() : Metric(0.1), i != 3, i == 3 ? evil : "", 0.8,
+                            0.6 + 0.01 * i});
   report.options = {{"style", evil}};
   report.versions = {{"COLMAP", evil}};
   return report;
