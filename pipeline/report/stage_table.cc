@@ -85,9 +85,11 @@ std::string MeasurementsHtml(const Stage& stage) {
 // See EQ(detail-kept).
 const std::string kDetailNote =
     "<p class=note>Detail kept: how much of the photos' fine detail (below about 3 pixels at "
-    "the size of the fit) the renders explain, from 0 to 1; noise and sharpening do not raise "
-    "it. Sharp: 0.9 or more; soft: below 0.5. A photo blurred by 1 pixel (standard deviation) "
-    "keeps 0.8 to 0.9, by 1.5 pixels 0.4 to 0.7. Its error is the RMS difference of that "
+    "the size of the fit) the renders explain, from 0 to 1. Noise does not raise it, "
+    "sharpening hardly "
+    "does. Sharp: 0.9 or more; soft: below 0.5. A photo blurred by 1 pixel (standard "
+    "deviation) "
+    "keeps 0.7 to 0.8, by 1.5 pixels 0.3 to 0.6. Its error is the RMS difference of that "
     "detail in levels of 255.</p>";
 
 struct StageLine {
