@@ -16,7 +16,7 @@ struct Measurement {
   double seconds = 0, cpu_seconds = 0;  // see Benchmark::time_of
   double accuracy = 0;                  // in the benchmark's unit
   // Beside a PSNR to photos: see PhotoMetrics.
-  std::optional<double> ssim, detail_kept, lpips;
+  std::optional<double> ssim = {}, detail_kept = {}, lpips = {};
   // Amount of work, for information: {"rays": ..., "voxels": ...}.
   JsonValue work = JsonValue::Object();
 };
