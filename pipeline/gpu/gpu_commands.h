@@ -77,7 +77,7 @@ double RenderMilliseconds(const DeviceGrid& grid, const PackedCapture& capture,
                           const MarchOptions& march, float opacity_step = 0,
                           const HalfGrid* half = nullptr);
 // The same for a row of settings of the march and of opacity_step: milliseconds, and the error
-// against the first in dB.
+// against the first in dB, PSNR, SSIM and detail kept to the photos.
 JsonValue RenderCosts(const DeviceGrid& grid, const PackedCapture& capture, float step);
 
 // The held-out views, exact, as pictures NAME_0.ppm, NAME_1.ppm, ...
@@ -99,8 +99,8 @@ void RenderPacked(const RenderPackedOptions& settings);
 // learned, device memory beyond the field.
 void StylePacked(const StylePackedOptions& settings, const TrainNetworkOptions& options);
 
-// Prints one line of JSON: times, counts, PSNR and SSIM of the held-out views, milliseconds a
-// rendered view.
+// Prints one line of JSON: times, counts, PSNR, SSIM and fine detail of the held-out views,
+// milliseconds a rendered view. `curve_heldout` has [seconds, PSNR, SSIM, detail kept].
 void FitPacked(const FitPackedOptions& settings, const FitOptions& options);
 
 }  // namespace regrade

@@ -73,9 +73,12 @@ struct ReconstructReport {
   int sh_degree = 0;
   int64_t voxels = 0;
   std::optional<int64_t> background_texels;
-  Metric psnr_train_db;
+  Metric psnr_train_db;  // of the rays of the last steps
+  // Of some rendered training views; see MeasuredTrainingViews.
+  Metric ssim_train, detail_kept_train, detail_error_train;
   int64_t rejected_voxels = 0;  // updates of voxels that were refused: gradient not finite
-  Metric psnr_heldout_db, ssim_heldout;
+  Metric psnr_heldout_db, ssim_heldout, detail_kept_heldout, detail_error_heldout;
+  std::string sharpness;             // SharpnessWord of detail_kept, held out, or else training
   std::vector<std::string> heldout;  // the user's file names
   Curve psnr_at_steps;               // dB on the rays of the last steps
   // Of the trial that decides for or against view dependence.
@@ -90,9 +93,17 @@ struct ReconstructReport {
     visit("voxels", voxels, {.label = "voxels"});
     visit("background_texels", background_texels, {.label = "background texels"});
     visit("psnr_train_db", psnr_train_db, {.label = "PSNR, training", .unit = "dB"});
+    visit("ssim_train", ssim_train, {.label = "SSIM, training", .decimals = 3});
+    visit("detail_kept_train", detail_kept_train, {.label = "detail kept, training"});
+    visit("detail_error_train", detail_error_train,
+          {.label = "its error", .unit = "levels", .decimals = 1});
     visit("rejected_voxels", rejected_voxels);
     visit("psnr_heldout_db", psnr_heldout_db, {.label = "PSNR, held out", .unit = "dB"});
     visit("ssim_heldout", ssim_heldout, {.label = "SSIM, held out", .decimals = 3});
+    visit("detail_kept_heldout", detail_kept_heldout, {.label = "detail kept, held out"});
+    visit("detail_error_heldout", detail_error_heldout,
+          {.label = "its error", .unit = "levels", .decimals = 1});
+    visit("sharpness", sharpness, {.label = "sharpness", .optional = true});
     visit("heldout", heldout, {.label = "photos held out"});
     visit("psnr_at_steps", psnr_at_steps);
     visit("trial_seconds", trial_seconds);
@@ -247,6 +258,9 @@ struct EvaluateReport {
   std::string comparison_note;
   Metric psnr_to_2d_photos_db;      // styled frames against the 2D method on the photos
   Metric linear_map_psnr_to_2d_db;  // of the better of two linear colour maps
+  // Of renders without style to the photos, as those of ReconstructReport; where a network was
+  // given.
+  std::optional<double> lpips_heldout = {}, lpips_train = {};
 
   template <typename Visit>
   void Describe(Visit& visit) {
@@ -257,6 +271,10 @@ struct EvaluateReport {
           {.label = "PSNR to the styled photos", .unit = "dB"});
     visit("linear_map_psnr_to_2d_db", linear_map_psnr_to_2d_db,
           {.label = "PSNR of the best linear colour map", .unit = "dB"});
+    visit("lpips_heldout", lpips_heldout,
+          {.label = "LPIPS to the photos, held out", .decimals = 3});
+    visit("lpips_train", lpips_train,
+          {.label = "LPIPS to the photos, training", .decimals = 3});
   }
 };
 

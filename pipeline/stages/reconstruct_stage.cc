@@ -3,10 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <functional>
 #include <string>
 
 #include "kernels/device/device_memory.h"
+#include "kernels/image/detail_kept.h"
 #include "pipeline/capture/capture_store.h"
 #include "pipeline/capture/scene_profile.h"
 #include "pipeline/capture/working_views.h"
@@ -18,7 +20,7 @@
 #include "pipeline/report/stage_metrics.h"
 #include "pipeline/run/plan.h"
 #include "pipeline/run/run_context.h"
-#include "pipeline/stages/held_out.h"
+#include "pipeline/stages/photo_metrics.h"
 #include "pipeline/stages/stages.h"
 #include "pipeline/workspace/metrics_json.h"
 #include "reconstruct/fit/choose_degree.h"
@@ -35,11 +37,40 @@ constexpr int kReproducibleShards = 4;  // sums grouped independently of the thr
 // To a thousandth, for charts.
 double Rounded(double value) { return std::round(value * 1000) / 1000; }
 
-void SetHeldOut(const HeldOutMetrics& held_out, ReconstructReport* metrics) {
-  const char* why = held_out.files.empty() ? "no photo was held out" : "";
+void SetPhotoMetrics(const PhotoMetrics& held_out, const PhotoMetrics& train,
+                     ReconstructReport* metrics) {
+  const auto metric = [](const PhotoMetrics& of, std::vector<double> PhotoMetrics::*values,
+                         const char* why = "") {
+    return Metric(MeanOf(of.*values), of.files.empty() ? "no photo was held out" : why);
+  };
+  const char* flat = "the photos have no fine detail";
   metrics->heldout = held_out.files;
-  metrics->psnr_heldout_db = Metric(held_out.MeanPsnr(), why);
-  metrics->ssim_heldout = Metric(held_out.MeanSsim(), why);
+  metrics->psnr_heldout_db = metric(held_out, &PhotoMetrics::psnr);
+  metrics->ssim_heldout = metric(held_out, &PhotoMetrics::ssim);
+  metrics->detail_kept_heldout = metric(held_out, &PhotoMetrics::detail_kept, flat);
+  metrics->detail_error_heldout = metric(held_out, &PhotoMetrics::detail_error);
+  metrics->ssim_train = metric(train, &PhotoMetrics::ssim);
+  metrics->detail_kept_train = metric(train, &PhotoMetrics::detail_kept, flat);
+  metrics->detail_error_train = metric(train, &PhotoMetrics::detail_error);
+  const auto& kept = metrics->detail_kept_heldout.value ? metrics->detail_kept_heldout.value
+                                                        : metrics->detail_kept_train.value;
+  if (kept) metrics->sharpness = SharpnessWord(*kept);
+}
+
+// "reconstruction: slightly soft, detail kept 0.62; 27.51 dB, SSIM 0.812 on held-out photos"
+std::string QualityLine(const ReconstructReport& metrics) {
+  const auto number = [](const Metric& metric, const char* format) {
+    char text[32] = "-";
+    if (metric.value) std::snprintf(text, sizeof text, format, *metric.value);
+    return std::string(text);
+  };
+  const bool held_out = !metrics.heldout.empty();
+  return "reconstruction: " + (metrics.sharpness.empty() ? "" : metrics.sharpness + ", ") +
+         "detail kept " +
+         number(held_out ? metrics.detail_kept_heldout : metrics.detail_kept_train, "%.2f") +
+         "; " + number(held_out ? metrics.psnr_heldout_db : metrics.psnr_train_db, "%.2f") +
+         " dB, SSIM " + number(held_out ? metrics.ssim_heldout : metrics.ssim_train, "%.3f") +
+         (held_out ? " on held-out photos" : " on training photos");
 }
 
 int Finest(const FitOptions& options) {
@@ -198,8 +229,11 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   for (const FitCurvePoint& point : fit.curve)
     if (std::isfinite(point.psnr_train_db))
       metrics.psnr_at_steps.emplace_back(point.step, Rounded(point.psnr_train_db));
-  SetHeldOut(MeasureHeldOut(views, ReadFieldFile(workspace.Path("field.npz")), backend),
-             &metrics);
+  const StoredField stored = ReadFieldFile(workspace.Path("field.npz"));
+  SetPhotoMetrics(MeasureOnPhotos(views, views.HeldOut(), stored, backend),
+                  MeasureOnPhotos(views, MeasuredTrainingViews(views), stored, backend),
+                  &metrics);
+  context->console->Info(QualityLine(metrics));
   PutMetrics(metrics, &outcome.metrics);
   return outcome;
 }

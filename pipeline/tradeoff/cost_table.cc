@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <utility>
 
 #include "pipeline/report/html_text.h"
 
@@ -92,7 +93,7 @@ std::vector<CostRow> CostTable(const std::vector<Variant>& variants,
                                const std::string& base) {
   std::vector<CostRow> rows;
   for (const Variant& variant : variants) {
-    std::vector<double> seconds, cpu, accuracy;
+    std::vector<double> seconds, cpu, accuracy, ssim, detail_kept, lpips;
     for (const Measurement& m : measurements) {
       if (m.benchmark != variant.benchmark || m.parameter != variant.parameter ||
           m.value != variant.value)
@@ -100,6 +101,9 @@ std::vector<CostRow> CostTable(const std::vector<Variant>& variants,
       seconds.push_back(m.seconds);
       cpu.push_back(m.cpu_seconds);
       accuracy.push_back(m.accuracy);
+      if (m.ssim) ssim.push_back(*m.ssim);
+      if (m.detail_kept) detail_kept.push_back(*m.detail_kept);
+      if (m.lpips) lpips.push_back(*m.lpips);
     }
     if (seconds.empty()) continue;
     const Benchmark& benchmark = BenchmarkOf(variant.benchmark);
@@ -116,6 +120,9 @@ std::vector<CostRow> CostTable(const std::vector<Variant>& variants,
     row.cpu_spread = Of(cpu).spread;
     row.accuracy = Of(accuracy).median;
     row.accuracy_spread = Of(accuracy).spread;
+    if (!ssim.empty()) row.ssim = Of(ssim).median;
+    if (!detail_kept.empty()) row.detail_kept = Of(detail_kept).median;
+    if (!lpips.empty()) row.lpips = Of(lpips).median;
     row.error = Metric::Undefined("not a value of a single parameter");
     rows.push_back(std::move(row));
   }
@@ -147,6 +154,9 @@ std::string CostTableText(const std::vector<CostRow>& rows) {
                   Cell(row.cpu_spread, decimals).c_str(), Cell(row.accuracy, 3).c_str(),
                   Cell(row.accuracy_spread, 3).c_str(), Cell(row.error, 3).c_str());
     text += line;
+    for (const auto& [name, value] :
+         {std::pair{"SSIM", row.ssim}, {"detail kept", row.detail_kept}, {"LPIPS", row.lpips}})
+      if (value) text += std::string("  ") + name + " " + FixedNumber(*value, 3);
     if (!row.dominated_by.empty()) text += "  dominated by " + row.dominated_by;
     text += "\n";
   }
@@ -157,7 +167,7 @@ std::string CostTableCsv(const std::vector<CostRow>& rows) {
   std::string text =
       "benchmark,parameter,setting,repeats,seconds,seconds_spread,cpu_seconds,cpu_spread,"
       "accuracy,"
-      "accuracy_spread,unit,error,on_pareto_front,dominated_by\n";
+      "accuracy_spread,unit,error,on_pareto_front,dominated_by,ssim,detail_kept,lpips\n";
   for (const CostRow& row : rows) {
     const auto number = [](const Metric& metric) {
       return "," + (metric.value ? FixedNumber(*metric.value, 6) : std::string());
@@ -166,7 +176,9 @@ std::string CostTableCsv(const std::vector<CostRow>& rows) {
             std::to_string(row.repeats) + number(row.seconds) + number(row.seconds_spread) +
             number(row.cpu_seconds) + number(row.cpu_spread) + number(row.accuracy) +
             number(row.accuracy_spread) + "," + row.unit + number(row.error) + "," +
-            (row.on_pareto_front ? "yes" : "no") + "," + Quoted(row.dominated_by) + "\n";
+            (row.on_pareto_front ? "yes" : "no") + "," + Quoted(row.dominated_by) +
+            number(Metric(row.ssim)) + number(Metric(row.detail_kept)) +
+            number(Metric(row.lpips)) + "\n";
   }
   return text;
 }

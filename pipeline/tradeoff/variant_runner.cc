@@ -9,6 +9,7 @@
 
 #include "evaluate/image_quality.h"
 #include "evaluate/pair_motion.h"
+#include "evaluate/pair_network.h"
 #include "kernels/base/error.h"
 #include "kernels/field/cpu/render_view.h"
 #include "kernels/field/packed_grid.h"
@@ -20,8 +21,8 @@
 #include "pipeline/fields/field_file.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/program/cpu_time.h"
-#include "pipeline/stages/held_out.h"
 #include "pipeline/stages/make_stylizer.h"
+#include "pipeline/stages/photo_metrics.h"
 #include "pipeline/stages/stages.h"
 #include "pipeline/workspace/output_names.h"
 #include "reconstruct/fit/fit_field.h"
@@ -207,12 +208,15 @@ void VariantRunner::MeasureFit(const Variant& variant, const ProgressFunction& p
   m->work["samples"] = fit.samples;
   m->work["voxels"] = fit.voxels;
   // Measured at the base's photo size for all variants, for comparable values.
-  m->accuracy =
-      MeasureHeldOut(photos.working_views.AtSize(base_->settings.scene.photo_size),
-                     {std::move(fit.field), photos.scene.field_from_world, photos.scene.ndc},
-                     Backend::kCpu)
-          .MeanPsnr()
-          .value_or(std::nan(""));
+  const PhotoMetrics held_out =
+      MeasureOnPhotos(photos.working_views.AtSize(base_->settings.scene.photo_size),
+                      photos.working_views.HeldOut(),
+                      {std::move(fit.field), photos.scene.field_from_world, photos.scene.ndc},
+                      Backend::kCpu, PerceptualDistance(base_->settings.consistency.lpips));
+  m->accuracy = MeanOf(held_out.psnr).value_or(std::nan(""));
+  m->ssim = MeanOf(held_out.ssim);
+  m->detail_kept = MeanOf(held_out.detail_kept);
+  m->lpips = MeanOf(held_out.lpips);
 }
 
 void VariantRunner::MeasureStyle(const Variant& variant, const ProgressFunction& progress,

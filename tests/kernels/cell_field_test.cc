@@ -242,7 +242,7 @@ TEST(ChangeCells, SplittingLeavesTheFieldAndRemovingEmptiesIt) {
   EXPECT_FALSE(ChangeCells(old, voxels, change, &sources).on());
 }
 
-TEST(CellField, H164_DamagedCellsAreRefused) {
+TEST(CellField, H165_DamagedCellsAreRefused) {
   const RadianceField good = RandomCellField({2, 2, 2}, 2, 1, 3);
   Validate(good, "field");
   const auto refused = [&](auto damage) {

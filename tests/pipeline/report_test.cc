@@ -195,6 +195,38 @@ TEST(ReportHtml, TheFitIsDrawnOverTheSteps) {
   EXPECT_NE(ReportHtml(report, {}).find("held-out photos, at the end"), std::string::npos);
 }
 
+TEST(ReportHtml, OneWordSaysHowSharpWithItsNumber) {
+  RunReport report = SomeReport();
+  report.stages.reconstruct->detail_kept_train = 0.93;
+  report.stages.reconstruct->sharpness = "sharp";
+  std::string html = ReportHtml(report, {});
+  EXPECT_NE(html.find("detail kept of the training photos"), std::string::npos);
+  EXPECT_NE(html.find("sharp <small>0.93 of 1</small>"), std::string::npos);
+  report.stages.reconstruct->detail_kept_heldout = 0.62;
+  report.stages.reconstruct->ssim_heldout = 0.8;
+  report.stages.reconstruct->sharpness = "slightly soft";
+  report.stages.evaluate = EvaluateReport{.flow = "dis-medium", .lpips_heldout = 0.21};
+  html = ReportHtml(report, {});
+  EXPECT_NE(html.find("slightly soft <small>0.62 of 1</small>"), std::string::npos);
+  EXPECT_NE(html.find("SSIM 0.800"), std::string::npos);
+  EXPECT_NE(html.find("LPIPS 0.210"), std::string::npos);
+  const std::string flat = "the photos have no fine detail";
+  report.stages.reconstruct->detail_kept_heldout = Metric::Undefined(flat);
+  report.stages.reconstruct->detail_kept_train = Metric::Undefined(flat);
+  report.stages.reconstruct->sharpness.clear();
+  EXPECT_NE(ReportHtml(report, {}).find("title=\"" + flat + "\""), std::string::npos);
+}
+
+TEST(ReportHtml, CostsHaveTheirSsimAndDetailOnlyWhereMeasured) {
+  RunReport report = SomeReport();
+  EXPECT_EQ(ReportHtml(report, {}).find("<th class=n>SSIM"), std::string::npos);
+  report.costs[0].ssim = 0.8125;
+  report.costs[0].detail_kept = 0.5;
+  const std::string html = ReportHtml(report, {});
+  EXPECT_NE(html.find("<th class=n>SSIM<th class=n>detail kept<th>"), std::string::npos);
+  EXPECT_NE(html.find("0.812"), std::string::npos);
+}
+
 TEST(ReportHtml, AnEffectThatWasNotMeasuredIsMarked) {
   RunReport report = SomeReport();
   report.effects = {{"exposure", false, "it was not wanted", Metric(), 0.1}};
