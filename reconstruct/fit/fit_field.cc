@@ -52,7 +52,7 @@ class Fitter {
   FitResult Run() {
     FitState state;
     if (hooks_.resume != nullptr) {
-      state = *hooks_.resume;
+      state = std::move(*hooks_.resume);
     } else {
       const GridFrame frame{ResolutionFor(box_, options_.resolutions[0]), box_.center,
                             box_.radius};

@@ -24,10 +24,10 @@ FitState StateOf(const RadianceField& field) {
 
 TEST(FitCheckpoint, BackgroundSpheresComeBackBitForBit) {
   RadianceField field = testing::RandomField({5, 4, 6}, 4, 0.5, 1);
-  const std::string without = PackFitState(StateOf(field));
+  const std::string without = PackFitState(StateOf(field)).Joined();
   testing::AddSpheres(6, 5, 0.6, 2, &field);
   const FitState state = StateOf(field);
-  const std::string with = PackFitState(state);
+  const std::string with = PackFitState(state).Joined();
   // The last section exists only with spheres.
   EXPECT_EQ(with.substr(0, without.size()), without);
   EXPECT_GT(with.size(), without.size());
