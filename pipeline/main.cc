@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <new>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "kernels/base/error.h"
@@ -64,6 +65,12 @@ int Run(const Arguments& arguments) {
   } catch (const std::bad_alloc&) {
     code = ExitCode::kResources;
     console.Fail("out of memory. To do: close other programs, or use --preset draft", code);
+  } catch (const std::system_error& error) {  // of files and folders, too
+    code = ExitCode::kResources;
+    console.Fail(std::string(error.what()) +
+                     ". To do: check the folder, its disk, and the limits on open files and "
+                     "threads, then run the same command again",
+                 code);
   } catch (const std::exception& error) {
     console.Fail(std::string("internal error: ") + error.what() +
                      ". To do: please report it with the command and this line",

@@ -35,8 +35,7 @@ StoredField RandomField(const Vec3i& resolution, int64_t voxels, int basis) {
   appearance.sh.Resize(count * appearance.stride());
 #pragma omp parallel for schedule(static)
   for (int64_t i = 0; i < appearance.sh.size(); ++i)
-    appearance.sh[i] =
-        static_cast<float>(RandomDouble(1, 2, static_cast<uint64_t>(i))) - 0.5f;
+    appearance.sh[i] = static_cast<float>(RandomDouble(1, 2, static_cast<uint64_t>(i))) - 0.5f;
   stored.field.geometry = std::move(geometry);
   return stored;
 }

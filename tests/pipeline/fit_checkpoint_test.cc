@@ -49,6 +49,12 @@ TEST(FitCheckpoint, BackgroundSpheresComeBackBitForBit) {
   EXPECT_TRUE(std::equal(a.texels.begin(), a.texels.end(), b.texels.begin(), b.texels.end()));
   EXPECT_TRUE(std::equal(back->sphere_moment.begin(), back->sphere_moment.end(),
                          state.sphere_moment.begin(), state.sphere_moment.end()));
+  // The arrays are packed where they are.
+  const auto at = reinterpret_cast<const char*>(state.grid.records.data());
+  int in_place = 0;
+  const BytePacker packed = PackFitState(state);
+  for (const std::string_view piece : packed.Pieces()) in_place += piece.data() == at;
+  EXPECT_EQ(in_place, 1);
   // Truncated bytes are refused.
   for (const size_t size : {without.size() + 1, without.size() + 8, with.size() - 1})
     EXPECT_FALSE(UnpackFitState(std::string_view(with).substr(0, size))) << size;
