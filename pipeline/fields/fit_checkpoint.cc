@@ -1,7 +1,5 @@
 #include "pipeline/fields/fit_checkpoint.h"
 
-#include "pipeline/files/byte_packing.h"
-
 namespace regrade {
 namespace {
 
@@ -67,16 +65,9 @@ void UnpackTally(ByteUnpacker* unpacker, FitTally* tally) {
 
 }  // namespace
 
-std::string PackFitState(const FitState& state, const std::string& note) {
+BytePacker PackFitState(const FitState& state, const std::string& note) {
   const FastGrid& grid = state.grid;
   BytePacker packer;
-  const size_t head =
-      256 + note.size() + sizeof(FitCurvePoint) * state.tally.curve.size();  // upper bound
-  packer.Reserve(head + sizeof(int32_t) * static_cast<size_t>(grid.links.size()) +
-                 sizeof(float) * static_cast<size_t>(
-                                     grid.records.size() + state.second_moment.size() +
-                                     grid.spheres.links.size() + grid.spheres.texels.size() +
-                                     state.sphere_moment.size()));
   packer.Value(kVersion);
   packer.Values(note);
   packer.Value(grid.basis);
@@ -90,16 +81,16 @@ std::string PackFitState(const FitState& state, const std::string& note) {
   }
   packer.Value(grid.near_clip);
   PackTally(state.tally, &packer);
-  packer.Values(grid.links);
-  packer.Values(grid.records);
-  packer.Values(state.second_moment);
-  if (!grid.spheres.on()) return packer.Take();
+  packer.Reference(grid.links);
+  packer.Reference(grid.records);
+  packer.Reference(state.second_moment);
+  if (!grid.spheres.on()) return packer;
   packer.Value(grid.spheres.layers);
   packer.Value(grid.spheres.resolution);
-  packer.Values(grid.spheres.links);
-  packer.Values(grid.spheres.texels);
-  packer.Values(state.sphere_moment);
-  return packer.Take();
+  packer.Reference(grid.spheres.links);
+  packer.Reference(grid.spheres.texels);
+  packer.Reference(state.sphere_moment);
+  return packer;
 }
 
 std::optional<FitState> UnpackFitState(std::string_view bytes, std::string* note) {

@@ -65,7 +65,7 @@ std::string PackTrainingState(const TrainingState& state) {
   Packing packing;
   packing.packer.Value(kVersion);
   Visit(&packing, &state);
-  return packing.packer.Take();
+  return packing.packer.Joined();
 }
 
 std::optional<TrainingState> UnpackTrainingState(std::string_view bytes) {

@@ -176,7 +176,7 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   FitHooks hooks;
   std::string measured;  // the row of view dependence: must survive an interruption
   hooks.checkpoint = [&](const FitState& state) {
-    workspace.SaveCheckpoint("reconstruct", inputs, PackFitState(state, measured));
+    workspace.SaveCheckpoint("reconstruct", inputs, PackFitState(state, measured).Pieces());
   };
   std::optional<FitState> resume;
   if (const auto bytes = workspace.LoadCheckpoint("reconstruct", inputs))
@@ -204,9 +204,15 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   context->console->Info(EffectLine(view_dependence));
   if (!view_dependence.on) options.sh_degree = 0;
   hooks.progress = parts.Next(1);
-  const FitResult fit = FitField(training_views, scene.box, options, hooks, backend);
+  FitResult fit = FitField(training_views, scene.box, options, hooks, backend);
 
-  WriteFieldFile(workspace.Path("field.npz"), {fit.field, scene.field_from_world, scene.ndc});
+  const int64_t voxels = fit.field.geometry->num_voxels(),
+                texels = fit.field.geometry->spheres.num_texels();
+  {
+    // Freed once it is written: what is measured is the file.
+    const StoredField stored{std::move(fit.field), scene.field_from_world, scene.ndc};
+    WriteFieldFile(workspace.Path("field.npz"), stored);
+  }
   StageOutcome outcome;
   outcome.outputs = {"field.npz"};
   outcome.metrics["effects"] = EffectsRecord(profile.effects);
@@ -222,8 +228,8 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   metrics.finest_grid = Finest(options);
   metrics.rays = fit.rays;
   metrics.sh_degree = options.sh_degree;
-  metrics.voxels = fit.field.geometry->num_voxels();
-  if (scene.box.spheres) metrics.background_texels = fit.field.geometry->spheres.num_texels();
+  metrics.voxels = voxels;
+  if (scene.box.spheres) metrics.background_texels = texels;
   metrics.psnr_train_db = fit.psnr_train_db;
   metrics.rejected_voxels = fit.rejected_voxels;
   for (const FitCurvePoint& point : fit.curve)

@@ -53,7 +53,7 @@ class Fitter {
   FitResult Run() {
     FitState state;
     if (hooks_.resume != nullptr) {
-      state = *hooks_.resume;
+      state = std::move(*hooks_.resume);
     } else {
       state.grid = InitialGrid();
       if (box_.background) state.grid.background = *box_.background;
