@@ -299,7 +299,7 @@ AggregationResult GradientAggregation::Run(const LipschitzNetwork& network,
   ForgetTouched();
 
   const double count = options_.divide_by_voxels
-                           ? static_cast<double>(field_.geometry->num_voxels())
+                           ? SpatialCount(*field_.geometry)
                            : 3.0 * static_cast<double>(result.rays);
   if (result.rays == 0) return result;
   result.loss = loss_sum / count;
