@@ -56,16 +56,15 @@ class Observer {
          i < weights.first[static_cast<size_t>(ray) + 1]; ++i) {
       const WeightedSample& sample = weights.samples[static_cast<size_t>(i)];
       Vec3d before{0.5, 0.5, 0.5}, after = before;
-      int32_t points[8];
-      CornerPoints(*source_.geometry, sample, points);
+      int32_t voxels[8];
+      CornerPoints(*source_.geometry, sample, voxels);
       for (int corner = 0; corner < 8; ++corner) {
-        const int32_t point = points[corner];
+        const int32_t voxel = voxels[corner];
         const double fraction = CornerWeight(sample.fraction, corner);
-        if (point < 0 || fraction == 0) continue;
-        before += ColorOf(source_.appearance, point, seen.gamma) * fraction;
-        after += ColorOf(styled_.appearance, point, seen.gamma) * fraction;
-        if (sample.on_sphere()) continue;  // background, as the light that is transmitted
-        seen.atoms.push_back({point, fraction * sample.weight});
+        if (voxel < 0 || fraction == 0) continue;
+        before += ColorOf(source_.appearance, voxel, seen.gamma) * fraction;
+        after += ColorOf(styled_.appearance, voxel, seen.gamma) * fraction;
+        seen.atoms.push_back({voxel, fraction * sample.weight});
         inside_weight += fraction * sample.weight;
       }
       for (int c = 0; c < 3; ++c) {
@@ -95,14 +94,9 @@ class Observer {
   double k() const { return base_norm_ + residual_bound_; }
 
  private:
-  // Of a voxel or, behind the voxels, a texel; see CornerPoints.
-  Vec3d ColorOf(const Appearance& appearance, int32_t point, const double* gamma) const {
+  Vec3d ColorOf(const Appearance& appearance, int32_t voxel, const double* gamma) const {
+    const float* sh = appearance.sh.data() + static_cast<int64_t>(voxel) * appearance.stride();
     Vec3d color{};
-    if (const int64_t texel = point - source_.geometry->num_voxels(); texel >= 0) {
-      for (int c = 0; c < 3; ++c) color[c] = appearance.sphere_color[3 * texel + c] * gamma[0];
-      return color;
-    }
-    const float* sh = appearance.sh.data() + static_cast<int64_t>(point) * appearance.stride();
     for (int c = 0; c < 3; ++c)
       for (int k = 0; k < basis_; ++k) color[c] += sh[c * basis_ + k] * gamma[k];
     return color;
