@@ -11,8 +11,9 @@ namespace regrade {
 inline constexpr int64_t kMaxTopCells = int64_t{1} << 24;
 inline constexpr int64_t kMaxNodes = int64_t{1} << 28;
 
-// What is wrong with `finest`, keys and levels in a box of `voxels`, or "". Cells without a defect
-// lie in the box, apart from each other and in order, and FindVertices and BuildTree accept them.
+// What is wrong with `finest`, keys and levels in a box of `voxels`, or "". Cells without a
+// defect lie in the box, apart from each other and in order, and FindVertices and BuildTree
+// accept them.
 std::string DefectOfCells(const CellGrid& grid, const Vec3i& voxels);
 
 }  // namespace regrade

@@ -1,5 +1,5 @@
-// regrade export: writes photos and poses, or the fields, of an output folder in formats of other
-// programs.
+// regrade export: writes photos and poses, or the fields, of an output folder in formats of
+// other programs.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -31,9 +31,10 @@ struct ExportOptions {
   void Describe(Bind& bind) {
     bind("out", out, {.help = "the folder to write: a new or empty one"});
     bind("format", format,
-         {.help = "colmap-text and colmap write images/ and sparse/; transforms writes images/ "
-                  "and transforms.json for nerfstudio and instant-ngp; svox2 writes field.npz and "
-                  "styled.npz on uniform grids",
+         {.help =
+              "colmap-text and colmap write images/ and sparse/; transforms writes images/ "
+              "and transforms.json for nerfstudio and instant-ngp; svox2 writes field.npz and "
+              "styled.npz on uniform grids",
           .choices = "colmap-text|colmap|transforms|svox2"});
     bind("resolution", resolution,
          {.unit = "voxels",

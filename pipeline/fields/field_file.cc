@@ -113,8 +113,8 @@ void ReadSpheres(NpzReader* file, SphereGeometry* spheres, Buffer<float>* color)
   }
 }
 
-// Keys and levels are checked before anything is derived of them: a key outside of the box would
-// be an entry outside of the tree.
+// Keys and levels are checked before anything is derived of them: a key outside of the box
+// would be an entry outside of the tree.
 void ReadCells(NpzReader* file, Geometry* geometry) {
   const NpzArray size = file->Read("regrade_cells_size", ArrayType::kI32, {3});
   const NpzArray keys = file->Read("regrade_cells_key", ArrayType::kU64, {-1});

@@ -81,8 +81,7 @@ void ForEachVertex(const Vec3i& n, const Body& body) {
 #pragma omp parallel for schedule(dynamic, 1)
   for (int x = 0; x < n.x; ++x)
     for (int y = 0; y < n.y; ++y)
-      for (int z = 0; z < n.z; ++z)
-        body((int64_t{x} * n.y + y) * n.z + z, x, y, z);
+      for (int z = 0; z < n.z; ++z) body((int64_t{x} * n.y + y) * n.z + z, x, y, z);
 }
 
 void CheckMemory(double bytes, const Vec3i& n, uint64_t memory) {

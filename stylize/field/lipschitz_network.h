@@ -105,13 +105,13 @@ void AddBaseMap(const ColorMap& map, const T* sh, T* output) {
   for (int i = 0; i < kNetworkSh; ++i) output[i] += mapped[i];
 }
 
-// The vertex of each voxel: the inverse of Geometry::links. Of an adaptive field, whose voxels are
-// vertices, the voxel.
+// The vertex of each voxel: the inverse of Geometry::links. Of an adaptive field, whose voxels
+// are vertices, the voxel.
 std::vector<int32_t> VertexOfVoxel(const Geometry& geometry);
 
 // Feature row [kFeatureStride] of a voxel; `vertex` as VertexOfVoxel has it. Coefficients of a
-// smaller basis are padded with zeros, which leaves the bound as it is. An adaptive field has one
-// frame for the positions of all levels, see EQ(cell-lattice): where two cells of different
+// smaller basis are padded with zeros, which leaves the bound as it is. An adaptive field has
+// one frame for the positions of all levels, see EQ(cell-lattice): where two cells of different
 // levels share a vertex, it is one record, restyled once.
 void FillFeatures(const RadianceField& field, float position_scale, int64_t voxel,
                   int32_t vertex, float* row);

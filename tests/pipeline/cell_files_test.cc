@@ -158,9 +158,8 @@ TEST_F(DamagedCells, F68_CellsOutOfTheirPlaceAreRefused) {
   ExpectRefused(keys, "overlaps another", [](Arrays* a) { a->key.back() = KeyOf({8, 0, 0}); });
   ExpectRefused(keys, "overlaps another", [](Arrays* a) { a->key.back() = ~CellKey{0}; });
   ExpectRefused(keys, "overlaps another", [](Arrays* a) { a->level[0] = 3; });
-  ExpectRefused(keys, "overlaps another", [](Arrays* a) {
-    *std::max_element(a->level.begin(), a->level.end()) = 0;
-  });
+  ExpectRefused(keys, "overlaps another",
+                [](Arrays* a) { *std::max_element(a->level.begin(), a->level.end()) = 0; });
   ExpectRefused(keys, "does not divide", [](Arrays* a) { a->size[1] = 11; });
   ExpectRefused(keys, "does not divide", [](Arrays* a) { a->size[2] = -8; });
   ExpectRefused(keys, "does not divide", [](Arrays* a) { a->size[2] = 1 << 21; });
@@ -227,11 +226,13 @@ TEST(CellCheckpoint, DamagedCellsAreRefused) {
   };
   EXPECT_TRUE(unpacks([](FastGrid*) {}));
   EXPECT_TRUE(unpacks([](FastGrid* grid) { grid->density_rate = {}; }));
-  EXPECT_FALSE(unpacks([](FastGrid* grid) { std::swap(grid->cells.key[0], grid->cells.key[1]); }));
+  EXPECT_FALSE(
+      unpacks([](FastGrid* grid) { std::swap(grid->cells.key[0], grid->cells.key[1]); }));
   EXPECT_FALSE(unpacks([](FastGrid* grid) { grid->cells.level[0] = 200; }));
   EXPECT_FALSE(unpacks([](FastGrid* grid) { grid->cells.finest = 40; }));
   EXPECT_FALSE(unpacks([](FastGrid* grid) { grid->frame.resolution.y = 1 << 24; }));
-  EXPECT_FALSE(unpacks([](FastGrid* grid) { grid->records.Resize(grid->records.size() - 16); }));
+  EXPECT_FALSE(
+      unpacks([](FastGrid* grid) { grid->records.Resize(grid->records.size() - 16); }));
   EXPECT_FALSE(unpacks([](FastGrid* grid) { grid->density_rate.Resize(1); }));
   EXPECT_FALSE(unpacks([](FastGrid* grid) { grid->links.Resize(8); }));
 }
@@ -261,15 +262,13 @@ TEST(CellStyledFile, IsRemadeFromFieldAndNetwork) {
   RestyleRequest request;
   request.options.steps = 5;
   regrade::RestyledField restyled = Restyle(std::move(stored.field), targets, request, {});
-  WriteNetworkFile(folder / "network.npz",
-                   {restyled.trained.network, restyled.trained.k_est,
-                    restyled.styled.background});
+  WriteNetworkFile(folder / "network.npz", {restyled.trained.network, restyled.trained.k_est,
+                                            restyled.styled.background});
   stored.field = restyled.styled;
   WriteFieldFile(folder / "styled.npz", stored);
 
-  WriteFieldFile(folder / "again.npz",
-                 RestyledField(ReadFieldFile(folder / "field.npz"),
-                               ReadNetworkFile(folder / "network.npz")));
+  WriteFieldFile(folder / "again.npz", RestyledField(ReadFieldFile(folder / "field.npz"),
+                                                     ReadNetworkFile(folder / "network.npz")));
   EXPECT_TRUE(ReadText(folder / "again.npz") == ReadText(folder / "styled.npz"));
   EXPECT_FALSE(ReadText(folder / "again.npz") == ReadText(folder / "field.npz"));
 }
@@ -322,8 +321,7 @@ TEST(UniformField, BlendsOfLinearValuesAreExact) {
             at[a] = static_cast<int>(place[a] * static_cast<float>(voxels[a]));
           int width;
           const bool is_cell = CellAt(view, at, &width) != kNoCell;
-          const int32_t link =
-              uniform.geometry->links[uniform.geometry->frame.Vertex(x, y, z)];
+          const int32_t link = uniform.geometry->links[uniform.geometry->frame.Vertex(x, y, z)];
           ASSERT_EQ(link >= 0, is_cell) << x << " " << y << " " << z;
           ++(is_cell ? stored : empty);
           if (!is_cell) continue;
