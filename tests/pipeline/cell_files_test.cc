@@ -9,12 +9,14 @@
 
 #include "kernels/base/half.h"
 #include "kernels/field/cpu/render_view.h"
+#include "kernels/field/pad_sh_basis.h"
 #include "pipeline/fields/field_file.h"
 #include "pipeline/fields/fit_checkpoint.h"
 #include "pipeline/fields/restyled_field.h"
 #include "pipeline/fields/uniform_field.h"
 #include "pipeline/files/npz_file.h"
-#include "stylize/training/restyle_field.h"
+#include "stylize/training/style_engine.h"
+#include "stylize/training/training_targets.h"
 #include "tests/support/cell_field.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"
@@ -259,13 +261,22 @@ TEST(CellStyledFile, IsRemadeFromFieldAndNetwork) {
   StyledTrainingView view{camera};
   view.name = "view";
   targets.Add(view, photo, target);
-  RestyleRequest request;
-  request.options.steps = 5;
-  regrade::RestyledField restyled = Restyle(std::move(stored.field), targets, request, {});
-  WriteNetworkFile(folder / "network.npz", {restyled.trained.network, restyled.trained.k_est,
-                                            restyled.styled.background});
-  stored.field = restyled.styled;
-  WriteFieldFile(folder / "styled.npz", stored);
+  stored.field.appearance = PadShBasis(std::move(stored.field.appearance), 9);
+  const MarchOptions march{stored.field.step};
+  TrainNetworkOptions options;
+  options.steps = 5;
+  const auto engine = MakeStyleEngine(Backend::kCpu, &stored.field, march, options);
+  std::vector<std::string> notices;
+  const std::vector<StyledTrainingView> views = targets.views();
+  const TrainNetworkResult trained =
+      TrainNetwork(stored.field, views, targets.SceneMap(&notices), march, options, {}, nullptr,
+                   engine.get());
+  const Vec3f background{0.25f, 0.5f, 0.125f};
+  WriteNetworkFile(folder / "network.npz", {trained.network, trained.k_est, background});
+  StoredField styled = stored;
+  styled.field.appearance = engine->Restyle(trained.network, nullptr);
+  styled.field.background = background;
+  WriteFieldFile(folder / "styled.npz", styled);
 
   WriteFieldFile(folder / "again.npz", RestyledField(ReadFieldFile(folder / "field.npz"),
                                                      ReadNetworkFile(folder / "network.npz")));
