@@ -1,7 +1,6 @@
 #include "evaluate/bootstrap.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "kernels/base/error.h"
 #include "kernels/base/random.h"

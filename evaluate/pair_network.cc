@@ -1,6 +1,5 @@
 #include "evaluate/pair_network.h"
 
-#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <mutex>

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
-#include <set>
 
 #include "kernels/base/error.h"
 #include "kernels/base/natural_order.h"

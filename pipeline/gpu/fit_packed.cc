@@ -1,6 +1,5 @@
 // regrade_gpu fit: a packed capture becomes a field, measured on the views that were kept back.
 #include <chrono>
-#include <cmath>
 #include <numeric>
 
 #include "evaluate/image_quality.h"

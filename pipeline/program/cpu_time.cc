@@ -2,8 +2,6 @@
 
 #include <sys/resource.h>
 
-#include <initializer_list>
-
 namespace regrade {
 namespace {
 

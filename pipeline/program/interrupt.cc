@@ -2,8 +2,6 @@
 
 #include <signal.h>
 
-#include <initializer_list>
-
 namespace regrade {
 namespace {
 

@@ -1,7 +1,6 @@
 #include "pipeline/report/html_text.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <cstdio>
 

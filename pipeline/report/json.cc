@@ -1,8 +1,5 @@
 #include "pipeline/report/json.h"
 
-#include <string>
-#include <vector>
-
 #include "pipeline/workspace/metrics_json.h"
 
 namespace regrade {

@@ -5,7 +5,6 @@
 #include <filesystem>
 #include <map>
 
-#include "kernels/base/error.h"
 #include "kernels/image/resize.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/images/image_file.h"

@@ -1,7 +1,6 @@
 #include "pipeline/report/tables.h"
 
 #include <algorithm>
-#include <utility>
 #include <vector>
 
 #include "pipeline/report/chart.h"

@@ -6,8 +6,6 @@
 #include "kernels/base/error.h"
 #include "kernels/field/packed_grid.h"
 #include "kernels/field/spherical_harmonics.h"
-#include "pipeline/program/console.h"
-#include "reconstruct/fit/resample_grid.h"
 
 namespace regrade {
 namespace {

@@ -3,10 +3,8 @@
 
 #include <string>
 
-#include "kernels/scene/capture.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/run/run_settings.h"
-#include "pipeline/workspace/stage_runner.h"
 
 namespace regrade {
 

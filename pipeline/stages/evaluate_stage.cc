@@ -1,11 +1,9 @@
 // Stage "evaluate": temporal consistency of the rendered sequences and their fidelity to the 2D
 // method.
 #include <filesystem>
-#include <optional>
 
 #include "evaluate/consistency.h"
 #include "evaluate/fidelity.h"
-#include "evaluate/image_quality.h"
 #include "evaluate/optical_flow.h"
 #include "evaluate/pair_network.h"
 #include "evaluate/tables.h"

@@ -1,7 +1,6 @@
 // Writes heat maps of the pairs with the largest errors.
 #pragma once
 
-#include <string>
 #include <vector>
 
 #include "evaluate/consistency.h"

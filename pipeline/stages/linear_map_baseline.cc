@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "evaluate/fidelity.h"
-#include "kernels/base/error.h"
 #include "kernels/field/cpu/render_view.h"
 #include "kernels/field/packed_grid.h"
 #include "kernels/image/color_statistics.h"

@@ -5,7 +5,6 @@
 #include "kernels/base/error.h"
 #include "kernels/field/cpu/rays.h"
 #include "pipeline/capture/capture_store.h"
-#include "pipeline/capture/photo_gains.h"
 #include "pipeline/capture/scene_profile.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/files/atomic_file.h"

@@ -3,7 +3,6 @@
 #include <charconv>
 #include <cstdio>
 #include <filesystem>
-#include <string_view>
 #include <vector>
 
 #include "evaluate/flow_file.h"

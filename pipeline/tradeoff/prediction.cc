@@ -1,7 +1,6 @@
 #include "pipeline/tradeoff/prediction.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "kernels/base/error.h"
 #include "kernels/scene/common_camera.h"

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <filesystem>
 #include <numeric>
-#include <optional>
 
 #include "evaluate/image_quality.h"
 #include "evaluate/pair_motion.h"

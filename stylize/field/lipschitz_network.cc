@@ -7,7 +7,6 @@
 
 #include "kernels/base/error.h"
 #include "kernels/field/background_spheres.h"
-#include "kernels/field/spherical_harmonics.h"
 #include "kernels/network/lipschitz_layer.h"
 
 namespace regrade {
