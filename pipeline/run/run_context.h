@@ -4,6 +4,7 @@
 #include <string>
 
 #include "pipeline/capture/working_views.h"
+#include "pipeline/program/console.h"
 #include "pipeline/run/run_settings.h"
 
 namespace regrade {
