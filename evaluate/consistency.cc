@@ -185,8 +185,7 @@ ConsistencyReport EvaluateConsistency(int frames, const PairMotionFunction& moti
         result.low_coverage = result.coverage < options.min_coverage;
         report.pairs.push_back(std::move(result));
       }
-      const LoopControl control =
-          Report(progress, static_cast<double>(++done), static_cast<double>(total));
+      const LoopControl control = Report(progress, ++done, total);
       if (control == LoopControl::kStop) throw Interrupted();
     }
   for (const NamedFrameSource& sequence : sequences)

@@ -222,9 +222,7 @@ IngestResult IngestPhotos(const std::string& folder, const std::string& staging_
     const Candidate candidate = next.get();
     next = decode_later(i + 1);
     const std::string& file = files[i].name;
-    if (Report(progress, static_cast<double>(i), static_cast<double>(files.size()), file) !=
-        LoopControl::kContinue)
-      throw Interrupted();
+    if (Report(progress, i, files.size(), file) != LoopControl::kContinue) throw Interrupted();
     if (!candidate.problem.empty()) {
       result.statuses.push_back({file, PhotoState::kSkipped, candidate.problem});
       if (candidate.problem != "not an image")
@@ -258,7 +256,7 @@ IngestResult IngestPhotos(const std::string& folder, const std::string& staging_
                              candidate.photo.exif_focal_px, bits});
     fingerprint.Add(file + '\n' + HashText(candidate.pixel_hash) + '\n');
   }
-  Report(progress, static_cast<double>(files.size()), static_cast<double>(files.size()));
+  Report(progress, files.size(), files.size());
   RequireEnough(result, folder);
   RemoveLeftovers(staging, staged_names);
   result.notices = notices.Texts();

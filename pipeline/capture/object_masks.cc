@@ -19,7 +19,7 @@ namespace {
 constexpr float kSameLabel = 24.0f / 255;
 
 Vec3f ColorOf(const Image& image, int64_t pixel) {
-  const float* p = &image.pixels[static_cast<size_t>(pixel * image.channels)];
+  const float* p = &image.pixels[pixel * image.channels];
   const float alpha = image.channels == 4 ? p[3] : 1;
   const bool grey = image.channels < 3;
   return Vec3f{p[0], p[grey ? 0 : 1], p[grey ? 0 : 2]} * alpha;
@@ -83,11 +83,11 @@ std::vector<Image> ObjectMasks::Regions(const std::string& path, int width, int 
     Image region(mask.width, mask.height, 1);
     for (int64_t i = 0; i < mask.num_pixels(); ++i) {
       const Vec3f color = ColorOf(mask, i);
-      float& m = region.pixels[static_cast<size_t>(i)];
+      float& m = region.pixels[i];
       if (labels_.empty())
         m = (color.x + color.y + color.z) / 3;
       else
-        m = Same(color, labels_[static_cast<size_t>(k)]) ? 1.0f : 0.0f;
+        m = Same(color, labels_[k]) ? 1.0f : 0.0f;
     }
     regions.push_back(region.width == width && region.height == height
                           ? std::move(region)
@@ -96,21 +96,21 @@ std::vector<Image> ObjectMasks::Regions(const std::string& path, int width, int 
   // Labels closer than their tolerance would count a pixel twice.
   for (int64_t i = 0; i < regions[0].num_pixels(); ++i) {
     float sum = 0;
-    for (const Image& region : regions) sum += region.pixels[static_cast<size_t>(i)];
+    for (const Image& region : regions) sum += region.pixels[i];
     if (sum > 1)
-      for (Image& region : regions) region.pixels[static_cast<size_t>(i)] /= sum;
+      for (Image& region : regions) region.pixels[i] /= sum;
   }
   return regions;
 }
 
 std::vector<Image> ObjectMasks::Coverage(int view, int width, int height) const {
   REGRADE_CHECK(Knows(view));
-  return Regions(paths_[static_cast<size_t>(view)], width, height);
+  return Regions(paths_[view], width, height);
 }
 
 Image ObjectMasks::StyleRegion(int region, int width, int height) const {
   if (labels_.empty()) return {};
-  return Regions(style_mask_, width, height)[static_cast<size_t>(region)];
+  return Regions(style_mask_, width, height)[region];
 }
 
 JsonValue MaskFiles(const MaskOptions& options) {

@@ -97,7 +97,7 @@ int64_t BytesOf(const Camera& camera) { return int64_t{camera.width} * camera.he
 
 void WritePackedCapture(const std::string& path, const PackedCapture& capture) {
   const auto n = static_cast<int64_t>(capture.views.size());
-  std::vector<double> cameras(static_cast<size_t>(n * kCameraValues));
+  std::vector<double> cameras(n * kCameraValues);
   std::vector<uint8_t> held_out;
   std::string names;
   int64_t bytes = 0;

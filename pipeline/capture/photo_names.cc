@@ -32,7 +32,7 @@ bool IsMeantAsPicture(const std::string& path) {
   std::string begin(4096, '\0');
   std::ifstream file(path, std::ios::binary);
   file.read(begin.data(), static_cast<std::streamsize>(begin.size()));
-  begin.resize(static_cast<size_t>(std::max<std::streamsize>(0, file.gcount())));
+  begin.resize(std::max<std::streamsize>(0, file.gcount()));
   return SniffImageFormat(begin, path) != nullptr;
 }
 

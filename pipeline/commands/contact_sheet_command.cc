@@ -137,9 +137,8 @@ std::vector<Image> Shown(const Scene& scene, const RadianceField& field) {
   const FastGrid grid = MakeFastGrid(field);
   std::vector<Image> frames;
   for (const int i : scene.shown)
-    frames.push_back(Clipped(
-        RenderView(grid, scene.cameras[static_cast<size_t>(i)], MarchOptions{field.step})
-            .color));
+    frames.push_back(
+        Clipped(RenderView(grid, scene.cameras[i], MarchOptions{field.step}).color));
   return frames;
 }
 
@@ -209,7 +208,7 @@ std::vector<Image> StyleRenders(RunContext* context, const Scene& scene,
   std::vector<Image> styled = Shown(scene, scene.stored.field);
   for (size_t k = 0; k < styled.size(); ++k) {
     const int view = scene.shown[k];
-    if (object) coverage = object->Render(scene.cameras[static_cast<size_t>(view)]);
+    if (object) coverage = object->Render(scene.cameras[view]);
     ViewStylizer* const stylizer = of_renders ? of_renders.get() : of_photos;
     styled[k] = Clipped(stylizer->Stylize(styled[k], view));
   }

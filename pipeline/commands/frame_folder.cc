@@ -101,9 +101,7 @@ FrameFolder OpenFrameFolder(const std::string& folder, const ProgressFunction& p
                       SizeText(*first),
                   frames.paths[i], "render all frames at one size");
     if (!first) first = std::move(image);
-    if (Report(progress, static_cast<double>(i + 1),
-               static_cast<double>(frames.paths.size())) == LoopControl::kStop)
-      throw Interrupted();
+    if (Report(progress, i + 1, frames.paths.size()) == LoopControl::kStop) throw Interrupted();
   }
   return frames;
 }

@@ -108,8 +108,8 @@ void WriteMix(const std::string& out, const RadianceField& source,
           MixFields(source, styles, weights, object_weights), backend);
       rendered = weights;
     }
-    const Camera& of_frame = cameras.frames[static_cast<size_t>(i)];
-    const Camera& of_film = cameras.film[static_cast<size_t>(i)];
+    const Camera& of_frame = cameras.frames[i];
+    const Camera& of_film = cameras.film[i];
     const Image frame = renderer->Render(of_frame).color;
     WritePng8(out + "/frames/" + FrameName(i), frame);
     if (film)

@@ -60,7 +60,7 @@ MixKeys ParseMixKeys(const std::string& text, int styles) {
     keys.points.emplace_back(static_cast<size_t>(styles), 0.0);
     for (int i = 0; i < styles; ++i) {
       keys.points.emplace_back(static_cast<size_t>(styles), 0.0);
-      keys.points.back()[static_cast<size_t>(i)] = 1;
+      keys.points.back()[i] = 1;
     }
     return keys;
   }

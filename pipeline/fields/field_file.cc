@@ -74,7 +74,7 @@ void CheckReadable(NpzReader* file) {
 void AddSpheres(const RadianceField& field, std::vector<float>* texels, NpzWriter* file) {
   const SphereGeometry& spheres = field.geometry->spheres;
   if (!spheres.on()) return;
-  texels->resize(static_cast<size_t>(4 * spheres.num_texels()));
+  texels->resize(4 * spheres.num_texels());
   for (int64_t i = 0; i < spheres.num_texels(); ++i) {
     float* const texel = texels->data() + 4 * i;
     std::copy_n(field.appearance.sphere_color.data() + 3 * i, 3, texel);

@@ -64,14 +64,14 @@ class ByteUnpacker {
   }
   template <typename T>
   void Values(std::vector<T>* array) {
-    Values(array, [array](int64_t n) { array->resize(static_cast<size_t>(n)); });
+    Values(array, [array](int64_t n) { array->resize(n); });
   }
   template <typename T>
   void Values(Buffer<T>* array) {
     Values(array, [array](int64_t n) { array->Resize(n); });
   }
   void Values(std::string* array) {
-    Values(array, [array](int64_t n) { array->resize(static_cast<size_t>(n)); });
+    Values(array, [array](int64_t n) { array->resize(n); });
   }
 
   bool ok() const { return ok_; }

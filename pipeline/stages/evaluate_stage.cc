@@ -27,16 +27,15 @@ namespace {
 
 // The pictures `folder`/00000.png, ... of the given views.
 FrameSource FramesOf(const std::string& folder, const std::vector<int>& views) {
-  return {static_cast<int>(views.size()), [folder, views](int i) {
-            return ReadImage(folder + "/" + FrameName(views[static_cast<size_t>(i)]));
-          }};
+  return {static_cast<int>(views.size()),
+          [folder, views](int i) { return ReadImage(folder + "/" + FrameName(views[i])); }};
 }
 
 // Depth at each camera, rendered on demand.
 GeometrySource GeometryOf(const RadianceField& field, const std::vector<Camera>& cameras) {
   const auto grid = std::make_shared<const FastGrid>(MakeFastGrid(field));
   return [grid, cameras, step = field.step](int i) -> FrameGeometry {
-    const Camera& camera = cameras[static_cast<size_t>(i)];
+    const Camera& camera = cameras[i];
     return {DepthAlongRays(camera, RenderView(*grid, camera, MarchOptions{step}).depth),
             camera};
   };
@@ -94,7 +93,7 @@ void AddFilm(RunContext* context, const Image& style, const Camera& camera,
              std::vector<FidelityRow>* fidelity, std::vector<HeatMapFile>* heat_maps) {
   const RunSettings& settings = context->settings;
   if (!HasFilm(settings)) return;
-  std::vector<int> all(static_cast<size_t>(settings.render.path.path_frames));
+  std::vector<int> all(settings.render.path.path_frames);
   for (size_t i = 0; i < all.size(); ++i) all[i] = static_cast<int>(i);
   const auto folder = [&](const char* name) {
     return context->workspace->Path(std::string("frames/") + kPathPrefix + name);
@@ -125,7 +124,7 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   Workspace& workspace = *context->workspace;
   const StoredField stored = ReadFieldFile(workspace.Path("field.npz"));
   const WorkingViews views = context->Views().InField(stored.field_from_world, stored.ndc);
-  std::vector<int> all(static_cast<size_t>(views.count()));
+  std::vector<int> all(views.count());
   for (size_t i = 0; i < all.size(); ++i) all[i] = static_cast<int>(i);
   const std::vector<int> training_views = StyledViews(workspace, views);
   const auto frames = [&](const char* sequence, const std::vector<int>& views) {
@@ -164,7 +163,7 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   // the rendered frames, or else to the photos.
   const Image style = ReadStylePicture(settings.style.picture, nullptr);
   const FrameSource of_photos{static_cast<int>(training_views.size()), [&](int k) {
-                                const int i = training_views[static_cast<size_t>(k)];
+                                const int i = training_views[k];
                                 Image picture =
                                     ReadImage(workspace.Path("views_2d/" + FrameName(i)));
                                 views.LeaveOutMasked(i, &picture);
@@ -185,8 +184,7 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
                                                 photo_targets, parts.Next(n * kFrameSeconds));
 
   std::vector<Camera> training_cameras;
-  for (const int i : training_views)
-    training_cameras.push_back(cameras[static_cast<size_t>(i)]);
+  for (const int i : training_views) training_cameras.push_back(cameras[i]);
   EvaluateReport report;
   report.flow = settings.consistency.flow;
   report.mask = settings.consistency.mode;

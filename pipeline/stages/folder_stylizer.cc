@@ -17,7 +17,7 @@ class FolderStylizer : public ViewStylizer {
 
   Image Stylize(const Image& view, int view_index) const override {
     REGRADE_CHECK(Knows(view_index));
-    const std::string& path = paths_[static_cast<size_t>(view_index)];
+    const std::string& path = paths_[view_index];
     DecodeLimits limits;
     limits.min_side = 1;
     return WithColors(view, FittedToView(DecodePhoto(path, limits).image, view, path));

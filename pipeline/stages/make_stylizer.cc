@@ -93,8 +93,8 @@ std::unique_ptr<ViewStylizer> MakeSceneStylizer(RunContext* context, const Worki
       if (!masks->Knows(static_cast<int>(i))) return std::nullopt;
       const std::optional<Image> picture = photo(i);
       if (!picture) return std::nullopt;
-      const Image region = masks->Coverage(static_cast<int>(i), picture->width,
-                                           picture->height)[static_cast<size_t>(k)];
+      const Image region =
+          masks->Coverage(static_cast<int>(i), picture->width, picture->height)[k];
       if (!ShowsRegion(region)) return std::nullopt;
       return WithRegion(*picture, region);
     };

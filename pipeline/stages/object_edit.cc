@@ -39,8 +39,7 @@ ObjectWeights VoteForObject(const RunSettings& settings, const WorkingViews& wor
   for (int k = 0; k < masks.num_regions(); ++k)
     votes.emplace_back(*field.geometry, field.near_clip, MarchOptions{field.step});
   for (size_t n = 0; n < views.size(); ++n) {
-    if (Report(progress, static_cast<double>(n), static_cast<double>(views.size()),
-               "masks vote") == LoopControl::kStop)
+    if (Report(progress, n, views.size(), "masks vote") == LoopControl::kStop)
       throw Interrupted();
     const int i = views[n];
     if (!masks.Knows(i)) continue;
@@ -101,8 +100,8 @@ std::vector<Image> CoverageRenderer::Render(const Camera& camera) const {
     const Image color = RenderView(grid, camera, MarchOptions{step_}).color;
     Image region(color.width, color.height, 1);
     for (int64_t i = 0; i < region.num_pixels(); ++i) {
-      const float m = color.pixels[static_cast<size_t>(3 * i)];
-      region.pixels[static_cast<size_t>(i)] = m > kNothing ? m : 0;
+      const float m = color.pixels[3 * i];
+      region.pixels[i] = m > kNothing ? m : 0;
     }
     coverage.push_back(std::move(region));
   }

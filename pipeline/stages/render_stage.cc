@@ -192,7 +192,7 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
         if (Report(progress, done++, total) == LoopControl::kStop) throw Interrupted();
         writer.Write(
             std::make_shared<const Frame>(RenderFrame(
-                context, &renderers, set.cameras[static_cast<size_t>(i)],
+                context, &renderers, set.cameras[i],
                 set.of_photos && settings.render.keep_exposure ? views.Gain(i) : kAsTaken, i)),
             set, i);
       }

@@ -95,7 +95,7 @@ ReportPictures PicturesOf(const RunContext& context, const RunReport& report) {
   const int shown = std::min(count, kPagePictures);
   for (int k = 0; k < shown; ++k) {
     const int i = shown < 2 ? 0 : k * (count - 1) / (shown - 1);
-    const CaptureView& photo = capture.views[static_cast<size_t>(i)];
+    const CaptureView& photo = capture.views[i];
     const std::string name = FrameName(i);
     const Image picture = as_taken.Photo(i);
     ReportView view;

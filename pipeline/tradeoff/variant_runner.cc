@@ -96,8 +96,7 @@ double Mean(const std::vector<double>& values) {
 std::vector<int> EvenlySpaced(const std::vector<int>& all, int count) {
   std::vector<int> some;
   const int n = static_cast<int>(all.size()), k = std::min(count, n);
-  for (int i = 0; i < k; ++i)
-    some.push_back(all[static_cast<size_t>((2 * i + 1) * n / (2 * k))]);
+  for (int i = 0; i < k; ++i) some.push_back(all[(2 * i + 1) * n / (2 * k)]);
   return some;
 }
 
@@ -256,19 +255,17 @@ const VariantRunner::Frames& VariantRunner::BaseFrames() {
   // Flow is compared on frames of one size.
   const std::vector<Camera> cameras = WithCommonIntrinsics(views.Cameras());
   for (int i = 0; i < count; ++i) {
-    const Camera& camera = cameras[static_cast<size_t>(i)];
+    const Camera& camera = cameras[i];
     const RenderedView view = RenderView(f.grid, camera, MarchOptions{f.stored.field.step});
     f.cameras.push_back(camera);
     f.colors.push_back(view.color);
     f.geometry.push_back({DepthAlongRays(camera, view.depth), camera});
   }
-  const PairMotionFunction known =
-      GeometricMotion([&f](int i) { return f.geometry[static_cast<size_t>(i)]; });
+  const PairMotionFunction known = GeometricMotion([&f](int i) { return f.geometry[i]; });
   for (int i = 0; i + 1 < count; ++i) f.truth.push_back(known(i, i + 1));
   for (int i = 0; i < std::min(kRenderedFrames, count); ++i)
-    f.accurate.push_back(RenderView(f.grid, f.cameras[static_cast<size_t>(i)],
-                                    MarchOptions{0.25f * f.stored.field.step, 0})
-                             .color);
+    f.accurate.push_back(
+        RenderView(f.grid, f.cameras[i], MarchOptions{0.25f * f.stored.field.step, 0}).color);
   return f;
 }
 
@@ -297,7 +294,7 @@ void VariantRunner::MeasureFlow(const Variant& variant, Measurement* m) {
   std::string method = base_->settings.consistency.flow;
   if (const JsonValue* flow = variant.options.Find("flow")) method = flow->AsString();
   const FrameSource source{static_cast<int>(f.colors.size()),
-                           [&f](int i) { return f.colors[static_cast<size_t>(i)]; }};
+                           [&f](int i) { return f.colors[i]; }};
   const std::string mode =
       base_->settings.consistency.mode == "ruder2016" ? "ruder2016" : "lai2018";
   const PairMotionFunction motion = EstimatedMotion(source, mode, method);

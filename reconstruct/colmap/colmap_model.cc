@@ -42,7 +42,7 @@ class Reader {
     if (!file)
       throw Error(ExitCode::kInput, "cannot open it", path_,
                   "a COLMAP model needs cameras, images and points3D, as .bin or .txt");
-    bytes_.resize(static_cast<size_t>(std::max<std::streamoff>(0, file.tellg())));
+    bytes_.resize(std::max<std::streamoff>(0, file.tellg()));
     file.seekg(0);
     if (!bytes_.empty() &&
         !file.read(bytes_.data(), static_cast<std::streamsize>(bytes_.size())))

@@ -162,8 +162,7 @@ void WriteColmapText(const ColmapModel& model, const std::string& folder) {
                " " + std::to_string(c.height) + " " + NumberText(c.fx);
     if (info.focals == 2) cameras += " " + NumberText(c.fy);
     cameras += " " + NumberText(c.cx) + " " + NumberText(c.cy);
-    for (int i = 0; i < info.coefficients; ++i)
-      cameras += " " + NumberText(c.distortion[static_cast<size_t>(i)]);
+    for (int i = 0; i < info.coefficients; ++i) cameras += " " + NumberText(c.distortion[i]);
     cameras += "\n";
   }
   std::string images =

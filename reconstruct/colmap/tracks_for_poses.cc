@@ -55,8 +55,7 @@ std::string ParametersOf(const ColmapCamera& camera) {
   text << c.fx;
   if (info.focals == 2) text << "," << c.fy;
   text << "," << c.cx << "," << c.cy;
-  for (int i = 0; i < info.coefficients; ++i)
-    text << "," << c.distortion[static_cast<size_t>(i)];
+  for (int i = 0; i < info.coefficients; ++i) text << "," << c.distortion[i];
   return text.str();
 }
 

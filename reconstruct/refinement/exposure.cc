@@ -114,7 +114,7 @@ double ExposureEstimate::Threshold() const {
 ExposureEstimate EstimateExposure(int num_views,
                                   const std::vector<ColorObservation>& observations) {
   ExposureEstimate estimate;
-  estimate.photos.resize(static_cast<size_t>(num_views));
+  estimate.photos.resize(num_views);
   const ExposureData data = ArrangeObservations(estimate.photos.size(), observations);
   if (data.observations.empty()) return estimate;
   const LogColors gains = BestGains(data, estimate.photos.size());

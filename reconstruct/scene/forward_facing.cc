@@ -26,7 +26,7 @@ double NearestDepth(const Capture& capture) {
   std::vector<double> depths;
   for (const ScenePoint& point : capture.points)
     for (const int32_t v : point.views) {
-      const Camera& camera = capture.views[static_cast<size_t>(v)].camera;
+      const Camera& camera = capture.views[v].camera;
       const double depth = (camera.camera_from_world * point.position).z;
       if (depth > 0) depths.push_back(depth);
     }

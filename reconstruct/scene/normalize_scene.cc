@@ -158,8 +158,7 @@ struct CameraPoses {
 double NearestDistance(const Capture& capture, const std::vector<Vec3d>& centers) {
   std::vector<double> distances;
   for (const ScenePoint& p : capture.points)
-    for (const int32_t view : p.views)
-      distances.push_back(Norm(p.position - centers[static_cast<size_t>(view)]));
+    for (const int32_t view : p.views) distances.push_back(Norm(p.position - centers[view]));
   return distances.empty() ? 0 : kNearestFraction * Quantile(&distances, kTail);
 }
 

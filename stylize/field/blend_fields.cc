@@ -34,7 +34,7 @@ void MixVoxel(const std::vector<const float*>& parts, const double* weights, int
   for (size_t i = 0; i < parts.size(); ++i)
     if (weights[i] != 0) alone = static_cast<int>(i), ++count;
   if (count == 1) {
-    std::copy_n(parts[static_cast<size_t>(alone)], stride, out);
+    std::copy_n(parts[alone], stride, out);
     return;
   }
   for (int k = 0; k < stride; ++k) {
@@ -105,7 +105,7 @@ RadianceField MixFields(const RadianceField& source,
       for (size_t i = 0; i < styles.size(); ++i)
         parts[i + 1] = styles[i]->appearance.sh.data() + v * stride;
       if (object_weights != nullptr) {
-        const double object_weight = (*object_weights)[static_cast<size_t>(v)];
+        const double object_weight = (*object_weights)[v];
         double left = 1;
         for (size_t i = 1; i < here.size(); ++i) {
           here[i] = object_weight * part_weights[i];

@@ -96,8 +96,7 @@ LocalLipschitz MeasureLocalLipschitz(const LipschitzNetwork& network,
     const int64_t voxel = static_cast<int64_t>(
         RandomIndex(options.seed, stream, static_cast<uint64_t>(i), static_cast<uint64_t>(n)));
     float row[kFeatureStride];
-    FillFeatures(field, network.data().position_scale, voxel,
-                 vertex[static_cast<size_t>(voxel)], row);
+    FillFeatures(field, network.data().position_scale, voxel, vertex[voxel], row);
     VectorXd point(kNetworkInputs);
     for (int k = 0; k < kNetworkInputs; ++k) point(k) = row[k];
     return point;

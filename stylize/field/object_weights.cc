@@ -46,9 +46,8 @@ void MaskVote::Add(const Camera& camera, const Image& mask) {
         ComputeRayWeights(geometry_, {rays.data(), count}, march_, near_clip_);
 #pragma omp parallel for schedule(dynamic, 64)
     for (int64_t r = 0; r < count; ++r)
-      for (int64_t i = weights.first[static_cast<size_t>(r)];
-           i < weights.first[static_cast<size_t>(r) + 1]; ++i) {
-        const WeightedSample& sample = weights.samples[static_cast<size_t>(i)];
+      for (int64_t i = weights.first[r]; i < weights.first[static_cast<size_t>(r) + 1]; ++i) {
+        const WeightedSample& sample = weights.samples[i];
         for (int corner = 0; corner < 8; ++corner) {
           const int32_t voxel =
               geometry_.links[CornerVertex(geometry_.frame, sample.vertex, corner)];
@@ -56,10 +55,10 @@ void MaskVote::Add(const Camera& camera, const Image& mask) {
           const double weight = sample.weight * CornerWeight(sample.fraction, corner);
           const uint64_t steps = static_cast<uint64_t>(weight * kStep);
           if (steps == 0) continue;
-          AddTo(&all_[static_cast<size_t>(voxel)], steps);
+          AddTo(&all_[voxel], steps);
           const uint64_t in_favour =
-              static_cast<uint64_t>(votes[static_cast<size_t>(r)] * static_cast<double>(steps));
-          if (in_favour > 0) AddTo(&yes_[static_cast<size_t>(voxel)], in_favour);
+              static_cast<uint64_t>(votes[r] * static_cast<double>(steps));
+          if (in_favour > 0) AddTo(&yes_[voxel], in_favour);
         }
       }
   }

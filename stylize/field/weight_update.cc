@@ -20,7 +20,7 @@ void LimitBound(const WeightUpdate& update, LipschitzNetwork* network) {
 bool UpdateWeights(const WeightUpdate& update, int64_t step, std::vector<double>* gradient,
                    LipschitzNetwork* network, AdamState* adam) {
   for (int l = 0; l < kNetworkLayers; ++l) {
-    double& d_k = (*gradient)[static_cast<size_t>(&network->k(l) - network->weight(0))];
+    double& d_k = (*gradient)[&network->k(l) - network->weight(0)];
     d_k = update.NormGradient(network->k(l), d_k);
   }
   const std::vector<float> gradient32(gradient->begin(), gradient->end());
