@@ -40,17 +40,16 @@ void CheckFrame(const Image& frame, const PairMotion& motion, const Image& first
                 const std::string& where) {
   if (frame.width != motion.flow.width || frame.height != motion.flow.height)
     throw Error(ExitCode::kInput,
-                "a frame of " + std::to_string(frame.width) + " x " +
-                    std::to_string(frame.height) + " px does not fit the reference of " +
-                    std::to_string(motion.flow.width) + " x " +
-                    std::to_string(motion.flow.height) + " px",
+                Concat("a frame of ", frame.width, " x ", frame.height,
+                       " px does not fit the reference of ", motion.flow.width, " x ",
+                       motion.flow.height, " px"),
                 where, "render all sequences at one size");
   if (ColourChannels(frame) != ColourChannels(first))
     throw Error(ExitCode::kInput, "grey and colour frames in one sequence", where);
 }
 
 std::string FrameName(const std::string& sequence, int index) {
-  return sequence + ", frame " + std::to_string(index);
+  return Concat(sequence, ", frame ", index);
 }
 
 }  // namespace
@@ -134,7 +133,7 @@ ConsistencyRow Summarize(const std::string& sequence, int gap,
     row.tc_psnr_interval_db = BootstrapMean(finite_db, gap);
   }
   if (row.pairs == 0)
-    row.why = "no pair of frames is " + std::to_string(gap) + " apart";
+    row.why = Concat("no pair of frames is ", gap, " apart");
   else if (defined == 0)
     row.why = "no pair has a comparable pixel";
   else if (finite_db.empty())
@@ -157,10 +156,10 @@ ConsistencyReport EvaluateConsistency(int frames, const PairMotionFunction& moti
   std::vector<FrameCache> caches;
   for (const NamedFrameSource& sequence : sequences) {
     if (sequence.frames.count != frames)
-      throw Error(ExitCode::kInput,
-                  "the sequence has " + std::to_string(sequence.frames.count) +
-                      " frames, the reference " + std::to_string(frames),
-                  sequence.name, "evaluate frames of the same cameras");
+      throw Error(
+          ExitCode::kInput,
+          Concat("the sequence has ", sequence.frames.count, " frames, the reference ", frames),
+          sequence.name, "evaluate frames of the same cameras");
     caches.emplace_back(sequence.frames, std::min(max_gap, frames) + 1,
                         kCacheBytes / static_cast<int64_t>(sequences.size()));
   }
@@ -185,8 +184,7 @@ ConsistencyReport EvaluateConsistency(int frames, const PairMotionFunction& moti
         result.low_coverage = result.coverage < options.min_coverage;
         report.pairs.push_back(std::move(result));
       }
-      const LoopControl control = Report(progress, ++done, total);
-      if (control == LoopControl::kStop) throw Interrupted();
+      ReportOrThrow(progress, ++done, total);
     }
   for (const NamedFrameSource& sequence : sequences)
     for (const int gap : options.gaps)

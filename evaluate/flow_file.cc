@@ -42,14 +42,11 @@ FlowField ReadFlowFile(const std::string& path, int64_t* unknown_pixels) {
   if (header.mark != kMark) Refuse("this is not a .flo file (its mark is not 202021.25)", path);
   if (header.width < 1 || header.width > kMaxSide || header.height < 1 ||
       header.height > kMaxSide)
-    Refuse("the flow file claims " + std::to_string(header.width) + " x " +
-               std::to_string(header.height) + " px",
-           path);
+    Refuse(Concat("the flow file claims ", header.width, " x ", header.height, " px"), path);
   const int64_t guaranteed = static_cast<int64_t>(sizeof(header)) +
                              static_cast<int64_t>(header.width) * header.height * 8;
   if (size != guaranteed)
-    Refuse("the flow file has " + std::to_string(size) + " bytes, its header specifies " +
-               std::to_string(guaranteed),
+    Refuse(Concat("the flow file has ", size, " bytes, its header specifies ", guaranteed),
            path);
   FlowField flow(header.width, header.height);
   if (!file.read(reinterpret_cast<char*>(flow.uv.data()), guaranteed - sizeof(header)))

@@ -73,7 +73,7 @@ const PairResult* WorstPair(const std::string& sequence, int gap,
 std::string HeatMapFileName(const PairResult& pair) {
   char number[16];
   std::snprintf(number, sizeof(number), "%05d", pair.from);
-  return pair.sequence + "_gap" + std::to_string(pair.to - pair.from) + "_" + number + ".png";
+  return Concat(pair.sequence, "_gap", pair.to - pair.from, "_", number, ".png");
 }
 
 }  // namespace regrade

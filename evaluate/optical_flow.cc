@@ -13,7 +13,7 @@ namespace regrade {
 namespace {
 
 std::string SizeText(const Image& image) {
-  return std::to_string(image.width) + " x " + std::to_string(image.height) + " px";
+  return Concat(image.width, " x ", image.height, " px");
 }
 
 uint8_t ToByte(float value) {

@@ -27,15 +27,13 @@ FlowField ReadPairFlow(const std::string& folder, int i, int j, const Image& fra
   const std::string path = folder + "/" + FlowFileName(i, j);
   if (!std::filesystem::exists(path))
     throw Error(ExitCode::kInput,
-                "there is no flow file from frame " + std::to_string(i) + " to frame " +
-                    std::to_string(j),
-                path, "every pair of --gaps needs its flow in both directions");
+                Concat("there is no flow file from frame ", i, " to frame ", j), path,
+                "every pair of --gaps needs its flow in both directions");
   FlowField flow = ReadFlowFile(path);
   if (flow.width != frame.width || flow.height != frame.height)
     throw Error(ExitCode::kInput,
-                "the flow is " + std::to_string(flow.width) + " x " +
-                    std::to_string(flow.height) + " px, the frames " +
-                    std::to_string(frame.width) + " x " + std::to_string(frame.height) + " px",
+                Concat("the flow is ", flow.width, " x ", flow.height, " px, the frames ",
+                       frame.width, " x ", frame.height, " px"),
                 path, "compute it at the frames' size");
   return flow;
 }
@@ -76,7 +74,7 @@ PairMotionFunction GeometricMotion(const GeometrySource& geometry) {
     const FrameGeometry a = geometry(i), b = geometry(j);
     if (!a.depth.SameSize(b.depth))
       throw Error(ExitCode::kInput, "depth images differ in size",
-                  "frames " + std::to_string(i) + " and " + std::to_string(j));
+                  Concat("frames ", i, " and ", j));
     PairMotion motion;
     Image visible;
     motion.flow = GeometricFlow(a.depth, a.camera, b.depth, b.camera, &visible);

@@ -5,6 +5,8 @@
 #include <cstdio>
 #include <optional>
 
+#include "kernels/base/error.h"
+
 namespace regrade {
 namespace {
 
@@ -48,17 +50,17 @@ std::string ConsistencyTable(const ConsistencyReport& report) {
                     std::to_string(row.undefined_pairs), Number(row.tc_psnr_mean_db, 2),
                     Range(row.tc_psnr_interval_db), Number(row.tc_psnr_of_mean_db, 2),
                     Number(100 * row.coverage, 1) + " %"});
-    const std::string prefix = row.sequence + ", gap " + std::to_string(row.gap) + ": ";
+    const std::string prefix = Concat(row.sequence, ", gap ", row.gap, ": ");
     if (!row.why.empty()) remarks += prefix + row.why + "\n";
     if (row.perfect_pairs > 0)
-      remarks += prefix + std::to_string(row.perfect_pairs) +
-                 " identical pair(s) at inf dB, not in the mean of dB\n";
+      remarks += Concat(prefix, row.perfect_pairs,
+                        " identical pair(s) at inf dB, not in the mean of dB\n");
     if (row.low_coverage_pairs > 0)
-      remarks += prefix + std::to_string(row.low_coverage_pairs) +
-                 " pair(s) with few comparable pixels\n";
+      remarks +=
+          Concat(prefix, row.low_coverage_pairs, " pair(s) with few comparable pixels\n");
     if (row.pairs_above_8bit_floor > row.perfect_pairs)
-      remarks += prefix + std::to_string(row.pairs_above_8bit_floor - row.perfect_pairs) +
-                 " pair(s) above 58.9 dB, beyond the precision of 8-bit frames\n";
+      remarks += Concat(prefix, row.pairs_above_8bit_floor - row.perfect_pairs,
+                        " pair(s) above 58.9 dB, beyond the precision of 8-bit frames\n");
   }
   return "Consistency: TC-PSNR, higher is better (mode " + report.mode + ", flow " +
          report.flow +

@@ -30,9 +30,8 @@ void CheckMask(const Image& image, const Image* mask) {
   REGRADE_CHECK_EQ(mask->channels, 1);
   if (!mask->SameSize(image))
     throw Error(ExitCode::kInput,
-                "the mask is " + std::to_string(mask->width) + "x" +
-                    std::to_string(mask->height) + ", its picture " +
-                    std::to_string(image.width) + "x" + std::to_string(image.height),
+                Concat("the mask is ", mask->width, "x", mask->height, ", its picture ",
+                       image.width, "x", image.height),
                 "", "a mask must have the size of its picture");
 }
 

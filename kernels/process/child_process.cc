@@ -194,19 +194,18 @@ class Child {
 }  // namespace
 
 std::string ChildResult::Describe() const {
-  const std::string by_signal = signal == 0 ? ""
-                                            : "killed by signal " + std::to_string(signal) +
-                                                  " (" + strsignal(signal) + ")";
+  const std::string by_signal =
+      signal == 0 ? "" : Concat("killed by signal ", signal, " (", strsignal(signal), ")");
   switch (end) {
     case ChildEnd::kExited:
       return "exit status " + std::to_string(exit_status);
     case ChildEnd::kSignal:
       return by_signal;
     case ChildEnd::kWallLimit:
-      return "ended after its time limit, " + std::to_string(std::lround(seconds)) + " s";
+      return Concat("ended after its time limit, ", std::lround(seconds), " s");
     case ChildEnd::kQuietLimit:
-      return "ended because it printed nothing for too long (it ran for " +
-             std::to_string(std::lround(seconds)) + " s)";
+      return Concat("ended because it printed nothing for too long (it ran for ",
+                    std::lround(seconds), " s)");
     case ChildEnd::kStopped:
       return "cancelled by the user";
   }

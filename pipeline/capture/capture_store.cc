@@ -102,8 +102,8 @@ ColmapModel ModelFromLlff(const CaptureSource& source, const std::vector<StagedP
   const LlffPoses poses = ReadPosesBounds(source.poses);
   if (poses.cameras.size() != photos.size())
     throw Error(ExitCode::kInput,
-                std::to_string(poses.cameras.size()) + " poses, but " +
-                    std::to_string(photos.size()) + " usable photos in " + source.photos,
+                Concat(poses.cameras.size(), " poses, but ", photos.size(),
+                       " usable photos in ", source.photos),
                 source.poses,
                 "an LLFF file has no photo names: all of its pictures must be present");
   *nearest_depth = poses.nearest;
@@ -127,8 +127,8 @@ void NoteMissing(const std::vector<PhotoStatus>& statuses, std::vector<std::stri
   for (const PhotoStatus& photo : statuses)
     if (photo.why == kNoPicture && count++ == 0) first = photo.file;
   if (count > 0)
-    notes->push_back("the pictures of " + std::to_string(count) +
-                     " poses are missing: " + first + (count > 1 ? " and others" : ""));
+    notes->push_back(Concat("the pictures of ", count, " poses are missing: ", first,
+                            (count > 1 ? " and others" : "")));
 }
 
 JsonValue StatusesJson(const std::vector<PhotoStatus>& statuses) {
@@ -149,8 +149,8 @@ JsonValue ReadIndex(const std::string& path) {
   const JsonValue* const schema = index.IsObject() ? index.Find("schema") : nullptr;
   if (schema == nullptr || !(*schema == JsonValue(kSchema)))
     throw Error(ExitCode::kInput,
-                "is of schema " + (schema == nullptr ? "0" : DumpJson(*schema, -1)) +
-                    ", this version of regrade reads schema " + std::to_string(kSchema),
+                Concat("is of schema ", (schema == nullptr ? "0" : DumpJson(*schema, -1)),
+                       ", this version of regrade reads schema ", kSchema),
                 path, "start a new folder with `regrade run`, or use --restart-from pose");
   return index;
 }

@@ -127,8 +127,8 @@ class Notices {
     for (const std::string& what : order_) {
       const Kind& kind = kinds_.at(what);
       texts.push_back(kind.count == 1 ? kind.first + ": " + what
-                                      : std::to_string(kind.count) + " photos: " + what +
-                                            " (the first is " + kind.first + ")");
+                                      : Concat(kind.count, " photos: ", what, " (the first is ",
+                                               kind.first, ")"));
     }
     return texts;
   }
@@ -153,9 +153,9 @@ std::string CountReasons(const std::vector<PhotoStatus>& statuses) {
   std::sort(sorted.begin(), sorted.end());
   std::string text;
   for (size_t i = 0; i < std::min(sorted.size(), kShown); ++i)
-    text += (i ? ", " : "") + std::to_string(-sorted[i].first) + " x " + sorted[i].second;
+    text += Concat((i ? ", " : ""), -sorted[i].first, " x ", sorted[i].second);
   if (sorted.size() > kShown)
-    text += ", and " + std::to_string(sorted.size() - kShown) + " other reasons";
+    text += Concat(", and ", sorted.size() - kShown, " other reasons");
   return text;
 }
 
@@ -165,21 +165,20 @@ void RequireEnough(const IngestResult& result, const std::string& folder) {
   std::string reasons = CountReasons(result.statuses);
   if (!reasons.empty()) reasons = ": " + reasons;
   if (usable == 0)
-    throw Error(ExitCode::kInput,
-                files == 0
-                    ? "the folder is empty" +
-                          (result.hidden > 0 ? " (except for " + std::to_string(result.hidden) +
-                                                   " hidden entries)"
-                                             : std::string())
-                    : std::to_string(files) + (files == 1 ? " file" : " files") +
-                          ", no usable photo" + reasons,
-                folder, "give a folder of JPEG, PNG or TIFF photos");
-  throw Error(ExitCode::kScene,
-              std::to_string(usable) + (usable == 1 ? " photo" : " photos") + " of " +
-                  std::to_string(files) +
-                  " files: a scene needs at least 3, better 20, from different viewpoints" +
-                  reasons,
-              folder);
+    throw Error(
+        ExitCode::kInput,
+        files == 0
+            ? "the folder is empty" +
+                  (result.hidden > 0
+                       ? Concat(" (except for ", result.hidden, " hidden entries)")
+                       : std::string())
+            : Concat(files, (files == 1 ? " file" : " files"), ", no usable photo", reasons),
+        folder, "give a folder of JPEG, PNG or TIFF photos");
+  throw Error(
+      ExitCode::kScene,
+      Concat(usable, (usable == 1 ? " photo" : " photos"), " of ", files,
+             " files: a scene needs at least 3, better 20, from different viewpoints", reasons),
+      folder);
 }
 
 std::string StagedName(size_t index, const char* suffix) {
@@ -222,7 +221,7 @@ IngestResult IngestPhotos(const std::string& folder, const std::string& staging_
     const Candidate candidate = next.get();
     next = decode_later(i + 1);
     const std::string& file = files[i].name;
-    if (Report(progress, i, files.size(), file) != LoopControl::kContinue) throw Interrupted();
+    ReportOrThrow(progress, i, files.size(), file);
     if (!candidate.problem.empty()) {
       result.statuses.push_back({file, PhotoState::kSkipped, candidate.problem});
       if (candidate.problem != "not an image")

@@ -18,7 +18,7 @@ constexpr uint64_t kMaxBytes = 16 << 20;
 constexpr double kRigidTolerance = 1e-2;
 
 [[noreturn]] void Refuse(const std::string& path, size_t row, const std::string& what) {
-  throw Error(ExitCode::kInput, "pose " + std::to_string(row) + ": " + what, path,
+  throw Error(ExitCode::kInput, Concat("pose ", row, ": ", what), path,
               "the file is damaged, or was written by another program");
 }
 

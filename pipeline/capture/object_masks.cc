@@ -56,8 +56,8 @@ std::vector<Vec3f> LabelsOf(const std::string& path) {
                 "paint each region of the style in one plain colour");
   if (kept.size() > ObjectMasks::kMostRegions)
     throw Error(ExitCode::kInput,
-                "has " + std::to_string(kept.size()) + " colours, at most " +
-                    std::to_string(ObjectMasks::kMostRegions) + " are regions",
+                Concat("has ", kept.size(), " colours, at most ", ObjectMasks::kMostRegions,
+                       " are regions"),
                 path, "paint each region in one plain colour, and save it as PNG");
   return kept;
 }

@@ -36,9 +36,7 @@ bool IsMeantAsPicture(const std::string& path) {
   return SniffImageFormat(begin, path) != nullptr;
 }
 
-std::string SizeOf(const Image& image) {
-  return std::to_string(image.width) + " x " + std::to_string(image.height);
-}
+std::string SizeOf(const Image& image) { return Concat(image.width, " x ", image.height); }
 
 }  // namespace
 
@@ -51,8 +49,7 @@ void CheckAspect(const Image& picture, int width, int height, const std::string&
   const double slack = 1.0 / std::min({width, height, picture.width, picture.height});
   if (std::abs(ratio_x - ratio_y) > slack * larger)
     throw Error(code,
-                "has " + SizeOf(picture) + " pixels, its view " + std::to_string(width) +
-                    " x " + std::to_string(height),
+                Concat("has ", SizeOf(picture), " pixels, its view ", width, " x ", height),
                 where, "keep the photo's aspect: do not crop or rotate");
 }
 

@@ -80,9 +80,9 @@ void NameUnknownPhotos(const Capture& capture, SceneProfile* profile) {
     if (!profile->exposure.photos[v].known)
       names += (names.empty() ? "" : ", ") + capture.views[v].file;
   if (!names.empty())
-    profile->notices.push_back("exposure: left unchanged, for fewer than " +
-                               std::to_string(kFewestColors) +
-                               " colours in common with other photos: " + names);
+    profile->notices.push_back(Concat("exposure: left unchanged, for fewer than ",
+                                      kFewestColors,
+                                      " colours in common with other photos: ", names));
 }
 
 std::string GainsEvidence(const ExposureEstimate& exposure) {

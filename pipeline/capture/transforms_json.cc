@@ -19,8 +19,7 @@ constexpr double kRigidTolerance = 1e-2;  // of R^T R against 1: files round to 
 
 [[noreturn]] void Refuse(const std::string& path, const JsonValue& at,
                          const std::string& what) {
-  throw Error(ExitCode::kInput, what,
-              path + ":" + std::to_string(at.line()) + ":" + std::to_string(at.column()));
+  throw Error(ExitCode::kInput, what, Concat(path, ":", at.line(), ":", at.column()));
 }
 
 // Intrinsics of one frame: its own members first, then those at the top of the file.
@@ -223,9 +222,8 @@ TransformsFile ReadTransformsJson(const std::string& path, const PictureSizeFunc
   }
   if (result.frames.empty())
     throw Error(ExitCode::kInput,
-                "none of the " + std::to_string(result.missing.size()) +
-                    " listed pictures is there" +
-                    (result.missing.empty() ? "" : ", e.g. \"" + result.missing[0] + "\""),
+                Concat("none of the ", result.missing.size(), " listed pictures is there",
+                       (result.missing.empty() ? "" : ", e.g. \"" + result.missing[0] + "\"")),
                 path, "file paths are relative to the folder of transforms.json");
   return result;
 }

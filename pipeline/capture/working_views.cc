@@ -91,9 +91,8 @@ Image WorkingViews::Photo(int i) const {
   Image photo = ReadImage(view.path);
   if (photo.width != view.camera.width || photo.height != view.camera.height)
     throw Error(ExitCode::kInput,
-                std::to_string(photo.width) + " x " + std::to_string(photo.height) +
-                    " pixels, but its camera has " + std::to_string(view.camera.width) + " x " +
-                    std::to_string(view.camera.height),
+                Concat(photo.width, " x ", photo.height, " pixels, but its camera has ",
+                       view.camera.width, " x ", view.camera.height),
                 view.path, "the staged photo was changed: use --restart-from pose");
   if (photo.channels != 3) throw Error(ExitCode::kInput, "not an RGB picture", view.path);
   photo = AtWorkingSize(std::move(photo), photo_size_);
@@ -140,10 +139,10 @@ void FillMasked(const Image& kept, const Image& render, Image* photo) {
 }
 
 std::string ComparisonNote(const Camera& common) {
-  return "the photos differ in size or lens: neighbouring views are compared on frames of one "
-         "camera (" +
-         std::to_string(common.width) + "x" + std::to_string(common.height) +
-         " px) at each photo's place";
+  return Concat(
+      "the photos differ in size or lens: neighbouring views are compared on frames of one "
+      "camera (",
+      common.width, "x", common.height, " px) at each photo's place");
 }
 
 Image DepthAlongRays(const Camera& camera, Image depth) {

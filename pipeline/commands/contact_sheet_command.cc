@@ -305,18 +305,16 @@ void RunContactSheet(const Command& command, const Arguments& arguments, Console
   const Backend backend = ChooseBackend(sheet.device, false);  // before work begins
   Scene scene = ReadScene(workspace, sheet, settings);
   scene.backend = backend;
-  const std::string plan = std::to_string(words.size() - 1) + " styles, " +
-                           std::to_string(scene.shown.size()) + " views each, trained on " +
-                           std::to_string(scene.training_views.size()) + " photos at " +
-                           std::to_string(sheet.size) + " pixels";
+  const std::string plan =
+      Concat(words.size() - 1, " styles, ", scene.shown.size(), " views each, trained on ",
+             scene.training_views.size(), " photos at ", sheet.size, " pixels");
   console->Info(plan);
   if (sheet.dry_run) return;
   std::vector<SheetRow> rows;
   for (size_t i = 1; i < words.size(); ++i) AddStyle(&context, scene, sheet, words[i], &rows);
   const Image picture = MakeContactSheet(kColumns, rows);
   WritePng8(sheet.out, picture);
-  console->Info("wrote " + sheet.out + ", " + std::to_string(picture.width) + "x" +
-                std::to_string(picture.height));
+  console->Info(Concat("wrote ", sheet.out, ", ", picture.width, "x", picture.height));
 }
 
 }  // namespace regrade

@@ -67,8 +67,7 @@ void RunDoctor(const Command& command, const Arguments& arguments, Console* cons
       {"regrade", REGRADE_VERSION, ""},
       FindDevice(),
       {"threads",
-       std::to_string(omp_get_max_threads()) + " of " +
-           std::to_string(::sysconf(_SC_NPROCESSORS_ONLN)) + " cores",
+       Concat(omp_get_max_threads(), " of ", ::sysconf(_SC_NPROCESSORS_ONLN), " cores"),
        "set with --threads"},
       {"memory", gigabytes(memory.available) + " free of " + gigabytes(memory.total),
        "limit with --max-memory"},

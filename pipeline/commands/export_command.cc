@@ -78,8 +78,8 @@ void RunExport(const Command& command, const Arguments& arguments, Console* cons
       throw Error(ExitCode::kResources, error.message(), settings.out + "/images/" + view.name);
   }
   WritePoses(settings, folder, capture);
-  console->Info("wrote " + std::to_string(capture.views.size()) +
-                " photos and their poses to " + settings.out);
+  console->Info(
+      Concat("wrote ", capture.views.size(), " photos and their poses to ", settings.out));
 }
 
 }  // namespace regrade

@@ -70,7 +70,7 @@ void CheckNumbers(const FrameFolder& frames) {
 }
 
 std::string SizeText(const Image& image) {
-  return std::to_string(image.width) + " x " + std::to_string(image.height) + " px";
+  return Concat(image.width, " x ", image.height, " px");
 }
 
 }  // namespace
@@ -101,7 +101,7 @@ FrameFolder OpenFrameFolder(const std::string& folder, const ProgressFunction& p
                       SizeText(*first),
                   frames.paths[i], "render all frames at one size");
     if (!first) first = std::move(image);
-    if (Report(progress, i + 1, frames.paths.size()) == LoopControl::kStop) throw Interrupted();
+    ReportOrThrow(progress, i + 1, frames.paths.size());
   }
   return frames;
 }
@@ -119,8 +119,8 @@ void CheckSameFrames(const FrameFolder& reference, const FrameFolder& sequence) 
     if (!known.count(all[i].number))
       missing = "; " + longer.names[i] + " of " + longer.folder + " has no counterpart";
   throw Error(ExitCode::kInput,
-              std::to_string(sequence.paths.size()) + " frames, the reference has " +
-                  std::to_string(reference.paths.size()) + missing,
+              Concat(sequence.paths.size(), " frames, the reference has ",
+                     reference.paths.size(), missing),
               sequence.folder, "evaluate the same frames of each");
 }
 

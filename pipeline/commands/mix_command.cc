@@ -99,7 +99,7 @@ void WriteMix(const std::string& out, const RadianceField& source,
   std::unique_ptr<FieldRenderer> renderer;
   const int frames = static_cast<int>(cameras.film.size());
   for (int i = 0; i < frames; ++i) {
-    if (Report(progress, i, frames) == LoopControl::kStop) throw Interrupted();
+    ReportOrThrow(progress, i, frames);
     const std::vector<double> weights =
         keys.At(static_cast<double>(i) / std::max(1, frames - 1));
     if (!renderer || weights != rendered) {
@@ -154,12 +154,10 @@ void RunMix(const Command& command, const Arguments& arguments, Console* console
   const Backend backend = ChooseBackend(settings.device, false);
   const MixCameras cameras = CamerasOf(folder, stored, scene, render);
   if (settings.dry_run) {
-    console->Info(std::to_string(cameras.film.size()) + " frames of " +
-                  std::to_string(cameras.film[0].width) + "x" +
-                  std::to_string(cameras.film[0].height) + " along " + render.path.path + ", " +
-                  std::to_string(keys.points.size()) +
-                  (keys.points.size() == 1 ? " point" : " points") + " of " +
-                  std::to_string(words.size()) + (words.size() == 1 ? " style" : " styles"));
+    console->Info(Concat(cameras.film.size(), " frames of ", cameras.film[0].width, "x",
+                         cameras.film[0].height, " along ", render.path.path, ", ",
+                         keys.points.size(), (keys.points.size() == 1 ? " point" : " points"),
+                         " of ", words.size(), (words.size() == 1 ? " style" : " styles")));
     return;
   }
   std::vector<StoredField> styles;
@@ -202,7 +200,7 @@ void RunMix(const Command& command, const Arguments& arguments, Console* console
     mixed.field = MixFields(stored.field, fields, keys.points[0], object_weights);
     WriteFieldFile(settings.out + "/mixed.npz", mixed);
   }
-  console->Info("wrote " + std::to_string(cameras.film.size()) + " frames to " + settings.out);
+  console->Info(Concat("wrote ", cameras.film.size(), " frames to ", settings.out));
 }
 
 }  // namespace regrade

@@ -14,9 +14,9 @@ std::vector<double> ParsePoint(const std::string& text, int styles) {
   const auto refuse = [&](const std::string& why) {
     throw Error(ExitCode::kUsage, "\"" + text + "\" " + why, "--mix",
                 styles == 1 ? "write weights of the style separated by colons, such as 0:1"
-                            : "write a weight for each of the " + std::to_string(styles) +
-                                  " styles separated by commas, and points separated by "
-                                  "colons, such as 1,0:0,1 for two");
+                            : Concat("write a weight for each of the ", styles,
+                                     " styles separated by commas, and points separated by "
+                                     "colons, such as 1,0:0,1 for two"));
   };
   std::vector<double> weights;
   double sum = 0;
@@ -30,8 +30,8 @@ std::vector<double> ParsePoint(const std::string& text, int styles) {
     sum += weight;
   }
   if (static_cast<int>(weights.size()) != styles)
-    refuse("has " + std::to_string(weights.size()) + " weights for " + std::to_string(styles) +
-           (styles == 1 ? " style" : " styles"));
+    refuse(Concat("has ", weights.size(), " weights for ", styles,
+                  (styles == 1 ? " style" : " styles")));
   if (sum > 1 + 1e-9) refuse("adds up to more than 1");
   return weights;
 }

@@ -67,8 +67,8 @@ void RunPack(const Command& command, const Arguments& arguments, Console* consol
     packed.views.push_back({views.View(i).file, IsHeldOut(static_cast<size_t>(i), run.holdout),
                             views.CameraOf(i), views.Photo(i)});
   WritePackedCapture(run.out, packed);
-  console->Info("wrote " + run.out + ": " + std::to_string(packed.views.size()) + " views, " +
-                std::to_string(std::filesystem::file_size(run.out) >> 20) + " MiB");
+  console->Info(Concat("wrote ", run.out, ": ", packed.views.size(), " views, ",
+                       std::filesystem::file_size(run.out) >> 20, " MiB"));
 }
 
 }  // namespace regrade

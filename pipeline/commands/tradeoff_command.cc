@@ -122,8 +122,7 @@ std::string BaseName(const RunSettings& settings, const OptionSet& options,
 }
 
 std::string Fingerprint(const RunContext& base, const Workspace& workspace) {
-  std::string all =
-      std::string(REGRADE_VERSION) + FastRays().name + std::to_string(omp_get_max_threads());
+  std::string all = Concat(REGRADE_VERSION, FastRays().name, omp_get_max_threads());
   for (const char* stage : {"pose", "reconstruct", "style_2d"})
     if (const auto record = workspace.Find(stage))
       all += HashText(HashOf(DumpJson(record->inputs, -1)));
@@ -183,13 +182,13 @@ void MeasureAll(RunContext* base, const TradeoffOptions& tradeoff, const std::st
     double left = 0;
     for (size_t k = i; k < jobs.size(); ++k) left += estimate.Seconds(*jobs[k].variant);
     if (i > 0 && tradeoff.budget > 0 && SecondsSince(begin) > 60 * tradeoff.budget) {
-      console->Warn("the budget is spent: " + std::to_string(jobs.size() - i) +
-                    " measurements remain, about " + DurationText(left) +
-                    "; the same command continues");
+      console->Warn(Concat("the budget is spent: ", jobs.size() - i,
+                           " measurements remain, about ", DurationText(left),
+                           "; the same command continues"));
       return;
     }
-    console->Info("[" + std::to_string(i + 1) + "/" + std::to_string(jobs.size()) + "] " +
-                  NameOf(*jobs[i].variant) + ", about " + DurationText(left) + " left");
+    console->Info(Concat("[", i + 1, "/", jobs.size(), "] ", NameOf(*jobs[i].variant),
+                         ", about ", DurationText(left), " left"));
     console->SetQuiet(true);
     Measurement m;
     try {
@@ -311,9 +310,9 @@ void RunTradeoff(const Command& command, const Arguments& arguments, Console* co
       console->Info(NameOf(variant) + ", about " + DurationText(estimate.Seconds(variant)));
       all += estimate.Seconds(variant);
     }
-    console->Info(std::to_string(variants.size()) + " variants, " +
-                  std::to_string(tradeoff.repeats) + " times each: about " +
-                  DurationText(all * tradeoff.repeats) + ", and a run of the base");
+    console->Info(Concat(variants.size(), " variants, ", tradeoff.repeats,
+                         " times each: about ", DurationText(all * tradeoff.repeats),
+                         ", and a run of the base"));
     return;
   }
   settings.run.device = "cpu";

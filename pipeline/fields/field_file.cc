@@ -94,8 +94,8 @@ void ReadSpheres(NpzReader* file, SphereGeometry* spheres, Buffer<float>* color)
     Refuse(
         file->path(),
         "a background of " + links.ShapeText() + " texels and " + data.ShapeText() + " values",
-        "the map is twice as wide as high, of at most " + std::to_string(kMaxSphereResolution) +
-            " and " + std::to_string(kMaxLayers) + " layers");
+        Concat("the map is twice as wide as high, of at most ", kMaxSphereResolution, " and ",
+               kMaxLayers, " layers"));
   spheres->layers = static_cast<int>(data.shape[1]);
   spheres->resolution = static_cast<int>(links.shape[1]);
   spheres->links.Resize(links.num_elements());
@@ -146,8 +146,8 @@ void ReadValues(NpzReader* file, Geometry* geometry, Appearance* appearance) {
       file->Has("regrade_basis") ? file->ReadScalar<int32_t>("regrade_basis") : stored;
   const int basis = appearance->basis;
   if ((basis != 1 && basis != 4 && basis != 9) || basis > stored)
-    Refuse(file->path(), "regrade_basis is " + std::to_string(basis) + " of " +
-                             std::to_string(stored) + " stored harmonics");
+    Refuse(file->path(),
+           Concat("regrade_basis is ", basis, " of ", stored, " stored harmonics"));
   appearance->sh = UnpackedColours(colours, first, stored, basis);
   geometry->density.Resize(colours.shape[0]);
   if (joined) {

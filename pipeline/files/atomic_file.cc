@@ -19,9 +19,7 @@ constexpr size_t kPending = 1 << 20;  // bytes
 [[noreturn]] void ThrowWriteError(const std::string& path, const char* step, uint64_t bytes) {
   const int error = errno;
   throw Error(ExitCode::kResources,
-              std::string("cannot ") + step + " (" + std::to_string(bytes) +
-                  " bytes): " + std::strerror(error),
-              path,
+              Concat("cannot ", step, " (", bytes, " bytes): ", std::strerror(error)), path,
               error == ENOSPC || error == EDQUOT || error == EFBIG
                   ? "free some space or raise the limit, then run the same command again"
                   : "check the folder's permissions, then run the same command again");
@@ -138,10 +136,8 @@ std::string ReadWholeFile(const std::string& path, uint64_t max_bytes) {
   uint64_t size = 0;
   const FileDescriptor fd(OpenToRead(path, &size));
   if (size > max_bytes)
-    throw Error(
-        ExitCode::kInput,
-        std::to_string(size) + " bytes, more than the limit of " + std::to_string(max_bytes),
-        path);
+    throw Error(ExitCode::kInput, Concat(size, " bytes, more than the limit of ", max_bytes),
+                path);
   std::string bytes(size, '\0');
   size_t done = 0;
   while (done < bytes.size()) {

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "kernels/base/error.h"
 #include "pipeline/files/atomic_file.h"
 
 namespace regrade {
@@ -89,8 +90,7 @@ class Builder : public nlohmann::json_sax<nlohmann::json> {
 
   [[noreturn]] void Refuse(const std::string& why) const {
     throw Error(code_, why,
-                where_ + ":" + std::to_string(position_->line) + ":" +
-                    std::to_string(std::max(1, position_->column)));
+                Concat(where_, ":", position_->line, ":", std::max(1, position_->column)));
   }
   bool Put(JsonValue value) {
     if (value.line() == 0) value.SetPosition(position_->line, std::max(1, position_->column));

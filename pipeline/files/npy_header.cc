@@ -41,9 +41,7 @@ class LiteralReader {
     return true;
   }
   void Expect(char c) {
-    if (!Accept(c))
-      Refuse(std::string("'") + c + "' expected at byte " + std::to_string(at_) +
-             " of the dictionary");
+    if (!Accept(c)) Refuse(Concat("'", c, "' expected at byte ", at_, " of the dictionary"));
   }
   std::string_view Quoted() {
     SkipSpace();

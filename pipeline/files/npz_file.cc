@@ -44,8 +44,7 @@ std::vector<ZipMember> CheckedMembers(zip_t* zip, uint64_t file_bytes,
                                       const std::string& path) {
   const zip_int64_t count = zip_get_num_entries(zip, 0);
   if (count > kMaxMembers)
-    RefuseArchive(path,
-                  std::to_string(count) + " members, more than " + std::to_string(kMaxMembers));
+    RefuseArchive(path, Concat(count, " members, more than ", kMaxMembers));
   std::vector<ZipMember> members;
   uint64_t packed = 0;
   for (zip_uint64_t i = 0; i < static_cast<zip_uint64_t>(count); ++i) {
@@ -53,18 +52,18 @@ std::vector<ZipMember> CheckedMembers(zip_t* zip, uint64_t file_bytes,
     constexpr zip_uint64_t kNeeded = ZIP_STAT_NAME | ZIP_STAT_SIZE | ZIP_STAT_COMP_SIZE |
                                      ZIP_STAT_COMP_METHOD | ZIP_STAT_ENCRYPTION_METHOD;
     if (zip_stat_index(zip, i, 0, &status) != 0 || (status.valid & kNeeded) != kNeeded)
-      RefuseArchive(path, "member " + std::to_string(i) + " is not described");
+      RefuseArchive(path, Concat("member ", i, " is not described"));
     const std::string name = "'" + std::string(status.name) + "'";
     if (status.encryption_method != ZIP_EM_NONE) RefuseArchive(path, name + " is encrypted");
     const bool stored = status.comp_method == ZIP_CM_STORE;
     if (!stored && status.comp_method != ZIP_CM_DEFLATE)
-      RefuseArchive(path, name + " is packed by method " + std::to_string(status.comp_method) +
-                              "; 0 and 8 are supported");
+      RefuseArchive(path, Concat(name, " is packed by method ", status.comp_method,
+                                 "; 0 and 8 are supported"));
     if (stored && status.size != status.comp_size)
       RefuseArchive(path, name + " is stored, but its two sizes differ");
     if (status.size / kMaxRatio > status.comp_size)
-      RefuseArchive(path, name + " claims " + std::to_string(status.size) + " bytes out of " +
-                              std::to_string(status.comp_size) + ", more than deflate can do");
+      RefuseArchive(path, Concat(name, " claims ", status.size, " bytes out of ",
+                                 status.comp_size, ", more than deflate can do"));
     if (status.comp_size > file_bytes - packed)
       RefuseArchive(path, "its members share bytes: they claim more than the file has");
     packed += status.comp_size;
@@ -127,10 +126,10 @@ NpzArray NpzReader::Read(const std::string& name) {
   const ZipMember* member = archive_->Find(name);
   if (member == nullptr) throw Error(ExitCode::kInput, "is missing", where);
   if (member->bytes > budget_)
-    throw Error(ExitCode::kInput,
-                std::to_string(member->bytes) + " bytes, more than the " +
-                    std::to_string(budget_) + " that may still be read",
-                where, "give more memory with --max-memory");
+    throw Error(
+        ExitCode::kInput,
+        Concat(member->bytes, " bytes, more than the ", budget_, " that may still be read"),
+        where, "give more memory with --max-memory");
   budget_ -= member->bytes;
 
   const std::unique_ptr<zip_file_t, decltype(&zip_fclose)> file(
@@ -169,10 +168,10 @@ NpzArray NpzReader::Read(const std::string& name) {
   const uint64_t surplus =
       head.size() - header.data_offset;  // of headers shorter than the fixed part
   if (header.data_bytes != left + surplus)
-    throw Error(ExitCode::kInput,
-                "its shape asks for " + std::to_string(header.data_bytes) + " bytes, it has " +
-                    std::to_string(left + surplus),
-                where);
+    throw Error(
+        ExitCode::kInput,
+        Concat("its shape asks for ", header.data_bytes, " bytes, it has ", left + surplus),
+        where);
   NpzArray array{header.type, header.shape, {}};
   array.bytes.Resize(static_cast<int64_t>(header.data_bytes));
   if (surplus > 0) std::memcpy(array.bytes.data(), &head[header.data_offset], surplus);
@@ -211,8 +210,7 @@ void RefuseNewerFormat(NpzReader* file, int32_t known) {
   const int32_t version = file->ReadScalar<int32_t>("regrade_version");
   if (version > known)
     throw Error(ExitCode::kInput,
-                "written in format " + std::to_string(version) + ", this program reads up to " +
-                    std::to_string(known),
+                Concat("written in format ", version, ", this program reads up to ", known),
                 file->path(), "update regrade; the file has not been touched");
 }
 

@@ -32,7 +32,7 @@ void RenderHeldOut(const DeviceGrid& grid, const PackedCapture& capture,
   int index = 0;
   for (const PackedView& view : capture.views)
     if (view.held_out)
-      WritePpm(folder + "/" + name + "_" + std::to_string(index++) + ".ppm",
+      WritePpm(Concat(folder, "/", name, "_", index++, ".ppm"),
                RenderViewOnDevice(grid, view.camera, march).color);
 }
 

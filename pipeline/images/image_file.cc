@@ -30,21 +30,21 @@ constexpr int64_t kMaxExpansion = 2000, kExpansionSlack = 16 << 20;
 
 void CheckSize(int64_t width, int64_t height, int64_t pixel_bytes, int64_t file_bytes,
                const DecodeLimits& limits, const std::string& where) {
-  const std::string size = std::to_string(width) + " x " + std::to_string(height) + " pixels";
+  const std::string size = Concat(width, " x ", height, " pixels");
   if (width <= 0 || height <= 0) throw Error(ExitCode::kInput, "no pixels", where);
   if (width > limits.max_pixels / height)
-    throw Error(ExitCode::kInput,
-                size + ", more than the limit of " +
-                    std::to_string(limits.max_pixels / 1'000'000) + " megapixels",
-                where, "scale it down or raise --max-megapixels");
+    throw Error(
+        ExitCode::kInput,
+        Concat(size, ", more than the limit of ", limits.max_pixels / 1'000'000, " megapixels"),
+        where, "scale it down or raise --max-megapixels");
   if (width * height * pixel_bytes > kExpansionSlack + kMaxExpansion * file_bytes)
-    throw Error(ExitCode::kInput,
-                "the header claims " + size + ", but the file has only " +
-                    std::to_string(file_bytes) + " bytes",
-                where);
+    throw Error(
+        ExitCode::kInput,
+        Concat("the header claims ", size, ", but the file has only ", file_bytes, " bytes"),
+        where);
   if (std::min(width, height) < limits.min_side)
-    throw Error(ExitCode::kInput,
-                size + ", less than " + std::to_string(limits.min_side) + " on a side", where);
+    throw Error(ExitCode::kInput, Concat(size, ", less than ", limits.min_side, " on a side"),
+                where);
 }
 
 void CheckRegularFile(const std::string& path) {
@@ -94,8 +94,8 @@ StoredPicture ReadJpeg(std::string_view bytes, const std::string& where,
   StoredPicture picture;
   picture.image = std::move(jpeg.image);
   if (jpeg.damage_warnings > 0) {
-    const std::string what = "damaged JPEG (" + std::to_string(jpeg.damage_warnings) +
-                             " warnings, first: " + jpeg.first_warning + ")";
+    const std::string what = Concat("damaged JPEG (", jpeg.damage_warnings,
+                                    " warnings, first: ", jpeg.first_warning, ")");
     if (!limits.accept_damaged)
       throw Error(ExitCode::kInput, what, where,
                   "copy the file again from the camera, or keep it with --accept-damaged");
@@ -126,9 +126,9 @@ StoredPicture ReadPng(std::string_view bytes, const std::string& where,
   TakeMetadata(spec, &picture);
   NoteProfile(png.icc, &picture);
   if (png.remarks > 0)
-    picture.notices.push_back("an odd PNG (" + std::to_string(png.remarks) +
-                              (png.remarks == 1 ? " remark: " : " remarks, first: ") +
-                              png.first_remark + ")");
+    picture.notices.push_back(Concat("an odd PNG (", png.remarks,
+                                     (png.remarks == 1 ? " remark: " : " remarks, first: "),
+                                     png.first_remark, ")"));
   return picture;
 }
 

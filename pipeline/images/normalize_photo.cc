@@ -15,9 +15,8 @@ void CheckFinite(const Image& image, const std::string& where) {
                                     [](float v) { return !std::isfinite(v); });
   if (bad > 0)
     throw Error(ExitCode::kInput,
-                std::to_string(bad) + " of " + std::to_string(image.pixels.size()) +
-                    " values are NaN or infinite",
-                where, "export the picture again without them");
+                Concat(bad, " of ", image.pixels.size(), " values are NaN or infinite"), where,
+                "export the picture again without them");
 }
 
 void Unpremultiply(Image* image) {

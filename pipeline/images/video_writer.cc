@@ -221,8 +221,7 @@ void VideoWriter::Finish() {
   const int readable = CountVideoFrames(s.temporary);
   if (readable != s.frames)
     throw Error(ExitCode::kResources,
-                std::to_string(readable) + " of " + std::to_string(s.frames) +
-                    " frames of the video can be read back",
+                Concat(readable, " of ", s.frames, " frames of the video can be read back"),
                 s.path, "check the disk, then run the same command again");
   RenameDurably(s.temporary, s.path);
   s.temporary.clear();

@@ -208,9 +208,7 @@ void OptionSet::Assign(const Entry& entry, const std::string& text, const std::s
 
 void OptionSet::ApplyConfig(const JsonValue& values, const std::string& where) {
   const auto place = [&where](const JsonValue& value) {
-    return value.line() == 0 ? where
-                             : where + ":" + std::to_string(value.line()) + ":" +
-                                   std::to_string(value.column());
+    return value.line() == 0 ? where : Concat(where, ":", value.line(), ":", value.column());
   };
   if (!values.IsObject())
     throw Error(ExitCode::kUsage, "an object of options expected", place(values));

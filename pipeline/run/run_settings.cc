@@ -75,8 +75,7 @@ void ApplyPreset(const std::string& preset, RunSettings* settings) {
 void CheckTogether(const RunSettings& settings) {
   const size_t grids = settings.fit.resolutions.size(), steps = settings.fit.steps.size();
   if (grids != steps)
-    throw Error(ExitCode::kUsage,
-                std::to_string(grids) + " and " + std::to_string(steps) + " stages",
+    throw Error(ExitCode::kUsage, Concat(grids, " and ", steps, " stages"),
                 "--fit-resolutions and --fit-steps", "give both the same number of stages");
   ParseStyleMethod(settings.style_2d);
   if (!settings.object.style_mask.empty() && !settings.object.On())

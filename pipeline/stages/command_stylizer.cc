@@ -64,7 +64,7 @@ class CommandStylizer : public ViewStylizer {
       : words_(std::move(words)), style_path_(std::move(style_path)), limit_s_(limit_s) {}
 
   Image Stylize(const Image& view, int view_index) const override {
-    const std::string where = words_[0] + " on view " + std::to_string(view_index);
+    const std::string where = Concat(words_[0], " on view ", view_index);
     CountNotFinite(view, where);
     const ScratchFolder folder;
     const std::string input = folder / "input.png", output = folder / "output.png";

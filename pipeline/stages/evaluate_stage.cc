@@ -7,6 +7,7 @@
 #include "evaluate/optical_flow.h"
 #include "evaluate/pair_network.h"
 #include "evaluate/tables.h"
+#include "kernels/base/error.h"
 #include "kernels/field/cpu/render_view.h"
 #include "kernels/field/packed_grid.h"
 #include "kernels/scene/common_camera.h"
@@ -45,9 +46,9 @@ GeometrySource GeometryOf(const RadianceField& field, const std::vector<Camera>&
 std::string TooSmallForFlow(const Camera& camera, const ConsistencyOptions& options) {
   if (options.mode == "geometry" || options.flow.find(':') != std::string::npos) return "";
   if (std::min(camera.width, camera.height) >= kLeastFlowSide) return "";
-  return "frames of " + std::to_string(camera.width) + " x " + std::to_string(camera.height) +
-         " px are too small for optical flow, which needs " + std::to_string(kLeastFlowSide) +
-         " px a side";
+  return Concat("frames of ", camera.width, " x ", camera.height,
+                " px are too small for optical flow, which needs ", kLeastFlowSide,
+                " px a side");
 }
 
 // Compares the sequences of one set of frames and writes heat maps of their worst pairs. The

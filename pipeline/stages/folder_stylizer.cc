@@ -32,8 +32,8 @@ class FolderStylizer : public ViewStylizer {
   std::vector<std::string> Notices() const override {
     const int all = static_cast<int>(paths_.size());
     if (known_ == all) return {};
-    return {std::to_string(known_) + " of " + std::to_string(all) +
-            " views have a styled picture; the style is learned from these"};
+    return {Concat(known_, " of ", all,
+                   " views have a styled picture; the style is learned from these")};
   }
 
  private:

@@ -39,8 +39,7 @@ ObjectWeights VoteForObject(const RunSettings& settings, const WorkingViews& wor
   for (int k = 0; k < masks.num_regions(); ++k)
     votes.emplace_back(*field.geometry, field.near_clip, MarchOptions{field.step});
   for (size_t n = 0; n < views.size(); ++n) {
-    if (Report(progress, n, views.size(), "masks vote") == LoopControl::kStop)
-      throw Interrupted();
+    ReportOrThrow(progress, n, views.size(), "masks vote");
     const int i = views[n];
     if (!masks.Knows(i)) continue;
     const Camera camera = working_views.CameraOf(i);
@@ -73,7 +72,7 @@ ObjectWeights ReadObjectFile(const std::string& path, int64_t voxels) {
   const NpzArray array = file.Read("weights", ArrayType::kF32, {-1, voxels});
   const int64_t regions = array.shape[0];
   if (regions < 1 || regions > ObjectMasks::kMostRegions)
-    throw Error(ExitCode::kInput, "holds " + std::to_string(regions) + " regions", path,
+    throw Error(ExitCode::kInput, Concat("holds ", regions, " regions"), path,
                 "run regrade stylize again");
   ObjectWeights weights;
   for (int64_t k = 0; k < regions; ++k) {

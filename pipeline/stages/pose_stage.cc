@@ -4,6 +4,7 @@
 
 #include <filesystem>
 
+#include "kernels/base/error.h"
 #include "pipeline/capture/capture_store.h"
 #include "pipeline/capture/colmap_photos.h"
 #include "pipeline/capture/photo_gains.h"
@@ -143,9 +144,9 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
   metrics.models_found = capture.models_found;
   PutMetrics(metrics, &outcome.metrics);
   outcome.outputs = {"poses"};
-  context->console->Info("registered " + std::to_string(capture.views.size()) + " of " +
-                         std::to_string(ingest.photos.size()) + " photos, " +
-                         std::to_string(capture.points.size()) + " points");
+  context->console->Info(Concat("registered ", capture.views.size(), " of ",
+                                ingest.photos.size(), " photos, ", capture.points.size(),
+                                " points"));
   return outcome;
 }
 
@@ -175,10 +176,11 @@ Stage PoseStage(RunContext* context) {
   stage.refuse_changes = true;
   const int64_t photos = static_cast<int64_t>(stage.inputs.At("photos").AsObject().size());
   stage.plan =
-      std::to_string(photos) + " files in " + source.photos +
-      (source.kind == CaptureKind::kPhotos
-           ? ", poses by COLMAP: " + PlanText(PlanPoses(photos, omp_get_max_threads()))
-           : ", poses from " + source.poses + PlannedTracks(context->settings, source, photos));
+      Concat(photos, " files in ", source.photos,
+             (source.kind == CaptureKind::kPhotos
+                  ? ", poses by COLMAP: " + PlanText(PlanPoses(photos, omp_get_max_threads()))
+                  : ", poses from " + source.poses +
+                        PlannedTracks(context->settings, source, photos)));
   stage.work = [context, source](const ProgressFunction& progress) {
     return FindPoses(context, source, progress);
   };

@@ -6,6 +6,7 @@
 #include <functional>
 #include <string>
 
+#include "kernels/base/error.h"
 #include "kernels/device/device_memory.h"
 #include "pipeline/capture/capture_store.h"
 #include "pipeline/capture/scene_profile.h"
@@ -75,10 +76,10 @@ FitOptions OptionsForMemory(RunContext* context,
   // Free memory must not change the result of a reproducible run.
   if ((!settings.run.reproducible || settings.run.max_memory_gb > 0) &&
       LowerToMemory(plan_of, limit, &options))
-    context->console->Info("the finest grid has " + std::to_string(Finest(options)) +
-                           " voxels a side instead of " + std::to_string(Finest(settings.fit)) +
-                           " to fit into " +
-                           (settings.run.max_memory_gb > 0 ? "--max-memory" : "free memory"));
+    context->console->Info(
+        Concat("the finest grid has ", Finest(options), " voxels a side instead of ",
+               Finest(settings.fit), " to fit into ",
+               (settings.run.max_memory_gb > 0 ? "--max-memory" : "free memory")));
   const StagePlan plan = plan_of(options);
   context->console->Info("the fit will take " + PlanText(plan));
   CheckFitsMemory(plan, limit, on_device ? "GPU memory" : "memory");
@@ -104,9 +105,9 @@ EffectReport ProfileViewDependence(const RunSettings& settings, const FitOptions
     return row(true, Metric(), "too few unmasked pixels for a trial with held-out photos");
   return row(
       trial.Pays(), trial.gain_db,
-      "dB that harmonics of degree " + std::to_string(options.sh_degree) +
-          " gain over one colour for all directions, in a small trial on a held-out fifth "
-          "of the views");
+      Concat("dB that harmonics of degree ", options.sh_degree,
+             " gain over one colour for all directions, in a small trial on a held-out fifth "
+             "of the views"));
 }
 
 StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,

@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 
+#include "kernels/base/error.h"
 #include "kernels/scene/common_camera.h"
 #include "pipeline/capture/photo_gains.h"
 #include "pipeline/capture/working_views.h"
@@ -81,15 +82,14 @@ std::string PlanOf(const std::vector<FrameSet>& sets) {
   for (const FrameSet& set : sets) {
     text += std::to_string(set.cameras.size());
     if (set.prefix == kCommonPrefix)
-      text += " there with one camera (" + std::to_string(set.cameras[0].width) + "x" +
-              std::to_string(set.cameras[0].height) + " px), ";
+      text += Concat(" there with one camera (", set.cameras[0].width, "x",
+                     set.cameras[0].height, " px), ");
     else
       text += set.of_photos ? " frames at the photos' positions, " : " of the film, ";
     for (const Camera& camera : set.cameras)
       pixels += static_cast<double>(camera.width) * camera.height;
   }
-  return text + "about " + std::to_string(std::lround(pixels * kBytesPerPixel * 1e-6)) +
-         " MB of pictures";
+  return Concat(text, "about ", std::lround(pixels * kBytesPerPixel * 1e-6), " MB of pictures");
 }
 
 // The scene as a camera of that gain records it.
@@ -189,7 +189,7 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
     int done = 0;
     for (const FrameSet& set : sets)
       for (int i = 0; i < static_cast<int>(set.cameras.size()); ++i) {
-        if (Report(progress, done++, total) == LoopControl::kStop) throw Interrupted();
+        ReportOrThrow(progress, done++, total);
         writer.Write(
             std::make_shared<const Frame>(RenderFrame(
                 context, &renderers, set.cameras[i],

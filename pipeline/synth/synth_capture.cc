@@ -173,8 +173,7 @@ void WriteSyntheticCapture(const std::string& out, const SynthOptions& options,
       WriteMotion(truth, i, TrueMotion(scene, cameras[i], cameras[i + 1]));
     frames.push_back({"../images/" + name, cameras[i]});
     if (effects.poses) depths.push_back(std::move(view.depth));
-    const LoopControl control = Report(progress, i + 1, options.views, name);
-    if (control == LoopControl::kStop) throw Interrupted();
+    ReportOrThrow(progress, i + 1, options.views, name);
   }
   WriteTransformsJson((truth / "transforms.json").string(), frames);
   if (!effects.poses) return;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "kernels/base/error.h"
 #include "pipeline/report/html_text.h"
 
 namespace regrade {
@@ -162,11 +163,11 @@ std::string CostTableCsv(const std::vector<CostRow>& rows) {
     const auto number = [](const Metric& metric) {
       return "," + (metric.value ? FixedNumber(*metric.value, 6) : std::string());
     };
-    text += row.benchmark + "," + Quoted(row.parameter) + "," + Quoted(row.setting) + "," +
-            std::to_string(row.repeats) + number(row.seconds) + number(row.seconds_spread) +
-            number(row.cpu_seconds) + number(row.cpu_spread) + number(row.accuracy) +
-            number(row.accuracy_spread) + "," + row.unit + number(row.error) + "," +
-            (row.on_pareto_front ? "yes" : "no") + "," + Quoted(row.dominated_by) + "\n";
+    text += Concat(row.benchmark, ",", Quoted(row.parameter), ",", Quoted(row.setting), ",",
+                   row.repeats, number(row.seconds), number(row.seconds_spread),
+                   number(row.cpu_seconds), number(row.cpu_spread), number(row.accuracy),
+                   number(row.accuracy_spread), ",", row.unit, number(row.error), ",",
+                   (row.on_pareto_front ? "yes" : "no"), ",", Quoted(row.dominated_by), "\n");
   }
   return text;
 }

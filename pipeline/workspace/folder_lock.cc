@@ -44,7 +44,7 @@ struct Holder {
 
   std::string Text() const {
     if (pid == 0) return "another run (it has not identified itself yet)";
-    return "process " + std::to_string(pid) + " on " + host + ", started " + start;
+    return Concat("process ", pid, " on ", host, ", started ", start);
   }
   bool AliveHere() const {
     return pid > 0 && host == HostName() &&

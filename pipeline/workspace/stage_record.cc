@@ -52,7 +52,7 @@ void AddDifferences(const std::string& path, const JsonValue& was, const JsonVal
   if (!path.empty() && here.size() > kNamedDifferences) {
     const size_t more = here.size() - kNamedDifferences;
     here.resize(kNamedDifferences);
-    here.push_back("and " + std::to_string(more) + " more differences of " + path);
+    here.push_back(Concat("and ", more, " more differences of ", path));
   }
   result->insert(result->end(), here.begin(), here.end());
 }

@@ -11,9 +11,7 @@
 namespace regrade {
 namespace {
 
-std::string SizeText(int width, int height) {
-  return std::to_string(width) + " x " + std::to_string(height);
-}
+std::string SizeText(int width, int height) { return Concat(width, " x ", height); }
 
 CaptureView ViewOf(const ColmapModel& model, const ColmapImage& image,
                    const StagedPhoto& photo) {

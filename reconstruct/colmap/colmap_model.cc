@@ -72,8 +72,8 @@ class Reader {
     const uint64_t count = Read<uint64_t>("a count");
     const auto needed = CheckedMul(count, smallest);
     if (!needed || *needed > Left())
-      Fail("the count of " + std::string(what) + " is " + std::to_string(count) +
-           ", but only " + std::to_string(Left()) + " bytes follow");
+      Fail(
+          Concat("the count of ", what, " is ", count, ", but only ", Left(), " bytes follow"));
     return static_cast<size_t>(count);
   }
 
@@ -94,8 +94,7 @@ class Reader {
   }
 
   [[noreturn]] void Fail(const std::string& why) const {
-    throw Error(ExitCode::kInput, why + ", at byte " + std::to_string(position_), path_,
-                kDamagedHint);
+    throw Error(ExitCode::kInput, Concat(why, ", at byte ", position_), path_, kDamagedHint);
   }
 
  private:
@@ -115,8 +114,7 @@ std::vector<ColmapCamera> ReadCameras(const std::string& folder) {
     camera.id = reader.Read<uint32_t>("a camera");
     const int32_t lens = reader.Read<int32_t>("a camera");
     if (lens < 0 || lens >= kNumColmapLenses)
-      reader.Fail(CameraText(camera.id) + " has the unknown camera model " +
-                  std::to_string(lens));
+      reader.Fail(Concat(CameraText(camera.id), " has the unknown camera model ", lens));
     camera.lens = static_cast<ColmapLens>(lens);
     const ColmapLensInfo& info = InfoOf(camera.lens);
     if (info.focals == 0)
@@ -130,8 +128,8 @@ std::vector<ColmapCamera> ReadCameras(const std::string& folder) {
     const uint64_t width = reader.Read<uint64_t>("a camera");
     const uint64_t height = reader.Read<uint64_t>("a camera");
     if (width < 1 || height < 1 || width > kLargestSide || height > kLargestSide)
-      reader.Fail(CameraText(camera.id) + " has the picture size " + std::to_string(width) +
-                  " x " + std::to_string(height));
+      reader.Fail(
+          Concat(CameraText(camera.id), " has the picture size ", width, " x ", height));
     c.width = static_cast<int>(width);
     c.height = static_cast<int>(height);
     c.fx = reader.ReadFinite("a focal length");
@@ -239,29 +237,28 @@ void SortById(std::vector<Record>& records, const std::string& folder, const cha
                    [](const Record& a, const Record& b) { return a.id < b.id; });
   for (size_t i = 1; i < records.size(); ++i)
     if (records[i].id == records[i - 1].id)
-      FailLink(folder, file, "the id " + std::to_string(records[i].id) + " occurs twice");
+      FailLink(folder, file, Concat("the id ", records[i].id, " occurs twice"));
 }
 
 void CheckLinks(const ColmapModel& model, const std::string& folder) {
   for (const ColmapImage& image : model.images) {
     if (model.FindCamera(image.camera_id) == nullptr)
       FailLink(folder, "images.bin",
-               "image " + std::to_string(image.id) + " refers to camera " +
-                   std::to_string(image.camera_id) + ", which does not exist");
+               Concat("image ", image.id, " refers to camera ", image.camera_id,
+                      ", which does not exist"));
     for (const ColmapKeypoint& keypoint : image.keypoints)
       if (keypoint.point_id != kNoColmapPoint && model.FindPoint(keypoint.point_id) == nullptr)
         FailLink(folder, "images.bin",
-                 "image " + std::to_string(image.id) + " refers to point " +
-                     std::to_string(keypoint.point_id) + ", which does not exist");
+                 Concat("image ", image.id, " refers to point ", keypoint.point_id,
+                        ", which does not exist"));
   }
   for (const ColmapPoint& point : model.points) {
     for (const ColmapTrackElement& element : point.track) {
       const ColmapImage* image = model.FindImage(element.image_id);
       if (image == nullptr || element.keypoint >= image->keypoints.size())
         FailLink(folder, "points3D.bin",
-                 "point " + std::to_string(point.id) + " refers to keypoint " +
-                     std::to_string(element.keypoint) + " of image " +
-                     std::to_string(element.image_id) + ", which does not exist");
+                 Concat("point ", point.id, " refers to keypoint ", element.keypoint,
+                        " of image ", element.image_id, ", which does not exist"));
     }
   }
 }

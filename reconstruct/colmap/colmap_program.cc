@@ -80,7 +80,7 @@ ColmapProgram::ColmapProgram(const std::string& program, const std::string& log_
         "this is not COLMAP, or it does not work (" + result.Describe() + "; " + first + ")",
         program, kInstall);
   }
-  version_ = std::to_string(major) + "." + std::to_string(minor);
+  version_ = Concat(major, ".", minor);
   if (std::pair(major, minor) < std::pair(3, 7))
     throw Error(ExitCode::kExternalProgram,
                 "COLMAP " + version_ + " is too old (3.7 and newer are supported)", program,

@@ -58,7 +58,7 @@ class LineReader {
     return value;
   }
   [[noreturn]] void Fail(const std::string& why) const {
-    throw Error(ExitCode::kInput, "line " + std::to_string(number_) + " " + why, path_,
+    throw Error(ExitCode::kInput, Concat("line ", number_, " ", why), path_,
                 "the file is damaged; let COLMAP write the model again");
   }
 
@@ -158,8 +158,8 @@ void WriteColmapText(const ColmapModel& model, const std::string& folder) {
   for (const ColmapCamera& camera : model.cameras) {
     const ColmapLensInfo& info = InfoOf(camera.lens);
     const Camera& c = camera.intrinsics;
-    cameras += std::to_string(camera.id) + " " + info.name + " " + std::to_string(c.width) +
-               " " + std::to_string(c.height) + " " + NumberText(c.fx);
+    cameras +=
+        Concat(camera.id, " ", info.name, " ", c.width, " ", c.height, " ", NumberText(c.fx));
     if (info.focals == 2) cameras += " " + NumberText(c.fy);
     cameras += " " + NumberText(c.cx) + " " + NumberText(c.cy);
     for (int i = 0; i < info.coefficients; ++i) cameras += " " + NumberText(c.distortion[i]);
@@ -174,11 +174,11 @@ void WriteColmapText(const ColmapModel& model, const std::string& folder) {
       images += " " + NumberText(q);
     for (int i = 0; i < 3; ++i)
       images += " " + NumberText(image.camera_from_world.translation[i]);
-    images += " " + std::to_string(image.camera_id) + " " + image.name + "\n";
+    images += Concat(" ", image.camera_id, " ", image.name, "\n");
     const char* separator = "";
     for (const ColmapKeypoint& keypoint : image.keypoints) {
-      images += separator + NumberText(keypoint.u) + " " + NumberText(keypoint.v) + " " +
-                std::to_string(static_cast<int64_t>(keypoint.point_id));
+      images += Concat(separator, NumberText(keypoint.u), " ", NumberText(keypoint.v), " ",
+                       static_cast<int64_t>(keypoint.point_id));
       separator = " ";
     }
     images += "\n";
@@ -191,7 +191,7 @@ void WriteColmapText(const ColmapModel& model, const std::string& folder) {
     for (const uint8_t value : point.color) points += " " + std::to_string(value);
     points += " " + NumberText(point.error);
     for (const ColmapTrackElement& element : point.track)
-      points += " " + std::to_string(element.image_id) + " " + std::to_string(element.keypoint);
+      points += Concat(" ", element.image_id, " ", element.keypoint);
     points += "\n";
   }
   WriteTextFile(folder + "/cameras.txt", cameras);

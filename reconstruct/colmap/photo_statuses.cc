@@ -13,8 +13,7 @@ constexpr const char* kTakeMore =
 std::string Photos(size_t n) { return std::to_string(n) + (n == 1 ? " photo" : " photos"); }
 
 std::string TooFew(size_t given, int least) {
-  return Photos(given) + " are too few for a scene in 3D (" + std::to_string(least) +
-         " at least)";
+  return Concat(Photos(given), " are too few for a scene in 3D (", least, " at least)");
 }
 
 }  // namespace
@@ -22,8 +21,8 @@ std::string TooFew(size_t given, int least) {
 Reason WhyNoModel(const ColmapEvidence& evidence) {
   const int features = evidence.MedianFeatures();
   if (features < kFewFeatures)
-    return {"the photos have too few features to match (about " + std::to_string(features) +
-                " each): they are blurred, or the scene has no texture",
+    return {Concat("the photos have too few features to match (about ", features,
+                   " each): they are blurred, or the scene has no texture"),
             "take sharp photos, in good light, of something with texture"};
   if (evidence.matched_pairs == 0)
     return {"no two photos show the same things from two places",
@@ -44,8 +43,7 @@ void ExplainUnregistered(const AttemptResult& attempt, const std::vector<StagedP
     if (features == attempt.evidence.features.end()) {
       photo.why = "COLMAP did not read it";
     } else if (features->second < kFewFeatures) {
-      photo.why =
-          "only " + std::to_string(features->second) + " features: blurred, or without texture";
+      photo.why = Concat("only ", features->second, " features: blurred, or without texture");
     } else {
       photo.why = "it overlaps too little with the registered photos";
     }
@@ -62,8 +60,9 @@ std::string NoteOnOtherModels(const AttemptResult& attempt) {
   std::string others;
   for (size_t k = 1; k < attempt.models.size(); ++k)
     others += (k == 1 ? "" : ", ") + std::to_string(attempt.models[k].model.images.size());
-  return "the photos form " + std::to_string(attempt.models.size()) +
-         " groups without common points; the largest is used (the others have " + others + ")";
+  return Concat("the photos form ", attempt.models.size(),
+                " groups without common points; the largest is used (the others have ", others,
+                ")");
 }
 
 void Refuse(const Reason& reason, size_t photos_given, int min_photos) {
@@ -83,9 +82,8 @@ void RefuseUnregistered(const Capture& capture) {
     if (photo.status == PhotoState::kUnregistered)
       names += "\n  " + photo.file + ": " + photo.why;
   throw Error(ExitCode::kScene,
-              "only " + std::to_string(capture.views.size()) + " of " +
-                  Photos(capture.statuses.size()) +
-                  " were registered in one scene; the others:" + names,
+              Concat("only ", capture.views.size(), " of ", Photos(capture.statuses.size()),
+                     " were registered in one scene; the others:", names),
               "",
               "give photos of one scene that overlap by two thirds, or lower "
               "--pose-min-registered to continue with the registered ones");

@@ -87,11 +87,10 @@ class PoseFinder {
     const double needed = kBytesPerPhoto * static_cast<double>(photos_.size());
     const double available = static_cast<double>(fs::space(work_folder_).available);
     if (available < needed)
-      throw Error(
-          ExitCode::kResources,
-          "too little free disk space: " + std::to_string(std::lround(available / 1e6)) +
-              " MB free, about " + std::to_string(std::lround(needed / 1e6)) + " MB needed",
-          work_folder_, "free some space, or choose another --out");
+      throw Error(ExitCode::kResources,
+                  Concat("too little free disk space: ", std::lround(available / 1e6),
+                         " MB free, about ", std::lround(needed / 1e6), " MB needed"),
+                  work_folder_, "free some space, or choose another --out");
   }
 
   // The best attempt, or the last one without models.
@@ -172,9 +171,8 @@ class PoseFinder {
     const PoseWeights weights = EstimateWeights(strategy, photos_, options_.image_size);
     planned_ = spent_ + weights.Sum();
     const std::string attempt_folder =
-        strategy.keep_matches
-            ? attempt_folder_
-            : work_folder_ + "/attempt_" + std::to_string(report_.attempts_made + 1);
+        strategy.keep_matches ? attempt_folder_
+                              : Concat(work_folder_, "/attempt_", report_.attempts_made + 1);
     const ColmapPaths paths = {photo_folder_, attempt_folder + "/database.db",
                                attempt_folder + "/images.txt", attempt_folder + "/sparse",
                                options_.mask_folder};

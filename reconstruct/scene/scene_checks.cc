@@ -6,6 +6,8 @@
 #include <iomanip>
 #include <sstream>
 
+#include "kernels/base/error.h"
+
 namespace regrade {
 namespace {
 
@@ -133,10 +135,10 @@ SceneAssessment AssessScene(const Capture& capture, const SceneLimits& limits) {
                   "take more photos, stepping sideways between them instead of only turning "
                   "the camera, and keep the scene still");
   if (views < limits.min_views)
-    return refuse("only " + std::to_string(views) +
-                      " photos could be registered, and a scene needs at least " +
-                      std::to_string(limits.min_views),
-                  "take more photos that overlap by two thirds; 20 to 60 are a good number");
+    return refuse(
+        Concat("only ", views, " photos could be registered, and a scene needs at least ",
+               limits.min_views),
+        "take more photos that overlap by two thirds; 20 to 60 are a good number");
   const Vec3d extents = PointExtents(capture);
   if (extents.y > 0 && extents.z < limits.min_thickness * extents.y)
     assessment.notes.push_back(

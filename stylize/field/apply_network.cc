@@ -41,8 +41,7 @@ Appearance ApplyNetwork(const LipschitzNetwork& network, const RadianceField& fi
           styled.sphere_color[3 * texel + c] = row[0];
       }
     }
-    const LoopControl control = Report(progress, begin + count, all);
-    if (control == LoopControl::kStop) throw Interrupted();
+    ReportOrThrow(progress, begin + count, all);
   }
   return styled;
 }

@@ -73,8 +73,8 @@ RadianceField MixFields(const RadianceField& source,
   for (size_t i = 0; i < styles.size(); ++i)
     if (styles[i]->appearance.basis != source.appearance.basis ||
         !SameGeometry(*source.geometry, *styles[i]->geometry))
-      throw Error(ExitCode::kInput,
-                  "style " + std::to_string(i + 1) + " is of another reconstruction", "",
+      throw Error(ExitCode::kInput, Concat("style ", i + 1, " is of another reconstruction"),
+                  "",
                   "styles that are mixed restyle one field: make them with `regrade stylize`");
   const int64_t voxels = source.geometry->num_voxels();
   const int stride = source.appearance.stride();

@@ -105,8 +105,7 @@ LipschitzNetwork::LipschitzNetwork(LipschitzNetworkData data) : data_(std::move(
                    [this](const auto& entry) { return data_.activation == entry.name; }))
     refuse("unknown activation '" + data_.activation + "'");
   if (static_cast<int64_t>(data_.parameters.size()) != NumParameters())
-    refuse(std::to_string(data_.parameters.size()) + " parameters instead of " +
-           std::to_string(NumParameters()));
+    refuse(Concat(data_.parameters.size(), " parameters instead of ", NumParameters()));
   if (static_cast<int64_t>(data_.singular_vectors.size()) != VectorOffset(kNetworkLayers))
     refuse("singular vectors of another shape");
   bool finite = std::isfinite(data_.omega) && std::isfinite(data_.sh_scale) &&

@@ -14,8 +14,7 @@ constexpr int kGuideRadius = 30;               // pixels of the working size
 constexpr double kGuideEpsilon = 0.02 * 0.02;  // squared values
 
 std::string ShapeOf(const FeatureMap& map) {
-  return std::to_string(map.channels) + " x " + std::to_string(map.height) + " x " +
-         std::to_string(map.width);
+  return Concat(map.channels, " x ", map.height, " x ", map.width);
 }
 
 }  // namespace
@@ -105,7 +104,7 @@ void CheckShape(const FeatureMap& map, int channels, int height, int width,
 }
 
 std::string Numbered(const std::string& folder, const std::string& name, int level) {
-  return folder + "/" + name + std::to_string(level) + ".onnx";
+  return Concat(folder, "/", name, level, ".onnx");
 }
 
 }  // namespace regrade

@@ -51,7 +51,7 @@ std::string ReadBytes(const std::string& path) {
   const uintmax_t size = std::filesystem::file_size(path, error);
   if (error || size == 0) Fail("the file is empty or cannot be read", path, "copy it again");
   if (size > kMostBytes)
-    Fail("the file has " + std::to_string(size) + " bytes", path, "at most 1 GiB is read");
+    Fail(Concat("the file has ", size, " bytes"), path, "at most 1 GiB is read");
   std::string bytes(static_cast<size_t>(size), '\0');
   std::ifstream file(path, std::ios::binary);
   if (!file.read(bytes.data(), static_cast<std::streamsize>(size)))

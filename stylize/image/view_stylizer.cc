@@ -19,15 +19,13 @@ int64_t CountNotFinite(const Image& image, ExitCode code, const std::string& whe
     if (!IsFinite(image, i)) ++count;
   if (count * 100 > image.num_pixels())
     throw Error(code,
-                std::to_string(count) + " of " + std::to_string(image.num_pixels()) +
-                    " pixels are not finite numbers",
+                Concat(count, " of ", image.num_pixels(), " pixels are not finite numbers"),
                 where, "at most 1 % may be");
   return count;
 }
 
 std::string Shape(const Image& image) {
-  return std::to_string(image.width) + "x" + std::to_string(image.height) + " with " +
-         std::to_string(image.channels) + " channels";
+  return Concat(image.width, "x", image.height, " with ", image.channels, " channels");
 }
 
 }  // namespace

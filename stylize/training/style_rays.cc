@@ -78,10 +78,8 @@ int64_t ValidateViews(const std::vector<StyledTrainingView>& views) {
     if (target.width != view.camera.width || target.height != view.camera.height ||
         target.channels != 3)
       throw Error(ExitCode::kInput,
-                  "the styled view is " + std::to_string(target.width) + "x" +
-                      std::to_string(target.height) + ", its photo " +
-                      std::to_string(view.camera.width) + "x" +
-                      std::to_string(view.camera.height),
+                  Concat("the styled view is ", target.width, "x", target.height,
+                         ", its photo ", view.camera.width, "x", view.camera.height),
                   view.name, "the 2D method must keep the picture's size");
     if (view.mask != nullptr) REGRADE_CHECK(view.mask->SameSize(target));
     int64_t bad = 0;
@@ -90,10 +88,10 @@ int64_t ValidateViews(const std::vector<StyledTrainingView>& views) {
       bad += !(std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]));
     }
     if (bad * 100 > target.num_pixels())
-      throw Error(ExitCode::kInput,
-                  std::to_string(bad) + " of " + std::to_string(target.num_pixels()) +
-                      " pixels of the styled view are not finite",
-                  view.name, "the 2D method failed on this view");
+      throw Error(
+          ExitCode::kInput,
+          Concat(bad, " of ", target.num_pixels(), " pixels of the styled view are not finite"),
+          view.name, "the 2D method failed on this view");
     left_out += bad;
   }
   return left_out;

@@ -265,10 +265,9 @@ TrainNetworkResult TrainNetwork(const RadianceField& field,
     if (steps.stopped) {
       if (hooks.checkpoint) hooks.checkpoint(training.Capture());
       throw Error(ExitCode::kScene,
-                  "style training stopped at step " +
-                      std::to_string(training.steps_done() - 1) +
-                      ": two steps in a row were not finite, first in " +
-                      FirstNonFinite(training.network(), steps.gradient, steps.last.loss),
+                  Concat("style training stopped at step ", training.steps_done() - 1,
+                         ": two steps in a row were not finite, first in ",
+                         FirstNonFinite(training.network(), steps.gradient, steps.last.loss)),
                   "", "lower --style-rate; the state before it was kept");
     }
     char note[64];

@@ -13,7 +13,6 @@
 #include "kernels/base/random.h"
 #include "kernels/field/spherical_harmonics.h"
 #include "kernels/network/lipschitz_layer.h"
-#include "stylize/field/algorithm1.h"
 #include "stylize/field/apply_network.h"
 #include "stylize/field/base_map.h"
 #include "stylize/field/gradient_aggregation.h"
