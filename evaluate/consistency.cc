@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <memory>
 #include <numeric>
@@ -167,25 +168,32 @@ ConsistencyReport EvaluateConsistency(int frames, const PairMotionFunction& moti
   ConsistencyReport report;
   report.mode = options.mode;
   report.flow = options.mode == "geometry" ? "depth and cameras" : options.flow;
+  std::vector<WorstPair> worst(sequences.size() * options.gaps.size());
   int64_t done = 0;
   for (int i = 0; i < frames; ++i)
-    for (const int gap : options.gaps) {
+    for (size_t g = 0; g < options.gaps.size(); ++g) {
+      const int gap = options.gaps[g];
       if (gap >= frames - i) continue;
-      const PairMotion pair_motion = motion(i, i + gap);
+      const auto pair_motion = std::make_shared<const PairMotion>(motion(i, i + gap));
       for (size_t s = 0; s < sequences.size(); ++s) {
         const std::string& name = sequences[s].name;
         const auto earlier = caches[s].Get(i), later = caches[s].Get(i + gap);
-        CheckFrame(*earlier, pair_motion, *earlier, FrameName(name, i));
-        CheckFrame(*later, pair_motion, *earlier, FrameName(name, i + gap));
-        PairResult result = ComparePair(*earlier, *later, pair_motion);
+        CheckFrame(*earlier, *pair_motion, *earlier, FrameName(name, i));
+        CheckFrame(*later, *pair_motion, *earlier, FrameName(name, i + gap));
+        PairResult result = ComparePair(*earlier, *later, *pair_motion);
         result.sequence = name;
         result.from = i;
         result.to = i + gap;
         result.low_coverage = result.coverage < options.min_coverage;
+        WorstPair& so_far = worst[s * options.gaps.size() + g];
+        if (result.error && *result.error > so_far.pair.error.value_or(0))
+          so_far = {result, pair_motion};
         report.pairs.push_back(std::move(result));
       }
       ReportOrThrow(progress, ++done, total);
     }
+  std::copy_if(worst.begin(), worst.end(), std::back_inserter(report.worst),
+               [](const WorstPair& pair) { return pair.motion != nullptr; });
   for (const NamedFrameSource& sequence : sequences)
     for (const int gap : options.gaps)
       report.rows.push_back(Summarize(sequence.name, gap, report.pairs));

@@ -60,16 +60,6 @@ Image ErrorHeatMap(const Image& earlier, const Image& later, const PairMotion& m
   return map;
 }
 
-const PairResult* WorstPair(const std::string& sequence, int gap,
-                            const std::vector<PairResult>& pairs) {
-  const PairResult* worst = nullptr;
-  for (const PairResult& pair : pairs)
-    if (pair.sequence == sequence && pair.to - pair.from == gap && pair.error &&
-        (worst == nullptr || *pair.error > *worst->error))
-      worst = &pair;
-  return worst;
-}
-
 std::string HeatMapFileName(const PairResult& pair) {
   char number[16];
   std::snprintf(number, sizeof(number), "%05d", pair.from);

@@ -109,9 +109,7 @@ void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& optio
   std::vector<HeatMapFile> heat_maps;
   if (workspace) {
     BeginHeatMaps(*workspace);
-    heat_maps =
-        WriteHeatMaps(*workspace, EstimatedMotion(reference, options.mode, options.flow),
-                      sequences, options.gaps, consistency);
+    heat_maps = WriteHeatMaps(*workspace, sequences, consistency);
   }
   const EvaluationMetrics metrics = MetricsOf(consistency, fidelity, heat_maps);
   if (workspace) WriteEvaluation(*workspace, metrics, seconds);

@@ -64,11 +64,7 @@ ConsistencyReport Compare(const Workspace& workspace,
     return UndefinedConsistency(reference.count, sequences, options, why);
   ConsistencyReport report =
       EvaluateConsistency(reference, sequences, options, progress, geometry);
-  const std::vector<HeatMapFile> maps =
-      WriteHeatMaps(workspace,
-                    geometry ? GeometricMotion(geometry)
-                             : EstimatedMotion(reference, options.mode, options.flow),
-                    sequences, options.gaps, report);
+  const std::vector<HeatMapFile> maps = WriteHeatMaps(workspace, sequences, report);
   heat_maps->insert(heat_maps->end(), maps.begin(), maps.end());
   return report;
 }
