@@ -2,7 +2,6 @@
 
 #include <bit>
 #include <cmath>
-#include <cstdio>
 #include <fstream>
 #include <limits>
 
@@ -84,10 +83,6 @@ void WriteFlowFile(const std::string& path, const FlowField& flow) {
                 "check the disk's free space and permissions");
 }
 
-std::string FlowFileName(int from, int to) {
-  char name[32];
-  std::snprintf(name, sizeof(name), "%05d_%05d.flo", from, to);
-  return name;
-}
+std::string FlowFileName(int from, int to) { return Format("%05d_%05d.flo", from, to); }
 
 }  // namespace regrade

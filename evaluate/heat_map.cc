@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 
 #include "kernels/base/error.h"
 #include "kernels/image/warp.h"
@@ -61,9 +60,7 @@ Image ErrorHeatMap(const Image& earlier, const Image& later, const PairMotion& m
 }
 
 std::string HeatMapFileName(const PairResult& pair) {
-  char number[16];
-  std::snprintf(number, sizeof(number), "%05d", pair.from);
-  return Concat(pair.sequence, "_gap", pair.to - pair.from, "_", number, ".png");
+  return Format("%s_gap%d_%05d.png", pair.sequence.c_str(), pair.to - pair.from, pair.from);
 }
 
 }  // namespace regrade

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <optional>
 
 #include "kernels/base/error.h"
@@ -13,9 +12,7 @@ namespace {
 std::string Number(const std::optional<double>& value, int decimals) {
   if (!value || std::isnan(*value)) return "-";
   if (std::isinf(*value)) return *value > 0 ? "inf" : "-inf";
-  char text[64];
-  std::snprintf(text, sizeof(text), "%.*f", decimals, *value);
-  return text;
+  return Format("%.*f", decimals, *value);
 }
 
 std::string Range(const std::optional<Interval>& interval) {

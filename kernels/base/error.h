@@ -57,6 +57,9 @@ std::string Concat(const Parts&... parts) {
   return text;
 }
 
+// As printf prints it.
+[[gnu::format(printf, 1, 2)]] std::string Format(const char* format, ...);
+
 // The user cancelled the work (by a signal); the stage has saved its state if it can.
 class Interrupted : public std::runtime_error {
  public:

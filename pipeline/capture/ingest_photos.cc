@@ -1,7 +1,6 @@
 #include "pipeline/capture/ingest_photos.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <future>
@@ -182,9 +181,7 @@ void RequireEnough(const IngestResult& result, const std::string& folder) {
 }
 
 std::string StagedName(size_t index, const char* suffix) {
-  char name[32];
-  std::snprintf(name, sizeof name, "%05zu%s", index, suffix);
-  return name;
+  return Format("%05zu%s", index, suffix);
 }
 
 }  // namespace

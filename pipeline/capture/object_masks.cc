@@ -8,7 +8,6 @@
 #include "kernels/base/error.h"
 #include "kernels/image/resize.h"
 #include "pipeline/capture/photo_names.h"
-#include "pipeline/files/folder_listing.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/workspace/stage_record.h"
 
@@ -114,9 +113,7 @@ Image ObjectMasks::StyleRegion(int region, int width, int height) const {
 }
 
 JsonValue MaskFiles(const MaskOptions& options) {
-  JsonValue hashes = JsonValue::Object();
-  for (const ListedFile& file : ListFolder(options.masks).files)
-    if (file.problem.empty()) hashes[file.name] = HashFile(file.path);
+  JsonValue hashes = HashFolder(options.masks);
   if (!options.style_mask.empty()) hashes["style mask"] = HashFile(options.style_mask);
   return hashes;
 }

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cstdio>
 
 #include "kernels/base/error.h"
 #include "pipeline/capture/scene_profile.h"
@@ -17,15 +16,12 @@ constexpr char kWithoutPoints[] =
     "the cameras";
 
 std::string Summary(const FoundTracks& found, double seconds, double cpu_seconds) {
-  char text[256];
-  std::snprintf(
-      text, sizeof text,
+  return Format(
       "the poses are without points: COLMAP %s triangulated %zu with %lld observations, "
       "median reprojection error %.2f px, in %.0f s (%.0f s of CPU); --tracks given "
       "skips this",
       found.colmap_version.c_str(), found.model.points.size(),
       static_cast<long long>(found.observations), found.median_px, seconds, cpu_seconds);
-  return text;
 }
 
 // Wrong poses give points, too: a match between two photos may fit by chance, but a third
@@ -37,16 +33,14 @@ bool Plausible(const FoundTracks& found) {
 }
 
 std::string DoubtText(const FoundTracks& found) {
-  char text[256];
-  std::snprintf(
-      text, sizeof text,
-      "with the given poses COLMAP triangulated %zu points, %.1f observations of each "
-      "on average: too little texture, or poses of other photos.",
-      found.model.points.size(),
-      found.model.points.empty() ? 0.0
-                                 : static_cast<double>(found.observations) /
-                                       static_cast<double>(found.model.points.size()));
-  return text + std::string(kWithoutPoints);
+  return Format(
+             "with the given poses COLMAP triangulated %zu points, %.1f observations of each "
+             "on average: too little texture, or poses of other photos.",
+             found.model.points.size(),
+             found.model.points.empty() ? 0.0
+                                        : static_cast<double>(found.observations) /
+                                              static_cast<double>(found.model.points.size())) +
+         kWithoutPoints;
 }
 
 }  // namespace

@@ -1,7 +1,6 @@
 #include "pipeline/capture/scene_profile.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <filesystem>
 
 #include "kernels/base/error.h"
@@ -27,9 +26,7 @@ EffectReport Row(const char* name, bool on, double value, double threshold,
 
 std::string Short(const Metric& metric) {
   if (!metric.value) return metric.why;
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g", *metric.value);
-  return text;
+  return Format("%.3g", *metric.value);
 }
 
 std::string AlphaPath(const CaptureView& view) {
@@ -86,13 +83,11 @@ void NameUnknownPhotos(const Capture& capture, SceneProfile* profile) {
 }
 
 std::string GainsEvidence(const ExposureEstimate& exposure) {
-  char spread[96];
-  std::snprintf(spread, sizeof spread, "; spread of the gains %.3g, standard error %.2g; ",
-                exposure.spread, exposure.median_error);
   return "fraction of the photos' colour differences at held-out points that the gains "
          "explain" +
-         std::string(spread) + "a spread up to " + Short(Metric{kExposureSpread}) +
-         " is not corrected";
+         Format("; spread of the gains %.3g, standard error %.2g; ", exposure.spread,
+                exposure.median_error) +
+         "a spread up to " + Short(Metric{kExposureSpread}) + " is not corrected";
 }
 
 // The row "exposure", and the gains if it is on.

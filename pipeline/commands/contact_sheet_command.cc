@@ -1,7 +1,6 @@
 // regrade contact-sheet: one picture that compares 2D method, linear map and both recipes.
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -85,11 +84,9 @@ std::string PsnrCaption(const Image& a, const Image& b, bool of_photos) {
     const double d = a.pixels[i] - b.pixels[i];
     if (std::isfinite(d)) sum += d * d, ++count;
   }
-  char text[64];
   const double mse = sum / static_cast<double>(std::max<int64_t>(1, count));
-  std::snprintf(text, sizeof text, "%.1f dB to 2D%s", -10 * std::log10(std::max(mse, 1e-12)),
+  return Format("%.1f dB to 2D%s", -10 * std::log10(std::max(mse, 1e-12)),
                 of_photos ? " of photo" : "");
-  return text;
 }
 
 // Everything about the scene that all styles share.
@@ -246,12 +243,11 @@ void AddStyle(RunContext* context, const Scene& scene, const SheetOptions& sheet
                                         Shown(scene, standard.styled)};
   const std::vector<Image> renders_2d = StyleRenders(context, scene, stylizer.get());
   const bool of_photos = renders_2d.empty();
-  char title[160];
-  std::snprintf(title, sizeof title,
-                "%s, %s: K_est %.2f, bounds %.2f (standard, %d steps), %.2f (paper, %d steps)",
-                name.c_str(), stylizer->Name().c_str(), standard.trained.k_est,
-                standard.trained.bound, static_cast<int>(standard.trained.steps),
-                paper.trained.bound, static_cast<int>(paper.trained.steps));
+  const std::string title =
+      Format("%s, %s: K_est %.2f, bounds %.2f (standard, %d steps), %.2f (paper, %d steps)",
+             name.c_str(), stylizer->Name().c_str(), standard.trained.k_est,
+             standard.trained.bound, static_cast<int>(standard.trained.steps),
+             paper.trained.bound, static_cast<int>(paper.trained.steps));
   for (size_t k = 0; k < scene.shown.size(); ++k) {
     const size_t n = static_cast<size_t>(scene.shown[k]);
     SheetRow row;

@@ -129,7 +129,7 @@ void RunEvaluate(const Command& command, const Arguments& arguments, Console* co
   options.Add("Program", &program);
   // Without --frames it evaluates the folder of a run, with all of a run's options.
   const bool has_frames = std::any_of(arguments.begin(), arguments.end(), [](const auto& word) {
-    return word == "--frames" || word.compare(0, 9, "--frames=") == 0;
+    return word == "--frames" || word.starts_with("--frames=");
   });
   if (!has_frames && !AsksForHelp(arguments))
     return ContinueRun(command, arguments, "evaluate", console);

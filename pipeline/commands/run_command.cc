@@ -5,7 +5,6 @@
 
 #include "kernels/base/error.h"
 #include "pipeline/capture/capture_store.h"
-#include "pipeline/capture/photo_masks.h"
 #include "pipeline/commands/command.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/program/device_choice.h"
@@ -15,6 +14,7 @@
 #include "pipeline/stages/make_stylizer.h"
 #include "pipeline/stages/network_probe.h"
 #include "pipeline/stages/stages.h"
+#include "pipeline/workspace/stage_record.h"
 
 namespace regrade {
 namespace {
@@ -32,7 +32,7 @@ void ProbeInputs(const std::string& last, RunContext* context) {
       throw Error(ExitCode::kUsage, "is the capture itself, and would be overwritten", "--out",
                   "name another folder; to continue this one, give the photos it was made of");
   if (std::string& masks = context->settings.pose.photo_masks; !masks.empty()) {
-    PhotoMaskFiles(masks);
+    HashFolder(masks);
     masks = std::filesystem::absolute(masks).lexically_normal().string();
   }
   if (last == "pose" || last == "reconstruct") return;

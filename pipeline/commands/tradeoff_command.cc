@@ -234,20 +234,17 @@ void PrintPrediction(const TradeoffOptions& tradeoff, Console* console) {
   ResolveSettings({.run_json = tradeoff.predict + "/run.json"}, &run.options);
   Workspace workspace(tradeoff.predict);
   const Capture capture = ReadCapture(workspace.Path("poses"));
-  char line[160];
-  std::snprintf(line, sizeof line, "%-12s %12s %12s %7s %12s %12s %7s", "stage", "predicted s",
-                "took s", "ratio", "predicted", "CPU s", "ratio");
-  console->Lines(line);
+  console->Lines(Format("%-12s %12s %12s %7s %12s %12s %7s", "stage", "predicted s", "took s",
+                        "ratio", "predicted", "CPU s", "ratio"));
   JsonValue::Array rows;
   StageTime all{"all", 0, 0}, took{"all", 0, 0};
   const auto print = [&](const StageTime& predicted, const StageTime& measured) {
     const double wall = measured.seconds > 0 ? predicted.seconds / measured.seconds : 0,
                  cpu = measured.cpu_seconds > 0 ? predicted.cpu_seconds / measured.cpu_seconds
                                                 : 0;
-    std::snprintf(line, sizeof line, "%-12s %12.1f %12.1f %7.2f %12.1f %12.1f %7.2f",
-                  predicted.stage.c_str(), predicted.seconds, measured.seconds, wall,
-                  predicted.cpu_seconds, measured.cpu_seconds, cpu);
-    console->Lines(line);
+    console->Lines(Format("%-12s %12.1f %12.1f %7.2f %12.1f %12.1f %7.2f",
+                          predicted.stage.c_str(), predicted.seconds, measured.seconds, wall,
+                          predicted.cpu_seconds, measured.cpu_seconds, cpu));
     rows.push_back(JsonValue::Object{{"stage", predicted.stage},
                                      {"predicted_seconds", predicted.seconds},
                                      {"seconds", measured.seconds},

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "kernels/base/error.h"
 #include "kernels/scene/srgb.h"
@@ -45,10 +44,9 @@ void Clamp(StoredPicture* picture) {
       ++clamped;
     }
   if (clamped == 0) return;
-  char text[96];
-  std::snprintf(text, sizeof text, "%.3g %% of the values were outside [0, 1] and were clamped",
-                100.0 * static_cast<double>(clamped) / picture->image.pixels.size());
-  picture->notices.push_back(text);
+  picture->notices.push_back(
+      Format("%.3g %% of the values were outside [0, 1] and were clamped",
+             100.0 * static_cast<double>(clamped) / picture->image.pixels.size()));
 }
 
 void CheckAlpha(const Image& image, const std::string& where) {

@@ -10,6 +10,7 @@
 #include <cstring>
 #include <ctime>
 
+#include "kernels/base/error.h"
 #include "pipeline/program/interrupt.h"
 
 namespace regrade {
@@ -148,10 +149,7 @@ void Console::Draw(const Progress& progress) {
   const std::optional<double> left = eta_.Remaining();
   std::string line = stage_;
   if (progress.total > 0) {
-    char percent[16];
-    std::snprintf(percent, sizeof percent, "%3.0f %%",
-                  100 * std::min(1.0, progress.done / progress.total));
-    line += std::string("  ") + percent;
+    line += Format("  %3.0f %%", 100 * std::min(1.0, progress.done / progress.total));
   }
   if (left) line += "  " + DurationText(*left) + " left";
   if (!progress.note.empty()) line += "  " + Printable(progress.note);

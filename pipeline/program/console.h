@@ -9,6 +9,7 @@
 #include "kernels/base/error.h"
 #include "kernels/base/progress.h"
 #include "pipeline/files/json_file.h"
+#include "pipeline/files/text.h"
 #include "pipeline/program/eta_estimator.h"
 
 namespace regrade {

@@ -1,7 +1,6 @@
 #include "pipeline/run/plan.h"
 
 #include <algorithm>
-#include <cstdio>
 
 #include "kernels/base/error.h"
 #include "kernels/field/packed_grid.h"
@@ -19,12 +18,7 @@ constexpr double kIndexBytes = 4;        // vertex of a voxel, slot of a voxel, 
 double SecondsWith(double seconds, int threads) { return seconds * 2 / std::max(threads, 1); }
 
 std::string MemoryText(double bytes) {
-  char text[32];
-  if (bytes < 1e8)
-    std::snprintf(text, sizeof text, "%.0f MB", bytes * 1e-6);
-  else
-    std::snprintf(text, sizeof text, "%.1f GB", bytes * 1e-9);
-  return text;
+  return bytes < 1e8 ? Format("%.0f MB", bytes * 1e-6) : Format("%.1f GB", bytes * 1e-9);
 }
 
 }  // namespace

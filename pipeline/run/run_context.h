@@ -6,6 +6,7 @@
 #include "pipeline/capture/working_views.h"
 #include "pipeline/program/console.h"
 #include "pipeline/run/run_settings.h"
+#include "pipeline/workspace/workspace.h"
 
 namespace regrade {
 

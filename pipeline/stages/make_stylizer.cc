@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "kernels/base/error.h"
-#include "pipeline/files/folder_listing.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/stages/command_stylizer.h"
 #include "pipeline/stages/folder_stylizer.h"
@@ -140,12 +139,9 @@ JsonValue MethodFiles(const StyleOptions& options) {
   const StyleMethod method = ParseStyleMethod(options);
   if (!ReadsFiles(method.kind)) return JsonValue();
   std::error_code error;
-  if (std::filesystem::is_regular_file(method.argument, error))
-    return HashFile(method.argument);
-  JsonValue hashes = JsonValue::Object();
-  for (const ListedFile& file : ListFolder(method.argument).files)
-    if (file.problem.empty()) hashes[file.name] = HashFile(file.path);
-  return hashes;
+  return std::filesystem::is_regular_file(method.argument, error)
+             ? JsonValue(HashFile(method.argument))
+             : HashFolder(method.argument);
 }
 
 }  // namespace regrade

@@ -172,7 +172,7 @@ Stage PoseStage(RunContext* context) {
   if (const auto refine = overrides.find(kPoseRefinement); refine != overrides.end())
     stage.inputs[kPoseRefinement] = refine->second;
   if (const std::string folder = MasksOf(*context, source); !folder.empty())
-    stage.inputs["photo_masks"] = PhotoMaskFiles(folder);
+    stage.inputs["photo_masks"] = HashFolder(folder);
   stage.refuse_changes = true;
   const int64_t photos = static_cast<int64_t>(stage.inputs.At("photos").AsObject().size());
   stage.plan =

@@ -1,7 +1,6 @@
 #include "pipeline/synth/synth_capture.h"
 
 #include <charconv>
-#include <cstdio>
 #include <filesystem>
 #include <vector>
 
@@ -25,9 +24,7 @@ namespace fs = std::filesystem;
 constexpr int kMinSide = 16, kMaxSide = 8192;  // pixels
 
 std::string FrameName(int index, const char* extension) {
-  char name[32];
-  std::snprintf(name, sizeof(name), "%05d%s", index, extension);
-  return name;
+  return Format("%05d%s", index, extension);
 }
 
 void ParseSize(const std::string& size, int* width, int* height) {

@@ -1,7 +1,6 @@
 #include "pipeline/tradeoff/cost_table.h"
 
 #include <algorithm>
-#include <cstdio>
 
 #include "kernels/base/error.h"
 #include "pipeline/report/html_text.h"
@@ -131,23 +130,20 @@ std::vector<CostRow> CostTable(const std::vector<Variant>& variants,
 
 std::string CostTableText(const std::vector<CostRow>& rows) {
   std::string text, benchmark;
-  char line[256];
   for (const CostRow& row : rows) {
     if (row.benchmark != benchmark) {
       benchmark = row.benchmark;
       text += (text.empty() ? "" : "\n") + benchmark + ": " + row.measure + ", " + row.unit +
               "; time of " + BenchmarkOf(benchmark).time_of + "; * on the Pareto front\n";
-      std::snprintf(line, sizeof line, "  %-40s %10s %10s %9s %10s %9s %9s\n", "", "s", "CPU s",
-                    "+-", row.unit.c_str(), "+-", "error");
-      text += line;
+      text += Format("  %-40s %10s %10s %9s %10s %9s %9s\n", "", "s", "CPU s", "+-",
+                     row.unit.c_str(), "+-", "error");
     }
     const int decimals = DecimalsFor(row.cpu_seconds);
-    std::snprintf(line, sizeof line, "%s %-40s %10s %10s %9s %10s %9s %9s",
-                  row.on_pareto_front ? "*" : " ", NameOf(row).c_str(),
-                  Cell(row.seconds, decimals).c_str(), Cell(row.cpu_seconds, decimals).c_str(),
-                  Cell(row.cpu_spread, decimals).c_str(), Cell(row.accuracy, 3).c_str(),
-                  Cell(row.accuracy_spread, 3).c_str(), Cell(row.error, 3).c_str());
-    text += line;
+    text += Format("%s %-40s %10s %10s %9s %10s %9s %9s", row.on_pareto_front ? "*" : " ",
+                   NameOf(row).c_str(), Cell(row.seconds, decimals).c_str(),
+                   Cell(row.cpu_seconds, decimals).c_str(),
+                   Cell(row.cpu_spread, decimals).c_str(), Cell(row.accuracy, 3).c_str(),
+                   Cell(row.accuracy_spread, 3).c_str(), Cell(row.error, 3).c_str());
     if (!row.dominated_by.empty()) text += "  dominated by " + row.dominated_by;
     text += "\n";
   }

@@ -10,6 +10,7 @@
 #include "kernels/base/file_descriptor.h"
 #include "kernels/base/hash.h"
 #include "pipeline/files/atomic_file.h"
+#include "pipeline/files/folder_listing.h"
 
 namespace regrade {
 namespace {
@@ -18,11 +19,6 @@ namespace fs = std::filesystem;
 
 constexpr int64_t kSchema = 2;
 constexpr size_t kNamedDifferences = 4;
-
-bool EndsWith(const std::string& text, const std::string& end) {
-  return text.size() >= end.size() &&
-         text.compare(text.size() - end.size(), end.size(), end) == 0;
-}
 
 std::string Shown(const JsonValue& value) {
   std::string text = value.IsString() ? value.AsString() : DumpJson(value, -1);
@@ -79,11 +75,18 @@ std::string HashFile(const std::string& path) {
   return HashText(hasher.Value());
 }
 
+JsonValue HashFolder(const std::string& folder) {
+  JsonValue hashes = JsonValue::Object();
+  for (const ListedFile& file : ListFolder(folder).files)
+    if (file.problem.empty()) hashes[file.name] = HashFile(file.path);
+  return hashes;
+}
+
 std::vector<StageOutput> DescribeOutputs(const std::string& root,
                                          const std::vector<std::string>& paths) {
   std::vector<StageOutput> outputs;
   const auto add = [&](const fs::path& file) {
-    if (EndsWith(file.string(), kTemporarySuffix)) return;
+    if (file.string().ends_with(kTemporarySuffix)) return;
     outputs.push_back({file.lexically_relative(root).generic_string(),
                        static_cast<int64_t>(fs::file_size(file)), HashFile(file.string())});
   };
@@ -164,7 +167,7 @@ StageRecord StageRecordFromJson(const JsonValue& value, const std::string& where
       // Paths out of the folder are refused.
       const fs::path path = output.At("path").AsString();
       if (path.is_absolute() || path.lexically_normal() != path ||
-          EndsWith(path.string(), "/") || *path.begin() == "..")
+          path.string().ends_with("/") || *path.begin() == "..")
         throw Error(ExitCode::kInput, "a path that leads out of the folder");
       record.outputs.push_back(
           {path.string(), output.At("bytes").AsInt(), output.At("hash").AsString()});

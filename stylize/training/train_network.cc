@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <memory>
 #include <utility>
@@ -270,10 +269,9 @@ TrainNetworkResult TrainNetwork(const RadianceField& field,
                          FirstNonFinite(training.network(), steps.gradient, steps.last.loss)),
                   "", "lower --style-rate; the state before it was kept");
     }
-    char note[64];
-    std::snprintf(note, sizeof note, "%.1f dB on this step's rays", Psnr(steps.last.Mse()));
     const LoopControl control =
-        Report(hooks.progress, training.steps_done(), options.steps, note);
+        Report(hooks.progress, training.steps_done(), options.steps,
+               Format("%.1f dB on this step's rays", Psnr(steps.last.Mse())));
     const bool last =
         control != LoopControl::kContinue || training.steps_done() == options.steps;
     if (hooks.checkpoint && (last || training.steps_done() % hooks.checkpoint_every == 0))
