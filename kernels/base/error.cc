@@ -35,9 +35,7 @@ std::string Format(const char* format, ...) {
 }
 
 void FailCheck(const char* file, int line, const std::string& message) {
-  std::ostringstream text;
-  text << file << ":" << line << ": check failed: " << message;
-  throw CheckFailure(text.str());
+  throw CheckFailure(Concat(file, ":", line, ": check failed: ", message));
 }
 
 }  // namespace regrade

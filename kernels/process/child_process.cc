@@ -9,13 +9,13 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <chrono>
 #include <cmath>
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
 #include <deque>
 
+#include "kernels/base/clock.h"
 #include "kernels/base/error.h"
 #include "kernels/base/file_descriptor.h"
 #include "kernels/process/process_guard.h"
@@ -26,11 +26,6 @@ namespace {
 constexpr size_t kLongestLine = 4096;
 constexpr size_t kLastLines = 20;
 constexpr int kPollMs = 100;
-
-double Now() {
-  using Clock = std::chrono::steady_clock;
-  return std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
-}
 
 [[noreturn]] void ThrowNoResources(const std::string& what, int code) {
   throw Error(ExitCode::kResources, what + ": " + std::strerror(code));
@@ -229,7 +224,7 @@ ChildResult RunChild(const ChildOptions& options, const LineFunction& on_line,
   std::deque<std::string> last;
   Lines lines(on_line, &last);
 
-  const double start = Now();
+  const double start = ClockSeconds();
   Child child(options, output.get());
   output.Close();
 
@@ -237,7 +232,7 @@ ChildResult RunChild(const ChildOptions& options, const LineFunction& on_line,
   double heard = start, asked = start, asked_to_end = 0, ended_since = 0;
   char bytes[1 << 16];
   while (true) {
-    const double now = Now();
+    const double now = ClockSeconds();
     if (ended_since == 0 && child.Ended()) {
       child.Signal(SIGKILL);  // the rest of its group
       ended_since = now;
@@ -275,7 +270,7 @@ ChildResult RunChild(const ChildOptions& options, const LineFunction& on_line,
   const int status = child.Reap();
   lines.End();
   log.Finish(last);
-  result.seconds = Now() - start;
+  result.seconds = ClockSeconds() - start;
   result.last_lines.assign(last.begin(), last.end());
   if (WIFSIGNALED(status)) {
     result.signal = WTERMSIG(status);

@@ -5,15 +5,10 @@
 #include <cstdint>
 
 #include "kernels/base/error.h"
+#include "kernels/base/median.h"
 
 namespace regrade {
 namespace {
-
-double Median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<long>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 bool IsPortrait(const Camera& camera) { return camera.height > camera.width; }
 

@@ -1,8 +1,8 @@
 #include "pipeline/capture/pose_tracks.h"
 
 #include <algorithm>
-#include <chrono>
 
+#include "kernels/base/clock.h"
 #include "kernels/base/error.h"
 #include "pipeline/capture/scene_profile.h"
 #include "pipeline/program/cpu_time.h"
@@ -59,8 +59,7 @@ PoseTracks AddTracks(const PoseOptions& options, const std::string& effects,
                      const ProgressFunction& progress) {
   PoseTracks result;
   if (!WantsTracks(options, effects, *capture)) return result;
-  using Clock = std::chrono::steady_clock;
-  const Clock::time_point began = Clock::now();
+  const double began = ClockSeconds();
   const double cpu_before = CpuSeconds();
   FoundTracks found;
   try {
@@ -73,7 +72,7 @@ PoseTracks AddTracks(const PoseOptions& options, const std::string& effects,
     result.metrics = JsonValue::Object{{"points", 0}, {"failed", error.what_failed()}};
     return result;
   }
-  const double seconds = std::chrono::duration<double>(Clock::now() - began).count();
+  const double seconds = ClockSeconds() - began;
   const double cpu_seconds = CpuSeconds() - cpu_before;
   result.metrics =
       JsonValue::Object{{"points", static_cast<int64_t>(found.model.points.size())},

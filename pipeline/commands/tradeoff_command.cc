@@ -3,9 +3,9 @@
 #include <omp.h>
 
 #include <algorithm>
-#include <chrono>
 #include <filesystem>
 
+#include "kernels/base/clock.h"
 #include "kernels/base/error.h"
 #include "kernels/base/hash.h"
 #include "kernels/field/cpu/rays.h"
@@ -75,12 +75,6 @@ std::vector<std::string> Words(const std::string& text) {
     begin = end + 1;
   }
   return words;
-}
-
-using Clock = std::chrono::steady_clock;
-
-double SecondsSince(Clock::time_point begin) {
-  return std::chrono::duration<double>(Clock::now() - begin).count();
 }
 
 // A measurement to make.
@@ -170,8 +164,7 @@ void WriteResults(const RunContext& base, const TradeoffOptions& tradeoff,
 
 // Makes the missing measurements, one at a time, until the budget is spent.
 void MeasureAll(RunContext* base, const TradeoffOptions& tradeoff, const std::string& folder,
-                const std::vector<Variant>& variants, Clock::time_point begin,
-                MeasurementStore* store) {
+                const std::vector<Variant>& variants, double begin, MeasurementStore* store) {
   std::vector<Job> jobs = JobsOf(variants, tradeoff.repeats);
   std::erase_if(
       jobs, [&](const Job& job) { return store->Find(*job.variant, job.repeat) != nullptr; });
@@ -181,7 +174,7 @@ void MeasureAll(RunContext* base, const TradeoffOptions& tradeoff, const std::st
   for (size_t i = 0; i < jobs.size(); ++i) {
     double left = 0;
     for (size_t k = i; k < jobs.size(); ++k) left += estimate.Seconds(*jobs[k].variant);
-    if (i > 0 && tradeoff.budget > 0 && SecondsSince(begin) > 60 * tradeoff.budget) {
+    if (i > 0 && tradeoff.budget > 0 && ClockSeconds() - begin > 60 * tradeoff.budget) {
       console->Warn(Concat("the budget is spent: ", jobs.size() - i,
                            " measurements remain, about ", DurationText(left),
                            "; the same command continues"));
@@ -266,7 +259,7 @@ void PrintPrediction(const TradeoffOptions& tradeoff, Console* console) {
 }  // namespace
 
 void RunTradeoff(const Command& command, const Arguments& arguments, Console* console) {
-  const Clock::time_point begin = Clock::now();
+  const double begin = ClockSeconds();
   TradeoffOptions tradeoff;
   RunContext base;
   base.console = console;

@@ -1,9 +1,9 @@
 // regrade_gpu style: restyles a packed capture's field after its style picture.
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <utility>
 
+#include "kernels/base/clock.h"
 #include "kernels/base/error.h"
 #include "kernels/field/cuda/device_rays.h"
 #include "kernels/field/packed_grid.h"
@@ -16,20 +16,17 @@
 namespace regrade {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 // Seconds since the last call, or since it was made.
 class Stopwatch {
  public:
   double Lap() {
-    const auto now = Clock::now();
-    const double seconds = std::chrono::duration<double>(now - last_).count();
-    last_ = now;
-    return seconds;
+    const double begin = last_;
+    last_ = ClockSeconds();
+    return last_ - begin;
   }
 
  private:
-  Clock::time_point last_ = Clock::now();
+  double last_ = ClockSeconds();
 };
 
 // What MKL makes of the views that the field was fitted to.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <climits>
 
+#include "pipeline/report/html_text.h"
 #include "pipeline/report/plot.h"
 #include "pipeline/report/sequence_names.h"
 #include "pipeline/workspace/output_names.h"

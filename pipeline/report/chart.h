@@ -4,6 +4,8 @@
 
 #include <string>
 
+#include "pipeline/report/data.h"
+
 namespace regrade {
 
 // tc_psnr_pairs_db at the smallest gap; a line breaks at undefined pairs. The frames at the

@@ -1,6 +1,7 @@
 #include "pipeline/report/html_text.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <cstdio>
 

@@ -1,5 +1,8 @@
 #include "pipeline/report/json.h"
 
+#include <string>
+#include <vector>
+
 #include "pipeline/workspace/metrics_json.h"
 
 namespace regrade {

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <map>
 
+#include "kernels/base/error.h"
 #include "kernels/image/resize.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/images/image_file.h"
@@ -81,7 +82,7 @@ std::vector<std::optional<ReportPicture>> Thumbnails(const Workspace& workspace,
   std::vector<std::string> wanted(capture.statuses.size());
   int taken = 0;
   for (int i = 0; i < count; ++i) {
-    const PhotoStatus& photo = capture.statuses[i];
+    const PhotoStatus& photo = capture.statuses[static_cast<size_t>(i)];
     const auto path = staged.find(photo.file);
     if (path == staged.end()) continue;
     // Evenly spaced.
@@ -89,12 +90,13 @@ std::vector<std::optional<ReportPicture>> Thumbnails(const Workspace& workspace,
                      taken < (i + 1) * static_cast<int64_t>(kMostThumbnails) / count;
     if (photo.status == PhotoState::kUsed && !due) continue;
     taken += photo.status == PhotoState::kUsed;
-    wanted[i] = path->second;
+    wanted[static_cast<size_t>(i)] = path->second;
   }
   // Decoding photos takes most of the time.
   std::vector<std::optional<ReportPicture>> thumbnails(wanted.size());
 #pragma omp parallel for schedule(dynamic)
-  for (int i = 0; i < count; ++i) thumbnails[i] = ThumbnailAt(wanted[i]);
+  for (int i = 0; i < count; ++i)
+    thumbnails[static_cast<size_t>(i)] = ThumbnailAt(wanted[static_cast<size_t>(i)]);
   return thumbnails;
 }
 

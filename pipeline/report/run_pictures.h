@@ -7,6 +7,7 @@
 
 #include "kernels/scene/capture.h"
 #include "kernels/scene/image.h"
+#include "pipeline/report/data.h"
 #include "pipeline/report/page_pictures.h"
 #include "pipeline/workspace/workspace.h"
 

@@ -1,6 +1,7 @@
 #include "pipeline/report/tables.h"
 
 #include <algorithm>
+#include <utility>
 #include <vector>
 
 #include "pipeline/report/chart.h"

@@ -5,6 +5,7 @@
 #include "kernels/base/error.h"
 #include "kernels/field/packed_grid.h"
 #include "kernels/field/spherical_harmonics.h"
+#include "pipeline/files/text.h"
 
 namespace regrade {
 namespace {

@@ -1,13 +1,13 @@
 #include "pipeline/tradeoff/variant_runner.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <numeric>
 
 #include "evaluate/image_quality.h"
 #include "evaluate/pair_motion.h"
+#include "kernels/base/clock.h"
 #include "kernels/base/error.h"
 #include "kernels/field/cpu/render_view.h"
 #include "kernels/field/packed_grid.h"
@@ -39,14 +39,13 @@ class Clocks {
  public:
   explicit Clocks(Measurement* measurement) : measurement_(measurement) {}
   void Stop(double count = 1) {
-    const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - begin_;
-    measurement_->seconds = wall.count() / count;
+    measurement_->seconds = (ClockSeconds() - begin_) / count;
     measurement_->cpu_seconds = (CpuSeconds() - cpu_begin_) / count;
   }
 
  private:
   Measurement* measurement_;
-  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+  double begin_ = ClockSeconds();
   double cpu_begin_ = CpuSeconds();
 };
 

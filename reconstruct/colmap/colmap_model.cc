@@ -10,7 +10,6 @@
 #include <cstring>
 #include <fstream>
 #include <set>
-#include <sstream>
 
 #include "kernels/base/checked_math.h"
 #include "kernels/base/error.h"
@@ -163,11 +162,9 @@ Mat3d ReadRotation(Reader& reader, uint32_t image_id) {
   for (double& component : wxyz) component = reader.ReadFinite("a quaternion");
   const Eigen::Quaterniond q(wxyz[0], wxyz[1], wxyz[2], wxyz[3]);
   const double norm = q.norm();
-  if (!(std::abs(norm - 1) <= kQuaternionTolerance)) {
-    std::ostringstream text;
-    text << "image " << image_id << " has a rotation quaternion of length " << norm;
-    reader.Fail(text.str());
-  }
+  if (!(std::abs(norm - 1) <= kQuaternionTolerance))
+    reader.Fail(Format("image %u has a rotation quaternion of length %g", image_id, norm));
+
   Mat3d rotation;
   Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(&rotation(0, 0)) =
       q.normalized().toRotationMatrix();

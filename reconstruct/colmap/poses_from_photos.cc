@@ -3,13 +3,13 @@
 #include "reconstruct/colmap/poses_from_photos.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <optional>
 #include <set>
 
+#include "kernels/base/clock.h"
 #include "kernels/base/error.h"
 #include "reconstruct/colmap/colmap_model.h"
 #include "reconstruct/colmap/colmap_output.h"
@@ -28,11 +28,6 @@ namespace fs = std::filesystem;
 constexpr double kGoodFraction = 0.95;  // of the photos: enough to stop
 constexpr double kBytesPerPhoto = 3e6;  // upper bound of database and logs
 
-double Now() {
-  using Clock = std::chrono::steady_clock;
-  return std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
-}
-
 class PoseFinder {
  public:
   PoseFinder(const std::vector<StagedPhoto>& photos, const PoseOptions& options,
@@ -48,7 +43,8 @@ class PoseFinder {
     limits_.min_views = options.min_photos;
     const double n = static_cast<double>(photos.size());
     const double automatic = 600 + 60 * n + 2 * std::min(n * (n - 1) / 2, 40 * n);
-    deadline_ = Now() + (options.time_limit_min > 0 ? 60 * options.time_limit_min : automatic);
+    deadline_ =
+        ClockSeconds() + (options.time_limit_min > 0 ? 60 * options.time_limit_min : automatic);
   }
 
   Capture Find(const std::string& sparse_output_folder) {
@@ -129,7 +125,7 @@ class PoseFinder {
       if (best.models.empty() && last != nullptr && strategy.all_pairs && pairs >= 0 &&
           pairs < static_cast<int>(photos_.size()) - 1)
         break;
-      if (Now() > deadline_) break;
+      if (ClockSeconds() > deadline_) break;
     }
     return best;
   }
@@ -264,7 +260,7 @@ class PoseFinder {
     };
     const ChildResult result = colmap_->Run(
         command, arguments, command,
-        {std::max(1.0, deadline_ - Now()), 60 * options_.quiet_limit_min},
+        {std::max(1.0, deadline_ - ClockSeconds()), 60 * options_.quiet_limit_min},
         [&](const std::string& line) { output_.Line(line); }, tick);
     spent_ += weight;
     return result;
@@ -289,9 +285,10 @@ class PoseFinder {
     const double weight = planned_ - spent_;
     double done = spent_;
     const auto on_step = [&](int step, int steps) { done = spent_ + weight * step / steps; };
-    return RefineIntrinsics(*colmap_, grown, work_folder_,
-                            {std::max(60.0, deadline_ - Now()), 60 * options_.quiet_limit_min},
-                            on_step, [&] { return ReportAt(done, "adjusting"); });
+    return RefineIntrinsics(
+        *colmap_, grown, work_folder_,
+        {std::max(60.0, deadline_ - ClockSeconds()), 60 * options_.quiet_limit_min}, on_step,
+        [&] { return ReportAt(done, "adjusting"); });
   }
 
   bool TooFewGiven() const { return static_cast<int>(photos_.size()) < options_.min_photos; }
@@ -333,7 +330,7 @@ class PoseFinder {
   std::string photo_folder_, attempt_folder_;
   SceneLimits limits_;
   int threads_;
-  double deadline_ = 0;             // on Now()'s clock
+  double deadline_ = 0;             // of ClockSeconds()
   double spent_ = 0, planned_ = 0;  // estimated seconds
 };
 

@@ -10,6 +10,7 @@
 
 #include "kernels/base/error.h"
 #include "kernels/base/hash.h"
+#include "kernels/base/median.h"
 #include "kernels/base/random.h"
 
 namespace regrade {
@@ -38,10 +39,7 @@ double ExtentOf(const std::vector<Vec3d>& centers) {
 double MedianDistance(const std::vector<ColmapPoint>& points, const Vec3d& from) {
   std::vector<double> distances;
   for (const ColmapPoint& point : points) distances.push_back(Norm(point.position - from));
-  if (distances.empty()) return 0;
-  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-  std::nth_element(distances.begin(), middle, distances.end());
-  return *middle;
+  return Median(std::move(distances));
 }
 
 }  // namespace
@@ -126,10 +124,7 @@ double MedianError(const Bundle& bundle, bool held_out) {
   for (const BundleObservation& observation : bundle.observations)
     if (observation.held_out == held_out)
       errors.push_back(ReprojectionError(bundle, observation));
-  if (errors.empty()) return 0;
-  const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
-  std::nth_element(errors.begin(), middle, errors.end());
-  return *middle;
+  return Median(std::move(errors));
 }
 
 ColmapModel ModelOfBundle(const Bundle& bundle, const ColmapModel& model) {

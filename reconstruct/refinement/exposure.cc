@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "kernels/base/error.h"
+#include "kernels/base/median.h"
 #include "reconstruct/refinement/exposure_model.h"
 
 namespace regrade {
@@ -144,9 +145,7 @@ ExposureEstimate EstimateExposure(int num_views,
     }
   }
   estimate.spread = std::sqrt(squares / static_cast<double>(errors.size()));
-  const auto middle = errors.begin() + static_cast<long>(errors.size() / 2);
-  std::nth_element(errors.begin(), middle, errors.end());
-  estimate.median_error = *middle;
+  estimate.median_error = Median(std::move(errors));
   return estimate;
 }
 

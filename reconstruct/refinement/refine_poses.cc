@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "kernels/base/error.h"
+#include "kernels/base/median.h"
 #include "reconstruct/refinement/bundle.h"
 
 namespace regrade {
@@ -158,12 +159,6 @@ class Adjustment {
     return std::pair(Median(rotations), Median(centers));
   }
 
-  static double Median(std::vector<double> values) {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-  }
-
  private:
   static ceres::Problem::Options Ownership() {
     ceres::Problem::Options options;
@@ -198,8 +193,8 @@ void MeasureCorrections(const ColmapModel& before, const ColmapModel& after, dou
                      M_PI);
     moved.push_back(Norm(now.Inverse().translation - old.Inverse().translation) * per_extent);
   }
-  result->turned_deg = Adjustment::Median(turned);
-  result->moved_fraction = Adjustment::Median(moved);
+  result->turned_deg = Median(turned);
+  result->moved_fraction = Median(moved);
 }
 
 std::string WhyRejected(const PoseRefinement& result, bool asked_for) {

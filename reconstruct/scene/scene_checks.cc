@@ -3,10 +3,9 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <iomanip>
-#include <sstream>
 
 #include "kernels/base/error.h"
+#include "kernels/base/median.h"
 
 namespace regrade {
 namespace {
@@ -30,24 +29,13 @@ double LargestAngle(const Vec3d& point, const std::vector<int32_t>& views,
   return largest;
 }
 
-double Median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 std::vector<Vec3d> Centers(const Capture& capture) {
   std::vector<Vec3d> centers;
   for (const CaptureView& view : capture.views) centers.push_back(view.camera.Center());
   return centers;
 }
 
-std::string Rounded(double value, int digits) {
-  std::ostringstream text;
-  text << std::fixed << std::setprecision(digits) << value;
-  return text.str();
-}
+std::string Rounded(double value, int digits) { return Format("%.*f", digits, value); }
 
 }  // namespace
 
