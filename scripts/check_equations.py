@@ -7,10 +7,11 @@ An equation is stated in a comment with EQ(tag) followed by a comma or a colon; 
 Exit status: 0, or 1 if there is a finding.
 """
 
-import argparse
 import os
 import re
 import sys
+
+from tree_files import parser_of, read
 
 MODULES = ("kernels", "reconstruct", "stylize", "evaluate", "pipeline")
 TAG = re.compile(r"(?<![A-Za-z0-9_])EQ\(([a-z][a-z0-9-]*)\)")
@@ -25,8 +26,7 @@ def source_files(root, modules):
             for name in sorted(names):
                 if name.endswith((".h", ".cuh", ".cc", ".cu")):
                     path = os.path.join(folder, name)
-                    with open(path, encoding="utf-8", errors="replace") as file:
-                        yield os.path.relpath(path, root).replace(os.sep, "/"), file.read()
+                    yield os.path.relpath(path, root).replace(os.sep, "/"), read(path)
 
 
 def homes_and_references(root):
@@ -55,15 +55,14 @@ def test_names(root):
 def table_rows(root):
     """[(line, tag, file, [tests])] of EQUATIONS.md; raises ValueError on a malformed row."""
     rows = []
-    with open(os.path.join(root, "EQUATIONS.md"), encoding="utf-8") as file:
-        for number, line in enumerate(file, 1):
-            if not line.startswith("| `"):
-                continue
-            cells = [cell.strip() for cell in re.split(r"(?<!\\)\|", line.strip().strip("|"))]
-            if len(cells) != TABLE_COLUMNS:
-                raise ValueError(f"EQUATIONS.md:{number}: {len(cells)} cells instead of {TABLE_COLUMNS}")
-            tests = [test.strip(" `") for test in cells[4].split(",") if test.strip(" `")]
-            rows.append((number, cells[0].strip("`"), cells[3].strip("`"), tests))
+    for number, line in enumerate(read(root, "EQUATIONS.md").splitlines(), 1):
+        if not line.startswith("| `"):
+            continue
+        cells = [cell.strip() for cell in re.split(r"(?<!\\)\|", line.strip().strip("|"))]
+        if len(cells) != TABLE_COLUMNS:
+            raise ValueError(f"EQUATIONS.md:{number}: {len(cells)} cells instead of {TABLE_COLUMNS}")
+        tests = [test.strip(" `") for test in cells[4].split(",") if test.strip(" `")]
+        rows.append((number, cells[0].strip("`"), cells[3].strip("`"), tests))
     return rows
 
 
@@ -105,9 +104,7 @@ def check_tree(root):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--root", default=os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-    arguments = parser.parse_args()
+    arguments = parser_of(__doc__).parse_args()
     findings = check_tree(arguments.root)
     for finding in findings:
         print(finding)

@@ -7,10 +7,11 @@ MODULES, LAYERS and ALLOWED below are the rules: a new folder or library needs a
 finding.
 """
 
-import argparse
 import os
 import re
 import sys
+
+from tree_files import parser_of, read
 
 # module -> the other modules that its files may include
 MODULES = {
@@ -197,8 +198,7 @@ def check_library(root, row, layers):
     path = row + "/CMakeLists.txt"
     if not os.path.isfile(os.path.join(root, path)):
         return [(path, 1, "missing: a folder is a library")]
-    with open(os.path.join(root, path), encoding="utf-8") as file:
-        text = file.read()
+    text = read(root, path)
     findings = []
     if not text.startswith("# "):
         findings.append((path, 1, "a CMakeLists.txt begins with a comment that describes its folder"))
@@ -274,8 +274,7 @@ def check_tree(root, layers):
     """(findings, remarks), each a list of (path, line, text)."""
     findings, remarks, includes = [], [], {}
     for path in files_to_check(root):
-        with open(os.path.join(root, path), encoding="utf-8", errors="replace") as file:
-            text = file.read()
+        text = read(root, path)
         lines = text.count("\n")
         if FLAG_FILES.match(path.rsplit("/", 1)[-1]):
             without_comments = re.sub(r"#[^\n]*", "", text)
@@ -299,9 +298,7 @@ def check_tree(root, layers):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--root", default=os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-    arguments = parser.parse_args()
+    arguments = parser_of(__doc__).parse_args()
     findings, remarks = check_tree(arguments.root, LAYERS)
     for path, line, text in remarks:
         print(f"{path}:{line}: remark: {text}")

@@ -10,7 +10,6 @@ CHANGELOG.md, MUTATIONS.md (recorded messages) and check_words.py (retired names
 Exit status: 0, or 1 if there is a finding.
 """
 
-import argparse
 import fnmatch
 import io
 import os
@@ -18,7 +17,7 @@ import re
 import sys
 import tokenize
 
-from tree_files import text_of, tree_files
+from tree_files import parser_of, text_of, tree_files
 
 EXEMPT = ("CHANGELOG.md", "tests/hard_cases/MUTATIONS.md", "scripts/check_names.py", "scripts/check_words.py")
 OTHER_SCRIPTS = re.compile(r"scripts/.*(\.sh|\.yaml|Snakefile)|\.ci/run|CMakePresets\.json")
@@ -119,9 +118,7 @@ class Tree:
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--root", default=os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-    arguments = parser.parse_args()
+    arguments = parser_of(__doc__).parse_args()
     findings = Tree(arguments.root).check()
     for path, line, what in findings:
         print(f"{path}:{line}: there is no {what}")

@@ -7,12 +7,10 @@ Exit status: 0, or 1 if there is a finding. A row of RULES is a regular expressi
 be found and similar texts that must not.
 """
 
-import argparse
-import os
 import re
 import sys
 
-from tree_files import text_of, tree_files
+from tree_files import parser_of, text_of, tree_files
 
 # Not checked: the history, this list and its test.
 EXEMPT = ("CHANGELOG.md", "scripts/check_words.py", "tests/scripts/check_words_test.py")
@@ -100,9 +98,7 @@ def check_tree(root):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--root", default=os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-    arguments = parser.parse_args()
+    arguments = parser_of(__doc__).parse_args()
     findings = check_tree(arguments.root)
     for path, line, what, plain in findings:
         where = f"{path}:{line}" if line else f"{path}: the file's name"

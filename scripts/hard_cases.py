@@ -18,7 +18,6 @@ reason ("unseen") where no safeguard can be removed. The safeguards and the test
 mutations.json and MUTATIONS.md. Metrics, each with its command, are in metrics.json.
 """
 
-import argparse
 import fnmatch
 import glob
 import json
@@ -27,6 +26,7 @@ import re
 import sys
 
 import measured_errors
+from tree_files import parser_of, read, write
 
 FOLDER = os.path.join("tests", "hard_cases")
 CASES, MUTATIONS, SEEN, PAGE, METRICS, MEASURED = (os.path.join(FOLDER, name) for name in (
@@ -45,11 +45,6 @@ worst of all inputs of the test; float and double are the precision of the compu
 {summary}
 """
 PARTS = (("Numbers and pictures", "H"), ("Inputs, machines, programs", "F"))
-
-
-def read(path):
-    with open(path, encoding="utf-8") as file:
-        return file.read()
 
 
 class Tree:
@@ -186,23 +181,20 @@ def keep(root, reports):
     known = set(tree.measured) | set(measured_errors.in_sources(root)[0])
     now = measured_errors.run(reports[0], sorted(known)) if build else measured_errors.gather(reports)
     kept = {test: rows for test, rows in {**tree.measured, **now}.items() if test in tree.tests}
-    with open(os.path.join(root, MEASURED), "w", encoding="utf-8") as file:
-        rows = [f" {json.dumps(test)}: [\n  " + ",\n  ".join(json.dumps(row) for row in kept[test]) + "]"
-                for test in sorted(kept)]
-        file.write("{\n" + ",\n".join(rows) + "\n}\n")
+    rows = [f" {json.dumps(test)}: [\n  " + ",\n  ".join(json.dumps(row) for row in kept[test]) + "]"
+            for test in sorted(kept)]
+    write(os.path.join(root, MEASURED), "{\n" + ",\n".join(rows) + "\n}\n")
 
 
 def write_page(root):
     """Writes the page; returns complaints."""
     text, complaints = page(Tree(root))
-    with open(os.path.join(root, PAGE), "w", encoding="utf-8") as file:
-        file.write(text)
+    write(os.path.join(root, PAGE), text)
     return complaints
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--root", default=os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+    parser = parser_of(__doc__)
     parser.add_argument("--check", action="store_true")
     parser.add_argument("--measured", nargs="+", metavar="REPORT", help="store what tests measured")
     arguments = parser.parse_args()

@@ -27,6 +27,8 @@ import subprocess
 import sys
 import tempfile
 
+from tree_files import read, write
+
 ENTRIES, TABLE = "tests/hard_cases/mutations.json", "tests/hard_cases/MUTATIONS.md"
 # The cases that have an entry: the numbers that tests are named after.
 CASES = "H1-H68 H70-H159 F1-F26 F28-F42 F44-F55 F57-F78"
@@ -51,17 +53,6 @@ SEARCHED = (".h", ".cuh", ".cc", ".cu", ".py", ".sh", ".cmake", "CMakeLists.txt"
 def all_cases():
     for first, last in (part.split("-") for part in CASES.split()):
         yield from (first[0] + str(number) for number in range(int(first[1:]), int(last[1:]) + 1))
-
-
-def read(path):
-    with open(path, encoding="utf-8") as file:
-        return file.read()
-
-
-def write(path, text):
-    os.makedirs(os.path.dirname(path), exist_ok=True)
-    with open(path, "w", encoding="utf-8") as file:
-        file.write(text)
 
 
 def pattern_of(snippet):
