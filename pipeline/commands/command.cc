@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <filesystem>
 
 #include "kernels/base/error.h"
 #include "pipeline/run/resolve_settings.h"
@@ -56,6 +57,19 @@ std::optional<Prepared> Prepare(const Command& command, const Arguments& argumen
   const int threads = static_cast<int>(options->Values().At("threads").AsInt());
   if (threads > 0) omp_set_num_threads(threads);
   return prepared;
+}
+
+void RequireValue(const std::string& value, const char* flag, const char* hint) {
+  if (value.empty()) throw Error(ExitCode::kUsage, "its value is missing", flag, hint);
+}
+
+std::string AbsolutePath(const std::string& path) {
+  std::error_code error;
+  const auto absolute = std::filesystem::absolute(path, error);
+  if (error)
+    throw Error(ExitCode::kResources, "the current folder does not exist: " + error.message(),
+                path, "start in an existing folder");
+  return absolute.lexically_normal().string();
 }
 
 }  // namespace regrade

@@ -288,9 +288,7 @@ void RunContactSheet(const Command& command, const Arguments& arguments, Console
   if (!fs::exists(folder + "/field.npz"))
     throw Error(ExitCode::kInput, "holds no reconstruction", folder,
                 "make one with `regrade run` or `regrade reconstruct`");
-  if (sheet.out.empty() && !sheet.dry_run)
-    throw Error(ExitCode::kUsage, "its value is missing", "--out",
-                "name the PNG file to write");
+  if (!sheet.dry_run) RequireValue(sheet.out, "--out", "name the PNG file to write");
   for (size_t i = 1; i < words.size(); ++i) ReadStylePicture(words[i], nullptr);
   ProbeMethod(&settings.style_2d);
   ProbeMasks(&settings.object);

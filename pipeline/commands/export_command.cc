@@ -64,8 +64,7 @@ void RunExport(const Command& command, const Arguments& arguments, Console* cons
   const auto prepared = Prepare(command, arguments, {}, &options);
   if (!prepared) return;
   const std::string& folder = prepared->words[0];
-  if (settings.out.empty())
-    throw Error(ExitCode::kUsage, "its value is missing", "--out", "name the folder to write");
+  RequireValue(settings.out, "--out", "name the folder to write");
   if (!fs::exists(folder + "/poses/photos.json"))
     throw Error(ExitCode::kInput, "has no poses", folder,
                 "run `regrade pose PHOTOS --out " + folder + "` first");

@@ -141,8 +141,7 @@ void RunMix(const Command& command, const Arguments& arguments, Console* console
   const Arguments& words = prepared->words;
   const std::string& folder = words[0];
   const MixKeys keys = ParseMixKeys(settings.mix, static_cast<int>(words.size()));
-  if (settings.out.empty() && !settings.dry_run)
-    throw Error(ExitCode::kUsage, "its value is missing", "--out", "name the folder to write");
+  if (!settings.dry_run) RequireValue(settings.out, "--out", "name the folder to write");
   ChooseBackend(settings.device, false);
   for (const std::string& word : words)
     if (!fs::is_regular_file(StyleFile(word)))

@@ -42,9 +42,7 @@ void RunPack(const Command& command, const Arguments& arguments, Console* consol
   const auto prepared = Prepare(command, arguments, {}, &options);
   if (!prepared) return;
   const std::string& folder = prepared->words[0];
-  if (run.out.empty())
-    throw Error(ExitCode::kUsage, "its value is missing", "--out",
-                "name the .npz file to write");
+  RequireValue(run.out, "--out", "name the .npz file to write");
   if (!std::filesystem::exists(folder + "/poses/photos.json"))
     throw Error(ExitCode::kInput, "has no poses", folder,
                 "run `regrade pose CAPTURE --out " + folder + "` first");

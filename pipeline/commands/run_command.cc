@@ -33,11 +33,10 @@ void ProbeInputs(const std::string& last, RunContext* context) {
                   "name another folder; to continue this one, give the photos it was made of");
   if (std::string& masks = context->settings.pose.photo_masks; !masks.empty()) {
     HashFolder(masks);
-    masks = std::filesystem::absolute(masks).lexically_normal().string();
+    masks = AbsolutePath(masks);
   }
   if (last == "pose" || last == "reconstruct") return;
-  if (context->settings.style.picture.empty())
-    throw Error(ExitCode::kUsage, "its value is missing", "--style", "name the style picture");
+  RequireValue(context->settings.style.picture, "--style", "name the style picture");
   ReadStylePicture(context->settings.style.picture, nullptr);
   ProbeMethod(&context->settings.style_2d);
   ProbeMasks(&context->settings.object);
@@ -63,15 +62,6 @@ void PrintPlan(const std::string& last, RunContext* context) {
   context->console->Info("stylize: " + PlanText(PlanStyle(settings.network.steps, threads)));
 }
 
-std::string Absolute(const std::string& path) {
-  std::error_code error;
-  const auto absolute = std::filesystem::absolute(path, error);
-  if (error)
-    throw Error(ExitCode::kResources, "the current folder does not exist: " + error.message(),
-                path, "start in an existing folder");
-  return absolute.lexically_normal().string();
-}
-
 }  // namespace
 
 void RunStages(const Command& command, const Arguments& arguments, Console* console) {
@@ -83,14 +73,13 @@ void RunStages(const Command& command, const Arguments& arguments, Console* cons
   const auto prepared = Prepare(command, arguments, {}, &context.options);
   if (!prepared) return;
   RunSettings& settings = context.settings;
-  if (settings.run.out.empty())
-    throw Error(ExitCode::kUsage, "its value is missing", "--out", "name the output folder");
+  RequireValue(settings.run.out, "--out", "name the output folder");
   CheckTogether(settings);
   ChooseBackend(settings.run.device, settings.run.reproducible);
-  context.source = Absolute(prepared->words[0]);
+  context.source = AbsolutePath(prepared->words[0]);
   if (!settings.style.picture.empty())
-    settings.style.picture = Absolute(settings.style.picture);
-  settings.run.out = Absolute(settings.run.out);
+    settings.style.picture = AbsolutePath(settings.style.picture);
+  settings.run.out = AbsolutePath(settings.run.out);
   ProbeInputs(last, &context);
 
   if (settings.start.dry_run && !Workspace::Exists(settings.run.out)) {

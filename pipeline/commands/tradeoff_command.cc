@@ -199,9 +199,7 @@ void MeasureAll(RunContext* base, const TradeoffOptions& tradeoff, const std::st
 
 // Refuses options that do not apply to measurements.
 void CheckOptions(const RunSettings& settings, const TradeoffOptions& tradeoff) {
-  if (settings.run.out.empty())
-    throw Error(ExitCode::kUsage, "its value is missing", "--out",
-                "name the folder for the results");
+  RequireValue(settings.run.out, "--out", "name the folder for the results");
   if (settings.object.On())
     throw Error(ExitCode::kUsage, "costs are measured for whole scenes", "--masks", "omit it");
   if (settings.run.device == "cuda")
@@ -214,9 +212,7 @@ void CheckOptions(const RunSettings& settings, const TradeoffOptions& tradeoff) 
 }
 
 void PrintPrediction(const TradeoffOptions& tradeoff, Console* console) {
-  if (tradeoff.costs.empty())
-    throw Error(ExitCode::kUsage, "its value is missing", "--costs",
-                "name a tradeoff.json from `regrade tradeoff`");
+  RequireValue(tradeoff.costs, "--costs", "name a tradeoff.json from `regrade tradeoff`");
   const std::vector<CostTerm> costs =
       CostsFromJson(ReadJsonFile(tradeoff.costs), tradeoff.costs);
   if (!Workspace::Exists(tradeoff.predict))
@@ -280,11 +276,11 @@ void RunTradeoff(const Command& command, const Arguments& arguments, Console* co
   CheckWords(command, words, 1, 1);
   CheckOptions(settings, tradeoff);
   CheckTogether(settings);
-  base.source = fs::absolute(words[0]).lexically_normal().string();
+  base.source = AbsolutePath(words[0]);
   const CaptureSource source = DetectCapture(base.source);
   const bool style = !settings.style.picture.empty();
   if (style) {
-    settings.style.picture = fs::absolute(settings.style.picture).lexically_normal().string();
+    settings.style.picture = AbsolutePath(settings.style.picture);
     ReadStylePicture(settings.style.picture, nullptr);
     ProbeMethod(&settings.style_2d);
   }
@@ -306,7 +302,7 @@ void RunTradeoff(const Command& command, const Arguments& arguments, Console* co
     return;
   }
   settings.run.device = "cpu";
-  const std::string folder = fs::absolute(settings.run.out).lexically_normal().string();
+  const std::string folder = AbsolutePath(settings.run.out);
   settings.run.out = folder + "/base";
   Workspace workspace(settings.run.out, settings.start.break_lock);
   base.workspace = &workspace;

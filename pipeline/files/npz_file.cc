@@ -112,9 +112,8 @@ NpzReader::~NpzReader() = default;
 std::vector<std::string> NpzReader::names() const {
   std::vector<std::string> names;
   for (const ZipMember& member : archive_->members) {
-    const size_t stem = member.name.size() - std::min(member.name.size(), strlen(kSuffix));
-    if (member.name.compare(stem, std::string::npos, kSuffix) == 0)
-      names.push_back(member.name.substr(0, stem));
+    const std::string& name = member.name;
+    if (name.ends_with(kSuffix)) names.push_back(name.substr(0, name.size() - strlen(kSuffix)));
   }
   return names;
 }

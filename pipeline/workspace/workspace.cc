@@ -47,9 +47,7 @@ void RemoveTemporaries(const std::string& folder) {
   for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end;
        it.increment(error)) {
     const std::string name = it->path().filename().string();
-    if (name.size() > suffix.size() &&
-        name.compare(name.size() - suffix.size(), suffix.size(), suffix) == 0)
-      found.push_back(it->path());
+    if (name.size() > suffix.size() && name.ends_with(suffix)) found.push_back(it->path());
   }
   for (const fs::path& path : found) fs::remove_all(path, error);
 }
@@ -165,8 +163,7 @@ std::optional<std::string> Workspace::LoadCheckpoint(const std::string& stage,
   if (!fs::is_regular_file(path)) return std::nullopt;
   std::string blob = ReadWholeFile(path, kMaxCheckpoint);
   const size_t header = kCheckpointMark.size() + 2 * kHashDigits;
-  if (blob.size() < header || blob.compare(0, kCheckpointMark.size(), kCheckpointMark) != 0)
-    return std::nullopt;
+  if (blob.size() < header || !blob.starts_with(kCheckpointMark)) return std::nullopt;
   const std::string_view view = blob;
   const std::string_view of_inputs = view.substr(kCheckpointMark.size(), kHashDigits);
   const std::string_view of_bytes =
