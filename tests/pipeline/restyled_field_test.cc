@@ -1,5 +1,5 @@
 // styled.npz remade from field.npz and network.npz, after small runs of the program.
-#include "pipeline/fields/restyled_field.h"
+#include "tests/support/restyled_field.h"
 
 #include <gtest/gtest.h>
 
@@ -13,6 +13,7 @@ namespace {
 
 using testing::ProgramOutcome;
 using testing::ReadText;
+using testing::RestyledField;
 using testing::TemporaryFolder;
 
 // Stylises a synthetic capture with further flags in folder / "e".
