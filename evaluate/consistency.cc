@@ -40,13 +40,12 @@ double Decibel(double error) {
 void CheckFrame(const Image& frame, const PairMotion& motion, const Image& first,
                 const std::string& where) {
   if (frame.width != motion.flow.width || frame.height != motion.flow.height)
-    throw Error(ExitCode::kInput,
-                Concat("a frame of ", frame.width, " x ", frame.height,
-                       " px does not fit the reference of ", motion.flow.width, " x ",
-                       motion.flow.height, " px"),
-                where, "render all sequences at one size");
+    throw InputError(Concat("a frame of ", frame.width, " x ", frame.height,
+                            " px does not fit the reference of ", motion.flow.width, " x ",
+                            motion.flow.height, " px"),
+                     where, "render all sequences at one size");
   if (ColourChannels(frame) != ColourChannels(first))
-    throw Error(ExitCode::kInput, "grey and colour frames in one sequence", where);
+    throw InputError("grey and colour frames in one sequence", where);
 }
 
 std::string FrameName(const std::string& sequence, int index) {
@@ -149,16 +148,14 @@ ConsistencyReport EvaluateConsistency(int frames, const PairMotionFunction& moti
   int64_t total = 0;
   int max_gap = 1;
   for (const int gap : options.gaps) {
-    if (gap < 1)
-      throw Error(ExitCode::kUsage, "gaps between frames start at 1", std::to_string(gap));
+    if (gap < 1) throw UsageError("gaps between frames start at 1", std::to_string(gap));
     max_gap = std::max(max_gap, gap);
     total += std::max<int64_t>(0, static_cast<int64_t>(frames) - gap);
   }
   std::vector<FrameCache> caches;
   for (const NamedFrameSource& sequence : sequences) {
     if (sequence.frames.count != frames)
-      throw Error(
-          ExitCode::kInput,
+      throw InputError(
           Concat("the sequence has ", sequence.frames.count, " frames, the reference ", frames),
           sequence.name, "evaluate frames of the same cameras");
     caches.emplace_back(sequence.frames, std::min(max_gap, frames) + 1,
@@ -226,8 +223,8 @@ ConsistencyReport EvaluateConsistency(const FrameSource& reference,
                                       const GeometrySource& geometry) {
   if (options.mode == "geometry") {
     if (!geometry)
-      throw Error(ExitCode::kUsage, "mode geometry needs depth and cameras of the frames", "",
-                  "evaluate a run's folder, or choose lai2018 or ruder2016");
+      throw UsageError("mode geometry needs depth and cameras of the frames", "",
+                       "evaluate a run's folder, or choose lai2018 or ruder2016");
     return EvaluateConsistency(reference.count, GeometricMotion(geometry), sequences, options,
                                progress);
   }

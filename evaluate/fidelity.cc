@@ -23,8 +23,7 @@ Image Clipped(Image image) {
 void CheckCount(const NamedFrameSource& sequence, const FrameSource& other,
                 const std::string& what) {
   if (other.count == 0 || other.count == sequence.frames.count) return;
-  throw Error(
-      ExitCode::kInput,
+  throw InputError(
       Concat("the sequence has ", sequence.frames.count, " frames, ", what, " ", other.count),
       sequence.name, "fidelity needs the same number of frames");
 }
@@ -32,10 +31,9 @@ void CheckCount(const NamedFrameSource& sequence, const FrameSource& other,
 void CheckSize(const Image& frame, const Image& other, const std::string& what, int index,
                const NamedFrameSource& sequence) {
   if (frame.SameSize(other)) return;
-  throw Error(ExitCode::kInput,
-              Concat(what, " of frame ", index, " has another size: ", other.width, " x ",
-                     other.height, " px instead of ", frame.width, " x ", frame.height),
-              sequence.name);
+  throw InputError(Concat(what, " of frame ", index, " has another size: ", other.width, " x ",
+                          other.height, " px instead of ", frame.width, " x ", frame.height),
+                   sequence.name);
 }
 
 }  // namespace

@@ -24,7 +24,7 @@ struct Header {
 static_assert(sizeof(Header) == 12);
 
 [[noreturn]] void Refuse(const std::string& what, const std::string& path) {
-  throw Error(ExitCode::kInput, what, path, "flow files are Middlebury .flo, uncompressed");
+  throw InputError(what, path, "flow files are Middlebury .flo, uncompressed");
 }
 
 }  // namespace
@@ -79,8 +79,8 @@ void WriteFlowFile(const std::string& path, const FlowField& flow) {
   }
   file.close();
   if (!file)
-    throw Error(ExitCode::kResources, "cannot write the flow file", path,
-                "check the disk's free space and permissions");
+    throw ResourceError("cannot write the flow file", path,
+                        "check the disk's free space and permissions");
 }
 
 std::string FlowFileName(int from, int to) { return Format("%05d_%05d.flo", from, to); }

@@ -49,7 +49,7 @@ struct PairNetwork::Implementation {
   mutable cv::dnn::Net net;
 
   [[noreturn]] void Fail(const std::string& what, const std::string& hint) const {
-    throw Error(ExitCode::kExternalProgram, what, path, hint);
+    throw ProgramError(what, path, hint);
   }
 
   // Reads at most 1 GiB and parses from memory: the network cannot reference external files.

@@ -42,8 +42,8 @@ void Dispatch(const Arguments& arguments, Console* console) {
     names.push_back(command.name);
   }
   const std::string nearest = NearestName(name, names);
-  throw Error(
-      ExitCode::kUsage, "unknown command", name,
+  throw UsageError(
+      "unknown command", name,
       nearest.empty() ? "see `regrade help`" : "did you mean `regrade " + nearest + "`?");
 }
 

@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 
 namespace regrade {
 
@@ -38,6 +39,18 @@ class Error : public std::runtime_error {
   ExitCode code_;
   std::string what_, where_, hint_;
 };
+
+// The errors of one exit code: throw InputError("no pixels", path).
+template <ExitCode kCode>
+struct ErrorOf : Error {
+  explicit ErrorOf(std::string what, std::string where = "", std::string hint = "")
+      : Error(kCode, std::move(what), std::move(where), std::move(hint)) {}
+};
+using UsageError = ErrorOf<ExitCode::kUsage>;
+using InputError = ErrorOf<ExitCode::kInput>;
+using ProgramError = ErrorOf<ExitCode::kExternalProgram>;
+using ResourceError = ErrorOf<ExitCode::kResources>;
+using SceneError = ErrorOf<ExitCode::kScene>;
 
 // Texts, characters and integers in one text: Concat("frame ", 3) is "frame 3". Fractions do
 // not compile: they need a number of digits.

@@ -28,7 +28,7 @@ constexpr size_t kLastLines = 20;
 constexpr int kPollMs = 100;
 
 [[noreturn]] void ThrowNoResources(const std::string& what, int code) {
-  throw Error(ExitCode::kResources, what + ": " + std::strerror(code));
+  throw ResourceError(what + ": " + std::strerror(code));
 }
 
 // Keeps the beginning of the output in a file, up to the cap, and the end in memory.
@@ -129,7 +129,7 @@ class Child {
     posix_spawn_file_actions_t actions;
     posix_spawnattr_t attributes;
     if (posix_spawn_file_actions_init(&actions) != 0 || posix_spawnattr_init(&attributes) != 0)
-      throw Error(ExitCode::kResources, "out of memory");
+      throw ResourceError("out of memory");
     posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
     posix_spawn_file_actions_adddup2(&actions, output, STDOUT_FILENO);
     posix_spawn_file_actions_adddup2(&actions, output, STDERR_FILENO);
@@ -155,7 +155,7 @@ class Child {
     pid_ = -1;
     const std::string what = "cannot start " + options.argv[0];
     if (status == EAGAIN || status == ENOMEM) ThrowNoResources(what, status);
-    throw Error(ExitCode::kExternalProgram, what + ": " + std::strerror(status));
+    throw ProgramError(what + ": " + std::strerror(status));
   }
   Child(const Child&) = delete;
   Child& operator=(const Child&) = delete;

@@ -101,11 +101,10 @@ ColmapModel ModelFromLlff(const CaptureSource& source, const std::vector<StagedP
                           double* nearest_depth) {
   const LlffPoses poses = ReadPosesBounds(source.poses);
   if (poses.cameras.size() != photos.size())
-    throw Error(ExitCode::kInput,
-                Concat(poses.cameras.size(), " poses, but ", photos.size(),
-                       " usable photos in ", source.photos),
-                source.poses,
-                "an LLFF file has no photo names: all of its pictures must be present");
+    throw InputError(Concat(poses.cameras.size(), " poses, but ", photos.size(),
+                            " usable photos in ", source.photos),
+                     source.poses,
+                     "an LLFF file has no photo names: all of its pictures must be present");
   *nearest_depth = poses.nearest;
   ColmapModel model;
   for (size_t i = 0; i < photos.size(); ++i) {
@@ -148,10 +147,9 @@ JsonValue ReadIndex(const std::string& path) {
   JsonValue index = ReadJsonFile(path);
   const JsonValue* const schema = index.IsObject() ? index.Find("schema") : nullptr;
   if (schema == nullptr || !(*schema == JsonValue(kSchema)))
-    throw Error(ExitCode::kInput,
-                Concat("is of schema ", (schema == nullptr ? "0" : DumpJson(*schema, -1)),
-                       ", this version of regrade reads schema ", kSchema),
-                path, "start a new folder with `regrade run`, or use --restart-from pose");
+    throw InputError(Concat("is of schema ", (schema == nullptr ? "0" : DumpJson(*schema, -1)),
+                            ", this version of regrade reads schema ", kSchema),
+                     path, "start a new folder with `regrade run`, or use --restart-from pose");
   return index;
 }
 
@@ -169,9 +167,9 @@ double NearestDepthOf(const CaptureSource& source) {
 CaptureSource DetectCapture(const std::string& folder) {
   std::error_code error;
   const fs::path root = fs::canonical(folder, error);
-  if (error) throw Error(ExitCode::kInput, error.message(), folder, "name a folder of photos");
+  if (error) throw InputError(error.message(), folder, "name a folder of photos");
   if (!fs::is_directory(root))
-    throw Error(ExitCode::kInput, "is a file, not a folder", folder, "name its folder");
+    throw InputError("is a file, not a folder", folder, "name its folder");
   for (const char* name : {"transforms.json", "transforms_train.json"}) {
     const fs::path file = root / name;
     if (!fs::is_regular_file(file)) continue;
@@ -267,7 +265,7 @@ Capture ReadCapture(const std::string& folder) {
       photo.file = entry.At("file").AsString();
       photo.name = entry.At("name").AsString();
       if (fs::path(photo.name).filename() != photo.name)
-        throw Error(ExitCode::kInput, "a photo's name is a path");
+        throw InputError("a photo's name is a path");
       photo.path = folder + "/photos/" + photo.name;
       photo.width = static_cast<int>(entry.At("width").AsInt());
       photo.height = static_cast<int>(entry.At("height").AsInt());
@@ -280,8 +278,7 @@ Capture ReadCapture(const std::string& folder) {
     for (const JsonValue& photo : index.At("statuses").AsArray()) {
       const auto state = PhotoStateOf(photo.At("status").AsString());
       if (!state)
-        throw Error(ExitCode::kInput,
-                    "'" + photo.At("status").AsString() + "' is not a photo's status");
+        throw InputError("'" + photo.At("status").AsString() + "' is not a photo's status");
       capture.statuses.push_back(
           {photo.At("file").AsString(), *state, photo.At("why").AsString()});
     }
@@ -290,8 +287,8 @@ Capture ReadCapture(const std::string& folder) {
     capture.models_found = static_cast<int>(index.At("models_found").AsInt());
     return capture;
   } catch (const Error& error) {
-    throw Error(ExitCode::kInput, error.what_failed(),
-                error.where().empty() ? path : error.where(), error.hint());
+    throw InputError(error.what_failed(), error.where().empty() ? path : error.where(),
+                     error.hint());
   }
 }
 

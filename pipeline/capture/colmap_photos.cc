@@ -22,7 +22,7 @@ std::vector<StagedPhoto> PhotosForColmap(const std::vector<StagedPhoto>& photos,
     const std::string path = folder + "/" + photo.name;
     if (photo.bits == 8) {
       fs::copy_file(photo.path, path, error);
-      if (error) throw Error(ExitCode::kResources, error.message(), path);
+      if (error) throw ResourceError(error.message(), path);
     } else {
       WritePng8(path, ReadImage(photo.path));
     }

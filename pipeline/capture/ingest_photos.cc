@@ -164,8 +164,7 @@ void RequireEnough(const IngestResult& result, const std::string& folder) {
   std::string reasons = CountReasons(result.statuses);
   if (!reasons.empty()) reasons = ": " + reasons;
   if (usable == 0)
-    throw Error(
-        ExitCode::kInput,
+    throw InputError(
         files == 0
             ? "the folder is empty" +
                   (result.hidden > 0
@@ -173,8 +172,7 @@ void RequireEnough(const IngestResult& result, const std::string& folder) {
                        : std::string())
             : Concat(files, (files == 1 ? " file" : " files"), ", no usable photo", reasons),
         folder, "give a folder of JPEG, PNG or TIFF photos");
-  throw Error(
-      ExitCode::kScene,
+  throw SceneError(
       Concat(usable, (usable == 1 ? " photo" : " photos"), " of ", files,
              " files: a scene needs at least 3, better 20, from different viewpoints", reasons),
       folder);
@@ -192,8 +190,7 @@ IngestResult IngestPhotos(const std::string& folder, const std::string& staging_
   const std::string staging = fs::absolute(staging_folder).lexically_normal().string();
   std::error_code error;
   fs::create_directories(staging, error);
-  if (error)
-    throw Error(ExitCode::kResources, "cannot create the folder: " + error.message(), staging);
+  if (error) throw ResourceError("cannot create the folder: " + error.message(), staging);
 
   IngestResult result;
   result.hidden = listing.hidden;

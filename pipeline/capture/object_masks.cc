@@ -51,13 +51,12 @@ std::vector<Vec3f> LabelsOf(const std::string& path) {
   for (size_t k = 0; k < labels.size(); ++k)
     if (counts[k] * 1000 >= mask.num_pixels()) kept.push_back(labels[k]);
   if (kept.empty())
-    throw Error(ExitCode::kInput, "has no region: it is entirely black", path,
-                "paint each region of the style in one plain colour");
+    throw InputError("has no region: it is entirely black", path,
+                     "paint each region of the style in one plain colour");
   if (kept.size() > ObjectMasks::kMostRegions)
-    throw Error(ExitCode::kInput,
-                Concat("has ", kept.size(), " colours, at most ", ObjectMasks::kMostRegions,
-                       " are regions"),
-                path, "paint each region in one plain colour, and save it as PNG");
+    throw InputError(Concat("has ", kept.size(), " colours, at most ",
+                            ObjectMasks::kMostRegions, " are regions"),
+                     path, "paint each region in one plain colour, and save it as PNG");
   return kept;
 }
 
@@ -125,8 +124,8 @@ void ProbeMasks(MaskOptions* options) {
     if (path->empty()) continue;
     std::error_code error;
     if (!fs::exists(*path, error))
-      throw Error(ExitCode::kInput, "there is no such file or folder", *path,
-                  std::string("correct ") + flag);
+      throw InputError("there is no such file or folder", *path,
+                       std::string("correct ") + flag);
     *path = fs::absolute(*path, error).lexically_normal().string();
   }
 }

@@ -83,8 +83,8 @@ JsonValue StoredGainRows(const std::string& poses) {
   const JsonValue file = ReadJsonFile(path);
   const JsonValue* const schema = file.IsObject() ? file.Find("schema") : nullptr;
   if (schema == nullptr || !(*schema == JsonValue(kSchema)))
-    throw Error(ExitCode::kInput, "is not of schema " + std::to_string(kSchema), path,
-                "use --restart-from reconstruct");
+    throw InputError("is not of schema " + std::to_string(kSchema), path,
+                     "use --restart-from reconstruct");
   return file.At("photos");
 }
 
@@ -104,8 +104,8 @@ PhotoGains ReadGains(const std::string& poses, const Capture& capture) {
                                row.At("highlights").AsDouble()});
   }
   if (!fits)
-    throw Error(ExitCode::kInput, "the stored exposures are not those of its photos",
-                poses + "/" + kExposureFile, "use --restart-from reconstruct");
+    throw InputError("the stored exposures are not those of its photos",
+                     poses + "/" + kExposureFile, "use --restart-from reconstruct");
   return gains;
 }
 

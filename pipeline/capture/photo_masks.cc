@@ -35,8 +35,8 @@ int StagePhotoMasks(const std::string& masks, const std::vector<StagedPhoto>& ph
       keeps_any |= keep.pixels[p] > 0;
     }
     if (!keeps_any)
-      throw Error(ExitCode::kInput, "is entirely black", paths[i],
-                  "remove the photo if none of it is to be used");
+      throw InputError("is entirely black", paths[i],
+                       "remove the photo if none of it is to be used");
     WritePng8(folder + "/" + photo.name + ".png", keep);
     ++count;
   }

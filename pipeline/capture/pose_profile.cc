@@ -55,8 +55,7 @@ PoseProfile ProfilePoses(CaptureKind kind, const PoseOptions& options,
   const bool requested = override != overrides.end() && override->second;
   const double threshold = kPoseMisfit * misfit_scale;
   const auto leave_out = [requested, threshold](const char* why) -> PoseProfile {
-    if (requested)
-      throw Error(ExitCode::kScene, why, std::string("--effects ") + kPoseRefinement + "=on");
+    if (requested) throw SceneError(why, std::string("--effects ") + kPoseRefinement + "=on");
     return {{kPoseRefinement, false, why, Metric(), threshold}, JsonValue()};
   };
   if (override != overrides.end() && !requested) return leave_out("off by --effects");

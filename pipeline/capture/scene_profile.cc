@@ -96,7 +96,7 @@ void ProfileExposure(const Capture& capture, const std::map<std::string, bool>& 
   const auto override = overrides.find("exposure");
   const bool requested = override != overrides.end() && override->second;
   const auto leave_out = [&](const char* why) {
-    if (requested) throw Error(ExitCode::kScene, why, "--effects exposure=on");
+    if (requested) throw SceneError(why, "--effects exposure=on");
     profile->effects.push_back({"exposure", false, why, Metric(), kExposureSpread});
   };
   if (override != overrides.end() && !requested) return leave_out("off by --effects");
@@ -134,9 +134,10 @@ std::map<std::string, bool> ParseEffects(const std::string& text) {
     const bool known =
         std::find(std::begin(kNames), std::end(kNames), name) != std::end(kNames);
     if (!known || (value != "on" && value != "off"))
-      throw Error(ExitCode::kUsage, "'" + word + "' is not allowed", "--effects",
-                  "auto, or on|off of ndc, alpha, background, exposure, view-dependence and "
-                  "pose-refinement: ndc=on,exposure=off");
+      throw UsageError(
+          "'" + word + "' is not allowed", "--effects",
+          "auto, or on|off of ndc, alpha, background, exposure, view-dependence and "
+          "pose-refinement: ndc=on,exposure=off");
     overrides[name] = value == "on";
   }
   return overrides;
@@ -171,8 +172,7 @@ SceneProfile ProfileScene(const Capture& capture, int sh_degree, const std::stri
   const bool background =
       decided("background", surroundings.far_fraction > kFarFraction && !ndc && !alpha);
   if (background && (ndc || alpha))
-    throw Error(
-        ExitCode::kUsage,
+    throw UsageError(
         std::string("background spheres cannot be combined with ") + (ndc ? "ndc" : "alpha"),
         "--effects background=on", ndc ? "add ndc=off" : "add alpha=off");
   profile.effects.push_back(

@@ -65,7 +65,7 @@ TrackColors ReadTrackColors(const Capture& capture) {
   for (size_t v = 0; v < capture.views.size(); ++v) {
     const CaptureView& view = capture.views[v];
     const Image photo = ReadImage(view.path);
-    if (photo.channels != 3) throw Error(ExitCode::kInput, "not an RGB picture", view.path);
+    if (photo.channels != 3) throw InputError("not an RGB picture", view.path);
     colors.clipped.push_back(ClippedFraction(photo));
     for (const int32_t p : points_of_view[v]) {
       double x = 0, y = 0;

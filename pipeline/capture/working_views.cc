@@ -90,11 +90,10 @@ Image WorkingViews::Photo(int i) const {
   const CaptureView& view = View(i);
   Image photo = ReadImage(view.path);
   if (photo.width != view.camera.width || photo.height != view.camera.height)
-    throw Error(ExitCode::kInput,
-                Concat(photo.width, " x ", photo.height, " pixels, but its camera has ",
-                       view.camera.width, " x ", view.camera.height),
-                view.path, "the staged photo was changed: use --restart-from pose");
-  if (photo.channels != 3) throw Error(ExitCode::kInput, "not an RGB picture", view.path);
+    throw InputError(Concat(photo.width, " x ", photo.height, " pixels, but its camera has ",
+                            view.camera.width, " x ", view.camera.height),
+                     view.path, "the staged photo was changed: use --restart-from pose");
+  if (photo.channels != 3) throw InputError("not an RGB picture", view.path);
   photo = AtWorkingSize(std::move(photo), photo_size_);
   UndoGain(gains_.Of(i), &photo);
   return photo;

@@ -20,11 +20,10 @@ bool AsksForHelp(const Arguments& arguments) {
 
 void CheckWords(const Command& command, const Arguments& words, size_t least, size_t most) {
   if (words.size() >= least && words.size() <= most) return;
-  throw Error(ExitCode::kUsage,
-              words.size() < least ? "an argument is missing"
-                                   : "one argument too many: '" + words[most] + "'",
-              std::string("regrade ") + command.name,
-              std::string("usage: regrade ") + command.name + " " + command.usage);
+  throw UsageError(words.size() < least ? "an argument is missing"
+                                        : "one argument too many: '" + words[most] + "'",
+                   std::string("regrade ") + command.name,
+                   std::string("usage: regrade ") + command.name + " " + command.usage);
 }
 
 std::optional<Prepared> Prepare(const Command& command, const Arguments& arguments,
@@ -47,8 +46,8 @@ std::optional<Prepared> Prepare(const Command& command, const Arguments& argumen
     check_words();
     const std::string& folder = prepared.words[0];
     if (!Workspace::Exists(folder))
-      throw Error(ExitCode::kInput, "no run has worked in this folder", folder,
-                  "make one with `regrade run` or `regrade reconstruct`");
+      throw InputError("no run has worked in this folder", folder,
+                       "make one with `regrade run` or `regrade reconstruct`");
     sources.run_json = folder + "/run.json";
   }
   prepared.run_words = ResolveSettings(sources, options);
@@ -60,15 +59,15 @@ std::optional<Prepared> Prepare(const Command& command, const Arguments& argumen
 }
 
 void RequireValue(const std::string& value, const char* flag, const char* hint) {
-  if (value.empty()) throw Error(ExitCode::kUsage, "its value is missing", flag, hint);
+  if (value.empty()) throw UsageError("its value is missing", flag, hint);
 }
 
 std::string AbsolutePath(const std::string& path) {
   std::error_code error;
   const auto absolute = std::filesystem::absolute(path, error);
   if (error)
-    throw Error(ExitCode::kResources, "the current folder does not exist: " + error.message(),
-                path, "start in an existing folder");
+    throw ResourceError("the current folder does not exist: " + error.message(), path,
+                        "start in an existing folder");
   return absolute.lexically_normal().string();
 }
 

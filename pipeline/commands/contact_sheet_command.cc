@@ -226,11 +226,10 @@ void AddStyle(RunContext* context, const Scene& scene, const SheetOptions& sheet
   const StyledPhotos styled = StylePhotos(scene, stylizer.get(), name);
   const TrainingTargets& targets = styled.targets.targets();
   if (targets.empty())
-    throw Error(ExitCode::kInput,
-                scene.object != nullptr
-                    ? "the masks and the 2D method agree on no part of the photos"
-                    : "the 2D method has a picture of none of the photos",
-                picture);
+    throw InputError(scene.object != nullptr
+                         ? "the masks and the 2D method agree on no part of the photos"
+                         : "the 2D method has a picture of none of the photos",
+                     picture);
 
   ProgressParts parts(progress, 2);
   const uint64_t seed = settings.run.seed;
@@ -286,8 +285,8 @@ void RunContactSheet(const Command& command, const Arguments& arguments, Console
   const Arguments& words = prepared->words;
   const std::string& folder = words[0];
   if (!fs::exists(folder + "/field.npz"))
-    throw Error(ExitCode::kInput, "holds no reconstruction", folder,
-                "make one with `regrade run` or `regrade reconstruct`");
+    throw InputError("holds no reconstruction", folder,
+                     "make one with `regrade run` or `regrade reconstruct`");
   if (!sheet.dry_run) RequireValue(sheet.out, "--out", "name the PNG file to write");
   for (size_t i = 1; i < words.size(); ++i) ReadStylePicture(words[i], nullptr);
   ProbeMethod(&settings.style_2d);

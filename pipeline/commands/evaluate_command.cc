@@ -58,8 +58,8 @@ void WriteEvaluation(const Workspace& workspace, const EvaluationMetrics& metric
 void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& options,
                     Console* console) {
   if (options.mode == "geometry")
-    throw Error(ExitCode::kUsage, "geometry is known only for runs of regrade", "--mode",
-                "use lai2018 or ruder2016 for frames of other programs");
+    throw UsageError("geometry is known only for runs of regrade", "--mode",
+                     "use lai2018 or ruder2016 for frames of other programs");
   ProbeEvaluationNetworks(options);
   const bool has_reference = !frames.reference.empty();
   if (!has_reference)

@@ -61,11 +61,11 @@ std::string StyleFile(const std::string& word) {
 void MakeMixFolder(const fs::path& out) {
   std::error_code error;
   if (fs::exists(out, error) && !fs::is_empty(out, error) && !fs::exists(out / "mix.json"))
-    throw Error(ExitCode::kUsage, "is not empty", out.string(), "name a new folder with --out");
+    throw UsageError("is not empty", out.string(), "name a new folder with --out");
   fs::remove_all(out / "frames", error);
   for (const char* file : {"mixed.mp4", "mixed.npz"}) fs::remove(out / file, error);
   fs::create_directories(out / "frames", error);
-  if (error) throw Error(ExitCode::kResources, error.message(), out.string());
+  if (error) throw ResourceError(error.message(), out.string());
 }
 
 // On the path "views" frames have the sizes of their photos; a film has one size.
@@ -145,9 +145,10 @@ void RunMix(const Command& command, const Arguments& arguments, Console* console
   ChooseBackend(settings.device, false);
   for (const std::string& word : words)
     if (!fs::is_regular_file(StyleFile(word)))
-      throw Error(ExitCode::kInput, "there is no styled field", StyleFile(word),
-                  "make it with `regrade stylize`, and copy styled.npz before making the next "
-                  "style");
+      throw InputError(
+          "there is no styled field", StyleFile(word),
+          "make it with `regrade stylize`, and copy styled.npz before making the next "
+          "style");
 
   StoredField stored = ReadFieldFile(folder + "/field.npz");
   const Backend backend = ChooseBackend(settings.device, false);
@@ -166,9 +167,10 @@ void RunMix(const Command& command, const Arguments& arguments, Console* console
     styles.push_back(ReadFieldFile(StyleFile(word)));
     RadianceField& field = styles.back().field;
     if (!SameGeometry(*field.geometry, *stored.field.geometry))
-      throw Error(ExitCode::kInput, "is a style of another reconstruction", StyleFile(word),
-                  "mixed styles must restyle the same field: make them with `regrade stylize " +
-                      folder + "`");
+      throw InputError(
+          "is a style of another reconstruction", StyleFile(word),
+          "mixed styles must restyle the same field: make them with `regrade stylize " +
+              folder + "`");
     field.geometry = stored.field.geometry;
     basis = std::max(basis, field.appearance.basis);
   }
@@ -182,8 +184,8 @@ void RunMix(const Command& command, const Arguments& arguments, Console* console
   if (settings.object) {
     const std::string file = folder + "/object.npz";
     if (!fs::exists(file))
-      throw Error(ExitCode::kInput, "there is no object", file,
-                  "make it with `regrade stylize " + folder + " --masks FOLDER`");
+      throw InputError("there is no object", file,
+                       "make it with `regrade stylize " + folder + " --masks FOLDER`");
     object = ReadObjectFile(file, stored.field.geometry->num_voxels());
   }
   const std::vector<float>* object_weights = object ? &object->all : nullptr;

@@ -12,11 +12,12 @@ namespace {
 
 std::vector<double> ParsePoint(const std::string& text, int styles) {
   const auto refuse = [&](const std::string& why) {
-    throw Error(ExitCode::kUsage, "\"" + text + "\" " + why, "--mix",
-                styles == 1 ? "write weights of the style separated by colons, such as 0:1"
-                            : Concat("write a weight for each of the ", styles,
-                                     " styles separated by commas, and points separated by "
-                                     "colons, such as 1,0:0,1 for two"));
+    throw UsageError("\"" + text + "\" " + why, "--mix",
+                     styles == 1
+                         ? "write weights of the style separated by colons, such as 0:1"
+                         : Concat("write a weight for each of the ", styles,
+                                  " styles separated by commas, and points separated by "
+                                  "colons, such as 1,0:0,1 for two"));
   };
   std::vector<double> weights;
   double sum = 0;

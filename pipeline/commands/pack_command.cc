@@ -44,15 +44,14 @@ void RunPack(const Command& command, const Arguments& arguments, Console* consol
   const std::string& folder = prepared->words[0];
   RequireValue(run.out, "--out", "name the .npz file to write");
   if (!std::filesystem::exists(folder + "/poses/photos.json"))
-    throw Error(ExitCode::kInput, "has no poses", folder,
-                "run `regrade pose CAPTURE --out " + folder + "` first");
+    throw InputError("has no poses", folder,
+                     "run `regrade pose CAPTURE --out " + folder + "` first");
   const Capture capture = ReadCapture(folder + "/poses");
   const WorkingViews as_taken(capture, scene.photo_size, run.holdout);
   for (int i = 0; i < as_taken.count(); ++i)
     if (!as_taken.Mask(i).empty())
-      throw Error(ExitCode::kInput,
-                  "was posed with --photo-masks, which a packed capture cannot hold", folder,
-                  "pose it again without them");
+      throw InputError("was posed with --photo-masks, which a packed capture cannot hold",
+                       folder, "pose it again without them");
   const SceneProfile profile = ProfileScene(capture, 2, run.effects);
   for (const EffectReport& effect : profile.effects) console->Info(EffectLine(effect));
   for (const std::string& notice : profile.notices) console->Info(notice);

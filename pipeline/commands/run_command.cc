@@ -22,15 +22,15 @@ namespace {
 // Checks all inputs before long work starts.
 void ProbeInputs(const std::string& last, RunContext* context) {
   if (!std::filesystem::exists(context->source))
-    throw Error(ExitCode::kInput, "there is no such folder", context->source,
-                "name a folder of photos");
+    throw InputError("there is no such folder", context->source, "name a folder of photos");
   const std::filesystem::path out =
       std::filesystem::weakly_canonical(context->settings.run.out);
   const bool posed = DetectCapture(context->source).kind == CaptureKind::kPosed;
   for (const std::filesystem::path& folder : {out, out / "poses"})
     if (posed && std::filesystem::weakly_canonical(context->source) == folder)
-      throw Error(ExitCode::kUsage, "is the capture itself, and would be overwritten", "--out",
-                  "name another folder; to continue this one, give the photos it was made of");
+      throw UsageError(
+          "is the capture itself, and would be overwritten", "--out",
+          "name another folder; to continue this one, give the photos it was made of");
   if (std::string& masks = context->settings.pose.photo_masks; !masks.empty()) {
     HashFolder(masks);
     masks = AbsolutePath(masks);

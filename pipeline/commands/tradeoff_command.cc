@@ -201,13 +201,12 @@ void MeasureAll(RunContext* base, const TradeoffOptions& tradeoff, const std::st
 void CheckOptions(const RunSettings& settings, const TradeoffOptions& tradeoff) {
   RequireValue(settings.run.out, "--out", "name the folder for the results");
   if (settings.object.On())
-    throw Error(ExitCode::kUsage, "costs are measured for whole scenes", "--masks", "omit it");
+    throw UsageError("costs are measured for whole scenes", "--masks", "omit it");
   if (settings.run.device == "cuda")
-    throw Error(ExitCode::kUsage, "costs are measured on the CPU only", "--device",
-                "use --device cpu");
+    throw UsageError("costs are measured on the CPU only", "--device", "use --device cpu");
   if (!settings.start.config.empty() || !settings.start.restart_from.empty())
-    throw Error(ExitCode::kUsage, "not supported by tradeoff", "--config and --restart-from",
-                "omit them; remove the folder to start over");
+    throw UsageError("not supported by tradeoff", "--config and --restart-from",
+                     "omit them; remove the folder to start over");
   for (const std::string& preset : Words(tradeoff.presets)) PresetOptions(preset);
 }
 
@@ -216,8 +215,8 @@ void PrintPrediction(const TradeoffOptions& tradeoff, Console* console) {
   const std::vector<CostTerm> costs =
       CostsFromJson(ReadJsonFile(tradeoff.costs), tradeoff.costs);
   if (!Workspace::Exists(tradeoff.predict))
-    throw Error(ExitCode::kInput, "this is not the folder of a run", tradeoff.predict,
-                "make one with `regrade run`");
+    throw InputError("this is not the folder of a run", tradeoff.predict,
+                     "make one with `regrade run`");
   RunContext run;
   run.settings.Bind(&run.options);
   ResolveSettings({.run_json = tradeoff.predict + "/run.json"}, &run.options);

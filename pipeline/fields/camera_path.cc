@@ -206,8 +206,8 @@ std::vector<Camera> MakeCameraPath(const std::vector<Camera>& cameras,
   if (options.path == "smooth") return SmoothPath(cameras, options.path_frames);
   if (options.path == "orbit") return OrbitPath(cameras, options.path_frames);
   if (options.path == "spiral") return SpiralPath(cameras, options.path_frames);
-  throw Error(ExitCode::kUsage, "'" + options.path + "' is not allowed", "--path",
-              "allowed: smooth, views, orbit, spiral");
+  throw UsageError("'" + options.path + "' is not allowed", "--path",
+                   "allowed: smooth, views, orbit, spiral");
 }
 
 }  // namespace regrade

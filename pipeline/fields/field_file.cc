@@ -49,7 +49,7 @@ Buffer<float> UnpackedColours(const NpzArray& array, int64_t first, int stored, 
 
 [[noreturn]] void Refuse(const std::string& path, const std::string& why,
                          const std::string& hint = "") {
-  throw Error(ExitCode::kInput, why, path, hint);
+  throw InputError(why, path, hint);
 }
 
 Vec3f ReadVec3(NpzReader* file, const std::string& name) {

@@ -18,7 +18,7 @@ constexpr uint64_t kBudget = uint64_t{1} << 20;  // the arrays are 110 KB
 constexpr double kBoundTolerance = 1e-9;
 
 [[noreturn]] void Refuse(const std::string& path, const std::string& why) {
-  throw Error(ExitCode::kInput, why, path, "run regrade stylize again");
+  throw InputError(why, path, "run regrade stylize again");
 }
 
 std::string Named(const char* array, int layer) { return Concat(array, "_", layer); }

@@ -154,8 +154,8 @@ bool JsonValue::IsNumber() const {
 }
 
 void JsonValue::RefuseKind(const char* expected) const {
-  throw Error(ExitCode::kInput, std::string(expected) + " expected",
-              line_ > 0 ? "line " + std::to_string(line_) : "");
+  throw InputError(std::string(expected) + " expected",
+                   line_ > 0 ? "line " + std::to_string(line_) : "");
 }
 
 bool JsonValue::AsBool() const {
@@ -203,8 +203,8 @@ const JsonValue* JsonValue::Find(std::string_view key) const {
 
 const JsonValue& JsonValue::At(std::string_view key) const {
   if (const JsonValue* value = Find(key)) return *value;
-  throw Error(ExitCode::kInput, "\"" + std::string(key) + "\" is missing",
-              line_ > 0 ? "line " + std::to_string(line_) : "");
+  throw InputError("\"" + std::string(key) + "\" is missing",
+                   line_ > 0 ? "line " + std::to_string(line_) : "");
 }
 
 JsonValue& JsonValue::operator[](std::string_view key) {

@@ -17,8 +17,8 @@ constexpr zip_int64_t kMaxMembers = 10000;
 constexpr uint64_t kMaxRatio = 1032;  // of deflate
 
 [[noreturn]] void RefuseArchive(const std::string& path, const std::string& why) {
-  throw Error(ExitCode::kInput, "zip archive: " + why, path,
-              "the file is damaged or malicious: make it again or get it from its source");
+  throw InputError("zip archive: " + why, path,
+                   "the file is damaged or malicious: make it again or get it from its source");
 }
 
 std::string OpenProblem(int code) {
@@ -123,26 +123,24 @@ bool NpzReader::Has(const std::string& name) const { return archive_->Find(name)
 NpzArray NpzReader::Read(const std::string& name) {
   const std::string where = path_ + ": array '" + name + "'";
   const ZipMember* member = archive_->Find(name);
-  if (member == nullptr) throw Error(ExitCode::kInput, "is missing", where);
+  if (member == nullptr) throw InputError("is missing", where);
   if (member->bytes > budget_)
-    throw Error(
-        ExitCode::kInput,
+    throw InputError(
         Concat(member->bytes, " bytes, more than the ", budget_, " that may still be read"),
         where, "give more memory with --max-memory");
   budget_ -= member->bytes;
 
   const std::unique_ptr<zip_file_t, decltype(&zip_fclose)> file(
       zip_fopen_index(archive_->zip, member->index, 0), &zip_fclose);
-  if (file == nullptr) throw Error(ExitCode::kInput, "cannot be unpacked", where);
+  if (file == nullptr) throw InputError("cannot be unpacked", where);
   uint64_t left = member->bytes;
   const auto read = [&](void* to, uint64_t size) {
     uint64_t done = 0;
     while (done < size) {
       const zip_int64_t n = zip_fread(file.get(), static_cast<char*>(to) + done, size - done);
       if (n <= 0)
-        throw Error(ExitCode::kInput,
-                    n < 0 ? "its checksum or packing is wrong" : "it ends too early", where,
-                    "the file is damaged: make it again");
+        throw InputError(n < 0 ? "its checksum or packing is wrong" : "it ends too early",
+                         where, "the file is damaged: make it again");
       done += static_cast<uint64_t>(n);
     }
     left -= size;
@@ -167,8 +165,7 @@ NpzArray NpzReader::Read(const std::string& name) {
   const uint64_t surplus =
       head.size() - header.data_offset;  // of headers shorter than the fixed part
   if (header.data_bytes != left + surplus)
-    throw Error(
-        ExitCode::kInput,
+    throw InputError(
         Concat("its shape asks for ", header.data_bytes, " bytes, it has ", left + surplus),
         where);
   NpzArray array{header.type, header.shape, {}};
@@ -178,8 +175,8 @@ NpzArray NpzReader::Read(const std::string& name) {
   // libzip compares the checksum at the end of the member.
   char beyond;
   if (zip_fread(file.get(), &beyond, 1) != 0)
-    throw Error(ExitCode::kInput, "its checksum or length is wrong", where,
-                "the file is damaged: make it again");
+    throw InputError("its checksum or length is wrong", where,
+                     "the file is damaged: make it again");
   return array;
 }
 
@@ -191,10 +188,9 @@ NpzArray NpzReader::Read(const std::string& name, ArrayType type,
     fits = shape[i] < 0 || shape[i] == array.shape[i];
   if (!fits) {
     NpzArray expected{type, shape, {}};
-    throw Error(ExitCode::kInput,
-                std::string(NameOf(array.type)) + array.ShapeText() + ", expected " +
-                    NameOf(type) + expected.ShapeText(),
-                path_ + ": array '" + name + "'");
+    throw InputError(std::string(NameOf(array.type)) + array.ShapeText() + ", expected " +
+                         NameOf(type) + expected.ShapeText(),
+                     path_ + ": array '" + name + "'");
   }
   return array;
 }
@@ -208,9 +204,9 @@ void RefuseNewerFormat(NpzReader* file, int32_t known) {
   if (!file->Has("regrade_version")) return;
   const int32_t version = file->ReadScalar<int32_t>("regrade_version");
   if (version > known)
-    throw Error(ExitCode::kInput,
-                Concat("written in format ", version, ", this program reads up to ", known),
-                file->path(), "update regrade; the file has not been touched");
+    throw InputError(
+        Concat("written in format ", version, ", this program reads up to ", known),
+        file->path(), "update regrade; the file has not been touched");
 }
 
 }  // namespace regrade

@@ -62,8 +62,8 @@ void StylePacked(const StylePackedOptions& settings, const TrainNetworkOptions& 
   Stopwatch watch;
   const PackedCapture capture = ReadPackedCapture(settings.capture);
   if (capture.style.num_pixels() == 0)
-    throw Error(ExitCode::kInput, "holds no style picture", settings.capture,
-                "pack it with --style PICTURE");
+    throw InputError("holds no style picture", settings.capture,
+                     "pack it with --style PICTURE");
   StoredField stored = ReadFieldFile(settings.field);
   const int64_t voxels = stored.field.geometry->num_voxels();
   JsonValue record = JsonValue::Object{{"capture", settings.capture}};

@@ -31,32 +31,28 @@ constexpr int64_t kMaxExpansion = 2000, kExpansionSlack = 16 << 20;
 void CheckSize(int64_t width, int64_t height, int64_t pixel_bytes, int64_t file_bytes,
                const DecodeLimits& limits, const std::string& where) {
   const std::string size = Concat(width, " x ", height, " pixels");
-  if (width <= 0 || height <= 0) throw Error(ExitCode::kInput, "no pixels", where);
+  if (width <= 0 || height <= 0) throw InputError("no pixels", where);
   if (width > limits.max_pixels / height)
-    throw Error(
-        ExitCode::kInput,
+    throw InputError(
         Concat(size, ", more than the limit of ", limits.max_pixels / 1'000'000, " megapixels"),
         where, "scale it down or raise --max-megapixels");
   if (width * height * pixel_bytes > kExpansionSlack + kMaxExpansion * file_bytes)
-    throw Error(
-        ExitCode::kInput,
+    throw InputError(
         Concat("the header claims ", size, ", but the file has only ", file_bytes, " bytes"),
         where);
   if (std::min(width, height) < limits.min_side)
-    throw Error(ExitCode::kInput, Concat(size, ", less than ", limits.min_side, " on a side"),
-                where);
+    throw InputError(Concat(size, ", less than ", limits.min_side, " on a side"), where);
 }
 
 void CheckRegularFile(const std::string& path) {
   struct stat status;
-  if (::stat(path.c_str(), &status) != 0)
-    throw Error(ExitCode::kInput, std::strerror(errno), path);
+  if (::stat(path.c_str(), &status) != 0) throw InputError(std::strerror(errno), path);
   const char* kind = S_ISREG(status.st_mode)    ? nullptr
                      : S_ISDIR(status.st_mode)  ? "a folder"
                      : S_ISFIFO(status.st_mode) ? "a named pipe"
                      : S_ISSOCK(status.st_mode) ? "a socket"
                                                 : "a device";
-  if (kind) throw Error(ExitCode::kInput, std::string(kind) + ", not a picture file", path);
+  if (kind) throw InputError(std::string(kind) + ", not a picture file", path);
 }
 
 // Metadata under OpenImageIO's names.
@@ -97,8 +93,8 @@ StoredPicture ReadJpeg(std::string_view bytes, const std::string& where,
     const std::string what = Concat("damaged JPEG (", jpeg.damage_warnings,
                                     " warnings, first: ", jpeg.first_warning, ")");
     if (!limits.accept_damaged)
-      throw Error(ExitCode::kInput, what, where,
-                  "copy the file again from the camera, or keep it with --accept-damaged");
+      throw InputError(what, where,
+                       "copy the file again from the camera, or keep it with --accept-damaged");
     picture.notices.push_back(what);
   }
   OIIO::ImageSpec spec;
@@ -161,8 +157,8 @@ bool ReadChannels(OIIO::ImageInput* input, const OIIO::ImageSpec& spec, float ma
 StoredPicture ReadWithOiio(const ImageFormat& format, std::string_view bytes,
                            const std::string& path, const DecodeLimits& limits) {
   const auto refuse = [&](const std::string& why) {
-    throw Error(ExitCode::kInput, std::string("cannot read this ") + format.name + ": " + why,
-                path, format.remedy);
+    throw InputError(std::string("cannot read this ") + format.name + ": " + why, path,
+                     format.remedy);
   };
   std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::create(format.decoder);
   if (input == nullptr) {
@@ -208,13 +204,13 @@ StoredPicture ReadStored(const std::string& path, const DecodeLimits& limits) {
   // An uncompressed file has at most sixteen bytes a pixel.
   const std::string bytes =
       ReadWholeFile(path, static_cast<uint64_t>(limits.max_pixels) * 16 + (64 << 20));
-  if (bytes.empty()) throw Error(ExitCode::kInput, "empty file", path);
+  if (bytes.empty()) throw InputError("empty file", path);
   const ImageFormat* format = SniffImageFormat(bytes, path);
-  if (format == nullptr) throw Error(ExitCode::kInput, "not an image", path);
+  if (format == nullptr) throw InputError("not an image", path);
   const std::string_view decoder = format->decoder;
   if (decoder.empty())
-    throw Error(ExitCode::kInput, std::string(format->name) + " is not supported here", path,
-                format->remedy);
+    throw InputError(std::string(format->name) + " is not supported here", path,
+                     format->remedy);
   // OpenImageIO's GIF decoder allocates the picture when it opens the file.
   if (decoder == "gif" && bytes.size() >= 10)
     CheckSize(Little16(bytes, 6), Little16(bytes, 8), 1, static_cast<int64_t>(bytes.size()),
@@ -249,8 +245,7 @@ std::string Encode(const char* format, const Image& image, OIIO::ImageSpec spec)
   const OIIO::TypeDesc type = OIIO::BaseTypeFromC<Value>::value;
   if (!output->open(std::string("memory.") + format, spec) ||
       !output->write_image(type, values.data()) || !output->close())
-    throw Error(ExitCode::kResources,
-                std::string("cannot encode ") + format + ": " + output->geterror());
+    throw ResourceError(std::string("cannot encode ") + format + ": " + output->geterror());
   return {bytes.begin(), bytes.end()};
 }
 

@@ -13,9 +13,8 @@ void CheckFinite(const Image& image, const std::string& where) {
   const int64_t bad = std::count_if(image.pixels.begin(), image.pixels.end(),
                                     [](float v) { return !std::isfinite(v); });
   if (bad > 0)
-    throw Error(ExitCode::kInput,
-                Concat(bad, " of ", image.pixels.size(), " values are NaN or infinite"), where,
-                "export the picture again without them");
+    throw InputError(Concat(bad, " of ", image.pixels.size(), " values are NaN or infinite"),
+                     where, "export the picture again without them");
 }
 
 void Unpremultiply(Image* image) {
@@ -52,8 +51,8 @@ void Clamp(StoredPicture* picture) {
 void CheckAlpha(const Image& image, const std::string& where) {
   for (int64_t i = 0; i < image.num_pixels(); ++i)
     if (image.pixels[4 * i + 3] > 0) return;
-  throw Error(ExitCode::kInput, "alpha is 0 everywhere: nothing to see", where,
-              "export the picture without alpha");
+  throw InputError("alpha is 0 everywhere: nothing to see", where,
+                   "export the picture without alpha");
 }
 
 }  // namespace

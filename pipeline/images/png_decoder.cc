@@ -123,8 +123,8 @@ PngPicture DecodePng(std::string_view bytes, const std::string& where,
                      const PngSizeCheck& check) {
   Decoder png(bytes);
   const auto refuse = [&] {
-    throw Error(ExitCode::kInput, std::string("cannot read this PNG: ") + png.failure(), where,
-                "copy the file again from its source");
+    throw InputError(std::string("cannot read this PNG: ") + png.failure(), where,
+                     "copy the file again from its source");
   };
   PngPicture picture;
   std::string_view exif, icc;

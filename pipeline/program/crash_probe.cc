@@ -28,8 +28,9 @@ void RunProbeCommand(const std::vector<std::string>& command, const std::string&
   else if (result.exit_status == kProbeOutOfMemory)
     problem = Concat("needs more than ", limits.memory_bytes >> 20, " MiB");
   if (!problem.empty())
-    throw Error(ExitCode::kExternalProgram, problem, file,
-                "the file is damaged or has the wrong content: get it from its source again");
+    throw ProgramError(
+        problem, file,
+        "the file is damaged or has the wrong content: get it from its source again");
 }
 
 void RunCrashProbe(const std::string& kind, const std::string& file,

@@ -13,16 +13,15 @@ constexpr int kLeastCapability = 75;  // of this build: Turing and later
 Backend ChooseBackend(const std::string& device, bool reproducible) {
   if (device == "cpu") return Backend::kCpu;
   if (device == "cuda" && reproducible)
-    throw Error(ExitCode::kUsage, "the GPU's sums have no fixed order",
-                "--device cuda --reproducible",
-                "use --device cpu, or leave out --reproducible");
+    throw UsageError("the GPU's sums have no fixed order", "--device cuda --reproducible",
+                     "use --device cpu, or leave out --reproducible");
   if (reproducible) return Backend::kCpu;
   const DeviceStatus status = ReadDeviceStatus();
   if (status.found && status.compute_capability >= kLeastCapability) return Backend::kCuda;
   if (device == "cuda")
-    throw Error(ExitCode::kResources,
-                status.found ? status.name + " is older than this build supports" : status.name,
-                "--device cuda", "use --device auto or cpu");
+    throw ResourceError(
+        status.found ? status.name + " is older than this build supports" : status.name,
+        "--device cuda", "use --device auto or cpu");
   return Backend::kCpu;
 }
 

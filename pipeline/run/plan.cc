@@ -102,11 +102,11 @@ uint64_t PlannedMemory(double max_memory_gb, uint64_t available) {
 
 void CheckFitsMemory(const StagePlan& plan, uint64_t limit, const char* memory) {
   if (limit == 0 || plan.memory <= limit) return;
-  throw Error(ExitCode::kResources,
-              "the fit would take about " + MemoryText(static_cast<double>(plan.memory)) +
-                  " of " + memory + ", the limit is " + MemoryText(static_cast<double>(limit)),
-              "reconstruct",
-              "use --preset draft or smaller --fit-resolutions; memory grows with their cube");
+  throw ResourceError(
+      "the fit would take about " + MemoryText(static_cast<double>(plan.memory)) + " of " +
+          memory + ", the limit is " + MemoryText(static_cast<double>(limit)),
+      "reconstruct",
+      "use --preset draft or smaller --fit-resolutions; memory grows with their cube");
 }
 
 bool LowerToMemory(const std::function<StagePlan(const FitOptions&)>& plan_of, uint64_t limit,

@@ -19,10 +19,10 @@ RunFile ReadRunFile(const std::string& path) {
     file.options = value.At("options");
     return file;
   } catch (const Error& error) {
-    throw Error(ExitCode::kUsage, error.what_failed(),
-                error.where().find(path) == std::string::npos ? path + ": " + error.where()
-                                                              : error.where(),
-                "give a run.json that regrade wrote");
+    throw UsageError(error.what_failed(),
+                     error.where().find(path) == std::string::npos ? path + ": " + error.where()
+                                                                   : error.where(),
+                     "give a run.json that regrade wrote");
   }
 }
 

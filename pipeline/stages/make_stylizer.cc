@@ -111,8 +111,8 @@ void ProbeMethod(StyleOptions* options) {
   if (!ReadsFiles(method.kind)) return;
   std::error_code error;
   if (!fs::exists(method.argument, error))
-    throw Error(ExitCode::kInput, "there is no such file or folder", method.argument,
-                "what follows \"" + method.name + ":\" in --method must exist");
+    throw InputError("there is no such file or folder", method.argument,
+                     "what follows \"" + method.name + ":\" in --method must exist");
   const fs::path absolute = fs::absolute(method.argument, error);
   if (!error) options->method = method.name + ":" + absolute.lexically_normal().string();
   if (method.kind != StyleMethodKind::kOnnx) return;
@@ -130,8 +130,8 @@ std::vector<int> StyledViews(const Workspace& workspace, const WorkingViews& wor
   std::vector<int> views = with_picture(working_views.Training());
   if (views.empty()) views = with_picture(working_views.HeldOut());
   if (views.empty())
-    throw Error(ExitCode::kInput, "no view has a styled picture", workspace.Path("views_2d"),
-                "use --restart-from style_2d");
+    throw InputError("no view has a styled picture", workspace.Path("views_2d"),
+                     "use --restart-from style_2d");
   return views;
 }
 

@@ -72,8 +72,7 @@ ObjectWeights ReadObjectFile(const std::string& path, int64_t voxels) {
   const NpzArray array = file.Read("weights", ArrayType::kF32, {-1, voxels});
   const int64_t regions = array.shape[0];
   if (regions < 1 || regions > ObjectMasks::kMostRegions)
-    throw Error(ExitCode::kInput, Concat("holds ", regions, " regions"), path,
-                "run regrade stylize again");
+    throw InputError(Concat("holds ", regions, " regions"), path, "run regrade stylize again");
   ObjectWeights weights;
   for (int64_t k = 0; k < regions; ++k) {
     const float* first = array.As<float>() + k * voxels;
@@ -81,8 +80,7 @@ ObjectWeights ReadObjectFile(const std::string& path, int64_t voxels) {
   }
   for (const std::vector<float>& region : weights.regions)
     if (!std::all_of(region.begin(), region.end(), [](float e) { return e >= 0 && e <= 1; }))
-      throw Error(ExitCode::kInput, "holds a weight outside [0, 1]", path,
-                  "run regrade stylize again");
+      throw InputError("holds a weight outside [0, 1]", path, "run regrade stylize again");
   weights.all = SumOf(weights.regions);
   return weights;
 }

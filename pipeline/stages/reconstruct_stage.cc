@@ -156,9 +156,10 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
     context->console->Info("reconstruct: continues from its checkpoint");
   }
   if (training_views.empty())
-    throw Error(ExitCode::kInput, "leave nothing of any photo to fit",
-                settings.pose.photo_masks.empty() ? "the masks" : settings.pose.photo_masks,
-                "make the masks' white parts larger");
+    throw InputError(
+        "leave nothing of any photo to fit",
+        settings.pose.photo_masks.empty() ? "the masks" : settings.pose.photo_masks,
+        "make the masks' white parts larger");
   ProgressParts parts(progress, kTrial + 1 + kAfterFit);
   EffectReport& view_dependence =
       *std::find_if(profile.effects.begin(), profile.effects.end(),

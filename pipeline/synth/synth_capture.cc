@@ -36,8 +36,8 @@ void ParseSize(const std::string& size, int* width, int* height) {
         *height >= kMinSide && *height <= kMaxSide)
       return;
   }
-  throw Error(ExitCode::kUsage, "\"" + size + "\" is not an image size", "--size",
-              "write WIDTHxHEIGHT, each from 16 to 8192, e.g. 640x480");
+  throw UsageError("\"" + size + "\" is not an image size", "--size",
+                   "write WIDTHxHEIGHT, each from 16 to 8192, e.g. 640x480");
 }
 
 JsonValue Vector(const Vec3d& v) { return JsonValue::Array{v.x, v.y, v.z}; }
@@ -113,8 +113,8 @@ void ClaimFolder(const fs::path& out, const JsonValue& description, bool with_ma
     std::error_code error;
     fs::create_directories(out / folder, error);
     if (error)
-      throw Error(ExitCode::kResources, "cannot create a folder: " + error.message(),
-                  (out / folder).string());
+      throw ResourceError("cannot create a folder: " + error.message(),
+                          (out / folder).string());
   }
   WriteJsonFile(record.string(), description);
 }

@@ -39,13 +39,12 @@ SynthEffects ParseSynthEffects(const std::string& list) {
     else if (name == "mixed-cameras")
       effects.mixed_cameras = true;
     else if (name == "motion-blur" || name == "occluders")
-      throw Error(ExitCode::kUsage, "the effect \"" + name + "\" is not supported", "--effects",
-                  kHint);
+      throw UsageError("the effect \"" + name + "\" is not supported", "--effects", kHint);
     else
-      throw Error(ExitCode::kUsage, "there is no effect \"" + name + "\"", "--effects", kHint);
+      throw UsageError("there is no effect \"" + name + "\"", "--effects", kHint);
   }
   if (effects.distortion + effects.barrel + effects.fisheye > 1)
-    throw Error(ExitCode::kUsage, "only one lens is possible", "--effects", kHint);
+    throw UsageError("only one lens is possible", "--effects", kHint);
   return effects;
 }
 

@@ -61,8 +61,8 @@ class VariantList {
         std::string known;
         for (const std::string& parameter : names_)
           known += (known.empty() ? "" : ", ") + parameter;
-        throw Error(ExitCode::kUsage, "'" + name + "' is not a measured parameter",
-                    "--parameters", "parameters: " + known);
+        throw UsageError("'" + name + "' is not a measured parameter", "--parameters",
+                         "parameters: " + known);
       }
     return std::move(variants_);
   }
@@ -108,7 +108,7 @@ void AddStyleParameters(const RunSettings& base, VariantList* list) {
 const Benchmark& BenchmarkOf(const std::string& name) {
   for (const Benchmark& benchmark : kBenchmarks)
     if (name == benchmark.name) return benchmark;
-  throw Error(ExitCode::kInput, "'" + name + "' is not a benchmark");
+  throw InputError("'" + name + "' is not a benchmark");
 }
 
 JsonValue PresetOptions(const std::string& preset) {

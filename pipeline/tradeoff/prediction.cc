@@ -145,7 +145,7 @@ double AmountOf(const std::string& unit, const RunSettings& settings, const Capt
       pairs += std::max(0.0, photos - gap) + std::max(0.0, film - gap);
     return pairs * common_frame;
   }
-  throw Error(ExitCode::kInput, "'" + unit + "' is not a unit of work");
+  throw InputError("'" + unit + "' is not a unit of work");
 }
 
 std::vector<CostTerm> LearnCosts(const RunSettings& base, const Capture& capture,
@@ -235,8 +235,8 @@ std::vector<CostTerm> CostsFromJson(const JsonValue& json, const std::string& wh
                        row.At("seconds").AsDouble(), row.At("cpu_seconds").AsDouble()});
     return costs;
   } catch (const Error& error) {
-    throw Error(ExitCode::kInput, error.what_failed(), where,
-                "give a tradeoff.json from `regrade tradeoff`");
+    throw InputError(error.what_failed(), where,
+                     "give a tradeoff.json from `regrade tradeoff`");
   }
 }
 

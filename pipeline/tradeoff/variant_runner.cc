@@ -135,10 +135,9 @@ Measurement VariantRunner::Measure(const Variant& variant, int repeat,
     MeasureFlow(variant, &m);
   fs::remove_all(folder_);
   if (!std::isfinite(m.accuracy))
-    throw Error(ExitCode::kScene, "there is nothing to measure accuracy with",
-                variant.benchmark,
-                variant.benchmark == "fit" ? "hold out photos: --holdout 8"
-                                           : "leave its parameters out with --parameters");
+    throw SceneError("there is nothing to measure accuracy with", variant.benchmark,
+                     variant.benchmark == "fit" ? "hold out photos: --holdout 8"
+                                                : "leave its parameters out with --parameters");
   return m;
 }
 

@@ -98,7 +98,7 @@ std::vector<StageOutput> DescribeOutputs(const std::string& root,
     } else if (fs::is_regular_file(full)) {
       add(full);
     } else {
-      throw Error(ExitCode::kInput, "this result is missing", full.string());
+      throw InputError("this result is missing", full.string());
     }
   }
   std::sort(outputs.begin(), outputs.end(),
@@ -147,9 +147,8 @@ JsonValue ToJson(const StageRecord& record) {
 void CheckRecordSchema(const JsonValue& value, const std::string& where) {
   const JsonValue* schema = value.Find("schema");
   if (schema == nullptr || !schema->IsNumber() || schema->AsDouble() >= kSchema) return;
-  throw Error(ExitCode::kInput,
-              "made by an older regrade (schema " + DumpJson(*schema, -1) + ")", where,
-              "use another --out, or delete the output folder");
+  throw InputError("made by an older regrade (schema " + DumpJson(*schema, -1) + ")", where,
+                   "use another --out, or delete the output folder");
 }
 
 StageRecord StageRecordFromJson(const JsonValue& value, const std::string& where) {
@@ -158,9 +157,8 @@ StageRecord StageRecordFromJson(const JsonValue& value, const std::string& where
     record.version = value.At("regrade").AsString();
     const int64_t schema = value.At("schema").AsInt();
     if (schema > kSchema)
-      throw Error(ExitCode::kInput,
-                  "written by regrade " + record.version + ", this is " REGRADE_VERSION, where,
-                  "update regrade; nothing has been touched");
+      throw InputError("written by regrade " + record.version + ", this is " REGRADE_VERSION,
+                       where, "update regrade; nothing has been touched");
     CheckRecordSchema(value, where);
     record.inputs = value.At("inputs");
     for (const JsonValue& output : value.At("outputs").AsArray()) {
@@ -168,7 +166,7 @@ StageRecord StageRecordFromJson(const JsonValue& value, const std::string& where
       const fs::path path = output.At("path").AsString();
       if (path.is_absolute() || path.lexically_normal() != path ||
           path.string().ends_with("/") || *path.begin() == "..")
-        throw Error(ExitCode::kInput, "a path that leads out of the folder");
+        throw InputError("a path that leads out of the folder");
       record.outputs.push_back(
           {path.string(), output.At("bytes").AsInt(), output.At("hash").AsString()});
     }
@@ -177,8 +175,8 @@ StageRecord StageRecordFromJson(const JsonValue& value, const std::string& where
     record.metrics = value.At("metrics");
   } catch (const Error& error) {
     if (!error.hint().empty()) throw;
-    throw Error(ExitCode::kInput, error.what_failed(), where,
-                "delete this file: its stage will be done again");
+    throw InputError(error.what_failed(), where,
+                     "delete this file: its stage will be done again");
   }
   return record;
 }

@@ -25,18 +25,17 @@ void RefuseForeignFolder(const std::string& folder) {
   if (Workspace::Exists(folder)) return;
   for (const char* name : kResultNames)
     if (fs::exists(fs::path(folder) / name))
-      throw Error(ExitCode::kInput,
-                  std::string("holds '") + name + "', which regrade did not write", folder,
-                  "choose an empty or new folder with --out");
+      throw InputError(std::string("holds '") + name + "', which regrade did not write", folder,
+                       "choose an empty or new folder with --out");
 }
 
 void MakeFolder(const std::string& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
   if (error || !fs::is_directory(folder))
-    throw Error(ExitCode::kResources,
-                error ? "cannot make this folder: " + error.message() : "is not a folder",
-                folder, "choose another folder with --out");
+    throw ResourceError(
+        error ? "cannot make this folder: " + error.message() : "is not a folder", folder,
+        "choose another folder with --out");
 }
 
 // The lock is held: no other run is writing them.
@@ -63,8 +62,8 @@ Workspace::Workspace(const std::string& folder, bool break_lock) {
   std::error_code error;
   folder_ = fs::absolute(folder, error).lexically_normal().string();
   if (error)
-    throw Error(ExitCode::kResources, "the working folder is gone: " + error.message(), folder,
-                "give an absolute path with --out");
+    throw ResourceError("the working folder is gone: " + error.message(), folder,
+                        "give an absolute path with --out");
   while (folder_.size() > 1 && folder_.back() == '/') folder_.pop_back();
   MakeFolder(folder_);
   RefuseForeignFolder(folder_);

@@ -39,13 +39,13 @@ class Reader {
     const bool text = !file;
     if (text) file.open(folder + "/" + name + ".txt", std::ios::binary | std::ios::ate);
     if (!file)
-      throw Error(ExitCode::kInput, "cannot open it", path_,
-                  "a COLMAP model needs cameras, images and points3D, as .bin or .txt");
+      throw InputError("cannot open it", path_,
+                       "a COLMAP model needs cameras, images and points3D, as .bin or .txt");
     bytes_.resize(std::max<std::streamoff>(0, file.tellg()));
     file.seekg(0);
     if (!bytes_.empty() &&
         !file.read(bytes_.data(), static_cast<std::streamsize>(bytes_.size())))
-      throw Error(ExitCode::kInput, "cannot read it", path_);
+      throw InputError("cannot read it", path_);
     if (!text) return;
     path_ = folder + "/" + name + ".txt";
     bytes_ = BinaryOfColmapText(name, bytes_, path_);
@@ -93,7 +93,7 @@ class Reader {
   }
 
   [[noreturn]] void Fail(const std::string& why) const {
-    throw Error(ExitCode::kInput, Concat(why, ", at byte ", position_), path_, kDamagedHint);
+    throw InputError(Concat(why, ", at byte ", position_), path_, kDamagedHint);
   }
 
  private:
@@ -117,12 +117,11 @@ std::vector<ColmapCamera> ReadCameras(const std::string& folder) {
     camera.lens = static_cast<ColmapLens>(lens);
     const ColmapLensInfo& info = InfoOf(camera.lens);
     if (info.focals == 0)
-      throw Error(ExitCode::kInput,
-                  CameraText(camera.id) + " has the camera model " + info.name +
-                      ", which is not supported",
-                  folder + "/cameras.bin",
-                  "run colmap image_undistorter, or pose the photos with OPENCV or "
-                  "OPENCV_FISHEYE");
+      throw InputError(CameraText(camera.id) + " has the camera model " + info.name +
+                           ", which is not supported",
+                       folder + "/cameras.bin",
+                       "run colmap image_undistorter, or pose the photos with OPENCV or "
+                       "OPENCV_FISHEYE");
     Camera& c = camera.intrinsics;
     const uint64_t width = reader.Read<uint64_t>("a camera");
     const uint64_t height = reader.Read<uint64_t>("a camera");
@@ -225,7 +224,7 @@ const Record* FindById(const std::vector<Record>& records, uint64_t id) {
 
 [[noreturn]] void FailLink(const std::string& folder, const char* file,
                            const std::string& why) {
-  throw Error(ExitCode::kInput, why, folder + "/" + file, kDamagedHint);
+  throw InputError(why, folder + "/" + file, kDamagedHint);
 }
 
 template <typename Record>

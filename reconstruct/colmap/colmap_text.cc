@@ -58,8 +58,8 @@ class LineReader {
     return value;
   }
   [[noreturn]] void Fail(const std::string& why) const {
-    throw Error(ExitCode::kInput, Concat("line ", number_, " ", why), path_,
-                "the file is damaged; let COLMAP write the model again");
+    throw InputError(Concat("line ", number_, " ", why), path_,
+                     "the file is damaged; let COLMAP write the model again");
   }
 
  private:
@@ -129,8 +129,7 @@ void WriteTextFile(const std::string& path, const std::string& text) {
   std::ofstream file(path, std::ios::binary | std::ios::trunc);
   file << text;
   file.close();
-  if (file.fail())
-    throw Error(ExitCode::kResources, "cannot write it", path, "is the disk full?");
+  if (file.fail()) throw ResourceError("cannot write it", path, "is the disk full?");
 }
 
 }  // namespace

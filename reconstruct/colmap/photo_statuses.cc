@@ -67,13 +67,12 @@ std::string NoteOnOtherModels(const AttemptResult& attempt) {
 
 void Refuse(const Reason& reason, size_t photos_given, int min_photos) {
   const bool few = static_cast<int>(photos_given) < min_photos;
-  throw Error(ExitCode::kScene,
-              (few ? TooFew(photos_given, min_photos) + "; besides, " : "") + reason.why, "",
-              reason.remedy);
+  throw SceneError((few ? TooFew(photos_given, min_photos) + "; besides, " : "") + reason.why,
+                   "", reason.remedy);
 }
 
 void RefuseTooFew(size_t photos_given, int min_photos) {
-  throw Error(ExitCode::kScene, TooFew(photos_given, min_photos), "", kTakeMore);
+  throw SceneError(TooFew(photos_given, min_photos), "", kTakeMore);
 }
 
 void RefuseUnregistered(const Capture& capture) {
@@ -81,12 +80,12 @@ void RefuseUnregistered(const Capture& capture) {
   for (const PhotoStatus& photo : capture.statuses)
     if (photo.status == PhotoState::kUnregistered)
       names += "\n  " + photo.file + ": " + photo.why;
-  throw Error(ExitCode::kScene,
-              Concat("only ", capture.views.size(), " of ", Photos(capture.statuses.size()),
-                     " were registered in one scene; the others:", names),
-              "",
-              "give photos of one scene that overlap by two thirds, or lower "
-              "--pose-min-registered to continue with the registered ones");
+  throw SceneError(
+      Concat("only ", capture.views.size(), " of ", Photos(capture.statuses.size()),
+             " were registered in one scene; the others:", names),
+      "",
+      "give photos of one scene that overlap by two thirds, or lower "
+      "--pose-min-registered to continue with the registered ones");
 }
 
 }  // namespace regrade

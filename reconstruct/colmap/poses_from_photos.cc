@@ -68,10 +68,10 @@ class PoseFinder {
  private:
   void CheckPhotos() {
     if (photos_.empty())
-      throw Error(ExitCode::kInput, "there are no photos", "", "give a folder with photos");
+      throw InputError("there are no photos", "", "give a folder with photos");
     if (photos_.size() == 1)
-      throw Error(ExitCode::kScene, "one photo shows no depth", photos_.front().file,
-                  "take 20 to 60 photos, stepping sideways between them");
+      throw SceneError("one photo shows no depth", photos_.front().file,
+                       "take 20 to 60 photos, stepping sideways between them");
     const fs::path folder = fs::path(photos_.front().path).parent_path();
     for (const StagedPhoto& photo : photos_)
       REGRADE_CHECK_EQ(fs::path(photo.path), folder / photo.name);
@@ -83,10 +83,9 @@ class PoseFinder {
     const double needed = kBytesPerPhoto * static_cast<double>(photos_.size());
     const double available = static_cast<double>(fs::space(work_folder_).available);
     if (available < needed)
-      throw Error(ExitCode::kResources,
-                  Concat("too little free disk space: ", std::lround(available / 1e6),
-                         " MB free, about ", std::lround(needed / 1e6), " MB needed"),
-                  work_folder_, "free some space, or choose another --out");
+      throw ResourceError(Concat("too little free disk space: ", std::lround(available / 1e6),
+                                 " MB free, about ", std::lround(needed / 1e6), " MB needed"),
+                          work_folder_, "free some space, or choose another --out");
   }
 
   // The best attempt, or the last one without models.
@@ -197,9 +196,9 @@ class PoseFinder {
              "features", strategy.name, weight * fraction);
     std::error_code none;
     if (fs::file_size(paths.database, none) == 0 || none)
-      throw Error(ExitCode::kExternalProgram,
-                  "colmap feature_extractor ended without an error, but wrote no database",
-                  colmap_->log_folder(), "see its log");
+      throw ProgramError(
+          "colmap feature_extractor ended without an error, but wrote no database",
+          colmap_->log_folder(), "see its log");
   }
 
   AttemptResult Map(const PoseStrategy& strategy, const ColmapPaths& paths, double weight) {
@@ -231,13 +230,12 @@ class PoseFinder {
     // A mapper that was stopped by its time limit may still have written complete models.
     if (!attempt.models.empty()) return attempt;
     if (!damage.empty())
-      throw Error(ExitCode::kExternalProgram,
-                  "colmap mapper (" + result.Describe() + ") left a damaged model: " + damage,
-                  colmap_->log_folder() + "/mapper.log", "is the disk full?");
+      throw ProgramError(
+          "colmap mapper (" + result.Describe() + ") left a damaged model: " + damage,
+          colmap_->log_folder() + "/mapper.log", "is the disk full?");
     if (result.Succeeded())
-      throw Error(ExitCode::kExternalProgram,
-                  "colmap mapper ended without an error, but wrote no model",
-                  colmap_->log_folder() + "/mapper.log", "see its log");
+      throw ProgramError("colmap mapper ended without an error, but wrote no model",
+                         colmap_->log_folder() + "/mapper.log", "see its log");
     // mapper exits with 1 if it found no model.
     if (result.end != ChildEnd::kExited || result.exit_status != 1) FailStage("mapper", result);
     return attempt;
@@ -348,8 +346,8 @@ Capture PosesFromPhotos(const std::vector<StagedPhoto>& photos,
     capture.statuses = MergeStatuses(ingest_statuses, capture.statuses);
     return capture;
   } catch (const fs::filesystem_error& e) {
-    throw Error(ExitCode::kResources, e.what(), e.path1().string(),
-                "is the disk full, or the folder not writable?");
+    throw ResourceError(e.what(), e.path1().string(),
+                        "is the disk full, or the folder not writable?");
   }
 }
 

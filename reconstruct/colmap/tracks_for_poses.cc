@@ -186,9 +186,9 @@ class TrackFinder {
     try {
       return ReadColmapModel(out);
     } catch (const Error& error) {
-      throw Error(ExitCode::kExternalProgram,
-                  "colmap point_triangulator wrote no readable model: " + error.what_failed(),
-                  colmap_->log_folder());
+      throw ProgramError(
+          "colmap point_triangulator wrote no readable model: " + error.what_failed(),
+          colmap_->log_folder());
     }
   }
 

@@ -263,8 +263,8 @@ NormalizedScene NormalizeSurrounded(const Capture& capture, const Surroundings& 
   NormalizedScene result;
   const CameraPoses poses(capture);
   if (!(surroundings.half > 0))
-    throw Error(ExitCode::kScene, "the cameras are at one place: they surround no box",
-                "--effects background=on", "leave the choice to auto");
+    throw SceneError("the cameras are at one place: they surround no box",
+                     "--effects background=on", "leave the choice to auto");
   const Mat3d upright =
       UprightRotation(poses.centers, poses.ups, poses.forwards, &result.notice);
   Similarity& s = result.field_from_world;

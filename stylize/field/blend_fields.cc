@@ -17,13 +17,13 @@ double CheckWeights(const std::vector<double>& weights) {
   double sum = 0;
   for (const double weight : weights) {
     if (!(weight >= 0 && weight <= 1))
-      throw Error(ExitCode::kUsage, std::to_string(weight) + " is not a fraction", "--mix",
-                  "fractions lie between 0 (the unstyled scene) and 1 (the whole style)");
+      throw UsageError(std::to_string(weight) + " is not a fraction", "--mix",
+                       "fractions lie between 0 (the unstyled scene) and 1 (the whole style)");
     sum += weight;
   }
   if (sum > 1 + kSumSlack)
-    throw Error(ExitCode::kUsage, "fractions add up to " + std::to_string(sum), "--mix",
-                "they may add up to 1; the rest is the unstyled scene");
+    throw UsageError("fractions add up to " + std::to_string(sum), "--mix",
+                     "they may add up to 1; the rest is the unstyled scene");
   return sum;
 }
 
@@ -73,9 +73,9 @@ RadianceField MixFields(const RadianceField& source,
   for (size_t i = 0; i < styles.size(); ++i)
     if (styles[i]->appearance.basis != source.appearance.basis ||
         !SameGeometry(*source.geometry, *styles[i]->geometry))
-      throw Error(ExitCode::kInput, Concat("style ", i + 1, " is of another reconstruction"),
-                  "",
-                  "styles that are mixed restyle one field: make them with `regrade stylize`");
+      throw InputError(
+          Concat("style ", i + 1, " is of another reconstruction"), "",
+          "styles that are mixed restyle one field: make them with `regrade stylize`");
   const int64_t voxels = source.geometry->num_voxels();
   const int stride = source.appearance.stride();
   if (object_weights != nullptr)

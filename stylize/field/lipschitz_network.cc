@@ -75,8 +75,8 @@ double SpectralNorm(const std::vector<double>& matrix, int rows, int columns) {
 Activation ActivationByName(const std::string& name) {
   for (const auto& entry : kActivations)
     if (name == entry.name) return entry.activation;
-  throw Error(ExitCode::kUsage, "unknown activation '" + name + "'", "",
-              "use sine, relu, leaky-relu, sigmoid or tanh");
+  throw UsageError("unknown activation '" + name + "'", "",
+                   "use sine, relu, leaky-relu, sigmoid or tanh");
 }
 
 const char* NameOf(Activation activation) {
@@ -98,8 +98,7 @@ LipschitzNetwork::LipschitzNetwork() {
 
 LipschitzNetwork::LipschitzNetwork(LipschitzNetworkData data) : data_(std::move(data)) {
   const auto refuse = [](const std::string& what) {
-    throw Error(ExitCode::kInput, "not a network: " + what, "network.npz",
-                "run regrade stylize again");
+    throw InputError("not a network: " + what, "network.npz", "run regrade stylize again");
   };
   if (std::none_of(std::begin(kActivations), std::end(kActivations),
                    [this](const auto& entry) { return data_.activation == entry.name; }))

@@ -182,8 +182,7 @@ std::vector<Vec3d> SampleColors(const Image& image, const std::string& where, in
     const Vec3d color{p[0], p[grey ? 0 : 1], p[grey ? 0 : 2]};
     if (std::isfinite(color.x + color.y + color.z)) all.push_back(color);
   }
-  if (all.empty())
-    throw Error(ExitCode::kInput, "the picture has no pixel to take a colour of", where);
+  if (all.empty()) throw InputError("the picture has no pixel to take a colour of", where);
   const int64_t count = static_cast<int64_t>(all.size());
   if (count <= most) return all;
   // By index, not by a whole stride: a stride that divides the width would see few columns.

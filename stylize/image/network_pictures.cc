@@ -97,8 +97,7 @@ Image TrialPicture(int width, int height) {
 void CheckShape(const FeatureMap& map, int channels, int height, int width,
                 const std::string& path) {
   if (map.channels == channels && map.height == height && map.width == width) return;
-  throw Error(
-      ExitCode::kExternalProgram,
+  throw ProgramError(
       "it gives " + ShapeOf(map) + ", expected is " + ShapeOf({channels, height, width}), path,
       "take all files of the folder from one conversion");
 }

@@ -35,7 +35,7 @@ class QuietOpenCv {
 
 [[noreturn]] void Fail(const std::string& what, const std::string& path,
                        const std::string& hint) {
-  throw Error(ExitCode::kExternalProgram, what, path, hint);
+  throw ProgramError(what, path, hint);
 }
 
 // The first line of what OpenCV says, without its place in OpenCV.

@@ -36,9 +36,8 @@ int64_t CountNotFinite(const Image& image, const std::string& where) {
 
 int64_t CheckStyledView(const Image& view, const Image& styled, const std::string& where) {
   if (!view.SameSize(styled) || view.channels != styled.channels)
-    throw Error(ExitCode::kExternalProgram,
-                "the styled view is " + Shape(styled) + ", the view " + Shape(view), where,
-                "a 2D method must keep the size of its view");
+    throw ProgramError("the styled view is " + Shape(styled) + ", the view " + Shape(view),
+                       where, "a 2D method must keep the size of its view");
   return CountNotFinite(styled, ExitCode::kExternalProgram, where);
 }
 

@@ -263,11 +263,11 @@ TrainNetworkResult TrainNetwork(const RadianceField& field,
     const StepResult steps = training.Advance(most);
     if (steps.stopped) {
       if (hooks.checkpoint) hooks.checkpoint(training.Capture());
-      throw Error(ExitCode::kScene,
-                  Concat("style training stopped at step ", training.steps_done() - 1,
-                         ": two steps in a row were not finite, first in ",
-                         FirstNonFinite(training.network(), steps.gradient, steps.last.loss)),
-                  "", "lower --style-rate; the state before it was kept");
+      throw SceneError(
+          Concat("style training stopped at step ", training.steps_done() - 1,
+                 ": two steps in a row were not finite, first in ",
+                 FirstNonFinite(training.network(), steps.gradient, steps.last.loss)),
+          "", "lower --style-rate; the state before it was kept");
     }
     const LoopControl control =
         Report(hooks.progress, training.steps_done(), options.steps,
