@@ -159,7 +159,7 @@ ConsistencyReport EvaluateConsistency(int frames, const PairMotionFunction& moti
           Concat("the sequence has ", sequence.frames.count, " frames, the reference ", frames),
           sequence.name, "evaluate frames of the same cameras");
     caches.emplace_back(sequence.frames, std::min(max_gap, frames) + 1,
-                        kCacheBytes / static_cast<int64_t>(sequences.size()));
+                        kCacheBytes / std::ssize(sequences));
   }
 
   ConsistencyReport report;

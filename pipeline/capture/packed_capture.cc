@@ -96,7 +96,7 @@ int64_t BytesOf(const Camera& camera) { return int64_t{camera.width} * camera.he
 }  // namespace
 
 void WritePackedCapture(const std::string& path, const PackedCapture& capture) {
-  const auto n = static_cast<int64_t>(capture.views.size());
+  const auto n = std::ssize(capture.views);
   std::vector<double> cameras(n * kCameraValues);
   std::vector<uint8_t> held_out;
   std::string names;

@@ -74,14 +74,13 @@ PoseTracks AddTracks(const PoseOptions& options, const std::string& effects,
   }
   const double seconds = ClockSeconds() - began;
   const double cpu_seconds = CpuSeconds() - cpu_before;
-  result.metrics =
-      JsonValue::Object{{"points", static_cast<int64_t>(found.model.points.size())},
-                        {"observations", found.observations},
-                        {"median_px", found.median_px},
-                        {"pairs", found.pairs},
-                        {"colmap", found.colmap_version},
-                        {"seconds", seconds},
-                        {"cpu_seconds", cpu_seconds}};
+  result.metrics = JsonValue::Object{{"points", std::ssize(found.model.points)},
+                                     {"observations", found.observations},
+                                     {"median_px", found.median_px},
+                                     {"pairs", found.pairs},
+                                     {"colmap", found.colmap_version},
+                                     {"seconds", seconds},
+                                     {"cpu_seconds", cpu_seconds}};
   if (!Plausible(found)) {
     result.note = DoubtText(found);
     return result;

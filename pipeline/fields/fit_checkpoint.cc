@@ -39,7 +39,7 @@ void PackTally(const FitTally& tally, BytePacker* packer) {
   for (const int64_t count :
        {tally.window_rays, tally.tail_rays, tally.rays, tally.samples, tally.rejected_voxels})
     packer->Value(count);
-  packer->Value(static_cast<int64_t>(tally.curve.size()));
+  packer->Value(std::ssize(tally.curve));
   for (const FitCurvePoint& point : tally.curve) {
     packer->Value(point.rays);
     packer->Value(point.seconds);

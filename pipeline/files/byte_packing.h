@@ -26,7 +26,7 @@ class BytePacker {
   // Any array of numbers with data() and size().
   template <typename Array>
   void Values(const Array& array) {
-    Value(static_cast<int64_t>(array.size()));
+    Value(std::ssize(array));
     bytes_.append(reinterpret_cast<const char*>(array.data()),
                   sizeof(*array.data()) * static_cast<size_t>(array.size()));
   }

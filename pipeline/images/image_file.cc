@@ -85,7 +85,7 @@ void NoteProfile(std::string_view profile, StoredPicture* picture) {
 StoredPicture ReadJpeg(std::string_view bytes, const std::string& where,
                        const DecodeLimits& limits) {
   JpegPicture jpeg = DecodeJpeg(bytes, where, [&](int64_t w, int64_t h, int64_t pixel_bytes) {
-    CheckSize(w, h, pixel_bytes, static_cast<int64_t>(bytes.size()), limits, where);
+    CheckSize(w, h, pixel_bytes, std::ssize(bytes), limits, where);
   });
   StoredPicture picture;
   picture.image = std::move(jpeg.image);
@@ -111,7 +111,7 @@ StoredPicture ReadJpeg(std::string_view bytes, const std::string& where,
 StoredPicture ReadPng(std::string_view bytes, const std::string& where,
                       const DecodeLimits& limits) {
   PngPicture png = DecodePng(bytes, where, [&](int64_t w, int64_t h, int64_t pixel_bytes) {
-    CheckSize(w, h, pixel_bytes, static_cast<int64_t>(bytes.size()), limits, where);
+    CheckSize(w, h, pixel_bytes, std::ssize(bytes), limits, where);
   });
   StoredPicture picture;
   picture.image = std::move(png.image);
@@ -171,7 +171,7 @@ StoredPicture ReadWithOiio(const ImageFormat& format, std::string_view bytes,
   if (format.from_memory) input->set_ioproxy(&memory);
   if (!input->open(path, spec, config)) refuse(input->geterror());
   CheckSize(spec.width, spec.height, static_cast<int64_t>(spec.pixel_bytes(true)),
-            static_cast<int64_t>(bytes.size()), limits, path);
+            std::ssize(bytes), limits, path);
   if (spec.deep || spec.depth > 1) refuse("it is not a flat picture");
 
   StoredPicture picture;
@@ -213,8 +213,7 @@ StoredPicture ReadStored(const std::string& path, const DecodeLimits& limits) {
                      format->remedy);
   // OpenImageIO's GIF decoder allocates the picture when it opens the file.
   if (decoder == "gif" && bytes.size() >= 10)
-    CheckSize(Little16(bytes, 6), Little16(bytes, 8), 1, static_cast<int64_t>(bytes.size()),
-              limits, path);
+    CheckSize(Little16(bytes, 6), Little16(bytes, 8), 1, std::ssize(bytes), limits, path);
   StoredPicture picture = decoder == "jpeg"  ? ReadJpeg(bytes, path, limits)
                           : decoder == "png" ? ReadPng(bytes, path, limits)
                                              : ReadWithOiio(*format, bytes, path, limits);

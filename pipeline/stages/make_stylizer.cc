@@ -31,8 +31,7 @@ std::unique_ptr<ViewStylizer> MakeColorMethod(StyleMethodKind kind, const StyleO
     if (!options.scene_wide) return MakeDistributionTransfer(options, style);
     // As many colours in all as are taken of one view otherwise, but 256 of each at least.
     const int64_t most = std::max<int64_t>(
-        256,
-        4 * kColorSample / std::max<int64_t>(1, static_cast<int64_t>(capture.views.size())));
+        256, 4 * kColorSample / std::max<int64_t>(1, std::ssize(capture.views)));
     std::vector<Vec3d> scene;
     for (size_t i = 0; i < capture.views.size(); ++i)
       if (const std::optional<Image> picture = photo(i))

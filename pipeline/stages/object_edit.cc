@@ -58,10 +58,8 @@ void WriteObjectFile(const std::string& path, const ObjectWeights& weights) {
   for (const std::vector<float>& region : weights.regions)
     values.insert(values.end(), region.begin(), region.end());
   NpzWriter file;
-  file.Add(
-      "weights",
-      {static_cast<int64_t>(weights.regions.size()), static_cast<int64_t>(weights.all.size())},
-      values.data(), NpzPacking::kDeflate);
+  file.Add("weights", {std::ssize(weights.regions), std::ssize(weights.all)}, values.data(),
+           NpzPacking::kDeflate);
   file.AddScalar<int32_t>("regrade_version", 2);
   file.WriteTo(path);
 }

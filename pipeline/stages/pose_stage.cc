@@ -138,7 +138,7 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
   WriteCaptureIndex(workspace.Path("poses"), capture, ingest.photos);
   std::filesystem::remove_all(workspace.Path(kColmapPhotos));
   metrics.registered = static_cast<int>(capture.views.size());
-  metrics.points = static_cast<int64_t>(capture.points.size());
+  metrics.points = std::ssize(capture.points);
   metrics.reprojection_px = capture.points.empty() ? Metric::Undefined("there are no points")
                                                    : Metric(capture.reprojection_px);
   metrics.models_found = capture.models_found;

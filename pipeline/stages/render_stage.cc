@@ -188,7 +188,7 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
     FrameWriter writer(workspace, &films);
     int done = 0;
     for (const FrameSet& set : sets)
-      for (int i = 0; i < static_cast<int>(set.cameras.size()); ++i) {
+      for (int i = 0; i < std::ssize(set.cameras); ++i) {
         ReportOrThrow(progress, done++, total);
         writer.Write(
             std::make_shared<const Frame>(RenderFrame(

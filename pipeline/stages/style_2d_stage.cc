@@ -57,7 +57,7 @@ StageOutcome StyleViews(RunContext* context, const ProgressFunction& progress) {
   const std::unique_ptr<ViewStylizer> stylizer = MakeSceneStylizer(
       context, views, masks.get(),
       [&](const Image& view, int i) { return masks->Coverage(i, view.width, view.height); });
-  if (masks != nullptr && masks->num_known() < static_cast<int>(capture.views.size()))
+  if (masks != nullptr && masks->num_known() < std::ssize(capture.views))
     context->console->Info(Concat(masks->num_known(), " of ", capture.views.size(),
                                   " photos have a mask; the style is learned from these"));
   const std::vector<std::string> notices = stylizer->Notices();

@@ -312,7 +312,7 @@ void VariantRunner::MeasureFlow(const Variant& variant, Measurement* m) {
         if (std::isfinite(error)) sum += error, ++pixels;
       }
   m->accuracy = pixels > 0 ? sum / pixels : std::nan("");
-  m->work["pairs"] = static_cast<int64_t>(estimated.size());
+  m->work["pairs"] = std::ssize(estimated);
 }
 
 }  // namespace regrade

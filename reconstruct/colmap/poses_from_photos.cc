@@ -122,7 +122,7 @@ class PoseFinder {
       // Too few pairs connect the photos, and there are no more features.
       const int pairs = output_.evidence().matched_pairs;
       if (best.models.empty() && last != nullptr && strategy.all_pairs && pairs >= 0 &&
-          pairs < static_cast<int>(photos_.size()) - 1)
+          pairs < std::ssize(photos_) - 1)
         break;
       if (ClockSeconds() > deadline_) break;
     }

@@ -219,7 +219,7 @@ class TrackFinder {
           errors.push_back(std::hypot(u - keypoint.u, v - keypoint.v));
       }
     }
-    result_.observations = static_cast<int64_t>(errors.size());
+    result_.observations = std::ssize(errors);
     result_.median_px = Median(std::move(errors));
   }
 

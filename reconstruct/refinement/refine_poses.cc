@@ -210,7 +210,7 @@ PoseRefinement RefinePoses(const ColmapModel& model, const RefinePosesOptions& o
   PoseRefinement result;
   result.model = model;
   Bundle bundle = MakeBundle(model);
-  result.observations = static_cast<int64_t>(bundle.observations.size());
+  result.observations = std::ssize(bundle.observations);
   for (const BundleObservation& s : bundle.observations) result.held_out += s.held_out;
   result.left_alone =
       static_cast<int>(std::count(bundle.adjustable.begin(), bundle.adjustable.end(), false));

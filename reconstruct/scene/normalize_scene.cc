@@ -250,7 +250,7 @@ Surroundings MeasureSurroundings(const Capture& capture) {
   }
   int64_t far = 0, all = 0;
   for (const ScenePoint& p : capture.points) {
-    const auto views = static_cast<int64_t>(p.views.size());
+    const auto views = std::ssize(p.views);
     all += views;
     if (Norm(p.position - result.center) > kFarSides * result.half) far += views;
   }

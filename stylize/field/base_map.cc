@@ -28,7 +28,7 @@ Vec3f SphereColor(const RadianceField& field, const WeightedSample& sample) {
 ColorMap LeastSquaresMap(const RadianceField& field, const StyleRays& batch,
                          const AggregationOptions& options) {
   const Geometry& geometry = *field.geometry;
-  const int64_t n = static_cast<int64_t>(batch.rays.size());
+  const int64_t n = std::ssize(batch.rays);
   const RayWeights weights = ComputeRayWeights(geometry, {batch.rays.data(), n}, options.march,
                                                field.near_clip, options.min_weight);
   const int basis = field.appearance.basis, stride = field.appearance.stride();

@@ -78,8 +78,7 @@ RadianceField MixFields(const RadianceField& source,
           "styles that are mixed restyle one field: make them with `regrade stylize`");
   const int64_t voxels = source.geometry->num_voxels();
   const int stride = source.appearance.stride();
-  if (object_weights != nullptr)
-    REGRADE_CHECK_EQ(static_cast<int64_t>(object_weights->size()), voxels);
+  if (object_weights != nullptr) REGRADE_CHECK_EQ(std::ssize(*object_weights), voxels);
 
   std::vector<double> part_weights{std::abs(1 - sum) <= kSumSlack ? 0 : 1 - sum};
   part_weights.insert(part_weights.end(), weights.begin(), weights.end());

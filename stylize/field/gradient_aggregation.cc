@@ -160,7 +160,7 @@ void GradientAggregation::March(const StyleRays& batch, int64_t begin, int64_t e
 }
 
 void GradientAggregation::FillTouchedFeatures(float position_scale) {
-  const int64_t slots = static_cast<int64_t>(touched_.size());
+  const int64_t slots = std::ssize(touched_);
   const int64_t voxels = field_.geometry->num_voxels();
   features_.Resize(slots * kFeatureStride);
   sh_.Resize(slots * kFeatureStride);
@@ -198,7 +198,7 @@ void GradientAggregation::RenderColors(const StyleRays& batch, Band* band) const
 // Each range of slots walks all rays in their order, so a sum does not know who computed it.
 void GradientAggregation::Scatter(const StyleRays& batch, const Band& band) {
   const RayWeights& weights = band.weights;
-  const int64_t slots = static_cast<int64_t>(touched_.size());
+  const int64_t slots = std::ssize(touched_);
   const int ranges = omp_get_max_threads();
 #pragma omp parallel for schedule(static, 1)
   for (int t = 0; t < ranges; ++t) {
@@ -218,7 +218,7 @@ void GradientAggregation::Scatter(const StyleRays& batch, const Band& band) {
 }
 
 double GradientAggregation::AddViewPenalty(const LipschitzNetworkData& data) {
-  const int64_t slots = static_cast<int64_t>(touched_.size());
+  const int64_t slots = std::ssize(touched_);
   const RowMap map = BaseOf(data);
   std::vector<double> sums(slots);  // summed up in order below
 #pragma omp parallel for schedule(static)
@@ -253,7 +253,7 @@ void GradientAggregation::ForgetTouched() {
 AggregationResult GradientAggregation::Run(const LipschitzNetwork& network,
                                            const StyleRays& batch,
                                            std::vector<double>* gradient) {
-  const int64_t num_rays = static_cast<int64_t>(batch.rays.size());
+  const int64_t num_rays = std::ssize(batch.rays);
   const bool one_band = num_rays <= kBandRays;
   AggregationResult result;
   Band band;
@@ -261,9 +261,9 @@ AggregationResult GradientAggregation::Run(const LipschitzNetwork& network,
   // Which voxels are touched. The lists of a whole view are large: marched again below.
   for (int64_t begin = 0; begin < num_rays; begin += kBandRays) {
     March(batch, begin, std::min(num_rays, begin + kBandRays), &band);
-    result.samples += static_cast<int64_t>(band.weights.samples.size());
+    result.samples += std::ssize(band.weights.samples);
   }
-  const int64_t slots = static_cast<int64_t>(touched_.size());
+  const int64_t slots = std::ssize(touched_);
   result.touched_voxels = slots;
   FillTouchedFeatures(network.data().position_scale);
   network.Forward(features_.data(), slots, sh_.data());
@@ -314,12 +314,12 @@ AggregationResult GradientAggregation::Run(const LipschitzNetwork& network,
 StyleLoss::HiddenSums GradientAggregation::SumHidden(const LipschitzNetwork& network,
                                                      const StyleRays& batch) {
   HiddenSums sums;
-  const int64_t num_rays = static_cast<int64_t>(batch.rays.size());
+  const int64_t num_rays = std::ssize(batch.rays);
   Band band;
   for (int64_t begin = 0; begin < num_rays; begin += kBandRays) {
     March(batch, begin, std::min(num_rays, begin + kBandRays), &band);
     const RayWeights& weights = band.weights;
-    const int64_t slots = static_cast<int64_t>(touched_.size());
+    const int64_t slots = std::ssize(touched_);
     FillTouchedFeatures(network.data().position_scale);
     network.Forward(features_.data(), slots, sh_.data());
     RenderColors(batch, &band);

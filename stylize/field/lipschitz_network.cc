@@ -103,9 +103,9 @@ LipschitzNetwork::LipschitzNetwork(LipschitzNetworkData data) : data_(std::move(
   if (std::none_of(std::begin(kActivations), std::end(kActivations),
                    [this](const auto& entry) { return data_.activation == entry.name; }))
     refuse("unknown activation '" + data_.activation + "'");
-  if (static_cast<int64_t>(data_.parameters.size()) != NumParameters())
+  if (std::ssize(data_.parameters) != NumParameters())
     refuse(Concat(data_.parameters.size(), " parameters instead of ", NumParameters()));
-  if (static_cast<int64_t>(data_.singular_vectors.size()) != VectorOffset(kNetworkLayers))
+  if (std::ssize(data_.singular_vectors) != VectorOffset(kNetworkLayers))
     refuse("singular vectors of another shape");
   bool finite = std::isfinite(data_.omega) && std::isfinite(data_.sh_scale) &&
                 std::isfinite(data_.position_scale) && AllFinite(data_.base.offset);
@@ -156,7 +156,7 @@ template DenseNetwork<double> LipschitzNetwork::Effective<double>() const;
 
 void LipschitzNetwork::AddGradient(const DenseNetwork<double>& d_effective,
                                    std::vector<double>* gradient) const {
-  REGRADE_CHECK_EQ(static_cast<int64_t>(gradient->size()), NumParameters());
+  REGRADE_CHECK_EQ(std::ssize(*gradient), NumParameters());
   for (int l = 0; l < kNetworkLayers; ++l) {
     std::vector<double> d_a = d_effective.layers[l].weight;
     if (l == 0)

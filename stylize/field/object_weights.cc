@@ -41,7 +41,7 @@ void MaskVote::Add(const Camera& camera, const Image& mask) {
         rays.push_back(camera.PixelRay(x, y));
         votes.push_back(std::clamp(vote, 0.0f, 1.0f));
       }
-    const int64_t count = static_cast<int64_t>(rays.size());
+    const int64_t count = std::ssize(rays);
     const RayWeights weights =
         ComputeRayWeights(geometry_, {rays.data(), count}, march_, near_clip_);
 #pragma omp parallel for schedule(dynamic, 64)
@@ -79,13 +79,13 @@ std::vector<float> MaskVote::Weights(double threshold, double edge) const {
 }
 
 RadianceField WeightField(const RadianceField& field, const std::vector<float>& weights) {
-  REGRADE_CHECK_EQ(static_cast<int64_t>(weights.size()), field.geometry->num_voxels());
+  REGRADE_CHECK_EQ(std::ssize(weights), field.geometry->num_voxels());
   RadianceField result;
   result.geometry = field.geometry;
   result.near_clip = field.near_clip;
   result.step = field.step;
   result.appearance.basis = 1;
-  result.appearance.sh.Resize(static_cast<int64_t>(weights.size()) * 3);
+  result.appearance.sh.Resize(std::ssize(weights) * 3);
   for (size_t v = 0; v < weights.size(); ++v)
     for (size_t c = 0; c < 3; ++c)
       result.appearance.sh[static_cast<int64_t>(3 * v + c)] =

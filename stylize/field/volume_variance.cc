@@ -180,9 +180,8 @@ VarianceReport MeasureVariance(const RadianceField& source, const RadianceField&
                                const std::vector<RayPair>& pairs, const MarchOptions& march) {
   std::vector<Ray> rays;
   for (const RayPair& pair : pairs) rays.insert(rays.end(), {pair.first, pair.second});
-  const RayWeights weights =
-      ComputeRayWeights(*source.geometry, {rays.data(), static_cast<int64_t>(rays.size())},
-                        march, source.near_clip);
+  const RayWeights weights = ComputeRayWeights(
+      *source.geometry, {rays.data(), std::ssize(rays)}, march, source.near_clip);
   const Observer observer(source, styled, network);
   struct Result {
     double source, styled, fraction;

@@ -25,7 +25,7 @@ bool UpdateWeights(const WeightUpdate& update, int64_t step, std::vector<double>
   }
   const std::vector<float> gradient32(gradient->begin(), gradient->end());
   std::vector<float>& parameters = network->data().parameters;
-  const int64_t size = static_cast<int64_t>(parameters.size());
+  const int64_t size = std::ssize(parameters);
   if (!AdamStep(update.adam, update.Rate(step), {gradient32.data(), size},
                 {parameters.data(), size}, adam))
     return false;

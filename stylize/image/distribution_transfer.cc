@@ -183,7 +183,7 @@ std::vector<Vec3d> SampleColors(const Image& image, const std::string& where, in
     if (std::isfinite(color.x + color.y + color.z)) all.push_back(color);
   }
   if (all.empty()) throw InputError("the picture has no pixel to take a colour of", where);
-  const int64_t count = static_cast<int64_t>(all.size());
+  const int64_t count = std::ssize(all);
   if (count <= most) return all;
   // By index, not by a whole stride: a stride that divides the width would see few columns.
   std::vector<Vec3d> sample(most);

@@ -113,7 +113,7 @@ void ClearLastLayer(LipschitzNetwork* network) {
 void SolveOutputLayer(const StyleLoss::HiddenSums& sums, double budget,
                       LipschitzNetwork* network) {
   constexpr int kSize = kMlpHidden + 1;
-  const int64_t n = static_cast<int64_t>(sums.opacity.size());
+  const int64_t n = std::ssize(sums.opacity);
   if (n == 0) return;
   Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(kSize, kSize);
   Eigen::MatrixXd right = Eigen::MatrixXd::Zero(kSize, 3);

@@ -188,16 +188,14 @@ void Training::DrawRays(int64_t step) {
 StepResult Training::Advance(int64_t most) {
   const int64_t first = state_.step;
   if (drawn_from_ != first) DrawRays(first);
-  if (static_cast<int64_t>(drawn_.size()) > most) drawn_.resize(most);
+  if (std::ssize(drawn_) > most) drawn_.resize(most);
   StepRequest request{.first = first, .batches = std::exchange(drawn_, {})};
   drawn_from_ = -1;
   if (first % kBoundEvery == 0)
     request.norms_lag = [this](const LipschitzNetwork& network) {
       return RecordBound(network);
     };
-  request.meanwhile = [this, next = first + static_cast<int64_t>(request.batches.size())] {
-    DrawRays(next);
-  };
+  request.meanwhile = [this, next = first + std::ssize(request.batches)] { DrawRays(next); };
   StepResult steps = engine_.Step(update_, request, &network_, &state_.adam);
   state_.step += steps.made;
   steps_here_ += steps.made;
