@@ -35,7 +35,7 @@ std::optional<Interval> BootstrapMean(const std::vector<double>& values, int blo
   std::vector<double> means(kBootstrapResamples);
   for (size_t r = 0; r < means.size(); ++r)
     means[r] = MeanOfResample(values, static_cast<size_t>(block), seed, r);
-  std::sort(means.begin(), means.end());
+  std::ranges::sort(means);
   return Interval{Quantile(means, 0.025), Quantile(means, 0.975)};
 }
 

@@ -229,8 +229,7 @@ ConsistencyReport EvaluateConsistency(const FrameSource& reference,
                                progress);
   }
   // Both frames of a pair are used again by later pairs.
-  const int max_gap =
-      options.gaps.empty() ? 1 : *std::max_element(options.gaps.begin(), options.gaps.end());
+  const int max_gap = options.gaps.empty() ? 1 : *std::ranges::max_element(options.gaps);
   const auto cache = std::make_shared<FrameCache>(
       reference, std::clamp(max_gap, 1, std::max(1, reference.count)) + 1, kCacheBytes);
   const FrameSource cached{reference.count, [cache](int i) { return *cache->Get(i); }};

@@ -70,13 +70,11 @@ std::string FidelityTable(const ConsistencyReport& consistency,
                           const std::vector<FidelityRow>& fidelity) {
   std::vector<Cells> rows{
       {"sequence", "PSNR to 2D", "hue std", "of 2D", "chroma", "of 2D", "SW to style"}};
-  const bool lpips = std::any_of(fidelity.begin(), fidelity.end(), [](const FidelityRow& f) {
-    return f.lpips_to_2d.has_value();
-  });
+  const bool lpips = std::ranges::any_of(
+      fidelity, [](const FidelityRow& f) { return f.lpips_to_2d.has_value(); });
   if (lpips) rows[0].push_back("LPIPS to 2D");
-  const bool structure =
-      std::any_of(fidelity.begin(), fidelity.end(),
-                  [](const FidelityRow& f) { return f.structure.has_value(); });
+  const bool structure = std::ranges::any_of(
+      fidelity, [](const FidelityRow& f) { return f.structure.has_value(); });
   if (structure) rows[0].push_back("structure");
   for (const FidelityRow& row : fidelity) {
     rows.push_back({row.sequence, Number(row.psnr_to_2d_db, 2), Number(row.hue_std, 3),
@@ -88,10 +86,9 @@ std::string FidelityTable(const ConsistencyReport& consistency,
   std::string remarks;
   std::vector<std::string> seen;
   for (const ConsistencyRow& row : consistency.rows) {
-    if (std::find(seen.begin(), seen.end(), row.sequence) != seen.end()) continue;
+    if (std::ranges::find(seen, row.sequence) != seen.end()) continue;
     seen.push_back(row.sequence);
-    if (std::any_of(fidelity.begin(), fidelity.end(),
-                    [&](const FidelityRow& f) { return f.sequence == row.sequence; }))
+    if (std::ranges::find(fidelity, row.sequence, &FidelityRow::sequence) != fidelity.end())
       continue;
     rows.push_back({row.sequence, "-", "-", "-", "-", "-", "-"});
     if (lpips) rows.back().push_back("-");

@@ -48,7 +48,7 @@ void Dispatch(const Arguments& arguments, Console* console) {
 }
 
 int Run(const Arguments& arguments) {
-  const auto flags_end = std::find(arguments.begin(), arguments.end(), "--");
+  const auto flags_end = std::ranges::find(arguments, "--");
   Console console(std::find(arguments.begin(), flags_end, "--json") != flags_end);
   ExitCode code = ExitCode::kBug;
   try {

@@ -51,7 +51,7 @@ fs::path PictureFolder(const fs::path& root) {
     if (const std::string name = it->path().filename().string();
         name.starts_with("images_") && fs::is_directory(it->path(), error))
       names.push_back(name);
-  std::sort(names.begin(), names.end(), NaturalLess);
+  std::ranges::sort(names, NaturalLess);
   return names.empty() ? fs::path() : root / names[0];
 }
 

@@ -13,8 +13,7 @@ std::vector<StagedPhoto> PhotosForColmap(const std::vector<StagedPhoto>& photos,
   namespace fs = std::filesystem;
   std::error_code error;
   fs::remove_all(folder, error);  // of an earlier run
-  if (std::all_of(photos.begin(), photos.end(),
-                  [](const StagedPhoto& photo) { return photo.bits == 8; }))
+  if (std::ranges::all_of(photos, [](const StagedPhoto& photo) { return photo.bits == 8; }))
     return photos;
   fs::create_directories(folder, error);
   std::vector<StagedPhoto> copies = photos;

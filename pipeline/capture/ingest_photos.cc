@@ -149,7 +149,7 @@ std::string CountReasons(const std::vector<PhotoStatus>& statuses) {
     if (photo.status != PhotoState::kUsed) ++counts[photo.why];
   std::vector<std::pair<int, std::string>> sorted;
   for (const auto& [why, count] : counts) sorted.emplace_back(-count, why);
-  std::sort(sorted.begin(), sorted.end());
+  std::ranges::sort(sorted);
   std::string text;
   for (size_t i = 0; i < std::min(sorted.size(), kShown); ++i)
     text += Concat((i ? ", " : ""), -sorted[i].first, " x ", sorted[i].second);

@@ -69,8 +69,8 @@ ObjectMasks::ObjectMasks(const MaskOptions& options, const std::vector<std::stri
 }
 
 int ObjectMasks::num_known() const {
-  return static_cast<int>(std::count_if(paths_.begin(), paths_.end(),
-                                        [](const std::string& path) { return !path.empty(); }));
+  return static_cast<int>(
+      std::ranges::count_if(paths_, [](const std::string& path) { return !path.empty(); }));
 }
 
 std::vector<Image> ObjectMasks::Regions(const std::string& path, int width, int height) const {

@@ -64,8 +64,7 @@ double TransparentFraction(const std::vector<Silhouette>& silhouettes) {
   int64_t clear = 0, all = 0;
   for (const Silhouette& silhouette : silhouettes) {
     all += silhouette.alpha.num_pixels();
-    clear += std::count_if(silhouette.alpha.pixels.begin(), silhouette.alpha.pixels.end(),
-                           [](float a) { return a < 0.5f; });
+    clear += std::ranges::count_if(silhouette.alpha.pixels, [](float a) { return a < 0.5f; });
   }
   return all > 0 ? static_cast<double>(clear) / static_cast<double>(all) : 0;
 }
@@ -131,8 +130,7 @@ std::map<std::string, bool> ParseEffects(const std::string& text) {
     const size_t equals = word.find('=');
     const std::string name = word.substr(0, equals);
     const std::string value = equals == std::string::npos ? "" : word.substr(equals + 1);
-    const bool known =
-        std::find(std::begin(kNames), std::end(kNames), name) != std::end(kNames);
+    const bool known = std::ranges::find(kNames, name) != std::end(kNames);
     if (!known || (value != "on" && value != "off"))
       throw UsageError(
           "'" + word + "' is not allowed", "--effects",

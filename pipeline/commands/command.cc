@@ -13,7 +13,7 @@
 namespace regrade {
 
 bool AsksForHelp(const Arguments& arguments) {
-  const auto flags_end = std::find(arguments.begin(), arguments.end(), "--");
+  const auto flags_end = std::ranges::find(arguments, "--");
   return std::any_of(arguments.begin(), flags_end,
                      [](const std::string& word) { return word == "--help" || word == "-h"; });
 }

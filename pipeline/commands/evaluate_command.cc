@@ -128,7 +128,7 @@ void RunEvaluate(const Command& command, const Arguments& arguments, Console* co
   options.Add("Evaluation", &consistency);
   options.Add("Program", &program);
   // Without --frames it evaluates the folder of a run, with all of a run's options.
-  const bool has_frames = std::any_of(arguments.begin(), arguments.end(), [](const auto& word) {
+  const bool has_frames = std::ranges::any_of(arguments, [](const auto& word) {
     return word == "--frames" || word.starts_with("--frames=");
   });
   if (!has_frames && !AsksForHelp(arguments))

@@ -51,8 +51,7 @@ std::vector<double> MixKeys::At(double time) const {
 }
 
 bool MixKeys::IsConstant() const {
-  return std::all_of(points.begin(), points.end(),
-                     [this](const auto& point) { return point == points[0]; });
+  return std::ranges::all_of(points, [this](const auto& point) { return point == points[0]; });
 }
 
 MixKeys ParseMixKeys(const std::string& text, int styles) {

@@ -96,9 +96,7 @@ FolderListing ListFolder(const std::string& folder) {
                      "give the folder that holds the photos");
   FolderListing listing;
   ListInto(root, "", root, &listing);
-  std::sort(
-      listing.files.begin(), listing.files.end(),
-      [](const ListedFile& a, const ListedFile& b) { return NaturalLess(a.name, b.name); });
+  std::ranges::sort(listing.files, NaturalLess, &ListedFile::name);
   return listing;
 }
 

@@ -45,7 +45,7 @@ bool Run(const std::vector<std::string>& arguments) {
     std::printf("%s", kUsage);
     return command == "help" || command == "--help";
   }
-  if (std::find(rest.begin(), rest.end(), "--help") != rest.end()) {
+  if (std::ranges::find(rest, "--help") != rest.end()) {
     std::printf("%s\n%s", kUsage, options.Help().c_str());
     return true;
   }

@@ -48,8 +48,7 @@ void MeasureFrames(const RadianceField& field, const PackedCapture& capture,
   const MarchOptions march{field.step};
   const DeviceGrid grid = UploadGrid(MakeFastGrid(field));
   Stopwatch watch;
-  const auto first = std::find_if(capture.views.begin(), capture.views.end(),
-                                  [](const PackedView& view) { return view.held_out; });
+  const auto first = std::ranges::find_if(capture.views, &PackedView::held_out);
   if (first != capture.views.end()) RenderViewOnDevice(grid, first->camera, march);
   (*record)["seconds_first_frame"] = watch.Lap();
   (*record)["render"] = RenderCosts(grid, capture, march.step);

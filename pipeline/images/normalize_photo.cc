@@ -10,8 +10,8 @@ namespace regrade {
 namespace {
 
 void CheckFinite(const Image& image, const std::string& where) {
-  const int64_t bad = std::count_if(image.pixels.begin(), image.pixels.end(),
-                                    [](float v) { return !std::isfinite(v); });
+  const int64_t bad =
+      std::ranges::count_if(image.pixels, [](float v) { return !std::isfinite(v); });
   if (bad > 0)
     throw InputError(Concat(bad, " of ", image.pixels.size(), " values are NaN or infinite"),
                      where, "export the picture again without them");

@@ -127,7 +127,7 @@ std::vector<std::string> OptionSet::Parse(const std::vector<std::string>& argume
       description.add_options()(("no-" + entry.name).c_str(), new po::untyped_value(true));
   }
   constexpr const char* kSeeHelp = "see --help";
-  const auto flags_end = std::find(arguments.begin(), arguments.end(), "--");
+  const auto flags_end = std::ranges::find(arguments, "--");
   po::parsed_options parsed(&description);
   try {
     namespace style = po::command_line_style;

@@ -114,7 +114,7 @@ bool LowerToMemory(const std::function<StagePlan(const FitOptions&)>& plan_of, u
   bool lowered = false;
   while (limit > 0 && plan_of(*options).memory > limit) {
     auto& sides = options->resolutions;
-    const int finest = *std::max_element(sides.begin(), sides.end());
+    const int finest = *std::ranges::max_element(sides);
     if (finest <= kLeastResolution) break;
     const int lower = std::max(kLeastResolution, finest - std::max(1, finest / 16));
     for (int& side : sides) side = std::min(side, lower);

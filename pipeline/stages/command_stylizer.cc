@@ -45,9 +45,8 @@ std::string Filled(const std::string& word,
                    const std::vector<std::pair<std::string, std::string>>& values) {
   std::string filled;
   for (size_t i = 0; i < word.size();) {
-    const auto value = std::find_if(values.begin(), values.end(), [&](const auto& v) {
-      return word.compare(i, v.first.size(), v.first) == 0;
-    });
+    const auto value = std::ranges::find_if(
+        values, [&](const auto& v) { return word.compare(i, v.first.size(), v.first) == 0; });
     if (value == values.end()) {
       filled += word[i++];
     } else {
@@ -140,7 +139,7 @@ std::unique_ptr<ViewStylizer> MakeCommandStylizer(const std::string& command,
                                                   double limit_s) {
   std::vector<std::string> words = SplitCommand(command);
   for (const char* placeholder : {"{input}", "{output}"})
-    if (std::none_of(words.begin(), words.end(), [&](const std::string& word) {
+    if (std::ranges::none_of(words, [&](const std::string& word) {
           return word.find(placeholder) != std::string::npos;
         }))
       throw UsageError(std::string("the style command has no ") + placeholder, "--method",

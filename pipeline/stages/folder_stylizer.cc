@@ -52,8 +52,8 @@ Image FittedToView(const Image& styled, const Image& view, const std::string& wh
 std::unique_ptr<ViewStylizer> MakeFolderStylizer(const std::string& folder,
                                                  const std::vector<std::string>& photos) {
   std::vector<std::string> paths = PicturesByPhotoName(folder, photos, "picture");
-  const int known = static_cast<int>(std::count_if(
-      paths.begin(), paths.end(), [](const std::string& path) { return !path.empty(); }));
+  const int known = static_cast<int>(
+      std::ranges::count_if(paths, [](const std::string& path) { return !path.empty(); }));
   return std::make_unique<FolderStylizer>(std::move(paths), known);
 }
 

@@ -77,7 +77,7 @@ ObjectWeights ReadObjectFile(const std::string& path, int64_t voxels) {
     weights.regions.emplace_back(first, first + voxels);
   }
   for (const std::vector<float>& region : weights.regions)
-    if (!std::all_of(region.begin(), region.end(), [](float e) { return e >= 0 && e <= 1; }))
+    if (!std::ranges::all_of(region, [](float e) { return e >= 0 && e <= 1; }))
       throw InputError("holds a weight outside [0, 1]", path, "run regrade stylize again");
   weights.all = SumOf(weights.regions);
   return weights;

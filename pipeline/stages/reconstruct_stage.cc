@@ -43,9 +43,7 @@ void SetHeldOut(const HeldOutMetrics& held_out, ReconstructReport* metrics) {
   metrics->ssim_heldout = Metric(held_out.MeanSsim(), why);
 }
 
-int Finest(const FitOptions& options) {
-  return *std::max_element(options.resolutions.begin(), options.resolutions.end());
-}
+int Finest(const FitOptions& options) { return *std::ranges::max_element(options.resolutions); }
 
 // Memory and time of a fit of these views, by its options.
 std::function<StagePlan(const FitOptions&)> PlannerOf(const WorkingViews& views,
@@ -162,8 +160,7 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
         "make the masks' white parts larger");
   ProgressParts parts(progress, kTrial + 1 + kAfterFit);
   EffectReport& view_dependence =
-      *std::find_if(profile.effects.begin(), profile.effects.end(),
-                    [](const EffectReport& effect) { return effect.name == kViewDependence; });
+      *std::ranges::find(profile.effects, kViewDependence, &EffectReport::name);
   const ProgressFunction trial = parts.Next(kTrial);
   const double trial_begin = context->console->StageSeconds(), trial_cpu_begin = CpuSeconds();
   view_dependence = resume ? EffectsOfRecord(ParseJson(measured, "checkpoint")).at(0)

@@ -62,9 +62,7 @@ std::vector<FrameSet> FrameSetsOf(const std::vector<Camera>& views, const PathOp
 }
 
 const FrameSet* CommonSet(const std::vector<FrameSet>& sets) {
-  const auto common = std::find_if(sets.begin(), sets.end(), [](const FrameSet& set) {
-    return set.prefix == kCommonPrefix;
-  });
+  const auto common = std::ranges::find(sets, kCommonPrefix, &FrameSet::prefix);
   return common == sets.end() ? nullptr : &*common;
 }
 
@@ -175,8 +173,7 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   const std::vector<FrameSet> sets = FrameSetsOf(views.Cameras(), settings.render.path);
   int total = 0;
   for (const FrameSet& set : sets) total += static_cast<int>(set.cameras.size());
-  const FrameSet& film =
-      *std::find_if(sets.begin(), sets.end(), [](const FrameSet& set) { return set.of_film; });
+  const FrameSet& film = *std::ranges::find_if(sets, &FrameSet::of_film);
   if (const FrameSet* common = CommonSet(sets))
     context->console->Info(ComparisonNote(common->cameras[0]));
 

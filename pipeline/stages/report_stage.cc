@@ -34,9 +34,8 @@ PhotosReport PhotosOf(const Capture& capture) {
   PhotosReport photos;
   photos.given = static_cast<int>(capture.statuses.size());
   photos.registered = static_cast<int>(capture.views.size());
-  photos.used = static_cast<int>(std::count_if(
-      capture.statuses.begin(), capture.statuses.end(),
-      [](const PhotoStatus& photo) { return photo.status == PhotoState::kUsed; }));
+  photos.used = static_cast<int>(
+      std::ranges::count(capture.statuses, PhotoState::kUsed, &PhotoStatus::status));
   photos.statuses = capture.statuses;
   return photos;
 }

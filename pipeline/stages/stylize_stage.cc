@@ -163,8 +163,8 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
   if (object != nullptr) {
     WriteObjectFile(workspace.Path("object.npz"), weights);
     outcome.outputs.push_back("object.npz");
-    metrics.object_voxels = static_cast<int64_t>(
-        std::count_if(weights.all.begin(), weights.all.end(), [](float e) { return e > 0; }));
+    metrics.object_voxels =
+        static_cast<int64_t>(std::ranges::count_if(weights.all, [](float e) { return e > 0; }));
   } else {
     std::filesystem::remove(workspace.Path("object.npz"));  // of an earlier style
   }

@@ -75,10 +75,9 @@ ColmapModel TracksOf(const std::vector<Camera>& cameras, const std::vector<Image
   ColmapModel model;
   if (cameras.empty()) return model;
   for (size_t v = 0; v < cameras.size(); ++v) {
-    const auto known = std::find_if(model.cameras.begin(), model.cameras.end(),
-                                    [&](const ColmapCamera& camera) {
-                                      return camera.intrinsics.SameIntrinsics(cameras[v]);
-                                    });
+    const auto known = std::ranges::find_if(model.cameras, [&](const ColmapCamera& camera) {
+      return camera.intrinsics.SameIntrinsics(cameras[v]);
+    });
     const uint32_t id = static_cast<uint32_t>(known - model.cameras.begin()) + 1;
     if (known == model.cameras.end()) {
       model.cameras.push_back({id, LensOf(cameras[v]), cameras[v]});

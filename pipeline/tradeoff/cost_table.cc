@@ -14,7 +14,7 @@ struct Spread {
 };
 
 Spread Of(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
+  std::ranges::sort(values);
   const size_t n = values.size();
   const double median = n % 2 == 1 ? values[n / 2] : 0.5 * (values[n / 2 - 1] + values[n / 2]);
   return {median, 0.5 * (values.back() - values.front())};
@@ -48,7 +48,7 @@ std::string NameOf(const CostRow& row) {
 void FillErrors(const std::vector<Variant>& variants, std::vector<CostRow>* rows) {
   for (CostRow& row : *rows) {
     if (row.parameter.empty() || row.parameter == "preset") continue;
-    const auto end = std::find_if(variants.begin(), variants.end(), [&](const Variant& v) {
+    const auto end = std::ranges::find_if(variants, [&](const Variant& v) {
       return v.benchmark == row.benchmark && v.parameter == row.parameter && v.accurate_end;
     });
     const std::string parameter = end == variants.end() ? "" : end->parameter;
@@ -120,7 +120,7 @@ std::vector<CostRow> CostTable(const std::vector<Variant>& variants,
     rows.push_back(std::move(row));
   }
   // Presets are measured last: groups them with the other rows of their benchmark.
-  std::stable_sort(rows.begin(), rows.end(), [](const CostRow& a, const CostRow& b) {
+  std::ranges::stable_sort(rows, [](const CostRow& a, const CostRow& b) {
     return &BenchmarkOf(a.benchmark) < &BenchmarkOf(b.benchmark);
   });
   FillErrors(variants, &rows);

@@ -163,8 +163,7 @@ std::vector<CostTerm> LearnCosts(const RunSettings& base, const Capture& capture
     for (const Measurement& m : measurements) {
       const bool relevant =
           m.parameter.empty() ||
-          std::any_of(stage.parameters.begin(), stage.parameters.end(),
-                      [&m](const char* parameter) { return m.parameter == parameter; });
+          std::ranges::find(stage.parameters, m.parameter) != stage.parameters.end();
       if (m.benchmark != stage.benchmark || !relevant) continue;
       for (const Variant& variant : variants)
         if (variant.benchmark == m.benchmark && variant.parameter == m.parameter &&
@@ -206,8 +205,7 @@ std::vector<StageTime> Predict(const std::vector<CostTerm>& costs, const RunSett
                                const Capture& capture) {
   std::vector<StageTime> times;
   for (const CostTerm& term : costs) {
-    auto at = std::find_if(times.begin(), times.end(),
-                           [&term](const StageTime& time) { return time.stage == term.stage; });
+    auto at = std::ranges::find(times, term.stage, &StageTime::stage);
     if (at == times.end()) at = times.insert(times.end(), {term.stage, 0, 0});
     const double amount = AmountOf(term.unit, settings, capture);
     at->seconds += amount * term.seconds;

@@ -101,8 +101,7 @@ std::vector<StageOutput> DescribeOutputs(const std::string& root,
       throw InputError("this result is missing", full.string());
     }
   }
-  std::sort(outputs.begin(), outputs.end(),
-            [](const StageOutput& a, const StageOutput& b) { return a.path < b.path; });
+  std::ranges::sort(outputs, {}, &StageOutput::path);
   return outputs;
 }
 

@@ -143,7 +143,7 @@ std::vector<std::string> Workspace::FinishedStages() const {
   std::vector<std::string> stages;
   for (const auto& entry : fs::directory_iterator(Path(".regrade/stages")))
     if (entry.path().extension() == ".json") stages.push_back(entry.path().stem().string());
-  std::sort(stages.begin(), stages.end());
+  std::ranges::sort(stages);
   return stages;
 }
 

@@ -75,7 +75,7 @@ Capture CaptureFromModel(const ColmapModel& model, const std::vector<StagedPhoto
       point_sum += std::hypot(u - keypoint.u, v - keypoint.v);
       ++point_observations;
     }
-    std::sort(point.views.begin(), point.views.end());
+    std::ranges::sort(point.views);
     point.views.erase(std::unique(point.views.begin(), point.views.end()), point.views.end());
     if (point.views.size() < 2) continue;
     if (point_observations > 0) point.reprojection_error = point_sum / point_observations;

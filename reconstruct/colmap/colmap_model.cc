@@ -229,8 +229,7 @@ const Record* FindById(const std::vector<Record>& records, uint64_t id) {
 
 template <typename Record>
 void SortById(std::vector<Record>& records, const std::string& folder, const char* file) {
-  std::stable_sort(records.begin(), records.end(),
-                   [](const Record& a, const Record& b) { return a.id < b.id; });
+  std::ranges::stable_sort(records, {}, &Record::id);
   for (size_t i = 1; i < records.size(); ++i)
     if (records[i].id == records[i - 1].id)
       FailLink(folder, file, Concat("the id ", records[i].id, " occurs twice"));

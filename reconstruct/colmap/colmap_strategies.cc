@@ -30,7 +30,7 @@ std::vector<CameraGroup> GroupByCamera(const std::vector<StagedPhoto>& photos) {
       return group.width == photo.width && group.height == photo.height &&
              group.focal_px == photo.exif_focal_px;
     };
-    auto it = std::find_if(groups.begin(), groups.end(), same);
+    auto it = std::ranges::find_if(groups, same);
     if (it == groups.end())
       it = groups.insert(groups.end(), {photo.width, photo.height, photo.exif_focal_px, {}});
     it->names.push_back(photo.name);

@@ -225,8 +225,8 @@ class PoseFinder {
       found.refusal = AssessScene(found.capture, lenient).refusal;
       attempt.models.push_back(std::move(found));
     }
-    std::stable_sort(attempt.models.begin(), attempt.models.end(),
-                     [](const auto& a, const auto& b) { return a.Rank() > b.Rank(); });
+    std::ranges::stable_sort(attempt.models,
+                             [](const auto& a, const auto& b) { return a.Rank() > b.Rank(); });
     // A mapper that was stopped by its time limit may still have written complete models.
     if (!attempt.models.empty()) return attempt;
     if (!damage.empty())

@@ -41,7 +41,7 @@ std::vector<std::pair<size_t, size_t>> PairsToMatch(const std::vector<Camera>& c
       const double apart = extent > 0 ? Norm(centers[i] - centers[j]) / extent : 0;
       by_distance.emplace_back(std::hypot(apart / kDistanceScale, angle / kAngleScale), j);
     }
-    std::sort(by_distance.begin(), by_distance.end());
+    std::ranges::sort(by_distance);
     for (const size_t rank : kRanks)
       if (rank < by_distance.size()) pairs.insert(std::minmax(i, by_distance[rank].second));
   }

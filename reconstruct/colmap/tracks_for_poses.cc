@@ -115,9 +115,8 @@ class TrackFinder {
     std::vector<LensGroup> groups;
     for (size_t i = 0; i < photos_.size(); ++i) {
       const ColmapCamera& camera = *start_.FindCamera(start_.images[i].camera_id);
-      auto group = std::find_if(groups.begin(), groups.end(), [&](const LensGroup& other) {
-        return SameLens(other.camera, camera);
-      });
+      auto group = std::ranges::find_if(
+          groups, [&](const LensGroup& other) { return SameLens(other.camera, camera); });
       if (group == groups.end())
         group =
             groups.insert(groups.end(), {camera, {photos_[i].width, photos_[i].height, 0, {}}});

@@ -85,10 +85,9 @@ Bundle MakeBundle(const ColmapModel& model) {
       if (std::isfinite(ReprojectionError(bundle, observation))) seen.push_back(observation);
     }
     if (seen.size() < 2) continue;
-    std::sort(seen.begin(), seen.end(),
-              [&](const BundleObservation& a, const BundleObservation& b) {
-                return numbers[a.view] < numbers[b.view];
-              });
+    std::ranges::sort(seen, [&](const BundleObservation& a, const BundleObservation& b) {
+      return numbers[a.view] < numbers[b.view];
+    });
     size_t kept = seen.size();
     for (BundleObservation& observation : seen) {
       observation.held_out =

@@ -128,10 +128,9 @@ ExposureData ArrangeObservations(size_t num_views,
       return of_point[s.point] < 2 || of_view[s.view] < kFewestColors;
     });
   }
-  std::sort(data.observations.begin(), data.observations.end(),
-            [](const Observation& a, const Observation& b) {
-              return a.point != b.point ? a.point < b.point : a.view < b.view;
-            });
+  std::ranges::sort(data.observations, [](const Observation& a, const Observation& b) {
+    return a.point != b.point ? a.point < b.point : a.view < b.view;
+  });
   data.tracks.resize(num_points + 1);
   data.known.resize(num_views);
   for (const Observation& s : data.observations)

@@ -73,8 +73,7 @@ Gauge ChooseGauge(const Bundle& bundle) {
   for (const BundleObservation& observation : bundle.observations)
     count[observation.view] += !observation.held_out;
   Gauge gauge;
-  gauge.view =
-      static_cast<size_t>(std::max_element(count.begin(), count.end()) - count.begin());
+  gauge.view = static_cast<size_t>(std::ranges::max_element(count) - count.begin());
   double farthest = -1;
   for (size_t v = 0; v < bundle.poses.size(); ++v) {
     if (!bundle.adjustable[v]) continue;
@@ -212,8 +211,7 @@ PoseRefinement RefinePoses(const ColmapModel& model, const RefinePosesOptions& o
   Bundle bundle = MakeBundle(model);
   result.observations = std::ssize(bundle.observations);
   for (const BundleObservation& s : bundle.observations) result.held_out += s.held_out;
-  result.left_alone =
-      static_cast<int>(std::count(bundle.adjustable.begin(), bundle.adjustable.end(), false));
+  result.left_alone = static_cast<int>(std::ranges::count(bundle.adjustable, false));
   ProgressParts parts(progress, 4);
   const auto refuse = [&result](const std::string& why) {
     result.tried = true;

@@ -41,7 +41,7 @@ Vec3d OrderFreeMean(std::vector<Vec3d> values) {
   for (int a = 0; a < 3; ++a) {
     std::vector<double> axis;
     for (const Vec3d& v : values) axis.push_back(v[a]);
-    std::sort(axis.begin(), axis.end());
+    std::ranges::sort(axis);
     double sum = 0;
     for (const double v : axis) sum += v;
     mean[a] = sum / static_cast<double>(axis.size());

@@ -100,8 +100,8 @@ LipschitzNetwork::LipschitzNetwork(LipschitzNetworkData data) : data_(std::move(
   const auto refuse = [](const std::string& what) {
     throw InputError("not a network: " + what, "network.npz", "run regrade stylize again");
   };
-  if (std::none_of(std::begin(kActivations), std::end(kActivations),
-                   [this](const auto& entry) { return data_.activation == entry.name; }))
+  if (std::ranges::none_of(
+          kActivations, [this](const auto& entry) { return data_.activation == entry.name; }))
     refuse("unknown activation '" + data_.activation + "'");
   if (std::ssize(data_.parameters) != NumParameters())
     refuse(Concat(data_.parameters.size(), " parameters instead of ", NumParameters()));

@@ -124,8 +124,7 @@ LocalLipschitz MeasureLocalLipschitz(const LipschitzNetwork& network,
     VectorXd direction = VectorXd::Ones(kNetworkInputs).normalized();
     steepest.emplace_back(f.NormAt(point, &direction), point);
   }
-  std::sort(steepest.begin(), steepest.end(),
-            [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::ranges::sort(steepest, [](const auto& a, const auto& b) { return a.first > b.first; });
   if (!steepest.empty()) {
     result.jacobians = steepest.front().first;
     const MatrixXd jacobian = f.Jacobian(steepest.front().second);

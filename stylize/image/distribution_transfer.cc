@@ -49,7 +49,7 @@ std::vector<double> SortedAxis(const std::vector<Vec3d>& colors, const Mat3d& ro
                                int axis) {
   std::vector<double> values(colors.size());
   for (size_t i = 0; i < colors.size(); ++i) values[i] = (rotation * colors[i])[axis];
-  std::sort(values.begin(), values.end());
+  std::ranges::sort(values);
   return values;
 }
 

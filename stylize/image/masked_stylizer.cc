@@ -46,8 +46,7 @@ class MaskedStylizer : public ViewStylizer {
     std::vector<std::string> notices;
     for (const auto& region : regions_)
       for (const std::string& notice : region->Notices())
-        if (std::find(notices.begin(), notices.end(), notice) == notices.end())
-          notices.push_back(notice);
+        if (std::ranges::find(notices, notice) == notices.end()) notices.push_back(notice);
     return notices;
   }
 
@@ -72,8 +71,7 @@ Image WithRegion(const Image& view, const Image& coverage) {
 }
 
 bool ShowsRegion(const Image& coverage) {
-  return std::any_of(coverage.pixels.begin(), coverage.pixels.end(),
-                     [](float m) { return m > 0.5f; });
+  return std::ranges::any_of(coverage.pixels, [](float m) { return m > 0.5f; });
 }
 
 std::unique_ptr<ViewStylizer> MakeMaskedStylizer(

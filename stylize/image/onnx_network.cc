@@ -65,8 +65,7 @@ FeatureMap Copied(const cv::Mat& blob, const std::string& name, const std::strin
          "expected is [1, channels, height, width]");
   FeatureMap map(blob.size[1], blob.size[2], blob.size[3]);
   std::memcpy(map.values.data(), blob.ptr<float>(), map.values.size() * sizeof(float));
-  if (!std::all_of(map.values.begin(), map.values.end(),
-                   [](float v) { return std::isfinite(v); }))
+  if (!std::ranges::all_of(map.values, [](float v) { return std::isfinite(v); }))
     Fail("its output \"" + name + "\" has values that are not finite numbers", path,
          "the weights may be damaged: copy the file again");
   return map;
