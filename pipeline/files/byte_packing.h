@@ -1,4 +1,5 @@
-// Packs values and arrays into a string, for checkpoints. Reading never goes beyond the end,
+// Packs values and arrays into a string, for checkpoints. Both directions have the same
+// functions, so that one list of members serves both. Reading never goes beyond the end,
 // although a hash has already been checked.
 #pragma once
 
@@ -19,17 +20,20 @@ class BytePacker {
   void Reserve(size_t bytes) { bytes_.reserve(bytes); }
 
   template <typename T>
-  void Value(const T& value) {
+  void Value(const T* value) {
     static_assert(std::is_arithmetic_v<T>);
-    bytes_.append(reinterpret_cast<const char*>(&value), sizeof value);
+    bytes_.append(reinterpret_cast<const char*>(value), sizeof *value);
   }
   // Any array of numbers with data() and size().
   template <typename Array>
-  void Values(const Array& array) {
-    Value(std::ssize(array));
-    bytes_.append(reinterpret_cast<const char*>(array.data()),
-                  sizeof(*array.data()) * static_cast<size_t>(array.size()));
+  void Values(const Array* array) {
+    const int64_t size = std::ssize(*array);
+    Value(&size);
+    bytes_.append(reinterpret_cast<const char*>(array->data()), sizeof(*array->data()) * size);
   }
+  // Whether an optional part follows: as the caller says here, by what is left when unpacking.
+  bool More(bool more) const { return more; }
+  bool ok() const { return true; }
   std::string Take() { return std::move(bytes_); }
 
  private:
@@ -74,6 +78,7 @@ class ByteUnpacker {
     Values(array, [array](int64_t n) { array->resize(n); });
   }
 
+  bool More(bool) const { return ok_ && !left_.empty(); }
   bool ok() const { return ok_; }
   bool at_end() const { return ok_ && left_.empty(); }
 
