@@ -42,15 +42,15 @@ class Error : public std::runtime_error {
 
 // The errors of one exit code: throw InputError("no pixels", path).
 template <ExitCode kCode>
-struct ErrorOf : Error {
-  explicit ErrorOf(std::string what, std::string where = "", std::string hint = "")
+struct CodedError : Error {
+  explicit CodedError(std::string what, std::string where = "", std::string hint = "")
       : Error(kCode, std::move(what), std::move(where), std::move(hint)) {}
 };
-using UsageError = ErrorOf<ExitCode::kUsage>;
-using InputError = ErrorOf<ExitCode::kInput>;
-using ProgramError = ErrorOf<ExitCode::kExternalProgram>;
-using ResourceError = ErrorOf<ExitCode::kResources>;
-using SceneError = ErrorOf<ExitCode::kScene>;
+using UsageError = CodedError<ExitCode::kUsage>;
+using InputError = CodedError<ExitCode::kInput>;
+using ProgramError = CodedError<ExitCode::kExternalProgram>;
+using ResourceError = CodedError<ExitCode::kResources>;
+using SceneError = CodedError<ExitCode::kScene>;
 
 // Texts, characters and integers in one text: Concat("frame ", 3) is "frame 3". Fractions do
 // not compile: they need a number of digits.

@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "kernels/base/error.h"
-#include "kernels/base/median.h"
+#include "kernels/base/quantile.h"
 
 namespace regrade {
 namespace {

@@ -55,20 +55,6 @@ fs::path PictureFolder(const fs::path& root) {
   return names.empty() ? fs::path() : root / names[0];
 }
 
-ColmapLens LensOf(const Camera& camera) {
-  switch (camera.lens) {
-    case LensModel::kPinhole:
-      return ColmapLens::kPinhole;
-    case LensModel::kOpenCv:
-      return ColmapLens::kOpenCv;
-    case LensModel::kFullOpenCv:
-      return ColmapLens::kFullOpenCv;
-    case LensModel::kFisheye:
-      return ColmapLens::kOpenCvFisheye;
-  }
-  return ColmapLens::kPinhole;
-}
-
 // A model with one camera per image and no points, with staged names.
 ColmapModel ModelFromTransforms(const CaptureSource& source,
                                 const std::vector<StagedPhoto>& photos,
@@ -90,7 +76,7 @@ ColmapModel ModelFromTransforms(const CaptureSource& source,
     const auto found = by_path.find(fs::weakly_canonical(folder / frame.file).string());
     if (found == by_path.end()) continue;  // left out at ingest, with a reason
     const uint32_t id = static_cast<uint32_t>(model.images.size()) + 1;
-    model.cameras.push_back({id, LensOf(frame.camera), frame.camera});
+    model.cameras.push_back({id, ColmapLensOf(frame.camera.lens), frame.camera});
     model.images.push_back({id, id, found->second->name, frame.camera.camera_from_world, {}});
   }
   return model;

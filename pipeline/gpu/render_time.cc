@@ -3,7 +3,7 @@
 
 #include "evaluate/image_quality.h"
 #include "kernels/base/clock.h"
-#include "kernels/base/median.h"
+#include "kernels/base/quantile.h"
 #include "kernels/field/cuda/device_rays.h"
 #include "pipeline/gpu/gpu_commands.h"
 

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "kernels/base/median.h"
+#include "kernels/base/quantile.h"
 
 namespace regrade {
 namespace {

@@ -8,7 +8,7 @@
 #include <optional>
 
 #include "kernels/base/error.h"
-#include "kernels/base/median.h"
+#include "kernels/base/quantile.h"
 
 namespace regrade {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "kernels/base/clock.h"
 #include "kernels/base/error.h"
-#include "kernels/base/median.h"
+#include "kernels/base/quantile.h"
 #include "reconstruct/colmap/colmap_output.h"
 #include "reconstruct/colmap/colmap_program.h"
 #include "reconstruct/colmap/colmap_strategies.h"

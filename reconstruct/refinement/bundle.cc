@@ -10,8 +10,9 @@
 
 #include "kernels/base/error.h"
 #include "kernels/base/hash.h"
-#include "kernels/base/median.h"
+#include "kernels/base/quantile.h"
 #include "kernels/base/random.h"
+#include "reconstruct/scene/scene_checks.h"
 
 namespace regrade {
 namespace {
@@ -27,14 +28,6 @@ Mat3d RotationOf(const double* angle_axis) {
 }
 
 Vec3d CenterOf(const std::array<double, 6>& pose) { return {pose[3], pose[4], pose[5]}; }
-
-// Largest distance between two centres.
-double ExtentOf(const std::vector<Vec3d>& centers) {
-  double extent = 0;
-  for (size_t i = 0; i < centers.size(); ++i)
-    for (size_t j = 0; j < i; ++j) extent = std::max(extent, Norm(centers[i] - centers[j]));
-  return extent;
-}
 
 double MedianDistance(const std::vector<ColmapPoint>& points, const Vec3d& from) {
   std::vector<double> distances;
@@ -63,7 +56,7 @@ Bundle MakeBundle(const ColmapModel& model) {
     numbers.push_back(HashOf(image.name));
   }
   bundle.focal.resize(model.cameras.size());
-  double extent = ExtentOf(centers);
+  double extent = LargestDistance(centers);
   if (extent < kLeastExtent * MedianDistance(model.points, mean)) extent = 0;
   const double scale = extent > 0 ? 1 / extent : 1;
   bundle.extent = extent > 0 ? 1 : 0;

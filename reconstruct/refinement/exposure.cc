@@ -8,7 +8,7 @@
 #include <numeric>
 
 #include "kernels/base/error.h"
-#include "kernels/base/median.h"
+#include "kernels/base/quantile.h"
 #include "reconstruct/refinement/exposure_model.h"
 
 namespace regrade {

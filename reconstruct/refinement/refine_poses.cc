@@ -8,7 +8,7 @@
 #include <cmath>
 
 #include "kernels/base/error.h"
-#include "kernels/base/median.h"
+#include "kernels/base/quantile.h"
 #include "reconstruct/refinement/bundle.h"
 
 namespace regrade {

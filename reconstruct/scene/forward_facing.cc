@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "kernels/base/error.h"
+#include "kernels/base/quantile.h"
 #include "kernels/scene/common_camera.h"
 
 namespace regrade {
@@ -31,9 +32,7 @@ double NearestDepth(const Capture& capture) {
       if (depth > 0) depths.push_back(depth);
     }
   if (depths.size() < 50) return 0;
-  const size_t k = static_cast<size_t>(kNearestTail * static_cast<double>(depths.size()));
-  std::nth_element(depths.begin(), depths.begin() + static_cast<long>(k), depths.end());
-  return depths[k];
+  return Quantile(std::move(depths), kNearestTail);
 }
 
 }  // namespace

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "kernels/base/error.h"
-#include "kernels/base/median.h"
+#include "kernels/base/quantile.h"
 
 namespace regrade {
 namespace {
@@ -88,13 +88,11 @@ double WorstPixelAspect(const Capture& capture) {
   return worst;
 }
 
-double CameraExtent(const Capture& capture) {
-  const std::vector<Vec3d> centers = Centers(capture);
-  double extent = 0;
-  for (size_t i = 0; i < centers.size(); ++i)
-    for (size_t j = i + 1; j < centers.size(); ++j)
-      extent = std::max(extent, Norm(centers[i] - centers[j]));
-  return extent;
+double LargestDistance(const std::vector<Vec3d>& points) {
+  double largest = 0;
+  for (size_t i = 0; i < points.size(); ++i)
+    for (size_t j = 0; j < i; ++j) largest = std::max(largest, Norm(points[i] - points[j]));
+  return largest;
 }
 
 SceneAssessment AssessScene(const Capture& capture, const SceneLimits& limits) {

@@ -21,8 +21,8 @@ Vec3d PointExtents(const Capture& capture);
 // Detects failed self-calibration, since sensors have square pixels.
 double WorstPixelAspect(const Capture& capture);
 
-// Largest distance between two camera centres, in world units.
-double CameraExtent(const Capture& capture);
+// Largest distance between two of these points; 0 for fewer.
+double LargestDistance(const std::vector<Vec3d>& points);
 
 struct SceneLimits {
   int min_views = 5;
