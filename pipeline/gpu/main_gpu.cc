@@ -70,7 +70,7 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "regrade_gpu: %s\n", error.what());
     return static_cast<int>(error.code());
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "regrade_gpu: a bug of ours: %s\n", error.what());
+    std::fprintf(stderr, "regrade_gpu: internal error: %s\n", error.what());
     return 1;
   }
 }
