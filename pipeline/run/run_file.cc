@@ -2,6 +2,7 @@
 
 #include "kernels/base/error.h"
 #include "kernels/base/hash.h"
+#include "pipeline/workspace/stage_runner.h"
 
 namespace regrade {
 namespace {
