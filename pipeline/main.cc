@@ -1,8 +1,13 @@
 // Entry point: runs the command, and turns its exceptions into a message and an exit code.
+#include <unistd.h>
+
 #include <algorithm>
 #include <cstdio>
+#include <cstdlib>
+#include <exception>
 #include <new>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "kernels/base/error.h"
@@ -47,6 +52,22 @@ void Dispatch(const Arguments& arguments, Console* console) {
       nearest.empty() ? "see `regrade help`" : "did you mean `regrade " + nearest + "`?");
 }
 
+// Memory may end in a thread of a parallel region, from which no exception leads out.
+[[noreturn]] void EndWithoutMemory() {
+  try {
+    if (const std::exception_ptr error = std::current_exception())
+      std::rethrow_exception(error);
+  } catch (const std::bad_alloc&) {
+    constexpr char kMessage[] =
+        "regrade: out of memory. To do: close other programs, or use --preset draft\n";
+    [[maybe_unused]] const ssize_t written =
+        ::write(STDERR_FILENO, kMessage, sizeof kMessage - 1);
+    ::_exit(static_cast<int>(ExitCode::kResources));
+  } catch (...) {
+  }
+  std::abort();
+}
+
 int Run(const Arguments& arguments) {
   const auto flags_end = std::ranges::find(arguments, "--");
   Console console(std::find(arguments.begin(), flags_end, "--json") != flags_end);
@@ -64,6 +85,12 @@ int Run(const Arguments& arguments) {
   } catch (const std::bad_alloc&) {
     code = ExitCode::kResources;
     console.Fail("out of memory. To do: close other programs, or use --preset draft", code);
+  } catch (const std::system_error& error) {  // of files and folders, too
+    code = ExitCode::kResources;
+    console.Fail(std::string(error.what()) +
+                     ". To do: check the folder, its disk, and the limits on open files and "
+                     "threads, then run the same command again",
+                 code);
   } catch (const std::exception& error) {
     console.Fail(std::string("internal error: ") + error.what() +
                      ". To do: please report it with the command and this line",
@@ -77,5 +104,6 @@ int Run(const Arguments& arguments) {
 
 int main(int argc, char** argv) {
   regrade::InstallSignalHandling();
+  std::set_terminate(regrade::EndWithoutMemory);
   return regrade::Run(regrade::Arguments(argv + std::min(argc, 1), argv + argc));
 }

@@ -14,18 +14,23 @@ struct StageEntry {
 };
 
 // The stages of a run, in order; each reads the results of earlier ones from the output folder.
+// The code of stage NAME begins in pipeline/stages/NAME_stage.cc.
 // clang-format off
 constexpr StageEntry kStages[] = {
     // photos -> poses/: cameras and points by COLMAP or as given (reconstruct/colmap)
     {"pose", PoseStage},
-    // poses/ -> field.npz: density and colour fitted to the photos (reconstruct/fit)
+    // poses/ -> field.npz: density and colour fitted to the photos (reconstruct/fit), whose
+    // exposure is undone where they are read (pipeline/capture/working_views.h); the loss is in
+    // kernels/field/render_ray.h
     {"reconstruct", ReconstructStage},
     // photos + style picture -> views_2d/: each photo styled in 2D (stylize/image)
     {"style_2d", Style2dStage},
     // field.npz + views_2d/ -> styled.npz: the field's colours mapped by a network of bounded
-    // Lipschitz constant (stylize/training, stylize/field)
+    // Lipschitz constant (stylize/training); its loss is in
+    // stylize/field/gradient_aggregation.h
     {"stylize", StylizeStage},
-    // field.npz + styled.npz -> frames/, films (kernels/field)
+    // field.npz + styled.npz -> frames/ (a ray in kernels/field/render_ray.h, the opacity of
+    // its samples in kernels/field/volume_rendering.h), films (pipeline/images/video_writer.h)
     {"render", RenderStage},
     // frames/ -> consistency and fidelity metrics, heatmaps/ (evaluate)
     {"evaluate", EvaluateStage},

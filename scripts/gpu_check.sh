@@ -6,15 +6,18 @@
 #   gpu_check.sh run DIR [OUT]              on the machine with the GPU, which needs only a CUDA driver; with
 #                                           compute-sanitizer on its PATH, small scenes run under its four tools;
 #                                           with ncu, the kernels of one small fit, restyling and frame are measured
+#   gpu_check.sh repeat DIR CAPTURE [OUT]   there, too: fits and restyles a capture that was packed with a style three
+#                                           times with --reproducible and three times without; prints seconds and the
+#                                           hashes of field, network, styled field and frames
 #
 # `run` prints the parity table, fits each packed capture (with the settings below for its name, or the last ones),
 # restyles the field with each recipe if the capture was packed with a style, and writes OUT/gpu_check.json (default
 # for OUT: DIR). REGRADE_RECIPES="standard" leaves out the paper's recipes.
-# Exit status: 0, or 1 if a tolerance is exceeded or a sanitizer finds an error.
+# Exit status: 0, or 1 if a tolerance is exceeded, a sanitizer finds an error or reproducible results differ.
 set -euo pipefail
 exec </dev/null
 
-usage() { sed -n '2,15s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"; }
+usage() { sed -n '2,19s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"; }
 [[ "${1:-}" != --help ]] || { usage; exit 0; }
 [[ $# -ge 2 ]] || { usage >&2; exit 2; }
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
@@ -25,9 +28,9 @@ bundle() {
   local build=$root/build/gpu-bundle
   cmake -S "$root" -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DREGRADE_CUDA=ON -DREGRADE_BENCHMARKS=OFF \
     -DCMAKE_CUDA_ARCHITECTURES="${REGRADE_CUDA_ARCH:-90}" >/dev/null
-  cmake --build "$build" --target regrade_gpu device_{parity,style,training}_test --parallel "$(nproc)"
-  cp "$build/pipeline/regrade_gpu" "$build"/tests/gpu/device_{parity,style,training}_test "${BASH_SOURCE[0]}" "$dir"
-  strip "$dir/regrade_gpu" "$dir"/device_{parity,style,training}_test
+  cmake --build "$build" --target regrade_gpu device_{film,parity,style,training}_test --parallel "$(nproc)"
+  cp "$build/pipeline/regrade_gpu" "$build"/tests/gpu/device_{film,parity,style,training}_test "${BASH_SOURCE[0]}" "$dir"
+  strip "$dir/regrade_gpu" "$dir"/device_{film,parity,style,training}_test
   ldd "$dir/regrade_gpu" | awk '/lib(zip|boost|bz2|crypto|gomp|z)[._]/ {print $3}' | xargs -I{} cp -L {} "$dir"
   [[ $# -eq 0 ]] || cp "$@" "$dir"
   du -sh "$dir"
@@ -79,7 +82,7 @@ run() {
   mkdir -p "$out"
   export LD_LIBRARY_PATH=$dir${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}
   : >"$out/parity.txt"
-  for test in device_{parity,style,training}_test; do
+  for test in device_{film,parity,style,training}_test; do
     # `hard_cases.py --measured OUT/*.xml` adds these numbers to RESULTS.md.
     "$dir/$test" --gtest_output="xml:$out/$test.xml" >>"$out/parity.txt" || status=1
   done
@@ -139,7 +142,34 @@ run() {
   return $status
 }
 
+# REGRADE_FIT: other options of the fit; REGRADE_STYLE: of the training.
+repeat() {
+  local capture=$1 out=${2:-$dir} option turn of hashes first record status=0
+  local fit=${REGRADE_FIT:-$(settings_of "$(basename "$capture" .npz)")}
+  mkdir -p "$out"
+  export LD_LIBRARY_PATH=$dir${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}
+  for option in --reproducible --no-reproducible; do
+    first=
+    for turn in 1 2 3; do
+      rm -rf "$out"/{field,network,styled}.npz "$out/frames"
+      # shellcheck disable=SC2086  # options are words
+      record=$("$dir/regrade_gpu" fit --capture "$capture" --field "$out/field.npz" $option $fit 2>/dev/null &&
+        "$dir/regrade_gpu" style --capture "$capture" --field "$out/field.npz" --network "$out/network.npz" $option \
+          --styled "$out/styled.npz" --frames "$out/frames" ${REGRADE_STYLE:-} 2>/dev/null) ||
+        { echo "$option $turn failed"; return 1; }
+      hashes="$(cat "$out"/frames/* | sha256sum | cut -c1-12) of frames,"
+      for of in field network styled; do hashes+=" $(sha256sum <"$out/$of.npz" | cut -c1-12) of $of"; done
+      echo "$option $turn: $hashes;" \
+        "$(grep -oE '"(seconds_fit|seconds_learn|psnr_heldout_db|psnr_to_2d_db|voxels)": ?[0-9.]+' <<<"$record" | tr '\n' ' ')"
+      [[ $option != --reproducible || ${first:=$hashes} == "$hashes" ]] || status=1
+    done
+  done
+  rm -rf "$out"/{field,network,styled}.npz "$out/frames"
+  return $status
+}
+
 case $1 in
+  repeat) shift 2; repeat "$@" ;;
   bundle) shift 2; bundle "$@" ;;
   run) shift 2; run "$@" ;;
   *) usage >&2; exit 2 ;;

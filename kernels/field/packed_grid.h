@@ -45,12 +45,16 @@ struct Probe {
 // A field in the packed layout, with the arrays derived from it.
 struct FastGrid {
   GridFrame frame;
+  CellGrid cells;                // of an adaptive field, which has no arrays over the box
+  Buffer<float> vertex_density;  // [N]: densities of an adaptive field, side by side
+  // [N], or empty: factors of the optimizer's rate of each voxel's density, in a fit.
+  Buffer<float> density_rate;
   Buffer<int32_t> links;            // [X, Y, Z]
   Buffer<Probe> probes;             // [X, Y, Z]
   Buffer<uint8_t> brick_distance;   // bricks of kBrick^3 cells, [X, Y, Z / kBrick rounded up]:
                                     // Chebyshev distance in bricks to the nearest brick with a
                                     // stored corner, 0 for such bricks
-  Buffer<int32_t> vertex_of_voxel;  // [N]
+  Buffer<int32_t> vertex_of_voxel;  // [N], of a uniform grid
   Buffer<float> records;            // [N, lanes]
   int basis = 9;
   Vec3f background{0, 0, 0};
@@ -63,11 +67,11 @@ struct FastGrid {
             (frame.resolution.z + kBrick - 1) / kBrick};
   }
   int lanes() const { return RecordLanes(basis); }
-  int64_t num_voxels() const { return vertex_of_voxel.size(); }
+  int64_t num_voxels() const { return records.size() / lanes(); }
 };
 
 FastGrid MakeFastGrid(const RadianceField& field);
-// Recomputes vertex_of_voxel, brick_distance and probes from links and records.
+// Recomputes the arrays that derive from links or cells and from records.
 void RefreshDerived(FastGrid* grid);
 RadianceField ToRadianceField(const FastGrid& grid);
 

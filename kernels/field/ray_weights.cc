@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "kernels/field/background_spheres.h"
+#include "kernels/field/render_cells.h"
 #include "kernels/field/trilinear.h"
 #include "kernels/field/volume_rendering.h"
 
@@ -38,13 +39,34 @@ void MarchSpheres(const Geometry& geometry, const Ray& world_ray, float stop, fl
   }
 }
 
+// The weights of the cells on a ray; returns the transmittance behind them.
+float MarchCellDensity(const Geometry& geometry, const Ray& ray, float stop, float near_clip,
+                       float min_weight, std::vector<WeightedSample>* out) {
+  static thread_local std::vector<CompositedCell<float>> samples;
+  const float transmittance =
+      MarchCells(geometry.frame, ViewOf(geometry.cells, geometry.frame.resolution),
+                 geometry.density.data(), ray, near_clip, stop, &samples);
+  for (const CompositedCell<float>& s : samples) {
+    const float w = s.transmittance_before * Opacity(s.tau);
+    if (w > min_weight) out->push_back({s.place.cell, s.place.fraction, w});
+  }
+  return transmittance;
+}
+
 // RenderRay without colours: the same arithmetic, so that weights agree bit for bit.
 float MarchDensity(const Geometry& geometry, const Ray& ray, const MarchOptions& options,
                    float near_clip, float min_weight, std::vector<WeightedSample>* out) {
+  CompositeState<float> state;
+  if (geometry.cells.on()) {
+    state.transmittance =
+        MarchCellDensity(geometry, ray, options.stop_transmittance, near_clip, min_weight, out);
+    if (geometry.spheres.on() && !(state.transmittance < options.stop_transmittance))
+      MarchSpheres(geometry, ray, options.stop_transmittance, min_weight, &state, out);
+    return state.transmittance;
+  }
   const GridFrame& frame = geometry.frame;
   const GridRay<float> march = ClipToGrid(frame, ray, near_clip, options.step);
   const float delta = options.step * march.world_per_voxel;
-  CompositeState<float> state;
   for (int64_t i = 0; i < march.num_steps; ++i) {
     const float t = march.t_begin + static_cast<float>(i) * options.step;
     const Cell<float> cell = LocateCell(frame, march.At(t));
@@ -65,7 +87,9 @@ float MarchDensity(const Geometry& geometry, const Ray& ray, const MarchOptions&
 void CornerPoints(const Geometry& geometry, const WeightedSample& sample, int32_t* point) {
   if (!sample.on_sphere()) {
     for (int k = 0; k < 8; ++k)
-      point[k] = geometry.links[CornerVertex(geometry.frame, sample.vertex, k)];
+      point[k] = geometry.cells.on()
+                     ? geometry.cells.corner[8 * int64_t{sample.vertex} + k]
+                     : geometry.links[CornerVertex(geometry.frame, sample.vertex, k)];
     return;
   }
   const SphereGeometry& spheres = geometry.spheres;

@@ -1,5 +1,5 @@
-// The capture as stages after "pose" use it: photos at working size without their gains,
-// cameras to match, and masks.
+// The capture as stages after "pose" use it: photos at working size with their exposure gains
+// undone, cameras to match, and masks.
 #pragma once
 
 #include <memory>

@@ -5,12 +5,43 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <latch>
+#include <string>
+#include <system_error>
+#include <thread>
+#include <vector>
 
 #include "kernels/base/error.h"
 #include "pipeline/run/resolve_settings.h"
 #include "pipeline/workspace/workspace.h"
 
 namespace regrade {
+namespace {
+
+// libgomp ends the program where it cannot start a thread, so its threads are started here,
+// after a trial with as many others. Throws Error(kResources).
+void StartThreads() {
+  const int count = omp_get_max_threads();
+  std::latch all_started(1);
+  std::vector<std::thread> trial;
+  std::string problem;
+  try {
+    while (static_cast<int>(trial.size()) + 1 < count)
+      trial.emplace_back([&all_started] { all_started.wait(); });
+  } catch (const std::system_error& error) {
+    problem = error.what();
+  }
+  all_started.count_down();
+  for (std::thread& thread : trial) thread.join();
+  if (!problem.empty())
+    throw Error(ExitCode::kResources,
+                "cannot start " + std::to_string(count) + " threads: " + problem, "regrade",
+                "lower --threads, or raise the limits on memory and processes");
+#pragma omp parallel
+  {}
+}
+
+}  // namespace
 
 bool AsksForHelp(const Arguments& arguments) {
   const auto flags_end = std::ranges::find(arguments, "--");
@@ -55,6 +86,7 @@ std::optional<Prepared> Prepare(const Command& command, const Arguments& argumen
   check_words();
   const int threads = static_cast<int>(options->Values().At("threads").AsInt());
   if (threads > 0) omp_set_num_threads(threads);
+  StartThreads();
   return prepared;
 }
 

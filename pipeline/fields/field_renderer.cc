@@ -1,5 +1,6 @@
 #include "pipeline/fields/field_renderer.h"
 
+#include "kernels/base/error.h"
 #include "kernels/field/cpu/render_view.h"
 #include "kernels/field/cuda/device_rays.h"
 
@@ -15,6 +16,23 @@ FieldRenderer::FieldRenderer(const RadianceField& field, Backend backend)
 RenderedView FieldRenderer::Render(const Camera& camera) const {
   return backend_ == Backend::kCuda ? RenderViewOnDevice(device_, camera, march_)
                                     : RenderView(grid_, camera, march_);
+}
+
+std::string FieldRenderer::PrepareFast() {
+  if (backend_ == Backend::kCpu) return "the CPU has no fast renderer";
+  try {
+    half_ = MakeHalfGrid(device_);
+  } catch (const Error& error) {
+    if (error.code() != ExitCode::kResources) throw;
+    return "the GPU has no memory for a copy of the field in half precision";
+  }
+  return half_.empty() ? "the fast renderer needs colours of degree 2" : "";
+}
+
+RenderedView FieldRenderer::RenderFast(const Camera& camera) const {
+  REGRADE_CHECK(!half_.empty() && camera.lens == LensModel::kPinhole);
+  return RenderViewOnDevice(device_, camera, {march_.step, kFastStop}, kFastOpacityStep,
+                            &half_);
 }
 
 }  // namespace regrade

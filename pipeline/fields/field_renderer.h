@@ -1,25 +1,45 @@
 // Prepares a field for many renders on the processor of the run.
 #pragma once
 
+#include <string>
+
 #include "kernels/device/backend.h"
 #include "kernels/field/cuda/device_grid.h"
+#include "kernels/field/cuda/half_grid.h"
 #include "kernels/field/packed_grid.h"
 #include "kernels/field/ray_march.h"
 #include "kernels/field/render.h"
 
 namespace regrade {
 
+// Of the fast renderer: the transmittance at which a ray ends, and the step of opacity at which
+// a colour is evaluated, see EQ(opacity-steps). Its errors and times are in COSTS.md.
+inline constexpr float kFastStop = 1e-3f, kFastOpacityStep = 1.0f / 128;
+inline constexpr char kFastRenderer[] =
+    "half precision, steps where opacity changes by 1/128; at least 55 dB from the exact "
+    "frames";
+
 class FieldRenderer {
  public:
   // Throws Error(kResources) where the GPU's memory is too small for the field.
   FieldRenderer(const RadianceField& field, Backend backend);
+  // Exact: single precision, every sample.
   RenderedView Render(const Camera& camera) const;
+
+  // Makes the fast renderer's copy of the field in half precision. Returns why there is none,
+  // or an empty text.
+  std::string PrepareFast();
+  // Frees that copy.
+  void ForgetFast() { half_ = {}; }
+  // Needs the copy, and a camera without distortion.
+  RenderedView RenderFast(const Camera& camera) const;
 
  private:
   Backend backend_;
   MarchOptions march_;
   FastGrid grid_;  // one of the two
   DeviceGrid device_;
+  HalfGrid half_;
 };
 
 }  // namespace regrade

@@ -1,7 +1,5 @@
 #include "pipeline/fields/fit_checkpoint.h"
 
-#include "pipeline/files/byte_packing.h"
-
 namespace regrade {
 namespace {
 
@@ -33,85 +31,100 @@ bool Consistent(const FastSpheres& spheres) {
   return true;
 }
 
-const FitCurvePoint& PointAt(const std::vector<FitCurvePoint>& curve, int64_t i) {
-  return curve[i];
-}
-// The next one, in the order of reading.
-FitCurvePoint& PointAt(std::vector<FitCurvePoint>& curve, int64_t) {
-  return curve.emplace_back();
+void PackTally(const FitTally& tally, BytePacker* packer) {
+  packer->Value(tally.window_error);
+  packer->Value(tally.tail_error);
+  for (const int64_t count :
+       {tally.window_rays, tally.tail_rays, tally.rays, tally.samples, tally.rejected_voxels})
+    packer->Value(count);
+  packer->Value(static_cast<int64_t>(tally.curve.size()));
+  for (const FitCurvePoint& point : tally.curve) {
+    packer->Value(point.rays);
+    packer->Value(point.seconds);
+    packer->Value(point.psnr_train_db);
+    packer->Value(point.step);
+  }
 }
 
-// Lists the members once for both directions. Returns whether there are background spheres.
-template <typename Visitor, typename State>
-bool Visit(Visitor* visit, State* state) {
-  auto& grid = state->grid;
-  visit->Value(&grid.basis);
-  visit->Value(&state->stage);
-  visit->Value(&state->step);
-  for (int a = 0; a < 3; ++a) {
-    visit->Value(&grid.frame.resolution[a]);
-    visit->Value(&grid.frame.center[a]);
-    visit->Value(&grid.frame.radius[a]);
-    visit->Value(&grid.background[a]);
+void UnpackTally(ByteUnpacker* unpacker, FitTally* tally) {
+  unpacker->Value(&tally->window_error);
+  unpacker->Value(&tally->tail_error);
+  for (int64_t* count : {&tally->window_rays, &tally->tail_rays, &tally->rays, &tally->samples,
+                         &tally->rejected_voxels})
+    unpacker->Value(count);
+  int64_t points = 0;
+  unpacker->Value(&points);
+  for (int64_t i = 0; i < points && unpacker->ok(); ++i) {
+    FitCurvePoint& point = tally->curve.emplace_back();
+    unpacker->Value(&point.rays);
+    unpacker->Value(&point.seconds);
+    unpacker->Value(&point.psnr_train_db);
+    unpacker->Value(&point.step);
   }
-  visit->Value(&grid.near_clip);
-  auto& tally = state->tally;
-  visit->Value(&tally.window_error);
-  visit->Value(&tally.tail_error);
-  for (auto* count : {&tally.window_rays, &tally.tail_rays, &tally.rays, &tally.samples,
-                      &tally.rejected_voxels})
-    visit->Value(count);
-  int64_t points = std::ssize(tally.curve);
-  visit->Value(&points);
-  for (int64_t i = 0; i < points && visit->ok(); ++i) {
-    auto& point = PointAt(tally.curve, i);
-    visit->Value(&point.rays);
-    visit->Value(&point.seconds);
-    visit->Value(&point.psnr_train_db);
-    visit->Value(&point.step);
-  }
-  visit->Values(&grid.links);
-  visit->Values(&grid.records);
-  visit->Values(&state->second_moment);
-  if (!visit->More(grid.spheres.on())) return false;
-  visit->Value(&grid.spheres.layers);
-  visit->Value(&grid.spheres.resolution);
-  visit->Values(&grid.spheres.links);
-  visit->Values(&grid.spheres.texels);
-  visit->Values(&state->sphere_moment);
-  return true;
 }
 
 }  // namespace
 
-std::string PackFitState(const FitState& state, const std::string& note) {
+BytePacker PackFitState(const FitState& state, const std::string& note) {
   const FastGrid& grid = state.grid;
   BytePacker packer;
-  const size_t head =
-      256 + note.size() + sizeof(FitCurvePoint) * state.tally.curve.size();  // upper bound
-  packer.Reserve(head + sizeof(int32_t) * static_cast<size_t>(grid.links.size()) +
-                 sizeof(float) * static_cast<size_t>(
-                                     grid.records.size() + state.second_moment.size() +
-                                     grid.spheres.links.size() + grid.spheres.texels.size() +
-                                     state.sphere_moment.size()));
-  packer.Value(&kVersion);
-  packer.Values(&note);
-  Visit(&packer, &state);
-  return packer.Take();
+  packer.Value(kVersion);
+  packer.Values(note);
+  packer.Value(grid.basis);
+  packer.Value(state.stage);
+  packer.Value(state.step);
+  for (int a = 0; a < 3; ++a) {
+    packer.Value(grid.frame.resolution[a]);
+    packer.Value(grid.frame.center[a]);
+    packer.Value(grid.frame.radius[a]);
+    packer.Value(grid.background[a]);
+  }
+  packer.Value(grid.near_clip);
+  PackTally(state.tally, &packer);
+  packer.Reference(grid.links);
+  packer.Reference(grid.records);
+  packer.Reference(state.second_moment);
+  if (!grid.spheres.on()) return packer;
+  packer.Value(grid.spheres.layers);
+  packer.Value(grid.spheres.resolution);
+  packer.Reference(grid.spheres.links);
+  packer.Reference(grid.spheres.texels);
+  packer.Reference(state.sphere_moment);
+  return packer;
 }
 
 std::optional<FitState> UnpackFitState(std::string_view bytes, std::string* note) {
   ByteUnpacker unpacker(bytes);
+  FitState state;
+  FastGrid& grid = state.grid;
   uint32_t version = 0;
   unpacker.Value(&version);
   if (version != kVersion) return std::nullopt;
   std::string unwanted;
   unpacker.Values(note != nullptr ? note : &unwanted);
-  FitState state;
-  const bool spheres = Visit(&unpacker, &state);
-  FastGrid& grid = state.grid;
-  if (!unpacker.at_end() || !Consistent(grid) || (spheres && !Consistent(grid.spheres)))
-    return std::nullopt;
+  unpacker.Value(&grid.basis);
+  unpacker.Value(&state.stage);
+  unpacker.Value(&state.step);
+  for (int a = 0; a < 3; ++a) {
+    unpacker.Value(&grid.frame.resolution[a]);
+    unpacker.Value(&grid.frame.center[a]);
+    unpacker.Value(&grid.frame.radius[a]);
+    unpacker.Value(&grid.background[a]);
+  }
+  unpacker.Value(&grid.near_clip);
+  UnpackTally(&unpacker, &state.tally);
+  unpacker.Values(&grid.links);
+  unpacker.Values(&grid.records);
+  unpacker.Values(&state.second_moment);
+  if (unpacker.ok() && !unpacker.at_end()) {
+    unpacker.Value(&grid.spheres.layers);
+    unpacker.Value(&grid.spheres.resolution);
+    unpacker.Values(&grid.spheres.links);
+    unpacker.Values(&grid.spheres.texels);
+    unpacker.Values(&state.sphere_moment);
+    if (!Consistent(grid.spheres)) return std::nullopt;
+  }
+  if (!unpacker.at_end() || !Consistent(grid)) return std::nullopt;
   RefreshDerived(&grid);
   return state;
 }

@@ -11,7 +11,7 @@ constexpr uint32_t kVersion = 2;
 template <typename Visitor, typename State>
 void Visit(Visitor* visit, State* state) {
   auto& network = state->network;
-  visit->Values(&network.activation);
+  visit->Text(&network.activation);
   visit->Value(&network.omega);
   visit->Value(&network.sh_scale);
   visit->Value(&network.position_scale);
@@ -33,23 +33,49 @@ void Visit(Visitor* visit, State* state) {
   visit->Values(&state->history.bounds);
 }
 
+struct Packing {
+  BytePacker packer;
+  template <typename T>
+  void Value(const T* value) {
+    packer.Value(*value);
+  }
+  template <typename T>
+  void Values(const T* values) {
+    packer.Values(*values);
+  }
+  void Text(const std::string* text) { packer.Values(*text); }
+};
+
+struct Unpacking {
+  ByteUnpacker unpacker;
+  template <typename T>
+  void Value(T* value) {
+    unpacker.Value(value);
+  }
+  template <typename T>
+  void Values(T* values) {
+    unpacker.Values(values);
+  }
+  void Text(std::string* text) { unpacker.Values(text); }
+};
+
 }  // namespace
 
 std::string PackTrainingState(const TrainingState& state) {
-  BytePacker packer;
-  packer.Value(&kVersion);
-  Visit(&packer, &state);
-  return packer.Take();
+  Packing packing;
+  packing.packer.Value(kVersion);
+  Visit(&packing, &state);
+  return packing.packer.Joined();
 }
 
 std::optional<TrainingState> UnpackTrainingState(std::string_view bytes) {
-  ByteUnpacker unpacker(bytes);
+  Unpacking unpacking{ByteUnpacker(bytes)};
   uint32_t version = 0;
-  unpacker.Value(&version);
+  unpacking.Value(&version);
   if (version != kVersion) return std::nullopt;
   TrainingState state;
-  Visit(&unpacker, &state);
-  if (!unpacker.at_end()) return std::nullopt;
+  Visit(&unpacking, &state);
+  if (!unpacking.unpacker.at_end()) return std::nullopt;
   return state;
 }
 

@@ -90,14 +90,14 @@ void AtomicFile::Commit() {
 }
 
 void WriteFileAtomically(const std::string& path, std::string_view bytes) {
-  WriteFileAtomically(path, {}, bytes);
+  WriteFileAtomically(path, std::vector<std::string_view>{bytes});
 }
 
-void WriteFileAtomically(const std::string& path, std::string_view head,
-                         std::string_view bytes) {
-  AtomicFile file(path, head.size() + bytes.size());
-  file.Write(head.data(), head.size());
-  file.Write(bytes.data(), bytes.size());
+void WriteFileAtomically(const std::string& path, const std::vector<std::string_view>& pieces) {
+  uint64_t size = 0;
+  for (const std::string_view piece : pieces) size += piece.size();
+  AtomicFile file(path, size);
+  for (const std::string_view piece : pieces) file.Write(piece.data(), piece.size());
   file.Commit();
 }
 

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "kernels/base/file_descriptor.h"
 
@@ -39,9 +40,8 @@ class AtomicFile {
 
 // Whole contents at once, through an AtomicFile.
 void WriteFileAtomically(const std::string& path, std::string_view bytes);
-// `head` followed by `bytes`, without a copy that joins them.
-void WriteFileAtomically(const std::string& path, std::string_view head,
-                         std::string_view bytes);
+// One piece after the other, without a copy that joins them.
+void WriteFileAtomically(const std::string& path, const std::vector<std::string_view>& pieces);
 
 // Makes a finished file durable. Throws Error(kResources).
 void SyncFile(const std::string& path);

@@ -1,6 +1,5 @@
-// Packs values and arrays into a string, for checkpoints. Both directions have the same
-// functions, so that one list of members serves both. Reading never goes beyond the end,
-// although a hash has already been checked.
+// Packs values and arrays for checkpoints. Reading never goes beyond the end, although a hash
+// has already been checked.
 #pragma once
 
 #include <cstdint>
@@ -8,6 +7,7 @@
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "kernels/base/buffer.h"
@@ -16,28 +16,48 @@ namespace regrade {
 
 class BytePacker {
  public:
-  // Without it, the growing string needs up to three times its final size.
-  void Reserve(size_t bytes) { bytes_.reserve(bytes); }
-
   template <typename T>
-  void Value(const T* value) {
+  void Value(const T& value) {
     static_assert(std::is_arithmetic_v<T>);
-    bytes_.append(reinterpret_cast<const char*>(value), sizeof *value);
+    bytes_.append(reinterpret_cast<const char*>(&value), sizeof value);
   }
   // Any array of numbers with data() and size().
   template <typename Array>
-  void Values(const Array* array) {
-    const int64_t size = std::ssize(*array);
-    Value(&size);
-    bytes_.append(reinterpret_cast<const char*>(array->data()), sizeof(*array->data()) * size);
+  void Values(const Array& array) {
+    Value(static_cast<int64_t>(array.size()));
+    bytes_.append(reinterpret_cast<const char*>(array.data()),
+                  sizeof(*array.data()) * static_cast<size_t>(array.size()));
   }
-  // Whether an optional part follows: as the caller says here, by what is left when unpacking.
-  bool More(bool more) const { return more; }
-  bool ok() const { return true; }
-  std::string Take() { return std::move(bytes_); }
+  // The same bytes without a copy: the array must not change until they have been used.
+  template <typename Array>
+  void Reference(const Array& array) {
+    Value(static_cast<int64_t>(array.size()));
+    references_.push_back({bytes_.size(),
+                           {reinterpret_cast<const char*>(array.data()),
+                            sizeof(*array.data()) * static_cast<size_t>(array.size())}});
+  }
+
+  // All bytes in their order, in this packer and in the arrays that it refers to.
+  std::vector<std::string_view> Pieces() const {
+    std::vector<std::string_view> pieces;
+    size_t begin = 0;
+    for (const auto& [end, array] : references_) {
+      pieces.push_back(std::string_view(bytes_).substr(begin, end - begin));
+      pieces.push_back(array);
+      begin = end;
+    }
+    pieces.push_back(std::string_view(bytes_).substr(begin));
+    return pieces;
+  }
+  std::string Joined() const {
+    std::string all;
+    for (const std::string_view piece : Pieces()) all += piece;
+    return all;
+  }
 
  private:
   std::string bytes_;
+  std::vector<std::pair<size_t, std::string_view>> references_;  // after so many of bytes_
 };
 
 // After a read beyond the end, all values read as zero or empty and ok() is false.
@@ -68,17 +88,16 @@ class ByteUnpacker {
   }
   template <typename T>
   void Values(std::vector<T>* array) {
-    Values(array, [array](int64_t n) { array->resize(n); });
+    Values(array, [array](int64_t n) { array->resize(static_cast<size_t>(n)); });
   }
   template <typename T>
   void Values(Buffer<T>* array) {
     Values(array, [array](int64_t n) { array->Resize(n); });
   }
   void Values(std::string* array) {
-    Values(array, [array](int64_t n) { array->resize(n); });
+    Values(array, [array](int64_t n) { array->resize(static_cast<size_t>(n)); });
   }
 
-  bool More(bool) const { return ok_ && !left_.empty(); }
   bool ok() const { return ok_; }
   bool at_end() const { return ok_ && left_.empty(); }
 

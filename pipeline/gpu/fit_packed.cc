@@ -5,6 +5,7 @@
 #include "kernels/base/clock.h"
 #include "kernels/field/packed_grid.h"
 #include "kernels/field/render.h"
+#include "kernels/image/detail_kept.h"
 #include "pipeline/capture/packed_capture.h"
 #include "pipeline/fields/field_file.h"
 #include "pipeline/files/json_file.h"
@@ -22,21 +23,28 @@ double Mean(const std::vector<double>& values) {
 
 struct HeldOut {
   double psnr = 0, ssim = 0;
-  double transmittance = 0;  // what the field lets through, of all that is seen
+  JsonValue detail_kept, detail_error;  // null without a view that has fine detail
+  double transmittance = 0;             // what the field lets through, of all that is seen
 };
 
 HeldOut MeasureHeldOut(FitEngine* engine, const PackedCapture& capture,
                        const MarchOptions& march) {
-  std::vector<double> psnr, ssim, transmittance;
+  std::vector<double> psnr, ssim, kept, error, transmittance;
   for (const PackedView& view : capture.views) {
     if (!view.held_out) continue;
     const RenderedView seen = engine->Render(view.camera, march);
     if (const auto value = Psnr(seen.color, view.photo)) psnr.push_back(*value);
     if (const auto value = Ssim(seen.color, view.photo)) ssim.push_back(*value);
+    const FineDetail detail = MeasureFineDetail(seen.color, view.photo);
+    if (detail.kept) kept.push_back(*detail.kept);
+    if (detail.levels) error.push_back(*detail.levels);
     transmittance.insert(transmittance.end(), seen.transmittance.pixels.begin(),
                          seen.transmittance.pixels.end());
   }
-  return {Mean(psnr), Mean(ssim), Mean(transmittance)};
+  const auto mean = [](const std::vector<double>& values) {
+    return values.empty() ? JsonValue() : JsonValue(Mean(values));
+  };
+  return {Mean(psnr), Mean(ssim), mean(kept), mean(error), Mean(transmittance)};
 }
 
 }  // namespace
@@ -66,7 +74,8 @@ void FitPacked(const FitPackedOptions& settings, const FitOptions& options) {
   hooks.measure = [&](FitEngine* engine) {
     const double seconds = ClockSeconds() - fit_start;
     measured = MeasureHeldOut(engine, capture, {options.step});
-    stages.push_back(JsonValue::Array{seconds, measured.psnr});
+    stages.push_back(
+        JsonValue::Array{seconds, measured.psnr, measured.ssim, measured.detail_kept});
   };
   const FitResult fit = FitField(views, capture.scene.box, options, hooks, backend);
   const double fit_seconds = ClockSeconds() - fit_start;
@@ -98,6 +107,8 @@ void FitPacked(const FitPackedOptions& settings, const FitOptions& options) {
                         {"psnr_train_db", fit.psnr_train_db},
                         {"psnr_heldout_db", measured.psnr},
                         {"ssim_heldout", measured.ssim},
+                        {"detail_kept_heldout", measured.detail_kept},
+                        {"detail_error_heldout", measured.detail_error},
                         {"transmittance_heldout", measured.transmittance},
                         {"render", std::move(render)},
                         {"curve_heldout", std::move(stages)},

@@ -16,28 +16,36 @@ struct FitPackedOptions {
   std::string capture;  // packed
   std::string field;    // .npz to write; empty: none
   std::string device = "cuda";
+  bool reproducible = false;  // see RunOptions
 
   template <typename Bind>
   void Describe(Bind& bind) {
     bind("capture", capture, {.help = "a file of `regrade pack`"});
     bind("field", field, {.help = "the .npz file that the field is written to"});
     bind("device", device, {.help = "where arithmetic runs", .choices = "cpu|cuda"});
+    bind("reproducible", reproducible, {.help = "two fits give the same bytes"});
   }
 };
 
 struct StylePackedOptions {
   std::string capture;  // packed with a style
   std::string field;    // .npz
+  std::string styled;   // .npz to write; empty: none
   std::string frames;   // folder for pictures; empty: none
+  std::string network;  // likewise
   std::string device = "cuda";
+  bool reproducible = false;  // see RunOptions
 
   template <typename Bind>
   void Describe(Bind& bind) {
     bind("capture", capture, {.help = "a file of `regrade pack --style`"});
     bind("field", field, {.help = "the .npz file that `regrade_gpu fit --field` wrote"});
+    bind("styled", styled, {.help = "the .npz file that the restyled field is written to"});
     bind("frames", frames,
          {.help = "a folder for .ppm pictures of the held-out views before and after"});
+    bind("network", network, {.help = "the .npz file that the network is written to"});
     bind("device", device, {.help = "where arithmetic runs", .choices = "cpu|cuda"});
+    bind("reproducible", reproducible, {.help = "two trainings give the same bytes"});
   }
 };
 
@@ -45,12 +53,21 @@ struct RenderPackedOptions {
   std::string capture;  // packed
   std::string field;    // .npz
   std::string frames;   // folder for pictures; empty: none
+  bool compare = false;
+  int path_frames = 24;
 
   template <typename Bind>
   void Describe(Bind& bind) {
     bind("capture", capture, {.help = "a file of `regrade pack`, for its held-out cameras"});
     bind("field", field, {.help = "an .npz file with svox2's layout"});
-    bind("frames", frames, {.help = "a folder for .ppm pictures of the held-out views"});
+    bind("frames", frames,
+         {.help = "a folder for .ppm pictures of the held-out views; with --compare, of the "
+                  "film by the exact and by the fast renderer"});
+    bind("compare", compare,
+         {.help = "compares the film's fast renderer and its variants with the exact one, on "
+                  "all training views and frames of a film"});
+    bind("path-frames", path_frames,
+         {.unit = "frames", .help = "length of the film to compare", .min = 2, .max = 10000});
   }
 };
 
@@ -60,13 +77,20 @@ double RenderMilliseconds(const DeviceGrid& grid, const PackedCapture& capture,
                           const MarchOptions& march, float opacity_step = 0,
                           const HalfGrid* half = nullptr);
 // The same for a row of settings of the march and of opacity_step: milliseconds, and the error
-// against the first in dB.
+// against the first in dB, PSNR, SSIM and detail kept to the photos.
 JsonValue RenderCosts(const DeviceGrid& grid, const PackedCapture& capture, float step);
 
 // The held-out views, exact, as pictures NAME_0.ppm, NAME_1.ppm, ...
 void RenderHeldOut(const DeviceGrid& grid, const PackedCapture& capture,
                    const MarchOptions& march, const std::string& folder,
                    const std::string& name);
+
+// Writes an 8-bit picture. Throws Error(kResources).
+void WritePpm(const std::string& path, const Image& image);
+
+// The film's fast renderer and its variants against the exact one (see fast_variants.cc).
+JsonValue CompareRenderers(const DeviceGrid& grid, const PackedCapture& capture, float step,
+                           const RenderPackedOptions& settings);
 
 // Prints one line of JSON: what frames of a field cost at which accuracy.
 void RenderPacked(const RenderPackedOptions& settings);
@@ -75,8 +99,8 @@ void RenderPacked(const RenderPackedOptions& settings);
 // learned, device memory beyond the field.
 void StylePacked(const StylePackedOptions& settings, const TrainNetworkOptions& options);
 
-// Prints one line of JSON: times, counts, PSNR and SSIM of the held-out views, milliseconds a
-// rendered view.
+// Prints one line of JSON: times, counts, PSNR, SSIM and fine detail of the held-out views,
+// milliseconds a rendered view. `curve_heldout` has [seconds, PSNR, SSIM, detail kept].
 void FitPacked(const FitPackedOptions& settings, const FitOptions& options);
 
 }  // namespace regrade

@@ -13,7 +13,6 @@
 #include "pipeline/gpu/gpu_commands.h"
 
 namespace regrade {
-namespace {
 
 void WritePpm(const std::string& path, const Image& image) {
   std::ofstream file(path, std::ios::binary);
@@ -22,8 +21,6 @@ void WritePpm(const std::string& path, const Image& image) {
     file.put(static_cast<char>(std::lround(255 * std::clamp(value, 0.0f, 1.0f))));
   if (!file) throw ResourceError("cannot be written", path, "is the disk full?");
 }
-
-}  // namespace
 
 void RenderHeldOut(const DeviceGrid& grid, const PackedCapture& capture,
                    const MarchOptions& march, const std::string& folder,
@@ -40,13 +37,15 @@ void RenderPacked(const RenderPackedOptions& settings) {
   const PackedCapture capture = ReadPackedCapture(settings.capture);
   const StoredField stored = ReadFieldFile(settings.field);
   const DeviceGrid grid = UploadGrid(MakeFastGrid(stored.field));
-  if (!settings.frames.empty())
+  if (!settings.frames.empty() && !settings.compare)
     RenderHeldOut(grid, capture, {stored.field.step}, settings.frames, "frame");
-  const JsonValue record =
-      JsonValue::Object{{"capture", settings.capture},
-                        {"device", ReadDeviceStatus().name},
-                        {"voxels", stored.field.geometry->num_voxels()},
-                        {"render", RenderCosts(grid, capture, stored.field.step)}};
+  JsonValue record = JsonValue::Object{{"capture", settings.capture},
+                                       {"device", ReadDeviceStatus().name},
+                                       {"voxels", stored.field.geometry->num_voxels()}};
+  if (settings.compare)
+    record["compare"] = CompareRenderers(grid, capture, stored.field.step, settings);
+  else
+    record["render"] = RenderCosts(grid, capture, stored.field.step);
   std::printf("%s\n", DumpJson(record, -1).c_str());
   std::fflush(stdout);
 }

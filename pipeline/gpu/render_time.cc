@@ -5,6 +5,7 @@
 #include "kernels/base/clock.h"
 #include "kernels/base/quantile.h"
 #include "kernels/field/cuda/device_rays.h"
+#include "kernels/image/detail_kept.h"
 #include "pipeline/gpu/gpu_commands.h"
 
 namespace regrade {
@@ -51,7 +52,7 @@ JsonValue RenderCosts(const DeviceGrid& grid, const PackedCapture& capture, floa
   for (const Setting& setting : settings) {
     const MarchOptions march{setting.step, setting.stop};
     const HalfGrid* halves = setting.half ? &half : nullptr;
-    std::vector<double> against_exact, against_photo;
+    std::vector<double> against_exact, against_photo, ssim, detail_kept;
     size_t index = 0;
     for (const PackedView& view : capture.views) {
       if (!view.held_out) continue;
@@ -60,6 +61,8 @@ JsonValue RenderCosts(const DeviceGrid& grid, const PackedCapture& capture, floa
       if (rows.empty()) exact.push_back(image);
       against_exact.push_back(Psnr(image, exact[index++]).value_or(0));
       against_photo.push_back(Psnr(image, view.photo).value_or(0));
+      ssim.push_back(Ssim(image, view.photo).value_or(0));
+      detail_kept.push_back(MeasureFineDetail(image, view.photo).kept.value_or(0));
     }
     rows.push_back(JsonValue::Object{
         {"stop", setting.stop},
@@ -68,7 +71,9 @@ JsonValue RenderCosts(const DeviceGrid& grid, const PackedCapture& capture, floa
         {"half", setting.half},
         {"ms", RenderMilliseconds(grid, capture, march, setting.opacity_step, halves)},
         {"db_against_first", rows.empty() ? 0.0 : Median(against_exact)},
-        {"db_against_photos", Median(against_photo)}});
+        {"db_against_photos", Median(against_photo)},
+        {"ssim_against_photos", Median(ssim)},
+        {"detail_kept_against_photos", Median(detail_kept)}});
   }
   return rows;
 }

@@ -8,6 +8,7 @@
 #include "kernels/field/cuda/device_rays.h"
 #include "kernels/field/packed_grid.h"
 #include "pipeline/fields/field_file.h"
+#include "pipeline/fields/network_file.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/gpu/gpu_commands.h"
 #include "stylize/image/color_transfer.h"
@@ -97,6 +98,11 @@ void StylePacked(const StylePackedOptions& settings, const TrainNetworkOptions& 
   };
   const RestyledField restyled = Restyle(std::move(stored.field), targets, request, hooks);
   const TrainNetworkResult& trained = restyled.trained;
+  if (!settings.network.empty())
+    WriteNetworkFile(settings.network,
+                     {trained.network, trained.k_est, restyled.styled.background});
+  if (!settings.styled.empty())
+    WriteFieldFile(settings.styled, {restyled.styled, stored.field_from_world, stored.ndc});
   record["seconds_start_and_first_steps"] = seconds_start;
   record["seconds_other_steps"] = seconds_steps;
   if (on_device) MeasureFrames(restyled.styled, capture, settings.frames, &record);

@@ -12,10 +12,7 @@ constexpr int kLeastCapability = 75;  // of this build: Turing and later
 
 Backend ChooseBackend(const std::string& device, bool reproducible) {
   if (device == "cpu") return Backend::kCpu;
-  if (device == "cuda" && reproducible)
-    throw UsageError("the GPU's sums have no fixed order", "--device cuda --reproducible",
-                     "use --device cpu, or leave out --reproducible");
-  if (reproducible) return Backend::kCpu;
+  if (reproducible && device == "auto") return Backend::kCpu;
   const DeviceStatus status = ReadDeviceStatus();
   if (status.found && status.compute_capability >= kLeastCapability) return Backend::kCuda;
   if (device == "cuda")

@@ -8,8 +8,8 @@
 namespace regrade {
 
 // `device`: "auto", "cpu" or "cuda". auto chooses the GPU where there is one, and the CPU for a
-// reproducible run, because the GPU's sums have no fixed order. Throws Error(kResources) for
-// "cuda" without a GPU, Error(kUsage) for "cuda" together with `reproducible`.
+// reproducible run, because processors round differently: its bytes must not depend on whether
+// there is a GPU. Throws Error(kResources) for "cuda" without a GPU.
 Backend ChooseBackend(const std::string& device, bool reproducible);
 
 // "cpu", or the GPU's name.

@@ -55,9 +55,12 @@ struct RunOptions {
           .help = "limit on planned memory, of 10^9 bytes; 0 takes what is free",
           .min = 0,
           .max = 1e6});
-    bind("reproducible", reproducible,
-         {.help = "gives the same bytes for any number of threads and any interruption, from "
-                  "finished poses on; slower"});
+    bind(
+        "reproducible", reproducible,
+        {.help = "gives the same bytes for any number of threads and any interruption, from "
+                 "finished poses on; slower. --device auto then means the CPU; with --device "
+                 "cuda --fit-exact-sums and --style-exact-sums are on, and the bytes are those "
+                 "of this card and build"});
   }
 };
 

@@ -1,6 +1,8 @@
 #include "pipeline/report/costs.h"
 
 #include <algorithm>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "pipeline/report/html_table.h"
@@ -49,7 +51,21 @@ std::string SecondsHtml(const Metric& seconds, const Metric& spread) {
          (spread.value ? " <span class=soft>±" + MetricHtml(spread, decimals) + "</span>" : "");
 }
 
-std::string RowHtml(const CostRow& row) {
+// What stands beside a PSNR to photos.
+constexpr std::pair<const char*, std::optional<double> CostRow::*> kBeside[] = {
+    {"SSIM", &CostRow::ssim},
+    {"detail kept", &CostRow::detail_kept},
+    {"LPIPS", &CostRow::lpips}};
+
+bool Measured(const Rows& rows, std::optional<double> CostRow::*member) {
+  return std::any_of(rows.begin(), rows.end(),
+                     [member](const CostRow* row) { return (row->*member).has_value(); });
+}
+
+std::string RowHtml(const CostRow& row, const Rows& rows) {
+  std::string beside;
+  for (const auto& [name, member] : kBeside)
+    if (Measured(rows, member)) beside += Number(Metric(row.*member), 3);
   const std::string comparison = row.on_pareto_front ? "<span class=on>Pareto front</span>"
                                  : row.dominated_by.empty()
                                      ? ""
@@ -60,19 +76,21 @@ std::string RowHtml(const CostRow& row) {
          "<td class=file>" + EscapeHtml(row.setting) + "<td class=n>" +
          SecondsHtml(row.seconds, row.seconds_spread) + "<td class=n>" +
          SecondsHtml(row.cpu_seconds, row.cpu_spread) + "<td class=n>" +
-         MetricHtml(row.accuracy, 3) + "<td class=n>" + MetricHtml(row.error, 3) +
+         MetricHtml(row.accuracy, 3) + "<td class=n>" + MetricHtml(row.error, 3) + beside +
          "<td class=w>" + comparison + "</tr>";
 }
 
 std::string BenchmarkHtml(const Rows& rows) {
-  std::string body;
-  for (const CostRow* row : rows) body += RowHtml(*row);
+  std::string body, beside;
+  for (const auto& [name, member] : kBeside)
+    if (Measured(rows, member)) beside += std::string("<th class=n>") + name;
+  for (const CostRow* row : rows) body += RowHtml(*row, rows);
   return "<h3>" + EscapeHtml(rows[0]->benchmark) +
          "</h3><p>Accuracy: " + EscapeHtml(rows[0]->measure) + ", " +
          EscapeHtml(rows[0]->unit) + ".</p>" + ParetoFrontHtml(rows) +
          "<div class=scroll><table><thead><tr><th>parameter<th>value<th class=n>time, s<th "
-         "class=n>CPU time, s<th class=n>accuracy<th class=n>error<th></tr></thead><tbody>" +
-         body + "</tbody></table></div>";
+         "class=n>CPU time, s<th class=n>accuracy<th class=n>error" +
+         beside + "<th></tr></thead><tbody>" + body + "</tbody></table></div>";
 }
 
 }  // namespace

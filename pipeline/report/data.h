@@ -34,6 +34,8 @@ struct CostRow {
   Metric error;                  // against the parameter's accurate end; positive is worse
   bool on_pareto_front = false;  // nothing is as accurate in less time
   std::string dominated_by;      // a row that is better beyond the spreads; may be empty
+  // Medians, where accuracy is a PSNR to photos.
+  std::optional<double> ssim = {}, detail_kept = {}, lpips = {};
 
   template <typename Visit>
   void Describe(Visit& visit) {
@@ -52,6 +54,9 @@ struct CostRow {
     visit("error", error);
     visit("on_pareto_front", on_pareto_front);
     visit("dominated_by", dominated_by, {.optional = true});
+    visit("ssim", ssim);
+    visit("detail_kept", detail_kept);
+    visit("lpips", lpips);
   }
 };
 

@@ -39,6 +39,8 @@ struct PoseStageReport {
   // Of COLMAP: its version, the strategy that succeeded, its camera model. Empty for given
   // poses.
   std::string colmap, strategy, lens;
+  std::vector<std::string> attempts;  // COLMAP's runs, each with its outcome
+  std::vector<std::string> notices;   // for the user: for example that the lens was simplified
   std::optional<int> photo_masks;
   int registered = 0;
   int64_t points = 0;
@@ -52,6 +54,8 @@ struct PoseStageReport {
     visit("colmap", colmap, {.label = "COLMAP", .optional = true});
     visit("strategy", strategy, {.label = "strategy", .optional = true});
     visit("lens", lens, {.label = "camera model", .optional = true});
+    visit("attempts", attempts, {.label = "attempts"});
+    visit("notices", notices);
     visit("photo_masks", photo_masks, {.label = "masks"});
     visit("registered", registered, {.label = "registered photos"});
     visit("points", points, {.label = "points"});
@@ -69,9 +73,12 @@ struct ReconstructReport {
   int sh_degree = 0;
   int64_t voxels = 0;
   std::optional<int64_t> background_texels;
-  Metric psnr_train_db;
+  Metric psnr_train_db;  // of the rays of the last steps
+  // Of some rendered training views; see MeasuredTrainingViews.
+  Metric ssim_train, detail_kept_train, detail_error_train;
   int64_t rejected_voxels = 0;  // updates of voxels that were refused: gradient not finite
-  Metric psnr_heldout_db, ssim_heldout;
+  Metric psnr_heldout_db, ssim_heldout, detail_kept_heldout, detail_error_heldout;
+  std::string sharpness;             // SharpnessWord of detail_kept, held out, or else training
   std::vector<std::string> heldout;  // the user's file names
   Curve psnr_at_steps;               // dB on the rays of the last steps
   // Of the trial that decides for or against view dependence.
@@ -86,9 +93,17 @@ struct ReconstructReport {
     visit("voxels", voxels, {.label = "voxels"});
     visit("background_texels", background_texels, {.label = "background texels"});
     visit("psnr_train_db", psnr_train_db, {.label = "PSNR, training", .unit = "dB"});
+    visit("ssim_train", ssim_train, {.label = "SSIM, training", .decimals = 3});
+    visit("detail_kept_train", detail_kept_train, {.label = "detail kept, training"});
+    visit("detail_error_train", detail_error_train,
+          {.label = "its error", .unit = "levels", .decimals = 1});
     visit("rejected_voxels", rejected_voxels);
     visit("psnr_heldout_db", psnr_heldout_db, {.label = "PSNR, held out", .unit = "dB"});
     visit("ssim_heldout", ssim_heldout, {.label = "SSIM, held out", .decimals = 3});
+    visit("detail_kept_heldout", detail_kept_heldout, {.label = "detail kept, held out"});
+    visit("detail_error_heldout", detail_error_heldout,
+          {.label = "its error", .unit = "levels", .decimals = 1});
+    visit("sharpness", sharpness, {.label = "sharpness", .optional = true});
     visit("heldout", heldout, {.label = "photos held out"});
     visit("psnr_at_steps", psnr_at_steps);
     visit("trial_seconds", trial_seconds);
@@ -192,13 +207,36 @@ struct FilmSize {
   }
 };
 
+// Fractions, in [0, 1], of pixels with a surface that fewer than three fitted photos see; see
+// evaluate's seen_by_few.h.
+struct SeenByFewMetrics {
+  Metric film;                 // mean over its frames
+  Metric worst_frame;          // of the film
+  int worst_frame_number = 0;  // its index
+  std::vector<Metric> photos;  // at each photo's position
+
+  // "seen by fewer than three photos: 41 % of the film (72 % of frame 12)"; empty without
+  // `film`.
+  std::string Sentence() const;
+
+  template <typename Visit>
+  void Describe(Visit& visit) {
+    visit("film", film);
+    visit("worst_frame", worst_frame);
+    visit("worst_frame_number", worst_frame_number);
+    visit("photos", photos);
+  }
+};
+
 struct RenderReport {
   RecordedTime time;
   std::string device;
   int frames = 0;
   int path_frames = 0;  // of these, along the film's camera path
   FilmSize film;
+  std::string film_renderer;  // which renderer made the film, and why if it is the exact one
   Metric frames_per_second;
+  SeenByFewMetrics seen_by_few;
 
   template <typename Visit>
   void Describe(Visit& visit) {
@@ -206,7 +244,9 @@ struct RenderReport {
     visit("frames", frames, {.label = "frames"});
     visit("path_frames", path_frames);
     visit("film", film);
+    visit("film_renderer", film_renderer, {.label = "renderer of the film", .optional = true});
     visit("frames_per_second", frames_per_second, {.label = "speed", .unit = "frames/s"});
+    visit("seen_by_few", seen_by_few);
   }
 };
 
@@ -218,6 +258,9 @@ struct EvaluateReport {
   std::string comparison_note;
   Metric psnr_to_2d_photos_db;      // styled frames against the 2D method on the photos
   Metric linear_map_psnr_to_2d_db;  // of the better of two linear colour maps
+  // Of renders without style to the photos, as those of ReconstructReport; where a network was
+  // given.
+  std::optional<double> lpips_heldout = {}, lpips_train = {};
 
   template <typename Visit>
   void Describe(Visit& visit) {
@@ -228,6 +271,10 @@ struct EvaluateReport {
           {.label = "PSNR to the styled photos", .unit = "dB"});
     visit("linear_map_psnr_to_2d_db", linear_map_psnr_to_2d_db,
           {.label = "PSNR of the best linear colour map", .unit = "dB"});
+    visit("lpips_heldout", lpips_heldout,
+          {.label = "LPIPS to the photos, held out", .decimals = 3});
+    visit("lpips_train", lpips_train,
+          {.label = "LPIPS to the photos, training", .decimals = 3});
   }
 };
 

@@ -55,8 +55,19 @@ std::string HeadlineMetricsHtml(const RunReport& report) {
     html += "<div><dt>" + name + "</dt><dd>" + value + "</dd></div>";
   };
   if (const auto& s = report.stages.reconstruct) {
-    card("reconstruction quality (PSNR on held-out photos)",
-         MetricHtml(s->psnr_heldout_db, 2, "<small>dB</small>"));
+    std::string value = MetricHtml(s->psnr_heldout_db, 2, "<small>dB</small>");
+    if (s->ssim_heldout.value)
+      value += " <small>SSIM " + MetricHtml(s->ssim_heldout, 3) + "</small>";
+    if (const auto& evaluate = report.stages.evaluate; evaluate && evaluate->lpips_heldout)
+      value += " <small>LPIPS " + MetricHtml(*evaluate->lpips_heldout, 3) + "</small>";
+    card("reconstruction quality (PSNR on held-out photos)", value);
+    const bool held_out = s->detail_kept_heldout.value.has_value();
+    const Metric& kept = held_out ? s->detail_kept_heldout : s->detail_kept_train;
+    card(std::string("sharpness of the reconstruction (detail kept of the ") +
+             (held_out ? "held-out" : "training") + " photos)",
+         s->sharpness.empty()
+             ? MetricHtml(kept, 2)
+             : EscapeHtml(s->sharpness) + " <small>" + MetricHtml(kept, 2) + " of 1</small>");
   }
   const EvaluationMetrics& evaluation = report.evaluation;
   const ConsistencyMetrics* styled = ShortestGap(evaluation, "styled");

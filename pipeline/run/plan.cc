@@ -14,6 +14,7 @@ constexpr double kGridBytes = 4 + 8;     // per vertex: link, and density with l
 constexpr double kPixelBytes = 12 + 6;   // floats as read, 16 bits a channel as drawn
 constexpr double kSphereFraction = 0.6;  // of a map's texels are visible in photos
 constexpr double kIndexBytes = 4;        // vertex of a voxel, slot of a voxel, and back
+constexpr double kWeightBytes = 4;       // of a voxel, in each thread
 
 // Rates are for two threads.
 double SecondsWith(double seconds, int threads) { return seconds * 2 / std::max(threads, 1); }
@@ -34,14 +35,15 @@ StagePlan PlanFit(const FitOptions& options, int64_t photo_pixels, const SceneBo
     const double vertices = static_cast<double>(n.x) * n.y * n.z;
     const double voxels = vertices * (s == 0 ? 1 : kStoredFraction);
     const double gradients = record + kIndexBytes + arenas * kIndexBytes;
-    field = std::max(
-        field, voxels * (4 * record + kIndexBytes + gradients) + vertices * 2 * kGridBytes);
+    const double pruning = record + threads * kWeightBytes;
+    field = std::max(field, voxels * (2 * record + kIndexBytes + gradients + pruning) +
+                                vertices * 2 * kGridBytes);
     const double rays = static_cast<double>(options.steps[s]) * options.rays_per_step;
     seconds += rays / kRaysPerSecond * options.resolutions[s] / kRateResolution;
   }
   if (box.spheres) {
-    // Values, moments, and both packed, 16 bytes each; a slot in each arena. Time is about the
-    // same: the ball has fewer voxels than the box.
+    // Values, moments, gradients and a resampled copy, 16 bytes each; a slot in each arena.
+    // Time is about the same: the ball has fewer voxels than the box.
     const double map = 2.0 * options.background_resolution * options.background_resolution;
     field += map * (kIndexBytes + kSphereFraction * options.background_layers *
                                       (4 * 16 + arenas * kIndexBytes));

@@ -1,11 +1,13 @@
 // Memory and time of a run, estimated before it starts from sizes and measured rates.
 //
-// A fit's memory peaks when its largest stage writes a checkpoint or is pruned: per voxel a
-// record of floats, its moments, and both packed or the pruned copy; per voxel and arena
-// indices and gradients; per vertex two dense grids of links and densities (12 B); 18 B per
-// photo pixel (12 B as read, 6 B as drawn by rays); and the program itself. The first stage
-// stores every vertex, later ones the fraction kStoredFraction. A step's gradients are assumed
-// to touch each voxel once.
+// A fit's memory peaks when its largest stage is pruned: per voxel a record of floats, its
+// moments, its gradients and the pruned copy, the weights of each thread, indices of each
+// arena; per vertex two dense grids of links and densities (12 B); 18 B per photo pixel (12 B
+// as read, 6 B as drawn by rays); and the program itself. The first stage stores every vertex,
+// later ones the fraction kStoredFraction. A step's gradients are assumed to touch each voxel
+// once. Less is needed to write a checkpoint or a field (nothing per voxel), to continue from a
+// checkpoint (its file besides values and moments), and to read a field: 4 + 12 basis B per
+// voxel that it keeps, and 58 of the file's arrays.
 #pragma once
 
 #include <cstdint>

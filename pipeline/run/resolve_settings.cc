@@ -85,6 +85,12 @@ std::vector<std::string> ResolveSettings(const SettingsSources& sources, OptionS
   if (const auto recipe = options->Given("recipe"))
     ApplyKnown(RecipeValues(*recipe), "--recipe", options);
   options->ApplyFlags();
+  const JsonValue values = options->Values();
+  const JsonValue *reproducible = values.Find("reproducible"), *device = values.Find("device");
+  if (reproducible != nullptr && reproducible->AsBool() && device != nullptr &&
+      device->AsString() == "cuda")
+    ApplyKnown(JsonValue::Object{{"fit-exact-sums", true}, {"style-exact-sums", true}},
+               "--reproducible", options);
   return words;
 }
 

@@ -42,6 +42,7 @@ struct StyleSource {
 struct RenderOptions {
   double fps = 24;
   bool keep_exposure = false;
+  bool exact = false;
   PathOptions path;
 
   template <typename Bind>
@@ -51,6 +52,9 @@ struct RenderOptions {
     bind("keep-exposure", keep_exposure,
          {.help = "renders frames at the photos' viewpoints with the exposure and white "
                   "balance of their photos, where these were undone"});
+    bind("exact", exact,
+         {.help = "renders the film's frames as exactly as the views; by default a GPU renders "
+                  "them in half precision, with one colour for each 1/128 of opacity"});
     path.Describe(bind);
   }
 };

@@ -14,11 +14,13 @@
 #include "pipeline/capture/working_views.h"
 #include "pipeline/fields/field_file.h"
 #include "pipeline/images/image_file.h"
+#include "pipeline/program/device_choice.h"
 #include "pipeline/report/records.h"
 #include "pipeline/run/run_context.h"
 #include "pipeline/stages/heat_map_files.h"
 #include "pipeline/stages/linear_map_baseline.h"
 #include "pipeline/stages/make_stylizer.h"
+#include "pipeline/stages/photo_metrics.h"
 #include "pipeline/stages/stages.h"
 #include "pipeline/workspace/metrics_json.h"
 #include "pipeline/workspace/output_names.h"
@@ -193,6 +195,15 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
           : Metric(LinearMapPsnr(stored.field, training_cameras,
                                  frames("source", training_views), targets.views_2d,
                                  targets.transmittance, parts.Next(n * kLinearMapSeconds)));
+  if (!settings.consistency.lpips.empty()) {
+    const auto network = PerceptualDistance(settings.consistency.lpips);
+    const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
+    const auto lpips = [&](const std::vector<int>& of) {
+      return MeanOf(MeasureOnPhotos(context->Views(), of, stored, backend, network).lpips);
+    };
+    report.lpips_heldout = lpips(views.HeldOut());
+    report.lpips_train = lpips(MeasuredTrainingViews(views));
+  }
   if (!same_camera) context->console->Info(report.comparison_note);
   context->console->Lines(FormatTables(consistency, fidelity));
   StageOutcome outcome;

@@ -108,12 +108,22 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
   }
   if (source.kind == CaptureKind::kPhotos) {
     PoseReport report;
-    capture = PosesFromPhotos(colmap_photos, ingest.statuses, options,
-                              workspace.Path(".regrade/work/pose"), sparse_folder,
-                              parts.Next(seconds.poses), &report);
-    for (const std::string& note : report.notes) context->console->Info(note);
+    const auto say_notes = [&] {
+      for (const std::string& note : report.notes) context->console->Info(note);
+    };
+    try {
+      capture = PosesFromPhotos(colmap_photos, ingest.statuses, options,
+                                workspace.Path(".regrade/work/pose"), sparse_folder,
+                                parts.Next(seconds.poses), &report);
+    } catch (const Error&) {
+      say_notes();
+      throw;
+    }
+    say_notes();
     metrics.colmap = report.colmap_version;
     metrics.strategy = report.strategy;
+    metrics.attempts = report.attempts;
+    metrics.notices = report.notes;
     metrics.lens = report.lens;
   } else {
     std::vector<std::string> notes;

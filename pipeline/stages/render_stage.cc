@@ -1,14 +1,15 @@
 // Stage "render": frames of the field before and after styling, and of the 2D method applied to
 // the former, at the photos' positions and along the film's camera path; and the films. Where
 // photos differ in size or lens, the frames at their positions are rendered again with one
-// common camera.
+// common camera. Frames along the film's path may come from the fast renderer; all others are
+// exact.
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <memory>
 #include <optional>
 
-#include "kernels/base/error.h"
+#include "evaluate/seen_by_few.h"
 #include "kernels/scene/common_camera.h"
 #include "pipeline/capture/photo_gains.h"
 #include "pipeline/capture/working_views.h"
@@ -20,6 +21,7 @@
 #include "pipeline/program/ordered_worker.h"
 #include "pipeline/report/stage_metrics.h"
 #include "pipeline/run/run_context.h"
+#include "pipeline/stages/film_renderer.h"
 #include "pipeline/stages/make_stylizer.h"
 #include "pipeline/stages/object_edit.h"
 #include "pipeline/stages/stages.h"
@@ -30,6 +32,8 @@
 namespace regrade {
 namespace {
 
+constexpr double kMuchSeenByFew = 0.2;  // of the film: worth a warning
+
 // The two fields and the 2D method.
 struct FrameRenderers {
   FieldRenderer source, styled;
@@ -37,11 +41,13 @@ struct FrameRenderers {
   std::unique_ptr<CoverageRenderer> object;  // null where the whole scene is styled
   std::vector<Image> coverage;               // of the current frame
   double styled_seconds = 0;                 // of rendering the restyled field
+  bool fast_film = false;                    // both renderers are prepared for it
 };
 
 // The frames of one camera.
 struct Frame {
   Image source, styled, transmittance;
+  Image depth;                    // of the source
   std::optional<Image> views_2d;  // of methods that can style a render
 };
 
@@ -62,7 +68,9 @@ std::vector<FrameSet> FrameSetsOf(const std::vector<Camera>& views, const PathOp
 }
 
 const FrameSet* CommonSet(const std::vector<FrameSet>& sets) {
-  const auto common = std::ranges::find(sets, kCommonPrefix, &FrameSet::prefix);
+  const auto common = std::find_if(sets.begin(), sets.end(), [](const FrameSet& set) {
+    return set.prefix == kCommonPrefix;
+  });
   return common == sets.end() ? nullptr : &*common;
 }
 
@@ -80,26 +88,31 @@ std::string PlanOf(const std::vector<FrameSet>& sets) {
   for (const FrameSet& set : sets) {
     text += std::to_string(set.cameras.size());
     if (set.prefix == kCommonPrefix)
-      text += Concat(" there with one camera (", set.cameras[0].width, "x",
-                     set.cameras[0].height, " px), ");
+      text += " there with one camera (" + std::to_string(set.cameras[0].width) + "x" +
+              std::to_string(set.cameras[0].height) + " px), ";
     else
       text += set.of_photos ? " frames at the photos' positions, " : " of the film, ";
     for (const Camera& camera : set.cameras)
       pixels += static_cast<double>(camera.width) * camera.height;
   }
-  return Concat(text, "about ", std::lround(pixels * kBytesPerPixel * 1e-6), " MB of pictures");
+  return text + "about " + std::to_string(std::lround(pixels * kBytesPerPixel * 1e-6)) +
+         " MB of pictures";
 }
 
 // The scene as a camera of that gain records it.
 Frame RenderFrame(RunContext* context, FrameRenderers* renderers, const Camera& camera,
-                  const PhotoGain& gain, int index) {
+                  const PhotoGain& gain, int index, bool fast) {
+  const auto render = [&](const FieldRenderer& field) {
+    return fast ? field.RenderFast(camera) : field.Render(camera);
+  };
   Frame frame;
-  RenderedView plain = renderers->source.Render(camera);
+  RenderedView plain = render(renderers->source);
   const double begin = context->console->StageSeconds();
-  frame.styled = renderers->styled.Render(camera).color;
+  frame.styled = render(renderers->styled).color;
   renderers->styled_seconds += context->console->StageSeconds() - begin;
   frame.source = std::move(plain.color);
   frame.transmittance = std::move(plain.transmittance);
+  frame.depth = std::move(plain.depth);
   PutGain(gain, &frame.source);
   PutGain(gain, &frame.styled);
   if (renderers->object != nullptr) renderers->coverage = renderers->object->Render(camera);
@@ -107,6 +120,51 @@ Frame RenderFrame(RunContext* context, FrameRenderers* renderers, const Camera& 
     frame.views_2d = renderers->stylizer->Stylize(frame.source, index);
   return frame;
 }
+
+// Gathers how much of each view few photos see. The frames at the photos' positions come first.
+class SeenByFewRecorder {
+ public:
+  SeenByFewRecorder(const WorkingViews& views, double near) : views_(views), near_(near) {}
+
+  void Add(const FrameSet& set, int index, const Image& depth) {
+    const bool photo = set.prefix.empty();
+    const Camera& camera = set.cameras[static_cast<size_t>(index)];
+    current_.push_back(SampleView(camera, depth, photo ? views_.Mask(index) : Image()));
+  }
+  void Finish(const FrameSet& set) {
+    if (set.prefix.empty())
+      for (const int i : views_.Training()) photos_.push_back(current_[static_cast<size_t>(i)]);
+    std::vector<Metric> shares;
+    for (const SampledView& view : current_)
+      shares.push_back(Metric(SeenByFew(view, photos_, near_), "the view shows no surface"));
+    current_.clear();
+    if (set.of_film) SetFilm(shares);
+    if (set.prefix.empty()) metrics_.photos = std::move(shares);
+  }
+  const SeenByFewMetrics& metrics() const { return metrics_; }
+
+ private:
+  void SetFilm(const std::vector<Metric>& shares) {
+    double sum = 0;
+    int count = 0;
+    for (size_t i = 0; i < shares.size(); ++i) {
+      const std::optional<double>& share = shares[i].value;
+      if (!share) continue;
+      sum += *share, ++count;
+      if (count > 1 && *share <= *metrics_.worst_frame.value) continue;
+      metrics_.worst_frame = *share;
+      metrics_.worst_frame_number = static_cast<int>(i);
+    }
+    metrics_.film =
+        count > 0 ? Metric(sum / count) : Metric::Undefined("no frame shows a surface");
+    if (count == 0) metrics_.worst_frame = metrics_.film;
+  }
+
+  const WorkingViews& views_;
+  const double near_;
+  std::vector<SampledView> photos_, current_;
+  SeenByFewMetrics metrics_;
+};
 
 // Writes files and films while the next frames are rendered: one thread for each half of the
 // pictures and one for the films, so that a GPU does not wait for them.
@@ -173,26 +231,37 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   const std::vector<FrameSet> sets = FrameSetsOf(views.Cameras(), settings.render.path);
   int total = 0;
   for (const FrameSet& set : sets) total += static_cast<int>(set.cameras.size());
-  const FrameSet& film = *std::ranges::find_if(sets, &FrameSet::of_film);
+  const FrameSet& film =
+      *std::find_if(sets.begin(), sets.end(), [](const FrameSet& set) { return set.of_film; });
   if (const FrameSet* common = CommonSet(sets))
     context->console->Info(ComparisonNote(common->cameras[0]));
+
+  const std::string why_exact =
+      PrepareFilm(settings, backend, film.of_photos, &renderers.source, &renderers.styled);
+  renderers.fast_film = why_exact.empty();
+  context->console->Info("renderer of the film: " + FilmRendererText(why_exact));
 
   std::filesystem::remove_all(workspace.Path("frames"));
   StageOutcome outcome;
   outcome.outputs = {"frames"};
   RunFilms films(workspace, settings.render.fps, static_cast<int>(film.cameras.size()));
+  // In NDC the field's limit is no distance.
+  SeenByFewRecorder seen(views, before.ndc.on() ? 0 : before.field.near_clip);
   {
     FrameWriter writer(workspace, &films);
     int done = 0;
-    for (const FrameSet& set : sets)
-      for (int i = 0; i < std::ssize(set.cameras); ++i) {
-        ReportOrThrow(progress, done++, total);
-        writer.Write(
-            std::make_shared<const Frame>(RenderFrame(
-                context, &renderers, set.cameras[i],
-                set.of_photos && settings.render.keep_exposure ? views.Gain(i) : kAsTaken, i)),
-            set, i);
+    for (const FrameSet& set : sets) {
+      for (int i = 0; i < static_cast<int>(set.cameras.size()); ++i) {
+        if (Report(progress, done++, total) == LoopControl::kStop) throw Interrupted();
+        const auto frame = std::make_shared<const Frame>(RenderFrame(
+            context, &renderers, set.cameras[static_cast<size_t>(i)],
+            set.of_photos && settings.render.keep_exposure ? views.Gain(i) : kAsTaken, i,
+            renderers.fast_film && !set.of_photos));
+        seen.Add(set, i, frame->depth);
+        writer.Write(frame, set, i);
       }
+      seen.Finish(set);
+    }
     writer.Finish();
   }
   films.Finish(&outcome.outputs);
@@ -202,7 +271,12 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   report.frames = total;
   report.path_frames = film.of_photos ? 0 : static_cast<int>(film.cameras.size());
   report.film = {film.cameras[0].width, film.cameras[0].height};
+  report.film_renderer = FilmRendererText(why_exact);
   if (renderers.styled_seconds > 0) report.frames_per_second = total / renderers.styled_seconds;
+  report.seen_by_few = seen.metrics();
+  if (report.seen_by_few.film.value.value_or(0) > kMuchSeenByFew)
+    context->console->Warn(report.seen_by_few.Sentence() +
+                           ": it may look wrong there; more photos of these parts help");
   PutMetrics(report, &outcome.metrics);
   return outcome;
 }
@@ -216,6 +290,7 @@ Stage RenderStage(RunContext* context) {
       {"field", context->ResultOf("reconstruct")},
       {"styled", context->ResultOf("stylize")},
       {"views_2d", context->ResultOf("style_2d")},
+      {"exact_film", WantsExactFilm(context->settings)},
       {"options", OptionValues(context->settings.scene, context->settings.render,
                                context->settings.style_2d)}};
   if (context->workspace->Find("pose")) {

@@ -143,7 +143,7 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
   RestyleHooks hooks;
   hooks.training.progress = parts.Next(1);
   hooks.training.checkpoint = [&](const TrainingState& state) {
-    workspace.SaveCheckpoint("stylize", inputs, PackTrainingState(state));
+    workspace.SaveCheckpoint("stylize", inputs, {PackTrainingState(state)});
   };
   std::optional<TrainingState> resume;
   if (const auto bytes = workspace.LoadCheckpoint("stylize", inputs))

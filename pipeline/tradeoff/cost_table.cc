@@ -1,8 +1,9 @@
 #include "pipeline/tradeoff/cost_table.h"
 
 #include <algorithm>
+#include <cstdio>
+#include <utility>
 
-#include "kernels/base/error.h"
 #include "pipeline/report/html_text.h"
 
 namespace regrade {
@@ -14,7 +15,7 @@ struct Spread {
 };
 
 Spread Of(std::vector<double> values) {
-  std::ranges::sort(values);
+  std::sort(values.begin(), values.end());
   const size_t n = values.size();
   const double median = n % 2 == 1 ? values[n / 2] : 0.5 * (values[n / 2 - 1] + values[n / 2]);
   return {median, 0.5 * (values.back() - values.front())};
@@ -48,7 +49,7 @@ std::string NameOf(const CostRow& row) {
 void FillErrors(const std::vector<Variant>& variants, std::vector<CostRow>* rows) {
   for (CostRow& row : *rows) {
     if (row.parameter.empty() || row.parameter == "preset") continue;
-    const auto end = std::ranges::find_if(variants, [&](const Variant& v) {
+    const auto end = std::find_if(variants.begin(), variants.end(), [&](const Variant& v) {
       return v.benchmark == row.benchmark && v.parameter == row.parameter && v.accurate_end;
     });
     const std::string parameter = end == variants.end() ? "" : end->parameter;
@@ -92,7 +93,7 @@ std::vector<CostRow> CostTable(const std::vector<Variant>& variants,
                                const std::string& base) {
   std::vector<CostRow> rows;
   for (const Variant& variant : variants) {
-    std::vector<double> seconds, cpu, accuracy;
+    std::vector<double> seconds, cpu, accuracy, ssim, detail_kept, lpips;
     for (const Measurement& m : measurements) {
       if (m.benchmark != variant.benchmark || m.parameter != variant.parameter ||
           m.value != variant.value)
@@ -100,6 +101,9 @@ std::vector<CostRow> CostTable(const std::vector<Variant>& variants,
       seconds.push_back(m.seconds);
       cpu.push_back(m.cpu_seconds);
       accuracy.push_back(m.accuracy);
+      if (m.ssim) ssim.push_back(*m.ssim);
+      if (m.detail_kept) detail_kept.push_back(*m.detail_kept);
+      if (m.lpips) lpips.push_back(*m.lpips);
     }
     if (seconds.empty()) continue;
     const Benchmark& benchmark = BenchmarkOf(variant.benchmark);
@@ -116,11 +120,14 @@ std::vector<CostRow> CostTable(const std::vector<Variant>& variants,
     row.cpu_spread = Of(cpu).spread;
     row.accuracy = Of(accuracy).median;
     row.accuracy_spread = Of(accuracy).spread;
+    if (!ssim.empty()) row.ssim = Of(ssim).median;
+    if (!detail_kept.empty()) row.detail_kept = Of(detail_kept).median;
+    if (!lpips.empty()) row.lpips = Of(lpips).median;
     row.error = Metric::Undefined("not a value of a single parameter");
     rows.push_back(std::move(row));
   }
   // Presets are measured last: groups them with the other rows of their benchmark.
-  std::ranges::stable_sort(rows, [](const CostRow& a, const CostRow& b) {
+  std::stable_sort(rows.begin(), rows.end(), [](const CostRow& a, const CostRow& b) {
     return &BenchmarkOf(a.benchmark) < &BenchmarkOf(b.benchmark);
   });
   FillErrors(variants, &rows);
@@ -130,20 +137,26 @@ std::vector<CostRow> CostTable(const std::vector<Variant>& variants,
 
 std::string CostTableText(const std::vector<CostRow>& rows) {
   std::string text, benchmark;
+  char line[256];
   for (const CostRow& row : rows) {
     if (row.benchmark != benchmark) {
       benchmark = row.benchmark;
       text += (text.empty() ? "" : "\n") + benchmark + ": " + row.measure + ", " + row.unit +
               "; time of " + BenchmarkOf(benchmark).time_of + "; * on the Pareto front\n";
-      text += Format("  %-40s %10s %10s %9s %10s %9s %9s\n", "", "s", "CPU s", "+-",
-                     row.unit.c_str(), "+-", "error");
+      std::snprintf(line, sizeof line, "  %-40s %10s %10s %9s %10s %9s %9s\n", "", "s", "CPU s",
+                    "+-", row.unit.c_str(), "+-", "error");
+      text += line;
     }
     const int decimals = DecimalsFor(row.cpu_seconds);
-    text += Format("%s %-40s %10s %10s %9s %10s %9s %9s", row.on_pareto_front ? "*" : " ",
-                   NameOf(row).c_str(), Cell(row.seconds, decimals).c_str(),
-                   Cell(row.cpu_seconds, decimals).c_str(),
-                   Cell(row.cpu_spread, decimals).c_str(), Cell(row.accuracy, 3).c_str(),
-                   Cell(row.accuracy_spread, 3).c_str(), Cell(row.error, 3).c_str());
+    std::snprintf(line, sizeof line, "%s %-40s %10s %10s %9s %10s %9s %9s",
+                  row.on_pareto_front ? "*" : " ", NameOf(row).c_str(),
+                  Cell(row.seconds, decimals).c_str(), Cell(row.cpu_seconds, decimals).c_str(),
+                  Cell(row.cpu_spread, decimals).c_str(), Cell(row.accuracy, 3).c_str(),
+                  Cell(row.accuracy_spread, 3).c_str(), Cell(row.error, 3).c_str());
+    text += line;
+    for (const auto& [name, value] :
+         {std::pair{"SSIM", row.ssim}, {"detail kept", row.detail_kept}, {"LPIPS", row.lpips}})
+      if (value) text += std::string("  ") + name + " " + FixedNumber(*value, 3);
     if (!row.dominated_by.empty()) text += "  dominated by " + row.dominated_by;
     text += "\n";
   }
@@ -154,16 +167,18 @@ std::string CostTableCsv(const std::vector<CostRow>& rows) {
   std::string text =
       "benchmark,parameter,setting,repeats,seconds,seconds_spread,cpu_seconds,cpu_spread,"
       "accuracy,"
-      "accuracy_spread,unit,error,on_pareto_front,dominated_by\n";
+      "accuracy_spread,unit,error,on_pareto_front,dominated_by,ssim,detail_kept,lpips\n";
   for (const CostRow& row : rows) {
     const auto number = [](const Metric& metric) {
       return "," + (metric.value ? FixedNumber(*metric.value, 6) : std::string());
     };
-    text += Concat(row.benchmark, ",", Quoted(row.parameter), ",", Quoted(row.setting), ",",
-                   row.repeats, number(row.seconds), number(row.seconds_spread),
-                   number(row.cpu_seconds), number(row.cpu_spread), number(row.accuracy),
-                   number(row.accuracy_spread), ",", row.unit, number(row.error), ",",
-                   (row.on_pareto_front ? "yes" : "no"), ",", Quoted(row.dominated_by), "\n");
+    text += row.benchmark + "," + Quoted(row.parameter) + "," + Quoted(row.setting) + "," +
+            std::to_string(row.repeats) + number(row.seconds) + number(row.seconds_spread) +
+            number(row.cpu_seconds) + number(row.cpu_spread) + number(row.accuracy) +
+            number(row.accuracy_spread) + "," + row.unit + number(row.error) + "," +
+            (row.on_pareto_front ? "yes" : "no") + "," + Quoted(row.dominated_by) +
+            number(Metric(row.ssim)) + number(Metric(row.detail_kept)) +
+            number(Metric(row.lpips)) + "\n";
   }
   return text;
 }

@@ -1,6 +1,7 @@
 #include "pipeline/tradeoff/measurements.h"
 
 #include <filesystem>
+#include <utility>
 
 #include "kernels/base/error.h"
 
@@ -8,6 +9,11 @@ namespace regrade {
 namespace {
 
 constexpr int kSchema = 2;
+
+constexpr std::pair<const char*, std::optional<double> Measurement::*> kBeside[] = {
+    {"ssim", &Measurement::ssim},
+    {"detail_kept", &Measurement::detail_kept},
+    {"lpips", &Measurement::lpips}};
 
 Measurement FromJson(const JsonValue& row) {
   Measurement measurement;
@@ -18,6 +24,8 @@ Measurement FromJson(const JsonValue& row) {
   measurement.seconds = row.At("seconds").AsDouble();
   measurement.cpu_seconds = row.At("cpu_seconds").AsDouble();
   measurement.accuracy = row.At("accuracy").AsDouble();
+  for (const auto& [key, member] : kBeside)
+    if (const JsonValue* value = row.Find(key)) measurement.*member = value->AsDouble();
   measurement.work = row.At("work");
   return measurement;
 }
@@ -25,11 +33,14 @@ Measurement FromJson(const JsonValue& row) {
 }  // namespace
 
 JsonValue ToJson(const Measurement& measurement) {
-  return JsonValue::Object{
+  JsonValue json = JsonValue::Object{
       {"benchmark", measurement.benchmark}, {"parameter", measurement.parameter},
       {"value", measurement.value},         {"repeat", measurement.repeat},
       {"seconds", measurement.seconds},     {"cpu_seconds", measurement.cpu_seconds},
       {"accuracy", measurement.accuracy},   {"work", measurement.work}};
+  for (const auto& [key, member] : kBeside)
+    if (measurement.*member) json[key] = *(measurement.*member);
+  return json;
 }
 
 MeasurementStore::MeasurementStore(const std::string& path, const std::string& fingerprint)

@@ -14,6 +14,8 @@ struct Measurement {
   int repeat = 0;
   double seconds = 0, cpu_seconds = 0;  // see Benchmark::time_of
   double accuracy = 0;                  // in the benchmark's unit
+  // Beside a PSNR to photos: see PhotoMetrics.
+  std::optional<double> ssim = {}, detail_kept = {}, lpips = {};
   // Amount of work, for information: {"rays": ..., "voxels": ...}.
   JsonValue work = JsonValue::Object();
 };

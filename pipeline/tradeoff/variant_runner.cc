@@ -1,13 +1,15 @@
 #include "pipeline/tradeoff/variant_runner.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <numeric>
+#include <optional>
 
 #include "evaluate/image_quality.h"
 #include "evaluate/pair_motion.h"
-#include "kernels/base/clock.h"
+#include "evaluate/pair_network.h"
 #include "kernels/base/error.h"
 #include "kernels/field/cpu/render_view.h"
 #include "kernels/field/packed_grid.h"
@@ -19,8 +21,8 @@
 #include "pipeline/fields/field_file.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/program/cpu_time.h"
-#include "pipeline/stages/held_out.h"
 #include "pipeline/stages/make_stylizer.h"
+#include "pipeline/stages/photo_metrics.h"
 #include "pipeline/stages/stages.h"
 #include "pipeline/workspace/output_names.h"
 #include "reconstruct/fit/fit_field.h"
@@ -39,13 +41,14 @@ class Clocks {
  public:
   explicit Clocks(Measurement* measurement) : measurement_(measurement) {}
   void Stop(double count = 1) {
-    measurement_->seconds = (ClockSeconds() - begin_) / count;
+    const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - begin_;
+    measurement_->seconds = wall.count() / count;
     measurement_->cpu_seconds = (CpuSeconds() - cpu_begin_) / count;
   }
 
  private:
   Measurement* measurement_;
-  double begin_ = ClockSeconds();
+  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
   double cpu_begin_ = CpuSeconds();
 };
 
@@ -95,7 +98,8 @@ double Mean(const std::vector<double>& values) {
 std::vector<int> EvenlySpaced(const std::vector<int>& all, int count) {
   std::vector<int> some;
   const int n = static_cast<int>(all.size()), k = std::min(count, n);
-  for (int i = 0; i < k; ++i) some.push_back(all[(2 * i + 1) * n / (2 * k)]);
+  for (int i = 0; i < k; ++i)
+    some.push_back(all[static_cast<size_t>((2 * i + 1) * n / (2 * k))]);
   return some;
 }
 
@@ -135,9 +139,10 @@ Measurement VariantRunner::Measure(const Variant& variant, int repeat,
     MeasureFlow(variant, &m);
   fs::remove_all(folder_);
   if (!std::isfinite(m.accuracy))
-    throw SceneError("there is nothing to measure accuracy with", variant.benchmark,
-                     variant.benchmark == "fit" ? "hold out photos: --holdout 8"
-                                                : "leave its parameters out with --parameters");
+    throw Error(ExitCode::kScene, "there is nothing to measure accuracy with",
+                variant.benchmark,
+                variant.benchmark == "fit" ? "hold out photos: --holdout 8"
+                                           : "leave its parameters out with --parameters");
   return m;
 }
 
@@ -203,12 +208,15 @@ void VariantRunner::MeasureFit(const Variant& variant, const ProgressFunction& p
   m->work["samples"] = fit.samples;
   m->work["voxels"] = fit.voxels;
   // Measured at the base's photo size for all variants, for comparable values.
-  m->accuracy =
-      MeasureHeldOut(photos.working_views.AtSize(base_->settings.scene.photo_size),
-                     {std::move(fit.field), photos.scene.field_from_world, photos.scene.ndc},
-                     Backend::kCpu)
-          .MeanPsnr()
-          .value_or(std::nan(""));
+  const PhotoMetrics held_out =
+      MeasureOnPhotos(photos.working_views.AtSize(base_->settings.scene.photo_size),
+                      photos.working_views.HeldOut(),
+                      {std::move(fit.field), photos.scene.field_from_world, photos.scene.ndc},
+                      Backend::kCpu, PerceptualDistance(base_->settings.consistency.lpips));
+  m->accuracy = MeanOf(held_out.psnr).value_or(std::nan(""));
+  m->ssim = MeanOf(held_out.ssim);
+  m->detail_kept = MeanOf(held_out.detail_kept);
+  m->lpips = MeanOf(held_out.lpips);
 }
 
 void VariantRunner::MeasureStyle(const Variant& variant, const ProgressFunction& progress,
@@ -253,17 +261,19 @@ const VariantRunner::Frames& VariantRunner::BaseFrames() {
   // Flow is compared on frames of one size.
   const std::vector<Camera> cameras = WithCommonIntrinsics(views.Cameras());
   for (int i = 0; i < count; ++i) {
-    const Camera& camera = cameras[i];
+    const Camera& camera = cameras[static_cast<size_t>(i)];
     const RenderedView view = RenderView(f.grid, camera, MarchOptions{f.stored.field.step});
     f.cameras.push_back(camera);
     f.colors.push_back(view.color);
     f.geometry.push_back({DepthAlongRays(camera, view.depth), camera});
   }
-  const PairMotionFunction known = GeometricMotion([&f](int i) { return f.geometry[i]; });
+  const PairMotionFunction known =
+      GeometricMotion([&f](int i) { return f.geometry[static_cast<size_t>(i)]; });
   for (int i = 0; i + 1 < count; ++i) f.truth.push_back(known(i, i + 1));
   for (int i = 0; i < std::min(kRenderedFrames, count); ++i)
-    f.accurate.push_back(
-        RenderView(f.grid, f.cameras[i], MarchOptions{0.25f * f.stored.field.step, 0}).color);
+    f.accurate.push_back(RenderView(f.grid, f.cameras[static_cast<size_t>(i)],
+                                    MarchOptions{0.25f * f.stored.field.step, 0})
+                             .color);
   return f;
 }
 
@@ -292,7 +302,7 @@ void VariantRunner::MeasureFlow(const Variant& variant, Measurement* m) {
   std::string method = base_->settings.consistency.flow;
   if (const JsonValue* flow = variant.options.Find("flow")) method = flow->AsString();
   const FrameSource source{static_cast<int>(f.colors.size()),
-                           [&f](int i) { return f.colors[i]; }};
+                           [&f](int i) { return f.colors[static_cast<size_t>(i)]; }};
   const std::string mode =
       base_->settings.consistency.mode == "ruder2016" ? "ruder2016" : "lai2018";
   const PairMotionFunction motion = EstimatedMotion(source, mode, method);
@@ -312,7 +322,7 @@ void VariantRunner::MeasureFlow(const Variant& variant, Measurement* m) {
         if (std::isfinite(error)) sum += error, ++pixels;
       }
   m->accuracy = pixels > 0 ? sum / pixels : std::nan("");
-  m->work["pairs"] = std::ssize(estimated);
+  m->work["pairs"] = static_cast<int64_t>(estimated.size());
 }
 
 }  // namespace regrade

@@ -149,11 +149,14 @@ std::vector<std::string> Workspace::FinishedStages() const {
 
 // Layout: mark, hash of the inputs, hash of the content, the content.
 void Workspace::SaveCheckpoint(const std::string& stage, const JsonValue& inputs,
-                               std::string_view bytes) const {
-  std::string head(kCheckpointMark);
-  head += HashText(HashOf(DumpJson(inputs, -1)));
-  head += HashText(HashOf(bytes));
-  WriteFileAtomically(CheckpointPath(stage), head, bytes);
+                               std::vector<std::string_view> content) const {
+  Hasher of_content;
+  for (const std::string_view piece : content) of_content.Add(piece);
+  const std::string head = std::string(kCheckpointMark) +
+                           HashText(HashOf(DumpJson(inputs, -1))) +
+                           HashText(of_content.Value());
+  content.insert(content.begin(), head);
+  WriteFileAtomically(CheckpointPath(stage), content);
 }
 
 std::optional<std::string> Workspace::LoadCheckpoint(const std::string& stage,

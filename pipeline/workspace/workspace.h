@@ -59,8 +59,9 @@ class Workspace {
   std::vector<std::string> FinishedStages() const;
 
   // A checkpoint belongs to its inputs: with other inputs, or damaged, it is ignored.
+  // `content`: its pieces in their order.
   void SaveCheckpoint(const std::string& stage, const JsonValue& inputs,
-                      std::string_view bytes) const;
+                      std::vector<std::string_view> content) const;
   std::optional<std::string> LoadCheckpoint(const std::string& stage,
                                             const JsonValue& inputs) const;
   void DropCheckpoint(const std::string& stage) const;

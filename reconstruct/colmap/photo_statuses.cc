@@ -18,6 +18,10 @@ std::string TooFew(size_t given, int least) {
 
 }  // namespace
 
+std::string AttemptResult::Name() const {
+  return strategy.name + (freedom == LensFreedom::kFull ? "" : ", ") + NameOf(freedom);
+}
+
 Reason WhyNoModel(const ColmapEvidence& evidence) {
   const int features = evidence.MedianFeatures();
   if (features < kFewFeatures)
@@ -27,10 +31,17 @@ Reason WhyNoModel(const ColmapEvidence& evidence) {
   if (evidence.matched_pairs == 0)
     return {"no two photos show the same things from two places",
             "take photos of one static scene, each overlapping the previous one by two thirds"};
+  const int photos = static_cast<int>(evidence.features.size());
+  if (evidence.matched_pairs > 0 && evidence.matched_pairs < photos - 1)
+    return {"only " + std::to_string(evidence.matched_pairs) + " pairs of the " +
+                Photos(evidence.features.size()) +
+                " show the same things: they overlap too little",
+            kTakeMore};
   return {
       "no two photos show the same things from clearly different places: the camera only "
-      "turned, or the scene moved",
-      "step sideways between photos instead of turning the camera, and keep the scene still"};
+      "turned, the scene moved, or its parts look alike",
+      "step sideways between photos instead of turning the camera, keep the scene still, and "
+      "include surroundings that do not repeat"};
 }
 
 void ExplainUnregistered(const AttemptResult& attempt, const std::vector<StagedPhoto>& photos,

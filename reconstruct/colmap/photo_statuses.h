@@ -9,6 +9,8 @@
 #include "kernels/scene/capture.h"
 #include "reconstruct/colmap/colmap_model.h"
 #include "reconstruct/colmap/colmap_output.h"
+#include "reconstruct/colmap/colmap_strategies.h"
+#include "reconstruct/colmap/simpler_lens.h"
 
 namespace regrade {
 
@@ -17,6 +19,7 @@ struct FoundModel {
   ColmapModel model;
   Capture capture;
   std::string refusal;  // from AssessScene; empty: plausible
+  std::string lens;     // likewise
 
   // Order: plausible, then number of photos, then number of points.
   auto Rank() const {
@@ -25,9 +28,14 @@ struct FoundModel {
 };
 
 struct AttemptResult {
-  std::string strategy;
+  PoseStrategy strategy;
+  LensFreedom freedom = LensFreedom::kFull;
+  std::string folder;              // of the database
   std::vector<FoundModel> models;  // best first
   ColmapEvidence evidence;
+
+  // "quick, one focal length"
+  std::string Name() const;
 };
 
 struct Reason {

@@ -74,11 +74,11 @@ struct PoseOptions {
 
 // Details of the pose computation.
 struct PoseReport {
-  std::string colmap_version;  // "3.8"
-  std::string strategy;        // of the attempt that was used
-  int attempts_made = 0;
-  std::string lens;                // chosen by the last adjustment
-  std::vector<std::string> notes;  // sentences for the user
+  std::string colmap_version;         // "3.8"
+  std::string strategy;               // of the attempt that was used
+  std::vector<std::string> attempts;  // each COLMAP run: "quick, one focal length: no model"
+  std::string lens;                   // chosen by the last adjustment
+  std::vector<std::string> notes;     // sentences for the user
 };
 
 // `photos`: staged PNGs in one folder, which may contain other files. `ingest_statuses`:

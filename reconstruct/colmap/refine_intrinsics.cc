@@ -26,7 +26,8 @@ constexpr size_t kFewestImages = 5;  // of a camera, for a free principal point
 
 std::string NameOf(const LensAttempt& attempt) {
   return std::string(ColmapLensName(attempt.lens)) +
-         (attempt.free_center ? ", free principal point" : ", principal point in the centre");
+         (attempt.free_center ? ", free principal point" : ", principal point in the centre") +
+         (attempt.held ? ", focal length held" : "");
 }
 
 // False for a diverged adjustment, which COLMAP writes all the same.
@@ -122,20 +123,23 @@ ColmapModel WithoutOutliers(const ColmapModel& model, const ColmapModel& referen
 }
 
 ColmapModel WithLens(const ColmapModel& model, ColmapLens lens) {
-  REGRADE_CHECK(lens == ColmapLens::kPinhole || lens == ColmapLens::kOpenCv);
+  const ColmapLensInfo& info = InfoOf(lens);
+  REGRADE_CHECK(info.focals > 0 &&
+                (info.lens == LensModel::kPinhole || info.lens == LensModel::kOpenCv));
   ColmapModel result = model;
   for (ColmapCamera& camera : result.cameras) {
     Camera& c = camera.intrinsics;
-    const bool keep = lens == ColmapLens::kOpenCv && c.lens == LensModel::kOpenCv;
+    if (c.lens != LensModel::kOpenCv) c.distortion = {};
+    std::fill(c.distortion.begin() + info.coefficients, c.distortion.end(), 0.0);
+    if (info.focals == 1 && c.fx != c.fy) c.fx = c.fy = std::sqrt(c.fx * c.fy);
     camera.lens = lens;
-    c.lens = lens == ColmapLens::kOpenCv ? LensModel::kOpenCv : LensModel::kPinhole;
-    if (!keep) c.distortion = {};
+    c.lens = info.lens;
   }
   return result;
 }
 
 RefinedModel RefineIntrinsics(ColmapProgram& colmap, const ColmapModel& mapped,
-                              const std::string& work_folder,
+                              LensFreedom freedom, const std::string& work_folder,
                               const ColmapProgram::Limits& limits,
                               const std::function<void(int, int)>& on_step,
                               const KeepGoingFunction& keep_going) {
@@ -157,6 +161,8 @@ RefinedModel RefineIntrinsics(ColmapProgram& colmap, const ColmapModel& mapped,
         {{"input_path", before},
          {"output_path", after},
          {"BundleAdjustment.refine_principal_point", attempt.free_center ? "1" : "0"},
+         {"BundleAdjustment.refine_focal_length", attempt.held ? "0" : "1"},
+         {"BundleAdjustment.refine_extra_params", attempt.held ? "0" : "1"},
          {"BundleAdjustment.function_tolerance", "1e-7"}},
         "bundle_adjuster_" + number, limits, {}, keep_going);
     RefinedModel refined{after, {}, attempt, NameOf(attempt)};
@@ -185,8 +191,14 @@ RefinedModel RefineIntrinsics(ColmapProgram& colmap, const ColmapModel& mapped,
 
   const ColmapModel start = WithoutOutliers(mapped, mapped, kOutlierFactor);
   std::optional<RefinedModel> chosen;
-  if (EnoughImagesForACenter(mapped)) chosen = choose_lens(start, true);
-  if (!chosen) chosen = choose_lens(start, false);
+  if (freedom == LensFreedom::kSquarePixels) {
+    chosen = adjust(start, {ColmapLens::kSimpleRadial});
+  } else if (freedom == LensFreedom::kHeldFocal) {
+    chosen = adjust(start, {ColmapLens::kSimplePinhole, false, true});
+  } else {
+    if (EnoughImagesForACenter(mapped)) chosen = choose_lens(start, true);
+    if (!chosen) chosen = choose_lens(start, false);
+  }
   if (chosen) {
     // Determines the outliers again: the mapper's fixed principal point misjudged some.
     const ColmapModel again = WithoutOutliers(mapped, chosen->model, kOutlierFactor);

@@ -7,12 +7,14 @@
 
 #include "reconstruct/colmap/colmap_model.h"
 #include "reconstruct/colmap/colmap_program.h"
+#include "reconstruct/colmap/simpler_lens.h"
 
 namespace regrade {
 
 struct LensAttempt {
   ColmapLens lens = ColmapLens::kPinhole;
   bool free_center = false;  // adjust the principal point
+  bool held = false;         // adjust neither focal lengths nor distortion
 };
 
 struct RefinedModel {
@@ -26,8 +28,9 @@ struct RefinedModel {
 // Mean squared reprojection error, pixels^2, over the observations in front of their cameras.
 double MeanSquaredReprojection(const ColmapModel& model);
 
-// The model with another lens: keeps focal lengths, centre, and the coefficients that both
-// lenses have. `lens` is kPinhole or kOpenCv.
+// The model with another lens: keeps centre, the coefficients that both lenses have, and focal
+// lengths, or their geometric mean where the lens has one. `lens` is kSimplePinhole, kPinhole,
+// kSimpleRadial or kOpenCv.
 ColmapModel WithLens(const ColmapModel& model, ColmapLens lens);
 
 // `model` without observations whose error in `reference` (the same images, cameras and points,
@@ -42,11 +45,12 @@ ColmapModel WithoutOutliers(const ColmapModel& model, const ColmapModel& referen
 // free principal point. Chooses PINHOLE unless OPENCV moves a corner of a picture by more than
 // half a pixel and reduces the mean squared error by more than 3 %. Adjusts once more with the
 // outliers determined by the result. If a principal point moves by more than a tenth of the
-// picture or the pixels are not square, the principal point stays in the centre. COLMAP's
-// results go to folders under `work_folder`. Calls `on_step(i, n)` before adjustment i of at
-// most n.
+// picture or the pixels are not square, the principal point stays in the centre. With less
+// than full `freedom` there is one lens instead: SIMPLE_RADIAL, or SIMPLE_PINHOLE that keeps
+// its focal length, in the centre. COLMAP's results go to folders under `work_folder`. Calls
+// `on_step(i, n)` before adjustment i of at most n.
 RefinedModel RefineIntrinsics(ColmapProgram& colmap, const ColmapModel& mapped,
-                              const std::string& work_folder,
+                              LensFreedom freedom, const std::string& work_folder,
                               const ColmapProgram::Limits& limits,
                               const std::function<void(int, int)>& on_step,
                               const KeepGoingFunction& keep_going);

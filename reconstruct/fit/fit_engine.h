@@ -8,6 +8,7 @@
 #include "kernels/device/backend.h"
 #include "kernels/field/render.h"
 #include "kernels/optimize/rmsprop.h"
+#include "reconstruct/fit/cell_statistics.h"
 #include "reconstruct/fit/fit_field.h"
 
 namespace regrade {
@@ -53,6 +54,8 @@ class FitEngine {
   virtual FitSums TakeSums() = 0;  // since the last call; may wait for queued steps
   // Renders the current field, colours clipped. Copies only the image to the host.
   virtual RenderedView Render(const Camera& camera, const MarchOptions& march) = 0;
+  // Of an adaptive field: removes and splits cells; moments stay.
+  virtual void RefineCells(const MarchOptions& march, const CellLimits& limits) = 0;
   // Prunes voxels whose rendering weight is below `threshold` in every view and resamples;
   // resets the optimizer's state, as in svox2. Background spheres, if any, get maps of
   // `sphere_resolution` and are not pruned.

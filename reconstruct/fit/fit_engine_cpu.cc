@@ -68,6 +68,13 @@ class CpuFitEngine : public FitEngine {
     ResetArenas();
   }
 
+  void RefineCells(const MarchOptions& march, const CellLimits& limits) override {
+    const CellStatistics statistics = MeasureCells(state_.grid, *rays_, march, kPruningStride);
+    ApplyChanges(ChooseChanges(state_.grid.cells, statistics, limits), &state_.grid,
+                 &state_.second_moment);
+    ResetArenas();
+  }
+
  private:
   void ResetArenas() {
     for (GradientArena& arena : arenas_) {
@@ -81,9 +88,11 @@ class CpuFitEngine : public FitEngine {
     const float scale = 1.0f / (3.0f * static_cast<float>(n));
     const int shards = static_cast<int>(arenas_.size());
     std::vector<FitStepResult> results(arenas_.size());
-    // The sampling run of total variation (see FitStep): contiguous vertices from a random
-    // start, wrapping around, scaled so that the expectation is lambda times the mean over all.
-    const int64_t vertices = state_.grid.frame.NumVertices();
+    // The sampling run of total variation (see FitStep): contiguous vertices, or cells, from a
+    // random start, wrapping around, scaled so that the expectation is lambda times the mean
+    // over all.
+    const int64_t vertices = state_.grid.cells.on() ? state_.grid.cells.num_cells()
+                                                    : state_.grid.frame.NumVertices();
     const int64_t run = static_cast<int64_t>(step.tv_fraction * static_cast<float>(vertices));
     const int64_t run_begin = static_cast<int64_t>(RandomIndex(
         seed_ ^ kRandomTotalVariation, step.number, 0, static_cast<uint64_t>(vertices)));

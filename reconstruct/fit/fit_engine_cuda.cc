@@ -76,6 +76,9 @@ class CudaFitEngine : public FitEngine {
     return RenderViewOnDevice(grid_, camera, march);
   }
 
+  void RefineCells(const MarchOptions&, const CellLimits&) override {
+    throw Error(ExitCode::kResources, "an adaptive field", "GPU", "use --device cpu");
+  }
   void Refine(const MarchOptions& march, float threshold, const Vec3i& resolution,
               int sphere_resolution) override {
     const DeviceRange range("pruning and resampling");

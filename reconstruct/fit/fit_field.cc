@@ -11,6 +11,7 @@
 
 #include "kernels/base/error.h"
 #include "reconstruct/fit/fit_engine.h"
+#include "reconstruct/fit/initial_cells.h"
 #include "reconstruct/fit/resample_grid.h"
 #include "reconstruct/fit/sphere_grid.h"
 
@@ -52,20 +53,17 @@ class Fitter {
   FitResult Run() {
     FitState state;
     if (hooks_.resume != nullptr) {
-      state = *hooks_.resume;
+      state = std::move(*hooks_.resume);
     } else {
-      const GridFrame frame{ResolutionFor(box_, options_.resolutions[0]), box_.center,
-                            box_.radius};
-      state.grid = MakeInitialGrid(rays_, frame, BasisOf(options_.sh_degree),
-                                   options_.initial_density, box_.near_clip, 2, box_.spheres);
+      state.grid = InitialGrid();
       if (box_.background) state.grid.background = *box_.background;
       if (state.grid.num_voxels() == 0)
         throw Error(ExitCode::kScene, "no part of the scene's box is seen by two cameras",
                     "reconstruct", "the poses are inconsistent; take photos with more overlap");
       if (box_.spheres) {
-        state.grid.spheres =
-            MakeInitialSpheres(rays_, frame, options_.background_layers, SphereResolution(0),
-                               options_.initial_background_density, state.grid.background);
+        state.grid.spheres = MakeInitialSpheres(
+            rays_, state.grid.frame, options_.background_layers, SphereResolution(0),
+            options_.initial_background_density, state.grid.background);
         // The background is fitted first, because the box would model distant surfaces wrongly.
         if (LeadSteps() > 0) SetDensities(0, &state.grid);
       }
@@ -107,6 +105,20 @@ class Fitter {
     for (int64_t v = 0; v < grid->num_voxels(); ++v)
       grid->records[v * grid->lanes() + DensityLane(grid->basis)] = density;
     RefreshDerived(grid);
+  }
+
+  FastGrid InitialGrid() const {
+    const int basis = BasisOf(options_.sh_degree), coarsest = options_.resolutions[0];
+    constexpr int kLeastViews = 2;
+    if (options_.adaptive()) {
+      const int finest = static_cast<int>(options_.resolutions.size()) - 1;
+      return MakeInitialCells(rays_, CellFrame(box_, coarsest, finest), finest, basis,
+                              options_.initial_density, box_.near_clip, kLeastViews,
+                              box_.spheres);
+    }
+    const GridFrame frame{ResolutionFor(box_, coarsest), box_.center, box_.radius};
+    return MakeInitialGrid(rays_, frame, basis, options_.initial_density, box_.near_clip,
+                           kLeastViews, box_.spheres);
   }
 
   static int BasisOf(int degree) { return (degree + 1) * (degree + 1); }
@@ -178,6 +190,12 @@ class Fitter {
     return step;
   }
 
+  [[noreturn]] void ThrowEmpty() const {
+    throw Error(ExitCode::kScene,
+                "no cell of the scene is left: none has enough weight in any view",
+                "reconstruct", "check the poses, or lower --prune-weight");
+  }
+
   int LeadSteps() const {
     return static_cast<int>(options_.background_lead * static_cast<float>(options_.steps[0]));
   }
@@ -190,6 +208,17 @@ class Fitter {
 
   // Prunes by weight and resamples to `longest` voxels a side; 0 keeps the resolution.
   void Refine(int longest) {
+    if (options_.adaptive()) {
+      const int stages = static_cast<int>(options_.resolutions.size());
+      const int before = std::clamp(stage_ - (longest > 0), 0, stages - 1);
+      const float width = static_cast<float>(options_.resolutions[static_cast<size_t>(before)]);
+      engine_->RefineCells(
+          {options_.step, options_.stop_transmittance},
+          {options_.prune_weight / width, options_.cell_pixels, longest > 0 ? stage_ : 0,
+           static_cast<int64_t>(double{options_.max_cells} * 1e6)});
+      if (engine_->num_voxels() == 0) ThrowEmpty();
+      return;
+    }
     const Vec3i now = engine_->resolution();
     const float longest_now = static_cast<float>(std::max({now.x, now.y, now.z}));
     const int last_stage = static_cast<int>(options_.resolutions.size()) - 1;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "kernels/base/options.h"
@@ -9,6 +10,7 @@
 namespace regrade {
 
 struct FitOptions {
+  std::string field = "uniform";
   std::vector<int> resolutions = {64, 128, 256};
   std::vector<int> steps = {800, 2000, 3000};
   int rays_per_step = 4096;
@@ -39,12 +41,21 @@ struct FitOptions {
   float tv_background_fraction = 0.01f;
   float initial_background_density = 0.1f;
   float background_lead = 0.9f;
+  float cell_pixels = 1.0f;
+  float max_cells = 12.0f;
   int shards = 0;
   bool exact_sums = false;
   uint64_t seed = 0;
 
+  bool adaptive() const { return field == "adaptive"; }
+
   template <typename Bind>
   void Describe(Bind& bind) {
+    bind("fit-field", field,
+         {.help = "uniform: voxels of one width; adaptive: cells that are halved where two "
+                  "photos see them wider than "
+                  "a pixel",
+          .choices = "uniform|adaptive"});
     bind("fit-resolutions", resolutions,
          {.unit = "voxels",
           .help = "longest side of the grid in each stage, coarse to fine; memory grows with "
@@ -163,6 +174,18 @@ struct FitOptions {
           .help = "time in which only the background is fitted",
           .min = 0,
           .max = 0.9});
+    bind("fit-cell-pixels", cell_pixels,
+         {.unit = "pixels",
+          .help =
+              "adaptive field: cells that only one photo sees wider than this are not halved",
+          .min = 0.1,
+          .max = 100});
+    bind("fit-max-cells", max_cells,
+         {.unit = "millions of cells",
+          .help = "adaptive field: where more would be halved, those that explain the largest "
+                  "errors are",
+          .min = 0.001,
+          .max = 200});
     bind("fit-shards", shards,
          {.help = "gradient arenas; 0: one per thread, or 4 with --reproducible",
           .min = 0,

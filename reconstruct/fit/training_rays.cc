@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "kernels/base/error.h"
 #include "kernels/base/random.h"
@@ -91,6 +92,17 @@ Ray TrainingRays::RayOf(int view, int x, int y) const {
   Ray ray{v.origin, v.world_from_camera * d};
   if (v.camera.ndc.on()) NdcRay(v.camera.ndc, &ray.origin, &ray.direction);
   return ray;
+}
+
+Vec3f TrainingRays::ColorOf(int view, int x, int y) const {
+  const StoredView& v = views_[static_cast<size_t>(view)];
+  const int64_t pixel = static_cast<int64_t>(y) * v.camera.width + x;
+  constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+  if (v.IsMasked(pixel)) return {kNone, kNone, kNone};
+  const uint16_t* color = v.color.data() + 3 * pixel;
+  return Vec3f{static_cast<float>(color[0]), static_cast<float>(color[1]),
+               static_cast<float>(color[2])} /
+         65535.0f;
 }
 
 DeviceViews TrainingRays::ToDevice() const {

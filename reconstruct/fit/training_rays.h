@@ -35,6 +35,7 @@ class TrainingRays {
             std::vector<Vec3f>* targets) const;
 
   Ray RayOf(int view, int x, int y) const;
+  Vec3f ColorOf(int view, int x, int y) const;  // sRGB; NaN where masked
   // Copies all views to a CUDA device. Throws Error(kResources) if it does not fit, or without
   // CUDA.
   DeviceViews ToDevice() const;

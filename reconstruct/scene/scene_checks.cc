@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "kernels/base/error.h"
 #include "kernels/base/quantile.h"
@@ -13,6 +14,12 @@ namespace {
 // The number of pairs grows with the square of a track's length; this many evenly chosen views
 // approximate the largest angle well.
 constexpr size_t kViewsOfATrack = 32;
+// Focal length over the longer side: the limits of COLMAP's mapper, 157 to 6 degrees.
+constexpr double kLeastFocal = 0.1, kMostFocal = 10;
+// A ray through an image point is projected to that point, within pixels, unless the distortion
+// folds over before it: the error is then the distance to the fold.
+constexpr double kMostFoldError = 0.5;
+constexpr int kBorderSteps = 16;  // of a side
 
 double LargestAngle(const Vec3d& point, const std::vector<int32_t>& views,
                     const std::vector<Vec3d>& centers) {
@@ -33,6 +40,25 @@ std::vector<Vec3d> Centers(const Capture& capture) {
   std::vector<Vec3d> centers;
   for (const CaptureView& view : capture.views) centers.push_back(view.camera.Center());
   return centers;
+}
+
+// Whether some point of the picture's border is the image of no ray.
+bool FoldsOver(Camera camera) {
+  camera.camera_from_world = {};
+  for (int i = 0; i <= kBorderSteps; ++i) {
+    const double x = camera.width * i / double{kBorderSteps};
+    const double y = camera.height * i / double{kBorderSteps};
+    for (const auto& [u, v] : {std::pair(x, 0.0), std::pair(x, double(camera.height)),
+                               std::pair(0.0, y), std::pair(double(camera.width), y)}) {
+      const Vec3d ray = camera.CameraRay(u, v);
+      double back_u, back_v;
+      if (ray.z <= 0) continue;  // of a fisheye lens, behind its image plane
+      if (!camera.Project(ray, &back_u, &back_v) ||
+          !(std::hypot(back_u - u, back_v - v) < kMostFoldError))
+        return true;
+    }
+  }
+  return false;
 }
 
 std::string Rounded(double value, int digits) { return Format("%.*f", digits, value); }
@@ -95,6 +121,22 @@ double LargestDistance(const std::vector<Vec3d>& points) {
   return largest;
 }
 
+std::string ImplausibleLens(const Capture& capture, double max_pixel_aspect) {
+  const double aspect = WorstPixelAspect(capture);
+  if (std::max(aspect, 1 / aspect) > max_pixel_aspect)
+    return "pixels that are not square (fx / fy = " + Rounded(aspect, 3) + ")";
+  const Camera* last = nullptr;
+  for (const CaptureView& view : capture.views) {
+    if (last != nullptr && last->SameIntrinsics(view.camera)) continue;
+    last = &view.camera;
+    const double focal = std::min(last->fx, last->fy) / std::max(last->width, last->height);
+    if (!(focal > kLeastFocal && focal < kMostFocal))
+      return "a focal length of " + Rounded(focal, 2) + " times the picture's longer side";
+    if (FoldsOver(*last)) return "a distortion that folds the picture over";
+  }
+  return "";
+}
+
 SceneAssessment AssessScene(const Capture& capture, const SceneLimits& limits) {
   SceneAssessment assessment;
   const auto refuse = [&](const std::string& why, const std::string& remedy) {
@@ -114,12 +156,13 @@ SceneAssessment AssessScene(const Capture& capture, const SceneLimits& limits) {
             Rounded(angle_deg, 2) +
             " degrees (needed: " + Rounded(limits.min_triangulation_angle_deg, 1) + ")",
         "a camera that only turns shows no depth: step sideways between photos");
-  const double aspect = WorstPixelAspect(capture);
-  if (std::max(aspect, 1 / aspect) > limits.max_pixel_aspect)
-    return refuse("the estimated camera has pixels that are not square (fx / fy = " +
-                      Rounded(aspect, 3) + "), so its geometry is unreliable",
-                  "take more photos, stepping sideways between them instead of only turning "
-                  "the camera, and keep the scene still");
+  assessment.lens = ImplausibleLens(capture, limits.max_pixel_aspect);
+  if (!assessment.lens.empty())
+    return refuse(
+        "the estimated camera has " + assessment.lens + ", so its geometry is unreliable",
+        "the photos do not determine the lens: take some from further to the sides "
+        "and at other distances, all at one zoom setting; do not crop or stretch "
+        "them, and keep their EXIF data, which has the focal length");
   if (views < limits.min_views)
     return refuse(
         Concat("only ", views, " photos could be registered, and a scene needs at least ",

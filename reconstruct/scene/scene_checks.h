@@ -24,6 +24,12 @@ double WorstPixelAspect(const Capture& capture);
 // Largest distance between two of these points; 0 for fewer.
 double LargestDistance(const std::vector<Vec3d>& points);
 
+// What is implausible about the views' lenses, worded to follow "the estimated camera has";
+// empty if there is nothing. Photos that do not determine a lens give pixels that are not
+// square, a focal length far from any lens's, or a distortion that maps two rays to one image
+// point.
+std::string ImplausibleLens(const Capture& capture, double max_pixel_aspect);
+
 struct SceneLimits {
   int min_views = 5;
   double min_triangulation_angle_deg = 1.5;
@@ -35,6 +41,7 @@ struct SceneLimits {
 struct SceneAssessment {
   std::string refusal;             // empty: the scene is usable
   std::string remedy;              // of the refusal
+  std::string lens;                // ImplausibleLens, if that is why; else empty
   std::vector<std::string> notes;  // warnings about a usable scene
 };
 

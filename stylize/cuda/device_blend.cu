@@ -1,6 +1,7 @@
 // Colours of rays blended from rows of the points that they touch, and the adjoint; a warp a
 // sample.
 #include "kernels/device/device_stream.h"
+#include "kernels/field/cuda/gradient_view.h"
 #include "kernels/field/cuda/launch.h"
 #include "kernels/field/cuda/warp_shade.h"
 #include "stylize/cuda/device_ray_weights.h"
@@ -76,16 +77,34 @@ __device__ float ChannelSums(float value, int lane) {
   return value + __shfl_down_sync(kAllLanes, value, 1);
 }
 
-__global__ void BeginColorsKernel(Vec3f background, const float* transmittance, int64_t n,
-                                  Vec3f* color) {
-  const int64_t r = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
-  if (r < n) color[r] = background * transmittance[r];
+// Adds to value `at`; integers are twice as wide.
+template <bool kExact>
+__device__ void AddTo(float* sums, int64_t at, float v) {
+  if constexpr (kExact)
+    AddExact(sums + 2 * at, 0, v);
+  else
+    atomicAdd(sums + at, v);
 }
 
+// values [n], or the first width * *counted of them, from integers.
+__global__ void TakeExactKernel(const float* exact, int64_t n, int width,
+                                const int32_t* counted, float* values) {
+  const int64_t i = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
+  if (i < n && (counted == nullptr || i < int64_t{*counted} * width))
+    values[i] = ExactSum(exact + 2 * i, 0);
+}
+
+__global__ void AddBackgroundKernel(Vec3f background, const float* transmittance, int64_t n,
+                                    Vec3f* color) {
+  const int64_t r = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
+  if (r < n) color[r] += background * transmittance[r];
+}
+
+template <bool kExact>
 __global__ void BlendColorsKernel(DeviceGridView grid, int basis,
                                   const DeviceWeightedSample* samples, int64_t n,
                                   const int32_t* counted, const int32_t* slot_of_point,
-                                  const Ray* rays, const float* rows, Vec3f* color,
+                                  const Ray* rays, const float* rows, float* color,
                                   uint8_t* unclamped) {
   const int64_t i = ItemOfWarp(n, counted);
   if (i < 0) return;
@@ -94,13 +113,15 @@ __global__ void BlendColorsKernel(DeviceGridView grid, int basis,
   const float value = 0.5f + sum;  // of a channel on its first lane
   const bool first = warp.lane < 27 && warp.lane % 9 == 0;
   if (first && value > 0)
-    atomicAdd(&color[warp.sample.ray][warp.lane / 9], warp.sample.weight * value);
+    AddTo<kExact>(color, int64_t{warp.sample.ray} * 3 + warp.lane / 9,
+                  warp.sample.weight * value);
   const unsigned above = __ballot_sync(kAllLanes, first && value > 0);
   if (warp.lane == 0)
     unclamped[i] =
         static_cast<uint8_t>((above & 1) | (above >> 9 & 1) << 1 | (above >> 18 & 1) << 2);
 }
 
+template <bool kExact>
 __global__ void BlendColorsAdjointKernel(DeviceGridView grid, int basis,
                                          const DeviceWeightedSample* samples, int64_t n,
                                          const int32_t* counted, const int32_t* slot_of_point,
@@ -124,69 +145,96 @@ __global__ void BlendColorsAdjointKernel(DeviceGridView grid, int basis,
     const int32_t at = __shfl_sync(kAllLanes, warp.slot, k);
     const float w = __shfl_sync(kAllLanes, warp.corner, k);
     if (at >= 0 && d_blend != 0)
-      atomicAdd(&d_rows[int64_t{at} * kRowLanes + warp.lane], w * d_blend);
+      AddTo<kExact>(d_rows, int64_t{at} * kRowLanes + warp.lane, w * d_blend);
   }
 }
 
+template <bool kExact>
 __global__ void BlendRowsKernel(DeviceGridView grid, const DeviceWeightedSample* samples,
                                 int64_t n, const int32_t* counted, const int32_t* slot_of_point,
                                 const float* rows, float* sums) {
   const int64_t i = ItemOfWarp(n, counted);
   if (i < 0) return;
   const WarpSample warp(grid, 1, samples[i], slot_of_point, nullptr);
-  atomicAdd(&sums[int64_t{warp.sample.ray} * kRowLanes + warp.lane],
-            warp.sample.weight * warp.Blend(rows));
+  AddTo<kExact>(sums, int64_t{warp.sample.ray} * kRowLanes + warp.lane,
+                warp.sample.weight * warp.Blend(rows));
+}
+
+constexpr int64_t kFloatBytes = sizeof(float);
+
+// What is left of integer sums: values [n], the rows of kRowLanes that are counted.
+void TakeExact(const float* exact, int64_t n, const int32_t* counted, float* values) {
+  TakeExactKernel<<<BlocksFor(n), kThreads, 0, LaunchStream()>>>(exact, n, kRowLanes, counted,
+                                                                 values);
+  CheckLaunch("take_exact");
 }
 
 }  // namespace
 
 void BlendColors(const DeviceGrid& grid, const DeviceRayWeights& weights,
                  const DeviceSlots& slots, const Ray* rays, const float* rows, Vec3f* color,
-                 uint8_t* unclamped) {
-  if (weights.num_rays == 0) return;
-  BeginColorsKernel<<<BlocksFor(weights.num_rays), kThreads, 0, LaunchStream()>>>(
+                 uint8_t* unclamped, float* exact) {
+  const int64_t values = 3 * weights.num_rays;
+  if (values == 0) return;
+  float* const sums = exact != nullptr ? exact : &color->x;
+  DeviceZero(sums, (exact != nullptr ? 2 : 1) * values * kFloatBytes);
+  if (weights.num_samples > 0) {
+    const auto kernel = exact != nullptr ? BlendColorsKernel<true> : BlendColorsKernel<false>;
+    kernel<<<BlocksFor(32 * weights.num_samples), kThreads, 0, LaunchStream()>>>(
+        grid.view(), grid.basis, weights.samples.data(), weights.num_samples,
+        weights.counter.data(), slots.slot_of_point.data(), rays, rows, sums, unclamped);
+    CheckLaunch("blend_colors");
+  }
+  if (exact != nullptr) TakeExact(exact, values, nullptr, &color->x);
+  AddBackgroundKernel<<<BlocksFor(weights.num_rays), kThreads, 0, LaunchStream()>>>(
       grid.background, weights.transmittance.data(), weights.num_rays, color);
-  CheckLaunch("begin_colors");
-  if (weights.num_samples == 0) return;
-  BlendColorsKernel<<<BlocksFor(32 * weights.num_samples), kThreads, 0, LaunchStream()>>>(
-      grid.view(), grid.basis, weights.samples.data(), weights.num_samples,
-      weights.counter.data(), slots.slot_of_point.data(), rays, rows, color, unclamped);
-  CheckLaunch("blend_colors");
+  CheckLaunch("add_background");
 }
 
 void BlendColorsAdjoint(const DeviceGrid& grid, const DeviceRayWeights& weights,
                         const DeviceSlots& slots, const Ray* rays, const uint8_t* unclamped,
-                        const Vec3f* d_color, float* d_rows) {
-  if (weights.num_samples == 0) return;
-  BlendColorsAdjointKernel<<<BlocksFor(32 * weights.num_samples), kThreads, 0,
-                             LaunchStream()>>>(
-      grid.view(), grid.basis, weights.samples.data(), weights.num_samples,
-      weights.counter.data(), slots.slot_of_point.data(), rays, unclamped, d_color, d_rows);
-  CheckLaunch("blend_colors_adjoint");
+                        const Vec3f* d_color, float* d_rows, float* exact) {
+  if (weights.num_samples > 0) {
+    const auto kernel =
+        exact != nullptr ? BlendColorsAdjointKernel<true> : BlendColorsAdjointKernel<false>;
+    kernel<<<BlocksFor(32 * weights.num_samples), kThreads, 0, LaunchStream()>>>(
+        grid.view(), grid.basis, weights.samples.data(), weights.num_samples,
+        weights.counter.data(), slots.slot_of_point.data(), rays, unclamped, d_color,
+        exact != nullptr ? exact : d_rows);
+    CheckLaunch("blend_colors_adjoint");
+  }
+  if (exact != nullptr && slots.num_slots > 0)
+    TakeExact(exact, slots.num_slots * kRowLanes, slots.counter.data(), d_rows);
 }
 
 void BlendRows(const DeviceGrid& grid, const DeviceRayWeights& weights,
-               const DeviceSlots& slots, const float* rows, float* sums) {
-  DeviceZero(sums, weights.num_rays * kRowLanes * int64_t{sizeof(float)});
-  if (weights.num_samples == 0) return;
-  BlendRowsKernel<<<BlocksFor(32 * weights.num_samples), kThreads, 0, LaunchStream()>>>(
-      grid.view(), weights.samples.data(), weights.num_samples, weights.counter.data(),
-      slots.slot_of_point.data(), rows, sums);
-  CheckLaunch("blend_rows");
+               const DeviceSlots& slots, const float* rows, float* sums, float* exact) {
+  const int64_t values = weights.num_rays * kRowLanes;
+  if (values == 0) return;
+  float* const to = exact != nullptr ? exact : sums;
+  DeviceZero(to, (exact != nullptr ? 2 : 1) * values * kFloatBytes);
+  if (weights.num_samples > 0) {
+    const auto kernel = exact != nullptr ? BlendRowsKernel<true> : BlendRowsKernel<false>;
+    kernel<<<BlocksFor(32 * weights.num_samples), kThreads, 0, LaunchStream()>>>(
+        grid.view(), weights.samples.data(), weights.num_samples, weights.counter.data(),
+        slots.slot_of_point.data(), rows, to);
+    CheckLaunch("blend_rows");
+  }
+  if (exact != nullptr) TakeExact(exact, values, nullptr, sums);
 }
 
 #else
 
 void BlendColors(const DeviceGrid&, const DeviceRayWeights&, const DeviceSlots&, const Ray*,
-                 const float*, Vec3f*, uint8_t*) {
+                 const float*, Vec3f*, uint8_t*, float*) {
   DeviceWait("blend_colors");
 }
 void BlendColorsAdjoint(const DeviceGrid&, const DeviceRayWeights&, const DeviceSlots&,
-                        const Ray*, const uint8_t*, const Vec3f*, float*) {
+                        const Ray*, const uint8_t*, const Vec3f*, float*, float*) {
   DeviceWait("blend_colors_adjoint");
 }
 void BlendRows(const DeviceGrid&, const DeviceRayWeights&, const DeviceSlots&, const float*,
-               float*) {
+               float*, float*) {
   DeviceWait("blend_rows");
 }
 

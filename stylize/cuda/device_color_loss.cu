@@ -1,5 +1,6 @@
 #include "kernels/device/device_stream.h"
 #include "kernels/device/launch_size.h"
+#include "kernels/field/cuda/gradient_view.h"
 #include "stylize/cuda/device_color_loss.h"
 #include "stylize/field/color_error.h"
 
@@ -27,6 +28,8 @@ __global__ void ColorLossKernel(const Vec3f* color, const Vec3f* targets,
         shown += static_cast<double>(error.shown) * error.shown;
         d[c] = 2 * error.loss;
       }
+      loss = ExactTerm(loss);
+      shown = ExactTerm(shown);
     }
     d_color[r] = d;
   }

@@ -22,7 +22,8 @@ struct ColorLossRule {
 };
 
 // d_color [n] = 2 (color - target), 0 where a ray does not count; adds to *sums, which lies on
-// the device.
+// the device: a ray's terms are rounded to multiples of 2^-26, so that sums do not depend on
+// the order of rays.
 void AddColorLoss(const Vec3f* color, const Vec3f* targets, const float* transmittance,
                   int64_t n, const ColorLossRule& rule, Vec3f* d_color, DeviceColorLoss* sums);
 

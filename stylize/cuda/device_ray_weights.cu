@@ -7,16 +7,21 @@
 #include "kernels/field/cuda/warp_layers.h"
 #include "stylize/cuda/device_ray_weights.h"
 
-namespace regrade {
+#if defined(__CUDACC__)
+#include <cub/device/device_scan.cuh>
+#endif
 
-DeviceSlots::DeviceSlots(const DeviceGrid& grid)
-    : slot_of_point(grid.num_points(), "slots of voxels"),
-      point_of_slot(grid.num_points(), "voxels of slots"),
-      counter(1, "a counter of slots") {}
+namespace regrade {
 
 #if defined(__CUDACC__)
 
 namespace {
+
+// The number of marks before each word, in place of its own.
+void SumBefore(int64_t words, int32_t* counts, void* scratch, size_t* scratch_bytes) {
+  cub::DeviceScan::ExclusiveSum(scratch, *scratch_bytes, counts, counts,
+                                static_cast<int>(words), LaunchStream());
+}
 
 // Where samples go: those beyond the list's capacity are counted and not written.
 struct SampleList {
@@ -90,24 +95,20 @@ __global__ void MarchSpheresKernel(DeviceGridView grid, const Ray* rays, int64_t
   if (layers.lane() == 0) transmittance[r] = layers.transmittance();
 }
 
-// A lane a word of marks; a warp takes its slots at once.
-__global__ void AssignSlotsKernel(uint32_t* touched, int64_t words, int32_t* slot_of_point,
+__global__ void CountMarksKernel(const uint32_t* touched, int64_t words, int32_t* counts) {
+  const int64_t word = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
+  if (word < words) counts[word] = __popc(touched[word]);
+}
+
+// A thread a word of marks.
+__global__ void AssignSlotsKernel(uint32_t* touched, int64_t words,
+                                  const int32_t* first_of_word, int32_t* slot_of_point,
                                   int32_t* point_of_slot, int32_t* counter) {
   const int64_t word = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
-  const int lane = static_cast<int>(threadIdx.x & 31);
-  unsigned marks = word < words ? touched[word] : 0;
-  const int count = __popc(marks);
-  int before = count;
-#pragma unroll
-  for (int d = 1; d < 32; d *= 2) {
-    const int other = __shfl_up_sync(kAllLanes, before, d);
-    if (lane >= d) before += other;
-  }
-  const int all = __shfl_sync(kAllLanes, before, 31);
-  if (all == 0) return;
-  int begin = 0;
-  if (lane == 0) begin = atomicAdd(counter, all);
-  int slot = __shfl_sync(kAllLanes, begin, 0) + before - count;
+  if (word >= words) return;
+  unsigned marks = touched[word];
+  int slot = first_of_word[word];
+  if (word + 1 == words) *counter = slot + __popc(marks);
   if (marks == 0) return;
   touched[word] = 0;
   for (; marks != 0; marks &= marks - 1, ++slot) {
@@ -128,6 +129,16 @@ __global__ void ClampToCapacityKernel(int64_t sample_capacity, int64_t slot_capa
 }
 
 }  // namespace
+
+DeviceSlots::DeviceSlots(const DeviceGrid& grid)
+    : slot_of_point(grid.num_points(), "slots of voxels"),
+      point_of_slot(grid.num_points(), "voxels of slots"),
+      counter(1, "a counter of slots"),
+      first_of_word((grid.num_points() + 31) / 32, "slots before words") {
+  size_t bytes = 0;
+  SumBefore(first_of_word.size(), first_of_word.data(), nullptr, &bytes);
+  scan_scratch = DeviceBuffer<uint8_t>(static_cast<int64_t>(bytes), "scratch of a scan");
+}
 
 void DeviceRayWeights::Reserve(int64_t rays, int64_t most_samples) {
   if (counter.empty()) counter = DeviceBuffer<int32_t>(1, "a counter of samples");
@@ -175,10 +186,17 @@ void DeviceRayWeights::March(const DeviceGrid& grid, const Ray* rays, int64_t n,
 }
 
 void DeviceSlots::Launch(DeviceTouched* touched) {
-  counter.Zero();
   const int64_t words = touched->bits.size();
+  uint32_t* const marks = touched->bits.data();
+  CountMarksKernel<<<BlocksFor(words), kThreads, 0, LaunchStream()>>>(marks, words,
+                                                                      first_of_word.data());
+  CheckLaunch("count_marks");
+  size_t bytes = static_cast<size_t>(scan_scratch.size());
+  SumBefore(words, first_of_word.data(), scan_scratch.data(), &bytes);
+  CheckLaunch("scan_marks");
   AssignSlotsKernel<<<BlocksFor(words), kThreads, 0, LaunchStream()>>>(
-      touched->bits.data(), words, slot_of_point.data(), point_of_slot.data(), counter.data());
+      marks, words, first_of_word.data(), slot_of_point.data(), point_of_slot.data(),
+      counter.data());
   CheckLaunch("assign_slots");
 }
 
@@ -200,6 +218,7 @@ void ClampToCapacity(int64_t slot_capacity, DeviceRayWeights* weights, DeviceSlo
 
 #else
 
+DeviceSlots::DeviceSlots(const DeviceGrid&) { DeviceWait("assign_slots"); }
 void DeviceRayWeights::March(const DeviceGrid&, const Ray*, int64_t, const MarchOptions&, float,
                              DeviceTouched*) {
   DeviceWait("march_weights");

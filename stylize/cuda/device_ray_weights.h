@@ -38,11 +38,13 @@ struct DeviceRayWeights {
               float min_weight, DeviceTouched* touched);
 };
 
-// Touched points (see DeviceGridView) in a dense list, near each other where the voxels are.
+// Touched points (see DeviceGridView) in a dense list, in their order.
 struct DeviceSlots {
   DeviceBuffer<int32_t> slot_of_point;  // only touched points' entries mean anything
   DeviceBuffer<int32_t> point_of_slot;  // the first num_slots of it
   DeviceBuffer<int32_t> counter;
+  DeviceBuffer<int32_t> first_of_word;  // slots before each word of marks
+  DeviceBuffer<uint8_t> scan_scratch;
   int64_t num_slots = 0;
 
   explicit DeviceSlots(const DeviceGrid& grid);
@@ -60,18 +62,24 @@ struct BufferDemand {
 void ClampToCapacity(int64_t slot_capacity, DeviceRayWeights* weights, DeviceSlots* slots,
                      BufferDemand* room);
 
+// Sums over samples, whose order differs from run to run. `exact`, here and below, is null for
+// float sums, or room on the device for twice as many floats as the result has: values are then
+// summed there as integers (AddExact in gradient_view.h), and the result is the same in any
+// order.
+
 // The colours of rays whose voxels have the rows of `slots` instead of their own: color [rays]
 // begins with the background and is not clipped at 1. unclamped [samples]: bit c is set where
 // the clamp at 0 left channel c alone.
 void BlendColors(const DeviceGrid& grid, const DeviceRayWeights& weights,
                  const DeviceSlots& slots, const Ray* rays, const float* rows, Vec3f* color,
-                 uint8_t* unclamped);
+                 uint8_t* unclamped, float* exact);
 // Its adjoint: adds to d_rows [slots, kRowLanes], the masses of EQ(view-penalty) among them.
+// With `exact` it adds to that, and d_rows is what has been added since it was zero.
 void BlendColorsAdjoint(const DeviceGrid& grid, const DeviceRayWeights& weights,
                         const DeviceSlots& slots, const Ray* rays, const uint8_t* unclamped,
-                        const Vec3f* d_color, float* d_rows);
+                        const Vec3f* d_color, float* d_rows, float* exact);
 // sums [rays, kRowLanes] = sum_i w_i of the blended rows themselves.
 void BlendRows(const DeviceGrid& grid, const DeviceRayWeights& weights,
-               const DeviceSlots& slots, const float* rows, float* sums);
+               const DeviceSlots& slots, const float* rows, float* sums, float* exact);
 
 }  // namespace regrade

@@ -1,6 +1,7 @@
 #include "kernels/device/device_stream.h"
 #include "kernels/device/launch_size.h"
 #include "kernels/field/background_spheres.h"
+#include "kernels/field/cuda/gradient_view.h"
 #include "stylize/cuda/device_rows.h"
 #include "stylize/cuda/warp_item.h"
 #include "stylize/field/view_penalty.h"
@@ -90,7 +91,7 @@ __global__ void AddViewPenaltyKernel(Mat3f matrix, const float* from, const floa
   if (threadIdx.x > 0) return;
   double of_block = 0;
   for (int w = 0; w < kThreads / 32; ++w) of_block += double{of_warp[w]};
-  if (of_block != 0) atomicAdd(loss, double{view_weight} * of_block);
+  if (of_block != 0) atomicAdd(loss, ExactTerm(double{view_weight} * of_block));
 }
 
 __global__ void ScatterRowsKernel(const float* rows, int64_t first, int64_t n, int basis,

@@ -52,15 +52,17 @@ class DeviceStyleLoss : public StyleLoss {
     Forward(network.Effective<float>(), precision);
     AddBaseMap(network.data(), features_.data(), slots_.num_slots, rows_.data());
     if (gradient != nullptr) {
-      Reserve(slots_.num_slots * kRowLanes, "gradients of styled voxels", &d_rows_);
-      DeviceZero(d_rows_.data(), slots_.num_slots * kRowLanes * int64_t{sizeof(float)});
+      const int64_t values = slots_.num_slots * kRowLanes;
+      Reserve(values, "gradients of styled voxels", &d_rows_);
+      float* const sums = options_.exact_sums ? Exact(values, &exact_rows_) : d_rows_.data();
+      DeviceZero(sums, (options_.exact_sums ? 2 : 1) * values * int64_t{sizeof(float)});
     }
     sums_.Zero();
     ForEachBand([&](int64_t begin, int64_t) {
       BlendBand(begin);
       if (gradient != nullptr)
         BlendColorsAdjoint(grid_, weights_, slots_, rays_.data() + begin, unclamped_.data(),
-                           d_color_.data(), d_rows_.data());
+                           d_color_.data(), d_rows_.data(), exact_rows_.data());
     });
     if (gradient != nullptr) {
       AddViewPenalty(BaseOf(network.data()).matrix, features_.data(), rows_.data(),
@@ -117,7 +119,8 @@ class DeviceStyleLoss : public StyleLoss {
     for (int half = 0; half < kMlpHidden; half += kRowLanes) {
       Forward(HiddenUnits(network, half), MlpPrecision::kSplit);
       ForEachBand([&](int64_t begin, int64_t count) {
-        BlendRows(grid_, weights_, slots_, rows_.data(), of_rays.data());
+        BlendRows(grid_, weights_, slots_, rows_.data(), of_rays.data(),
+                  Exact(count * kRowLanes, &exact_sums_));
         of_rays.CopyOut(band.data() + begin * kRowLanes, count * kRowLanes);
       });
       for (size_t i = 0; i < counted.size(); ++i)
@@ -173,13 +176,19 @@ class DeviceStyleLoss : public StyleLoss {
     }
   }
 
+  // Room for integer sums of so many values; null without exact_sums.
+  float* Exact(int64_t values, DeviceBuffer<float>* buffer) const {
+    if (options_.exact_sums) Reserve(2 * values, "exact sums of the style", buffer);
+    return buffer->data();
+  }
+
   // Colours, loss and what goes back for the band that begins at ray `begin`.
   void BlendBand(int64_t begin) {
     Reserve(weights_.num_rays, "colours of rays", &color_);
     Reserve(weights_.num_rays, "gradients of colours", &d_color_);
     Reserve(weights_.num_samples, "clamps of samples", &unclamped_);
     BlendColors(grid_, weights_, slots_, rays_.data() + begin, rows_.data(), color_.data(),
-                unclamped_.data());
+                unclamped_.data(), Exact(3 * weights_.num_rays, &exact_sums_));
     AddColorLoss(color_.data(), targets_.data() + begin, weights_.transmittance.data(),
                  weights_.num_rays, {options_.max_transmittance, options_.one_sided},
                  d_color_.data(), sums_.data());
@@ -196,6 +205,7 @@ class DeviceStyleLoss : public StyleLoss {
   DeviceBuffer<Vec3f> targets_, color_, d_color_;
   DeviceBuffer<uint8_t> unclamped_;
   DeviceBuffer<float> features_, rows_, d_rows_;  // [slots, kRowLanes]
+  DeviceBuffer<float> exact_rows_, exact_sums_;
   DeviceBuffer<DeviceColorLoss> sums_;
 };
 

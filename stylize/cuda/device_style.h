@@ -12,9 +12,9 @@
 namespace regrade {
 
 // `grid` is the field, not one that is being fitted; it stays with the caller. Gradients are of
-// TF32 products, loss and hidden sums as good as float's; float sums in no fixed order, so two
-// runs differ in the last bits. Throws Error(kResources) without a device, or where its memory
-// is too small.
+// TF32 products, loss and hidden sums as good as float's; with options.exact_sums they do not
+// depend on the order in which samples are added, and two runs are bitwise equal. Throws
+// Error(kResources) without a device, or where its memory is too small.
 std::unique_ptr<StyleLoss> MakeDeviceStyleLoss(const DeviceGrid* grid,
                                                const AggregationOptions& options);
 

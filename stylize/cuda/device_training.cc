@@ -55,6 +55,7 @@ class DeviceTraining::CapturedSteps {
         color_(rays_per_step, "colours of rays"),
         d_color_(rays_per_step, "gradients of colours"),
         sums_(1, "sums of a loss"),
+        exact_colors_(options.exact_sums ? 6 * rays_per_step : 0, "exact colours of rays"),
         demand_(1, "buffer sizes that a step needed"),
         stats_(most_steps, "statistics of steps") {
     stats_.Zero();
@@ -124,6 +125,8 @@ class DeviceTraining::CapturedSteps {
     rows_ = DeviceBuffer<float>(floats, "styled voxels");
     d_rows_ = {};
     d_rows_ = DeviceBuffer<float>(floats, "gradients of styled voxels");
+    exact_rows_ = {};
+    if (options_.exact_sums) exact_rows_ = DeviceBuffer<float>(2 * floats, "exact gradients");
     unclamped_ = {};
     unclamped_ = DeviceBuffer<uint8_t>(sample_capacity_, "clamps of samples");
     mlp_.ReserveAdjoint(slot_capacity_);
@@ -148,15 +151,15 @@ class DeviceTraining::CapturedSteps {
     if (has_base_)
       AddMappedRows(base_.matrix, base_.constant, features_.data(), slot_capacity_,
                     rows_.data(), touched);
-    d_rows_.Zero();
+    (options_.exact_sums ? exact_rows_ : d_rows_).Zero();
     sums_.Zero();
     BlendColors(grid_, weights_, slots_, rays_.data(), rows_.data(), color_.data(),
-                unclamped_.data());
+                unclamped_.data(), exact_colors_.data());
     AddColorLoss(color_.data(), targets_.data(), weights_.transmittance.data(), rays_.size(),
                  {options_.max_transmittance, options_.one_sided}, d_color_.data(),
                  sums_.data());
     BlendColorsAdjoint(grid_, weights_, slots_, rays_.data(), unclamped_.data(),
-                       d_color_.data(), d_rows_.data());
+                       d_color_.data(), d_rows_.data(), exact_rows_.data());
     AddViewPenalty(base_.matrix, features_.data(), rows_.data(), slot_capacity_,
                    static_cast<float>(options_.view_weight), d_rows_.data(),
                    &sums_.data()->loss, touched);
@@ -213,6 +216,7 @@ class DeviceTraining::CapturedSteps {
   DeviceBuffer<Ray> rays_;
   DeviceBuffer<Vec3f> targets_, color_, d_color_;
   DeviceBuffer<DeviceColorLoss> sums_;
+  DeviceBuffer<float> exact_colors_, exact_rows_;  // empty without exact sums
   DeviceBuffer<BufferDemand> demand_;
   DeviceBuffer<StepStats> stats_;
   DeviceBuffer<uint8_t> unclamped_;

@@ -1,7 +1,8 @@
 // Training steps that run on a CUDA device without the host: the touched voxels, loss, gradient
 // and weight update of a step are captured once as a graph and launched again for each step.
 // The same steps as those of host_steps.h, but for the order of float sums; the parity table
-// compares them.
+// compares them. With AggregationOptions::exact_sums the steps of two runs are bitwise equal,
+// however often buffers were enlarged.
 #pragma once
 
 #include <memory>

@@ -40,6 +40,7 @@ struct AggregationOptions {
   double view_weight = 0;         // lambda_view of EQ(view-penalty)
   bool divide_by_voxels = false;  // 1 / B instead of 1 / (3 Q)
   bool every_voxel = false;       // through f at each step, as in Algorithm 1: same gradient
+  bool exact_sums = false;        // on a device; the CPU's sums have a fixed order
 
   // Without `march`, which is the field's, and divide_by_voxels, see TrainNetworkOptions.
   template <typename Bind>
@@ -67,6 +68,9 @@ struct AggregationOptions {
          {.help = "sends every voxel through the network at each step, as the paper's "
                   "Algorithm 1, instead of those that the step's rays touch: same result, "
                   "slower; for timing"});
+    bind("style-exact-sums", exact_sums,
+         {.help = "GPU: sums colours and gradients as integers, so that two trainings on the "
+                  "same card are bitwise equal; slower, and more memory"});
   }
 };
 

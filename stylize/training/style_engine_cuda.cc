@@ -1,6 +1,7 @@
 // Style training on a CUDA device. Where a step's rays are few enough, whole series of steps
 // run there without the host; otherwise the device computes loss and gradient, and the host
-// updates the weights. Float sums in no fixed order, so two runs differ in the last bits.
+// updates the weights. Float sums have no fixed order, so two runs differ in the last bits
+// unless exact_sums is set.
 #include <utility>
 
 #include "kernels/field/packed_grid.h"

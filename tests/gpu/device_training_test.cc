@@ -46,17 +46,20 @@ class DeviceStyleTraining : public ::testing::Test {
   static constexpr int kViews = 3, kSide = 13;
   static constexpr int64_t kRays = int64_t{kViews} * kSide * kSide;
   // The same rays with other targets each time.
-  static std::vector<StyleRays> Batches(int n) {
-    std::vector<StyleRays> batches(static_cast<size_t>(n), SomeRays(kViews, kSide));
+  static std::vector<StyleRays> Batches(int n, int side = kSide) {
+    std::vector<StyleRays> batches(static_cast<size_t>(n), SomeRays(kViews, side));
     for (size_t i = 0; i < batches.size(); ++i)
       std::rotate(batches[i].targets.begin(),
                   batches[i].targets.begin() + static_cast<int64_t>(37 * i),
                   batches[i].targets.end());
     return batches;
   }
-  static AggregationOptions Options() {
-    return {
-        .min_weight = 1e-4f, .max_transmittance = 0.9f, .one_sided = true, .view_weight = 0.5};
+  static AggregationOptions Options(bool exact_sums = false) {
+    return {.min_weight = 1e-4f,
+            .max_transmittance = 0.9f,
+            .one_sided = true,
+            .view_weight = 0.5,
+            .exact_sums = exact_sums};
   }
   static double Difference(const std::vector<float>& a, const std::vector<float>& b,
                            const std::vector<float>& from) {
@@ -135,6 +138,55 @@ TEST_F(DeviceStyleTraining, BuffersGrowAndNoStepIsLost) {
     loss[little] = made.last.loss;
   }
   EXPECT_NEAR(loss[1] / loss[0], 1, 1e-4);
+}
+
+// Exact sums: training again, with buffers that are too small at first, and in two parts as
+// after an interruption gives the same bits. With float sums the runs differ in the last bits.
+TEST_F(DeviceStyleTraining, H68_ExactSumsGiveTheSameBits) {
+  constexpr int kSteps = 8, kLargeSide = 60;
+  constexpr int64_t kLarge = int64_t{kViews} * kLargeSide * kLargeSide;
+  RadianceField field = Ball(72, 9);
+  AddSpheres(40, 24, 0.7, 5, &field);
+  const DeviceGrid grid = UploadGrid(MakeFastGrid(field));
+  const std::vector<StyleRays> batches = Batches(kSteps, kLargeSide);
+  struct Trained {
+    LipschitzNetwork network = Start();
+    AdamState adam;
+    DeviceTraining::Steps made;
+  };
+  const auto train = [&](bool exact, bool little, int parts) {
+    Trained trained;
+    for (int part = 0; part < parts; ++part) {
+      DeviceTraining training(&grid, Options(exact), Update(kSteps), trained.network, kLarge,
+                              kSteps);
+      if (little) training.ForgetCapacity(64, 32);
+      const int size = kSteps / parts, first = part * size;
+      training.Begin(first, {batches.begin() + first, batches.begin() + first + size},
+                     trained.network, trained.adam);
+      trained.made = training.End(&trained.network, &trained.adam);
+      EXPECT_EQ(training.regrown() > 0, little);
+    }
+    EXPECT_EQ(trained.adam.steps, kSteps);
+    return trained;
+  };
+  const Trained one = train(true, false, 1), floats = train(false, false, 1);
+  EXPECT_GT(one.made.last.touched_voxels, 20000);
+  for (const Trained& other :
+       {train(true, false, 1), train(true, true, 1), train(true, false, 2)}) {
+    EXPECT_TRUE(RecordSameBits(
+        "networks of two trainings", Computed::kGpu,
+        one.network.data().parameters == other.network.data().parameters &&
+            one.network.data().singular_vectors == other.network.data().singular_vectors));
+    EXPECT_EQ(one.adam.first_moment, other.adam.first_moment);
+    EXPECT_EQ(one.adam.second_moment, other.adam.second_moment);
+    EXPECT_EQ(one.made.last.loss, other.made.last.loss);
+    EXPECT_EQ(one.made.last.squared_error, other.made.last.squared_error);
+  }
+  ParityRow("training with exact sums, weights", std::to_string(kSteps) + " steps",
+            "float sums, of the path length",
+            Difference(one.network.data().parameters, floats.network.data().parameters,
+                       Start().data().parameters),
+            5e-2);  // as above: Adam
 }
 
 // A target that is not finite leaves the loss; weights that are not finite stop it, also where

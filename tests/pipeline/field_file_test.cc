@@ -15,6 +15,7 @@
 #include "kernels/field/cpu/render_view.h"
 #include "pipeline/files/npz_file.h"
 #include "tests/support/expect_error.h"
+#include "tests/support/peak_memory.h"
 #include "tests/support/small_field.h"
 #include "tests/support/temporary_folder.h"
 
@@ -78,17 +79,6 @@ TEST(FieldFile, RoundTripIsExactUpToHalfColours) {
 }
 
 #if !defined(__SANITIZE_ADDRESS__)
-// Maximum memory of this process since ResetPeak, bytes; 0 where the kernel does not tell.
-int64_t PeakMemory() {
-  std::ifstream status("/proc/self/status");
-  for (std::string line; std::getline(status, line);)
-    if (line.starts_with("VmHWM:")) return std::stoll(line.substr(6)) << 10;
-  return 0;
-}
-bool ResetPeak() {
-  return static_cast<bool>(std::ofstream("/proc/self/clear_refs") << "5\n" << std::flush);
-}
-
 // The file is 59 MB; 6 MB were seen. An archive in memory took three times the file.
 TEST(FieldFile, WritingNeedsAFewMegabytesOfMemory) {
   constexpr int kSide = 100;
@@ -102,11 +92,11 @@ TEST(FieldFile, WritingNeedsAFewMegabytesOfMemory) {
   stored.field.appearance.sh.Resize(27 * geometry->links.size());
   stored.field.geometry = geometry;
   const TemporaryFolder folder;
-  if (!ResetPeak()) GTEST_SKIP() << "the kernel does not reset the peak";
-  const int64_t before = PeakMemory();
+  if (!testing::ResetPeakMemory()) GTEST_SKIP() << "the kernel does not reset the peak";
+  const int64_t before = testing::PeakMemory();
   WriteFieldFile(folder / "field.npz", stored);
   EXPECT_GT(std::filesystem::file_size(folder / "field.npz"), 58'000'000u);
-  EXPECT_LT(PeakMemory() - before, 16'000'000);
+  EXPECT_LT(testing::PeakMemory() - before, 16'000'000);
 }
 #endif
 

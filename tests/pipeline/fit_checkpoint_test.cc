@@ -24,10 +24,10 @@ FitState StateOf(const RadianceField& field) {
 
 TEST(FitCheckpoint, BackgroundSpheresComeBackBitForBit) {
   RadianceField field = testing::RandomField({5, 4, 6}, 4, 0.5, 1);
-  const std::string without = PackFitState(StateOf(field));
+  const std::string without = PackFitState(StateOf(field)).Joined();
   testing::AddSpheres(6, 5, 0.6, 2, &field);
   const FitState state = StateOf(field);
-  const std::string with = PackFitState(state);
+  const std::string with = PackFitState(state).Joined();
   // The last section exists only with spheres.
   EXPECT_EQ(with.substr(0, without.size()), without);
   EXPECT_GT(with.size(), without.size());
@@ -49,6 +49,12 @@ TEST(FitCheckpoint, BackgroundSpheresComeBackBitForBit) {
   EXPECT_TRUE(std::equal(a.texels.begin(), a.texels.end(), b.texels.begin(), b.texels.end()));
   EXPECT_TRUE(std::equal(back->sphere_moment.begin(), back->sphere_moment.end(),
                          state.sphere_moment.begin(), state.sphere_moment.end()));
+  // The arrays are packed where they are.
+  const auto at = reinterpret_cast<const char*>(state.grid.records.data());
+  int in_place = 0;
+  const BytePacker packed = PackFitState(state);
+  for (const std::string_view piece : packed.Pieces()) in_place += piece.data() == at;
+  EXPECT_EQ(in_place, 1);
   // Truncated bytes are refused.
   for (const size_t size : {without.size() + 1, without.size() + 8, with.size() - 1})
     EXPECT_FALSE(UnpackFitState(std::string_view(with).substr(0, size))) << size;

@@ -19,16 +19,17 @@ FitOptions Fit(const std::vector<int>& resolutions, const std::vector<int>& step
 }
 
 TEST(Plan, MemoryOfOneStageByHand) {
-  // 100^3 vertices, all stored: values, moments, both packed and gradients of 128 B,
-  // vertex, slot and two arenas of 4 B; two dense grids of 12 B. 1000 pixels of 18 B.
+  // 100^3 vertices, all stored: values, moments, gradients and the pruned copy of 128 B,
+  // vertex, slot, two arenas and two threads' weights of 4 B; two dense grids of 12 B. 1000
+  // pixels of 18 B.
   const StagePlan plan = PlanFit(Fit({100}, {10}), 1000, kCube, 2);
-  EXPECT_EQ(plan.memory, kProgram + 1000000u * (5 * 128 + 4 * 4 + 2 * 12) + 18000u);
+  EXPECT_EQ(plan.memory, kProgram + 1000000u * (4 * 128 + 6 * 4 + 2 * 12) + 18000u);
 }
 
 TEST(Plan, LaterStagesStoreAFraction) {
   // 200^3 at two fifths outweighs 100^3 in full.
   const StagePlan plan = PlanFit(Fit({100, 200}, {10, 10}), 0, kCube, 2);
-  EXPECT_EQ(plan.memory, kProgram + 3200000u * (5 * 128 + 4 * 4) + 8000000u * 2 * 12);
+  EXPECT_EQ(plan.memory, kProgram + 3200000u * (4 * 128 + 6 * 4) + 8000000u * 2 * 12);
   // A coarse stage in full can be the peak: 0.4 * 110^3 < 100^3.
   EXPECT_EQ(PlanFit(Fit({100, 110}, {10, 10}), 0, kCube, 2).memory,
             PlanFit(Fit({100}, {10}), 0, kCube, 2).memory);
@@ -45,7 +46,7 @@ TEST(Plan, MemoryFollowsBoxDegreeAndThreads) {
   plain.sh_degree = 0;  // records of 4 lanes instead of 32
   const double voxels = 0.4 * 128 * 128 * 128;
   EXPECT_NEAR(static_cast<double>(cube + kProgram - PlanFit(plain, 0, kCube, 2).memory),
-              voxels * 5 * (128 - 16), 2);  // whole bytes
+              voxels * 4 * (128 - 16), 2);  // whole bytes
 }
 
 TEST(Plan, TimeFollowsRaysResolutionAndThreads) {

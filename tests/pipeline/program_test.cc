@@ -26,9 +26,10 @@ struct Outcome {
   std::string text;
 };
 
-Outcome Regrade(std::vector<std::string> arguments) {
+Outcome RunProgram(std::vector<std::string> command,
+                   const std::vector<std::string>& arguments) {
   ChildOptions options;
-  options.argv = {REGRADE_PROGRAM};
+  options.argv = std::move(command);
   options.argv.insert(options.argv.end(), arguments.begin(), arguments.end());
   options.wall_limit_s = 120;
   Outcome outcome;
@@ -36,6 +37,10 @@ Outcome Regrade(std::vector<std::string> arguments) {
       RunChild(options, [&outcome](const std::string& line) { outcome.text += line + "\n"; });
   outcome.code = result.end == ChildEnd::kExited ? result.exit_status : 128 + result.signal;
   return outcome;
+}
+
+Outcome Regrade(const std::vector<std::string>& arguments) {
+  return RunProgram({REGRADE_PROGRAM}, arguments);
 }
 
 #define EXPECT_SAYS(outcome, part) \
@@ -157,6 +162,33 @@ TEST(Program, F33_OutputThatIsAFileExitsWith5) {
   WriteText(folder / "photos/a.png", "x");
   WriteText(folder / "out", "x");
   EXPECT_EQ(Regrade({"pose", folder / "photos", "--out", folder / "out"}).code, 5);
+}
+
+// `regrade render` in a folder of a run, under limits that a shell sets.
+Outcome RenderUnder(const std::string& limits, const std::vector<std::string>& arguments) {
+  const TemporaryFolder folder;
+  { const Workspace workspace(folder / "out"); }
+  WriteText(folder / "out/run.json",
+            "{\"arguments\": [\"photos\"], \"options\": {\"style\": \"" + testing::SourceDir() +
+                "/assets/style_sunset.png\"}}");
+  return RunProgram({"/bin/sh", "-c", limits + "; exec \"$0\" \"$@\"", REGRADE_PROGRAM,
+                     "render", folder / "out"},
+                    arguments);
+}
+
+// Standard streams and the lock take the four files that may be open.
+TEST(Program, F25_WithoutAFileLeftToListTheFolderExitsWith5) {
+  const Outcome outcome = RenderUnder("ulimit -n 4", {});
+  EXPECT_EQ(outcome.code, 5) << outcome.text;
+  EXPECT_SAYS(outcome, "Too many open files");
+}
+
+// Stacks of 8 MB: 4096 of them do not fit into 4 GB of address space.
+TEST(Program, F44_ThreadsThatCannotStartExitWith5) {
+  const Outcome outcome =
+      RenderUnder("ulimit -s 8192; ulimit -v 4000000", {"--threads", "4096"});
+  EXPECT_EQ(outcome.code, 5) << outcome.text;
+  EXPECT_SAYS(outcome, "cannot start 4096 threads");
 }
 
 TEST(Program, F22_ConfigErrorsNameTheLine) {

@@ -86,13 +86,20 @@ RunReport FullReport() {
                                                 .sh_degree = 2,
                                                 .voxels = 1000,
                                                 .psnr_train_db = 29,
+                                                .ssim_train = 0.85,
+                                                .detail_kept_train = 0.7,
+                                                .detail_error_train = 4,
                                                 .psnr_heldout_db = 26.5,
                                                 .ssim_heldout = 0.8,
+                                                .detail_kept_heldout = 0.6,
+                                                .detail_error_heldout = 5,
+                                                .sharpness = "slightly soft",
                                                 .heldout = {"a.jpg"}};
   report.stages.style_2d = Style2dReport{.time = {3, {}}, .method = "mkl", .views = 7};
   report.stages.stylize = MeasuredStyle();
-  report.stages.render = RenderReport{{5, {}}, "cpu", 60, 36, {640, 480}, 12};
-  report.stages.evaluate = EvaluateReport{{6, {}}, "dis-medium", "lai2018", "", 25, 26};
+  report.stages.render = RenderReport{{5, {}},    "cpu",   60, 36,
+                                      {640, 480}, "exact", 12, {0.41, 0.72, 12, {0.5, 0.25}}};
+  report.stages.evaluate = EvaluateReport{{6, {}}, "dis-medium", "lai2018", "", 25, 26, 0.2};
   report.evaluation = MeasuredEvaluation();
   return report;
 }
@@ -111,12 +118,14 @@ TEST(ReportJson, HasTheKeysOfSchema2InOrder) {
   const JsonValue& stages = json.At("stages");
   EXPECT_EQ(KeysOf(stages),
             (Keys{"pose", "reconstruct", "style_2d", "stylize", "render", "evaluate"}));
-  EXPECT_EQ(KeysOf(stages.At("pose")),
-            (Keys{"seconds", "registered", "points", "reprojection_px", "models_found"}));
-  EXPECT_EQ(KeysOf(stages.At("reconstruct")),
-            (Keys{"seconds", "device", "finest_grid", "rays", "sh_degree", "voxels",
-                  "psnr_train_db", "rejected_voxels", "psnr_heldout_db", "ssim_heldout",
-                  "heldout", "psnr_at_steps", "cpu_seconds"}));
+  EXPECT_EQ(KeysOf(stages.At("pose")), (Keys{"seconds", "attempts", "notices", "registered",
+                                             "points", "reprojection_px", "models_found"}));
+  EXPECT_EQ(
+      KeysOf(stages.At("reconstruct")),
+      (Keys{"seconds", "device", "finest_grid", "rays", "sh_degree", "voxels", "psnr_train_db",
+            "ssim_train", "detail_kept_train", "detail_error_train", "rejected_voxels",
+            "psnr_heldout_db", "ssim_heldout", "detail_kept_heldout", "detail_error_heldout",
+            "sharpness", "heldout", "psnr_at_steps", "cpu_seconds"}));
   EXPECT_EQ(KeysOf(stages.At("style_2d")), (Keys{"seconds", "method", "views", "notices"}));
   EXPECT_EQ(
       KeysOf(stages.At("stylize")),
@@ -125,10 +134,13 @@ TEST(ReportJson, HasTheKeysOfSchema2InOrder) {
             "local_lipschitz_along_coefficients", "local_lipschitz_along_position",
             "bound_at_steps", "notices", "cpu_seconds"}));
   EXPECT_EQ(KeysOf(stages.At("render")),
-            (Keys{"seconds", "device", "frames", "path_frames", "film", "frames_per_second"}));
-  EXPECT_EQ(
-      KeysOf(stages.At("evaluate")),
-      (Keys{"seconds", "flow", "mask", "psnr_to_2d_photos_db", "linear_map_psnr_to_2d_db"}));
+            (Keys{"seconds", "device", "frames", "path_frames", "film", "film_renderer",
+                  "frames_per_second", "seen_by_few"}));
+  EXPECT_EQ(KeysOf(stages.At("render").At("seen_by_few")),
+            (Keys{"film", "worst_frame", "worst_frame_number", "photos"}));
+  EXPECT_EQ(KeysOf(stages.At("evaluate")),
+            (Keys{"seconds", "flow", "mask", "psnr_to_2d_photos_db", "linear_map_psnr_to_2d_db",
+                  "lpips_heldout"}));
   EXPECT_EQ(KeysOf(json.At("consistency").AsArray()[0]),
             (Keys{"sequence", "gap", "pairs", "undefined_pairs", "tc_psnr_mean_db",
                   "tc_psnr_of_mean_db", "tc_psnr_low_db", "tc_psnr_high_db", "coverage",
@@ -225,6 +237,7 @@ TEST(MetricsJson, AMissingNumberIsNoZero) {
   };
   const std::string whole =
       R"({"device": "cpu", "frames": 3, "path_frames": 0, "film": {"width": 4, "height": 3},)"
+      R"( "seen_by_few": {"film": 0.41, "worst_frame": 0.72, "worst_frame_number": 3, "photos": []},)"
       R"( "frames_per_second": null, "frames_per_second_why": "not measured"})";
   EXPECT_EQ(read(whole).frames_per_second.why, "not measured");
   const auto without = [&](const std::string& part, const std::string& instead = "") {

@@ -195,6 +195,38 @@ TEST(ReportHtml, TheFitIsDrawnOverTheSteps) {
   EXPECT_NE(ReportHtml(report, {}).find("held-out photos, at the end"), std::string::npos);
 }
 
+TEST(ReportHtml, OneWordSaysHowSharpWithItsNumber) {
+  RunReport report = SomeReport();
+  report.stages.reconstruct->detail_kept_train = 0.93;
+  report.stages.reconstruct->sharpness = "sharp";
+  std::string html = ReportHtml(report, {});
+  EXPECT_NE(html.find("detail kept of the training photos"), std::string::npos);
+  EXPECT_NE(html.find("sharp <small>0.93 of 1</small>"), std::string::npos);
+  report.stages.reconstruct->detail_kept_heldout = 0.62;
+  report.stages.reconstruct->ssim_heldout = 0.8;
+  report.stages.reconstruct->sharpness = "slightly soft";
+  report.stages.evaluate = EvaluateReport{.flow = "dis-medium", .lpips_heldout = 0.21};
+  html = ReportHtml(report, {});
+  EXPECT_NE(html.find("slightly soft <small>0.62 of 1</small>"), std::string::npos);
+  EXPECT_NE(html.find("SSIM 0.800"), std::string::npos);
+  EXPECT_NE(html.find("LPIPS 0.210"), std::string::npos);
+  const std::string flat = "the photos have no fine detail";
+  report.stages.reconstruct->detail_kept_heldout = Metric::Undefined(flat);
+  report.stages.reconstruct->detail_kept_train = Metric::Undefined(flat);
+  report.stages.reconstruct->sharpness.clear();
+  EXPECT_NE(ReportHtml(report, {}).find("title=\"" + flat + "\""), std::string::npos);
+}
+
+TEST(ReportHtml, CostsHaveTheirSsimAndDetailOnlyWhereMeasured) {
+  RunReport report = SomeReport();
+  EXPECT_EQ(ReportHtml(report, {}).find("<th class=n>SSIM"), std::string::npos);
+  report.costs[0].ssim = 0.8125;
+  report.costs[0].detail_kept = 0.5;
+  const std::string html = ReportHtml(report, {});
+  EXPECT_NE(html.find("<th class=n>SSIM<th class=n>detail kept<th>"), std::string::npos);
+  EXPECT_NE(html.find("0.812"), std::string::npos);
+}
+
 TEST(ReportHtml, AnEffectThatWasNotMeasuredIsMarked) {
   RunReport report = SomeReport();
   report.effects = {{"exposure", false, "it was not wanted", Metric(), 0.1}};
@@ -212,12 +244,17 @@ TEST(ReportHtml, StagesHaveTheirCpuTime) {
 TEST(ReportHtml, RowsOfStagesComeFromLabels) {
   RunReport report = SomeReport();
   report.stages.reconstruct->voxels = 2234881;
-  report.stages.render =
-      RenderReport{.frames = 48, .film = {640, 480}, .frames_per_second = 0.9};
+  report.stages.render = RenderReport{.frames = 48,
+                                      .film = {640, 480},
+                                      .film_renderer = "exact (--exact)",
+                                      .frames_per_second = 0.9,
+                                      .seen_by_few = {0.414, 0.72, 12, {}}};
   const std::string html = ReportHtml(report, {});
   for (const char* part :
        {"voxels <b>2,234,881</b>", "PSNR, training <b>28.25&nbsp;dB</b>", "frames <b>48</b>",
-        "film <b>640 × 480&nbsp;px</b>", "speed <b>0.90&nbsp;frames/s</b>"})
+        "film <b>640 × 480&nbsp;px</b>", "renderer of the film <b>exact (--exact)</b>",
+        "speed <b>0.90&nbsp;frames/s</b>",
+        "seen by fewer than three photos: 41 % of the film (72 % of frame 12)"})
     EXPECT_NE(html.find(part), std::string::npos) << part;
   EXPECT_EQ(html.find("finest"), std::string::npos);  // it has no label
 }

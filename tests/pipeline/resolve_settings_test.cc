@@ -122,6 +122,28 @@ TEST(ResolveSettings, RecipeSetsEveryOptionOfTheNetwork) {
   EXPECT_REGRADE_ERROR(Resolve({"--recipe=fast"}), ExitCode::kUsage, "--recipe");
 }
 
+// On a GPU sums are exact only if asked for, and a reproducible run asks.
+TEST(ResolveSettings, H68_AReproducibleRunOnTheGpuHasExactSums) {
+  const auto both = [](const std::vector<std::string>& flags,
+                       const SettingsSources& from = {}) {
+    const RunSettings settings = Resolve(flags, from).settings;
+    EXPECT_EQ(settings.fit.exact_sums, settings.network.loss.exact_sums);
+    return settings.fit.exact_sums;
+  };
+  EXPECT_TRUE(both({"--reproducible", "--device", "cuda"}));
+  EXPECT_TRUE(both({"--reproducible", "--device", "cuda", "--recipe", "paper"}));
+  EXPECT_TRUE(both(
+      {"--reproducible", "--device", "cuda", "--no-fit-exact-sums", "--no-style-exact-sums"}));
+  EXPECT_FALSE(both({"--reproducible"}));  // on the CPU: device auto
+  EXPECT_FALSE(both({"--reproducible", "--device", "cpu"}));
+  EXPECT_FALSE(both({"--device", "cuda"}));
+  const TemporaryFolder folder;
+  const std::string run = folder / "run.json";
+  WriteText(run, R"({"arguments": ["/photos"], "options": {"reproducible": true}})");
+  EXPECT_TRUE(both({"--device", "cuda"}, {.run_json = run}));
+  EXPECT_FALSE(both({}, {.run_json = run}));
+}
+
 TEST(ResolveSettings, F22_ErrorsOfAFileNameTheLine) {
   const TemporaryFolder folder;
   WriteText(folder / "run.json", "{\"arguments\": [],\n\"options\": {\n\"preset\": \"fast\"}}");

@@ -46,7 +46,7 @@ TEST(RunReport, ShowsEveryPartOfTheRun) {
   ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}).code, 0);
   std::vector<std::string> run{"run",       folder / "s/truth", "--style",  style,
                                "--out",     folder / "e",       "--preset", "draft",
-                               "--effects", "exposure=off"};
+                               "--effects", "exposure=off",     "--device", "cpu"};
   for (const std::string& flag : testing::TinyFlags()) run.push_back(flag);
   const testing::ProgramOutcome done = Regrade(run);
   ASSERT_EQ(done.code, 0) << done.text;
@@ -61,6 +61,13 @@ TEST(RunReport, ShowsEveryPartOfTheRun) {
   const JsonValue& fit = report.At("stages").At("reconstruct");
   EXPECT_EQ(fit.At("psnr_at_steps").AsArray().back().AsArray()[0].AsInt(), 30);
   EXPECT_GT(fit.At("cpu_seconds").AsDouble(), 0);
+  const JsonValue& few = report.At("stages").At("render").At("seen_by_few");
+  ASSERT_EQ(few.At("photos").AsArray().size(), 6u);
+  for (const JsonValue& share : few.At("photos").AsArray()) {
+    if (share.IsNull()) continue;  // the view shows no surface
+    EXPECT_GE(share.AsDouble(), 0);
+    EXPECT_LE(share.AsDouble(), 1);
+  }
   EXPECT_TRUE(std::filesystem::exists(folder / "e/views_2d.mp4"));
   const std::string page = testing::ReadText(folder / "e/report.html");
   for (const char* part :
@@ -93,6 +100,17 @@ TEST(RunReport, ShowsEveryPartOfTheRun) {
   ASSERT_EQ(measured.code, 0) << measured.text;
   EXPECT_EQ(HeatMapsNamed(folder / "e"), 6);
   EXPECT_EQ(HeatMapFiles(folder / "e"), 6);
+
+  // Another choice of the film's renderer renders again, and is named.
+  const auto film_renderer = [&] {
+    return ReadJsonFile(folder / "e/report.json").At("stages").At("render").At("film_renderer");
+  };
+  EXPECT_EQ(film_renderer().AsString(), "exact (the CPU has no fast renderer)");
+  const testing::ProgramOutcome rendered = Regrade({"render", folder / "e", "--exact"});
+  ASSERT_EQ(rendered.code, 0) << rendered.text;
+  EXPECT_NE(rendered.text.find("renderer of the film: exact (--exact)"), std::string::npos)
+      << rendered.text;
+  EXPECT_EQ(film_renderer().AsString(), "exact (--exact)");
 }
 
 // H157: a style picture of one colour is reported on the terminal, in report.json and on the

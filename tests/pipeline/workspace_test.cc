@@ -124,7 +124,7 @@ TEST(Workspace, F42_TheFolderCanMove) {
     Workspace workspace(folder / "out");
     WriteText(workspace.Path("poses/a.bin"), "abc");
     workspace.Record("pose", Inputs(1), {"poses"}, 1, JsonValue::Object());
-    workspace.SaveCheckpoint("reconstruct", Inputs(2), "state");
+    workspace.SaveCheckpoint("reconstruct", Inputs(2), {"state"});
     EXPECT_EQ(ReadText(workspace.Path(".regrade/stages/pose.json")).find(folder.path()),
               std::string::npos);
   }
@@ -219,7 +219,7 @@ TEST(Workspace, CheckpointsBelongToTheirInputs) {
   const TemporaryFolder folder;
   Workspace workspace(folder / "out");
   const std::string state("a\0b", 3);
-  workspace.SaveCheckpoint("reconstruct", Inputs(1), state);
+  workspace.SaveCheckpoint("reconstruct", Inputs(1), {state.substr(0, 1), "", state.substr(1)});
   EXPECT_EQ(workspace.LoadCheckpoint("reconstruct", Inputs(1)), state);
   EXPECT_EQ(workspace.LoadCheckpoint("reconstruct", Inputs(2)), std::nullopt);
   EXPECT_EQ(workspace.LoadCheckpoint("stylize", Inputs(1)), std::nullopt);

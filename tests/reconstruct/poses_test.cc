@@ -4,16 +4,14 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
 
 #include "kernels/base/error.h"
 #include "reconstruct/colmap/colmap_model.h"
-#include "reconstruct/colmap/colmap_output.h"
-#include "reconstruct/colmap/colmap_strategies.h"
 #include "reconstruct/colmap/poses_from_photos.h"
-#include "reconstruct/colmap/refine_intrinsics.h"
 #include "tests/support/process_state.h"
 #include "tests/support/synthetic_model.h"
 
@@ -35,7 +33,7 @@ class Poses : public ::testing::Test {
     std::vector<StagedPhoto> photos;
     for (int i = 0; i < count; ++i)
       photos.push_back({"IMG " + std::to_string(i) + ".jpg", StagedName(i),
-                        folder_ / "photos" / StagedName(i), 640, 480, 0});
+                        folder_ / "photos" / StagedName(i), 640, 480, exif_focal_px_});
     return photos;
   }
 
@@ -64,6 +62,7 @@ class Poses : public ::testing::Test {
   }
 
   fs::path folder_;
+  double exif_focal_px_ = 0;
   PoseOptions options_;
   PoseReport report_;
   std::vector<PhotoStatus> statuses_;
@@ -79,7 +78,7 @@ TEST_F(Poses, GoodCaptureComesWithModelAndStatuses) {
   EXPECT_LT(capture.reprojection_px, 1e-6);
   EXPECT_EQ(report_.colmap_version, "3.8");
   EXPECT_EQ(report_.strategy, "quick");
-  EXPECT_EQ(report_.attempts_made, 1);
+  EXPECT_EQ(report_.attempts.size(), 1u);
   ASSERT_EQ(capture.statuses.size(), 11u);
   EXPECT_EQ(capture.statuses[1].why, "not a picture");
   EXPECT_EQ(ReadColmapModel((folder_ / "sparse").string()).images.size(), 10u);
@@ -234,12 +233,13 @@ TEST_F(Poses, H125_TooFewPhotos) {
 TEST_F(Poses, H127_CameraOnlyTurned) {
   ExpectError("turned", ExitCode::kScene, {"nearly one place", "step sideways"});
   ExpectError("nomodel", ExitCode::kScene, {"only turned", "step sideways"});
-  EXPECT_GT(report_.attempts_made, 1);
+  EXPECT_GT(report_.attempts.size(), 1u);
 }
 
 TEST_F(Poses, H127_NothingMatches) {
   ExpectError("nomatches", ExitCode::kScene, {"no two photos show the same"});
   ExpectError("plain", ExitCode::kScene, {"about 12 each", "sharp photos"});
+  ExpectError("apart", ExitCode::kScene, {"only 3 pairs of the 10 photos", "two thirds"});
 }
 
 TEST_F(Poses, H128_PlanarSceneIsNoted) {
@@ -278,90 +278,73 @@ TEST_F(Poses, H134_ADivergingPrincipalPointStaysInTheCentre) {
   EXPECT_NE(report_.lens.find("in the centre"), std::string::npos);
 }
 
+TEST_F(Poses, H170_PixelsThatAreNotSquareAreTriedAgainWithOneFocalLength) {
+  const Capture capture = Run("skewed");  // by the adjustment; the mapper's lens is simple
+  EXPECT_EQ(capture.views[0].camera.fx, capture.views[0].camera.fy);
+  EXPECT_EQ(report_.strategy, "quick, one focal length");
+  EXPECT_EQ(report_.lens, "SIMPLE_RADIAL, principal point in the centre");
+  EXPECT_EQ(report_.attempts,
+            (std::vector<std::string>{"quick: 10 of 10 photos",
+                                      "quick, one focal length: 10 of 10 photos"}));
+  ASSERT_EQ(report_.notes.size(), 1u);
+  EXPECT_NE(report_.notes[0].find("fx / fy = 0.913"), std::string::npos);
+  EXPECT_NE(report_.notes[0].find("trying again with one focal length"), std::string::npos);
+}
+
+TEST_F(Poses, H170_ASimplerLensIsMappedFromTheSameFeaturesAndMatches) {
+  Run("skewed-map", 24);  // enough photos that the mapper has two focal lengths
+  EXPECT_EQ(report_.strategy, "quick, one focal length");
+  ASSERT_EQ(report_.attempts.size(), 2u);
+  EXPECT_NE(report_.attempts[0].find("fx / fy = 1.300"), std::string::npos);
+  EXPECT_TRUE(fs::exists(folder_ / "work/attempt_1/database.db"));
+  EXPECT_FALSE(fs::exists(folder_ / "work/attempt_2")) << "features were extracted again";
+}
+
+TEST_F(Poses, H170_AFoldedDistortionIsTriedAgain) {
+  EXPECT_EQ(Run("folded").views[0].camera.distortion[1], 0);
+  EXPECT_EQ(report_.strategy, "quick, one focal length");
+  EXPECT_NE(report_.notes[0].find("folds"), std::string::npos);
+}
+
+TEST_F(Poses, H171_TheFocalLengthIsHeldAtThatOfExif) {
+  exif_focal_px_ = 700;
+  const Camera camera = Run("focal").views[0].camera;
+  EXPECT_EQ(camera.fx, 700);
+  EXPECT_EQ(camera.fy, 700);
+  EXPECT_EQ(camera.MaxCornerDistortion(), 0);
+  EXPECT_EQ(report_.strategy, "quick, focal length held");
+  EXPECT_EQ(report_.attempts.size(), 3u);
+  EXPECT_NE(report_.notes.back().find("held at that of EXIF"), std::string::npos);
+}
+
+TEST_F(Poses, H171_WithoutExifTheFocalLengthIsThatOfAUsualLens) {
+  const Camera camera = Run("focal").views[0].camera;
+  // The longer side of 640 px under 50 degrees.
+  EXPECT_NEAR(2 * std::atan(320 / camera.fx) * 180 / M_PI, 50, 1e-9);
+  EXPECT_NE(report_.notes.back().find("50 degrees along the picture's longer side"),
+            std::string::npos);
+}
+
+TEST_F(Poses, H172_ARefusalNamesEveryLensThatFailed) {
+  ExpectError("no-lens", ExitCode::kScene,
+              {"quick: pixels that are not square (fx / fy = 0.913)",
+               "quick, one focal length: a focal length of 20.00 times",
+               "quick, focal length held: no model", "keep their EXIF data"});
+  EXPECT_EQ(report_.attempts.size(), 3u);
+  EXPECT_EQ(report_.notes.size(), 2u);  // which the console shows: one for each further lens
+}
+
 TEST_F(Poses, StrategiesAreTriedUntilOneSucceeds) {
   EXPECT_EQ(Run("strategies").views.size(), 10u);
   EXPECT_EQ(report_.strategy, "more features");
-  EXPECT_EQ(report_.attempts_made, 2);
+  EXPECT_EQ(report_.attempts.size(), 2u);
 }
 
 TEST_F(Poses, AnAttemptThatWouldFindTheSameFeaturesIsSkipped) {
   EXPECT_THROW(Run("nomodel"), Error);
-  EXPECT_EQ(report_.attempts_made, 3);  // all except "more features": there are no more
+  EXPECT_EQ(report_.attempts.size(), 3u);  // all except "more features": there are no more
   EXPECT_THROW(Run("nomatches"), Error);
-  EXPECT_EQ(report_.attempts_made, 4);  // one more: nothing helps without matches
-}
-
-TEST(PoseStrategies, CostIncreases) {
-  std::vector<StagedPhoto> photos(50);
-  for (StagedPhoto& photo : photos) photo.width = 1920, photo.height = 1080;
-  const std::vector<PoseStrategy> strategies = PoseStrategies(photos, 30);
-  EXPECT_FALSE(strategies[0].all_pairs);
-  EXPECT_EQ(strategies[0].first_octave, 0);
-  EXPECT_GT(strategies[1].max_features, strategies[0].max_features);
-  EXPECT_TRUE(strategies[2].keep_matches);
-  EXPECT_TRUE(strategies.back().all_pairs);
-  photos.resize(11);
-  EXPECT_TRUE(PoseStrategies(photos, 30)[0].all_pairs);
-  EXPECT_EQ(PoseStrategies(photos, 30)[0].lens, ColmapLens::kSimpleRadial);
-}
-
-TEST(PoseStrategies, H148_MixedSizesAndFocalLengthsHaveTheirOwnCameras) {
-  std::vector<StagedPhoto> photos = {{"a", "0", "", 640, 480, 0},
-                                     {"b", "1", "", 480, 640, 0},
-                                     {"c", "2", "", 640, 480, 0},
-                                     {"d", "3", "", 640, 480, 700}};
-  const std::vector<CameraGroup> groups = GroupByCamera(photos);
-  ASSERT_EQ(groups.size(), 3u);
-  EXPECT_EQ(groups[0].names, (std::vector<std::string>{"0", "2"}));
-  const ColmapArguments arguments = ExtractArguments({}, groups[2], 1000, 0, {});
-  EXPECT_EQ(arguments.back().first, "ImageReader.camera_params");
-  EXPECT_EQ(arguments.back().second, "700,700,320,240,0,0,0,0");
-}
-
-TEST(ColmapOutput, ReadsProgressAndEvidence) {
-  ColmapOutput output(10);
-  output.Line("Processed file [3/12]");
-  EXPECT_DOUBLE_EQ(output.fraction(), 0.25);
-  output.Line("  Name:            a b.png");
-  output.Line("  Features:        1398");
-  output.StartCommand();
-  output.Line("Matching block [2/2, 1/2] in 1.9s");
-  EXPECT_DOUBLE_EQ(output.fraction(), 0.75);
-  output.StartCommand();
-  output.Line("I20250101 12:00:00 mapper.cc:1] Registering image #7 (5)");
-  EXPECT_DOUBLE_EQ(output.fraction(), 0.5);
-  output.Line("Loading matches... 41 in 0.000s");
-  output.Line("Matching block [x/0, 1");
-  output.Line("Processed file [5/0]");
-  EXPECT_DOUBLE_EQ(output.fraction(), 0.5);
-  EXPECT_EQ(output.evidence().features.at("a b.png"), 1398);
-  EXPECT_EQ(output.evidence().matched_pairs, 41);
-}
-
-TEST(RefineIntrinsics, RemovesOutliersAndPointsWithoutObservations) {
-  ColmapModel model = MakeSyntheticModel({.images = 5, .points = 30});
-  for (ColmapImage& image : model.images)
-    for (ColmapKeypoint& keypoint : image.keypoints) keypoint.u += 0.2;  // an error of all
-  model.images[2].keypoints[7].v += 3;
-  for (int i = 0; i < 4; ++i) model.images[i].keypoints[9].v += 3;
-  const ColmapModel cleaned = WithoutOutliers(model, model, 2.5);
-  EXPECT_EQ(cleaned.points.size(),
-            29u);  // point 10 would keep one observation, so it is removed
-  EXPECT_EQ(cleaned.FindPoint(10), nullptr);
-  EXPECT_EQ(cleaned.FindPoint(8)->track.size(), 4u);
-  EXPECT_EQ(cleaned.images[2].keypoints[7].point_id, kNoColmapPoint);
-  EXPECT_EQ(cleaned.images[4].keypoints[9].point_id, kNoColmapPoint);
-  EXPECT_EQ(cleaned.images[0].keypoints[7].point_id, 8u);
-  EXPECT_NEAR(MeanSquaredReprojection(cleaned), 0.04, 1e-9);
-}
-
-TEST(RefineIntrinsics, WithLensKeepsCommonCoefficients) {
-  ColmapModel model = MakeSyntheticModel({});
-  model.cameras[0].intrinsics.distortion[0] = 0.1;
-  EXPECT_EQ(WithLens(model, ColmapLens::kOpenCv).cameras[0].intrinsics.distortion[0], 0.1);
-  const ColmapModel pinhole = WithLens(model, ColmapLens::kPinhole);
-  EXPECT_EQ(pinhole.cameras[0].intrinsics.MaxCornerDistortion(), 0);
-  EXPECT_EQ(pinhole.cameras[0].intrinsics.fx, 600);
+  EXPECT_EQ(report_.attempts.size(), 4u);  // one more: nothing helps without matches
 }
 
 }  // namespace

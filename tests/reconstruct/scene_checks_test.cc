@@ -76,6 +76,27 @@ TEST(SceneChecks, H134_PixelsThatAreNotSquareAreRefused) {
   EXPECT_EQ(AssessScene(CaptureOf(options)).refusal, "");
 }
 
+TEST(SceneChecks, H172_LensesThatNoCameraHas) {
+  const auto lens_of = [](double focal, double k1, double k2) {
+    Capture capture = CaptureOf({.lens = ColmapLens::kOpenCv});
+    for (CaptureView& view : capture.views) {
+      view.camera.fx = view.camera.fy = focal * view.camera.width;
+      view.camera.distortion[0] = k1;
+      view.camera.distortion[1] = k2;
+    }
+    return AssessScene(capture).lens;
+  };
+  EXPECT_NE(lens_of(0.09, 0, 0).find("0.09 times"), std::string::npos);
+  EXPECT_NE(lens_of(12, 0, 0).find("12.00 times"), std::string::npos);
+  EXPECT_EQ(lens_of(0.11, 0, 0), "");
+  EXPECT_EQ(lens_of(9, 0, 0), "");
+  // At f = 0.9 W the corners are at r^2 = 0.48: r (1 + k1 r^2) falls beyond r^2 = -1 / (3 k1).
+  EXPECT_EQ(lens_of(0.9, -0.2, 0), "");  // a real wide-angle lens
+  EXPECT_NE(lens_of(0.9, -0.9, 0).find("folds"), std::string::npos);
+  EXPECT_EQ(lens_of(0.9, 0.3, 0), "");  // pincushion
+  EXPECT_NE(lens_of(0.9, 0, -8).find("folds"), std::string::npos);
+}
+
 TEST(SceneChecks, TooFewViewsAreRefused) {
   EXPECT_NE(AssessScene(CaptureOf({.images = 4})).refusal.find("only 4 photos"),
             std::string::npos);

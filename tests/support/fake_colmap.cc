@@ -51,7 +51,11 @@ std::vector<std::string> KnownOptions() {
           "Mapper.num_threads",
           "Mapper.min_model_size",
           "Mapper.init_min_tri_angle",
+          "Mapper.ba_refine_focal_length",
+          "Mapper.ba_refine_extra_params",
           "BundleAdjustment.refine_principal_point",
+          "BundleAdjustment.refine_focal_length",
+          "BundleAdjustment.refine_extra_params",
           "match_list_path",
           "clear_points",
           "Mapper.filter_max_reproj_error"};
@@ -136,19 +140,33 @@ int Map() {
   for (std::string line; std::getline(database, line);)
     (line.rfind("#features ", 0) == 0 ? features = line.substr(10),
      void()                           : names.push_back(line));
-  std::printf("Loading matches... %d in 0.000s\n", Is("nomatches") ? 0 : 41);
+  std::printf("Loading matches... %d in 0.000s\n", Is("nomatches") ? 0 : Is("apart") ? 3 : 41);
   const bool too_small =
       static_cast<int>(names.size()) < std::stoi(arguments["Mapper.min_model_size"]);
-  if (Is("nomodel") || Is("nomatches") || Is("plain") || too_small ||
+  if (Is("nomodel") || Is("apart") || Is("nomatches") || Is("plain") || too_small ||
       (Is("strategies") && features != "8192")) {
     std::fprintf(stderr, "ERROR: failed to create sparse model\n");
     return 1;
   }
   testing::SyntheticModelOptions options{.images = static_cast<int>(names.size())};
   if (Is("turned")) options.arc_deg = 0.4;
-  if (Is("aspect")) options.aspect = 1.3, options.lens = ColmapLens::kOpenCv;
+  if (Is("aspect") || Is("skewed-map"))
+    options.aspect = 1.3, options.lens = ColmapLens::kOpenCv;
   if (Is("planar")) options.thickness = 0.001;
   const std::string out = arguments["output_path"];
+  if (arguments.count("input_path") > 0) {
+    // Continues from a model of cameras alone, whose focal length may be held, and writes no
+    // subfolder.
+    const ColmapModel start = ReadColmapModel(arguments["input_path"]);
+    const bool held = arguments["Mapper.ba_refine_focal_length"] == "0";
+    if (!start.images.empty() || start.cameras.size() != 1) std::abort();
+    if (Is("aspect") || (held && Is("no-lens"))) return 1;
+    options.aspect = 1;
+    options.lens = start.cameras[0].lens;
+    if (held) options.focal = start.cameras[0].intrinsics.fx;
+    Write(testing::MakeSyntheticModel(options), names, out);
+    return 0;
+  }
   if (Is("few")) {
     names.resize(4);
     options.images = 4;
@@ -183,6 +201,15 @@ int Adjust() {
   // A principal point that diverges if it may be refined.
   if (Is("runaway") && arguments["BundleAdjustment.refine_principal_point"] == "1")
     model.cameras[0].intrinsics.cx = 500;
+  const bool held = arguments["BundleAdjustment.refine_focal_length"] == "0";
+  // Photos that determine neither fx / fy nor the focal length.
+  const ColmapLensInfo& info = InfoOf(model.cameras[0].lens);
+  const bool one_focal = info.focals == 1;
+  Camera& c = model.cameras[0].intrinsics;
+  if ((Is("skewed") || Is("focal") || Is("no-lens")) && !held && !one_focal)
+    c.fx = 0.913 * c.fy;
+  if ((Is("focal") || Is("no-lens")) && !held && one_focal) c.fx = c.fy = 20 * c.width;
+  if (Is("folded") && info.coefficients > 1) c.distortion[1] = -8;
   WriteColmapModel(model, arguments["output_path"]);
   return 0;
 }

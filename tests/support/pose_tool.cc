@@ -48,7 +48,7 @@ int main(int argc, char** argv) {
         "%.2f px, %.1f s\n",
         capture.views.size(), ingest.photos.size(), capture.points.size(),
         capture.reprojection_px, capture.models_found, report.strategy.c_str(),
-        report.attempts_made, report.lens.c_str(),
+        static_cast<int>(report.attempts.size()), report.lens.c_str(),
         MedianTriangulationAngle(capture) * 180 / M_PI, extents.x, extents.y, extents.z,
         camera.fx, camera.fy, camera.cx, camera.cy, camera.MaxCornerDistortion(), seconds());
     for (const PhotoStatus& photo : capture.statuses)
@@ -58,7 +58,7 @@ int main(int argc, char** argv) {
     for (const std::string& note : report.notes) std::printf("note: %s\n", note.c_str());
   } catch (const Error& e) {
     std::printf("exit %d after %.1f s, %d attempts: %s\n", static_cast<int>(e.code()),
-                seconds(), report.attempts_made, e.what());
+                seconds(), static_cast<int>(report.attempts.size()), e.what());
     return static_cast<int>(e.code());
   }
   return 0;

@@ -16,6 +16,7 @@ struct SyntheticModelOptions {
   double arc_deg = 40;   // between the first camera and the last
   double thickness = 1;  // of the cloud along the line of sight; its width is 2
   double aspect = 1;     // fx / fy
+  double focal = 600;    // fy, pixels
   ColmapLens lens = ColmapLens::kSimpleRadial;
 };
 
@@ -31,7 +32,7 @@ inline ColmapModel MakeSyntheticModel(const SyntheticModelOptions& options = {})
   ColmapCamera camera{1, options.lens, {}};
   Camera& c = camera.intrinsics;
   c.width = 640, c.height = 480;
-  c.fx = 600 * options.aspect, c.fy = 600;
+  c.fx = options.focal * options.aspect, c.fy = options.focal;
   c.cx = 320, c.cy = 240;
   if (options.lens != ColmapLens::kSimplePinhole && options.lens != ColmapLens::kPinhole)
     c.lens = LensModel::kOpenCv;

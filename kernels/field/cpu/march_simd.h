@@ -1,4 +1,5 @@
 // Marches the density along a ray, many steps at once; compiled once per instruction set.
+// cell_march_simd.h marches an adaptive field.
 //
 // Between skips through empty space a ray is marched in blocks of kWide steps: positions,
 // corner weights, density and opacity are vectors over the steps, and only the transmittance
@@ -20,9 +21,9 @@ namespace {
 // Consecutive steps, one per lane.
 struct alignas(64) StepBlock {
   float corner_weight[8][kWide];
-  int32_t vertex[kWide];  // lowest corner of the cell
+  int32_t vertex[kWide];  // lowest corner of the cell; of an adaptive field the cell
   int32_t composited[kWide];
-  float t[kWide];  // voxels
+  float t[kWide];  // voxels; of an adaptive field world units
   float alpha[kWide];
   float decay[kWide];  // exp(-tau)
   float slope[kWide];  // dtau/dsigma, world units; 0 if sigma or tau is clamped
@@ -40,7 +41,8 @@ struct Marched {
   std::vector<StepBlock> blocks;
   std::vector<Sample> samples;  // capacity; the first num_samples are this ray's
   int64_t num_samples = 0;
-  float world_per_voxel = 0;
+  int32_t num_blocks = 0;     // with samples
+  float world_per_voxel = 0;  // or the unit of t
   float transmittance = 1;
 
   const StepBlock& block(const Sample& sample) const {
@@ -49,6 +51,40 @@ struct Marched {
   float weight(const Sample& sample) const {
     const StepBlock& b = block(sample);
     return b.transmittance_before[sample.lane] * b.alpha[sample.lane];
+  }
+
+  void Clear() {
+    num_samples = 0;
+    num_blocks = 0;
+    transmittance = 1;
+  }
+  StepBlock* next_block() {
+    if (blocks.size() <= static_cast<size_t>(num_blocks)) {
+      blocks.resize(2 * blocks.size() + 16);
+      samples.resize(blocks.size() * kWide + 1);
+    }
+    return &blocks[static_cast<size_t>(num_blocks)];
+  }
+  // Keeps the samples of the next block that composite; true if the ray ends among them.
+  bool Composite(float stop_transmittance) {
+    StepBlock& block = blocks[static_cast<size_t>(num_blocks)];
+    Sample* const first = samples.data() + num_samples;
+    Sample* next = first;
+    bool stopped = false;
+    for (int lane = 0; lane < kWide; ++lane) {
+      next->block = num_blocks;
+      next->lane = lane;
+      next -= block.composited[lane];  // a true comparison is -1
+      block.transmittance_before[lane] = transmittance;
+      transmittance *= block.decay[lane];  // 1 for a sample that does not composite
+      if (transmittance < stop_transmittance && block.composited[lane] != 0) {
+        stopped = true;
+        break;
+      }
+    }
+    num_samples += next - first;
+    num_blocks += next > first;
+    return stopped;
   }
 };
 
@@ -89,6 +125,24 @@ struct StepPlaces {
   }
 };
 
+// alpha, decay, slope and composited of a block; see OpticalDepth.
+inline void SetOpacity(const Wide& density, const Wide& delta, const WideInt& counts,
+                       StepBlock* block) {
+  const WideInt composited = (density > Wide{}) & counts;
+  constexpr float kDensest = static_cast<float>(kMaxDensity);
+  constexpr float kDeepest = static_cast<float>(kMaxOpticalDepth);
+  const Wide sigma = density < Fill(kDensest) ? density : Fill(kDensest);
+  const Wide product = sigma * delta;
+  const Wide bounded = product < Fill(kDeepest) ? product : Fill(kDeepest);
+  const Extinction extinction = Extinguish(composited ? bounded : Wide{});
+  const WideInt free = (density < Fill(kDensest)) & (product < Fill(kDeepest));
+  const Wide slope = free ? delta : Wide{};
+  std::memcpy(block->composited, &composited, sizeof(composited));
+  std::memcpy(block->alpha, &extinction.alpha, sizeof(slope));
+  std::memcpy(block->decay, &extinction.decay, sizeof(slope));
+  std::memcpy(block->slope, &slope, sizeof(slope));
+}
+
 // Everything about steps [first, first + kWide) except the transmittance.
 inline void MarchBlock(const FastGrid& grid, const GridRay<float>& march, float step,
                        int64_t first, StepBlock* block) {
@@ -110,23 +164,9 @@ inline void MarchBlock(const FastGrid& grid, const GridRay<float>& march, float 
     std::memcpy(block->corner_weight[2 * row + 1], &w1, sizeof(w1));
   }
 
-  // See OpticalDepth.
   const Wide end = Fill(static_cast<float>(march.num_steps));
-  const WideInt composited = (density > Wide{}) & (index < end);
-  constexpr float kDensest = static_cast<float>(kMaxDensity);
-  constexpr float kDeepest = static_cast<float>(kMaxOpticalDepth);
-  const float delta = step * march.world_per_voxel;
-  const Wide sigma = density < Fill(kDensest) ? density : Fill(kDensest);
-  const Wide product = sigma * delta;
-  const Wide bounded = product < Fill(kDeepest) ? product : Fill(kDeepest);
-  const Extinction extinction = Extinguish(composited ? bounded : Wide{});
-  const WideInt free = (density < Fill(kDensest)) & (product < Fill(kDeepest));
-  const Wide slope = free ? Fill(delta) : Wide{};
-  std::memcpy(block->composited, &composited, sizeof(composited));
+  SetOpacity(density, Fill(step * march.world_per_voxel), index < end, block);
   std::memcpy(block->t, &t, sizeof(t));
-  std::memcpy(block->alpha, &extinction.alpha, sizeof(t));
-  std::memcpy(block->decay, &extinction.decay, sizeof(t));
-  std::memcpy(block->slope, &slope, sizeof(t));
 }
 
 // Marches the density and keeps the samples that composite. Skipped steps, through cells
@@ -135,10 +175,8 @@ inline void March(const FastGrid& grid, const Ray& ray, const MarchOptions& opti
                   Marched* result) {
   const GridRay<float> march = ClipToGrid(grid.frame, ray, grid.near_clip, options.step);
   result->world_per_voxel = march.world_per_voxel;
-  result->num_samples = 0;
   const EmptySpace empty_space(grid, march, options.step);
-  float transmittance = 1;
-  int32_t block_index = 0;
+  result->Clear();
   bool stopped = false;
   for (int64_t i = 0; i < march.num_steps && !stopped;) {
     const float t = march.t_begin + static_cast<float>(i) * options.step;
@@ -147,31 +185,10 @@ inline void March(const FastGrid& grid, const Ray& ray, const MarchOptions& opti
       i += empty_steps;
       continue;
     }
-    if (result->blocks.size() <= static_cast<size_t>(block_index)) {
-      result->blocks.resize(2 * result->blocks.size() + 16);
-      result->samples.resize(result->blocks.size() * kWide + 1);
-    }
-    StepBlock& block = result->blocks[static_cast<size_t>(block_index)];
-    MarchBlock(grid, march, options.step, i, &block);
+    MarchBlock(grid, march, options.step, i, result->next_block());
     i += kWide;
-    Sample* const first = result->samples.data() + result->num_samples;
-    Sample* next = first;
-    for (int lane = 0; lane < kWide; ++lane) {
-      next->block = block_index;
-      next->lane = lane;
-      next -= block.composited[lane];  // a true comparison is -1
-      block.transmittance_before[lane] = transmittance;
-      transmittance *= block.decay[lane];  // 1 for a sample that does not composite
-      if (transmittance < options.stop_transmittance && block.composited[lane] != 0) {
-        stopped = true;
-        break;
-      }
-    }
-    if (next == first) continue;
-    result->num_samples += next - first;
-    ++block_index;
+    stopped = result->Composite(options.stop_transmittance);
   }
-  result->transmittance = transmittance;
 }
 
 }  // namespace

@@ -48,11 +48,11 @@ struct FastRayFunctions {
   FitStepResult (*accumulate)(const FastGrid&, const RayBatch&, const MarchOptions&,
                               float scale, GradientArena*);
   // Largest w_i that any ray gives a sample at each voxel's corners; weights [N] are running
-  // maxima.
+  // maxima. Of an adaptive field: a sample in each cell, weights [C].
   void (*max_weights)(const FastGrid&, const Ray*, int64_t n, const MarchOptions&,
                       float* weights);
-  // Adds the gradient of the total variation of vertices [begin, end). See regularizers in
-  // total_variation.h.
+  // Adds the gradient of the total variation of vertices [begin, end), or of an adaptive
+  // field's cells: see total_variation.h and cell_variation.h.
   void (*total_variation)(const FastGrid&, int64_t begin, int64_t end, float scale_density,
                           float scale_sh, GradientArena*);
   // Steps slots [begin, end) of arena `self` by the sum over all arenas in order; a voxel

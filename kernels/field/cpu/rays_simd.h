@@ -2,7 +2,9 @@
 // before including it. It uses GCC's vector types nearly everywhere, so the same source
 // compiles to SSE, AVX2 or AVX-512.
 #include <algorithm>
+#include <type_traits>
 
+#include "kernels/field/cpu/cell_march_simd.h"
 #include "kernels/field/cpu/march_simd.h"
 #include "kernels/field/cpu/rays.h"
 #include "kernels/field/cpu/scatter_simd.h"
@@ -13,13 +15,21 @@
 namespace regrade::REGRADE_SIMD_NAMESPACE {
 namespace {
 
+inline void MarchRay(const FastGrid& grid, const Ray& ray, const MarchOptions& options,
+                     Marched* marched) {
+  if (grid.cells.on())
+    MarchCellRay(grid, ray, options, marched);
+  else
+    March(grid, ray, options, marched);
+}
+
 template <int kBasis>
 void RenderRays(const FastGrid& grid, const Ray* rays, int64_t n, const MarchOptions& options,
                 float* color, float* depth, float* transmittance) {
   Marched marched;
   const auto spheres = MakeMarchedSpheres(grid);
   for (int64_t r = 0; r < n; ++r) {
-    March(grid, rays[r], options, &marched);
+    MarchRay(grid, rays[r], options, &marched);
     Quad sums = Shade(grid, RayBasis<kBasis>(rays[r].direction), &marched);
     sums[3] *= marched.world_per_voxel;
     float remaining = marched.transmittance;
@@ -40,7 +50,7 @@ FitStepResult Accumulate(const FastGrid& grid, const RayBatch& batch,
   Marched marched;
   const auto spheres = MakeMarchedSpheres(grid);
   for (int64_t r = 0; r < batch.size; ++r) {
-    March(grid, batch.rays[r], options, &marched);
+    MarchRay(grid, batch.rays[r], options, &marched);
     const RayBasis<kBasis> basis(batch.rays[r].direction);
     Quad sums = Shade(grid, basis, &marched);
     float remaining = marched.transmittance;
@@ -68,10 +78,15 @@ void MaxWeights(const FastGrid& grid, const Ray* rays, int64_t n, const MarchOpt
   Marched marched;
   const CornerOffsets offsets(grid.frame);
   for (int64_t r = 0; r < n; ++r) {
-    March(grid, rays[r], options, &marched);
+    MarchRay(grid, rays[r], options, &marched);
     for (int64_t i = 0; i < marched.num_samples; ++i) {
       const Sample& s = marched.samples[static_cast<size_t>(i)];
       const float w = marched.weight(s);
+      if (grid.cells.on()) {
+        float& most = weights[marched.block(s).vertex[s.lane]];
+        most = std::max(most, w);
+        continue;
+      }
       int32_t link[8];
       LoadLinks(grid, offsets, marched.block(s).vertex[s.lane], link);
       for (int k = 0; k < 8; ++k)
@@ -107,10 +122,16 @@ const FastRayFunctions kFunctions = {
     MaxWeights,
     [](const FastGrid& g, int64_t begin, int64_t end, float density, float sh,
        GradientArena* arena) {
+      const auto add = [&](auto basis) {
+        if (g.cells.on())
+          CellVariation<basis.value>(g, begin, end, density, sh, arena);
+        else
+          TotalVariation<basis.value>(g, begin, end, density, sh, arena);
+      };
       ByBasis(
-          g.basis, [&] { TotalVariation<9>(g, begin, end, density, sh, arena); },
-          [&] { TotalVariation<4>(g, begin, end, density, sh, arena); },
-          [&] { TotalVariation<1>(g, begin, end, density, sh, arena); });
+          g.basis, [&] { add(std::integral_constant<int, 9>()); },
+          [&] { add(std::integral_constant<int, 4>()); },
+          [&] { add(std::integral_constant<int, 1>()); });
     },
     [](FastGrid* g, float* moments, const GradientArena* arenas, int count, int self,
        int64_t begin, int64_t end, const RmspropOptions& o) {

@@ -29,8 +29,13 @@ struct RayBasis {
   }
 };
 
+// `vertex`: see StepBlock.
 inline void LoadLinks(const FastGrid& grid, const CornerOffsets& offsets, int32_t vertex,
                       int32_t* link) {
+  if (grid.cells.on()) {
+    std::memcpy(link, grid.cells.corner.data() + 8 * int64_t{vertex}, 8 * sizeof(int32_t));
+    return;
+  }
   const Probe* lowest = grid.probes.data() + vertex;
   for (int row = 0; row < 4; ++row)
     for (int z = 0; z < 2; ++z) link[2 * row + z] = lowest[offsets[row] + z].link;

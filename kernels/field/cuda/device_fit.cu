@@ -183,7 +183,7 @@ __global__ void FitRaysKernel(DeviceGridView grid, const Ray* rays, const Vec3f*
       error[c] = WarpSum(color[c]) + behind[c] * transmittance - targets[r][c];
     if (d_behind_rays != nullptr && lane == 0)
       d_behind_rays[r] = error * (sees_layers ? 2 * scale * transmittance : 0.0f);
-    squared_error += static_cast<double>(Dot(error, error));
+    squared_error += ExactTerm(static_cast<double>(Dot(error, error)));
     samples += static_cast<unsigned>(count);
     __syncwarp();  // colours were written by some lanes and are read by others
     WalkBack<kBasis, kExact>(grid, values, store, count, march.delta(), behind,

@@ -61,7 +61,7 @@ struct DeviceTouched {
 
 // Forward pass, loss and adjoint of a batch on a grid that is being fitted: adds the gradient
 // of scale * sum (C - target)^2, including that of background layers (device_sphere_rays.h).
-// Float sums have no fixed order: two runs differ in the last bits.
+// Float sums have no fixed order: two runs differ in the last bits unless exact_sums is set.
 class DeviceRayFitter {
  public:
   // Stores every sample of the rays in flight; `max_bytes` bounds the store.

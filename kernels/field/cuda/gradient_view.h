@@ -8,9 +8,10 @@
 
 namespace regrade {
 
-// Order-independent sums: 64-bit integers in units of 2^-44. A fit's gradients are far below
-// the range of 5e5; a non-finite value leaves a mark that no sum reaches.
-inline constexpr float kExactUnit = 0x1p-44f;
+// Order-independent sums: 64-bit integers in units of 2^-44. Gradients and colours are far
+// below the range of 1.3e5; a value that is not finite or beyond kExactLimit leaves a mark that
+// no sum reaches.
+inline constexpr float kExactUnit = 0x1p-44f, kExactLimit = 0x1p18f;
 inline constexpr long long kNotFinite = 1ll << 62;
 
 struct GradientView {
@@ -31,7 +32,7 @@ namespace regrade {
 
 __device__ inline void AddExact(float* gradient, int value, float v) {
   auto* const sum = reinterpret_cast<unsigned long long*>(gradient) + value;
-  if (isfinite(v))
+  if (fabsf(v) < kExactLimit)
     atomicAdd(sum, static_cast<unsigned long long>(
                        llrint(static_cast<double>(v) * (1.0 / double{kExactUnit}))));
   else
@@ -42,6 +43,10 @@ __device__ inline float ExactSum(const float* gradient, int value) {
   if (units > kNotFinite / 2 || units < -kNotFinite / 2) return INFINITY;
   return static_cast<float>(static_cast<double>(units) * kExactUnit);
 }
+
+// A term of a statistic, rounded to a multiple of 2^-26: a sum of such terms in double is exact
+// below 2^27, and so the same in any order.
+__device__ inline double ExactTerm(double v) { return rint(v * 0x1p26) * 0x1p-26; }
 
 __device__ inline void Touch(uint32_t* touched, int32_t voxel) {
   uint32_t* word = touched + (voxel >> 5);

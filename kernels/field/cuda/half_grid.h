@@ -1,4 +1,4 @@
-// A copy of a DeviceGrid for interactive rendering: colours and densities in half precision, in
+// A copy of a DeviceGrid for the frames of films: colours and densities in half precision, in
 // half the bytes, ordered by bricks, so that a ray in any direction reads nearby memory.
 #pragma once
 

@@ -1,6 +1,7 @@
-// See EQ(mlp). The adjoint is two kernels: the first runs each row forward and back and stores
-// every layer's input x_{l-1} and dL/d(A_l x_{l-1} + b_l); the second sums their outer products
-// over the rows, one block for a part of the rows and a layer.
+// See EQ(mlp). The adjoint is three kernels: the first runs each row forward and back and
+// stores every layer's input x_{l-1} and dL/d(A_l x_{l-1} + b_l); the second sums their outer
+// products over the rows, one block for a part of the rows and a layer; the third adds the
+// parts in their order.
 #include <algorithm>
 #include <vector>
 
@@ -109,7 +110,8 @@ __global__ void __launch_bounds__(kThreads)
 }
 
 // Blocks (x: part of the rows, y: layer) of four warps, each computing 16 outputs.
-constexpr int kOuterRows = 32, kOuterStride = kMlpHidden + 4, kOuterThreads = 128;
+constexpr int kOuterParts = 256, kOuterRows = 32, kOuterStride = kMlpHidden + 4,
+              kOuterThreads = 128;
 
 __device__ inline void StageRows(const float* from, int width, int64_t row, int64_t n,
                                  float* to) {
@@ -125,9 +127,9 @@ __device__ inline void StageRows(const float* from, int width, int64_t row, int6
 template <bool kSplit>
 __global__ void __launch_bounds__(kOuterThreads)
     OuterProductsKernel(MlpView mlp, const float* input, const float* d_output, RowCount count,
-                        Scratch scratch, double* gradient) {
+                        Scratch scratch, float* parts, int64_t parameters) {
   const int64_t n = count.Get();
-  if (n <= 0) return;
+  if (blockIdx.x * static_cast<int64_t>(kOuterRows) >= n) return;
   __shared__ float4 left_quads[kOuterRows * kOuterStride / 4],
       right_quads[kOuterRows * kOuterStride / 4];
   float *left_rows = reinterpret_cast<float*>(left_quads),
@@ -162,14 +164,14 @@ __global__ void __launch_bounds__(kOuterThreads)
     }
   }
   if (first_output >= outputs) return;
-  double* to = gradient + mlp.Offset(layer);
+  float* to = parts + blockIdx.x * parameters + mlp.Offset(layer);
 #pragma unroll
   for (int j = 0; j < kHiddenTiles; ++j) {
     if (8 * j >= inputs) break;
 #pragma unroll
     for (int i = 0; i < 4; ++i) {
       const int output = first_output + lane.g + 8 * (i / 2), in = 8 * j + 2 * lane.t + i % 2;
-      atomicAdd(to + output * inputs + in, static_cast<double>(sums[j].x[i]));
+      to[output * inputs + in] = sums[j].x[i];
     }
   }
 #pragma unroll
@@ -178,8 +180,21 @@ __global__ void __launch_bounds__(kOuterThreads)
     bias_high += __shfl_xor_sync(0xffffffffu, bias_high, other);
   }
   if (lane.t != 0) return;
-  atomicAdd(to + outputs * inputs + first_output + lane.g, static_cast<double>(bias_low));
-  atomicAdd(to + outputs * inputs + first_output + lane.g + 8, static_cast<double>(bias_high));
+  to[outputs * inputs + first_output + lane.g] = bias_low;
+  to[outputs * inputs + first_output + lane.g + 8] = bias_high;
+}
+
+__global__ void AddPartsKernel(const float* parts, int64_t parameters, RowCount count,
+                               double* gradient) {
+  const int64_t i = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
+  const int64_t n = count.Get(), blocks = (n + kOuterRows - 1) / kOuterRows;
+  if (i >= parameters || n <= 0) return;
+  const int used = blocks < kOuterParts ? static_cast<int>(blocks) : kOuterParts;
+  double sum = 0;
+#pragma unroll 8
+  for (int part = 0; part < used; ++part)
+    sum += static_cast<double>(parts[part * parameters + i]);
+  gradient[i] += sum;
 }
 
 MlpView ViewOf(const FusedMlp& shape, const DeviceBuffer<float>& parameters) {
@@ -219,17 +234,19 @@ void LaunchForward(const MlpView& mlp, const float* input, const RowCount& count
 
 template <bool kSplit>
 void LaunchAdjoint(const MlpView& mlp, const float* input, const float* d_output,
-                   const RowCount& count, const Scratch& scratch, double* gradient) {
+                   const RowCount& count, const Scratch& scratch,
+                   const DeviceBuffer<float>& parts, const DeviceBuffer<double>& gradient) {
   const WalkLaunch launch(AdjointRowsKernel<kSplit>, mlp, count.n);
   AdjointRowsKernel<kSplit><<<launch.blocks, kThreads, launch.bytes, LaunchStream()>>>(
       mlp, launch.stage, input, d_output, count, scratch);
   CheckLaunch("mlp_adjoint_rows");
-  const int64_t tiles = (count.n + kOuterRows - 1) / kOuterRows;
-  const dim3 blocks(static_cast<unsigned>(std::min<int64_t>(tiles, 256)),
-                    static_cast<unsigned>(mlp.layers));
+  const dim3 blocks(kOuterParts, static_cast<unsigned>(mlp.layers));
   OuterProductsKernel<kSplit><<<blocks, kOuterThreads, 0, LaunchStream()>>>(
-      mlp, input, d_output, count, scratch, gradient);
+      mlp, input, d_output, count, scratch, parts.data(), gradient.size());
   CheckLaunch("mlp_outer_products");
+  AddPartsKernel<<<BlocksFor(gradient.size()), kThreads, 0, LaunchStream()>>>(
+      parts.data(), gradient.size(), count, gradient.data());
+  CheckLaunch("mlp_add_parts");
 }
 
 }  // namespace
@@ -249,6 +266,9 @@ void DeviceMlp::ReserveAdjoint(int64_t n) {
       (static_cast<int64_t>(shape_.layers.size()) - 1) * std::min(n, kChunk) * kMlpHidden;
   if (scratch_.size() < 2 * kept)
     scratch_ = DeviceBuffer<float>(2 * kept, "layer values of the style network");
+  if (parts_.empty())
+    parts_ =
+        DeviceBuffer<float>(kOuterParts * gradient_.size(), "parts of the style's gradient");
 }
 
 void DeviceMlp::AddAdjoint(MlpPrecision precision, const float* input, const float* d_output,
@@ -261,9 +281,9 @@ void DeviceMlp::AddAdjoint(MlpPrecision precision, const float* input, const flo
     const Scratch scratch{scratch_.data(), scratch_.data() + kept, rows};
     const float *from = input + begin * kMlpEndLanes, *d_from = d_output + begin * kMlpEndLanes;
     if (precision == MlpPrecision::kSplit)
-      LaunchAdjoint<true>(mlp, from, d_from, count, scratch, gradient_.data());
+      LaunchAdjoint<true>(mlp, from, d_from, count, scratch, parts_, gradient_);
     else
-      LaunchAdjoint<false>(mlp, from, d_from, count, scratch, gradient_.data());
+      LaunchAdjoint<false>(mlp, from, d_from, count, scratch, parts_, gradient_);
   }
 }
 

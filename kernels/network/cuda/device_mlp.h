@@ -29,7 +29,7 @@ class DeviceMlp {
 
   // Adds the adjoint for d_output [n, kMlpEndLanes] to sums that TakeGradient returns and
   // resets to zero. The forward pass is recomputed chunk by chunk, so memory does not grow with
-  // n.
+  // n. Sums have a fixed order, which depends on the number of rows meant and not on n.
   void AddAdjoint(MlpPrecision precision, const float* input, const float* d_output, int64_t n,
                   const int32_t* counted = nullptr);
   void ReserveAdjoint(int64_t n);                     // allocates its memory beforehand
@@ -42,10 +42,10 @@ class DeviceMlp {
   int64_t ParameterOffset(size_t layer) const { return shape_.Offset(layer); }
 
  private:
-  FusedMlp shape_;                  // its weights are unused
-  DeviceBuffer<float> parameters_;  // in the layout of FusedMlp::Offset
-  DeviceBuffer<double> gradient_;   // the same
-  DeviceBuffer<float> scratch_;     // see device_mlp.cu
+  FusedMlp shape_;                       // its weights are unused
+  DeviceBuffer<float> parameters_;       // in the layout of FusedMlp::Offset
+  DeviceBuffer<double> gradient_;        // the same
+  DeviceBuffer<float> scratch_, parts_;  // see device_mlp.cu
 };
 
 }  // namespace regrade

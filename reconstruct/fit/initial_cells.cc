@@ -1,0 +1,143 @@
+#include "reconstruct/fit/initial_cells.h"
+
+#include <algorithm>
+#include <vector>
+
+#include "kernels/field/trilinear.h"
+
+namespace regrade {
+namespace {
+
+constexpr int kRateLattice = 48;  // vertices along the longest side
+
+// Number of cameras that see a point beyond near_clip, up to `enough`. A vertex may project
+// just outside of a photo and still be a corner of a visible cell: `margin` is a fraction of
+// the photo's side.
+int ViewsThatSee(const TrainingRays& rays, const Vec3d& p, float near_clip, double margin,
+                 int enough) {
+  int views = 0;
+  for (int v = 0; v < rays.num_views() && views < enough; ++v) {
+    const Camera& camera = rays.camera(v);
+    const Vec3d point = camera.ndc.on() ? WorldFromNdc(camera.ndc, p) : p;
+    double x, y;
+    if (Norm(point - camera.Center()) < near_clip || !camera.Project(point, &x, &y)) continue;
+    const double mx = margin * camera.width, my = margin * camera.height;
+    views += x >= -mx && x <= camera.width + mx && y >= -my && y <= camera.height + my;
+  }
+  return views;
+}
+
+// `at` counts voxels from the box's corner.
+Vec3d WorldOfLattice(const GridFrame& frame, const Vec3d& at) {
+  Vec3d world;
+  for (int a = 0; a < 3; ++a)
+    world[a] = double{frame.center[a]} +
+               (2 * at[a] / frame.resolution[a] - 1) * double{frame.radius[a]};
+  return world;
+}
+
+bool TouchesBall(const GridFrame& frame, const Vec3i& low, int width) {
+  double distance = 0;  // of the cell's nearest point from the centre, in half sides
+  for (int a = 0; a < 3; ++a) {
+    const double begin = 2.0 * low[a] / frame.resolution[a] - 1;
+    const double end = 2.0 * (low[a] + width) / frame.resolution[a] - 1;
+    const double nearest = begin > 0 ? begin : end < 0 ? -end : 0;
+    distance += nearest * nearest;
+  }
+  return distance <= 1;
+}
+
+}  // namespace
+
+GridFrame CellFrame(const SceneBox& box, int coarsest, int finest) {
+  Vec3i size = ResolutionFor(box, coarsest << finest);
+  for (int a = 0; a < 3; ++a)
+    size[a] = std::max(1, ((size[a] >> finest) + (size[a] >> (finest - 1) & (finest > 0))))
+              << finest;
+  return {size, box.center, box.radius};
+}
+
+FastGrid MakeInitialCells(const TrainingRays& rays, const GridFrame& frame, int finest,
+                          int basis, float density, float near_clip, int min_views, bool ball) {
+  FastGrid grid;
+  grid.frame = frame;
+  grid.basis = basis;
+  grid.near_clip = near_clip;
+  grid.background = rays.mean_color();
+  const int width = 1 << finest;
+  const Vec3i top{frame.resolution.x >> finest, frame.resolution.y >> finest,
+                  frame.resolution.z >> finest};
+  std::vector<std::vector<CellKey>> rows(static_cast<size_t>(top.x));
+#pragma omp parallel for schedule(dynamic, 1)
+  for (int x = 0; x < top.x; ++x)
+    for (int y = 0; y < top.y; ++y)
+      for (int z = 0; z < top.z; ++z) {
+        const Vec3i low{x * width, y * width, z * width};
+        if (ball && !TouchesBall(frame, low, width)) continue;
+        const auto seen = [&](const Vec3d& at) {
+          return ViewsThatSee(rays, WorldOfLattice(frame, at), near_clip, 0.02, min_views) >=
+                 min_views;
+        };
+        bool kept =
+            seen(low.Cast<double>() + Vec3d{0.5, 0.5, 0.5} * static_cast<double>(width));
+        for (int k = 0; k < 8 && !kept; ++k)
+          kept = seen(CornerOf(low, width, k).Cast<double>());
+        if (kept) rows[static_cast<size_t>(x)].push_back(KeyOf(low));
+      }
+  std::vector<CellKey> keys;
+  for (const auto& row : rows) keys.insert(keys.end(), row.begin(), row.end());
+  std::sort(keys.begin(), keys.end());
+  grid.cells.finest = finest;
+  grid.cells.key = Buffer<CellKey>(static_cast<int64_t>(keys.size()));
+  std::copy(keys.begin(), keys.end(), grid.cells.key.begin());
+  grid.cells.level = Buffer<uint8_t>(grid.cells.key.size());
+  FindVertices(&grid.cells);
+  BuildTree(frame.resolution, &grid.cells);
+  const int lanes = grid.lanes();
+  grid.records.Resize(grid.cells.num_vertices() * lanes);
+  for (int64_t v = 0; v < grid.num_voxels(); ++v)
+    grid.records[v * lanes + DensityLane(basis)] = density;
+  grid.density_rate = DensityRates(rays, frame, grid.cells, near_clip);
+  RefreshDerived(&grid);
+  return grid;
+}
+
+Buffer<float> DensityRates(const TrainingRays& rays, const GridFrame& frame,
+                           const CellGrid& cells, float near_clip) {
+  const int longest = std::max({frame.resolution.x, frame.resolution.y, frame.resolution.z});
+  Vec3i n;  // vertices of the lattice
+  for (int a = 0; a < 3; ++a)
+    n[a] = std::max(2, static_cast<int>(int64_t{kRateLattice} * frame.resolution[a] / longest));
+  GridFrame lattice{n, frame.center, frame.radius};
+  std::vector<float> views(static_cast<size_t>(lattice.NumVertices()));
+#pragma omp parallel for schedule(dynamic, 1)
+  for (int x = 0; x < n.x; ++x)
+    for (int y = 0; y < n.y; ++y)
+      for (int z = 0; z < n.z; ++z) {
+        const Vec3d at{x * static_cast<double>(frame.resolution.x) / (n.x - 1),
+                       y * static_cast<double>(frame.resolution.y) / (n.y - 1),
+                       z * static_cast<double>(frame.resolution.z) / (n.z - 1)};
+        views[static_cast<size_t>(lattice.Vertex(x, y, z))] = static_cast<float>(
+            ViewsThatSee(rays, WorldOfLattice(frame, at), near_clip, 0, rays.num_views()));
+      }
+  const float most = std::max(1.0f, *std::max_element(views.begin(), views.end()));
+  constexpr float kLeast = 1e-3f;
+  Buffer<float> rates(cells.num_vertices());
+#pragma omp parallel for schedule(static)
+  for (int64_t v = 0; v < rates.size(); ++v) {
+    const Vec3i place = PlaceOf(cells.vertex_key[v]);
+    Vec3f p;
+    for (int a = 0; a < 3; ++a)
+      p[a] = static_cast<float>(place[a]) * static_cast<float>(n[a] - 1) /
+             static_cast<float>(frame.resolution[a]);
+    const Cell<float> cell = LocateCell(lattice, p);
+    float sum = 0;
+    for (int k = 0; k < 8; ++k)
+      sum += CornerWeight(cell.fraction, k) *
+             views[static_cast<size_t>(CornerVertex(lattice, cell.vertex, k))];
+    rates[v] = std::max(kLeast, sum / most);
+  }
+  return rates;
+}
+
+}  // namespace regrade

@@ -1,0 +1,65 @@
+// Which renderer makes a film: what options and processor decide, and how the report says it.
+#include "pipeline/stages/film_renderer.h"
+
+#include <gtest/gtest.h>
+
+#include "pipeline/run/resolve_settings.h"
+#include "tests/support/small_field.h"
+
+namespace regrade {
+namespace {
+
+RunSettings Resolve(const std::vector<std::string>& flags) {
+  RunSettings settings;
+  OptionSet options;
+  settings.Bind(&options);
+  options.Parse(flags);
+  ResolveSettings({}, &options);
+  return settings;
+}
+
+std::string Why(const std::vector<std::string>& flags, Backend backend = Backend::kCuda,
+                bool film_of_views = false) {
+  return WhyExactFilm(Resolve(flags), backend, film_of_views);
+}
+
+TEST(FilmRenderer, IsFastOnAGpuUnlessAnOptionIsAgainstIt) {
+  EXPECT_EQ(Why({}), "");
+  EXPECT_EQ(Why({"--exact"}), "--exact");
+  EXPECT_EQ(Why({"--reproducible"}), "--reproducible");
+  EXPECT_EQ(Why({"--no-exact"}), "");
+  for (const char* preset : kPresets) EXPECT_EQ(Why({"--preset", preset}), "") << preset;
+}
+
+TEST(FilmRenderer, IsExactOnTheCpuAndWhereTheFilmShowsTheViews) {
+  EXPECT_EQ(Why({}, Backend::kCpu), "the CPU has no fast renderer");
+  EXPECT_EQ(Why({}, Backend::kCuda, true), "its frames are those of the views");
+}
+
+// A film is rendered again when this changes, but not on another processor.
+TEST(FilmRenderer, OptionsDecideWhatIsRenderedAgain) {
+  EXPECT_FALSE(WantsExactFilm(Resolve({})));
+  EXPECT_FALSE(WantsExactFilm(Resolve({"--device", "cpu"})));
+  EXPECT_TRUE(WantsExactFilm(Resolve({"--exact"})));
+  EXPECT_TRUE(WantsExactFilm(Resolve({"--reproducible"})));
+}
+
+TEST(FilmRenderer, ThePreparedRenderersAreBothFastOrTheReasonIsGiven) {
+  const RadianceField field = testing::RandomField({5, 5, 5}, 9, 0.5, 1);
+  FieldRenderer source(field, Backend::kCpu), styled(field, Backend::kCpu);
+  EXPECT_EQ(PrepareFilm(Resolve({}), Backend::kCpu, false, &source, &styled),
+            "the CPU has no fast renderer");
+  EXPECT_EQ(source.PrepareFast(), "the CPU has no fast renderer");
+}
+
+TEST(FilmRenderer, TheReportNamesIt) {
+  EXPECT_EQ(
+      FilmRendererText(""),
+      "half precision, steps where opacity changes by 1/128; at least 55 dB from the exact "
+      "frames");
+  EXPECT_EQ(kFastOpacityStep, 1.0f / 128);  // as the text says
+  EXPECT_EQ(FilmRendererText("--exact"), "exact (--exact)");
+}
+
+}  // namespace
+}  // namespace regrade
