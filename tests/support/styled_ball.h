@@ -12,6 +12,7 @@
 #include "kernels/base/error.h"
 #include "kernels/base/random.h"
 #include "kernels/field/spherical_harmonics.h"
+#include "kernels/field/trilinear.h"
 #include "kernels/network/lipschitz_layer.h"
 #include "stylize/field/apply_network.h"
 #include "stylize/field/base_map.h"
