@@ -30,10 +30,9 @@ struct ExportOptions {
 void MakeEmptyFolder(const fs::path& folder) {
   std::error_code error;
   if (fs::exists(folder, error) && !fs::is_empty(folder, error))
-    throw Error(ExitCode::kUsage, "is not empty", folder.string(),
-                "name a new folder with --out");
+    throw UsageError("is not empty", folder.string(), "name a new folder with --out");
   fs::create_directories(folder / "images", error);
-  if (error) throw Error(ExitCode::kResources, error.message(), folder.string());
+  if (error) throw ResourceError(error.message(), folder.string());
 }
 
 void WritePoses(const ExportOptions& options, const std::string& folder,
@@ -64,22 +63,20 @@ void RunExport(const Command& command, const Arguments& arguments, Console* cons
   const auto prepared = Prepare(command, arguments, {}, &options);
   if (!prepared) return;
   const std::string& folder = prepared->words[0];
-  if (settings.out.empty())
-    throw Error(ExitCode::kUsage, "its value is missing", "--out", "name the folder to write");
+  RequireValue(settings.out, "--out", "name the folder to write");
   if (!fs::exists(folder + "/poses/photos.json"))
-    throw Error(ExitCode::kInput, "has no poses", folder,
-                "run `regrade pose PHOTOS --out " + folder + "` first");
+    throw InputError("has no poses", folder,
+                     "run `regrade pose PHOTOS --out " + folder + "` first");
   const Capture capture = ReadCapture(folder + "/poses");
   MakeEmptyFolder(settings.out);
   for (const CaptureView& view : capture.views) {
     std::error_code error;
     fs::copy_file(view.path, settings.out + "/images/" + view.name, error);
-    if (error)
-      throw Error(ExitCode::kResources, error.message(), settings.out + "/images/" + view.name);
+    if (error) throw ResourceError(error.message(), settings.out + "/images/" + view.name);
   }
   WritePoses(settings, folder, capture);
-  console->Info("wrote " + std::to_string(capture.views.size()) +
-                " photos and their poses to " + settings.out);
+  console->Info(
+      Concat("wrote ", capture.views.size(), " photos and their poses to ", settings.out));
 }
 
 }  // namespace regrade
