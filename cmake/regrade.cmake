@@ -71,7 +71,7 @@ endfunction()
 function(regrade_test name)
   cmake_parse_arguments(ARG "" "" "SOURCES;LINK" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
-  target_link_libraries(${name} PRIVATE regrade_flags ${ARG_LINK} GTest::gtest GTest::gtest_main)
+  target_link_libraries(${name} PRIVATE regrade_flags source_dir ${ARG_LINK} GTest::gtest GTest::gtest_main)
   # Idle OpenMP threads sleep: tests run side by side, and spinning ones would take each other's cores.
   gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST
     PROPERTIES TIMEOUT 600 ENVIRONMENT OMP_WAIT_POLICY=passive)

@@ -1,7 +1,6 @@
 #include "evaluate/bootstrap.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "kernels/base/error.h"
 #include "kernels/base/random.h"
@@ -36,7 +35,7 @@ std::optional<Interval> BootstrapMean(const std::vector<double>& values, int blo
   std::vector<double> means(kBootstrapResamples);
   for (size_t r = 0; r < means.size(); ++r)
     means[r] = MeanOfResample(values, static_cast<size_t>(block), seed, r);
-  std::sort(means.begin(), means.end());
+  std::ranges::sort(means);
   return Interval{Quantile(means, 0.025), Quantile(means, 0.975)};
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <memory>
 #include <numeric>
@@ -39,18 +40,16 @@ double Decibel(double error) {
 void CheckFrame(const Image& frame, const PairMotion& motion, const Image& first,
                 const std::string& where) {
   if (frame.width != motion.flow.width || frame.height != motion.flow.height)
-    throw Error(ExitCode::kInput,
-                "a frame of " + std::to_string(frame.width) + " x " +
-                    std::to_string(frame.height) + " px does not fit the reference of " +
-                    std::to_string(motion.flow.width) + " x " +
-                    std::to_string(motion.flow.height) + " px",
-                where, "render all sequences at one size");
+    throw InputError(Concat("a frame of ", frame.width, " x ", frame.height,
+                            " px does not fit the reference of ", motion.flow.width, " x ",
+                            motion.flow.height, " px"),
+                     where, "render all sequences at one size");
   if (ColourChannels(frame) != ColourChannels(first))
-    throw Error(ExitCode::kInput, "grey and colour frames in one sequence", where);
+    throw InputError("grey and colour frames in one sequence", where);
 }
 
 std::string FrameName(const std::string& sequence, int index) {
-  return sequence + ", frame " + std::to_string(index);
+  return Concat(sequence, ", frame ", index);
 }
 
 }  // namespace
@@ -134,7 +133,7 @@ ConsistencyRow Summarize(const std::string& sequence, int gap,
     row.tc_psnr_interval_db = BootstrapMean(finite_db, gap);
   }
   if (row.pairs == 0)
-    row.why = "no pair of frames is " + std::to_string(gap) + " apart";
+    row.why = Concat("no pair of frames is ", gap, " apart");
   else if (defined == 0)
     row.why = "no pair has a comparable pixel";
   else if (finite_db.empty())
@@ -149,46 +148,49 @@ ConsistencyReport EvaluateConsistency(int frames, const PairMotionFunction& moti
   int64_t total = 0;
   int max_gap = 1;
   for (const int gap : options.gaps) {
-    if (gap < 1)
-      throw Error(ExitCode::kUsage, "gaps between frames start at 1", std::to_string(gap));
+    if (gap < 1) throw UsageError("gaps between frames start at 1", std::to_string(gap));
     max_gap = std::max(max_gap, gap);
     total += std::max<int64_t>(0, static_cast<int64_t>(frames) - gap);
   }
   std::vector<FrameCache> caches;
   for (const NamedFrameSource& sequence : sequences) {
     if (sequence.frames.count != frames)
-      throw Error(ExitCode::kInput,
-                  "the sequence has " + std::to_string(sequence.frames.count) +
-                      " frames, the reference " + std::to_string(frames),
-                  sequence.name, "evaluate frames of the same cameras");
+      throw InputError(
+          Concat("the sequence has ", sequence.frames.count, " frames, the reference ", frames),
+          sequence.name, "evaluate frames of the same cameras");
     caches.emplace_back(sequence.frames, std::min(max_gap, frames) + 1,
-                        kCacheBytes / static_cast<int64_t>(sequences.size()));
+                        kCacheBytes / std::ssize(sequences));
   }
 
   ConsistencyReport report;
   report.mode = options.mode;
   report.flow = options.mode == "geometry" ? "depth and cameras" : options.flow;
+  std::vector<WorstPair> worst(sequences.size() * options.gaps.size());
   int64_t done = 0;
   for (int i = 0; i < frames; ++i)
-    for (const int gap : options.gaps) {
+    for (size_t g = 0; g < options.gaps.size(); ++g) {
+      const int gap = options.gaps[g];
       if (gap >= frames - i) continue;
-      const PairMotion pair_motion = motion(i, i + gap);
+      const auto pair_motion = std::make_shared<const PairMotion>(motion(i, i + gap));
       for (size_t s = 0; s < sequences.size(); ++s) {
         const std::string& name = sequences[s].name;
         const auto earlier = caches[s].Get(i), later = caches[s].Get(i + gap);
-        CheckFrame(*earlier, pair_motion, *earlier, FrameName(name, i));
-        CheckFrame(*later, pair_motion, *earlier, FrameName(name, i + gap));
-        PairResult result = ComparePair(*earlier, *later, pair_motion);
+        CheckFrame(*earlier, *pair_motion, *earlier, FrameName(name, i));
+        CheckFrame(*later, *pair_motion, *earlier, FrameName(name, i + gap));
+        PairResult result = ComparePair(*earlier, *later, *pair_motion);
         result.sequence = name;
         result.from = i;
         result.to = i + gap;
         result.low_coverage = result.coverage < options.min_coverage;
+        WorstPair& so_far = worst[s * options.gaps.size() + g];
+        if (result.error && *result.error > so_far.pair.error.value_or(0))
+          so_far = {result, pair_motion};
         report.pairs.push_back(std::move(result));
       }
-      const LoopControl control =
-          Report(progress, static_cast<double>(++done), static_cast<double>(total));
-      if (control == LoopControl::kStop) throw Interrupted();
+      ReportOrThrow(progress, ++done, total);
     }
+  std::copy_if(worst.begin(), worst.end(), std::back_inserter(report.worst),
+               [](const WorstPair& pair) { return pair.motion != nullptr; });
   for (const NamedFrameSource& sequence : sequences)
     for (const int gap : options.gaps)
       report.rows.push_back(Summarize(sequence.name, gap, report.pairs));
@@ -221,14 +223,13 @@ ConsistencyReport EvaluateConsistency(const FrameSource& reference,
                                       const GeometrySource& geometry) {
   if (options.mode == "geometry") {
     if (!geometry)
-      throw Error(ExitCode::kUsage, "mode geometry needs depth and cameras of the frames", "",
-                  "evaluate a run's folder, or choose lai2018 or ruder2016");
+      throw UsageError("mode geometry needs depth and cameras of the frames", "",
+                       "evaluate a run's folder, or choose lai2018 or ruder2016");
     return EvaluateConsistency(reference.count, GeometricMotion(geometry), sequences, options,
                                progress);
   }
   // Both frames of a pair are used again by later pairs.
-  const int max_gap =
-      options.gaps.empty() ? 1 : *std::max_element(options.gaps.begin(), options.gaps.end());
+  const int max_gap = options.gaps.empty() ? 1 : *std::ranges::max_element(options.gaps);
   const auto cache = std::make_shared<FrameCache>(
       reference, std::clamp(max_gap, 1, std::max(1, reference.count)) + 1, kCacheBytes);
   const FrameSource cached{reference.count, [cache](int i) { return *cache->Get(i); }};

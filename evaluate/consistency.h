@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -99,10 +100,18 @@ struct ConsistencyRow {
   std::string why;      // why a metric is missing or infinite; else empty
 };
 
+// The pair with the largest error of a row, with its motion, which sequences share.
+struct WorstPair {
+  PairResult pair;
+  std::shared_ptr<const PairMotion> motion;
+};
+
 struct ConsistencyReport {
   std::string mode, flow;
   std::vector<ConsistencyRow> rows;  // by sequence, then by gap, in the order given
   std::vector<PairResult> pairs;     // by first frame, gap, sequence
+  // In the order of rows; rows whose pairs are all perfect or undefined have none.
+  std::vector<WorstPair> worst;
 };
 
 // Compares frame i with frame i + gap of each sequence, for every i and gap. Flow and mask are

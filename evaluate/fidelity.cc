@@ -23,21 +23,17 @@ Image Clipped(Image image) {
 void CheckCount(const NamedFrameSource& sequence, const FrameSource& other,
                 const std::string& what) {
   if (other.count == 0 || other.count == sequence.frames.count) return;
-  throw Error(ExitCode::kInput,
-              "the sequence has " + std::to_string(sequence.frames.count) + " frames, " + what +
-                  " " + std::to_string(other.count),
-              sequence.name, "fidelity needs the same number of frames");
+  throw InputError(
+      Concat("the sequence has ", sequence.frames.count, " frames, ", what, " ", other.count),
+      sequence.name, "fidelity needs the same number of frames");
 }
 
 void CheckSize(const Image& frame, const Image& other, const std::string& what, int index,
                const NamedFrameSource& sequence) {
   if (frame.SameSize(other)) return;
-  throw Error(ExitCode::kInput,
-              what + " of frame " + std::to_string(index) +
-                  " has another size: " + std::to_string(other.width) + " x " +
-                  std::to_string(other.height) + " px instead of " +
-                  std::to_string(frame.width) + " x " + std::to_string(frame.height),
-              sequence.name);
+  throw InputError(Concat(what, " of frame ", index, " has another size: ", other.width, " x ",
+                          other.height, " px instead of ", frame.width, " x ", frame.height),
+                   sequence.name);
 }
 
 }  // namespace
@@ -90,8 +86,7 @@ FidelityRow MeasureFidelity(const NamedFrameSource& sequence, const FidelityTarg
         ++perfect;
       }
     }
-    const LoopControl control = Report(progress, i + 1, count);
-    if (control == LoopControl::kStop) throw Interrupted();
+    ReportOrThrow(progress, i + 1, count);
   }
 
   FidelityRow row;

@@ -2,7 +2,6 @@
 
 #include <bit>
 #include <cmath>
-#include <cstdio>
 #include <fstream>
 #include <limits>
 
@@ -25,7 +24,7 @@ struct Header {
 static_assert(sizeof(Header) == 12);
 
 [[noreturn]] void Refuse(const std::string& what, const std::string& path) {
-  throw Error(ExitCode::kInput, what, path, "flow files are Middlebury .flo, uncompressed");
+  throw InputError(what, path, "flow files are Middlebury .flo, uncompressed");
 }
 
 }  // namespace
@@ -42,14 +41,11 @@ FlowField ReadFlowFile(const std::string& path, int64_t* unknown_pixels) {
   if (header.mark != kMark) Refuse("this is not a .flo file (its mark is not 202021.25)", path);
   if (header.width < 1 || header.width > kMaxSide || header.height < 1 ||
       header.height > kMaxSide)
-    Refuse("the flow file claims " + std::to_string(header.width) + " x " +
-               std::to_string(header.height) + " px",
-           path);
+    Refuse(Concat("the flow file claims ", header.width, " x ", header.height, " px"), path);
   const int64_t guaranteed = static_cast<int64_t>(sizeof(header)) +
                              static_cast<int64_t>(header.width) * header.height * 8;
   if (size != guaranteed)
-    Refuse("the flow file has " + std::to_string(size) + " bytes, its header specifies " +
-               std::to_string(guaranteed),
+    Refuse(Concat("the flow file has ", size, " bytes, its header specifies ", guaranteed),
            path);
   FlowField flow(header.width, header.height);
   if (!file.read(reinterpret_cast<char*>(flow.uv.data()), guaranteed - sizeof(header)))
@@ -83,14 +79,10 @@ void WriteFlowFile(const std::string& path, const FlowField& flow) {
   }
   file.close();
   if (!file)
-    throw Error(ExitCode::kResources, "cannot write the flow file", path,
-                "check the disk's free space and permissions");
+    throw ResourceError("cannot write the flow file", path,
+                        "check the disk's free space and permissions");
 }
 
-std::string FlowFileName(int from, int to) {
-  char name[32];
-  std::snprintf(name, sizeof(name), "%05d_%05d.flo", from, to);
-  return name;
-}
+std::string FlowFileName(int from, int to) { return Format("%05d_%05d.flo", from, to); }
 
 }  // namespace regrade

@@ -31,7 +31,7 @@ class FrameCache {
   }
 
  private:
-  int64_t Size() const { return static_cast<int64_t>(kept_.size()); }
+  int64_t Size() const { return std::ssize(kept_); }
 
   FrameSource source_;
   int64_t max_frames_;

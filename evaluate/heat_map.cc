@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 
 #include "kernels/base/error.h"
 #include "kernels/image/warp.h"
@@ -60,20 +59,8 @@ Image ErrorHeatMap(const Image& earlier, const Image& later, const PairMotion& m
   return map;
 }
 
-const PairResult* WorstPair(const std::string& sequence, int gap,
-                            const std::vector<PairResult>& pairs) {
-  const PairResult* worst = nullptr;
-  for (const PairResult& pair : pairs)
-    if (pair.sequence == sequence && pair.to - pair.from == gap && pair.error &&
-        (worst == nullptr || *pair.error > *worst->error))
-      worst = &pair;
-  return worst;
-}
-
 std::string HeatMapFileName(const PairResult& pair) {
-  char number[16];
-  std::snprintf(number, sizeof(number), "%05d", pair.from);
-  return pair.sequence + "_gap" + std::to_string(pair.to - pair.from) + "_" + number + ".png";
+  return Format("%s_gap%d_%05d.png", pair.sequence.c_str(), pair.to - pair.from, pair.from);
 }
 
 }  // namespace regrade

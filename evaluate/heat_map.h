@@ -2,7 +2,6 @@
 #pragma once
 
 #include <string>
-#include <utility>
 
 #include "evaluate/consistency.h"
 
@@ -18,10 +17,6 @@ inline constexpr double kHeatWhiteDb = 50, kHeatDarkDb = 10;
 // show the earlier frame in grey at a quarter of its brightness. The scale is fixed, so maps of
 // two methods are comparable.
 Image ErrorHeatMap(const Image& earlier, const Image& later, const PairMotion& motion);
-
-// The pair of one sequence and gap with the largest error; null if no pair has an error.
-const PairResult* WorstPair(const std::string& sequence, int gap,
-                            const std::vector<PairResult>& pairs);
 
 // "NAME_gap1_00012.png" for the pair whose first frame is 12.
 std::string HeatMapFileName(const PairResult& pair);

@@ -13,7 +13,7 @@ namespace regrade {
 namespace {
 
 std::string SizeText(const Image& image) {
-  return std::to_string(image.width) + " x " + std::to_string(image.height) + " px";
+  return Concat(image.width, " x ", image.height, " px");
 }
 
 uint8_t ToByte(float value) {
@@ -54,9 +54,10 @@ cv::Ptr<cv::DenseOpticalFlow> MakeContributed([[maybe_unused]] const std::string
   if (name == "pca-flow") return cv::optflow::createOptFlow_PCAFlow();
   return cv::optflow::createOptFlow_DenseRLOF();
 #else
-  throw Error(ExitCode::kUsage, "this build has no optical flow '" + name + "'", "--flow",
-              "install the package libopencv-contrib-dev and build again, or choose one of " +
-                  std::string(kFlowMethods));
+  throw UsageError(
+      "this build has no optical flow '" + name + "'", "--flow",
+      "install the package libopencv-contrib-dev and build again, or choose one of " +
+          std::string(kFlowMethods));
 #endif
 }
 
@@ -75,9 +76,9 @@ cv::Ptr<cv::DenseOpticalFlow> MakeMethod(const std::string& name) {
   }
   if (Contributed(name)) return MakeContributed(name);
   if (name == "farneback") return cv::FarnebackOpticalFlow::create(5, 0.5, false, 15);
-  throw Error(ExitCode::kUsage, "unknown optical flow method", name,
-              std::string("choose one of ") + kFlowMethods + "|" + kContributedFlowMethods +
-                  ", files:DIR or onnx:FILE");
+  throw UsageError("unknown optical flow method", name,
+                   std::string("choose one of ") + kFlowMethods + "|" +
+                       kContributedFlowMethods + ", files:DIR or onnx:FILE");
 }
 
 }  // namespace
@@ -85,12 +86,11 @@ cv::Ptr<cv::DenseOpticalFlow> MakeMethod(const std::string& name) {
 FlowField ComputeFlow(const Image& from, const Image& to, const std::string& method) {
   const cv::Ptr<cv::DenseOpticalFlow> algorithm = MakeMethod(method);
   if (!from.SameSize(to))
-    throw Error(ExitCode::kInput,
-                "frames differ in size: " + SizeText(from) + " and " + SizeText(to), "",
-                "all frames of a sequence must have one size");
+    throw InputError("frames differ in size: " + SizeText(from) + " and " + SizeText(to), "",
+                     "all frames of a sequence must have one size");
   if (from.width < kLeastFlowSide || from.height < kLeastFlowSide)
-    throw Error(ExitCode::kInput, "frames of " + SizeText(from) + " are too small for flow", "",
-                "use frames of at least 12 x 12 px");
+    throw InputError("frames of " + SizeText(from) + " are too small for flow", "",
+                     "use frames of at least 12 x 12 px");
   cv::Mat flow;
   const bool in_colour = method == "rlof";  // the only method that needs colour
   algorithm->calc(Bytes(from, in_colour), Bytes(to, in_colour), flow);

@@ -18,25 +18,21 @@ OcclusionMask MakeMask(const std::string& mode, const FlowField& forward,
                        const FlowField& backward) {
   if (mode == "lai2018") return MaskLai2018(forward, backward);
   if (mode == "ruder2016") return MaskRuder2016(forward, backward);
-  throw Error(ExitCode::kUsage, "unknown consistency mode", mode,
-              "choose lai2018, ruder2016 or geometry (which needs depth and cameras)");
+  throw UsageError("unknown consistency mode", mode,
+                   "choose lai2018, ruder2016 or geometry (which needs depth and cameras)");
 }
 
 // Reads the precomputed motion from frame i to frame j; `frame` is any frame of the sequence.
 FlowField ReadPairFlow(const std::string& folder, int i, int j, const Image& frame) {
   const std::string path = folder + "/" + FlowFileName(i, j);
   if (!std::filesystem::exists(path))
-    throw Error(ExitCode::kInput,
-                "there is no flow file from frame " + std::to_string(i) + " to frame " +
-                    std::to_string(j),
-                path, "every pair of --gaps needs its flow in both directions");
+    throw InputError(Concat("there is no flow file from frame ", i, " to frame ", j), path,
+                     "every pair of --gaps needs its flow in both directions");
   FlowField flow = ReadFlowFile(path);
   if (flow.width != frame.width || flow.height != frame.height)
-    throw Error(ExitCode::kInput,
-                "the flow is " + std::to_string(flow.width) + " x " +
-                    std::to_string(flow.height) + " px, the frames " +
-                    std::to_string(frame.width) + " x " + std::to_string(frame.height) + " px",
-                path, "compute it at the frames' size");
+    throw InputError(Concat("the flow is ", flow.width, " x ", flow.height, " px, the frames ",
+                            frame.width, " x ", frame.height, " px"),
+                     path, "compute it at the frames' size");
   return flow;
 }
 
@@ -75,8 +71,7 @@ PairMotionFunction GeometricMotion(const GeometrySource& geometry) {
   return [=](int i, int j) {
     const FrameGeometry a = geometry(i), b = geometry(j);
     if (!a.depth.SameSize(b.depth))
-      throw Error(ExitCode::kInput, "depth images differ in size",
-                  "frames " + std::to_string(i) + " and " + std::to_string(j));
+      throw InputError("depth images differ in size", Concat("frames ", i, " and ", j));
     PairMotion motion;
     Image visible;
     motion.flow = GeometricFlow(a.depth, a.camera, b.depth, b.camera, &visible);

@@ -1,6 +1,5 @@
 #include "evaluate/pair_network.h"
 
-#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <mutex>
@@ -50,7 +49,7 @@ struct PairNetwork::Implementation {
   mutable cv::dnn::Net net;
 
   [[noreturn]] void Fail(const std::string& what, const std::string& hint) const {
-    throw Error(ExitCode::kExternalProgram, what, path, hint);
+    throw ProgramError(what, path, hint);
   }
 
   // Reads at most 1 GiB and parses from memory: the network cannot reference external files.
@@ -112,8 +111,8 @@ FlowField PairNetwork::Flow(const Image& from, const Image& to) const {
   const cv::Mat output = implementation_->Run(from, to);
   if (output.dims != 4 || output.size[1] != 2 || output.size[2] != from.height ||
       output.size[3] != from.width)
-    implementation_->Fail("its output is not a motion field of " + std::to_string(from.width) +
-                              " x " + std::to_string(from.height) + " pixels",
+    implementation_->Fail(Concat("its output is not a motion field of ", from.width, " x ",
+                                 from.height, " pixels"),
                           "expected: [1, 2, height, width]");
   FlowField flow(from.width, from.height);
   for (int y = 0; y < from.height; ++y)

@@ -5,7 +5,6 @@
 #include <functional>
 #include <memory>
 #include <string>
-#include <vector>
 
 #include "evaluate/flow_field.h"
 #include "kernels/scene/image.h"

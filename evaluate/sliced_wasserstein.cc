@@ -61,7 +61,7 @@ void ColourSlices::Add(const Image& image) {
       ++bins[std::clamp(static_cast<int>(position), 0, kBins - 1)];
     }
   }
-  count_ += static_cast<int64_t>(colours.size());
+  count_ += std::ssize(colours);
 }
 
 std::vector<double> ColourSlices::Quantiles(int direction) const {

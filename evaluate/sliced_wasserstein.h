@@ -5,7 +5,6 @@
 #include <optional>
 #include <vector>
 
-#include "kernels/base/vec.h"
 #include "kernels/scene/image.h"
 
 namespace regrade {

@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <optional>
+
+#include "kernels/base/error.h"
 
 namespace regrade {
 namespace {
@@ -11,9 +12,7 @@ namespace {
 std::string Number(const std::optional<double>& value, int decimals) {
   if (!value || std::isnan(*value)) return "-";
   if (std::isinf(*value)) return *value > 0 ? "inf" : "-inf";
-  char text[64];
-  std::snprintf(text, sizeof(text), "%.*f", decimals, *value);
-  return text;
+  return Format("%.*f", decimals, *value);
 }
 
 std::string Range(const std::optional<Interval>& interval) {
@@ -48,17 +47,17 @@ std::string ConsistencyTable(const ConsistencyReport& report) {
                     std::to_string(row.undefined_pairs), Number(row.tc_psnr_mean_db, 2),
                     Range(row.tc_psnr_interval_db), Number(row.tc_psnr_of_mean_db, 2),
                     Number(100 * row.coverage, 1) + " %"});
-    const std::string prefix = row.sequence + ", gap " + std::to_string(row.gap) + ": ";
+    const std::string prefix = Concat(row.sequence, ", gap ", row.gap, ": ");
     if (!row.why.empty()) remarks += prefix + row.why + "\n";
     if (row.perfect_pairs > 0)
-      remarks += prefix + std::to_string(row.perfect_pairs) +
-                 " identical pair(s) at inf dB, not in the mean of dB\n";
+      remarks += Concat(prefix, row.perfect_pairs,
+                        " identical pair(s) at inf dB, not in the mean of dB\n");
     if (row.low_coverage_pairs > 0)
-      remarks += prefix + std::to_string(row.low_coverage_pairs) +
-                 " pair(s) with few comparable pixels\n";
+      remarks +=
+          Concat(prefix, row.low_coverage_pairs, " pair(s) with few comparable pixels\n");
     if (row.pairs_above_8bit_floor > row.perfect_pairs)
-      remarks += prefix + std::to_string(row.pairs_above_8bit_floor - row.perfect_pairs) +
-                 " pair(s) above 58.9 dB, beyond the precision of 8-bit frames\n";
+      remarks += Concat(prefix, row.pairs_above_8bit_floor - row.perfect_pairs,
+                        " pair(s) above 58.9 dB, beyond the precision of 8-bit frames\n");
   }
   return "Consistency: TC-PSNR, higher is better (mode " + report.mode + ", flow " +
          report.flow +
@@ -71,13 +70,11 @@ std::string FidelityTable(const ConsistencyReport& consistency,
                           const std::vector<FidelityRow>& fidelity) {
   std::vector<Cells> rows{
       {"sequence", "PSNR to 2D", "hue std", "of 2D", "chroma", "of 2D", "SW to style"}};
-  const bool lpips = std::any_of(fidelity.begin(), fidelity.end(), [](const FidelityRow& f) {
-    return f.lpips_to_2d.has_value();
-  });
+  const bool lpips = std::ranges::any_of(
+      fidelity, [](const FidelityRow& f) { return f.lpips_to_2d.has_value(); });
   if (lpips) rows[0].push_back("LPIPS to 2D");
-  const bool structure =
-      std::any_of(fidelity.begin(), fidelity.end(),
-                  [](const FidelityRow& f) { return f.structure.has_value(); });
+  const bool structure = std::ranges::any_of(
+      fidelity, [](const FidelityRow& f) { return f.structure.has_value(); });
   if (structure) rows[0].push_back("structure");
   for (const FidelityRow& row : fidelity) {
     rows.push_back({row.sequence, Number(row.psnr_to_2d_db, 2), Number(row.hue_std, 3),
@@ -89,10 +86,9 @@ std::string FidelityTable(const ConsistencyReport& consistency,
   std::string remarks;
   std::vector<std::string> seen;
   for (const ConsistencyRow& row : consistency.rows) {
-    if (std::find(seen.begin(), seen.end(), row.sequence) != seen.end()) continue;
+    if (std::ranges::find(seen, row.sequence) != seen.end()) continue;
     seen.push_back(row.sequence);
-    if (std::any_of(fidelity.begin(), fidelity.end(),
-                    [&](const FidelityRow& f) { return f.sequence == row.sequence; }))
+    if (std::ranges::find(fidelity, row.sequence, &FidelityRow::sequence) != fidelity.end())
       continue;
     rows.push_back({row.sequence, "-", "-", "-", "-", "-", "-"});
     if (lpips) rows.back().push_back("-");

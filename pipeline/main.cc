@@ -47,8 +47,8 @@ void Dispatch(const Arguments& arguments, Console* console) {
     names.push_back(command.name);
   }
   const std::string nearest = NearestName(name, names);
-  throw Error(
-      ExitCode::kUsage, "unknown command", name,
+  throw UsageError(
+      "unknown command", name,
       nearest.empty() ? "see `regrade help`" : "did you mean `regrade " + nearest + "`?");
 }
 
@@ -69,7 +69,7 @@ void Dispatch(const Arguments& arguments, Console* console) {
 }
 
 int Run(const Arguments& arguments) {
-  const auto flags_end = std::find(arguments.begin(), arguments.end(), "--");
+  const auto flags_end = std::ranges::find(arguments, "--");
   Console console(std::find(arguments.begin(), flags_end, "--json") != flags_end);
   ExitCode code = ExitCode::kBug;
   try {

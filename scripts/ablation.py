@@ -22,6 +22,8 @@ import shutil
 import subprocess
 import sys
 
+from tree_files import read, write
+
 VARIANTS = (
     ("as it is", ()),
     ("relu", ("--style-activation", "relu")),
@@ -66,8 +68,7 @@ def copy_reconstruction(source, target):
 
 
 def metrics_of(folder):
-    with open(os.path.join(folder, "report.json"), encoding="utf-8") as file:
-        report = json.load(file)
+    report = json.loads(read(folder, "report.json"))
     stylize, evaluate = report["stages"]["stylize"], report["stages"]["evaluate"]
     steady = {row["gap"]: row["tc_psnr_mean_db"] for row in report["consistency"] if row["sequence"] == "styled"}
     faith = next(row for row in report["fidelity"] if row["sequence"] == "styled")
@@ -150,14 +151,11 @@ def curves(rows):
 
 def save(work, rows):
     """Writes the results so far, so that an interrupted run loses only the rest."""
-    with open(os.path.join(work, "ablation.json"), "w", encoding="utf-8") as file:
-        json.dump([{"recipe": r, "variant": v, **f} for r, v, f in rows], file, indent=1)
-    with open(os.path.join(work, "ablation.md"), "w", encoding="utf-8") as file:
-        file.write(table(rows) + "\n")
-    drawing = curves(rows)
-    if drawing:
-        with open(os.path.join(work, "bound.svg"), "w", encoding="utf-8") as file:
-            file.write(drawing)
+    write(os.path.join(work, "ablation.json"),
+          json.dumps([{"recipe": r, "variant": v, **f} for r, v, f in rows], indent=1))
+    write(os.path.join(work, "ablation.md"), table(rows) + "\n")
+    if drawing := curves(rows):
+        write(os.path.join(work, "bound.svg"), drawing)
 
 
 def main():

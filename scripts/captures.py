@@ -17,6 +17,8 @@ import shutil
 import subprocess
 import sys
 
+from tree_files import read, write
+
 # name, path in DATA, expected exit status
 REAL = (("kermit", "kermit", 0), ("sceaux_castle", "sceaux_castle", 0),
         ("fountain-P11", "strecha/fountain-P11/images", 0),
@@ -47,15 +49,11 @@ def call(command, log):
 
 def record_of(folder, stage):
     path = os.path.join(folder, ".regrade", "stages", stage + ".json")
-    if not os.path.exists(path):
-        return {}
-    with open(path, encoding="utf-8") as file:
-        return json.load(file)
+    return json.loads(read(path)) if os.path.exists(path) else {}
 
 
 def last_message(log):
-    with open(log, encoding="utf-8", errors="replace") as file:
-        lines = [line.strip() for line in file if line.strip()]
+    lines = [line.strip() for line in read(log).splitlines() if line.strip()]
     message = next((line for line in reversed(lines) if "error" in line.lower()), lines[-1] if lines else "")
     return message.removeprefix("regrade: ").split(" To do: ")[0]
 
@@ -67,8 +65,7 @@ def metrics_of(folder):
         metrics[key] = fit.get("metrics", {}).get(key)
     index = os.path.join(folder, "poses", "photos.json")
     if os.path.exists(index):
-        with open(index, encoding="utf-8") as file:
-            metrics["photos"] = len(json.load(file)["photos"])
+        metrics["photos"] = len(json.loads(read(index))["photos"])
     metrics["registered"] = pose.get("metrics", {}).get("registered")
     metrics["effects"] = pose.get("metrics", {}).get("effects", []) + fit.get("metrics", {}).get("effects", [])
     return metrics
@@ -170,8 +167,7 @@ def main():
         if (only and name.split(": ")[-1] not in only) or not os.path.isdir(source):
             continue
         rows.append(measure(arguments, name.split(": ")[-1], source, status) | {"name": name})
-        with open(os.path.join(arguments.work, "captures.json"), "w", encoding="utf-8") as file:
-            json.dump(rows, file, indent=1)
+        write(os.path.join(arguments.work, "captures.json"), json.dumps(rows, indent=1))
         print(name, "done", file=sys.stderr, flush=True)
     print(table_of(rows))
     return 0 if all(row["as_expected"] for row in rows) else 1

@@ -2,17 +2,16 @@
 """Checks that each equation is stated once in the sources, has one row in EQUATIONS.md, and a test that exists.
 
   check_equations.py [--root DIR]   checks the tree; one line for each finding
-  check_equations.py --self-test    plants each kind of mistake in a temporary tree and checks that it is found
 
 An equation is stated in a comment with EQ(tag) followed by a comma or a colon; other places write "see EQ(tag)".
 Exit status: 0, or 1 if there is a finding.
 """
 
-import argparse
 import os
 import re
 import sys
-import tempfile
+
+from tree_files import parser_of, read
 
 MODULES = ("kernels", "reconstruct", "stylize", "evaluate", "pipeline")
 TAG = re.compile(r"(?<![A-Za-z0-9_])EQ\(([a-z][a-z0-9-]*)\)")
@@ -27,8 +26,7 @@ def source_files(root, modules):
             for name in sorted(names):
                 if name.endswith((".h", ".cuh", ".cc", ".cu")):
                     path = os.path.join(folder, name)
-                    with open(path, encoding="utf-8", errors="replace") as file:
-                        yield os.path.relpath(path, root).replace(os.sep, "/"), file.read()
+                    yield os.path.relpath(path, root).replace(os.sep, "/"), read(path)
 
 
 def homes_and_references(root):
@@ -57,15 +55,14 @@ def test_names(root):
 def table_rows(root):
     """[(line, tag, file, [tests])] of EQUATIONS.md; raises ValueError on a malformed row."""
     rows = []
-    with open(os.path.join(root, "EQUATIONS.md"), encoding="utf-8") as file:
-        for number, line in enumerate(file, 1):
-            if not line.startswith("| `"):
-                continue
-            cells = [cell.strip() for cell in re.split(r"(?<!\\)\|", line.strip().strip("|"))]
-            if len(cells) != TABLE_COLUMNS:
-                raise ValueError(f"EQUATIONS.md:{number}: {len(cells)} cells instead of {TABLE_COLUMNS}")
-            tests = [test.strip(" `") for test in cells[4].split(",") if test.strip(" `")]
-            rows.append((number, cells[0].strip("`"), cells[3].strip("`"), tests))
+    for number, line in enumerate(read(root, "EQUATIONS.md").splitlines(), 1):
+        if not line.startswith("| `"):
+            continue
+        cells = [cell.strip() for cell in re.split(r"(?<!\\)\|", line.strip().strip("|"))]
+        if len(cells) != TABLE_COLUMNS:
+            raise ValueError(f"EQUATIONS.md:{number}: {len(cells)} cells instead of {TABLE_COLUMNS}")
+        tests = [test.strip(" `") for test in cells[4].split(",") if test.strip(" `")]
+        rows.append((number, cells[0].strip("`"), cells[3].strip("`"), tests))
     return rows
 
 
@@ -106,55 +103,8 @@ def check_tree(root):
     return findings
 
 
-def self_test():
-    tidy = {
-        "kernels/field/a.h": "// EQ(one): x = y.\n// As in (see EQ(two)), above.\n// EQ(two), after Max: a | b.\n",
-        "tests/a_test.cc": "TEST(A, One) { EXPECT_EQ(two); }\nTEST_F(A,\n       Two) {}\n// see EQ(one): tested\n",
-        "EQUATIONS.md": "| tag | equation | source | file | tests |\n|---|---|---|---|---|\n"
-                        "| `one` | x = y | us | `kernels/field/a.h` | `A.One` |\n"
-                        "| `two` | a \\| b | Max | `kernels/field/a.h` | `A.One`, `A.Two` |\n",
-    }
-    table = tidy["EQUATIONS.md"]
-    planted = (
-        ({"kernels/field/b.h": "// EQ(one): x = y.\n"}, "2 homes"),
-        ({"kernels/field/b.h": "// EQ(three): z.\n"}, "no row"),
-        ({"kernels/field/b.h": "// see EQ(four).\n"}, "is not stated"),
-        ({"EQUATIONS.md": table + "| `five` | x | us | `kernels/field/a.h` | `A.One` |\n"}, "is not stated"),
-        ({"EQUATIONS.md": table + table.splitlines()[2] + "\n"}, "second row"),
-        ({"EQUATIONS.md": table.replace("a.h` | `A.One` |", "z.h` | `A.One` |")}, "lives in"),
-        ({"EQUATIONS.md": table.replace("`A.Two`", "`A.Three`")}, "no test A.Three"),
-        ({"EQUATIONS.md": table.replace("a.h` | `A.One` |", "a.h` | |")}, "names no test"),
-        ({"EQUATIONS.md": table.replace("\\|", "|")}, "6 cells"),
-    )
-    failures = 0
-
-    def findings_with(extra):
-        with tempfile.TemporaryDirectory() as root:
-            for path, text in {**tidy, **extra}.items():
-                os.makedirs(os.path.dirname(os.path.join(root, path)) or root, exist_ok=True)
-                with open(os.path.join(root, path), "w", encoding="utf-8") as file:
-                    file.write(text)
-            return check_tree(root)
-
-    for finding in findings_with({}):
-        failures += 1
-        print("self-test: a finding in a correct tree:", finding)
-    for extra, expected in planted:
-        found = findings_with(extra)
-        if len(found) != 1 or expected not in found[0]:
-            failures += 1
-            print(f"self-test: expected one finding '{expected}', got {found}")
-    print(f"self-test: {len(planted)} planted mistakes, {failures} failures")
-    return failures
-
-
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--root", default=os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-    parser.add_argument("--self-test", action="store_true")
-    arguments = parser.parse_args()
-    if arguments.self_test:
-        return 1 if self_test() else 0
+    arguments = parser_of(__doc__).parse_args()
     findings = check_tree(arguments.root)
     for finding in findings:
         print(finding)

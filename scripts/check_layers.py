@@ -2,17 +2,16 @@
 """Checks the layers: which folder includes which, which file includes which third-party library.
 
   check_layers.py [--root DIR]   checks the tree; one line for each finding
-  check_layers.py --self-test    plants each kind of violation in a temporary tree and checks that it is found
 
 MODULES, LAYERS and ALLOWED below are the rules: a new folder or library needs a row. Exit status: 0, or 1 if there is a
 finding.
 """
 
-import argparse
 import os
 import re
 import sys
-import tempfile
+
+from tree_files import parser_of, read
 
 # module -> the other modules that its files may include
 MODULES = {
@@ -199,8 +198,7 @@ def check_library(root, row, layers):
     path = row + "/CMakeLists.txt"
     if not os.path.isfile(os.path.join(root, path)):
         return [(path, 1, "missing: a folder is a library")]
-    with open(os.path.join(root, path), encoding="utf-8") as file:
-        text = file.read()
+    text = read(root, path)
     findings = []
     if not text.startswith("# "):
         findings.append((path, 1, "a CMakeLists.txt begins with a comment that describes its folder"))
@@ -276,8 +274,7 @@ def check_tree(root, layers):
     """(findings, remarks), each a list of (path, line, text)."""
     findings, remarks, includes = [], [], {}
     for path in files_to_check(root):
-        with open(os.path.join(root, path), encoding="utf-8", errors="replace") as file:
-            text = file.read()
+        text = read(root, path)
         lines = text.count("\n")
         if FLAG_FILES.match(path.rsplit("/", 1)[-1]):
             without_comments = re.sub(r"#[^\n]*", "", text)
@@ -300,143 +297,8 @@ def check_tree(root, layers):
     return findings, remarks
 
 
-def self_test():
-    """Plants one violation at a time in a correct tree; each must be found, and the correct tree have no finding."""
-    tidy = {
-        "kernels/base/vec.h": "// Vectors.\n#pragma once\n#include <cmath>\n",
-        "kernels/scene/camera.h": '// Cameras.\n#pragma once\n#include "kernels/base/vec.h"\n',
-        "kernels/field/grid.h": '// A grid.\n#pragma once\n#include "kernels/scene/camera.h"\n',
-        "reconstruct/colmap/model.h": '// A model.\n#pragma once\n#include "kernels/scene/camera.h"\n',
-        "reconstruct/fit/fit.h": '// Fits.\n#pragma once\n#include "kernels/field/grid.h"\n',
-        "reconstruct/refinement/exposure.cc": '#include <ceres/ceres.h>\n#include <Eigen/Core>\n'
-                                              '#include "reconstruct/colmap/model.h"\n',
-        "stylize/image/style.h": '// Styles; no system() here.\n#pragma once\n#include "kernels/base/vec.h"\n',
-        "stylize/field/loss.h": '// A loss.\n#pragma once\n#include "kernels/field/grid.h"\n',
-        "stylize/cuda/loss.cu": '#include <cuda_runtime.h>\n#include "stylize/field/loss.h"\n',
-        "evaluate/optical_flow.cc": "#include <opencv2/video.hpp>\n#include <unistd.h>\n",
-        "pipeline/files/json.h": "// JSON.\n#pragma once\n",
-        "pipeline/capture/store.h": '// Stores.\n#pragma once\n#include "pipeline/files/json.h"\n',
-        "pipeline/report/page.h": '// A page.\n#pragma once\n#include "pipeline/files/json.h"\n',
-        "pipeline/run/settings.h": '// Settings.\n#pragma once\n#include "pipeline/capture/store.h"\n',
-        "pipeline/commands/command.h": '// Commands.\n#pragma once\n#include "pipeline/run/settings.h"\n',
-        "pipeline/main.cc": '#include "pipeline/commands/command.h"\n#include "stylize/image/style.h"\n'
-                            'const char* k = "system(";  // popen( in a comment\n'
-                            "int n = ecosystem(1) + a.system(2) + system(i, j) + 1\'000;\n",
-        "tests/kernels/vec_test.cc": '#include <gtest/gtest.h>\n#include "kernels/base/vec.h"\n',
-        "CMakeLists.txt": "# -ffast-math is forbidden\nproject(x)\n",
-    }
-    layers = {row: layer for row, layer in LAYERS.items() if any(row_of(path, LAYERS) == row for path in tidy)}
-    for row in layers:
-        if not row.endswith(".cc"):
-            name = row.replace("/", "_")
-            tidy[row + "/CMakeLists.txt"] = f"# What lives here.\nregrade_library({name}\n  SOURCES a.cc)\n"
-
-    def header(include):
-        return f'// A.\n#pragma once\n#include "{include}"\n'
-
-    def library(name, rest):
-        return f"# What lives here.\nregrade_library({name}\n  SOURCES a.cc{rest}\n"
-
-    run_library = "pipeline/run/CMakeLists.txt"
-
-    planted = (
-        # Layers: between modules, between folders of a module, and circles.
-        ("kernels/base/a.h", header("kernels/scene/camera.h"), "not below it"),
-        ("kernels/scene/a.h", header("kernels/field/grid.h"), "not below it"),
-        ("kernels/field/a.cc", '#include "reconstruct/fit/fit.h"\n', "kernels may not use reconstruct"),
-        ("reconstruct/fit/a.cc", '#include "stylize/image/style.h"\n', "reconstruct may not use stylize"),
-        ("stylize/image/a.cc", '  #  include "reconstruct/fit/fit.h"\n', "stylize may not use reconstruct"),
-        ("evaluate/a.cc", '#include "stylize/image/style.h"\n', "evaluate may not use stylize"),
-        ("evaluate/a.cc", '#include "pipeline/files/json.h"\n', "evaluate may not use pipeline"),
-        ("reconstruct/fit/a.h", header("reconstruct/colmap/model.h"), "not below it"),
-        ("stylize/image/a.cc", '#include "stylize/field/loss.h"\n', "not below it"),
-        ("pipeline/files/a.h", header("pipeline/commands/command.h"), "not below it"),
-        ("pipeline/capture/a.cc", '#include "pipeline/run/settings.h"\n', "not below it"),
-        ("pipeline/capture/a.cc", '#include "pipeline/report/page.h"\n', "not below it"),
-        ("pipeline/capture/store.h", header("pipeline/run/settings.h"), "a circle of files"),
-        ("pipeline/capture/a.h", header("pipeline/run/settings.h"), "a circle of folders"),
-        ("stylize/field/loss.h", header("stylize/field/loss.h"), "a circle of files"),
-        ("kernels/base/a.h", header("tests/kernels/vec_test.cc"), "by tests only"),
-        ("stylize/image/a.cc", '#include "style.h"\n', "no such file"),
-        # Folders and their libraries.
-        ("pipeline/odd/a.cc", "int x;\n", "has no row"),
-        ("pipeline/a.cc", "int x;\n", "has no row"),
-        (run_library, "regrade_library(pipeline_run SOURCES a.cc)\n", "begins with a comment"),
-        (run_library, library("pipeline", ")"), "one library, pipeline_run"),
-        (run_library, library("pipeline_run", ")\nregrade_library(other SOURCES b.cc)"), "one library"),
-        (run_library, library("pipeline_run", "\n  LINK kernels_base pipeline_commands)"), "not below"),
-        ("stylize/field/CMakeLists.txt", library("stylize_field", "\n  LINK reconstruct_fit)"), "stylize may not use"),
-        ("kernels/base/CMakeLists.txt",
-         library("kernels_base", ")\ntarget_link_libraries(kernels_base PRIVATE kernels_scene)"), "not below it"),
-        # Third-party libraries.
-        ("evaluate/a.cc", "#include <opencv2/core.hpp>\n", "OpenCV is not allowed"),
-        ("pipeline/files/a.cc", "#include <libavformat/avformat.h>\n", "FFmpeg is not allowed"),
-        ("pipeline/files/a.cc", "#include <OpenImageIO/imageio.h>\n", "OpenImageIO is not allowed"),
-        ("pipeline/files/a.cc", "#include <jpeglib.h>\n", "libjpeg-turbo is not allowed"),
-        ("reconstruct/fit/a.cc", "#include <ceres/ceres.h>\n", "Ceres is not allowed"),
-        ("pipeline/run/a.cc", "#include <boost/program_options.hpp>\n", "Boost is not allowed"),
-        ("pipeline/run/a.cc", "#include <nlohmann/json.hpp>\n", "nlohmann-json is not allowed"),
-        ("pipeline/run/a.cc", "#include <zip.h>\n", "libzip is not allowed"),
-        ("pipeline/run/a.cc", "#include <utf8cpp/utf8.h>\n", "utfcpp is not allowed"),
-        ("pipeline/run/a.cc", "#include <Eigen/Core>\n", "Eigen is not allowed"),
-        ("stylize/field/a.cc", "#include <cuda_runtime.h>\n", "CUDA is not allowed"),
-        ("kernels/field/a.cc", "#include <cuda_runtime.h>\n", "CUDA is not allowed"),
-        ("reconstruct/fit/a.h", "// A.\n#pragma once\n#include <Eigen/Core>\n", "Eigen is not allowed"),
-        ("pipeline/files/a.h", "// A.\n#pragma once\n#include <nlohmann/json.hpp>\n", "is not allowed"),
-        ("pipeline/run/a.h", "// A.\n#pragma once\n#include <unistd.h>\n", "own types"),
-        ("pipeline/run/a.cc", "#include <curl/curl.h>\n", "unknown library"),
-        # Words.
-        ("pipeline/run/a.cc", 'void F() { std::system("ls"); }\n', "system()"),
-        ("pipeline/run/a.cc", "int n = ::system(Join(a, b));\n", "system()"),
-        ("pipeline/run/a.cc", 'auto f = popen("ls", "r");\n', "popen()"),
-        ("kernels/field/a.cc", "solver.computeDirect(m);\n", "computeDirect"),
-        ("kernels/field/a.cc", "float g = w / (1.f - alpha);\n", "1 - alpha"),
-        ("kernels/field/a.h", "// A.\nint F();\n", "#pragma once"),
-        ("kernels/field/a.h", "#pragma once\nint F();\n", "begins with a comment"),
-        ("kernels/field/a.cc", "int x;\n" * (MAX_LINES + 1), "split the file"),
-        ("cmake/CMakeLists.txt", "add_compile_options(-O3 -ffast-math)\n", "fast math"),
-        ("cmake/a.cmake", "add_compile_options(-Ofast)\n", "fast math"),
-    )
-    failures = 0
-
-    def findings_with(extra):
-        with tempfile.TemporaryDirectory() as root:
-            for path, text in {**tidy, **extra}.items():
-                if text is not None:
-                    os.makedirs(os.path.dirname(os.path.join(root, path)) or root, exist_ok=True)
-                    with open(os.path.join(root, path), "w", encoding="utf-8") as file:
-                        file.write(text)
-            return check_tree(root, layers)[0]
-
-    def expect(path, text, expected):
-        found = findings_with({path: text})
-        # An upward include that closes a circle is found as both.
-        others = [what for where, _, what in found if not (where == path and expected in what)]
-        if "circle" in expected:
-            found_it = any(expected in what for _, _, what in found)
-        else:
-            found_it = len(others) < len(found) and not [what for what in others if "a circle of folders" not in what]
-        if not found_it:
-            print(f"self-test: expected one finding '{expected}' in {path}, got {found}")
-        return 0 if found_it else 1
-
-    for finding in findings_with({}):
-        failures += 1
-        print("self-test: a finding in a correct tree:", *finding)
-    failures += sum(expect(*violation) for violation in planted)
-    failures += expect(run_library, None, "missing: a folder is a library")
-    failures += expect("pipeline/main.cc", None, "no such file, but a row")
-    print(f"self-test: {len(planted) + 2} planted violations, {failures} failures")
-    return failures
-
-
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--root", default=os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-    parser.add_argument("--self-test", action="store_true")
-    arguments = parser.parse_args()
-    if arguments.self_test:
-        return 1 if self_test() else 0
+    arguments = parser_of(__doc__).parse_args()
     findings, remarks = check_tree(arguments.root, LAYERS)
     for path, line, text in remarks:
         print(f"{path}:{line}: remark: {text}")

@@ -2,26 +2,22 @@
 """Checks that the files, folders and options that Markdown files and scripts name exist.
 
   check_names.py [--root DIR]   checks Markdown files, scripts, .ci/run and CMakePresets.json; prints FILE:LINE and the name
-  check_names.py --self-test    plants names that do not exist, and checks what is found
 
 Checked are paths that begin with a top folder of the tree (also as patterns: {a,b}, *, regular expressions), targets of
 Markdown links, names of sources, scripts and Markdown files, and, in Markdown and in comments of scripts, options: a
 source or script must contain "name" or "--name". Words in capitals are placeholders (tests/fuzz/TARGET). Not checked:
-CHANGELOG.md, MUTATIONS.md (recorded messages), check_words.py (retired names) and functions named self_test.
+CHANGELOG.md, MUTATIONS.md (recorded messages) and check_words.py (retired names).
 Exit status: 0, or 1 if there is a finding.
 """
 
-import argparse
-import ast
 import fnmatch
 import io
 import os
 import re
 import sys
-import tempfile
 import tokenize
 
-from tree_files import text_of, tree_files
+from tree_files import parser_of, text_of, tree_files
 
 EXEMPT = ("CHANGELOG.md", "tests/hard_cases/MUTATIONS.md", "scripts/check_names.py", "scripts/check_words.py")
 OTHER_SCRIPTS = re.compile(r"scripts/.*(\.sh|\.yaml|Snakefile)|\.ci/run|CMakePresets\.json")
@@ -91,14 +87,10 @@ class Tree:
                 if not re.match(r"[a-z]+:", target) and not self.has(os.path.normpath(os.path.join(folder, target)))]
 
     def missing_in_python(self, text):
-        """Of the comments and strings outside of self-tests."""
-        tree, skipped = ast.parse(text), set()
-        for node in ast.walk(tree):
-            if isinstance(node, ast.FunctionDef) and node.name.startswith("self_test"):
-                skipped.update(range(node.lineno, node.end_lineno + 1))
+        """Of the comments and strings."""
         strings, prose = ([""] * (text.count("\n") + 2) for _ in range(2))
         for token in tokenize.generate_tokens(io.StringIO(text).readline):
-            if token.type not in (tokenize.COMMENT, tokenize.STRING) or token.start[0] in skipped:
+            if token.type not in (tokenize.COMMENT, tokenize.STRING):
                 continue
             is_prose = token.type == tokenize.COMMENT or token.string.startswith('"""')
             words = QUOTES.sub(" ", token.string)
@@ -125,55 +117,8 @@ class Tree:
         return found
 
 
-def self_test():
-    tidy = {
-        "kernels/base/vec.h": "", "kernels/base/view.h": "", "assets/a.png": "", "tests/hard/RESULTS.md": "",
-        "CHANGELOG.md": "`kernels/old.h` went\n",
-        "scripts/run.py": "\"\"\"Reads kernels/base/vec.h; see run.py.\"\"\"\nX = r\"kernels/base/(vec|view)\\.h\"\n"
-                          "Y = r\"kernels/.*\\.h\", \"omp.h\"\n\n\ndef self_test():\n    return \"kernels/a.h\"  # kernels/b.h\n",
-        "pipeline/a.cc": "bind(\"fit-steps\", steps);\n",
-        "scripts/all.sh": "\"$root/scripts/run.py\"\nkernels=$build/kernels/x --out build/cpu/tests/x\n",
-        "README.md": "`kernels/base/{vec,view}.h`, `kernels/base/`, `scripts/*.py`, [results](tests/hard/RESULTS.md#a), "
-                     "https://x.org/kernels/x.h, vec.h, report.html. In kernels/base. To tests/hard/TARGET/. With --fit-steps 3, --out.\n",
-    }
-    planted = (
-        ("README.md", "`kernels/base/{vec,wide}.h`\n", "kernels/base/wide.h"),
-        ("README.md", "In kernels/math, too.\n", "kernels/math"),
-        ("README.md", "`scripts/*.pl`\n", "scripts/*.pl"),
-        ("README.md", "see [there](tests/RESULTS.md)\n", "tests/RESULTS.md"),
-        ("tests/hard/MORE.md", "see [there](WORSE.md)\n", "WORSE.md"),
-        ("README.md", "`jump.py` runs\n", "jump.py"),
-        ("README.md", "With\n`--fit-stairs 3`, --fit-steps 2\n", "option --fit-stairs"),
-        ("scripts/a.py", "\"\"\"a.py --gone\"\"\"\nx = \"--there\"  # --there\n", "option --gone"),
-        ("scripts/a.py", "\"\"\"Reads kernels/none.h.\"\"\"\n", "kernels/none.h"),
-        ("scripts/a.py", "x = 1  # see other.py\n", "other.py"),
-        ("scripts/a.py", "X = (r\"reach/.*\",\n     r\"kernels/base/none\\.h\")\n", "kernels/base/none.h"),
-        ("scripts/a.sh", "python3 \"$root/scripts/gone.py\"\n", "scripts/gone.py"),
-        ("scripts/a.sh", "python3 scripts/gone.py\n", "scripts/gone.py"),
-    )
-    failures = 0
-    for path, text, expected in (("", "", ""),) + planted:
-        with tempfile.TemporaryDirectory() as root:
-            for name, content in {**tidy, **({path: text} if path else {})}.items():
-                os.makedirs(os.path.dirname(os.path.join(root, name)) or root, exist_ok=True)
-                with open(os.path.join(root, name), "w", encoding="utf-8") as file:
-                    file.write(content)
-            found = Tree(root).check()
-        line = text[:text.find(re.split("[/ ]", expected)[-1])].count("\n") + 1
-        if found != ([(path, line, expected)] if expected else []):
-            failures += 1
-            print(f"self-test: expected '{expected}', got {found}")
-    print(f"self-test: {len(planted)} planted names, {failures} failures")
-    return failures
-
-
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--root", default=os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-    parser.add_argument("--self-test", action="store_true")
-    arguments = parser.parse_args()
-    if arguments.self_test:
-        return 1 if self_test() else 0
+    arguments = parser_of(__doc__).parse_args()
     findings = Tree(arguments.root).check()
     for path, line, what in findings:
         print(f"{path}:{line}: there is no {what}")

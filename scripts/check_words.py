@@ -2,22 +2,18 @@
 """Checks that retired words and identifiers do not come back, in texts and in file names.
 
   check_words.py [--root DIR]   checks all files of the tree but CHANGELOG.md; prints FILE:LINE and the word to use
-  check_words.py --self-test    plants retired words and similar words, and checks what is found
 
 Exit status: 0, or 1 if there is a finding. A row of RULES is a regular expression, the word to use, texts that must
 be found and similar texts that must not.
 """
 
-import argparse
-import os
 import re
 import sys
-import tempfile
 
-from tree_files import text_of, tree_files
+from tree_files import parser_of, text_of, tree_files
 
-# Not checked: the history, and this list.
-EXEMPT = ("CHANGELOG.md", "scripts/check_words.py")
+# Not checked: the history, this list and its test.
+EXEMPT = ("CHANGELOG.md", "scripts/check_words.py", "tests/scripts/check_words_test.py")
 
 # (regular expression, plain word, texts that must be found, texts that must not)
 RULES = (
@@ -101,39 +97,8 @@ def check_tree(root):
             for finding in findings_in(path, text_of(root, path))]
 
 
-def self_test():
-    failures = 0
-    for pattern, plain, wanted, allowed in RULES:
-        for text in wanted:
-            if not any(row[2] == plain for row in findings_in("a.md", f"first\n{text}\n")):
-                failures += 1
-                print(f"self-test: '{text}' is not found as {plain}")
-        for text in allowed:
-            for number, what, found in findings_in("a.md", f"first\n{text}\n"):
-                if found == plain:
-                    failures += 1
-                    print(f"self-test: '{text}' is a false finding: {what}, line {number}")
-    with tempfile.TemporaryDirectory() as root:
-        for path, text in (("CHANGELOG.md", "was a knob\n"), ("docs/a.md", "plain\na knob\n"), ("price_list.cc", "x\n"),
-                           ("a.bin", "knob\0"), ("build/a.md", "a knob\n")):
-            os.makedirs(os.path.dirname(os.path.join(root, path)) or root, exist_ok=True)
-            with open(os.path.join(root, path), "w", encoding="utf-8") as file:
-                file.write(text)
-        found = check_tree(root)
-        if found != [("docs/a.md", 2, "knob", "parameter"), ("price_list.cc", 0, "price_", "cost")]:
-            failures += 1
-            print("self-test: wrong findings in a tree:", found)
-    print(f"self-test: {len(RULES)} rules, {failures} failures")
-    return failures
-
-
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--root", default=os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-    parser.add_argument("--self-test", action="store_true")
-    arguments = parser.parse_args()
-    if arguments.self_test:
-        return 1 if self_test() else 0
+    arguments = parser_of(__doc__).parse_args()
     findings = check_tree(arguments.root)
     for path, line, what, plain in findings:
         where = f"{path}:{line}" if line else f"{path}: the file's name"

@@ -12,8 +12,8 @@ only: no code in them is executed.
   --random SEED    first writes files with random weights of the right shapes to DIR (--version cat5, sum, photo or art),
                    and converts these
   --check PROGRAM  then styles two pictures with PROGRAM (build/cpu/tests/stylize/style_picture) and with a separate
-                   PyTorch implementation (reference_networks.py), and prints the largest difference, and the difference
-                   without the feature transforms
+                   PyTorch implementation (tests/stylize/reference_networks.py), and prints the largest difference, and
+                   the difference without the feature transforms
 
 Exit status: 0, or 1 if an input is wrong or --check finds a difference above 1e-4 of white.
 """
@@ -21,6 +21,9 @@ Exit status: 0, or 1 if an input is wrong or --check finds a difference above 1e
 import argparse
 import os
 import sys
+
+# For --random and --check.
+sys.path.append(os.path.join(os.path.dirname(os.path.abspath(__file__)), "../tests/stylize"))
 
 HAAR = {"ll": (1, 1, 1, 1), "lh": (-1, 1, -1, 1), "hl": (-1, -1, 1, 1), "hh": (1, -1, -1, 1)}  # halves, 2 x 2
 BANDS = ("lh", "hl", "hh")

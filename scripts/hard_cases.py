@@ -9,7 +9,6 @@
   hard_cases.py --measured REPORT.xml...
                             the same from GoogleTest's reports or folders of them: for tests that began to measure, and for
                             device_parity_test and device_style_test --gtest_output=xml:FILE on a machine with a GPU
-  hard_cases.py --self-test plants mistakes and checks that --check finds them
 
 Exit status: 0, or 1 if there is a finding.
 
@@ -19,16 +18,15 @@ reason ("unseen") where no safeguard can be removed. The safeguards and the test
 mutations.json and MUTATIONS.md. Metrics, each with its command, are in metrics.json.
 """
 
-import argparse
 import fnmatch
 import glob
 import json
 import os
 import re
 import sys
-import tempfile
 
 import measured_errors
+from tree_files import parser_of, read, write
 
 FOLDER = os.path.join("tests", "hard_cases")
 CASES, MUTATIONS, SEEN, PAGE, METRICS, MEASURED = (os.path.join(FOLDER, name) for name in (
@@ -47,11 +45,6 @@ worst of all inputs of the test; float and double are the precision of the compu
 {summary}
 """
 PARTS = (("Numbers and pictures", "H"), ("Inputs, machines, programs", "F"))
-
-
-def read(path):
-    with open(path, encoding="utf-8") as file:
-        return file.read()
 
 
 class Tree:
@@ -188,70 +181,26 @@ def keep(root, reports):
     known = set(tree.measured) | set(measured_errors.in_sources(root)[0])
     now = measured_errors.run(reports[0], sorted(known)) if build else measured_errors.gather(reports)
     kept = {test: rows for test, rows in {**tree.measured, **now}.items() if test in tree.tests}
-    with open(os.path.join(root, MEASURED), "w", encoding="utf-8") as file:
-        rows = [f" {json.dumps(test)}: [\n  " + ",\n  ".join(json.dumps(row) for row in kept[test]) + "]"
-                for test in sorted(kept)]
-        file.write("{\n" + ",\n".join(rows) + "\n}\n")
+    rows = [f" {json.dumps(test)}: [\n  " + ",\n  ".join(json.dumps(row) for row in kept[test]) + "]"
+            for test in sorted(kept)]
+    write(os.path.join(root, MEASURED), "{\n" + ",\n".join(rows) + "\n}\n")
 
 
-def self_test():
-    tidy = {"H1": {"title": "one"}, "F1": {"title": "two", "tests": ["S.*", "by_ctest"], "unseen": "no"},
-            "F2": {"title": "three", "why": "not tested: no"}}
-    safeguards = [{"case": "H1", "safeguard": "c"}]
-    row = {"what": "sums", "kind": "digits", "where": "double CPU", "measured": "1e-15", "allowed": "1e-14"}
-    good = {"S.H1_C": [row]}
-    planted = [({}, good, ""),
-               ({"F1": {"title": "two", "tests": ["T.*"], "unseen": "no"}}, good, "no test is called T.*"),
-               ({"F2": {"title": "three"}}, good, "neither a test"),
-               ({"H1": {"title": "one", "why": "no"}}, good, "a test, and a reason why there"),
-               ({"H1": {"title": "one", "unseen": "no"}}, good, "a reason why none can be"),
-               ({"F1": {"title": "two", "tests": ["S.*"]}}, good, "no reason is given"),
-               ({"H1": None}, good, "a test has this number"),
-               ({}, {}, "S.H1_C measures, but is not in"),
-               ({}, {**good, "S.Gone": [row]}, "but there is no such test"),
-               ({}, {"S.H1_C": [row, {**row, "what": "means"}]}, "does not measure"),
-               ({}, {"S.H1_C": [{**row, "what": "su"}]}, "which measured.json does not have")]
-    failures = 0
-    for change, measured, expected in planted:
-        with tempfile.TemporaryDirectory() as root:
-            cases = {case: row for case, row in {**tidy, **change}.items() if row}
-            files = {CASES: json.dumps(cases), MUTATIONS: json.dumps(safeguards), SEEN: "| H1 | c | S.H1_C | no |",
-                     MEASURED: json.dumps(measured), "tests/CMakeLists.txt": "add_test(NAME by_ctest COMMAND x)",
-                     "tests/s_test.cc": "TEST(S, H1_C) {\n  RecordDigits(\"sums\", 1);\n}\n"}
-            for path, text in files.items():
-                os.makedirs(os.path.dirname(os.path.join(root, path)), exist_ok=True)
-                with open(os.path.join(root, path), "w", encoding="utf-8") as file:
-                    file.write(text)
-            with open(os.path.join(root, PAGE), "w", encoding="utf-8") as file:
-                file.write(page(Tree(root))[0])
-            found = check(root)
-            with open(os.path.join(root, PAGE), "a", encoding="utf-8") as file:
-                file.write("more\n")
-            stale = any("is not what" in text for text in check(root))
-        if not stale or bool(found) != bool(expected) or (expected and expected not in found[0]):
-            failures += 1
-            print(f"self-test: expected '{expected}', got {found}")
-    print(f"self-test: {len(planted)} lists, {failures} failures")
-    return failures
+def write_page(root):
+    """Writes the page; returns complaints."""
+    text, complaints = page(Tree(root))
+    write(os.path.join(root, PAGE), text)
+    return complaints
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--root", default=os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+    parser = parser_of(__doc__)
     parser.add_argument("--check", action="store_true")
-    parser.add_argument("--self-test", action="store_true")
     parser.add_argument("--measured", nargs="+", metavar="REPORT", help="store what tests measured")
     arguments = parser.parse_args()
-    if arguments.self_test:
-        return 1 if self_test() else 0
     if arguments.measured:
         keep(arguments.root, arguments.measured)
-    if arguments.check:
-        complaints = check(arguments.root)
-    else:
-        text, complaints = page(Tree(arguments.root))
-        with open(os.path.join(arguments.root, PAGE), "w", encoding="utf-8") as file:
-            file.write(text)
+    complaints = check(arguments.root) if arguments.check else write_page(arguments.root)
     for complaint in complaints:
         print(complaint)
     print(f"hard_cases: {len(complaints)} findings")

@@ -17,6 +17,8 @@ import shutil
 import subprocess
 import sys
 
+from tree_files import read
+
 PARAMETERS = {
     "pose": [
         ("pose-image-size", ["600", "1600"]), ("pose-all-pairs-up-to", ["60"]),
@@ -54,8 +56,7 @@ def run(command, log):
 
 
 def stage(folder, name):
-    with open(os.path.join(folder, ".regrade", "stages", name + ".json")) as file:
-        return json.load(file)
+    return json.loads(read(folder, ".regrade", "stages", name + ".json"))
 
 
 def metrics_of(part, folder):
@@ -67,8 +68,7 @@ def metrics_of(part, folder):
         record = stage(folder, "reconstruct")
         f = record["metrics"]
         return record["seconds"], [round(f["psnr_train_db"], 2), round(f["psnr_heldout_db"], 2), f["voxels"]]
-    with open(os.path.join(folder, "report.json")) as file:
-        report = json.load(file)
+    report = json.loads(read(folder, "report.json"))
     s = report["stages"]["stylize"]
     near = next(f for f in report["fidelity"] if f["sequence"] == "styled")
     steady = {c["gap"]: c["tc_psnr_mean_db"] for c in report["consistency"] if c["sequence"] == "styled"}
@@ -117,8 +117,7 @@ def main():
              arguments.preset] + arguments.base_options, base + ".log")
     done = set()
     if os.path.exists(table):
-        with open(table) as file:
-            done = {tuple(line.split("\t")[:2]) for line in file}
+        done = {tuple(line.split("\t")[:2]) for line in read(table).splitlines()}
     for part in arguments.part or list(PARAMETERS):
         rows = [(None, None)] + [(parameter, value) for parameter, values in PARAMETERS[part] for value in values]
         for parameter, value in rows:
@@ -138,8 +137,7 @@ def main():
 
 
 def print_tables(table):
-    with open(table) as file:
-        rows = [line.rstrip("\n").split("\t") for line in file]
+    rows = [line.split("\t") for line in read(table).splitlines()]
     for part in PARAMETERS:
         here = [row[1:] for row in rows if row[0] == part]
         if not here:

@@ -16,6 +16,8 @@ import subprocess
 import tempfile
 import xml.etree.ElementTree
 
+from tree_files import read
+
 TEST = re.compile(r"^TEST(?:_F|_P)?\(\s*(\w+)\s*,\s*(\w+)\s*\)(.*?)^\}", re.M | re.S)
 RECORD = re.compile(r"\bRecord(?:Digits|Bound|SameBits)\(\s*(?:\"((?:[^\"\\]|\\.)*)\")?")
 KEY = "measured: "
@@ -64,9 +66,7 @@ def in_sources(root):
     """({test: [beginning of each quantity's name]}, {tests that need a GPU}); helper functions are not searched."""
     recorded, on_gpu = {}, set()
     for path in sorted(glob.glob(os.path.join(root, "tests", "**", "*_test.cc"), recursive=True)):
-        with open(path, encoding="utf-8") as file:
-            text = file.read()
-        for suite, name, body in TEST.findall(text):
+        for suite, name, body in TEST.findall(read(path)):
             test = f"{suite}.{name}"
             if os.sep + "gpu" + os.sep in path:
                 on_gpu.add(test)

@@ -10,8 +10,6 @@ for ctest. An entry {case, cannot_arise} gives the reason why there is nothing t
                               runs the entries, in a copy of the tree; hours for all of them
   mutation_tests.py --check   builds nothing: does each entry apply, has each case an entry, is MUTATIONS.md up to date
   mutation_tests.py --rebase  for each entry that does not apply, prints the nearest lines in its file and in other files
-  mutation_tests.py --self-test
-                              plants mistakes and checks that --check and --rebase find them
 """
 
 import argparse
@@ -28,6 +26,8 @@ import signal
 import subprocess
 import sys
 import tempfile
+
+from tree_files import read, write
 
 ENTRIES, TABLE = "tests/hard_cases/mutations.json", "tests/hard_cases/MUTATIONS.md"
 # The cases that have an entry: the numbers that tests are named after.
@@ -53,17 +53,6 @@ SEARCHED = (".h", ".cuh", ".cc", ".cu", ".py", ".sh", ".cmake", "CMakeLists.txt"
 def all_cases():
     for first, last in (part.split("-") for part in CASES.split()):
         yield from (first[0] + str(number) for number in range(int(first[1:]), int(last[1:]) + 1))
-
-
-def read(path):
-    with open(path, encoding="utf-8") as file:
-        return file.read()
-
-
-def write(path, text):
-    os.makedirs(os.path.dirname(path), exist_ok=True)
-    with open(path, "w", encoding="utf-8") as file:
-        file.write(text)
 
 
 def pattern_of(snippet):
@@ -316,75 +305,6 @@ def write_table(root, rows):
     write(path, HEAD + "\n".join(lines) + "\n")
 
 
-def self_test_check():
-    """Plants one mistake at a time in a list of entries; returns the number of mistakes that --check does not find."""
-    tidy = [{"case": case, "cannot_arise": "no"} for case in all_cases()]
-    good = {"case": "H1", "safeguard": "s", "file": "a.cc", "find": "one", "replace": "r", "target": "t", "tests": "*S.C*"}
-    planted = [({}, ""), ({"find": "twice"}, "occurs 2 times"), ({"find": "none"}, "occurs 0 times"),
-               ({"find": "on"}, "occurs 0 times"), ({"find": " "}, "occurs 0 times"),
-               ({"file": "b.cc"}, "occurs 0 times"), ({"replace": " one"}, "are the same"),
-               ({"tests": "X.*"}, "no test is called"), ({"more": ""}, "an entry has"), ({"case": "H0"}, "not one of")]
-    lists = [(tidy + [{**good, **change}], expected) for change, expected in planted] + [(tidy[1:], "H1: no entry")]
-    failures = 0
-    for entries, expected in lists:
-        with tempfile.TemporaryDirectory() as root:
-            files = {ENTRIES: json.dumps(entries), "a.cc": "one twice twice", "tests/t.cc": "TEST(S, C)"}
-            for path, text in files.items():
-                write(os.path.join(root, path), text)
-            found = check(root)[1]
-        if len(found) != bool(expected) or (found and expected not in found[0]):
-            failures += 1
-            print(f"self-test: expected '{expected}', got {found}")
-    return failures
-
-
-def self_test_find():
-    """White space of any amount matches, identifiers match exactly; returns the number of failures."""
-    failures = 0
-    for find, text, expected in (
-            ("a = f(b, c);", "  a =\n      f( b,c );  // d\n", "  X  // d\n"),
-            ("a = f(b,\n      c);", "a = f(b, c);\n", "X\n"),
-            ("return x", "return\n x;", "X;"),
-            ("return x", "returnx; return x2; my_return x;", None),
-            ("x", "x2 ax a_x", None),
-            ("  a();\n", "b();  // keep\n  a();\n  c();\n", "b();  // keep\nXc();\n"),
-            ("a.b", "a_b", None), (r"\d", r"f(\d)", "f(X)")):
-        result, count = mutated(text, {"find": find, "replace": "X"})
-        if (result if count else None) != expected:
-            failures += 1
-            print(f"self-test: {find!r} in {text!r}: expected {expected!r}, got {result!r}, {count} times")
-    return failures
-
-
-def self_test_rebase():
-    """Renames and moves that --rebase must find; returns the number of failures."""
-    entry = {"case": "H1", "safeguard": "s", "file": "a.cc", "find": "if (weight < kLeast) continue;", "replace": "",
-             "target": "t", "tests": "S.C"}
-    other = "int main() {\n  return 0;\n}\n"
-    failures = 0
-    for files, expected in (
-            ({"a.cc": "for (;;) {\n  if (weight < kLeast) continue;\n}\n"}, None),
-            ({"a.cc": other + "  if (object_weight < kLeast) continue;\n"}, "a.cc:4 ("),
-            ({"a.cc": other, "b/c.h": "if (weight <\n    kLeast) continue;\n"}, 'moved: "file": "b/c.h"'),
-            ({"a.cc": other, "b/c.h": "x();\nif (w < kLeast) continue;\n"}, "b/c.h:2 ("),
-            ({"a.cc": other}, "nothing similar"),
-            ({"a.cc": entry["find"], "tests/t.cc": "TEST(S, Cc)\n"}, "nearest: S.Cc")):
-        with tempfile.TemporaryDirectory() as root:
-            for path, text in {"tests/t.cc": "TEST(S, C)", **files}.items():
-                write(os.path.join(root, path), text)
-            report = rebase(root, [entry])
-        if bool(report) != bool(expected) or (expected and not any(expected in line for line in report)):
-            failures += 1
-            print(f"self-test: expected '{expected}', got {report}")
-    return failures
-
-
-def self_test():
-    failures = self_test_check() + self_test_find() + self_test_rebase()
-    print(f"self-test: {failures} failures")
-    return failures
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter,
                                      epilog="Exit status: 0, or 1 if a safeguard was removed and no test failed, or if an\n"
@@ -396,10 +316,7 @@ def main():
     parser.add_argument("--write", action="store_true", help=f"update {TABLE}, with --only the rows of these cases")
     parser.add_argument("--check", action="store_true", help="check the entries, build nothing")
     parser.add_argument("--rebase", action="store_true", help="find the snippets of entries that do not apply")
-    parser.add_argument("--self-test", action="store_true", help="plant mistakes and check that they are found")
     arguments = parser.parse_args()
-    if arguments.self_test:
-        return 1 if self_test() else 0
     entries, complaints = check(arguments.root)
     if arguments.rebase:
         report = rebase(arguments.root, entries)

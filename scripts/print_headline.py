@@ -5,6 +5,7 @@
 """
 
 import json
+import pathlib
 import sys
 
 
@@ -20,8 +21,7 @@ def main():
     if len(sys.argv) != 2 or sys.argv[1] == "--help":
         print(__doc__)
         return 0 if "--help" in sys.argv else 2
-    with open(sys.argv[1], encoding="utf-8") as file:
-        report = json.load(file)
+    report = json.loads(pathlib.Path(sys.argv[1]).read_text(encoding="utf-8"))
     consistency = {(row["sequence"], row["gap"]): row for row in report["consistency"]}
     fidelity = {row["sequence"]: row for row in report["fidelity"]}
     reconstruct = report["stages"].get("reconstruct") or {}

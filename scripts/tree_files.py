@@ -1,9 +1,27 @@
-"""Lists the files of the source tree; a module of check_words.py and check_names.py."""
+"""Lists and reads the files of the source tree; a module of the scripts that check it."""
 
+import argparse
 import os
+import pathlib
 import subprocess
 
 HIDDEN_BUT_OURS = (".ci", ".clang-format", ".gitignore")
+
+
+def parser_of(doc):
+    """The parser of a script that checks the tree: its help is `doc`, and it has --root."""
+    parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--root", default=os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+    return parser
+
+
+def read(*path):
+    return pathlib.Path(*path).read_text(encoding="utf-8", errors="replace")
+
+
+def write(path, text):
+    os.makedirs(os.path.dirname(path), exist_ok=True)
+    pathlib.Path(path).write_text(text, encoding="utf-8")
 
 
 def tree_files(root):

@@ -12,10 +12,4 @@ inline std::optional<uint64_t> CheckedMul(uint64_t a, uint64_t b) {
   return result;
 }
 
-inline std::optional<uint64_t> CheckedAdd(uint64_t a, uint64_t b) {
-  uint64_t result;
-  if (__builtin_add_overflow(a, b, &result)) return std::nullopt;
-  return result;
-}
-
 }  // namespace regrade

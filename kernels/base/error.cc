@@ -1,5 +1,7 @@
 #include "kernels/base/error.h"
 
+#include <cstdarg>
+#include <cstdio>
 #include <utility>
 
 namespace regrade {
@@ -21,10 +23,19 @@ Error::Error(ExitCode code, std::string what, std::string where, std::string hin
       where_(std::move(where)),
       hint_(std::move(hint)) {}
 
+std::string Format(const char* format, ...) {
+  std::va_list arguments, again;
+  va_start(arguments, format);
+  va_copy(again, arguments);
+  std::string text(std::vsnprintf(nullptr, 0, format, arguments), '\0');
+  std::vsnprintf(text.data(), text.size() + 1, format, again);
+  va_end(again);
+  va_end(arguments);
+  return text;
+}
+
 void FailCheck(const char* file, int line, const std::string& message) {
-  std::ostringstream text;
-  text << file << ":" << line << ": check failed: " << message;
-  throw CheckFailure(text.str());
+  throw CheckFailure(Concat(file, ":", line, ": check failed: ", message));
 }
 
 }  // namespace regrade

@@ -1,10 +1,13 @@
-// User-facing errors (Error, with an exit code and a remedy) and checks of internal invariants
-// (CHECK).
+// User-facing errors (Error, with an exit code and a remedy), their texts, and checks of
+// internal invariants (CHECK).
 #pragma once
 
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
 
 namespace regrade {
 
@@ -36,6 +39,39 @@ class Error : public std::runtime_error {
   ExitCode code_;
   std::string what_, where_, hint_;
 };
+
+// The errors of one exit code: throw InputError("no pixels", path).
+template <ExitCode kCode>
+struct CodedError : Error {
+  explicit CodedError(std::string what, std::string where = "", std::string hint = "")
+      : Error(kCode, std::move(what), std::move(where), std::move(hint)) {}
+};
+using UsageError = CodedError<ExitCode::kUsage>;
+using InputError = CodedError<ExitCode::kInput>;
+using ProgramError = CodedError<ExitCode::kExternalProgram>;
+using ResourceError = CodedError<ExitCode::kResources>;
+using SceneError = CodedError<ExitCode::kScene>;
+
+// Texts, characters and integers in one text: Concat("frame ", 3) is "frame 3". Fractions do
+// not compile: they need a number of digits.
+template <typename... Parts>
+std::string Concat(const Parts&... parts) {
+  std::string text;
+  const auto add = [&text](const auto& part) {
+    using Part = std::decay_t<decltype(part)>;
+    if constexpr (std::is_same_v<Part, char>)
+      text += part;
+    else if constexpr (std::is_integral_v<Part>)
+      text += std::to_string(part);
+    else
+      text += std::string_view(part);
+  };
+  (add(parts), ...);
+  return text;
+}
+
+// As printf prints it.
+[[gnu::format(printf, 1, 2)]] std::string Format(const char* format, ...);
 
 // The user cancelled the work (by a signal); the stage has saved its state if it can.
 class Interrupted : public std::runtime_error {
@@ -73,4 +109,3 @@ class CheckFailure : public std::logic_error {
 #define REGRADE_CHECK_GE(a, b) REGRADE_CHECK_OP_(>=, a, b)
 #define REGRADE_CHECK_GT(a, b) REGRADE_CHECK_OP_(>, a, b)
 #define REGRADE_CHECK_LE(a, b) REGRADE_CHECK_OP_(<=, a, b)
-#define REGRADE_CHECK_LT(a, b) REGRADE_CHECK_OP_(<, a, b)

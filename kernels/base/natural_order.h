@@ -1,7 +1,6 @@
 // Natural order of file names: "view2" comes before "view10".
 #pragma once
 
-#include <string>
 #include <string_view>
 
 namespace regrade {

@@ -6,6 +6,8 @@
 #include <string>
 #include <utility>
 
+#include "kernels/base/error.h"
+
 namespace regrade {
 
 enum class LoopControl {
@@ -25,6 +27,12 @@ using ProgressFunction = std::function<LoopControl(const Progress&)>;
 inline LoopControl Report(const ProgressFunction& progress, double done, double total,
                           const std::string& note = "") {
   return progress ? progress({done, total, note}) : LoopControl::kContinue;
+}
+
+// The same for a loop without a state to save.
+inline void ReportOrThrow(const ProgressFunction& progress, double done, double total,
+                          const std::string& note = "") {
+  if (Report(progress, done, total, note) == LoopControl::kStop) throw Interrupted();
 }
 
 // Combines the progress of several parts, each reporting from 0 to its own total. `whole` gets

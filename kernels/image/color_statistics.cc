@@ -29,17 +29,16 @@ void CheckMask(const Image& image, const Image* mask) {
   if (mask == nullptr) return;
   REGRADE_CHECK_EQ(mask->channels, 1);
   if (!mask->SameSize(image))
-    throw Error(ExitCode::kInput,
-                "the mask is " + std::to_string(mask->width) + "x" +
-                    std::to_string(mask->height) + ", its picture " +
-                    std::to_string(image.width) + "x" + std::to_string(image.height),
-                "", "a mask must have the size of its picture");
+    throw InputError(Concat("the mask is ", mask->width, "x", mask->height, ", its picture ",
+                            image.width, "x", image.height),
+                     "", "a mask must have the size of its picture");
 }
 
 [[noreturn]] void ThrowNoPixel() {
-  throw Error(ExitCode::kInput, "mask selects no pixel", "",
-              "colours are measured where the mask is above 1/2, the picture is opaque and its "
-              "values are finite");
+  throw InputError(
+      "mask selects no pixel", "",
+      "colours are measured where the mask is above 1/2, the picture is opaque and its "
+      "values are finite");
 }
 
 // Sums of 8-bit values: exact, so their order does not matter. 64 bits hold 2.8e14 pixels.

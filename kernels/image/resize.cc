@@ -1,7 +1,6 @@
 #include "kernels/image/resize.h"
 
 #include <algorithm>
-#include <cmath>
 #include <vector>
 
 #include "kernels/base/error.h"

@@ -39,7 +39,7 @@ void DenseAdjoint(const DenseNetwork<T>& network, const T* x, const T* d_y,
   std::vector<T> d_sum(d_y, d_y + network.layers.back().outputs);
   for (size_t l = network.layers.size(); l-- > 0;) {
     const DenseLayer<T>& layer = network.layers[l];
-    std::vector<T> d_input(static_cast<size_t>(layer.inputs));
+    std::vector<T> d_input(layer.inputs);
     for (int o = 0; o < layer.outputs; ++o) {
       gradient->layers[l].bias[o] += d_sum[o];
       for (int i = 0; i < layer.inputs; ++i) {

@@ -4,7 +4,6 @@
 // activation; the adjoint is the chain rule, layer by layer.
 #pragma once
 
-#include <cstdint>
 #include <vector>
 
 #include "kernels/network/activation.h"

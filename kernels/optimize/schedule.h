@@ -1,7 +1,6 @@
 // Learning rates over time.
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 #include <cstdint>
 

@@ -9,13 +9,13 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <chrono>
 #include <cmath>
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
 #include <deque>
 
+#include "kernels/base/clock.h"
 #include "kernels/base/error.h"
 #include "kernels/base/file_descriptor.h"
 #include "kernels/process/process_guard.h"
@@ -27,13 +27,8 @@ constexpr size_t kLongestLine = 4096;
 constexpr size_t kLastLines = 20;
 constexpr int kPollMs = 100;
 
-double Now() {
-  using Clock = std::chrono::steady_clock;
-  return std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
-}
-
 [[noreturn]] void ThrowNoResources(const std::string& what, int code) {
-  throw Error(ExitCode::kResources, what + ": " + std::strerror(code));
+  throw ResourceError(what + ": " + std::strerror(code));
 }
 
 // Keeps the beginning of the output in a file, up to the cap, and the end in memory.
@@ -134,7 +129,7 @@ class Child {
     posix_spawn_file_actions_t actions;
     posix_spawnattr_t attributes;
     if (posix_spawn_file_actions_init(&actions) != 0 || posix_spawnattr_init(&attributes) != 0)
-      throw Error(ExitCode::kResources, "out of memory");
+      throw ResourceError("out of memory");
     posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
     posix_spawn_file_actions_adddup2(&actions, output, STDOUT_FILENO);
     posix_spawn_file_actions_adddup2(&actions, output, STDERR_FILENO);
@@ -160,7 +155,7 @@ class Child {
     pid_ = -1;
     const std::string what = "cannot start " + options.argv[0];
     if (status == EAGAIN || status == ENOMEM) ThrowNoResources(what, status);
-    throw Error(ExitCode::kExternalProgram, what + ": " + std::strerror(status));
+    throw ProgramError(what + ": " + std::strerror(status));
   }
   Child(const Child&) = delete;
   Child& operator=(const Child&) = delete;
@@ -194,19 +189,18 @@ class Child {
 }  // namespace
 
 std::string ChildResult::Describe() const {
-  const std::string by_signal = signal == 0 ? ""
-                                            : "killed by signal " + std::to_string(signal) +
-                                                  " (" + strsignal(signal) + ")";
+  const std::string by_signal =
+      signal == 0 ? "" : Concat("killed by signal ", signal, " (", strsignal(signal), ")");
   switch (end) {
     case ChildEnd::kExited:
       return "exit status " + std::to_string(exit_status);
     case ChildEnd::kSignal:
       return by_signal;
     case ChildEnd::kWallLimit:
-      return "ended after its time limit, " + std::to_string(std::lround(seconds)) + " s";
+      return Concat("ended after its time limit, ", std::lround(seconds), " s");
     case ChildEnd::kQuietLimit:
-      return "ended because it printed nothing for too long (it ran for " +
-             std::to_string(std::lround(seconds)) + " s)";
+      return Concat("ended because it printed nothing for too long (it ran for ",
+                    std::lround(seconds), " s)");
     case ChildEnd::kStopped:
       return "cancelled by the user";
   }
@@ -230,7 +224,7 @@ ChildResult RunChild(const ChildOptions& options, const LineFunction& on_line,
   std::deque<std::string> last;
   Lines lines(on_line, &last);
 
-  const double start = Now();
+  const double start = ClockSeconds();
   Child child(options, output.get());
   output.Close();
 
@@ -238,7 +232,7 @@ ChildResult RunChild(const ChildOptions& options, const LineFunction& on_line,
   double heard = start, asked = start, asked_to_end = 0, ended_since = 0;
   char bytes[1 << 16];
   while (true) {
-    const double now = Now();
+    const double now = ClockSeconds();
     if (ended_since == 0 && child.Ended()) {
       child.Signal(SIGKILL);  // the rest of its group
       ended_since = now;
@@ -276,7 +270,7 @@ ChildResult RunChild(const ChildOptions& options, const LineFunction& on_line,
   const int status = child.Reap();
   lines.End();
   log.Finish(last);
-  result.seconds = Now() - start;
+  result.seconds = ClockSeconds() - start;
   result.last_lines.assign(last.begin(), last.end());
   if (WIFSIGNALED(status)) {
     result.signal = WTERMSIG(status);

@@ -35,7 +35,7 @@ namespace {
 ProcessGuard::ProcessGuard() {
   int ends[2];
   if (pipe2(ends, O_CLOEXEC) != 0)
-    throw Error(ExitCode::kResources, std::string("cannot make a pipe: ") + strerror(errno));
+    throw ResourceError(std::string("cannot make a pipe: ") + strerror(errno));
   // The guard blocks all signals: only the parent reacts to them.
   sigset_t all, before;
   sigfillset(&all);
@@ -47,7 +47,7 @@ ProcessGuard::ProcessGuard() {
   close(ends[0]);
   if (leader_ < 0) {
     close(ends[1]);
-    throw Error(ExitCode::kResources, std::string("cannot start a process: ") + strerror(why));
+    throw ResourceError(std::string("cannot start a process: ") + strerror(why));
   }
   life_ = ends[1];
   setpgid(leader_, leader_);  // also here: the group must exist before its programs start

@@ -5,8 +5,6 @@
 #pragma once
 
 #include <array>
-#include <string>
-#include <vector>
 
 #include "kernels/base/vec.h"
 #include "kernels/scene/ndc.h"

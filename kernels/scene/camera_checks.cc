@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
+
+#include "kernels/base/error.h"
 
 namespace regrade {
 
@@ -10,12 +11,9 @@ std::string ImplausibleCamera(const Camera& camera) {
   constexpr double kLargestTranslation = 1e12;  // world units
   const double side = std::max(camera.width, camera.height);
   for (const double f : {camera.fx, camera.fy})
-    if (!(f > 0.05 * side && f < 100 * side)) {
-      std::ostringstream text;
-      text << "the focal length " << f << " px for a picture of " << camera.width << " x "
-           << camera.height;
-      return text.str();
-    }
+    if (!(f > 0.05 * side && f < 100 * side))
+      return Format("the focal length %g px for a picture of %d x %d", f, camera.width,
+                    camera.height);
   if (!(camera.cx >= 0 && camera.cx <= camera.width && camera.cy >= 0 &&
         camera.cy <= camera.height))
     return "its principal point outside the picture";

@@ -5,15 +5,10 @@
 #include <cstdint>
 
 #include "kernels/base/error.h"
+#include "kernels/base/quantile.h"
 
 namespace regrade {
 namespace {
-
-double Median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<long>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 bool IsPortrait(const Camera& camera) { return camera.height > camera.width; }
 
@@ -24,8 +19,7 @@ bool IsNarrower(const Camera* a, const Camera* b) {
 
 // The cameras with the orientation of the majority.
 std::vector<const Camera*> OfMainOrientation(const std::vector<Camera>& cameras) {
-  const size_t portraits =
-      static_cast<size_t>(std::count_if(cameras.begin(), cameras.end(), IsPortrait));
+  const size_t portraits = static_cast<size_t>(std::ranges::count_if(cameras, IsPortrait));
   const bool portrait = 2 * portraits > cameras.size();
   std::vector<const Camera*> chosen;
   for (const Camera& camera : cameras)
@@ -36,8 +30,8 @@ std::vector<const Camera*> OfMainOrientation(const std::vector<Camera>& cameras)
 }  // namespace
 
 bool HaveSameIntrinsics(const std::vector<Camera>& cameras) {
-  return std::all_of(cameras.begin(), cameras.end(),
-                     [&](const Camera& camera) { return camera.SameIntrinsics(cameras[0]); });
+  return std::ranges::all_of(
+      cameras, [&](const Camera& camera) { return camera.SameIntrinsics(cameras[0]); });
 }
 
 Camera CommonCamera(const std::vector<Camera>& cameras) {
@@ -50,7 +44,7 @@ Camera CommonCamera(const std::vector<Camera>& cameras) {
     for (const Camera& camera : cameras)
       focals.push_back(std::sqrt(camera.fx * camera.fy) /
                        std::max(camera.width, camera.height));
-    std::stable_sort(candidates.begin(), candidates.end(), IsNarrower);
+    std::ranges::stable_sort(candidates, IsNarrower);
     const Camera* middle = candidates[(candidates.size() - 1) / 2];
     const Camera* shape =
         *std::lower_bound(candidates.begin(), candidates.end(), middle, IsNarrower);

@@ -38,7 +38,7 @@ inline bool HasColor(const Image& image) {
   for (int64_t p = 0; p < image.num_pixels(); ++p) {
     bool finite = true;
     for (int c = 0; c < image.channels; ++c)
-      finite &= std::isfinite(image.pixels[static_cast<size_t>(p * image.channels + c)]);
+      finite &= std::isfinite(image.pixels[p * image.channels + c]);
     if (finite) return true;
   }
   return false;

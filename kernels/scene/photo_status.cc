@@ -26,8 +26,7 @@ std::optional<PhotoState> PhotoStateOf(std::string_view text) {
 std::vector<PhotoStatus> MergeStatuses(std::vector<PhotoStatus> earlier,
                                        const std::vector<PhotoStatus>& later) {
   for (const PhotoStatus& photo : later) {
-    const auto same = std::find_if(earlier.begin(), earlier.end(),
-                                   [&](const PhotoStatus& p) { return p.file == photo.file; });
+    const auto same = std::ranges::find(earlier, photo.file, &PhotoStatus::file);
     if (same == earlier.end()) {
       earlier.push_back(photo);
       continue;

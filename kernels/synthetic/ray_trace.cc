@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include "kernels/base/error.h"
 #include "kernels/scene/srgb.h"
 
 namespace regrade {

@@ -1,7 +1,6 @@
 // The shapes of synthetic scenes and their intersections with rays, in double precision.
 #pragma once
 
-#include <string>
 #include <vector>
 
 #include "kernels/base/vec.h"

@@ -269,8 +269,8 @@ SyntheticScene MakeSyntheticScene(const std::string& name, uint64_t seed) {
   if (name == "wall") return MakeWall(seed);
   if (name == "room") return MakeRoom(seed);
   if (name == "square") return MakeSquare(seed);
-  throw Error(ExitCode::kUsage, "there is no synthetic scene \"" + name + "\"", "--scene",
-              std::string("choose one of ") + kSyntheticSceneNames);
+  throw UsageError("there is no synthetic scene \"" + name + "\"", "--scene",
+                   std::string("choose one of ") + kSyntheticSceneNames);
 }
 
 std::vector<Camera> SyntheticCameras(const SyntheticScene& scene, int views, int width,

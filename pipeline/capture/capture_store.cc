@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
-#include <set>
 
 #include "kernels/base/error.h"
 #include "kernels/base/natural_order.h"
@@ -52,22 +51,8 @@ fs::path PictureFolder(const fs::path& root) {
     if (const std::string name = it->path().filename().string();
         name.starts_with("images_") && fs::is_directory(it->path(), error))
       names.push_back(name);
-  std::sort(names.begin(), names.end(), NaturalLess);
+  std::ranges::sort(names, NaturalLess);
   return names.empty() ? fs::path() : root / names[0];
-}
-
-ColmapLens LensOf(const Camera& camera) {
-  switch (camera.lens) {
-    case LensModel::kPinhole:
-      return ColmapLens::kPinhole;
-    case LensModel::kOpenCv:
-      return ColmapLens::kOpenCv;
-    case LensModel::kFullOpenCv:
-      return ColmapLens::kFullOpenCv;
-    case LensModel::kFisheye:
-      return ColmapLens::kOpenCvFisheye;
-  }
-  return ColmapLens::kPinhole;
 }
 
 // A model with one camera per image and no points, with staged names.
@@ -91,7 +76,7 @@ ColmapModel ModelFromTransforms(const CaptureSource& source,
     const auto found = by_path.find(fs::weakly_canonical(folder / frame.file).string());
     if (found == by_path.end()) continue;  // left out at ingest, with a reason
     const uint32_t id = static_cast<uint32_t>(model.images.size()) + 1;
-    model.cameras.push_back({id, LensOf(frame.camera), frame.camera});
+    model.cameras.push_back({id, ColmapLensOf(frame.camera.lens), frame.camera});
     model.images.push_back({id, id, found->second->name, frame.camera.camera_from_world, {}});
   }
   return model;
@@ -102,11 +87,10 @@ ColmapModel ModelFromLlff(const CaptureSource& source, const std::vector<StagedP
                           double* nearest_depth) {
   const LlffPoses poses = ReadPosesBounds(source.poses);
   if (poses.cameras.size() != photos.size())
-    throw Error(ExitCode::kInput,
-                std::to_string(poses.cameras.size()) + " poses, but " +
-                    std::to_string(photos.size()) + " usable photos in " + source.photos,
-                source.poses,
-                "an LLFF file has no photo names: all of its pictures must be present");
+    throw InputError(Concat(poses.cameras.size(), " poses, but ", photos.size(),
+                            " usable photos in ", source.photos),
+                     source.poses,
+                     "an LLFF file has no photo names: all of its pictures must be present");
   *nearest_depth = poses.nearest;
   ColmapModel model;
   for (size_t i = 0; i < photos.size(); ++i) {
@@ -128,8 +112,8 @@ void NoteMissing(const std::vector<PhotoStatus>& statuses, std::vector<std::stri
   for (const PhotoStatus& photo : statuses)
     if (photo.why == kNoPicture && count++ == 0) first = photo.file;
   if (count > 0)
-    notes->push_back("the pictures of " + std::to_string(count) +
-                     " poses are missing: " + first + (count > 1 ? " and others" : ""));
+    notes->push_back(Concat("the pictures of ", count, " poses are missing: ", first,
+                            (count > 1 ? " and others" : "")));
 }
 
 JsonValue StatusesJson(const std::vector<PhotoStatus>& statuses) {
@@ -149,10 +133,9 @@ JsonValue ReadIndex(const std::string& path) {
   JsonValue index = ReadJsonFile(path);
   const JsonValue* const schema = index.IsObject() ? index.Find("schema") : nullptr;
   if (schema == nullptr || !(*schema == JsonValue(kSchema)))
-    throw Error(ExitCode::kInput,
-                "is of schema " + (schema == nullptr ? "0" : DumpJson(*schema, -1)) +
-                    ", this version of regrade reads schema " + std::to_string(kSchema),
-                path, "start a new folder with `regrade run`, or use --restart-from pose");
+    throw InputError(Concat("is of schema ", (schema == nullptr ? "0" : DumpJson(*schema, -1)),
+                            ", this version of regrade reads schema ", kSchema),
+                     path, "start a new folder with `regrade run`, or use --restart-from pose");
   return index;
 }
 
@@ -170,9 +153,9 @@ double NearestDepthOf(const CaptureSource& source) {
 CaptureSource DetectCapture(const std::string& folder) {
   std::error_code error;
   const fs::path root = fs::canonical(folder, error);
-  if (error) throw Error(ExitCode::kInput, error.message(), folder, "name a folder of photos");
+  if (error) throw InputError(error.message(), folder, "name a folder of photos");
   if (!fs::is_directory(root))
-    throw Error(ExitCode::kInput, "is a file, not a folder", folder, "name its folder");
+    throw InputError("is a file, not a folder", folder, "name its folder");
   for (const char* name : {"transforms.json", "transforms_train.json"}) {
     const fs::path file = root / name;
     if (!fs::is_regular_file(file)) continue;
@@ -268,7 +251,7 @@ Capture ReadCapture(const std::string& folder) {
       photo.file = entry.At("file").AsString();
       photo.name = entry.At("name").AsString();
       if (fs::path(photo.name).filename() != photo.name)
-        throw Error(ExitCode::kInput, "a photo's name is a path");
+        throw InputError("a photo's name is a path");
       photo.path = folder + "/photos/" + photo.name;
       photo.width = static_cast<int>(entry.At("width").AsInt());
       photo.height = static_cast<int>(entry.At("height").AsInt());
@@ -281,8 +264,7 @@ Capture ReadCapture(const std::string& folder) {
     for (const JsonValue& photo : index.At("statuses").AsArray()) {
       const auto state = PhotoStateOf(photo.At("status").AsString());
       if (!state)
-        throw Error(ExitCode::kInput,
-                    "'" + photo.At("status").AsString() + "' is not a photo's status");
+        throw InputError("'" + photo.At("status").AsString() + "' is not a photo's status");
       capture.statuses.push_back(
           {photo.At("file").AsString(), *state, photo.At("why").AsString()});
     }
@@ -291,8 +273,8 @@ Capture ReadCapture(const std::string& folder) {
     capture.models_found = static_cast<int>(index.At("models_found").AsInt());
     return capture;
   } catch (const Error& error) {
-    throw Error(ExitCode::kInput, error.what_failed(),
-                error.where().empty() ? path : error.where(), error.hint());
+    throw InputError(error.what_failed(), error.where().empty() ? path : error.where(),
+                     error.hint());
   }
 }
 

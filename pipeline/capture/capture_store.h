@@ -5,7 +5,6 @@
 #include <string>
 
 #include "kernels/scene/capture.h"
-#include "reconstruct/colmap/colmap_model.h"
 
 namespace regrade {
 

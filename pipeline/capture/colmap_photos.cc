@@ -13,8 +13,7 @@ std::vector<StagedPhoto> PhotosForColmap(const std::vector<StagedPhoto>& photos,
   namespace fs = std::filesystem;
   std::error_code error;
   fs::remove_all(folder, error);  // of an earlier run
-  if (std::all_of(photos.begin(), photos.end(),
-                  [](const StagedPhoto& photo) { return photo.bits == 8; }))
+  if (std::ranges::all_of(photos, [](const StagedPhoto& photo) { return photo.bits == 8; }))
     return photos;
   fs::create_directories(folder, error);
   std::vector<StagedPhoto> copies = photos;
@@ -22,7 +21,7 @@ std::vector<StagedPhoto> PhotosForColmap(const std::vector<StagedPhoto>& photos,
     const std::string path = folder + "/" + photo.name;
     if (photo.bits == 8) {
       fs::copy_file(photo.path, path, error);
-      if (error) throw Error(ExitCode::kResources, error.message(), path);
+      if (error) throw ResourceError(error.message(), path);
     } else {
       WritePng8(path, ReadImage(photo.path));
     }

@@ -1,7 +1,6 @@
 #include "pipeline/capture/ingest_photos.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <future>
@@ -127,8 +126,8 @@ class Notices {
     for (const std::string& what : order_) {
       const Kind& kind = kinds_.at(what);
       texts.push_back(kind.count == 1 ? kind.first + ": " + what
-                                      : std::to_string(kind.count) + " photos: " + what +
-                                            " (the first is " + kind.first + ")");
+                                      : Concat(kind.count, " photos: ", what, " (the first is ",
+                                               kind.first, ")"));
     }
     return texts;
   }
@@ -150,12 +149,12 @@ std::string CountReasons(const std::vector<PhotoStatus>& statuses) {
     if (photo.status != PhotoState::kUsed) ++counts[photo.why];
   std::vector<std::pair<int, std::string>> sorted;
   for (const auto& [why, count] : counts) sorted.emplace_back(-count, why);
-  std::sort(sorted.begin(), sorted.end());
+  std::ranges::sort(sorted);
   std::string text;
   for (size_t i = 0; i < std::min(sorted.size(), kShown); ++i)
-    text += (i ? ", " : "") + std::to_string(-sorted[i].first) + " x " + sorted[i].second;
+    text += Concat((i ? ", " : ""), -sorted[i].first, " x ", sorted[i].second);
   if (sorted.size() > kShown)
-    text += ", and " + std::to_string(sorted.size() - kShown) + " other reasons";
+    text += Concat(", and ", sorted.size() - kShown, " other reasons");
   return text;
 }
 
@@ -165,27 +164,22 @@ void RequireEnough(const IngestResult& result, const std::string& folder) {
   std::string reasons = CountReasons(result.statuses);
   if (!reasons.empty()) reasons = ": " + reasons;
   if (usable == 0)
-    throw Error(ExitCode::kInput,
-                files == 0
-                    ? "the folder is empty" +
-                          (result.hidden > 0 ? " (except for " + std::to_string(result.hidden) +
-                                                   " hidden entries)"
-                                             : std::string())
-                    : std::to_string(files) + (files == 1 ? " file" : " files") +
-                          ", no usable photo" + reasons,
-                folder, "give a folder of JPEG, PNG or TIFF photos");
-  throw Error(ExitCode::kScene,
-              std::to_string(usable) + (usable == 1 ? " photo" : " photos") + " of " +
-                  std::to_string(files) +
-                  " files: a scene needs at least 3, better 20, from different viewpoints" +
-                  reasons,
-              folder);
+    throw InputError(
+        files == 0
+            ? "the folder is empty" +
+                  (result.hidden > 0
+                       ? Concat(" (except for ", result.hidden, " hidden entries)")
+                       : std::string())
+            : Concat(files, (files == 1 ? " file" : " files"), ", no usable photo", reasons),
+        folder, "give a folder of JPEG, PNG or TIFF photos");
+  throw SceneError(
+      Concat(usable, (usable == 1 ? " photo" : " photos"), " of ", files,
+             " files: a scene needs at least 3, better 20, from different viewpoints", reasons),
+      folder);
 }
 
 std::string StagedName(size_t index, const char* suffix) {
-  char name[32];
-  std::snprintf(name, sizeof name, "%05zu%s", index, suffix);
-  return name;
+  return Format("%05zu%s", index, suffix);
 }
 
 }  // namespace
@@ -196,8 +190,7 @@ IngestResult IngestPhotos(const std::string& folder, const std::string& staging_
   const std::string staging = fs::absolute(staging_folder).lexically_normal().string();
   std::error_code error;
   fs::create_directories(staging, error);
-  if (error)
-    throw Error(ExitCode::kResources, "cannot create the folder: " + error.message(), staging);
+  if (error) throw ResourceError("cannot create the folder: " + error.message(), staging);
 
   IngestResult result;
   result.hidden = listing.hidden;
@@ -222,9 +215,7 @@ IngestResult IngestPhotos(const std::string& folder, const std::string& staging_
     const Candidate candidate = next.get();
     next = decode_later(i + 1);
     const std::string& file = files[i].name;
-    if (Report(progress, static_cast<double>(i), static_cast<double>(files.size()), file) !=
-        LoopControl::kContinue)
-      throw Interrupted();
+    ReportOrThrow(progress, i, files.size(), file);
     if (!candidate.problem.empty()) {
       result.statuses.push_back({file, PhotoState::kSkipped, candidate.problem});
       if (candidate.problem != "not an image")
@@ -258,7 +249,7 @@ IngestResult IngestPhotos(const std::string& folder, const std::string& staging_
                              candidate.photo.exif_focal_px, bits});
     fingerprint.Add(file + '\n' + HashText(candidate.pixel_hash) + '\n');
   }
-  Report(progress, static_cast<double>(files.size()), static_cast<double>(files.size()));
+  Report(progress, files.size(), files.size());
   RequireEnough(result, folder);
   RemoveLeftovers(staging, staged_names);
   result.notices = notices.Texts();

@@ -18,8 +18,8 @@ constexpr uint64_t kMaxBytes = 16 << 20;
 constexpr double kRigidTolerance = 1e-2;
 
 [[noreturn]] void Refuse(const std::string& path, size_t row, const std::string& what) {
-  throw Error(ExitCode::kInput, "pose " + std::to_string(row) + ": " + what, path,
-              "the file is damaged, or was written by another program");
+  throw InputError(Concat("pose ", row, ": ", what), path,
+                   "the file is damaged, or was written by another program");
 }
 
 Camera CameraOf(const std::string& path, size_t row, const double* v) {
@@ -63,8 +63,8 @@ LlffPoses ReadPosesBounds(const std::string& path) {
   if (header.type != ArrayType::kF64 || header.shape.size() != 2 ||
       header.shape[1] != kColumns || header.shape[0] < 1 ||
       header.data_bytes != bytes.size() - header.data_offset)
-    throw Error(ExitCode::kInput, "is not a table of 17 doubles per pose", path,
-                "poses_bounds.npy is written by LLFF's imgs2poses.py");
+    throw InputError("is not a table of 17 doubles per pose", path,
+                     "poses_bounds.npy is written by LLFF's imgs2poses.py");
   std::vector<double> values(header.data_bytes / sizeof(double));
   std::memcpy(values.data(), bytes.data() + header.data_offset, header.data_bytes);
   LlffPoses result;

@@ -8,7 +8,6 @@
 #include "kernels/base/error.h"
 #include "kernels/image/resize.h"
 #include "pipeline/capture/photo_names.h"
-#include "pipeline/files/folder_listing.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/workspace/stage_record.h"
 
@@ -19,7 +18,7 @@ namespace {
 constexpr float kSameLabel = 24.0f / 255;
 
 Vec3f ColorOf(const Image& image, int64_t pixel) {
-  const float* p = &image.pixels[static_cast<size_t>(pixel * image.channels)];
+  const float* p = &image.pixels[pixel * image.channels];
   const float alpha = image.channels == 4 ? p[3] : 1;
   const bool grey = image.channels < 3;
   return Vec3f{p[0], p[grey ? 0 : 1], p[grey ? 0 : 2]} * alpha;
@@ -52,13 +51,12 @@ std::vector<Vec3f> LabelsOf(const std::string& path) {
   for (size_t k = 0; k < labels.size(); ++k)
     if (counts[k] * 1000 >= mask.num_pixels()) kept.push_back(labels[k]);
   if (kept.empty())
-    throw Error(ExitCode::kInput, "has no region: it is entirely black", path,
-                "paint each region of the style in one plain colour");
+    throw InputError("has no region: it is entirely black", path,
+                     "paint each region of the style in one plain colour");
   if (kept.size() > ObjectMasks::kMostRegions)
-    throw Error(ExitCode::kInput,
-                "has " + std::to_string(kept.size()) + " colours, at most " +
-                    std::to_string(ObjectMasks::kMostRegions) + " are regions",
-                path, "paint each region in one plain colour, and save it as PNG");
+    throw InputError(Concat("has ", kept.size(), " colours, at most ",
+                            ObjectMasks::kMostRegions, " are regions"),
+                     path, "paint each region in one plain colour, and save it as PNG");
   return kept;
 }
 
@@ -71,8 +69,8 @@ ObjectMasks::ObjectMasks(const MaskOptions& options, const std::vector<std::stri
 }
 
 int ObjectMasks::num_known() const {
-  return static_cast<int>(std::count_if(paths_.begin(), paths_.end(),
-                                        [](const std::string& path) { return !path.empty(); }));
+  return static_cast<int>(
+      std::ranges::count_if(paths_, [](const std::string& path) { return !path.empty(); }));
 }
 
 std::vector<Image> ObjectMasks::Regions(const std::string& path, int width, int height) const {
@@ -83,11 +81,11 @@ std::vector<Image> ObjectMasks::Regions(const std::string& path, int width, int 
     Image region(mask.width, mask.height, 1);
     for (int64_t i = 0; i < mask.num_pixels(); ++i) {
       const Vec3f color = ColorOf(mask, i);
-      float& m = region.pixels[static_cast<size_t>(i)];
+      float& m = region.pixels[i];
       if (labels_.empty())
         m = (color.x + color.y + color.z) / 3;
       else
-        m = Same(color, labels_[static_cast<size_t>(k)]) ? 1.0f : 0.0f;
+        m = Same(color, labels_[k]) ? 1.0f : 0.0f;
     }
     regions.push_back(region.width == width && region.height == height
                           ? std::move(region)
@@ -96,27 +94,25 @@ std::vector<Image> ObjectMasks::Regions(const std::string& path, int width, int 
   // Labels closer than their tolerance would count a pixel twice.
   for (int64_t i = 0; i < regions[0].num_pixels(); ++i) {
     float sum = 0;
-    for (const Image& region : regions) sum += region.pixels[static_cast<size_t>(i)];
+    for (const Image& region : regions) sum += region.pixels[i];
     if (sum > 1)
-      for (Image& region : regions) region.pixels[static_cast<size_t>(i)] /= sum;
+      for (Image& region : regions) region.pixels[i] /= sum;
   }
   return regions;
 }
 
 std::vector<Image> ObjectMasks::Coverage(int view, int width, int height) const {
   REGRADE_CHECK(Knows(view));
-  return Regions(paths_[static_cast<size_t>(view)], width, height);
+  return Regions(paths_[view], width, height);
 }
 
 Image ObjectMasks::StyleRegion(int region, int width, int height) const {
   if (labels_.empty()) return {};
-  return Regions(style_mask_, width, height)[static_cast<size_t>(region)];
+  return Regions(style_mask_, width, height)[region];
 }
 
 JsonValue MaskFiles(const MaskOptions& options) {
-  JsonValue hashes = JsonValue::Object();
-  for (const ListedFile& file : ListFolder(options.masks).files)
-    if (file.problem.empty()) hashes[file.name] = HashFile(file.path);
+  JsonValue hashes = HashFolder(options.masks);
   if (!options.style_mask.empty()) hashes["style mask"] = HashFile(options.style_mask);
   return hashes;
 }
@@ -128,8 +124,8 @@ void ProbeMasks(MaskOptions* options) {
     if (path->empty()) continue;
     std::error_code error;
     if (!fs::exists(*path, error))
-      throw Error(ExitCode::kInput, "there is no such file or folder", *path,
-                  std::string("correct ") + flag);
+      throw InputError("there is no such file or folder", *path,
+                       std::string("correct ") + flag);
     *path = fs::absolute(*path, error).lexically_normal().string();
   }
 }

@@ -52,7 +52,7 @@ class ObjectMasks {
   static constexpr int kMostRegions = 16;
 
   int num_regions() const { return labels_.empty() ? 1 : static_cast<int>(labels_.size()); }
-  bool Knows(int view) const { return !paths_[static_cast<size_t>(view)].empty(); }
+  bool Knows(int view) const { return !paths_[view].empty(); }
   int num_known() const;
   // [regions] of [height, width, 1] for a photo of that size. Throws Error(kInput) for a mask
   // of another aspect, and for one that cannot be read.

@@ -35,7 +35,7 @@ Camera UnpackCamera(const double* v, const std::string& where) {
   if (!std::all_of(v, v + kCameraValues, [](double x) { return std::isfinite(x); }) ||
       !(v[0] >= 1 && v[0] <= kMaxSide && v[1] >= 1 && v[1] <= kMaxSide && v[2] > 0 &&
         v[3] > 0 && v[6] >= 0 && v[6] <= static_cast<double>(LensModel::kFisheye)))
-    throw Error(ExitCode::kInput, "a camera is out of range", where, "pack the capture again");
+    throw InputError("a camera is out of range", where, "pack the capture again");
   Camera camera;
   camera.width = static_cast<int>(v[0]);
   camera.height = static_cast<int>(v[1]);
@@ -46,7 +46,7 @@ Camera UnpackCamera(const double* v, const std::string& where) {
   for (int i = 0; i < 3; ++i) camera.camera_from_world.translation[i] = v[24 + i];
   const RigidTransform& pose = camera.camera_from_world;
   if (!ImplausibleCamera(camera).empty() || !IsSound({1, pose.rotation, pose.translation}))
-    throw Error(ExitCode::kInput, "a camera is implausible", where, "pack the capture again");
+    throw InputError("a camera is implausible", where, "pack the capture again");
   return camera;
 }
 
@@ -87,8 +87,8 @@ void CheckScene(const NormalizedScene& scene, const std::string& path) {
   for (const double side : {scene.ndc.a, scene.ndc.b})
     sound = sound && side >= 0 && side < 1e3 && (side > 0) == (scene.ndc.a > 0);
   if (!sound)
-    throw Error(ExitCode::kInput, "its box or frame is not that of a capture", path,
-                "pack the capture again");
+    throw InputError("its box or frame is not that of a capture", path,
+                     "pack the capture again");
 }
 
 int64_t BytesOf(const Camera& camera) { return int64_t{camera.width} * camera.height * 3; }
@@ -96,8 +96,8 @@ int64_t BytesOf(const Camera& camera) { return int64_t{camera.width} * camera.he
 }  // namespace
 
 void WritePackedCapture(const std::string& path, const PackedCapture& capture) {
-  const auto n = static_cast<int64_t>(capture.views.size());
-  std::vector<double> cameras(static_cast<size_t>(n * kCameraValues));
+  const auto n = std::ssize(capture.views);
+  std::vector<double> cameras(n * kCameraValues);
   std::vector<uint8_t> held_out;
   std::string names;
   int64_t bytes = 0;
@@ -174,7 +174,7 @@ PackedCapture ReadPackedCapture(const std::string& path) {
   if (file.Has("style")) {
     const NpzArray style = file.Read("style", ArrayType::kU8, {-1, -1, 3});
     if (style.shape[0] > kMaxSide || style.shape[1] > kMaxSide)
-      throw Error(ExitCode::kInput, "is too large", path + ": style", "pack the capture again");
+      throw InputError("is too large", path + ": style", "pack the capture again");
     capture.style = UnpackPixels(style.bytes.data(), static_cast<int>(style.shape[1]),
                                  static_cast<int>(style.shape[0]));
   }
@@ -191,8 +191,8 @@ PackedCapture ReadPackedCapture(const std::string& path) {
     name_begin = std::min(name_end + 1, names.size());
     const int64_t bytes = BytesOf(view.camera);
     if (bytes > pixels.bytes.size() - at)
-      throw Error(ExitCode::kInput, "holds fewer pixels than its cameras have",
-                  path + ": pixels", "pack the capture again");
+      throw InputError("holds fewer pixels than its cameras have", path + ": pixels",
+                       "pack the capture again");
     view.photo = UnpackPixels(pixels.bytes.data() + at, view.camera.width, view.camera.height);
     at += bytes;
     capture.views.push_back(std::move(view));

@@ -83,8 +83,8 @@ JsonValue StoredGainRows(const std::string& poses) {
   const JsonValue file = ReadJsonFile(path);
   const JsonValue* const schema = file.IsObject() ? file.Find("schema") : nullptr;
   if (schema == nullptr || !(*schema == JsonValue(kSchema)))
-    throw Error(ExitCode::kInput, "is not of schema " + std::to_string(kSchema), path,
-                "use --restart-from reconstruct");
+    throw InputError("is not of schema " + std::to_string(kSchema), path,
+                     "use --restart-from reconstruct");
   return file.At("photos");
 }
 
@@ -96,16 +96,16 @@ PhotoGains ReadGains(const std::string& poses, const Capture& capture) {
   for (size_t v = 0; fits && v < capture.views.size(); ++v) {
     const JsonValue& row = rows.AsArray()[v];
     const JsonValue::Array& gain = row.At("gain").AsArray();
-    fits = row.At("file").AsString() == capture.views[v].file && gain.size() == 3 &&
-           std::all_of(gain.begin(), gain.end(),
-                       [](const JsonValue& value) { return value.AsDouble() > 0; });
+    fits =
+        row.At("file").AsString() == capture.views[v].file && gain.size() == 3 &&
+        std::ranges::all_of(gain, [](const JsonValue& value) { return value.AsDouble() > 0; });
     if (fits)
       gains.of_view.push_back({{gain[0].AsDouble(), gain[1].AsDouble(), gain[2].AsDouble()},
                                row.At("highlights").AsDouble()});
   }
   if (!fits)
-    throw Error(ExitCode::kInput, "the stored exposures are not those of its photos",
-                poses + "/" + kExposureFile, "use --restart-from reconstruct");
+    throw InputError("the stored exposures are not those of its photos",
+                     poses + "/" + kExposureFile, "use --restart-from reconstruct");
   return gains;
 }
 

@@ -28,9 +28,7 @@ inline const PhotoGain kAsTaken{};
 struct PhotoGains {
   std::vector<PhotoGain> of_view;
 
-  PhotoGain Of(int view) const {
-    return of_view.empty() ? kAsTaken : of_view[static_cast<size_t>(view)];
-  }
+  PhotoGain Of(int view) const { return of_view.empty() ? kAsTaken : of_view[view]; }
 };
 
 // `clipped`: for each view the fraction of its pixels that are clipped, by channel.

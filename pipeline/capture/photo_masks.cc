@@ -6,9 +6,7 @@
 #include "kernels/base/error.h"
 #include "kernels/image/resize.h"
 #include "pipeline/capture/photo_names.h"
-#include "pipeline/files/folder_listing.h"
 #include "pipeline/images/image_file.h"
-#include "pipeline/workspace/stage_record.h"
 
 namespace regrade {
 
@@ -37,8 +35,8 @@ int StagePhotoMasks(const std::string& masks, const std::vector<StagedPhoto>& ph
       keeps_any |= keep.pixels[p] > 0;
     }
     if (!keeps_any)
-      throw Error(ExitCode::kInput, "is entirely black", paths[i],
-                  "remove the photo if none of it is to be used");
+      throw InputError("is entirely black", paths[i],
+                       "remove the photo if none of it is to be used");
     WritePng8(folder + "/" + photo.name + ".png", keep);
     ++count;
   }
@@ -48,13 +46,6 @@ int StagePhotoMasks(const std::string& masks, const std::vector<StagedPhoto>& ph
 std::string StagedMaskOf(const std::string& photo_path) {
   const std::filesystem::path path(photo_path);
   return (path.parent_path().parent_path() / "masks" / path.filename()).string() + ".png";
-}
-
-JsonValue PhotoMaskFiles(const std::string& masks) {
-  JsonValue hashes = JsonValue::Object();
-  for (const ListedFile& file : ListFolder(masks).files)
-    if (file.problem.empty()) hashes[file.name] = HashFile(file.path);
-  return hashes;
 }
 
 }  // namespace regrade

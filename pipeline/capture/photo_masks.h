@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "kernels/scene/capture.h"
-#include "pipeline/files/json_file.h"
 
 namespace regrade {
 
@@ -21,8 +20,5 @@ int StagePhotoMasks(const std::string& masks, const std::vector<StagedPhoto>& ph
 // Path of the mask of a staged photo, if it has one: poses/masks/00007.png.png for
 // poses/photos/00007.png.
 std::string StagedMaskOf(const std::string& photo_path);
-
-// Hashes of the masks, as part of a stage's inputs. Throws Error(kInput) for a missing folder.
-JsonValue PhotoMaskFiles(const std::string& masks);
 
 }  // namespace regrade

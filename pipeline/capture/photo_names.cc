@@ -32,13 +32,11 @@ bool IsMeantAsPicture(const std::string& path) {
   std::string begin(4096, '\0');
   std::ifstream file(path, std::ios::binary);
   file.read(begin.data(), static_cast<std::streamsize>(begin.size()));
-  begin.resize(static_cast<size_t>(std::max<std::streamsize>(0, file.gcount())));
+  begin.resize(std::max<std::streamsize>(0, file.gcount()));
   return SniffImageFormat(begin, path) != nullptr;
 }
 
-std::string SizeOf(const Image& image) {
-  return std::to_string(image.width) + " x " + std::to_string(image.height);
-}
+std::string SizeOf(const Image& image) { return Concat(image.width, " x ", image.height); }
 
 }  // namespace
 
@@ -51,8 +49,7 @@ void CheckAspect(const Image& picture, int width, int height, const std::string&
   const double slack = 1.0 / std::min({width, height, picture.width, picture.height});
   if (std::abs(ratio_x - ratio_y) > slack * larger)
     throw Error(code,
-                "has " + SizeOf(picture) + " pixels, its view " + std::to_string(width) +
-                    " x " + std::to_string(height),
+                Concat("has ", SizeOf(picture), " pixels, its view ", width, " x ", height),
                 where, "keep the photo's aspect: do not crop or rotate");
 }
 
@@ -62,8 +59,8 @@ std::vector<std::string> PicturesByPhotoName(const std::string& folder,
   std::map<std::string, size_t> view_of;
   for (size_t i = 0; i < photos.size(); ++i)
     if (!view_of.emplace(StemOf(photos[i]), i).second)
-      throw Error(ExitCode::kInput, "two photos have the name \"" + StemOf(photos[i]) + "\"",
-                  photos[i], what + "s are found by name: give the photos different names");
+      throw InputError("two photos have the name \"" + StemOf(photos[i]) + "\"", photos[i],
+                       what + "s are found by name: give the photos different names");
   std::vector<std::string> paths(photos.size());
   bool any = false;
   for (const ListedFile& file : ListFolder(folder).files) {
@@ -72,18 +69,19 @@ std::vector<std::string> PicturesByPhotoName(const std::string& folder,
     if (match == view_of.end() && HasPictureName(StemOf(file.name)))
       match = view_of.find(StemOf(StemOf(file.name)));
     if (match == view_of.end()) continue;
-    if (!file.problem.empty()) throw Error(ExitCode::kInput, file.problem, file.path);
+    if (!file.problem.empty()) throw InputError(file.problem, file.path);
     if (!IsMeantAsPicture(file.path)) continue;
     std::string& path = paths[match->second];
     if (!path.empty())
-      throw Error(ExitCode::kInput, "two " + what + "s for the photo " + photos[match->second],
-                  path + " and " + file.path, "leave one of them");
+      throw InputError("two " + what + "s for the photo " + photos[match->second],
+                       path + " and " + file.path, "leave one of them");
     path = file.path;
     any = true;
   }
   if (!any)
-    throw Error(ExitCode::kInput, "has no picture with the name of a photo", folder,
-                photos.empty() ? "" : "expected are names like " + StemOf(photos[0]) + ".png");
+    throw InputError(
+        "has no picture with the name of a photo", folder,
+        photos.empty() ? "" : "expected are names like " + StemOf(photos[0]) + ".png");
   return paths;
 }
 

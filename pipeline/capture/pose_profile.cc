@@ -1,8 +1,5 @@
 #include "pipeline/capture/pose_profile.h"
 
-#include <cstdarg>
-#include <cstdio>
-
 #include "kernels/base/error.h"
 #include "pipeline/capture/scene_profile.h"
 #include "reconstruct/refinement/refine_poses.h"
@@ -10,30 +7,21 @@
 namespace regrade {
 namespace {
 
-__attribute__((format(printf, 1, 2))) std::string Text(const char* format, ...) {
-  char text[256];
-  va_list arguments;
-  va_start(arguments, format);
-  std::vsnprintf(text, sizeof text, format, arguments);
-  va_end(arguments);
-  return text;
-}
-
 std::string Evidence(const PoseRefinement& refinement) {
   std::string text = "median reprojection error after optimal triangulation, in pixels";
   if (!refinement.tried) return text;
   if (refinement.held_out_after_px > 0)
-    text += Text(
+    text += Format(
         "; after bundle adjustment: %.2f, and %.2f instead of %.2f for %lld held-out "
         "observations",
         refinement.refined_px, refinement.held_out_after_px, refinement.held_out_before_px,
         static_cast<long long>(refinement.held_out));
   if (!refinement.Accepted()) return text + "; refused: " + refinement.refused;
-  text += Text("; cameras turned by %.2g deg and moved by %.2g %% of their extent",
-               refinement.turned_deg, 100 * refinement.moved_fraction);
+  text += Format("; cameras turned by %.2g deg and moved by %.2g %% of their extent",
+                 refinement.turned_deg, 100 * refinement.moved_fraction);
   if (refinement.turn_error_deg)
-    text += Text(", standard errors %.2g deg and %.2g %%", *refinement.turn_error_deg,
-                 100 * *refinement.moved_error);
+    text += Format(", standard errors %.2g deg and %.2g %%", *refinement.turn_error_deg,
+                   100 * *refinement.moved_error);
   return text;
 }
 
@@ -67,8 +55,7 @@ PoseProfile ProfilePoses(CaptureKind kind, const PoseOptions& options,
   const bool requested = override != overrides.end() && override->second;
   const double threshold = kPoseMisfit * misfit_scale;
   const auto leave_out = [requested, threshold](const char* why) -> PoseProfile {
-    if (requested)
-      throw Error(ExitCode::kScene, why, std::string("--effects ") + kPoseRefinement + "=on");
+    if (requested) throw SceneError(why, std::string("--effects ") + kPoseRefinement + "=on");
     return {{kPoseRefinement, false, why, Metric(), threshold}, JsonValue()};
   };
   if (override != overrides.end() && !requested) return leave_out("off by --effects");

@@ -1,9 +1,8 @@
 #include "pipeline/capture/pose_tracks.h"
 
 #include <algorithm>
-#include <chrono>
-#include <cstdio>
 
+#include "kernels/base/clock.h"
 #include "kernels/base/error.h"
 #include "pipeline/capture/scene_profile.h"
 #include "pipeline/program/cpu_time.h"
@@ -17,15 +16,12 @@ constexpr char kWithoutPoints[] =
     "the cameras";
 
 std::string Summary(const FoundTracks& found, double seconds, double cpu_seconds) {
-  char text[256];
-  std::snprintf(
-      text, sizeof text,
+  return Format(
       "the poses are without points: COLMAP %s triangulated %zu with %lld observations, "
       "median reprojection error %.2f px, in %.0f s (%.0f s of CPU); --tracks given "
       "skips this",
       found.colmap_version.c_str(), found.model.points.size(),
       static_cast<long long>(found.observations), found.median_px, seconds, cpu_seconds);
-  return text;
 }
 
 // Wrong poses give points, too: a match between two photos may fit by chance, but a third
@@ -37,16 +33,14 @@ bool Plausible(const FoundTracks& found) {
 }
 
 std::string DoubtText(const FoundTracks& found) {
-  char text[256];
-  std::snprintf(
-      text, sizeof text,
-      "with the given poses COLMAP triangulated %zu points, %.1f observations of each "
-      "on average: too little texture, or poses of other photos.",
-      found.model.points.size(),
-      found.model.points.empty() ? 0.0
-                                 : static_cast<double>(found.observations) /
-                                       static_cast<double>(found.model.points.size()));
-  return text + std::string(kWithoutPoints);
+  return Format(
+             "with the given poses COLMAP triangulated %zu points, %.1f observations of each "
+             "on average: too little texture, or poses of other photos.",
+             found.model.points.size(),
+             found.model.points.empty() ? 0.0
+                                        : static_cast<double>(found.observations) /
+                                              static_cast<double>(found.model.points.size())) +
+         kWithoutPoints;
 }
 
 }  // namespace
@@ -65,8 +59,7 @@ PoseTracks AddTracks(const PoseOptions& options, const std::string& effects,
                      const ProgressFunction& progress) {
   PoseTracks result;
   if (!WantsTracks(options, effects, *capture)) return result;
-  using Clock = std::chrono::steady_clock;
-  const Clock::time_point began = Clock::now();
+  const double began = ClockSeconds();
   const double cpu_before = CpuSeconds();
   FoundTracks found;
   try {
@@ -79,16 +72,15 @@ PoseTracks AddTracks(const PoseOptions& options, const std::string& effects,
     result.metrics = JsonValue::Object{{"points", 0}, {"failed", error.what_failed()}};
     return result;
   }
-  const double seconds = std::chrono::duration<double>(Clock::now() - began).count();
+  const double seconds = ClockSeconds() - began;
   const double cpu_seconds = CpuSeconds() - cpu_before;
-  result.metrics =
-      JsonValue::Object{{"points", static_cast<int64_t>(found.model.points.size())},
-                        {"observations", found.observations},
-                        {"median_px", found.median_px},
-                        {"pairs", found.pairs},
-                        {"colmap", found.colmap_version},
-                        {"seconds", seconds},
-                        {"cpu_seconds", cpu_seconds}};
+  result.metrics = JsonValue::Object{{"points", std::ssize(found.model.points)},
+                                     {"observations", found.observations},
+                                     {"median_px", found.median_px},
+                                     {"pairs", found.pairs},
+                                     {"colmap", found.colmap_version},
+                                     {"seconds", seconds},
+                                     {"cpu_seconds", cpu_seconds}};
   if (!Plausible(found)) {
     result.note = DoubtText(found);
     return result;

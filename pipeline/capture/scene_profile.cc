@@ -1,7 +1,6 @@
 #include "pipeline/capture/scene_profile.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <filesystem>
 
 #include "kernels/base/error.h"
@@ -27,9 +26,7 @@ EffectReport Row(const char* name, bool on, double value, double threshold,
 
 std::string Short(const Metric& metric) {
   if (!metric.value) return metric.why;
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g", *metric.value);
-  return text;
+  return Format("%.3g", *metric.value);
 }
 
 std::string AlphaPath(const CaptureView& view) {
@@ -67,8 +64,7 @@ double TransparentFraction(const std::vector<Silhouette>& silhouettes) {
   int64_t clear = 0, all = 0;
   for (const Silhouette& silhouette : silhouettes) {
     all += silhouette.alpha.num_pixels();
-    clear += std::count_if(silhouette.alpha.pixels.begin(), silhouette.alpha.pixels.end(),
-                           [](float a) { return a < 0.5f; });
+    clear += std::ranges::count_if(silhouette.alpha.pixels, [](float a) { return a < 0.5f; });
   }
   return all > 0 ? static_cast<double>(clear) / static_cast<double>(all) : 0;
 }
@@ -80,19 +76,17 @@ void NameUnknownPhotos(const Capture& capture, SceneProfile* profile) {
     if (!profile->exposure.photos[v].known)
       names += (names.empty() ? "" : ", ") + capture.views[v].file;
   if (!names.empty())
-    profile->notices.push_back("exposure: left unchanged, for fewer than " +
-                               std::to_string(kFewestColors) +
-                               " colours in common with other photos: " + names);
+    profile->notices.push_back(Concat("exposure: left unchanged, for fewer than ",
+                                      kFewestColors,
+                                      " colours in common with other photos: ", names));
 }
 
 std::string GainsEvidence(const ExposureEstimate& exposure) {
-  char spread[96];
-  std::snprintf(spread, sizeof spread, "; spread of the gains %.3g, standard error %.2g; ",
-                exposure.spread, exposure.median_error);
   return "fraction of the photos' colour differences at held-out points that the gains "
          "explain" +
-         std::string(spread) + "a spread up to " + Short(Metric{kExposureSpread}) +
-         " is not corrected";
+         Format("; spread of the gains %.3g, standard error %.2g; ", exposure.spread,
+                exposure.median_error) +
+         "a spread up to " + Short(Metric{kExposureSpread}) + " is not corrected";
 }
 
 // The row "exposure", and the gains if it is on.
@@ -101,7 +95,7 @@ void ProfileExposure(const Capture& capture, const std::map<std::string, bool>& 
   const auto override = overrides.find("exposure");
   const bool requested = override != overrides.end() && override->second;
   const auto leave_out = [&](const char* why) {
-    if (requested) throw Error(ExitCode::kScene, why, "--effects exposure=on");
+    if (requested) throw SceneError(why, "--effects exposure=on");
     profile->effects.push_back({"exposure", false, why, Metric(), kExposureSpread});
   };
   if (override != overrides.end() && !requested) return leave_out("off by --effects");
@@ -136,12 +130,12 @@ std::map<std::string, bool> ParseEffects(const std::string& text) {
     const size_t equals = word.find('=');
     const std::string name = word.substr(0, equals);
     const std::string value = equals == std::string::npos ? "" : word.substr(equals + 1);
-    const bool known =
-        std::find(std::begin(kNames), std::end(kNames), name) != std::end(kNames);
+    const bool known = std::ranges::find(kNames, name) != std::end(kNames);
     if (!known || (value != "on" && value != "off"))
-      throw Error(ExitCode::kUsage, "'" + word + "' is not allowed", "--effects",
-                  "auto, or on|off of ndc, alpha, background, exposure, view-dependence and "
-                  "pose-refinement: ndc=on,exposure=off");
+      throw UsageError(
+          "'" + word + "' is not allowed", "--effects",
+          "auto, or on|off of ndc, alpha, background, exposure, view-dependence and "
+          "pose-refinement: ndc=on,exposure=off");
     overrides[name] = value == "on";
   }
   return overrides;
@@ -176,8 +170,7 @@ SceneProfile ProfileScene(const Capture& capture, int sh_degree, const std::stri
   const bool background =
       decided("background", surroundings.far_fraction > kFarFraction && !ndc && !alpha);
   if (background && (ndc || alpha))
-    throw Error(
-        ExitCode::kUsage,
+    throw UsageError(
         std::string("background spheres cannot be combined with ") + (ndc ? "ndc" : "alpha"),
         "--effects background=on", ndc ? "add ndc=off" : "add alpha=off");
   profile.effects.push_back(

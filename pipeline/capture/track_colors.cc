@@ -57,7 +57,7 @@ TrackColors ReadTrackColors(const Capture& capture) {
   std::vector<std::vector<int32_t>> points_of_view(capture.views.size());
   for (size_t p = 0; p < capture.points.size(); ++p)
     for (const int32_t v : capture.points[p].views)
-      points_of_view[static_cast<size_t>(v)].push_back(static_cast<int32_t>(p));
+      points_of_view[v].push_back(static_cast<int32_t>(p));
   std::vector<Vec3d> positions;
   for (const ScenePoint& point : capture.points) positions.push_back(point.position);
   const std::vector<int> folds = SpatialFolds(positions, kFoldLevels);
@@ -65,13 +65,12 @@ TrackColors ReadTrackColors(const Capture& capture) {
   for (size_t v = 0; v < capture.views.size(); ++v) {
     const CaptureView& view = capture.views[v];
     const Image photo = ReadImage(view.path);
-    if (photo.channels != 3) throw Error(ExitCode::kInput, "not an RGB picture", view.path);
+    if (photo.channels != 3) throw InputError("not an RGB picture", view.path);
     colors.clipped.push_back(ClippedFraction(photo));
     for (const int32_t p : points_of_view[v]) {
       double x = 0, y = 0;
-      ColorObservation observation{
-          static_cast<int32_t>(v), p, {}, folds[static_cast<size_t>(p)]};
-      if (view.camera.Project(capture.points[static_cast<size_t>(p)].position, &x, &y) &&
+      ColorObservation observation{static_cast<int32_t>(v), p, {}, folds[p]};
+      if (view.camera.Project(capture.points[p].position, &x, &y) &&
           WindowLight(photo, x, y, &observation.light))
         colors.observations.push_back(observation);
     }

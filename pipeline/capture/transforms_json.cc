@@ -19,8 +19,7 @@ constexpr double kRigidTolerance = 1e-2;  // of R^T R against 1: files round to 
 
 [[noreturn]] void Refuse(const std::string& path, const JsonValue& at,
                          const std::string& what) {
-  throw Error(ExitCode::kInput, what,
-              path + ":" + std::to_string(at.line()) + ":" + std::to_string(at.column()));
+  throw InputError(what, Concat(path, ":", at.line(), ":", at.column()));
 }
 
 // Intrinsics of one frame: its own members first, then those at the top of the file.
@@ -191,8 +190,8 @@ JsonValue::Object Intrinsics(const std::string& path, const Camera& camera) {
   object.emplace_back("p1", k[2]);
   object.emplace_back("p2", k[3]);
   if (k[5] != 0 || k[6] != 0 || k[7] != 0)
-    throw Error(ExitCode::kInput, "transforms.json cannot hold a lens with k4, k5 or k6", path,
-                "undistort the pictures first");
+    throw InputError("transforms.json cannot hold a lens with k4, k5 or k6", path,
+                     "undistort the pictures first");
   if (k[4] != 0) object.emplace_back("k3", k[4]);
   return object;
 }
@@ -222,11 +221,10 @@ TransformsFile ReadTransformsJson(const std::string& path, const PictureSizeFunc
         {file, ReadCamera(path, top, frame, (folder / file).string(), size_of)});
   }
   if (result.frames.empty())
-    throw Error(ExitCode::kInput,
-                "none of the " + std::to_string(result.missing.size()) +
-                    " listed pictures is there" +
-                    (result.missing.empty() ? "" : ", e.g. \"" + result.missing[0] + "\""),
-                path, "file paths are relative to the folder of transforms.json");
+    throw InputError(
+        Concat("none of the ", result.missing.size(), " listed pictures is there",
+               (result.missing.empty() ? "" : ", e.g. \"" + result.missing[0] + "\"")),
+        path, "file paths are relative to the folder of transforms.json");
   return result;
 }
 

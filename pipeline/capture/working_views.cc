@@ -90,12 +90,10 @@ Image WorkingViews::Photo(int i) const {
   const CaptureView& view = View(i);
   Image photo = ReadImage(view.path);
   if (photo.width != view.camera.width || photo.height != view.camera.height)
-    throw Error(ExitCode::kInput,
-                std::to_string(photo.width) + " x " + std::to_string(photo.height) +
-                    " pixels, but its camera has " + std::to_string(view.camera.width) + " x " +
-                    std::to_string(view.camera.height),
-                view.path, "the staged photo was changed: use --restart-from pose");
-  if (photo.channels != 3) throw Error(ExitCode::kInput, "not an RGB picture", view.path);
+    throw InputError(Concat(photo.width, " x ", photo.height, " pixels, but its camera has ",
+                            view.camera.width, " x ", view.camera.height),
+                     view.path, "the staged photo was changed: use --restart-from pose");
+  if (photo.channels != 3) throw InputError("not an RGB picture", view.path);
   photo = AtWorkingSize(std::move(photo), photo_size_);
   UndoGain(gains_.Of(i), &photo);
   return photo;
@@ -140,10 +138,10 @@ void FillMasked(const Image& kept, const Image& render, Image* photo) {
 }
 
 std::string ComparisonNote(const Camera& common) {
-  return "the photos differ in size or lens: neighbouring views are compared on frames of one "
-         "camera (" +
-         std::to_string(common.width) + "x" + std::to_string(common.height) +
-         " px) at each photo's place";
+  return Concat(
+      "the photos differ in size or lens: neighbouring views are compared on frames of one "
+      "camera (",
+      common.width, "x", common.height, " px) at each photo's place");
 }
 
 Image DepthAlongRays(const Camera& camera, Image depth) {

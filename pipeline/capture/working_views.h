@@ -34,7 +34,7 @@ class WorkingViews {
   WorkingViews AtSize(int photo_size) const;
 
   const Capture& capture() const { return *capture_; }
-  const CaptureView& View(int i) const { return capture_->views[static_cast<size_t>(i)]; }
+  const CaptureView& View(int i) const { return capture_->views[i]; }
   int count() const { return static_cast<int>(capture_->views.size()); }
   int photo_size() const { return photo_size_; }
   PhotoGain Gain(int i) const { return gains_.Of(i); }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <filesystem>
 #include <latch>
 #include <string>
 #include <system_error>
@@ -43,18 +44,17 @@ void StartThreads() {
 }  // namespace
 
 bool AsksForHelp(const Arguments& arguments) {
-  const auto flags_end = std::find(arguments.begin(), arguments.end(), "--");
+  const auto flags_end = std::ranges::find(arguments, "--");
   return std::any_of(arguments.begin(), flags_end,
                      [](const std::string& word) { return word == "--help" || word == "-h"; });
 }
 
 void CheckWords(const Command& command, const Arguments& words, size_t least, size_t most) {
   if (words.size() >= least && words.size() <= most) return;
-  throw Error(ExitCode::kUsage,
-              words.size() < least ? "an argument is missing"
-                                   : "one argument too many: '" + words[most] + "'",
-              std::string("regrade ") + command.name,
-              std::string("usage: regrade ") + command.name + " " + command.usage);
+  throw UsageError(words.size() < least ? "an argument is missing"
+                                        : "one argument too many: '" + words[most] + "'",
+                   std::string("regrade ") + command.name,
+                   std::string("usage: regrade ") + command.name + " " + command.usage);
 }
 
 std::optional<Prepared> Prepare(const Command& command, const Arguments& arguments,
@@ -77,8 +77,8 @@ std::optional<Prepared> Prepare(const Command& command, const Arguments& argumen
     check_words();
     const std::string& folder = prepared.words[0];
     if (!Workspace::Exists(folder))
-      throw Error(ExitCode::kInput, "no run has worked in this folder", folder,
-                  "make one with `regrade run` or `regrade reconstruct`");
+      throw InputError("no run has worked in this folder", folder,
+                       "make one with `regrade run` or `regrade reconstruct`");
     sources.run_json = folder + "/run.json";
   }
   prepared.run_words = ResolveSettings(sources, options);
@@ -88,6 +88,19 @@ std::optional<Prepared> Prepare(const Command& command, const Arguments& argumen
   if (threads > 0) omp_set_num_threads(threads);
   StartThreads();
   return prepared;
+}
+
+void RequireValue(const std::string& value, const char* flag, const char* hint) {
+  if (value.empty()) throw UsageError("its value is missing", flag, hint);
+}
+
+std::string AbsolutePath(const std::string& path) {
+  std::error_code error;
+  const auto absolute = std::filesystem::absolute(path, error);
+  if (error)
+    throw ResourceError("the current folder does not exist: " + error.message(), path,
+                        "start in an existing folder");
+  return absolute.lexically_normal().string();
 }
 
 }  // namespace regrade

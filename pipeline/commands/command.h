@@ -50,6 +50,12 @@ bool AsksForHelp(const Arguments& arguments);
 // Throws Error(kUsage) unless there are between `least` and `most` words.
 void CheckWords(const Command& command, const Arguments& words, size_t least, size_t most);
 
+// Throws Error(kUsage) for an empty value of a flag that must have one.
+void RequireValue(const std::string& value, const char* flag, const char* hint);
+
+// Without links resolved. Throws Error(kResources) if the current folder does not exist.
+std::string AbsolutePath(const std::string& path);
+
 void RunStages(const Command&, const Arguments&, Console*);  // run, pose, reconstruct
 void RunFolder(const Command&, const Arguments&, Console*);  // stylize, render
 void RunEvaluate(const Command&, const Arguments&, Console*);

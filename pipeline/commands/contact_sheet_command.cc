@@ -1,7 +1,6 @@
 // regrade contact-sheet: one picture that compares 2D method, linear map and both recipes.
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -85,11 +84,9 @@ std::string PsnrCaption(const Image& a, const Image& b, bool of_photos) {
     const double d = a.pixels[i] - b.pixels[i];
     if (std::isfinite(d)) sum += d * d, ++count;
   }
-  char text[64];
   const double mse = sum / static_cast<double>(std::max<int64_t>(1, count));
-  std::snprintf(text, sizeof text, "%.1f dB to 2D%s", -10 * std::log10(std::max(mse, 1e-12)),
+  return Format("%.1f dB to 2D%s", -10 * std::log10(std::max(mse, 1e-12)),
                 of_photos ? " of photo" : "");
-  return text;
 }
 
 // Everything about the scene that all styles share.
@@ -137,9 +134,8 @@ std::vector<Image> Shown(const Scene& scene, const RadianceField& field) {
   const FastGrid grid = MakeFastGrid(field);
   std::vector<Image> frames;
   for (const int i : scene.shown)
-    frames.push_back(Clipped(
-        RenderView(grid, scene.cameras[static_cast<size_t>(i)], MarchOptions{field.step})
-            .color));
+    frames.push_back(
+        Clipped(RenderView(grid, scene.cameras[i], MarchOptions{field.step}).color));
   return frames;
 }
 
@@ -209,7 +205,7 @@ std::vector<Image> StyleRenders(RunContext* context, const Scene& scene,
   std::vector<Image> styled = Shown(scene, scene.stored.field);
   for (size_t k = 0; k < styled.size(); ++k) {
     const int view = scene.shown[k];
-    if (object) coverage = object->Render(scene.cameras[static_cast<size_t>(view)]);
+    if (object) coverage = object->Render(scene.cameras[view]);
     ViewStylizer* const stylizer = of_renders ? of_renders.get() : of_photos;
     styled[k] = Clipped(stylizer->Stylize(styled[k], view));
   }
@@ -230,11 +226,10 @@ void AddStyle(RunContext* context, const Scene& scene, const SheetOptions& sheet
   const StyledPhotos styled = StylePhotos(scene, stylizer.get(), name);
   const TrainingTargets& targets = styled.targets.targets();
   if (targets.empty())
-    throw Error(ExitCode::kInput,
-                scene.object != nullptr
-                    ? "the masks and the 2D method agree on no part of the photos"
-                    : "the 2D method has a picture of none of the photos",
-                picture);
+    throw InputError(scene.object != nullptr
+                         ? "the masks and the 2D method agree on no part of the photos"
+                         : "the 2D method has a picture of none of the photos",
+                     picture);
 
   ProgressParts parts(progress, 2);
   const uint64_t seed = settings.run.seed;
@@ -247,12 +242,11 @@ void AddStyle(RunContext* context, const Scene& scene, const SheetOptions& sheet
                                         Shown(scene, standard.styled)};
   const std::vector<Image> renders_2d = StyleRenders(context, scene, stylizer.get());
   const bool of_photos = renders_2d.empty();
-  char title[160];
-  std::snprintf(title, sizeof title,
-                "%s, %s: K_est %.2f, bounds %.2f (standard, %d steps), %.2f (paper, %d steps)",
-                name.c_str(), stylizer->Name().c_str(), standard.trained.k_est,
-                standard.trained.bound, static_cast<int>(standard.trained.steps),
-                paper.trained.bound, static_cast<int>(paper.trained.steps));
+  const std::string title =
+      Format("%s, %s: K_est %.2f, bounds %.2f (standard, %d steps), %.2f (paper, %d steps)",
+             name.c_str(), stylizer->Name().c_str(), standard.trained.k_est,
+             standard.trained.bound, static_cast<int>(standard.trained.steps),
+             paper.trained.bound, static_cast<int>(paper.trained.steps));
   for (size_t k = 0; k < scene.shown.size(); ++k) {
     const size_t n = static_cast<size_t>(scene.shown[k]);
     SheetRow row;
@@ -291,11 +285,9 @@ void RunContactSheet(const Command& command, const Arguments& arguments, Console
   const Arguments& words = prepared->words;
   const std::string& folder = words[0];
   if (!fs::exists(folder + "/field.npz"))
-    throw Error(ExitCode::kInput, "holds no reconstruction", folder,
-                "make one with `regrade run` or `regrade reconstruct`");
-  if (sheet.out.empty() && !sheet.dry_run)
-    throw Error(ExitCode::kUsage, "its value is missing", "--out",
-                "name the PNG file to write");
+    throw InputError("holds no reconstruction", folder,
+                     "make one with `regrade run` or `regrade reconstruct`");
+  if (!sheet.dry_run) RequireValue(sheet.out, "--out", "name the PNG file to write");
   for (size_t i = 1; i < words.size(); ++i) ReadStylePicture(words[i], nullptr);
   ProbeMethod(&settings.style_2d);
   ProbeMasks(&settings.object);
@@ -306,18 +298,16 @@ void RunContactSheet(const Command& command, const Arguments& arguments, Console
   const Backend backend = ChooseBackend(sheet.device, false);  // before work begins
   Scene scene = ReadScene(workspace, sheet, settings);
   scene.backend = backend;
-  const std::string plan = std::to_string(words.size() - 1) + " styles, " +
-                           std::to_string(scene.shown.size()) + " views each, trained on " +
-                           std::to_string(scene.training_views.size()) + " photos at " +
-                           std::to_string(sheet.size) + " pixels";
+  const std::string plan =
+      Concat(words.size() - 1, " styles, ", scene.shown.size(), " views each, trained on ",
+             scene.training_views.size(), " photos at ", sheet.size, " pixels");
   console->Info(plan);
   if (sheet.dry_run) return;
   std::vector<SheetRow> rows;
   for (size_t i = 1; i < words.size(); ++i) AddStyle(&context, scene, sheet, words[i], &rows);
   const Image picture = MakeContactSheet(kColumns, rows);
   WritePng8(sheet.out, picture);
-  console->Info("wrote " + sheet.out + ", " + std::to_string(picture.width) + "x" +
-                std::to_string(picture.height));
+  console->Info(Concat("wrote ", sheet.out, ", ", picture.width, "x", picture.height));
 }
 
 }  // namespace regrade

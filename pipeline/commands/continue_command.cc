@@ -20,11 +20,9 @@ void ContinueRun(const Command& command, const Arguments& arguments, const std::
   const std::string& folder = prepared->words[0];
   RunSettings& settings = context.settings;
   if (!prepared->run_words.empty()) context.source = prepared->run_words[0];
-  settings.run.out = std::filesystem::absolute(folder).lexically_normal().string();
-  if (settings.style.picture.empty())
-    throw Error(ExitCode::kUsage, "its value is missing", "--style", "name the style picture");
-  settings.style.picture =
-      std::filesystem::absolute(settings.style.picture).lexically_normal().string();
+  settings.run.out = AbsolutePath(folder);
+  RequireValue(settings.style.picture, "--style", "name the style picture");
+  settings.style.picture = AbsolutePath(settings.style.picture);
   ReadStylePicture(settings.style.picture, nullptr);
   ProbeMethod(&settings.style_2d);
   ProbeMasks(&settings.object);

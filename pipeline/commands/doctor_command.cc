@@ -41,11 +41,11 @@ Finding FindColmap(const std::string& program) {
 Finding FindDevice() {
   const DeviceStatus status = ReadDeviceStatus();
   if (!status.found) return {"GPU", status.name, "everything runs on the CPU"};
-  char text[160];
-  std::snprintf(text, sizeof text, "%s, sm_%d, %.1f GB free of %.1f GB", status.name.c_str(),
-                status.compute_capability, static_cast<double>(status.free_bytes) / (1u << 30),
-                static_cast<double>(status.total_bytes) / (1u << 30));
-  return {"GPU", text, "runs fits, restyling and frames; the CPU runs the rest"};
+  return {"GPU",
+          Format("%s, sm_%d, %.1f GB free of %.1f GB", status.name.c_str(),
+                 status.compute_capability, static_cast<double>(status.free_bytes) / (1u << 30),
+                 static_cast<double>(status.total_bytes) / (1u << 30)),
+          "runs fits, restyling and frames; the CPU runs the rest"};
 }
 
 }  // namespace
@@ -57,9 +57,7 @@ void RunDoctor(const Command& command, const Arguments& arguments, Console* cons
   if (!Prepare(command, arguments, {.least_words = 0, .most_words = 0}, &options)) return;
 
   const auto gigabytes = [](uint64_t bytes) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.1f GB", static_cast<double>(bytes) / (1u << 30));
-    return std::string(text);
+    return Format("%.1f GB", static_cast<double>(bytes) / (1u << 30));
   };
   const MemoryStatus memory = ReadMemoryStatus();
   const std::string scratch = std::filesystem::temp_directory_path().string();
@@ -67,8 +65,7 @@ void RunDoctor(const Command& command, const Arguments& arguments, Console* cons
       {"regrade", REGRADE_VERSION, ""},
       FindDevice(),
       {"threads",
-       std::to_string(omp_get_max_threads()) + " of " +
-           std::to_string(::sysconf(_SC_NPROCESSORS_ONLN)) + " cores",
+       Concat(omp_get_max_threads(), " of ", ::sysconf(_SC_NPROCESSORS_ONLN), " cores"),
        "set with --threads"},
       {"memory", gigabytes(memory.available) + " free of " + gigabytes(memory.total),
        "limit with --max-memory"},

@@ -58,8 +58,8 @@ void WriteEvaluation(const Workspace& workspace, const EvaluationMetrics& metric
 void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& options,
                     Console* console) {
   if (options.mode == "geometry")
-    throw Error(ExitCode::kUsage, "geometry is known only for runs of regrade", "--mode",
-                "use lai2018 or ruder2016 for frames of other programs");
+    throw UsageError("geometry is known only for runs of regrade", "--mode",
+                     "use lai2018 or ruder2016 for frames of other programs");
   ProbeEvaluationNetworks(options);
   const bool has_reference = !frames.reference.empty();
   if (!has_reference)
@@ -109,9 +109,7 @@ void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& optio
   std::vector<HeatMapFile> heat_maps;
   if (workspace) {
     BeginHeatMaps(*workspace);
-    heat_maps =
-        WriteHeatMaps(*workspace, EstimatedMotion(reference, options.mode, options.flow),
-                      sequences, options.gaps, consistency);
+    heat_maps = WriteHeatMaps(*workspace, sequences, consistency);
   }
   const EvaluationMetrics metrics = MetricsOf(consistency, fidelity, heat_maps);
   if (workspace) WriteEvaluation(*workspace, metrics, seconds);
@@ -130,8 +128,8 @@ void RunEvaluate(const Command& command, const Arguments& arguments, Console* co
   options.Add("Evaluation", &consistency);
   options.Add("Program", &program);
   // Without --frames it evaluates the folder of a run, with all of a run's options.
-  const bool has_frames = std::any_of(arguments.begin(), arguments.end(), [](const auto& word) {
-    return word == "--frames" || word.compare(0, 9, "--frames=") == 0;
+  const bool has_frames = std::ranges::any_of(arguments, [](const auto& word) {
+    return word == "--frames" || word.starts_with("--frames=");
   });
   if (!has_frames && !AsksForHelp(arguments))
     return ContinueRun(command, arguments, "evaluate", console);

@@ -48,10 +48,9 @@ struct ExportOptions {
 void MakeEmptyFolder(const fs::path& folder, const char* inside) {
   std::error_code error;
   if (fs::exists(folder, error) && !fs::is_empty(folder, error))
-    throw Error(ExitCode::kUsage, "is not empty", folder.string(),
-                "name a new folder with --out");
+    throw UsageError("is not empty", folder.string(), "name a new folder with --out");
   fs::create_directories(folder / inside, error);
-  if (error) throw Error(ExitCode::kResources, error.message(), folder.string());
+  if (error) throw ResourceError(error.message(), folder.string());
 }
 
 void WritePoses(const ExportOptions& options, const std::string& folder,
@@ -129,8 +128,8 @@ void ExportField(const ExportOptions& options, const std::string& folder, const 
 
 void ExportFields(const ExportOptions& options, const std::string& folder, Console* console) {
   if (!fs::exists(folder + "/field.npz"))
-    throw Error(ExitCode::kInput, "holds no reconstruction", folder,
-                "make one with `regrade run` or `regrade reconstruct`");
+    throw InputError("holds no reconstruction", folder,
+                     "make one with `regrade run` or `regrade reconstruct`");
   MakeEmptyFolder(options.out, "");
   for (const char* name : {"field.npz", "styled.npz"})
     if (fs::exists(folder + "/" + name)) ExportField(options, folder, name, console);
@@ -147,25 +146,22 @@ void RunExport(const Command& command, const Arguments& arguments, Console* cons
   const auto prepared = Prepare(command, arguments, {}, &options);
   if (!prepared) return;
   const std::string& folder = prepared->words[0];
-  if (settings.out.empty())
-    throw Error(ExitCode::kUsage, "its value is missing", "--out", "name the folder to write");
+  RequireValue(settings.out, "--out", "name the folder to write");
   if (settings.format == "svox2") return ExportFields(settings, folder, console);
-  if (settings.resolution != 0)
-    throw Error(ExitCode::kUsage, "is of --format svox2 only", "--resolution");
+  if (settings.resolution != 0) throw UsageError("is of --format svox2 only", "--resolution");
   if (!fs::exists(folder + "/poses/photos.json"))
-    throw Error(ExitCode::kInput, "has no poses", folder,
-                "run `regrade pose PHOTOS --out " + folder + "` first");
+    throw InputError("has no poses", folder,
+                     "run `regrade pose PHOTOS --out " + folder + "` first");
   const Capture capture = ReadCapture(folder + "/poses");
   MakeEmptyFolder(settings.out, "images");
   for (const CaptureView& view : capture.views) {
     std::error_code error;
     fs::copy_file(view.path, settings.out + "/images/" + view.name, error);
-    if (error)
-      throw Error(ExitCode::kResources, error.message(), settings.out + "/images/" + view.name);
+    if (error) throw ResourceError(error.message(), settings.out + "/images/" + view.name);
   }
   WritePoses(settings, folder, capture);
-  console->Info("wrote " + std::to_string(capture.views.size()) +
-                " photos and their poses to " + settings.out);
+  console->Info(
+      Concat("wrote ", capture.views.size(), " photos and their poses to ", settings.out));
 }
 
 }  // namespace regrade

@@ -59,18 +59,16 @@ void CheckNumbers(const FrameFolder& frames) {
     const NumberedName &last = numbers[i - 1], &next = numbers[i];
     const std::string both = frames.names[i - 1] + " and " + frames.names[i];
     if (next.number == last.number)
-      throw Error(ExitCode::kInput, both + " have the same number", frames.folder,
-                  "keep one of them");
+      throw InputError(both + " have the same number", frames.folder, "keep one of them");
     if (step > 0 && next.number != last.number + step)
-      throw Error(ExitCode::kInput,
-                  "frame " + Padded(last.number + step, last.digits.size()) +
-                      " is missing between " + both,
-                  frames.folder, "add it, or renumber the frames without a gap");
+      throw InputError("frame " + Padded(last.number + step, last.digits.size()) +
+                           " is missing between " + both,
+                       frames.folder, "add it, or renumber the frames without a gap");
   }
 }
 
 std::string SizeText(const Image& image) {
-  return std::to_string(image.width) + " x " + std::to_string(image.height) + " px";
+  return Concat(image.width, " x ", image.height, " px");
 }
 
 }  // namespace
@@ -85,25 +83,22 @@ FrameFolder OpenFrameFolder(const std::string& folder, const ProgressFunction& p
   frames.folder = folder;
   for (const ListedFile& file : ListFolder(folder).files) {
     if (!file.problem.empty())
-      throw Error(ExitCode::kInput, "a frame cannot be opened: " + file.problem,
-                  folder + "/" + file.name, "keep only the frames in this folder");
+      throw InputError("a frame cannot be opened: " + file.problem, folder + "/" + file.name,
+                       "keep only the frames in this folder");
     frames.paths.push_back(file.path);
     frames.names.push_back(file.name);
   }
-  if (frames.paths.empty()) throw Error(ExitCode::kInput, "there are no frames here", folder);
+  if (frames.paths.empty()) throw InputError("there are no frames here", folder);
   CheckNumbers(frames);
   std::optional<Image> first;
   for (size_t i = 0; i < frames.paths.size(); ++i) {
     Image image = ReadImage(frames.paths[i]);
     if (first && !image.SameSize(*first))
-      throw Error(ExitCode::kInput,
-                  "this frame is " + SizeText(image) + ", " + frames.names.front() + " is " +
-                      SizeText(*first),
-                  frames.paths[i], "render all frames at one size");
+      throw InputError("this frame is " + SizeText(image) + ", " + frames.names.front() +
+                           " is " + SizeText(*first),
+                       frames.paths[i], "render all frames at one size");
     if (!first) first = std::move(image);
-    if (Report(progress, static_cast<double>(i + 1),
-               static_cast<double>(frames.paths.size())) == LoopControl::kStop)
-      throw Interrupted();
+    ReportOrThrow(progress, i + 1, frames.paths.size());
   }
   return frames;
 }
@@ -120,10 +115,9 @@ void CheckSameFrames(const FrameFolder& reference, const FrameFolder& sequence) 
   for (size_t i = 0; i < all.size() && !known.empty() && missing.empty(); ++i)
     if (!known.count(all[i].number))
       missing = "; " + longer.names[i] + " of " + longer.folder + " has no counterpart";
-  throw Error(ExitCode::kInput,
-              std::to_string(sequence.paths.size()) + " frames, the reference has " +
-                  std::to_string(reference.paths.size()) + missing,
-              sequence.folder, "evaluate the same frames of each");
+  throw InputError(Concat(sequence.paths.size(), " frames, the reference has ",
+                          reference.paths.size(), missing),
+                   sequence.folder, "evaluate the same frames of each");
 }
 
 }  // namespace regrade

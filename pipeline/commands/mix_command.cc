@@ -61,11 +61,11 @@ std::string StyleFile(const std::string& word) {
 void MakeMixFolder(const fs::path& out) {
   std::error_code error;
   if (fs::exists(out, error) && !fs::is_empty(out, error) && !fs::exists(out / "mix.json"))
-    throw Error(ExitCode::kUsage, "is not empty", out.string(), "name a new folder with --out");
+    throw UsageError("is not empty", out.string(), "name a new folder with --out");
   fs::remove_all(out / "frames", error);
   for (const char* file : {"mixed.mp4", "mixed.npz"}) fs::remove(out / file, error);
   fs::create_directories(out / "frames", error);
-  if (error) throw Error(ExitCode::kResources, error.message(), out.string());
+  if (error) throw ResourceError(error.message(), out.string());
 }
 
 // On the path "views" frames have the sizes of their photos; a film has one size.
@@ -99,7 +99,7 @@ void WriteMix(const std::string& out, const RadianceField& source,
   std::unique_ptr<FieldRenderer> renderer;
   const int frames = static_cast<int>(cameras.film.size());
   for (int i = 0; i < frames; ++i) {
-    if (Report(progress, i, frames) == LoopControl::kStop) throw Interrupted();
+    ReportOrThrow(progress, i, frames);
     const std::vector<double> weights =
         keys.At(static_cast<double>(i) / std::max(1, frames - 1));
     if (!renderer || weights != rendered) {
@@ -108,8 +108,8 @@ void WriteMix(const std::string& out, const RadianceField& source,
           MixFields(source, styles, weights, object_weights), backend);
       rendered = weights;
     }
-    const Camera& of_frame = cameras.frames[static_cast<size_t>(i)];
-    const Camera& of_film = cameras.film[static_cast<size_t>(i)];
+    const Camera& of_frame = cameras.frames[i];
+    const Camera& of_film = cameras.film[i];
     const Image frame = renderer->Render(of_frame).color;
     WritePng8(out + "/frames/" + FrameName(i), frame);
     if (film)
@@ -141,25 +141,23 @@ void RunMix(const Command& command, const Arguments& arguments, Console* console
   const Arguments& words = prepared->words;
   const std::string& folder = words[0];
   const MixKeys keys = ParseMixKeys(settings.mix, static_cast<int>(words.size()));
-  if (settings.out.empty() && !settings.dry_run)
-    throw Error(ExitCode::kUsage, "its value is missing", "--out", "name the folder to write");
+  if (!settings.dry_run) RequireValue(settings.out, "--out", "name the folder to write");
   ChooseBackend(settings.device, false);
   for (const std::string& word : words)
     if (!fs::is_regular_file(StyleFile(word)))
-      throw Error(ExitCode::kInput, "there is no styled field", StyleFile(word),
-                  "make it with `regrade stylize`, and copy styled.npz before making the next "
-                  "style");
+      throw InputError(
+          "there is no styled field", StyleFile(word),
+          "make it with `regrade stylize`, and copy styled.npz before making the next "
+          "style");
 
   StoredField stored = ReadFieldFile(folder + "/field.npz");
   const Backend backend = ChooseBackend(settings.device, false);
   const MixCameras cameras = CamerasOf(folder, stored, scene, render);
   if (settings.dry_run) {
-    console->Info(std::to_string(cameras.film.size()) + " frames of " +
-                  std::to_string(cameras.film[0].width) + "x" +
-                  std::to_string(cameras.film[0].height) + " along " + render.path.path + ", " +
-                  std::to_string(keys.points.size()) +
-                  (keys.points.size() == 1 ? " point" : " points") + " of " +
-                  std::to_string(words.size()) + (words.size() == 1 ? " style" : " styles"));
+    console->Info(Concat(cameras.film.size(), " frames of ", cameras.film[0].width, "x",
+                         cameras.film[0].height, " along ", render.path.path, ", ",
+                         keys.points.size(), (keys.points.size() == 1 ? " point" : " points"),
+                         " of ", words.size(), (words.size() == 1 ? " style" : " styles")));
     return;
   }
   std::vector<StoredField> styles;
@@ -169,9 +167,10 @@ void RunMix(const Command& command, const Arguments& arguments, Console* console
     styles.push_back(ReadFieldFile(StyleFile(word)));
     RadianceField& field = styles.back().field;
     if (!SameGeometry(*field.geometry, *stored.field.geometry))
-      throw Error(ExitCode::kInput, "is a style of another reconstruction", StyleFile(word),
-                  "mixed styles must restyle the same field: make them with `regrade stylize " +
-                      folder + "`");
+      throw InputError(
+          "is a style of another reconstruction", StyleFile(word),
+          "mixed styles must restyle the same field: make them with `regrade stylize " +
+              folder + "`");
     field.geometry = stored.field.geometry;
     basis = std::max(basis, field.appearance.basis);
   }
@@ -185,8 +184,8 @@ void RunMix(const Command& command, const Arguments& arguments, Console* console
   if (settings.object) {
     const std::string file = folder + "/object.npz";
     if (!fs::exists(file))
-      throw Error(ExitCode::kInput, "there is no object", file,
-                  "make it with `regrade stylize " + folder + " --masks FOLDER`");
+      throw InputError("there is no object", file,
+                       "make it with `regrade stylize " + folder + " --masks FOLDER`");
     object = ReadObjectFile(file, stored.field.geometry->num_voxels());
   }
   const std::vector<float>* object_weights = object ? &object->all : nullptr;
@@ -202,7 +201,7 @@ void RunMix(const Command& command, const Arguments& arguments, Console* console
     mixed.field = MixFields(stored.field, fields, keys.points[0], object_weights);
     WriteFieldFile(settings.out + "/mixed.npz", mixed);
   }
-  console->Info("wrote " + std::to_string(cameras.film.size()) + " frames to " + settings.out);
+  console->Info(Concat("wrote ", cameras.film.size(), " frames to ", settings.out));
 }
 
 }  // namespace regrade

@@ -12,11 +12,12 @@ namespace {
 
 std::vector<double> ParsePoint(const std::string& text, int styles) {
   const auto refuse = [&](const std::string& why) {
-    throw Error(ExitCode::kUsage, "\"" + text + "\" " + why, "--mix",
-                styles == 1 ? "write weights of the style separated by colons, such as 0:1"
-                            : "write a weight for each of the " + std::to_string(styles) +
+    throw UsageError("\"" + text + "\" " + why, "--mix",
+                     styles == 1
+                         ? "write weights of the style separated by colons, such as 0:1"
+                         : Concat("write a weight for each of the ", styles,
                                   " styles separated by commas, and points separated by "
-                                  "colons, such as 1,0:0,1 for two");
+                                  "colons, such as 1,0:0,1 for two"));
   };
   std::vector<double> weights;
   double sum = 0;
@@ -30,8 +31,8 @@ std::vector<double> ParsePoint(const std::string& text, int styles) {
     sum += weight;
   }
   if (static_cast<int>(weights.size()) != styles)
-    refuse("has " + std::to_string(weights.size()) + " weights for " + std::to_string(styles) +
-           (styles == 1 ? " style" : " styles"));
+    refuse(Concat("has ", weights.size(), " weights for ", styles,
+                  (styles == 1 ? " style" : " styles")));
   if (sum > 1 + 1e-9) refuse("adds up to more than 1");
   return weights;
 }
@@ -50,8 +51,7 @@ std::vector<double> MixKeys::At(double time) const {
 }
 
 bool MixKeys::IsConstant() const {
-  return std::all_of(points.begin(), points.end(),
-                     [this](const auto& point) { return point == points[0]; });
+  return std::ranges::all_of(points, [this](const auto& point) { return point == points[0]; });
 }
 
 MixKeys ParseMixKeys(const std::string& text, int styles) {
@@ -60,7 +60,7 @@ MixKeys ParseMixKeys(const std::string& text, int styles) {
     keys.points.emplace_back(static_cast<size_t>(styles), 0.0);
     for (int i = 0; i < styles; ++i) {
       keys.points.emplace_back(static_cast<size_t>(styles), 0.0);
-      keys.points.back()[static_cast<size_t>(i)] = 1;
+      keys.points.back()[i] = 1;
     }
     return keys;
   }

@@ -42,19 +42,16 @@ void RunPack(const Command& command, const Arguments& arguments, Console* consol
   const auto prepared = Prepare(command, arguments, {}, &options);
   if (!prepared) return;
   const std::string& folder = prepared->words[0];
-  if (run.out.empty())
-    throw Error(ExitCode::kUsage, "its value is missing", "--out",
-                "name the .npz file to write");
+  RequireValue(run.out, "--out", "name the .npz file to write");
   if (!std::filesystem::exists(folder + "/poses/photos.json"))
-    throw Error(ExitCode::kInput, "has no poses", folder,
-                "run `regrade pose CAPTURE --out " + folder + "` first");
+    throw InputError("has no poses", folder,
+                     "run `regrade pose CAPTURE --out " + folder + "` first");
   const Capture capture = ReadCapture(folder + "/poses");
   const WorkingViews as_taken(capture, scene.photo_size, run.holdout);
   for (int i = 0; i < as_taken.count(); ++i)
     if (!as_taken.Mask(i).empty())
-      throw Error(ExitCode::kInput,
-                  "was posed with --photo-masks, which a packed capture cannot hold", folder,
-                  "pose it again without them");
+      throw InputError("was posed with --photo-masks, which a packed capture cannot hold",
+                       folder, "pose it again without them");
   const SceneProfile profile = ProfileScene(capture, 2, run.effects);
   for (const EffectReport& effect : profile.effects) console->Info(EffectLine(effect));
   for (const std::string& notice : profile.notices) console->Info(notice);
@@ -67,8 +64,8 @@ void RunPack(const Command& command, const Arguments& arguments, Console* consol
     packed.views.push_back({views.View(i).file, IsHeldOut(static_cast<size_t>(i), run.holdout),
                             views.CameraOf(i), views.Photo(i)});
   WritePackedCapture(run.out, packed);
-  console->Info("wrote " + run.out + ": " + std::to_string(packed.views.size()) + " views, " +
-                std::to_string(std::filesystem::file_size(run.out) >> 20) + " MiB");
+  console->Info(Concat("wrote ", run.out, ": ", packed.views.size(), " views, ",
+                       std::filesystem::file_size(run.out) >> 20, " MiB"));
 }
 
 }  // namespace regrade

@@ -5,7 +5,6 @@
 
 #include "kernels/base/error.h"
 #include "pipeline/capture/capture_store.h"
-#include "pipeline/capture/photo_masks.h"
 #include "pipeline/commands/command.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/program/device_choice.h"
@@ -15,6 +14,7 @@
 #include "pipeline/stages/make_stylizer.h"
 #include "pipeline/stages/network_probe.h"
 #include "pipeline/stages/stages.h"
+#include "pipeline/workspace/stage_record.h"
 
 namespace regrade {
 namespace {
@@ -22,22 +22,21 @@ namespace {
 // Checks all inputs before long work starts.
 void ProbeInputs(const std::string& last, RunContext* context) {
   if (!std::filesystem::exists(context->source))
-    throw Error(ExitCode::kInput, "there is no such folder", context->source,
-                "name a folder of photos");
+    throw InputError("there is no such folder", context->source, "name a folder of photos");
   const std::filesystem::path out =
       std::filesystem::weakly_canonical(context->settings.run.out);
   const bool posed = DetectCapture(context->source).kind == CaptureKind::kPosed;
   for (const std::filesystem::path& folder : {out, out / "poses"})
     if (posed && std::filesystem::weakly_canonical(context->source) == folder)
-      throw Error(ExitCode::kUsage, "is the capture itself, and would be overwritten", "--out",
-                  "name another folder; to continue this one, give the photos it was made of");
+      throw UsageError(
+          "is the capture itself, and would be overwritten", "--out",
+          "name another folder; to continue this one, give the photos it was made of");
   if (std::string& masks = context->settings.pose.photo_masks; !masks.empty()) {
-    PhotoMaskFiles(masks);
-    masks = std::filesystem::absolute(masks).lexically_normal().string();
+    HashFolder(masks);
+    masks = AbsolutePath(masks);
   }
   if (last == "pose" || last == "reconstruct") return;
-  if (context->settings.style.picture.empty())
-    throw Error(ExitCode::kUsage, "its value is missing", "--style", "name the style picture");
+  RequireValue(context->settings.style.picture, "--style", "name the style picture");
   ReadStylePicture(context->settings.style.picture, nullptr);
   ProbeMethod(&context->settings.style_2d);
   ProbeMasks(&context->settings.object);
@@ -63,15 +62,6 @@ void PrintPlan(const std::string& last, RunContext* context) {
   context->console->Info("stylize: " + PlanText(PlanStyle(settings.network.steps, threads)));
 }
 
-std::string Absolute(const std::string& path) {
-  std::error_code error;
-  const auto absolute = std::filesystem::absolute(path, error);
-  if (error)
-    throw Error(ExitCode::kResources, "the current folder does not exist: " + error.message(),
-                path, "start in an existing folder");
-  return absolute.lexically_normal().string();
-}
-
 }  // namespace
 
 void RunStages(const Command& command, const Arguments& arguments, Console* console) {
@@ -83,14 +73,13 @@ void RunStages(const Command& command, const Arguments& arguments, Console* cons
   const auto prepared = Prepare(command, arguments, {}, &context.options);
   if (!prepared) return;
   RunSettings& settings = context.settings;
-  if (settings.run.out.empty())
-    throw Error(ExitCode::kUsage, "its value is missing", "--out", "name the output folder");
+  RequireValue(settings.run.out, "--out", "name the output folder");
   CheckTogether(settings);
   ChooseBackend(settings.run.device, settings.run.reproducible);
-  context.source = Absolute(prepared->words[0]);
+  context.source = AbsolutePath(prepared->words[0]);
   if (!settings.style.picture.empty())
-    settings.style.picture = Absolute(settings.style.picture);
-  settings.run.out = Absolute(settings.run.out);
+    settings.style.picture = AbsolutePath(settings.style.picture);
+  settings.run.out = AbsolutePath(settings.run.out);
   ProbeInputs(last, &context);
 
   if (settings.start.dry_run && !Workspace::Exists(settings.run.out)) {

@@ -3,9 +3,9 @@
 #include <omp.h>
 
 #include <algorithm>
-#include <chrono>
 #include <filesystem>
 
+#include "kernels/base/clock.h"
 #include "kernels/base/error.h"
 #include "kernels/base/hash.h"
 #include "kernels/field/cpu/rays.h"
@@ -77,12 +77,6 @@ std::vector<std::string> Words(const std::string& text) {
   return words;
 }
 
-using Clock = std::chrono::steady_clock;
-
-double SecondsSince(Clock::time_point begin) {
-  return std::chrono::duration<double>(Clock::now() - begin).count();
-}
-
 // A measurement to make.
 struct Job {
   const Variant* variant;
@@ -122,8 +116,7 @@ std::string BaseName(const RunSettings& settings, const OptionSet& options,
 }
 
 std::string Fingerprint(const RunContext& base, const Workspace& workspace) {
-  std::string all =
-      std::string(REGRADE_VERSION) + FastRays().name + std::to_string(omp_get_max_threads());
+  std::string all = Concat(REGRADE_VERSION, FastRays().name, omp_get_max_threads());
   for (const char* stage : {"pose", "reconstruct", "style_2d"})
     if (const auto record = workspace.Find(stage))
       all += HashText(HashOf(DumpJson(record->inputs, -1)));
@@ -171,8 +164,7 @@ void WriteResults(const RunContext& base, const TradeoffOptions& tradeoff,
 
 // Makes the missing measurements, one at a time, until the budget is spent.
 void MeasureAll(RunContext* base, const TradeoffOptions& tradeoff, const std::string& folder,
-                const std::vector<Variant>& variants, Clock::time_point begin,
-                MeasurementStore* store) {
+                const std::vector<Variant>& variants, double begin, MeasurementStore* store) {
   std::vector<Job> jobs = JobsOf(variants, tradeoff.repeats);
   std::erase_if(
       jobs, [&](const Job& job) { return store->Find(*job.variant, job.repeat) != nullptr; });
@@ -182,14 +174,14 @@ void MeasureAll(RunContext* base, const TradeoffOptions& tradeoff, const std::st
   for (size_t i = 0; i < jobs.size(); ++i) {
     double left = 0;
     for (size_t k = i; k < jobs.size(); ++k) left += estimate.Seconds(*jobs[k].variant);
-    if (i > 0 && tradeoff.budget > 0 && SecondsSince(begin) > 60 * tradeoff.budget) {
-      console->Warn("the budget is spent: " + std::to_string(jobs.size() - i) +
-                    " measurements remain, about " + DurationText(left) +
-                    "; the same command continues");
+    if (i > 0 && tradeoff.budget > 0 && ClockSeconds() - begin > 60 * tradeoff.budget) {
+      console->Warn(Concat("the budget is spent: ", jobs.size() - i,
+                           " measurements remain, about ", DurationText(left),
+                           "; the same command continues"));
       return;
     }
-    console->Info("[" + std::to_string(i + 1) + "/" + std::to_string(jobs.size()) + "] " +
-                  NameOf(*jobs[i].variant) + ", about " + DurationText(left) + " left");
+    console->Info(Concat("[", i + 1, "/", jobs.size(), "] ", NameOf(*jobs[i].variant),
+                         ", about ", DurationText(left), " left"));
     console->SetQuiet(true);
     Measurement m;
     try {
@@ -207,48 +199,40 @@ void MeasureAll(RunContext* base, const TradeoffOptions& tradeoff, const std::st
 
 // Refuses options that do not apply to measurements.
 void CheckOptions(const RunSettings& settings, const TradeoffOptions& tradeoff) {
-  if (settings.run.out.empty())
-    throw Error(ExitCode::kUsage, "its value is missing", "--out",
-                "name the folder for the results");
+  RequireValue(settings.run.out, "--out", "name the folder for the results");
   if (settings.object.On())
-    throw Error(ExitCode::kUsage, "costs are measured for whole scenes", "--masks", "omit it");
+    throw UsageError("costs are measured for whole scenes", "--masks", "omit it");
   if (settings.run.device == "cuda")
-    throw Error(ExitCode::kUsage, "costs are measured on the CPU only", "--device",
-                "use --device cpu");
+    throw UsageError("costs are measured on the CPU only", "--device", "use --device cpu");
   if (!settings.start.config.empty() || !settings.start.restart_from.empty())
-    throw Error(ExitCode::kUsage, "not supported by tradeoff", "--config and --restart-from",
-                "omit them; remove the folder to start over");
+    throw UsageError("not supported by tradeoff", "--config and --restart-from",
+                     "omit them; remove the folder to start over");
   for (const std::string& preset : Words(tradeoff.presets)) PresetOptions(preset);
 }
 
 void PrintPrediction(const TradeoffOptions& tradeoff, Console* console) {
-  if (tradeoff.costs.empty())
-    throw Error(ExitCode::kUsage, "its value is missing", "--costs",
-                "name a tradeoff.json from `regrade tradeoff`");
+  RequireValue(tradeoff.costs, "--costs", "name a tradeoff.json from `regrade tradeoff`");
   const std::vector<CostTerm> costs =
       CostsFromJson(ReadJsonFile(tradeoff.costs), tradeoff.costs);
   if (!Workspace::Exists(tradeoff.predict))
-    throw Error(ExitCode::kInput, "this is not the folder of a run", tradeoff.predict,
-                "make one with `regrade run`");
+    throw InputError("this is not the folder of a run", tradeoff.predict,
+                     "make one with `regrade run`");
   RunContext run;
   run.settings.Bind(&run.options);
   ResolveSettings({.run_json = tradeoff.predict + "/run.json"}, &run.options);
   Workspace workspace(tradeoff.predict);
   const Capture capture = ReadCapture(workspace.Path("poses"));
-  char line[160];
-  std::snprintf(line, sizeof line, "%-12s %12s %12s %7s %12s %12s %7s", "stage", "predicted s",
-                "took s", "ratio", "predicted", "CPU s", "ratio");
-  console->Lines(line);
+  console->Lines(Format("%-12s %12s %12s %7s %12s %12s %7s", "stage", "predicted s", "took s",
+                        "ratio", "predicted", "CPU s", "ratio"));
   JsonValue::Array rows;
   StageTime all{"all", 0, 0}, took{"all", 0, 0};
   const auto print = [&](const StageTime& predicted, const StageTime& measured) {
     const double wall = measured.seconds > 0 ? predicted.seconds / measured.seconds : 0,
                  cpu = measured.cpu_seconds > 0 ? predicted.cpu_seconds / measured.cpu_seconds
                                                 : 0;
-    std::snprintf(line, sizeof line, "%-12s %12.1f %12.1f %7.2f %12.1f %12.1f %7.2f",
-                  predicted.stage.c_str(), predicted.seconds, measured.seconds, wall,
-                  predicted.cpu_seconds, measured.cpu_seconds, cpu);
-    console->Lines(line);
+    console->Lines(Format("%-12s %12.1f %12.1f %7.2f %12.1f %12.1f %7.2f",
+                          predicted.stage.c_str(), predicted.seconds, measured.seconds, wall,
+                          predicted.cpu_seconds, measured.cpu_seconds, cpu));
     rows.push_back(JsonValue::Object{{"stage", predicted.stage},
                                      {"predicted_seconds", predicted.seconds},
                                      {"seconds", measured.seconds},
@@ -270,7 +254,7 @@ void PrintPrediction(const TradeoffOptions& tradeoff, Console* console) {
 }  // namespace
 
 void RunTradeoff(const Command& command, const Arguments& arguments, Console* console) {
-  const Clock::time_point begin = Clock::now();
+  const double begin = ClockSeconds();
   TradeoffOptions tradeoff;
   RunContext base;
   base.console = console;
@@ -291,11 +275,11 @@ void RunTradeoff(const Command& command, const Arguments& arguments, Console* co
   CheckWords(command, words, 1, 1);
   CheckOptions(settings, tradeoff);
   CheckTogether(settings);
-  base.source = fs::absolute(words[0]).lexically_normal().string();
+  base.source = AbsolutePath(words[0]);
   const CaptureSource source = DetectCapture(base.source);
   const bool style = !settings.style.picture.empty();
   if (style) {
-    settings.style.picture = fs::absolute(settings.style.picture).lexically_normal().string();
+    settings.style.picture = AbsolutePath(settings.style.picture);
     ReadStylePicture(settings.style.picture, nullptr);
     ProbeMethod(&settings.style_2d);
   }
@@ -311,13 +295,13 @@ void RunTradeoff(const Command& command, const Arguments& arguments, Console* co
       console->Info(NameOf(variant) + ", about " + DurationText(estimate.Seconds(variant)));
       all += estimate.Seconds(variant);
     }
-    console->Info(std::to_string(variants.size()) + " variants, " +
-                  std::to_string(tradeoff.repeats) + " times each: about " +
-                  DurationText(all * tradeoff.repeats) + ", and a run of the base");
+    console->Info(Concat(variants.size(), " variants, ", tradeoff.repeats,
+                         " times each: about ", DurationText(all * tradeoff.repeats),
+                         ", and a run of the base"));
     return;
   }
   settings.run.device = "cpu";
-  const std::string folder = fs::absolute(settings.run.out).lexically_normal().string();
+  const std::string folder = AbsolutePath(settings.run.out);
   settings.run.out = folder + "/base";
   Workspace workspace(settings.run.out, settings.start.break_lock);
   base.workspace = &workspace;

@@ -86,8 +86,7 @@ std::vector<Camera> SmoothPath(const std::vector<Camera>& cameras, int frames) {
   const double unit = MeanExtent(cameras, MeanCenter(cameras));
   std::vector<double> at(order.size(), 0.0);
   for (size_t i = 1; i < order.size(); ++i)
-    at[i] = at[i - 1] + Jump(cameras[static_cast<size_t>(order[i - 1])],
-                             cameras[static_cast<size_t>(order[i])], unit);
+    at[i] = at[i - 1] + Jump(cameras[order[i - 1]], cameras[order[i]], unit);
   const double length = at.back();
   const double width = std::max(1.5 * length / static_cast<double>(order.size()), 1e-9);
   const Camera film = CommonCamera(cameras);
@@ -97,7 +96,7 @@ std::vector<Camera> SmoothPath(const std::vector<Camera>& cameras, int frames) {
     Vec3d center{}, forward{}, up{};
     double total = 0;
     for (size_t i = 0; i < order.size(); ++i) {
-      const Camera& camera = cameras[static_cast<size_t>(order[i])];
+      const Camera& camera = cameras[order[i]];
       const double z = (at[i] - t) / width;
       const double weight = std::exp(-0.5 * z * z) + 1e-12;
       center += camera.Center() * weight;
@@ -165,8 +164,7 @@ double TourLength(const std::vector<Camera>& cameras, const std::vector<int>& or
                   double unit) {
   double length = 0;
   for (size_t i = 1; i < order.size(); ++i)
-    length += Jump(cameras[static_cast<size_t>(order[i - 1])],
-                   cameras[static_cast<size_t>(order[i])], unit);
+    length += Jump(cameras[order[i - 1]], cameras[order[i]], unit);
   return length;
 }
 
@@ -179,9 +177,7 @@ std::vector<int> SmoothOrder(const std::vector<Camera>& cameras) {
   constexpr size_t kMostToSort = 300;  // 2-opt is cubic at worst
   if (n < 4 || n > kMostToSort) return natural;
   const double unit = MeanExtent(cameras, MeanCenter(cameras));
-  const auto jump = [&](int a, int b) {
-    return Jump(cameras[static_cast<size_t>(a)], cameras[static_cast<size_t>(b)], unit);
-  };
+  const auto jump = [&](int a, int b) { return Jump(cameras[a], cameras[b], unit); };
   std::vector<int> tour = natural;
   for (bool better = true; better;) {
     better = false;
@@ -210,8 +206,8 @@ std::vector<Camera> MakeCameraPath(const std::vector<Camera>& cameras,
   if (options.path == "smooth") return SmoothPath(cameras, options.path_frames);
   if (options.path == "orbit") return OrbitPath(cameras, options.path_frames);
   if (options.path == "spiral") return SpiralPath(cameras, options.path_frames);
-  throw Error(ExitCode::kUsage, "'" + options.path + "' is not allowed", "--path",
-              "allowed: smooth, views, orbit, spiral");
+  throw UsageError("'" + options.path + "' is not allowed", "--path",
+                   "allowed: smooth, views, orbit, spiral");
 }
 
 }  // namespace regrade

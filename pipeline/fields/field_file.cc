@@ -51,7 +51,7 @@ Buffer<float> UnpackedColours(const NpzArray& array, int64_t first, int stored, 
 
 [[noreturn]] void Refuse(const std::string& path, const std::string& why,
                          const std::string& hint = "") {
-  throw Error(ExitCode::kInput, why, path, hint);
+  throw InputError(why, path, hint);
 }
 
 Vec3f ReadVec3(NpzReader* file, const std::string& name) {
@@ -76,7 +76,7 @@ void CheckReadable(NpzReader* file) {
 void AddSpheres(const RadianceField& field, std::vector<float>* texels, NpzWriter* file) {
   const SphereGeometry& spheres = field.geometry->spheres;
   if (!spheres.on()) return;
-  texels->resize(static_cast<size_t>(4 * spheres.num_texels()));
+  texels->resize(4 * spheres.num_texels());
   for (int64_t i = 0; i < spheres.num_texels(); ++i) {
     float* const texel = texels->data() + 4 * i;
     std::copy_n(field.appearance.sphere_color.data() + 3 * i, 3, texel);
@@ -96,8 +96,8 @@ void ReadSpheres(NpzReader* file, SphereGeometry* spheres, Buffer<float>* color)
     Refuse(
         file->path(),
         "a background of " + links.ShapeText() + " texels and " + data.ShapeText() + " values",
-        "the map is twice as wide as high, of at most " + std::to_string(kMaxSphereResolution) +
-            " and " + std::to_string(kMaxLayers) + " layers");
+        Concat("the map is twice as wide as high, of at most ", kMaxSphereResolution, " and ",
+               kMaxLayers, " layers"));
   spheres->layers = static_cast<int>(data.shape[1]);
   spheres->resolution = static_cast<int>(links.shape[1]);
   spheres->links.Resize(links.num_elements());
@@ -182,8 +182,8 @@ void ReadValues(NpzReader* file, Geometry* geometry, Appearance* appearance) {
       file->Has("regrade_basis") ? file->ReadScalar<int32_t>("regrade_basis") : stored;
   const int basis = appearance->basis;
   if ((basis != 1 && basis != 4 && basis != 9) || basis > stored)
-    Refuse(file->path(), "regrade_basis is " + std::to_string(basis) + " of " +
-                             std::to_string(stored) + " stored harmonics");
+    Refuse(file->path(),
+           Concat("regrade_basis is ", basis, " of ", stored, " stored harmonics"));
   appearance->sh = UnpackedColours(colours, first, stored, basis);
   geometry->density.Resize(colours.shape[0]);
   if (joined) {

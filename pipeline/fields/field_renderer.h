@@ -16,7 +16,8 @@ namespace regrade {
 // a colour is evaluated, see EQ(opacity-steps). Its errors and times are in COSTS.md.
 inline constexpr float kFastStop = 1e-3f, kFastOpacityStep = 1.0f / 128;
 inline constexpr char kFastRenderer[] =
-    "half precision, steps where opacity changes by 1/128; at least 55 dB from the exact frames";
+    "half precision, steps where opacity changes by 1/128; at least 55 dB from the exact "
+    "frames";
 
 class FieldRenderer {
  public:

@@ -18,12 +18,10 @@ constexpr uint64_t kBudget = uint64_t{1} << 20;  // the arrays are 110 KB
 constexpr double kBoundTolerance = 1e-9;
 
 [[noreturn]] void Refuse(const std::string& path, const std::string& why) {
-  throw Error(ExitCode::kInput, why, path, "run regrade stylize again");
+  throw InputError(why, path, "run regrade stylize again");
 }
 
-std::string Named(const char* array, int layer) {
-  return std::string(array) + "_" + std::to_string(layer);
-}
+std::string Named(const char* array, int layer) { return Concat(array, "_", layer); }
 
 // Calls visit(name, shape, data) for the arrays of each layer. `Network` is const for writing.
 template <typename Network, typename Visitor>
@@ -71,8 +69,8 @@ StoredNetwork ReadNetworkFile(const std::string& path) {
   NpzReader file(path, kBudget);
   RefuseNewerFormat(&file, kVersion);
   if (const int32_t version = file.ReadScalar<int32_t>("regrade_version"); version < kVersion)
-    Refuse(path, "format " + std::to_string(version) + ", older than " +
-                     std::to_string(kVersion) + ", the only one that is read");
+    Refuse(path, Concat("format ", version, ", older than ", kVersion,
+                        ", the only one that is read"));
   LipschitzNetwork network;
   VisitLayers(&network, [&file](const std::string& name, const std::vector<int64_t>& shape,
                                 float* values) {

@@ -18,13 +18,11 @@ constexpr size_t kPending = 1 << 20;  // bytes
 
 [[noreturn]] void ThrowWriteError(const std::string& path, const char* step, uint64_t bytes) {
   const int error = errno;
-  throw Error(ExitCode::kResources,
-              std::string("cannot ") + step + " (" + std::to_string(bytes) +
-                  " bytes): " + std::strerror(error),
-              path,
-              error == ENOSPC || error == EDQUOT || error == EFBIG
-                  ? "free some space or raise the limit, then run the same command again"
-                  : "check the folder's permissions, then run the same command again");
+  throw ResourceError(
+      Concat("cannot ", step, " (", bytes, " bytes): ", std::strerror(error)), path,
+      error == ENOSPC || error == EDQUOT || error == EFBIG
+          ? "free some space or raise the limit, then run the same command again"
+          : "check the folder's permissions, then run the same command again");
 }
 
 void SyncFolder(const std::string& folder) {
@@ -117,19 +115,20 @@ void RenameDurably(const std::string& from, const std::string& to) {
 void ThrowReadError(const std::string& path) {
   const int error = errno;
   if (error == EIO || error == ESTALE || error == ENODEV)
-    throw Error(ExitCode::kResources, std::string("cannot read: ") + std::strerror(error), path,
-                "is its drive still there? then run the same command again");
+    throw ResourceError(std::string("cannot read: ") + std::strerror(error), path,
+                        "is its drive still there? then run the same command again");
   if (error == EMFILE || error == ENFILE || error == ENOMEM)
-    throw Error(ExitCode::kResources, std::string("cannot read: ") + std::strerror(error), path,
-                "raise the limit (ulimit -n, ulimit -v), then run the same command again");
-  throw Error(ExitCode::kInput, std::strerror(error), path);
+    throw ResourceError(
+        std::string("cannot read: ") + std::strerror(error), path,
+        "raise the limit (ulimit -n, ulimit -v), then run the same command again");
+  throw InputError(std::strerror(error), path);
 }
 
 int OpenToRead(const std::string& path, uint64_t* size) {
   FileDescriptor fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
   struct stat status;
   if (fd.get() < 0 || ::fstat(fd.get(), &status) != 0) ThrowReadError(path);
-  if (!S_ISREG(status.st_mode)) throw Error(ExitCode::kInput, "not a regular file", path);
+  if (!S_ISREG(status.st_mode)) throw InputError("not a regular file", path);
   if (size != nullptr) *size = static_cast<uint64_t>(status.st_size);
   return fd.Release();
 }
@@ -138,18 +137,14 @@ std::string ReadWholeFile(const std::string& path, uint64_t max_bytes) {
   uint64_t size = 0;
   const FileDescriptor fd(OpenToRead(path, &size));
   if (size > max_bytes)
-    throw Error(
-        ExitCode::kInput,
-        std::to_string(size) + " bytes, more than the limit of " + std::to_string(max_bytes),
-        path);
+    throw InputError(Concat(size, " bytes, more than the limit of ", max_bytes), path);
   std::string bytes(size, '\0');
   size_t done = 0;
   while (done < bytes.size()) {
     const ssize_t n = ::read(fd.get(), bytes.data() + done, bytes.size() - done);
     if (n < 0 && errno == EINTR) continue;
     if (n < 0) ThrowReadError(path);
-    if (n == 0)
-      throw Error(ExitCode::kInput, "the file became shorter while it was read", path);
+    if (n == 0) throw InputError("the file became shorter while it was read", path);
     done += static_cast<size_t>(n);
   }
   return bytes;

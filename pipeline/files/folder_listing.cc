@@ -89,16 +89,14 @@ FolderListing ListFolder(const std::string& folder) {
   std::error_code error;
   const fs::path root = fs::canonical(folder, error);
   if (error)
-    throw Error(ExitCode::kInput, "no such folder: " + error.message(), folder,
-                "give the folder that holds the photos");
+    throw InputError("no such folder: " + error.message(), folder,
+                     "give the folder that holds the photos");
   if (!fs::is_directory(root, error))
-    throw Error(ExitCode::kInput, "this is a file, not a folder", folder,
-                "give the folder that holds the photos");
+    throw InputError("this is a file, not a folder", folder,
+                     "give the folder that holds the photos");
   FolderListing listing;
   ListInto(root, "", root, &listing);
-  std::sort(
-      listing.files.begin(), listing.files.end(),
-      [](const ListedFile& a, const ListedFile& b) { return NaturalLess(a.name, b.name); });
+  std::ranges::sort(listing.files, NaturalLess, &ListedFile::name);
   return listing;
 }
 

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "kernels/base/error.h"
 #include "pipeline/files/atomic_file.h"
 
 namespace regrade {
@@ -89,8 +90,7 @@ class Builder : public nlohmann::json_sax<nlohmann::json> {
 
   [[noreturn]] void Refuse(const std::string& why) const {
     throw Error(code_, why,
-                where_ + ":" + std::to_string(position_->line) + ":" +
-                    std::to_string(std::max(1, position_->column)));
+                Concat(where_, ":", position_->line, ":", std::max(1, position_->column)));
   }
   bool Put(JsonValue value) {
     if (value.line() == 0) value.SetPosition(position_->line, std::max(1, position_->column));
@@ -154,8 +154,8 @@ bool JsonValue::IsNumber() const {
 }
 
 void JsonValue::RefuseKind(const char* expected) const {
-  throw Error(ExitCode::kInput, std::string(expected) + " expected",
-              line_ > 0 ? "line " + std::to_string(line_) : "");
+  throw InputError(std::string(expected) + " expected",
+                   line_ > 0 ? "line " + std::to_string(line_) : "");
 }
 
 bool JsonValue::AsBool() const {
@@ -203,8 +203,8 @@ const JsonValue* JsonValue::Find(std::string_view key) const {
 
 const JsonValue& JsonValue::At(std::string_view key) const {
   if (const JsonValue* value = Find(key)) return *value;
-  throw Error(ExitCode::kInput, "\"" + std::string(key) + "\" is missing",
-              line_ > 0 ? "line " + std::to_string(line_) : "");
+  throw InputError("\"" + std::string(key) + "\" is missing",
+                   line_ > 0 ? "line " + std::to_string(line_) : "");
 }
 
 JsonValue& JsonValue::operator[](std::string_view key) {

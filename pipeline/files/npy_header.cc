@@ -30,7 +30,7 @@ class LiteralReader {
   LiteralReader(std::string_view text, const std::string& where) : text_(text), where_(where) {}
 
   [[noreturn]] void Refuse(const std::string& why) const {
-    throw Error(ExitCode::kInput, "array header: " + why, where_);
+    throw InputError("array header: " + why, where_);
   }
   void SkipSpace() {
     while (at_ < text_.size() && std::strchr(" \t\r\n", text_[at_]) != nullptr) ++at_;
@@ -42,9 +42,7 @@ class LiteralReader {
     return true;
   }
   void Expect(char c) {
-    if (!Accept(c))
-      Refuse(std::string("'") + c + "' expected at byte " + std::to_string(at_) +
-             " of the dictionary");
+    if (!Accept(c)) Refuse(Concat("'", c, "' expected at byte ", at_, " of the dictionary"));
   }
   std::string_view Quoted() {
     SkipSpace();
@@ -126,7 +124,7 @@ const char* NameOf(ArrayType type) {
 
 NpyHeader ParseNpyHeader(std::string_view bytes, const std::string& where) {
   const auto refuse = [&where](const std::string& why) {
-    throw Error(ExitCode::kInput, "array header: " + why, where);
+    throw InputError("array header: " + why, where);
   };
   if (bytes.size() < 10 || bytes.substr(0, kMagic.size()) != kMagic)
     refuse("this is not a NumPy array");

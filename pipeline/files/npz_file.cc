@@ -17,8 +17,8 @@ constexpr zip_int64_t kMaxMembers = 10000;
 constexpr uint64_t kMaxRatio = 1032;  // of deflate
 
 [[noreturn]] void RefuseArchive(const std::string& path, const std::string& why) {
-  throw Error(ExitCode::kInput, "zip archive: " + why, path,
-              "the file is damaged or malicious: make it again or get it from its source");
+  throw InputError("zip archive: " + why, path,
+                   "the file is damaged or malicious: make it again or get it from its source");
 }
 
 std::string OpenProblem(int code) {
@@ -44,8 +44,7 @@ std::vector<ZipMember> CheckedMembers(zip_t* zip, uint64_t file_bytes,
                                       const std::string& path) {
   const zip_int64_t count = zip_get_num_entries(zip, 0);
   if (count > kMaxMembers)
-    RefuseArchive(path,
-                  std::to_string(count) + " members, more than " + std::to_string(kMaxMembers));
+    RefuseArchive(path, Concat(count, " members, more than ", kMaxMembers));
   std::vector<ZipMember> members;
   uint64_t packed = 0;
   for (zip_uint64_t i = 0; i < static_cast<zip_uint64_t>(count); ++i) {
@@ -53,18 +52,18 @@ std::vector<ZipMember> CheckedMembers(zip_t* zip, uint64_t file_bytes,
     constexpr zip_uint64_t kNeeded = ZIP_STAT_NAME | ZIP_STAT_SIZE | ZIP_STAT_COMP_SIZE |
                                      ZIP_STAT_COMP_METHOD | ZIP_STAT_ENCRYPTION_METHOD;
     if (zip_stat_index(zip, i, 0, &status) != 0 || (status.valid & kNeeded) != kNeeded)
-      RefuseArchive(path, "member " + std::to_string(i) + " is not described");
+      RefuseArchive(path, Concat("member ", i, " is not described"));
     const std::string name = "'" + std::string(status.name) + "'";
     if (status.encryption_method != ZIP_EM_NONE) RefuseArchive(path, name + " is encrypted");
     const bool stored = status.comp_method == ZIP_CM_STORE;
     if (!stored && status.comp_method != ZIP_CM_DEFLATE)
-      RefuseArchive(path, name + " is packed by method " + std::to_string(status.comp_method) +
-                              "; 0 and 8 are supported");
+      RefuseArchive(path, Concat(name, " is packed by method ", status.comp_method,
+                                 "; 0 and 8 are supported"));
     if (stored && status.size != status.comp_size)
       RefuseArchive(path, name + " is stored, but its two sizes differ");
     if (status.size / kMaxRatio > status.comp_size)
-      RefuseArchive(path, name + " claims " + std::to_string(status.size) + " bytes out of " +
-                              std::to_string(status.comp_size) + ", more than deflate can do");
+      RefuseArchive(path, Concat(name, " claims ", status.size, " bytes out of ",
+                                 status.comp_size, ", more than deflate can do"));
     if (status.comp_size > file_bytes - packed)
       RefuseArchive(path, "its members share bytes: they claim more than the file has");
     packed += status.comp_size;
@@ -113,9 +112,8 @@ NpzReader::~NpzReader() = default;
 std::vector<std::string> NpzReader::names() const {
   std::vector<std::string> names;
   for (const ZipMember& member : archive_->members) {
-    const size_t stem = member.name.size() - std::min(member.name.size(), strlen(kSuffix));
-    if (member.name.compare(stem, std::string::npos, kSuffix) == 0)
-      names.push_back(member.name.substr(0, stem));
+    const std::string& name = member.name;
+    if (name.ends_with(kSuffix)) names.push_back(name.substr(0, name.size() - strlen(kSuffix)));
   }
   return names;
 }
@@ -125,26 +123,24 @@ bool NpzReader::Has(const std::string& name) const { return archive_->Find(name)
 NpzArray NpzReader::Read(const std::string& name) {
   const std::string where = path_ + ": array '" + name + "'";
   const ZipMember* member = archive_->Find(name);
-  if (member == nullptr) throw Error(ExitCode::kInput, "is missing", where);
+  if (member == nullptr) throw InputError("is missing", where);
   if (member->bytes > budget_)
-    throw Error(ExitCode::kInput,
-                std::to_string(member->bytes) + " bytes, more than the " +
-                    std::to_string(budget_) + " that may still be read",
-                where, "give more memory with --max-memory");
+    throw InputError(
+        Concat(member->bytes, " bytes, more than the ", budget_, " that may still be read"),
+        where, "give more memory with --max-memory");
   budget_ -= member->bytes;
 
   const std::unique_ptr<zip_file_t, decltype(&zip_fclose)> file(
       zip_fopen_index(archive_->zip, member->index, 0), &zip_fclose);
-  if (file == nullptr) throw Error(ExitCode::kInput, "cannot be unpacked", where);
+  if (file == nullptr) throw InputError("cannot be unpacked", where);
   uint64_t left = member->bytes;
   const auto read = [&](void* to, uint64_t size) {
     uint64_t done = 0;
     while (done < size) {
       const zip_int64_t n = zip_fread(file.get(), static_cast<char*>(to) + done, size - done);
       if (n <= 0)
-        throw Error(ExitCode::kInput,
-                    n < 0 ? "its checksum or packing is wrong" : "it ends too early", where,
-                    "the file is damaged: make it again");
+        throw InputError(n < 0 ? "its checksum or packing is wrong" : "it ends too early",
+                         where, "the file is damaged: make it again");
       done += static_cast<uint64_t>(n);
     }
     left -= size;
@@ -169,10 +165,9 @@ NpzArray NpzReader::Read(const std::string& name) {
   const uint64_t surplus =
       head.size() - header.data_offset;  // of headers shorter than the fixed part
   if (header.data_bytes != left + surplus)
-    throw Error(ExitCode::kInput,
-                "its shape asks for " + std::to_string(header.data_bytes) + " bytes, it has " +
-                    std::to_string(left + surplus),
-                where);
+    throw InputError(
+        Concat("its shape asks for ", header.data_bytes, " bytes, it has ", left + surplus),
+        where);
   NpzArray array{header.type, header.shape, {}};
   array.bytes.Resize(static_cast<int64_t>(header.data_bytes));
   if (surplus > 0) std::memcpy(array.bytes.data(), &head[header.data_offset], surplus);
@@ -180,8 +175,8 @@ NpzArray NpzReader::Read(const std::string& name) {
   // libzip compares the checksum at the end of the member.
   char beyond;
   if (zip_fread(file.get(), &beyond, 1) != 0)
-    throw Error(ExitCode::kInput, "its checksum or length is wrong", where,
-                "the file is damaged: make it again");
+    throw InputError("its checksum or length is wrong", where,
+                     "the file is damaged: make it again");
   return array;
 }
 
@@ -193,10 +188,9 @@ NpzArray NpzReader::Read(const std::string& name, ArrayType type,
     fits = shape[i] < 0 || shape[i] == array.shape[i];
   if (!fits) {
     NpzArray expected{type, shape, {}};
-    throw Error(ExitCode::kInput,
-                std::string(NameOf(array.type)) + array.ShapeText() + ", expected " +
-                    NameOf(type) + expected.ShapeText(),
-                path_ + ": array '" + name + "'");
+    throw InputError(std::string(NameOf(array.type)) + array.ShapeText() + ", expected " +
+                         NameOf(type) + expected.ShapeText(),
+                     path_ + ": array '" + name + "'");
   }
   return array;
 }
@@ -210,10 +204,9 @@ void RefuseNewerFormat(NpzReader* file, int32_t known) {
   if (!file->Has("regrade_version")) return;
   const int32_t version = file->ReadScalar<int32_t>("regrade_version");
   if (version > known)
-    throw Error(ExitCode::kInput,
-                "written in format " + std::to_string(version) + ", this program reads up to " +
-                    std::to_string(known),
-                file->path(), "update regrade; the file has not been touched");
+    throw InputError(
+        Concat("written in format ", version, ", this program reads up to ", known),
+        file->path(), "update regrade; the file has not been touched");
 }
 
 }  // namespace regrade

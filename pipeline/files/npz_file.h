@@ -64,8 +64,7 @@ class NpzWriter {
     AddCopy(name, ArrayTypeOf<T>::value, {}, &value, sizeof value);
   }
   void AddText(const std::string& name, const std::string& text) {
-    AddCopy(name, ArrayType::kU8, {static_cast<int64_t>(text.size())}, text.data(),
-            text.size());
+    AddCopy(name, ArrayType::kU8, {std::ssize(text)}, text.data(), text.size());
   }
 
   // Atomically (see AtomicFile); takes a few megabytes of memory, whatever the arrays' sizes.

@@ -18,7 +18,7 @@ constexpr uint64_t kPieceBytes = 4 << 20;                       // of a filled a
 constexpr uint64_t kHeaderBytes = 256;                          // of a member, roughly
 
 void RequireZip(bool ok, const char* step) {
-  if (!ok) throw Error(ExitCode::kResources, std::string("cannot ") + step + " an archive");
+  if (!ok) throw ResourceError(std::string("cannot ") + step + " an archive");
 }
 
 // State that libzip's callbacks share. Exceptions may not pass through libzip: the first one

@@ -4,7 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
+
+#include "kernels/base/error.h"
 
 namespace regrade {
 
@@ -30,9 +31,7 @@ std::string Printable(std::string_view text) {
       text.remove_prefix(c.bytes);
       continue;
     }
-    char escaped[8];
-    std::snprintf(escaped, sizeof escaped, "\\x%02x", static_cast<unsigned char>(text[0]));
-    result += escaped;
+    result += Format("\\x%02x", static_cast<unsigned char>(text[0]));
     text.remove_prefix(1);
   }
   return result;
@@ -40,14 +39,9 @@ std::string Printable(std::string_view text) {
 
 std::string DurationText(double seconds) {
   const long long whole = std::llround(std::min(seconds, 1e15));
-  char text[64];
-  if (whole >= 3600)
-    std::snprintf(text, sizeof text, "%lld h %02lld min", whole / 3600, whole / 60 % 60);
-  else if (whole >= 60)
-    std::snprintf(text, sizeof text, "%lld min %02lld s", whole / 60, whole % 60);
-  else
-    std::snprintf(text, sizeof text, "%lld s", whole);
-  return text;
+  if (whole >= 3600) return Format("%lld h %02lld min", whole / 3600, whole / 60 % 60);
+  if (whole >= 60) return Format("%lld min %02lld s", whole / 60, whole % 60);
+  return Format("%lld s", whole);
 }
 
 std::vector<std::string> Split(std::string_view text, char separator) {

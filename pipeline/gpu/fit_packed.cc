@@ -1,9 +1,8 @@
 // regrade_gpu fit: a packed capture becomes a field, measured on the views that were kept back.
-#include <chrono>
-#include <cmath>
 #include <numeric>
 
 #include "evaluate/image_quality.h"
+#include "kernels/base/clock.h"
 #include "kernels/field/packed_grid.h"
 #include "kernels/field/render.h"
 #include "kernels/image/detail_kept.h"
@@ -16,12 +15,6 @@
 
 namespace regrade {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double SecondsSince(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 double Mean(const std::vector<double>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0) /
@@ -57,19 +50,19 @@ HeldOut MeasureHeldOut(FitEngine* engine, const PackedCapture& capture,
 }  // namespace
 
 void FitPacked(const FitPackedOptions& settings, const FitOptions& options) {
-  const auto start = Clock::now();
+  const double start = ClockSeconds();
   const PackedCapture capture = ReadPackedCapture(settings.capture);
   std::vector<TrainingView> views;
   for (const PackedView& view : capture.views)
     if (!view.held_out) views.push_back({view.camera, &view.photo});
-  const double read_seconds = SecondsSince(start);
-  const auto fit_start = Clock::now();
+  const double read_seconds = ClockSeconds() - start;
+  const double fit_start = ClockSeconds();
   const Backend backend = settings.device == "cpu" ? Backend::kCpu : Backend::kCuda;
   FitHooks hooks;
   double last_note = 0;
   hooks.progress = [&](const Progress& progress) {
-    if (SecondsSince(fit_start) - last_note > 5) {
-      last_note = SecondsSince(fit_start);
+    if (ClockSeconds() - fit_start - last_note > 5) {
+      last_note = ClockSeconds() - fit_start;
       std::fprintf(stderr, "%3.0f %%  %.0f s  %s\n", 100 * progress.done / progress.total,
                    last_note, progress.note.c_str());
     }
@@ -79,13 +72,13 @@ void FitPacked(const FitPackedOptions& settings, const FitOptions& options) {
   JsonValue::Array stages;
   hooks.keep_field = !settings.field.empty();
   hooks.measure = [&](FitEngine* engine) {
-    const double seconds = SecondsSince(fit_start);
+    const double seconds = ClockSeconds() - fit_start;
     measured = MeasureHeldOut(engine, capture, {options.step});
     stages.push_back(
         JsonValue::Array{seconds, measured.psnr, measured.ssim, measured.detail_kept});
   };
   const FitResult fit = FitField(views, capture.scene.box, options, hooks, backend);
-  const double fit_seconds = SecondsSince(fit_start);
+  const double fit_seconds = ClockSeconds() - fit_start;
   JsonValue render;
   if (hooks.keep_field) {
     WriteFieldFile(settings.field,
@@ -106,7 +99,7 @@ void FitPacked(const FitPackedOptions& settings, const FitOptions& options) {
                         {"seconds_read", read_seconds},
                         {"seconds_fit", fit_seconds},
                         {"seconds_steps", fit.seconds},
-                        {"seconds_all", SecondsSince(start)},
+                        {"seconds_all", ClockSeconds() - start},
                         {"rays", fit.rays},
                         {"samples", fit.samples},
                         {"rejected_voxels", fit.rejected_voxels},

@@ -23,8 +23,7 @@ bool GpuSettings::Bind(const std::string& command, OptionSet* options) {
 void ReadFlags(const std::vector<std::string>& arguments, OptionSet* options) {
   const std::vector<std::string> words = options->Parse(arguments);
   if (!words.empty())
-    throw Error(ExitCode::kUsage, "unexpected argument", words[0],
-                "options begin with two dashes");
+    throw UsageError("unexpected argument", words[0], "options begin with two dashes");
   ResolveSettings({}, options);
 }
 

@@ -45,7 +45,7 @@ bool Run(const std::vector<std::string>& arguments) {
     std::printf("%s", kUsage);
     return command == "help" || command == "--help";
   }
-  if (std::find(rest.begin(), rest.end(), "--help") != rest.end()) {
+  if (std::ranges::find(rest, "--help") != rest.end()) {
     std::printf("%s\n%s", kUsage, options.Help().c_str());
     return true;
   }
@@ -70,7 +70,7 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "regrade_gpu: %s\n", error.what());
     return static_cast<int>(error.code());
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "regrade_gpu: a bug of ours: %s\n", error.what());
+    std::fprintf(stderr, "regrade_gpu: internal error: %s\n", error.what());
     return 1;
   }
 }

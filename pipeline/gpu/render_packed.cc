@@ -19,7 +19,7 @@ void WritePpm(const std::string& path, const Image& image) {
   file << "P6\n" << image.width << " " << image.height << "\n255\n";
   for (const float value : image.pixels)
     file.put(static_cast<char>(std::lround(255 * std::clamp(value, 0.0f, 1.0f))));
-  if (!file) throw Error(ExitCode::kResources, "cannot be written", path, "is the disk full?");
+  if (!file) throw ResourceError("cannot be written", path, "is the disk full?");
 }
 
 void RenderHeldOut(const DeviceGrid& grid, const PackedCapture& capture,
@@ -29,7 +29,7 @@ void RenderHeldOut(const DeviceGrid& grid, const PackedCapture& capture,
   int index = 0;
   for (const PackedView& view : capture.views)
     if (view.held_out)
-      WritePpm(folder + "/" + name + "_" + std::to_string(index++) + ".ppm",
+      WritePpm(Concat(folder, "/", name, "_", index++, ".ppm"),
                RenderViewOnDevice(grid, view.camera, march).color);
 }
 

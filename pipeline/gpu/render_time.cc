@@ -1,31 +1,14 @@
 // How long a view takes to render.
-#include <algorithm>
-#include <chrono>
 #include <vector>
 
 #include "evaluate/image_quality.h"
+#include "kernels/base/clock.h"
+#include "kernels/base/quantile.h"
 #include "kernels/field/cuda/device_rays.h"
 #include "kernels/image/detail_kept.h"
 #include "pipeline/gpu/gpu_commands.h"
 
 namespace regrade {
-namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double SecondsSince(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
-
-double Median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const size_t middle = values.size() / 2;
-  std::nth_element(values.begin(), values.begin() + static_cast<long>(middle), values.end());
-  return values[middle];
-}
-
-}  // namespace
-
 double RenderMilliseconds(const DeviceGrid& grid, const PackedCapture& capture,
                           const MarchOptions& march, float opacity_step, const HalfGrid* half) {
   std::vector<double> milliseconds;
@@ -37,12 +20,12 @@ double RenderMilliseconds(const DeviceGrid& grid, const PackedCapture& capture,
     DeviceBuffer<float> depth(n, "depths"), transmittance(n, "transmittances");
     for (int repeat = 0; repeat < 6; ++repeat) {
       DeviceWait("rendering");
-      const auto start = Clock::now();
+      const double start = ClockSeconds();
       RenderFrameOnDevice(grid, camera, march,
                           {color.data(), depth.data(), transmittance.data()}, opacity_step,
                           half);
       DeviceWait("rendering");
-      if (repeat > 0) milliseconds.push_back(1e3 * SecondsSince(start));
+      if (repeat > 0) milliseconds.push_back(1e3 * (ClockSeconds() - start));
     }
   }
   return Median(milliseconds);

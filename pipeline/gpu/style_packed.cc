@@ -1,9 +1,9 @@
 // regrade_gpu style: restyles a packed capture's field after its style picture.
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <utility>
 
+#include "kernels/base/clock.h"
 #include "kernels/base/error.h"
 #include "kernels/field/cuda/device_rays.h"
 #include "kernels/field/packed_grid.h"
@@ -17,20 +17,17 @@
 namespace regrade {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 // Seconds since the last call, or since it was made.
 class Stopwatch {
  public:
   double Lap() {
-    const auto now = Clock::now();
-    const double seconds = std::chrono::duration<double>(now - last_).count();
-    last_ = now;
-    return seconds;
+    const double begin = last_;
+    last_ = ClockSeconds();
+    return last_ - begin;
   }
 
  private:
-  Clock::time_point last_ = Clock::now();
+  double last_ = ClockSeconds();
 };
 
 // What MKL makes of the views that the field was fitted to.
@@ -52,8 +49,7 @@ void MeasureFrames(const RadianceField& field, const PackedCapture& capture,
   const MarchOptions march{field.step};
   const DeviceGrid grid = UploadGrid(MakeFastGrid(field));
   Stopwatch watch;
-  const auto first = std::find_if(capture.views.begin(), capture.views.end(),
-                                  [](const PackedView& view) { return view.held_out; });
+  const auto first = std::ranges::find_if(capture.views, &PackedView::held_out);
   if (first != capture.views.end()) RenderViewOnDevice(grid, first->camera, march);
   (*record)["seconds_first_frame"] = watch.Lap();
   (*record)["render"] = RenderCosts(grid, capture, march.step);
@@ -66,8 +62,8 @@ void StylePacked(const StylePackedOptions& settings, const TrainNetworkOptions& 
   Stopwatch watch;
   const PackedCapture capture = ReadPackedCapture(settings.capture);
   if (capture.style.num_pixels() == 0)
-    throw Error(ExitCode::kInput, "holds no style picture", settings.capture,
-                "pack it with --style PICTURE");
+    throw InputError("holds no style picture", settings.capture,
+                     "pack it with --style PICTURE");
   StoredField stored = ReadFieldFile(settings.field);
   const int64_t voxels = stored.field.geometry->num_voxels();
   JsonValue record = JsonValue::Object{{"capture", settings.capture}};

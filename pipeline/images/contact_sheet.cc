@@ -41,7 +41,7 @@ Image MakeContactSheet(const std::vector<std::string>& columns,
     height += HeadHeight(row) + HeightOf(row);
   }
   Image sheet(kGap + static_cast<int>(columns.size()) * (cell + kGap), height);
-  std::fill(sheet.pixels.begin(), sheet.pixels.end(), kPaper);
+  std::ranges::fill(sheet.pixels, kPaper);
   int y = kGap;
   const auto x_of = [&](size_t column) {
     return kGap + static_cast<int>(column) * (cell + kGap);

@@ -30,33 +30,29 @@ constexpr int64_t kMaxExpansion = 2000, kExpansionSlack = 16 << 20;
 
 void CheckSize(int64_t width, int64_t height, int64_t pixel_bytes, int64_t file_bytes,
                const DecodeLimits& limits, const std::string& where) {
-  const std::string size = std::to_string(width) + " x " + std::to_string(height) + " pixels";
-  if (width <= 0 || height <= 0) throw Error(ExitCode::kInput, "no pixels", where);
+  const std::string size = Concat(width, " x ", height, " pixels");
+  if (width <= 0 || height <= 0) throw InputError("no pixels", where);
   if (width > limits.max_pixels / height)
-    throw Error(ExitCode::kInput,
-                size + ", more than the limit of " +
-                    std::to_string(limits.max_pixels / 1'000'000) + " megapixels",
-                where, "scale it down or raise --max-megapixels");
+    throw InputError(
+        Concat(size, ", more than the limit of ", limits.max_pixels / 1'000'000, " megapixels"),
+        where, "scale it down or raise --max-megapixels");
   if (width * height * pixel_bytes > kExpansionSlack + kMaxExpansion * file_bytes)
-    throw Error(ExitCode::kInput,
-                "the header claims " + size + ", but the file has only " +
-                    std::to_string(file_bytes) + " bytes",
-                where);
+    throw InputError(
+        Concat("the header claims ", size, ", but the file has only ", file_bytes, " bytes"),
+        where);
   if (std::min(width, height) < limits.min_side)
-    throw Error(ExitCode::kInput,
-                size + ", less than " + std::to_string(limits.min_side) + " on a side", where);
+    throw InputError(Concat(size, ", less than ", limits.min_side, " on a side"), where);
 }
 
 void CheckRegularFile(const std::string& path) {
   struct stat status;
-  if (::stat(path.c_str(), &status) != 0)
-    throw Error(ExitCode::kInput, std::strerror(errno), path);
+  if (::stat(path.c_str(), &status) != 0) throw InputError(std::strerror(errno), path);
   const char* kind = S_ISREG(status.st_mode)    ? nullptr
                      : S_ISDIR(status.st_mode)  ? "a folder"
                      : S_ISFIFO(status.st_mode) ? "a named pipe"
                      : S_ISSOCK(status.st_mode) ? "a socket"
                                                 : "a device";
-  if (kind) throw Error(ExitCode::kInput, std::string(kind) + ", not a picture file", path);
+  if (kind) throw InputError(std::string(kind) + ", not a picture file", path);
 }
 
 // Metadata under OpenImageIO's names.
@@ -89,16 +85,16 @@ void NoteProfile(std::string_view profile, StoredPicture* picture) {
 StoredPicture ReadJpeg(std::string_view bytes, const std::string& where,
                        const DecodeLimits& limits) {
   JpegPicture jpeg = DecodeJpeg(bytes, where, [&](int64_t w, int64_t h, int64_t pixel_bytes) {
-    CheckSize(w, h, pixel_bytes, static_cast<int64_t>(bytes.size()), limits, where);
+    CheckSize(w, h, pixel_bytes, std::ssize(bytes), limits, where);
   });
   StoredPicture picture;
   picture.image = std::move(jpeg.image);
   if (jpeg.damage_warnings > 0) {
-    const std::string what = "damaged JPEG (" + std::to_string(jpeg.damage_warnings) +
-                             " warnings, first: " + jpeg.first_warning + ")";
+    const std::string what = Concat("damaged JPEG (", jpeg.damage_warnings,
+                                    " warnings, first: ", jpeg.first_warning, ")");
     if (!limits.accept_damaged)
-      throw Error(ExitCode::kInput, what, where,
-                  "copy the file again from the camera, or keep it with --accept-damaged");
+      throw InputError(what, where,
+                       "copy the file again from the camera, or keep it with --accept-damaged");
     picture.notices.push_back(what);
   }
   OIIO::ImageSpec spec;
@@ -115,7 +111,7 @@ StoredPicture ReadJpeg(std::string_view bytes, const std::string& where,
 StoredPicture ReadPng(std::string_view bytes, const std::string& where,
                       const DecodeLimits& limits) {
   PngPicture png = DecodePng(bytes, where, [&](int64_t w, int64_t h, int64_t pixel_bytes) {
-    CheckSize(w, h, pixel_bytes, static_cast<int64_t>(bytes.size()), limits, where);
+    CheckSize(w, h, pixel_bytes, std::ssize(bytes), limits, where);
   });
   StoredPicture picture;
   picture.image = std::move(png.image);
@@ -126,9 +122,9 @@ StoredPicture ReadPng(std::string_view bytes, const std::string& where,
   TakeMetadata(spec, &picture);
   NoteProfile(png.icc, &picture);
   if (png.remarks > 0)
-    picture.notices.push_back("an odd PNG (" + std::to_string(png.remarks) +
-                              (png.remarks == 1 ? " remark: " : " remarks, first: ") +
-                              png.first_remark + ")");
+    picture.notices.push_back(Concat("an odd PNG (", png.remarks,
+                                     (png.remarks == 1 ? " remark: " : " remarks, first: "),
+                                     png.first_remark, ")"));
   return picture;
 }
 
@@ -161,8 +157,8 @@ bool ReadChannels(OIIO::ImageInput* input, const OIIO::ImageSpec& spec, float ma
 StoredPicture ReadWithOiio(const ImageFormat& format, std::string_view bytes,
                            const std::string& path, const DecodeLimits& limits) {
   const auto refuse = [&](const std::string& why) {
-    throw Error(ExitCode::kInput, std::string("cannot read this ") + format.name + ": " + why,
-                path, format.remedy);
+    throw InputError(std::string("cannot read this ") + format.name + ": " + why, path,
+                     format.remedy);
   };
   std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::create(format.decoder);
   if (input == nullptr) {
@@ -175,7 +171,7 @@ StoredPicture ReadWithOiio(const ImageFormat& format, std::string_view bytes,
   if (format.from_memory) input->set_ioproxy(&memory);
   if (!input->open(path, spec, config)) refuse(input->geterror());
   CheckSize(spec.width, spec.height, static_cast<int64_t>(spec.pixel_bytes(true)),
-            static_cast<int64_t>(bytes.size()), limits, path);
+            std::ssize(bytes), limits, path);
   if (spec.deep || spec.depth > 1) refuse("it is not a flat picture");
 
   StoredPicture picture;
@@ -208,17 +204,16 @@ StoredPicture ReadStored(const std::string& path, const DecodeLimits& limits) {
   // An uncompressed file has at most sixteen bytes a pixel.
   const std::string bytes =
       ReadWholeFile(path, static_cast<uint64_t>(limits.max_pixels) * 16 + (64 << 20));
-  if (bytes.empty()) throw Error(ExitCode::kInput, "empty file", path);
+  if (bytes.empty()) throw InputError("empty file", path);
   const ImageFormat* format = SniffImageFormat(bytes, path);
-  if (format == nullptr) throw Error(ExitCode::kInput, "not an image", path);
+  if (format == nullptr) throw InputError("not an image", path);
   const std::string_view decoder = format->decoder;
   if (decoder.empty())
-    throw Error(ExitCode::kInput, std::string(format->name) + " is not supported here", path,
-                format->remedy);
+    throw InputError(std::string(format->name) + " is not supported here", path,
+                     format->remedy);
   // OpenImageIO's GIF decoder allocates the picture when it opens the file.
   if (decoder == "gif" && bytes.size() >= 10)
-    CheckSize(Little16(bytes, 6), Little16(bytes, 8), 1, static_cast<int64_t>(bytes.size()),
-              limits, path);
+    CheckSize(Little16(bytes, 6), Little16(bytes, 8), 1, std::ssize(bytes), limits, path);
   StoredPicture picture = decoder == "jpeg"  ? ReadJpeg(bytes, path, limits)
                           : decoder == "png" ? ReadPng(bytes, path, limits)
                                              : ReadWithOiio(*format, bytes, path, limits);
@@ -249,8 +244,7 @@ std::string Encode(const char* format, const Image& image, OIIO::ImageSpec spec)
   const OIIO::TypeDesc type = OIIO::BaseTypeFromC<Value>::value;
   if (!output->open(std::string("memory.") + format, spec) ||
       !output->write_image(type, values.data()) || !output->close())
-    throw Error(ExitCode::kResources,
-                std::string("cannot encode ") + format + ": " + output->geterror());
+    throw ResourceError(std::string("cannot encode ") + format + ": " + output->geterror());
   return {bytes.begin(), bytes.end()};
 }
 

@@ -133,11 +133,10 @@ class Decompressor {
 
 [[noreturn]] void Refuse(const Decompressor& jpeg, const std::string& where) {
   if (jpeg.state().too_many_scans)
-    throw Error(ExitCode::kInput,
-                "a JPEG of more than " + std::to_string(kMaxJpegScans) +
-                    " scans, which only serves to keep a decoder busy",
-                where);
-  throw Error(ExitCode::kInput, std::string("damaged JPEG: ") + jpeg.state().message, where);
+    throw InputError(Concat("a JPEG of more than ", kMaxJpegScans,
+                            " scans, which only serves to keep a decoder busy"),
+                     where);
+  throw InputError(std::string("damaged JPEG: ") + jpeg.state().message, where);
 }
 
 }  // namespace

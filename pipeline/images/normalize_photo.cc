@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "kernels/base/error.h"
 #include "kernels/scene/srgb.h"
@@ -11,13 +10,11 @@ namespace regrade {
 namespace {
 
 void CheckFinite(const Image& image, const std::string& where) {
-  const int64_t bad = std::count_if(image.pixels.begin(), image.pixels.end(),
-                                    [](float v) { return !std::isfinite(v); });
+  const int64_t bad =
+      std::ranges::count_if(image.pixels, [](float v) { return !std::isfinite(v); });
   if (bad > 0)
-    throw Error(ExitCode::kInput,
-                std::to_string(bad) + " of " + std::to_string(image.pixels.size()) +
-                    " values are NaN or infinite",
-                where, "export the picture again without them");
+    throw InputError(Concat(bad, " of ", image.pixels.size(), " values are NaN or infinite"),
+                     where, "export the picture again without them");
 }
 
 void Unpremultiply(Image* image) {
@@ -46,17 +43,16 @@ void Clamp(StoredPicture* picture) {
       ++clamped;
     }
   if (clamped == 0) return;
-  char text[96];
-  std::snprintf(text, sizeof text, "%.3g %% of the values were outside [0, 1] and were clamped",
-                100.0 * static_cast<double>(clamped) / picture->image.pixels.size());
-  picture->notices.push_back(text);
+  picture->notices.push_back(
+      Format("%.3g %% of the values were outside [0, 1] and were clamped",
+             100.0 * static_cast<double>(clamped) / picture->image.pixels.size()));
 }
 
 void CheckAlpha(const Image& image, const std::string& where) {
   for (int64_t i = 0; i < image.num_pixels(); ++i)
     if (image.pixels[4 * i + 3] > 0) return;
-  throw Error(ExitCode::kInput, "alpha is 0 everywhere: nothing to see", where,
-              "export the picture without alpha");
+  throw InputError("alpha is 0 everywhere: nothing to see", where,
+                   "export the picture without alpha");
 }
 
 }  // namespace

@@ -123,8 +123,8 @@ PngPicture DecodePng(std::string_view bytes, const std::string& where,
                      const PngSizeCheck& check) {
   Decoder png(bytes);
   const auto refuse = [&] {
-    throw Error(ExitCode::kInput, std::string("cannot read this PNG: ") + png.failure(), where,
-                "copy the file again from its source");
+    throw InputError(std::string("cannot read this PNG: ") + png.failure(), where,
+                     "copy the file again from its source");
   };
   PngPicture picture;
   std::string_view exif, icc;
@@ -135,7 +135,7 @@ PngPicture DecodePng(std::string_view bytes, const std::string& where,
   const int channels = png.channels();
   check(png.width(), png.height(), channels * picture.bits / 8);
 
-  std::vector<unsigned char> pixels(static_cast<size_t>(png.row_bytes() * png.height()));
+  std::vector<unsigned char> pixels(png.row_bytes() * png.height());
   std::vector<png_bytep> rows;
   for (int64_t y = 0; y < png.height(); ++y) rows.push_back(&pixels[y * png.row_bytes()]);
   if (!png.ReadRows(rows.data())) refuse();

@@ -89,15 +89,15 @@ struct VideoWriter::State {
 
   void CheckEncoder(int code, const char* step) const {
     if (code < 0)
-      throw Error(ExitCode::kExternalProgram,
-                  std::string("H.264 encoder: cannot ") + step + ": " + ErrorText(code), path,
-                  "install FFmpeg's libavcodec with libx264, or go without the video");
+      throw ProgramError(std::string("H.264 encoder: cannot ") + step + ": " + ErrorText(code),
+                         path,
+                         "install FFmpeg's libavcodec with libx264, or go without the video");
   }
   void CheckWrite(int code) const {
     if (code >= 0 && output->pb != nullptr) code = output->pb->error;
     if (code < 0)
-      throw Error(ExitCode::kResources, "cannot write the video: " + ErrorText(code), path,
-                  "free some space, then run the same command again");
+      throw ResourceError("cannot write the video: " + ErrorText(code), path,
+                          "free some space, then run the same command again");
   }
 
   void OpenEncoder(double frames_per_second) {
@@ -220,10 +220,9 @@ void VideoWriter::Finish() {
   SyncFile(s.temporary);
   const int readable = CountVideoFrames(s.temporary);
   if (readable != s.frames)
-    throw Error(ExitCode::kResources,
-                std::to_string(readable) + " of " + std::to_string(s.frames) +
-                    " frames of the video can be read back",
-                s.path, "check the disk, then run the same command again");
+    throw ResourceError(
+        Concat(readable, " of ", s.frames, " frames of the video can be read back"), s.path,
+        "check the disk, then run the same command again");
   RenameDurably(s.temporary, s.path);
   s.temporary.clear();
 }

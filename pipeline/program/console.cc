@@ -10,16 +10,12 @@
 #include <cstring>
 #include <ctime>
 
+#include "kernels/base/clock.h"
+#include "kernels/base/error.h"
 #include "pipeline/program/interrupt.h"
 
 namespace regrade {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double Seconds(Clock::duration duration) {
-  return std::chrono::duration<double>(duration).count();
-}
 
 // A closed stream does not stop the work: the text is dropped.
 void Put(std::FILE* stream, const std::string& text) {
@@ -44,7 +40,7 @@ Console::Console(bool json) : json_(json) {
   const char* term = std::getenv("TERM");
   const bool dumb = term == nullptr || std::string(term) == "dumb";
   color_ = terminal_ && !dumb && (no_color == nullptr || *no_color == '\0');
-  stage_begin_ = last_drawn_ = Clock::now();
+  stage_begin_ = last_drawn_ = ClockSeconds();
 }
 
 Console::~Console() { Erase(); }
@@ -117,12 +113,12 @@ void Console::Event(const std::string& name, const JsonValue& members) {
 void Console::BeginStage(const std::string& stage) {
   stage_ = stage;
   eta_ = EtaEstimator();
-  stage_begin_ = Clock::now();
-  last_drawn_ = stage_begin_ - std::chrono::hours(1);
+  stage_begin_ = ClockSeconds();
+  last_drawn_ = stage_begin_ - 3600;
   Event("stage_begin", JsonValue::Object{{"stage", stage}});
 }
 
-double Console::StageSeconds() const { return Seconds(Clock::now() - stage_begin_); }
+double Console::StageSeconds() const { return ClockSeconds() - stage_begin_; }
 
 void Console::EndStage() {
   Erase();
@@ -138,20 +134,17 @@ ProgressFunction Console::StageProgress() {
 
 void Console::Draw(const Progress& progress) {
   if (quiet_) return;
-  const Clock::time_point now = Clock::now();
-  eta_.Add(Seconds(now - stage_begin_), progress.done, progress.total);
+  const double now = ClockSeconds();
+  eta_.Add(now - stage_begin_, progress.done, progress.total);
   const double interval = terminal_ ? 0.1 : json_ ? 1.0 : 10.0;  // seconds
   const bool last = progress.total > 0 && progress.done >= progress.total;
-  if (Seconds(now - last_drawn_) < interval && !(last && terminal_)) return;
+  if (now - last_drawn_ < interval && !(last && terminal_)) return;
   last_drawn_ = now;
 
   const std::optional<double> left = eta_.Remaining();
   std::string line = stage_;
   if (progress.total > 0) {
-    char percent[16];
-    std::snprintf(percent, sizeof percent, "%3.0f %%",
-                  100 * std::min(1.0, progress.done / progress.total));
-    line += std::string("  ") + percent;
+    line += Format("  %3.0f %%", 100 * std::min(1.0, progress.done / progress.total));
   }
   if (left) line += "  " + DurationText(*left) + " left";
   if (!progress.note.empty()) line += "  " + Printable(progress.note);

@@ -2,7 +2,6 @@
 // and all messages in the output folder's log.
 #pragma once
 
-#include <chrono>
 #include <fstream>
 #include <string>
 
@@ -63,7 +62,7 @@ class Console {
   std::ofstream log_;
   std::string stage_, kept_;
   EtaEstimator eta_;
-  std::chrono::steady_clock::time_point stage_begin_, last_drawn_;
+  double stage_begin_, last_drawn_;  // of ClockSeconds()
 };
 
 }  // namespace regrade

@@ -21,15 +21,16 @@ void RunProbeCommand(const std::vector<std::string>& command, const std::string&
   if (result.end == ChildEnd::kStopped) throw Interrupted();
   std::string problem;
   if (result.TimedOut())
-    problem = "did not end within " + std::to_string(static_cast<int>(limits.seconds)) + " s";
+    problem = Concat("did not end within ", static_cast<int>(limits.seconds), " s");
   else if (result.end == ChildEnd::kSignal)
     problem =
         std::string("crashes the library that reads it (") + ::strsignal(result.signal) + ")";
   else if (result.exit_status == kProbeOutOfMemory)
-    problem = "needs more than " + std::to_string(limits.memory_bytes >> 20) + " MiB";
+    problem = Concat("needs more than ", limits.memory_bytes >> 20, " MiB");
   if (!problem.empty())
-    throw Error(ExitCode::kExternalProgram, problem, file,
-                "the file is damaged or has the wrong content: get it from its source again");
+    throw ProgramError(
+        problem, file,
+        "the file is damaged or has the wrong content: get it from its source again");
 }
 
 void RunCrashProbe(const std::string& kind, const std::string& file,

@@ -16,9 +16,9 @@ Backend ChooseBackend(const std::string& device, bool reproducible) {
   const DeviceStatus status = ReadDeviceStatus();
   if (status.found && status.compute_capability >= kLeastCapability) return Backend::kCuda;
   if (device == "cuda")
-    throw Error(ExitCode::kResources,
-                status.found ? status.name + " is older than this build supports" : status.name,
-                "--device cuda", "use --device auto or cpu");
+    throw ResourceError(
+        status.found ? status.name + " is older than this build supports" : status.name,
+        "--device cuda", "use --device auto or cpu");
   return Backend::kCpu;
 }
 

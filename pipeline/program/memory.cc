@@ -12,7 +12,7 @@ namespace {
 
 // The number after "Name:", in kB, as bytes.
 uint64_t Entry(const std::string& line, const std::string& name) {
-  if (line.compare(0, name.size(), name) != 0) return 0;
+  if (!line.starts_with(name)) return 0;
   const size_t digits = line.find_first_of("0123456789");
   uint64_t kilobytes = 0;
   if (digits != std::string::npos)

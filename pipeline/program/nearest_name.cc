@@ -26,7 +26,7 @@ std::string NearestName(const std::string& typed, const std::vector<std::string>
   int fewest = std::max(2, static_cast<int>(typed.size()) / 3) + 1;
   if (typed.size() > 200) return nearest;  // not a typing mistake
   for (const std::string& name : names) {
-    const bool begins = typed.size() >= 3 && name.compare(0, typed.size(), typed) == 0;
+    const bool begins = typed.size() >= 3 && name.starts_with(typed);
     const int edits = begins ? 1 : EditDistance(typed, name);
     if (edits < fewest) {
       fewest = edits;

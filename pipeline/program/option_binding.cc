@@ -34,7 +34,7 @@ std::string BoundsText(const OptionInfo& info) {
 
 [[noreturn]] void RefuseValue(const std::string& where, const std::string& text,
                               const std::string& allowed) {
-  throw Error(ExitCode::kUsage, "'" + text + "' is not allowed", where, "allowed: " + allowed);
+  throw UsageError("'" + text + "' is not allowed", where, "allowed: " + allowed);
 }
 
 // The whole text must be one finite number within the bounds.
@@ -127,7 +127,7 @@ std::vector<std::string> OptionSet::Parse(const std::vector<std::string>& argume
       description.add_options()(("no-" + entry.name).c_str(), new po::untyped_value(true));
   }
   constexpr const char* kSeeHelp = "see --help";
-  const auto flags_end = std::find(arguments.begin(), arguments.end(), "--");
+  const auto flags_end = std::ranges::find(arguments, "--");
   po::parsed_options parsed(&description);
   try {
     namespace style = po::command_line_style;
@@ -144,17 +144,17 @@ std::vector<std::string> OptionSet::Parse(const std::vector<std::string>& argume
     typed.erase(0, typed.find_first_not_of('-'));
     typed.erase(std::min(typed.find('='), typed.size()));
     const std::string nearest = NearestName(typed, Names());
-    throw Error(ExitCode::kUsage, "unknown option", "--" + typed,
-                nearest.empty() ? kSeeHelp : "did you mean --" + nearest + "?");
+    throw UsageError("unknown option", "--" + typed,
+                     nearest.empty() ? kSeeHelp : "did you mean --" + nearest + "?");
   } catch (const po::error_with_option_name& error) {
     std::string name = error.get_option_name();
     name.erase(0, name.find_first_not_of('-'));
     const Entry* entry = Find(name);
     const bool is_switch = entry == nullptr || std::holds_alternative<bool*>(entry->target);
-    throw Error(ExitCode::kUsage, is_switch ? "takes no value" : "its value is missing",
-                "--" + name, kSeeHelp);
+    throw UsageError(is_switch ? "takes no value" : "its value is missing", "--" + name,
+                     kSeeHelp);
   } catch (const po::error& error) {
-    throw Error(ExitCode::kUsage, error.what(), "", kSeeHelp);
+    throw UsageError(error.what(), "", kSeeHelp);
   }
 
   std::vector<std::string> rest;
@@ -162,8 +162,8 @@ std::vector<std::string> OptionSet::Parse(const std::vector<std::string>& argume
     if (option.position_key >= 0 || option.string_key.empty()) {
       for (const std::string& word : option.value) {
         if (word.size() > 1 && word[0] == '-')
-          throw Error(ExitCode::kUsage, "unknown option", word,
-                      "options begin with two dashes; write a file of this name after --");
+          throw UsageError("unknown option", word,
+                           "options begin with two dashes; write a file of this name after --");
         rest.push_back(word);
       }
       continue;
@@ -171,8 +171,7 @@ std::vector<std::string> OptionSet::Parse(const std::vector<std::string>& argume
     Flag flag{option.string_key, option.value.empty() ? "true" : option.value[0]};
     if (option.value.empty() && Find(flag.name) == nullptr)
       flag = {flag.name.substr(std::strlen("no-")), "false"};
-    if (Given(flag.name))
-      throw Error(ExitCode::kUsage, "given twice", "--" + flag.name, "keep one of them");
+    if (Given(flag.name)) throw UsageError("given twice", "--" + flag.name, "keep one of them");
     flags_.push_back(flag);
   }
   if (flags_end != arguments.end()) rest.insert(rest.end(), flags_end + 1, arguments.end());
@@ -208,21 +207,18 @@ void OptionSet::Assign(const Entry& entry, const std::string& text, const std::s
 
 void OptionSet::ApplyConfig(const JsonValue& values, const std::string& where) {
   const auto place = [&where](const JsonValue& value) {
-    return value.line() == 0 ? where
-                             : where + ":" + std::to_string(value.line()) + ":" +
-                                   std::to_string(value.column());
+    return value.line() == 0 ? where : Concat(where, ":", value.line(), ":", value.column());
   };
-  if (!values.IsObject())
-    throw Error(ExitCode::kUsage, "an object of options expected", place(values));
+  if (!values.IsObject()) throw UsageError("an object of options expected", place(values));
   for (const auto& [name, value] : values.AsObject()) {
     const Entry* entry = Find(name);
     if (entry == nullptr) {
       const std::string nearest = NearestName(name, Names());
-      throw Error(ExitCode::kUsage, "unknown option \"" + name + "\"", place(value),
-                  nearest.empty() ? "see --help" : "did you mean \"" + nearest + "\"?");
+      throw UsageError("unknown option \"" + name + "\"", place(value),
+                       nearest.empty() ? "see --help" : "did you mean \"" + nearest + "\"?");
     }
     if (value.IsObject() || value.IsNull())
-      throw Error(ExitCode::kUsage, "a value expected for \"" + name + "\"", place(value));
+      throw UsageError("a value expected for \"" + name + "\"", place(value));
     Assign(*entry, FlagText(value), place(value) + ": " + name);
   }
 }

@@ -1,13 +1,11 @@
 #include "pipeline/run/plan.h"
 
 #include <algorithm>
-#include <cstdio>
 
 #include "kernels/base/error.h"
 #include "kernels/field/packed_grid.h"
 #include "kernels/field/spherical_harmonics.h"
-#include "pipeline/program/console.h"
-#include "reconstruct/fit/resample_grid.h"
+#include "pipeline/files/text.h"
 
 namespace regrade {
 namespace {
@@ -22,12 +20,7 @@ constexpr double kWeightBytes = 4;       // of a voxel, in each thread
 double SecondsWith(double seconds, int threads) { return seconds * 2 / std::max(threads, 1); }
 
 std::string MemoryText(double bytes) {
-  char text[32];
-  if (bytes < 1e8)
-    std::snprintf(text, sizeof text, "%.0f MB", bytes * 1e-6);
-  else
-    std::snprintf(text, sizeof text, "%.1f GB", bytes * 1e-9);
-  return text;
+  return bytes < 1e8 ? Format("%.0f MB", bytes * 1e-6) : Format("%.1f GB", bytes * 1e-9);
 }
 
 }  // namespace
@@ -111,11 +104,11 @@ uint64_t PlannedMemory(double max_memory_gb, uint64_t available) {
 
 void CheckFitsMemory(const StagePlan& plan, uint64_t limit, const char* memory) {
   if (limit == 0 || plan.memory <= limit) return;
-  throw Error(ExitCode::kResources,
-              "the fit would take about " + MemoryText(static_cast<double>(plan.memory)) +
-                  " of " + memory + ", the limit is " + MemoryText(static_cast<double>(limit)),
-              "reconstruct",
-              "use --preset draft or smaller --fit-resolutions; memory grows with their cube");
+  throw ResourceError(
+      "the fit would take about " + MemoryText(static_cast<double>(plan.memory)) + " of " +
+          memory + ", the limit is " + MemoryText(static_cast<double>(limit)),
+      "reconstruct",
+      "use --preset draft or smaller --fit-resolutions; memory grows with their cube");
 }
 
 bool LowerToMemory(const std::function<StagePlan(const FitOptions&)>& plan_of, uint64_t limit,
@@ -123,7 +116,7 @@ bool LowerToMemory(const std::function<StagePlan(const FitOptions&)>& plan_of, u
   bool lowered = false;
   while (limit > 0 && plan_of(*options).memory > limit) {
     auto& sides = options->resolutions;
-    const int finest = *std::max_element(sides.begin(), sides.end());
+    const int finest = *std::ranges::max_element(sides);
     if (finest <= kLeastResolution) break;
     const int lower = std::max(kLeastResolution, finest - std::max(1, finest / 16));
     for (int& side : sides) side = std::min(side, lower);

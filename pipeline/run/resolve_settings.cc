@@ -28,7 +28,7 @@ JsonValue PresetValues(const std::string& preset) {
     const auto differs = [&plain, &key = name](const JsonValue& other) {
       return !(other.At(key) == plain.At(key));
     };
-    if (network.Find(name) != nullptr || std::any_of(presets.begin(), presets.end(), differs))
+    if (network.Find(name) != nullptr || std::ranges::any_of(presets, differs))
       set[name] = value;
   }
   return set;

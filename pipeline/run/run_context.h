@@ -3,10 +3,10 @@
 
 #include <string>
 
-#include "kernels/scene/capture.h"
 #include "pipeline/capture/working_views.h"
+#include "pipeline/program/console.h"
 #include "pipeline/run/run_settings.h"
-#include "pipeline/workspace/stage_runner.h"
+#include "pipeline/workspace/workspace.h"
 
 namespace regrade {
 

@@ -2,6 +2,7 @@
 
 #include "kernels/base/error.h"
 #include "kernels/base/hash.h"
+#include "pipeline/workspace/stage_runner.h"
 
 namespace regrade {
 namespace {
@@ -19,10 +20,10 @@ RunFile ReadRunFile(const std::string& path) {
     file.options = value.At("options");
     return file;
   } catch (const Error& error) {
-    throw Error(ExitCode::kUsage, error.what_failed(),
-                error.where().find(path) == std::string::npos ? path + ": " + error.where()
-                                                              : error.where(),
-                "give a run.json that regrade wrote");
+    throw UsageError(error.what_failed(),
+                     error.where().find(path) == std::string::npos ? path + ": " + error.where()
+                                                                   : error.where(),
+                     "give a run.json that regrade wrote");
   }
 }
 

@@ -67,21 +67,22 @@ void ApplyPreset(const std::string& preset, RunSettings* settings) {
     settings->fit.rate_background_color = 0.1f;
     settings->fit.rate_background_color_end = 1.7e-3f;
   } else {
-    throw Error(ExitCode::kUsage, "'" + preset + "' is not allowed", "--preset",
-                "allowed: draft, standard, paper, best");
+    throw UsageError("'" + preset + "' is not allowed", "--preset",
+                     "allowed: draft, standard, paper, best");
   }
 }
 
 void CheckTogether(const RunSettings& settings) {
   const size_t grids = settings.fit.resolutions.size(), steps = settings.fit.steps.size();
   if (grids != steps)
-    throw Error(ExitCode::kUsage,
-                std::to_string(grids) + " and " + std::to_string(steps) + " stages",
-                "--fit-resolutions and --fit-steps", "give both the same number of stages");
+    throw UsageError(Concat(grids, " and ", steps, " stages"),
+                     "--fit-resolutions and --fit-steps",
+                     "give both the same number of stages");
   ParseStyleMethod(settings.style_2d);
   if (!settings.object.style_mask.empty() && !settings.object.On())
-    throw Error(ExitCode::kUsage, "labels of the style picture need labels of the photos",
-                "--style-mask and --masks", "give --masks, a folder of labels for the photos");
+    throw UsageError("labels of the style picture need labels of the photos",
+                     "--style-mask and --masks",
+                     "give --masks, a folder of labels for the photos");
 }
 
 }  // namespace regrade

@@ -24,8 +24,8 @@ class ScratchFolder {
   ScratchFolder() {
     std::string name = (fs::temp_directory_path() / "regrade-view-XXXXXX").string();
     if (::mkdtemp(name.data()) == nullptr)
-      throw Error(ExitCode::kResources, "cannot make a temporary folder", name,
-                  "set TMPDIR to a disk with space");
+      throw ResourceError("cannot make a temporary folder", name,
+                          "set TMPDIR to a disk with space");
     path_ = name;
   }
   ~ScratchFolder() {
@@ -45,9 +45,8 @@ std::string Filled(const std::string& word,
                    const std::vector<std::pair<std::string, std::string>>& values) {
   std::string filled;
   for (size_t i = 0; i < word.size();) {
-    const auto value = std::find_if(values.begin(), values.end(), [&](const auto& v) {
-      return word.compare(i, v.first.size(), v.first) == 0;
-    });
+    const auto value = std::ranges::find_if(
+        values, [&](const auto& v) { return word.compare(i, v.first.size(), v.first) == 0; });
     if (value == values.end()) {
       filled += word[i++];
     } else {
@@ -64,7 +63,7 @@ class CommandStylizer : public ViewStylizer {
       : words_(std::move(words)), style_path_(std::move(style_path)), limit_s_(limit_s) {}
 
   Image Stylize(const Image& view, int view_index) const override {
-    const std::string where = words_[0] + " on view " + std::to_string(view_index);
+    const std::string where = Concat(words_[0], " on view ", view_index);
     CountNotFinite(view, where);
     const ScratchFolder folder;
     const std::string input = folder / "input.png", output = folder / "output.png";
@@ -76,16 +75,14 @@ class CommandStylizer : public ViewStylizer {
     options.wall_limit_s = limit_s_;
     const ChildResult result = RunChild(options);
     if (!result.Succeeded())
-      throw Error(ExitCode::kExternalProgram,
-                  "the style command failed: " + result.Describe() +
-                      (result.last_lines.empty() ? "" : "\n" + result.LastLines()),
-                  where,
-                  result.TimedOut() ? "--style-command-limit gives it longer"
-                                    : "run the command by hand on one photo");
+      throw ProgramError("the style command failed: " + result.Describe() +
+                             (result.last_lines.empty() ? "" : "\n" + result.LastLines()),
+                         where,
+                         result.TimedOut() ? "--style-command-limit gives it longer"
+                                           : "run the command by hand on one photo");
     std::error_code error;
     if (!fs::exists(output, error))
-      throw Error(ExitCode::kExternalProgram, "the style command left no picture at {output}",
-                  where, kHint);
+      throw ProgramError("the style command left no picture at {output}", where, kHint);
     return WithColors(view, FittedToView(Decoded(output, where), view, where));
   }
 
@@ -97,9 +94,8 @@ class CommandStylizer : public ViewStylizer {
     limits.min_side = 1;
     return DecodePhoto(path, limits).image;
   } catch (const Error& error) {
-    throw Error(ExitCode::kExternalProgram,
-                "what the style command wrote is no picture: " + error.what_failed(), where,
-                kHint);
+    throw ProgramError("what the style command wrote is no picture: " + error.what_failed(),
+                       where, kHint);
   }
 
   std::vector<std::string> words_;
@@ -133,8 +129,7 @@ std::vector<std::string> SplitCommand(const std::string& command) {
     }
   }
   if (quote != 0)
-    throw Error(ExitCode::kUsage, std::string("a quote ") + quote + " stays open", "--method",
-                kHint);
+    throw UsageError(std::string("a quote ") + quote + " stays open", "--method", kHint);
   if (in_word) words.push_back(word);
   return words;
 }
@@ -144,13 +139,12 @@ std::unique_ptr<ViewStylizer> MakeCommandStylizer(const std::string& command,
                                                   double limit_s) {
   std::vector<std::string> words = SplitCommand(command);
   for (const char* placeholder : {"{input}", "{output}"})
-    if (std::none_of(words.begin(), words.end(), [&](const std::string& word) {
+    if (std::ranges::none_of(words, [&](const std::string& word) {
           return word.find(placeholder) != std::string::npos;
         }))
-      throw Error(ExitCode::kUsage, std::string("the style command has no ") + placeholder,
-                  "--method", kHint);
-  if (words[0].empty())
-    throw Error(ExitCode::kUsage, "the style command has no program", "--method", kHint);
+      throw UsageError(std::string("the style command has no ") + placeholder, "--method",
+                       kHint);
+  if (words[0].empty()) throw UsageError("the style command has no program", "--method", kHint);
   return std::make_unique<CommandStylizer>(std::move(words), style_path, limit_s);
 }
 

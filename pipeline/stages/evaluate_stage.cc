@@ -1,14 +1,13 @@
 // Stage "evaluate": temporal consistency of the rendered sequences and their fidelity to the 2D
 // method.
 #include <filesystem>
-#include <optional>
 
 #include "evaluate/consistency.h"
 #include "evaluate/fidelity.h"
-#include "evaluate/image_quality.h"
 #include "evaluate/optical_flow.h"
 #include "evaluate/pair_network.h"
 #include "evaluate/tables.h"
+#include "kernels/base/error.h"
 #include "kernels/field/cpu/render_view.h"
 #include "kernels/field/packed_grid.h"
 #include "kernels/scene/common_camera.h"
@@ -31,16 +30,15 @@ namespace {
 
 // The pictures `folder`/00000.png, ... of the given views.
 FrameSource FramesOf(const std::string& folder, const std::vector<int>& views) {
-  return {static_cast<int>(views.size()), [folder, views](int i) {
-            return ReadImage(folder + "/" + FrameName(views[static_cast<size_t>(i)]));
-          }};
+  return {static_cast<int>(views.size()),
+          [folder, views](int i) { return ReadImage(folder + "/" + FrameName(views[i])); }};
 }
 
 // Depth at each camera, rendered on demand.
 GeometrySource GeometryOf(const RadianceField& field, const std::vector<Camera>& cameras) {
   const auto grid = std::make_shared<const FastGrid>(MakeFastGrid(field));
   return [grid, cameras, step = field.step](int i) -> FrameGeometry {
-    const Camera& camera = cameras[static_cast<size_t>(i)];
+    const Camera& camera = cameras[i];
     return {DepthAlongRays(camera, RenderView(*grid, camera, MarchOptions{step}).depth),
             camera};
   };
@@ -50,9 +48,9 @@ GeometrySource GeometryOf(const RadianceField& field, const std::vector<Camera>&
 std::string TooSmallForFlow(const Camera& camera, const ConsistencyOptions& options) {
   if (options.mode == "geometry" || options.flow.find(':') != std::string::npos) return "";
   if (std::min(camera.width, camera.height) >= kLeastFlowSide) return "";
-  return "frames of " + std::to_string(camera.width) + " x " + std::to_string(camera.height) +
-         " px are too small for optical flow, which needs " + std::to_string(kLeastFlowSide) +
-         " px a side";
+  return Concat("frames of ", camera.width, " x ", camera.height,
+                " px are too small for optical flow, which needs ", kLeastFlowSide,
+                " px a side");
 }
 
 // Compares the sequences of one set of frames and writes heat maps of their worst pairs. The
@@ -68,11 +66,7 @@ ConsistencyReport Compare(const Workspace& workspace,
     return UndefinedConsistency(reference.count, sequences, options, why);
   ConsistencyReport report =
       EvaluateConsistency(reference, sequences, options, progress, geometry);
-  const std::vector<HeatMapFile> maps =
-      WriteHeatMaps(workspace,
-                    geometry ? GeometricMotion(geometry)
-                             : EstimatedMotion(reference, options.mode, options.flow),
-                    sequences, options.gaps, report);
+  const std::vector<HeatMapFile> maps = WriteHeatMaps(workspace, sequences, report);
   heat_maps->insert(heat_maps->end(), maps.begin(), maps.end());
   return report;
 }
@@ -98,7 +92,7 @@ void AddFilm(RunContext* context, const Image& style, const Camera& camera,
              std::vector<FidelityRow>* fidelity, std::vector<HeatMapFile>* heat_maps) {
   const RunSettings& settings = context->settings;
   if (!HasFilm(settings)) return;
-  std::vector<int> all(static_cast<size_t>(settings.render.path.path_frames));
+  std::vector<int> all(settings.render.path.path_frames);
   for (size_t i = 0; i < all.size(); ++i) all[i] = static_cast<int>(i);
   const auto folder = [&](const char* name) {
     return context->workspace->Path(std::string("frames/") + kPathPrefix + name);
@@ -129,7 +123,7 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   Workspace& workspace = *context->workspace;
   const StoredField stored = ReadFieldFile(workspace.Path("field.npz"));
   const WorkingViews views = context->Views().InField(stored.field_from_world, stored.ndc);
-  std::vector<int> all(static_cast<size_t>(views.count()));
+  std::vector<int> all(views.count());
   for (size_t i = 0; i < all.size(); ++i) all[i] = static_cast<int>(i);
   const std::vector<int> training_views = StyledViews(workspace, views);
   const auto frames = [&](const char* sequence, const std::vector<int>& views) {
@@ -168,7 +162,7 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   // the rendered frames, or else to the photos.
   const Image style = ReadStylePicture(settings.style.picture, nullptr);
   const FrameSource of_photos{static_cast<int>(training_views.size()), [&](int k) {
-                                const int i = training_views[static_cast<size_t>(k)];
+                                const int i = training_views[k];
                                 Image picture =
                                     ReadImage(workspace.Path("views_2d/" + FrameName(i)));
                                 views.LeaveOutMasked(i, &picture);
@@ -189,8 +183,7 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
                                                 photo_targets, parts.Next(n * kFrameSeconds));
 
   std::vector<Camera> training_cameras;
-  for (const int i : training_views)
-    training_cameras.push_back(cameras[static_cast<size_t>(i)]);
+  for (const int i : training_views) training_cameras.push_back(cameras[i]);
   EvaluateReport report;
   report.flow = settings.consistency.flow;
   report.mask = settings.consistency.mode;

@@ -17,7 +17,7 @@ class FolderStylizer : public ViewStylizer {
 
   Image Stylize(const Image& view, int view_index) const override {
     REGRADE_CHECK(Knows(view_index));
-    const std::string& path = paths_[static_cast<size_t>(view_index)];
+    const std::string& path = paths_[view_index];
     DecodeLimits limits;
     limits.min_side = 1;
     return WithColors(view, FittedToView(DecodePhoto(path, limits).image, view, path));
@@ -32,8 +32,8 @@ class FolderStylizer : public ViewStylizer {
   std::vector<std::string> Notices() const override {
     const int all = static_cast<int>(paths_.size());
     if (known_ == all) return {};
-    return {std::to_string(known_) + " of " + std::to_string(all) +
-            " views have a styled picture; the style is learned from these"};
+    return {Concat(known_, " of ", all,
+                   " views have a styled picture; the style is learned from these")};
   }
 
  private:
@@ -52,8 +52,8 @@ Image FittedToView(const Image& styled, const Image& view, const std::string& wh
 std::unique_ptr<ViewStylizer> MakeFolderStylizer(const std::string& folder,
                                                  const std::vector<std::string>& photos) {
   std::vector<std::string> paths = PicturesByPhotoName(folder, photos, "picture");
-  const int known = static_cast<int>(std::count_if(
-      paths.begin(), paths.end(), [](const std::string& path) { return !path.empty(); }));
+  const int known = static_cast<int>(
+      std::ranges::count_if(paths, [](const std::string& path) { return !path.empty(); }));
   return std::make_unique<FolderStylizer>(std::move(paths), known);
 }
 

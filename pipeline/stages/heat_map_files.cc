@@ -1,8 +1,6 @@
 #include "pipeline/stages/heat_map_files.h"
 
 #include <filesystem>
-#include <map>
-#include <utility>
 
 #include "evaluate/heat_map.h"
 #include "pipeline/images/image_file.h"
@@ -23,23 +21,16 @@ void BeginHeatMaps(const Workspace& workspace) {
 }
 
 std::vector<HeatMapFile> WriteHeatMaps(const Workspace& workspace,
-                                       const PairMotionFunction& motion,
                                        const std::vector<NamedFrameSource>& sequences,
-                                       const std::vector<int>& gaps,
                                        const ConsistencyReport& report) {
-  std::map<std::pair<int, int>, PairMotion> motions;  // sequences often share their worst pair
   std::vector<HeatMapFile> written;
-  for (const NamedFrameSource& sequence : sequences)
-    for (const int gap : gaps) {
-      const PairResult* worst = WorstPair(sequence.name, gap, report.pairs);
-      if (worst == nullptr || *worst->error == 0) continue;
-      const auto key = std::pair(worst->from, worst->to);
-      if (!motions.count(key)) motions[key] = motion(worst->from, worst->to);
-      const std::string path = std::string(kHeatMapFolder) + "/" + HeatMapFileName(*worst);
+  for (const auto& [pair, motion] : report.worst)
+    for (const auto& [name, frames] : sequences) {
+      if (name != pair.sequence) continue;
+      const std::string path = std::string(kHeatMapFolder) + "/" + HeatMapFileName(pair);
       WritePng8(workspace.NewPath(path),
-                ErrorHeatMap(sequence.frames.frame(worst->from),
-                             sequence.frames.frame(worst->to), motions[key]));
-      written.push_back({sequence.name, gap, worst->from, worst->to, path});
+                ErrorHeatMap(frames.frame(pair.from), frames.frame(pair.to), *motion));
+      written.push_back({name, pair.to - pair.from, pair.from, pair.to, path});
     }
   return written;
 }

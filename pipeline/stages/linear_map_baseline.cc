@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "evaluate/fidelity.h"
-#include "kernels/base/error.h"
 #include "kernels/field/cpu/render_view.h"
 #include "kernels/field/packed_grid.h"
 #include "kernels/image/color_statistics.h"
@@ -15,7 +14,7 @@ namespace regrade {
 namespace {
 
 Vec3d ColorAt(const Image& image, int64_t pixel) {
-  const float* c = &image.pixels[static_cast<size_t>(pixel * image.channels)];
+  const float* c = &image.pixels[pixel * image.channels];
   return {c[0], c[1], c[2]};
 }
 
@@ -70,11 +69,9 @@ std::optional<double> LinearMapPsnr(const RadianceField& field,
   mapped.appearance = ApplyColorMap(field.appearance, better);
   mapped.background = MapBackground(better, field.background);
   const FastGrid grid = MakeFastGrid(mapped);
-  const FrameSource rendered{source.count, [&](int i) {
-                               return RenderView(grid, cameras[static_cast<size_t>(i)],
-                                                 MarchOptions{field.step})
-                                   .color;
-                             }};
+  const FrameSource rendered{
+      source.count,
+      [&](int i) { return RenderView(grid, cameras[i], MarchOptions{field.step}).color; }};
   return MeasureFidelity({"linear_map", rendered}, {views_2d, transmittance, nullptr, {}, {}},
                          progress)
       .psnr_to_2d_db;

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "kernels/base/error.h"
-#include "pipeline/files/folder_listing.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/stages/command_stylizer.h"
 #include "pipeline/stages/folder_stylizer.h"
@@ -32,8 +31,7 @@ std::unique_ptr<ViewStylizer> MakeColorMethod(StyleMethodKind kind, const StyleO
     if (!options.scene_wide) return MakeDistributionTransfer(options, style);
     // As many colours in all as are taken of one view otherwise, but 256 of each at least.
     const int64_t most = std::max<int64_t>(
-        256,
-        4 * kColorSample / std::max<int64_t>(1, static_cast<int64_t>(capture.views.size())));
+        256, 4 * kColorSample / std::max<int64_t>(1, std::ssize(capture.views)));
     std::vector<Vec3d> scene;
     for (size_t i = 0; i < capture.views.size(); ++i)
       if (const std::optional<Image> picture = photo(i))
@@ -93,8 +91,8 @@ std::unique_ptr<ViewStylizer> MakeSceneStylizer(RunContext* context, const Worki
       if (!masks->Knows(static_cast<int>(i))) return std::nullopt;
       const std::optional<Image> picture = photo(i);
       if (!picture) return std::nullopt;
-      const Image region = masks->Coverage(static_cast<int>(i), picture->width,
-                                           picture->height)[static_cast<size_t>(k)];
+      const Image region =
+          masks->Coverage(static_cast<int>(i), picture->width, picture->height)[k];
       if (!ShowsRegion(region)) return std::nullopt;
       return WithRegion(*picture, region);
     };
@@ -112,8 +110,8 @@ void ProbeMethod(StyleOptions* options) {
   if (!ReadsFiles(method.kind)) return;
   std::error_code error;
   if (!fs::exists(method.argument, error))
-    throw Error(ExitCode::kInput, "there is no such file or folder", method.argument,
-                "what follows \"" + method.name + ":\" in --method must exist");
+    throw InputError("there is no such file or folder", method.argument,
+                     "what follows \"" + method.name + ":\" in --method must exist");
   const fs::path absolute = fs::absolute(method.argument, error);
   if (!error) options->method = method.name + ":" + absolute.lexically_normal().string();
   if (method.kind != StyleMethodKind::kOnnx) return;
@@ -131,8 +129,8 @@ std::vector<int> StyledViews(const Workspace& workspace, const WorkingViews& wor
   std::vector<int> views = with_picture(working_views.Training());
   if (views.empty()) views = with_picture(working_views.HeldOut());
   if (views.empty())
-    throw Error(ExitCode::kInput, "no view has a styled picture", workspace.Path("views_2d"),
-                "use --restart-from style_2d");
+    throw InputError("no view has a styled picture", workspace.Path("views_2d"),
+                     "use --restart-from style_2d");
   return views;
 }
 
@@ -140,12 +138,9 @@ JsonValue MethodFiles(const StyleOptions& options) {
   const StyleMethod method = ParseStyleMethod(options);
   if (!ReadsFiles(method.kind)) return JsonValue();
   std::error_code error;
-  if (std::filesystem::is_regular_file(method.argument, error))
-    return HashFile(method.argument);
-  JsonValue hashes = JsonValue::Object();
-  for (const ListedFile& file : ListFolder(method.argument).files)
-    if (file.problem.empty()) hashes[file.name] = HashFile(file.path);
-  return hashes;
+  return std::filesystem::is_regular_file(method.argument, error)
+             ? JsonValue(HashFile(method.argument))
+             : HashFolder(method.argument);
 }
 
 }  // namespace regrade

@@ -38,7 +38,7 @@ void RunNetworkProbe(const std::vector<std::string>& arguments) {
   int64_t memory = 0;
   if (arguments.size() == 3)
     std::from_chars(arguments[0].data(), arguments[0].data() + arguments[0].size(), memory);
-  if (memory <= 0) throw Error(ExitCode::kUsage, "expects MEMORY KIND FILE", kProbeFlag);
+  if (memory <= 0) throw UsageError("expects MEMORY KIND FILE", kProbeFlag);
   ApplyProbeLimits(memory);
   const std::string &kind = arguments[1], &path = arguments[2];
   try {
@@ -51,7 +51,7 @@ void RunNetworkProbe(const std::vector<std::string>& arguments) {
   } catch (const std::bad_alloc&) {
     std::_Exit(kProbeOutOfMemory);
   }
-  throw Error(ExitCode::kUsage, "unknown kind of probe", kind);
+  throw UsageError("unknown kind of probe", kind);
 }
 
 }  // namespace regrade

@@ -39,9 +39,7 @@ ObjectWeights VoteForObject(const RunSettings& settings, const WorkingViews& wor
   for (int k = 0; k < masks.num_regions(); ++k)
     votes.emplace_back(*field.geometry, field.near_clip, MarchOptions{field.step});
   for (size_t n = 0; n < views.size(); ++n) {
-    if (Report(progress, static_cast<double>(n), static_cast<double>(views.size()),
-               "masks vote") == LoopControl::kStop)
-      throw Interrupted();
+    ReportOrThrow(progress, n, views.size(), "masks vote");
     const int i = views[n];
     if (!masks.Knows(i)) continue;
     const Camera camera = working_views.CameraOf(i);
@@ -60,10 +58,8 @@ void WriteObjectFile(const std::string& path, const ObjectWeights& weights) {
   for (const std::vector<float>& region : weights.regions)
     values.insert(values.end(), region.begin(), region.end());
   NpzWriter file;
-  file.Add(
-      "weights",
-      {static_cast<int64_t>(weights.regions.size()), static_cast<int64_t>(weights.all.size())},
-      values.data(), NpzPacking::kDeflate);
+  file.Add("weights", {std::ssize(weights.regions), std::ssize(weights.all)}, values.data(),
+           NpzPacking::kDeflate);
   file.AddScalar<int32_t>("regrade_version", 2);
   file.WriteTo(path);
 }
@@ -74,17 +70,15 @@ ObjectWeights ReadObjectFile(const std::string& path, int64_t voxels) {
   const NpzArray array = file.Read("weights", ArrayType::kF32, {-1, voxels});
   const int64_t regions = array.shape[0];
   if (regions < 1 || regions > ObjectMasks::kMostRegions)
-    throw Error(ExitCode::kInput, "holds " + std::to_string(regions) + " regions", path,
-                "run regrade stylize again");
+    throw InputError(Concat("holds ", regions, " regions"), path, "run regrade stylize again");
   ObjectWeights weights;
   for (int64_t k = 0; k < regions; ++k) {
     const float* first = array.As<float>() + k * voxels;
     weights.regions.emplace_back(first, first + voxels);
   }
   for (const std::vector<float>& region : weights.regions)
-    if (!std::all_of(region.begin(), region.end(), [](float e) { return e >= 0 && e <= 1; }))
-      throw Error(ExitCode::kInput, "holds a weight outside [0, 1]", path,
-                  "run regrade stylize again");
+    if (!std::ranges::all_of(region, [](float e) { return e >= 0 && e <= 1; }))
+      throw InputError("holds a weight outside [0, 1]", path, "run regrade stylize again");
   weights.all = SumOf(weights.regions);
   return weights;
 }
@@ -101,8 +95,8 @@ std::vector<Image> CoverageRenderer::Render(const Camera& camera) const {
     const Image color = RenderView(grid, camera, MarchOptions{step_}).color;
     Image region(color.width, color.height, 1);
     for (int64_t i = 0; i < region.num_pixels(); ++i) {
-      const float m = color.pixels[static_cast<size_t>(3 * i)];
-      region.pixels[static_cast<size_t>(i)] = m > kNothing ? m : 0;
+      const float m = color.pixels[3 * i];
+      region.pixels[i] = m > kNothing ? m : 0;
     }
     coverage.push_back(std::move(region));
   }

@@ -148,15 +148,15 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
   WriteCaptureIndex(workspace.Path("poses"), capture, ingest.photos);
   std::filesystem::remove_all(workspace.Path(kColmapPhotos));
   metrics.registered = static_cast<int>(capture.views.size());
-  metrics.points = static_cast<int64_t>(capture.points.size());
+  metrics.points = std::ssize(capture.points);
   metrics.reprojection_px = capture.points.empty() ? Metric::Undefined("there are no points")
                                                    : Metric(capture.reprojection_px);
   metrics.models_found = capture.models_found;
   PutMetrics(metrics, &outcome.metrics);
   outcome.outputs = {"poses"};
-  context->console->Info("registered " + std::to_string(capture.views.size()) + " of " +
-                         std::to_string(ingest.photos.size()) + " photos, " +
-                         std::to_string(capture.points.size()) + " points");
+  context->console->Info(Concat("registered ", capture.views.size(), " of ",
+                                ingest.photos.size(), " photos, ", capture.points.size(),
+                                " points"));
   return outcome;
 }
 
@@ -182,14 +182,15 @@ Stage PoseStage(RunContext* context) {
   if (const auto refine = overrides.find(kPoseRefinement); refine != overrides.end())
     stage.inputs[kPoseRefinement] = refine->second;
   if (const std::string folder = MasksOf(*context, source); !folder.empty())
-    stage.inputs["photo_masks"] = PhotoMaskFiles(folder);
+    stage.inputs["photo_masks"] = HashFolder(folder);
   stage.refuse_changes = true;
   const int64_t photos = static_cast<int64_t>(stage.inputs.At("photos").AsObject().size());
   stage.plan =
-      std::to_string(photos) + " files in " + source.photos +
-      (source.kind == CaptureKind::kPhotos
-           ? ", poses by COLMAP: " + PlanText(PlanPoses(photos, omp_get_max_threads()))
-           : ", poses from " + source.poses + PlannedTracks(context->settings, source, photos));
+      Concat(photos, " files in ", source.photos,
+             (source.kind == CaptureKind::kPhotos
+                  ? ", poses by COLMAP: " + PlanText(PlanPoses(photos, omp_get_max_threads()))
+                  : ", poses from " + source.poses +
+                        PlannedTracks(context->settings, source, photos)));
   stage.work = [context, source](const ProgressFunction& progress) {
     return FindPoses(context, source, progress);
   };

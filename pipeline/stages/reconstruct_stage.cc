@@ -7,6 +7,7 @@
 #include <functional>
 #include <string>
 
+#include "kernels/base/error.h"
 #include "kernels/device/device_memory.h"
 #include "kernels/image/detail_kept.h"
 #include "pipeline/capture/capture_store.h"
@@ -73,9 +74,7 @@ std::string QualityLine(const ReconstructReport& metrics) {
          (held_out ? " on held-out photos" : " on training photos");
 }
 
-int Finest(const FitOptions& options) {
-  return *std::max_element(options.resolutions.begin(), options.resolutions.end());
-}
+int Finest(const FitOptions& options) { return *std::ranges::max_element(options.resolutions); }
 
 // Memory and time of a fit of these views, by its options.
 std::function<StagePlan(const FitOptions&)> PlannerOf(const WorkingViews& views,
@@ -106,10 +105,10 @@ FitOptions OptionsForMemory(RunContext* context,
   // Free memory must not change the result of a reproducible run.
   if ((!settings.run.reproducible || settings.run.max_memory_gb > 0) &&
       LowerToMemory(plan_of, limit, &options))
-    context->console->Info("the finest grid has " + std::to_string(Finest(options)) +
-                           " voxels a side instead of " + std::to_string(Finest(settings.fit)) +
-                           " to fit into " +
-                           (settings.run.max_memory_gb > 0 ? "--max-memory" : "free memory"));
+    context->console->Info(
+        Concat("the finest grid has ", Finest(options), " voxels a side instead of ",
+               Finest(settings.fit), " to fit into ",
+               (settings.run.max_memory_gb > 0 ? "--max-memory" : "free memory")));
   const StagePlan plan = plan_of(options);
   context->console->Info("the fit will take " + PlanText(plan));
   CheckFitsMemory(plan, limit, on_device ? "GPU memory" : "memory");
@@ -135,9 +134,9 @@ EffectReport ProfileViewDependence(const RunSettings& settings, const FitOptions
     return row(true, Metric(), "too few unmasked pixels for a trial with held-out photos");
   return row(
       trial.Pays(), trial.gain_db,
-      "dB that harmonics of degree " + std::to_string(options.sh_degree) +
-          " gain over one colour for all directions, in a small trial on a held-out fifth "
-          "of the views");
+      Concat("dB that harmonics of degree ", options.sh_degree,
+             " gain over one colour for all directions, in a small trial on a held-out fifth "
+             "of the views"));
 }
 
 StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
@@ -186,13 +185,13 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
     context->console->Info("reconstruct: continues from its checkpoint");
   }
   if (training_views.empty())
-    throw Error(ExitCode::kInput, "leave nothing of any photo to fit",
-                settings.pose.photo_masks.empty() ? "the masks" : settings.pose.photo_masks,
-                "make the masks' white parts larger");
+    throw InputError(
+        "leave nothing of any photo to fit",
+        settings.pose.photo_masks.empty() ? "the masks" : settings.pose.photo_masks,
+        "make the masks' white parts larger");
   ProgressParts parts(progress, kTrial + 1 + kAfterFit);
   EffectReport& view_dependence =
-      *std::find_if(profile.effects.begin(), profile.effects.end(),
-                    [](const EffectReport& effect) { return effect.name == kViewDependence; });
+      *std::ranges::find(profile.effects, kViewDependence, &EffectReport::name);
   const ProgressFunction trial = parts.Next(kTrial);
   const double trial_begin = context->console->StageSeconds(), trial_cpu_begin = CpuSeconds();
   view_dependence = resume ? EffectsOfRecord(ParseJson(measured, "checkpoint")).at(0)

@@ -5,7 +5,6 @@
 #include "kernels/base/error.h"
 #include "kernels/field/cpu/rays.h"
 #include "pipeline/capture/capture_store.h"
-#include "pipeline/capture/photo_gains.h"
 #include "pipeline/capture/scene_profile.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/files/atomic_file.h"
@@ -35,9 +34,8 @@ PhotosReport PhotosOf(const Capture& capture) {
   PhotosReport photos;
   photos.given = static_cast<int>(capture.statuses.size());
   photos.registered = static_cast<int>(capture.views.size());
-  photos.used = static_cast<int>(std::count_if(
-      capture.statuses.begin(), capture.statuses.end(),
-      [](const PhotoStatus& photo) { return photo.status == PhotoState::kUsed; }));
+  photos.used = static_cast<int>(
+      std::ranges::count(capture.statuses, PhotoState::kUsed, &PhotoStatus::status));
   photos.statuses = capture.statuses;
   return photos;
 }
@@ -96,7 +94,7 @@ ReportPictures PicturesOf(const RunContext& context, const RunReport& report) {
   const int shown = std::min(count, kPagePictures);
   for (int k = 0; k < shown; ++k) {
     const int i = shown < 2 ? 0 : k * (count - 1) / (shown - 1);
-    const CaptureView& photo = capture.views[static_cast<size_t>(i)];
+    const CaptureView& photo = capture.views[i];
     const std::string name = FrameName(i);
     const Image picture = as_taken.Photo(i);
     ReportView view;

@@ -2,6 +2,7 @@
 #include <filesystem>
 #include <optional>
 
+#include "kernels/base/error.h"
 #include "kernels/image/color_statistics.h"
 #include "pipeline/capture/photo_gains.h"
 #include "pipeline/capture/working_views.h"
@@ -56,10 +57,9 @@ StageOutcome StyleViews(RunContext* context, const ProgressFunction& progress) {
   const std::unique_ptr<ViewStylizer> stylizer = MakeSceneStylizer(
       context, views, masks.get(),
       [&](const Image& view, int i) { return masks->Coverage(i, view.width, view.height); });
-  if (masks != nullptr && masks->num_known() < static_cast<int>(capture.views.size()))
-    context->console->Info(std::to_string(masks->num_known()) + " of " +
-                           std::to_string(capture.views.size()) +
-                           " photos have a mask; the style is learned from these");
+  if (masks != nullptr && masks->num_known() < std::ssize(capture.views))
+    context->console->Info(Concat(masks->num_known(), " of ", capture.views.size(),
+                                  " photos have a mask; the style is learned from these"));
   const std::vector<std::string> notices = stylizer->Notices();
   for (const std::string& notice : notices) context->console->Info(notice);
 
@@ -68,7 +68,7 @@ StageOutcome StyleViews(RunContext* context, const ProgressFunction& progress) {
   const int count = static_cast<int>(capture.views.size());
   int styled = 0;
   for (int i = 0; i < count; ++i) {
-    if (Report(progress, i, count) == LoopControl::kStop) throw Interrupted();
+    ReportOrThrow(progress, i, count);
     if (!stylizer->Knows(i) || (masks != nullptr && !masks->Knows(i))) continue;
     ++styled;
     Image photo = views.Photo(i);

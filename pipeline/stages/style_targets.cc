@@ -35,8 +35,7 @@ bool StyleTargets::Add(const StyleView& view) {
                          consensus_->Render(view.camera));
     for (int64_t p = 0; p < view.kept.num_pixels(); ++p) mask.pixels[p] *= view.kept.pixels[p];
     if (!CropToMask(mask, &training_view)) return false;
-  } else if (!mask.empty() &&
-             std::find(mask.pixels.begin(), mask.pixels.end(), 1.0f) == mask.pixels.end()) {
+  } else if (!mask.empty() && std::ranges::find(mask.pixels, 1.0f) == mask.pixels.end()) {
     return false;
   }
   targets_.Add(std::move(training_view), view.photo(), view.target(), std::move(mask));

@@ -4,7 +4,6 @@
 #include <functional>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "pipeline/fields/field_file.h"
 #include "pipeline/stages/object_edit.h"

@@ -3,10 +3,10 @@
 #include <omp.h>
 
 #include <algorithm>
-#include <cstdio>
 #include <filesystem>
 #include <utility>
 
+#include "kernels/base/error.h"
 #include "kernels/field/pad_sh_basis.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/fields/field_file.h"
@@ -64,14 +64,11 @@ std::string WhySteep(const TrainNetworkResult& trained) {
     reason = "the colour map that follows the 2D method already has such a norm";
   else if (of_places > of_colors - of_map)
     reason = "the 2D method maps the same colours differently in different views and places";
-  char text[400];
-  std::snprintf(text, sizeof text,
-                "the largest local Lipschitz constant, %.2f, is %.2f K_est: %s (the map alone "
-                "%.2f; at its maximum %.2f along coefficients and %.2f along positions)",
-                trained.local_lipschitz_sampled,
-                trained.local_lipschitz_sampled / trained.k_est, reason, of_map, of_colors,
-                of_places);
-  return text;
+  return Format(
+      "the largest local Lipschitz constant, %.2f, is %.2f K_est: %s (the map alone "
+      "%.2f; at its maximum %.2f along coefficients and %.2f along positions)",
+      trained.local_lipschitz_sampled, trained.local_lipschitz_sampled / trained.k_est, reason,
+      of_map, of_colors, of_places);
 }
 
 // Where no view shows the object: the scene keeps its colours.
@@ -166,8 +163,8 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
   if (object != nullptr) {
     WriteObjectFile(workspace.Path("object.npz"), weights);
     outcome.outputs.push_back("object.npz");
-    metrics.object_voxels = static_cast<int64_t>(
-        std::count_if(weights.all.begin(), weights.all.end(), [](float e) { return e > 0; }));
+    metrics.object_voxels =
+        static_cast<int64_t>(std::ranges::count_if(weights.all, [](float e) { return e > 0; }));
   } else {
     std::filesystem::remove(workspace.Path("object.npz"));  // of an earlier style
   }

@@ -1,9 +1,7 @@
 #include "pipeline/synth/synth_capture.h"
 
 #include <charconv>
-#include <cstdio>
 #include <filesystem>
-#include <string_view>
 #include <vector>
 
 #include "evaluate/flow_file.h"
@@ -26,9 +24,7 @@ namespace fs = std::filesystem;
 constexpr int kMinSide = 16, kMaxSide = 8192;  // pixels
 
 std::string FrameName(int index, const char* extension) {
-  char name[32];
-  std::snprintf(name, sizeof(name), "%05d%s", index, extension);
-  return name;
+  return Format("%05d%s", index, extension);
 }
 
 void ParseSize(const std::string& size, int* width, int* height) {
@@ -40,8 +36,8 @@ void ParseSize(const std::string& size, int* width, int* height) {
         *height >= kMinSide && *height <= kMaxSide)
       return;
   }
-  throw Error(ExitCode::kUsage, "\"" + size + "\" is not an image size", "--size",
-              "write WIDTHxHEIGHT, each from 16 to 8192, e.g. 640x480");
+  throw UsageError("\"" + size + "\" is not an image size", "--size",
+                   "write WIDTHxHEIGHT, each from 16 to 8192, e.g. 640x480");
 }
 
 JsonValue Vector(const Vec3d& v) { return JsonValue::Array{v.x, v.y, v.z}; }
@@ -117,8 +113,8 @@ void ClaimFolder(const fs::path& out, const JsonValue& description, bool with_ma
     std::error_code error;
     fs::create_directories(out / folder, error);
     if (error)
-      throw Error(ExitCode::kResources, "cannot create a folder: " + error.message(),
-                  (out / folder).string());
+      throw ResourceError("cannot create a folder: " + error.message(),
+                          (out / folder).string());
   }
   WriteJsonFile(record.string(), description);
 }
@@ -174,8 +170,7 @@ void WriteSyntheticCapture(const std::string& out, const SynthOptions& options,
       WriteMotion(truth, i, TrueMotion(scene, cameras[i], cameras[i + 1]));
     frames.push_back({"../images/" + name, cameras[i]});
     if (effects.poses) depths.push_back(std::move(view.depth));
-    const LoopControl control = Report(progress, i + 1, options.views, name);
-    if (control == LoopControl::kStop) throw Interrupted();
+    ReportOrThrow(progress, i + 1, options.views, name);
   }
   WriteTransformsJson((truth / "transforms.json").string(), frames);
   if (!effects.poses) return;

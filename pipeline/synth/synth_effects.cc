@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <string_view>
 
 #include "kernels/base/error.h"
 #include "kernels/base/random.h"
@@ -9,6 +11,24 @@
 #include "kernels/scene/srgb.h"
 
 namespace regrade {
+
+namespace {
+
+struct NamedEffect {
+  std::string_view name;
+  bool SynthEffects::*member;
+};
+constexpr NamedEffect kEffects[] = {{"exposure", &SynthEffects::exposure},
+                                    {"noise", &SynthEffects::noise},
+                                    {"distortion", &SynthEffects::distortion},
+                                    {"barrel", &SynthEffects::barrel},
+                                    {"fisheye", &SynthEffects::fisheye},
+                                    {"highlights", &SynthEffects::highlights},
+                                    {"masks", &SynthEffects::masks},
+                                    {"poses", &SynthEffects::poses},
+                                    {"mixed-cameras", &SynthEffects::mixed_cameras}};
+
+}  // namespace
 
 SynthEffects ParseSynthEffects(const std::string& list) {
   constexpr char kHint[] =
@@ -20,32 +40,16 @@ SynthEffects ParseSynthEffects(const std::string& list) {
     const size_t end = std::min(list.find(',', begin), list.size());
     const std::string name = list.substr(begin, end - begin);
     begin = end + 1;
-    if (name == "exposure")
-      effects.exposure = true;
-    else if (name == "noise")
-      effects.noise = true;
-    else if (name == "distortion")
-      effects.distortion = true;
-    else if (name == "barrel")
-      effects.barrel = true;
-    else if (name == "fisheye")
-      effects.fisheye = true;
-    else if (name == "highlights")
-      effects.highlights = true;
-    else if (name == "masks")
-      effects.masks = true;
-    else if (name == "poses")
-      effects.poses = true;
-    else if (name == "mixed-cameras")
-      effects.mixed_cameras = true;
+    const auto known = std::ranges::find(kEffects, name, &NamedEffect::name);
+    if (known != std::end(kEffects))
+      effects.*known->member = true;
     else if (name == "motion-blur" || name == "occluders")
-      throw Error(ExitCode::kUsage, "the effect \"" + name + "\" is not supported", "--effects",
-                  kHint);
+      throw UsageError("the effect \"" + name + "\" is not supported", "--effects", kHint);
     else
-      throw Error(ExitCode::kUsage, "there is no effect \"" + name + "\"", "--effects", kHint);
+      throw UsageError("there is no effect \"" + name + "\"", "--effects", kHint);
   }
   if (effects.distortion + effects.barrel + effects.fisheye > 1)
-    throw Error(ExitCode::kUsage, "only one lens is possible", "--effects", kHint);
+    throw UsageError("only one lens is possible", "--effects", kHint);
   return effects;
 }
 

@@ -37,11 +37,6 @@ Mat3d RotationAbout(const Vec3d& axis, double angle) {
   return rotation;
 }
 
-ColmapLens LensOf(const Camera& camera) {
-  if (camera.lens == LensModel::kFisheye) return ColmapLens::kOpenCvFisheye;
-  return camera.lens == LensModel::kOpenCv ? ColmapLens::kOpenCv : ColmapLens::kPinhole;
-}
-
 // Adds the point and its keypoints in the views that see it; omits points with fewer than two.
 void AddTrack(const std::vector<Camera>& cameras, const std::vector<Image>& depths,
               const Vec3d& position, uint64_t seed, ColmapModel* model) {
@@ -75,13 +70,12 @@ ColmapModel TracksOf(const std::vector<Camera>& cameras, const std::vector<Image
   ColmapModel model;
   if (cameras.empty()) return model;
   for (size_t v = 0; v < cameras.size(); ++v) {
-    const auto known = std::find_if(model.cameras.begin(), model.cameras.end(),
-                                    [&](const ColmapCamera& camera) {
-                                      return camera.intrinsics.SameIntrinsics(cameras[v]);
-                                    });
+    const auto known = std::ranges::find_if(model.cameras, [&](const ColmapCamera& camera) {
+      return camera.intrinsics.SameIntrinsics(cameras[v]);
+    });
     const uint32_t id = static_cast<uint32_t>(known - model.cameras.begin()) + 1;
     if (known == model.cameras.end()) {
-      model.cameras.push_back({id, LensOf(cameras[v]), cameras[v]});
+      model.cameras.push_back({id, ColmapLensOf(cameras[v].lens), cameras[v]});
       model.cameras.back().intrinsics.camera_from_world = {};
     }
     model.images.push_back(

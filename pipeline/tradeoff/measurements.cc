@@ -49,15 +49,14 @@ MeasurementStore::MeasurementStore(const std::string& path, const std::string& f
   try {
     const JsonValue file = ReadJsonFile(path);
     if (const int64_t schema = file.At("schema").AsInt(); schema != kSchema)
-      throw Error(ExitCode::kInput, "it has schema " + std::to_string(schema) +
-                                        ", and this version reads schema " +
-                                        std::to_string(kSchema));
+      throw InputError(
+          Concat("it has schema ", schema, ", and this version reads schema ", kSchema));
     if (file.At("fingerprint").AsString() != fingerprint) return;
     for (const JsonValue& row : file.At("measurements").AsArray())
       all_.push_back(FromJson(row));
   } catch (const Error& error) {
-    throw Error(ExitCode::kInput, error.what_failed(), path,
-                "delete this file: its measurements will be repeated");
+    throw InputError(error.what_failed(), path,
+                     "delete this file: its measurements will be repeated");
   }
 }
 

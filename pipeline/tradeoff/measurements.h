@@ -1,7 +1,6 @@
 // Stores measurements on disk one by one, so that an interruption loses only the current one.
 #pragma once
 
-#include <optional>
 #include <string>
 #include <vector>
 

@@ -44,7 +44,7 @@ class VariantList {
            const std::vector<JsonValue>& values, bool last_is_accurate = true) {
     names_.push_back(parameter);
     if (!choice_.only.empty() &&
-        std::find(choice_.only.begin(), choice_.only.end(), parameter) == choice_.only.end())
+        std::ranges::find(choice_.only, parameter) == choice_.only.end())
       return;
     for (const JsonValue& value : values) {
       if (Same(value, own)) continue;
@@ -57,12 +57,12 @@ class VariantList {
 
   std::vector<Variant> Take() {
     for (const std::string& name : choice_.only)
-      if (std::find(names_.begin(), names_.end(), name) == names_.end()) {
+      if (std::ranges::find(names_, name) == names_.end()) {
         std::string known;
         for (const std::string& parameter : names_)
           known += (known.empty() ? "" : ", ") + parameter;
-        throw Error(ExitCode::kUsage, "'" + name + "' is not a measured parameter",
-                    "--parameters", "parameters: " + known);
+        throw UsageError("'" + name + "' is not a measured parameter", "--parameters",
+                         "parameters: " + known);
       }
     return std::move(variants_);
   }
@@ -108,7 +108,7 @@ void AddStyleParameters(const RunSettings& base, VariantList* list) {
 const Benchmark& BenchmarkOf(const std::string& name) {
   for (const Benchmark& benchmark : kBenchmarks)
     if (name == benchmark.name) return benchmark;
-  throw Error(ExitCode::kInput, "'" + name + "' is not a benchmark");
+  throw InputError("'" + name + "' is not a benchmark");
 }
 
 JsonValue PresetOptions(const std::string& preset) {
@@ -143,7 +143,7 @@ std::vector<Variant> VariantsOf(const RunSettings& base, const ParameterChoice& 
   // Removes the base of benchmarks without a chosen parameter.
   std::erase_if(variants, [&](const Variant& variant) {
     return variant.parameter.empty() &&
-           std::none_of(variants.begin(), variants.end(), [&](const Variant& other) {
+           std::ranges::none_of(variants, [&](const Variant& other) {
              return other.benchmark == variant.benchmark && !other.parameter.empty();
            });
   });

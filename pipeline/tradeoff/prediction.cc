@@ -1,7 +1,6 @@
 #include "pipeline/tradeoff/prediction.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "kernels/base/error.h"
 #include "kernels/scene/common_camera.h"
@@ -146,7 +145,7 @@ double AmountOf(const std::string& unit, const RunSettings& settings, const Capt
       pairs += std::max(0.0, photos - gap) + std::max(0.0, film - gap);
     return pairs * common_frame;
   }
-  throw Error(ExitCode::kInput, "'" + unit + "' is not a unit of work");
+  throw InputError("'" + unit + "' is not a unit of work");
 }
 
 std::vector<CostTerm> LearnCosts(const RunSettings& base, const Capture& capture,
@@ -164,8 +163,7 @@ std::vector<CostTerm> LearnCosts(const RunSettings& base, const Capture& capture
     for (const Measurement& m : measurements) {
       const bool relevant =
           m.parameter.empty() ||
-          std::any_of(stage.parameters.begin(), stage.parameters.end(),
-                      [&m](const char* parameter) { return m.parameter == parameter; });
+          std::ranges::find(stage.parameters, m.parameter) != stage.parameters.end();
       if (m.benchmark != stage.benchmark || !relevant) continue;
       for (const Variant& variant : variants)
         if (variant.benchmark == m.benchmark && variant.parameter == m.parameter &&
@@ -207,8 +205,7 @@ std::vector<StageTime> Predict(const std::vector<CostTerm>& costs, const RunSett
                                const Capture& capture) {
   std::vector<StageTime> times;
   for (const CostTerm& term : costs) {
-    auto at = std::find_if(times.begin(), times.end(),
-                           [&term](const StageTime& time) { return time.stage == term.stage; });
+    auto at = std::ranges::find(times, term.stage, &StageTime::stage);
     if (at == times.end()) at = times.insert(times.end(), {term.stage, 0, 0});
     const double amount = AmountOf(term.unit, settings, capture);
     at->seconds += amount * term.seconds;
@@ -236,8 +233,8 @@ std::vector<CostTerm> CostsFromJson(const JsonValue& json, const std::string& wh
                        row.At("seconds").AsDouble(), row.At("cpu_seconds").AsDouble()});
     return costs;
   } catch (const Error& error) {
-    throw Error(ExitCode::kInput, error.what_failed(), where,
-                "give a tradeoff.json from `regrade tradeoff`");
+    throw InputError(error.what_failed(), where,
+                     "give a tradeoff.json from `regrade tradeoff`");
   }
 }
 

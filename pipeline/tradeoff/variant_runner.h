@@ -3,7 +3,6 @@
 
 #include <memory>
 #include <string>
-#include <vector>
 
 #include "pipeline/run/run_context.h"
 #include "pipeline/tradeoff/measurements.h"

@@ -44,7 +44,7 @@ struct Holder {
 
   std::string Text() const {
     if (pid == 0) return "another run (it has not identified itself yet)";
-    return "process " + std::to_string(pid) + " on " + host + ", started " + start;
+    return Concat("process ", pid, " on ", host, ", started ", start);
   }
   bool AliveHere() const {
     return pid > 0 && host == HostName() &&
@@ -82,9 +82,8 @@ FolderLock::FolderLock(const std::string& path, bool break_lock) {
   while (true) {
     fd_.Reset(::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0644));
     if (fd_.get() < 0)
-      throw Error(ExitCode::kResources,
-                  std::string("cannot write here: ") + std::strerror(errno), path,
-                  "choose another folder with --out, or correct its permissions");
+      throw ResourceError(std::string("cannot write here: ") + std::strerror(errno), path,
+                          "choose another folder with --out, or correct its permissions");
     int status;
     do status = ::flock(fd_.get(), LOCK_EX | LOCK_NB);
     while (status != 0 && errno == EINTR);
@@ -93,9 +92,9 @@ FolderLock::FolderLock(const std::string& path, bool break_lock) {
       const int error = errno;
       const Holder holder = ReadHolder(fd_.get());
       if (error != EWOULDBLOCK)
-        throw Error(ExitCode::kResources,
-                    std::string("this file system cannot lock files: ") + std::strerror(error),
-                    path, "choose a folder on a local disk with --out");
+        throw ResourceError(
+            std::string("this file system cannot lock files: ") + std::strerror(error), path,
+            "choose a folder on a local disk with --out");
       const bool may_break = break_lock && !holder.AliveHere();
       if (!may_break)
         throw Error(ExitCode::kFolderInUse, "in use by " + holder.Text(), folder,
@@ -103,16 +102,16 @@ FolderLock::FolderLock(const std::string& path, bool break_lock) {
                                : "wait for it or end it; if that run has certainly ended (a "
                                  "network drive can keep its lock), add --break-lock");
       if (::unlink(path.c_str()) != 0 && errno != ENOENT)
-        throw Error(ExitCode::kResources,
-                    std::string("cannot remove the lock: ") + std::strerror(errno), path);
+        throw ResourceError(std::string("cannot remove the lock: ") + std::strerror(errno),
+                            path);
       break_lock = false;
     }
   }
   const std::string text = HolderText();
   if (::ftruncate(fd_.get(), 0) != 0 ||
       ::pwrite(fd_.get(), text.data(), text.size(), 0) != static_cast<ssize_t>(text.size())) {
-    throw Error(ExitCode::kResources, std::string("cannot write: ") + std::strerror(errno),
-                path, "free some space, or choose another folder with --out");
+    throw ResourceError(std::string("cannot write: ") + std::strerror(errno), path,
+                        "free some space, or choose another folder with --out");
   }
 }
 

@@ -12,8 +12,7 @@ Metric MetricAt(const JsonValue& object, const std::string& key) {
   if (value.IsNumber()) return value.AsDouble();
   const JsonValue* why = object.Find(key + "_why");
   if (!value.IsNull() || why == nullptr || !why->IsString())
-    throw Error(
-        ExitCode::kInput,
+    throw InputError(
         "\"" + key + "\" is neither a number nor null with a reason in \"" + key + "_why\"",
         value.line() > 0 ? "line " + std::to_string(value.line()) : "");
   return Metric::Undefined(why->AsString());

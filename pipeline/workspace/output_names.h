@@ -1,8 +1,9 @@
 // Names of files in the output folder.
 #pragma once
 
-#include <cstdio>
 #include <string>
+
+#include "kernels/base/error.h"
 
 namespace regrade {
 
@@ -15,10 +16,6 @@ inline constexpr char kPathPrefix[] = "path_";
 inline constexpr char kCommonPrefix[] = "common_";
 
 // "00007.png"
-inline std::string FrameName(int index) {
-  char name[32];
-  std::snprintf(name, sizeof name, "%05d.png", index);
-  return name;
-}
+inline std::string FrameName(int index) { return Format("%05d.png", index); }
 
 }  // namespace regrade

@@ -10,6 +10,7 @@
 #include "kernels/base/file_descriptor.h"
 #include "kernels/base/hash.h"
 #include "pipeline/files/atomic_file.h"
+#include "pipeline/files/folder_listing.h"
 
 namespace regrade {
 namespace {
@@ -18,11 +19,6 @@ namespace fs = std::filesystem;
 
 constexpr int64_t kSchema = 2;
 constexpr size_t kNamedDifferences = 4;
-
-bool EndsWith(const std::string& text, const std::string& end) {
-  return text.size() >= end.size() &&
-         text.compare(text.size() - end.size(), end.size(), end) == 0;
-}
 
 std::string Shown(const JsonValue& value) {
   std::string text = value.IsString() ? value.AsString() : DumpJson(value, -1);
@@ -52,7 +48,7 @@ void AddDifferences(const std::string& path, const JsonValue& was, const JsonVal
   if (!path.empty() && here.size() > kNamedDifferences) {
     const size_t more = here.size() - kNamedDifferences;
     here.resize(kNamedDifferences);
-    here.push_back("and " + std::to_string(more) + " more differences of " + path);
+    here.push_back(Concat("and ", more, " more differences of ", path));
   }
   result->insert(result->end(), here.begin(), here.end());
 }
@@ -79,11 +75,18 @@ std::string HashFile(const std::string& path) {
   return HashText(hasher.Value());
 }
 
+JsonValue HashFolder(const std::string& folder) {
+  JsonValue hashes = JsonValue::Object();
+  for (const ListedFile& file : ListFolder(folder).files)
+    if (file.problem.empty()) hashes[file.name] = HashFile(file.path);
+  return hashes;
+}
+
 std::vector<StageOutput> DescribeOutputs(const std::string& root,
                                          const std::vector<std::string>& paths) {
   std::vector<StageOutput> outputs;
   const auto add = [&](const fs::path& file) {
-    if (EndsWith(file.string(), kTemporarySuffix)) return;
+    if (file.string().ends_with(kTemporarySuffix)) return;
     outputs.push_back({file.lexically_relative(root).generic_string(),
                        static_cast<int64_t>(fs::file_size(file)), HashFile(file.string())});
   };
@@ -95,11 +98,10 @@ std::vector<StageOutput> DescribeOutputs(const std::string& root,
     } else if (fs::is_regular_file(full)) {
       add(full);
     } else {
-      throw Error(ExitCode::kInput, "this result is missing", full.string());
+      throw InputError("this result is missing", full.string());
     }
   }
-  std::sort(outputs.begin(), outputs.end(),
-            [](const StageOutput& a, const StageOutput& b) { return a.path < b.path; });
+  std::ranges::sort(outputs, {}, &StageOutput::path);
   return outputs;
 }
 
@@ -144,9 +146,8 @@ JsonValue ToJson(const StageRecord& record) {
 void CheckRecordSchema(const JsonValue& value, const std::string& where) {
   const JsonValue* schema = value.Find("schema");
   if (schema == nullptr || !schema->IsNumber() || schema->AsDouble() >= kSchema) return;
-  throw Error(ExitCode::kInput,
-              "made by an older regrade (schema " + DumpJson(*schema, -1) + ")", where,
-              "use another --out, or delete the output folder");
+  throw InputError("made by an older regrade (schema " + DumpJson(*schema, -1) + ")", where,
+                   "use another --out, or delete the output folder");
 }
 
 StageRecord StageRecordFromJson(const JsonValue& value, const std::string& where) {
@@ -155,17 +156,16 @@ StageRecord StageRecordFromJson(const JsonValue& value, const std::string& where
     record.version = value.At("regrade").AsString();
     const int64_t schema = value.At("schema").AsInt();
     if (schema > kSchema)
-      throw Error(ExitCode::kInput,
-                  "written by regrade " + record.version + ", this is " REGRADE_VERSION, where,
-                  "update regrade; nothing has been touched");
+      throw InputError("written by regrade " + record.version + ", this is " REGRADE_VERSION,
+                       where, "update regrade; nothing has been touched");
     CheckRecordSchema(value, where);
     record.inputs = value.At("inputs");
     for (const JsonValue& output : value.At("outputs").AsArray()) {
       // Paths out of the folder are refused.
       const fs::path path = output.At("path").AsString();
       if (path.is_absolute() || path.lexically_normal() != path ||
-          EndsWith(path.string(), "/") || *path.begin() == "..")
-        throw Error(ExitCode::kInput, "a path that leads out of the folder");
+          path.string().ends_with("/") || *path.begin() == "..")
+        throw InputError("a path that leads out of the folder");
       record.outputs.push_back(
           {path.string(), output.At("bytes").AsInt(), output.At("hash").AsString()});
     }
@@ -174,8 +174,8 @@ StageRecord StageRecordFromJson(const JsonValue& value, const std::string& where
     record.metrics = value.At("metrics");
   } catch (const Error& error) {
     if (!error.hint().empty()) throw;
-    throw Error(ExitCode::kInput, error.what_failed(), where,
-                "delete this file: its stage will be done again");
+    throw InputError(error.what_failed(), where,
+                     "delete this file: its stage will be done again");
   }
   return record;
 }

@@ -31,6 +31,9 @@ struct StageRecord {
 // Content hash of a regular file, read in pieces. Throws Error(kInput).
 std::string HashFile(const std::string& path);
 
+// {name: hash} of the usable files of a folder. Errors as ListFolder.
+JsonValue HashFolder(const std::string& folder);
+
 // Hashes files, and all regular files in folders, given relative to `root`; our temporaries are
 // left out. Throws Error(kInput) if one is missing.
 std::vector<StageOutput> DescribeOutputs(const std::string& root,

@@ -45,8 +45,7 @@ bool StageRunner::Run(const Stage& stage) {
     return true;
   }
   if (status.state == StageState::kInputsDiffer && stage.refuse_changes)
-    throw Error(
-        ExitCode::kInput,
+    throw InputError(
         "stage " + stage.name + " was done from other inputs (" + Join(status.why, "; ") + ")",
         workspace_->folder(),
         "use the old ones, another --out, or --restart-from " + stage.name +
@@ -69,9 +68,8 @@ bool StageRunner::Run(const Stage& stage) {
   try {
     outcome = stage.work(console_->StageProgress());
   } catch (const std::bad_alloc&) {
-    throw Error(ExitCode::kResources, "out of memory in stage " + stage.name,
-                workspace_->folder(),
-                "close other programs, use --preset draft, or set --max-memory");
+    throw ResourceError("out of memory in stage " + stage.name, workspace_->folder(),
+                        "close other programs, use --preset draft, or set --max-memory");
   }
   const double seconds = console_->StageSeconds();
   workspace_->Record(stage.name, stage.inputs, outcome.outputs, seconds, outcome.metrics,
@@ -85,12 +83,12 @@ bool StageRunner::Run(const Stage& stage) {
 StageRecord StageRunner::Require(const std::string& stage, const std::string& how) const {
   const std::optional<StageRecord> record = workspace_->Find(stage);
   if (!record)
-    throw Error(ExitCode::kInput, "stage " + stage + " has not been done here",
-                workspace_->folder(), "run `" + how + "` first");
+    throw InputError("stage " + stage + " has not been done here", workspace_->folder(),
+                     "run `" + how + "` first");
   const std::vector<std::string> changed = ChangedOutputs(workspace_->folder(), *record);
   if (!changed.empty())
-    throw Error(ExitCode::kInput, Join(changed, "; "), workspace_->folder(),
-                "run `" + how + "` again: it will redo that stage");
+    throw InputError(Join(changed, "; "), workspace_->folder(),
+                     "run `" + how + "` again: it will redo that stage");
   return *record;
 }
 

@@ -25,18 +25,17 @@ void RefuseForeignFolder(const std::string& folder) {
   if (Workspace::Exists(folder)) return;
   for (const char* name : kResultNames)
     if (fs::exists(fs::path(folder) / name))
-      throw Error(ExitCode::kInput,
-                  std::string("holds '") + name + "', which regrade did not write", folder,
-                  "choose an empty or new folder with --out");
+      throw InputError(std::string("holds '") + name + "', which regrade did not write", folder,
+                       "choose an empty or new folder with --out");
 }
 
 void MakeFolder(const std::string& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
   if (error || !fs::is_directory(folder))
-    throw Error(ExitCode::kResources,
-                error ? "cannot make this folder: " + error.message() : "is not a folder",
-                folder, "choose another folder with --out");
+    throw ResourceError(
+        error ? "cannot make this folder: " + error.message() : "is not a folder", folder,
+        "choose another folder with --out");
 }
 
 // The lock is held: no other run is writing them.
@@ -47,9 +46,7 @@ void RemoveTemporaries(const std::string& folder) {
   for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end;
        it.increment(error)) {
     const std::string name = it->path().filename().string();
-    if (name.size() > suffix.size() &&
-        name.compare(name.size() - suffix.size(), suffix.size(), suffix) == 0)
-      found.push_back(it->path());
+    if (name.size() > suffix.size() && name.ends_with(suffix)) found.push_back(it->path());
   }
   for (const fs::path& path : found) fs::remove_all(path, error);
 }
@@ -65,8 +62,8 @@ Workspace::Workspace(const std::string& folder, bool break_lock) {
   std::error_code error;
   folder_ = fs::absolute(folder, error).lexically_normal().string();
   if (error)
-    throw Error(ExitCode::kResources, "the working folder is gone: " + error.message(), folder,
-                "give an absolute path with --out");
+    throw ResourceError("the working folder is gone: " + error.message(), folder,
+                        "give an absolute path with --out");
   while (folder_.size() > 1 && folder_.back() == '/') folder_.pop_back();
   MakeFolder(folder_);
   RefuseForeignFolder(folder_);
@@ -146,7 +143,7 @@ std::vector<std::string> Workspace::FinishedStages() const {
   std::vector<std::string> stages;
   for (const auto& entry : fs::directory_iterator(Path(".regrade/stages")))
     if (entry.path().extension() == ".json") stages.push_back(entry.path().stem().string());
-  std::sort(stages.begin(), stages.end());
+  std::ranges::sort(stages);
   return stages;
 }
 
@@ -168,8 +165,7 @@ std::optional<std::string> Workspace::LoadCheckpoint(const std::string& stage,
   if (!fs::is_regular_file(path)) return std::nullopt;
   std::string blob = ReadWholeFile(path, kMaxCheckpoint);
   const size_t header = kCheckpointMark.size() + 2 * kHashDigits;
-  if (blob.size() < header || blob.compare(0, kCheckpointMark.size(), kCheckpointMark) != 0)
-    return std::nullopt;
+  if (blob.size() < header || !blob.starts_with(kCheckpointMark)) return std::nullopt;
   const std::string_view view = blob;
   const std::string_view of_inputs = view.substr(kCheckpointMark.size(), kHashDigits);
   const std::string_view of_bytes =

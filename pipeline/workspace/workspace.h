@@ -7,7 +7,6 @@
 //   .regrade/log.txt            messages
 #pragma once
 
-#include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>

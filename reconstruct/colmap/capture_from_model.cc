@@ -11,20 +11,18 @@
 namespace regrade {
 namespace {
 
-std::string SizeText(int width, int height) {
-  return std::to_string(width) + " x " + std::to_string(height);
-}
+std::string SizeText(int width, int height) { return Concat(width, " x ", height); }
 
 CaptureView ViewOf(const ColmapModel& model, const ColmapImage& image,
                    const StagedPhoto& photo) {
   const Camera camera = model.CameraOf(image);
   if (camera.width != photo.width || camera.height != photo.height)
-    throw Error(ExitCode::kInput,
-                "the photo has " + SizeText(photo.width, photo.height) +
-                    " pixels, its camera in the model " + SizeText(camera.width, camera.height),
-                photo.file,
-                "the poses belong to pictures of another size or orientation (COLMAP ignores "
-                "EXIF orientation); use those pictures, or compute poses for the photos");
+    throw InputError(
+        "the photo has " + SizeText(photo.width, photo.height) +
+            " pixels, its camera in the model " + SizeText(camera.width, camera.height),
+        photo.file,
+        "the poses belong to pictures of another size or orientation (COLMAP ignores "
+        "EXIF orientation); use those pictures, or compute poses for the photos");
   return {photo.name, photo.file, photo.path, camera};
 }
 
@@ -49,10 +47,10 @@ Capture CaptureFromModel(const ColmapModel& model, const std::vector<StagedPhoto
     capture.statuses.push_back({photo.file, PhotoState::kUsed, ""});
   }
   if (capture.views.empty())
-    throw Error(ExitCode::kInput, "no image name of the model is the name of a photo", "",
-                model.images.empty()
-                    ? "the model has no images"
-                    : "the model's first image is \"" + model.images.front().name + "\"");
+    throw InputError("no image name of the model is the name of a photo", "",
+                     model.images.empty()
+                         ? "the model has no images"
+                         : "the model's first image is \"" + model.images.front().name + "\"");
   for (const ColmapImage& image : model.images)
     if (view_of_image.count(image.id) == 0)
       capture.statuses.push_back(
@@ -77,7 +75,7 @@ Capture CaptureFromModel(const ColmapModel& model, const std::vector<StagedPhoto
       point_sum += std::hypot(u - keypoint.u, v - keypoint.v);
       ++point_observations;
     }
-    std::sort(point.views.begin(), point.views.end());
+    std::ranges::sort(point.views);
     point.views.erase(std::unique(point.views.begin(), point.views.end()), point.views.end());
     if (point.views.size() < 2) continue;
     if (point_observations > 0) point.reprojection_error = point_sum / point_observations;

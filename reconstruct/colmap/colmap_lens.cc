@@ -27,4 +27,18 @@ const ColmapLensInfo& InfoOf(ColmapLens lens) {
   return kLenses[number];
 }
 
+ColmapLens ColmapLensOf(LensModel lens) {
+  switch (lens) {
+    case LensModel::kPinhole:
+      return ColmapLens::kPinhole;
+    case LensModel::kOpenCv:
+      return ColmapLens::kOpenCv;
+    case LensModel::kFullOpenCv:
+      return ColmapLens::kFullOpenCv;
+    case LensModel::kFisheye:
+      return ColmapLens::kOpenCvFisheye;
+  }
+  return ColmapLens::kPinhole;
+}
+
 }  // namespace regrade

@@ -35,6 +35,9 @@ struct ColmapLensInfo {
 
 const ColmapLensInfo& InfoOf(ColmapLens lens);
 
+// The model with the parameters of ours, and two focal lengths.
+ColmapLens ColmapLensOf(LensModel lens);
+
 inline const char* ColmapLensName(ColmapLens lens) { return InfoOf(lens).name; }
 
 }  // namespace regrade

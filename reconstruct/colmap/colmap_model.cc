@@ -10,7 +10,6 @@
 #include <cstring>
 #include <fstream>
 #include <set>
-#include <sstream>
 
 #include "kernels/base/checked_math.h"
 #include "kernels/base/error.h"
@@ -40,13 +39,13 @@ class Reader {
     const bool text = !file;
     if (text) file.open(folder + "/" + name + ".txt", std::ios::binary | std::ios::ate);
     if (!file)
-      throw Error(ExitCode::kInput, "cannot open it", path_,
-                  "a COLMAP model needs cameras, images and points3D, as .bin or .txt");
-    bytes_.resize(static_cast<size_t>(std::max<std::streamoff>(0, file.tellg())));
+      throw InputError("cannot open it", path_,
+                       "a COLMAP model needs cameras, images and points3D, as .bin or .txt");
+    bytes_.resize(std::max<std::streamoff>(0, file.tellg()));
     file.seekg(0);
     if (!bytes_.empty() &&
         !file.read(bytes_.data(), static_cast<std::streamsize>(bytes_.size())))
-      throw Error(ExitCode::kInput, "cannot read it", path_);
+      throw InputError("cannot read it", path_);
     if (!text) return;
     path_ = folder + "/" + name + ".txt";
     bytes_ = BinaryOfColmapText(name, bytes_, path_);
@@ -72,8 +71,8 @@ class Reader {
     const uint64_t count = Read<uint64_t>("a count");
     const auto needed = CheckedMul(count, smallest);
     if (!needed || *needed > Left())
-      Fail("the count of " + std::string(what) + " is " + std::to_string(count) +
-           ", but only " + std::to_string(Left()) + " bytes follow");
+      Fail(
+          Concat("the count of ", what, " is ", count, ", but only ", Left(), " bytes follow"));
     return static_cast<size_t>(count);
   }
 
@@ -94,8 +93,7 @@ class Reader {
   }
 
   [[noreturn]] void Fail(const std::string& why) const {
-    throw Error(ExitCode::kInput, why + ", at byte " + std::to_string(position_), path_,
-                kDamagedHint);
+    throw InputError(Concat(why, ", at byte ", position_), path_, kDamagedHint);
   }
 
  private:
@@ -115,23 +113,21 @@ std::vector<ColmapCamera> ReadCameras(const std::string& folder) {
     camera.id = reader.Read<uint32_t>("a camera");
     const int32_t lens = reader.Read<int32_t>("a camera");
     if (lens < 0 || lens >= kNumColmapLenses)
-      reader.Fail(CameraText(camera.id) + " has the unknown camera model " +
-                  std::to_string(lens));
+      reader.Fail(Concat(CameraText(camera.id), " has the unknown camera model ", lens));
     camera.lens = static_cast<ColmapLens>(lens);
     const ColmapLensInfo& info = InfoOf(camera.lens);
     if (info.focals == 0)
-      throw Error(ExitCode::kInput,
-                  CameraText(camera.id) + " has the camera model " + info.name +
-                      ", which is not supported",
-                  folder + "/cameras.bin",
-                  "run colmap image_undistorter, or pose the photos with OPENCV or "
-                  "OPENCV_FISHEYE");
+      throw InputError(CameraText(camera.id) + " has the camera model " + info.name +
+                           ", which is not supported",
+                       folder + "/cameras.bin",
+                       "run colmap image_undistorter, or pose the photos with OPENCV or "
+                       "OPENCV_FISHEYE");
     Camera& c = camera.intrinsics;
     const uint64_t width = reader.Read<uint64_t>("a camera");
     const uint64_t height = reader.Read<uint64_t>("a camera");
     if (width < 1 || height < 1 || width > kLargestSide || height > kLargestSide)
-      reader.Fail(CameraText(camera.id) + " has the picture size " + std::to_string(width) +
-                  " x " + std::to_string(height));
+      reader.Fail(
+          Concat(CameraText(camera.id), " has the picture size ", width, " x ", height));
     c.width = static_cast<int>(width);
     c.height = static_cast<int>(height);
     c.fx = reader.ReadFinite("a focal length");
@@ -165,11 +161,9 @@ Mat3d ReadRotation(Reader& reader, uint32_t image_id) {
   for (double& component : wxyz) component = reader.ReadFinite("a quaternion");
   const Eigen::Quaterniond q(wxyz[0], wxyz[1], wxyz[2], wxyz[3]);
   const double norm = q.norm();
-  if (!(std::abs(norm - 1) <= kQuaternionTolerance)) {
-    std::ostringstream text;
-    text << "image " << image_id << " has a rotation quaternion of length " << norm;
-    reader.Fail(text.str());
-  }
+  if (!(std::abs(norm - 1) <= kQuaternionTolerance))
+    reader.Fail(Format("image %u has a rotation quaternion of length %g", image_id, norm));
+
   Mat3d rotation;
   Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(&rotation(0, 0)) =
       q.normalized().toRotationMatrix();
@@ -230,38 +224,36 @@ const Record* FindById(const std::vector<Record>& records, uint64_t id) {
 
 [[noreturn]] void FailLink(const std::string& folder, const char* file,
                            const std::string& why) {
-  throw Error(ExitCode::kInput, why, folder + "/" + file, kDamagedHint);
+  throw InputError(why, folder + "/" + file, kDamagedHint);
 }
 
 template <typename Record>
 void SortById(std::vector<Record>& records, const std::string& folder, const char* file) {
-  std::stable_sort(records.begin(), records.end(),
-                   [](const Record& a, const Record& b) { return a.id < b.id; });
+  std::ranges::stable_sort(records, {}, &Record::id);
   for (size_t i = 1; i < records.size(); ++i)
     if (records[i].id == records[i - 1].id)
-      FailLink(folder, file, "the id " + std::to_string(records[i].id) + " occurs twice");
+      FailLink(folder, file, Concat("the id ", records[i].id, " occurs twice"));
 }
 
 void CheckLinks(const ColmapModel& model, const std::string& folder) {
   for (const ColmapImage& image : model.images) {
     if (model.FindCamera(image.camera_id) == nullptr)
       FailLink(folder, "images.bin",
-               "image " + std::to_string(image.id) + " refers to camera " +
-                   std::to_string(image.camera_id) + ", which does not exist");
+               Concat("image ", image.id, " refers to camera ", image.camera_id,
+                      ", which does not exist"));
     for (const ColmapKeypoint& keypoint : image.keypoints)
       if (keypoint.point_id != kNoColmapPoint && model.FindPoint(keypoint.point_id) == nullptr)
         FailLink(folder, "images.bin",
-                 "image " + std::to_string(image.id) + " refers to point " +
-                     std::to_string(keypoint.point_id) + ", which does not exist");
+                 Concat("image ", image.id, " refers to point ", keypoint.point_id,
+                        ", which does not exist"));
   }
   for (const ColmapPoint& point : model.points) {
     for (const ColmapTrackElement& element : point.track) {
       const ColmapImage* image = model.FindImage(element.image_id);
       if (image == nullptr || element.keypoint >= image->keypoints.size())
         FailLink(folder, "points3D.bin",
-                 "point " + std::to_string(point.id) + " refers to keypoint " +
-                     std::to_string(element.keypoint) + " of image " +
-                     std::to_string(element.image_id) + ", which does not exist");
+                 Concat("point ", point.id, " refers to keypoint ", element.keypoint,
+                        " of image ", element.image_id, ", which does not exist"));
     }
   }
 }

@@ -30,8 +30,7 @@ class Writer {
 
   void Close() {
     file_.close();
-    if (file_.fail())
-      throw Error(ExitCode::kResources, "cannot write it", path_, "is the disk full?");
+    if (file_.fail()) throw ResourceError("cannot write it", path_, "is the disk full?");
   }
 
  private:

@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <cstdio>
 #include <vector>
+
+#include "kernels/base/quantile.h"
 
 namespace regrade {
 namespace {
@@ -22,10 +23,7 @@ int Scan(const std::string& line, const char* key, const char* format, Numbers..
 int ColmapEvidence::MedianFeatures() const {
   std::vector<int> counts;
   for (const auto& [name, count] : features) counts.push_back(count);
-  if (counts.empty()) return 0;
-  const auto middle = counts.begin() + static_cast<ptrdiff_t>(counts.size() / 2);
-  std::nth_element(counts.begin(), middle, counts.end());
-  return *middle;
+  return Median(std::move(counts));
 }
 
 void ColmapOutput::Line(const std::string& line) {

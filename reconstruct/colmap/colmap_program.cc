@@ -70,21 +70,19 @@ ColmapProgram::ColmapProgram(const std::string& program, const std::string& log_
     result = RunChild(options, read_version);
   } catch (const Error& e) {
     if (e.code() != ExitCode::kExternalProgram) throw;
-    throw Error(ExitCode::kExternalProgram, e.what_failed(), program, kInstall);
+    throw ProgramError(e.what_failed(), program, kInstall);
   }
   if (!found) {
     const std::string first =
         result.last_lines.empty() ? "it printed nothing" : "it printed: " + result.LastLines();
-    throw Error(
-        ExitCode::kExternalProgram,
+    throw ProgramError(
         "this is not COLMAP, or it does not work (" + result.Describe() + "; " + first + ")",
         program, kInstall);
   }
-  version_ = std::to_string(major) + "." + std::to_string(minor);
+  version_ = Concat(major, ".", minor);
   if (std::pair(major, minor) < std::pair(3, 7))
-    throw Error(ExitCode::kExternalProgram,
-                "COLMAP " + version_ + " is too old (3.7 and newer are supported)", program,
-                kInstall);
+    throw ProgramError("COLMAP " + version_ + " is too old (3.7 and newer are supported)",
+                       program, kInstall);
 }
 
 ChildResult ColmapProgram::Run(const std::string& command, const ColmapArguments& arguments,
@@ -107,8 +105,8 @@ ChildResult ColmapProgram::Run(const std::string& command, const ColmapArguments
       keep_going);
   if (result.end == ChildEnd::kStopped) throw Interrupted();
   if (disk_full)
-    throw Error(ExitCode::kResources, "the disk is full (colmap " + command + ")", log_folder_,
-                "free some space; COLMAP needs about 1 MB per photo");
+    throw ResourceError("the disk is full (colmap " + command + ")", log_folder_,
+                        "free some space; COLMAP needs about 1 MB per photo");
   return result;
 }
 
@@ -116,7 +114,7 @@ void ColmapProgram::Fail(const std::string& command, const ChildResult& result,
                          const std::string& log_name) const {
   std::string what = "colmap " + command + " failed: " + result.Describe();
   if (!result.last_lines.empty()) what += "; its last lines were:\n" + result.LastLines();
-  throw Error(ExitCode::kExternalProgram, what, LogPath(log_name), LikelyCause(result));
+  throw ProgramError(what, LogPath(log_name), LikelyCause(result));
 }
 
 const std::set<std::string>& ColmapProgram::OptionsOf(const std::string& command) {

@@ -1,7 +1,8 @@
 #include "reconstruct/colmap/colmap_strategies.h"
 
 #include <algorithm>
-#include <sstream>
+
+#include "kernels/base/error.h"
 
 namespace regrade {
 namespace {
@@ -18,12 +19,7 @@ constexpr size_t kFewPairs = 15;
 // The cost of matching all pairs grows with the square.
 constexpr size_t kMostForAllPairs = 150;
 
-std::string Text(double value) {
-  std::ostringstream text;
-  text.precision(9);
-  text << value;
-  return text.str();
-}
+std::string Text(double value) { return Format("%.9g", value); }
 
 }  // namespace
 
@@ -34,7 +30,7 @@ std::vector<CameraGroup> GroupByCamera(const std::vector<StagedPhoto>& photos) {
       return group.width == photo.width && group.height == photo.height &&
              group.focal_px == photo.exif_focal_px;
     };
-    auto it = std::find_if(groups.begin(), groups.end(), same);
+    auto it = std::ranges::find_if(groups, same);
     if (it == groups.end())
       it = groups.insert(groups.end(), {photo.width, photo.height, photo.exif_focal_px, {}});
     it->names.push_back(photo.name);

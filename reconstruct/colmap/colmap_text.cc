@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cstring>
 #include <fstream>
 
 #include "kernels/base/error.h"
@@ -59,8 +58,8 @@ class LineReader {
     return value;
   }
   [[noreturn]] void Fail(const std::string& why) const {
-    throw Error(ExitCode::kInput, "line " + std::to_string(number_) + " " + why, path_,
-                "the file is damaged; let COLMAP write the model again");
+    throw InputError(Concat("line ", number_, " ", why), path_,
+                     "the file is damaged; let COLMAP write the model again");
   }
 
  private:
@@ -130,8 +129,7 @@ void WriteTextFile(const std::string& path, const std::string& text) {
   std::ofstream file(path, std::ios::binary | std::ios::trunc);
   file << text;
   file.close();
-  if (file.fail())
-    throw Error(ExitCode::kResources, "cannot write it", path, "is the disk full?");
+  if (file.fail()) throw ResourceError("cannot write it", path, "is the disk full?");
 }
 
 }  // namespace
@@ -159,12 +157,11 @@ void WriteColmapText(const ColmapModel& model, const std::string& folder) {
   for (const ColmapCamera& camera : model.cameras) {
     const ColmapLensInfo& info = InfoOf(camera.lens);
     const Camera& c = camera.intrinsics;
-    cameras += std::to_string(camera.id) + " " + info.name + " " + std::to_string(c.width) +
-               " " + std::to_string(c.height) + " " + NumberText(c.fx);
+    cameras +=
+        Concat(camera.id, " ", info.name, " ", c.width, " ", c.height, " ", NumberText(c.fx));
     if (info.focals == 2) cameras += " " + NumberText(c.fy);
     cameras += " " + NumberText(c.cx) + " " + NumberText(c.cy);
-    for (int i = 0; i < info.coefficients; ++i)
-      cameras += " " + NumberText(c.distortion[static_cast<size_t>(i)]);
+    for (int i = 0; i < info.coefficients; ++i) cameras += " " + NumberText(c.distortion[i]);
     cameras += "\n";
   }
   std::string images =
@@ -176,11 +173,11 @@ void WriteColmapText(const ColmapModel& model, const std::string& folder) {
       images += " " + NumberText(q);
     for (int i = 0; i < 3; ++i)
       images += " " + NumberText(image.camera_from_world.translation[i]);
-    images += " " + std::to_string(image.camera_id) + " " + image.name + "\n";
+    images += Concat(" ", image.camera_id, " ", image.name, "\n");
     const char* separator = "";
     for (const ColmapKeypoint& keypoint : image.keypoints) {
-      images += separator + NumberText(keypoint.u) + " " + NumberText(keypoint.v) + " " +
-                std::to_string(static_cast<int64_t>(keypoint.point_id));
+      images += Concat(separator, NumberText(keypoint.u), " ", NumberText(keypoint.v), " ",
+                       static_cast<int64_t>(keypoint.point_id));
       separator = " ";
     }
     images += "\n";
@@ -193,7 +190,7 @@ void WriteColmapText(const ColmapModel& model, const std::string& folder) {
     for (const uint8_t value : point.color) points += " " + std::to_string(value);
     points += " " + NumberText(point.error);
     for (const ColmapTrackElement& element : point.track)
-      points += " " + std::to_string(element.image_id) + " " + std::to_string(element.keypoint);
+      points += Concat(" ", element.image_id, " ", element.keypoint);
     points += "\n";
   }
   WriteTextFile(folder + "/cameras.txt", cameras);

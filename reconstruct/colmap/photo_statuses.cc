@@ -13,8 +13,7 @@ constexpr const char* kTakeMore =
 std::string Photos(size_t n) { return std::to_string(n) + (n == 1 ? " photo" : " photos"); }
 
 std::string TooFew(size_t given, int least) {
-  return Photos(given) + " are too few for a scene in 3D (" + std::to_string(least) +
-         " at least)";
+  return Concat(Photos(given), " are too few for a scene in 3D (", least, " at least)");
 }
 
 }  // namespace
@@ -26,8 +25,8 @@ std::string AttemptResult::Name() const {
 Reason WhyNoModel(const ColmapEvidence& evidence) {
   const int features = evidence.MedianFeatures();
   if (features < kFewFeatures)
-    return {"the photos have too few features to match (about " + std::to_string(features) +
-                " each): they are blurred, or the scene has no texture",
+    return {Concat("the photos have too few features to match (about ", features,
+                   " each): they are blurred, or the scene has no texture"),
             "take sharp photos, in good light, of something with texture"};
   if (evidence.matched_pairs == 0)
     return {"no two photos show the same things from two places",
@@ -55,8 +54,7 @@ void ExplainUnregistered(const AttemptResult& attempt, const std::vector<StagedP
     if (features == attempt.evidence.features.end()) {
       photo.why = "COLMAP did not read it";
     } else if (features->second < kFewFeatures) {
-      photo.why =
-          "only " + std::to_string(features->second) + " features: blurred, or without texture";
+      photo.why = Concat("only ", features->second, " features: blurred, or without texture");
     } else {
       photo.why = "it overlaps too little with the registered photos";
     }
@@ -73,19 +71,19 @@ std::string NoteOnOtherModels(const AttemptResult& attempt) {
   std::string others;
   for (size_t k = 1; k < attempt.models.size(); ++k)
     others += (k == 1 ? "" : ", ") + std::to_string(attempt.models[k].model.images.size());
-  return "the photos form " + std::to_string(attempt.models.size()) +
-         " groups without common points; the largest is used (the others have " + others + ")";
+  return Concat("the photos form ", attempt.models.size(),
+                " groups without common points; the largest is used (the others have ", others,
+                ")");
 }
 
 void Refuse(const Reason& reason, size_t photos_given, int min_photos) {
   const bool few = static_cast<int>(photos_given) < min_photos;
-  throw Error(ExitCode::kScene,
-              (few ? TooFew(photos_given, min_photos) + "; besides, " : "") + reason.why, "",
-              reason.remedy);
+  throw SceneError((few ? TooFew(photos_given, min_photos) + "; besides, " : "") + reason.why,
+                   "", reason.remedy);
 }
 
 void RefuseTooFew(size_t photos_given, int min_photos) {
-  throw Error(ExitCode::kScene, TooFew(photos_given, min_photos), "", kTakeMore);
+  throw SceneError(TooFew(photos_given, min_photos), "", kTakeMore);
 }
 
 void RefuseUnregistered(const Capture& capture) {
@@ -93,13 +91,12 @@ void RefuseUnregistered(const Capture& capture) {
   for (const PhotoStatus& photo : capture.statuses)
     if (photo.status == PhotoState::kUnregistered)
       names += "\n  " + photo.file + ": " + photo.why;
-  throw Error(ExitCode::kScene,
-              "only " + std::to_string(capture.views.size()) + " of " +
-                  Photos(capture.statuses.size()) +
-                  " were registered in one scene; the others:" + names,
-              "",
-              "give photos of one scene that overlap by two thirds, or lower "
-              "--pose-min-registered to continue with the registered ones");
+  throw SceneError(
+      Concat("only ", capture.views.size(), " of ", Photos(capture.statuses.size()),
+             " were registered in one scene; the others:", names),
+      "",
+      "give photos of one scene that overlap by two thirds, or lower "
+      "--pose-min-registered to continue with the registered ones");
 }
 
 }  // namespace regrade

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "kernels/base/error.h"
+#include "kernels/base/quantile.h"
 
 namespace regrade {
 namespace {
@@ -99,9 +100,7 @@ ColmapModel WithoutOutliers(const ColmapModel& model, const ColmapModel& referen
     }
   }
   if (all.empty()) return result;
-  const auto middle = all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2);
-  std::nth_element(all.begin(), middle, all.end());
-  const double limit = factor * *middle;
+  const double limit = factor * Median(std::move(all));
 
   std::erase_if(result.points, [&](ColmapPoint& point) {
     std::erase_if(point.track, [&](const ColmapTrackElement& element) {

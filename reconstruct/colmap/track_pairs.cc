@@ -4,6 +4,8 @@
 #include <cmath>
 #include <set>
 
+#include "reconstruct/scene/scene_checks.h"
+
 namespace regrade {
 namespace {
 
@@ -29,9 +31,7 @@ std::vector<std::pair<size_t, size_t>> PairsToMatch(const std::vector<Camera>& c
     centers.push_back(camera.Center());
     forwards.push_back(camera.Forward());
   }
-  double extent = 0;
-  for (const Vec3d& a : centers)
-    for (const Vec3d& b : centers) extent = std::max(extent, Norm(a - b));
+  const double extent = LargestDistance(centers);
   for (size_t i = 0; i < n; ++i) {
     std::vector<std::pair<double, size_t>> by_distance;
     for (size_t j = 0; j < n; ++j) {
@@ -41,7 +41,7 @@ std::vector<std::pair<size_t, size_t>> PairsToMatch(const std::vector<Camera>& c
       const double apart = extent > 0 ? Norm(centers[i] - centers[j]) / extent : 0;
       by_distance.emplace_back(std::hypot(apart / kDistanceScale, angle / kAngleScale), j);
     }
-    std::sort(by_distance.begin(), by_distance.end());
+    std::ranges::sort(by_distance);
     for (const size_t rank : kRanks)
       if (rank < by_distance.size()) pairs.insert(std::minmax(i, by_distance[rank].second));
   }

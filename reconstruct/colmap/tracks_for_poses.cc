@@ -1,15 +1,15 @@
 #include "reconstruct/colmap/tracks_for_poses.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <map>
 #include <optional>
-#include <sstream>
 
+#include "kernels/base/clock.h"
 #include "kernels/base/error.h"
+#include "kernels/base/quantile.h"
 #include "reconstruct/colmap/colmap_output.h"
 #include "reconstruct/colmap/colmap_program.h"
 #include "reconstruct/colmap/colmap_strategies.h"
@@ -50,14 +50,11 @@ bool SameLens(const ColmapCamera& a, const ColmapCamera& b) {
 std::string ParametersOf(const ColmapCamera& camera) {
   const ColmapLensInfo& info = InfoOf(camera.lens);
   const Camera& c = camera.intrinsics;
-  std::ostringstream text;
-  text.precision(17);
-  text << c.fx;
-  if (info.focals == 2) text << "," << c.fy;
-  text << "," << c.cx << "," << c.cy;
-  for (int i = 0; i < info.coefficients; ++i)
-    text << "," << c.distortion[static_cast<size_t>(i)];
-  return text.str();
+  std::string text = Format("%.17g", c.fx);
+  if (info.focals == 2) text += Format(",%.17g", c.fy);
+  text += Format(",%.17g,%.17g", c.cx, c.cy);
+  for (int i = 0; i < info.coefficients; ++i) text += Format(",%.17g", c.distortion[i]);
+  return text;
 }
 
 class TrackFinder {
@@ -69,7 +66,7 @@ class TrackFinder {
         work_folder_(fs::absolute(work_folder).string()),
         progress_(progress),
         output_(static_cast<int>(photos.size())),
-        began_(Clock::now()) {
+        began_(ClockSeconds()) {
     std::map<std::string, const StagedPhoto*> by_name;
     for (const StagedPhoto& photo : photos) by_name[photo.name] = &photo;
     for (const ColmapCamera& camera : posed.cameras) start_.cameras.push_back(camera);
@@ -108,8 +105,6 @@ class TrackFinder {
   }
 
  private:
-  using Clock = std::chrono::steady_clock;
-
   int LongerSide() const {
     int side = 0;
     for (const StagedPhoto& photo : photos_) side = std::max({side, photo.width, photo.height});
@@ -120,9 +115,8 @@ class TrackFinder {
     std::vector<LensGroup> groups;
     for (size_t i = 0; i < photos_.size(); ++i) {
       const ColmapCamera& camera = *start_.FindCamera(start_.images[i].camera_id);
-      auto group = std::find_if(groups.begin(), groups.end(), [&](const LensGroup& other) {
-        return SameLens(other.camera, camera);
-      });
+      auto group = std::ranges::find_if(
+          groups, [&](const LensGroup& other) { return SameLens(other.camera, camera); });
       if (group == groups.end())
         group =
             groups.insert(groups.end(), {camera, {photos_[i].width, photos_[i].height, 0, {}}});
@@ -174,8 +168,7 @@ class TrackFinder {
     const std::string out = work_folder_ + "/triangulated";
     fs::remove_all(out);
     fs::create_directories(out);
-    std::ostringstream limit;
-    limit << limit_px;
+    const std::string limit = Format("%g", limit_px);
     // With clear_points, images get the database's ids, by name.
     RunColmap("point_triangulator",
               {{"database_path", Database()},
@@ -185,16 +178,16 @@ class TrackFinder {
                {"clear_points", "1"},
                {"Mapper.num_threads", Threads()},
                {"Mapper.ba_global_function_tolerance", "1e-6"},
-               {"Mapper.filter_max_reproj_error", limit.str()},
-               {"Mapper.tri_complete_max_reproj_error", limit.str()},
-               {"Mapper.tri_merge_max_reproj_error", limit.str()}},
+               {"Mapper.filter_max_reproj_error", limit},
+               {"Mapper.tri_complete_max_reproj_error", limit},
+               {"Mapper.tri_merge_max_reproj_error", limit}},
               "triangulating points", weight);
     try {
       return ReadColmapModel(out);
     } catch (const Error& error) {
-      throw Error(ExitCode::kExternalProgram,
-                  "colmap point_triangulator wrote no readable model: " + error.what_failed(),
-                  colmap_->log_folder());
+      throw ProgramError(
+          "colmap point_triangulator wrote no readable model: " + error.what_failed(),
+          colmap_->log_folder());
     }
   }
 
@@ -225,12 +218,8 @@ class TrackFinder {
           errors.push_back(std::hypot(u - keypoint.u, v - keypoint.v));
       }
     }
-    result_.observations = static_cast<int64_t>(errors.size());
-    result_.median_px = 0;
-    if (errors.empty()) return;
-    const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
-    std::nth_element(errors.begin(), middle, errors.end());
-    result_.median_px = *middle;
+    result_.observations = std::ssize(errors);
+    result_.median_px = Median(std::move(errors));
   }
 
   void RunColmap(const std::string& command, const ColmapArguments& arguments,
@@ -239,7 +228,7 @@ class TrackFinder {
     const double n = static_cast<double>(photos_.size());
     const double allowed =
         options_.time_limit_min > 0 ? 60 * options_.time_limit_min : 600 + 60 * n;
-    const double spent = std::chrono::duration<double>(Clock::now() - began_).count();
+    const double spent = ClockSeconds() - began_;
     const ChildResult result = colmap_->Run(
         command, arguments, command,
         {std::max(1.0, allowed - spent), 60 * options_.quiet_limit_min},
@@ -264,7 +253,7 @@ class TrackFinder {
   const std::string work_folder_;
   const ProgressFunction& progress_;
   ColmapOutput output_;
-  const Clock::time_point began_;
+  const double began_;
   std::vector<StagedPhoto> photos_;  // of start_.images
   ColmapModel start_;                // images that have a photo
   FoundTracks result_;

@@ -8,8 +8,8 @@
 #include "kernels/device/backend.h"
 #include "kernels/field/render.h"
 #include "kernels/optimize/rmsprop.h"
-#include "reconstruct/fit/cell_statistics.h"
 #include "reconstruct/fit/fit_field.h"
+#include "reconstruct/fit/measure_cells.h"
 
 namespace regrade {
 

@@ -70,7 +70,7 @@ class CpuFitEngine : public FitEngine {
 
   void RefineCells(const MarchOptions& march, const CellLimits& limits) override {
     const CellStatistics statistics = MeasureCells(state_.grid, *rays_, march, kPruningStride);
-    ApplyChanges(ChooseChanges(state_.grid.cells, statistics, limits), &state_.grid,
+    ApplyChanges(ChooseChanges(state_.grid.cells.level, statistics, limits), &state_.grid,
                  &state_.second_moment);
     ResetArenas();
   }

@@ -8,6 +8,7 @@
 #include "kernels/base/error.h"
 #include "kernels/base/random.h"
 #include "kernels/base/random_streams.h"
+#include "kernels/field/cuda/device_cell_statistics.h"
 #include "kernels/field/cuda/device_rays.h"
 #include "kernels/field/cuda/device_sphere_rays.h"
 #include "kernels/field/cuda/device_views.h"
@@ -53,13 +54,15 @@ class CudaFitEngine : public FitEngine {
                         1.0f / (3.0f * static_cast<float>(step.rays)), &touched_);
     // The sampling run of total variation is over stored voxels (see FitStep): each is chosen
     // with probability tv_fraction, so the expectation equals the CPU's.
-    const int64_t voxels = grid_.num_voxels();
+    const bool adaptive = grid_.cells.on();
+    const int64_t voxels = adaptive ? grid_.cells.num_cells() : grid_.num_voxels();
     const int64_t run = static_cast<int64_t>(step.tv_fraction * static_cast<float>(voxels));
     if (run > 0) {
       const int64_t begin = static_cast<int64_t>(RandomIndex(
           seed_ ^ kRandomTotalVariation, step.number, 0, static_cast<uint64_t>(voxels)));
       const float scale =
-          1.0f / (step.tv_fraction * static_cast<float>(grid_.frame.NumVertices()));
+          1.0f / (adaptive ? static_cast<float>(run)
+                           : step.tv_fraction * static_cast<float>(grid_.frame.NumVertices()));
       AddTotalVariation(grid_, begin, run, step.tv_density * scale, step.tv_sh * scale,
                         &touched_);
     }
@@ -76,8 +79,13 @@ class CudaFitEngine : public FitEngine {
     return RenderViewOnDevice(grid_, camera, march);
   }
 
-  void RefineCells(const MarchOptions&, const CellLimits&) override {
-    throw Error(ExitCode::kResources, "an adaptive field", "GPU", "use --device cpu");
+  void RefineCells(const MarchOptions& march, const CellLimits& limits) override {
+    const DeviceRange range("changing cells");
+    constexpr int kStride = 2;  // every other row and column of a view
+    const CellStatistics statistics = MeasureCellsOnDevice(grid_, views_, march, kStride);
+    const auto change = ChooseChanges(grid_.cells.level.ToHost(), statistics, limits);
+    grid_ = ChangeCellsOnDevice(std::move(grid_), change);
+    if (grid_.num_voxels() > 0) Renew();
   }
   void Refine(const MarchOptions& march, float threshold, const Vec3i& resolution,
               int sphere_resolution) override {

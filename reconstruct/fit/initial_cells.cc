@@ -10,9 +10,11 @@ namespace {
 
 constexpr int kRateLattice = 48;  // vertices along the longest side
 
-// Number of cameras that see a point beyond near_clip, up to `enough`. A vertex may project just outside of a photo and
-// still be a corner of a visible cell: `margin` is a fraction of the photo's side.
-int ViewsThatSee(const TrainingRays& rays, const Vec3d& p, float near_clip, double margin, int enough) {
+// Number of cameras that see a point beyond near_clip, up to `enough`. A vertex may project
+// just outside of a photo and still be a corner of a visible cell: `margin` is a fraction of
+// the photo's side.
+int ViewsThatSee(const TrainingRays& rays, const Vec3d& p, float near_clip, double margin,
+                 int enough) {
   int views = 0;
   for (int v = 0; v < rays.num_views() && views < enough; ++v) {
     const Camera& camera = rays.camera(v);
@@ -49,19 +51,22 @@ bool TouchesBall(const GridFrame& frame, const Vec3i& low, int width) {
 
 GridFrame CellFrame(const SceneBox& box, int coarsest, int finest) {
   Vec3i size = ResolutionFor(box, coarsest << finest);
-  for (int a = 0; a < 3; ++a) size[a] = std::max(1, ((size[a] >> finest) + (size[a] >> (finest - 1) & (finest > 0)))) << finest;
+  for (int a = 0; a < 3; ++a)
+    size[a] = std::max(1, ((size[a] >> finest) + (size[a] >> (finest - 1) & (finest > 0))))
+              << finest;
   return {size, box.center, box.radius};
 }
 
-FastGrid MakeInitialCells(const TrainingRays& rays, const GridFrame& frame, int finest, int basis, float density,
-                          float near_clip, int min_views, bool ball) {
+FastGrid MakeInitialCells(const TrainingRays& rays, const GridFrame& frame, int finest,
+                          int basis, float density, float near_clip, int min_views, bool ball) {
   FastGrid grid;
   grid.frame = frame;
   grid.basis = basis;
   grid.near_clip = near_clip;
   grid.background = rays.mean_color();
   const int width = 1 << finest;
-  const Vec3i top{frame.resolution.x >> finest, frame.resolution.y >> finest, frame.resolution.z >> finest};
+  const Vec3i top{frame.resolution.x >> finest, frame.resolution.y >> finest,
+                  frame.resolution.z >> finest};
   std::vector<std::vector<CellKey>> rows(static_cast<size_t>(top.x));
 #pragma omp parallel for schedule(dynamic, 1)
   for (int x = 0; x < top.x; ++x)
@@ -70,10 +75,13 @@ FastGrid MakeInitialCells(const TrainingRays& rays, const GridFrame& frame, int 
         const Vec3i low{x * width, y * width, z * width};
         if (ball && !TouchesBall(frame, low, width)) continue;
         const auto seen = [&](const Vec3d& at) {
-          return ViewsThatSee(rays, WorldOfLattice(frame, at), near_clip, 0.02, min_views) >= min_views;
+          return ViewsThatSee(rays, WorldOfLattice(frame, at), near_clip, 0.02, min_views) >=
+                 min_views;
         };
-        bool kept = seen(low.Cast<double>() + Vec3d{0.5, 0.5, 0.5} * static_cast<double>(width));
-        for (int k = 0; k < 8 && !kept; ++k) kept = seen(CornerOf(low, width, k).Cast<double>());
+        bool kept =
+            seen(low.Cast<double>() + Vec3d{0.5, 0.5, 0.5} * static_cast<double>(width));
+        for (int k = 0; k < 8 && !kept; ++k)
+          kept = seen(CornerOf(low, width, k).Cast<double>());
         if (kept) rows[static_cast<size_t>(x)].push_back(KeyOf(low));
       }
   std::vector<CellKey> keys;
@@ -87,13 +95,15 @@ FastGrid MakeInitialCells(const TrainingRays& rays, const GridFrame& frame, int 
   BuildTree(frame.resolution, &grid.cells);
   const int lanes = grid.lanes();
   grid.records.Resize(grid.cells.num_vertices() * lanes);
-  for (int64_t v = 0; v < grid.num_voxels(); ++v) grid.records[v * lanes + DensityLane(basis)] = density;
+  for (int64_t v = 0; v < grid.num_voxels(); ++v)
+    grid.records[v * lanes + DensityLane(basis)] = density;
   grid.density_rate = DensityRates(rays, frame, grid.cells, near_clip);
   RefreshDerived(&grid);
   return grid;
 }
 
-Buffer<float> DensityRates(const TrainingRays& rays, const GridFrame& frame, const CellGrid& cells, float near_clip) {
+Buffer<float> DensityRates(const TrainingRays& rays, const GridFrame& frame,
+                           const CellGrid& cells, float near_clip) {
   const int longest = std::max({frame.resolution.x, frame.resolution.y, frame.resolution.z});
   Vec3i n;  // vertices of the lattice
   for (int a = 0; a < 3; ++a)

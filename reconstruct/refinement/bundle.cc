@@ -10,7 +10,9 @@
 
 #include "kernels/base/error.h"
 #include "kernels/base/hash.h"
+#include "kernels/base/quantile.h"
 #include "kernels/base/random.h"
+#include "reconstruct/scene/scene_checks.h"
 
 namespace regrade {
 namespace {
@@ -27,21 +29,10 @@ Mat3d RotationOf(const double* angle_axis) {
 
 Vec3d CenterOf(const std::array<double, 6>& pose) { return {pose[3], pose[4], pose[5]}; }
 
-// Largest distance between two centres.
-double ExtentOf(const std::vector<Vec3d>& centers) {
-  double extent = 0;
-  for (size_t i = 0; i < centers.size(); ++i)
-    for (size_t j = 0; j < i; ++j) extent = std::max(extent, Norm(centers[i] - centers[j]));
-  return extent;
-}
-
 double MedianDistance(const std::vector<ColmapPoint>& points, const Vec3d& from) {
   std::vector<double> distances;
   for (const ColmapPoint& point : points) distances.push_back(Norm(point.position - from));
-  if (distances.empty()) return 0;
-  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-  std::nth_element(distances.begin(), middle, distances.end());
-  return *middle;
+  return Median(std::move(distances));
 }
 
 }  // namespace
@@ -65,7 +56,7 @@ Bundle MakeBundle(const ColmapModel& model) {
     numbers.push_back(HashOf(image.name));
   }
   bundle.focal.resize(model.cameras.size());
-  double extent = ExtentOf(centers);
+  double extent = LargestDistance(centers);
   if (extent < kLeastExtent * MedianDistance(model.points, mean)) extent = 0;
   const double scale = extent > 0 ? 1 / extent : 1;
   bundle.extent = extent > 0 ? 1 : 0;
@@ -87,10 +78,9 @@ Bundle MakeBundle(const ColmapModel& model) {
       if (std::isfinite(ReprojectionError(bundle, observation))) seen.push_back(observation);
     }
     if (seen.size() < 2) continue;
-    std::sort(seen.begin(), seen.end(),
-              [&](const BundleObservation& a, const BundleObservation& b) {
-                return numbers[a.view] < numbers[b.view];
-              });
+    std::ranges::sort(seen, [&](const BundleObservation& a, const BundleObservation& b) {
+      return numbers[a.view] < numbers[b.view];
+    });
     size_t kept = seen.size();
     for (BundleObservation& observation : seen) {
       observation.held_out =
@@ -126,10 +116,7 @@ double MedianError(const Bundle& bundle, bool held_out) {
   for (const BundleObservation& observation : bundle.observations)
     if (observation.held_out == held_out)
       errors.push_back(ReprojectionError(bundle, observation));
-  if (errors.empty()) return 0;
-  const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
-  std::nth_element(errors.begin(), middle, errors.end());
-  return *middle;
+  return Median(std::move(errors));
 }
 
 ColmapModel ModelOfBundle(const Bundle& bundle, const ColmapModel& model) {

@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "kernels/base/error.h"
+#include "kernels/base/quantile.h"
 #include "reconstruct/refinement/exposure_model.h"
 
 namespace regrade {
@@ -114,7 +115,7 @@ double ExposureEstimate::Threshold() const {
 ExposureEstimate EstimateExposure(int num_views,
                                   const std::vector<ColorObservation>& observations) {
   ExposureEstimate estimate;
-  estimate.photos.resize(static_cast<size_t>(num_views));
+  estimate.photos.resize(num_views);
   const ExposureData data = ArrangeObservations(estimate.photos.size(), observations);
   if (data.observations.empty()) return estimate;
   const LogColors gains = BestGains(data, estimate.photos.size());
@@ -144,9 +145,7 @@ ExposureEstimate EstimateExposure(int num_views,
     }
   }
   estimate.spread = std::sqrt(squares / static_cast<double>(errors.size()));
-  const auto middle = errors.begin() + static_cast<long>(errors.size() / 2);
-  std::nth_element(errors.begin(), middle, errors.end());
-  estimate.median_error = *middle;
+  estimate.median_error = Median(std::move(errors));
   return estimate;
 }
 

@@ -14,7 +14,7 @@ int WidestAxis(const std::vector<Vec3d>& positions, const Members& members) {
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<double> values;
     for (const size_t i : members) values.push_back(positions[i][axis]);
-    std::sort(values.begin(), values.end());
+    std::ranges::sort(values);
     const double width = values[values.size() * 9 / 10] - values[values.size() / 10];
     if (width > most) most = width, widest = axis;
   }
@@ -28,7 +28,7 @@ void Split(const std::vector<Vec3d>& positions, Members members, int levels, int
     return;
   }
   const int axis = WidestAxis(positions, members);
-  std::sort(members.begin(), members.end(), [&](size_t i, size_t j) {
+  std::ranges::sort(members, [&](size_t i, size_t j) {
     for (int k = 0; k < 3; ++k) {
       const double a = positions[i][(axis + k) % 3], b = positions[j][(axis + k) % 3];
       if (a != b) return a < b;

@@ -119,8 +119,7 @@ ExposureData ArrangeObservations(size_t num_views,
          {std::log(o.light.x), std::log(o.light.y), std::log(o.light.z)}});
   }
   data.fold_of_point.resize(num_points);
-  for (const ColorObservation& o : observations)
-    data.fold_of_point[static_cast<size_t>(o.point)] = o.fold;
+  for (const ColorObservation& o : observations) data.fold_of_point[o.point] = o.fold;
   for (size_t before = data.observations.size() + 1; data.observations.size() < before;) {
     before = data.observations.size();
     std::vector<int> of_view(num_views), of_point(num_points);
@@ -129,10 +128,9 @@ ExposureData ArrangeObservations(size_t num_views,
       return of_point[s.point] < 2 || of_view[s.view] < kFewestColors;
     });
   }
-  std::sort(data.observations.begin(), data.observations.end(),
-            [](const Observation& a, const Observation& b) {
-              return a.point != b.point ? a.point < b.point : a.view < b.view;
-            });
+  std::ranges::sort(data.observations, [](const Observation& a, const Observation& b) {
+    return a.point != b.point ? a.point < b.point : a.view < b.view;
+  });
   data.tracks.resize(num_points + 1);
   data.known.resize(num_views);
   for (const Observation& s : data.observations)
@@ -209,7 +207,7 @@ std::vector<double> Disagreement(const ExposureData& data, const LogColors& gain
   for (size_t p = 0; p + 1 < data.tracks.size(); ++p) {
     if (data.tracks[p] == data.tracks[p + 1]) continue;
     const Vec3d color = RobustColor(data, p, gains);
-    double& sum = sums[static_cast<size_t>(data.fold_of_point[p])];
+    double& sum = sums[data.fold_of_point[p]];
     for (size_t i = data.tracks[p]; i < data.tracks[p + 1]; ++i) {
       const Observation& s = data.observations[i];
       sum += Loss(s.log_light - gains[s.view] - color);

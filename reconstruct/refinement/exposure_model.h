@@ -2,7 +2,6 @@
 // reweighted least squares with parts of the scene left out.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <vector>
 

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "kernels/base/error.h"
+#include "kernels/base/quantile.h"
 #include "reconstruct/refinement/bundle.h"
 
 namespace regrade {
@@ -72,8 +73,7 @@ Gauge ChooseGauge(const Bundle& bundle) {
   for (const BundleObservation& observation : bundle.observations)
     count[observation.view] += !observation.held_out;
   Gauge gauge;
-  gauge.view =
-      static_cast<size_t>(std::max_element(count.begin(), count.end()) - count.begin());
+  gauge.view = static_cast<size_t>(std::ranges::max_element(count) - count.begin());
   double farthest = -1;
   for (size_t v = 0; v < bundle.poses.size(); ++v) {
     if (!bundle.adjustable[v]) continue;
@@ -158,12 +158,6 @@ class Adjustment {
     return std::pair(Median(rotations), Median(centers));
   }
 
-  static double Median(std::vector<double> values) {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-  }
-
  private:
   static ceres::Problem::Options Ownership() {
     ceres::Problem::Options options;
@@ -198,8 +192,8 @@ void MeasureCorrections(const ColmapModel& before, const ColmapModel& after, dou
                      M_PI);
     moved.push_back(Norm(now.Inverse().translation - old.Inverse().translation) * per_extent);
   }
-  result->turned_deg = Adjustment::Median(turned);
-  result->moved_fraction = Adjustment::Median(moved);
+  result->turned_deg = Median(turned);
+  result->moved_fraction = Median(moved);
 }
 
 std::string WhyRejected(const PoseRefinement& result, bool asked_for) {
@@ -215,10 +209,9 @@ PoseRefinement RefinePoses(const ColmapModel& model, const RefinePosesOptions& o
   PoseRefinement result;
   result.model = model;
   Bundle bundle = MakeBundle(model);
-  result.observations = static_cast<int64_t>(bundle.observations.size());
+  result.observations = std::ssize(bundle.observations);
   for (const BundleObservation& s : bundle.observations) result.held_out += s.held_out;
-  result.left_alone =
-      static_cast<int>(std::count(bundle.adjustable.begin(), bundle.adjustable.end(), false));
+  result.left_alone = static_cast<int>(std::ranges::count(bundle.adjustable, false));
   ProgressParts parts(progress, 4);
   const auto refuse = [&result](const std::string& why) {
     result.tried = true;

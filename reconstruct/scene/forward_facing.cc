@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "kernels/base/error.h"
+#include "kernels/base/quantile.h"
 #include "kernels/scene/common_camera.h"
 
 namespace regrade {
@@ -26,14 +27,12 @@ double NearestDepth(const Capture& capture) {
   std::vector<double> depths;
   for (const ScenePoint& point : capture.points)
     for (const int32_t v : point.views) {
-      const Camera& camera = capture.views[static_cast<size_t>(v)].camera;
+      const Camera& camera = capture.views[v].camera;
       const double depth = (camera.camera_from_world * point.position).z;
       if (depth > 0) depths.push_back(depth);
     }
   if (depths.size() < 50) return 0;
-  const size_t k = static_cast<size_t>(kNearestTail * static_cast<double>(depths.size()));
-  std::nth_element(depths.begin(), depths.begin() + static_cast<long>(k), depths.end());
-  return depths[k];
+  return Quantile(std::move(depths), kNearestTail);
 }
 
 }  // namespace
@@ -80,15 +79,15 @@ NormalizedScene NormalizeForwardFacing(const Capture& capture, const ForwardFaci
   for (const CaptureView& view : capture.views) {
     const Camera camera = view.camera.Transformed(s);
     if (!(camera.Center().z < 1))
-      throw Error(ExitCode::kScene, "its camera is in front of the near plane of the capture",
-                  view.file, "leave this photo out");
+      throw SceneError("its camera is in front of the near plane of the capture", view.file,
+                       "leave this photo out");
     for (const double u : {0.5, camera.width - 0.5})
       for (const double v : {0.5, camera.height - 0.5}) {
         RayT<double> ray = camera.WorldRay(u, v);
         NdcRay(result.ndc, &ray.origin, &ray.direction);
         if (!(ray.direction.z > 0))
-          throw Error(ExitCode::kScene, "its camera looks sideways or backwards", view.file,
-                      "leave this photo out");
+          throw SceneError("its camera looks sideways or backwards", view.file,
+                           "leave this photo out");
         const Vec3d far = ray.origin + ray.direction * (2 / ray.direction.z);
         radius_x = std::max({radius_x, std::abs(ray.origin.x), std::abs(far.x)});
         radius_y = std::max({radius_y, std::abs(ray.origin.y), std::abs(far.y)});

@@ -2,10 +2,10 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
-#include <cmath>
 #include <vector>
 
 #include "kernels/base/error.h"
+#include "kernels/base/quantile.h"
 
 namespace regrade {
 namespace {
@@ -29,20 +29,13 @@ constexpr double kMostNearClip = 0.5;  // half sides
 Eigen::Vector3d ToEigen(const Vec3d& v) { return {v.x, v.y, v.z}; }
 Vec3d FromEigen(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
-double Quantile(std::vector<double>* values, double q) {
-  const size_t k = std::min(values->size() - 1,
-                            static_cast<size_t>(q * static_cast<double>(values->size())));
-  std::nth_element(values->begin(), values->begin() + static_cast<long>(k), values->end());
-  return (*values)[k];
-}
-
 // Sums in the order of sorted values, so that re-ordered photos give the same bits (H154).
 Vec3d OrderFreeMean(std::vector<Vec3d> values) {
   Vec3d mean;
   for (int a = 0; a < 3; ++a) {
     std::vector<double> axis;
     for (const Vec3d& v : values) axis.push_back(v[a]);
-    std::sort(axis.begin(), axis.end());
+    std::ranges::sort(axis);
     double sum = 0;
     for (const double v : axis) sum += v;
     mean[a] = sum / static_cast<double>(axis.size());
@@ -123,7 +116,7 @@ std::vector<Vec3d> PhotoCorners(const Capture& capture) {
   for (size_t v = 0; v < depths.size(); ++v) {
     if (depths[v].size() < kMinPointsOfView) continue;
     const Camera& camera = capture.views[v].camera;
-    const double depth = Quantile(&depths[v], kCornerDepth);
+    const double depth = Quantile(depths[v], kCornerDepth);
     for (const double x : {0.0, static_cast<double>(camera.width)})
       for (const double y : {0.0, static_cast<double>(camera.height)}) {
         const Vec3d ray = camera.CameraRay(x, y);
@@ -159,9 +152,8 @@ struct CameraPoses {
 double NearestDistance(const Capture& capture, const std::vector<Vec3d>& centers) {
   std::vector<double> distances;
   for (const ScenePoint& p : capture.points)
-    for (const int32_t view : p.views)
-      distances.push_back(Norm(p.position - centers[static_cast<size_t>(view)]));
-  return distances.empty() ? 0 : kNearestFraction * Quantile(&distances, kTail);
+    for (const int32_t view : p.views) distances.push_back(Norm(p.position - centers[view]));
+  return distances.empty() ? 0 : kNearestFraction * Quantile(distances, kTail);
 }
 
 }  // namespace
@@ -181,20 +173,20 @@ NormalizedScene NormalizeScene(const Capture& capture) {
       std::vector<double> along;
       for (const ScenePoint& p : capture.points)
         along.push_back(Dot(rotation.row[a], p.position));
-      low[a] = Quantile(&along, kTail);
-      high[a] = Quantile(&along, 1 - kTail);
+      low[a] = Quantile(along, kTail);
+      high[a] = Quantile(along, 1 - kTail);
       if (corners.empty()) continue;
       along.clear();
       for (const Vec3d& corner : corners) along.push_back(Dot(rotation.row[a], corner));
-      low[a] = std::min(low[a], Quantile(&along, kCornerTail));
-      high[a] = std::max(high[a], Quantile(&along, 1 - kCornerTail));
+      low[a] = std::min(low[a], Quantile(along, kCornerTail));
+      high[a] = std::max(high[a], Quantile(along, 1 - kCornerTail));
     }
     nearest = NearestDistance(capture, centers);
   } else {
     const Vec3d common = CommonPoint(centers, forwards);
     std::vector<double> distances;
     for (const Vec3d& c : centers) distances.push_back(Norm(c - common));
-    double half = Quantile(&distances, 0.5) / kCameraRange;
+    double half = Quantile(distances, 0.5) / kCameraRange;
     std::string notice = "few points: the box is the cube around the cameras' common point";
     if (!(half > RoundingOf(centers))) {
       notice =
@@ -202,7 +194,7 @@ NormalizedScene NormalizeScene(const Capture& capture) {
           "distances, or 1";
       std::vector<double> depths;
       for (const ScenePoint& p : capture.points) depths.push_back(Norm(p.position - common));
-      half = depths.empty() ? 1 : Quantile(&depths, 0.5);
+      half = depths.empty() ? 1 : Quantile(depths, 0.5);
       if (!(half > RoundingOf(centers))) half = 1;
     }
     result.notice += (result.notice.empty() ? "" : "; ") + notice;
@@ -241,18 +233,18 @@ Surroundings MeasureSurroundings(const Capture& capture) {
     distances.push_back(Norm(to_center));
     ahead.push_back(Dot(to_center, poses.forwards[i]));
   }
-  const double half = Quantile(&distances, 0.5) / kCameraRange;
+  const double half = Quantile(distances, 0.5) / kCameraRange;
   if (!(half > RoundingOf(poses.centers))) return result;
   result.half = half;
   // Cameras that look outwards surround nothing: the near region extends to the nearer points.
-  if (Quantile(&ahead, 0.5) < 0 && capture.points.size() >= kMinPoints) {
+  if (Quantile(ahead, 0.5) < 0 && capture.points.size() >= kMinPoints) {
     std::vector<double> out;
     for (const ScenePoint& p : capture.points) out.push_back(Norm(p.position - result.center));
-    result.half = std::max(half, Quantile(&out, kNearPoints));
+    result.half = std::max(half, Quantile(out, kNearPoints));
   }
   int64_t far = 0, all = 0;
   for (const ScenePoint& p : capture.points) {
-    const auto views = static_cast<int64_t>(p.views.size());
+    const auto views = std::ssize(p.views);
     all += views;
     if (Norm(p.position - result.center) > kFarSides * result.half) far += views;
   }
@@ -265,8 +257,8 @@ NormalizedScene NormalizeSurrounded(const Capture& capture, const Surroundings& 
   NormalizedScene result;
   const CameraPoses poses(capture);
   if (!(surroundings.half > 0))
-    throw Error(ExitCode::kScene, "the cameras are at one place: they surround no box",
-                "--effects background=on", "leave the choice to auto");
+    throw SceneError("the cameras are at one place: they surround no box",
+                     "--effects background=on", "leave the choice to auto");
   const Mat3d upright =
       UprightRotation(poses.centers, poses.ups, poses.forwards, &result.notice);
   Similarity& s = result.field_from_world;

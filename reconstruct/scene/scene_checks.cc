@@ -3,9 +3,10 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <iomanip>
-#include <sstream>
 #include <utility>
+
+#include "kernels/base/error.h"
+#include "kernels/base/quantile.h"
 
 namespace regrade {
 namespace {
@@ -35,13 +36,6 @@ double LargestAngle(const Vec3d& point, const std::vector<int32_t>& views,
   return largest;
 }
 
-double Median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 std::vector<Vec3d> Centers(const Capture& capture) {
   std::vector<Vec3d> centers;
   for (const CaptureView& view : capture.views) centers.push_back(view.camera.Center());
@@ -67,11 +61,7 @@ bool FoldsOver(Camera camera) {
   return false;
 }
 
-std::string Rounded(double value, int digits) {
-  std::ostringstream text;
-  text << std::fixed << std::setprecision(digits) << value;
-  return text.str();
-}
+std::string Rounded(double value, int digits) { return Format("%.*f", digits, value); }
 
 }  // namespace
 
@@ -124,13 +114,11 @@ double WorstPixelAspect(const Capture& capture) {
   return worst;
 }
 
-double CameraExtent(const Capture& capture) {
-  const std::vector<Vec3d> centers = Centers(capture);
-  double extent = 0;
-  for (size_t i = 0; i < centers.size(); ++i)
-    for (size_t j = i + 1; j < centers.size(); ++j)
-      extent = std::max(extent, Norm(centers[i] - centers[j]));
-  return extent;
+double LargestDistance(const std::vector<Vec3d>& points) {
+  double largest = 0;
+  for (size_t i = 0; i < points.size(); ++i)
+    for (size_t j = 0; j < i; ++j) largest = std::max(largest, Norm(points[i] - points[j]));
+  return largest;
 }
 
 std::string ImplausibleLens(const Capture& capture, double max_pixel_aspect) {
@@ -176,10 +164,10 @@ SceneAssessment AssessScene(const Capture& capture, const SceneLimits& limits) {
         "and at other distances, all at one zoom setting; do not crop or stretch "
         "them, and keep their EXIF data, which has the focal length");
   if (views < limits.min_views)
-    return refuse("only " + std::to_string(views) +
-                      " photos could be registered, and a scene needs at least " +
-                      std::to_string(limits.min_views),
-                  "take more photos that overlap by two thirds; 20 to 60 are a good number");
+    return refuse(
+        Concat("only ", views, " photos could be registered, and a scene needs at least ",
+               limits.min_views),
+        "take more photos that overlap by two thirds; 20 to 60 are a good number");
   const Vec3d extents = PointExtents(capture);
   if (extents.y > 0 && extents.z < limits.min_thickness * extents.y)
     assessment.notes.push_back(

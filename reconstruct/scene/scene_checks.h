@@ -21,14 +21,14 @@ Vec3d PointExtents(const Capture& capture);
 // Detects failed self-calibration, since sensors have square pixels.
 double WorstPixelAspect(const Capture& capture);
 
+// Largest distance between two of these points; 0 for fewer.
+double LargestDistance(const std::vector<Vec3d>& points);
+
 // What is implausible about the views' lenses, worded to follow "the estimated camera has";
 // empty if there is nothing. Photos that do not determine a lens give pixels that are not
 // square, a focal length far from any lens's, or a distortion that maps two rays to one image
 // point.
 std::string ImplausibleLens(const Capture& capture, double max_pixel_aspect);
-
-// Largest distance between two camera centres, in world units.
-double CameraExtent(const Capture& capture);
 
 struct SceneLimits {
   int min_views = 5;

@@ -1,7 +1,6 @@
 #include "reconstruct/scene/visual_hull.h"
 
 #include <algorithm>
-#include <cmath>
 
 namespace regrade {
 namespace {

@@ -25,10 +25,9 @@ Appearance ApplyNetwork(const LipschitzNetwork& network, const RadianceField& fi
       float* const row = features.data() + i * kFeatureStride;
       const int64_t point = begin + i, texel = point - n;
       if (texel < 0)
-        FillFeatures(field, scale, point, vertex[static_cast<size_t>(point)], row);
+        FillFeatures(field, scale, point, vertex[point], row);
       else
-        FillTexelFeatures(field, scale, texel,
-                          place[static_cast<size_t>(texel / spheres.layers)], row);
+        FillTexelFeatures(field, scale, texel, place[texel / spheres.layers], row);
     }
     network.Forward(features.data(), count, output.data());
 #pragma omp parallel for schedule(static)
@@ -42,9 +41,7 @@ Appearance ApplyNetwork(const LipschitzNetwork& network, const RadianceField& fi
           styled.sphere_color[3 * texel + c] = row[0];
       }
     }
-    const LoopControl control =
-        Report(progress, static_cast<double>(begin + count), static_cast<double>(all));
-    if (control == LoopControl::kStop) throw Interrupted();
+    ReportOrThrow(progress, begin + count, all);
   }
   return styled;
 }

@@ -42,20 +42,19 @@ Vec3f SphereColor(const RadianceField& field, const WeightedSample& sample) {
 ColorMap LeastSquaresMap(const RadianceField& field, const StyleRays& batch,
                          const AggregationOptions& options) {
   const Geometry& geometry = *field.geometry;
-  const int64_t n = static_cast<int64_t>(batch.rays.size());
+  const int64_t n = std::ssize(batch.rays);
   const RayWeights weights = ComputeRayWeights(geometry, {batch.rays.data(), n}, options.march,
                                                field.near_clip, options.min_weight);
   const int basis = field.appearance.basis;
-  std::vector<Vec3f> foreground(static_cast<size_t>(n));
+  std::vector<Vec3f> foreground(n);
 #pragma omp parallel for schedule(dynamic, 64)
   for (int64_t r = 0; r < n; ++r) {
     float gamma[kMaxBasis];
-    ShBasis(basis, batch.rays[static_cast<size_t>(r)].direction, gamma);
-    for (int64_t i = weights.first[static_cast<size_t>(r)];
-         i < weights.first[static_cast<size_t>(r) + 1]; ++i) {
-      const WeightedSample& sample = weights.samples[static_cast<size_t>(i)];
+    ShBasis(basis, batch.rays[r].direction, gamma);
+    for (int64_t i = weights.first[r]; i < weights.first[static_cast<size_t>(r) + 1]; ++i) {
+      const WeightedSample& sample = weights.samples[i];
       if (sample.on_sphere()) {
-        foreground[static_cast<size_t>(r)] += SphereColor(field, sample) * sample.weight;
+        foreground[r] += SphereColor(field, sample) * sample.weight;
         continue;
       }
       float sh[3 * kMaxBasis];
@@ -63,16 +62,16 @@ ColorMap LeastSquaresMap(const RadianceField& field, const StyleRays& batch,
       for (int c = 0; c < 3; ++c) {
         float value = 0.5f;
         for (int k = 0; k < basis; ++k) value += sh[c * basis + k] * gamma[k];
-        foreground[static_cast<size_t>(r)][c] += sample.weight * std::max(value, 0.0f);
+        foreground[r][c] += sample.weight * std::max(value, 0.0f);
       }
     }
   }
   LeastSquaresAccumulator sum;
   for (int64_t r = 0; r < n; ++r) {
-    const Vec3f& target = batch.targets[static_cast<size_t>(r)];
-    const float transmittance = weights.transmittance[static_cast<size_t>(r)];
+    const Vec3f& target = batch.targets[r];
+    const float transmittance = weights.transmittance[r];
     if (!AllFinite(target) || transmittance > options.max_transmittance) continue;
-    sum.Add(foreground[static_cast<size_t>(r)].Cast<double>(),
+    sum.Add(foreground[r].Cast<double>(),
             (target - field.background * transmittance).Cast<double>(), 1, 1 - transmittance);
   }
   return sum.Solve();

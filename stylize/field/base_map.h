@@ -2,7 +2,6 @@
 #pragma once
 
 #include "kernels/field/radiance_field.h"
-#include "kernels/field/ray_march.h"
 #include "stylize/field/gradient_aggregation.h"
 #include "stylize/linear_map.h"
 

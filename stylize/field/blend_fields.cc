@@ -17,13 +17,13 @@ double CheckWeights(const std::vector<double>& weights) {
   double sum = 0;
   for (const double weight : weights) {
     if (!(weight >= 0 && weight <= 1))
-      throw Error(ExitCode::kUsage, std::to_string(weight) + " is not a fraction", "--mix",
-                  "fractions lie between 0 (the unstyled scene) and 1 (the whole style)");
+      throw UsageError(std::to_string(weight) + " is not a fraction", "--mix",
+                       "fractions lie between 0 (the unstyled scene) and 1 (the whole style)");
     sum += weight;
   }
   if (sum > 1 + kSumSlack)
-    throw Error(ExitCode::kUsage, "fractions add up to " + std::to_string(sum), "--mix",
-                "they may add up to 1; the rest is the unstyled scene");
+    throw UsageError("fractions add up to " + std::to_string(sum), "--mix",
+                     "they may add up to 1; the rest is the unstyled scene");
   return sum;
 }
 
@@ -34,7 +34,7 @@ void MixVoxel(const std::vector<const float*>& parts, const double* weights, int
   for (size_t i = 0; i < parts.size(); ++i)
     if (weights[i] != 0) alone = static_cast<int>(i), ++count;
   if (count == 1) {
-    std::copy_n(parts[static_cast<size_t>(alone)], stride, out);
+    std::copy_n(parts[alone], stride, out);
     return;
   }
   for (int k = 0; k < stride; ++k) {
@@ -75,13 +75,12 @@ RadianceField MixFields(const RadianceField& source,
   for (size_t i = 0; i < styles.size(); ++i)
     if (styles[i]->appearance.basis != source.appearance.basis ||
         !SameGeometry(*source.geometry, *styles[i]->geometry))
-      throw Error(ExitCode::kInput,
-                  "style " + std::to_string(i + 1) + " is of another reconstruction", "",
-                  "styles that are mixed restyle one field: make them with `regrade stylize`");
+      throw InputError(
+          Concat("style ", i + 1, " is of another reconstruction"), "",
+          "styles that are mixed restyle one field: make them with `regrade stylize`");
   const int64_t voxels = source.geometry->num_voxels();
   const int stride = source.appearance.stride();
-  if (object_weights != nullptr)
-    REGRADE_CHECK_EQ(static_cast<int64_t>(object_weights->size()), voxels);
+  if (object_weights != nullptr) REGRADE_CHECK_EQ(std::ssize(*object_weights), voxels);
 
   std::vector<double> part_weights{std::abs(1 - sum) <= kSumSlack ? 0 : 1 - sum};
   part_weights.insert(part_weights.end(), weights.begin(), weights.end());
@@ -107,7 +106,7 @@ RadianceField MixFields(const RadianceField& source,
       for (size_t i = 0; i < styles.size(); ++i)
         parts[i + 1] = styles[i]->appearance.sh.data() + v * stride;
       if (object_weights != nullptr) {
-        const double object_weight = (*object_weights)[static_cast<size_t>(v)];
+        const double object_weight = (*object_weights)[v];
         double left = 1;
         for (size_t i = 1; i < here.size(); ++i) {
           here[i] = object_weight * part_weights[i];

@@ -3,7 +3,6 @@
 #include <omp.h>
 
 #include <algorithm>
-#include <cmath>
 #include <numeric>
 
 #include "kernels/field/spherical_harmonics.h"
@@ -29,7 +28,7 @@ DenseNetwork<float> HiddenUnits(const LipschitzNetwork& network, int first) {
   DenseNetwork<float> hidden = network.Effective<float>();
   hidden.layers.back() = DenseLayer<float>(kFeatureStride, kMlpHidden);
   for (int o = 0; o < kFeatureStride; ++o)
-    hidden.layers.back().weight[static_cast<size_t>(o * kMlpHidden + first + o)] = 1;
+    hidden.layers.back().weight[o * kMlpHidden + first + o] = 1;
   return hidden;
 }
 
@@ -64,7 +63,7 @@ void GradientAggregation::Touch(Band* band) {
         *slot++ = -1;
         continue;
       }
-      int32_t& known = slot_of_point_[static_cast<size_t>(point)];
+      int32_t& known = slot_of_point_[point];
       if (known < 0) {
         known = static_cast<int32_t>(touched_.size());
         touched_.push_back(point);
@@ -161,17 +160,16 @@ void GradientAggregation::March(const StyleRays& batch, int64_t begin, int64_t e
 }
 
 void GradientAggregation::FillTouchedFeatures(float position_scale) {
-  const int64_t slots = static_cast<int64_t>(touched_.size());
+  const int64_t slots = std::ssize(touched_);
   const int64_t voxels = field_.geometry->num_voxels();
   features_.Resize(slots * kFeatureStride);
   sh_.Resize(slots * kFeatureStride);
 #pragma omp parallel for schedule(static)
   for (int64_t s = 0; s < slots; ++s) {
-    const int32_t point = touched_[static_cast<size_t>(s)];
+    const int32_t point = touched_[s];
     float* const row = features_.data() + s * kFeatureStride;
     if (point < voxels) {
-      FillFeatures(field_, position_scale, point, vertex_of_voxel_[static_cast<size_t>(point)],
-                   row);
+      FillFeatures(field_, position_scale, point, vertex_of_voxel_[point], row);
     } else {
       const int64_t texel = point - voxels;
       const size_t column = static_cast<size_t>(texel / field_.geometry->spheres.layers);
@@ -183,37 +181,35 @@ void GradientAggregation::FillTouchedFeatures(float position_scale) {
 void GradientAggregation::RenderColors(const StyleRays& batch, Band* band) const {
   const RayWeights& weights = band->weights;
   band->unclamped.resize(weights.samples.size());
-  band->color.resize(static_cast<size_t>(weights.num_rays()));
+  band->color.resize(weights.num_rays());
 #pragma omp parallel for schedule(dynamic, 64)
   for (int64_t r = 0; r < weights.num_rays(); ++r) {
-    const int64_t first = weights.first[static_cast<size_t>(r)];
+    const int64_t first = weights.first[r];
     float gamma[kMaxBasis];
-    RayBasis(field_.appearance.basis,
-             batch.rays[static_cast<size_t>(band->begin + r)].direction, gamma);
-    band->color[static_cast<size_t>(r)] =
+    RayBasis(field_.appearance.basis, batch.rays[band->begin + r].direction, gamma);
+    band->color[r] =
         RenderStyled(weights.samples.data() + first, band->slots.data() + first * 8,
                      weights.first[static_cast<size_t>(r) + 1] - first, gamma, sh_.data(),
                      band->unclamped.data() + first) +
-        field_.background * weights.transmittance[static_cast<size_t>(r)];
+        field_.background * weights.transmittance[r];
   }
 }
 
 // Each range of slots walks all rays in their order, so a sum does not know who computed it.
 void GradientAggregation::Scatter(const StyleRays& batch, const Band& band) {
   const RayWeights& weights = band.weights;
-  const int64_t slots = static_cast<int64_t>(touched_.size());
+  const int64_t slots = std::ssize(touched_);
   const int ranges = omp_get_max_threads();
 #pragma omp parallel for schedule(static, 1)
   for (int t = 0; t < ranges; ++t) {
     const int32_t begin = static_cast<int32_t>(slots * t / ranges);
     const int32_t end = static_cast<int32_t>(slots * (t + 1) / ranges);
     for (int64_t r = 0; r < weights.num_rays(); ++r) {
-      const Vec3f& d_color = band.d_color[static_cast<size_t>(r)];
+      const Vec3f& d_color = band.d_color[r];
       if (d_color == Vec3f{0, 0, 0}) continue;
-      const int64_t first = weights.first[static_cast<size_t>(r)];
+      const int64_t first = weights.first[r];
       float gamma[kMaxBasis];
-      RayBasis(field_.appearance.basis,
-               batch.rays[static_cast<size_t>(band.begin + r)].direction, gamma);
+      RayBasis(field_.appearance.basis, batch.rays[band.begin + r].direction, gamma);
       ScatterStyled(weights.samples.data() + first, band.slots.data() + first * 8,
                     weights.first[static_cast<size_t>(r) + 1] - first, gamma,
                     band.unclamped.data() + first, d_color, begin, end, d_sh_.data());
@@ -222,9 +218,9 @@ void GradientAggregation::Scatter(const StyleRays& batch, const Band& band) {
 }
 
 double GradientAggregation::AddViewPenalty(const LipschitzNetworkData& data) {
-  const int64_t slots = static_cast<int64_t>(touched_.size());
+  const int64_t slots = std::ssize(touched_);
   const RowMap map = BaseOf(data);
-  std::vector<double> sums(static_cast<size_t>(slots));  // summed up in order below
+  std::vector<double> sums(slots);  // summed up in order below
 #pragma omp parallel for schedule(static)
   for (int64_t s = 0; s < slots; ++s) {
     const float* const from = features_.data() + s * kFeatureStride;
@@ -235,7 +231,7 @@ double GradientAggregation::AddViewPenalty(const LipschitzNetworkData& data) {
         const Vec3f source{from[k], from[9 + k], from[18 + k]};
         const ViewPenalty<float> penalty =
             ViewPenaltyOf(d[kMassLane + c], styled[c * 9 + k] - Dot(map.matrix.row[c], source));
-        sums[static_cast<size_t>(s)] += double{penalty.value};
+        sums[s] += double{penalty.value};
         d[c * 9 + k] += static_cast<float>(options_.view_weight) * penalty.derivative;
       }
       d[kMassLane + c] = 0;
@@ -245,19 +241,19 @@ double GradientAggregation::AddViewPenalty(const LipschitzNetworkData& data) {
 }
 
 bool GradientAggregation::Counts(const StyleRays& batch, const Band& band, int64_t ray) const {
-  return AllFinite(batch.targets[static_cast<size_t>(band.begin + ray)]) &&
-         band.weights.transmittance[static_cast<size_t>(ray)] <= options_.max_transmittance;
+  return AllFinite(batch.targets[band.begin + ray]) &&
+         band.weights.transmittance[ray] <= options_.max_transmittance;
 }
 
 void GradientAggregation::ForgetTouched() {
-  for (const int32_t point : touched_) slot_of_point_[static_cast<size_t>(point)] = -1;
+  for (const int32_t point : touched_) slot_of_point_[point] = -1;
   touched_.clear();
 }
 
 AggregationResult GradientAggregation::Run(const LipschitzNetwork& network,
                                            const StyleRays& batch,
                                            std::vector<double>* gradient) {
-  const int64_t num_rays = static_cast<int64_t>(batch.rays.size());
+  const int64_t num_rays = std::ssize(batch.rays);
   const bool one_band = num_rays <= kBandRays;
   AggregationResult result;
   Band band;
@@ -265,9 +261,9 @@ AggregationResult GradientAggregation::Run(const LipschitzNetwork& network,
   // Which voxels are touched. The lists of a whole view are large: marched again below.
   for (int64_t begin = 0; begin < num_rays; begin += kBandRays) {
     March(batch, begin, std::min(num_rays, begin + kBandRays), &band);
-    result.samples += static_cast<int64_t>(band.weights.samples.size());
+    result.samples += std::ssize(band.weights.samples);
   }
-  const int64_t slots = static_cast<int64_t>(touched_.size());
+  const int64_t slots = std::ssize(touched_);
   result.touched_voxels = slots;
   FillTouchedFeatures(network.data().position_scale);
   network.Forward(features_.data(), slots, sh_.data());
@@ -284,13 +280,12 @@ AggregationResult GradientAggregation::Run(const LipschitzNetwork& network,
     for (int64_t r = 0; r < band.weights.num_rays(); ++r) {
       if (!Counts(batch, band, r)) continue;
       ++result.rays;
-      const Vec3f& target = batch.targets[static_cast<size_t>(begin + r)];
+      const Vec3f& target = batch.targets[begin + r];
       for (int c = 0; c < 3; ++c) {
-        const ColorError error =
-            ErrorOf(band.color[static_cast<size_t>(r)][c], target[c], options_.one_sided);
+        const ColorError error = ErrorOf(band.color[r][c], target[c], options_.one_sided);
         loss_sum += static_cast<double>(error.loss) * error.loss;
         result.squared_error += static_cast<double>(error.shown) * error.shown;
-        band.d_color[static_cast<size_t>(r)][c] = 2 * error.loss;
+        band.d_color[r][c] = 2 * error.loss;
       }
     }
     if (gradient != nullptr) Scatter(batch, band);
@@ -318,22 +313,21 @@ AggregationResult GradientAggregation::Run(const LipschitzNetwork& network,
 StyleLoss::HiddenSums GradientAggregation::SumHidden(const LipschitzNetwork& network,
                                                      const StyleRays& batch) {
   HiddenSums sums;
-  const int64_t num_rays = static_cast<int64_t>(batch.rays.size());
+  const int64_t num_rays = std::ssize(batch.rays);
   Band band;
   for (int64_t begin = 0; begin < num_rays; begin += kBandRays) {
     March(batch, begin, std::min(num_rays, begin + kBandRays), &band);
     const RayWeights& weights = band.weights;
-    const int64_t slots = static_cast<int64_t>(touched_.size());
+    const int64_t slots = std::ssize(touched_);
     FillTouchedFeatures(network.data().position_scale);
     network.Forward(features_.data(), slots, sh_.data());
     RenderColors(batch, &band);
     const size_t row = sums.opacity.size();
     for (int64_t r = 0; r < weights.num_rays(); ++r) {
       if (!Counts(batch, band, r)) continue;
-      sums.opacity.push_back(1 - weights.transmittance[static_cast<size_t>(r)]);
+      sums.opacity.push_back(1 - weights.transmittance[r]);
       for (int c = 0; c < 3; ++c)
-        sums.missing.push_back(batch.targets[static_cast<size_t>(begin + r)][c] -
-                               band.color[static_cast<size_t>(r)][c]);
+        sums.missing.push_back(batch.targets[begin + r][c] - band.color[r][c]);
     }
     sums.hidden.resize(sums.opacity.size() * kMlpHidden);
     for (int half = 0; half < kMlpHidden; half += kFeatureStride) {
@@ -343,12 +337,11 @@ StyleLoss::HiddenSums GradientAggregation::SumHidden(const LipschitzNetwork& net
       for (int64_t r = 0; r < weights.num_rays(); ++r) {
         if (!Counts(batch, band, r)) continue;
         float* out = &sums.hidden[next++ * kMlpHidden + static_cast<size_t>(half)];
-        for (int64_t i = weights.first[static_cast<size_t>(r)];
-             i < weights.first[static_cast<size_t>(r) + 1]; ++i)
+        for (int64_t i = weights.first[r]; i < weights.first[static_cast<size_t>(r) + 1]; ++i)
           for (int corner = 0; corner < 8; ++corner) {
-            const int32_t slot = band.slots[static_cast<size_t>(i * 8 + corner)];
+            const int32_t slot = band.slots[i * 8 + corner];
             if (slot < 0) continue;
-            const WeightedSample& sample = weights.samples[static_cast<size_t>(i)];
+            const WeightedSample& sample = weights.samples[i];
             const float w = sample.weight * CornerWeight(sample.fraction, corner);
             const float* h = sh_.data() + static_cast<int64_t>(slot) * kFeatureStride;
             for (int l = 0; l < kFeatureStride; ++l) out[l] += w * h[l];

@@ -8,7 +8,6 @@
 
 #include "kernels/base/error.h"
 #include "kernels/field/background_spheres.h"
-#include "kernels/field/spherical_harmonics.h"
 #include "kernels/network/lipschitz_layer.h"
 
 namespace regrade {
@@ -77,8 +76,8 @@ double SpectralNorm(const std::vector<double>& matrix, int rows, int columns) {
 Activation ActivationByName(const std::string& name) {
   for (const auto& entry : kActivations)
     if (name == entry.name) return entry.activation;
-  throw Error(ExitCode::kUsage, "unknown activation '" + name + "'", "",
-              "use sine, relu, leaky-relu, sigmoid or tanh");
+  throw UsageError("unknown activation '" + name + "'", "",
+                   "use sine, relu, leaky-relu, sigmoid or tanh");
 }
 
 const char* NameOf(Activation activation) {
@@ -94,22 +93,20 @@ int LipschitzNetwork::Inputs(int layer) { return layer == 0 ? kNetworkInputs : k
 int64_t LipschitzNetwork::NumParameters() { return WeightOffset(kNetworkLayers); }
 
 LipschitzNetwork::LipschitzNetwork() {
-  data_.parameters.resize(static_cast<size_t>(NumParameters()));
-  data_.singular_vectors.resize(static_cast<size_t>(VectorOffset(kNetworkLayers)));
+  data_.parameters.resize(NumParameters());
+  data_.singular_vectors.resize(VectorOffset(kNetworkLayers));
 }
 
 LipschitzNetwork::LipschitzNetwork(LipschitzNetworkData data) : data_(std::move(data)) {
   const auto refuse = [](const std::string& what) {
-    throw Error(ExitCode::kInput, "not a network: " + what, "network.npz",
-                "run regrade stylize again");
+    throw InputError("not a network: " + what, "network.npz", "run regrade stylize again");
   };
-  if (std::none_of(std::begin(kActivations), std::end(kActivations),
-                   [this](const auto& entry) { return data_.activation == entry.name; }))
+  if (std::ranges::none_of(
+          kActivations, [this](const auto& entry) { return data_.activation == entry.name; }))
     refuse("unknown activation '" + data_.activation + "'");
-  if (static_cast<int64_t>(data_.parameters.size()) != NumParameters())
-    refuse(std::to_string(data_.parameters.size()) + " parameters instead of " +
-           std::to_string(NumParameters()));
-  if (static_cast<int64_t>(data_.singular_vectors.size()) != VectorOffset(kNetworkLayers))
+  if (std::ssize(data_.parameters) != NumParameters())
+    refuse(Concat(data_.parameters.size(), " parameters instead of ", NumParameters()));
+  if (std::ssize(data_.singular_vectors) != VectorOffset(kNetworkLayers))
     refuse("singular vectors of another shape");
   bool finite = std::isfinite(data_.omega) && std::isfinite(data_.sh_scale) &&
                 std::isfinite(data_.position_scale) && AllFinite(data_.base.offset);
@@ -160,17 +157,16 @@ template DenseNetwork<double> LipschitzNetwork::Effective<double>() const;
 
 void LipschitzNetwork::AddGradient(const DenseNetwork<double>& d_effective,
                                    std::vector<double>* gradient) const {
-  REGRADE_CHECK_EQ(static_cast<int64_t>(gradient->size()), NumParameters());
+  REGRADE_CHECK_EQ(std::ssize(*gradient), NumParameters());
   for (int l = 0; l < kNetworkLayers; ++l) {
-    std::vector<double> d_a = d_effective.layers[static_cast<size_t>(l)].weight;
+    std::vector<double> d_a = d_effective.layers[l].weight;
     if (l == 0)
       for (int o = 0; o < Outputs(l); ++o)
         for (int i = 0; i < kNetworkSh; ++i)
           d_a[static_cast<size_t>(o) * kNetworkInputs + i] *= data_.sh_scale;
     double* d_weight = gradient->data() + WeightOffset(l);
     double* d_bias = d_weight + static_cast<int64_t>(Outputs(l)) * Inputs(l);
-    for (int o = 0; o < Outputs(l); ++o)
-      d_bias[o] += d_effective.layers[static_cast<size_t>(l)].bias[static_cast<size_t>(o)];
+    for (int o = 0; o < Outputs(l); ++o) d_bias[o] += d_effective.layers[l].bias[o];
     SpectralCopy<double> copy(*this, l);
     LipschitzWeightAdjoint(copy.View(), static_cast<double>(k(l)), d_a.data(), d_weight,
                            d_bias + Outputs(l));
@@ -228,11 +224,10 @@ double LipschitzNetwork::SmallestK() const {
 }
 
 std::vector<int32_t> VertexOfVoxel(const Geometry& geometry) {
-  std::vector<int32_t> vertex(static_cast<size_t>(geometry.num_voxels()), -1);
+  std::vector<int32_t> vertex(geometry.num_voxels(), -1);
   if (geometry.cells.on()) std::iota(vertex.begin(), vertex.end(), 0);
   for (int64_t i = 0; i < geometry.links.size(); ++i)
-    if (geometry.links[i] >= 0)
-      vertex[static_cast<size_t>(geometry.links[i])] = static_cast<int32_t>(i);
+    if (geometry.links[i] >= 0) vertex[geometry.links[i]] = static_cast<int32_t>(i);
   return vertex;
 }
 
@@ -272,10 +267,9 @@ void FillTexelFeatures(const RadianceField& field, float position_scale, int64_t
 }
 
 std::vector<int32_t> PlaceOfColumn(const SphereGeometry& spheres) {
-  std::vector<int32_t> place(static_cast<size_t>(spheres.num_columns()));
+  std::vector<int32_t> place(spheres.num_columns());
   for (int64_t at = 0; at < spheres.links.size(); ++at)
-    if (spheres.links[at] >= 0)
-      place[static_cast<size_t>(spheres.links[at])] = static_cast<int32_t>(at);
+    if (spheres.links[at] >= 0) place[spheres.links[at]] = static_cast<int32_t>(at);
   return place;
 }
 

@@ -19,8 +19,8 @@ inline constexpr double kLargestKEst = 1e3;
 // kLargestKEst is no style but a broken map: it is cut there (`capped` says so).
 inline double LayerTarget(double k_est, int layers, bool* capped = nullptr) {
   if (!std::isfinite(k_est) || k_est < 0)
-    throw Error(ExitCode::kInput, "the style's linear map has no finite norm", "",
-                "look at the styled views: they must be pictures of the same scene");
+    throw InputError("the style's linear map has no finite norm", "",
+                     "look at the styled views: they must be pictures of the same scene");
   if (capped != nullptr) *capped = k_est > kLargestKEst;
   return k_est > 0 ? std::pow(std::min(k_est, kLargestKEst), 1.0 / layers) : 0.0;
 }

@@ -2,7 +2,6 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
-#include <cmath>
 #include <utility>
 #include <vector>
 
@@ -97,8 +96,7 @@ LocalLipschitz MeasureLocalLipschitz(const LipschitzNetwork& network,
     const int64_t voxel = static_cast<int64_t>(
         RandomIndex(options.seed, stream, static_cast<uint64_t>(i), static_cast<uint64_t>(n)));
     float row[kFeatureStride];
-    FillFeatures(field, network.data().position_scale, voxel,
-                 vertex[static_cast<size_t>(voxel)], row);
+    FillFeatures(field, network.data().position_scale, voxel, vertex[voxel], row);
     VectorXd point(kNetworkInputs);
     for (int k = 0; k < kNetworkInputs; ++k) point(k) = row[k];
     return point;
@@ -126,8 +124,7 @@ LocalLipschitz MeasureLocalLipschitz(const LipschitzNetwork& network,
     VectorXd direction = VectorXd::Ones(kNetworkInputs).normalized();
     steepest.emplace_back(f.NormAt(point, &direction), point);
   }
-  std::sort(steepest.begin(), steepest.end(),
-            [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::ranges::sort(steepest, [](const auto& a, const auto& b) { return a.first > b.first; });
   if (!steepest.empty()) {
     result.jacobians = steepest.front().first;
     const MatrixXd jacobian = f.Jacobian(steepest.front().second);

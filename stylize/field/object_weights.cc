@@ -41,14 +41,13 @@ void MaskVote::Add(const Camera& camera, const Image& mask) {
         rays.push_back(camera.PixelRay(x, y));
         votes.push_back(std::clamp(vote, 0.0f, 1.0f));
       }
-    const int64_t count = static_cast<int64_t>(rays.size());
+    const int64_t count = std::ssize(rays);
     const RayWeights weights =
         ComputeRayWeights(geometry_, {rays.data(), count}, march_, near_clip_);
 #pragma omp parallel for schedule(dynamic, 64)
     for (int64_t r = 0; r < count; ++r)
-      for (int64_t i = weights.first[static_cast<size_t>(r)];
-           i < weights.first[static_cast<size_t>(r) + 1]; ++i) {
-        const WeightedSample& sample = weights.samples[static_cast<size_t>(i)];
+      for (int64_t i = weights.first[r]; i < weights.first[static_cast<size_t>(r) + 1]; ++i) {
+        const WeightedSample& sample = weights.samples[i];
         if (sample.on_sphere()) continue;
         int32_t voxels[8];
         CornerPoints(geometry_, sample, voxels);
@@ -58,10 +57,10 @@ void MaskVote::Add(const Camera& camera, const Image& mask) {
           const double weight = sample.weight * CornerWeight(sample.fraction, corner);
           const uint64_t steps = static_cast<uint64_t>(weight * kStep);
           if (steps == 0) continue;
-          AddTo(&all_[static_cast<size_t>(voxel)], steps);
+          AddTo(&all_[voxel], steps);
           const uint64_t in_favour =
-              static_cast<uint64_t>(votes[static_cast<size_t>(r)] * static_cast<double>(steps));
-          if (in_favour > 0) AddTo(&yes_[static_cast<size_t>(voxel)], in_favour);
+              static_cast<uint64_t>(votes[r] * static_cast<double>(steps));
+          if (in_favour > 0) AddTo(&yes_[voxel], in_favour);
         }
       }
   }
@@ -82,13 +81,13 @@ std::vector<float> MaskVote::Weights(double threshold, double edge) const {
 }
 
 RadianceField WeightField(const RadianceField& field, const std::vector<float>& weights) {
-  REGRADE_CHECK_EQ(static_cast<int64_t>(weights.size()), field.geometry->num_voxels());
+  REGRADE_CHECK_EQ(std::ssize(weights), field.geometry->num_voxels());
   RadianceField result;
   result.geometry = field.geometry;
   result.near_clip = field.near_clip;
   result.step = field.step;
   result.appearance.basis = 1;
-  result.appearance.sh.Resize(static_cast<int64_t>(weights.size()) * 3);
+  result.appearance.sh.Resize(std::ssize(weights) * 3);
   for (size_t v = 0; v < weights.size(); ++v)
     for (size_t c = 0; c < 3; ++c)
       result.appearance.sh[static_cast<int64_t>(3 * v + c)] =

@@ -48,13 +48,12 @@ class Observer {
   Seen Look(const Vec3f& direction, const RayWeights& weights, int64_t ray) const {
     Seen seen;
     ShBasis(basis_, direction.Cast<double>(), seen.gamma);
-    const double left = weights.transmittance[static_cast<size_t>(ray)];
+    const double left = weights.transmittance[ray];
     seen.source = source_.background.Cast<double>() * left;
     seen.styled = styled_.background.Cast<double>() * left;
     double inside_weight = 0;
-    for (int64_t i = weights.first[static_cast<size_t>(ray)];
-         i < weights.first[static_cast<size_t>(ray) + 1]; ++i) {
-      const WeightedSample& sample = weights.samples[static_cast<size_t>(i)];
+    for (int64_t i = weights.first[ray]; i < weights.first[static_cast<size_t>(ray) + 1]; ++i) {
+      const WeightedSample& sample = weights.samples[i];
       Vec3d before{0.5, 0.5, 0.5}, after = before;
       int32_t voxels[8];
       CornerPoints(*source_.geometry, sample, voxels);
@@ -124,8 +123,8 @@ class Observer {
 
   double Distance(int32_t one, int32_t other) const {
     float x[kFeatureStride], y[kFeatureStride];
-    FillFeatures(source_, position_scale_, one, vertex_[static_cast<size_t>(one)], x);
-    FillFeatures(source_, position_scale_, other, vertex_[static_cast<size_t>(other)], y);
+    FillFeatures(source_, position_scale_, one, vertex_[one], x);
+    FillFeatures(source_, position_scale_, other, vertex_[other], y);
     double sum = 0;
     for (int i = 0; i < kNetworkInputs; ++i) {
       const double d = static_cast<double>(x[i]) - static_cast<double>(y[i]);
@@ -181,9 +180,8 @@ VarianceReport MeasureVariance(const RadianceField& source, const RadianceField&
                                const std::vector<RayPair>& pairs, const MarchOptions& march) {
   std::vector<Ray> rays;
   for (const RayPair& pair : pairs) rays.insert(rays.end(), {pair.first, pair.second});
-  const RayWeights weights =
-      ComputeRayWeights(*source.geometry, {rays.data(), static_cast<int64_t>(rays.size())},
-                        march, source.near_clip);
+  const RayWeights weights = ComputeRayWeights(
+      *source.geometry, {rays.data(), std::ssize(rays)}, march, source.near_clip);
   const Observer observer(source, styled, network);
   struct Result {
     double source, styled, fraction;
@@ -225,8 +223,7 @@ std::vector<RayPair> NeighbouringPixels(const std::vector<Camera>& cameras, int6
       return static_cast<int>(RandomIndex(seed, kStream, static_cast<uint64_t>(4 * i + which),
                                           static_cast<uint64_t>(below)));
     };
-    const Camera& camera =
-        cameras[static_cast<size_t>(draw(0, static_cast<int>(cameras.size())))];
+    const Camera& camera = cameras[draw(0, static_cast<int>(cameras.size()))];
     const bool down = draw(1, 2) == 1;
     const int right = down ? 0 : 1, below = down ? 1 : 0;
     if (camera.width <= right || camera.height <= below) continue;

@@ -48,7 +48,6 @@ struct VarianceReport {
   double largest_fraction = 0;  // of the bound, see EQ(vrr-bound), over `valid`; at most 1
 
   int64_t Pairs() const { return transparent.pairs + clamped.pairs + valid.pairs; }
-  int64_t Above() const { return transparent.above + clamped.above + valid.above; }
 };
 
 inline constexpr double kVarianceSlack = 1e-5;             // float's rounding in a ray's colour

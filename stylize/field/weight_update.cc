@@ -20,12 +20,12 @@ void LimitBound(const WeightUpdate& update, LipschitzNetwork* network) {
 bool UpdateWeights(const WeightUpdate& update, int64_t step, std::vector<double>* gradient,
                    LipschitzNetwork* network, AdamState* adam) {
   for (int l = 0; l < kNetworkLayers; ++l) {
-    double& d_k = (*gradient)[static_cast<size_t>(&network->k(l) - network->weight(0))];
+    double& d_k = (*gradient)[&network->k(l) - network->weight(0)];
     d_k = update.NormGradient(network->k(l), d_k);
   }
   const std::vector<float> gradient32(gradient->begin(), gradient->end());
   std::vector<float>& parameters = network->data().parameters;
-  const int64_t size = static_cast<int64_t>(parameters.size());
+  const int64_t size = std::ssize(parameters);
   if (!AdamStep(update.adam, update.Rate(step), {gradient32.data(), size},
                 {parameters.data(), size}, adam))
     return false;

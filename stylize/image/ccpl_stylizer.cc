@@ -107,8 +107,7 @@ void AddMean(const std::vector<double>& mean, FeatureMap* features) {
   REGRADE_CHECK_EQ(mean.size(), static_cast<size_t>(features->channels));
   for (int c = 0; c < features->channels; ++c)
     for (int64_t i = 0; i < features->num_pixels(); ++i)
-      features->plane(c)[i] =
-          static_cast<float>(features->plane(c)[i] + mean[static_cast<size_t>(c)]);
+      features->plane(c)[i] = static_cast<float>(features->plane(c)[i] + mean[c]);
 }
 
 std::unique_ptr<ViewStylizer> MakeCcplStylizer(const std::string& folder, int max_side,

@@ -49,14 +49,14 @@ std::vector<double> SortedAxis(const std::vector<Vec3d>& colors, const Mat3d& ro
                                int axis) {
   std::vector<double> values(colors.size());
   for (size_t i = 0; i < colors.size(); ++i) values[i] = (rotation * colors[i])[axis];
-  std::sort(values.begin(), values.end());
+  std::ranges::sort(values);
   return values;
 }
 
 Vec3d Turned(const DistributionMap::Turn& turn, const Vec3d& color) {
   const Vec3d place = turn.rotation * color;
   Vec3d moved;
-  for (int c = 0; c < 3; ++c) moved[c] = turn.axes[static_cast<size_t>(c)](place[c]) - place[c];
+  for (int c = 0; c < 3; ++c) moved[c] = turn.axes[c](place[c]) - place[c];
   Vec3d result = color;
   for (int c = 0; c < 3; ++c)
     for (int k = 0; k < 3; ++k) result[c] += turn.rotation(k, c) * moved[k];
@@ -146,12 +146,11 @@ Vec3d DistributionMap::operator()(Vec3d color) const {
 
 StyleTurns MeasureTurns(const std::vector<Vec3d>& style, int iterations) {
   StyleTurns turns;
-  turns.quantiles.resize(static_cast<size_t>(iterations));
+  turns.quantiles.resize(iterations);
 #pragma omp parallel for schedule(static)
   for (int k = 0; k < 3 * iterations; ++k) {
     const std::vector<double> sorted = SortedAxis(style, RotationOf(k / 3), k % 3);
-    std::vector<double>& quantiles =
-        turns.quantiles[static_cast<size_t>(k / 3)][static_cast<size_t>(k % 3)];
+    std::vector<double>& quantiles = turns.quantiles[k / 3][k % 3];
     for (int i = 0; i < kQuantiles; ++i) quantiles.push_back(Quantile(sorted, i));
   }
   return turns;
@@ -165,9 +164,8 @@ DistributionMap LearnDistributionMap(std::vector<Vec3d> source, const StyleTurns
     // The quantiles of kQuantiles quantiles are themselves.
 #pragma omp parallel for schedule(static)
     for (int axis = 0; axis < 3; ++axis)
-      turn.axes[static_cast<size_t>(axis)] =
-          MatchHistograms(SortedAxis(source, turn.rotation, axis),
-                          style.quantiles[i][static_cast<size_t>(axis)]);
+      turn.axes[axis] =
+          MatchHistograms(SortedAxis(source, turn.rotation, axis), style.quantiles[i][axis]);
 #pragma omp parallel for schedule(static)
     for (size_t k = 0; k < source.size(); ++k) source[k] = Turned(turn, source[k]);
     map.turns.push_back(std::move(turn));
@@ -184,14 +182,12 @@ std::vector<Vec3d> SampleColors(const Image& image, const std::string& where, in
     const Vec3d color{p[0], p[grey ? 0 : 1], p[grey ? 0 : 2]};
     if (std::isfinite(color.x + color.y + color.z)) all.push_back(color);
   }
-  if (all.empty())
-    throw Error(ExitCode::kInput, "the picture has no pixel to take a colour of", where);
-  const int64_t count = static_cast<int64_t>(all.size());
+  if (all.empty()) throw InputError("the picture has no pixel to take a colour of", where);
+  const int64_t count = std::ssize(all);
   if (count <= most) return all;
   // By index, not by a whole stride: a stride that divides the width would see few columns.
-  std::vector<Vec3d> sample(static_cast<size_t>(most));
-  for (int64_t i = 0; i < most; ++i)
-    sample[static_cast<size_t>(i)] = all[static_cast<size_t>(i * count / most)];
+  std::vector<Vec3d> sample(most);
+  for (int64_t i = 0; i < most; ++i) sample[i] = all[i * count / most];
   return sample;
 }
 

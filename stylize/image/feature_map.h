@@ -22,8 +22,8 @@ struct FeatureMap {
         values(static_cast<size_t>(channels) * height * width) {}
 
   int64_t num_pixels() const { return static_cast<int64_t>(height) * width; }
-  float* plane(int c) { return &values[static_cast<size_t>(c * num_pixels())]; }
-  const float* plane(int c) const { return &values[static_cast<size_t>(c * num_pixels())]; }
+  float* plane(int c) { return &values[c * num_pixels()]; }
+  const float* plane(int c) const { return &values[c * num_pixels()]; }
 };
 
 }  // namespace regrade

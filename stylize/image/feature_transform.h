@@ -1,7 +1,6 @@
 // Moves mean and covariance of a network's features onto a style's: whitening, then colouring.
 #pragma once
 
-#include <cstdint>
 #include <vector>
 
 #include "stylize/image/feature_map.h"

@@ -67,7 +67,7 @@ GuidedCoefficients FitGuided(const Image& guide, const Image& picture, int radiu
   const int width = guide.width, height = guide.height;
   const int64_t count = guide.num_pixels();
   std::array<Plane, 21> means;
-  for (Plane& plane : means) plane.resize(static_cast<size_t>(count));
+  for (Plane& plane : means) plane.resize(count);
   for (int64_t i = 0; i < count; ++i) {
     const float *g = &guide.pixels[3 * i], *p = &picture.pixels[3 * i];
     for (int c = 0; c < 3; ++c) {
@@ -83,7 +83,7 @@ GuidedCoefficients FitGuided(const Image& guide, const Image& picture, int radiu
   // Means of products less products of means: in double, of values near [0, 1], their rounding
   // of 1e-15 is nothing beside eps.
   std::array<Plane, 12> fits;  // 3 c + d: of guide channel c for output d; 9 + d: offset
-  for (Plane& plane : fits) plane.resize(static_cast<size_t>(count));
+  for (Plane& plane : fits) plane.resize(count);
 #pragma omp parallel for schedule(static)
   for (int64_t i = 0; i < count; ++i) {
     Eigen::Matrix3d sigma, cross;

@@ -28,13 +28,11 @@ class MaskedStylizer : public ViewStylizer {
       const Image styled =
           regions_[k]->Stylize(alpha_tells_ ? WithRegion(view, coverage[k]) : view, view_index);
       for (int64_t i = 0; i < view.num_pixels(); ++i) {
-        const float m = coverage[k].pixels[static_cast<size_t>(i)];
+        const float m = coverage[k].pixels[i];
         if (!(m > 0)) continue;
         for (int c = 0; c < std::min(3, view.channels); ++c) {
           const size_t at = static_cast<size_t>(i * view.channels + c);
-          result.pixels[at] +=
-              m *
-              (styled.pixels[static_cast<size_t>(i * styled.channels + c)] - view.pixels[at]);
+          result.pixels[at] += m * (styled.pixels[i * styled.channels + c] - view.pixels[at]);
         }
       }
     }
@@ -48,8 +46,7 @@ class MaskedStylizer : public ViewStylizer {
     std::vector<std::string> notices;
     for (const auto& region : regions_)
       for (const std::string& notice : region->Notices())
-        if (std::find(notices.begin(), notices.end(), notice) == notices.end())
-          notices.push_back(notice);
+        if (std::ranges::find(notices, notice) == notices.end()) notices.push_back(notice);
     return notices;
   }
 
@@ -65,17 +62,16 @@ Image WithRegion(const Image& view, const Image& coverage) {
   REGRADE_CHECK(view.SameSize(coverage) && coverage.channels == 1);
   Image result(view.width, view.height, 4);
   for (int64_t i = 0; i < view.num_pixels(); ++i) {
-    const float* p = &view.pixels[static_cast<size_t>(i * view.channels)];
-    float* q = &result.pixels[static_cast<size_t>(4 * i)];
+    const float* p = &view.pixels[i * view.channels];
+    float* q = &result.pixels[4 * i];
     for (int c = 0; c < 3; ++c) q[c] = p[view.channels < 3 ? 0 : c];
-    q[3] = coverage.pixels[static_cast<size_t>(i)] > 0.5f ? 1.0f : 0.0f;
+    q[3] = coverage.pixels[i] > 0.5f ? 1.0f : 0.0f;
   }
   return result;
 }
 
 bool ShowsRegion(const Image& coverage) {
-  return std::any_of(coverage.pixels.begin(), coverage.pixels.end(),
-                     [](float m) { return m > 0.5f; });
+  return std::ranges::any_of(coverage.pixels, [](float m) { return m > 0.5f; });
 }
 
 std::unique_ptr<ViewStylizer> MakeMaskedStylizer(

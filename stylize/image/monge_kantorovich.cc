@@ -3,7 +3,6 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 
 #include "kernels/base/error.h"
@@ -84,10 +83,8 @@ MklMap ComputeMkl(const ColorStatistics& source, const ColorStatistics& style) {
                                    "not defined by the style");
   }
   if (result.norm > kLargestUsualNorm) {
-    char text[96];
-    std::snprintf(text, sizeof(text), "the colour map magnifies differences %.3g times",
-                  result.norm);
-    result.notices.push_back(text);
+    result.notices.push_back(
+        Format("the colour map magnifies differences %.3g times", result.norm));
   }
   return result;
 }

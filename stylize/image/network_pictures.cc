@@ -14,8 +14,7 @@ constexpr int kGuideRadius = 30;               // pixels of the working size
 constexpr double kGuideEpsilon = 0.02 * 0.02;  // squared values
 
 std::string ShapeOf(const FeatureMap& map) {
-  return std::to_string(map.channels) + " x " + std::to_string(map.height) + " x " +
-         std::to_string(map.width);
+  return Concat(map.channels, " x ", map.height, " x ", map.width);
 }
 
 }  // namespace
@@ -98,14 +97,13 @@ Image TrialPicture(int width, int height) {
 void CheckShape(const FeatureMap& map, int channels, int height, int width,
                 const std::string& path) {
   if (map.channels == channels && map.height == height && map.width == width) return;
-  throw Error(
-      ExitCode::kExternalProgram,
+  throw ProgramError(
       "it gives " + ShapeOf(map) + ", expected is " + ShapeOf({channels, height, width}), path,
       "take all files of the folder from one conversion");
 }
 
 std::string Numbered(const std::string& folder, const std::string& name, int level) {
-  return folder + "/" + name + std::to_string(level) + ".onnx";
+  return Concat(folder, "/", name, level, ".onnx");
 }
 
 }  // namespace regrade

@@ -35,7 +35,7 @@ class QuietOpenCv {
 
 [[noreturn]] void Fail(const std::string& what, const std::string& path,
                        const std::string& hint) {
-  throw Error(ExitCode::kExternalProgram, what, path, hint);
+  throw ProgramError(what, path, hint);
 }
 
 // The first line of what OpenCV says, without its place in OpenCV.
@@ -51,7 +51,7 @@ std::string ReadBytes(const std::string& path) {
   const uintmax_t size = std::filesystem::file_size(path, error);
   if (error || size == 0) Fail("the file is empty or cannot be read", path, "copy it again");
   if (size > kMostBytes)
-    Fail("the file has " + std::to_string(size) + " bytes", path, "at most 1 GiB is read");
+    Fail(Concat("the file has ", size, " bytes"), path, "at most 1 GiB is read");
   std::string bytes(static_cast<size_t>(size), '\0');
   std::ifstream file(path, std::ios::binary);
   if (!file.read(bytes.data(), static_cast<std::streamsize>(size)))
@@ -65,8 +65,7 @@ FeatureMap Copied(const cv::Mat& blob, const std::string& name, const std::strin
          "expected is [1, channels, height, width]");
   FeatureMap map(blob.size[1], blob.size[2], blob.size[3]);
   std::memcpy(map.values.data(), blob.ptr<float>(), map.values.size() * sizeof(float));
-  if (!std::all_of(map.values.begin(), map.values.end(),
-                   [](float v) { return std::isfinite(v); }))
+  if (!std::ranges::all_of(map.values, [](float v) { return std::isfinite(v); }))
     Fail("its output \"" + name + "\" has values that are not finite numbers", path,
          "the weights may be damaged: copy the file again");
   return map;

@@ -129,8 +129,8 @@ std::unique_ptr<ViewStylizer> MakeOnnxStylizer(const std::string& path, int max_
     folder = fs::path(path).parent_path().string();
     if (folder.empty()) folder = ".";
     if (fs::path(path).filename().string().find("encoder") == std::string::npos)
-      throw Error(
-          ExitCode::kExternalProgram, "one network alone is no method known here", path,
+      throw ProgramError(
+          "one network alone is no method known here", path,
           "name the folder that holds all networks of a method, such as PCA-KD's encoder.onnx "
           "and decoder1.onnx ... decoder4.onnx");
   }
@@ -143,8 +143,8 @@ std::unique_ptr<ViewStylizer> MakeOnnxStylizer(const std::string& path, int max_
       return MakeWct2Stylizer(folder, cat5, max_side, style);
   if (fs::exists(folder + "/ccpl_encoder.onnx", error))
     return MakeCcplStylizer(folder, max_side, style);
-  throw Error(
-      ExitCode::kExternalProgram, "there is no encoder.onnx in this folder", folder,
+  throw ProgramError(
+      "there is no encoder.onnx in this folder", folder,
       "PCA-KD is encoder.onnx and decoder1.onnx ... decoder4.onnx, WCT encoder1.onnx ... "
       "encoder3.onnx and decoder1.onnx ... decoder3.onnx; scripts/convert_networks.py makes "
       "the files of WCT2 and CCPL");

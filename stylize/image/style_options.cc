@@ -23,9 +23,9 @@ StyleMethod ParseStyleMethod(const StyleOptions& options) {
   const std::string& text = options.method;
   const std::string hint = std::string("use ") + kStyleMethods;
   if (options.regrain && text != "idt" && text != "histogram")
-    throw Error(ExitCode::kUsage, "\"" + text + "\" makes no grain louder",
-                "--method and --style-regrain",
-                "leave it out, or add --no-style-regrain where an earlier run asked for it");
+    throw UsageError(
+        "\"" + text + "\" makes no grain louder", "--method and --style-regrain",
+        "leave it out, or add --no-style-regrain where an earlier run asked for it");
   for (const auto& [name, kind] : kColorMethods)
     if (text == name) return {kind, name, ""};
   for (const auto& [name, kind] : kMethodsWithArgument) {
@@ -33,14 +33,15 @@ StyleMethod ParseStyleMethod(const StyleOptions& options) {
     if (!text.starts_with(prefix)) continue;
     const std::string argument = text.substr(prefix.size());
     if (argument.find_first_not_of(" \t") == std::string::npos)
-      throw Error(ExitCode::kUsage, "nothing follows \"" + prefix + "\"", "--method", hint);
+      throw UsageError("nothing follows \"" + prefix + "\"", "--method", hint);
     if (options.scene_wide)
-      throw Error(ExitCode::kUsage, "\"" + std::string(name) + "\" styles each view by itself",
-                  "--method and --scene-wide",
-                  "leave it out, or add --no-scene-wide where an earlier run asked for it");
+      throw UsageError(
+          "\"" + std::string(name) + "\" styles each view by itself",
+          "--method and --scene-wide",
+          "leave it out, or add --no-scene-wide where an earlier run asked for it");
     return {kind, name, argument};
   }
-  throw Error(ExitCode::kUsage, "there is no 2D method \"" + text + "\"", "--method", hint);
+  throw UsageError("there is no 2D method \"" + text + "\"", "--method", hint);
 }
 
 }  // namespace regrade

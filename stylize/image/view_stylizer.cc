@@ -19,15 +19,13 @@ int64_t CountNotFinite(const Image& image, ExitCode code, const std::string& whe
     if (!IsFinite(image, i)) ++count;
   if (count * 100 > image.num_pixels())
     throw Error(code,
-                std::to_string(count) + " of " + std::to_string(image.num_pixels()) +
-                    " pixels are not finite numbers",
+                Concat(count, " of ", image.num_pixels(), " pixels are not finite numbers"),
                 where, "at most 1 % may be");
   return count;
 }
 
 std::string Shape(const Image& image) {
-  return std::to_string(image.width) + "x" + std::to_string(image.height) + " with " +
-         std::to_string(image.channels) + " channels";
+  return Concat(image.width, "x", image.height, " with ", image.channels, " channels");
 }
 
 }  // namespace
@@ -38,9 +36,8 @@ int64_t CountNotFinite(const Image& image, const std::string& where) {
 
 int64_t CheckStyledView(const Image& view, const Image& styled, const std::string& where) {
   if (!view.SameSize(styled) || view.channels != styled.channels)
-    throw Error(ExitCode::kExternalProgram,
-                "the styled view is " + Shape(styled) + ", the view " + Shape(view), where,
-                "a 2D method must keep the size of its view");
+    throw ProgramError("the styled view is " + Shape(styled) + ", the view " + Shape(view),
+                       where, "a 2D method must keep the size of its view");
   return CountNotFinite(styled, ExitCode::kExternalProgram, where);
 }
 

@@ -76,7 +76,7 @@ class Wct2 : public ViewStylizer {
   FeatureMap Restyle(FeatureMap x, const At& at) const {
     std::array<Bypass, kLevels + 1> over;  // [decoder's level]
     for (int level = 1; level <= kLevels; ++level) {
-      const OnnxNetwork& encoder = encoders_[static_cast<size_t>(level - 1)];
+      const OnnxNetwork& encoder = encoders_[level - 1];
       const size_t taker = static_cast<size_t>(cat5_ ? level : level + 1);
       const bool halves = taker >= 2 && taker <= kLevels;
       std::vector<std::string> outputs = {"out"};

@@ -113,19 +113,17 @@ void ClearLastLayer(LipschitzNetwork* network) {
 void SolveOutputLayer(const StyleLoss::HiddenSums& sums, double budget,
                       LipschitzNetwork* network) {
   constexpr int kSize = kMlpHidden + 1;
-  const int64_t n = static_cast<int64_t>(sums.opacity.size());
+  const int64_t n = std::ssize(sums.opacity);
   if (n == 0) return;
   Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(kSize, kSize);
   Eigen::MatrixXd right = Eigen::MatrixXd::Zero(kSize, 3);
   Eigen::VectorXd x(kSize);
   for (int64_t r = 0; r < n; ++r) {
-    for (int i = 0; i < kMlpHidden; ++i)
-      x(i) = kSh0 * sums.hidden[static_cast<size_t>(r * kMlpHidden + i)];
-    x(kMlpHidden) = kSh0 * sums.opacity[static_cast<size_t>(r)];
+    for (int i = 0; i < kMlpHidden; ++i) x(i) = kSh0 * sums.hidden[r * kMlpHidden + i];
+    x(kMlpHidden) = kSh0 * sums.opacity[r];
     gram.selfadjointView<Eigen::Lower>().rankUpdate(x, 1.0 / static_cast<double>(n));
     for (int c = 0; c < 3; ++c)
-      right.col(c) +=
-          x * (sums.missing[static_cast<size_t>(r * 3 + c)] / static_cast<double>(n));
+      right.col(c) += x * (sums.missing[r * 3 + c] / static_cast<double>(n));
   }
   gram = Eigen::MatrixXd(gram.selfadjointView<Eigen::Lower>());
 

@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "kernels/base/progress.h"
 #include "kernels/device/backend.h"
 #include "kernels/field/radiance_field.h"
 #include "stylize/training/train_network.h"

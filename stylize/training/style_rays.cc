@@ -69,20 +69,16 @@ int64_t RaysPerStep(int rays, int patch) {
 
 int64_t ValidateViews(const std::vector<StyledTrainingView>& views) {
   if (views.empty())
-    throw Error(ExitCode::kInput, "no styled view to learn from", "",
-                "keep some training views");
+    throw InputError("no styled view to learn from", "", "keep some training views");
   int64_t left_out = 0;
   for (const StyledTrainingView& view : views) {
     REGRADE_CHECK(view.target != nullptr);
     const Image& target = *view.target;
     if (target.width != view.camera.width || target.height != view.camera.height ||
         target.channels != 3)
-      throw Error(ExitCode::kInput,
-                  "the styled view is " + std::to_string(target.width) + "x" +
-                      std::to_string(target.height) + ", its photo " +
-                      std::to_string(view.camera.width) + "x" +
-                      std::to_string(view.camera.height),
-                  view.name, "the 2D method must keep the picture's size");
+      throw InputError(Concat("the styled view is ", target.width, "x", target.height,
+                              ", its photo ", view.camera.width, "x", view.camera.height),
+                       view.name, "the 2D method must keep the picture's size");
     if (view.mask != nullptr) REGRADE_CHECK(view.mask->SameSize(target));
     int64_t bad = 0;
     for (int64_t i = 0; i < target.num_pixels(); ++i) {
@@ -90,10 +86,9 @@ int64_t ValidateViews(const std::vector<StyledTrainingView>& views) {
       bad += !(std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]));
     }
     if (bad * 100 > target.num_pixels())
-      throw Error(ExitCode::kInput,
-                  std::to_string(bad) + " of " + std::to_string(target.num_pixels()) +
-                      " pixels of the styled view are not finite",
-                  view.name, "the 2D method failed on this view");
+      throw InputError(
+          Concat(bad, " of ", target.num_pixels(), " pixels of the styled view are not finite"),
+          view.name, "the 2D method failed on this view");
     left_out += bad;
   }
   return left_out;

@@ -6,8 +6,7 @@ namespace regrade {
 
 void ApplyStyleRecipe(const std::string& recipe, TrainNetworkOptions* options) {
   if (recipe != "standard" && recipe != "paper")
-    throw Error(ExitCode::kUsage, "unknown recipe '" + recipe + "'", "--recipe",
-                "use standard or paper");
+    throw UsageError("unknown recipe '" + recipe + "'", "--recipe", "use standard or paper");
   const uint64_t seed = options->seed;
   *options = TrainNetworkOptions{};
   options->seed = seed;

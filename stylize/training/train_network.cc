@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <memory>
 #include <utility>
@@ -29,9 +28,8 @@ std::string FirstNonFinite(const LipschitzNetwork& network, const std::vector<do
         1;
     for (int64_t i = first; i < first + size; ++i) {
       const std::string layer = "layer " + std::to_string(l + 1);
-      if (!std::isfinite(network.data().parameters[static_cast<size_t>(i)]))
-        return "the weights of " + layer;
-      if (!std::isfinite(gradient[static_cast<size_t>(i)])) return "the gradient of " + layer;
+      if (!std::isfinite(network.data().parameters[i])) return "the weights of " + layer;
+      if (!std::isfinite(gradient[i])) return "the gradient of " + layer;
     }
   }
   return std::isfinite(loss) ? "no tensor, but a gradient is too large to square" : "the loss";
@@ -180,27 +178,24 @@ void Training::DrawRays(int64_t step) {
   const int64_t n = std::min({int64_t{engine_.steps_per_call()},
                               kBoundEvery - step % kBoundEvery, options_.steps - step});
   drawn_from_ = step;
-  drawn_.assign(static_cast<size_t>(std::max<int64_t>(n, 0)), {});
+  drawn_.assign(std::max<int64_t>(n, 0), {});
 #pragma omp parallel for schedule(dynamic)
   for (int64_t i = 0; i < n; ++i)
-    drawn_[static_cast<size_t>(i)] =
-        SampleStyleRays(views_, options_.rays_per_step, options_.patch, options_.seed,
-                        static_cast<uint64_t>(step + i));
+    drawn_[i] = SampleStyleRays(views_, options_.rays_per_step, options_.patch, options_.seed,
+                                static_cast<uint64_t>(step + i));
 }
 
 StepResult Training::Advance(int64_t most) {
   const int64_t first = state_.step;
   if (drawn_from_ != first) DrawRays(first);
-  if (static_cast<int64_t>(drawn_.size()) > most) drawn_.resize(static_cast<size_t>(most));
+  if (std::ssize(drawn_) > most) drawn_.resize(most);
   StepRequest request{.first = first, .batches = std::exchange(drawn_, {})};
   drawn_from_ = -1;
   if (first % kBoundEvery == 0)
     request.norms_lag = [this](const LipschitzNetwork& network) {
       return RecordBound(network);
     };
-  request.meanwhile = [this, next = first + static_cast<int64_t>(request.batches.size())] {
-    DrawRays(next);
-  };
+  request.meanwhile = [this, next = first + std::ssize(request.batches)] { DrawRays(next); };
   StepResult steps = engine_.Step(update_, request, &network_, &state_.adam);
   state_.step += steps.made;
   steps_here_ += steps.made;
@@ -266,18 +261,15 @@ TrainNetworkResult TrainNetwork(const RadianceField& field,
     const StepResult steps = training.Advance(most);
     if (steps.stopped) {
       if (hooks.checkpoint) hooks.checkpoint(training.Capture());
-      throw Error(ExitCode::kScene,
-                  "style training stopped at step " +
-                      std::to_string(training.steps_done() - 1) +
-                      ": two steps in a row were not finite, first in " +
-                      FirstNonFinite(training.network(), steps.gradient, steps.last.loss),
-                  "", "lower --style-rate; the state before it was kept");
+      throw SceneError(
+          Concat("style training stopped at step ", training.steps_done() - 1,
+                 ": two steps in a row were not finite, first in ",
+                 FirstNonFinite(training.network(), steps.gradient, steps.last.loss)),
+          "", "lower --style-rate; the state before it was kept");
     }
-    char note[64];
-    std::snprintf(note, sizeof note, "%.1f dB on this step's rays", Psnr(steps.last.Mse()));
     const LoopControl control =
-        Report(hooks.progress, static_cast<double>(training.steps_done()),
-               static_cast<double>(options.steps), note);
+        Report(hooks.progress, training.steps_done(), options.steps,
+               Format("%.1f dB on this step's rays", Psnr(steps.last.Mse())));
     const bool last =
         control != LoopControl::kContinue || training.steps_done() == options.steps;
     if (hooks.checkpoint && (last || training.steps_done() % hooks.checkpoint_every == 0))

@@ -48,21 +48,31 @@ TEST(HeatMap, H116_NonFinitePixelsAreDark) {
 }
 
 TEST(HeatMap, WorstPairOfEachSequenceAndGap) {
-  std::vector<PairResult> pairs(4);
-  for (size_t i = 0; i < pairs.size(); ++i) {
-    pairs[i].sequence = "styled";
-    pairs[i].from = static_cast<int>(i);
-    pairs[i].to = static_cast<int>(i) + 1;
-  }
-  EXPECT_EQ(WorstPair("styled", 1, pairs), nullptr);  // no pair has an error
-  pairs[1].error = 0.1;
-  pairs[2].error = 0.3;
-  pairs[3].error = 0.9;
-  pairs[3].to = 8;
-  EXPECT_EQ(WorstPair("styled", 1, pairs), &pairs[2]);
-  EXPECT_EQ(WorstPair("styled", 5, pairs), &pairs[3]);
-  EXPECT_EQ(WorstPair("source", 1, pairs), nullptr);
-  EXPECT_EQ(HeatMapFileName(pairs[2]), "styled_gap1_00002.png");
+  const auto levels = [](std::vector<float> levels) {
+    std::vector<Image> images;
+    for (const float level : levels) images.push_back(ConstantImage(8, 8, level));
+    return Frames(std::move(images));
+  };
+  int computed = 0;
+  const PairMotionFunction motion = [&computed](int, int) {
+    ++computed;
+    return StillMotion(8, 8);
+  };
+  ConsistencyOptions options;
+  options.gaps = {1, 3};
+  const ConsistencyReport report =
+      EvaluateConsistency(4, motion,
+                          {{"source", levels({0, 0, 0, 0})},  // all pairs are identical
+                           {"views_2d", levels({0, 0, 0.2f, 0.2f})},
+                           {"styled", levels({0, 0.1f, 0.5f, 0.3f})}},
+                          options);
+  ASSERT_EQ(report.worst.size(), 4);
+  EXPECT_EQ(HeatMapFileName(report.worst[0].pair), "views_2d_gap1_00001.png");
+  EXPECT_EQ(HeatMapFileName(report.worst[1].pair), "views_2d_gap3_00000.png");
+  EXPECT_EQ(HeatMapFileName(report.worst[2].pair), "styled_gap1_00001.png");
+  EXPECT_EQ(HeatMapFileName(report.worst[3].pair), "styled_gap3_00000.png");
+  EXPECT_EQ(report.worst[0].motion, report.worst[2].motion);  // of the same pair
+  EXPECT_EQ(computed, 4);                                     // once for each pair
 }
 
 }  // namespace

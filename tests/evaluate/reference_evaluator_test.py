@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Compares `regrade evaluate` with scripts/reference_evaluator.py: same frames, same flow, same metric for each pair.
+"""Compares `regrade evaluate` with reference_evaluator.py: same frames, same flow, same metric for each pair.
 
   reference_evaluator_test.py REGRADE      exit status 77 (skipped) without numpy
 """
@@ -24,7 +24,7 @@ except ImportError:
 WIDTH, HEIGHT, FRAMES = 61, 47, 7
 GAPS = (1, 3)
 TOLERANCE_DB = 1e-4  # frames and flow are identical: only the order of sums differs
-REFERENCE = os.path.join(os.path.dirname(os.path.abspath(__file__)), "../../scripts/reference_evaluator.py")
+REFERENCE = os.path.join(os.path.dirname(os.path.abspath(__file__)), "reference_evaluator.py")
 
 
 def write_png(path, pixels):

@@ -5,6 +5,8 @@
 
 #include <filesystem>
 
+#include "tests/support/source_dir.h"
+
 namespace regrade::testing {
 namespace {
 
@@ -50,7 +52,7 @@ void FuzzReplay::ReadSeedsFindsAndMutants() {
     EXPECT_TRUE(Read(kept[i], "seed " + std::to_string(i))) << "a good input was refused";
 
   const std::filesystem::path finds =
-      std::filesystem::path(REGRADE_SOURCE_DIR) / "tests/fuzz/found" / target.name;
+      std::filesystem::path(SourceDir()) / "tests/fuzz/found" / target.name;
   if (std::filesystem::is_directory(finds))
     for (const auto& entry : std::filesystem::directory_iterator(finds))
       Read(FromHex(ReadText(entry.path())), entry.path().filename());

@@ -8,6 +8,7 @@
 #include <iterator>
 
 #include "pipeline/fields/field_file.h"
+#include "tests/support/source_dir.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/tiny_run.h"
 
@@ -29,7 +30,7 @@ ProgramOutcome Regrade(const std::vector<std::string>& arguments) {
 // A scene whose colours know no direction has a style that does, and a film between the two.
 TEST(MixCommand, AStyleMayKnowDirectionsThatItsSceneDoesNot) {
   const TemporaryFolder folder;
-  const std::string style = std::string(REGRADE_SOURCE_DIR) + "/assets/style_sunset.png";
+  const std::string style = testing::SourceDir() + "/assets/style_sunset.png";
   ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}).code, 0);
   std::vector<std::string> run{"run",   folder / "s/truth", "--style",   style,
                                "--out", folder / "e",       "--effects", "view-dependence=off"};
@@ -53,7 +54,7 @@ TEST(MixCommand, AStyleMayKnowDirectionsThatItsSceneDoesNot) {
 
 TEST(MixCommand, H49_AFilmBetweenTheSceneAndItsStyle) {
   const TemporaryFolder folder;
-  const std::string style = std::string(REGRADE_SOURCE_DIR) + "/assets/style_sunset.png";
+  const std::string style = testing::SourceDir() + "/assets/style_sunset.png";
   ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}).code, 0);
   std::vector<std::string> run{"run",   folder / "s/truth", "--style", style,
                                "--out", folder / "e"};

@@ -13,6 +13,7 @@
 #include "pipeline/files/json_file.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/images/video_writer.h"
+#include "tests/support/source_dir.h"
 #include "tests/support/spawn.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/tiny_run.h"
@@ -24,7 +25,7 @@ namespace fs = std::filesystem;
 using testing::ProgramOutcome;
 using testing::TemporaryFolder;
 
-const std::string kStyle = std::string(REGRADE_SOURCE_DIR) + "/assets/style_sunset.png";
+const std::string kStyle = testing::SourceDir() + "/assets/style_sunset.png";
 
 ProgramOutcome Regrade(const std::vector<std::string>& arguments) {
   return testing::RunProgram(REGRADE_PROGRAM, arguments);

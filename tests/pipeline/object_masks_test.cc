@@ -10,6 +10,7 @@
 #include "pipeline/files/json_file.h"
 #include "pipeline/images/image_file.h"
 #include "tests/support/expect_error.h"
+#include "tests/support/source_dir.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/tiny_run.h"
 
@@ -91,7 +92,7 @@ double Change(const Image& a, const Image& b, const Image& mask, bool inside) {
 
 TEST(ObjectMasks, H50_ARunWithWrongMasksRestylesTheObjectAlone) {
   const TemporaryFolder folder;
-  const std::string style = std::string(REGRADE_SOURCE_DIR) + "/assets/style_sunset.png";
+  const std::string style = testing::SourceDir() + "/assets/style_sunset.png";
   const auto regrade = [](const std::vector<std::string>& arguments) {
     return testing::RunProgram(REGRADE_PROGRAM, arguments);
   };

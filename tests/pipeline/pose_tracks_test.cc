@@ -17,6 +17,7 @@
 #include "pipeline/files/json_file.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/synth/synth_effects.h"
+#include "reconstruct/colmap/colmap_model.h"
 #include "tests/support/temporary_folder.h"
 
 namespace regrade {

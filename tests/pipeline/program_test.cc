@@ -11,6 +11,7 @@
 #include "pipeline/files/json_file.h"
 #include "pipeline/program/interrupt.h"
 #include "pipeline/workspace/workspace.h"
+#include "tests/support/source_dir.h"
 #include "tests/support/spawn.h"
 #include "tests/support/temporary_folder.h"
 
@@ -99,7 +100,7 @@ TEST(Program, F21_ContradictionsNameBoth) {
 TEST(Program, TheStyleMethodIsCheckedBeforeAnyWork) {
   const TemporaryFolder folder;
   WriteText(folder / "photos/a.png", "x");
-  const std::string style = std::string(REGRADE_SOURCE_DIR) + "/assets/style_sunset.png";
+  const std::string style = testing::SourceDir() + "/assets/style_sunset.png";
   const auto run = [&](const std::string& method) {
     return Regrade({"run", folder / "photos", "--style", style, "--out", folder / "out",
                     "--method", method});
@@ -168,8 +169,8 @@ Outcome RenderUnder(const std::string& limits, const std::vector<std::string>& a
   const TemporaryFolder folder;
   { const Workspace workspace(folder / "out"); }
   WriteText(folder / "out/run.json",
-            "{\"arguments\": [\"photos\"], \"options\": {\"style\": \"" REGRADE_SOURCE_DIR
-            "/assets/style_sunset.png\"}}");
+            "{\"arguments\": [\"photos\"], \"options\": {\"style\": \"" + testing::SourceDir() +
+                "/assets/style_sunset.png\"}}");
   return RunProgram({"/bin/sh", "-c", limits + "; exec \"$0\" \"$@\"", REGRADE_PROGRAM,
                      "render", folder / "out"},
                     arguments);

@@ -97,8 +97,8 @@ RunReport FullReport() {
                                                 .heldout = {"a.jpg"}};
   report.stages.style_2d = Style2dReport{.time = {3, {}}, .method = "mkl", .views = 7};
   report.stages.stylize = MeasuredStyle();
-  report.stages.render = RenderReport{
-      {5, {}}, "cpu", 60, 36, {640, 480}, "exact", 12, {0.41, 0.72, 12, {0.5, 0.25}}};
+  report.stages.render = RenderReport{{5, {}},    "cpu",   60, 36,
+                                      {640, 480}, "exact", 12, {0.41, 0.72, 12, {0.5, 0.25}}};
   report.stages.evaluate = EvaluateReport{{6, {}}, "dis-medium", "lai2018", "", 25, 26, 0.2};
   report.evaluation = MeasuredEvaluation();
   return report;
@@ -133,9 +133,9 @@ TEST(ReportJson, HasTheKeysOfSchema2InOrder) {
             "local_lipschitz_sampled", "local_lipschitz_max", "k_est", "local_lipschitz_of_map",
             "local_lipschitz_along_coefficients", "local_lipschitz_along_position",
             "bound_at_steps", "notices", "cpu_seconds"}));
-  EXPECT_EQ(KeysOf(stages.At("render")), (Keys{"seconds", "device", "frames", "path_frames",
-                                               "film", "film_renderer", "frames_per_second",
-                                               "seen_by_few"}));
+  EXPECT_EQ(KeysOf(stages.At("render")),
+            (Keys{"seconds", "device", "frames", "path_frames", "film", "film_renderer",
+                  "frames_per_second", "seen_by_few"}));
   EXPECT_EQ(KeysOf(stages.At("render").At("seen_by_few")),
             (Keys{"film", "worst_frame", "worst_frame_number", "photos"}));
   EXPECT_EQ(KeysOf(stages.At("evaluate")),

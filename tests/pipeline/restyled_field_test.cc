@@ -1,9 +1,10 @@
 // styled.npz remade from field.npz and network.npz, after small runs of the program.
-#include "pipeline/fields/restyled_field.h"
+#include "tests/support/restyled_field.h"
 
 #include <gtest/gtest.h>
 
 #include "pipeline/stages/object_edit.h"
+#include "tests/support/source_dir.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/tiny_run.h"
 
@@ -12,6 +13,7 @@ namespace {
 
 using testing::ProgramOutcome;
 using testing::ReadText;
+using testing::RestyledField;
 using testing::TemporaryFolder;
 
 // Stylises a synthetic capture with further flags in folder / "e".
@@ -20,11 +22,10 @@ void Stylize(const TemporaryFolder& folder, const std::vector<std::string>& synt
   std::vector<std::string> synth{"synth", folder / "s", "--views", "8", "--size", "96x72"};
   synth.insert(synth.end(), synth_flags.begin(), synth_flags.end());
   ASSERT_EQ(testing::RunProgram(REGRADE_PROGRAM, synth).code, 0);
-  std::vector<std::string> run{
-      "run",      folder / "s/truth",
-      "--out",    folder / "e",
-      "--style",  std::string(REGRADE_SOURCE_DIR) + "/assets/style_sunset.png",
-      "--device", "cpu"};
+  std::vector<std::string> run{"run",      folder / "s/truth",
+                               "--out",    folder / "e",
+                               "--style",  testing::SourceDir() + "/assets/style_sunset.png",
+                               "--device", "cpu"};
   for (const std::string& flag : testing::TinyFlags()) run.push_back(flag);
   run.insert(run.end(), flags.begin(), flags.end());
   const ProgramOutcome outcome = testing::RunProgram(REGRADE_PROGRAM, run);

@@ -6,6 +6,7 @@
 
 #include "pipeline/files/json_file.h"
 #include "pipeline/images/image_file.h"
+#include "tests/support/source_dir.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/tiny_run.h"
 
@@ -41,7 +42,7 @@ int HeatMapsNamed(const std::string& folder) {
 
 TEST(RunReport, ShowsEveryPartOfTheRun) {
   const TemporaryFolder folder;
-  const std::string style = std::string(REGRADE_SOURCE_DIR) + "/assets/style_sunset.png";
+  const std::string style = testing::SourceDir() + "/assets/style_sunset.png";
   ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}).code, 0);
   std::vector<std::string> run{"run",       folder / "s/truth", "--style",  style,
                                "--out",     folder / "e",       "--preset", "draft",

@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "pipeline/files/json_file.h"
+#include "tests/support/source_dir.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/tiny_run.h"
 
@@ -26,7 +27,7 @@ size_t Count(const std::string& text, const std::string& what) {
 
 TEST(TradeoffCommand, MeasuresContinuesAndPredicts) {
   const TemporaryFolder folder;
-  const std::string style = std::string(REGRADE_SOURCE_DIR) + "/assets/style_sunset.png";
+  const std::string style = testing::SourceDir() + "/assets/style_sunset.png";
   ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}).code, 0);
   const auto tradeoff = [&](const std::vector<std::string>& more) {
     std::vector<std::string> words{"tradeoff",     folder / "s/truth",

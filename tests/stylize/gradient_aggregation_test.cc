@@ -1,6 +1,7 @@
 // The network's gradient by touched voxels against Algorithm 1, and the network applied to a
 // field.
 #include "kernels/field/background_spheres.h"
+#include "tests/support/algorithm1.h"
 #include "tests/support/record_error.h"
 #include "tests/support/small_field.h"
 #include "tests/support/styled_ball.h"

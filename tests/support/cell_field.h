@@ -1,6 +1,7 @@
 // A small random adaptive field, for tests of its rendering and fitting.
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <vector>
 

@@ -6,11 +6,13 @@
 #include <filesystem>
 #include <string>
 
+#include "tests/support/source_dir.h"
+
 namespace regrade::testing {
 
 inline std::string DataRoot() {
   if (const char* root = std::getenv("REGRADE_DATA")) return root;
-  return std::string(REGRADE_SOURCE_DIR) + "/../shared/data";
+  return SourceDir() + "/../shared/data";
 }
 
 inline std::string DataPath(const std::string& relative) { return DataRoot() + "/" + relative; }

@@ -1,5 +1,4 @@
 // Upload and download of a grid, and the arrays derived from links and records.
-#include "kernels/base/error.h"
 #include "kernels/field/cuda/device_grid.h"
 #include "kernels/field/cuda/gradient_view.h"
 #include "kernels/field/cuda/launch.h"
@@ -20,20 +19,21 @@ DeviceGridView DeviceGrid::view() const {
       near_clip,
       {static_cast<float>(frame.resolution.x - 1), static_cast<float>(frame.resolution.y - 1),
        static_cast<float>(frame.resolution.z - 1)},
-      spheres.view()};
+      spheres.view(),
+      cells.on() ? cells.view(frame.resolution) : CellsView{},
+      density_rate.size() > 0 ? density_rate.data() : nullptr};
 }
 
 DeviceGrid UploadGrid(const FastGrid& grid, bool fitting, const Buffer<float>& second_moment,
                       bool exact_sums, const Buffer<float>& sphere_moment) {
-  if (grid.cells.on())
-    throw Error(ExitCode::kResources, "an adaptive field is processed on the CPU only", "",
-                "use --device cpu");
   DeviceGrid device;
   device.frame = grid.frame;
   device.basis = grid.basis;
   device.background = grid.background;
   device.near_clip = grid.near_clip;
   device.links = DeviceBuffer<int32_t>::Of(grid.links, "links");
+  device.cells = UploadCells(grid.cells);
+  device.density_rate = DeviceBuffer<float>::Of(grid.density_rate, "rates of densities");
   device.fitting = fitting;
   device.exact_sums = exact_sums;
   const int64_t n = grid.num_voxels(), row = device.lanes() * int64_t{sizeof(float)};
@@ -59,6 +59,35 @@ Buffer<float> DownloadRows(const DeviceGrid& device, const float* from) {
 
 }  // namespace
 
+DeviceGrid ChangeCellsOnDevice(DeviceGrid grid, const std::vector<CellChange>& change) {
+  DeviceBuffer<VertexSource> sources;
+  DeviceCells cells = ChangeCellsOnDevice(grid.cells, grid.frame.resolution, change, &sources);
+  const int64_t n = cells.num_vertices(), stride = grid.stride();
+  if (n == 0) {
+    grid.cells = {};
+    grid.records = {};
+    return grid;
+  }
+  const auto move = [&](const float* values, int lanes, int64_t pitch, float* out) {
+    MoveValuesOnDevice(grid.cells, cells, sources, values, lanes, pitch, out);
+  };
+  DeviceBuffer<float> records(n * stride, "voxels");
+  if (grid.fitting) {
+    records.Zero();
+    move(grid.second_moment(), grid.lanes(), stride, records.data() + (stride - grid.lanes()));
+  }
+  move(grid.records.data(), grid.lanes(), stride, records.data());
+  grid.records = std::move(records);
+  if (grid.density_rate.size() > 0) {
+    DeviceBuffer<float> rates(n, "rates of densities");
+    move(grid.density_rate.data(), 1, 1, rates.data());
+    grid.density_rate = std::move(rates);
+  }
+  grid.cells = std::move(cells);
+  RefreshDerived(&grid, n);
+  return grid;
+}
+
 Buffer<float> DownloadSecondMoment(const DeviceGrid& device) {
   return DownloadRows(device, device.second_moment());
 }
@@ -83,6 +112,8 @@ FastGrid DownloadGrid(const DeviceGrid& device) {
   grid.background = device.background;
   grid.near_clip = device.near_clip;
   grid.links = device.links.ToHost();
+  grid.cells = DownloadCells(device.cells);
+  grid.density_rate = device.density_rate.ToHost();
   grid.records = DownloadRows(device, device.records.data());
   RefreshDerived(&grid);
   grid.spheres = DownloadSpheres(device.spheres);
@@ -117,6 +148,12 @@ __global__ void ScatterVoxels(DeviceGridView grid, int density_lane, int64_t ver
   distance[vertex] = stored ? 0 : kFar;
 }
 
+__global__ void CopyDensities(DeviceGridView grid, int density_lane) {
+  const int64_t voxel = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
+  if (voxel < grid.num_voxels)
+    grid.dense_density[voxel] = grid.records[voxel * grid.stride + density_lane];
+}
+
 // One axis of the Chebyshev distance: the minimum of max(distance, steps along the axis).
 __global__ void SpreadAlongAxis(Vec3i n, int axis, int64_t vertices, const uint8_t* from,
                                 uint8_t* to) {
@@ -137,6 +174,12 @@ __global__ void SpreadAlongAxis(Vec3i n, int axis, int64_t vertices, const uint8
 }  // namespace
 
 void RefreshDerived(DeviceGrid* grid, int64_t num_voxels) {
+  if (grid->cells.on()) {
+    grid->dense_density = DeviceBuffer<float>(num_voxels, "densities");
+    CopyDensities<<<BlocksFor(num_voxels), kThreads>>>(grid->view(), DensityLane(grid->basis));
+    CheckLaunch("copy_densities");
+    return;
+  }
   const int64_t vertices = grid->frame.NumVertices();
   grid->vertex_of_voxel = DeviceBuffer<int32_t>(num_voxels, "vertices of voxels");
   grid->dense_density = DeviceBuffer<float>(vertices, "dense densities");

@@ -3,6 +3,7 @@
 // processes a ray; its lanes first march 32 samples at a time, then hold the values of a voxel.
 #pragma once
 
+#include "kernels/field/cuda/cell_march.h"
 #include "kernels/field/cuda/device_grid.h"
 #include "kernels/field/cuda/half_grid.h"
 #include "kernels/field/ray_march.h"
@@ -72,8 +73,13 @@ class DeviceRayFitter {
   DeviceFitSums* sums() { return sums_.data(); }
 
  private:
+  void AccumulateCells(const DeviceGrid& grid, const Ray* rays, const Vec3f* targets, int64_t n,
+                       float scale, DeviceTouched* touched);
+
   MarchOptions options_;
-  int64_t capacity_ = 0;  // samples a ray
+  int64_t max_bytes_ = 0;
+  CellSampleStore cells_;  // of an adaptive field
+  int64_t capacity_ = 0;   // samples a ray
   int warps_ = 0;
   DeviceBuffer<float> store_;
   DeviceBuffer<int32_t> next_ray_;
@@ -86,7 +92,8 @@ void MaxWeightsOnDevice(const DeviceGrid& grid, const Ray* rays, int64_t n,
                         const MarchOptions& options, float* weights);
 
 // Adds the gradient of the total variation (see EQ(total-variation)) of voxels begin, begin +
-// 1, ..., begin + count - 1, modulo their number.
+// 1, ..., begin + count - 1, modulo their number; of an adaptive field's cells
+// EQ(cell-variation).
 void AddTotalVariation(const DeviceGrid& grid, int64_t begin, int64_t count,
                        float scale_density, float scale_sh, DeviceTouched* touched);
 

@@ -1,4 +1,5 @@
 // Rendering, one warp per ray at a time.
+#include <algorithm>
 #include <vector>
 
 #include "kernels/base/error.h"
@@ -27,7 +28,7 @@ RenderedView RenderViewOnDevice(const DeviceGrid& grid, const Camera& camera,
     depth.CopyOut(view.depth.pixels.data(), n);
     transmittance.CopyOut(view.transmittance.pixels.data(), n);
   };
-  if (camera.lens == LensModel::kPinhole) {
+  if (camera.lens == LensModel::kPinhole && !grid.cells.on()) {
     RenderFrameOnDevice(grid, camera, options, target, opacity_step, half);
     take();
     return view;
@@ -261,6 +262,67 @@ __global__ void RenderSpheresKernel(DeviceGridView grid, Rays rays, float stop,
   target.transmittance[place] = transmittance;
 }
 
+// Sums of an adaptive field's rays, whose samples are in lists; a warp a ray.
+template <int kBasis>
+__global__ void RenderCellRaysKernel(DeviceGridView grid, const Ray* rays, int64_t n,
+                                     CellSamples lists, DeviceRenderTarget target) {
+  using Layout = RecordLayout<kBasis>;
+  const int lane = static_cast<int>(threadIdx.x & 31);
+  const int64_t r = (blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x) / 32;
+  if (r >= n) return;
+  const float4* const place = reinterpret_cast<const float4*>(lists.place) + r * lists.capacity;
+  const float4* const raw_tau =
+      reinterpret_cast<const float4*>(lists.raw_tau) + r * lists.capacity;
+  const float4* const rest = reinterpret_cast<const float4*>(lists.rest) + r * lists.capacity;
+  float basis[kMaxBasis];
+  ShBasis(kBasis, rays[r].direction, basis);
+  const LaneValues<kBasis> values(lane, basis);
+  const int count = lists.count[r];
+  Vec3f color{};
+  float depth = 0;
+  for (int first = 0; first < count; first += Layout::kSamples) {
+    const int at = first + lane / Layout::kGroup;
+    const bool valid = at < count;
+    const float4 p = valid ? place[at] : float4{};
+    const Vec3f raw = RawColor<kBasis, CellSampler>(grid, values, __float_as_int(p.x),
+                                                    {p.y, p.z, p.w}, valid, lane);
+    if (!valid || lane % Layout::kGroup != 0) continue;
+    const float w = rest[at].x * Opacity(raw_tau[at].w);
+    for (int c = 0; c < 3; ++c) color[c] += w * fmaxf(raw[c], 0.0f);
+    depth += w * rest[at].z;
+  }
+  for (int c = 0; c < 3; ++c) color[c] = WarpSum(color[c]);
+  depth = WarpSum(depth);
+  if (lane != 0) return;
+  target.color[r] = color + grid.background * lists.transmittance[r];
+  target.depth[r] = depth;
+  target.transmittance[r] = lists.transmittance[r];
+}
+
+// Every sample is shaded.
+void RenderCellRays(const DeviceGrid& grid, const Ray* rays, int64_t n,
+                    const MarchOptions& options, const DeviceRenderTarget& target) {
+  constexpr int64_t kMostRays = 1 << 16, kMostBytes = int64_t{2} << 30;
+  CellSampleStore store(grid.frame, std::min(n, kMostRays), kMostBytes);
+  const CellSamples lists = store.view();
+  DeviceGridView view = grid.view();
+  if (grid.spheres.on()) view.background = {};  // the layers are composited before it
+  for (int64_t begin = 0; begin < n; begin += store.rays()) {
+    const int64_t size = std::min(n - begin, store.rays());
+    MarchCellsOnDevice(grid, rays + begin, size, options, lists);
+    ByBasis(grid.basis, [&](auto basis) {
+      RenderCellRaysKernel<basis.value><<<BlocksFor(32 * size), kThreads>>>(
+          view, rays + begin, size, lists,
+          {target.color + begin, target.depth + begin, target.transmittance + begin});
+    });
+    CheckLaunch("render_cell_rays");
+  }
+  if (!grid.spheres.on()) return;
+  RenderSpheresKernel<<<BlocksFor(32 * n), kThreads>>>(grid.view(), ListedRays{rays, n},
+                                                       options.stop_transmittance, target);
+  CheckLaunch("render_spheres");
+}
+
 template <typename Rays>
 void RenderBlocks(const DeviceGrid& grid, const HalfGrid* half, const Rays& rays,
                   const MarchOptions& options, float opacity_step,
@@ -297,13 +359,16 @@ void RenderBlocks(const DeviceGrid& grid, const HalfGrid* half, const Rays& rays
 void RenderOnDevice(const DeviceGrid& grid, const Ray* rays, int64_t n,
                     const MarchOptions& options, const DeviceRenderTarget& target,
                     float opacity_step) {
-  RenderBlocks(grid, nullptr, ListedRays{rays, n}, options, opacity_step, target);
+  if (grid.cells.on())
+    RenderCellRays(grid, rays, n, options, target);
+  else
+    RenderBlocks(grid, nullptr, ListedRays{rays, n}, options, opacity_step, target);
 }
 
 void RenderFrameOnDevice(const DeviceGrid& grid, const Camera& camera,
                          const MarchOptions& options, const DeviceRenderTarget& target,
                          float opacity_step, const HalfGrid* half) {
-  REGRADE_CHECK(camera.lens == LensModel::kPinhole);
+  REGRADE_CHECK(camera.lens == LensModel::kPinhole && !grid.cells.on());
   const DeviceRange range("frame");
   RenderBlocks(grid, half, FrameRays{PinholeRays(camera), ResolvePixel(camera)}, options,
                opacity_step, target);

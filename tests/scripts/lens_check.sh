@@ -1,7 +1,7 @@
 #!/bin/sh
 # Prints the held-out PSNR of the same synthetic scene through a pinhole, a strong barrel and a fisheye lens, with given poses.
 #
-#   scripts/lens_check.sh REGRADE FOLDER ["OPTIONS OF synth" ["OPTIONS OF reconstruct"]]
+#   tests/scripts/lens_check.sh REGRADE FOLDER ["OPTIONS OF synth" ["OPTIONS OF reconstruct"]]
 #
 # Barrel and fisheye should be within half a decibel of the pinhole. Exit status: 0, or that of the command that failed.
 set -eu

@@ -9,7 +9,7 @@ SMALL = ["--photo-size", "96", "--fit-resolutions", "24,32", "--fit-steps", "60,
          "--style-steps", "20", "--style-rays", "512", "--path-frames", "4", "--preset", "draft", "--reproducible",
          "--holdout", "0", "--tracks", "given"]
 STAGES = ("pose", "reconstruct", "style_2d", "stylize", "render", "evaluate", "report")
-STYLE = os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "assets", "style_sunset.png")
+STYLE = os.path.join(os.path.dirname(os.path.abspath(__file__)), "../../assets/style_sunset.png")
 # Keys of the report that differ from run to run.
 TIMES = {"seconds", "cpu_seconds", "trial_seconds", "trial_cpu_seconds", "frames_per_second", "peak_memory_mb"}
 

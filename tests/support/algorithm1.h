@@ -35,12 +35,10 @@ T Algorithm1(const LipschitzNetwork& network, const RadianceField& field,
   for (int64_t v = 0; v < n; ++v) {
     float row[kFeatureStride];
     if (v < voxels)
-      FillFeatures(field, network.data().position_scale, v, vertex[static_cast<size_t>(v)],
-                   row);
+      FillFeatures(field, network.data().position_scale, v, vertex[v], row);
     else
       FillTexelFeatures(field, network.data().position_scale, v - voxels,
-                        place[static_cast<size_t>((v - voxels) / geometry.spheres.layers)],
-                        row);
+                        place[(v - voxels) / geometry.spheres.layers], row);
     T* x = &features[static_cast<size_t>(v) * kNetworkInputs];
     std::copy_n(row, kNetworkInputs, x);
     T* y = &sh[static_cast<size_t>(v) * kNetworkSh];
@@ -53,14 +51,13 @@ T Algorithm1(const LipschitzNetwork& network, const RadianceField& field,
   T loss = 0;
   for (int64_t r = 0; r < weights.num_rays(); ++r) {
     T gamma[kMaxBasis] = {};
-    ShBasis(field.appearance.basis, directions[static_cast<size_t>(r)], gamma);
-    const int64_t first = weights.first[static_cast<size_t>(r)];
+    ShBasis(field.appearance.basis, directions[r], gamma);
+    const int64_t first = weights.first[r];
     const int64_t last = weights.first[static_cast<size_t>(r) + 1];
-    std::vector<Vec3<T>> raw(static_cast<size_t>(last - first));
-    Vec3<T> color =
-        field.background.Cast<T>() * T(weights.transmittance[static_cast<size_t>(r)]);
+    std::vector<Vec3<T>> raw(last - first);
+    Vec3<T> color = field.background.Cast<T>() * T(weights.transmittance[r]);
     for (int64_t i = first; i < last; ++i) {
-      const WeightedSample& sample = weights.samples[static_cast<size_t>(i)];
+      const WeightedSample& sample = weights.samples[i];
       const Vec3<T> fraction = sample.fraction.Cast<T>();
       int32_t points[8];
       CornerPoints(geometry, sample, points);
@@ -74,19 +71,19 @@ T Algorithm1(const LipschitzNetwork& network, const RadianceField& field,
         T value = T(0.5);
         for (int k = 0; k < (sample.on_sphere() ? 1 : 9); ++k)
           value += blend[c * 9 + k] * gamma[k];
-        raw[static_cast<size_t>(i - first)][c] = value;
+        raw[i - first][c] = value;
         color[c] += T(sample.weight) * std::max(value, T(0));
       }
     }
-    const Vec3<T> difference = color - targets[static_cast<size_t>(r)];
+    const Vec3<T> difference = color - targets[r];
     loss += scale * Dot(difference, difference);
     for (int64_t i = first; i < last; ++i) {
-      const WeightedSample& sample = weights.samples[static_cast<size_t>(i)];
+      const WeightedSample& sample = weights.samples[i];
       const Vec3<T> fraction = sample.fraction.Cast<T>();
       int32_t points[8];
       CornerPoints(geometry, sample, points);
       for (int c = 0; c < 3; ++c) {
-        if (!(raw[static_cast<size_t>(i - first)][c] > 0)) continue;
+        if (!(raw[i - first][c] > 0)) continue;
         for (int corner = 0; corner < 8; ++corner)
           if (points[corner] >= 0 && !sample.on_sphere())
             mass[static_cast<size_t>(points[corner]) * 3 + static_cast<size_t>(c)] +=

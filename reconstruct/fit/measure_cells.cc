@@ -1,4 +1,4 @@
-#include "reconstruct/fit/cell_statistics.h"
+#include "reconstruct/fit/measure_cells.h"
 
 #include <omp.h>
 
@@ -37,8 +37,8 @@ struct Partial {
   }
 };
 
-void MeasurePhoto(const FastGrid& grid, const TrainingRays& rays, int view, const MarchOptions& march, int stride,
-                  Partial* partial) {
+void MeasurePhoto(const FastGrid& grid, const TrainingRays& rays, int view,
+                  const MarchOptions& march, int stride, Partial* partial) {
   const Camera& camera = rays.camera(view);
   const CellsView cells = ViewOf(grid.cells, grid.frame.resolution);
   std::vector<Ray> row, beside;
@@ -49,28 +49,31 @@ void MeasurePhoto(const FastGrid& grid, const TrainingRays& rays, int view, cons
     beside.clear();
     for (int x = 0; x < camera.width; x += stride) {
       row.push_back(rays.RayOf(view, x, y));
-      beside.push_back(rays.RayOf(view, x + stride < camera.width ? x + stride : x - stride, y));
+      beside.push_back(rays.RayOf(
+          view, x + stride < camera.width ? x + stride : std::max(x - stride, 0), y));
     }
     color.resize(3 * row.size());
     depth.resize(row.size());
     transmittance.resize(row.size());
-    FastRays().render(grid, row.data(), static_cast<int64_t>(row.size()), march, color.data(), depth.data(),
-                      transmittance.data());
+    FastRays().render(grid, row.data(), static_cast<int64_t>(row.size()), march, color.data(),
+                      depth.data(), transmittance.data());
     for (size_t i = 0; i < row.size(); ++i) {
       const Vec3f seen{color[3 * i], color[3 * i + 1], color[3 * i + 2]};
       const Vec3f off = seen - rays.ColorOf(view, static_cast<int>(i) * stride, y);
       const float squares = Dot(off, off);
-      MarchCells(grid.frame, cells, grid.vertex_density.data(), row[i], grid.near_clip, march.stop_transmittance,
-                 &samples);
+      MarchCells(grid.frame, cells, grid.vertex_density.data(), row[i], grid.near_clip,
+                 march.stop_transmittance, &samples);
       for (const CompositedCell<float>& s : samples) {
         const int64_t c = s.place.cell;
         const float w = s.transmittance_before * Opacity(s.tau);
         partial->weight[c] = std::max(partial->weight[c], w);
         if (w < kSeenWeight) continue;
         if (std::isfinite(squares))
-          partial->error[c] += static_cast<uint64_t>(std::llrint(double{w * squares} / kErrorUnit));
+          partial->error[c] +=
+              static_cast<uint64_t>(std::llrint(double{w * squares} / kErrorUnit));
         partial->here[c] = std::max(
-            partial->here[c], WidthInPixels(grid.frame, row[i], beside[i], s.place.t, stride, s.place.width));
+            partial->here[c],
+            WidthInPixels(grid.frame, row[i], beside[i], s.place.t, stride, s.place.width));
       }
     }
   }
@@ -79,25 +82,15 @@ void MeasurePhoto(const FastGrid& grid, const TrainingRays& rays, int view, cons
 
 }  // namespace
 
-float WidthInPixels(const GridFrame& frame, const Ray& ray, const Ray& next, float t, int stride, int voxels) {
-  const Vec3f scale = frame.Scale();
-  Vec3f apart, along;  // voxels
-  for (int a = 0; a < 3; ++a) {
-    apart[a] = (next.origin[a] - ray.origin[a] + (next.direction[a] - ray.direction[a]) * t) * scale[a];
-    along[a] = ray.direction[a] * scale[a];
-  }
-  const Vec3f across = apart - along * (Dot(apart, along) / Dot(along, along));
-  const float pixel = std::sqrt(Dot(across, across)) / static_cast<float>(stride);
-  return static_cast<float>(voxels) / std::max(pixel, 1e-20f);
-}
-
-CellStatistics MeasureCells(const FastGrid& grid, const TrainingRays& rays, const MarchOptions& march, int stride) {
+CellStatistics MeasureCells(const FastGrid& grid, const TrainingRays& rays,
+                            const MarchOptions& march, int stride) {
   const int64_t n = grid.cells.num_cells();
   const int threads = std::min(omp_get_max_threads(), kMostThreads);
   std::vector<Partial> partials(static_cast<size_t>(threads), Partial(n));
 #pragma omp parallel for schedule(dynamic, 1) num_threads(threads)
   for (int view = 0; view < rays.num_views(); ++view)
-    MeasurePhoto(grid, rays, view, march, stride, &partials[static_cast<size_t>(omp_get_thread_num())]);
+    MeasurePhoto(grid, rays, view, march, stride,
+                 &partials[static_cast<size_t>(omp_get_thread_num())]);
   Partial& all = partials[0];
   for (size_t p = 1; p < partials.size(); ++p)
     for (int64_t c = 0; c < n; ++c) {
@@ -109,9 +102,10 @@ CellStatistics MeasureCells(const FastGrid& grid, const TrainingRays& rays, cons
   return {std::move(all.weight), std::move(all.second), std::move(all.error)};
 }
 
-std::vector<CellChange> ChooseChanges(const CellGrid& cells, const CellStatistics& statistics,
+std::vector<CellChange> ChooseChanges(const Buffer<uint8_t>& level,
+                                      const CellStatistics& statistics,
                                       const CellLimits& limits) {
-  const int64_t n = cells.num_cells();
+  const int64_t n = level.size();
   std::vector<CellChange> change(static_cast<size_t>(n), CellChange::kRemove);
   std::vector<int64_t> candidates;
   int64_t kept = 0;
@@ -119,22 +113,28 @@ std::vector<CellChange> ChooseChanges(const CellGrid& cells, const CellStatistic
     if (!(statistics.weight[c] >= limits.least_weight)) continue;
     ++kept;
     change[static_cast<size_t>(c)] = CellChange::kKeep;
-    if (cells.level[c] < std::min(limits.deepest, cells.finest) && statistics.pixels[c] > limits.least_pixels)
+    if (level[c] < limits.deepest && statistics.pixels[c] > limits.least_pixels)
       candidates.push_back(c);
   }
-  const int64_t room = limits.most_cells > 0 ? std::max<int64_t>(limits.most_cells - kept, 0) / 7
-                                             : static_cast<int64_t>(candidates.size());
+  const int64_t room = limits.most_cells > 0
+                           ? std::max<int64_t>(limits.most_cells - kept, 0) / 7
+                           : static_cast<int64_t>(candidates.size());
   if (room < static_cast<int64_t>(candidates.size())) {
-    std::sort(candidates.begin(), candidates.end(), [&](int64_t a, int64_t b) {
-      return statistics.error[a] != statistics.error[b] ? statistics.error[a] > statistics.error[b] : a < b;
-    });
+    const auto more_error = [&](int64_t a, int64_t b) {
+      return statistics.error[a] != statistics.error[b]
+                 ? statistics.error[a] > statistics.error[b]
+                 : a < b;
+    };
+    std::nth_element(candidates.begin(), candidates.begin() + room, candidates.end(),
+                     more_error);
     candidates.resize(static_cast<size_t>(room));
   }
   for (const int64_t c : candidates) change[static_cast<size_t>(c)] = CellChange::kSplit;
   return change;
 }
 
-void ApplyChanges(const std::vector<CellChange>& change, FastGrid* grid, Buffer<float>* second_moment) {
+void ApplyChanges(const std::vector<CellChange>& change, FastGrid* grid,
+                  Buffer<float>* second_moment) {
   std::vector<VertexSource> sources;
   CellGrid cells = ChangeCells(grid->cells, grid->frame.resolution, change, &sources);
   const auto move = [&](Buffer<float>* values, int lanes) {

@@ -1,0 +1,37 @@
+// What the training photos say of each cell of an adaptive field, and which cells are split and
+// removed for it.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "kernels/field/cell_statistics.h"
+#include "kernels/field/packed_grid.h"
+#include "kernels/field/ray_march.h"
+#include "kernels/field/refine_cells.h"
+#include "reconstruct/fit/training_rays.h"
+
+namespace regrade {
+
+// Of every `stride`-th row and column of each photo.
+CellStatistics MeasureCells(const FastGrid& grid, const TrainingRays& rays,
+                            const MarchOptions& march, int stride);
+
+struct CellLimits {
+  float least_weight = 0;  // cells of less in every photo are removed
+  float least_pixels = 1;  // cells narrower than this are not split
+  int deepest = 0;         // the finest level of this stage
+  int64_t most_cells = 0;  // after the change; 0: no limit
+};
+
+// level [C]. Where the cells are limited, those with the largest error are split; of equal ones
+// the first.
+std::vector<CellChange> ChooseChanges(const Buffer<uint8_t>& level,
+                                      const CellStatistics& statistics,
+                                      const CellLimits& limits);
+
+// Changes cells and moves records, moments [V, lanes] and rates.
+void ApplyChanges(const std::vector<CellChange>& change, FastGrid* grid,
+                  Buffer<float>* second_moment);
+
+}  // namespace regrade
