@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "kernels/base/error.h"
+#include "kernels/field/cell_checks.h"
 
 namespace regrade {
 namespace {
@@ -36,30 +37,16 @@ void CheckFrame(const GridFrame& frame, const char* name) {
 void CheckCells(const Geometry& geometry, const char* name) {
   const CellGrid& cells = geometry.cells;
   const int64_t n = cells.num_cells();
-  if (cells.finest < 0 || cells.finest > kMaxCellLevel || cells.level.size() != n ||
-      cells.corner.size() != 8 * n || cells.num_vertices() != geometry.num_voxels())
-    Refuse(name, "the sizes of the cells' arrays disagree");
-  for (int a = 0; a < 3; ++a)
-    if (geometry.frame.resolution[a] % (1 << cells.finest) != 0 ||
-        geometry.frame.resolution[a] > kMaxLattice)
-      Refuse(name, "a box of " + std::to_string(geometry.frame.resolution[a]) +
-                       " voxels along an axis does not divide into cells of level 0");
+  const std::string defect = DefectOfCells(cells, geometry.frame.resolution);
+  if (!defect.empty()) Refuse(name, defect);
+  if (cells.corner.size() != 8 * n || cells.num_vertices() != geometry.num_voxels())
+    Refuse(name, std::to_string(geometry.num_voxels()) + " values for cells with " +
+                     std::to_string(cells.num_vertices()) + " vertices");
   for (int64_t i = 0; i < 8 * n; ++i)
     if (cells.corner[i] < 0 || cells.corner[i] >= cells.num_vertices())
       Refuse(name, "cell " + std::to_string(i / 8) + " has vertex " +
                        std::to_string(cells.corner[i]) + " of " +
                        std::to_string(cells.num_vertices()));
-  CellKey free = 0;  // the first key that no cell before covers
-  for (int64_t c = 0; c < n; ++c) {
-    const Vec3i at = PlaceOf(cells.key[c]);
-    const int shift = cells.finest - cells.level[c];
-    bool inside = shift >= 0 && cells.key[c] >= free;
-    for (int a = 0; a < 3 && inside; ++a)
-      inside = at[a] % (1 << shift) == 0 && at[a] < geometry.frame.resolution[a];
-    if (!inside)
-      Refuse(name, "cell " + std::to_string(c) + " overlaps another, or is not in its place");
-    free = cells.key[c] + (CellKey{1} << (3 * shift));
-  }
 }
 
 // One pass: a link out of range would be an access out of bounds, and a voxel shared by two

@@ -6,13 +6,15 @@
 
 #include "kernels/base/error.h"
 #include "kernels/base/half.h"
+#include "kernels/field/cell_checks.h"
 #include "kernels/scene/camera_checks.h"
 #include "pipeline/files/npz_file.h"
 
 namespace regrade {
 namespace {
 
-constexpr int32_t kVersion = 1;
+// An adaptive field's arrays are unknown to readers of version 1.
+constexpr int32_t kUniformVersion = 1, kCellsVersion = 2;
 constexpr int kStoredBasis = 9;
 constexpr int64_t kSphericalHarmonics = 1;  // svox2's basis_type
 
@@ -59,7 +61,7 @@ Vec3f ReadVec3(NpzReader* file, const std::string& name) {
 }
 
 void CheckReadable(NpzReader* file) {
-  RefuseNewerFormat(file, kVersion);
+  RefuseNewerFormat(file, kCellsVersion);
   if (file->Has("basis_type")) {
     const NpzArray type = file->Read("basis_type");
     const bool wide = type.type == ArrayType::kI64, narrow = type.type == ArrayType::kI32;
@@ -111,10 +113,40 @@ void ReadSpheres(NpzReader* file, SphereGeometry* spheres, Buffer<float>* color)
   }
 }
 
+// Keys and levels are checked before anything is derived of them: a key outside of the box
+// would be an entry outside of the tree.
+void ReadCells(NpzReader* file, Geometry* geometry) {
+  const NpzArray size = file->Read("regrade_cells_size", ArrayType::kI32, {3});
+  const NpzArray keys = file->Read("regrade_cells_key", ArrayType::kU64, {-1});
+  const int64_t n = keys.num_elements();
+  const NpzArray levels = file->Read("regrade_cells_level", ArrayType::kU8, {n});
+  const int32_t* const voxels = size.As<int32_t>();
+  geometry->frame.resolution = {voxels[0], voxels[1], voxels[2]};
+  CellGrid& cells = geometry->cells;
+  cells.finest = file->ReadScalar<int32_t>("regrade_cells_finest");
+  cells.key.Resize(n);
+  std::copy_n(keys.As<CellKey>(), n, cells.key.data());
+  cells.level.Resize(n);
+  std::copy_n(levels.As<uint8_t>(), n, cells.level.data());
+  const std::string defect =
+      n == 0 ? "there are no cells" : DefectOfCells(cells, geometry->frame.resolution);
+  if (!defect.empty())
+    Refuse(file->path() + ": array 'regrade_cells_key'", defect,
+           "the file is damaged: make it again");
+  FindVertices(&cells);
+  BuildTree(geometry->frame.resolution, &cells);
+}
+
 Geometry ReadGeometry(NpzReader* file) {
   Geometry geometry;
   geometry.frame.radius = ReadVec3(file, "radius");
   geometry.frame.center = ReadVec3(file, "center");
+  if (file->Has("regrade_cells_key")) {
+    if (file->Has("links"))
+      Refuse(file->path() + ": array 'links'", "a field has links or cells, not both");
+    ReadCells(file, &geometry);
+    return geometry;
+  }
   const NpzArray links = file->Read("links", ArrayType::kI32, {-1, -1, -1});
   for (int a = 0; a < 3; ++a) {
     if (links.shape[a] > 4096)
@@ -141,6 +173,10 @@ void ReadValues(NpzReader* file, Geometry* geometry, Appearance* appearance) {
        colours.shape[1] != first + 3))
     Refuse(file->path(), std::string("colours are ") + NameOf(colours.type) +
                              colours.ShapeText() + "; 3, 12 or 27 columns are read");
+  if (geometry->cells.on() && colours.shape[0] != geometry->cells.num_vertices())
+    Refuse(file->path() + ": array '" + (joined ? "data" : "sh_data") + "'",
+           std::to_string(colours.shape[0]) + " rows, but the cells have " +
+               std::to_string(geometry->cells.num_vertices()) + " vertices");
   const int stored = static_cast<int>((colours.shape[1] - first) / 3);
   appearance->basis =
       file->Has("regrade_basis") ? file->ReadScalar<int32_t>("regrade_basis") : stored;
@@ -176,7 +212,16 @@ void WriteFieldFile(const std::string& path, const StoredField& stored) {
   NpzWriter file;
   file.Add("radius", {3}, &geometry.frame.radius.x);
   file.Add("center", {3}, &geometry.frame.center.x);
-  file.Add("links", {size.x, size.y, size.z}, geometry.links.data(), NpzPacking::kDeflate);
+  const CellGrid& cells = geometry.cells;
+  if (cells.on()) {
+    file.Add("regrade_cells_size", {3}, &size.x);
+    file.AddScalar<int32_t>("regrade_cells_finest", cells.finest);
+    file.Add("regrade_cells_key", {cells.num_cells()}, cells.key.data(), NpzPacking::kDeflate);
+    file.Add("regrade_cells_level", {cells.num_cells()}, cells.level.data(),
+             NpzPacking::kDeflate);
+  } else {
+    file.Add("links", {size.x, size.y, size.z}, geometry.links.data(), NpzPacking::kDeflate);
+  }
   file.Add("density_data", {voxels, 1}, geometry.density.data());
   file.AddFilled<uint16_t>(
       "sh_data", {voxels, 3 * kStoredBasis},
@@ -185,7 +230,7 @@ void WriteFieldFile(const std::string& path, const StoredField& stored) {
       },
       field.appearance.basis == kStoredBasis ? NpzPacking::kStore : NpzPacking::kDeflate);
   file.AddScalar<int64_t>("basis_type", kSphericalHarmonics);
-  file.AddScalar<int32_t>("regrade_version", kVersion);
+  file.AddScalar<int32_t>("regrade_version", cells.on() ? kCellsVersion : kUniformVersion);
   file.AddScalar<int32_t>("regrade_basis", field.appearance.basis);
   file.Add("regrade_background", {3}, &field.background.x);
   file.AddScalar<float>("regrade_near_clip", field.near_clip);

@@ -20,8 +20,9 @@ struct TypeRow {
   int64_t size;
 };
 constexpr TypeRow kTypes[] = {{ArrayType::kU8, "|u1", 1},  {ArrayType::kI32, "<i4", 4},
-                              {ArrayType::kI64, "<i8", 8}, {ArrayType::kF16, "<f2", 2},
-                              {ArrayType::kF32, "<f4", 4}, {ArrayType::kF64, "<f8", 8}};
+                              {ArrayType::kI64, "<i8", 8}, {ArrayType::kU64, "<u8", 8},
+                              {ArrayType::kF16, "<f2", 2}, {ArrayType::kF32, "<f4", 4},
+                              {ArrayType::kF64, "<f8", 8}};
 
 // Parses the header: a Python dictionary literal with three known keys, and nothing else.
 class LiteralReader {

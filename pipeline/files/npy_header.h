@@ -9,7 +9,7 @@
 
 namespace regrade {
 
-enum class ArrayType { kU8, kI32, kI64, kF16, kF32, kF64 };
+enum class ArrayType { kU8, kI32, kI64, kU64, kF16, kF32, kF64 };
 
 int64_t SizeOf(ArrayType type);      // bytes per element
 const char* NameOf(ArrayType type);  // NumPy's: "<f4", "|u1", ...

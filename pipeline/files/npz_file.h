@@ -22,6 +22,8 @@ struct ArrayTypeOf<int32_t> : std::integral_constant<ArrayType, ArrayType::kI32>
 template <>
 struct ArrayTypeOf<int64_t> : std::integral_constant<ArrayType, ArrayType::kI64> {};
 template <>
+struct ArrayTypeOf<uint64_t> : std::integral_constant<ArrayType, ArrayType::kU64> {};
+template <>
 struct ArrayTypeOf<uint16_t> : std::integral_constant<ArrayType, ArrayType::kF16> {};
 template <>
 struct ArrayTypeOf<float> : std::integral_constant<ArrayType, ArrayType::kF32> {};

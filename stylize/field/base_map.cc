@@ -9,6 +9,20 @@
 namespace regrade {
 namespace {
 
+// The blend of coefficients [3, basis] at a sample of the box.
+void BlendAt(const RadianceField& field, const WeightedSample& sample, float* sh) {
+  const int stride = field.appearance.stride();
+  int32_t points[8];
+  CornerPoints(*field.geometry, sample, points);
+  std::fill_n(sh, stride, 0.0f);
+  for (int k = 0; k < 8; ++k) {
+    if (points[k] < 0) continue;
+    const float w = CornerWeight(sample.fraction, k);
+    const float* const corner = field.appearance.sh.data() + int64_t{points[k]} * stride;
+    for (int c = 0; c < stride; ++c) sh[c] += w * corner[c];
+  }
+}
+
 Vec3f SphereColor(const RadianceField& field, const WeightedSample& sample) {
   const int64_t voxels = field.geometry->num_voxels();
   int32_t points[8];
@@ -31,7 +45,7 @@ ColorMap LeastSquaresMap(const RadianceField& field, const StyleRays& batch,
   const int64_t n = std::ssize(batch.rays);
   const RayWeights weights = ComputeRayWeights(geometry, {batch.rays.data(), n}, options.march,
                                                field.near_clip, options.min_weight);
-  const int basis = field.appearance.basis, stride = field.appearance.stride();
+  const int basis = field.appearance.basis;
   std::vector<Vec3f> foreground(n);
 #pragma omp parallel for schedule(dynamic, 64)
   for (int64_t r = 0; r < n; ++r) {
@@ -44,8 +58,7 @@ ColorMap LeastSquaresMap(const RadianceField& field, const StyleRays& batch,
         continue;
       }
       float sh[3 * kMaxBasis];
-      Interpolate(geometry.frame, geometry.links.data(), field.appearance.sh.data(), stride,
-                  stride, Cell<float>{sample.vertex, sample.fraction}, sh);
+      BlendAt(field, sample, sh);
       for (int c = 0; c < 3; ++c) {
         float value = 0.5f;
         for (int k = 0; k < basis; ++k) value += sh[c * basis + k] * gamma[k];

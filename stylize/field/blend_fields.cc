@@ -60,8 +60,10 @@ bool SameGeometry(const Geometry& a, const Geometry& b) {
   return same_vector(a.frame.resolution, b.frame.resolution) &&
          same_vector(a.frame.center, b.frame.center) &&
          same_vector(a.frame.radius, b.frame.radius) && same(a.links, b.links) &&
-         same(a.density, b.density) && a.spheres.layers == b.spheres.layers &&
-         same(a.spheres.links, b.spheres.links) && same(a.spheres.density, b.spheres.density);
+         a.cells.finest == b.cells.finest && same(a.cells.key, b.cells.key) &&
+         same(a.cells.level, b.cells.level) && same(a.density, b.density) &&
+         a.spheres.layers == b.spheres.layers && same(a.spheres.links, b.spheres.links) &&
+         same(a.spheres.density, b.spheres.density);
 }
 
 RadianceField MixFields(const RadianceField& source,

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <numeric>
 
 #include "kernels/base/error.h"
 #include "kernels/field/background_spheres.h"
@@ -224,6 +225,7 @@ double LipschitzNetwork::SmallestK() const {
 
 std::vector<int32_t> VertexOfVoxel(const Geometry& geometry) {
   std::vector<int32_t> vertex(geometry.num_voxels(), -1);
+  if (geometry.cells.on()) std::iota(vertex.begin(), vertex.end(), 0);
   for (int64_t i = 0; i < geometry.links.size(); ++i)
     if (geometry.links[i] >= 0) vertex[geometry.links[i]] = static_cast<int32_t>(i);
   return vertex;
@@ -235,12 +237,24 @@ void FillFeatures(const RadianceField& field, float position_scale, int64_t voxe
   const float* sh = field.appearance.sh.data() + voxel * field.appearance.stride();
   std::fill_n(row, kFeatureStride, 0.0f);
   for (int c = 0; c < 3; ++c) std::copy_n(sh + c * basis, basis, row + c * 9);
-  const Vec3i n = field.geometry->frame.resolution;
-  const int index[3] = {vertex / (n.y * n.z), vertex / n.z % n.y, vertex % n.z};
+  const Geometry& geometry = *field.geometry;
+  const Vec3i n = geometry.frame.resolution;
+  Vec3f place{0.5f, 0.5f, 0.5f};  // voxels from the box's corner
+  if (geometry.cells.on())
+    place = PlaceOf(geometry.cells.vertex_key[vertex]).Cast<float>();
+  else
+    place += Vec3i{vertex / (n.y * n.z), vertex / n.z % n.y, vertex % n.z}.Cast<float>();
   for (int a = 0; a < 3; ++a)
-    row[kNetworkSh + a] =
-        position_scale *
-        (2 * (static_cast<float>(index[a]) + 0.5f) / static_cast<float>(n[a]) - 1);
+    row[kNetworkSh + a] = position_scale * (2 * place[a] / static_cast<float>(n[a]) - 1);
+}
+
+double SpatialCount(const Geometry& geometry) {
+  const CellGrid& cells = geometry.cells;
+  if (!cells.on()) return static_cast<double>(geometry.num_voxels());
+  double count = 0;
+  for (int64_t c = 0; c < cells.num_cells(); ++c)
+    count += std::ldexp(1.0, 3 * (cells.finest - cells.level[c]));
+  return count;
 }
 
 void FillTexelFeatures(const RadianceField& field, float position_scale, int64_t texel,

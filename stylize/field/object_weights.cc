@@ -48,9 +48,11 @@ void MaskVote::Add(const Camera& camera, const Image& mask) {
     for (int64_t r = 0; r < count; ++r)
       for (int64_t i = weights.first[r]; i < weights.first[static_cast<size_t>(r) + 1]; ++i) {
         const WeightedSample& sample = weights.samples[i];
+        if (sample.on_sphere()) continue;
+        int32_t voxels[8];
+        CornerPoints(geometry_, sample, voxels);
         for (int corner = 0; corner < 8; ++corner) {
-          const int32_t voxel =
-              geometry_.links[CornerVertex(geometry_.frame, sample.vertex, corner)];
+          const int32_t voxel = voxels[corner];
           if (voxel < 0) continue;
           const double weight = sample.weight * CornerWeight(sample.fraction, corner);
           const uint64_t steps = static_cast<uint64_t>(weight * kStep);

@@ -46,7 +46,6 @@ class Observer {
   }
 
   Seen Look(const Vec3f& direction, const RayWeights& weights, int64_t ray) const {
-    const GridFrame& frame = source_.geometry->frame;
     Seen seen;
     ShBasis(basis_, direction.Cast<double>(), seen.gamma);
     const double left = weights.transmittance[ray];
@@ -56,9 +55,10 @@ class Observer {
     for (int64_t i = weights.first[ray]; i < weights.first[static_cast<size_t>(ray) + 1]; ++i) {
       const WeightedSample& sample = weights.samples[i];
       Vec3d before{0.5, 0.5, 0.5}, after = before;
+      int32_t voxels[8];
+      CornerPoints(*source_.geometry, sample, voxels);
       for (int corner = 0; corner < 8; ++corner) {
-        const int32_t voxel =
-            source_.geometry->links[CornerVertex(frame, sample.vertex, corner)];
+        const int32_t voxel = voxels[corner];
         const double fraction = CornerWeight(sample.fraction, corner);
         if (voxel < 0 || fraction == 0) continue;
         before += ColorOf(source_.appearance, voxel, seen.gamma) * fraction;

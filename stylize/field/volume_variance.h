@@ -54,7 +54,8 @@ inline constexpr double kVarianceSlack = 1e-5;             // float's rounding i
 inline constexpr double kTransparentTransmittance = 1e-2;  // more than that is background
 
 // `styled` is `source` restyled by `network`. Colours are as rendered, but not clipped to [0,
-// 1]. Sums in double; the result does not depend on the number of threads.
+// 1]. Of fields without background spheres. Sums in double; the result does not depend on the
+// number of threads.
 VarianceReport MeasureVariance(const RadianceField& source, const RadianceField& styled,
                                const LipschitzNetwork& network,
                                const std::vector<RayPair>& pairs, const MarchOptions& march);

@@ -4,6 +4,7 @@
 // unless exact_sums is set.
 #include <utility>
 
+#include "kernels/base/error.h"
 #include "kernels/field/packed_grid.h"
 #include "stylize/cuda/device_style.h"
 #include "stylize/cuda/device_training.h"
@@ -79,6 +80,9 @@ class CudaStyleEngine : public StyleEngine {
 std::unique_ptr<StyleEngine> MakeCudaStyleEngine(const RadianceField* field,
                                                  const AggregationOptions& loss,
                                                  int64_t rays_per_step) {
+  if (field->geometry->cells.on())
+    throw Error(ExitCode::kResources, "an adaptive field is styled on the CPU only", "",
+                "use --device cpu");
   return std::make_unique<CudaStyleEngine>(field, loss, rays_per_step);
 }
 

@@ -7,16 +7,17 @@
 #include "pipeline/fields/field_file.h"
 #include "tests/fuzz/fuzz_support.h"
 #include "tests/fuzz/stored_zip.h"
-#include "tests/support/small_field.h"
+#include "tests/support/cell_field.h"
 
 namespace regrade::testing {
 namespace {
 
 constexpr uint64_t kBudget = 4 << 20;
 
-std::string StoredField(bool spheres, bool ndc) {
+std::string StoredField(bool spheres, bool ndc, bool cells = false) {
   regrade::StoredField stored;
-  stored.field = RandomField({4, 3, 5}, spheres ? 1 : 4, 0.6, 3);
+  stored.field = cells ? RandomCellField({1, 2, 1}, 1, 1, 3)
+                       : RandomField({4, 3, 5}, spheres ? 1 : 4, 0.6, 3);
   if (spheres) AddSpheres(3, 4, 0.7, 4, &stored.field);
   if (ndc) stored.ndc = {1.5, 2};
   const std::string path = FuzzFolder() + "/seed_field.npz";
@@ -25,7 +26,8 @@ std::string StoredField(bool spheres, bool ndc) {
 }
 
 std::vector<std::string> FieldSeeds() {
-  return {StoredField(false, false), StoredField(true, false), StoredField(false, true)};
+  return {StoredField(false, false), StoredField(true, false), StoredField(false, true),
+          StoredField(false, false, true)};
 }
 
 bool ReadField(std::string_view bytes) {

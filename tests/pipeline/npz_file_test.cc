@@ -48,6 +48,19 @@ TEST(Npz, RoundTrip) {
                        "(2, 3), expected <f4(3, 2)");
 }
 
+TEST(Npz, UnsignedNumbersOf64BitsKeepTheirTop) {
+  const TemporaryFolder folder;
+  const uint64_t keys[3] = {0, uint64_t{1} << 63, ~uint64_t{0}};
+  NpzWriter writer;
+  writer.Add("keys", {3}, keys, NpzPacking::kDeflate);
+  writer.WriteTo(folder / "a.npz");
+  NpzReader reader(folder / "a.npz", kBudget);
+  const NpzArray array = reader.Read("keys", ArrayType::kU64, {3});
+  EXPECT_STREQ(NameOf(array.type), "<u8");
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(array.As<uint64_t>()[i], keys[i]);
+  EXPECT_REGRADE_ERROR(reader.Read("keys", ArrayType::kI64, {3}), ExitCode::kInput, "<u8(3)");
+}
+
 TEST(Npz, SameArraysSameBytesOnAnyDay) {
   const std::string bytes = SmallArchive();
   EXPECT_EQ(bytes, SmallArchive());

@@ -1,4 +1,5 @@
 // Upload and download of a grid, and the arrays derived from links and records.
+#include "kernels/base/error.h"
 #include "kernels/field/cuda/device_grid.h"
 #include "kernels/field/cuda/gradient_view.h"
 #include "kernels/field/cuda/launch.h"
@@ -26,6 +27,9 @@ DeviceGridView DeviceGrid::view() const {
 
 DeviceGrid UploadGrid(const FastGrid& grid, bool fitting, const Buffer<float>& second_moment,
                       bool exact_sums, const Buffer<float>& sphere_moment) {
+  if (grid.cells.on())
+    throw Error(ExitCode::kResources, "an adaptive field is processed on the CPU only", "",
+                "use --device cpu");
   DeviceGrid device;
   device.frame = grid.frame;
   device.basis = grid.basis;
