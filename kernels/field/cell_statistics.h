@@ -13,14 +13,16 @@ namespace regrade {
 // Of each cell, over the rays of all photos; [C] each.
 struct CellStatistics {
   Buffer<float> weight;    // the largest w_i of EQ(composite)
-  Buffer<float> pixels;    // its width in pixels in the photo that sees it second largest, of those that give it a
-                           // weight of kSeenWeight; 0 if fewer than two do
-  Buffer<uint64_t> error;  // sum of w_i |C - C_photo|^2, in units of kErrorUnit: integers, so the order is free
+  Buffer<float> pixels;    // its width in pixels in the photo that sees it second largest, of
+                           // those that give it a weight of kSeenWeight; 0 if fewer than two do
+  Buffer<uint64_t> error;  // sum of w_i |C - C_photo|^2, in units of kErrorUnit: integers, so
+                           // the order is free
 };
 inline constexpr float kSeenWeight = 1e-3f;
 inline constexpr double kErrorUnit = 0x1p-24;
 
-// The width in pixels of a cell of `voxels` at `t` (world units) along a ray; `next` is the ray `stride` pixels beside it.
+// The width in pixels of a cell of `voxels` at `t` (world units) along a ray; `next` is the ray
+// `stride` pixels beside it.
 HD inline float WidthInPixels(const GridFrame& frame, const Ray& ray, const Ray& next, float t,
                               int stride, int voxels) {
   const Vec3f scale = frame.Scale();

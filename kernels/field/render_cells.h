@@ -1,5 +1,5 @@
-// One ray through an adaptive field, forward and adjoint: the plain specification. See
-// EQ(cell-march), EQ(composite).
+// One ray through an adaptive field, forward and adjoint: the plain specification. The march is
+// in cell_walk.h.
 #pragma once
 
 #include <vector>

@@ -46,17 +46,52 @@ HD Vec3<T> SampleColor(const FieldView<T>& field, const Cell<T>& cell, const T* 
   return color;
 }
 
-// RenderRay and RenderRayAdjoint of an adaptive field; options.step is not used.
+// The samples of a uniform grid on a ray, without what is behind them.
 template <typename T>
-RayResult<T> RenderCellRay(const FieldView<T>& field, const RayT<T>& ray,
-                           const MarchOptions& options) {
-  RayResult<T> result;
+HD void CompositeGrid(const FieldView<T>& field, const RayT<T>& ray,
+                      const MarchOptions& options, CompositeState<T>* state,
+                      RayResult<T>* result) {
+  const GridRay<T> march =
+      ClipToGrid(field.frame, ray, field.near_clip, static_cast<T>(options.step));
+  const T delta = T(options.step) * march.world_per_voxel;
+  T gamma[kMaxBasis];
+  ShBasis(field.basis, ray.direction, gamma);
+  for (int64_t i = 0; i < march.num_steps; ++i) {
+    const T t = march.t_begin + T(i) * T(options.step);
+    const Cell<T> cell = LocateCell(field.frame, march.At(t));
+    T density;
+    Interpolate(field.frame, field.links, field.density, 1, 1, cell, &density);
+    if (!(density > 0)) continue;
+    const T tau = OpticalDepth(density, delta);
+    Vec3<T> raw;
+    const Vec3<T> color = SampleColor(field, cell, gamma, &raw);
+    result->depth += Composite(tau, color, state) * t * march.world_per_voxel;
+    result->optical_depth += tau;
+    result->last_step = i;
+    if (state->transmittance < T(options.stop_transmittance)) break;
+  }
+}
+
+// The same of an adaptive field; options.step is not used.
+template <typename T>
+void CompositeCells(const FieldView<T>& field, const RayT<T>& ray, const MarchOptions& options,
+                    CompositeState<T>* state, RayResult<T>* result) {
   std::vector<CompositedCell<T>> samples;
+  state->transmittance = MarchCells(field.frame, field.cells, field.density, ray,
+                                    field.near_clip, T(options.stop_transmittance), &samples);
+  state->color = ShadeCells(field, ray, samples, &result->depth);
+  for (const CompositedCell<T>& sample : samples) result->optical_depth += sample.tau;
+}
+
+template <typename T>
+HD RayResult<T> RenderRay(const FieldView<T>& field, const RayT<T>& ray,
+                          const MarchOptions& options) {
+  RayResult<T> result;
   CompositeState<T> state;
-  state.transmittance = MarchCells(field.frame, field.cells, field.density, ray,
-                                   field.near_clip, T(options.stop_transmittance), &samples);
-  state.color = ShadeCells(field, ray, samples, &result.depth);
-  for (const CompositedCell<T>& sample : samples) result.optical_depth += sample.tau;
+  if (field.cells.top != nullptr)
+    CompositeCells(field, ray, options, &state, &result);
+  else
+    CompositeGrid(field, ray, options, &state, &result);
   if (field.spheres.layers > 0) {
     result.spheres = CompositeSpheres(field.frame, field.spheres, ray,
                                       T(options.stop_transmittance), &state);
@@ -67,6 +102,7 @@ RayResult<T> RenderCellRay(const FieldView<T>& field, const RayT<T>& ray,
   return result;
 }
 
+// RenderRayAdjoint of an adaptive field.
 template <typename T, typename Add>
 void RenderCellRayAdjoint(const FieldView<T>& field, const RayT<T>& ray,
                           const MarchOptions& options, const RayResult<T>& result,
@@ -81,41 +117,6 @@ void RenderCellRayAdjoint(const FieldView<T>& field, const RayT<T>& ray,
                             result.optical_depth, d_color, &behind, d_sphere_density,
                             d_sphere_color, add);
   ShadeCellsAdjoint(field, ray, samples, behind, d_color, d_density, d_sh, add);
-}
-
-template <typename T>
-HD RayResult<T> RenderRay(const FieldView<T>& field, const RayT<T>& ray,
-                          const MarchOptions& options) {
-  if (field.cells.top != nullptr) return RenderCellRay(field, ray, options);
-  RayResult<T> result;
-  const GridRay<T> march =
-      ClipToGrid(field.frame, ray, field.near_clip, static_cast<T>(options.step));
-  const T delta = T(options.step) * march.world_per_voxel;
-  T gamma[kMaxBasis];
-  ShBasis(field.basis, ray.direction, gamma);
-  CompositeState<T> state;
-  for (int64_t i = 0; i < march.num_steps; ++i) {
-    const T t = march.t_begin + T(i) * T(options.step);
-    const Cell<T> cell = LocateCell(field.frame, march.At(t));
-    T density;
-    Interpolate(field.frame, field.links, field.density, 1, 1, cell, &density);
-    if (!(density > 0)) continue;
-    const T tau = OpticalDepth(density, delta);
-    Vec3<T> raw;
-    const Vec3<T> color = SampleColor(field, cell, gamma, &raw);
-    result.depth += Composite(tau, color, &state) * t * march.world_per_voxel;
-    result.optical_depth += tau;
-    result.last_step = i;
-    if (state.transmittance < T(options.stop_transmittance)) break;
-  }
-  if (field.spheres.layers > 0) {
-    result.spheres = CompositeSpheres(field.frame, field.spheres, ray,
-                                      T(options.stop_transmittance), &state);
-    result.depth += result.spheres.depth;
-  }
-  result.transmittance = state.transmittance;
-  result.color = state.color + field.background * state.transmittance;
-  return result;
 }
 
 // Adds dL/d(density), dL/d(sh) for dL/dC = d_color to the gradients, which have the field's

@@ -23,6 +23,9 @@ namespace fs = std::filesystem;
 
 constexpr double kGoodFraction = 0.95;  // of the photos: enough to stop
 
+// Of fewer photos, some lens makes a model of photos that only turn.
+constexpr size_t kFewestForASimplerLens = 5;
+
 class PoseFinder {
  public:
   PoseFinder(const std::vector<StagedPhoto>& photos, const PoseOptions& options,
@@ -128,7 +131,7 @@ class PoseFinder {
   // Tries again with the next simpler lens that gives a model, if `why` says that the attempt's
   // lens is implausible. False if the attempt remains as it is.
   bool Simplify(const std::string& why, AttemptResult* attempt) {
-    if (why.empty()) return false;
+    if (why.empty() || Registered(*attempt) < kFewestForASimplerLens) return false;
     lens_failures_.push_back(attempt->Name() + ": " + why);
     for (int next = static_cast<int>(attempt->freedom) + 1;
          next <= static_cast<int>(LensFreedom::kHeldFocal) && !runner_->TimeIsOver(); ++next) {

@@ -1,4 +1,5 @@
-// Adaptive fields on the device against the plain specification and the host; skipped without a device.
+// Adaptive fields on the device against the plain specification and the host; skipped without a
+// device.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -55,15 +56,16 @@ TEST_P(DeviceCellsTest, Render) {
   const int64_t n = on_device.size();
   DeviceBuffer<Vec3f> color(n, "colours");
   DeviceBuffer<float> depth(n, "depths"), transmittance(n, "transmittances");
-  RenderOnDevice(grid, on_device.data(), n, options, {color.data(), depth.data(), transmittance.data()});
+  RenderOnDevice(grid, on_device.data(), n, options,
+                 {color.data(), depth.data(), transmittance.data()});
   const Buffer<Vec3f> colors = color.ToHost();
   const Buffer<float> depths = depth.ToHost();
   double error = 0, exact_error = 0, depth_error = 0;
   for (int64_t r = 0; r < n; ++r) {
     const Ray& ray = rays[static_cast<size_t>(r)];
     const RayResult<float> plain = RenderRay(ViewOf(field), ray, options);
-    const RayResult<double> exact =
-        RenderRay(in_double.view(), {ray.origin.Cast<double>(), ray.direction.Cast<double>()}, options);
+    const RayResult<double> exact = RenderRay(
+        in_double.view(), {ray.origin.Cast<double>(), ray.direction.Cast<double>()}, options);
     for (int c = 0; c < 3; ++c) {
       ASSERT_TRUE(std::isfinite(colors[r][c]));
       error = std::max(error, std::abs(double{colors[r][c]} - plain.color[c]));
@@ -93,7 +95,8 @@ TEST_P(DeviceCellsTest, FitGradientAndVariation) {
     const RayResult<double> result = RenderRay(d.view(), ray, options);
     const Vec3d off = result.color - targets[r].Cast<double>();
     squares += Dot(off, off);
-    RenderRayAdjoint(d.view(), ray, options, result, off * (2.0 * scale), d_density.data(), d_sh.data(), PlainAdd());
+    RenderRayAdjoint(d.view(), ray, options, result, off * (2.0 * scale), d_density.data(),
+                     d_sh.data(), PlainAdd());
   }
   const CellGrid& cells = field.geometry->cells;
   const CellsView view = ViewOf(cells, field.geometry->frame.resolution);
@@ -104,29 +107,34 @@ TEST_P(DeviceCellsTest, FitGradientAndVariation) {
   const int64_t begin = cells.num_cells() - 20, count = 45;  // wraps around
   for (int64_t i = 0; i < count; ++i) {
     const int64_t c = (begin + i) % cells.num_cells();
-    CellVariation<double>(view, d.density.data(), 1, 0, unit.data(), c, c + 1, 0.7e-3, d_density.data());
+    CellVariation<double>(view, d.density.data(), 1, 0, unit.data(), c, c + 1, 0.7e-3,
+                          d_density.data());
     for (int k = 0; k < stride; ++k)
-      CellVariation<double>(view, d.sh.data(), stride, k, one.data(), c, c + 1, 0.2e-3, d_sh.data());
+      CellVariation<double>(view, d.sh.data(), stride, k, one.data(), c, c + 1, 0.2e-3,
+                            d_sh.data());
   }
   for (const bool exact_sums : {false, true}) {
     DeviceGrid grid = UploadGrid(MakeFastGrid(field), true, {}, exact_sums);
     DeviceTouched touched(grid);
-    for (const int64_t store : {int64_t{1} << 28, int64_t{1} << 16}) {  // the second one needs several turns
+    for (const int64_t store :
+         {int64_t{1} << 28, int64_t{1} << 16}) {  // the second one needs several turns
       grid = UploadGrid(MakeFastGrid(field), true, {}, exact_sums);
       DeviceRayFitter fitter(grid.frame, options, store);
-      fitter.Accumulate(grid, on_device.data(), device_targets.data(), on_device.size(), scale, &touched);
+      fitter.Accumulate(grid, on_device.data(), device_targets.data(), on_device.size(), scale,
+                        &touched);
       AddTotalVariation(grid, begin, count, 0.7e-3f, 0.2e-3f, &touched);
       const Buffer<float> gradient = DownloadGradient(grid);
       double largest = 0, worst = 0;
       const int lanes = RecordLanes(basis());
       for (int64_t v = 0; v < cells.num_vertices(); ++v)
         for (int i = 0; i <= stride; ++i) {
-          const double plain = i < stride ? d_sh[static_cast<size_t>(v * stride + i)] : d_density[static_cast<size_t>(v)];
+          const double plain = i < stride ? d_sh[static_cast<size_t>(v * stride + i)]
+                                          : d_density[static_cast<size_t>(v)];
           largest = std::max(largest, std::abs(plain));
           worst = std::max(worst, std::abs(gradient[v * lanes + i] - plain));
         }
-      Row("gradient of a fit", basis(), exact_sums ? "plain double, exact sums" : "plain double", worst / largest,
-          1e-4);
+      Row("gradient of a fit", basis(),
+          exact_sums ? "plain double, exact sums" : "plain double", worst / largest, 1e-4);
       EXPECT_NEAR(fitter.TakeSums().squared_error, squares, 1e-4 * squares);
     }
   }
@@ -137,18 +145,22 @@ TEST_P(DeviceCellsTest, ChangesEqualTheHosts) {
   const RadianceField field = RandomCellField({3, 2, 2}, 3, basis(), 61);
   FastGrid host = MakeFastGrid(field);
   host.density_rate = Buffer<float>(host.num_voxels());
-  for (int64_t v = 0; v < host.num_voxels(); ++v) host.density_rate[v] = static_cast<float>(v % 5) / 5;
+  for (int64_t v = 0; v < host.num_voxels(); ++v)
+    host.density_rate[v] = static_cast<float>(v % 5) / 5;
   Buffer<float> moment(host.records.size());
   for (int64_t i = 0; i < moment.size(); ++i) moment[i] = static_cast<float>(i % 11);
   std::vector<CellChange> change;
   for (int64_t c = 0; c < host.cells.num_cells(); ++c)
-    change.push_back(c % 4 == 0 ? CellChange::kRemove : c % 4 == 1 ? CellChange::kSplit : CellChange::kKeep);
+    change.push_back(c % 4 == 0   ? CellChange::kRemove
+                     : c % 4 == 1 ? CellChange::kSplit
+                                  : CellChange::kKeep);
   const DeviceGrid device = ChangeCellsOnDevice(UploadGrid(host, true, moment), change);
   const FastGrid down = DownloadGrid(device);
   const Buffer<float> down_moment = DownloadSecondMoment(device);
   ApplyChanges(change, &host, &moment);
   const auto same = [](const auto& a, const auto& b) {
-    return a.size() == b.size() && std::memcmp(a.data(), b.data(), static_cast<size_t>(a.size()) * sizeof(a[0])) == 0;
+    return a.size() == b.size() &&
+           std::memcmp(a.data(), b.data(), static_cast<size_t>(a.size()) * sizeof(a[0])) == 0;
   };
   EXPECT_TRUE(same(down.cells.key, host.cells.key));
   EXPECT_TRUE(same(down.cells.level, host.cells.level));
@@ -182,20 +194,24 @@ TEST_P(DeviceCellsTest, StatisticsEqualTheHosts) {
     camera.camera_from_world.translation = {0.1 * i, 0.05, 2.5};
     photos.emplace_back(41, 31, 3);
     for (size_t p = 0; p < photos.back().pixels.size(); ++p)
-      photos.back().pixels[p] = p % 3 == 0 && p % 77 == 0 ? std::nanf("") : static_cast<float>(p % 7) / 7;
+      photos.back().pixels[p] =
+          p % 3 == 0 && p % 77 == 0 ? std::nanf("") : static_cast<float>(p % 7) / 7;
     views.push_back({camera, &photos.back()});
   }
   const TrainingRays rays(views);
   const MarchOptions march{0.5f, 1e-3f};
   const CellStatistics plain = MeasureCells(host, rays, march, 2);
-  const CellStatistics device = MeasureCellsOnDevice(UploadGrid(host), rays.ToDevice(), march, 2);
+  const CellStatistics device =
+      MeasureCellsOnDevice(UploadGrid(host), rays.ToDevice(), march, 2);
   double weight = 0, pixels = 0, error = 0, total = 0;
   for (int64_t c = 0; c < host.cells.num_cells(); ++c) {
     weight = std::max(weight, std::abs(double{plain.weight[c]} - device.weight[c]));
     // A weight at the limit may count on one side only.
     if (std::abs(plain.weight[c] - kSeenWeight) > 1e-5f)
-      pixels = std::max(pixels, std::abs(double{plain.pixels[c]} - device.pixels[c]) / std::max(1.0f, plain.pixels[c]));
-    error += std::abs(static_cast<double>(plain.error[c]) - static_cast<double>(device.error[c]));
+      pixels = std::max(pixels, std::abs(double{plain.pixels[c]} - device.pixels[c]) /
+                                    std::max(1.0f, plain.pixels[c]));
+    error +=
+        std::abs(static_cast<double>(plain.error[c]) - static_cast<double>(device.error[c]));
     total += static_cast<double>(plain.error[c]);
   }
   Row("weights of cells", basis(), "host", weight, 2e-5);

@@ -38,7 +38,8 @@ double Derivative(double* x, const F& f) {
   return std::abs(fine - coarse) > 1e-6 ? std::nan("") : (4 * fine - coarse) / 3;
 }
 
-// Rays cross faces between levels, so the gradients of the vertices on them are among those checked.
+// Rays cross faces between levels, so the gradients of the vertices on them are among those
+// checked.
 TEST(CellGradient, H166_AdjointEqualsDerivativeInDoubleAcrossFaces) {
   for (const int basis : {1, 9}) {
     const RadianceField field = RandomCellField({2, 2, 2}, 2, basis, 21);
@@ -50,14 +51,15 @@ TEST(CellGradient, H166_AdjointEqualsDerivativeInDoubleAcrossFaces) {
       const RayT<double> ray = ToDouble(ray_f);
       const RayResult<double> result = RenderRay(d.view(), ray, options);
       std::vector<double> d_density(d.density.size()), d_sh(d.sh.size());
-      RenderRayAdjoint(d.view(), ray, options, result, d_color, d_density.data(), d_sh.data(), PlainAdd());
+      RenderRayAdjoint(d.view(), ray, options, result, d_color, d_density.data(), d_sh.data(),
+                       PlainAdd());
       const auto loss = [&] { return Dot(RenderRay(d.view(), ray, options).color, d_color); };
       const auto check = [&](double* x, double gradient) {
         const double numeric = Derivative(x, loss);
         if (std::isnan(numeric)) return;
         EXPECT_NEAR(numeric, gradient,
-                    testing::RecordDigits("gradient of a pixel", testing::Computed::kDouble, numeric - gradient, 1e-8,
-                                          1 + std::abs(gradient)));
+                    testing::RecordDigits("gradient of a pixel", testing::Computed::kDouble,
+                                          numeric - gradient, 1e-8, 1 + std::abs(gradient)));
         checked += gradient != 0;
       };
       for (size_t i = 0; i < d.density.size(); ++i)
@@ -97,18 +99,21 @@ TEST(CellRays, FastPathsEqualThePlainRay) {
       const std::vector<Ray> rays = RandomRays(400, 32);
       const MarchOptions options{0.5f, 1e-4f};
       std::vector<float> color(1200), depth(400), transmittance(400);
-      functions->render(grid, rays.data(), 400, options, color.data(), depth.data(), transmittance.data());
+      functions->render(grid, rays.data(), 400, options, color.data(), depth.data(),
+                        transmittance.data());
       std::vector<float> plain_weights(static_cast<size_t>(grid.cells.num_cells()));
       const RayWeights weights =
           ComputeRayWeights(*field.geometry, {rays.data(), 400}, options, field.near_clip);
       for (const WeightedSample& s : weights.samples)
-        plain_weights[static_cast<size_t>(s.vertex)] = std::max(plain_weights[static_cast<size_t>(s.vertex)], s.weight);
+        plain_weights[static_cast<size_t>(s.vertex)] =
+            std::max(plain_weights[static_cast<size_t>(s.vertex)], s.weight);
       for (size_t r = 0; r < rays.size(); ++r) {
         const RayResult<float> plain = RenderRay(ViewOf(field), rays[r], options);
         for (int c = 0; c < 3; ++c)
-          ASSERT_NEAR(color[3 * r + c], plain.color[c],
-                      testing::RecordBound("a pixel against the plain ray", testing::Computed::kFloat,
-                                           color[3 * r + c] - plain.color[c], 2e-5));
+          ASSERT_NEAR(
+              color[3 * r + c], plain.color[c],
+              testing::RecordBound("a pixel against the plain ray", testing::Computed::kFloat,
+                                   color[3 * r + c] - plain.color[c], 2e-5));
         ASSERT_NEAR(transmittance[r], plain.transmittance, 2e-5);
         ASSERT_NEAR(depth[r], plain.depth, 1e-4);
         ASSERT_NEAR(weights.transmittance[r], plain.transmittance, 1e-6);
@@ -139,13 +144,15 @@ TEST(CellRays, FastGradientsEqualThePlainAdjoint) {
       const RayT<double> ray{rays[r].origin.Cast<double>(), rays[r].direction.Cast<double>()};
       const RayResult<double> result = RenderRay(d.view(), ray, options);
       const Vec3d d_color = (result.color - targets[r].Cast<double>()) * (2.0 * scale);
-      RenderRayAdjoint(d.view(), ray, options, result, d_color, d_density.data(), d_sh.data(), PlainAdd());
+      RenderRayAdjoint(d.view(), ray, options, result, d_color, d_density.data(), d_sh.data(),
+                       PlainAdd());
     }
     const CellsView cells = ViewOf(grid.cells, grid.frame.resolution);
     std::vector<double> unit, one(static_cast<size_t>(grid.cells.finest) + 1, 1.0);
     for (int level = 0; level <= grid.cells.finest; ++level)
       unit.push_back(WorldWidth(grid.frame, 1 << (grid.cells.finest - level)));
-    CellVariation<double>(cells, d.density.data(), 1, 0, unit.data(), 5, 40, 0.7, d_density.data());
+    CellVariation<double>(cells, d.density.data(), 1, 0, unit.data(), 5, 40, 0.7,
+                          d_density.data());
     const int stride = 3 * basis;
     for (int i = 0; i < stride; ++i)
       CellVariation<double>(cells, d.sh.data(), stride, i, one.data(), 5, 40, 0.2, d_sh.data());
@@ -154,8 +161,11 @@ TEST(CellRays, FastGradientsEqualThePlainAdjoint) {
     for (const double g : d_sh) largest = std::max(largest, std::abs(g));
     for (int64_t v = 0; v < grid.num_voxels(); ++v) {
       const int32_t slot = arena.slot_of_voxel[v];
-      const auto at = [&](int lane) { return slot < 0 ? 0.0 : double{arena.gradient[int64_t{slot} * grid.lanes() + lane]}; };
-      worst = std::max(worst, std::abs(at(DensityLane(basis)) - d_density[static_cast<size_t>(v)]));
+      const auto at = [&](int lane) {
+        return slot < 0 ? 0.0 : double{arena.gradient[int64_t{slot} * grid.lanes() + lane]};
+      };
+      worst =
+          std::max(worst, std::abs(at(DensityLane(basis)) - d_density[static_cast<size_t>(v)]));
       for (int i = 0; i < stride; ++i)
         worst = std::max(worst, std::abs(at(i) - d_sh[static_cast<size_t>(v * stride + i)]));
     }
@@ -168,7 +178,8 @@ TEST(CellRays, AStepScalesTheRateOfEachDensity) {
   FastGrid grid = MakeFastGrid(RandomCellField({2, 2, 2}, 1, 4, 51));
   const FastGrid before = grid;
   grid.density_rate = Buffer<float>(grid.num_voxels());
-  for (int64_t v = 0; v < grid.num_voxels(); ++v) grid.density_rate[v] = v % 2 == 0 ? 1.0f : 0.25f;
+  for (int64_t v = 0; v < grid.num_voxels(); ++v)
+    grid.density_rate[v] = v % 2 == 0 ? 1.0f : 0.25f;
   GradientArena arena;
   arena.Reset(grid.num_voxels());
   FastRays().total_variation(grid, 0, grid.cells.num_cells(), 1.0f, 1.0f, &arena);

@@ -1,10 +1,9 @@
-#include "kernels/field/cuda/cell_march.h"
-
 #include <algorithm>
 
 #include "kernels/base/error.h"
 #include "kernels/device/launch_size.h"
 #include "kernels/field/cell_walk.h"
+#include "kernels/field/cuda/cell_march.h"
 #include "kernels/field/trilinear.h"
 #include "kernels/field/volume_rendering.h"
 
@@ -23,19 +22,16 @@ CellSampleStore::CellSampleStore(const GridFrame& frame, int64_t rays, int64_t m
 }
 
 CellSamples CellSampleStore::view() {
-  return {place_.data(),
-          raw_tau_.data(),
-          rest_.data(),
-          count_.data(),
-          transmittance_.data(),
-          capacity_};
+  return {place_.data(), raw_tau_.data(),       rest_.data(),
+          count_.data(), transmittance_.data(), capacity_};
 }
 
 #if defined(__CUDACC__)
 
 namespace {
 
-__global__ void MarchCellsKernel(DeviceGridView grid, const Ray* rays, int64_t n, float stop, CellSamples out) {
+__global__ void MarchCellsKernel(DeviceGridView grid, const Ray* rays, int64_t n, float stop,
+                                 CellSamples out) {
   const int64_t r = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
   if (r >= n) return;
   const int64_t begin = r * out.capacity;
@@ -70,8 +66,8 @@ __global__ void MarchCellsKernel(DeviceGridView grid, const Ray* rays, int64_t n
 
 }  // namespace
 
-void MarchCellsOnDevice(const DeviceGrid& grid, const Ray* rays, int64_t n, const MarchOptions& options,
-                        const CellSamples& samples) {
+void MarchCellsOnDevice(const DeviceGrid& grid, const Ray* rays, int64_t n,
+                        const MarchOptions& options, const CellSamples& samples) {
   if (n == 0) return;
   constexpr int kBlock = 64;  // rays differ in length
   MarchCellsKernel<<<static_cast<unsigned>((n + kBlock - 1) / kBlock), kBlock>>>(
@@ -81,7 +77,8 @@ void MarchCellsOnDevice(const DeviceGrid& grid, const Ray* rays, int64_t n, cons
 
 #else
 
-void MarchCellsOnDevice(const DeviceGrid&, const Ray*, int64_t, const MarchOptions&, const CellSamples&) {
+void MarchCellsOnDevice(const DeviceGrid&, const Ray*, int64_t, const MarchOptions&,
+                        const CellSamples&) {
   DeviceWait("march_cells");
 }
 

@@ -1,11 +1,10 @@
-#include "kernels/field/cuda/device_cell_statistics.h"
-
 #include <algorithm>
 #include <cmath>
 
 #include "kernels/base/error.h"
 #include "kernels/device/launch_size.h"
 #include "kernels/field/cuda/cell_march.h"
+#include "kernels/field/cuda/device_cell_statistics.h"
 #include "kernels/field/cuda/device_rays.h"
 #include "kernels/field/volume_rendering.h"
 
@@ -68,32 +67,36 @@ __global__ void EndPhoto(Sums sums, int64_t n) {
 
 }  // namespace
 
-CellStatistics MeasureCellsOnDevice(const DeviceGrid& grid, const DeviceViews& views, const MarchOptions& march,
-                                    int stride) {
+CellStatistics MeasureCellsOnDevice(const DeviceGrid& grid, const DeviceViews& views,
+                                    const MarchOptions& march, int stride) {
   const int64_t n = grid.cells.num_cells();
   DeviceBuffer<float> arrays(4 * n, "statistics of cells");
   DeviceBuffer<uint64_t> error(n, "errors of cells");
   arrays.Zero();
   error.Zero();
-  const Sums sums{arrays.data(), arrays.data() + n, arrays.data() + 2 * n, arrays.data() + 3 * n,
-                  reinterpret_cast<unsigned long long*>(error.data())};
+  const Sums sums{arrays.data(), arrays.data() + n, arrays.data() + 2 * n,
+                  arrays.data() + 3 * n, reinterpret_cast<unsigned long long*>(error.data())};
   int64_t most = 1;
-  for (int view = 0; view < views.num_views(); ++view) most = std::max(most, views.RaysOf(view, stride, nullptr));
+  for (int view = 0; view < views.num_views(); ++view)
+    most = std::max(most, views.RaysOf(view, stride, nullptr));
   DeviceBuffer<Ray> rays(most, "rays of a photo");
   DeviceBuffer<Vec3f> colors(most, "colours of a view"), targets(most, "colours of a photo");
-  DeviceBuffer<float> depths(most, "depths of a view"), transmittances(most, "transmittances of a view");
+  DeviceBuffer<float> depths(most, "depths of a view"),
+      transmittances(most, "transmittances of a view");
   CellSampleStore store(grid.frame, std::min<int64_t>(most, 1 << 16), int64_t{2} << 30);
   const CellSamples lists = store.view();
   for (int view = 0; view < views.num_views(); ++view) {
     const int64_t size = views.RaysOf(view, stride, rays.data());
     views.TargetsOf(view, stride, targets.data());
-    RenderOnDevice(grid, rays.data(), size, march, {colors.data(), depths.data(), transmittances.data()});
+    RenderOnDevice(grid, rays.data(), size, march,
+                   {colors.data(), depths.data(), transmittances.data()});
     const int columns = (views.WidthOf(view) + stride - 1) / stride;
     for (int64_t begin = 0; begin < size; begin += store.rays()) {
       const int64_t part = std::min(size - begin, store.rays());
       MarchCellsOnDevice(grid, rays.data() + begin, part, march, lists);
-      AddRays<<<BlocksFor(part), kThreads>>>(grid.frame, grid.view().cells, rays.data(), colors.data(),
-                                             targets.data(), begin, part, columns, stride, lists, sums);
+      AddRays<<<BlocksFor(part), kThreads>>>(grid.frame, grid.view().cells, rays.data(),
+                                             colors.data(), targets.data(), begin, part,
+                                             columns, stride, lists, sums);
       CheckLaunch("add_rays");
     }
     EndPhoto<<<BlocksFor(n), kThreads>>>(sums, n);
@@ -107,7 +110,8 @@ CellStatistics MeasureCellsOnDevice(const DeviceGrid& grid, const DeviceViews& v
 
 #else
 
-CellStatistics MeasureCellsOnDevice(const DeviceGrid&, const DeviceViews&, const MarchOptions&, int) {
+CellStatistics MeasureCellsOnDevice(const DeviceGrid&, const DeviceViews&, const MarchOptions&,
+                                    int) {
   DeviceWait("statistics of cells");
   return {};
 }

@@ -1,11 +1,10 @@
-// The tree of an adaptive field's cells: changed, numbered and linked on the device. Every order is that of keys, so the
-// result does not depend on the order in which threads run.
-#include "kernels/field/cuda/device_cells.h"
-
+// The tree of an adaptive field's cells: changed, numbered and linked on the device. Every
+// order is that of keys, so the result does not depend on the order in which threads run.
 #include <vector>
 
 #include "kernels/base/error.h"
 #include "kernels/device/launch_size.h"
+#include "kernels/field/cuda/device_cells.h"
 #include "kernels/field/trilinear.h"
 
 #if defined(__CUDACC__)
@@ -55,7 +54,9 @@ CellGrid DownloadCells(const DeviceCells& device) {
 
 namespace {
 
-__device__ int64_t Thread() { return blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x; }
+__device__ int64_t Thread() {
+  return blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
+}
 
 // Runs a cub function twice: for the size of its scratch memory, and for its result.
 template <typename Function>
@@ -79,14 +80,14 @@ __device__ int32_t Find(const CellKey* keys, int32_t n, CellKey key) {
   return low < n && keys[low] == key ? low : -1;
 }
 
-__global__ void CountChildren(const uint8_t* change, const uint8_t* level, int finest, int64_t n,
-                              int32_t* count) {
+__global__ void CountChildren(const uint8_t* change, const uint8_t* level, int finest,
+                              int64_t n, int32_t* count) {
   const int64_t c = Thread();
   if (c >= n) return;
   const auto what = static_cast<CellChange>(change[c]);
-  count[c] = what == CellChange::kRemove                          ? 0
+  count[c] = what == CellChange::kRemove                       ? 0
              : what == CellChange::kSplit && level[c] < finest ? 8
-                                                                  : 1;
+                                                               : 1;
 }
 
 __global__ void PlaceChildren(const CellKey* key, const uint8_t* level, const int32_t* count,
@@ -103,12 +104,12 @@ __global__ void PlaceChildren(const CellKey* key, const uint8_t* level, const in
   }
 }
 
-__global__ void ListCorners(const CellKey* key, const uint8_t* level, int finest, int64_t corners,
-                            CellKey* corner_key, int32_t* corner) {
+__global__ void ListCorners(const CellKey* key, const uint8_t* level, int finest,
+                            int64_t corners, CellKey* corner_key, int32_t* corner) {
   const int64_t i = Thread();
   if (i >= corners) return;
-  corner_key[i] = KeyOf(CornerOf(PlaceOf(key[i / 8]), 1 << (finest - level[i / 8]),
-                                 static_cast<int>(i % 8)));
+  corner_key[i] = KeyOf(
+      CornerOf(PlaceOf(key[i / 8]), 1 << (finest - level[i / 8]), static_cast<int>(i % 8)));
   corner[i] = static_cast<int32_t>(i);
 }
 
@@ -117,9 +118,11 @@ __global__ void MarkFirst(const CellKey* sorted, int64_t n, int32_t* mark) {
   if (i < n) mark[i] = i == 0 || sorted[i] != sorted[i - 1] ? 1 : 0;
 }
 
-// `rank`: inclusive sums of MarkFirst's marks; `order`: corners in the order of their keys, ties in their own.
+// `rank`: inclusive sums of MarkFirst's marks; `order`: corners in the order of their keys,
+// ties in their own.
 __global__ void NumberVertices(const CellKey* sorted, const int32_t* order, const int32_t* rank,
-                               int64_t n, int32_t* corner, CellKey* vertex_key, int32_t* first) {
+                               int64_t n, int32_t* corner, CellKey* vertex_key,
+                               int32_t* first) {
   const int64_t i = Thread();
   if (i >= n) return;
   const int32_t vertex = rank[i] - 1;
@@ -129,9 +132,9 @@ __global__ void NumberVertices(const CellKey* sorted, const int32_t* order, cons
   first[vertex] = order[i];
 }
 
-__global__ void FindSources(const CellKey* vertex_key, const int32_t* first, const int32_t* parent,
-                            int64_t n, const CellKey* old_key, int32_t old_n,
-                            VertexSource* sources) {
+__global__ void FindSources(const CellKey* vertex_key, const int32_t* first,
+                            const int32_t* parent, int64_t n, const CellKey* old_key,
+                            int32_t old_n, VertexSource* sources) {
   const int64_t v = Thread();
   if (v < n) sources[v] = {Find(old_key, old_n, vertex_key[v]), parent[first[v] / 8]};
 }
@@ -143,8 +146,8 @@ __global__ void ListAncestors(const CellKey* key, const uint8_t* level, int64_t 
   if (c >= n) return;
   const CellKey mine = key[c] >> (3 * (finest - ancestor));
   out[c] = mine;
-  flag[c] = level[c] > ancestor &&
-            (c == 0 || level[c - 1] <= ancestor || key[c - 1] >> (3 * (finest - ancestor)) != mine);
+  flag[c] = level[c] > ancestor && (c == 0 || level[c - 1] <= ancestor ||
+                                    key[c - 1] >> (3 * (finest - ancestor)) != mine);
 }
 
 struct Level {
@@ -203,7 +206,8 @@ __global__ void MoveRows(const CellKey* from_key, const uint8_t* from_level,
   }
   const int64_t c = source.cell;
   const Vec3i offset = PlaceOf(vertex_key[v]) - PlaceOf(from_key[c]);
-  const Vec3f fraction = offset.Cast<float>() / static_cast<float>(1 << (finest - from_level[c]));
+  const Vec3f fraction =
+      offset.Cast<float>() / static_cast<float>(1 << (finest - from_level[c]));
   float sum = 0;
   for (int k = 0; k < 8; ++k)
     sum += CornerWeight(fraction, k) * values[from_corner[8 * c + k] * stride + lane];
@@ -217,18 +221,19 @@ DeviceBuffer<T> FirstOf(const DeviceBuffer<T>& from, int64_t count, const char* 
   return result;
 }
 
-void NumberVerticesOf(const DeviceBuffer<int32_t>& parent, const DeviceCells& old, DeviceCells* cells,
-                      DeviceBuffer<VertexSource>* sources) {
+void NumberVerticesOf(const DeviceBuffer<int32_t>& parent, const DeviceCells& old,
+                      DeviceCells* cells, DeviceBuffer<VertexSource>* sources) {
   const int64_t corners = 8 * cells->num_cells();
   REGRADE_CHECK(corners <= INT32_MAX);
   DeviceBuffer<CellKey> keys(corners, "keys of corners"), sorted(corners, "keys of corners");
   DeviceBuffer<int32_t> numbers(corners, "corners"), order(corners, "corners");
-  ListCorners<<<BlocksFor(corners), kThreads>>>(cells->key.data(), cells->level.data(), cells->finest, corners,
-                                                keys.data(), numbers.data());
+  ListCorners<<<BlocksFor(corners), kThreads>>>(cells->key.data(), cells->level.data(),
+                                                cells->finest, corners, keys.data(),
+                                                numbers.data());
   CheckLaunch("list_corners");
   WithScratch([&](void* scratch, size_t* bytes) {
-    cub::DeviceRadixSort::SortPairs(scratch, *bytes, keys.data(), sorted.data(), numbers.data(), order.data(),
-                                    corners, 0, 63);
+    cub::DeviceRadixSort::SortPairs(scratch, *bytes, keys.data(), sorted.data(), numbers.data(),
+                                    order.data(), corners, 0, 63);
   });
   keys = {};
   MarkFirst<<<BlocksFor(corners), kThreads>>>(sorted.data(), corners, numbers.data());
@@ -242,13 +247,14 @@ void NumberVerticesOf(const DeviceBuffer<int32_t>& parent, const DeviceCells& ol
   cells->corner = DeviceBuffer<int32_t>(corners, "corners of cells");
   cells->vertex_key = DeviceBuffer<CellKey>(vertices, "keys of vertices");
   DeviceBuffer<int32_t> first(vertices, "first corners of vertices");
-  NumberVertices<<<BlocksFor(corners), kThreads>>>(sorted.data(), order.data(), rank.data(), corners,
-                                                   cells->corner.data(), cells->vertex_key.data(), first.data());
+  NumberVertices<<<BlocksFor(corners), kThreads>>>(sorted.data(), order.data(), rank.data(),
+                                                   corners, cells->corner.data(),
+                                                   cells->vertex_key.data(), first.data());
   CheckLaunch("number_vertices");
   *sources = DeviceBuffer<VertexSource>(vertices, "sources of vertices");
-  FindSources<<<BlocksFor(vertices), kThreads>>>(cells->vertex_key.data(), first.data(), parent.data(), vertices,
-                                                 old.vertex_key.data(), static_cast<int32_t>(old.num_vertices()),
-                                                 sources->data());
+  FindSources<<<BlocksFor(vertices), kThreads>>>(
+      cells->vertex_key.data(), first.data(), parent.data(), vertices, old.vertex_key.data(),
+      static_cast<int32_t>(old.num_vertices()), sources->data());
   CheckLaunch("find_sources");
 }
 
@@ -262,11 +268,12 @@ void LinkTree(const Vec3i& voxels, DeviceCells* cells) {
   DeviceBuffer<uint8_t> flags(n, "marks of ancestors");
   DeviceBuffer<int32_t> count(1, "number of ancestors");
   for (int level = 0; level < cells->finest; ++level) {
-    ListAncestors<<<BlocksFor(n), kThreads>>>(cells->key.data(), cells->level.data(), n, cells->finest, level,
-                                              all.data(), flags.data());
+    ListAncestors<<<BlocksFor(n), kThreads>>>(cells->key.data(), cells->level.data(), n,
+                                              cells->finest, level, all.data(), flags.data());
     CheckLaunch("list_ancestors");
     WithScratch([&](void* scratch, size_t* bytes) {
-      cub::DeviceSelect::Flagged(scratch, *bytes, all.data(), flags.data(), chosen.data(), count.data(), n);
+      cub::DeviceSelect::Flagged(scratch, *bytes, all.data(), flags.data(), chosen.data(),
+                                 count.data(), n);
     });
     int32_t nodes = 0;
     count.CopyOut(&nodes, 1);
@@ -278,15 +285,19 @@ void LinkTree(const Vec3i& voxels, DeviceCells* cells) {
   cells->top = DeviceBuffer<int32_t>(tops, "top of a tree");
   cells->nodes = DeviceBuffer<int32_t>(8 * int64_t{total}, "nodes of a tree");
   FillEntries<<<BlocksFor(tops), kThreads>>>(tops, cells->top.data());
-  if (total > 0) FillEntries<<<BlocksFor(8 * int64_t{total}), kThreads>>>(8 * int64_t{total}, cells->nodes.data());
+  if (total > 0)
+    FillEntries<<<BlocksFor(8 * int64_t{total}), kThreads>>>(8 * int64_t{total},
+                                                             cells->nodes.data());
   CheckLaunch("fill_entries");
   for (int level = 0; level <= cells->finest; ++level) {
     const Level parents = level > 0 ? levels[static_cast<size_t>(level) - 1] : Level{};
     if (level < cells->finest && levels[static_cast<size_t>(level)].count > 0)
       LinkNodes<<<BlocksFor(levels[static_cast<size_t>(level)].count), kThreads>>>(
-          levels[static_cast<size_t>(level)], parents, level == 0, size, cells->top.data(), cells->nodes.data());
-    LinkCells<<<BlocksFor(n), kThreads>>>(cells->key.data(), cells->level.data(), n, cells->finest, level, parents,
-                                          size, cells->top.data(), cells->nodes.data());
+          levels[static_cast<size_t>(level)], parents, level == 0, size, cells->top.data(),
+          cells->nodes.data());
+    LinkCells<<<BlocksFor(n), kThreads>>>(cells->key.data(), cells->level.data(), n,
+                                          cells->finest, level, parents, size,
+                                          cells->top.data(), cells->nodes.data());
     CheckLaunch("link_cells");
   }
   DeviceWait("the tree of cells");  // the keys of nodes are freed
@@ -294,13 +305,15 @@ void LinkTree(const Vec3i& voxels, DeviceCells* cells) {
 
 }  // namespace
 
-DeviceCells ChangeCellsOnDevice(const DeviceCells& old, const Vec3i& voxels, const std::vector<CellChange>& change,
+DeviceCells ChangeCellsOnDevice(const DeviceCells& old, const Vec3i& voxels,
+                                const std::vector<CellChange>& change,
                                 DeviceBuffer<VertexSource>* sources) {
   const int64_t n = old.num_cells();
   DeviceBuffer<uint8_t> what(n, "changes of cells");
   what.CopyIn(reinterpret_cast<const uint8_t*>(change.data()), n);
   DeviceBuffer<int32_t> count(n, "numbers of children"), first(n, "first children");
-  CountChildren<<<BlocksFor(n), kThreads>>>(what.data(), old.level.data(), old.finest, n, count.data());
+  CountChildren<<<BlocksFor(n), kThreads>>>(what.data(), old.level.data(), old.finest, n,
+                                            count.data());
   CheckLaunch("count_children");
   WithScratch([&](void* scratch, size_t* bytes) {
     cub::DeviceScan::ExclusiveSum(scratch, *bytes, count.data(), first.data(), n);
@@ -316,31 +329,33 @@ DeviceCells ChangeCellsOnDevice(const DeviceCells& old, const Vec3i& voxels, con
   cells.key = DeviceBuffer<CellKey>(total, "keys of cells");
   cells.level = DeviceBuffer<uint8_t>(total, "levels of cells");
   DeviceBuffer<int32_t> parent(total, "parents of cells");
-  PlaceChildren<<<BlocksFor(n), kThreads>>>(old.key.data(), old.level.data(), count.data(), first.data(), old.finest,
-                                            n, cells.key.data(), cells.level.data(), parent.data());
+  PlaceChildren<<<BlocksFor(n), kThreads>>>(old.key.data(), old.level.data(), count.data(),
+                                            first.data(), old.finest, n, cells.key.data(),
+                                            cells.level.data(), parent.data());
   CheckLaunch("place_children");
   NumberVerticesOf(parent, old, &cells, sources);
   LinkTree(voxels, &cells);
   return cells;
 }
 
-void MoveValuesOnDevice(const DeviceCells& from, const DeviceCells& to, const DeviceBuffer<VertexSource>& sources,
-                        const float* values, int lanes, int64_t stride, float* out) {
+void MoveValuesOnDevice(const DeviceCells& from, const DeviceCells& to,
+                        const DeviceBuffer<VertexSource>& sources, const float* values,
+                        int lanes, int64_t stride, float* out) {
   MoveRows<<<BlocksFor(to.num_vertices() * lanes), kThreads>>>(
-      from.key.data(), from.level.data(), from.corner.data(), from.finest, to.vertex_key.data(), sources.data(),
-      to.num_vertices(), values, lanes, stride, out);
+      from.key.data(), from.level.data(), from.corner.data(), from.finest, to.vertex_key.data(),
+      sources.data(), to.num_vertices(), values, lanes, stride, out);
   CheckLaunch("move_rows");
 }
 
 #else
 
-DeviceCells ChangeCellsOnDevice(const DeviceCells&, const Vec3i&, const std::vector<CellChange>&,
-                                DeviceBuffer<VertexSource>*) {
+DeviceCells ChangeCellsOnDevice(const DeviceCells&, const Vec3i&,
+                                const std::vector<CellChange>&, DeviceBuffer<VertexSource>*) {
   DeviceWait("cells");
   return {};
 }
-void MoveValuesOnDevice(const DeviceCells&, const DeviceCells&, const DeviceBuffer<VertexSource>&, const float*, int,
-                        int64_t, float*) {
+void MoveValuesOnDevice(const DeviceCells&, const DeviceCells&,
+                        const DeviceBuffer<VertexSource>&, const float*, int, int64_t, float*) {
   DeviceWait("cells");
 }
 
