@@ -12,7 +12,7 @@
 #include "kernels/field/pad_sh_basis.h"
 #include "pipeline/fields/field_file.h"
 #include "pipeline/fields/fit_checkpoint.h"
-#include "pipeline/fields/restyled_field.h"
+#include "tests/support/restyled_field.h"
 #include "pipeline/fields/uniform_field.h"
 #include "pipeline/files/npz_file.h"
 #include "stylize/training/style_engine.h"

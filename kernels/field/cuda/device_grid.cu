@@ -27,9 +27,6 @@ DeviceGridView DeviceGrid::view() const {
 
 DeviceGrid UploadGrid(const FastGrid& grid, bool fitting, const Buffer<float>& second_moment,
                       bool exact_sums, const Buffer<float>& sphere_moment) {
-  if (grid.cells.on())
-    throw Error(ExitCode::kResources, "an adaptive field is processed on the CPU only", "",
-                "use --device cpu");
   DeviceGrid device;
   device.frame = grid.frame;
   device.basis = grid.basis;
