@@ -128,8 +128,8 @@ void ExportField(const ExportOptions& options, const std::string& folder, const 
 
 void ExportFields(const ExportOptions& options, const std::string& folder, Console* console) {
   if (!fs::exists(folder + "/field.npz"))
-    throw Error(ExitCode::kInput, "holds no reconstruction", folder,
-                "make one with `regrade run` or `regrade reconstruct`");
+    throw InputError("holds no reconstruction", folder,
+                     "make one with `regrade run` or `regrade reconstruct`");
   MakeEmptyFolder(options.out, "");
   for (const char* name : {"field.npz", "styled.npz"})
     if (fs::exists(folder + "/" + name)) ExportField(options, folder, name, console);

@@ -86,11 +86,11 @@ void ForEachVertex(const Vec3i& n, const Body& body) {
 
 void CheckMemory(double bytes, const Vec3i& n, uint64_t memory) {
   if (bytes <= static_cast<double>(memory)) return;
-  throw Error(ExitCode::kResources,
-              "a grid of " + std::to_string(n.x) + " x " + std::to_string(n.y) + " x " +
-                  std::to_string(n.z) + " takes " + std::to_string(std::llround(bytes * 1e-6)) +
-                  " MB, " + std::to_string(memory / 1000000) + " MB are free",
-              "", "lower --resolution; memory grows with its cube");
+  throw ResourceError("a grid of " + std::to_string(n.x) + " x " + std::to_string(n.y) + " x " +
+                          std::to_string(n.z) + " takes " +
+                          std::to_string(std::llround(bytes * 1e-6)) + " MB, " +
+                          std::to_string(memory / 1000000) + " MB are free",
+                      "", "lower --resolution; memory grows with its cube");
 }
 
 }  // namespace

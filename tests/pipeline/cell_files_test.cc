@@ -12,13 +12,13 @@
 #include "kernels/field/pad_sh_basis.h"
 #include "pipeline/fields/field_file.h"
 #include "pipeline/fields/fit_checkpoint.h"
-#include "tests/support/restyled_field.h"
 #include "pipeline/fields/uniform_field.h"
 #include "pipeline/files/npz_file.h"
 #include "stylize/training/style_engine.h"
 #include "stylize/training/training_targets.h"
 #include "tests/support/cell_field.h"
 #include "tests/support/expect_error.h"
+#include "tests/support/restyled_field.h"
 #include "tests/support/temporary_folder.h"
 
 namespace regrade {
@@ -26,6 +26,7 @@ namespace {
 
 using testing::RandomCellField;
 using testing::ReadText;
+using testing::RestyledField;
 using testing::TemporaryFolder;
 
 template <typename T>

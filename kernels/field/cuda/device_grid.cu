@@ -1,5 +1,4 @@
 // Upload and download of a grid, and the arrays derived from links and records.
-#include "kernels/base/error.h"
 #include "kernels/field/cuda/device_grid.h"
 #include "kernels/field/cuda/gradient_view.h"
 #include "kernels/field/cuda/launch.h"
