@@ -20,6 +20,7 @@ RenderedView FieldRenderer::Render(const Camera& camera) const {
 
 std::string FieldRenderer::PrepareFast() {
   if (backend_ == Backend::kCpu) return "the CPU has no fast renderer";
+  if (device_.cells.on()) return "the fast renderer needs a uniform field";
   try {
     half_ = MakeHalfGrid(device_);
   } catch (const Error& error) {

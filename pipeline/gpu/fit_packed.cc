@@ -83,7 +83,7 @@ void FitPacked(const FitPackedOptions& settings, const FitOptions& options) {
   if (hooks.keep_field) {
     WriteFieldFile(settings.field,
                    {fit.field, capture.scene.field_from_world, capture.scene.ndc});
-    if (backend == Backend::kCuda) {
+    if (backend == Backend::kCuda && !fit.field.geometry->cells.on()) {
       const DeviceGrid grid = UploadGrid(MakeFastGrid(fit.field));
       render = RenderCosts(grid, capture, options.step);
     }

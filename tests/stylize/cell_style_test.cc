@@ -7,6 +7,7 @@
 #include "stylize/field/blend_fields.h"
 #include "stylize/field/object_weights.h"
 #include "stylize/field/volume_variance.h"
+#include "tests/support/algorithm1.h"
 #include "tests/support/cell_field.h"
 #include "tests/support/record_error.h"
 #include "tests/support/styled_ball.h"
