@@ -1,0 +1,162 @@
+// Adaptive fits: convergence, refinement where photos ask for it, the same result for any number of threads and after a
+// resume.
+#include <gtest/gtest.h>
+#include <omp.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "kernels/base/error.h"
+#include "reconstruct/fit/fit_field.h"
+#include "reconstruct/fit/initial_cells.h"
+#include "reconstruct/fit/measure_cells.h"
+#include "tests/support/ball_views.h"
+#include "tests/support/record_error.h"
+
+namespace regrade {
+namespace {
+
+class CellFit : public testing::FitField {
+ protected:
+  void SetUp() override {
+    FitField::SetUp();
+    options_.field = "adaptive";
+    options_.resolutions = {6, 12, 24};
+    options_.steps = {50, 50, 60};
+    options_.tv_density = 1e-2f;
+    options_.tv_sh = 1e-3f;
+  }
+  static bool SameCells(const RadianceField& a, const RadianceField& b) {
+    return SameBits(a, b) && std::equal(a.geometry->cells.key.begin(), a.geometry->cells.key.end(),
+                                        b.geometry->cells.key.begin(), b.geometry->cells.key.end());
+  }
+};
+
+TEST_F(CellFit, ReproducesAHeldOutViewWithFineCellsAtTheSurface) {
+  const FitResult result = regrade::FitField(views_, box_, options_, {});
+  const CellGrid& cells = result.field.geometry->cells;
+  Validate(result.field, "fit");
+  RadianceField empty = result.field;
+  auto geometry = std::make_shared<Geometry>(*empty.geometry);
+  for (float& density : geometry->density) density = -1;
+  empty.geometry = geometry;
+  EXPECT_GT(HeldOutPsnr(result.field), HeldOutPsnr(empty) + 6.0);  // as the uniform fit
+  EXPECT_EQ(result.rejected_voxels, 0);
+  // The ball's surface is at a radius of 0.6: finest cells lie there, and none is as far out as the box's corners.
+  int64_t at_surface = 0, far_out = 0, finest = 0;
+  for (int64_t c = 0; c < cells.num_cells(); ++c) {
+    if (cells.level[c] < cells.finest) continue;
+    ++finest;
+    const Vec3i at = PlaceOf(cells.key[c]);
+    const double n = result.field.geometry->frame.resolution.x;
+    const double r = Norm(Vec3d{(2 * at.x + 1) / n - 1, (2 * at.y + 1) / n - 1, (2 * at.z + 1) / n - 1});
+    at_surface += r > 0.4 && r < 0.8;
+    far_out += r > 1.3;
+  }
+  EXPECT_GT(at_surface, 500);
+  EXPECT_LT(far_out, finest / 10);
+}
+
+TEST_F(CellFit, SameBytesForAnyThreadCount) {
+  const int before = omp_get_max_threads();
+  omp_set_num_threads(1);
+  const FitResult one = regrade::FitField(views_, box_, options_, {});
+  omp_set_num_threads(3);
+  const FitResult three = regrade::FitField(views_, box_, options_, {});
+  omp_set_num_threads(before);
+  EXPECT_TRUE(testing::RecordSameBits("1 and 3 threads", testing::Computed::kFloat, SameCells(one.field, three.field)));
+}
+
+TEST_F(CellFit, H110_AResumedFitIsTheUndisturbedOne) {
+  const FitResult straight = regrade::FitField(views_, box_, options_, {});
+  for (const int stop_after : {30, 50, 77, 130}) {
+    FitState saved;
+    int steps = 0;
+    FitHooks hooks;
+    hooks.checkpoint = [&](const FitState& state) { saved = state; };
+    hooks.progress = [&](const Progress&) {
+      return ++steps == stop_after ? LoopControl::kStop : LoopControl::kContinue;
+    };
+    EXPECT_THROW(regrade::FitField(views_, box_, options_, hooks), Interrupted);
+    FitHooks resumed;
+    resumed.resume = &saved;
+    const FitResult result = regrade::FitField(views_, box_, options_, resumed);
+    EXPECT_TRUE(SameCells(straight.field, result.field)) << stop_after;
+  }
+}
+
+TEST(ChooseChanges, H167_TheLimitOfCellsHoldsAndTheLargestErrorsAreSplit) {
+  constexpr int64_t kCells = 1000;
+  Buffer<uint8_t> level(kCells);
+  CellStatistics statistics{Buffer<float>(kCells), Buffer<float>(kCells), Buffer<uint64_t>(kCells)};
+  for (int64_t c = 0; c < kCells; ++c) {
+    statistics.weight[c] = c % 10 == 0 ? 0.0f : 0.5f;
+    statistics.pixels[c] = c % 2 == 0 ? 0.8f : 3.0f;
+    statistics.error[c] = static_cast<uint64_t>(c * 7919 % 1009 / 4);  // some are equal
+    level[c] = static_cast<uint8_t>(c % 3);
+  }
+  CellLimits limits{.least_weight = 0.1f, .least_pixels = 1, .deepest = 2, .most_cells = 1200};
+  const auto change = ChooseChanges(level, statistics, limits);
+  int64_t cells = 0, split = 0;
+  uint64_t least_split = ~uint64_t{0}, most_kept = 0;
+  for (int64_t c = 0; c < kCells; ++c) {
+    const CellChange what = change[static_cast<size_t>(c)];
+    EXPECT_EQ(what == CellChange::kRemove, c % 10 == 0);
+    const bool could = c % 10 != 0 && c % 2 == 1 && level[c] < 2;
+    if (what == CellChange::kSplit) {
+      EXPECT_TRUE(could);
+      ++split;
+      least_split = std::min(least_split, statistics.error[c]);
+    } else if (could) {
+      most_kept = std::max(most_kept, statistics.error[c]);
+    }
+    cells += what == CellChange::kRemove ? 0 : what == CellChange::kSplit ? 8 : 1;
+  }
+  EXPECT_LE(cells, 1200);
+  EXPECT_GT(cells, 1200 - 8);
+  EXPECT_GE(least_split, most_kept);
+  limits.most_cells = 0;
+  const auto unlimited = ChooseChanges(level, statistics, limits);
+  EXPECT_GT(std::count(unlimited.begin(), unlimited.end(), CellChange::kSplit), split);
+}
+
+// A pixel of a camera 2 units away with a focal length of 100 pixels is 0.02 units wide there.
+TEST(WidthInPixels, IsTheCellsWidthOverThePixels) {
+  const GridFrame frame{{100, 100, 100}, {0, 0, 0}, {1, 1, 1}};  // voxels of 0.02
+  const Ray ray{{0, 0, -2}, {0, 0, 1}};
+  const Ray beside{{0, 0, -2}, Normalized(Vec3f{0.02f, 0, 1})};
+  EXPECT_NEAR(WidthInPixels(frame, ray, beside, 2, 2, 4), 4, 0.01);
+}
+
+TEST(DensityRates, FallWhereFewPhotosSee) {
+  Camera camera;
+  camera.width = camera.height = 50;
+  camera.fx = camera.fy = 50;
+  camera.cx = camera.cy = 25;
+  const Image photo = [] {
+    Image image(50, 50, 3);
+    std::fill(image.pixels.begin(), image.pixels.end(), 0.5f);
+    return image;
+  }();
+  std::vector<TrainingView> views;
+  for (const double x : {-1.0, 0.0, 1.0}) {
+    camera.camera_from_world.translation = {x, 0, 3};
+    views.push_back({camera, &photo});
+  }
+  const TrainingRays rays(views);
+  const GridFrame frame{{16, 16, 16}, {0, 0, 0}, {1, 1, 1}};
+  const FastGrid grid = MakeInitialCells(rays, frame, 2, 1, 0.5f, 0, 1, false);
+  ASSERT_EQ(grid.density_rate.size(), grid.cells.num_vertices());
+  float least = 2, most = 0;
+  for (const float rate : grid.density_rate) {
+    least = std::min(least, rate);
+    most = std::max(most, rate);
+  }
+  EXPECT_FLOAT_EQ(most, 1);  // all three see the middle
+  EXPECT_LT(least, 0.7f);
+  EXPECT_GT(least, 0);
+}
+
+}  // namespace
+}  // namespace regrade

@@ -1,0 +1,93 @@
+// Twelve views of a coloured ball, for tests of fits.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <memory>
+#include <vector>
+
+#include "kernels/field/cpu/render_view.h"
+#include "kernels/field/render.h"
+#include "reconstruct/fit/fit_field.h"
+#include "tests/support/small_field.h"
+
+namespace regrade::testing {
+
+// Twelve views of a coloured ball in a grid field, rendered by the reference renderer.
+class FitField : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    RadianceField truth = RandomField({24, 24, 24}, 1, 1.0, 5);
+    auto geometry = std::make_shared<Geometry>(*truth.geometry);
+    geometry->frame.center = {0, 0, 0};
+    geometry->frame.radius = {1, 1, 1};
+    for (int64_t v = 0; v < geometry->links.size(); ++v) {
+      const Vec3f p =
+          geometry->frame.WorldOf({static_cast<float>(v / 576), static_cast<float>(v / 24 % 24),
+                                   static_cast<float>(v % 24)});
+      const float inside = 0.6f - Norm(p);
+      geometry->density[v] = inside > 0 ? 60.0f * inside : -1.0f;
+      for (int c = 0; c < 3; ++c)
+        truth.appearance.sh[3 * v + c] =
+            0.8f * std::sin(3.0f * p[c] + 2.0f * p[(c + 1) % 3] + static_cast<float>(c));
+    }
+    truth.geometry = geometry;
+    truth.background = {0.2f, 0.4f, 0.6f};
+    truth_ = truth;
+    for (int i = 0; i < 12; ++i) {
+      const double angle = 2 * M_PI * i / 12;
+      const Vec3d center{2.6 * std::cos(angle), 2.6 * std::sin(angle),
+                         0.7 * std::sin(2 * angle)};
+      Camera camera;
+      camera.width = camera.height = 48;
+      camera.fx = camera.fy = focal_;
+      camera.cx = camera.cy = 24;
+      const Vec3d forward = Normalized(-center);
+      const Vec3d right = Normalized(Cross(forward, Vec3d{0, 0, 1}));
+      const Vec3d down = Cross(forward, right);
+      camera.camera_from_world.rotation.row[0] = right;
+      camera.camera_from_world.rotation.row[1] = down;
+      camera.camera_from_world.rotation.row[2] = forward;
+      camera.camera_from_world.translation = -(camera.camera_from_world.rotation * center);
+      cameras_.push_back(camera);
+      photos_.push_back(RenderViewPlain(truth, camera, {0.5f, 1e-4f}).color);
+    }
+    for (size_t i = 1; i < cameras_.size(); ++i) views_.push_back({cameras_[i], &photos_[i]});
+    options_.resolutions = {12, 24};
+    options_.steps = {60, 60};
+    options_.rays_per_step = 1024;
+    options_.sh_degree = 1;
+    options_.shards = 3;
+    options_.step = 0.5f;
+  }
+
+  double HeldOutPsnr(const RadianceField& field) const {
+    const RenderedView view = RenderView(field, cameras_[0], {0.5f, 1e-4f});
+    double error = 0;
+    for (size_t i = 0; i < view.color.pixels.size(); ++i)
+      error += std::pow(view.color.pixels[i] - photos_[0].pixels[i], 2.0);
+    return -10 * std::log10(error / static_cast<double>(view.color.pixels.size()));
+  }
+
+  static bool SameBits(const RadianceField& a, const RadianceField& b) {
+    const auto same = [](const auto& x, const auto& y) {
+      return x.size() == y.size() &&
+             std::memcmp(x.data(), y.data(), sizeof(x[0]) * static_cast<size_t>(x.size())) == 0;
+    };
+    return same(a.geometry->links, b.geometry->links) &&
+           same(a.geometry->density, b.geometry->density) &&
+           same(a.appearance.sh, b.appearance.sh);
+  }
+
+  RadianceField truth_;
+  double focal_ = 60;  // pixels
+  std::vector<Camera> cameras_;
+  std::vector<Image> photos_;
+  std::vector<TrainingView> views_;
+  FitOptions options_;
+  SceneBox box_;
+};
+
+}  // namespace regrade::testing
