@@ -1,5 +1,5 @@
-// Adaptive fits: convergence, refinement where photos ask for it, the same result for any number of threads and after a
-// resume.
+// Adaptive fits: convergence, refinement where photos ask for it, the same result for any
+// number of threads and after a resume.
 #include <gtest/gtest.h>
 #include <omp.h>
 
@@ -28,8 +28,9 @@ class CellFit : public testing::FitField {
     options_.tv_sh = 1e-3f;
   }
   static bool SameCells(const RadianceField& a, const RadianceField& b) {
-    return SameBits(a, b) && std::equal(a.geometry->cells.key.begin(), a.geometry->cells.key.end(),
-                                        b.geometry->cells.key.begin(), b.geometry->cells.key.end());
+    return SameBits(a, b) &&
+           std::equal(a.geometry->cells.key.begin(), a.geometry->cells.key.end(),
+                      b.geometry->cells.key.begin(), b.geometry->cells.key.end());
   }
 };
 
@@ -43,14 +44,16 @@ TEST_F(CellFit, ReproducesAHeldOutViewWithFineCellsAtTheSurface) {
   empty.geometry = geometry;
   EXPECT_GT(HeldOutPsnr(result.field), HeldOutPsnr(empty) + 6.0);  // as the uniform fit
   EXPECT_EQ(result.rejected_voxels, 0);
-  // The ball's surface is at a radius of 0.6: finest cells lie there, and none is as far out as the box's corners.
+  // The ball's surface is at a radius of 0.6: finest cells lie there, and none is as far out as
+  // the box's corners.
   int64_t at_surface = 0, far_out = 0, finest = 0;
   for (int64_t c = 0; c < cells.num_cells(); ++c) {
     if (cells.level[c] < cells.finest) continue;
     ++finest;
     const Vec3i at = PlaceOf(cells.key[c]);
     const double n = result.field.geometry->frame.resolution.x;
-    const double r = Norm(Vec3d{(2 * at.x + 1) / n - 1, (2 * at.y + 1) / n - 1, (2 * at.z + 1) / n - 1});
+    const double r =
+        Norm(Vec3d{(2 * at.x + 1) / n - 1, (2 * at.y + 1) / n - 1, (2 * at.z + 1) / n - 1});
     at_surface += r > 0.4 && r < 0.8;
     far_out += r > 1.3;
   }
@@ -65,7 +68,8 @@ TEST_F(CellFit, SameBytesForAnyThreadCount) {
   omp_set_num_threads(3);
   const FitResult three = regrade::FitField(views_, box_, options_, {});
   omp_set_num_threads(before);
-  EXPECT_TRUE(testing::RecordSameBits("1 and 3 threads", testing::Computed::kFloat, SameCells(one.field, three.field)));
+  EXPECT_TRUE(testing::RecordSameBits("1 and 3 threads", testing::Computed::kFloat,
+                                      SameCells(one.field, three.field)));
 }
 
 TEST_F(CellFit, H110_AResumedFitIsTheUndisturbedOne) {
@@ -89,7 +93,8 @@ TEST_F(CellFit, H110_AResumedFitIsTheUndisturbedOne) {
 TEST(ChooseChanges, H167_TheLimitOfCellsHoldsAndTheLargestErrorsAreSplit) {
   constexpr int64_t kCells = 1000;
   Buffer<uint8_t> level(kCells);
-  CellStatistics statistics{Buffer<float>(kCells), Buffer<float>(kCells), Buffer<uint64_t>(kCells)};
+  CellStatistics statistics{Buffer<float>(kCells), Buffer<float>(kCells),
+                            Buffer<uint64_t>(kCells)};
   for (int64_t c = 0; c < kCells; ++c) {
     statistics.weight[c] = c % 10 == 0 ? 0.0f : 0.5f;
     statistics.pixels[c] = c % 2 == 0 ? 0.8f : 3.0f;
