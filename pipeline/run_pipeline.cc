@@ -1,8 +1,11 @@
 #include "pipeline/run_pipeline.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <iterator>
 
+#include "kernels/base/error.h"
+#include "pipeline/run/run_file.h"
 #include "pipeline/stages/stages.h"
 
 namespace regrade {
@@ -25,11 +28,11 @@ constexpr StageEntry kStages[] = {
     {"reconstruct", ReconstructStage},
     // photos + style picture -> views_2d/: each photo styled in 2D (stylize/image)
     {"style_2d", Style2dStage},
-    // field.npz + views_2d/ -> styled.npz: the field's colours mapped by a network of bounded
-    // Lipschitz constant (stylize/training); its loss is in
+    // field.npz + views_2d/ -> network.npz: a network of bounded Lipschitz constant that maps
+    // the field's colours (stylize/training); its loss is in
     // stylize/field/gradient_aggregation.h
     {"stylize", StylizeStage},
-    // field.npz + styled.npz -> frames/ (a ray in kernels/field/render_ray.h, the opacity of
+    // field.npz + network.npz -> frames/ (a ray in kernels/field/render_ray.h, the opacity of
     // its samples in kernels/field/volume_rendering.h), films (pipeline/images/video_writer.h)
     {"render", RenderStage},
     // frames/ -> consistency and fidelity metrics, heatmaps/ (evaluate)
@@ -46,23 +49,50 @@ const StageEntry* Find(const std::string& name) {
 
 }  // namespace
 
-void RunPipeline(const std::string& first, const std::string& last, RunContext* context) {
-  StageRunner runner(context->workspace, context->console);
+bool RunPipeline(const std::string& first, const std::string& last, RunContext* context) {
+  StageRunner runner(context->workspace, context->style, context->console);
   runner.SetDryRun(context->settings.start.dry_run);
-  runner.RestartFrom(context->settings.start.restart_from);
+  const StageEntry* const restart = Find(context->settings.start.restart_from);
+  if (restart <= Find(last)) runner.RestartFrom(std::max(restart, Find(first))->name);
   for (const StageEntry* before = std::begin(kStages); before != Find(first); ++before)
     runner.Require(before->name, "regrade run");
   for (const StageEntry* entry = Find(first); entry != std::end(kStages); ++entry) {
     // In a dry run the stages after an undone one have no inputs yet.
     if (!runner.Run(entry->make(context))) {
-      if (last == entry->name) return;
-      for (++entry; entry != std::end(kStages); ++entry) {
-        context->console->Info(std::string(entry->name) + ": would follow");
-        if (last == entry->name) break;
-      }
-      return;
+      for (; last != entry->name; ++entry)
+        context->console->Info(std::string(entry[1].name) + ": would follow");
+      return false;
     }
-    if (last == entry->name) return;
+    if (last == entry->name) break;
+  }
+  return true;
+}
+
+void RunStyles(const std::string& first, const std::vector<NamedStyle>& styles,
+               RunContext* context) {
+  const StyleSource given = context->settings.style;
+  for (size_t i = 0; i < styles.size(); ++i) {
+    const auto& [name, picture] = styles[i];
+    const std::string folder = StyleFolder(context->workspace->folder(), name);
+    if (styles.size() > 1)
+      context->console->Info(Concat("style ", i + 1, " of ", styles.size(), ": ", name));
+    if (context->settings.start.dry_run && !Workspace::Exists(folder)) {
+      context->console->Info(folder + " is new: every stage of a style would run");
+      continue;
+    }
+    Workspace workspace(folder, context->settings.start.break_lock);
+    context->style = &workspace;
+    context->settings.style.pictures = {picture};
+    context->settings.style.name = name;
+    // From its beginning on the folder belongs to this picture.
+    if (!std::filesystem::exists(workspace.Path("run.json"))) WriteRunFile("run", *context);
+    RunPipeline(first, "report", context);
+    if (!context->settings.start.dry_run) {
+      WriteRunFile("run", *context);
+      PublishStyle(context->workspace->folder(), name);
+    }
+    context->style = nullptr;
+    context->settings.style = given;
   }
 }
 

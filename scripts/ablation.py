@@ -68,7 +68,7 @@ def copy_reconstruction(source, target):
 
 
 def metrics_of(folder):
-    report = json.loads(read(folder, "report.json"))
+    report = json.loads(read(folder, "styles/style/report.json"))
     stylize, evaluate = report["stages"]["stylize"], report["stages"]["evaluate"]
     steady = {row["gap"]: row["tc_psnr_mean_db"] for row in report["consistency"] if row["sequence"] == "styled"}
     faith = next(row for row in report["fidelity"] if row["sequence"] == "styled")
@@ -189,7 +189,7 @@ def main():
             folder = os.path.join(options.work, f"{recipe} {name}".replace(" ", "_").replace(",", ""))
             if not os.path.exists(folder):
                 copy_reconstruction(options.folder, folder)
-            command = [options.regrade, "stylize", folder, "--recipe", recipe, "--path", "views", *extra]
+            command = [options.regrade, "stylize", folder, "--recipe", recipe, "--name", "style", "--path", "views", *extra]
             if options.style:
                 command += ["--style", options.style]
             if options.steps:

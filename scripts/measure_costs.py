@@ -68,7 +68,7 @@ def metrics_of(part, folder):
         record = stage(folder, "reconstruct")
         f = record["metrics"]
         return record["seconds"], [round(f["psnr_train_db"], 2), round(f["psnr_heldout_db"], 2), f["voxels"]]
-    report = json.loads(read(folder, "report.json"))
+    report = json.loads(read(folder, "styles/style/report.json"))
     s = report["stages"]["stylize"]
     near = next(f for f in report["fidelity"] if f["sequence"] == "styled")
     steady = {c["gap"]: c["tc_psnr_mean_db"] for c in report["consistency"] if c["sequence"] == "styled"}
@@ -85,10 +85,10 @@ def measure(part, arguments, base, parameter, value):
     if part == "style":
         shutil.copytree(base, row)
         # Frames at the photos' poses only: a film would cost time and adds no metric.
-        command = [arguments.regrade, "stylize", row, "--style", arguments.style, "--path", "views"]
+        command = [arguments.regrade, "stylize", row, "--style", arguments.style, "--name", "style", "--path", "views"]
     else:
         if part == "fit":
-            shutil.copytree(base, row, ignore=shutil.ignore_patterns("frames", "*.mp4", "views_2d", "field.npz"))
+            shutil.copytree(base, row, ignore=shutil.ignore_patterns("styles", "*.mp4", "field.npz"))
         command = [arguments.regrade, "pose" if part == "pose" else "reconstruct", arguments.photos, "--out", row,
                    "--preset", arguments.preset] + arguments.base_options
         if part == "fit":
@@ -112,8 +112,8 @@ def main():
     arguments.base_options = words[split + 1:]
     base, table = os.path.join(arguments.work, "base"), os.path.join(arguments.work, "rows.tsv")
     os.makedirs(arguments.work, exist_ok=True)
-    if not os.path.exists(os.path.join(base, "report.json")):
-        run([arguments.regrade, "run", arguments.photos, "--style", arguments.style, "--out", base, "--preset",
+    if not os.path.exists(os.path.join(base, "styles/style/report.json")):
+        run([arguments.regrade, "run", arguments.photos, "--style", arguments.style, "--name", "style", "--out", base, "--preset",
              arguments.preset] + arguments.base_options, base + ".log")
     done = set()
     if os.path.exists(table):

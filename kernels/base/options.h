@@ -11,7 +11,8 @@
 //     }
 //   };
 //
-// A member is bool, int, int64_t, uint64_t, float, double, std::string or std::vector<int>.
+// A member is bool, int, int64_t, uint64_t, float, double, std::string, std::vector<int> (one
+// flag, values separated by commas) or std::vector<std::string> (a flag for each value).
 #pragma once
 
 #include <limits>

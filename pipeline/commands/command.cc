@@ -13,6 +13,8 @@
 
 #include "kernels/base/error.h"
 #include "pipeline/run/resolve_settings.h"
+#include "pipeline/run/run_file.h"
+#include "pipeline/workspace/style_folders.h"
 #include "pipeline/workspace/workspace.h"
 
 namespace regrade {
@@ -73,13 +75,18 @@ std::optional<Prepared> Prepare(const Command& command, const Arguments& argumen
   const auto check_words = [&] {
     CheckWords(command, prepared.words, preparation.least_words, preparation.most_words);
   };
-  if (preparation.continues_run) {
+  if (preparation.continues_run || preparation.continues_style) {
     check_words();
     const std::string& folder = prepared.words[0];
     if (!Workspace::Exists(folder))
       throw InputError("no run has worked in this folder", folder,
                        "make one with `regrade run` or `regrade reconstruct`");
-    sources.run_json = folder + "/run.json";
+    ReadRunFile(folder + "/run.json");  // refuses folders of another schema
+    const std::string style =
+        preparation.continues_style
+            ? StyleFolder(folder, ChosenStyle(folder, options->Given("name").value_or("")))
+            : folder;
+    sources.run_json = style + "/run.json";
   }
   prepared.run_words = ResolveSettings(sources, options);
   if (prepared.words.empty() && options->Given("config")) prepared.words = prepared.run_words;

@@ -28,6 +28,8 @@ struct Preparation {
   // The first word is the folder of a run, and its run.json sets options: those named in
   // `taken`, or all.
   bool continues_run = false;
+  // The same with run.json of the style that --name chooses, or of the last one.
+  bool continues_style = false;
   std::vector<std::string> taken = {};
   std::string preset = "standard";  // where none is given
 };
@@ -57,7 +59,8 @@ void RequireValue(const std::string& value, const char* flag, const char* hint);
 std::string AbsolutePath(const std::string& path);
 
 void RunStages(const Command&, const Arguments&, Console*);  // run, pose, reconstruct
-void RunFolder(const Command&, const Arguments&, Console*);  // stylize, render
+void RunStylize(const Command&, const Arguments&, Console*);
+void RunRender(const Command&, const Arguments&, Console*);
 void RunEvaluate(const Command&, const Arguments&, Console*);
 void RunContactSheet(const Command&, const Arguments&, Console*);
 void RunMix(const Command&, const Arguments&, Console*);

@@ -1,4 +1,5 @@
-// regrade contact-sheet: one picture that compares 2D method, linear map and both recipes.
+// regrade contact-sheet: one picture that compares the styles of a folder, or, for style pictures,
+// 2D method, linear map and both recipes.
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -19,6 +20,8 @@
 #include "pipeline/stages/make_stylizer.h"
 #include "pipeline/stages/object_edit.h"
 #include "pipeline/stages/style_targets.h"
+#include "pipeline/stages/styled_field.h"
+#include "pipeline/workspace/style_folders.h"
 #include "pipeline/workspace/workspace.h"
 #include "stylize/field/blend_fields.h"
 #include "stylize/linear_map.h"
@@ -215,7 +218,7 @@ std::vector<Image> StyleRenders(RunContext* context, const Scene& scene,
 void AddStyle(RunContext* context, const Scene& scene, const SheetOptions& sheet,
               const std::string& picture, std::vector<SheetRow>* rows) {
   RunSettings& settings = context->settings;
-  settings.style.picture = picture;
+  settings.style.pictures = {picture};
   const std::string name = fs::path(picture).filename().string();
   context->console->BeginStage(name);
   const ProgressFunction progress = context->console->StageProgress();
@@ -262,6 +265,36 @@ void AddStyle(RunContext* context, const Scene& scene, const SheetOptions& sheet
   context->console->EndStage();
 }
 
+// A row for each shown view: the photo, and each style as it is in the folder.
+std::vector<SheetRow> RowsOfStyles(const Scene& scene, const std::string& folder,
+                                   const Arguments& names) {
+  std::vector<SheetRow> rows(scene.shown.size());
+  for (size_t k = 0; k < rows.size(); ++k)
+    rows[k].cells.push_back({scene.photos[static_cast<size_t>(scene.shown[k])], ""});
+  for (const std::string& name : names) {
+    const std::vector<Image> renders =
+        Shown(scene, ReadStyledField(folder, StyleFolder(folder, name)).field);
+    for (size_t k = 0; k < rows.size(); ++k) rows[k].cells.push_back({renders[k], ""});
+  }
+  return rows;
+}
+
+// The styles of the folder that `words` behind it name, all without any; empty for pictures.
+Arguments StylesAmong(const Arguments& words) {
+  const Arguments known = StyleNames(words[0]);
+  if (words.size() == 1) {
+    ChosenStyle(words[0], "");  // refuses a folder without styles
+    return known;
+  }
+  Arguments styles;
+  for (size_t i = 1; i < words.size(); ++i)
+    if (std::ranges::find(known, words[i]) != known.end()) styles.push_back(words[i]);
+  if (!styles.empty() && styles.size() + 1 != words.size())
+    throw UsageError("names of styles and pictures are mixed", "regrade contact-sheet",
+                     "name styles of the folder (" + Join(known, ", ") + "), or pictures");
+  return styles;
+}
+
 }  // namespace
 
 void RunContactSheet(const Command& command, const Arguments& arguments, Console* console) {
@@ -276,7 +309,7 @@ void RunContactSheet(const Command& command, const Arguments& arguments, Console
   options.Add("Program", &settings.program);
   constexpr size_t kMostStyles = 64;
   const auto prepared = Prepare(command, arguments,
-                                {.least_words = 2,
+                                {.least_words = 1,
                                  .most_words = 1 + kMostStyles,
                                  .continues_run = true,
                                  .taken = {"holdout", "masks", "mask-vote", "mask-edge"}},
@@ -284,28 +317,39 @@ void RunContactSheet(const Command& command, const Arguments& arguments, Console
   if (!prepared) return;
   const Arguments& words = prepared->words;
   const std::string& folder = words[0];
+  const Arguments styles = fs::exists(folder + "/field.npz") ? StylesAmong(words) : Arguments();
   if (!fs::exists(folder + "/field.npz"))
     throw InputError("holds no reconstruction", folder,
                      "make one with `regrade run` or `regrade reconstruct`");
   if (!sheet.dry_run) RequireValue(sheet.out, "--out", "name the PNG file to write");
-  for (size_t i = 1; i < words.size(); ++i) ReadStylePicture(words[i], nullptr);
+  if (styles.empty())
+    for (size_t i = 1; i < words.size(); ++i) ReadStylePicture(words[i], nullptr);
   ProbeMethod(&settings.style_2d);
   ProbeMasks(&settings.object);
 
   Workspace workspace(folder);
-  context.workspace = &workspace;
+  context.workspace = context.style = &workspace;
   settings.scene.photo_size = sheet.size;
   const Backend backend = ChooseBackend(sheet.device, false);  // before work begins
   Scene scene = ReadScene(workspace, sheet, settings);
   scene.backend = backend;
   const std::string plan =
-      Concat(words.size() - 1, " styles, ", scene.shown.size(), " views each, trained on ",
-             scene.training_views.size(), " photos at ", sheet.size, " pixels");
+      styles.empty()
+          ? Concat(words.size() - 1, " styles, ", scene.shown.size(), " views each, trained on ",
+                   scene.training_views.size(), " photos at ", sheet.size, " pixels")
+          : Concat(scene.shown.size(), " views of ", Join(styles, ", "));
   console->Info(plan);
   if (sheet.dry_run) return;
   std::vector<SheetRow> rows;
-  for (size_t i = 1; i < words.size(); ++i) AddStyle(&context, scene, sheet, words[i], &rows);
-  const Image picture = MakeContactSheet(kColumns, rows);
+  Arguments columns = kColumns;
+  if (!styles.empty()) {
+    columns = {"photo"};
+    columns.insert(columns.end(), styles.begin(), styles.end());
+    rows = RowsOfStyles(scene, folder, styles);
+  } else {
+    for (size_t i = 1; i < words.size(); ++i) AddStyle(&context, scene, sheet, words[i], &rows);
+  }
+  const Image picture = MakeContactSheet(columns, rows);
   WritePng8(sheet.out, picture);
   console->Info(Concat("wrote ", sheet.out, ", ", picture.width, "x", picture.height));
 }

@@ -1,43 +1,70 @@
 #include "pipeline/commands/continue_command.h"
 
-#include <filesystem>
-
 #include "kernels/base/error.h"
-#include "pipeline/images/image_file.h"
-#include "pipeline/run/run_file.h"
+#include "pipeline/commands/probe_styles.h"
 #include "pipeline/run_pipeline.h"
-#include "pipeline/stages/make_stylizer.h"
 
 namespace regrade {
+namespace {
 
-void ContinueRun(const Command& command, const Arguments& arguments, const std::string& first,
-                 Console* console) {
+// The stages from `first` on, of styles of the folder of a run.
+void Continue(const std::string& folder, const Prepared& prepared,
+              const std::vector<NamedStyle>& styles, const std::string& first,
+              RunContext* context) {
+  RunSettings& settings = context->settings;
+  if (!prepared.run_words.empty()) context->source = prepared.run_words[0];
+  settings.run.out = AbsolutePath(folder);
+  CheckTogether(settings);
+  Workspace workspace(folder, settings.start.break_lock);
+  context->workspace = &workspace;
+  context->console->OpenLog(workspace.Path(".regrade/log.txt"));
+  RunStyles(first, styles, context);
+}
+
+}  // namespace
+
+void ContinueStyle(const Command& command, const Arguments& arguments, const std::string& first,
+                   Console* console) {
   RunContext context;
   context.console = console;
   context.settings.Bind(&context.options);
-  const auto prepared = Prepare(command, arguments, {.continues_run = true}, &context.options);
+  const auto prepared = Prepare(command, arguments, {.continues_style = true}, &context.options);
   if (!prepared) return;
   const std::string& folder = prepared->words[0];
   RunSettings& settings = context.settings;
-  if (!prepared->run_words.empty()) context.source = prepared->run_words[0];
-  settings.run.out = AbsolutePath(folder);
-  RequireValue(settings.style.picture, "--style", "name the style picture");
-  settings.style.picture = AbsolutePath(settings.style.picture);
-  ReadStylePicture(settings.style.picture, nullptr);
-  ProbeMethod(&settings.style_2d);
-  ProbeMasks(&settings.object);
-  CheckTogether(settings);
-
-  Workspace workspace(folder, settings.start.break_lock);
-  context.workspace = &workspace;
-  console->OpenLog(workspace.Path(".regrade/log.txt"));
-  RunPipeline(first, "report", &context);
-  if (!settings.start.dry_run) WriteRunFile("run", context);
+  if (settings.style.pictures.size() > 1)
+    throw UsageError("continues one style", std::string("regrade ") + command.name,
+                     "name it with --name");
+  ProbeStyles(&settings);
+  const std::string given = context.options.Given("name").value_or("");
+  Continue(folder, *prepared, {{ChosenStyle(folder, given), settings.style.picture()}}, first,
+           &context);
 }
 
-void RunFolder(const Command& command, const Arguments& arguments, Console* console) {
-  const bool stylize = std::string(command.name) == "stylize";
-  ContinueRun(command, arguments, stylize ? "style_2d" : "render", console);
+// A style that has the name is made again; without pictures, those of the run are.
+void RunStylize(const Command& command, const Arguments& arguments, Console* console) {
+  constexpr size_t kMostStyles = 64;
+  RunContext context;
+  context.console = console;
+  context.settings.Bind(&context.options);
+  const auto prepared = Prepare(
+      command, arguments, {.most_words = 1 + kMostStyles, .continues_run = true},
+      &context.options);
+  if (!prepared) return;
+  const std::string& folder = prepared->words[0];
+  StyleSource& style = context.settings.style;
+  style.name = context.options.Given("name").value_or("");
+  // Further words are pictures, too: --style A.jpg B.jpg.
+  if (!context.options.Given("style") && prepared->words.size() > 1) style.pictures.clear();
+  style.pictures.insert(style.pictures.end(), prepared->words.begin() + 1,
+                        prepared->words.end());
+  ProbeStyles(&context.settings);
+  Continue(folder, *prepared, NameStyles(folder, style.pictures, style.name), "style_2d",
+           &context);
+}
+
+void RunRender(const Command& command, const Arguments& arguments, Console* console) {
+  ContinueStyle(command, arguments, "render", console);
 }
 
 }  // namespace regrade

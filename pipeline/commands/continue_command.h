@@ -7,9 +7,10 @@
 
 namespace regrade {
 
-// Opens the folder among `arguments`, takes the options of its run.json, overridden by flags,
-// and runs the stages from `first` to the report.
-void ContinueRun(const Command& command, const Arguments& arguments, const std::string& first,
-                 Console* console);
+// Opens the folder among `arguments` and runs the stages from `first` to the report, of one
+// style of the folder: --name, or the last one that was finished. Takes the options of the
+// style's run.json, overridden by flags.
+void ContinueStyle(const Command& command, const Arguments& arguments, const std::string& first,
+                   Console* console);
 
 }  // namespace regrade

@@ -132,7 +132,7 @@ void RunEvaluate(const Command& command, const Arguments& arguments, Console* co
     return word == "--frames" || word.starts_with("--frames=");
   });
   if (!has_frames && !AsksForHelp(arguments))
-    return ContinueRun(command, arguments, "evaluate", console);
+    return ContinueStyle(command, arguments, "evaluate", console);
   if (!Prepare(command, arguments, {.least_words = 0, .most_words = 0}, &options)) return;
   EvaluateFrames(frames, consistency, console);
 }

@@ -18,7 +18,9 @@
 #include "pipeline/program/device_choice.h"
 #include "pipeline/run/run_settings.h"
 #include "pipeline/stages/object_edit.h"
+#include "pipeline/stages/styled_field.h"
 #include "pipeline/workspace/output_names.h"
+#include "pipeline/workspace/style_folders.h"
 #include "pipeline/workspace/workspace.h"
 #include "stylize/field/blend_fields.h"
 
@@ -53,9 +55,12 @@ struct MixOptions {
   }
 };
 
-std::string StyleFile(const std::string& word) {
-  std::error_code error;
-  return fs::is_directory(word, error) ? word + "/styled.npz" : word;
+bool IsFieldFile(const std::string& word) { return word.ends_with(".npz"); }
+
+// A style of the folder by its name, or a field's file. Throws Error(kInput).
+StoredField ReadStyle(const std::string& folder, const std::string& word) {
+  return IsFieldFile(word) ? ReadFieldFile(word)
+                           : ReadStyledField(folder, StyleFolder(folder, word));
 }
 
 void MakeMixFolder(const fs::path& out) {
@@ -131,24 +136,28 @@ void RunMix(const Command& command, const Arguments& arguments, Console* console
   options.Add("Scene", &scene);
   options.Add("Render", &render);
   options.Add("Program", &program);
-  constexpr size_t kMostStyles = 16;
+  constexpr size_t kMostWords = 17;  // the folder and 16 styles
   const auto prepared = Prepare(command, arguments,
-                                {.most_words = kMostStyles,
+                                {.most_words = kMostWords,
                                  .continues_run = true,
                                  .taken = {"photo-size", "fps", "path", "path-frames"}},
                                 &options);
   if (!prepared) return;
   const Arguments& words = prepared->words;
   const std::string& folder = words[0];
-  const MixKeys keys = ParseMixKeys(settings.mix, static_cast<int>(words.size()));
+  Arguments chosen;  // names of styles, or files
+  for (size_t i = 1; i < words.size(); ++i)
+    chosen.push_back(IsFieldFile(words[i]) ? words[i] : ChosenStyle(folder, words[i]));
+  if (chosen.empty()) chosen.push_back(ChosenStyle(folder, ""));
+  const MixKeys keys = ParseMixKeys(settings.mix, static_cast<int>(chosen.size()));
   if (!settings.dry_run) RequireValue(settings.out, "--out", "name the folder to write");
   ChooseBackend(settings.device, false);
-  for (const std::string& word : words)
-    if (!fs::is_regular_file(StyleFile(word)))
-      throw InputError(
-          "there is no styled field", StyleFile(word),
-          "make it with `regrade stylize`, and copy styled.npz before making the next "
-          "style");
+  for (const std::string& style : chosen) {
+    const std::string file =
+        IsFieldFile(style) ? style : StyleFolder(folder, style) + "/network.npz";
+    if (!fs::is_regular_file(file))
+      throw InputError("there is no such style", file, "make it with `regrade stylize`");
+  }
 
   StoredField stored = ReadFieldFile(folder + "/field.npz");
   const Backend backend = ChooseBackend(settings.device, false);
@@ -157,18 +166,18 @@ void RunMix(const Command& command, const Arguments& arguments, Console* console
     console->Info(Concat(cameras.film.size(), " frames of ", cameras.film[0].width, "x",
                          cameras.film[0].height, " along ", render.path.path, ", ",
                          keys.points.size(), (keys.points.size() == 1 ? " point" : " points"),
-                         " of ", words.size(), (words.size() == 1 ? " style" : " styles")));
+                         " of ", chosen.size(), (chosen.size() == 1 ? " style" : " styles")));
     return;
   }
   std::vector<StoredField> styles;
   std::vector<const RadianceField*> fields;
   int basis = stored.field.appearance.basis;
-  for (const std::string& word : words) {
-    styles.push_back(ReadFieldFile(StyleFile(word)));
+  for (const std::string& style : chosen) {
+    styles.push_back(ReadStyle(folder, style));
     RadianceField& field = styles.back().field;
     if (!SameGeometry(*field.geometry, *stored.field.geometry))
       throw InputError(
-          "is a style of another reconstruction", StyleFile(word),
+          "is a style of another reconstruction", style,
           "mixed styles must restyle the same field: make them with `regrade stylize " +
               folder + "`");
     field.geometry = stored.field.geometry;
@@ -182,9 +191,14 @@ void RunMix(const Command& command, const Arguments& arguments, Console* console
 
   std::optional<ObjectWeights> object;
   if (settings.object) {
-    const std::string file = folder + "/object.npz";
-    if (!fs::exists(file))
-      throw InputError("there is no object", file,
+    // That of the first style that has one.
+    std::string file;
+    for (const std::string& style : chosen)
+      if (const std::string found = StyleFolder(folder, style) + "/object.npz";
+          file.empty() && !IsFieldFile(style) && fs::exists(found))
+        file = found;
+    if (file.empty())
+      throw InputError("none of the styles has an object", folder,
                        "make it with `regrade stylize " + folder + " --masks FOLDER`");
     object = ReadObjectFile(file, stored.field.geometry->num_voxels());
   }
@@ -192,7 +206,7 @@ void RunMix(const Command& command, const Arguments& arguments, Console* console
 
   MakeMixFolder(settings.out);
   JsonValue record = JsonValue::Object{{"field", folder}, {"options", options.Values()}};
-  for (const std::string& word : words) record["styles"].Append(StyleFile(word));
+  for (const std::string& style : chosen) record["styles"].Append(style);
   WriteJsonFile(settings.out + "/mix.json", record);
   WriteMix(settings.out, stored.field, fields, keys, object_weights, cameras, render.fps,
            backend, console);

@@ -56,7 +56,7 @@ void RunPack(const Command& command, const Arguments& arguments, Console* consol
   for (const EffectReport& effect : profile.effects) console->Info(EffectLine(effect));
   for (const std::string& notice : profile.notices) console->Info(notice);
   PackedCapture packed;
-  if (!style.picture.empty()) packed.style = SmallPicture(style.picture);
+  if (!style.pictures.empty()) packed.style = SmallPicture(style.picture());
   packed.scene = profile.scene;
   const WorkingViews views = as_taken.WithGains(profile.gains)
                                  .InField(packed.scene.field_from_world, packed.scene.ndc);

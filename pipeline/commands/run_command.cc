@@ -6,12 +6,11 @@
 #include "kernels/base/error.h"
 #include "pipeline/capture/capture_store.h"
 #include "pipeline/commands/command.h"
-#include "pipeline/images/image_file.h"
+#include "pipeline/commands/probe_styles.h"
 #include "pipeline/program/device_choice.h"
 #include "pipeline/run/plan.h"
 #include "pipeline/run/run_file.h"
 #include "pipeline/run_pipeline.h"
-#include "pipeline/stages/make_stylizer.h"
 #include "pipeline/stages/network_probe.h"
 #include "pipeline/stages/stages.h"
 #include "pipeline/workspace/stage_record.h"
@@ -20,7 +19,7 @@ namespace regrade {
 namespace {
 
 // Checks all inputs before long work starts.
-void ProbeInputs(const std::string& last, RunContext* context) {
+void ProbeInputs(const std::string& command, RunContext* context) {
   if (!std::filesystem::exists(context->source))
     throw InputError("there is no such folder", context->source, "name a folder of photos");
   const std::filesystem::path out =
@@ -35,21 +34,18 @@ void ProbeInputs(const std::string& last, RunContext* context) {
     HashFolder(masks);
     masks = AbsolutePath(masks);
   }
-  if (last == "pose" || last == "reconstruct") return;
-  RequireValue(context->settings.style.picture, "--style", "name the style picture");
-  ReadStylePicture(context->settings.style.picture, nullptr);
-  ProbeMethod(&context->settings.style_2d);
-  ProbeMasks(&context->settings.object);
+  if (command != "run") return;
+  ProbeStyles(&context->settings);
   ProbeEvaluationNetworks(context->settings.consistency);
 }
 
 // The plan of a dry run for a new folder: photos are assumed to be 4:3, the scene's box a cube.
-void PrintPlan(const std::string& last, RunContext* context) {
+void PrintPlan(const std::string& command, RunContext* context) {
   const RunSettings& settings = context->settings;
   const Stage pose = PoseStage(context);
   context->console->Info(settings.run.out + " is new: every stage would run, from " +
                          pose.plan);
-  if (last == "pose") return;
+  if (command == "pose") return;
   const int threads = omp_get_max_threads();
   const int64_t photos = static_cast<int64_t>(pose.inputs.At("photos").AsObject().size());
   const int64_t side = settings.scene.photo_size;
@@ -58,7 +54,7 @@ void PrintPlan(const std::string& last, RunContext* context) {
       PlanText(ChooseBackend(settings.run.device, settings.run.reproducible) == Backend::kCuda
                    ? PlanFitOnDevice(settings.fit, photos * side * side * 3 / 4, SceneBox())
                    : PlanFit(settings.fit, photos * side * side * 3 / 4, SceneBox(), threads)));
-  if (last == "reconstruct") return;
+  if (command == "reconstruct") return;
   context->console->Info("stylize: " + PlanText(PlanStyle(settings.network.steps, threads)));
 }
 
@@ -66,7 +62,6 @@ void PrintPlan(const std::string& last, RunContext* context) {
 
 void RunStages(const Command& command, const Arguments& arguments, Console* console) {
   const std::string name = command.name;
-  const std::string last = name == "run" ? "report" : name;
   RunContext context;
   context.console = console;
   context.settings.Bind(&context.options);
@@ -77,13 +72,14 @@ void RunStages(const Command& command, const Arguments& arguments, Console* cons
   CheckTogether(settings);
   ChooseBackend(settings.run.device, settings.run.reproducible);
   context.source = AbsolutePath(prepared->words[0]);
-  if (!settings.style.picture.empty())
-    settings.style.picture = AbsolutePath(settings.style.picture);
   settings.run.out = AbsolutePath(settings.run.out);
-  ProbeInputs(last, &context);
+  ProbeInputs(name, &context);
+  const std::vector<NamedStyle> styles =
+      name == "run" ? NameStyles(settings.run.out, settings.style.pictures, settings.style.name)
+                    : std::vector<NamedStyle>();
 
   if (settings.start.dry_run && !Workspace::Exists(settings.run.out)) {
-    PrintPlan(last, &context);
+    PrintPlan(name, &context);
     return;
   }
   Workspace workspace(settings.run.out, settings.start.break_lock);
@@ -92,8 +88,12 @@ void RunStages(const Command& command, const Arguments& arguments, Console* cons
   // Later commands take their options from it, also after an interruption.
   const bool first_start = !std::filesystem::exists(workspace.Path("run.json"));
   if (first_start && !settings.start.dry_run) WriteRunFile(name, context);
-  RunPipeline("pose", last, &context);
+  const bool done = RunPipeline("pose", name == "pose" ? "pose" : "reconstruct", &context);
   if (!settings.start.dry_run) WriteRunFile(name, context);
+  if (done)
+    RunStyles("style_2d", styles, &context);
+  else
+    for (const NamedStyle& style : styles) console->Info("style " + style.name + ": would follow");
 }
 
 }  // namespace regrade

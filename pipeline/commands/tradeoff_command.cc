@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <optional>
 
 #include "kernels/base/clock.h"
 #include "kernels/base/error.h"
@@ -25,6 +26,7 @@
 #include "pipeline/tradeoff/prediction.h"
 #include "pipeline/tradeoff/variant_runner.h"
 #include "pipeline/workspace/metrics_json.h"
+#include "pipeline/workspace/style_folders.h"
 
 namespace regrade {
 namespace {
@@ -115,10 +117,12 @@ std::string BaseName(const RunSettings& settings, const OptionSet& options,
   return name;
 }
 
-std::string Fingerprint(const RunContext& base, const Workspace& workspace) {
+std::string Fingerprint(const RunContext& base) {
   std::string all = Concat(REGRADE_VERSION, FastRays().name, omp_get_max_threads());
   for (const char* stage : {"pose", "reconstruct", "style_2d"})
-    if (const auto record = workspace.Find(stage))
+    if (!IsOfScene(stage) && base.style == nullptr)
+      continue;
+    else if (const auto record = base.FolderOf(stage).Find(stage))
       all += HashText(HashOf(DumpJson(record->inputs, -1)));
   const JsonValue values = base.options.Values();
   for (const auto& [name, value] : values.AsObject())
@@ -137,7 +141,7 @@ void WriteResults(const RunContext& base, const TradeoffOptions& tradeoff,
   for (const CostRow& row : rows) costs.push_back(MetricsToJson(row));
   for (const Measurement& m : store.all()) measured.push_back(ToJson(m));
   const std::vector<CostTerm> terms =
-      LearnCosts(base.settings, capture, *base.workspace, variants, store.all());
+      LearnCosts(base, capture, variants, store.all());
   WriteJsonFile(folder + "/tradeoff.json",
                 JsonValue::Object{{"schema", kTradeoffSchema},
                                   {"regrade", REGRADE_VERSION},
@@ -214,13 +218,15 @@ void PrintPrediction(const TradeoffOptions& tradeoff, Console* console) {
   RequireValue(tradeoff.costs, "--costs", "name a tradeoff.json from `regrade tradeoff`");
   const std::vector<CostTerm> costs =
       CostsFromJson(ReadJsonFile(tradeoff.costs), tradeoff.costs);
-  if (!Workspace::Exists(tradeoff.predict))
-    throw InputError("this is not the folder of a run", tradeoff.predict,
+  const std::string& folder = tradeoff.predict;
+  if (!Workspace::Exists(folder))
+    throw InputError("this is not the folder of a run", folder,
                      "make one with `regrade run`");
   RunContext run;
   run.settings.Bind(&run.options);
-  ResolveSettings({.run_json = tradeoff.predict + "/run.json"}, &run.options);
-  Workspace workspace(tradeoff.predict);
+  const std::string style = StyleFolder(folder, ChosenStyle(folder, ""));
+  ResolveSettings({.run_json = style + "/run.json"}, &run.options);
+  Workspace workspace(folder), of_style(style);
   const Capture capture = ReadCapture(workspace.Path("poses"));
   console->Lines(Format("%-12s %12s %12s %7s %12s %12s %7s", "stage", "predicted s", "took s",
                         "ratio", "predicted", "CPU s", "ratio"));
@@ -240,7 +246,8 @@ void PrintPrediction(const TradeoffOptions& tradeoff, Console* console) {
                                      {"cpu_seconds", measured.cpu_seconds}});
   };
   for (const StageTime& predicted : Predict(costs, run.settings, capture)) {
-    const auto record = workspace.Find(predicted.stage);
+    const auto record =
+        (IsOfScene(predicted.stage) ? workspace : of_style).Find(predicted.stage);
     if (!record) continue;
     const StageTime measured{predicted.stage, record->seconds, record->cpu_seconds.value_or(0)};
     print(predicted, measured);
@@ -277,10 +284,12 @@ void RunTradeoff(const Command& command, const Arguments& arguments, Console* co
   CheckTogether(settings);
   base.source = AbsolutePath(words[0]);
   const CaptureSource source = DetectCapture(base.source);
-  const bool style = !settings.style.picture.empty();
+  const bool style = !settings.style.pictures.empty();
   if (style) {
-    settings.style.picture = AbsolutePath(settings.style.picture);
-    ReadStylePicture(settings.style.picture, nullptr);
+    if (settings.style.pictures.size() > 1)
+      throw UsageError("costs are measured with one picture", "--style", "give one");
+    settings.style.pictures[0] = AbsolutePath(settings.style.picture());
+    ReadStylePicture(settings.style.picture(), nullptr);
     ProbeMethod(&settings.style_2d);
   }
   ParameterChoice choice{Words(tradeoff.parameters),
@@ -306,9 +315,20 @@ void RunTradeoff(const Command& command, const Arguments& arguments, Console* co
   Workspace workspace(settings.run.out, settings.start.break_lock);
   base.workspace = &workspace;
   console->OpenLog(workspace.Path(".regrade/log.txt"));
-  RunPipeline("pose", style ? "evaluate" : "reconstruct", &base);
+  RunPipeline("pose", "reconstruct", &base);
   WriteRunFile("run", base);
-  MeasurementStore store(folder + "/measurements.json", Fingerprint(base, workspace));
+  std::optional<Workspace> of_style;
+  if (style) {
+    const NamedStyle named =
+        NameStyles(settings.run.out, settings.style.pictures, settings.style.name)[0];
+    settings.style.name = named.name;
+    of_style.emplace(StyleFolder(settings.run.out, named.name));
+    base.style = &*of_style;
+    WriteRunFile("run", base);
+    RunPipeline("style_2d", "evaluate", &base);
+    WriteRunFile("run", base);
+  }
+  MeasurementStore store(folder + "/measurements.json", Fingerprint(base));
   MeasureAll(&base, tradeoff, folder, variants, begin, &store);
   WriteResults(base, tradeoff, folder, variants, store, base_name);
 }

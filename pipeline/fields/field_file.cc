@@ -18,6 +18,10 @@ constexpr int32_t kUniformVersion = 1, kCellsVersion = 2;
 constexpr int kStoredBasis = 9;
 constexpr int64_t kSphericalHarmonics = 1;  // svox2's basis_type
 
+uint16_t StoredColour(float value) {
+  return HalfFromFloat(std::clamp(value, -kMaxHalf, kMaxHalf));
+}
+
 // Colours of voxels [first, first + voxels) in half precision, 27 values each.
 void PackColours(const Appearance& appearance, int64_t first, int64_t voxels, uint16_t* to) {
   std::fill_n(to, voxels * 3 * kStoredBasis, uint16_t{0});
@@ -25,9 +29,8 @@ void PackColours(const Appearance& appearance, int64_t first, int64_t voxels, ui
   for (int64_t i = 0; i < voxels; ++i)
     for (int channel = 0; channel < 3; ++channel)
       for (int k = 0; k < appearance.basis; ++k)
-        to[(i * 3 + channel) * kStoredBasis + k] = HalfFromFloat(
-            std::clamp(appearance.sh[((first + i) * 3 + channel) * appearance.basis + k],
-                       -kMaxHalf, kMaxHalf));
+        to[(i * 3 + channel) * kStoredBasis + k] =
+            StoredColour(appearance.sh[((first + i) * 3 + channel) * appearance.basis + k]);
 }
 
 float ValueAt(const NpzArray& array, int64_t i) {
@@ -240,6 +243,13 @@ void WriteFieldFile(const std::string& path, const StoredField& stored) {
   std::vector<float> texels;  // read by the writer in WriteTo
   AddSpheres(field, &texels, &file);
   file.WriteTo(path);
+}
+
+void RoundAsStored(Appearance* appearance) {
+  const int64_t n = appearance->sh.size();
+#pragma omp parallel for schedule(static)
+  for (int64_t i = 0; i < n; ++i)
+    appearance->sh[i] = FloatFromHalf(StoredColour(appearance->sh[i]));
 }
 
 StoredField ReadFieldFile(const std::string& path, uint64_t budget) {

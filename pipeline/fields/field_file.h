@@ -39,6 +39,9 @@ struct StoredField {
 // Throws Error(kResources).
 void WriteFieldFile(const std::string& path, const StoredField& stored);
 
+// Rounds colours as a file stores them.
+void RoundAsStored(Appearance* appearance);
+
 // Reads our files and svox2's (with its older key `data` and links below -1, too). A field of
 // svox2 gets a white background, svox2's default: its file has no entry for it. Throws
 // Error(kInput) for files that are damaged, larger than `budget` bytes, from a newer version of

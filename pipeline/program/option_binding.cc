@@ -171,7 +171,8 @@ std::vector<std::string> OptionSet::Parse(const std::vector<std::string>& argume
     Flag flag{option.string_key, option.value.empty() ? "true" : option.value[0]};
     if (option.value.empty() && Find(flag.name) == nullptr)
       flag = {flag.name.substr(std::strlen("no-")), "false"};
-    if (Given(flag.name)) throw UsageError("given twice", "--" + flag.name, "keep one of them");
+    if (Given(flag.name) && !IsTextList(*Find(flag.name)))
+      throw UsageError("given twice", "--" + flag.name, "keep one of them");
     flags_.push_back(flag);
   }
   if (flags_end != arguments.end()) rest.insert(rest.end(), flags_end + 1, arguments.end());
@@ -198,6 +199,8 @@ void OptionSet::Assign(const Entry& entry, const std::string& text, const std::s
           for (const std::string& part : Split(text, ','))
             values.push_back(ParseNumber<int>(part, info, where));
           *target = values;
+        } else if constexpr (std::is_same_v<T, std::vector<std::string>>) {
+          target->push_back(text);
         } else {
           *target = ParseNumber<T>(text, info, where);
         }
@@ -219,11 +222,24 @@ void OptionSet::ApplyConfig(const JsonValue& values, const std::string& where) {
     }
     if (value.IsObject() || value.IsNull())
       throw UsageError("a value expected for \"" + name + "\"", place(value));
-    Assign(*entry, FlagText(value), place(value) + ": " + name);
+    const std::string where_of = place(value) + ": " + name;
+    if (!IsTextList(*entry)) {
+      Assign(*entry, FlagText(value), where_of);
+      continue;
+    }
+    std::get<std::vector<std::string>*>(entry->target)->clear();
+    if (!value.IsArray()) throw UsageError("an array of texts expected", where_of);
+    for (const JsonValue& element : value.AsArray()) {
+      if (!element.IsString()) throw UsageError("a text expected", where_of);
+      Assign(*entry, element.AsString(), where_of);
+    }
   }
 }
 
 void OptionSet::ApplyFlags() {
+  for (const Flag& flag : flags_)
+    if (const Entry* entry = Find(flag.name); IsTextList(*entry))
+      std::get<std::vector<std::string>*>(entry->target)->clear();
   for (const Flag& flag : flags_) Assign(*Find(flag.name), flag.value, "--" + flag.name);
 }
 
@@ -234,6 +250,10 @@ JsonValue OptionSet::ValueOf(const Entry& entry) {
         if constexpr (std::is_same_v<T, std::vector<int>>) {
           JsonValue::Array array;
           for (const int value : *target) array.emplace_back(value);
+          return array;
+        } else if constexpr (std::is_same_v<T, std::vector<std::string>>) {
+          JsonValue::Array array;
+          for (const std::string& value : *target) array.emplace_back(value);
           return array;
         } else if constexpr (std::is_same_v<T, float>) {
           // The double nearest to the float's shortest text: 0.1, not 0.10000000149.
@@ -260,7 +280,8 @@ std::string OptionSet::Help() const {
     if (entry.heading != heading || text.empty()) text += "\n" + entry.heading + ":\n";
     heading = entry.heading;
     const bool is_switch = std::holds_alternative<bool*>(entry.target);
-    const bool is_text = std::holds_alternative<std::string*>(entry.target);
+    const bool is_text =
+        std::holds_alternative<std::string*>(entry.target) || IsTextList(entry);
     std::string head = "  --" + entry.name;
     if (!is_switch)
       head += " " + std::string(*entry.info.choices ? entry.info.choices

@@ -26,10 +26,10 @@ class OptionSet {
   // Reads flags without changing the structs; returns the words that are no flags. Forms:
   // "--name value", "--name=value"; for switches "--name" and "--no-name"; "--" ends flags.
   // Throws Error(kUsage) for unknown names (with the nearest known one), a missing value, and a
-  // flag given twice.
+  // flag given twice, unless it is a list of texts.
   std::vector<std::string> Parse(const std::vector<std::string>& arguments);
 
-  // The value of --name on the command line.
+  // The value of --name on the command line, the first of several.
   std::optional<std::string> Given(const std::string& name) const;
 
   // Writes the values of a JSON object {"name": value, ...} into the structs. Throws
@@ -47,7 +47,7 @@ class OptionSet {
 
  private:
   using Target = std::variant<bool*, int*, int64_t*, uint64_t*, float*, double*, std::string*,
-                              std::vector<int>*>;
+                              std::vector<int>*, std::vector<std::string>*>;
   struct Entry {
     std::string heading, name;
     Target target;
@@ -69,6 +69,9 @@ class OptionSet {
   const Entry* Find(const std::string& name) const;
   std::vector<std::string> Names() const;
   static void Assign(const Entry& entry, const std::string& text, const std::string& where);
+  static bool IsTextList(const Entry& entry) {
+    return std::holds_alternative<std::vector<std::string>*>(entry.target);
+  }
   static JsonValue ValueOf(const Entry& entry);
 
   std::vector<Entry> entries_;

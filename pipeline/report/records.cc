@@ -1,6 +1,7 @@
 #include "pipeline/report/records.h"
 
 #include "pipeline/workspace/metrics_json.h"
+#include "pipeline/workspace/stage_runner.h"
 
 namespace regrade {
 namespace {
@@ -89,9 +90,10 @@ EvaluationMetrics MetricsOf(const ConsistencyReport& consistency,
   return metrics;
 }
 
-RunReport ReportFromRecords(const Workspace& workspace) {
+RunReport ReportFromRecords(const Workspace& scene, const Workspace& style) {
   RunReport report;
   report.stages.ForEach([&](const char* name, auto& stage) {
+    const Workspace& workspace = IsOfScene(name) ? scene : style;
     const auto record = workspace.Find(name);
     if (!record) return;
     using Metrics = typename std::remove_reference_t<decltype(stage)>::value_type;

@@ -14,10 +14,11 @@ EvaluationMetrics MetricsOf(const ConsistencyReport& consistency,
                             const std::vector<FidelityRow>& fidelity,
                             const std::vector<HeatMapFile>& heat_maps = {});
 
-// Everything that the finished stages of a folder have measured. The caller adds options,
+// Everything that the finished stages of a scene and of a style have measured, each recorded in
+// its folder (see StageRunner). The caller adds options,
 // command and times of this start.
 //
 // Throws Error(kInput), which names the record and the key, where a metric is missing.
-RunReport ReportFromRecords(const Workspace& workspace);
+RunReport ReportFromRecords(const Workspace& scene, const Workspace& style);
 
 }  // namespace regrade

@@ -234,6 +234,7 @@ struct RenderReport {
   int frames = 0;
   int path_frames = 0;  // of these, along the film's camera path
   FilmSize film;
+  double strength = 1;  // of the style, see EQ(style-mix)
   std::string film_renderer;  // which renderer made the film, and why if it is the exact one
   Metric frames_per_second;
   SeenByFewMetrics seen_by_few;
@@ -244,6 +245,7 @@ struct RenderReport {
     visit("frames", frames, {.label = "frames"});
     visit("path_frames", path_frames);
     visit("film", film);
+    visit("strength", strength, {.label = "strength of the style"});
     visit("film_renderer", film_renderer, {.label = "renderer of the film", .optional = true});
     visit("frames_per_second", frames_per_second, {.label = "speed", .unit = "frames/s"});
     visit("seen_by_few", seen_by_few);

@@ -8,6 +8,11 @@ void AddFlag(const std::string& name, const JsonValue& value, std::vector<std::s
     words->push_back((value.AsBool() ? "--" : "--no-") + name);
     return;
   }
+  if (value.IsArray() && !value.AsArray().empty() && value.AsArray()[0].IsString()) {
+    for (const JsonValue& element : value.AsArray())
+      words->insert(words->end(), {"--" + name, element.AsString()});
+    return;
+  }
   std::string text;
   if (value.IsString()) {
     text = value.AsString();

@@ -6,6 +6,7 @@
 #include "pipeline/capture/working_views.h"
 #include "pipeline/program/console.h"
 #include "pipeline/run/run_settings.h"
+#include "pipeline/workspace/stage_runner.h"
 #include "pipeline/workspace/workspace.h"
 
 namespace regrade {
@@ -14,7 +15,8 @@ struct RunContext {
   RunSettings settings;
   OptionSet options;   // bound to `settings`
   std::string source;  // PHOTOS or CAPTURE, absolute; empty where a command takes none
-  Workspace* workspace = nullptr;
+  Workspace* workspace = nullptr;  // of the scene
+  Workspace* style = nullptr;      // of the style that is being made: styles/NAME
   Console* console = nullptr;
 
   // Of the finished stage "pose", with the gains of "reconstruct"; cameras in the capture's
@@ -23,9 +25,13 @@ struct RunContext {
     return ReadWorkingViews(workspace->Path("poses"), settings.scene.photo_size,
                             settings.run.holdout);
   }
+  // Where a stage has its record and its results. A style must be chosen for a stage of one.
+  Workspace& FolderOf(const std::string& stage) const {
+    return *(IsOfScene(stage) ? workspace : style);
+  }
   // Hash of a finished stage's outputs, an input of later stages; null before it is done.
   JsonValue ResultOf(const std::string& stage) const {
-    const auto record = workspace->Find(stage);
+    const auto record = FolderOf(stage).Find(stage);
     return record ? JsonValue(record->OutputHash()) : JsonValue();
   }
 };

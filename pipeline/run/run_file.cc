@@ -3,17 +3,29 @@
 #include "kernels/base/error.h"
 #include "kernels/base/hash.h"
 #include "pipeline/workspace/stage_runner.h"
+#include "pipeline/workspace/style_folders.h"
 
 namespace regrade {
 namespace {
 
 constexpr uint64_t kMaxRunFile = 16 << 20;
+constexpr int64_t kRunSchema = 2;
+
+void CheckSchema(const JsonValue& run) {
+  const JsonValue* schema = run.Find("schema");
+  if (schema == nullptr || schema->AsInt() == kRunSchema) return;
+  throw InputError(Concat("made by ", schema->AsInt() < kRunSchema ? "an older" : "a newer",
+                          " regrade (schema ", schema->AsInt(), ", this one has ", kRunSchema,
+                          ")"),
+                   "", "run again with another --out, or delete the output folder");
+}
 
 }  // namespace
 
 RunFile ReadRunFile(const std::string& path) {
   try {
     const JsonValue value = ReadJsonFile(path, kMaxRunFile, ExitCode::kUsage);
+    CheckSchema(value);
     RunFile file;
     for (const JsonValue& word : value.At("arguments").AsArray())
       file.words.push_back(word.AsString());
@@ -23,14 +35,17 @@ RunFile ReadRunFile(const std::string& path) {
     throw UsageError(error.what_failed(),
                      error.where().find(path) == std::string::npos ? path + ": " + error.where()
                                                                    : error.where(),
-                     "give a run.json that regrade wrote");
+                     error.hint().empty() ? "give a run.json that regrade wrote"
+                                          : error.hint());
   }
 }
 
 JsonValue RunFileJson(const std::string& command, const RunContext& context) {
   JsonValue fingerprints = JsonValue::Object();
   for (const char* stage : kStageNames)
-    if (const auto record = context.workspace->Find(stage))
+    if (!IsOfScene(stage) && context.style == nullptr)
+      continue;
+    else if (const auto record = context.FolderOf(stage).Find(stage))
       fingerprints[stage] =
           JsonValue::Object{{"inputs", HashText(HashOf(DumpJson(record->inputs, -1)))},
                             {"outputs", record->OutputHash()}};
@@ -42,17 +57,22 @@ JsonValue RunFileJson(const std::string& command, const RunContext& context) {
   JsonValue kept = JsonValue::Object();
   for (const auto& [name, value] : options.AsObject())
     if (start.Find(name) == nullptr) kept[name] = value;
-  return JsonValue::Object{{"schema", 1},
+  JsonValue run =
+      JsonValue::Object{{"schema", kRunSchema},
                            {"regrade", REGRADE_VERSION},
                            {"command", command},
                            {"arguments", words},
                            {"seed", context.settings.run.seed},
                            {"options", kept},
                            {"fingerprints", fingerprints}};
+  if (context.style != nullptr && !context.settings.style.pictures.empty())
+    run[kPictureHash] = HashFile(context.settings.style.picture());
+  return run;
 }
 
 void WriteRunFile(const std::string& command, const RunContext& context) {
-  WriteJsonFile(context.workspace->Path("run.json"), RunFileJson(command, context));
+  const Workspace& folder = context.style != nullptr ? *context.style : *context.workspace;
+  WriteJsonFile(folder.Path("run.json"), RunFileJson(command, context));
 }
 
 }  // namespace regrade

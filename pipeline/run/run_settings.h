@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "evaluate/consistency.h"
 #include "pipeline/capture/ingest_photos.h"
@@ -31,11 +32,30 @@ struct SceneOptions {
 };
 
 struct StyleSource {
-  std::string picture;
+  std::vector<std::string> pictures;
+  std::string name;
+  double strength = 1;
+  bool keep_field = false;
+
+  // The one that stages work on; empty where there is none.
+  std::string picture() const { return pictures.empty() ? "" : pictures[0]; }
 
   template <typename Bind>
   void Describe(Bind& bind) {
-    bind("style", picture, {.help = "the style picture: the scene gets its colours"});
+    bind("style", pictures,
+         {.help = "a style picture: the scene gets its colours, in the folder styles/NAME; give "
+                  "the option once for each style"});
+    bind("name", name,
+         {.help = "name of the style's folder in styles/; by default that of the picture's "
+                  "file"});
+    bind("strength", strength,
+         {.help = "how much of the style is applied: 0 leaves the scene's colours, 1 takes the "
+                  "style's",
+          .min = 0,
+          .max = 1});
+    bind("keep-field", keep_field,
+         {.help = "writes the styled field to styled.npz; without it, whoever needs the field "
+                  "makes it again from field.npz and network.npz"});
   }
 };
 

@@ -22,6 +22,7 @@
 #include "pipeline/stages/make_stylizer.h"
 #include "pipeline/stages/photo_metrics.h"
 #include "pipeline/stages/stages.h"
+#include "pipeline/stages/styled_field.h"
 #include "pipeline/workspace/metrics_json.h"
 #include "pipeline/workspace/output_names.h"
 
@@ -95,7 +96,7 @@ void AddFilm(RunContext* context, const Image& style, const Camera& camera,
   std::vector<int> all(settings.render.path.path_frames);
   for (size_t i = 0; i < all.size(); ++i) all[i] = static_cast<int>(i);
   const auto folder = [&](const char* name) {
-    return context->workspace->Path(std::string("frames/") + kPathPrefix + name);
+    return context->style->Path(std::string("frames/") + kPathPrefix + name);
   };
   const bool renders_styled = std::filesystem::exists(folder("views_2d"));
   std::vector<NamedFrameSource> sequences;
@@ -105,7 +106,7 @@ void AddFilm(RunContext* context, const Image& style, const Camera& camera,
     sequences.push_back({sequence, FramesOf(folder(name), all)});
   }
   const ConsistencyReport film =
-      Compare(*context->workspace, sequences, camera, {}, settings.consistency,
+      Compare(*context->style, sequences, camera, {}, settings.consistency,
               parts->Next(PairWeight(settings, static_cast<int>(all.size()))), heat_maps);
   report->rows.insert(report->rows.end(), film.rows.begin(), film.rows.end());
   report->pairs.insert(report->pairs.end(), film.pairs.begin(), film.pairs.end());
@@ -120,8 +121,8 @@ void AddFilm(RunContext* context, const Image& style, const Camera& camera,
 
 StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   const RunSettings& settings = context->settings;
-  Workspace& workspace = *context->workspace;
-  const StoredField stored = ReadFieldFile(workspace.Path("field.npz"));
+  Workspace& workspace = *context->style;
+  const StoredField stored = ReadFieldFile(context->workspace->Path("field.npz"));
   const WorkingViews views = context->Views().InField(stored.field_from_world, stored.ndc);
   std::vector<int> all(views.count());
   for (size_t i = 0; i < all.size(); ++i) all[i] = static_cast<int>(i);
@@ -160,11 +161,13 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
 
   // Fidelity is measured on the training views of the style, against the 2D method applied to
   // the rendered frames, or else to the photos.
-  const Image style = ReadStylePicture(settings.style.picture, nullptr);
+  const Image style = ReadStylePicture(settings.style.picture(), nullptr);
   const FrameSource of_photos{static_cast<int>(training_views.size()), [&](int k) {
                                 const int i = training_views[k];
                                 Image picture =
                                     ReadImage(workspace.Path("views_2d/" + FrameName(i)));
+                                if (settings.style.strength != 1)
+                                  MixPicture(views.Photo(i), settings.style.strength, &picture);
                                 views.LeaveOutMasked(i, &picture);
                                 return picture;
                               }};
@@ -220,7 +223,7 @@ Stage EvaluateStage(RunContext* context) {
   stage.name = "evaluate";
   stage.inputs = JsonValue::Object{{"frames", context->ResultOf("render")},
                                    {"views_2d", context->ResultOf("style_2d")},
-                                   {"style", HashFile(context->settings.style.picture)},
+                                   {"style", HashFile(context->settings.style.picture())},
                                    {"holdout", context->settings.run.holdout},
                                    {"options", OptionValues(context->settings.consistency)}};
   stage.work = [context](const ProgressFunction& progress) {

@@ -61,7 +61,7 @@ std::unique_ptr<ViewStylizer> MakeMethod(RunContext* context, const Capture& cap
       return MakeFolderStylizer(method.argument, photos);
     }
     case StyleMethodKind::kCommand:
-      return MakeCommandStylizer(method.argument, settings.style.picture,
+      return MakeCommandStylizer(method.argument, settings.style.picture(),
                                  settings.style_2d.command_limit_s);
     default:
       return MakeColorMethod(method.kind, settings.style_2d, style, capture, photo);
@@ -75,7 +75,7 @@ std::unique_ptr<ViewStylizer> MakeSceneStylizer(RunContext* context, const Worki
                                                 const CoverageFunction& coverage) {
   const RunSettings& settings = context->settings;
   std::string notice;
-  const Image style = ReadStylePicture(settings.style.picture, &notice);
+  const Image style = ReadStylePicture(settings.style.picture(), &notice);
   if (!notice.empty()) context->console->Info(notice);
   const Capture& capture = views.capture();
   const auto photo = [&](size_t i) -> std::optional<Image> {

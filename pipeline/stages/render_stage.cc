@@ -25,6 +25,7 @@
 #include "pipeline/stages/make_stylizer.h"
 #include "pipeline/stages/object_edit.h"
 #include "pipeline/stages/stages.h"
+#include "pipeline/stages/styled_field.h"
 #include "pipeline/stages/videos.h"
 #include "pipeline/workspace/metrics_json.h"
 #include "pipeline/workspace/output_names.h"
@@ -116,8 +117,10 @@ Frame RenderFrame(RunContext* context, FrameRenderers* renderers, const Camera& 
   PutGain(gain, &frame.source);
   PutGain(gain, &frame.styled);
   if (renderers->object != nullptr) renderers->coverage = renderers->object->Render(camera);
-  if (renderers->stylizer->StylesAnything())
+  if (renderers->stylizer->StylesAnything()) {
     frame.views_2d = renderers->stylizer->Stylize(frame.source, index);
+    MixPicture(frame.source, context->settings.style.strength, &*frame.views_2d);
+  }
   return frame;
 }
 
@@ -210,10 +213,16 @@ class FrameWriter {
 
 StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   const RunSettings& settings = context->settings;
-  Workspace& workspace = *context->workspace;
-  const StoredField before = ReadFieldFile(workspace.Path("field.npz"));
+  Workspace &workspace = *context->style, &scene = *context->workspace;
+  const StoredField before = ReadFieldFile(scene.Path("field.npz"));
   const WorkingViews views = context->Views().InField(before.field_from_world, before.ndc);
-  const StoredField after = ReadFieldFile(workspace.Path("styled.npz"));
+  const double strength = settings.style.strength;
+  const StoredField after = ReadStyledField(scene.folder(), workspace.folder(), strength);
+  const std::string kept = workspace.Path("styled.npz");
+  if (settings.style.keep_field)
+    WriteFieldFile(kept, after);
+  else
+    std::filesystem::remove(kept);  // of an earlier style
   const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
   FrameRenderers renderers{FieldRenderer(before.field, backend),
                            FieldRenderer(after.field, backend),
@@ -244,6 +253,7 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   std::filesystem::remove_all(workspace.Path("frames"));
   StageOutcome outcome;
   outcome.outputs = {"frames"};
+  if (settings.style.keep_field) outcome.outputs.push_back("styled.npz");
   RunFilms films(workspace, settings.render.fps, static_cast<int>(film.cameras.size()));
   // In NDC the field's limit is no distance.
   SeenByFewRecorder seen(views, before.ndc.on() ? 0 : before.field.near_clip);
@@ -271,6 +281,7 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   report.frames = total;
   report.path_frames = film.of_photos ? 0 : static_cast<int>(film.cameras.size());
   report.film = {film.cameras[0].width, film.cameras[0].height};
+  report.strength = strength;
   report.film_renderer = FilmRendererText(why_exact);
   if (renderers.styled_seconds > 0) report.frames_per_second = total / renderers.styled_seconds;
   report.seen_by_few = seen.metrics();
@@ -290,6 +301,8 @@ Stage RenderStage(RunContext* context) {
       {"field", context->ResultOf("reconstruct")},
       {"styled", context->ResultOf("stylize")},
       {"views_2d", context->ResultOf("style_2d")},
+      {"strength", context->settings.style.strength},
+      {"keep_field", context->settings.style.keep_field},
       {"exact_film", WantsExactFilm(context->settings)},
       {"options", OptionValues(context->settings.scene, context->settings.render,
                                context->settings.style_2d)}};

@@ -85,10 +85,12 @@ std::vector<ReportFilm> FilmsOf(const Workspace& workspace, const RunReport& rep
 ReportPictures PicturesOf(const RunContext& context, const RunReport& report) {
   const WorkingViews as_taken = context.Views().AsTaken();
   const Capture& capture = as_taken.capture();
-  const Workspace& workspace = *context.workspace;
+  const Workspace &workspace = *context.style, &scene = *context.workspace;
   ReportPictures pictures;
-  pictures.title = std::filesystem::path(workspace.folder()).filename().string();
-  const Image style = ReadStylePicture(context.settings.style.picture, nullptr);
+  pictures.title = std::filesystem::path(scene.folder()).filename().string();
+  if (&workspace != &scene)
+    pictures.title += " · " + std::filesystem::path(workspace.folder()).filename().string();
+  const Image style = ReadStylePicture(context.settings.style.picture(), nullptr);
   pictures.style = Encoded(style);
   const int count = static_cast<int>(capture.views.size());
   const int shown = std::min(count, kPagePictures);
@@ -107,7 +109,7 @@ ReportPictures PicturesOf(const RunContext& context, const RunReport& report) {
   }
   pictures.films = FilmsOf(workspace, report, count);
   pictures.heat_maps = HeatMapPictures(workspace, report.evaluation);
-  pictures.thumbnails = Thumbnails(workspace, capture);
+  pictures.thumbnails = Thumbnails(scene, capture);
   pictures.cameras = MapCameras(capture, context.settings.run.holdout);
   pictures.run_json = DumpJson(RunFileJson("run", context), 1);
   return pictures;
@@ -115,9 +117,9 @@ ReportPictures PicturesOf(const RunContext& context, const RunReport& report) {
 
 StageOutcome WriteReport(RunContext* context) {
   const RunSettings& settings = context->settings;
-  Workspace& workspace = *context->workspace;
-  const Capture capture = ReadCapture(workspace.Path("poses"));
-  RunReport report = ReportFromRecords(workspace);
+  Workspace &workspace = *context->style, &scene = *context->workspace;
+  const Capture capture = ReadCapture(scene.Path("poses"));
+  RunReport report = ReportFromRecords(scene, workspace);
   report.version = REGRADE_VERSION;
   report.command = EquivalentCommand(*context);
   report.versions = VersionsOf(report.stages);
@@ -125,16 +127,17 @@ StageOutcome WriteReport(RunContext* context) {
   if (report.stages.reconstruct) report.device = report.stages.reconstruct->device;
   report.seed = settings.run.seed;
   for (const char* stage : kStageNames)
-    if (const auto record = workspace.Find(stage)) report.seconds += record->seconds;
+    if (const auto record = context->FolderOf(stage).Find(stage))
+      report.seconds += record->seconds;
   report.peak_memory_mb = static_cast<double>(ReadMemoryStatus().peak_used >> 20);
   report.photos = PhotosOf(capture);
   for (const char* stage : {"pose", "reconstruct"})
-    if (const auto record = workspace.Find(stage))
+    if (const auto record = scene.Find(stage))
       if (const JsonValue* effects = record->metrics.Find("effects"))
         for (const EffectReport& effect : EffectsOfRecord(*effects))
           report.effects.push_back(effect);
   try {
-    report.costs = ReadCostTable(workspace.Path(kCostTable));
+    report.costs = ReadCostTable(scene.Path(kCostTable));
   } catch (const Error& error) {
     context->console->Warn("the report does without " + std::string(kCostTable) + ": " +
                            error.what_failed());
@@ -159,7 +162,7 @@ Stage ReportStage(RunContext* context) {
   for (const char* earlier : kStageNames)
     if (std::string(earlier) != "report") stage.inputs[earlier] = context->ResultOf(earlier);
   // The results of stage "evaluate" are its metrics.
-  if (const auto record = context->workspace->Find("evaluate"))
+  if (const auto record = context->style->Find("evaluate"))
     stage.inputs["evaluate"] = record->metrics;
   const std::string costs = context->workspace->Path(kCostTable);
   if (std::filesystem::is_regular_file(costs)) stage.inputs["costs"] = HashFile(costs);

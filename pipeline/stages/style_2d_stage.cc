@@ -50,7 +50,7 @@ class MaskFiller {
 
 StageOutcome StyleViews(RunContext* context, const ProgressFunction& progress) {
   const RunSettings& settings = context->settings;
-  Workspace& workspace = *context->workspace;
+  Workspace& workspace = *context->style;
   const WorkingViews views = context->Views();
   const Capture& capture = views.capture();
   const std::unique_ptr<ObjectMasks> masks = OpenObjectMasks(settings, capture);
@@ -88,7 +88,7 @@ Stage Style2dStage(RunContext* context) {
   stage.name = "style_2d";
   stage.inputs = JsonValue::Object{
       {"poses", context->ResultOf("pose")},
-      {"style", HashFile(context->settings.style.picture)},
+      {"style", HashFile(context->settings.style.picture())},
       {"options", OptionValues(context->settings.scene, context->settings.style_2d)}};
   const JsonValue files = MethodFiles(context->settings.style_2d);
   if (!files.IsNull()) stage.inputs["method_files"] = files;

@@ -1,5 +1,5 @@
-// Stage "stylize": trains a network on the pictures of views_2d/ and writes it to network.npz,
-// and the field that it restyles to styled.npz.
+// Stage "stylize": trains a network on the pictures of views_2d/ and writes it to network.npz;
+// styled_field.h makes the styled field from it.
 #include <omp.h>
 
 #include <algorithm>
@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "kernels/base/error.h"
-#include "kernels/field/pad_sh_basis.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/fields/field_file.h"
 #include "pipeline/fields/network_checkpoint.h"
@@ -72,31 +71,29 @@ std::string WhySteep(const TrainNetworkResult& trained) {
 }
 
 // Where no view shows the object: the scene keeps its colours.
-StageOutcome KeepColors(RunContext* context, StoredField stored, const ObjectWeights& weights) {
-  const Workspace& workspace = *context->workspace;
+StageOutcome KeepColors(RunContext* context, const Vec3f& background,
+                        const ObjectWeights& weights) {
+  const Workspace& folder = *context->style;
   context->console->Warn(
       "the masks agree on no part of the scene: it keeps its colours. Check --masks, or lower "
       "--mask-vote");
-  stored.field.appearance = PadShBasis(std::move(stored.field.appearance), kStyledBasis);
-  WriteNetworkFile(workspace.Path("network.npz"),
-                   {NetworkOfMap({}), 0, stored.field.background});
-  WriteFieldFile(workspace.Path("styled.npz"), stored);
-  WriteObjectFile(workspace.Path("object.npz"), weights);
+  WriteNetworkFile(folder.Path("network.npz"), {NetworkOfMap({}), 0, background});
+  WriteObjectFile(folder.Path("object.npz"), weights);
   StageOutcome outcome;
-  outcome.outputs = {"network.npz", "styled.npz", "object.npz"};
+  outcome.outputs = {"network.npz", "object.npz"};
   PutMetrics(StylizeReport(), &outcome.metrics);
   return outcome;
 }
 
 // The views `indices` with their pictures in views_2d/.
-StyleTargets ReadStyleTargets(const Workspace& workspace, const WorkingViews& views,
+StyleTargets ReadStyleTargets(const Workspace& folder, const WorkingViews& views,
                               const RadianceField& field, const std::vector<int>& indices,
                               const ObjectMasks* object, const ObjectWeights& weights) {
   StyleTargets targets(field, object, &weights);
   for (const int i : indices) {
     const std::string name = "views_2d/" + FrameName(i);
     targets.Add({i, views.CameraOf(i), name, views.Mask(i), [&] { return views.Photo(i); },
-                 [&] { return ReadImage(workspace.Path(name)); }});
+                 [&] { return ReadImage(folder.Path(name)); }});
   }
   return targets;
 }
@@ -121,8 +118,8 @@ StylizeReport MetricsOfTraining(const TrainNetworkResult& trained) {
 StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
                      const ProgressFunction& progress) {
   const RunSettings& settings = context->settings;
-  Workspace& workspace = *context->workspace;
-  StoredField stored = ReadFieldFile(workspace.Path("field.npz"));
+  Workspace& workspace = *context->style;
+  StoredField stored = ReadFieldFile(context->workspace->Path("field.npz"));
   const WorkingViews views = context->Views().InField(stored.field_from_world, stored.ndc);
   ProgressParts parts(progress, 1 + (settings.object.On() ? kVoting : 0));
   const std::vector<int> indices = StyledViews(workspace, views);
@@ -133,7 +130,8 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
         VoteForObject(settings, views, indices, *object, stored.field, parts.Next(kVoting));
   const StyleTargets targets =
       ReadStyleTargets(workspace, views, stored.field, indices, object.get(), weights);
-  if (targets.targets().empty()) return KeepColors(context, std::move(stored), weights);
+  if (targets.targets().empty()) 
+    return KeepColors(context, stored.field.background, weights);
 
   RestyleRequest request;
   request.options = settings.network;
@@ -159,7 +157,7 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
                    {trained.network, trained.k_est, restyled.styled.background});
   StageOutcome outcome;
   StylizeReport metrics = MetricsOfTraining(trained);
-  outcome.outputs = {"network.npz", "styled.npz"};
+  outcome.outputs = {"network.npz"};
   if (object != nullptr) {
     WriteObjectFile(workspace.Path("object.npz"), weights);
     outcome.outputs.push_back("object.npz");
@@ -172,8 +170,6 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
   if (object == nullptr && !restyled.source.geometry->spheres.on())
     metrics.variance = MetricsOfVariance(restyled.source, restyled.styled, trained.network,
                                          targets.targets().views(), settings.run.seed);
-  stored.field = std::move(restyled.styled);
-  WriteFieldFile(workspace.Path("styled.npz"), stored);
   metrics.device = DeviceName(request.backend);
   metrics.notices = restyled.notices;
   for (const std::string& warning : trained.warnings) metrics.notices.push_back(warning);

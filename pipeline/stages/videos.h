@@ -8,12 +8,10 @@
 
 #include "kernels/scene/image.h"
 #include "pipeline/images/video_writer.h"
+#include "pipeline/workspace/output_names.h"
 #include "pipeline/workspace/workspace.h"
 
 namespace regrade {
-
-inline constexpr char kStyledFilm[] = "styled.mp4", kWipeFilm[] = "source_vs_styled.mp4",
-                      kViews2dFilm[] = "views_2d.mp4";
 
 // `left` up to column `border`, and `right` from there on.
 Image Wipe(const Image& left, const Image& right, int border);

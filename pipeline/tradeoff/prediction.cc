@@ -148,13 +148,14 @@ double AmountOf(const std::string& unit, const RunSettings& settings, const Capt
   throw InputError("'" + unit + "' is not a unit of work");
 }
 
-std::vector<CostTerm> LearnCosts(const RunSettings& base, const Capture& capture,
-                                 const Workspace& workspace,
+std::vector<CostTerm> LearnCosts(const RunContext& run, const Capture& capture,
                                  const std::vector<Variant>& variants,
                                  const std::vector<Measurement>& measurements) {
+  const RunSettings& base = run.settings;
   std::vector<CostTerm> costs;
   for (StageUnits stage : AllUnits()) {
-    const auto record = workspace.Find(stage.stage);
+    const Workspace* const folder = IsOfScene(stage.stage) ? run.workspace : run.style;
+    const auto record = folder == nullptr ? std::nullopt : folder->Find(stage.stage);
     // Photos with given poses are only read.
     if (stage.stage == std::string("pose") && record &&
         record->metrics.Find("colmap") == nullptr)

@@ -7,7 +7,7 @@
 
 #include "kernels/scene/capture.h"
 #include "pipeline/tradeoff/measurements.h"
-#include "pipeline/workspace/workspace.h"
+#include "pipeline/run/run_context.h"
 
 namespace regrade {
 
@@ -33,8 +33,7 @@ double AmountOf(const std::string& unit, const RunSettings& settings, const Capt
 // measured numbers of steps and grid sizes. The rest of the reconstruct stage, without a fit's
 // steps and the trial of degrees (that is, reading photos and held-out views), is per staged
 // pixel.
-std::vector<CostTerm> LearnCosts(const RunSettings& base, const Capture& capture,
-                                 const Workspace& workspace,
+std::vector<CostTerm> LearnCosts(const RunContext& run, const Capture& capture,
                                  const std::vector<Variant>& variants,
                                  const std::vector<Measurement>& measurements);
 

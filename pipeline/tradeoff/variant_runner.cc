@@ -24,6 +24,7 @@
 #include "pipeline/stages/make_stylizer.h"
 #include "pipeline/stages/photo_metrics.h"
 #include "pipeline/stages/stages.h"
+#include "pipeline/stages/styled_field.h"
 #include "pipeline/workspace/output_names.h"
 #include "reconstruct/fit/fit_field.h"
 
@@ -64,13 +65,13 @@ struct Trial {
     context.options.ApplyConfig(variant.options, "tradeoff");
     context.settings.run.out = folder;
     context.source = base.source;
-    context.workspace = &workspace;
+    context.workspace = context.style = &workspace;  // one folder for both
     context.console = base.console;
   }
 
   // Links a file or folder of the base, or copies it if the disk has no hard links.
-  void Link(const RunContext& base, const std::string& relative) {
-    const fs::path from = base.workspace->Path(relative), to = workspace.NewPath(relative);
+  void Link(const Workspace& base, const std::string& relative) {
+    const fs::path from = base.Path(relative), to = workspace.NewPath(relative);
     std::error_code error;
     fs::copy(from, to, fs::copy_options::recursive | fs::copy_options::create_hard_links,
              error);
@@ -79,7 +80,7 @@ struct Trial {
     fs::copy(from, to, fs::copy_options::recursive);
   }
   void LinkRecord(const RunContext& base, const std::string& stage) {
-    Link(base, ".regrade/stages/" + stage + ".json");
+    Link(base.FolderOf(stage), ".regrade/stages/" + stage + ".json");
   }
 };
 
@@ -222,7 +223,8 @@ void VariantRunner::MeasureFit(const Variant& variant, const ProgressFunction& p
 void VariantRunner::MeasureStyle(const Variant& variant, const ProgressFunction& progress,
                                  Measurement* m) {
   Trial trial(*base_, variant, folder_);
-  for (const char* path : {"poses", "field.npz", "views_2d"}) trial.Link(*base_, path);
+  for (const char* path : {"poses", "field.npz"}) trial.Link(*base_->workspace, path);
+  trial.Link(*base_->style, "views_2d");
   for (const char* stage : {"reconstruct", "style_2d"}) trial.LinkRecord(*base_, stage);
   trial.context.settings.run.seed += static_cast<uint64_t>(m->repeat);
   const Stage stage = StylizeStage(&trial.context);
@@ -231,8 +233,9 @@ void VariantRunner::MeasureStyle(const Variant& variant, const ProgressFunction&
   clocks.Stop();
   for (const char* name : {"steps", "k_est", "bound"}) m->work[name] = outcome.metrics.At(name);
 
-  const Workspace& base = *base_->workspace;
-  const StoredField styled = ReadFieldFile(trial.workspace.Path("styled.npz"));
+  const Workspace& base = *base_->style;
+  const StoredField styled = ReadStyledField(trial.workspace.folder(),
+                                             trial.workspace.folder(), base_->settings.style.strength);
   const WorkingViews views = base_->Views().InField(styled.field_from_world, styled.ndc);
   const FastGrid grid = MakeFastGrid(styled.field);
   const bool of_renders = fs::exists(base.Path("frames/views_2d"));

@@ -15,6 +15,9 @@ inline constexpr char kPathPrefix[] = "path_";
 // are compared on these.
 inline constexpr char kCommonPrefix[] = "common_";
 
+inline constexpr char kStyledFilm[] = "styled.mp4", kWipeFilm[] = "source_vs_styled.mp4",
+                      kViews2dFilm[] = "views_2d.mp4";
+
 // "00007.png"
 inline std::string FrameName(int index) { return Format("%05d.png", index); }
 

@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int64_t kSchema = 2;
+constexpr int64_t kSchema = 3;
 constexpr size_t kNamedDifferences = 4;
 
 std::string Shown(const JsonValue& value) {

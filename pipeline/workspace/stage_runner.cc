@@ -25,13 +25,20 @@ void StageRunner::RestartFrom(const std::string& stage) {
     planned_restart_ = stage;
     return;
   }
-  workspace_->Forget(stage);
+  FolderOf(stage)->Forget(stage);
   ForgetAfter(stage);
+}
+
+std::string StageRunner::Finished() const {
+  std::string finished = Join(scene_->FinishedStages(), ", ");
+  if (style_ == nullptr || style_ == scene_) return finished;
+  const std::string of_style = Join(style_->FinishedStages(), ", ");
+  return finished + (finished.empty() || of_style.empty() ? "" : ", ") + of_style;
 }
 
 void StageRunner::ForgetAfter(const std::string& stage) {
   for (size_t i = PlaceOf(stage) + 1; i < std::size(kStageNames); ++i)
-    workspace_->Forget(kStageNames[i]);
+    if (Workspace* folder = FolderOf(kStageNames[i])) folder->Forget(kStageNames[i]);
 }
 
 bool StageRunner::Run(const Stage& stage) {
@@ -39,7 +46,8 @@ bool StageRunner::Run(const Stage& stage) {
     console_->Info(stage.name + ": would be done again");
     return false;
   }
-  const StageStatus status = workspace_->Status(stage.name, stage.inputs);
+  Workspace* const folder = FolderOf(stage.name);
+  const StageStatus status = folder->Status(stage.name, stage.inputs);
   if (status.state == StageState::kDone) {
     console_->Info(stage.name + ": done before");
     return true;
@@ -47,7 +55,7 @@ bool StageRunner::Run(const Stage& stage) {
   if (status.state == StageState::kInputsDiffer && stage.refuse_changes)
     throw InputError(
         "stage " + stage.name + " was done from other inputs (" + Join(status.why, "; ") + ")",
-        workspace_->folder(),
+        folder->folder(),
         "use the old ones, another --out, or --restart-from " + stage.name +
             " to replace what is there");
   const std::string why = status.why.empty() ? "" : " (" + Join(status.why, "; ") + ")";
@@ -59,35 +67,36 @@ bool StageRunner::Run(const Stage& stage) {
   if (!why.empty()) console_->Info(stage.name + ": is done again" + why);
 
   // The later stages are out of date now; the inputs of their checkpoints differ.
-  if (status.state != StageState::kNeverDone) workspace_->Forget(stage.name);
+  if (status.state != StageState::kNeverDone) folder->Forget(stage.name);
   ForgetAfter(stage.name);
-  console_->SetKept(Join(workspace_->FinishedStages(), ", "));
+  console_->SetKept(Finished());
   console_->BeginStage(stage.name);
   const double cpu_before = CpuSeconds();
   StageOutcome outcome;
   try {
     outcome = stage.work(console_->StageProgress());
   } catch (const std::bad_alloc&) {
-    throw ResourceError("out of memory in stage " + stage.name, workspace_->folder(),
+    throw ResourceError("out of memory in stage " + stage.name, folder->folder(),
                         "close other programs, use --preset draft, or set --max-memory");
   }
   const double seconds = console_->StageSeconds();
-  workspace_->Record(stage.name, stage.inputs, outcome.outputs, seconds, outcome.metrics,
+  folder->Record(stage.name, stage.inputs, outcome.outputs, seconds, outcome.metrics,
                      CpuSeconds() - cpu_before);
   console_->EndStage();
-  console_->SetKept(Join(workspace_->FinishedStages(), ", "));
+  console_->SetKept(Finished());
   console_->Info(stage.name + ": done in " + DurationText(seconds));
   return true;
 }
 
 StageRecord StageRunner::Require(const std::string& stage, const std::string& how) const {
-  const std::optional<StageRecord> record = workspace_->Find(stage);
+  const Workspace* const folder = FolderOf(stage);
+  const std::optional<StageRecord> record = folder->Find(stage);
   if (!record)
-    throw InputError("stage " + stage + " has not been done here", workspace_->folder(),
+    throw InputError("stage " + stage + " has not been done here", folder->folder(),
                      "run `" + how + "` first");
-  const std::vector<std::string> changed = ChangedOutputs(workspace_->folder(), *record);
+  const std::vector<std::string> changed = ChangedOutputs(folder->folder(), *record);
   if (!changed.empty())
-    throw InputError(Join(changed, "; "), workspace_->folder(),
+    throw InputError(Join(changed, "; "), folder->folder(),
                      "run `" + how + "` again: it will redo that stage");
   return *record;
 }

@@ -16,6 +16,11 @@ namespace regrade {
 inline constexpr const char* kStageNames[] = {"pose",   "reconstruct", "style_2d", "stylize",
                                               "render", "evaluate",    "report"};
 
+// Stages of the scene work in the output folder; those of a style in its folder styles/NAME.
+inline bool IsOfScene(const std::string& stage) {
+  return stage == "pose" || stage == "reconstruct";
+}
+
 struct StageOutcome {
   std::vector<std::string> outputs;  // files and folders, relative to the output folder
   JsonValue metrics = JsonValue::Object();
@@ -33,8 +38,9 @@ struct Stage {
 
 class StageRunner {
  public:
-  StageRunner(Workspace* workspace, Console* console)
-      : workspace_(workspace), console_(console) {}
+  // `style` may be null where no stage of a style is run.
+  StageRunner(Workspace* scene, Workspace* style, Console* console)
+      : scene_(scene), style_(style), console_(console) {}
 
   // Forgets this stage and the later ones; an empty name forgets none.
   void RestartFrom(const std::string& stage);
@@ -51,8 +57,13 @@ class StageRunner {
 
  private:
   void ForgetAfter(const std::string& stage);
+  Workspace* FolderOf(const std::string& stage) const {
+    return IsOfScene(stage) ? scene_ : style_;
+  }
+  std::string Finished() const;
 
-  Workspace* workspace_;
+  Workspace* scene_;
+  Workspace* style_;
   Console* console_;
   bool dry_run_ = false;
   std::string planned_restart_;  // in a dry run nothing is forgotten

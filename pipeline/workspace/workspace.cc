@@ -18,7 +18,7 @@ constexpr uint64_t kMaxCheckpoint = uint64_t{64} << 30;
 constexpr std::string_view kCheckpointMark = "regrade checkpoint 1\n";
 constexpr size_t kHashDigits = 16;
 // Results at the top of an output folder.
-constexpr const char* kResultNames[] = {"run.json",    "poses",    "field.npz", "styled.npz",
+constexpr const char* kResultNames[] = {"run.json",    "poses",    "field.npz", "styles",
                                         "network.npz", "views_2d", "frames",    "report.json"};
 
 void RefuseForeignFolder(const std::string& folder) {

@@ -3,7 +3,7 @@
 
   make_table.py WORK
 
-Reads WORK/runs/SCENE/STYLE/METHOD/report.json and WORK/foreign/...; writes table.csv with all metrics, and table.tex and
+Reads WORK/runs/SCENE/STYLE/METHOD/styles/style/report.json and WORK/foreign/...; writes table.csv with all metrics, and table.tex and
 table.html with means over the styles in the form of the paper's table. Exit status: 0, or 1 without a finished run.
 """
 
@@ -26,7 +26,7 @@ def reports(work, kind):
         for style in sorted(os.listdir(os.path.join(work, kind, scene))):
             folder = os.path.join(work, kind, scene, style)
             for method in sorted(os.listdir(folder)):
-                file = os.path.join(folder, method, "report.json")
+                file = os.path.join(folder, method, "styles/style/report.json" if kind == "runs" else "report.json")
                 if not method.endswith(".part") and os.path.exists(file):
                     with open(file) as stream:
                         yield scene, style, method, json.load(stream)

@@ -14,11 +14,11 @@
 #include "pipeline/fields/fit_checkpoint.h"
 #include "pipeline/fields/uniform_field.h"
 #include "pipeline/files/npz_file.h"
+#include "pipeline/stages/styled_field.h"
 #include "stylize/training/style_engine.h"
 #include "stylize/training/training_targets.h"
 #include "tests/support/cell_field.h"
 #include "tests/support/expect_error.h"
-#include "tests/support/restyled_field.h"
 #include "tests/support/temporary_folder.h"
 
 namespace regrade {
@@ -279,8 +279,9 @@ TEST(CellStyledFile, IsRemadeFromFieldAndNetwork) {
   styled.field.background = background;
   WriteFieldFile(folder / "styled.npz", styled);
 
-  WriteFieldFile(folder / "again.npz", RestyledField(ReadFieldFile(folder / "field.npz"),
-                                                     ReadNetworkFile(folder / "network.npz")));
+  WriteFieldFile(folder / "again.npz",
+                 StyledFieldOf(ReadFieldFile(folder / "field.npz"),
+                               ReadNetworkFile(folder / "network.npz"), 1, nullptr));
   EXPECT_TRUE(ReadText(folder / "again.npz") == ReadText(folder / "styled.npz"));
   EXPECT_FALSE(ReadText(folder / "again.npz") == ReadText(folder / "field.npz"));
 }

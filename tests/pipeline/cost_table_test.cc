@@ -183,7 +183,10 @@ TEST(Prediction, AppliesMeasuredUnitCostsToAnotherCapture) {
   workspace.Record("reconstruct", JsonValue::Object(), {}, 0.6 * truth(base, capture) + 3,
                    JsonValue::Object{{"trial_seconds", 1}, {"trial_cpu_seconds", 1}},
                    truth(base, capture) + 4);
-  const std::vector<CostTerm> costs = LearnCosts(base, capture, workspace, variants, measured);
+  RunContext run;
+  run.settings = base;
+  run.workspace = &workspace;
+  const std::vector<CostTerm> costs = LearnCosts(run, capture, variants, measured);
   RunSettings larger = base;
   larger.fit.steps = {700, 900};
   const std::vector<StageTime> times =

@@ -110,19 +110,19 @@ TEST(MixedSizes, H159_ThreeSizesOfTwoCamerasGoToFilmAndReport) {
       << done.text;
 
   // Views keep their shape; compared frames and the film have a common one.
-  EXPECT_EQ(SizeOf(folder / "e/frames/styled/00000.png"), "64x48");
-  EXPECT_EQ(SizeOf(folder / "e/frames/styled/00001.png"), "48x64");
-  EXPECT_EQ(SizeOf(folder / "e/views_2d/00001.png"), "48x64");
+  EXPECT_EQ(SizeOf(folder / "e/styles/style_sunset/frames/styled/00000.png"), "64x48");
+  EXPECT_EQ(SizeOf(folder / "e/styles/style_sunset/frames/styled/00001.png"), "48x64");
+  EXPECT_EQ(SizeOf(folder / "e/styles/style_sunset/views_2d/00001.png"), "48x64");
   for (const char* sequence : {"source", "views_2d", "styled"})
     for (const char* frame : {"00000.png", "00001.png", "00002.png"})
-      EXPECT_EQ(SizeOf(folder / (std::string("e/frames/common_") + sequence + "/" + frame)),
+      EXPECT_EQ(SizeOf(folder / (std::string("e/styles/style_sunset/frames/common_") + sequence + "/" + frame)),
                 "64x48");
-  EXPECT_FALSE(fs::exists(folder / "e/frames/common_transmittance"));
+  EXPECT_FALSE(fs::exists(folder / "e/styles/style_sunset/frames/common_transmittance"));
   EXPECT_EQ(CountVideoFrames(folder / "e/styled.mp4"), 3);
-  for (const auto& map : fs::directory_iterator(folder / "e/heatmaps"))
+  for (const auto& map : fs::directory_iterator(folder / "e/styles/style_sunset/heatmaps"))
     EXPECT_EQ(SizeOf(map.path().string()), "64x48") << map.path();
 
-  const JsonValue report = ReadJsonFile(folder / "e/report.json");
+  const JsonValue report = ReadJsonFile(folder / "e/styles/style_sunset/report.json");
   ExpectFiniteOrReason(report, "report");
   EXPECT_EQ(report.At("stages").At("render").At("frames").AsInt(), 6 + 6 + 3);
   EXPECT_EQ(report.At("stages").At("render").At("film").At("width").AsInt(), 64);
@@ -133,7 +133,7 @@ TEST(MixedSizes, H159_ThreeSizesOfTwoCamerasGoToFilmAndReport) {
   // A run that was killed among the common frames goes on to the same bytes.
   const int null = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
   testing::Spawn(REGRADE_PROGRAM, RunOf(folder / "s/truth", folder / "k"), null, SIGKILL,
-                 folder / "k/frames/common_source/00001.png");
+                 folder / "k/styles/style_sunset/frames/common_source/00001.png");
   const ProgramOutcome again = Regrade(RunOf(folder / "s/truth", folder / "k"));
   ::close(null);
   ASSERT_EQ(again.code, 0) << again.text;
@@ -146,7 +146,7 @@ TEST(MixedSizes, H159_ThreeSizesOfTwoCamerasGoToFilmAndReport) {
   const ProgramOutcome views = Regrade({"render", folder / "e", "--path", "views"});
   ASSERT_EQ(views.code, 0) << views.text;
   EXPECT_EQ(CountVideoFrames(folder / "e/styled.mp4"), 6);
-  EXPECT_FALSE(fs::exists(folder / "e/frames/path_source"));
+  EXPECT_FALSE(fs::exists(folder / "e/styles/style_sunset/frames/path_source"));
   const ProgramOutcome mix =
       Regrade({"mix", folder / "e", "--mix", "0:1", "--path", "views", "--out", folder / "m"});
   ASSERT_EQ(mix.code, 0) << mix.text;
@@ -158,7 +158,7 @@ TEST(MixedSizes, H159_ThreeSizesOfTwoCamerasGoToFilmAndReport) {
 
   // Frames of another program that differ in size are a mistake.
   const ProgramOutcome sizes_differ =
-      Regrade({"evaluate", "--frames", folder / "e/frames/styled", "--out", folder / "f"});
+      Regrade({"evaluate", "--frames", folder / "e/styles/style_sunset/frames/styled", "--out", folder / "f"});
   EXPECT_EQ(sizes_differ.code, 3);
   EXPECT_NE(sizes_differ.text.find("48 x 64 px, 00000.png is 64 x 48 px"), std::string::npos)
       << sizes_differ.text;
@@ -171,10 +171,10 @@ TEST(MixedSizes, H159_OnePhotoOfAnotherShape) {
   CropPhoto(folder / "s", 0, 72, 96);  // the first photo does not determine the common camera
   const ProgramOutcome done = Regrade(RunOf(folder / "s/truth", folder / "e"));
   ASSERT_EQ(done.code, 0) << done.text;
-  EXPECT_EQ(SizeOf(folder / "e/frames/source/00000.png"), "48x64");
-  EXPECT_EQ(SizeOf(folder / "e/frames/common_source/00000.png"), "64x48");
-  EXPECT_EQ(SizeOf(folder / "e/frames/path_source/00000.png"), "64x48");
-  ExpectFiniteOrReason(ReadJsonFile(folder / "e/report.json"), "report");
+  EXPECT_EQ(SizeOf(folder / "e/styles/style_sunset/frames/source/00000.png"), "48x64");
+  EXPECT_EQ(SizeOf(folder / "e/styles/style_sunset/frames/common_source/00000.png"), "64x48");
+  EXPECT_EQ(SizeOf(folder / "e/styles/style_sunset/frames/path_source/00000.png"), "64x48");
+  ExpectFiniteOrReason(ReadJsonFile(folder / "e/styles/style_sunset/report.json"), "report");
 }
 
 TEST(MixedSizes, H159_OneOfEachAndAPanorama) {
@@ -185,9 +185,9 @@ TEST(MixedSizes, H159_OneOfEachAndAPanorama) {
   CropPhoto(folder / "s", 2, 72, 96);
   const ProgramOutcome done = Regrade(RunOf(folder / "s/truth", folder / "e"));
   ASSERT_EQ(done.code, 0) << done.text;
-  EXPECT_EQ(SizeOf(folder / "e/frames/source/00003.png"), "64x16");
-  EXPECT_EQ(SizeOf(folder / "e/frames/common_source/00003.png"), "64x48");
-  ExpectFiniteOrReason(ReadJsonFile(folder / "e/report.json"), "report");
+  EXPECT_EQ(SizeOf(folder / "e/styles/style_sunset/frames/source/00003.png"), "64x16");
+  EXPECT_EQ(SizeOf(folder / "e/styles/style_sunset/frames/common_source/00003.png"), "64x48");
+  ExpectFiniteOrReason(ReadJsonFile(folder / "e/styles/style_sunset/report.json"), "report");
 }
 
 // Frames too small for flow have no consistency, and the report says why.
@@ -196,8 +196,8 @@ TEST(MixedSizes, H159_FramesBelowTheFlowsPyramidHaveAReason) {
   ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "4", "--size", "512x64"}).code, 0);
   const ProgramOutcome done = Regrade(RunOf(folder / "s/truth", folder / "e"));
   ASSERT_EQ(done.code, 0) << done.text;
-  EXPECT_EQ(SizeOf(folder / "e/frames/source/00000.png"), "64x8");
-  const JsonValue report = ReadJsonFile(folder / "e/report.json");
+  EXPECT_EQ(SizeOf(folder / "e/styles/style_sunset/frames/source/00000.png"), "64x8");
+  const JsonValue report = ReadJsonFile(folder / "e/styles/style_sunset/report.json");
   ExpectFiniteOrReason(report, "report");
   const JsonValue& row = RowOf(report, "styled", 1);
   EXPECT_EQ(row.At("undefined_pairs").AsInt(), 3);
@@ -216,8 +216,8 @@ TEST(MixedSizes, H159_MasksOfPhotosThatDiffer) {
   const ProgramOutcome done =
       Regrade(RunOf(folder / "s/truth", folder / "e", {"--masks", folder / "s/truth/masks"}));
   ASSERT_EQ(done.code, 0) << done.text;
-  EXPECT_EQ(SizeOf(folder / "e/frames/common_views_2d/00001.png"), "64x48");
-  ExpectFiniteOrReason(ReadJsonFile(folder / "e/report.json"), "report");
+  EXPECT_EQ(SizeOf(folder / "e/styles/style_sunset/frames/common_views_2d/00001.png"), "64x48");
+  ExpectFiniteOrReason(ReadJsonFile(folder / "e/styles/style_sunset/report.json"), "report");
 }
 
 }  // namespace

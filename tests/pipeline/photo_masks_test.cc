@@ -97,8 +97,8 @@ TEST(PhotoMasks, MaskedPixelsAreNeitherFittedNorMeasured) {
              "--style-steps", "1", "--path", "views"});
   const Capture capture = ReadCapture(folder / "with/poses");
   for (const int i : {1, 6}) {
-    const Image seen = ReadImage(folder / ("with/views_2d/" + FrameName(i)));
-    const Image clean = ReadImage(folder / ("clean_out/views_2d/" + FrameName(i)));
+    const Image seen = ReadImage(folder / ("with/styles/00008/views_2d/" + FrameName(i)));
+    const Image clean = ReadImage(folder / ("clean_out/styles/00008/views_2d/" + FrameName(i)));
     // Of the masked part alone.
     const Image kept = WorkingViews(capture, kWidth, 0).Mask(i);
     EXPECT_GT(Psnr(seen, clean, &kept).value(), 17) << FrameName(i);  // the square has 13
@@ -140,8 +140,8 @@ TEST(PhotoMasks, LaterStagesAndRunsUseTheStagedMasks) {
     fs::copy(folder / "out", out, fs::copy_options::recursive);
     Regrade({"stylize", out, "--style", folder / "s/images/00016.png", "--method",
              "folder:" + styled, "--style-steps", "4", "--path", "views"});
-    networks[k] = Bytes(out + "/network.npz");
-    psnr[k] = ReadJsonFile(out + "/report.json")
+    networks[k] = Bytes(out + "/styles/00016/network.npz");
+    psnr[k] = ReadJsonFile(out + "/styles/00016/report.json")
                   .At("stages")
                   .At("evaluate")
                   .At("psnr_to_2d_photos_db")

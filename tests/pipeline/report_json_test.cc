@@ -98,7 +98,7 @@ RunReport FullReport() {
   report.stages.style_2d = Style2dReport{.time = {3, {}}, .method = "mkl", .views = 7};
   report.stages.stylize = MeasuredStyle();
   report.stages.render = RenderReport{{5, {}},    "cpu",   60, 36,
-                                      {640, 480}, "exact", 12, {0.41, 0.72, 12, {0.5, 0.25}}};
+                                      {640, 480}, 1, "exact", 12, {0.41, 0.72, 12, {0.5, 0.25}}};
   report.stages.evaluate = EvaluateReport{{6, {}}, "dis-medium", "lai2018", "", 25, 26, 0.2};
   report.evaluation = MeasuredEvaluation();
   return report;
@@ -134,7 +134,7 @@ TEST(ReportJson, HasTheKeysOfSchema2InOrder) {
             "local_lipschitz_along_coefficients", "local_lipschitz_along_position",
             "bound_at_steps", "notices", "cpu_seconds"}));
   EXPECT_EQ(KeysOf(stages.At("render")),
-            (Keys{"seconds", "device", "frames", "path_frames", "film", "film_renderer",
+            (Keys{"seconds", "device", "frames", "path_frames", "film", "strength", "film_renderer",
                   "frames_per_second", "seen_by_few"}));
   EXPECT_EQ(KeysOf(stages.At("render").At("seen_by_few")),
             (Keys{"film", "worst_frame", "worst_frame_number", "photos"}));
@@ -261,15 +261,15 @@ TEST(ReportFromRecords, ReadsWhatStagesRecordAndNamesFileAndKeyOfWhatIsMissing) 
   render.frames = 48;
   PutMetrics(render, &metrics);
   workspace.Record("render", JsonValue::Object(), {}, 5, metrics, 9);
-  const RunReport report = ReportFromRecords(workspace);
+  const RunReport report = ReportFromRecords(workspace, workspace);
   EXPECT_EQ(report.stages.render->frames, 48);
   EXPECT_EQ(report.stages.render->time.seconds, 5);
   EXPECT_EQ(report.stages.render->time.cpu_seconds, 9);
   EXPECT_FALSE(report.stages.pose.has_value());
 
   workspace.Record("render", JsonValue::Object(), {}, 5, JsonValue::Object{{"device", "cpu"}});
-  EXPECT_REGRADE_ERROR(ReportFromRecords(workspace), ExitCode::kInput, "\"frames\" is missing");
-  EXPECT_REGRADE_ERROR(ReportFromRecords(workspace), ExitCode::kInput,
+  EXPECT_REGRADE_ERROR(ReportFromRecords(workspace, workspace), ExitCode::kInput, "\"frames\" is missing");
+  EXPECT_REGRADE_ERROR(ReportFromRecords(workspace, workspace), ExitCode::kInput,
                        ".regrade/stages/render.json");
 }
 

@@ -55,9 +55,9 @@ TEST(RunReport, ShowsEveryPartOfTheRun) {
 
   // Three sequences at the photos' positions and three along the film's path, at gaps 1 and 5;
   // the path has three frames, so no pair is 5 apart.
-  EXPECT_EQ(HeatMapsNamed(folder / "e"), 9);
-  EXPECT_EQ(HeatMapFiles(folder / "e"), 9);
-  const JsonValue report = ReadJsonFile(folder / "e/report.json");
+  EXPECT_EQ(HeatMapsNamed(folder / "e/styles/style_sunset"), 9);
+  EXPECT_EQ(HeatMapFiles(folder / "e/styles/style_sunset"), 9);
+  const JsonValue report = ReadJsonFile(folder / "e/styles/style_sunset/report.json");
   const JsonValue& fit = report.At("stages").At("reconstruct");
   EXPECT_EQ(fit.At("psnr_at_steps").AsArray().back().AsArray()[0].AsInt(), 30);
   EXPECT_GT(fit.At("cpu_seconds").AsDouble(), 0);
@@ -68,8 +68,8 @@ TEST(RunReport, ShowsEveryPartOfTheRun) {
     EXPECT_GE(share.AsDouble(), 0);
     EXPECT_LE(share.AsDouble(), 1);
   }
-  EXPECT_TRUE(std::filesystem::exists(folder / "e/views_2d.mp4"));
-  const std::string page = testing::ReadText(folder / "e/report.html");
+  EXPECT_TRUE(std::filesystem::exists(folder / "e/styles/style_sunset/views_2d.mp4"));
+  const std::string page = testing::ReadText(folder / "e/styles/style_sunset/report.html");
   for (const char* part :
        {"PSNR of the fit over steps", "Lipschitz bound over steps", "positions of the cameras",
         "styled scene, frames ", "views_2d.mp4", "<td class=\"n soft\">not measured"})
@@ -98,12 +98,12 @@ TEST(RunReport, ShowsEveryPartOfTheRun) {
   // Evaluated again with other pairs: the maps of the earlier ones are gone.
   const testing::ProgramOutcome measured = Regrade({"evaluate", folder / "e", "--gaps", "2"});
   ASSERT_EQ(measured.code, 0) << measured.text;
-  EXPECT_EQ(HeatMapsNamed(folder / "e"), 6);
-  EXPECT_EQ(HeatMapFiles(folder / "e"), 6);
+  EXPECT_EQ(HeatMapsNamed(folder / "e/styles/style_sunset"), 6);
+  EXPECT_EQ(HeatMapFiles(folder / "e/styles/style_sunset"), 6);
 
   // Another choice of the film's renderer renders again, and is named.
   const auto film_renderer = [&] {
-    return ReadJsonFile(folder / "e/report.json").At("stages").At("render").At("film_renderer");
+    return ReadJsonFile(folder / "e/styles/style_sunset/report.json").At("stages").At("render").At("film_renderer");
   };
   EXPECT_EQ(film_renderer().AsString(), "exact (the CPU has no fast renderer)");
   const testing::ProgramOutcome rendered = Regrade({"render", folder / "e", "--exact"});
@@ -129,21 +129,20 @@ TEST(RunReport, H157_H158_AGreyStyleIsNamedAndWithoutEvaluationNothingMoves) {
   const testing::ProgramOutcome fitted = Regrade(fit);
   ASSERT_EQ(fitted.code, 0) << fitted.text;
   EXPECT_EQ(fitted.text.find("flow"), std::string::npos) << fitted.text;
-  for (const char* name : {".regrade/stages/evaluate.json", ".regrade/checkpoints/evaluate",
-                           "report.json", "heatmaps", "frames"})
+  for (const char* name : {"styles", ".regrade/stages/style_2d.json", "styled.mp4"})
     EXPECT_FALSE(std::filesystem::exists(folder / (std::string("e/") + name))) << name;
 
   std::vector<std::string> run{"run", folder / "s/truth", "--style", folder / "grey.png"};
   run.insert(run.end(), flags.begin(), flags.end());
   const testing::ProgramOutcome done = Regrade(run);
   ASSERT_EQ(done.code, 0) << done.text;
-  const JsonValue stages = ReadJsonFile(folder / "e/report.json").At("stages");
+  const JsonValue stages = ReadJsonFile(folder / "e/styles/grey/report.json").At("stages");
   const JsonValue* notices = stages.At("style_2d").Find("notices");
   ASSERT_NE(notices, nullptr);
   const std::string notice = notices->AsArray()[0].AsString();
   EXPECT_NE(notice.find("single colour"), std::string::npos) << notice;
   EXPECT_NE(done.text.find(notice), std::string::npos);
-  EXPECT_NE(testing::ReadText(folder / "e/report.html").find("single colour"),
+  EXPECT_NE(testing::ReadText(folder / "e/styles/grey/report.html").find("single colour"),
             std::string::npos);
 }
 

@@ -34,7 +34,7 @@ import tempfile
 import time
 import zipfile
 
-from small_run import SMALL, STAGES, STYLE, different, make_capture, results
+from small_run import SMALL, STAGES, STYLE, STYLED, different, make_capture, results
 from watched_run import Run
 
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
@@ -110,8 +110,8 @@ class Supervisor:
         self.startup = starts[0]
         self.duration = dict(zip(STAGES[1:], starts[1:]))
         self.expected = results(self.work)
-        if not any(name.endswith("styled.npz") for name in self.expected):
-            sys.exit("the baseline run wrote no styled field")
+        if not any(name.endswith("network.npz") for name in self.expected):
+            sys.exit("the baseline run wrote no network")
 
     def start(self, command, finished, group=True):
         self.starts += 1
@@ -282,7 +282,7 @@ class Supervisor:
         def cut():
             self.reset(self.posed)
             self.complete(self.command(), ["pose"])
-            frame = os.path.join(self.work, "frames/styled/00001.png")
+            frame = os.path.join(self.work, STYLED, "frames/styled/00001.png")
             os.truncate(frame, os.path.getsize(frame) // 2)
             for name in incomplete_files(self.work):
                 self.report(f"{name} is incomplete")
@@ -290,7 +290,7 @@ class Supervisor:
         def forget():
             self.reset(self.posed)
             self.complete(self.command(), ["pose"])
-            os.remove(os.path.join(self.work, ".regrade/stages/render.json"))
+            os.remove(os.path.join(self.work, STYLED, ".regrade/stages/render.json"))
             self.complete(self.command(), list(STAGES))
 
         self.expect_finding("a checkpoint of another seed", True, exchange)

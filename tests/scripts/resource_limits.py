@@ -24,7 +24,7 @@ import subprocess
 import sys
 import tempfile
 
-from small_run import SMALL, STAGES, STYLE, call, different, make_capture, results
+from small_run import SMALL, STAGES, STYLE, STYLED, call, different, make_capture, results
 
 
 def size_of(folder):
@@ -82,7 +82,7 @@ class Trials:
             sys.exit("the baseline run failed")
         self.expected = results(self.work)
         # Before a later stage: the finished folder without the records and outputs of this stage and later ones.
-        makes = {"stylize": ("styled.npz", "network.npz"), "render": ("frames", "styled.mp4", "source_vs_styled.mp4"),
+        makes = {"stylize": ("network.npz",), "render": ("frames", "styled.mp4", "source_vs_styled.mp4"),
                  "evaluate": (), "report": ("report.html", "report.json")}
         for number, name in enumerate(STAGES):
             if name not in makes:
@@ -90,7 +90,7 @@ class Trials:
             self.begins[name] = shutil.copytree(self.work, os.path.join(self.scratch, name))
             for later in STAGES[number:]:
                 for gone in (f".regrade/stages/{later}.json", *makes.get(later, ())):
-                    path = os.path.join(self.begins[name], gone)
+                    path = os.path.join(self.begins[name], STYLED, gone)
                     shutil.rmtree(path) if os.path.isdir(path) else os.path.exists(path) and os.remove(path)
         self.finished = size_of(self.work)
 

@@ -17,7 +17,7 @@ import sys
 import tempfile
 import zipfile
 
-from small_run import SMALL, STYLE, call, different, make_capture, results
+from small_run import SMALL, STYLE, STYLED, call, different, make_capture, results
 
 
 def arrays(path):
@@ -37,7 +37,7 @@ def arrays(path):
 def largest_difference(one, other):
     """Largest difference of fields and networks, relative to the RMS of the array; inf if sizes differ."""
     largest = 0.0
-    for name in ("field.npz", "styled.npz", "network.npz"):
+    for name in ("field.npz", STYLED + "/network.npz"):
         before, after = arrays(os.path.join(one, name)), arrays(os.path.join(other, name))
         for key, values in before.items():
             if len(after[key]) != len(values):

@@ -28,7 +28,7 @@ import time
 
 from small_run import STYLE
 
-FIELD_READS = 6  # field.npz by reconstruct, stylize, render and evaluate, styled.npz by render and evaluate
+FIELD_READS = 5  # field.npz by reconstruct, stylize, render (twice) and evaluate
 
 
 def measured(command, environment=None):

@@ -9,6 +9,7 @@ SMALL = ["--photo-size", "96", "--fit-resolutions", "24,32", "--fit-steps", "60,
          "--style-steps", "20", "--style-rays", "512", "--path-frames", "4", "--preset", "draft", "--reproducible",
          "--holdout", "0", "--tracks", "given"]
 STAGES = ("pose", "reconstruct", "style_2d", "stylize", "render", "evaluate", "report")
+STYLED = "styles/style_sunset"  # the folder of a run's style
 STYLE = os.path.join(os.path.dirname(os.path.abspath(__file__)), "../../assets/style_sunset.png")
 # Keys of the report that differ from run to run.
 TIMES = {"seconds", "cpu_seconds", "trial_seconds", "trial_cpu_seconds", "frames_per_second", "peak_memory_mb"}
@@ -46,10 +47,10 @@ def results(folder):
         relative = os.path.relpath(place, folder)
         for name in names:
             path = os.path.join(place, name)
-            if relative == "." and name == "report.json":
+            if relative == STYLED and name == "report.json":
                 with open(path, encoding="utf-8") as file:
                     found.update(leaves(json.load(file), name))
-            elif name.endswith(".npz") or relative.split(os.sep)[0] in ("frames", "views_2d"):
+            elif name.endswith((".npz", ".mp4")) or {"frames", "views_2d"} & set(relative.split(os.sep)):
                 with open(path, "rb") as file:
                     found[os.path.normpath(os.path.join(relative, name))] = hashlib.sha256(file.read()).hexdigest()
     return found

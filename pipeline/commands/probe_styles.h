@@ -1,0 +1,12 @@
+// Looks at what styles are made from before long work starts.
+#pragma once
+
+#include "pipeline/run/run_settings.h"
+
+namespace regrade {
+
+// Makes the paths of the style pictures absolute and reads each; checks 2D method and masks.
+// Throws Error(kUsage) where there is no picture, and Error(kInput).
+void ProbeStyles(RunSettings* settings);
+
+}  // namespace regrade

@@ -1,0 +1,31 @@
+// The field of a style, made from the scene's field and what is stored of the style.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "kernels/scene/image.h"
+#include "pipeline/fields/field_file.h"
+#include "pipeline/fields/network_file.h"
+
+namespace regrade {
+
+// `source` restyled by the network, on the CPU, and mixed with itself by 1 - `strength`, see
+// EQ(style-mix); colours as a file stores them. `object_weights` [voxels]: the sum over the
+// regions of object.npz; null where the whole scene is styled. Deterministic: equal inputs give
+// equal bits, for any number of threads.
+StoredField StyledFieldOf(StoredField source, const StoredNetwork& network, double strength,
+                          const std::vector<float>* object_weights);
+
+// The same from files: field.npz of the output folder `scene`, network.npz and object.npz of
+// the style's folder. Throws Error(kInput).
+StoredField ReadStyledField(const std::string& scene, const std::string& style,
+                            double strength);
+
+// With the strength in the style's run.json.
+StoredField ReadStyledField(const std::string& scene, const std::string& style);
+
+// The same of pictures: what a 2D method made of `before` at full strength, mixed with it.
+void MixPicture(const Image& before, double strength, Image* after);
+
+}  // namespace regrade

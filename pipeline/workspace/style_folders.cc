@@ -1,0 +1,129 @@
+#include "pipeline/workspace/style_folders.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <string_view>
+
+#include "kernels/base/error.h"
+#include "kernels/base/natural_order.h"
+#include "pipeline/files/atomic_file.h"
+#include "pipeline/files/json_file.h"
+#include "pipeline/files/text.h"
+#include "pipeline/workspace/output_names.h"
+#include "pipeline/workspace/stage_record.h"
+
+namespace regrade {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr char kLastStyle[] = "/.regrade/last_style.json";
+constexpr uint64_t kMaxFilm = uint64_t{16} << 30;
+
+bool IsSafe(char c) {
+  constexpr std::string_view kOthers = "-_.";
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+         kOthers.find(c) != std::string_view::npos;
+}
+
+// Of the picture that a folder styles/NAME belongs to; empty for a folder without a run.
+std::string PictureHashOf(const std::string& folder, const std::string& name) {
+  const std::string path = StyleFolder(folder, name) + "/run.json";
+  if (!fs::is_regular_file(path)) return "";
+  const JsonValue run = ReadJsonFile(path);
+  const JsonValue* hash = run.Find(kPictureHash);
+  return hash != nullptr && hash->IsString() ? hash->AsString() : "";
+}
+
+}  // namespace
+
+std::string SafeStyleName(const std::string& picture) {
+  std::string name = fs::path(picture).stem().string();
+  // Bytes of a character beyond ASCII give one '_'.
+  std::string safe;
+  for (const char c : name) {
+    const bool continues = (static_cast<unsigned char>(c) & 0xc0) == 0x80;
+    if (!continues) safe += IsSafe(c) ? c : '_';
+  }
+  safe.erase(0, std::min(safe.size(), safe.find_first_not_of('.')));
+  constexpr size_t kLongest = 80;  // a folder's name may have 255 bytes
+  if (safe.size() > kLongest) safe.resize(kLongest);
+  return safe.empty() ? "style" : safe;
+}
+
+std::string StyleFolder(const std::string& folder, const std::string& name) {
+  return folder + "/" + kStylesFolder + "/" + name;
+}
+
+std::vector<NamedStyle> NameStyles(const std::string& folder,
+                                   const std::vector<std::string>& pictures,
+                                   const std::string& name) {
+  if (!name.empty() && pictures.size() > 1)
+    throw UsageError("names one style, and there are several pictures", "--name",
+                     "give one --style, or leave --name out");
+  if (!name.empty() && SafeStyleName(name + ".x") != name)
+    throw UsageError("'" + name + "' is not allowed", "--name",
+                     "use letters, digits, '-', '_' and '.', not first; for example " +
+                         SafeStyleName(name + ".x"));
+  std::vector<NamedStyle> styles;
+  std::vector<std::string> hashes;
+  for (const std::string& picture : pictures) {
+    const std::string hash = HashFile(picture);
+    if (std::ranges::find(hashes, hash) != hashes.end())
+      throw UsageError("this picture is given twice", picture, "leave one of them out");
+    const auto taken = [&](const std::string& wanted) {
+      if (std::ranges::find(styles, wanted, &NamedStyle::name) != styles.end()) return true;
+      const std::string of_folder = PictureHashOf(folder, wanted);
+      return !of_folder.empty() && of_folder != hash;
+    };
+    if (!name.empty() && taken(name))
+      throw UsageError("style '" + name + "' belongs to another picture", "--name",
+                       "choose another name");
+    const std::string stem = name.empty() ? SafeStyleName(picture) : name;
+    std::string free = stem;
+    for (int k = 2; taken(free); ++k) free = stem + "-" + std::to_string(k);
+    styles.push_back({free, picture});
+    hashes.push_back(hash);
+  }
+  return styles;
+}
+
+std::vector<std::string> StyleNames(const std::string& folder) {
+  std::vector<std::string> names;
+  std::error_code error;
+  for (fs::directory_iterator it(folder + "/" + kStylesFolder, error), end;
+       !error && it != end; it.increment(error))
+    if (fs::is_regular_file(it->path() / "run.json"))
+      names.push_back(it->path().filename().string());
+  std::ranges::sort(names, NaturalLess);
+  return names;
+}
+
+std::string ChosenStyle(const std::string& folder, const std::string& name) {
+  const std::vector<std::string> names = StyleNames(folder);
+  if (names.empty())
+    throw InputError("has no styles", folder,
+                     "make one with `regrade stylize " + folder + " --style PICTURE`");
+  std::string chosen = name;
+  if (chosen.empty() && fs::is_regular_file(folder + kLastStyle))
+    chosen = ReadJsonFile(folder + kLastStyle).At("name").AsString();
+  if (chosen.empty() && names.size() == 1) chosen = names[0];
+  if (std::ranges::find(names, chosen) == names.end())
+    throw InputError(chosen.empty() ? "several styles, none of them finished"
+                                    : "has no style '" + chosen + "'",
+                     folder, "its styles, for --name: " + Join(names, ", "));
+  return chosen;
+}
+
+void PublishStyle(const std::string& folder, const std::string& name) {
+  const std::string film = StyleFolder(folder, name) + "/" + kStyledFilm,
+                    copy = folder + "/" + kStyledFilm;
+  std::error_code error;
+  if (!fs::is_regular_file(film))
+    fs::remove(copy, error);  // it would be another style's
+  else if (!fs::is_regular_file(copy) || HashFile(film) != HashFile(copy))
+    WriteFileAtomically(copy, ReadWholeFile(film, kMaxFilm));
+  WriteJsonFile(folder + kLastStyle, JsonValue::Object{{"name", name}});
+}
+
+}  // namespace regrade

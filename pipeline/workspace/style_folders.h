@@ -1,0 +1,49 @@
+// The styles of an output folder: each has a folder styles/NAME, itself a workspace, with the
+// records and results of the stages from "style_2d" to "report".
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace regrade {
+
+inline constexpr char kStylesFolder[] = "styles";
+
+// A style picture and the name of its folder.
+struct NamedStyle {
+  std::string name, picture;
+};
+
+// The name of a picture's file without its ending: letters, digits, '-', '_' and '.'; other
+// characters become '_', and a leading dot is removed. "style" where nothing is left.
+std::string SafeStyleName(const std::string& picture);
+
+// The path of a style's folder in an output folder.
+std::string StyleFolder(const std::string& folder, const std::string& name);
+
+// A name for each picture: that of its file, or `name`, for a single picture, where it is not
+// empty. A picture keeps the name that it has in `folder`, which need not exist: pictures are
+// told apart by their content. Where another picture has a name, "-2" and so on is added.
+//
+// Throws Error(kUsage) for a `name` that is not safe, is that of another picture, or is given
+// with several pictures; for a picture that is given twice; Error(kInput) for one that cannot be
+// read.
+std::vector<NamedStyle> NameStyles(const std::string& folder,
+                                   const std::vector<std::string>& pictures,
+                                   const std::string& name);
+
+// Names of the styles that were begun in `folder`, in natural order.
+std::vector<std::string> StyleNames(const std::string& folder);
+
+// The style that a command continues: `name`, or the last one that was finished, or the only
+// one. Throws Error(kInput), which lists the names, where there is none.
+std::string ChosenStyle(const std::string& folder, const std::string& name);
+
+// Notes that this style was finished last, and copies its film, where it has one, to styled.mp4
+// of `folder`. Throws Error(kResources).
+void PublishStyle(const std::string& folder, const std::string& name);
+
+// In run.json of a style's folder: the hash of the picture's file.
+inline constexpr char kPictureHash[] = "picture_hash";
+
+}  // namespace regrade

@@ -1,0 +1,285 @@
+// Styles of one scene, each in its own folder: names, nothing overwritten, the styled field
+// remade from field and network, strength, and kills in the midst.
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <filesystem>
+#include <map>
+
+#include "pipeline/fields/field_file.h"
+#include "pipeline/files/json_file.h"
+#include "pipeline/images/image_file.h"
+#include "pipeline/stages/object_edit.h"
+#include "pipeline/stages/styled_field.h"
+#include "pipeline/workspace/style_folders.h"
+#include "tests/support/expect_error.h"
+#include "tests/support/source_dir.h"
+#include "tests/support/spawn.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/support/tiny_run.h"
+
+namespace regrade {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::ProgramOutcome;
+using testing::ReadText;
+using testing::TemporaryFolder;
+using testing::WriteText;
+
+ProgramOutcome Regrade(const std::vector<std::string>& arguments) {
+  return testing::RunProgram(REGRADE_PROGRAM, arguments);
+}
+
+std::string Asset(const std::string& name) {
+  return testing::SourceDir() + "/assets/style_" + name + ".png";
+}
+
+void Synth(const TemporaryFolder& folder, const std::vector<std::string>& more = {}) {
+  std::vector<std::string> synth{"synth", folder / "s", "--views", "6", "--size", "96x72"};
+  synth.insert(synth.end(), more.begin(), more.end());
+  ASSERT_EQ(Regrade(synth).code, 0);
+}
+
+// A tiny run of folder / "s" with the given flags, its results in `out`.
+std::vector<std::string> RunOf(const TemporaryFolder& folder, const std::string& out,
+                               const std::vector<std::string>& more) {
+  std::vector<std::string> run{"run",   folder / "s/truth", "--out", folder / out,
+                               "--device", "cpu"};
+  for (const std::string& flag : testing::TinyFlags()) run.push_back(flag);
+  run.insert(run.end(), more.begin(), more.end());
+  return run;
+}
+
+// Contents of all networks, fields, films and frames below a folder.
+std::map<std::string, std::string> ResultsOf(const std::string& folder) {
+  std::map<std::string, std::string> results;
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    const std::string kind = entry.path().extension().string();
+    if (kind == ".npz" || kind == ".mp4" || kind == ".png")
+      results[entry.path().lexically_relative(folder)] = ReadText(entry.path().string());
+  }
+  return results;
+}
+
+TEST(StyleFolders, NamesAreSafeAndKeptApartByContent) {
+  EXPECT_EQ(SafeStyleName("/a/b/Sunset 3.JPG"), "Sunset_3");
+  EXPECT_EQ(SafeStyleName("caf\xc3\xa9.png"), "caf_");
+  EXPECT_EQ(SafeStyleName("..hidden.png"), "hidden");
+  EXPECT_EQ(SafeStyleName("/x/.."), "style");
+  EXPECT_EQ(SafeStyleName(std::string(300, 'x') + ".png").size(), 80u);
+
+  const TemporaryFolder folder;
+  for (const char* name : {"a/x.png", "b/x.png", "c/x.png"})
+    WriteText(folder / name, name);
+  const std::string out = folder / "out";
+  std::vector<NamedStyle> named = NameStyles(out, {folder / "a/x.png", folder / "b/x.png"}, "");
+  EXPECT_EQ(named[0].name, "x");
+  EXPECT_EQ(named[1].name, "x-2");
+  // In a folder that has b's picture as "x", a's gets the other name, whatever comes first.
+  WriteText(out + "/styles/x/run.json",
+            "{\"picture_hash\": \"" + HashFile(folder / "b/x.png") + "\"}");
+  named = NameStyles(out, {folder / "a/x.png", folder / "b/x.png"}, "");
+  EXPECT_EQ(named[0].name, "x-2");
+  EXPECT_EQ(named[1].name, "x");
+  EXPECT_REGRADE_ERROR(NameStyles(out, {folder / "c/x.png"}, "x"), ExitCode::kUsage,
+                       "another picture");
+  EXPECT_EQ(NameStyles(out, {folder / "b/x.png"}, "x")[0].name, "x");
+  for (const char* unsafe : {"../x", ".x", "a b", "a/b"})
+    EXPECT_REGRADE_ERROR(NameStyles(out, {folder / "c/x.png"}, unsafe), ExitCode::kUsage,
+                         "not allowed");
+  EXPECT_REGRADE_ERROR(NameStyles(out, {folder / "a/x.png", folder / "a/x.png"}, ""),
+                       ExitCode::kUsage, "twice");
+  EXPECT_REGRADE_ERROR(NameStyles(out, {folder / "a/x.png", folder / "b/x.png"}, "y"),
+                       ExitCode::kUsage, "several");
+}
+
+TEST(Styles, EachHasItsFolderAndNothingIsOverwritten) {
+  const TemporaryFolder folder;
+  Synth(folder);
+  ProgramOutcome done =
+      Regrade(RunOf(folder, "e", {"--style", Asset("sunset"), "--style", Asset("night")}));
+  ASSERT_EQ(done.code, 0) << done.text;
+  const auto before = ResultsOf(folder / "e/styles");
+  for (const char* style : {"style_sunset", "style_night"})
+    for (const char* file : {"styled.mp4", "network.npz", "report.html", "report.json",
+                             "frames/styled/00000.png", "run.json"})
+      EXPECT_TRUE(fs::exists(folder / (std::string("e/styles/") + style + "/" + file))) << file;
+  EXPECT_FALSE(fs::exists(folder / "e/styles/style_night/styled.npz"));
+  EXPECT_EQ(ReadText(folder / "e/styled.mp4"),
+            ReadText(folder / "e/styles/style_night/styled.mp4"));
+
+  // Another picture of the same name, and a further one, on the same field.
+  fs::create_directories(folder / "other");
+  fs::copy_file(Asset("autumn"), folder / "other/style_night.png");
+  const std::string field = ReadText(folder / "e/field.npz");
+  done = Regrade({"stylize", folder / "e", "--style", folder / "other/style_night.png"});
+  ASSERT_EQ(done.code, 0) << done.text;
+  EXPECT_EQ(ReadText(folder / "e/field.npz"), field);
+  for (const auto& [name, bytes] : before)
+    EXPECT_TRUE(ReadText(folder / ("e/styles/" + name)) == bytes) << name;
+  EXPECT_EQ(ReadText(folder / "e/styled.mp4"),
+            ReadText(folder / "e/styles/style_night-2/styled.mp4"));
+  EXPECT_EQ(StyleNames(folder / "e"),
+            (std::vector<std::string>{"style_night", "style_night-2", "style_sunset"}));
+
+  // mix and contact-sheet take the names.
+  done = Regrade({"mix", folder / "e", "style_night", "style_sunset", "--mix", "1,0:0,1",
+                  "--out", folder / "m"});
+  ASSERT_EQ(done.code, 0) << done.text;
+  const auto frame = [&](const std::string& path) { return ReadText(folder / path); };
+  EXPECT_TRUE(frame("m/frames/00000.png") ==
+              frame("e/styles/style_night/frames/path_styled/00000.png"));
+  EXPECT_TRUE(frame("m/frames/00002.png") ==
+              frame("e/styles/style_sunset/frames/path_styled/00002.png"));
+  done = Regrade({"contact-sheet", folder / "e", "--size", "64", "--views", "2", "--out",
+                  folder / "sheet.png"});
+  ASSERT_EQ(done.code, 0) << done.text;
+  EXPECT_GE(ReadImage(folder / "sheet.png").width, 4 * 64);  // photo and three styles
+  EXPECT_EQ(Regrade({"contact-sheet", folder / "e", "style_night", Asset("sunset"), "--out",
+                     folder / "x.png"})
+                .code,
+            2);
+  done = Regrade({"render", folder / "e", "--name", "none"});
+  EXPECT_EQ(done.code, 3);
+  EXPECT_NE(done.text.find("style_night, style_night-2, style_sunset"), std::string::npos)
+      << done.text;
+}
+
+TEST(Styles, StrengthIsAMixOfSceneAndStyle) {
+  const TemporaryFolder folder;
+  Synth(folder);
+  ProgramOutcome done =
+      Regrade(RunOf(folder, "e", {"--style", Asset("sunset"), "--name", "s", "--keep-field"}));
+  ASSERT_EQ(done.code, 0) << done.text;
+  const std::string network = ReadText(folder / "e/styles/s/network.npz"),
+                    whole = ReadText(folder / "e/styles/s/styled.npz");
+  for (const char* strength : {"0.5", "0"}) {
+    done = Regrade({"stylize", folder / "e", "--name", "s", "--style", Asset("sunset"),
+                    "--keep-field", "--strength", strength});
+    ASSERT_EQ(done.code, 0) << done.text;
+    EXPECT_NE(done.text.find("stylize: done before"), std::string::npos) << done.text;
+    EXPECT_TRUE(ReadText(folder / "e/styles/s/network.npz") == network);
+    const JsonValue run = ReadJsonFile(folder / "e/styles/s/run.json");
+    EXPECT_EQ(run.At("options").At("strength").AsDouble(), std::stod(strength));
+    EXPECT_EQ(ReadJsonFile(folder / "e/styles/s/report.json")
+                  .At("stages")
+                  .At("render")
+                  .At("strength")
+                  .AsDouble(),
+              std::stod(strength));
+    if (std::string(strength) != "0") {
+      // As `regrade mix` makes it.
+      WriteText(folder / "whole.npz", whole);
+      ASSERT_EQ(Regrade({"mix", folder / "e", folder / "whole.npz", "--mix", strength, "--out",
+                         folder / "m"})
+                    .code,
+                0);
+      EXPECT_FALSE(ReadText(folder / "e/styles/s/styled.npz") == whole);
+      const StoredField a = ReadFieldFile(folder / "e/styles/s/styled.npz"),
+                        b = ReadFieldFile(folder / "m/mixed.npz");
+      // The style is rounded to half precision before the mix in one, after it in the other:
+      // values below 8 differ by at most 2^-9.
+      float worst = 0;
+      for (int64_t i = 0; i < a.field.appearance.sh.size(); ++i)
+        worst = std::max(worst, std::abs(a.field.appearance.sh[i] - b.field.appearance.sh[i]));
+      EXPECT_LT(worst, 1.0f / 512);
+    }
+  }
+  // Nothing of the style is left: renders, and what they are compared with.
+  for (const char* sequence : {"styled", "views_2d"})
+    EXPECT_EQ(ReadImage(folder / (std::string("e/styles/s/frames/") + sequence + "/00001.png"))
+                  .pixels,
+              ReadImage(folder / "e/styles/s/frames/source/00001.png").pixels)
+        << sequence;
+  EXPECT_EQ(Regrade({"stylize", folder / "e", "--name", "s", "--strength", "1.5"}).code, 2);
+}
+
+// Three styles on one run, killed within the second, and gone on.
+TEST(Styles, KilledInTheMidstAndGoneOnIsByteIdentical) {
+  const TemporaryFolder folder;
+  Synth(folder);
+  const std::vector<std::string> styles{"--style", Asset("sunset"), "--style", Asset("night"),
+                                        "--style", Asset("autumn"), "--reproducible"};
+  ASSERT_EQ(Regrade(RunOf(folder, "whole", styles)).code, 0);
+  const int null = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
+  for (const char* when : {"styles/style_night/views_2d/00002.png",
+                           "styles/style_night/frames/styled/00001.png",
+                           "styles/style_autumn/network.npz"})
+    testing::Spawn(REGRADE_PROGRAM, RunOf(folder, "killed", styles), null, SIGKILL,
+                   folder / ("killed/" + std::string(when)));
+  ::close(null);
+  EXPECT_FALSE(fs::exists(folder / "killed/styles/style_autumn/report.html"));
+  const ProgramOutcome done = Regrade(RunOf(folder, "killed", styles));
+  ASSERT_EQ(done.code, 0) << done.text;
+  const auto expected = ResultsOf(folder / "whole"), now = ResultsOf(folder / "killed");
+  EXPECT_EQ(now.size(), expected.size());
+  EXPECT_EQ(expected.count("styled.mp4"), 1u);
+  for (const auto& [name, bytes] : expected)
+    EXPECT_TRUE(now.count(name) == 1 && now.at(name) == bytes) << name;
+}
+
+TEST(Styles, FoldersOfAnOlderSchemaAreRefusedWithItsNumber) {
+  const TemporaryFolder folder;
+  Synth(folder);
+  WriteText(folder / "old/.regrade/stages/pose.json",
+            "{\"schema\": 2, \"regrade\": \"0.1.0\", \"inputs\": {}, \"outputs\": [], "
+            "\"seconds\": 1, \"metrics\": {}}");
+  WriteText(folder / "old/run.json",
+            "{\"schema\": 1, \"arguments\": [], \"options\": {\"style\": \"a.png\"}}");
+  ProgramOutcome refused = Regrade(RunOf(folder, "old", {"--style", Asset("sunset")}));
+  EXPECT_EQ(refused.code, 3);
+  EXPECT_NE(refused.text.find("schema 2"), std::string::npos) << refused.text;
+  EXPECT_NE(refused.text.find("--out"), std::string::npos) << refused.text;
+  for (const char* command : {"render", "stylize"}) {
+    refused = Regrade({command, folder / "old", "--style", Asset("sunset")});
+    EXPECT_EQ(refused.code, 2);
+    EXPECT_NE(refused.text.find("schema 1"), std::string::npos) << refused.text;
+    EXPECT_NE(refused.text.find("--out"), std::string::npos) << refused.text;
+  }
+}
+
+// Background spheres, and the background colour that the scene's colour map changes.
+TEST(StyledField, IsRemadeToTheBit) {
+  const TemporaryFolder folder;
+  Synth(folder);
+  const ProgramOutcome done = Regrade(
+      RunOf(folder, "e",
+            {"--style", Asset("sunset"), "--keep-field", "--effects", "background=on",
+             "--background-layers", "4", "--background-resolution", "16"}));
+  ASSERT_EQ(done.code, 0) << done.text;
+  const std::string style = folder / "e/styles/style_sunset";
+  const StoredField source = ReadFieldFile(folder / "e/field.npz");
+  EXPECT_TRUE(source.field.geometry->spheres.on());
+  const Vec3f before = source.field.background,
+              after = ReadNetworkFile(style + "/network.npz").background;
+  EXPECT_FALSE(before.x == after.x && before.y == after.y && before.z == after.z);
+  WriteFieldFile(folder / "again.npz", ReadStyledField(folder / "e", style));
+  EXPECT_TRUE(ReadText(folder / "again.npz") == ReadText(style + "/styled.npz"));
+  // In memory it is what the file holds.
+  const StoredField remade = ReadStyledField(folder / "e", style),
+                    read = ReadFieldFile(style + "/styled.npz");
+  for (int64_t i = 0; i < read.field.appearance.sh.size(); ++i)
+    ASSERT_EQ(remade.field.appearance.sh[i], read.field.appearance.sh[i]) << i;
+}
+
+TEST(StyledField, WithObjectWeightsToo) {
+  const TemporaryFolder folder;
+  Synth(folder, {"--effects", "masks"});
+  const ProgramOutcome done =
+      Regrade(RunOf(folder, "e", {"--style", Asset("sunset"), "--keep-field", "--masks",
+                                  folder / "s/masks"}));
+  ASSERT_EQ(done.code, 0) << done.text;
+  const std::string style = folder / "e/styles/style_sunset";
+  WriteFieldFile(folder / "again.npz", ReadStyledField(folder / "e", style));
+  EXPECT_TRUE(ReadText(folder / "again.npz") == ReadText(style + "/styled.npz"));
+  WriteFieldFile(folder / "whole.npz",
+                 StyledFieldOf(ReadFieldFile(folder / "e/field.npz"),
+                               ReadNetworkFile(style + "/network.npz"), 1, nullptr));
+  EXPECT_FALSE(ReadText(folder / "whole.npz") == ReadText(style + "/styled.npz"));
+}
+
+}  // namespace
+}  // namespace regrade
