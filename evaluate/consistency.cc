@@ -52,6 +52,16 @@ std::string FrameName(const std::string& sequence, int index) {
   return Concat(sequence, ", frame ", index);
 }
 
+bool InOneExcerpt(int from, int gap, int excerpt) {
+  return excerpt == 0 || from / excerpt == (from + gap) / excerpt;
+}
+
+int NumPairs(int frames, int gap, int excerpt) {
+  int pairs = 0;
+  for (int i = 0; i + gap < frames; ++i) pairs += InOneExcerpt(i, gap, excerpt);
+  return pairs;
+}
+
 }  // namespace
 
 PairResult ComparePair(const Image& earlier, const Image& later, const PairMotion& motion) {
@@ -150,7 +160,7 @@ ConsistencyReport EvaluateConsistency(int frames, const PairMotionFunction& moti
   for (const int gap : options.gaps) {
     if (gap < 1) throw UsageError("gaps between frames start at 1", std::to_string(gap));
     max_gap = std::max(max_gap, gap);
-    total += std::max<int64_t>(0, static_cast<int64_t>(frames) - gap);
+    total += NumPairs(frames, gap, options.excerpt);
   }
   std::vector<FrameCache> caches;
   for (const NamedFrameSource& sequence : sequences) {
@@ -170,7 +180,7 @@ ConsistencyReport EvaluateConsistency(int frames, const PairMotionFunction& moti
   for (int i = 0; i < frames; ++i)
     for (size_t g = 0; g < options.gaps.size(); ++g) {
       const int gap = options.gaps[g];
-      if (gap >= frames - i) continue;
+      if (gap >= frames - i || !InOneExcerpt(i, gap, options.excerpt)) continue;
       const auto pair_motion = std::make_shared<const PairMotion>(motion(i, i + gap));
       for (size_t s = 0; s < sequences.size(); ++s) {
         const std::string& name = sequences[s].name;
@@ -209,7 +219,7 @@ ConsistencyReport UndefinedConsistency(int frames,
       ConsistencyRow row;
       row.sequence = sequence.name;
       row.gap = gap;
-      row.pairs = row.undefined_pairs = std::max(0, frames - gap);
+      row.pairs = row.undefined_pairs = NumPairs(frames, gap, options.excerpt);
       row.why = why;
       report.rows.push_back(std::move(row));
     }

@@ -22,6 +22,9 @@ struct ConsistencyOptions {
   std::string flow = "dis-medium";
   std::string lpips;
   double min_coverage = 0.4;
+  // Frames come in excerpts of that many, and pairs lie within one; 0: all are one sequence. Not
+  // an option of the user: it follows from the frames.
+  int excerpt = 0;
 
   template <typename Bind>
   void Describe(Bind& bind) {
@@ -114,7 +117,7 @@ struct ConsistencyReport {
   std::vector<WorstPair> worst;
 };
 
-// Compares frame i with frame i + gap of each sequence, for every i and gap. Flow and mask are
+// Compares frame i with frame i + gap of each sequence, for every i and gap within an excerpt. Flow and mask are
 // estimated once per pair from the reference frames (the unstyled ones), so all sequences are
 // measured on the same pixels; mode "geometry" takes them from `geometry`. Only a few frames
 // are in memory at a time.

@@ -26,9 +26,12 @@ void PrintHelp() {
       "regrade " REGRADE_VERSION
       ": photographs in, a styled 3D scene out\n\nusage: regrade COMMAND [OPTIONS]\n\n");
   for (const Command& command : AllCommands())
-    std::printf("  %-12s %s\n               regrade %s %s\n", command.name, command.summary,
-                command.name, command.usage);
-  std::printf("\nregrade COMMAND --help lists the options of a command.\n");
+    std::printf("  %-14s %s\n", command.name, command.summary);
+  std::printf(
+      "\nthe usual way:\n"
+      "  regrade run PHOTOS --style PICTURE --out DIR      photos to film and report\n"
+      "  regrade stylize DIR --style OTHER_PICTURE         another style of the same scene\n"
+      "\nregrade COMMAND --help has the usual options of a command, --help-all has all.\n");
 }
 
 void Dispatch(const Arguments& arguments, Console* console) {
@@ -71,6 +74,7 @@ void Dispatch(const Arguments& arguments, Console* console) {
 int Run(const Arguments& arguments) {
   const auto flags_end = std::ranges::find(arguments, "--");
   Console console(std::find(arguments.begin(), flags_end, "--json") != flags_end);
+  console.SetVerbose(std::find(arguments.begin(), flags_end, "--verbose") != flags_end);
   ExitCode code = ExitCode::kBug;
   try {
     Dispatch(arguments, &console);

@@ -5,8 +5,13 @@
 #include <iterator>
 
 #include "kernels/base/error.h"
+#include "pipeline/files/text.h"
+#include "pipeline/report/records.h"
+#include "pipeline/report/verdict.h"
 #include "pipeline/run/run_file.h"
 #include "pipeline/stages/stages.h"
+#include "pipeline/workspace/folder_size.h"
+#include "pipeline/workspace/output_names.h"
 
 namespace regrade {
 namespace {
@@ -68,6 +73,28 @@ bool RunPipeline(const std::string& first, const std::string& last, RunContext* 
   return true;
 }
 
+namespace {
+
+// Four lines: where film and page are, how long it took, how it went, and what to do next.
+void PrintSummary(const RunContext& context) {
+  const Workspace &scene = *context.workspace, &style = *context.style;
+  RunReport report = ReportFromRecords(scene, style);
+  report.preset = context.settings.run.preset;
+  for (const char* stage : kStageNames)
+    if (const auto record = context.FolderOf(stage).Find(stage))
+      report.seconds += record->seconds;
+  const Verdict verdict = VerdictOf(report);
+  const bool film = std::filesystem::exists(style.Path(kStyledFilm));
+  context.console->Info((film ? "film " + style.Path(kStyledFilm) + ", " : std::string()) +
+                        "page " + style.Path("report.html"));
+  context.console->Info("took " + DurationText(report.seconds) + "; the folder " +
+                        scene.folder() + " has " + SizeText(SizeOnDisk(scene.folder())));
+  context.console->Info(verdict.Line());
+  context.console->Info("next: " + verdict.advice);
+}
+
+}  // namespace
+
 void RunStyles(const std::string& first, const std::vector<NamedStyle>& styles,
                RunContext* context) {
   const StyleSource given = context->settings.style;
@@ -90,6 +117,7 @@ void RunStyles(const std::string& first, const std::vector<NamedStyle>& styles,
     if (!context->settings.start.dry_run) {
       WriteRunFile("run", *context);
       PublishStyle(context->workspace->folder(), name);
+      PrintSummary(*context);
     }
     context->style = nullptr;
     context->settings.style = given;

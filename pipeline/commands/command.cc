@@ -45,10 +45,42 @@ void StartThreads() {
 
 }  // namespace
 
-bool AsksForHelp(const Arguments& arguments) {
+namespace {
+
+bool HasFlag(const Arguments& arguments, const std::string& flag) {
   const auto flags_end = std::ranges::find(arguments, "--");
-  return std::any_of(arguments.begin(), flags_end,
-                     [](const std::string& word) { return word == "--help" || word == "-h"; });
+  return std::find(arguments.begin(), flags_end, flag) != flags_end;
+}
+
+// What most people use; a command shows those that it has.
+const std::vector<std::string> kBasicOptions = {
+    "style",       "name",  "strength",     "out",       "preset", "method",      "masks",
+    "photo-masks", "still", "film-seconds", "film-size", "device", "restart-from", "dry-run",
+    "verbose"};
+constexpr int kFewOptions = 20;  // of a command with so few all are shown
+
+void PrintHelp(const Command& command, const Arguments& arguments, const OptionSet& options) {
+  if (HasFlag(arguments, kHelpMan)) {
+    std::printf("%s", options.ManPage().c_str());
+  } else if (HasFlag(arguments, kHelpWords)) {
+    std::printf("%s", options.CompletionWords().c_str());
+  } else {
+    std::printf("regrade %s %s\n%s\n", command.name, command.usage, command.summary);
+    const bool all = HasFlag(arguments, "--help-all") || options.count() <= kFewOptions;
+    std::printf("%s%s", all ? "" : "\n",
+                options.Help(all ? Arguments() : kBasicOptions).c_str());
+    if (!all)
+      std::printf("\nregrade %s --help-all lists all %d options.\n", command.name,
+                  options.count());
+  }
+}
+
+}  // namespace
+
+bool AsksForHelp(const Arguments& arguments) {
+  for (const char* flag : {"--help", "-h", "--help-all", kHelpMan, kHelpWords})
+    if (HasFlag(arguments, flag)) return true;
+  return false;
 }
 
 void CheckWords(const Command& command, const Arguments& words, size_t least, size_t most) {
@@ -66,8 +98,7 @@ std::optional<Prepared> Prepare(const Command& command, const Arguments& argumen
   sources.taken = preparation.taken;
   if (AsksForHelp(arguments)) {
     ResolveSettings(sources, options);
-    std::printf("regrade %s %s\n%s\n%s", command.name, command.usage, command.summary,
-                options->Help().c_str());
+    PrintHelp(command, arguments, *options);
     return std::nullopt;
   }
   Prepared prepared;

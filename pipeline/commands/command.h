@@ -39,14 +39,18 @@ struct Prepared {
   Arguments run_words;  // of the run that is continued: PHOTOS or CAPTURE
 };
 
-// The beginning of every command. --help prints usage and options and returns nothing.
+// The beginning of every command. --help prints usage and the options that most people use,
+// --help-all all of them, and kHelpMan and kHelpWords what `regrade manual` is made of; each
+// returns nothing.
 // Otherwise parses the arguments, sets the options (ResolveSettings) and the number of threads.
 // `options` has ProgramOptions among others. Throws Error(kUsage) for a wrong number of words,
 // Error(kInput) for a folder without a run.
 std::optional<Prepared> Prepare(const Command& command, const Arguments& arguments,
                                 const Preparation& preparation, OptionSet* options);
 
-// Is --help or -h among the flags?
+inline constexpr char kHelpMan[] = "--help-man", kHelpWords[] = "--help-words";
+
+// Is --help, -h or one of the others among the flags?
 bool AsksForHelp(const Arguments& arguments);
 
 // Throws Error(kUsage) unless there are between `least` and `most` words.
@@ -68,6 +72,8 @@ void RunTradeoff(const Command&, const Arguments&, Console*);
 void RunSynth(const Command&, const Arguments&, Console*);
 void RunExport(const Command&, const Arguments&, Console*);
 void RunPack(const Command&, const Arguments&, Console*);
+void RunClean(const Command&, const Arguments&, Console*);
+void RunManual(const Command&, const Arguments&, Console*);
 void RunDoctor(const Command&, const Arguments&, Console*);
 
 }  // namespace regrade

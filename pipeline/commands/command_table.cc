@@ -29,6 +29,8 @@ const std::vector<Command>& AllCommands() {
        RunExport},
       {"pack", "DIR --out FILE [OPTIONS]",
        "writes a posed capture as one file, for regrade_gpu on a bare GPU machine", RunPack},
+      {"clean", "DIR [OPTIONS]", "removes what can be made again from a run's folder", RunClean},
+      {"manual", "[OPTIONS]", "prints the man page, or bash's completion", RunManual},
       {"doctor", "[OPTIONS]", "prints what is installed and which processor runs what",
        RunDoctor},
   };

@@ -63,8 +63,5 @@ void RunStylize(const Command& command, const Arguments& arguments, Console* con
            &context);
 }
 
-void RunRender(const Command& command, const Arguments& arguments, Console* console) {
-  ContinueStyle(command, arguments, "render", console);
-}
 
 }  // namespace regrade

@@ -17,6 +17,7 @@
 #include "pipeline/images/video_writer.h"
 #include "pipeline/program/device_choice.h"
 #include "pipeline/run/run_settings.h"
+#include "pipeline/stages/film_frames.h"
 #include "pipeline/stages/object_edit.h"
 #include "pipeline/stages/styled_field.h"
 #include "pipeline/workspace/output_names.h"
@@ -80,11 +81,10 @@ struct MixCameras {
 
 MixCameras CamerasOf(const std::string& folder, const StoredField& stored,
                      const SceneOptions& scene, const RenderOptions& render) {
-  const std::vector<Camera> views = ReadWorkingViews(folder + "/poses", scene.photo_size, 0)
-                                        .InField(stored.field_from_world, stored.ndc)
-                                        .Cameras();
-  const std::vector<Camera> film = MakeCameraPath(views, render.path);
-  return {render.path.path == "views" ? views : film, film};
+  const WorkingViews views = ReadWorkingViews(folder + "/poses", scene.photo_size, 0)
+                                 .InField(stored.field_from_world, stored.ndc);
+  const std::vector<Camera> film = MakeFilmPath(views, render, &stored.field).film;
+  return {render.path.path == "views" ? views.Cameras() : film, film};
 }
 
 void WriteMix(const std::string& out, const RadianceField& source,
@@ -140,7 +140,7 @@ void RunMix(const Command& command, const Arguments& arguments, Console* console
   const auto prepared = Prepare(command, arguments,
                                 {.most_words = kMostWords,
                                  .continues_run = true,
-                                 .taken = {"photo-size", "fps", "path", "path-frames"}},
+                                 .taken = {"photo-size", "fps", "path", "film-seconds", "film-size"}},
                                 &options);
   if (!prepared) return;
   const Arguments& words = prepared->words;

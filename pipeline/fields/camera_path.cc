@@ -81,24 +81,29 @@ Vec3d MeanUp(const std::vector<Camera>& cameras) {
 }
 
 // Gaussian means of the photos' positions and orientations along the tour.
-std::vector<Camera> SmoothPath(const std::vector<Camera>& cameras, int frames) {
+std::vector<Camera> SmoothPath(const std::vector<Camera>& cameras,
+                               const std::vector<double>& moments, double relative_width) {
   const std::vector<int> order = SmoothOrder(cameras);
   const double unit = MeanExtent(cameras, MeanCenter(cameras));
   std::vector<double> at(order.size(), 0.0);
   for (size_t i = 1; i < order.size(); ++i)
     at[i] = at[i - 1] + Jump(cameras[order[i - 1]], cameras[order[i]], unit);
   const double length = at.back();
-  const double width = std::max(1.5 * length / static_cast<double>(order.size()), 1e-9);
+  const double width =
+      std::max(relative_width * 1.5 * length / static_cast<double>(order.size()), 1e-9);
   const Camera film = CommonCamera(cameras);
   std::vector<Camera> path;
-  for (int f = 0; f < frames; ++f) {
-    const double t = length * f / std::max(1, frames - 1);
+  for (const double moment : moments) {
+    const double t = length * EasedWay(moment);
     Vec3d center{}, forward{}, up{};
     double total = 0;
+    // Relative to the nearest photo, so that narrow Gaussians do not vanish between photos.
+    double nearest = 1e300;
+    for (const double place : at) nearest = std::min(nearest, std::abs(place - t) / width);
     for (size_t i = 0; i < order.size(); ++i) {
       const Camera& camera = cameras[order[i]];
       const double z = (at[i] - t) / width;
-      const double weight = std::exp(-0.5 * z * z) + 1e-12;
+      const double weight = std::exp(-0.5 * (z * z - nearest * nearest)) + 1e-12;
       center += camera.Center() * weight;
       forward += camera.Forward() * weight;
       up += camera.Up() * weight;
@@ -110,7 +115,8 @@ std::vector<Camera> SmoothPath(const std::vector<Camera>& cameras, int frames) {
   return path;
 }
 
-std::vector<Camera> OrbitPath(const std::vector<Camera>& cameras, int frames) {
+std::vector<Camera> OrbitPath(const std::vector<Camera>& cameras,
+                              const std::vector<double>& moments) {
   const Vec3d up = MeanUp(cameras), center = MeanCenter(cameras);
   const Vec3d target = LookAtPoint(cameras, center);
   double radius = 0, height = 0;
@@ -127,8 +133,8 @@ std::vector<Camera> OrbitPath(const std::vector<Camera>& cameras, int frames) {
   const Vec3d side = Cross(up, across);
   const Camera film = CommonCamera(cameras);
   std::vector<Camera> path;
-  for (int f = 0; f < frames; ++f) {
-    const double a = 2 * M_PI * f / frames;
+  for (const double moment : moments) {
+    const double a = 2 * M_PI * moment;
     const Vec3d place =
         target + (across * std::cos(a) + side * std::sin(a)) * radius + up * height;
     path.push_back(LookingAlong(film, place, target - place, up));
@@ -136,7 +142,8 @@ std::vector<Camera> OrbitPath(const std::vector<Camera>& cameras, int frames) {
   return path;
 }
 
-std::vector<Camera> SpiralPath(const std::vector<Camera>& cameras, int frames) {
+std::vector<Camera> SpiralPath(const std::vector<Camera>& cameras,
+                               const std::vector<double>& moments) {
   const Vec3d up = MeanUp(cameras), center = MeanCenter(cameras);
   const Vec3d target = LookAtPoint(cameras, center);
   const Vec3d forward = Normalized(target - center);
@@ -150,8 +157,8 @@ std::vector<Camera> SpiralPath(const std::vector<Camera>& cameras, int frames) {
   sway_y /= static_cast<double>(cameras.size());
   const Camera film = CommonCamera(cameras);
   std::vector<Camera> path;
-  for (int f = 0; f < frames; ++f) {
-    const double a = 4 * M_PI * f / frames;
+  for (const double moment : moments) {
+    const double a = 4 * M_PI * moment;
     const Vec3d place = center + right * (sway_x * std::cos(a)) +
                         down * (sway_y * std::sin(a)) +
                         forward * (0.3 * sway_y * std::sin(0.5 * a));
@@ -199,13 +206,27 @@ std::vector<int> SmoothOrder(const std::vector<Camera>& cameras) {
                                                                                     : natural;
 }
 
+double EasedWay(double time) {
+  // The integral of a trapezium of speeds; its area is 1 - kEasing.
+  const auto rising = [](double t) { return 0.5 * t * t / kEasing; };
+  double way;
+  if (time < kEasing)
+    way = rising(time);
+  else if (time > 1 - kEasing)
+    way = 1 - kEasing - rising(1 - time);
+  else
+    way = time - 0.5 * kEasing;
+  return std::clamp(way / (1 - kEasing), 0.0, 1.0);
+}
+
 std::vector<Camera> MakeCameraPath(const std::vector<Camera>& cameras,
-                                   const PathOptions& options) {
+                                   const PathOptions& options,
+                                   const std::vector<double>& moments, double width) {
   REGRADE_CHECK(!cameras.empty());
   if (options.path == "views") return WithCommonIntrinsics(cameras);
-  if (options.path == "smooth") return SmoothPath(cameras, options.path_frames);
-  if (options.path == "orbit") return OrbitPath(cameras, options.path_frames);
-  if (options.path == "spiral") return SpiralPath(cameras, options.path_frames);
+  if (options.path == "smooth") return SmoothPath(cameras, moments, width);
+  if (options.path == "orbit") return OrbitPath(cameras, moments);
+  if (options.path == "spiral") return SpiralPath(cameras, moments);
   throw UsageError("'" + options.path + "' is not allowed", "--path",
                    "allowed: smooth, views, orbit, spiral");
 }

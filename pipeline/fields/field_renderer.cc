@@ -18,6 +18,13 @@ RenderedView FieldRenderer::Render(const Camera& camera) const {
                                     : RenderView(grid_, camera, march_);
 }
 
+RenderedPair FieldRenderer::RenderWith(const FieldRenderer& other,
+                                       const Camera& camera) const {
+  REGRADE_CHECK(backend_ == other.backend_);
+  if (backend_ == Backend::kCpu) return RenderViewPair(grid_, other.grid_, camera, march_);
+  return {Render(camera), other.Render(camera).color};
+}
+
 std::string FieldRenderer::PrepareFast() {
   if (backend_ == Backend::kCpu) return "the CPU has no fast renderer";
   if (device_.cells.on()) return "the fast renderer needs a uniform field";

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "kernels/device/backend.h"
+#include "kernels/field/cpu/render_view.h"
 #include "kernels/field/cuda/device_grid.h"
 #include "kernels/field/cuda/half_grid.h"
 #include "kernels/field/packed_grid.h"
@@ -25,6 +26,10 @@ class FieldRenderer {
   FieldRenderer(const RadianceField& field, Backend backend);
   // Exact: single precision, every sample.
   RenderedView Render(const Camera& camera) const;
+
+  // This field's view, and the colours of another one of the same geometry on the same processor;
+  // exact. The CPU marches once for both.
+  RenderedPair RenderWith(const FieldRenderer& other, const Camera& camera) const;
 
   // Makes the fast renderer's copy of the field in half precision. Returns why there is none,
   // or an empty text.

@@ -7,73 +7,20 @@
 #include <utility>
 
 #include "kernels/base/error.h"
-#include "kernels/field/trilinear.h"
+#include "pipeline/fields/field_sampler.h"
 
 namespace regrade {
 namespace {
 
-// The corners of the cell at a vertex of the new grid.
-struct Corners {
-  int32_t voxel[8];
-  Vec3f fraction;
-
-  bool any() const {
-    for (int k = 0; k < 8; ++k)
-      if (voxel[k] >= 0 && CornerWeight(fraction, k) > 0) return true;
-    return false;
-  }
-};
-
-class Sampler {
- public:
-  Sampler(const Geometry& geometry, const Vec3i& resolution)
-      : geometry_(geometry),
-        resolution_(resolution),
-        cells_(geometry.cells.on() ? ViewOf(geometry.cells, geometry.frame.resolution)
-                                   : CellsView{}) {}
-
-  Corners At(int x, int y, int z) const {
-    const Vec3i index{x, y, z}, n = geometry_.frame.resolution;
-    Vec3f place;  // voxels from the box's corner
-    for (int a = 0; a < 3; ++a)
-      place[a] = (static_cast<float>(index[a]) + 0.5f) * static_cast<float>(n[a]) /
-                 static_cast<float>(resolution_[a]);
-    Corners corners;
-    std::fill_n(corners.voxel, 8, -1);
-    if (!geometry_.cells.on()) {
-      const Cell<float> cell = LocateCell(geometry_.frame, place - Vec3f{0.5f, 0.5f, 0.5f});
-      for (int k = 0; k < 8; ++k)
-        corners.voxel[k] = geometry_.links[CornerVertex(geometry_.frame, cell.vertex, k)];
-      corners.fraction = cell.fraction;
-      return corners;
-    }
-    Vec3i at;
-    for (int a = 0; a < 3; ++a) at[a] = std::min(static_cast<int>(place[a]), n[a] - 1);
-    int width;
-    const int32_t cell = CellAt(cells_, at, &width);
-    if (cell == kNoCell) return corners;
-    for (int a = 0; a < 3; ++a)
-      corners.fraction[a] =
-          (place[a] - static_cast<float>(at[a] & ~(width - 1))) / static_cast<float>(width);
-    std::copy_n(geometry_.cells.corner.data() + 8 * int64_t{cell}, 8, corners.voxel);
-    return corners;
-  }
-
- private:
-  const Geometry& geometry_;
-  Vec3i resolution_;
-  CellsView cells_;
-};
-
-// out [channels] of values [N, channels].
-void Blend(const Corners& corners, const Buffer<float>& values, int channels, float* out) {
-  std::fill_n(out, channels, 0.0f);
-  for (int k = 0; k < 8; ++k) {
-    if (corners.voxel[k] < 0) continue;
-    const float w = CornerWeight(corners.fraction, k);
-    const float* const from = values.data() + int64_t{corners.voxel[k]} * channels;
-    for (int c = 0; c < channels; ++c) out[c] += w * from[c];
-  }
+// Of a vertex of the new grid.
+CellCorners CornersAt(const Geometry& from, const FieldSampler& sampler,
+                      const Vec3i& resolution, const Vec3i& index) {
+  Vec3f place;  // voxels from the box's corner
+  for (int a = 0; a < 3; ++a)
+    place[a] = (static_cast<float>(index[a]) + 0.5f) *
+               static_cast<float>(from.frame.resolution[a]) /
+               static_cast<float>(resolution[a]);
+  return sampler.At(place);
 }
 
 template <typename Body>
@@ -114,10 +61,13 @@ RadianceField ToUniform(const RadianceField& field, const Vec3i& resolution, uin
   geometry->spheres = from.spheres;
   const double vertices = static_cast<double>(geometry->frame.NumVertices());
   CheckMemory(vertices * sizeof(int32_t), resolution, memory);
-  const Sampler sampler(from, resolution);
+  const FieldSampler sampler(from);
+  const auto corners_at = [&](int x, int y, int z) {
+    return CornersAt(from, sampler, resolution, {x, y, z});
+  };
   geometry->links.Resize(geometry->frame.NumVertices());
   ForEachVertex(resolution, [&](int64_t v, int x, int y, int z) {
-    geometry->links[v] = sampler.At(x, y, z).any() ? 0 : -1;
+    geometry->links[v] = corners_at(x, y, z).any() ? 0 : -1;
   });
   int64_t voxels = 0;
   for (int32_t& link : geometry->links)
@@ -131,7 +81,7 @@ RadianceField ToUniform(const RadianceField& field, const Vec3i& resolution, uin
   ForEachVertex(resolution, [&](int64_t v, int x, int y, int z) {
     const int64_t voxel = geometry->links[v];
     if (voxel < 0) return;
-    const Corners corners = sampler.At(x, y, z);
+    const CellCorners corners = corners_at(x, y, z);
     Blend(corners, from.density, 1, geometry->density.data() + voxel);
     Blend(corners, field.appearance.sh, stride, uniform.appearance.sh.data() + voxel * stride);
   });

@@ -11,6 +11,7 @@
 #include "evaluate/image_quality.h"
 #include "kernels/field/cuda/device_rays.h"
 #include "pipeline/fields/camera_path.h"
+#include "pipeline/fields/film_timing.h"
 #include "pipeline/fields/field_renderer.h"
 #include "pipeline/gpu/gpu_commands.h"
 
@@ -164,7 +165,7 @@ JsonValue CompareRenderers(const DeviceGrid& grid, const PackedCapture& capture,
   for (size_t i = 0; i < cameras.size(); ++i)
     if (!capture.views[i].held_out) comparison.AddView(cameras[i]);
   const std::vector<Camera> film =
-      MakeCameraPath(cameras, {.path = "smooth", .path_frames = settings.path_frames});
+      MakeCameraPath(cameras, {.path = "smooth"}, EvenMoments(settings.path_frames));
   for (size_t i = 0; i < film.size(); ++i) {
     char name[16];
     std::snprintf(name, sizeof name, "%05d.ppm", static_cast<int>(i));

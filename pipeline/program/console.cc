@@ -78,6 +78,18 @@ void Console::Info(const std::string& text) {
   if (!quiet_) Event("info", JsonValue::Object{{"text", text}});
 }
 
+void Console::Detail(const std::string& text) {
+  if (verbose_) return Info(text);
+  Log("info", Printable(text));
+  if (!quiet_) Event("info", JsonValue::Object{{"text", text}});
+}
+
+void Console::DetailLines(const std::string& text) {
+  if (verbose_) return Lines(text);
+  for (const std::string& line : Split(text, '\n'))
+    if (!line.empty()) Log("info", Printable(line));
+}
+
 void Console::Lines(const std::string& text) {
   size_t begin = 0;
   while (begin < text.size()) {
@@ -110,8 +122,10 @@ void Console::Event(const std::string& name, const JsonValue& members) {
   Put(stdout, DumpJson(line, -1) + "\n");
 }
 
-void Console::BeginStage(const std::string& stage) {
+void Console::BeginStage(const std::string& stage, const std::string& title, double later) {
   stage_ = stage;
+  title_ = title.empty() ? stage : title;
+  later_ = later;
   eta_ = EtaEstimator();
   stage_begin_ = ClockSeconds();
   last_drawn_ = stage_begin_ - 3600;
@@ -142,11 +156,17 @@ void Console::Draw(const Progress& progress) {
   last_drawn_ = now;
 
   const std::optional<double> left = eta_.Remaining();
-  std::string line = stage_;
+  std::string line = title_;
   if (progress.total > 0) {
     line += Format("  %3.0f %%", 100 * std::min(1.0, progress.done / progress.total));
   }
-  if (left) line += "  " + DurationText(*left) + " left";
+  if (left && later_ > 0 && progress.done > 0) {
+    // The later stages take a multiple of this one, as they usually do.
+    const double in_all = *left + later_ * (now - stage_begin_ + *left);
+    line += "  about " + DurationText(in_all) + " left in all";
+  } else if (left) {
+    line += "  " + DurationText(*left) + " left";
+  }
   if (!progress.note.empty()) line += "  " + Printable(progress.note);
   if (terminal_) {
     winsize size = {};

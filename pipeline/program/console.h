@@ -30,6 +30,10 @@ class Console {
   void OpenLog(const std::string& path);
 
   void Info(const std::string& text);
+  // Evidence of a decision, for the log, --json and --verbose.
+  void Detail(const std::string& text);
+  void DetailLines(const std::string& text);
+  void SetVerbose(bool verbose) { verbose_ = verbose; }
   // A text of several lines, for example a table.
   void Lines(const std::string& text);
   void Warn(const std::string& text);
@@ -42,7 +46,9 @@ class Console {
   // A line of JSON {"event": name, ...members} with --json, nothing without.
   void Event(const std::string& name, const JsonValue& members);
 
-  void BeginStage(const std::string& stage);
+  // `title`: what a person reads in place of the stage's name; `later`: the time of what follows,
+  // in times of this stage.
+  void BeginStage(const std::string& stage, const std::string& title = "", double later = 0);
   void EndStage();
   double StageSeconds() const;
   // Draws the progress line, updates the estimate, and returns kStop after a signal.
@@ -59,8 +65,10 @@ class Console {
   bool color_ = false;
   bool line_drawn_ = false;
   bool quiet_ = false;
+  bool verbose_ = false;
   std::ofstream log_;
-  std::string stage_, kept_;
+  std::string stage_, title_, kept_;
+  double later_ = 0;
   EtaEstimator eta_;
   double stage_begin_, last_drawn_;  // of ClockSeconds()
 };

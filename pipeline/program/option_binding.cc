@@ -274,28 +274,35 @@ JsonValue OptionSet::Values() const {
   return values;
 }
 
-std::string OptionSet::Help() const {
+OptionSet::Description OptionSet::Describe(const Entry& entry) {
+  const bool is_switch = std::holds_alternative<bool*>(entry.target);
+  const bool is_text = std::holds_alternative<std::string*>(entry.target) || IsTextList(entry);
+  Description description;
+  if (!is_switch)
+    description.value = *entry.info.choices ? entry.info.choices : is_text ? "TEXT" : "N";
+  std::string facts;
+  if (!is_switch && *entry.info.unit) facts += std::string(entry.info.unit) + ", ";
+  if (!is_switch && !is_text && (std::isfinite(entry.info.min) || std::isfinite(entry.info.max)))
+    facts += BoundsText(entry.info) + ", ";
+  const std::string value = FlagText(ValueOf(entry));
+  facts += "default " + (is_switch       ? (value == "true" ? "on" : "off")
+                         : value.empty() ? "none"
+                                         : value);
+  description.sentence = std::string(entry.info.help) + " (" + facts + ")";
+  return description;
+}
+
+std::string OptionSet::Help(const std::vector<std::string>& only) const {
   std::string text, heading;
   for (const Entry& entry : entries_) {
-    if (entry.heading != heading || text.empty()) text += "\n" + entry.heading + ":\n";
+    const bool shown = only.empty() || std::ranges::find(only, entry.name) != only.end();
+    if (!shown) continue;
+    if (only.empty() && (entry.heading != heading || text.empty()))
+      text += "\n" + entry.heading + ":\n";
     heading = entry.heading;
-    const bool is_switch = std::holds_alternative<bool*>(entry.target);
-    const bool is_text =
-        std::holds_alternative<std::string*>(entry.target) || IsTextList(entry);
+    const Description description = Describe(entry);
     std::string head = "  --" + entry.name;
-    if (!is_switch)
-      head += " " + std::string(*entry.info.choices ? entry.info.choices
-                                : is_text           ? "TEXT"
-                                                    : "N");
-    std::string facts;
-    if (!is_switch && *entry.info.unit) facts += std::string(entry.info.unit) + ", ";
-    if (!is_switch && !is_text &&
-        (std::isfinite(entry.info.min) || std::isfinite(entry.info.max)))
-      facts += BoundsText(entry.info) + ", ";
-    const std::string value = FlagText(ValueOf(entry));
-    facts += "default " + (is_switch       ? (value == "true" ? "on" : "off")
-                           : value.empty() ? "none"
-                                           : value);
+    if (!description.value.empty()) head += " " + description.value;
     constexpr size_t kIndent = 28, kWidth = 96;
     if (head.size() + 2 > kIndent) {
       head += '\n';
@@ -303,8 +310,37 @@ std::string OptionSet::Help() const {
     } else {
       head.resize(kIndent, ' ');
     }
-    text += head + Wrapped(std::string(entry.info.help) + " (" + facts + ")", kIndent, kWidth) +
-            "\n";
+    text += head + Wrapped(description.sentence, kIndent, kWidth) + "\n";
+  }
+  return text;
+}
+
+std::string OptionSet::ManPage() const {
+  std::string text, heading;
+  // A dash that is typed, and a line that is no request.
+  const auto escaped = [](const std::string& plain) {
+    std::string result;
+    for (const char c : plain) result += c == '-' ? "\\-" : c == '\\' ? "\\e" : std::string(1, c);
+    return result;
+  };
+  for (const Entry& entry : entries_) {
+    if (entry.heading != heading) text += ".PP\n" + entry.heading + ":\n";
+    heading = entry.heading;
+    const Description description = Describe(entry);
+    text += ".TP\n.B " + escaped("--" + entry.name);
+    if (!description.value.empty()) text += " \\fI" + escaped(description.value) + "\\fR";
+    text += "\n\\&" + escaped(description.sentence) + "\n";
+  }
+  return text;
+}
+
+std::string OptionSet::CompletionWords() const {
+  std::string text;
+  for (const Entry& entry : entries_) {
+    text += "--" + entry.name;
+    for (const std::string& choice : Split(entry.info.choices, '|'))
+      if (!choice.empty()) text += " " + choice;
+    text += "\n";
   }
   return text;
 }

@@ -42,8 +42,14 @@ class OptionSet {
   // {"name": value, ...} of everything in effect.
   JsonValue Values() const;
 
-  // Names, units, effects, defaults and bounds. Call before flags are applied.
-  std::string Help() const;
+  // Names, units, effects, defaults and bounds, of the options named in `only`, or of all. Call
+  // before flags are applied.
+  std::string Help(const std::vector<std::string>& only = {}) const;
+  // The same of all as the body of a section of a man page.
+  std::string ManPage() const;
+  // For completion: a line for each option, "--name" and its choices.
+  std::string CompletionWords() const;
+  int count() const { return static_cast<int>(entries_.size()); }
 
  private:
   using Target = std::variant<bool*, int*, int64_t*, uint64_t*, float*, double*, std::string*,
@@ -64,6 +70,12 @@ class OptionSet {
   struct Flag {
     std::string name, value;
   };
+
+  // What stands behind the name, and the sentence with unit, bounds and default.
+  struct Description {
+    std::string value, sentence;
+  };
+  static Description Describe(const Entry& entry);
 
   void AddEntry(Entry entry);
   const Entry* Find(const std::string& name) const;

@@ -7,6 +7,7 @@
 #include "pipeline/report/page_assets.h"
 #include "pipeline/report/photos.h"
 #include "pipeline/report/tables.h"
+#include "pipeline/report/verdict.h"
 
 namespace regrade {
 namespace {
@@ -32,16 +33,36 @@ std::string CompareHtml(const ReportView& view) {
          "before styling\"></div>";
 }
 
-std::string FilmsHtml(const ReportPictures& pictures) {
+std::string FilmHtml(const ReportFilm& film) {
+  return "<figure><video controls loop muted playsinline preload=metadata src=\"" +
+         EscapeHtml(film.file) + "\"" +
+         (film.poster ? " poster=\"" + DataUrl(*film.poster) + "\"" : "") +
+         "></video><figcaption>" + EscapeHtml(film.caption) + ", <code>" +
+         EscapeHtml(film.file) + "</code></figcaption></figure>";
+}
+
+// The first film, large.
+std::string MainFilmHtml(const ReportPictures& pictures) {
   if (pictures.films.empty()) return "";
-  std::string html = "<h2>Films</h2><div class=films>";
-  for (const ReportFilm& film : pictures.films)
-    html += "<figure><video controls loop muted playsinline preload=metadata src=\"" +
-            EscapeHtml(film.file) + "\"" +
-            (film.poster ? " poster=\"" + DataUrl(*film.poster) + "\"" : "") +
-            "></video><figcaption>" + EscapeHtml(film.caption) + ", <code>" +
-            EscapeHtml(film.file) + "</code></figcaption></figure>";
+  return "<div class=mainfilm>" + FilmHtml(pictures.films[0]) + "</div>";
+}
+
+std::string OtherFilmsHtml(const ReportPictures& pictures) {
+  if (pictures.films.size() < 2) return "";
+  std::string html = "<h2>Other films</h2><div class=films>";
+  for (size_t i = 1; i < pictures.films.size(); ++i) html += FilmHtml(pictures.films[i]);
   return html + "</div>";
+}
+
+// How it went, for the page of a run.
+std::string VerdictHtml(const RunReport& report) {
+  if (!report.stages.reconstruct || report.evaluation.consistency.empty()) return "";
+  const Verdict verdict = VerdictOf(report);
+  std::string items;
+  for (const std::string& sentence : verdict.sentences)
+    items += "<li>" + EscapeHtml(sentence) + "</li>";
+  return "<ul class=verdict>" + items + "</ul><p class=note>What to do next: " +
+         EscapeHtml(verdict.advice) + ".</p>";
 }
 
 std::string ViewsHtml(const ReportPictures& pictures) {
@@ -103,9 +124,10 @@ std::string ReportHtml(const RunReport& report, const ReportPictures& pictures) 
       title + " · regrade report</title><style>" + kReportCss +
       "</style></head>\n<body><script>" + kReportScript + "</script><main>\n<header><h1>" +
       title + "</h1>" + FactsHtml(report) + "</header>\n";
-  if (headline) html += CompareHtml(*headline);
+  html += VerdictHtml(report) + MainFilmHtml(pictures);
+  if (headline) html += "<section>" + CompareHtml(*headline) + "</section>";
   for (const std::string& section :
-       {HeadlineMetricsHtml(report), FilmsHtml(pictures), ViewsHtml(pictures),
+       {HeadlineMetricsHtml(report), OtherFilmsHtml(pictures), ViewsHtml(pictures),
         ConsistencyHtml(report), HeatMapsHtml(pictures), StagesHtml(report), CostsHtml(report),
         EffectsHtml(report), PhotosHtml(report, pictures),
         RepeatHtml(report, pictures.run_json)}) {

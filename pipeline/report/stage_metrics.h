@@ -232,7 +232,11 @@ struct RenderReport {
   RecordedTime time;
   std::string device;
   int frames = 0;
-  int path_frames = 0;  // of these, along the film's camera path
+  int path_frames = 0;  // of these, on disk along the film's path: the film is measured there
+  int film_frames = 0;
+  double film_seconds = 0;
+  // The path's least transmittance, and its largest distance to a photo, in the photos' spacing.
+  Metric path_transmittance, path_photo_distance;
   FilmSize film;
   double strength = 1;  // of the style, see EQ(style-mix)
   std::string film_renderer;  // which renderer made the film, and why if it is the exact one
@@ -244,6 +248,11 @@ struct RenderReport {
     visit("device", device);
     visit("frames", frames, {.label = "frames"});
     visit("path_frames", path_frames);
+    visit("film_frames", film_frames, {.label = "frames of the film"});
+    visit("film_seconds", film_seconds, {.label = "length of the film", .unit = "s", .decimals = 1});
+    visit("path_transmittance", path_transmittance, {.label = "least transmittance of its path"});
+    visit("path_photo_distance", path_photo_distance,
+          {.label = "largest distance of its path to a photo", .unit = "photo spacings"});
     visit("film", film);
     visit("strength", strength, {.label = "strength of the style"});
     visit("film_renderer", film_renderer, {.label = "renderer of the film", .optional = true});

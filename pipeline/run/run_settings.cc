@@ -35,12 +35,15 @@ void ApplyPreset(const std::string& preset, RunSettings* settings) {
     settings->scene.photo_size = 480;
     settings->fit.resolutions = {64, 128, 192};
     settings->fit.steps = {400, 1000, 600};
-    settings->render.path.path_frames = 60;
+    settings->render.film_seconds = 6;
+    settings->render.film_size = 480;
   } else if (preset == "best") {
     settings->scene.photo_size = 1280;
     settings->fit.resolutions = {96, 192, 320};
     settings->fit.steps = {2000, 3000, 4000};
     settings->network.steps = 600;
+    settings->render.film_seconds = 12;
+    settings->render.film_size = 1920;
   } else if (preset == "paper") {
     // svox2's configuration for custom captures; LipRF's recipe for the style.
     settings->scene.photo_size = 1280;

@@ -24,8 +24,8 @@ struct SceneOptions {
   void Describe(Bind& bind) {
     bind("photo-size", photo_size,
          {.unit = "pixels",
-          .help = "longer side of the photos that the field is fitted to, and of rendered "
-                  "frames; time grows with its square",
+          .help = "longer side of the photos that the field is fitted to, and of frames at "
+                  "their places; time grows with its square",
           .min = 64,
           .max = 16384});
   }
@@ -60,7 +60,9 @@ struct StyleSource {
 };
 
 struct RenderOptions {
-  double fps = 24;
+  double fps = 30;
+  double film_seconds = 10;
+  int film_size = 1280;
   bool keep_exposure = false;
   bool exact = false;
   PathOptions path;
@@ -69,6 +71,14 @@ struct RenderOptions {
   void Describe(Bind& bind) {
     bind("fps", fps,
          {.unit = "frames/s", .help = "frame rate of the films", .min = 1, .max = 240});
+    bind("film-seconds", film_seconds,
+         {.unit = "s", .help = "length of the film; not of --path views", .min = 0.1, .max = 3600});
+    bind("film-size", film_size,
+         {.unit = "pixels",
+          .help = "longer side of the film, at most that of the photos' files; not of --path "
+                  "views",
+          .min = 16,
+          .max = 16384});
     bind("keep-exposure", keep_exposure,
          {.help = "renders frames at the photos' viewpoints with the exposure and white "
                   "balance of their photos, where these were undone"});

@@ -13,10 +13,12 @@
 #include "kernels/scene/common_camera.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/fields/field_file.h"
+#include "pipeline/fields/film_timing.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/program/device_choice.h"
 #include "pipeline/report/records.h"
 #include "pipeline/run/run_context.h"
+#include "pipeline/stages/film_frames.h"
 #include "pipeline/stages/heat_map_files.h"
 #include "pipeline/stages/linear_map_baseline.h"
 #include "pipeline/stages/make_stylizer.h"
@@ -93,11 +95,14 @@ void AddFilm(RunContext* context, const Image& style, const Camera& camera,
              std::vector<FidelityRow>* fidelity, std::vector<HeatMapFile>* heat_maps) {
   const RunSettings& settings = context->settings;
   if (!HasFilm(settings)) return;
-  std::vector<int> all(settings.render.path.path_frames);
+  std::vector<int> all(CountSamples(settings.render));
   for (size_t i = 0; i < all.size(); ++i) all[i] = static_cast<int>(i);
   const auto folder = [&](const char* name) {
     return context->style->Path(std::string("frames/") + kPathPrefix + name);
   };
+  ConsistencyOptions options = settings.consistency;
+  options.excerpt =
+      SamplesOfFilm(settings.render.film_seconds, settings.render.fps).excerpt;
   const bool renders_styled = std::filesystem::exists(folder("views_2d"));
   std::vector<NamedFrameSource> sequences;
   for (const char* name : {"source", "views_2d", "styled"}) {
@@ -106,7 +111,7 @@ void AddFilm(RunContext* context, const Image& style, const Camera& camera,
     sequences.push_back({sequence, FramesOf(folder(name), all)});
   }
   const ConsistencyReport film =
-      Compare(*context->style, sequences, camera, {}, settings.consistency,
+      Compare(*context->style, sequences, camera, {}, options,
               parts->Next(PairWeight(settings, static_cast<int>(all.size()))), heat_maps);
   report->rows.insert(report->rows.end(), film.rows.begin(), film.rows.end());
   report->pairs.insert(report->pairs.end(), film.pairs.begin(), film.pairs.end());
@@ -136,7 +141,7 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   const std::vector<Camera> compared = WithCommonIntrinsics(cameras);
 
   const double n = static_cast<double>(training_views.size());
-  const int film = HasFilm(settings) ? settings.render.path.path_frames : 0;
+  const int film = HasFilm(settings) ? CountSamples(settings.render) : 0;
   double weight = PairWeight(settings, static_cast<int>(all.size())) +
                   n * (4 * kFrameSeconds + kLinearMapSeconds);
   if (film > 0) weight += PairWeight(settings, film) + 3 * kFrameSeconds * film;
@@ -208,7 +213,7 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
     report.lpips_train = lpips(MeasuredTrainingViews(views));
   }
   if (!same_camera) context->console->Info(report.comparison_note);
-  context->console->Lines(FormatTables(consistency, fidelity));
+  context->console->DetailLines(FormatTables(consistency, fidelity));
   StageOutcome outcome;
   outcome.outputs = {kHeatMapFolder};
   PutMetrics(MetricsOf(consistency, fidelity, heat_maps), &outcome.metrics);

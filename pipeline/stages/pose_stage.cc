@@ -142,7 +142,7 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
   const PoseProfile profile = ProfilePoses(source.kind, settings.pose, settings.run.effects,
                                            sparse_folder, ingest.photos, tracks.misfit_scale,
                                            &capture, parts.Next(seconds.refinement));
-  context->console->Info(EffectLine(profile.effect));
+  context->console->Detail(EffectLine(profile.effect));
   outcome.metrics["effects"] = EffectsRecord({profile.effect});
   if (!profile.metrics.IsNull()) outcome.metrics["pose_refinement"] = profile.metrics;
   WriteCaptureIndex(workspace.Path("poses"), capture, ingest.photos);

@@ -152,7 +152,7 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
       as_taken.WithGains(profile.gains).InField(scene.field_from_world, scene.ndc);
   if (!scene.notice.empty()) context->console->Info(scene.notice);
   for (const EffectReport& effect : profile.effects)
-    if (effect.name != kViewDependence) context->console->Info(EffectLine(effect));
+    if (effect.name != kViewDependence) context->console->Detail(EffectLine(effect));
   for (const std::string& notice : profile.notices) context->console->Info(notice);
   const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
   FitOptions options = OptionsForMemory(context, PlannerOf(views, scene.box, backend), backend);
@@ -200,7 +200,7 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   measured = DumpJson(EffectsRecord({view_dependence}), -1);
   const double trial_seconds = context->console->StageSeconds() - trial_begin,
                trial_cpu_seconds = CpuSeconds() - trial_cpu_begin;
-  context->console->Info(EffectLine(view_dependence));
+  context->console->Detail(EffectLine(view_dependence));
   if (!view_dependence.on) options.sh_degree = 0;
   hooks.progress = parts.Next(1);
   FitResult fit = FitField(training_views, scene.box, options, hooks, backend);

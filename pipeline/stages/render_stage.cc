@@ -2,18 +2,18 @@
 // the former, at the photos' positions and along the film's camera path; and the films. Where
 // photos differ in size or lens, the frames at their positions are rendered again with one
 // common camera. Frames along the film's path may come from the fast renderer; all others are
-// exact.
+// exact. The 2D method styles frames at the photos' positions, and of the film those on which it
+// is measured.
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <memory>
 #include <optional>
 
-#include "evaluate/seen_by_few.h"
 #include "kernels/scene/common_camera.h"
 #include "pipeline/capture/photo_gains.h"
 #include "pipeline/capture/working_views.h"
-#include "pipeline/fields/camera_path.h"
+#include "pipeline/fields/film_timing.h"
 #include "pipeline/fields/field_file.h"
 #include "pipeline/fields/field_renderer.h"
 #include "pipeline/images/image_file.h"
@@ -21,9 +21,11 @@
 #include "pipeline/program/ordered_worker.h"
 #include "pipeline/report/stage_metrics.h"
 #include "pipeline/run/run_context.h"
+#include "pipeline/stages/film_frames.h"
 #include "pipeline/stages/film_renderer.h"
 #include "pipeline/stages/make_stylizer.h"
 #include "pipeline/stages/object_edit.h"
+#include "pipeline/stages/seen_by_few_recorder.h"
 #include "pipeline/stages/stages.h"
 #include "pipeline/stages/styled_field.h"
 #include "pipeline/stages/videos.h"
@@ -41,7 +43,7 @@ struct FrameRenderers {
   std::unique_ptr<ViewStylizer> stylizer;
   std::unique_ptr<CoverageRenderer> object;  // null where the whole scene is styled
   std::vector<Image> coverage;               // of the current frame
-  double styled_seconds = 0;                 // of rendering the restyled field
+  double seconds = 0;                        // of rendering both fields
   bool fast_film = false;                    // both renderers are prepared for it
 };
 
@@ -52,22 +54,6 @@ struct Frame {
   std::optional<Image> views_2d;  // of methods that can style a render
 };
 
-// Frames of one set of folders, frames/PREFIX{source, ...}.
-struct FrameSet {
-  std::string prefix;
-  std::vector<Camera> cameras;
-  bool of_photos = false;  // camera i is at photo i's position
-  bool of_film = false;
-};
-
-std::vector<FrameSet> FrameSetsOf(const std::vector<Camera>& views, const PathOptions& path) {
-  const bool same = HaveSameIntrinsics(views), film_of_views = path.path == "views";
-  std::vector<FrameSet> sets = {{"", views, true, film_of_views && same}};
-  if (!same) sets.push_back({kCommonPrefix, WithCommonIntrinsics(views), true, film_of_views});
-  if (!film_of_views) sets.push_back({kPathPrefix, MakeCameraPath(views, path), false, true});
-  return sets;
-}
-
 const FrameSet* CommonSet(const std::vector<FrameSet>& sets) {
   const auto common = std::find_if(sets.begin(), sets.end(), [](const FrameSet& set) {
     return set.prefix == kCommonPrefix;
@@ -77,22 +63,29 @@ const FrameSet* CommonSet(const std::vector<FrameSet>& sets) {
 
 // The sets before there is a field: poses in the capture's world, final sizes.
 std::vector<FrameSet> PlannedSets(const RunContext& context) {
-  return FrameSetsOf(context.Views().Cameras(), context.settings.render.path);
+  const WorkingViews views = context.Views();
+  const RenderOptions& options = context.settings.render;
+  return FrameSetsOf(views, options, MakeFilmPath(views, options, nullptr));
 }
 
-// "24 frames at the photos' positions, 24 there with one camera (480x360 px), 60 of the film,
-// about 53 MB of pictures".
+// "24 frames at the photos' positions, 24 there with one camera (480x360 px), 60 where the film
+// is measured, 180 of the film (480x360 px), about 53 MB of pictures".
 std::string PlanOf(const std::vector<FrameSet>& sets) {
   constexpr double kBytesPerPixel = 5;  // of three PNGs in colour and one in grey, measured
   std::string text;
   double pixels = 0;
   for (const FrameSet& set : sets) {
+    const std::string size =
+        Concat(" (", set.cameras[0].width, "x", set.cameras[0].height, " px), ");
     text += std::to_string(set.cameras.size());
     if (set.prefix == kCommonPrefix)
-      text += " there with one camera (" + std::to_string(set.cameras[0].width) + "x" +
-              std::to_string(set.cameras[0].height) + " px), ";
+      text += " there with one camera" + size;
+    else if (set.prefix == kFilmPrefix)
+      text += " of the film" + size;
     else
-      text += set.of_photos ? " frames at the photos' positions, " : " of the film, ";
+      text += set.of_photos ? " frames at the photos' positions, "
+                            : " where the film is measured, ";
+    if (set.prefix == kFilmPrefix) continue;
     for (const Camera& camera : set.cameras)
       pixels += static_cast<double>(camera.width) * camera.height;
   }
@@ -102,20 +95,25 @@ std::string PlanOf(const std::vector<FrameSet>& sets) {
 
 // The scene as a camera of that gain records it.
 Frame RenderFrame(RunContext* context, FrameRenderers* renderers, const Camera& camera,
-                  const PhotoGain& gain, int index, bool fast) {
-  const auto render = [&](const FieldRenderer& field) {
-    return fast ? field.RenderFast(camera) : field.Render(camera);
-  };
-  Frame frame;
-  RenderedView plain = render(renderers->source);
+                  const PhotoGain& gain, int index, bool fast, bool with_2d) {
   const double begin = context->console->StageSeconds();
-  frame.styled = render(renderers->styled).color;
-  renderers->styled_seconds += context->console->StageSeconds() - begin;
+  RenderedView plain;
+  Frame frame;
+  if (fast) {
+    plain = renderers->source.RenderFast(camera);
+    frame.styled = renderers->styled.RenderFast(camera).color;
+  } else {
+    RenderedPair pair = renderers->source.RenderWith(renderers->styled, camera);
+    plain = std::move(pair.view);
+    frame.styled = std::move(pair.other_color);
+  }
+  renderers->seconds += context->console->StageSeconds() - begin;
   frame.source = std::move(plain.color);
   frame.transmittance = std::move(plain.transmittance);
   frame.depth = std::move(plain.depth);
   PutGain(gain, &frame.source);
   PutGain(gain, &frame.styled);
+  if (!with_2d) return frame;
   if (renderers->object != nullptr) renderers->coverage = renderers->object->Render(camera);
   if (renderers->stylizer->StylesAnything()) {
     frame.views_2d = renderers->stylizer->Stylize(frame.source, index);
@@ -123,51 +121,6 @@ Frame RenderFrame(RunContext* context, FrameRenderers* renderers, const Camera& 
   }
   return frame;
 }
-
-// Gathers how much of each view few photos see. The frames at the photos' positions come first.
-class SeenByFewRecorder {
- public:
-  SeenByFewRecorder(const WorkingViews& views, double near) : views_(views), near_(near) {}
-
-  void Add(const FrameSet& set, int index, const Image& depth) {
-    const bool photo = set.prefix.empty();
-    const Camera& camera = set.cameras[static_cast<size_t>(index)];
-    current_.push_back(SampleView(camera, depth, photo ? views_.Mask(index) : Image()));
-  }
-  void Finish(const FrameSet& set) {
-    if (set.prefix.empty())
-      for (const int i : views_.Training()) photos_.push_back(current_[static_cast<size_t>(i)]);
-    std::vector<Metric> shares;
-    for (const SampledView& view : current_)
-      shares.push_back(Metric(SeenByFew(view, photos_, near_), "the view shows no surface"));
-    current_.clear();
-    if (set.of_film) SetFilm(shares);
-    if (set.prefix.empty()) metrics_.photos = std::move(shares);
-  }
-  const SeenByFewMetrics& metrics() const { return metrics_; }
-
- private:
-  void SetFilm(const std::vector<Metric>& shares) {
-    double sum = 0;
-    int count = 0;
-    for (size_t i = 0; i < shares.size(); ++i) {
-      const std::optional<double>& share = shares[i].value;
-      if (!share) continue;
-      sum += *share, ++count;
-      if (count > 1 && *share <= *metrics_.worst_frame.value) continue;
-      metrics_.worst_frame = *share;
-      metrics_.worst_frame_number = static_cast<int>(i);
-    }
-    metrics_.film =
-        count > 0 ? Metric(sum / count) : Metric::Undefined("no frame shows a surface");
-    if (count == 0) metrics_.worst_frame = metrics_.film;
-  }
-
-  const WorkingViews& views_;
-  const double near_;
-  std::vector<SampledView> photos_, current_;
-  SeenByFewMetrics metrics_;
-};
 
 // Writes files and films while the next frames are rendered: one thread for each half of the
 // pictures and one for the films, so that a GPU does not wait for them.
@@ -178,6 +131,10 @@ class FrameWriter {
 
   // frames/<prefix>{source, styled, views_2d, transmittance}/<index>.png
   void Write(const std::shared_ptr<const Frame>& frame, const FrameSet& set, int index) {
+    if (set.of_film) film_.Do([=, this] { films_->Add(index, frame->source, frame->styled); });
+    if (set.of_2d_film && frame->views_2d)
+      film_.Do([=, this] { films_->AddViews2d(*frame->views_2d); });
+    if (set.prefix == kFilmPrefix) return;
     const std::string prefix = set.prefix;
     const auto write = [this, prefix, index](const char* sequence, const Image& image) {
       WritePng8(workspace_.NewPath("frames/" + prefix + sequence + "/" + FrameName(index)),
@@ -192,11 +149,6 @@ class FrameWriter {
     after_.Do([=] {
       write("styled", frame->styled);
       if (frame->views_2d) write("views_2d", *frame->views_2d);
-    });
-    if (!set.of_film) return;
-    film_.Do([=, this] {
-      films_->Add(index, frame->source, frame->styled,
-                  frame->views_2d ? &*frame->views_2d : nullptr);
     });
   }
   void Finish() {
@@ -237,7 +189,16 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   renderers.stylizer = MakeSceneStylizer(context, views, masks.get(),
                                          [&](const Image&, int) { return renderers.coverage; });
 
-  const std::vector<FrameSet> sets = FrameSetsOf(views.Cameras(), settings.render.path);
+  const FilmPath path = MakeFilmPath(views, settings.render, &before.field);
+  if (path.narrowed)
+    context->console->Info(
+        "the film keeps close to the photos' places: a smoother path would pass through "
+        "surfaces");
+  if (path.transmittance.value.value_or(1) < kClearTransmittance)
+    context->console->Warn(
+        "the film passes through surfaces, for photos were taken on both sides of them; "
+        "--path views shows the photos' places one by one");
+  const std::vector<FrameSet> sets = FrameSetsOf(views, settings.render, path);
   int total = 0;
   for (const FrameSet& set : sets) total += static_cast<int>(set.cameras.size());
   const FrameSet& film =
@@ -248,13 +209,14 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   const std::string why_exact =
       PrepareFilm(settings, backend, film.of_photos, &renderers.source, &renderers.styled);
   renderers.fast_film = why_exact.empty();
-  context->console->Info("renderer of the film: " + FilmRendererText(why_exact));
+  context->console->Detail("renderer of the film: " + FilmRendererText(why_exact));
 
   std::filesystem::remove_all(workspace.Path("frames"));
   StageOutcome outcome;
   outcome.outputs = {"frames"};
   if (settings.style.keep_field) outcome.outputs.push_back("styled.npz");
-  RunFilms films(workspace, settings.render.fps, static_cast<int>(film.cameras.size()));
+  RunFilms films(workspace, settings.render.fps, static_cast<int>(film.cameras.size()),
+                 film.of_photos ? settings.render.fps : kSampleRate);
   // In NDC the field's limit is no distance.
   SeenByFewRecorder seen(views, before.ndc.on() ? 0 : before.field.near_clip);
   {
@@ -266,7 +228,7 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
         const auto frame = std::make_shared<const Frame>(RenderFrame(
             context, &renderers, set.cameras[static_cast<size_t>(i)],
             set.of_photos && settings.render.keep_exposure ? views.Gain(i) : kAsTaken, i,
-            renderers.fast_film && !set.of_photos));
+            renderers.fast_film && !set.of_photos, set.prefix != kFilmPrefix));
         seen.Add(set, i, frame->depth);
         writer.Write(frame, set, i);
       }
@@ -279,11 +241,15 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   RenderReport report;
   report.device = DeviceName(backend);
   report.frames = total;
-  report.path_frames = film.of_photos ? 0 : static_cast<int>(film.cameras.size());
+  report.path_frames = CountSamples(settings.render);
+  report.film_frames = static_cast<int>(film.cameras.size());
+  report.film_seconds = report.film_frames / settings.render.fps;
+  report.path_transmittance = path.transmittance;
+  report.path_photo_distance = path.photo_distance;
   report.film = {film.cameras[0].width, film.cameras[0].height};
   report.strength = strength;
   report.film_renderer = FilmRendererText(why_exact);
-  if (renderers.styled_seconds > 0) report.frames_per_second = total / renderers.styled_seconds;
+  if (renderers.seconds > 0) report.frames_per_second = total / renderers.seconds;
   report.seen_by_few = seen.metrics();
   if (report.seen_by_few.film.value.value_or(0) > kMuchSeenByFew)
     context->console->Warn(report.seen_by_few.Sentence() +

@@ -174,7 +174,7 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
   metrics.notices = restyled.notices;
   for (const std::string& warning : trained.warnings) metrics.notices.push_back(warning);
   if (const std::string why = WhySteep(trained); !why.empty()) {
-    context->console->Info(why);
+    context->console->Detail(why);
     metrics.notices.push_back(why);
   }
   PutMetrics(metrics, &outcome.metrics);

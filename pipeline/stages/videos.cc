@@ -24,37 +24,40 @@ Image Wipe(const Image& left, const Image& right, int border) {
   return mixed;
 }
 
-RunFilms::RunFilms(const Workspace& workspace, double frames_per_second, int frames)
-    : workspace_(workspace), frames_per_second_(frames_per_second), frames_(frames) {
+RunFilms::RunFilms(const Workspace& workspace, double frames_per_second, int frames,
+                   double views_2d_per_second)
+    : workspace_(workspace),
+      frames_per_second_(frames_per_second),
+      views_2d_per_second_(views_2d_per_second),
+      frames_(frames) {
   // An earlier film: this run's 2D method may not be able to style rendered frames.
   std::filesystem::remove(workspace.Path(kViews2dFilm));
 }
 
-void RunFilms::Begin(const Image& first, bool with_views_2d) {
-  width_ = first.width;
-  height_ = first.height;
-  const auto open = [&](const char* name, std::optional<VideoWriter>* writer) {
-    writer->emplace(workspace_.Path(name), width_, height_, frames_per_second_);
-  };
+void RunFilms::Open(const char* name, const Image& first, double frames_per_second,
+                    std::optional<VideoWriter>* writer) {
+  if (!*writer)
+    writer->emplace(workspace_.Path(name), first.width, first.height, frames_per_second);
+}
+
+void RunFilms::Add(int index, const Image& source, const Image& styled) {
+  if (!why_none_.empty()) return;
   try {
-    open(kStyledFilm, &film_);
-    open(kWipeFilm, &wipe_);
-    if (with_views_2d) open(kViews2dFilm, &frame_by_frame_);
+    Open(kStyledFilm, styled, frames_per_second_, &film_);
+    Open(kWipeFilm, styled, frames_per_second_, &wipe_);
+    film_->Add(styled);
+    wipe_->Add(Wipe(source, styled, WipeBorder(styled.width, index, frames_)));
   } catch (const Error& error) {
     if (error.code() != ExitCode::kExternalProgram) throw;
     GiveUp(error.what_failed());
   }
 }
 
-void RunFilms::Add(int index, const Image& source, const Image& styled, const Image* views_2d) {
-  if (index == 0) Begin(styled, views_2d != nullptr);
+void RunFilms::AddViews2d(const Image& views_2d) {
   if (!why_none_.empty()) return;
-  REGRADE_CHECK_EQ(styled.width, width_);
-  REGRADE_CHECK_EQ(styled.height, height_);
   try {
-    film_->Add(styled);
-    wipe_->Add(Wipe(source, styled, WipeBorder(width_, index, frames_)));
-    if (frame_by_frame_ && views_2d != nullptr) frame_by_frame_->Add(*views_2d);
+    Open(kViews2dFilm, views_2d, views_2d_per_second_, &frame_by_frame_);
+    frame_by_frame_->Add(views_2d);
   } catch (const Error& error) {
     if (error.code() != ExitCode::kExternalProgram) throw;
     GiveUp(error.what_failed());

@@ -18,12 +18,16 @@ Image Wipe(const Image& left, const Image& right, int border);
 
 class RunFilms {
  public:
-  // `frames`: their number, at most one for each camera of the film's path.
-  RunFilms(const Workspace& workspace, double frames_per_second, int frames);
+  // `frames`: their number, at most one for each camera of the film's path. The film of the 2D
+  // method has its own rate.
+  RunFilms(const Workspace& workspace, double frames_per_second, int frames,
+           double views_2d_per_second);
 
-  // Frame `index` of each film; `views_2d` is null for all frames or for none. All frames have
-  // one size. Without an H.264 encoder there are no films: see why_none.
-  void Add(int index, const Image& source, const Image& styled, const Image* views_2d);
+  // Frame `index` of the film and the wipe; all have one size. Without an H.264 encoder there
+  // are no films: see why_none.
+  void Add(int index, const Image& source, const Image& styled);
+  // The next frame of the 2D method's film.
+  void AddViews2d(const Image& views_2d);
   // Completes the films and adds their names to `outputs`.
   void Finish(std::vector<std::string>* outputs);
 
@@ -31,13 +35,13 @@ class RunFilms {
   const std::string& why_none() const { return why_none_; }
 
  private:
-  void Begin(const Image& first, bool with_views_2d);
+  void Open(const char* name, const Image& first, double frames_per_second,
+            std::optional<VideoWriter>* writer);
   void GiveUp(const std::string& why);
 
   const Workspace& workspace_;
-  double frames_per_second_;
+  double frames_per_second_, views_2d_per_second_;
   int frames_;
-  int width_ = 0, height_ = 0;
   std::optional<VideoWriter> film_, wipe_, frame_by_frame_;
   std::string why_none_;
 };

@@ -4,6 +4,8 @@
 
 #include "kernels/base/error.h"
 #include "kernels/scene/common_camera.h"
+#include "pipeline/fields/film_timing.h"
+#include "pipeline/stages/film_frames.h"
 #include "pipeline/capture/scene_profile.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/report/cost_rows.h"
@@ -88,6 +90,19 @@ RunSettings SettingsOf(const RunSettings& base, const Variant& variant) {
   return settings;
 }
 
+// Of the frames that are only in the film, whose camera at working size is `common`.
+double FilmPixels(const RunSettings& settings, const Capture& capture, const Camera& common) {
+  const RenderOptions& render = settings.render;
+  if (render.path.path == "views") return 0;
+  double side = 0;  // of the photos' files
+  for (const CaptureView& view : capture.views)
+    side = std::max<double>(side, std::max(view.camera.width, view.camera.height));
+  const double scale =
+      std::min<double>(render.film_size, side) / std::max(common.width, common.height);
+  return FilmFrames(render.film_seconds, render.fps) * scale * scale * common.width *
+         common.height;
+}
+
 }  // namespace
 
 double AmountOf(const std::string& unit, const RunSettings& settings, const Capture& capture) {
@@ -95,7 +110,7 @@ double AmountOf(const std::string& unit, const RunSettings& settings, const Capt
   const double pixels = PhotoPixels(settings, capture);
   const double film = settings.render.path.path == "views"
                           ? 0
-                          : static_cast<double>(settings.render.path.path_frames);
+                          : static_cast<double>(CountSamples(settings.render));
   const double frame = photos > 0 ? pixels / photos : 0;
   if (unit == "photo megapixels") {
     double sum = 0;
@@ -139,7 +154,8 @@ double AmountOf(const std::string& unit, const RunSettings& settings, const Capt
     const Camera common = CommonCamera(views);
     const double common_frame = static_cast<double>(common.width) * common.height;
     if (unit == "frame pixels")
-      return pixels + (film + (HaveSameIntrinsics(views) ? 0 : photos)) * common_frame;
+      return pixels + (film + (HaveSameIntrinsics(views) ? 0 : photos)) * common_frame +
+             FilmPixels(settings, capture, common);
     double pairs = 0;
     for (const int gap : settings.consistency.gaps)
       pairs += std::max(0.0, photos - gap) + std::max(0.0, film - gap);

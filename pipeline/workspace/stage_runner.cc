@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <iterator>
 #include <new>
+#include <string>
 
 #include "kernels/base/error.h"
 #include "pipeline/files/text.h"
@@ -11,6 +12,17 @@
 namespace regrade {
 namespace {
 
+// What a person reads, and the stage's part of the time of a draft of 24 photos on two cores.
+struct StageFacts {
+  const char* words;
+  double part;
+};
+constexpr StageFacts kFacts[] = {
+    {"finding where each photo was taken", 0.17}, {"fitting the scene to the photos", 0.33},
+    {"recolouring each photo", 0.01},             {"applying the style to the scene", 0.15},
+    {"rendering frames and films", 0.22},         {"measuring", 0.11},
+    {"writing the report", 0.01}};
+
 size_t PlaceOf(const std::string& stage) {
   const auto* found = std::find(std::begin(kStageNames), std::end(kStageNames), stage);
   REGRADE_CHECK(found != std::end(kStageNames));
@@ -18,6 +30,11 @@ size_t PlaceOf(const std::string& stage) {
 }
 
 }  // namespace
+
+std::string StageTitle(const std::string& stage) {
+  const size_t place = PlaceOf(stage);
+  return Concat("stage ", place + 1, " of ", std::size(kStageNames), ": ", kFacts[place].words);
+}
 
 void StageRunner::RestartFrom(const std::string& stage) {
   if (stage.empty()) return;
@@ -70,7 +87,13 @@ bool StageRunner::Run(const Stage& stage) {
   if (status.state != StageState::kNeverDone) folder->Forget(stage.name);
   ForgetAfter(stage.name);
   console_->SetKept(Finished());
-  console_->BeginStage(stage.name);
+  const size_t place = PlaceOf(stage.name);
+  double later = 0;
+  // Without a style the scene is all.
+  for (size_t i = place + 1; i < (style_ == nullptr ? 2 : std::size(kStageNames)); ++i)
+    later += kFacts[i].part;
+  console_->Info(StageTitle(stage.name));
+  console_->BeginStage(stage.name, StageTitle(stage.name), later / kFacts[place].part);
   const double cpu_before = CpuSeconds();
   StageOutcome outcome;
   try {

@@ -21,6 +21,9 @@ inline bool IsOfScene(const std::string& stage) {
   return stage == "pose" || stage == "reconstruct";
 }
 
+// "stage 2 of 7: fitting the scene to the photos".
+std::string StageTitle(const std::string& stage);
+
 struct StageOutcome {
   std::vector<std::string> outputs;  // files and folders, relative to the output folder
   JsonValue metrics = JsonValue::Object();

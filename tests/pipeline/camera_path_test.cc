@@ -3,8 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include "pipeline/fields/film_timing.h"
+#include "pipeline/fields/path_clearance.h"
+
 #include <algorithm>
 #include <cmath>
+#include <memory>
 
 namespace regrade {
 namespace {
@@ -42,7 +46,7 @@ void ExpectCameras(const std::vector<Camera>& path) {
 
 TEST(CameraPath, SmoothHasNoJumpsEvenFromShuffledPhotos) {
   for (const bool shuffled : {false, true}) {
-    const std::vector<Camera> path = MakeCameraPath(Arc(15, shuffled), {"smooth", 60});
+    const std::vector<Camera> path = MakeCameraPath(Arc(15, shuffled), {"smooth"}, EvenMoments(60));
     ASSERT_EQ(path.size(), 60u);
     ExpectCameras(path);
     double largest = 0, total = 0;
@@ -75,7 +79,7 @@ TEST(CameraPath, OrderIsATourWithoutDetours) {
 
 TEST(CameraPath, OrbitAndSpiralLookAtTheScene) {
   for (const char* name : {"orbit", "spiral"}) {
-    const std::vector<Camera> path = MakeCameraPath(Arc(15, false), {name, 24});
+    const std::vector<Camera> path = MakeCameraPath(Arc(15, false), {name}, EvenMoments(24));
     ASSERT_EQ(path.size(), 24u);
     ExpectCameras(path);
     for (const Camera& camera : path)
@@ -84,13 +88,93 @@ TEST(CameraPath, OrbitAndSpiralLookAtTheScene) {
   }
 }
 
+TEST(CameraPath, BeginsAndEndsAtRestWithoutJumps) {
+  EXPECT_EQ(EasedWay(0), 0);
+  EXPECT_EQ(EasedWay(1), 1);
+  EXPECT_NEAR(EasedWay(0.5), 0.5, 1e-12);
+  constexpr int kFrames = 180;
+  const std::vector<Camera> path =
+      MakeCameraPath(Arc(15, false), {"smooth"}, EvenMoments(kFrames));
+  std::vector<double> steps;
+  for (int i = 1; i < kFrames; ++i)
+    steps.push_back(Norm(path[static_cast<size_t>(i)].Center() -
+                         path[static_cast<size_t>(i - 1)].Center()));
+  const double most = *std::max_element(steps.begin(), steps.end());
+  // The first step of a constant acceleration over 27 frames is 1/54 of full speed.
+  EXPECT_LT(steps.front(), 0.05 * most);
+  EXPECT_LT(steps.back(), 0.05 * most);
+  for (size_t i = 1; i < steps.size(); ++i)
+    EXPECT_LT(std::abs(steps[i] - steps[i - 1]), 0.1 * most) << i;  // nor does speed jump
+}
+
+// Two walls of photos' places with a slab between them: a wide mean cuts the corner through it.
+TEST(PathClearance, FindsAPathThroughASurface) {
+  RadianceField field;
+  auto geometry = std::make_shared<Geometry>();
+  constexpr int kN = 32;
+  geometry->frame = {{kN, kN, kN}, {0, 0, 0}, {1, 1, 1}};
+  geometry->links.Resize(kN * kN * kN);
+  for (int x = 0; x < kN; ++x)
+    for (int y = 0; y < kN; ++y)
+      for (int z = 0; z < kN; ++z)
+        geometry->links[geometry->frame.Vertex(x, y, z)] = std::abs(x - kN / 2) < 2 ? 0 : -1;
+  geometry->density.Resize(1);
+  geometry->density[0] = 100;  // per unit of length: e^-19 through the slab of 3 / 16
+  field.geometry = geometry;
+  std::vector<Camera> photos = Arc(6, false);
+  const auto place = [](double x, double y) {
+    Camera camera = Arc(2, false)[0];
+    camera.camera_from_world.rotation = Mat3d();
+    camera.camera_from_world.translation = {-x, -y, 0};
+    return camera;
+  };
+  for (int i = 0; i < 6; ++i) photos[static_cast<size_t>(i)] = place(-0.6, -0.5 + 0.2 * i);
+  std::vector<Camera> beside, through;
+  for (int i = 0; i <= 40; ++i) {
+    beside.push_back(place(-0.5, -0.5 + 0.025 * i));
+    through.push_back(place(-0.6 + 0.03 * i, 0));
+  }
+  const PathClearance clear = MeasureClearance(field, photos, beside);
+  EXPECT_EQ(clear.transmittance, 1);
+  EXPECT_LE(clear.photo_distance, std::hypot(0.1, 0.1) / 0.2 + 1e-9);
+  EXPECT_GT(clear.photo_distance, 0.45);
+  const PathClearance blocked = MeasureClearance(field, photos, through);
+  EXPECT_LT(blocked.transmittance, 1e-3);
+  EXPECT_GT(blocked.photo_distance, 5);
+}
+
+TEST(FilmTiming, SamplesAreAtFixedTimesWhateverTheRate) {
+  for (const double rate : {24.0, 30.0, 60.0}) {
+    const FilmSamples samples = SamplesOfFilm(6, rate);
+    ASSERT_EQ(samples.moments.size(), 60u);
+    EXPECT_EQ(samples.excerpt, 20);
+    const double length = (FilmFrames(6, rate) - 1) / rate;
+    for (int i = 1; i < 60; ++i) {
+      const double gap = (samples.moments[static_cast<size_t>(i)] -
+                          samples.moments[static_cast<size_t>(i - 1)]) *
+                         length;
+      if (i % 20 == 0)
+        EXPECT_GT(gap, 0.5) << i;  // between excerpts
+      else
+        EXPECT_NEAR(gap, 1.0 / 24, 1e-9) << i;
+    }
+    EXPECT_GE(samples.moments.front(), 0);
+    EXPECT_LE(samples.moments.back(), 1);
+  }
+  // At 24 a second the samples of a short film are its frames.
+  const FilmSamples all = SamplesOfFilm(0.125, 24);
+  EXPECT_EQ(all.moments.size(), 3u);
+  EXPECT_EQ(all.moments.back(), 1);
+  EXPECT_EQ(FilmFrames(0.125, 24), 3);
+}
+
 TEST(CameraPath, OneCameraStands) {
-  const std::vector<Camera> path = MakeCameraPath(Arc(2, false), {"smooth", 5});
+  const std::vector<Camera> path = MakeCameraPath(Arc(2, false), {"smooth"}, EvenMoments(5));
   ExpectCameras(path);
   std::vector<Camera> one = Arc(2, false);
   one.resize(1);
   for (const char* name : {"smooth", "orbit", "spiral"})
-    ExpectCameras(MakeCameraPath(one, {name, 5}));
+    ExpectCameras(MakeCameraPath(one, {name}, EvenMoments(5)));
 }
 
 }  // namespace

@@ -26,7 +26,6 @@ namespace {
 
 using testing::RandomCellField;
 using testing::ReadText;
-using testing::RestyledField;
 using testing::TemporaryFolder;
 
 template <typename T>

@@ -97,8 +97,19 @@ RunReport FullReport() {
                                                 .heldout = {"a.jpg"}};
   report.stages.style_2d = Style2dReport{.time = {3, {}}, .method = "mkl", .views = 7};
   report.stages.stylize = MeasuredStyle();
-  report.stages.render = RenderReport{{5, {}},    "cpu",   60, 36,
-                                      {640, 480}, 1, "exact", 12, {0.41, 0.72, 12, {0.5, 0.25}}};
+  report.stages.render = RenderReport{.time = {5, {}},
+                                      .device = "cpu",
+                                      .frames = 60,
+                                      .path_frames = 36,
+                                      .film_frames = 180,
+                                      .film_seconds = 6,
+                                      .path_transmittance = 0.97,
+                                      .path_photo_distance = 1.4,
+                                      .film = {640, 480},
+                                      .strength = 1,
+                                      .film_renderer = "exact",
+                                      .frames_per_second = 12,
+                                      .seen_by_few = {0.41, 0.72, 12, {0.5, 0.25}}};
   report.stages.evaluate = EvaluateReport{{6, {}}, "dis-medium", "lai2018", "", 25, 26, 0.2};
   report.evaluation = MeasuredEvaluation();
   return report;
@@ -134,7 +145,8 @@ TEST(ReportJson, HasTheKeysOfSchema2InOrder) {
             "local_lipschitz_along_coefficients", "local_lipschitz_along_position",
             "bound_at_steps", "notices", "cpu_seconds"}));
   EXPECT_EQ(KeysOf(stages.At("render")),
-            (Keys{"seconds", "device", "frames", "path_frames", "film", "strength", "film_renderer",
+            (Keys{"seconds", "device", "frames", "path_frames", "film_frames", "film_seconds",
+                  "path_transmittance", "path_photo_distance", "film", "strength", "film_renderer",
                   "frames_per_second", "seen_by_few"}));
   EXPECT_EQ(KeysOf(stages.At("render").At("seen_by_few")),
             (Keys{"film", "worst_frame", "worst_frame_number", "photos"}));
@@ -236,7 +248,8 @@ TEST(MetricsJson, AMissingNumberIsNoZero) {
     return MetricsFromJson<RenderReport>(ParseJson(text, "render.json"));
   };
   const std::string whole =
-      R"({"device": "cpu", "frames": 3, "path_frames": 0, "film": {"width": 4, "height": 3},)"
+      R"({"device": "cpu", "frames": 3, "path_frames": 0, "film_frames": 2, "film_seconds": 1, )"
+      R"("path_transmittance": 1, "path_photo_distance": 1, "strength": 1, "film": {"width": 4, "height": 3},)"
       R"( "seen_by_few": {"film": 0.41, "worst_frame": 0.72, "worst_frame_number": 3, "photos": []},)"
       R"( "frames_per_second": null, "frames_per_second_why": "not measured"})";
   EXPECT_EQ(read(whole).frames_per_second.why, "not measured");

@@ -26,11 +26,12 @@ inline ProgramOutcome RunProgram(const std::string& program,
   return outcome;
 }
 
-// Options for the smallest possible fit, style and film.
+// Options for the smallest possible fit, style and film: three frames, at which it is measured,
+// too.
 inline std::vector<std::string> TinyFlags() {
   return {"--photo-size",  "64",   "--fit-resolutions", "24", "--fit-steps", "30",
-          "--style-steps", "3",    "--path-frames",     "3",  "--threads",   "2",
-          "--tracks",      "given"};
+          "--style-steps", "3",    "--film-seconds",    "0.125", "--fps",   "24",
+          "--film-size",   "64",   "--threads",         "2",     "--tracks", "given"};
 }
 
 }  // namespace regrade::testing

@@ -23,6 +23,26 @@ inline void MarchRay(const FastGrid& grid, const Ray& ray, const MarchOptions& o
     March(grid, ray, options, marched);
 }
 
+// The colour of a ray that has been marched, with what is behind the box.
+struct ShadedRay {
+  Quad sums;  // the last lane: the sum of w t, in world units
+  float transmittance;
+};
+
+template <int kBasis>
+ShadedRay ShadeRay(const FastGrid& grid, const Ray& ray, const MarchOptions& options,
+                   Marched* marched, MarchedSpheres* spheres) {
+  Quad sums = Shade(grid, RayBasis<kBasis>(ray.direction), marched);
+  sums[3] *= marched->world_per_voxel;
+  float remaining = marched->transmittance;
+  if (spheres != nullptr) {
+    sums += ShadeSpheres(grid, ray, options.stop_transmittance, remaining, spheres);
+    remaining = spheres->transmittance;
+  }
+  for (int a = 0; a < 3; ++a) sums[a] += grid.background[a] * remaining;
+  return {sums, remaining};
+}
+
 template <int kBasis>
 void RenderRays(const FastGrid& grid, const Ray* rays, int64_t n, const MarchOptions& options,
                 float* color, float* depth, float* transmittance) {
@@ -30,16 +50,29 @@ void RenderRays(const FastGrid& grid, const Ray* rays, int64_t n, const MarchOpt
   const auto spheres = MakeMarchedSpheres(grid);
   for (int64_t r = 0; r < n; ++r) {
     MarchRay(grid, rays[r], options, &marched);
-    Quad sums = Shade(grid, RayBasis<kBasis>(rays[r].direction), &marched);
-    sums[3] *= marched.world_per_voxel;
-    float remaining = marched.transmittance;
-    if (spheres) {
-      sums += ShadeSpheres(grid, rays[r], options.stop_transmittance, remaining, spheres.get());
-      remaining = spheres->transmittance;
+    const ShadedRay shaded = ShadeRay<kBasis>(grid, rays[r], options, &marched, spheres.get());
+    for (int a = 0; a < 3; ++a) color[3 * r + a] = shaded.sums[a];
+    depth[r] = shaded.sums[3];
+    transmittance[r] = shaded.transmittance;
+  }
+}
+
+template <int kBasis, int kOther>
+void RenderPair(const FastGrid& grid, const FastGrid& other, const Ray* rays, int64_t n,
+                const MarchOptions& options, float* color, float* other_color, float* depth,
+                float* transmittance) {
+  Marched marched;
+  const auto spheres = MakeMarchedSpheres(grid);
+  for (int64_t r = 0; r < n; ++r) {
+    MarchRay(grid, rays[r], options, &marched);
+    const ShadedRay first = ShadeRay<kBasis>(grid, rays[r], options, &marched, spheres.get());
+    const ShadedRay second = ShadeRay<kOther>(other, rays[r], options, &marched, spheres.get());
+    for (int a = 0; a < 3; ++a) {
+      color[3 * r + a] = first.sums[a];
+      other_color[3 * r + a] = second.sums[a];
     }
-    for (int a = 0; a < 3; ++a) color[3 * r + a] = sums[a] + grid.background[a] * remaining;
-    depth[r] = sums[3];
-    transmittance[r] = remaining;
+    depth[r] = first.sums[3];
+    transmittance[r] = first.transmittance;
   }
 }
 
@@ -111,6 +144,24 @@ const FastRayFunctions kFunctions = {
           g.basis, [&] { RenderRays<9>(g, rays, n, o, color, depth, transmittance); },
           [&] { RenderRays<4>(g, rays, n, o, color, depth, transmittance); },
           [&] { RenderRays<1>(g, rays, n, o, color, depth, transmittance); });
+    },
+    [](const FastGrid& g, const FastGrid& other, const Ray* rays, int64_t n,
+       const MarchOptions& o, float* color, float* other_color, float* depth,
+       float* transmittance) {
+      const auto render = [&](auto basis) {
+        const auto with = [&](auto of_other) {
+          RenderPair<basis.value, of_other.value>(g, other, rays, n, o, color, other_color,
+                                                  depth, transmittance);
+        };
+        ByBasis(
+            other.basis, [&] { with(std::integral_constant<int, 9>()); },
+            [&] { with(std::integral_constant<int, 4>()); },
+            [&] { with(std::integral_constant<int, 1>()); });
+      };
+      ByBasis(
+          g.basis, [&] { render(std::integral_constant<int, 9>()); },
+          [&] { render(std::integral_constant<int, 4>()); },
+          [&] { render(std::integral_constant<int, 1>()); });
     },
     [](const FastGrid& g, const RayBatch& b, const MarchOptions& o, float scale,
        GradientArena* arena) {

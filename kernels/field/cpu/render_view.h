@@ -15,4 +15,14 @@ RenderedView RenderView(const FastGrid& grid, const Camera& camera,
 RenderedView RenderView(const RadianceField& field, const Camera& camera,
                         const MarchOptions& options);
 
+// A view of a field and the colours of another one of the same geometry.
+struct RenderedPair {
+  RenderedView view;
+  Image other_color;  // [H, W, 3] sRGB, clipped to [0, 1]
+};
+
+// To the bit what two calls of RenderView give; density is marched once.
+RenderedPair RenderViewPair(const FastGrid& grid, const FastGrid& other, const Camera& camera,
+                            const MarchOptions& options);
+
 }  // namespace regrade

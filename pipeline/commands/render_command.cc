@@ -1,0 +1,104 @@
+// regrade render: the frames and films of a style again, or single stills.
+#include <algorithm>
+#include <filesystem>
+
+#include "kernels/base/error.h"
+#include "pipeline/capture/working_views.h"
+#include "pipeline/commands/continue_command.h"
+#include "pipeline/fields/field_renderer.h"
+#include "pipeline/images/image_file.h"
+#include "pipeline/program/device_choice.h"
+#include "pipeline/run/run_settings.h"
+#include "pipeline/stages/styled_field.h"
+#include "pipeline/workspace/style_folders.h"
+#include "pipeline/workspace/workspace.h"
+
+namespace regrade {
+namespace {
+
+struct StillOptions {
+  std::vector<std::string> still;
+  int size = 0;
+  std::string format = "png";
+
+  template <typename Bind>
+  void Describe(Bind& bind) {
+    bind("still", still,
+         {.help = "name of a photo: renders the styled scene from its place to stills/ in the "
+                  "style's folder, and nothing else; may be given more than once"});
+    bind("size", size,
+         {.unit = "pixels",
+          .help = "longer side of stills, at most the photo's own; 0 takes that",
+          .min = 0,
+          .max = 65536});
+    bind("format", format,
+         {.help = "of stills; tiff has 16 bits, and all are tagged as sRGB",
+          .choices = "png|jpeg|tiff"});
+  }
+};
+
+// The photo of a name, with or without its ending. Throws Error(kInput) with the nearest ones.
+int PhotoNamed(const Capture& capture, const std::string& name) {
+  std::string known;
+  for (size_t i = 0; i < capture.views.size(); ++i) {
+    const std::filesystem::path file = capture.views[i].file;
+    if (file == name || file.filename() == name || file.stem() == name)
+      return static_cast<int>(i);
+    if (i < 5) known += (i > 0 ? ", " : "") + file.string();
+  }
+  throw InputError("no photo of this name was placed", name, "its photos are " + known + " ...");
+}
+
+void RenderStills(const std::string& folder, const std::string& name,
+                  const StillOptions& options, const RunSettings& settings,
+                  Console* console) {
+  Workspace scene(folder), style(StyleFolder(folder, name));
+  constexpr int kLongest = 1 << 16;
+  const StoredField stored =
+      ReadStyledField(folder, style.folder(), settings.style.strength);
+  const WorkingViews views =
+      ReadWorkingViews(scene.Path("poses"), options.size > 0 ? options.size : kLongest, 0)
+          .InField(stored.field_from_world, stored.ndc);
+  std::vector<int> wanted;
+  for (const std::string& still : options.still)
+    wanted.push_back(PhotoNamed(views.capture(), still));
+  const FieldRenderer renderer(
+      stored.field, ChooseBackend(settings.run.device, settings.run.reproducible));
+  for (const int i : wanted) {
+    const Image picture = renderer.Render(views.CameraOf(i)).color;
+    const std::string ending = options.format == "jpeg"   ? ".jpg"
+                               : options.format == "tiff" ? ".tif"
+                                                          : ".png";
+    const std::string path = style.NewPath(
+        "stills/" + std::filesystem::path(views.View(i).file).stem().string() + ending);
+    WriteStill(path, picture);
+    console->Info(Concat("wrote ", path, ", ", picture.width, "x", picture.height));
+  }
+}
+
+}  // namespace
+
+void RunRender(const Command& command, const Arguments& arguments, Console* console) {
+  const bool stills = std::ranges::any_of(arguments, [](const std::string& word) {
+    return word == "--still" || word.starts_with("--still=");
+  });
+  if (!stills && !AsksForHelp(arguments))
+    return ContinueStyle(command, arguments, "render", console);
+  StillOptions still;
+  RunSettings settings;
+  OptionSet options;
+  options.Add("Still", &still);
+  settings.Bind(&options);
+  const auto prepared = Prepare(command, arguments, {.continues_style = true}, &options);
+  if (!prepared) return;
+  const std::string& folder = prepared->words[0];
+  const std::string name = ChosenStyle(folder, options.Given("name").value_or(""));
+  if (settings.start.dry_run) {
+    console->Info(Concat(still.still.size(), " stills of style ", name, " would be written to ",
+                         StyleFolder(folder, name), "/stills"));
+    return;
+  }
+  RenderStills(folder, name, still, settings, console);
+}
+
+}  // namespace regrade

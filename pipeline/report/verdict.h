@@ -1,0 +1,22 @@
+// How a run went, in words, and what to do about what is weakest.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "pipeline/report/data.h"
+
+namespace regrade {
+
+struct Verdict {
+  // "sharp: 71 % of the photos' detail", "steady: 1.0 dB steadier than frame by frame",
+  // "faithful: 33.9 dB to the recoloured photos, close". A figure that is missing has its reason.
+  std::vector<std::string> sentences;
+  std::string advice;  // about the weakest
+
+  std::string Line() const;  // the sentences, joined
+};
+
+Verdict VerdictOf(const RunReport& report);
+
+}  // namespace regrade

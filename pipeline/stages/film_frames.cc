@@ -1,0 +1,86 @@
+#include "pipeline/stages/film_frames.h"
+
+#include "kernels/scene/common_camera.h"
+#include "pipeline/fields/camera_path.h"
+#include "pipeline/fields/film_timing.h"
+#include "pipeline/workspace/output_names.h"
+
+namespace regrade {
+namespace {
+
+// Widths of the smoothing that are tried, see MakeCameraPath.
+constexpr double kWidths[] = {1, 0.5, 0.25, 0.1};
+constexpr int kMeasuredMoments = 240;
+
+// Of the widest smoothing whose path is clear, or else of the clearest one.
+double ChooseWidth(const std::vector<Camera>& photos, const PathOptions& options,
+                   const RadianceField& field, PathClearance* clearance) {
+  double chosen = kWidths[0];
+  *clearance = {-1, 0};
+  for (const double width : kWidths) {
+    const PathClearance of_width = MeasureClearance(
+        field, photos,
+        MakeCameraPath(photos, options, EvenMoments(kMeasuredMoments), width));
+    if (of_width.transmittance > clearance->transmittance) {
+      *clearance = of_width;
+      chosen = width;
+    }
+    if (clearance->transmittance >= kClearTransmittance || options.path != "smooth") break;
+  }
+  return chosen;
+}
+
+}  // namespace
+
+FilmPath MakeFilmPath(const WorkingViews& views, const RenderOptions& options,
+                      const RadianceField* field) {
+  FilmPath path;
+  path.transmittance = path.photo_distance =
+      Metric::Undefined("the film shows the photos' own viewpoints");
+  const std::vector<Camera> photos = views.Cameras();
+  if (options.path.path == "views") {
+    path.film = MakeCameraPath(photos, options.path, {});
+    return path;
+  }
+  double width = kWidths[0];
+  if (field == nullptr) {
+    path.transmittance = path.photo_distance = Metric::Undefined("not measured");
+  } else if (photos[0].ndc.on()) {
+    path.transmittance = path.photo_distance =
+        Metric::Undefined("a forward-facing field begins in front of all cameras");
+  } else {
+    PathClearance clearance;
+    width = ChooseWidth(photos, options.path, *field, &clearance);
+    path.transmittance = clearance.transmittance;
+    path.photo_distance = clearance.photo_distance;
+    path.narrowed = width != kWidths[0];
+  }
+  path.film =
+      MakeCameraPath(views.AtSize(options.film_size).Cameras(), options.path,
+                     EvenMoments(FilmFrames(options.film_seconds, options.fps)), width);
+  path.samples =
+      MakeCameraPath(photos, options.path,
+                     SamplesOfFilm(options.film_seconds, options.fps).moments, width);
+  return path;
+}
+
+std::vector<FrameSet> FrameSetsOf(const WorkingViews& views, const RenderOptions& options,
+                                  const FilmPath& path) {
+  const std::vector<Camera> cameras = views.Cameras();
+  const bool same = HaveSameIntrinsics(cameras), of_views = options.path.path == "views";
+  std::vector<FrameSet> sets = {{"", cameras, true, of_views && same, of_views && same}};
+  if (!same)
+    sets.push_back(
+        {kCommonPrefix, WithCommonIntrinsics(cameras), true, of_views, of_views});
+  if (of_views) return sets;
+  sets.push_back({kPathPrefix, path.samples, false, false, true});
+  sets.push_back({kFilmPrefix, path.film, false, true, false});
+  return sets;
+}
+
+int CountSamples(const RenderOptions& options) {
+  if (options.path.path == "views") return 0;
+  return static_cast<int>(SamplesOfFilm(options.film_seconds, options.fps).moments.size());
+}
+
+}  // namespace regrade
