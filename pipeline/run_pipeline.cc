@@ -7,7 +7,7 @@
 #include "kernels/base/error.h"
 #include "pipeline/files/text.h"
 #include "pipeline/report/records.h"
-#include "pipeline/report/verdict.h"
+#include "pipeline/report/assessment.h"
 #include "pipeline/run/run_file.h"
 #include "pipeline/stages/stages.h"
 #include "pipeline/workspace/folder_size.h"
@@ -83,14 +83,14 @@ void PrintSummary(const RunContext& context) {
   for (const char* stage : kStageNames)
     if (const auto record = context.FolderOf(stage).Find(stage))
       report.seconds += record->seconds;
-  const Verdict verdict = VerdictOf(report);
+  const Assessment assessment = AssessmentOf(report);
   const bool film = std::filesystem::exists(style.Path(kStyledFilm));
   context.console->Info((film ? "film " + style.Path(kStyledFilm) + ", " : std::string()) +
                         "page " + style.Path("report.html"));
   context.console->Info("took " + DurationText(report.seconds) + "; the folder " +
                         scene.folder() + " has " + SizeText(SizeOnDisk(scene.folder())));
-  context.console->Info(verdict.Line());
-  context.console->Info("next: " + verdict.advice);
+  context.console->Info(assessment.Line());
+  context.console->Info("next: " + assessment.advice);
 }
 
 }  // namespace

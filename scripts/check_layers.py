@@ -73,7 +73,7 @@ ALLOWED = (
      (r"evaluate/(optical_flow|pair_network)\.cc", r"stylize/image/onnx_network\.cc",
       r"pipeline/images/draw_text\.cc")),
     ("FFmpeg", r"lib(av|sw)[a-z]+/", (r"pipeline/images/video_writer\.cc",)),
-    ("OpenImageIO", r"OpenImageIO/", (r"pipeline/images/image_file\.cc",)),
+    ("OpenImageIO", r"OpenImageIO/", (r"pipeline/images/(image_file|still_file)\.cc",)),
     ("libjpeg-turbo", r"(jpeglib|jerror|jmorecfg|turbojpeg)\.h", (r"pipeline/images/jpeg_decoder\.cc",)),
     ("libpng", r"(png|pngconf|pnglibconf)\.h", (r"pipeline/images/png_decoder\.cc",)),
     ("Ceres", r"(ceres|glog)/", (r"reconstruct/refinement/(bundle|exposure|refine_poses)\.cc",)),

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Installs the Debian 12 packages that regrade is built with and runs on; does nothing when all are there.
-#   install_packages.sh [--dev]     --dev adds clang-format, clang-tidy, and a browser to look at report pages with
+#   install_packages.sh [--dev] [--ask]     --ask asks first, where somebody can answer; --dev adds clang-format, clang-tidy, and a browser to look at report pages with
 set -euo pipefail
 
 packages=(
@@ -14,7 +14,11 @@ packages=(
   libceres-dev libeigen3-dev
   colmap                                     # poses, started as a program
 )
-[[ "${1:-}" == "--dev" ]] && packages+=(clang-format clang-tidy chromium)
+ask=
+for word in "$@"; do
+  [[ $word == --dev ]] && packages+=(clang-format clang-tidy chromium)
+  [[ $word == --ask ]] && ask=1
+done
 
 if ! command -v dpkg-query >/dev/null; then
   echo "This is not a Debian system; install what corresponds to: ${packages[*]}" >&2
@@ -44,6 +48,10 @@ if [[ $EUID -ne 0 ]]; then
 fi
 
 echo "Installing: ${missing[*]}"
+if [[ -n $ask && -t 0 ]]; then
+  read -r -p "Install these Debian packages${as_root[*]:+ with sudo}? [y/N] " answer
+  [[ $answer == [yY]* ]] || { echo "Nothing was installed." >&2; exit 5; }
+fi
 "${as_root[@]}" apt-get update -qq </dev/null
 "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -qq -y --no-install-recommends \
   "${missing[@]}" </dev/null

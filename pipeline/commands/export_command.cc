@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <utility>
 
 #include "kernels/base/error.h"
 #include "kernels/field/cpu/render_view.h"
@@ -13,8 +14,11 @@
 #include "pipeline/capture/working_views.h"
 #include "pipeline/commands/command.h"
 #include "pipeline/fields/field_file.h"
+#include "pipeline/fields/surface_points.h"
 #include "pipeline/fields/uniform_field.h"
 #include "pipeline/program/memory.h"
+#include "pipeline/stages/styled_field.h"
+#include "pipeline/workspace/style_folders.h"
 #include "reconstruct/colmap/colmap_text.h"
 
 namespace regrade {
@@ -26,6 +30,7 @@ struct ExportOptions {
   std::string out;
   std::string format = "colmap-text";
   int resolution = 0;
+  bool dry_run = false;
 
   template <typename Bind>
   void Describe(Bind& bind) {
@@ -34,14 +39,16 @@ struct ExportOptions {
          {.help =
               "colmap-text and colmap write images/ and sparse/; transforms writes images/ "
               "and transforms.json for nerfstudio and instant-ngp; svox2 writes field.npz and "
-              "styled.npz on uniform grids",
-          .choices = "colmap-text|colmap|transforms|svox2"});
+              "each style's NAME.npz on uniform grids; ply writes points with colours, "
+              "approximately on the surfaces, to field.ply and NAME.ply",
+          .choices = "colmap-text|colmap|transforms|svox2|ply"});
     bind("resolution", resolution,
          {.unit = "voxels",
           .help = "of svox2: longest side of the grid. 0 copies a uniform field, and takes the "
                   "finest level of an adaptive one, up to 512; memory grows with its cube",
           .min = 0,
           .max = 1290});
+    bind("dry-run", dry_run, {.help = "prints what would be written, and does nothing"});
   }
 };
 
@@ -70,12 +77,14 @@ void WritePoses(const ExportOptions& options, const std::string& folder,
     WriteColmapText(model, options.out + "/sparse");
 }
 
-// Three views, evenly spaced, in a field's frame.
-std::vector<Camera> ComparedViews(const std::string& folder, const StoredField& stored) {
-  constexpr int kSize = 400, kViews = 3;  // pixels of the longer side
+constexpr int kComparedViews = 3;
+
+// Some views, evenly spaced, in a field's frame.
+std::vector<Camera> ViewsOf(const std::string& folder, const StoredField& stored, int most) {
+  constexpr int kSize = 400;  // pixels of the longer side
   const WorkingViews views = ReadWorkingViews(folder + "/poses", kSize, 0)
                                  .InField(stored.field_from_world, stored.ndc);
-  const int count = std::min(kViews, views.count());
+  const int count = std::min(most, views.count());
   std::vector<Camera> cameras;
   for (int i = 0; i < count; ++i) cameras.push_back(views.CameraOf(views.count() * i / count));
   return cameras;
@@ -99,20 +108,19 @@ double PsnrOf(const std::vector<Image>& a, const std::vector<Image>& b) {
 }
 
 // One field on a uniform grid; says what its renders lose by that.
-void ExportField(const ExportOptions& options, const std::string& folder, const char* name,
-                 Console* console) {
-  const std::string from = folder + "/" + name, to = options.out + "/" + name;
-  StoredField stored = ReadFieldFile(from);
+void ExportField(const ExportOptions& options, const std::string& folder,
+                 const std::string& name, StoredField stored, Console* console) {
+  const std::string to = options.out + "/" + name + ".npz";
   const Vec3i own = stored.field.geometry->frame.resolution;
   const Vec3i n = UniformResolution(stored.field, options.resolution);
   const std::string size =
       std::to_string(n.x) + "x" + std::to_string(n.y) + "x" + std::to_string(n.z);
   if (!stored.field.geometry->cells.on() && n == own) {
-    fs::copy_file(from, to);
-    console->Info("copied " + to + ": a uniform grid of " + size);
+    WriteFieldFile(to, stored);
+    console->Info("wrote " + to + ": a uniform grid of " + size);
     return;
   }
-  const std::vector<Camera> cameras = ComparedViews(folder, stored);
+  const std::vector<Camera> cameras = ViewsOf(folder, stored, kComparedViews);
   const std::vector<Image> before = Renders(stored.field, cameras);
   stored.field = ToUniform(stored.field, n, ReadMemoryStatus().available);
   WriteFieldFile(to, stored);
@@ -126,13 +134,39 @@ void ExportField(const ExportOptions& options, const std::string& folder, const 
   console->Info("wrote " + to + text);
 }
 
+void ExportPoints(const ExportOptions& options, const std::string& folder,
+                  const std::string& name, const StoredField& stored, Console* console) {
+  constexpr int kViews = 60, kResolution = 512;
+  const std::vector<SurfacePoint> points =
+      SurfacePoints(stored.field, ViewsOf(folder, stored, kViews), kResolution);
+  const std::string to = options.out + "/" + name + ".ply";
+  WritePly(to, points, stored.field_from_world,
+           "approximate: points at the expected depth of rays, colours as photos saw them");
+  console->Info(Concat("wrote ", to, ": ", points.size(), " points, approximate"));
+}
+
 void ExportFields(const ExportOptions& options, const std::string& folder, Console* console) {
   if (!fs::exists(folder + "/field.npz"))
     throw InputError("holds no reconstruction", folder,
                      "make one with `regrade run` or `regrade reconstruct`");
+  const std::vector<std::string> styles = StyleNames(folder);
+  if (options.dry_run) {
+    console->Info(Concat("the field and ", styles.size(), " styles would be written to ",
+                         options.out, " as ", options.format));
+    return;
+  }
   MakeEmptyFolder(options.out, "");
-  for (const char* name : {"field.npz", "styled.npz"})
-    if (fs::exists(folder + "/" + name)) ExportField(options, folder, name, console);
+  const auto write = [&](const std::string& name, StoredField stored) {
+    if (options.format == "ply")
+      ExportPoints(options, folder, name, stored, console);
+    else
+      ExportField(options, folder, name, std::move(stored), console);
+  };
+  write("field", ReadFieldFile(folder + "/field.npz"));
+  for (const std::string& style : styles)
+    if (fs::exists(StyleFolder(folder, style) + "/network.npz"))
+      write(style == "field" ? "field-style" : style,
+            ReadStyledField(folder, StyleFolder(folder, style)));
 }
 
 }  // namespace
@@ -147,12 +181,17 @@ void RunExport(const Command& command, const Arguments& arguments, Console* cons
   if (!prepared) return;
   const std::string& folder = prepared->words[0];
   RequireValue(settings.out, "--out", "name the folder to write");
-  if (settings.format == "svox2") return ExportFields(settings, folder, console);
+  if (settings.format == "svox2" || settings.format == "ply") return ExportFields(settings, folder, console);
   if (settings.resolution != 0) throw UsageError("is of --format svox2 only", "--resolution");
   if (!fs::exists(folder + "/poses/photos.json"))
     throw InputError("has no poses", folder,
                      "run `regrade pose PHOTOS --out " + folder + "` first");
   const Capture capture = ReadCapture(folder + "/poses");
+  if (settings.dry_run) {
+    console->Info(Concat(capture.views.size(), " photos and their poses would be written to ",
+                         settings.out));
+    return;
+  }
   MakeEmptyFolder(settings.out, "images");
   for (const CaptureView& view : capture.views) {
     std::error_code error;

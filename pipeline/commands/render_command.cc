@@ -6,7 +6,7 @@
 #include "pipeline/capture/working_views.h"
 #include "pipeline/commands/continue_command.h"
 #include "pipeline/fields/field_renderer.h"
-#include "pipeline/images/image_file.h"
+#include "pipeline/images/still_file.h"
 #include "pipeline/program/device_choice.h"
 #include "pipeline/run/run_settings.h"
 #include "pipeline/stages/styled_field.h"

@@ -7,7 +7,7 @@
 #include "pipeline/report/page_assets.h"
 #include "pipeline/report/photos.h"
 #include "pipeline/report/tables.h"
-#include "pipeline/report/verdict.h"
+#include "pipeline/report/assessment.h"
 
 namespace regrade {
 namespace {
@@ -55,14 +55,14 @@ std::string OtherFilmsHtml(const ReportPictures& pictures) {
 }
 
 // How it went, for the page of a run.
-std::string VerdictHtml(const RunReport& report) {
+std::string AssessmentHtml(const RunReport& report) {
   if (!report.stages.reconstruct || report.evaluation.consistency.empty()) return "";
-  const Verdict verdict = VerdictOf(report);
+  const Assessment assessment = AssessmentOf(report);
   std::string items;
-  for (const std::string& sentence : verdict.sentences)
+  for (const std::string& sentence : assessment.sentences)
     items += "<li>" + EscapeHtml(sentence) + "</li>";
-  return "<ul class=verdict>" + items + "</ul><p class=note>What to do next: " +
-         EscapeHtml(verdict.advice) + ".</p>";
+  return "<ul class=assessment>" + items + "</ul><p class=note>What to do next: " +
+         EscapeHtml(assessment.advice) + ".</p>";
 }
 
 std::string ViewsHtml(const ReportPictures& pictures) {
@@ -124,7 +124,7 @@ std::string ReportHtml(const RunReport& report, const ReportPictures& pictures) 
       title + " · regrade report</title><style>" + kReportCss +
       "</style></head>\n<body><script>" + kReportScript + "</script><main>\n<header><h1>" +
       title + "</h1>" + FactsHtml(report) + "</header>\n";
-  html += VerdictHtml(report) + MainFilmHtml(pictures);
+  html += AssessmentHtml(report) + MainFilmHtml(pictures);
   if (headline) html += "<section>" + CompareHtml(*headline) + "</section>";
   for (const std::string& section :
        {HeadlineMetricsHtml(report), OtherFilmsHtml(pictures), ViewsHtml(pictures),

@@ -4,6 +4,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <csignal>
 #include <thread>
 
@@ -57,8 +58,25 @@ TEST(Program, HelpAndVersion) {
   EXPECT_SAYS(Regrade({"--version"}), "regrade 0.");
   const Outcome help = Regrade({"run", "--help"});
   EXPECT_EQ(help.code, 0);
-  EXPECT_SAYS(help, "--photo-size");
-  EXPECT_SAYS(help, "default 800");
+  EXPECT_SAYS(help, "--film-seconds");
+  EXPECT_EQ(help.text.find("--photo-size"), std::string::npos);
+  EXPECT_LE(std::ranges::count(help.text, '\n'), 45);
+  EXPECT_LE(std::ranges::count(Regrade({}).text, '\n'), 45);
+  const Outcome all = Regrade({"run", "--help-all"});
+  EXPECT_SAYS(all, "--photo-size");
+  EXPECT_SAYS(all, "default 800");
+}
+
+// Both are written from the table of options.
+TEST(Program, ManPageAndCompletionHaveEveryCommandAndOption) {
+  const Outcome man = Regrade({"manual"}), bash = Regrade({"manual", "--bash"});
+  EXPECT_EQ(man.code, 0);
+  EXPECT_EQ(bash.code, 0);
+  for (const char* part : {".TH REGRADE 1", "regrade contact", "photo\\-size", "film\\-seconds"})
+    EXPECT_SAYS(man, part);
+  for (const char* part : {"    stylize) cat", "--preset draft standard paper best",
+                           "complete -o default -F _regrade regrade"})
+    EXPECT_SAYS(bash, part);
 }
 
 TEST(Program, F18_UsageErrorsExitWith2) {

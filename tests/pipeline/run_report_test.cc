@@ -46,7 +46,8 @@ TEST(RunReport, ShowsEveryPartOfTheRun) {
   ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}).code, 0);
   std::vector<std::string> run{"run",       folder / "s/truth", "--style",  style,
                                "--out",     folder / "e",       "--preset", "draft",
-                               "--effects", "exposure=off",     "--device", "cpu"};
+                               "--effects", "exposure=off",     "--device", "cpu",
+                               "--verbose"};
   for (const std::string& flag : testing::TinyFlags()) run.push_back(flag);
   const testing::ProgramOutcome done = Regrade(run);
   ASSERT_EQ(done.code, 0) << done.text;
@@ -95,6 +96,13 @@ TEST(RunReport, ShowsEveryPartOfTheRun) {
       EXPECT_EQ(DumpJson(value, -1), DumpJson(are.At(name), -1)) << name;
     }
 
+  // Where things are, how long it took and how it went are the last lines.
+  for (const char* part : {"film " , "styles/style_sunset/styled.mp4", "page ", "took ", "sharp: ",
+                           "; steady: ", "; faithful: ", "next: ", "stage 2 of 7: fitting"})
+    EXPECT_NE(done.text.find(part), std::string::npos) << part << "\n" << done.text;
+  EXPECT_LT(page.find("class=assessment"), page.find("class=mainfilm"));
+  EXPECT_LT(page.find("class=mainfilm"), page.find("class=compare"));
+
   // Evaluated again with other pairs: the maps of the earlier ones are gone.
   const testing::ProgramOutcome measured = Regrade({"evaluate", folder / "e", "--gaps", "2"});
   ASSERT_EQ(measured.code, 0) << measured.text;
@@ -106,7 +114,7 @@ TEST(RunReport, ShowsEveryPartOfTheRun) {
     return ReadJsonFile(folder / "e/styles/style_sunset/report.json").At("stages").At("render").At("film_renderer");
   };
   EXPECT_EQ(film_renderer().AsString(), "exact (the CPU has no fast renderer)");
-  const testing::ProgramOutcome rendered = Regrade({"render", folder / "e", "--exact"});
+  const testing::ProgramOutcome rendered = Regrade({"render", folder / "e", "--exact", "--verbose"});
   ASSERT_EQ(rendered.code, 0) << rendered.text;
   EXPECT_NE(rendered.text.find("renderer of the film: exact (--exact)"), std::string::npos)
       << rendered.text;

@@ -241,6 +241,113 @@ TEST(Styles, FoldersOfAnOlderSchemaAreRefusedWithItsNumber) {
   }
 }
 
+// A photo's GPS position and a camera's serial number stay in the photo.
+TEST(Styles, NothingOfThePhotosMetadataLeaves) {
+  const TemporaryFolder folder;
+  Synth(folder);
+  const std::string secrets[] = {"SN-4711-SECRET", "Secret Lane"};
+  for (const auto& entry : fs::directory_iterator(folder / "s/images")) {
+    // A text chunk and trailing bytes, as cameras write them.
+    std::string png = ReadText(entry.path().string());
+    const std::string text = "Comment" + std::string(1, '\0') + secrets[0] + " " + secrets[1];
+    std::string chunk = "tEXt" + text;
+    uint32_t crc = 0xffffffffu;
+    for (const char c : chunk) {
+      crc ^= static_cast<unsigned char>(c);
+      for (int k = 0; k < 8; ++k) crc = crc & 1 ? 0xedb88320u ^ crc >> 1 : crc >> 1;
+    }
+    crc = ~crc;
+    const auto big = [](uint32_t v) {
+      return std::string{static_cast<char>(v >> 24), static_cast<char>(v >> 16),
+                         static_cast<char>(v >> 8), static_cast<char>(v)};
+    };
+    png.insert(33, big(static_cast<uint32_t>(text.size())) + chunk + big(crc));
+    WriteText(entry.path().string(), png);
+  }
+  const ProgramOutcome done = Regrade(RunOf(folder, "e", {"--style", Asset("sunset")}));
+  ASSERT_EQ(done.code, 0) << done.text;
+  for (const char* format : {"png", "jpeg", "tiff"})
+    ASSERT_EQ(Regrade({"render", folder / "e", "--still", "00001", "--format", format}).code, 0);
+  int files = 0;
+  for (const auto& entry : fs::recursive_directory_iterator(folder / "e/styles")) {
+    if (!entry.is_regular_file()) continue;
+    const std::string bytes = ReadText(entry.path().string());
+    ++files;
+    for (const std::string& secret : secrets)
+      EXPECT_EQ(bytes.find(secret), std::string::npos) << entry.path();
+  }
+  EXPECT_GT(files, 20);
+}
+
+TEST(Stills, HaveThePhotosSizeAndASrgbTag) {
+  const TemporaryFolder folder;
+  Synth(folder);
+  const ProgramOutcome done = Regrade(RunOf(folder, "e", {"--style", Asset("sunset")}));
+  ASSERT_EQ(done.code, 0) << done.text;
+  for (const char* format : {"png", "jpeg", "tiff"})
+    ASSERT_EQ(Regrade({"render", folder / "e", "--still", "00001", "--format", format}).code, 0);
+  const std::string stills = folder / "e/styles/style_sunset/stills/00001";
+  const DecodedPhoto png = DecodePhoto(stills + ".png"), jpeg = DecodePhoto(stills + ".jpg"),
+                     tiff = DecodePhoto(stills + ".tif");
+  EXPECT_EQ(png.image.width, 96);  // the photo's own, beyond the 64 of the fit
+  EXPECT_EQ(tiff.bits, 16);
+  EXPECT_NE(ReadText(stills + ".png").find("sRGB"), std::string::npos);
+  float worst = 0, worst_jpeg = 0;
+  for (size_t i = 0; i < png.image.pixels.size(); ++i) {
+    worst = std::max(worst, std::abs(png.image.pixels[i] - tiff.image.pixels[i]));
+    worst_jpeg = std::max(worst_jpeg, std::abs(png.image.pixels[i] - jpeg.image.pixels[i]));
+  }
+  EXPECT_LT(worst, 0.5f / 255 + 1e-4f);  // rounding to 8 bits
+  EXPECT_LT(worst_jpeg, 40.f / 255);     // of quality 95 with chroma at half size
+  EXPECT_TRUE(png.notice.empty() && jpeg.notice.empty() && tiff.notice.empty());
+  ASSERT_EQ(Regrade({"render", folder / "e", "--still", "00002.png", "--size", "48"}).code, 0);
+  EXPECT_EQ(ReadImage(folder / "e/styles/style_sunset/stills/00002.png").width, 48);
+  const ProgramOutcome none = Regrade({"render", folder / "e", "--still", "nowhere"});
+  EXPECT_EQ(none.code, 3);
+  EXPECT_NE(none.text.find("00000"), std::string::npos) << none.text;
+}
+
+// Of both kinds of field; the scene's objects lie within 2 units of the world's origin.
+TEST(Points, AreWrittenInTheCapturesWorldAndLabelled) {
+  const TemporaryFolder folder;
+  Synth(folder);
+  ASSERT_EQ(Regrade(RunOf(folder, "e", {"--style", Asset("sunset")})).code, 0);
+  const ProgramOutcome done =
+      Regrade({"export", folder / "e", "--format", "ply", "--out", folder / "p"});
+  ASSERT_EQ(done.code, 0) << done.text;
+  for (const char* name : {"p/field.ply", "p/style_sunset.ply"}) {
+    const std::string ply = ReadText(folder / name);
+    EXPECT_EQ(ply.substr(0, 4), "ply\n");
+    EXPECT_NE(ply.find("comment approximate"), std::string::npos);
+    const size_t count_at = ply.find("element vertex ") + 15, body = ply.find("end_header\n") + 11;
+    const size_t count = std::stoul(ply.substr(count_at));
+    EXPECT_EQ(ply.size(), body + 15 * count) << name;
+  }
+}
+
+TEST(Clean, RemovesOnlyWhatCanBeMadeAgain) {
+  const TemporaryFolder folder;
+  Synth(folder);
+  std::vector<std::string> run = RunOf(folder, "e", {"--style", Asset("sunset"), "--keep-field"});
+  ASSERT_EQ(Regrade(run).code, 0);
+  const std::string style = folder / "e/styles/style_sunset";
+  const std::string film = ReadText(style + "/styled.mp4"), field = ReadText(style + "/styled.npz");
+  ProgramOutcome done = Regrade({"clean", folder / "e", "--dry-run"});
+  EXPECT_EQ(done.code, 0);
+  EXPECT_NE(done.text.find("can be made again"), std::string::npos) << done.text;
+  EXPECT_TRUE(fs::exists(style + "/frames"));
+  // Nobody answers: nothing is removed.
+  EXPECT_EQ(Regrade({"clean", folder / "e"}).code, 0);
+  EXPECT_TRUE(fs::exists(style + "/frames"));
+  ASSERT_EQ(Regrade({"clean", folder / "e", "--yes"}).code, 0);
+  EXPECT_FALSE(fs::exists(style + "/frames"));
+  EXPECT_FALSE(fs::exists(style + "/styled.npz"));
+  EXPECT_TRUE(ReadText(style + "/styled.mp4") == film);
+  ASSERT_EQ(Regrade(run).code, 0);  // made again, to the bit
+  EXPECT_TRUE(ReadText(style + "/styled.npz") == field);
+  EXPECT_TRUE(ReadText(style + "/styled.mp4") == film);
+}
+
 // Background spheres, and the background colour that the scene's colour map changes.
 TEST(StyledField, IsRemadeToTheBit) {
   const TemporaryFolder folder;

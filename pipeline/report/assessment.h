@@ -8,7 +8,7 @@
 
 namespace regrade {
 
-struct Verdict {
+struct Assessment {
   // "sharp: 71 % of the photos' detail", "steady: 1.0 dB steadier than frame by frame",
   // "faithful: 33.9 dB to the recoloured photos, close". A figure that is missing has its reason.
   std::vector<std::string> sentences;
@@ -17,6 +17,6 @@ struct Verdict {
   std::string Line() const;  // the sentences, joined
 };
 
-Verdict VerdictOf(const RunReport& report);
+Assessment AssessmentOf(const RunReport& report);
 
 }  // namespace regrade

@@ -1,4 +1,4 @@
-#include "pipeline/report/verdict.h"
+#include "pipeline/report/assessment.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,7 +10,7 @@
 namespace regrade {
 namespace {
 
-// A part of the verdict; `grade` is 1 where nothing is missing, less where it is weak.
+// A part of the assessment; `grade` is 1 where nothing is missing, less where it is weak.
 struct Part {
   std::string sentence, advice;
   std::optional<double> grade = {};
@@ -84,22 +84,22 @@ Part Faithful(const RunReport& report) {
 
 }  // namespace
 
-std::string Verdict::Line() const { return Join(sentences, "; "); }
+std::string Assessment::Line() const { return Join(sentences, "; "); }
 
-Verdict VerdictOf(const RunReport& report) {
-  Verdict verdict;
+Assessment AssessmentOf(const RunReport& report) {
+  Assessment assessment;
   const Part* weakest = nullptr;
   const Part parts[] = {Sharp(report), Steady(report), Faithful(report)};
   for (const Part& part : parts) {
-    verdict.sentences.push_back(part.sentence);
+    assessment.sentences.push_back(part.sentence);
     if (part.grade && *part.grade < 1 && (weakest == nullptr || *part.grade < *weakest->grade))
       weakest = &part;
   }
-  verdict.advice = weakest != nullptr
+  assessment.advice = weakest != nullptr
                        ? weakest->advice
                        : "nothing is weak; `regrade render` makes larger and longer films "
                          "(--film-size, --film-seconds)";
-  return verdict;
+  return assessment;
 }
 
 }  // namespace regrade
