@@ -22,8 +22,8 @@ struct ConsistencyOptions {
   std::string flow = "dis-medium";
   std::string lpips;
   double min_coverage = 0.4;
-  // Frames come in excerpts of that many, and pairs lie within one; 0: all are one sequence. Not
-  // an option of the user: it follows from the frames.
+  // Frames come in excerpts of that many, and pairs lie within one; 0: all are one sequence.
+  // Not an option of the user: it follows from the frames.
   int excerpt = 0;
 
   template <typename Bind>
@@ -117,10 +117,10 @@ struct ConsistencyReport {
   std::vector<WorstPair> worst;
 };
 
-// Compares frame i with frame i + gap of each sequence, for every i and gap within an excerpt. Flow and mask are
-// estimated once per pair from the reference frames (the unstyled ones), so all sequences are
-// measured on the same pixels; mode "geometry" takes them from `geometry`. Only a few frames
-// are in memory at a time.
+// Compares frame i with frame i + gap of each sequence, for every i and gap within an excerpt.
+// Flow and mask are estimated once per pair from the reference frames (the unstyled ones), so
+// all sequences are measured on the same pixels; mode "geometry" takes them from `geometry`.
+// Only a few frames are in memory at a time.
 //
 // Errors: kUsage for an unknown mode or a gap below 1; kInput if counts, sizes or channels of
 // the frames differ, or if frames are too small for flow. Progress counts pairs.

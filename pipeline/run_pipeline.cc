@@ -6,8 +6,8 @@
 
 #include "kernels/base/error.h"
 #include "pipeline/files/text.h"
-#include "pipeline/report/records.h"
 #include "pipeline/report/assessment.h"
+#include "pipeline/report/records.h"
 #include "pipeline/run/run_file.h"
 #include "pipeline/stages/stages.h"
 #include "pipeline/workspace/folder_size.h"

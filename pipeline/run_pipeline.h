@@ -10,9 +10,9 @@
 namespace regrade {
 
 // Runs the stages from `first` to `last` (names of kStageNames); each reads the results of
-// earlier ones from disk. Stages before `first` must be done; --restart-from an earlier one means
-// `first`. False only in a dry run, where a stage would have to be done. Throws what stages
-// throw.
+// earlier ones from disk. Stages before `first` must be done; --restart-from an earlier one
+// means `first`. False only in a dry run, where a stage would have to be done. Throws what
+// stages throw.
 bool RunPipeline(const std::string& first, const std::string& last, RunContext* context);
 
 // The stages from `first` to "report" of each style in turn, in its own folder; each film is

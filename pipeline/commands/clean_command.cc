@@ -43,7 +43,8 @@ std::vector<Removable> RemovableIn(const std::string& folder) {
     all.push_back({style + "/.regrade/checkpoints",
                    "a stage that was interrupted would begin from its start"});
   }
-  std::erase_if(all, [&](const Removable& r) { return SizeOnDisk(folder + "/" + r.path) == 0; });
+  std::erase_if(all,
+                [&](const Removable& r) { return SizeOnDisk(folder + "/" + r.path) == 0; });
   return all;
 }
 

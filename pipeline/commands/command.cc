@@ -54,9 +54,9 @@ bool HasFlag(const Arguments& arguments, const std::string& flag) {
 
 // What most people use; a command shows those that it has.
 const std::vector<std::string> kBasicOptions = {
-    "style",       "name",  "strength",     "out",       "preset", "method",      "masks",
-    "photo-masks", "still", "film-seconds", "film-size", "device", "restart-from", "dry-run",
-    "verbose"};
+    "style",     "name",   "strength",     "out",     "preset",
+    "method",    "masks",  "photo-masks",  "still",   "film-seconds",
+    "film-size", "device", "restart-from", "dry-run", "verbose"};
 constexpr int kFewOptions = 20;  // of a command with so few all are shown
 
 void PrintHelp(const Command& command, const Arguments& arguments, const OptionSet& options) {

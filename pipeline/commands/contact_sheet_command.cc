@@ -1,5 +1,5 @@
-// regrade contact-sheet: one picture that compares the styles of a folder, or, for style pictures,
-// 2D method, linear map and both recipes.
+// regrade contact-sheet: one picture that compares the styles of a folder, or, for style
+// pictures, 2D method, linear map and both recipes.
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -333,11 +333,11 @@ void RunContactSheet(const Command& command, const Arguments& arguments, Console
   const Backend backend = ChooseBackend(sheet.device, false);  // before work begins
   Scene scene = ReadScene(workspace, sheet, settings);
   scene.backend = backend;
-  const std::string plan =
-      styles.empty()
-          ? Concat(words.size() - 1, " styles, ", scene.shown.size(), " views each, trained on ",
-                   scene.training_views.size(), " photos at ", sheet.size, " pixels")
-          : Concat(scene.shown.size(), " views of ", Join(styles, ", "));
+  const std::string plan = styles.empty()
+                               ? Concat(words.size() - 1, " styles, ", scene.shown.size(),
+                                        " views each, trained on ", scene.training_views.size(),
+                                        " photos at ", sheet.size, " pixels")
+                               : Concat(scene.shown.size(), " views of ", Join(styles, ", "));
   console->Info(plan);
   if (sheet.dry_run) return;
   std::vector<SheetRow> rows;

@@ -28,7 +28,8 @@ void ContinueStyle(const Command& command, const Arguments& arguments, const std
   RunContext context;
   context.console = console;
   context.settings.Bind(&context.options);
-  const auto prepared = Prepare(command, arguments, {.continues_style = true}, &context.options);
+  const auto prepared =
+      Prepare(command, arguments, {.continues_style = true}, &context.options);
   if (!prepared) return;
   const std::string& folder = prepared->words[0];
   RunSettings& settings = context.settings;
@@ -47,9 +48,9 @@ void RunStylize(const Command& command, const Arguments& arguments, Console* con
   RunContext context;
   context.console = console;
   context.settings.Bind(&context.options);
-  const auto prepared = Prepare(
-      command, arguments, {.most_words = 1 + kMostStyles, .continues_run = true},
-      &context.options);
+  const auto prepared =
+      Prepare(command, arguments, {.most_words = 1 + kMostStyles, .continues_run = true},
+              &context.options);
   if (!prepared) return;
   const std::string& folder = prepared->words[0];
   StyleSource& style = context.settings.style;
@@ -62,6 +63,5 @@ void RunStylize(const Command& command, const Arguments& arguments, Console* con
   Continue(folder, *prepared, NameStyles(folder, style.pictures, style.name), "style_2d",
            &context);
 }
-
 
 }  // namespace regrade

@@ -181,7 +181,8 @@ void RunExport(const Command& command, const Arguments& arguments, Console* cons
   if (!prepared) return;
   const std::string& folder = prepared->words[0];
   RequireValue(settings.out, "--out", "name the folder to write");
-  if (settings.format == "svox2" || settings.format == "ply") return ExportFields(settings, folder, console);
+  if (settings.format == "svox2" || settings.format == "ply")
+    return ExportFields(settings, folder, console);
   if (settings.resolution != 0) throw UsageError("is of --format svox2 only", "--resolution");
   if (!fs::exists(folder + "/poses/photos.json"))
     throw InputError("has no poses", folder,

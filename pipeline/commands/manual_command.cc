@@ -17,10 +17,9 @@ struct ManualOptions {
 };
 
 void PrintManPage(Console* console) {
-  std::printf(
-      ".TH REGRADE 1 \"\" \"regrade " REGRADE_VERSION
-      "\"\n.SH NAME\nregrade \\- photographs in, a styled 3D scene out\n.SH SYNOPSIS\n"
-      ".B regrade\n.I COMMAND\n[\\fIOPTIONS\\fR]\n.SH COMMANDS\n");
+  std::printf(".TH REGRADE 1 \"\" \"regrade " REGRADE_VERSION
+              "\"\n.SH NAME\nregrade \\- photographs in, a styled 3D scene out\n.SH SYNOPSIS\n"
+              ".B regrade\n.I COMMAND\n[\\fIOPTIONS\\fR]\n.SH COMMANDS\n");
   for (const Command& command : AllCommands())
     std::printf(".TP\n.B %s\n\\&%s\n", command.name, command.summary);
   for (const Command& command : AllCommands()) {
@@ -29,8 +28,10 @@ void PrintManPage(Console* console) {
     command.run(command, {kHelpMan}, console);
   }
   std::printf(
-      ".SH EXIT STATUS\n0 done, 1 internal error, 2 usage, 3 input data, 4 an external program, "
-      "5 resources, 6 the scene cannot be reconstructed, 7 the output folder is in use, 128 + n "
+      ".SH EXIT STATUS\n0 done, 1 internal error, 2 usage, 3 input data, 4 an external "
+      "program, "
+      "5 resources, 6 the scene cannot be reconstructed, 7 the output folder is in use, 128 + "
+      "n "
       "ended by signal n.\n");
 }
 

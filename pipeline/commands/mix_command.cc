@@ -137,11 +137,12 @@ void RunMix(const Command& command, const Arguments& arguments, Console* console
   options.Add("Render", &render);
   options.Add("Program", &program);
   constexpr size_t kMostWords = 17;  // the folder and 16 styles
-  const auto prepared = Prepare(command, arguments,
-                                {.most_words = kMostWords,
-                                 .continues_run = true,
-                                 .taken = {"photo-size", "fps", "path", "film-seconds", "film-size"}},
-                                &options);
+  const auto prepared =
+      Prepare(command, arguments,
+              {.most_words = kMostWords,
+               .continues_run = true,
+               .taken = {"photo-size", "fps", "path", "film-seconds", "film-size"}},
+              &options);
   if (!prepared) return;
   const Arguments& words = prepared->words;
   const std::string& folder = words[0];

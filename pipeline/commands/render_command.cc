@@ -46,24 +46,23 @@ int PhotoNamed(const Capture& capture, const std::string& name) {
       return static_cast<int>(i);
     if (i < 5) known += (i > 0 ? ", " : "") + file.string();
   }
-  throw InputError("no photo of this name was placed", name, "its photos are " + known + " ...");
+  throw InputError("no photo of this name was placed", name,
+                   "its photos are " + known + " ...");
 }
 
 void RenderStills(const std::string& folder, const std::string& name,
-                  const StillOptions& options, const RunSettings& settings,
-                  Console* console) {
+                  const StillOptions& options, const RunSettings& settings, Console* console) {
   Workspace scene(folder), style(StyleFolder(folder, name));
   constexpr int kLongest = 1 << 16;
-  const StoredField stored =
-      ReadStyledField(folder, style.folder(), settings.style.strength);
+  const StoredField stored = ReadStyledField(folder, style.folder(), settings.style.strength);
   const WorkingViews views =
       ReadWorkingViews(scene.Path("poses"), options.size > 0 ? options.size : kLongest, 0)
           .InField(stored.field_from_world, stored.ndc);
   std::vector<int> wanted;
   for (const std::string& still : options.still)
     wanted.push_back(PhotoNamed(views.capture(), still));
-  const FieldRenderer renderer(
-      stored.field, ChooseBackend(settings.run.device, settings.run.reproducible));
+  const FieldRenderer renderer(stored.field,
+                               ChooseBackend(settings.run.device, settings.run.reproducible));
   for (const int i : wanted) {
     const Image picture = renderer.Render(views.CameraOf(i)).color;
     const std::string ending = options.format == "jpeg"   ? ".jpg"

@@ -93,7 +93,8 @@ void RunStages(const Command& command, const Arguments& arguments, Console* cons
   if (done)
     RunStyles("style_2d", styles, &context);
   else
-    for (const NamedStyle& style : styles) console->Info("style " + style.name + ": would follow");
+    for (const NamedStyle& style : styles)
+      console->Info("style " + style.name + ": would follow");
 }
 
 }  // namespace regrade

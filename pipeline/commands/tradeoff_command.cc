@@ -140,8 +140,7 @@ void WriteResults(const RunContext& base, const TradeoffOptions& tradeoff,
   JsonValue::Array costs, measured;
   for (const CostRow& row : rows) costs.push_back(MetricsToJson(row));
   for (const Measurement& m : store.all()) measured.push_back(ToJson(m));
-  const std::vector<CostTerm> terms =
-      LearnCosts(base, capture, variants, store.all());
+  const std::vector<CostTerm> terms = LearnCosts(base, capture, variants, store.all());
   WriteJsonFile(folder + "/tradeoff.json",
                 JsonValue::Object{{"schema", kTradeoffSchema},
                                   {"regrade", REGRADE_VERSION},
@@ -220,8 +219,7 @@ void PrintPrediction(const TradeoffOptions& tradeoff, Console* console) {
       CostsFromJson(ReadJsonFile(tradeoff.costs), tradeoff.costs);
   const std::string& folder = tradeoff.predict;
   if (!Workspace::Exists(folder))
-    throw InputError("this is not the folder of a run", folder,
-                     "make one with `regrade run`");
+    throw InputError("this is not the folder of a run", folder, "make one with `regrade run`");
   RunContext run;
   run.settings.Bind(&run.options);
   const std::string style = StyleFolder(folder, ChosenStyle(folder, ""));

@@ -25,17 +25,17 @@ struct PathOptions {
 
 // `cameras` in any order, in one frame, z up; at least one. All cameras of the path have the
 // intrinsics of CommonCamera (kernels/scene/common_camera.h), those of "views" of
-// WithCommonIntrinsics, one for each of `cameras`; of the others one for each of `moments`, parts
-// of the film's time in [0, 1]. "smooth" stays within the hull of neighbouring photos, where
-// photos support the field: each place is a mean of photos along their tour, with a Gaussian of
-// `width` times 1.5 of their distance. It begins and ends at rest; "orbit" and "spiral" are
-// closed.
+// WithCommonIntrinsics, one for each of `cameras`; of the others one for each of `moments`,
+// parts of the film's time in [0, 1]. "smooth" stays within the hull of neighbouring photos,
+// where photos support the field: each place is a mean of photos along their tour, with a
+// Gaussian of `width` times 1.5 of their distance. It begins and ends at rest; "orbit" and
+// "spiral" are closed.
 std::vector<Camera> MakeCameraPath(const std::vector<Camera>& cameras,
                                    const PathOptions& options,
                                    const std::vector<double>& moments, double width = 1);
 
-// Part of the way at part `time` of the time, both in [0, 1]: speed rises from 0 within the first
-// kEasing of the time, is constant, and falls to 0 within the last.
+// Part of the way at part `time` of the time, both in [0, 1]: speed rises from 0 within the
+// first kEasing of the time, is constant, and falls to 0 within the last.
 inline constexpr double kEasing = 0.15;
 double EasedWay(double time);
 

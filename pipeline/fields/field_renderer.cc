@@ -18,8 +18,7 @@ RenderedView FieldRenderer::Render(const Camera& camera) const {
                                     : RenderView(grid_, camera, march_);
 }
 
-RenderedPair FieldRenderer::RenderWith(const FieldRenderer& other,
-                                       const Camera& camera) const {
+RenderedPair FieldRenderer::RenderWith(const FieldRenderer& other, const Camera& camera) const {
   REGRADE_CHECK(backend_ == other.backend_);
   if (backend_ == Backend::kCpu) return RenderViewPair(grid_, other.grid_, camera, march_);
   return {Render(camera), other.Render(camera).color};

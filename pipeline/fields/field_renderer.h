@@ -27,8 +27,8 @@ class FieldRenderer {
   // Exact: single precision, every sample.
   RenderedView Render(const Camera& camera) const;
 
-  // This field's view, and the colours of another one of the same geometry on the same processor;
-  // exact. The CPU marches once for both.
+  // This field's view, and the colours of another one of the same geometry on the same
+  // processor; exact. The CPU marches once for both.
   RenderedPair RenderWith(const FieldRenderer& other, const Camera& camera) const;
 
   // Makes the fast renderer's copy of the field in half precision. Returns why there is none,

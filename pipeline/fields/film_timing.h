@@ -21,8 +21,8 @@ inline std::vector<double> EvenMoments(int frames) {
 }
 
 // The moments at which the 2D method and the metrics look at a film: kSampleRate a second,
-// whatever its frame rate and size, so that frames 1 and 5 apart are 1/24 and 5/24 s apart. Of a
-// film with more than kMostSamples of them, kExcerpts excerpts, evenly spread over its time.
+// whatever its frame rate and size, so that frames 1 and 5 apart are 1/24 and 5/24 s apart. Of
+// a film with more than kMostSamples of them, kExcerpts excerpts, evenly spread over its time.
 inline constexpr double kSampleRate = 24;
 inline constexpr int kMostSamples = 60, kExcerpts = 3;
 

@@ -25,8 +25,7 @@ Vec3f Rounded(const Vec3d& v) {
 }
 
 // Optical depth of the straight line between two points.
-double OpticalDepth(const FieldSampler& sampler, const Vec3d& a, const Vec3d& b,
-                    double step) {
+double OpticalDepth(const FieldSampler& sampler, const Vec3d& a, const Vec3d& b, double step) {
   constexpr int kMost = 4096;
   const double length = Norm(b - a);
   const int samples = std::clamp(static_cast<int>(std::ceil(length / step)), 1, kMost);

@@ -14,8 +14,8 @@
 namespace regrade {
 namespace {
 
-constexpr float kMostBehind = 0.1f;   // transmittance
-constexpr float kMostSlope = 0.05f;   // of depth, from a pixel to its neighbours
+constexpr float kMostBehind = 0.1f;  // transmittance
+constexpr float kMostSlope = 0.05f;  // of depth, from a pixel to its neighbours
 
 bool OnSurface(const RenderedView& view, int x, int y) {
   const float depth = *view.depth.at(x, y);
@@ -45,13 +45,13 @@ std::vector<SurfacePoint> SurfacePoints(const RadianceField& field,
         const Vec3d ray = camera.CameraRay(x + 0.5, y + 0.5);
         if (!(ray.z > 0.05)) continue;
         const double depth = static_cast<double>(*view.depth.at(x, y));
-        const Vec3d place =
-            world_from_camera.rotation * (ray * (depth / ray.z)) + world_from_camera.translation;
+        const Vec3d place = world_from_camera.rotation * (ray * (depth / ray.z)) +
+                            world_from_camera.translation;
         uint64_t cube = 0;
         for (int a = 0; a < 3; ++a) {
           constexpr int64_t kMiddle = 1 << 20;
-          const int64_t i = std::clamp<int64_t>(std::llround(place[a] / side), 1 - kMiddle,
-                                                kMiddle - 1);
+          const int64_t i =
+              std::clamp<int64_t>(std::llround(place[a] / side), 1 - kMiddle, kMiddle - 1);
           cube = cube << 21 | static_cast<uint64_t>(i + kMiddle);
         }
         if (!taken.insert(cube).second) continue;

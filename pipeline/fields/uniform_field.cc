@@ -18,8 +18,7 @@ CellCorners CornersAt(const Geometry& from, const FieldSampler& sampler,
   Vec3f place;  // voxels from the box's corner
   for (int a = 0; a < 3; ++a)
     place[a] = (static_cast<float>(index[a]) + 0.5f) *
-               static_cast<float>(from.frame.resolution[a]) /
-               static_cast<float>(resolution[a]);
+               static_cast<float>(from.frame.resolution[a]) / static_cast<float>(resolution[a]);
   return sampler.At(place);
 }
 

@@ -11,8 +11,8 @@
 #include "evaluate/image_quality.h"
 #include "kernels/field/cuda/device_rays.h"
 #include "pipeline/fields/camera_path.h"
-#include "pipeline/fields/film_timing.h"
 #include "pipeline/fields/field_renderer.h"
+#include "pipeline/fields/film_timing.h"
 #include "pipeline/gpu/gpu_commands.h"
 
 namespace regrade {

@@ -32,20 +32,19 @@ void WriteStill(const std::string& path, const Image& image) {
   for (size_t i = 0; i < values.size(); ++i) {
     const float v = image.pixels[i];
     // NaN becomes 0.
-    values[i] =
-        static_cast<uint16_t>((v > 0 ? std::min(v, 1.0f) : 0.0f) * most + 0.5f);
+    values[i] = static_cast<uint16_t>((v > 0 ? std::min(v, 1.0f) : 0.0f) * most + 0.5f);
   }
   std::vector<uint8_t> bytes;
   if (!tiff) bytes.assign(values.begin(), values.end());
 
   const std::string temporary = path + kTemporarySuffix;
-  const std::unique_ptr<OIIO::ImageOutput> output =
-      OIIO::ImageOutput::create(tiff ? "tiff" : jpeg ? "jpeg" : "png");
-  const bool written =
-      output != nullptr && output->open(temporary, spec) &&
-      (tiff ? output->write_image(OIIO::TypeDesc::UINT16, values.data())
-            : output->write_image(OIIO::TypeDesc::UINT8, bytes.data())) &&
-      output->close();
+  const std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create(tiff   ? "tiff"
+                                                                              : jpeg ? "jpeg"
+                                                                                     : "png");
+  const bool written = output != nullptr && output->open(temporary, spec) &&
+                       (tiff ? output->write_image(OIIO::TypeDesc::UINT16, values.data())
+                             : output->write_image(OIIO::TypeDesc::UINT8, bytes.data())) &&
+                       output->close();
   if (!written) {
     const std::string why = output != nullptr ? output->geterror() : OIIO::geterror();
     std::error_code error;

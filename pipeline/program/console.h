@@ -46,8 +46,8 @@ class Console {
   // A line of JSON {"event": name, ...members} with --json, nothing without.
   void Event(const std::string& name, const JsonValue& members);
 
-  // `title`: what a person reads in place of the stage's name; `later`: the time of what follows,
-  // in times of this stage.
+  // `title`: what a person reads in place of the stage's name; `later`: the time of what
+  // follows, in times of this stage.
   void BeginStage(const std::string& stage, const std::string& title = "", double later = 0);
   void EndStage();
   double StageSeconds() const;

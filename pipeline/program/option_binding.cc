@@ -282,7 +282,8 @@ OptionSet::Description OptionSet::Describe(const Entry& entry) {
     description.value = *entry.info.choices ? entry.info.choices : is_text ? "TEXT" : "N";
   std::string facts;
   if (!is_switch && *entry.info.unit) facts += std::string(entry.info.unit) + ", ";
-  if (!is_switch && !is_text && (std::isfinite(entry.info.min) || std::isfinite(entry.info.max)))
+  if (!is_switch && !is_text &&
+      (std::isfinite(entry.info.min) || std::isfinite(entry.info.max)))
     facts += BoundsText(entry.info) + ", ";
   const std::string value = FlagText(ValueOf(entry));
   facts += "default " + (is_switch       ? (value == "true" ? "on" : "off")
@@ -320,7 +321,8 @@ std::string OptionSet::ManPage() const {
   // A dash that is typed, and a line that is no request.
   const auto escaped = [](const std::string& plain) {
     std::string result;
-    for (const char c : plain) result += c == '-' ? "\\-" : c == '\\' ? "\\e" : std::string(1, c);
+    for (const char c : plain)
+      result += c == '-' ? "\\-" : c == '\\' ? "\\e" : std::string(1, c);
     return result;
   };
   for (const Entry& entry : entries_) {

@@ -18,8 +18,9 @@ struct ProgramOptions {
     bind("threads", threads,
          {.unit = "threads", .help = "0 uses one per core", .min = 0, .max = 4096});
     bind("json", json, {.help = "prints progress and results as lines of JSON on stdout"});
-    bind("verbose", verbose,
-         {.help = "prints what was measured, too; it is always in the folder's log and report"});
+    bind(
+        "verbose", verbose,
+        {.help = "prints what was measured, too; it is always in the folder's log and report"});
   }
 };
 

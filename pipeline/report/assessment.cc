@@ -55,11 +55,10 @@ Part Steady(const RunReport& report) {
   const std::string than = frame_by_frame ? "frame by frame" : "the scene before styling";
   constexpr double kNoDifference = 0.05;  // below what is printed
   Part part;
-  part.sentence =
-      std::abs(gain) < kNoDifference
-          ? "steady: as " + than
-          : Format("steady: %.1f dB %s than %s", std::abs(gain),
-                   gain > 0 ? "steadier" : "less steady", than.c_str());
+  part.sentence = std::abs(gain) < kNoDifference
+                      ? "steady: as " + than
+                      : Format("steady: %.1f dB %s than %s", std::abs(gain),
+                               gain > 0 ? "steadier" : "less steady", than.c_str());
   part.grade = 1 + std::min(0.0, gain) / 3;  // 3 dB twice the squared error
   part.advice = "--scene-wide uses one colour map for all photos, the steadiest there is";
   return part;
@@ -73,9 +72,10 @@ Part Faithful(const RunReport& report) {
   const Metric& psnr = row->psnr_to_2d_db;
   if (!psnr.value) return {"faithful: not measured (" + psnr.why + ")", ""};
   Part part;
-  part.sentence =
-      Format("faithful: %.1f dB to the recoloured photos, %s", *psnr.value,
-             *psnr.value >= 30 ? "close" : *psnr.value >= 25 ? "mostly close" : "apart in places");
+  part.sentence = Format("faithful: %.1f dB to the recoloured photos, %s", *psnr.value,
+                         *psnr.value >= 30   ? "close"
+                         : *psnr.value >= 25 ? "mostly close"
+                                             : "apart in places");
   part.grade = *psnr.value / 30;
   part.advice =
       "--style-view-weight 0 follows each recoloured photo more closely, and is less steady";
@@ -96,9 +96,9 @@ Assessment AssessmentOf(const RunReport& report) {
       weakest = &part;
   }
   assessment.advice = weakest != nullptr
-                       ? weakest->advice
-                       : "nothing is weak; `regrade render` makes larger and longer films "
-                         "(--film-size, --film-seconds)";
+                          ? weakest->advice
+                          : "nothing is weak; `regrade render` makes larger and longer films "
+                            "(--film-size, --film-seconds)";
   return assessment;
 }
 

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 
+#include "pipeline/report/assessment.h"
 #include "pipeline/report/costs.h"
 #include "pipeline/report/html_text.h"
 #include "pipeline/report/page_assets.h"
 #include "pipeline/report/photos.h"
 #include "pipeline/report/tables.h"
-#include "pipeline/report/assessment.h"
 
 namespace regrade {
 namespace {
@@ -61,8 +61,8 @@ std::string AssessmentHtml(const RunReport& report) {
   std::string items;
   for (const std::string& sentence : assessment.sentences)
     items += "<li>" + EscapeHtml(sentence) + "</li>";
-  return "<ul class=assessment>" + items + "</ul><p class=note>What to do next: " +
-         EscapeHtml(assessment.advice) + ".</p>";
+  return "<ul class=assessment>" + items +
+         "</ul><p class=note>What to do next: " + EscapeHtml(assessment.advice) + ".</p>";
 }
 
 std::string ViewsHtml(const ReportPictures& pictures) {

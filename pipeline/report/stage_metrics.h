@@ -235,10 +235,11 @@ struct RenderReport {
   int path_frames = 0;  // of these, on disk along the film's path: the film is measured there
   int film_frames = 0;
   double film_seconds = 0;
-  // The path's least transmittance, and its largest distance to a photo, in the photos' spacing.
+  // The path's least transmittance, and its largest distance to a photo, in the photos'
+  // spacing.
   Metric path_transmittance, path_photo_distance;
   FilmSize film;
-  double strength = 1;  // of the style, see EQ(style-mix)
+  double strength = 1;        // of the style, see EQ(style-mix)
   std::string film_renderer;  // which renderer made the film, and why if it is the exact one
   Metric frames_per_second;
   SeenByFewMetrics seen_by_few;
@@ -249,8 +250,10 @@ struct RenderReport {
     visit("frames", frames, {.label = "frames"});
     visit("path_frames", path_frames);
     visit("film_frames", film_frames, {.label = "frames of the film"});
-    visit("film_seconds", film_seconds, {.label = "length of the film", .unit = "s", .decimals = 1});
-    visit("path_transmittance", path_transmittance, {.label = "least transmittance of its path"});
+    visit("film_seconds", film_seconds,
+          {.label = "length of the film", .unit = "s", .decimals = 1});
+    visit("path_transmittance", path_transmittance,
+          {.label = "least transmittance of its path"});
     visit("path_photo_distance", path_photo_distance,
           {.label = "largest distance of its path to a photo", .unit = "photo spacings"});
     visit("film", film);

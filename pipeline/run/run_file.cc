@@ -14,10 +14,10 @@ constexpr int64_t kRunSchema = 2;
 void CheckSchema(const JsonValue& run) {
   const JsonValue* schema = run.Find("schema");
   if (schema == nullptr || schema->AsInt() == kRunSchema) return;
-  throw InputError(Concat("made by ", schema->AsInt() < kRunSchema ? "an older" : "a newer",
-                          " regrade (schema ", schema->AsInt(), ", this one has ", kRunSchema,
-                          ")"),
-                   "", "run again with another --out, or delete the output folder");
+  throw InputError(
+      Concat("made by ", schema->AsInt() < kRunSchema ? "an older" : "a newer",
+             " regrade (schema ", schema->AsInt(), ", this one has ", kRunSchema, ")"),
+      "", "run again with another --out, or delete the output folder");
 }
 
 }  // namespace
@@ -32,11 +32,11 @@ RunFile ReadRunFile(const std::string& path) {
     file.options = value.At("options");
     return file;
   } catch (const Error& error) {
-    throw UsageError(error.what_failed(),
-                     error.where().find(path) == std::string::npos ? path + ": " + error.where()
-                                                                   : error.where(),
-                     error.hint().empty() ? "give a run.json that regrade wrote"
-                                          : error.hint());
+    throw UsageError(
+        error.what_failed(),
+        error.where().find(path) == std::string::npos ? path + ": " + error.where()
+                                                      : error.where(),
+        error.hint().empty() ? "give a run.json that regrade wrote" : error.hint());
   }
 }
 
@@ -57,14 +57,10 @@ JsonValue RunFileJson(const std::string& command, const RunContext& context) {
   JsonValue kept = JsonValue::Object();
   for (const auto& [name, value] : options.AsObject())
     if (start.Find(name) == nullptr) kept[name] = value;
-  JsonValue run =
-      JsonValue::Object{{"schema", kRunSchema},
-                           {"regrade", REGRADE_VERSION},
-                           {"command", command},
-                           {"arguments", words},
-                           {"seed", context.settings.run.seed},
-                           {"options", kept},
-                           {"fingerprints", fingerprints}};
+  JsonValue run = JsonValue::Object{
+      {"schema", kRunSchema},        {"regrade", REGRADE_VERSION},        {"command", command},
+      {"arguments", words},          {"seed", context.settings.run.seed}, {"options", kept},
+      {"fingerprints", fingerprints}};
   if (context.style != nullptr && !context.settings.style.pictures.empty())
     run[kPictureHash] = HashFile(context.settings.style.picture());
   return run;

@@ -16,8 +16,8 @@ struct RunFile {
 // Throws Error(kUsage) with line and column for what is not such a file, or of another schema.
 RunFile ReadRunFile(const std::string& path);
 
-// The content for `command`, with the fingerprints of finished stages; of the style's folder, if
-// a style is chosen, with its picture's hash (style_folders.h).
+// The content for `command`, with the fingerprints of finished stages; of the style's folder,
+// if a style is chosen, with its picture's hash (style_folders.h).
 JsonValue RunFileJson(const std::string& command, const RunContext& context);
 
 // Into the folder of the chosen style, or else the output folder.

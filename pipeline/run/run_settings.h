@@ -42,9 +42,10 @@ struct StyleSource {
 
   template <typename Bind>
   void Describe(Bind& bind) {
-    bind("style", pictures,
-         {.help = "a style picture: the scene gets its colours, in the folder styles/NAME; give "
-                  "the option once for each style"});
+    bind(
+        "style", pictures,
+        {.help = "a style picture: the scene gets its colours, in the folder styles/NAME; give "
+                 "the option once for each style"});
     bind("name", name,
          {.help = "name of the style's folder in styles/; by default that of the picture's "
                   "file"});
@@ -72,7 +73,10 @@ struct RenderOptions {
     bind("fps", fps,
          {.unit = "frames/s", .help = "frame rate of the films", .min = 1, .max = 240});
     bind("film-seconds", film_seconds,
-         {.unit = "s", .help = "length of the film; not of --path views", .min = 0.1, .max = 3600});
+         {.unit = "s",
+          .help = "length of the film; not of --path views",
+          .min = 0.1,
+          .max = 3600});
     bind("film-size", film_size,
          {.unit = "pixels",
           .help = "longer side of the film, at most that of the photos' files; not of --path "

@@ -101,8 +101,7 @@ void AddFilm(RunContext* context, const Image& style, const Camera& camera,
     return context->style->Path(std::string("frames/") + kPathPrefix + name);
   };
   ConsistencyOptions options = settings.consistency;
-  options.excerpt =
-      SamplesOfFilm(settings.render.film_seconds, settings.render.fps).excerpt;
+  options.excerpt = SamplesOfFilm(settings.render.film_seconds, settings.render.fps).excerpt;
   const bool renders_styled = std::filesystem::exists(folder("views_2d"));
   std::vector<NamedFrameSource> sequences;
   for (const char* name : {"source", "views_2d", "styled"}) {

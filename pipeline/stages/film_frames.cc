@@ -19,8 +19,7 @@ double ChooseWidth(const std::vector<Camera>& photos, const PathOptions& options
   *clearance = {-1, 0};
   for (const double width : kWidths) {
     const PathClearance of_width = MeasureClearance(
-        field, photos,
-        MakeCameraPath(photos, options, EvenMoments(kMeasuredMoments), width));
+        field, photos, MakeCameraPath(photos, options, EvenMoments(kMeasuredMoments), width));
     if (of_width.transmittance > clearance->transmittance) {
       *clearance = of_width;
       chosen = width;
@@ -55,12 +54,10 @@ FilmPath MakeFilmPath(const WorkingViews& views, const RenderOptions& options,
     path.photo_distance = clearance.photo_distance;
     path.narrowed = width != kWidths[0];
   }
-  path.film =
-      MakeCameraPath(views.AtSize(options.film_size).Cameras(), options.path,
-                     EvenMoments(FilmFrames(options.film_seconds, options.fps)), width);
-  path.samples =
-      MakeCameraPath(photos, options.path,
-                     SamplesOfFilm(options.film_seconds, options.fps).moments, width);
+  path.film = MakeCameraPath(views.AtSize(options.film_size).Cameras(), options.path,
+                             EvenMoments(FilmFrames(options.film_seconds, options.fps)), width);
+  path.samples = MakeCameraPath(
+      photos, options.path, SamplesOfFilm(options.film_seconds, options.fps).moments, width);
   return path;
 }
 
@@ -70,8 +67,7 @@ std::vector<FrameSet> FrameSetsOf(const WorkingViews& views, const RenderOptions
   const bool same = HaveSameIntrinsics(cameras), of_views = options.path.path == "views";
   std::vector<FrameSet> sets = {{"", cameras, true, of_views && same, of_views && same}};
   if (!same)
-    sets.push_back(
-        {kCommonPrefix, WithCommonIntrinsics(cameras), true, of_views, of_views});
+    sets.push_back({kCommonPrefix, WithCommonIntrinsics(cameras), true, of_views, of_views});
   if (of_views) return sets;
   sets.push_back({kPathPrefix, path.samples, false, false, true});
   sets.push_back({kFilmPrefix, path.film, false, true, false});

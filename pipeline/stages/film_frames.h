@@ -18,8 +18,8 @@ namespace regrade {
 struct FrameSet {
   std::string prefix;
   std::vector<Camera> cameras;
-  bool of_photos = false;  // camera i is at photo i's position
-  bool of_film = false;    // the film shows them
+  bool of_photos = false;   // camera i is at photo i's position
+  bool of_film = false;     // the film shows them
   bool of_2d_film = false;  // the 2D method's film shows them
 };
 
@@ -28,10 +28,10 @@ inline constexpr char kFilmPrefix[] = "film_";
 
 // The film's way through the scene.
 struct FilmPath {
-  std::vector<Camera> film;     // of the film's size
-  std::vector<Camera> samples;  // of the photos' working size; see SamplesOfFilm
+  std::vector<Camera> film;              // of the film's size
+  std::vector<Camera> samples;           // of the photos' working size; see SamplesOfFilm
   Metric transmittance, photo_distance;  // see PathClearance
-  bool narrowed = false;  // a smoother path would pass through surfaces
+  bool narrowed = false;                 // a smoother path would pass through surfaces
 };
 
 // `views` in the frame of `field`. Without a field nothing is measured. "smooth" keeps so close

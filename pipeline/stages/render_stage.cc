@@ -2,8 +2,8 @@
 // the former, at the photos' positions and along the film's camera path; and the films. Where
 // photos differ in size or lens, the frames at their positions are rendered again with one
 // common camera. Frames along the film's path may come from the fast renderer; all others are
-// exact. The 2D method styles frames at the photos' positions, and of the film those on which it
-// is measured.
+// exact. The 2D method styles frames at the photos' positions, and of the film those on which
+// it is measured.
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -13,9 +13,9 @@
 #include "kernels/scene/common_camera.h"
 #include "pipeline/capture/photo_gains.h"
 #include "pipeline/capture/working_views.h"
-#include "pipeline/fields/film_timing.h"
 #include "pipeline/fields/field_file.h"
 #include "pipeline/fields/field_renderer.h"
+#include "pipeline/fields/film_timing.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/program/device_choice.h"
 #include "pipeline/program/ordered_worker.h"

@@ -78,7 +78,8 @@ std::vector<ReportFilm> FilmsOf(const Workspace& workspace, const RunReport& rep
     wipe = Wipe(*source, *styled, styled->width / 2);
   add(kStyledFilm, "the styled scene", styled);
   add(kWipeFilm, "before and after, with a moving border", wipe);
-  add(kViews2dFilm, "each frame recoloured by itself (2D method), for comparison", frame("views_2d"));
+  add(kViews2dFilm, "each frame recoloured by itself (2D method), for comparison",
+      frame("views_2d"));
   return films;
 }
 

@@ -130,8 +130,7 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
         VoteForObject(settings, views, indices, *object, stored.field, parts.Next(kVoting));
   const StyleTargets targets =
       ReadStyleTargets(workspace, views, stored.field, indices, object.get(), weights);
-  if (targets.targets().empty()) 
-    return KeepColors(context, stored.field.background, weights);
+  if (targets.targets().empty()) return KeepColors(context, stored.field.background, weights);
 
   RestyleRequest request;
   request.options = settings.network;

@@ -4,11 +4,11 @@
 
 #include "kernels/base/error.h"
 #include "kernels/scene/common_camera.h"
-#include "pipeline/fields/film_timing.h"
-#include "pipeline/stages/film_frames.h"
 #include "pipeline/capture/scene_profile.h"
 #include "pipeline/capture/working_views.h"
+#include "pipeline/fields/film_timing.h"
 #include "pipeline/report/cost_rows.h"
+#include "pipeline/stages/film_frames.h"
 #include "reconstruct/fit/choose_degree.h"
 
 namespace regrade {

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "kernels/scene/capture.h"
-#include "pipeline/tradeoff/measurements.h"
 #include "pipeline/run/run_context.h"
+#include "pipeline/tradeoff/measurements.h"
 
 namespace regrade {
 

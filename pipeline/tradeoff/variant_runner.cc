@@ -234,8 +234,8 @@ void VariantRunner::MeasureStyle(const Variant& variant, const ProgressFunction&
   for (const char* name : {"steps", "k_est", "bound"}) m->work[name] = outcome.metrics.At(name);
 
   const Workspace& base = *base_->style;
-  const StoredField styled = ReadStyledField(trial.workspace.folder(),
-                                             trial.workspace.folder(), base_->settings.style.strength);
+  const StoredField styled = ReadStyledField(trial.workspace.folder(), trial.workspace.folder(),
+                                             base_->settings.style.strength);
   const WorkingViews views = base_->Views().InField(styled.field_from_world, styled.ndc);
   const FastGrid grid = MakeFastGrid(styled.field);
   const bool of_renders = fs::exists(base.Path("frames/views_2d"));

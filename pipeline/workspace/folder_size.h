@@ -6,7 +6,8 @@
 
 namespace regrade {
 
-// Bytes of a file, or of all files below a folder; 0 for what is not there. Links count nothing.
+// Bytes of a file, or of all files below a folder; 0 for what is not there. Links count
+// nothing.
 uint64_t SizeOnDisk(const std::string& path);
 
 // "231 MB", "1.8 GB", of 10^6 and 10^9 bytes.

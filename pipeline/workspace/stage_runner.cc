@@ -17,11 +17,13 @@ struct StageFacts {
   const char* words;
   double part;
 };
-constexpr StageFacts kFacts[] = {
-    {"finding where each photo was taken", 0.17}, {"fitting the scene to the photos", 0.33},
-    {"recolouring each photo", 0.01},             {"applying the style to the scene", 0.15},
-    {"rendering frames and films", 0.22},         {"measuring", 0.11},
-    {"writing the report", 0.01}};
+constexpr StageFacts kFacts[] = {{"finding where each photo was taken", 0.17},
+                                 {"fitting the scene to the photos", 0.33},
+                                 {"recolouring each photo", 0.01},
+                                 {"applying the style to the scene", 0.15},
+                                 {"rendering frames and films", 0.22},
+                                 {"measuring", 0.11},
+                                 {"writing the report", 0.01}};
 
 size_t PlaceOf(const std::string& stage) {
   const auto* found = std::find(std::begin(kStageNames), std::end(kStageNames), stage);
@@ -104,7 +106,7 @@ bool StageRunner::Run(const Stage& stage) {
   }
   const double seconds = console_->StageSeconds();
   folder->Record(stage.name, stage.inputs, outcome.outputs, seconds, outcome.metrics,
-                     CpuSeconds() - cpu_before);
+                 CpuSeconds() - cpu_before);
   console_->EndStage();
   console_->SetKept(Finished());
   console_->Info(stage.name + ": done in " + DurationText(seconds));

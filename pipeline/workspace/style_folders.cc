@@ -91,8 +91,8 @@ std::vector<NamedStyle> NameStyles(const std::string& folder,
 std::vector<std::string> StyleNames(const std::string& folder) {
   std::vector<std::string> names;
   std::error_code error;
-  for (fs::directory_iterator it(folder + "/" + kStylesFolder, error), end;
-       !error && it != end; it.increment(error))
+  for (fs::directory_iterator it(folder + "/" + kStylesFolder, error), end; !error && it != end;
+       it.increment(error))
     if (fs::is_regular_file(it->path() / "run.json"))
       names.push_back(it->path().filename().string());
   std::ranges::sort(names, NaturalLess);

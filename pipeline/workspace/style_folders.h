@@ -26,8 +26,8 @@ std::string StyleFolder(const std::string& folder, const std::string& name);
 // told apart by their content. Where another picture has a name, "-2" and so on is added.
 //
 // Throws Error(kUsage) for a `name` that is not safe, is that of another picture, or is given
-// with several pictures; for a picture that is given twice; Error(kInput) for one that cannot be
-// read.
+// with several pictures; for a picture that is given twice; Error(kInput) for one that cannot
+// be read.
 std::vector<NamedStyle> NameStyles(const std::string& folder,
                                    const std::vector<std::string>& pictures,
                                    const std::string& name);

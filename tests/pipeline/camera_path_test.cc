@@ -3,12 +3,12 @@
 
 #include <gtest/gtest.h>
 
-#include "pipeline/fields/film_timing.h"
-#include "pipeline/fields/path_clearance.h"
-
 #include <algorithm>
 #include <cmath>
 #include <memory>
+
+#include "pipeline/fields/film_timing.h"
+#include "pipeline/fields/path_clearance.h"
 
 namespace regrade {
 namespace {
@@ -46,7 +46,8 @@ void ExpectCameras(const std::vector<Camera>& path) {
 
 TEST(CameraPath, SmoothHasNoJumpsEvenFromShuffledPhotos) {
   for (const bool shuffled : {false, true}) {
-    const std::vector<Camera> path = MakeCameraPath(Arc(15, shuffled), {"smooth"}, EvenMoments(60));
+    const std::vector<Camera> path =
+        MakeCameraPath(Arc(15, shuffled), {"smooth"}, EvenMoments(60));
     ASSERT_EQ(path.size(), 60u);
     ExpectCameras(path);
     double largest = 0, total = 0;

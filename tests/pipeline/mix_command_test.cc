@@ -38,7 +38,8 @@ TEST(MixCommand, AStyleMayKnowDirectionsThatItsSceneDoesNot) {
   const ProgramOutcome done = Regrade(run);
   ASSERT_EQ(done.code, 0) << done.text;
   EXPECT_EQ(ReadFieldFile(folder / "e/field.npz").field.appearance.basis, 1);
-  const Appearance styled = ReadFieldFile(folder / "e/styles/style_sunset/styled.npz").field.appearance;
+  const Appearance styled =
+      ReadFieldFile(folder / "e/styles/style_sunset/styled.npz").field.appearance;
   ASSERT_EQ(styled.basis, 9);
   float beyond = 0;
   for (int64_t i = 0; i < styled.sh.size(); ++i)
@@ -47,9 +48,12 @@ TEST(MixCommand, AStyleMayKnowDirectionsThatItsSceneDoesNot) {
 
   ASSERT_EQ(Regrade({"mix", folder / "e", "--mix", "0:0.5:1", "--out", folder / "m"}).code, 0);
   const auto frame = [&](const std::string& path) { return Bytes(folder / path); };
-  EXPECT_EQ(frame("m/frames/00000.png"), frame("e/styles/style_sunset/frames/path_source/00000.png"));
-  EXPECT_EQ(frame("m/frames/00002.png"), frame("e/styles/style_sunset/frames/path_styled/00002.png"));
-  EXPECT_NE(frame("m/frames/00001.png"), frame("e/styles/style_sunset/frames/path_styled/00001.png"));
+  EXPECT_EQ(frame("m/frames/00000.png"),
+            frame("e/styles/style_sunset/frames/path_source/00000.png"));
+  EXPECT_EQ(frame("m/frames/00002.png"),
+            frame("e/styles/style_sunset/frames/path_styled/00002.png"));
+  EXPECT_NE(frame("m/frames/00001.png"),
+            frame("e/styles/style_sunset/frames/path_styled/00001.png"));
 }
 
 TEST(MixCommand, H49_AFilmBetweenTheSceneAndItsStyle) {
@@ -66,10 +70,14 @@ TEST(MixCommand, H49_AFilmBetweenTheSceneAndItsStyle) {
       Regrade({"mix", folder / "e", "--mix", "0:0.5:1", "--out", folder / "m"});
   ASSERT_EQ(mixed.code, 0) << mixed.text;
   const auto frame = [&](const std::string& path) { return Bytes(folder / path); };
-  EXPECT_EQ(frame("m/frames/00000.png"), frame("e/styles/style_sunset/frames/path_source/00000.png"));
-  EXPECT_EQ(frame("m/frames/00002.png"), frame("e/styles/style_sunset/frames/path_styled/00002.png"));
-  EXPECT_NE(frame("m/frames/00001.png"), frame("e/styles/style_sunset/frames/path_source/00001.png"));
-  EXPECT_NE(frame("m/frames/00001.png"), frame("e/styles/style_sunset/frames/path_styled/00001.png"));
+  EXPECT_EQ(frame("m/frames/00000.png"),
+            frame("e/styles/style_sunset/frames/path_source/00000.png"));
+  EXPECT_EQ(frame("m/frames/00002.png"),
+            frame("e/styles/style_sunset/frames/path_styled/00002.png"));
+  EXPECT_NE(frame("m/frames/00001.png"),
+            frame("e/styles/style_sunset/frames/path_source/00001.png"));
+  EXPECT_NE(frame("m/frames/00001.png"),
+            frame("e/styles/style_sunset/frames/path_styled/00001.png"));
 
   // The field at the end is the style's file, and the folder of a mix may be used again.
   ASSERT_EQ(Regrade({"mix", folder / "e", "--mix", "1", "--out", folder / "m"}).code, 0);

@@ -115,7 +115,8 @@ TEST(MixedSizes, H159_ThreeSizesOfTwoCamerasGoToFilmAndReport) {
   EXPECT_EQ(SizeOf(folder / "e/styles/style_sunset/views_2d/00001.png"), "48x64");
   for (const char* sequence : {"source", "views_2d", "styled"})
     for (const char* frame : {"00000.png", "00001.png", "00002.png"})
-      EXPECT_EQ(SizeOf(folder / (std::string("e/styles/style_sunset/frames/common_") + sequence + "/" + frame)),
+      EXPECT_EQ(SizeOf(folder / (std::string("e/styles/style_sunset/frames/common_") +
+                                 sequence + "/" + frame)),
                 "64x48");
   EXPECT_FALSE(fs::exists(folder / "e/styles/style_sunset/frames/common_transmittance"));
   EXPECT_EQ(CountVideoFrames(folder / "e/styled.mp4"), 3);
@@ -158,7 +159,8 @@ TEST(MixedSizes, H159_ThreeSizesOfTwoCamerasGoToFilmAndReport) {
 
   // Frames of another program that differ in size are a mistake.
   const ProgramOutcome sizes_differ =
-      Regrade({"evaluate", "--frames", folder / "e/styles/style_sunset/frames/styled", "--out", folder / "f"});
+      Regrade({"evaluate", "--frames", folder / "e/styles/style_sunset/frames/styled", "--out",
+               folder / "f"});
   EXPECT_EQ(sizes_differ.code, 3);
   EXPECT_NE(sizes_differ.text.find("48 x 64 px, 00000.png is 64 x 48 px"), std::string::npos)
       << sizes_differ.text;

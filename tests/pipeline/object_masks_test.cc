@@ -128,7 +128,8 @@ TEST(ObjectMasks, H50_ARunWithWrongMasksRestylesTheObjectAlone) {
   double restyled = 0, spilled = 0;
   for (const char* name : {"00001", "00002", "00003", "00005"}) {
     const auto frame = [&](const char* sequence) {
-      return ReadImage(folder / (std::string("e/styles/style_sunset/frames/") + sequence + "/" + name + ".png"));
+      return ReadImage(folder / (std::string("e/styles/style_sunset/frames/") + sequence + "/" +
+                                 name + ".png"));
     };
     const Image truth = ReadImage(folder / (std::string("s/truth/masks/") + name + ".png"));
     restyled += Change(frame("source"), frame("styled"), truth, true);
@@ -151,7 +152,8 @@ TEST(ObjectMasks, H50_ARunWithWrongMasksRestylesTheObjectAlone) {
   ASSERT_EQ(empty.code, 0) << empty.text;
   EXPECT_NE(empty.text.find("--mask-vote"), std::string::npos) << empty.text;
   const auto pixels = [&](const char* path) { return ReadImage(folder / path).pixels; };
-  EXPECT_EQ(pixels("e/styles/style_sunset/frames/styled/00001.png"), pixels("e/styles/style_sunset/frames/source/00001.png"));
+  EXPECT_EQ(pixels("e/styles/style_sunset/frames/styled/00001.png"),
+            pixels("e/styles/style_sunset/frames/source/00001.png"));
 
   EXPECT_EQ(regrade({"stylize", folder / "e", "--masks", folder / "nowhere"}).code, 3);
   EXPECT_EQ(regrade({"stylize", folder / "e", "--masks", "", "--style-mask", style}).code, 2);

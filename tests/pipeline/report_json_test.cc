@@ -146,8 +146,8 @@ TEST(ReportJson, HasTheKeysOfSchema2InOrder) {
             "bound_at_steps", "notices", "cpu_seconds"}));
   EXPECT_EQ(KeysOf(stages.At("render")),
             (Keys{"seconds", "device", "frames", "path_frames", "film_frames", "film_seconds",
-                  "path_transmittance", "path_photo_distance", "film", "strength", "film_renderer",
-                  "frames_per_second", "seen_by_few"}));
+                  "path_transmittance", "path_photo_distance", "film", "strength",
+                  "film_renderer", "frames_per_second", "seen_by_few"}));
   EXPECT_EQ(KeysOf(stages.At("render").At("seen_by_few")),
             (Keys{"film", "worst_frame", "worst_frame_number", "photos"}));
   EXPECT_EQ(KeysOf(stages.At("evaluate")),
@@ -281,7 +281,8 @@ TEST(ReportFromRecords, ReadsWhatStagesRecordAndNamesFileAndKeyOfWhatIsMissing) 
   EXPECT_FALSE(report.stages.pose.has_value());
 
   workspace.Record("render", JsonValue::Object(), {}, 5, JsonValue::Object{{"device", "cpu"}});
-  EXPECT_REGRADE_ERROR(ReportFromRecords(workspace, workspace), ExitCode::kInput, "\"frames\" is missing");
+  EXPECT_REGRADE_ERROR(ReportFromRecords(workspace, workspace), ExitCode::kInput,
+                       "\"frames\" is missing");
   EXPECT_REGRADE_ERROR(ReportFromRecords(workspace, workspace), ExitCode::kInput,
                        ".regrade/stages/render.json");
 }

@@ -97,8 +97,9 @@ TEST(RunReport, ShowsEveryPartOfTheRun) {
     }
 
   // Where things are, how long it took and how it went are the last lines.
-  for (const char* part : {"film " , "styles/style_sunset/styled.mp4", "page ", "took ", "sharp: ",
-                           "; steady: ", "; faithful: ", "next: ", "stage 2 of 7: fitting"})
+  for (const char* part :
+       {"film ", "styles/style_sunset/styled.mp4", "page ", "took ",
+        "sharp: ", "; steady: ", "; faithful: ", "next: ", "stage 2 of 7: fitting"})
     EXPECT_NE(done.text.find(part), std::string::npos) << part << "\n" << done.text;
   EXPECT_LT(page.find("class=assessment"), page.find("class=mainfilm"));
   EXPECT_LT(page.find("class=mainfilm"), page.find("class=compare"));
@@ -111,10 +112,14 @@ TEST(RunReport, ShowsEveryPartOfTheRun) {
 
   // Another choice of the film's renderer renders again, and is named.
   const auto film_renderer = [&] {
-    return ReadJsonFile(folder / "e/styles/style_sunset/report.json").At("stages").At("render").At("film_renderer");
+    return ReadJsonFile(folder / "e/styles/style_sunset/report.json")
+        .At("stages")
+        .At("render")
+        .At("film_renderer");
   };
   EXPECT_EQ(film_renderer().AsString(), "exact (the CPU has no fast renderer)");
-  const testing::ProgramOutcome rendered = Regrade({"render", folder / "e", "--exact", "--verbose"});
+  const testing::ProgramOutcome rendered =
+      Regrade({"render", folder / "e", "--exact", "--verbose"});
   ASSERT_EQ(rendered.code, 0) << rendered.text;
   EXPECT_NE(rendered.text.find("renderer of the film: exact (--exact)"), std::string::npos)
       << rendered.text;

@@ -46,8 +46,8 @@ void Synth(const TemporaryFolder& folder, const std::vector<std::string>& more =
 // A tiny run of folder / "s" with the given flags, its results in `out`.
 std::vector<std::string> RunOf(const TemporaryFolder& folder, const std::string& out,
                                const std::vector<std::string>& more) {
-  std::vector<std::string> run{"run",   folder / "s/truth", "--out", folder / out,
-                               "--device", "cpu"};
+  std::vector<std::string> run{"run",        folder / "s/truth", "--out",
+                               folder / out, "--device",         "cpu"};
   for (const std::string& flag : testing::TinyFlags()) run.push_back(flag);
   run.insert(run.end(), more.begin(), more.end());
   return run;
@@ -72,8 +72,7 @@ TEST(StyleFolders, NamesAreSafeAndKeptApartByContent) {
   EXPECT_EQ(SafeStyleName(std::string(300, 'x') + ".png").size(), 80u);
 
   const TemporaryFolder folder;
-  for (const char* name : {"a/x.png", "b/x.png", "c/x.png"})
-    WriteText(folder / name, name);
+  for (const char* name : {"a/x.png", "b/x.png", "c/x.png"}) WriteText(folder / name, name);
   const std::string out = folder / "out";
   std::vector<NamedStyle> named = NameStyles(out, {folder / "a/x.png", folder / "b/x.png"}, "");
   EXPECT_EQ(named[0].name, "x");
@@ -201,13 +200,14 @@ TEST(Styles, StrengthIsAMixOfSceneAndStyle) {
 TEST(Styles, KilledInTheMidstAndGoneOnIsByteIdentical) {
   const TemporaryFolder folder;
   Synth(folder);
-  const std::vector<std::string> styles{"--style", Asset("sunset"), "--style", Asset("night"),
-                                        "--style", Asset("autumn"), "--reproducible"};
+  const std::vector<std::string> styles{"--style",       Asset("sunset"), "--style",
+                                        Asset("night"),  "--style",       Asset("autumn"),
+                                        "--reproducible"};
   ASSERT_EQ(Regrade(RunOf(folder, "whole", styles)).code, 0);
   const int null = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
-  for (const char* when : {"styles/style_night/views_2d/00002.png",
-                           "styles/style_night/frames/styled/00001.png",
-                           "styles/style_autumn/network.npz"})
+  for (const char* when :
+       {"styles/style_night/views_2d/00002.png", "styles/style_night/frames/styled/00001.png",
+        "styles/style_autumn/network.npz"})
     testing::Spawn(REGRADE_PROGRAM, RunOf(folder, "killed", styles), null, SIGKILL,
                    folder / ("killed/" + std::string(when)));
   ::close(null);
@@ -267,7 +267,8 @@ TEST(Styles, NothingOfThePhotosMetadataLeaves) {
   const ProgramOutcome done = Regrade(RunOf(folder, "e", {"--style", Asset("sunset")}));
   ASSERT_EQ(done.code, 0) << done.text;
   for (const char* format : {"png", "jpeg", "tiff"})
-    ASSERT_EQ(Regrade({"render", folder / "e", "--still", "00001", "--format", format}).code, 0);
+    ASSERT_EQ(Regrade({"render", folder / "e", "--still", "00001", "--format", format}).code,
+              0);
   int files = 0;
   for (const auto& entry : fs::recursive_directory_iterator(folder / "e/styles")) {
     if (!entry.is_regular_file()) continue;
@@ -285,7 +286,8 @@ TEST(Stills, HaveThePhotosSizeAndASrgbTag) {
   const ProgramOutcome done = Regrade(RunOf(folder, "e", {"--style", Asset("sunset")}));
   ASSERT_EQ(done.code, 0) << done.text;
   for (const char* format : {"png", "jpeg", "tiff"})
-    ASSERT_EQ(Regrade({"render", folder / "e", "--still", "00001", "--format", format}).code, 0);
+    ASSERT_EQ(Regrade({"render", folder / "e", "--still", "00001", "--format", format}).code,
+              0);
   const std::string stills = folder / "e/styles/style_sunset/stills/00001";
   const DecodedPhoto png = DecodePhoto(stills + ".png"), jpeg = DecodePhoto(stills + ".jpg"),
                      tiff = DecodePhoto(stills + ".tif");
@@ -319,7 +321,8 @@ TEST(Points, AreWrittenInTheCapturesWorldAndLabelled) {
     const std::string ply = ReadText(folder / name);
     EXPECT_EQ(ply.substr(0, 4), "ply\n");
     EXPECT_NE(ply.find("comment approximate"), std::string::npos);
-    const size_t count_at = ply.find("element vertex ") + 15, body = ply.find("end_header\n") + 11;
+    const size_t count_at = ply.find("element vertex ") + 15,
+                 body = ply.find("end_header\n") + 11;
     const size_t count = std::stoul(ply.substr(count_at));
     EXPECT_EQ(ply.size(), body + 15 * count) << name;
   }
@@ -328,10 +331,12 @@ TEST(Points, AreWrittenInTheCapturesWorldAndLabelled) {
 TEST(Clean, RemovesOnlyWhatCanBeMadeAgain) {
   const TemporaryFolder folder;
   Synth(folder);
-  std::vector<std::string> run = RunOf(folder, "e", {"--style", Asset("sunset"), "--keep-field"});
+  std::vector<std::string> run =
+      RunOf(folder, "e", {"--style", Asset("sunset"), "--keep-field"});
   ASSERT_EQ(Regrade(run).code, 0);
   const std::string style = folder / "e/styles/style_sunset";
-  const std::string film = ReadText(style + "/styled.mp4"), field = ReadText(style + "/styled.npz");
+  const std::string film = ReadText(style + "/styled.mp4"),
+                    field = ReadText(style + "/styled.npz");
   ProgramOutcome done = Regrade({"clean", folder / "e", "--dry-run"});
   EXPECT_EQ(done.code, 0);
   EXPECT_NE(done.text.find("can be made again"), std::string::npos) << done.text;
@@ -352,10 +357,10 @@ TEST(Clean, RemovesOnlyWhatCanBeMadeAgain) {
 TEST(StyledField, IsRemadeToTheBit) {
   const TemporaryFolder folder;
   Synth(folder);
-  const ProgramOutcome done = Regrade(
-      RunOf(folder, "e",
-            {"--style", Asset("sunset"), "--keep-field", "--effects", "background=on",
-             "--background-layers", "4", "--background-resolution", "16"}));
+  const ProgramOutcome done =
+      Regrade(RunOf(folder, "e",
+                    {"--style", Asset("sunset"), "--keep-field", "--effects", "background=on",
+                     "--background-layers", "4", "--background-resolution", "16"}));
   ASSERT_EQ(done.code, 0) << done.text;
   const std::string style = folder / "e/styles/style_sunset";
   const StoredField source = ReadFieldFile(folder / "e/field.npz");
@@ -375,9 +380,9 @@ TEST(StyledField, IsRemadeToTheBit) {
 TEST(StyledField, WithObjectWeightsToo) {
   const TemporaryFolder folder;
   Synth(folder, {"--effects", "masks"});
-  const ProgramOutcome done =
-      Regrade(RunOf(folder, "e", {"--style", Asset("sunset"), "--keep-field", "--masks",
-                                  folder / "s/masks"}));
+  const ProgramOutcome done = Regrade(
+      RunOf(folder, "e",
+            {"--style", Asset("sunset"), "--keep-field", "--masks", folder / "s/masks"}));
   ASSERT_EQ(done.code, 0) << done.text;
   const std::string style = folder / "e/styles/style_sunset";
   WriteFieldFile(folder / "again.npz", ReadStyledField(folder / "e", style));

@@ -29,9 +29,9 @@ inline ProgramOutcome RunProgram(const std::string& program,
 // Options for the smallest possible fit, style and film: three frames, at which it is measured,
 // too.
 inline std::vector<std::string> TinyFlags() {
-  return {"--photo-size",  "64",   "--fit-resolutions", "24", "--fit-steps", "30",
-          "--style-steps", "3",    "--film-seconds",    "0.125", "--fps",   "24",
-          "--film-size",   "64",   "--threads",         "2",     "--tracks", "given"};
+  return {"--photo-size",  "64", "--fit-resolutions", "24",    "--fit-steps", "30",
+          "--style-steps", "3",  "--film-seconds",    "0.125", "--fps",       "24",
+          "--film-size",   "64", "--threads",         "2",     "--tracks",    "given"};
 }
 
 }  // namespace regrade::testing

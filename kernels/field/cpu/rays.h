@@ -43,8 +43,8 @@ struct FastRayFunctions {
   // color [n, 3] unclipped, depth [n] = sum w t (world), transmittance [n].
   void (*render)(const FastGrid&, const Ray*, int64_t n, const MarchOptions&, float* color,
                  float* depth, float* transmittance);
-  // The same of two fields of one geometry, whose density is marched once: `other_color` [n, 3] is
-  // the second one's. To the bit what two calls of `render` give.
+  // The same of two fields of one geometry, whose density is marched once: `other_color` [n, 3]
+  // is the second one's. To the bit what two calls of `render` give.
   void (*render_pair)(const FastGrid&, const FastGrid& other, const Ray*, int64_t n,
                       const MarchOptions&, float* color, float* other_color, float* depth,
                       float* transmittance);
