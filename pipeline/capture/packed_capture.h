@@ -12,6 +12,7 @@
 #include "kernels/scene/camera.h"
 #include "kernels/scene/image.h"
 #include "reconstruct/scene/normalize_scene.h"
+#include "reconstruct/scene/point_observations.h"
 
 namespace regrade {
 
@@ -20,6 +21,7 @@ struct PackedView {
   bool held_out = false;
   Camera camera;  // in the field's frame, at the photo's size
   Image photo;    // [H, W, 3] sRGB
+  std::vector<SeenPoint> points;  // of a fitted view; may be empty
 };
 
 struct PackedCapture {

@@ -63,6 +63,13 @@ void RunPack(const Command& command, const Arguments& arguments, Console* consol
   for (int i = 0; i < views.count(); ++i)
     packed.views.push_back({views.View(i).file, IsHeldOut(static_cast<size_t>(i), run.holdout),
                             views.CameraOf(i), views.Photo(i)});
+  std::vector<int> fitted;
+  for (int i = 0; i < views.count(); ++i)
+    if (!packed.views[static_cast<size_t>(i)].held_out) fitted.push_back(i);
+  std::vector<std::vector<SeenPoint>> seen =
+      PointsSeenBy(capture, fitted, packed.scene.field_from_world);
+  for (size_t i = 0; i < fitted.size(); ++i)
+    packed.views[static_cast<size_t>(fitted[i])].points = std::move(seen[i]);
   WritePackedCapture(run.out, packed);
   console->Info(Concat("wrote ", run.out, ": ", packed.views.size(), " views, ",
                        std::filesystem::file_size(run.out) >> 20, " MiB"));

@@ -54,7 +54,7 @@ void FitPacked(const FitPackedOptions& settings, const FitOptions& options) {
   const PackedCapture capture = ReadPackedCapture(settings.capture);
   std::vector<TrainingView> views;
   for (const PackedView& view : capture.views)
-    if (!view.held_out) views.push_back({view.camera, &view.photo});
+    if (!view.held_out) views.push_back({view.camera, &view.photo, view.points});
   const double read_seconds = ClockSeconds() - start;
   const double fit_start = ClockSeconds();
   const Backend backend = settings.device == "cpu" ? Backend::kCpu : Backend::kCuda;

@@ -161,14 +161,17 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   std::vector<Image> photos;
   photos.reserve(fitted.size());
   std::vector<TrainingView> training_views;
-  for (const int i : fitted) {
+  std::vector<std::vector<SeenPoint>> seen =
+      PointsSeenBy(capture, fitted, scene.field_from_world);
+  for (size_t f = 0; f < fitted.size(); ++f) {
+    const int i = fitted[f];
     Image photo = views.PhotoToFit(i);
     if (photo.empty()) {
       context->console->Info(views.View(i).file + ": its mask leaves nothing to fit");
       continue;
     }
     photos.push_back(std::move(photo));
-    training_views.push_back({views.CameraOf(i), &photos.back()});
+    training_views.push_back({views.CameraOf(i), &photos.back(), std::move(seen[f])});
   }
 
   if (settings.run.reproducible && options.shards == 0) options.shards = kReproducibleShards;

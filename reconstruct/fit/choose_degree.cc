@@ -23,7 +23,7 @@ TrainingView Smaller(const TrainingView& view, double scale, std::vector<Image>*
   const int width = std::max(1, static_cast<int>(std::lround(view.camera.width * factor)));
   const int height = std::max(1, static_cast<int>(std::lround(view.camera.height * factor)));
   photos->push_back(Resize(*view.photo, width, height));
-  return {view.camera.Resized(width, height), &photos->back()};
+  return {view.camera.Resized(width, height), &photos->back(), view.points};
 }
 
 // Over all pixels of all views that have a colour; masked ones are NaN.

@@ -43,6 +43,7 @@ struct FitOptions {
   float background_lead = 0.9f;
   float cell_pixels = 1.0f;
   float max_cells = 12.0f;
+  float free_space = 0.02f;
   int shards = 0;
   bool exact_sums = false;
   uint64_t seed = 0;
@@ -186,6 +187,11 @@ struct FitOptions {
                   "errors are",
           .min = 0.001,
           .max = 200});
+    bind("fit-free-space", free_space,
+         {.help = "adaptive field: keeps the space clear between cameras and the points they "
+                  "saw; less fog where few photos look",
+          .min = 0,
+          .max = 10});
     bind("fit-shards", shards,
          {.help = "gradient arenas; 0: one per thread, or 4 with --reproducible",
           .min = 0,

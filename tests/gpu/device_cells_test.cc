@@ -7,8 +7,10 @@
 #include <cstring>
 #include <vector>
 
+#include "kernels/base/random.h"
 #include "kernels/field/cell_variation.h"
 #include "kernels/field/cuda/device_cell_statistics.h"
+#include "kernels/field/cuda/device_free_space.h"
 #include "kernels/field/cuda/device_rays.h"
 #include "kernels/field/packed_grid.h"
 #include "kernels/field/render.h"
@@ -137,6 +139,45 @@ TEST_P(DeviceCellsTest, FitGradientAndVariation) {
           exact_sums ? "plain double, exact sums" : "plain double", worst / largest, 1e-4);
       EXPECT_NEAR(fitter.TakeSums().squared_error, squares, 1e-4 * squares);
     }
+  }
+}
+
+TEST_P(DeviceCellsTest, FreeSpace) {
+  const RadianceField field = RandomCellField({3, 2, 2}, 2, basis(), 51);
+  const DoubleField d(field);
+  const CellsView view = ViewOf(field.geometry->cells, field.geometry->frame.resolution);
+  std::vector<FreeRay> rays;
+  for (const Ray& ray : RandomRays(40, 52)) rays.push_back({ray, 1.7f});
+  constexpr int kDrawn = 500;
+  constexpr uint64_t kSeed = 9, kStep = 3;
+  std::vector<double> plain(d.density.size());
+  for (int i = 0; i < kDrawn; ++i) {
+    const FreeRay& free = rays[RandomIndex(kSeed, kStep, static_cast<uint64_t>(i), rays.size())];
+    const RayT<double> ray = testing::ToDouble(free.ray);
+    const double near_clip = field.near_clip, length = free.length;
+    const double opacity = OpacityBefore(field.geometry->frame, view, d.density.data(), ray,
+                                         near_clip, length);
+    OpacityBeforeAdjoint(field.geometry->frame, view, d.density.data(), ray, near_clip, length,
+                         opacity, 0.5 / kDrawn,
+                         [&](int32_t v, double g) { plain[static_cast<size_t>(v)] += g; });
+  }
+  DeviceFreeSpace free_space(rays);
+  for (const bool exact_sums : {false, true}) {
+    DeviceGrid grid = UploadGrid(MakeFastGrid(field), true, {}, exact_sums);
+    DeviceTouched touched(grid);
+    free_space.Accumulate(grid, kSeed, kStep, kDrawn, 0.5f, &touched);
+    free_space.Join();
+    const Buffer<float> gradient = DownloadGradient(grid);
+    double largest = 0, worst = 0;
+    const int lanes = RecordLanes(basis());
+    for (int64_t v = 0; v < field.geometry->cells.num_vertices(); ++v) {
+      largest = std::max(largest, std::abs(plain[static_cast<size_t>(v)]));
+      worst = std::max(worst, std::abs(gradient[v * lanes + DensityLane(basis())] -
+                                       plain[static_cast<size_t>(v)]));
+    }
+    EXPECT_GT(largest, 0);
+    Row("gradient of free space", basis(),
+        exact_sums ? "plain double, exact sums" : "plain double", worst / largest, 1e-4);
   }
 }
 
