@@ -28,7 +28,7 @@ RenderedView RenderViewOnDevice(const DeviceGrid& grid, const Camera& camera,
     depth.CopyOut(view.depth.pixels.data(), n);
     transmittance.CopyOut(view.transmittance.pixels.data(), n);
   };
-  if (camera.lens == LensModel::kPinhole && !grid.cells.on()) {
+  if (camera.lens == LensModel::kPinhole) {
     RenderFrameOnDevice(grid, camera, options, target, opacity_step, half);
     take();
     return view;
@@ -323,6 +323,41 @@ void RenderCellRays(const DeviceGrid& grid, const Ray* rays, int64_t n,
   CheckLaunch("render_spheres");
 }
 
+// Lists a frame's rays in their order; those beyond its border have no direction, and so no
+// samples.
+__global__ void ListRaysKernel(FrameRays frame, int64_t n, Ray* rays) {
+  const int64_t i = blockIdx.x * int64_t{blockDim.x} + threadIdx.x;
+  int64_t place;
+  if (i < n && !frame.Get(i, &rays[i], &place)) rays[i] = Ray{};
+}
+__global__ void ResolveFrameKernel(FrameRays frame, int64_t n, DeviceRenderTarget listed,
+                                   DeviceRenderTarget target) {
+  const int64_t i = blockIdx.x * int64_t{blockDim.x} + threadIdx.x;
+  Ray ray;
+  int64_t place;
+  if (i >= n || !frame.Get(i, &ray, &place)) return;
+  Vec3f color = listed.color[i];
+  float depth = listed.depth[i];
+  frame.Resolve(ray, listed.transmittance[i], &color, &depth);
+  target.color[place] = color;
+  target.depth[place] = depth;
+  target.transmittance[place] = listed.transmittance[i];
+}
+
+void RenderCellFrame(const DeviceGrid& grid, const FrameRays& frame,
+                     const MarchOptions& options, const DeviceRenderTarget& target) {
+  const int64_t n = frame.Blocks() * kRays;
+  DeviceBuffer<Ray> rays(n, "rays of a frame");
+  DeviceBuffer<Vec3f> color(n, "colours of a frame");
+  DeviceBuffer<float> depth(n, "depths of a frame"), transmittance(n, "transmittances");
+  ListRaysKernel<<<BlocksFor(n), kThreads>>>(frame, n, rays.data());
+  CheckLaunch("list_rays");
+  const DeviceRenderTarget listed{color.data(), depth.data(), transmittance.data()};
+  RenderCellRays(grid, rays.data(), n, options, listed);
+  ResolveFrameKernel<<<BlocksFor(n), kThreads>>>(frame, n, listed, target);
+  CheckLaunch("resolve_frame");
+}
+
 template <typename Rays>
 void RenderBlocks(const DeviceGrid& grid, const HalfGrid* half, const Rays& rays,
                   const MarchOptions& options, float opacity_step,
@@ -368,10 +403,13 @@ void RenderOnDevice(const DeviceGrid& grid, const Ray* rays, int64_t n,
 void RenderFrameOnDevice(const DeviceGrid& grid, const Camera& camera,
                          const MarchOptions& options, const DeviceRenderTarget& target,
                          float opacity_step, const HalfGrid* half) {
-  REGRADE_CHECK(camera.lens == LensModel::kPinhole && !grid.cells.on());
+  REGRADE_CHECK(camera.lens == LensModel::kPinhole);
   const DeviceRange range("frame");
-  RenderBlocks(grid, half, FrameRays{PinholeRays(camera), ResolvePixel(camera)}, options,
-               opacity_step, target);
+  const FrameRays rays{PinholeRays(camera), ResolvePixel(camera)};
+  if (grid.cells.on())
+    RenderCellFrame(grid, rays, options, target);
+  else
+    RenderBlocks(grid, half, rays, options, opacity_step, target);
 }
 
 #else
