@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "kernels/base/error.h"
+#include "pipeline/capture/capture_store.h"
 #include "pipeline/run/resolve_settings.h"
 #include "pipeline/workspace/workspace.h"
 
@@ -92,6 +93,14 @@ std::optional<Prepared> Prepare(const Command& command, const Arguments& argumen
 
 void RequireValue(const std::string& value, const char* flag, const char* hint) {
   if (value.empty()) throw UsageError("its value is missing", flag, hint);
+}
+
+Capture ReadPosedCapture(const std::string& folder) {
+  const std::string poses = folder + "/poses";
+  if (!std::filesystem::exists(poses + "/photos.json"))
+    throw InputError("has no poses", folder,
+                     "run `regrade pose PHOTOS --out " + folder + "` first");
+  return ReadCapture(poses);
 }
 
 std::string AbsolutePath(const std::string& path) {
