@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <latch>
+#include <sstream>
 #include <string>
 #include <system_error>
 #include <thread>
@@ -58,6 +59,18 @@ void CheckWords(const Command& command, const Arguments& words, size_t least, si
                    std::string("usage: regrade ") + command.name + " " + command.usage);
 }
 
+std::vector<std::string> RequiredOptions(const std::string& usage) {
+  std::vector<std::string> names;
+  std::istringstream words(usage);
+  bool in_brackets = false;
+  for (std::string word; words >> word && word != "|";) {
+    in_brackets = in_brackets || word.starts_with('[');
+    if (!in_brackets && word.starts_with("--")) names.push_back(word.substr(2));
+    if (word.ends_with(']')) in_brackets = false;
+  }
+  return names;
+}
+
 std::optional<Prepared> Prepare(const Command& command, const Arguments& arguments,
                                 const Preparation& preparation, OptionSet* options) {
   SettingsSources sources;
@@ -66,7 +79,7 @@ std::optional<Prepared> Prepare(const Command& command, const Arguments& argumen
   if (AsksForHelp(arguments)) {
     ResolveSettings(sources, options);
     std::printf("regrade %s %s\n%s\n%s", command.name, command.usage, command.summary,
-                options->Help().c_str());
+                options->Help(RequiredOptions(command.usage)).c_str());
     return std::nullopt;
   }
   Prepared prepared;

@@ -23,6 +23,10 @@ struct Command {
 
 const std::vector<Command>& AllCommands();
 
+// Names of the options that a usage demands: those before an alternative (" | ") and outside
+// brackets.
+std::vector<std::string> RequiredOptions(const std::string& usage);
+
 // What Prepare is to read.
 struct Preparation {
   size_t least_words = 1, most_words = 1;
