@@ -26,7 +26,7 @@ void PrintHelp() {
       "regrade " REGRADE_VERSION
       ": photographs in, a styled 3D scene out\n\nusage: regrade COMMAND [OPTIONS]\n\n");
   for (const Command& command : AllCommands())
-    std::printf("  %-12s %s\n               regrade %s %s\n", command.name, command.summary,
+    std::printf("  %-13s %s\n                regrade %s %s\n", command.name, command.summary,
                 command.name, command.usage);
   std::printf("\nregrade COMMAND --help lists the options of a command.\n");
 }

@@ -6,12 +6,14 @@
 #include <cstdio>
 #include <filesystem>
 #include <latch>
+#include <sstream>
 #include <string>
 #include <system_error>
 #include <thread>
 #include <vector>
 
 #include "kernels/base/error.h"
+#include "pipeline/capture/capture_store.h"
 #include "pipeline/run/resolve_settings.h"
 #include "pipeline/workspace/workspace.h"
 
@@ -57,6 +59,18 @@ void CheckWords(const Command& command, const Arguments& words, size_t least, si
                    std::string("usage: regrade ") + command.name + " " + command.usage);
 }
 
+std::vector<std::string> RequiredOptions(const std::string& usage) {
+  std::vector<std::string> names;
+  std::istringstream words(usage);
+  bool in_brackets = false;
+  for (std::string word; words >> word && word != "|";) {
+    in_brackets = in_brackets || word.starts_with('[');
+    if (!in_brackets && word.starts_with("--")) names.push_back(word.substr(2));
+    if (word.ends_with(']')) in_brackets = false;
+  }
+  return names;
+}
+
 std::optional<Prepared> Prepare(const Command& command, const Arguments& arguments,
                                 const Preparation& preparation, OptionSet* options) {
   SettingsSources sources;
@@ -65,7 +79,7 @@ std::optional<Prepared> Prepare(const Command& command, const Arguments& argumen
   if (AsksForHelp(arguments)) {
     ResolveSettings(sources, options);
     std::printf("regrade %s %s\n%s\n%s", command.name, command.usage, command.summary,
-                options->Help().c_str());
+                options->Help(RequiredOptions(command.usage)).c_str());
     return std::nullopt;
   }
   Prepared prepared;
@@ -92,6 +106,14 @@ std::optional<Prepared> Prepare(const Command& command, const Arguments& argumen
 
 void RequireValue(const std::string& value, const char* flag, const char* hint) {
   if (value.empty()) throw UsageError("its value is missing", flag, hint);
+}
+
+Capture ReadPosedCapture(const std::string& folder) {
+  const std::string poses = folder + "/poses";
+  if (!std::filesystem::exists(poses + "/photos.json"))
+    throw InputError("has no poses", folder,
+                     "run `regrade pose PHOTOS --out " + folder + "` first");
+  return ReadCapture(poses);
 }
 
 std::string AbsolutePath(const std::string& path) {

@@ -25,7 +25,7 @@ const std::vector<Command>& AllCommands() {
       {"synth", "OUT [OPTIONS]", "writes a synthetic capture with its exact ground truth",
        RunSynth},
       {"export", "DIR --out FOLDER [OPTIONS]",
-       "writes photos and poses for other programs: COLMAP text or binary, transforms.json",
+       "writes photos and poses for COLMAP, nerfstudio and instant-ngp, or fields for svox2",
        RunExport},
       {"pack", "DIR --out FILE [OPTIONS]",
        "writes a posed capture as one file, for regrade_gpu on a bare GPU machine", RunPack},

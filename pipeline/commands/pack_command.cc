@@ -4,7 +4,6 @@
 
 #include "kernels/base/error.h"
 #include "kernels/image/resize.h"
-#include "pipeline/capture/capture_store.h"
 #include "pipeline/capture/packed_capture.h"
 #include "pipeline/capture/scene_profile.h"
 #include "pipeline/capture/working_views.h"
@@ -43,10 +42,7 @@ void RunPack(const Command& command, const Arguments& arguments, Console* consol
   if (!prepared) return;
   const std::string& folder = prepared->words[0];
   RequireValue(run.out, "--out", "name the .npz file to write");
-  if (!std::filesystem::exists(folder + "/poses/photos.json"))
-    throw InputError("has no poses", folder,
-                     "run `regrade pose CAPTURE --out " + folder + "` first");
-  const Capture capture = ReadCapture(folder + "/poses");
+  const Capture capture = ReadPosedCapture(folder);
   const WorkingViews as_taken(capture, scene.photo_size, run.holdout);
   for (int i = 0; i < as_taken.count(); ++i)
     if (!as_taken.Mask(i).empty())

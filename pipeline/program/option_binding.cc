@@ -254,7 +254,7 @@ JsonValue OptionSet::Values() const {
   return values;
 }
 
-std::string OptionSet::Help() const {
+std::string OptionSet::Help(const std::vector<std::string>& required) const {
   std::string text, heading;
   for (const Entry& entry : entries_) {
     if (entry.heading != heading || text.empty()) text += "\n" + entry.heading + ":\n";
@@ -262,19 +262,20 @@ std::string OptionSet::Help() const {
     const bool is_switch = std::holds_alternative<bool*>(entry.target);
     const bool is_text = std::holds_alternative<std::string*>(entry.target);
     std::string head = "  --" + entry.name;
-    if (!is_switch)
-      head += " " + std::string(*entry.info.choices ? entry.info.choices
-                                : is_text           ? "TEXT"
-                                                    : "N");
+    const char* choices = entry.info.choices + (*entry.info.choices == '|' ? 1 : 0);
+    if (!is_switch) head += std::string(" ") + (*choices ? choices : is_text ? "TEXT" : "N");
     std::string facts;
     if (!is_switch && *entry.info.unit) facts += std::string(entry.info.unit) + ", ";
     if (!is_switch && !is_text &&
         (std::isfinite(entry.info.min) || std::isfinite(entry.info.max)))
       facts += BoundsText(entry.info) + ", ";
     const std::string value = FlagText(ValueOf(entry));
-    facts += "default " + (is_switch       ? (value == "true" ? "on" : "off")
-                           : value.empty() ? "none"
-                                           : value);
+    if (std::ranges::find(required, entry.name) != required.end())
+      facts += "required";
+    else
+      facts += "default " + (is_switch       ? (value == "true" ? "on" : "off")
+                             : value.empty() ? "none"
+                                             : value);
     constexpr size_t kIndent = 28, kWidth = 96;
     if (head.size() + 2 > kIndent) {
       head += '\n';

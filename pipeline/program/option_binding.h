@@ -42,8 +42,9 @@ class OptionSet {
   // {"name": value, ...} of everything in effect.
   JsonValue Values() const;
 
-  // Names, units, effects, defaults and bounds. Call before flags are applied.
-  std::string Help() const;
+  // Names, units, effects, defaults and bounds. Call before flags are applied. `required`:
+  // names of options that the command demands.
+  std::string Help(const std::vector<std::string>& required = {}) const;
 
  private:
   using Target = std::variant<bool*, int*, int64_t*, uint64_t*, float*, double*, std::string*,

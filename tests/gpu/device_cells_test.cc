@@ -17,6 +17,7 @@
 #include "kernels/field/render_ray.h"
 #include "reconstruct/fit/measure_cells.h"
 #include "tests/support/cell_field.h"
+#include "tests/support/device_test.h"
 #include "tests/support/double_field.h"
 #include "tests/support/parity_row.h"
 
@@ -27,14 +28,7 @@ using testing::DoubleField;
 using testing::RandomCellField;
 using testing::RandomRays;
 
-class DeviceCellsTest : public ::testing::TestWithParam<int> {
- protected:
-  void SetUp() override {
-    const DeviceStatus status = ReadDeviceStatus();
-    if (!status.found) GTEST_SKIP() << "no GPU: " << status.name;
-  }
-  int basis() const { return GetParam(); }
-};
+class DeviceCellsTest : public testing::DeviceTestOfBasis {};
 
 void Row(const char* body, int basis, const char* against, double error, double tolerance) {
   testing::ParityRow(body, "cells, basis " + std::to_string(basis), against, error, tolerance);

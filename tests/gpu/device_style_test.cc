@@ -12,6 +12,7 @@
 #include "kernels/device/device_memory.h"
 #include "kernels/field/packed_grid.h"
 #include "kernels/network/cuda/device_mlp.h"
+#include "tests/support/device_test.h"
 #include "tests/support/parity_row.h"
 #include "tests/support/small_field.h"
 #include "tests/support/styled_ball.h"
@@ -21,13 +22,7 @@ namespace {
 
 using namespace testing;  // NOLINT: a test
 
-class DeviceStyle : public ::testing::Test {
- protected:
-  void SetUp() override {
-    const DeviceStatus status = ReadDeviceStatus();
-    if (!status.found) GTEST_SKIP() << "no GPU: " << status.name;
-  }
-};
+using DeviceStyle = testing::DeviceTest;
 
 DenseNetwork<double> InDouble(const DenseNetwork<float>& network) {
   DenseNetwork<double> exact;
