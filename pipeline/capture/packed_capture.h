@@ -19,8 +19,8 @@ namespace regrade {
 struct PackedView {
   std::string file;  // the user's name
   bool held_out = false;
-  Camera camera;  // in the field's frame, at the photo's size
-  Image photo;    // [H, W, 3] sRGB
+  Camera camera;                  // in the field's frame, at the photo's size
+  Image photo;                    // [H, W, 3] sRGB
   std::vector<SeenPoint> points;  // of a fitted view; may be empty
 };
 

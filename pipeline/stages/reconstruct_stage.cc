@@ -15,6 +15,7 @@
 #include "pipeline/capture/working_views.h"
 #include "pipeline/fields/field_file.h"
 #include "pipeline/fields/fit_checkpoint.h"
+#include "pipeline/files/text.h"
 #include "pipeline/program/cpu_time.h"
 #include "pipeline/program/device_choice.h"
 #include "pipeline/program/memory.h"
@@ -106,9 +107,11 @@ FitOptions OptionsForMemory(RunContext* context,
   if ((!settings.run.reproducible || settings.run.max_memory_gb > 0) &&
       LowerToMemory(plan_of, limit, &options))
     context->console->Info(
-        Concat("the finest grid has ", Finest(options), " voxels a side instead of ",
-               Finest(settings.fit), " to fit into ",
-               (settings.run.max_memory_gb > 0 ? "--max-memory" : "free memory")));
+        (options.adaptive()
+             ? Format("the field has at most %.1f million cells", double{options.max_cells})
+             : Concat("the finest grid has ", Finest(options), " voxels a side instead of ",
+                      Finest(settings.fit))) +
+        " to fit into " + (settings.run.max_memory_gb > 0 ? "--max-memory" : "free memory"));
   const StagePlan plan = plan_of(options);
   context->console->Info("the fit will take " + PlanText(plan));
   CheckFitsMemory(plan, limit, on_device ? "GPU memory" : "memory");

@@ -184,8 +184,7 @@ const VariantRunner::Photos& VariantRunner::PhotosAt(int size) {
     Image picture = p.working_views.PhotoToFit(i);
     if (picture.empty()) continue;
     p.pictures.push_back(std::move(picture));
-    p.views.push_back(
-        {p.working_views.CameraOf(i), &p.pictures.back(), std::move(seen[f])});
+    p.views.push_back({p.working_views.CameraOf(i), &p.pictures.back(), std::move(seen[f])});
   }
   return p;
 }

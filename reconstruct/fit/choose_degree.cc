@@ -51,6 +51,7 @@ DegreeTrial TryDegrees(const std::vector<TrainingView>& views, const SceneBox& b
                        Backend backend) {
   if (views.size() < kLeastTrialViews) return {std::numeric_limits<double>::infinity()};
   FitOptions small = options;
+  small.MakeUniform();  // one of few voxels is made sooner
   const int resolution = std::min(kResolution, options.resolutions.back());
   small.resolutions = {std::max(8, resolution / 2), resolution};
   small.steps = {kSteps[0], kSteps[1]};

@@ -22,7 +22,7 @@ struct FitStep {
   int patch = 1;
   MarchOptions march;
   RmspropOptions optimizer;
-  // EQ(free-space), of an adaptive field: rays drawn, and the weight of their mean opacity.
+  // See EQ(free-space), of an adaptive field: rays drawn, and the weight of their mean opacity.
   int free_rays = 0;
   float free_space = 0;
   // Total variation, with weights of its mean over all voxels. Each step regularises one

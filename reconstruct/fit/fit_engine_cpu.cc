@@ -89,9 +89,8 @@ class CpuFitEngine : public FitEngine {
     free_batch_.clear();
     if (free_rays_.empty()) return;
     for (int i = 0; i < step.free_rays; ++i)
-      free_batch_.push_back(
-          free_rays_[RandomIndex(seed_ ^ kRandomFreeSpace, step.number,
-                                 static_cast<uint64_t>(i), free_rays_.size())]);
+      free_batch_.push_back(free_rays_[RandomIndex(
+          seed_ ^ kRandomFreeSpace, step.number, static_cast<uint64_t>(i), free_rays_.size())]);
   }
 
   void Accumulate(const FitStep& step) {

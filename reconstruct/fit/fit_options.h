@@ -10,25 +10,25 @@
 namespace regrade {
 
 struct FitOptions {
-  std::string field = "uniform";
-  std::vector<int> resolutions = {64, 128, 256};
-  std::vector<int> steps = {800, 2000, 3000};
+  std::string field = "adaptive";
+  std::vector<int> resolutions = {64, 128, 256, 512};
+  std::vector<int> steps = {600, 900, 1200, 2300};
   int rays_per_step = 4096;
   int patch = 1;
   int sh_degree = 2;
   float view_bound = 0.2f;
   float step = 1.0f;
   float stop_transmittance = 1e-3f;
-  float rate_density = 8.0f;
-  float rate_density_end = 1.0f;
+  float rate_density = 58.0f;
+  float rate_density_end = 24.0f;
   float density_delay = 0;
-  float rate_sh = 6e-2f;
-  float rate_sh_end = 5e-3f;
-  float tv_density = 1e-2f;
-  float tv_sh = 1e-2f;
-  float tv_decay = 0.5f;
-  float tv_fraction = 0.03f;
-  float prune_weight = 0.5f;
+  float rate_sh = 5e-2f;
+  float rate_sh_end = 2e-3f;
+  float tv_density = 5e-2f;
+  float tv_sh = 4e-3f;
+  float tv_decay = 0.7f;
+  float tv_fraction = 0.02f;
+  float prune_weight = 0.4f;
   float initial_density = 0.5f;
   int background_layers = 64;
   int background_resolution = 512;
@@ -49,6 +49,19 @@ struct FitOptions {
   uint64_t seed = 0;
 
   bool adaptive() const { return field == "adaptive"; }
+  // Makes the field uniform, with the rates and regularisers that suit it: the defaults above
+  // are an adaptive field's.
+  void MakeUniform() {
+    field = "uniform";
+    rate_density = 8;
+    rate_density_end = 1;
+    rate_sh = 6e-2f;
+    rate_sh_end = 5e-3f;
+    tv_density = tv_sh = 1e-2f;
+    tv_decay = 0.5f;
+    tv_fraction = 0.03f;
+    prune_weight = 0.5f;
+  }
 
   template <typename Bind>
   void Describe(Bind& bind) {
@@ -59,8 +72,8 @@ struct FitOptions {
           .choices = "uniform|adaptive"});
     bind("fit-resolutions", resolutions,
          {.unit = "voxels",
-          .help = "longest side of the grid in each stage, coarse to fine; memory grows with "
-                  "its cube",
+          .help = "longest side of the grid in each stage, coarse to fine; an adaptive field "
+                  "doubles it in each stage, and its memory grows with --fit-max-cells",
           .min = 8,
           .max = 2048});
     bind("fit-steps", steps,

@@ -84,8 +84,7 @@ std::vector<FreeRay> FreeRays(const std::vector<TrainingView>& views, double mar
     for (size_t n = 0; n < image.size(); ++n) {
       const double u = camera.width * RandomDouble(seed ^ kRandomFreeSpace, i, 2 * n);
       const double v = camera.height * RandomDouble(seed ^ kRandomFreeSpace, i, 2 * n + 1);
-      const FreeRay ray =
-          RayThrough(camera, u, v, kFreePart * NearestBeside(image, u, v), 0);
+      const FreeRay ray = RayThrough(camera, u, v, kFreePart * NearestBeside(image, u, v), 0);
       if (ray.length > 0) of_view[i].push_back(ray);
     }
   }

@@ -20,9 +20,8 @@ __device__ Vec3f BoxPosition(const DeviceGridView& grid, int64_t voxel) {
     place = PlaceOf(grid.vertex_key[voxel]).Cast<float>();
   } else {
     const int32_t vertex = grid.vertex_of_voxel[voxel];
-    place +=
-        Vec3i{vertex / (size.y * size.z), vertex / size.z % size.y, vertex % size.z}
-            .Cast<float>();
+    place += Vec3i{vertex / (size.y * size.z), vertex / size.z % size.y, vertex % size.z}
+                 .Cast<float>();
   }
   for (int a = 0; a < 3; ++a) place[a] = 2 * place[a] / static_cast<float>(size[a]) - 1;
   return place;

@@ -9,6 +9,7 @@
 
 #include "kernels/base/random.h"
 #include "kernels/field/cell_variation.h"
+#include "kernels/field/cpu/render_view.h"
 #include "kernels/field/cuda/device_cell_statistics.h"
 #include "kernels/field/cuda/device_free_space.h"
 #include "kernels/field/cuda/device_rays.h"
@@ -72,6 +73,32 @@ TEST_P(DeviceCellsTest, Render) {
   Row("render", basis(), "plain float", error, 2e-5);
   Row("render", basis(), "plain double", exact_error, 1e-4);
   Row("depth", basis(), "plain float", depth_error, 1e-4);
+}
+
+// A frame's rays are made on the device; a view's, on the host for a lens with distortion.
+TEST_P(DeviceCellsTest, AFrameIsTheViewOfItsRays) {
+  const RadianceField field = RandomCellField({5, 4, 4}, 3, basis(), 33);
+  const FastGrid host = MakeFastGrid(field);
+  const DeviceGrid grid = UploadGrid(host);
+  Camera camera;
+  camera.width = 53;  // not whole tiles
+  camera.height = 37;
+  camera.fx = camera.fy = 40;
+  camera.cx = 26;
+  camera.cy = 18;
+  camera.camera_from_world.translation = {0, 0, 3};
+  const MarchOptions options{0.5f, 1e-4f};
+  const RenderedView is = RenderViewOnDevice(grid, camera, options);
+  const RenderedView should = RenderView(host, camera, options);
+  double off = 0, depth_off = 0;
+  for (size_t i = 0; i < is.color.pixels.size(); ++i)
+    off = std::max(off, std::abs(double{is.color.pixels[i]} - should.color.pixels[i]));
+  for (size_t i = 0; i < is.depth.pixels.size(); ++i)
+    if (std::isfinite(should.depth.pixels[i]))
+      depth_off =
+          std::max(depth_off, std::abs(double{is.depth.pixels[i]} - should.depth.pixels[i]));
+  Row("frame", basis(), "CPU", off, 2e-5);
+  Row("depths of a frame", basis(), "CPU", depth_off, 1e-3);
 }
 
 TEST_P(DeviceCellsTest, FitGradientAndVariation) {
@@ -146,11 +173,12 @@ TEST_P(DeviceCellsTest, FreeSpace) {
   constexpr uint64_t kSeed = 9, kStep = 3;
   std::vector<double> plain(d.density.size());
   for (int i = 0; i < kDrawn; ++i) {
-    const FreeRay& free = rays[RandomIndex(kSeed, kStep, static_cast<uint64_t>(i), rays.size())];
+    const FreeRay& free =
+        rays[RandomIndex(kSeed, kStep, static_cast<uint64_t>(i), rays.size())];
     const RayT<double> ray = testing::ToDouble(free.ray);
     const double near_clip = field.near_clip, length = free.length;
-    const double opacity = OpacityBefore(field.geometry->frame, view, d.density.data(), ray,
-                                         near_clip, length);
+    const double opacity =
+        OpacityBefore(field.geometry->frame, view, d.density.data(), ray, near_clip, length);
     OpacityBeforeAdjoint(field.geometry->frame, view, d.density.data(), ray, near_clip, length,
                          opacity, 0.5 / kDrawn,
                          [&](int32_t v, double g) { plain[static_cast<size_t>(v)] += g; });

@@ -19,7 +19,10 @@ class CellFit : public testing::FitField {
  protected:
   void SetUp() override {
     FitField::SetUp();
-    options_.field = "adaptive";
+    options_ = FitOptions();
+    options_.rays_per_step = 1024;
+    options_.sh_degree = 1;
+    options_.shards = 3;
     options_.resolutions = {6, 12, 24};
     options_.steps = {50, 50, 60};
     options_.tv_density = 1e-2f;

@@ -58,6 +58,7 @@ class FitField : public ::testing::Test {
       photos_.push_back(RenderViewPlain(truth, camera, {0.5f, 1e-4f}).color);
     }
     for (size_t i = 1; i < cameras_.size(); ++i) views_.push_back({cameras_[i], &photos_[i]});
+    options_.MakeUniform();
     options_.resolutions = {12, 24};
     options_.steps = {60, 60};
     options_.rays_per_step = 1024;

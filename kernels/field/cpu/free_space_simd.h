@@ -16,13 +16,14 @@ inline void FreeSpace(const FastGrid& grid, const FreeRay* rays, int64_t n, floa
   const float* const density = grid.vertex_density.data();
   std::vector<std::pair<int32_t, float>> terms;  // of one ray
   for (int64_t r = 0; r < n; ++r) {
-    const float opacity = OpacityBefore(grid.frame, cells, density, rays[r].ray,
-                                        grid.near_clip, rays[r].length);
+    const float opacity =
+        OpacityBefore(grid.frame, cells, density, rays[r].ray, grid.near_clip, rays[r].length);
     if (!(opacity > 0)) continue;
     terms.clear();
-    OpacityBeforeAdjoint(
-        grid.frame, cells, density, rays[r].ray, grid.near_clip, rays[r].length, opacity, scale,
-        [&](int32_t vertex, float gradient) { terms.push_back({vertex, gradient}); });
+    OpacityBeforeAdjoint(grid.frame, cells, density, rays[r].ray, grid.near_clip,
+                         rays[r].length, opacity, scale, [&](int32_t vertex, float gradient) {
+                           terms.push_back({vertex, gradient});
+                         });
     ReserveSlots(arena, static_cast<int64_t>(terms.size()), lanes);
     for (const auto& [vertex, gradient] : terms)
       arena->gradient[int64_t{SlotOf(arena, vertex, lanes)} * lanes + lane] += gradient;

@@ -1,6 +1,5 @@
-#include "kernels/field/cuda/device_free_space.h"
-
 #include "kernels/base/random.h"
+#include "kernels/field/cuda/device_free_space.h"
 #include "kernels/field/cuda/gradient_view.h"
 #include "kernels/field/cuda/launch.h"
 
@@ -28,8 +27,8 @@ struct DeviceFreeSpace::Stream {
 namespace {
 
 template <bool kExact>
-__global__ void FreeSpaceKernel(DeviceGridView grid, int lane, const FreeRay* rays, int64_t size,
-                                uint64_t seed, uint64_t step, int n, float scale,
+__global__ void FreeSpaceKernel(DeviceGridView grid, int lane, const FreeRay* rays,
+                                int64_t size, uint64_t seed, uint64_t step, int n, float scale,
                                 GradientView gradient) {
   const int i = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
   if (i >= n) return;
