@@ -70,6 +70,7 @@ TEST(FreeSpace, H168_AdjointEqualsDerivativeInDoubleAcrossFaces) {
 TEST(FreeSpace, H168_OnlyWhatIsBeforeTheLengthCounts) {
   const RadianceField field = RandomCellField({2, 2, 2}, 2, 1, 71);
   const Space space(field);
+  int grown = 0;
   for (const Ray& ray_f : RandomRays(50, 73)) {
     const RayT<double> ray = ToDouble(ray_f);
     EXPECT_EQ(space.Opacity(ray, 0), 0);
@@ -81,7 +82,9 @@ TEST(FreeSpace, H168_OnlyWhatIsBeforeTheLengthCounts) {
       EXPECT_LE(opacity, 1);
       before = opacity;
     }
+    grown += space.Opacity(ray, 0.5) < space.Opacity(ray, 4);
   }
+  EXPECT_GT(grown, 10);
 }
 
 // In float against double: 1e-4 of the largest entry, as gradients of rays.

@@ -63,6 +63,10 @@ TEST(FreeRays, H168_InDeviceCoordinatesTheLengthIsOfThatSpace) {
   view.camera.ndc = {2, 2};
   const std::vector<FreeRay> rays = FreeRays({view}, 0, 1);
   ASSERT_EQ(rays.size(), 1u);  // the other point is before the near plane
+  // Before this camera, and behind the one of the device coordinates.
+  TrainingView behind{view.camera, nullptr, {{{0, 0, -0.5f}, 0}}};
+  behind.camera.camera_from_world.translation = {0, 0, 1};
+  EXPECT_TRUE(FreeRays({behind}, 0, 1).empty());
   const Vec3d end = rays[0].ray.origin.Cast<double>() +
                     rays[0].ray.direction.Cast<double>() * double{rays[0].length};
   const Vec3d world = WorldFromNdc(view.camera.ndc, end);

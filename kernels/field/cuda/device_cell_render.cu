@@ -96,8 +96,8 @@ void RenderCellRays(const DeviceGrid& grid, const Ray* rays, int64_t n,
   CheckLaunch("render_spheres");
 }
 
-void RenderCellFrame(const DeviceGrid& grid, const Camera& camera,
-                     const MarchOptions& options, const DeviceRenderTarget& target) {
+void RenderCellFrame(const DeviceGrid& grid, const Camera& camera, const MarchOptions& options,
+                     const DeviceRenderTarget& target) {
   const FrameRays frame{PinholeRays(camera), ResolvePixel(camera)};
   const int64_t n = frame.Blocks() * kRenderedRays;
   DeviceBuffer<Ray> rays(n, "rays of a frame");

@@ -49,9 +49,9 @@ RenderedView RenderViewOnDevice(const DeviceGrid& grid, const Camera& camera,
 
 namespace {
 
-constexpr int kWarps = 4;     // per block
+constexpr int kWarps = 4;             // per block
 constexpr int kRays = kRenderedRays;  // per block
-constexpr int kPending = 64;  // samples waiting to be shaded; a power of 2
+constexpr int kPending = 64;          // samples waiting to be shaded; a power of 2
 
 // Selects the samples to shade and their weights; see EQ(opacity-steps).
 class OpacitySteps {

@@ -10,7 +10,8 @@
 
 namespace regrade {
 
-inline constexpr int kRenderedRays = 8;  // per block; 16 are as fast, 32 lose what neighbours share
+inline constexpr int kRenderedRays =
+    8;  // per block; 16 are as fast, 32 lose what neighbours share
 
 // Rays from a list; sums are stored unchanged. A block processes kRenderedRays of them.
 struct ListedRays {
@@ -54,7 +55,8 @@ struct FrameRays {
     resolve(ray, transmittance, color, depth);
   }
   int64_t Blocks() const {
-    return int64_t{Columns()} * ((camera.height + kTile - 1) / kTile) * (kPixels / kRenderedRays);
+    return int64_t{Columns()} * ((camera.height + kTile - 1) / kTile) *
+           (kPixels / kRenderedRays);
   }
 };
 
