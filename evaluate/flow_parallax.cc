@@ -40,8 +40,8 @@ std::vector<Point> GridPoints(const FlowField& flow) {
     for (int x = step / 2; x < flow.width; x += step) {
       const float* uv = flow.at(x, y);
       if (std::isfinite(uv[0]) && std::isfinite(uv[1]))
-        points.push_back({(2.0 * x - flow.width) / side, (2.0 * y - flow.height) / side, uv[0],
-                          uv[1]});
+        points.push_back(
+            {(2.0 * x - flow.width) / side, (2.0 * y - flow.height) / side, uv[0], uv[1]});
     }
   return points;
 }

@@ -49,7 +49,8 @@ Image Smaller(const Image& grey) {
 double StepsBetween(const Image& from, const Image& to) {
   const FlowMotion moved = MeasureFlowMotion(ComputeFlow(from, to, "dis-fast"));
   const double side = std::max(from.width, from.height);
-  return std::min(kMostSteps, std::max(moved.motion / kMotionStep, moved.parallax / kParallaxStep) / side);
+  return std::min(kMostSteps,
+                  std::max(moved.motion / kMotionStep, moved.parallax / kParallaxStep) / side);
 }
 
 // The travel of one frame after the other. Motion is measured from a reference, which moves on
@@ -146,12 +147,15 @@ std::vector<std::vector<size_t>> PickFrames(const std::vector<ClipSurvey>& clips
   double travel = 0;
   for (const ClipSurvey& clip : clips) travel += clip.Travel();
   if (wanted == 0)
-    wanted = static_cast<int>(std::lround(std::clamp(travel, kLeastFrames * 1.0, kMostFrames * 1.0)));
+    wanted = static_cast<int>(
+        std::lround(std::clamp(travel, kLeastFrames * 1.0, kMostFrames * 1.0)));
   std::vector<std::vector<size_t>> picked;
   for (const ClipSurvey& clip : clips) {
-    const double share = travel > 0 ? clip.Travel() / travel : 1.0 / static_cast<double>(clips.size());
-    const size_t count = std::max(std::min<size_t>(kLeastOfEachClip, static_cast<size_t>(wanted)),
-                                  static_cast<size_t>(std::lround(share * wanted)));
+    const double share =
+        travel > 0 ? clip.Travel() / travel : 1.0 / static_cast<double>(clips.size());
+    const size_t count =
+        std::max(std::min<size_t>(kLeastOfEachClip, static_cast<size_t>(wanted)),
+                 static_cast<size_t>(std::lround(share * wanted)));
     picked.push_back(clip.frames.empty() ? std::vector<size_t>()
                                          : PickFramesOfClip(clip.frames, count));
   }

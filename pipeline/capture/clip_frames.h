@@ -41,8 +41,8 @@ ClipSurvey SurveyClip(const std::string& file, const std::string& path,
 // Indices of the picked frames of each film, ascending. `wanted` frames in all, of kLeastFrames
 // to kMostFrames by the films' travel if it is 0; the films get shares in proportion to their
 // travel, and a few frames each at least. Each film is divided into as many parts of equal
-// travel, and of each part the sharpest frame is taken; parts without a frame are not filled, so
-// that fewer can remain.
+// travel, and of each part the sharpest frame is taken; parts without a frame are not filled,
+// so that fewer can remain.
 std::vector<std::vector<size_t>> PickFrames(const std::vector<ClipSurvey>& clips, int wanted);
 
 // The user's name of a picked frame: "CLIP.mp4/003.250s.png".

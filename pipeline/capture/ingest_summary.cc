@@ -59,8 +59,7 @@ void IngestNotices::AddClip(const ClipSurvey& clip, size_t frames) {
                             clip.frames.empty() ? 0 : clip.frames.back().seconds);
   if (clip.Travel() < kHardlyMoves) text += "; the camera hardly moves in it";
   if (clip.damaged > 0) text += Concat("; ", clip.damaged, " could not be decoded");
-  if (!clip.info.colors.empty())
-    text += "; " + ColorNotice(clip.info.colors, 0);
+  if (!clip.info.colors.empty()) text += "; " + ColorNotice(clip.info.colors, 0);
   clips_.push_back(text);
 }
 
@@ -108,11 +107,11 @@ void RequireEnoughPhotos(size_t usable, const std::vector<PhotoStatus>& statuses
   if (!reasons.empty()) reasons = ": " + reasons;
   if (usable == 0)
     throw InputError(
-        files == 0 ? "the folder is empty" +
-                         (hidden > 0 ? Concat(" (except for ", hidden, " hidden entries)")
-                                     : std::string())
-                   : Concat(files, (files == 1 ? " file" : " files"), ", no usable photo",
-                            reasons),
+        files == 0
+            ? "the folder is empty" + (hidden > 0
+                                           ? Concat(" (except for ", hidden, " hidden entries)")
+                                           : std::string())
+            : Concat(files, (files == 1 ? " file" : " files"), ", no usable photo", reasons),
         where, "give a folder of JPEG, PNG, TIFF, HEIC or raw photos, or a film");
   throw SceneError(
       Concat(usable, (usable == 1 ? " photo" : " photos"), " of ", files,

@@ -124,8 +124,7 @@ std::string CountsText(const std::map<std::string, int>& counts, const std::stri
   std::string text;
   for (size_t i = 0; i < std::min(sorted.size(), kShown); ++i)
     text += Concat((i ? ", " : ""), -sorted[i].first, between, sorted[i].second);
-  if (sorted.size() > kShown)
-    text += Concat(", and ", sorted.size() - kShown, " others");
+  if (sorted.size() > kShown) text += Concat(", and ", sorted.size() - kShown, " others");
   return text;
 }
 

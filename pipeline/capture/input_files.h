@@ -32,8 +32,8 @@ struct InputFiles {
 // The files of a folder and its subfolders, or the one film that `path` is; decided by content,
 // but for the names that cameras give to their own small copies. Left are: cameras' thumbnails
 // (.thm) and small films (.lrv, .lrf); the clip of a live photo, which is a film of at most
-// kLongestLiveClip seconds beside a picture of the same name; a camera raw file beside a picture
-// of the same name, which the camera or the user developed from it; films, where
+// kLongestLiveClip seconds beside a picture of the same name; a camera raw file beside a
+// picture of the same name, which the camera or the user developed from it; films, where
 // `take_clips` is false. Throws as ListFolder, and Error(kInput) for a path that is a file and
 // no film.
 InputFiles ListInputs(const std::string& path, bool take_clips = true);

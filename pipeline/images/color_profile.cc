@@ -54,9 +54,10 @@ cmsUInt32Number FormatOf(int channels) {
 Transform ToLinear(const Profile& profile, int channels) {
   const Profile linear = RgbProfile(kSrgb, 1);
   if (profile == nullptr || linear == nullptr) return nullptr;
-  return Transform(cmsCreateTransform(
-      profile.get(), FormatOf(channels), linear.get(), channels == 4 ? TYPE_RGBA_FLT : TYPE_RGB_FLT,
-      INTENT_RELATIVE_COLORIMETRIC, cmsFLAGS_NOCACHE | cmsFLAGS_COPY_ALPHA));
+  return Transform(cmsCreateTransform(profile.get(), FormatOf(channels), linear.get(),
+                                      channels == 4 ? TYPE_RGBA_FLT : TYPE_RGB_FLT,
+                                      INTENT_RELATIVE_COLORIMETRIC,
+                                      cmsFLAGS_NOCACHE | cmsFLAGS_COPY_ALPHA));
 }
 
 // Whether colours of a lattice come out as if the profile were sRGB.

@@ -14,8 +14,8 @@ struct HeifPicture {
   Image image;  // RGB, or RGB + alpha; upright: turned and mirrored as the file says
   int bits = 8;
   bool premultiplied = false;
-  std::string exif;  // a TIFF block; empty if there is none
-  std::string icc;   // the colour profile; empty if there is none
+  std::string exif;                 // a TIFF block; empty if there is none
+  std::string icc;                  // the colour profile; empty if there is none
   int primaries = 0, transfer = 0;  // ITU-T H.273; 0: not given
   int pictures = 1;                 // in the file; the primary one is decoded
 };

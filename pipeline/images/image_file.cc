@@ -72,9 +72,12 @@ void TakeMetadata(const OIIO::ImageSpec& spec, StoredPicture* picture) {
       spec.get_float_attribute("Exif:FocalPlaneXResolution") / unit_mm;
 }
 
-// Cameras set to Adobe RGB name no profile, but the interoperability rule "R03".
-bool MarksAdobeRgb(const OIIO::ImageSpec& spec) {
-  return spec.get_string_attribute("Exif:InteroperabilityIndex") == "R03";
+// Cameras set to Adobe RGB embed no profile: their EXIF block has the entry "R03" of the
+// interoperability index (DCF 2.0), which OpenImageIO passes over.
+bool MarksAdobeRgb(std::string_view exif) {
+  using namespace std::string_view_literals;
+  return exif.find("\1\0\2\0\4\0\0\0R03\0"sv) != exif.npos ||
+         exif.find("\0\1\0\2\0\0\0\4R03\0"sv) != exif.npos;
 }
 
 StoredPicture ReadJpeg(std::string_view bytes, const std::string& where,
@@ -99,7 +102,7 @@ StoredPicture ReadJpeg(std::string_view bytes, const std::string& where,
     picture.notices.push_back(
         "CMYK was converted without its profile: colours are approximate");
   else
-    picture.icc = jpeg.icc.empty() && MarksAdobeRgb(spec) ? AdobeRgbProfile() : jpeg.icc;
+    picture.icc = jpeg.icc.empty() && MarksAdobeRgb(jpeg.exif) ? AdobeRgbProfile() : jpeg.icc;
   return picture;
 }
 

@@ -83,8 +83,7 @@ struct VideoReader::State {
   }
   void CheckOpen(int code, const char* step) const {
     if (code < 0)
-      Refuse(std::string("cannot read this film: ") + step + ": " + ErrorText(code),
-             kConvert);
+      Refuse(std::string("cannot read this film: ") + step + ": " + ErrorText(code), kConvert);
   }
   [[noreturn]] void RefuseLong() const {
     Refuse(Format("a film of more than %.0f minutes, %lld frames or %.0f gigapixels",
@@ -123,8 +122,8 @@ struct VideoReader::State {
     if (width <= 0 || height <= 0) Refuse("no pixels", "");
     const AVRational aspect = av_guess_sample_aspect_ratio(input.get(), stream, nullptr);
     const double ratio = aspect.num > 0 && aspect.den > 0 ? av_q2d(aspect) : 1;
-    const double square =
-        ratio > 0.1 && ratio < 10 ? static_cast<double>(width) * ratio : static_cast<double>(width);
+    const double square = ratio > 0.1 && ratio < 10 ? static_cast<double>(width) * ratio
+                                                    : static_cast<double>(width);
     if (width > limits.max_pixels / height ||
         square * static_cast<double>(height) > static_cast<double>(limits.max_pixels))
       Refuse(Concat("frames of ", width, " x ", height, " pixels, more than the limit of ",
@@ -137,13 +136,11 @@ struct VideoReader::State {
     info.height = turned ? square_width : static_cast<int>(height);
     if (!IsSrgbLike(parameters.color_primaries, parameters.color_trc))
       info.colors = CicpName(parameters.color_primaries, parameters.color_trc);
-    if (input->duration > 0)
-      info.seconds = static_cast<double>(input->duration) / AV_TIME_BASE;
+    if (input->duration > 0) info.seconds = static_cast<double>(input->duration) / AV_TIME_BASE;
     if (stream->nb_frames > 0)
       info.frames = stream->nb_frames;
     else if (stream->avg_frame_rate.num > 0)
-      info.frames = std::llround(
-          std::min(info.seconds * av_q2d(stream->avg_frame_rate), 1e15));
+      info.frames = std::llround(std::min(info.seconds * av_q2d(stream->avg_frame_rate), 1e15));
     if (info.seconds > limits.max_seconds) RefuseLong();
   }
 
@@ -153,8 +150,10 @@ struct VideoReader::State {
     decoder->pkt_timebase = stream->time_base;
     decoder->max_pixels = limits.max_pixels;
     decoder->err_recognition = AV_EF_EXPLODE;  // no frames with invented parts
-    decoder->thread_count = std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, kMostThreads);
-    if (info.frames > kManyFrames && !limits.every_frame) decoder->skip_frame = AVDISCARD_NONREF;
+    decoder->thread_count =
+        std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, kMostThreads);
+    if (info.frames > kManyFrames && !limits.every_frame)
+      decoder->skip_frame = AVDISCARD_NONREF;
     CheckOpen(avcodec_open2(decoder.get(), codec, nullptr), "its codec");
   }
 
@@ -184,8 +183,8 @@ struct VideoReader::State {
 
   void SetTime() {
     const int64_t stamp = frame->best_effort_timestamp;
-    const double now = stamp == AV_NOPTS_VALUE ? NAN
-                                         : static_cast<double>(stamp) * av_q2d(stream->time_base);
+    const double now =
+        stamp == AV_NOPTS_VALUE ? NAN : static_cast<double>(stamp) * av_q2d(stream->time_base);
     if (std::isfinite(now)) {
       if (!std::isfinite(first)) first = now;
       seconds = std::max(seconds, now - first);
@@ -198,10 +197,9 @@ struct VideoReader::State {
   // The stored frame as interleaved values of one or two bytes.
   template <typename Value>
   Image Convert(int width, int height, AVPixelFormat format, int channels, int flags) {
-    scaler.reset(sws_getCachedContext(
-        scaler.release(), frame->width, frame->height,
-        static_cast<AVPixelFormat>(frame->format), width, height, format, flags, nullptr,
-        nullptr, nullptr));
+    scaler.reset(sws_getCachedContext(scaler.release(), frame->width, frame->height,
+                                      static_cast<AVPixelFormat>(frame->format), width, height,
+                                      format, flags, nullptr, nullptr, nullptr));
     if (scaler == nullptr) Refuse("its pixels have a form that cannot be converted", kConvert);
     // A film that does not name its matrix has BT.601's where it is small, else BT.709's.
     const bool unnamed =
@@ -277,10 +275,9 @@ Image VideoReader::Picture() {
   StoredPicture picture;
   picture.primaries = s.frame->color_primaries;
   picture.transfer = s.frame->color_trc;
-  picture.image =
-      IsSrgbLike(picture.primaries, picture.transfer)
-          ? s.Convert<uint8_t>(width, height, AV_PIX_FMT_RGB24, 3, kExact)
-          : s.Convert<uint16_t>(width, height, AV_PIX_FMT_RGB48, 3, kExact);
+  picture.image = IsSrgbLike(picture.primaries, picture.transfer)
+                      ? s.Convert<uint8_t>(width, height, AV_PIX_FMT_RGB24, 3, kExact)
+                      : s.Convert<uint16_t>(width, height, AV_PIX_FMT_RGB48, 3, kExact);
   picture.orientation = OrientationOf(s.info.turn);
   ApplyPhotoRules(&picture, s.path);
   return std::move(picture.image);

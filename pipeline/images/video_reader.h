@@ -11,9 +11,9 @@ namespace regrade {
 
 // What a film may cost; a file that needs more is refused.
 struct VideoLimits {
-  int64_t max_pixels = 128'000'000;             // of a frame
-  double max_seconds = 1200;                    // by its header and by its frames' times
-  int64_t max_frames = 72'000;                  // decoded: 20 minutes of 60 a second
+  int64_t max_pixels = 128'000'000;              // of a frame
+  double max_seconds = 1200;                     // by its header and by its frames' times
+  int64_t max_frames = 72'000;                   // decoded: 20 minutes of 60 a second
   int64_t max_decoded_pixels = 300'000'000'000;  // of all frames: 10 minutes of 4K at 60 a s
   bool every_frame = false;                      // passes over none of a long film
 };
@@ -23,8 +23,8 @@ struct VideoInfo {
   int width = 0, height = 0;  // of a frame, upright, with square pixels
   double seconds = 0;         // 0: unknown
   int64_t frames = 0;         // about; 0: unknown
-  int turn = 0;               // degrees clockwise that bring a stored frame upright: 0, 90, 180, 270
-  std::string colors;         // other than those of sRGB, which are converted: "BT.2020, HLG"
+  int turn = 0;        // degrees clockwise that bring a stored frame upright: 0, 90, 180, 270
+  std::string colors;  // other than those of sRGB, which are converted: "BT.2020, HLG"
 };
 
 // MP4, QuickTime, Matroska, WebM, AVI, MPEG transport and program streams, with any codec of
