@@ -2,11 +2,13 @@
 #include "pipeline/images/color_profile.h"
 
 #include <lcms2.h>
+#include <lcms2_plugin.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <memory>
 #include <vector>
 
@@ -21,6 +23,31 @@ constexpr size_t kLargestProfile = 32 << 20;
 // In values of 8 bits.
 constexpr double kSameStep = 0.5;
 constexpr double kPqPeak = 10000, kPqWhite = 203;  // cd/m^2
+
+// A profile of some bytes may claim tables of any size.
+constexpr cmsUInt32Number kLargestTable = 64 << 20;
+
+void* Allocate(cmsContext, cmsUInt32Number size) {
+  return size > kLargestTable ? nullptr : std::malloc(size);
+}
+void* Reallocate(cmsContext, void* block, cmsUInt32Number size) {
+  return size > kLargestTable ? nullptr : std::realloc(block, size);
+}
+void Deallocate(cmsContext, void* block) { std::free(block); }
+
+// With the limit above, and without messages.
+cmsContext Context() {
+  static const cmsContext context = [] {
+    cmsPluginMemHandler memory = {};
+    memory.base = {cmsPluginMagicNumber, 2060, cmsPluginMemHandlerSig, nullptr};
+    memory.MallocPtr = Allocate;
+    memory.FreePtr = Deallocate;
+    memory.ReallocPtr = Reallocate;
+    return cmsCreateContext(&memory, nullptr);
+  }();
+  REGRADE_CHECK(context != nullptr);
+  return context;
+}
 
 struct CloseProfile {
   void operator()(void* profile) const { cmsCloseProfile(profile); }
@@ -41,9 +68,9 @@ constexpr Chromaticities kAdobe = {0.64, 0.33, 0.21, 0.71, 0.15, 0.06, 0.3127, 0
 Profile RgbProfile(const Chromaticities& c, double gamma) {
   const cmsCIExyY white = {c[6], c[7], 1};
   const cmsCIExyYTRIPLE primaries = {{c[0], c[1], 1}, {c[2], c[3], 1}, {c[4], c[5], 1}};
-  const std::unique_ptr<cmsToneCurve, FreeCurve> curve(cmsBuildGamma(nullptr, gamma));
+  const std::unique_ptr<cmsToneCurve, FreeCurve> curve(cmsBuildGamma(Context(), gamma));
   cmsToneCurve* const curves[] = {curve.get(), curve.get(), curve.get()};
-  return Profile(cmsCreateRGBProfile(&white, &primaries, curves));
+  return Profile(cmsCreateRGBProfileTHR(Context(), &white, &primaries, curves));
 }
 
 cmsUInt32Number FormatOf(int channels) {
@@ -54,10 +81,10 @@ cmsUInt32Number FormatOf(int channels) {
 Transform ToLinear(const Profile& profile, int channels) {
   const Profile linear = RgbProfile(kSrgb, 1);
   if (profile == nullptr || linear == nullptr) return nullptr;
-  return Transform(cmsCreateTransform(profile.get(), FormatOf(channels), linear.get(),
-                                      channels == 4 ? TYPE_RGBA_FLT : TYPE_RGB_FLT,
-                                      INTENT_RELATIVE_COLORIMETRIC,
-                                      cmsFLAGS_NOCACHE | cmsFLAGS_COPY_ALPHA));
+  return Transform(cmsCreateTransformTHR(
+      Context(), profile.get(), FormatOf(channels), linear.get(),
+      channels == 4 ? TYPE_RGBA_FLT : TYPE_RGB_FLT, INTENT_RELATIVE_COLORIMETRIC,
+      cmsFLAGS_NOCACHE | cmsFLAGS_COPY_ALPHA));
 }
 
 // Whether colours of a lattice come out as if the profile were sRGB.
@@ -140,10 +167,10 @@ bool HasOwnCurve(int transfer) {
 }  // namespace
 
 std::string LinearizeByProfile(std::string_view icc, Image* image, std::string* problem) {
-  cmsSetLogErrorHandler(nullptr);
   Profile profile;
   if (icc.size() <= kLargestProfile)
-    profile.reset(cmsOpenProfileFromMem(icc.data(), static_cast<cmsUInt32Number>(icc.size())));
+    profile.reset(cmsOpenProfileFromMemTHR(Context(), icc.data(),
+                                           static_cast<cmsUInt32Number>(icc.size())));
   if (profile == nullptr) {
     *problem = "a damaged colour profile is not applied: colours are taken as sRGB";
     return "";

@@ -5,53 +5,44 @@
 #include <new>
 #include <string>
 
-extern "C" {
-#include <libavcodec/avcodec.h>
-#include <libavformat/avformat.h>
-#include <libswscale/swscale.h>
-}
+struct AVCodecContext;
+struct AVFormatContext;
+struct AVFrame;
+struct AVPacket;
+struct SwsContext;
 
 namespace regrade::ffmpeg {
 
-// A deleter for FFmpeg's functions that take a pointer to the pointer.
-template <auto Function>
 struct Free {
-  template <typename T>
-  void operator()(T* pointer) const {
-    Function(&pointer);
-  }
+  void operator()(AVCodecContext* codec) const;
+  void operator()(AVFrame* frame) const;
+  void operator()(AVPacket* packet) const;
+  void operator()(SwsContext* scaler) const;
 };
-using Packet = std::unique_ptr<AVPacket, Free<av_packet_free>>;
-using Frame = std::unique_ptr<AVFrame, Free<av_frame_free>>;
-using Codec = std::unique_ptr<AVCodecContext, Free<avcodec_free_context>>;
-using Input = std::unique_ptr<AVFormatContext, Free<avformat_close_input>>;
-
-struct OutputCloser {
-  void operator()(AVFormatContext* output) const {
-    avio_closep(&output->pb);
-    avformat_free_context(output);
-  }
+struct CloseInput {
+  void operator()(AVFormatContext* input) const;
 };
-using Output = std::unique_ptr<AVFormatContext, OutputCloser>;
-
-struct ScalerFree {
-  void operator()(SwsContext* scaler) const { sws_freeContext(scaler); }
+struct CloseOutput {
+  void operator()(AVFormatContext* output) const;
 };
-using Scaler = std::unique_ptr<SwsContext, ScalerFree>;
+using Codec = std::unique_ptr<AVCodecContext, Free>;
+using Frame = std::unique_ptr<AVFrame, Free>;
+using Packet = std::unique_ptr<AVPacket, Free>;
+using Scaler = std::unique_ptr<SwsContext, Free>;
+using Input = std::unique_ptr<AVFormatContext, CloseInput>;
+using Output = std::unique_ptr<AVFormatContext, CloseOutput>;
 
+// Throws std::bad_alloc for a null pointer.
 template <typename T>
 T* Allocated(T* pointer) {
   if (pointer == nullptr) throw std::bad_alloc();
   return pointer;
 }
 
-inline std::string ErrorText(int code) {
-  char text[AV_ERROR_MAX_STRING_SIZE] = "";
-  av_strerror(code, text, sizeof text);
-  return text;
-}
+// The text of FFmpeg's error code.
+std::string ErrorText(int code);
 
 // FFmpeg takes what stands before a colon for a protocol.
-inline std::string Url(const std::string& path) { return "file:" + path; }
+std::string Url(const std::string& path);
 
 }  // namespace regrade::ffmpeg

@@ -62,9 +62,10 @@ void ConvertColors(StoredPicture* picture) {
 
 void Clamp(StoredPicture* picture) {
   int64_t clamped = 0;
-  for (float& v : picture->image.pixels)
-    if (v < -kRounding || v > 1 + kRounding) ++clamped;
-  for (float& v : picture->image.pixels) v = std::clamp(v, 0.f, 1.f);
+  for (float& v : picture->image.pixels) {
+    if (!(v >= -kRounding && v <= 1 + kRounding)) ++clamped;
+    v = v > 0 ? std::min(v, 1.f) : 0;  // an odd profile makes NaN
+  }
   picture->clipped = static_cast<double>(clamped) / picture->image.pixels.size();
 }
 

@@ -13,8 +13,11 @@
 #include <vector>
 
 extern "C" {
+#include <libavcodec/avcodec.h>
+#include <libavformat/avformat.h>
 #include <libavutil/display.h>
 #include <libavutil/log.h>
+#include <libswscale/swscale.h>
 }
 
 #include "kernels/base/error.h"

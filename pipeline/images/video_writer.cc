@@ -9,8 +9,11 @@
 #include <vector>
 
 extern "C" {
+#include <libavcodec/avcodec.h>
+#include <libavformat/avformat.h>
 #include <libavutil/log.h>
 #include <libavutil/opt.h>
+#include <libswscale/swscale.h>
 }
 
 #include "kernels/base/error.h"

@@ -8,9 +8,12 @@
 #include <vector>
 
 extern "C" {
+#include <libavcodec/avcodec.h>
+#include <libavformat/avformat.h>
 #include <libavutil/display.h>
 #include <libavutil/log.h>
 #include <libavutil/opt.h>
+#include <libswscale/swscale.h>
 }
 
 #include "kernels/scene/image.h"
@@ -19,15 +22,15 @@ extern "C" {
 namespace regrade::testing {
 
 struct ClipSpec {
-  const char* encoder = "libx264";   // or "libx265"
-  const char* container = "mp4";     // or "mov", "matroska"
-  int turn = 0;                      // degrees clockwise that a player turns the frames
-  std::vector<int64_t> times = {};   // of the frames, in 1/600 s; empty: 25 a second
+  const char* encoder = "libx264";  // or "libx265"
+  const char* container = "mp4";    // or "mov", "matroska"
+  int turn = 0;                     // degrees clockwise that a player turns the frames
+  std::vector<int64_t> times = {};  // of the frames, in 1/600 s; empty: 25 a second
   AVColorPrimaries primaries = AVCOL_PRI_BT709;
   AVColorTransferCharacteristic transfer = AVCOL_TRC_BT709;
   AVColorSpace matrix = AVCOL_SPC_BT709;
   AVPixelFormat pixels = AV_PIX_FMT_YUV420P;
-  AVRational aspect = {1, 1};        // of a pixel
+  AVRational aspect = {1, 1};  // of a pixel
 };
 
 inline constexpr int kTicks = 24;  // of a frame, in 1/600 s
@@ -41,7 +44,8 @@ inline bool WriteClip(const std::string& path, const std::vector<Image>& frames,
   if (codec == nullptr) return false;
   const int w = frames[0].width, h = frames[0].height;
   AVFormatContext* opened = nullptr;
-  EXPECT_GE(avformat_alloc_output_context2(&opened, nullptr, spec.container, Url(path).c_str()), 0);
+  EXPECT_GE(avformat_alloc_output_context2(&opened, nullptr, spec.container, Url(path).c_str()),
+            0);
   const Output output(opened);
   const Codec encoder(Allocated(avcodec_alloc_context3(codec)));
   encoder->width = w;
@@ -73,9 +77,9 @@ inline bool WriteClip(const std::string& path, const std::vector<Image>& frames,
   }
   EXPECT_GE(avio_open(&opened->pb, Url(path).c_str(), AVIO_FLAG_WRITE), 0);
   EXPECT_GE(avformat_write_header(opened, nullptr), 0);
-  const Scaler scaler(Allocated(sws_getContext(w, h, AV_PIX_FMT_RGB48, w, h, spec.pixels,
-                                               SWS_BICUBIC | SWS_ACCURATE_RND, nullptr, nullptr,
-                                               nullptr)));
+  const Scaler scaler(
+      Allocated(sws_getContext(w, h, AV_PIX_FMT_RGB48, w, h, spec.pixels,
+                               SWS_BICUBIC | SWS_ACCURATE_RND, nullptr, nullptr, nullptr)));
   const int* matrix = sws_getCoefficients(spec.matrix);
   sws_setColorspaceDetails(scaler.get(), matrix, 1, matrix, 0, 0, 1 << 16, 1 << 16);
   const Packet packet(Allocated(av_packet_alloc()));

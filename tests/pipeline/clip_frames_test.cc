@@ -93,8 +93,7 @@ class ClipFrames : public ::testing::Test {
       for (size_t i = 0; i < noise.pixels.size(); ++i)
         noise.pixels[i] = static_cast<float>(RandomDouble(5, static_cast<uint64_t>(cell), i));
       const Image blobs = Resize(noise, 1600, 400);
-      for (size_t i = 0; i < blobs.pixels.size(); ++i)
-        scene_.pixels[i] += blobs.pixels[i] / 3;
+      for (size_t i = 0; i < blobs.pixels.size(); ++i) scene_.pixels[i] += blobs.pixels[i] / 3;
     }
   }
   Image Window(double left, double top = 40, bool blurred = false) const {
@@ -155,7 +154,8 @@ TEST_F(ClipFrames, F90_FramesAreStagedLikePhotos) {
     for (size_t i = 0; i < result.photos.size(); ++i) {
       const StagedPhoto& photo = result.photos[i];
       double seconds = 0;
-      ASSERT_EQ(std::sscanf(photo.file.c_str(), "walk.mp4/%lfs.png", &seconds), 1) << photo.file;
+      ASSERT_EQ(std::sscanf(photo.file.c_str(), "walk.mp4/%lfs.png", &seconds), 1)
+          << photo.file;
       EXPECT_EQ(photo.clip, 0);
       EXPECT_EQ(photo.bits, 8);
       EXPECT_EQ(photo.width, 320);
@@ -187,7 +187,8 @@ TEST_F(ClipFrames, F90_ADamagedFilmIsNamedAndTheRestIsTaken) {
   const IngestResult result = IngestPhotos(scratch_ / "in", scratch_ / "out", {}, {});
   EXPECT_EQ(result.photos.size(), 3u);
   EXPECT_EQ(result.statuses[0].file, "cut.mp4");
-  EXPECT_TRUE(Contains(result.statuses[0].why, "cannot read this film")) << result.statuses[0].why;
+  EXPECT_TRUE(Contains(result.statuses[0].why, "cannot read this film"))
+      << result.statuses[0].why;
   try {
     IngestPhotos(scratch_ / "in/cut.mp4", scratch_ / "out", {}, {});
     FAIL();
@@ -214,8 +215,9 @@ TEST(ListedPairs, FramesAreMatchedWithTheirNeighboursAndPhotosWithTheFilm) {
   for (size_t i = 20; i + 1 < 100; ++i) EXPECT_TRUE(has(i, i + 1)) << i;
   EXPECT_TRUE(has(20, 92)) << "ends of a loop";
   for (size_t i = 0; i < 20; ++i)
-    EXPECT_EQ(std::ranges::count_if(pairs, [&](auto p) { return p.first == i && p.second >= 20; }),
-              10);
+    EXPECT_EQ(
+        std::ranges::count_if(pairs, [&](auto p) { return p.first == i && p.second >= 20; }),
+        10);
   // A twelfth of all pairs of 200: COLMAP's time is in proportion.
   EXPECT_LT(PairsOfClips(Staged(80, 120)).size(), 200u * 199 / 2 / 6);
   EXPECT_TRUE(std::ranges::is_sorted(pairs));

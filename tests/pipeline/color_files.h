@@ -26,8 +26,8 @@ inline std::string IccProfile(const Primaries& p, double gamma, const char* name
   const cmsCIExyY white = {0.3127, 0.3290, 1};
   const cmsCIExyYTRIPLE primaries = {{p[0], p[1], 1}, {p[2], p[3], 1}, {p[4], p[5], 1}};
   const double srgb[5] = {2.4, 1 / 1.055, 0.055 / 1.055, 1 / 12.92, 0.04045};
-  cmsToneCurve* curve = gamma > 0 ? cmsBuildGamma(nullptr, gamma)
-                                  : cmsBuildParametricToneCurve(nullptr, 4, srgb);
+  cmsToneCurve* curve =
+      gamma > 0 ? cmsBuildGamma(nullptr, gamma) : cmsBuildParametricToneCurve(nullptr, 4, srgb);
   cmsToneCurve* const curves[] = {curve, curve, curve};
   cmsHPROFILE profile = cmsCreateRGBProfile(&white, &primaries, curves);
   cmsMLU* text = cmsMLUalloc(nullptr, 1);
@@ -54,8 +54,9 @@ inline Matrix Inverse(const Matrix& m) {
     determinant += at(0, c) * (at(1, c + 1) * at(2, c + 2) - at(1, c + 2) * at(2, c + 1));
   for (int r = 0; r < 3; ++r)
     for (int c = 0; c < 3; ++c)
-      inverse[c][r] = (at(r + 1, c + 1) * at(r + 2, c + 2) - at(r + 1, c + 2) * at(r + 2, c + 1)) /
-                      determinant;
+      inverse[c][r] =
+          (at(r + 1, c + 1) * at(r + 2, c + 2) - at(r + 1, c + 2) * at(r + 2, c + 1)) /
+          determinant;
   return inverse;
 }
 inline Matrix XyzFromRgb(const Primaries& p) {

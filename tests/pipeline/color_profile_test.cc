@@ -60,7 +60,8 @@ TEST_F(ColorProfile, H145_P3AndAdobeRgbCopiesAreTheSamePicture) {
     EXPECT_LT(worst, testing::RecordBound(std::string("colours of ") + copy.file,
                                           testing::Computed::kFloat, worst, copy.tolerance));
     EXPECT_LT(MeanDifference(photo.image, srgb), 0.5 / 255);
-    EXPECT_TRUE(Contains(photo.colors, copy.primaries == kP3Primaries ? "Display P3" : "Adobe"));
+    EXPECT_TRUE(
+        Contains(photo.colors, copy.primaries == kP3Primaries ? "Display P3" : "Adobe"));
     EXPECT_EQ(photo.notice, "");
   }
 }
@@ -152,15 +153,14 @@ TEST_F(ColorProfile, H145_AdobeRgbOfACameraHasAMarkOnly) {
   WriteWithProfile(scratch_ / "a.jpg", Photo(96, 64, 3), "", k8);
   // EXIF: a directory that leads to the interoperability directory with its index "R03".
   using testing::Little, testing::TiffEntry;
-  const std::string exif =
-      std::string("Exif\0\0II*\0", 10) + Little(8, 4) + Little(1, 2) +
-      TiffEntry(0x8769, 4, 1, 26) + Little(0, 4) + Little(1, 2) + TiffEntry(0xa005, 4, 1, 44) +
-      Little(0, 4) + Little(1, 2) + Little(1, 2) + Little(2, 2) + Little(4, 4) +
-      std::string("R03\0", 4) + Little(0, 4);
+  const std::string exif = std::string("Exif\0\0II*\0", 10) + Little(8, 4) + Little(1, 2) +
+                           TiffEntry(0x8769, 4, 1, 26) + Little(0, 4) + Little(1, 2) +
+                           TiffEntry(0xa005, 4, 1, 44) + Little(0, 4) + Little(1, 2) +
+                           Little(1, 2) + Little(2, 2) + Little(4, 4) +
+                           std::string("R03\0", 4) + Little(0, 4);
   const std::string jpeg = testing::ReadBytes(scratch_ / "a.jpg");
   EXPECT_EQ(DecodePhoto(scratch_ / "a.jpg").colors, "");
-  const DecodedPhoto photo =
-      DecodePhoto(Put("b.jpg", testing::WithSegment(jpeg, 0xe1, exif)));
+  const DecodedPhoto photo = DecodePhoto(Put("b.jpg", testing::WithSegment(jpeg, 0xe1, exif)));
   EXPECT_NE(photo.colors, "");
   // As with the profile itself.
   const std::string body = std::string("ICC_PROFILE\0\1\1", 14) + Adobe();
@@ -173,7 +173,7 @@ TEST_F(ColorProfile, H143_OpenExrOfOtherPrimariesBecomesSrgb) {
   const Image srgb = Photo(96, 64, 5);
   const Image light = testing::LinearIn(kP3Primaries, srgb);
   OIIO::ImageSpec spec(96, 64, 3, OIIO::TypeDesc::FLOAT);
-  const float chromaticities[8] = {0.680f, 0.320f, 0.265f, 0.690f,
+  const float chromaticities[8] = {0.680f, 0.320f, 0.265f,  0.690f,
                                    0.150f, 0.060f, 0.3127f, 0.3290f};
   spec.attribute("chromaticities", OIIO::TypeDesc(OIIO::TypeDesc::FLOAT, 8), chromaticities);
   const auto output = OIIO::ImageOutput::create("openexr");

@@ -50,7 +50,8 @@ class InputFolder : public ::testing::Test {
 };
 
 TEST_F(InputFolder, F92_LiveClipsSidecarsAndSmallCopiesAreLeft) {
-  for (const char* name : {"IMG_1.JPG", "IMG_2.JPG", "IMG_3.JPG", "sub/IMG_1.JPG"}) PutPhoto(name);
+  for (const char* name : {"IMG_1.JPG", "IMG_2.JPG", "IMG_3.JPG", "sub/IMG_1.JPG"})
+    PutPhoto(name);
   PutClip("IMG_1.MOV", 20);
   PutClip("IMG_2.MOV", 200);  // 8 s: no live photo
   PutClip("other.mp4", 20);

@@ -23,41 +23,42 @@ constexpr double kNeutral[3] = {0.5, 1.0, 0.625};
 std::string Rationals(std::initializer_list<double> values) {
   std::string bytes;
   for (const double value : values)
-    bytes += Little(static_cast<uint32_t>(static_cast<int32_t>(std::lround(value * 10000))), 4) +
-             Little(10000, 4);
+    bytes +=
+        Little(static_cast<uint32_t>(static_cast<int32_t>(std::lround(value * 10000))), 4) +
+        Little(10000, 4);
   return bytes;
 }
 
 // A mosaic RGGB of 16 bits through a sensor whose primaries are sRGB's.
 std::string Dng(double exposure, int orientation = 1) {
   // XYZ of D65 to linear sRGB.
-  const std::string matrix = Rationals({3.2405, -1.5371, -0.4985, -0.9693, 1.8760, 0.0416,
-                                        0.0556, -0.2040, 1.0572});
+  const std::string matrix =
+      Rationals({3.2405, -1.5371, -0.4985, -0.9693, 1.8760, 0.0416, 0.0556, -0.2040, 1.0572});
   const std::string neutral = Rationals({kNeutral[0], kNeutral[1], kNeutral[2]});
   constexpr int kEntries = 20;
   const uint32_t extra = 8 + 2 + kEntries * 12 + 4;
   const uint32_t at_neutral = extra + static_cast<uint32_t>(matrix.size());
   const uint32_t pixels = at_neutral + static_cast<uint32_t>(neutral.size());
-  const uint32_t version = 1 | 4 << 8;                  // 1.4.0.0
+  const uint32_t version = 1 | 4 << 8;                      // 1.4.0.0
   const uint32_t pattern = 0 | 1 << 8 | 1 << 16 | 2 << 24;  // RGGB
   std::string dng = std::string("II*\0", 4) + Little(8, 4) + Little(kEntries, 2);
-  dng += TiffEntry(254, 4, 1, 0) + TiffEntry(256, 4, 1, kWidth) + TiffEntry(257, 4, 1, kHeight) +
-         TiffEntry(258, 3, 1, 16) + TiffEntry(259, 3, 1, 1) + TiffEntry(262, 3, 1, 32803) +
-         TiffEntry(271, 2, 4, 0x00747365) + TiffEntry(272, 2, 4, 0x00747365) +  // "est"
-         TiffEntry(273, 4, 1, pixels) + TiffEntry(274, 3, 1, static_cast<uint32_t>(orientation)) +
-         TiffEntry(277, 3, 1, 1) + TiffEntry(278, 4, 1, kHeight) +
-         TiffEntry(279, 4, 1, kWidth * kHeight * 2) + TiffEntry(33421, 3, 2, 2 | 2 << 16) +
-         TiffEntry(33422, 1, 4, pattern) + TiffEntry(50706, 1, 4, version) +
-         TiffEntry(50717, 4, 1, 65535) + TiffEntry(50721, 10, 9, extra) +
-         TiffEntry(50728, 5, 3, at_neutral) + TiffEntry(50778, 3, 1, 21) + Little(0, 4);
+  dng +=
+      TiffEntry(254, 4, 1, 0) + TiffEntry(256, 4, 1, kWidth) + TiffEntry(257, 4, 1, kHeight) +
+      TiffEntry(258, 3, 1, 16) + TiffEntry(259, 3, 1, 1) + TiffEntry(262, 3, 1, 32803) +
+      TiffEntry(271, 2, 4, 0x00747365) + TiffEntry(272, 2, 4, 0x00747365) +  // "est"
+      TiffEntry(273, 4, 1, pixels) + TiffEntry(274, 3, 1, static_cast<uint32_t>(orientation)) +
+      TiffEntry(277, 3, 1, 1) + TiffEntry(278, 4, 1, kHeight) +
+      TiffEntry(279, 4, 1, kWidth * kHeight * 2) + TiffEntry(33421, 3, 2, 2 | 2 << 16) +
+      TiffEntry(33422, 1, 4, pattern) + TiffEntry(50706, 1, 4, version) +
+      TiffEntry(50717, 4, 1, 65535) + TiffEntry(50721, 10, 9, extra) +
+      TiffEntry(50728, 5, 3, at_neutral) + TiffEntry(50778, 3, 1, 21) + Little(0, 4);
   dng += matrix + neutral;
   for (int y = 0; y < kHeight; ++y)
     for (int x = 0; x < kWidth; ++x) {
       const int channel = y % 2 == 0 ? (x % 2 == 0 ? 0 : 1) : (x % 2 == 0 ? 1 : 2);
       const double light = kPatches[y / kPatch * 3 + x / kPatch][channel];
-      dng += Little(static_cast<uint64_t>(
-                        std::lround(65535 * exposure * light * kNeutral[channel])),
-                    2);
+      dng += Little(
+          static_cast<uint64_t>(std::lround(65535 * exposure * light * kNeutral[channel])), 2);
     }
   return dng;
 }

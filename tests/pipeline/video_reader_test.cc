@@ -61,8 +61,9 @@ class VideoReaderTest : public testing::PictureTest {
 };
 
 TEST_F(VideoReaderTest, F90_FramesComeInOrderWithTheirColours) {
-  for (const ClipSpec& spec : {ClipSpec{}, ClipSpec{.encoder = "libx265"},
-                              ClipSpec{.container = "mov"}, ClipSpec{.container = "matroska"}}) {
+  for (const ClipSpec& spec :
+       {ClipSpec{}, ClipSpec{.encoder = "libx265"}, ClipSpec{.container = "mov"},
+        ClipSpec{.container = "matroska"}}) {
     const std::vector<Image> frames = FilmFrames(30);
     const std::string path = scratch_ / "film";
     if (!WriteClip(path, frames, spec)) continue;
@@ -185,7 +186,8 @@ TEST_F(VideoReaderTest, F90_PlaylistsAndReferencesAreNotFollowed) {
 
 TEST_F(VideoReaderTest, F90_LongAndLargeFilmsEnd) {
   WriteClip(scratch_ / "a.mp4", FilmFrames(50));
-  EXPECT_TRUE(Contains(RefusalOf(scratch_ / "a.mp4", {.max_seconds = 1}), "a film of more than"));
+  EXPECT_TRUE(
+      Contains(RefusalOf(scratch_ / "a.mp4", {.max_seconds = 1}), "a film of more than"));
   EXPECT_TRUE(Contains(RefusalOf(scratch_ / "a.mp4", {.max_frames = 40}), "40 frames"));
   EXPECT_TRUE(Contains(RefusalOf(scratch_ / "a.mp4", {.max_decoded_pixels = 40 * 160 * 96}),
                        "a film of more than"));
