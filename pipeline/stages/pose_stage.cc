@@ -96,13 +96,15 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
   ingest_options.take_clips = source.kind == CaptureKind::kPhotos;
   const IngestResult ingest =
       IngestPhotos(source.photos, photo_folder, ingest_options, parts.Next(seconds.ingest));
-  if (!ingest.summary.empty()) context->console->Info(ingest.summary);
-  for (const std::string& notice : ingest.notices) context->console->Info(notice);
+  std::vector<std::string> said = ingest.notices;
+  if (!ingest.summary.empty()) said.insert(said.begin(), ingest.summary);
+  for (const std::string& notice : said) context->console->Info(notice);
   const std::vector<StagedPhoto> colmap_photos =
       PhotosForColmap(ingest.photos, workspace.Path(kColmapPhotos));
 
   StageOutcome outcome;
   PoseStageReport metrics;
+  metrics.notices = said;
   Capture capture;
   PoseOptions options = settings.pose;
   options.threads = settings.program.threads;
@@ -133,7 +135,7 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
     metrics.colmap = report.colmap_version;
     metrics.strategy = report.strategy;
     metrics.attempts = report.attempts;
-    metrics.notices = report.notes;
+    metrics.notices.insert(metrics.notices.end(), report.notes.begin(), report.notes.end());
     metrics.lens = report.lens;
   } else {
     std::vector<std::string> notes;
