@@ -175,11 +175,11 @@ TEST_F(VideoReaderTest, F90_DamagedEmptyAndOtherFilesAreRefusedByName) {
 }
 
 TEST_F(VideoReaderTest, F90_PlaylistsAndReferencesAreNotFollowed) {
-  WriteClip(scratch_ / "other.mp4", FilmFrames(3));
-  const std::string other = scratch_ / "other.mp4";
+  WriteClip(scratch_ / "other.ts", FilmFrames(3), {.container = "mpegts"});
   for (const std::string& list :
-       {"#EXTM3U\n#EXT-X-VERSION:3\n#EXTINF:1,\n" + other + "\n#EXT-X-ENDLIST\n",
-        "ffconcat version 1.0\nfile '" + other + "'\n",
+       {std::string("#EXTM3U\n#EXT-X-VERSION:3\n#EXT-X-TARGETDURATION:1\n#EXTINF:1,\nother.ts\n"
+                    "#EXT-X-ENDLIST\n"),
+        std::string("ffconcat version 1.0\nfile 'other.ts'\n"),
         std::string("v=0\r\no=- 0 0 IN IP4 127.0.0.1\r\nm=video 5004 RTP/AVP 96\r\n")})
     EXPECT_TRUE(Contains(RefusalOf(Put("list.mp4", list)), "cannot read this film")) << list;
 }
