@@ -91,10 +91,10 @@ std::function<StagePlan(const FitOptions&)> PlannerOf(const WorkingViews& views,
   };
 }
 
-// The fit's options, with resolutions lowered to fit into memory, which is reported.
-FitOptions OptionsForMemory(RunContext* context,
-                            const std::function<StagePlan(const FitOptions&)>& plan_of,
-                            Backend backend) {
+// The fit's options for the scene, lowered to fit into memory, which is reported.
+FitOptions OptionsForScene(RunContext* context, const NormalizedScene& scene,
+                           const std::function<StagePlan(const FitOptions&)>& plan_of,
+                           Backend backend) {
   const RunSettings& settings = context->settings;
   const bool on_device = backend == Backend::kCuda;
   const uint64_t limit =
@@ -102,6 +102,8 @@ FitOptions OptionsForMemory(RunContext* context,
                     on_device ? static_cast<uint64_t>(ReadDeviceStatus().free_bytes)
                               : ReadMemoryStatus().available);
   FitOptions options = settings.fit;
+  options.ChooseField(scene.ndc.on());
+  const int finest = Finest(options);
   options.seed = settings.run.seed;
   // Free memory must not change the result of a reproducible run.
   if ((!settings.run.reproducible || settings.run.max_memory_gb > 0) &&
@@ -110,7 +112,7 @@ FitOptions OptionsForMemory(RunContext* context,
         (options.adaptive()
              ? Format("the field has at most %.1f million cells", double{options.max_cells})
              : Concat("the finest grid has ", Finest(options), " voxels a side instead of ",
-                      Finest(settings.fit))) +
+                      finest)) +
         " to fit into " + (settings.run.max_memory_gb > 0 ? "--max-memory" : "free memory"));
   const StagePlan plan = plan_of(options);
   context->console->Info("the fit will take " + PlanText(plan));
@@ -158,7 +160,8 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
     if (effect.name != kViewDependence) context->console->Info(EffectLine(effect));
   for (const std::string& notice : profile.notices) context->console->Info(notice);
   const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
-  FitOptions options = OptionsForMemory(context, PlannerOf(views, scene.box, backend), backend);
+  FitOptions options =
+      OptionsForScene(context, scene, PlannerOf(views, scene.box, backend), backend);
 
   const std::vector<int> fitted = views.Training();
   std::vector<Image> photos;
@@ -270,7 +273,9 @@ Stage ReconstructStage(RunContext* context) {
     const SceneProfile profile = ProfileScene(views.capture(), context->settings.fit.sh_degree,
                                               run.effects + ",exposure=off");
     const Backend backend = ChooseBackend(run.device, run.reproducible);
-    stage.plan = PlanText(PlannerOf(views, profile.scene.box, backend)(context->settings.fit));
+    FitOptions options = context->settings.fit;
+    options.ChooseField(profile.scene.ndc.on());
+    stage.plan = PlanText(PlannerOf(views, profile.scene.box, backend)(options));
   }
   stage.work = [context, inputs = stage.inputs](const ProgressFunction& progress) {
     return Reconstruct(context, inputs, progress);

@@ -10,7 +10,7 @@
 namespace regrade {
 
 struct FitOptions {
-  std::string field = "adaptive";
+  std::string field = "auto";
   std::vector<int> resolutions = {64, 128, 256, 512};
   std::vector<int> steps = {600, 900, 1200, 2300};
   int rays_per_step = 4096;
@@ -48,7 +48,7 @@ struct FitOptions {
   bool exact_sums = false;
   uint64_t seed = 0;
 
-  bool adaptive() const { return field == "adaptive"; }
+  bool adaptive() const { return field != "uniform"; }
   // Makes the field uniform, with the rates and regularisers that suit it: the defaults above
   // are an adaptive field's.
   void MakeUniform() {
@@ -62,14 +62,36 @@ struct FitOptions {
     tv_fraction = 0.03f;
     prune_weight = 0.5f;
   }
+  // Decides "auto": uniform in device coordinates, where that is still better (COSTS.md). What
+  // differs from the defaults was asked for, and stays. At most three stages: more would take
+  // much memory.
+  void ChooseField(bool device_coordinates) {
+    if (field != "auto" || !device_coordinates) return;
+    const FitOptions plain;
+    FitOptions uniform;
+    uniform.MakeUniform();
+    for (float FitOptions::*value :
+         {&FitOptions::rate_density, &FitOptions::rate_density_end, &FitOptions::rate_sh,
+          &FitOptions::rate_sh_end, &FitOptions::tv_density, &FitOptions::tv_sh,
+          &FitOptions::tv_decay, &FitOptions::tv_fraction, &FitOptions::prune_weight})
+      if (this->*value == plain.*value) this->*value = uniform.*value;
+    field = "uniform";
+    constexpr size_t kStages = 3;
+    while (resolutions.size() > kStages && steps.size() == resolutions.size()) {
+      resolutions.pop_back();
+      steps[steps.size() - 2] += steps.back();
+      steps.pop_back();
+    }
+  }
 
   template <typename Bind>
   void Describe(Bind& bind) {
-    bind("fit-field", field,
-         {.help = "uniform: voxels of one width; adaptive: cells that are halved where two "
-                  "photos see them wider than "
-                  "a pixel",
-          .choices = "uniform|adaptive"});
+    bind(
+        "fit-field", field,
+        {.help = "uniform: voxels of one width; adaptive: cells that are halved where two "
+                 "photos see them wider than a pixel; auto: uniform for captures that look one "
+                 "way, else adaptive",
+         .choices = "auto|uniform|adaptive"});
     bind("fit-resolutions", resolutions,
          {.unit = "voxels",
           .help = "longest side of the grid in each stage, coarse to fine; an adaptive field "

@@ -121,7 +121,7 @@ TEST(Plan, ResolutionsAreLoweredToMemory) {
 // cell twice and two threads' statistics of 24 B.
 TEST(Plan, MemoryOfAnAdaptiveFieldByHand) {
   FitOptions fit = Fit({100}, {10});
-  fit.field = "adaptive";
+  fit.field = "auto";
   const double per_cell = 1.2 * (4 * 128 + 4 * 4) + 2 * 45 + 2 * 24;
   const auto memory = [&](const std::vector<int>& resolutions) {
     fit.resolutions = resolutions;

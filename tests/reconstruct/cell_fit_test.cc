@@ -71,6 +71,26 @@ TEST_F(CellFit, H110_AResumedFitIsTheUndisturbedOne) {
   }
 }
 
+TEST(FitOptions, TheFieldFollowsTheSceneAndKeepsWhatWasAskedFor) {
+  FitOptions uniform;
+  uniform.MakeUniform();
+  FitOptions options;
+  options.ChooseField(/*device_coordinates=*/false);
+  EXPECT_TRUE(options.adaptive());
+  EXPECT_EQ(options.rate_density, FitOptions().rate_density);
+  options.tv_sh = 0.5f;
+  options.ChooseField(true);
+  EXPECT_FALSE(options.adaptive());
+  EXPECT_EQ(options.rate_density, uniform.rate_density);
+  EXPECT_EQ(options.tv_sh, 0.5f);
+  EXPECT_EQ(options.resolutions, (std::vector<int>{64, 128, 256}));
+  EXPECT_EQ(options.steps, (std::vector<int>{600, 900, 3500}));
+  FitOptions asked;
+  asked.field = "adaptive";
+  asked.ChooseField(true);
+  EXPECT_TRUE(asked.adaptive());
+}
+
 TEST(ChooseChanges, H167_TheLimitOfCellsHoldsAndTheLargestErrorsAreSplit) {
   constexpr int64_t kCells = 1000;
   Buffer<uint8_t> level(kCells);
