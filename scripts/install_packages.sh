@@ -8,9 +8,9 @@ packages=(
   libgtest-dev libbenchmark-dev python3-numpy   # to test and to measure
   libboost-program-options-dev               # command line
   nlohmann-json3-dev libzip-dev libutfcpp-dev
-  libopenimageio-dev libjpeg62-turbo-dev libpng-dev   # pictures
+  libopenimageio-dev libjpeg62-turbo-dev libpng-dev libheif-dev liblcms2-dev   # pictures
   libopencv-dev                              # flow, networks of 2D methods
-  libavformat-dev libavcodec-dev libavutil-dev libswscale-dev   # films
+  libavformat-dev libavcodec-dev libavutil-dev libswscale-dev   # films, in and out
   libceres-dev libeigen3-dev
   colmap                                     # poses, started as a program
 )

@@ -24,7 +24,8 @@ struct OptionInfo {
   const char* help = "";
   double min = -std::numeric_limits<double>::infinity();  // inclusive; numbers only
   double max = std::numeric_limits<double>::infinity();
-  const char* choices = "";  // for strings: "a|b|c"; empty allows anything
+  // For strings: "a|b|c"; "|a|b|c" allows an empty text, too, and "" anything.
+  const char* choices = "";
 };
 
 }  // namespace regrade

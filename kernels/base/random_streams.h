@@ -8,6 +8,7 @@ namespace regrade {
 // Salts, combined with the seed by XOR (see random.h): each purpose draws independent numbers.
 inline constexpr uint64_t kRandomTotalVariation = 0x7476;     // start of the regularised run
 inline constexpr uint64_t kRandomSphereVariation = 0x6d7369;  // the same for background layers
+inline constexpr uint64_t kRandomFreeSpace = 0x66726565;      // rays of EQ(free-space)
 inline constexpr uint64_t kRandomSynthNoise = 0x5e4507;  // sensor noise of synthetic photos
 inline constexpr uint64_t kRandomSynthModel = 0x7a11;    // errors of synthetic poses, points
 

@@ -21,6 +21,7 @@ struct StagedPhoto {
   int height = 0;
   double exif_focal_px = 0;  // focal length in pixels from EXIF; 0 where unknown
   int bits = 8;              // of a value in the PNG: 8 or 16
+  int clip = -1;             // index of the film that it is a frame of; -1: a photo
 };
 
 // A registered photo. `name` is the staged name ("00007.png"); `file` the user's.

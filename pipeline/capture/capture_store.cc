@@ -153,9 +153,10 @@ double NearestDepthOf(const CaptureSource& source) {
 CaptureSource DetectCapture(const std::string& folder) {
   std::error_code error;
   const fs::path root = fs::canonical(folder, error);
-  if (error) throw InputError(error.message(), folder, "name a folder of photos");
+  if (error) throw InputError(error.message(), folder, "name a folder of photos, or a film");
+  if (fs::is_regular_file(root)) return {CaptureKind::kPhotos, root.string(), ""};
   if (!fs::is_directory(root))
-    throw InputError("is a file, not a folder", folder, "name its folder");
+    throw InputError("is neither a folder nor a film", folder, "name a folder or a file");
   for (const char* name : {"transforms.json", "transforms_train.json"}) {
     const fs::path file = root / name;
     if (!fs::is_regular_file(file)) continue;

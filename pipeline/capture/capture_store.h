@@ -19,12 +19,13 @@ enum class CaptureKind {
 
 struct CaptureSource {
   CaptureKind kind = CaptureKind::kPhotos;
-  std::string photos;  // the folder to take photos from, absolute
+  std::string photos;  // the folder to take photos from, or a film; absolute
   std::string poses;   // folder of the model, or the file of poses; empty for kPhotos
 };
 
-// Decides by content. The folder of pictures beside poses is images/, or else the first of
-// images_2/, images_4/ and so on. Throws Error(kInput) if there is no such folder.
+// Decides by content. A file counts as a film, of which poses are found. The folder of pictures
+// beside poses is images/, or else the first of images_2/, images_4/ and so on. Throws
+// Error(kInput) if there is no such folder.
 CaptureSource DetectCapture(const std::string& folder);
 
 // Capture::nearest_depth by the photos.json of a kPosed capture; 0 for others.

@@ -2,17 +2,19 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 #include <future>
-#include <limits>
 #include <map>
-#include <regex>
+#include <memory>
 #include <set>
 #include <unordered_map>
 
 #include "kernels/base/error.h"
 #include "kernels/base/hash.h"
-#include "pipeline/files/folder_listing.h"
+#include "kernels/base/quantile.h"
+#include "pipeline/capture/clip_frames.h"
+#include "pipeline/capture/ingest_summary.h"
+#include "pipeline/capture/input_files.h"
+#include "pipeline/capture/staged_files.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/images/normalize_photo.h"
 
@@ -21,7 +23,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr size_t kLeastPhotos = 3;
+constexpr char kNotAnImage[] = "not an image";
+// A photo whose longer side is below this fraction of the larger photos' is a thumbnail.
+constexpr double kThumbnail = 0.25;
+constexpr double kLargerPhotos = 0.75;  // quantile of the longer sides
+constexpr int kUsualFrames = 80;        // of films, before they are surveyed
+// Of the time that a film takes, while it is surveyed and while its frames are staged.
+constexpr double kSurveyWeight = 0.6;
 
 // A photo, or why there is none.
 struct Candidate {
@@ -29,39 +37,46 @@ struct Candidate {
   Image rgb;  // over white
   uint64_t pixel_hash = 0;
   std::string problem;
+
+  void Complete() {
+    pixel_hash = PixelHash8(photo.image);
+    rgb = CompositeOnWhite(photo.image);
+  }
 };
 
-// Of size and values as integers, so that a photo and its staged PNG agree.
-template <typename Value>
-uint64_t PixelHash(const Image& image) {
-  Hasher hasher;
-  const int shape[3] = {image.width, image.height, image.channels};
-  hasher.Add(shape, sizeof shape);
-  constexpr float kMax = std::numeric_limits<Value>::max();
-  std::vector<Value> values(image.pixels.size());
-  std::transform(image.pixels.begin(), image.pixels.end(), values.begin(), [](float v) {
-    return static_cast<Value>(std::clamp(v, 0.f, 1.f) * kMax + 0.5f);
-  });
-  hasher.Add(values.data(), values.size() * sizeof(Value));
-  return hasher.Value();
-}
+// A file, or a frame of a film.
+struct Item {
+  std::string name;  // the user's
+  const InputFile* input = nullptr;
+  int clip = -1;
+  size_t frame = 0;  // of the decoded ones
+};
 
-// Errors of a file become its problem; errors of a disk are thrown.
-Candidate Decode(const ListedFile& file, const DecodeLimits& limits) {
-  Candidate candidate;
-  candidate.problem = file.problem;
-  if (!candidate.problem.empty()) return candidate;
-  try {
-    candidate.photo = DecodePhoto(file.path, limits);
-    candidate.pixel_hash = PixelHash<uint8_t>(candidate.photo.image);
-    candidate.rgb = CompositeOnWhite(candidate.photo.image);
-  } catch (const Error& error) {
-    if (error.code() != ExitCode::kInput) throw;
-    candidate.problem = error.what_failed();
-    if (!error.hint().empty()) candidate.problem += "; " + error.hint();
+// Reads picked frames in their order.
+class ClipFrames {
+ public:
+  ClipFrames(const std::vector<ClipSurvey>& clips, const VideoLimits& limits)
+      : clips_(clips), limits_(limits) {}
+
+  Image Read(int clip, size_t frame) {
+    if (clip != clip_) {
+      reader_ = std::make_unique<VideoReader>(clips_[static_cast<size_t>(clip)].path, limits_);
+      clip_ = clip;
+      decoded_ = 0;
+    }
+    for (; decoded_ <= frame; ++decoded_)
+      if (!reader_->Next())
+        throw InputError("the film has become shorter", clips_[static_cast<size_t>(clip)].path);
+    return reader_->Picture();
   }
-  return candidate;
-}
+
+ private:
+  const std::vector<ClipSurvey>& clips_;
+  const VideoLimits limits_;
+  std::unique_ptr<VideoReader> reader_;
+  int clip_ = -1;
+  size_t decoded_ = 0;  // frames of this film
+};
 
 Image AlphaOf(const Image& rgba) {
   Image alpha(rgba.width, rgba.height, 1);
@@ -75,186 +90,245 @@ bool HasTransparentPixels(const Image& rgba) {
   return false;
 }
 
-int StagedBits(const DecodedPhoto& photo) { return photo.bits > 8 ? 16 : 8; }
-
-// Bit depth of a PNG by its header; 0 if the file ends before.
-int PngDepth(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  file.seekg(24);
-  char depth = 0;
-  return file.get(depth) ? depth : 0;
-}
-
-// Writes the picture unless the file already holds these pixels at this depth.
-void Stage(const std::string& path, const Image& image, int bits) {
-  if (fs::exists(path)) {
-    try {
-      if (PngDepth(path) == bits &&
-          PixelHash<uint16_t>(ReadImage(path)) == PixelHash<uint16_t>(image))
-        return;
-    } catch (const Error&) {
-      // Damaged or something else: written anew.
-    }
-  }
-  if (bits == 16)
-    WritePng16(path, image);
-  else
-    WritePng8(path, image);
-}
-
-void RemoveLeftovers(const std::string& folder, const std::set<std::string>& staged) {
-  static const std::regex kOurs(R"(\d{5,}(\.alpha)?\.png)");
-  std::vector<fs::path> leftovers;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
-    const std::string name = entry.path().filename().string();
-    if (std::regex_match(name, kOurs) && !staged.contains(name))
-      leftovers.push_back(entry.path());
-  }
-  for (const fs::path& path : leftovers) fs::remove(path);
-}
-
-// Reports each kind once: "12 photos: <what> (the first is a.jpg)".
-class Notices {
+class Ingest {
  public:
-  void Add(const std::string& what, const std::string& file) {
-    auto [entry, is_new] = kinds_.try_emplace(what, Kind{file, 0});
-    ++entry->second.count;
-    if (is_new) order_.push_back(what);
+  Ingest(const std::string& source, const std::string& staging_folder,
+         const IngestOptions& options)
+      : source_(source),
+        staging_(fs::absolute(staging_folder).lexically_normal().string()),
+        options_(options),
+        inputs_(ListInputs(source, options.take_clips)) {
+    limits_.max_pixels = options.max_megapixels * 1'000'000;
+    limits_.accept_damaged = options.accept_damaged;
+    video_limits_.max_pixels = limits_.max_pixels;
+    std::error_code error;
+    fs::create_directories(staging_, error);
+    if (error) throw ResourceError("cannot create the folder: " + error.message(), staging_);
   }
-  std::vector<std::string> Texts() const {
-    std::vector<std::string> texts;
-    for (const std::string& what : order_) {
-      const Kind& kind = kinds_.at(what);
-      texts.push_back(kind.count == 1 ? kind.first + ": " + what
-                                      : Concat(kind.count, " photos: ", what, " (the first is ",
-                                               kind.first, ")"));
-    }
-    return texts;
+
+  IngestResult Run(const ProgressFunction& progress) {
+    const int clips = inputs_.Count(InputKind::kClip);
+    const double photos = static_cast<double>(inputs_.files.size()) - clips;
+    // A film costs about as much as so many photos.
+    const double films = static_cast<double>(clips) * kMostFrames;
+    ProgressParts parts(progress, photos + films);
+    if (clips > 0) SurveyClips(parts.Next(kSurveyWeight * films));
+    StageAll(clips > 0 ? parts.Next(photos + (1 - kSurveyWeight) * films) : progress);
+    DropThumbnails();
+    Finish();
+    return std::move(result_);
   }
 
  private:
-  struct Kind {
-    std::string first;
-    int count;
-  };
-  std::map<std::string, Kind> kinds_;
-  std::vector<std::string> order_;
-};
+  void SurveyClips(const ProgressFunction& progress) {
+    ProgressParts parts(progress, inputs_.Count(InputKind::kClip));
+    for (const InputFile& input : inputs_.files)
+      if (input.kind == InputKind::kClip)
+        clips_.push_back(
+            SurveyClip(input.file.name, input.file.path, video_limits_, parts.Next(1)));
+    picked_ = PickFrames(clips_, options_.video_frames);
+    for (size_t i = 0; i < clips_.size(); ++i)
+      if (clips_[i].problem.empty()) notices_.AddClip(clips_[i], picked_[i].size());
+  }
 
-// "2 x not an image, 1 x empty file": why files are not used.
-std::string CountReasons(const std::vector<PhotoStatus>& statuses) {
-  constexpr size_t kShown = 5;
-  std::map<std::string, int> counts;
-  for (const PhotoStatus& photo : statuses)
-    if (photo.status != PhotoState::kUsed) ++counts[photo.why];
-  std::vector<std::pair<int, std::string>> sorted;
-  for (const auto& [why, count] : counts) sorted.emplace_back(-count, why);
-  std::ranges::sort(sorted);
-  std::string text;
-  for (size_t i = 0; i < std::min(sorted.size(), kShown); ++i)
-    text += Concat((i ? ", " : ""), -sorted[i].first, " x ", sorted[i].second);
-  if (sorted.size() > kShown)
-    text += Concat(", and ", sorted.size() - kShown, " other reasons");
-  return text;
-}
-
-void RequireEnough(const IngestResult& result, const std::string& folder) {
-  const size_t usable = result.photos.size(), files = result.statuses.size();
-  if (usable >= kLeastPhotos) return;
-  std::string reasons = CountReasons(result.statuses);
-  if (!reasons.empty()) reasons = ": " + reasons;
-  if (usable == 0)
-    throw InputError(
-        files == 0
-            ? "the folder is empty" +
-                  (result.hidden > 0
-                       ? Concat(" (except for ", result.hidden, " hidden entries)")
-                       : std::string())
-            : Concat(files, (files == 1 ? " file" : " files"), ", no usable photo", reasons),
-        folder, "give a folder of JPEG, PNG or TIFF photos");
-  throw SceneError(
-      Concat(usable, (usable == 1 ? " photo" : " photos"), " of ", files,
-             " files: a scene needs at least 3, better 20, from different viewpoints", reasons),
-      folder);
-}
-
-std::string StagedName(size_t index, const char* suffix) {
-  return Format("%05zu%s", index, suffix);
-}
-
-}  // namespace
-
-IngestResult IngestPhotos(const std::string& folder, const std::string& staging_folder,
-                          const IngestOptions& options, const ProgressFunction& progress) {
-  const FolderListing listing = ListFolder(folder);
-  const std::string staging = fs::absolute(staging_folder).lexically_normal().string();
-  std::error_code error;
-  fs::create_directories(staging, error);
-  if (error) throw ResourceError("cannot create the folder: " + error.message(), staging);
-
-  IngestResult result;
-  result.hidden = listing.hidden;
-  DecodeLimits limits;
-  limits.max_pixels = options.max_megapixels * 1'000'000;
-  limits.accept_damaged = options.accept_damaged;
-
-  Notices notices;
-  Hasher fingerprint;
-  std::unordered_map<uint64_t, std::string> file_of_pixels;
-  std::set<std::string> staged_names;
-  const auto& files = listing.files;
-  // The next file is decoded while this one is encoded. A future's destructor waits for its
-  // thread, also on errors.
-  const auto decode_later = [&](size_t i) {
-    return i < files.size()
-               ? std::async(std::launch::async, Decode, std::cref(files[i]), limits)
-               : std::future<Candidate>();
-  };
-  std::future<Candidate> next = decode_later(0);
-  for (size_t i = 0; i < files.size(); ++i) {
-    const Candidate candidate = next.get();
-    next = decode_later(i + 1);
-    const std::string& file = files[i].name;
-    ReportOrThrow(progress, i, files.size(), file);
-    if (!candidate.problem.empty()) {
-      result.statuses.push_back({file, PhotoState::kSkipped, candidate.problem});
-      if (candidate.problem != "not an image")
-        notices.Add("left out, " + candidate.problem, file);
-      continue;
+  // Files and picked frames, in natural order of the files' names.
+  std::vector<Item> Items() const {
+    std::vector<Item> items;
+    int clip = -1;
+    for (const InputFile& input : inputs_.files) {
+      if (input.kind == InputKind::kClip) ++clip;
+      if (input.kind != InputKind::kClip ||
+          !clips_[static_cast<size_t>(clip)].problem.empty()) {
+        items.push_back({input.file.name, &input, -1, 0});
+        continue;
+      }
+      const ClipSurvey& survey = clips_[static_cast<size_t>(clip)];
+      for (const size_t frame : picked_[static_cast<size_t>(clip)])
+        items.push_back(
+            {FrameName(input.file.name, survey.frames[frame].seconds), &input, clip, frame});
     }
-    const auto [twin, is_new] = file_of_pixels.try_emplace(candidate.pixel_hash, file);
+    return items;
+  }
+
+  // Errors of a file become its problem; errors of a disk are thrown.
+  Candidate Decode(const Item& item, ClipFrames* frames) const {
+    Candidate candidate;
+    candidate.problem = item.input->file.problem;
+    if (item.clip < 0 && item.input->kind == InputKind::kClip)
+      for (const ClipSurvey& clip : clips_)
+        if (clip.file == item.name) candidate.problem = clip.problem;
+    if (item.input->kind == InputKind::kLeft) candidate.problem = item.input->why;
+    if (!candidate.problem.empty()) return candidate;
+    try {
+      if (item.clip >= 0)
+        candidate.photo.image = frames->Read(item.clip, item.frame);
+      else
+        candidate.photo = DecodePhoto(item.input->file.path, limits_);
+      candidate.Complete();
+    } catch (const Error& error) {
+      if (error.code() != ExitCode::kInput) throw;
+      candidate.problem = error.what_failed();
+      if (!error.hint().empty()) candidate.problem += "; " + error.hint();
+    }
+    return candidate;
+  }
+
+  void StageAll(const ProgressFunction& progress) {
+    const std::vector<Item> items = Items();
+    ClipFrames frames(clips_, video_limits_);
+    // The next item is decoded while this one is encoded. A future's destructor waits for its
+    // thread, also on errors.
+    const auto decode_later = [&](size_t i) {
+      return i < items.size()
+                 ? std::async(std::launch::async,
+                              [this, &items, &frames, i] { return Decode(items[i], &frames); })
+                 : std::future<Candidate>();
+    };
+    std::future<Candidate> next = decode_later(0);
+    for (size_t i = 0; i < items.size(); ++i) {
+      const Candidate candidate = next.get();
+      next = decode_later(i + 1);
+      ReportOrThrow(progress, i, items.size(), items[i].name);
+      Take(items[i], candidate);
+    }
+    Report(progress, items.size(), items.size());
+  }
+
+  void Take(const Item& item, const Candidate& candidate) {
+    if (item.input->kind == InputKind::kLeft)
+      return LeaveOut(item.name, candidate.problem, item.input->left_as);
+    if (candidate.problem == kNotAnImage)
+      return LeaveOut(item.name, candidate.problem,
+                      "no picture" + fs::path(item.name).extension().string());
+    if (!candidate.problem.empty()) {
+      notices_.Add("left out, " + candidate.problem, item.name);
+      return LeaveOut(item.name, candidate.problem, "unusable file");
+    }
+    const auto [twin, is_new] = file_of_pixels_.try_emplace(candidate.pixel_hash, item.name);
     if (!is_new) {
       const std::string why = "the same picture as " + twin->second;
-      result.statuses.push_back({file, PhotoState::kSkipped, why});
-      notices.Add("left out, " + why, file);
-      continue;
+      notices_.Add("left out, " + why, item.name);
+      return LeaveOut(item.name, why, "repeated picture");
     }
-    const std::string name = StagedName(result.photos.size(), ".png");
-    const std::string path = staging + "/" + name;
-    const int bits = StagedBits(candidate.photo);
-    Stage(path, candidate.rgb, bits);
-    staged_names.insert(name);
+    Stage(item, candidate);
+  }
+
+  void LeaveOut(const std::string& name, const std::string& why, const std::string& as) {
+    result_.statuses.push_back({name, PhotoState::kSkipped, why});
+    ++left_[as];
+  }
+
+  void Stage(const Item& item, const Candidate& candidate) {
+    const size_t index = result_.photos.size();
+    const std::string name = StagedName(index, ".png"), path = staging_ + "/" + name;
+    const int bits = candidate.photo.bits > 8 ? 16 : 8;
+    StagePicture(path, candidate.rgb, bits);
     std::string notice = candidate.photo.notice;
-    if (candidate.photo.image.channels == 4) {
-      const std::string alpha = StagedName(result.photos.size(), ".alpha.png");
-      Stage(staging + "/" + alpha, AlphaOf(candidate.photo.image), 8);
-      staged_names.insert(alpha);
+    has_alpha_.push_back(candidate.photo.image.channels == 4);
+    if (has_alpha_.back()) {
+      StagePicture(staging_ + "/" + StagedName(index, ".alpha.png"),
+                   AlphaOf(candidate.photo.image), 8);
       if (HasTransparentPixels(candidate.photo.image))
         notice += std::string(notice.empty() ? "" : "; ") +
                   "transparent parts are composited on white";
     }
-    if (!notice.empty()) notices.Add(notice, file);
-    result.statuses.push_back({file, PhotoState::kUsed, notice});
-    result.photos.push_back({file, name, path, candidate.rgb.width, candidate.rgb.height,
-                             candidate.photo.exif_focal_px, bits});
-    fingerprint.Add(file + '\n' + HashText(candidate.pixel_hash) + '\n');
+    if (!notice.empty()) notices_.Add(notice, item.name);
+    notices_.AddColors(candidate.photo.colors, candidate.photo.clipped, item.name);
+    result_.statuses.push_back({item.name, PhotoState::kUsed, notice});
+    result_.photos.push_back({item.name, name, path, candidate.rgb.width, candidate.rgb.height,
+                              candidate.photo.exif_focal_px, bits, item.clip});
+    hashes_.push_back(candidate.pixel_hash);
   }
-  Report(progress, files.size(), files.size());
-  RequireEnough(result, folder);
-  RemoveLeftovers(staging, staged_names);
-  result.notices = notices.Texts();
-  result.fingerprint = HashText(fingerprint.Value());
-  return result;
+
+  // Only all sizes together show which photos are thumbnails of others.
+  void DropThumbnails() {
+    std::vector<int> sides;
+    for (const StagedPhoto& photo : result_.photos)
+      if (photo.clip < 0) sides.push_back(std::max(photo.width, photo.height));
+    const double limit = kThumbnail * Quantile(sides, kLargerPhotos);
+    const std::vector<StagedPhoto> all = std::move(result_.photos);
+    result_.photos.clear();
+    for (size_t i = 0; i < all.size(); ++i) {
+      StagedPhoto photo = all[i];
+      const size_t index = result_.photos.size();
+      if (photo.clip < 0 && std::max(photo.width, photo.height) < limit) {
+        const std::string why = Concat("a thumbnail: ", photo.width, " x ", photo.height);
+        for (PhotoStatus& status : result_.statuses)
+          if (status.file == photo.file) status = {photo.file, PhotoState::kSkipped, why};
+        ++left_["thumbnail"];
+        continue;
+      }
+      if (index != i) {
+        RenumberStaged(staging_, i, index);
+        photo.name = StagedName(index, ".png");
+        photo.path = staging_ + "/" + photo.name;
+        hashes_[index] = hashes_[i];
+        has_alpha_[index] = has_alpha_[i];
+      }
+      result_.photos.push_back(photo);
+    }
+  }
+
+  void Finish() {
+    RequireEnoughPhotos(result_.photos.size(), result_.statuses, inputs_.hidden, source_);
+    Hasher fingerprint;
+    std::set<std::string> staged;
+    for (size_t i = 0; i < result_.photos.size(); ++i) {
+      fingerprint.Add(result_.photos[i].file + '\n' + HashText(hashes_[i]) + '\n');
+      staged.insert(result_.photos[i].name);
+      if (has_alpha_[i]) staged.insert(StagedName(i, ".alpha.png"));
+    }
+    RemoveLeftovers(staging_, staged);
+    result_.hidden = inputs_.hidden;
+    result_.notices = notices_.Texts();
+    result_.summary = TakenAndLeft(result_.photos, clips_, left_);
+    result_.fingerprint = HashText(fingerprint.Value());
+  }
+
+  const std::string source_, staging_;
+  const IngestOptions& options_;
+  const InputFiles inputs_;
+  DecodeLimits limits_;
+  VideoLimits video_limits_;
+  std::vector<ClipSurvey> clips_;
+  std::vector<std::vector<size_t>> picked_;  // frames of each
+  IngestResult result_;
+  std::vector<uint64_t> hashes_;  // of the photos' pixels
+  std::vector<bool> has_alpha_;
+  std::unordered_map<uint64_t, std::string> file_of_pixels_;
+  std::map<std::string, int> left_;  // by what they are
+  IngestNotices notices_;
+};
+
+}  // namespace
+
+IngestResult IngestPhotos(const std::string& source, const std::string& staging_folder,
+                          const IngestOptions& options, const ProgressFunction& progress) {
+  return Ingest(source, staging_folder, options).Run(progress);
+}
+
+InputFiles InputsOf(const CaptureSource& source) {
+  return ListInputs(source.photos, source.kind == CaptureKind::kPhotos);
+}
+
+int64_t ExpectedPhotos(const InputFiles& inputs, const IngestOptions& options) {
+  const int frames = options.video_frames > 0 ? options.video_frames : kUsualFrames;
+  return inputs.Count(InputKind::kPhoto) + (inputs.Count(InputKind::kClip) > 0 ? frames : 0);
+}
+
+std::string PlannedInputs(const InputFiles& inputs, const IngestOptions& options) {
+  const int clips = inputs.Count(InputKind::kClip);
+  const std::string files = Concat(inputs.files.size() - static_cast<size_t>(clips), " files");
+  if (clips == 0) return files;
+  double seconds = 0;
+  for (const InputFile& input : inputs.files)
+    if (input.kind == InputKind::kClip) seconds += SecondsOfFilm(input.file.path);
+  return (inputs.files.size() > static_cast<size_t>(clips) ? files + " and " : "") +
+         Concat(clips, clips == 1 ? " film" : " films") +
+         Format(" (%.1f s), of which ", seconds) +
+         (options.video_frames > 0 ? std::to_string(options.video_frames)
+                                   : Concat(kLeastFrames, " to ", kMostFrames)) +
+         " frames are picked";
 }
 
 }  // namespace regrade

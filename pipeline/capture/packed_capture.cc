@@ -91,6 +91,25 @@ void CheckScene(const NormalizedScene& scene, const std::string& path) {
                      "pack the capture again");
 }
 
+// Leaves views without points where the file has none.
+void ReadPoints(NpzReader* file, const std::string& path, std::vector<PackedView>* views) {
+  if (!file->Has("points")) return;
+  const NpzArray counts = file->Read("points_of_view", ArrayType::kI32, {std::ssize(*views)});
+  const NpzArray points = file->Read("points", ArrayType::kF32, {-1, 4});
+  const float* at = points.As<float>();
+  int64_t left = points.shape[0];
+  for (size_t v = 0; v < views->size(); ++v) {
+    const int32_t count = counts.As<int32_t>()[v];
+    if (count < 0 || count > left ||
+        !std::all_of(at, at + 4 * count, [](float x) { return std::isfinite(x); }))
+      throw InputError("holds fewer points than its views have, or one that is not finite",
+                       path + ": points", "pack the capture again");
+    left -= count;
+    for (const float* end = at + 4 * count; at < end; at += 4)
+      (*views)[v].points.push_back({{at[0], at[1], at[2]}, at[3]});
+  }
+}
+
 int64_t BytesOf(const Camera& camera) { return int64_t{camera.width} * camera.height * 3; }
 
 }  // namespace
@@ -131,6 +150,16 @@ void WritePackedCapture(const std::string& path, const PackedCapture& capture) {
   if (box.background) file.Add("background", {3}, &box.background->x);
   file.Add("field_from_world", {13}, placement);
   file.Add("ndc", {2}, &capture.scene.ndc.a);
+  std::vector<int32_t> points_of_view;
+  std::vector<SeenPoint> points;
+  for (const PackedView& view : capture.views) {
+    points_of_view.push_back(static_cast<int32_t>(view.points.size()));
+    points.insert(points.end(), view.points.begin(), view.points.end());
+  }
+  static_assert(sizeof(SeenPoint) == 4 * sizeof(float));
+  file.Add("points_of_view", {n}, points_of_view.data());
+  file.Add("points", {std::ssize(points), 4}, reinterpret_cast<const float*>(points.data()),
+           NpzPacking::kDeflate);
   Buffer<uint8_t> style(capture.style.num_pixels() * 3);  // the writer reads it when it writes
   if (style.size() > 0) {
     PackPixels(capture.style, style.data());
@@ -197,6 +226,7 @@ PackedCapture ReadPackedCapture(const std::string& path) {
     at += bytes;
     capture.views.push_back(std::move(view));
   }
+  ReadPoints(&file, path, &capture.views);
   return capture;
 }
 

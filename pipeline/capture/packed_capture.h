@@ -12,14 +12,16 @@
 #include "kernels/scene/camera.h"
 #include "kernels/scene/image.h"
 #include "reconstruct/scene/normalize_scene.h"
+#include "reconstruct/scene/point_observations.h"
 
 namespace regrade {
 
 struct PackedView {
   std::string file;  // the user's name
   bool held_out = false;
-  Camera camera;  // in the field's frame, at the photo's size
-  Image photo;    // [H, W, 3] sRGB
+  Camera camera;                  // in the field's frame, at the photo's size
+  Image photo;                    // [H, W, 3] sRGB
+  std::vector<SeenPoint> points;  // of a fitted view; may be empty
 };
 
 struct PackedCapture {

@@ -6,12 +6,14 @@
 #include <cstdio>
 #include <filesystem>
 #include <latch>
+#include <sstream>
 #include <string>
 #include <system_error>
 #include <thread>
 #include <vector>
 
 #include "kernels/base/error.h"
+#include "pipeline/capture/capture_store.h"
 #include "pipeline/run/resolve_settings.h"
 #include "pipeline/run/run_file.h"
 #include "pipeline/workspace/style_folders.h"
@@ -60,15 +62,16 @@ const std::vector<std::string> kBasicOptions = {
 constexpr int kFewOptions = 20;  // of a command with so few all are shown
 
 void PrintHelp(const Command& command, const Arguments& arguments, const OptionSet& options) {
+  const std::vector<std::string> required = RequiredOptions(command.usage);
   if (HasFlag(arguments, kHelpMan)) {
-    std::printf("%s", options.ManPage().c_str());
+    std::printf("%s", options.ManPage(required).c_str());
   } else if (HasFlag(arguments, kHelpWords)) {
     std::printf("%s", options.CompletionWords().c_str());
   } else {
     std::printf("regrade %s %s\n%s\n", command.name, command.usage, command.summary);
     const bool all = HasFlag(arguments, "--help-all") || options.count() <= kFewOptions;
     std::printf("%s%s", all ? "" : "\n",
-                options.Help(all ? Arguments() : kBasicOptions).c_str());
+                options.Help(required, all ? Arguments() : kBasicOptions).c_str());
     if (!all)
       std::printf("\nregrade %s --help-all lists all %d options.\n", command.name,
                   options.count());
@@ -89,6 +92,18 @@ void CheckWords(const Command& command, const Arguments& words, size_t least, si
                                         : "one argument too many: '" + words[most] + "'",
                    std::string("regrade ") + command.name,
                    std::string("usage: regrade ") + command.name + " " + command.usage);
+}
+
+std::vector<std::string> RequiredOptions(const std::string& usage) {
+  std::vector<std::string> names;
+  std::istringstream words(usage);
+  bool in_brackets = false;
+  for (std::string word; words >> word && word != "|";) {
+    in_brackets = in_brackets || word.starts_with('[');
+    if (!in_brackets && word.starts_with("--")) names.push_back(word.substr(2));
+    if (word.ends_with(']')) in_brackets = false;
+  }
+  return names;
 }
 
 std::optional<Prepared> Prepare(const Command& command, const Arguments& arguments,
@@ -130,6 +145,14 @@ std::optional<Prepared> Prepare(const Command& command, const Arguments& argumen
 
 void RequireValue(const std::string& value, const char* flag, const char* hint) {
   if (value.empty()) throw UsageError("its value is missing", flag, hint);
+}
+
+Capture ReadPosedCapture(const std::string& folder) {
+  const std::string poses = folder + "/poses";
+  if (!std::filesystem::exists(poses + "/photos.json"))
+    throw InputError("has no poses", folder,
+                     "run `regrade pose PHOTOS --out " + folder + "` first");
+  return ReadCapture(poses);
 }
 
 std::string AbsolutePath(const std::string& path) {

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "kernels/scene/capture.h"
 #include "pipeline/program/console.h"
 #include "pipeline/program/option_binding.h"
 #include "pipeline/program/run_options.h"
@@ -21,6 +22,10 @@ struct Command {
 };
 
 const std::vector<Command>& AllCommands();
+
+// Names of the options that a usage demands: those before an alternative (" | ") and outside
+// brackets.
+std::vector<std::string> RequiredOptions(const std::string& usage);
 
 // What Prepare is to read.
 struct Preparation {
@@ -58,6 +63,9 @@ void CheckWords(const Command& command, const Arguments& words, size_t least, si
 
 // Throws Error(kUsage) for an empty value of a flag that must have one.
 void RequireValue(const std::string& value, const char* flag, const char* hint);
+
+// The poses and photos of an output folder. Throws Error(kInput) if it has none.
+Capture ReadPosedCapture(const std::string& folder);
 
 // Without links resolved. Throws Error(kResources) if the current folder does not exist.
 std::string AbsolutePath(const std::string& path);

@@ -27,7 +27,8 @@ const std::vector<Command>& AllCommands() {
       {"synth", "OUT [OPTIONS]", "writes a synthetic capture with its exact ground truth",
        RunSynth},
       {"export", "DIR --out FOLDER [OPTIONS]",
-       "writes poses, fields or points for other programs: COLMAP, transforms.json, svox2, PLY",
+       "writes photos and poses for COLMAP, nerfstudio and instant-ngp, or fields for svox2 or "
+       "as points",
        RunExport},
       {"pack", "DIR --out FILE [OPTIONS]",
        "writes a posed capture as one file, for regrade_gpu on a bare GPU machine", RunPack},

@@ -9,7 +9,6 @@
 #include "kernels/base/error.h"
 #include "kernels/field/cpu/render_view.h"
 #include "kernels/field/packed_grid.h"
-#include "pipeline/capture/capture_store.h"
 #include "pipeline/capture/transforms_json.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/commands/command.h"
@@ -75,6 +74,25 @@ void WritePoses(const ExportOptions& options, const std::string& folder,
     WriteColmapModel(model, options.out + "/sparse");
   else
     WriteColmapText(model, options.out + "/sparse");
+}
+
+void ExportCapture(const ExportOptions& options, const std::string& folder, Console* console) {
+  const Capture capture = ReadPosedCapture(folder);
+  if (options.dry_run) {
+    console->Info(Concat(capture.views.size(), " photos and their poses would be written to ",
+                         options.out));
+    return;
+  }
+  MakeEmptyFolder(options.out, "images");
+  for (const CaptureView& view : capture.views) {
+    const std::string to = options.out + "/images/" + view.name;
+    std::error_code error;
+    fs::copy_file(view.path, to, error);
+    if (error) throw ResourceError(error.message(), to);
+  }
+  WritePoses(options, folder, capture);
+  console->Info(
+      Concat("wrote ", capture.views.size(), " photos and their poses to ", options.out));
 }
 
 constexpr int kComparedViews = 3;
@@ -181,27 +199,10 @@ void RunExport(const Command& command, const Arguments& arguments, Console* cons
   if (!prepared) return;
   const std::string& folder = prepared->words[0];
   RequireValue(settings.out, "--out", "name the folder to write");
-  if (settings.format == "svox2" || settings.format == "ply")
-    return ExportFields(settings, folder, console);
-  if (settings.resolution != 0) throw UsageError("is of --format svox2 only", "--resolution");
-  if (!fs::exists(folder + "/poses/photos.json"))
-    throw InputError("has no poses", folder,
-                     "run `regrade pose PHOTOS --out " + folder + "` first");
-  const Capture capture = ReadCapture(folder + "/poses");
-  if (settings.dry_run) {
-    console->Info(Concat(capture.views.size(), " photos and their poses would be written to ",
-                         settings.out));
-    return;
-  }
-  MakeEmptyFolder(settings.out, "images");
-  for (const CaptureView& view : capture.views) {
-    std::error_code error;
-    fs::copy_file(view.path, settings.out + "/images/" + view.name, error);
-    if (error) throw ResourceError(error.message(), settings.out + "/images/" + view.name);
-  }
-  WritePoses(settings, folder, capture);
-  console->Info(
-      Concat("wrote ", capture.views.size(), " photos and their poses to ", settings.out));
+  const bool fields = settings.format == "svox2" || settings.format == "ply";
+  if (settings.resolution != 0 && settings.format != "svox2")
+    throw UsageError("is of --format svox2 only", "--resolution");
+  fields ? ExportFields(settings, folder, console) : ExportCapture(settings, folder, console);
 }
 
 }  // namespace regrade

@@ -4,7 +4,6 @@
 
 #include "kernels/base/error.h"
 #include "kernels/image/resize.h"
-#include "pipeline/capture/capture_store.h"
 #include "pipeline/capture/packed_capture.h"
 #include "pipeline/capture/scene_profile.h"
 #include "pipeline/capture/working_views.h"
@@ -43,10 +42,7 @@ void RunPack(const Command& command, const Arguments& arguments, Console* consol
   if (!prepared) return;
   const std::string& folder = prepared->words[0];
   RequireValue(run.out, "--out", "name the .npz file to write");
-  if (!std::filesystem::exists(folder + "/poses/photos.json"))
-    throw InputError("has no poses", folder,
-                     "run `regrade pose CAPTURE --out " + folder + "` first");
-  const Capture capture = ReadCapture(folder + "/poses");
+  const Capture capture = ReadPosedCapture(folder);
   const WorkingViews as_taken(capture, scene.photo_size, run.holdout);
   for (int i = 0; i < as_taken.count(); ++i)
     if (!as_taken.Mask(i).empty())
@@ -63,6 +59,13 @@ void RunPack(const Command& command, const Arguments& arguments, Console* consol
   for (int i = 0; i < views.count(); ++i)
     packed.views.push_back({views.View(i).file, IsHeldOut(static_cast<size_t>(i), run.holdout),
                             views.CameraOf(i), views.Photo(i)});
+  std::vector<int> fitted;
+  for (int i = 0; i < views.count(); ++i)
+    if (!packed.views[static_cast<size_t>(i)].held_out) fitted.push_back(i);
+  std::vector<std::vector<SeenPoint>> seen =
+      PointsSeenBy(capture, fitted, packed.scene.field_from_world);
+  for (size_t i = 0; i < fitted.size(); ++i)
+    packed.views[static_cast<size_t>(fitted[i])].points = std::move(seen[i]);
   WritePackedCapture(run.out, packed);
   console->Info(Concat("wrote ", run.out, ": ", packed.views.size(), " views, ",
                        std::filesystem::file_size(run.out) >> 20, " MiB"));

@@ -5,6 +5,7 @@
 
 #include "kernels/base/error.h"
 #include "pipeline/capture/capture_store.h"
+#include "pipeline/capture/ingest_photos.h"
 #include "pipeline/commands/command.h"
 #include "pipeline/commands/probe_styles.h"
 #include "pipeline/program/device_choice.h"
@@ -21,7 +22,8 @@ namespace {
 // Checks all inputs before long work starts.
 void ProbeInputs(const std::string& command, RunContext* context) {
   if (!std::filesystem::exists(context->source))
-    throw InputError("there is no such folder", context->source, "name a folder of photos");
+    throw InputError("there is no such folder or film", context->source,
+                     "name a folder of photos, or a film");
   const std::filesystem::path out =
       std::filesystem::weakly_canonical(context->settings.run.out);
   const bool posed = DetectCapture(context->source).kind == CaptureKind::kPosed;
@@ -47,7 +49,8 @@ void PrintPlan(const std::string& command, RunContext* context) {
                          pose.plan);
   if (command == "pose") return;
   const int threads = omp_get_max_threads();
-  const int64_t photos = static_cast<int64_t>(pose.inputs.At("photos").AsObject().size());
+  const int64_t photos =
+      ExpectedPhotos(InputsOf(DetectCapture(context->source)), settings.ingest);
   const int64_t side = settings.scene.photo_size;
   context->console->Info(
       "reconstruct: " +

@@ -49,12 +49,14 @@ HeldOut MeasureHeldOut(FitEngine* engine, const PackedCapture& capture,
 
 }  // namespace
 
-void FitPacked(const FitPackedOptions& settings, const FitOptions& options) {
+void FitPacked(const FitPackedOptions& settings, const FitOptions& asked) {
   const double start = ClockSeconds();
   const PackedCapture capture = ReadPackedCapture(settings.capture);
+  FitOptions options = asked;
+  options.ChooseField(capture.scene.ndc.on());
   std::vector<TrainingView> views;
   for (const PackedView& view : capture.views)
-    if (!view.held_out) views.push_back({view.camera, &view.photo});
+    if (!view.held_out) views.push_back({view.camera, &view.photo, view.points});
   const double read_seconds = ClockSeconds() - start;
   const double fit_start = ClockSeconds();
   const Backend backend = settings.device == "cpu" ? Backend::kCpu : Backend::kCuda;

@@ -6,6 +6,7 @@
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <limits>
@@ -16,6 +17,8 @@
 #include "kernels/base/error.h"
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/files/text.h"
+#include "pipeline/images/color_profile.h"
+#include "pipeline/images/heif_decoder.h"
 #include "pipeline/images/image_format.h"
 #include "pipeline/images/jpeg_decoder.h"
 #include "pipeline/images/normalize_photo.h"
@@ -69,17 +72,12 @@ void TakeMetadata(const OIIO::ImageSpec& spec, StoredPicture* picture) {
       spec.get_float_attribute("Exif:FocalPlaneXResolution") / unit_mm;
 }
 
-void NoteProfile(std::string_view profile, StoredPicture* picture) {
-  if (profile.empty()) return;
-  OIIO::ImageSpec spec;
-  std::string error;
-  OIIO::decode_icc_profile(
-      OIIO::cspan<uint8_t>(reinterpret_cast<const uint8_t*>(profile.data()), profile.size()),
-      spec, error);
-  const std::string name = spec.get_string_attribute("ICCProfile:profile_description");
-  if (name.find("sRGB") != std::string::npos) return;
-  picture->notices.push_back("the colour profile" + (name.empty() ? "" : " \"" + name + "\"") +
-                             " is not applied: colours are taken as sRGB");
+// Cameras set to Adobe RGB embed no profile: their EXIF block has the entry "R03" of the
+// interoperability index (DCF 2.0), which OpenImageIO passes over.
+bool MarksAdobeRgb(std::string_view exif) {
+  using namespace std::string_view_literals;
+  return exif.find("\1\0\2\0\4\0\0\0R03\0"sv) != exif.npos ||
+         exif.find("\0\1\0\2\0\0\0\4R03\0"sv) != exif.npos;
 }
 
 StoredPicture ReadJpeg(std::string_view bytes, const std::string& where,
@@ -104,7 +102,7 @@ StoredPicture ReadJpeg(std::string_view bytes, const std::string& where,
     picture.notices.push_back(
         "CMYK was converted without its profile: colours are approximate");
   else
-    NoteProfile(jpeg.icc, &picture);
+    picture.icc = jpeg.icc.empty() && MarksAdobeRgb(jpeg.exif) ? AdobeRgbProfile() : jpeg.icc;
   return picture;
 }
 
@@ -120,11 +118,31 @@ StoredPicture ReadPng(std::string_view bytes, const std::string& where,
   OIIO::ImageSpec spec;
   if (!png.exif.empty()) OIIO::decode_exif(OIIO::string_view(png.exif), spec);
   TakeMetadata(spec, &picture);
-  NoteProfile(png.icc, &picture);
+  picture.icc = png.icc;
   if (png.remarks > 0)
     picture.notices.push_back(Concat("an odd PNG (", png.remarks,
                                      (png.remarks == 1 ? " remark: " : " remarks, first: "),
                                      png.first_remark, ")"));
+  return picture;
+}
+
+StoredPicture ReadHeif(std::string_view bytes, const std::string& where,
+                       const DecodeLimits& limits) {
+  HeifPicture heif = DecodeHeif(bytes, where, [&](int64_t w, int64_t h, int64_t pixel_bytes) {
+    CheckSize(w, h, pixel_bytes, std::ssize(bytes), limits, where);
+  });
+  StoredPicture picture;
+  picture.image = std::move(heif.image);
+  picture.bits = heif.bits;
+  picture.premultiplied = heif.premultiplied;
+  picture.icc = std::move(heif.icc);
+  picture.primaries = heif.primaries;
+  picture.transfer = heif.transfer;
+  OIIO::ImageSpec spec;
+  if (!heif.exif.empty()) OIIO::decode_exif(OIIO::string_view(heif.exif), spec);
+  TakeMetadata(spec, &picture);
+  picture.orientation = 1;  // libheif has turned the picture; EXIF repeats the turn
+  if (heif.pictures > 1) picture.notices.push_back("only the first picture of several is used");
   return picture;
 }
 
@@ -167,6 +185,11 @@ StoredPicture ReadWithOiio(const ImageFormat& format, std::string_view bytes,
   }
   OIIO::ImageSpec spec, config;
   config["oiio:UnassociatedAlpha"] = 1;
+  // Camera raw: the same development for every photo.
+  config["raw:ColorSpace"] = "sRGB";
+  config["raw:use_camera_wb"] = 1;
+  config["raw:auto_bright"] = 0;
+  config["raw:adjust_maximum_thr"] = 0.f;
   OIIO::Filesystem::IOMemReader memory(bytes.data(), bytes.size());
   if (format.from_memory) input->set_ioproxy(&memory);
   if (!input->open(path, spec, config)) refuse(input->geterror());
@@ -191,9 +214,12 @@ StoredPicture ReadWithOiio(const ImageFormat& format, std::string_view bytes,
   picture.linear_light = OIIO::Strutil::iequals(space, "linear");
   picture.premultiplied = spec.get_int_attribute("oiio:UnassociatedAlpha") == 0;
   if (const OIIO::ParamValue* profile = spec.find_attribute("ICCProfile"))
-    NoteProfile(
-        {static_cast<const char*>(profile->data()), static_cast<size_t>(profile->datasize())},
-        &picture);
+    picture.icc.assign(static_cast<const char*>(profile->data()),
+                       static_cast<size_t>(profile->datasize()));
+  std::array<float, 8> chromaticities;
+  if (spec.getattribute("chromaticities", OIIO::TypeDesc(OIIO::TypeDesc::FLOAT, 8),
+                        chromaticities.data()))
+    picture.chromaticities = chromaticities;
   if (input->seek_subimage(1, 0))
     picture.notices.push_back("only the first picture of several is used");
   return picture;
@@ -214,9 +240,10 @@ StoredPicture ReadStored(const std::string& path, const DecodeLimits& limits) {
   // OpenImageIO's GIF decoder allocates the picture when it opens the file.
   if (decoder == "gif" && bytes.size() >= 10)
     CheckSize(Little16(bytes, 6), Little16(bytes, 8), 1, std::ssize(bytes), limits, path);
-  StoredPicture picture = decoder == "jpeg"  ? ReadJpeg(bytes, path, limits)
-                          : decoder == "png" ? ReadPng(bytes, path, limits)
-                                             : ReadWithOiio(*format, bytes, path, limits);
+  StoredPicture picture = decoder == "jpeg"   ? ReadJpeg(bytes, path, limits)
+                          : decoder == "png"  ? ReadPng(bytes, path, limits)
+                          : decoder == "heif" ? ReadHeif(bytes, path, limits)
+                                              : ReadWithOiio(*format, bytes, path, limits);
   ApplyPhotoRules(&picture, path);
   return picture;
 }
@@ -266,6 +293,8 @@ DecodedPhoto DecodePhoto(const std::string& path, const DecodeLimits& limits) {
   photo.exif_focal_px = FocalInPixels(stored);
   photo.bits = stored.bits;
   photo.notice = Join(stored.notices, "; ");
+  photo.colors = stored.colors;
+  photo.clipped = stored.clipped;
   photo.image = ReplicateGrey(stored.image);
   return photo;
 }
@@ -278,6 +307,8 @@ Image ReadStylePicture(const std::string& path, std::string* notice) {
   StoredPicture stored = ReadStored(path, {.min_side = 1});
   if (stored.image.channels == 4)
     stored.notices.push_back("its transparent parts are laid over white");
+  if (const std::string colors = ColorNotice(stored.colors, stored.clipped); !colors.empty())
+    stored.notices.push_back(colors);
   if (notice) *notice = Join(stored.notices, "; ");
   return CompositeOnWhite(ReplicateGrey(stored.image));
 }

@@ -1,6 +1,7 @@
 // Reads and writes picture files. Readers return a whole picture or throw the reason why there
-// is none; writers encode in memory and write atomically. JPEG and PNG have decoders of our own
-// over libjpeg and libpng, because OpenImageIO hides their warnings.
+// is none; writers encode in memory and write atomically. JPEG, PNG and HEIC have decoders of
+// our own over libjpeg, libpng and libheif, because OpenImageIO hides their warnings and
+// profiles.
 #pragma once
 
 #include <cstdint>
@@ -21,14 +22,19 @@ struct DecodedPhoto {
   double exif_focal_px = 0;  // focal length in pixels from EXIF; 0 where unknown
   int bits = 8;              // per value in the file; 32 means floating point
   std::string notice;        // remarks for the user; empty if none
+  // Of the conversion to sRGB (normalize_photo.h), apart from the notice, because many photos
+  // share them.
+  std::string colors;
+  double clipped = 0;
 };
 
 // Decodes a photo; its content decides the format, not its name. Throws Error(kInput) for what
 // is not a whole picture: not a regular file (named pipes are never opened), not an image,
 // damaged, too large, too small, an undecodable format (with a remedy), NaN, alpha 0
 // everywhere. Grey is replicated to 3 channels, EXIF orientation is applied, linear light
-// (OpenEXR, HDR) is encoded, CMYK is converted without its profile (notice), other colour
-// profiles are named but not applied (notice).
+// (OpenEXR, HDR) is encoded, colours of a profile or of known primaries are converted to sRGB,
+// CMYK is converted without its profile (notice). Camera raw is developed to sRGB with the
+// camera's white balance and no automatic brightness.
 DecodedPhoto DecodePhoto(const std::string& path, const DecodeLimits& limits = {});
 
 // A picture of any size; 1, 3 or 4 channels as in the file.

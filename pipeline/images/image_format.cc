@@ -11,11 +11,13 @@ constexpr char kConvert[] = "convert it to JPEG (or 16-bit TIFF) first";
 
 const ImageFormat kJpeg = {"JPEG", "jpeg"};
 const ImageFormat kTiff = {"TIFF", "tiff"};
-const ImageFormat kHeic = {"HEIC", "heif", false, kConvert};
-const ImageFormat kAvif = {"AVIF", "heif", false, kConvert};
+const ImageFormat kHeic = {"HEIC", "heif", true, kConvert};
+const ImageFormat kAvif = {"AVIF", "heif", true, kConvert};
 const ImageFormat kRaw = {"camera raw", "raw", false, kConvert};
 const ImageFormat kJpegXl = {"JPEG XL", "", true, kConvert};
-const ImageFormat kVideo = {"video", "", true, "extract its frames as pictures first"};
+const ImageFormat kVideo = {"video", "", true,
+                            "give the film, or a folder with it, to `regrade run`, which "
+                            "picks frames; elsewhere extract one as a picture"};
 
 struct Signature {
   std::string_view bytes;
@@ -49,10 +51,24 @@ const Signature kSignatures[] = {
     {"IIU\0"sv, 0, kRaw},
     {"\x1a\x45\xdf\xa3"sv, 0, kVideo},
     {"AVI "sv, 8, kVideo},
+    {"moov"sv, 4, kVideo},  // QuickTime of older cameras begins without a brand
+    {"mdat"sv, 4, kVideo},
+    {"wide"sv, 4, kVideo},
+    {"\0\0\x01\xba"sv, 0, kVideo},  // MPEG program stream
 };
 
 bool HasAt(std::string_view bytes, size_t offset, std::string_view what) {
   return bytes.size() >= offset + what.size() && bytes.substr(offset, what.size()) == what;
+}
+
+// MPEG transport streams have packets of 188 bytes, on discs with 4 bytes before each.
+bool IsTransportStream(std::string_view bytes) {
+  for (const size_t before : {0, 4}) {
+    bool all = true;
+    for (size_t i = 0; i < 4; ++i) all = all && HasAt(bytes, before + i * (188 + before), "G");
+    if (all) return true;
+  }
+  return false;
 }
 
 // Camera makers' raw formats are TIFF files whose first picture is a thumbnail: reading them as
@@ -103,7 +119,12 @@ const ImageFormat* SniffImageFormat(std::string_view bytes, const std::string& p
   if (HasAt(bytes, 4, "ftyp") && bytes.size() >= 12) return SniffBrand(bytes);
   for (const Signature& signature : kSignatures)
     if (HasAt(bytes, signature.offset, signature.bytes)) return &signature.format;
-  return nullptr;
+  return IsTransportStream(bytes) ? &kVideo : nullptr;
+}
+
+bool IsVideo(const ImageFormat& format) { return format.name == std::string_view("video"); }
+bool IsCameraRaw(const ImageFormat& format) {
+  return format.decoder == std::string_view("raw");
 }
 
 }  // namespace regrade

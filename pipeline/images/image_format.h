@@ -18,4 +18,8 @@ struct ImageFormat {
 // extension of `path` matters only for camera raw files that look like TIFF.
 const ImageFormat* SniffImageFormat(std::string_view bytes, const std::string& path);
 
+// A film (video_reader.h); it has no decoder as a picture.
+bool IsVideo(const ImageFormat& format);
+bool IsCameraRaw(const ImageFormat& format);
+
 }  // namespace regrade

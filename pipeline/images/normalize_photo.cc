@@ -5,9 +5,13 @@
 
 #include "kernels/base/error.h"
 #include "kernels/scene/srgb.h"
+#include "pipeline/images/color_profile.h"
 
 namespace regrade {
 namespace {
+
+// Conversions leave white and black this far outside.
+constexpr float kRounding = 1e-4f;
 
 void CheckFinite(const Image& image, const std::string& where) {
   const int64_t bad =
@@ -35,17 +39,34 @@ void EncodeSrgb(Image* image) {
     }
 }
 
+// To sRGB's primaries in linear light, by what the file says of its colours: a profile, or
+// else code points or chromaticities.
+void ConvertColors(StoredPicture* picture) {
+  Image* const image = &picture->image;
+  std::string problem;
+  if (!picture->icc.empty()) {
+    picture->colors = LinearizeByProfile(picture->icc, image, &problem);
+    if (!problem.empty()) picture->notices.push_back(problem);
+  }
+  if (picture->icc.empty() || !problem.empty()) {
+    if (picture->linear_light) {
+      if (picture->chromaticities)
+        picture->colors = LinearizeByPrimaries(*picture->chromaticities, image);
+      if (picture->colors.empty()) picture->colors = "linear light";
+    } else {
+      picture->colors = LinearizeByCicp(picture->primaries, picture->transfer, image);
+    }
+  }
+  if (!picture->colors.empty()) EncodeSrgb(image);
+}
+
 void Clamp(StoredPicture* picture) {
   int64_t clamped = 0;
-  for (float& v : picture->image.pixels)
-    if (v < 0 || v > 1) {
-      v = std::clamp(v, 0.f, 1.f);
-      ++clamped;
-    }
-  if (clamped == 0) return;
-  picture->notices.push_back(
-      Format("%.3g %% of the values were outside [0, 1] and were clamped",
-             100.0 * static_cast<double>(clamped) / picture->image.pixels.size()));
+  for (float& v : picture->image.pixels) {
+    if (!(v >= -kRounding && v <= 1 + kRounding)) ++clamped;
+    v = v > 0 ? std::min(v, 1.f) : 0;  // an odd profile makes NaN
+  }
+  picture->clipped = static_cast<double>(clamped) / picture->image.pixels.size();
 }
 
 void CheckAlpha(const Image& image, const std::string& where) {
@@ -62,13 +83,19 @@ void ApplyPhotoRules(StoredPicture* picture, const std::string& where) {
   const bool alpha = image.channels == 4;
   if (picture->bits == 32) CheckFinite(image, where);
   if (alpha && picture->premultiplied) Unpremultiply(&image);
-  if (picture->linear_light) {
-    EncodeSrgb(&image);
-    picture->notices.push_back("linear light was encoded as sRGB");
-  }
+  ConvertColors(picture);
   Clamp(picture);
   if (alpha) CheckAlpha(image, where);
   if (picture->orientation != 1) image = Upright(image, picture->orientation);
+}
+
+std::string ColorNotice(const std::string& colors, double clipped) {
+  std::string text;
+  if (!colors.empty()) text = "colours were converted from " + colors + " to sRGB";
+  if (clipped > 0)
+    text += Format("%s%.3g %% of the values were outside [0, 1] and were clamped",
+                   text.empty() ? "" : "; ", 100 * clipped);
+  return text;
 }
 
 Image Upright(const Image& stored, int orientation) {

@@ -18,51 +18,17 @@ extern "C" {
 
 #include "kernels/base/error.h"
 #include "pipeline/files/atomic_file.h"
+#include "pipeline/images/ffmpeg_pointers.h"
 #include "pipeline/images/normalize_photo.h"
+#include "pipeline/images/video_reader.h"
 
 namespace regrade {
 namespace {
 
+using namespace ffmpeg;  // NOLINT: owners of its objects
+
 // x264's output depends on the number of threads: a fixed one gives the same film anywhere.
 constexpr int kEncoderThreads = 4;
-
-// A deleter for FFmpeg's functions that take a pointer to the pointer.
-template <auto Function>
-struct Free {
-  template <typename T>
-  void operator()(T* pointer) const {
-    Function(&pointer);
-  }
-};
-using Packet = std::unique_ptr<AVPacket, Free<av_packet_free>>;
-using Frame = std::unique_ptr<AVFrame, Free<av_frame_free>>;
-using Codec = std::unique_ptr<AVCodecContext, Free<avcodec_free_context>>;
-using Input = std::unique_ptr<AVFormatContext, Free<avformat_close_input>>;
-
-struct OutputCloser {
-  void operator()(AVFormatContext* output) const {
-    avio_closep(&output->pb);
-    avformat_free_context(output);
-  }
-};
-struct ScalerFree {
-  void operator()(SwsContext* scaler) const { sws_freeContext(scaler); }
-};
-
-template <typename T>
-T* Allocated(T* pointer) {
-  if (pointer == nullptr) throw std::bad_alloc();
-  return pointer;
-}
-
-std::string ErrorText(int code) {
-  char text[AV_ERROR_MAX_STRING_SIZE] = "";
-  av_strerror(code, text, sizeof text);
-  return text;
-}
-
-// FFmpeg takes what stands before a colon for a protocol.
-std::string Url(const std::string& path) { return "file:" + path; }
 
 uint8_t Byte(float value) {  // as in our PNG files
   return value > 0 ? static_cast<uint8_t>(std::min(value, 1.f) * 255.f + 0.5f) : 0;
@@ -75,10 +41,10 @@ struct VideoWriter::State {
   int width, height;         // of the frames
   int64_t frames = 0;        // given to the encoder
   std::vector<uint8_t> rgb;  // a frame at the even size
-  std::unique_ptr<AVFormatContext, OutputCloser> output;
+  Output output;
   AVStream* stream = nullptr;
   Codec encoder;
-  std::unique_ptr<SwsContext, ScalerFree> scaler;
+  Scaler scaler;
   Frame yuv{Allocated(av_frame_alloc())};
   Packet packet{Allocated(av_packet_alloc())};
 
@@ -225,34 +191,6 @@ void VideoWriter::Finish() {
         "check the disk, then run the same command again");
   RenameDurably(s.temporary, s.path);
   s.temporary.clear();
-}
-
-int CountVideoFrames(const std::string& path) {
-  av_log_set_level(AV_LOG_QUIET);
-  AVFormatContext* opened = nullptr;
-  if (avformat_open_input(&opened, Url(path).c_str(), nullptr, nullptr) < 0) return -1;
-  const Input input(opened);
-  const AVCodec* codec = nullptr;
-  if (avformat_find_stream_info(opened, nullptr) < 0) return -1;
-  const int index = av_find_best_stream(opened, AVMEDIA_TYPE_VIDEO, -1, -1, &codec, 0);
-  if (index < 0 || codec == nullptr) return -1;
-  const Codec decoder(Allocated(avcodec_alloc_context3(codec)));
-  if (avcodec_parameters_to_context(decoder.get(), opened->streams[index]->codecpar) < 0 ||
-      avcodec_open2(decoder.get(), codec, nullptr) < 0)
-    return -1;
-  const Packet packet(Allocated(av_packet_alloc()));
-  const Frame frame(Allocated(av_frame_alloc()));
-  int frames = 0;
-  const auto decode = [&](const AVPacket* bytes) {
-    if (avcodec_send_packet(decoder.get(), bytes) < 0) return;
-    while (avcodec_receive_frame(decoder.get(), frame.get()) >= 0) ++frames;
-  };
-  while (av_read_frame(opened, packet.get()) >= 0) {
-    if (packet->stream_index == index) decode(packet.get());
-    av_packet_unref(packet.get());
-  }
-  decode(nullptr);
-  return frames;
 }
 
 }  // namespace regrade

@@ -37,7 +37,4 @@ class VideoWriter {
   std::unique_ptr<State> state_;
 };
 
-// Number of frames that decode, or -1 if the file cannot be opened as a video.
-int CountVideoFrames(const std::string& path);
-
 }  // namespace regrade

@@ -274,26 +274,31 @@ JsonValue OptionSet::Values() const {
   return values;
 }
 
-OptionSet::Description OptionSet::Describe(const Entry& entry) {
+OptionSet::Description OptionSet::Describe(const Entry& entry,
+                                            const Texts& required) {
   const bool is_switch = std::holds_alternative<bool*>(entry.target);
   const bool is_text = std::holds_alternative<std::string*>(entry.target) || IsTextList(entry);
+  const char* choices = entry.info.choices + (*entry.info.choices == '|' ? 1 : 0);
   Description description;
   if (!is_switch)
-    description.value = *entry.info.choices ? entry.info.choices : is_text ? "TEXT" : "N";
+    description.value = *choices ? choices : is_text ? "TEXT" : "N";
   std::string facts;
   if (!is_switch && *entry.info.unit) facts += std::string(entry.info.unit) + ", ";
   if (!is_switch && !is_text &&
       (std::isfinite(entry.info.min) || std::isfinite(entry.info.max)))
     facts += BoundsText(entry.info) + ", ";
   const std::string value = FlagText(ValueOf(entry));
-  facts += "default " + (is_switch       ? (value == "true" ? "on" : "off")
-                         : value.empty() ? "none"
-                                         : value);
+  if (std::ranges::find(required, entry.name) != required.end())
+    facts += "required";
+  else
+    facts += "default " + (is_switch       ? (value == "true" ? "on" : "off")
+                           : value.empty() ? "none"
+                                           : value);
   description.sentence = std::string(entry.info.help) + " (" + facts + ")";
   return description;
 }
 
-std::string OptionSet::Help(const std::vector<std::string>& only) const {
+std::string OptionSet::Help(const Texts& required, const Texts& only) const {
   std::string text, heading;
   for (const Entry& entry : entries_) {
     const bool shown = only.empty() || std::ranges::find(only, entry.name) != only.end();
@@ -301,7 +306,7 @@ std::string OptionSet::Help(const std::vector<std::string>& only) const {
     if (only.empty() && (entry.heading != heading || text.empty()))
       text += "\n" + entry.heading + ":\n";
     heading = entry.heading;
-    const Description description = Describe(entry);
+    const Description description = Describe(entry, required);
     std::string head = "  --" + entry.name;
     if (!description.value.empty()) head += " " + description.value;
     constexpr size_t kIndent = 28, kWidth = 96;
@@ -316,7 +321,7 @@ std::string OptionSet::Help(const std::vector<std::string>& only) const {
   return text;
 }
 
-std::string OptionSet::ManPage() const {
+std::string OptionSet::ManPage(const Texts& required) const {
   std::string text, heading;
   // A dash that is typed, and a line that is no request.
   const auto escaped = [](const std::string& plain) {
@@ -328,7 +333,7 @@ std::string OptionSet::ManPage() const {
   for (const Entry& entry : entries_) {
     if (entry.heading != heading) text += ".PP\n" + entry.heading + ":\n";
     heading = entry.heading;
-    const Description description = Describe(entry);
+    const Description description = Describe(entry, required);
     text += ".TP\n.B " + escaped("--" + entry.name);
     if (!description.value.empty()) text += " \\fI" + escaped(description.value) + "\\fR";
     text += "\n\\&" + escaped(description.sentence) + "\n";

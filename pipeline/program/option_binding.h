@@ -15,6 +15,8 @@ namespace regrade {
 
 class OptionSet {
  public:
+  using Texts = std::vector<std::string>;
+
   // `options` must outlive the set. `heading` is that of its part of the help, and nothing
   // else. Flag names must be unique within the set (checked).
   template <typename T>
@@ -43,10 +45,10 @@ class OptionSet {
   JsonValue Values() const;
 
   // Names, units, effects, defaults and bounds, of the options named in `only`, or of all. Call
-  // before flags are applied.
-  std::string Help(const std::vector<std::string>& only = {}) const;
+  // before flags are applied. `required`: names of options that the command demands.
+  std::string Help(const Texts& required = {}, const Texts& only = {}) const;
   // The same of all as the body of a section of a man page.
-  std::string ManPage() const;
+  std::string ManPage(const Texts& required = {}) const;
   // For completion: a line for each option, "--name" and its choices.
   std::string CompletionWords() const;
   int count() const { return static_cast<int>(entries_.size()); }
@@ -75,7 +77,7 @@ class OptionSet {
   struct Description {
     std::string value, sentence;
   };
-  static Description Describe(const Entry& entry);
+  static Description Describe(const Entry& entry, const Texts& required);
 
   void AddEntry(Entry entry);
   const Entry* Find(const std::string& name) const;

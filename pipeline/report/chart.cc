@@ -55,7 +55,7 @@ std::string ConsistencyChart(const EvaluationMetrics& metrics, bool film) {
   const std::string pairs =
       gap == 1 ? "consecutive frames" : "frames " + std::to_string(gap) + " apart";
   plot.note = "TC-PSNR of " + pairs + (film ? " of the film" : " at the photos' positions") +
-              ", in dB; higher is steadier.";
+              ", in dB; higher is more consistent.";
   return PlotHtml(plot);
 }
 

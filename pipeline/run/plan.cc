@@ -19,6 +19,24 @@ constexpr double kWeightBytes = 4;       // of a voxel, in each thread
 // Rates are for two threads.
 double SecondsWith(double seconds, int threads) { return seconds * 2 / std::max(threads, 1); }
 
+constexpr double kCellBytes = 45, kStatisticBytes = 24;
+constexpr int kStatisticThreads = 4;
+
+// Cells of an adaptive field at a stage's end, and voxels of a uniform one.
+struct StageSize {
+  double cells = 0, voxels = 0, vertices_of_grid = 0;
+};
+StageSize SizeOf(const FitOptions& options, const SceneBox& box, size_t stage) {
+  const Vec3i n = ResolutionFor(box, options.resolutions[stage]);
+  const double all = static_cast<double>(n.x) * n.y * n.z;
+  if (!options.adaptive()) return {0, all * (stage == 0 ? 1 : kStoredFraction), all};
+  const double longest = options.resolutions[stage];
+  const double cells = stage == 0 ? all
+                                  : std::min({all, kCellsOfSquare * longest * longest,
+                                              double{options.max_cells} * 1e6});
+  return {cells, cells * kVerticesOfCell, 0};
+}
+
 std::string MemoryText(double bytes) {
   return bytes < 1e8 ? Format("%.0f MB", bytes * 1e-6) : Format("%.1f GB", bytes * 1e-9);
 }
@@ -31,13 +49,13 @@ StagePlan PlanFit(const FitOptions& options, int64_t photo_pixels, const SceneBo
   const int arenas = options.shards > 0 ? options.shards : std::max(threads, 1);
   double field = 0, seconds = 0;
   for (size_t s = 0; s < options.resolutions.size(); ++s) {
-    const Vec3i n = ResolutionFor(box, options.resolutions[s]);
-    const double vertices = static_cast<double>(n.x) * n.y * n.z;
-    const double voxels = vertices * (s == 0 ? 1 : kStoredFraction);
+    const auto [cells, voxels, vertices] = SizeOf(options, box, s);
     const double gradients = record + kIndexBytes + arenas * kIndexBytes;
-    const double pruning = record + threads * kWeightBytes;
-    field = std::max(field, voxels * (2 * record + kIndexBytes + gradients + pruning) +
-                                vertices * 2 * kGridBytes);
+    const double pruning = record + (cells > 0 ? 0 : threads * kWeightBytes);
+    field = std::max(
+        field,
+        voxels * (2 * record + kIndexBytes + gradients + pruning) + vertices * 2 * kGridBytes +
+            cells * (2 * kCellBytes + std::min(threads, kStatisticThreads) * kStatisticBytes));
     const double rays = static_cast<double>(options.steps[s]) * options.rays_per_step;
     seconds += rays / kRaysPerSecond * options.resolutions[s] / kRateResolution;
   }
@@ -59,12 +77,10 @@ StagePlan PlanFitOnDevice(const FitOptions& options, int64_t photo_pixels,
   const double record = 4.0 * RecordLanes(BasisOfDegree(options.sh_degree));
   double peak = 0, coarser = 0, seconds = 0;
   for (size_t s = 0; s < options.resolutions.size(); ++s) {
-    const Vec3i n = ResolutionFor(box, options.resolutions[s]);
-    const double vertices = static_cast<double>(n.x) * n.y * n.z;
-    const double voxels = vertices * (s == 0 ? 1 : kStoredFraction);
+    const auto [cells, voxels, vertices] = SizeOf(options, box, s);
     // Values, gradients, moments; exact sums are twice as wide.
     const double field = voxels * ((options.exact_sums ? 4 : 3) * record + kIndexBytes) +
-                         vertices * kVertexBytes;
+                         vertices * kVertexBytes + cells * (kCellBytes + kStatisticBytes);
     peak = std::max(peak, field + coarser);
     coarser = field + 4 * voxels;  // with weights, which decide what is kept
     seconds += static_cast<double>(options.steps[s]) * options.rays_per_step * kSamplesPerRay /
@@ -107,14 +123,22 @@ void CheckFitsMemory(const StagePlan& plan, uint64_t limit, const char* memory) 
   throw ResourceError(
       "the fit would take about " + MemoryText(static_cast<double>(plan.memory)) + " of " +
           memory + ", the limit is " + MemoryText(static_cast<double>(limit)),
-      "reconstruct",
-      "use --preset draft or smaller --fit-resolutions; memory grows with their cube");
+      "reconstruct", "use --preset draft, smaller --fit-resolutions or --fit-max-cells");
 }
 
 bool LowerToMemory(const std::function<StagePlan(const FitOptions&)>& plan_of, uint64_t limit,
                    FitOptions* options) {
   bool lowered = false;
   while (limit > 0 && plan_of(*options).memory > limit) {
+    if (options->adaptive()) {
+      if (options->max_cells <= kLeastCells) break;
+      const double square = static_cast<double>(options->resolutions.back()) *
+                            options->resolutions.back() * kCellsOfSquare * 1e-6;
+      options->max_cells = static_cast<float>(
+          std::max(double{kLeastCells}, 0.9 * std::min<double>(options->max_cells, square)));
+      lowered = true;
+      continue;
+    }
     auto& sides = options->resolutions;
     const int finest = *std::ranges::max_element(sides);
     if (finest <= kLeastResolution) break;

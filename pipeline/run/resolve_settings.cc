@@ -40,6 +40,20 @@ JsonValue RecipeValues(const std::string& recipe) {
   return OptionValues(network);
 }
 
+// The rates and regularisers that suit a field of another kind than the settings' so far.
+JsonValue FieldValues(const std::string& field) {
+  FitOptions other;
+  if (field == "uniform") other.MakeUniform();
+  const JsonValue values = OptionValues(other);
+  FitOptions uniform;
+  uniform.MakeUniform();
+  const JsonValue plain = OptionValues(FitOptions()), changed = OptionValues(uniform);
+  JsonValue set = JsonValue::Object();
+  for (const auto& [name, value] : values.AsObject())
+    if (!(plain.At(name) == changed.At(name))) set[name] = value;
+  return set;
+}
+
 // Writes those of the values that the set has.
 void ApplyKnown(const JsonValue& values, const std::string& where, OptionSet* options) {
   const JsonValue known = options->Values();
@@ -47,6 +61,13 @@ void ApplyKnown(const JsonValue& values, const std::string& where, OptionSet* op
   for (const auto& [name, value] : values.AsObject())
     if (known.Find(name) != nullptr) kept[name] = value;
   options->ApplyConfig(kept, where);
+}
+
+void ApplyField(const std::string& field, OptionSet* options) {
+  const JsonValue values = options->Values();
+  const JsonValue* now = values.Find("fit-field");
+  if (now != nullptr && now->AsString() != field)
+    ApplyKnown(FieldValues(field), "--fit-field", options);
 }
 
 void ApplyRunFile(const RunFile& file, const std::string& path,
@@ -84,6 +105,7 @@ std::vector<std::string> ResolveSettings(const SettingsSources& sources, OptionS
     ApplyKnown(PresetValues(*preset), "--preset", options);
   if (const auto recipe = options->Given("recipe"))
     ApplyKnown(RecipeValues(*recipe), "--recipe", options);
+  if (const auto field = options->Given("fit-field")) ApplyField(*field, options);
   options->ApplyFlags();
   const JsonValue values = options->Values();
   const JsonValue *reproducible = values.Find("reproducible"), *device = values.Find("device");

@@ -33,20 +33,21 @@ void ApplyPreset(const std::string& preset, RunSettings* settings) {
   if (preset == "standard") return;  // the defaults of the structs
   if (preset == "draft") {
     settings->scene.photo_size = 480;
-    settings->fit.resolutions = {64, 128, 192};
-    settings->fit.steps = {400, 1000, 600};
+    settings->fit.resolutions = {64, 128, 256};
+    settings->fit.steps = {400, 700, 800};
     settings->render.film_seconds = 6;
     settings->render.film_size = 480;
   } else if (preset == "best") {
     settings->scene.photo_size = 1280;
-    settings->fit.resolutions = {96, 192, 320};
-    settings->fit.steps = {2000, 3000, 4000};
+    settings->fit.resolutions = {96, 192, 384, 768};
+    settings->fit.steps = {1500, 2000, 3000, 5500};
     settings->network.steps = 600;
     settings->render.film_seconds = 12;
     settings->render.film_size = 1920;
   } else if (preset == "paper") {
     // svox2's configuration for custom captures; LipRF's recipe for the style.
     settings->scene.photo_size = 1280;
+    settings->fit.MakeUniform();
     settings->fit.resolutions = {128, 256, 512};
     settings->fit.steps = {25600, 25600, 51200};
     settings->fit.rays_per_step = 5000;

@@ -7,12 +7,12 @@
 #include "kernels/base/error.h"
 #include "pipeline/capture/capture_store.h"
 #include "pipeline/capture/colmap_photos.h"
+#include "pipeline/capture/ingest_photos.h"
 #include "pipeline/capture/photo_gains.h"
 #include "pipeline/capture/photo_masks.h"
 #include "pipeline/capture/pose_profile.h"
 #include "pipeline/capture/pose_tracks.h"
 #include "pipeline/capture/scene_profile.h"
-#include "pipeline/files/folder_listing.h"
 #include "pipeline/report/stage_metrics.h"
 #include "pipeline/run/plan.h"
 #include "pipeline/run/run_context.h"
@@ -22,13 +22,17 @@
 namespace regrade {
 namespace {
 
+// A film's compressed bytes take this many times as long as a photo's, and it gives about so
+// many frames.
+constexpr double kFilmBytes = 3, kFramesOfFilm = 60;
 constexpr char kColmapPhotos[] = ".regrade/work/pose_photos";
 
 // Names and hashes of the files (F40).
 JsonValue PhotoSet(const CaptureSource& source) {
   JsonValue files = JsonValue::Object();
-  for (const ListedFile& file : ListFolder(source.photos).files)
-    files[file.name] = file.problem.empty() ? HashFile(file.path) : file.problem;
+  for (const InputFile& input : InputsOf(source).files)
+    files[input.file.name] =
+        input.file.problem.empty() ? HashFile(input.file.path) : input.file.problem;
   return files;
 }
 
@@ -39,10 +43,13 @@ struct StageSeconds {
 
 StageSeconds EstimateSeconds(const CaptureSource& source) {
   double bytes = 0, photos = 0;
-  for (const ListedFile& file : ListFolder(source.photos).files) {
+  for (const InputFile& input : InputsOf(source).files) {
     std::error_code none;
-    const auto size = std::filesystem::file_size(file.path, none);
-    if (!none) bytes += static_cast<double>(size), ++photos;
+    const auto size = std::filesystem::file_size(input.file.path, none);
+    if (none || input.kind == InputKind::kLeft) continue;
+    const bool clip = input.kind == InputKind::kClip;
+    bytes += static_cast<double>(size) * (clip ? kFilmBytes : 1);
+    photos += clip ? kFramesOfFilm : 1;
   }
   const double ingest = 0.5e-6 * bytes + 0.1;
   if (source.kind == CaptureKind::kPhotos)
@@ -85,14 +92,19 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
   const StageSeconds seconds = EstimateSeconds(source);
   ProgressParts parts(progress,
                       seconds.ingest + seconds.poses + seconds.tracks + seconds.refinement);
+  IngestOptions ingest_options = settings.ingest;
+  ingest_options.take_clips = source.kind == CaptureKind::kPhotos;
   const IngestResult ingest =
-      IngestPhotos(source.photos, photo_folder, settings.ingest, parts.Next(seconds.ingest));
-  for (const std::string& notice : ingest.notices) context->console->Info(notice);
+      IngestPhotos(source.photos, photo_folder, ingest_options, parts.Next(seconds.ingest));
+  std::vector<std::string> said = ingest.notices;
+  if (!ingest.summary.empty()) said.insert(said.begin(), ingest.summary);
+  for (const std::string& notice : said) context->console->Info(notice);
   const std::vector<StagedPhoto> colmap_photos =
       PhotosForColmap(ingest.photos, workspace.Path(kColmapPhotos));
 
   StageOutcome outcome;
   PoseStageReport metrics;
+  metrics.notices = said;
   Capture capture;
   PoseOptions options = settings.pose;
   options.threads = settings.program.threads;
@@ -123,7 +135,7 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
     metrics.colmap = report.colmap_version;
     metrics.strategy = report.strategy;
     metrics.attempts = report.attempts;
-    metrics.notices = report.notes;
+    metrics.notices.insert(metrics.notices.end(), report.notes.begin(), report.notes.end());
     metrics.lens = report.lens;
   } else {
     std::vector<std::string> notes;
@@ -184,9 +196,10 @@ Stage PoseStage(RunContext* context) {
   if (const std::string folder = MasksOf(*context, source); !folder.empty())
     stage.inputs["photo_masks"] = HashFolder(folder);
   stage.refuse_changes = true;
-  const int64_t photos = static_cast<int64_t>(stage.inputs.At("photos").AsObject().size());
+  const InputFiles inputs = InputsOf(source);
+  const int64_t photos = ExpectedPhotos(inputs, context->settings.ingest);
   stage.plan =
-      Concat(photos, " files in ", source.photos,
+      Concat(PlannedInputs(inputs, context->settings.ingest), " in ", source.photos,
              (source.kind == CaptureKind::kPhotos
                   ? ", poses by COLMAP: " + PlanText(PlanPoses(photos, omp_get_max_threads()))
                   : ", poses from " + source.poses +

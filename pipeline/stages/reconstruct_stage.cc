@@ -15,6 +15,7 @@
 #include "pipeline/capture/working_views.h"
 #include "pipeline/fields/field_file.h"
 #include "pipeline/fields/fit_checkpoint.h"
+#include "pipeline/files/text.h"
 #include "pipeline/program/cpu_time.h"
 #include "pipeline/program/device_choice.h"
 #include "pipeline/program/memory.h"
@@ -90,10 +91,10 @@ std::function<StagePlan(const FitOptions&)> PlannerOf(const WorkingViews& views,
   };
 }
 
-// The fit's options, with resolutions lowered to fit into memory, which is reported.
-FitOptions OptionsForMemory(RunContext* context,
-                            const std::function<StagePlan(const FitOptions&)>& plan_of,
-                            Backend backend) {
+// The fit's options for the scene, lowered to fit into memory, which is reported.
+FitOptions OptionsForScene(RunContext* context, const NormalizedScene& scene,
+                           const std::function<StagePlan(const FitOptions&)>& plan_of,
+                           Backend backend) {
   const RunSettings& settings = context->settings;
   const bool on_device = backend == Backend::kCuda;
   const uint64_t limit =
@@ -101,14 +102,18 @@ FitOptions OptionsForMemory(RunContext* context,
                     on_device ? static_cast<uint64_t>(ReadDeviceStatus().free_bytes)
                               : ReadMemoryStatus().available);
   FitOptions options = settings.fit;
+  options.ChooseField(scene.ndc.on());
+  const int finest = Finest(options);
   options.seed = settings.run.seed;
   // Free memory must not change the result of a reproducible run.
   if ((!settings.run.reproducible || settings.run.max_memory_gb > 0) &&
       LowerToMemory(plan_of, limit, &options))
     context->console->Info(
-        Concat("the finest grid has ", Finest(options), " voxels a side instead of ",
-               Finest(settings.fit), " to fit into ",
-               (settings.run.max_memory_gb > 0 ? "--max-memory" : "free memory")));
+        (options.adaptive()
+             ? Format("the field has at most %.1f million cells", double{options.max_cells})
+             : Concat("the finest grid has ", Finest(options), " voxels a side instead of ",
+                      finest)) +
+        " to fit into " + (settings.run.max_memory_gb > 0 ? "--max-memory" : "free memory"));
   const StagePlan plan = plan_of(options);
   context->console->Info("the fit will take " + PlanText(plan));
   CheckFitsMemory(plan, limit, on_device ? "GPU memory" : "memory");
@@ -155,20 +160,24 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
     if (effect.name != kViewDependence) context->console->Detail(EffectLine(effect));
   for (const std::string& notice : profile.notices) context->console->Info(notice);
   const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
-  FitOptions options = OptionsForMemory(context, PlannerOf(views, scene.box, backend), backend);
+  FitOptions options =
+      OptionsForScene(context, scene, PlannerOf(views, scene.box, backend), backend);
 
   const std::vector<int> fitted = views.Training();
   std::vector<Image> photos;
   photos.reserve(fitted.size());
   std::vector<TrainingView> training_views;
-  for (const int i : fitted) {
+  std::vector<std::vector<SeenPoint>> seen =
+      PointsSeenBy(capture, fitted, scene.field_from_world);
+  for (size_t f = 0; f < fitted.size(); ++f) {
+    const int i = fitted[f];
     Image photo = views.PhotoToFit(i);
     if (photo.empty()) {
       context->console->Info(views.View(i).file + ": its mask leaves nothing to fit");
       continue;
     }
     photos.push_back(std::move(photo));
-    training_views.push_back({views.CameraOf(i), &photos.back()});
+    training_views.push_back({views.CameraOf(i), &photos.back(), std::move(seen[f])});
   }
 
   if (settings.run.reproducible && options.shards == 0) options.shards = kReproducibleShards;
@@ -264,7 +273,9 @@ Stage ReconstructStage(RunContext* context) {
     const SceneProfile profile = ProfileScene(views.capture(), context->settings.fit.sh_degree,
                                               run.effects + ",exposure=off");
     const Backend backend = ChooseBackend(run.device, run.reproducible);
-    stage.plan = PlanText(PlannerOf(views, profile.scene.box, backend)(context->settings.fit));
+    FitOptions options = context->settings.fit;
+    options.ChooseField(profile.scene.ndc.on());
+    stage.plan = PlanText(PlannerOf(views, profile.scene.box, backend)(options));
   }
   stage.work = [context, inputs = stage.inputs](const ProgressFunction& progress) {
     return Reconstruct(context, inputs, progress);

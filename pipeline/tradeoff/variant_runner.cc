@@ -178,11 +178,14 @@ const VariantRunner::Photos& VariantRunner::PhotosAt(int size) {
   p.working_views = p.working_views.InField(p.scene.field_from_world, p.scene.ndc);
   const std::vector<int> fitted = p.working_views.Training();
   p.pictures.reserve(fitted.size());
-  for (const int i : fitted) {
+  std::vector<std::vector<SeenPoint>> seen =
+      PointsSeenBy(p.working_views.capture(), fitted, p.scene.field_from_world);
+  for (size_t f = 0; f < fitted.size(); ++f) {
+    const int i = fitted[f];
     Image picture = p.working_views.PhotoToFit(i);
     if (picture.empty()) continue;
     p.pictures.push_back(std::move(picture));
-    p.views.push_back({p.working_views.CameraOf(i), &p.pictures.back()});
+    p.views.push_back({p.working_views.CameraOf(i), &p.pictures.back(), std::move(seen[f])});
   }
   return p;
 }
@@ -195,6 +198,7 @@ void VariantRunner::MeasureFit(const Variant& variant, const ProgressFunction& p
   set.ApplyConfig(variant.options, "tradeoff");
   const Photos& photos = PhotosAt(settings.scene.photo_size);
   FitOptions options = settings.fit;
+  options.ChooseField(photos.scene.ndc.on());
   options.seed = settings.run.seed + static_cast<uint64_t>(m->repeat);
   // The degree chosen by the base's trial, unless it is the parameter.
   const auto record = base_->workspace->Find("reconstruct");

@@ -12,6 +12,7 @@
 #include "kernels/base/error.h"
 #include "reconstruct/colmap/colmap_model.h"
 #include "reconstruct/colmap/colmap_program.h"
+#include "reconstruct/colmap/listed_pairs.h"
 #include "reconstruct/colmap/pose_weights.h"
 #include "reconstruct/scene/scene_checks.h"
 
@@ -125,8 +126,7 @@ class AttemptRunner::Impl {
       fs::create_directories(attempt_folder);
       attempt_folder_ = attempt_folder;
       for (const CameraGroup& group : groups_) Extract(strategy, group, paths, weights.extract);
-      RunStage(MatchCommand(strategy), MatchArguments(strategy, threads_, paths), "matching",
-               strategy.name, weights.match);
+      Match(strategy, paths, weights.match);
     }
     return Map(AttemptResult{strategy, LensFreedom::kFull, attempt_folder, {}, {}},
                weights.map);
@@ -151,6 +151,17 @@ class AttemptRunner::Impl {
       throw Error(ExitCode::kExternalProgram,
                   "colmap feature_extractor ended without an error, but wrote no database",
                   colmap_.log_folder(), "see its log");
+  }
+
+  void Match(const PoseStrategy& strategy, const ColmapPaths& paths, double weight) {
+    if (!strategy.by_list)
+      return RunStage(MatchCommand(strategy), MatchArguments(strategy, threads_, paths),
+                      "matching", strategy.name, weight);
+    MatchListed(PairsOfClips(photos_), photos_, paths.database, attempt_folder_ + "/pairs.txt",
+                threads_, [&](const ColmapArguments& arguments, double fraction) {
+                  RunStage(kListMatcher, arguments, "matching", strategy.name,
+                           weight * fraction);
+                });
   }
 
   // The attempt with the models that are found with its lens.

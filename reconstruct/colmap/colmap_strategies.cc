@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "kernels/base/error.h"
+#include "reconstruct/colmap/listed_pairs.h"
 
 namespace regrade {
 namespace {
@@ -28,11 +29,12 @@ std::vector<CameraGroup> GroupByCamera(const std::vector<StagedPhoto>& photos) {
   for (const StagedPhoto& photo : photos) {
     const auto same = [&](const CameraGroup& group) {
       return group.width == photo.width && group.height == photo.height &&
-             group.focal_px == photo.exif_focal_px;
+             group.focal_px == photo.exif_focal_px && group.film == (photo.clip >= 0);
     };
     auto it = std::ranges::find_if(groups, same);
     if (it == groups.end())
-      it = groups.insert(groups.end(), {photo.width, photo.height, photo.exif_focal_px, {}});
+      it = groups.insert(groups.end(),
+                         {photo.width, photo.height, photo.exif_focal_px, photo.clip >= 0, {}});
     it->names.push_back(photo.name);
   }
   return groups;
@@ -49,6 +51,7 @@ std::vector<PoseStrategy> PoseStrategies(const std::vector<StagedPhoto>& photos,
   quick.first_octave = side < kSmallSide || photos.size() <= kFewPairs ? -1 : 0;
   quick.lens = simple_lens ? ColmapLens::kSimpleRadial : ColmapLens::kOpenCv;
   quick.all_pairs = static_cast<int>(photos.size()) <= all_pairs_up_to;
+  quick.by_list = !quick.all_pairs && HasClips(photos);
 
   PoseStrategy finer = quick;
   finer.name = "more features";
@@ -67,6 +70,7 @@ std::vector<PoseStrategy> PoseStrategies(const std::vector<StagedPhoto>& photos,
   thorough.keep_matches = false;
   thorough.max_features = quick.all_pairs ? 8192 : 4096;
   thorough.all_pairs = photos.size() <= kMostForAllPairs;
+  thorough.by_list = !thorough.all_pairs && quick.by_list;
   thorough.lens = ColmapLens::kSimpleRadial;
   thorough.focal_factor = 0.75;
   return {quick, finer, relaxed, thorough};

@@ -17,7 +17,8 @@ struct PoseStrategy {
   int first_octave = 0;     // -1 upsamples the photo by 2: more and finer features
   ColmapLens lens = ColmapLens::kOpenCv;  // of the mapper; the final lens is fitted later
   double focal_factor = 1.2;   // initial focal length over the longer side, without EXIF
-  bool all_pairs = true;       // otherwise each photo with its successors
+  bool all_pairs = true;       // otherwise each photo with its successors ...
+  bool by_list = false;        // ... or, of films, the pairs of listed_pairs.h
   bool keep_matches = false;   // reuse features and matches of the previous attempt
   double init_angle_deg = 16;  // least angle between the rays of the first two photos
   int init_inliers = 100;      // least matches between them
@@ -28,14 +29,16 @@ struct PoseStrategy {
 struct CameraGroup {
   int width = 0, height = 0;       // pixels
   double focal_px = 0;             // from EXIF; 0 where unknown
+  bool film = false;               // frames of films
   std::vector<std::string> names;  // staged names
 };
 
-// In the order of their first photo. Photos share a camera if size and EXIF focal length agree.
+// In the order of their first photo. Photos share a camera if size and EXIF focal length agree;
+// frames of films, which a camera crops, share none with photos.
 std::vector<CameraGroup> GroupByCamera(const std::vector<StagedPhoto>& photos);
 
 // With more than `all_pairs_up_to` photos, each is matched with its neighbours in the order of
-// names, except in the last strategy.
+// names, except in the last strategy; frames of films by the list of listed_pairs.h.
 std::vector<PoseStrategy> PoseStrategies(const std::vector<StagedPhoto>& photos,
                                          int all_pairs_up_to);
 

@@ -13,6 +13,7 @@
 #include "reconstruct/colmap/colmap_output.h"
 #include "reconstruct/colmap/colmap_program.h"
 #include "reconstruct/colmap/colmap_strategies.h"
+#include "reconstruct/colmap/listed_pairs.h"
 #include "reconstruct/colmap/pose_weights.h"
 #include "reconstruct/colmap/track_pairs.h"
 
@@ -23,8 +24,6 @@ namespace fs = std::filesystem;
 
 constexpr int kFeatures = 768;   // per photo: give hundreds of tracks
 constexpr int kSmallSide = 900;  // pixels; upsamples smaller photos, as in the strategies
-// Batches, because the matcher for lists of pairs prints nothing until it ends.
-constexpr size_t kPairsAtATime = 200;
 // COLMAP's own limit of the reprojection error, pixels ...
 constexpr double kStrictLimit = 4;
 // ... and ours for inaccurate poses, as a fraction of a photo's longer side.
@@ -118,8 +117,8 @@ class TrackFinder {
       auto group = std::ranges::find_if(
           groups, [&](const LensGroup& other) { return SameLens(other.camera, camera); });
       if (group == groups.end())
-        group =
-            groups.insert(groups.end(), {camera, {photos_[i].width, photos_[i].height, 0, {}}});
+        group = groups.insert(groups.end(),
+                              {camera, {photos_[i].width, photos_[i].height, 0, false, {}}});
       group->photos.names.push_back(photos_[i].name);
     }
     return groups;
@@ -147,21 +146,10 @@ class TrackFinder {
     for (const ColmapImage& image : start_.images) cameras.push_back(start_.CameraOf(image));
     const auto pairs = PairsToMatch(cameras);
     result_.pairs = static_cast<int>(pairs.size());
-    const std::string list = work_folder_ + "/pairs.txt";
-    for (size_t begin = 0; begin < pairs.size(); begin += kPairsAtATime) {
-      const size_t end = std::min(begin + kPairsAtATime, pairs.size());
-      std::ofstream file(list, std::ios::trunc);
-      for (size_t i = begin; i < end; ++i)
-        file << photos_[pairs[i].first].name << " " << photos_[pairs[i].second].name << "\n";
-      file.close();
-      RunColmap("matches_importer",
-                {{"database_path", Database()},
-                 {"match_list_path", list},
-                 {"SiftMatching.use_gpu", "0"},
-                 {"SiftMatching.num_threads", Threads()}},
-                "matching",
-                weight * static_cast<double>(end - begin) / static_cast<double>(pairs.size()));
-    }
+    MatchListed(pairs, photos_, Database(), work_folder_ + "/pairs.txt", options_.threads,
+                [&](const ColmapArguments& arguments, double fraction) {
+                  RunColmap(kListMatcher, arguments, "matching", weight * fraction);
+                });
   }
 
   ColmapModel Triangulate(const std::string& start, double limit_px, double weight) {

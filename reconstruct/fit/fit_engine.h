@@ -4,8 +4,10 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <vector>
 
 #include "kernels/device/backend.h"
+#include "kernels/field/free_space.h"
 #include "kernels/field/render.h"
 #include "kernels/optimize/rmsprop.h"
 #include "reconstruct/fit/fit_field.h"
@@ -20,6 +22,9 @@ struct FitStep {
   int patch = 1;
   MarchOptions march;
   RmspropOptions optimizer;
+  // See EQ(free-space), of an adaptive field: rays drawn, and the weight of their mean opacity.
+  int free_rays = 0;
+  float free_space = 0;
   // Total variation, with weights of its mean over all voxels. Each step regularises one
   // contiguous sampling run from a random start: tv_fraction of all grid vertices on the CPU,
   // tv_fraction of the stored voxels on the GPU; the expected gradient is the same.
@@ -42,6 +47,7 @@ class FitEngine {
  public:
   virtual ~FitEngine() = default;
 
+  virtual void SetFreeRays(std::vector<FreeRay> rays) = 0;  // none unless this is called
   virtual void SetState(FitState state) = 0;
   // Calls `read` with the grid and the moments, without a copy where they are in host memory.
   // `read` may set stage, step and tally, and nothing else.

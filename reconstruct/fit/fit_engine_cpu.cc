@@ -25,6 +25,7 @@ class CpuFitEngine : public FitEngine {
   CpuFitEngine(const TrainingRays* rays, uint64_t seed, int shards)
       : rays_(rays), seed_(seed), arenas_(static_cast<size_t>(shards)) {}
 
+  void SetFreeRays(std::vector<FreeRay> rays) override { free_rays_ = std::move(rays); }
   void SetState(FitState state) override {
     state_ = std::move(state);
     if (state_.second_moment.size() != state_.grid.records.size())
@@ -41,6 +42,7 @@ class CpuFitEngine : public FitEngine {
   void Step(const FitStep& step) override {
     const int patches = std::max(1, step.rays / (step.patch * step.patch));
     rays_->Draw(seed_, step.number, patches, step.patch, &batch_rays_, &batch_targets_);
+    DrawFreeRays(step);
     Accumulate(step);
     StepVoxels(step.optimizer);
     if (state_.grid.spheres.on()) StepLayers(step.optimizer);
@@ -83,6 +85,14 @@ class CpuFitEngine : public FitEngine {
     }
   }
 
+  void DrawFreeRays(const FitStep& step) {
+    free_batch_.clear();
+    if (free_rays_.empty()) return;
+    for (int i = 0; i < step.free_rays; ++i)
+      free_batch_.push_back(free_rays_[RandomIndex(
+          seed_ ^ kRandomFreeSpace, step.number, static_cast<uint64_t>(i), free_rays_.size())]);
+  }
+
   void Accumulate(const FitStep& step) {
     const int64_t n = static_cast<int64_t>(batch_rays_.size());
     const float scale = 1.0f / (3.0f * static_cast<float>(n));
@@ -112,6 +122,12 @@ class CpuFitEngine : public FitEngine {
         FastRays().total_variation(state_.grid, from, from + count, step.tv_density * tv_scale,
                                    step.tv_sh * tv_scale, arena);
         v += count;
+      }
+      if (step.free_space > 0 && !free_batch_.empty()) {
+        const int64_t free = std::ssize(free_batch_);
+        const int64_t from = free * s / shards, to = free * (s + 1) / shards;
+        FastRays().free_space(state_.grid, free_batch_.data() + from, to - from,
+                              step.free_space / static_cast<float>(free), arena);
       }
       if (state_.grid.spheres.on()) RegularizeLayers(step, s, shards, &arena->spheres);
     }
@@ -183,6 +199,7 @@ class CpuFitEngine : public FitEngine {
   FitState state_;
   FitSums sums_;
   std::vector<GradientArena> arenas_;
+  std::vector<FreeRay> free_rays_, free_batch_;
   std::vector<Ray> batch_rays_;
   std::vector<Vec3f> batch_targets_;
 };

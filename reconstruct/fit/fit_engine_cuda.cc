@@ -9,6 +9,7 @@
 #include "kernels/base/random.h"
 #include "kernels/base/random_streams.h"
 #include "kernels/field/cuda/device_cell_statistics.h"
+#include "kernels/field/cuda/device_free_space.h"
 #include "kernels/field/cuda/device_rays.h"
 #include "kernels/field/cuda/device_sphere_rays.h"
 #include "kernels/field/cuda/device_views.h"
@@ -25,6 +26,7 @@ class CudaFitEngine : public FitEngine {
   CudaFitEngine(const TrainingRays* rays, uint64_t seed, bool exact_sums)
       : seed_(seed), exact_sums_(exact_sums), views_(rays->ToDevice()) {}
 
+  void SetFreeRays(std::vector<FreeRay> rays) override { free_space_.emplace(rays); }
   void SetState(FitState state) override {
     grid_ = UploadGrid(state.grid, true, state.second_moment, exact_sums_, state.sphere_moment);
     Renew();
@@ -50,6 +52,9 @@ class CudaFitEngine : public FitEngine {
     }
     Reserve(step.rays);
     views_.Draw(seed_, step.number, step.rays, rays_.data(), targets_.data());
+    if (free_space_)
+      free_space_->Accumulate(grid_, seed_ ^ kRandomFreeSpace, step.number, step.free_rays,
+                              step.free_space, &touched_);
     fitter_->Accumulate(grid_, rays_.data(), targets_.data(), step.rays,
                         1.0f / (3.0f * static_cast<float>(step.rays)), &touched_);
     // The sampling run of total variation is over stored voxels (see FitStep): each is chosen
@@ -66,6 +71,7 @@ class CudaFitEngine : public FitEngine {
       AddTotalVariation(grid_, begin, run, step.tv_density * scale, step.tv_sh * scale,
                         &touched_);
     }
+    if (free_space_) free_space_->Join();
     StepOnDevice(&grid_, &touched_, step.optimizer, fitter_->sums());
     if (grid_.spheres.on()) StepLayers(step);
   }
@@ -168,6 +174,7 @@ class CudaFitEngine : public FitEngine {
   DeviceTouched touched_;
   MarchOptions march_;
   std::optional<DeviceRayFitter> fitter_;
+  std::optional<DeviceFreeSpace> free_space_;
   FitSums sums_;  // of previous fitters
   DeviceBuffer<Ray> rays_;
   DeviceBuffer<Vec3f> targets_;

@@ -11,6 +11,7 @@
 
 #include "kernels/base/error.h"
 #include "reconstruct/fit/fit_engine.h"
+#include "reconstruct/fit/free_rays.h"
 #include "reconstruct/fit/initial_cells.h"
 #include "reconstruct/fit/resample_grid.h"
 #include "reconstruct/fit/sphere_grid.h"
@@ -34,6 +35,7 @@ class Fitter {
   Fitter(const std::vector<TrainingView>& views, const SceneBox& box, const FitOptions& options,
          const FitHooks& hooks, Backend backend)
       : rays_(views),
+        views_(views),
         box_(box),
         options_(options),
         hooks_(hooks),
@@ -51,6 +53,11 @@ class Fitter {
   }
 
   FitResult Run() {
+    if (options_.adaptive() && options_.free_space > 0) {
+      const float cell = 2 * std::max({box_.radius.x, box_.radius.y, box_.radius.z}) /
+                         static_cast<float>(options_.resolutions[0]);
+      engine_->SetFreeRays(FreeRays(views_, kFreeMargin * cell, options_.seed));
+    }
     FitState state;
     if (hooks_.resume != nullptr) {
       state = std::move(*hooks_.resume);
@@ -176,6 +183,10 @@ class Fitter {
         ExponentialRate(options_.rate_density, options_.rate_density_end, p) *
         DelayFactor(number, options_.density_delay * static_cast<float>(total_steps_));
     step.optimizer.view_bound = options_.view_bound;
+    if (options_.adaptive()) {
+      step.free_rays = std::max(1, options_.rays_per_step / kRaysPerFreeRay);
+      step.free_space = options_.free_space;
+    }
     step.tv_fraction = options_.tv_fraction;
     step.tv_density = decay * options_.tv_density;
     step.tv_sh = decay * options_.tv_sh;
@@ -209,9 +220,7 @@ class Fitter {
   // Prunes by weight and resamples to `longest` voxels a side; 0 keeps the resolution.
   void Refine(int longest) {
     if (options_.adaptive()) {
-      const int stages = static_cast<int>(options_.resolutions.size());
-      const int before = std::clamp(stage_ - (longest > 0), 0, stages - 1);
-      const float width = static_cast<float>(options_.resolutions[static_cast<size_t>(before)]);
+      const float width = static_cast<float>(options_.resolutions[0]);
       engine_->RefineCells(
           {options_.step, options_.stop_transmittance},
           {options_.prune_weight / width, options_.cell_pixels, longest > 0 ? stage_ : 0,
@@ -283,9 +292,12 @@ class Fitter {
     idle_seconds_ += SecondsSince(begin);
   }
 
-  static constexpr int kWindow = 20;  // steps
+  static constexpr int kWindow = 20;          // steps
+  static constexpr float kFreeMargin = 0.4f;  // cells of the first stage
+  static constexpr int kRaysPerFreeRay = 4;
 
   TrainingRays rays_;
+  const std::vector<TrainingView>& views_;
   SceneBox box_;
   FitOptions options_;
   FitHooks hooks_;

@@ -10,25 +10,25 @@
 namespace regrade {
 
 struct FitOptions {
-  std::string field = "uniform";
-  std::vector<int> resolutions = {64, 128, 256};
-  std::vector<int> steps = {800, 2000, 3000};
+  std::string field = "auto";
+  std::vector<int> resolutions = {64, 128, 256, 512};
+  std::vector<int> steps = {600, 900, 1200, 2300};
   int rays_per_step = 4096;
   int patch = 1;
   int sh_degree = 2;
   float view_bound = 0.2f;
   float step = 1.0f;
   float stop_transmittance = 1e-3f;
-  float rate_density = 8.0f;
-  float rate_density_end = 1.0f;
+  float rate_density = 58.0f;
+  float rate_density_end = 24.0f;
   float density_delay = 0;
-  float rate_sh = 6e-2f;
-  float rate_sh_end = 5e-3f;
-  float tv_density = 1e-2f;
-  float tv_sh = 1e-2f;
-  float tv_decay = 0.5f;
-  float tv_fraction = 0.03f;
-  float prune_weight = 0.5f;
+  float rate_sh = 5e-2f;
+  float rate_sh_end = 2e-3f;
+  float tv_density = 5e-2f;
+  float tv_sh = 4e-3f;
+  float tv_decay = 0.7f;
+  float tv_fraction = 0.02f;
+  float prune_weight = 0.4f;
   float initial_density = 0.5f;
   int background_layers = 64;
   int background_resolution = 512;
@@ -43,23 +43,59 @@ struct FitOptions {
   float background_lead = 0.9f;
   float cell_pixels = 1.0f;
   float max_cells = 12.0f;
+  float free_space = 0.02f;
   int shards = 0;
   bool exact_sums = false;
   uint64_t seed = 0;
 
-  bool adaptive() const { return field == "adaptive"; }
+  bool adaptive() const { return field != "uniform"; }
+  // Makes the field uniform, with the rates and regularisers that suit it: the defaults above
+  // are an adaptive field's.
+  void MakeUniform() {
+    field = "uniform";
+    rate_density = 8;
+    rate_density_end = 1;
+    rate_sh = 6e-2f;
+    rate_sh_end = 5e-3f;
+    tv_density = tv_sh = 1e-2f;
+    tv_decay = 0.5f;
+    tv_fraction = 0.03f;
+    prune_weight = 0.5f;
+  }
+  // Decides "auto": uniform in device coordinates, where that is still better (COSTS.md). What
+  // differs from the defaults was asked for, and stays. At most three stages: more would take
+  // much memory.
+  void ChooseField(bool device_coordinates) {
+    if (field != "auto" || !device_coordinates) return;
+    const FitOptions plain;
+    FitOptions uniform;
+    uniform.MakeUniform();
+    for (float FitOptions::*value :
+         {&FitOptions::rate_density, &FitOptions::rate_density_end, &FitOptions::rate_sh,
+          &FitOptions::rate_sh_end, &FitOptions::tv_density, &FitOptions::tv_sh,
+          &FitOptions::tv_decay, &FitOptions::tv_fraction, &FitOptions::prune_weight})
+      if (this->*value == plain.*value) this->*value = uniform.*value;
+    field = "uniform";
+    constexpr size_t kStages = 3;
+    while (resolutions.size() > kStages && steps.size() == resolutions.size()) {
+      resolutions.pop_back();
+      steps[steps.size() - 2] += steps.back();
+      steps.pop_back();
+    }
+  }
 
   template <typename Bind>
   void Describe(Bind& bind) {
-    bind("fit-field", field,
-         {.help = "uniform: voxels of one width; adaptive: cells that are halved where two "
-                  "photos see them wider than "
-                  "a pixel",
-          .choices = "uniform|adaptive"});
+    bind(
+        "fit-field", field,
+        {.help = "uniform: voxels of one width; adaptive: cells that are halved where two "
+                 "photos see them wider than a pixel; auto: uniform for captures that look one "
+                 "way, else adaptive",
+         .choices = "auto|uniform|adaptive"});
     bind("fit-resolutions", resolutions,
          {.unit = "voxels",
-          .help = "longest side of the grid in each stage, coarse to fine; memory grows with "
-                  "its cube",
+          .help = "longest side of the grid in each stage, coarse to fine; an adaptive field "
+                  "doubles it in each stage, and its memory grows with --fit-max-cells",
           .min = 8,
           .max = 2048});
     bind("fit-steps", steps,
@@ -186,6 +222,11 @@ struct FitOptions {
                   "errors are",
           .min = 0.001,
           .max = 200});
+    bind("fit-free-space", free_space,
+         {.help = "adaptive field: keeps the space clear between cameras and the points they "
+                  "saw; less fog where few photos look",
+          .min = 0,
+          .max = 10});
     bind("fit-shards", shards,
          {.help = "gradient arenas; 0: one per thread, or 4 with --reproducible",
           .min = 0,

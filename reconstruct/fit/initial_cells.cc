@@ -54,6 +54,9 @@ GridFrame CellFrame(const SceneBox& box, int coarsest, int finest) {
   for (int a = 0; a < 3; ++a)
     size[a] = std::max(1, ((size[a] >> finest) + (size[a] >> (finest - 1) & (finest > 0))))
               << finest;
+  // The limit of layers is one of the coarsest cells: rays run along z, and have a sample a
+  // cell.
+  if (box.layers > 0) size.z = ResolutionFor(box, coarsest).z << finest;
   return {size, box.center, box.radius};
 }
 

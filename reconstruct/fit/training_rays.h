@@ -8,6 +8,7 @@
 #include "kernels/field/cuda/device_views.h"
 #include "kernels/scene/camera.h"
 #include "kernels/scene/image.h"
+#include "reconstruct/scene/point_observations.h"
 
 namespace regrade {
 
@@ -16,6 +17,7 @@ namespace regrade {
 struct TrainingView {
   Camera camera;
   const Image* photo = nullptr;
+  std::vector<SeenPoint> points = {};  // that the photo saw; used by adaptive fits
 };
 
 class TrainingRays {

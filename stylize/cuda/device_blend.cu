@@ -17,6 +17,8 @@ namespace {
 // The point at corner k < 8 of a sample's cell, or -1; see CornerPoints.
 __device__ int32_t CornerPoint(const DeviceGridView& grid, const DeviceWeightedSample& sample,
                                int k) {
+  if (sample.vertex >= 0 && grid.cells.top != nullptr)
+    return grid.cells.corner[sample.vertex + k];
   if (sample.vertex >= 0)
     return grid.links[sample.vertex + GridSampler(grid).Steps(sample.vertex).To(k)];
   if (k & 1) return -1;

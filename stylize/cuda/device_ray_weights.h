@@ -13,7 +13,9 @@ namespace regrade {
 
 // As WeightedSample.
 struct DeviceWeightedSample {
-  int32_t vertex;  // lowest corner of the cell; negative on a background sphere
+  // Lowest corner of the cell; of an adaptive field, eight times the cell; negative on a
+  // background sphere.
+  int32_t vertex;
   Vec3f fraction;
   float weight;
   int32_t ray;

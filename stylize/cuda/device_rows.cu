@@ -12,6 +12,21 @@ namespace regrade {
 
 namespace {
 
+// Of a voxel, or of an adaptive field's vertex: [-1, 1] across the box.
+__device__ Vec3f BoxPosition(const DeviceGridView& grid, int64_t voxel) {
+  const Vec3i size = grid.frame.resolution;
+  Vec3f place{0.5f, 0.5f, 0.5f};  // voxels from the box's corner
+  if (grid.vertex_key != nullptr) {
+    place = PlaceOf(grid.vertex_key[voxel]).Cast<float>();
+  } else {
+    const int32_t vertex = grid.vertex_of_voxel[voxel];
+    place += Vec3i{vertex / (size.y * size.z), vertex / size.z % size.y, vertex % size.z}
+                 .Cast<float>();
+  }
+  for (int a = 0; a < 3; ++a) place[a] = 2 * place[a] / static_cast<float>(size[a]) - 1;
+  return place;
+}
+
 // A warp a point; see FillFeatures and FillTexelFeatures.
 __global__ void GatherRowsKernel(DeviceGridView grid, int basis, const int32_t* points,
                                  int64_t first, int64_t n, const int32_t* counted,
@@ -36,14 +51,7 @@ __global__ void GatherRowsKernel(DeviceGridView grid, int basis, const int32_t* 
     if (lane % 9 < basis)
       value = grid.records[voxel * grid.stride + lane / 9 * basis + lane % 9];
   } else if (lane < 30) {
-    const Vec3i size = grid.frame.resolution;
-    const int32_t vertex = grid.vertex_of_voxel[voxel];
-    const int index = lane == 27   ? vertex / (size.y * size.z)
-                      : lane == 28 ? vertex / size.z % size.y
-                                   : vertex % size.z;
-    const int length = lane == 27 ? size.x : lane == 28 ? size.y : size.z;
-    value = position_scale *
-            (2 * (static_cast<float>(index) + 0.5f) / static_cast<float>(length) - 1);
+    value = position_scale * BoxPosition(grid, voxel)[lane - 27];
   }
   rows[i * kRowLanes + lane] = value;
 }

@@ -61,7 +61,7 @@ struct AggregationOptions {
     bind("style-view-weight", view_weight,
          {.help = "penalty on restyled colours that change with the viewing direction: 0 "
                   "follows a 2D method that maps each view differently, and flickers more; "
-                  "larger values are steadier and less faithful",
+                  "larger values are more consistent and less faithful to the 2D method",
           .min = 0,
           .max = 1e6});
     bind("style-every-voxel", every_voxel,

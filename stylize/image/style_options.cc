@@ -24,7 +24,7 @@ StyleMethod ParseStyleMethod(const StyleOptions& options) {
   const std::string hint = std::string("use ") + kStyleMethods;
   if (options.regrain && text != "idt" && text != "histogram")
     throw UsageError(
-        "\"" + text + "\" makes no grain louder", "--method and --style-regrain",
+        "\"" + text + "\" does not amplify grain", "--method and --style-regrain",
         "leave it out, or add --no-style-regrain where an earlier run asked for it");
   for (const auto& [name, kind] : kColorMethods)
     if (text == name) return {kind, name, ""};

@@ -25,25 +25,26 @@ struct StyleOptions {
         "method", method,
         {.help =
              "2D method that styles each view: mkl moves mean and covariance of the colours "
-             "onto the style's, reinhard mean and spread of each CIELAB channel, idt the whole "
-             "distribution (strongest, and loud where the photo has grain or soft edges), "
-             "histogram that of each channel; onnx:DIR runs the networks of "
-             "PCA-KD, WCT, WCT2 or CCPL that are in DIR (scripts/convert_networks.py makes "
-             "the last two of the authors' files); folder:DIR takes the pictures that anything "
-             "made "
-             "of the photos, by the photos' names (some may be missing); "
+             "onto the style's, reinhard mean and standard deviation of each CIELAB channel, "
+             "idt "
+             "the whole distribution (the strongest change; it amplifies grain and soft "
+             "edges), histogram that of each channel; onnx:DIR runs the networks of "
+             "PCA-KD, WCT, WCT2 or CCPL that are in DIR (scripts/convert_networks.py converts "
+             "the authors' files of the last two); folder:DIR takes photos that were styled by "
+             "any other program, by the photos' names (some may be missing); "
              "command:\"PROGRAM {input} {style} {output}\" runs a program for each view, "
              "without a shell"});
     bind("scene-wide", scene_wide,
-         {.help = "one colour map from the colours of all views, instead of one for each view: "
-                  "steadier, but a view's own colours meet the style's less well; with mkl, "
-                  "reinhard, idt and histogram"});
+         {.help =
+              "estimates one colour map from all views, instead of one for each view: frames "
+              "are more consistent with each other, but a single view's colours are further "
+              "from the style's; with mkl, reinhard, idt and histogram"});
     bind("style-iterations", iterations,
          {.help = "rotations of method idt; its time grows with them", .min = 1, .max = 200});
     bind("style-regrain", regrain,
-         {.help = "with idt and histogram: give the styled view the photo's own grain and "
-                  "edges back, which the transfer makes louder; costs about a second a view "
-                  "of a megapixel, and a little of the style's contrast"});
+         {.help = "with idt and histogram: restores the photo's grain and edges, which the "
+                  "transfer amplifies; takes about a second for a view of a megapixel, and "
+                  "reduces the style's contrast a little"});
     bind("style-max-side", max_side,
          {.unit = "pixels",
           .help =

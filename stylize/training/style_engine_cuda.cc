@@ -80,8 +80,6 @@ class CudaStyleEngine : public StyleEngine {
 std::unique_ptr<StyleEngine> MakeCudaStyleEngine(const RadianceField* field,
                                                  const AggregationOptions& loss,
                                                  int64_t rays_per_step) {
-  if (field->geometry->cells.on())
-    throw ResourceError("an adaptive field is styled on the CPU only", "", "use --device cpu");
   return std::make_unique<CudaStyleEngine>(field, loss, rays_per_step);
 }
 

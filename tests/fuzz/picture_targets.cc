@@ -1,11 +1,17 @@
-// Fuzz targets: recognition of formats, whole pictures, and text drawn into pictures.
+// Fuzz targets: recognition of formats, whole pictures, colour profiles, films, and text drawn
+// into pictures.
 #include <zlib.h>
 
 #include <cmath>
+#include <fstream>
+#include <iterator>
 
+#include "pipeline/images/color_profile.h"
 #include "pipeline/images/draw_text.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/images/image_format.h"
+#include "pipeline/images/video_reader.h"
+#include "pipeline/images/video_writer.h"
 #include "tests/fuzz/fuzz_support.h"
 #include "tests/fuzz/mutate.h"
 
@@ -95,6 +101,47 @@ std::string MutatePhoto(std::string bytes, FuzzRandom* random) {
                             : MutateBytes(std::move(bytes), random);
 }
 
+// --- colour profiles
+
+std::vector<std::string> ProfileSeeds() { return {AdobeRgbProfile()}; }
+
+bool ReadProfile(std::string_view bytes) {
+  Image image = Waves(4, 3);
+  std::string problem;
+  const std::string name = LinearizeByProfile(bytes, &image, &problem);
+  FuzzRequire(problem.empty() || name.empty(), "applied or refused");
+  if (!problem.empty()) FuzzRequire(image.pixels == Waves(4, 3).pixels, "refused: unchanged");
+  return problem.empty();
+}
+
+// --- films
+
+std::vector<std::string> FilmSeeds() {
+  const std::string path = FuzzFolder() + "/seed.mp4";
+  VideoWriter film(path, 32, 16, 25);
+  for (int i = 0; i < 3; ++i) film.Add(Waves(32, 16));
+  film.Finish();
+  std::ifstream file(path, std::ios::binary);
+  return {{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()}};
+}
+
+bool ReadFilm(std::string_view bytes) {
+  const std::string path = FuzzFile("film", bytes);
+  return Accepts([&path] {
+    VideoReader reader(path, {.max_pixels = 1 << 16, .max_seconds = 60, .max_frames = 50});
+    double last = 0;
+    while (reader.Next()) {
+      FuzzRequire(reader.seconds() >= last && reader.seconds() <= 60, "times go on");
+      last = reader.seconds();
+      const Image picture = reader.Picture();
+      FuzzRequire(picture.width == reader.info().width && picture.channels == 3 &&
+                      picture.height == reader.info().height,
+                  "of the size that the header says");
+      FuzzRequire(reader.Grey(8).width <= 8, "scaled down");
+    }
+  });
+}
+
 // --- text in pictures: four numbers, then the text
 
 std::vector<std::string> TextSeeds() {
@@ -122,6 +169,8 @@ bool Draw(std::string_view bytes) {
 std::vector<FuzzTarget> PictureTargets() {
   return {{"image_format", FormatSeeds, ReadFormat, Mutate, 100000},
           {"photo", PhotoSeeds, ReadPhoto, MutatePhoto, 40000},
+          {"color_profile", ProfileSeeds, ReadProfile, Mutate, 8000},
+          {"film", FilmSeeds, ReadFilm, Mutate, 1000},
           {"picture_text", TextSeeds, Draw, Mutate, 8000}};
 }
 

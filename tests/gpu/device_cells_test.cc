@@ -7,14 +7,18 @@
 #include <cstring>
 #include <vector>
 
+#include "kernels/base/random.h"
 #include "kernels/field/cell_variation.h"
+#include "kernels/field/cpu/render_view.h"
 #include "kernels/field/cuda/device_cell_statistics.h"
+#include "kernels/field/cuda/device_free_space.h"
 #include "kernels/field/cuda/device_rays.h"
 #include "kernels/field/packed_grid.h"
 #include "kernels/field/render.h"
 #include "kernels/field/render_ray.h"
 #include "reconstruct/fit/measure_cells.h"
 #include "tests/support/cell_field.h"
+#include "tests/support/device_test.h"
 #include "tests/support/double_field.h"
 #include "tests/support/parity_row.h"
 
@@ -25,14 +29,7 @@ using testing::DoubleField;
 using testing::RandomCellField;
 using testing::RandomRays;
 
-class DeviceCellsTest : public ::testing::TestWithParam<int> {
- protected:
-  void SetUp() override {
-    const DeviceStatus status = ReadDeviceStatus();
-    if (!status.found) GTEST_SKIP() << "no GPU: " << status.name;
-  }
-  int basis() const { return GetParam(); }
-};
+class DeviceCellsTest : public testing::DeviceTestOfBasis {};
 
 void Row(const char* body, int basis, const char* against, double error, double tolerance) {
   testing::ParityRow(body, "cells, basis " + std::to_string(basis), against, error, tolerance);
@@ -76,6 +73,32 @@ TEST_P(DeviceCellsTest, Render) {
   Row("render", basis(), "plain float", error, 2e-5);
   Row("render", basis(), "plain double", exact_error, 1e-4);
   Row("depth", basis(), "plain float", depth_error, 1e-4);
+}
+
+// A frame's rays are made on the device; a view's, on the host for a lens with distortion.
+TEST_P(DeviceCellsTest, AFrameIsTheViewOfItsRays) {
+  const RadianceField field = RandomCellField({5, 4, 4}, 3, basis(), 33);
+  const FastGrid host = MakeFastGrid(field);
+  const DeviceGrid grid = UploadGrid(host);
+  Camera camera;
+  camera.width = 53;  // not whole tiles
+  camera.height = 37;
+  camera.fx = camera.fy = 40;
+  camera.cx = 26;
+  camera.cy = 18;
+  camera.camera_from_world.translation = {0, 0, 3};
+  const MarchOptions options{0.5f, 1e-4f};
+  const RenderedView is = RenderViewOnDevice(grid, camera, options);
+  const RenderedView should = RenderView(host, camera, options);
+  double off = 0, depth_off = 0;
+  for (size_t i = 0; i < is.color.pixels.size(); ++i)
+    off = std::max(off, std::abs(double{is.color.pixels[i]} - should.color.pixels[i]));
+  for (size_t i = 0; i < is.depth.pixels.size(); ++i)
+    if (std::isfinite(should.depth.pixels[i]))
+      depth_off =
+          std::max(depth_off, std::abs(double{is.depth.pixels[i]} - should.depth.pixels[i]));
+  Row("frame", basis(), "CPU", off, 2e-5);
+  Row("depths of a frame", basis(), "CPU", depth_off, 1e-3);
 }
 
 TEST_P(DeviceCellsTest, FitGradientAndVariation) {
@@ -137,6 +160,46 @@ TEST_P(DeviceCellsTest, FitGradientAndVariation) {
           exact_sums ? "plain double, exact sums" : "plain double", worst / largest, 1e-4);
       EXPECT_NEAR(fitter.TakeSums().squared_error, squares, 1e-4 * squares);
     }
+  }
+}
+
+TEST_P(DeviceCellsTest, FreeSpace) {
+  const RadianceField field = RandomCellField({3, 2, 2}, 2, basis(), 51);
+  const DoubleField d(field);
+  const CellsView view = ViewOf(field.geometry->cells, field.geometry->frame.resolution);
+  std::vector<FreeRay> rays;
+  for (const Ray& ray : RandomRays(40, 52)) rays.push_back({ray, 1.7f});
+  constexpr int kDrawn = 500;
+  constexpr uint64_t kSeed = 9, kStep = 3;
+  std::vector<double> plain(d.density.size());
+  for (int i = 0; i < kDrawn; ++i) {
+    const FreeRay& free =
+        rays[RandomIndex(kSeed, kStep, static_cast<uint64_t>(i), rays.size())];
+    const RayT<double> ray = testing::ToDouble(free.ray);
+    const double near_clip = field.near_clip, length = free.length;
+    const double opacity =
+        OpacityBefore(field.geometry->frame, view, d.density.data(), ray, near_clip, length);
+    OpacityBeforeAdjoint(field.geometry->frame, view, d.density.data(), ray, near_clip, length,
+                         opacity, 0.5 / kDrawn,
+                         [&](int32_t v, double g) { plain[static_cast<size_t>(v)] += g; });
+  }
+  DeviceFreeSpace free_space(rays);
+  for (const bool exact_sums : {false, true}) {
+    DeviceGrid grid = UploadGrid(MakeFastGrid(field), true, {}, exact_sums);
+    DeviceTouched touched(grid);
+    free_space.Accumulate(grid, kSeed, kStep, kDrawn, 0.5f, &touched);
+    free_space.Join();
+    const Buffer<float> gradient = DownloadGradient(grid);
+    double largest = 0, worst = 0;
+    const int lanes = RecordLanes(basis());
+    for (int64_t v = 0; v < field.geometry->cells.num_vertices(); ++v) {
+      largest = std::max(largest, std::abs(plain[static_cast<size_t>(v)]));
+      worst = std::max(worst, std::abs(gradient[v * lanes + DensityLane(basis())] -
+                                       plain[static_cast<size_t>(v)]));
+    }
+    EXPECT_GT(largest, 0);
+    Row("gradient of free space", basis(),
+        exact_sums ? "plain double, exact sums" : "plain double", worst / largest, 1e-4);
   }
 }
 

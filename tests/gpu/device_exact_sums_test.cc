@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "kernels/field/cuda/device_rays.h"
+#include "tests/support/device_test.h"
 #include "tests/support/parity_row.h"
 #include "tests/support/small_field.h"
 
@@ -17,20 +18,15 @@ namespace {
 using testing::RandomField;
 using testing::RandomRays;
 
-class DeviceExactSums : public ::testing::TestWithParam<int> {
+class DeviceExactSums : public testing::DeviceTestOfBasis {
  protected:
-  void SetUp() override {
-    const DeviceStatus status = ReadDeviceStatus();
-    if (!status.found) GTEST_SKIP() << "no GPU: " << status.name;
-  }
-
   // A step's gradient of the rays in the given order, including total variation, and the field
   // after the step.
   struct Step {
     Buffer<float> gradient, records;
   };
   Step Make(bool exact, bool backwards) const {
-    const FastGrid host = MakeFastGrid(RandomField({16, 14, 15}, GetParam(), 0.5, 77));
+    const FastGrid host = MakeFastGrid(RandomField({16, 14, 15}, basis(), 0.5, 77));
     DeviceGrid grid = UploadGrid(host, true, {}, exact);
     std::vector<Ray> rays = RandomRays(600, 7);
     if (backwards) std::reverse(rays.begin(), rays.end());
@@ -74,13 +70,13 @@ TEST_P(DeviceExactSums, EqualFloatSumsUpToRounding) {
     off = std::max(off, std::abs(double{exact.gradient[i]} - floats.gradient[i]));
     largest = std::max(largest, std::abs(double{floats.gradient[i]}));
   }
-  testing::ParityRow("exact sums", "basis " + std::to_string(GetParam()),
+  testing::ParityRow("exact sums", "basis " + std::to_string(basis()),
                      "float sums, of the largest", off / largest, 1e-5);
 }
 
 // H104 for integers: a voxel with a non-finite gradient does not change.
 TEST_P(DeviceExactSums, NonFiniteGradientsAreNotStepped) {
-  const FastGrid before = MakeFastGrid(RandomField({4, 4, 4}, GetParam(), 1.0, 51));
+  const FastGrid before = MakeFastGrid(RandomField({4, 4, 4}, basis(), 1.0, 51));
   DeviceGrid grid = UploadGrid(before, true, {}, true);
   DeviceTouched touched(grid);
   AddTotalVariation(grid, 0, grid.num_voxels(), std::numeric_limits<float>::infinity(), 0,

@@ -7,7 +7,9 @@
 #include <string>
 
 #include "pipeline/fields/field_renderer.h"
+#include "tests/support/device_test.h"
 #include "tests/support/parity_row.h"
+#include "tests/support/psnr.h"
 #include "tests/support/small_field.h"
 
 namespace regrade {
@@ -45,13 +47,6 @@ RadianceField Ball(float edge, int basis) {
   return field;
 }
 
-double PsnrOf(const Image& a, const Image& b) {
-  double sum = 0;
-  for (size_t i = 0; i < a.pixels.size(); ++i)
-    sum += std::pow(double{a.pixels[i]} - double{b.pixels[i]}, 2);
-  return -10 * std::log10(sum / static_cast<double>(a.pixels.size()));
-}
-
 Camera FilmCamera(bool inside) {
   Camera camera;
   camera.width = 160;
@@ -63,13 +58,7 @@ Camera FilmCamera(bool inside) {
   return camera;
 }
 
-class DeviceFilm : public ::testing::Test {
- protected:
-  void SetUp() override {
-    const DeviceStatus status = ReadDeviceStatus();
-    if (!status.found) GTEST_SKIP() << "no GPU: " << status.name;
-  }
-};
+using DeviceFilm = testing::DeviceTest;
 
 // 55 dB is what the report promises, less than the rounding of an 8-bit picture changes it
 // twice over (58.9 dB each).
@@ -83,7 +72,7 @@ TEST_F(DeviceFilm, FastFramesAreWithin55Db) {
       for (const bool inside : {false, true}) {
         const Camera camera = FilmCamera(inside);
         const Image exact = renderer.Render(camera).color;
-        const double db = PsnrOf(renderer.RenderFast(camera).color, exact);
+        const double db = testing::Psnr(renderer.RenderFast(camera).color, exact);
         const auto [low, high] = std::minmax_element(exact.pixels.begin(), exact.pixels.end());
         ASSERT_GT(*high - *low, 0.2f);  // a picture of something
         // It is another renderer, not the exact one again.

@@ -14,6 +14,7 @@
 #include "kernels/field/render_ray.h"
 #include "kernels/field/total_variation.h"
 #include "kernels/optimize/rmsprop.h"
+#include "tests/support/device_test.h"
 #include "tests/support/double_field.h"
 #include "tests/support/parity_row.h"
 #include "tests/support/small_field.h"
@@ -25,14 +26,7 @@ using testing::DoubleField;
 using testing::RandomField;
 using testing::RandomRays;
 
-class DeviceParity : public ::testing::TestWithParam<int> {
- protected:
-  void SetUp() override {
-    const DeviceStatus status = ReadDeviceStatus();
-    if (!status.found) GTEST_SKIP() << "no GPU: " << status.name;
-  }
-  int basis() const { return GetParam(); }
-};
+class DeviceParity : public testing::DeviceTestOfBasis {};
 
 void Row(const char* body, int basis, const char* against, double error, double tolerance) {
   testing::ParityRow(body, "basis " + std::to_string(basis), against, error, tolerance);

@@ -12,6 +12,7 @@
 #include "kernels/field/render_ray.h"
 #include "kernels/field/sphere_variation.h"
 #include "kernels/field/spherical_harmonics.h"
+#include "tests/support/device_test.h"
 #include "tests/support/double_field.h"
 #include "tests/support/parity_row.h"
 #include "tests/support/small_field.h"
@@ -45,13 +46,8 @@ double Largest(const std::vector<double>& values) {
   return largest;
 }
 
-class DeviceSpheresParity : public ::testing::TestWithParam<int> {
+class DeviceSpheresParity : public testing::DeviceTestOfBasis {
  protected:
-  void SetUp() override {
-    const DeviceStatus status = ReadDeviceStatus();
-    if (!status.found) GTEST_SKIP() << "no GPU: " << status.name;
-  }
-  int basis() const { return GetParam(); }
   void Row(const char* body, const char* against, double error, double tolerance) const {
     ParityRow(body, "basis " + std::to_string(basis()), against, error, tolerance);
   }

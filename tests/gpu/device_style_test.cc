@@ -12,6 +12,8 @@
 #include "kernels/device/device_memory.h"
 #include "kernels/field/packed_grid.h"
 #include "kernels/network/cuda/device_mlp.h"
+#include "tests/support/cell_field.h"
+#include "tests/support/device_test.h"
 #include "tests/support/parity_row.h"
 #include "tests/support/small_field.h"
 #include "tests/support/styled_ball.h"
@@ -21,13 +23,7 @@ namespace {
 
 using namespace testing;  // NOLINT: a test
 
-class DeviceStyle : public ::testing::Test {
- protected:
-  void SetUp() override {
-    const DeviceStatus status = ReadDeviceStatus();
-    if (!status.found) GTEST_SKIP() << "no GPU: " << status.name;
-  }
-};
+using DeviceStyle = testing::DeviceTest;
 
 DenseNetwork<double> InDouble(const DenseNetwork<float>& network) {
   DenseNetwork<double> exact;
@@ -135,18 +131,22 @@ TEST_F(DeviceStyle, MlpLessThanATile) { CheckMlp(1); }
 TEST_F(DeviceStyle, MlpNoWholeTiles) { CheckMlp(37); }
 TEST_F(DeviceStyle, LargeMlpOfTwoChunks) { CheckMlp(70001); }
 
-// A ball, and one in front of background layers.
-RadianceField BallBefore(bool layers, int n, int basis) {
+enum class Scene { kBall, kBallBeforeLayers, kCells };
+constexpr const char* kSceneNames[] = {"", ", layers", ", cells"};
+
+// A ball of n voxels a side, one in front of background layers, or cells of three sizes.
+RadianceField FieldOf(Scene scene, int n, int basis) {
+  if (scene == Scene::kCells) return RandomCellField({4, 4, 4}, 2, basis, 81);
   RadianceField field = Ball(n, basis);
-  if (layers) AddSpheres(40, 9, 0.7, 5, &field);
+  if (scene == Scene::kBallBeforeLayers) AddSpheres(40, 9, 0.7, 5, &field);
   return field;
 }
 
 // Loss, gradient and counts of the device path against the CPU's, which other tests compare
 // with Algorithm 1 in double.
-void CheckLossAndGradient(int side, bool layers) {
+void CheckLossAndGradient(int side, Scene scene) {
   for (const int basis : {9, 4, 1}) {
-    const RadianceField field = BallBefore(layers, 14, basis);
+    const RadianceField field = FieldOf(scene, 14, basis);
     const DeviceGrid grid = UploadGrid(MakeFastGrid(field));
     LipschitzNetwork network = RandomNetwork(91);
     network.data().has_base = true;
@@ -168,8 +168,8 @@ void CheckLossAndGradient(int side, bool layers) {
       const AggregationResult exact = on_device->Run(network, batch, nullptr);
       const AggregationResult is = on_device->Run(network, batch, &gradient);
       const std::string what = "basis " + std::to_string(basis) + ", " +
-                               std::to_string(batch.rays.size()) +
-                               (layers ? " rays, layers" : " rays");
+                               std::to_string(batch.rays.size()) + " rays" +
+                               kSceneNames[static_cast<int>(scene)];
       EXPECT_EQ(is.rays, should.rays);
       EXPECT_NEAR(static_cast<double>(is.samples), static_cast<double>(should.samples),
                   3);  // at the threshold
@@ -185,18 +185,21 @@ void CheckLossAndGradient(int side, bool layers) {
   }
 }
 
-TEST_F(DeviceStyle, LossAndGradient) { CheckLossAndGradient(13, false); }
-TEST_F(DeviceStyle, LossAndGradientBeforeLayers) { CheckLossAndGradient(13, true); }
-TEST_F(DeviceStyle, LargeLossAndGradientOfTwoBands) { CheckLossAndGradient(150, false); }
+TEST_F(DeviceStyle, LossAndGradient) { CheckLossAndGradient(13, Scene::kBall); }
+TEST_F(DeviceStyle, LossAndGradientBeforeLayers) {
+  CheckLossAndGradient(13, Scene::kBallBeforeLayers);
+}
+TEST_F(DeviceStyle, LossAndGradientOfCells) { CheckLossAndGradient(13, Scene::kCells); }
+TEST_F(DeviceStyle, LargeLossAndGradientOfTwoBands) { CheckLossAndGradient(150, Scene::kBall); }
 TEST_F(DeviceStyle, LargeLossAndGradientOfTwoBandsBeforeLayers) {
-  CheckLossAndGradient(150, true);
+  CheckLossAndGradient(150, Scene::kBallBeforeLayers);
 }
 
 // With the rays in the opposite order samples arrive in another one, and the bands hold others.
 // Against float sums: TF32 rounds some factors whose last bit differs to the other side, by
 // 1e-3 each, and few do.
-void CheckExactSums(int side, bool layers) {
-  const RadianceField field = BallBefore(layers, 40, 9);
+void CheckExactSums(int side, Scene scene) {
+  const RadianceField field = FieldOf(scene, 40, 9);
   const DeviceGrid grid = UploadGrid(MakeFastGrid(field));
   const LipschitzNetwork network = RandomNetwork(33);
   StyleRays batch = SomeRays(3, side);
@@ -230,15 +233,21 @@ void CheckExactSums(int side, bool layers) {
       ASSERT_EQ(one.sums.hidden[kMlpHidden * r + h],
                 other.sums.hidden[kMlpHidden * (n - 1 - r) + h]);
   }
-  ParityRow("exact sums of the style", std::to_string(n) + (layers ? " rays, layers" : " rays"),
+  ParityRow("exact sums of the style",
+            std::to_string(n) + " rays" + kSceneNames[static_cast<int>(scene)],
             "float sums, norms", RelativeDifference(one.gradient, floats.gradient), 1e-4);
 }
 
-TEST_F(DeviceStyle, H68_ExactSumsAreTheSameBitsInAnyOrder) { CheckExactSums(50, false); }
-TEST_F(DeviceStyle, H68_LargeExactSumsAreTheSameBitsInAnyOrder) { CheckExactSums(150, true); }
+TEST_F(DeviceStyle, H68_ExactSumsAreTheSameBitsInAnyOrder) { CheckExactSums(50, Scene::kBall); }
+TEST_F(DeviceStyle, H68_ExactSumsOfCellsAreTheSameBitsInAnyOrder) {
+  CheckExactSums(50, Scene::kCells);
+}
+TEST_F(DeviceStyle, H68_LargeExactSumsAreTheSameBitsInAnyOrder) {
+  CheckExactSums(150, Scene::kBallBeforeLayers);
+}
 
-void CheckHiddenSums(bool layers) {
-  const RadianceField field = BallBefore(layers, 12, 9);
+void CheckHiddenSums(Scene scene) {
+  const RadianceField field = FieldOf(scene, 12, 9);
   const DeviceGrid grid = UploadGrid(MakeFastGrid(field));
   const StyleRays batch = SomeRays(2, 20);
   const LipschitzNetwork network = RandomNetwork(33);
@@ -252,15 +261,19 @@ void CheckHiddenSums(bool layers) {
     off = std::max(off, std::abs(double{is.hidden[i]} - should.hidden[i]));
   for (size_t i = 0; i < is.missing.size(); ++i)
     off = std::max(off, std::abs(double{is.missing[i]} - should.missing[i]));
-  ParityRow("hidden sums", layers ? "basis 9, layers" : "basis 9", "CPU", off, 5e-5);
+  ParityRow("hidden sums", std::string("basis 9") + kSceneNames[static_cast<int>(scene)], "CPU",
+            off, 5e-5);
 }
 
-TEST_F(DeviceStyle, HiddenSums) { CheckHiddenSums(false); }
-TEST_F(DeviceStyle, HiddenSumsBeforeLayers) { CheckHiddenSums(true); }
+TEST_F(DeviceStyle, HiddenSums) { CheckHiddenSums(Scene::kBall); }
+TEST_F(DeviceStyle, HiddenSumsBeforeLayers) { CheckHiddenSums(Scene::kBallBeforeLayers); }
+TEST_F(DeviceStyle, HiddenSumsOfCells) { CheckHiddenSums(Scene::kCells); }
 
-TEST_F(DeviceStyle, Restyle) {
+void CheckRestyle(Scene scene) {
   for (const int basis : {9, 4, 1}) {
-    const RadianceField field = BallBefore(true, 13, basis);
+    const std::string what =
+        "basis " + std::to_string(basis) + kSceneNames[static_cast<int>(scene)];
+    const RadianceField field = FieldOf(scene, 13, basis);
     LipschitzNetwork network = RandomNetwork(92);
     network.data().has_base = true;
     network.data().base = SomeMap();
@@ -276,7 +289,7 @@ TEST_F(DeviceStyle, Restyle) {
       ASSERT_EQ(restyled.records[v * restyled.lanes() + DensityLane(basis)],
                 field.geometry->density[v]);
     }
-    ParityRow("restyled voxels", "basis " + std::to_string(basis), "CPU", off, 2e-5);
+    ParityRow("restyled voxels", what, "CPU", off, 2e-5);
     double layers_off = 0;
     for (int64_t t = 0; t < restyled.spheres.num_texels(); ++t) {
       for (int c = 0; c < 3; ++c)
@@ -284,9 +297,12 @@ TEST_F(DeviceStyle, Restyle) {
                                                    should.sphere_color[3 * t + c]));
       ASSERT_EQ(restyled.spheres.texels[4 * t + 3], field.geometry->spheres.density[t]);
     }
-    ParityRow("restyled layers", "basis " + std::to_string(basis), "CPU", layers_off, 2e-5);
+    ParityRow("restyled layers", what, "CPU", layers_off, 2e-5);
   }
 }
+
+TEST_F(DeviceStyle, Restyle) { CheckRestyle(Scene::kBallBeforeLayers); }
+TEST_F(DeviceStyle, RestyleOfCells) { CheckRestyle(Scene::kCells); }
 
 }  // namespace
 }  // namespace regrade

@@ -11,6 +11,7 @@
 
 #include "stylize/cuda/device_style.h"
 #include "stylize/training/host_steps.h"
+#include "tests/support/device_test.h"
 #include "tests/support/parity_row.h"
 #include "tests/support/small_field.h"
 #include "tests/support/styled_ball.h"
@@ -20,13 +21,8 @@ namespace {
 
 using namespace testing;  // NOLINT: a test
 
-class DeviceStyleTraining : public ::testing::Test {
+class DeviceStyleTraining : public testing::DeviceTest {
  protected:
-  void SetUp() override {
-    const DeviceStatus status = ReadDeviceStatus();
-    if (!status.found) GTEST_SKIP() << "no GPU here: " << status.name;
-  }
-
   static LipschitzNetwork Start() {
     LipschitzNetwork network = RandomNetwork(33);
     network.data().sh_scale = 2;

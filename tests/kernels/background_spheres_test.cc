@@ -12,6 +12,7 @@
 #include "kernels/field/packed_grid.h"
 #include "kernels/field/render_ray.h"
 #include "kernels/field/sphere_variation.h"
+#include "tests/support/derivative.h"
 #include "tests/support/double_field.h"
 #include "tests/support/record_error.h"
 #include "tests/support/small_field.h"
@@ -20,6 +21,7 @@ namespace regrade {
 namespace {
 
 using testing::AddSpheres;
+using testing::DerivativeBy;
 using testing::DoubleField;
 using testing::RandomField;
 using testing::RandomRays;
@@ -181,18 +183,8 @@ TEST(BackgroundSpheres, AdjointEqualsDerivativeInDouble) {
                      PlainAdd(), d_sphere_density.data(), d_sphere_color.data());
     const auto loss = [&] { return Dot(RenderRay(d.view(), ray, options).color, d_color); };
     const auto check = [&](double* x, double gradient) {
-      const double x0 = *x;
-      const auto central = [&](double h) {
-        *x = x0 + h;
-        const double up = loss();
-        *x = x0 - h;
-        const double down = loss();
-        *x = x0;
-        return (up - down) / (2 * h);
-      };
-      const double fine = central(1e-4), coarse = central(2e-4);
-      if (std::abs(fine - coarse) > 1e-6) return 0;  // a kink between the two steps
-      const double numeric = (4 * fine - coarse) / 3;
+      const double numeric = DerivativeBy(x, loss, 2e-4, testing::kKink);
+      if (std::isnan(numeric)) return 0;
       EXPECT_NEAR(numeric, gradient,
                   testing::RecordDigits("gradient of a pixel before spheres",
                                         testing::Computed::kDouble, numeric - gradient, 1e-8,
@@ -321,16 +313,8 @@ TEST(SphereVariation, GradientIsTheValuesDerivative) {
   value(1.0, [&](int32_t texel, double d) { gradient[static_cast<size_t>(texel)] += d; });
   const auto nothing = [](int32_t, double) {};
   for (size_t i = 0; i < values.size(); ++i) {
-    const double x = values[i];
-    const auto central = [&](double h) {
-      values[i] = x + h;
-      const double up = value(0.0, nothing);
-      values[i] = x - h;
-      const double down = value(0.0, nothing);
-      values[i] = x;
-      return (up - down) / (2 * h);
-    };
-    const double numeric = (4 * central(1e-4) - central(2e-4)) / 3;
+    const double numeric = DerivativeBy(
+        &values[i], [&] { return value(0.0, nothing); }, 2e-4);
     EXPECT_NEAR(numeric, gradient[i],
                 testing::RecordDigits("gradient", testing::Computed::kDouble,
                                       numeric - gradient[i], 1e-8));  // see H97

@@ -17,26 +17,12 @@
 namespace regrade {
 namespace {
 
+using testing::DerivativeBy;
 using testing::DoubleField;
+using testing::kKink;
 using testing::RandomCellField;
 using testing::RandomRays;
 using testing::ToDouble;
-
-// Richardson-extrapolated central differences of f at *x; NaN at a kink.
-template <typename F>
-double Derivative(double* x, const F& f) {
-  const double x0 = *x;
-  const auto central = [&](double h) {
-    *x = x0 + h;
-    const double up = f();
-    *x = x0 - h;
-    const double down = f();
-    *x = x0;
-    return (up - down) / (2 * h);
-  };
-  const double fine = central(1e-4), coarse = central(2e-4);
-  return std::abs(fine - coarse) > 1e-6 ? std::nan("") : (4 * fine - coarse) / 3;
-}
 
 // Rays cross faces between levels, so the gradients of the vertices on them are among those
 // checked.
@@ -55,7 +41,7 @@ TEST(CellGradient, H166_AdjointEqualsDerivativeInDoubleAcrossFaces) {
                        PlainAdd());
       const auto loss = [&] { return Dot(RenderRay(d.view(), ray, options).color, d_color); };
       const auto check = [&](double* x, double gradient) {
-        const double numeric = Derivative(x, loss);
+        const double numeric = DerivativeBy(x, loss, 2e-4, kKink);
         if (std::isnan(numeric)) return;
         EXPECT_NEAR(numeric, gradient,
                     testing::RecordDigits("gradient of a pixel", testing::Computed::kDouble,
@@ -83,7 +69,8 @@ TEST(CellVariation, H166_GradientIsTheValuesDerivative) {
   };
   CellVariation<double>(cells, values.data(), 1, 0, unit, 0, n, 1.0, gradient.data());
   for (size_t i = 0; i < values.size(); i += 3)
-    EXPECT_NEAR(Derivative(&values[i], value), gradient[i], 1e-8 * (1 + std::abs(gradient[i])));
+    EXPECT_NEAR(DerivativeBy(&values[i], value, 2e-4), gradient[i],
+                1e-8 * (1 + std::abs(gradient[i])));
   // A constant field has none, on any levels.
   std::fill(values.begin(), values.end(), 3.5);
   EXPECT_NEAR(value(), static_cast<double>(n) * std::sqrt(1e-9), 1e-9);

@@ -1,7 +1,6 @@
 #include "kernels/image/color_statistics.h"
 
 #include <gtest/gtest.h>
-#include <omp.h>
 
 #include <cmath>
 #include <cstring>
@@ -12,6 +11,7 @@
 #include "kernels/base/random.h"
 #include "tests/support/floating_point_traps.h"
 #include "tests/support/record_error.h"
+#include "tests/support/threads.h"
 
 namespace regrade {
 namespace {
@@ -162,19 +162,17 @@ TEST(ColorStatistics, H17_IntegerSumsDoNotLoseASingleStep) {
 }
 
 TEST(ColorStatistics, H17_SameBitsForAnyNumberOfThreads) {
-  const int threads = omp_get_max_threads();
   for (const bool is_8_bit : {true, false}) {
     const Image image = RandomImage(127, 203, 5, is_8_bit);
-    omp_set_num_threads(1);
+    const testing::Threads single(1);
     const ColorStatistics one = MeasureColor(image);
     for (const int n : {2, 3, 7}) {
-      omp_set_num_threads(n);
+      const testing::Threads threads(n);
       EXPECT_TRUE(testing::RecordSameBits("1 to 7 threads", testing::Computed::kDouble,
                                           SameBits(MeasureColor(image), one)))
           << n << " threads, 8-bit " << is_8_bit;
     }
   }
-  omp_set_num_threads(threads);
 }
 
 TEST(ColorStatistics, H18_SmallSpreadAroundALargeMean) {

@@ -1,7 +1,6 @@
 // The Lipschitz layer, the fused network against its plain specification, Adam and its
 // schedule.
 #include <gtest/gtest.h>
-#include <omp.h>
 
 #include <cmath>
 #include <limits>
@@ -15,11 +14,12 @@
 #include "tests/support/derivative.h"
 #include "tests/support/floating_point_traps.h"
 #include "tests/support/record_error.h"
+#include "tests/support/threads.h"
 
 namespace regrade {
 namespace {
 
-using testing::Derivative;
+using testing::DerivativeBy;
 
 double Random(uint64_t stream, uint64_t counter) {  // uniform in [-1, 1)
   return 2 * RandomDouble(20231103, stream, counter) - 1;
@@ -139,14 +139,7 @@ TEST(LipschitzLayer, H46_H47_GradientWithFrozenVectors) {
   double d_k = 0;
   LipschitzWeightAdjoint(m.View(), k, d_a.weight.data(), d_w.data(), &d_k);
   for (int i = 0; i < 20; ++i) {
-    const double before = m.weight[i];
-    const double numeric = Derivative(
-        [&](double x) {
-          m.weight[i] = x;
-          return loss();
-        },
-        before, 1e-3);
-    m.weight[i] = before;
+    const double numeric = DerivativeBy(&m.weight[i], loss, 1e-3);
     EXPECT_NEAR(d_w[i], numeric,
                 testing::RecordDigits("gradient by W", testing::Computed::kDouble,
                                       d_w[i] - numeric, 1e-8))
@@ -158,12 +151,7 @@ TEST(LipschitzLayer, H46_H47_GradientWithFrozenVectors) {
     k = at;
     d_k = 0;
     LipschitzWeightAdjoint(m.View(), k, d_a.weight.data(), d_w.data(), &d_k);
-    const double numeric = Derivative(
-        [&](double x) {
-          k = x;
-          return loss();
-        },
-        at, at > 0.1 ? 1e-3 : 1e-8);
+    const double numeric = DerivativeBy(&k, loss, at > 0.1 ? 1e-3 : 1e-8);
     EXPECT_NEAR(d_k, numeric,
                 at > 0.1 ? testing::RecordDigits("gradient by K", testing::Computed::kDouble,
                                                  d_k - numeric, 1e-9)
@@ -221,14 +209,7 @@ TEST(DenseNetwork, AdjointAgainstRichardson) {
       return y[0] * d_y[0] + y[1] * d_y[1] + y[2] * d_y[2];
     };
     const auto check = [&](double* value, double analytic) {
-      const double before = *value;
-      const double numeric = Derivative(
-          [&](double v) {
-            *value = v;
-            return loss();
-          },
-          before, 1e-3);
-      *value = before;
+      const double numeric = DerivativeBy(value, loss, 1e-3);
       EXPECT_NEAR(
           analytic, numeric,
           testing::RecordDigits("gradient of a dense network", testing::Computed::kDouble,
@@ -339,14 +320,12 @@ TEST(FusedMlp, ThreadsDoNotChangeABit) {
   std::vector<float> x(kRows * kMlpEndLanes), y[2];
   for (size_t i = 0; i < x.size(); ++i) x[i] = i % 32 < 27 ? Random(32, i) : 0;
   DenseNetwork<double> gradient[2] = {ZeroLike<double>(network), ZeroLike<double>(network)};
-  const int threads = omp_get_max_threads();
   for (int t = 0; t < 2; ++t) {
-    omp_set_num_threads(t == 0 ? 1 : 5);
+    const testing::Threads threads(t == 0 ? 1 : 5);
     y[t].resize(x.size());
     FusedForward(mlp, x.data(), kRows, y[t].data());
     FusedAdjoint(mlp, x.data(), x.data(), kRows, &gradient[t]);
   }
-  omp_set_num_threads(threads);
   EXPECT_TRUE(
       testing::RecordSameBits("1 and 5 threads", testing::Computed::kFloat, y[0] == y[1]));
   for (size_t l = 0; l < 6; ++l) {

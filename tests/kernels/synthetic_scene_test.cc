@@ -3,13 +3,13 @@
 #include "kernels/synthetic/synthetic_scene.h"
 
 #include <gtest/gtest.h>
-#include <omp.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include "kernels/base/error.h"
 #include "kernels/synthetic/ray_trace.h"
+#include "tests/support/threads.h"
 
 namespace regrade {
 namespace {
@@ -31,12 +31,11 @@ INSTANTIATE_TEST_SUITE_P(SyntheticScene, EveryScene, ::testing::ValuesIn(kScenes
 TEST_P(EveryScene, SameBytesForAnyNumberOfThreads) {
   const SyntheticScene scene = MakeSyntheticScene(GetParam(), 3);
   const Camera camera = SyntheticCameras(scene, 24, 96, 72)[5];
-  const int threads = omp_get_max_threads();
-  omp_set_num_threads(1);
-  const SyntheticView one = RenderSyntheticView(scene, camera);
-  omp_set_num_threads(3);
-  const SyntheticView three = RenderSyntheticView(scene, camera);
-  omp_set_num_threads(threads);
+  const auto with_threads = [&](int n) {
+    const testing::Threads threads(n);
+    return RenderSyntheticView(scene, camera);
+  };
+  const SyntheticView one = with_threads(1), three = with_threads(3);
   EXPECT_EQ(one.color.pixels, three.color.pixels);
   EXPECT_EQ(one.depth.pixels, three.depth.pixels);
 }

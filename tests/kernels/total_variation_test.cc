@@ -7,6 +7,7 @@
 
 #include "kernels/field/cpu/rays.h"
 #include "kernels/field/packed_grid.h"
+#include "tests/support/derivative.h"
 #include "tests/support/record_error.h"
 #include "tests/support/small_field.h"
 
@@ -27,16 +28,7 @@ TEST(TotalVariation, H97_GradientIsTheValuesDerivative) {
     TotalVariation<double>(g.frame, g.links.data(), values.data(), 1, 0, empty_is_zero, 0,
                            g.frame.NumVertices(), 1.0, gradient.data());
     for (size_t i = 0; i < values.size(); ++i) {
-      const double x = values[i];
-      const auto central = [&](double h) {
-        values[i] = x + h;
-        const double up = value();
-        values[i] = x - h;
-        const double down = value();
-        values[i] = x;
-        return (up - down) / (2 * h);
-      };
-      const double numeric = (4 * central(1e-4) - central(2e-4)) / 3;
+      const double numeric = testing::DerivativeBy(&values[i], value, 2e-4);
       EXPECT_NEAR(
           numeric, gradient[i],
           testing::RecordDigits("gradient", testing::Computed::kDouble, numeric - gradient[i],

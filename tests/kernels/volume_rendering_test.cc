@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "kernels/base/random.h"
+#include "tests/support/derivative.h"
 #include "tests/support/record_error.h"
 
 namespace regrade {
@@ -102,18 +103,7 @@ TEST(VolumeRendering, H58_H61_AdjointEqualsDerivative) {
         Composite(OpticalDepth(sigma[i], delta[i]), color[i], &state);
       return Dot(state.color + background * state.transmittance, d_color);
     };
-    const auto derivative = [&](double* x) {
-      const double x0 = *x;
-      const auto central = [&](double h) {
-        *x = x0 + h;
-        const double up = loss();
-        *x = x0 - h;
-        const double down = loss();
-        *x = x0;
-        return (up - down) / (2 * h);
-      };
-      return (4 * central(5e-4) - central(1e-3)) / 3;
-    };
+    const auto derivative = [&](double* x) { return testing::DerivativeBy(x, loss, 1e-3); };
     std::vector<double> weight(kN), after(kN);
     CompositeState<double> state;
     for (int i = 0; i < kN; ++i) {

@@ -213,8 +213,8 @@ TEST(Prediction, RefusesCostsOfAnotherSchema) {
 TEST(DurationEstimate, ImprovesWithTheFirstMeasurement) {
   RunSettings base;
   const Variant own = FitVariant("", "");
-  Variant twice = FitVariant("fit-steps", "1600,4000,6000", true);
-  twice.options["fit-steps"] = JsonValue::Array{1600, 4000, 6000};
+  Variant twice = FitVariant("fit-steps", "1200,1800,2400,4600", true);
+  twice.options["fit-steps"] = JsonValue::Array{1200, 1800, 2400, 4600};
   DurationEstimate estimate(base, {});
   EXPECT_NEAR(estimate.Seconds(twice), 2 * estimate.Seconds(own), 1e-6 * estimate.Seconds(own));
   estimate.Add({"fit", "", "", 0, 10, 15, 26});

@@ -12,7 +12,7 @@
 #include "pipeline/capture/transforms_json.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/images/image_file.h"
-#include "pipeline/images/video_writer.h"
+#include "pipeline/images/video_reader.h"
 #include "tests/support/source_dir.h"
 #include "tests/support/spawn.h"
 #include "tests/support/temporary_folder.h"

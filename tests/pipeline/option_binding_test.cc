@@ -5,6 +5,7 @@
 #include <clocale>
 #include <locale>
 
+#include "pipeline/commands/command.h"
 #include "pipeline/program/nearest_name.h"
 #include "tests/support/expect_error.h"
 
@@ -21,6 +22,7 @@ struct Sample {
   double rate = 1e-3;
   std::string name = "none";
   std::string method = "mkl";
+  std::string stage;
   std::vector<int> sizes = {64, 128};
 
   template <typename Bind>
@@ -34,6 +36,7 @@ struct Sample {
     bind("rate", rate, {.min = 0});
     bind("name", name, {});
     bind("method", method, {.choices = "mkl|reinhard"});
+    bind("stage", stage, {.choices = "|pose|render"});
     bind("sizes", sizes, {.min = 8, .max = 1024});
   }
 };
@@ -168,6 +171,22 @@ TEST_F(Options, HelpHasUnitDefaultAndBounds) {
       << help;
   EXPECT_NE(help.find("--method mkl|reinhard"), std::string::npos);
   EXPECT_NE(help.find("default 64,128"), std::string::npos);
+  EXPECT_NE(help.find("--stage pose|render"), std::string::npos);  // none is no choice
+  EXPECT_EQ(help.find("required"), std::string::npos);
+}
+
+TEST_F(Options, HelpNamesWhatACommandRequires) {
+  Parse({});
+  const std::string help = set_.Help({"stage"});
+  const size_t stage = help.find("--stage");
+  EXPECT_NE(help.find("(required)", stage), std::string::npos) << help;
+  EXPECT_EQ(help.find("(default none)", stage), std::string::npos);
+  using Names = std::vector<std::string>;
+  EXPECT_EQ(RequiredOptions("DIR --style PICTURE --out DIR [OPTIONS]"),
+            (Names{"style", "out"}));
+  EXPECT_EQ(RequiredOptions("DIR --out DIR [--style PICTURE] [OPTIONS] | --predict DIR"),
+            (Names{"out"}));
+  EXPECT_EQ(RequiredOptions("DIR [OPTIONS] | --frames DIR"), Names{});
 }
 
 TEST(NearestName, EditsAndBeginnings) {

@@ -145,6 +145,15 @@ inline double MaxDifference(const Image& a, const Image& b) {
   return worst;
 }
 
+inline double MeanDifference(const Image& a, const Image& b) {
+  EXPECT_TRUE(a.SameSize(b) && a.channels == b.channels);
+  if (a.pixels.size() != b.pixels.size()) return 1e9;
+  double sum = 0;
+  for (size_t i = 0; i < a.pixels.size(); ++i)
+    sum += std::abs(static_cast<double>(a.pixels[i]) - b.pixels[i]);
+  return sum / static_cast<double>(a.pixels.size());
+}
+
 // A test with a scratch folder.
 class PictureTest : public ::testing::Test {
  protected:

@@ -12,6 +12,7 @@ constexpr uint64_t kProgram = static_cast<uint64_t>(kProgramBytes);
 
 FitOptions Fit(const std::vector<int>& resolutions, const std::vector<int>& steps) {
   FitOptions options;
+  options.MakeUniform();
   options.resolutions = resolutions;
   options.steps = steps;
   options.rays_per_step = 10500;
@@ -113,6 +114,37 @@ TEST(Plan, ResolutionsAreLoweredToMemory) {
   EXPECT_TRUE(LowerToMemory(plan_of, 1, &options));  // in vain: CheckFitsMemory then says so
   EXPECT_EQ(options.resolutions, (std::vector<int>{64, 64, 64}));
   EXPECT_FALSE(LowerToMemory(plan_of, 1, &options));
+}
+
+// 100^3 cells of level 0; later 25 times the square of the resolution, up to the limit. 1.2
+// vertices a cell with what a uniform field's voxels take but a pruned copy's weights; 45 B a
+// cell twice and two threads' statistics of 24 B.
+TEST(Plan, MemoryOfAnAdaptiveFieldByHand) {
+  FitOptions fit = Fit({100}, {10});
+  fit.field = "auto";
+  const double per_cell = 1.2 * (4 * 128 + 4 * 4) + 2 * 45 + 2 * 24;
+  const auto memory = [&](const std::vector<int>& resolutions) {
+    fit.resolutions = resolutions;
+    fit.steps.assign(resolutions.size(), 10);
+    return static_cast<double>(PlanFit(fit, 0, kCube, 2).memory) - kProgramBytes;
+  };
+  EXPECT_NEAR(memory({100}), 1e6 * per_cell, 2);
+  EXPECT_NEAR(memory({100, 400}), 4e6 * per_cell, 2);
+  fit.max_cells = 2;
+  EXPECT_NEAR(memory({100, 400}), 2e6 * per_cell, 2);
+  // To half of the memory: fewer cells, by steps of a tenth.
+  const auto plan_of = [](const FitOptions& options) { return PlanFit(options, 0, kCube, 2); };
+  const uint64_t half = plan_of(fit).memory / 2 + kProgram / 2;
+  FitOptions lowered = fit;
+  fit.resolutions = {50, 400};
+  lowered.resolutions = fit.resolutions;
+  EXPECT_TRUE(LowerToMemory(plan_of, half, &lowered));
+  EXPECT_EQ(lowered.resolutions, fit.resolutions);
+  EXPECT_LE(plan_of(lowered).memory, half);
+  EXPECT_GT(static_cast<double>(plan_of(lowered).memory), 0.85 * static_cast<double>(half));
+  EXPECT_TRUE(LowerToMemory(plan_of, 1, &lowered));  // in vain: CheckFitsMemory then says so
+  EXPECT_EQ(lowered.max_cells, kLeastCells);
+  EXPECT_FALSE(LowerToMemory(plan_of, 1, &lowered));
 }
 
 }  // namespace

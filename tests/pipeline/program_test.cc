@@ -6,10 +6,13 @@
 
 #include <algorithm>
 #include <csignal>
+#include <filesystem>
+#include <fstream>
 #include <thread>
 
 #include "kernels/process/child_process.h"
 #include "pipeline/files/json_file.h"
+#include "pipeline/images/video_writer.h"
 #include "pipeline/program/interrupt.h"
 #include "pipeline/workspace/workspace.h"
 #include "tests/support/source_dir.h"
@@ -93,6 +96,24 @@ TEST(Program, F18_UsageErrorsExitWith2) {
   EXPECT_EQ(Regrade({"pose", "a"}).code, 2);
   EXPECT_EQ(Regrade({"tradeoff"}).code, 2);
   EXPECT_EQ(Regrade({"synth", "x", "--scene", "moon"}).code, 2);
+}
+
+TEST(Program, F90_FilmsArePlannedAndDamagedOnesExitWith3) {
+  const TemporaryFolder folder;
+  VideoWriter film(folder / "walk.mp4", 64, 48, 30);
+  for (int i = 0; i < 45; ++i) film.Add(Image(64, 48));
+  film.Finish();
+  Outcome outcome = Regrade({"pose", folder / "walk.mp4", "--out", folder / "o", "--dry-run"});
+  EXPECT_EQ(outcome.code, 0) << outcome.text;
+  EXPECT_SAYS(outcome, "1 film (1.5 s), of which 40 to 120 frames are picked in");
+  EXPECT_FALSE(std::filesystem::exists(folder / "o"));
+  std::filesystem::resize_file(folder / "walk.mp4", 300);
+  std::ofstream(folder / "empty.mov");
+  for (const char* name : {"walk.mp4", "empty.mov", "none.mp4"}) {
+    outcome = Regrade({"pose", folder / name, "--out", folder / "o"});
+    EXPECT_EQ(outcome.code, 3) << outcome.text;
+    EXPECT_SAYS(outcome, name);
+  }
 }
 
 // The child process of crash_probe.h.

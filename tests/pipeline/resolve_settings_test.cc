@@ -73,7 +73,7 @@ TEST(ResolveSettings, LaterSourcesOverrideEarlierOnes) {
 
   Resolved r = Resolve({}, sources);
   EXPECT_EQ(r.words, std::vector<std::string>{"/photos"});
-  EXPECT_EQ(r.settings.fit.resolutions, (std::vector<int>{64, 128, 192}));  // its preset
+  EXPECT_EQ(r.settings.fit.resolutions, (std::vector<int>{64, 128, 256}));  // its preset
   EXPECT_EQ(r.settings.scene.photo_size, 300);  // its option over its preset
   EXPECT_EQ(r.settings.network.rays_per_step, 7);
 
@@ -89,6 +89,18 @@ TEST(ResolveSettings, LaterSourcesOverrideEarlierOnes) {
   EXPECT_EQ(r.settings.fit.resolutions, FitOptions().resolutions);
   EXPECT_EQ(r.settings.network.rays_per_step, TrainNetworkOptions().rays_per_step);
   EXPECT_EQ(r.settings.render.fps, 12);
+
+  // A field of another kind brings its rates and regularisers, and nothing over a flag.
+  FitOptions uniform;
+  uniform.MakeUniform();
+  r = Resolve({"--fit-field", "uniform", "--tv-sh", "0.5"});
+  EXPECT_EQ(r.settings.fit.rate_density, uniform.rate_density);
+  EXPECT_EQ(r.settings.fit.tv_sh, 0.5f);
+  EXPECT_EQ(r.settings.fit.resolutions, FitOptions().resolutions);
+  r = Resolve({"--preset", "paper", "--fit-field", "uniform"});
+  EXPECT_EQ(r.settings.fit.rate_density, 30);  // its own: the field is uniform there, too
+  r = Resolve({"--preset", "paper", "--fit-field", "adaptive"});
+  EXPECT_EQ(r.settings.fit.rate_density, FitOptions().rate_density);
 
   r = Resolve({"--preset", "best", "--photo-size", "320", "--recipe", "paper"}, sources);
   EXPECT_EQ(r.settings.scene.photo_size, 320);

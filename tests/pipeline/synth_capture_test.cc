@@ -2,7 +2,6 @@
 #include "pipeline/synth/synth_capture.h"
 
 #include <gtest/gtest.h>
-#include <omp.h>
 
 #include <cmath>
 #include <cstring>
@@ -20,6 +19,7 @@
 #include "pipeline/images/image_file.h"
 #include "pipeline/synth/synth_effects.h"
 #include "reconstruct/colmap/colmap_model.h"
+#include "tests/support/threads.h"
 
 namespace regrade {
 namespace {
@@ -123,12 +123,11 @@ TEST_F(SynthCapture, TruthOnDiskIsThatOfTheScene) {
 }
 
 TEST_F(SynthCapture, SameBytesForAnyNumberOfThreadsAndEveryTime) {
-  const int threads = omp_get_max_threads();
-  omp_set_num_threads(1);
-  const auto one = AllBytes(Write("one", "exposure,noise,distortion,highlights"));
-  omp_set_num_threads(3);
-  const auto three = AllBytes(Write("three", "exposure,noise,distortion,highlights"));
-  omp_set_num_threads(threads);
+  const auto with_threads = [&](int n, const char* name) {
+    const testing::Threads threads(n);
+    return AllBytes(Write(name, "exposure,noise,distortion,highlights"));
+  };
+  const auto one = with_threads(1, "one"), three = with_threads(3, "three");
   EXPECT_EQ(one, three);
   EXPECT_EQ(three, AllBytes(Write("three", "exposure,noise,distortion,highlights")));
 }

@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "kernels/base/error.h"
+#include "pipeline/images/video_reader.h"
 #include "pipeline/images/video_writer.h"
 #include "tests/pipeline/picture_corpus.h"
 

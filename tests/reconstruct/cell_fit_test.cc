@@ -1,13 +1,11 @@
 // Adaptive fits: convergence, refinement where photos ask for it, the same result for any
 // number of threads and after a resume.
 #include <gtest/gtest.h>
-#include <omp.h>
 
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
-#include "kernels/base/error.h"
 #include "reconstruct/fit/fit_field.h"
 #include "reconstruct/fit/initial_cells.h"
 #include "reconstruct/fit/measure_cells.h"
@@ -21,21 +19,19 @@ class CellFit : public testing::FitField {
  protected:
   void SetUp() override {
     FitField::SetUp();
-    options_.field = "adaptive";
+    options_ = FitOptions();
+    options_.rays_per_step = 1024;
+    options_.sh_degree = 1;
+    options_.shards = 3;
     options_.resolutions = {6, 12, 24};
     options_.steps = {50, 50, 60};
     options_.tv_density = 1e-2f;
     options_.tv_sh = 1e-3f;
   }
-  static bool SameCells(const RadianceField& a, const RadianceField& b) {
-    return SameBits(a, b) &&
-           std::equal(a.geometry->cells.key.begin(), a.geometry->cells.key.end(),
-                      b.geometry->cells.key.begin(), b.geometry->cells.key.end());
-  }
 };
 
 TEST_F(CellFit, ReproducesAHeldOutViewWithFineCellsAtTheSurface) {
-  const FitResult result = regrade::FitField(views_, box_, options_, {});
+  const FitResult result = Fit();
   const CellGrid& cells = result.field.geometry->cells;
   Validate(result.field, "fit");
   RadianceField empty = result.field;
@@ -62,32 +58,37 @@ TEST_F(CellFit, ReproducesAHeldOutViewWithFineCellsAtTheSurface) {
 }
 
 TEST_F(CellFit, SameBytesForAnyThreadCount) {
-  const int before = omp_get_max_threads();
-  omp_set_num_threads(1);
-  const FitResult one = regrade::FitField(views_, box_, options_, {});
-  omp_set_num_threads(3);
-  const FitResult three = regrade::FitField(views_, box_, options_, {});
-  omp_set_num_threads(before);
-  EXPECT_TRUE(testing::RecordSameBits("1 and 3 threads", testing::Computed::kFloat,
-                                      SameCells(one.field, three.field)));
+  EXPECT_TRUE(
+      testing::RecordSameBits("1 and 3 threads", testing::Computed::kFloat,
+                              SameBits(FitWithThreads(1).field, FitWithThreads(3).field)));
 }
 
 TEST_F(CellFit, H110_AResumedFitIsTheUndisturbedOne) {
-  const FitResult straight = regrade::FitField(views_, box_, options_, {});
+  const FitResult straight = Fit();
   for (const int stop_after : {30, 50, 77, 130}) {
-    FitState saved;
-    int steps = 0;
-    FitHooks hooks;
-    hooks.checkpoint = [&](const FitState& state) { saved = state; };
-    hooks.progress = [&](const Progress&) {
-      return ++steps == stop_after ? LoopControl::kStop : LoopControl::kContinue;
-    };
-    EXPECT_THROW(regrade::FitField(views_, box_, options_, hooks), Interrupted);
-    FitHooks resumed;
-    resumed.resume = &saved;
-    const FitResult result = regrade::FitField(views_, box_, options_, resumed);
-    EXPECT_TRUE(SameCells(straight.field, result.field)) << stop_after;
+    FitState saved = StoppedFit(stop_after);
+    EXPECT_TRUE(SameBits(straight.field, ResumedFit(&saved).field)) << stop_after;
   }
+}
+
+TEST(FitOptions, TheFieldFollowsTheSceneAndKeepsWhatWasAskedFor) {
+  FitOptions uniform;
+  uniform.MakeUniform();
+  FitOptions options;
+  options.ChooseField(/*device_coordinates=*/false);
+  EXPECT_TRUE(options.adaptive());
+  EXPECT_EQ(options.rate_density, FitOptions().rate_density);
+  options.tv_sh = 0.5f;
+  options.ChooseField(true);
+  EXPECT_FALSE(options.adaptive());
+  EXPECT_EQ(options.rate_density, uniform.rate_density);
+  EXPECT_EQ(options.tv_sh, 0.5f);
+  EXPECT_EQ(options.resolutions, (std::vector<int>{64, 128, 256}));
+  EXPECT_EQ(options.steps, (std::vector<int>{600, 900, 3500}));
+  FitOptions asked;
+  asked.field = "adaptive";
+  asked.ChooseField(true);
+  EXPECT_TRUE(asked.adaptive());
 }
 
 TEST(ChooseChanges, H167_TheLimitOfCellsHoldsAndTheLargestErrorsAreSplit) {

@@ -3,12 +3,10 @@
 #include "reconstruct/fit/fit_field.h"
 
 #include <gtest/gtest.h>
-#include <omp.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <map>
 #include <memory>
 #include <vector>
@@ -28,7 +26,7 @@ namespace {
 using testing::FitField;
 
 TEST_F(FitField, ReproducesAHeldOutView) {
-  const FitResult result = regrade::FitField(views_, box_, options_, {});
+  const FitResult result = Fit();
   RadianceField empty = result.field;
   auto geometry = std::make_shared<Geometry>(*empty.geometry);
   for (float& density : geometry->density) density = -1;
@@ -41,31 +39,16 @@ TEST_F(FitField, ReproducesAHeldOutView) {
 }
 
 TEST_F(FitField, SameBytesForAnyThreadCount) {
-  const int before = omp_get_max_threads();
-  omp_set_num_threads(1);
-  const FitResult one = regrade::FitField(views_, box_, options_, {});
-  omp_set_num_threads(3);
-  const FitResult three = regrade::FitField(views_, box_, options_, {});
-  omp_set_num_threads(before);
-  EXPECT_TRUE(testing::RecordSameBits("1 and 3 threads", testing::Computed::kFloat,
-                                      SameBits(one.field, three.field)));
+  EXPECT_TRUE(
+      testing::RecordSameBits("1 and 3 threads", testing::Computed::kFloat,
+                              SameBits(FitWithThreads(1).field, FitWithThreads(3).field)));
 }
 
 TEST_F(FitField, H109_H110_AResumedFitIsTheUndisturbedOne) {
-  const FitResult straight = regrade::FitField(views_, box_, options_, {});
+  const FitResult straight = Fit();
   for (const int stop_after : {25, 60, 95, 113}) {
-    FitState saved;
-    int steps = 0;
-    FitHooks hooks;
-    hooks.checkpoint = [&](const FitState& state) { saved = state; };
-    hooks.progress = [&](const Progress&) {
-      return ++steps == stop_after ? LoopControl::kStop : LoopControl::kContinue;
-    };
-    EXPECT_THROW(regrade::FitField(views_, box_, options_, hooks), Interrupted);
-    ASSERT_GT(saved.grid.num_voxels(), 0) << "nothing was saved";
-    FitHooks resume;
-    resume.resume = &saved;
-    const FitResult resumed = regrade::FitField(views_, box_, options_, resume);
+    FitState saved = StoppedFit(stop_after);
+    const FitResult resumed = ResumedFit(&saved);
     EXPECT_EQ(saved.grid.records.size(), 0) << "a second state was kept";
     EXPECT_TRUE(testing::RecordSameBits("resumed and straight", testing::Computed::kFloat,
                                         SameBits(straight.field, resumed.field)))
@@ -111,9 +94,9 @@ class FitSpheres : public FitField {
 };
 
 TEST_F(FitSpheres, DistantSurroundingsAreFitted) {
-  const double without = HeldOutPsnr(regrade::FitField(views_, box_, options_, {}).field);
+  const double without = HeldOutPsnr(Fit().field);
   box_.spheres = true;
-  const FitResult with = regrade::FitField(views_, box_, options_, {});
+  const FitResult with = Fit();
   EXPECT_TRUE(with.field.geometry->spheres.on());
   EXPECT_EQ(with.rejected_voxels, 0);
   // 3 dB is half of the squared error; 11.8 dB was measured.
@@ -124,37 +107,17 @@ TEST_F(FitSpheres, H109_H110_AResumedFitIsTheUndisturbedOne) {
   box_.spheres = true;
   options_.steps = {40, 40};
   options_.background_lead = 0.5f;
-  const auto same = [](const FitResult& a, const FitResult& b) {
-    const auto& s = a.field.geometry->spheres.density;
-    const auto& t = b.field.geometry->spheres.density;
-    const auto& c = a.field.appearance.sphere_color;
-    const auto& d = b.field.appearance.sphere_color;
-    return SameBits(a.field, b.field) && s.size() == t.size() && s.size() > 0 &&
-           std::equal(s.begin(), s.end(), t.begin()) &&
-           std::equal(c.begin(), c.end(), d.begin());
-  };
-  const int before = omp_get_max_threads();
-  omp_set_num_threads(1);
-  const FitResult straight = regrade::FitField(views_, box_, options_, {});
-  omp_set_num_threads(3);
+  const FitResult straight = FitWithThreads(1);
+  EXPECT_GT(straight.field.geometry->spheres.density.size(), 0);
+  const testing::Threads threads(3);
   // Before, at and after the first step of the box; at the end of the stage; later.
   for (const int stop_after : {10, 20, 21, 40, 55}) {
-    FitState saved;
-    int steps = 0;
-    FitHooks hooks;
-    hooks.checkpoint = [&](const FitState& state) { saved = state; };
-    hooks.progress = [&](const Progress&) {
-      return ++steps == stop_after ? LoopControl::kStop : LoopControl::kContinue;
-    };
-    EXPECT_THROW(regrade::FitField(views_, box_, options_, hooks), Interrupted);
-    FitHooks resume;
-    resume.resume = &saved;
-    EXPECT_TRUE(testing::RecordSameBits(
-        "resumed and straight, before spheres", testing::Computed::kFloat,
-        same(straight, regrade::FitField(views_, box_, options_, resume))))
+    FitState saved = StoppedFit(stop_after);
+    EXPECT_TRUE(testing::RecordSameBits("resumed and straight, before spheres",
+                                        testing::Computed::kFloat,
+                                        SameBits(straight.field, ResumedFit(&saved).field)))
         << stop_after;
   }
-  omp_set_num_threads(before);
 }
 
 TEST_F(FitSpheres, ResamplingTheLayersKeepsConstants) {
@@ -237,7 +200,7 @@ TEST(DelayFactor, RisesFromAHundredthToOne) {
 TEST_F(FitField, H85_PruningEverythingIsAnError) {
   options_.prune_weight = 100;
   try {
-    regrade::FitField(views_, box_, options_, {});
+    Fit();
     FAIL() << "a field without voxels was accepted";
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ExitCode::kScene);

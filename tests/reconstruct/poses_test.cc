@@ -11,6 +11,7 @@
 
 #include "kernels/base/error.h"
 #include "reconstruct/colmap/colmap_model.h"
+#include "reconstruct/colmap/colmap_strategies.h"
 #include "reconstruct/colmap/poses_from_photos.h"
 #include "tests/support/process_state.h"
 #include "tests/support/synthetic_model.h"
@@ -33,7 +34,8 @@ class Poses : public ::testing::Test {
     std::vector<StagedPhoto> photos;
     for (int i = 0; i < count; ++i)
       photos.push_back({"IMG " + std::to_string(i) + ".jpg", StagedName(i),
-                        folder_ / "photos" / StagedName(i), 640, 480, exif_focal_px_});
+                        folder_ / "photos" / StagedName(i), 640, 480, exif_focal_px_, 8,
+                        film_from_ >= 0 && i >= film_from_ ? 0 : -1});
     return photos;
   }
 
@@ -63,6 +65,7 @@ class Poses : public ::testing::Test {
 
   fs::path folder_;
   double exif_focal_px_ = 0;
+  int film_from_ = -1;  // photos from this one on are frames of a film
   PoseOptions options_;
   PoseReport report_;
   std::vector<PhotoStatus> statuses_;
@@ -82,6 +85,32 @@ TEST_F(Poses, GoodCaptureComesWithModelAndStatuses) {
   ASSERT_EQ(capture.statuses.size(), 11u);
   EXPECT_EQ(capture.statuses[1].why, "not a picture");
   EXPECT_EQ(ReadColmapModel((folder_ / "sparse").string()).images.size(), 10u);
+}
+
+// Frames of a film are matched by the list, in batches, and have a camera of their own.
+TEST_F(Poses, F90_FramesOfAFilmAreMatchedByAList) {
+  film_from_ = 5;
+  double last = 0;
+  const Capture capture = Run("good", 60, [&](const Progress& p) {
+    EXPECT_GE(p.done, last);
+    last = p.done;
+    return LoopControl::kContinue;
+  });
+  EXPECT_EQ(capture.views.size(), 60u);
+  std::ifstream list(folder_ / "work/attempt_1/pairs.txt");
+  std::string first, second;
+  int pairs = 0;
+  for (; list >> first >> second; ++pairs) EXPECT_LT(first, second);
+  EXPECT_GT(pairs, 0);
+  EXPECT_LE(pairs, 200);
+  const std::vector<CameraGroup> groups = GroupByCamera(Photos(60));
+  ASSERT_EQ(groups.size(), 2u);
+  EXPECT_EQ(groups[0].names.size(), 5u);
+  EXPECT_TRUE(groups[1].film);
+  film_from_ = -1;
+  Run("good", 60);
+  EXPECT_TRUE(fs::exists(folder_ / "work/attempt_2"));
+  EXPECT_FALSE(fs::exists(folder_ / "work/attempt_2/pairs.txt"));
 }
 
 TEST_F(Poses, ProgressGrowsToItsTotal) {

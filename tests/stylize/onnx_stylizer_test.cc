@@ -1,7 +1,6 @@
 #include "stylize/image/onnx_stylizer.h"
 
 #include <gtest/gtest.h>
-#include <omp.h>
 
 #include <algorithm>
 #include <cmath>
@@ -14,6 +13,7 @@
 #include "tests/support/data.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/threads.h"
 #include "tests/support/wavy_picture.h"
 
 namespace regrade {
@@ -61,13 +61,11 @@ TEST(OnnxStylizer, PcaKdMovesColoursToTheStyleAndKeepsThePhoto) {
 TEST(OnnxStylizer, SameBytesForAnyNumberOfThreads) {
   REGRADE_NEED_DATA(kPcaKd);
   const Image photo = Scene(150, 109, kDay), style = Scene(96, 128, kEvening);
-  const int before = omp_get_max_threads();
   std::vector<Image> styled;
-  for (const int threads : {3, 2, 1}) {
-    omp_set_num_threads(threads);
+  for (const int n : {3, 2, 1}) {
+    const testing::Threads threads(n);
     styled.push_back(MakeOnnxStylizer(DataPath(kPcaKd), 1024, style)->Stylize(photo, 0));
   }
-  omp_set_num_threads(before);
   EXPECT_EQ(styled[0].pixels, styled[1].pixels);
   EXPECT_EQ(styled[0].pixels, styled[2].pixels);
 }

@@ -1,4 +1,4 @@
-// Twelve views of a coloured ball, for tests of fits.
+// Twelve views of a coloured ball, and fits of them that are stopped or run on some threads.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -8,10 +8,13 @@
 #include <memory>
 #include <vector>
 
+#include "kernels/base/error.h"
 #include "kernels/field/cpu/render_view.h"
 #include "kernels/field/render.h"
 #include "reconstruct/fit/fit_field.h"
+#include "tests/support/psnr.h"
 #include "tests/support/small_field.h"
+#include "tests/support/threads.h"
 
 namespace regrade::testing {
 
@@ -55,6 +58,7 @@ class FitField : public ::testing::Test {
       photos_.push_back(RenderViewPlain(truth, camera, {0.5f, 1e-4f}).color);
     }
     for (size_t i = 1; i < cameras_.size(); ++i) views_.push_back({cameras_[i], &photos_[i]});
+    options_.MakeUniform();
     options_.resolutions = {12, 24};
     options_.steps = {60, 60};
     options_.rays_per_step = 1024;
@@ -64,21 +68,52 @@ class FitField : public ::testing::Test {
   }
 
   double HeldOutPsnr(const RadianceField& field) const {
-    const RenderedView view = RenderView(field, cameras_[0], {0.5f, 1e-4f});
-    double error = 0;
-    for (size_t i = 0; i < view.color.pixels.size(); ++i)
-      error += std::pow(view.color.pixels[i] - photos_[0].pixels[i], 2.0);
-    return -10 * std::log10(error / static_cast<double>(view.color.pixels.size()));
+    return Psnr(RenderView(field, cameras_[0], {0.5f, 1e-4f}).color, photos_[0]);
   }
 
+  FitResult Fit(const FitHooks& hooks = {}) const {
+    return regrade::FitField(views_, box_, options_, hooks);
+  }
+
+  FitResult FitWithThreads(int n) const {
+    const Threads threads(n);
+    return Fit();
+  }
+
+  // The checkpoint of a fit that is stopped after `steps` steps.
+  FitState StoppedFit(int steps) const {
+    FitState saved;
+    int done = 0;
+    FitHooks hooks;
+    hooks.checkpoint = [&](const FitState& state) { saved = state; };
+    hooks.progress = [&](const Progress&) {
+      return ++done == steps ? LoopControl::kStop : LoopControl::kContinue;
+    };
+    EXPECT_THROW(Fit(hooks), Interrupted);
+    EXPECT_GT(saved.grid.num_voxels(), 0) << "nothing was saved";
+    return saved;
+  }
+
+  // Continues from `saved`, which the fit empties.
+  FitResult ResumedFit(FitState* saved) const {
+    FitHooks hooks;
+    hooks.resume = saved;
+    return Fit(hooks);
+  }
+
+  // Voxels or cells, densities and colours, also of background spheres.
   static bool SameBits(const RadianceField& a, const RadianceField& b) {
     const auto same = [](const auto& x, const auto& y) {
       return x.size() == y.size() &&
-             std::memcmp(x.data(), y.data(), sizeof(x[0]) * static_cast<size_t>(x.size())) == 0;
+             (x.size() == 0 || std::memcmp(x.data(), y.data(),
+                                           sizeof(x[0]) * static_cast<size_t>(x.size())) == 0);
     };
     return same(a.geometry->links, b.geometry->links) &&
+           same(a.geometry->cells.key, b.geometry->cells.key) &&
            same(a.geometry->density, b.geometry->density) &&
-           same(a.appearance.sh, b.appearance.sh);
+           same(a.appearance.sh, b.appearance.sh) &&
+           same(a.geometry->spheres.density, b.geometry->spheres.density) &&
+           same(a.appearance.sphere_color, b.appearance.sphere_color);
   }
 
   RadianceField truth_;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "kernels/base/random.h"
@@ -50,25 +51,12 @@ inline CellGrid RandomCells(const Vec3i& top, int finest, double removed, uint64
   return grid;
 }
 
-// Densities in [-2, 10) per world unit, as RandomField's.
 inline RadianceField CellField(CellGrid cells, const Vec3i& voxels, int basis, uint64_t seed) {
   auto geometry = std::make_shared<Geometry>();
-  geometry->frame = {voxels, {0.1f, -0.2f, 0.05f}, {1.0f, 0.9f, 1.1f}};
-  const int64_t n = cells.num_vertices();
+  geometry->frame = SmallFrame(voxels);
+  const int64_t count = cells.num_vertices();
   geometry->cells = std::move(cells);
-  geometry->density.Resize(n);
-  RadianceField field;
-  field.appearance.basis = basis;
-  field.appearance.sh.Resize(n * field.appearance.stride());
-  for (int64_t i = 0; i < n; ++i)
-    geometry->density[i] =
-        static_cast<float>(Uniform(seed, static_cast<uint64_t>(i), -2.0, 10.0));
-  for (int64_t i = 0; i < field.appearance.sh.size(); ++i)
-    field.appearance.sh[i] =
-        static_cast<float>(Uniform(seed + 1, static_cast<uint64_t>(i), -0.6, 0.9));
-  field.geometry = std::move(geometry);
-  field.background = {0.3f, 0.6f, 0.2f};
-  return field;
+  return RandomValues(std::move(geometry), count, basis, seed);
 }
 
 inline RadianceField RandomCellField(const Vec3i& top, int finest, int basis, uint64_t seed) {

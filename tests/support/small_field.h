@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "kernels/base/random.h"
@@ -15,20 +16,19 @@ inline double Uniform(uint64_t seed, uint64_t counter, double lo, double hi) {
   return lo + (hi - lo) * RandomDouble(seed, 77, counter);
 }
 
-// About a fraction `fill` of the vertices is stored; densities are in [-2, 10), so ReLU makes
-// some of them empty.
-inline RadianceField RandomField(const Vec3i& resolution, int basis, double fill,
-                                 uint64_t seed) {
-  auto geometry = std::make_shared<Geometry>();
-  geometry->frame = {resolution, {0.1f, -0.2f, 0.05f}, {1.0f, 0.9f, 1.1f}};
-  geometry->links.Resize(geometry->frame.NumVertices());
-  int32_t count = 0;
-  for (int64_t v = 0; v < geometry->links.size(); ++v)
-    geometry->links[v] = RandomDouble(seed, 1, static_cast<uint64_t>(v)) < fill ? count++ : -1;
+// A box that is no cube, beside the origin.
+inline GridFrame SmallFrame(const Vec3i& resolution) {
+  return {resolution, {0.1f, -0.2f, 0.05f}, {1.0f, 0.9f, 1.1f}};
+}
+
+// A field of `count` values on the given geometry: densities in [-2, 10) per world unit, so
+// ReLU makes some of them empty.
+inline RadianceField RandomValues(std::shared_ptr<Geometry> geometry, int64_t count, int basis,
+                                  uint64_t seed) {
   geometry->density.Resize(count);
   RadianceField field;
   field.appearance.basis = basis;
-  field.appearance.sh.Resize(static_cast<int64_t>(count) * field.appearance.stride());
+  field.appearance.sh.Resize(count * field.appearance.stride());
   for (int64_t i = 0; i < geometry->density.size(); ++i)
     geometry->density[i] =
         static_cast<float>(Uniform(seed, static_cast<uint64_t>(i), -2.0, 10.0));
@@ -38,6 +38,18 @@ inline RadianceField RandomField(const Vec3i& resolution, int basis, double fill
   field.geometry = std::move(geometry);
   field.background = {0.3f, 0.6f, 0.2f};
   return field;
+}
+
+// About a fraction `fill` of the vertices is stored.
+inline RadianceField RandomField(const Vec3i& resolution, int basis, double fill,
+                                 uint64_t seed) {
+  auto geometry = std::make_shared<Geometry>();
+  geometry->frame = SmallFrame(resolution);
+  geometry->links.Resize(geometry->frame.NumVertices());
+  int32_t count = 0;
+  for (int64_t v = 0; v < geometry->links.size(); ++v)
+    geometry->links[v] = RandomDouble(seed, 1, static_cast<uint64_t>(v)) < fill ? count++ : -1;
+  return RandomValues(std::move(geometry), count, basis, seed);
 }
 
 // Adds background layers; about a fraction `fill` of their columns is stored.

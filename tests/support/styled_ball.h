@@ -2,7 +2,6 @@
 #pragma once
 
 #include <gtest/gtest.h>
-#include <omp.h>
 
 #include <algorithm>
 #include <cmath>
@@ -23,6 +22,7 @@
 #include "stylize/training/initial_network.h"
 #include "stylize/training/style_rays.h"
 #include "stylize/training/train_network.h"
+#include "tests/support/threads.h"
 
 namespace regrade::testing {
 
@@ -192,11 +192,5 @@ inline double RelativeDifference(const std::vector<double>& a, const std::vector
   }
   return std::sqrt(difference / norm);
 }
-
-struct Threads {
-  explicit Threads(int n) : before(omp_get_max_threads()) { omp_set_num_threads(n); }
-  ~Threads() { omp_set_num_threads(before); }
-  int before;
-};
 
 }  // namespace regrade::testing

@@ -7,6 +7,7 @@
 
 #include "kernels/base/buffer.h"
 #include "kernels/field/cpu/spheres.h"
+#include "kernels/field/free_space.h"
 #include "kernels/field/packed_grid.h"
 #include "kernels/field/ray_march.h"
 #include "kernels/optimize/rmsprop.h"
@@ -60,6 +61,8 @@ struct FastRayFunctions {
   // field's cells: see total_variation.h and cell_variation.h.
   void (*total_variation)(const FastGrid&, int64_t begin, int64_t end, float scale_density,
                           float scale_sh, GradientArena*);
+  // Adds the gradient of scale times the sum of the opacities of EQ(free-space).
+  void (*free_space)(const FastGrid&, const FreeRay*, int64_t n, float scale, GradientArena*);
   // Steps slots [begin, end) of arena `self` by the sum over all arenas in order; a voxel
   // belongs to the first arena that has it.
   int64_t (*step)(FastGrid*, float* second_moment, const GradientArena* arenas, int num_arenas,

@@ -5,6 +5,7 @@
 #include <type_traits>
 
 #include "kernels/field/cpu/cell_march_simd.h"
+#include "kernels/field/cpu/free_space_simd.h"
 #include "kernels/field/cpu/march_simd.h"
 #include "kernels/field/cpu/rays.h"
 #include "kernels/field/cpu/scatter_simd.h"
@@ -184,6 +185,7 @@ const FastRayFunctions kFunctions = {
           [&] { add(std::integral_constant<int, 4>()); },
           [&] { add(std::integral_constant<int, 1>()); });
     },
+    FreeSpace,
     [](FastGrid* g, float* moments, const GradientArena* arenas, int count, int self,
        int64_t begin, int64_t end, const RmspropOptions& o) {
       return ByBasis(

@@ -21,6 +21,7 @@ DeviceGridView DeviceGrid::view() const {
        static_cast<float>(frame.resolution.z - 1)},
       spheres.view(),
       cells.on() ? cells.view(frame.resolution) : CellsView{},
+      cells.on() ? cells.vertex_key.data() : nullptr,
       density_rate.size() > 0 ? density_rate.data() : nullptr};
 }
 

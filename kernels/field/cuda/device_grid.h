@@ -28,6 +28,7 @@ struct DeviceGridView {
   Vec3f last{};  // the frame's resolution minus 1
   DeviceSpheresView spheres;
   CellsView cells;                      // top is null for a uniform grid
+  const CellKey* vertex_key = nullptr;  // [N], of an adaptive field
   const float* density_rate = nullptr;  // [N], or null; see FastGrid
 
   // Points number the voxels, and from the next multiple of 32 the texels of the background.

@@ -32,7 +32,8 @@ void RenderOnDevice(const DeviceGrid& grid, const Ray* rays, int64_t n,
 
 // A frame at a camera without distortion: rays are generated and pixels resolved (see
 // ResolvePixel) inside the kernel. `target` [height, width]; does not wait. `half`, if not null
-// and not empty, replaces the grid's own colours and densities.
+// and not empty, replaces the grid's own colours and densities. An adaptive field's frames are
+// exact: `opacity_step` and `half` are not used.
 void RenderFrameOnDevice(const DeviceGrid& grid, const Camera& camera,
                          const MarchOptions& options, const DeviceRenderTarget& target,
                          float opacity_step = 0, const HalfGrid* half = nullptr);

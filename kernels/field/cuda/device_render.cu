@@ -3,12 +3,11 @@
 #include <vector>
 
 #include "kernels/base/error.h"
+#include "kernels/field/cuda/device_cell_render.h"
 #include "kernels/field/cuda/device_rays.h"
 #include "kernels/field/cuda/launch.h"
 #include "kernels/field/cuda/ray_shaders.h"
-#include "kernels/field/cuda/warp_layers.h"
-#include "kernels/field/resolve_pixel.h"
-#include "kernels/scene/pinhole_rays.h"
+#include "kernels/field/cuda/rendered_rays.h"
 
 namespace regrade {
 
@@ -28,7 +27,7 @@ RenderedView RenderViewOnDevice(const DeviceGrid& grid, const Camera& camera,
     depth.CopyOut(view.depth.pixels.data(), n);
     transmittance.CopyOut(view.transmittance.pixels.data(), n);
   };
-  if (camera.lens == LensModel::kPinhole && !grid.cells.on()) {
+  if (camera.lens == LensModel::kPinhole) {
     RenderFrameOnDevice(grid, camera, options, target, opacity_step, half);
     take();
     return view;
@@ -50,9 +49,9 @@ RenderedView RenderViewOnDevice(const DeviceGrid& grid, const Camera& camera,
 
 namespace {
 
-constexpr int kWarps = 4;     // per block
-constexpr int kRays = 8;      // per block; 16 are as fast, 32 lose what neighbours share
-constexpr int kPending = 64;  // samples waiting to be shaded; a power of 2
+constexpr int kWarps = 4;             // per block
+constexpr int kRays = kRenderedRays;  // per block
+constexpr int kPending = 64;          // samples waiting to be shaded; a power of 2
 
 // Selects the samples to shade and their weights; see EQ(opacity-steps).
 class OpacitySteps {
@@ -85,52 +84,6 @@ class OpacitySteps {
 
   float inverse_;
   float shaded_ = 1;  // transmittance after the last selected sample
-};
-
-// Rays from a list; sums are stored unchanged. A block processes kRays of them.
-struct ListedRays {
-  const Ray* rays;
-  int64_t n;
-
-  // The index-th ray and the index of its results; false past the last.
-  __device__ bool Get(int64_t index, Ray* ray, int64_t* place) const {
-    *place = index;
-    if (index >= n) return false;
-    *ray = rays[*place];
-    return true;
-  }
-  __device__ void Resolve(const Ray&, float, Vec3f*, float*) const {}
-  int64_t Blocks() const { return (n + kRays - 1) / kRays; }
-};
-
-// The rays of a frame. Concurrent warps process neighbouring pixels, which read the same
-// voxels: square tiles one after the other, Morton order within each.
-struct FrameRays {
-  static constexpr int kTile = 16, kPixels = kTile * kTile;
-  PinholeRays camera;
-  ResolvePixel resolve;
-
-  HD int Columns() const { return (camera.width + kTile - 1) / kTile; }
-  __device__ bool Get(int64_t index, Ray* ray, int64_t* place) const {
-    const int tile = static_cast<int>(index / kPixels);
-    int x = tile % Columns() * kTile, y = tile / Columns() * kTile;
-#pragma unroll
-    for (int bit = 0; bit < 4; ++bit) {
-      x += static_cast<int>(index >> (2 * bit) & 1) << bit;
-      y += static_cast<int>(index >> (2 * bit + 1) & 1) << bit;
-    }
-    if (x >= camera.width || y >= camera.height) return false;
-    *ray = camera.At(x, y);
-    *place = int64_t{y} * camera.width + x;
-    return true;
-  }
-  __device__ void Resolve(const Ray& ray, float transmittance, Vec3f* color,
-                          float* depth) const {
-    resolve(ray, transmittance, color, depth);
-  }
-  int64_t Blocks() const {
-    return int64_t{Columns()} * ((camera.height + kTile - 1) / kTile) * (kPixels / kRays);
-  }
 };
 
 // A ray prepared by one thread of the block for a warp.
@@ -233,96 +186,6 @@ __global__ void __launch_bounds__(32 * kWarps, 5)
   target.transmittance[place] = mine.transmittance;
 }
 
-// Continues behind the box for a field with layers; one warp per ray.
-template <typename Rays>
-__global__ void RenderSpheresKernel(DeviceGridView grid, Rays rays, float stop,
-                                    DeviceRenderTarget target) {
-  Ray ray;
-  int64_t place;
-  if (!rays.Get((blockIdx.x * int64_t{blockDim.x} + threadIdx.x) / 32, &ray, &place)) return;
-  WarpLayers layers(grid, ray, target.transmittance[place], stop);
-  LaneLayer mine;
-  unsigned composited;
-  Vec3f color{};
-  float depth = 0;
-  while (layers.Next(&mine, &composited)) {
-    if (!(mine.tau > 0)) continue;
-    const float w = mine.Weight();
-    color += mine.Color() * w;
-    depth += w * mine.depth;
-  }
-  for (int c = 0; c < 3; ++c) color[c] = WarpSum(color[c]);
-  depth = target.depth[place] + WarpSum(depth);
-  if (layers.lane() != 0) return;
-  const float transmittance = layers.transmittance();
-  color += target.color[place] + grid.background * transmittance;
-  rays.Resolve(ray, transmittance, &color, &depth);
-  target.color[place] = color;
-  target.depth[place] = depth;
-  target.transmittance[place] = transmittance;
-}
-
-// Sums of an adaptive field's rays, whose samples are in lists; a warp a ray.
-template <int kBasis>
-__global__ void RenderCellRaysKernel(DeviceGridView grid, const Ray* rays, int64_t n,
-                                     CellSamples lists, DeviceRenderTarget target) {
-  using Layout = RecordLayout<kBasis>;
-  const int lane = static_cast<int>(threadIdx.x & 31);
-  const int64_t r = (blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x) / 32;
-  if (r >= n) return;
-  const float4* const place = reinterpret_cast<const float4*>(lists.place) + r * lists.capacity;
-  const float4* const raw_tau =
-      reinterpret_cast<const float4*>(lists.raw_tau) + r * lists.capacity;
-  const float4* const rest = reinterpret_cast<const float4*>(lists.rest) + r * lists.capacity;
-  float basis[kMaxBasis];
-  ShBasis(kBasis, rays[r].direction, basis);
-  const LaneValues<kBasis> values(lane, basis);
-  const int count = lists.count[r];
-  Vec3f color{};
-  float depth = 0;
-  for (int first = 0; first < count; first += Layout::kSamples) {
-    const int at = first + lane / Layout::kGroup;
-    const bool valid = at < count;
-    const float4 p = valid ? place[at] : float4{};
-    const Vec3f raw = RawColor<kBasis, CellSampler>(grid, values, __float_as_int(p.x),
-                                                    {p.y, p.z, p.w}, valid, lane);
-    if (!valid || lane % Layout::kGroup != 0) continue;
-    const float w = rest[at].x * Opacity(raw_tau[at].w);
-    for (int c = 0; c < 3; ++c) color[c] += w * fmaxf(raw[c], 0.0f);
-    depth += w * rest[at].z;
-  }
-  for (int c = 0; c < 3; ++c) color[c] = WarpSum(color[c]);
-  depth = WarpSum(depth);
-  if (lane != 0) return;
-  target.color[r] = color + grid.background * lists.transmittance[r];
-  target.depth[r] = depth;
-  target.transmittance[r] = lists.transmittance[r];
-}
-
-// Every sample is shaded.
-void RenderCellRays(const DeviceGrid& grid, const Ray* rays, int64_t n,
-                    const MarchOptions& options, const DeviceRenderTarget& target) {
-  constexpr int64_t kMostRays = 1 << 16, kMostBytes = int64_t{2} << 30;
-  CellSampleStore store(grid.frame, std::min(n, kMostRays), kMostBytes);
-  const CellSamples lists = store.view();
-  DeviceGridView view = grid.view();
-  if (grid.spheres.on()) view.background = {};  // the layers are composited before it
-  for (int64_t begin = 0; begin < n; begin += store.rays()) {
-    const int64_t size = std::min(n - begin, store.rays());
-    MarchCellsOnDevice(grid, rays + begin, size, options, lists);
-    ByBasis(grid.basis, [&](auto basis) {
-      RenderCellRaysKernel<basis.value><<<BlocksFor(32 * size), kThreads>>>(
-          view, rays + begin, size, lists,
-          {target.color + begin, target.depth + begin, target.transmittance + begin});
-    });
-    CheckLaunch("render_cell_rays");
-  }
-  if (!grid.spheres.on()) return;
-  RenderSpheresKernel<<<BlocksFor(32 * n), kThreads>>>(grid.view(), ListedRays{rays, n},
-                                                       options.stop_transmittance, target);
-  CheckLaunch("render_spheres");
-}
-
 template <typename Rays>
 void RenderBlocks(const DeviceGrid& grid, const HalfGrid* half, const Rays& rays,
                   const MarchOptions& options, float opacity_step,
@@ -368,10 +231,13 @@ void RenderOnDevice(const DeviceGrid& grid, const Ray* rays, int64_t n,
 void RenderFrameOnDevice(const DeviceGrid& grid, const Camera& camera,
                          const MarchOptions& options, const DeviceRenderTarget& target,
                          float opacity_step, const HalfGrid* half) {
-  REGRADE_CHECK(camera.lens == LensModel::kPinhole && !grid.cells.on());
+  REGRADE_CHECK(camera.lens == LensModel::kPinhole);
   const DeviceRange range("frame");
-  RenderBlocks(grid, half, FrameRays{PinholeRays(camera), ResolvePixel(camera)}, options,
-               opacity_step, target);
+  if (grid.cells.on())
+    RenderCellFrame(grid, camera, options, target);
+  else
+    RenderBlocks(grid, half, FrameRays{PinholeRays(camera), ResolvePixel(camera)}, options,
+                 opacity_step, target);
 }
 
 #else
