@@ -1,11 +1,10 @@
 // A ray's way through the cells of an adaptive field.
 //
 // EQ(cell-march): a ray crosses each cell in one interval, between the planes of the cell's
-// faces; its sample is at the fraction `in_interval` of it, 1/2 but for a fit, and the
-// interval's length is delta in EQ(composite). The intervals of all cells and empty cubes join
-// without gap or overlap, for the next cube is found by its integer position, never by a
-// rounded one: the plane that ends an interval begins the next. Their lengths sum to the ray's
-// length in the box.
+// faces; its sample is at the interval's middle, and the interval's length is delta in
+// EQ(composite). The intervals of all cells and empty cubes join without gap or overlap, for
+// the next cube is found by its integer position, never by a rounded one: the plane that ends
+// an interval begins the next. Their lengths sum to the ray's length in the box.
 #pragma once
 
 #include <cmath>
@@ -31,7 +30,7 @@ struct CellSample {
 // origin has no samples.
 template <typename T, typename Body>
 HD void WalkCells(const GridFrame& frame, const CellsView& cells, const RayT<T>& ray,
-                  T near_clip, T in_interval, const Body& body) {
+                  T near_clip, const Body& body) {
   using std::floor;
   if (!AllFinite(ray.origin) || !AllFinite(ray.direction)) return;
   const Vec3f scale = frame.Scale();
@@ -80,7 +79,7 @@ HD void WalkCells(const GridFrame& frame, const CellsView& cells, const RayT<T>&
     }
     if (next < t) next = t;
     sample.delta = next - t;
-    sample.t = t + sample.delta * in_interval;
+    sample.t = t + sample.delta / 2;
     for (int a = 0; a < 3; ++a) {
       const T inside =
           (origin[a] + direction[a] * sample.t - T(low[a] - frame.resolution[a] / 2)) /

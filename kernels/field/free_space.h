@@ -27,7 +27,7 @@ struct FreeRay {
 template <typename T, typename Body>
 HD void WalkFreeSpace(const GridFrame& frame, const CellsView& cells, const T* density,
                       const RayT<T>& ray, T near_clip, T length, const Body& body) {
-  WalkCells(frame, cells, ray, near_clip, T(0.5), [&](const CellSample<T>& sample) {
+  WalkCells(frame, cells, ray, near_clip, [&](const CellSample<T>& sample) {
     if (!(sample.t < length)) return false;
     if (sample.cell == kNoCell) return true;
     T sigma = 0;

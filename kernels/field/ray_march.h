@@ -13,7 +13,6 @@ namespace regrade {
 struct MarchOptions {
   float step = 0.5f;                 // voxels
   float stop_transmittance = 1e-4f;  // a ray ends below it; bounds the lost light per channel
-  float in_interval = 0.5f;          // see EQ(cell-march); a fit varies it from step to step
 };
 
 inline constexpr int64_t kMaxSteps = 1 << 20;

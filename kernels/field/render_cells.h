@@ -6,7 +6,6 @@
 
 #include "kernels/field/cell_walk.h"
 #include "kernels/field/radiance_field.h"
-#include "kernels/field/ray_march.h"
 #include "kernels/field/spherical_harmonics.h"
 #include "kernels/field/trilinear.h"
 #include "kernels/field/volume_rendering.h"
@@ -45,15 +44,13 @@ struct CompositedCell {
 };
 
 // The samples of a ray that composite, front to back, up to the one that leaves less than
-// options.stop_transmittance; returns the transmittance behind them.
+// `stop`; returns the transmittance behind them.
 template <typename T>
 T MarchCells(const GridFrame& frame, const CellsView& cells, const T* density,
-             const RayT<T>& ray, T near_clip, const MarchOptions& options,
-             std::vector<CompositedCell<T>>* samples) {
-  const T stop(options.stop_transmittance);
+             const RayT<T>& ray, T near_clip, T stop, std::vector<CompositedCell<T>>* samples) {
   samples->clear();
   T depth = 0, transmittance = 1;
-  WalkCells(frame, cells, ray, near_clip, T(options.in_interval), [&](const auto& place) {
+  WalkCells(frame, cells, ray, near_clip, [&](const CellSample<T>& place) {
     if (place.cell == kNoCell) return true;
     T sigma;
     InterpolateInCell(cells, place, density, 1, 1, &sigma);

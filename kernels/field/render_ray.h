@@ -78,7 +78,7 @@ void CompositeCells(const FieldView<T>& field, const RayT<T>& ray, const MarchOp
                     CompositeState<T>* state, RayResult<T>* result) {
   std::vector<CompositedCell<T>> samples;
   state->transmittance = MarchCells(field.frame, field.cells, field.density, ray,
-                                    field.near_clip, options, &samples);
+                                    field.near_clip, T(options.stop_transmittance), &samples);
   state->color = ShadeCells(field, ray, samples, &result->depth);
   for (const CompositedCell<T>& sample : samples) result->optical_depth += sample.tau;
 }
@@ -109,7 +109,8 @@ void RenderCellRayAdjoint(const FieldView<T>& field, const RayT<T>& ray,
                           const Vec3<T>& d_color, T* d_density, T* d_sh, const Add& add,
                           T* d_sphere_density, T* d_sphere_color) {
   std::vector<CompositedCell<T>> samples;
-  MarchCells(field.frame, field.cells, field.density, ray, field.near_clip, options, &samples);
+  MarchCells(field.frame, field.cells, field.density, ray, field.near_clip,
+             T(options.stop_transmittance), &samples);
   Vec3<T> behind = field.background;
   if (field.spheres.layers > 0)
     CompositeSpheresAdjoint(field.frame, field.spheres, ray, result.spheres,

@@ -50,7 +50,6 @@ class CudaFitEngine : public FitEngine {
       march_ = step.march;
       fitter_.emplace(grid_.frame, march_, kSampleStoreBytes);
     }
-    fitter_->set_in_interval(step.march.in_interval);
     Reserve(step.rays);
     views_.Draw(seed_, step.number, step.rays, rays_.data(), targets_.data());
     if (free_space_)

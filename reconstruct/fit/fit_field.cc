@@ -30,13 +30,6 @@ double PsnrOf(double squared_error, int64_t rays) {
          std::log10(squared_error / (3.0 * static_cast<double>(std::max<int64_t>(rays, 1))));
 }
 
-// n / golden ratio without its whole part: evenly spread in [0, 1) for every run of n.
-float GoldenFraction(uint64_t n) {
-  constexpr double kInverse = 0.6180339887498949;
-  const double turns = static_cast<double>(n) * kInverse;
-  return static_cast<float>(turns - std::floor(turns));
-}
-
 class Fitter {
  public:
   Fitter(const std::vector<TrainingView>& views, const SceneBox& box, const FitOptions& options,
@@ -191,7 +184,6 @@ class Fitter {
         DelayFactor(number, options_.density_delay * static_cast<float>(total_steps_));
     step.optimizer.view_bound = options_.view_bound;
     if (options_.adaptive()) {
-      step.march.in_interval = 0.5f + options_.jitter * (GoldenFraction(step.number) - 0.5f);
       step.free_rays = std::max(1, options_.rays_per_step / kRaysPerFreeRay);
       step.free_space = options_.free_space;
     }

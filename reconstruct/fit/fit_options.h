@@ -18,7 +18,6 @@ struct FitOptions {
   int sh_degree = 2;
   float view_bound = 0.2f;
   float step = 1.0f;
-  float jitter = 0.8f;
   float stop_transmittance = 1e-3f;
   float rate_density = 58.0f;
   float rate_density_end = 24.0f;
@@ -128,12 +127,6 @@ struct FitOptions {
                   "nothing on real photos",
           .min = 0.1,
           .max = 4});
-    bind("fit-jitter", jitter,
-         {.unit = "fraction of a cell",
-          .help = "how far the sample in each cell of an adaptive field moves from step to "
-                  "step; 0: it stays in the middle",
-          .min = 0,
-          .max = 1});
     bind("fit-stop", stop_transmittance,
          {.help = "transmittance at which a ray ends; the error per channel is at most this",
           .min = 0,

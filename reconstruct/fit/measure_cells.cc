@@ -61,8 +61,8 @@ void MeasurePhoto(const FastGrid& grid, const TrainingRays& rays, int view,
       const Vec3f seen{color[3 * i], color[3 * i + 1], color[3 * i + 2]};
       const Vec3f off = seen - rays.ColorOf(view, static_cast<int>(i) * stride, y);
       const float squares = Dot(off, off);
-      MarchCells(grid.frame, cells, grid.vertex_density.data(), row[i], grid.near_clip, march,
-                 &samples);
+      MarchCells(grid.frame, cells, grid.vertex_density.data(), row[i], grid.near_clip,
+                 march.stop_transmittance, &samples);
       for (const CompositedCell<float>& s : samples) {
         const int64_t c = s.place.cell;
         const float w = s.transmittance_before * Opacity(s.tau);

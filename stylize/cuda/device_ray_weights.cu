@@ -74,26 +74,25 @@ __global__ void MarchCellWeightsKernel(DeviceGridView grid, const Ray* rays, int
   const int64_t r = blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x;
   if (r >= n) return;
   float depth = 0, before = 1;
-  WalkCells(grid.frame, grid.cells, rays[r], grid.near_clip, 0.5f,
-            [&](const CellSample<float>& s) {
-              if (s.cell == kNoCell) return true;
-              float density;
-              InterpolateInCell(grid.cells, s, grid.dense_density, 1, 1, &density);
-              const float tau = OpticalDepth(density, s.delta);
-              if (!(tau > 0)) return true;
-              const float w = before * Opacity(tau);
-              if (w > min_weight) {
-                const int64_t at = atomicAdd(list.counter, 1);
-                if (at < list.capacity) {
-                  list.samples[at] = {8 * s.cell, s.fraction, w, static_cast<int32_t>(r)};
-                  for (int k = 0; k < 8 && touched != nullptr; ++k)
-                    Touch(touched, grid.cells.corner[int64_t{8} * s.cell + k]);
-                }
-              }
-              depth += tau;
-              before = expf(-depth);
-              return !(before < stop);
-            });
+  WalkCells(grid.frame, grid.cells, rays[r], grid.near_clip, [&](const CellSample<float>& s) {
+    if (s.cell == kNoCell) return true;
+    float density;
+    InterpolateInCell(grid.cells, s, grid.dense_density, 1, 1, &density);
+    const float tau = OpticalDepth(density, s.delta);
+    if (!(tau > 0)) return true;
+    const float w = before * Opacity(tau);
+    if (w > min_weight) {
+      const int64_t at = atomicAdd(list.counter, 1);
+      if (at < list.capacity) {
+        list.samples[at] = {8 * s.cell, s.fraction, w, static_cast<int32_t>(r)};
+        for (int k = 0; k < 8 && touched != nullptr; ++k)
+          Touch(touched, grid.cells.corner[int64_t{8} * s.cell + k]);
+      }
+    }
+    depth += tau;
+    before = expf(-depth);
+    return !(before < stop);
+  });
   transmittance[r] = before;
 }
 

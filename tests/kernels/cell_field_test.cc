@@ -52,7 +52,7 @@ template <typename T>
 T WalkedLength(const GridFrame& frame, const CellsView& cells, const RayT<T>& ray, T near_clip,
                int* widths = nullptr) {
   T sum = 0;
-  WalkCells(frame, cells, ray, near_clip, T(0.5), [&](const CellSample<T>& sample) {
+  WalkCells(frame, cells, ray, near_clip, [&](const CellSample<T>& sample) {
     EXPECT_GE(sample.delta, 0);
     sum += sample.delta;
     if (widths != nullptr) *widths |= sample.width;
@@ -149,7 +149,7 @@ TEST(CellWalk, RaysThatMissOrAreInvalidHaveNoSamples) {
   for (const Ray& ray :
        {Ray{{5, 5, 5}, {1, 0, 0}}, Ray{{0, 0, 0}, {0, 0, 0}}, Ray{{nan, 0, 0}, {1, 0, 0}},
         Ray{{0, 0, 0}, {0, nan, 0}}, Ray{{-5, 0, 0}, {-1, 0, 0}}})
-    WalkCells(field.geometry->frame, cells, ray, 0.0f, 0.5f, [](const CellSample<float>&) {
+    WalkCells(field.geometry->frame, cells, ray, 0.0f, [](const CellSample<float>&) {
       ADD_FAILURE();
       return true;
     });

@@ -57,7 +57,7 @@ inline void MarchCellRay(const FastGrid& grid, const Ray& ray, const MarchOption
   };
   bool stopped = false;
   WalkCells(grid.frame, ViewOf(grid.cells, grid.frame.resolution), ray, grid.near_clip,
-            options.in_interval, [&](const CellSample<float>& sample) {
+            [&](const CellSample<float>& sample) {
               if (sample.cell == kNoCell) return true;
               const int lane = cells.count++;
               cells.cell[lane] = sample.cell;

@@ -70,7 +70,6 @@ class DeviceRayFitter {
   DeviceRayFitter(const GridFrame& frame, const MarchOptions& options, int64_t max_bytes);
   void Accumulate(const DeviceGrid& grid, const Ray* rays, const Vec3f* targets, int64_t n,
                   float scale, DeviceTouched* touched);
-  void set_in_interval(float value) { options_.in_interval = value; }  // see MarchOptions
   DeviceFitSums TakeSums();  // returns the sums and resets them to zero
   DeviceFitSums* sums() { return sums_.data(); }
 
