@@ -15,6 +15,7 @@ namespace regrade {
 struct FitPackedOptions {
   std::string capture;  // packed
   std::string field;    // .npz to write; empty: none
+  std::string frames;   // folder for pictures; empty: none
   std::string device = "cuda";
   bool reproducible = false;  // see RunOptions
 
@@ -22,6 +23,7 @@ struct FitPackedOptions {
   void Describe(Bind& bind) {
     bind("capture", capture, {.help = "a file of `regrade pack`"});
     bind("field", field, {.help = "the .npz file that the field is written to"});
+    bind("frames", frames, {.help = "a folder for .ppm pictures of the held-out views"});
     bind("device", device, {.help = "where arithmetic runs", .choices = "cpu|cuda"});
     bind("reproducible", reproducible, {.help = "two fits give the same bytes"});
   }
