@@ -55,11 +55,9 @@ HeldOut MeasureHeldOut(FitEngine* engine, const PackedCapture& capture,
 
 }  // namespace
 
-void FitPacked(const FitPackedOptions& settings, const FitOptions& asked) {
+void FitPacked(const FitPackedOptions& settings, const FitOptions& options) {
   const double start = ClockSeconds();
   const PackedCapture capture = ReadPackedCapture(settings.capture);
-  FitOptions options = asked;
-  options.ChooseField(capture.scene.ndc.on());
   std::vector<TrainingView> views;
   for (const PackedView& view : capture.views)
     if (!view.held_out) views.push_back({view.camera, &view.photo, view.points});

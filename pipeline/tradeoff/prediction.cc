@@ -7,6 +7,7 @@
 #include "pipeline/capture/scene_profile.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/report/cost_rows.h"
+#include "reconstruct/fit/adapt_options.h"
 #include "reconstruct/fit/choose_degree.h"
 
 namespace regrade {
@@ -121,11 +122,10 @@ double AmountOf(const std::string& unit, const RunSettings& settings, const Capt
     return sum;
   }
   if (unit == "ray voxels") {
+    const FitOptions fit = AdaptOptions(settings.fit, {});
     double sum = 0;
-    for (size_t s = 0; s < std::min(settings.fit.steps.size(), settings.fit.resolutions.size());
-         ++s)
-      sum += static_cast<double>(settings.fit.steps[s]) * settings.fit.rays_per_step *
-             settings.fit.resolutions[s];
+    for (size_t s = 0; s < std::min(fit.steps.size(), fit.resolutions.size()); ++s)
+      sum += static_cast<double>(fit.steps[s]) * fit.rays_per_step * fit.resolutions[s];
     return sum;
   }
   if (unit == "style rays")
