@@ -1,8 +1,10 @@
 // regrade_gpu fit: a packed capture becomes a field, measured on the views that were kept back.
+#include <filesystem>
 #include <numeric>
 
 #include "evaluate/image_quality.h"
 #include "kernels/base/clock.h"
+#include "kernels/base/error.h"
 #include "kernels/field/packed_grid.h"
 #include "kernels/field/render.h"
 #include "kernels/image/detail_kept.h"
@@ -27,12 +29,16 @@ struct HeldOut {
   double transmittance = 0;             // what the field lets through, of all that is seen
 };
 
+// Writes the views' pictures to `frames`, unless it is empty.
 HeldOut MeasureHeldOut(FitEngine* engine, const PackedCapture& capture,
-                       const MarchOptions& march) {
+                       const MarchOptions& march, const std::string& frames) {
   std::vector<double> psnr, ssim, kept, error, transmittance;
+  int index = 0;
+  if (!frames.empty()) std::filesystem::create_directories(frames);
   for (const PackedView& view : capture.views) {
     if (!view.held_out) continue;
     const RenderedView seen = engine->Render(view.camera, march);
+    if (!frames.empty()) WritePpm(Concat(frames, "/frame_", index++, ".ppm"), seen.color);
     if (const auto value = Psnr(seen.color, view.photo)) psnr.push_back(*value);
     if (const auto value = Ssim(seen.color, view.photo)) ssim.push_back(*value);
     const FineDetail detail = MeasureFineDetail(seen.color, view.photo);
@@ -49,11 +55,9 @@ HeldOut MeasureHeldOut(FitEngine* engine, const PackedCapture& capture,
 
 }  // namespace
 
-void FitPacked(const FitPackedOptions& settings, const FitOptions& asked) {
+void FitPacked(const FitPackedOptions& settings, const FitOptions& options) {
   const double start = ClockSeconds();
   const PackedCapture capture = ReadPackedCapture(settings.capture);
-  FitOptions options = asked;
-  options.ChooseField(capture.scene.ndc.on());
   std::vector<TrainingView> views;
   for (const PackedView& view : capture.views)
     if (!view.held_out) views.push_back({view.camera, &view.photo, view.points});
@@ -75,7 +79,7 @@ void FitPacked(const FitPackedOptions& settings, const FitOptions& asked) {
   hooks.keep_field = !settings.field.empty();
   hooks.measure = [&](FitEngine* engine) {
     const double seconds = ClockSeconds() - fit_start;
-    measured = MeasureHeldOut(engine, capture, {options.step});
+    measured = MeasureHeldOut(engine, capture, {options.step}, settings.frames);
     stages.push_back(
         JsonValue::Array{seconds, measured.psnr, measured.ssim, measured.detail_kept});
   };

@@ -15,13 +15,19 @@ namespace regrade {
 struct FitPackedOptions {
   std::string capture;  // packed
   std::string field;    // .npz to write; empty: none
+  std::string frames;   // folder for pictures; empty: none
+  std::string preset = "standard";
   std::string device = "cuda";
   bool reproducible = false;  // see RunOptions
 
   template <typename Bind>
   void Describe(Bind& bind) {
+    bind("preset", preset,
+         {.help = "how much time the fit may take, as of `regrade run`",
+          .choices = "draft|standard|paper|best"});
     bind("capture", capture, {.help = "a file of `regrade pack`"});
     bind("field", field, {.help = "the .npz file that the field is written to"});
+    bind("frames", frames, {.help = "a folder for .ppm pictures of the held-out views"});
     bind("device", device, {.help = "where arithmetic runs", .choices = "cpu|cuda"});
     bind("reproducible", reproducible, {.help = "two fits give the same bytes"});
   }

@@ -22,6 +22,10 @@ Backend ChooseBackend(const std::string& device, bool reproducible) {
   return Backend::kCpu;
 }
 
+bool PrefersCard(const std::string& device, bool reproducible) {
+  return device == "cuda" || ChooseBackend(device, reproducible) == Backend::kCuda;
+}
+
 std::string DeviceName(Backend backend) {
   return backend == Backend::kCpu ? "cpu" : ReadDeviceStatus().name;
 }

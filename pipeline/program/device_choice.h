@@ -12,6 +12,10 @@ namespace regrade {
 // there is a GPU. Throws Error(kResources) for "cuda" without a GPU.
 Backend ChooseBackend(const std::string& device, bool reproducible);
 
+// Whether settings are chosen for a card: where "cuda" is asked for, or ChooseBackend would
+// take one.
+bool PrefersCard(const std::string& device, bool reproducible);
+
 // "cpu", or the GPU's name.
 std::string DeviceName(Backend backend);
 

@@ -1,5 +1,8 @@
 #include "pipeline/run/equivalent_command.h"
 
+#include "pipeline/program/device_choice.h"
+#include "pipeline/run/presets.h"
+
 namespace regrade {
 namespace {
 
@@ -33,7 +36,8 @@ std::vector<std::string> EquivalentCommand(const RunContext& context) {
   OptionSet plain_options;
   plain.Bind(&plain_options);
   const std::string& preset = context.settings.run.preset;
-  ApplyPreset(preset, &plain);
+  const RunOptions& run = context.settings.run;
+  ApplyPreset(preset, PrefersCard(run.device, run.reproducible), &plain);
   const JsonValue before = plain_options.Values(), start = OptionValues(plain.start),
                   program = OptionValues(plain.program);
   std::vector<std::string> words = {"regrade", "run"};

@@ -2,15 +2,17 @@
 
 #include <algorithm>
 
+#include "pipeline/program/device_choice.h"
+#include "pipeline/run/presets.h"
 #include "pipeline/run/run_file.h"
 #include "pipeline/run/run_settings.h"
 
 namespace regrade {
 namespace {
 
-JsonValue AllValues(const std::string& preset) {
+JsonValue AllValues(const std::string& preset, bool on_card) {
   RunSettings settings;
-  ApplyPreset(preset, &settings);
+  ApplyPreset(preset, on_card, &settings);
   OptionSet options;
   settings.Bind(&options);
   return options.Values();
@@ -18,11 +20,11 @@ JsonValue AllValues(const std::string& preset) {
 
 // Of the options that at least one preset sets, so that a preset also resets what another one
 // set before.
-JsonValue PresetValues(const std::string& preset) {
-  const JsonValue values = AllValues(preset), plain = AllValues("standard");
+JsonValue PresetValues(const std::string& preset, bool on_card) {
+  const JsonValue values = AllValues(preset, on_card), plain = AllValues("standard", on_card);
   const JsonValue network = OptionValues(TrainNetworkOptions());
   std::vector<JsonValue> presets;
-  for (const char* name : kPresets) presets.push_back(AllValues(name));
+  for (const char* name : kPresets) presets.push_back(AllValues(name, on_card));
   JsonValue set = JsonValue::Object();
   for (const auto& [name, value] : values.AsObject()) {
     const auto differs = [&plain, &key = name](const JsonValue& other) {
@@ -70,13 +72,22 @@ void ApplyField(const std::string& field, OptionSet* options) {
     ApplyKnown(FieldValues(field), "--fit-field", options);
 }
 
+// What the flags say, or else the defaults; false for a command without --device.
+bool OnCard(const OptionSet& options) {
+  const JsonValue values = options.Values();
+  const JsonValue *device = values.Find("device"), *reproducible = values.Find("reproducible");
+  if (device == nullptr || reproducible == nullptr) return false;
+  return PrefersCard(options.Given("device").value_or(device->AsString()),
+                     options.Given("reproducible").has_value() || reproducible->AsBool());
+}
+
 void ApplyRunFile(const RunFile& file, const std::string& path,
-                  const std::vector<std::string>& taken, OptionSet* options) {
+                  const std::vector<std::string>& taken, bool on_card, OptionSet* options) {
   if (taken.empty()) {
     const JsonValue* preset = file.options.IsObject() ? file.options.Find("preset") : nullptr;
     // An unknown preset is refused below, with its line.
     if (preset != nullptr && preset->IsString() && IsPreset(preset->AsString()))
-      ApplyKnown(PresetValues(preset->AsString()), path, options);
+      ApplyKnown(PresetValues(preset->AsString(), on_card), path, options);
     options->ApplyConfig(file.options, path);
     return;
   }
@@ -90,22 +101,25 @@ void ApplyRunFile(const RunFile& file, const std::string& path,
 
 std::vector<std::string> ResolveSettings(const SettingsSources& sources, OptionSet* options) {
   std::vector<std::string> words;
-  ApplyKnown(PresetValues(sources.preset), "--preset", options);
+  const bool on_card = OnCard(*options);
+  ApplyKnown(PresetValues(sources.preset, on_card), "--preset", options);
   if (!sources.run_json.empty()) {
     const RunFile file = ReadRunFile(sources.run_json);
-    ApplyRunFile(file, sources.run_json, sources.taken, options);
+    ApplyRunFile(file, sources.run_json, sources.taken, on_card, options);
     words = file.words;
   }
   if (const auto config = options->Given("config")) {
     const RunFile file = ReadRunFile(*config);
-    ApplyRunFile(file, *config, {}, options);
+    ApplyRunFile(file, *config, {}, on_card, options);
     if (sources.run_json.empty()) words = file.words;
   }
   if (const auto preset = options->Given("preset"))
-    ApplyKnown(PresetValues(*preset), "--preset", options);
+    ApplyKnown(PresetValues(*preset, on_card), "--preset", options);
   if (const auto recipe = options->Given("recipe"))
     ApplyKnown(RecipeValues(*recipe), "--recipe", options);
   if (const auto field = options->Given("fit-field")) ApplyField(*field, options);
+  if (options->Given("fit-resolutions"))
+    ApplyKnown(JsonValue::Object{{"fit-fewer-stages", false}}, "--fit-resolutions", options);
   options->ApplyFlags();
   const JsonValue values = options->Values();
   const JsonValue *reproducible = values.Find("reproducible"), *device = values.Find("device");

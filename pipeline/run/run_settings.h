@@ -112,13 +112,6 @@ struct RunSettings {
   void Bind(OptionSet* options);
 };
 
-inline constexpr const char* kPresets[] = {"draft", "standard", "paper", "best"};
-bool IsPreset(const std::string& name);
-
-// Changes default settings to those of a preset. Throws Error(kUsage) for a name that is not in
-// kPresets.
-void ApplyPreset(const std::string& preset, RunSettings* settings);
-
 // Throws Error(kUsage), naming both, for options that contradict each other.
 void CheckTogether(const RunSettings& settings);
 

@@ -25,6 +25,7 @@
 #include "pipeline/stages/photo_metrics.h"
 #include "pipeline/stages/stages.h"
 #include "pipeline/workspace/metrics_json.h"
+#include "reconstruct/fit/adapt_options.h"
 #include "reconstruct/fit/choose_degree.h"
 #include "reconstruct/fit/fit_field.h"
 
@@ -77,14 +78,18 @@ std::string QualityLine(const ReconstructReport& metrics) {
 
 int Finest(const FitOptions& options) { return *std::ranges::max_element(options.resolutions); }
 
-// Memory and time of a fit of these views, by its options.
-std::function<StagePlan(const FitOptions&)> PlannerOf(const WorkingViews& views,
-                                                      const SceneBox& box, Backend backend) {
+int64_t PixelsToFit(const WorkingViews& views) {
   int64_t pixels = 0;
   for (const int i : views.Training()) {
     const Camera camera = views.CameraOf(i);
     pixels += int64_t{camera.width} * camera.height;
   }
+  return pixels;
+}
+
+// Memory and time of a fit of these photos, by its options.
+std::function<StagePlan(const FitOptions&)> PlannerOf(int64_t pixels, const SceneBox& box,
+                                                      Backend backend) {
   return [pixels, box, backend](const FitOptions& options) {
     return backend == Backend::kCuda ? PlanFitOnDevice(options, pixels, box)
                                      : PlanFit(options, pixels, box, omp_get_max_threads());
@@ -92,17 +97,16 @@ std::function<StagePlan(const FitOptions&)> PlannerOf(const WorkingViews& views,
 }
 
 // The fit's options for the scene, lowered to fit into memory, which is reported.
-FitOptions OptionsForScene(RunContext* context, const NormalizedScene& scene,
-                           const std::function<StagePlan(const FitOptions&)>& plan_of,
+FitOptions OptionsForScene(RunContext* context, const NormalizedScene& scene, int64_t pixels,
                            Backend backend) {
+  const auto plan_of = PlannerOf(pixels, scene.box, backend);
   const RunSettings& settings = context->settings;
   const bool on_device = backend == Backend::kCuda;
   const uint64_t limit =
       PlannedMemory(settings.run.max_memory_gb,
                     on_device ? static_cast<uint64_t>(ReadDeviceStatus().free_bytes)
                               : ReadMemoryStatus().available);
-  FitOptions options = settings.fit;
-  options.ChooseField(scene.ndc.on());
+  FitOptions options = AdaptOptions(settings.fit, {scene.ndc.on(), on_device, pixels});
   const int finest = Finest(options);
   options.seed = settings.run.seed;
   // Free memory must not change the result of a reproducible run.
@@ -160,8 +164,7 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
     if (effect.name != kViewDependence) context->console->Detail(EffectLine(effect));
   for (const std::string& notice : profile.notices) context->console->Info(notice);
   const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
-  FitOptions options =
-      OptionsForScene(context, scene, PlannerOf(views, scene.box, backend), backend);
+  FitOptions options = OptionsForScene(context, scene, PixelsToFit(views), backend);
 
   const std::vector<int> fitted = views.Training();
   std::vector<Image> photos;
@@ -273,9 +276,10 @@ Stage ReconstructStage(RunContext* context) {
     const SceneProfile profile = ProfileScene(views.capture(), context->settings.fit.sh_degree,
                                               run.effects + ",exposure=off");
     const Backend backend = ChooseBackend(run.device, run.reproducible);
-    FitOptions options = context->settings.fit;
-    options.ChooseField(profile.scene.ndc.on());
-    stage.plan = PlanText(PlannerOf(views, profile.scene.box, backend)(options));
+    const int64_t pixels = PixelsToFit(views);
+    const FitOptions options = AdaptOptions(
+        context->settings.fit, {profile.scene.ndc.on(), backend == Backend::kCuda, pixels});
+    stage.plan = PlanText(PlannerOf(pixels, profile.scene.box, backend)(options));
   }
   stage.work = [context, inputs = stage.inputs](const ProgressFunction& progress) {
     return Reconstruct(context, inputs, progress);

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "kernels/base/error.h"
+#include "pipeline/run/presets.h"
 
 namespace regrade {
 namespace {
@@ -113,7 +114,7 @@ const Benchmark& BenchmarkOf(const std::string& name) {
 
 JsonValue PresetOptions(const std::string& preset) {
   RunSettings settings;
-  ApplyPreset(preset, &settings);
+  ApplyPreset(preset, /*on_card=*/false, &settings);
   return OptionValues(settings.scene, settings.fit);
 }
 

@@ -9,6 +9,7 @@
 #include "pipeline/fields/film_timing.h"
 #include "pipeline/report/cost_rows.h"
 #include "pipeline/stages/film_frames.h"
+#include "reconstruct/fit/adapt_options.h"
 #include "reconstruct/fit/choose_degree.h"
 
 namespace regrade {
@@ -136,11 +137,10 @@ double AmountOf(const std::string& unit, const RunSettings& settings, const Capt
     return sum;
   }
   if (unit == "ray voxels") {
+    const FitOptions fit = AdaptOptions(settings.fit, {});
     double sum = 0;
-    for (size_t s = 0; s < std::min(settings.fit.steps.size(), settings.fit.resolutions.size());
-         ++s)
-      sum += static_cast<double>(settings.fit.steps[s]) * settings.fit.rays_per_step *
-             settings.fit.resolutions[s];
+    for (size_t s = 0; s < std::min(fit.steps.size(), fit.resolutions.size()); ++s)
+      sum += static_cast<double>(fit.steps[s]) * fit.rays_per_step * fit.resolutions[s];
     return sum;
   }
   if (unit == "style rays")

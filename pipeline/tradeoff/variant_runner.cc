@@ -198,7 +198,6 @@ void VariantRunner::MeasureFit(const Variant& variant, const ProgressFunction& p
   set.ApplyConfig(variant.options, "tradeoff");
   const Photos& photos = PhotosAt(settings.scene.photo_size);
   FitOptions options = settings.fit;
-  options.ChooseField(photos.scene.ndc.on());
   options.seed = settings.run.seed + static_cast<uint64_t>(m->repeat);
   // The degree chosen by the base's trial, unless it is the parameter.
   const auto record = base_->workspace->Find("reconstruct");

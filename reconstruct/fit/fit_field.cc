@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "kernels/base/error.h"
+#include "reconstruct/fit/adapt_options.h"
 #include "reconstruct/fit/fit_engine.h"
 #include "reconstruct/fit/free_rays.h"
 #include "reconstruct/fit/initial_cells.h"
@@ -30,6 +31,16 @@ double PsnrOf(double squared_error, int64_t rays) {
          std::log10(squared_error / (3.0 * static_cast<double>(std::max<int64_t>(rays, 1))));
 }
 
+FitConditions ConditionsOf(const std::vector<TrainingView>& views, Backend backend) {
+  FitConditions conditions;
+  conditions.on_card = backend == Backend::kCuda;
+  for (const TrainingView& view : views) {
+    conditions.device_coordinates = conditions.device_coordinates || view.camera.ndc.on();
+    conditions.pixels += int64_t{view.camera.width} * view.camera.height;
+  }
+  return conditions;
+}
+
 class Fitter {
  public:
   Fitter(const std::vector<TrainingView>& views, const SceneBox& box, const FitOptions& options,
@@ -37,7 +48,7 @@ class Fitter {
       : rays_(views),
         views_(views),
         box_(box),
-        options_(options),
+        options_(AdaptOptions(options, ConditionsOf(views, backend))),
         hooks_(hooks),
         sums_each_step_(backend == Backend::kCpu) {
     REGRADE_CHECK_EQ(options.resolutions.size(), options.steps.size());

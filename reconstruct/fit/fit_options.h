@@ -10,10 +10,11 @@
 namespace regrade {
 
 struct FitOptions {
-  std::string field = "auto";
-  std::vector<int> resolutions = {64, 128, 256, 512};
-  std::vector<int> steps = {600, 900, 1200, 2300};
-  int rays_per_step = 4096;
+  std::string field = "adaptive";
+  std::vector<int> resolutions = {48, 96, 192, 384, 768};
+  bool fewer_stages = true;
+  std::vector<int> steps = {600, 700, 900, 1200, 1400};
+  int rays_per_step = 0;  // 0: see AdaptOptions
   int patch = 1;
   int sh_degree = 2;
   float view_bound = 0.2f;
@@ -42,7 +43,7 @@ struct FitOptions {
   float initial_background_density = 0.1f;
   float background_lead = 0.9f;
   float cell_pixels = 1.0f;
-  float max_cells = 12.0f;
+  float max_cells = 8.0f;
   float free_space = 0.02f;
   int shards = 0;
   bool exact_sums = false;
@@ -62,28 +63,6 @@ struct FitOptions {
     tv_fraction = 0.03f;
     prune_weight = 0.5f;
   }
-  // Decides "auto": uniform in device coordinates, where that is still better (COSTS.md). What
-  // differs from the defaults was asked for, and stays. At most three stages: more would take
-  // much memory.
-  void ChooseField(bool device_coordinates) {
-    if (field != "auto" || !device_coordinates) return;
-    const FitOptions plain;
-    FitOptions uniform;
-    uniform.MakeUniform();
-    for (float FitOptions::*value :
-         {&FitOptions::rate_density, &FitOptions::rate_density_end, &FitOptions::rate_sh,
-          &FitOptions::rate_sh_end, &FitOptions::tv_density, &FitOptions::tv_sh,
-          &FitOptions::tv_decay, &FitOptions::tv_fraction, &FitOptions::prune_weight})
-      if (this->*value == plain.*value) this->*value = uniform.*value;
-    field = "uniform";
-    constexpr size_t kStages = 3;
-    while (resolutions.size() > kStages && steps.size() == resolutions.size()) {
-      resolutions.pop_back();
-      steps[steps.size() - 2] += steps.back();
-      steps.pop_back();
-    }
-  }
-
   template <typename Bind>
   void Describe(Bind& bind) {
     bind(
@@ -91,20 +70,26 @@ struct FitOptions {
         {.help = "uniform: voxels of one width; adaptive: cells that are halved where two "
                  "photos see them wider than a pixel; auto: uniform for captures that look one "
                  "way, else adaptive",
-         .choices = "auto|uniform|adaptive"});
+         .choices = "adaptive|uniform"});
     bind("fit-resolutions", resolutions,
          {.unit = "voxels",
           .help = "longest side of the grid in each stage, coarse to fine; an adaptive field "
                   "doubles it in each stage, and its memory grows with --fit-max-cells",
           .min = 8,
           .max = 2048});
+    bind("fit-fewer-stages", fewer_stages,
+         {.help = "leaves out last stages that are finer than the photos can determine; giving "
+                  "--fit-resolutions switches it off"});
     bind("fit-steps", steps,
          {.unit = "steps",
           .help = "optimizer steps in each stage; time grows with their sum",
           .min = 1,
           .max = 1000000});
     bind("fit-rays", rays_per_step,
-         {.unit = "rays", .help = "rays per step", .min = 64, .max = 1 << 22});
+         {.unit = "rays",
+          .help = "rays per step; 0: 4096, on a card more for captures of many pixels",
+          .min = 0,
+          .max = 1 << 22});
     bind("fit-patch", patch,
          {.unit = "pixels",
           .help = "side of the pixel squares that rays are drawn in: larger is faster (rays "

@@ -54,9 +54,9 @@ GridFrame CellFrame(const SceneBox& box, int coarsest, int finest) {
   for (int a = 0; a < 3; ++a)
     size[a] = std::max(1, ((size[a] >> finest) + (size[a] >> (finest - 1) & (finest > 0))))
               << finest;
-  // The limit of layers is one of the coarsest cells: rays run along z, and have a sample a
-  // cell.
-  if (box.layers > 0) size.z = ResolutionFor(box, coarsest).z << finest;
+  // In device coordinates rays run along z, and what is seen of a surface lies across.
+  constexpr int kWidthsPerLayer = 3;
+  if (box.layers > 0) size.z = std::max(1, coarsest / kWidthsPerLayer) << finest;
   return {size, box.center, box.radius};
 }
 

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "pipeline/run/presets.h"
 #include "pipeline/run/resolve_settings.h"
 #include "tests/support/small_field.h"
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "pipeline/run/presets.h"
 #include "pipeline/run/run_settings.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"
@@ -32,22 +33,23 @@ TEST(RunSettings, AllOptionsBind) {
   OptionSet options;
   settings.Bind(&options);
   EXPECT_NE(options.Help().find("--photo-size"), std::string::npos);
-  for (const char* preset : kPresets) {
-    RunSettings other;
-    ApplyPreset(preset, &other);
-    EXPECT_EQ(other.run.preset, preset);
-    // Presets stay within the bounds that users have.
-    OptionSet bound;
-    other.Bind(&bound);
-    EXPECT_NO_THROW(bound.ApplyConfig(bound.Values(), preset)) << preset;
-  }
-  EXPECT_REGRADE_ERROR(ApplyPreset("fast", &settings), ExitCode::kUsage, "draft");
+  for (const bool on_card : {false, true})
+    for (const char* preset : kPresets) {
+      RunSettings other;
+      ApplyPreset(preset, on_card, &other);
+      EXPECT_EQ(other.run.preset, preset);
+      // Presets stay within the bounds that users have.
+      OptionSet bound;
+      other.Bind(&bound);
+      EXPECT_NO_THROW(bound.ApplyConfig(bound.Values(), preset)) << preset;
+    }
+  EXPECT_REGRADE_ERROR(ApplyPreset("fast", false, &settings), ExitCode::kUsage, "draft");
 }
 
 TEST(ResolveSettings, PresetsGiveTheirValues) {
   for (const char* preset : kPresets) {
     RunSettings expected;
-    ApplyPreset(preset, &expected);
+    ApplyPreset(preset, false, &expected);
     OptionSet bound;
     expected.Bind(&bound);
     RunSettings settings;
@@ -73,8 +75,10 @@ TEST(ResolveSettings, LaterSourcesOverrideEarlierOnes) {
 
   Resolved r = Resolve({}, sources);
   EXPECT_EQ(r.words, std::vector<std::string>{"/photos"});
-  EXPECT_EQ(r.settings.fit.resolutions, (std::vector<int>{64, 128, 256}));  // its preset
-  EXPECT_EQ(r.settings.scene.photo_size, 300);  // its option over its preset
+  RunSettings draft;
+  ApplyPreset("draft", false, &draft);
+  EXPECT_EQ(r.settings.fit.resolutions, draft.fit.resolutions);  // its preset
+  EXPECT_EQ(r.settings.scene.photo_size, 300);                   // its option over its preset
   EXPECT_EQ(r.settings.network.rays_per_step, 7);
 
   r = Resolve({"--config", config}, sources);

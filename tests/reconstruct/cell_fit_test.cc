@@ -6,6 +6,7 @@
 #include <cmath>
 #include <vector>
 
+#include "reconstruct/fit/adapt_options.h"
 #include "reconstruct/fit/fit_field.h"
 #include "reconstruct/fit/initial_cells.h"
 #include "reconstruct/fit/measure_cells.h"
@@ -71,24 +72,57 @@ TEST_F(CellFit, H110_AResumedFitIsTheUndisturbedOne) {
   }
 }
 
-TEST(FitOptions, TheFieldFollowsTheSceneAndKeepsWhatWasAskedFor) {
-  FitOptions uniform;
-  uniform.MakeUniform();
+TEST(AdaptOptions, RaysFollowThePixelsOnACardOnly) {
   FitOptions options;
-  options.ChooseField(/*device_coordinates=*/false);
-  EXPECT_TRUE(options.adaptive());
-  EXPECT_EQ(options.rate_density, FitOptions().rate_density);
+  options.resolutions = {8, 16};
+  options.steps = {400, 600};
+  const auto rays = [&](bool on_card, int64_t pixels) {
+    return AdaptOptions(options, {.on_card = on_card, .pixels = pixels}).rays_per_step;
+  };
+  EXPECT_EQ(rays(false, 1000000), 4096);
+  EXPECT_EQ(rays(true, 100000), 4096);
+  EXPECT_EQ(rays(true, 1000000), kPasses * 1000);
+  EXPECT_EQ(rays(true, 100000000), 16384);
+  options.rays_per_step = 77;
+  EXPECT_EQ(rays(true, 1000000), 77);
+}
+
+TEST(AdaptOptions, StagesFinerThanThePhotosAreLeftOut) {
+  FitOptions options;
+  options.resolutions = {48, 96, 192};
+  options.steps = {10, 20, 30};
+  const auto stages = [&](int64_t pixels) {
+    const FitOptions adapted = AdaptOptions(options, {.pixels = pixels});
+    EXPECT_EQ(adapted.steps.size(), adapted.resolutions.size());
+    return adapted.resolutions.size();
+  };
+  EXPECT_EQ(stages(4 * 192 * 192), 3u);
+  EXPECT_EQ(stages(4 * 192 * 192 - 1), 2u);
+  EXPECT_EQ(stages(1), 1u);
+  options.fewer_stages = false;
+  EXPECT_EQ(stages(1), 3u);
+  options.fewer_stages = true;
+  options.MakeUniform();
+  EXPECT_EQ(stages(1), 3u);
+}
+
+TEST(AdaptOptions, DeviceCoordinatesHaveRatesOfTheirOwnAndWhatWasAskedForStays) {
+  FitOptions options;
+  const FitOptions elsewhere = AdaptOptions(options, {});
+  EXPECT_EQ(elsewhere.rate_density, options.rate_density);
+  EXPECT_GT(elsewhere.free_space, 0);
   options.tv_sh = 0.5f;
-  options.ChooseField(true);
-  EXPECT_FALSE(options.adaptive());
-  EXPECT_EQ(options.rate_density, uniform.rate_density);
-  EXPECT_EQ(options.tv_sh, 0.5f);
-  EXPECT_EQ(options.resolutions, (std::vector<int>{64, 128, 256}));
-  EXPECT_EQ(options.steps, (std::vector<int>{600, 900, 3500}));
-  FitOptions asked;
-  asked.field = "adaptive";
-  asked.ChooseField(true);
-  EXPECT_TRUE(asked.adaptive());
+  const FitOptions forward = AdaptOptions(options, {.device_coordinates = true});
+  EXPECT_LT(forward.rate_density, options.rate_density);
+  EXPECT_EQ(forward.free_space, 0);
+  EXPECT_EQ(forward.tv_sh, 0.5f);
+  const FitOptions again = AdaptOptions(forward, {.device_coordinates = true});
+  EXPECT_EQ(again.rate_density, forward.rate_density);
+  EXPECT_EQ(again.tv_density, forward.tv_density);
+  EXPECT_EQ(again.rays_per_step, forward.rays_per_step);
+  options.MakeUniform();
+  EXPECT_EQ(AdaptOptions(options, {.device_coordinates = true}).rate_density,
+            options.rate_density);
 }
 
 TEST(ChooseChanges, H167_TheLimitOfCellsHoldsAndTheLargestErrorsAreSplit) {
