@@ -53,11 +53,11 @@ struct VideoWriter::State {
     if (!temporary.empty()) ::unlink(temporary.c_str());
   }
 
+  // libx264 itself is there: it fails where memory or threads are not.
   void CheckEncoder(int code, const char* step) const {
     if (code < 0)
-      throw ProgramError(std::string("H.264 encoder: cannot ") + step + ": " + ErrorText(code),
-                         path,
-                         "install FFmpeg's libavcodec with libx264, or go without the video");
+      throw ResourceError(std::string("H.264 encoder: cannot ") + step + ": " + ErrorText(code),
+                          path, "close other programs, or make a smaller film (--film-size)");
   }
   void CheckWrite(int code) const {
     if (code >= 0 && output->pb != nullptr) code = output->pb->error;
@@ -68,7 +68,9 @@ struct VideoWriter::State {
 
   void OpenEncoder(double frames_per_second) {
     const AVCodec* codec = avcodec_find_encoder_by_name("libx264");
-    CheckEncoder(codec == nullptr ? AVERROR_ENCODER_NOT_FOUND : 0, "find libx264");
+    if (codec == nullptr)
+      throw ProgramError("no H.264 encoder", path,
+                         "install FFmpeg's libavcodec with libx264, or go without the video");
     encoder.reset(Allocated(avcodec_alloc_context3(codec)));
     encoder->width = width + width % 2;
     encoder->height = height + height % 2;

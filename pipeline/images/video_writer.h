@@ -17,8 +17,8 @@ inline constexpr int kVideoCrf = 18;
 // where the frames have odd ones. Equal frames give equal bytes.
 class VideoWriter {
  public:
-  // Throws Error(kExternalProgram) if FFmpeg here cannot write H.264, Error(kResources) if the
-  // file cannot be created.
+  // Throws Error(kExternalProgram) if FFmpeg here has no H.264 encoder, Error(kResources) if
+  // the file cannot be created.
   VideoWriter(const std::string& path, int width, int height, double frames_per_second);
   ~VideoWriter();
   VideoWriter(const VideoWriter&) = delete;

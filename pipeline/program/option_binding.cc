@@ -223,12 +223,12 @@ void OptionSet::ApplyConfig(const JsonValue& values, const std::string& where) {
     if (value.IsObject() || value.IsNull())
       throw UsageError("a value expected for \"" + name + "\"", place(value));
     const std::string where_of = place(value) + ": " + name;
-    if (!IsTextList(*entry)) {
+    if (IsTextList(*entry)) std::get<std::vector<std::string>*>(entry->target)->clear();
+    if (!IsTextList(*entry) || value.IsString()) {  // one text is a list of one
       Assign(*entry, FlagText(value), where_of);
       continue;
     }
-    std::get<std::vector<std::string>*>(entry->target)->clear();
-    if (!value.IsArray()) throw UsageError("an array of texts expected", where_of);
+    if (!value.IsArray()) throw UsageError("a text or an array of texts expected", where_of);
     for (const JsonValue& element : value.AsArray()) {
       if (!element.IsString()) throw UsageError("a text expected", where_of);
       Assign(*entry, element.AsString(), where_of);
@@ -274,14 +274,12 @@ JsonValue OptionSet::Values() const {
   return values;
 }
 
-OptionSet::Description OptionSet::Describe(const Entry& entry,
-                                            const Texts& required) {
+OptionSet::Description OptionSet::Describe(const Entry& entry, const Texts& required) {
   const bool is_switch = std::holds_alternative<bool*>(entry.target);
   const bool is_text = std::holds_alternative<std::string*>(entry.target) || IsTextList(entry);
   const char* choices = entry.info.choices + (*entry.info.choices == '|' ? 1 : 0);
   Description description;
-  if (!is_switch)
-    description.value = *choices ? choices : is_text ? "TEXT" : "N";
+  if (!is_switch) description.value = *choices ? choices : is_text ? "TEXT" : "N";
   std::string facts;
   if (!is_switch && *entry.info.unit) facts += std::string(entry.info.unit) + ", ";
   if (!is_switch && !is_text &&

@@ -3,6 +3,7 @@
 #include <omp.h>
 
 #include "pipeline/run/plan.h"
+#include "reconstruct/fit/adapt_options.h"
 
 namespace regrade {
 namespace {
@@ -48,7 +49,8 @@ double DurationEstimate::Rough(const Variant& variant) const {
   if (variant.benchmark == "fit" || variant.benchmark == "style")
     options.ApplyConfig(variant.options, "tradeoff");
   const int threads = omp_get_max_threads();
-  if (variant.benchmark == "fit") return PlanFit(settings.fit, 0, SceneBox(), threads).seconds;
+  if (variant.benchmark == "fit")
+    return PlanFit(AdaptOptions(settings.fit, {}), 0, SceneBox(), threads).seconds;
   if (variant.benchmark == "style") return PlanStyle(settings.network.steps, threads).seconds;
   return variant.benchmark == "poses" ? kPoses : kFewSeconds;
 }

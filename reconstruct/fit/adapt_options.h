@@ -13,9 +13,9 @@ struct FitConditions {
   int64_t pixels = 0;  // of the photos that are fitted
 };
 
-// - Rays per step, where they are 0: 4096 on a CPU; on a card as many as make kPasses passes over
-//   the photos' pixels in all steps, from 4096 to 16384. Fewer passes leave captures of many
-//   photos soft, more gain nothing (COSTS.md).
+// - Rays per step, where they are 0: 4096 on a CPU; on a card as many as make kPasses passes
+//   over the photos' pixels in all steps, from 4096 to 16384. Fewer passes leave captures of
+//   many photos soft, more gain nothing (COSTS.md).
 // - Stages of an adaptive field, with fewer_stages: none is finer than half the square root of
 //   the pixels. Nine photos of 640 x 480 pixels lose 0.5 dB and .05 of SSIM by cells half as
 //   wide (COSTS.md).

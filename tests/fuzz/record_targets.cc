@@ -76,7 +76,7 @@ std::vector<std::string> RunSeeds() {
   settings.Bind(&options);
   const JsonValue values = options.Values();
   return {DumpJson(JsonValue::Object{
-              {"schema", 1}, {"arguments", JsonValue::Array{"photos"}}, {"options", values}}),
+              {"schema", 2}, {"arguments", JsonValue::Array{"photos"}}, {"options", values}}),
           R"({"arguments": [], "options": {"seed": 3, "fit-rays": 512, "out": "x"}})"};
 }
 

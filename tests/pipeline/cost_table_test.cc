@@ -213,8 +213,10 @@ TEST(Prediction, RefusesCostsOfAnotherSchema) {
 TEST(DurationEstimate, ImprovesWithTheFirstMeasurement) {
   RunSettings base;
   const Variant own = FitVariant("", "");
-  Variant twice = FitVariant("fit-steps", "1200,1800,2400,4600", true);
-  twice.options["fit-steps"] = JsonValue::Array{1200, 1800, 2400, 4600};
+  Variant twice = FitVariant("fit-steps", "twice", true);
+  JsonValue::Array steps;
+  for (const int count : base.fit.steps) steps.push_back(2 * count);
+  twice.options["fit-steps"] = steps;
   DurationEstimate estimate(base, {});
   EXPECT_NEAR(estimate.Seconds(twice), 2 * estimate.Seconds(own), 1e-6 * estimate.Seconds(own));
   estimate.Add({"fit", "", "", 0, 10, 15, 26});

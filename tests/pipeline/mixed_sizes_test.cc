@@ -125,7 +125,8 @@ TEST(MixedSizes, H159_ThreeSizesOfTwoCamerasGoToFilmAndReport) {
 
   const JsonValue report = ReadJsonFile(folder / "e/styles/style_sunset/report.json");
   ExpectFiniteOrReason(report, "report");
-  EXPECT_EQ(report.At("stages").At("render").At("frames").AsInt(), 6 + 6 + 3);
+  // At the photos' places, of the common camera, along the film's path, and of the film.
+  EXPECT_EQ(report.At("stages").At("render").At("frames").AsInt(), 6 + 6 + 3 + 3);
   EXPECT_EQ(report.At("stages").At("render").At("film").At("width").AsInt(), 64);
   EXPECT_NE(report.At("stages").At("evaluate").Find("comparison_note"), nullptr);
   EXPECT_EQ(RowOf(report, "styled", 1).At("pairs").AsInt(), 5);

@@ -193,7 +193,8 @@ TEST(PoseTracks, PerturbedPosesAreRefined) {
   Synth(folder / "s", "poses");
   Regrade({"pose", folder / "s", "--out", folder / "off", "--effects", "pose-refinement=off"});
   Regrade({"export", folder / "off", "--format", "transforms", "--out", folder / "shaken"});
-  const std::string output = Regrade({"pose", folder / "shaken", "--out", folder / "out"});
+  const std::string output =
+      Regrade({"pose", folder / "shaken", "--out", folder / "out", "--verbose"});
   ASSERT_NE(output.find("pose-refinement on"), std::string::npos) << output;
   Regrade({"pose", folder / "s/truth", "--out", folder / "truth", "--tracks", "given"});
   const Capture truth = ReadCapture(folder / "truth/poses"),

@@ -208,9 +208,9 @@ TEST(Program, F33_OutputThatIsAFileExitsWith5) {
 Outcome RenderUnder(const std::string& limits, const std::vector<std::string>& arguments) {
   const TemporaryFolder folder;
   { const Workspace workspace(folder / "out"); }
-  WriteText(folder / "out/run.json",
-            "{\"arguments\": [\"photos\"], \"options\": {\"style\": \"" + testing::SourceDir() +
-                "/assets/style_sunset.png\"}}");
+  for (const char* run : {"out/run.json", "out/styles/style_sunset/run.json"})
+    WriteText(folder / run, "{\"arguments\": [\"photos\"], \"options\": {\"style\": \"" +
+                                testing::SourceDir() + "/assets/style_sunset.png\"}}");
   return RunProgram({"/bin/sh", "-c", limits + "; exec \"$0\" \"$@\"", REGRADE_PROGRAM,
                      "render", folder / "out"},
                     arguments);

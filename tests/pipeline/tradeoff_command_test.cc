@@ -83,7 +83,9 @@ TEST(TradeoffCommand, MeasuresContinuesAndPredicts) {
 
   // In the folder of a run the table becomes part of its report; a damaged one or one of
   // another schema is omitted with a warning.
-  const auto page = [&] { return testing::ReadText(folder / "t/base/report.html"); };
+  const auto page = [&] {
+    return testing::ReadText(folder / "t/base/styles/style_sunset/report.html");
+  };
   testing::WriteText(folder / "t/base/tradeoff/tradeoff.json",
                      "{\"schema\": 1, \"costs\": [{}]}");
   outcome = Regrade({"evaluate", folder / "t/base"});

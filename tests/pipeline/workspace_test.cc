@@ -164,7 +164,7 @@ TEST(Workspace, RecordsCannotLeadOutOfTheFolder) {
   for (const char* path : {"../secret", "/etc/passwd", "a/../../b", "poses/"}) {
     WriteJsonFile(
         workspace.Path(".regrade/stages/pose.json"),
-        JsonValue::Object{{"schema", 2},
+        JsonValue::Object{{"schema", 3},
                           {"regrade", "x"},
                           {"inputs", JsonValue::Object()},
                           {"outputs", JsonValue::Array{JsonValue::Object{
