@@ -72,4 +72,46 @@ HD inline int32_t CellAt(const CellsView& cells, const Vec3i& at, int* width) {
   return entry;
 }
 
+// CellAt for voxels near each other, one after the other: it keeps the nodes above the last one
+// and begins at the smallest that holds the next voxel, too.
+class CellPath {
+ public:
+  explicit CellPath(const CellsView& cells) : cells_(cells) {}
+
+  int32_t operator()(const Vec3i& at, int* width) {
+    const uint32_t differs =
+        static_cast<uint32_t>((at.x ^ last_.x) | (at.y ^ last_.y) | (at.z ^ last_.z));
+    int shift = differs == 0 ? 0 : 32 - __builtin_clz(differs);  // of the cube that holds both
+    if (shift < leaf_shift_) shift = leaf_shift_;
+    last_ = at;
+    int32_t entry;
+    if (shift <= cells_.finest) {
+      entry = entry_[shift];
+    } else {
+      shift = cells_.finest;
+      entry = entry_[shift] =
+          cells_
+              .top[((at.x >> shift) * cells_.top_size.y + (at.y >> shift)) * cells_.top_size.z +
+                   (at.z >> shift)];
+    }
+    while (IsNode(entry)) {
+      --shift;
+      entry = entry_[shift] = cells_.nodes[int64_t{NodeOf(entry)} * 8 +
+                                           ((at.x >> shift & 1) << 2 |
+                                            (at.y >> shift & 1) << 1 | (at.z >> shift & 1))];
+    }
+    leaf_shift_ = shift;
+    *width = 1 << shift;
+    return entry;
+  }
+
+ private:
+  static constexpr int kMostLevels = 32;
+
+  CellsView cells_;
+  Vec3i last_{-1, -1, -1};  // differs from every voxel in the highest bit
+  int leaf_shift_ = 0;
+  int32_t entry_[kMostLevels] = {};  // of the cube of 2^k voxels that holds the last voxel
+};
+
 }  // namespace regrade

@@ -27,10 +27,10 @@ struct CellSample {
 
 // Calls body(sample) front to back for each cell and empty cube on the ray beyond near_clip
 // (world units); it returns false to end the ray. A ray with a zero or non-finite direction or
-// origin has no samples.
-template <typename T, typename Body>
-HD void WalkCells(const GridFrame& frame, const CellsView& cells, const RayT<T>& ray,
-                  T near_clip, const Body& body) {
+// origin has no samples. `cell_at(at, &width)` finds a cell as CellAt does.
+template <typename T, typename Find, typename Body>
+HD void WalkCellsFoundBy(const GridFrame& frame, Find& cell_at, const RayT<T>& ray, T near_clip,
+                         const Body& body) {
   using std::floor;
   if (!AllFinite(ray.origin) || !AllFinite(ray.direction)) return;
   const Vec3f scale = frame.Scale();
@@ -66,7 +66,7 @@ HD void WalkCells(const GridFrame& frame, const CellsView& cells, const RayT<T>&
   for (int a = 0; a < 3; ++a) at[a] = voxel_at(a, begin, 0, frame.resolution[a]);
   for (T t = begin;;) {
     CellSample<T> sample;
-    sample.cell = CellAt(cells, at, &sample.width);
+    sample.cell = cell_at(at, &sample.width);
     Vec3i low;
     T next = end;
     int axis = -1;
@@ -80,20 +80,28 @@ HD void WalkCells(const GridFrame& frame, const CellsView& cells, const RayT<T>&
     if (next < t) next = t;
     sample.delta = next - t;
     sample.t = t + sample.delta / 2;
+    const T per_width = T(1) / T(sample.width);  // exact: a power of two
     for (int a = 0; a < 3; ++a) {
       const T inside =
-          (origin[a] + direction[a] * sample.t - T(low[a] - frame.resolution[a] / 2)) /
-          T(sample.width);
+          (origin[a] + direction[a] * sample.t - T(low[a] - frame.resolution[a] / 2)) *
+          per_width;
       sample.fraction[a] = inside >= 0 ? (inside <= 1 ? inside : T(1)) : T(0);
     }
     if (!body(sample) || axis < 0 || !(next < end)) return;
-    for (int a = 0; a < 3; ++a)
-      at[a] = a != axis          ? voxel_at(a, next, low[a], sample.width)
-              : direction[a] > 0 ? low[a] + sample.width
-                                 : low[a] - 1;
+    if (sample.width > 1)  // a cube of one voxel has no other
+      for (int a = 0; a < 3; ++a)
+        if (a != axis) at[a] = voxel_at(a, next, low[a], sample.width);
+    at[axis] = direction[axis] > 0 ? low[axis] + sample.width : low[axis] - 1;
     if (at[axis] < 0 || at[axis] >= frame.resolution[axis]) return;
     t = next;
   }
+}
+
+template <typename T, typename Body>
+HD void WalkCells(const GridFrame& frame, const CellsView& cells, const RayT<T>& ray,
+                  T near_clip, const Body& body) {
+  const auto cell_at = [&](const Vec3i& at, int* width) { return CellAt(cells, at, width); };
+  WalkCellsFoundBy(frame, cell_at, ray, near_clip, body);
 }
 
 }  // namespace regrade

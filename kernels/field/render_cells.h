@@ -50,7 +50,8 @@ T MarchCells(const GridFrame& frame, const CellsView& cells, const T* density,
              const RayT<T>& ray, T near_clip, T stop, std::vector<CompositedCell<T>>* samples) {
   samples->clear();
   T depth = 0, transmittance = 1;
-  WalkCells(frame, cells, ray, near_clip, [&](const CellSample<T>& place) {
+  CellPath cell_at(cells);
+  WalkCellsFoundBy(frame, cell_at, ray, near_clip, [&](const CellSample<T>& place) {
     if (place.cell == kNoCell) return true;
     T sigma;
     InterpolateInCell(cells, place, density, 1, 1, &sigma);

@@ -3,8 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <random>
 #include <set>
 #include <vector>
 
@@ -69,6 +71,24 @@ TEST(CellLattice, KeysKeepPlacesAndOrder) {
   for (int k = 0; k < 8; ++k)
     EXPECT_EQ(KeyOf(CornerOf({8, 16, 24}, 4, k)),
               KeyOf({8, 16, 24}) + (static_cast<CellKey>(k) << 6));
+}
+
+// Steps of one voxel, as a ray makes them, and leaps.
+TEST(CellGrid, APathFindsWhatASearchFromTheTopFinds) {
+  const Vec3i voxels{16, 24, 16};
+  const CellGrid grid = RandomCells({2, 3, 2}, 3, 0.15, 5);
+  const CellsView view = ViewOf(grid, voxels);
+  std::mt19937 random(3);
+  CellPath path(view);
+  Vec3i at{0, 0, 0};
+  for (int i = 0; i < 20000; ++i) {
+    int width = 0, from_top = 0;
+    EXPECT_EQ(path(at, &width), CellAt(view, at, &from_top)) << i;
+    EXPECT_EQ(width, from_top) << i;
+    const int a = static_cast<int>(random() % 3);
+    at[a] = i % 10 == 0 ? static_cast<int>(random() % voxels[a])
+                        : std::clamp(at[a] + (random() % 2 == 0 ? 1 : -1), 0, voxels[a] - 1);
+  }
 }
 
 TEST(CellGrid, EveryVoxelIsFoundInItsCell) {

@@ -56,19 +56,20 @@ inline void MarchCellRay(const FastGrid& grid, const Ray& ray, const MarchOption
     return result->Composite(options.stop_transmittance);
   };
   bool stopped = false;
-  WalkCells(grid.frame, ViewOf(grid.cells, grid.frame.resolution), ray, grid.near_clip,
-            [&](const CellSample<float>& sample) {
-              if (sample.cell == kNoCell) return true;
-              const int lane = cells.count++;
-              cells.cell[lane] = sample.cell;
-              cells.x[lane] = sample.fraction.x;
-              cells.y[lane] = sample.fraction.y;
-              cells.z[lane] = sample.fraction.z;
-              cells.t[lane] = sample.t;
-              cells.delta[lane] = sample.delta;
-              if (cells.count == kWide) stopped = composite();
-              return !stopped;
-            });
+  CellPath cell_at(ViewOf(grid.cells, grid.frame.resolution));
+  const auto collect = [&](const CellSample<float>& sample) {
+    if (sample.cell == kNoCell) return true;
+    const int lane = cells.count++;
+    cells.cell[lane] = sample.cell;
+    cells.x[lane] = sample.fraction.x;
+    cells.y[lane] = sample.fraction.y;
+    cells.z[lane] = sample.fraction.z;
+    cells.t[lane] = sample.t;
+    cells.delta[lane] = sample.delta;
+    if (cells.count == kWide) stopped = composite();
+    return !stopped;
+  };
+  WalkCellsFoundBy(grid.frame, cell_at, ray, grid.near_clip, collect);
   if (cells.count > 0 && !stopped) composite();
 }
 
