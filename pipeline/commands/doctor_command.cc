@@ -10,6 +10,7 @@
 #include "kernels/field/cpu/rays.h"
 #include "kernels/process/child_process.h"
 #include "pipeline/commands/command.h"
+#include "pipeline/images/libraries.h"
 #include "pipeline/program/memory.h"
 
 namespace regrade {
@@ -23,19 +24,22 @@ struct Finding {
 Finding FindColmap(const std::string& program) {
   const std::string needed = "needed for `run` and `pose` on photos without poses";
   std::string version;
+  bool cuda = false;
   try {
     ChildOptions options;
     options.argv = {program, "help"};
     options.wall_limit_s = 20;
     options.environment = {{"QT_QPA_PLATFORM", "offscreen"}};
-    RunChild(options, [&version](const std::string& line) {
+    RunChild(options, [&](const std::string& line) {
       if (version.empty() && line.find("COLMAP") != std::string::npos) version = line;
+      cuda = cuda || line.find("with CUDA") != std::string::npos;
     });
   } catch (const Error& error) {
     return {"COLMAP", "not found: " + error.what_failed(),
             needed + "; install the package `colmap`"};
   }
-  return {"COLMAP", version.empty() ? "'" + program + "' is not COLMAP" : version, needed};
+  return {"COLMAP", version.empty() ? "'" + program + "' is not COLMAP" : version,
+          needed + (cuda ? "; finds and matches features on the GPU" : "")};
 }
 
 Finding FindDevice() {
@@ -72,6 +76,8 @@ void RunDoctor(const Command& command, const Arguments& arguments, Console* cons
       {"fast path", FastRays().name, "instruction set of rendering and fitting"},
       FindColmap("colmap"),
   };
+  for (const Library& library : PictureLibraries())
+    findings.push_back({library.name, library.version, library.purpose});
   console->Event("doctor", JsonValue::Object());
   for (const Finding& finding : findings) {
     if (program.json) {

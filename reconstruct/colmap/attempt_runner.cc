@@ -42,7 +42,7 @@ class AttemptRunner::Impl {
         report_(*report),
         output_(static_cast<int>(photos.size())),
         log_folder_(MakeLogFolder()),
-        colmap_(options.colmap, log_folder_),
+        colmap_(options.colmap, log_folder_, options.colmap_gpu),
         threads_(options.threads) {
     const double n = static_cast<double>(photos.size());
     const double automatic = 600 + 60 * n + 2 * std::min(n * (n - 1) / 2, 40 * n);
@@ -238,6 +238,7 @@ class AttemptRunner::Impl {
         command, arguments, command,
         {std::max(1.0, deadline_ - Now()), 60 * options_.quiet_limit_min},
         [&](const std::string& line) { output_.Line(line); }, tick);
+    for (std::string& note : colmap_.TakeNotes()) report_.notes.push_back(std::move(note));
     spent_ += weight;
     return result;
   }

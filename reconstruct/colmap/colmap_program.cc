@@ -1,5 +1,6 @@
 #include "reconstruct/colmap/colmap_program.h"
 
+#include <algorithm>
 #include <csignal>
 #include <cstdio>
 #include <filesystem>
@@ -30,6 +31,8 @@ const std::vector<std::pair<std::string, std::string>> kEnvironment = {
 
 bool IsPathOption(const std::string& name) { return name.ends_with("_path"); }
 
+bool IsGpuOption(const std::string& name) { return name.ends_with(".use_gpu"); }
+
 bool ReportsFullDisk(const std::string& line) {
   return line.find("disk is full") != std::string::npos ||
          line.find("No space left on device") != std::string::npos ||
@@ -54,16 +57,18 @@ const char* LikelyCause(const ChildResult& result) {
 
 }  // namespace
 
-ColmapProgram::ColmapProgram(const std::string& program, const std::string& log_folder)
+ColmapProgram::ColmapProgram(const std::string& program, const std::string& log_folder,
+                             const std::string& gpu)
     : program_(program.find('/') == std::string::npos ? program : Absolute(program)),
       log_folder_(log_folder) {
   ChildOptions options{
       .argv = {program_, "help"}, .environment = kEnvironment, .wall_limit_s = 60};
   options.log_path = LogPath("help");
   int major = 0, minor = 0;
-  bool found = false;
+  bool found = false, has_cuda = false;
   const LineFunction read_version = [&](const std::string& line) {
     found = found || std::sscanf(line.c_str(), "COLMAP %d.%d", &major, &minor) == 2;
+    has_cuda = has_cuda || line.find("with CUDA") != std::string::npos;
   };
   ChildResult result;
   try {
@@ -83,12 +88,32 @@ ColmapProgram::ColmapProgram(const std::string& program, const std::string& log_
   if (std::pair(major, minor) < std::pair(3, 7))
     throw ProgramError("COLMAP " + version_ + " is too old (3.7 and newer are supported)",
                        program, kInstall);
+  if (gpu == "on" && !has_cuda)
+    throw ProgramError("this COLMAP was built without CUDA", program,
+                       "use --colmap-gpu auto, or give a COLMAP with CUDA with --colmap PATH");
+  use_gpu_ = gpu != "off" && has_cuda;
+  may_fall_back_ = gpu == "auto";
 }
 
 ChildResult ColmapProgram::Run(const std::string& command, const ColmapArguments& arguments,
                                const std::string& log_name, const Limits& limits,
                                const LineFunction& on_line,
                                const KeepGoingFunction& keep_going) {
+  const bool on_gpu = use_gpu_ && std::ranges::any_of(arguments, [](const auto& argument) {
+                        return IsGpuOption(argument.first);
+                      });
+  ChildResult result = RunOnce(command, arguments, log_name, limits, on_line, keep_going);
+  if (!on_gpu || !may_fall_back_ || result.Succeeded() || result.TimedOut()) return result;
+  notes_.push_back("colmap " + command + " failed on the GPU (" + result.Describe() +
+                   "); COLMAP goes on with the CPU");
+  use_gpu_ = false;
+  return RunOnce(command, arguments, log_name, limits, on_line, keep_going);
+}
+
+ChildResult ColmapProgram::RunOnce(const std::string& command, const ColmapArguments& arguments,
+                                   const std::string& log_name, const Limits& limits,
+                                   const LineFunction& on_line,
+                                   const KeepGoingFunction& keep_going) {
   ChildOptions options;
   options.argv = CommandLine(command, arguments);
   options.environment = kEnvironment;
@@ -143,7 +168,7 @@ std::vector<std::string> ColmapProgram::CommandLine(const std::string& command,
     if (IsPathOption(name)) {
       argv.insert(argv.end(), {"--" + name, Absolute(value)});
     } else if (known.count(option) > 0) {
-      argv.insert(argv.end(), {"--" + option, value});
+      argv.insert(argv.end(), {"--" + option, IsGpuOption(name) && use_gpu_ ? "1" : value});
     }
   }
   return argv;

@@ -12,6 +12,7 @@ namespace regrade {
 
 struct PoseOptions {
   std::string colmap = "colmap";
+  std::string colmap_gpu = "auto";
   int image_size = 1000;
   int all_pairs_up_to = 30;
   double min_registered = 0.5;
@@ -27,6 +28,10 @@ struct PoseOptions {
   template <typename Bind>
   void Describe(Bind& bind) {
     bind("colmap", colmap, {.help = "the COLMAP program: a name on PATH, or a path"});
+    bind("colmap-gpu", colmap_gpu,
+         {.help = "auto finds and matches features on a GPU where this COLMAP was built with "
+                  "CUDA, and goes on with the CPU if that fails",
+          .choices = "auto|on|off"});
     bind("pose-image-size", image_size,
          {.unit = "pixels",
           .help = "longer side for feature extraction; 2000 takes about 4 times as long and "

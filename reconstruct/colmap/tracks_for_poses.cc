@@ -84,7 +84,7 @@ class TrackFinder {
     fs::remove_all(work_folder_);  // COLMAP would reuse the database of an interrupted run
     fs::create_directories(start);
     fs::create_directories(logs);
-    colmap_.emplace(options_.colmap, logs);
+    colmap_.emplace(options_.colmap, logs, options_.colmap_gpu);
     result_.colmap_version = colmap_->version();
     PoseStrategy strategy{.max_features = kFeatures};
     strategy.first_octave = LongerSide() < kSmallSide ? -1 : 0;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <set>
 
 #include "pipeline/files/json_file.h"
 #include "pipeline/images/image_file.h"
@@ -40,6 +41,24 @@ int HeatMapsNamed(const std::string& folder) {
   return maps;
 }
 
+// Keys of all objects in `value`.
+void AddKeys(const JsonValue& value, std::set<std::string>* keys) {
+  if (value.IsArray())
+    for (const JsonValue& element : value.AsArray()) AddKeys(element, keys);
+  if (!value.IsObject()) return;
+  for (const auto& [key, member] : value.AsObject()) {
+    keys->insert(key);
+    AddKeys(member, keys);
+  }
+}
+
+// FORMATS.md explains each key of the report, and each event of --json.
+void ExpectDocumented(const std::set<std::string>& keys) {
+  const std::string formats = testing::ReadText(testing::SourceDir() + "/FORMATS.md");
+  for (const std::string& key : keys)
+    EXPECT_NE(formats.find("`" + key + "`"), std::string::npos) << key;
+}
+
 TEST(RunReport, ShowsEveryPartOfTheRun) {
   const TemporaryFolder folder;
   const std::string style = testing::SourceDir() + "/assets/style_sunset.png";
@@ -59,6 +78,10 @@ TEST(RunReport, ShowsEveryPartOfTheRun) {
   EXPECT_EQ(HeatMapsNamed(folder / "e/styles/style_sunset"), 9);
   EXPECT_EQ(HeatMapFiles(folder / "e/styles/style_sunset"), 9);
   const JsonValue report = ReadJsonFile(folder / "e/styles/style_sunset/report.json");
+  std::set<std::string> keys;
+  AddKeys(report, &keys);
+  AddKeys(ReadJsonFile(folder / "e/poses/photos.json"), &keys);
+  ExpectDocumented(keys);
   const JsonValue& fit = report.At("stages").At("reconstruct");
   EXPECT_EQ(fit.At("psnr_at_steps").AsArray().back().AsArray()[0].AsInt(), 30);
   EXPECT_GT(fit.At("cpu_seconds").AsDouble(), 0);

@@ -87,6 +87,24 @@ TEST_F(Poses, GoodCaptureComesWithModelAndStatuses) {
   EXPECT_EQ(ReadColmapModel((folder_ / "sparse").string()).images.size(), 10u);
 }
 
+TEST_F(Poses, ACardIsUsedWhereColmapHasCuda) {
+  EXPECT_EQ(Run("gpu").views.size(), 10u);
+  EXPECT_TRUE(report_.notes.empty());
+  options_.colmap_gpu = "off";
+  EXPECT_ANY_THROW(Run("gpu"));  // the stand-in insists on its card
+}
+
+TEST_F(Poses, ACardThatFailsIsReplacedByTheProcessor) {
+  EXPECT_EQ(Run("broken-gpu").views.size(), 10u);
+  ASSERT_EQ(report_.notes.size(), 1u);  // one command tells
+  EXPECT_NE(report_.notes[0].find("feature_extractor failed on the GPU"), std::string::npos)
+      << report_.notes[0];
+  options_.colmap_gpu = "on";
+  fs::remove_all(folder_ / "sparse");
+  ExpectError("broken-gpu", ExitCode::kExternalProgram, {"feature_extractor failed"});
+  ExpectError("good", ExitCode::kExternalProgram, {"without CUDA", "--colmap-gpu auto"});
+}
+
 // Frames of a film are matched by the list, in batches, and have a camera of their own.
 TEST_F(Poses, F90_FramesOfAFilmAreMatchedByAList) {
   film_from_ = 5;

@@ -61,10 +61,11 @@ std::vector<std::string> KnownOptions() {
           "Mapper.filter_max_reproj_error"};
 }
 
-// COLMAP aborts without a display unless use_gpu is 0.
-void NeedsNoGpu(const char* kind) {
-  if (arguments[(Is("new") ? "Feature" : "Sift") + std::string(kind) + ".use_gpu"] != "0")
-    std::abort();
+// COLMAP aborts without a display unless use_gpu is 0; "colmap-gpu" has a card.
+void CheckGpu(const char* kind) {
+  const std::string use =
+      arguments[(Is("new") ? "Feature" : "Sift") + std::string(kind) + ".use_gpu"];
+  if (use != (Is("gpu") ? "1" : "0")) std::abort();
 }
 
 [[noreturn]] void HangForEver() {
@@ -74,7 +75,7 @@ void NeedsNoGpu(const char* kind) {
 }
 
 int Extract() {
-  NeedsNoGpu("Extraction");
+  CheckGpu("Extraction");
   if (Is("flood"))
     for (int i = 0; i < 300000; ++i) std::printf("%0100d\n", i);
   if (Is("diskfull")) std::fprintf(stderr, "SQLite error: database or disk is full\n");
@@ -257,6 +258,8 @@ int main(int argc, char** argv) {
                                                                               : Is("new")
                                                                                   ? "9.9"
                                                                                   : "3.8");
+    std::printf("   (Commit 0 on 2023-01-01 %s CUDA)\n",
+                Is("gpu") || Is("broken-gpu") ? "with" : "without");
     return 0;
   }
   const char* platform = std::getenv("QT_QPA_PLATFORM");  // COLMAP's Qt aborts, too
@@ -282,7 +285,7 @@ int main(int argc, char** argv) {
   if (command == "mapper") return Map();
   if (command == "bundle_adjuster") return Adjust();
   if (command == "point_triangulator") return Triangulate();
-  NeedsNoGpu("Matching");
+  CheckGpu("Matching");
   std::printf("Matching block [1/1, 1/1] in 0.001s\n");
   return 0;
 }

@@ -16,12 +16,16 @@
 namespace regrade::REGRADE_SIMD_NAMESPACE {
 namespace {
 
-inline void MarchRay(const FastGrid& grid, const Ray& ray, const MarchOptions& options,
-                     Marched* marched) {
-  if (grid.cells.on())
-    MarchCellRay(grid, ray, options, marched);
-  else
-    March(grid, ray, options, marched);
+// Calls done(index, &marched) for each ray, in an order that depends on the rays alone.
+template <typename Done>
+void MarchRays(const FastGrid& grid, const Ray* rays, int64_t n, const MarchOptions& options,
+               const Done& done) {
+  if (grid.cells.on()) return MarchCellRays(grid, rays, n, options, done);
+  Marched marched;
+  for (int64_t r = 0; r < n; ++r) {
+    March(grid, rays[r], options, &marched);
+    done(r, &marched);
+  }
 }
 
 // The colour of a ray that has been marched, with what is behind the box.
@@ -47,47 +51,41 @@ ShadedRay ShadeRay(const FastGrid& grid, const Ray& ray, const MarchOptions& opt
 template <int kBasis>
 void RenderRays(const FastGrid& grid, const Ray* rays, int64_t n, const MarchOptions& options,
                 float* color, float* depth, float* transmittance) {
-  Marched marched;
   const auto spheres = MakeMarchedSpheres(grid);
-  for (int64_t r = 0; r < n; ++r) {
-    MarchRay(grid, rays[r], options, &marched);
-    const ShadedRay shaded = ShadeRay<kBasis>(grid, rays[r], options, &marched, spheres.get());
+  MarchRays(grid, rays, n, options, [&](int64_t r, Marched* marched) {
+    const ShadedRay shaded = ShadeRay<kBasis>(grid, rays[r], options, marched, spheres.get());
     for (int a = 0; a < 3; ++a) color[3 * r + a] = shaded.sums[a];
     depth[r] = shaded.sums[3];
     transmittance[r] = shaded.transmittance;
-  }
+  });
 }
 
 template <int kBasis, int kOther>
 void RenderPair(const FastGrid& grid, const FastGrid& other, const Ray* rays, int64_t n,
                 const MarchOptions& options, float* color, float* other_color, float* depth,
                 float* transmittance) {
-  Marched marched;
   const auto spheres = MakeMarchedSpheres(grid);
-  for (int64_t r = 0; r < n; ++r) {
-    MarchRay(grid, rays[r], options, &marched);
-    const ShadedRay first = ShadeRay<kBasis>(grid, rays[r], options, &marched, spheres.get());
-    const ShadedRay second = ShadeRay<kOther>(other, rays[r], options, &marched, spheres.get());
+  MarchRays(grid, rays, n, options, [&](int64_t r, Marched* marched) {
+    const ShadedRay first = ShadeRay<kBasis>(grid, rays[r], options, marched, spheres.get());
+    const ShadedRay second = ShadeRay<kOther>(other, rays[r], options, marched, spheres.get());
     for (int a = 0; a < 3; ++a) {
       color[3 * r + a] = first.sums[a];
       other_color[3 * r + a] = second.sums[a];
     }
     depth[r] = first.sums[3];
     transmittance[r] = first.transmittance;
-  }
+  });
 }
 
 template <int kBasis>
 FitStepResult Accumulate(const FastGrid& grid, const RayBatch& batch,
                          const MarchOptions& options, float scale, GradientArena* arena) {
   FitStepResult result;
-  Marched marched;
   const auto spheres = MakeMarchedSpheres(grid);
-  for (int64_t r = 0; r < batch.size; ++r) {
-    MarchRay(grid, batch.rays[r], options, &marched);
+  MarchRays(grid, batch.rays, batch.size, options, [&](int64_t r, Marched* marched) {
     const RayBasis<kBasis> basis(batch.rays[r].direction);
-    Quad sums = Shade(grid, basis, &marched);
-    float remaining = marched.transmittance;
+    Quad sums = Shade(grid, basis, marched);
+    float remaining = marched->transmittance;
     if (spheres) {
       sums += ShadeSpheres(grid, batch.rays[r], options.stop_transmittance, remaining,
                            spheres.get());
@@ -98,35 +96,33 @@ FitStepResult Accumulate(const FastGrid& grid, const RayBatch& batch,
     for (int a = 0; a < 3; ++a)
       error[a] = sums[a] + grid.background[a] * remaining - batch.targets[r][a];
     result.squared_error += Dot(error, error);
-    result.samples += marched.num_samples;
+    result.samples += marched->num_samples;
     const Vec3f d_color = error * (2 * scale);
     Quad behind{grid.background.x, grid.background.y, grid.background.z, 0};
     if (spheres) ScatterSpheres(*spheres, d_color, &behind, &arena->spheres);
-    ScatterRay(basis, d_color, behind, &marched, arena);
-  }
+    ScatterRay(basis, d_color, behind, marched, arena);
+  });
   return result;
 }
 
 void MaxWeights(const FastGrid& grid, const Ray* rays, int64_t n, const MarchOptions& options,
                 float* weights) {
-  Marched marched;
   const CornerOffsets offsets(grid.frame);
-  for (int64_t r = 0; r < n; ++r) {
-    MarchRay(grid, rays[r], options, &marched);
-    for (int64_t i = 0; i < marched.num_samples; ++i) {
-      const Sample& s = marched.samples[static_cast<size_t>(i)];
-      const float w = marched.weight(s);
+  MarchRays(grid, rays, n, options, [&](int64_t, const Marched* marched) {
+    for (int64_t i = 0; i < marched->num_samples; ++i) {
+      const Sample& s = marched->samples[static_cast<size_t>(i)];
+      const float w = marched->weight(s);
       if (grid.cells.on()) {
-        float& most = weights[marched.block(s).vertex[s.lane]];
+        float& most = weights[marched->block(s).vertex[s.lane]];
         most = std::max(most, w);
         continue;
       }
       int32_t link[8];
-      LoadLinks(grid, offsets, marched.block(s).vertex[s.lane], link);
+      LoadLinks(grid, offsets, marched->block(s).vertex[s.lane], link);
       for (int k = 0; k < 8; ++k)
         if (link[k] >= 0) weights[link[k]] = std::max(weights[link[k]], w);
     }
-  }
+  });
 }
 
 template <typename Body9, typename Body4, typename Body1>
