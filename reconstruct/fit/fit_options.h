@@ -65,12 +65,10 @@ struct FitOptions {
   }
   template <typename Bind>
   void Describe(Bind& bind) {
-    bind(
-        "fit-field", field,
-        {.help = "uniform: voxels of one width; adaptive: cells that are halved where two "
-                 "photos see them wider than a pixel; auto: uniform for captures that look one "
-                 "way, else adaptive",
-         .choices = "adaptive|uniform"});
+    bind("fit-field", field,
+         {.help = "uniform: voxels of one width; adaptive: cells that are halved where two "
+                  "photos see them wider than a pixel",
+          .choices = "adaptive|uniform"});
     bind("fit-resolutions", resolutions,
          {.unit = "voxels",
           .help = "longest side of the grid in each stage, coarse to fine; an adaptive field "

@@ -112,6 +112,31 @@ TEST(CellRays, FastPathsEqualThePlainRay) {
   }
 }
 
+// Rays share vectors, so what is beside a ray must not change a bit of it: the order and the
+// number of rays in a batch differ between threads, tiles and shards.
+TEST(CellRays, ARayIsTheSameAloneAndAmongOthers) {
+  const RadianceField field = RandomCellField({3, 2, 2}, 3, 9, 31);
+  const FastGrid grid = MakeFastGrid(field);
+  std::vector<Ray> rays = RandomRays(200, 33);
+  rays[7].direction = {};  // has no samples
+  rays[50].origin.x = NAN;
+  const MarchOptions options{0.5f, 1e-4f};
+  for (const char* name : {"baseline", "avx2", "avx512"}) {
+    const FastRayFunctions* functions = FastRaysFor(name);
+    if (functions == nullptr) continue;
+    std::vector<float> color(600), depth(200), transmittance(200);
+    functions->render(grid, rays.data(), 200, options, color.data(), depth.data(),
+                      transmittance.data());
+    for (size_t r = 0; r < rays.size(); ++r) {
+      float alone[3], its_depth, its_transmittance;
+      functions->render(grid, &rays[r], 1, options, alone, &its_depth, &its_transmittance);
+      for (int c = 0; c < 3; ++c) ASSERT_EQ(alone[c], color[3 * r + c]) << name << " " << r;
+      ASSERT_EQ(its_depth, depth[r]);
+      ASSERT_EQ(its_transmittance, transmittance[r]);
+    }
+  }
+}
+
 // Float gradients against the plain adjoint in double: 1e-4 of the largest entry.
 TEST(CellRays, FastGradientsEqualThePlainAdjoint) {
   for (const int basis : {1, 4, 9}) {
