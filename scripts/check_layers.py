@@ -54,6 +54,7 @@ LAYERS = {
     "pipeline/images": 1,
     "pipeline/workspace": 2,
     "pipeline/capture": 3,
+    "pipeline/page": 4,
     "pipeline/report": 3,
     "pipeline/run": 4,
     "pipeline/synth": 4,
