@@ -72,7 +72,7 @@ int16_t DensityNumber(double density, double width) {
 }
 
 double DensityOfNumber(int16_t number, double width) {
-  const double squared = double{number} * number * kPageOpticalDepth / width;
+  const double squared = static_cast<double>(number) * number * kPageOpticalDepth / width;
   return number < 0 ? -squared : squared;
 }
 
