@@ -70,7 +70,7 @@ vec4 Codes(uint w) {
   return vec4(w & 255u, w >> 8 & 255u, w >> 16 & 255u, w >> 24) - 128.0;
 }
 
-// The products of a voxel's coefficients with `s`, the harmonics times the scales.
+// The products of a voxel's coefficients with s, the harmonics times the scales.
 vec3 ColorOf(usampler2D first, usampler2D second, int voxel, vec4 s[7]) {
   uvec4 a = texelFetch(first, At(voxel), 0), b = texelFetch(second, At(voxel), 0);
   fetches += 2.0;
