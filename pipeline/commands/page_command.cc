@@ -48,8 +48,7 @@ void RunPage(const Command& command, const Arguments& arguments, Console* consol
   options.Add("Page's size", &page);
   options.Add("Program", &program);
   constexpr size_t kMostStyles = 16;
-  const auto prepared =
-      Prepare(command, arguments, {.most_words = 1 + kMostStyles}, &options);
+  const auto prepared = Prepare(command, arguments, {.most_words = 1 + kMostStyles}, &options);
   if (!prepared) return;
   const std::string& folder = prepared->words[0];
   if (!fs::exists(folder + "/field.npz"))
@@ -58,7 +57,8 @@ void RunPage(const Command& command, const Arguments& arguments, Console* consol
   const std::vector<std::string> styles = WantedStyles(folder, prepared->words);
   if (!file.dry_run) RequireValue(file.out, "--out", "name the page to write");
   if (file.dry_run) {
-    console->Info(Concat("the scene and ", styles.size(), " styles would be written as a page"));
+    console->Info(
+        Concat("the scene and ", styles.size(), " styles would be written as a page"));
     return;
   }
   console->BeginStage("page");
@@ -67,11 +67,10 @@ void RunPage(const Command& command, const Arguments& arguments, Console* consol
   WriteFileAtomically(file.out, made.html);
   for (const std::string& line : made.report) console->Info(line);
   const double megabytes = static_cast<double>(made.html.size()) / 1e6;
-  console->Info(Concat("wrote ", file.out, ": ", Format("%.1f", megabytes), " MB, ", made.voxels,
-                       " voxels of ",
-                       Format("%.2f", static_cast<double>(made.field_bytes) /
-                                          static_cast<double>(made.voxels)),
-                       " bytes, ", styles.size(), " styles"));
+  console->Info(Concat(
+      "wrote ", file.out, ": ", Format("%.1f", megabytes), " MB, ", made.voxels, " voxels of ",
+      Format("%.2f", static_cast<double>(made.field_bytes) / static_cast<double>(made.voxels)),
+      " bytes, ", styles.size(), " styles"));
   for (size_t i = 0; i < styles.size(); ++i)
     console->Info(Concat("  ", styles[i], ": ", (made.style_bytes[i] + 999) / 1000, " kB"));
   console->Info(

@@ -23,12 +23,9 @@ JsonValue CameraJson(const Camera& camera) {
   JsonValue::Array rotation;
   for (const Vec3d& row : camera.camera_from_world.rotation.row)
     for (int a = 0; a < 3; ++a) rotation.push_back(Rounded(row[a]));
-  return JsonValue::Object{{"center", ArrayOf(camera.Center())},
-                           {"fx", Rounded(camera.fx)},
-                           {"fy", Rounded(camera.fy)},
-                           {"height", camera.height},
-                           {"rotation", std::move(rotation)},
-                           {"width", camera.width}};
+  return JsonValue::Object{{"center", ArrayOf(camera.Center())}, {"fx", Rounded(camera.fx)},
+                           {"fy", Rounded(camera.fy)},           {"height", camera.height},
+                           {"rotation", std::move(rotation)},    {"width", camera.width}};
 }
 
 // "sha256-...": the hash of a policy, from hexadecimal digits.
@@ -51,8 +48,8 @@ std::string InElement(std::string json) {
 JsonValue Header(const PageContent& content, const PageCheck* check) {
   JsonValue header = content.field.header;
   const Camera& first = content.cameras.at(0);
-  header["ndc"] = first.ndc.on() ? JsonValue(JsonValue::Array{first.ndc.a, first.ndc.b})
-                                 : JsonValue();
+  header["ndc"] =
+      first.ndc.on() ? JsonValue(JsonValue::Array{first.ndc.a, first.ndc.b}) : JsonValue();
   if (header.Find("spheres") == nullptr) header["spheres"] = JsonValue();
   header["home"] = content.home;
   Vec3d up{};
@@ -98,8 +95,8 @@ std::string PageHtml(const PageContent& content, const PageCheck* check) {
       PolicyHash(kPageScriptHash) + "; style-src " + PolicyHash(kPageCssHash);
   const std::string scene = InElement(DumpJson(Header(content, check), -1));
   const std::pair<const char*, std::string> parts[] = {
-      {"@CSP@", policy},   {"@CSS@", kPageCss},       {"@POSTER@", JpegUrl(content.poster)},
-      {"@SCENE@", scene},  {"@SECTIONS@", sections},  {"@JS@", kPageScript}};
+      {"@CSP@", policy},  {"@CSS@", kPageCss},      {"@POSTER@", JpegUrl(content.poster)},
+      {"@SCENE@", scene}, {"@SECTIONS@", sections}, {"@JS@", kPageScript}};
   std::string_view rest = kPageTemplate;
   std::string html;
   for (const auto& [place, text] : parts) {  // in the template's order
@@ -119,13 +116,12 @@ int HomeCamera(const std::vector<Camera>& cameras) {
     forward += camera.Forward() / static_cast<double>(cameras.size());
   }
   double size = 1e-9;
-  for (const Camera& camera : cameras)
-    size = std::max(size, Norm(camera.Center() - center));
+  for (const Camera& camera : cameras) size = std::max(size, Norm(camera.Center() - center));
   int best = 0;
   double least = 1e300;
   for (size_t i = 0; i < cameras.size(); ++i) {
-    const double far = Norm(cameras[i].Center() - center) / size -
-                       Dot(cameras[i].Forward(), forward);
+    const double far =
+        Norm(cameras[i].Center() - center) / size - Dot(cameras[i].Forward(), forward);
     if (far < least) least = far, best = static_cast<int>(i);
   }
   return best;

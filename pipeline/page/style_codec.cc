@@ -76,17 +76,16 @@ PageStyle EncodeStyle(const StoredNetwork& stored, const RadianceField& page, do
   const auto array = [](const Vec3f& v) {
     return JsonValue::Array{double{v.x}, double{v.y}, double{v.z}};
   };
-  style.header = JsonValue::Object{
-      {"activation", static_cast<int>(dense.activation)},
-      {"omega", double{data.omega}},
-      {"position_scale", double{data.position_scale}},
-      {"base", std::move(matrix)},
-      {"constant", array(base.constant)},
-      {"scale", ArrayOf(coded.scale)},
-      {"sphere_scale", ArrayOf(coded.sphere_scale)},
-      {"background", array(stored.background)},
-      {"strength", strength},
-      {"bound", stored.network.Bound()}};
+  style.header = JsonValue::Object{{"activation", static_cast<int>(dense.activation)},
+                                   {"omega", double{data.omega}},
+                                   {"position_scale", double{data.position_scale}},
+                                   {"base", std::move(matrix)},
+                                   {"constant", array(base.constant)},
+                                   {"scale", ArrayOf(coded.scale)},
+                                   {"sphere_scale", ArrayOf(coded.sphere_scale)},
+                                   {"background", array(stored.background)},
+                                   {"strength", strength},
+                                   {"bound", stored.network.Bound()}};
   style.packed = Deflate(halves);
   return style;
 }

@@ -1,8 +1,8 @@
 // Packs a style for a page: its network, which the page sends the voxels through.
 //
-// The network's effective weights, [out, in] and biases, layer after layer, are stored as halves:
-// 20,379 of them. Scales of the styled coefficients' 8-bit codes are found when the page is
-// written, on the field as the page has it.
+// The network's effective weights, [out, in] and biases, layer after layer, are stored as
+// halves: 20,379 of them. Scales of the styled coefficients' 8-bit codes are found when the
+// page is written, on the field as the page has it.
 #pragma once
 
 #include <string>

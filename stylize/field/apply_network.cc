@@ -8,11 +8,9 @@ namespace regrade {
 
 Appearance ApplyNetwork(const LipschitzNetwork& network, const RadianceField& field,
                         const ProgressFunction& progress) {
-  return ApplyForward(
-      [&](const float* features, int64_t n, float* output) {
-        network.Forward(features, n, output);
-      },
-      network.data().position_scale, field, progress);
+  return ApplyForward([&](const float* features, int64_t n,
+                          float* output) { network.Forward(features, n, output); },
+                      network.data().position_scale, field, progress);
 }
 
 Appearance ApplyForward(const ForwardPass& forward, float position_scale,

@@ -128,6 +128,15 @@ async function start(page) {
     keys: Object.fromEntries(Object.keys(actions.keys).map((k) => [k, () => page.actions.keys[k]()])),
     released: {c: () => page.actions.released.c()}});
   Object.assign(page, {actions, changed, scene, graphics, painter, header, load, colors, setsOf, weights, resize: () => painter.resize()});
+  // RGBA rows from the bottom, of any view and weights, with a colour for every sample.
+  page.picture = async ({rotation, eye, lens, width, height, weights: wanted, count}) => {
+    for (let i = 0; i < wanted.length; ++i) if (wanted[i] > 0) await load(i);
+    const target = graphics.target(width, height);
+    graphics.draw(scene, {rotation, eye, lens}, setsOf(wanted), null, target, {x: 0, y: 0, width, height}, 0, count);
+    const pixels = graphics.read(target);
+    target.free();
+    return pixels;
+  };
   say('');
   canvas.classList.add('ready');
   let before = performance.now();
