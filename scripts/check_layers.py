@@ -59,11 +59,11 @@ LAYERS = {
     "pipeline/run": 4,
     "pipeline/synth": 4,
     "pipeline/gpu": 5,
-    "pipeline/stages": 5,
-    "pipeline/tradeoff": 6,
-    "pipeline": 6,
-    "pipeline/commands": 7,
-    "pipeline/main.cc": 8,
+    "pipeline/stages": 6,
+    "pipeline/tradeoff": 7,
+    "pipeline": 7,
+    "pipeline/commands": 8,
+    "pipeline/main.cc": 9,
 }
 
 # library, how its headers look, and the files that may include it (regular expressions of paths).
