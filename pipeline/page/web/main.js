@@ -31,6 +31,7 @@ async function start(page) {
   if (!gl) throw new PageError('this browser has no WebGL 2, or has switched it off');
   if (typeof DecompressionStream === 'undefined') throw new PageError('this browser is too old');
   const graphics = new Graphics(gl);
+  graphics.onCores = location.hash === '#cores';
   const scene = await loadScene(header, graphics, (part) => say('The scene is being unpacked: ' + Math.round(100 * part) + ' %'));
   const view = page.view ??= new View(header);
   const state = page.state ??= {axes: [0, 1], amount: [0, 0], original: false, split: false, cut: 0.5, map: null, playing: null};
@@ -128,11 +129,11 @@ async function start(page) {
     keys: Object.fromEntries(Object.keys(actions.keys).map((k) => [k, () => page.actions.keys[k]()])),
     released: {c: () => page.actions.released.c()}});
   Object.assign(page, {actions, changed, scene, graphics, painter, header, load, colors, setsOf, weights, resize: () => painter.resize()});
-  // RGBA rows from the bottom, of any view and weights, with a colour for every sample.
-  page.picture = async ({rotation, eye, lens, width, height, weights: wanted, count}) => {
+  // For tests: RGBA rows from the bottom, of any view and weights; with `count` the fetches of each ray.
+  page.picture = async ({rotation, eye, lens, width, height, weights: wanted, count, opacityStep = 0}) => {
     for (let i = 0; i < wanted.length; ++i) if (wanted[i] > 0) await load(i);
     const target = graphics.target(width, height);
-    graphics.draw(scene, {rotation, eye, lens}, setsOf(wanted), null, target, {x: 0, y: 0, width, height}, 0, count);
+    graphics.draw(scene, {rotation, eye, lens}, setsOf(wanted), null, target, {x: 0, y: 0, width, height}, opacityStep, count);
     const pixels = graphics.read(target);
     target.free();
     return pixels;
