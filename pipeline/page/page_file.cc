@@ -90,7 +90,8 @@ std::string PageHtml(const PageContent& content, const PageCheck* check) {
   for (size_t i = 0; i < content.styles.size(); ++i)
     add("network_" + std::to_string(i), content.styles[i].packed);
   const std::string policy =
-      "default-src 'none'; base-uri 'none'; form-action 'none'; img-src data:; worker-src blob:; "
+      "default-src 'none'; base-uri 'none'; form-action 'none'; img-src data:; worker-src "
+      "blob:; "
       "script-src " +
       PolicyHash(kPageScriptHash) + "; style-src " + PolicyHash(kPageCssHash);
   const std::string scene = InElement(DumpJson(Header(content, check), -1));
