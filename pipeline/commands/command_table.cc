@@ -32,6 +32,8 @@ const std::vector<Command>& AllCommands() {
        RunExport},
       {"pack", "DIR --out FILE [OPTIONS]",
        "writes a posed capture as one file, for regrade_gpu on a bare GPU machine", RunPack},
+      {"page", "DIR [STYLE ...] --out FILE.html [OPTIONS]",
+       "writes the scene and its styles as one page, to walk through in a browser", RunPage},
       {"clean", "DIR [OPTIONS]", "removes what can be made again from a run's folder",
        RunClean},
       {"manual", "[OPTIONS]", "prints the man page, or bash's completion", RunManual},

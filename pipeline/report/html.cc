@@ -124,6 +124,9 @@ std::string ReportHtml(const RunReport& report, const ReportPictures& pictures) 
       title + " · regrade report</title><style>" + kReportCss +
       "</style></head>\n<body><script>" + kReportScript + "</script><main>\n<header><h1>" +
       title + "</h1>" + FactsHtml(report) + "</header>\n";
+  if (!pictures.scene_page.empty())
+    html += "<p><a href=\"" + EscapeHtml(pictures.scene_page) +
+            "\">Walk through the scene</a> in this browser</p>";
   html += AssessmentHtml(report) + MainFilmHtml(pictures);
   if (headline) html += "<section>" + CompareHtml(*headline) + "</section>";
   for (const std::string& section :

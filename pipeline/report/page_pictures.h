@@ -35,6 +35,7 @@ struct ReportPictures {
   std::vector<ReportView> views;       // the middle one is the headline picture
   std::vector<ReportHeatMap> heat_maps;
   std::vector<ReportFilm> films;
+  std::string scene_page;  // the page to walk in, in the page's folder; may be empty
   // Of the photos in the order of their statuses; may be missing or fewer.
   std::vector<std::optional<ReportPicture>> thumbnails;
   CameraMap cameras;

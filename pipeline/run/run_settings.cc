@@ -20,6 +20,7 @@ void RunSettings::Bind(OptionSet* options) {
   options->Add("Network", &network);
   options->Add("Render", &render);
   options->Add("Evaluation", &consistency);
+  options->Add("Page", &page);
   options->Add("Program", &program);
 }
 

@@ -93,6 +93,18 @@ struct RenderOptions {
   }
 };
 
+struct PageChoice {
+  std::string page = "auto";
+
+  template <typename Bind>
+  void Describe(Bind& bind) {
+    bind("page", page,
+         {.help = "writes scene.html, the scene and its style to walk through in a browser: "
+                  "auto does where it stays below 25 MB",
+          .choices = "auto|on|off"});
+  }
+};
+
 struct RunSettings {
   ProgramOptions program;
   StartOptions start;
@@ -107,6 +119,7 @@ struct RunSettings {
   TrainNetworkOptions network;
   RenderOptions render;
   ConsistencyOptions consistency;
+  PageChoice page;
 
   // Under the headings of the help.
   void Bind(OptionSet* options);

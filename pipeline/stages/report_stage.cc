@@ -9,6 +9,7 @@
 #include "pipeline/capture/working_views.h"
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/images/image_file.h"
+#include "pipeline/page/make_page.h"
 #include "pipeline/program/memory.h"
 #include "pipeline/report/cost_rows.h"
 #include "pipeline/report/html.h"
@@ -116,7 +117,32 @@ ReportPictures PicturesOf(const RunContext& context, const RunReport& report) {
   return pictures;
 }
 
-StageOutcome WriteReport(RunContext* context) {
+// scene.html beside the report; false where it is not wanted, too large, or the style is of
+// masked objects, which a page does not hold.
+bool WriteScenePage(const RunContext& context, const ProgressFunction& progress) {
+  constexpr size_t kLargest = 25'000'000;  // bytes, of --page auto
+  const std::string& choice = context.settings.page.page;
+  const Workspace& style = *context.style;
+  const std::string path = style.Path(kScenePage);
+  std::filesystem::remove(path);
+  if (choice == "off") return false;
+  if (std::filesystem::exists(style.Path("object.npz"))) {
+    if (choice == "on") context.console->Warn("no page: the style is of masked objects");
+    return false;
+  }
+  const std::string name = std::filesystem::path(style.folder()).filename().string();
+  const std::string html =
+      MakePage(context.workspace->folder(), {name}, PageOptions{}, progress).html;
+  if (choice == "auto" && html.size() > kLargest) {
+    context.console->Info(Format("no page: it would have %.0f MB; --page on writes it",
+                                 static_cast<double>(html.size()) / 1e6));
+    return false;
+  }
+  WriteFileAtomically(path, html);
+  return true;
+}
+
+StageOutcome WriteReport(RunContext* context, const ProgressFunction& progress) {
   const RunSettings& settings = context->settings;
   Workspace &workspace = *context->style, &scene = *context->workspace;
   const Capture capture = ReadCapture(scene.Path("poses"));
@@ -147,10 +173,14 @@ StageOutcome WriteReport(RunContext* context) {
   for (const auto& [name, value] : options.AsObject())
     report.options.push_back({name, value.IsString() ? value.AsString() : DumpJson(value, -1)});
   WriteJsonFile(workspace.Path("report.json"), ReportJson(report));
-  WriteFileAtomically(workspace.Path("report.html"),
-                      ReportHtml(report, PicturesOf(*context, report)));
+  ReportPictures pictures = PicturesOf(*context, report);
   StageOutcome outcome;
   outcome.outputs = {"report.json", "report.html"};
+  if (WriteScenePage(*context, progress)) {
+    pictures.scene_page = kScenePage;
+    outcome.outputs.push_back(kScenePage);
+  }
+  WriteFileAtomically(workspace.Path("report.html"), ReportHtml(report, pictures));
   return outcome;
 }
 
@@ -162,12 +192,15 @@ Stage ReportStage(RunContext* context) {
   stage.inputs = JsonValue::Object();
   for (const char* earlier : kStageNames)
     if (std::string(earlier) != "report") stage.inputs[earlier] = context->ResultOf(earlier);
+  stage.inputs["page"] = context->settings.page.page;
   // The results of stage "evaluate" are its metrics.
   if (const auto record = context->style->Find("evaluate"))
     stage.inputs["evaluate"] = record->metrics;
   const std::string costs = context->workspace->Path(kCostTable);
   if (std::filesystem::is_regular_file(costs)) stage.inputs["costs"] = HashFile(costs);
-  stage.work = [context](const ProgressFunction&) { return WriteReport(context); };
+  stage.work = [context](const ProgressFunction& progress) {
+    return WriteReport(context, progress);
+  };
   return stage;
 }
 

@@ -18,6 +18,9 @@ inline constexpr char kCommonPrefix[] = "common_";
 inline constexpr char kStyledFilm[] = "styled.mp4", kWipeFilm[] = "source_vs_styled.mp4",
                       kViews2dFilm[] = "views_2d.mp4";
 
+// The page to walk in; report.html links to it.
+inline constexpr char kScenePage[] = "scene.html";
+
 // "00007.png"
 inline std::string FrameName(int index) { return Format("%05d.png", index); }
 

@@ -8,6 +8,13 @@ namespace regrade {
 
 Appearance ApplyNetwork(const LipschitzNetwork& network, const RadianceField& field,
                         const ProgressFunction& progress) {
+  return ApplyForward([&](const float* features, int64_t n,
+                          float* output) { network.Forward(features, n, output); },
+                      network.data().position_scale, field, progress);
+}
+
+Appearance ApplyForward(const ForwardPass& forward, float position_scale,
+                        const RadianceField& field, const ProgressFunction& progress) {
   constexpr int64_t kChunk = 1 << 17;  // voxels; 32 MB of features and results
   const std::vector<int32_t> vertex = VertexOfVoxel(*field.geometry);
   const int64_t n = field.geometry->num_voxels();
@@ -17,7 +24,6 @@ Appearance ApplyNetwork(const LipschitzNetwork& network, const RadianceField& fi
   const std::vector<int32_t> place = PlaceOfColumn(spheres);
   const int64_t all = n + spheres.num_texels();
   Buffer<float> features(std::min(all, kChunk) * kFeatureStride), output(features.size());
-  const float scale = network.data().position_scale;
   for (int64_t begin = 0; begin < all; begin += kChunk) {
     const int64_t count = std::min(kChunk, all - begin);
 #pragma omp parallel for schedule(static)
@@ -25,11 +31,11 @@ Appearance ApplyNetwork(const LipschitzNetwork& network, const RadianceField& fi
       float* const row = features.data() + i * kFeatureStride;
       const int64_t point = begin + i, texel = point - n;
       if (texel < 0)
-        FillFeatures(field, scale, point, vertex[point], row);
+        FillFeatures(field, position_scale, point, vertex[point], row);
       else
-        FillTexelFeatures(field, scale, texel, place[texel / spheres.layers], row);
+        FillTexelFeatures(field, position_scale, texel, place[texel / spheres.layers], row);
     }
-    network.Forward(features.data(), count, output.data());
+    forward(features.data(), count, output.data());
 #pragma omp parallel for schedule(static)
     for (int64_t i = 0; i < count; ++i) {
       const int64_t point = begin + i, texel = point - n;

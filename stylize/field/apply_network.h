@@ -1,6 +1,8 @@
 // A field's appearance sent through the network: the same geometry, restyled coefficients.
 #pragma once
 
+#include <functional>
+
 #include "kernels/base/progress.h"
 #include "kernels/field/radiance_field.h"
 #include "stylize/field/lipschitz_network.h"
@@ -11,5 +13,11 @@ namespace regrade {
 // Interrupted on kStop.
 Appearance ApplyNetwork(const LipschitzNetwork& network, const RadianceField& field,
                         const ProgressFunction& progress = nullptr);
+
+// The same with another forward pass, such as that of rounded weights: output [n,
+// kFeatureStride] of features [n, kFeatureStride].
+using ForwardPass = std::function<void(const float* features, int64_t n, float* output)>;
+Appearance ApplyForward(const ForwardPass& forward, float position_scale,
+                        const RadianceField& field, const ProgressFunction& progress = nullptr);
 
 }  // namespace regrade

@@ -56,6 +56,7 @@ ReportPictures SomePictures() {
   pictures.views = {{"00000, a.jpg", Picture(), Picture(), Picture(), Picture()}};
   pictures.heat_maps = {{"styled, frames 3 and 8", Picture()}};
   pictures.films = {{"styled.mp4", "the styled scene", Picture()}};
+  pictures.scene_page = "scene.html";
   pictures.thumbnails = {Picture(), std::nullopt};
   pictures.cameras.cameras = {{0, 0, 0, 1, 0.5, true, "a.jpg"},
                               {1, 0.2, 0, 1, 0.5, false, "b"}};
@@ -145,11 +146,13 @@ TEST(ReportHtml, FetchesNothing) {
   for (std::sregex_iterator it(page.begin(), page.end(), address), end; it != end;
        ++it, ++addresses) {
     const std::string where = (*it)[2];
-    EXPECT_TRUE(where.rfind("data:image/", 0) == 0 || where == "styled.mp4") << where;
+    EXPECT_TRUE(where.rfind("data:image/", 0) == 0 || where == "styled.mp4" ||
+                where == "scene.html")
+        << where;
   }
   EXPECT_EQ(addresses,
-            2 + 4 + 1 + 2 + 1);  // headline pair, one view, a heat map, a film with its
-                                 // poster, a thumbnail
+            2 + 4 + 1 + 2 + 1 + 1);  // headline pair, one view, a heat map, a film with its
+                                     // poster, a thumbnail, the scene's page
 }
 
 TEST(ReportHtml, UndefinedMetricsHaveAReason) {

@@ -104,6 +104,17 @@ TEST(RunReport, ShowsEveryPartOfTheRun) {
     ++posters;
   EXPECT_EQ(posters, 3u);
 
+  // The scene to walk through, beside the report: without names, paths, or metadata of photos.
+  EXPECT_NE(page.find("<a href=\"scene.html\">"), std::string::npos);
+  const std::string scene = testing::ReadText(folder / "e/styles/style_sunset/scene.html");
+  for (const char* private_part : {"sunset", ".png", ".jpg", "e/styles"})
+    EXPECT_EQ(scene.find(private_part), std::string::npos) << private_part;
+  EXPECT_EQ(scene.find(folder / ""), std::string::npos);
+  EXPECT_NE(scene.find("id=\"network_0\""), std::string::npos);
+  // "Exif" in base64: the encoder's block, without entries.
+  for (size_t at = 0; (at = scene.find("RXhpZg", at)) != std::string::npos; ++at)
+    EXPECT_EQ(scene.substr(at, 27), "RXhpZgAASUkqAAgAAAAAAAAAAAD");
+
   // The command in the report results in the same options.
   std::vector<std::string> again;
   for (const JsonValue& word : report.At("command").AsArray()) again.push_back(word.AsString());

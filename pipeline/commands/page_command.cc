@@ -1,0 +1,81 @@
+// regrade page: the scene and its styles as one page that a browser opens without a server.
+#include <filesystem>
+
+#include "kernels/base/error.h"
+#include "pipeline/commands/command.h"
+#include "pipeline/files/atomic_file.h"
+#include "pipeline/page/make_page.h"
+#include "pipeline/workspace/style_folders.h"
+
+namespace regrade {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct PageFileOptions {
+  std::string out;
+  bool dry_run = false;
+
+  template <typename Bind>
+  void Describe(Bind& bind) {
+    bind("out", out, {.help = "the page to write, such as scene.html"});
+    bind("dry-run", dry_run, {.help = "prints what would be done, and does nothing"});
+  }
+};
+
+// All styles of the folder that have a network, or those that were named.
+std::vector<std::string> WantedStyles(const std::string& folder, const Arguments& words) {
+  std::vector<std::string> styles;
+  if (words.size() == 1) {
+    for (const std::string& style : StyleNames(folder))
+      if (const std::string at = StyleFolder(folder, style);
+          fs::exists(at + "/network.npz") && !fs::exists(at + "/object.npz"))
+        styles.push_back(style);
+    return styles;
+  }
+  for (size_t i = 1; i < words.size(); ++i) styles.push_back(ChosenStyle(folder, words[i]));
+  return styles;
+}
+
+}  // namespace
+
+void RunPage(const Command& command, const Arguments& arguments, Console* console) {
+  PageFileOptions file;
+  PageOptions page;
+  ProgramOptions program;
+  OptionSet options;
+  options.Add("Page", &file);
+  options.Add("Page's size", &page);
+  options.Add("Program", &program);
+  constexpr size_t kMostStyles = 16;
+  const auto prepared = Prepare(command, arguments, {.most_words = 1 + kMostStyles}, &options);
+  if (!prepared) return;
+  const std::string& folder = prepared->words[0];
+  if (!fs::exists(folder + "/field.npz"))
+    throw InputError("holds no reconstruction", folder,
+                     "make one with `regrade run` or `regrade reconstruct`");
+  const std::vector<std::string> styles = WantedStyles(folder, prepared->words);
+  if (!file.dry_run) RequireValue(file.out, "--out", "name the page to write");
+  if (file.dry_run) {
+    console->Info(
+        Concat("the scene and ", styles.size(), " styles would be written as a page"));
+    return;
+  }
+  console->BeginStage("page");
+  const MadePage made = MakePage(folder, styles, page, console->StageProgress());
+  console->EndStage();
+  WriteFileAtomically(file.out, made.html);
+  for (const std::string& line : made.report) console->Info(line);
+  const double megabytes = static_cast<double>(made.html.size()) / 1e6;
+  console->Info(Concat(
+      "wrote ", file.out, ": ", Format("%.1f", megabytes), " MB, ", made.voxels, " voxels of ",
+      Format("%.2f", static_cast<double>(made.field_bytes) / static_cast<double>(made.voxels)),
+      " bytes, ", styles.size(), " styles"));
+  for (size_t i = 0; i < styles.size(); ++i)
+    console->Info(Concat("  ", styles[i], ": ", (made.style_bytes[i] + 999) / 1000, " kB"));
+  console->Info(
+      "The page is a copy of the place: whoever has it can look around there. Names, paths and "
+      "photos' metadata are not in it; small pictures of the photos are.");
+}
+
+}  // namespace regrade

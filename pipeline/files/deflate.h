@@ -1,0 +1,17 @@
+// Compresses bytes in zlib's container (RFC 1950), which browsers read as "deflate".
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+namespace regrade {
+
+// Equal bytes give equal results.
+std::string Deflate(std::string_view bytes);
+
+// Throws Error(kInput) with `where` for bytes that are damaged, followed by others, or larger
+// than `max_bytes` when unpacked.
+std::string Inflate(std::string_view packed, uint64_t max_bytes, const std::string& where);
+
+}  // namespace regrade

@@ -1,0 +1,124 @@
+#include "pipeline/page/make_page.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <utility>
+
+#include "kernels/base/error.h"
+#include "kernels/field/cpu/render_view.h"
+#include "kernels/field/pad_sh_basis.h"
+#include "kernels/image/resize.h"
+#include "pipeline/capture/working_views.h"
+#include "pipeline/fields/field_file.h"
+#include "pipeline/images/image_file.h"
+#include "pipeline/page/check_page.h"
+#include "pipeline/page/page_file.h"
+#include "pipeline/run/run_file.h"
+#include "pipeline/workspace/style_folders.h"
+#include "stylize/field/apply_network.h"
+
+namespace regrade {
+namespace {
+
+constexpr int kMostPhotos = 24, kThumbnail = 128, kPoster = 480, kChecked = 320;  // pixels
+constexpr int kQuality = 75;
+
+std::string Thumbnail(const Image& image, int longest) {
+  const double scale = std::min(1.0, double{1} * longest / std::max(image.width, image.height));
+  return EncodeJpeg(Resize(image, std::max(1, static_cast<int>(image.width * scale)),
+                           std::max(1, static_cast<int>(image.height * scale))),
+                    kQuality);
+}
+
+double StrengthOf(const std::string& style_folder) {
+  if (!std::filesystem::exists(style_folder + "/run.json")) return 1;
+  const JsonValue* const strength =
+      ReadRunFile(style_folder + "/run.json").options.Find("strength");
+  return strength != nullptr ? strength->AsDouble() : 1;
+}
+
+Image RenderHome(const RadianceField& field, const Camera& home) {
+  const double scale = std::min(1.0, double{kPoster} / std::max(home.width, home.height));
+  return RenderView(field,
+                    home.Resized(std::max(1, static_cast<int>(home.width * scale)),
+                                 std::max(1, static_cast<int>(home.height * scale))),
+                    MarchOptions{field.step})
+      .color;
+}
+
+std::vector<PagePhoto> PhotosOf(const WorkingViews& views, const std::vector<int>& chosen) {
+  const WorkingViews small = views.AtSize(kThumbnail);
+  std::vector<PagePhoto> photos;
+  for (size_t i = 0; i < chosen.size(); ++i)
+    photos.push_back({static_cast<int>(i), Thumbnail(small.Photo(chosen[i]), kThumbnail)});
+  return photos;
+}
+
+std::string CheckLine(const std::string& what, const PageCheck& check) {
+  return what + Format(" to the exact one, worst of %d views: %.1f dB (mean %.1f)", check.views,
+                       check.worst_db, check.mean_db);
+}
+
+}  // namespace
+
+MadePage MakePage(const std::string& folder, const std::vector<std::string>& styles,
+                  const PageOptions& options, const ProgressFunction& progress) {
+  const int steps = 2 + static_cast<int>(styles.size());
+  for (const std::string& style : styles)
+    if (std::filesystem::exists(StyleFolder(folder, style) + "/object.npz"))
+      throw InputError("is limited to masks, which a page does not hold", style,
+                       "name the styles of the whole scene: regrade page DIR STYLE ...");
+  ReportOrThrow(progress, 0, steps);
+  StoredField stored = ReadFieldFile(folder + "/field.npz");
+  const WorkingViews views = ReadWorkingViews(folder + "/poses", kChecked, 0)
+                                 .InField(stored.field_from_world, stored.ndc);
+  PageContent content;
+  content.field = EncodeField(stored.field, options.step);
+  const RadianceField page = DecodeField(content.field);
+  std::vector<int> chosen;
+  const int count = std::min(views.count(), kMostPhotos);
+  for (int i = 0; i < count; ++i) chosen.push_back(i * views.count() / count);
+  for (const int i : chosen) content.cameras.push_back(views.CameraOf(i).Undistorted());
+  content.photos = PhotosOf(views, chosen);
+  content.home = HomeCamera(content.cameras);
+  const Camera& home = content.cameras[static_cast<size_t>(content.home)];
+  const std::vector<Camera> checked =
+      options.check ? CheckedViews(views.Cameras(), kChecked) : std::vector<Camera>{};
+  MadePage made;
+  PageCheck check;
+  if (options.check) {
+    check = CheckPage(stored.field, page, checked);
+    made.report.push_back(CheckLine("the page's field", check));
+  }
+  content.poster = EncodeJpeg(RenderHome(page, home), kQuality);
+  for (size_t i = 0; i < styles.size(); ++i) {
+    ReportOrThrow(progress, 1 + static_cast<int64_t>(i), steps);
+    const std::string style_folder = StyleFolder(folder, styles[i]);
+    const StoredNetwork network = ReadNetworkFile(style_folder + "/network.npz");
+    PageStyle style = EncodeStyle(network, page, StrengthOf(style_folder));
+    const Image picture = RenderHome(style.styled, home);
+    if (i == 0 && style.header.At("strength").AsDouble() == 1)
+      content.poster = EncodeJpeg(picture, kQuality);
+    content.style_pictures.push_back(Thumbnail(picture, kThumbnail));
+    if (options.check) {
+      RadianceField exact = stored.field;
+      exact.appearance = PadShBasis(std::move(exact.appearance), style.styled.appearance.basis);
+      exact.appearance = ApplyNetwork(network.network, exact);
+      exact.background = network.background;
+      made.report.push_back(
+          CheckLine("its style " + styles[i], CheckPage(exact, style.styled, checked)));
+    }
+    style.styled = {};
+    content.styles.push_back(std::move(style));
+  }
+  ReportOrThrow(progress, steps - 1, steps);
+  made.html = PageHtml(content, options.check ? &check : nullptr);
+  made.voxels = content.field.header.At("voxels").AsInt();
+  const auto in_text = [](size_t bytes) { return static_cast<int64_t>((bytes + 2) / 3 * 4); };
+  made.field_bytes = in_text(content.field.bytes());
+  for (const PageStyle& style : content.styles)
+    made.style_bytes.push_back(in_text(style.packed.size()));
+  return made;
+}
+
+}  // namespace regrade

@@ -1,0 +1,41 @@
+// Makes the page of an output folder: reads the scene and its styles, and renders the pictures
+// that a page begins with.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "kernels/base/progress.h"
+
+namespace regrade {
+
+struct PageOptions {
+  double step = 0.03;
+  bool check = false;
+
+  template <typename Bind>
+  void Describe(Bind& bind) {
+    bind("page-step", step,
+         {.help = "step of rounded colour coefficients: a smaller one costs bytes and lowers "
+                  "the error",
+          .min = 1e-4,
+          .max = 1});
+    bind("check", check,
+         {.help = "measures how far renders of the page's field and styles are from the exact "
+                  "ones, and prints it"});
+  }
+};
+
+struct MadePage {
+  std::string html;
+  int64_t voxels = 0, field_bytes = 0;  // in the text of the page
+  std::vector<int64_t> style_bytes;
+  std::vector<std::string> report;  // lines of --check
+};
+
+// `styles`: names in `folder`; whole-scene styles only. Throws Error(kInput).
+MadePage MakePage(const std::string& folder, const std::vector<std::string>& styles,
+                  const PageOptions& options, const ProgressFunction& progress);
+
+}  // namespace regrade

@@ -1,0 +1,10 @@
+// The page's own files, embedded when the program is built.
+#pragma once
+
+namespace regrade {
+
+extern const char kPageTemplate[], kPageCss[], kPageScript[];
+// SHA-256 in hexadecimal digits.
+extern const char kPageCssHash[], kPageScriptHash[];
+
+}  // namespace regrade

@@ -1,0 +1,93 @@
+#include "pipeline/page/style_codec.h"
+
+#include <utility>
+#include <vector>
+
+#include "kernels/base/half.h"
+#include "kernels/field/pad_sh_basis.h"
+#include "kernels/network/fused_mlp.h"
+#include "pipeline/files/deflate.h"
+#include "pipeline/page/value_codec.h"
+#include "stylize/field/apply_network.h"
+#include "stylize/field/base_map.h"
+#include "stylize/training/restyle_field.h"
+
+namespace regrade {
+namespace {
+
+// Rounds `values` and appends them to `bytes`, the low byte first.
+void RoundToHalves(std::vector<float>* values, std::string* bytes) {
+  for (float& value : *values) {
+    const uint16_t half = HalfFromFloat(value);
+    bytes->push_back(static_cast<char>(half & 255));
+    bytes->push_back(static_cast<char>(half >> 8));
+    value = FloatFromHalf(half);
+  }
+}
+
+std::vector<double> RoundToCodes(Buffer<float>* values, int channels) {
+  std::vector<float> copy(values->begin(), values->end());
+  const std::vector<double> scale = CodeScales(copy, channels);
+  for (int64_t i = 0; i < values->size(); ++i) {
+    const double s = scale[static_cast<size_t>(i % channels)];
+    (*values)[i] = static_cast<float>((CodeOf((*values)[i], s) - 128) * s);
+  }
+  return scale;
+}
+
+JsonValue::Array ArrayOf(const std::vector<double>& values) {
+  return {values.begin(), values.end()};
+}
+
+}  // namespace
+
+Coded RoundToCodes(RadianceField* field) {
+  Appearance& appearance = field->appearance;
+  return {RoundToCodes(&appearance.sh, appearance.stride()),
+          RoundToCodes(&appearance.sphere_color, 3)};
+}
+
+PageStyle EncodeStyle(const StoredNetwork& stored, const RadianceField& page, double strength) {
+  const LipschitzNetworkData& data = stored.network.data();
+  DenseNetwork<float> dense = stored.network.Effective<float>();
+  std::string halves;
+  for (DenseLayer<float>& layer : dense.layers) {
+    RoundToHalves(&layer.weight, &halves);
+    RoundToHalves(&layer.bias, &halves);
+  }
+  const FusedMlp fused = MakeFusedMlp(dense);
+  PageStyle style;
+  style.styled = page;
+  style.styled.appearance = PadShBasis(std::move(style.styled.appearance), kStyledBasis);
+  style.styled.appearance = ApplyForward(
+      [&](const float* features, int64_t n, float* output) {
+        FusedForward(fused, features, n, output);
+        if (!data.has_base) return;
+        for (int64_t r = 0; r < n; ++r)
+          AddBaseMap(data.base, features + r * kFeatureStride, output + r * kFeatureStride);
+      },
+      data.position_scale, style.styled);
+  style.styled.background = stored.background;
+  const Coded coded = RoundToCodes(&style.styled);
+  const RowMap base = BaseOf(data);
+  JsonValue::Array matrix;
+  for (int r = 0; r < 3; ++r)
+    for (int c = 0; c < 3; ++c) matrix.push_back(double{base.matrix.row[r][c]});
+  const auto array = [](const Vec3f& v) {
+    return JsonValue::Array{double{v.x}, double{v.y}, double{v.z}};
+  };
+  style.header = JsonValue::Object{{"activation", static_cast<int>(dense.activation)},
+                                   {"omega", double{data.omega}},
+                                   {"position_scale", double{data.position_scale}},
+                                   {"base", std::move(matrix)},
+                                   {"constant", array(base.constant)},
+                                   {"scale", ArrayOf(coded.scale)},
+                                   {"sphere_scale", ArrayOf(coded.sphere_scale)},
+                                   {"background", array(stored.background)},
+                                   {"strength", strength},
+                                   {"bound", stored.network.Bound()}};
+  style.packed = Deflate(halves);
+  return style;
+}
+
+}  // namespace regrade

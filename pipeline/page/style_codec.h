@@ -1,0 +1,31 @@
+// Packs a style for a page: its network, which the page sends the voxels through.
+//
+// The network's effective weights, [out, in] and biases, layer after layer, are stored as
+// halves: 20,379 of them. Scales of the styled coefficients' 8-bit codes are found when the
+// page is written, on the field as the page has it.
+#pragma once
+
+#include <string>
+
+#include "kernels/field/radiance_field.h"
+#include "pipeline/fields/network_file.h"
+#include "pipeline/files/json_file.h"
+
+namespace regrade {
+
+struct PageStyle {
+  JsonValue header;
+  std::string packed;    // the weights, compressed
+  RadianceField styled;  // as the page will have it, up to the arithmetic of its processor
+};
+
+// `page`: of DecodeField. `strength` in [0, 1]: the weight at which the style is shown first.
+PageStyle EncodeStyle(const StoredNetwork& stored, const RadianceField& page, double strength);
+
+// A field whose coefficients are rounded to codes of 8 bits, with the scales of each channel.
+struct Coded {
+  std::vector<double> scale, sphere_scale;
+};
+Coded RoundToCodes(RadianceField* field);
+
+}  // namespace regrade

@@ -1,0 +1,153 @@
+// The field in textures, its march and the styles' networks, on the graphics processor.
+
+const WIDTH = 2048;  // of all textures
+
+function compile(gl, sources) {
+  const program = gl.createProgram();
+  for (const [kind, source] of sources) {
+    const shader = gl.createShader(kind);
+    gl.shaderSource(shader, source);
+    gl.compileShader(shader);
+    if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS) && !gl.isContextLost())
+      throw new PageError('the graphics processor refuses a program: ' + gl.getShaderInfoLog(shader));
+    gl.attachShader(program, shader);
+  }
+  gl.linkProgram(program);
+  if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost())
+    throw new PageError('the graphics processor refuses a program: ' + gl.getProgramInfoLog(program));
+  const place = {};
+  return {program, at: (name) => place[name] ??= gl.getUniformLocation(program, name)};
+}
+
+const EVERY_PIXEL = `#version 300 es
+void main() { gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0); }`;
+
+class Graphics {
+  constructor(gl) {
+    this.gl = gl;
+    this.bytes = 0;
+    this.march = compile(gl, [[gl.VERTEX_SHADER, EVERY_PIXEL], [gl.FRAGMENT_SHADER, MARCH_GLSL]]);
+    this.empty = {u: this.texture('u4', new Uint32Array(4)), i: this.texture('i1', new Int32Array(1)),
+                  p: this.texture('u2', new Uint32Array(2))};
+    this.array = gl.createVertexArray();
+  }
+  // 2048 texels a row; kinds: u4, u2, i1 are unsigned and signed integers of 32 bits.
+  texture(kind, data) {
+    const gl = this.gl, channels = Number(kind[1]), texels = data.length / channels;
+    const height = Math.max(1, Math.ceil(texels / WIDTH));
+    if (height > gl.getParameter(gl.MAX_TEXTURE_SIZE))
+      throw new PageError('this scene has more voxels than this graphics processor can hold');
+    const [inside, format, type] = {
+      u4: [gl.RGBA32UI, gl.RGBA_INTEGER, gl.UNSIGNED_INT],
+      u2: [gl.RG32UI, gl.RG_INTEGER, gl.UNSIGNED_INT],
+      i1: [gl.R32I, gl.RED_INTEGER, gl.INT]}[kind];
+    const texture = gl.createTexture();
+    gl.bindTexture(gl.TEXTURE_2D, texture);
+    gl.texStorage2D(gl.TEXTURE_2D, 1, inside, WIDTH, height);
+    for (const side of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER])
+      gl.texParameteri(gl.TEXTURE_2D, side, gl.NEAREST);
+    const whole = Math.floor(texels / WIDTH), rest = texels % WIDTH;
+    if (whole) gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, WIDTH, whole, format, type, data, 0);
+    if (rest) gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, whole, rest, 1, format, type, data, whole * WIDTH * channels);
+    this.bytes += WIDTH * height * 4 * channels;
+    return {texture, height, kind, bytes: WIDTH * height * 4 * channels};
+  }
+  blank(kind, height) { return this.texture(kind, new Uint32Array(WIDTH * height * Number(kind[1]))); }
+  free(texture) {
+    this.gl.deleteTexture(texture.texture);
+    this.bytes -= texture.bytes;
+  }
+  bind(program, name, unit, texture) {
+    const gl = this.gl;
+    gl.activeTexture(gl.TEXTURE0 + unit);
+    gl.bindTexture(gl.TEXTURE_2D, texture.texture);
+    gl.uniform1i(program.at(name), unit);
+  }
+
+  // `sets`: {weight, colors, background} of at most three; `view`: see camera.js.
+  draw(scene, view, sets, map, target, strip, opacityStep, count) {
+    const gl = this.gl, p = this.march, h = scene.header, u = (name) => p.at(name);
+    gl.useProgram(p.program);
+    gl.bindVertexArray(this.array);
+    this.bind(p, 'uTree', 0, scene.tree);
+    this.bind(p, 'uDensity', 1, scene.density);
+    this.bind(p, 'uCorner', 2, scene.corner);
+    this.bind(p, 'uColumn', 9, scene.column ?? this.empty.i);
+    const scale = new Float32Array(81), texel = new Float32Array(9), weight = [0, 0, 0];
+    const background = [0, 0, 0];
+    for (let i = 0; i < 3; ++i) {
+      const set = sets[i];
+      this.bind(p, 'uFirst' + i, 3 + 2 * i, set?.colors.first ?? this.empty.u);
+      this.bind(p, 'uSecond' + i, 4 + 2 * i, set?.colors.second ?? this.empty.u);
+      this.bind(p, 'uTexel' + i, 10 + i, set?.colors.texel ?? this.empty.p);
+      if (!set) continue;
+      weight[i] = set.weight;
+      scale.set(set.colors.scale, 27 * i);
+      texel.set(set.colors.texelScale, 3 * i);
+      for (let c = 0; c < 3; ++c) background[c] += set.weight * set.colors.background[c];
+    }
+    gl.uniform1fv(u('uScale'), scale);
+    gl.uniform1fv(u('uTexelScale'), texel);
+    gl.uniform3fv(u('uWeight'), weight);
+    gl.uniform3fv(u('uBackground'), background);
+    gl.uniformMatrix3fv(u('uMap'), true, map?.matrix ?? [1, 0, 0, 0, 1, 0, 0, 0, 1]);
+    gl.uniform3fv(u('uOffset'), map?.offset ?? [0, 0, 0]);
+    gl.uniformMatrix3fv(u('uWorldFromCamera'), true, view.rotation);
+    gl.uniform3fv(u('uEye'), view.eye);
+    gl.uniform4fv(u('uLens'), view.lens);
+    gl.uniform2f(u('uSize'), target.width, target.height);
+    gl.uniform2fv(u('uNdc'), h.ndc ?? [0, 0]);
+    gl.uniform3iv(u('uVoxels'), h.resolution);
+    gl.uniform3iv(u('uTop'), scene.top);
+    gl.uniform1i(u('uFinest'), scene.finest);
+    gl.uniform1i(u('uOnCells'), h.finest === null ? 0 : 1);
+    gl.uniform1i(u('uLayers'), h.spheres?.layers ?? 0);
+    gl.uniform1i(u('uResolution'), h.spheres?.resolution ?? 0);
+    gl.uniform1i(u('uCount'), count ? 1 : 0);
+    gl.uniform3fv(u('uCenter'), h.center);
+    gl.uniform3fv(u('uRadius'), h.radius);
+    gl.uniform1f(u('uUnit'), scene.unit);
+    gl.uniform1f(u('uNear'), h.near);
+    gl.uniform1f(u('uStep'), h.step);
+    gl.uniform1f(u('uOpacityStep'), opacityStep);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
+    gl.viewport(0, 0, target.width, target.height);
+    gl.enable(gl.SCISSOR_TEST);
+    gl.scissor(strip.x, strip.y, strip.width, strip.height);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+    gl.disable(gl.SCISSOR_TEST);
+  }
+
+  // A picture of RGBA8 to draw into.
+  target(width, height) {
+    const gl = this.gl, texture = gl.createTexture(), framebuffer = gl.createFramebuffer();
+    gl.bindTexture(gl.TEXTURE_2D, texture);
+    gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA8, width, height);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, 0);
+    return {texture, framebuffer, width, height, free: () => {
+      gl.deleteFramebuffer(framebuffer);
+      gl.deleteTexture(texture);
+    }};
+  }
+  // All of a picture, stretched, or the rows of a strip of one of the canvas's size.
+  show(target, canvas, strip) {
+    const gl = this.gl, [low, high] = strip ? [strip.y, strip.y + strip.height] : [0, target.height];
+    gl.bindFramebuffer(gl.READ_FRAMEBUFFER, target.framebuffer);
+    gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, null);
+    gl.blitFramebuffer(0, low, target.width, high, 0, strip ? low : 0, canvas.width,
+                       strip ? high : canvas.height, gl.COLOR_BUFFER_BIT, gl.LINEAR);
+  }
+  // Waits for what was drawn.
+  settle(target) {
+    const gl = this.gl;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
+    gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
+  }
+  read(target) {
+    const gl = this.gl, pixels = new Uint8Array(4 * target.width * target.height);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
+    gl.readPixels(0, 0, target.width, target.height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+    return pixels;
+  }
+}

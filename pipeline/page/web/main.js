@@ -1,0 +1,181 @@
+// Starts the page: unpacks the scene, binds the controls, and paints.
+
+const PAGE_FORMAT = 1;
+
+function readHeader() {
+  let header = null;
+  try { header = JSON.parse(element('scene').textContent); } catch (error) { /* said below */ }
+  if (!header || typeof header !== 'object') throw new PageError('a part of the page is damaged: scene');
+  if (header.format !== PAGE_FORMAT) throw new PageError('this page was made by another version of regrade');
+  const numbers = (v, n) => Array.isArray(v) && v.length === n && v.every(Number.isFinite);
+  if (!numbers(header.resolution, 3) || !numbers(header.center, 3) || !numbers(header.radius, 3) ||
+      !(header.voxels > 0 && header.voxels <= 1 << 26) || ![1, 4, 9].includes(header.basis) ||
+      !header.resolution.every((n) => n > 0 && n <= 1 << 20) || !header.cameras?.length ||
+      !(header.finest === null || header.finest >= 0 && header.finest <= 16) || !header.cameras[header.home])
+    throw new PageError('a part of the page is damaged: scene');
+  return header;
+}
+
+function say(text) { element('message').textContent = text; }
+
+function fail(error) {
+  const known = error instanceof PageError || error instanceof RangeError;
+  say(known ? 'The scene cannot be shown: ' + error.message + '.'
+            : 'The scene cannot be shown; this browser says: ' + error.message);
+  if (!known) throw error;
+}
+
+async function start(page) {
+  const header = readHeader(), canvas = element('canvas');
+  const gl = canvas.getContext('webgl2', {antialias: false, preserveDrawingBuffer: true, powerPreference: 'high-performance'});
+  if (!gl) throw new PageError('this browser has no WebGL 2, or has switched it off');
+  if (typeof DecompressionStream === 'undefined') throw new PageError('this browser is too old');
+  const graphics = new Graphics(gl);
+  graphics.onCores = location.hash === '#cores';
+  const scene = await loadScene(header, graphics, (part) => say('The scene is being unpacked: ' + Math.round(100 * part) + ' %'));
+  const view = page.view ??= new View(header);
+  const state = page.state ??= {axes: [0, 1], amount: [0, 0], original: false, split: false, cut: 0.5, map: null, playing: null};
+  const colors = header.styles.map(() => null), loading = header.styles.map(() => null);
+
+  const weights = () => header.styles.map((_, i) => {
+    const axis = state.axes.indexOf(i);
+    return axis >= 0 ? state.amount[axis] ?? 0 : 0;
+  });
+  function setsOf(wanted) {
+    let rest = 1;
+    const sets = [];
+    wanted.forEach((weight, i) => {
+      if (!(weight > 0) || !colors[i] || sets.length === 2) return;
+      sets.push({weight, colors: colors[i]});
+      rest -= weight;
+    });
+    return rest > 1e-6 || sets.length === 0 ? [{weight: Math.max(rest, 0), colors: scene.source}, ...sets] : sets;
+  }
+  function load(i) {
+    return loading[i] ??= styleColors(graphics, scene, header.styles[i], 'network_' + i, (part) => {
+      say(part < 1 ? 'Style ' + (i + 1) + ' is being applied: ' + Math.round(100 * part) + ' %' : '');
+    }).then((made) => {
+      colors[i] = made;
+      say('');
+      painter.change();
+    }).catch(fail);
+  }
+  const pictureOf = (width, height) => {
+    const styled = setsOf(weights()), source = [{weight: 1, colors: scene.source}];
+    const parts = state.original ? [{from: 0, to: 1, sets: source}]
+        : state.split ? [{from: 0, to: state.cut, sets: source}, {from: state.cut, to: 1, sets: styled}]
+        : [{from: 0, to: 1, sets: styled}];
+    return {view: view.at(width, height), map: state.map, parts};
+  };
+  const painter = new Painter(canvas, graphics, scene, pictureOf);
+  const changed = () => painter.change();
+  const showStyles = bindStyles(header, state, () => {
+    weights().forEach((weight, i) => weight > 0 && !loading[i] && load(i));
+    changed();
+  });
+  bindPhotos(header, view, changed);
+  const path = page.path ??= new CameraPath();
+  const take = (key) => {
+    Object.assign(view, {eye: key.eye.slice(), forward: unit(key.forward), top: unit(key.up), half: key.half.slice()});
+    state.axes.forEach((style, axis) => { if (style < key.weights.length) state.amount[axis] = key.weights[style]; });
+    key.weights.forEach((weight, i) => weight > 0 && !loading[i] && load(i));
+    showStyles();
+    changed();
+  };
+  bindPath(path, state, header, () => view.save(), weights, take, changed);
+
+  const press = (id, on) => element(id).setAttribute('aria-pressed', on);
+  const toggle = (id, sheet) => () => {
+    const open = element(sheet).hidden;
+    for (const [b, s] of [['show_path', 'path'], ['show_facts', 'facts']]) {
+      element(s).hidden = s !== sheet || !open;
+      press(b, s === sheet && open);
+    }
+    if (sheet === 'facts') factsOf(header, scene, graphics, painter);
+  };
+  const actions = {
+    home() { view.go(view.photos[header.home]); view.pivot = view.pivotOfHome; changed(); },
+    mode() { view.mode = view.mode === 'orbit' ? 'fly' : 'orbit'; press('mode', view.mode === 'fly'); },
+    original(on) { if (state.original !== on) { state.original = on; changed(); } },
+    halve() {
+      state.split = !state.split;
+      press('halve', state.split);
+      element('half').hidden = element('split').hidden = !state.split;
+      changed();
+    }};
+  actions.keys = {h: actions.home, f: actions.mode, c: () => actions.original(true), v: actions.halve,
+                  k: toggle('show_path', 'path'), i: toggle('show_facts', 'facts')};
+  actions.released = {c: () => actions.original(false)};
+  element('home').onclick = actions.home;
+  element('mode').onclick = actions.mode;
+  element('halve').onclick = actions.halve;
+  element('show_path').onclick = actions.keys.k;
+  element('show_facts').onclick = actions.keys.i;
+  const compare = element('compare');
+  compare.hidden = element('halve').hidden = header.styles.length === 0;
+  compare.onpointerdown = () => actions.original(true);
+  compare.onpointerup = compare.onpointerleave = compare.onblur = () => actions.original(false);
+  compare.onkeydown = (event) => { if (event.key === ' ' || event.key === 'Enter') actions.original(true); };
+  compare.onkeyup = () => actions.original(false);
+  element('cut').oninput = () => {
+    state.cut = element('cut').value / 100;
+    element('split').style.left = 100 * state.cut + '%';
+    changed();
+  };
+  element('split').style.left = 100 * state.cut + '%';
+
+  page.controls ??= bindControls(canvas, view, () => page.changed(), {
+    home: () => page.actions.home(),
+    keys: Object.fromEntries(Object.keys(actions.keys).map((k) => [k, () => page.actions.keys[k]()])),
+    released: {c: () => page.actions.released.c()}});
+  Object.assign(page, {actions, changed, scene, graphics, painter, header, load, colors, setsOf, weights, resize: () => painter.resize()});
+  // For tests: RGBA rows from the bottom, of any view and weights; with `count` the fetches of each ray.
+  page.picture = async ({rotation, eye, lens, width, height, weights: wanted, count, opacityStep = 0}) => {
+    for (let i = 0; i < wanted.length; ++i) if (wanted[i] > 0) await load(i);
+    const target = graphics.target(width, height);
+    graphics.draw(scene, {rotation, eye, lens}, setsOf(wanted), null, target, {x: 0, y: 0, width, height}, opacityStep, count);
+    const pixels = graphics.read(target);
+    target.free();
+    return pixels;
+  };
+  say('');
+  canvas.classList.add('ready');
+  let before = performance.now();
+  const run = page.run = () => {
+    if (page.run !== run || gl.isContextLost()) return;
+    const now = performance.now(), seconds = Math.min(0.1, (now - before) / 1000);
+    before = now;
+    page.controls(seconds);
+    if (state.playing !== null) {
+      state.playing += seconds;
+      if (state.playing >= path.seconds) {
+        take(path.keyframes[path.keyframes.length - 1]);
+        element('play').onclick();
+      } else {
+        take(path.at(state.playing));
+      }
+    }
+    painter.step();
+    requestAnimationFrame(run);
+  };
+  run();
+  if (header.styles.length > 0) {
+    await load(0);
+    if (colors[0] && state.amount.every((v) => v === 0)) {
+      state.amount[0] = header.styles[0].strength;
+      showStyles();
+      changed();
+    }
+  }
+}
+
+const page = {};
+globalThis.regradePage = page;  // for tests
+const begin = () => page.started = start(page).catch(fail);
+element('canvas').addEventListener('webglcontextlost', (event) => {
+  event.preventDefault();
+  say('The graphics processor was reset; the scene is being made again.');
+});
+element('canvas').addEventListener('webglcontextrestored', begin);
+addEventListener('resize', () => page.resize?.());
+begin();

@@ -1,0 +1,310 @@
+#version 300 es
+// One ray for each pixel through cells of all levels, or a uniform grid, and background spheres;
+// see the C++ headers kernels/field/cell_walk.h, ray_march.h and background_spheres.h.
+precision highp float;
+precision highp int;
+precision highp isampler2D;
+precision highp usampler2D;
+
+uniform isampler2D uTree;      // entries: a cell, -1 nothing, -2 - n node n
+uniform usampler2D uDensity;   // of a cell's corners, eight halves
+uniform usampler2D uCorner;    // of a cell, two texels of four voxels
+uniform usampler2D uFirst0, uSecond0, uFirst1, uSecond1, uFirst2, uSecond2;  // codes [27]
+uniform isampler2D uColumn;    // of the spheres' map
+uniform usampler2D uTexel0, uTexel1, uTexel2;  // codes, density
+
+uniform float uScale[81];      // of three sets
+uniform float uTexelScale[9];
+uniform vec3 uWeight, uBackground;
+uniform mat3 uMap;
+uniform vec3 uOffset;
+uniform mat3 uWorldFromCamera;
+uniform vec3 uEye;
+uniform vec4 uLens;            // focal lengths and principal point, pixels
+uniform vec2 uSize, uNdc;
+uniform ivec3 uVoxels, uTop;
+uniform int uFinest, uOnCells, uLayers, uResolution, uCount;
+uniform vec3 uCenter, uRadius;
+uniform float uUnit, uNear, uStep, uOpacityStep;
+out vec4 color;
+
+const int kBits = 11;          // textures are 2048 wide
+const float kStop = 1e-4;
+float fetches = 0.0;
+
+ivec2 At(int i) { return ivec2(i & 2047, i >> kBits); }
+
+int EntryAt(ivec3 at, out int width) {
+  int shift = uFinest;
+  ivec3 top = at >> shift;
+  int entry = texelFetch(uTree, At((top.x * uTop.y + top.y) * uTop.z + top.z), 0).x;
+  fetches += 1.0;
+  int first = uTop.x * uTop.y * uTop.z;
+  for (int i = 0; i < 16 && entry < -1; ++i) {
+    --shift;
+    ivec3 bit = (at >> shift) & 1;
+    entry = texelFetch(uTree, At(first + (-2 - entry) * 8 + (bit.x << 2 | bit.y << 1 | bit.z)), 0).x;
+    fetches += 1.0;
+  }
+  width = 1 << shift;
+  return entry;
+}
+
+// Corner weights: x is the highest bit.
+void Weights(vec3 f, out vec4 low, out vec4 high) {
+  vec4 yz = vec4((1.0 - f.y) * (1.0 - f.z), (1.0 - f.y) * f.z, f.y * (1.0 - f.z), f.y * f.z);
+  low = yz * (1.0 - f.x);
+  high = yz * f.x;
+}
+
+float DensityIn(int cell, vec3 f) {
+  uvec4 d = texelFetch(uDensity, At(cell), 0);
+  fetches += 1.0;
+  vec4 a, b;
+  Weights(f, a, b);
+  return dot(a, vec4(unpackHalf2x16(d.x), unpackHalf2x16(d.y))) +
+         dot(b, vec4(unpackHalf2x16(d.z), unpackHalf2x16(d.w)));
+}
+
+vec4 Codes(uint w) {
+  return vec4(w & 255u, w >> 8 & 255u, w >> 16 & 255u, w >> 24) - 128.0;
+}
+
+// The products of a voxel's coefficients with s, the harmonics times the scales.
+vec3 ColorOf(usampler2D first, usampler2D second, int voxel, vec4 s[7]) {
+  uvec4 a = texelFetch(first, At(voxel), 0), b = texelFetch(second, At(voxel), 0);
+  fetches += 2.0;
+  vec4 c2 = Codes(a.z), c4 = Codes(b.x);
+  return vec3(dot(Codes(a.x), s[0]) + dot(Codes(a.y), s[1]) + c2.x * s[2].x,
+              dot(c2.yzw, s[2].yzw) + dot(Codes(a.w), s[3]) + dot(c4.xy, s[4].xy),
+              dot(c4.zw, s[4].zw) + dot(Codes(b.y), s[5]) + dot(Codes(b.z).xyz, s[6].xyz));
+}
+
+void Harmonics(vec3 d, out float g[9]) {
+  g[0] = 0.28209479177387814;
+  g[1] = -0.4886025119029199 * d.y;
+  g[2] = 0.4886025119029199 * d.z;
+  g[3] = -0.4886025119029199 * d.x;
+  g[4] = 1.0925484305920792 * d.x * d.y;
+  g[5] = -1.0925484305920792 * d.y * d.z;
+  g[6] = 0.31539156525252005 * (2.0 * d.z * d.z - d.x * d.x - d.y * d.y);
+  g[7] = -1.0925484305920792 * d.x * d.z;
+  g[8] = 0.5462742152960396 * (d.x * d.x - d.y * d.y);
+}
+
+vec4 s0[7], s1[7], s2[7];
+
+void Scaled(float g[9], int set, out vec4 s[7]) {
+  for (int i = 0; i < 7; ++i)
+    for (int k = 0; k < 4; ++k) {
+      int j = 4 * i + k;
+      s[i][k] = j < 27 ? uScale[27 * set + j] * g[j - 9 * (j / 9)] : 0.0;
+    }
+}
+
+vec3 Shade(int cell, vec3 f) {
+  ivec4 low = ivec4(texelFetch(uCorner, At(2 * cell), 0));
+  ivec4 high = ivec4(texelFetch(uCorner, At(2 * cell + 1), 0));
+  fetches += 2.0;
+  vec4 a, b;
+  Weights(f, a, b);
+  vec3 raw = vec3(0.5);
+  for (int k = 0; k < 8; ++k) {
+    float w = k < 4 ? a[k] : b[k - 4];
+    int voxel = k < 4 ? low[k] : high[k - 4];
+    if (uWeight.x > 0.0) raw += w * uWeight.x * ColorOf(uFirst0, uSecond0, voxel, s0);
+    if (uWeight.y > 0.0) raw += w * uWeight.y * ColorOf(uFirst1, uSecond1, voxel, s1);
+    if (uWeight.z > 0.0) raw += w * uWeight.z * ColorOf(uFirst2, uSecond2, voxel, s2);
+  }
+  return max(uMap * raw + uOffset, 0.0);
+}
+
+// The sums of a ray: light, what is transmitted, and opacity that has no colour yet.
+vec3 sum = vec3(0.0);
+float transmitted = 1.0, waiting = 0.0;
+int lastCell = -1;
+vec3 lastFraction;
+
+void Composite(int cell, vec3 f, float density, float delta) {
+  float tau = min(max(density, 0.0) * delta, 104.0);
+  if (!(tau > 0.0)) return;
+  // 1 - exp(-tau) of a small tau loses its digits.
+  float alpha = tau < 0.01 ? tau * (1.0 - tau * (0.5 - tau * (1.0 / 6.0))) : 1.0 - exp(-tau);
+  waiting += transmitted * alpha;
+  transmitted *= exp(-tau);
+  lastCell = cell;
+  lastFraction = f;
+  if (waiting >= uOpacityStep) {
+    sum += waiting * Shade(cell, f);
+    waiting = 0.0;
+    lastCell = -1;
+  }
+}
+
+void MarchCells(vec3 eye, vec3 direction) {
+  vec3 scale = 0.5 * vec3(uVoxels) / uRadius, middle = vec3(uVoxels) * 0.5;
+  vec3 o = (eye - uCenter) * scale, d = direction * scale;
+  vec3 inverse = mix(1.0 / d, vec3(0.0), equal(d, vec3(0.0)));
+  float begin = uNear, end = 3.4e38;
+  for (int a = 0; a < 3; ++a) {
+    if (d[a] == 0.0) {
+      if (!(o[a] >= -middle[a] && o[a] < middle[a])) return;
+      continue;
+    }
+    float t0 = (-middle[a] - o[a]) * inverse[a], t1 = (middle[a] - o[a]) * inverse[a];
+    begin = max(begin, min(t0, t1));
+    end = min(end, max(t0, t1));
+  }
+  if (!(end > begin)) return;
+  ivec3 at = clamp(ivec3(floor(o + d * begin) + middle), ivec3(0), uVoxels - 1);
+  float t = begin;
+  for (int i = 0; i < 16384; ++i) {
+    int width;
+    int cell = EntryAt(at, width);
+    ivec3 low = at & ~(width - 1);
+    vec3 face = vec3(low) + vec3(width) * vec3(greaterThan(d, vec3(0.0))) - middle;
+    vec3 crossing = mix((face - o) * inverse, vec3(3.4e38), equal(d, vec3(0.0)));
+    float next = min(end, min(crossing.x, min(crossing.y, crossing.z)));
+    int axis = next == crossing.x ? 0 : next == crossing.y ? 1 : next == crossing.z ? 2 : -1;
+    bool last = axis < 0 || !(next < end);
+    next = max(next, t);
+    if (cell >= 0) {
+      vec3 inside = (o + d * (0.5 * (t + next)) - (vec3(low) - middle)) / float(width);
+      vec3 f = clamp(inside, 0.0, 1.0);
+      Composite(cell, f, DensityIn(cell, f), (next - t) / uUnit);
+      if (transmitted < kStop) return;
+    }
+    if (last) return;
+    ivec3 then = clamp(ivec3(floor(o + d * next) + middle), low, low + (width - 1));
+    then[axis] = d[axis] > 0.0 ? low[axis] + width : low[axis] - 1;
+    if (then[axis] < 0 || then[axis] >= uVoxels[axis]) return;
+    at = then;
+    t = next;
+  }
+}
+
+void MarchGrid(vec3 eye, vec3 direction) {
+  vec3 scale = 0.5 * vec3(uVoxels) / uRadius;
+  vec3 o = eye * scale + 0.5 * vec3(uVoxels) - 0.5 - uCenter * scale, d = direction * scale;
+  float perWorld = length(d);
+  if (!(perWorld > 0.0)) return;
+  d /= perWorld;
+  float begin = max(uNear * perWorld, 0.0), end = 3.4e38;
+  for (int a = 0; a < 3; ++a) {
+    float low = -0.5, high = float(uVoxels[a]) - 0.5;
+    if (d[a] == 0.0) {
+      if (!(o[a] >= low && o[a] < high)) return;
+      continue;
+    }
+    float t0 = (low - o[a]) / d[a], t1 = (high - o[a]) / d[a];
+    begin = max(begin, min(t0, t1));
+    end = min(end, max(t0, t1) * (1.0 + 3.582e-7));
+  }
+  if (!(end > begin)) return;
+  int steps = int(min(ceil((end - begin) / uStep), 1048576.0));
+  vec3 top = vec3(uVoxels - 1);
+  float delta = uStep / (perWorld * uUnit);
+  for (int i = 0, guard = 0; i < steps && guard < 16384; ++guard) {
+    vec3 p = clamp(o + d * (begin + float(i) * uStep), vec3(0.0), top);
+    ivec3 base = min(ivec3(p), uVoxels - 2);
+    int width;
+    int cell = EntryAt(base, width);
+    if (cell >= 0) {
+      vec3 f = p - vec3(base);
+      Composite(cell, f, DensityIn(cell, f), delta);
+      if (transmitted < kStop) return;
+      ++i;
+      continue;
+    }
+    // To the last sample before the empty cube's end; cubes at the box's faces have none there.
+    ivec3 low = base & ~(width - 1);
+    float leave = 3.4e38;
+    for (int a = 0; a < 3; ++a) {
+      if (d[a] == 0.0) continue;
+      int face = d[a] > 0.0 ? low[a] + width : low[a];
+      if (face > 0 && face < uVoxels[a] - 1) leave = min(leave, (float(face) - o[a]) / d[a]);
+    }
+    if (leave > end) return;
+    i = max(i + 1, int(floor((leave - begin) / uStep)));
+  }
+}
+
+vec3 LayerColor(uvec4 texel, float w, int set) {
+  vec3 c = Codes(texel.x).xyz;
+  return w * c * vec3(uTexelScale[3 * set], uTexelScale[3 * set + 1], uTexelScale[3 * set + 2]);
+}
+
+void CompositeSpheres(vec3 eye, vec3 direction) {
+  vec3 o = (eye - uCenter) / uRadius, d = direction / uRadius;
+  float perWorld = length(d);
+  if (!(perWorld > 0.0)) return;
+  d /= perWorld;
+  float along = dot(o, d);
+  vec3 nearest = o - d * along;
+  float rest = dot(nearest, d);
+  nearest -= d * rest;
+  along += rest;
+  for (int i = 0; i < uLayers; ++i) {
+    if (transmitted < kStop) return;
+    float u = 1.0 - (float(i) + 0.5) / float(uLayers);
+    float squared = dot(nearest, nearest) * u * u;
+    if (!(squared < 1.0)) continue;
+    float root = sqrt(1.0 - squared);
+    if (!(root - along * u > 0.0)) continue;
+    vec3 place = nearest * u + d * root;
+    float x = float(uResolution) * (1.0 + atan(place.x, place.z) * 0.318309886183790672);
+    float y = float(uResolution) * (0.5 - atan(place.y, length(place.xz)) * 0.318309886183790672);
+    ivec2 low = clamp(ivec2(x, y), ivec2(0), ivec2(2 * uResolution - 1, uResolution - 1));
+    vec2 f = vec2(x, y) - vec2(low);
+    vec3 raw = vec3(0.0);
+    float density = 0.0;
+    for (int k = 0; k < 4; ++k) {
+      ivec2 at = ivec2((low.x + (k >> 1)) % (2 * uResolution), min(low.y + (k & 1), uResolution - 1));
+      int column = texelFetch(uColumn, At(at.x * uResolution + at.y), 0).x;
+      fetches += 1.0;
+      if (column < 0) continue;
+      float w = (k >> 1 == 1 ? f.x : 1.0 - f.x) * ((k & 1) == 1 ? f.y : 1.0 - f.y);
+      int texel = column * uLayers + i;
+      uvec4 own = texelFetch(uTexel0, At(texel), 0);
+      fetches += 1.0;
+      density += w * unpackHalf2x16(own.y).x;
+      if (uWeight.x > 0.0) raw += uWeight.x * LayerColor(own, w, 0);
+      if (uWeight.y > 0.0) raw += uWeight.y * LayerColor(texelFetch(uTexel1, At(texel), 0), w, 1);
+      if (uWeight.z > 0.0) raw += uWeight.z * LayerColor(texelFetch(uTexel2, At(texel), 0), w, 2);
+    }
+    float tau = min(max(density, 0.0) / (float(uLayers) * perWorld), 104.0);
+    if (!(tau > 0.0)) continue;
+    float alpha = tau < 0.01 ? tau * (1.0 - tau * (0.5 - tau * (1.0 / 6.0))) : 1.0 - exp(-tau);
+    vec3 raised = uMap * (0.5 + 0.28209479177387814 * raw) + uOffset;
+    sum += transmitted * alpha * max(raised, 0.0);
+    transmitted *= exp(-tau);
+  }
+}
+
+void main() {
+  // Rows count from the top, as in pictures.
+  vec2 pixel = vec2(gl_FragCoord.x, uSize.y - gl_FragCoord.y);
+  vec3 eye = uEye;
+  vec3 d = normalize(uWorldFromCamera * vec3((pixel - uLens.zw) / uLens.xy, 1.0));
+  if (uNdc.x > 0.0) {
+    if (d.z > 1e-6) {
+      vec2 on = eye.xy + (1.0 - eye.z) / d.z * d.xy;
+      eye = vec3(uNdc * on, -1.0);
+      d = normalize(vec3(uNdc * (d.xy / d.z - on), 2.0));
+    } else {
+      d = vec3(0.0);
+    }
+  }
+  float g[9];
+  Harmonics(d, g);
+  Scaled(g, 0, s0);
+  if (uWeight.y > 0.0) Scaled(g, 1, s1);
+  if (uWeight.z > 0.0) Scaled(g, 2, s2);
+  if (dot(d, d) > 0.0) {
+    if (uOnCells == 1) MarchCells(eye, d); else MarchGrid(eye, d);
+    if (lastCell >= 0) sum += waiting * Shade(lastCell, lastFraction);
+    if (uLayers > 0 && transmitted >= kStop) CompositeSpheres(eye, d);
+  }
+  color = vec4(clamp(sum + transmitted * uBackground, 0.0, 1.0), 1.0);
+  if (uCount == 1) color = vec4(mod(fetches, 256.0) / 255.0, floor(fetches / 256.0) / 255.0, 0.0, 1.0);
+}

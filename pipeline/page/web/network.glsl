@@ -1,0 +1,118 @@
+#version 300 es
+// A style's network on one voxel for each pixel: see EQ(liprf-network) in the C++ sources.
+precision highp float;
+precision highp int;
+precision highp usampler2D;
+precision highp isampler2D;
+
+uniform usampler2D uFirst, uSecond;   // a voxel's codes and place
+uniform isampler2D uPlaceOfColumn;    // of the spheres' columns
+uniform float uScale[27], uStyledScale[27];
+uniform vec3 uPosition;               // the place's unit: 2 / voxels
+uniform vec3 uConstant;               // of the colour map
+uniform mat3 uBase;
+uniform float uOmega, uPositionScale;
+uniform int uActivation, uOnSpheres, uLayers, uResolution;
+layout(std140) uniform Layer0 { mat4 w0[128]; };
+layout(std140) uniform Layer1 { mat4 w1[256]; };
+layout(std140) uniform Layer2 { mat4 w2[256]; };
+layout(std140) uniform Layer3 { mat4 w3[256]; };
+layout(std140) uniform Layer4 { mat4 w4[256]; };
+layout(std140) uniform Layer5 { mat4 w5[112]; };
+layout(std140) uniform Biases { vec4 bias[96]; };
+layout(location = 0) out uvec4 first;
+layout(location = 1) out uvec4 second;
+
+vec4 Activate(vec4 x) {
+  if (uActivation == 0) return sin(uOmega * x);
+  if (uActivation == 1) return max(x, 0.0);
+  if (uActivation == 2) return max(x, 0.01 * x);
+  if (uActivation == 3) return 1.0 / (1.0 + exp(-x));
+  return tanh(clamp(x, -20.0, 20.0));
+}
+
+uint Packed(vec4 code) {
+  uvec4 c = uvec4(floor(clamp(code, -127.0, 127.0) + 128.5));
+  return c.x | c.y << 8 | c.z << 16 | c.w << 24;
+}
+
+float CodeIn(uvec4 a, uvec4 b, int i) {
+  uint w = i < 16 ? a[i >> 2] : b[(i - 16) >> 2];
+  return float(w >> (8 * (i & 3)) & 255u) - 128.0;
+}
+
+void main() {
+  ivec2 at = ivec2(gl_FragCoord.xy);
+  uvec4 a = texelFetch(uFirst, at, 0), b = texelFetch(uSecond, at, 0);
+  float s[32];
+  for (int i = 0; i < 32; ++i) s[i] = 0.0;
+  vec3 place;
+  if (uOnSpheres == 1) {
+    for (int c = 0; c < 3; ++c) s[9 * c] = (float(a.x >> (8 * c) & 255u) - 128.0) * uScale[c];
+    int column = (at.y * 2048 + at.x) / uLayers;
+    int texel = texelFetch(uPlaceOfColumn, ivec2(column & 2047, column >> 11), 0).x;
+    float longitude = (float(texel / uResolution) / float(uResolution) - 1.0) * 3.14159265358979324;
+    float latitude = (0.5 - float(texel % uResolution) / float(uResolution)) * 3.14159265358979324;
+    place = vec3(cos(latitude) * sin(longitude), sin(latitude), cos(latitude) * cos(longitude));
+  } else {
+    if (b.w >> 31 == 1u) {  // the empty voxel stays so
+      first = second = uvec4(0x80808080u);
+      return;
+    }
+    for (int i = 0; i < 27; ++i) s[i] = CodeIn(a, b, i) * uScale[i];
+    uvec3 p = uvec3(b.z >> 24 | (b.w & 31u) << 8, b.w >> 5 & 8191u, b.w >> 18 & 8191u);
+    place = (vec3(p) + (uOnSpheres == 2 ? 0.5 : 0.0)) * uPosition - 1.0;
+  }
+  for (int i = 0; i < 3; ++i) s[27 + i] = place[i] * uPositionScale;
+
+  vec4 h[16], n[16];
+  for (int o = 0; o < 16; ++o) {
+    vec4 x = bias[o];
+    for (int i = 0; i < 8; ++i) x += w0[8 * o + i] * vec4(s[4 * i], s[4 * i + 1], s[4 * i + 2], s[4 * i + 3]);
+    h[o] = Activate(x);
+  }
+  for (int o = 0; o < 16; ++o) {
+    vec4 x = bias[16 + o];
+    for (int i = 0; i < 16; ++i) x += w1[16 * o + i] * h[i];
+    n[o] = Activate(x);
+  }
+  for (int o = 0; o < 16; ++o) {
+    vec4 x = bias[32 + o];
+    for (int i = 0; i < 16; ++i) x += w2[16 * o + i] * n[i];
+    h[o] = Activate(x);
+  }
+  for (int o = 0; o < 16; ++o) {
+    vec4 x = bias[48 + o];
+    for (int i = 0; i < 16; ++i) x += w3[16 * o + i] * h[i];
+    n[o] = Activate(x);
+  }
+  for (int o = 0; o < 16; ++o) {
+    vec4 x = bias[64 + o];
+    for (int i = 0; i < 16; ++i) x += w4[16 * o + i] * n[i];
+    h[o] = Activate(x);
+  }
+  float r[28];
+  for (int o = 0; o < 7; ++o) {
+    vec4 x = bias[80 + o];
+    for (int i = 0; i < 16; ++i) x += w5[16 * o + i] * h[i];
+    for (int k = 0; k < 4; ++k) r[4 * o + k] = x[k];
+  }
+  for (int k = 0; k < 9; ++k) {
+    vec3 mapped = uBase * vec3(s[k], s[9 + k], s[18 + k]);
+    if (k == 0) mapped += uConstant;
+    for (int c = 0; c < 3; ++c) r[9 * c + k] += mapped[c];
+  }
+  if (uOnSpheres == 1) {
+    first = uvec4(Packed(vec4(r[0], r[9], r[18], 0.0) / vec4(uStyledScale[0], uStyledScale[1], uStyledScale[2], 1.0)), a.yzw);
+    second = uvec4(0u);
+    return;
+  }
+  uvec4 lowest = uvec4(0u), highest = uvec4(0u);
+  for (int i = 0; i < 7; ++i) {
+    vec4 code;
+    for (int k = 0; k < 4; ++k) code[k] = 4 * i + k < 27 ? r[4 * i + k] / uStyledScale[4 * i + k] : 0.0;
+    if (i < 4) lowest[i] = Packed(code); else highest[i - 4] = Packed(code);
+  }
+  first = lowest;
+  second = highest;
+}

@@ -1,0 +1,118 @@
+// A style: its network's weights, and the pass that sends each voxel through it.
+
+const LAYERS = [[30, 64], [64, 64], [64, 64], [64, 64], [64, 64], [64, 27]];
+
+// Of each layer: weights [inputs, outputs], outputs padded to a multiple of 4.
+async function loadWeights(id) {
+  const bytes = await bytesOf(id), half = new Uint16Array(bytes.buffer);
+  const expected = LAYERS.reduce((sum, [i, o]) => sum + o * (i + 1), 0);
+  if (half.length !== expected) throw new PageError('a part of the page is damaged: ' + id);
+  let next = 0;
+  return LAYERS.map(([inputs, outputs]) => {
+    const padded = 4 * Math.ceil(outputs / 4);
+    const layer = {inputs, outputs: padded, weight: new Float64Array(inputs * padded), bias: new Float64Array(padded)};
+    for (let o = 0; o < outputs; ++o)
+      for (let i = 0; i < inputs; ++i) layer.weight[i * padded + o] = fromHalf(half[next++]);
+    for (let o = 0; o < outputs; ++o) layer.bias[o] = fromHalf(half[next++]);
+    return layer;
+  });
+}
+
+// The layers as uniform blocks of 4 x 4 matrices, column by column, and one of biases.
+function buffersOf(gl, layers) {
+  const bias = new Float32Array(96 * 4), blocks = layers.map(({inputs, outputs, weight, bias: own}, l) => {
+    const across = Math.ceil(inputs / 4), block = new Float32Array(4 * across * outputs);
+    for (let i = 0; i < inputs; ++i)
+      for (let o = 0; o < outputs; ++o)
+        block[16 * ((o >> 2) * across + (i >> 2)) + 4 * (i & 3) + (o & 3)] = weight[i * outputs + o];
+    bias.set(own, 64 * l);
+    return block;
+  });
+  return [...blocks, bias].map((data) => {
+    const buffer = gl.createBuffer();
+    gl.bindBuffer(gl.UNIFORM_BUFFER, buffer);
+    gl.bufferData(gl.UNIFORM_BUFFER, data, gl.STATIC_DRAW);
+    return buffer;
+  });
+}
+
+// Colours of a style, to draw the scene with.
+async function styleColors(graphics, scene, style, id, progress) {
+  const gl = graphics.gl;
+  graphics.network ??= compile(gl, [[gl.VERTEX_SHADER, EVERY_PIXEL], [gl.FRAGMENT_SHADER, NETWORK_GLSL]]);
+  const p = graphics.network, layers = await loadWeights(id), buffers = buffersOf(gl, layers);
+  const names = ['Layer0', 'Layer1', 'Layer2', 'Layer3', 'Layer4', 'Layer5', 'Biases'];
+  const colors = {scale: style.scale, texelScale: style.sphere_scale ?? [1, 1, 1], background: style.background};
+  colors.first = graphics.blank('u4', scene.source.first.height);
+  colors.second = graphics.blank('u4', scene.source.first.height);
+  const framebuffer = gl.createFramebuffer();
+
+  // False if it would take long and `mayLeave` is set.
+  async function pass(targets, height, onSpheres, from, scale, styledScale, mayLeave) {
+    gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
+    const attached = targets.map((t, i) => {
+      gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0 + i, gl.TEXTURE_2D, t?.texture ?? null, 0);
+      return t ? gl.COLOR_ATTACHMENT0 + i : gl.NONE;
+    });
+    let second = 0;
+    for (let y = 0, rows = 1, strips = 0; y < height; ++strips) {
+      const begun = performance.now();
+      // The first strip compiles; the second says how long all would take.
+      if (strips === 2 && mayLeave && (begun - second) * height / 1000 > 5) return false;
+      if (strips === 1) second = begun;
+      gl.useProgram(p.program);
+      gl.bindVertexArray(graphics.array);
+      buffers.forEach((buffer, i) => {
+        gl.uniformBlockBinding(p.program, gl.getUniformBlockIndex(p.program, names[i]), i);
+        gl.bindBufferBase(gl.UNIFORM_BUFFER, i, buffer);
+      });
+      graphics.bind(p, 'uFirst', 0, from[0]);
+      graphics.bind(p, 'uSecond', 1, from[1]);
+      graphics.bind(p, 'uPlaceOfColumn', 2, scene.placeOfColumn ?? graphics.empty.i);
+      gl.uniform1fv(p.at('uScale'), scale);
+      gl.uniform1fv(p.at('uStyledScale'), styledScale);
+      gl.uniform3fv(p.at('uPosition'), scene.positionUnit);
+      gl.uniform3fv(p.at('uConstant'), style.constant);
+      gl.uniformMatrix3fv(p.at('uBase'), true, style.base);
+      gl.uniform1f(p.at('uOmega'), style.omega);
+      gl.uniform1f(p.at('uPositionScale'), style.position_scale);
+      gl.uniform1i(p.at('uActivation'), style.activation);
+      gl.uniform1i(p.at('uOnSpheres'), onSpheres);
+      gl.uniform1i(p.at('uLayers'), scene.header.spheres?.layers ?? 1);
+      gl.uniform1i(p.at('uResolution'), scene.header.spheres?.resolution ?? 1);
+      gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
+      gl.drawBuffers(attached);
+      gl.viewport(0, 0, WIDTH, height);
+      gl.enable(gl.SCISSOR_TEST);
+      gl.scissor(0, y, WIDTH, rows);
+      gl.drawArrays(gl.TRIANGLES, 0, 3);
+      gl.disable(gl.SCISSOR_TEST);
+      gl.finish();
+      gl.readBuffer(gl.COLOR_ATTACHMENT0);
+      gl.readPixels(0, y, 1, 1, gl.RGBA_INTEGER, gl.UNSIGNED_INT, new Uint32Array(4));
+      y += rows;
+      progress(Math.min(1, y / height));
+      const took = performance.now() - begun;
+      if (strips > 0) rows = Math.max(1, Math.min(256, took < 40 ? 2 * rows : took > 120 ? rows >> 1 : rows));
+      await wait();
+    }
+    return true;
+  }
+  const {source} = scene;
+  const fast = graphics.onCores !== true &&
+      await pass([colors.first, colors.second], source.first.height, scene.header.finest === null ? 2 : 0,
+                 [source.first, source.second], source.scale, style.scale, typeof Worker !== 'undefined');
+  if (!fast) {
+    graphics.onCores = true;
+    await restyleOnCores(graphics, scene, style, layers, colors, progress);
+  }
+  if (source.texel) {
+    colors.texel = graphics.blank('u2', source.texel.height);
+    const scales = (three) => Float32Array.from({length: 27}, (_, i) => i < 3 ? three[i] : 1);
+    await pass([colors.texel], source.texel.height, 1, [source.texel, source.texel],
+               scales(source.texelScale), scales(colors.texelScale), false);
+  }
+  gl.deleteFramebuffer(framebuffer);
+  buffers.forEach((buffer) => gl.deleteBuffer(buffer));
+  return colors;
+}

@@ -1,0 +1,57 @@
+// Keyframes of a film: places and weights of styles, interpolated as Catmull and Rom did;
+// pipeline/fields/path_file.h says what camera_path.json holds.
+
+const spline = (a, b, c, d, t) =>
+    b.map((_, i) => b[i] + 0.5 * t * (c[i] - a[i] + t * (2 * a[i] - 5 * b[i] + 4 * c[i] - d[i] +
+                                                        t * (3 * (b[i] - c[i]) + d[i] - a[i]))));
+
+class CameraPath {
+  constructor() { this.keyframes = []; }
+  get seconds() { return this.keyframes.length ? this.keyframes[this.keyframes.length - 1].time : 0; }
+  add(place, weights) {
+    this.keyframes.push({time: this.keyframes.length ? this.seconds + 2 : 0, ...place, weights});
+  }
+  remove(i) {
+    this.keyframes.splice(i, 1);
+    const first = this.keyframes[0]?.time ?? 0;
+    for (const key of this.keyframes) key.time -= first;
+  }
+  at(seconds) {
+    const keys = this.keyframes, last = keys.length - 1;
+    let i = 0;
+    while (i < last - 1 && keys[i + 1].time <= seconds) ++i;
+    const j = Math.min(i + 1, last), length = keys[j].time - keys[i].time;
+    const t = length > 0 ? Math.max(0, Math.min(1, (seconds - keys[i].time) / length)) : 0;
+    const four = [keys[Math.max(i - 1, 0)], keys[i], keys[j], keys[Math.min(j + 1, last)]];
+    const of = (name) => spline(...four.map((key) => key[name]), t);
+    const between = (name) => keys[i][name].map((v, k) => (1 - t) * v + t * keys[j][name][k]);
+    return {eye: of('eye'), forward: unit(of('forward')), up: unit(of('up')), half: between('half'),
+            weights: between('weights')};
+  }
+  text(styles) {
+    const round = (v) => v.map((x) => Number(x.toPrecision(8)));
+    return JSON.stringify({
+      format: 'regrade camera path', version: 1, styles,
+      keyframes: this.keyframes.map((k) => ({
+        time: k.time, eye: round(k.eye), forward: round(k.forward), up: round(k.up),
+        half_width: k.half[0], half_height: k.half[1], weights: round(k.weights)}))}, null, 1) + '\n';
+  }
+  read(text, styles) {
+    let json = null;
+    try { json = JSON.parse(text); } catch (error) { /* said below */ }
+    const three = (v) => Array.isArray(v) && v.length === 3 && v.every(Number.isFinite);
+    if (json?.format !== 'regrade camera path' || json.version !== 1 || !Array.isArray(json.keyframes) ||
+        json.keyframes.length > 1000)
+      throw new PageError('this file is no camera path');
+    let time = -1;
+    const keys = json.keyframes.map((k) => {
+      if (!three(k.eye) || !three(k.forward) || !three(k.up) || !(k.half_width > 0) ||
+          !(k.half_height > 0) || !(k.time > time) || !Array.isArray(k.weights))
+        throw new PageError('a keyframe of this camera path is damaged');
+      time = k.time;
+      const weights = Array.from({length: styles}, (_, i) => Math.max(0, Math.min(1, Number(k.weights[i]) || 0)));
+      return {time, eye: k.eye, forward: unit(k.forward), up: unit(k.up), half: [k.half_width, k.half_height], weights};
+    });
+    this.keyframes = keys;
+  }
+}

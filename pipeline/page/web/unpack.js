@@ -1,0 +1,108 @@
+// Bytes of the page to numbers of voxels; pipeline/page/value_codec.h says how they are packed.
+
+class PageError extends Error {}
+
+const wait = () => new Promise((done) => setTimeout(done, 0));
+
+async function bytesOf(id) {
+  const element = document.getElementById(id);
+  if (!element) throw new PageError('a part of the page is missing: ' + id);
+  let packed;
+  try {
+    const text = element.textContent;
+    if (Uint8Array.fromBase64) {
+      packed = Uint8Array.fromBase64(text);
+    } else {
+      const raw = atob(text);
+      packed = new Uint8Array(raw.length);
+      for (let i = 0; i < raw.length; ++i) packed[i] = raw.charCodeAt(i);
+    }
+    const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream('deflate'));
+    return new Uint8Array(await new Response(stream).arrayBuffer());
+  } catch (error) {
+    throw new PageError('a part of the page is damaged: ' + id);
+  }
+}
+
+function toHalf(value) {
+  toHalf.float[0] = Math.max(-65504, Math.min(65504, value));
+  const bits = toHalf.bits[0], sign = bits >>> 16 & 0x8000;
+  const exponent = (bits >>> 23 & 255) - 112, mantissa = bits & 0x7fffff;
+  if (exponent < -10) return sign;
+  const whole = exponent > 0 ? mantissa : (mantissa | 0x800000);
+  const shift = exponent > 0 ? 13 : 14 - exponent;
+  let half = (exponent > 0 ? exponent << 10 : 0) + (whole >>> shift);
+  const rest = whole & (1 << shift) - 1, middle = 1 << shift - 1;
+  if (rest > middle || rest === middle && half & 1) ++half;
+  return sign | half;
+}
+toHalf.float = new Float32Array(1);
+toHalf.bits = new Uint32Array(toHalf.float.buffer);
+
+function fromHalf(half) {
+  const sign = half & 0x8000 ? -1 : 1, exponent = half >> 10 & 31, mantissa = half & 1023;
+  return exponent === 0 ? sign * mantissa * 2 ** -24
+                        : sign * (1024 + mantissa) * 2 ** (exponent - 25);
+}
+
+// Numbers of one channel, see EQ(page-prediction); `earlier` has three entries a voxel.
+function channelNumbers(bytes, channel, earlier, into) {
+  const n = into.length, low = 2 * n * channel, high = low + n;
+  for (let i = 0; i < n; ++i) {
+    const folded = bytes[low + i] | bytes[high + i] << 8;
+    const a = earlier[3 * i], b = earlier[3 * i + 1], c = earlier[3 * i + 2];
+    let p = 0;
+    if (c >= 0) p = Math.floor((into[a] + into[b] + into[c]) / 3);
+    else if (b >= 0) p = into[a] + into[b] >> 1;
+    else if (a >= 0) p = into[a];
+    into[i] = p + (folded & 1 ? -(folded + 1 >> 1) : folded >> 1);
+  }
+}
+
+// Densities times a voxel's width, as halves.
+async function unpackDensity(id, earlier, widthOf) {
+  const bytes = await bytesOf(id), n = earlier.length / 3;
+  if (bytes.length !== 2 * n) throw new PageError('a part of the page is damaged: ' + id);
+  const number = new Int16Array(n), half = new Uint16Array(n);
+  channelNumbers(bytes, 0, earlier, number);
+  for (let i = 0; i < n; ++i) {
+    const q = number[i];
+    half[i] = toHalf(Math.sign(q) * q * q * 4e-4 / widthOf(i));
+  }
+  return half;
+}
+
+// Codes of 8 bits: put(voxel, channel, code).
+async function unpackColors(id, header, channels, earlier, put, progress) {
+  const bytes = await bytesOf(id), n = earlier.length / 3;
+  const {matrix, scale, step} = header;
+  if (bytes.length !== 2 * n * channels || matrix.length !== channels * channels ||
+      scale.length !== channels)
+    throw new PageError('a part of the page is damaged: ' + id);
+  const numbers = [];
+  for (let k = 0; k < channels; ++k) {
+    numbers.push(new Int16Array(n));
+    channelNumbers(bytes, k, earlier, numbers[k]);
+    if (k % 4 === 3) {
+      progress(0.5 * k / channels);
+      await wait();
+    }
+  }
+  const sum = new Float64Array(channels), slice = 1 << 16;
+  for (let begin = 0; begin < n; begin += slice) {
+    for (let i = begin; i < Math.min(n, begin + slice); ++i) {
+      sum.fill(0);
+      for (let k = 0; k < channels; ++k) {
+        const y = numbers[k][i] * step;
+        if (y === 0) continue;
+        for (let j = 0; j < channels; ++j) sum[j] += matrix[k * channels + j] * y;
+      }
+      for (let j = 0; j < channels; ++j) {
+        const code = Math.fround(sum[j]) / scale[j];
+        put(i, j, Math.floor(Math.max(-127, Math.min(127, code)) + 128.5));
+      }
+    }
+    progress(0.5 + 0.5 * begin / n);
+    await wait();
+  }
+}

@@ -1,0 +1,223 @@
+#!/usr/bin/env python3
+"""Opens scene pages in headless Chromium and compares their pictures with the program's own.
+
+  look_at_page.py FOLDER [--shots FOLDER] [--chromium PROGRAM]
+
+FOLDER is write_scene_pages's: pages NAME.html with views and pixels in NAME.json. Checked of each page: its pictures,
+nothing asked of the network, nothing on the console (a violation of the page's policy is an error there), no scrolling
+sideways at the sizes of a phone and a desktop, a name on each control; of the first one, that keys and the slider change
+the picture, that a lost graphics context comes back, and that damaged copies say so.
+--shots keeps pictures of the pages. Exit status 1 if anything is wrong, 77 if there is no Chromium.
+"""
+
+import argparse
+import base64
+import glob
+import json
+import math
+import os
+import re
+import shutil
+import sys
+import tempfile
+import time
+
+from look_at_report import NO_CHROMIUM, SIZES, Browser, Page
+
+# The shader's arithmetic is the program's in another order of sums: measured 70 dB and more, where one unit of 255
+# everywhere would be 48 dB. Styles go through another sine, and both round to codes: a code more or less is 1 / 127 of
+# the largest coefficient.
+SOURCE_DB, STYLED_DB, WITHIN_ONE = 55, 50, 0.999
+WAIT_S = 120
+
+
+def wait_until(page, expression):
+    end = time.monotonic() + WAIT_S
+    while not page.value(expression):
+        if time.monotonic() > end:
+            raise RuntimeError("waited in vain for " + expression)
+        time.sleep(0.1)
+
+
+def open_page(browser, path, size):
+    page = Page(browser, path, size)
+    wait_until(page, "!!globalThis.regradePage && (!!regradePage.picture || /cannot/.test(message.textContent))")
+    return page
+
+
+def complaints(page):
+    # Reading pixels back is slow on purpose here.
+    return [c for c in page.complaints() if "GPU stall due to ReadPixels" not in c]
+
+
+def pixels_of(page, view):
+    text = page.value("(async () => { const p = await regradePage.picture(" + json.dumps(view) + ");"
+                      "let s = ''; for (const b of p) s += String.fromCharCode(b); return btoa(s) })()")
+    data, width, height = base64.b64decode(text), view["width"], view["height"]
+    rows = [data[4 * width * y:4 * width * (y + 1)] for y in reversed(range(height))]
+    return bytes(b for row in rows for i, b in enumerate(row) if i % 4 < 3)
+
+
+def compare_pictures(page, views):
+    found, worst = [], {}
+    for i, view in enumerate(views):
+        want = base64.b64decode(view["pixels"])
+        got = pixels_of(page, {key: value for key, value in view.items() if key != "pixels"})
+        error = sum((a - b) ** 2 for a, b in zip(got, want)) / len(want)
+        decibels = 99 if error == 0 else 10 * math.log10(255 ** 2 / error)
+        near = sum(abs(a - b) <= 1 for a, b in zip(got, want)) / len(want)
+        styled = view["weights"][0] > 0
+        worst[styled] = min(worst.get(styled, (99, 1)), (decibels, near))
+        if decibels < (STYLED_DB if styled else SOURCE_DB) or (not styled and near < WITHIN_ONE):
+            found.append(f"view {i}: {decibels:.1f} dB from the program's picture, {100 * near:.2f} % within 1 of 255")
+    for styled, (decibels, near) in worst.items():
+        print(f"  {'styled' if styled else 'source'}: worst {decibels:.1f} dB, {100 * near:.2f} % within 1 of 255")
+    return found
+
+
+def check_controls(page, width):
+    found = []
+    wide = page.value("document.documentElement.scrollWidth")
+    if wide > width:
+        found.append(f"scrolls sideways: {wide} pixels wide at {width}")
+    nameless = page.value("[...document.querySelectorAll('button,input,select,canvas')].filter(e => !(e.ariaLabel || "
+                          "e.getAttribute('aria-label') || e.textContent.trim() || e.labels?.length)).map(e => "
+                          "e.outerHTML.slice(0, 80)).join(' ')")
+    if nameless:
+        found.append("controls without a name: " + nameless)
+    outside = page.value("[...document.querySelectorAll('#tools button,#styles input')].filter(e => { const r = "
+                         "e.getBoundingClientRect(); return r.width && (r.left < 0 || r.right > innerWidth + 1 || "
+                         "r.top < 0 || r.bottom > innerHeight + 1) }).length")
+    if outside:
+        found.append(f"{outside} controls are outside the window")
+    return found
+
+
+def check_input(page):
+    """Keys move the view, the slider mixes, and the view stays within its fence."""
+    found = []
+    where = "JSON.stringify([regradePage.view.eye, regradePage.view.forward])"
+    for key in ["ArrowRight", "w", "d", "+"]:
+        before = page.value(where)
+        page.call("Input.dispatchKeyEvent", type="keyDown", key=key)
+        time.sleep(0.5)
+        page.call("Input.dispatchKeyEvent", type="keyUp", key=key)
+        wait_until(page, "regradePage.painter.changed === false")
+        if page.value(where) == before:
+            found.append(f"the key {key} does not move the view")
+    page.call("Input.dispatchKeyEvent", type="keyDown", key="h")
+    page.call("Input.dispatchKeyEvent", type="keyUp", key="h")
+    page.value("style0.value = 25; style0.dispatchEvent(new Event('input'))")
+    if page.value("regradePage.weights()[0]") != 0.25:
+        found.append("the slider does not set the style's weight")
+    away = page.value("(() => { for (let i = 0; i < 99; ++i) regradePage.view.move(9, 0, 9); return "
+                      "regradePage.view.eye.every((v, a) => v >= regradePage.view.fence[0][a] && v <= "
+                      "regradePage.view.fence[1][a]) })()")
+    if not away:
+        found.append("the view leaves its fence")
+    path = page.value("(() => { add_key.click(); home.click(); add_key.click(); const t = regradePage.path.text(['a']);"
+                      "regradePage.path.read(t, 1); return regradePage.path.text(['a']) === t && "
+                      "regradePage.path.keyframes.length === 2 })()")
+    if not path:
+        found.append("a camera path does not come back from its text")
+    return found
+
+
+def check_lost_context(page):
+    page.value("(() => { const c = canvas.getContext('webgl2').getExtension('WEBGL_lose_context'); "
+               "regradePage.picture = null; c.loseContext(); setTimeout(() => c.restoreContext(), 300) })()")
+    wait_until(page, "!!regradePage.picture")
+    return []
+
+
+def check_cores(browser, path, views):
+    """Styles made by workers, as where the graphics processor is slow."""
+    page = open_page(browser, path, SIZES["phone"])
+    page.value("location.hash = '#cores'")
+    page.call("Page.reload")
+    time.sleep(1)
+    wait_until(page, "!!globalThis.regradePage && !!regradePage.picture")
+    found = compare_pictures(page, [view for view in views if view["weights"][0] == 1]) + complaints(page)
+    page.close()
+    return ["styled on cores: " + complaint for complaint in found]
+
+
+def check_damaged(browser, path, folder):
+    """Copies with a missing part, other bytes and no scene say so, and throw nothing."""
+    found = []
+    with open(path, encoding="utf-8") as file:
+        text = file.read()
+    part = r'(id="color">)([^<]{40})'
+    for name, damaged in {
+            "missing": re.sub(r'<script type="application/octet-stream" id="density">[^<]*</script>', "", text),
+            "bytes": re.sub(part, lambda m: m[1] + m[2][:20] + m[2][:20], text),
+            "base64": re.sub(part, lambda m: m[1] + "!!!" + m[2], text),
+            "header": text.replace('"resolution":[', '"resolution":["x",', 1),
+            "json": re.sub(r'(id="scene">)\{', r"\1", text)}.items():
+        copy = os.path.join(folder, "damaged_" + name + ".html")
+        with open(copy, "w", encoding="utf-8") as file:
+            file.write(damaged)
+        page = Page(browser, copy, SIZES["phone"])
+        try:
+            wait_until(page, "/cannot be shown: ./.test(message.textContent)")
+        except RuntimeError:
+            found.append(f"a page with damaged {name} says '{page.value('message.textContent')}'")
+        found += [f"a page with damaged {name}: {c}" for c in complaints(page)]
+        page.close()
+    return found
+
+
+def check_folder(browser, arguments, scratch):
+    found = []
+    for number, path in enumerate(sorted(glob.glob(os.path.join(arguments.folder, "*.html")))):
+        name = os.path.basename(path)[:-5]
+        print(name)
+        with open(path[:-5] + ".json", encoding="utf-8") as file:
+            views = json.load(file)
+        for size_name, size in SIZES.items() if number == 0 else [("phone", SIZES["phone"])]:
+            page = open_page(browser, path, size)
+            here = check_controls(page, size[0])
+            if size_name == "phone":
+                here += compare_pictures(page, views)
+            elif number == 0:
+                here += check_input(page) + check_lost_context(page)
+            if arguments.shots:
+                wait_until(page, "regradePage.painter.settled")
+                page.shot(os.path.join(arguments.shots, f"{name}_{size_name}.png"))
+            here += complaints(page)
+            found += [f"{name}, {size_name}: {complaint}" for complaint in here]
+            page.close()
+        if number == 0 or name == "uniform_near":
+            found += [f"{name}, {c}" for c in check_cores(browser, path, views)]
+        if number == 0:
+            found += check_damaged(browser, path, scratch)
+    return found
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", help="folder with pages and their views")
+    parser.add_argument("--shots", help="folder for screenshots of the pages")
+    parser.add_argument("--chromium", default=shutil.which("chromium") or shutil.which("chromium-browser"))
+    arguments = parser.parse_args()
+    if not arguments.chromium:
+        print("skipped: Chromium is not installed (Debian package chromium)")
+        return NO_CHROMIUM
+    if not glob.glob(os.path.join(arguments.folder, "*.html")):
+        parser.error(arguments.folder + " has no pages")
+    if arguments.shots:
+        os.makedirs(arguments.shots, exist_ok=True)
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as scratch:
+        browser = Browser(arguments.chromium, os.path.join(scratch, "profile"))
+        try:
+            found = check_folder(browser, arguments, scratch)
+        finally:
+            browser.close()
+    for complaint in found:
+        print(complaint)
+    print(f"look_at_page: {len(found)} findings")
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

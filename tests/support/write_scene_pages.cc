@@ -1,0 +1,134 @@
+// Writes small pages of every kind of field, and what this program renders of them:
+// write_scene_pages FOLDER. For tests that open them in a browser.
+//
+// FOLDER/NAME.html, and FOLDER/NAME.json: views with the page's lens, place and weights, and
+// their pixels, RGB of 8 bits in base64, of the field and the style as the page has them.
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+
+#include "kernels/field/cpu/render_view.h"
+#include "kernels/field/pad_sh_basis.h"
+#include "pipeline/files/atomic_file.h"
+#include "pipeline/images/image_file.h"
+#include "pipeline/page/page_file.h"
+#include "pipeline/report/html_text.h"
+#include "stylize/field/blend_fields.h"
+#include "stylize/training/initial_network.h"
+#include "tests/support/cell_field.h"
+
+namespace regrade {
+namespace {
+
+constexpr int kWidth = 48, kHeight = 36;
+
+Camera LookingAt(const Vec3d& eye, const Vec3d& at, double focal) {
+  Camera camera;
+  camera.width = kWidth, camera.height = kHeight;
+  camera.fx = camera.fy = focal;
+  camera.cx = kWidth / 2.0, camera.cy = kHeight / 2.0;
+  const Vec3d ahead = Normalized(at - eye), right = Normalized(Cross(ahead, {0, 0, 1}));
+  camera.camera_from_world.rotation.row[0] = right;
+  camera.camera_from_world.rotation.row[1] = Cross(ahead, right);
+  camera.camera_from_world.rotation.row[2] = ahead;
+  camera.camera_from_world.translation = -(camera.camera_from_world.rotation * eye);
+  return camera;
+}
+
+// Around the box of SmallFrame, and one inside it; or in front of it, in device coordinates.
+std::vector<Camera> CamerasOf(bool forward_facing) {
+  std::vector<Camera> cameras;
+  if (forward_facing)
+    for (const double x : {-0.2, 0.0, 0.3}) {
+      Camera camera = LookingAt({x, 0, 0}, {0, 0.1, 3}, 40);
+      camera.camera_from_world.rotation = {};
+      camera.camera_from_world.translation = {-x, 0.1, 0};
+      camera.ndc = {2 * 40.0 / kWidth, 2 * 40.0 / kHeight};
+      cameras.push_back(camera);
+    }
+  else
+    cameras = {LookingAt({2.4, 0.3, 0.5}, {0.1, -0.2, 0}, 50),
+               LookingAt({-1.9, 1.5, 0.9}, {0, -0.1, 0.1}, 60),
+               LookingAt({0.3, -0.3, 0.1}, {-0.4, 0.5, 0.3}, 30)};
+  return cameras;
+}
+
+StoredNetwork Style() {
+  StoredNetwork style;
+  style.network.data().sh_scale = 0.5f;
+  style.network.data().omega = 1;
+  InitializeAsPyTorch(7, &style.network);
+  style.network.data().has_base = true;
+  style.network.data().base.matrix.row[0] = {0.3, 0.6, 0.1};
+  style.network.data().base.offset = {0.05, 0.1, -0.05};
+  style.background = {0.1f, 0.2f, 0.5f};
+  return style;
+}
+
+std::string Pixels(const Image& image) {
+  std::string bytes;
+  for (const float value : image.pixels)
+    bytes += static_cast<char>(static_cast<int>(std::floor(value * 255 + 0.5f)));
+  return Base64(bytes);
+}
+
+JsonValue ViewJson(const Camera& camera, double weight, const RadianceField& field) {
+  JsonValue::Array rotation, eye;
+  const Mat3d from_camera = camera.camera_from_world.rotation.Transposed();
+  for (const Vec3d& row : from_camera.row)
+    for (int a = 0; a < 3; ++a) rotation.push_back(row[a]);
+  for (int a = 0; a < 3; ++a) eye.push_back(camera.Center()[a]);
+  return JsonValue::Object{
+      {"rotation", std::move(rotation)},
+      {"eye", std::move(eye)},
+      {"lens", JsonValue::Array{camera.fx, camera.fy, camera.cx, camera.cy}},
+      {"width", camera.width},
+      {"height", camera.height},
+      {"weights", JsonValue::Array{weight}},
+      {"pixels", Pixels(RenderView(field, camera, MarchOptions{field.step}).color)}};
+}
+
+void WritePages(const std::string& folder, const std::string& name, const RadianceField& field,
+                bool forward_facing) {
+  PageContent content;
+  content.cameras = CamerasOf(forward_facing);
+  content.field = EncodeField(field, 0.03);
+  RadianceField page = DecodeField(content.field);
+  content.styles = {EncodeStyle(Style(), page, 0.5)};
+  const Image picture(8, 6, 3);
+  content.poster = EncodeJpeg(picture, 80);
+  content.style_pictures = {content.poster};
+  content.photos = {{0, content.poster}, {1, content.poster}};
+  JsonValue::Array views;
+  page.appearance = PadShBasis(std::move(page.appearance), 9);
+  const RadianceField& styled = content.styles[0].styled;
+  for (const double weight : {0.0, 0.5, 1.0})
+    for (const Camera& camera : content.cameras)
+      views.push_back(ViewJson(camera, weight, MixFields(page, {&styled}, {weight})));
+  const PageCheck check{48, 50, 3};
+  WriteFileAtomically(folder + "/" + name + ".html", PageHtml(content, &check));
+  WriteJsonFile(folder + "/" + name + ".json", JsonValue(std::move(views)));
+}
+
+}  // namespace
+}  // namespace regrade
+
+int main(int argc, char** argv) {
+  using namespace regrade;
+  if (argc != 2) {
+    std::fprintf(stderr, "usage: write_scene_pages FOLDER\n");
+    return 2;
+  }
+  const std::string folder = argv[1];
+  std::filesystem::create_directories(folder);
+  WritePages(folder, "levels", testing::RandomCellField({2, 3, 2}, 3, 9, 5), false);
+  WritePages(folder, "levels_near", testing::RandomCellField({2, 2, 2}, 2, 4, 6), true);
+  RadianceField uniform = testing::RandomField({13, 17, 9}, 1, 0.5, 6);
+  uniform.near_clip = 0.2f;
+  WritePages(folder, "uniform", uniform, false);
+  WritePages(folder, "uniform_near", testing::RandomField({12, 11, 10}, 9, 0.7, 8), true);
+  RadianceField far = testing::RandomField({9, 8, 11}, 9, 0.3, 7);
+  testing::AddSpheres(5, 12, 0.7, 8, &far);
+  WritePages(folder, "spheres", far, false);
+  return 0;
+}
