@@ -56,7 +56,8 @@ std::vector<Camera> CheckedViews(const std::vector<Camera>& photos, int longest)
   cameras.push_back(Placed(first, {}, here + first.Forward() * (0.3 * Norm(mean - here))));
   cameras.push_back(Placed(first, Turn({0, 1, 0}, {-1, 0, 0}, {0, 0, 1}), here));
   for (Camera& camera : cameras) {
-    const double scale = std::min(1.0, double{longest} / std::max(camera.width, camera.height));
+    const double scale =
+        std::min(1.0, static_cast<double>(longest) / std::max(camera.width, camera.height));
     camera = camera.Resized(std::max(1, static_cast<int>(camera.width * scale)),
                             std::max(1, static_cast<int>(camera.height * scale)));
   }
