@@ -1,5 +1,5 @@
-// Keyframes of a film: places and weights of styles, interpolated as Catmull and Rom did;
-// pipeline/fields/path_file.h says what camera_path.json holds.
+// Keyframes of a film: places and weights of styles, interpolated as Catmull and Rom did.
+// camera_path.json has places in the field's frame, times in seconds, and a weight for each style.
 
 const spline = (a, b, c, d, t) =>
     b.map((_, i) => b[i] + 0.5 * t * (c[i] - a[i] + t * (2 * a[i] - 5 * b[i] + 4 * c[i] - d[i] +
