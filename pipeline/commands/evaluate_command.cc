@@ -24,7 +24,7 @@ namespace regrade {
 namespace {
 
 struct FramesOptions {
-  std::string frames, reference, target, style, out, protocol;
+  std::string frames, reference, target, style, out, protocol, table = "text";
 
   template <typename Bind>
   void Describe(Bind& bind) {
@@ -42,6 +42,9 @@ struct FramesOptions {
          {.help = "a published protocol by name, also for runs: sets --mode and --gaps and "
                   "refuses others; geometry only for runs; evaluate/PROTOCOLS.md defines each",
           .choices = ProtocolChoices()});
+    bind("table", table,
+         {.help = "form of the printed tables; latex needs the package booktabs",
+          .choices = kTableForms});
     bind("out", out,
          {.help = "folder for report.html, report.json and heatmaps/ of the worst pairs"});
   }
@@ -120,7 +123,7 @@ void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& optio
   const EvaluationMetrics metrics = MetricsOf(consistency, fidelity, heat_maps);
   if (workspace) WriteEvaluation(*workspace, metrics, seconds);
   console->Event("evaluation", MetricsToJson(metrics));
-  console->Lines(FormatTables(consistency, fidelity));
+  console->Lines(FormatTables(consistency, fidelity, frames.table));
 }
 
 }  // namespace
