@@ -38,7 +38,81 @@ std::string Align(const std::vector<Cells>& rows) {
   return text;
 }
 
-std::string ConsistencyTable(const ConsistencyReport& report) {
+// The cells between a start, separators and an end.
+std::string Joined(const Cells& row, const char* start, const char* between, const char* end) {
+  std::string line = start;
+  for (size_t c = 0; c < row.size(); ++c) line += (c > 0 ? between : "") + row[c];
+  return line + end;
+}
+
+std::string Markdown(const std::vector<Cells>& rows) {
+  std::string text = Joined(rows.front(), "| ", " | ", " |\n");
+  text += "|---";
+  for (size_t c = 1; c < rows.front().size(); ++c) text += "|---:";
+  text += "|\n";
+  for (size_t r = 1; r < rows.size(); ++r) text += Joined(rows[r], "| ", " | ", " |\n");
+  return text;
+}
+
+// Cells in quotes where RFC 4180 demands them.
+std::string Csv(const std::vector<Cells>& rows) {
+  std::string text;
+  for (Cells row : rows) {
+    for (std::string& cell : row) {
+      if (cell.find_first_of(",\"\n") == std::string::npos) continue;
+      std::string quoted = "\"";
+      for (const char c : cell) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+      cell = quoted + "\"";
+    }
+    text += Joined(row, "", ",", "\n");
+  }
+  return text;
+}
+
+// A tabular with the lines of the package booktabs.
+std::string Latex(const std::vector<Cells>& rows) {
+  std::string text =
+      "\\begin{tabular}{l" + std::string(rows.front().size() - 1, 'r') + "}\n\\toprule\n";
+  for (size_t r = 0; r < rows.size(); ++r) {
+    Cells row = rows[r];
+    for (std::string& cell : row) {
+      std::string escaped;
+      for (const char c : cell) {
+        if (std::string("%_&#$").find(c) != std::string::npos) escaped += '\\';
+        escaped += c;
+      }
+      cell = escaped;
+    }
+    text += Joined(row, "", " & ", " \\\\\n");
+    if (r == 0) text += "\\midrule\n";
+  }
+  return text + "\\bottomrule\n\\end{tabular}\n";
+}
+
+// Every line as a comment.
+std::string Commented(const std::string& text, const std::string& sign) {
+  std::string result;
+  for (size_t at = 0; at < text.size();) {
+    const size_t end = std::min(text.find('\n', at), text.size());
+    result += sign + text.substr(at, end - at) + "\n";
+    at = end + 1;
+  }
+  return result;
+}
+
+std::string Table(const std::string& title, const std::vector<Cells>& rows,
+                  const std::string& remarks, const std::string& form) {
+  if (form == "text") return title + "\n" + Align(rows) + remarks;
+  if (form == "markdown") {
+    return title + "\n\n" + Markdown(rows) + (remarks.empty() ? "" : "\n" + remarks);
+  }
+  if (form == "csv") return Commented(title, "# ") + Csv(rows) + Commented(remarks, "# ");
+  if (form == "latex") return Commented(title, "% ") + Latex(rows) + Commented(remarks, "% ");
+  throw UsageError("there is no table form '" + form + "'", "--table",
+                   std::string("use one of ") + kTableForms);
+}
+
+std::string ConsistencyTable(const ConsistencyReport& report, const std::string& form) {
   std::vector<Cells> rows{{"sequence", "gap", "pairs", "undefined", "mean of dB", "95 %",
                            "dB of mean", "compared"}};
   std::string remarks;
@@ -59,15 +133,15 @@ std::string ConsistencyTable(const ConsistencyReport& report) {
       remarks += Concat(prefix, row.pairs_above_8bit_floor - row.perfect_pairs,
                         " pair(s) above 58.9 dB, beyond the precision of 8-bit frames\n");
   }
-  return "Consistency: TC-PSNR, higher is better (mode " + report.mode + ", flow " +
-         report.flow +
-         ", error per pixel and channel; 95 %: block bootstrap of the mean of dB, runs of "
-         "the gap's length)\n" +
-         Align(rows) + remarks;
+  return Table(
+      "Consistency: TC-PSNR, higher is better (mode " + report.mode + ", flow " + report.flow +
+          ", error per pixel and channel; 95 %: block bootstrap of the mean of dB, runs of "
+          "the gap's length)",
+      rows, remarks, form);
 }
 
 std::string FidelityTable(const ConsistencyReport& consistency,
-                          const std::vector<FidelityRow>& fidelity) {
+                          const std::vector<FidelityRow>& fidelity, const std::string& form) {
   std::vector<Cells> rows{
       {"sequence", "PSNR to 2D", "hue std", "of 2D", "chroma", "of 2D", "SW to style"}};
   const bool lpips = std::ranges::any_of(
@@ -98,15 +172,16 @@ std::string FidelityTable(const ConsistencyReport& consistency,
         ": fidelity was not measured; high consistency may come from lost colours; give the 2D "
         "method's frames and the style picture\n";
   }
-  return "Fidelity: closeness to the 2D method's frames and to the style's colours\n" +
-         Align(rows) + remarks;
+  return Table("Fidelity: closeness to the 2D method's frames and to the style's colours", rows,
+               remarks, form);
 }
 
 }  // namespace
 
 std::string FormatTables(const ConsistencyReport& consistency,
-                         const std::vector<FidelityRow>& fidelity) {
-  return ConsistencyTable(consistency) + "\n" + FidelityTable(consistency, fidelity);
+                         const std::vector<FidelityRow>& fidelity, const std::string& form) {
+  return ConsistencyTable(consistency, form) + "\n" +
+         FidelityTable(consistency, fidelity, form);
 }
 
 }  // namespace regrade

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "evaluate/pair_network.h"
+#include "evaluate/protocols.h"
 #include "evaluate/tables.h"
 #include "kernels/base/error.h"
 #include "pipeline/commands/continue_command.h"
@@ -23,7 +24,7 @@ namespace regrade {
 namespace {
 
 struct FramesOptions {
-  std::string frames, reference, target, style, out;
+  std::string frames, reference, target, style, out, protocol, table = "text";
 
   template <typename Bind>
   void Describe(Bind& bind) {
@@ -36,6 +37,14 @@ struct FramesOptions {
     bind("target", target,
          {.help = "folder with the 2D method's version of each frame, for fidelity"});
     bind("style", style, {.help = "style picture, for fidelity"});
+    // Stands for other options, which ExpandProtocol() puts in its place.
+    bind("protocol", protocol,
+         {.help = "a published protocol by name, also for runs: sets --mode and --gaps and "
+                  "refuses others; geometry only for runs; evaluate/PROTOCOLS.md defines each",
+          .choices = ProtocolChoices()});
+    bind("table", table,
+         {.help = "form of the printed tables; latex needs the package booktabs",
+          .choices = kTableForms});
     bind("out", out,
          {.help = "folder for report.html, report.json and heatmaps/ of the worst pairs"});
   }
@@ -114,12 +123,13 @@ void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& optio
   const EvaluationMetrics metrics = MetricsOf(consistency, fidelity, heat_maps);
   if (workspace) WriteEvaluation(*workspace, metrics, seconds);
   console->Event("evaluation", MetricsToJson(metrics));
-  console->Lines(FormatTables(consistency, fidelity));
+  console->Lines(FormatTables(consistency, fidelity, frames.table));
 }
 
 }  // namespace
 
-void RunEvaluate(const Command& command, const Arguments& arguments, Console* console) {
+void RunEvaluate(const Command& command, const Arguments& words, Console* console) {
+  const Arguments arguments = ExpandProtocol(words);
   FramesOptions frames;
   ConsistencyOptions consistency;
   ProgramOptions program;

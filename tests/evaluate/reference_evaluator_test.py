@@ -22,7 +22,14 @@ except ImportError:
     sys.exit(77)
 
 WIDTH, HEIGHT, FRAMES = 61, 47, 7
-GAPS = (1, 3)
+GAPS = (1, 3, 5)
+# Options of the program, and mode and gaps that they stand for: spelled out here, so that a wrong table in the program
+# shows.
+CASES = ((("--mode", "lai2018", "--gaps", "1,3"), "lai2018", "1,3"),
+         (("--mode", "ruder2016", "--gaps", "1,3"), "ruder2016", "1,3"),
+         (("--protocol", "liprf"), "ruder2016", "1,5"),
+         (("--protocol", "lai2018"), "lai2018", "1"),
+         (("--protocol", "ruder2016"), "ruder2016", "1"))
 TOLERANCE_DB = 1e-4  # frames and flow are identical: only the order of sums differs
 REFERENCE = os.path.join(os.path.dirname(os.path.abspath(__file__)), "reference_evaluator.py")
 
@@ -90,11 +97,11 @@ def run(command):
     return done.stdout
 
 
-def complaints_of(regrade, work, mode):
-    gaps = ",".join(map(str, GAPS))
-    out = os.path.join(work, "out_" + mode)
+def complaints_of(regrade, work, options, mode, gaps):
+    case = " ".join(options)
+    out = os.path.join(work, "out")
     run([regrade, "evaluate", "--frames", os.path.join(work, "styled"), "--reference", os.path.join(work, "source"),
-         "--flow", "files:" + os.path.join(work, "flow"), "--mode", mode, "--gaps", gaps, "--out", out])
+         "--flow", "files:" + os.path.join(work, "flow"), *options, "--out", out])
     with open(os.path.join(out, "report.json"), encoding="utf-8") as file:
         pairs = json.load(file)["consistency_pairs"]
     complaints, compared, worst = [], 0, 0.0
@@ -103,7 +110,7 @@ def complaints_of(regrade, work, mode):
                                    os.path.join(work, "flow"), "--mode", mode, "--gaps", gaps]))["pairs"]
         ours = {(p["from"], p["to"]): p for p in pairs if p["sequence"] == sequence}
         if len(ours) != len(expected):
-            complaints.append(f"{mode}, {sequence}: {len(ours)} pairs, the reference has {len(expected)}")
+            complaints.append(f"{case}, {sequence}: {len(ours)} pairs, the reference has {len(expected)}")
         for want in expected:
             have = ours.get((want["from"], want["to"]), {})
             a, b = have.get("tc_psnr_db"), want["tc_psnr_db"]
@@ -111,11 +118,11 @@ def complaints_of(regrade, work, mode):
             coverage_difference = abs(have.get("coverage", -1) - want["coverage"])
             compared, worst = compared + (b is not None), max(worst, apart)
             if apart > TOLERANCE_DB or coverage_difference > 1e-6:
-                complaints.append(f"{mode}, {sequence}, {want['from']} to {want['to']}: {a} dB of "
+                complaints.append(f"{case}, {sequence}, {want['from']} to {want['to']}: {a} dB of "
                                   f"{have.get('coverage')}, the reference {b} dB of {want['coverage']}")
-    print(f"{mode}: {compared} pairs with a metric, maximum difference {worst:.2e} dB")
+    print(f"{case}: {compared} pairs with a metric, maximum difference {worst:.2e} dB")
     if compared != 2 * (len(expected) - 1):
-        complaints.append(f"{mode}: {compared} pairs have a metric; one of each sequence must be undefined")
+        complaints.append(f"{case}: {compared} pairs have a metric; one of each sequence must be undefined")
     return complaints
 
 
@@ -126,7 +133,7 @@ def main():
         make_frames(os.path.join(work, "source"), random, 0.01)
         make_frames(os.path.join(work, "styled"), random, 0.05)
         make_flow(os.path.join(work, "flow"), random)
-        complaints = [line for mode in ("lai2018", "ruder2016") for line in complaints_of(regrade, work, mode)]
+        complaints = [line for case in CASES for line in complaints_of(regrade, work, *case)]
     print("\n".join(complaints))
     return 1 if complaints else 0
 

@@ -36,6 +36,25 @@ bool Has(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
 
+TEST(Tables, FormsForPasting) {
+  const std::string markdown = FormatTables(SomeReport(), {}, "markdown");
+  EXPECT_TRUE(Has(markdown, "\n| sequence | gap | pairs |")) << markdown;
+  EXPECT_TRUE(Has(markdown, "| styled | 1 | 49 | 2 | 31.23 | 30.88..31.50 | inf | 81.2 % |"));
+  const std::string csv = FormatTables(SomeReport(), {}, "csv");
+  EXPECT_TRUE(Has(csv, "\nstyled,1,49,2,31.23,30.88..31.50,inf,81.2 %\n")) << csv;
+  EXPECT_TRUE(Has(csv, "\n# styled, gap 5: no pair"));
+  const std::string latex = FormatTables(SomeReport(), {}, "latex");
+  EXPECT_TRUE(Has(latex, "styled & 1 & 49 & 2 & 31.23 & 30.88..31.50 & inf & 81.2 \\% \\\\\n"))
+      << latex;
+  EXPECT_TRUE(Has(latex, "\\begin{tabular}{lrrrrrrr}\n\\toprule\n"));
+}
+
+TEST(Tables, ASequenceWithACommaIsQuotedInCsv) {
+  ConsistencyReport report = SomeReport();
+  report.rows[0].sequence = "mine, \"new\"";
+  EXPECT_TRUE(Has(FormatTables(report, {}, "csv"), "\n\"mine, \"\"new\"\"\",1,49"));
+}
+
 TEST(Tables, MetricsUndefinedOnesAndInfinity) {
   FidelityRow fidelity;
   fidelity.sequence = "styled";

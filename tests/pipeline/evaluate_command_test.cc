@@ -160,6 +160,29 @@ TEST(EvaluateCommand, H121_OneFrameIsNoPair) {
   EXPECT_TRUE(json.At("consistency_pairs").AsArray().empty());
 }
 
+TEST(EvaluateCommand, AProtocolSetsModeAndGaps) {
+  const TemporaryFolder folder;
+  WriteFrames(folder / "source", 6);
+  WriteFrames(folder / "styled", 6, 0.03f);
+  const auto evaluate = [&](const std::vector<std::string>& more, const std::string& out) {
+    std::vector<std::string> words{"--frames",        folder / "styled", "--reference",
+                                   folder / "source", "--out",           folder / out};
+    words.insert(words.end(), more.begin(), more.end());
+    return Evaluate(words);
+  };
+  const Outcome named = evaluate({"--protocol", "liprf"}, "named");
+  ASSERT_EQ(named.code, 0) << named.text;
+  EXPECT_OUTPUT(named, "mode ruder2016");
+  const Outcome spelled = evaluate({"--mode", "ruder2016", "--gaps", "1,5"}, "spelled");
+  ASSERT_EQ(spelled.code, 0) << spelled.text;
+  EXPECT_EQ(testing::ReadText(folder / "named/report.json"),
+            testing::ReadText(folder / "spelled/report.json"));
+  const Outcome refused = evaluate({"--protocol", "liprf", "--gaps", "1,7"}, "refused");
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_OUTPUT(refused, "leave out --gaps");
+  EXPECT_FALSE(std::filesystem::exists(folder / "refused"));
+}
+
 TEST(EvaluateCommand, UnusableFlowFilesAreNamed) {
   const TemporaryFolder folder;
   WriteFrames(folder / "styled", 2);

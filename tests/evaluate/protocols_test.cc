@@ -1,0 +1,52 @@
+#include "evaluate/protocols.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/expect_error.h"
+
+namespace regrade {
+namespace {
+
+using Words = std::vector<std::string>;
+
+TEST(Protocols, StandForTheirFlags) {
+  EXPECT_EQ(ExpandProtocol({"--frames", "a", "--protocol", "liprf"}),
+            (Words{"--mode=ruder2016", "--gaps=1,5", "--frames", "a"}));
+  EXPECT_EQ(ExpandProtocol({"--protocol=ruder2016", "--flow", "dis-fast"}),
+            (Words{"--mode=ruder2016", "--gaps=1", "--flow", "dis-fast"}));
+  EXPECT_EQ(ExpandProtocol({"dir", "--protocol", "geometry"}),
+            (Words{"--mode=geometry", "--gaps=1,5", "dir"}));
+}
+
+TEST(Protocols, WithoutOneTheWordsStay) {
+  const Words words{"--frames", "a", "--gaps", "3"};
+  EXPECT_EQ(ExpandProtocol(words), words);
+  const Words after_the_flags{"--frames", "a", "--", "--protocol", "liprf"};
+  EXPECT_EQ(ExpandProtocol(after_the_flags), after_the_flags);
+}
+
+TEST(Protocols, AFlagThatAgreesIsGivenOnce) {
+  EXPECT_EQ(ExpandProtocol({"--protocol", "lai2018", "--gaps", "1"}),
+            (Words{"--mode=lai2018", "--gaps", "1"}));
+}
+
+TEST(Protocols, AFlagThatContradictsIsRefused) {
+  EXPECT_REGRADE_ERROR(ExpandProtocol(Words({"--protocol", "liprf", "--gaps", "1,7"})),
+                       ExitCode::kUsage, "has --gaps 1,5, not 1,7");
+  EXPECT_REGRADE_ERROR(ExpandProtocol(Words({"--mode=ruder2016", "--protocol=lai2018"})),
+                       ExitCode::kUsage, "has --mode lai2018, not ruder2016");
+  EXPECT_REGRADE_ERROR(ExpandProtocol(Words({"--protocol", "geometry", "--flow=dis-fast"})),
+                       ExitCode::kUsage, "not from flow");
+}
+
+TEST(Protocols, UnknownMissingAndRepeatedNamesAreRefused) {
+  EXPECT_REGRADE_ERROR(ExpandProtocol(Words({"--protocol", "lai2081"})), ExitCode::kUsage,
+                       "there is no protocol 'lai2081'");
+  EXPECT_REGRADE_ERROR(ExpandProtocol(Words({"--protocol"})), ExitCode::kUsage,
+                       "no protocol ''");
+  EXPECT_REGRADE_ERROR(ExpandProtocol(Words({"--protocol=lai2018", "--protocol=liprf"})),
+                       ExitCode::kUsage, "given twice");
+}
+
+}  // namespace
+}  // namespace regrade
