@@ -12,6 +12,7 @@
 #include "kernels/field/pad_sh_basis.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/commands/command.h"
+#include "pipeline/commands/probe_styles.h"
 #include "pipeline/fields/field_file.h"
 #include "pipeline/images/contact_sheet.h"
 #include "pipeline/images/image_file.h"
@@ -323,7 +324,7 @@ void RunContactSheet(const Command& command, const Arguments& arguments, Console
                      "make one with `regrade run` or `regrade reconstruct`");
   if (!sheet.dry_run) RequireValue(sheet.out, "--out", "name the PNG file to write");
   if (styles.empty())
-    for (size_t i = 1; i < words.size(); ++i) ReadStylePicture(words[i], nullptr);
+    for (size_t i = 1; i < words.size(); ++i) CheckStyle(words[i], settings);
   ProbeMethod(&settings.style_2d);
   ProbeMasks(&settings.object);
 

@@ -15,10 +15,13 @@
 #include "pipeline/fields/field_file.h"
 #include "pipeline/fields/surface_points.h"
 #include "pipeline/fields/uniform_field.h"
+#include "pipeline/files/atomic_file.h"
+#include "pipeline/images/cube_file.h"
 #include "pipeline/program/memory.h"
 #include "pipeline/stages/styled_field.h"
 #include "pipeline/workspace/style_folders.h"
 #include "reconstruct/colmap/colmap_text.h"
+#include "stylize/fit_color_table.h"
 
 namespace regrade {
 namespace {
@@ -28,19 +31,22 @@ namespace fs = std::filesystem;
 struct ExportOptions {
   std::string out;
   std::string format = "colmap-text";
+  std::string name;
   int resolution = 0;
   bool dry_run = false;
 
   template <typename Bind>
   void Describe(Bind& bind) {
-    bind("out", out, {.help = "the folder to write: a new or empty one"});
+    bind("out", out, {.help = "the folder to write, a new or empty one; of cube the file"});
     bind("format", format,
          {.help =
               "colmap-text and colmap write images/ and sparse/; transforms writes images/ "
               "and transforms.json for nerfstudio and instant-ngp; svox2 writes field.npz and "
               "each style's NAME.npz on uniform grids; ply writes points with colours, "
-              "approximately on the surfaces, to field.ply and NAME.ply",
-          .choices = "colmap-text|colmap|transforms|svox2|ply"});
+              "approximately on the surfaces, to field.ply and NAME.ply; cube writes one style "
+              "as a LUT for photo and video editors, to the file --out",
+          .choices = "colmap-text|colmap|transforms|svox2|ply|cube"});
+    bind("name", name, {.help = "of cube: the style; by default the last one"});
     bind("resolution", resolution,
          {.unit = "voxels",
           .help = "of svox2: longest side of the grid. 0 copies a uniform field, and takes the "
@@ -187,6 +193,47 @@ void ExportFields(const ExportOptions& options, const std::string& folder, Conso
             ReadStyledField(folder, StyleFolder(folder, style)));
 }
 
+// The style as one map of colours: fitted to renders before and after, on views that it is not
+// measured on.
+void ExportLut(const ExportOptions& options, const std::string& folder, Console* console) {
+  constexpr int kViews = 12, kSize = 33, kStride = 4;  // of pixels
+  const std::string name = ChosenStyle(folder, options.name);
+  const std::string style = StyleFolder(folder, name);
+  if (options.dry_run) {
+    console->Info(Concat("style ", name, " would be written to ", options.out, " as a LUT of ",
+                         kSize, "^3 colours"));
+    return;
+  }
+  const StoredField stored = ReadFieldFile(folder + "/field.npz");
+  const std::vector<Camera> cameras = ViewsOf(folder, stored, kViews);
+  const std::vector<Image> before = Renders(stored.field, cameras),
+                           after = Renders(ReadStyledField(folder, style).field, cameras);
+  const auto color = [](const Image& image, int64_t i) {
+    Vec3d c;
+    for (int k = 0; k < 3; ++k)
+      c[k] = std::clamp(double{image.pixels[static_cast<size_t>(3 * i + k)]}, 0.0, 1.0);
+    return c;
+  };
+  TableFit fit(kSize);
+  for (size_t v = 0; v<before.size(); v += before.size()> 1 ? 2 : 1)
+    for (int64_t i = 0; i < before[v].num_pixels(); i += kStride)
+      fit.Add(color(before[v], i), color(after[v], i));
+  const ColorTable table = fit.Solve();
+  WriteFileAtomically(options.out, CubeText(table, name));
+  double sum = 0, count = 0;
+  for (size_t v = before.size() > 1 ? 1 : 0; v < before.size(); v += 2)
+    for (int64_t i = 0; i < before[v].num_pixels(); ++i, count += 3) {
+      const Vec3d d = table(color(before[v], i)) - color(after[v], i);
+      sum += Dot(d, d);
+    }
+  console->Info(Format(
+      "wrote %s: style %s as a LUT of %d^3 colours; on renders it is %.1f dB from the styled "
+      "scene, which may differ from place to place, and magnifies differences at most %.2f "
+      "times",
+      options.out.c_str(), name.c_str(), kSize,
+      -10 * std::log10(std::max(sum / std::max(count, 1.0), 1e-12)), SteepestSlope(table)));
+}
+
 }  // namespace
 
 void RunExport(const Command& command, const Arguments& arguments, Console* console) {
@@ -198,10 +245,12 @@ void RunExport(const Command& command, const Arguments& arguments, Console* cons
   const auto prepared = Prepare(command, arguments, {}, &options);
   if (!prepared) return;
   const std::string& folder = prepared->words[0];
-  RequireValue(settings.out, "--out", "name the folder to write");
+  RequireValue(settings.out, "--out", "name the folder or file to write");
   const bool fields = settings.format == "svox2" || settings.format == "ply";
   if (settings.resolution != 0 && settings.format != "svox2")
     throw UsageError("is of --format svox2 only", "--resolution");
+  if (settings.format == "cube") return ExportLut(settings, folder, console);
+  if (!settings.name.empty()) throw UsageError("is of --format cube only", "--name");
   fields ? ExportFields(settings, folder, console) : ExportCapture(settings, folder, console);
 }
 

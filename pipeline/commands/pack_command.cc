@@ -8,6 +8,7 @@
 #include "pipeline/capture/scene_profile.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/commands/command.h"
+#include "pipeline/images/cube_file.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/run/run_settings.h"
 #include "stylize/image/view_stylizer.h"
@@ -19,6 +20,10 @@ namespace {
 constexpr int kStyleSide = 512;
 
 Image SmallPicture(const std::string& path) {
+  RefuseOtherLooks(path);
+  if (IsCubeFile(path))
+    throw InputError("is a LUT, and a packed capture holds a style picture", path,
+                     "style the capture here: regrade stylize");
   const Image picture = ReadStylePicture(path, nullptr);
   const double scale =
       std::min(1.0, static_cast<double>(kStyleSide) / std::max(picture.width, picture.height));

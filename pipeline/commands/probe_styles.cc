@@ -1,17 +1,31 @@
 #include "pipeline/commands/probe_styles.h"
 
+#include "kernels/base/error.h"
 #include "pipeline/commands/command.h"
-#include "pipeline/images/image_file.h"
+#include "pipeline/images/cube_file.h"
 #include "pipeline/stages/make_stylizer.h"
 
 namespace regrade {
+
+void CheckStyle(const std::string& path, const RunSettings& settings) {
+  if (IsCubeFile(path)) {
+    if (settings.style_2d.method != StyleOptions().method)
+      throw UsageError("a LUT is its own method", "--method and --style " + path,
+                       "leave --method out, or give --method " + StyleOptions().method +
+                           " where an earlier run asked for another");
+    if (!settings.object.style_mask.empty())
+      throw UsageError("a LUT has no regions", "--style-mask and --style " + path,
+                       "leave --style-mask out");
+  }
+  StyleExample(path, nullptr);
+}
 
 void ProbeStyles(RunSettings* settings) {
   RequireValue(settings->style.picture(), "--style", "name the style picture");
   for (std::string& picture : settings->style.pictures) {
     RequireValue(picture, "--style", "name the style picture");
     picture = AbsolutePath(picture);
-    ReadStylePicture(picture, nullptr);
+    CheckStyle(picture, *settings);
   }
   ProbeMethod(&settings->style_2d);
   ProbeMasks(&settings->object);

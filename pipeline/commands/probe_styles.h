@@ -9,4 +9,8 @@ namespace regrade {
 // Throws Error(kUsage) where there is no picture, and Error(kInput).
 void ProbeStyles(RunSettings* settings);
 
+// One of them: a picture that can be read, or a LUT and what goes with it. Throws Error(kUsage,
+// kInput).
+void CheckStyle(const std::string& path, const RunSettings& settings);
+
 }  // namespace regrade

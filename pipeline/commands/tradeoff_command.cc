@@ -12,8 +12,8 @@
 #include "kernels/field/cpu/rays.h"
 #include "pipeline/capture/capture_store.h"
 #include "pipeline/commands/command.h"
+#include "pipeline/commands/probe_styles.h"
 #include "pipeline/files/atomic_file.h"
-#include "pipeline/images/image_file.h"
 #include "pipeline/program/interrupt.h"
 #include "pipeline/report/cost_rows.h"
 #include "pipeline/report/html.h"
@@ -287,7 +287,7 @@ void RunTradeoff(const Command& command, const Arguments& arguments, Console* co
     if (settings.style.pictures.size() > 1)
       throw UsageError("costs are measured with one picture", "--style", "give one");
     settings.style.pictures[0] = AbsolutePath(settings.style.picture());
-    ReadStylePicture(settings.style.picture(), nullptr);
+    CheckStyle(settings.style.picture(), settings);
     ProbeMethod(&settings.style_2d);
   }
   ParameterChoice choice{Words(tradeoff.parameters),

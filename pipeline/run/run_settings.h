@@ -45,7 +45,7 @@ struct StyleSource {
     bind(
         "style", pictures,
         {.help = "a style picture: the scene gets its colours, in the folder styles/NAME; give "
-                 "the option once for each style"});
+                 "the option once for each style. A LUT (.cube) is applied as it is"});
     bind("name", name,
          {.help = "name of the style's folder in styles/; by default that of the picture's "
                   "file"});

@@ -14,6 +14,7 @@
 #include "pipeline/capture/working_views.h"
 #include "pipeline/fields/field_file.h"
 #include "pipeline/fields/film_timing.h"
+#include "pipeline/images/cube_file.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/program/device_choice.h"
 #include "pipeline/report/records.h"
@@ -165,7 +166,9 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
 
   // Fidelity is measured on the training views of the style, against the 2D method applied to
   // the rendered frames, or else to the photos.
-  const Image style = ReadStylePicture(settings.style.picture(), nullptr);
+  const bool of_picture = !IsCubeFile(settings.style.picture());  // not a LUT
+  const Image style =
+      of_picture ? ReadStylePicture(settings.style.picture(), nullptr) : Image();
   const FrameSource of_photos{static_cast<int>(training_views.size()), [&](int k) {
                                 const int i = training_views[k];
                                 Image picture =
@@ -175,10 +178,10 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
                                 views.LeaveOutMasked(i, &picture);
                                 return picture;
                               }};
-  const FidelityTargets targets{renders_styled ? frames("views_2d", training_views) : of_photos,
-                                frames("transmittance", training_views), &style,
-                                PerceptualDistance(settings.consistency.lpips),
-                                frames("source", training_views)};
+  const FidelityTargets targets{
+      renders_styled ? frames("views_2d", training_views) : of_photos,
+      frames("transmittance", training_views), of_picture ? &style : nullptr,
+      PerceptualDistance(settings.consistency.lpips), frames("source", training_views)};
   std::vector<FidelityRow> fidelity;
   for (const NamedFrameSource& sequence : sequences)
     fidelity.push_back(

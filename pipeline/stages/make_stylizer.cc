@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "kernels/base/error.h"
-#include "pipeline/images/image_file.h"
+#include "pipeline/images/cube_file.h"
 #include "pipeline/stages/command_stylizer.h"
 #include "pipeline/stages/folder_stylizer.h"
 #include "pipeline/stages/network_probe.h"
@@ -15,6 +15,9 @@
 #include "pipeline/workspace/stage_record.h"
 #include "stylize/image/color_transfer.h"
 #include "stylize/image/distribution_transfer.h"
+#include "stylize/image/gaussian_mixture.h"
+#include "stylize/image/map_stylizer.h"
+#include "stylize/image/mixture_transfer.h"
 #include "stylize/image/onnx_stylizer.h"
 
 namespace regrade {
@@ -27,16 +30,22 @@ using PhotoFunction = std::function<std::optional<Image>(size_t view)>;
 std::unique_ptr<ViewStylizer> MakeColorMethod(StyleMethodKind kind, const StyleOptions& options,
                                               const Image& style, const Capture& capture,
                                               const PhotoFunction& photo) {
-  if (kind == StyleMethodKind::kIdt || kind == StyleMethodKind::kHistogram) {
-    if (!options.scene_wide) return MakeDistributionTransfer(options, style);
-    // As many colours in all as are taken of one view otherwise, but 256 of each at least.
-    const int64_t most = std::max<int64_t>(
-        256, 4 * kColorSample / std::max<int64_t>(1, std::ssize(capture.views)));
+  // `all` colours evenly from all photos, but 256 of each at least.
+  const auto sample = [&](int64_t all) {
+    const int64_t most =
+        std::max<int64_t>(256, all / std::max<int64_t>(1, std::ssize(capture.views)));
     std::vector<Vec3d> scene;
     for (size_t i = 0; i < capture.views.size(); ++i)
       if (const std::optional<Image> picture = photo(i))
         for (const Vec3d& color : SampleColors(*picture, capture.views[i].path, most))
           scene.push_back(color);
+    return scene;
+  };
+  if (kind == StyleMethodKind::kGmm)
+    return MakeMixtureTransfer(options, style, sample(kMixtureSample));
+  if (kind == StyleMethodKind::kIdt || kind == StyleMethodKind::kHistogram) {
+    if (!options.scene_wide) return MakeDistributionTransfer(options, style);
+    const std::vector<Vec3d> scene = sample(4 * kColorSample);
     return MakeDistributionTransfer(options, style, &scene);
   }
   if (!options.scene_wide) return MakeColorTransfer(options, style);
@@ -52,6 +61,12 @@ std::unique_ptr<ViewStylizer> MakeMethod(RunContext* context, const Capture& cap
                                          const Image& style, const PhotoFunction& photo) {
   const RunSettings& settings = context->settings;
   const StyleMethod method = ParseStyleMethod(settings.style_2d);
+  if (const std::string look = settings.style.picture(); IsCubeFile(look)) {
+    const ColorLut lut = ReadCubeFile(look);
+    const std::string notice =
+        Format("the LUT magnifies differences of colours at most %.2f times", lut.Slope());
+    return MakeMapStylizer(lut, "lut", {notice});
+  }
   switch (method.kind) {
     case StyleMethodKind::kOnnx:
       return MakeOnnxStylizer(method.argument, settings.style_2d.max_side, style);
@@ -75,7 +90,7 @@ std::unique_ptr<ViewStylizer> MakeSceneStylizer(RunContext* context, const Worki
                                                 const CoverageFunction& coverage) {
   const RunSettings& settings = context->settings;
   std::string notice;
-  const Image style = ReadStylePicture(settings.style.picture(), &notice);
+  const Image style = StyleExample(settings.style.picture(), &notice);
   if (!notice.empty()) context->console->Info(notice);
   const Capture& capture = views.capture();
   const auto photo = [&](size_t i) -> std::optional<Image> {

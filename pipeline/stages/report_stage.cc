@@ -8,6 +8,7 @@
 #include "pipeline/capture/scene_profile.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/files/atomic_file.h"
+#include "pipeline/images/cube_file.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/page/make_page.h"
 #include "pipeline/program/memory.h"
@@ -92,7 +93,7 @@ ReportPictures PicturesOf(const RunContext& context, const RunReport& report) {
   pictures.title = std::filesystem::path(scene.folder()).filename().string();
   if (&workspace != &scene)
     pictures.title += " · " + std::filesystem::path(workspace.folder()).filename().string();
-  const Image style = ReadStylePicture(context.settings.style.picture(), nullptr);
+  const Image style = StyleExample(context.settings.style.picture(), nullptr);
   pictures.style = Encoded(style);
   const int count = static_cast<int>(capture.views.size());
   const int shown = std::min(count, kPagePictures);

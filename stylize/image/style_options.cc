@@ -10,6 +10,7 @@ struct NamedKind {
   StyleMethodKind kind;
 };
 constexpr NamedKind kColorMethods[] = {{"mkl", StyleMethodKind::kMkl},
+                                       {"gmm", StyleMethodKind::kGmm},
                                        {"reinhard", StyleMethodKind::kReinhard},
                                        {"idt", StyleMethodKind::kIdt},
                                        {"histogram", StyleMethodKind::kHistogram}};

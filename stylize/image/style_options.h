@@ -9,11 +9,13 @@ namespace regrade {
 
 // For hints; --method has no `choices`, because three of its values continue after a colon.
 inline constexpr char kStyleMethods[] =
-    "mkl, reinhard, idt, histogram, onnx:DIR, folder:DIR or command:\"PROGRAM ...\"";
+    "mkl, gmm, reinhard, idt, histogram, onnx:DIR, folder:DIR or command:\"PROGRAM ...\"";
 
 struct StyleOptions {
   std::string method = "mkl";
   bool scene_wide = false;
+  int parts = 6;
+  double max_slope = 4;
   int iterations = 20;
   bool regrain = false;
   int max_side = 1024;
@@ -25,7 +27,9 @@ struct StyleOptions {
         "method", method,
         {.help =
              "2D method that styles each view: mkl moves mean and covariance of the colours "
-             "onto the style's, reinhard mean and standard deviation of each CIELAB channel, "
+             "onto the style's, gmm those of several groups of colours, each onto the "
+             "groups that suit it, reinhard mean and standard deviation of each CIELAB "
+             "channel, "
              "idt "
              "the whole distribution (the strongest change; it amplifies grain and soft "
              "edges), histogram that of each channel; onnx:DIR runs the networks of "
@@ -38,7 +42,16 @@ struct StyleOptions {
          {.help =
               "estimates one colour map from all views, instead of one for each view: frames "
               "are more consistent with each other, but a single view's colours are further "
-              "from the style's; with mkl, reinhard, idt and histogram"});
+              "from the style's; with mkl, gmm, reinhard, idt and histogram"});
+    bind("style-parts", parts,
+         {.help = "groups of colours of method gmm, fewer where a picture has fewer",
+          .min = 1,
+          .max = 16});
+    bind("max-slope", max_slope,
+         {.help = "how many times method gmm may magnify a difference of colours at most: "
+                  "groups are widened where it would be more, which makes them less distinct",
+          .min = 1.5,
+          .max = 100});
     bind("style-iterations", iterations,
          {.help = "rotations of method idt; its time grows with them", .min = 1, .max = 200});
     bind("style-regrain", regrain,
@@ -60,7 +73,16 @@ struct StyleOptions {
   }
 };
 
-enum class StyleMethodKind { kMkl, kReinhard, kIdt, kHistogram, kOnnx, kFolder, kCommand };
+enum class StyleMethodKind {
+  kMkl,
+  kGmm,
+  kReinhard,
+  kIdt,
+  kHistogram,
+  kOnnx,
+  kFolder,
+  kCommand
+};
 
 // Reads networks or pictures from the disk.
 inline bool ReadsFiles(StyleMethodKind kind) {

@@ -45,6 +45,7 @@ inline std::ostream& operator<<(std::ostream& out, const FuzzTarget& target) {
 std::vector<FuzzTarget> ArchiveTargets();
 std::vector<FuzzTarget> ColmapTargets();
 std::vector<FuzzTarget> CommandLineTargets();
+std::vector<FuzzTarget> CubeTargets();
 std::vector<FuzzTarget> FieldTargets();
 std::vector<FuzzTarget> FlowTargets();
 std::vector<FuzzTarget> JsonTargets();
@@ -63,8 +64,8 @@ std::vector<FuzzTarget> Joined(Lists... lists) {
 
 // Readers that link few libraries, and the others.
 inline std::vector<FuzzTarget> ReaderTargets() {
-  return Joined(ColmapTargets, ArchiveTargets, FieldTargets, JsonTargets, PoseTableTargets,
-                PictureTargets);
+  return Joined(ColmapTargets, CubeTargets, ArchiveTargets, FieldTargets, JsonTargets,
+                PoseTableTargets, PictureTargets);
 }
 inline std::vector<FuzzTarget> ProgramTargets() {
   return Joined(RecordTargets, FlowTargets, StateTargets, CommandLineTargets);

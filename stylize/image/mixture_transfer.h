@@ -1,0 +1,20 @@
+// 2D method gmm: optimal transport between mixtures of Gaussians in colour.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "kernels/base/vec.h"
+#include "stylize/image/style_options.h"
+#include "stylize/image/view_stylizer.h"
+
+namespace regrade {
+
+// `scene`, colours of all views, gives the mixture that the views share: each view's mixture
+// starts from it, so that the parts of neighbouring views correspond, or is it where
+// options.scene_wide. See EQ(mixture-transport).
+std::unique_ptr<ViewStylizer> MakeMixtureTransfer(const StyleOptions& options,
+                                                  const Image& style,
+                                                  const std::vector<Vec3d>& scene);
+
+}  // namespace regrade
