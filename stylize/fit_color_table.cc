@@ -46,8 +46,8 @@ struct NormalEquations {
 
 // Conjugate gradients, from zero.
 Values SolveFor(const NormalEquations& matrix, const Values& right) {
-  constexpr int kMostSteps = 300;
-  constexpr double kResidual = 1e-6;  // of the right side
+  constexpr int kMostSteps = 100;
+  constexpr double kResidual = 1e-4;  // of the right side
   Values x(right.size()), r = right, p = right;
   double squared = DotProduct(r, r);
   const double enough = kResidual * kResidual * squared;
@@ -75,7 +75,7 @@ void TableFit::Add(const Vec3d& source, const Vec3d& target) {
   linear_.Add(source, target);
 }
 
-ColorTable TableFit::Solve() const {
+ColorTable TableFit::Solve(double smoothness) const {
   const ColorMap linear = linear_.Solve();
   ColorTable table = TabulateColors(size_, linear);
   std::vector<TableStencil> stencils;
@@ -83,7 +83,7 @@ ColorTable TableFit::Solve() const {
   for (const Vec3d& source : sources_) stencils.push_back(StencilOf(table, source));
   const double vertices = static_cast<double>(table.values.size());
   const NormalEquations matrix{
-      size_, 1e-3 * std::max<double>(1, static_cast<double>(sources_.size())) / vertices,
+      size_, smoothness * std::max<double>(1, static_cast<double>(sources_.size())) / vertices,
       stencils};
   for (int c = 0; c < 3; ++c) {
     Values right(table.values.size());

@@ -13,6 +13,8 @@ const std::vector<Command>& AllCommands() {
       {"stylize", "DIR --style PICTURE [PICTURE ...] [OPTIONS]",
        "applies further styles to a finished reconstruction, each in DIR/styles/NAME",
        RunStylize},
+      {"retouch", "DIR --photo NAME --edited PICTURE [OPTIONS]",
+       "lets the scene follow one retouched photo, as a style in DIR/styles/NAME", RunRetouch},
       {"render", "DIR [OPTIONS]", "renders and measures a styled scene again", RunRender},
       {"mix", "DIR [NAME|STYLED.npz ...] --out FOLDER [OPTIONS]",
        "makes a film that blends from the unstyled scene into one or more styles", RunMix},

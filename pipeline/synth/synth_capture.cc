@@ -14,6 +14,7 @@
 #include "pipeline/files/npy_header.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/synth/synth_effects.h"
+#include "pipeline/synth/synth_grade.h"
 #include "pipeline/synth/synth_model.h"
 
 namespace regrade {
@@ -90,13 +91,15 @@ JsonValue DescribeCapture(const SynthOptions& options, const SynthEffects& effec
                                             {"turn_degrees", kSynthPoseTurn},
                                             {"step_fraction", kSynthPoseStep},
                                             {"track_sigma_px", kSynthTrackSigma}};
-  return JsonValue::Object{{"scene", options.scene},
-                           {"seed", options.seed},
-                           {"views", options.views},
-                           {"size", options.size},
-                           {"bounds_min", Vector(scene.bounds_min)},
-                           {"bounds_max", Vector(scene.bounds_max)},
-                           {"effects", of_effects}};
+  JsonValue::Object description{{"scene", options.scene},
+                                {"seed", options.seed},
+                                {"views", options.views},
+                                {"size", options.size},
+                                {"bounds_min", Vector(scene.bounds_min)},
+                                {"bounds_max", Vector(scene.bounds_max)},
+                                {"effects", of_effects}};
+  if (!options.grade.empty()) description.emplace_back("grade", options.grade);
+  return description;
 }
 
 // Creates the folders. Throws Error(kFolderInUse) if there are photos made with other options.
@@ -145,6 +148,7 @@ void WriteSyntheticCapture(const std::string& out, const SynthOptions& options,
   int width = 0, height = 0;
   ParseSize(options.size, &width, &height);
   const SynthEffects effects = ParseSynthEffects(options.effects);
+  const SynthGrade grade = ParseSynthGrade(options.grade);
   const SyntheticScene scene = MakeSyntheticScene(options.scene, options.seed);
   std::vector<Camera> cameras = SyntheticCameras(scene, options.views, width, height);
   for (int i = 0; i < options.views; ++i)
@@ -161,6 +165,11 @@ void WriteSyntheticCapture(const std::string& out, const SynthOptions& options,
     const std::string name = FrameName(i, ".png");
     WritePng8((fs::path(out) / "images" / name).string(), view.color);
     WriteDepth((truth / "depth" / FrameName(i, ".npy")).string(), view.depth);
+    if (grade != SynthGrade::kNone) {
+      ApplyGrade(grade, scene, cameras[i], view.depth, MaskedSolid(scene), &view.color);
+      fs::create_directories(truth / "graded");
+      WritePng8((truth / "graded" / name).string(), view.color);
+    }
     if (effects.masks) {
       const Image mask = RenderSolidMask(scene, cameras[i], MaskedSolid(scene));
       WritePng8((truth / "masks" / name).string(), mask);

@@ -14,6 +14,7 @@ struct SynthOptions {
   int views = 24;
   std::string size = "640x480";
   std::string effects;  // comma-separated
+  std::string grade;
   uint64_t seed = 0;
 
   template <typename Bind>
@@ -32,6 +33,12 @@ struct SynthOptions {
              "0.5 % "
              "of the cameras' extent), mixed-cameras (two cameras, three sizes, portrait and "
              "landscape), and one lens: distortion (mild), barrel (k1 = -0.2) or fisheye"});
+    bind(
+        "grade", grade,
+        {.help = "writes the photos as graded, too, to truth/graded: by one map of colours, by "
+                 "the place in the scene, by exchanging two colours of one object, or by a "
+                 "vignette over the first",
+         .choices = "|global|local|object|vignette"});
     bind("seed", seed, {.help = "seed of textures, exposures and noise"});
   }
 };
@@ -44,6 +51,7 @@ struct SynthOptions {
 //   OUT/truth/visible/00000_00001.png     255 where view i + 1 sees the same point
 //   with `masks`: OUT/masks/00000.png, some of them wrong, and correct ones in OUT/truth/masks/
 //   with `poses`: OUT/sparse/0/, a COLMAP model with pose errors (synth_model.h)
+//   with `grade`: OUT/truth/graded/00000.png, what the true grade makes of each photo
 //   OUT/truth/effects.json                the options and the parameters of the effects
 // Effects do not change the scene. The same options give the same bytes, for any number of
 // threads. Reports progress once per view.

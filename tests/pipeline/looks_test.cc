@@ -33,7 +33,7 @@ TEST(Looks, ALutIsAStyleAndAStyleALut) {
   const TemporaryFolder folder;
   ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "6", "--size", "96x72"}).code, 0);
   WriteText(folder / "warm.cube", CubeText(TabulateColors(17, Look), "warm"));
-  std::vector<std::string> run{"run",     folder / "s/truth",     "--out", folder / "out",
+  std::vector<std::string> run{"run",     folder / "s/truth",   "--out",    folder / "out",
                                "--style", folder / "warm.cube", "--device", "cpu"};
   for (const std::string& flag : testing::TinyFlags()) run.push_back(flag);
   const ProgramOutcome outcome = Regrade(run);
@@ -72,11 +72,10 @@ TEST(Looks, ALutIsAStyleAndAStyleALut) {
   refused({"--style", folder / "bad.cube"}, "line 3 ends before its last number");
 
   // Back again: the styled scene's map.
-  const ProgramOutcome exported = Regrade(
-      {"export", folder / "out", "--format", "cube", "--out", folder / "back.cube"});
+  const ProgramOutcome exported =
+      Regrade({"export", folder / "out", "--format", "cube", "--out", folder / "back.cube"});
   ASSERT_EQ(exported.code, 0) << exported.text;
-  EXPECT_NE(exported.text.find("dB from the styled scene"), std::string::npos)
-      << exported.text;
+  EXPECT_NE(exported.text.find("dB from the styled scene"), std::string::npos) << exported.text;
   const ColorLut back = ReadCubeFile(folder / "back.cube");
   ASSERT_EQ(back.table.size, 33);
   EXPECT_EQ(back.title, "warm");
