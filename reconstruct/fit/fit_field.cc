@@ -129,14 +129,21 @@ class Fitter {
     const int basis = BasisOf(options_.sh_degree), coarsest = options_.resolutions[0];
     constexpr int kLeastViews = 2;
     if (options_.adaptive()) {
-      const int finest = static_cast<int>(options_.resolutions.size()) - 1;
-      return MakeInitialCells(rays_, CellFrame(box_, coarsest, finest), finest, basis,
+      const CellLevels levels = Levels();
+      return MakeInitialCells(rays_, CellFrame(box_, coarsest, levels), levels, basis,
                               options_.initial_density, box_.near_clip, kLeastViews,
                               box_.spheres);
     }
     const GridFrame frame{ResolutionFor(box_, coarsest), box_.center, box_.radius};
     return MakeInitialGrid(rays_, frame, basis, options_.initial_density, box_.near_clip,
                            kLeastViews, box_.spheres);
+  }
+
+  // Spheres and device coordinates reach to infinity, and nothing is behind a transparent
+  // photo.
+  CellLevels Levels() const {
+    const bool bounded = !box_.spheres && box_.layers == 0 && !box_.background;
+    return {static_cast<int>(options_.resolutions.size()) - 1, bounded ? options_.outward : 0};
   }
 
   static int BasisOf(int degree) { return (degree + 1) * (degree + 1); }
@@ -232,10 +239,10 @@ class Fitter {
   void Refine(int longest) {
     if (options_.adaptive()) {
       const float width = static_cast<float>(options_.resolutions[0]);
-      engine_->RefineCells(
-          {options_.step, options_.stop_transmittance},
-          {options_.prune_weight / width, options_.cell_pixels, longest > 0 ? stage_ : 0,
-           static_cast<int64_t>(double{options_.max_cells} * 1e6)});
+      engine_->RefineCells({options_.step, options_.stop_transmittance},
+                           {options_.prune_weight / width, options_.cell_pixels,
+                            longest > 0 ? Levels().outward + stage_ : 0,
+                            static_cast<int64_t>(double{options_.max_cells} * 1e6)});
       if (engine_->num_voxels() == 0) ThrowEmpty();
       return;
     }

@@ -45,6 +45,7 @@ struct FitOptions {
   float cell_pixels = 1.0f;
   float max_cells = 8.0f;
   float free_space = 0.02f;
+  int outward = 2;
   int shards = 0;
   bool exact_sums = false;
   uint64_t seed = 0;
@@ -205,6 +206,13 @@ struct FitOptions {
                   "errors are",
           .min = 0.001,
           .max = 200});
+    bind(
+        "fit-outward", outward,
+        {.unit = "doublings",
+         .help = "adaptive field: the region around the scene's box is 2^N times as wide, with "
+                 "cells as much wider, for what photos show behind the scene",
+         .min = 0,
+         .max = 5});
     bind("fit-free-space", free_space,
          {.help = "adaptive field: keeps the space clear between cameras and the points they "
                   "saw; less fog where few photos look",

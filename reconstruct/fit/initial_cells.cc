@@ -8,7 +8,7 @@
 namespace regrade {
 namespace {
 
-constexpr int kRateLattice = 48;  // vertices along the longest side
+constexpr int kRateLattice = 96;  // vertices along the longest side
 
 // Number of cameras that see a point beyond near_clip, up to `enough`. A vertex may project
 // just outside of a photo and still be a corner of a visible cell: `margin` is a fraction of
@@ -47,9 +47,37 @@ bool TouchesBall(const GridFrame& frame, const Vec3i& low, int width) {
   return distance <= 1;
 }
 
+struct FirstCell {
+  CellKey key;
+  uint8_t level;
+};
+
+// Whether a cell reaches into the box, which is 2^outward times smaller than the frame.
+bool ReachesIntoBox(const GridFrame& frame, const Vec3i& low, int width, int outward) {
+  for (int a = 0; a < 3; ++a) {
+    const int middle = frame.resolution[a] / 2, half = middle >> outward;
+    if (low[a] >= middle + half || low[a] + width <= middle - half) return false;
+  }
+  return true;
+}
+
+// Calls keep(low, level) for the first cells in a cell.
+template <typename Keep>
+void ForFirstCells(const GridFrame& frame, const CellLevels& levels, const Vec3i& low,
+                   int level, const Keep& keep) {
+  const int width = 1 << (levels.all() - level);
+  if (level == levels.outward || !ReachesIntoBox(frame, low, width, levels.outward)) {
+    keep(low, level);
+    return;
+  }
+  for (int child = 0; child < 8; ++child)
+    ForFirstCells(frame, levels, CornerOf(low, width / 2, child), level + 1, keep);
+}
+
 }  // namespace
 
-GridFrame CellFrame(const SceneBox& box, int coarsest, int finest) {
+GridFrame CellFrame(const SceneBox& box, int coarsest, const CellLevels& levels) {
+  const int finest = levels.finest;
   Vec3i size = ResolutionFor(box, coarsest << finest);
   for (int a = 0; a < 3; ++a)
     size[a] = std::max(1, ((size[a] >> finest) + (size[a] >> (finest - 1) & (finest > 0))))
@@ -57,43 +85,50 @@ GridFrame CellFrame(const SceneBox& box, int coarsest, int finest) {
   // In device coordinates rays run along z, and what is seen of a surface lies across.
   constexpr int kWidthsPerLayer = 3;
   if (box.layers > 0) size.z = std::max(1, coarsest / kWidthsPerLayer) << finest;
-  return {size, box.center, box.radius};
+  const int times = 1 << levels.outward;
+  return {size * times, box.center, box.radius * static_cast<float>(times)};
 }
 
-FastGrid MakeInitialCells(const TrainingRays& rays, const GridFrame& frame, int finest,
-                          int basis, float density, float near_clip, int min_views, bool ball) {
+FastGrid MakeInitialCells(const TrainingRays& rays, const GridFrame& frame,
+                          const CellLevels& levels, int basis, float density, float near_clip,
+                          int min_views, bool ball) {
   FastGrid grid;
   grid.frame = frame;
   grid.basis = basis;
   grid.near_clip = near_clip;
   grid.background = rays.mean_color();
-  const int width = 1 << finest;
-  const Vec3i top{frame.resolution.x >> finest, frame.resolution.y >> finest,
-                  frame.resolution.z >> finest};
-  std::vector<std::vector<CellKey>> rows(static_cast<size_t>(top.x));
+  const int width = 1 << levels.all();
+  const Vec3i top{frame.resolution.x / width, frame.resolution.y / width,
+                  frame.resolution.z / width};
+  std::vector<std::vector<FirstCell>> rows(static_cast<size_t>(top.x));
+  const auto seen = [&](const Vec3d& at) {
+    return ViewsThatSee(rays, WorldOfLattice(frame, at), near_clip, 0.02, min_views) >=
+           min_views;
+  };
 #pragma omp parallel for schedule(dynamic, 1)
-  for (int x = 0; x < top.x; ++x)
+  for (int x = 0; x < top.x; ++x) {
+    const auto keep_seen = [&](const Vec3i& low, int level) {
+      const int own = 1 << (levels.all() - level);
+      if (ball && !TouchesBall(frame, low, own)) return;
+      bool kept = seen(low.Cast<double>() + Vec3d{0.5, 0.5, 0.5} * static_cast<double>(own));
+      for (int k = 0; k < 8 && !kept; ++k) kept = seen(CornerOf(low, own, k).Cast<double>());
+      if (kept)
+        rows[static_cast<size_t>(x)].push_back({KeyOf(low), static_cast<uint8_t>(level)});
+    };
     for (int y = 0; y < top.y; ++y)
-      for (int z = 0; z < top.z; ++z) {
-        const Vec3i low{x * width, y * width, z * width};
-        if (ball && !TouchesBall(frame, low, width)) continue;
-        const auto seen = [&](const Vec3d& at) {
-          return ViewsThatSee(rays, WorldOfLattice(frame, at), near_clip, 0.02, min_views) >=
-                 min_views;
-        };
-        bool kept =
-            seen(low.Cast<double>() + Vec3d{0.5, 0.5, 0.5} * static_cast<double>(width));
-        for (int k = 0; k < 8 && !kept; ++k)
-          kept = seen(CornerOf(low, width, k).Cast<double>());
-        if (kept) rows[static_cast<size_t>(x)].push_back(KeyOf(low));
-      }
-  std::vector<CellKey> keys;
-  for (const auto& row : rows) keys.insert(keys.end(), row.begin(), row.end());
-  std::sort(keys.begin(), keys.end());
-  grid.cells.finest = finest;
-  grid.cells.key = Buffer<CellKey>(static_cast<int64_t>(keys.size()));
-  std::copy(keys.begin(), keys.end(), grid.cells.key.begin());
+      for (int z = 0; z < top.z; ++z)
+        ForFirstCells(frame, levels, {x * width, y * width, z * width}, 0, keep_seen);
+  }
+  std::vector<FirstCell> cells;
+  for (const auto& row : rows) cells.insert(cells.end(), row.begin(), row.end());
+  std::ranges::sort(cells, {}, &FirstCell::key);
+  grid.cells.finest = levels.all();
+  grid.cells.key = Buffer<CellKey>(static_cast<int64_t>(cells.size()));
   grid.cells.level = Buffer<uint8_t>(grid.cells.key.size());
+  for (size_t i = 0; i < cells.size(); ++i) {
+    grid.cells.key[static_cast<int64_t>(i)] = cells[i].key;
+    grid.cells.level[static_cast<int64_t>(i)] = cells[i].level;
+  }
   FindVertices(&grid.cells);
   BuildTree(frame.resolution, &grid.cells);
   const int lanes = grid.lanes();

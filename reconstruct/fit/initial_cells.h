@@ -7,20 +7,29 @@
 
 namespace regrade {
 
-// The frame of an adaptive field: `coarsest` cells of level 0 on the longest side, `finest`
-// levels below it.
-GridFrame CellFrame(const SceneBox& box, int coarsest, int finest);
+// Levels of an adaptive fit. Around the box there is a region 2^outward times as wide, for what
+// photos show behind the scene.
+struct CellLevels {
+  int finest = 0;   // times that the box's first cells can be halved
+  int outward = 0;  // times that the region's first cells are wider: level 0 is theirs
+  int all() const { return finest + outward; }
+};
 
-// A mid-grey field of one density: the cells of level 0 of which at least `min_views` cameras
-// see the centre or a corner, beyond near_clip. With `ball`, only cells that touch the box's
-// unit sphere.
-FastGrid MakeInitialCells(const TrainingRays& rays, const GridFrame& frame, int finest,
-                          int basis, float density, float near_clip, int min_views, bool ball);
+// The frame of an adaptive field: `coarsest` first cells on the box's longest side, and as many
+// of level 0 on that of the region.
+GridFrame CellFrame(const SceneBox& box, int coarsest, const CellLevels& levels);
+
+// A mid-grey field of one density: cells of level `outward` in the box and of level 0 around
+// it, of which at least `min_views` cameras see the centre or a corner, beyond near_clip. With
+// `ball`, only cells that touch the frame's sphere.
+FastGrid MakeInitialCells(const TrainingRays& rays, const GridFrame& frame,
+                          const CellLevels& levels, int basis, float density, float near_clip,
+                          int min_views, bool ball);
 
 // Factors of the density's rate, [V]: the number of photos that see a vertex, over the number
 // that see the best seen one. What few photos see settles slowly, so that it takes shape where
 // more photos agree (Sun, Sun, Chen 2022, DVGO, section 5.2). The factor is exact on a lattice
-// of at most 48 vertices a side and blended between them.
+// of at most 96 vertices a side and blended between them.
 Buffer<float> DensityRates(const TrainingRays& rays, const GridFrame& frame,
                            const CellGrid& cells, float near_clip);
 

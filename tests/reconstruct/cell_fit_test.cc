@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <vector>
 
 #include "reconstruct/fit/adapt_options.h"
@@ -28,6 +29,7 @@ class CellFit : public testing::FitField {
     options_.steps = {50, 50, 60};
     options_.tv_density = 1e-2f;
     options_.tv_sh = 1e-3f;
+    options_.outward = 0;  // nothing is behind the ball
   }
 };
 
@@ -169,24 +171,60 @@ TEST(WidthInPixels, IsTheCellsWidthOverThePixels) {
   EXPECT_NEAR(WidthInPixels(frame, ray, beside, 2, 2, 4), 4, 0.01);
 }
 
-TEST(DensityRates, FallWhereFewPhotosSee) {
-  Camera camera;
-  camera.width = camera.height = 50;
-  camera.fx = camera.fy = 50;
-  camera.cx = camera.cy = 25;
-  const Image photo = [] {
-    Image image(50, 50, 3);
-    std::fill(image.pixels.begin(), image.pixels.end(), 0.5f);
-    return image;
-  }();
-  std::vector<TrainingView> views;
-  for (const double x : {-1.0, 0.0, 1.0}) {
-    camera.camera_from_world.translation = {x, 0, 3};
-    views.push_back({camera, &photo});
+// Three cameras side by side that look along z at the origin.
+class ThreeViews {
+ public:
+  ThreeViews() : photo_(50, 50, 3) {
+    std::fill(photo_.pixels.begin(), photo_.pixels.end(), 0.5f);
+    Camera camera;
+    camera.width = camera.height = 50;
+    camera.fx = camera.fy = 50;
+    camera.cx = camera.cy = 25;
+    for (const double x : {-1.0, 0.0, 1.0}) {
+      camera.camera_from_world.translation = {x, 0, 3};
+      views_.push_back({camera, &photo_});
+    }
   }
-  const TrainingRays rays(views);
+  const std::vector<TrainingView>& views() const { return views_; }
+
+ private:
+  Image photo_;
+  std::vector<TrainingView> views_;
+};
+
+TEST(InitialCells, TheBoxHasTheCellsThatItHasAlone) {
+  const ThreeViews three;
+  const TrainingRays rays(three.views());
+  SceneBox box;
+  box.radius = {1, 0.75f, 0.5f};
+  box.center = {0.1f, 0, 0};
+  const CellLevels alone{1, 0}, around{1, 2};
+  const GridFrame inner = CellFrame(box, 16, alone), outer = CellFrame(box, 16, around);
+  EXPECT_EQ(outer.resolution, inner.resolution * 4);
+  EXPECT_EQ(outer.radius, inner.radius * 4.0f);
+  const FastGrid in_box = MakeInitialCells(rays, inner, alone, 1, 0.5f, 0, 2, false);
+  const FastGrid all = MakeInitialCells(rays, outer, around, 1, 0.5f, 0, 2, false);
+  std::set<CellKey> expected, found;
+  for (const CellKey key : in_box.cells.key) expected.insert(key);
+  int64_t outside = 0;
+  for (int64_t c = 0; c < all.cells.num_cells(); ++c) {
+    if (all.cells.level[c] < around.outward) {
+      ++outside;
+      continue;
+    }
+    const Vec3i low = PlaceOf(all.cells.key[c]);
+    found.insert(KeyOf({low.x - 3 * inner.resolution.x / 2, low.y - 3 * inner.resolution.y / 2,
+                        low.z - 3 * inner.resolution.z / 2}));
+  }
+  EXPECT_EQ(found, expected);
+  EXPECT_GT(outside, 0);
+}
+
+TEST(DensityRates, FallWhereFewPhotosSee) {
+  const ThreeViews three;
+  const TrainingRays rays(three.views());
   const GridFrame frame{{16, 16, 16}, {0, 0, 0}, {1, 1, 1}};
-  const FastGrid grid = MakeInitialCells(rays, frame, 2, 1, 0.5f, 0, 1, false);
+  const FastGrid grid = MakeInitialCells(rays, frame, {2, 0}, 1, 0.5f, 0, 1, false);
   ASSERT_EQ(grid.density_rate.size(), grid.cells.num_vertices());
   float least = 2, most = 0;
   for (const float rate : grid.density_rate) {
