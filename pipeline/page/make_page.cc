@@ -12,6 +12,7 @@
 #include "pipeline/fields/field_file.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/page/check_page.h"
+#include "pipeline/page/keyframes.h"
 #include "pipeline/page/page_file.h"
 #include "pipeline/run/run_file.h"
 #include "pipeline/workspace/style_folders.h"
@@ -109,6 +110,7 @@ MadePage MakePage(const std::string& folder, const std::vector<std::string>& sty
           CheckLine("its style " + styles[i], CheckPage(exact, style.styled, checked)));
     }
     style.styled = {};
+    style.header["id"] = PageStyleId(style_folder);
     content.styles.push_back(std::move(style));
   }
   ReportOrThrow(progress, steps - 1, steps);

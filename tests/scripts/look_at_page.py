@@ -116,11 +116,29 @@ def check_input(page):
     if not away:
         found.append("the view leaves its fence")
     path = page.value("(() => { add_key.click(); home.click(); add_key.click(); const t = regradePage.path.text(['a']);"
-                      "regradePage.path.read(t, 1); return regradePage.path.text(['a']) === t && "
+                      "regradePage.path.read(t, ['a']); return regradePage.path.text(['a']) === t && "
                       "regradePage.path.keyframes.length === 2 })()")
     if not path:
         found.append("a camera path does not come back from its text")
     return found
+
+
+def check_path(page, folder):
+    """Places, directions, angles and weights along a camera path are those of the program, to rounding."""
+    with open(os.path.join(folder, "camera_path.json"), encoding="utf-8") as file:
+        text = file.read()
+    with open(os.path.join(folder, "places.json"), encoding="utf-8") as file:
+        want = json.load(file)
+    got = page.value("(() => { const path = regradePage.path, view = regradePage.view, kept = path.keyframes; path.read(" +
+                     json.dumps(text) + ", ['a', 'b']); const all = " + json.dumps([row[0] for row in want]) +
+                     ".map((t) => { const k = path.at(t), to = Object.create(view); Object.assign(to, {eye: k.eye, "
+                     "forward: k.forward, top: k.up, half: k.half}); const at = to.at(48, 36), r = at.rotation; return [t, "
+                     "...k.eye, ...k.forward, ...k.up, ...k.half, ...k.weights, at.lens[0], r[0], r[3], r[6], r[1], r[4], "
+                     "r[7], r[2], r[5], r[8]] }); path.keyframes = kept; return all })()")
+    worst = max(abs(a - b) for one, two in zip(got, want) for a, b in zip(one, two))
+    print(f"  camera path: {len(want)} moments, {len(want[0])} numbers each, worst difference {worst:.1e}")
+    # Numbers of about 1, focal lengths of about 50 pixels: sums of a few terms in double precision.
+    return [] if len(got) == len(want) and worst < 1e-12 else [f"a camera path differs from the program's by {worst}"]
 
 
 def check_lost_context(page):
@@ -180,7 +198,7 @@ def check_folder(browser, arguments, scratch):
             if size_name == "phone":
                 here += compare_pictures(page, views)
             elif number == 0:
-                here += check_input(page) + check_lost_context(page)
+                here += check_input(page) + check_path(page, arguments.folder) + check_lost_context(page)
             if arguments.shots:
                 wait_until(page, "regradePage.painter.settled")
                 page.shot(os.path.join(arguments.shots, f"{name}_{size_name}.png"))

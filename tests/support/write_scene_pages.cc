@@ -3,6 +3,7 @@
 //
 // FOLDER/NAME.html, and FOLDER/NAME.json: views with the page's lens, place and weights, and
 // their pixels, RGB of 8 bits in base64, of the field and the style as the page has them.
+// FOLDER/camera_path.json, and places.json: what this program computes along it.
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -11,11 +12,13 @@
 #include "kernels/field/pad_sh_basis.h"
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/images/image_file.h"
+#include "pipeline/page/keyframes.h"
 #include "pipeline/page/page_file.h"
 #include "pipeline/report/html_text.h"
 #include "stylize/field/blend_fields.h"
 #include "stylize/training/initial_network.h"
 #include "tests/support/cell_field.h"
+#include "tests/support/keyframes.h"
 
 namespace regrade {
 namespace {
@@ -95,6 +98,7 @@ void WritePages(const std::string& folder, const std::string& name, const Radian
   content.field = EncodeField(field, 0.03);
   RadianceField page = DecodeField(content.field);
   content.styles = {EncodeStyle(Style(), page, 0.5)};
+  content.styles[0].header["id"] = "a";
   const Image picture(8, 6, 3);
   content.poster = EncodeJpeg(picture, 80);
   content.style_pictures = {content.poster};
@@ -108,6 +112,29 @@ void WritePages(const std::string& folder, const std::string& name, const Radian
   const PageCheck check{48, 50, 3};
   WriteFileAtomically(folder + "/" + name + ".html", PageHtml(content, &check));
   WriteJsonFile(folder + "/" + name + ".json", JsonValue(std::move(views)));
+}
+
+// camera_path.json, and places and weights along it.
+void WritePath(const std::string& folder) {
+  const JsonValue json = testing::SomeKeyframes();
+  WriteJsonFile(folder + "/camera_path.json", json);
+  const KeyframePath path = ReadKeyframePath(folder + "/camera_path.json");
+  JsonValue::Array table;
+  constexpr int kMoments = 45;
+  for (int i = -1; i <= kMoments; ++i) {
+    const Keyframe key = path.At(path.Seconds() * i / (kMoments - 1));
+    std::vector<double> row{key.time};
+    for (const Vec3d* v : {&key.eye, &key.forward, &key.up})
+      for (int a = 0; a < 3; ++a) row.push_back((*v)[a]);
+    for (const double half : key.half) row.push_back(half);
+    for (const double weight : key.weights) row.push_back(weight);
+    const Camera camera = CameraOfKeyframe(key, kWidth, kHeight, {});
+    row.push_back(camera.fx);
+    for (const Vec3d& axis : camera.camera_from_world.rotation.row)
+      for (int a = 0; a < 3; ++a) row.push_back(axis[a]);
+    table.emplace_back(JsonValue::Array(row.begin(), row.end()));
+  }
+  WriteJsonFile(folder + "/places.json", JsonValue(std::move(table)));
 }
 
 }  // namespace
@@ -130,5 +157,6 @@ int main(int argc, char** argv) {
   RadianceField far = testing::RandomField({9, 8, 11}, 9, 0.3, 7);
   testing::AddSpheres(5, 12, 0.7, 8, &far);
   WritePages(folder, "spheres", far, false);
+  WritePath(folder);
   return 0;
 }

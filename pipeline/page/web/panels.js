@@ -104,7 +104,7 @@ function bindPath(path, state, header, place, weights, go, changed) {
     const file = event.target.files[0];
     if (!file) return;
     try {
-      path.read(await file.text(), header.styles.length);
+      path.read(await file.text(), header.styles.map((s) => s.id));
       refresh();
     } catch (error) {
       if (!(error instanceof PageError)) throw error;
