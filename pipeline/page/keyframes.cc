@@ -22,8 +22,7 @@ constexpr double kSumSlack = 1e-6;  // weights are written with eight digits
 
 [[noreturn]] void Refuse(const std::string& why, const JsonValue& value,
                          const std::string& where) {
-  throw InputError(why, value.line() > 0 ? Concat(where, ":", value.line()) : where,
-                   kRemedy);
+  throw InputError(why, value.line() > 0 ? Concat(where, ":", value.line()) : where, kRemedy);
 }
 
 double NumberIn(const JsonValue& value, double least, double most, const std::string& where) {
@@ -58,7 +57,8 @@ std::vector<double> WeightsOf(const JsonValue& value, size_t styles, const std::
   if (weights.size() != styles)
     Refuse(Concat("a keyframe has ", weights.size(), " weights for ", styles, " styles"), value,
            where);
-  if (sum > 1 + kSumSlack) Refuse("the weights of a keyframe add up to more than 1", value, where);
+  if (sum > 1 + kSumSlack)
+    Refuse("the weights of a keyframe add up to more than 1", value, where);
   if (sum > 1)
     for (double& weight : weights) weight /= sum;
   return weights;
@@ -91,8 +91,7 @@ Vec3d Spline(const Vec3d& a, const Vec3d& b, const Vec3d& c, const Vec3d& d, dou
 KeyframePath PathOf(const JsonValue& json, const std::string& where) {
   const JsonValue *format = json.Find("format"), *version = json.Find("version");
   if (format == nullptr || !(*format == JsonValue(kFormat)))
-    throw InputError("is no camera path of a page", where,
-                     kRemedy);
+    throw InputError("is no camera path of a page", where, kRemedy);
   if (version == nullptr || !(*version == JsonValue(kVersion)))
     throw InputError("is a camera path of another version of regrade", where,
                      "save the path again with a page of this version");

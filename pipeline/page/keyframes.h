@@ -18,9 +18,9 @@ inline constexpr double kLongestPath = 3600;  // seconds
 
 struct Keyframe {
   double time = 0;
-  Vec3d eye, forward, up;        // the last two of unit length, not parallel
-  double half[2] = {1, 1};       // tangents of half the angles of view, across and down
-  std::vector<double> weights;   // of each style; the rest to 1 is the unstyled scene
+  Vec3d eye, forward, up;       // the last two of unit length, not parallel
+  double half[2] = {1, 1};      // tangents of half the angles of view, across and down
+  std::vector<double> weights;  // of each style; the rest to 1 is the unstyled scene
 };
 
 struct KeyframePath {

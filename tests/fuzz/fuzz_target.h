@@ -48,9 +48,11 @@ std::vector<FuzzTarget> CommandLineTargets();
 std::vector<FuzzTarget> FieldTargets();
 std::vector<FuzzTarget> FlowTargets();
 std::vector<FuzzTarget> JsonTargets();
+std::vector<FuzzTarget> PageTargets();
 std::vector<FuzzTarget> PictureTargets();
 std::vector<FuzzTarget> PoseTableTargets();
 std::vector<FuzzTarget> RecordTargets();
+std::vector<FuzzTarget> RequestTargets();
 std::vector<FuzzTarget> StateTargets();
 
 template <typename... Lists>
@@ -67,7 +69,8 @@ inline std::vector<FuzzTarget> ReaderTargets() {
                 PictureTargets);
 }
 inline std::vector<FuzzTarget> ProgramTargets() {
-  return Joined(RecordTargets, FlowTargets, StateTargets, CommandLineTargets);
+  return Joined(RecordTargets, PageTargets, RequestTargets, FlowTargets, StateTargets,
+                CommandLineTargets);
 }
 
 }  // namespace regrade::testing

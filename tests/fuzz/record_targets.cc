@@ -171,7 +171,7 @@ std::vector<FuzzTarget> RecordTargets() {
   return {{"transforms_json", TransformsSeeds, ReadTransforms, MutateJson},
           {"run_json", RunSeeds, ReadRun, MutateJson, 5000},
           {"stage_record", RecordSeeds, ReadRecord, MutateJson, 25000},
-          {"camera_path", PathSeeds, ReadPath, MutateJson, 20000},
+          {"camera_path", PathSeeds, ReadPath, MutateJson, 3000},
           {"capture_index", IndexSeeds, ReadIndex, MutateJson}};
 }
 

@@ -38,7 +38,8 @@ TEST(Keyframes, ThePathPassesThroughThem) {
   EXPECT_LT(Norm(after.eye - path.keyframes[3].eye), 1e-12);
 }
 
-// On a straight line at even places Catmull and Rom's curve is the line, in its middle interval.
+// On a straight line at even places Catmull and Rom's curve is the line, in its middle
+// interval.
 TEST(Keyframes, BetweenEvenPlacesOfALineItIsTheLine) {
   JsonValue json = SomeKeyframes();
   for (int i = 0; i < 4; ++i)

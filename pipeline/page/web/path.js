@@ -6,7 +6,10 @@ const spline = (a, b, c, d, t) =>
                                                         t * (3 * (b[i] - c[i]) + d[i] - a[i]))));
 
 class CameraPath {
-  constructor() { this.keyframes = []; }
+  constructor() {
+    this.keyframes = [];
+    this.fps = 30;
+  }
   get seconds() { return this.keyframes.length ? this.keyframes[this.keyframes.length - 1].time : 0; }
   add(place, weights) {
     this.keyframes.push({time: this.keyframes.length ? this.seconds + 2 : 0, ...place, weights});
@@ -32,7 +35,7 @@ class CameraPath {
   text(styles) {
     const round = (v) => v.map((x) => Number(x.toPrecision(8)));
     return JSON.stringify({
-      format: 'regrade camera path', version: 1, styles,
+      format: 'regrade camera path', version: 1, frames_per_second: this.fps, styles,
       keyframes: this.keyframes.map((k) => ({
         time: k.time, eye: round(k.eye), forward: round(k.forward), up: round(k.up),
         half_width: k.half[0], half_height: k.half[1], weights: round(k.weights)}))}, null, 1) + '\n';
@@ -62,5 +65,6 @@ class CameraPath {
       return {time, eye: k.eye, forward: unit(k.forward), up: unit(k.up), half: [k.half_width, k.half_height], weights};
     });
     this.keyframes = keys;
+    if (json.frames_per_second >= 1 && json.frames_per_second <= 240) this.fps = json.frames_per_second;
   }
 }
