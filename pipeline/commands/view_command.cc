@@ -1,11 +1,16 @@
 // regrade view: the page of a scene, served to a browser on this machine, which learns styles
 // from pictures that are dropped on it.
+#include <fcntl.h>
+#include <signal.h>
+#include <spawn.h>
 #include <stdlib.h>
+#include <unistd.h>
 
+#include <cstring>
 #include <filesystem>
+#include <optional>
 
 #include "kernels/base/error.h"
-#include "kernels/process/child_process.h"
 #include "pipeline/commands/command.h"
 #include "pipeline/commands/page_styles.h"
 #include "pipeline/files/atomic_file.h"
@@ -55,6 +60,30 @@ class OpeningFile {
   std::string folder_;
 };
 
+// In a session of its own, which stays when this program ends; nobody waits for it.
+void StartBrowser(const std::string& file, Console* console) {
+  posix_spawn_file_actions_t actions;
+  posix_spawnattr_t attributes;
+  if (::posix_spawn_file_actions_init(&actions) != 0 ||
+      ::posix_spawnattr_init(&attributes) != 0)
+    throw ResourceError("out of memory");
+  for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
+    ::posix_spawn_file_actions_addopen(&actions, fd, "/dev/null", O_RDWR, 0);
+  ::posix_spawn_file_actions_addclosefrom_np(&actions, STDERR_FILENO + 1);
+  sigset_t all;
+  ::sigfillset(&all);
+  ::posix_spawnattr_setsigdefault(&attributes, &all);
+  ::posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSID | POSIX_SPAWN_SETSIGDEF);
+  std::string program = "xdg-open", path = file;
+  char* const words[] = {program.data(), path.data(), nullptr};
+  pid_t browser = 0;
+  const int status = ::posix_spawnp(&browser, words[0], &actions, &attributes, words, environ);
+  ::posix_spawn_file_actions_destroy(&actions);
+  ::posix_spawnattr_destroy(&attributes);
+  if (status != 0)
+    console->Warn(Concat("no browser was opened: xdg-open: ", std::strerror(status)));
+}
+
 }  // namespace
 
 void RunView(const Command& command, const Arguments& arguments, Console* console) {
@@ -79,9 +108,7 @@ void RunView(const Command& command, const Arguments& arguments, Console* consol
   std::optional<OpeningFile> file;
   if (view.browse) {
     file.emplace(server.Address());
-    const ChildResult opened =
-        RunChild({.argv = {"xdg-open", file->path()}, .wall_limit_s = 20});
-    if (!opened.Succeeded()) console->Warn("no browser was opened: " + opened.Describe());
+    StartBrowser(file->path(), console);
   }
   server.Run([] { return !StopRequested(); });
   console->Info("stopped");

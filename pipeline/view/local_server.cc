@@ -177,7 +177,7 @@ struct LocalServer::State {
   std::string token;
   asio::io_context context{1};
   tcp::acceptor acceptor{context};
-  asio::steady_timer timer{context};
+  asio::steady_timer timer{context}, pause{context};
   int port = 0, connections = 0;
 
   Gate OwnGate() const { return {routes, token, port}; }
@@ -274,7 +274,10 @@ void LocalServer::State::Accept() {
     if (!acceptor.is_open()) return;
     if (!error)
       std::make_shared<Connection>(std::move(socket), OwnGate(), &connections)->Start();
-    Accept();
+    if (!error) return Accept();
+    // Of files, for example, there are no more: some are closed soon.
+    pause.expires_after(std::chrono::milliseconds(100));
+    pause.async_wait([this](const beast::error_code&) { Accept(); });
   });
 }
 
