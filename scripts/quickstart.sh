@@ -56,6 +56,8 @@ options=(--preset draft)
 
 "$regrade" run "$photos" --style "$style" "${options[@]}" "$@"
 
+# As a shell reads it back.
+for name in regrade photos style out build; do printf -v "$name" '%q' "${!name}"; done
 cat <<END
 
 To go on, for example:

@@ -17,13 +17,13 @@ struct StageFacts {
   const char* words;
   double part;
 };
-constexpr StageFacts kFacts[] = {{"finding where each photo was taken", 0.17},
-                                 {"fitting the scene to the photos", 0.33},
+constexpr StageFacts kFacts[] = {{"finding where each photo was taken", 0.12},
+                                 {"fitting the scene to the photos", 0.22},
                                  {"recolouring each photo", 0.01},
-                                 {"applying the style to the scene", 0.15},
-                                 {"rendering frames and films", 0.22},
+                                 {"applying the style to the scene", 0.10},
+                                 {"rendering frames and films", 0.37},
                                  {"measuring", 0.11},
-                                 {"writing the report", 0.01}};
+                                 {"writing the report", 0.07}};
 
 size_t PlaceOf(const std::string& stage) {
   const auto* found = std::find(std::begin(kStageNames), std::end(kStageNames), stage);
