@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "kernels/base/error.h"
-#include "pipeline/fields/network_file.h"
+#include "pipeline/fields/network_checkpoint.h"
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/images/image_format.h"
@@ -15,6 +15,7 @@
 #include "pipeline/report/html_text.h"
 #include "pipeline/workspace/output_names.h"
 #include "pipeline/workspace/style_folders.h"
+#include "pipeline/workspace/workspace.h"
 
 namespace regrade {
 namespace {
@@ -92,6 +93,7 @@ std::vector<Route> ViewSession::Routes() {
            [this](const HttpRequest& request) { return TakePath(request); }},
           {"GET", "/job", 0, false, [this](const HttpRequest&) { return JobState(); }},
           {"DELETE", "/job", 0, false, cancel},
+          {"GET", "/learning", 0, false, [this](const HttpRequest&) { return StyleSoFar(); }},
           {"GET", "/style", 0, false, style},
           {"GET", "/film", 0, false, film}};
 }
@@ -120,9 +122,29 @@ HttpResponse ViewSession::TakePicture(const HttpRequest& request) {
       });
   if (!fs::exists(picture)) WriteFileAtomically(picture, request.body);
   const std::string name = NameStyles(folder_, {picture}, "")[0].name;
+  learning_ = StyleFolder(folder_, name);
+  step_ = -1;
   return Accepted(job_.Start(
       "style", {"stylize", folder_, "--style", picture, "--name", name, "--until", "stylize"},
-      [this, name] { StyleLearned(name); }));
+      [this, folder = learning_] {
+        const std::string style =
+            StyleJson(ReadNetworkFile(folder + "/network.npz"), PageStyleId(folder));
+        const std::lock_guard lock(mutex_);
+        style_ = style;
+      }));
+}
+
+HttpResponse ViewSession::StyleSoFar() {
+  const auto nothing = [] { return HttpResponse{.status = 204}; };
+  if (!job_.Running() || learning_.empty()) return nothing();
+  const auto bytes = Workspace::PeekCheckpoint(learning_, "stylize");
+  const auto state = bytes ? UnpackTrainingState(*bytes) : std::nullopt;
+  if (!state || state->step == step_) return nothing();
+  step_ = state->step;
+  HttpResponse response;
+  response.body =
+      StyleJson({LipschitzNetwork(state->network), 0, field_.background}, "learning");
+  return response;
 }
 
 HttpResponse ViewSession::TakePath(const HttpRequest& request) {
@@ -137,6 +159,7 @@ HttpResponse ViewSession::TakePath(const HttpRequest& request) {
                }) +
       ".json";
   WriteFileAtomically(path, request.body);
+  learning_.clear();
   return Accepted(job_.Start("film", {"render", folder_, "--path", path}, [this, path] {
     const std::lock_guard lock(mutex_);
     film_ = fs::path(path).replace_extension(".mp4").string();
@@ -157,13 +180,11 @@ HttpResponse ViewSession::JobState() const {
   return response;
 }
 
-void ViewSession::StyleLearned(const std::string& name) {
-  const std::string folder = StyleFolder(folder_, name);
-  PageStyle style = EncodeStyle(ReadNetworkFile(folder + "/network.npz"), field_, 1);
-  style.header["id"] = PageStyleId(folder);
+std::string ViewSession::StyleJson(const StoredNetwork& network, const std::string& id) const {
+  PageStyle style = EncodeStyle(network, field_, 1);
+  style.header["id"] = id;
   style.header["weights"] = Base64(style.packed);
-  const std::lock_guard lock(mutex_);
-  style_ = DumpJson(style.header, -1);
+  return DumpJson(style.header, -1);
 }
 
 }  // namespace regrade

@@ -7,6 +7,7 @@
 //   POST /film    camera_path.json; `regrade render --path` writes films/. The answer is a job
 //   GET /job      the job's state
 //   DELETE /job   cancels it
+//   GET /learning the network of the style that is being learned, so far, or nothing new
 //   GET /style    the network of the style that was learned last, as the page holds it
 //   GET /film     the film that was rendered last
 #pragma once
@@ -17,6 +18,7 @@
 
 #include "kernels/base/progress.h"
 #include "kernels/field/radiance_field.h"
+#include "pipeline/fields/network_file.h"
 #include "pipeline/view/local_server.h"
 #include "pipeline/view/view_job.h"
 
@@ -38,13 +40,16 @@ class ViewSession {
   HttpResponse TakePicture(const HttpRequest& request);
   HttpResponse TakePath(const HttpRequest& request);
   HttpResponse JobState() const;
-  void StyleLearned(const std::string& name);
+  HttpResponse StyleSoFar();
+  std::string StyleJson(const StoredNetwork& network, const std::string& id) const;
 
   const std::string folder_;
   std::string page_;
   RadianceField field_;       // the page's
   mutable std::mutex mutex_;  // of what follows: jobs end on their own thread
   std::string style_, film_;  // JSON; the file's path
+  std::string learning_;      // the style's folder
+  int64_t step_ = -1;         // of what StyleSoFar told last
   ViewJob job_;               // last: ends before the rest
 };
 

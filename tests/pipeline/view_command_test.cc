@@ -2,6 +2,7 @@
 // that `regrade render --path` makes, and nothing is written elsewhere.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <filesystem>
@@ -98,6 +99,8 @@ TEST(ViewCommand, ADroppedPictureBecomesAStyleAndAPathTheFilmOfRender) {
   std::vector<std::string> reconstruct{"reconstruct", folder / "s/truth", "--out",
                                        folder / "e"};
   for (const std::string& flag : testing::TinyFlags()) reconstruct.push_back(flag);
+  // So long that the style can be watched: its network comes every 50 steps.
+  *std::next(std::ranges::find(reconstruct, "--style-steps")) = "250";
   const testing::ProgramOutcome made = regrade(reconstruct);
   ASSERT_EQ(made.code, 0) << made.text;
   const auto before = OtherFiles(folder / "");
@@ -122,6 +125,11 @@ TEST(ViewCommand, ADroppedPictureBecomesAStyleAndAPathTheFilmOfRender) {
   const std::string hostile_name = "Regrade-Name: ../../.. /an evil name.png\r\n";
   EXPECT_EQ(StatusOf(view.Ask("POST", "/style", picture, hostile_name)), 202);
   EXPECT_EQ(StatusOf(view.Ask("POST", "/style", picture)), 409);
+  int so_far = 0;
+  while (ParseJson(BodyOf(view.Ask("GET", "/job")), "job").At("state") == JsonValue("running"))
+    so_far += StatusOf(view.Ask("GET", "/learning")) == 200;
+  EXPECT_GE(so_far, 1);
+  EXPECT_EQ(StatusOf(view.Ask("GET", "/learning")), 204);
   JsonValue job = view.Finished();
   ASSERT_EQ(job.At("state").AsString(), "done") << DumpJson(job);
   EXPECT_TRUE(fs::exists(folder / "e/styles/an_evil_name/network.npz"));

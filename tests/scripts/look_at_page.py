@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Opens scene pages in headless Chromium and compares their pictures with the program's own.
 
-  look_at_page.py FOLDER [--shots FOLDER] [--chromium PROGRAM]
+  look_at_page.py FOLDER [--shots FOLDER] [--restyles N] [--chromium PROGRAM]
 
 FOLDER is write_scene_pages's: pages NAME.html with views and pixels in NAME.json. Checked of each page: its pictures,
 nothing asked of the network, nothing on the console (a violation of the page's policy is an error there), no scrolling
@@ -227,6 +227,21 @@ def check_film(page, folder, shots):
     return [] if film["worst"] >= 35 else [f"a frame of the film is {film['worst']:.1f} dB from the page"]
 
 
+def check_growth(page, restyles):
+    """200 drags of the slider and some styles, one in the place of the other, take no more memory than the first."""
+    page.value("""(async () => {
+      const p = regradePage, style = {...p.header.styles[0], weights: network_0.textContent}, sizes = [];
+      const size = () => [p.graphics.bytes, document.querySelectorAll('*').length, p.header.styles.length];
+      for (let i = 0; i < RESTYLES; ++i) { await p.putStyle(1, style); if (i === 0 || i === RESTYLES - 1) sizes.push(size()) }
+      for (let i = 0; i < 200; ++i) { style0.value = i % 101; style0.dispatchEvent(new Event('input')) }
+      sizes.push(size());
+      p.removeStyle(1);
+      p.sizes = sizes })(); 0""".replace("RESTYLES", str(restyles)))
+    wait_until(page, "!!regradePage.sizes")
+    sizes = page.value("regradePage.sizes")
+    return [] if sizes[0] == sizes[1] == sizes[2] else [f"memory grows: bytes, elements and styles {sizes}"]
+
+
 def check_lost_context(page):
     page.value("(() => { const c = canvas.getContext('webgl2').getExtension('WEBGL_lose_context'); "
                "regradePage.picture = null; c.loseContext(); setTimeout(() => c.restoreContext(), 300) })()")
@@ -286,7 +301,7 @@ def check_folder(browser, arguments, scratch):
             elif number == 0:
                 here += check_input(page) + check_path(page, arguments.folder)
                 here += check_colors(page, arguments.folder) + check_film(page, arguments.folder, arguments.shots)
-                here += check_lost_context(page)
+                here += check_growth(page, arguments.restyles) + check_lost_context(page)
             if arguments.shots:
                 wait_until(page, "regradePage.painter.settled")
                 page.shot(os.path.join(arguments.shots, f"{name}_{size_name}.png"))
@@ -304,6 +319,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", help="folder with pages and their views")
     parser.add_argument("--shots", help="folder for screenshots of the pages")
+    parser.add_argument("--restyles", type=int, default=6, help="how often a style is learned again")
     parser.add_argument("--chromium", default=shutil.which("chromium") or shutil.which("chromium-browser"))
     arguments = parser.parse_args()
     if not arguments.chromium:

@@ -19,8 +19,8 @@ class Live {
     const why = await answer.json().catch(() => null);
     throw new PageError(why?.error ?? 'regrade view refuses this');
   }
-  // Waits for the job; false if it was cancelled.
-  async finish(words) {
+  // Waits for the job; false if it was cancelled. `meanwhile` runs now and then.
+  async finish(words, meanwhile) {
     const cancel = element('cancel');
     cancel.hidden = false;
     cancel.onclick = () => this.ask('DELETE', '/job').catch(() => {});
@@ -30,6 +30,7 @@ class Live {
         if (job.state === 'failed') throw new PageError(job.error || 'it failed');
         if (job.state !== 'running') return job.state === 'done';
         say(words + (job.stage ? ' ' + Math.round(100 * job.part) + ' %' : '') + (job.note ? ', ' + job.note : ''));
+        await meanwhile?.(job);
         await new Promise((done) => setTimeout(done, 500));
       }
     } finally {
@@ -37,12 +38,17 @@ class Live {
       say('');
     }
   }
-  // The header of a page's style with its weights, or null.
-  async learn(file) {
+  // The header of a page's style with its weights, or null. `soFar` gets those of the training.
+  async learn(file, soFar) {
     if (file.size > 32 << 20) throw new PageError('this picture is larger than 32 MB');
     const name = file.name.normalize('NFKD').replace(/[^\w.-]+/g, '_').slice(-80);
     await this.ask('POST', '/style', file, {'Regrade-Name': name});
-    if (!await this.finish('The style is being learned:')) return null;
+    const peek = async (job) => {
+      if (job.stage !== 'stylize') return;
+      const style = await this.ask('GET', '/learning').then((answer) => answer.status === 200 ? answer.json() : null).catch(() => null);
+      if (style) await soFar(style);
+    };
+    if (!await this.finish('The style is being learned:', peek)) return null;
     return (await this.ask('GET', '/style')).json();
   }
   async film(text) {

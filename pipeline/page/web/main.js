@@ -51,11 +51,21 @@ async function start(page) {
     });
     return rest > 1e-6 || sets.length === 0 ? [{weight: Math.max(rest, 0), colors: scene.source}, ...sets] : sets;
   }
+  const free = (set) => {
+    for (const texture of [set?.first, set?.second, set?.texel]) if (texture) graphics.free(texture);
+  };
+  const forget = (i) => {
+    free(colors[i]);
+    colors[i] = loading[i] = null;
+  };
   function load(i) {
     return loading[i] ??= styleColors(graphics, scene, header.styles[i], 'network_' + i, (part) => {
       say(part < 1 ? 'Style ' + (i + 1) + ' is being applied: ' + Math.round(100 * part) + ' %' : '');
     }).then((made) => {
       colors[i] = made;
+      // Of many styles those that no slider shows make room.
+      if (colors.filter(Boolean).length > 3)
+        colors.forEach((c, k) => { if (c && k !== i && !state.axes.includes(k)) forget(k); });
       say('');
       painter.change();
     }).catch(fail);
@@ -89,32 +99,59 @@ async function start(page) {
     changed();
   };
   bindPath(path, state, header, () => view.save(), weights, take, changed);
-  // A style that the program behind the page has learned.
-  const addStyle = async (style) => {
-    const i = header.styles.length, {weights: packed, ...rest} = style;
+  // A style that the program behind the page has learned, or is learning; the last one, or a new one.
+  const putStyle = async (i, {weights: packed, ...style}) => {
+    const isNew = i === header.styles.length, before = colors[i];
     element('network_' + i)?.remove();
     document.body.append(make('script', {type: 'application/octet-stream', id: 'network_' + i, textContent: packed}));
-    page.added.push(rest);
-    header.styles.push(rest);
-    colors.push(null);
-    loading.push(null);
+    if (isNew) {
+      colors.push(null);
+      loading.push(null);
+    } else {
+      loading[i] = null;  // what is shown stays until the next one is ready
+      page.added.pop();
+      header.styles.pop();
+    }
+    page.added.push(style);
+    header.styles.push(style);
     await load(i);
+    free(before);
+    if (!isNew) return;
     const axis = Math.min(i, 1);
-    state.axes = axis === 0 ? [0, 1] : [state.axes[0] === i ? 0 : state.axes[0], i];
+    state.axes = axis === 0 ? [0, 1] : [state.axes[0], i];
     state.amount = [0, 0];
     state.amount[axis] = 1;
     page.clearPicture();
     refreshStyles();
     changed();
   };
+  const removeStyle = (i) => {
+    forget(i);
+    for (const list of [header.styles, page.added, colors, loading]) list.pop();
+    Object.assign(state, {axes: [0, 1], amount: [0, 0]});
+    refreshStyles();
+    changed();
+  };
   const learn = async (file) => {
     if (!page.live) return;
+    if (page.learning) return sayBriefly('Another style is being learned.');
+    page.learning = true;
+    const i = header.styles.length, picture = page.dropped?.url ?? '';
+    let done = false;
     try {
-      const style = await page.live.learn(file);
-      if (style) await addStyle({...style, picture: page.dropped?.url ?? ''});
+      if (i >= 16) throw new PageError('this page has 16 styles; load it again');
+      // Where a pass over the voxels takes long, only the end is shown.
+      const soFar = async (style) => { if (!graphics.onCores) await putStyle(i, {...style, picture}); };
+      const style = await page.live.learn(file, soFar);
+      if (!style) return;
+      done = true;
+      await putStyle(i, {...style, picture});
     } catch (error) {
       if (!(error instanceof PageError)) throw error;
       sayBriefly('The style was not learned: ' + error.message);
+    } finally {
+      page.learning = false;
+      if (!done && header.styles.length > i) removeStyle(i);
     }
   };
   bindPicture(header, page, (map) => {
@@ -136,7 +173,7 @@ async function start(page) {
   };
   // For tests.
   page.moment = pictureOfPath;
-  page.state = state;
+  Object.assign(page, {state, putStyle, removeStyle});
   page.colorMaps = (rows) => rows.map((pair) => {
     const [source, style] = pair.map((n) => ({mean: n.slice(0, 3), covariance: n.slice(3)}));
     const map = colorMap(source, style);
