@@ -36,7 +36,7 @@ class ViewProgram {
     thread_ = std::thread([this, folder] {
       ChildOptions options;
       options.argv = {REGRADE_PROGRAM, "view", folder, "--threads", "2"};
-      options.wall_limit_s = 300;
+      options.wall_limit_s = 600;
       RunChild(
           options, [this](const std::string& line) { Take(line); }, [this] { return !stop_; });
       ended_ = true;
