@@ -98,6 +98,10 @@ void PrintSummary(const RunContext& context) {
 void RunStyles(const std::string& first, const std::vector<NamedStyle>& styles,
                RunContext* context) {
   const StyleSource given = context->settings.style;
+  const std::string& until = context->settings.start.until;
+  if (Find(until) < Find(first))
+    throw UsageError("stage " + until + " comes before " + first, "--until",
+                     "leave it out, or use `regrade stylize`");
   for (size_t i = 0; i < styles.size(); ++i) {
     const auto& [name, picture] = styles[i];
     const std::string folder = StyleFolder(context->workspace->folder(), name);
@@ -113,9 +117,9 @@ void RunStyles(const std::string& first, const std::vector<NamedStyle>& styles,
     context->settings.style.name = name;
     // From its beginning on the folder belongs to this picture.
     if (!std::filesystem::exists(workspace.Path("run.json"))) WriteRunFile("run", *context);
-    RunPipeline(first, "report", context);
-    if (!context->settings.start.dry_run) {
-      WriteRunFile("run", *context);
+    RunPipeline(first, until, context);
+    if (!context->settings.start.dry_run) WriteRunFile("run", *context);
+    if (!context->settings.start.dry_run && until == "report") {
       PublishStyle(context->workspace->folder(), name);
       PrintSummary(*context);
     }

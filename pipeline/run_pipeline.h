@@ -15,8 +15,8 @@ namespace regrade {
 // stages throw.
 bool RunPipeline(const std::string& first, const std::string& last, RunContext* context);
 
-// The stages from `first` to "report" of each style in turn, in its own folder; each film is
-// copied to the top of the output folder. The scene's stages must be done.
+// The stages from `first` to --until, "report" as a rule, of each style in turn, in its own
+// folder; each film is copied to the top of the output folder. The scene's stages must be done.
 void RunStyles(const std::string& first, const std::vector<NamedStyle>& styles,
                RunContext* context);
 

@@ -25,11 +25,11 @@ RULES = (
     (r"(?i)\boutlines?\b(?!\s*:|-)", "silhouette", ["an outline", "Outlines"], ["outline:3px", "outline-offset"]),
     (r"(?i)\bclimb(s|ed|ing)?\b|Climb", "gradient ascent; try further strategies", ["climbed to", "AttemptResult Climb()"], []),
     # Metrics, costs.
-    (r"[\"']figures?[\"']|--figures?\b|\bFigures?\s*[{&*<>(;]|\bk?Figures?[A-Z_]|[a-z_](figure|Figure)s?\b|\bfigures?_|"
+    (r"[\"']figures?[\"']|--figures?\b|\bFigures?\s*[{&*<>(;]|\bk?Figures?[A-Z_]|[a-z_](?<!con)(figure|Figure)s?\b|\bfigures?_|"
      r"\bfigures?[\[(]|\bfigures\.\w|\bfigures?\s=\s",
      "metric", ["report[\"figures\"]", "struct Figure {", "figures = {}", "figures(part)", "kFigures", "figures.json"],
      ["the figures of a run", "Figures are PSNR in dB", "Wu et al., Fig. 3", "<figure>", "figure{margin:0}",
-      "figure+figure", "figure.querySelector(q)"]),
+      "figure+figure", "figure.querySelector(q)", "encoder.configure(c)"]),
     (r"(?i)\bknobs?\b|knobs?_|_knobs?\b", "parameter", ["every knob", "price_knobs"], ["knobbly"]),
     (r"(?i)\bprice(s|d)?\b|\bpricing\b|\bPrice[A-Z]|price_|_prices?\b", "cost",
      ["at the price of", "PriceRow", "PRICES.md", "price_list"], ["enterprise"]),

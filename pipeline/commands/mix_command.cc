@@ -2,11 +2,9 @@
 // into another, and the field of a constant blend.
 #include <algorithm>
 #include <filesystem>
-#include <memory>
 #include <optional>
 
 #include "kernels/base/error.h"
-#include "kernels/field/pad_sh_basis.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/commands/command.h"
 #include "pipeline/commands/mix_keys.h"
@@ -18,6 +16,7 @@
 #include "pipeline/program/device_choice.h"
 #include "pipeline/run/run_settings.h"
 #include "pipeline/stages/film_frames.h"
+#include "pipeline/stages/mixed_film.h"
 #include "pipeline/stages/object_edit.h"
 #include "pipeline/stages/styled_field.h"
 #include "pipeline/workspace/output_names.h"
@@ -88,7 +87,7 @@ MixCameras CamerasOf(const std::string& folder, const StoredField& stored,
 }
 
 void WriteMix(const std::string& out, const RadianceField& source,
-              const std::vector<const RadianceField*>& styles, const MixKeys& keys,
+              const std::vector<StoredField>& styles, const MixKeys& keys,
               const std::vector<float>* object_weights, const MixCameras& cameras, double fps,
               Backend backend, Console* console) {
   std::optional<VideoWriter> film;
@@ -100,25 +99,18 @@ void WriteMix(const std::string& out, const RadianceField& source,
   }
   console->BeginStage("mix");
   const ProgressFunction progress = console->StageProgress();
-  std::vector<double> rendered;
-  std::unique_ptr<FieldRenderer> renderer;
+  MixRenderer mixed(source, styles, object_weights, backend);
   const int frames = static_cast<int>(cameras.film.size());
   for (int i = 0; i < frames; ++i) {
     ReportOrThrow(progress, i, frames);
-    const std::vector<double> weights =
-        keys.At(static_cast<double>(i) / std::max(1, frames - 1));
-    if (!renderer || weights != rendered) {
-      renderer.reset();  // first: a field may need most of the memory
-      renderer = std::make_unique<FieldRenderer>(
-          MixFields(source, styles, weights, object_weights), backend);
-      rendered = weights;
-    }
+    const FieldRenderer& renderer =
+        mixed.With(keys.At(static_cast<double>(i) / std::max(1, frames - 1)));
     const Camera& of_frame = cameras.frames[i];
     const Camera& of_film = cameras.film[i];
-    const Image frame = renderer->Render(of_frame).color;
+    const Image frame = renderer.Render(of_frame).color;
     WritePng8(out + "/frames/" + FrameName(i), frame);
     if (film)
-      film->Add(of_frame.SameIntrinsics(of_film) ? frame : renderer->Render(of_film).color);
+      film->Add(of_frame.SameIntrinsics(of_film) ? frame : renderer.Render(of_film).color);
   }
   if (film) film->Finish();
   console->EndStage();
@@ -171,24 +163,8 @@ void RunMix(const Command& command, const Arguments& arguments, Console* console
     return;
   }
   std::vector<StoredField> styles;
-  std::vector<const RadianceField*> fields;
-  int basis = stored.field.appearance.basis;
-  for (const std::string& style : chosen) {
-    styles.push_back(ReadStyle(folder, style));
-    RadianceField& field = styles.back().field;
-    if (!SameGeometry(*field.geometry, *stored.field.geometry))
-      throw InputError(
-          "is a style of another reconstruction", style,
-          "mixed styles must restyle the same field: make them with `regrade stylize " +
-              folder + "`");
-    field.geometry = stored.field.geometry;
-    basis = std::max(basis, field.appearance.basis);
-  }
-  // Styles of a field without view dependence may have some.
-  stored.field.appearance = PadShBasis(std::move(stored.field.appearance), basis);
-  for (StoredField& style : styles)
-    style.field.appearance = PadShBasis(std::move(style.field.appearance), basis);
-  for (const StoredField& style : styles) fields.push_back(&style.field);
+  for (const std::string& style : chosen) styles.push_back(ReadStyle(folder, style));
+  MakeMixable(folder, chosen, &stored, &styles);
 
   std::optional<ObjectWeights> object;
   if (settings.object) {
@@ -209,9 +185,11 @@ void RunMix(const Command& command, const Arguments& arguments, Console* console
   JsonValue record = JsonValue::Object{{"field", folder}, {"options", options.Values()}};
   for (const std::string& style : chosen) record["styles"].Append(style);
   WriteJsonFile(settings.out + "/mix.json", record);
-  WriteMix(settings.out, stored.field, fields, keys, object_weights, cameras, render.fps,
+  WriteMix(settings.out, stored.field, styles, keys, object_weights, cameras, render.fps,
            backend, console);
   if (keys.IsConstant()) {
+    std::vector<const RadianceField*> fields;
+    for (const StoredField& style : styles) fields.push_back(&style.field);
     StoredField mixed = stored;
     mixed.field = MixFields(stored.field, fields, keys.points[0], object_weights);
     WriteFieldFile(settings.out + "/mixed.npz", mixed);

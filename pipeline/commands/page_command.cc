@@ -1,16 +1,11 @@
 // regrade page: the scene and its styles as one page that a browser opens without a server.
-#include <filesystem>
-
 #include "kernels/base/error.h"
-#include "pipeline/commands/command.h"
+#include "pipeline/commands/page_styles.h"
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/page/make_page.h"
-#include "pipeline/workspace/style_folders.h"
 
 namespace regrade {
 namespace {
-
-namespace fs = std::filesystem;
 
 struct PageFileOptions {
   std::string out;
@@ -23,20 +18,6 @@ struct PageFileOptions {
   }
 };
 
-// All styles of the folder that have a network, or those that were named.
-std::vector<std::string> WantedStyles(const std::string& folder, const Arguments& words) {
-  std::vector<std::string> styles;
-  if (words.size() == 1) {
-    for (const std::string& style : StyleNames(folder))
-      if (const std::string at = StyleFolder(folder, style);
-          fs::exists(at + "/network.npz") && !fs::exists(at + "/object.npz"))
-        styles.push_back(style);
-    return styles;
-  }
-  for (size_t i = 1; i < words.size(); ++i) styles.push_back(ChosenStyle(folder, words[i]));
-  return styles;
-}
-
 }  // namespace
 
 void RunPage(const Command& command, const Arguments& arguments, Console* console) {
@@ -47,13 +28,10 @@ void RunPage(const Command& command, const Arguments& arguments, Console* consol
   options.Add("Page", &file);
   options.Add("Page's size", &page);
   options.Add("Program", &program);
-  constexpr size_t kMostStyles = 16;
-  const auto prepared = Prepare(command, arguments, {.most_words = 1 + kMostStyles}, &options);
+  const auto prepared =
+      Prepare(command, arguments, {.most_words = 1 + kMostPageStyles}, &options);
   if (!prepared) return;
   const std::string& folder = prepared->words[0];
-  if (!fs::exists(folder + "/field.npz"))
-    throw InputError("holds no reconstruction", folder,
-                     "make one with `regrade run` or `regrade reconstruct`");
   const std::vector<std::string> styles = WantedStyles(folder, prepared->words);
   if (!file.dry_run) RequireValue(file.out, "--out", "name the page to write");
   if (file.dry_run) {

@@ -1,4 +1,4 @@
-// regrade render: the frames and films of a style again, or single stills.
+// regrade render: the frames and films of a style again, single stills, or the film of a page.
 #include <algorithm>
 #include <filesystem>
 
@@ -9,7 +9,9 @@
 #include "pipeline/images/still_file.h"
 #include "pipeline/program/device_choice.h"
 #include "pipeline/run/run_settings.h"
+#include "pipeline/stages/mixed_film.h"
 #include "pipeline/stages/styled_field.h"
+#include "pipeline/workspace/output_names.h"
 #include "pipeline/workspace/style_folders.h"
 #include "pipeline/workspace/workspace.h"
 
@@ -34,6 +36,34 @@ struct StillOptions {
     bind("format", format,
          {.help = "of stills; tiff has 16 bits, and all are tagged as sRGB",
           .choices = "png|jpeg|tiff"});
+  }
+};
+
+struct PathFilmOptions {
+  std::string path;
+  int film_size = 1280;
+  double fps = 30;
+  std::string device = "auto";
+  bool dry_run = false;
+
+  template <typename Bind>
+  void Describe(Bind& bind) {
+    bind("path", path,
+         {.help = "a page's camera_path.json: writes its film, rendered exactly, to films/ of "
+                  "the folder, and nothing else"});
+    bind("film-size", film_size,
+         {.unit = "pixels",
+          .help = "longer side of the film; its shape is that of the first keyframe",
+          .min = 16,
+          .max = 8192});
+    bind("fps", fps,
+         {.unit = "frames/s",
+          .help = "frame rate of the film, where the path does not say one",
+          .min = 1,
+          .max = 240});
+    bind("device", device,
+         {.help = "the processor that renders frames", .choices = "auto|cpu|cuda"});
+    bind("dry-run", dry_run, {.help = "prints what would be done, and does nothing"});
   }
 };
 
@@ -75,9 +105,47 @@ void RenderStills(const std::string& folder, const std::string& name,
   }
 }
 
+// --path FILE.json is a page's path; other values are names of paths.
+bool NamesPathFile(const Arguments& arguments) {
+  for (size_t i = 0; i < arguments.size() && arguments[i] != "--"; ++i) {
+    const bool apart = arguments[i] == "--path" && i + 1 < arguments.size();
+    if ((apart && arguments[i + 1].ends_with(".json")) ||
+        (arguments[i].starts_with("--path=") && arguments[i].ends_with(".json")))
+      return true;
+  }
+  return false;
+}
+
+void RenderPath(const Command& command, const Arguments& arguments, Console* console) {
+  PathFilmOptions settings;
+  ProgramOptions program;
+  OptionSet options;
+  options.Add("Film", &settings);
+  options.Add("Program", &program);
+  const auto prepared = Prepare(
+      command, arguments, {.continues_run = true, .taken = {"film-size", "fps"}}, &options);
+  if (!prepared) return;
+  const std::string& folder = prepared->words[0];
+  const KeyframePath path = ReadKeyframePath(settings.path);
+  const double fps = path.fps > 0 && !options.Given("fps") ? path.fps : settings.fps;
+  const PathFilm film = PlanPathFilm(folder, path, settings.film_size, fps);
+  const std::string name =
+      std::string(kFilmsFolder) + "/" + SafeStyleName(settings.path) + ".mp4";
+  const std::string what = Concat(film.frames, " frames of ", film.width, "x", film.height,
+                                  " to ", folder, "/", name);
+  if (settings.dry_run) return console->Info("would render " + what);
+  const Backend backend = ChooseBackend(settings.device, false);
+  const Workspace scene(folder);
+  console->BeginStage("film");
+  WritePathFilm(folder, path, film, backend, scene.NewPath(name), console->StageProgress());
+  console->EndStage();
+  console->Info("rendered " + what);
+}
+
 }  // namespace
 
 void RunRender(const Command& command, const Arguments& arguments, Console* console) {
+  if (NamesPathFile(arguments)) return RenderPath(command, arguments, console);
   const bool stills = std::ranges::any_of(arguments, [](const std::string& word) {
     return word == "--still" || word.starts_with("--still=");
   });

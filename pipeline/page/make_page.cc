@@ -7,11 +7,13 @@
 #include "kernels/base/error.h"
 #include "kernels/field/cpu/render_view.h"
 #include "kernels/field/pad_sh_basis.h"
+#include "kernels/image/color_statistics.h"
 #include "kernels/image/resize.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/fields/field_file.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/page/check_page.h"
+#include "pipeline/page/keyframes.h"
 #include "pipeline/page/page_file.h"
 #include "pipeline/run/run_file.h"
 #include "pipeline/workspace/style_folders.h"
@@ -46,12 +48,15 @@ Image RenderHome(const RadianceField& field, const Camera& home) {
       .color;
 }
 
-std::vector<PagePhoto> PhotosOf(const WorkingViews& views, const std::vector<int>& chosen) {
-  const WorkingViews small = views.AtSize(kThumbnail);
-  std::vector<PagePhoto> photos;
-  for (size_t i = 0; i < chosen.size(); ++i)
-    photos.push_back({static_cast<int>(i), Thumbnail(small.Photo(chosen[i]), kThumbnail)});
-  return photos;
+void AddPhotos(const WorkingViews& views, const std::vector<int>& chosen,
+               PageContent* content) {
+  std::vector<ColorStatistics> parts;
+  for (size_t i = 0; i < chosen.size(); ++i) {
+    const Image photo = views.Photo(chosen[i]);
+    content->photos.push_back({static_cast<int>(i), Thumbnail(photo, kThumbnail)});
+    parts.push_back(MeasureColor(photo));
+  }
+  content->colors = Pool(parts);
 }
 
 std::string CheckLine(const std::string& what, const PageCheck& check) {
@@ -74,12 +79,13 @@ MadePage MakePage(const std::string& folder, const std::vector<std::string>& sty
                                  .InField(stored.field_from_world, stored.ndc);
   PageContent content;
   content.field = EncodeField(stored.field, options.step);
-  const RadianceField page = DecodeField(content.field);
+  RadianceField page = DecodeField(content.field);
   std::vector<int> chosen;
   const int count = std::min(views.count(), kMostPhotos);
   for (int i = 0; i < count; ++i) chosen.push_back(i * views.count() / count);
   for (const int i : chosen) content.cameras.push_back(views.CameraOf(i).Undistorted());
-  content.photos = PhotosOf(views, chosen);
+  AddPhotos(views, chosen, &content);
+  content.served = options.served;
   content.home = HomeCamera(content.cameras);
   const Camera& home = content.cameras[static_cast<size_t>(content.home)];
   const std::vector<Camera> checked =
@@ -109,10 +115,12 @@ MadePage MakePage(const std::string& folder, const std::vector<std::string>& sty
           CheckLine("its style " + styles[i], CheckPage(exact, style.styled, checked)));
     }
     style.styled = {};
+    style.header["id"] = PageStyleId(style_folder);
     content.styles.push_back(std::move(style));
   }
   ReportOrThrow(progress, steps - 1, steps);
   made.html = PageHtml(content, options.check ? &check : nullptr);
+  made.field = std::move(page);
   made.voxels = content.field.header.At("voxels").AsInt();
   const auto in_text = [](size_t bytes) { return static_cast<int64_t>((bytes + 2) / 3 * 4); };
   made.field_bytes = in_text(content.field.bytes());

@@ -7,12 +7,14 @@
 #include <vector>
 
 #include "kernels/base/progress.h"
+#include "kernels/field/radiance_field.h"
 
 namespace regrade {
 
 struct PageOptions {
   double step = 0.03;
   bool check = false;
+  bool served = false;  // by `regrade view`
 
   template <typename Bind>
   void Describe(Bind& bind) {
@@ -32,6 +34,7 @@ struct MadePage {
   int64_t voxels = 0, field_bytes = 0;  // in the text of the page
   std::vector<int64_t> style_bytes;
   std::vector<std::string> report;  // lines of --check
+  RadianceField field;              // as the page has it
 };
 
 // `styles`: names in `folder`; whole-scene styles only. Throws Error(kInput).

@@ -4,7 +4,8 @@
 namespace regrade {
 
 extern const char kPageTemplate[], kPageCss[], kPageScript[];
+extern const char kOpenTemplate[], kOpenScript[];
 // SHA-256 in hexadecimal digits.
-extern const char kPageCssHash[], kPageScriptHash[];
+extern const char kPageCssHash[], kPageScriptHash[], kOpenScriptHash[];
 
 }  // namespace regrade

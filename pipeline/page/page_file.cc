@@ -69,6 +69,11 @@ JsonValue Header(const PageContent& content, const PageCheck* check) {
     style["picture"] = JpegUrl(content.style_pictures.at(i));
     styles.push_back(std::move(style));
   }
+  JsonValue::Array covariance;
+  for (const Vec3d& row : content.colors.covariance.row)
+    for (int a = 0; a < 3; ++a) covariance.push_back(row[a]);
+  header["colors"] = JsonValue::Object{{"mean", ArrayOf(content.colors.mean)},
+                                       {"covariance", std::move(covariance)}};
   header["photos"] = std::move(photos);
   header["styles"] = std::move(styles);
   header["check"] = check == nullptr
@@ -78,7 +83,24 @@ JsonValue Header(const PageContent& content, const PageCheck* check) {
   return header;
 }
 
+std::string PagePolicy(const std::string& scripts, bool served) {
+  return "default-src 'none'; base-uri 'none'; form-action 'none'; img-src data:; worker-src "
+         "blob:; script-src " +
+         scripts + "; style-src " + PolicyHash(kPageCssHash) +
+         (served ? "; connect-src 'self'" : "");
+}
+
 }  // namespace
+
+std::string OpeningHtml() {
+  std::string html = kOpenTemplate;
+  const std::string place = "@JS@";
+  return html.replace(html.find(place), place.size(), kOpenScript);
+}
+
+std::string OpeningPolicy() {
+  return PagePolicy(PolicyHash(kOpenScriptHash) + " " + PolicyHash(kPageScriptHash), true);
+}
 
 std::string PageHtml(const PageContent& content, const PageCheck* check) {
   std::string sections;
@@ -89,11 +111,7 @@ std::string PageHtml(const PageContent& content, const PageCheck* check) {
   for (const PageSection& section : content.field.sections) add(section.name, section.packed);
   for (size_t i = 0; i < content.styles.size(); ++i)
     add("network_" + std::to_string(i), content.styles[i].packed);
-  const std::string policy =
-      "default-src 'none'; base-uri 'none'; form-action 'none'; img-src data:; worker-src "
-      "blob:; "
-      "script-src " +
-      PolicyHash(kPageScriptHash) + "; style-src " + PolicyHash(kPageCssHash);
+  const std::string policy = PagePolicy(PolicyHash(kPageScriptHash), content.served);
   const std::string scene = InElement(DumpJson(Header(content, check), -1));
   const std::pair<const char*, std::string> parts[] = {
       {"@CSP@", policy},  {"@CSS@", kPageCss},      {"@POSTER@", JpegUrl(content.poster)},

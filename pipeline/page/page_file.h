@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "kernels/image/color_statistics.h"
 #include "kernels/scene/camera.h"
 #include "pipeline/page/check_page.h"
 #include "pipeline/page/field_codec.h"
@@ -26,11 +27,17 @@ struct PageContent {
   std::vector<Camera> cameras;              // of the photos, in the field's frame
   int home = 0;                             // the camera where the page begins
   std::vector<PagePhoto> photos;
-  std::string poster;  // JPEG: the home view
+  std::string poster;      // JPEG: the home view
+  ColorStatistics colors;  // of the photos: what a dropped picture's colours replace
+  bool served = false;     // may ask the server that it came from
 };
 
 // The text of the page. `check` may be null.
 std::string PageHtml(const PageContent& content, const PageCheck* check);
+
+// What `regrade view` answers first, and its policy: it asks for the page and becomes it.
+std::string OpeningHtml();
+std::string OpeningPolicy();
 
 // The camera whose place is nearest to the mean of all, of those that look at what most see.
 int HomeCamera(const std::vector<Camera>& cameras);

@@ -72,6 +72,7 @@ struct RunOptions {
 struct StartOptions {
   std::string config;
   std::string restart_from;
+  std::string until = "report";
   bool dry_run = false;
   bool break_lock = false;
 
@@ -82,6 +83,9 @@ struct StartOptions {
     bind("restart-from", restart_from,
          {.help = "repeats this stage and all later ones, even where they are done",
           .choices = "|pose|reconstruct|style_2d|stylize|render|evaluate|report"});
+    bind("until", until,
+         {.help = "ends each style after this stage; `regrade render` goes on",
+          .choices = "stylize|render|evaluate|report"});
     bind("dry-run", dry_run, {.help = "prints what would be done, and does nothing"});
     bind("break-lock", break_lock,
          {.help = "takes over a folder whose last run died on another machine"});

@@ -21,6 +21,9 @@ inline constexpr char kStyledFilm[] = "styled.mp4", kWipeFilm[] = "source_vs_sty
 // The page to walk in; report.html links to it.
 inline constexpr char kScenePage[] = "scene.html";
 
+// Films of camera paths that were made in a page.
+inline constexpr char kFilmsFolder[] = "films";
+
 // "00007.png"
 inline std::string FrameName(int index) { return Format("%05d.png", index); }
 

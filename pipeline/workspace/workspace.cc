@@ -159,22 +159,36 @@ void Workspace::SaveCheckpoint(const std::string& stage, const JsonValue& inputs
   WriteFileAtomically(CheckpointPath(stage), content);
 }
 
-std::optional<std::string> Workspace::LoadCheckpoint(const std::string& stage,
-                                                     const JsonValue& inputs) const {
-  const std::string path = CheckpointPath(stage);
+namespace {
+
+// Empty `of_inputs`: of any.
+std::optional<std::string> ReadCheckpoint(const std::string& path,
+                                          const std::string& of_inputs) {
   if (!fs::is_regular_file(path)) return std::nullopt;
   std::string blob = ReadWholeFile(path, kMaxCheckpoint);
   const size_t header = kCheckpointMark.size() + 2 * kHashDigits;
   if (blob.size() < header || !blob.starts_with(kCheckpointMark)) return std::nullopt;
   const std::string_view view = blob;
-  const std::string_view of_inputs = view.substr(kCheckpointMark.size(), kHashDigits);
+  const std::string_view inputs = view.substr(kCheckpointMark.size(), kHashDigits);
   const std::string_view of_bytes =
       view.substr(kCheckpointMark.size() + kHashDigits, kHashDigits);
-  if (of_inputs != HashText(HashOf(DumpJson(inputs, -1))) ||
+  if ((!of_inputs.empty() && of_inputs != inputs) ||
       of_bytes != HashText(HashOf(view.substr(header))))
     return std::nullopt;
   blob.erase(0, header);
   return blob;
+}
+
+}  // namespace
+
+std::optional<std::string> Workspace::LoadCheckpoint(const std::string& stage,
+                                                     const JsonValue& inputs) const {
+  return ReadCheckpoint(CheckpointPath(stage), HashText(HashOf(DumpJson(inputs, -1))));
+}
+
+std::optional<std::string> Workspace::PeekCheckpoint(const std::string& folder,
+                                                     const std::string& stage) {
+  return ReadCheckpoint(folder + "/.regrade/checkpoints/" + stage, "");
 }
 
 void Workspace::DropCheckpoint(const std::string& stage) const {

@@ -65,6 +65,9 @@ class Workspace {
   std::optional<std::string> LoadCheckpoint(const std::string& stage,
                                             const JsonValue& inputs) const;
   void DropCheckpoint(const std::string& stage) const;
+  // The newest one of a folder that another process may be working in, of whatever inputs.
+  static std::optional<std::string> PeekCheckpoint(const std::string& folder,
+                                                   const std::string& stage);
 
  private:
   void RefuseOlderRecords() const;

@@ -49,9 +49,11 @@ std::vector<FuzzTarget> CubeTargets();
 std::vector<FuzzTarget> FieldTargets();
 std::vector<FuzzTarget> FlowTargets();
 std::vector<FuzzTarget> JsonTargets();
+std::vector<FuzzTarget> PageTargets();
 std::vector<FuzzTarget> PictureTargets();
 std::vector<FuzzTarget> PoseTableTargets();
 std::vector<FuzzTarget> RecordTargets();
+std::vector<FuzzTarget> RequestTargets();
 std::vector<FuzzTarget> StateTargets();
 
 template <typename... Lists>
@@ -68,7 +70,8 @@ inline std::vector<FuzzTarget> ReaderTargets() {
                 PoseTableTargets, PictureTargets);
 }
 inline std::vector<FuzzTarget> ProgramTargets() {
-  return Joined(RecordTargets, FlowTargets, StateTargets, CommandLineTargets);
+  return Joined(RecordTargets, PageTargets, RequestTargets, FlowTargets, StateTargets,
+                CommandLineTargets);
 }
 
 }  // namespace regrade::testing

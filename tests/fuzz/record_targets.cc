@@ -1,14 +1,17 @@
-// Fuzz targets: transforms.json, run.json, stage records, the index of a capture.
+// Fuzz targets: transforms.json, run.json, stage records, camera paths, the index of a
+// capture.
 #include <cmath>
 #include <filesystem>
 
 #include "pipeline/capture/capture_store.h"
 #include "pipeline/capture/transforms_json.h"
 #include "pipeline/files/json_file.h"
+#include "pipeline/page/keyframes.h"
 #include "pipeline/run/run_file.h"
 #include "pipeline/workspace/stage_record.h"
 #include "tests/fuzz/fuzz_support.h"
 #include "tests/fuzz/mutate.h"
+#include "tests/support/keyframes.h"
 #include "tests/support/synthetic_model.h"
 
 namespace regrade::testing {
@@ -141,12 +144,34 @@ bool ReadIndex(std::string_view bytes) {
   });
 }
 
+// --- camera_path.json
+
+std::vector<std::string> PathSeeds() { return {DumpJson(SomeKeyframes())}; }
+
+bool ReadPath(std::string_view bytes) {
+  return Accepts([bytes] {
+    const KeyframePath path = ParseKeyframePath(bytes, "camera_path.json");
+    for (const double part : {0.0, 0.3, 0.5, 1.0}) {
+      const Keyframe key = path.At(part * path.Seconds());
+      const Camera camera = CameraOfKeyframe(key, 64, 48, NdcSpace());
+      FuzzRequire(std::abs(Norm(camera.Forward()) - 1) < 1e-9 &&
+                      std::abs(Dot(camera.Forward(), camera.Up())) < 1e-9 &&
+                      std::isfinite(Norm(camera.Center())) && camera.fx > 0,
+                  "every moment has a camera");
+      double sum = 0;
+      for (const double weight : key.weights) sum += weight;
+      FuzzRequire(sum <= 1 + 1e-9, "weights can be mixed");
+    }
+  });
+}
+
 }  // namespace
 
 std::vector<FuzzTarget> RecordTargets() {
   return {{"transforms_json", TransformsSeeds, ReadTransforms, MutateJson},
           {"run_json", RunSeeds, ReadRun, MutateJson, 5000},
           {"stage_record", RecordSeeds, ReadRecord, MutateJson, 25000},
+          {"camera_path", PathSeeds, ReadPath, MutateJson, 3000},
           {"capture_index", IndexSeeds, ReadIndex, MutateJson}};
 }
 

@@ -1,4 +1,5 @@
-// regrade mix and contact-sheet over a whole, tiny run: exact ends, and what they refuse.
+// regrade mix, render --path and contact-sheet over a whole, tiny run: exact ends, and what
+// they refuse.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -8,6 +9,8 @@
 #include <iterator>
 
 #include "pipeline/fields/field_file.h"
+#include "pipeline/page/keyframes.h"
+#include "tests/support/keyframes.h"
 #include "tests/support/source_dir.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/tiny_run.h"
@@ -84,6 +87,34 @@ TEST(MixCommand, H49_AFilmBetweenTheSceneAndItsStyle) {
   // The field at the end is the style's file, and the folder of a mix may be used again.
   ASSERT_EQ(Regrade({"mix", folder / "e", "--mix", "1", "--out", folder / "m"}).code, 0);
   EXPECT_EQ(frame("m/mixed.npz"), frame("e/styles/style_sunset/styled.npz"));
+
+  // The film of a page's path from the scene to its style.
+  const std::string id = PageStyleId(folder / "e/styles/style_sunset");
+  JsonValue path = testing::SomeKeyframes();
+  path["styles"] = JsonValue::Array{id, "unknown"};
+  JsonValue::Array keyframes = path.At("keyframes").AsArray();
+  keyframes.resize(2);
+  keyframes[1]["time"] = 0.125;
+  path["keyframes"] = keyframes;
+  WriteJsonFile(folder / "walk 1.json", path);
+  const std::vector<std::string> render{
+      "render", folder / "e", "--path", folder / "walk 1.json", "--film-size", "33"};
+  const ProgramOutcome walked = Regrade(render);
+  ASSERT_EQ(walked.code, 0) << walked.text;
+  EXPECT_NE(walked.text.find("3 frames of 32x24"), std::string::npos) << walked.text;
+  const std::string film = frame("e/films/walk_1.mp4");
+  EXPECT_GT(film.size(), 1000u);
+  ASSERT_EQ(Regrade(render).code, 0);
+  EXPECT_EQ(frame("e/films/walk_1.mp4"), film);  // the same bytes again
+  keyframes[1]["weights"] = JsonValue::Array{0, 1};
+  path["keyframes"] = keyframes;
+  WriteJsonFile(folder / "walk.json", path);
+  const ProgramOutcome unknown =
+      Regrade({"render", folder / "e", "--path", folder / "walk.json"});
+  EXPECT_EQ(unknown.code, 3);
+  EXPECT_NE(unknown.text.find("style 2 of this camera path"), std::string::npos)
+      << unknown.text;
+  EXPECT_FALSE(std::filesystem::exists(folder / "e/films/walk.mp4"));
 
   ProgramOutcome refused =
       Regrade({"mix", folder / "e", "--mix", "0:1.5", "--out", folder / "x"});

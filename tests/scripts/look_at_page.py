@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Opens scene pages in headless Chromium and compares their pictures with the program's own.
 
-  look_at_page.py FOLDER [--shots FOLDER] [--chromium PROGRAM]
+  look_at_page.py FOLDER [--shots FOLDER] [--restyles N] [--chromium PROGRAM]
 
 FOLDER is write_scene_pages's: pages NAME.html with views and pixels in NAME.json. Checked of each page: its pictures,
 nothing asked of the network, nothing on the console (a violation of the page's policy is an error there), no scrolling
@@ -116,11 +116,130 @@ def check_input(page):
     if not away:
         found.append("the view leaves its fence")
     path = page.value("(() => { add_key.click(); home.click(); add_key.click(); const t = regradePage.path.text(['a']);"
-                      "regradePage.path.read(t, 1); return regradePage.path.text(['a']) === t && "
+                      "regradePage.path.read(t, ['a']); return regradePage.path.text(['a']) === t && "
                       "regradePage.path.keyframes.length === 2 })()")
     if not path:
         found.append("a camera path does not come back from its text")
     return found
+
+
+def check_path(page, folder):
+    """Places, directions, angles and weights along a camera path are those of the program, to rounding."""
+    with open(os.path.join(folder, "camera_path.json"), encoding="utf-8") as file:
+        text = file.read()
+    with open(os.path.join(folder, "places.json"), encoding="utf-8") as file:
+        want = json.load(file)
+    got = page.value("(() => { const path = regradePage.path, view = regradePage.view, kept = path.keyframes; path.read(" +
+                     json.dumps(text) + ", ['a', 'b']); const all = " + json.dumps([row[0] for row in want]) +
+                     ".map((t) => { const k = path.at(t), to = Object.create(view); Object.assign(to, {eye: k.eye, "
+                     "forward: k.forward, top: k.up, half: k.half}); const at = to.at(48, 36), r = at.rotation; return [t, "
+                     "...k.eye, ...k.forward, ...k.up, ...k.half, ...k.weights, at.lens[0], r[0], r[3], r[6], r[1], r[4], "
+                     "r[7], r[2], r[5], r[8]] }); path.keyframes = kept; return all })()")
+    worst = max(abs(a - b) for one, two in zip(got, want) for a, b in zip(one, two))
+    print(f"  camera path: {len(want)} moments, {len(want[0])} numbers each, worst difference {worst:.1e}")
+    # Numbers of about 1, focal lengths of about 50 pixels: sums of a few terms in double precision.
+    return [] if len(got) == len(want) and worst < 1e-12 else [f"a camera path differs from the program's by {worst}"]
+
+
+def check_colors(page, folder):
+    """The maps of colours are the program's, and a dropped picture gets one at once."""
+    found = []
+    with open(os.path.join(folder, "colors.json"), encoding="utf-8") as file:
+        rows = json.load(file)
+    got = page.value("regradePage.colorMaps(" + json.dumps([row[:2] for row in rows]) + ")")
+    scale = [max(1, *map(abs, row[2])) for row in rows]
+    worst = max(abs(a - b) / s for one, row, s in zip(got, rows, scale) for a, b in zip(one, row[2]))
+    print(f"  colour maps: {len(rows)}, worst difference {worst:.1e} of the largest number")
+    # The page squares the inner root: half of the digits of double precision.
+    if worst > 1e-7:
+        found.append(f"a map of colours differs from the program's by {worst}")
+    page.value("(async () => { const c = document.createElement('canvas'); c.width = 320; c.height = 180; const x = "
+               "c.getContext('2d'); for (let i = 0; i < 64; ++i) { x.fillStyle = `hsl(${i * 37} 80% ${20 + i % 50}%)`; "
+               "x.fillRect(i * 5, 0, 5, 180) } const b = await new Promise(d => c.toBlob(d)); "
+               "await regradePage.take(new File([b], 'a.png')) })()")
+    before = page.value("JSON.stringify(regradePage.state.map)")
+    seconds = page.value("regradePage.previewTime") / 1000
+    print(f"  dropped picture: its colours after {seconds:.2f} s")
+    if before == "null" or page.value("dropped.hidden"):
+        found.append("a dropped picture changes nothing")
+    page.value("dropped_part.value = 0; dropped_part.dispatchEvent(new Event('input'))")
+    none = page.value("regradePage.state.map.matrix.map((v, i) => Math.abs(v - (i % 4 === 0))).reduce((a, b) => a + b)")
+    page.value("remove_picture.click()")
+    if none != 0 or page.value("regradePage.state.map !== null || !dropped.hidden"):
+        found.append("the picture's slider does not lead back to the scene")
+    page.value("regradePage.take(new File(['no picture'], 'a.txt'))")
+    if "cannot open this picture" not in page.value("message.textContent"):
+        found.append("a file that is no picture is taken for one")
+    return found
+
+
+# Decodes every frame of the film with the browser's decoder, and compares it with the page's own pixels.
+FILM = """(async () => {
+  const p = regradePage, path = p.path, kept = path.keyframes;
+  path.read(%s, ['a', 'b']);
+  path.keyframes = path.keyframes.slice(0, 2);
+  path.keyframes.forEach((k, i) => { k.time = 0.25 * i; k.weights = [i]; });
+  film_size.value = 160;
+  const made = await p.film(), data = new DataView(await made.film.arrayBuffer()), bytes = new Uint8Array(data.buffer);
+  const find = (name) => { for (let i = 0; i < bytes.length - 4; ++i) if ([...name].every((c, k) => bytes[i + k] === c.charCodeAt(0))) return i + 4 };
+  const sizes = find('stsz') + 8, count = data.getUint32(sizes), offset = data.getUint32(find('stco') + 8), setup = find('avcC');
+  let at = offset, worst = 99, frames = 0;
+  const out = [], decoder = new VideoDecoder({output: (f) => out.push(f), error: (e) => { throw e }});
+  decoder.configure({codec: made.codec, codedWidth: made.width, codedHeight: made.height,
+    ...(setup ? {description: bytes.slice(setup, setup + data.getUint32(setup - 8) - 8)} : {})});
+  for (let i = 0; i < count; ++i) {
+    const size = data.getUint32(sizes + 4 + 4 * i);
+    decoder.decode(new EncodedVideoChunk({type: i === 0 ? 'key' : 'delta', timestamp: i, data: bytes.slice(at, at + size)}));
+    at += size;
+  }
+  await decoder.flush();
+  for (const frame of out) {
+    const w = made.width, h = made.height, rgba = new Uint8Array(4 * w * h);
+    await frame.copyTo(rgba, {format: 'RGBA'});
+    const own = await p.moment(path.at(path.seconds * frames / (count - 1)), w, h);
+    let sum = 0;
+    for (let y = 0; y < h; ++y) for (let x = 0; x < w; ++x) for (let c = 0; c < 3; ++c)
+      sum += (rgba[4 * (y * w + x) + c] - own[4 * ((h - 1 - y) * w + x) + c]) ** 2;
+    worst = Math.min(worst, 10 * Math.log10(255 ** 2 * 3 * w * h / Math.max(sum, 1e-9)));
+    frame.close();
+    ++frames;
+  }
+  path.keyframes = kept;
+  let text = '';
+  for (const b of bytes) text += String.fromCharCode(b);
+  return {codec: made.codec, count: made.count, frames, ends: at === bytes.length, worst, width: made.width, data: btoa(text)};
+})()"""
+
+
+def check_film(page, folder, shots):
+    if not page.value("typeof VideoEncoder !== 'undefined'"):
+        return []
+    with open(os.path.join(folder, "camera_path.json"), encoding="utf-8") as file:
+        film = page.value(FILM % json.dumps(file.read()))
+    print(f"  film: {film['codec']}, {film['frames']} of {film['count']} frames, worst {film['worst']:.1f} dB from the page")
+    if shots:
+        with open(os.path.join(shots, "film.mp4"), "wb") as out:
+            out.write(base64.b64decode(film["data"]))
+    # A quarter of a second at 24 a second.
+    if film["count"] != 6 or film["frames"] != 6 or not film["ends"] or film["width"] != 160:
+        return [f"the film has {film['frames']} frames of {film['count']}"]
+    # 4:2:0 and the encoder: what a person takes for the same picture.
+    return [] if film["worst"] >= 35 else [f"a frame of the film is {film['worst']:.1f} dB from the page"]
+
+
+def check_growth(page, restyles):
+    """200 drags of the slider and some styles, one in the place of the other, take no more memory than the first."""
+    page.value("""(async () => {
+      const p = regradePage, style = {...p.header.styles[0], weights: network_0.textContent}, sizes = [];
+      const size = () => [p.graphics.bytes, document.querySelectorAll('*').length, p.header.styles.length];
+      for (let i = 0; i < RESTYLES; ++i) { await p.putStyle(1, style); if (i === 0 || i === RESTYLES - 1) sizes.push(size()) }
+      for (let i = 0; i < 200; ++i) { style0.value = i % 101; style0.dispatchEvent(new Event('input')) }
+      sizes.push(size());
+      p.removeStyle(1);
+      p.sizes = sizes })(); 0""".replace("RESTYLES", str(restyles)))
+    wait_until(page, "!!regradePage.sizes")
+    sizes = page.value("regradePage.sizes")
+    return [] if sizes[0] == sizes[1] == sizes[2] else [f"memory grows: bytes, elements and styles {sizes}"]
 
 
 def check_lost_context(page):
@@ -180,7 +299,9 @@ def check_folder(browser, arguments, scratch):
             if size_name == "phone":
                 here += compare_pictures(page, views)
             elif number == 0:
-                here += check_input(page) + check_lost_context(page)
+                here += check_input(page) + check_path(page, arguments.folder)
+                here += check_colors(page, arguments.folder) + check_film(page, arguments.folder, arguments.shots)
+                here += check_growth(page, arguments.restyles) + check_lost_context(page)
             if arguments.shots:
                 wait_until(page, "regradePage.painter.settled")
                 page.shot(os.path.join(arguments.shots, f"{name}_{size_name}.png"))
@@ -198,6 +319,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", help="folder with pages and their views")
     parser.add_argument("--shots", help="folder for screenshots of the pages")
+    parser.add_argument("--restyles", type=int, default=6, help="how often a style is learned again")
     parser.add_argument("--chromium", default=shutil.which("chromium") or shutil.which("chromium-browser"))
     arguments = parser.parse_args()
     if not arguments.chromium:

@@ -101,7 +101,7 @@ class Browser:
 
 
 class Page:
-    """The report in one tab of one size."""
+    """A file, or an address that begins with http://, in one tab of one size."""
 
     def __init__(self, browser, path, size, script=True):
         self.browser, self.path = browser, path
@@ -115,7 +115,8 @@ class Page:
                   mobile=size[0] < 600)
         if not script:
             self.call("Emulation.setScriptExecutionDisabled", value=True)
-        self.call("Page.navigate", url="file://" + pathname2url(os.path.abspath(path)))
+        served = path.startswith("http://")
+        self.call("Page.navigate", url=path if served else "file://" + pathname2url(os.path.abspath(path)))
         browser.wait_for("Page.loadEventFired")
 
     def call(self, method, **parameters):
@@ -153,7 +154,8 @@ class Page:
             elif method == "Network.requestWillBeSent":
                 address = urlparse(about["request"]["url"])
                 in_folder = address.scheme == "file" and os.path.dirname(address.path) == pathname2url(folder)
-                if address.scheme not in ("data", "about", "blob") and not in_folder:
+                own = self.path.startswith("http://") and address.netloc == urlparse(self.path).netloc
+                if address.scheme not in ("data", "about", "blob") and not in_folder and not own:
                     found.append("requests " + about["request"]["url"][:200])
         return found
 

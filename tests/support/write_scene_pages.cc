@@ -3,19 +3,25 @@
 //
 // FOLDER/NAME.html, and FOLDER/NAME.json: views with the page's lens, place and weights, and
 // their pixels, RGB of 8 bits in base64, of the field and the style as the page has them.
+// FOLDER/camera_path.json, and places.json: what this program computes along it; colors.json:
+// its colour maps.
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
 
+#include "kernels/base/random.h"
 #include "kernels/field/cpu/render_view.h"
 #include "kernels/field/pad_sh_basis.h"
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/images/image_file.h"
+#include "pipeline/page/keyframes.h"
 #include "pipeline/page/page_file.h"
 #include "pipeline/report/html_text.h"
 #include "stylize/field/blend_fields.h"
+#include "stylize/image/monge_kantorovich.h"
 #include "stylize/training/initial_network.h"
 #include "tests/support/cell_field.h"
+#include "tests/support/keyframes.h"
 
 namespace regrade {
 namespace {
@@ -95,9 +101,12 @@ void WritePages(const std::string& folder, const std::string& name, const Radian
   content.field = EncodeField(field, 0.03);
   RadianceField page = DecodeField(content.field);
   content.styles = {EncodeStyle(Style(), page, 0.5)};
+  content.styles[0].header["id"] = "a";
   const Image picture(8, 6, 3);
   content.poster = EncodeJpeg(picture, 80);
   content.style_pictures = {content.poster};
+  content.colors.mean = {0.4, 0.3, 0.5};
+  content.colors.covariance = {{{0.05, 0.02, 0.01}, {0.02, 0.04, 0.01}, {0.01, 0.01, 0.06}}};
   content.photos = {{0, content.poster}, {1, content.poster}};
   JsonValue::Array views;
   page.appearance = PadShBasis(std::move(page.appearance), 9);
@@ -108,6 +117,63 @@ void WritePages(const std::string& folder, const std::string& name, const Radian
   const PageCheck check{48, 50, 3};
   WriteFileAtomically(folder + "/" + name + ".html", PageHtml(content, &check));
   WriteJsonFile(folder + "/" + name + ".json", JsonValue(std::move(views)));
+}
+
+// colors.json: colour maps from the colours of a scene to those of a picture, see EQ(mkl).
+void WriteColorMaps(const std::string& folder) {
+  const auto statistics = [](uint64_t seed, double spread, int rank) {
+    ColorStatistics colors;
+    colors.count = 1000;
+    colors.mean = {0.3 + 0.1 * RandomDouble(seed, 1, 0), 0.5, 0.4};
+    Mat3d root = kZeroMat3d;
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < rank; ++j)
+        root(i, j) = spread * (RandomDouble(seed, 2, static_cast<uint64_t>(3 * i + j)) - 0.5);
+    colors.covariance = root * root.Transposed();
+    return colors;
+  };
+  const auto numbers = [](const Vec3d& v, const Mat3d& m) {
+    std::vector<double> all;
+    for (int a = 0; a < 3; ++a) all.push_back(v[a]);
+    for (const Vec3d& row : m.row)
+      for (int a = 0; a < 3; ++a) all.push_back(row[a]);
+    return JsonValue(JsonValue::Array(all.begin(), all.end()));
+  };
+  JsonValue::Array rows;
+  for (uint64_t seed = 0; seed < 12; ++seed) {
+    // Pictures with colours, a grey scene, a style of one colour, and almost no contrast.
+    const ColorStatistics scene = statistics(seed, seed == 10 ? 0.01 : 0.5, seed == 8 ? 1 : 3);
+    const ColorStatistics style =
+        statistics(seed + 50, seed == 9 ? 0 : 0.6, seed == 11 ? 2 : 3);
+    const MklMap mkl = ComputeMkl(scene, style);
+    rows.emplace_back(JsonValue::Array{numbers(scene.mean, scene.covariance),
+                                       numbers(style.mean, style.covariance),
+                                       numbers(mkl.map.offset, mkl.map.matrix)});
+  }
+  WriteJsonFile(folder + "/colors.json", JsonValue(std::move(rows)));
+}
+
+// camera_path.json, and places and weights along it.
+void WritePath(const std::string& folder) {
+  const JsonValue json = testing::SomeKeyframes();
+  WriteJsonFile(folder + "/camera_path.json", json);
+  const KeyframePath path = ReadKeyframePath(folder + "/camera_path.json");
+  JsonValue::Array table;
+  constexpr int kMoments = 45;
+  for (int i = -1; i <= kMoments; ++i) {
+    const Keyframe key = path.At(path.Seconds() * i / (kMoments - 1));
+    std::vector<double> row{key.time};
+    for (const Vec3d* v : {&key.eye, &key.forward, &key.up})
+      for (int a = 0; a < 3; ++a) row.push_back((*v)[a]);
+    for (const double half : key.half) row.push_back(half);
+    for (const double weight : key.weights) row.push_back(weight);
+    const Camera camera = CameraOfKeyframe(key, kWidth, kHeight, {});
+    row.push_back(camera.fx);
+    for (const Vec3d& axis : camera.camera_from_world.rotation.row)
+      for (int a = 0; a < 3; ++a) row.push_back(axis[a]);
+    table.emplace_back(JsonValue::Array(row.begin(), row.end()));
+  }
+  WriteJsonFile(folder + "/places.json", JsonValue(std::move(table)));
 }
 
 }  // namespace
@@ -130,5 +196,7 @@ int main(int argc, char** argv) {
   RadianceField far = testing::RandomField({9, 8, 11}, 9, 0.3, 7);
   testing::AddSpheres(5, 12, 0.7, 8, &far);
   WritePages(folder, "spheres", far, false);
+  WritePath(folder);
+  WriteColorMaps(folder);
   return 0;
 }

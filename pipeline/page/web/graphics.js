@@ -86,6 +86,11 @@ class Graphics {
       texel.set(set.colors.texelScale, 3 * i);
       for (let c = 0; c < 3; ++c) background[c] += set.weight * set.colors.background[c];
     }
+    if (map) {
+      const flat = background.slice();
+      for (let c = 0; c < 3; ++c)
+        background[c] = Math.max(0, dot(map.matrix.slice(3 * c, 3 * c + 3), flat) + map.offset[c]);
+    }
     gl.uniform1fv(u('uScale'), scale);
     gl.uniform1fv(u('uTexelScale'), texel);
     gl.uniform3fv(u('uWeight'), weight);

@@ -2,7 +2,8 @@
 
 const PAGE_FORMAT = 1;
 
-function readHeader() {
+// `added`: styles that the page has learned since it was opened.
+function readHeader(added) {
   let header = null;
   try { header = JSON.parse(element('scene').textContent); } catch (error) { /* said below */ }
   if (!header || typeof header !== 'object') throw new PageError('a part of the page is damaged: scene');
@@ -13,10 +14,9 @@ function readHeader() {
       !header.resolution.every((n) => n > 0 && n <= 1 << 20) || !header.cameras?.length ||
       !(header.finest === null || header.finest >= 0 && header.finest <= 16) || !header.cameras[header.home])
     throw new PageError('a part of the page is damaged: scene');
+  header.styles.push(...added);
   return header;
 }
-
-function say(text) { element('message').textContent = text; }
 
 function fail(error) {
   const known = error instanceof PageError || error instanceof RangeError;
@@ -26,7 +26,7 @@ function fail(error) {
 }
 
 async function start(page) {
-  const header = readHeader(), canvas = element('canvas');
+  const header = readHeader(page.added ??= []), canvas = element('canvas');
   const gl = canvas.getContext('webgl2', {antialias: false, preserveDrawingBuffer: true, powerPreference: 'high-performance'});
   if (!gl) throw new PageError('this browser has no WebGL 2, or has switched it off');
   if (typeof DecompressionStream === 'undefined') throw new PageError('this browser is too old');
@@ -51,28 +51,44 @@ async function start(page) {
     });
     return rest > 1e-6 || sets.length === 0 ? [{weight: Math.max(rest, 0), colors: scene.source}, ...sets] : sets;
   }
+  const free = (set) => {
+    for (const texture of [set?.first, set?.second, set?.texel]) if (texture) graphics.free(texture);
+  };
+  const forget = (i) => {
+    free(colors[i]);
+    colors[i] = loading[i] = null;
+  };
   function load(i) {
     return loading[i] ??= styleColors(graphics, scene, header.styles[i], 'network_' + i, (part) => {
       say(part < 1 ? 'Style ' + (i + 1) + ' is being applied: ' + Math.round(100 * part) + ' %' : '');
     }).then((made) => {
       colors[i] = made;
+      // Of many styles those that no slider shows make room.
+      if (colors.filter(Boolean).length > 3)
+        colors.forEach((c, k) => { if (c && k !== i && !state.axes.includes(k)) forget(k); });
       say('');
       painter.change();
     }).catch(fail);
   }
   const pictureOf = (width, height) => {
     const styled = setsOf(weights()), source = [{weight: 1, colors: scene.source}];
+    const {map} = state;
     const parts = state.original ? [{from: 0, to: 1, sets: source}]
-        : state.split ? [{from: 0, to: state.cut, sets: source}, {from: state.cut, to: 1, sets: styled}]
-        : [{from: 0, to: 1, sets: styled}];
-    return {view: view.at(width, height), map: state.map, parts};
+        : state.split ? [{from: 0, to: state.cut, sets: source}, {from: state.cut, to: 1, sets: styled, map}]
+        : [{from: 0, to: 1, sets: styled, map}];
+    return {view: view.at(width, height), parts};
   };
   const painter = new Painter(canvas, graphics, scene, pictureOf);
   const changed = () => painter.change();
-  const showStyles = bindStyles(header, state, () => {
-    weights().forEach((weight, i) => weight > 0 && !loading[i] && load(i));
-    changed();
-  });
+  let showStyles;
+  const refreshStyles = () => {
+    showStyles = bindStyles(header, state, () => {
+      weights().forEach((weight, i) => weight > 0 && !loading[i] && load(i));
+      changed();
+    });
+    element('compare').hidden = element('halve').hidden = header.styles.length === 0 && !state.map;
+  };
+  refreshStyles();
   bindPhotos(header, view, changed);
   const path = page.path ??= new CameraPath();
   const take = (key) => {
@@ -83,6 +99,119 @@ async function start(page) {
     changed();
   };
   bindPath(path, state, header, () => view.save(), weights, take, changed);
+  // A style that the program behind the page has learned, or is learning; the last one, or a new one.
+  const putStyle = async (i, {weights: packed, ...style}) => {
+    const isNew = i === header.styles.length, before = colors[i];
+    element('network_' + i)?.remove();
+    document.body.append(make('script', {type: 'application/octet-stream', id: 'network_' + i, textContent: packed}));
+    if (isNew) {
+      colors.push(null);
+      loading.push(null);
+    } else {
+      loading[i] = null;  // what is shown stays until the next one is ready
+      page.added.pop();
+      header.styles.pop();
+    }
+    page.added.push(style);
+    header.styles.push(style);
+    await load(i);
+    free(before);
+    if (!isNew) return;
+    const axis = Math.min(i, 1);
+    state.axes = axis === 0 ? [0, 1] : [state.axes[0], i];
+    state.amount = [0, 0];
+    state.amount[axis] = 1;
+    page.clearPicture();
+    refreshStyles();
+    changed();
+  };
+  const removeStyle = (i) => {
+    forget(i);
+    for (const list of [header.styles, page.added, colors, loading]) list.pop();
+    Object.assign(state, {axes: [0, 1], amount: [0, 0]});
+    refreshStyles();
+    changed();
+  };
+  const learn = async (file) => {
+    if (!page.live) return;
+    if (page.learning) return sayBriefly('Another style is being learned.');
+    page.learning = true;
+    const i = header.styles.length, picture = page.dropped?.url ?? '';
+    let done = false;
+    try {
+      if (i >= 16) throw new PageError('this page has 16 styles; load it again');
+      // Where a pass over the voxels takes long, only the end is shown.
+      const soFar = async (style) => { if (!graphics.onCores) await putStyle(i, {...style, picture}); };
+      const style = await page.live.learn(file, soFar);
+      if (!style) return;
+      done = true;
+      await putStyle(i, {...style, picture});
+    } catch (error) {
+      if (!(error instanceof PageError)) throw error;
+      sayBriefly('The style was not learned: ' + error.message);
+    } finally {
+      page.learning = false;
+      if (!done && header.styles.length > i) removeStyle(i);
+    }
+  };
+  bindPicture(header, page, (map) => {
+    if (map) state.amount = [0, 0];
+    state.map = map;
+    refreshStyles();
+    changed();
+  }, (file) => page.learned = learn(file));
+  // A moment of the path, as the canvas would show it.
+  const pictureOfPath = async (key, width, height) => {
+    for (let i = 0; i < key.weights.length; ++i) if (key.weights[i] > 0) await load(i);
+    const target = graphics.target(width, height);
+    const at = Object.assign(Object.create(view), {eye: key.eye, forward: key.forward, top: key.up, half: key.half});
+    graphics.draw(scene, at.at(width, height), setsOf(key.weights), state.map, target, {x: 0, y: 0, width, height}, 1 / 64, false);
+    const pixels = graphics.read(target);
+    target.free();
+    await wait();
+    return pixels;
+  };
+  // For tests.
+  page.moment = pictureOfPath;
+  Object.assign(page, {state, putStyle, removeStyle});
+  page.colorMaps = (rows) => rows.map((pair) => {
+    const [source, style] = pair.map((n) => ({mean: n.slice(0, 3), covariance: n.slice(3)}));
+    const map = colorMap(source, style);
+    return [...map.offset, ...map.matrix];
+  });
+  page.film = async () => {
+    const {fps} = path, stop = element('cancel');
+    let going = true;
+    stop.hidden = false;
+    stop.onclick = () => going = false;
+    try {
+      const longest = Math.max(16, Math.min(4096, Number(element('film_size').value) || 1280));
+      const made = await makeFilm(path, longest, fps, pictureOfPath, (part) => {
+        say('The film is being made: ' + Math.round(100 * part) + ' %');
+        return going;
+      });
+      say('');
+      return made;
+    } finally {
+      stop.hidden = true;
+    }
+  };
+  const save = (film) => async () => {
+    try {
+      const blob = await film();
+      if (blob) saveFile(blob, 'film.mp4');
+    } catch (error) {
+      if (!(error instanceof PageError)) throw error;
+      sayBriefly('There is no film: ' + error.message + '.');
+    }
+  };
+  element('save_film').onclick = save(async () => {
+    const made = await page.film();
+    if (made) sayBriefly(made.count + ' frames of ' + made.width + ' x ' + made.height + ', ' + made.codec);
+    return made?.film;
+  });
+  element('exact_film').hidden = !page.live;
+  element('exact_film').onclick = save(() => page.live.film(path.text(header.styles.map((s) => s.id))));
 
   const press = (id, on) => element(id).setAttribute('aria-pressed', on);
   const toggle = (id, sheet) => () => {
@@ -112,7 +241,6 @@ async function start(page) {
   element('show_path').onclick = actions.keys.k;
   element('show_facts').onclick = actions.keys.i;
   const compare = element('compare');
-  compare.hidden = element('halve').hidden = header.styles.length === 0;
   compare.onpointerdown = () => actions.original(true);
   compare.onpointerup = compare.onpointerleave = compare.onblur = () => actions.original(false);
   compare.onkeydown = (event) => { if (event.key === ' ' || event.key === 'Enter') actions.original(true); };
@@ -169,7 +297,7 @@ async function start(page) {
   }
 }
 
-const page = {};
+const page = {live: Live.begin()};
 globalThis.regradePage = page;  // for tests
 const begin = () => page.started = start(page).catch(fail);
 element('canvas').addEventListener('webglcontextlost', (event) => {
@@ -177,5 +305,6 @@ element('canvas').addEventListener('webglcontextlost', (event) => {
   say('The graphics processor was reset; the scene is being made again.');
 });
 element('canvas').addEventListener('webglcontextrestored', begin);
+bindDrop(page);
 addEventListener('resize', () => page.resize?.());
 begin();

@@ -34,18 +34,34 @@ float fetches = 0.0;
 
 ivec2 At(int i) { return ivec2(i & 2047, i >> kBits); }
 
+// The nodes above the entry that was found last, by the logarithm of their width.
+int nodes[17];
+ivec3 before;
+int shiftBefore = 99;
+
 int EntryAt(ivec3 at, out int width) {
-  int shift = uFinest;
-  ivec3 top = at >> shift;
-  int entry = texelFetch(uTree, At((top.x * uTop.y + top.y) * uTop.z + top.z), 0).x;
-  fetches += 1.0;
+  // The search goes on from the smallest node that holds both places.
+  ivec3 differ = at ^ before;
+  int shift = shiftBefore + 1, bits = differ.x | differ.y | differ.z, entry;
+  while (shift <= uFinest && bits >> shift != 0) ++shift;
+  if (shift <= uFinest) {
+    entry = -2 - nodes[shift];
+  } else {
+    shift = uFinest;
+    ivec3 top = at >> shift;
+    entry = texelFetch(uTree, At((top.x * uTop.y + top.y) * uTop.z + top.z), 0).x;
+    fetches += 1.0;
+  }
   int first = uTop.x * uTop.y * uTop.z;
   for (int i = 0; i < 16 && entry < -1; ++i) {
+    nodes[shift] = -2 - entry;
     --shift;
     ivec3 bit = (at >> shift) & 1;
     entry = texelFetch(uTree, At(first + (-2 - entry) * 8 + (bit.x << 2 | bit.y << 1 | bit.z)), 0).x;
     fetches += 1.0;
   }
+  before = at;
+  shiftBefore = shift;
   width = 1 << shift;
   return entry;
 }

@@ -27,8 +27,8 @@ class Painter {
   }
   // The rectangles of a picture and the styles in each.
   draw(target, strip, opacityStep) {
-    const {view, map, parts} = this.pictureOf(target.width, target.height);
-    for (const {from, to, sets} of parts) {
+    const {view, parts} = this.pictureOf(target.width, target.height);
+    for (const {from, to, sets, map} of parts) {
       const x = Math.round(from * target.width), end = Math.round(to * target.width);
       if (end > x)
         this.graphics.draw(this.scene, view, sets, map, target,

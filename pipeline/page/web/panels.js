@@ -8,6 +8,19 @@ function make(tag, properties, ...children) {
   return made;
 }
 
+function say(text) { element('message').textContent = text; }
+
+function sayBriefly(text) {
+  say(text);
+  setTimeout(() => { if (element('message').textContent === text) say(''); }, 4000);
+}
+
+function saveFile(blob, name) {
+  const url = URL.createObjectURL(blob);
+  make('a', {href: url, download: name}).click();
+  setTimeout(() => URL.revokeObjectURL(url), 10000);
+}
+
 // A slider for each of two axes; of two styles or more, the axes' styles can be chosen.
 function bindStyles(header, state, changed) {
   const count = header.styles.length, box = element('styles');
@@ -88,6 +101,7 @@ function bindPath(path, state, header, place, weights, go, changed) {
     }));
     element('play').disabled = path.keyframes.length < 2;
     element('save_path').disabled = path.keyframes.length === 0;
+    element('save_film').disabled = element('exact_film').disabled = path.keyframes.length < 2;
   };
   element('add_key').onclick = () => { path.add(place(), weights()); refresh(); };
   element('play').onclick = () => {
@@ -95,21 +109,21 @@ function bindPath(path, state, header, place, weights, go, changed) {
     element('play').textContent = state.playing === null ? 'Play' : 'Stop';
     changed();
   };
-  element('save_path').onclick = () => {
-    const url = URL.createObjectURL(new Blob([path.text(header.styles.map((s) => s.id))], {type: 'application/json'}));
-    make('a', {href: url, download: 'camera_path.json'}).click();
-    setTimeout(() => URL.revokeObjectURL(url), 1000);
-  };
+  const fps = element('film_fps');
+  fps.onchange = () => path.fps = fps.value = Math.max(1, Math.min(120, Number(fps.value) || 30));
+  fps.value = path.fps;
+  element('save_path').onclick = () =>
+    saveFile(new Blob([path.text(header.styles.map((s) => s.id))], {type: 'application/json'}), 'camera_path.json');
   element('open_path').onchange = async (event) => {
     const file = event.target.files[0];
     if (!file) return;
     try {
-      path.read(await file.text(), header.styles.length);
+      path.read(await file.text(), header.styles.map((s) => s.id));
+      fps.value = path.fps;
       refresh();
     } catch (error) {
       if (!(error instanceof PageError)) throw error;
-      element('message').textContent = error.message + '.';
-      setTimeout(() => element('message').textContent = '', 4000);
+      sayBriefly(error.message + '.');
     }
     event.target.value = '';
   };

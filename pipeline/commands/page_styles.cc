@@ -1,0 +1,28 @@
+#include "pipeline/commands/page_styles.h"
+
+#include <filesystem>
+
+#include "kernels/base/error.h"
+#include "pipeline/workspace/style_folders.h"
+
+namespace regrade {
+
+namespace fs = std::filesystem;
+
+std::vector<std::string> WantedStyles(const std::string& folder, const Arguments& words) {
+  if (!fs::exists(folder + "/field.npz"))
+    throw InputError("holds no reconstruction", folder,
+                     "make one with `regrade run` or `regrade reconstruct`");
+  std::vector<std::string> styles;
+  if (words.size() == 1) {
+    for (const std::string& style : StyleNames(folder))
+      if (const std::string at = StyleFolder(folder, style);
+          fs::exists(at + "/network.npz") && !fs::exists(at + "/object.npz"))
+        styles.push_back(style);
+    return styles;
+  }
+  for (size_t i = 1; i < words.size(); ++i) styles.push_back(ChosenStyle(folder, words[i]));
+  return styles;
+}
+
+}  // namespace regrade

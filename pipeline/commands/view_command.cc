@@ -1,0 +1,117 @@
+// regrade view: the page of a scene, served to a browser on this machine, which learns styles
+// from pictures that are dropped on it.
+#include <fcntl.h>
+#include <signal.h>
+#include <spawn.h>
+#include <stdlib.h>
+#include <unistd.h>
+
+#include <cstring>
+#include <filesystem>
+#include <optional>
+
+#include "kernels/base/error.h"
+#include "pipeline/commands/command.h"
+#include "pipeline/commands/page_styles.h"
+#include "pipeline/files/atomic_file.h"
+#include "pipeline/program/interrupt.h"
+#include "pipeline/report/html_text.h"
+#include "pipeline/view/view_session.h"
+
+namespace regrade {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr char kOpenOption[] = "open";
+
+struct ViewOptions {
+  bool browse = false;
+
+  template <typename Bind>
+  void Describe(Bind& bind) {
+    bind(kOpenOption, browse, {.help = "opens the page in the browser"});
+  }
+};
+
+// A file that leads the browser to the address: on a command line others could read the token.
+class OpeningFile {
+ public:
+  explicit OpeningFile(const std::string& address) {
+    folder_ = (fs::temp_directory_path() / "regrade-view-XXXXXX").string();
+    if (::mkdtemp(folder_.data()) == nullptr)  // for this user only
+      throw ResourceError("cannot make a temporary folder", folder_,
+                          "set TMPDIR to a disk with space");
+    WriteFileAtomically(path(),
+                        "<!doctype html><meta charset=\"utf-8\"><meta name=\"referrer\" "
+                        "content=\"no-referrer\"><meta http-equiv=\"refresh\" "
+                        "content=\"0;url=" +
+                            EscapeHtml(address) + "\">");
+  }
+  ~OpeningFile() {
+    std::error_code error;
+    fs::remove_all(folder_, error);
+  }
+  OpeningFile(const OpeningFile&) = delete;
+  OpeningFile& operator=(const OpeningFile&) = delete;
+  std::string path() const { return folder_ + "/open.html"; }
+
+ private:
+  std::string folder_;
+};
+
+// In a session of its own, which stays when this program ends; nobody waits for it.
+void StartBrowser(const std::string& file, Console* console) {
+  posix_spawn_file_actions_t actions;
+  posix_spawnattr_t attributes;
+  if (::posix_spawn_file_actions_init(&actions) != 0 ||
+      ::posix_spawnattr_init(&attributes) != 0)
+    throw ResourceError("out of memory");
+  for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
+    ::posix_spawn_file_actions_addopen(&actions, fd, "/dev/null", O_RDWR, 0);
+  ::posix_spawn_file_actions_addclosefrom_np(&actions, STDERR_FILENO + 1);
+  sigset_t all;
+  ::sigfillset(&all);
+  ::posix_spawnattr_setsigdefault(&attributes, &all);
+  ::posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSID | POSIX_SPAWN_SETSIGDEF);
+  std::string program = "xdg-open", path = file;
+  char* const words[] = {program.data(), path.data(), nullptr};
+  pid_t browser = 0;
+  const int status = ::posix_spawnp(&browser, words[0], &actions, &attributes, words, environ);
+  ::posix_spawn_file_actions_destroy(&actions);
+  ::posix_spawnattr_destroy(&attributes);
+  if (status != 0)
+    console->Warn(Concat("no browser was opened: xdg-open: ", std::strerror(status)));
+}
+
+}  // namespace
+
+void RunView(const Command& command, const Arguments& arguments, Console* console) {
+  ViewOptions view;
+  ProgramOptions program;
+  OptionSet options;
+  options.Add("View", &view);
+  options.Add("Program", &program);
+  const auto prepared =
+      Prepare(command, arguments, {.most_words = 1 + kMostPageStyles}, &options);
+  if (!prepared) return;
+  const std::string& folder = prepared->words[0];
+  const std::vector<std::string> styles = WantedStyles(folder, prepared->words);
+  console->BeginStage("page");
+  ViewSession session(AbsolutePath(folder), styles, console->StageProgress());
+  console->EndStage();
+  LocalServer server(session.Routes(), MakeToken());
+  console->Info("open " + server.Address());
+  console->Info(
+      "The address is for this machine and for whoever has it: ssh -L carries it elsewhere. "
+      "Ctrl-C ends it.");
+  std::optional<OpeningFile> file;
+  if (view.browse) {
+    file.emplace(server.Address());
+    StartBrowser(file->path(), console);
+  }
+  server.Run([] { return !StopRequested(); });
+  console->Info("stopped");
+}
+
+}  // namespace regrade

@@ -1,0 +1,59 @@
+// Under `regrade view`: the program behind the page learns styles and renders exact films. The
+// address's fragment has the token; see pipeline/view/view_session.h.
+
+class Live {
+  static begin() {
+    const token = location.hash.slice(1);
+    return location.protocol === 'http:' && /^[0-9a-f]{64}$/.test(token) ? new Live(token) : null;
+  }
+  constructor(token) { this.token = token; }
+  async ask(method, target, body, headers = {}) {
+    let answer;
+    try {
+      answer = await fetch(target, {method, body, cache: 'no-store', credentials: 'omit',
+                                    headers: {...headers, Authorization: 'Bearer ' + this.token}});
+    } catch (error) {
+      throw new PageError('regrade view does not answer');
+    }
+    if (answer.ok) return answer;
+    const why = await answer.json().catch(() => null);
+    throw new PageError(why?.error ?? 'regrade view refuses this');
+  }
+  // Waits for the job; false if it was cancelled. `meanwhile` runs now and then.
+  async finish(words, meanwhile) {
+    const cancel = element('cancel');
+    cancel.hidden = false;
+    cancel.onclick = () => this.ask('DELETE', '/job').catch(() => {});
+    try {
+      for (;;) {
+        const job = await (await this.ask('GET', '/job')).json();
+        if (job.state === 'failed') throw new PageError(job.error || 'it failed');
+        if (job.state !== 'running') return job.state === 'done';
+        say(words + (job.stage ? ' ' + Math.round(100 * job.part) + ' %' : '') + (job.note ? ', ' + job.note : ''));
+        await meanwhile?.(job);
+        await new Promise((done) => setTimeout(done, 500));
+      }
+    } finally {
+      cancel.hidden = true;
+      say('');
+    }
+  }
+  // The header of a page's style with its weights, or null. `soFar` gets those of the training.
+  async learn(file, soFar) {
+    if (file.size > 32 << 20) throw new PageError('this picture is larger than 32 MB');
+    const name = file.name.normalize('NFKD').replace(/[^\w.-]+/g, '_').slice(-80);
+    await this.ask('POST', '/style', file, {'Regrade-Name': name});
+    const peek = async (job) => {
+      if (job.stage !== 'stylize') return;
+      const style = await this.ask('GET', '/learning').then((answer) => answer.status === 200 ? answer.json() : null).catch(() => null);
+      if (style) await soFar(style);
+    };
+    if (!await this.finish('The style is being learned:', peek)) return null;
+    return (await this.ask('GET', '/style')).json();
+  }
+  async film(text) {
+    await this.ask('POST', '/film', text);
+    if (!await this.finish('The film is being rendered:')) return null;
+    return (await this.ask('GET', '/film')).blob();
+  }
+}

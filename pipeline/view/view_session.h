@@ -1,0 +1,56 @@
+// What `regrade view` answers: the page of a scene, styles from pictures that are dropped on
+// it, and exact films of its camera paths.
+//
+//   GET /         opens the page: asks for it with the token of the address
+//   GET /page     the page, as `regrade page` writes it, allowed to ask here
+//   POST /style   a picture; `regrade stylize` learns it in styles/NAME/. The answer is a job
+//   POST /film    camera_path.json; `regrade render --path` writes films/. The answer is a job
+//   GET /job      the job's state
+//   DELETE /job   cancels it
+//   GET /learning the network of the style that is being learned, so far, or nothing new
+//   GET /style    the network of the style that was learned last, as the page holds it
+//   GET /film     the film that was rendered last
+#pragma once
+
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "kernels/base/progress.h"
+#include "kernels/field/radiance_field.h"
+#include "pipeline/fields/network_file.h"
+#include "pipeline/view/local_server.h"
+#include "pipeline/view/view_job.h"
+
+namespace regrade {
+
+inline constexpr uint64_t kMostPictureBytes = 32 << 20, kMostPathBytes = 4 << 20;
+
+class ViewSession {
+ public:
+  // Makes the page of the folder with these styles. Throws as MakePage.
+  ViewSession(const std::string& folder, const std::vector<std::string>& styles,
+              const ProgressFunction& progress);
+
+  // They refer to this object.
+  std::vector<Route> Routes();
+
+ private:
+  HttpResponse Opening() const;
+  HttpResponse TakePicture(const HttpRequest& request);
+  HttpResponse TakePath(const HttpRequest& request);
+  HttpResponse JobState() const;
+  HttpResponse StyleSoFar();
+  std::string StyleJson(const StoredNetwork& network, const std::string& id) const;
+
+  const std::string folder_;
+  std::string page_;
+  RadianceField field_;       // the page's
+  mutable std::mutex mutex_;  // of what follows: jobs end on their own thread
+  std::string style_, film_;  // JSON; the file's path
+  std::string learning_;      // the style's folder
+  int64_t step_ = -1;         // of what StyleSoFar told last
+  ViewJob job_;               // last: ends before the rest
+};
+
+}  // namespace regrade
