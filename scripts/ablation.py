@@ -9,7 +9,7 @@ finished variant is skipped. Prints a table in Markdown and writes FOLDER/ablati
 metrics) and FOLDER/bound.svg (the Lipschitz bound over the steps, on a logarithmic scale). Exit status: 0, or 1 if a
 run failed.
 
-The variants follow LipRF's Sec. 5.3: the activation, without K_est, without regularisation, with spectral normalisation
+The variants follow LipRF's Sec. 6.3: the activation, without K_est, without regularisation, with spectral normalisation
 to 1, each for every recipe. With --readings they are interpretations of the paper's text instead: what its B counts,
 steps, rates, starts and seeds.
 """

@@ -84,7 +84,7 @@ struct TrainNetworkOptions : WeightUpdateOptions {
   }
 };
 
-// Sets every option that the recipe decides: "standard", or "paper" (LipRF Sec. 5: no colour
+// Sets every option that the recipe decides: "standard", or "paper" (LipRF Sec. 6: no colour
 // map, PyTorch's default initialisation, a whole view a step, 300 steps, 1e-2 to 1e-4). Call it
 // before options are read. Throws Error(kUsage) for another name.
 void ApplyStyleRecipe(const std::string& recipe, TrainNetworkOptions* options);
