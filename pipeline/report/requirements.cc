@@ -11,7 +11,8 @@
 namespace regrade {
 namespace {
 
-constexpr char kForm[] = "write SUBJECT:METRIC>=VALUE or <=, as styled:tc-psnr:1>=30; see FORMATS.md";
+constexpr char kForm[] =
+    "write SUBJECT:METRIC>=VALUE or <=, as styled:tc-psnr:1>=30; see FORMATS.md";
 
 // Finds the number that a metric's name means among the members of a struct of metrics.
 struct NumberFinder {
@@ -54,7 +55,8 @@ bool IsSequence(const std::string& name) {
 
 // The stage's number; empty if there is no such stage or metric. `known` tells a stage that has
 // not run from one that does not exist.
-std::optional<Metric> NumberOfStage(StagesReport stages, const Requirement& wanted, bool* known) {
+std::optional<Metric> NumberOfStage(StagesReport stages, const Requirement& wanted,
+                                    bool* known) {
   std::optional<Metric> found;
   *known = false;
   stages.ForEach([&](const char* name, auto& stage) {

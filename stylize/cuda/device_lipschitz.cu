@@ -196,8 +196,10 @@ __global__ void __launch_bounds__(kLayerThreads)
     const int o = i / inputs, c = i % inputs;
     give(i, loss_factor * factor * (d_a(o, c) - inner * u[o] * v[c]));
   }
+  const bool biased = all.params.update.options.hidden_bias || l + 1 == all.shape.layers;
   if (thread < outputs)
-    give(size + thread, loss_factor * from[all.shape.mlp_outputs[l] * stride + thread]);
+    give(size + thread,
+         biased ? loss_factor * from[all.shape.mlp_outputs[l] * stride + thread] : 0.0);
   if (thread != 0) return;
   give(size + outputs,
        all.params.update.NormGradient(k, loss_factor * SquareplusDerivative(k) * inner));
