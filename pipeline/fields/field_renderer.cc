@@ -1,6 +1,7 @@
 #include "pipeline/fields/field_renderer.h"
 
 #include "kernels/base/error.h"
+#include "kernels/field/cpu/render_film.h"
 #include "kernels/field/cpu/render_view.h"
 #include "kernels/field/cuda/device_rays.h"
 
@@ -25,7 +26,7 @@ RenderedPair FieldRenderer::RenderWith(const FieldRenderer& other, const Camera&
 }
 
 std::string FieldRenderer::PrepareFast() {
-  if (backend_ == Backend::kCpu) return "the CPU has no fast renderer";
+  if (backend_ == Backend::kCpu) return "";
   if (device_.cells.on()) return "the fast renderer needs a uniform field";
   try {
     half_ = MakeHalfGrid(device_);
@@ -36,8 +37,16 @@ std::string FieldRenderer::PrepareFast() {
   return half_.empty() ? "the fast renderer needs colours of degree 2" : "";
 }
 
-RenderedView FieldRenderer::RenderFast(const Camera& camera) const {
-  REGRADE_CHECK(!half_.empty() && camera.lens == LensModel::kPinhole);
+RenderedPair FieldRenderer::RenderFastWith(const FieldRenderer& other,
+                                           const Camera& camera) const {
+  REGRADE_CHECK(backend_ == other.backend_ && camera.lens == LensModel::kPinhole);
+  if (backend_ == Backend::kCuda) return {RenderHalf(camera), other.RenderHalf(camera).color};
+  return RenderFilmFrame(grid_, other.grid_, camera, {march_.step, kFastStop}, kSmoothTolerance)
+      .pair;
+}
+
+RenderedView FieldRenderer::RenderHalf(const Camera& camera) const {
+  REGRADE_CHECK(!half_.empty());
   return RenderViewOnDevice(device_, camera, {march_.step, kFastStop}, kFastOpacityStep,
                             &half_);
 }

@@ -13,12 +13,16 @@
 
 namespace regrade {
 
-// Of the fast renderer: the transmittance at which a ray ends, and the step of opacity at which
-// a colour is evaluated, see EQ(opacity-steps). Its errors and times are in COSTS.md.
-inline constexpr float kFastStop = 1e-3f, kFastOpacityStep = 1.0f / 128;
-inline constexpr char kFastRenderer[] =
+// Of the fast renderers: the transmittance at which a ray ends; on a GPU the step of opacity at
+// which a colour is evaluated, see EQ(opacity-steps); on the CPU the tolerance of
+// EQ(smooth-pixels). Errors and times are in COSTS.md.
+inline constexpr float kFastStop = 1e-3f, kFastOpacityStep = 1.0f / 128,
+                       kSmoothTolerance = 1.5f / 255;
+inline constexpr char kFastRendererOfGpu[] =
     "half precision, steps where opacity changes by 1/128; at least 55 dB from the exact "
     "frames";
+inline constexpr char kFastRendererOfCpu[] =
+    "smooth parts interpolated between rays; at least 55 dB from the exact frames";
 
 class FieldRenderer {
  public:
@@ -31,15 +35,17 @@ class FieldRenderer {
   // processor; exact. The CPU marches once for both.
   RenderedPair RenderWith(const FieldRenderer& other, const Camera& camera) const;
 
-  // Makes the fast renderer's copy of the field in half precision. Returns why there is none,
-  // or an empty text.
+  // Prepares the fast renderer: on a GPU a copy of the field in half precision. Returns why
+  // there is none, or an empty text.
   std::string PrepareFast();
   // Frees that copy.
   void ForgetFast() { half_ = {}; }
-  // Needs the copy, and a camera without distortion.
-  RenderedView RenderFast(const Camera& camera) const;
+  // As RenderWith; both are prepared, and the camera has no distortion.
+  RenderedPair RenderFastWith(const FieldRenderer& other, const Camera& camera) const;
 
  private:
+  RenderedView RenderHalf(const Camera& camera) const;
+
   Backend backend_;
   MarchOptions march_;
   FastGrid grid_;  // one of the two

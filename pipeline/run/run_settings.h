@@ -88,8 +88,9 @@ struct RenderOptions {
          {.help = "renders frames at the photos' viewpoints with the exposure and white "
                   "balance of their photos, where these were undone"});
     bind("exact", exact,
-         {.help = "renders the film's frames as exactly as the views; by default a GPU renders "
-                  "them in half precision, with one colour for each 1/128 of opacity"});
+         {.help = "renders the film's frames as exactly as the views; by default their smooth "
+                  "parts are interpolated, and a GPU renders uniform fields in half precision, "
+                  "with one colour for each 1/128 of opacity"});
     path.Describe(bind);
   }
 };

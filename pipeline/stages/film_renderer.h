@@ -15,13 +15,13 @@ inline bool WantsExactFilm(const RunSettings& settings) {
 
 // Why the film's frames are rendered exactly; empty: by the fast renderer. The frames of
 // `film_of_views` are those at the photos' positions, which are always exact.
-std::string WhyExactFilm(const RunSettings& settings, Backend backend, bool film_of_views);
+std::string WhyExactFilm(const RunSettings& settings, bool film_of_views);
 
 // The same, and prepares both renderers where it is empty: both, or neither.
-std::string PrepareFilm(const RunSettings& settings, Backend backend, bool film_of_views,
-                        FieldRenderer* source, FieldRenderer* styled);
+std::string PrepareFilm(const RunSettings& settings, bool film_of_views, FieldRenderer* source,
+                        FieldRenderer* styled);
 
-// For the console and the report: kFastRenderer, or "exact (REASON)".
-std::string FilmRendererText(const std::string& why_exact);
+// For the console and the report: the processor's fast renderer, or "exact (REASON)".
+std::string FilmRendererText(const std::string& why_exact, Backend backend);
 
 }  // namespace regrade

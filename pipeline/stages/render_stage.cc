@@ -1,7 +1,7 @@
 // Stage "render": frames of the field before and after styling, and of the 2D method applied to
 // the former, at the photos' positions and along the film's camera path; and the films. Where
 // photos differ in size or lens, the frames at their positions are rendered again with one
-// common camera. Frames along the film's path may come from the fast renderer; all others are
+// common camera. The film's frames may come from the fast renderer; those that are measured are
 // exact. The 2D method styles frames at the photos' positions, and of the film those on which
 // it is measured.
 #include <algorithm>
@@ -97,17 +97,12 @@ std::string PlanOf(const std::vector<FrameSet>& sets) {
 Frame RenderFrame(RunContext* context, FrameRenderers* renderers, const Camera& camera,
                   const PhotoGain& gain, int index, bool fast, bool with_2d) {
   const double begin = context->console->StageSeconds();
-  RenderedView plain;
-  Frame frame;
-  if (fast) {
-    plain = renderers->source.RenderFast(camera);
-    frame.styled = renderers->styled.RenderFast(camera).color;
-  } else {
-    RenderedPair pair = renderers->source.RenderWith(renderers->styled, camera);
-    plain = std::move(pair.view);
-    frame.styled = std::move(pair.other_color);
-  }
+  RenderedPair pair = fast ? renderers->source.RenderFastWith(renderers->styled, camera)
+                           : renderers->source.RenderWith(renderers->styled, camera);
   renderers->seconds += context->console->StageSeconds() - begin;
+  RenderedView& plain = pair.view;
+  Frame frame;
+  frame.styled = std::move(pair.other_color);
   frame.source = std::move(plain.color);
   frame.transmittance = std::move(plain.transmittance);
   frame.depth = std::move(plain.depth);
@@ -207,9 +202,9 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
     context->console->Info(ComparisonNote(common->cameras[0]));
 
   const std::string why_exact =
-      PrepareFilm(settings, backend, film.of_photos, &renderers.source, &renderers.styled);
+      PrepareFilm(settings, film.of_photos, &renderers.source, &renderers.styled);
   renderers.fast_film = why_exact.empty();
-  context->console->Detail("renderer of the film: " + FilmRendererText(why_exact));
+  context->console->Detail("renderer of the film: " + FilmRendererText(why_exact, backend));
 
   std::filesystem::remove_all(workspace.Path("frames"));
   StageOutcome outcome;
@@ -228,7 +223,7 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
         const auto frame = std::make_shared<const Frame>(RenderFrame(
             context, &renderers, set.cameras[static_cast<size_t>(i)],
             set.of_photos && settings.render.keep_exposure ? views.Gain(i) : kAsTaken, i,
-            renderers.fast_film && !set.of_photos, set.prefix != kFilmPrefix));
+            renderers.fast_film && set.prefix == kFilmPrefix, set.prefix != kFilmPrefix));
         seen.Add(set, i, frame->depth);
         writer.Write(frame, set, i);
       }
@@ -248,7 +243,7 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   report.path_photo_distance = path.photo_distance;
   report.film = {film.cameras[0].width, film.cameras[0].height};
   report.strength = strength;
-  report.film_renderer = FilmRendererText(why_exact);
+  report.film_renderer = FilmRendererText(why_exact, backend);
   if (renderers.seconds > 0) report.frames_per_second = total / renderers.seconds;
   report.seen_by_few = seen.metrics();
   if (report.seen_by_few.film.value.value_or(0) > kMuchSeenByFew)

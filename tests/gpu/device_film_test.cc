@@ -72,7 +72,8 @@ TEST_F(DeviceFilm, FastFramesAreWithin55Db) {
       for (const bool inside : {false, true}) {
         const Camera camera = FilmCamera(inside);
         const Image exact = renderer.Render(camera).color;
-        const double db = testing::Psnr(renderer.RenderFast(camera).color, exact);
+        const double db =
+            testing::Psnr(renderer.RenderFastWith(renderer, camera).other_color, exact);
         const auto [low, high] = std::minmax_element(exact.pixels.begin(), exact.pixels.end());
         ASSERT_GT(*high - *low, 0.2f);  // a picture of something
         // It is another renderer, not the exact one again.
@@ -97,7 +98,7 @@ TEST_F(DeviceFilm, PreparingChangesNoExactFrame) {
   const RadianceField field = Ball(0.3f, 9);
   FieldRenderer plain(field, Backend::kCuda), prepared(field, Backend::kCuda);
   ASSERT_EQ(prepared.PrepareFast(), "");
-  prepared.RenderFast(FilmCamera(false));
+  prepared.RenderFastWith(prepared, FilmCamera(false));
   EXPECT_EQ(plain.Render(FilmCamera(false)).color.pixels,
             prepared.Render(FilmCamera(false)).color.pixels);
 }
