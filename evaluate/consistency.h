@@ -22,6 +22,7 @@ struct ConsistencyOptions {
   std::string flow = "dis-medium";
   std::string lpips;
   double min_coverage = 0.4;
+  bool controls = false;  // the caller adds the sequences
   // Frames come in excerpts of that many, and pairs lie within one; 0: all are one sequence.
   // Not an option of the user: it follows from the frames.
   int excerpt = 0;
@@ -56,6 +57,9 @@ struct ConsistencyOptions {
              "0.35, neighbouring views of a scene 0.8",
          .min = 0,
          .max = 1});
+    bind("controls", controls,
+         {.help = "adds rows that bound the table: one linear colour map, the styled frames "
+                  "blurred and in grey; for runs also the photos and the 2D method on them"});
   }
 };
 

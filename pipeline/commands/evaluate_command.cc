@@ -16,6 +16,7 @@
 #include "pipeline/report/records.h"
 #include "pipeline/report/run_pictures.h"
 #include "pipeline/run/run_settings.h"
+#include "pipeline/stages/control_sequences.h"
 #include "pipeline/stages/heat_map_files.h"
 #include "pipeline/stages/network_probe.h"
 #include "pipeline/workspace/metrics_json.h"
@@ -102,6 +103,10 @@ void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& optio
     targets.style = &style;
   }
   sequences.push_back(styled);
+  if (options.controls)
+    for (NamedFrameSource& control : ControlSequences(
+             {reference, styled.frames, targets.views_2d, targets.style, has_reference}))
+      sequences.push_back(std::move(control));
   targets.perceptual = PerceptualDistance(options.lpips);
   console->EndStage();
   std::optional<Workspace> workspace;  // before the work: the folder may be unusable

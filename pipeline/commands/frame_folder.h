@@ -13,6 +13,7 @@ struct FrameFolder {
   std::string folder;
   std::vector<std::string> paths;  // in natural order of names
   std::vector<std::string> names;  // relative to the folder
+  int width = 0, height = 0;       // of every frame
 
   FrameSource Source() const;
 };
@@ -25,8 +26,8 @@ struct FrameFolder {
 // Errors: kInput, with the file.
 FrameFolder OpenFrameFolder(const std::string& folder, const ProgressFunction& progress = {});
 
-// Throws Error(kInput) unless both have the same number of frames; names the first one without
-// a counterpart if names are numbered.
+// Throws Error(kInput) unless both have the same number of frames, of the same size; names the
+// first one without a counterpart if names are numbered.
 void CheckSameFrames(const FrameFolder& reference, const FrameFolder& sequence);
 
 }  // namespace regrade

@@ -148,6 +148,32 @@ TEST(EvaluateCommand, NetworksOfTheUser) {
   }
 }
 
+// Grey and transparent frames are frames: the controls take them, too.
+TEST(EvaluateCommand, ControlsAreRows) {
+  const TemporaryFolder folder;
+  WriteFrames(folder / "source", 4);
+  WriteFrames(folder / "styled", 4, 0.03f);
+  for (int i = 0; i < 4; ++i)
+    WriteText(folder / ("grey/0000" + std::to_string(i) + ".png"),
+              EncodePng8(Image(64, 48, 1)));
+  const auto evaluate = [&](std::vector<std::string> more) {
+    more.insert(more.end(), {"--frames", folder / "styled", "--gaps", "1", "--controls",
+                             "--out", folder / "out"});
+    const Outcome done = Evaluate(more);
+    EXPECT_EQ(done.code, 0) << done.text;
+    std::string names;
+    for (const JsonValue& row :
+         ReadJsonFile(folder / "out/report.json").At("fidelity").AsArray())
+      names += row.At("sequence").AsString() + " ";
+    return names;
+  };
+  EXPECT_EQ(evaluate({}), "styled control_blurred control_grey ");
+  EXPECT_EQ(evaluate({"--reference", folder / "source"}),
+            "source styled control_blurred control_grey ");
+  EXPECT_EQ(evaluate({"--reference", folder / "source", "--target", folder / "grey"}),
+            "source views_2d styled control_linear_map control_blurred control_grey ");
+}
+
 TEST(EvaluateCommand, H121_OneFrameIsNoPair) {
   const TemporaryFolder folder;
   WriteFrames(folder / "styled", 1);
