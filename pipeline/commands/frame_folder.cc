@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <filesystem>
 #include <optional>
 #include <set>
@@ -67,6 +68,13 @@ void CheckNumbers(const FrameFolder& frames) {
   }
 }
 
+bool HasFineValues(const Image& image) {
+  return std::ranges::any_of(image.pixels, [](float value) {
+    const float level = 255 * value;
+    return std::abs(level - std::round(level)) > 1e-3f;  // float rounding is 3e-5
+  });
+}
+
 std::string SizeText(int width, int height) { return Concat(width, " x ", height, " px"); }
 
 }  // namespace
@@ -88,8 +96,11 @@ FrameFolder OpenFrameFolder(const std::string& folder, const ProgressFunction& p
   }
   if (frames.paths.empty()) throw InputError("there are no frames here", folder);
   CheckNumbers(frames);
+  bool alpha = false, fine = false;
   for (size_t i = 0; i < frames.paths.size(); ++i) {
     const Image image = ReadImage(frames.paths[i]);
+    alpha |= image.channels == 4;
+    fine = fine || HasFineValues(image);
     if (i == 0) {
       frames.width = image.width;
       frames.height = image.height;
@@ -101,6 +112,10 @@ FrameFolder OpenFrameFolder(const std::string& folder, const ProgressFunction& p
                        frames.paths[i], "render all frames at one size");
     ReportOrThrow(progress, i + 1, frames.paths.size());
   }
+  if (alpha) frames.notice = folder + ": frames have transparency, which is ignored";
+  if (fine)
+    frames.notice += (alpha ? "; they have" : folder + ": frames have") +
+                     std::string(" more than 8 bits, which are used; flow sees 8");
   return frames;
 }
 
