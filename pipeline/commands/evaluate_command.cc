@@ -76,7 +76,9 @@ void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& optio
     console->Warn("no --reference: motion is estimated from the styled frames themselves");
   console->BeginStage("frames");
   const auto open = [&](const std::string& folder) {
-    return OpenFrameFolder(folder, console->StageProgress());
+    FrameFolder frames = OpenFrameFolder(folder, console->StageProgress());
+    if (!frames.notice.empty()) console->Warn(frames.notice);
+    return frames;
   };
   const FrameFolder styled_folder = open(frames.frames);
   const FrameFolder reference_folder = has_reference ? open(frames.reference) : styled_folder;
@@ -115,9 +117,8 @@ void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& optio
   console->BeginStage("evaluate");
   const ConsistencyReport consistency =
       EvaluateConsistency(reference, sequences, options, console->StageProgress());
-  std::vector<FidelityRow> fidelity;
-  for (const NamedFrameSource& sequence : sequences)
-    fidelity.push_back(MeasureFidelity(sequence, targets, console->StageProgress()));
+  const std::vector<FidelityRow> fidelity =
+      MeasureFidelities(sequences, targets, console->StageProgress());
   const double seconds = console->StageSeconds();
   console->EndStage();
   std::vector<HeatMapFile> heat_maps;

@@ -158,9 +158,12 @@ void AddFilm(RunContext* context, const Image& style, const Camera& camera,
               parts->Next(PairWeight(settings, static_cast<int>(all.size()))), heat_maps);
   report->rows.insert(report->rows.end(), film.rows.begin(), film.rows.end());
   report->pairs.insert(report->pairs.end(), film.pairs.begin(), film.pairs.end());
-  for (const NamedFrameSource& sequence : sequences)
-    fidelity->push_back(MeasureFidelity(
-        sequence, targets, parts->Next(kFrameSeconds * static_cast<double>(all.size()))));
+  report->warped.insert(report->warped.end(), film.warped.begin(), film.warped.end());
+  report->warped_pairs.insert(report->warped_pairs.end(), film.warped_pairs.begin(),
+                              film.warped_pairs.end());
+  const double frames = static_cast<double>(sequences.size() * all.size());
+  std::ranges::move(MeasureFidelities(sequences, targets, parts->Next(kFrameSeconds * frames)),
+                    std::back_inserter(*fidelity));
 }
 
 StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
@@ -241,11 +244,11 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
     Append(controls.Of(training_views, targets.unstyled, targets.views_2d,
                        measured.back().frames, true),
            &measured);
-  std::vector<FidelityRow> fidelity;
-  for (const NamedFrameSource& sequence : measured)
-    fidelity.push_back(MeasureFidelity(sequence, targets, parts.Next(n * kFrameSeconds)));
+  std::vector<FidelityRow> fidelity = MeasureFidelities(
+      measured, targets, parts.Next(n * kFrameSeconds * static_cast<double>(measured.size())));
   AddFilm(context, style, CommonCamera(cameras), &parts, &consistency, &fidelity, &heat_maps);
-  const FidelityTargets photo_targets{of_photos, targets.transmittance, nullptr, {}, {}};
+  const FidelityTargets photo_targets{of_photos,         targets.transmittance, nullptr, {}, {},
+                                      /*only_psnr=*/true};
   const FidelityRow to_photos = MeasureFidelity({"styled", frames("styled", training_views)},
                                                 photo_targets, parts.Next(n * kFrameSeconds));
 

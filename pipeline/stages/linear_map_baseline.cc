@@ -74,7 +74,8 @@ std::optional<double> LinearMapPsnr(const RadianceField& field,
   const FrameSource rendered{
       source.count,
       [&](int i) { return RenderView(grid, cameras[i], MarchOptions{field.step}).color; }};
-  return MeasureFidelity({"linear_map", rendered}, {views_2d, transmittance, nullptr, {}, {}},
+  return MeasureFidelity({"linear_map", rendered},
+                         {views_2d, transmittance, nullptr, {}, {}, /*only_psnr=*/true},
                          progress)
       .psnr_to_2d_db;
 }
