@@ -61,9 +61,8 @@ std::vector<NamedFrameSource> ControlSequences(const ControlInputs& inputs,
                                                const std::string& prefix) {
   std::vector<NamedFrameSource> controls;
   const auto add = [&](const char* name, const FrameSource& from, auto change) {
-    controls.push_back({prefix + name, {from.count, [from, change](int i) {
-                                          return change(from.frame(i));
-                                        }}});
+    controls.push_back(
+        {prefix + name, {from.count, [from, change](int i) { return change(from.frame(i)); }}});
   };
   if (const std::optional<ColorMap> map = MapOf(inputs))
     add(kLinearMapControl, inputs.unstyled, [map = *map](const Image& frame) {

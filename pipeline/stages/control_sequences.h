@@ -24,8 +24,8 @@ struct ControlInputs {
 // The unstyled frames under one linear colour map, clipped: BestLinearMap onto the 2D method's
 // frames, or without these the Monge-Kantorovich map onto the style picture's colours; left out
 // without either. The styled frames blurred, with a standard deviation of 1/160 of their longer
-// side, and in grey, with the luma of Rec. 709. Frames have the size of the inputs' and are made
-// when they are asked for; `unstyled` and `views_2d` are read before, for the map.
+// side, and in grey, with the luma of Rec. 709. Frames have the size of the inputs' and are
+// made when they are asked for; `unstyled` and `views_2d` are read before, for the map.
 std::vector<NamedFrameSource> ControlSequences(const ControlInputs& inputs,
                                                const std::string& prefix = "");
 

@@ -1,5 +1,5 @@
-// What the controls of a table show: each row is better in one metric, for a reason that another
-// metric sees.
+// What the controls of a table show: each row is better in one metric, for a reason that
+// another metric sees.
 #include "pipeline/stages/control_sequences.h"
 
 #include <gtest/gtest.h>
@@ -44,8 +44,8 @@ struct Row {
   FidelityRow fidelity;
 };
 
-// A texture that moves by a pixel a frame. The style adds stripes of two pixels that move along,
-// and its frames flicker.
+// A texture that moves by a pixel a frame. The style adds stripes of two pixels that move
+// along, and its frames flicker.
 std::map<std::string, Row> Table() {
   std::vector<Image> source, views_2d, styled;
   for (int i = 0; i < kFrames; ++i) {
@@ -75,8 +75,8 @@ std::map<std::string, Row> Table() {
   return rows;
 }
 
-// Blurred frames have less noise and no stripes, grey ones less noise and no colour, mapped ones
-// neither noise nor stripes.
+// Blurred frames have less noise and no stripes, grey ones less noise and no colour, mapped
+// ones neither noise nor stripes.
 TEST(ControlSequences, EachIsMoreConsistentAndLessFaithful) {
   auto rows = Table();
   ASSERT_EQ(rows.size(), 4u);
