@@ -4,10 +4,13 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
+#include <map>
 #include <memory>
 #include <numeric>
 
 #include "evaluate/frame_cache.h"
+#include "evaluate/frame_pairs.h"
+#include "evaluate/warped_rows.h"
 #include "kernels/base/error.h"
 #include "kernels/image/row_sum.h"
 #include "kernels/image/warp.h"
@@ -17,8 +20,6 @@ namespace {
 
 // Rounding to 8 bits has a mean square error of (1/255)^2 / 12: 58.9 dB.
 const double kByteFloorDb = -10 * std::log10(1.0 / 12 / (255.0 * 255.0));
-
-constexpr int64_t kCacheBytes = 512ll << 20;  // for all sequences together
 
 struct PairSums {
   double squared_error = 0, weight = 0;
@@ -31,35 +32,8 @@ struct PairSums {
   }
 };
 
-int ColourChannels(const Image& image) { return std::min(image.channels, 3); }
-
 double Decibel(double error) {
   return error > 0 ? -10 * std::log10(error) : std::numeric_limits<double>::infinity();
-}
-
-void CheckFrame(const Image& frame, const PairMotion& motion, const Image& first,
-                const std::string& where) {
-  if (frame.width != motion.flow.width || frame.height != motion.flow.height)
-    throw InputError(Concat("a frame of ", frame.width, " x ", frame.height,
-                            " px does not fit the reference of ", motion.flow.width, " x ",
-                            motion.flow.height, " px"),
-                     where, "render all sequences at one size");
-  if (ColourChannels(frame) != ColourChannels(first))
-    throw InputError("grey and colour frames in one sequence", where);
-}
-
-std::string FrameName(const std::string& sequence, int index) {
-  return Concat(sequence, ", frame ", index);
-}
-
-bool InOneExcerpt(int from, int gap, int excerpt) {
-  return excerpt == 0 || from / excerpt == (from + gap) / excerpt;
-}
-
-int NumPairs(int frames, int gap, int excerpt) {
-  int pairs = 0;
-  for (int i = 0; i + gap < frames; ++i) pairs += InOneExcerpt(i, gap, excerpt);
-  return pairs;
 }
 
 }  // namespace
@@ -155,52 +129,37 @@ ConsistencyReport EvaluateConsistency(int frames, const PairMotionFunction& moti
                                       const std::vector<NamedFrameSource>& sequences,
                                       const ConsistencyOptions& options,
                                       const ProgressFunction& progress) {
-  int64_t total = 0;
-  int max_gap = 1;
-  for (const int gap : options.gaps) {
-    if (gap < 1) throw UsageError("gaps between frames start at 1", std::to_string(gap));
-    max_gap = std::max(max_gap, gap);
-    total += NumPairs(frames, gap, options.excerpt);
-  }
-  std::vector<FrameCache> caches;
-  for (const NamedFrameSource& sequence : sequences) {
-    if (sequence.frames.count != frames)
-      throw InputError(
-          Concat("the sequence has ", sequence.frames.count, " frames, the reference ", frames),
-          sequence.name, "evaluate frames of the same cameras");
-    caches.emplace_back(sequence.frames, std::min(max_gap, frames) + 1,
-                        kCacheBytes / std::ssize(sequences));
-  }
-
+  const auto pairs = FramePairs(frames, options.gaps, options.excerpt);
+  std::vector<FrameCache> caches = CachesOf(sequences, frames, options.gaps);
   ConsistencyReport report;
   report.mode = options.mode;
   report.flow = options.mode == "geometry" ? "depth and cameras" : options.flow;
-  std::vector<WorstPair> worst(sequences.size() * options.gaps.size());
+  std::map<std::pair<size_t, int>, WorstPair> worst;  // by sequence and gap
   int64_t done = 0;
-  for (int i = 0; i < frames; ++i)
-    for (size_t g = 0; g < options.gaps.size(); ++g) {
-      const int gap = options.gaps[g];
-      if (gap >= frames - i || !InOneExcerpt(i, gap, options.excerpt)) continue;
-      const auto pair_motion = std::make_shared<const PairMotion>(motion(i, i + gap));
-      for (size_t s = 0; s < sequences.size(); ++s) {
-        const std::string& name = sequences[s].name;
-        const auto earlier = caches[s].Get(i), later = caches[s].Get(i + gap);
-        CheckFrame(*earlier, *pair_motion, *earlier, FrameName(name, i));
-        CheckFrame(*later, *pair_motion, *earlier, FrameName(name, i + gap));
-        PairResult result = ComparePair(*earlier, *later, *pair_motion);
-        result.sequence = name;
-        result.from = i;
-        result.to = i + gap;
-        result.low_coverage = result.coverage < options.min_coverage;
-        WorstPair& so_far = worst[s * options.gaps.size() + g];
-        if (result.error && *result.error > so_far.pair.error.value_or(0))
-          so_far = {result, pair_motion};
-        report.pairs.push_back(std::move(result));
-      }
-      ReportOrThrow(progress, ++done, total);
+  for (const auto& [i, j] : pairs) {
+    const auto pair_motion = std::make_shared<const PairMotion>(motion(i, j));
+    for (size_t s = 0; s < sequences.size(); ++s) {
+      const std::string& name = sequences[s].name;
+      const auto earlier = caches[s].Get(i), later = caches[s].Get(j);
+      CheckFrame(*earlier, pair_motion->flow, *earlier, name, i);
+      CheckFrame(*later, pair_motion->flow, *earlier, name, j);
+      PairResult result = ComparePair(*earlier, *later, *pair_motion);
+      result.sequence = name;
+      result.from = i;
+      result.to = j;
+      result.low_coverage = result.coverage < options.min_coverage;
+      WorstPair& so_far = worst[{s, j - i}];
+      if (result.error && *result.error > so_far.pair.error.value_or(0))
+        so_far = {result, pair_motion};
+      report.pairs.push_back(std::move(result));
     }
-  std::copy_if(worst.begin(), worst.end(), std::back_inserter(report.worst),
-               [](const WorstPair& pair) { return pair.motion != nullptr; });
+    ReportOrThrow(progress, ++done, std::ssize(pairs));
+  }
+  for (size_t s = 0; s < sequences.size(); ++s)
+    for (const int gap : options.gaps)
+      if (const auto found = worst.find({s, gap});
+          found != worst.end() && found->second.motion != nullptr)
+        report.worst.push_back(found->second);
   for (const NamedFrameSource& sequence : sequences)
     for (const int gap : options.gaps)
       report.rows.push_back(Summarize(sequence.name, gap, report.pairs));
@@ -219,7 +178,8 @@ ConsistencyReport UndefinedConsistency(int frames,
       ConsistencyRow row;
       row.sequence = sequence.name;
       row.gap = gap;
-      row.pairs = row.undefined_pairs = NumPairs(frames, gap, options.excerpt);
+      row.pairs = row.undefined_pairs =
+          static_cast<int>(FramePairs(frames, {gap}, options.excerpt).size());
       row.why = why;
       report.rows.push_back(std::move(row));
     }
@@ -238,10 +198,11 @@ ConsistencyReport EvaluateConsistency(const FrameSource& reference,
     return EvaluateConsistency(reference.count, GeometricMotion(geometry), sequences, options,
                                progress);
   }
+  if (options.mode == kWarpedMode)
+    return EvaluateWarped(reference, sequences, options, progress);
   // Both frames of a pair are used again by later pairs.
-  const int max_gap = options.gaps.empty() ? 1 : *std::ranges::max_element(options.gaps);
-  const auto cache = std::make_shared<FrameCache>(
-      reference, std::clamp(max_gap, 1, std::max(1, reference.count)) + 1, kCacheBytes);
+  const auto cache =
+      std::make_shared<FrameCache>(CacheOf(reference, options.gaps, kFrameCacheBytes));
   const FrameSource cached{reference.count, [cache](int i) { return *cache->Get(i); }};
   return EvaluateConsistency(reference.count,
                              EstimatedMotion(cached, options.mode, options.flow), sequences,

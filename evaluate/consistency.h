@@ -11,6 +11,7 @@
 #include "evaluate/bootstrap.h"
 #include "evaluate/frame_source.h"
 #include "evaluate/pair_motion.h"
+#include "evaluate/warped_error.h"
 #include "kernels/base/options.h"
 #include "kernels/base/progress.h"
 
@@ -22,6 +23,7 @@ struct ConsistencyOptions {
   std::string flow = "dis-medium";
   std::string lpips;
   double min_coverage = 0.4;
+  bool controls = false;  // the caller adds the sequences
   // Frames come in excerpts of that many, and pairs lie within one; 0: all are one sequence.
   // Not an option of the user: it follows from the frames.
   int excerpt = 0;
@@ -37,8 +39,9 @@ struct ConsistencyOptions {
     bind("mode", mode,
          {.help = "source of motion and mask: lai2018 and ruder2016 use estimated optical flow "
                   "with the mask of the named paper, geometry uses exact flow from depth and "
-                  "cameras",
-          .choices = "lai2018|ruder2016|geometry"});
+                  "cameras; stylegaussian moves frames forward and measures RMSE and, with "
+                  "--lpips, LPIPS, as published and corrected",
+          .choices = "lai2018|ruder2016|geometry|stylegaussian"});
     bind("flow", flow,
          {.help = "optical flow method for the reference frames: dis-ultrafast, dis-fast, "
                   "dis-medium, dis-tuned, farneback (relative times 1 : 1.3 : 5 : 25 : 16, "
@@ -56,6 +59,9 @@ struct ConsistencyOptions {
              "0.35, neighbouring views of a scene 0.8",
          .min = 0,
          .max = 1});
+    bind("controls", controls,
+         {.help = "adds rows that bound the table: one linear colour map, the styled frames "
+                  "blurred and in grey; for runs also the photos and the 2D method on them"});
   }
 };
 
@@ -109,17 +115,37 @@ struct WorstPair {
   std::shared_ptr<const PairMotion> motion;
 };
 
+// One pair of one sequence in mode stylegaussian, by both readings of warped_error.h.
+struct WarpedPair {
+  std::string sequence;
+  int from = 0, to = 0;  // frame indices
+  WarpedError published, corrected;
+};
+
+// The means over the pairs of one sequence at one gap, pairs without a value left out.
+struct WarpedRow {
+  std::string sequence;
+  int gap = 0;
+  int pairs = 0;
+  WarpedError published, corrected;
+  std::string why;  // why a reading is missing; else empty
+};
+
 struct ConsistencyReport {
   std::string mode, flow;
   std::vector<ConsistencyRow> rows;  // by sequence, then by gap, in the order given
   std::vector<PairResult> pairs;     // by first frame, gap, sequence
   // In the order of rows; rows whose pairs are all perfect or undefined have none.
   std::vector<WorstPair> worst;
+  // Instead of the others in mode stylegaussian, in the same orders.
+  std::vector<WarpedRow> warped;
+  std::vector<WarpedPair> warped_pairs;
 };
 
 // Compares frame i with frame i + gap of each sequence, for every i and gap within an excerpt.
 // Flow and mask are estimated once per pair from the reference frames (the unstyled ones), so
 // all sequences are measured on the same pixels; mode "geometry" takes them from `geometry`.
+// Mode "stylegaussian" is that of warped_rows.h.
 // Only a few frames are in memory at a time.
 //
 // Errors: kUsage for an unknown mode or a gap below 1; kInput if counts, sizes or channels of

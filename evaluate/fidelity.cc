@@ -36,76 +36,130 @@ void CheckSize(const Image& frame, const Image& other, const std::string& what, 
                    sequence.name);
 }
 
+// The references of one frame; each may be empty.
+struct FrameTargets {
+  Image view_2d, unstyled, transmittance;
+  HueChroma hues_2d;
+};
+
+FrameTargets ReadTargets(const FidelityTargets& targets, int i) {
+  FrameTargets frame;
+  if (targets.unstyled.count > 0) frame.unstyled = Clipped(targets.unstyled.frame(i));
+  if (targets.views_2d.count == 0) return frame;
+  frame.view_2d = Clipped(targets.views_2d.frame(i));
+  if (!targets.only_psnr) frame.hues_2d.Add(frame.view_2d);
+  if (targets.transmittance.count > 0) frame.transmittance = targets.transmittance.frame(i);
+  return frame;
+}
+
+// What is summed over the frames of a sequence.
+class FidelitySums {
+ public:
+  FidelitySums(const NamedFrameSource& sequence, const FidelityTargets& targets)
+      : sequence_(sequence), targets_(targets) {
+    CheckCount(sequence, targets.views_2d, "the 2D method's");
+    CheckCount(sequence, targets.unstyled, "the unstyled");
+    CheckCount(sequence, targets.transmittance, "transmittance");
+  }
+
+  void Add(int i, const FrameTargets& target) {
+    const Image frame = Clipped(sequence_.frames.frame(i));
+    if (frame.pixels == target.view_2d.pixels && frame.SameSize(target.view_2d))
+      hues_ += target.hues_2d;
+    else if (!targets_.only_psnr)
+      hues_.Add(frame);
+    if (targets_.style != nullptr) colours_.Add(frame);
+    if (!target.unstyled.empty()) {
+      CheckSize(frame, target.unstyled, "the unstyled version", i, sequence_);
+      if (const auto correlation = GradientCorrelation(frame, target.unstyled)) {
+        sum_structure_ += *correlation;
+        ++with_edges_;
+      }
+    }
+    if (!target.view_2d.empty()) AddToTarget(frame, i, target);
+  }
+
+  FidelityRow Row(const ColourSlices& style) const {
+    FidelityRow row;
+    row.sequence = sequence_.name;
+    if (finite_ > 0)
+      row.psnr_to_2d_db = sum_db_ / finite_;
+    else if (perfect_ > 0)
+      row.psnr_to_2d_db = std::numeric_limits<double>::infinity();
+    if (compared_ > 0) row.lpips_to_2d = sum_lpips_ / compared_;
+    if (with_edges_ > 0) row.structure = sum_structure_ / with_edges_;
+    row.hue_std = hues_.HueStd();
+    row.chroma = hues_.MeanChroma();
+    row.hue_std_2d = hues_2d_.HueStd();
+    row.chroma_2d = hues_2d_.MeanChroma();
+    if (targets_.style != nullptr)
+      row.sliced_wasserstein_to_style = SlicedWasserstein(colours_, style);
+    return row;
+  }
+
+ private:
+  void AddToTarget(const Image& frame, int i, const FrameTargets& target) {
+    CheckSize(frame, target.view_2d, "the 2D method's version", i, sequence_);
+    hues_2d_ += target.hues_2d;
+    if (targets_.perceptual) {
+      Image whole = target.view_2d;  // excluded pixels are copied: they add no difference
+      for (size_t v = 0; v < whole.pixels.size(); ++v)
+        if (!std::isfinite(whole.pixels[v])) whole.pixels[v] = frame.pixels[v];
+      sum_lpips_ += targets_.perceptual(frame, whole);
+      ++compared_;
+    }
+    if (!target.transmittance.empty())
+      CheckSize(frame, target.transmittance, "the transmittance", i, sequence_);
+    const std::optional<double> db = Psnr(
+        frame, target.view_2d, target.transmittance.empty() ? nullptr : &target.transmittance);
+    if (db && std::isfinite(*db)) {
+      sum_db_ += *db;
+      ++finite_;
+    } else if (db) {
+      ++perfect_;
+    }
+  }
+
+  const NamedFrameSource& sequence_;
+  const FidelityTargets& targets_;
+  HueChroma hues_, hues_2d_;
+  ColourSlices colours_;
+  double sum_db_ = 0, sum_lpips_ = 0, sum_structure_ = 0;
+  int compared_ = 0, with_edges_ = 0;
+  int finite_ = 0, perfect_ = 0;
+};
+
 }  // namespace
+
+std::vector<FidelityRow> MeasureFidelities(const std::vector<NamedFrameSource>& sequences,
+                                           const FidelityTargets& targets,
+                                           const ProgressFunction& progress) {
+  std::vector<FidelitySums> sums;
+  int frames = 0;
+  int64_t total = 0, done = 0;
+  for (const NamedFrameSource& sequence : sequences) {
+    sums.emplace_back(sequence, targets);
+    frames = std::max(frames, sequence.frames.count);
+    total += sequence.frames.count;
+  }
+  for (int i = 0; i < frames; ++i) {
+    const FrameTargets target = ReadTargets(targets, i);
+    for (size_t s = 0; s < sequences.size(); ++s) {
+      if (i >= sequences[s].frames.count) continue;
+      sums[s].Add(i, target);
+      ReportOrThrow(progress, ++done, total);
+    }
+  }
+  ColourSlices style;
+  if (targets.style != nullptr) style.Add(*targets.style);
+  std::vector<FidelityRow> rows;
+  for (const FidelitySums& sum : sums) rows.push_back(sum.Row(style));
+  return rows;
+}
 
 FidelityRow MeasureFidelity(const NamedFrameSource& sequence, const FidelityTargets& targets,
                             const ProgressFunction& progress) {
-  CheckCount(sequence, targets.views_2d, "the 2D method's");
-  CheckCount(sequence, targets.unstyled, "the unstyled");
-  CheckCount(sequence, targets.transmittance, "transmittance");
-  HueChroma hues, hues_2d;
-  ColourSlices colours, style;
-  double sum_db = 0, sum_lpips = 0, sum_structure = 0;
-  int compared = 0, with_edges = 0;
-  int finite = 0, perfect = 0;
-  const int count = sequence.frames.count;
-  for (int i = 0; i < count; ++i) {
-    const Image frame = Clipped(sequence.frames.frame(i));
-    hues.Add(frame);
-    if (targets.style != nullptr) colours.Add(frame);
-    if (targets.unstyled.count > 0) {
-      const Image unstyled = Clipped(targets.unstyled.frame(i));
-      CheckSize(frame, unstyled, "the unstyled version", i, sequence);
-      if (const std::optional<double> correlation = GradientCorrelation(frame, unstyled)) {
-        sum_structure += *correlation;
-        ++with_edges;
-      }
-    }
-    if (targets.views_2d.count > 0) {
-      const Image target = Clipped(targets.views_2d.frame(i));
-      CheckSize(frame, target, "the 2D method's version", i, sequence);
-      hues_2d.Add(target);
-      if (targets.perceptual) {
-        Image whole = target;  // excluded pixels are copied: they add no difference
-        for (size_t v = 0; v < whole.pixels.size(); ++v)
-          if (!std::isfinite(whole.pixels[v])) whole.pixels[v] = frame.pixels[v];
-        sum_lpips += targets.perceptual(frame, whole);
-        ++compared;
-      }
-      Image transmittance;
-      if (targets.transmittance.count > 0) {
-        transmittance = targets.transmittance.frame(i);
-        CheckSize(frame, transmittance, "the transmittance", i, sequence);
-      }
-      const std::optional<double> db =
-          Psnr(frame, target, transmittance.empty() ? nullptr : &transmittance);
-      if (db && std::isfinite(*db)) {
-        sum_db += *db;
-        ++finite;
-      } else if (db) {
-        ++perfect;
-      }
-    }
-    ReportOrThrow(progress, i + 1, count);
-  }
-
-  FidelityRow row;
-  row.sequence = sequence.name;
-  if (finite > 0)
-    row.psnr_to_2d_db = sum_db / finite;
-  else if (perfect > 0)
-    row.psnr_to_2d_db = std::numeric_limits<double>::infinity();
-  if (compared > 0) row.lpips_to_2d = sum_lpips / compared;
-  if (with_edges > 0) row.structure = sum_structure / with_edges;
-  row.hue_std = hues.HueStd();
-  row.chroma = hues.MeanChroma();
-  row.hue_std_2d = hues_2d.HueStd();
-  row.chroma_2d = hues_2d.MeanChroma();
-  if (targets.style != nullptr) {
-    style.Add(*targets.style);
-    row.sliced_wasserstein_to_style = SlicedWasserstein(colours, style);
-  }
-  return row;
+  return MeasureFidelities({sequence}, targets, progress).front();
 }
 
 }  // namespace regrade

@@ -5,6 +5,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "evaluate/frame_source.h"
 #include "kernels/base/progress.h"
@@ -46,10 +47,17 @@ struct FidelityTargets {
   const Image* style = nullptr;  // the style picture
   std::function<double(const Image&, const Image&)> perceptual;  // see PairNetwork::Distance
   FrameSource unstyled = {};                                     // each frame before styling
+  bool only_psnr = false;                                        // measures nothing else
 };
 
-// Errors (kInput): counts or sizes that differ. At most one frame of each source is in memory.
-// Progress counts frames.
+// One row for each sequence, in one pass: a frame of `targets` is read once for all of them,
+// and what is measured of the 2D method's frame is not measured again of a sequence that has
+// it. Errors (kInput): counts or sizes that differ. At most one frame of each source is in
+// memory. Progress counts frames of all sequences.
+std::vector<FidelityRow> MeasureFidelities(const std::vector<NamedFrameSource>& sequences,
+                                           const FidelityTargets& targets,
+                                           const ProgressFunction& progress = {});
+
 FidelityRow MeasureFidelity(const NamedFrameSource& sequence, const FidelityTargets& targets,
                             const ProgressFunction& progress = {});
 

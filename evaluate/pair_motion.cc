@@ -12,14 +12,16 @@
 namespace regrade {
 namespace {
 
-constexpr char kFilesPrefix[] = "files:", kOnnxPrefix[] = "onnx:";
+constexpr char kOnnxPrefix[] = "onnx:";
 
 OcclusionMask MakeMask(const std::string& mode, const FlowField& forward,
                        const FlowField& backward) {
   if (mode == "lai2018") return MaskLai2018(forward, backward);
   if (mode == "ruder2016") return MaskRuder2016(forward, backward);
-  throw UsageError("unknown consistency mode", mode,
-                   "choose lai2018, ruder2016 or geometry (which needs depth and cameras)");
+  throw UsageError(
+      "unknown consistency mode", mode,
+      "choose lai2018, ruder2016, stylegaussian or geometry (which needs depth and "
+      "cameras)");
 }
 
 // Reads the precomputed motion from frame i to frame j; `frame` is any frame of the sequence.
@@ -38,31 +40,32 @@ FlowField ReadPairFlow(const std::string& folder, int i, int j, const Image& fra
 
 }  // namespace
 
-PairMotionFunction EstimatedMotion(const FrameSource& frames, const std::string& mode,
-                                   const std::string& flow) {
-  MakeMask(mode, FlowField(1, 1), FlowField(1, 1));  // rejects an unknown mode early
-  if (flow.starts_with(kFilesPrefix)) {
-    const std::string folder = flow.substr(sizeof(kFilesPrefix) - 1);
-    return [=](int i, int j) {
-      const Image frame = frames.frame(i);
-      PairMotion motion;
-      motion.flow = ReadPairFlow(folder, i, j, frame);
-      motion.mask = MakeMask(mode, motion.flow, ReadPairFlow(folder, j, i, frame));
-      return motion;
+PairFlowFunction PairFlow(const std::string& flow) {
+  if (flow.starts_with(kFlowFiles))
+    return [folder = flow.substr(sizeof(kFlowFiles) - 1)](int i, int j, const Image& from,
+                                                          const Image&) {
+      return ReadPairFlow(folder, i, j, from);
     };
-  }
-  std::function<FlowField(const Image&, const Image&)> compute =
-      [flow](const Image& from, const Image& to) { return ComputeFlow(from, to, flow); };
   if (flow.starts_with(kOnnxPrefix)) {
     const auto network =
         std::make_shared<const PairNetwork>(flow.substr(sizeof(kOnnxPrefix) - 1));
-    compute = [network](const Image& from, const Image& to) { return network->Flow(from, to); };
+    return [network](int, int, const Image& from, const Image& to) {
+      return network->Flow(from, to);
+    };
   }
-  return [=](int i, int j) {
+  return [flow](int, int, const Image& from, const Image& to) {
+    return ComputeFlow(from, to, flow);
+  };
+}
+
+PairMotionFunction EstimatedMotion(const FrameSource& frames, const std::string& mode,
+                                   const std::string& flow) {
+  MakeMask(mode, FlowField(1, 1), FlowField(1, 1));  // rejects an unknown mode early
+  return [=, compute = PairFlow(flow)](int i, int j) {
     const Image from = frames.frame(i), to = frames.frame(j);
     PairMotion motion;
-    motion.flow = compute(from, to);
-    motion.mask = MakeMask(mode, motion.flow, compute(to, from));
+    motion.flow = compute(i, j, from, to);
+    motion.mask = MakeMask(mode, motion.flow, compute(j, i, to, from));
     return motion;
   };
 }

@@ -18,6 +18,15 @@ struct PairMotion {
 };
 using PairMotionFunction = std::function<PairMotion(int i, int j)>;
 
+// Motion from frame i to frame j, given both. `flow` is a method of optical_flow.h, or
+// "files:DIR", where DIR holds 00003_00004.flo for the pair (3, 4), of the frames' size, or
+// "onnx:FILE", a network (see pair_network.h). Errors: those of the source.
+using PairFlowFunction =
+    std::function<FlowField(int i, int j, const Image& from, const Image& to)>;
+PairFlowFunction PairFlow(const std::string& flow);
+
+inline constexpr char kFlowFiles[] = "files:";
+
 // Input of mode "geometry" for a frame: depth along the ray in world units (see
 // geometric_flow.h), and the camera.
 struct FrameGeometry {
@@ -26,10 +35,8 @@ struct FrameGeometry {
 };
 using GeometrySource = std::function<FrameGeometry(int)>;
 
-// Motion estimated from frames. `mode` is lai2018 or ruder2016 (see occlusion.h); `flow` is a
-// method of optical_flow.h, or "files:DIR", where DIR holds 00003_00004.flo and 00004_00003.flo
-// for the pair (3, 4), or "onnx:FILE", a network (see pair_network.h). Files must have the
-// frames' size. Errors: kUsage for unknown names, kInput from flow and files.
+// Motion estimated from frames, in both directions by PairFlow. `mode` is lai2018 or ruder2016
+// (see occlusion.h). Errors: kUsage for unknown names, kInput from flow and files.
 PairMotionFunction EstimatedMotion(const FrameSource& frames, const std::string& mode,
                                    const std::string& flow);
 

@@ -1,5 +1,6 @@
 #include "evaluate/pair_network.h"
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <mutex>
@@ -27,8 +28,8 @@ class QuietOpenCv {
   cv::utils::logging::LogLevel level_;
 };
 
-// [1, 3, height, width] from -1 to 1; non-finite values become black.
-cv::Mat BlobOf(const Image& image) {
+// [1, 3, height, width] from -1 to 1, or `as_given`; non-finite values become black.
+cv::Mat BlobOf(const Image& image, bool as_given) {
   const int shape[] = {1, 3, image.height, image.width};
   cv::Mat blob(4, shape, CV_32F);
   for (int c = 0; c < 3; ++c)
@@ -36,7 +37,8 @@ cv::Mat BlobOf(const Image& image) {
       for (int x = 0; x < image.width; ++x) {
         const float value = image.at(x, y)[image.channels >= 3 ? c : 0];
         const float shown = value > 0 ? std::min(value, 1.0f) : 0.0f;
-        blob.ptr<float>(0, c, y)[x] = 2 * shown - 1;
+        const float given = std::isfinite(value) ? value : 0.0f;
+        blob.ptr<float>(0, c, y)[x] = as_given ? given : 2 * shown - 1;
       }
   return blob;
 }
@@ -67,15 +69,15 @@ struct PairNetwork::Implementation {
     return bytes;
   }
 
-  cv::Mat Run(const Image& first, const Image& second) const {
+  cv::Mat Run(const Image& first, const Image& second, bool as_given) const {
     if (!first.SameSize(second))
       Fail("two pictures differ in size", "use pictures of one size");
     const std::lock_guard lock(mutex);
     cv::Mat output;
     try {
       const QuietOpenCv quiet;
-      net.setInput(BlobOf(first), "first");
-      net.setInput(BlobOf(second), "second");
+      net.setInput(BlobOf(first, as_given), "first");
+      net.setInput(BlobOf(second, as_given), "second");
       output = net.forward().clone();
     } catch (const cv::Exception& exception) {
       Fail("the network does not run: " + exception.err,
@@ -108,7 +110,7 @@ PairNetwork::PairNetwork(const std::string& path)
 PairNetwork::~PairNetwork() = default;
 
 FlowField PairNetwork::Flow(const Image& from, const Image& to) const {
-  const cv::Mat output = implementation_->Run(from, to);
+  const cv::Mat output = implementation_->Run(from, to, false);
   if (output.dims != 4 || output.size[1] != 2 || output.size[2] != from.height ||
       output.size[3] != from.width)
     implementation_->Fail(Concat("its output is not a motion field of ", from.width, " x ",
@@ -121,18 +123,21 @@ FlowField PairNetwork::Flow(const Image& from, const Image& to) const {
   return flow;
 }
 
-double PairNetwork::Distance(const Image& a, const Image& b) const {
-  const cv::Mat output = implementation_->Run(a, b);
+double PairNetwork::Distance(const Image& a, const Image& b, bool as_given) const {
+  const cv::Mat output = implementation_->Run(a, b, as_given);
   double sum = 0;
   const float* values = output.ptr<float>();
   for (size_t i = 0; i < output.total(); ++i) sum += values[i];
   return sum / static_cast<double>(output.total());
 }
 
-std::function<double(const Image&, const Image&)> PerceptualDistance(const std::string& path) {
+std::function<double(const Image&, const Image&)> PerceptualDistance(const std::string& path,
+                                                                     bool as_given) {
   if (path.empty()) return {};
   const auto network = std::make_shared<const PairNetwork>(path);
-  return [network](const Image& a, const Image& b) { return network->Distance(a, b); };
+  return [network, as_given](const Image& a, const Image& b) {
+    return network->Distance(a, b, as_given);
+  };
 }
 
 }  // namespace regrade

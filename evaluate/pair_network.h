@@ -24,15 +24,17 @@ class PairNetwork {
   // as RAFT's.
   FlowField Flow(const Image& from, const Image& to) const;
 
-  // The mean of the output, of any shape: LPIPS (Zhang et al. 2018) returns one number.
-  double Distance(const Image& a, const Image& b) const;
+  // The mean of the output, of any shape: LPIPS (Zhang et al. 2018) returns one number. With
+  // `as_given` the network gets the pictures' values as they are, in any range.
+  double Distance(const Image& a, const Image& b, bool as_given = false) const;
 
  private:
   struct Implementation;
   std::unique_ptr<Implementation> implementation_;
 };
 
-// The perceptual distance by the network in the file; empty for an empty path.
-std::function<double(const Image&, const Image&)> PerceptualDistance(const std::string& path);
+// PairNetwork::Distance by the network in the file; empty for an empty path.
+std::function<double(const Image&, const Image&)> PerceptualDistance(const std::string& path,
+                                                                     bool as_given = false);
 
 }  // namespace regrade

@@ -41,6 +41,8 @@ const std::vector<Protocol>& Protocols() {
        "LipRF: short and long range, the mask of Ruder et al."},
       {"lai2018", "lai2018", "1", true, "Lai et al. 2018, as their evaluator computes it"},
       {"ruder2016", "ruder2016", "1", true, "Ruder et al. 2016, as their checker computes it"},
+      {"stylegaussian", "stylegaussian", "1,7", true,
+       "StyleGaussian: RMSE and LPIPS after forward warping, as published and corrected"},
       {"geometry", "geometry", "1,5", false, "exact motion from depth and cameras"},
   };
   return protocols;

@@ -140,6 +140,31 @@ std::string ConsistencyTable(const ConsistencyReport& report, const std::string&
       rows, remarks, form);
 }
 
+std::string WarpedTable(const ConsistencyReport& report, const std::string& form) {
+  std::vector<Cells> rows{{"sequence", "gap", "pairs", "RMSE published", "RMSE", "compared"}};
+  const bool lpips = std::ranges::any_of(report.warped, [](const WarpedRow& row) {
+    return row.published.lpips || row.corrected.lpips;
+  });
+  if (lpips) rows[0].insert(rows[0].end(), {"LPIPS published", "LPIPS"});
+  std::string remarks;
+  for (const WarpedRow& row : report.warped) {
+    rows.push_back({row.sequence, std::to_string(row.gap), std::to_string(row.pairs),
+                    Number(row.published.rmse, 4), Number(row.corrected.rmse, 4),
+                    Number(100 * row.corrected.coverage, 1) + " %"});
+    if (lpips) {
+      rows.back().push_back(Number(row.published.lpips, 4));
+      rows.back().push_back(Number(row.corrected.lpips, 4));
+    }
+    if (!row.why.empty())
+      remarks += Concat(row.sequence, ", gap ", row.gap, ": ", row.why, "\n");
+  }
+  return Table("Consistency after forward warping, lower is better (mode " + report.mode +
+                   ", flow " + report.flow +
+                   "; published: flow of the measured frames, mean over all pixels; else flow "
+                   "of the unstyled frames, mean over the mask)",
+               rows, remarks, form);
+}
+
 std::string FidelityTable(const ConsistencyReport& consistency,
                           const std::vector<FidelityRow>& fidelity, const std::string& form) {
   std::vector<Cells> rows{
@@ -159,16 +184,19 @@ std::string FidelityTable(const ConsistencyReport& consistency,
   }
   std::string remarks;
   std::vector<std::string> seen;
-  for (const ConsistencyRow& row : consistency.rows) {
-    if (std::ranges::find(seen, row.sequence) != seen.end()) continue;
-    seen.push_back(row.sequence);
-    if (std::ranges::find(fidelity, row.sequence, &FidelityRow::sequence) != fidelity.end())
+  std::vector<std::string> measured;
+  for (const ConsistencyRow& row : consistency.rows) measured.push_back(row.sequence);
+  for (const WarpedRow& row : consistency.warped) measured.push_back(row.sequence);
+  for (const std::string& sequence : measured) {
+    if (std::ranges::find(seen, sequence) != seen.end()) continue;
+    seen.push_back(sequence);
+    if (std::ranges::find(fidelity, sequence, &FidelityRow::sequence) != fidelity.end())
       continue;
-    rows.push_back({row.sequence, "-", "-", "-", "-", "-", "-"});
+    rows.push_back({sequence, "-", "-", "-", "-", "-", "-"});
     if (lpips) rows.back().push_back("-");
     if (structure) rows.back().push_back("-");
     remarks +=
-        row.sequence +
+        sequence +
         ": fidelity was not measured; high consistency may come from lost colours; give the 2D "
         "method's frames and the style picture\n";
   }
@@ -180,8 +208,9 @@ std::string FidelityTable(const ConsistencyReport& consistency,
 
 std::string FormatTables(const ConsistencyReport& consistency,
                          const std::vector<FidelityRow>& fidelity, const std::string& form) {
-  return ConsistencyTable(consistency, form) + "\n" +
-         FidelityTable(consistency, fidelity, form);
+  return (consistency.warped.empty() ? ConsistencyTable(consistency, form)
+                                     : WarpedTable(consistency, form)) +
+         "\n" + FidelityTable(consistency, fidelity, form);
 }
 
 }  // namespace regrade

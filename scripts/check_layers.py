@@ -55,6 +55,7 @@ LAYERS = {
     "pipeline/workspace": 2,
     "pipeline/capture": 3,
     "pipeline/page": 5,
+    "pipeline/study": 4,
     "pipeline/report": 3,
     "pipeline/run": 4,
     "pipeline/synth": 4,

@@ -62,8 +62,10 @@ Vec3d LinearFromXyz(const Vec3d& xyz) {
   return linear_from_xyz * xyz;
 }
 
-Vec3d LabFromSrgb(const Vec3d& srgb) {
-  const Vec3d xyz = XyzFromLinear(LinearFromSrgb(srgb));
+Vec3d LabFromSrgb(const Vec3d& srgb) { return LabFromLinear(LinearFromSrgb(srgb)); }
+
+Vec3d LabFromLinear(const Vec3d& linear) {
+  const Vec3d xyz = XyzFromLinear(linear);
   const double fx = LabCurve(xyz.x / White(0)), fy = LabCurve(xyz.y / White(1)),
                fz = LabCurve(xyz.z / White(2));
   return {116 * fy - 16, 500 * (fx - fy), 200 * (fy - fz)};

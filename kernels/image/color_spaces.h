@@ -19,6 +19,7 @@ Vec3d LinearFromXyz(const Vec3d& xyz);
 // b = 200 (f(Y) - f(Z)), each of X, Y, Z divided by white's, and f the cube root with a linear
 // toe. Grey has a = b = 0 up to rounding, white has L = 100.
 Vec3d LabFromSrgb(const Vec3d& srgb);
+Vec3d LabFromLinear(const Vec3d& linear);
 Vec3d SrgbFromLab(const Vec3d& lab);
 
 }  // namespace regrade

@@ -78,6 +78,7 @@ void RunEvaluate(const Command&, const Arguments&, Console*);
 void RunContactSheet(const Command&, const Arguments&, Console*);
 void RunMix(const Command&, const Arguments&, Console*);
 void RunTradeoff(const Command&, const Arguments&, Console*);
+void RunStudy(const Command&, const Arguments&, Console*);
 void RunSynth(const Command&, const Arguments&, Console*);
 void RunExport(const Command&, const Arguments&, Console*);
 void RunPack(const Command&, const Arguments&, Console*);

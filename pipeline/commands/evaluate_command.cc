@@ -17,6 +17,7 @@
 #include "pipeline/report/requirements.h"
 #include "pipeline/report/run_pictures.h"
 #include "pipeline/run/run_settings.h"
+#include "pipeline/stages/control_sequences.h"
 #include "pipeline/stages/heat_map_files.h"
 #include "pipeline/stages/network_probe.h"
 #include "pipeline/workspace/metrics_json.h"
@@ -78,7 +79,9 @@ void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& optio
     console->Warn("no --reference: motion is estimated from the styled frames themselves");
   console->BeginStage("frames");
   const auto open = [&](const std::string& folder) {
-    return OpenFrameFolder(folder, console->StageProgress());
+    FrameFolder frames = OpenFrameFolder(folder, console->StageProgress());
+    if (!frames.notice.empty()) console->Warn(frames.notice);
+    return frames;
   };
   const FrameFolder styled_folder = open(frames.frames);
   const FrameFolder reference_folder = has_reference ? open(frames.reference) : styled_folder;
@@ -105,6 +108,10 @@ void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& optio
     targets.style = &style;
   }
   sequences.push_back(styled);
+  if (options.controls)
+    for (NamedFrameSource& control : ControlSequences(
+             {reference, styled.frames, targets.views_2d, targets.style, has_reference}))
+      sequences.push_back(std::move(control));
   targets.perceptual = PerceptualDistance(options.lpips);
   console->EndStage();
   std::optional<Workspace> workspace;  // before the work: the folder may be unusable
@@ -113,9 +120,8 @@ void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& optio
   console->BeginStage("evaluate");
   const ConsistencyReport consistency =
       EvaluateConsistency(reference, sequences, options, console->StageProgress());
-  std::vector<FidelityRow> fidelity;
-  for (const NamedFrameSource& sequence : sequences)
-    fidelity.push_back(MeasureFidelity(sequence, targets, console->StageProgress()));
+  const std::vector<FidelityRow> fidelity =
+      MeasureFidelities(sequences, targets, console->StageProgress());
   const double seconds = console->StageSeconds();
   console->EndStage();
   std::vector<HeatMapFile> heat_maps;

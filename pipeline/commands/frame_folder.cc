@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <filesystem>
 #include <optional>
 #include <set>
@@ -67,9 +68,14 @@ void CheckNumbers(const FrameFolder& frames) {
   }
 }
 
-std::string SizeText(const Image& image) {
-  return Concat(image.width, " x ", image.height, " px");
+bool HasFineValues(const Image& image) {
+  return std::ranges::any_of(image.pixels, [](float value) {
+    const float level = 255 * value;
+    return std::abs(level - std::round(level)) > 1e-3f;  // float rounding is 3e-5
+  });
 }
+
+std::string SizeText(int width, int height) { return Concat(width, " x ", height, " px"); }
 
 }  // namespace
 
@@ -90,20 +96,34 @@ FrameFolder OpenFrameFolder(const std::string& folder, const ProgressFunction& p
   }
   if (frames.paths.empty()) throw InputError("there are no frames here", folder);
   CheckNumbers(frames);
-  std::optional<Image> first;
+  bool alpha = false, fine = false;
   for (size_t i = 0; i < frames.paths.size(); ++i) {
-    Image image = ReadImage(frames.paths[i]);
-    if (first && !image.SameSize(*first))
-      throw InputError("this frame is " + SizeText(image) + ", " + frames.names.front() +
-                           " is " + SizeText(*first),
+    const Image image = ReadImage(frames.paths[i]);
+    alpha |= image.channels == 4;
+    fine = fine || HasFineValues(image);
+    if (i == 0) {
+      frames.width = image.width;
+      frames.height = image.height;
+    }
+    if (image.width != frames.width || image.height != frames.height)
+      throw InputError("this frame is " + SizeText(image.width, image.height) + ", " +
+                           frames.names.front() + " is " +
+                           SizeText(frames.width, frames.height),
                        frames.paths[i], "render all frames at one size");
-    if (!first) first = std::move(image);
     ReportOrThrow(progress, i + 1, frames.paths.size());
   }
+  if (alpha) frames.notice = folder + ": frames have transparency, which is ignored";
+  if (fine)
+    frames.notice += (alpha ? "; they have" : folder + ": frames have") +
+                     std::string(" more than 8 bits, which are used; flow sees 8");
   return frames;
 }
 
 void CheckSameFrames(const FrameFolder& reference, const FrameFolder& sequence) {
+  if (reference.width != sequence.width || reference.height != sequence.height)
+    throw InputError("frames of " + SizeText(sequence.width, sequence.height) +
+                         ", the reference has " + SizeText(reference.width, reference.height),
+                     sequence.folder, "render all sequences at one size");
   if (reference.paths.size() == sequence.paths.size()) return;
   const bool more = reference.paths.size() > sequence.paths.size();
   const FrameFolder &longer = more ? reference : sequence,

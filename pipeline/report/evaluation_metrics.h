@@ -96,17 +96,45 @@ struct FidelityMetrics {
   }
 };
 
+// A sequence over frames `gap` apart by forward warping; see evaluate/warped_error.h.
+struct WarpedMetrics {
+  std::string sequence;
+  int gap = 1;
+  int pairs = 0;
+  Metric rmse_published, rmse;
+  std::optional<double> lpips_published, lpips;          // where a network was given
+  double coverage = 0;                                   // mean fraction of compared pixels
+  std::vector<Metric> rmse_pairs_published, rmse_pairs;  // one for each pair in order of time
+
+  template <typename Visit>
+  void Describe(Visit& visit) {
+    visit("sequence", sequence);
+    visit("gap", gap);
+    visit("pairs", pairs);
+    visit("rmse_published", rmse_published);
+    visit("rmse", rmse);
+    visit("lpips_published", lpips_published);
+    visit("lpips", lpips);
+    visit("coverage", coverage);
+    visit("rmse_pairs_published", rmse_pairs_published);
+    visit("rmse_pairs", rmse_pairs);
+  }
+};
+
 // What an evaluation measures of sequences of frames.
 struct EvaluationMetrics {
   std::vector<ConsistencyMetrics> consistency;
   std::vector<FidelityMetrics> fidelity;
   std::vector<PairMetrics> pairs;  // of all sequences, by first frame
+  // In place of consistency and pairs in mode stylegaussian.
+  std::optional<std::vector<WarpedMetrics>> warped;
 
   template <typename Visit>
   void Describe(Visit& visit) {
     visit("consistency", consistency);
     visit("fidelity", fidelity);
     visit("consistency_pairs", pairs);
+    visit("warped", warped);
   }
 };
 

@@ -131,8 +131,8 @@ std::string ReportHtml(const RunReport& report, const ReportPictures& pictures) 
   if (headline) html += "<section>" + CompareHtml(*headline) + "</section>";
   for (const std::string& section :
        {HeadlineMetricsHtml(report), OtherFilmsHtml(pictures), ViewsHtml(pictures),
-        ConsistencyHtml(report), HeatMapsHtml(pictures), StagesHtml(report), CostsHtml(report),
-        EffectsHtml(report), PhotosHtml(report, pictures),
+        WarpedHtml(report), ConsistencyHtml(report), HeatMapsHtml(pictures), StagesHtml(report),
+        CostsHtml(report), EffectsHtml(report), PhotosHtml(report, pictures),
         RepeatHtml(report, pictures.run_json)}) {
     if (!section.empty()) html += "<section>" + section + "</section>\n";
   }

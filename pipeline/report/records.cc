@@ -46,6 +46,24 @@ PairMetrics MetricsOfPair(const PairResult& pair) {
   return metrics;
 }
 
+WarpedMetrics MetricsOfWarped(const WarpedRow& row, const std::vector<WarpedPair>& pairs) {
+  WarpedMetrics metrics;
+  metrics.sequence = row.sequence;
+  metrics.gap = row.gap;
+  metrics.pairs = row.pairs;
+  metrics.rmse_published = Metric(row.published.rmse, row.why);
+  metrics.rmse = Metric(row.corrected.rmse, row.why);
+  metrics.lpips_published = row.published.lpips;
+  metrics.lpips = row.corrected.lpips;
+  metrics.coverage = row.corrected.coverage;
+  for (const WarpedPair& pair : pairs) {
+    if (pair.sequence != row.sequence || pair.to - pair.from != row.gap) continue;
+    metrics.rmse_pairs_published.push_back(Metric(pair.published.rmse));
+    metrics.rmse_pairs.push_back(Metric(pair.corrected.rmse));
+  }
+  return metrics;
+}
+
 FidelityMetrics MetricsOfFidelity(const FidelityRow& row) {
   FidelityMetrics metrics;
   metrics.sequence = row.sequence;
@@ -87,6 +105,9 @@ EvaluationMetrics MetricsOf(const ConsistencyReport& consistency,
   }
   for (const FidelityRow& row : fidelity) metrics.fidelity.push_back(MetricsOfFidelity(row));
   for (const PairResult& pair : consistency.pairs) metrics.pairs.push_back(MetricsOfPair(pair));
+  if (!consistency.warped.empty()) metrics.warped.emplace();
+  for (const WarpedRow& row : consistency.warped)
+    metrics.warped->push_back(MetricsOfWarped(row, consistency.warped_pairs));
   return metrics;
 }
 

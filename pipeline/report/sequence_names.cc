@@ -10,6 +10,11 @@ std::string SequenceLabel(const std::string& sequence) {
   if (sequence == "source") return "before styling";
   if (sequence == "views_2d") return "2D method, frame by frame";
   if (sequence == "styled") return "styled scene";
+  if (sequence == "photos") return "photos";
+  if (sequence == "photos_2d") return "2D method on the photos";
+  if (sequence == "control_linear_map") return "control: one linear colour map";
+  if (sequence == "control_blurred") return "control: styled, blurred";
+  if (sequence == "control_grey") return "control: styled, grey";
   return sequence;
 }
 

@@ -1,6 +1,10 @@
 // Stage "evaluate": temporal consistency of the rendered sequences and their fidelity to the 2D
 // method.
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
+#include <functional>
+#include <iterator>
 
 #include "evaluate/consistency.h"
 #include "evaluate/fidelity.h"
@@ -19,6 +23,7 @@
 #include "pipeline/program/device_choice.h"
 #include "pipeline/report/records.h"
 #include "pipeline/run/run_context.h"
+#include "pipeline/stages/control_sequences.h"
 #include "pipeline/stages/film_frames.h"
 #include "pipeline/stages/heat_map_files.h"
 #include "pipeline/stages/linear_map_baseline.h"
@@ -37,6 +42,35 @@ FrameSource FramesOf(const std::string& folder, const std::vector<int>& views) {
   return {static_cast<int>(views.size()),
           [folder, views](int i) { return ReadImage(folder + "/" + FrameName(views[i])); }};
 }
+
+void Append(std::vector<NamedFrameSource> more, std::vector<NamedFrameSource>* sequences) {
+  std::ranges::move(more, std::back_inserter(*sequences));
+}
+
+// What bounds the table of the frames at the photos' places. Frames with another camera than
+// the photos are not compared with them.
+struct ViewControls {
+  const WorkingViews* views;
+  bool one_map;
+  const Image* style;
+  std::function<Image(int)> photo_2d;
+
+  std::vector<NamedFrameSource> Of(const std::vector<int>& of, const FrameSource& unstyled,
+                                   const FrameSource& views_2d, const FrameSource& styled,
+                                   bool with_photos) const {
+    std::vector<NamedFrameSource> controls =
+        ControlSequences({unstyled, styled, views_2d, style, one_map});
+    if (!with_photos) return controls;
+    const int count = static_cast<int>(of.size());
+    controls.push_back({"photos", {count, [this, of](int k) {
+                                     Image photo = views->Photo(of[k]);
+                                     views->LeaveOutMasked(of[k], &photo);
+                                     return photo;
+                                   }}});
+    controls.push_back({"photos_2d", {count, [this, of](int k) { return photo_2d(of[k]); }}});
+    return controls;
+  }
+};
 
 // Depth at each camera, rendered on demand.
 GeometrySource GeometryOf(const RadianceField& field, const std::vector<Camera>& cameras) {
@@ -110,18 +144,26 @@ void AddFilm(RunContext* context, const Image& style, const Camera& camera,
     const std::string sequence = std::string(kPathPrefix) + name;
     sequences.push_back({sequence, FramesOf(folder(name), all)});
   }
+  const FidelityTargets targets{
+      renders_styled ? sequences[1].frames : FrameSource(),
+      FramesOf(folder("transmittance"), all), style.empty() ? nullptr : &style,
+      PerceptualDistance(settings.consistency.lpips), sequences[0].frames};
+  if (options.controls)
+    Append(ControlSequences({sequences[0].frames, sequences.back().frames, targets.views_2d,
+                             targets.style, !settings.object.On()},
+                            kPathPrefix),
+           &sequences);
   const ConsistencyReport film =
       Compare(*context->style, sequences, camera, {}, options,
               parts->Next(PairWeight(settings, static_cast<int>(all.size()))), heat_maps);
   report->rows.insert(report->rows.end(), film.rows.begin(), film.rows.end());
   report->pairs.insert(report->pairs.end(), film.pairs.begin(), film.pairs.end());
-  const FidelityTargets targets{renders_styled ? sequences[1].frames : FrameSource(),
-                                FramesOf(folder("transmittance"), all), &style,
-                                PerceptualDistance(settings.consistency.lpips),
-                                sequences[0].frames};
-  for (const NamedFrameSource& sequence : sequences)
-    fidelity->push_back(MeasureFidelity(
-        sequence, targets, parts->Next(kFrameSeconds * static_cast<double>(all.size()))));
+  report->warped.insert(report->warped.end(), film.warped.begin(), film.warped.end());
+  report->warped_pairs.insert(report->warped_pairs.end(), film.warped_pairs.begin(),
+                              film.warped_pairs.end());
+  const double frames = static_cast<double>(sequences.size() * all.size());
+  std::ranges::move(MeasureFidelities(sequences, targets, parts->Next(kFrameSeconds * frames)),
+                    std::back_inserter(*fidelity));
 }
 
 StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
@@ -155,6 +197,28 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
     const std::string folder = (same_camera ? "" : kCommonPrefix) + std::string(name);
     sequences.push_back({name, frames(folder.c_str(), all)});
   }
+  const bool of_picture = !IsCubeFile(settings.style.picture());  // not a LUT
+  const Image style =
+      of_picture ? ReadStylePicture(settings.style.picture(), nullptr) : Image();
+  const auto photo_2d = [&](int i) {
+    Image picture = ReadImage(workspace.Path("views_2d/" + FrameName(i)));
+    if (settings.style.strength != 1)
+      MixPicture(views.Photo(i), settings.style.strength, &picture);
+    views.LeaveOutMasked(i, &picture);
+    return picture;
+  };
+  const ViewControls controls{
+      &views, !settings.object.On(), of_picture ? &style : nullptr,
+      [&](int i) {  // held-out photos have no picture: NaN is left out
+        if (std::ranges::find(training_views, i) != training_views.end()) return photo_2d(i);
+        Image none = views.Photo(i);
+        std::ranges::fill(none.pixels, std::nanf(""));
+        return none;
+      }};
+  const FrameSource all_2d = renders_styled ? sequences[1].frames : FrameSource();
+  if (settings.consistency.controls)
+    Append(controls.Of(all, sequences[0].frames, all_2d, sequences.back().frames, same_camera),
+           &sequences);
   BeginHeatMaps(workspace);
   std::vector<HeatMapFile> heat_maps;
   ConsistencyReport consistency =
@@ -166,29 +230,25 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
 
   // Fidelity is measured on the training views of the style, against the 2D method applied to
   // the rendered frames, or else to the photos.
-  const bool of_picture = !IsCubeFile(settings.style.picture());  // not a LUT
-  const Image style =
-      of_picture ? ReadStylePicture(settings.style.picture(), nullptr) : Image();
-  const FrameSource of_photos{static_cast<int>(training_views.size()), [&](int k) {
-                                const int i = training_views[k];
-                                Image picture =
-                                    ReadImage(workspace.Path("views_2d/" + FrameName(i)));
-                                if (settings.style.strength != 1)
-                                  MixPicture(views.Photo(i), settings.style.strength, &picture);
-                                views.LeaveOutMasked(i, &picture);
-                                return picture;
-                              }};
+  const FrameSource of_photos{static_cast<int>(training_views.size()),
+                              [&](int k) { return photo_2d(training_views[k]); }};
   const FidelityTargets targets{
       renders_styled ? frames("views_2d", training_views) : of_photos,
       frames("transmittance", training_views), of_picture ? &style : nullptr,
       PerceptualDistance(settings.consistency.lpips), frames("source", training_views)};
-  std::vector<FidelityRow> fidelity;
-  for (const NamedFrameSource& sequence : sequences)
-    fidelity.push_back(
-        MeasureFidelity({sequence.name, frames(sequence.name.c_str(), training_views)}, targets,
-                        parts.Next(n * kFrameSeconds)));
+  std::vector<NamedFrameSource> measured;
+  for (const char* name : {"source", "views_2d", "styled"})
+    if (renders_styled || name != std::string("views_2d"))
+      measured.push_back({name, frames(name, training_views)});
+  if (settings.consistency.controls)
+    Append(controls.Of(training_views, targets.unstyled, targets.views_2d,
+                       measured.back().frames, true),
+           &measured);
+  std::vector<FidelityRow> fidelity = MeasureFidelities(
+      measured, targets, parts.Next(n * kFrameSeconds * static_cast<double>(measured.size())));
   AddFilm(context, style, CommonCamera(cameras), &parts, &consistency, &fidelity, &heat_maps);
-  const FidelityTargets photo_targets{of_photos, targets.transmittance, nullptr, {}, {}};
+  const FidelityTargets photo_targets{of_photos,         targets.transmittance, nullptr, {}, {},
+                                      /*only_psnr=*/true};
   const FidelityRow to_photos = MeasureFidelity({"styled", frames("styled", training_views)},
                                                 photo_targets, parts.Next(n * kFrameSeconds));
 

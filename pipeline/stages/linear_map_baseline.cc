@@ -8,7 +8,6 @@
 #include "kernels/field/packed_grid.h"
 #include "kernels/image/color_statistics.h"
 #include "stylize/image/monge_kantorovich.h"
-#include "stylize/linear_map.h"
 
 namespace regrade {
 namespace {
@@ -39,12 +38,7 @@ double SquaredError(const ColorMap& map, const FrameSource& source, const FrameS
 
 }  // namespace
 
-std::optional<double> LinearMapPsnr(const RadianceField& field,
-                                    const std::vector<Camera>& cameras,
-                                    const FrameSource& source, const FrameSource& views_2d,
-                                    const FrameSource& transmittance,
-                                    const ProgressFunction& progress) {
-  if (source.count == 0) return std::nullopt;
+std::optional<ColorMap> BestLinearMap(const FrameSource& source, const FrameSource& views_2d) {
   std::vector<ColorStatistics> before, after;
   LeastSquaresAccumulator accumulator;
   for (int i = 0; i < source.count; ++i) {
@@ -61,18 +55,27 @@ std::optional<double> LinearMapPsnr(const RadianceField& field,
   if (before.empty()) return std::nullopt;
   const ColorMap mkl = ComputeMkl(Pool(before), Pool(after)).map;
   const ColorMap least_squares = accumulator.Solve();
-  const ColorMap better =
-      SquaredError(mkl, source, views_2d) < SquaredError(least_squares, source, views_2d)
-          ? mkl
-          : least_squares;
+  return SquaredError(mkl, source, views_2d) < SquaredError(least_squares, source, views_2d)
+             ? mkl
+             : least_squares;
+}
+
+std::optional<double> LinearMapPsnr(const RadianceField& field,
+                                    const std::vector<Camera>& cameras,
+                                    const FrameSource& source, const FrameSource& views_2d,
+                                    const FrameSource& transmittance,
+                                    const ProgressFunction& progress) {
+  const std::optional<ColorMap> better = BestLinearMap(source, views_2d);
+  if (!better) return std::nullopt;
   RadianceField mapped = field;
-  mapped.appearance = ApplyColorMap(field.appearance, better);
-  mapped.background = MapBackground(better, field.background);
+  mapped.appearance = ApplyColorMap(field.appearance, *better);
+  mapped.background = MapBackground(*better, field.background);
   const FastGrid grid = MakeFastGrid(mapped);
   const FrameSource rendered{
       source.count,
       [&](int i) { return RenderView(grid, cameras[i], MarchOptions{field.step}).color; }};
-  return MeasureFidelity({"linear_map", rendered}, {views_2d, transmittance, nullptr, {}, {}},
+  return MeasureFidelity({"linear_map", rendered},
+                         {views_2d, transmittance, nullptr, {}, {}, /*only_psnr=*/true},
                          progress)
       .psnr_to_2d_db;
 }

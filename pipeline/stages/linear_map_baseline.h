@@ -8,14 +8,17 @@
 #include "kernels/base/progress.h"
 #include "kernels/field/radiance_field.h"
 #include "kernels/scene/camera.h"
+#include "stylize/linear_map.h"
 
 namespace regrade {
 
-// PSNR, measured as psnr_to_2d_db, of the field under the better of two maps carried into its
-// coefficients (see EQ(sh-color-map)): the Monge-Kantorovich map between the pooled colours of
-// `source` and `views_2d`, and the least-squares map between their pixels. The better one is
-// chosen on the frames, and rendered at `cameras`. Pixels of `views_2d` that are not finite do
-// not count.
+// The better of two maps on the frames, clipped as pictures are: the Monge-Kantorovich map
+// between the pooled colours of `source` and `views_2d`, and the least-squares map between
+// their pixels. Pixels of `views_2d` that are not finite do not count; nothing if none counts.
+std::optional<ColorMap> BestLinearMap(const FrameSource& source, const FrameSource& views_2d);
+
+// PSNR, measured as psnr_to_2d_db, of the field under BestLinearMap carried into its
+// coefficients (see EQ(sh-color-map)) and rendered at `cameras`.
 std::optional<double> LinearMapPsnr(const RadianceField& field,
                                     const std::vector<Camera>& cameras,
                                     const FrameSource& source, const FrameSource& views_2d,

@@ -14,6 +14,8 @@ TEST(Protocols, StandForTheirFlags) {
             (Words{"--mode=ruder2016", "--gaps=1,5", "--frames", "a"}));
   EXPECT_EQ(ExpandProtocol({"--protocol=ruder2016", "--flow", "dis-fast"}),
             (Words{"--mode=ruder2016", "--gaps=1", "--flow", "dis-fast"}));
+  EXPECT_EQ(ExpandProtocol({"--protocol", "stylegaussian"}),
+            (Words{"--mode=stylegaussian", "--gaps=1,7"}));
   EXPECT_EQ(ExpandProtocol({"dir", "--protocol", "geometry"}),
             (Words{"--mode=geometry", "--gaps=1,5", "dir"}));
 }

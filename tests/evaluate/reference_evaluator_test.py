@@ -53,10 +53,10 @@ def write_flow(path, flow):
         file.write(struct.pack("<fii", 202021.25, WIDTH, HEIGHT) + flow.astype("<f4").tobytes())
 
 
-def make_frames(folder, random, flicker):
+def make_frames(folder, random, flicker, count=FRAMES):
     os.makedirs(folder)
     y, x = numpy.mgrid[0:HEIGHT, 0:WIDTH]
-    for i in range(FRAMES):
+    for i in range(count):
         u, v = x - 1.7 * i, y + 0.6 * i
         channels = [0.5 + 0.25 * numpy.sin(0.37 * u + 0.2 * v + c) + 0.2 * numpy.sin(0.11 * u - 0.31 * v)
                     for c in range(3)]

@@ -2,8 +2,10 @@
 // frames.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <functional>
 
 #include "evaluate/flow_file.h"
 #include "kernels/process/child_process.h"
@@ -168,6 +170,32 @@ TEST(EvaluateCommand, NetworksOfTheUser) {
   }
 }
 
+// Grey and transparent frames are frames: the controls take them, too.
+TEST(EvaluateCommand, ControlsAreRows) {
+  const TemporaryFolder folder;
+  WriteFrames(folder / "source", 4);
+  WriteFrames(folder / "styled", 4, 0.03f);
+  for (int i = 0; i < 4; ++i)
+    WriteText(folder / ("grey/0000" + std::to_string(i) + ".png"),
+              EncodePng8(Image(64, 48, 1)));
+  const auto evaluate = [&](std::vector<std::string> more) {
+    more.insert(more.end(), {"--frames", folder / "styled", "--gaps", "1", "--controls",
+                             "--out", folder / "out"});
+    const Outcome done = Evaluate(more);
+    EXPECT_EQ(done.code, 0) << done.text;
+    std::string names;
+    for (const JsonValue& row :
+         ReadJsonFile(folder / "out/report.json").At("fidelity").AsArray())
+      names += row.At("sequence").AsString() + " ";
+    return names;
+  };
+  EXPECT_EQ(evaluate({}), "styled control_blurred control_grey ");
+  EXPECT_EQ(evaluate({"--reference", folder / "source"}),
+            "source styled control_blurred control_grey ");
+  EXPECT_EQ(evaluate({"--reference", folder / "source", "--target", folder / "grey"}),
+            "source views_2d styled control_linear_map control_blurred control_grey ");
+}
+
 TEST(EvaluateCommand, H121_OneFrameIsNoPair) {
   const TemporaryFolder folder;
   WriteFrames(folder / "styled", 1);
@@ -201,6 +229,95 @@ TEST(EvaluateCommand, AProtocolSetsModeAndGaps) {
   EXPECT_EQ(refused.code, 2);
   EXPECT_OUTPUT(refused, "leave out --gaps");
   EXPECT_FALSE(std::filesystem::exists(folder / "refused"));
+}
+
+// Inputs that a person may give by mistake: each has its exit status and its sentence.
+TEST(EvaluateCommand, OddInputsHaveTheirSentences) {
+  struct Case {
+    const char* name;
+    std::function<void(const TemporaryFolder&)> change;  // of folders with four good frames
+    int code;
+    const char* sentence;
+  };
+  const auto each = [](const TemporaryFolder& folder, const std::string& name, auto encode) {
+    for (int i = 0; i < 4; ++i)
+      WriteText(folder / (name + "/0000" + std::to_string(i) + ".png"), encode(Frame(i)));
+  };
+  const auto with_alpha = [](const Image& frame) {
+    Image wide(frame.width, frame.height, 4);
+    for (int64_t p = 0; p < frame.num_pixels(); ++p)
+      for (int c = 0; c < 4; ++c)
+        wide.pixels[4 * p + c] = c < 3 ? frame.pixels[3 * p + c] : 0.5f;
+    return EncodePng8(wide);
+  };
+  const Case cases[] = {
+      {"good", [](const auto&) {}, 0, "Consistency"},
+      {"all of another size than the reference",
+       [&](const auto& folder) {
+         each(folder, "styled", [](const Image&) { return EncodePng8(Image(32, 24, 3)); });
+       },
+       3, "frames of 32 x 24 px, the reference has 64 x 48 px"},
+      {"one of another size",
+       [](const auto& folder) {
+         WriteText(folder / "styled/00003.png", EncodePng8(Image(48, 64, 3)));
+       },
+       3, "this frame is 48 x 64 px, 00000.png is 64 x 48 px"},
+      {"missing in the middle",
+       [](const auto& folder) { std::filesystem::remove(folder / "styled/00001.png"); }, 3,
+       "frame 00001 is missing"},
+      {"missing at the end",
+       [](const auto& folder) { std::filesystem::remove(folder / "styled/00003.png"); }, 3,
+       "00003.png of"},
+      {"no folder", [](const auto& folder) { std::filesystem::remove_all(folder / "styled"); },
+       3, "styled"},
+      {"no frames",
+       [](const auto& folder) {
+         for (int i = 0; i < 4; ++i)
+           std::filesystem::remove(folder / ("styled/0000" + std::to_string(i) + ".png"));
+       },
+       3, "there are no frames here"},
+      {"16 bits", [&](const auto& folder) { each(folder, "styled", EncodePng16); }, 0,
+       "more than 8 bits"},
+      {"alpha", [&](const auto& folder) { each(folder, "styled", with_alpha); }, 0,
+       "transparency, which is ignored"},
+      {"grey among colours",
+       [](const auto& folder) {
+         WriteText(folder / "styled/00002.png", EncodePng8(Image(64, 48, 1)));
+       },
+       3, "grey and colour frames in one sequence"},
+      {"not a picture",
+       [](const auto& folder) { WriteText(folder / "styled/00002.png", "a diary"); }, 3,
+       "00002.png"},
+      {"flow that is not a number",
+       [](const auto& folder) {
+         FlowField unknown(64, 48);
+         std::ranges::fill(unknown.uv, std::nanf(""));
+         for (int i = 0; i < 3; ++i)
+           for (const auto& [a, b] : {std::pair{i, i + 1}, std::pair{i + 1, i}})
+             WriteFlowFile(folder / ("flow/" + FlowFileName(a, b)), unknown);
+       },
+       0, "no pair has a comparable pixel"},
+  };
+  for (const Case& test : cases) {
+    SCOPED_TRACE(test.name);
+    const TemporaryFolder folder;
+    WriteFrames(folder / "source", 4);
+    WriteFrames(folder / "styled", 4);
+    std::filesystem::create_directories(folder / "flow");
+    test.change(folder);
+    for (const char* mode : {"lai2018", "stylegaussian"}) {
+      std::vector<std::string> words{
+          "--frames", folder / "styled", "--reference", folder / "source", "--gaps",
+          "1",        "--mode",          mode};
+      if (!std::filesystem::is_empty(folder / "flow"))
+        words.insert(words.end(), {"--flow", "files:" + (folder / "flow")});
+      const Outcome outcome = Evaluate(words);
+      EXPECT_EQ(outcome.code, test.code) << outcome.text;
+      const bool no_pair = std::string(test.sentence).starts_with("no pair");
+      if (!no_pair || mode == std::string("lai2018")) EXPECT_OUTPUT(outcome, test.sentence);
+      EXPECT_EQ(outcome.text.find("nan"), std::string::npos) << outcome.text;
+    }
+  }
 }
 
 TEST(EvaluateCommand, UnusableFlowFilesAreNamed) {

@@ -149,6 +149,25 @@ TEST(RunReport, ShowsEveryPartOfTheRun) {
   EXPECT_EQ(HeatMapsNamed(folder / "e/styles/style_sunset"), 6);
   EXPECT_EQ(HeatMapFiles(folder / "e/styles/style_sunset"), 6);
 
+  // With the rows that bound the table: of the views also photos, of which the 2D method has no
+  // picture of those held out, and all rows have fidelity.
+  const testing::ProgramOutcome bounded =
+      Regrade({"evaluate", folder / "e", "--gaps", "1", "--controls"});
+  ASSERT_EQ(bounded.code, 0) << bounded.text;
+  const JsonValue table = ReadJsonFile(folder / "e/styles/style_sunset/report.json");
+  std::set<std::string> measured_rows;
+  for (const JsonValue& row : table.At("fidelity").AsArray())
+    measured_rows.insert(row.At("sequence").AsString());
+  EXPECT_EQ(measured_rows.size(), 3u + 5 + 3 + 3);
+  for (const JsonValue& row : table.At("consistency").AsArray()) {
+    const std::string sequence = row.At("sequence").AsString();
+    EXPECT_EQ(measured_rows.count(sequence), 1u) << sequence;
+    EXPECT_EQ(row.At("undefined_pairs").AsInt() > 0, sequence == "photos_2d") << sequence;
+  }
+  for (const char* sequence : {"photos", "photos_2d", "control_blurred", "control_grey",
+                               "control_linear_map", "path_control_grey"})
+    EXPECT_EQ(measured_rows.count(sequence), 1u) << sequence;
+
   // Another choice of the film's renderer renders again, and is named.
   const auto film_renderer = [&] {
     return ReadJsonFile(folder / "e/styles/style_sunset/report.json")

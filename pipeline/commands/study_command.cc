@@ -1,0 +1,58 @@
+// regrade study: a page that asks which film people prefer, and what their answers show.
+#include "kernels/base/error.h"
+#include "pipeline/commands/command.h"
+#include "pipeline/files/atomic_file.h"
+#include "pipeline/study/make_study.h"
+#include "pipeline/study/study_answers.h"
+
+namespace regrade {
+namespace {
+
+struct StudyFileOptions {
+  std::string out;
+  bool analyse = false;
+
+  template <typename Bind>
+  void Describe(Bind& bind) {
+    bind("out", out,
+         {.help = "the page to write; with --analyse a JSON file of the analysis, if wanted"});
+    bind("analyse", analyse,
+         {.help = "reads the answers that participants saved: preference shares with intervals, "
+                  "Bradley-Terry strengths, and a test of each pair"});
+  }
+};
+
+}  // namespace
+
+void RunStudy(const Command& command, const Arguments& arguments, Console* console) {
+  constexpr size_t kMostParticipants = 10'000;
+  StudyFileOptions file;
+  StudyOptions study;
+  ProgramOptions program;
+  OptionSet options;
+  options.Add("Study", &file);
+  options.Add("Page", &study);
+  options.Add("Program", &program);
+  const auto prepared =
+      Prepare(command, arguments, {.most_words = kMostParticipants}, &options);
+  if (!prepared) return;
+  if (file.analyse) {
+    const JsonValue analysis = AnalyseStudy(ReadStudyAnswers(prepared->words));
+    console->Event("study", analysis);
+    console->Lines(FormatStudy(analysis));
+    if (!file.out.empty()) WriteJsonFile(file.out, analysis);
+    return;
+  }
+  CheckWords(command, prepared->words, 2, kMostMethods);
+  RequireValue(file.out, "--out", "name the page to write");
+  const MadeStudy made = MakeStudy(prepared->words, study);
+  WriteFileAtomically(file.out, made.html);
+  console->Info(Concat("wrote ", file.out, ": ", made.methods.size(), " methods, ",
+                       made.clips.size(), " clips, ",
+                       Format("%.1f", static_cast<double>(made.html.size()) / 1e6), " MB"));
+  console->Info(
+      "The page does not show which film is whose, but its source has the methods' names; each "
+      "participant sends back the file that it saves.");
+}
+
+}  // namespace regrade

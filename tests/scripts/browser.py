@@ -1,0 +1,147 @@
+"""Headless Chromium for tests of pages: over two pipes, without a package (Chrome DevTools Protocol)."""
+
+import base64
+import json
+import os
+import subprocess
+import time
+from urllib.parse import urlparse
+from urllib.request import pathname2url
+
+SIZES = {"phone": (390, 844), "desktop": (1280, 900)}
+NO_CHROMIUM = 77  # ctest reports "skipped"
+TIMEOUT_S = 60  # for any answer
+
+
+class Browser:
+    """Chromium controlled over two pipes; messages are JSON and end with a zero byte."""
+
+    def __init__(self, program, profile):
+        to_browser, self.send_fd = os.pipe()
+        self.read_fd, from_browser = os.pipe()
+
+        def connect():
+            # The browser expects descriptors 3 and 4; the pipes may already have these numbers, swapped.
+            read, write = os.dup(to_browser), os.dup(from_browser)
+            os.dup2(read, 3)
+            os.dup2(write, 4)
+            os.set_inheritable(3, True)
+            os.set_inheritable(4, True)
+
+        self.process = subprocess.Popen(
+            [program, "--headless=new", "--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage", "--no-first-run",
+             "--disable-background-networking", "--mute-audio", "--user-data-dir=" + profile, "--remote-debugging-pipe",
+             "about:blank"],
+            preexec_fn=connect, close_fds=False, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        os.close(to_browser)
+        os.close(from_browser)
+        os.set_blocking(self.read_fd, False)
+        self.buffer, self.number, self.events = b"", 0, []
+
+    def _message(self, deadline):
+        while b"\0" not in self.buffer:
+            if time.monotonic() > deadline or self.process.poll() is not None:
+                raise RuntimeError("Chromium does not answer")
+            try:
+                piece = os.read(self.read_fd, 1 << 20)
+            except BlockingIOError:
+                time.sleep(0.01)
+                continue
+            if not piece:
+                raise RuntimeError("Chromium has ended")
+            self.buffer += piece
+        text, self.buffer = self.buffer.split(b"\0", 1)
+        return json.loads(text)
+
+    def call(self, method, session=None, **parameters):
+        self.number += 1
+        message = {"id": self.number, "method": method, "params": parameters}
+        if session:
+            message["sessionId"] = session
+        data = json.dumps(message).encode() + b"\0"
+        while data:
+            data = data[os.write(self.send_fd, data):]
+        deadline = time.monotonic() + TIMEOUT_S
+        while True:
+            answer = self._message(deadline)
+            if answer.get("id") == self.number:
+                if "error" in answer:
+                    raise RuntimeError(method + ": " + answer["error"]["message"])
+                return answer["result"]
+            self.events.append(answer)
+
+    def wait_for(self, method):
+        deadline = time.monotonic() + TIMEOUT_S
+        while not any(event.get("method") == method for event in self.events):
+            self.events.append(self._message(deadline))
+
+    def close(self):
+        try:
+            self.call("Browser.close")
+        except (RuntimeError, OSError):
+            pass
+        try:
+            self.process.wait(timeout=10)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+
+
+class Page:
+    """A file, or an address that begins with http://, in one tab of one size."""
+
+    def __init__(self, browser, path, size, script=True):
+        self.browser, self.path = browser, path
+        browser.events = []
+        target = browser.call("Target.createTarget", url="about:blank")["targetId"]
+        self.target = target
+        self.session = browser.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+        for domain in ["Page", "Runtime", "Log", "Network"]:
+            self.call(domain + ".enable")
+        self.call("Emulation.setDeviceMetricsOverride", width=size[0], height=size[1], deviceScaleFactor=1,
+                  mobile=size[0] < 600)
+        if not script:
+            self.call("Emulation.setScriptExecutionDisabled", value=True)
+        served = path.startswith("http://")
+        self.call("Page.navigate", url=path if served else "file://" + pathname2url(os.path.abspath(path)))
+        browser.wait_for("Page.loadEventFired")
+
+    def call(self, method, **parameters):
+        return self.browser.call(method, session=self.session, **parameters)
+
+    def value(self, expression):
+        result = self.call("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
+        if "exceptionDetails" in result:
+            raise RuntimeError(result["exceptionDetails"]["text"] + " in " + expression)
+        return result["result"].get("value")
+
+    def click(self, x, y):
+        for kind in ["mousePressed", "mouseReleased"]:
+            self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
+
+    def shot(self, file):
+        picture = self.call("Page.captureScreenshot", format="png", captureBeyondViewport=True)["data"]
+        with open(file, "wb") as out:
+            out.write(base64.b64decode(picture))
+
+    def close(self):
+        self.browser.call("Target.closeTarget", targetId=self.target)
+
+    def complaints(self):
+        """Messages on the console and network requests of the page."""
+        found, folder = [], os.path.dirname(os.path.abspath(self.path))
+        for event in self.browser.events:
+            about, method = event.get("params", {}), event.get("method")
+            if method == "Runtime.exceptionThrown":
+                found.append("exception: " + about["exceptionDetails"].get("exception", {}).get("description", "?"))
+            elif method == "Runtime.consoleAPICalled" and about["type"] in ("error", "warning", "assert"):
+                found.append("console: " + str(about["args"]))
+            elif method == "Log.entryAdded" and about["entry"]["level"] in ("error", "warning"):
+                found.append("log: " + about["entry"]["text"] + " " + about["entry"].get("url", ""))
+            elif method == "Network.requestWillBeSent":
+                address = urlparse(about["request"]["url"])
+                in_folder = address.scheme == "file" and os.path.dirname(address.path) == pathname2url(folder)
+                own = self.path.startswith("http://") and address.netloc == urlparse(self.path).netloc
+                if address.scheme not in ("data", "about", "blob") and not in_folder and not own:
+                    found.append("requests " + about["request"]["url"][:200])
+        return found

@@ -1,0 +1,213 @@
+#!/usr/bin/env python3
+"""Makes a study with `regrade study`, answers it in headless Chromium, and analyses the saved answers.
+
+  look_at_study.py REGRADE [--shots FOLDER] [--chromium PROGRAM]
+
+Participants prefer one method; one of them ignores the attention checks. Checked: nothing on the console or asked of the
+network, no scrolling sideways and every film within the window at the sizes of a phone and a desktop, no name of a method
+on the page, films that play, places that are counterbalanced, a reload that goes on, keys that choose, and the analysis.
+Exit status 1 if anything is wrong, 77 if there is no Chromium or ffmpeg.
+"""
+
+import argparse
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+
+from browser import NO_CHROMIUM, SIZES, Browser, Page
+
+CLIPS = ("fern", "horns", "trex", "room")
+METHODS = ("plain", "lovely", "dull")
+CHECKS = 2
+PAIRS = len(CLIPS) * 3
+STATE = "JSON.parse(localStorage.getItem(Object.keys(localStorage).find((k) => k.startsWith('regrade study'))) || '{}')"
+
+
+def make_films(folder):
+    colours = {"plain": "gray", "lovely": "orange", "dull": "black"}
+    for method in METHODS:
+        os.makedirs(os.path.join(folder, method))
+        for i, clip in enumerate(CLIPS):
+            subprocess.run(["ffmpeg", "-v", "error", "-f", "lavfi", "-i",
+                            f"color={colours[method]}:s={160 + 16 * i}x96:d=1:r=10", "-c:v", "libvpx", "-b:v", "50k",
+                            os.path.join(folder, method, clip + ".webm")], check=True)
+
+
+def program(*words):
+    done = subprocess.run(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
+    return done.returncode, done.stdout
+
+
+def wait_until(page, expression):
+    end = time.monotonic() + 60
+    while not page.value(expression):
+        if time.monotonic() > end:
+            raise RuntimeError("waited in vain for " + expression)
+        time.sleep(0.05)
+
+
+def open_study(browser, path, size, forget):
+    page = Page(browser, path, size)
+    if forget:
+        page.value("localStorage.clear()")
+        page.call("Page.reload")
+        wait_until(page, "document.readyState === 'complete' && !!document.getElementById('begin').onclick")
+    return page
+
+
+def ready(page):
+    wait_until(page, "!document.getElementById('end').hidden || "
+                     "[...document.querySelectorAll('#films button')].some((b) => !b.disabled)")
+
+
+def brightness(page):
+    """Of each film shown, from its own picture: a participant sees no more."""
+    return page.value("[...document.querySelectorAll('video')].map((v) => { const c = document.createElement('canvas');"
+                      "c.width = c.height = 1; const g = c.getContext('2d'); g.drawImage(v, 0, 0, 1, 1);"
+                      "return g.getImageData(0, 0, 1, 1).data[0] })")
+
+
+def choose(page, place, key):
+    if key:
+        page.call("Input.dispatchKeyEvent", type="keyDown", key=str(place + 1), text=str(place + 1))
+        page.call("Input.dispatchKeyEvent", type="keyUp", key=str(place + 1))
+    else:
+        page.value(f"document.querySelectorAll('#films button')[{place}].click()")
+
+
+def layout(page, size):
+    found = []
+    wide = page.value("document.documentElement.scrollWidth")
+    if wide > size[0]:
+        found.append(f"scrolls sideways: {wide} pixels wide at {size[0]}")
+    outside = page.value("[...document.querySelectorAll('.film video,.film button')].filter((e) => { const r = "
+                         "e.getBoundingClientRect(); return r.width < 40 || r.bottom > innerHeight || r.right > innerWidth + 1 "
+                         "}).length")
+    if outside:
+        found.append(f"{outside} films or buttons are outside the window")
+    text = page.value("document.querySelector('main').innerText")
+    if any(method in text for method in METHODS):
+        found.append("a method's name is on the page: " + text)
+    return found
+
+
+def take_part(browser, path, size, careful, shot=None):
+    """(answers of one participant, complaints)"""
+    found = []
+    page = open_study(browser, path, size, forget=True)
+    page.value("document.getElementById('begin').click()")
+    number = 0
+    while True:
+        ready(page)
+        if not page.value("document.getElementById('end').hidden"):
+            break
+        if number == 0:
+            found += layout(page, size)
+            if shot:
+                page.shot(shot)
+            time.sleep(0.3)
+            if not page.value("[...document.querySelectorAll('video')].every((v) => v.currentTime > 0 && !v.paused)"):
+                found.append("a film does not play")
+        if number == 3:  # closed and opened again
+            found += page.complaints()
+            page.close()
+            page = open_study(browser, path, size, forget=False)
+            ready(page)
+            if page.value(STATE + ".answers.length") != 3:
+                found.append("a reload does not go on")
+        sign = page.value("[...document.querySelectorAll('.film')].findIndex((f) => f.querySelector('.sign'))")
+        bright = brightness(page)
+        best = max(range(len(bright)), key=bright.__getitem__)
+        place = best if sign < 0 else sign if careful else 1 - sign
+        choose(page, place, key=number % 2)
+        wait_until(page, STATE + f".answers.length === {number + 1}")
+        number += 1
+    answers = json.loads(page.value("document.getElementById('text').value"))
+    found += page.complaints()
+    page.close()
+    return answers, found
+
+
+def check_answers(all_answers):
+    found = []
+    for answers in all_answers:
+        given = [a for a in answers["answers"] if not a.get("check")]
+        if len(given) != PAIRS or len(answers["answers"]) != PAIRS + CHECKS or answers["trials"] != PAIRS + CHECKS:
+            found.append(f"{len(given)} choices and {len(answers['answers'])} answers")
+        if answers["answers"][0].get("check"):
+            found.append("a check stands first")
+        for a, b in ((0, 1), (0, 2), (1, 2)):
+            orders = [x["shown"] for x in given if sorted(x["shown"]) == [a, b]]
+            if len(orders) != len(CLIPS) or orders.count([a, b]) != len(CLIPS) // 2:
+                found.append(f"the places of {a} and {b} are not counterbalanced: {orders}")
+    orders = {tuple((x["clip"], tuple(x["shown"])) for x in answers["answers"]) for answers in all_answers}
+    if len(orders) != len(all_answers):
+        found.append("two participants have the same order")
+    return found
+
+
+def check_analysis(regrade, folder, all_answers):
+    found, files = [], []
+    for i, answers in enumerate(all_answers):
+        files.append(os.path.join(folder, f"answers_{i}.json"))
+        with open(files[-1], "w", encoding="utf-8") as file:
+            json.dump(answers, file)
+    out = os.path.join(folder, "analysis.json")
+    status, text = program(regrade, "study", "--analyse", *files, "--out", out)
+    if status:
+        return [text]
+    with open(out, encoding="utf-8") as file:
+        analysis = json.load(file)
+    rows = {row["name"]: row for row in analysis["methods"]}
+    if analysis["participants"] != len(all_answers) - 1 or analysis["failed_checks"] != 1:
+        found.append("the careless participant is counted: " + text)
+    if rows["lovely"]["share"] != 1 or rows["dull"]["share"] != 0 or rows["plain"]["share"] != 0.5:
+        found.append("wrong shares: " + text)
+    if not rows["lovely"]["share_low"] > 0.5 > rows["dull"]["share_high"]:
+        found.append("wrong intervals: " + text)
+    status, text = program(regrade, "study", "--analyse", files[0], files[0])
+    if status != 3 or "is in two files" not in text:
+        found.append("a participant counts twice: " + text)
+    return found
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("regrade", help="the program")
+    parser.add_argument("--shots", help="folder for screenshots")
+    parser.add_argument("--chromium", default=shutil.which("chromium") or shutil.which("chromium-browser"))
+    arguments = parser.parse_args()
+    if not arguments.chromium or not shutil.which("ffmpeg"):
+        print("skipped: Chromium or ffmpeg is not installed (Debian packages chromium, ffmpeg)")
+        return NO_CHROMIUM
+    found, all_answers = [], []
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+        make_films(folder)
+        page = os.path.join(folder, "study.html")
+        status, text = program(arguments.regrade, "study", *(os.path.join(folder, m) for m in METHODS), "--out", page,
+                               "--checks", str(CHECKS), "--least-seconds", "0.2")
+        if status:
+            print(text)
+            return 1
+        browser = Browser(arguments.chromium, os.path.join(folder, "profile"))
+        try:
+            for i, name in enumerate(["phone", "desktop", "phone", "desktop"]):
+                shot = os.path.join(arguments.shots, f"study_{name}.png") if arguments.shots and i < 2 else None
+                answers, complaints = take_part(browser, page, SIZES[name], careful=i != 2, shot=shot)
+                all_answers.append(answers)
+                found += [f"{name}: {complaint}" for complaint in complaints]
+        finally:
+            browser.close()
+        found += check_answers(all_answers) + check_analysis(arguments.regrade, folder, all_answers)
+    for complaint in found:
+        print(complaint)
+    print(f"look_at_study: {len(found)} findings")
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
