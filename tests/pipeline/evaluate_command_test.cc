@@ -184,8 +184,8 @@ TEST(EvaluateCommand, ControlsAreRows) {
     const Outcome done = Evaluate(more);
     EXPECT_EQ(done.code, 0) << done.text;
     std::string names;
-    for (const JsonValue& row :
-         ReadJsonFile(folder / "out/report.json").At("fidelity").AsArray())
+    const JsonValue report = ReadJsonFile(folder / "out/report.json");
+    for (const JsonValue& row : report.At("fidelity").AsArray())
       names += row.At("sequence").AsString() + " ";
     return names;
   };
@@ -314,7 +314,9 @@ TEST(EvaluateCommand, OddInputsHaveTheirSentences) {
       const Outcome outcome = Evaluate(words);
       EXPECT_EQ(outcome.code, test.code) << outcome.text;
       const bool no_pair = std::string(test.sentence).starts_with("no pair");
-      if (!no_pair || mode == std::string("lai2018")) EXPECT_OUTPUT(outcome, test.sentence);
+      if (!no_pair || mode == std::string("lai2018")) {
+        EXPECT_OUTPUT(outcome, test.sentence);
+      }
       EXPECT_EQ(outcome.text.find("nan"), std::string::npos) << outcome.text;
     }
   }

@@ -5,6 +5,7 @@
 
 #include "pipeline/run/presets.h"
 #include "pipeline/run/resolve_settings.h"
+#include "tests/support/psnr.h"
 #include "tests/support/small_field.h"
 
 namespace regrade {
