@@ -8,6 +8,7 @@ packages=(
   libgtest-dev libbenchmark-dev python3-numpy   # to test and to measure
   libboost-program-options-dev               # command line
   libboost1.74-dev                           # the local server (Beast)
+  libcurl4-openssl-dev libssl-dev            # fetching a network, SHA-256
   nlohmann-json3-dev libzip-dev libutfcpp-dev
   libopenimageio-dev libjpeg62-turbo-dev libpng-dev libheif-dev liblcms2-dev   # pictures
   libopencv-dev                              # flow, networks of 2D methods
