@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "kernels/base/error.h"
+#include "kernels/image/resize.h"
 #include "pipeline/capture/photo_names.h"
 #include "pipeline/commands/command.h"
 #include "pipeline/fields/field_file.h"
@@ -107,7 +108,7 @@ Image BeforeEdit(const RetouchOptions& options, const std::string& render, const
   if (!fs::exists(render))
     throw InputError("the render was not written yet", render,
                      "leave --edited out once: --from render writes what is to be edited");
-  return EditAtPhotoSize(Colors(DecodePhoto(render, AnySize()).image), photo, render);
+  return Resize(Colors(DecodePhoto(render, AnySize()).image), photo.width, photo.height);
 }
 
 // Writes what the style is made from to its folder, and sets style picture and method: a LUT
