@@ -16,7 +16,6 @@
 #include "tests/support/canned_server.h"
 #include "tests/support/data.h"
 #include "tests/support/expect_error.h"
-#include "tests/support/record_error.h"
 #include "tests/support/source_dir.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/tiny_run.h"
@@ -178,8 +177,7 @@ TEST_F(Networks, FetchedOnceConvertedAndTheSamePictureAsTheSegments) {
   const double difference =
       LargestDifference(MakeOnnxStylizer(folder, 1024, style)->Stylize(photo, 0), expected);
   // Weights are the same bits but those of the first layer, whose stretch both fold in 32 bits.
-  EXPECT_LE(difference, testing::RecordBound("pca-kd against separate ONNX segments",
-                                             testing::Computed::kFloat, difference, 2e-5));
+  EXPECT_LE(difference, 2e-5);
 
   // Files that a person put there need no host, and no yes.
   EXPECT_TRUE(RemoveNetwork(network_));
