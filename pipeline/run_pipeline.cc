@@ -8,6 +8,7 @@
 #include "pipeline/files/text.h"
 #include "pipeline/report/assessment.h"
 #include "pipeline/report/records.h"
+#include "pipeline/report/requirements.h"
 #include "pipeline/run/run_file.h"
 #include "pipeline/stages/stages.h"
 #include "pipeline/workspace/folder_size.h"
@@ -76,9 +77,8 @@ bool RunPipeline(const std::string& first, const std::string& last, RunContext* 
 namespace {
 
 // Four lines: where film and page are, how long it took, how it went, and what to do next.
-void PrintSummary(const RunContext& context) {
+void PrintSummary(RunReport report, const RunContext& context) {
   const Workspace &scene = *context.workspace, &style = *context.style;
-  RunReport report = ReportFromRecords(scene, style);
   report.preset = context.settings.run.preset;
   for (const char* stage : kStageNames)
     if (const auto record = context.FolderOf(stage).Find(stage))
@@ -102,6 +102,8 @@ void RunStyles(const std::string& first, const std::vector<NamedStyle>& styles,
   if (Find(until) < Find(first))
     throw UsageError("stage " + until + " comes before " + first, "--until",
                      "leave it out, or use `regrade stylize`");
+  const std::vector<Requirement> required = RequirementsOf(context->settings);
+  std::vector<std::string> failed;
   for (size_t i = 0; i < styles.size(); ++i) {
     const auto& [name, picture] = styles[i];
     const std::string folder = StyleFolder(context->workspace->folder(), name);
@@ -121,11 +123,15 @@ void RunStyles(const std::string& first, const std::vector<NamedStyle>& styles,
     if (!context->settings.start.dry_run) WriteRunFile("run", *context);
     if (!context->settings.start.dry_run && until == "report") {
       PublishStyle(context->workspace->folder(), name);
-      PrintSummary(*context);
+      const RunReport report = ReportFromRecords(*context->workspace, workspace);
+      PrintSummary(report, *context);
+      for (const std::string& sentence : FailedRequirements(required, report))
+        failed.push_back(name + ": " + sentence);
     }
     context->style = nullptr;
     context->settings.style = given;
   }
+  ThrowIfAny(failed);
 }
 
 }  // namespace regrade

@@ -9,7 +9,7 @@ finished variant is skipped. Prints a table in Markdown and writes FOLDER/ablati
 metrics) and FOLDER/bound.svg (the Lipschitz bound over the steps, on a logarithmic scale). Exit status: 0, or 1 if a
 run failed.
 
-The variants follow LipRF's Sec. 5.3: the activation, without K_est, without regularisation, with spectral normalisation
+The variants follow LipRF's Sec. 6.3: the activation, without K_est, without regularisation, with spectral normalisation
 to 1, each for every recipe. With --readings they are interpretations of the paper's text instead: what its B counts,
 steps, rates, starts and seeds.
 """
@@ -37,10 +37,16 @@ VARIANTS = (
 # Interpretations of the paper's text, and choices that it does not specify.
 READINGS = (
     ("as it is", ()),
-    ("B counts voxels", ("--style-loss", "sum-over-voxels")),
+    ("mean over rays", ("--style-loss", "mean")),
+    ("norms settle", ("--style-settle-norms",)),
+    ("no hidden biases", ("--no-style-hidden-bias",)),
+    ("views in passes", ("--style-view-order", "passes")),
+    ("300 passes", ("--style-view-order", "passes", "--style-steps", "300 VIEWS")),
     ("1000 steps", ("--style-steps", "1000")),
-    ("B counts voxels, 1000 steps", ("--style-loss", "sum-over-voxels", "--style-steps", "1000")),
     ("rate 3e-3, 1000 steps", ("--style-rate", "3e-3", "--style-rate-last", "3e-5", "--style-steps", "1000")),
+    ("starts as SIREN", ("--style-start", "siren")),
+    ("starts as SIREN, wide last layer", ("--style-start", "siren-wide-end")),
+    ("starts as SIREN, layers alike", ("--style-start", "siren-even")),
     ("starts orthogonal", ("--style-start", "orthogonal")),
     ("starts at the identity", ("--style-start", "identity")),
     ("another seed", ("--seed", "1")),
@@ -102,11 +108,12 @@ def ratio(value, whole):
 def table(rows):
     gaps = rows[0][2]["gaps"]
     head = ["recipe", "variant", "styled to 2D, dB", "to 2D of the photos, dB"] + [f"TC-PSNR gap {gap}, dB" for gap in gaps]
-    head += ["bound", "local Lipschitz, sampled", "maximum by gradient ascent", "K_est", "hue spread kept", "chroma kept", "s"]
+    head += ["bound at the start", "bound", "local Lipschitz, sampled", "maximum by gradient ascent", "K_est", "hue spread kept", "chroma kept", "s"]
     lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
     for recipe, variant, f in rows:
         cells = [recipe, variant, number(f["psnr_to_2d_db"]), number(f["psnr_to_2d_photos_db"])] + [number(tc) for tc in f["tc"]]
-        cells += [number(f["bound"]), number(f["local_lipschitz_sampled"]), number(f["local_lipschitz_max"]), number(f["k_est"])]
+        start = f["bound_at_steps"][0][1] if f["bound_at_steps"] else None
+        cells += [number(start), number(f["bound"]), number(f["local_lipschitz_sampled"]), number(f["local_lipschitz_max"]), number(f["k_est"])]
         cells += [ratio(f["hue_std"], f["hue_std_2d"]), ratio(f["chroma"], f["chroma_2d"]), number(f["seconds"], 0)]
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines)
@@ -181,6 +188,7 @@ def main():
     for name in wanted:
         if name not in names:
             parser.error(f"there is no variant '{name}'; there are: " + ", ".join(names))
+    registered = json.loads(read(options.folder, ".regrade/stages/pose.json"))["metrics"]["registered"]
     rows = []
     for recipe in options.recipes.split(","):
         for name, flags in variants:
@@ -194,7 +202,8 @@ def main():
                 command += ["--style", options.style]
             if options.steps:
                 command += ["--style-steps", str(options.steps)]
-            command += flags
+            # "300 VIEWS": as many times the number of registered photos.
+            command += [str(int(word.split()[0]) * registered) if word.endswith(" VIEWS") else word for word in flags]
             print(f"{recipe}, {name} ...", file=sys.stderr, flush=True)
             log = os.path.join(options.work, os.path.basename(folder) + ".log")
             with open(log, "w", encoding="utf-8") as file:

@@ -10,14 +10,14 @@
 #                                           times with --reproducible and three times without; prints seconds and the
 #                                           hashes of field, network, styled field and frames
 #
-# `run` prints the parity table, fits each packed capture (with the settings below for its name, or the last ones),
-# restyles the field with each recipe if the capture was packed with a style, and writes OUT/gpu_check.json (default
-# for OUT: DIR). REGRADE_RECIPES="standard" leaves out the paper's recipes.
+# `run` prints the parity table, fits each packed capture (with REGRADE_FIT, default: --preset best), restyles the
+# field with each recipe if the capture was packed with a style, and writes OUT/gpu_check.json (default for OUT: DIR).
+# REGRADE_RECIPES="standard" leaves out the paper's recipes.
 # Exit status: 0, or 1 if a tolerance is exceeded, a sanitizer finds an error or reproducible results differ.
 set -euo pipefail
 exec </dev/null
 
-usage() { sed -n '2,19s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"; }
+usage() { sed -n '2,16s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"; }
 [[ "${1:-}" != --help ]] || { usage; exit 0; }
 [[ $# -ge 2 ]] || { usage >&2; exit 2; }
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
@@ -28,28 +28,12 @@ bundle() {
   local build=$root/build/gpu-bundle
   cmake -S "$root" -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DREGRADE_CUDA=ON -DREGRADE_BENCHMARKS=OFF \
     -DCMAKE_CUDA_ARCHITECTURES="${REGRADE_CUDA_ARCH:-90}" >/dev/null
-  cmake --build "$build" --target regrade_gpu device_{film,parity,style,training}_test --parallel "$(nproc)"
-  cp "$build/pipeline/regrade_gpu" "$build"/tests/gpu/device_{film,parity,style,training}_test "${BASH_SOURCE[0]}" "$dir"
-  strip "$dir/regrade_gpu" "$dir"/device_{film,parity,style,training}_test
+  cmake --build "$build" --target regrade_gpu device_{cells,film,parity,style,training}_test --parallel "$(nproc)"
+  cp "$build/pipeline/regrade_gpu" "$build"/tests/gpu/device_{cells,film,parity,style,training}_test "${BASH_SOURCE[0]}" "$dir"
+  strip "$dir/regrade_gpu" "$dir"/device_{cells,film,parity,style,training}_test
   ldd "$dir/regrade_gpu" | awk '/lib(zip|boost|bz2|crypto|gomp|z)[._]/ {print $3}' | xargs -I{} cp -L {} "$dir"
   [[ $# -eq 0 ]] || cp "$@" "$dir"
   du -sh "$dir"
-}
-
-# Settings of the README's table; other names are fitted with the settings of the phone capture.
-settings_of() {
-  case $1 in
-    lego) echo "--fit-resolutions 128,256,512 --fit-steps 1500,4000,16000 --fit-rays 16384 --fit-step-size 0.5
-                --initial-density 0.1 --tv-density 1e-5 --tv-sh 1e-3 --tv-fraction 0.01 --tv-decay 1
-                --fit-rate-density 64 --fit-rate-density-end 4 --fit-density-delay 0.07 --fit-rate-sh-end 3e-4
-                --prune-weight 0.256" ;;
-    fern) echo "--fit-resolutions 352,704,1408 --fit-steps 3000,7000,7000 --fit-rays 12288 --fit-step-size 0.5
-                --initial-density 0.1 --prune-weight 2.5 --tv-density 2e-3 --tv-sh 1e-2 --tv-fraction 0.01 --tv-decay 1
-                --fit-rate-density 16 --fit-rate-density-end 3 --fit-density-delay 0.08 --fit-view-bound 0.3
-                --fit-rate-sh 5e-2 --fit-rate-sh-end 2e-3" ;;
-    *) echo "--fit-resolutions 96,192,384 --fit-steps 600,1500,4000 --fit-rays 16384 --fit-rate-density 32
-             --fit-rate-density-end 4 --fit-density-delay 0.1 --fit-rate-sh-end 2e-3" ;;
-  esac
 }
 
 # Time, bytes of memory and of the L2 cache, warp instructions and tensor-core instructions of each kernel, in a small
@@ -82,7 +66,7 @@ run() {
   mkdir -p "$out"
   export LD_LIBRARY_PATH=$dir${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}
   : >"$out/parity.txt"
-  for test in device_{film,parity,style,training}_test; do
+  for test in device_{cells,film,parity,style,training}_test; do
     # `hard_cases.py --measured OUT/*.xml` adds these numbers to RESULTS.md.
     "$dir/$test" --gtest_output="xml:$out/$test.xml" >>"$out/parity.txt" || status=1
   done
@@ -113,8 +97,8 @@ run() {
   for capture in "$dir"/*.npz; do
     [[ -e $capture ]] || continue
     name=$(basename "$capture" .npz)
-    # shellcheck disable=SC2046  # settings are words
-    if record=$("$dir/regrade_gpu" fit --capture "$capture" --field "$out/field.npz" $(settings_of "$name") \
+    # shellcheck disable=SC2086  # settings are words
+    if record=$("$dir/regrade_gpu" fit --capture "$capture" --field "$out/field.npz" ${REGRADE_FIT:---preset best} \
       2>/dev/null); then
       printf ',\n"fit_%s": %s' "$name" "$record" >>"$out/gpu_check.json"
       echo "$name: $record" | cut -c1-400
@@ -142,10 +126,10 @@ run() {
   return $status
 }
 
-# REGRADE_FIT: other options of the fit; REGRADE_STYLE: of the training.
+# REGRADE_FIT: options of the fit; REGRADE_STYLE: of the training.
 repeat() {
   local capture=$1 out=${2:-$dir} option turn of hashes first record status=0
-  local fit=${REGRADE_FIT:-$(settings_of "$(basename "$capture" .npz)")}
+  local fit=${REGRADE_FIT:---preset standard}
   mkdir -p "$out"
   export LD_LIBRARY_PATH=$dir${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}
   for option in --reproducible --no-reproducible; do

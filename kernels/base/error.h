@@ -21,6 +21,7 @@ enum class ExitCode {
   kResources = 5,
   kScene = 6,
   kFolderInUse = 7,
+  kRequirement = 8,
 };
 
 // A recoverable user-facing error. `what` failed, `where` (file, photo, option; may be empty),

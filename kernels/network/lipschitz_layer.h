@@ -1,6 +1,6 @@
 // A linear layer whose spectral norm is a parameter, and its adjoint.
 //
-// EQ(lipschitz-layer), LipRF Sec. 4.3:  A = squareplus(K, b) W / sigma,  sigma = u^T W v, with
+// EQ(lipschitz-layer), LipRF Sec. 5.3:  A = squareplus(K, b) W / sigma,  sigma = u^T W v, with
 // u and v from the power iteration (Miyato et al. 2018), held constant in the adjoint:
 //   d_W = s / sigma (d_A - <d_A, W / sigma> u v^T),   d_K = squareplus'(K) <d_A, W / sigma>.
 // sigma never exceeds ||W||_2, so ||A||_2 >= squareplus(K): the certificate needs exact

@@ -14,6 +14,7 @@
 #include "pipeline/report/html.h"
 #include "pipeline/report/json.h"
 #include "pipeline/report/records.h"
+#include "pipeline/report/requirements.h"
 #include "pipeline/report/run_pictures.h"
 #include "pipeline/run/run_settings.h"
 #include "pipeline/stages/heat_map_files.h"
@@ -24,7 +25,7 @@ namespace regrade {
 namespace {
 
 struct FramesOptions {
-  std::string frames, reference, target, style, out, protocol, table = "text";
+  std::string frames, reference, target, style, out, protocol, table = "text", require;
 
   template <typename Bind>
   void Describe(Bind& bind) {
@@ -45,6 +46,7 @@ struct FramesOptions {
     bind("table", table,
          {.help = "form of the printed tables; latex needs the package booktabs",
           .choices = kTableForms});
+    bind("require", require, {.help = kRequireHelp});
     bind("out", out,
          {.help = "folder for report.html, report.json and heatmaps/ of the worst pairs"});
   }
@@ -69,6 +71,7 @@ void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& optio
   if (options.mode == "geometry")
     throw UsageError("geometry is known only for runs of regrade", "--mode",
                      "use lai2018 or ruder2016 for frames of other programs");
+  const std::vector<Requirement> required = ParseRequirements(frames.require, options.gaps);
   ProbeEvaluationNetworks(options);
   const bool has_reference = !frames.reference.empty();
   if (!has_reference)
@@ -124,6 +127,9 @@ void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& optio
   if (workspace) WriteEvaluation(*workspace, metrics, seconds);
   console->Event("evaluation", MetricsToJson(metrics));
   console->Lines(FormatTables(consistency, fidelity, frames.table));
+  RunReport report;
+  report.evaluation = metrics;
+  ThrowIfAny(FailedRequirements(required, report));
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "pipeline/commands/command.h"
 #include "pipeline/commands/probe_styles.h"
 #include "pipeline/program/device_choice.h"
+#include "pipeline/report/records.h"
 #include "pipeline/run/plan.h"
 #include "pipeline/run/run_file.h"
 #include "pipeline/run_pipeline.h"
@@ -93,6 +94,12 @@ void RunStages(const Command& command, const Arguments& arguments, Console* cons
   if (first_start && !settings.start.dry_run) WriteRunFile(name, context);
   const bool done = RunPipeline("pose", name == "pose" ? "pose" : "reconstruct", &context);
   if (!settings.start.dry_run) WriteRunFile(name, context);
+  if (name != "run") {
+    if (!settings.start.dry_run)
+      ThrowIfAny(FailedRequirements(RequirementsOf(settings),
+                                    ReportFromRecords(workspace, workspace)));
+    return;
+  }
   if (done)
     RunStyles("style_2d", styles, &context);
   else

@@ -55,8 +55,9 @@ HeldOut MeasureHeldOut(FitEngine* engine, const PackedCapture& capture,
 
 }  // namespace
 
-void FitPacked(const FitPackedOptions& settings, const FitOptions& options) {
+void FitPacked(const FitPackedOptions& settings, FitOptions options) {
   const double start = ClockSeconds();
+  options.seed = settings.seed;
   const PackedCapture capture = ReadPackedCapture(settings.capture);
   std::vector<TrainingView> views;
   for (const PackedView& view : capture.views)

@@ -18,6 +18,7 @@ struct FitPackedOptions {
   std::string frames;   // folder for pictures; empty: none
   std::string preset = "standard";
   std::string device = "cuda";
+  uint64_t seed = 0;
   bool reproducible = false;  // see RunOptions
 
   template <typename Bind>
@@ -29,6 +30,7 @@ struct FitPackedOptions {
     bind("field", field, {.help = "the .npz file that the field is written to"});
     bind("frames", frames, {.help = "a folder for .ppm pictures of the held-out views"});
     bind("device", device, {.help = "where arithmetic runs", .choices = "cpu|cuda"});
+    bind("seed", seed, {.help = "seed of all random numbers"});
     bind("reproducible", reproducible, {.help = "two fits give the same bytes"});
   }
 };
@@ -107,6 +109,6 @@ void StylePacked(const StylePackedOptions& settings, const TrainNetworkOptions& 
 
 // Prints one line of JSON: times, counts, PSNR, SSIM and fine detail of the held-out views,
 // milliseconds a rendered view. `curve_heldout` has [seconds, PSNR, SSIM, detail kept].
-void FitPacked(const FitPackedOptions& settings, const FitOptions& options);
+void FitPacked(const FitPackedOptions& settings, FitOptions options);
 
 }  // namespace regrade

@@ -69,10 +69,15 @@ struct RunOptions {
 };
 
 // Options of one start of the program; never part of a stage's inputs.
+inline constexpr char kRequireHelp[] =
+    "bounds of metrics, as styled:tc-psnr:1>=30,reconstruct:psnr-heldout>=25; where one does "
+    "not hold, the exit status is 8";
+
 struct StartOptions {
   std::string config;
   std::string restart_from;
   std::string until = "report";
+  std::string require;
   bool dry_run = false;
   bool break_lock = false;
   bool yes = false;
@@ -87,6 +92,7 @@ struct StartOptions {
     bind("until", until,
          {.help = "ends each style after this stage; `regrade render` goes on",
           .choices = "stylize|render|evaluate|report"});
+    bind("require", require, {.help = kRequireHelp});
     bind("dry-run", dry_run, {.help = "prints what would be done, and does nothing"});
     bind("break-lock", break_lock,
          {.help = "takes over a folder whose last run died on another machine"});

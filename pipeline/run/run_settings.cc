@@ -35,6 +35,13 @@ void CheckTogether(const RunSettings& settings) {
     throw UsageError("labels of the style picture need labels of the photos",
                      "--style-mask and --masks",
                      "give --masks, a folder of labels for the photos");
+  if (!RequirementsOf(settings).empty() && settings.start.until != "report")
+    throw UsageError("metrics are measured after stage " + settings.start.until, "--require",
+                     "leave out --until");
+}
+
+std::vector<Requirement> RequirementsOf(const RunSettings& settings) {
+  return ParseRequirements(settings.start.require, settings.consistency.gaps);
 }
 
 }  // namespace regrade

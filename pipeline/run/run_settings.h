@@ -10,6 +10,7 @@
 #include "pipeline/fields/camera_path.h"
 #include "pipeline/program/option_binding.h"
 #include "pipeline/program/run_options.h"
+#include "pipeline/report/requirements.h"
 #include "reconstruct/colmap/poses_from_photos.h"
 #include "reconstruct/fit/fit_options.h"
 #include "stylize/image/style_options.h"
@@ -127,5 +128,8 @@ struct RunSettings {
 
 // Throws Error(kUsage), naming both, for options that contradict each other.
 void CheckTogether(const RunSettings& settings);
+
+// What --require demands. Throws Error(kUsage).
+std::vector<Requirement> RequirementsOf(const RunSettings& settings);
 
 }  // namespace regrade

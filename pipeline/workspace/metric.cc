@@ -5,6 +5,7 @@ namespace regrade {
 void PutMetric(const std::string& key, const Metric& metric, JsonValue* object) {
   (*object)[key] = metric.value ? JsonValue(*metric.value) : JsonValue();
   if (!metric.value) (*object)[key + "_why"] = metric.why;
+  if (metric.infinite) (*object)[key + "_infinite"] = true;
 }
 
 Metric MetricAt(const JsonValue& object, const std::string& key) {
@@ -15,7 +16,10 @@ Metric MetricAt(const JsonValue& object, const std::string& key) {
     throw InputError(
         "\"" + key + "\" is neither a number nor null with a reason in \"" + key + "_why\"",
         value.line() > 0 ? "line " + std::to_string(value.line()) : "");
-  return Metric::Undefined(why->AsString());
+  Metric metric = Metric::Undefined(why->AsString());
+  const JsonValue* infinite = object.Find(key + "_infinite");
+  metric.infinite = infinite != nullptr && infinite->AsBool();
+  return metric;
 }
 
 }  // namespace regrade

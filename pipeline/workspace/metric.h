@@ -29,6 +29,7 @@ namespace regrade {
 struct Metric {
   std::optional<double> value;
   std::string why = "not measured";  // meaningful only while `value` is empty
+  bool infinite = false;             // the number was +inf: `value` is empty
 
   Metric() = default;
   Metric(double number) {  // NOLINT: a number is a metric
@@ -36,6 +37,7 @@ struct Metric {
       value = number;
     } else {
       why = std::isnan(number) ? "not a number" : "infinite: no error at all";
+      infinite = number > 0 && std::isinf(number);
     }
   }
   // `why`, where given, is the reason for a missing and for an infinite number.
@@ -58,7 +60,8 @@ struct MetricInfo {
   bool optional = false;  // of a text: where it is empty, the key is absent
 };
 
-// "key": number, or "key": null and "key_why": reason.
+// "key": number, or "key": null and "key_why": reason; where it is infinite, "key_infinite":
+// true.
 void PutMetric(const std::string& key, const Metric& metric, JsonValue* object);
 
 // Throws Error(kInput), which names the key, unless there is a number, or null with its reason.

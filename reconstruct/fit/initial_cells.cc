@@ -3,12 +3,8 @@
 #include <algorithm>
 #include <vector>
 
-#include "kernels/field/trilinear.h"
-
 namespace regrade {
 namespace {
-
-constexpr int kRateLattice = 96;  // vertices along the longest side
 
 // Number of cameras that see a point beyond near_clip, up to `enough`. A vertex may project
 // just outside of a photo and still be a corner of a visible cell: `margin` is a fraction of
@@ -142,39 +138,16 @@ FastGrid MakeInitialCells(const TrainingRays& rays, const GridFrame& frame,
 
 Buffer<float> DensityRates(const TrainingRays& rays, const GridFrame& frame,
                            const CellGrid& cells, float near_clip) {
-  const int longest = std::max({frame.resolution.x, frame.resolution.y, frame.resolution.z});
-  Vec3i n;  // vertices of the lattice
-  for (int a = 0; a < 3; ++a)
-    n[a] = std::max(2, static_cast<int>(int64_t{kRateLattice} * frame.resolution[a] / longest));
-  GridFrame lattice{n, frame.center, frame.radius};
-  std::vector<float> views(static_cast<size_t>(lattice.NumVertices()));
-#pragma omp parallel for schedule(dynamic, 1)
-  for (int x = 0; x < n.x; ++x)
-    for (int y = 0; y < n.y; ++y)
-      for (int z = 0; z < n.z; ++z) {
-        const Vec3d at{x * static_cast<double>(frame.resolution.x) / (n.x - 1),
-                       y * static_cast<double>(frame.resolution.y) / (n.y - 1),
-                       z * static_cast<double>(frame.resolution.z) / (n.z - 1)};
-        views[static_cast<size_t>(lattice.Vertex(x, y, z))] = static_cast<float>(
-            ViewsThatSee(rays, WorldOfLattice(frame, at), near_clip, 0, rays.num_views()));
-      }
-  const float most = std::max(1.0f, *std::max_element(views.begin(), views.end()));
-  constexpr float kLeast = 1e-3f;
   Buffer<float> rates(cells.num_vertices());
-#pragma omp parallel for schedule(static)
+  float most = 1;  // photos
+#pragma omp parallel for schedule(dynamic, 256) reduction(max : most)
   for (int64_t v = 0; v < rates.size(); ++v) {
-    const Vec3i place = PlaceOf(cells.vertex_key[v]);
-    Vec3f p;
-    for (int a = 0; a < 3; ++a)
-      p[a] = static_cast<float>(place[a]) * static_cast<float>(n[a] - 1) /
-             static_cast<float>(frame.resolution[a]);
-    const Cell<float> cell = LocateCell(lattice, p);
-    float sum = 0;
-    for (int k = 0; k < 8; ++k)
-      sum += CornerWeight(cell.fraction, k) *
-             views[static_cast<size_t>(CornerVertex(lattice, cell.vertex, k))];
-    rates[v] = std::max(kLeast, sum / most);
+    const Vec3d at = WorldOfLattice(frame, PlaceOf(cells.vertex_key[v]).Cast<double>());
+    rates[v] = static_cast<float>(ViewsThatSee(rays, at, near_clip, 0, rays.num_views()));
+    most = std::max(most, rates[v]);
   }
+  constexpr float kLeast = 1e-3f;
+  for (float& rate : rates) rate = std::max(kLeast, rate / most);
   return rates;
 }
 

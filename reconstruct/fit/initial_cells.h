@@ -28,8 +28,8 @@ FastGrid MakeInitialCells(const TrainingRays& rays, const GridFrame& frame,
 
 // Factors of the density's rate, [V]: the number of photos that see a vertex, over the number
 // that see the best seen one. What few photos see settles slowly, so that it takes shape where
-// more photos agree (Sun, Sun, Chen 2022, DVGO, section 5.2). The factor is exact on a lattice
-// of at most 96 vertices a side and blended between them.
+// more photos agree (Sun, Sun, Chen 2022, DVGO, section 5.2). Vertices of later stages take the
+// factor between those of their parents.
 Buffer<float> DensityRates(const TrainingRays& rays, const GridFrame& frame,
                            const CellGrid& cells, float near_clip);
 

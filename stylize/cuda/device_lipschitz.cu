@@ -104,11 +104,12 @@ __device__ void StartAtLongestColumn(SharedLayer* layer, int outputs, int inputs
   __syncthreads();
 }
 
-// A block a layer.
+// A block a layer. A step that Update will not make leaves the vectors alone: it is made again.
 template <typename View>
 __global__ void __launch_bounds__(kLayerThreads)
-    ActivateWeightsKernel(View all, float* mlp_parameters) {
+    ActivateWeightsKernel(View all, float* mlp_parameters, const int32_t* skip) {
   __shared__ SharedLayer layer;
+  if (*skip != 0 || all.state->halted != 0) return;
   const int l = static_cast<int>(blockIdx.x), outputs = all.shape.outputs[l],
             inputs = all.shape.inputs[l], size = outputs * inputs;
   const int thread = static_cast<int>(threadIdx.x);
@@ -195,8 +196,10 @@ __global__ void __launch_bounds__(kLayerThreads)
     const int o = i / inputs, c = i % inputs;
     give(i, loss_factor * factor * (d_a(o, c) - inner * u[o] * v[c]));
   }
+  const bool biased = all.params.update.options.hidden_bias || l + 1 == all.shape.layers;
   if (thread < outputs)
-    give(size + thread, loss_factor * from[all.shape.mlp_outputs[l] * stride + thread]);
+    give(size + thread,
+         biased ? loss_factor * from[all.shape.mlp_outputs[l] * stride + thread] : 0.0);
   if (thread != 0) return;
   give(size + outputs,
        all.params.update.NormGradient(k, loss_factor * SquareplusDerivative(k) * inner));
@@ -248,9 +251,9 @@ __global__ void __launch_bounds__(kUpdateThreads)
 
 }  // namespace
 
-void DeviceLipschitz::ActivateWeights(DeviceMlp* mlp) {
+void DeviceLipschitz::ActivateWeights(DeviceMlp* mlp, const int32_t* skip) {
   ActivateWeightsKernel<<<static_cast<unsigned>(shape_.layers), kLayerThreads, 0,
-                          LaunchStream()>>>(GetView(), mlp->parameters());
+                          LaunchStream()>>>(GetView(), mlp->parameters(), skip);
   CheckLaunch("activate_weights");
 }
 
@@ -267,7 +270,9 @@ void DeviceLipschitz::Update(DeviceMlp* mlp, const Step& step,
 
 #else
 
-void DeviceLipschitz::ActivateWeights(DeviceMlp*) { DeviceWait("activate_weights"); }
+void DeviceLipschitz::ActivateWeights(DeviceMlp*, const int32_t*) {
+  DeviceWait("activate_weights");
+}
 void DeviceLipschitz::Update(DeviceMlp*, const Step&, const DeviceBuffer<StepStats>&) {
   DeviceWait("lipschitz_update");
 }

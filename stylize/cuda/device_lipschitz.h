@@ -52,9 +52,9 @@ class DeviceLipschitz {
                          AdamState* adam) const;
   std::vector<float> Gradient() const;  // of the last step, regularisation included
 
-  // The power iteration's steps, then the effective weights into `mlp`. Neither this nor Update
-  // waits.
-  void ActivateWeights(DeviceMlp* mlp);
+  // The power iteration's steps, then the effective weights into `mlp`. Does nothing where
+  // Update will not: *skip, on the device, is not 0, or training has halted. Neither waits.
+  void ActivateWeights(DeviceMlp* mlp, const int32_t* skip);
   // A step along the gradient that `mlp` has summed, which is then cleared. The pointers are to
   // device memory; their values are written to stats[number of the step % its size]. Does
   // nothing where *skip is not 0.

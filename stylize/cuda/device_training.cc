@@ -145,7 +145,7 @@ class DeviceTraining::CapturedSteps {
     const int32_t* touched = slots_.counter.data();
     GatherRows(grid_, slots_.point_of_slot.data(), 0, slot_capacity_, position_scale_,
                features_.data(), touched);
-    optimizer_.ActivateWeights(&mlp_);
+    optimizer_.ActivateWeights(&mlp_, &demand_.data()->overflowed);
     mlp_.Forward(MlpPrecision::kTensor, features_.data(), slot_capacity_, rows_.data(),
                  touched);
     if (has_base_)

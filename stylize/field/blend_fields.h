@@ -1,6 +1,6 @@
 // Between a field and its styles: mixed coefficients over one geometry.
 //
-// EQ(style-mix), LipRF Sec. 5.2, for several styles: s_j = (1 - sum_i a_i) s0_j + sum_i a_i
+// EQ(style-mix), LipRF Sec. 6.1, for several styles: s_j = (1 - sum_i a_i) s0_j + sum_i a_i
 // s^i_j for each voxel j, a_i >= 0, sum a_i <= 1. A ray's colour is linear in its voxels'
 // coefficients, with weights that only the geometry decides: so the mixed field renders the mix
 // of the fields' renders wherever no sample's colour is clamped, at the cost of one field. As

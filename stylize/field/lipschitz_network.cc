@@ -124,6 +124,10 @@ float* LipschitzNetwork::bias(int layer) {
 }
 float& LipschitzNetwork::k(int layer) { return bias(layer)[Outputs(layer)]; }
 
+void LipschitzNetwork::RestartNorms() {
+  for (int l = 0; l < kNetworkLayers; ++l) StartPowerIteration(ViewOfLayer(this, l));
+}
+
 void LipschitzNetwork::WarmUpNorms() {
   for (int l = 0; l < kNetworkLayers; ++l) WarmUpPowerIteration(ViewOfLayer(this, l));
 }

@@ -64,7 +64,8 @@ class LipschitzNetwork {
   const float* bias(int layer) const { return Mutable()->bias(layer); }
   float k(int layer) const { return Mutable()->k(layer); }
 
-  // Power iteration: from the start until it has settled, and one step of it.
+  // Power iteration: its start, from there until it has settled, and one step of it.
+  void RestartNorms();
   void WarmUpNorms();
   void StepNorms();
 

@@ -1,6 +1,6 @@
 // LipRF's adaptive Lipschitz regularisation.
 //
-// EQ(liprf-regularizer), LipRF eq. 11:  L_Lip = sum_i squareplus(K_i - K_est^(1/l), b),  l = 6:
+// EQ(liprf-regularizer), LipRF eq. 13:  L_Lip = sum_i squareplus(K_i - K_est^(1/l), b),  l = 6:
 // the number of weight matrices, the same in the root and in the product, so that all K_i at
 // the root give a product of K_est.
 #pragma once

@@ -23,6 +23,8 @@ struct WeightUpdateOptions {
   double rate_last = 7e-6;
   double lambda = 2e-4;
   int norm_steps = 20;
+  bool settle_norms = true;
+  bool hidden_bias = true;
   bool no_regularisation = false;
   bool spectral_normalisation = false;
 
@@ -45,6 +47,11 @@ struct WeightUpdateOptions {
           .help = "steps of the power iteration before each training step",
           .min = 1,
           .max = 1000});
+    bind("style-settle-norms", settle_norms,
+         {.help = "lets the power iteration settle at the start, at the end, and where its "
+                  "estimate lags behind the weights"});
+    bind("style-hidden-bias", hidden_bias,
+         {.help = "hidden layers have biases; LipRF's proposition on networks assumes none"});
     bind("style-no-regularisation", no_regularisation,
          {.help = "ablation: no Lipschitz regularisation: closer to the 2D method, and noisier "
                   "where its views disagree; only --style-bound limits the bound"});

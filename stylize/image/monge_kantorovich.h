@@ -21,7 +21,7 @@ inline constexpr char kFlatStyleNotice[] =
     "the style image has a single colour: the result will be flat";
 inline constexpr double kLargestUsualNorm = 1e3;  // beyond it, a notice
 
-// EQ(mkl), Pitie and Kokaram 2007, LipRF eq. 8. Source covariance A, style covariance B. Of
+// EQ(mkl), Pitie and Kokaram 2007, LipRF eq. 11. Source covariance A, style covariance B. Of
 //   T = A^-1/2 (A^1/2 B A^1/2)^1/2 A^-1/2 = B^1/2 (B^1/2 A B^1/2)^-1/2 B^1/2
 // the second, dual form is used, for it survives a singular A. With s = RankWeight(A / tau), a
 // function of the matrix A, and G = B^1/2 (s A)^1/2 = P S Q^T,

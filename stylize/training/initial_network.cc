@@ -48,6 +48,25 @@ void UseWeightsNorms(LipschitzNetwork* network) {
     network->k(l) = static_cast<float>(network->NormEstimate(l));
 }
 
+void InitializeAsSiren(const std::string& start, uint64_t seed, LipschitzNetwork* network) {
+  constexpr double kOmega = 30;
+  for (int l = 0; l < kNetworkLayers; ++l) {
+    const double n = LipschitzNetwork::Inputs(l);
+    double range = std::sqrt(6 / n), bias = kOmega / std::sqrt(n);
+    if (l == 0 && start != "siren-even") range = kOmega / n;
+    if (l == kLast) {
+      bias = 1 / std::sqrt(n);
+      if (start == "siren") range /= kOmega;
+    }
+    const int64_t weights = network->bias(l) - network->weight(l);
+    for (int64_t i = 0; i < weights; ++i)
+      network->weight(l)[i] = static_cast<float>(range * Uniform(seed, StreamOf(l, 0), i));
+    for (int o = 0; o < LipschitzNetwork::Outputs(l); ++o)
+      network->bias(l)[o] = static_cast<float>(bias * Uniform(seed, StreamOf(l, 1), o));
+  }
+  UseWeightsNorms(network);
+}
+
 }  // namespace
 
 void InitializeAsPyTorch(uint64_t seed, LipschitzNetwork* network) {
@@ -61,6 +80,7 @@ void InitializeAsPyTorch(uint64_t seed, LipschitzNetwork* network) {
 }
 
 void InitializeWithoutMap(const std::string& start, uint64_t seed, LipschitzNetwork* network) {
+  if (start.starts_with("siren")) return InitializeAsSiren(start, seed, network);
   InitializeAsPyTorch(seed, network);
   if (start == "pytorch") return;
   REGRADE_CHECK(start == "orthogonal" || start == "identity");

@@ -17,7 +17,11 @@ void InitializeAsPyTorch(uint64_t seed, LipschitzNetwork* network);
 // Without a colour map, "pytorch" as above, or to see what that costs: "orthogonal", layers
 // that are random isometries with small biases, or "identity", which halves the coefficients
 // and position, hands them through the first units and doubles the coefficients at the end: but
-// for the activations the colours that are there. The other units are PyTorch's.
+// for the activations the colours that are there. The other units are PyTorch's. Or "siren"
+// (Sitzmann et al. 2020, section 3.2, with omega = 30 folded into weights and biases): weights
+// uniform in +-30 / n in the first layer of n inputs, +-sqrt(6 / n) in the hidden ones and
+// +-sqrt(6 / n) / 30 in the last, biases in +-30 / sqrt(n), in the last +-1 / sqrt(n);
+// "siren-wide-end": +-sqrt(6 / n) in the last layer; "siren-even": in the first one, too.
 void InitializeWithoutMap(const std::string& start, uint64_t seed, LipschitzNetwork* network);
 
 // Hidden layers are isometries (random matrices made orthogonal), so that a bound is spent

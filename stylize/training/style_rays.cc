@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "kernels/base/error.h"
 #include "kernels/base/random.h"
@@ -26,30 +27,46 @@ void AddPatch(const StyledTrainingView& view, int x0, int y0, int width, int hei
     }
 }
 
+struct Part {
+  int x0, y0, width, height;
+};
+
+Part PartOf(const StyledTrainingView& view) {
+  const bool all = view.x1 <= view.x0 || view.y1 <= view.y0;
+  return all ? Part{0, 0, view.camera.width, view.camera.height}
+             : Part{view.x0, view.y0, view.x1 - view.x0, view.y1 - view.y0};
+}
+
+// Element `place` of a random order of n.
+size_t InRandomOrder(size_t n, size_t place, uint64_t seed, uint64_t order) {
+  std::vector<size_t> all(n);
+  std::iota(all.begin(), all.end(), size_t{0});
+  for (size_t i = 0; i <= place; ++i)
+    std::swap(all[i], all[i + RandomIndex(seed, order, i, n - i)]);
+  return all[place];
+}
+
 }  // namespace
+
+StyleRays WholeViewRays(const std::vector<StyledTrainingView>& views, bool passes,
+                        uint64_t seed, uint64_t step) {
+  const size_t n = views.size();
+  const auto& view = views[passes ? InRandomOrder(n, step % n, seed, step / n)
+                                  : RandomIndex(seed, step, 0, n)];
+  const Part part = PartOf(view);
+  StyleRays batch;
+  AddPatch(view, part.x0, part.y0, part.width, part.height, &batch);
+  return batch;
+}
 
 StyleRays SampleStyleRays(const std::vector<StyledTrainingView>& views, int rays, int patch,
                           uint64_t seed, uint64_t step) {
   StyleRays batch;
-  const auto part_of = [](const StyledTrainingView& view) {
-    const bool all = view.x1 <= view.x0 || view.y1 <= view.y0;
-    struct Part {
-      int x0, y0, width, height;
-    };
-    return all ? Part{0, 0, view.camera.width, view.camera.height}
-               : Part{view.x0, view.y0, view.x1 - view.x0, view.y1 - view.y0};
-  };
-  if (rays <= 0) {
-    const auto& view = views[RandomIndex(seed, step, 0, views.size())];
-    const auto part = part_of(view);
-    AddPatch(view, part.x0, part.y0, part.width, part.height, &batch);
-    return batch;
-  }
   const int patches = std::max(1, rays / (patch * patch));
   for (int p = 0; p < patches; ++p) {
     const uint64_t counter = 3 * static_cast<uint64_t>(p);
     const auto& view = views[RandomIndex(seed, step, counter, views.size())];
-    const auto part = part_of(view);
+    const Part part = PartOf(view);
     const int width = std::min(patch, part.width);
     const int height = std::min(patch, part.height);
     const int x0 = static_cast<int>(

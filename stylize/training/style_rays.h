@@ -10,10 +10,14 @@
 namespace regrade {
 
 // Patches of patch x patch neighbouring pixels at random places of random views, about `rays`
-// of them; neighbours share voxels, and a step costs what its voxels cost. rays = 0: one whole
-// view.
+// of them; neighbours share voxels, and a step costs what its voxels cost.
 StyleRays SampleStyleRays(const std::vector<StyledTrainingView>& views, int rays, int patch,
                           uint64_t seed, uint64_t step);
+
+// All rays of one view: a random one, or with `passes` the next of a random order that each
+// pass over the views has of its own.
+StyleRays WholeViewRays(const std::vector<StyledTrainingView>& views, bool passes,
+                        uint64_t seed, uint64_t step);
 
 // Rays of a step of patches; 0 for one of a whole view.
 int64_t RaysPerStep(int rays, int patch);

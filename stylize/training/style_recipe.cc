@@ -16,7 +16,9 @@ void ApplyStyleRecipe(const std::string& recipe, TrainNetworkOptions* options) {
   options->rate_first = 1e-2;
   options->rate_last = 1e-4;
   options->norm_steps = 1;
+  options->settle_norms = false;
   options->loss = AggregationOptions{};  // two-sided, of all rays and samples, no view penalty
+  options->loss_scale = "sum-over-voxels";
   options->rays_per_step = 0;
   options->map_background = false;
   options->base = "none";

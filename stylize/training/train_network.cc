@@ -145,6 +145,10 @@ void Training::Start(int64_t bad_pixels) {
     SolveOutputLayer(engine_.loss()->SumHidden(network_, sample_), 2 * result_.k_est,
                      &network_);
   }
+  if (!options_.hidden_bias)
+    for (int l = 0; l + 1 < kNetworkLayers; ++l)
+      std::fill_n(network_.bias(l), LipschitzNetwork::Outputs(l), 0.0f);
+  if (!options_.settle_norms) network_.RestartNorms();
   if (options_.spectral_normalisation)
     for (int l = 0; l < kNetworkLayers; ++l) network_.k(l) = 1;
   LimitResidual();
@@ -169,7 +173,7 @@ bool Training::RecordBound(const LipschitzNetwork& network) {
   state_.history.bounds.push_back(network.Bound());
   const double drift = network.NormDrift();
   result_.largest_norm_drift = std::max(result_.largest_norm_drift, drift);
-  return drift > 0.01 / kNetworkLayers;
+  return options_.settle_norms && drift > 0.01 / kNetworkLayers;
 }
 
 // The rays of the steps from `step` on, as many as the engine takes before the next measurement
@@ -181,8 +185,11 @@ void Training::DrawRays(int64_t step) {
   drawn_.assign(std::max<int64_t>(n, 0), {});
 #pragma omp parallel for schedule(dynamic)
   for (int64_t i = 0; i < n; ++i)
-    drawn_[i] = SampleStyleRays(views_, options_.rays_per_step, options_.patch, options_.seed,
-                                static_cast<uint64_t>(step + i));
+    drawn_[i] = options_.rays_per_step > 0
+                    ? SampleStyleRays(views_, options_.rays_per_step, options_.patch,
+                                      options_.seed, static_cast<uint64_t>(step + i))
+                    : WholeViewRays(views_, options_.view_order == "passes", options_.seed,
+                                    static_cast<uint64_t>(step + i));
 }
 
 StepResult Training::Advance(int64_t most) {
@@ -204,7 +211,7 @@ StepResult Training::Advance(int64_t most) {
 }
 
 TrainNetworkResult Training::Conclude() {
-  network_.WarmUpNorms();
+  if (options_.settle_norms) network_.WarmUpNorms();
   double mse = LossOfSample(network_).Mse();
   if (network_.data().has_base && !(mse <= state_.linear_map_mse)) {
     result_.warnings.push_back("the network did not beat the colour map: that alone is used");

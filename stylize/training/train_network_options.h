@@ -19,6 +19,7 @@ struct TrainNetworkOptions : WeightUpdateOptions {
   bool map_background = true;
   std::string base = "best";
   std::string start = "pytorch";
+  std::string view_order = "random";
   double bound_factor = 4;
   float sh_scale = 2;
   float position_scale = 8;
@@ -57,8 +58,15 @@ struct TrainNetworkOptions : WeightUpdateOptions {
     bind("style-start", start,
          {.help = "ablation, with --style-base none: initial weights; pytorch maps all voxels "
                   "to almost one colour, orthogonal keeps their distances, identity starts "
-                  "near the field's colours",
-          .choices = "pytorch|orthogonal|identity"});
+                  "near the field's colours, siren is that of sine networks, siren-wide-end "
+                  "the same with a last layer as wide as the others, siren-even with a first "
+                  "one as narrow",
+          .choices = "pytorch|orthogonal|identity|siren|siren-wide-end|siren-even"});
+    bind(
+        "style-view-order", view_order,
+        {.help = "of whole views (--style-rays 0): random draws each anew, passes takes all in "
+                 "random order before any comes again",
+         .choices = "random|passes"});
     bind("style-bound", bound_factor,
          {.help = "largest certified Lipschitz bound, in units of K_est; 0 sets no limit",
           .min = 0,
@@ -84,8 +92,9 @@ struct TrainNetworkOptions : WeightUpdateOptions {
   }
 };
 
-// Sets every option that the recipe decides: "standard", or "paper" (LipRF Sec. 5: no colour
-// map, PyTorch's default initialisation, a whole view a step, 300 steps, 1e-2 to 1e-4). Call it
+// Sets every option that the recipe decides: "standard", or "paper" (LipRF Sec. 6: no colour
+// map, PyTorch's default initialisation, a whole view a step, 300 steps, 1e-2 to 1e-4, one
+// step of the power iteration; RECIPE.md lists the readings that were chosen). Call it
 // before options are read. Throws Error(kUsage) for another name.
 void ApplyStyleRecipe(const std::string& recipe, TrainNetworkOptions* options);
 

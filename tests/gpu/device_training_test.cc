@@ -167,8 +167,14 @@ TEST_F(DeviceStyleTraining, H68_ExactSumsGiveTheSameBits) {
   };
   const Trained one = train(true, false, 1), floats = train(false, false, 1);
   EXPECT_GT(one.made.last.touched_voxels, 20000);
-  for (const Trained& other :
-       {train(true, false, 1), train(true, true, 1), train(true, false, 2)}) {
+  struct Case {
+    const char* name;
+    Trained trained;
+  };
+  for (const auto& [name, other] :
+       {Case{"again", train(true, false, 1)}, Case{"buffers that grow", train(true, true, 1)},
+        Case{"in two parts", train(true, false, 2)}}) {
+    SCOPED_TRACE(name);
     EXPECT_TRUE(RecordSameBits(
         "networks of two trainings", Computed::kGpu,
         one.network.data().parameters == other.network.data().parameters &&

@@ -88,6 +88,26 @@ TEST(EvaluateCommand, WritesMetricsIntervalsAndHeatMaps) {
   EXPECT_EQ(json.At("consistency_pairs").AsArray().size(), 2u * (5 + 1));
 }
 
+// The exit status tells a required metric that is out of its bound from frames that cannot be
+// measured and from a requirement that nothing can fulfil.
+TEST(EvaluateCommand, RequiredMetrics) {
+  const TemporaryFolder folder;
+  WriteFrames(folder / "source", 6);
+  WriteFrames(folder / "styled", 6, 0.03f);
+  const auto outcome_of = [&](const std::string& require) {
+    return Evaluate({"--frames", folder / "styled", "--reference", folder / "source", "--out",
+                     folder / "out", "--require", require});
+  };
+  Outcome outcome = outcome_of("styled:beauty>=1");
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_FALSE(std::filesystem::exists(folder / "out"));
+  outcome = outcome_of("styled:tc-psnr:1>=90");
+  EXPECT_EQ(outcome.code, 8);
+  EXPECT_OUTPUT(outcome, "styled:tc-psnr:1>=90: measured");
+  EXPECT_TRUE(std::filesystem::exists(folder / "out/report.json"));
+  EXPECT_EQ(outcome_of("styled:tc-psnr:1<=90,source:tc-psnr:1>=20").code, 0);
+}
+
 TEST(EvaluateCommand, UnusableFramesAreNamed) {
   const TemporaryFolder folder;
   WriteFrames(folder / "source", 4);

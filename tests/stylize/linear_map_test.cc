@@ -67,6 +67,29 @@ TEST(LinearMap, Lemma2_MappedCoefficientsGiveMappedColours) {
                                   LargestErrorOfLemma2<float>(), 4e-6));
 }
 
+// The remark on Lemma 2: A s with b added to the constant coefficients is the colour
+// A c + b Gamma_0 + v - A v, where v = 1/2.
+TEST(LinearMap, Lemma2_RemarkOnAnOffsetOfCoefficients) {
+  double worst = 0;
+  for (uint64_t seed = 0; seed < 200; ++seed) {
+    const ColorMap map = RandomMap(seed);
+    ColorMap colors = map;
+    const Vec3d v{0.5, 0.5, 0.5}, b = map.offset;
+    colors.offset = b * kSh0 + v - map.matrix * v;
+    double sh[27], mapped[27], expected[27];
+    for (uint64_t i = 0; i < 27; ++i) sh[i] = Uniform(seed, 100 + i);
+    MapCoefficients(colors, 9, sh, expected);
+    for (int c = 0; c < 3; ++c)
+      for (int k = 0; k < 9; ++k) {
+        mapped[c * 9 + k] = k == 0 ? b[c] : 0;
+        for (int d = 0; d < 3; ++d) mapped[c * 9 + k] += map.matrix(c, d) * sh[d * 9 + k];
+      }
+    for (int i = 0; i < 27; ++i) worst = std::max(worst, std::abs(mapped[i] - expected[i]));
+  }
+  EXPECT_LE(worst, testing::RecordDigits("coefficients with an offset",
+                                         testing::Computed::kDouble, worst, 1e-12));
+}
+
 TEST(LinearMap, AppearanceIsMappedVoxelByVoxel) {
   const ColorMap map = RandomMap(5);
   Appearance appearance;

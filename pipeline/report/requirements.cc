@@ -1,0 +1,172 @@
+#include "pipeline/report/requirements.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <type_traits>
+
+#include "kernels/base/error.h"
+#include "pipeline/files/text.h"
+
+namespace regrade {
+namespace {
+
+constexpr char kForm[] =
+    "write SUBJECT:METRIC>=VALUE or <=, as styled:tc-psnr:1>=30; see FORMATS.md";
+
+// Finds the number that a metric's name means among the members of a struct of metrics.
+struct NumberFinder {
+  const std::string& name;
+  std::optional<Metric> found = {};
+
+  template <typename T>
+  void operator()(const char* key, T& member, const MetricInfo& = {}) {
+    if (found || (key != name && key != name + "_db" && key != name + "_mean_db")) return;
+    if constexpr (std::is_same_v<T, Metric>) {
+      found = member;
+    } else if constexpr (std::is_arithmetic_v<T>) {
+      found = Metric(static_cast<double>(member));
+    } else if constexpr (std::is_same_v<T, std::optional<double>> ||
+                         std::is_same_v<T, std::optional<int>> ||
+                         std::is_same_v<T, std::optional<int64_t>>) {
+      found = member ? Metric(static_cast<double>(*member)) : Metric();
+    }
+  }
+};
+
+template <typename Metrics>
+std::optional<Metric> NumberIn(Metrics metrics, const std::string& name) {
+  NumberFinder finder{name};
+  metrics.Describe(finder);
+  return finder.found;
+}
+
+template <typename T>
+bool ReadNumber(const std::string& text, T* value) {
+  const char* end = text.data() + text.size();
+  const auto [rest, error] = std::from_chars(text.data(), end, *value);
+  return error == std::errc() && rest == end;
+}
+
+bool IsSequence(const std::string& name) {
+  const std::string plain = name.starts_with("path_") ? name.substr(5) : name;
+  return plain == "source" || plain == "views_2d" || plain == "styled" || plain == "photos";
+}
+
+// The stage's number; empty if there is no such stage or metric. `known` tells a stage that has
+// not run from one that does not exist.
+std::optional<Metric> NumberOfStage(StagesReport stages, const Requirement& wanted,
+                                    bool* known) {
+  std::optional<Metric> found;
+  *known = false;
+  stages.ForEach([&](const char* name, auto& stage) {
+    if (name != wanted.subject) return;
+    *known = true;
+    using Report = typename std::remove_reference_t<decltype(stage)>::value_type;
+    found = NumberIn(Report(), wanted.metric);
+    if (found && stage) found = NumberIn(*stage, wanted.metric);
+  });
+  return found;
+}
+
+// Throws unless an evaluation can measure it.
+void CheckName(const Requirement& wanted, const std::vector<int>& gaps) {
+  const bool of_pairs = NumberIn(ConsistencyMetrics(), wanted.metric).has_value();
+  const bool of_frames = NumberIn(FidelityMetrics(), wanted.metric).has_value();
+  bool known_metric = of_pairs || of_frames;
+  if (!IsSequence(wanted.subject)) {
+    bool known = false;
+    known_metric = NumberOfStage({}, wanted, &known).has_value();
+    if (!known)
+      throw UsageError("there is no sequence or stage " + wanted.subject, wanted.text,
+                       "sequences are styled, source, views_2d and photos, those of the film "
+                       "with path_ in front; stages are those of report.json");
+    if (wanted.gap) throw UsageError("metrics of stages have no gap", wanted.text, kForm);
+  } else if (known_metric && of_pairs != wanted.gap.has_value()) {
+    throw UsageError(of_pairs ? "the gap is missing" : "metrics of frames have no gap",
+                     wanted.text, kForm);
+  }
+  if (!known_metric)
+    throw UsageError("there is no metric " + wanted.metric + " of " + wanted.subject,
+                     wanted.text, "report.json and FORMATS.md have the names");
+  if (wanted.gap && std::ranges::find(gaps, *wanted.gap) == gaps.end())
+    throw UsageError(Concat("gap ", *wanted.gap, " is not measured"), wanted.text,
+                     "name a gap of --gaps");
+}
+
+Requirement ParseRequirement(const std::string& text) {
+  Requirement wanted;
+  wanted.text = text;
+  const size_t relation = std::min(text.find(">="), text.find("<="));
+  if (relation == std::string::npos) throw UsageError("there is no bound", text, kForm);
+  wanted.at_least = text[relation] == '>';
+  if (!ReadNumber(text.substr(relation + 2), &wanted.bound) || !std::isfinite(wanted.bound))
+    throw UsageError("the bound is not a number", text, kForm);
+  std::vector<std::string> parts = Split(text.substr(0, relation), ':');
+  if (parts.size() != 2 && parts.size() != 3)
+    throw UsageError("a sequence or stage and a metric are expected", text, kForm);
+  for (std::string& part : parts) std::ranges::replace(part, '-', '_');
+  wanted.subject = parts[0];
+  wanted.metric = parts[1];
+  if (parts.size() == 3) {
+    wanted.gap = 0;
+    if (!ReadNumber(parts[2], &*wanted.gap))
+      throw UsageError("the gap is not a whole number", text, kForm);
+  }
+  return wanted;
+}
+
+Metric Measured(const Requirement& wanted, const RunReport& report) {
+  if (!IsSequence(wanted.subject)) {
+    bool known;
+    return NumberOfStage(report.stages, wanted, &known).value_or(Metric());
+  }
+  if (wanted.gap) {
+    for (const ConsistencyMetrics& row : report.evaluation.consistency)
+      if (row.sequence == wanted.subject && row.gap == *wanted.gap)
+        return NumberIn(row, wanted.metric).value_or(Metric());
+    return {};
+  }
+  for (const FidelityMetrics& row : report.evaluation.fidelity)
+    if (row.sequence == wanted.subject) return NumberIn(row, wanted.metric).value_or(Metric());
+  return {};
+}
+
+}  // namespace
+
+std::vector<Requirement> ParseRequirements(const std::string& text,
+                                           const std::vector<int>& gaps) {
+  std::vector<Requirement> requirements;
+  if (text.empty()) return requirements;
+  for (const std::string& part : Split(text, ',')) {
+    requirements.push_back(ParseRequirement(part));
+    CheckName(requirements.back(), gaps);
+  }
+  return requirements;
+}
+
+std::vector<std::string> FailedRequirements(const std::vector<Requirement>& requirements,
+                                            const RunReport& report) {
+  std::vector<std::string> failed;
+  for (const Requirement& wanted : requirements) {
+    const Metric measured = Measured(wanted, report);
+    if (!measured.value) {
+      if (!measured.infinite || !wanted.at_least)
+        failed.push_back(wanted.text + ": there is no value (" + measured.why + ")");
+    } else if (wanted.at_least ? *measured.value < wanted.bound
+                               : *measured.value > wanted.bound) {
+      failed.push_back(Format("%s: measured %.6g", wanted.text.c_str(), *measured.value));
+    }
+  }
+  return failed;
+}
+
+void ThrowIfAny(const std::vector<std::string>& failed) {
+  if (failed.empty()) return;
+  std::string all;
+  for (const std::string& sentence : failed) all += (all.empty() ? "" : "; ") + sentence;
+  throw Error(ExitCode::kRequirement, "a required metric is out of its bound", all,
+              "report.json has all metrics; the results are complete");
+}
+
+}  // namespace regrade

@@ -1,0 +1,86 @@
+// --require: what is understood, what is refused before work, and which bounds hold.
+#include "pipeline/report/requirements.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "tests/support/expect_error.h"
+
+namespace regrade {
+namespace {
+
+RunReport Report() {
+  ConsistencyMetrics near{.sequence = "styled", .gap = 1}, far{.sequence = "styled", .gap = 5};
+  near.tc_psnr_mean_db = 31.5;
+  far.tc_psnr_mean_db = Metric::Undefined("too few frames");
+  ConsistencyMetrics film{.sequence = "path_styled", .gap = 1};
+  film.tc_psnr_mean_db = Metric(std::numeric_limits<double>::infinity());
+  FidelityMetrics fidelity{.sequence = "styled"};
+  fidelity.structure = 0.97;
+  fidelity.psnr_to_2d_db = std::nan("");
+  RunReport report;
+  report.evaluation = {{near, far, film}, {fidelity}, {}};
+  report.stages.reconstruct.emplace();
+  report.stages.reconstruct->psnr_heldout_db = 28.25;
+  report.stages.reconstruct->voxels = 1000;
+  return report;
+}
+
+std::vector<std::string> Failed(const std::string& text) {
+  return FailedRequirements(ParseRequirements(text, {1, 5}), Report());
+}
+
+TEST(Requirements, HoldOrNameValueAndBound) {
+  EXPECT_TRUE(Failed("").empty());
+  EXPECT_TRUE(Failed("styled:tc-psnr:1>=31.5,styled:tc-psnr:1<=31.5").empty());
+  EXPECT_TRUE(Failed("styled:structure>=0.97,reconstruct:psnr-heldout>=28").empty());
+  EXPECT_TRUE(Failed("styled:tc_psnr_mean_db:1>=30,reconstruct:voxels<=1e3").empty());
+  const std::vector<std::string> failed =
+      Failed("styled:tc-psnr:1>=32,styled:structure>=0.9,reconstruct:psnr-heldout<=28");
+  ASSERT_EQ(failed.size(), 2u);
+  EXPECT_EQ(failed[0], "styled:tc-psnr:1>=32: measured 31.5");
+  EXPECT_EQ(failed[1], "reconstruct:psnr-heldout<=28: measured 28.25");
+}
+
+// A missing stage, row or number holds nothing; no error at all is better than any bound.
+TEST(Requirements, WithoutANumber) {
+  EXPECT_EQ(Failed("styled:tc-psnr:5>=1")[0],
+            "styled:tc-psnr:5>=1: there is no value (too few frames)");
+  EXPECT_EQ(Failed("styled:psnr-to-2d>=1")[0],
+            "styled:psnr-to-2d>=1: there is no value (not a number)");
+  for (const char* text : {"source:tc-psnr:1>=1", "stylize:bound<=9", "styled:lpips-to-2d<=1",
+                           "reconstruct:trial-seconds<=1"})
+    EXPECT_EQ(Failed(text).size(), 1u) << text;
+  EXPECT_TRUE(Failed("path-styled:tc-psnr:1>=99").empty());
+  EXPECT_EQ(Failed("path-styled:tc-psnr:1<=99").size(), 1u);
+}
+
+TEST(Requirements, AreRefusedBeforeWork) {
+  for (const auto& [text, part] : std::vector<std::pair<std::string, std::string>>{
+           {"styled:tc-psnr:1", "no bound"},
+           {"styled:tc-psnr:1>=", "not a number"},
+           {"styled:tc-psnr:1>=3x", "not a number"},
+           {"styled:tc-psnr:1>=nan", "not a number"},
+           {"styled:tc-psnr:1>=inf", "not a number"},
+           {"styled:tc-psnr:x>=3", "not a whole number"},
+           {"styled:tc-psnr>=3", "gap is missing"},
+           {"styled:structure:1>=3", "no gap"},
+           {"reconstruct:voxels:1>=3", "no gap"},
+           {"styled:tc-psnr:2>=3", "gap 2 is not measured"},
+           {"style:tc-psnr:1>=3", "no sequence or stage style"},
+           {"styled:beauty>=3", "no metric beauty of styled"},
+           {"reconstruct:tc-psnr>=3", "no metric tc_psnr of reconstruct"},
+           {"styled>=3", "sequence or stage and a metric"},
+           {"styled:tc-psnr:1>=3,", "no bound"}})
+    EXPECT_REGRADE_ERROR(ParseRequirements(text, {1, 5}), ExitCode::kUsage, part);
+}
+
+TEST(Requirements, FailWithAStatusOfTheirOwn) {
+  ThrowIfAny({});
+  EXPECT_REGRADE_ERROR(ThrowIfAny({"a", "b"}), ExitCode::kRequirement, "a; b");
+}
+
+}  // namespace
+}  // namespace regrade
