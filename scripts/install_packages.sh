@@ -7,7 +7,8 @@ packages=(
   g++ cmake ninja-build pkg-config python3   # to build
   libgtest-dev libbenchmark-dev python3-numpy   # to test and to measure
   libboost-program-options-dev               # command line
-  libboost-dev                               # the local server (Beast)
+  libboost-dev                               # the local server (Beast), checksums
+  libcurl4-openssl-dev libssl-dev            # fetching a network, SHA-256
   nlohmann-json3-dev libzip-dev libutfcpp-dev
   libopenimageio-dev libjpeg62-turbo-dev libpng-dev libheif-dev liblcms2-dev   # pictures
   libopencv-dev                              # flow, networks of 2D methods

@@ -1,11 +1,11 @@
 // regrade clean: removes from a run's folder what can be made again, after a yes.
 #include <filesystem>
-#include <iostream>
 #include <string>
 #include <vector>
 
 #include "kernels/base/error.h"
 #include "pipeline/commands/command.h"
+#include "pipeline/program/question.h"
 #include "pipeline/workspace/folder_size.h"
 #include "pipeline/workspace/style_folders.h"
 #include "pipeline/workspace/workspace.h"
@@ -48,13 +48,6 @@ std::vector<Removable> RemovableIn(const std::string& folder) {
   return all;
 }
 
-bool AnsweredYes() {
-  std::cerr << "remove them? [y/N] " << std::flush;
-  std::string answer;
-  std::getline(std::cin, answer);
-  return answer == "y" || answer == "Y" || answer == "yes";
-}
-
 }  // namespace
 
 void RunClean(const Command& command, const Arguments& arguments, Console* console) {
@@ -78,7 +71,7 @@ void RunClean(const Command& command, const Arguments& arguments, Console* conso
   }
   console->Info(SizeText(sum) + " of " + SizeText(SizeOnDisk(folder)) + " can be made again");
   if (clean.dry_run || removable.empty()) return;
-  if (!clean.yes && !AnsweredYes()) {
+  if (!clean.yes && !AnsweredYes("remove them?")) {
     console->Info("nothing was removed");
     return;
   }

@@ -84,6 +84,7 @@ void RunExport(const Command&, const Arguments&, Console*);
 void RunPack(const Command&, const Arguments&, Console*);
 void RunPage(const Command&, const Arguments&, Console*);
 void RunView(const Command&, const Arguments&, Console*);
+void RunNetworks(const Command&, const Arguments&, Console*);
 void RunClean(const Command&, const Arguments&, Console*);
 void RunManual(const Command&, const Arguments&, Console*);
 void RunDoctor(const Command&, const Arguments&, Console*);

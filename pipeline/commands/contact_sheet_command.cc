@@ -41,6 +41,7 @@ struct SheetOptions {
   int holdout = 8;
   std::string device = "auto";
   bool dry_run = false;
+  bool yes = false;
 
   template <typename Bind>
   void Describe(Bind& bind) {
@@ -68,6 +69,7 @@ struct SheetOptions {
           .max = 1000});
     bind("device", device, {.help = "where networks are trained", .choices = "auto|cpu|cuda"});
     bind("dry-run", dry_run, {.help = "prints what would be done, and does nothing"});
+    bind("yes", yes, {.help = "fetches what --method pca-kd needs without asking"});
   }
 };
 
@@ -325,7 +327,8 @@ void RunContactSheet(const Command& command, const Arguments& arguments, Console
   if (!sheet.dry_run) RequireValue(sheet.out, "--out", "name the PNG file to write");
   if (styles.empty())
     for (size_t i = 1; i < words.size(); ++i) CheckStyle(words[i], settings);
-  ProbeMethod(&settings.style_2d);
+  ProbeMethod(&settings.style_2d,
+              sheet.dry_run ? NetworkAccess() : AccessAfterYes(sheet.yes, console));
   ProbeMasks(&settings.object);
 
   Workspace workspace(folder);

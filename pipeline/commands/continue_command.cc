@@ -36,7 +36,7 @@ void ContinueStyle(const Command& command, const Arguments& arguments, const std
   if (settings.style.pictures.size() > 1)
     throw UsageError("continues one style", std::string("regrade ") + command.name,
                      "name it with --name");
-  ProbeStyles(&settings);
+  ProbeStyles(&settings, console);
   const std::string given = context.options.Given("name").value_or("");
   Continue(folder, *prepared, {{ChosenStyle(folder, given), settings.style.picture()}}, first,
            &context);
@@ -59,7 +59,7 @@ void RunStylize(const Command& command, const Arguments& arguments, Console* con
   if (!context.options.Given("style") && prepared->words.size() > 1) style.pictures.clear();
   style.pictures.insert(style.pictures.end(), prepared->words.begin() + 1,
                         prepared->words.end());
-  ProbeStyles(&context.settings);
+  ProbeStyles(&context.settings, console);
   Continue(folder, *prepared, NameStyles(folder, style.pictures, style.name), "style_2d",
            &context);
 }

@@ -11,6 +11,7 @@
 #include "kernels/process/child_process.h"
 #include "pipeline/commands/command.h"
 #include "pipeline/images/libraries.h"
+#include "pipeline/networks/fetch_file.h"
 #include "pipeline/program/memory.h"
 
 namespace regrade {
@@ -78,6 +79,8 @@ void RunDoctor(const Command& command, const Arguments& arguments, Console* cons
   };
   for (const Library& library : PictureLibraries())
     findings.push_back({library.name, library.version, library.purpose});
+  findings.push_back(
+      {"libcurl", FetchLibrary(), "fetches networks that are named, after a yes"});
   console->Event("doctor", JsonValue::Object());
   for (const Finding& finding : findings) {
     if (program.json) {

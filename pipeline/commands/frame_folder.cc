@@ -77,11 +77,21 @@ bool HasFineValues(const Image& image) {
 
 std::string SizeText(int width, int height) { return Concat(width, " x ", height, " px"); }
 
+// Grey is replicated, so that grey frames compare with coloured ones.
+Image ReadFrame(const std::string& path) {
+  Image image = ReadImage(path);
+  if (image.channels != 1) return image;
+  Image color(image.width, image.height, 3);
+  for (size_t i = 0; i < image.pixels.size(); ++i)
+    std::fill_n(&color.pixels[3 * i], 3, image.pixels[i]);
+  return color;
+}
+
 }  // namespace
 
 FrameSource FrameFolder::Source() const {
   return {static_cast<int>(paths.size()),
-          [paths = paths](int i) { return ReadImage(paths.at(static_cast<size_t>(i))); }};
+          [paths = paths](int i) { return ReadFrame(paths.at(static_cast<size_t>(i))); }};
 }
 
 FrameFolder OpenFrameFolder(const std::string& folder, const ProgressFunction& progress) {

@@ -20,14 +20,16 @@ void CheckStyle(const std::string& path, const RunSettings& settings) {
   StyleExample(path, nullptr);
 }
 
-void ProbeStyles(RunSettings* settings) {
+void ProbeStyles(RunSettings* settings, Console* console) {
   RequireValue(settings->style.picture(), "--style", "name the style picture");
   for (std::string& picture : settings->style.pictures) {
     RequireValue(picture, "--style", "name the style picture");
     picture = AbsolutePath(picture);
     CheckStyle(picture, *settings);
   }
-  ProbeMethod(&settings->style_2d);
+  const StartOptions& start = settings->start;
+  ProbeMethod(&settings->style_2d,
+              start.dry_run ? NetworkAccess() : AccessAfterYes(start.yes, console));
   ProbeMasks(&settings->object);
 }
 

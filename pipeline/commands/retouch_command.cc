@@ -3,13 +3,18 @@
 #include <filesystem>
 
 #include "kernels/base/error.h"
+#include "kernels/image/resize.h"
 #include "pipeline/capture/photo_names.h"
 #include "pipeline/commands/command.h"
+#include "pipeline/fields/field_file.h"
+#include "pipeline/fields/field_renderer.h"
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/files/text.h"
 #include "pipeline/images/cube_file.h"
 #include "pipeline/images/image_file.h"
+#include "pipeline/images/still_file.h"
+#include "pipeline/program/device_choice.h"
 #include "pipeline/run_pipeline.h"
 #include "pipeline/stages/photo_edit.h"
 #include "pipeline/workspace/style_folders.h"
@@ -22,17 +27,30 @@ namespace fs = std::filesystem;
 
 // In the style's folder: what was found in the edit.
 constexpr char kRecord[] = "retouch.json";
+// In the output folder: renders to be edited.
+constexpr char kRenders[] = "retouch";
 
 struct RetouchOptions {
   std::string photo, edited;
+  std::string from = "photo";
 
   template <typename Bind>
   void Describe(Bind& bind) {
     bind("photo", photo, {.help = "the photo that was retouched, by its name in the capture"});
     bind("edited", edited,
          {.help = "the retouched picture: the whole frame, in any size of the same shape"});
+    bind("from", from,
+         {.help = "what was edited: the photo, or the scene's render from its place, which is "
+                  "written to retouch/ of DIR, as a TIFF of 16 bits, where --edited is missing",
+          .choices = "photo|render"});
   }
 };
+
+DecodeLimits AnySize() {
+  DecodeLimits limits;
+  limits.min_side = 1;
+  return limits;
+}
 
 std::string Stem(const std::string& file) { return fs::path(file).stem().string(); }
 
@@ -58,6 +76,7 @@ JsonValue RecordOf(const RetouchOptions& options, const PhotoEdit& edit,
   for (const std::string& notice : notices) said.push_back(notice);
   return JsonValue::Object{{"photo", options.photo},
                            {"edited", options.edited},
+                           {"from", options.from},
                            {"change", edit.change},
                            {"local", edit.local},
                            {"vignette", edit.vignette},
@@ -65,6 +84,31 @@ JsonValue RecordOf(const RetouchOptions& options, const PhotoEdit& edit,
                            {"grain", edit.grain},
                            {"steepest_slope", SteepestSlope(edit.table)},
                            {"notices", said}};
+}
+
+// What a person edits in place of the photo: the unstyled scene, in the photo's own size.
+void WriteRender(const std::string& path, int view, RunContext* context) {
+  const RunSettings& settings = context->settings;
+  const std::string field = context->workspace->Path("field.npz");
+  if (!fs::exists(field))
+    throw InputError("holds no reconstruction", settings.run.out,
+                     "make one with `regrade run` or `regrade reconstruct`");
+  const StoredField stored = ReadFieldFile(field);
+  const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
+  constexpr int kLongest = 1 << 16;
+  const WorkingViews views = ReadWorkingViews(context->workspace->Path("poses"), kLongest, 0)
+                                 .InField(stored.field_from_world, stored.ndc);
+  WriteStill(path, FieldRenderer(stored.field, backend).Render(views.CameraOf(view)).color);
+  context->console->Info("wrote " + path + ": edit it, and give the edit with --edited");
+}
+
+// The picture that was edited: the photo, or the render that an earlier call wrote.
+Image BeforeEdit(const RetouchOptions& options, const std::string& render, const Image& photo) {
+  if (options.from == "photo") return photo;
+  if (!fs::exists(render))
+    throw InputError("the render was not written yet", render,
+                     "leave --edited out once: --from render writes what is to be edited");
+  return Resize(Colors(DecodePhoto(render, AnySize()).image), photo.width, photo.height);
 }
 
 // Writes what the style is made from to its folder, and sets style picture and method: a LUT
@@ -97,7 +141,8 @@ void RunRetouch(const Command& command, const Arguments& arguments, Console* con
   if (!prepared) return;
   const std::string& folder = prepared->words[0];
   RequireValue(retouch.photo, "--photo", "name the photo that was retouched");
-  RequireValue(retouch.edited, "--edited", "name the retouched picture");
+  const bool writes_render = retouch.from == "render" && retouch.edited.empty();
+  if (!writes_render) RequireValue(retouch.edited, "--edited", "name the retouched picture");
   context.settings = given.settings;
   RunSettings& settings = context.settings;
   settings.Bind(&context.options);
@@ -105,7 +150,8 @@ void RunRetouch(const Command& command, const Arguments& arguments, Console* con
     throw UsageError("the edit says itself what it changes", "--masks and --scene-wide",
                      "leave them out");
   const std::string wanted = given.options.Given("name").value_or("");
-  const std::string name = wanted.empty() ? SafeStyleName(retouch.edited) : wanted;
+  const std::string name =
+      wanted.empty() ? SafeStyleName(writes_render ? retouch.photo : retouch.edited) : wanted;
   if (SafeStyleName(name + ".x") != name)
     throw UsageError("'" + name + "' is not allowed", "--name",
                      "use letters, digits, '-', '_' and '.', not first");
@@ -122,11 +168,13 @@ void RunRetouch(const Command& command, const Arguments& arguments, Console* con
   console->OpenLog(workspace.Path(".regrade/log.txt"));
   const WorkingViews views = context.Views();
   const int view = ViewOf(views, retouch.photo);
-  DecodeLimits limits;
-  limits.min_side = 1;
-  const Image photo = views.Photo(view);
+  const std::string render = std::string(kRenders) + "/" + Stem(views.View(view).file) + ".tif";
+  if (writes_render && settings.start.dry_run)
+    return console->Info("would write " + workspace.Path(render));
+  if (writes_render) return WriteRender(workspace.NewPath(render), view, &context);
+  const Image photo = BeforeEdit(retouch, workspace.Path(render), views.Photo(view));
   const PhotoEdit edit =
-      AnalyseEdit(photo, EditAtPhotoSize(Colors(DecodePhoto(retouch.edited, limits).image),
+      AnalyseEdit(photo, EditAtPhotoSize(Colors(DecodePhoto(retouch.edited, AnySize()).image),
                                          photo, retouch.edited));
   const std::vector<std::string> notices = EditNotices(edit);
   for (const std::string& notice : notices) console->Info(notice);

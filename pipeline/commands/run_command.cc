@@ -38,7 +38,7 @@ void ProbeInputs(const std::string& command, RunContext* context) {
     masks = AbsolutePath(masks);
   }
   if (command != "run") return;
-  ProbeStyles(&context->settings);
+  ProbeStyles(&context->settings, context->console);
   ProbeEvaluationNetworks(context->settings.consistency);
 }
 

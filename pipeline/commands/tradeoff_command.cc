@@ -288,7 +288,9 @@ void RunTradeoff(const Command& command, const Arguments& arguments, Console* co
       throw UsageError("costs are measured with one picture", "--style", "give one");
     settings.style.pictures[0] = AbsolutePath(settings.style.picture());
     CheckStyle(settings.style.picture(), settings);
-    ProbeMethod(&settings.style_2d);
+    ProbeMethod(&settings.style_2d, settings.start.dry_run
+                                        ? NetworkAccess()
+                                        : AccessAfterYes(settings.start.yes, console));
   }
   ParameterChoice choice{Words(tradeoff.parameters),
                          tradeoff.with_poses && source.kind == CaptureKind::kPhotos, style,

@@ -80,6 +80,7 @@ struct StartOptions {
   std::string require;
   bool dry_run = false;
   bool break_lock = false;
+  bool yes = false;
 
   template <typename Bind>
   void Describe(Bind& bind) {
@@ -95,6 +96,7 @@ struct StartOptions {
     bind("dry-run", dry_run, {.help = "prints what would be done, and does nothing"});
     bind("break-lock", break_lock,
          {.help = "takes over a folder whose last run died on another machine"});
+    bind("yes", yes, {.help = "fetches what --method pca-kd needs without asking"});
   }
 };
 

@@ -8,6 +8,8 @@
 
 #include "kernels/base/error.h"
 #include "pipeline/images/cube_file.h"
+#include "pipeline/networks/fetch_file.h"
+#include "pipeline/program/question.h"
 #include "pipeline/stages/command_stylizer.h"
 #include "pipeline/stages/folder_stylizer.h"
 #include "pipeline/stages/network_probe.h"
@@ -57,10 +59,18 @@ std::unique_ptr<ViewStylizer> MakeColorMethod(StyleMethodKind kind, const StyleO
   return MakeColorTransfer(options, style, &scene);
 }
 
+// The method with the files that it reads: a network's name stands for its folder.
+StyleMethod MethodWithFiles(const StyleOptions& options) {
+  StyleMethod method = ParseStyleMethod(options);
+  if (method.kind == StyleMethodKind::kNetwork)
+    method = {StyleMethodKind::kOnnx, method.name, NetworkFolder(method.name)};
+  return method;
+}
+
 std::unique_ptr<ViewStylizer> MakeMethod(RunContext* context, const Capture& capture,
                                          const Image& style, const PhotoFunction& photo) {
   const RunSettings& settings = context->settings;
-  const StyleMethod method = ParseStyleMethod(settings.style_2d);
+  const StyleMethod method = MethodWithFiles(settings.style_2d);
   if (const std::string look = settings.style.picture(); IsCubeFile(look)) {
     const ColorLut lut = ReadCubeFile(look);
     const std::string notice =
@@ -118,9 +128,30 @@ std::unique_ptr<ViewStylizer> MakeSceneStylizer(RunContext* context, const Worki
   return MakeMaskedStylizer(std::move(regions), of_colors, coverage);
 }
 
-void ProbeMethod(StyleOptions* options) {
+NetworkAccess AccessAfterYes(bool yes, Console* console) {
+  NetworkAccess access;
+  access.fetch = [](const std::string& address) { return FetchFile(address); };
+  if (yes) {
+    access.ask = [console](const std::string& offer) {
+      console->Info(offer);
+      return true;
+    };
+  } else if (CanAsk()) {
+    access.ask = [](const std::string& offer) {
+      return AnsweredYes(offer + ". Fetch it now?");
+    };
+  }
+  return access;
+}
+
+void ProbeMethod(StyleOptions* options, const NetworkAccess& access) {
   namespace fs = std::filesystem;
   const StyleMethod method = ParseStyleMethod(*options);
+  if (method.kind == StyleMethodKind::kNetwork) {
+    const KnownNetwork& network = FindNetwork(method.name);
+    if (access.fetch || HasNetwork(network)) ProbeStyleNetwork(EnsureNetwork(network, access));
+    return;
+  }
   if (method.kind == StyleMethodKind::kCommand) MakeCommandStylizer(method.argument, "", 0);
   if (!ReadsFiles(method.kind)) return;
   std::error_code error;
@@ -150,7 +181,7 @@ std::vector<int> StyledViews(const Workspace& workspace, const WorkingViews& wor
 }
 
 JsonValue MethodFiles(const StyleOptions& options) {
-  const StyleMethod method = ParseStyleMethod(options);
+  const StyleMethod method = MethodWithFiles(options);
   if (!ReadsFiles(method.kind)) return JsonValue();
   std::error_code error;
   return std::filesystem::is_regular_file(method.argument, error)

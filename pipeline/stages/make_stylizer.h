@@ -7,6 +7,7 @@
 
 #include "pipeline/capture/object_masks.h"
 #include "pipeline/files/json_file.h"
+#include "pipeline/networks/known_networks.h"
 #include "pipeline/run/run_context.h"
 #include "stylize/image/masked_stylizer.h"
 #include "stylize/image/view_stylizer.h"
@@ -18,8 +19,13 @@ std::unique_ptr<ViewStylizer> MakeSceneStylizer(RunContext* context, const Worki
                                                 const CoverageFunction& coverage = nullptr);
 
 // Looked at before long work starts: the method exists, and so does the folder or file that it
-// names, which is made absolute; a command has its placeholders. Throws Error(kUsage, kInput).
-void ProbeMethod(StyleOptions* options);
+// names, which is made absolute; a command has its placeholders; networks that are had by name
+// are fetched as `access` allows, which says nothing in a dry run. Throws Error(kUsage,
+// kInput).
+void ProbeMethod(StyleOptions* options, const NetworkAccess& access);
+
+// How networks may be fetched: after a yes at the terminal, or with `yes`, which is said.
+NetworkAccess AccessAfterYes(bool yes, Console* console);
 
 // Views that the style is learned from and measured on: the fitted ones that have a picture in
 // views_2d/; where none of them has, all that do, held out or not. Throws Error(kInput) if

@@ -14,6 +14,7 @@ constexpr NamedKind kColorMethods[] = {{"mkl", StyleMethodKind::kMkl},
                                        {"reinhard", StyleMethodKind::kReinhard},
                                        {"idt", StyleMethodKind::kIdt},
                                        {"histogram", StyleMethodKind::kHistogram}};
+constexpr NamedKind kNetworks[] = {{"pca-kd", StyleMethodKind::kNetwork}};
 constexpr NamedKind kMethodsWithArgument[] = {{"onnx", StyleMethodKind::kOnnx},
                                               {"folder", StyleMethodKind::kFolder},
                                               {"command", StyleMethodKind::kCommand}};
@@ -29,17 +30,24 @@ StyleMethod ParseStyleMethod(const StyleOptions& options) {
         "leave it out, or add --no-style-regrain where an earlier run asked for it");
   for (const auto& [name, kind] : kColorMethods)
     if (text == name) return {kind, name, ""};
+  const auto refuse_scene_wide = [&](const std::string& name) {
+    if (options.scene_wide)
+      throw UsageError(
+          "\"" + name + "\" styles each view by itself", "--method and --scene-wide",
+          "leave it out, or add --no-scene-wide where an earlier run asked for it");
+  };
+  for (const auto& [name, kind] : kNetworks) {
+    if (text != name) continue;
+    refuse_scene_wide(name);
+    return {kind, name, ""};
+  }
   for (const auto& [name, kind] : kMethodsWithArgument) {
     const std::string prefix = std::string(name) + ":";
     if (!text.starts_with(prefix)) continue;
     const std::string argument = text.substr(prefix.size());
     if (argument.find_first_not_of(" \t") == std::string::npos)
       throw UsageError("nothing follows \"" + prefix + "\"", "--method", hint);
-    if (options.scene_wide)
-      throw UsageError(
-          "\"" + std::string(name) + "\" styles each view by itself",
-          "--method and --scene-wide",
-          "leave it out, or add --no-scene-wide where an earlier run asked for it");
+    refuse_scene_wide(name);
     return {kind, name, argument};
   }
   throw UsageError("there is no 2D method \"" + text + "\"", "--method", hint);

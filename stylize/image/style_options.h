@@ -9,7 +9,8 @@ namespace regrade {
 
 // For hints; --method has no `choices`, because three of its values continue after a colon.
 inline constexpr char kStyleMethods[] =
-    "mkl, gmm, reinhard, idt, histogram, onnx:DIR, folder:DIR or command:\"PROGRAM ...\"";
+    "mkl, gmm, reinhard, idt, histogram, pca-kd, onnx:DIR, folder:DIR or command:\"PROGRAM "
+    "...\"";
 
 struct StyleOptions {
   std::string method = "mkl";
@@ -32,7 +33,8 @@ struct StyleOptions {
              "channel, "
              "idt "
              "the whole distribution (the strongest change; it amplifies grain and soft "
-             "edges), histogram that of each channel; onnx:DIR runs the networks of "
+             "edges), histogram that of each channel; pca-kd runs networks of 302 kB, "
+             "which are fetched once, after a yes (--yes); onnx:DIR runs those of "
              "PCA-KD, WCT, WCT2 or CCPL that are in DIR (scripts/convert_networks.py converts "
              "the authors' files of the last two); folder:DIR takes photos that were styled by "
              "any other program, by the photos' names (some may be missing); "
@@ -60,9 +62,8 @@ struct StyleOptions {
                   "reduces the style's contrast a little"});
     bind("style-max-side", max_side,
          {.unit = "pixels",
-          .help =
-              "longer side at which networks of onnx:DIR see a picture; memory and time grow "
-              "with its square",
+          .help = "longer side at which networks see a picture; memory and time grow "
+                  "with its square",
           .min = 64,
           .max = 8192});
     bind("style-command-limit", command_limit_s,
@@ -79,6 +80,7 @@ enum class StyleMethodKind {
   kReinhard,
   kIdt,
   kHistogram,
+  kNetwork,  // had by name
   kOnnx,
   kFolder,
   kCommand
@@ -86,7 +88,8 @@ enum class StyleMethodKind {
 
 // Reads networks or pictures from the disk.
 inline bool ReadsFiles(StyleMethodKind kind) {
-  return kind == StyleMethodKind::kOnnx || kind == StyleMethodKind::kFolder;
+  return kind == StyleMethodKind::kNetwork || kind == StyleMethodKind::kOnnx ||
+         kind == StyleMethodKind::kFolder;
 }
 // Maps colours alone, whatever their place in the picture.
 inline bool MapsColors(StyleMethodKind kind) {

@@ -43,6 +43,7 @@ inline std::ostream& operator<<(std::ostream& out, const FuzzTarget& target) {
 
 // By kind of file; each list is in the file of its name.
 std::vector<FuzzTarget> ArchiveTargets();
+std::vector<FuzzTarget> BundleTargets();
 std::vector<FuzzTarget> ColmapTargets();
 std::vector<FuzzTarget> CommandLineTargets();
 std::vector<FuzzTarget> CubeTargets();
@@ -66,8 +67,8 @@ std::vector<FuzzTarget> Joined(Lists... lists) {
 
 // Readers that link few libraries, and the others.
 inline std::vector<FuzzTarget> ReaderTargets() {
-  return Joined(ColmapTargets, CubeTargets, ArchiveTargets, FieldTargets, JsonTargets,
-                PoseTableTargets, PictureTargets);
+  return Joined(BundleTargets, ColmapTargets, CubeTargets, ArchiveTargets, FieldTargets,
+                JsonTargets, PoseTableTargets, PictureTargets);
 }
 inline std::vector<FuzzTarget> ProgramTargets() {
   return Joined(RecordTargets, PageTargets, RequestTargets, FlowTargets, StateTargets,

@@ -142,5 +142,48 @@ TEST(Retouch, ALocalEditIsLearnedFromItsPhotoAlone) {
             std::string::npos);
 }
 
+TEST(Retouch, ARenderIsWrittenToBeEdited) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "5", "--size", "64x48"}).code, 0);
+  std::vector<std::string> reconstruct{"reconstruct",  folder / "s/truth", "--out",
+                                       folder / "out", "--device",         "cpu"};
+  for (const std::string& flag : testing::TinyFlags()) reconstruct.push_back(flag);
+  ASSERT_EQ(Regrade(reconstruct).code, 0);
+  const auto retouch = [&](std::vector<std::string> more) {
+    std::vector<std::string> all{"retouch", folder / "out", "--photo", "00002"};
+    all.insert(all.end(), more.begin(), more.end());
+    return Regrade(all);
+  };
+  const std::string render = folder / "out/retouch/00002.tif", edited = folder / "edited.png";
+  ProgramOutcome outcome = retouch({});
+  EXPECT_EQ(outcome.code, 2);  // a photo's edit is not written by anybody but its owner
+  WritePng16(edited, Image(64, 48));
+  outcome = retouch({"--from", "render", "--edited", edited});
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_NE(outcome.text.find("not written yet"), std::string::npos) << outcome.text;
+  outcome = retouch({"--from", "render"});
+  ASSERT_EQ(outcome.code, 0) << outcome.text;
+  EXPECT_NE(outcome.text.find("00002.tif"), std::string::npos) << outcome.text;
+  EXPECT_FALSE(fs::exists(folder / "out/styles"));
+  DecodeLimits limits;
+  limits.min_side = 1;
+  Image picture = DecodePhoto(render, limits).image;
+  ASSERT_EQ(picture.width, 64);
+  // More than 256 levels: 16 bits came through.
+  std::vector<float> levels = picture.pixels;
+  std::sort(levels.begin(), levels.end());
+  EXPECT_GT(std::unique(levels.begin(), levels.end()) - levels.begin(), 1000);
+  // Half as light. Seen from the render it is one map of colours, although this small fit is
+  // far from its photo.
+  for (float& v : picture.pixels) v *= 0.5f;
+  WritePng16(edited, picture);
+  outcome = retouch({"--from", "render", "--edited", edited, "--name", "dim"});
+  ASSERT_EQ(outcome.code, 0) << outcome.text;
+  EXPECT_NE(outcome.text.find("one map of colours"), std::string::npos) << outcome.text;
+  EXPECT_TRUE(fs::exists(folder / "out/styles/dim/edit.cube"));
+  EXPECT_NE(ReadText(folder / "out/styles/dim/retouch.json").find("\"render\""),
+            std::string::npos);
+}
+
 }  // namespace
 }  // namespace regrade
