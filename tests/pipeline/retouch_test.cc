@@ -144,7 +144,7 @@ TEST(Retouch, ALocalEditIsLearnedFromItsPhotoAlone) {
 
 TEST(Retouch, ARenderIsWrittenToBeEdited) {
   const TemporaryFolder folder;
-  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "5", "--size", "64x48"}).code, 0);
+  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "5", "--size", "96x72"}).code, 0);
   std::vector<std::string> reconstruct{"reconstruct",  folder / "s/truth", "--out",
                                        folder / "out", "--device",         "cpu"};
   for (const std::string& flag : testing::TinyFlags()) reconstruct.push_back(flag);
@@ -157,7 +157,7 @@ TEST(Retouch, ARenderIsWrittenToBeEdited) {
   const std::string render = folder / "out/retouch/00002.tif", edited = folder / "edited.png";
   ProgramOutcome outcome = retouch({});
   EXPECT_EQ(outcome.code, 2);  // a photo's edit is not written by anybody but its owner
-  WritePng16(edited, Image(64, 48));
+  WritePng16(edited, Image(96, 72));
   outcome = retouch({"--from", "render", "--edited", edited});
   EXPECT_EQ(outcome.code, 3);
   EXPECT_NE(outcome.text.find("not written yet"), std::string::npos) << outcome.text;
@@ -168,7 +168,7 @@ TEST(Retouch, ARenderIsWrittenToBeEdited) {
   DecodeLimits limits;
   limits.min_side = 1;
   Image picture = DecodePhoto(render, limits).image;
-  ASSERT_EQ(picture.width, 64);
+  ASSERT_EQ(picture.width, 96);
   // More than 256 levels: 16 bits came through.
   std::vector<float> levels = picture.pixels;
   std::sort(levels.begin(), levels.end());

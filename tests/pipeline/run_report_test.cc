@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <set>
 
+#include "pipeline/fields/field_renderer.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/images/image_file.h"
 #include "tests/support/source_dir.h"
@@ -52,13 +53,14 @@ void AddKeys(const JsonValue& value, std::set<std::string>* keys) {
   }
 }
 
-// FORMATS.md explains each key of the report, and each event of --json. NAME_why is explained
-// once for all names.
+// FORMATS.md explains each key of the report, and each event of --json. NAME_why and
+// NAME_infinite are explained once for all names.
 void ExpectDocumented(const std::set<std::string>& keys) {
   const std::string formats = testing::ReadText(testing::SourceDir() + "/FORMATS.md");
   for (const std::string& key : keys) {
-    const bool why = key.ends_with("_why");
-    const std::string name = why ? key.substr(0, key.size() - 4) : key;
+    std::string name = key;
+    for (const std::string ending : {"_why", "_infinite"})
+      if (key.ends_with(ending)) name = key.substr(0, key.size() - ending.size());
     EXPECT_NE(formats.find("`" + name + "`"), std::string::npos) << key;
   }
 }
@@ -175,7 +177,7 @@ TEST(RunReport, ShowsEveryPartOfTheRun) {
         .At("render")
         .At("film_renderer");
   };
-  EXPECT_EQ(film_renderer().AsString(), "exact (the CPU has no fast renderer)");
+  EXPECT_EQ(film_renderer().AsString(), kFastRendererOfCpu);
   const testing::ProgramOutcome rendered =
       Regrade({"render", folder / "e", "--exact", "--verbose"});
   ASSERT_EQ(rendered.code, 0) << rendered.text;

@@ -88,7 +88,7 @@ PLANTED = (
     ("reconstruct/fit/a.h", "// A.\n#pragma once\n#include <Eigen/Core>\n", "Eigen is not allowed"),
     ("pipeline/files/a.h", "// A.\n#pragma once\n#include <nlohmann/json.hpp>\n", "is not allowed"),
     ("pipeline/run/a.h", "// A.\n#pragma once\n#include <unistd.h>\n", "own types"),
-    ("pipeline/run/a.cc", "#include <curl/curl.h>\n", "unknown library"),
+    ("pipeline/run/a.cc", "#include <tbb/tbb.h>\n", "unknown library"),
     # Words.
     ("pipeline/run/a.cc", 'void F() { std::system("ls"); }\n', "system()"),
     ("pipeline/run/a.cc", "int n = ::system(Join(a, b));\n", "system()"),
