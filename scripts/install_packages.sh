@@ -1,6 +1,9 @@
 #!/usr/bin/env bash
 # Installs the Debian 12 packages that regrade is built with and runs on; does nothing when all are there.
-#   install_packages.sh [--dev] [--ask]     --ask asks first, where somebody can answer; --dev adds clang-format, clang-tidy, and a browser to look at report pages with
+#   install_packages.sh [--browser] [--dev] [--ask]
+# --browser adds Chromium, to test pages with; --dev that, clang-format and clang-tidy; --ask asks first, where somebody
+# can answer
+#   clang-tidy; --ask asks first, where somebody can answer
 set -euo pipefail
 
 packages=(
@@ -18,7 +21,8 @@ packages=(
 )
 ask=
 for word in "$@"; do
-  [[ $word == --dev ]] && packages+=(clang-format clang-tidy chromium)
+  [[ $word == --dev ]] && packages+=(clang-format clang-tidy)
+  [[ $word == --dev || $word == --browser ]] && packages+=(chromium)
   [[ $word == --ask ]] && ask=1
 done
 

@@ -22,32 +22,12 @@ import sys
 import tempfile
 import time
 
-from look_at_report import NO_CHROMIUM, SIZES, Browser, Page
+from browser import NO_CHROMIUM, SIZES, Browser, Page, complaints, open_page, wait_until
 
 # The shader's arithmetic is the program's in another order of sums: measured 70 dB and more, where one unit of 255
 # everywhere would be 48 dB. Styles go through another sine, and both round to codes: a code more or less is 1 / 127 of
 # the largest coefficient.
 SOURCE_DB, STYLED_DB, WITHIN_ONE = 55, 50, 0.999
-WAIT_S = 120
-
-
-def wait_until(page, expression):
-    end = time.monotonic() + WAIT_S
-    while not page.value(expression):
-        if time.monotonic() > end:
-            raise RuntimeError("waited in vain for " + expression)
-        time.sleep(0.1)
-
-
-def open_page(browser, path, size):
-    page = Page(browser, path, size)
-    wait_until(page, "!!globalThis.regradePage && (!!regradePage.picture || /cannot/.test(message.textContent))")
-    return page
-
-
-def complaints(page):
-    # Reading pixels back is slow on purpose here.
-    return [c for c in page.complaints() if "GPU stall due to ReadPixels" not in c]
 
 
 def pixels_of(page, view):
@@ -323,7 +303,7 @@ def main():
     parser.add_argument("--chromium", default=shutil.which("chromium") or shutil.which("chromium-browser"))
     arguments = parser.parse_args()
     if not arguments.chromium:
-        print("skipped: Chromium is not installed (Debian package chromium)")
+        print("Chromium is not installed (Debian package chromium)")
         return NO_CHROMIUM
     if not glob.glob(os.path.join(arguments.folder, "*.html")):
         parser.error(arguments.folder + " has no pages")

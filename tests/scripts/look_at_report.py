@@ -91,7 +91,7 @@ def main():
     parser.add_argument("--chromium", default=shutil.which("chromium") or shutil.which("chromium-browser"))
     arguments = parser.parse_args()
     if not arguments.chromium:
-        print("skipped: Chromium is not installed (Debian package chromium)")
+        print("Chromium is not installed (Debian package chromium)")
         return NO_CHROMIUM
     if not os.path.isfile(arguments.report):
         parser.error(arguments.report + " is not a file")

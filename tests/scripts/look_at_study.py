@@ -18,7 +18,7 @@ import sys
 import tempfile
 import time
 
-from browser import NO_CHROMIUM, SIZES, Browser, Page
+from browser import NO_CHROMIUM, SIZES, Browser, Page, wait_until
 
 CLIPS = ("fern", "horns", "trex", "room")
 METHODS = ("plain", "lovely", "dull")
@@ -40,14 +40,6 @@ def make_films(folder):
 def program(*words):
     done = subprocess.run(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
     return done.returncode, done.stdout
-
-
-def wait_until(page, expression):
-    end = time.monotonic() + 60
-    while not page.value(expression):
-        if time.monotonic() > end:
-            raise RuntimeError("waited in vain for " + expression)
-        time.sleep(0.05)
 
 
 def open_study(browser, path, size, forget):

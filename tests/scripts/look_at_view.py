@@ -18,8 +18,7 @@ import sys
 import tempfile
 import time
 
-from look_at_page import complaints, open_page, wait_until
-from look_at_report import NO_CHROMIUM, SIZES, Browser, Page
+from browser import NO_CHROMIUM, SIZES, Browser, Page, complaints, open_page, wait_until
 from small_run import SMALL, STYLE, call, make_capture
 
 DROP = """(async () => {
@@ -89,7 +88,7 @@ def main():
     parser.add_argument("--chromium", default=shutil.which("chromium") or shutil.which("chromium-browser"))
     arguments = parser.parse_args()
     if not arguments.chromium:
-        print("skipped: Chromium is not installed (Debian package chromium)")
+        print("Chromium is not installed (Debian package chromium)")
         return NO_CHROMIUM
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as scratch:
         folder = os.path.join(scratch, "run")

@@ -135,25 +135,29 @@ vec3 Shade(int cell, vec3 f) {
   return max(uMap * raw + uOffset, 0.0);
 }
 
-// The sums of a ray: light, what is transmitted, and opacity that has no colour yet.
+// The sums of a ray: light, what is transmitted, opacity that has no colour yet, and the sample at its middle, whose
+// colour it gets: the error is of second order in the step, where the last sample's is of first order.
 vec3 sum = vec3(0.0);
 float transmitted = 1.0, waiting = 0.0;
-int lastCell = -1;
-vec3 lastFraction;
+int middleCell = -1;
+vec3 middleFraction;
 
 void Composite(int cell, vec3 f, float density, float delta) {
   float tau = min(max(density, 0.0) * delta, 104.0);
   if (!(tau > 0.0)) return;
   // 1 - exp(-tau) of a small tau loses its digits.
   float alpha = tau < 0.01 ? tau * (1.0 - tau * (0.5 - tau * (1.0 / 6.0))) : 1.0 - exp(-tau);
-  waiting += transmitted * alpha;
+  float weight = transmitted * alpha;
+  if (waiting < max(0.5 * uOpacityStep, weight) || middleCell < 0) {
+    middleCell = cell;
+    middleFraction = f;
+  }
+  waiting += weight;
   transmitted *= exp(-tau);
-  lastCell = cell;
-  lastFraction = f;
   if (waiting >= uOpacityStep) {
-    sum += waiting * Shade(cell, f);
+    sum += waiting * Shade(middleCell, middleFraction);
     waiting = 0.0;
-    lastCell = -1;
+    middleCell = -1;
   }
 }
 
@@ -318,7 +322,7 @@ void main() {
   if (uWeight.z > 0.0) Scaled(g, 2, s2);
   if (dot(d, d) > 0.0) {
     if (uOnCells == 1) MarchCells(eye, d); else MarchGrid(eye, d);
-    if (lastCell >= 0) sum += waiting * Shade(lastCell, lastFraction);
+    if (middleCell >= 0) sum += waiting * Shade(middleCell, middleFraction);
     if (uLayers > 0 && transmitted >= kStop) CompositeSpheres(eye, d);
   }
   color = vec4(clamp(sum + transmitted * uBackground, 0.0, 1.0), 1.0);

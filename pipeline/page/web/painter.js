@@ -3,6 +3,7 @@
 class Painter {
   constructor(canvas, graphics, scene, pictureOf) {
     Object.assign(this, {canvas, graphics, scene, pictureOf});
+    this.steps = {moving: 1 / 8, rest: 1 / 32};  // of opacity, a colour for each
     this.part = 0.5;        // of the canvas's side while moving
     this.rows = 16;         // of a strip
     this.changed = true;
@@ -46,7 +47,7 @@ class Painter {
         this.coarse?.free();
         this.coarse = this.graphics.target(width, height);
       }
-      this.draw(this.coarse, {y: 0, height}, 1 / 16);
+      this.draw(this.coarse, {y: 0, height}, this.steps.moving);
       this.graphics.settle(this.coarse);
       this.graphics.show(this.coarse, this.canvas, null);
       this.frameTime = performance.now() - begun;
@@ -60,7 +61,7 @@ class Painter {
     if (begun < this.rest) return true;
     const height = Math.min(this.rows, this.full.height - this.next);
     const strip = {y: this.full.height - this.next - height, height};  // from the top
-    this.draw(this.full, strip, 1 / 64);
+    this.draw(this.full, strip, this.steps.rest);
     this.graphics.settle(this.full);
     this.graphics.show(this.full, this.canvas, strip);
     this.next += height;
