@@ -3,7 +3,6 @@
 #   install_packages.sh [--browser] [--dev] [--ask]
 # --browser adds Chromium, to test pages with; --dev that, clang-format and clang-tidy; --ask asks first, where somebody
 # can answer
-#   clang-tidy; --ask asks first, where somebody can answer
 set -euo pipefail
 
 packages=(
