@@ -1,5 +1,6 @@
 #include "evaluate/pair_network.h"
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>

@@ -1,5 +1,6 @@
 #include "pipeline/capture/transforms_json.h"
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <optional>

@@ -1,4 +1,5 @@
 // regrade_gpu fit: a packed capture becomes a field, measured on the views that were kept back.
+#include <algorithm>
 #include <filesystem>
 #include <numeric>
 

@@ -51,10 +51,10 @@ class Fitter {
         options_(AdaptOptions(options, ConditionsOf(views, backend))),
         hooks_(hooks),
         sums_each_step_(backend == Backend::kCpu) {
-    REGRADE_CHECK_EQ(options.resolutions.size(), options.steps.size());
-    for (size_t s = 0; s < options.steps.size(); ++s) {
-      total_steps_ += options.steps[s];
-      total_work_ += options.steps[s] * WorkOfStep(static_cast<int>(s));
+    REGRADE_CHECK_EQ(options_.resolutions.size(), options_.steps.size());
+    for (size_t s = 0; s < options_.steps.size(); ++s) {
+      total_steps_ += options_.steps[s];
+      total_work_ += options_.steps[s] * WorkOfStep(static_cast<int>(s));
     }
     if (backend == Backend::kCuda)
       engine_ = MakeCudaFitEngine(&rays_, options.seed, options.exact_sums);
@@ -240,8 +240,8 @@ class Fitter {
     if (options_.adaptive()) {
       const float width = static_cast<float>(options_.resolutions[0]);
       engine_->RefineCells({options_.step, options_.stop_transmittance},
-                           {options_.prune_weight / width, options_.cell_pixels,
-                            longest > 0 ? Levels().outward + stage_ : 0,
+                           {options_.prune_weight / width, Levels().outward,
+                            options_.cell_pixels, longest > 0 ? Levels().outward + stage_ : 0,
                             static_cast<int64_t>(double{options_.max_cells} * 1e6)});
       if (engine_->num_voxels() == 0) ThrowEmpty();
       return;

@@ -5,6 +5,7 @@
 // the root give a product of K_est.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 
 #include "kernels/base/error.h"

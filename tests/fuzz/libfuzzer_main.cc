@@ -5,6 +5,7 @@
 //   fuzz_readers --target=NAME [libFuzzer's flags and folders]
 #include <omp.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>

@@ -1,5 +1,6 @@
 // Fuzz target: the field of a page. Its bytes here are the header as a line of JSON, and for
 // each section a line "NAME SIZE" and its bytes, not compressed: mutants pass the checksums.
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 

@@ -2,6 +2,7 @@
 // into pictures.
 #include <zlib.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <iterator>

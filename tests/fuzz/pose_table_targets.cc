@@ -1,4 +1,5 @@
 // Fuzz target: poses_bounds.npy of LLFF captures.
+#include <algorithm>
 #include <cmath>
 
 #include "pipeline/capture/llff_poses.h"

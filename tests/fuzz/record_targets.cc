@@ -1,5 +1,6 @@
 // Fuzz targets: transforms.json, run.json, stage records, camera paths, the index of a
 // capture.
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 

@@ -1,6 +1,7 @@
 // Gradients of adaptive fields in double, and the CPU's fast path against the plain ray.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 

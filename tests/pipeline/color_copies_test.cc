@@ -2,6 +2,7 @@
 // pictures that are rendered of it.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "kernels/field/cpu/render_view.h"

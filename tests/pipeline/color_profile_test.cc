@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <libheif/heif.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "pipeline/capture/ingest_photos.h"

@@ -60,6 +60,14 @@ TEST_F(CellFit, ReproducesAHeldOutViewWithFineCellsAtTheSurface) {
   EXPECT_LT(far_out, finest / 10);
 }
 
+// Rates end with the last step that is taken, so a stage that is left out leaves no trace.
+TEST_F(CellFit, AStageThatIsLeftOutChangesNothing) {
+  const FitResult without = Fit();
+  options_.resolutions.push_back(2048);
+  options_.steps.push_back(400);
+  EXPECT_TRUE(SameBits(Fit().field, without.field));
+}
+
 TEST_F(CellFit, SameBytesForAnyThreadCount) {
   EXPECT_TRUE(
       testing::RecordSameBits("1 and 3 threads", testing::Computed::kFloat,
@@ -161,6 +169,24 @@ TEST(ChooseChanges, H167_TheLimitOfCellsHoldsAndTheLargestErrorsAreSplit) {
   limits.most_cells = 0;
   const auto unlimited = ChooseChanges(level, statistics, limits);
   EXPECT_GT(std::count(unlimited.begin(), unlimited.end(), CellChange::kSplit), split);
+}
+
+// Half the weight keeps a cell half as wide; wider ones than those of the first level need no
+// more.
+TEST(ChooseChanges, TheLeastWeightFallsWithACellsWidth) {
+  const std::vector<float> kept_from{0.1f, 0.1f, 0.05f, 0.025f};  // by level
+  const int64_t n = std::ssize(kept_from);
+  Buffer<uint8_t> level(2 * n);
+  CellStatistics statistics{Buffer<float>(2 * n), Buffer<float>(2 * n),
+                            Buffer<uint64_t>(2 * n)};
+  for (int64_t c = 0; c < 2 * n; ++c) {
+    level[c] = static_cast<uint8_t>(c % n);
+    statistics.weight[c] = kept_from[static_cast<size_t>(c % n)] * (c < n ? 1.0f : 0.99f);
+  }
+  const auto change =
+      ChooseChanges(level, statistics, {.least_weight = 0.1f, .first_level = 1, .deepest = 3});
+  for (int64_t c = 0; c < 2 * n; ++c)
+    EXPECT_EQ(change[static_cast<size_t>(c)], c < n ? CellChange::kKeep : CellChange::kRemove);
 }
 
 // A pixel of a camera 2 units away with a focal length of 100 pixels is 0.02 units wide there.

@@ -1,6 +1,7 @@
 // Mixing styles: exact ends, linear between them, nothing beyond them.
 #include "stylize/field/blend_fields.h"
 
+#include <algorithm>
 #include <cstring>
 
 #include "tests/support/expect_error.h"

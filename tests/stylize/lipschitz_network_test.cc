@@ -1,4 +1,5 @@
 // The Lipschitz network: its certificate under attack, its regularisation.
+#include <algorithm>
 #include <cstdlib>
 
 #include "tests/support/record_error.h"

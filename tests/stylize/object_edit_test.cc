@@ -1,5 +1,6 @@
 // A style for one object: masks that disagree vote, and what is not of the object keeps its
 // bits.
+#include <algorithm>
 #include <cstring>
 
 #include "kernels/field/cpu/render_view.h"

@@ -6,6 +6,7 @@
 // in march_simd.h. A lane whose ray has ended takes the next one.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <memory>
 
