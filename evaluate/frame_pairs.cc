@@ -32,8 +32,7 @@ std::vector<FrameCache> CachesOf(const std::vector<NamedFrameSource>& sequences,
       throw InputError(
           Concat("the sequence has ", sequence.frames.count, " frames, the reference ", frames),
           sequence.name, "evaluate frames of the same cameras");
-    caches.push_back(
-        CacheOf(sequence.frames, gaps, kFrameCacheBytes / std::ssize(sequences)));
+    caches.push_back(CacheOf(sequence.frames, gaps, kFrameCacheBytes / std::ssize(sequences)));
   }
   return caches;
 }
@@ -44,10 +43,10 @@ void CheckFrame(const Image& frame, const FlowField& flow, const Image& first,
                 const std::string& sequence, int index) {
   const std::string where = Concat(sequence, ", frame ", index);
   if (frame.width != flow.width || frame.height != flow.height)
-    throw InputError(Concat("a frame of ", frame.width, " x ", frame.height,
-                            " px does not fit the reference of ", flow.width, " x ",
-                            flow.height, " px"),
-                     where, "render all sequences at one size");
+    throw InputError(
+        Concat("a frame of ", frame.width, " x ", frame.height,
+               " px does not fit the reference of ", flow.width, " x ", flow.height, " px"),
+        where, "render all sequences at one size");
   if (ColourChannels(frame) != ColourChannels(first))
     throw InputError("grey and colour frames in one sequence", where);
 }

@@ -86,8 +86,8 @@ std::vector<double> BradleyTerry(const std::vector<Choice>& choices, int methods
   return strength;
 }
 
-std::vector<Interval> BradleyTerryIntervals(const std::vector<std::vector<Choice>>& participants,
-                                            int methods) {
+std::vector<Interval> BradleyTerryIntervals(
+    const std::vector<std::vector<Choice>>& participants, int methods) {
   if (participants.size() < 2) return {};
   std::vector<std::vector<double>> strengths(methods);
   for (int resample = 0; resample < kResamples; ++resample) {

@@ -25,14 +25,14 @@ struct Choice {
 };
 
 // EQ(bradley-terry), Bradley and Terry 1952, Luce 1959: P(i of S) = s_i / sum_{j in S} s_j. The
-// strengths s, with a sum of 1, of largest likelihood, by Hunter's iteration (2004) s_i <- w_i /
-// sum_{S with i} 1 / sum_{j in S} s_j, w_i the number of i's choices. A method that is never
+// strengths s, with a sum of 1, of largest likelihood, by Hunter's iteration (2004) s_i <- w_i
+// / sum_{S with i} 1 / sum_{j in S} s_j, w_i the number of i's choices. A method that is never
 // chosen has 0; where a method is always chosen against the others, the others have 0.
 std::vector<double> BradleyTerry(const std::vector<Choice>& choices, int methods);
 
 // 95 % intervals of BradleyTerry by bootstrap over participants: 1000 resamples of whole
 // participants with a fixed seed, quantiles 2.5 % and 97.5 %. Empty for fewer than two.
-std::vector<Interval> BradleyTerryIntervals(const std::vector<std::vector<Choice>>& participants,
-                                            int methods);
+std::vector<Interval> BradleyTerryIntervals(
+    const std::vector<std::vector<Choice>>& participants, int methods);
 
 }  // namespace regrade

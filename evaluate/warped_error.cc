@@ -86,9 +86,8 @@ SplatFrame SoftmaxSplat(const Image& moved, const Image& first, const Image& sec
       const int64_t pixel = static_cast<int64_t>(y) * width + x;
       const double u = flow.at(x, y)[0], v = flow.at(x, y)[1];
       if (!std::isfinite(u) || !std::isfinite(v) || !IsFinite(moved, pixel)) continue;
-      const double importance =
-          Importance(first, pixel, second,
-                     TapsInside(x + scale_x * u, y + scale_y * v, width, height));
+      const double importance = Importance(
+          first, pixel, second, TapsInside(x + scale_x * u, y + scale_y * v, width, height));
       if (!std::isfinite(importance)) continue;
       const InnerTaps taps = TapsInside(x + u, y + v, width, height);
       for (int k = 0; k < taps.count; ++k) {
@@ -149,8 +148,7 @@ WarpedError PublishedWarpedError(const Image& earlier, const Image& later,
 WarpedError CorrectedWarpedError(const Image& earlier, const Image& later,
                                  const Image& unstyled_earlier, const Image& unstyled_later,
                                  const FlowField& flow, const PairDistance& lpips) {
-  SplatFrame warped =
-      SoftmaxSplat(earlier, unstyled_earlier, unstyled_later, flow, 1, 1, 0);
+  SplatFrame warped = SoftmaxSplat(earlier, unstyled_earlier, unstyled_later, flow, 1, 1, 0);
   const int channels = warped.color.channels;
   Image target(earlier.width, earlier.height, channels);
   double squares = 0;

@@ -17,12 +17,12 @@ struct SplatFrame {
   Image weight;  // [H, W, 1]: the sum that `color` was divided by; 0 where nothing arrived
 };
 
-// EQ(softmax-splat), Niklaus and Liu 2020: with b_xy the bilinear weight that x + f(x) gives the
-// pixel y and s(x) an importance, W(y) = sum_x b_xy e^s(x) I(x) / (n(y) + bias), n(y) = sum_x
-// b_xy e^s(x). Here, with values from 0 to 255, s = max(-10, -10 mean_c |A(x) - B(x + k f(x))|):
-// B is sampled bilinearly with zeros outside. `first` and `second` are A and B; `moved` is I.
-// k = `scale` per axis. Where n = 0, W = 0. Pixels with flow or a colour that is not finite are
-// not moved. Images and flow are of one size.
+// EQ(softmax-splat), Niklaus and Liu 2020: with b_xy the bilinear weight that x + f(x) gives
+// the pixel y and s(x) an importance, W(y) = sum_x b_xy e^s(x) I(x) / (n(y) + bias), n(y) =
+// sum_x b_xy e^s(x). Here, with values from 0 to 255, s = max(-10, -10 mean_c |A(x) - B(x + k
+// f(x))|): B is sampled bilinearly with zeros outside. `first` and `second` are A and B;
+// `moved` is I. k = `scale` per axis. Where n = 0, W = 0. Pixels with flow or a colour that is
+// not finite are not moved. Images and flow are of one size.
 SplatFrame SoftmaxSplat(const Image& moved, const Image& first, const Image& second,
                         const FlowField& flow, double scale_x, double scale_y, double bias);
 
@@ -48,8 +48,8 @@ WarpedError CorrectedWarpedError(const Image& earlier, const Image& later,
                                  const Image& unstyled_earlier, const Image& unstyled_later,
                                  const FlowField& flow, const PairDistance& lpips);
 
-// With sides that are multiples of 8, the border repeated on both sides, as RAFT's demonstration
-// does it. Only colour channels are kept.
+// With sides that are multiples of 8, the border repeated on both sides, as RAFT's
+// demonstration does it. Only colour channels are kept.
 Image PadFrame(const Image& frame);
 FlowField PadFlow(const FlowField& flow);
 

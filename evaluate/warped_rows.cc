@@ -57,7 +57,7 @@ class OwnFlow {
 };
 
 WarpedRow Summarize(const std::string& sequence, int gap,
-                          const std::vector<WarpedPair>& pairs) {
+                    const std::vector<WarpedPair>& pairs) {
   WarpedRow row;
   row.sequence = sequence;
   row.gap = gap;
@@ -113,10 +113,9 @@ ConsistencyReport EvaluateWarped(const FrameSource& reference,
       CheckFrame(*later, motion, *earlier, name, j);
       WarpedPair pair{name, i, j, {}, {}};
       if (const auto own_flow = own[s](i, j, *earlier, *later))
-        pair.published = PublishedWarpedError(PadFrame(*earlier), PadFrame(*later), *own_flow,
-                                              raw_lpips);
-      pair.corrected =
-          CorrectedWarpedError(*earlier, *later, *from, *to, motion, lpips);
+        pair.published =
+            PublishedWarpedError(PadFrame(*earlier), PadFrame(*later), *own_flow, raw_lpips);
+      pair.corrected = CorrectedWarpedError(*earlier, *later, *from, *to, motion, lpips);
       report.warped_pairs.push_back(std::move(pair));
     }
     ReportOrThrow(progress, ++done, std::ssize(pairs));

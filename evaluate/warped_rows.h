@@ -1,5 +1,5 @@
-// The consistency of sequences by forward warping: every pair, and one row for each sequence and
-// gap.
+// The consistency of sequences by forward warping: every pair, and one row for each sequence
+// and gap.
 #pragma once
 
 #include <string>
@@ -14,10 +14,10 @@ namespace regrade {
 inline constexpr char kWarpedMode[] = "stylegaussian";
 
 // Compares the pairs of EvaluateConsistency in mode kWarpedMode by both readings of
-// warped_error.h; the report has `warped` and `warped_pairs` and no other rows. Flow is computed
-// by options.flow, of the unstyled frames and, padded, of each sequence. With files:DIR that of
-// a sequence is in DIR/NAME, of frames' size, and of the reference in DIR itself; a sequence
-// without such a folder has no published reading.
+// warped_error.h; the report has `warped` and `warped_pairs` and no other rows. Flow is
+// computed by options.flow, of the unstyled frames and, padded, of each sequence. With
+// files:DIR that of a sequence is in DIR/NAME, of frames' size, and of the reference in DIR
+// itself; a sequence without such a folder has no published reading.
 //
 // Errors: those of EvaluateConsistency, of flow and of options.lpips' network. Progress counts
 // pairs.

@@ -16,9 +16,10 @@ struct StudyFileOptions {
   void Describe(Bind& bind) {
     bind("out", out,
          {.help = "the page to write; with --analyse a JSON file of the analysis, if wanted"});
-    bind("analyse", analyse,
-         {.help = "reads the answers that participants saved: preference shares with intervals, "
-                  "Bradley-Terry strengths, and a test of each pair"});
+    bind(
+        "analyse", analyse,
+        {.help = "reads the answers that participants saved: preference shares with intervals, "
+                 "Bradley-Terry strengths, and a test of each pair"});
   }
 };
 

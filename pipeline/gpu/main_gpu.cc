@@ -51,7 +51,7 @@ bool Run(const std::vector<std::string>& arguments) {
   }
   ReadFlags(rest, &options);
   if (command == "fit")
-    FitPacked(settings.fit_packed, settings.fit);
+    FitPacked(settings.fit_packed, settings.fit, &options);
   else if (command == "render")
     RenderPacked(settings.render_packed);
   else
@@ -69,6 +69,9 @@ int main(int argc, char** argv) {
   } catch (const regrade::Error& error) {
     std::fprintf(stderr, "regrade_gpu: %s\n", error.what());
     return static_cast<int>(error.code());
+  } catch (const regrade::Interrupted&) {
+    std::fprintf(stderr, "regrade_gpu: stopped; the same command continues\n");
+    return 130;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "regrade_gpu: internal error: %s\n", error.what());
     return 1;

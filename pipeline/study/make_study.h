@@ -18,10 +18,11 @@ struct StudyOptions {
 
   template <typename Bind>
   void Describe(Bind& bind) {
-    bind("protocol", protocol,
-         {.help = "pairs shows every two methods of every clip; liprf shows all methods at once "
-                  "and asks for the favourite, as LipRF's study of 16 clips and 35 volunteers",
-          .choices = kStudyProtocols});
+    bind(
+        "protocol", protocol,
+        {.help = "pairs shows every two methods of every clip; liprf shows all methods at once "
+                 "and asks for the favourite, as LipRF's study of 16 clips and 35 volunteers",
+         .choices = kStudyProtocols});
     bind("question", question, {.help = "what each choice answers"});
     bind("method-name", names,
          {.help = "name of a method in the answers, once for each in their order; by default "
@@ -31,7 +32,9 @@ struct StudyOptions {
           .min = 0,
           .max = 20});
     bind("least-seconds", seconds,
-         {.unit = "s", .help = "films are seen that long before they can be chosen", .min = 0,
+         {.unit = "s",
+          .help = "films are seen that long before they can be chosen",
+          .min = 0,
           .max = 60});
   }
 };

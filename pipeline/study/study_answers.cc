@@ -106,9 +106,9 @@ StudyAnswers ReadStudyAnswers(const std::vector<std::string>& paths) {
   size_t choices = 0;
   for (const auto& participant : answers.participants) choices += participant.size();
   if (choices == 0)
-    throw InputError(answers.failed > 0 ? "nobody passed the attention checks"
-                                        : "there is no answer",
-                     paths[0]);
+    throw InputError(
+        answers.failed > 0 ? "nobody passed the attention checks" : "there is no answer",
+        paths[0]);
   return answers;
 }
 
@@ -152,7 +152,8 @@ JsonValue AnalyseStudy(const StudyAnswers& answers) {
     for (int b = a + 1; b < methods; ++b) {
       int64_t first = 0, both = 0;  // choices of one of the two where both were shown
       for (const Choice& choice : all) {
-        const bool shown = std::ranges::count(choice.shown, a) && std::ranges::count(choice.shown, b);
+        const bool shown =
+            std::ranges::count(choice.shown, a) && std::ranges::count(choice.shown, b);
         first += shown && choice.chosen == a;
         both += shown && (choice.chosen == a || choice.chosen == b);
       }
@@ -180,8 +181,8 @@ std::string FormatStudy(const JsonValue& analysis) {
   std::string text = Concat(
       analysis.At("question").AsString(), "\n", analysis.At("participants").AsInt(),
       " participants, ", analysis.At("choices").AsInt(), " choices; left out after a failed ",
-      "check: ", analysis.At("failed_checks").AsInt(), "; unfinished: ",
-      analysis.At("unfinished").AsInt(), "\n\n");
+      "check: ", analysis.At("failed_checks").AsInt(),
+      "; unfinished: ", analysis.At("unfinished").AsInt(), "\n\n");
   for (const JsonValue& row : analysis.At("methods").AsArray())
     text += Concat(row.At("name").AsString(), ": chosen ", row.At("chosen").AsInt(), " of ",
                    row.At("shown").AsInt(), ", ", Percent(row.At("share")), " (",
@@ -191,8 +192,8 @@ std::string FormatStudy(const JsonValue& analysis) {
   for (const JsonValue& pair : analysis.At("pairs").AsArray())
     text += Concat(pair.At("first").AsString(), " over ", pair.At("second").AsString(), ": ",
                    pair.At("first_chosen").AsInt(), " of ", pair.At("choices").AsInt(), " (",
-                   Range(pair, "share"), "), p = ",
-                   Format("%.2g", pair.At("sign_test").AsDouble()), "\n");
+                   Range(pair, "share"),
+                   "), p = ", Format("%.2g", pair.At("sign_test").AsDouble()), "\n");
   return text +
          "\n95 % intervals. Shares and p are exact binomial ones, as if all choices were "
          "independent; Bradley-Terry's are a bootstrap over participants.\n";

@@ -35,7 +35,8 @@ void Compare(const std::string& folder, const std::string& style, int size, int 
     int64_t rays = 0;
   };
   std::vector<Row> rows;
-  for (const float levels : {0.5f, 1.0f, 1.5f, 2.0f, 3.0f, 4.0f}) rows.push_back({levels / 255});
+  for (const float levels : {0.5f, 1.0f, 1.5f, 2.0f, 3.0f, 4.0f})
+    rows.push_back({levels / 255});
   double exact_seconds = 0;
   int64_t pixels = 0;
   for (const Camera& camera : path) {

@@ -70,8 +70,7 @@ TEST(Preference, IntervalsCoverTheStrength) {
     std::vector<std::vector<Choice>> participants(20);
     for (uint64_t p = 0; p < 20; ++p)
       for (uint64_t k = 0; k < 8; ++k)
-        participants[p].push_back(
-            {{0, 1}, RandomDouble(study, p, k) < truth ? 0 : 1});
+        participants[p].push_back({{0, 1}, RandomDouble(study, p, k) < truth ? 0 : 1});
     const Interval interval = BradleyTerryIntervals(participants, 2)[0];
     covered += interval.low <= truth && truth <= interval.high;
   }

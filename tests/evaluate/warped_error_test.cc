@@ -106,7 +106,7 @@ TEST(WarpedError, SidesBecomeMultiplesOfEight) {
   EXPECT_EQ(padded.height, 48);
   EXPECT_EQ(padded.channels, 3);
   EXPECT_EQ(padded.at(0, 0)[1], frame.at(0, 0)[1]);
-  EXPECT_EQ(padded.at(1, 0)[1], frame.at(0, 0)[1]);    // one column before, two behind
+  EXPECT_EQ(padded.at(1, 0)[1], frame.at(0, 0)[1]);      // one column before, two behind
   EXPECT_EQ(padded.at(63, 47)[1], frame.at(60, 46)[1]);  // no row before, one behind
   EXPECT_EQ(padded.at(62, 46)[1], frame.at(60, 46)[1]);
   EXPECT_EQ(PadFrame(NoiseImage(16, 8, 1)).pixels, NoiseImage(16, 8, 1).pixels);
@@ -132,13 +132,12 @@ TEST(WarpedRows, FlickerCountsAndDarknessIsRewarded) {
     dark.push_back(flickering.back());
     for (float& v : dark.back().pixels) v *= 0.25f;
   }
-  const ConsistencyReport report = EvaluateConsistency(
-      Frames(source),
-      {{"source", Frames(source)},
-       {"styled", Frames(steady)},
-       {"flickering", Frames(flickering)},
-       {"dark", Frames(dark)}},
-      Options("dis-medium"));
+  const ConsistencyReport report = EvaluateConsistency(Frames(source),
+                                                       {{"source", Frames(source)},
+                                                        {"styled", Frames(steady)},
+                                                        {"flickering", Frames(flickering)},
+                                                        {"dark", Frames(dark)}},
+                                                       Options("dis-medium"));
   ASSERT_EQ(report.warped.size(), 4u);
   EXPECT_TRUE(report.rows.empty() && report.pairs.empty());
   EXPECT_EQ(report.warped_pairs.size(), 4u * 3);

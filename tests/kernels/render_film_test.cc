@@ -81,8 +81,8 @@ TEST(FilmFrame, WithoutToleranceItIsTheExactFrame) {
 
 TEST(FilmFrame, SizesAndThreads) {
   const FastGrid grid = MakeFastGrid(Smooth(9));
-  for (const auto& [width, height] : std::vector<std::pair<int, int>>{
-           {1, 1}, {2, 2}, {3, 5}, {7, 4}, {33, 31}, {64, 65}}) {
+  for (const auto& [width, height] :
+       std::vector<std::pair<int, int>>{{1, 1}, {2, 2}, {3, 5}, {7, 4}, {33, 31}, {64, 65}}) {
     const Camera camera = CameraOf(width, height);
     omp_set_num_threads(1);
     const FilmFrame one = RenderFilmFrame(grid, grid, camera, kMarch, 0.01f);

@@ -75,8 +75,9 @@ TEST(Study, AnswersAreCountedOncePerParticipant) {
   WriteText(folder / "1.json", Answers("1", a + "," + a + "," + a));
   WriteText(folder / "2.json",
             Answers("2", a + R"(, {"shown": [0, 1], "chosen": 1})"));  // not finished
-  WriteText(folder / "3.json",
-            Answers("3", a + R"(, {"shown": [0, 1], "chosen": 1, "check": true, "passed": false})"));
+  WriteText(
+      folder / "3.json",
+      Answers("3", a + R"(, {"shown": [0, 1], "chosen": 1, "check": true, "passed": false})"));
   const StudyAnswers answers =
       ReadStudyAnswers({folder / "1.json", folder / "2.json", folder / "3.json"});
   EXPECT_EQ(answers.participants.size(), 2u);

@@ -84,8 +84,8 @@ class FilmFrameRenderer {
       for (int y = y0; y < std::min(y0 + kTile, height_); ++y)
         for (int x = x0; x < std::min(x0 + kTile, width_); ++x) {
           if (!is_of_set(x, y)) continue;
-          const size_t pixel = static_cast<size_t>(y) * static_cast<size_t>(width_) +
-                               static_cast<size_t>(x);
+          const size_t pixel =
+              static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x);
           rays_[pixel] = camera_.PixelRay(x, y);
           if (neighbours != nullptr && IsInside(x, y, neighbours->reach) &&
               Interpolate(pixel, *neighbours))
