@@ -51,10 +51,10 @@ class Fitter {
         options_(AdaptOptions(options, ConditionsOf(views, backend))),
         hooks_(hooks),
         sums_each_step_(backend == Backend::kCpu) {
-    REGRADE_CHECK_EQ(options.resolutions.size(), options.steps.size());
-    for (size_t s = 0; s < options.steps.size(); ++s) {
-      total_steps_ += options.steps[s];
-      total_work_ += options.steps[s] * WorkOfStep(static_cast<int>(s));
+    REGRADE_CHECK_EQ(options_.resolutions.size(), options_.steps.size());
+    for (size_t s = 0; s < options_.steps.size(); ++s) {
+      total_steps_ += options_.steps[s];
+      total_work_ += options_.steps[s] * WorkOfStep(static_cast<int>(s));
     }
     if (backend == Backend::kCuda)
       engine_ = MakeCudaFitEngine(&rays_, options.seed, options.exact_sums);

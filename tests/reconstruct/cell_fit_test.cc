@@ -60,6 +60,14 @@ TEST_F(CellFit, ReproducesAHeldOutViewWithFineCellsAtTheSurface) {
   EXPECT_LT(far_out, finest / 10);
 }
 
+// Rates end with the last step that is taken, so a stage that is left out leaves no trace.
+TEST_F(CellFit, AStageThatIsLeftOutChangesNothing) {
+  const FitResult without = Fit();
+  options_.resolutions.push_back(2048);
+  options_.steps.push_back(400);
+  EXPECT_TRUE(SameBits(Fit().field, without.field));
+}
+
 TEST_F(CellFit, SameBytesForAnyThreadCount) {
   EXPECT_TRUE(
       testing::RecordSameBits("1 and 3 threads", testing::Computed::kFloat,
