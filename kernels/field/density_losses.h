@@ -18,8 +18,7 @@
 
 namespace regrade {
 
-// Weights of a ray's losses, 0 if off: lambda / Q of EQ(beta-loss), lambda of
-// EQ(sparsity-loss).
+// Weights of a ray's losses, 0 if off: lambda / Q of the first, lambda of the second.
 struct DensityLosses {
   float beta = 0;
   float sparsity = 0;

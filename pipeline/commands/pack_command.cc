@@ -11,6 +11,7 @@
 #include "pipeline/images/cube_file.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/run/paper_config.h"
+#include "pipeline/run/paper_traits.h"
 #include "pipeline/run/run_settings.h"
 #include "stylize/image/view_stylizer.h"
 

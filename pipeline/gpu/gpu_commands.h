@@ -1,4 +1,4 @@
-// What regrade_gpu can do on a machine with nothing but a CUDA driver.
+// What regrade_gpu can do on a machine without COLMAP, OpenCV and picture formats.
 #pragma once
 
 #include <string>

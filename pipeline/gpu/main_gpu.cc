@@ -13,7 +13,8 @@ namespace {
 
 constexpr char kUsage[] =
     "regrade_gpu " REGRADE_VERSION
-    ": regrade on a machine with nothing but a CUDA driver\n\n"
+    ": regrade on a machine with a CUDA driver and the shared libraries that it is linked to\n"
+    "(libzip, Boost, libgomp and theirs); no COLMAP, no OpenCV, no picture formats\n\n"
     "usage: regrade_gpu device                       prints the card's name and memory\n"
     "       regrade_gpu fit --capture FILE [OPTIONS]   fits a field to a file of `regrade "
     "pack`\n"

@@ -4,8 +4,6 @@
 #include <iterator>
 
 #include "kernels/base/error.h"
-#include "pipeline/capture/scene_profile.h"
-#include "reconstruct/scene/forward_facing.h"
 
 namespace regrade {
 namespace {
@@ -166,10 +164,6 @@ JsonValue PaperValues(const std::string& name) {
   RunSettings settings;
   UsePaperConfig(name, &settings);
   return DecidedValues(settings);
-}
-
-PaperTraits TraitsOf(const Capture& capture) {
-  return {ShowsThroughPhotos(capture), MeasureForwardFacing(capture).on};
 }
 
 PaperChoice ChoosePaperConfig(const std::string& asked, const PaperTraits& traits) {

@@ -21,11 +21,10 @@ void UsePaperConfig(const std::string& name, RunSettings* settings);
 JsonValue DecidedValues(const RunSettings& settings);
 JsonValue PaperValues(const std::string& name);
 
-// What the choice depends on.
+// What the choice depends on; see paper_traits.h.
 struct PaperTraits {
   bool transparent = false, forward_facing = false;
 };
-PaperTraits TraitsOf(const Capture& capture);
 
 struct PaperChoice {
   std::string name, reason;

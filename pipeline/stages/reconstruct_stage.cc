@@ -21,6 +21,7 @@
 #include "pipeline/program/memory.h"
 #include "pipeline/report/stage_metrics.h"
 #include "pipeline/run/paper_config.h"
+#include "pipeline/run/paper_traits.h"
 #include "pipeline/run/plan.h"
 #include "pipeline/run/run_context.h"
 #include "pipeline/stages/photo_metrics.h"

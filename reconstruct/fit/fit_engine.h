@@ -23,7 +23,7 @@ struct FitStep {
   int patch = 1;
   MarchOptions march;
   RmspropOptions optimizer;
-  // Weights of EQ(beta-loss), before the division by the rays, and of EQ(sparsity-loss).
+  // The lambdas of density_losses.h, before the division by the rays.
   DensityLosses losses;
   // See EQ(free-space), of an adaptive field: rays drawn, and the weight of their mean opacity.
   int free_rays = 0;
