@@ -30,12 +30,13 @@ void ForRandomPairs(const LipschitzNetwork& network, int pairs, const Body& body
 
 inline double SteepestPair(const LipschitzNetwork& network, int pairs) {
   double steepest = 0;
-  ForRandomPairs(network, pairs, [&](const double*, const double*, const double* fx,
-                                     const double* fy, double distance) {
-    double change = 0;
-    for (int k = 0; k < kNetworkSh; ++k) change += (fx[k] - fy[k]) * (fx[k] - fy[k]);
-    steepest = std::max(steepest, std::sqrt(change) / distance);
-  });
+  ForRandomPairs(
+      network, pairs,
+      [&](const double*, const double*, const double* fx, const double* fy, double distance) {
+        double change = 0;
+        for (int k = 0; k < kNetworkSh; ++k) change += (fx[k] - fy[k]) * (fx[k] - fy[k]);
+        steepest = std::max(steepest, std::sqrt(change) / distance);
+      });
   return steepest;
 }
 
