@@ -2,7 +2,6 @@
 #include <cstdlib>
 
 #include "tests/support/floating_point_traps.h"
-#include "tests/support/record_error.h"
 #include "tests/support/steepest_pair.h"
 #include "tests/support/styled_ball.h"
 
@@ -28,9 +27,7 @@ TEST(TrainNetwork, H36_NoPairIsSteeperThanTheBoundOfWhatWasLearned) {
     const TrainNetworkResult result =
         TrainNetwork(ball.field, ball.views, map, {}, options, {});
     const double fraction = SteepestPair(result.network, pairs) / result.network.Bound();
-    EXPECT_LE(fraction, testing::RecordBound("steepest of 20 000 pairs over a learned bound",
-                                             testing::Computed::kDouble, fraction, 1))
-        << recipe;
+    EXPECT_LE(fraction, 1) << recipe;
     EXPECT_GT(fraction, 0.1) << recipe;  // the attack is not idle
   }
 }
