@@ -60,12 +60,14 @@ JsonValue FieldValues(const std::string& field) {
   return set;
 }
 
-// Writes those of the values that the set has.
+// Writes those of the values that the set has. Without --preset an option `effects` is not that
+// of a run: `regrade synth` has its own.
 void ApplyKnown(const JsonValue& values, const std::string& where, OptionSet* options) {
   const JsonValue known = options->Values();
+  const bool run = known.Find("preset") != nullptr;
   JsonValue kept = JsonValue::Object();
   for (const auto& [name, value] : values.AsObject())
-    if (known.Find(name) != nullptr) kept[name] = value;
+    if (known.Find(name) != nullptr && (run || name != "effects")) kept[name] = value;
   options->ApplyConfig(kept, where);
 }
 
