@@ -244,8 +244,8 @@ class Fitter {
     if (options_.adaptive()) {
       const float width = static_cast<float>(options_.resolutions[0]);
       engine_->RefineCells({options_.step, options_.stop_transmittance},
-                           {options_.prune_weight / width, options_.cell_pixels,
-                            last ? 0 : Levels().outward + stage_,
+                           {options_.prune_weight / width, Levels().outward,
+                            options_.cell_pixels, last ? 0 : Levels().outward + stage_,
                             static_cast<int64_t>(double{options_.max_cells} * 1e6)});
       if (engine_->num_voxels() == 0) ThrowEmpty();
       return;

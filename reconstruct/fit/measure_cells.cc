@@ -110,7 +110,9 @@ std::vector<CellChange> ChooseChanges(const Buffer<uint8_t>& level,
   std::vector<int64_t> candidates;
   int64_t kept = 0;
   for (int64_t c = 0; c < n; ++c) {
-    if (!(statistics.weight[c] >= limits.least_weight)) continue;
+    const float least =
+        std::ldexp(limits.least_weight, std::min(0, limits.first_level - level[c]));
+    if (!(statistics.weight[c] >= least)) continue;
     ++kept;
     change[static_cast<size_t>(c)] = CellChange::kKeep;
     if (level[c] < limits.deepest && statistics.pixels[c] > limits.least_pixels)

@@ -18,7 +18,10 @@ CellStatistics MeasureCells(const FastGrid& grid, const TrainingRays& rays,
                             const MarchOptions& march, int stride);
 
 struct CellLimits {
-  float least_weight = 0;  // cells of less in every photo are removed
+  // Cells of less weight in every photo are removed: this much for a cell of first_level or a
+  // coarser one, and half as much for each finer level, as fog gives a cell half as wide.
+  float least_weight = 0;
+  int first_level = 0;
   float least_pixels = 1;  // cells narrower than this are not split
   int deepest = 0;         // the finest level of this stage
   int64_t most_cells = 0;  // after the change; 0: no limit

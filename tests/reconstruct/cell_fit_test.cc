@@ -171,6 +171,24 @@ TEST(ChooseChanges, H167_TheLimitOfCellsHoldsAndTheLargestErrorsAreSplit) {
   EXPECT_GT(std::count(unlimited.begin(), unlimited.end(), CellChange::kSplit), split);
 }
 
+// Half the weight keeps a cell half as wide; wider ones than those of the first level need no
+// more.
+TEST(ChooseChanges, TheLeastWeightFallsWithACellsWidth) {
+  const std::vector<float> kept_from{0.1f, 0.1f, 0.05f, 0.025f};  // by level
+  const int64_t n = std::ssize(kept_from);
+  Buffer<uint8_t> level(2 * n);
+  CellStatistics statistics{Buffer<float>(2 * n), Buffer<float>(2 * n),
+                            Buffer<uint64_t>(2 * n)};
+  for (int64_t c = 0; c < 2 * n; ++c) {
+    level[c] = static_cast<uint8_t>(c % n);
+    statistics.weight[c] = kept_from[static_cast<size_t>(c % n)] * (c < n ? 1.0f : 0.99f);
+  }
+  const auto change =
+      ChooseChanges(level, statistics, {.least_weight = 0.1f, .first_level = 1, .deepest = 3});
+  for (int64_t c = 0; c < 2 * n; ++c)
+    EXPECT_EQ(change[static_cast<size_t>(c)], c < n ? CellChange::kKeep : CellChange::kRemove);
+}
+
 // A pixel of a camera 2 units away with a focal length of 100 pixels is 0.02 units wide there.
 TEST(WidthInPixels, IsTheCellsWidthOverThePixels) {
   const GridFrame frame{{100, 100, 100}, {0, 0, 0}, {1, 1, 1}};  // voxels of 0.02
