@@ -1,0 +1,144 @@
+#!/usr/bin/env python3
+"""Writes the tables of a benchmark from the reports of its runs.
+
+  make_table.py WORK [SCENE=ROLE...]
+
+Reads WORK/runs/SCENE/STYLE/METHOD/SEED/styles/style/report.json and WORK/foreign/...; writes WORK/table.csv with every run, and
+WORK/table.md and table.tex with means over styles and seeds, each with the standard deviation between seeds. ROLE says whether
+settings were chosen on the scene. Exit status: 0, or 1 without a finished run.
+"""
+
+import csv
+import json
+import os
+import statistics
+import sys
+
+COLUMNS = ["scene", "style", "method", "seed", "motion", "heldout_db", "heldout_ssim", "short_db", "long_db", "to_2d_db", "linear_map_db",
+           "hue_spread", "chroma", "structure", "distance_to_style", "k_est", "bound", "local_lipschitz_sampled", "seconds"]
+SHOWN = [("short_db", "TC short", 2), ("long_db", "TC long", 2), ("to_2d_db", "to 2D", 2), ("linear_map_db", "linear map to 2D", 2),
+         ("hue_spread", "hue spread", 3), ("structure", "structure", 3), ("seconds", "s", 1)]
+
+
+def folders(folder):
+    return sorted(os.listdir(folder)) if os.path.isdir(folder) else []
+
+
+def reports(work, kind):
+    """(scene, style, method, seed, report) of every finished job."""
+    for scene in folders(os.path.join(work, kind)):
+        for style in folders(os.path.join(work, kind, scene)):
+            for method in folders(os.path.join(work, kind, scene, style)):
+                for seed in folders(os.path.join(work, kind, scene, style, method)):
+                    file = os.path.join(work, kind, scene, style, method, seed,
+                                        "styles/style/report.json" if kind == "runs" else "report.json")
+                    if seed.isdigit() and os.path.exists(file):
+                        with open(file) as stream:
+                            yield scene, style, method, int(seed), json.load(stream)
+
+
+def rows_of(scene, style, method, seed, report):
+    """A row for each sequence of frames: the renders, the 2D method on them, the restyled field."""
+    foreign = "stages" not in report
+    names = {} if foreign else {"source": "no style", "views_2d": method, "styled": method + " w/ Lip"}
+    tc = {(c["sequence"], c["gap"]): c["tc_psnr_mean_db"] for c in report["consistency"]}
+    gaps = sorted({gap for _, gap in tc})
+    stages = report.get("stages", {})
+    stylize, evaluate, fit = (stages.get(stage, {}) for stage in ("stylize", "evaluate", "reconstruct"))
+    for sequence in dict.fromkeys(c["sequence"] for c in report["consistency"]):
+        if sequence.startswith("path_") or (foreign and sequence == "source"):
+            continue
+        near = next((f for f in report.get("fidelity", []) if f["sequence"] == sequence), {})
+        row = {"scene": scene, "style": style, "method": names.get(sequence, method), "seed": seed,
+               "motion": report.get("mask") or evaluate.get("mask"),
+               "short_db": tc.get((sequence, gaps[0])), "long_db": tc.get((sequence, gaps[-1])),
+               "structure": near.get("structure"), "distance_to_style": near.get("sliced_wasserstein_to_style")}
+        if sequence == "source":
+            row.update({"heldout_db": fit.get("psnr_heldout_db"), "heldout_ssim": fit.get("ssim_heldout")})
+        if sequence == "styled":
+            row.update({"to_2d_db": near.get("psnr_to_2d_db"), "linear_map_db": evaluate.get("linear_map_psnr_to_2d_db"),
+                        **{key: stylize.get(key) for key in ("k_est", "bound", "local_lipschitz_sampled", "seconds")}})
+        if sequence != "source" and near.get("hue_std_2d"):
+            row["hue_spread"] = near["hue_std"] / near["hue_std_2d"]
+            row["chroma"] = near["chroma"] / near["chroma_2d"]
+        yield row
+
+
+def mean_and_spread(rows, key):
+    """The mean over all rows, and the standard deviation between the means of each seed; None where there is no value."""
+    of_seed = {}
+    for row in rows:
+        if row.get(key) is not None:
+            of_seed.setdefault(row["seed"], []).append(row[key])
+    if not of_seed:
+        return None, None
+    means = [statistics.fmean(values) for values in of_seed.values()]
+    return statistics.fmean(means), statistics.stdev(means) if len(means) > 1 else None
+
+
+def text(value, spread, digits):
+    if value is None:
+        return "--"
+    return f"{value:.{digits}f}" + (f" ± {spread:.{digits}f}" if spread is not None else "")
+
+
+def table(rows, roles):
+    """Lines of cells: scene, role, method, motion, the metrics of SHOWN."""
+    lines = []
+    for scene in dict.fromkeys(row["scene"] for row in rows):
+        of_scene = [row for row in rows if row["scene"] == scene]
+        for method in dict.fromkeys(row["method"] for row in of_scene):
+            some = [row for row in of_scene if row["method"] == method]
+            lines.append([scene, roles.get(scene) or "--", method] +
+                         [" / ".join(sorted({row["motion"] or "--" for row in some}))] +
+                     [text(*mean_and_spread(some, key), digits) for key, _, digits in SHOWN])
+    return lines
+
+
+def fits(rows):
+    """Lines of cells: scene, held-out PSNR and SSIM."""
+    return [[scene] + [text(*mean_and_spread([r for r in rows if r["scene"] == scene], key), digits)
+                       for key, digits in (("heldout_db", 2), ("heldout_ssim", 3))]
+            for scene in dict.fromkeys(row["scene"] for row in rows)]
+
+
+def markdown(head, lines):
+    return "\n".join("| " + " | ".join(cells) + " |" for cells in [head, ["---"] * len(head)] + lines) + "\n"
+
+
+def latex(head, lines):
+    cell = lambda value: value.replace("_", r"\_").replace("±", r"$\pm$")
+    body = [" & ".join(cell(value) for value in cells) + r" \\" for cells in lines]
+    return "\n".join([r"\begin{tabular}{llll" + "r" * len(SHOWN) + "}", r"\toprule", " & ".join(head) + r" \\", r"\midrule"] +
+                     body + [r"\bottomrule", r"\end{tabular}", ""])
+
+
+def main():
+    if len(sys.argv) < 2 or sys.argv[1] == "--help" or not all("=" in word for word in sys.argv[2:]):
+        print(__doc__)
+        return 0 if "--help" in sys.argv else 2
+    work, roles = sys.argv[1], dict(word.split("=", 1) for word in sys.argv[2:])
+    rows, seen = [], set()
+    for kind in ("runs", "foreign"):
+        for found in reports(work, kind):
+            for row in rows_of(*found):
+                key = tuple(row[name] for name in ("scene", "style", "method", "seed"))
+                if key not in seen:  # the renders without style are the same for every method
+                    seen.add(key)
+                    rows.append(row)
+    if not rows:
+        sys.exit(f"{work}/runs: no report.json of a finished run (did the jobs fail? see {work}/logs)")
+    with open(os.path.join(work, "table.csv"), "w", newline="") as file:
+        writer = csv.DictWriter(file, COLUMNS)
+        writer.writeheader()
+        writer.writerows(rows)
+    head, lines = ["scene", "settings", "method", "motion"] + [name for _, name, _ in SHOWN], table(rows, roles)
+    with open(os.path.join(work, "table.md"), "w") as file:
+        file.write(markdown(["scene", "held-out PSNR", "SSIM"], fits(rows)) + "\n" + markdown(head, lines))
+    with open(os.path.join(work, "table.tex"), "w") as file:
+        file.write(latex(head, lines))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
