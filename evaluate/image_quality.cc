@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include "kernels/base/error.h"
 #include "kernels/image/row_sum.h"
@@ -72,10 +73,31 @@ double Grey(const Image& image, int x, int y) {
   return sum / ColourChannels(image);
 }
 
-double GradientMagnitude(const Image& image, int x, int y) {
-  const double here = Grey(image, x, y);
-  return std::hypot(Grey(image, x + 1, y) - here, Grey(image, x, y + 1) - here);
-}
+// The gradient's length at each pixel but those of the last row and column, row by row; their
+// mean.
+struct Gradients {
+  std::vector<double> length;
+  std::optional<double> mean;
+
+  explicit Gradients(const Image& image)
+      : length(static_cast<size_t>(image.width - 1) * static_cast<size_t>(image.height - 1)) {
+    const auto sums = SumOverRows(image.height - 1, [&](int y) {
+      Mean row;
+      double* out =
+          length.data() + static_cast<size_t>(y) * static_cast<size_t>(image.width - 1);
+      double here = Grey(image, 0, y);
+      for (int x = 0; x + 1 < image.width; ++x) {
+        const double right = Grey(image, x + 1, y);
+        const double dx = right - here, dy = Grey(image, x, y + 1) - here;
+        out[x] = std::sqrt(dx * dx + dy * dy);
+        row.Add(out[x]);
+        here = right;
+      }
+      return row;
+    });
+    mean = sums.Value();
+  }
+};
 
 struct Covariance {
   double aa = 0, bb = 0, ab = 0;
@@ -145,21 +167,14 @@ std::optional<double> GradientCorrelation(const Image& a, const Image& b) {
   CheckSameKind(a, b);
   if (a.width < 2 || a.height < 2) return std::nullopt;
   // Two passes: the one-pass variance cancels.
-  const auto mean_over_pixels = [&](const Image& image) {
-    return SumOverRows(a.height - 1, [&](int y) {
-      Mean row;
-      for (int x = 0; x + 1 < a.width; ++x) row.Add(GradientMagnitude(image, x, y));
-      return row;
-    });
-  };
-  const std::optional<double> mean_a = mean_over_pixels(a).Value();
-  const std::optional<double> mean_b = mean_over_pixels(b).Value();
-  if (!mean_a || !mean_b) return std::nullopt;
+  const Gradients of_a(a), of_b(b);
+  if (!of_a.mean || !of_b.mean) return std::nullopt;
+  const size_t width = static_cast<size_t>(a.width - 1);
   const Covariance sum = SumOverRows(a.height - 1, [&](int y) {
     Covariance row;
-    for (int x = 0; x + 1 < a.width; ++x) {
-      const double da = GradientMagnitude(a, x, y) - *mean_a;
-      const double db = GradientMagnitude(b, x, y) - *mean_b;
+    for (size_t i = static_cast<size_t>(y) * width; i < static_cast<size_t>(y + 1) * width;
+         ++i) {
+      const double da = of_a.length[i] - *of_a.mean, db = of_b.length[i] - *of_b.mean;
       if (std::isfinite(da) && std::isfinite(db)) row += {da * da, db * db, da * db};
     }
     return row;

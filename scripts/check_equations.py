@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Checks that each equation is stated once in the sources, has one row in EQUATIONS.md, and a test that exists.
+"""Checks that each equation is stated once in the sources, has one row in EQUATIONS.md, and a test that exists; and that
+each numbered item of the paper has one row there, with a place that exists or the reason why it has none.
 
   check_equations.py [--root DIR]   checks the tree; one line for each finding
 
@@ -16,6 +17,9 @@ from tree_files import parser_of, read
 MODULES = ("kernels", "reconstruct", "stylize", "evaluate", "pipeline")
 TAG = re.compile(r"(?<![A-Za-z0-9_])EQ\(([a-z][a-z0-9-]*)\)")
 TEST = re.compile(r"\bTEST(?:_F|_P)?\(\s*(\w+)\s*,\s*(\w+)\s*\)|\bTYPED_TEST(?:_P)?\(\s*(\w+)\s*,\s*(\w+)\s*\)")
+PAPER_HEADING = "## LipRF, item by item"
+PAPER_ITEMS = ([f"eq. {n}" for n in range(1, 16)] + [f"proposition {n}" for n in (1, 2, 3)] + ["lemma 1", "lemma 2"]
+               + [f"algorithm 1, step {n}" for n in range(4)] + ["table 1"] + [f"figure {n}" for n in range(1, 9)])
 TABLE_COLUMNS = 5  # tag, equation, source, file, tests
 
 
@@ -66,6 +70,28 @@ def table_rows(root):
     return rows
 
 
+def check_paper(root, tags, tests):
+    """Findings about the table of the paper's items."""
+    section = read(root, "EQUATIONS.md").partition(PAPER_HEADING)[2].partition("\n## ")[0]
+    rows = re.findall(r"^\| (?!item |-)([^|]+) \| (.*) \|$", section, re.M)
+    findings = []
+    for item in PAPER_ITEMS:
+        count = sum(name == item for name, _ in rows)
+        if count != 1:
+            findings.append(f"EQUATIONS.md: {item} of the paper has {count} rows")
+    for name, place in rows:
+        if name not in PAPER_ITEMS:
+            findings.append(f"EQUATIONS.md: the paper has no {name}")
+        words = re.findall(r"`([^`]+)`", place)
+        if not words and not place.startswith("not here: "):
+            findings.append(f"EQUATIONS.md: {name} names neither a place nor a reason")
+        for word in words:
+            if not (word in tags or word in tests or word.startswith(("--", "regrade "))
+                    or os.path.exists(os.path.join(root, word))):
+                findings.append(f"EQUATIONS.md: {name}: there is no {word}")
+    return findings
+
+
 def check_tree(root):
     homes, references = homes_and_references(root)
     tests = test_names(root)
@@ -85,6 +111,7 @@ def check_tree(root):
         if tag not in homes:
             findings.append(f"{places[0][0]}:{places[0][1]}: EQ({tag}) is not stated")
 
+    findings += check_paper(root, homes, tests)
     seen = set()
     for number, tag, path, row_tests in rows:
         where = f"EQUATIONS.md:{number}: {tag}"

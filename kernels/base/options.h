@@ -26,6 +26,7 @@ struct OptionInfo {
   double max = std::numeric_limits<double>::infinity();
   // For strings: "a|b|c"; "|a|b|c" allows an empty text, too, and "" anything.
   const char* choices = "";
+  bool may_be_empty = false;  // of a list of numbers
 };
 
 }  // namespace regrade

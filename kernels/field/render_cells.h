@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "kernels/field/cell_walk.h"
+#include "kernels/field/density_losses.h"
 #include "kernels/field/radiance_field.h"
 #include "kernels/field/spherical_harmonics.h"
 #include "kernels/field/trilinear.h"
@@ -106,7 +107,11 @@ Vec3<T> ShadeCells(const FieldView<T>& field, const RayT<T>& ray,
 template <typename T, typename Add>
 void ShadeCellsAdjoint(const FieldView<T>& field, const RayT<T>& ray,
                        const std::vector<CompositedCell<T>>& samples, Vec3<T> behind,
-                       const Vec3<T>& d_color, T* d_density, T* d_sh, const Add& add) {
+                       const Vec3<T>& d_color, T* d_density, T* d_sh, const Add& add,
+                       const DensityLosses& losses = {}) {
+  const T remaining = samples.empty()
+                          ? T(1)
+                          : samples.back().transmittance_before * std::exp(-samples.back().tau);
   T gamma[kMaxBasis];
   ShBasis(field.basis, ray.direction, gamma);
   const int stride = 3 * field.basis;
@@ -116,7 +121,8 @@ void ShadeCellsAdjoint(const FieldView<T>& field, const RayT<T>& ray,
     const Vec3<T> raw = RawColorInCell(field, s.place, gamma);
     const T w = s.transmittance_before * Opacity(s.tau);
     T d_sigma = CompositeAdjoint(delta, s.tau, s.transmittance_before * std::exp(-s.tau),
-                                 ClampedColor(raw), d_color, &behind);
+                                 ClampedColor(raw), d_color, &behind) +
+                DensityLossSlope(losses, remaining, s.density, delta);
     if (!(s.density < T(kMaxDensity)) || !(s.density * delta < T(kMaxOpticalDepth)))
       d_sigma = 0;
     T d_sample[3 * kMaxBasis];

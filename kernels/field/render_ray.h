@@ -10,6 +10,7 @@
 #include <cmath>
 
 #include "kernels/field/background_spheres.h"
+#include "kernels/field/density_losses.h"
 #include "kernels/field/radiance_field.h"
 #include "kernels/field/ray_march.h"
 #include "kernels/field/render_cells.h"
@@ -107,7 +108,7 @@ template <typename T, typename Add>
 void RenderCellRayAdjoint(const FieldView<T>& field, const RayT<T>& ray,
                           const MarchOptions& options, const RayResult<T>& result,
                           const Vec3<T>& d_color, T* d_density, T* d_sh, const Add& add,
-                          T* d_sphere_density, T* d_sphere_color) {
+                          T* d_sphere_density, T* d_sphere_color, const DensityLosses& losses) {
   std::vector<CompositedCell<T>> samples;
   MarchCells(field.frame, field.cells, field.density, ray, field.near_clip,
              T(options.stop_transmittance), &samples);
@@ -116,21 +117,23 @@ void RenderCellRayAdjoint(const FieldView<T>& field, const RayT<T>& ray,
     CompositeSpheresAdjoint(field.frame, field.spheres, ray, result.spheres,
                             result.optical_depth, d_color, &behind, d_sphere_density,
                             d_sphere_color, add);
-  ShadeCellsAdjoint(field, ray, samples, behind, d_color, d_density, d_sh, add);
+  ShadeCellsAdjoint(field, ray, samples, behind, d_color, d_density, d_sh, add, losses);
 }
 
 // Adds dL/d(density), dL/d(sh) for dL/dC = d_color to the gradients, which have the field's
-// shapes; the sphere gradients may be null for a field without layers. `result` is RenderRay's
-// of the same arguments. `Add(pointer, value)` is a plain or an atomic +=.
+// shapes, and that of the losses of densities; the sphere gradients may be null for a field
+// without layers. `result` is RenderRay's of the same arguments. `Add(pointer, value)` is a
+// plain or an atomic +=.
 template <typename T, typename Add>
 HD void RenderRayAdjoint(const FieldView<T>& field, const RayT<T>& ray,
                          const MarchOptions& options, const RayResult<T>& result,
                          const Vec3<T>& d_color, T* d_density, T* d_sh, const Add& add,
-                         T* d_sphere_density = nullptr, T* d_sphere_color = nullptr) {
+                         T* d_sphere_density = nullptr, T* d_sphere_color = nullptr,
+                         const DensityLosses& losses = {}) {
   using std::exp;
   if (field.cells.top != nullptr) {
     RenderCellRayAdjoint(field, ray, options, result, d_color, d_density, d_sh, add,
-                         d_sphere_density, d_sphere_color);
+                         d_sphere_density, d_sphere_color, losses);
     return;
   }
   const GridRay<T> march =
@@ -156,7 +159,8 @@ HD void RenderRayAdjoint(const FieldView<T>& field, const RayT<T>& ray,
     const Vec3<T> color = SampleColor(field, cell, gamma, &raw);
     const T transmittance_after = exp(-depth_after);
     const T w = exp(-(depth_after - tau)) * Opacity(tau);
-    T d_sigma = CompositeAdjoint(delta, tau, transmittance_after, color, d_color, &behind);
+    T d_sigma = CompositeAdjoint(delta, tau, transmittance_after, color, d_color, &behind) +
+                DensityLossSlope(losses, exp(-result.optical_depth), density, delta);
     if (!(density < T(kMaxDensity)) || !(density * delta < T(kMaxOpticalDepth))) d_sigma = 0;
     T d_sample[3 * kMaxBasis];
     for (int c = 0; c < 3; ++c)

@@ -61,7 +61,7 @@ void HueChroma::Add(const Image& image, const Image* mask) {
       }
       row.sum_a_ += lab.y;
       row.sum_b_ += lab.z;
-      row.sum_chroma_ += std::hypot(lab.y, lab.z);
+      row.sum_chroma_ += std::sqrt(lab.y * lab.y + lab.z * lab.z);
       ++row.count_;
     }
     return row;

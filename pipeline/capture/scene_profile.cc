@@ -141,7 +141,8 @@ std::map<std::string, bool> ParseEffects(const std::string& text) {
   return overrides;
 }
 
-SceneProfile ProfileScene(const Capture& capture, int sh_degree, const std::string& effects) {
+SceneProfile ProfileScene(const Capture& capture, int sh_degree, const std::string& effects,
+                          const BoxOptions& box) {
   const std::map<std::string, bool> overrides = ParseEffects(effects);
   const auto decided = [&overrides](const char* name, bool measured) {
     const auto override = overrides.find(name);
@@ -166,7 +167,7 @@ SceneProfile ProfileScene(const Capture& capture, int sh_degree, const std::stri
                                 "to their mean, degrees"));
   profile.effects.push_back(Row("alpha", alpha, clear, kAlphaFraction,
                                 "fraction of transparent pixels, if every photo has some"));
-  const Surroundings surroundings = MeasureSurroundings(capture);
+  const Surroundings surroundings = MeasureSurroundings(capture, box.camera_range);
   const bool background =
       decided("background", surroundings.far_fraction > kFarFraction && !ndc && !alpha);
   if (background && (ndc || alpha))
@@ -180,14 +181,19 @@ SceneProfile ProfileScene(const Capture& capture, int sh_degree, const std::stri
   profile.effects.push_back(Row(kViewDependence, sh_degree > 0, sh_degree, 0,
                                 "degree of the fit's spherical harmonics, as set"));
 
-  profile.scene = ndc          ? NormalizeForwardFacing(capture, forward)
-                  : background ? NormalizeSurrounded(capture, surroundings)
-                               : NormalizeScene(capture);
+  const bool cube = !ndc && box.camera_range > 0;
+  profile.scene = ndc                  ? NormalizeForwardFacing(capture, forward, box.margin)
+                  : background || cube ? NormalizeSurrounded(capture, surroundings)
+                                       : NormalizeScene(capture);
+  profile.scene.box.spheres = background;
   if (alpha && !silhouettes.empty()) {
-    if (!ndc) profile.scene = TightenToSilhouettes(profile.scene, silhouettes);
+    if (!ndc && !cube) profile.scene = TightenToSilhouettes(profile.scene, silhouettes);
     profile.scene.box.background =
         Vec3f{1, 1, 1};  // transparent photos are composited on white
   }
+  if (box.near_clip >= 0) profile.scene.box.near_clip = box.near_clip;
+  if (box.background >= 0)
+    profile.scene.box.background = Vec3f{box.background, box.background, box.background};
   ProfileExposure(capture, overrides, alpha, &profile);
   return profile;
 }

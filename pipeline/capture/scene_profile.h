@@ -9,6 +9,7 @@
 #include "pipeline/capture/photo_gains.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/workspace/metric.h"
+#include "reconstruct/scene/box_options.h"
 #include "reconstruct/scene/normalize_scene.h"
 
 namespace regrade {
@@ -46,7 +47,8 @@ bool ShowsThroughPhotos(const Capture& capture);
 
 // Independent of the photos' order (H154). Reads every photo, unless "exposure=off". Throws
 // Error(kScene) for a requested effect that the capture does not allow.
-SceneProfile ProfileScene(const Capture& capture, int sh_degree, const std::string& effects);
+SceneProfile ProfileScene(const Capture& capture, int sh_degree, const std::string& effects,
+                          const BoxOptions& box = {});
 
 // "distortion on: 12.3 > 0.5 (largest shift ...)"
 std::string EffectLine(const EffectReport& effect);

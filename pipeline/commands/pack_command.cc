@@ -10,6 +10,8 @@
 #include "pipeline/commands/command.h"
 #include "pipeline/images/cube_file.h"
 #include "pipeline/images/image_file.h"
+#include "pipeline/run/paper_config.h"
+#include "pipeline/run/paper_traits.h"
 #include "pipeline/run/run_settings.h"
 #include "stylize/image/view_stylizer.h"
 
@@ -48,12 +50,17 @@ void RunPack(const Command& command, const Arguments& arguments, Console* consol
   const std::string& folder = prepared->words[0];
   RequireValue(run.out, "--out", "name the .npz file to write");
   const Capture capture = ReadPosedCapture(folder);
+  if (run.preset == "paper") {
+    const PaperChoice choice = ChoosePaperConfig(run.paper_config, TraitsOf(capture));
+    ApplyPaperChoice(choice, &options);
+    console->Info("configuration of the paper: " + choice.name + ", " + choice.reason);
+  }
   const WorkingViews as_taken(capture, scene.photo_size, run.holdout);
   for (int i = 0; i < as_taken.count(); ++i)
     if (!as_taken.Mask(i).empty())
       throw InputError("was posed with --photo-masks, which a packed capture cannot hold",
                        folder, "pose it again without them");
-  const SceneProfile profile = ProfileScene(capture, 2, run.effects);
+  const SceneProfile profile = ProfileScene(capture, 2, run.effects, scene.box);
   for (const EffectReport& effect : profile.effects) console->Info(EffectLine(effect));
   for (const std::string& notice : profile.notices) console->Info(notice);
   PackedCapture packed;

@@ -11,8 +11,11 @@
 #include "kernels/image/detail_kept.h"
 #include "pipeline/capture/packed_capture.h"
 #include "pipeline/fields/field_file.h"
+#include "pipeline/fields/fit_checkpoint.h"
+#include "pipeline/files/atomic_file.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/gpu/gpu_commands.h"
+#include "pipeline/run/paper_config.h"
 #include "reconstruct/fit/fit_engine.h"
 #include "reconstruct/fit/fit_field.h"
 
@@ -54,12 +57,40 @@ HeldOut MeasureHeldOut(FitEngine* engine, const PackedCapture& capture,
   return {Mean(psnr), Mean(ssim), mean(kept), mean(error), Mean(transmittance)};
 }
 
+// The configuration of --preset paper, which sets the fit's options. What it decides of the
+// scene was decided by `regrade pack`.
+std::string ChoosePaper(const FitPackedOptions& settings, const PackedCapture& capture,
+                        OptionSet* bound) {
+  const SceneBox& box = capture.scene.box;
+  const bool llff = capture.scene.ndc.on(), syn = !llff && !box.spheres && box.background;
+  if (!llff && !syn && !box.spheres)
+    throw UsageError("was packed without --preset paper", settings.capture,
+                     "pack it with --preset paper and the same --paper-config");
+  const PaperChoice choice = ChoosePaperConfig(settings.paper_config, {syn, llff});
+  ApplyPaperChoice(choice, bound);
+  CheckPaper(settings.preset, settings.paper_config,
+             bound->Values().At("fit-field").AsString());
+  return choice.name;
+}
+
+std::optional<FitState> ReadFitCheckpoint(const std::string& path) {
+  if (!std::filesystem::is_regular_file(path)) return std::nullopt;
+  constexpr uint64_t kMost = uint64_t{1} << 36;
+  std::optional<FitState> state = UnpackFitState(ReadWholeFile(path, kMost));
+  if (!state) throw InputError("is no checkpoint of a fit", path, "remove it");
+  return state;
+}
+
 }  // namespace
 
-void FitPacked(const FitPackedOptions& settings, FitOptions options) {
+void FitPacked(const FitPackedOptions& settings, const FitOptions& fit_options,
+               OptionSet* bound) {
   const double start = ClockSeconds();
-  options.seed = settings.seed;
   const PackedCapture capture = ReadPackedCapture(settings.capture);
+  std::string paper;
+  if (settings.preset == "paper") paper = ChoosePaper(settings, capture, bound);
+  FitOptions options = fit_options;
+  options.seed = settings.seed;
   std::vector<TrainingView> views;
   for (const PackedView& view : capture.views)
     if (!view.held_out) views.push_back({view.camera, &view.photo, view.points});
@@ -67,6 +98,14 @@ void FitPacked(const FitPackedOptions& settings, FitOptions options) {
   const double fit_start = ClockSeconds();
   const Backend backend = settings.device == "cpu" ? Backend::kCpu : Backend::kCuda;
   FitHooks hooks;
+  std::optional<FitState> resume;
+  if (!settings.checkpoint.empty()) {
+    resume = ReadFitCheckpoint(settings.checkpoint);
+    hooks.checkpoint = [&](const FitState& state) {
+      WriteFileAtomically(settings.checkpoint, PackFitState(state).Pieces());
+    };
+  }
+  if (resume) hooks.resume = &*resume;
   double last_note = 0;
   hooks.progress = [&](const Progress& progress) {
     if (ClockSeconds() - fit_start - last_note > 5) {
@@ -74,7 +113,9 @@ void FitPacked(const FitPackedOptions& settings, FitOptions options) {
       std::fprintf(stderr, "%3.0f %%  %.0f s  %s\n", 100 * progress.done / progress.total,
                    last_note, progress.note.c_str());
     }
-    return LoopControl::kContinue;
+    return settings.stop_after > 0 && ClockSeconds() - start > settings.stop_after
+               ? LoopControl::kStop
+               : LoopControl::kContinue;
   };
   HeldOut measured;
   JsonValue::Array stages;
@@ -100,10 +141,16 @@ void FitPacked(const FitPackedOptions& settings, FitOptions options) {
   JsonValue::Array curve;
   for (size_t i = 0; i < fit.curve.size(); i += std::max<size_t>(1, fit.curve.size() / 100))
     curve.push_back(JsonValue::Array{fit.curve[i].seconds, fit.curve[i].psnr_train_db});
+  JsonValue::Array differences;
+  if (!paper.empty())
+    for (std::string& difference : NotToTheLetter(paper, OptionValues(options)))
+      differences.push_back(std::move(difference));
   const DeviceStatus device = ReadDeviceStatus();
   const JsonValue record =
       JsonValue::Object{{"capture", settings.capture},
                         {"device", settings.device == "cpu" ? "cpu" : device.name},
+                        {"paper_config", paper},
+                        {"not_to_the_letter", std::move(differences)},
                         {"seconds_read", read_seconds},
                         {"seconds_fit", fit_seconds},
                         {"seconds_steps", fit.seconds},

@@ -1,4 +1,4 @@
-// What regrade_gpu can do on a machine with nothing but a CUDA driver.
+// What regrade_gpu can do on a machine without COLMAP, OpenCV and picture formats.
 #pragma once
 
 #include <string>
@@ -7,6 +7,8 @@
 #include "kernels/field/cuda/half_grid.h"
 #include "pipeline/capture/packed_capture.h"
 #include "pipeline/files/json_file.h"
+#include "pipeline/program/option_binding.h"
+#include "pipeline/program/run_options.h"
 #include "reconstruct/fit/fit_options.h"
 #include "stylize/training/train_network.h"
 
@@ -17,6 +19,9 @@ struct FitPackedOptions {
   std::string field;    // .npz to write; empty: none
   std::string frames;   // folder for pictures; empty: none
   std::string preset = "standard";
+  std::string paper_config = "auto";
+  std::string checkpoint;
+  double stop_after = 0;
   std::string device = "cuda";
   uint64_t seed = 0;
   bool reproducible = false;  // see RunOptions
@@ -26,7 +31,17 @@ struct FitPackedOptions {
     bind("preset", preset,
          {.help = "how much time the fit may take, as of `regrade run`",
           .choices = "draft|standard|paper|best"});
+    bind("paper-config", paper_config,
+         {.help = kPaperConfigHelp, .choices = "auto|syn|llff|tnt|custom"});
     bind("capture", capture, {.help = "a file of `regrade pack`"});
+    bind(
+        "checkpoint", checkpoint,
+        {.help = "a file that an unfinished fit is kept in; the same command again continues"});
+    bind("stop-after", stop_after,
+         {.unit = "s",
+          .help = "stops there, with the checkpoint written; 0: never",
+          .min = 0,
+          .max = 1e6});
     bind("field", field, {.help = "the .npz file that the field is written to"});
     bind("frames", frames, {.help = "a folder for .ppm pictures of the held-out views"});
     bind("device", device, {.help = "where arithmetic runs", .choices = "cpu|cuda"});
@@ -108,7 +123,9 @@ void RenderPacked(const RenderPackedOptions& settings);
 void StylePacked(const StylePackedOptions& settings, const TrainNetworkOptions& options);
 
 // Prints one line of JSON: times, counts, PSNR, SSIM and fine detail of the held-out views,
-// milliseconds a rendered view. `curve_heldout` has [seconds, PSNR, SSIM, detail kept].
-void FitPacked(const FitPackedOptions& settings, FitOptions options);
+// milliseconds a rendered view. `curve_heldout` has [seconds, PSNR, SSIM, detail kept]; seconds
+// are of this call. `bound` has `settings` and `fit`, which --preset paper sets by the capture.
+// Throws Interrupted after --stop-after.
+void FitPacked(const FitPackedOptions& settings, const FitOptions& fit, OptionSet* bound);
 
 }  // namespace regrade

@@ -13,7 +13,8 @@ namespace {
 
 constexpr char kUsage[] =
     "regrade_gpu " REGRADE_VERSION
-    ": regrade on a machine with nothing but a CUDA driver\n\n"
+    ": regrade on a machine with a CUDA driver and the shared libraries that it is linked to\n"
+    "(libzip, Boost, libgomp and theirs); no COLMAP, no OpenCV, no picture formats\n\n"
     "usage: regrade_gpu device                       prints the card's name and memory\n"
     "       regrade_gpu fit --capture FILE [OPTIONS]   fits a field to a file of `regrade "
     "pack`\n"
@@ -51,7 +52,7 @@ bool Run(const std::vector<std::string>& arguments) {
   }
   ReadFlags(rest, &options);
   if (command == "fit")
-    FitPacked(settings.fit_packed, settings.fit);
+    FitPacked(settings.fit_packed, settings.fit, &options);
   else if (command == "render")
     RenderPacked(settings.render_packed);
   else
@@ -69,6 +70,9 @@ int main(int argc, char** argv) {
   } catch (const regrade::Error& error) {
     std::fprintf(stderr, "regrade_gpu: %s\n", error.what());
     return static_cast<int>(error.code());
+  } catch (const regrade::Interrupted&) {
+    std::fprintf(stderr, "regrade_gpu: stopped; the same command continues\n");
+    return 130;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "regrade_gpu: internal error: %s\n", error.what());
     return 1;

@@ -196,7 +196,8 @@ void OptionSet::Assign(const Entry& entry, const std::string& text, const std::s
           *target = ParseChoice(text, info, where);
         } else if constexpr (std::is_same_v<T, std::vector<int>>) {
           std::vector<int> values;
-          for (const std::string& part : Split(text, ','))
+          const bool none = info.may_be_empty && text.empty();
+          for (const std::string& part : none ? std::vector<std::string>() : Split(text, ','))
             values.push_back(ParseNumber<int>(part, info, where));
           *target = values;
         } else if constexpr (std::is_same_v<T, std::vector<std::string>>) {

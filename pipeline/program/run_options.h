@@ -24,9 +24,14 @@ struct ProgramOptions {
   }
 };
 
+inline constexpr char kPaperConfigHelp[] =
+    "of --preset paper: the configuration of Plenoxels' code. auto takes syn for transparent "
+    "photos, llff for forward-facing captures, else custom";
+
 struct RunOptions {
   std::string out;
   std::string preset = "standard";
+  std::string paper_config = "auto";
   std::string device = "auto";
   uint64_t seed = 0;
   int holdout = 8;
@@ -41,6 +46,8 @@ struct RunOptions {
     bind("preset", preset,
          {.help = "trade-off between accuracy and time; single options override it",
           .choices = "draft|standard|paper|best"});
+    bind("paper-config", paper_config,
+         {.help = kPaperConfigHelp, .choices = "auto|syn|llff|tnt|custom"});
     bind("device", device,
          {.help = "the processor for fits, restyling and frames", .choices = "auto|cpu|cuda"});
     bind("seed", seed, {.help = "seed of all random numbers"});

@@ -68,6 +68,9 @@ struct PoseStageReport {
 struct ReconstructReport {
   RecordedTime time;
   std::string device;
+  // Of --preset paper: "llff: the cameras all look one way", and what was set by hand.
+  std::string paper_config;
+  std::vector<std::string> not_to_the_letter;
   int finest_grid = 0;  // voxels a side
   int64_t rays = 0;
   int sh_degree = 0;
@@ -87,6 +90,9 @@ struct ReconstructReport {
   template <typename Visit>
   void Describe(Visit& visit) {
     visit("device", device);
+    visit("paper_config", paper_config,
+          {.label = "configuration of the paper", .optional = true});
+    visit("not_to_the_letter", not_to_the_letter, {.label = "not to the letter"});
     visit("finest_grid", finest_grid);
     visit("rays", rays);
     visit("sh_degree", sh_degree, {.label = "degree of view dependence"});

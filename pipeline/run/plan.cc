@@ -6,6 +6,7 @@
 #include "kernels/field/packed_grid.h"
 #include "kernels/field/spherical_harmonics.h"
 #include "pipeline/files/text.h"
+#include "reconstruct/fit/resample_grid.h"
 
 namespace regrade {
 namespace {
@@ -27,9 +28,13 @@ struct StageSize {
   double cells = 0, voxels = 0, vertices_of_grid = 0;
 };
 StageSize SizeOf(const FitOptions& options, const SceneBox& box, size_t stage) {
-  const Vec3i n = ResolutionFor(box, options.resolutions[stage]);
+  const Vec3i n = GridOfStage(options, box, stage);
   const double all = static_cast<double>(n.x) * n.y * n.z;
-  if (!options.adaptive()) return {0, all * (stage == 0 ? 1 : kStoredFraction), all};
+  if (!options.adaptive()) {
+    const double stored = all * (stage == 0 ? 1 : kStoredFraction);
+    const double most = double{options.max_voxels} * 1e6;
+    return {0, most > 0 ? std::min(stored, most) : stored, all};
+  }
   const double longest = options.resolutions[stage];
   const double cells = stage == 0 ? all
                                   : std::min({all, kCellsOfSquare * longest * longest,
@@ -143,6 +148,9 @@ bool LowerToMemory(const std::function<StagePlan(const FitOptions&)>& plan_of, u
     const int finest = *std::ranges::max_element(sides);
     if (finest <= kLeastResolution) break;
     const int lower = std::max(kLeastResolution, finest - std::max(1, finest / 16));
+    for (auto* other : {&options->resolutions_y, &options->resolutions_z})
+      for (size_t s = 0; s < other->size(); ++s)
+        if (sides[s] > lower) (*other)[s] = std::max(2, (*other)[s] * lower / sides[s]);
     for (int& side : sides) side = std::min(side, lower);
     lowered = true;
   }

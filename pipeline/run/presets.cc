@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "kernels/base/error.h"
+#include "pipeline/run/paper_config.h"
 
 namespace regrade {
 namespace {
@@ -37,34 +38,6 @@ void UseFitEffort(const std::string& preset, bool on_card, FitOptions* fit) {
   fit->max_cells = found->max_cells;
 }
 
-void UsePaper(RunSettings* settings) {
-  // svox2's configuration for custom captures; LipRF's recipe for the style.
-  settings->scene.photo_size = 1280;
-  settings->fit.MakeUniform();
-  settings->fit.resolutions = {128, 256, 512};
-  settings->fit.steps = {25600, 25600, 51200};
-  settings->fit.rays_per_step = 5000;
-  settings->fit.patch = 1;
-  settings->fit.step = 0.5f;
-  settings->fit.view_bound = 1e6f;
-  settings->fit.stop_transmittance = 1e-7f;
-  settings->fit.rate_density = 30;
-  settings->fit.rate_density_end = 1.5f;
-  settings->fit.rate_sh = 1e-2f;
-  settings->fit.rate_sh_end = 4e-4f;
-  settings->fit.tv_density = settings->fit.tv_sh = 5e-3f;
-  settings->fit.tv_fraction = 0.01f;
-  settings->fit.prune_weight = 1.28f;
-  settings->fit.initial_density = 0.1f;
-  // Final rates are those of svox2's schedule of 250000 steps after 102400.
-  settings->fit.background_resolution = 1024;
-  settings->fit.background_lead = 0.04f;
-  settings->fit.rate_background_density = 3;
-  settings->fit.rate_background_density_end = 0.18f;
-  settings->fit.rate_background_color = 0.1f;
-  settings->fit.rate_background_color_end = 1.7e-3f;
-}
-
 }  // namespace
 
 bool IsPreset(const std::string& name) {
@@ -88,7 +61,7 @@ void ApplyPreset(const std::string& preset, bool on_card, RunSettings* settings)
     settings->render.film_seconds = 12;
     settings->render.film_size = 1920;
   } else if (preset == "paper") {
-    UsePaper(settings);
+    UsePaperConfig(kPaperBase, settings);
   }
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "pipeline/program/device_choice.h"
+#include "pipeline/run/paper_config.h"
 #include "pipeline/run/presets.h"
 #include "pipeline/run/run_file.h"
 #include "pipeline/run/run_settings.h"
@@ -18,19 +19,22 @@ JsonValue AllValues(const std::string& preset, bool on_card) {
   return options.Values();
 }
 
-// Of the options that at least one preset sets, so that a preset also resets what another one
-// set before.
+// Of the options that at least one preset or configuration of the paper sets, so that a preset
+// also resets what another one set before.
 JsonValue PresetValues(const std::string& preset, bool on_card) {
   const JsonValue values = AllValues(preset, on_card), plain = AllValues("standard", on_card);
   const JsonValue network = OptionValues(TrainNetworkOptions());
   std::vector<JsonValue> presets;
   for (const char* name : kPresets) presets.push_back(AllValues(name, on_card));
+  for (const char* name : kPaperConfigs) presets.push_back(PaperValues(name));
   JsonValue set = JsonValue::Object();
   for (const auto& [name, value] : values.AsObject()) {
     const auto differs = [&plain, &key = name](const JsonValue& other) {
-      return !(other.At(key) == plain.At(key));
+      const JsonValue* const set = other.Find(key);
+      return set != nullptr && !(*set == plain.At(key));
     };
-    if (network.Find(name) != nullptr || std::ranges::any_of(presets, differs))
+    if (network.Find(name) != nullptr || name == "paper-config" ||
+        std::ranges::any_of(presets, differs))
       set[name] = value;
   }
   return set;
@@ -56,12 +60,14 @@ JsonValue FieldValues(const std::string& field) {
   return set;
 }
 
-// Writes those of the values that the set has.
+// Writes those of the values that the set has. Without --preset an option `effects` is not that
+// of a run: `regrade synth` has its own.
 void ApplyKnown(const JsonValue& values, const std::string& where, OptionSet* options) {
   const JsonValue known = options->Values();
+  const bool run = known.Find("preset") != nullptr;
   JsonValue kept = JsonValue::Object();
   for (const auto& [name, value] : values.AsObject())
-    if (known.Find(name) != nullptr) kept[name] = value;
+    if (known.Find(name) != nullptr && (run || name != "effects")) kept[name] = value;
   options->ApplyConfig(kept, where);
 }
 
@@ -115,6 +121,13 @@ std::vector<std::string> ResolveSettings(const SettingsSources& sources, OptionS
   }
   if (const auto preset = options->Given("preset"))
     ApplyKnown(PresetValues(*preset, on_card), "--preset", options);
+  if (const auto config = options->Given("paper-config"); config && config != "auto") {
+    const JsonValue values = options->Values();
+    if (const JsonValue* preset = values.Find("preset");
+        options->Given("preset").value_or(preset != nullptr ? preset->AsString() : "") ==
+        "paper")
+      ApplyKnown(PaperValues(*config), "--paper-config", options);
+  }
   if (const auto recipe = options->Given("recipe"))
     ApplyKnown(RecipeValues(*recipe), "--recipe", options);
   if (const auto field = options->Given("fit-field")) ApplyField(*field, options);

@@ -20,9 +20,10 @@ struct SettingsSources {
 //   1. the preset: that of the run.json, or else of `sources`
 //   2. `sources.run_json`, then the file of --config
 //   3. --preset, for the options that presets set
-//   4. --recipe, for all options of the style network
-//   5. single flags
-//   6. "reproducible" with the device "cuda": exact sums of the fit and the style
+//   4. --paper-config, with the preset paper, for what it decides
+//   5. --recipe, for all options of the style network
+//   6. single flags
+//   7. "reproducible" with the device "cuda": exact sums of the fit and the style
 // Options of presets and recipes that are not in the set are skipped. Returns the arguments of
 // `sources.run_json`, or else of --config. Throws Error(kUsage).
 std::vector<std::string> ResolveSettings(const SettingsSources& sources, OptionSet* options);

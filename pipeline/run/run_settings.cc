@@ -4,6 +4,7 @@
 #include <iterator>
 
 #include "kernels/base/error.h"
+#include "pipeline/run/paper_config.h"
 
 namespace regrade {
 
@@ -30,6 +31,14 @@ void CheckTogether(const RunSettings& settings) {
     throw UsageError(Concat(grids, " and ", steps, " stages"),
                      "--fit-resolutions and --fit-steps",
                      "give both the same number of stages");
+  for (const auto& [sides, flag] :
+       {std::pair{&settings.fit.resolutions_y, "--fit-resolutions-y"},
+        std::pair{&settings.fit.resolutions_z, "--fit-resolutions-z"}})
+    if (!sides->empty() && (settings.fit.adaptive() || sides->size() != grids))
+      throw UsageError(
+          Concat("belongs to a uniform field, with a side for each of ", grids, " stages"),
+          flag, "leave it out, or give --fit-field uniform and the sides");
+  CheckPaper(settings.run.preset, settings.run.paper_config, settings.fit.field);
   ParseStyleMethod(settings.style_2d);
   if (!settings.object.style_mask.empty() && !settings.object.On())
     throw UsageError("labels of the style picture need labels of the photos",

@@ -13,6 +13,7 @@
 #include "pipeline/report/requirements.h"
 #include "reconstruct/colmap/poses_from_photos.h"
 #include "reconstruct/fit/fit_options.h"
+#include "reconstruct/scene/box_options.h"
 #include "stylize/image/style_options.h"
 #include "stylize/training/train_network.h"
 
@@ -20,6 +21,7 @@ namespace regrade {
 
 struct SceneOptions {
   int photo_size = 800;
+  BoxOptions box;
 
   template <typename Bind>
   void Describe(Bind& bind) {
@@ -29,6 +31,7 @@ struct SceneOptions {
                   "their places; time grows with its square",
           .min = 64,
           .max = 16384});
+    box.Describe(bind);
   }
 };
 

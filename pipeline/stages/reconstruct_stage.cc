@@ -20,6 +20,8 @@
 #include "pipeline/program/device_choice.h"
 #include "pipeline/program/memory.h"
 #include "pipeline/report/stage_metrics.h"
+#include "pipeline/run/paper_config.h"
+#include "pipeline/run/paper_traits.h"
 #include "pipeline/run/plan.h"
 #include "pipeline/run/run_context.h"
 #include "pipeline/stages/photo_metrics.h"
@@ -155,7 +157,8 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   const WorkingViews as_taken(ReadCapture(workspace.Path("poses")), settings.scene.photo_size,
                               settings.run.holdout);
   const Capture& capture = as_taken.capture();
-  SceneProfile profile = ProfileScene(capture, settings.fit.sh_degree, settings.run.effects);
+  SceneProfile profile =
+      ProfileScene(capture, settings.fit.sh_degree, settings.run.effects, settings.scene.box);
   const NormalizedScene& scene = profile.scene;
   const WorkingViews views =
       as_taken.WithGains(profile.gains).InField(scene.field_from_world, scene.ndc);
@@ -236,6 +239,13 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
     metrics.trial_cpu_seconds = trial_cpu_seconds;
   }
   metrics.device = DeviceName(backend);
+  if (settings.run.preset == "paper") {
+    const PaperChoice choice = ChoosePaperConfig(settings.run.paper_config, TraitsOf(capture));
+    metrics.paper_config = choice.name + ": " + choice.reason;
+    RunSettings used = settings;
+    used.fit = options;
+    metrics.not_to_the_letter = NotToTheLetter(choice.name, DecidedValues(used));
+  }
   metrics.finest_grid = Finest(options);
   metrics.rays = fit.rays;
   metrics.sh_degree = options.sh_degree;
@@ -255,9 +265,22 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   return outcome;
 }
 
+// Sets what --preset paper decides, now that the capture is known.
+void ChoosePaperSettings(RunContext* context) {
+  RunSettings& settings = context->settings;
+  if (settings.run.preset != "paper") return;
+  const PaperChoice choice = ChoosePaperConfig(
+      settings.run.paper_config, TraitsOf(ReadCapture(context->workspace->Path("poses"))));
+  ApplyPaperChoice(choice, &context->options);
+  context->console->Info("configuration of the paper: " + choice.name + ", " + choice.reason);
+  for (const std::string& difference : NotToTheLetter(choice.name, DecidedValues(settings)))
+    context->console->Info("not to the letter: " + difference);
+}
+
 }  // namespace
 
 Stage ReconstructStage(RunContext* context) {
+  ChoosePaperSettings(context);
   const RunOptions& run = context->settings.run;
   Stage stage;
   stage.name = "reconstruct";
@@ -273,8 +296,9 @@ Stage ReconstructStage(RunContext* context) {
     const WorkingViews views(ReadCapture(context->workspace->Path("poses")),
                              context->settings.scene.photo_size, run.holdout);
     // The box does not depend on exposures, and measuring them would read every photo.
-    const SceneProfile profile = ProfileScene(views.capture(), context->settings.fit.sh_degree,
-                                              run.effects + ",exposure=off");
+    const SceneProfile profile =
+        ProfileScene(views.capture(), context->settings.fit.sh_degree,
+                     run.effects + ",exposure=off", context->settings.scene.box);
     const Backend backend = ChooseBackend(run.device, run.reproducible);
     const int64_t pixels = PixelsToFit(views);
     const FitOptions options = AdaptOptions(

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "kernels/device/backend.h"
+#include "kernels/field/density_losses.h"
 #include "kernels/field/free_space.h"
 #include "kernels/field/render.h"
 #include "kernels/optimize/rmsprop.h"
@@ -22,6 +23,8 @@ struct FitStep {
   int patch = 1;
   MarchOptions march;
   RmspropOptions optimizer;
+  // The lambdas of density_losses.h, before the division by the rays.
+  DensityLosses losses;
   // See EQ(free-space), of an adaptive field: rays drawn, and the weight of their mean opacity.
   int free_rays = 0;
   float free_space = 0;
@@ -43,6 +46,13 @@ struct FitSums {
   int64_t rejected_voxels = 0;
 };
 
+// Which voxels of a uniform field stay.
+struct PruneLimits {
+  bool by_density = false;  // or else by the largest rendering weight in any view
+  float least = 0;
+  int64_t max_voxels = 0;  // see BoundedLimit; 0: no limit
+};
+
 class FitEngine {
  public:
   virtual ~FitEngine() = default;
@@ -62,11 +72,11 @@ class FitEngine {
   virtual RenderedView Render(const Camera& camera, const MarchOptions& march) = 0;
   // Of an adaptive field: removes and splits cells; moments stay.
   virtual void RefineCells(const MarchOptions& march, const CellLimits& limits) = 0;
-  // Prunes voxels whose rendering weight is below `threshold` in every view and resamples;
+  // Prunes voxels and resamples;
   // resets the optimizer's state, as in svox2. Background spheres, if any, get maps of
   // `sphere_resolution` and are not pruned.
-  virtual void Refine(const MarchOptions& march, float threshold, const Vec3i& resolution,
-                      int sphere_resolution) = 0;
+  virtual void Refine(const MarchOptions& march, const PruneLimits& limits,
+                      const Vec3i& resolution, int sphere_resolution) = 0;
 };
 
 // `rays` and the photos behind it must outlive the engine. shards: gradient arenas of the CPU.

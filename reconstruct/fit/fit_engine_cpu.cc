@@ -56,10 +56,15 @@ class CpuFitEngine : public FitEngine {
 
   FitSums TakeSums() override { return std::exchange(sums_, {}); }
 
-  void Refine(const MarchOptions& march, float threshold, const Vec3i& resolution,
+  void Refine(const MarchOptions& march, const PruneLimits& limits, const Vec3i& resolution,
               int sphere_resolution) override {
     const Buffer<float> weights =
-        MaxWeightsOverViews(state_.grid, *rays_, march, kPruningStride);
+        limits.by_density ? Densities()
+                          : MaxWeightsOverViews(state_.grid, *rays_, march, kPruningStride);
+    const double growth =
+        static_cast<double>(int64_t{resolution.x} * resolution.y * resolution.z) /
+        static_cast<double>(state_.grid.frame.NumVertices());
+    const float threshold = BoundedLimit(weights, limits.least, growth, limits.max_voxels);
     FastSpheres spheres = std::move(state_.grid.spheres);
     state_.grid = Resample(state_.grid, weights, threshold, resolution);
     if (spheres.on() && sphere_resolution != spheres.resolution)
@@ -78,6 +83,14 @@ class CpuFitEngine : public FitEngine {
   }
 
  private:
+  Buffer<float> Densities() const {
+    Buffer<float> densities(state_.grid.num_voxels());
+    for (int64_t v = 0; v < densities.size(); ++v)
+      densities[v] =
+          state_.grid.records[v * state_.grid.lanes() + DensityLane(state_.grid.basis)];
+    return densities;
+  }
+
   void ResetArenas() {
     for (GradientArena& arena : arenas_) {
       arena.Reset(state_.grid.num_voxels());
@@ -112,7 +125,9 @@ class CpuFitEngine : public FitEngine {
     for (int s = 0; s < shards; ++s) {
       const int64_t begin = n * s / shards, end = n * (s + 1) / shards;
       const RayBatch batch{&batch_rays_[static_cast<size_t>(begin)],
-                           &batch_targets_[static_cast<size_t>(begin)], end - begin};
+                           &batch_targets_[static_cast<size_t>(begin)],
+                           end - begin,
+                           {step.losses.beta / static_cast<float>(n), step.losses.sparsity}};
       GradientArena* arena = &arenas_[static_cast<size_t>(s)];
       results[static_cast<size_t>(s)] =
           FastRays().accumulate(state_.grid, batch, step.march, scale, arena);

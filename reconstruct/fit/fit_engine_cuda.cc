@@ -14,6 +14,7 @@
 #include "kernels/field/cuda/device_sphere_rays.h"
 #include "kernels/field/cuda/device_views.h"
 #include "reconstruct/fit/fit_engine.h"
+#include "reconstruct/fit/resample_grid.h"
 #include "reconstruct/fit/sphere_grid.h"
 
 namespace regrade {
@@ -55,8 +56,10 @@ class CudaFitEngine : public FitEngine {
     if (free_space_)
       free_space_->Accumulate(grid_, seed_ ^ kRandomFreeSpace, step.number, step.free_rays,
                               step.free_space, &touched_);
-    fitter_->Accumulate(grid_, rays_.data(), targets_.data(), step.rays,
-                        1.0f / (3.0f * static_cast<float>(step.rays)), &touched_);
+    fitter_->Accumulate(
+        grid_, rays_.data(), targets_.data(), step.rays,
+        1.0f / (3.0f * static_cast<float>(step.rays)), &touched_,
+        {step.losses.beta / static_cast<float>(step.rays), step.losses.sparsity});
     // The sampling run of total variation is over stored voxels (see FitStep): each is chosen
     // with probability tv_fraction, so the expectation equals the CPU's.
     const bool adaptive = grid_.cells.on();
@@ -93,9 +96,31 @@ class CudaFitEngine : public FitEngine {
     grid_ = ChangeCellsOnDevice(std::move(grid_), change);
     if (grid_.num_voxels() > 0) Renew();
   }
-  void Refine(const MarchOptions& march, float threshold, const Vec3i& resolution,
+  void Refine(const MarchOptions& march, const PruneLimits& limits, const Vec3i& resolution,
               int sphere_resolution) override {
     const DeviceRange range("pruning and resampling");
+    const DeviceBuffer<float> weights = limits.by_density ? Densities() : MaxWeights(march);
+    const double growth =
+        static_cast<double>(int64_t{resolution.x} * resolution.y * resolution.z) /
+        static_cast<double>(grid_.frame.NumVertices());
+    const float threshold =
+        limits.max_voxels == 0
+            ? limits.least
+            : BoundedLimit(weights.ToHost(), limits.least, growth, limits.max_voxels);
+    DeviceGrid next = ResampleOnDevice(grid_, weights, threshold, resolution);
+    if (next.num_voxels() == 0)
+      throw Error(ExitCode::kScene,
+                  std::string("no voxel of the scene is left: none has a ") +
+                      (limits.by_density ? "density" : "rendering weight") + " above " +
+                      std::to_string(threshold),
+                  "reconstruct", "check the poses, or lower --prune-weight");
+    next.spheres = Resampled(std::move(grid_.spheres), sphere_resolution);
+    grid_ = std::move(next);
+    Renew();
+  }
+
+ private:
+  DeviceBuffer<float> MaxWeights(const MarchOptions& march) {
     DeviceBuffer<float> weights(grid_.num_voxels(), "weights of voxels");
     weights.Zero();
     constexpr int kStride = 2;  // every other row and column of a view
@@ -104,18 +129,18 @@ class CudaFitEngine : public FitEngine {
       const int64_t n = views_.RaysOf(view, kStride, rays_.data());
       MaxWeightsOnDevice(grid_, rays_.data(), n, march, weights.data());
     }
-    DeviceGrid next = ResampleOnDevice(grid_, weights, threshold, resolution);
-    if (next.num_voxels() == 0)
-      throw Error(ExitCode::kScene,
-                  "no voxel of the scene is left: none has a rendering weight above " +
-                      std::to_string(threshold) + " in any view",
-                  "reconstruct", "check the poses, or lower --prune-weight");
-    next.spheres = Resampled(std::move(grid_.spheres), sphere_resolution);
-    grid_ = std::move(next);
-    Renew();
+    return weights;
   }
 
- private:
+  // Through the host: three times per fit, a second each.
+  DeviceBuffer<float> Densities() const {
+    const auto dense = grid_.dense_density.ToHost();
+    const auto vertex = grid_.vertex_of_voxel.ToHost();
+    Buffer<float> densities(grid_.num_voxels());
+    for (int64_t v = 0; v < densities.size(); ++v) densities[v] = dense[vertex[v]];
+    return DeviceBuffer<float>::Of(densities, "densities of voxels");
+  }
+
   FitState Download() const {
     FitState state{DownloadGrid(grid_), DownloadSecondMoment(grid_), 0, 0};
     if (grid_.spheres.on()) state.sphere_moment = grid_.spheres.second_moment.ToHost();

@@ -96,12 +96,12 @@ class Fitter {
       RunStage();
       if (stage_ + 1 < num_stages) Measure();
       if (++stage_ == num_stages) break;
-      Refine(options_.resolutions[static_cast<size_t>(stage_)]);
+      Refine(false);
       step_ = 0;
       SaveCheckpoint();
     }
     // Prunes once more without resampling: removes voxels that no training view sees.
-    Refine(0);
+    if (options_.prune_last) Refine(true);
     result_.seconds = SecondsSince(start_) - idle_seconds_;
     result_.voxels = engine_->num_voxels();
     Measure();
@@ -127,16 +127,15 @@ class Fitter {
 
   FastGrid InitialGrid() const {
     const int basis = BasisOf(options_.sh_degree), coarsest = options_.resolutions[0];
-    constexpr int kLeastViews = 2;
     if (options_.adaptive()) {
       const CellLevels levels = Levels();
       return MakeInitialCells(rays_, CellFrame(box_, coarsest, levels), levels, basis,
-                              options_.initial_density, box_.near_clip, kLeastViews,
+                              options_.initial_density, box_.near_clip, options_.initial_views,
                               box_.spheres);
     }
-    const GridFrame frame{ResolutionFor(box_, coarsest), box_.center, box_.radius};
+    const GridFrame frame{GridOfStage(options_, box_, 0), box_.center, box_.radius};
     return MakeInitialGrid(rays_, frame, basis, options_.initial_density, box_.near_clip,
-                           kLeastViews, box_.spheres);
+                           options_.initial_views, box_.spheres);
   }
 
   // Spheres and device coordinates reach to infinity, and nothing is behind a transparent
@@ -190,7 +189,8 @@ class Fitter {
   FitStep NextStep() const {
     FitStep step;
     const int number = StepsBefore();
-    const double p = static_cast<double>(number) / total_steps_;
+    const double p = static_cast<double>(number) /
+                     (options_.rate_steps > 0 ? options_.rate_steps : total_steps_);
     const float decay = std::pow(options_.tv_decay, static_cast<float>(stage_));
     step.number = static_cast<uint64_t>(number);
     step.rays = options_.rays_per_step;
@@ -201,6 +201,8 @@ class Fitter {
         ExponentialRate(options_.rate_density, options_.rate_density_end, p) *
         DelayFactor(number, options_.density_delay * static_cast<float>(total_steps_));
     step.optimizer.view_bound = options_.view_bound;
+    if (!options_.bound_mean) step.optimizer.mean_bound = kUnbounded;
+    step.losses = {options_.beta_loss, options_.sparsity_loss};
     if (options_.adaptive()) {
       step.free_rays = std::max(1, options_.rays_per_step / kRaysPerFreeRay);
       step.free_space = options_.free_space;
@@ -214,8 +216,9 @@ class Fitter {
     step.optimizer.rate_sphere_color =
         ExponentialRate(options_.rate_background_color, options_.rate_background_color_end, p);
     step.tv_sphere_fraction = options_.tv_background_fraction;
-    step.tv_sphere_density = decay * options_.tv_background_density;
-    step.tv_sphere_color = decay * options_.tv_background_color;
+    const float sphere_decay = options_.tv_background_decays ? decay : 1.0f;
+    step.tv_sphere_density = sphere_decay * options_.tv_background_density;
+    step.tv_sphere_color = sphere_decay * options_.tv_background_color;
     return step;
   }
 
@@ -230,29 +233,34 @@ class Fitter {
   }
 
   int SphereResolution(int stage) const {
+    if (!options_.background_grows) return options_.background_resolution;
     return SphereResolutionFor(options_.background_resolution,
                                options_.resolutions[static_cast<size_t>(stage)],
                                options_.resolutions.back());
   }
 
-  // Prunes by weight and resamples to `longest` voxels a side; 0 keeps the resolution.
-  void Refine(int longest) {
+  // Prunes, and resamples to the grid of stage_; `last` keeps the resolution.
+  void Refine(bool last) {
     if (options_.adaptive()) {
       const float width = static_cast<float>(options_.resolutions[0]);
       engine_->RefineCells({options_.step, options_.stop_transmittance},
                            {options_.prune_weight / width, Levels().outward,
-                            options_.cell_pixels, longest > 0 ? Levels().outward + stage_ : 0,
+                            options_.cell_pixels, last ? 0 : Levels().outward + stage_,
                             static_cast<int64_t>(double{options_.max_cells} * 1e6)});
       if (engine_->num_voxels() == 0) ThrowEmpty();
       return;
     }
     const Vec3i now = engine_->resolution();
-    const float longest_now = static_cast<float>(std::max({now.x, now.y, now.z}));
     const int last_stage = static_cast<int>(options_.resolutions.size()) - 1;
-    const Vec3i next = longest > 0 ? ResolutionFor(box_, longest) : now;
+    const Vec3i next = last ? now : GridOfStage(options_, box_, static_cast<size_t>(stage_));
+    const bool by_density = options_.prune_by == "density";
+    const int side = by_density                              ? 1
+                     : options_.prune_by == "weight-of-next" ? next.z
+                                                             : std::max({now.x, now.y, now.z});
     engine_->Refine({options_.step, options_.stop_transmittance},
-                    options_.prune_weight / longest_now, next,
-                    SphereResolution(std::min(stage_, last_stage)));
+                    {by_density, options_.prune_weight / static_cast<float>(side),
+                     static_cast<int64_t>(double{options_.max_voxels} * 1e6)},
+                    next, SphereResolution(std::min(stage_, last_stage)));
   }
 
   // A device's sums are read once per window, so that it need not wait for the host at each

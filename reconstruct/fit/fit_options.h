@@ -12,6 +12,7 @@ namespace regrade {
 struct FitOptions {
   std::string field = "adaptive";
   std::vector<int> resolutions = {48, 96, 192, 384, 768};
+  std::vector<int> resolutions_y, resolutions_z;
   bool fewer_stages = true;
   std::vector<int> steps = {600, 700, 900, 1200, 1400};
   int rays_per_step = 0;  // 0: see AdaptOptions
@@ -22,6 +23,7 @@ struct FitOptions {
   float stop_transmittance = 1e-3f;
   float rate_density = 58.0f;
   float rate_density_end = 24.0f;
+  int rate_steps = 0;
   float density_delay = 0;
   float rate_sh = 5e-2f;
   float rate_sh_end = 2e-3f;
@@ -29,10 +31,18 @@ struct FitOptions {
   float tv_sh = 4e-3f;
   float tv_decay = 0.7f;
   float tv_fraction = 0.02f;
+  float beta_loss = 0;
+  float sparsity_loss = 0;
+  bool bound_mean = true;
+  std::string prune_by = "weight";
   float prune_weight = 0.4f;
+  bool prune_last = true;
+  float max_voxels = 0;
+  int initial_views = 2;
   float initial_density = 0.5f;
   int background_layers = 64;
   int background_resolution = 512;
+  bool background_grows = true;
   float rate_background_density = 10.0f;
   float rate_background_density_end = 1.0f;
   float rate_background_color = 0.1f;
@@ -40,6 +50,7 @@ struct FitOptions {
   float tv_background_density = 5e-3f;
   float tv_background_color = 5e-3f;
   float tv_background_fraction = 0.01f;
+  bool tv_background_decays = true;
   float initial_background_density = 0.1f;
   float background_lead = 0.9f;
   float cell_pixels = 1.0f;
@@ -76,6 +87,20 @@ struct FitOptions {
                   "doubles it in each stage, and its memory grows with --fit-max-cells",
           .min = 8,
           .max = 2048});
+    bind(
+        "fit-resolutions-y", resolutions_y,
+        {.unit = "voxels",
+         .help = "uniform field: --fit-resolutions are of the box's x axis, and these of its y "
+                 "axis; none: as the box's sides",
+         .min = 2,
+         .max = 2048,
+         .may_be_empty = true});
+    bind("fit-resolutions-z", resolutions_z,
+         {.unit = "voxels",
+          .help = "the same of the z axis",
+          .min = 2,
+          .max = 2048,
+          .may_be_empty = true});
     bind("fit-fewer-stages", fewer_stages,
          {.help = "leaves out last stages that are finer than the photos can determine; giving "
                   "--fit-resolutions switches it off"});
@@ -100,6 +125,9 @@ struct FitOptions {
                   "channel); a small trial falls back to 0 where that loses nothing",
           .min = 0,
           .max = 2});
+    bind("fit-mean-bound", bound_mean,
+         {.help = "keeps the mean colour of a voxel within [0, 1], and that of background "
+                  "layers"});
     bind("fit-view-bound", view_bound,
          {.help = "largest view-dependent coefficient; limits coefficients that are hidden by "
                   "clamping and would appear after restyling",
@@ -121,6 +149,12 @@ struct FitOptions {
          {.help = "learning rate of densities at the end (exponential in between)",
           .min = 0,
           .max = 1e4});
+    bind("fit-rate-steps", rate_steps,
+         {.unit = "steps",
+          .help = "learning rates reach their ends after so many steps, even if the fit ends "
+                  "before; 0: at its end",
+          .min = 0,
+          .max = 10000000});
     bind("fit-density-delay", density_delay,
          {.unit = "fraction of all steps",
           .help = "raises the learning rate of densities along a sine, from a hundredth to its "
@@ -144,9 +178,33 @@ struct FitOptions {
           .max = 1});
     bind("tv-fraction", tv_fraction,
          {.help = "fraction of the voxels regularised in a step", .min = 0, .max = 1});
+    bind("beta-loss", beta_loss,
+         {.help = "weight of a loss that makes rays opaque or clear", .min = 0, .max = 10});
+    bind("sparsity-loss", sparsity_loss,
+         {.help = "weight of a loss on the densities of a ray's samples; not divided by the "
+                  "rays",
+          .min = 0,
+          .max = 10});
+    bind(
+        "prune-by", prune_by,
+        {.help = "removes voxels of a uniform field between stages whose rendering weight is "
+                 "below --prune-weight / resolution in every view (weight), / the next stage's "
+                 "resolution along z (weight-of-next), or whose density is below "
+                 "--prune-weight (density)",
+         .choices = "weight|weight-of-next|density"});
     bind("prune-weight", prune_weight,
-         {.help = "removes voxels between stages whose rendering weight is below this / "
-                  "resolution in every view",
+         {.help = "the limit of --prune-by; an adaptive field has weights",
+          .min = 0,
+          .max = 100});
+    bind("prune-last", prune_last, {.help = "prunes after the last stage, too"});
+    bind("fit-max-voxels", max_voxels,
+         {.unit = "millions of voxels",
+          .help = "uniform field: pruning raises its limit where more would be kept; 0: never",
+          .min = 0,
+          .max = 2000});
+    bind("fit-initial-views", initial_views,
+         {.unit = "photos",
+          .help = "stores what so many photos see; 0 stores the whole box",
           .min = 0,
           .max = 100});
     bind("initial-density", initial_density,
@@ -163,6 +221,8 @@ struct FitOptions {
                   "grows with its square",
           .min = 16,
           .max = 4096});
+    bind("background-grows", background_grows,
+         {.help = "the background's resolution grows from stage to stage, as the grid's"});
     bind("background-rate-density", rate_background_density,
          {.help = "RMSProp learning rate of the background's densities at the start",
           .min = 0,
@@ -187,6 +247,8 @@ struct FitOptions {
           .max = 10});
     bind("background-tv-fraction", tv_background_fraction,
          {.help = "fraction of the background regularised in a step", .min = 0, .max = 1});
+    bind("background-tv-decays", tv_background_decays,
+         {.help = "applies --tv-decay to the background, too"});
     bind("background-initial-density", initial_background_density,
          {.help = "initial density of all background layers", .min = 0, .max = 100});
     bind("background-lead", background_lead,

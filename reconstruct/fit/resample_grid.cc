@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <iterator>
 #include <string>
 
 #include "kernels/base/error.h"
@@ -87,6 +89,26 @@ FastGrid MakeInitialGrid(const TrainingRays& rays, const GridFrame& frame, int b
   for (int64_t v = 0; v < count; ++v) grid.records[v * lanes + DensityLane(basis)] = density;
   RefreshDerived(&grid);
   return grid;
+}
+
+Vec3i GridOfStage(const FitOptions& options, const SceneBox& box, size_t stage) {
+  Vec3i n = ResolutionFor(box, options.resolutions[stage]);
+  if (!options.resolutions_y.empty() || !options.resolutions_z.empty())
+    n.x = options.resolutions[stage];
+  if (!options.resolutions_y.empty()) n.y = options.resolutions_y[stage];
+  if (!options.resolutions_z.empty()) n.z = options.resolutions_z[stage];
+  return n;
+}
+
+float BoundedLimit(const Buffer<float>& weights, float least, double growth, int64_t most) {
+  std::vector<float> kept;
+  std::ranges::copy_if(weights, std::back_inserter(kept),
+                       [least](float weight) { return weight >= least; });
+  const auto few = static_cast<size_t>(static_cast<double>(most) / growth);
+  if (most == 0 || kept.size() <= few || few == 0) return least;
+  const auto last = kept.begin() + static_cast<std::ptrdiff_t>(few) - 1;
+  std::ranges::nth_element(kept, last, std::greater());
+  return *last;
 }
 
 Buffer<float> MaxWeightsOverViews(const FastGrid& grid, const TrainingRays& rays,

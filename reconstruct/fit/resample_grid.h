@@ -6,13 +6,15 @@
 
 #include "kernels/field/packed_grid.h"
 #include "kernels/field/ray_march.h"
+#include "reconstruct/fit/fit_options.h"
 #include "reconstruct/fit/training_rays.h"
+#include "reconstruct/scene/scene_box.h"
 
 namespace regrade {
 
 // A mid-grey grid of one density that stores every vertex seen by at least `min_views` cameras
-// beyond near_clip. With `ball`, only vertices within the box's unit sphere: the background
-// spheres model the rest.
+// beyond near_clip; 0 stores all. With `ball`, only vertices within the box's unit sphere: the
+// background spheres model the rest.
 FastGrid MakeInitialGrid(const TrainingRays& rays, const GridFrame& frame, int basis,
                          float density, float near_clip, int min_views, bool ball = false);
 
@@ -20,6 +22,14 @@ FastGrid MakeInitialGrid(const TrainingRays& rays, const GridFrame& frame, int b
 // column.
 Buffer<float> MaxWeightsOverViews(const FastGrid& grid, const TrainingRays& rays,
                                   const MarchOptions& options, int stride);
+
+// The vertices of a stage along x, y and z.
+Vec3i GridOfStage(const FitOptions& options, const SceneBox& box, size_t stage);
+
+// The least of `weights` to keep, at least `least`: raised, as in svox2, where more than `most`
+// vertices would stay on a grid with `growth` times as many. Their neighbours, which stay, too,
+// are not counted. most 0: no limit.
+float BoundedLimit(const Buffer<float>& weights, float least, double growth, int64_t most);
 
 // The field interpolated trilinearly on a grid of `resolution`; keeps vertices within one voxel
 // of an old voxel whose weight is at least `threshold`. Throws Error(kScene) naming the

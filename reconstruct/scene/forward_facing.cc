@@ -54,7 +54,8 @@ ForwardFacing MeasureForwardFacing(const Capture& capture) {
   return result;
 }
 
-NormalizedScene NormalizeForwardFacing(const Capture& capture, const ForwardFacing& measured) {
+NormalizedScene NormalizeForwardFacing(const Capture& capture, const ForwardFacing& measured,
+                                       double margin) {
   Vec3d up{}, center{};
   const double weight = 1.0 / static_cast<double>(capture.views.size());
   for (const CaptureView& view : capture.views) {
@@ -92,6 +93,11 @@ NormalizedScene NormalizeForwardFacing(const Capture& capture, const ForwardFaci
         radius_x = std::max({radius_x, std::abs(ray.origin.x), std::abs(far.x)});
         radius_y = std::max({radius_y, std::abs(ray.origin.y), std::abs(far.y)});
       }
+  }
+  if (margin > 0) {
+    const double beyond = 2 * margin * std::max(common.width, common.height);
+    radius_x = 1 + beyond / common.width;
+    radius_y = 1 + beyond / common.height;
   }
   result.box.radius = {static_cast<float>(std::min(radius_x, kLargestRadius)),
                        static_cast<float>(std::min(radius_y, kLargestRadius)), 1};

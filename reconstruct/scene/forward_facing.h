@@ -21,8 +21,10 @@ struct ForwardFacing {
 ForwardFacing MeasureForwardFacing(const Capture& capture);
 
 // The frame of the mean camera, scaled so that the nearest depth is 4/3 (LLFF's factor 0.75),
-// and the box in NDC that contains every pixel's ray. See EQ(ndc). Throws Error(kScene) with a
-// photo's name if NDC is not valid for it (H87-H90).
-NormalizedScene NormalizeForwardFacing(const Capture& capture, const ForwardFacing& measured);
+// and the box in NDC that contains every pixel's ray. See EQ(ndc). margin: if not 0, the box
+// instead reaches this fraction of the longer side beyond the mean camera's picture. Throws
+// Error(kScene) with a photo's name if NDC is not valid for it (H87-H90).
+NormalizedScene NormalizeForwardFacing(const Capture& capture, const ForwardFacing& measured,
+                                       double margin = 0);
 
 }  // namespace regrade

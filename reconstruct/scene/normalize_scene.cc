@@ -223,7 +223,7 @@ NormalizedScene NormalizeScene(const Capture& capture) {
   return result;
 }
 
-Surroundings MeasureSurroundings(const Capture& capture) {
+Surroundings MeasureSurroundings(const Capture& capture, double camera_range) {
   Surroundings result;
   const CameraPoses poses(capture);
   result.center = CommonPoint(poses.centers, poses.forwards);
@@ -233,11 +233,12 @@ Surroundings MeasureSurroundings(const Capture& capture) {
     distances.push_back(Norm(to_center));
     ahead.push_back(Dot(to_center, poses.forwards[i]));
   }
-  const double half = Quantile(distances, 0.5) / kCameraRange;
+  const double half =
+      Quantile(distances, 0.5) / (camera_range > 0 ? camera_range : kCameraRange);
   if (!(half > RoundingOf(poses.centers))) return result;
   result.half = half;
   // Cameras that look outwards surround nothing: the near region extends to the nearer points.
-  if (Quantile(ahead, 0.5) < 0 && capture.points.size() >= kMinPoints) {
+  if (!(camera_range > 0) && Quantile(ahead, 0.5) < 0 && capture.points.size() >= kMinPoints) {
     std::vector<double> out;
     for (const ScenePoint& p : capture.points) out.push_back(Norm(p.position - result.center));
     result.half = std::max(half, Quantile(out, kNearPoints));

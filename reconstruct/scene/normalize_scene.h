@@ -33,8 +33,9 @@ struct Surroundings {
 // than a quarter of the voxels along each side.
 inline constexpr double kFarSides = 4;
 inline constexpr double kFarFraction = 0.05;  // above it, the scene has a background
-// Independent of the order of photos. far_fraction is 0 without points.
-Surroundings MeasureSurroundings(const Capture& capture);
+// Independent of the order of photos. far_fraction is 0 without points. camera_range: the
+// cameras' median distance in half sides; 0: 0.9, or less where the cameras look outwards.
+Surroundings MeasureSurroundings(const Capture& capture, double camera_range = 0);
 
 // Uses the cube as the box, for a scene with background spheres. The field's frame has y up, so
 // that few photos see the spheres' poles.

@@ -214,8 +214,9 @@ TEST_P(DeviceParity, FitGradient) {
   DeviceRayFitter fitter(grid.frame, options, 64 << 20);
   const DeviceBuffer<Ray> device_rays = DeviceBuffer<Ray>::Of(rays, "rays");
   const DeviceBuffer<Vec3f> device_targets = DeviceBuffer<Vec3f>::Of(targets, "targets");
+  const DensityLosses losses{1e-4f, 1e-2f};
   fitter.Accumulate(grid, device_rays.data(), device_targets.data(), rays.size(), scale,
-                    &touched_voxels);
+                    &touched_voxels, losses);
   const DeviceFitSums sums = fitter.TakeSums();
   const Buffer<float> g = DownloadGradient(grid);
   const Buffer<uint32_t> touched = touched_voxels.bits.ToHost();
@@ -227,8 +228,9 @@ TEST_P(DeviceParity, FitGradient) {
     const RayResult<double> result = RenderRay(in_double.view(), ray, options);
     const Vec3d e = result.color - targets[r].Cast<double>();
     error += Dot(e, e);
-    RenderRayAdjoint(in_double.view(), ray, options, result, e * (2.0 * scale),
-                     d_density.data(), d_sh.data(), PlainAdd());
+    RenderRayAdjoint<double>(in_double.view(), ray, options, result, e * (2.0 * scale),
+                             d_density.data(), d_sh.data(), PlainAdd(), nullptr, nullptr,
+                             losses);
   }
   Row("loss", basis(), "plain double, relative", std::abs(sums.squared_error - error) / error,
       1e-5);

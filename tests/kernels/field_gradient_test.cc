@@ -246,6 +246,10 @@ TEST_P(FastRaysParity, StepIsProjected) {
     }
     EXPECT_GT(std::abs(grid.records[4 * lanes + DensityLane(basis())]),
               80);  // densities are not bounded
+    functions()->step(&grid, moments.data(), &arena, 1, 0, 0, 1,
+                      {.rate_sh = 100, .mean_bound = kUnbounded, .view_bound = kUnbounded});
+    for (int l = 0; l < 3 * basis(); ++l)  // as published
+      EXPECT_GT(std::abs(grid.records[4 * lanes + l]), 50);
   }
 }
 

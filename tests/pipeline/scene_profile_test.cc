@@ -141,6 +141,23 @@ TEST(SceneProfile, H153_H156_FarSurroundingsUseSpheres) {
       ExitCode::kUsage, "alpha");
 }
 
+// What is given is not measured.
+TEST(SceneProfile, OptionsOfTheBoxReplaceMeasurements) {
+  BoxOptions box;
+  box.camera_range = 2;
+  box.near_clip = 0;
+  box.background = 0.5f;
+  for (const char* background : {"background=off", "background=on"}) {
+    const SceneProfile given =
+        ProfileScene(CaptureSeenAllRound(5), 2, std::string(background) + ",exposure=off", box);
+    EXPECT_EQ(given.scene.box.radius, (Vec3f{1, 1, 1}));
+    EXPECT_NEAR(given.scene.field_from_world.scale, 2 / std::hypot(2.0, 0.3), 1e-3);
+    EXPECT_EQ(given.scene.box.near_clip, 0.0f);
+    EXPECT_EQ(given.scene.box.background.value(), (Vec3f{0.5f, 0.5f, 0.5f}));
+    EXPECT_EQ(given.scene.box.spheres, std::string(background) == "background=on");
+  }
+}
+
 // H154: the photos' order does not matter.
 TEST(SceneProfile, H154_BackgroundIsIndependentOfThePhotosOrder) {
   Capture capture = CaptureSeenAllRound(2);

@@ -60,6 +60,16 @@ TEST(ForwardFacing, AGivenDepthIsUsed) {
   EXPECT_EQ(MeasureForwardFacing(capture).nearest, 2.5);
 }
 
+// A margin replaces the reach of all photos: 250 of 1008 pixels, as published, on both sides.
+TEST(ForwardFacing, AMarginAroundTheMeanPictureIsTheRadius) {
+  const Capture capture = WallCapture(10, 0.05);  // 400 x 300 pixels
+  const NormalizedScene scene =
+      NormalizeForwardFacing(capture, MeasureForwardFacing(capture), 0.25);
+  EXPECT_FLOAT_EQ(scene.box.radius.x, 1 + 2 * 100.0f / 400);
+  EXPECT_FLOAT_EQ(scene.box.radius.y, 1 + 2 * 100.0f / 300);
+  EXPECT_EQ(scene.box.radius.z, 1.0f);
+}
+
 TEST(ForwardFacing, H88_EveryRayStaysInTheBoxAndMeetsTheScene) {
   const Capture capture = WallCapture(10, 0.05);
   const NormalizedScene scene = NormalizeForwardFacing(capture, MeasureForwardFacing(capture));

@@ -2,7 +2,9 @@
 #include <algorithm>
 #include <cstdlib>
 
+#include "kernels/base/half.h"
 #include "tests/support/record_error.h"
+#include "tests/support/steepest_pair.h"
 #include "tests/support/styled_ball.h"
 
 namespace regrade {
@@ -11,32 +13,6 @@ namespace {
 using namespace testing;  // NOLINT: a test
 
 // --- the certificate
-
-// 1e5 pairs of arbitrary points, near and far, against EQ(liprf-bound).
-double SteepestPair(const LipschitzNetwork& network, int pairs) {
-  const DenseNetwork<double> f = network.Effective<double>();
-  double steepest = 0;
-  for (int i = 0; i < pairs; ++i) {
-    double x[kFeatureStride] = {}, y[kFeatureStride] = {}, fx[kNetworkSh], fy[kNetworkSh];
-    const double reach = std::pow(10.0, -3 + 3 * (i % 7) / 6.0);
-    double distance = 0;
-    for (int k = 0; k < kNetworkInputs; ++k) {
-      x[k] = 2 * Random(70, static_cast<uint64_t>(i) * 64 + k);
-      y[k] = x[k] + reach * Random(71, static_cast<uint64_t>(i) * 64 + k);
-      distance += (x[k] - y[k]) * (x[k] - y[k]);
-    }
-    DenseForward(f, x, fx);
-    DenseForward(f, y, fy);
-    if (network.data().has_base) {
-      AddBaseMap(network.data().base, x, fx);
-      AddBaseMap(network.data().base, y, fy);
-    }
-    double change = 0;
-    for (int k = 0; k < kNetworkSh; ++k) change += (fx[k] - fy[k]) * (fx[k] - fy[k]);
-    steepest = std::max(steepest, std::sqrt(change / distance));
-  }
-  return steepest;
-}
 
 TEST(LipschitzNetwork, H36_NoPairIsSteeperThanTheBound) {
   for (const char* activation : {"sine", "relu", "leaky-relu", "sigmoid", "tanh"}) {
@@ -67,6 +43,51 @@ TEST(LipschitzNetwork, H36_SineUnderManyArbitraryPairs) {
     steepest = std::max(steepest, fraction);
   }
   EXPECT_GT(steepest, 0.02);  // the attack is not idle
+}
+
+// What follows from the bound; see EQ(liprf-bound): coefficients stored as halves, styles mixed
+// with the scene, and objects, whose voxels have weights of their own.
+TEST(LipschitzNetwork, H36_HalvesMixesAndObjectsFollowFromTheBound) {
+  LipschitzNetwork network = RandomNetwork(80);
+  network.data().has_base = true;
+  network.data().base = SomeMap();
+  const double bound = network.Bound();
+  constexpr double kHalf = 0x1p-11, kSmallest = 0x1p-25;  // relative, and of subnormal halves
+  struct Sums {
+    double squares = 0;
+    void Add(double v) { squares += v * v; }
+    double norm() const { return std::sqrt(squares); }
+  };
+  ForRandomPairs(
+      network, 4000,
+      [&](const double* x, const double* y, const double* fx, const double* fy,
+          double distance) {
+        Sums stored, styled_x, styled_y, mixed, object, apart;
+        const double own = RandomDouble(1, 72, static_cast<uint64_t>(1e9 * distance)),
+                     other = 1 - own * own;
+        for (int k = 0; k < kNetworkSh; ++k) {
+          const auto half = [](double v) {
+            return double{FloatFromHalf(HalfFromFloat(static_cast<float>(v)))};
+          };
+          stored.Add(half(fx[k]) - half(fy[k]));
+          styled_x.Add(fx[k]);
+          styled_y.Add(fy[k]);
+          const auto blend = [k](const double* from, const double* to, double weight) {
+            return from[k] + weight * (to[k] - from[k]);
+          };
+          mixed.Add(blend(x, fx, own) - blend(y, fy, own));
+          object.Add(blend(x, fx, own) - blend(y, fy, other));
+          apart.Add(fy[k] - y[k]);
+        }
+        // Float rounding before the half adds 2^-24 of a value, within the rounding of kHalf's.
+        const double rounding = (kHalf + 0x1p-23) * (styled_x.norm() + styled_y.norm()) +
+                                2 * std::sqrt(27.0) * kSmallest;
+        ASSERT_LE(stored.norm(), bound * distance + rounding);
+        const double of_mix = 1 - own + own * bound;
+        ASSERT_LE(mixed.norm(), of_mix * distance * (1 + 1e-12));
+        ASSERT_LE(object.norm(), of_mix * distance * (1 + 1e-12) +
+                                     std::abs(own - other) * apart.norm() + 1e-12);
+      });
 }
 
 TEST(LipschitzNetwork, H36_StaleNormsAreNotBelieved) {

@@ -27,6 +27,7 @@ struct alignas(64) StepBlock {
   float alpha[kWide];
   float decay[kWide];  // exp(-tau)
   float slope[kWide];  // dtau/dsigma, world units; 0 if sigma or tau is clamped
+  float density[kWide];
   float transmittance_before[kWide];
 };
 
@@ -141,6 +142,7 @@ inline void SetOpacity(const Wide& density, const Wide& delta, const WideInt& co
   std::memcpy(block->alpha, &extinction.alpha, sizeof(slope));
   std::memcpy(block->decay, &extinction.decay, sizeof(slope));
   std::memcpy(block->slope, &slope, sizeof(slope));
+  std::memcpy(block->density, &density, sizeof(density));
 }
 
 // Everything about steps [first, first + kWide) except the transmittance.

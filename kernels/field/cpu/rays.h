@@ -7,6 +7,7 @@
 
 #include "kernels/base/buffer.h"
 #include "kernels/field/cpu/spheres.h"
+#include "kernels/field/density_losses.h"
 #include "kernels/field/free_space.h"
 #include "kernels/field/packed_grid.h"
 #include "kernels/field/ray_march.h"
@@ -30,6 +31,7 @@ struct RayBatch {
   const Ray* rays = nullptr;
   const Vec3f* targets = nullptr;  // sRGB; unused for rendering
   int64_t size = 0;
+  DensityLosses losses = {};  // of an adjoint
 };
 
 struct FitStepResult {
@@ -49,7 +51,8 @@ struct FastRayFunctions {
   void (*render_pair)(const FastGrid&, const FastGrid& other, const Ray*, int64_t n,
                       const MarchOptions&, float* color, float* other_color, float* depth,
                       float* transmittance);
-  // Renders, and adds the gradient of scale * sum (C - target)^2 to the arena. Returns squared
+  // Renders, and adds the gradient of scale * sum (C - target)^2 and of the batch's losses of
+  // densities to the arena. Returns squared
   // error and number of samples.
   FitStepResult (*accumulate)(const FastGrid&, const RayBatch&, const MarchOptions&,
                               float scale, GradientArena*);

@@ -100,7 +100,7 @@ FitStepResult Accumulate(const FastGrid& grid, const RayBatch& batch,
     const Vec3f d_color = error * (2 * scale);
     Quad behind{grid.background.x, grid.background.y, grid.background.z, 0};
     if (spheres) ScatterSpheres(*spheres, d_color, &behind, &arena->spheres);
-    ScatterRay(basis, d_color, behind, marched, arena);
+    ScatterRay(basis, d_color, behind, batch.losses, marched, arena);
   });
   return result;
 }

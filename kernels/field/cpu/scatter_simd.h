@@ -33,7 +33,7 @@ inline void FindSlots(Marched* marched, GradientArena* arena) {
 // radiance behind the box. See EQ(composite-adjoint).
 template <int kBasis>
 inline void ScatterRay(const RayBasis<kBasis>& basis, const Vec3f& d_color, Quad behind,
-                       Marched* marched, GradientArena* arena) {
+                       const DensityLosses& losses, Marched* marched, GradientArena* arena) {
   using Shape = RecordShape<kBasis>;
   constexpr int kLanes = Shape::kLanes;
   constexpr int kDensityVector = DensityLane(kBasis) / Shape::kWidth;
@@ -57,8 +57,10 @@ inline void ScatterRay(const RayBasis<kBasis>& basis, const Vec3f& d_color, Quad
     const float alpha = block.alpha[s.lane], decay = block.decay[s.lane];
     const float before = block.transmittance_before[s.lane];
     const Quad color = s.raw > Quad{} ? s.raw : Quad{};
-    const float d_sigma =
-        block.slope[s.lane] * before * decay * SumOf((color - behind) * d_quad);
+    float d_sigma = block.slope[s.lane] * before * decay * SumOf((color - behind) * d_quad);
+    if (losses.on() && block.slope[s.lane] > 0)
+      d_sigma += DensityLossSlope(losses, marched->transmittance, block.density[s.lane],
+                                  block.slope[s.lane]);
     behind = color * alpha + behind * decay;
 
     const Quad d_raw = s.raw > Quad{} ? before * alpha * d_quad : Quad{};

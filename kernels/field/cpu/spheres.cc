@@ -39,7 +39,6 @@ void SphereVariationGradient(const FastSpheres& spheres, int64_t begin, int64_t 
 int64_t StepSpheres(FastSpheres* spheres, float* second_moment,
                     const SphereArena* const* arenas, int num_arenas, int self, int64_t begin,
                     int64_t end, const RmspropOptions& options) {
-  constexpr float kColorBound = static_cast<float>(0.5 / kSh0);  // 1/2 + kSh0 a in [0, 1]
   int64_t rejected = 0;
   for (int64_t slot = begin; slot < end; ++slot) {
     const int32_t texel = arenas[self]->texel_of_slot[slot];
@@ -65,7 +64,7 @@ int64_t StepSpheres(FastSpheres* spheres, float* second_moment,
       v[c] = v[c] == 0 ? squared : options.beta * v[c] + (1 - options.beta) * squared;
       const float rate = c == 3 ? options.rate_sphere_density : options.rate_sphere_color;
       x[c] -= rate * g[c] / (std::sqrt(v[c]) + options.epsilon);
-      if (c < 3) x[c] = std::clamp(x[c], -kColorBound, kColorBound);
+      if (c < 3) x[c] = std::clamp(x[c], -options.mean_bound, options.mean_bound);
     }
   }
   return rejected;

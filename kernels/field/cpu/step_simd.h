@@ -142,10 +142,10 @@ int64_t Step(FastGrid* grid, float* second_moment, const GradientArena* arenas, 
   density_lanes[DensityLane(kBasis)] = 1;
   const R only_density = R::Load(density_lanes);
   alignas(64) float low_lanes[kLanes], high_lanes[kLanes];
-  constexpr float kMeanBound = static_cast<float>(0.5 / kSh0);  // 1/2 + kSh0 sh_0 in [0, 1]
+  static_assert(RmspropOptions().mean_bound == static_cast<float>(0.5 / kSh0));
   for (int l = 0; l < kLanes; ++l) {
-    const float bound = l >= 3 * kBasis   ? 3e38f
-                        : l % kBasis == 0 ? kMeanBound
+    const float bound = l >= 3 * kBasis   ? kUnbounded
+                        : l % kBasis == 0 ? options.mean_bound
                                           : options.view_bound;
     low_lanes[l] = -bound;
     high_lanes[l] = bound;

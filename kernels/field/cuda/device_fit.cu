@@ -91,11 +91,12 @@ __device__ void ScatterChunk(const DeviceGridView& grid, const LaneValues<kBasis
 }
 
 // The backward pass along a ray; see EQ(composite-adjoint). `behind` is the radiance behind all
-// samples.
+// samples, `remaining` the transmittance there.
 template <int kBasis, bool kExact, typename Sampler>
 __device__ void WalkBack(const DeviceGridView& grid, const LaneValues<kBasis>& values,
                          const SampleStore& store, int count, float delta, Vec3f behind,
-                         const Vec3f& d_color, const GradientView& gradient, int lane) {
+                         const Vec3f& d_color, const DensityLosses& losses, float remaining,
+                         const GradientView& gradient, int lane) {
   for (int end = count; end > 0; end -= 32) {
     const int mine = end - 1 - lane;
     float a = 1, d_sigma = 0;
@@ -117,8 +118,12 @@ __device__ void WalkBack(const DeviceGridView& grid, const LaneValues<kBasis>& v
                raw_tau.z > 0 ? w * d_color.z : 0.0f};
     }
     const Vec3f radiance_behind = BackgroundRadiance(a, b, lane, &behind);
-    if (mine >= 0 && tau < static_cast<float>(kMaxOpticalDepth))
-      d_sigma = store.Delta(mine, delta) * before * a * Dot(color - radiance_behind, d_color);
+    if (mine >= 0 && tau < static_cast<float>(kMaxOpticalDepth)) {
+      const float length = store.Delta(mine, delta);
+      d_sigma = length * before * a * Dot(color - radiance_behind, d_color);
+      if (losses.on() && length > 0)
+        d_sigma += DensityLossSlope(losses, remaining, tau / length, length);
+    }
     ScatterChunk<kBasis, kExact, Sampler>(grid, values, place, d_raw, d_sigma, min(32, end),
                                           gradient, lane);
     __syncwarp();
@@ -163,9 +168,10 @@ struct RayLoss {
 // a ray.
 template <int kBasis, bool kExact>
 __global__ void FitCellRaysKernel(DeviceGridView grid, const Ray* rays, const Vec3f* targets,
-                                  int64_t n, float stop, float scale, GradientView gradient,
-                                  CellSamples lists, const Vec3f* behind_rays,
-                                  Vec3f* d_behind_rays, DeviceFitSums* sums) {
+                                  int64_t n, float stop, float scale, DensityLosses losses,
+                                  GradientView gradient, CellSamples lists,
+                                  const Vec3f* behind_rays, Vec3f* d_behind_rays,
+                                  DeviceFitSums* sums) {
   using Layout = RecordLayout<kBasis>;
   const int lane = static_cast<int>(threadIdx.x & 31);
   const int64_t r = (blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x) / 32;
@@ -185,7 +191,8 @@ __global__ void FitCellRaysKernel(DeviceGridView grid, const Ray* rays, const Ve
                      behind_rays, d_behind_rays, lane);
   __syncwarp();  // colours were written by some lanes and are read by others
   WalkBack<kBasis, kExact, CellSampler>(grid, values, store, count, 0, loss.behind,
-                                        loss.error * (2 * scale), gradient, lane);
+                                        loss.error * (2 * scale), losses,
+                                        lists.transmittance[r], gradient, lane);
   if (lane != 0) return;
   atomicAdd(&sums->squared_error, ExactTerm(static_cast<double>(Dot(loss.error, loss.error))));
   atomicAdd(&sums->samples, static_cast<unsigned long long>(count));
@@ -193,9 +200,9 @@ __global__ void FitCellRaysKernel(DeviceGridView grid, const Ray* rays, const Ve
 
 template <int kBasis, bool kExact>
 __global__ void FitRaysKernel(DeviceGridView grid, const Ray* rays, const Vec3f* targets, int n,
-                              MarchOptions options, float scale, GradientView gradient,
-                              float* store_memory, int64_t capacity, int32_t* next_ray,
-                              const Vec3f* behind_rays, Vec3f* d_behind_rays,
+                              MarchOptions options, float scale, DensityLosses losses,
+                              GradientView gradient, float* store_memory, int64_t capacity,
+                              int32_t* next_ray, const Vec3f* behind_rays, Vec3f* d_behind_rays,
                               DeviceFitSums* sums) {
   using Layout = RecordLayout<kBasis>;
   const int lane = static_cast<int>(threadIdx.x & 31);
@@ -243,8 +250,8 @@ __global__ void FitRaysKernel(DeviceGridView grid, const Ray* rays, const Vec3f*
     samples += static_cast<unsigned>(count);
     __syncwarp();  // colours were written by some lanes and are read by others
     WalkBack<kBasis, kExact, GridSampler>(grid, values, store, count, march.delta(),
-                                          loss.behind, loss.error * (2 * scale), gradient,
-                                          lane);
+                                          loss.behind, loss.error * (2 * scale), losses,
+                                          transmittance, gradient, lane);
   }
   if (lane == 0) {
     atomicAdd(&sums->squared_error, squared_error);
@@ -273,7 +280,7 @@ DeviceRayFitter::DeviceRayFitter(const GridFrame& frame, const MarchOptions& opt
 
 void DeviceRayFitter::AccumulateCells(const DeviceGrid& grid, const Ray* rays,
                                       const Vec3f* targets, int64_t n, float scale,
-                                      DeviceTouched* touched) {
+                                      DeviceTouched* touched, const DensityLosses& losses) {
   if (cells_.rays() == 0) cells_ = CellSampleStore(grid.frame, n, max_bytes_);
   const CellSamples lists = cells_.view();
   const GradientView view{grid.gradient(), touched->bits.data()};
@@ -283,7 +290,7 @@ void DeviceRayFitter::AccumulateCells(const DeviceGrid& grid, const Ray* rays,
     ByBasis(grid.basis, grid.exact_sums, [&](auto basis, auto exact) {
       FitCellRaysKernel<basis.value, exact.value><<<BlocksFor(32 * size), kThreads>>>(
           grid.view(), rays + begin, targets + begin, size, options_.stop_transmittance, scale,
-          view, lists, grid.spheres.on() ? behind_.data() + begin : nullptr,
+          losses, view, lists, grid.spheres.on() ? behind_.data() + begin : nullptr,
           grid.spheres.on() ? d_behind_.data() + begin : nullptr, sums_.data());
     });
     CheckLaunch("fit_cell_rays");
@@ -291,7 +298,8 @@ void DeviceRayFitter::AccumulateCells(const DeviceGrid& grid, const Ray* rays,
 }
 
 void DeviceRayFitter::Accumulate(const DeviceGrid& grid, const Ray* rays, const Vec3f* targets,
-                                 int64_t n, float scale, DeviceTouched* touched) {
+                                 int64_t n, float scale, DeviceTouched* touched,
+                                 const DensityLosses& losses) {
   next_ray_.Zero();
   REGRADE_CHECK(grid.fitting);
   if (!grid.cells.on() && store_.size() == 0)
@@ -307,7 +315,7 @@ void DeviceRayFitter::Accumulate(const DeviceGrid& grid, const Ray* rays, const 
     SphereRadiance(grid, rays, n, options_, behind_.data());
   }
   if (grid.cells.on()) {
-    AccumulateCells(grid, rays, targets, n, scale, touched);
+    AccumulateCells(grid, rays, targets, n, scale, touched, losses);
     if (spheres)
       SphereRadianceAdjoint(grid, rays, d_behind_.data(), n, options_, touched, sums_.data());
     return;
@@ -315,7 +323,7 @@ void DeviceRayFitter::Accumulate(const DeviceGrid& grid, const Ray* rays, const 
   ByBasis(grid.basis, grid.exact_sums, [&](auto basis, auto exact) {
     FitRaysKernel<basis.value, exact.value>
         <<<static_cast<unsigned>(warps_ / kWarpsPerBlock), 32 * kWarpsPerBlock>>>(
-            grid.view(), rays, targets, static_cast<int>(n), options_, scale, view,
+            grid.view(), rays, targets, static_cast<int>(n), options_, scale, losses, view,
             store_.data(), capacity_, next_ray_.data(), spheres ? behind_.data() : nullptr,
             spheres ? d_behind_.data() : nullptr, sums_.data());
   });
@@ -337,9 +345,9 @@ DeviceRayFitter::DeviceRayFitter(const GridFrame&, const MarchOptions&, int64_t)
   DeviceWait("fit_rays");
 }
 void DeviceRayFitter::Accumulate(const DeviceGrid&, const Ray*, const Vec3f*, int64_t, float,
-                                 DeviceTouched*) {}
+                                 DeviceTouched*, const DensityLosses&) {}
 void DeviceRayFitter::AccumulateCells(const DeviceGrid&, const Ray*, const Vec3f*, int64_t,
-                                      float, DeviceTouched*) {}
+                                      float, DeviceTouched*, const DensityLosses&) {}
 DeviceFitSums DeviceRayFitter::TakeSums() { return {}; }
 
 #endif

@@ -6,6 +6,7 @@
 #include "kernels/field/cuda/cell_march.h"
 #include "kernels/field/cuda/device_grid.h"
 #include "kernels/field/cuda/half_grid.h"
+#include "kernels/field/density_losses.h"
 #include "kernels/field/ray_march.h"
 #include "kernels/field/render.h"
 #include "kernels/optimize/rmsprop.h"
@@ -62,20 +63,21 @@ struct DeviceTouched {
 };
 
 // Forward pass, loss and adjoint of a batch on a grid that is being fitted: adds the gradient
-// of scale * sum (C - target)^2, including that of background layers (device_sphere_rays.h).
+// of scale * sum (C - target)^2, including that of background layers (device_sphere_rays.h),
+// and of the losses of densities.
 // Float sums have no fixed order: two runs differ in the last bits unless exact_sums is set.
 class DeviceRayFitter {
  public:
   // Stores every sample of the rays in flight; `max_bytes` bounds the store.
   DeviceRayFitter(const GridFrame& frame, const MarchOptions& options, int64_t max_bytes);
   void Accumulate(const DeviceGrid& grid, const Ray* rays, const Vec3f* targets, int64_t n,
-                  float scale, DeviceTouched* touched);
+                  float scale, DeviceTouched* touched, const DensityLosses& losses = {});
   DeviceFitSums TakeSums();  // returns the sums and resets them to zero
   DeviceFitSums* sums() { return sums_.data(); }
 
  private:
   void AccumulateCells(const DeviceGrid& grid, const Ray* rays, const Vec3f* targets, int64_t n,
-                       float scale, DeviceTouched* touched);
+                       float scale, DeviceTouched* touched, const DensityLosses& losses);
 
   MarchOptions options_;
   int64_t max_bytes_ = 0;

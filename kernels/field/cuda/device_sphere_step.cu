@@ -60,7 +60,6 @@ template <bool kExact>
 __global__ void StepSpheresKernel(DeviceSpheresView spheres, float* gradient,
                                   float* second_moment, uint32_t* __restrict__ touched,
                                   int64_t words, RmspropOptions options, DeviceFitSums* sums) {
-  constexpr float kColorBound = static_cast<float>(0.5 / kSh0);  // 1/2 + kSh0 a in [0, 1]
   const int lane = static_cast<int>(threadIdx.x & 31);
   const int64_t warps = static_cast<int64_t>(gridDim.x) * (blockDim.x / 32);
   for (int64_t w = blockIdx.x * static_cast<int64_t>(blockDim.x / 32) + threadIdx.x / 32;
@@ -100,7 +99,7 @@ __global__ void StepSpheresKernel(DeviceSpheresView spheres, float* gradient,
           moment[c] == 0 ? squared : options.beta * moment[c] + (1 - options.beta) * squared;
       const float rate = c == 3 ? options.rate_sphere_density : options.rate_sphere_color;
       value[c] -= rate * g[c] / (sqrtf(moment[c]) + options.epsilon);
-      if (c < 3) value[c] = fminf(fmaxf(value[c], -kColorBound), kColorBound);
+      if (c < 3) value[c] = fminf(fmaxf(value[c], -options.mean_bound), options.mean_bound);
     }
     *x = {value[0], value[1], value[2], value[3]};
     *v = {moment[0], moment[1], moment[2], moment[3]};

@@ -114,15 +114,14 @@ struct StepRules {
   float rate[4], bound[4];
 
   __device__ StepRules(int quad, const RmspropOptions& options) {
-    constexpr float kMeanBound = static_cast<float>(0.5 / kSh0);  // 1/2 + kSh0 sh_0 in [0, 1]
 #pragma unroll
     for (int i = 0; i < 4; ++i) {
       const int value = 4 * quad + i;
       rate[i] = value == DensityLane(kBasis) ? options.rate_density
                 : value < 3 * kBasis         ? options.rate_sh
                                              : 0.0f;
-      bound[i] = value >= 3 * kBasis   ? 3e38f
-                 : value % kBasis == 0 ? kMeanBound
+      bound[i] = value >= 3 * kBasis   ? kUnbounded
+                 : value % kBasis == 0 ? options.mean_bound
                                        : options.view_bound;
     }
   }

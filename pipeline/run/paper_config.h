@@ -1,0 +1,48 @@
+// The four configurations of Plenoxels' published code (svox2), for --preset paper.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "pipeline/program/run_options.h"
+#include "pipeline/run/run_settings.h"
+
+namespace regrade {
+
+inline constexpr const char* kPaperConfigs[] = {"syn", "llff", "tnt", "custom"};
+// What --preset paper sets before the capture is known.
+inline constexpr char kPaperBase[] = "custom";
+
+// Sets everything that a configuration decides: field, box, effects and size of the photos.
+// Throws Error(kUsage) for a name that is not in kPaperConfigs.
+void UsePaperConfig(const std::string& name, RunSettings* settings);
+
+// {"name": value} of what a configuration decides: as the settings have it, and as published.
+JsonValue DecidedValues(const RunSettings& settings);
+JsonValue PaperValues(const std::string& name);
+
+// What the choice depends on; see paper_traits.h.
+struct PaperTraits {
+  bool transparent = false, forward_facing = false;
+};
+
+struct PaperChoice {
+  std::string name, reason;
+};
+
+// svox2 chooses none by itself; auto is ours. Throws Error(kUsage), with the remedy, for syn
+// without transparent photos and for llff without a forward-facing capture.
+PaperChoice ChoosePaperConfig(const std::string& asked, const PaperTraits& traits);
+
+// Throws Error(kUsage) for a field of several levels with --preset paper, and for a
+// configuration without it.
+void CheckPaper(const std::string& preset, const std::string& config, const std::string& field);
+
+// Sets the options, bound after --preset paper, to the choice. An option stays where a flag set
+// it, or where its value is not the base's: it was asked for.
+void ApplyPaperChoice(const PaperChoice& choice, OptionSet* options);
+
+// "--fit-rays is 64, published 5000" for each value that is not the configuration's.
+std::vector<std::string> NotToTheLetter(const std::string& name, const JsonValue& values);
+
+}  // namespace regrade
