@@ -54,21 +54,20 @@ struct FramesOptions {
 };
 
 // Writes report.json, and a page with the metrics and the heat maps.
-void WriteEvaluation(const Workspace& workspace, const EvaluationMetrics& metrics,
-                     double seconds) {
-  RunReport report;
-  report.evaluation = metrics;
+void WriteEvaluation(const Workspace& workspace, const RunReport& report) {
+  WriteJsonFile(workspace.Path("report.json"), EvaluationJson(report));
   ReportPictures pictures;
   pictures.title = std::filesystem::path(workspace.folder()).filename().string();
-  pictures.heat_maps = HeatMapPictures(workspace, metrics);
-  report.version = REGRADE_VERSION;
-  report.seconds = seconds;
-  WriteJsonFile(workspace.Path("report.json"), EvaluationJson(metrics));
-  WriteFileAtomically(workspace.Path("report.html"), ReportHtml(report, pictures));
+  pictures.heat_maps = HeatMapPictures(workspace, report.evaluation);
+  RunReport page = report;  // which has no run's command and stages
+  page.command.clear();
+  page.stages = {};
+  WriteFileAtomically(workspace.Path("report.html"), ReportHtml(page, pictures));
 }
 
+// `words` are those of the command line.
 void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& options,
-                    Console* console) {
+                    const Arguments& words, Console* console) {
   if (options.mode == "geometry")
     throw UsageError("geometry is known only for runs of regrade", "--mode",
                      "use lai2018 or ruder2016 for frames of other programs");
@@ -129,12 +128,19 @@ void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& optio
     BeginHeatMaps(*workspace);
     heat_maps = WriteHeatMaps(*workspace, sequences, consistency);
   }
-  const EvaluationMetrics metrics = MetricsOf(consistency, fidelity, heat_maps);
-  if (workspace) WriteEvaluation(*workspace, metrics, seconds);
-  console->Event("evaluation", MetricsToJson(metrics));
-  console->Lines(FormatTables(consistency, fidelity, frames.table));
   RunReport report;
-  report.evaluation = metrics;
+  report.evaluation = MetricsOf(consistency, fidelity, heat_maps);
+  report.version = REGRADE_VERSION;
+  report.seconds = seconds;
+  report.command = {"regrade", "evaluate"};
+  report.command.insert(report.command.end(), words.begin(), words.end());
+  report.stages.evaluate.emplace();
+  report.stages.evaluate->time.seconds = seconds;
+  report.stages.evaluate->flow = options.flow;
+  report.stages.evaluate->mask = options.mode;
+  if (workspace) WriteEvaluation(*workspace, report);
+  console->Event("evaluation", MetricsToJson(report.evaluation));
+  console->Lines(FormatTables(consistency, fidelity, frames.table));
   ThrowIfAny(FailedRequirements(required, report));
 }
 
@@ -156,7 +162,7 @@ void RunEvaluate(const Command& command, const Arguments& words, Console* consol
   if (!has_frames && !AsksForHelp(arguments))
     return ContinueStyle(command, arguments, "evaluate", console);
   if (!Prepare(command, arguments, {.least_words = 0, .most_words = 0}, &options)) return;
-  EvaluateFrames(frames, consistency, console);
+  EvaluateFrames(frames, consistency, words, console);
 }
 
 }  // namespace regrade

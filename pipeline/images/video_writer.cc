@@ -27,8 +27,11 @@ namespace {
 
 using namespace ffmpeg;  // NOLINT: owners of its objects
 
-// x264's output depends on the number of threads: a fixed one gives the same film anywhere.
-constexpr int kEncoderThreads = 4;
+// x264's output depends on the number of threads: one that follows from the height gives the
+// same film anywhere. Threads work on frames one behind the other, and where a frame is too low
+// for them, what one reads of another is a race: three frames of 64 x 48 pixels by four threads
+// gave another film in one of six runs.
+int EncoderThreads(int height) { return std::clamp(height / 96, 1, 4); }
 
 uint8_t Byte(float value) {  // as in our PNG files
   return value > 0 ? static_cast<uint8_t>(std::min(value, 1.f) * 255.f + 0.5f) : 0;
@@ -81,7 +84,7 @@ struct VideoWriter::State {
     encoder->colorspace = AVCOL_SPC_BT709;
     encoder->color_primaries = AVCOL_PRI_BT709;
     encoder->color_trc = AVCOL_TRC_IEC61966_2_1;  // sRGB
-    encoder->thread_count = kEncoderThreads;
+    encoder->thread_count = EncoderThreads(height);
     encoder->flags |= AV_CODEC_FLAG_BITEXACT;
     if ((output->oformat->flags & AVFMT_GLOBALHEADER) != 0)
       encoder->flags |= AV_CODEC_FLAG_GLOBAL_HEADER;

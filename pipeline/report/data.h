@@ -67,7 +67,7 @@ struct OptionValue {
 
 struct RunReport {
   std::string version;               // of regrade
-  std::vector<std::string> command;  // argv; empty for frames of other programs
+  std::vector<std::string> command;  // argv; pages of other programs' frames do not show it
   std::string preset, device;
   uint64_t seed = 0;
   double seconds = 0;

@@ -57,9 +57,13 @@ JsonValue ReportJson(const RunReport& report) {
   return json;
 }
 
-JsonValue EvaluationJson(const EvaluationMetrics& metrics) {
-  JsonValue json = Object{{"schema", kSchema}};
-  PutMetrics(metrics, &json);
+JsonValue EvaluationJson(const RunReport& report) {
+  JsonValue json =
+      Object{{"schema", kSchema},
+             {"regrade", report.version},
+             {"command", JsonValue::Array(report.command.begin(), report.command.end())},
+             {"stages", StagesJson(report.stages)}};
+  PutMetrics(report.evaluation, &json);
   return json;
 }
 

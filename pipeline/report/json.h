@@ -10,8 +10,9 @@ namespace regrade {
 // did not run are absent, as are versions and costs where there are none.
 JsonValue ReportJson(const RunReport& report);
 
-// {"schema": 2, "consistency": [...], "fidelity": [...], "consistency_pairs": [...]}: what
-// `regrade evaluate` writes for frames of other programs.
-JsonValue EvaluationJson(const EvaluationMetrics& metrics);
+// {"schema": 2, "regrade": ..., "command": [...], "stages": {"evaluate": {...}}, "consistency":
+// [...], "fidelity": [...], "consistency_pairs": [...]}: what `regrade evaluate` writes for
+// frames of other programs.
+JsonValue EvaluationJson(const RunReport& report);
 
 }  // namespace regrade

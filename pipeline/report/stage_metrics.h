@@ -92,7 +92,8 @@ struct ReconstructReport {
     visit("device", device);
     visit("paper_config", paper_config,
           {.label = "configuration of the paper", .optional = true});
-    visit("not_to_the_letter", not_to_the_letter, {.label = "not to the letter"});
+    if (!paper_config.empty())
+      visit("not_to_the_letter", not_to_the_letter, {.label = "not to the letter"});
     visit("finest_grid", finest_grid);
     visit("rays", rays);
     visit("sh_degree", sh_degree, {.label = "degree of view dependence"});

@@ -39,7 +39,7 @@ def reports(work, kind):
 
 def rows_of(scene, style, method, seed, report):
     """A row for each sequence of frames: the renders, the 2D method on them, the restyled field."""
-    foreign = "stages" not in report
+    foreign = "stylize" not in report["stages"]
     names = {} if foreign else {"source": "no style", "views_2d": method, "styled": method + " w/ Lip"}
     tc = {(c["sequence"], c["gap"]): c["tc_psnr_mean_db"] for c in report["consistency"]}
     gaps = sorted({gap for _, gap in tc})
@@ -50,7 +50,7 @@ def rows_of(scene, style, method, seed, report):
             continue
         near = next((f for f in report.get("fidelity", []) if f["sequence"] == sequence), {})
         row = {"scene": scene, "style": style, "method": names.get(sequence, method), "seed": seed,
-               "motion": report.get("mask") or evaluate.get("mask"),
+               "motion": evaluate.get("mask"),
                "short_db": tc.get((sequence, gaps[0])), "long_db": tc.get((sequence, gaps[-1])),
                "structure": near.get("structure"), "distance_to_style": near.get("sliced_wasserstein_to_style")}
         if sequence == "source":

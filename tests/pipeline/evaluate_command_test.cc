@@ -223,8 +223,12 @@ TEST(EvaluateCommand, AProtocolSetsModeAndGaps) {
   EXPECT_OUTPUT(named, "mode ruder2016");
   const Outcome spelled = evaluate({"--mode", "ruder2016", "--gaps", "1,5"}, "spelled");
   ASSERT_EQ(spelled.code, 0) << spelled.text;
-  EXPECT_EQ(testing::ReadText(folder / "named/report.json"),
-            testing::ReadText(folder / "spelled/report.json"));
+  const auto report_of = [&](const std::string& out) {
+    JsonValue json = ReadJsonFile(folder / (out + "/report.json"));
+    json["command"] = json["stages"]["evaluate"]["seconds"] = JsonValue();
+    return DumpJson(json);
+  };
+  EXPECT_EQ(report_of("named"), report_of("spelled"));
   const Outcome refused = evaluate({"--protocol", "liprf", "--gaps", "1,7"}, "refused");
   EXPECT_EQ(refused.code, 2);
   EXPECT_OUTPUT(refused, "leave out --gaps");

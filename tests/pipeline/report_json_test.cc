@@ -215,8 +215,15 @@ TEST(ReportJson, StagesThatDidNotRunAreAbsent) {
 }
 
 TEST(ReportJson, EvaluationAlone) {
-  EXPECT_EQ(KeysOf(EvaluationJson(MeasuredEvaluation())),
-            (Keys{"schema", "consistency", "fidelity", "consistency_pairs"}));
+  RunReport report;
+  report.evaluation = MeasuredEvaluation();
+  report.stages.evaluate.emplace();
+  report.stages.evaluate->mask = "ruder2016";
+  const JsonValue json = EvaluationJson(report);
+  EXPECT_EQ(KeysOf(json), (Keys{"schema", "regrade", "command", "stages", "consistency",
+                                "fidelity", "consistency_pairs"}));
+  EXPECT_EQ(KeysOf(json.At("stages")), Keys{"evaluate"});
+  EXPECT_EQ(json.At("stages").At("evaluate").At("mask").AsString(), "ruder2016");
 }
 
 // What is read is what was written, member for member.
