@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Installs the Debian 12 packages that regrade is built with and runs on; does nothing when all are there.
 #   install_packages.sh [--browser] [--dev] [--ask]
-# --browser adds Chromium, to test pages with; --dev that, clang-format and clang-tidy; --ask asks first, where somebody
-# can answer
+# --browser adds Chromium and ffmpeg, to test pages with; --dev these, clang-format and clang-tidy; --ask asks first, where
+# somebody can answer
 set -euo pipefail
 
 packages=(
@@ -21,7 +21,7 @@ packages=(
 ask=
 for word in "$@"; do
   [[ $word == --dev ]] && packages+=(clang-format clang-tidy)
-  [[ $word == --dev || $word == --browser ]] && packages+=(chromium)
+  [[ $word == --dev || $word == --browser ]] && packages+=(chromium ffmpeg)
   [[ $word == --ask ]] && ask=1
 done
 

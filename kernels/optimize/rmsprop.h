@@ -3,11 +3,11 @@
 
 namespace regrade {
 
+inline constexpr float kUnbounded = 3e38f;
+
 // EQ(rmsprop), as in svox2: v = g^2 at first touch, then v = beta v + (1 - beta) g^2;
 // x -= rate g / (sqrt(v) + epsilon), without bias correction; untouched voxels keep value and
 // state bit for bit.
-inline constexpr float kUnbounded = 3e38f;
-
 struct RmspropOptions {
   float beta = 0.95f;
   float epsilon = 1e-8f;

@@ -73,11 +73,27 @@ std::string ChoosePaper(const FitPackedOptions& settings, const PackedCapture& c
   return choice.name;
 }
 
-std::optional<FitState> ReadFitCheckpoint(const std::string& path) {
+// What a fit depends on: a checkpoint of another one is not continued.
+std::string IdentityOf(const FitPackedOptions& settings, const FitOptions& options) {
+  return DumpJson(
+      JsonValue::Object{
+          {"capture", std::filesystem::path(settings.capture).filename().string()},
+          {"bytes", static_cast<int64_t>(std::filesystem::file_size(settings.capture))},
+          {"options", OptionValues(options)},
+          {"seed", options.seed}},
+      -1);
+}
+
+std::optional<FitState> ReadFitCheckpoint(const std::string& path,
+                                          const std::string& identity) {
   if (!std::filesystem::is_regular_file(path)) return std::nullopt;
   constexpr uint64_t kMost = uint64_t{1} << 36;
-  std::optional<FitState> state = UnpackFitState(ReadWholeFile(path, kMost));
+  std::string note;
+  std::optional<FitState> state = UnpackFitState(ReadWholeFile(path, kMost), &note);
   if (!state) throw InputError("is no checkpoint of a fit", path, "remove it");
+  if (note != identity)
+    throw InputError("is the checkpoint of a fit with another capture or other options", path,
+                     "give the same ones, or another --checkpoint");
   return state;
 }
 
@@ -100,9 +116,10 @@ void FitPacked(const FitPackedOptions& settings, const FitOptions& fit_options,
   FitHooks hooks;
   std::optional<FitState> resume;
   if (!settings.checkpoint.empty()) {
-    resume = ReadFitCheckpoint(settings.checkpoint);
-    hooks.checkpoint = [&](const FitState& state) {
-      WriteFileAtomically(settings.checkpoint, PackFitState(state).Pieces());
+    const std::string identity = IdentityOf(settings, options);
+    resume = ReadFitCheckpoint(settings.checkpoint, identity);
+    hooks.checkpoint = [&settings, identity](const FitState& state) {
+      WriteFileAtomically(settings.checkpoint, PackFitState(state, identity).Pieces());
     };
   }
   if (resume) hooks.resume = &*resume;
@@ -149,7 +166,7 @@ void FitPacked(const FitPackedOptions& settings, const FitOptions& fit_options,
   const JsonValue record =
       JsonValue::Object{{"capture", settings.capture},
                         {"device", settings.device == "cpu" ? "cpu" : device.name},
-                        {"paper_config", paper},
+                        {"paper_config", paper.empty() ? JsonValue() : JsonValue(paper)},
                         {"not_to_the_letter", std::move(differences)},
                         {"seconds_read", read_seconds},
                         {"seconds_fit", fit_seconds},

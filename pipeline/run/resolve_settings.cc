@@ -60,14 +60,12 @@ JsonValue FieldValues(const std::string& field) {
   return set;
 }
 
-// Writes those of the values that the set has. Without --preset an option `effects` is not that
-// of a run: `regrade synth` has its own.
+// Writes those of the values that the set has.
 void ApplyKnown(const JsonValue& values, const std::string& where, OptionSet* options) {
   const JsonValue known = options->Values();
-  const bool run = known.Find("preset") != nullptr;
   JsonValue kept = JsonValue::Object();
   for (const auto& [name, value] : values.AsObject())
-    if (known.Find(name) != nullptr && (run || name != "effects")) kept[name] = value;
+    if (known.Find(name) != nullptr) kept[name] = value;
   options->ApplyConfig(kept, where);
 }
 
@@ -108,7 +106,9 @@ void ApplyRunFile(const RunFile& file, const std::string& path,
 std::vector<std::string> ResolveSettings(const SettingsSources& sources, OptionSet* options) {
   std::vector<std::string> words;
   const bool on_card = OnCard(*options);
-  ApplyKnown(PresetValues(sources.preset, on_card), "--preset", options);
+  // Not to a command that no preset is meant for: `regrade synth` has --effects of its own.
+  if (options->Values().Find("preset") != nullptr || !sources.run_json.empty())
+    ApplyKnown(PresetValues(sources.preset, on_card), "--preset", options);
   if (!sources.run_json.empty()) {
     const RunFile file = ReadRunFile(sources.run_json);
     ApplyRunFile(file, sources.run_json, sources.taken, on_card, options);

@@ -50,7 +50,7 @@ struct FitSums {
 struct PruneLimits {
   bool by_density = false;  // or else by the largest rendering weight in any view
   float least = 0;
-  int64_t max_voxels = 0;  // see BoundedLimit; 0: no limit
+  int64_t max_voxels = 0;  // before resampling; see BoundedLimit; 0: no limit
 };
 
 class FitEngine {
@@ -72,9 +72,8 @@ class FitEngine {
   virtual RenderedView Render(const Camera& camera, const MarchOptions& march) = 0;
   // Of an adaptive field: removes and splits cells; moments stay.
   virtual void RefineCells(const MarchOptions& march, const CellLimits& limits) = 0;
-  // Prunes voxels and resamples;
-  // resets the optimizer's state, as in svox2. Background spheres, if any, get maps of
-  // `sphere_resolution` and are not pruned.
+  // Prunes voxels and resamples; resets the optimizer's state, as in svox2. Background spheres,
+  // if any, get maps of `sphere_resolution` and are not pruned.
   virtual void Refine(const MarchOptions& march, const PruneLimits& limits,
                       const Vec3i& resolution, int sphere_resolution) = 0;
 };

@@ -61,10 +61,7 @@ class CpuFitEngine : public FitEngine {
     const Buffer<float> weights =
         limits.by_density ? Densities()
                           : MaxWeightsOverViews(state_.grid, *rays_, march, kPruningStride);
-    const double growth =
-        static_cast<double>(int64_t{resolution.x} * resolution.y * resolution.z) /
-        static_cast<double>(state_.grid.frame.NumVertices());
-    const float threshold = BoundedLimit(weights, limits.least, growth, limits.max_voxels);
+    const float threshold = BoundedLimit(weights, limits.least, limits.max_voxels);
     FastSpheres spheres = std::move(state_.grid.spheres);
     state_.grid = Resample(state_.grid, weights, threshold, resolution);
     if (spheres.on() && sphere_resolution != spheres.resolution)

@@ -100,13 +100,10 @@ class CudaFitEngine : public FitEngine {
               int sphere_resolution) override {
     const DeviceRange range("pruning and resampling");
     const DeviceBuffer<float> weights = limits.by_density ? Densities() : MaxWeights(march);
-    const double growth =
-        static_cast<double>(int64_t{resolution.x} * resolution.y * resolution.z) /
-        static_cast<double>(grid_.frame.NumVertices());
     const float threshold =
         limits.max_voxels == 0
             ? limits.least
-            : BoundedLimit(weights.ToHost(), limits.least, growth, limits.max_voxels);
+            : BoundedLimit(weights.ToHost(), limits.least, limits.max_voxels);
     DeviceGrid next = ResampleOnDevice(grid_, weights, threshold, resolution);
     if (next.num_voxels() == 0)
       throw Error(ExitCode::kScene,

@@ -259,8 +259,17 @@ class Fitter {
                                                              : std::max({now.x, now.y, now.z});
     engine_->Refine({options_.step, options_.stop_transmittance},
                     {by_density, options_.prune_weight / static_cast<float>(side),
-                     static_cast<int64_t>(double{options_.max_voxels} * 1e6)},
+                     MostVoxelsBefore(now, next)},
                     next, SphereResolution(std::min(stage_, last_stage)));
+  }
+
+  // How many vertices may stay on a grid of `now` so that --max-voxels are left on `next`,
+  // whose vertices are closer; 0: any number.
+  int64_t MostVoxelsBefore(const Vec3i& now, const Vec3i& next) const {
+    if (options_.max_voxels == 0) return 0;
+    const auto vertices = [](const Vec3i& n) { return double(n.x) * n.y * n.z; };
+    return std::max<int64_t>(1, static_cast<int64_t>(double{options_.max_voxels} * 1e6 *
+                                                     vertices(now) / vertices(next)));
   }
 
   // A device's sums are read once per window, so that it need not wait for the host at each

@@ -100,13 +100,12 @@ Vec3i GridOfStage(const FitOptions& options, const SceneBox& box, size_t stage) 
   return n;
 }
 
-float BoundedLimit(const Buffer<float>& weights, float least, double growth, int64_t most) {
+float BoundedLimit(const Buffer<float>& weights, float least, int64_t most) {
   std::vector<float> kept;
   std::ranges::copy_if(weights, std::back_inserter(kept),
                        [least](float weight) { return weight >= least; });
-  const auto few = static_cast<size_t>(static_cast<double>(most) / growth);
-  if (most == 0 || kept.size() <= few || few == 0) return least;
-  const auto last = kept.begin() + static_cast<std::ptrdiff_t>(few) - 1;
+  if (most == 0 || std::ssize(kept) <= most) return least;
+  const auto last = kept.begin() + most - 1;
   std::ranges::nth_element(kept, last, std::greater());
   return *last;
 }

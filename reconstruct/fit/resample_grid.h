@@ -27,9 +27,8 @@ Buffer<float> MaxWeightsOverViews(const FastGrid& grid, const TrainingRays& rays
 Vec3i GridOfStage(const FitOptions& options, const SceneBox& box, size_t stage);
 
 // The least of `weights` to keep, at least `least`: raised, as in svox2, where more than `most`
-// vertices would stay on a grid with `growth` times as many. Their neighbours, which stay, too,
-// are not counted. most 0: no limit.
-float BoundedLimit(const Buffer<float>& weights, float least, double growth, int64_t most);
+// would stay. Their neighbours, which stay, too, are not counted. most 0: no limit.
+float BoundedLimit(const Buffer<float>& weights, float least, int64_t most);
 
 // The field interpolated trilinearly on a grid of `resolution`; keeps vertices within one voxel
 // of an old voxel whose weight is at least `threshold`. Throws Error(kScene) naming the

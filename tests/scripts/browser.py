@@ -1,9 +1,14 @@
 """Headless Chromium for tests of pages: over two pipes, without a package (Chrome DevTools Protocol)."""
 
+import argparse
 import base64
+import contextlib
 import json
 import os
+import shutil
 import subprocess
+import sys
+import tempfile
 import time
 from urllib.parse import urlparse
 from urllib.request import pathname2url
@@ -166,3 +171,42 @@ def open_page(browser, path, size):
 def complaints(page):
     # Reading pixels back is slow on purpose here.
     return [c for c in page.complaints() if "GPU stall due to ReadPixels" not in c]
+
+
+def parser_of(doc, shots=True):
+    """A parser for a script with this text; --chromium, and --shots for a folder of screenshots."""
+    parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
+    if shots:
+        parser.add_argument("--shots", help="folder for screenshots")
+    parser.add_argument("--chromium", default=shutil.which("chromium") or shutil.which("chromium-browser"))
+    return parser
+
+
+def parsed(parser):
+    """The arguments; ends the script where there is no Chromium."""
+    arguments = parser.parse_args()
+    if not arguments.chromium:
+        print("Chromium is not installed (Debian package chromium)")
+        sys.exit(NO_CHROMIUM)
+    if getattr(arguments, "shots", None):
+        os.makedirs(arguments.shots, exist_ok=True)
+    return arguments
+
+
+@contextlib.contextmanager
+def running(chromium):
+    """A browser with a profile of its own, closed at the end."""
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
+        browser = Browser(chromium, profile)
+        try:
+            yield browser
+        finally:
+            browser.close()
+
+
+def status_of(name, found):
+    """Prints the findings; the exit status."""
+    for complaint in found:
+        print(complaint)
+    print(f"{name}: {len(found)} findings")
+    return 1 if found else 0

@@ -10,19 +10,17 @@ the picture, that a lost graphics context comes back, and that damaged copies sa
 --shots keeps pictures of the pages. Exit status 1 if anything is wrong, 77 if there is no Chromium.
 """
 
-import argparse
 import base64
 import glob
 import json
 import math
 import os
 import re
-import shutil
 import sys
 import tempfile
 import time
 
-from browser import NO_CHROMIUM, SIZES, Browser, Page, complaints, open_page, wait_until
+from browser import SIZES, Page, complaints, open_page, parsed, parser_of, running, status_of, wait_until
 
 # The shader's arithmetic is the program's in another order of sums: measured 70 dB and more, where one unit of 255
 # everywhere would be 48 dB. Styles go through another sine, and both round to codes: a code more or less is 1 / 127 of
@@ -296,29 +294,15 @@ def check_folder(browser, arguments, scratch):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("folder", help="folder with pages and their views")
-    parser.add_argument("--shots", help="folder for screenshots of the pages")
     parser.add_argument("--restyles", type=int, default=6, help="how often a style is learned again")
-    parser.add_argument("--chromium", default=shutil.which("chromium") or shutil.which("chromium-browser"))
-    arguments = parser.parse_args()
-    if not arguments.chromium:
-        print("Chromium is not installed (Debian package chromium)")
-        return NO_CHROMIUM
+    arguments = parsed(parser)
     if not glob.glob(os.path.join(arguments.folder, "*.html")):
         parser.error(arguments.folder + " has no pages")
-    if arguments.shots:
-        os.makedirs(arguments.shots, exist_ok=True)
-    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as scratch:
-        browser = Browser(arguments.chromium, os.path.join(scratch, "profile"))
-        try:
-            found = check_folder(browser, arguments, scratch)
-        finally:
-            browser.close()
-    for complaint in found:
-        print(complaint)
-    print(f"look_at_page: {len(found)} findings")
-    return 1 if found else 0
+    with tempfile.TemporaryDirectory() as scratch, running(arguments.chromium) as browser:
+        found = check_folder(browser, arguments, scratch)
+    return status_of("look_at_page", found)
 
 
 if __name__ == "__main__":

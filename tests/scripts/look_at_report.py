@@ -9,13 +9,10 @@ without JavaScript the charts are visible, too.
 --shots keeps pictures of the whole page. Exit status 1 if anything is wrong, 77 if there is no Chromium.
 """
 
-import argparse
 import os
-import shutil
 import sys
-import tempfile
 
-from browser import NO_CHROMIUM, SIZES, Browser, Page
+from browser import SIZES, Page, complaints, parsed, parser_of, running, status_of
 
 
 def check_slider(page):
@@ -85,28 +82,14 @@ def check_report(browser, arguments):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("report", help="the report page")
-    parser.add_argument("--shots", help="folder for screenshots of the page")
-    parser.add_argument("--chromium", default=shutil.which("chromium") or shutil.which("chromium-browser"))
-    arguments = parser.parse_args()
-    if not arguments.chromium:
-        print("Chromium is not installed (Debian package chromium)")
-        return NO_CHROMIUM
+    arguments = parsed(parser)
     if not os.path.isfile(arguments.report):
         parser.error(arguments.report + " is not a file")
-    if arguments.shots:
-        os.makedirs(arguments.shots, exist_ok=True)
-    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
-        browser = Browser(arguments.chromium, profile)
-        try:
-            found = check_report(browser, arguments)
-        finally:
-            browser.close()
-    for complaint in found:
-        print(complaint)
-    print(f"look_at_report: {len(found)} findings")
-    return 1 if found else 0
+    with running(arguments.chromium) as browser:
+        found = check_report(browser, arguments)
+    return status_of("look_at_report", found)
 
 
 if __name__ == "__main__":

@@ -9,16 +9,14 @@ on the page, films that play, places that are counterbalanced, a reload that goe
 Exit status 1 if anything is wrong, 77 if there is no Chromium or ffmpeg.
 """
 
-import argparse
 import json
 import os
 import shutil
 import subprocess
 import sys
 import tempfile
-import time
 
-from browser import NO_CHROMIUM, SIZES, Browser, Page, wait_until
+from browser import NO_CHROMIUM, SIZES, Page, complaints, parsed, parser_of, running, status_of, wait_until
 
 CLIPS = ("fern", "horns", "trex", "room")
 METHODS = ("plain", "lovely", "dull")
@@ -101,9 +99,8 @@ def take_part(browser, path, size, careful, shot=None):
             found += layout(page, size)
             if shot:
                 page.shot(shot)
-            time.sleep(0.3)
-            if not page.value("[...document.querySelectorAll('video')].every((v) => v.currentTime > 0 && !v.paused)"):
-                found.append("a film does not play")
+            # Ends with the waiting where a film does not play.
+            wait_until(page, "[...document.querySelectorAll('video')].every((v) => v.currentTime > 0 && !v.paused)")
         if number == 3:  # closed and opened again
             found += page.complaints()
             page.close()
@@ -168,13 +165,11 @@ def check_analysis(regrade, folder, all_answers):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("regrade", help="the program")
-    parser.add_argument("--shots", help="folder for screenshots")
-    parser.add_argument("--chromium", default=shutil.which("chromium") or shutil.which("chromium-browser"))
-    arguments = parser.parse_args()
-    if not arguments.chromium or not shutil.which("ffmpeg"):
-        print("skipped: Chromium or ffmpeg is not installed (Debian packages chromium, ffmpeg)")
+    arguments = parsed(parser)
+    if not shutil.which("ffmpeg"):
+        print("ffmpeg is not installed (Debian package ffmpeg)")
         return NO_CHROMIUM
     found, all_answers = [], []
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
@@ -185,20 +180,14 @@ def main():
         if status:
             print(text)
             return 1
-        browser = Browser(arguments.chromium, os.path.join(folder, "profile"))
-        try:
+        with running(arguments.chromium) as browser:
             for i, name in enumerate(["phone", "desktop", "phone", "desktop"]):
                 shot = os.path.join(arguments.shots, f"study_{name}.png") if arguments.shots and i < 2 else None
                 answers, complaints = take_part(browser, page, SIZES[name], careful=i != 2, shot=shot)
                 all_answers.append(answers)
                 found += [f"{name}: {complaint}" for complaint in complaints]
-        finally:
-            browser.close()
         found += check_answers(all_answers) + check_analysis(arguments.regrade, folder, all_answers)
-    for complaint in found:
-        print(complaint)
-    print(f"look_at_study: {len(found)} findings")
-    return 1 if found else 0
+    return status_of("look_at_study", found)
 
 
 if __name__ == "__main__":

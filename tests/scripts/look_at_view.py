@@ -8,17 +8,15 @@ draws, and the folder keeps it; the exact film comes; a second tab without the t
 another host, and nothing is on the console. Exit status 1 if anything is wrong, 77 if there is no Chromium.
 """
 
-import argparse
 import base64
 import os
 import re
-import shutil
 import subprocess
 import sys
 import tempfile
 import time
 
-from browser import NO_CHROMIUM, SIZES, Browser, Page, complaints, open_page, wait_until
+from browser import SIZES, Page, complaints, open_page, parsed, parser_of, running, status_of, wait_until
 from small_run import SMALL, STYLE, call, make_capture
 
 DROP = """(async () => {
@@ -82,14 +80,9 @@ def check_view(browser, address, folder, shots):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("regrade", help="the program")
-    parser.add_argument("--shots", help="folder for a screenshot")
-    parser.add_argument("--chromium", default=shutil.which("chromium") or shutil.which("chromium-browser"))
-    arguments = parser.parse_args()
-    if not arguments.chromium:
-        print("Chromium is not installed (Debian package chromium)")
-        return NO_CHROMIUM
+    arguments = parsed(parser)
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as scratch:
         folder = os.path.join(scratch, "run")
         status, error = call([arguments.regrade, "reconstruct", make_capture(arguments.regrade, os.path.join(scratch, "s")),
@@ -97,18 +90,14 @@ def main():
         if status:
             raise RuntimeError(error)
         program, address = start(arguments.regrade, folder)
-        browser = Browser(arguments.chromium, os.path.join(scratch, "profile"))
         try:
-            found = check_view(browser, address, folder, arguments.shots)
+            with running(arguments.chromium) as browser:
+                found = check_view(browser, address, folder, arguments.shots)
         finally:
-            browser.close()
             program.terminate()
             time.sleep(0.2)
             program.wait(timeout=30)
-    for complaint in found:
-        print(complaint)
-    print(f"look_at_view: {len(found)} findings")
-    return 1 if found else 0
+    return status_of("look_at_view", found)
 
 
 if __name__ == "__main__":

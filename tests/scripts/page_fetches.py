@@ -8,14 +8,11 @@ the worst view's decibels to the page without steps, for the source and, if ther
 there is no Chromium.
 """
 
-import argparse
 import json
 import math
-import shutil
 import sys
-import tempfile
 
-from browser import NO_CHROMIUM, SIZES, Browser, open_page
+from browser import SIZES, open_page, parsed, parser_of, running
 
 # One view: fetches a ray, and the mean squared difference from the picture without opacity steps.
 MEASURE = """(async () => {
@@ -34,30 +31,22 @@ MEASURE = """(async () => {
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__, shots=False)
     parser.add_argument("page", help="a scene page")
     parser.add_argument("--views", type=int, default=6, help="how many of the photos' places")
     parser.add_argument("--width", type=int, default=96, help="of a picture, pixels; 3 of its height for 4")
-    parser.add_argument("--chromium", default=shutil.which("chromium") or shutil.which("chromium-browser"))
-    arguments = parser.parse_args()
-    if not arguments.chromium:
-        print("Chromium is not installed (Debian package chromium)")
-        return NO_CHROMIUM
-    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as scratch:
-        browser = Browser(arguments.chromium, scratch)
-        try:
-            page = open_page(browser, arguments.page, SIZES["phone"])
-            styles = page.value("regradePage.header.styles.length")
-            for look, weights in [("source", [0] * styles)] + [("styled", [1] + [0] * (styles - 1))] * (styles > 0):
-                for name in ["exact", "rest", "moving"]:
-                    views = [page.value(MEASURE % json.dumps([weights, name, i / arguments.views, arguments.width]))
-                             for i in range(arguments.views)]
-                    fetches, worst = [v[0] for v in views], max(v[1] for v in views)
-                    decibels = f", worst view {10 * math.log10(255 ** 2 / worst):.1f} dB" if worst > 0 else ""
-                    print(f"{look} {name:6}: {sum(fetches) / len(fetches):6.1f} fetches a ray, {max(fetches):6.1f} in the "
-                          f"worst view{decibels}", flush=True)
-        finally:
-            browser.close()
+    arguments = parsed(parser)
+    with running(arguments.chromium) as browser:
+        page = open_page(browser, arguments.page, SIZES["phone"])
+        styles = page.value("regradePage.header.styles.length")
+        for look, weights in [("source", [0] * styles)] + [("styled", [1] + [0] * (styles - 1))] * (styles > 0):
+            for name in ["exact", "rest", "moving"]:
+                views = [page.value(MEASURE % json.dumps([weights, name, i / arguments.views, arguments.width]))
+                         for i in range(arguments.views)]
+                fetches, worst = [v[0] for v in views], max(v[1] for v in views)
+                decibels = f", worst view {10 * math.log10(255 ** 2 / worst):.1f} dB" if worst > 0 else ""
+                print(f"{look} {name:6}: {sum(fetches) / len(fetches):6.1f} fetches a ray, {max(fetches):6.1f} in the "
+                      f"worst view{decibels}", flush=True)
     return 0
 
 

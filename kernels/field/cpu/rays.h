@@ -52,8 +52,7 @@ struct FastRayFunctions {
                       const MarchOptions&, float* color, float* other_color, float* depth,
                       float* transmittance);
   // Renders, and adds the gradient of scale * sum (C - target)^2 and of the batch's losses of
-  // densities to the arena. Returns squared
-  // error and number of samples.
+  // densities to the arena. Returns squared error and number of samples.
   FitStepResult (*accumulate)(const FastGrid&, const RayBatch&, const MarchOptions&,
                               float scale, GradientArena*);
   // Largest w_i that any ray gives a sample at each voxel's corners; weights [N] are running
