@@ -94,13 +94,22 @@ class Browser:
             self.process.wait()
 
 
-class Page:
-    """A file, or an address that begins with http://, in one tab of one size."""
+def new_person(browser):
+    """Somebody who was never on a page: a storage of their own."""
+    return browser.call("Target.createBrowserContext")["browserContextId"]
 
-    def __init__(self, browser, path, size, script=True):
+
+class Page:
+    """A file, or an address that begins with http://, in one tab of one size.
+
+    Pages of one `person` (from new_person) share what a browser stores; None: the browser's own.
+    """
+
+    def __init__(self, browser, path, size, script=True, person=None):
         self.browser, self.path = browser, path
         browser.events = []
-        target = browser.call("Target.createTarget", url="about:blank")["targetId"]
+        of_person = {"browserContextId": person} if person else {}
+        target = browser.call("Target.createTarget", url="about:blank", **of_person)["targetId"]
         self.target = target
         self.session = browser.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
         for domain in ["Page", "Runtime", "Log", "Network"]:
@@ -115,6 +124,11 @@ class Page:
 
     def call(self, method, **parameters):
         return self.browser.call(method, session=self.session, **parameters)
+
+    def reload(self):
+        self.browser.events = []
+        self.call("Page.reload")
+        self.browser.wait_for("Page.loadEventFired")
 
     def value(self, expression):
         result = self.call("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)

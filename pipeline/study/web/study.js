@@ -50,12 +50,17 @@ function makeTrials(participant) {
   return trials;
 }
 
+// Answers are kept twice: Chromium's storage of pages from files was seen empty after a reload
+// on a busy machine, and the history of a tab ends with the tab.
 function load() {
+  const kept = [history.state];
   try {
-    const stored = JSON.parse(localStorage.getItem(KEY));
-    if (stored && /^[0-9a-f]{8}$/.test(stored.participant) && Array.isArray(stored.answers)) return stored;
-  } catch (error) { /* a browser without storage: the study works, but does not go on after a reload */ }
-  return {participant: crypto.getRandomValues(new Uint32Array(1))[0].toString(16).padStart(8, '0'), answers: []};
+    kept.push(JSON.parse(localStorage.getItem(KEY)));
+  } catch (error) { /* a browser without storage */ }
+  const own = kept.filter((k) => k && k.study === study.id && /^[0-9a-f]{8}$/.test(k.participant) && Array.isArray(k.answers));
+  if (own.length) return own.reduce((a, b) => b.answers.length > a.answers.length ? b : a);
+  const participant = crypto.getRandomValues(new Uint32Array(1))[0].toString(16).padStart(8, '0');
+  return {study: study.id, participant, answers: []};
 }
 
 const state = load();
@@ -64,6 +69,7 @@ const urls = new Map();
 let shown_at = 0, timer = 0;
 
 function store() {
+  history.replaceState(state, '');
   try {
     localStorage.setItem(KEY, JSON.stringify(state));
   } catch (error) { /* see load() */ }
