@@ -6,7 +6,7 @@ precision highp int;
 precision highp isampler2D;
 precision highp usampler2D;
 
-uniform isampler2D uTree;      // entries: a cell, -1 nothing, -2 - n node n
+uniform isampler2D uTree;      // four entries a texel: a cell, -1 nothing, -2 - n node n
 uniform usampler2D uDensity;   // of a cell's corners, eight halves
 uniform usampler2D uCorner;    // of a cell, two texels of four voxels
 uniform usampler2D uFirst0, uSecond0, uFirst1, uSecond1, uFirst2, uSecond2;  // codes [27]
@@ -29,7 +29,8 @@ uniform float uUnit, uNear, uStep, uOpacityStep;
 out vec4 color;
 
 const int kBits = 11;          // textures are 2048 wide
-const float kStop = 1e-4;
+const float kStop = 1e-4, kStopOfStep = 0.05;  // transmittance where a ray ends; of an opacity step
+const float kLeastCorner = 0.5;                // of an opacity step
 float fetches = 0.0;
 
 ivec2 At(int i) { return ivec2(i & 2047, i >> kBits); }
@@ -38,6 +39,18 @@ ivec2 At(int i) { return ivec2(i & 2047, i >> kBits); }
 int nodes[17];
 ivec3 before;
 int shiftBefore = 99;
+
+ivec4 treeTexel;               // the last one
+int treeTexelAt = -1;
+
+int TreeEntry(int i) {
+  if (i >> 2 != treeTexelAt) {
+    treeTexelAt = i >> 2;
+    treeTexel = texelFetch(uTree, At(treeTexelAt), 0);
+    fetches += 1.0;
+  }
+  return treeTexel[i & 3];
+}
 
 int EntryAt(ivec3 at, out int width) {
   // The search goes on from the smallest node that holds both places.
@@ -49,16 +62,14 @@ int EntryAt(ivec3 at, out int width) {
   } else {
     shift = uFinest;
     ivec3 top = at >> shift;
-    entry = texelFetch(uTree, At((top.x * uTop.y + top.y) * uTop.z + top.z), 0).x;
-    fetches += 1.0;
+    entry = TreeEntry((top.x * uTop.y + top.y) * uTop.z + top.z);
   }
-  int first = uTop.x * uTop.y * uTop.z;
+  int first = uTop.x * uTop.y * uTop.z + 3 & ~3;
   for (int i = 0; i < 16 && entry < -1; ++i) {
     nodes[shift] = -2 - entry;
     --shift;
     ivec3 bit = (at >> shift) & 1;
-    entry = texelFetch(uTree, At(first + (-2 - entry) * 8 + (bit.x << 2 | bit.y << 1 | bit.z)), 0).x;
-    fetches += 1.0;
+    entry = TreeEntry(first + (-2 - entry) * 8 + (bit.x << 2 | bit.y << 1 | bit.z));
   }
   before = at;
   shiftBefore = shift;
@@ -124,9 +135,19 @@ vec3 Shade(int cell, vec3 f) {
   fetches += 2.0;
   vec4 a, b;
   Weights(f, a, b);
+  // With opacity steps, corners of little weight are left out, and the others make up for them.
+  float least = kLeastCorner * uOpacityStep, kept = 0.0;
+  for (int k = 0; k < 8; ++k)
+    if ((k < 4 ? a[k] : b[k - 4]) >= least) kept += k < 4 ? a[k] : b[k - 4];
+  if (least > 0.0) {
+    a /= kept;
+    b /= kept;
+    least /= kept;
+  }
   vec3 raw = vec3(0.5);
   for (int k = 0; k < 8; ++k) {
     float w = k < 4 ? a[k] : b[k - 4];
+    if (w < least) continue;
     int voxel = k < 4 ? low[k] : high[k - 4];
     if (uWeight.x > 0.0) raw += w * uWeight.x * ColorOf(uFirst0, uSecond0, voxel, s0);
     if (uWeight.y > 0.0) raw += w * uWeight.y * ColorOf(uFirst1, uSecond1, voxel, s1);
@@ -192,7 +213,7 @@ void MarchCells(vec3 eye, vec3 direction) {
       vec3 inside = (o + d * (0.5 * (t + next)) - (vec3(low) - middle)) / float(width);
       vec3 f = clamp(inside, 0.0, 1.0);
       Composite(cell, f, DensityIn(cell, f), (next - t) / uUnit);
-      if (transmitted < kStop) return;
+      if (transmitted < max(kStop, kStopOfStep * uOpacityStep)) return;
     }
     if (last) return;
     ivec3 then = clamp(ivec3(floor(o + d * next) + middle), low, low + (width - 1));
@@ -232,7 +253,7 @@ void MarchGrid(vec3 eye, vec3 direction) {
     if (cell >= 0) {
       vec3 f = p - vec3(base);
       Composite(cell, f, DensityIn(cell, f), delta);
-      if (transmitted < kStop) return;
+      if (transmitted < max(kStop, kStopOfStep * uOpacityStep)) return;
       ++i;
       continue;
     }
@@ -265,7 +286,7 @@ void CompositeSpheres(vec3 eye, vec3 direction) {
   nearest -= d * rest;
   along += rest;
   for (int i = 0; i < uLayers; ++i) {
-    if (transmitted < kStop) return;
+    if (transmitted < max(kStop, kStopOfStep * uOpacityStep)) return;
     float u = 1.0 - (float(i) + 0.5) / float(uLayers);
     float squared = dot(nearest, nearest) * u * u;
     if (!(squared < 1.0)) continue;

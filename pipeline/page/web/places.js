@@ -34,7 +34,11 @@ class Vertices {
   }
 }
 
-// -> {vertices, top, tree (top cells, then nodes), corner [8 cells]}
+// The tree has the top cells, then nodes of eight entries each; both begin at a multiple of four,
+// for a texel holds four entries.
+const firstNode = (topCells) => topCells + 3 & ~3;
+
+// -> {vertices, top, tree, corner [8 cells]}
 function placesOfTree(bytes, voxels, finest, count) {
   const top = voxels.map((n) => n >> finest), topCells = top[0] * top[1] * top[2];
   let cells = 0, nodes = 0;
@@ -43,7 +47,7 @@ function placesOfTree(bytes, voxels, finest, count) {
       cells += (byte >> s & 3) === 1;
       nodes += (byte >> s & 3) === 2;
     }
-  const vertices = new Vertices(count), tree = new Int32Array(topCells + 8 * nodes).fill(-1);
+  const vertices = new Vertices(count), tree = new Int32Array(firstNode(topCells) + 8 * nodes).fill(-1);
   const corner = new Int32Array(8 * cells), own = new Int32Array(8);
   let symbol = 0, cell = 0, node = 0, predicted = 0;
 
@@ -72,7 +76,7 @@ function placesOfTree(bytes, voxels, finest, count) {
     if (kind === 0) return -1;
     if (kind === 1) return addCell(low, finest - level);
     if (kind !== 2 || level >= finest) throw new PageError('the tree of cells is damaged');
-    const first = topCells + 8 * node, entry = -2 - node++;
+    const first = firstNode(topCells) + 8 * node, entry = -2 - node++;
     for (let k = 0; k < 8; ++k)
       tree[first + k] = visit(cornerOf(low, 1 << finest - level - 1, k), level + 1);
     return entry;
@@ -159,9 +163,9 @@ function cellsOfGrid(vertices, voxels, half) {
     const z = cube % top[2], y = Math.floor(cube / top[2]) % top[1], x = Math.floor(cube / top[2] / top[1]);
     head[cube] = build(mask, [8 * x, 8 * y, 8 * z], 0, 0, 0, 8);
   }
-  const all = new Int32Array(topCells + tree.length);
+  const all = new Int32Array(firstNode(topCells) + tree.length).fill(-1);
   all.set(head);
-  all.set(tree, topCells);
+  all.set(tree, firstNode(topCells));
   return {vertices, top, tree: all, corner: Int32Array.from(corner), finest};
 }
 

@@ -26,7 +26,7 @@ async function loadScene(header, graphics, progress) {
     const d = places.corner[i] < n ? half[places.corner[i]] : 0;
     density[i >> 1] |= i & 1 ? d << 16 : d;
   }
-  scene.tree = graphics.texture('i1', places.tree);
+  scene.tree = graphics.texture('i4', places.tree);
   scene.corner = graphics.texture('u4', new Uint32Array(places.corner.buffer));
   scene.density = graphics.texture('u4', density);
 
