@@ -31,7 +31,7 @@ class Graphics {
                   p: this.texture('u2', new Uint32Array(2))};
     this.array = gl.createVertexArray();
   }
-  // 2048 texels a row; kinds: u4, u2, i4, i1 are unsigned and signed integers of 32 bits.
+  // 2048 texels a row; kinds: u4, u2, i1 are unsigned and signed integers of 32 bits.
   texture(kind, data) {
     const gl = this.gl, channels = Number(kind[1]), texels = data.length / channels;
     const height = Math.max(1, Math.ceil(texels / WIDTH));
@@ -40,7 +40,6 @@ class Graphics {
     const [inside, format, type] = {
       u4: [gl.RGBA32UI, gl.RGBA_INTEGER, gl.UNSIGNED_INT],
       u2: [gl.RG32UI, gl.RG_INTEGER, gl.UNSIGNED_INT],
-      i4: [gl.RGBA32I, gl.RGBA_INTEGER, gl.INT],
       i1: [gl.R32I, gl.RED_INTEGER, gl.INT]}[kind];
     const texture = gl.createTexture();
     gl.bindTexture(gl.TEXTURE_2D, texture);
@@ -71,7 +70,6 @@ class Graphics {
     gl.useProgram(p.program);
     gl.bindVertexArray(this.array);
     this.bind(p, 'uTree', 0, scene.tree);
-    this.bind(p, 'uDensity', 1, scene.density);
     this.bind(p, 'uCorner', 2, scene.corner);
     this.bind(p, 'uColumn', 9, scene.column ?? this.empty.i);
     const scale = new Float32Array(81), texel = new Float32Array(9), weight = [0, 0, 0];

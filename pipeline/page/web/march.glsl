@@ -6,8 +6,7 @@ precision highp int;
 precision highp isampler2D;
 precision highp usampler2D;
 
-uniform isampler2D uTree;      // four entries a texel: a cell, -1 nothing, -2 - n node n
-uniform usampler2D uDensity;   // of a cell's corners, eight halves
+uniform usampler2D uTree;      // see tree.js
 uniform usampler2D uCorner;    // of a cell, two texels of four voxels
 uniform usampler2D uFirst0, uSecond0, uFirst1, uSecond1, uFirst2, uSecond2;  // codes [27]
 uniform isampler2D uColumn;    // of the spheres' map
@@ -28,6 +27,7 @@ uniform vec3 uCenter, uRadius;
 uniform float uUnit, uNear, uStep, uOpacityStep;
 out vec4 color;
 
+const float kOpticalDepth = 4e-4;
 const int kBits = 11;          // textures are 2048 wide
 const float kStop = 1e-4, kStopOfStep = 0.05;  // transmittance where a ray ends; of an opacity step
 const float kLeastCorner = 0.5;                // of an opacity step
@@ -35,46 +35,45 @@ float fetches = 0.0;
 
 ivec2 At(int i) { return ivec2(i & 2047, i >> kBits); }
 
-// The nodes above the entry that was found last, by the logarithm of their width.
-int nodes[17];
+// The nodes above the texel that was found last, by the logarithm of their width: first child and mask.
+uvec2 nodes[17];
 ivec3 before;
 int shiftBefore = 99;
 
-ivec4 treeTexel;               // the last one
-int treeTexelAt = -1;
-
-int TreeEntry(int i) {
-  if (i >> 2 != treeTexelAt) {
-    treeTexelAt = i >> 2;
-    treeTexel = texelFetch(uTree, At(treeTexelAt), 0);
-    fetches += 1.0;
-  }
-  return treeTexel[i & 3];
-}
-
-int EntryAt(ivec3 at, out int width) {
+// The texel of the cell around a place, or one of bit 31 where nothing is; the width is that of the cell or the empty cube.
+uvec4 TexelAt(ivec3 at, out int width) {
   // The search goes on from the smallest node that holds both places.
   ivec3 differ = at ^ before;
-  int shift = shiftBefore + 1, bits = differ.x | differ.y | differ.z, entry;
+  int shift = shiftBefore + 1, bits = differ.x | differ.y | differ.z;
   while (shift <= uFinest && bits >> shift != 0) ++shift;
+  uvec4 texel;
   if (shift <= uFinest) {
-    entry = -2 - nodes[shift];
+    texel = uvec4(nodes[shift], 0u, 0u);
   } else {
     shift = uFinest;
     ivec3 top = at >> shift;
-    entry = TreeEntry((top.x * uTop.y + top.y) * uTop.z + top.z);
+    texel = texelFetch(uTree, At((top.x * uTop.y + top.y) * uTop.z + top.z), 0);
+    fetches += 1.0;
   }
-  int first = uTop.x * uTop.y * uTop.z + 3 & ~3;
-  for (int i = 0; i < 16 && entry < -1; ++i) {
-    nodes[shift] = -2 - entry;
+  for (int i = 0; i < 16 && texel.x >> 31 == 1u && texel.y != 0u; ++i) {
+    nodes[shift] = texel.xy;
     --shift;
     ivec3 bit = (at >> shift) & 1;
-    entry = TreeEntry(first + (-2 - entry) * 8 + (bit.x << 2 | bit.y << 1 | bit.z));
+    uint child = 1u << (bit.x << 2 | bit.y << 1 | bit.z), earlier = texel.y & (child - 1u);
+    if ((texel.y & child) == 0u) {
+      texel = uvec4(1u << 31, 0u, 0u, 0u);
+      break;
+    }
+    earlier = (earlier & 0x55u) + (earlier >> 1 & 0x55u);
+    earlier = (earlier & 0x33u) + (earlier >> 2 & 0x33u);
+    earlier = (earlier & 0x0fu) + (earlier >> 4);
+    texel = texelFetch(uTree, At(int((texel.x & 0x7fffffffu) + earlier)), 0);
+    fetches += 1.0;
   }
   before = at;
   shiftBefore = shift;
   width = 1 << shift;
-  return entry;
+  return texel;
 }
 
 // Corner weights: x is the highest bit.
@@ -84,13 +83,13 @@ void Weights(vec3 f, out vec4 low, out vec4 high) {
   high = yz * f.x;
 }
 
-float DensityIn(int cell, vec3 f) {
-  uvec4 d = texelFetch(uDensity, At(cell), 0);
-  fetches += 1.0;
+float DensityIn(uvec4 cell, int width, vec3 f) {
   vec4 a, b;
   Weights(f, a, b);
-  return dot(a, vec4(unpackHalf2x16(d.x), unpackHalf2x16(d.y))) +
-         dot(b, vec4(unpackHalf2x16(d.z), unpackHalf2x16(d.w)));
+  vec4 low = vec4(cell.y & 4095u, cell.y >> 12 & 4095u, cell.z & 4095u, cell.z >> 12 & 4095u) - 2048.0;
+  vec4 high = vec4(cell.w & 4095u, cell.w >> 12 & 4095u, cell.y >> 24 | (cell.z >> 16 & 0xf00u),
+                   cell.z >> 28 | (cell.w >> 20 & 0xff0u)) - 2048.0;
+  return (dot(a, low * abs(low)) + dot(b, high * abs(high))) * (kOpticalDepth / 16.0) / float(width);
 }
 
 vec4 Codes(uint w) {
@@ -201,7 +200,7 @@ void MarchCells(vec3 eye, vec3 direction) {
   float t = begin;
   for (int i = 0; i < 16384; ++i) {
     int width;
-    int cell = EntryAt(at, width);
+    uvec4 cell = TexelAt(at, width);
     ivec3 low = at & ~(width - 1);
     vec3 face = vec3(low) + vec3(width) * vec3(greaterThan(d, vec3(0.0))) - middle;
     vec3 crossing = mix((face - o) * inverse, vec3(3.4e38), equal(d, vec3(0.0)));
@@ -209,10 +208,10 @@ void MarchCells(vec3 eye, vec3 direction) {
     int axis = next == crossing.x ? 0 : next == crossing.y ? 1 : next == crossing.z ? 2 : -1;
     bool last = axis < 0 || !(next < end);
     next = max(next, t);
-    if (cell >= 0) {
+    if (cell.x >> 31 == 0u) {
       vec3 inside = (o + d * (0.5 * (t + next)) - (vec3(low) - middle)) / float(width);
       vec3 f = clamp(inside, 0.0, 1.0);
-      Composite(cell, f, DensityIn(cell, f), (next - t) / uUnit);
+      Composite(int(cell.x), f, DensityIn(cell, width, f), (next - t) / uUnit);
       if (transmitted < max(kStop, kStopOfStep * uOpacityStep)) return;
     }
     if (last) return;
@@ -249,10 +248,10 @@ void MarchGrid(vec3 eye, vec3 direction) {
     vec3 p = clamp(o + d * (begin + float(i) * uStep), vec3(0.0), top);
     ivec3 base = min(ivec3(p), uVoxels - 2);
     int width;
-    int cell = EntryAt(base, width);
-    if (cell >= 0) {
+    uvec4 cell = TexelAt(base, width);
+    if (cell.x >> 31 == 0u) {
       vec3 f = p - vec3(base);
-      Composite(cell, f, DensityIn(cell, f), delta);
+      Composite(int(cell.x), f, DensityIn(cell, width, f), delta);
       if (transmitted < max(kStop, kStopOfStep * uOpacityStep)) return;
       ++i;
       continue;

@@ -34,9 +34,7 @@ class Vertices {
   }
 }
 
-// The tree has the top cells, then nodes of eight entries each; both begin at a multiple of four,
-// for a texel holds four entries.
-const firstNode = (topCells) => topCells + 3 & ~3;
+// The tree has the top cells, then nodes of eight entries each: a cell, -1 nothing, -2 - n node n.
 
 // -> {vertices, top, tree, corner [8 cells]}
 function placesOfTree(bytes, voxels, finest, count) {
@@ -47,7 +45,7 @@ function placesOfTree(bytes, voxels, finest, count) {
       cells += (byte >> s & 3) === 1;
       nodes += (byte >> s & 3) === 2;
     }
-  const vertices = new Vertices(count), tree = new Int32Array(firstNode(topCells) + 8 * nodes).fill(-1);
+  const vertices = new Vertices(count), tree = new Int32Array(topCells + 8 * nodes).fill(-1);
   const corner = new Int32Array(8 * cells), own = new Int32Array(8);
   let symbol = 0, cell = 0, node = 0, predicted = 0;
 
@@ -76,7 +74,7 @@ function placesOfTree(bytes, voxels, finest, count) {
     if (kind === 0) return -1;
     if (kind === 1) return addCell(low, finest - level);
     if (kind !== 2 || level >= finest) throw new PageError('the tree of cells is damaged');
-    const first = firstNode(topCells) + 8 * node, entry = -2 - node++;
+    const first = topCells + 8 * node, entry = -2 - node++;
     for (let k = 0; k < 8; ++k)
       tree[first + k] = visit(cornerOf(low, 1 << finest - level - 1, k), level + 1);
     return entry;
@@ -119,14 +117,13 @@ function placesOfMask(bytes, voxels, count) {
 }
 
 // Cells of a uniform grid that a ray can see, in a tree of cubes of eight. A corner without a
-// voxel is voxel `count`, whose values are 0.
-function cellsOfGrid(vertices, voxels, half) {
+// voxel is voxel `count`, whose values are 0. `number`: densities, positive where light is stopped.
+function cellsOfGrid(vertices, voxels, number) {
   const finest = 3, top = voxels.map((n) => Math.ceil((n - 1) / 8));
-  const positive = (i) => half[i] > 0 && half[i] < 0x8000;
   const found = new Map(), {place, count} = vertices;
   const seen = new Map();  // of a cube: the cells in it
   for (let i = 0; i < count; ++i) {
-    if (!positive(i)) continue;
+    if (number[i] <= 0) continue;
     for (let k = 0; k < 8; ++k) {
       const x = place[3 * i] - (k >> 2), y = place[3 * i + 1] - (k >> 1 & 1), z = place[3 * i + 2] - (k & 1);
       if (x < 0 || y < 0 || z < 0 || x > voxels[0] - 2 || y > voxels[1] - 2 || z > voxels[2] - 2) continue;
@@ -163,9 +160,9 @@ function cellsOfGrid(vertices, voxels, half) {
     const z = cube % top[2], y = Math.floor(cube / top[2]) % top[1], x = Math.floor(cube / top[2] / top[1]);
     head[cube] = build(mask, [8 * x, 8 * y, 8 * z], 0, 0, 0, 8);
   }
-  const all = new Int32Array(firstNode(topCells) + tree.length).fill(-1);
+  const all = new Int32Array(topCells + tree.length).fill(-1);
   all.set(head);
-  all.set(tree, firstNode(topCells));
+  all.set(tree, topCells);
   return {vertices, top, tree: all, corner: Int32Array.from(corner), finest};
 }
 

@@ -2,12 +2,11 @@
 
 async function loadScene(header, graphics, progress) {
   const {resolution, basis} = header, finestOfPage = header.finest, onCells = finestOfPage !== null;
-  let places = null, vertices, widthOf = () => 1;
+  let places = null, vertices;
   progress(0.02, 'places');
   if (onCells) {
     places = placesOfTree(await bytesOf('tree'), resolution, finestOfPage, header.voxels);
     vertices = places.vertices;
-    widthOf = (i) => 2 ** vertices.width[i];
   } else {
     vertices = placesOfMask(await bytesOf('mask'), resolution, header.voxels);
   }
@@ -16,19 +15,15 @@ async function loadScene(header, graphics, progress) {
   const earlier = vertices.earlier.subarray(0, 3 * n);
   progress(0.1, 'densities');
   await wait();
-  const half = await unpackDensity('density', earlier, widthOf);
-  if (!onCells) places = cellsOfGrid(vertices, resolution, half);
+  const number = await unpackDensity('density', earlier);
+  if (!onCells) places = cellsOfGrid(vertices, resolution, number);
+  const rootOfWidth = Array.from({length: 32}, (_, log2) => 2 ** (-0.5 * log2));
+  const root = (i) => i < n ? number[i] * rootOfWidth[vertices.width[i]] : 0;
 
   const scene = {header, top: places.top, finest: places.finest, cells: places.corner.length / 8, voxels: n};
   scene.unit = Math.max(...[0, 1, 2].map((a) => 2 * header.radius[a] / resolution[a]));
-  const cells = places.corner.length / 8, density = new Uint32Array(4 * cells);
-  for (let i = 0; i < 8 * cells; ++i) {
-    const d = places.corner[i] < n ? half[places.corner[i]] : 0;
-    density[i >> 1] |= i & 1 ? d << 16 : d;
-  }
-  scene.tree = graphics.texture('i4', places.tree);
+  scene.tree = graphics.texture('u4', packedTree(places, root));
   scene.corner = graphics.texture('u4', new Uint32Array(places.corner.buffer));
-  scene.density = graphics.texture('u4', density);
 
   // A voxel: 27 codes, channel by channel, and its place in 39 bits; the last one is empty.
   const first = new Uint8Array(16 * (n + 1)).fill(128), second = new Uint8Array(16 * (n + 1)).fill(128);
@@ -61,9 +56,10 @@ async function loadScene(header, graphics, progress) {
 async function loadSpheres(scene, graphics) {
   const {layers, resolution} = scene.header.spheres, header = scene.header.sphere_color;
   const spheres = placesOfSpheres(await bytesOf('sphere_mask'), resolution, layers);
-  const half = await unpackDensity('sphere_density', spheres.earlier, () => 1 / layers);
-  const texel = new Uint32Array(2 * half.length);
-  for (let i = 0; i < half.length; ++i) texel[2 * i + 1] = half[i];
+  const number = await unpackDensity('sphere_density', spheres.earlier);
+  const texel = new Uint32Array(2 * number.length);
+  for (let i = 0; i < number.length; ++i)
+    texel[2 * i + 1] = toHalf(Math.sign(number[i]) * number[i] ** 2 * OPTICAL_DEPTH * layers);
   await unpackColors('sphere_color', header, 3, spheres.earlier,
                      (i, j, code) => texel[2 * i] |= code << 8 * j, () => {});
   scene.column = graphics.texture('i1', spheres.links);

@@ -59,17 +59,13 @@ function channelNumbers(bytes, channel, earlier, into) {
   }
 }
 
-// Densities times a voxel's width, as halves.
-async function unpackDensity(id, earlier, widthOf) {
+// Numbers of densities, see EQ(page-density).
+async function unpackDensity(id, earlier) {
   const bytes = await bytesOf(id), n = earlier.length / 3;
   if (bytes.length !== 2 * n) throw new PageError('a part of the page is damaged: ' + id);
-  const number = new Int16Array(n), half = new Uint16Array(n);
+  const number = new Int16Array(n);
   channelNumbers(bytes, 0, earlier, number);
-  for (let i = 0; i < n; ++i) {
-    const q = number[i];
-    half[i] = toHalf(Math.sign(q) * q * q * 4e-4 / widthOf(i));
-  }
-  return half;
+  return number;
 }
 
 // Codes of 8 bits: put(voxel, channel, code).
