@@ -57,6 +57,7 @@ struct StylePackedOptions {
   std::string frames;   // folder for pictures; empty: none
   std::string network;  // likewise
   std::string device = "cuda";
+  uint64_t seed = 0;
   bool reproducible = false;  // see RunOptions
 
   template <typename Bind>
@@ -68,6 +69,7 @@ struct StylePackedOptions {
          {.help = "a folder for .ppm pictures of the held-out views before and after"});
     bind("network", network, {.help = "the .npz file that the network is written to"});
     bind("device", device, {.help = "where arithmetic runs", .choices = "cpu|cuda"});
+    bind("seed", seed, {.help = "seed of all random numbers"});
     bind("reproducible", reproducible, {.help = "two trainings give the same bytes"});
   }
 };

@@ -50,6 +50,8 @@ JsonValue RenderCosts(const DeviceGrid& grid, const PackedCapture& capture, floa
   std::vector<Image> exact;
   JsonValue::Array rows;
   for (const Setting& setting : settings) {
+    // Of an adaptive field every sample is shaded.
+    if (grid.cells.on() && (setting.half || setting.opacity_step > 0)) continue;
     const MarchOptions march{setting.step, setting.stop};
     const HalfGrid* halves = setting.half ? &half : nullptr;
     std::vector<double> against_exact, against_photo, ssim, detail_kept;

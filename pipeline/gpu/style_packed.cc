@@ -1,8 +1,13 @@
 // regrade_gpu style: restyles a packed capture's field after its style picture.
 #include <algorithm>
 #include <cstdio>
+#include <memory>
+#include <optional>
+#include <string>
 #include <utility>
+#include <vector>
 
+#include "evaluate/fidelity.h"
 #include "kernels/base/clock.h"
 #include "kernels/base/error.h"
 #include "kernels/field/cuda/device_rays.h"
@@ -43,9 +48,43 @@ TrainingTargets StyleViews(const PackedCapture& capture) {
   return targets;
 }
 
+std::vector<Image> HeldOutFrames(const DeviceGrid& grid, const PackedCapture& capture,
+                                 const MarchOptions& march) {
+  std::vector<Image> frames;
+  for (const PackedView& view : capture.views)
+    if (view.held_out) frames.push_back(RenderViewOnDevice(grid, view.camera, march).color);
+  return frames;
+}
+
+FrameSource SourceOf(const std::vector<Image>& frames) {
+  return {static_cast<int>(frames.size()), [&frames](int i) { return frames[i]; }};
+}
+
+// Held-out frames of the restyled field beside what the 2D method makes of the unstyled ones.
+JsonValue MeasureHeldOutFidelity(const std::vector<Image>& unstyled,
+                                 const std::vector<Image>& styled, const Image& style) {
+  const std::unique_ptr<ViewStylizer> method = MakeColorTransfer(StyleOptions(), style);
+  std::vector<Image> of_2d;
+  for (size_t i = 0; i < unstyled.size(); ++i)
+    of_2d.push_back(method->Stylize(unstyled[i], static_cast<int>(i)));
+  FidelityTargets targets{.views_2d = SourceOf(of_2d), .unstyled = SourceOf(unstyled)};
+  const FidelityRow row = MeasureFidelity({"styled", SourceOf(styled)}, targets);
+  const auto value = [](const std::optional<double>& v) {
+    return v ? JsonValue(*v) : JsonValue();
+  };
+  return JsonValue::Object{{"psnr_to_2d_db", value(row.psnr_to_2d_db)},
+                           {"structure", value(row.structure)},
+                           {"hue_std", value(row.hue_std)},
+                           {"hue_std_2d", value(row.hue_std_2d)},
+                           {"chroma", value(row.chroma)},
+                           {"chroma_2d", value(row.chroma_2d)}};
+}
+
 // Renders the held-out views and measures frame times, of a field that is uploaded for that.
+// `unstyled`: its frames before.
 void MeasureFrames(const RadianceField& field, const PackedCapture& capture,
-                   const std::string& frames, JsonValue* record) {
+                   const std::vector<Image>& unstyled, const std::string& frames,
+                   JsonValue* record) {
   const MarchOptions march{field.step};
   const DeviceGrid grid = UploadGrid(MakeFastGrid(field));
   Stopwatch watch;
@@ -53,6 +92,9 @@ void MeasureFrames(const RadianceField& field, const PackedCapture& capture,
   if (first != capture.views.end()) RenderViewOnDevice(grid, first->camera, march);
   (*record)["seconds_first_frame"] = watch.Lap();
   (*record)["render"] = RenderCosts(grid, capture, march.step);
+  if (!unstyled.empty())
+    (*record)["held_out"] =
+        MeasureHeldOutFidelity(unstyled, HeldOutFrames(grid, capture, march), capture.style);
   if (!frames.empty()) RenderHeldOut(grid, capture, march, frames, "styled");
 }
 
@@ -72,11 +114,16 @@ void StylePacked(const StylePackedOptions& settings, const TrainNetworkOptions& 
   record["seconds_2d"] = watch.Lap();
   RestyleRequest request;
   request.options = options;
+  request.options.seed = settings.seed;
   request.backend = settings.device == "cuda" ? Backend::kCuda : Backend::kCpu;
   const bool on_device = request.backend == Backend::kCuda;
-  if (on_device && !settings.frames.empty())
-    RenderHeldOut(UploadGrid(MakeFastGrid(stored.field)), capture, {stored.field.step},
-                  settings.frames, "source");
+  std::vector<Image> unstyled;
+  if (on_device) {
+    const DeviceGrid grid = UploadGrid(MakeFastGrid(stored.field));
+    unstyled = HeldOutFrames(grid, capture, {stored.field.step});
+    if (!settings.frames.empty())
+      RenderHeldOut(grid, capture, {stored.field.step}, settings.frames, "source");
+  }
   watch.Lap();
 
   int64_t free_before = 0, least_free = 0;  // bytes on the device, beside the field
@@ -105,7 +152,7 @@ void StylePacked(const StylePackedOptions& settings, const TrainNetworkOptions& 
     WriteFieldFile(settings.styled, {restyled.styled, stored.field_from_world, stored.ndc});
   record["seconds_start_and_first_steps"] = seconds_start;
   record["seconds_other_steps"] = seconds_steps;
-  if (on_device) MeasureFrames(restyled.styled, capture, settings.frames, &record);
+  if (on_device) MeasureFrames(restyled.styled, capture, unstyled, settings.frames, &record);
   record["device"] = on_device ? ReadDeviceStatus().name : "cpu";
   record["voxels"] = voxels;
   record["steps"] = trained.steps;
@@ -114,6 +161,7 @@ void StylePacked(const StylePackedOptions& settings, const TrainNetworkOptions& 
   record["psnr_to_2d_db"] = trained.psnr_db;
   record["linear_map_psnr_db"] = trained.linear_map_psnr_db;
   record["k_est"] = trained.k_est;
+  if (!trained.history.bounds.empty()) record["first_bound"] = trained.history.bounds.front();
   record["bound"] = trained.bound;
   record["local_lipschitz_sampled"] = trained.local_lipschitz_sampled;
   std::printf("%s\n", DumpJson(record, -1).c_str());

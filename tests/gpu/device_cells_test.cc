@@ -75,6 +75,11 @@ TEST_P(DeviceCellsTest, Render) {
   Row("depth", basis(), "plain float", depth_error, 1e-4);
 }
 
+TEST_P(DeviceCellsTest, AnAdaptiveFieldHasNoHalfGrid) {
+  const RadianceField field = RandomCellField({5, 4, 4}, 3, basis(), 35);
+  EXPECT_TRUE(MakeHalfGrid(UploadGrid(MakeFastGrid(field))).empty());
+}
+
 // A frame's rays are made on the device; a view's, on the host for a lens with distortion.
 TEST_P(DeviceCellsTest, AFrameIsTheViewOfItsRays) {
   const RadianceField field = RandomCellField({5, 4, 4}, 3, basis(), 33);
