@@ -41,8 +41,9 @@ struct FramesOptions {
     bind("style", style, {.help = "style picture, for fidelity"});
     // Stands for other options, which ExpandProtocol() puts in its place.
     bind("protocol", protocol,
-         {.help = "a published protocol by name, also for runs: sets --mode and --gaps and "
-                  "refuses others; geometry only for runs; evaluate/PROTOCOLS.md defines each",
+         {.help = "a published protocol by name, also for runs: sets --mode, --gaps and "
+                  "--warp where it says so, and refuses others; geometry only for runs; "
+                  "evaluate/PROTOCOLS.md defines each",
           .choices = ProtocolChoices()});
     bind("table", table,
          {.help = "form of the printed tables; latex needs the package booktabs",
@@ -138,6 +139,9 @@ void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& optio
   report.stages.evaluate->time.seconds = seconds;
   report.stages.evaluate->flow = options.flow;
   report.stages.evaluate->mask = options.mode;
+  report.stages.evaluate->warp = options.warp;
+  report.stages.evaluate->error_per = options.error_per;
+  report.stages.evaluate->protocol = ProtocolOf(options);
   if (workspace) WriteEvaluation(*workspace, report);
   console->Event("evaluation", MetricsToJson(report.evaluation));
   console->Lines(FormatTables(consistency, fidelity, frames.table));

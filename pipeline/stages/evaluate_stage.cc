@@ -10,6 +10,7 @@
 #include "evaluate/fidelity.h"
 #include "evaluate/optical_flow.h"
 #include "evaluate/pair_network.h"
+#include "evaluate/protocols.h"
 #include "evaluate/tables.h"
 #include "kernels/base/error.h"
 #include "kernels/field/cpu/render_view.h"
@@ -257,6 +258,9 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   EvaluateReport report;
   report.flow = settings.consistency.flow;
   report.mask = settings.consistency.mode;
+  report.warp = settings.consistency.warp;
+  report.error_per = settings.consistency.error_per;
+  report.protocol = ProtocolOf(settings.consistency);
   if (!same_camera) report.comparison_note = ComparisonNote(compared[0]);
   report.psnr_to_2d_photos_db = Metric(to_photos.psnr_to_2d_db);
   report.linear_map_psnr_to_2d_db =

@@ -221,7 +221,8 @@ TEST(EvaluateCommand, AProtocolSetsModeAndGaps) {
   const Outcome named = evaluate({"--protocol", "liprf"}, "named");
   ASSERT_EQ(named.code, 0) << named.text;
   EXPECT_OUTPUT(named, "mode ruder2016");
-  const Outcome spelled = evaluate({"--mode", "ruder2016", "--gaps", "1,5"}, "spelled");
+  const Outcome spelled =
+      evaluate({"--mode", "ruder2016", "--gaps", "1,5", "--warp", "earlier"}, "spelled");
   ASSERT_EQ(spelled.code, 0) << spelled.text;
   const auto report_of = [&](const std::string& out) {
     JsonValue json = ReadJsonFile(folder / (out + "/report.json"));
