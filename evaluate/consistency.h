@@ -24,7 +24,7 @@ struct ConsistencyOptions {
   std::string warp = "later", error_per = "channel";
   std::string lpips;
   double min_coverage = 0.4;
-  bool controls = false;  // the caller adds the sequences
+  bool controls = false, control_field = false;  // the caller adds the sequences
   // Frames come in excerpts of that many, and pairs lie within one; 0: all are one sequence.
   // Not an option of the user: it follows from the frames.
   int excerpt = 0;
@@ -73,6 +73,11 @@ struct ConsistencyOptions {
     bind("controls", controls,
          {.help = "adds rows that bound the table: one linear colour map, the styled frames "
                   "blurred and in grey; for runs also the photos and the 2D method on them"});
+    bind("control-field", control_field,
+         {.help =
+              "for runs, adds a row of the naive way to style a scene: a field fitted to the "
+              "2D method's pictures of the photos, with the options of the scene's own fit "
+              "and its time"});
   }
 };
 

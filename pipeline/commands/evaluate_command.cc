@@ -72,6 +72,9 @@ void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& optio
   if (options.mode == "geometry")
     throw UsageError("geometry is known only for runs of regrade", "--mode",
                      "use lai2018 or ruder2016 for frames of other programs");
+  if (options.control_field)
+    throw UsageError("a field is fitted for runs of regrade only", "--control-field",
+                     "leave it out, or evaluate the folder of a run");
   const std::vector<Requirement> required = ParseRequirements(frames.require, options.gaps);
   ProbeEvaluationNetworks(options);
   const bool has_reference = !frames.reference.empty();

@@ -233,6 +233,9 @@ TEST(EvaluateCommand, AProtocolSetsModeAndGaps) {
   const Outcome refused = evaluate({"--protocol", "liprf", "--gaps", "1,7"}, "refused");
   EXPECT_EQ(refused.code, 2);
   EXPECT_OUTPUT(refused, "leave out --gaps");
+  const Outcome fitted = evaluate({"--control-field"}, "refused");  // of what photos?
+  EXPECT_EQ(fitted.code, 2);
+  EXPECT_OUTPUT(fitted, "for runs of regrade only");
   EXPECT_FALSE(std::filesystem::exists(folder / "refused"));
 }
 
