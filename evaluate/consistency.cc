@@ -38,13 +38,14 @@ double Decibel(double error) {
 
 }  // namespace
 
-PairResult ComparePair(const Image& earlier, const Image& later, const PairMotion& motion) {
+PairResult ComparePair(const Image& at, const Image& warped, const PairMotion& motion,
+                       bool per_pixel) {
   const FlowField& flow = motion.flow;
-  REGRADE_CHECK_EQ(earlier.width, flow.width);
-  REGRADE_CHECK_EQ(earlier.height, flow.height);
-  REGRADE_CHECK(earlier.SameSize(later) && earlier.SameSize(motion.mask.weight));
-  const int channels = ColourChannels(earlier);
-  REGRADE_CHECK_EQ(channels, ColourChannels(later));
+  REGRADE_CHECK_EQ(at.width, flow.width);
+  REGRADE_CHECK_EQ(at.height, flow.height);
+  REGRADE_CHECK(at.SameSize(warped) && at.SameSize(motion.mask.weight));
+  const int channels = ColourChannels(at);
+  REGRADE_CHECK_EQ(channels, ColourChannels(warped));
 
   const PairSums sums = SumOverRows(flow.height, [&](int y) {
     PairSums row;
@@ -56,7 +57,7 @@ PairResult ComparePair(const Image& earlier, const Image& later, const PairMotio
                                        y + static_cast<double>(f[1]), flow.width, flow.height);
       double squared = 0;
       for (int c = 0; c < channels; ++c) {
-        const double difference = Sample(taps, later, c) - earlier.at(x, y)[c];
+        const double difference = Sample(taps, warped, c) - at.at(x, y)[c];
         squared += difference * difference;
       }
       if (!std::isfinite(squared)) {
@@ -71,10 +72,12 @@ PairResult ComparePair(const Image& earlier, const Image& later, const PairMotio
 
   PairResult result;
   if (sums.weight > 0) {
-    result.error = sums.squared_error / (channels * sums.weight);
+    const double per_channel = sums.squared_error / (channels * sums.weight);
+    result.error = per_pixel ? channels * per_channel : per_channel;
     result.psnr_db = Decibel(*result.error);
+    result.above_8bit_floor = Decibel(per_channel) > kByteFloorDb;
   }
-  result.coverage = sums.weight / static_cast<double>(earlier.num_pixels());
+  result.coverage = sums.weight / static_cast<double>(at.num_pixels());
   result.flow_not_finite = motion.mask.not_finite;
   result.out_of_frame = motion.mask.out_of_frame;
   result.disoccluded = motion.mask.disoccluded;
@@ -102,7 +105,7 @@ ConsistencyRow Summarize(const std::string& sequence, int gap,
     }
     ++defined;
     sum_error += *pair.error;
-    if (*pair.psnr_db > kByteFloorDb) ++row.pairs_above_8bit_floor;
+    row.pairs_above_8bit_floor += pair.above_8bit_floor;
     if (std::isinf(*pair.psnr_db)) {
       ++row.perfect_pairs;
       continue;
@@ -134,23 +137,27 @@ ConsistencyReport EvaluateConsistency(int frames, const PairMotionFunction& moti
   ConsistencyReport report;
   report.mode = options.mode;
   report.flow = options.mode == "geometry" ? "depth and cameras" : options.flow;
+  report.warp = options.warp;
+  report.error_per = options.error_per;
   std::map<std::pair<size_t, int>, WorstPair> worst;  // by sequence and gap
   int64_t done = 0;
   for (const auto& [i, j] : pairs) {
-    const auto pair_motion = std::make_shared<const PairMotion>(motion(i, j));
+    const int at = options.warp == "earlier" ? j : i, warped = at == i ? j : i;
+    const auto pair_motion = std::make_shared<const PairMotion>(motion(at, warped));
     for (size_t s = 0; s < sequences.size(); ++s) {
       const std::string& name = sequences[s].name;
       const auto earlier = caches[s].Get(i), later = caches[s].Get(j);
       CheckFrame(*earlier, pair_motion->flow, *earlier, name, i);
       CheckFrame(*later, pair_motion->flow, *earlier, name, j);
-      PairResult result = ComparePair(*earlier, *later, *pair_motion);
+      PairResult result = ComparePair(at == i ? *earlier : *later, at == i ? *later : *earlier,
+                                      *pair_motion, options.error_per == "pixel");
       result.sequence = name;
       result.from = i;
       result.to = j;
       result.low_coverage = result.coverage < options.min_coverage;
       WorstPair& so_far = worst[{s, j - i}];
       if (result.error && *result.error > so_far.pair.error.value_or(0))
-        so_far = {result, pair_motion};
+        so_far = {result, pair_motion, at, warped};
       report.pairs.push_back(std::move(result));
     }
     ReportOrThrow(progress, ++done, std::ssize(pairs));
@@ -173,6 +180,8 @@ ConsistencyReport UndefinedConsistency(int frames,
   ConsistencyReport report;
   report.mode = options.mode;
   report.flow = options.flow;
+  report.warp = options.warp;
+  report.error_per = options.error_per;
   for (const NamedFrameSource& sequence : sequences)
     for (const int gap : options.gaps) {
       ConsistencyRow row;
@@ -198,8 +207,14 @@ ConsistencyReport EvaluateConsistency(const FrameSource& reference,
     return EvaluateConsistency(reference.count, GeometricMotion(geometry), sequences, options,
                                progress);
   }
-  if (options.mode == kWarpedMode)
+  if (options.mode == kWarpedMode) {
+    const ConsistencyOptions plain;
+    if (options.warp != plain.warp || options.error_per != plain.error_per)
+      throw UsageError("mode stylegaussian moves frames forward and has an error of its own",
+                       options.warp != plain.warp ? "--warp" : "--error-per",
+                       "leave it out, or choose another mode");
     return EvaluateWarped(reference, sequences, options, progress);
+  }
   // Both frames of a pair are used again by later pairs.
   const auto cache =
       std::make_shared<FrameCache>(CacheOf(reference, options.gaps, kFrameCacheBytes));

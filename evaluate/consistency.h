@@ -21,9 +21,10 @@ struct ConsistencyOptions {
   std::vector<int> gaps{1, 5};
   std::string mode = "lai2018";
   std::string flow = "dis-medium";
+  std::string warp = "later", error_per = "channel";
   std::string lpips;
   double min_coverage = 0.4;
-  bool controls = false;  // the caller adds the sequences
+  bool controls = false, control_field = false;  // the caller adds the sequences
   // Frames come in excerpts of that many, and pairs lie within one; 0: all are one sequence.
   // Not an option of the user: it follows from the frames.
   int excerpt = 0;
@@ -48,6 +49,16 @@ struct ConsistencyOptions {
                   "errors in COSTS.md); with OpenCV's optflow module deepflow, tvl1, pca-flow, "
                   "rlof; files:DIR reads 00000_00001.flo and 00001_00000.flo; onnx:FILE runs a "
                   "network with inputs named first and second, RGB from -1 to 1"});
+    bind("warp", warp,
+         {.help = "which frame of a pair is warped onto the other, where both are compared and "
+                  "the mask is made: later as Lai et al. compute it, earlier as LipRF writes "
+                  "it; not of mode stylegaussian",
+          .choices = "later|earlier"});
+    bind("error-per", error_per,
+         {.help = "what a pair's squared error is divided by: the colour channels of the "
+                  "compared pixels, or those pixels, which is 4.77 dB lower; not of mode "
+                  "stylegaussian",
+          .choices = "channel|pixel"});
     bind("lpips", lpips,
          {.help = "ONNX file of a perceptual distance network (LPIPS), with the inputs of "
                   "--flow onnx:FILE; compares each sequence with the 2D method's frames"});
@@ -62,6 +73,11 @@ struct ConsistencyOptions {
     bind("controls", controls,
          {.help = "adds rows that bound the table: one linear colour map, the styled frames "
                   "blurred and in grey; for runs also the photos and the 2D method on them"});
+    bind("control-field", control_field,
+         {.help =
+              "for runs, adds a row of the naive way to style a scene: a field fitted to the "
+              "2D method's pictures of the photos, with the options of the scene's own fit "
+              "and its time"});
   }
 };
 
@@ -70,11 +86,12 @@ struct PairResult {
   std::string sequence;
   int from = 0, to = 0;  // frame indices
 
-  // EQ(tc-psnr), Lai et al. 2018: e = sum_x M(x) |O_to(x + f(x)) - O_from(x)|^2 / (C sum_x
-  // M(x)), the mean squared error over trusted pixels x and the C = 3 colour channels. f and M
-  // are flow and mask of the reference frames; O is sampled bilinearly with repeated border,
-  // values as given (white = 1, not clipped). Summing over channels instead would lower every
-  // value by 4.77 dB. Empty if no pixel can be compared.
+  // EQ(tc-psnr), Lai et al. 2018: e = sum_x M(x) |O_b(x + f(x)) - O_a(x)|^2 / (C sum_x M(x)),
+  // the mean squared error over trusted pixels x of frame a and the C = 3 colour channels. f
+  // and M are flow from a to b and mask of the reference frames; O is sampled bilinearly with
+  // repeated border, values as given (white = 1, not clipped). b is the frame that is warped:
+  // the later one, or with `--warp earlier` the earlier one. `--error-per pixel` leaves C out:
+  // every value is 10 log10 3 = 4.77 dB lower. Empty if no pixel can be compared.
   std::optional<double> error;
   // -10 log10(e) in dB; +inf for identical frames; empty if `error` is.
   std::optional<double> psnr_db;
@@ -84,6 +101,7 @@ struct PairResult {
   // Numbers of pixels, see OcclusionMask.
   int64_t flow_not_finite = 0, out_of_frame = 0, disoccluded = 0, motion_boundary = 0;
   int64_t colour_not_finite = 0;  // excluded: a colour of this sequence is NaN or inf
+  bool above_8bit_floor = false;  // the error per channel is below that of 8-bit frames
 };
 
 // The summary of all pairs of one sequence at one gap: one row of the table.
@@ -94,8 +112,7 @@ struct ConsistencyRow {
   int undefined_pairs = 0;  // without comparable pixels: excluded from all means
   int perfect_pairs = 0;    // identical frames (infinite dB): excluded from the mean of dB
   int low_coverage_pairs = 0;
-  int pairs_above_8bit_floor =
-      0;  // above 58.9 dB, below the quantisation error of 8-bit frames
+  int pairs_above_8bit_floor = 0;
 
   // Mean over pairs of psnr_db, without perfect pairs; the headline metric.
   std::optional<double> tc_psnr_mean_db;
@@ -109,10 +126,12 @@ struct ConsistencyRow {
   std::string why;      // why a metric is missing or infinite; else empty
 };
 
-// The pair with the largest error of a row, with its motion, which sequences share.
+// The pair with the largest error of a row, with its motion, which sequences share: from frame
+// `at`, where both are compared, to frame `warped`.
 struct WorstPair {
   PairResult pair;
   std::shared_ptr<const PairMotion> motion;
+  int at = 0, warped = 0;
 };
 
 // One pair of one sequence in mode stylegaussian, by both readings of warped_error.h.
@@ -132,7 +151,7 @@ struct WarpedRow {
 };
 
 struct ConsistencyReport {
-  std::string mode, flow;
+  std::string mode, flow, warp = "later", error_per = "channel";
   std::vector<ConsistencyRow> rows;  // by sequence, then by gap, in the order given
   std::vector<PairResult> pairs;     // by first frame, gap, sequence
   // In the order of rows; rows whose pairs are all perfect or undefined have none.
@@ -148,15 +167,17 @@ struct ConsistencyReport {
 // Mode "stylegaussian" is that of warped_rows.h.
 // Only a few frames are in memory at a time.
 //
-// Errors: kUsage for an unknown mode or a gap below 1; kInput if counts, sizes or channels of
-// the frames differ, or if frames are too small for flow. Progress counts pairs.
+// Errors: kUsage for an unknown mode, a gap below 1, or a switch that the mode does not have;
+// kInput if counts, sizes or channels of the frames differ, or if frames are too small for
+// flow. Progress counts pairs.
 ConsistencyReport EvaluateConsistency(const FrameSource& reference,
                                       const std::vector<NamedFrameSource>& sequences,
                                       const ConsistencyOptions& options,
                                       const ProgressFunction& progress = {},
                                       const GeometrySource& geometry = {});
 
-// The same with motion from any source; options.mode and options.flow are only reported.
+// The same with motion from any source, which is asked for motion(j, i) where the earlier frame
+// is warped; options.mode and options.flow are only reported.
 ConsistencyReport EvaluateConsistency(int frames, const PairMotionFunction& motion,
                                       const std::vector<NamedFrameSource>& sequences,
                                       const ConsistencyOptions& options,
@@ -169,9 +190,10 @@ ConsistencyReport UndefinedConsistency(int frames,
                                        const ConsistencyOptions& options,
                                        const std::string& why);
 
-// Compares one pair. `later` and `earlier` are frames of one sequence, of the flow's size.
-// Fills error, psnr_db, coverage and the counts.
-PairResult ComparePair(const Image& earlier, const Image& later, const PairMotion& motion);
+// Compares one pair: frames of one sequence, of the flow's size. `motion` leads from the pixels
+// of `at` to positions in `warped`. Fills error, psnr_db, coverage and the counts.
+PairResult ComparePair(const Image& at, const Image& warped, const PairMotion& motion,
+                       bool per_pixel = false);
 
 // Summarises the pairs of one sequence and gap.
 ConsistencyRow Summarize(const std::string& sequence, int gap,

@@ -35,11 +35,11 @@ double Heat(double squared_error) {
 
 }  // namespace
 
-Image ErrorHeatMap(const Image& earlier, const Image& later, const PairMotion& motion) {
+Image ErrorHeatMap(const Image& at, const Image& warped, const PairMotion& motion) {
   const FlowField& flow = motion.flow;
-  REGRADE_CHECK(earlier.SameSize(later) && earlier.SameSize(motion.mask.weight));
-  const int channels = std::min({earlier.channels, later.channels, 3});
-  Image map(earlier.width, earlier.height, 3);
+  REGRADE_CHECK(at.SameSize(warped) && at.SameSize(motion.mask.weight));
+  const int channels = std::min({at.channels, warped.channels, 3});
+  Image map(at.width, at.height, 3);
   for (int y = 0; y < map.height; ++y)
     for (int x = 0; x < map.width; ++x) {
       const float* f = flow.at(x, y);
@@ -47,8 +47,8 @@ Image ErrorHeatMap(const Image& earlier, const Image& later, const PairMotion& m
                                        y + static_cast<double>(f[1]), flow.width, flow.height);
       double squared = 0, grey = 0;
       for (int c = 0; c < channels; ++c) {
-        const double value = earlier.at(x, y)[c];
-        squared += std::pow(Sample(taps, later, c) - value, 2) / channels;
+        const double value = at.at(x, y)[c];
+        squared += std::pow(Sample(taps, warped, c) - value, 2) / channels;
         grey += value / channels;
       }
       const bool trusted = *motion.mask.weight.at(x, y) >= 0.5f && std::isfinite(squared);

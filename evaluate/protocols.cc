@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <sstream>
 
 #include "kernels/base/error.h"
 
@@ -26,24 +27,33 @@ const Protocol& Named(const std::string& name) {
   return *found;
 }
 
+std::vector<int> GapsOf(const Protocol& protocol) {
+  std::vector<int> gaps;
+  std::istringstream text(protocol.gaps);
+  for (std::string gap; std::getline(text, gap, ',');) gaps.push_back(std::stoi(gap));
+  return gaps;
+}
+
 [[noreturn]] void Refuse(const Protocol& protocol, const std::string& flag,
                          const std::string& why) {
   throw UsageError(
       "--protocol " + protocol.name + " " + why, flag,
-      "leave out " + flag + ", or give --mode, --gaps and --flow without " + kProtocol);
+      "leave out " + flag + ", or give --mode, --gaps, --warp and --flow without " + kProtocol);
 }
 
 }  // namespace
 
 const std::vector<Protocol>& Protocols() {
   static const std::vector<Protocol> protocols{
-      {"liprf", "ruder2016", "1,5", true,
-       "LipRF: short and long range, the mask of Ruder et al."},
-      {"lai2018", "lai2018", "1", true, "Lai et al. 2018, as their evaluator computes it"},
-      {"ruder2016", "ruder2016", "1", true, "Ruder et al. 2016, as their checker computes it"},
-      {"stylegaussian", "stylegaussian", "1,7", true,
+      {"liprf", "ruder2016", "1,5", "earlier", true,
+       "LipRF: short and long range, the mask of Ruder et al., the earlier frame warped"},
+      {"lai2018", "lai2018", "1", "later", true,
+       "Lai et al. 2018, as their evaluator computes it"},
+      {"ruder2016", "ruder2016", "1", "", true,
+       "Ruder et al. 2016, as their checker computes it"},
+      {"stylegaussian", "stylegaussian", "1,7", "", true,
        "StyleGaussian: RMSE and LPIPS after forward warping, as published and corrected"},
-      {"geometry", "geometry", "1,5", false, "exact motion from depth and cameras"},
+      {"geometry", "geometry", "1,5", "", false, "exact motion from depth and cameras"},
   };
   return protocols;
 }
@@ -56,6 +66,21 @@ const char* ProtocolChoices() {
     return text;
   }();
   return choices.c_str();
+}
+
+void UseProtocol(const std::string& name, ConsistencyOptions* options) {
+  const Protocol& protocol = Named(name);
+  options->mode = protocol.mode;
+  options->gaps = GapsOf(protocol);
+  if (!protocol.warp.empty()) options->warp = protocol.warp;
+}
+
+std::string ProtocolOf(const ConsistencyOptions& options) {
+  for (const Protocol& protocol : Protocols())
+    if (options.mode == protocol.mode && options.gaps == GapsOf(protocol) &&
+        (protocol.warp.empty() || options.warp == protocol.warp))
+      return protocol.name;
+  return "";
 }
 
 std::vector<std::string> ExpandProtocol(const std::vector<std::string>& words) {
@@ -75,13 +100,15 @@ std::vector<std::string> ExpandProtocol(const std::vector<std::string>& words) {
   if (!protocol) return words;
 
   std::vector<std::string> flags{"--mode=" + protocol->mode, "--gaps=" + protocol->gaps};
+  if (!protocol->warp.empty()) flags.push_back("--warp=" + protocol->warp);
   for (size_t i = 0; i < end; ++i) {
     if (!protocol->has_flow && ValueAt(words, i, "--flow"))
       Refuse(*protocol, "--flow", "takes motion from depth and cameras, not from flow");
     for (const auto& [flag, value] :
-         {std::pair{"--mode", protocol->mode}, std::pair{"--gaps", protocol->gaps}}) {
+         {std::pair{"--mode", protocol->mode}, std::pair{"--gaps", protocol->gaps},
+          std::pair{"--warp", protocol->warp}}) {
       const auto given = ValueAt(words, i, flag);
-      if (!given) continue;
+      if (!given || value.empty()) continue;
       if (*given != value)
         Refuse(*protocol, flag, std::string("has ") + flag + " " + value + ", not " + *given);
       std::erase(flags, std::string(flag) + "=" + value);

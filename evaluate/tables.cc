@@ -130,14 +130,17 @@ std::string ConsistencyTable(const ConsistencyReport& report, const std::string&
       remarks +=
           Concat(prefix, row.low_coverage_pairs, " pair(s) with few comparable pixels\n");
     if (row.pairs_above_8bit_floor > row.perfect_pairs)
-      remarks += Concat(prefix, row.pairs_above_8bit_floor - row.perfect_pairs,
-                        " pair(s) above 58.9 dB, beyond the precision of 8-bit frames\n");
+      remarks +=
+          Concat(prefix, row.pairs_above_8bit_floor - row.perfect_pairs,
+                 " pair(s) above 58.9 dB a channel, beyond the precision of 8-bit frames\n");
   }
-  return Table(
-      "Consistency: TC-PSNR, higher is better (mode " + report.mode + ", flow " + report.flow +
-          ", error per pixel and channel; 95 %: block bootstrap of the mean of dB, runs of "
-          "the gap's length)",
-      rows, remarks, form);
+  const std::string reading = std::string("error per pixel") +
+                              (report.error_per == "pixel" ? "" : " and channel") +
+                              (report.warp == "earlier" ? ", the earlier frame warped" : "");
+  return Table("Consistency: TC-PSNR, higher is better (mode " + report.mode + ", flow " +
+                   report.flow + ", " + reading +
+                   "; 95 %: block bootstrap of the mean of dB, runs of the gap's length)",
+               rows, remarks, form);
 }
 
 std::string WarpedTable(const ConsistencyReport& report, const std::string& form) {

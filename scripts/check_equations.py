@@ -19,7 +19,10 @@ TAG = re.compile(r"(?<![A-Za-z0-9_])EQ\(([a-z][a-z0-9-]*)\)")
 TEST = re.compile(r"\bTEST(?:_F|_P)?\(\s*(\w+)\s*,\s*(\w+)\s*\)|\bTYPED_TEST(?:_P)?\(\s*(\w+)\s*,\s*(\w+)\s*\)")
 PAPER_HEADING = "## LipRF, item by item"
 PAPER_ITEMS = ([f"eq. {n}" for n in range(1, 16)] + [f"proposition {n}" for n in (1, 2, 3)] + ["lemma 1", "lemma 2"]
-               + [f"algorithm 1, step {n}" for n in range(4)] + ["table 1"] + [f"figure {n}" for n in range(1, 9)])
+               + [f"proof of {of}" for of in ("proposition 1", "lemma 1", "proposition 2", "lemma 2", "proposition 3")]
+               + ["remark of lemma 2", "remarks of proposition 3"]
+               + [f"algorithm 1, step {n}" for n in range(4)] + ["table 1"] + [f"figure {n}" for n in range(1, 9)]
+               + ["user study", "video"])
 TABLE_COLUMNS = 5  # tag, equation, source, file, tests
 
 

@@ -93,8 +93,8 @@ RayT<double> Camera::WorldRay(double u, double v) const {
   return {Center(), Normalized(world_from_camera * CameraRay(u, v))};
 }
 
-Ray Camera::PixelRay(int x, int y) const {
-  RayT<double> ray = WorldRay(x + 0.5, y + 0.5);
+Ray Camera::FieldRay(double u, double v) const {
+  RayT<double> ray = WorldRay(u, v);
   if (ndc.on()) NdcRay(ndc, &ray.origin, &ray.direction);
   return {ray.origin.Cast<float>(), ray.direction.Cast<float>()};
 }

@@ -69,8 +69,10 @@ struct Camera {
   Vec3d CameraRay(double u, double v) const;
   // World ray through (u, v) pixels. Its direction is unit to double precision before rounding.
   RayT<double> WorldRay(double u, double v) const;
-  // Through the centre of pixel (x, y), in the field's space: the world, or NDC.
-  Ray PixelRay(int x, int y) const;
+  // Through (u, v) pixels in the field's space, the world or NDC; and through the centre of
+  // pixel (x, y).
+  Ray FieldRay(double u, double v) const;
+  Ray PixelRay(int x, int y) const { return FieldRay(x + 0.5, y + 0.5); }
 
   // Image point of a world point; false if it is behind the camera. Depth is z in the camera
   // frame.

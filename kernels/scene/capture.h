@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -28,8 +29,9 @@ struct StagedPhoto {
 struct CaptureView {
   std::string name;
   std::string file;
-  std::string path;  // of the image file, absolute
-  Camera camera;     // at the photo's own size
+  std::string path;   // of the image file, absolute
+  Camera camera;      // at the photo's own size
+  bool test = false;  // the poses name it as a test photo
 };
 
 // A triangulated point in the world frame of the cameras.
@@ -40,19 +42,45 @@ struct ScenePoint {
   std::vector<int32_t> views;     // indices into Capture::views, ascending, without repeats
 };
 
+// The extent of a scene in the world frame of the cameras.
+struct WorldBox {
+  Vec3d low, high;
+};
+
+// A volume, and within the range of scenes.
+inline bool IsSound(const WorldBox& box) {
+  constexpr double kFarthest = 1e12;
+  for (int a = 0; a < 3; ++a)
+    if (!(box.low[a] >= -kFarthest && box.low[a] < box.high[a] && box.high[a] <= kFarthest))
+      return false;
+  return true;
+}
+
 struct Capture {
   std::vector<CaptureView> views;  // in natural order of `file`
   std::vector<ScenePoint> points;  // empty for poses without points
   double nearest_depth = 0;        // of the scene, if given with the poses; else 0
+  std::optional<WorldBox> box;     // of the scene, if given with the poses
   std::vector<PhotoStatus> statuses;
   double reprojection_px = 0;  // mean over observations, at the photos' size
   int models_found = 0;        // by COLMAP; 0 for poses from another source
 };
 
-// True for held-out views: every `holdout`-th in order, starting with the first; holdout 0
-// keeps none.
-inline bool IsHeldOut(size_t view_index, int holdout) {
-  return holdout > 0 && view_index % static_cast<size_t>(holdout) == 0;
+// Whether the poses name photos for tests, and others.
+inline bool HasTestSplit(const Capture& capture) {
+  size_t test = 0;
+  for (const CaptureView& view : capture.views) test += view.test;
+  return test > 0 && test < capture.views.size();
+}
+
+// [views]: true for held-out views. These are the test photos where the poses name some, or
+// else every `holdout`-th in order, starting with the first; holdout 0 keeps none.
+inline std::vector<bool> HeldOutViews(const Capture& capture, int holdout) {
+  std::vector<bool> held_out(capture.views.size(), false);
+  const bool split = HasTestSplit(capture);
+  for (size_t i = 0; i < held_out.size() && holdout > 0; ++i)
+    held_out[i] = split ? capture.views[i].test : i % static_cast<size_t>(holdout) == 0;
+  return held_out;
 }
 
 }  // namespace regrade

@@ -3,11 +3,12 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
+#include <optional>
+#include <set>
 
 #include "kernels/base/error.h"
-#include "kernels/base/natural_order.h"
-#include "pipeline/capture/llff_poses.h"
-#include "pipeline/capture/transforms_json.h"
+#include "pipeline/capture/given_models.h"
+#include "pipeline/capture/nsvf_cameras.h"
 #include "pipeline/files/json_file.h"
 #include "reconstruct/colmap/resized_model.h"
 
@@ -15,92 +16,6 @@ namespace regrade {
 namespace {
 
 namespace fs = std::filesystem;
-
-bool HoldsModel(const fs::path& folder) {
-  for (const char* ending : {".bin", ".txt"})
-    if (fs::is_regular_file(folder / (std::string("cameras") + ending)) &&
-        fs::is_regular_file(folder / (std::string("images") + ending)))
-      return true;
-  return false;
-}
-
-// The deepest folder that holds all pictures of a transforms.json.
-fs::path CommonFolder(const fs::path& folder, const TransformsFile& file) {
-  fs::path common;
-  for (const TransformsFrame& frame : file.frames) {
-    const fs::path parent = fs::weakly_canonical(folder / frame.file).parent_path();
-    if (common.empty()) {
-      common = parent;
-      continue;
-    }
-    fs::path shared;
-    for (auto a = common.begin(), b = parent.begin();
-         a != common.end() && b != parent.end() && *a == *b; ++a, ++b)
-      shared /= *a;
-    common = shared;
-  }
-  return common;
-}
-
-// Where the pictures are; empty if there is no such folder.
-fs::path PictureFolder(const fs::path& root) {
-  if (fs::is_directory(root / "images")) return root / "images";
-  std::vector<std::string> names;
-  std::error_code error;  // the caller reports a folder that cannot be listed
-  for (fs::directory_iterator it(root, error), end; !error && it != end; it.increment(error))
-    if (const std::string name = it->path().filename().string();
-        name.starts_with("images_") && fs::is_directory(it->path(), error))
-      names.push_back(name);
-  std::ranges::sort(names, NaturalLess);
-  return names.empty() ? fs::path() : root / names[0];
-}
-
-// A model with one camera per image and no points, with staged names.
-ColmapModel ModelFromTransforms(const CaptureSource& source,
-                                const std::vector<StagedPhoto>& photos,
-                                std::vector<std::string>* missing) {
-  const fs::path folder = fs::path(source.poses).parent_path();
-  std::map<std::string, const StagedPhoto*> by_path;
-  for (const StagedPhoto& photo : photos)
-    by_path[fs::weakly_canonical(fs::path(source.photos) / photo.file).string()] = &photo;
-  const PictureSizeFunction size_of = [&by_path](const std::string& path, int* width,
-                                                 int* height) {
-    const auto found = by_path.find(fs::weakly_canonical(path).string());
-    *width = found == by_path.end() ? 1 : found->second->width;
-    *height = found == by_path.end() ? 1 : found->second->height;
-  };
-  ColmapModel model;
-  const TransformsFile file = ReadTransformsJson(source.poses, size_of);
-  *missing = file.missing;
-  for (const TransformsFrame& frame : file.frames) {
-    const auto found = by_path.find(fs::weakly_canonical(folder / frame.file).string());
-    if (found == by_path.end()) continue;  // left out at ingest, with a reason
-    const uint32_t id = static_cast<uint32_t>(model.images.size()) + 1;
-    model.cameras.push_back({id, ColmapLensOf(frame.camera.lens), frame.camera});
-    model.images.push_back({id, id, found->second->name, frame.camera.camera_from_world, {}});
-  }
-  return model;
-}
-
-// An LLFF file has one pose for each picture of its folder, in natural order.
-ColmapModel ModelFromLlff(const CaptureSource& source, const std::vector<StagedPhoto>& photos,
-                          double* nearest_depth) {
-  const LlffPoses poses = ReadPosesBounds(source.poses);
-  if (poses.cameras.size() != photos.size())
-    throw InputError(Concat(poses.cameras.size(), " poses, but ", photos.size(),
-                            " usable photos in ", source.photos),
-                     source.poses,
-                     "an LLFF file has no photo names: all of its pictures must be present");
-  *nearest_depth = poses.nearest;
-  ColmapModel model;
-  for (size_t i = 0; i < photos.size(); ++i) {
-    const uint32_t id = static_cast<uint32_t>(i) + 1;
-    Camera camera = poses.cameras[i].Resized(photos[i].width, photos[i].height);
-    model.cameras.push_back({id, ColmapLens::kPinhole, camera});
-    model.images.push_back({id, id, photos[i].name, camera.camera_from_world, {}});
-  }
-  return model;
-}
 
 constexpr int64_t kSchema = 2;         // of photos.json
 constexpr char kAbsent[] = "absent/";  // no staged photo's name has a slash
@@ -139,6 +54,30 @@ JsonValue ReadIndex(const std::string& path) {
   return index;
 }
 
+// The photos that are for tests, by "file" or "name".
+std::set<std::string> TestPhotos(const JsonValue& index, const char* key) {
+  std::set<std::string> test;
+  for (const JsonValue& photo : index.At("photos").AsArray())
+    if (const JsonValue* for_test = photo.Find("test");
+        for_test != nullptr && for_test->AsBool())
+      test.insert(photo.At(key).AsString());
+  return test;
+}
+
+std::optional<WorldBox> BoxOf(const JsonValue& index) {
+  const JsonValue* corners = index.Find("box");
+  if (corners == nullptr) return std::nullopt;
+  const JsonValue::Array& numbers = corners->AsArray();
+  WorldBox box;
+  if (numbers.size() != 6) throw InputError("the box is not two corners");
+  for (int a = 0; a < 3; ++a) {
+    box.low[a] = numbers[static_cast<size_t>(a)].AsDouble();
+    box.high[a] = numbers[static_cast<size_t>(a) + 3].AsDouble();
+  }
+  if (!IsSound(box)) throw InputError("the box has no volume");
+  return box;
+}
+
 double NearestDepth(const JsonValue& index) {
   const JsonValue* depth = index.Find("nearest_depth");
   return depth == nullptr ? 0 : depth->AsDouble();
@@ -146,38 +85,14 @@ double NearestDepth(const JsonValue& index) {
 
 }  // namespace
 
-double NearestDepthOf(const CaptureSource& source) {
-  return source.kind == CaptureKind::kPosed ? NearestDepth(ReadIndex(IndexOf(source))) : 0;
-}
-
-CaptureSource DetectCapture(const std::string& folder) {
-  std::error_code error;
-  const fs::path root = fs::canonical(folder, error);
-  if (error) throw InputError(error.message(), folder, "name a folder of photos, or a film");
-  if (fs::is_regular_file(root)) return {CaptureKind::kPhotos, root.string(), ""};
-  if (!fs::is_directory(root))
-    throw InputError("is neither a folder nor a film", folder, "name a folder or a file");
-  for (const char* name : {"transforms.json", "transforms_train.json"}) {
-    const fs::path file = root / name;
-    if (!fs::is_regular_file(file)) continue;
-    const auto unknown_size = [](const std::string&, int* width, int* height) {
-      *width = *height = 0;
-    };
-    const fs::path photos = CommonFolder(root, ReadTransformsJson(file.string(), unknown_size));
-    return {CaptureKind::kTransforms, photos.string(), file.string()};
-  }
-  const fs::path pictures = PictureFolder(root);
-  if (fs::is_regular_file(root / "poses_bounds.npy"))
-    return {CaptureKind::kLlff, (pictures.empty() ? root : pictures).string(),
-            (root / "poses_bounds.npy").string()};
-  for (const fs::path& poses : {root / "poses", root})
-    if (fs::is_regular_file(poses / "photos.json") && HoldsModel(poses / "sparse"))
-      return {CaptureKind::kPosed, (poses / "photos").string(), (poses / "sparse").string()};
-  if (!pictures.empty())
-    for (const char* model : {"sparse", "sparse/0"})
-      if (HoldsModel(root / model))
-        return {CaptureKind::kColmap, pictures.string(), (root / model).string()};
-  return {CaptureKind::kPhotos, root.string(), ""};
+JsonValue KnownBesideModel(const CaptureSource& posed) {
+  const JsonValue index = ReadIndex(IndexOf(posed));
+  JsonValue known = JsonValue::Object{{"nearest_depth", NearestDepth(index)}};
+  JsonValue::Array test;
+  for (const std::string& name : TestPhotos(index, "name")) test.push_back(name);
+  if (!test.empty()) known["test"] = std::move(test);
+  if (const JsonValue* box = index.Find("box")) known["box"] = *box;
+  return known;
 }
 
 Capture ImportPoses(const CaptureSource& source, const std::vector<StagedPhoto>& photos,
@@ -186,13 +101,19 @@ Capture ImportPoses(const CaptureSource& source, const std::vector<StagedPhoto>&
   ColmapModel model;
   double nearest_depth = 0;
   std::vector<std::string> missing;
-  if (source.kind == CaptureKind::kTransforms) {
-    model = ModelFromTransforms(source, photos, &missing);
-  } else if (source.kind == CaptureKind::kLlff) {
-    model = ModelFromLlff(source, photos, &nearest_depth);
+  std::set<std::string> test = source.test;  // the user's names
+  std::optional<WorldBox> box;
+  if (!source.box.empty()) box = ReadNsvfBox(source.box);
+  if (LacksPoints(source.kind)) {
+    model = ModelOfPoses(source, photos, &nearest_depth, &missing);
   } else {
     model = ReadColmapModel(source.poses);
-    nearest_depth = NearestDepthOf(source);
+    if (source.kind == CaptureKind::kPosed) {
+      const JsonValue index = ReadIndex(IndexOf(source));
+      nearest_depth = NearestDepth(index);
+      test = TestPhotos(index, "name");  // its photos are the staged ones
+      box = BoxOf(index);
+    }
     // Images get staged names. An image without a staged photo gets a name that no photo has:
     // its own may be the staged name of another.
     std::map<std::string, std::string> name_of;
@@ -211,6 +132,8 @@ Capture ImportPoses(const CaptureSource& source, const std::vector<StagedPhoto>&
   WriteColmapModel(model, sparse_folder);
   Capture capture = CaptureFromModel(model, photos, PhotoNames::kStaged);
   capture.nearest_depth = nearest_depth;
+  capture.box = box;
+  for (CaptureView& view : capture.views) view.test = test.contains(view.file);
   std::vector<PhotoStatus> posed;
   for (const PhotoStatus& photo : capture.statuses)
     if (photo.status == PhotoState::kSkipped)
@@ -226,20 +149,32 @@ Capture ImportPoses(const CaptureSource& source, const std::vector<StagedPhoto>&
 
 void WriteCaptureIndex(const std::string& folder, const Capture& capture,
                        const std::vector<StagedPhoto>& photos) {
+  std::set<std::string> test;
+  for (const CaptureView& view : capture.views)
+    if (view.test) test.insert(view.file);
   JsonValue::Array staged;
-  for (const StagedPhoto& photo : photos)
-    staged.push_back(JsonValue::Object{{"file", photo.file},
-                                       {"name", photo.name},
-                                       {"width", photo.width},
-                                       {"height", photo.height},
-                                       {"exif_focal_px", photo.exif_focal_px}});
-  WriteJsonFile(folder + "/photos.json",
-                JsonValue::Object{{"schema", kSchema},
-                                  {"photos", std::move(staged)},
-                                  {"statuses", StatusesJson(capture.statuses)},
-                                  {"reprojection_px", capture.reprojection_px},
-                                  {"nearest_depth", capture.nearest_depth},
-                                  {"models_found", capture.models_found}});
+  for (const StagedPhoto& photo : photos) {
+    JsonValue entry = JsonValue::Object{{"file", photo.file},
+                                        {"name", photo.name},
+                                        {"width", photo.width},
+                                        {"height", photo.height},
+                                        {"exif_focal_px", photo.exif_focal_px}};
+    if (test.contains(photo.file)) entry["test"] = true;
+    staged.push_back(std::move(entry));
+  }
+  JsonValue index = JsonValue::Object{{"schema", kSchema},
+                                      {"photos", std::move(staged)},
+                                      {"statuses", StatusesJson(capture.statuses)},
+                                      {"reprojection_px", capture.reprojection_px},
+                                      {"nearest_depth", capture.nearest_depth},
+                                      {"models_found", capture.models_found}};
+  if (capture.box) {
+    JsonValue::Array corners;
+    for (const Vec3d& corner : {capture.box->low, capture.box->high})
+      for (int a = 0; a < 3; ++a) corners.push_back(corner[a]);
+    index["box"] = std::move(corners);
+  }
+  WriteJsonFile(folder + "/photos.json", std::move(index));
 }
 
 Capture ReadCapture(const std::string& folder) {
@@ -271,6 +206,9 @@ Capture ReadCapture(const std::string& folder) {
     }
     capture.reprojection_px = index.At("reprojection_px").AsDouble();
     capture.nearest_depth = NearestDepth(index);
+    capture.box = BoxOf(index);
+    const std::set<std::string> test = TestPhotos(index, "file");
+    for (CaptureView& view : capture.views) view.test = test.contains(view.file);
     capture.models_found = static_cast<int>(index.At("models_found").AsInt());
     return capture;
   } catch (const Error& error) {

@@ -5,31 +5,14 @@
 #include <string>
 
 #include "kernels/scene/capture.h"
+#include "pipeline/capture/capture_source.h"
+#include "pipeline/files/json_file.h"
 
 namespace regrade {
 
-// Where the poses of a capture come from.
-enum class CaptureKind {
-  kPhotos,      // none: COLMAP finds them
-  kPosed,       // an output folder of regrade, or its poses/: photos.json, photos/ and sparse/
-  kColmap,      // a folder of pictures beside sparse/ or sparse/0/
-  kTransforms,  // transforms.json, or transforms_train.json of a Blender capture
-  kLlff,        // poses_bounds.npy beside a folder of pictures, or among them
-};
-
-struct CaptureSource {
-  CaptureKind kind = CaptureKind::kPhotos;
-  std::string photos;  // the folder to take photos from, or a film; absolute
-  std::string poses;   // folder of the model, or the file of poses; empty for kPhotos
-};
-
-// Decides by content. A file counts as a film, of which poses are found. The folder of pictures
-// beside poses is images/, or else the first of images_2/, images_4/ and so on. Throws
-// Error(kInput) if there is no such folder.
-CaptureSource DetectCapture(const std::string& folder);
-
-// Capture::nearest_depth by the photos.json of a kPosed capture; 0 for others.
-double NearestDepthOf(const CaptureSource& source);
+// What the photos.json of a kPosed capture knows beside its model: "nearest_depth", and "test"
+// (photos) and "box" where it has them.
+JsonValue KnownBesideModel(const CaptureSource& posed);
 
 // Reads given poses of the staged photos and writes the model to `sparse_folder`. Photos that
 // were resampled since get cameras of their size. `notes`: sentences for the user. Throws

@@ -97,7 +97,7 @@ class Ingest {
       : source_(source),
         staging_(fs::absolute(staging_folder).lexically_normal().string()),
         options_(options),
-        inputs_(ListInputs(source, options.take_clips)) {
+        inputs_(ListInputs(source, options.take_clips, options.only)) {
     limits_.max_pixels = options.max_megapixels * 1'000'000;
     limits_.accept_damaged = options.accept_damaged;
     video_limits_.max_pixels = limits_.max_pixels;
@@ -308,7 +308,7 @@ IngestResult IngestPhotos(const std::string& source, const std::string& staging_
 }
 
 InputFiles InputsOf(const CaptureSource& source) {
-  return ListInputs(source.photos, source.kind == CaptureKind::kPhotos);
+  return ListInputs(source.photos, source.kind == CaptureKind::kPhotos, source.only);
 }
 
 int64_t ExpectedPhotos(const InputFiles& inputs, const IngestOptions& options) {

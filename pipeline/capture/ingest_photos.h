@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -18,7 +19,8 @@ struct IngestOptions {
   bool accept_damaged = false;
   int64_t max_megapixels = 128;
   int video_frames = 0;
-  bool take_clips = true;  // films; they have no given poses. Has no flag.
+  bool take_clips = true;      // films; they have no given poses. Has no flag.
+  std::set<std::string> only;  // see ListInputs. Has no flag.
 
   template <typename Bind>
   void Describe(Bind& bind) {

@@ -73,10 +73,14 @@ int InputFiles::Count(InputKind kind) const {
   return static_cast<int>(std::ranges::count(files, kind, &InputFile::kind));
 }
 
-InputFiles ListInputs(const std::string& path, bool take_clips) {
+InputFiles ListInputs(const std::string& path, bool take_clips,
+                      const std::set<std::string>& only) {
   std::error_code none;
   if (fs::is_regular_file(path, none)) return OneFilm(path);
   FolderListing listing = ListFolder(path);
+  if (!only.empty())
+    std::erase_if(listing.files,
+                  [&](const ListedFile& file) { return !only.contains(file.name); });
   InputFiles inputs;
   inputs.hidden = listing.hidden;
   std::map<std::string, std::string> picture_of_shot;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -34,9 +35,11 @@ struct InputFiles {
 // (.thm) and small films (.lrv, .lrf); the clip of a live photo, which is a film of at most
 // kLongestLiveClip seconds beside a picture of the same name; a camera raw file beside a
 // picture of the same name, which the camera or the user developed from it; films, where
-// `take_clips` is false. Throws as ListFolder, and Error(kInput) for a path that is a file and
+// `take_clips` is false. Files that are not in `only`, unless that is empty, are not listed.
+// Throws as ListFolder, and Error(kInput) for a path that is a file and
 // no film.
-InputFiles ListInputs(const std::string& path, bool take_clips = true);
+InputFiles ListInputs(const std::string& path, bool take_clips = true,
+                      const std::set<std::string>& only = {});
 inline constexpr double kLongestLiveClip = 6;
 
 // By its header; 0 if that cannot be read.

@@ -8,6 +8,7 @@
 
 #include "kernels/base/error.h"
 #include "kernels/scene/camera_checks.h"
+#include "pipeline/capture/rigid_matrix.h"
 #include "pipeline/files/json_file.h"
 
 namespace regrade {
@@ -15,8 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kMaxSide = 1 << 16;         // pixels
-constexpr double kRigidTolerance = 1e-2;  // of R^T R against 1: files round to a few digits
+constexpr int kMaxSide = 1 << 16;  // pixels
 
 [[noreturn]] void Refuse(const std::string& path, const JsonValue& at,
                          const std::string& what) {
@@ -88,18 +88,6 @@ void ReadLens(const std::string& path, const JsonValue& frame, const FrameValues
   Refuse(path, *named, "camera model \"" + model + "\" is not supported");
 }
 
-// The nearest rotation, by Newton's iteration on R (R^T R)^-1/2.
-Mat3d Orthonormal(Mat3d r) {
-  for (int i = 0; i < 4; ++i) {
-    const Mat3d gram = r.Transposed() * r;
-    Mat3d correction;
-    for (int a = 0; a < 3; ++a)
-      for (int b = 0; b < 3; ++b) correction(a, b) = (a == b ? 1.5 : 0.0) - 0.5 * gram(a, b);
-    r = r * correction;
-  }
-  return r;
-}
-
 RigidTransform ReadPose(const std::string& path, const JsonValue& frame) {
   const JsonValue* matrix = frame.Find("transform_matrix");
   if (matrix == nullptr || !matrix->IsArray())
@@ -107,28 +95,20 @@ RigidTransform ReadPose(const std::string& path, const JsonValue& frame) {
   const JsonValue::Array& rows = matrix->AsArray();
   if (rows.size() != 4 && rows.size() != 3)
     Refuse(path, *matrix, "transform_matrix is not 4x4");
-  RigidTransform world_from_gl;
+  double numbers[12];
   for (int i = 0; i < 3; ++i) {
     if (!rows[i].IsArray() || rows[i].AsArray().size() != 4)
       Refuse(path, rows[i], "a row of transform_matrix does not have 4 numbers");
     for (int j = 0; j < 4; ++j) {
       const JsonValue& value = rows[i].AsArray()[j];
-      const double number = value.IsNumber() ? value.AsDouble() : NAN;
-      if (!std::isfinite(number))
+      numbers[4 * i + j] = value.IsNumber() ? value.AsDouble() : NAN;
+      if (!std::isfinite(numbers[4 * i + j]))
         Refuse(path, value, "this element of transform_matrix is not a number");
-      if (j < 3)
-        world_from_gl.rotation(i, j) = number;
-      else
-        world_from_gl.translation[i] = number;
     }
   }
-  const Mat3d gram = world_from_gl.rotation.Transposed() * world_from_gl.rotation;
-  double off = 0;
-  for (int a = 0; a < 3; ++a)
-    for (int b = 0; b < 3; ++b) off = std::max(off, std::abs(gram(a, b) - (a == b)));
-  if (!(off < kRigidTolerance) || !(world_from_gl.rotation.Determinant() > 0))
-    Refuse(path, *matrix, "transform_matrix is not a rotation and a translation");
-  world_from_gl.rotation = Orthonormal(world_from_gl.rotation);
+  const std::optional<RigidTransform> found = RigidFromRows(numbers);
+  if (!found) Refuse(path, *matrix, "transform_matrix is not a rotation and a translation");
+  const RigidTransform& world_from_gl = *found;
   // y and z of the camera change sign.
   RigidTransform world_from_camera = world_from_gl;
   for (int i = 0; i < 3; ++i)
@@ -199,7 +179,8 @@ JsonValue::Object Intrinsics(const std::string& path, const Camera& camera) {
 
 }  // namespace
 
-TransformsFile ReadTransformsJson(const std::string& path, const PictureSizeFunction& size_of) {
+TransformsFile ReadTransformsJson(const std::string& path, const PictureSizeFunction& size_of,
+                                  bool may_be_empty) {
   const JsonValue top = ReadJsonFile(path);
   const JsonValue* frames = top.Find("frames");
   if (frames == nullptr || !frames->IsArray())
@@ -221,7 +202,7 @@ TransformsFile ReadTransformsJson(const std::string& path, const PictureSizeFunc
     result.frames.push_back(
         {file, ReadCamera(path, top, frame, (folder / file).string(), size_of)});
   }
-  if (result.frames.empty())
+  if (result.frames.empty() && !may_be_empty)
     throw InputError(
         Concat("none of the ", result.missing.size(), " listed pictures is there",
                (result.missing.empty() ? "" : ", e.g. \"" + result.missing[0] + "\"")),

@@ -36,9 +36,11 @@ using PictureSizeFunction =
 //
 // Throws Error(kInput) with the place in the file: JSON that ParseJson refuses, more than 64
 // MiB, values that are missing, out of range or not finite, a matrix that is no rigid motion,
-// an implausible camera, an unknown lens, a picture listed twice, or no picture on disk.
+// an implausible camera, an unknown lens, a picture listed twice, or, unless the file may be
+// empty, no picture on disk.
 TransformsFile ReadTransformsJson(const std::string& path,
-                                  const PictureSizeFunction& size_of = {});
+                                  const PictureSizeFunction& size_of = {},
+                                  bool may_be_empty = false);
 
 // Intrinsics are written at the top if all cameras share them. Numbers read back exactly.
 // Throws Error(kInput) for lenses that the format cannot express (kFullOpenCv beyond k3).

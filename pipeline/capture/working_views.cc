@@ -71,8 +71,9 @@ WorkingViews WorkingViews::AtSize(int photo_size) const {
 
 std::vector<int> WorkingViews::Indices(bool held_out) const {
   std::vector<int> indices;
+  const std::vector<bool> held = HeldOutViews(*capture_, holdout_);
   for (int i = 0; i < count(); ++i)
-    if (IsHeldOut(static_cast<size_t>(i), holdout_) == held_out) indices.push_back(i);
+    if (held[static_cast<size_t>(i)] == held_out) indices.push_back(i);
   return indices;
 }
 

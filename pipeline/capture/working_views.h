@@ -25,7 +25,7 @@ Camera WorkingCamera(const Camera& camera, int longest_side, const Similarity& f
 // Indices below are those of Capture::views. Copies share the capture.
 class WorkingViews {
  public:
-  // Photos as taken, cameras in the capture's world. `holdout`: see IsHeldOut.
+  // Photos as taken, cameras in the capture's world. `holdout`: see HeldOutViews.
   WorkingViews(Capture capture, int photo_size, int holdout);
 
   WorkingViews InField(const Similarity& field_from_world, const NdcSpace& ndc) const;

@@ -39,6 +39,8 @@ std::vector<Removable> RemovableIn(const std::string& folder) {
   for (const std::string& name : StyleNames(folder)) {
     const std::string style = std::string(kStylesFolder) + "/" + name;
     all.push_back({style + "/frames", "`regrade render` makes them again"});
+    all.push_back(
+        {style + "/field_2d.npz", "made again by `regrade evaluate --control-field`"});
     all.push_back({style + "/styled.npz", "made again from field.npz and network.npz"});
     all.push_back({style + "/.regrade/checkpoints",
                    "a stage that was interrupted would begin from its start"});

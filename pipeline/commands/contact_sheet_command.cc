@@ -17,7 +17,9 @@
 #include "pipeline/images/contact_sheet.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/program/device_choice.h"
+#include "pipeline/run/resolve_settings.h"
 #include "pipeline/run/run_context.h"
+#include "pipeline/stages/fit_pictures.h"
 #include "pipeline/stages/make_stylizer.h"
 #include "pipeline/stages/object_edit.h"
 #include "pipeline/stages/style_targets.h"
@@ -38,6 +40,7 @@ struct SheetOptions {
   int views = 3;
   int size = 320;
   int steps = 0;
+  bool control_field = false;
   int holdout = 8;
   std::string device = "auto";
   bool dry_run = false;
@@ -62,6 +65,11 @@ struct SheetOptions {
           .help = "training steps of each network; 0 takes those of its recipe",
           .min = 0,
           .max = 1e6});
+    bind(
+        "control-field", control_field,
+        {.help = "adds a column of the naive way to style a scene: a field fitted to the 2D "
+                 "method's pictures of the photos, with the options of the scene's own fit and "
+                 "its time"});
     bind("holdout", holdout,
          {.unit = "photos",
           .help = "as in `regrade run`, by default as in the run of DIR",
@@ -75,6 +83,7 @@ struct SheetOptions {
 
 const std::vector<std::string> kColumns = {"photo", "2D method", "linear map", "paper recipe",
                                            "standard recipe"};
+constexpr char kFieldColumn[] = "field fitted to 2D";
 
 Image Clipped(Image image) {
   for (float& v : image.pixels) v = std::isfinite(v) ? std::clamp(v, 0.0f, 1.0f) : v;
@@ -196,6 +205,27 @@ RadianceField MapColors(const Scene& scene, const RestyledField& standard) {
   return mapped;
 }
 
+// Fitted to the pictures of the photos with the options of the scene's own fit.
+RadianceField FieldOfPictures(const Scene& scene, const std::vector<Image>& pictures,
+                              const Vec3f& background, const std::string& folder,
+                              const ProgressFunction& progress) {
+  RunSettings of_run;
+  OptionSet options;
+  of_run.Bind(&options);
+  ResolveSettings({.run_json = folder + "/run.json"}, &options);
+  std::vector<int> indices;
+  for (const int i : scene.training_views)
+    if (!pictures[static_cast<size_t>(i)].empty()) indices.push_back(i);
+  const auto picture = [&](int i) {
+    Image image = pictures[static_cast<size_t>(i)];
+    scene.views.LeaveOutMasked(i, &image);
+    return image;
+  };
+  return FitPictures(scene.views, scene.stored, indices, picture, of_run, background,
+                     scene.backend, progress)
+      .stored.field;
+}
+
 // What the 2D method makes of renders of the shown views; empty where it can only style photos.
 std::vector<Image> StyleRenders(RunContext* context, const Scene& scene,
                                 ViewStylizer* of_photos) {
@@ -237,15 +267,19 @@ void AddStyle(RunContext* context, const Scene& scene, const SheetOptions& sheet
                          : "the 2D method has a picture of none of the photos",
                      picture);
 
-  ProgressParts parts(progress, 2);
+  ProgressParts parts(progress, sheet.control_field ? 3 : 2);
   const uint64_t seed = settings.run.seed;
   const RestyledField standard =
       RestyleByRecipe(scene, targets, "standard", sheet.steps, seed, parts.Next(1));
   const RestyledField paper =
       RestyleByRecipe(scene, targets, "paper", sheet.steps, seed, parts.Next(1));
-  const std::vector<Image> columns[] = {Shown(scene, MapColors(scene, standard)),
-                                        Shown(scene, paper.styled),
-                                        Shown(scene, standard.styled)};
+  std::vector<std::vector<Image>> columns = {Shown(scene, MapColors(scene, standard)),
+                                             Shown(scene, paper.styled),
+                                             Shown(scene, standard.styled)};
+  if (sheet.control_field)
+    columns.push_back(
+        Shown(scene, FieldOfPictures(scene, styled.pictures, standard.styled.background,
+                                     context->workspace->folder(), parts.Next(1))));
   const std::vector<Image> renders_2d = StyleRenders(context, scene, stylizer.get());
   const bool of_photos = renders_2d.empty();
   const std::string title =
@@ -346,6 +380,7 @@ void RunContactSheet(const Command& command, const Arguments& arguments, Console
   if (sheet.dry_run) return;
   std::vector<SheetRow> rows;
   Arguments columns = kColumns;
+  if (sheet.control_field) columns.push_back(kFieldColumn);
   if (!styles.empty()) {
     columns = {"photo"};
     columns.insert(columns.end(), styles.begin(), styles.end());

@@ -41,8 +41,9 @@ struct FramesOptions {
     bind("style", style, {.help = "style picture, for fidelity"});
     // Stands for other options, which ExpandProtocol() puts in its place.
     bind("protocol", protocol,
-         {.help = "a published protocol by name, also for runs: sets --mode and --gaps and "
-                  "refuses others; geometry only for runs; evaluate/PROTOCOLS.md defines each",
+         {.help = "a published protocol by name, also for runs: sets --mode, --gaps and "
+                  "--warp where it says so, and refuses others; geometry only for runs; "
+                  "evaluate/PROTOCOLS.md defines each",
           .choices = ProtocolChoices()});
     bind("table", table,
          {.help = "form of the printed tables; latex needs the package booktabs",
@@ -71,6 +72,9 @@ void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& optio
   if (options.mode == "geometry")
     throw UsageError("geometry is known only for runs of regrade", "--mode",
                      "use lai2018 or ruder2016 for frames of other programs");
+  if (options.control_field)
+    throw UsageError("a field is fitted for runs of regrade only", "--control-field",
+                     "leave it out, or evaluate the folder of a run");
   const std::vector<Requirement> required = ParseRequirements(frames.require, options.gaps);
   ProbeEvaluationNetworks(options);
   const bool has_reference = !frames.reference.empty();
@@ -138,6 +142,9 @@ void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& optio
   report.stages.evaluate->time.seconds = seconds;
   report.stages.evaluate->flow = options.flow;
   report.stages.evaluate->mask = options.mode;
+  report.stages.evaluate->warp = options.warp;
+  report.stages.evaluate->error_per = options.error_per;
+  report.stages.evaluate->protocol = ProtocolOf(options);
   if (workspace) WriteEvaluation(*workspace, report);
   console->Event("evaluation", MetricsToJson(report.evaluation));
   console->Lines(FormatTables(consistency, fidelity, frames.table));

@@ -68,8 +68,9 @@ void RunPack(const Command& command, const Arguments& arguments, Console* consol
   packed.scene = profile.scene;
   const WorkingViews views = as_taken.WithGains(profile.gains)
                                  .InField(packed.scene.field_from_world, packed.scene.ndc);
+  const std::vector<bool> held_out = HeldOutViews(capture, run.holdout);
   for (int i = 0; i < views.count(); ++i)
-    packed.views.push_back({views.View(i).file, IsHeldOut(static_cast<size_t>(i), run.holdout),
+    packed.views.push_back({views.View(i).file, held_out[static_cast<size_t>(i)],
                             views.CameraOf(i), views.Photo(i)});
   std::vector<int> fitted;
   for (int i = 0; i < views.count(); ++i)

@@ -61,13 +61,14 @@ CameraMap MapCameras(const Capture& capture, int holdout) {
   CameraMap map;
   if (capture.views.empty()) return map;
   const Page page = PageOf(capture);
+  const std::vector<bool> held_out = HeldOutViews(capture, holdout);
   for (size_t i = 0; i < capture.views.size(); ++i) {
     const Camera& camera = capture.views[i].camera;
     const Vec3d center = camera.Center(), look = camera.Forward();
     map.cameras.push_back({Dot(center, page.right), Dot(center, page.up), Dot(look, page.right),
                            Dot(look, page.up),
-                           camera.fx > 0 ? 0.5 * camera.width / camera.fx : 0.5,
-                           IsHeldOut(i, holdout), capture.views[i].file});
+                           camera.fx > 0 ? 0.5 * camera.width / camera.fx : 0.5, held_out[i],
+                           capture.views[i].file});
   }
   const size_t step = capture.points.size() / kMostPoints + 1;
   for (size_t i = 0; i < capture.points.size(); i += step) {

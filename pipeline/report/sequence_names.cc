@@ -15,6 +15,8 @@ std::string SequenceLabel(const std::string& sequence) {
   if (sequence == "control_linear_map") return "control: one linear colour map";
   if (sequence == "control_blurred") return "control: styled, blurred";
   if (sequence == "control_grey") return "control: styled, grey";
+  if (sequence == "control_field_2d")
+    return "control: field fitted to the 2D method's pictures";
   return sequence;
 }
 

@@ -132,7 +132,7 @@ struct Style2dReport {
   }
 };
 
-// Differences of neighbouring pixels before and after styling; see stylize's volume_variance.h.
+// Differences of pairs of pixels before and after styling; see stylize's volume_variance.h.
 struct VarianceGroupMetrics {
   int64_t pairs = 0;
   int64_t above = 0;  // pairs that differ by more than the bound times their difference before
@@ -154,9 +154,13 @@ struct VarianceMetrics {
   VarianceGroupMetrics clamped;      // a colour is clamped
   VarianceGroupMetrics transparent;  // light passes through the scene
   Metric largest_fraction_of_bound;  // among the valid ones; at most 1
+  // Light from background spheres; voxels that are not wholly of the styled object.
+  std::optional<VarianceGroupMetrics> spheres = {}, partial = {};
 
   template <typename Visit>
   void Describe(Visit& visit) {
+    visit("spheres", spheres);
+    visit("partial", partial);
     visit("valid", valid);
     visit("clamped", clamped);
     visit("transparent", transparent);
@@ -180,7 +184,8 @@ struct StylizeReport {
       local_lipschitz_along_position;
   Curve bound_at_steps;
   std::optional<int64_t> object_voxels;
-  std::optional<VarianceMetrics> variance;
+  // Of neighbouring pixels of a view, and of pixels of two views that see one point.
+  std::optional<VarianceMetrics> variance, variance_across_views;
   std::vector<std::string> notices;  // about the colour map and the training
 
   template <typename Visit>
@@ -200,6 +205,7 @@ struct StylizeReport {
     visit("bound_at_steps", bound_at_steps);
     visit("object_voxels", object_voxels, {.label = "voxels of the object"});
     visit("variance", variance);
+    visit("variance_across_views", variance_across_views);
     visit("notices", notices);
   }
 };
@@ -273,8 +279,10 @@ struct RenderReport {
 
 struct EvaluateReport {
   RecordedTime time;
-  std::string flow;  // "dis-medium"
-  std::string mask;  // "lai2018"
+  std::string flow;             // "dis-medium"
+  std::string mask;             // "lai2018"
+  std::string warp, error_per;  // "later", "channel"
+  std::string protocol;         // whose values these are; empty for none
   // Which frames stand for neighbouring views that differ in size or lens; else empty.
   std::string comparison_note;
   Metric psnr_to_2d_photos_db;      // styled frames against the 2D method on the photos
@@ -287,6 +295,9 @@ struct EvaluateReport {
   void Describe(Visit& visit) {
     visit("flow", flow, {.label = "optical flow"});
     visit("mask", mask, {.label = "mask"});
+    visit("warp", warp, {.label = "warped frame", .optional = true});
+    visit("error_per", error_per, {.label = "error per", .optional = true});
+    visit("protocol", protocol, {.label = "protocol", .optional = true});
     visit("comparison_note", comparison_note, {.optional = true});
     visit("psnr_to_2d_photos_db", psnr_to_2d_photos_db,
           {.label = "PSNR to the styled photos", .unit = "dB"});

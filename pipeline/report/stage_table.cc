@@ -50,18 +50,20 @@ struct RowWriter {
   }
 };
 
-// How differences of neighbouring pixels compare with the certified bound.
-void AddVariance(const VarianceMetrics& variance, RowWriter* row) {
-  const auto add = [row](const VarianceGroupMetrics& group, const char* where) {
+// How differences of pairs of pixels compare with the certified bound.
+void AddVariance(const VarianceMetrics& variance, const std::string& pixels, RowWriter* row) {
+  const auto add = [&](const VarianceGroupMetrics& group, const char* where) {
     if (group.pairs == 0) return;
     row->Add("<b>" + GroupedNumber(group.above) + " of " + GroupedNumber(group.pairs) +
-             "</b> pairs of neighbouring pixels above the bound " + where +
-             " (largest excess " + MetricHtml(group.largest_excess, 3) + ", mean gain " +
-             MetricHtml(group.gain, 2) + ")");
+             "</b> pairs of " + pixels + " above the bound " + where + " (largest excess " +
+             MetricHtml(group.largest_excess, 3) + ", mean gain " + MetricHtml(group.gain, 2) +
+             ")");
   };
   add(variance.valid, "where the premises of the guarantee hold");
   add(variance.clamped, "where a colour is clamped");
   add(variance.transparent, "where light passes through the scene");
+  add(variance.spheres.value_or(VarianceGroupMetrics()), "on background spheres");
+  add(variance.partial.value_or(VarianceGroupMetrics()), "at or beside the styled object");
 }
 
 template <typename Stage>
@@ -78,8 +80,11 @@ std::string MeasurementsHtml(const Stage& stage) {
   if constexpr (std::is_same_v<Stage, RenderReport>)
     if (const std::string sentence = stage.seen_by_few.Sentence(); !sentence.empty())
       row.Add(EscapeHtml(sentence));
-  if constexpr (std::is_same_v<Stage, StylizeReport>)
-    if (stage.variance) AddVariance(*stage.variance, &row);
+  if constexpr (std::is_same_v<Stage, StylizeReport>) {
+    if (stage.variance) AddVariance(*stage.variance, "neighbouring pixels", &row);
+    if (stage.variance_across_views)
+      AddVariance(*stage.variance_across_views, "pixels of two views that see one point", &row);
+  }
   if constexpr (requires { stage.notices; })
     for (const std::string& notice : stage.notices) row.Add(EscapeHtml(notice));
   return row.html;

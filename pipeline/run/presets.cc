@@ -4,6 +4,7 @@
 #include <iterator>
 #include <vector>
 
+#include "evaluate/protocols.h"
 #include "kernels/base/error.h"
 #include "pipeline/run/paper_config.h"
 
@@ -62,6 +63,7 @@ void ApplyPreset(const std::string& preset, bool on_card, RunSettings* settings)
     settings->render.film_size = 1920;
   } else if (preset == "paper") {
     UsePaperConfig(kPaperBase, settings);
+    UseProtocol("liprf", &settings->consistency);
   }
 }
 

@@ -110,6 +110,9 @@ struct PageChoice {
   }
 };
 
+// Of the sums of a reproducible run, so that they do not depend on the threads.
+inline constexpr int kReproducibleShards = 4;
+
 struct RunSettings {
   ProgramOptions program;
   StartOptions start;

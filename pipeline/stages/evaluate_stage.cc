@@ -5,11 +5,13 @@
 #include <filesystem>
 #include <functional>
 #include <iterator>
+#include <optional>
 
 #include "evaluate/consistency.h"
 #include "evaluate/fidelity.h"
 #include "evaluate/optical_flow.h"
 #include "evaluate/pair_network.h"
+#include "evaluate/protocols.h"
 #include "evaluate/tables.h"
 #include "kernels/base/error.h"
 #include "kernels/field/cpu/render_view.h"
@@ -23,6 +25,7 @@
 #include "pipeline/program/device_choice.h"
 #include "pipeline/report/records.h"
 #include "pipeline/run/run_context.h"
+#include "pipeline/stages/control_field.h"
 #include "pipeline/stages/control_sequences.h"
 #include "pipeline/stages/film_frames.h"
 #include "pipeline/stages/heat_map_files.h"
@@ -110,6 +113,7 @@ ConsistencyReport Compare(const Workspace& workspace,
 }
 
 // Rough seconds on two cores at 480 pixels, for the estimate of the remaining time.
+constexpr double kControlFieldSeconds = 60;
 constexpr double kPairSeconds = 0.085, kFrameSeconds = 0.07, kLinearMapSeconds = 0.23;
 
 double PairWeight(const RunSettings& settings, int frames) {
@@ -187,6 +191,7 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   double weight = PairWeight(settings, static_cast<int>(all.size())) +
                   n * (4 * kFrameSeconds + kLinearMapSeconds);
   if (film > 0) weight += PairWeight(settings, film) + 3 * kFrameSeconds * film;
+  if (settings.consistency.control_field) weight += kControlFieldSeconds;
   ProgressParts parts(progress, weight);
 
   // A method that styles photos only has no pictures of rendered frames.
@@ -219,6 +224,12 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   if (settings.consistency.controls)
     Append(controls.Of(all, sequences[0].frames, all_2d, sequences.back().frames, same_camera),
            &sequences);
+  std::optional<StoredField> field_2d;
+  if (settings.consistency.control_field) {
+    field_2d = ControlField(context, views, stored, training_views, photo_2d,
+                            parts.Next(kControlFieldSeconds));
+    sequences.push_back(ControlFieldFrames(*field_2d, compared));
+  }
   BeginHeatMaps(workspace);
   std::vector<HeatMapFile> heat_maps;
   ConsistencyReport consistency =
@@ -244,6 +255,9 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
     Append(controls.Of(training_views, targets.unstyled, targets.views_2d,
                        measured.back().frames, true),
            &measured);
+  std::vector<Camera> training_cameras;
+  for (const int i : training_views) training_cameras.push_back(cameras[i]);
+  if (field_2d) measured.push_back(ControlFieldFrames(*field_2d, training_cameras));
   std::vector<FidelityRow> fidelity = MeasureFidelities(
       measured, targets, parts.Next(n * kFrameSeconds * static_cast<double>(measured.size())));
   AddFilm(context, style, CommonCamera(cameras), &parts, &consistency, &fidelity, &heat_maps);
@@ -252,11 +266,12 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   const FidelityRow to_photos = MeasureFidelity({"styled", frames("styled", training_views)},
                                                 photo_targets, parts.Next(n * kFrameSeconds));
 
-  std::vector<Camera> training_cameras;
-  for (const int i : training_views) training_cameras.push_back(cameras[i]);
   EvaluateReport report;
   report.flow = settings.consistency.flow;
   report.mask = settings.consistency.mode;
+  report.warp = settings.consistency.warp;
+  report.error_per = settings.consistency.error_per;
+  report.protocol = ProtocolOf(settings.consistency);
   if (!same_camera) report.comparison_note = ComparisonNote(compared[0]);
   report.psnr_to_2d_photos_db = Metric(to_photos.psnr_to_2d_db);
   report.linear_map_psnr_to_2d_db =

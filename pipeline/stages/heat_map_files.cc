@@ -24,12 +24,12 @@ std::vector<HeatMapFile> WriteHeatMaps(const Workspace& workspace,
                                        const std::vector<NamedFrameSource>& sequences,
                                        const ConsistencyReport& report) {
   std::vector<HeatMapFile> written;
-  for (const auto& [pair, motion] : report.worst)
+  for (const auto& [pair, motion, at, warped] : report.worst)
     for (const auto& [name, frames] : sequences) {
       if (name != pair.sequence) continue;
       const std::string path = std::string(kHeatMapFolder) + "/" + HeatMapFileName(pair);
       WritePng8(workspace.NewPath(path),
-                ErrorHeatMap(frames.frame(pair.from), frames.frame(pair.to), *motion));
+                ErrorHeatMap(frames.frame(at), frames.frame(warped), *motion));
       written.push_back({name, pair.to - pair.from, pair.from, pair.to, path});
     }
   return written;

@@ -55,7 +55,7 @@ StageSeconds EstimateSeconds(const CaptureSource& source) {
   if (source.kind == CaptureKind::kPhotos)
     return {ingest, 0.75 * kPoseSecondsPerPhoto * photos, 0, 0};
   // Whether tracks are needed is known later.
-  if (source.kind == CaptureKind::kTransforms || source.kind == CaptureKind::kLlff)
+  if (LacksPoints(source.kind))
     return {ingest, 0, kTrackSecondsPerPhoto * photos, 0.1 * photos};
   return {ingest, 0, 0, 0.1 * photos};
 }
@@ -63,9 +63,7 @@ StageSeconds EstimateSeconds(const CaptureSource& source) {
 // The clause of a dry run about tracks, which may be needed.
 std::string PlannedTracks(const RunSettings& settings, const CaptureSource& source,
                           int64_t photos) {
-  const bool without_points =
-      source.kind == CaptureKind::kTransforms || source.kind == CaptureKind::kLlff;
-  if (!without_points || settings.pose.tracks != "auto") return "";
+  if (!LacksPoints(source.kind) || settings.pose.tracks != "auto") return "";
   return "; points by COLMAP, unless photos are transparent: " +
          PlanText(PlanTracks(photos, omp_get_max_threads()));
 }
@@ -94,6 +92,7 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
                       seconds.ingest + seconds.poses + seconds.tracks + seconds.refinement);
   IngestOptions ingest_options = settings.ingest;
   ingest_options.take_clips = source.kind == CaptureKind::kPhotos;
+  ingest_options.only = source.only;
   const IngestResult ingest =
       IngestPhotos(source.photos, photo_folder, ingest_options, parts.Next(seconds.ingest));
   std::vector<std::string> said = ingest.notices;
@@ -181,15 +180,23 @@ Stage PoseStage(RunContext* context) {
   stage.inputs = JsonValue::Object{
       {"photos", PhotoSet(source)},
       {"options", OptionValues(context->settings.ingest, context->settings.pose)}};
-  if (source.kind == CaptureKind::kTransforms || source.kind == CaptureKind::kLlff)
+  if (source.kind == CaptureKind::kNsvf)
+    stage.inputs["poses"] = HashFolder(source.poses);
+  else if (LacksPoints(source.kind))
     stage.inputs["poses"] = HashFile(source.poses);
+  for (const auto& [key, path] :
+       {std::pair{"test_poses", source.test_poses}, std::pair{"intrinsics", source.intrinsics},
+        std::pair{"box", source.box}})
+    if (!path.empty()) stage.inputs[key] = HashFile(path);
   if (source.kind == CaptureKind::kColmap || source.kind == CaptureKind::kPosed)
     for (const char* part : {"cameras.bin", "images.bin", "points3D.bin", "cameras.txt",
                              "images.txt", "points3D.txt"})
       if (std::filesystem::is_regular_file(source.poses + "/" + part))
         stage.inputs["poses"][part] = HashFile(source.poses + "/" + part);
-  if (source.kind == CaptureKind::kPosed)
-    stage.inputs["poses"]["nearest_depth"] = NearestDepthOf(source);
+  if (source.kind == CaptureKind::kPosed) {
+    const JsonValue known = KnownBesideModel(source);
+    for (const auto& [key, value] : known.AsObject()) stage.inputs["poses"][key] = value;
+  }
   const auto overrides = ParseEffects(context->settings.run.effects);
   if (const auto refine = overrides.find(kPoseRefinement); refine != overrides.end())
     stage.inputs[kPoseRefinement] = refine->second;

@@ -36,8 +36,7 @@ namespace {
 
 constexpr double kAfterFit =
     0.08;  // pruning, writing and measuring, as a fraction of the steps' time
-constexpr double kTrial = 0.08;         // the trial of degrees, likewise
-constexpr int kReproducibleShards = 4;  // sums grouped independently of the threads
+constexpr double kTrial = 0.08;  // the trial of degrees, likewise
 
 // To a thousandth, for charts.
 double Rounded(double value) { return std::round(value * 1000) / 1000; }

@@ -31,7 +31,8 @@ namespace {
 
 constexpr double kVoting = 0.2;  // of the time of training and application, roughly
 
-// Pairs of neighbouring pixels on which LipRF's propositions are checked.
+// Pairs of pixels on which LipRF's propositions are checked: so many neighbours, and as many of
+// two views.
 constexpr int64_t kVariancePairs = 4000;
 
 VarianceGroupMetrics MetricsOfGroup(const VarianceGroup& group) {
@@ -39,16 +40,28 @@ VarianceGroupMetrics MetricsOfGroup(const VarianceGroup& group) {
   return {group.pairs, group.above, group.Gain(), group.largest_excess};
 }
 
-VarianceMetrics MetricsOfVariance(const RadianceField& source, const RadianceField& styled,
-                                  const LipschitzNetwork& network,
-                                  const std::vector<StyledTrainingView>& views, uint64_t seed) {
+VarianceMetrics MetricsOfVariance(const VarianceReport& report) {
+  VarianceMetrics metrics{MetricsOfGroup(report.valid), MetricsOfGroup(report.clamped),
+                          MetricsOfGroup(report.transparent), report.largest_fraction};
+  if (report.spheres.pairs > 0) metrics.spheres = MetricsOfGroup(report.spheres);
+  if (report.partial.pairs > 0) metrics.partial = MetricsOfGroup(report.partial);
+  return metrics;
+}
+
+void SetVariance(const RestyledField& restyled, const std::vector<StyledTrainingView>& views,
+                 uint64_t seed, const std::vector<float>* object_weights,
+                 StylizeReport* metrics) {
   std::vector<Camera> cameras;
   for (const StyledTrainingView& view : views) cameras.push_back(view.camera);
-  const VarianceReport report = MeasureVariance(
-      source, styled, network, NeighbouringPixels(cameras, kVariancePairs, seed),
-      MarchOptions{source.step});
-  return {MetricsOfGroup(report.valid), MetricsOfGroup(report.clamped),
-          MetricsOfGroup(report.transparent), report.largest_fraction};
+  const MarchOptions march{restyled.source.step};
+  const auto measure = [&](const std::vector<RayPair>& pairs) {
+    return MetricsOfVariance(MeasureVariance(restyled.source, restyled.styled,
+                                             restyled.trained.network, pairs, march,
+                                             object_weights));
+  };
+  metrics->variance = measure(NeighbouringPixels(cameras, kVariancePairs, seed));
+  metrics->variance_across_views =
+      measure(PixelsOfOnePoint(restyled.source, cameras, kVariancePairs, seed, march));
 }
 
 // Why the local Lipschitz constant is above what the colours' covariances predict, where it is.
@@ -165,10 +178,8 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
   } else {
     std::filesystem::remove(workspace.Path("object.npz"));  // of an earlier style
   }
-  // A network's guarantee is about what it alone has made, and is measured on voxels.
-  if (object == nullptr && !restyled.source.geometry->spheres.on())
-    metrics.variance = MetricsOfVariance(restyled.source, restyled.styled, trained.network,
-                                         targets.targets().views(), settings.run.seed);
+  SetVariance(restyled, targets.targets().views(), settings.run.seed, request.object_weights,
+              &metrics);
   metrics.device = DeviceName(request.backend);
   metrics.notices = restyled.notices;
   for (const std::string& warning : trained.warnings) metrics.notices.push_back(warning);

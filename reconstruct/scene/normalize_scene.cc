@@ -2,6 +2,8 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <vector>
 
 #include "kernels/base/error.h"
@@ -156,6 +158,27 @@ double NearestDistance(const Capture& capture, const std::vector<Vec3d>& centers
   return distances.empty() ? 0 : kNearestFraction * Quantile(distances, kTail);
 }
 
+// The near clip in world units without points: a fraction of the nearest camera's distance to
+// the box; 0 for a camera inside.
+double NearestToBox(const WorldBox& box, const std::vector<Vec3d>& centers) {
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const Vec3d& c : centers) {
+    Vec3d out;
+    for (int a = 0; a < 3; ++a) out[a] = std::max({box.low[a] - c[a], 0.0, c[a] - box.high[a]});
+    nearest = std::min(nearest, Norm(out));
+  }
+  return kNearestFraction * nearest;
+}
+
+// The extent along an axis of unit length.
+void ExtentOf(const WorldBox& box, const Vec3d& axis, double* low, double* high) {
+  const Vec3d middle = (box.low + box.high) * 0.5, half = (box.high - box.low) * 0.5;
+  double reach = 0;
+  for (int a = 0; a < 3; ++a) reach += std::abs(axis[a]) * half[a];
+  *low = Dot(axis, middle) - reach;
+  *high = Dot(axis, middle) + reach;
+}
+
 }  // namespace
 
 NormalizedScene NormalizeScene(const Capture& capture) {
@@ -167,7 +190,11 @@ NormalizedScene NormalizeScene(const Capture& capture) {
   // Box and nearest distance in the rotated world.
   Vec3d low, high;
   double nearest = 0;
-  if (capture.points.size() >= kMinPoints) {
+  if (capture.box) {
+    for (int a = 0; a < 3; ++a) ExtentOf(*capture.box, rotation.row[a], &low[a], &high[a]);
+    nearest = capture.points.size() >= kMinPoints ? NearestDistance(capture, centers)
+                                                  : NearestToBox(*capture.box, centers);
+  } else if (capture.points.size() >= kMinPoints) {
     const std::vector<Vec3d> corners = PhotoCorners(capture);
     for (int a = 0; a < 3; ++a) {
       std::vector<double> along;

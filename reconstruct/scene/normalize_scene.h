@@ -16,11 +16,12 @@ struct NormalizedScene {
   std::string notice;           // the fallback that was used, if any
 };
 
-// From camera poses and triangulated points, in any order. The box contains the points except
-// the outermost hundredth on each side, and most corners of the photos at the depth of their
-// nearer points. With fewer than 50 points it is a cube around the optical axes' common point
-// that extends to the cameras. Valid for collinear cameras (H129), cameras at one point (H130)
-// and up vectors that cancel (H131).
+// From camera poses and triangulated points, in any order. The box is the given one, turned
+// upright and widened by 8 % of its extent on each side; without one it contains the points
+// except the outermost hundredth on each side, and most corners of the photos at the depth of
+// their nearer points. With fewer than 50 points it is a cube around the optical axes' common
+// point that extends to the cameras. Valid for collinear cameras (H129), cameras at one point
+// (H130) and up vectors that cancel (H131).
 NormalizedScene NormalizeScene(const Capture& capture);
 
 // The region that the cameras surround, and how much of the scene is far outside of it.

@@ -38,15 +38,16 @@ def reports(work, kind):
 
 
 def rows_of(scene, style, method, seed, report):
-    """A row for each sequence of frames: the renders, the 2D method on them, the restyled field."""
+    """A row for each sequence of frames: the renders, the 2D method on them, the restyled field, a field fitted to the 2D method's pictures."""
     foreign = "stylize" not in report["stages"]
-    names = {} if foreign else {"source": "no style", "views_2d": method, "styled": method + " w/ Lip"}
+    names = {} if foreign else {"source": "no style", "views_2d": method, "control_field_2d": method + ", field fitted",
+                                "styled": method + " w/ Lip"}
     tc = {(c["sequence"], c["gap"]): c["tc_psnr_mean_db"] for c in report["consistency"]}
     gaps = sorted({gap for _, gap in tc})
     stages = report.get("stages", {})
     stylize, evaluate, fit = (stages.get(stage, {}) for stage in ("stylize", "evaluate", "reconstruct"))
     for sequence in dict.fromkeys(c["sequence"] for c in report["consistency"]):
-        if sequence.startswith("path_") or (foreign and sequence == "source"):
+        if sequence.startswith("path_") or (foreign and sequence == "source") or (names and sequence not in names):
             continue
         near = next((f for f in report.get("fidelity", []) if f["sequence"] == sequence), {})
         row = {"scene": scene, "style": style, "method": names.get(sequence, method), "seed": seed,
@@ -55,8 +56,10 @@ def rows_of(scene, style, method, seed, report):
                "structure": near.get("structure"), "distance_to_style": near.get("sliced_wasserstein_to_style")}
         if sequence == "source":
             row.update({"heldout_db": fit.get("psnr_heldout_db"), "heldout_ssim": fit.get("ssim_heldout")})
+        if sequence in ("styled", "control_field_2d"):
+            row["to_2d_db"] = near.get("psnr_to_2d_db")
         if sequence == "styled":
-            row.update({"to_2d_db": near.get("psnr_to_2d_db"), "linear_map_db": evaluate.get("linear_map_psnr_to_2d_db"),
+            row.update({"linear_map_db": evaluate.get("linear_map_psnr_to_2d_db"),
                         **{key: stylize.get(key) for key in ("k_est", "bound", "local_lipschitz_sampled", "seconds")}})
         if sequence != "source" and near.get("hue_std_2d"):
             row["hue_spread"] = near["hue_std"] / near["hue_std_2d"]

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "kernels/base/error.h"
-#include "kernels/base/random.h"
 #include "kernels/field/ray_weights.h"
 #include "kernels/field/spherical_harmonics.h"
 #include "kernels/field/trilinear.h"
@@ -25,15 +24,16 @@ struct Seen {
   Vec3d source{}, styled{};                // as rendered
   Vec3d closed_source{}, closed_styled{};  // with mu for weights, nothing clamped
   double gamma[kMaxBasis] = {};
-  bool transparent = false, clamped = false;
+  bool partial = false, on_sphere = false, transparent = false, clamped = false;
 };
 
 class Observer {
  public:
   Observer(const RadianceField& source, const RadianceField& styled,
-           const LipschitzNetwork& network)
+           const LipschitzNetwork& network, const std::vector<float>* object_weights)
       : source_(source),
         styled_(styled),
+        object_weights_(object_weights),
         basis_(source.appearance.basis),
         base_(network.data().base),
         has_base_(network.data().has_base),
@@ -55,15 +55,18 @@ class Observer {
     for (int64_t i = weights.first[ray]; i < weights.first[static_cast<size_t>(ray) + 1]; ++i) {
       const WeightedSample& sample = weights.samples[i];
       Vec3d before{0.5, 0.5, 0.5}, after = before;
-      int32_t voxels[8];
-      CornerPoints(*source_.geometry, sample, voxels);
+      int32_t points[8];
+      CornerPoints(*source_.geometry, sample, points);
+      seen.on_sphere |= sample.on_sphere();
       for (int corner = 0; corner < 8; ++corner) {
-        const int32_t voxel = voxels[corner];
+        const int32_t point = points[corner];
         const double fraction = CornerWeight(sample.fraction, corner);
-        if (voxel < 0 || fraction == 0) continue;
-        before += ColorOf(source_.appearance, voxel, seen.gamma) * fraction;
-        after += ColorOf(styled_.appearance, voxel, seen.gamma) * fraction;
-        seen.atoms.push_back({voxel, fraction * sample.weight});
+        if (point < 0 || fraction == 0) continue;
+        before += ColorOf(source_.appearance, point, seen.gamma) * fraction;
+        after += ColorOf(styled_.appearance, point, seen.gamma) * fraction;
+        if (sample.on_sphere()) continue;
+        seen.partial |= object_weights_ != nullptr && (*object_weights_)[point] < 1;
+        seen.atoms.push_back({point, fraction * sample.weight});
         inside_weight += fraction * sample.weight;
       }
       for (int c = 0; c < 3; ++c) {
@@ -90,12 +93,21 @@ class Observer {
            kGammaNorm * residual_bound_ * Transport(a, b) +
            ResidualNorm(b) * std::sqrt(difference);
   }
-  double k() const { return base_norm_ + residual_bound_; }
+  // The mix of an object's style has the constant 1 - e + e K at most.
+  double k() const {
+    const double network = base_norm_ + residual_bound_;
+    return object_weights_ != nullptr ? std::max(1.0, network) : network;
+  }
 
  private:
-  Vec3d ColorOf(const Appearance& appearance, int32_t voxel, const double* gamma) const {
-    const float* sh = appearance.sh.data() + static_cast<int64_t>(voxel) * appearance.stride();
+  // Of a voxel, or of a texel of the spheres behind the voxels.
+  Vec3d ColorOf(const Appearance& appearance, int32_t point, const double* gamma) const {
     Vec3d color{};
+    if (const int64_t texel = point - source_.geometry->num_voxels(); texel >= 0) {
+      for (int c = 0; c < 3; ++c) color[c] = appearance.sphere_color[3 * texel + c] * gamma[0];
+      return color;
+    }
+    const float* sh = appearance.sh.data() + static_cast<int64_t>(point) * appearance.stride();
     for (int c = 0; c < 3; ++c)
       for (int k = 0; k < basis_; ++k) color[c] += sh[c * basis_ + k] * gamma[k];
     return color;
@@ -156,6 +168,7 @@ class Observer {
 
   const RadianceField& source_;
   const RadianceField& styled_;
+  const std::vector<float>* object_weights_;  // may be null
   int basis_;
   ColorMap base_;
   bool has_base_;
@@ -163,6 +176,15 @@ class Observer {
   double base_norm_, residual_bound_;
   std::vector<int32_t> vertex_;
 };
+
+// The first premise that either ray violates.
+VarianceGroup VarianceReport::*GroupOf(const Seen& a, const Seen& b) {
+  if (a.partial || b.partial) return &VarianceReport::partial;
+  if (a.on_sphere || b.on_sphere) return &VarianceReport::spheres;
+  if (a.transparent || b.transparent) return &VarianceReport::transparent;
+  if (a.clamped || b.clamped) return &VarianceReport::clamped;
+  return &VarianceReport::valid;
+}
 
 void Add(double source, double styled, double k, VarianceGroup* group) {
   ++group->pairs;
@@ -177,15 +199,18 @@ void Add(double source, double styled, double k, VarianceGroup* group) {
 
 VarianceReport MeasureVariance(const RadianceField& source, const RadianceField& styled,
                                const LipschitzNetwork& network,
-                               const std::vector<RayPair>& pairs, const MarchOptions& march) {
+                               const std::vector<RayPair>& pairs, const MarchOptions& march,
+                               const std::vector<float>* object_weights) {
+  if (object_weights != nullptr)
+    REGRADE_CHECK_EQ(std::ssize(*object_weights), source.geometry->num_voxels());
   std::vector<Ray> rays;
   for (const RayPair& pair : pairs) rays.insert(rays.end(), {pair.first, pair.second});
   const RayWeights weights = ComputeRayWeights(
       *source.geometry, {rays.data(), std::ssize(rays)}, march, source.near_clip);
-  const Observer observer(source, styled, network);
+  const Observer observer(source, styled, network, object_weights);
   struct Result {
     double source, styled, fraction;
-    bool transparent, clamped;
+    VarianceGroup VarianceReport::*group;
   };
   std::vector<Result> results(pairs.size());
 #pragma omp parallel for schedule(dynamic, 16)
@@ -194,9 +219,8 @@ VarianceReport MeasureVariance(const RadianceField& source, const RadianceField&
     const Seen a = observer.Look(pairs[i].first.direction, weights, ray);
     const Seen b = observer.Look(pairs[i].second.direction, weights, ray + 1);
     Result& result = results[i];
-    result = {Norm(a.source - b.source), Norm(a.styled - b.styled), 0,
-              a.transparent || b.transparent, a.clamped || b.clamped};
-    if (result.transparent || result.clamped) continue;
+    result = {Norm(a.source - b.source), Norm(a.styled - b.styled), 0, GroupOf(a, b)};
+    if (result.group != &VarianceReport::valid) continue;
     const double bound = observer.Bound(a, b);
     if (bound > kVarianceSlack)
       result.fraction = Norm(a.closed_styled - b.closed_styled) / bound;
@@ -204,33 +228,10 @@ VarianceReport MeasureVariance(const RadianceField& source, const RadianceField&
   VarianceReport report;
   report.k = observer.k();
   for (const Result& result : results) {
-    Add(result.source, result.styled, report.k,
-        result.transparent ? &report.transparent
-        : result.clamped   ? &report.clamped
-                           : &report.valid);
+    Add(result.source, result.styled, report.k, &(report.*result.group));
     report.largest_fraction = std::max(report.largest_fraction, result.fraction);
   }
   return report;
-}
-
-std::vector<RayPair> NeighbouringPixels(const std::vector<Camera>& cameras, int64_t count,
-                                        uint64_t seed) {
-  REGRADE_CHECK(!cameras.empty());
-  constexpr uint64_t kStream = 0x7661726961;
-  std::vector<RayPair> pairs;
-  for (int64_t i = 0; i < count; ++i) {
-    const auto draw = [&](int which, int below) {
-      return static_cast<int>(RandomIndex(seed, kStream, static_cast<uint64_t>(4 * i + which),
-                                          static_cast<uint64_t>(below)));
-    };
-    const Camera& camera = cameras[draw(0, static_cast<int>(cameras.size()))];
-    const bool down = draw(1, 2) == 1;
-    const int right = down ? 0 : 1, below = down ? 1 : 0;
-    if (camera.width <= right || camera.height <= below) continue;
-    const int x = draw(2, camera.width - right), y = draw(3, camera.height - below);
-    pairs.emplace_back(camera.PixelRay(x, y), camera.PixelRay(x + right, y + below));
-  }
-  return pairs;
 }
 
 }  // namespace regrade

@@ -15,20 +15,20 @@
 // The propositions say K vrr, K = |A| + K_g: that holds for A alone (Prop. 1 and 3), and for g
 // under Prop. 2's premise that the rays' weighted colours agree sample by sample, which
 // neighbouring rays need not do.
+//
+// Where an object alone is styled, a voxel of weight e has the coefficients x + e (f(x) - x):
+// with e = 1 for all that two rays see, the bound is the network's.
 #pragma once
 
 #include <cstdint>
-#include <utility>
 #include <vector>
 
 #include "kernels/field/radiance_field.h"
 #include "kernels/field/ray_march.h"
-#include "kernels/scene/camera.h"
 #include "stylize/field/lipschitz_network.h"
+#include "stylize/field/ray_pairs.h"
 
 namespace regrade {
-
-using RayPair = std::pair<Ray, Ray>;
 
 struct VarianceGroup {
   int64_t pairs = 0;
@@ -41,27 +41,28 @@ struct VarianceGroup {
 
 // A pair is counted in the first group whose condition it meets.
 struct VarianceReport {
-  double k = 0;                 // |A| + K_g
+  double k = 0;                 // |A| + K_g; at least 1 where an object alone is styled
+  VarianceGroup partial;        // a ray sees a voxel whose object weight is below 1
+  VarianceGroup spheres;        // a ray sees a background sphere
   VarianceGroup transparent;    // a ray transmits light, or passes cells with empty corners
   VarianceGroup clamped;        // a sample's colour is clamped, before or after
   VarianceGroup valid;          // every premise of the bound holds
   double largest_fraction = 0;  // of the bound, see EQ(vrr-bound), over `valid`; at most 1
 
-  int64_t Pairs() const { return transparent.pairs + clamped.pairs + valid.pairs; }
+  int64_t Pairs() const {
+    return partial.pairs + spheres.pairs + transparent.pairs + clamped.pairs + valid.pairs;
+  }
 };
 
 inline constexpr double kVarianceSlack = 1e-5;             // float's rounding in a ray's colour
 inline constexpr double kTransparentTransmittance = 1e-2;  // more than that is background
 
-// `styled` is `source` restyled by `network`. Colours are as rendered, but not clipped to [0,
-// 1]. Of fields without background spheres. Sums in double; the result does not depend on the
-// number of threads.
+// `styled` is `source` restyled by `network`, where `object_weights` [voxels] are given by
+// MixFields with them. Colours are as rendered, but not clipped to [0, 1]. Sums in double; the
+// result does not depend on the number of threads.
 VarianceReport MeasureVariance(const RadianceField& source, const RadianceField& styled,
                                const LipschitzNetwork& network,
-                               const std::vector<RayPair>& pairs, const MarchOptions& march);
-
-// `count` pixels of random views with the one to the right of or below each.
-std::vector<RayPair> NeighbouringPixels(const std::vector<Camera>& cameras, int64_t count,
-                                        uint64_t seed);
+                               const std::vector<RayPair>& pairs, const MarchOptions& march,
+                               const std::vector<float>* object_weights = nullptr);
 
 }  // namespace regrade

@@ -111,6 +111,68 @@ TEST(Consistency, H114_ErrorIsPerPixelAndChannel) {
   EXPECT_EQ(*ComparePair(a, b, StillMotion(kW, kH)).error, 0);
 }
 
+// A step to the right by 2 px: the positions that are compared, and the frame that is sampled
+// between pixels, differ by direction.
+TEST(Consistency, TheWarpedFrameIsTheOneAskedFor) {
+  const int shift = 2;
+  const auto motion = [](int from, int to) {
+    PairMotion still = StillMotion(kW, kH);
+    for (int y = 0; y < kH; ++y)
+      for (int x = 0; x < kW; ++x)
+        still.flow.at(x, y)[0] = static_cast<float>(to > from ? shift : -shift);
+    // Only the left column of the frame in which the two are compared counts.
+    for (int y = 0; y < kH; ++y)
+      for (int x = 1; x < kW; ++x) *still.mask.weight.at(x, y) = 0;
+    return still;
+  };
+  Image earlier = ConstantImage(kW, kH, 0), later = ConstantImage(kW, kH, 0.5f);
+  for (int y = 0; y < kH; ++y)
+    for (int c = 0; c < 3; ++c) {
+      later.at(shift, y)[c] = 0.1f;  // what the earlier frame's left column moves to
+      later.at(0, y)[c] = 0.2f;      // comes from outside the earlier frame: its border
+    }
+  const std::vector<NamedFrameSource> frames{{"s", Frames({earlier, later})}};
+  ConsistencyOptions options = Gaps({1});
+  EXPECT_NEAR(*EvaluateConsistency(2, motion, frames, options).pairs.at(0).error, 0.01, 1e-8);
+  options.warp = "earlier";
+  const ConsistencyReport report = EvaluateConsistency(2, motion, frames, options);
+  EXPECT_NEAR(*report.pairs.at(0).error, 0.04, 1e-8);
+  EXPECT_EQ(report.pairs.at(0).from, 0);
+  EXPECT_EQ(report.worst.at(0).at, 1);
+  EXPECT_EQ(report.worst.at(0).warped, 0);
+}
+
+TEST(Consistency, H114_ErrorPerPixelIsTheSumOverChannels) {
+  ConsistencyOptions options = Gaps({1});
+  const std::vector<NamedFrameSource> colour{{"s", Levels({0.25f, 0.35f})}};
+  const PairResult channel = EvaluateConsistency(2, Still(), colour, options).pairs.at(0);
+  options.error_per = "pixel";
+  const PairResult pixel = EvaluateConsistency(2, Still(), colour, options).pairs.at(0);
+  EXPECT_NEAR(*pixel.error, 3 * *channel.error, 1e-12);
+  EXPECT_NEAR(*channel.psnr_db - *pixel.psnr_db, 10 * std::log10(3.0), 1e-9);
+  // A grey frame has one channel.
+  const std::vector<NamedFrameSource> grey{
+      {"s", Frames({ConstantImage(kW, kH, 0.25f, 1), ConstantImage(kW, kH, 0.35f, 1)})}};
+  EXPECT_NEAR(*EvaluateConsistency(2, Still(), grey, options).pairs.at(0).error, 0.01, 1e-8);
+  // What 8 bits resolve does not depend on how the error is counted: 60 dB a channel.
+  const std::vector<NamedFrameSource> fine{{"s", Levels({0.25f, 0.251f})}};
+  EXPECT_EQ(EvaluateConsistency(2, Still(), fine, options).rows.at(0).pairs_above_8bit_floor,
+            1);
+}
+
+TEST(Consistency, ForwardWarpingRefusesTheSwitches) {
+  const FrameSource frames = Levels({0, 0.1f});
+  for (const bool direction : {false, true}) {
+    ConsistencyOptions options = Gaps({1});
+    options.mode = "stylegaussian";
+    (direction ? options.warp : options.error_per) = direction ? "earlier" : "pixel";
+    EXPECT_EQ(CodeOf([&] {
+                EvaluateConsistency(frames, {{"s", frames}}, options);
+              }),
+              ExitCode::kUsage);
+  }
+}
+
 TEST(Consistency, H115_PairsAboveThe8BitFloorAreCounted) {
   // A step of 1/1000 is 60 dB, of 1/500 54 dB; 8 bits resolve up to 58.9 dB.
   const auto report =

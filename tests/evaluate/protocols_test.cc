@@ -11,7 +11,7 @@ using Words = std::vector<std::string>;
 
 TEST(Protocols, StandForTheirFlags) {
   EXPECT_EQ(ExpandProtocol({"--frames", "a", "--protocol", "liprf"}),
-            (Words{"--mode=ruder2016", "--gaps=1,5", "--frames", "a"}));
+            (Words{"--mode=ruder2016", "--gaps=1,5", "--warp=earlier", "--frames", "a"}));
   EXPECT_EQ(ExpandProtocol({"--protocol=ruder2016", "--flow", "dis-fast"}),
             (Words{"--mode=ruder2016", "--gaps=1", "--flow", "dis-fast"}));
   EXPECT_EQ(ExpandProtocol({"--protocol", "stylegaussian"}),
@@ -29,7 +29,7 @@ TEST(Protocols, WithoutOneTheWordsStay) {
 
 TEST(Protocols, AFlagThatAgreesIsGivenOnce) {
   EXPECT_EQ(ExpandProtocol({"--protocol", "lai2018", "--gaps", "1"}),
-            (Words{"--mode=lai2018", "--gaps", "1"}));
+            (Words{"--mode=lai2018", "--warp=later", "--gaps", "1"}));
 }
 
 TEST(Protocols, AFlagThatContradictsIsRefused) {
@@ -37,8 +37,28 @@ TEST(Protocols, AFlagThatContradictsIsRefused) {
                        ExitCode::kUsage, "has --gaps 1,5, not 1,7");
   EXPECT_REGRADE_ERROR(ExpandProtocol(Words({"--mode=ruder2016", "--protocol=lai2018"})),
                        ExitCode::kUsage, "has --mode lai2018, not ruder2016");
+  EXPECT_REGRADE_ERROR(ExpandProtocol(Words({"--protocol", "liprf", "--warp=later"})),
+                       ExitCode::kUsage, "has --warp earlier, not later");
+  const Words free{"--protocol", "geometry", "--warp", "earlier"};  // it leaves the direction
+  EXPECT_EQ(ExpandProtocol(free),
+            (Words{"--mode=geometry", "--gaps=1,5", "--warp", "earlier"}));
   EXPECT_REGRADE_ERROR(ExpandProtocol(Words({"--protocol", "geometry", "--flow=dis-fast"})),
                        ExitCode::kUsage, "not from flow");
+}
+
+TEST(Protocols, OptionsAreRecognized) {
+  ConsistencyOptions options;
+  EXPECT_EQ(ProtocolOf(options), "");  // lai2018 with a gap of 5, too
+  for (const Protocol& protocol : Protocols()) {
+    UseProtocol(protocol.name, &options);
+    EXPECT_EQ(ProtocolOf(options), protocol.name);
+  }
+  UseProtocol("liprf", &options);
+  EXPECT_EQ(options.gaps, (std::vector<int>{1, 5}));
+  EXPECT_EQ(options.warp, "earlier");
+  options.warp = "later";
+  EXPECT_EQ(ProtocolOf(options), "");
+  EXPECT_REGRADE_ERROR(UseProtocol("lai2081", &options), ExitCode::kUsage, "no protocol");
 }
 
 TEST(Protocols, UnknownMissingAndRepeatedNamesAreRefused) {

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Measures the temporal consistency of frames in numpy, as an independent check of `regrade evaluate`.
 
-  reference_evaluator.py --frames DIR --flow DIR [--mode lai2018|ruder2016] [--gaps 1,5] [--as-published]
+  reference_evaluator.py --frames DIR --flow DIR [--mode lai2018|ruder2016] [--gaps 1,5]
+                         [--warp later|earlier] [--error-per channel|pixel] [--as-published]
 
 The DIR of --frames has 8-bit PNG or PPM files in natural order, the DIR of --flow the files 00000_00001.flo (motion from
 frame 0 to frame 1) and 00001_00000.flo (backward). Prints one JSON object. Shares no code with the program.
@@ -163,28 +164,29 @@ def mask_ruder2016(forward, backward, as_published):
 MASKS = {"lai2018": mask_lai2018, "ruder2016": mask_ruder2016}
 
 
-def compare(earlier, later, forward, mask, as_published):
-    """(mean squared error over trusted pixels and channels, fraction of trusted pixels)"""
+def compare(fixed, moved, flow, mask, error_per, as_published):
+    """(mean squared error over trusted pixels of `fixed`, fraction of trusted pixels)"""
     # Pixels of weight 0 are ignored, even if their target is unknown.
-    warped = numpy.where(mask[:, :, None] > 0, bilinear(later, *targets(forward)), earlier)
-    total = (mask[:, :, None] * (warped - earlier) ** 2).sum()
+    warped = numpy.where(mask[:, :, None] > 0, bilinear(moved, *targets(flow)), fixed)
+    total = (mask[:, :, None] * (warped - fixed) ** 2).sum()
     if mask.sum() == 0:
         return (0.0 if as_published else None), 0.0
-    return total / (earlier.shape[2] * mask.sum()), mask.mean()
+    return total / ((fixed.shape[2] if error_per == "channel" else 1) * mask.sum()), mask.mean()
 
 
 def decibel(error):
     return None if error is None else float("inf") if error == 0 else -10 * numpy.log10(error)
 
 
-def evaluate(frames, flow_folder, mode, gaps, as_published):
+def evaluate(frames, flow_folder, mode, gaps, warp, error_per, as_published):
     pairs = []
     for gap in gaps:
         for i in range(len(frames) - gap):
-            forward, backward = read_flow(flow_folder, i, i + gap), read_flow(flow_folder, i + gap, i)
+            fixed, moved = (i, i + gap) if warp == "later" else (i + gap, i)
+            there, back = read_flow(flow_folder, fixed, moved), read_flow(flow_folder, moved, fixed)
             with numpy.errstate(invalid="ignore"):
-                mask = MASKS[mode](forward, backward, as_published)
-            error, coverage = compare(frames[i], frames[i + gap], forward, mask, as_published)
+                mask = MASKS[mode](there, back, as_published)
+            error, coverage = compare(frames[fixed], frames[moved], there, mask, error_per, as_published)
             pairs.append({"gap": gap, "from": i, "to": i + gap, "error": error, "tc_psnr_db": decibel(error),
                           "coverage": coverage})
     return pairs
@@ -196,10 +198,14 @@ def main():
     parser.add_argument("--flow", required=True, metavar="DIR", help="files 00000_00001.flo and 00001_00000.flo")
     parser.add_argument("--mode", choices=sorted(MASKS), default="lai2018")
     parser.add_argument("--gaps", default="1,5", help="distances between compared frames (1,5)")
+    parser.add_argument("--warp", choices=("later", "earlier"), default="later", help="the frame that is sampled at the other's pixels")
+    parser.add_argument("--error-per", choices=("channel", "pixel"), default="channel",
+                        help="whether the sum of squares is divided by channels of pixels, or by pixels")
     parser.add_argument("--as-published", action="store_true", help="without the three differences above")
     options = parser.parse_args()
     gaps = [int(gap) for gap in options.gaps.split(",")]
-    pairs = evaluate(read_frames(options.frames), options.flow, options.mode, gaps, options.as_published)
+    pairs = evaluate(read_frames(options.frames), options.flow, options.mode, gaps, options.warp, options.error_per,
+                     options.as_published)
     json.dump({"mode": options.mode, "pairs": pairs}, sys.stdout, indent=1)
     print()
 

@@ -23,13 +23,17 @@ except ImportError:
 
 WIDTH, HEIGHT, FRAMES = 61, 47, 7
 GAPS = (1, 3, 5)
-# Options of the program, and mode and gaps that they stand for: spelled out here, so that a wrong table in the program
-# shows.
-CASES = ((("--mode", "lai2018", "--gaps", "1,3"), "lai2018", "1,3"),
-         (("--mode", "ruder2016", "--gaps", "1,3"), "ruder2016", "1,3"),
-         (("--protocol", "liprf"), "ruder2016", "1,5"),
-         (("--protocol", "lai2018"), "lai2018", "1"),
-         (("--protocol", "ruder2016"), "ruder2016", "1"))
+# Options of the program, and the reference's options that they stand for: spelled out here, so that a wrong table in the
+# program shows.
+CASES = tuple((ours.split(), theirs.split()) for ours, theirs in (
+    ("--mode lai2018 --gaps 1,3", "--mode lai2018 --gaps 1,3"),
+    ("--mode ruder2016 --gaps 1,3", "--mode ruder2016 --gaps 1,3"),
+    ("--mode lai2018 --gaps 1,3 --warp earlier", "--mode lai2018 --gaps 1,3 --warp earlier"),
+    ("--mode ruder2016 --gaps 1,3 --error-per pixel", "--mode ruder2016 --gaps 1,3 --error-per pixel"),
+    ("--protocol liprf", "--mode ruder2016 --gaps 1,5 --warp earlier"),
+    ("--protocol liprf --error-per pixel", "--mode ruder2016 --gaps 1,5 --warp earlier --error-per pixel"),
+    ("--protocol lai2018", "--mode lai2018 --gaps 1"),
+    ("--protocol ruder2016", "--mode ruder2016 --gaps 1")))
 TOLERANCE_DB = 1e-4  # frames and flow are identical: only the order of sums differs
 REFERENCE = os.path.join(os.path.dirname(os.path.abspath(__file__)), "reference_evaluator.py")
 
@@ -97,7 +101,7 @@ def run(command):
     return done.stdout
 
 
-def complaints_of(regrade, work, options, mode, gaps):
+def complaints_of(regrade, work, options, reference_options):
     case = " ".join(options)
     out = os.path.join(work, "out")
     run([regrade, "evaluate", "--frames", os.path.join(work, "styled"), "--reference", os.path.join(work, "source"),
@@ -107,7 +111,7 @@ def complaints_of(regrade, work, options, mode, gaps):
     complaints, compared, worst = [], 0, 0.0
     for sequence in ("source", "styled"):
         expected = json.loads(run([sys.executable, REFERENCE, "--frames", os.path.join(work, sequence), "--flow",
-                                   os.path.join(work, "flow"), "--mode", mode, "--gaps", gaps]))["pairs"]
+                                   os.path.join(work, "flow"), *reference_options]))["pairs"]
         ours = {(p["from"], p["to"]): p for p in pairs if p["sequence"] == sequence}
         if len(ours) != len(expected):
             complaints.append(f"{case}, {sequence}: {len(ours)} pairs, the reference has {len(expected)}")

@@ -221,7 +221,8 @@ TEST(EvaluateCommand, AProtocolSetsModeAndGaps) {
   const Outcome named = evaluate({"--protocol", "liprf"}, "named");
   ASSERT_EQ(named.code, 0) << named.text;
   EXPECT_OUTPUT(named, "mode ruder2016");
-  const Outcome spelled = evaluate({"--mode", "ruder2016", "--gaps", "1,5"}, "spelled");
+  const Outcome spelled =
+      evaluate({"--mode", "ruder2016", "--gaps", "1,5", "--warp", "earlier"}, "spelled");
   ASSERT_EQ(spelled.code, 0) << spelled.text;
   const auto report_of = [&](const std::string& out) {
     JsonValue json = ReadJsonFile(folder / (out + "/report.json"));
@@ -232,6 +233,9 @@ TEST(EvaluateCommand, AProtocolSetsModeAndGaps) {
   const Outcome refused = evaluate({"--protocol", "liprf", "--gaps", "1,7"}, "refused");
   EXPECT_EQ(refused.code, 2);
   EXPECT_OUTPUT(refused, "leave out --gaps");
+  const Outcome fitted = evaluate({"--control-field"}, "refused");  // of what photos?
+  EXPECT_EQ(fitted.code, 2);
+  EXPECT_OUTPUT(fitted, "for runs of regrade only");
   EXPECT_FALSE(std::filesystem::exists(folder / "refused"));
 }
 

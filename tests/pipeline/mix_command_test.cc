@@ -9,6 +9,7 @@
 #include <iterator>
 
 #include "pipeline/fields/field_file.h"
+#include "pipeline/images/image_file.h"
 #include "pipeline/page/keyframes.h"
 #include "tests/support/keyframes.h"
 #include "tests/support/source_dir.h"
@@ -133,6 +134,14 @@ TEST(MixCommand, H49_AFilmBetweenTheSceneAndItsStyle) {
                "64", "--steps", "2", "--views", "1"});
   EXPECT_EQ(sheet.code, 0) << sheet.text;
   EXPECT_GT(frame("sheet.png").size(), 10000u);
+  // A sixth column: a field fitted to the 2D method's pictures.
+  const ProgramOutcome wider =
+      Regrade({"contact-sheet", folder / "e", style, "--out", folder / "wider.png", "--size",
+               "64", "--steps", "2", "--views", "1", "--control-field"});
+  ASSERT_EQ(wider.code, 0) << wider.text;
+  const Image narrow = ReadImage(folder / "sheet.png"), wide = ReadImage(folder / "wider.png");
+  EXPECT_EQ(wide.height, narrow.height);
+  EXPECT_GT(wide.width, narrow.width + 60);
   // Without a picture it shows the styles that are there.
   EXPECT_EQ(Regrade({"contact-sheet", folder / "e", "--out", folder / "y.png"}).code, 0);
   EXPECT_GT(frame("y.png").size(), 10000u);

@@ -110,7 +110,8 @@ RunReport FullReport() {
                                       .film_renderer = "exact",
                                       .frames_per_second = 12,
                                       .seen_by_few = {0.41, 0.72, 12, {0.5, 0.25}}};
-  report.stages.evaluate = EvaluateReport{{6, {}}, "dis-medium", "lai2018", "", 25, 26, 0.2};
+  report.stages.evaluate =
+      EvaluateReport{{6, {}}, "dis-medium", "lai2018", "later", "channel", "", "", 25, 26, 0.2};
   report.evaluation = MeasuredEvaluation();
   return report;
 }
@@ -151,8 +152,8 @@ TEST(ReportJson, HasTheKeysOfSchema2InOrder) {
   EXPECT_EQ(KeysOf(stages.At("render").At("seen_by_few")),
             (Keys{"film", "worst_frame", "worst_frame_number", "photos"}));
   EXPECT_EQ(KeysOf(stages.At("evaluate")),
-            (Keys{"seconds", "flow", "mask", "psnr_to_2d_photos_db", "linear_map_psnr_to_2d_db",
-                  "lpips_heldout"}));
+            (Keys{"seconds", "flow", "mask", "warp", "error_per", "psnr_to_2d_photos_db",
+                  "linear_map_psnr_to_2d_db", "lpips_heldout"}));
   EXPECT_EQ(KeysOf(json.At("consistency").AsArray()[0]),
             (Keys{"sequence", "gap", "pairs", "undefined_pairs", "tc_psnr_mean_db",
                   "tc_psnr_of_mean_db", "tc_psnr_low_db", "tc_psnr_high_db", "coverage",
@@ -240,6 +241,8 @@ TEST(MetricsJson, EveryStageSurvivesARoundTrip) {
   report.stages.reconstruct->background_texels = 5;
   report.stages.reconstruct->psnr_at_steps = {{20, 15.5}, {40, 21.25}};
   report.stages.stylize->variance = VarianceMetrics{{40, 3, 1.2, 0.01}, {}, {}, 0.7};
+  report.stages.stylize->variance_across_views =
+      VarianceMetrics{{}, {}, {30, 2, 0.9, 0.02}, 0.6, VarianceGroupMetrics{5, 1, 1.1, 0.03}};
   report.stages.evaluate->comparison_note = "one camera";
   report.stages.ForEach([](const char*, const auto& stage) { ExpectRoundTrip(*stage); });
   ExpectRoundTrip(report.evaluation);

@@ -184,6 +184,8 @@ TEST(ReportHtml, TheBoundIsDrawnOverTheSteps) {
   EXPECT_NE(html.find("K_est"), std::string::npos);
   EXPECT_EQ(html.find("nan"), std::string::npos);
   report.stages.stylize->variance = VarianceMetrics{{40, 3, 1.2, 0.01}, {}, {}, 0.7};
+  report.stages.stylize->variance_across_views =
+      VarianceMetrics{{}, {}, {}, 0.6, {}, VarianceGroupMetrics{7, 2, 1.1, 0.03}};
   EXPECT_NE(ReportHtml(report, {}).find("3 of 40</b> pairs"), std::string::npos);
 }
 

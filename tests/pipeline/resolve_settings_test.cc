@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "evaluate/protocols.h"
 #include "pipeline/run/presets.h"
 #include "pipeline/run/run_settings.h"
 #include "tests/support/expect_error.h"
@@ -62,6 +63,26 @@ TEST(ResolveSettings, PresetsGiveTheirValues) {
   EXPECT_REGRADE_ERROR(Resolve({"--preset", "fast"}), ExitCode::kUsage, "draft");
   EXPECT_EQ(Resolve({}, {.preset = "draft"}).settings.scene.photo_size, 480);
   EXPECT_EQ(Resolve({"--preset=standard"}, {.preset = "draft"}).settings.scene.photo_size, 800);
+}
+
+// The paper's preset evaluates as the paper does, a later one as ever; flags override both.
+TEST(ResolveSettings, ThePapersPresetEvaluatesByItsProtocol) {
+  const TemporaryFolder folder;
+  const std::string run = folder / "run.json";
+  WriteText(run, R"({"arguments": ["/photos"], "options": {"preset": "paper"}})");
+  EXPECT_EQ(ProtocolOf(Resolve({"--preset", "paper"}).settings.consistency), "liprf");
+  EXPECT_EQ(ProtocolOf(Resolve({}, {.run_json = run}).settings.consistency), "liprf");
+  const ConsistencyOptions plain,
+      draft = Resolve({"--preset", "draft"}, {.run_json = run}).settings.consistency;
+  EXPECT_EQ(draft.mode, plain.mode);
+  EXPECT_EQ(draft.warp, plain.warp);
+  const ConsistencyOptions own =
+      Resolve({"--preset", "paper", "--warp", "later", "--error-per", "pixel"})
+          .settings.consistency;
+  EXPECT_EQ(own.mode, "ruder2016");
+  EXPECT_EQ(own.warp, "later");
+  EXPECT_EQ(own.error_per, "pixel");
+  EXPECT_EQ(ProtocolOf(own), "");
 }
 
 TEST(ResolveSettings, LaterSourcesOverrideEarlierOnes) {

@@ -154,21 +154,33 @@ TEST(RunReport, ShowsEveryPartOfTheRun) {
   // With the rows that bound the table: of the views also photos, of which the 2D method has no
   // picture of those held out, and all rows have fidelity.
   const testing::ProgramOutcome bounded =
-      Regrade({"evaluate", folder / "e", "--gaps", "1", "--controls"});
+      Regrade({"evaluate", folder / "e", "--gaps", "1", "--controls", "--control-field"});
   ASSERT_EQ(bounded.code, 0) << bounded.text;
   const JsonValue table = ReadJsonFile(folder / "e/styles/style_sunset/report.json");
   std::set<std::string> measured_rows;
   for (const JsonValue& row : table.At("fidelity").AsArray())
     measured_rows.insert(row.At("sequence").AsString());
-  EXPECT_EQ(measured_rows.size(), 3u + 5 + 3 + 3);
+  EXPECT_EQ(measured_rows.size(), 3u + 6 + 3 + 3);
   for (const JsonValue& row : table.At("consistency").AsArray()) {
     const std::string sequence = row.At("sequence").AsString();
     EXPECT_EQ(measured_rows.count(sequence), 1u) << sequence;
     EXPECT_EQ(row.At("undefined_pairs").AsInt() > 0, sequence == "photos_2d") << sequence;
   }
   for (const char* sequence : {"photos", "photos_2d", "control_blurred", "control_grey",
-                               "control_linear_map", "path_control_grey"})
+                               "control_linear_map", "path_control_grey", "control_field_2d"})
     EXPECT_EQ(measured_rows.count(sequence), 1u) << sequence;
+  // The field of the 2D method's pictures is one of them, not the scene's, and is fitted once.
+  const auto to_2d = [&](const char* sequence) {
+    for (const JsonValue& row : table.At("fidelity").AsArray())
+      if (row.At("sequence").AsString() == sequence) return row.At("psnr_to_2d_db").AsDouble();
+    return 0.0;
+  };
+  EXPECT_GT(to_2d("control_field_2d"), to_2d("source") + 1);
+  EXPECT_NE(bounded.text.find("fitted to the 2D method's pictures"), std::string::npos);
+  const testing::ProgramOutcome again_bounded =
+      Regrade({"evaluate", folder / "e", "--gaps", "2", "--control-field"});
+  ASSERT_EQ(again_bounded.code, 0) << again_bounded.text;
+  EXPECT_EQ(again_bounded.text.find("fitted to the 2D method's pictures"), std::string::npos);
 
   // Another choice of the film's renderer renders again, and is named.
   const auto film_renderer = [&] {

@@ -94,6 +94,28 @@ TEST(NormalizeScene, BoxContainsRegionsWithoutPoints) {
   EXPECT_GE(inside, 73);  // of 81
 }
 
+// A given box decides, with and without points, however the cameras are turned.
+TEST(NormalizeScene, AGivenBoxIsTheBox) {
+  for (const bool points : {false, true}) {
+    Capture capture = ArcCapture(points);
+    capture.box = WorldBox{{-1, -0.5, 0}, {2, 0.5, 1}};
+    const NormalizedScene scene = NormalizeScene(capture);
+    ExpectValid(scene);
+    EXPECT_TRUE(scene.notice.empty());
+    // The cameras look along y and are upright, so the frame's axes are the world's; 3 is the
+    // longest side, widened by 8 % on each.
+    EXPECT_NEAR(scene.field_from_world.scale, 1 / (3 * 0.58), 0.01);
+    EXPECT_NEAR(scene.box.radius.y / scene.box.radius.x, 1.0 / 3, 0.1);
+    const Vec3d middle = scene.field_from_world * Vec3d{0.5, 0, 0.5};
+    EXPECT_NEAR(Norm(middle), 0, 1e-9);
+    EXPECT_GT(scene.box.near_clip, 0);
+  }
+  // Cameras inside have nothing to clip.
+  Capture inside = ArcCapture(false);
+  inside.box = WorldBox{{-9, -9, -9}, {9, 9, 9}};
+  EXPECT_EQ(NormalizeScene(inside).box.near_clip, 0);
+}
+
 TEST(NormalizeScene, H140_OtherUnitsGiveTheSameField) {
   const Capture capture = ArcCapture(true);
   const NormalizedScene scene = NormalizeScene(capture);

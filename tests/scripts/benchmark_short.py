@@ -31,7 +31,7 @@ scenes:
 styles:
   sunset: {root}/assets/style_sunset.png
 methods:
-  MKL: --method mkl --mode geometry --style-steps 10
+  MKL: --method mkl --mode geometry --style-steps 10 --control-field
 foreign: {{other: "{work}/runs/{{scene}}/{{style}}/MKL/0/styles/style/frames/views_2d"}}
 """
 
@@ -69,7 +69,7 @@ def main():
         with open(os.path.join(work, "table.md")) as file:
             page = file.read()
         found = {(row["method"], row["seed"]) for row in rows}
-        wanted = {(method, seed) for method in ("no style", "MKL", "MKL w/ Lip") for seed in "01"} | {("other", "0")}
+        wanted = {(method, seed) for method in ("no style", "MKL", "MKL, field fitted", "MKL w/ Lip") for seed in "01"} | {("other", "0")}
         assert found == wanted, found
         reports = [os.path.join(work, f"runs/table/sunset/MKL/{seed}/styles/style/report.json") for seed in (0, 1)]
         tc = [tc_of(report, "styled", 1) for report in reports]
@@ -77,6 +77,10 @@ def main():
             if row["method"] == "MKL w/ Lip":
                 assert math.isclose(float(row["short_db"]), tc[int(row["seed"])], abs_tol=1e-9), row
                 assert row["motion"] == "geometry", row
+            if row["method"] == "MKL, field fitted":
+                report = reports[int(row["seed"])]
+                assert math.isclose(float(row["short_db"]), tc_of(report, "control_field_2d", 1), abs_tol=1e-9), row
+                assert float(row["to_2d_db"]) > 10 and row["hue_spread"], row
         cell = f"{statistics.fmean(tc):.2f} ± {statistics.stdev(tc):.2f}"
         assert f"| table | chosen on | MKL w/ Lip | geometry | {cell} |" in page, (cell, page)
         assert tc[0] != tc[1], "another seed changes nothing"

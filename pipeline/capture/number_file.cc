@@ -1,0 +1,48 @@
+#include "pipeline/capture/number_file.h"
+
+#include <charconv>
+#include <cmath>
+#include <string_view>
+
+#include "kernels/base/error.h"
+#include "pipeline/files/atomic_file.h"
+#include "pipeline/files/text.h"
+
+namespace regrade {
+namespace {
+
+constexpr uint64_t kMostBytes = 64 << 10;
+constexpr char kBetween[] = " \t\r,";
+
+double NumberOf(std::string_view word, const std::string& where) {
+  if (word.starts_with('+')) word.remove_prefix(1);
+  double value = 0;
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+  if (error != std::errc() || end != word.data() + word.size() || !std::isfinite(value))
+    throw InputError("'" + Printable(word.substr(0, 40)) + "' is not a number", where,
+                     "the file is damaged, or was written by another program");
+  return value;
+}
+
+}  // namespace
+
+std::vector<std::vector<double>> ReadNumberFile(const std::string& path) {
+  const std::string text = ReadWholeFile(path, kMostBytes);
+  std::vector<std::vector<double>> lines;
+  int number = 0;
+  for (const std::string& line : Split(text, '\n')) {
+    ++number;
+    std::vector<double> values;
+    for (size_t at = line.find_first_not_of(kBetween); at != std::string::npos;) {
+      const size_t end = std::min(line.find_first_of(kBetween, at), line.size());
+      values.push_back(NumberOf(std::string_view(line).substr(at, end - at),
+                                path + ":" + std::to_string(number)));
+      at = line.find_first_not_of(kBetween, end);
+    }
+    if (!values.empty()) lines.push_back(std::move(values));
+  }
+  if (lines.empty()) throw InputError("holds no numbers", path);
+  return lines;
+}
+
+}  // namespace regrade

@@ -1,0 +1,67 @@
+#include "pipeline/stages/control_field.h"
+
+#include <cmath>
+#include <filesystem>
+#include <memory>
+
+#include "kernels/field/cpu/render_view.h"
+#include "kernels/field/packed_grid.h"
+#include "pipeline/fields/network_file.h"
+#include "pipeline/program/device_choice.h"
+#include "pipeline/stages/fit_pictures.h"
+
+namespace regrade {
+namespace {
+
+constexpr char kMark[] = "field_2d";  // names the checkpoint that says what was fitted
+
+JsonValue InputsOfFit(const RunContext& context) {
+  const RunSettings& settings = context.settings;
+  return JsonValue::Object{{"field", context.ResultOf("reconstruct")},
+                           {"views_2d", context.ResultOf("style_2d")},
+                           {"fit", OptionValues(settings.scene, settings.fit)},
+                           {"effects", settings.run.effects},
+                           {"strength", settings.style.strength},
+                           {"holdout", settings.run.holdout},
+                           {"seed", settings.run.seed}};
+}
+
+}  // namespace
+
+StoredField ControlField(RunContext* context, const WorkingViews& views,
+                         const StoredField& scene, const std::vector<int>& indices,
+                         const std::function<Image(int)>& picture,
+                         const ProgressFunction& progress) {
+  const RunSettings& settings = context->settings;
+  Workspace& style = *context->style;
+  const std::string path = style.Path(kFieldControlFile);
+  const JsonValue inputs = InputsOfFit(*context);
+  if (std::filesystem::exists(path) && style.LoadCheckpoint(kMark, inputs)) {
+    Report(progress, 1, 1);
+    return ReadFieldFile(path);
+  }
+  style.DropCheckpoint(kMark);  // the file is another one from here on
+  const FittedPictures fitted =
+      FitPictures(views, scene, indices, picture, settings,
+                  ReadNetworkFile(style.Path("network.npz")).background,
+                  ChooseBackend(settings.run.device, settings.run.reproducible), progress);
+  context->console->Info(Format("a field fitted to the 2D method's pictures: %.2f dB on them",
+                                fitted.psnr_train_db));
+  WriteFieldFile(path, fitted.stored);
+  style.SaveCheckpoint(kMark, inputs, {"fitted"});
+  return ReadFieldFile(path);
+}
+
+NamedFrameSource ControlFieldFrames(const StoredField& stored,
+                                    const std::vector<Camera>& cameras) {
+  const auto grid = std::make_shared<const FastGrid>(MakeFastGrid(stored.field));
+  return {kFieldControl,
+          {static_cast<int>(cameras.size()), [grid, cameras, step = stored.field.step](int i) {
+             Image frame =
+                 RenderView(*grid, cameras[static_cast<size_t>(i)], MarchOptions{step}).color;
+             for (float& value : frame.pixels) value = std::round(255 * value) / 255;
+             return frame;
+           }}};
+}
+
+}  // namespace regrade
