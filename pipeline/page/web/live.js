@@ -21,9 +21,7 @@ class Live {
   }
   // Waits for the job; false if it was cancelled. `meanwhile` runs now and then.
   async finish(words, meanwhile) {
-    const cancel = element('cancel');
-    cancel.hidden = false;
-    cancel.onclick = () => this.ask('DELETE', '/job').catch(() => {});
+    const ended = offerCancel(() => this.ask('DELETE', '/job').catch(() => {}));
     try {
       for (;;) {
         const job = await (await this.ask('GET', '/job')).json();
@@ -34,7 +32,7 @@ class Live {
         await new Promise((done) => setTimeout(done, 500));
       }
     } finally {
-      cancel.hidden = true;
+      ended();
       say('');
     }
   }
