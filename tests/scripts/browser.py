@@ -16,7 +16,7 @@ from urllib.request import pathname2url
 SIZES = {"phone": (390, 844), "desktop": (1280, 900)}
 # ctest reports "skipped"; a failure where a browser is required.
 NO_CHROMIUM = 1 if os.environ.get("REGRADE_REQUIRE_BROWSER") == "1" else 77
-TIMEOUT_S = 60  # for any answer
+TIMEOUT_S = 300  # for any answer
 WAIT_S = 120  # for a page to do something
 
 

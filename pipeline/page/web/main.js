@@ -31,7 +31,7 @@ async function start(page) {
   if (!gl) throw new PageError('this browser has no WebGL 2, or has switched it off');
   if (typeof DecompressionStream === 'undefined') throw new PageError('this browser is too old');
   const graphics = new Graphics(gl);
-  graphics.onCores = location.hash === '#cores';
+  if (location.hash === '#cores') graphics.onCores = true;
   const scene = await loadScene(header, graphics, (part) => say('The scene is being unpacked: ' + Math.round(100 * part) + ' %'));
   const view = page.view ??= new View(header);
   const state = page.state ??= {axes: [0, 1], amount: [0, 0], original: false, split: false, cut: 0.5, map: null, playing: null};
@@ -58,10 +58,10 @@ async function start(page) {
     free(colors[i]);
     colors[i] = loading[i] = null;
   };
-  function load(i) {
+  function load(i, codes) {
     return loading[i] ??= styleColors(graphics, scene, header.styles[i], 'network_' + i, (part) => {
       say(part < 1 ? 'Style ' + (i + 1) + ' is being applied: ' + Math.round(100 * part) + ' %' : '');
-    }).then((made) => {
+    }, codes).then((made) => {
       colors[i] = made;
       // Of many styles those that no slider shows make room.
       if (colors.filter(Boolean).length > 3)
@@ -100,7 +100,7 @@ async function start(page) {
   };
   bindPath(path, state, header, () => view.save(), weights, take, changed);
   // A style that the program behind the page has learned, or is learning; the last one, or a new one.
-  const putStyle = async (i, {weights: packed, ...style}) => {
+  const putStyle = async (i, {weights: packed, codes, ...style}) => {
     const isNew = i === header.styles.length, before = colors[i];
     element('network_' + i)?.remove();
     document.body.append(make('script', {type: 'application/octet-stream', id: 'network_' + i, textContent: packed}));
@@ -114,7 +114,7 @@ async function start(page) {
     }
     page.added.push(style);
     header.styles.push(style);
-    await load(i);
+    await load(i, codes);
     if (before !== colors[i]) free(before);
     if (!isNew) return;
     const axis = Math.min(i, 1);
@@ -141,9 +141,9 @@ async function start(page) {
     let done = false;
     try {
       if (i >= 16) throw new PageError('this page has 16 styles; load it again');
-      // Where a pass over the voxels takes long, only the end is shown.
-      const soFar = async (style) => { if (!page.graphics.onCores) await page.putStyle(i, {...style, picture}); };
-      const style = await page.live.learn(file, soFar);
+      const soFar = (style) => page.putStyle(i, {...style, picture});
+      // The program makes a pass over the voxels faster than this page's cores.
+      const style = await page.live.learn(file, soFar, () => page.graphics.onCores !== false);
       if (!style) return;
       done = true;
       await page.putStyle(i, {...style, picture});
