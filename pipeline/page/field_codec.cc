@@ -152,6 +152,12 @@ std::vector<int64_t> VoxelsOf(const Geometry& geometry, const PageOrder& order) 
   return voxel;
 }
 
+PageOrder OrderOf(const Geometry& geometry, const std::string& places) {
+  const Vec3i& voxels = geometry.frame.resolution;
+  return geometry.cells.on() ? OrderOfTree(places, voxels, geometry.cells.finest)
+                             : OrderOfMask(places, voxels);
+}
+
 void MakeCells(const PageOrder& order, int finest, Geometry* geometry) {
   CellGrid& cells = geometry->cells;
   cells.finest = finest;
@@ -179,15 +185,18 @@ void MakeLinks(const PageOrder& order, Geometry* geometry) {
 
 }  // namespace
 
+std::vector<int64_t> VoxelsInPageOrder(const Geometry& geometry) {
+  return VoxelsOf(geometry, OrderOf(geometry, geometry.cells.on() ? TreeOfCells(geometry)
+                                                                  : MaskOfGrid(geometry)));
+}
+
 PageField EncodeField(const RadianceField& field, double step) {
   const Geometry& geometry = *field.geometry;
   const GridFrame& frame = geometry.frame;
   const bool on_cells = geometry.cells.on();
   PageField page;
   const std::string places = on_cells ? TreeOfCells(geometry) : MaskOfGrid(geometry);
-  const PageOrder order = on_cells
-                              ? OrderOfTree(places, frame.resolution, geometry.cells.finest)
-                              : OrderOfMask(places, frame.resolution);
+  const PageOrder order = OrderOf(geometry, places);
   const std::vector<int64_t> voxel = VoxelsOf(geometry, order);
   const int channels = field.appearance.stride();
   std::vector<int16_t> density;

@@ -44,4 +44,7 @@ PageField EncodeField(const RadianceField& field, double step);
 // memory in proportion to what the sections unpack to.
 RadianceField DecodeField(const PageField& page);
 
+// Voxels of a field that DecodeField has made, in the order in which its page has them.
+std::vector<int64_t> VoxelsInPageOrder(const Geometry& geometry);
+
 }  // namespace regrade

@@ -90,4 +90,18 @@ PageStyle EncodeStyle(const StoredNetwork& stored, const RadianceField& page, do
   return style;
 }
 
+std::string StyledCodes(const PageStyle& style, const std::vector<int64_t>& voxels) {
+  const Appearance& appearance = style.styled.appearance;
+  const int channels = appearance.stride();
+  std::vector<double> scale;
+  for (const JsonValue& s : style.header.At("scale").AsArray()) scale.push_back(s.AsDouble());
+  std::string codes;
+  codes.reserve(voxels.size() * scale.size());
+  for (const int64_t voxel : voxels)
+    for (int j = 0; j < channels; ++j)
+      codes.push_back(static_cast<char>(
+          CodeOf(appearance.sh[voxel * channels + j], scale[static_cast<size_t>(j)])));
+  return codes;
+}
+
 }  // namespace regrade

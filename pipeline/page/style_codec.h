@@ -5,7 +5,9 @@
 // page is written, on the field as the page has it.
 #pragma once
 
+#include <cstdint>
 #include <string>
+#include <vector>
 
 #include "kernels/field/radiance_field.h"
 #include "pipeline/fields/network_file.h"
@@ -21,6 +23,10 @@ struct PageStyle {
 
 // `page`: of DecodeField. `strength` in [0, 1]: the weight at which the style is shown first.
 PageStyle EncodeStyle(const StoredNetwork& stored, const RadianceField& page, double strength);
+
+// The styled coefficients as a page that has run the network holds them: 27 codes for each of
+// `voxels`, see VoxelsInPageOrder.
+std::string StyledCodes(const PageStyle& style, const std::vector<int64_t>& voxels);
 
 // A field whose coefficients are rounded to codes of 8 bits, with the scales of each channel.
 struct Coded {

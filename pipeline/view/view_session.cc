@@ -8,6 +8,7 @@
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/images/image_format.h"
+#include "pipeline/page/field_codec.h"
 #include "pipeline/page/keyframes.h"
 #include "pipeline/page/make_page.h"
 #include "pipeline/page/page_file.h"
@@ -57,6 +58,7 @@ ViewSession::ViewSession(const std::string& folder, const std::vector<std::strin
   MadePage made = MakePage(folder, styles, {.served = true}, progress);
   page_ = std::move(made.html);
   field_ = std::move(made.field);
+  voxels_ = VoxelsInPageOrder(*field_.geometry);
 }
 
 std::vector<Route> ViewSession::Routes() {
@@ -70,9 +72,17 @@ std::vector<Route> ViewSession::Routes() {
   };
   const auto style = [this](const HttpRequest&) {
     const std::lock_guard lock(mutex_);
-    if (style_.empty()) return RefusedRequest(404, "no style has been learned");
+    if (style_.json.empty()) return RefusedRequest(404, "no style has been learned");
     HttpResponse response;
-    response.body = style_;
+    response.body = style_.json;
+    return response;
+  };
+  const auto codes = [this](const Served& style) {
+    const std::lock_guard lock(mutex_);
+    if (style.codes.empty()) return RefusedRequest(404, "no style has been learned");
+    HttpResponse response;
+    response.type = "application/octet-stream";
+    response.body = style.codes;
     return response;
   };
   const auto page = [this](const HttpRequest&) {
@@ -94,7 +104,11 @@ std::vector<Route> ViewSession::Routes() {
           {"GET", "/job", 0, false, [this](const HttpRequest&) { return JobState(); }},
           {"DELETE", "/job", 0, false, cancel},
           {"GET", "/learning", 0, false, [this](const HttpRequest&) { return StyleSoFar(); }},
+          {"GET", "/learning/codes", 0, false,
+           [this, codes](const HttpRequest&) { return codes(so_far_); }},
           {"GET", "/style", 0, false, style},
+          {"GET", "/style/codes", 0, false,
+           [this, codes](const HttpRequest&) { return codes(style_); }},
           {"GET", "/film", 0, false, film}};
 }
 
@@ -127,10 +141,9 @@ HttpResponse ViewSession::TakePicture(const HttpRequest& request) {
   return Accepted(job_.Start(
       "style", {"stylize", folder_, "--style", picture, "--name", name, "--until", "stylize"},
       [this, folder = learning_] {
-        const std::string style =
-            StyleJson(ReadNetworkFile(folder + "/network.npz"), PageStyleId(folder));
+        Served style = Serve(ReadNetworkFile(folder + "/network.npz"), PageStyleId(folder));
         const std::lock_guard lock(mutex_);
-        style_ = style;
+        style_ = std::move(style);
       }));
 }
 
@@ -142,8 +155,8 @@ HttpResponse ViewSession::StyleSoFar() {
   if (!state || state->step == step_) return nothing();
   step_ = state->step;
   HttpResponse response;
-  response.body =
-      StyleJson({LipschitzNetwork(state->network), 0, field_.background}, "learning");
+  so_far_ = Serve({LipschitzNetwork(state->network), 0, field_.background}, "learning");
+  response.body = so_far_.json;
   return response;
 }
 
@@ -180,11 +193,12 @@ HttpResponse ViewSession::JobState() const {
   return response;
 }
 
-std::string ViewSession::StyleJson(const StoredNetwork& network, const std::string& id) const {
+ViewSession::Served ViewSession::Serve(const StoredNetwork& network,
+                                       const std::string& id) const {
   PageStyle style = EncodeStyle(network, field_, 1);
   style.header["id"] = id;
   style.header["weights"] = Base64(style.packed);
-  return DumpJson(style.header, -1);
+  return {DumpJson(style.header, -1), StyledCodes(style, voxels_)};
 }
 
 }  // namespace regrade

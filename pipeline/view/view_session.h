@@ -9,6 +9,8 @@
 //   DELETE /job   cancels it
 //   GET /learning the network of the style that is being learned, so far, or nothing new
 //   GET /style    the network of the style that was learned last, as the page holds it
+//   GET /learning/codes, /style/codes    what these networks make of the page's voxels, for a
+//                 page whose graphics processor is slow: 27 bytes a voxel, in the page's order
 //   GET /film     the film that was rendered last
 #pragma once
 
@@ -41,16 +43,22 @@ class ViewSession {
   HttpResponse TakePath(const HttpRequest& request);
   HttpResponse JobState() const;
   HttpResponse StyleSoFar();
-  std::string StyleJson(const StoredNetwork& network, const std::string& id) const;
+  // A style as JSON, and its codes.
+  struct Served {
+    std::string json, codes;
+  };
+  Served Serve(const StoredNetwork& network, const std::string& id) const;
 
   const std::string folder_;
   std::string page_;
-  RadianceField field_;       // the page's
-  mutable std::mutex mutex_;  // of what follows: jobs end on their own thread
-  std::string style_, film_;  // JSON; the file's path
-  std::string learning_;      // the style's folder
-  int64_t step_ = -1;         // of what StyleSoFar told last
-  ViewJob job_;               // last: ends before the rest
+  RadianceField field_;          // the page's
+  std::vector<int64_t> voxels_;  // of the field, in the page's order
+  mutable std::mutex mutex_;     // of what follows: jobs end on their own thread
+  Served style_, so_far_;
+  std::string film_;      // the file's path
+  std::string learning_;  // the style's folder
+  int64_t step_ = -1;     // of what StyleSoFar told last
+  ViewJob job_;           // last: ends before the rest
 };
 
 }  // namespace regrade

@@ -62,7 +62,7 @@ class Running {
   std::thread thread_;
 };
 
-TEST(LocalServer, EveryHostileRequestHasItsAnswerAndReachesNothing) {
+TEST(LocalServer, F96_EveryHostileRequestHasItsAnswerAndReachesNothing) {
   Reached reached;
   const Running server(&reached);
   const std::string token(64, 'a');
@@ -81,7 +81,7 @@ TEST(LocalServer, EveryHostileRequestHasItsAnswerAndReachesNothing) {
   EXPECT_EQ(reached.times, 0);
 }
 
-TEST(LocalServer, AnHonestRequestIsAnsweredAndMayNotBeFramedOrKept) {
+TEST(LocalServer, F96_AnHonestRequestIsAnsweredAndMayNotBeFramedOrKept) {
   Reached reached;
   const Running server(&reached);
   const std::string token(64, 'a');
@@ -102,7 +102,7 @@ TEST(LocalServer, AnHonestRequestIsAnsweredAndMayNotBeFramedOrKept) {
   EXPECT_EQ(reached.times, 3);
 }
 
-TEST(LocalServer, ListensOnThisMachineOnly) {
+TEST(LocalServer, F96_ListensOnThisMachineOnly) {
   Reached reached;
   const Running server(&reached);
   // Another address of the loopback network: a server on all addresses would take it.
@@ -110,7 +110,7 @@ TEST(LocalServer, ListensOnThisMachineOnly) {
   EXPECT_TRUE(Loopback(server.port()).connected());
 }
 
-TEST(LocalServer, ASlowHeaderIsCutOff) {
+TEST(LocalServer, F96_ASlowHeaderIsCutOff) {
   Reached reached;
   const Running server(&reached);
   const Loopback slow(server.port());
@@ -122,7 +122,7 @@ TEST(LocalServer, ASlowHeaderIsCutOff) {
   EXPECT_LT(took.count(), kHeaderSeconds + 5);  // on a busy machine
 }
 
-TEST(LocalServer, OfAHundredConnectionsAFewAreHeldAndItGoesOn) {
+TEST(LocalServer, F96_OfAHundredConnectionsAFewAreHeldAndItGoesOn) {
   Reached reached;
   const Running server(&reached);
   const std::string token(64, 'a');
@@ -147,7 +147,7 @@ TEST(LocalServer, OfAHundredConnectionsAFewAreHeldAndItGoesOn) {
   EXPECT_EQ(reached.times, 1);
 }
 
-TEST(LocalServer, TokensHave256BitsAndDiffer) {
+TEST(LocalServer, F96_TokensHave256BitsAndDiffer) {
   const std::string token = MakeToken();
   EXPECT_EQ(token.size(), 64u);
   EXPECT_EQ(token.find_first_not_of("0123456789abcdef"), std::string::npos);

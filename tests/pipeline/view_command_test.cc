@@ -119,6 +119,8 @@ TEST(ViewCommand, ADroppedPictureBecomesAStyleAndAPathTheFilmOfRender) {
   EXPECT_EQ(StatusOf(refused), 422);
   EXPECT_NE(refused.find("save the path again"), std::string::npos) << refused;
   EXPECT_EQ(StatusOf(view.Ask("GET", "/style")), 404);
+  EXPECT_EQ(StatusOf(view.Ask("GET", "/style/codes")), 404);
+  EXPECT_EQ(StatusOf(view.Ask("GET", "/learning/codes")), 404);
   EXPECT_EQ(StatusOf(view.Ask("GET", "/film")), 404);
 
   const std::string picture = ReadText(testing::SourceDir() + "/assets/style_sunset.png");
@@ -136,6 +138,9 @@ TEST(ViewCommand, ADroppedPictureBecomesAStyleAndAPathTheFilmOfRender) {
   EXPECT_FALSE(fs::exists(folder / "e/styles/an_evil_name/frames"));  // of later stages
   const JsonValue style = ParseJson(BodyOf(view.Ask("GET", "/style")), "style");
   EXPECT_GT(style.At("weights").AsString().size(), 1000u);
+  const std::string codes = BodyOf(view.Ask("GET", "/style/codes"));
+  EXPECT_GT(codes.size(), 27u * 100);
+  EXPECT_EQ(codes.size() % 27, 0u);
 
   JsonValue path = testing::SomeKeyframes();
   path["styles"] = JsonValue::Array{style.At("id"), "unknown"};

@@ -16,7 +16,7 @@ from urllib.request import pathname2url
 SIZES = {"phone": (390, 844), "desktop": (1280, 900)}
 # ctest reports "skipped"; a failure where a browser is required.
 NO_CHROMIUM = 1 if os.environ.get("REGRADE_REQUIRE_BROWSER") == "1" else 77
-TIMEOUT_S = 60  # for any answer
+TIMEOUT_S = 300  # for any answer
 WAIT_S = 120  # for a page to do something
 
 
@@ -102,10 +102,11 @@ def new_person(browser):
 class Page:
     """A file, or an address that begins with http://, in one tab of one size.
 
-    Pages of one `person` (from new_person) share what a browser stores; None: the browser's own.
+    Pages of one `person` (from new_person) share what a browser stores; None: the browser's own. `before` is a script that
+    runs before those of the page.
     """
 
-    def __init__(self, browser, path, size, script=True, person=None):
+    def __init__(self, browser, path, size, script=True, person=None, before=None):
         self.browser, self.path = browser, path
         browser.events = []
         of_person = {"browserContextId": person} if person else {}
@@ -118,6 +119,8 @@ class Page:
                   mobile=size[0] < 600)
         if not script:
             self.call("Emulation.setScriptExecutionDisabled", value=True)
+        if before:
+            self.call("Page.addScriptToEvaluateOnNewDocument", source=before)
         served = path.startswith("http://")
         self.call("Page.navigate", url=path if served else "file://" + pathname2url(os.path.abspath(path)))
         browser.wait_for("Page.loadEventFired")
@@ -176,8 +179,8 @@ def wait_until(page, expression):
         time.sleep(0.1)
 
 
-def open_page(browser, path, size):
-    page = Page(browser, path, size)
+def open_page(browser, path, size, before=None):
+    page = Page(browser, path, size, before=before)
     wait_until(page, "!!globalThis.regradePage && (!!regradePage.picture || /cannot/.test(message.textContent))")
     return page
 

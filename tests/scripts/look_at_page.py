@@ -1,56 +1,24 @@
 #!/usr/bin/env python3
 """Opens scene pages in headless Chromium and compares their pictures with the program's own.
 
-  look_at_page.py FOLDER [--shots FOLDER] [--restyles N] [--chromium PROGRAM]
+  look_at_page.py FOLDER [--shots FOLDER] [--chromium PROGRAM]
 
-FOLDER is write_scene_pages's: pages NAME.html with views and pixels in NAME.json. Checked of each page: its pictures,
+FOLDER is write_scene_pages's: pages NAME.html with views and pixels in NAME.json. Checked of each page: its pictures, its style's bound,
 nothing asked of the network, nothing on the console (a violation of the page's policy is an error there), no scrolling
-sideways at the sizes of a phone and a desktop, a name on each control; of the first one, that keys and the slider change
-the picture, that a lost graphics context comes back, and that damaged copies say so.
+sideways at the sizes of a phone and a desktop; of the first one, that keys and the slider change the picture. Everything
+that keys can do is walk_page.py's, long use and damage strain_page.py's.
 --shots keeps pictures of the pages. Exit status 1 if anything is wrong, 77 if there is no Chromium.
 """
 
 import base64
 import glob
 import json
-import math
 import os
-import re
 import sys
-import tempfile
-import time
 
-from browser import SIZES, Page, complaints, open_page, parsed, parser_of, running, status_of, wait_until
-
-# The shader's arithmetic is the program's in another order of sums: measured 70 dB and more, where one unit of 255
-# everywhere would be 48 dB. Styles go through another sine, and both round to codes: a code more or less is 1 / 127 of
-# the largest coefficient.
-SOURCE_DB, STYLED_DB, WITHIN_ONE = 55, 50, 0.999
-
-
-def pixels_of(page, view):
-    text = page.value("(async () => { const p = await regradePage.picture(" + json.dumps(view) + ");"
-                      "let s = ''; for (const b of p) s += String.fromCharCode(b); return btoa(s) })()")
-    data, width, height = base64.b64decode(text), view["width"], view["height"]
-    rows = [data[4 * width * y:4 * width * (y + 1)] for y in reversed(range(height))]
-    return bytes(b for row in rows for i, b in enumerate(row) if i % 4 < 3)
-
-
-def compare_pictures(page, views):
-    found, worst = [], {}
-    for i, view in enumerate(views):
-        want = base64.b64decode(view["pixels"])
-        got = pixels_of(page, {key: value for key, value in view.items() if key != "pixels"})
-        error = sum((a - b) ** 2 for a, b in zip(got, want)) / len(want)
-        decibels = 99 if error == 0 else 10 * math.log10(255 ** 2 / error)
-        near = sum(abs(a - b) <= 1 for a, b in zip(got, want)) / len(want)
-        styled = view["weights"][0] > 0
-        worst[styled] = min(worst.get(styled, (99, 1)), (decibels, near))
-        if decibels < (STYLED_DB if styled else SOURCE_DB) or (not styled and near < WITHIN_ONE):
-            found.append(f"view {i}: {decibels:.1f} dB from the program's picture, {100 * near:.2f} % within 1 of 255")
-    for styled, (decibels, near) in worst.items():
-        print(f"  {'styled' if styled else 'source'}: worst {decibels:.1f} dB, {100 * near:.2f} % within 1 of 255")
-    return found
+from browser import SIZES, complaints, open_page, parsed, parser_of, running, status_of, wait_until
+from page_network import check_bound
+from page_pictures import compare_pictures
 
 
 def check_controls(page, width):
@@ -58,11 +26,6 @@ def check_controls(page, width):
     wide = page.value("document.documentElement.scrollWidth")
     if wide > width:
         found.append(f"scrolls sideways: {wide} pixels wide at {width}")
-    nameless = page.value("[...document.querySelectorAll('button,input,select,canvas')].filter(e => !(e.ariaLabel || "
-                          "e.getAttribute('aria-label') || e.textContent.trim() || e.labels?.length)).map(e => "
-                          "e.outerHTML.slice(0, 80)).join(' ')")
-    if nameless:
-        found.append("controls without a name: " + nameless)
     outside = page.value("[...document.querySelectorAll('#tools button,#styles input')].filter(e => { const r = "
                          "e.getBoundingClientRect(); return r.width && (r.left < 0 || r.right > innerWidth + 1 || "
                          "r.top < 0 || r.bottom > innerHeight + 1) }).length")
@@ -78,11 +41,12 @@ def check_input(page):
     for key in ["ArrowRight", "w", "d", "+"]:
         before = page.value(where)
         page.call("Input.dispatchKeyEvent", type="keyDown", key=key)
-        time.sleep(0.5)
+        try:
+            wait_until(page, f"{where} !== {json.dumps(before)}")
+        except RuntimeError:
+            found.append(f"the key {key} does not move the view")
         page.call("Input.dispatchKeyEvent", type="keyUp", key=key)
         wait_until(page, "regradePage.painter.changed === false")
-        if page.value(where) == before:
-            found.append(f"the key {key} does not move the view")
     page.call("Input.dispatchKeyEvent", type="keyDown", key="h")
     page.call("Input.dispatchKeyEvent", type="keyUp", key="h")
     page.value("style0.value = 25; style0.dispatchEvent(new Event('input'))")
@@ -205,66 +169,18 @@ def check_film(page, folder, shots):
     return [] if film["worst"] >= 35 else [f"a frame of the film is {film['worst']:.1f} dB from the page"]
 
 
-def check_growth(page, restyles):
-    """200 drags of the slider and some styles, one in the place of the other, take no more memory than the first."""
-    page.value("""(async () => {
-      const p = regradePage, style = {...p.header.styles[0], weights: network_0.textContent}, sizes = [];
-      const size = () => [p.graphics.bytes, document.querySelectorAll('*').length, p.header.styles.length];
-      for (let i = 0; i < RESTYLES; ++i) { await p.putStyle(1, style); if (i === 0 || i === RESTYLES - 1) sizes.push(size()) }
-      for (let i = 0; i < 200; ++i) { style0.value = i % 101; style0.dispatchEvent(new Event('input')) }
-      sizes.push(size());
-      p.removeStyle(1);
-      p.sizes = sizes })(); 0""".replace("RESTYLES", str(restyles)))
-    wait_until(page, "!!regradePage.sizes")
-    sizes = page.value("regradePage.sizes")
-    return [] if sizes[0] == sizes[1] == sizes[2] else [f"memory grows: bytes, elements and styles {sizes}"]
-
-
-def check_lost_context(page):
-    page.value("(() => { const c = canvas.getContext('webgl2').getExtension('WEBGL_lose_context'); "
-               "regradePage.picture = null; c.loseContext(); setTimeout(() => c.restoreContext(), 300) })()")
-    wait_until(page, "!!regradePage.picture")
-    return []
-
-
 def check_cores(browser, path, views):
     """Styles made by workers, as where the graphics processor is slow."""
     page = open_page(browser, path, SIZES["phone"])
     page.value("location.hash = '#cores'")
-    page.call("Page.reload")
-    time.sleep(1)
+    page.reload()
     wait_until(page, "!!globalThis.regradePage && !!regradePage.picture")
     found = compare_pictures(page, [view for view in views if view["weights"][0] == 1]) + complaints(page)
     page.close()
     return ["styled on cores: " + complaint for complaint in found]
 
 
-def check_damaged(browser, path, folder):
-    """Copies with a missing part, other bytes and no scene say so, and throw nothing."""
-    found = []
-    with open(path, encoding="utf-8") as file:
-        text = file.read()
-    part = r'(id="color">)([^<]{40})'
-    for name, damaged in {
-            "missing": re.sub(r'<script type="application/octet-stream" id="density">[^<]*</script>', "", text),
-            "bytes": re.sub(part, lambda m: m[1] + m[2][:20] + m[2][:20], text),
-            "base64": re.sub(part, lambda m: m[1] + "!!!" + m[2], text),
-            "header": text.replace('"resolution":[', '"resolution":["x",', 1),
-            "json": re.sub(r'(id="scene">)\{', r"\1", text)}.items():
-        copy = os.path.join(folder, "damaged_" + name + ".html")
-        with open(copy, "w", encoding="utf-8") as file:
-            file.write(damaged)
-        page = Page(browser, copy, SIZES["phone"])
-        try:
-            wait_until(page, "/cannot be shown: ./.test(message.textContent)")
-        except RuntimeError:
-            found.append(f"a page with damaged {name} says '{page.value('message.textContent')}'")
-        found += [f"a page with damaged {name}: {c}" for c in complaints(page)]
-        page.close()
-    return found
-
-
-def check_folder(browser, arguments, scratch):
+def check_folder(browser, arguments):
     found = []
     for number, path in enumerate(sorted(glob.glob(os.path.join(arguments.folder, "*.html")))):
         name = os.path.basename(path)[:-5]
@@ -275,11 +191,10 @@ def check_folder(browser, arguments, scratch):
             page = open_page(browser, path, size)
             here = check_controls(page, size[0])
             if size_name == "phone":
-                here += compare_pictures(page, views)
+                here += compare_pictures(page, views) + check_bound(page)
             elif number == 0:
                 here += check_input(page) + check_path(page, arguments.folder)
                 here += check_colors(page, arguments.folder) + check_film(page, arguments.folder, arguments.shots)
-                here += check_growth(page, arguments.restyles) + check_lost_context(page)
             if arguments.shots:
                 wait_until(page, "regradePage.painter.settled")
                 page.shot(os.path.join(arguments.shots, f"{name}_{size_name}.png"))
@@ -288,20 +203,17 @@ def check_folder(browser, arguments, scratch):
             page.close()
         if number == 0 or name == "uniform_near":
             found += [f"{name}, {c}" for c in check_cores(browser, path, views)]
-        if number == 0:
-            found += check_damaged(browser, path, scratch)
     return found
 
 
 def main():
     parser = parser_of(__doc__)
     parser.add_argument("folder", help="folder with pages and their views")
-    parser.add_argument("--restyles", type=int, default=6, help="how often a style is learned again")
     arguments = parsed(parser)
     if not glob.glob(os.path.join(arguments.folder, "*.html")):
         parser.error(arguments.folder + " has no pages")
-    with tempfile.TemporaryDirectory() as scratch, running(arguments.chromium) as browser:
-        found = check_folder(browser, arguments, scratch)
+    with running(arguments.chromium) as browser:
+        found = check_folder(browser, arguments)
     return status_of("look_at_page", found)
 
 

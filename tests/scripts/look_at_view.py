@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
 """Opens `regrade view` of a small scene in headless Chromium, drops a picture on it, and renders an exact film.
 
-  look_at_view.py REGRADE [--shots FOLDER] [--chromium PROGRAM]
+  look_at_view.py REGRADE [--run FOLDER] [--shots FOLDER] [--chromium PROGRAM]
 
 Checked: the opening answer becomes the page; a dropped picture shows its colours at once, then its style, which the page
 draws, and the folder keeps it; the exact film comes; a second tab without the token sees nothing; nothing is asked of
-another host, and nothing is on the console. Exit status 1 if anything is wrong, 77 if there is no Chromium.
+another host, and nothing is on the console. --run takes a folder of `regrade run` or `reconstruct` instead of a small scene, and writes
+into it; the window then has 320 x 180 pixels. Exit status 1 if anything is wrong, 77 if there is no Chromium.
 """
 
 import base64
@@ -23,10 +24,26 @@ DROP = """(async () => {
   const bytes = Uint8Array.from(atob(%s), (c) => c.charCodeAt(0));
   await regradePage.take(new File([bytes], 'sun set.png', {type: 'image/png'}));
   const map = JSON.stringify(regradePage.state.map), time = regradePage.previewTime;
-  const begun = performance.now();
+  const begun = performance.now(), put = regradePage.putStyle, shown = [];
+  regradePage.putStyle = async (...style) => {
+    await put(...style);
+    shown.push(performance.now() - begun);
+  };
   await regradePage.learned;
-  return {map, time, learned: performance.now() - begun, styles: regradePage.header.styles.length,
+  regradePage.putStyle = put;
+  return {map, time, shown, styles: regradePage.header.styles.length,
           weights: regradePage.weights(), after: regradePage.state.map, message: message.textContent};
+})()"""
+
+# The style as the program sent its voxels, and as the page's own pass makes them: decibels between two pictures.
+CODES = """(async () => {
+  const p = regradePage, last = p.header.styles.length - 1, width = 96, height = 72;
+  const view = {...p.view.at(width, height), width, height, weights: p.header.styles.map((_, i) => i === last ? 1 : 0)};
+  const sent = await p.picture(view), before = p.colors[last];
+  await p.putStyle(last, {...p.header.styles[last], weights: document.getElementById('network_' + last).textContent});
+  const own = await p.picture(view), plain = await p.picture({...view, weights: view.weights.map(() => 0)});
+  const decibels = (a, b) => 10 * Math.log10(255 ** 2 / Math.max(1e-9, a.reduce((sum, v, k) => sum + (v - b[k]) ** 2, 0) / (3 * width * height)));
+  return [decibels(sent, own), decibels(sent, plain), before !== p.colors[last]];
 })()"""
 
 FILM = """(async () => {
@@ -49,20 +66,26 @@ def start(regrade, folder):
     raise RuntimeError("regrade view has ended")
 
 
-def check_view(browser, address, folder, shots):
+def check_view(browser, address, folder, shots, size):
     found = []
-    page = open_page(browser, address, SIZES["phone"])
+    page = open_page(browser, address, size)
+    before = page.value("regradePage.header.styles.length")
     with open(STYLE, "rb") as file:
         picture = base64.b64encode(file.read()).decode()
     page.value("regradePage.dropped_file = " + repr(picture) + "; 0")
     done = page.value(DROP % "regradePage.dropped_file")
-    print(f"  colours after {done['time'] / 1000:.2f} s, the style after {done['learned'] / 1000:.1f} s")
+    print(f"  colours after {done['time'] / 1000:.2f} s, the style after {', '.join(f'{t / 1000:.1f}' for t in done['shown'])} s")
     if done["map"] == "null":
         found.append("a dropped picture does not show its colours")
-    if done["styles"] != 1 or done["weights"] != [1] or done["after"] is not None:
+    if done["styles"] != before + 1 or done["weights"] != [0] * before + [1] or done["after"] is not None:
         found.append(f"the style is not shown: {done['styles']} styles, weights {done['weights']}, '{done['message']}'")
-    if not os.path.exists(os.path.join(folder, "styles", "sun_set", "network.npz")):
+    if done["shown"] == [] or not os.path.exists(os.path.join(folder, "styles", "sun_set", "network.npz")):
         found.append("the style is not in the folder")
+    own, plain, again = page.value(CODES)
+    print(f"  the voxels that the program styled: {own:.1f} dB from those of the page's own pass, {plain:.1f} dB from the scene")
+    # As the bar between two arithmetics in page_pictures.py.
+    if own < 50 or plain > 40 or not again:
+        found.append("the voxels that the program styled are not those of its network")
     size, film = page.value(FILM), os.path.join(folder, "films", "film.mp4")
     if not os.path.exists(film) or size != os.path.getsize(film):
         found.append("the exact film did not come")
@@ -82,17 +105,19 @@ def check_view(browser, address, folder, shots):
 def main():
     parser = parser_of(__doc__)
     parser.add_argument("regrade", help="the program")
+    parser.add_argument("--run", help="an output folder, which gets a style and a film")
     arguments = parsed(parser)
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as scratch:
-        folder = os.path.join(scratch, "run")
-        status, error = call([arguments.regrade, "reconstruct", make_capture(arguments.regrade, os.path.join(scratch, "s")),
-                              "--out", folder] + SMALL)
-        if status:
-            raise RuntimeError(error)
+        folder = arguments.run or os.path.join(scratch, "run")
+        if not arguments.run:
+            capture = make_capture(arguments.regrade, os.path.join(scratch, "s"))
+            status, error = call([arguments.regrade, "reconstruct", capture, "--out", folder] + SMALL)
+            if status:
+                raise RuntimeError(error)
         program, address = start(arguments.regrade, folder)
         try:
             with running(arguments.chromium) as browser:
-                found = check_view(browser, address, folder, arguments.shots)
+                found = check_view(browser, address, folder, arguments.shots, (320, 180) if arguments.run else SIZES["phone"])
         finally:
             program.terminate()
             time.sleep(0.2)

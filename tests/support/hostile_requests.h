@@ -82,6 +82,8 @@ inline std::vector<HostileRequest> HostileRequests(int port, const std::string& 
       {"a question about other origins", 401,
        PlainRequest("OPTIONS", "/style", port, "", "Access-Control-Request-Method: POST\r\n")},
       {"a body where there is none", 413, get("/page", "Content-Length: 5\r\n") + "12345"},
+      {"a chunk where there is none", 413,
+       get("/page", "Transfer-Encoding: chunked\r\n") + "1\r\nx\r\n0\r\n\r\n"},
       {"a body of 1 GB", 413,
        PlainRequest("POST", "/style", port, token, "Content-Length: 1000000000\r\n")},
       {"a body of 2^64 bytes", 400,

@@ -1,5 +1,6 @@
 // Writes small pages of every kind of field, and what this program renders of them:
-// write_scene_pages FOLDER. For tests that open them in a browser.
+// write_scene_pages FOLDER [RUN STYLE]. For tests that open them in a browser. With an output
+// folder and one of its styles only that page is written, with pictures of the checked views.
 //
 // FOLDER/NAME.html, and FOLDER/NAME.json: views with the page's lens, place and weights, and
 // their pixels, RGB of 8 bits in base64, of the field and the style as the page has them.
@@ -12,11 +13,17 @@
 #include "kernels/base/random.h"
 #include "kernels/field/cpu/render_view.h"
 #include "kernels/field/pad_sh_basis.h"
+#include "pipeline/capture/working_views.h"
+#include "pipeline/fields/field_file.h"
+#include "pipeline/fields/network_file.h"
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/images/image_file.h"
+#include "pipeline/page/check_page.h"
 #include "pipeline/page/keyframes.h"
+#include "pipeline/page/make_page.h"
 #include "pipeline/page/page_file.h"
 #include "pipeline/report/html_text.h"
+#include "pipeline/workspace/style_folders.h"
 #include "stylize/field/blend_fields.h"
 #include "stylize/image/monge_kantorovich.h"
 #include "stylize/training/initial_network.h"
@@ -119,6 +126,26 @@ void WritePages(const std::string& folder, const std::string& name, const Radian
   WriteJsonFile(folder + "/" + name + ".json", JsonValue(std::move(views)));
 }
 
+void WritePageOfRun(const std::string& folder, const std::string& run,
+                    const std::string& name) {
+  constexpr int kLongest = 128;
+  const MadePage made = MakePage(run, {name}, {}, {});
+  const StoredField stored = ReadFieldFile(run + "/field.npz");
+  const WorkingViews photos = ReadWorkingViews(run + "/poses", kLongest, 0)
+                                  .InField(stored.field_from_world, stored.ndc);
+  const PageStyle style =
+      EncodeStyle(ReadNetworkFile(StyleFolder(run, name) + "/network.npz"), made.field, 1);
+  RadianceField page = made.field;
+  page.appearance = PadShBasis(std::move(page.appearance), 9);
+  JsonValue::Array views;
+  for (const double weight : {0.0, 1.0})
+    for (const Camera& camera : CheckedViews(photos.Cameras(), kLongest))
+      views.push_back(
+          ViewJson(camera.Undistorted(), weight, MixFields(page, {&style.styled}, {weight})));
+  WriteFileAtomically(folder + "/page.html", made.html);
+  WriteJsonFile(folder + "/page.json", JsonValue(std::move(views)));
+}
+
 // colors.json: colour maps from the colours of a scene to those of a picture, see EQ(mkl).
 void WriteColorMaps(const std::string& folder) {
   const auto statistics = [](uint64_t seed, double spread, int rank) {
@@ -181,12 +208,16 @@ void WritePath(const std::string& folder) {
 
 int main(int argc, char** argv) {
   using namespace regrade;
-  if (argc != 2) {
-    std::fprintf(stderr, "usage: write_scene_pages FOLDER\n");
+  if (argc != 2 && argc != 4) {
+    std::fprintf(stderr, "usage: write_scene_pages FOLDER [RUN STYLE]\n");
     return 2;
   }
   const std::string folder = argv[1];
   std::filesystem::create_directories(folder);
+  if (argc == 4) {
+    WritePageOfRun(folder, argv[2], argv[3]);
+    return 0;
+  }
   WritePages(folder, "levels", testing::RandomCellField({2, 3, 2}, 3, 9, 5), false);
   WritePages(folder, "levels_near", testing::RandomCellField({2, 2, 2}, 2, 4, 6), true);
   RadianceField uniform = testing::RandomField({13, 17, 9}, 1, 0.5, 6);

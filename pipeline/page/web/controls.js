@@ -54,7 +54,7 @@ function bindControls(canvas, view, changed, actions) {
   const typed = (event) => event.target.closest?.('input, select, textarea');
   addEventListener('keydown', (event) => {
     const key = event.key === '=' ? '+' : event.key.toLowerCase();
-    if (event.ctrlKey || event.metaKey || event.altKey || typed(event)) return;
+    if (event.ctrlKey || event.metaKey || event.altKey || typed(event) && key !== 'escape') return;
     if (moving.includes(key)) {
       if (key.startsWith('arrow') && event.target.closest?.('#photos')) return;
       held.add(key);

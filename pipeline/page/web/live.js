@@ -21,9 +21,7 @@ class Live {
   }
   // Waits for the job; false if it was cancelled. `meanwhile` runs now and then.
   async finish(words, meanwhile) {
-    const cancel = element('cancel');
-    cancel.hidden = false;
-    cancel.onclick = () => this.ask('DELETE', '/job').catch(() => {});
+    const ended = offerCancel(() => this.ask('DELETE', '/job').catch(() => {}));
     try {
       for (;;) {
         const job = await (await this.ask('GET', '/job')).json();
@@ -34,22 +32,29 @@ class Live {
         await new Promise((done) => setTimeout(done, 500));
       }
     } finally {
-      cancel.hidden = true;
+      ended();
       say('');
     }
   }
-  // The header of a page's style with its weights, or null. `soFar` gets those of the training.
-  async learn(file, soFar) {
+  // The header of a page's style with its weights, or null. `soFar` gets those of the training; with
+  // the codes of its voxels where `needed()`.
+  async learn(file, soFar, needed) {
     if (file.size > 32 << 20) throw new PageError('this picture is larger than 32 MB');
     const name = file.name.normalize('NFKD').replace(/[^\w.-]+/g, '_').slice(-80);
     await this.ask('POST', '/style', file, {'Regrade-Name': name});
+    let seen = false;
     const peek = async (job) => {
-      if (job.stage !== 'stylize') return;
+      // Passes over the voxels take time from the training: where codes are needed, one is enough.
+      if (job.stage !== 'stylize' || seen && needed()) return;
       const style = await this.ask('GET', '/learning').then((answer) => answer.status === 200 ? answer.json() : null).catch(() => null);
-      if (style) await soFar(style);
+      if (!style) return;
+      seen = true;
+      await soFar(await withCodes(style, '/learning'));
     };
+    const withCodes = async (style, target) => needed()
+        ? {...style, codes: new Uint8Array(await (await this.ask('GET', target + '/codes')).arrayBuffer())} : style;
     if (!await this.finish('The style is being learned:', peek)) return null;
-    return (await this.ask('GET', '/style')).json();
+    return withCodes(await (await this.ask('GET', '/style')).json(), '/style');
   }
   async film(text) {
     await this.ask('POST', '/film', text);

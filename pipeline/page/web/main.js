@@ -31,7 +31,7 @@ async function start(page) {
   if (!gl) throw new PageError('this browser has no WebGL 2, or has switched it off');
   if (typeof DecompressionStream === 'undefined') throw new PageError('this browser is too old');
   const graphics = new Graphics(gl);
-  graphics.onCores = location.hash === '#cores';
+  if (location.hash === '#cores') graphics.onCores = true;
   const scene = await loadScene(header, graphics, (part) => say('The scene is being unpacked: ' + Math.round(100 * part) + ' %'));
   const view = page.view ??= new View(header);
   const state = page.state ??= {axes: [0, 1], amount: [0, 0], original: false, split: false, cut: 0.5, map: null, playing: null};
@@ -58,10 +58,10 @@ async function start(page) {
     free(colors[i]);
     colors[i] = loading[i] = null;
   };
-  function load(i) {
+  function load(i, codes) {
     return loading[i] ??= styleColors(graphics, scene, header.styles[i], 'network_' + i, (part) => {
       say(part < 1 ? 'Style ' + (i + 1) + ' is being applied: ' + Math.round(100 * part) + ' %' : '');
-    }).then((made) => {
+    }, codes).then((made) => {
       colors[i] = made;
       // Of many styles those that no slider shows make room.
       if (colors.filter(Boolean).length > 3)
@@ -100,7 +100,7 @@ async function start(page) {
   };
   bindPath(path, state, header, () => view.save(), weights, take, changed);
   // A style that the program behind the page has learned, or is learning; the last one, or a new one.
-  const putStyle = async (i, {weights: packed, ...style}) => {
+  const putStyle = async (i, {weights: packed, codes, ...style}) => {
     const isNew = i === header.styles.length, before = colors[i];
     element('network_' + i)?.remove();
     document.body.append(make('script', {type: 'application/octet-stream', id: 'network_' + i, textContent: packed}));
@@ -114,8 +114,8 @@ async function start(page) {
     }
     page.added.push(style);
     header.styles.push(style);
-    await load(i);
-    free(before);
+    await load(i, codes);
+    if (before !== colors[i]) free(before);
     if (!isNew) return;
     const axis = Math.min(i, 1);
     state.axes = axis === 0 ? [0, 1] : [state.axes[0], i];
@@ -136,26 +136,27 @@ async function start(page) {
     if (!page.live) return;
     if (page.learning) return sayBriefly('Another style is being learned.');
     page.learning = true;
-    const i = header.styles.length, picture = page.dropped?.url ?? '';
+    // By way of `page`: the scene may be made again meanwhile.
+    const i = page.header.styles.length, picture = page.dropped?.url ?? '';
     let done = false;
     try {
       if (i >= 16) throw new PageError('this page has 16 styles; load it again');
-      // Where a pass over the voxels takes long, only the end is shown.
-      const soFar = async (style) => { if (!graphics.onCores) await putStyle(i, {...style, picture}); };
-      const style = await page.live.learn(file, soFar);
+      const soFar = (style) => page.putStyle(i, {...style, picture});
+      // The program makes a pass over the voxels faster than this page's cores.
+      const style = await page.live.learn(file, soFar, () => page.graphics.onCores !== false);
       if (!style) return;
       done = true;
-      await putStyle(i, {...style, picture});
+      await page.putStyle(i, {...style, picture});
     } catch (error) {
       if (!(error instanceof PageError)) throw error;
       sayBriefly('The style was not learned: ' + error.message);
     } finally {
       page.learning = false;
-      if (!done && header.styles.length > i) removeStyle(i);
+      if (!done && page.header.styles.length > i) page.removeStyle(i);
     }
   };
-  bindPicture(header, page, (map) => {
-    if (map) state.amount = [0, 0];
+  bindPicture(header, page, (map, isNew) => {
+    if (map && isNew) state.amount = [0, 0];
     state.map = map;
     refreshStyles();
     changed();
@@ -180,10 +181,9 @@ async function start(page) {
     return [...map.offset, ...map.matrix];
   });
   page.film = async () => {
-    const {fps} = path, stop = element('cancel');
+    const {fps} = path;
     let going = true;
-    stop.hidden = false;
-    stop.onclick = () => going = false;
+    const ended = offerCancel(() => going = false);
     try {
       const longest = Math.max(16, Math.min(4096, Number(element('film_size').value) || 1280));
       const made = await makeFilm(path, longest, fps, pictureOfPath, (part) => {
@@ -193,7 +193,7 @@ async function start(page) {
       say('');
       return made;
     } finally {
-      stop.hidden = true;
+      ended();
     }
   };
   const save = (film) => async () => {
@@ -213,12 +213,13 @@ async function start(page) {
   element('exact_film').hidden = !page.live;
   element('exact_film').onclick = save(() => page.live.film(path.text(header.styles.map((s) => s.id))));
 
-  const press = (id, on) => element(id).setAttribute('aria-pressed', on);
-  const toggle = (id, sheet) => () => {
+  const press = (id, on) => element(id).ariaPressed = on;
+  const sheets = [['show_path', 'path'], ['show_facts', 'facts']];
+  const toggle = (sheet) => () => {
     const open = element(sheet).hidden;
-    for (const [b, s] of [['show_path', 'path'], ['show_facts', 'facts']]) {
+    for (const [b, s] of sheets) {
       element(s).hidden = s !== sheet || !open;
-      press(b, s === sheet && open);
+      element(b).ariaExpanded = s === sheet && open;
     }
     if (sheet === 'facts') factsOf(header, scene, graphics, painter);
   };
@@ -233,7 +234,13 @@ async function start(page) {
       changed();
     }};
   actions.keys = {h: actions.home, f: actions.mode, c: () => actions.original(true), v: actions.halve,
-                  k: toggle('show_path', 'path'), i: toggle('show_facts', 'facts')};
+                  k: toggle('path'), i: toggle('facts'), escape: () => {
+                    for (const [b, s] of sheets) {
+                      if (element(s).hidden) continue;
+                      if (element(s).contains(document.activeElement)) element(b).focus();
+                      toggle(s)();
+                    }
+                  }};
   actions.released = {c: () => actions.original(false)};
   element('home').onclick = actions.home;
   element('mode').onclick = actions.mode;
@@ -247,10 +254,14 @@ async function start(page) {
   compare.onkeyup = () => actions.original(false);
   element('cut').oninput = () => {
     state.cut = element('cut').value / 100;
-    element('split').style.left = 100 * state.cut + '%';
+    showCut();
     changed();
   };
-  element('split').style.left = 100 * state.cut + '%';
+  const showCut = () => {
+    element('split').style.left = 100 * state.cut + '%';
+    element('cut').ariaValueText = Math.round(100 * state.cut) + ' % of the width';
+  };
+  showCut();
 
   page.controls ??= bindControls(canvas, view, () => page.changed(), {
     home: () => page.actions.home(),
@@ -287,14 +298,16 @@ async function start(page) {
     requestAnimationFrame(run);
   };
   run();
-  if (header.styles.length > 0) {
+  weights().forEach((weight, i) => weight > 0 && load(i));
+  if (!page.begun && header.styles.length > 0) {
     await load(0);
-    if (colors[0] && state.amount.every((v) => v === 0)) {
+    if (colors[0] && !state.map && state.amount.every((v) => v === 0)) {
       state.amount[0] = header.styles[0].strength;
       showStyles();
       changed();
     }
   }
+  page.begun = true;
 }
 
 const page = {live: Live.begin()};

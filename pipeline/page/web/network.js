@@ -36,15 +36,27 @@ function buffersOf(gl, layers) {
   });
 }
 
-// Colours of a style, to draw the scene with.
-async function styleColors(graphics, scene, style, id, progress) {
+// Textures of the codes [voxels, 27] of a style, as loadScene makes those of the source.
+function texturesOf(graphics, codes, voxels) {
+  if (codes.length !== 27 * voxels) throw new PageError('the style that came has another number of voxels');
+  const first = new Uint8Array(16 * (voxels + 1)).fill(128), second = new Uint8Array(16 * (voxels + 1)).fill(128);
+  for (let i = 0; i < voxels; ++i) {
+    first.set(codes.subarray(27 * i, 27 * i + 16), 16 * i);
+    second.set(codes.subarray(27 * i + 16, 27 * i + 27), 16 * i);
+  }
+  return [first, second].map((bytes) => graphics.texture('u4', new Uint32Array(bytes.buffer)));
+}
+
+// Colours of a style, to draw the scene with; `codes`: of its voxels, if they are known.
+async function styleColors(graphics, scene, style, id, progress, codes = null) {
   const gl = graphics.gl;
   graphics.network ??= compile(gl, [[gl.VERTEX_SHADER, EVERY_PIXEL], [gl.FRAGMENT_SHADER, NETWORK_GLSL]]);
   const p = graphics.network, layers = await loadWeights(id), buffers = buffersOf(gl, layers);
   const names = ['Layer0', 'Layer1', 'Layer2', 'Layer3', 'Layer4', 'Layer5', 'Biases'];
   const colors = {scale: style.scale, texelScale: style.sphere_scale ?? [1, 1, 1], background: style.background};
-  colors.first = graphics.blank('u4', scene.source.first.height);
-  colors.second = graphics.blank('u4', scene.source.first.height);
+  if (codes) [colors.first, colors.second] = texturesOf(graphics, codes, scene.voxels);
+  colors.first ??= graphics.blank('u4', scene.source.first.height);
+  colors.second ??= graphics.blank('u4', scene.source.first.height);
   const framebuffer = gl.createFramebuffer();
 
   // False if it would take long and `mayLeave` is set.
@@ -99,11 +111,11 @@ async function styleColors(graphics, scene, style, id, progress) {
     return true;
   }
   const {source} = scene;
-  const fast = graphics.onCores !== true &&
+  const fast = !codes && graphics.onCores !== true &&
       await pass([colors.first, colors.second], source.first.height, scene.header.finest === null ? 2 : 0,
                  [source.first, source.second], source.scale, style.scale, typeof Worker !== 'undefined');
-  if (!fast) {
-    graphics.onCores = true;
+  if (!codes) graphics.onCores = !fast;
+  if (!codes && !fast) {
     await restyleOnCores(graphics, scene, style, layers, colors, progress);
   }
   if (source.texel) {

@@ -15,6 +15,17 @@ function sayBriefly(text) {
   setTimeout(() => { if (element('message').textContent === text) say(''); }, 4000);
 }
 
+// Shows the button that stops a job; the function that comes back hides it again.
+function offerCancel(stop) {
+  const button = element('cancel'), before = document.activeElement;
+  button.hidden = false;
+  button.onclick = stop;
+  return () => {
+    if (document.activeElement === button) (before?.isConnected ? before : element('canvas')).focus();
+    button.hidden = true;
+  };
+}
+
 function saveFile(blob, name) {
   const url = URL.createObjectURL(blob);
   make('a', {href: url, download: name}).click();
@@ -29,7 +40,7 @@ function bindStyles(header, state, changed) {
   for (let axis = 0; axis < Math.min(2, count); ++axis) {
     const id = 'style' + axis, name = (i) => 'Style ' + (i + 1);
     const picture = make('img', {alt: '', src: header.styles[state.axes[axis]].picture});
-    const output = make('output', {htmlFor: id});
+    const output = make('output', {htmlFor: id, ariaHidden: 'true'});  // the slider says it
     const slider = make('input', {id, type: 'range', min: 0, max: 100, value: 100 * state.amount[axis]});
     const label = make('span', {}, picture);
     if (count > 2) {
@@ -40,16 +51,17 @@ function bindStyles(header, state, changed) {
         if (state.axes[1 - axis] === Number(select.value)) return void (select.value = state.axes[axis]);
         state.axes[axis] = Number(select.value);
         picture.src = header.styles[state.axes[axis]].picture;
+        show();
         changed();
       });
       label.append(select);
-      slider.setAttribute('aria-label', 'Weight of slider ' + (axis + 1));
     } else {
       label.append(make('label', {htmlFor: id, textContent: count > 1 ? name(axis) : 'Original to style'}));
     }
     const show = () => {
       slider.value = Math.round(100 * state.amount[axis]);
-      output.textContent = Math.round(100 * state.amount[axis]) + ' %';
+      slider.ariaValueText = output.textContent = Math.round(100 * state.amount[axis]) + ' %';
+      if (count > 2) slider.ariaLabel = 'Weight of style ' + (state.axes[axis] + 1);
     };
     slider.addEventListener('input', () => {
       state.amount[axis] = slider.value / 100;
@@ -84,6 +96,9 @@ function bindPhotos(header, view, changed) {
 function bindPath(path, state, header, place, weights, go, changed) {
   const list = element('keyframes');
   const refresh = () => {
+    // The keyboard stays where it was: at the same control of the same place, or the nearest one.
+    const item = document.activeElement?.closest('#keyframes li'), row = [...list.children].indexOf(item);
+    const column = item ? [...item.children].indexOf(document.activeElement) : -1;
     list.replaceChildren(...path.keyframes.map((key, i) => {
       const time = make('input', {type: 'number', min: 0, step: 0.1, value: key.time.toFixed(1),
                                   ariaLabel: 'Seconds of place ' + (i + 1), disabled: i === 0});
@@ -99,6 +114,7 @@ function bindPath(path, state, header, place, weights, go, changed) {
       remove.addEventListener('click', () => { path.remove(i); refresh(); });
       return make('li', {}, time, ' s', show, remove);
     }));
+    if (item) (list.children[Math.min(row, list.children.length - 1)]?.children[column] ?? element('add_key')).focus();
     element('play').disabled = path.keyframes.length < 2;
     element('save_path').disabled = path.keyframes.length === 0;
     element('save_film').disabled = element('exact_film').disabled = path.keyframes.length < 2;

@@ -77,20 +77,23 @@ async function openPicture(file) {
   };
   const {canvas, context} = drawn(LONGEST);
   const {data} = context.getImageData(0, 0, canvas.width, canvas.height);
-  return {statistics: statisticsOf(data), url: drawn(128).canvas.toDataURL('image/jpeg', 0.75)};
+  const url = drawn(128).canvas.toDataURL('image/jpeg', 0.75);
+  picture.close();
+  return {statistics: statisticsOf(data), url};
 }
 
-// The slider of the dropped picture. `shown` gets {matrix, offset} or null, `taken` the file.
+// The slider of the dropped picture. `shown` gets {matrix, offset} or null, and whether it is a new
+// picture's; `taken` gets the file.
 function bindPicture(header, page, shown, taken) {
   const box = element('dropped'), slider = element('dropped_part'), amount = element('dropped_amount');
   const identity = [1, 0, 0, 0, 1, 0, 0, 0, 1];
-  const show = () => {
+  const show = (isNew) => {
     const part = slider.value / 100, map = page.dropped?.map;
     box.hidden = !map;
-    amount.textContent = slider.value + ' %';
+    slider.ariaValueText = amount.textContent = slider.value + ' %';
     // EQ(style-mix): the mix of a map and no map is a map.
     shown(map ? {matrix: map.matrix.map((v, i) => (1 - part) * identity[i] + part * v),
-                 offset: map.offset.map((v) => part * v)} : null);
+                 offset: map.offset.map((v) => part * v)} : null, isNew);
   };
   const take = async (file) => {
     if (!file) return;
@@ -105,22 +108,25 @@ function bindPicture(header, page, shown, taken) {
       if (!page.live) return sayBriefly(error.message + '.');
       page.dropped = {map: null, url: ''};  // the program may
     }
-    show();
+    show(true);
     page.previewTime = performance.now() - begun;
     taken(file);
   };
   const clear = page.clearPicture = () => {
     page.dropped = null;
-    show();
+    show(false);
   };
-  slider.oninput = show;
-  element('remove_picture').onclick = clear;
+  slider.oninput = () => show(false);
+  element('remove_picture').onclick = () => {
+    clear();
+    element('open_picture').focus();
+  };
   element('open_picture').onchange = (event) => {
     take(event.target.files[0]);
     event.target.value = '';
   };
   page.take = take;
-  show();
+  show(false);
 }
 
 // Anywhere on the page; a file that is let go beside it must not replace the page.
