@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "kernels/base/error.h"
+#include "pipeline/page/make_page.h"
 #include "pipeline/workspace/style_folders.h"
 
 namespace regrade {
@@ -17,7 +18,7 @@ std::vector<std::string> WantedStyles(const std::string& folder, const Arguments
   if (words.size() == 1) {
     for (const std::string& style : StyleNames(folder))
       if (const std::string at = StyleFolder(folder, style);
-          fs::exists(at + "/network.npz") && !fs::exists(at + "/object.npz"))
+          fs::exists(at + "/network.npz") && WhyNoPage(at).empty())
         styles.push_back(style);
     return styles;
   }

@@ -17,6 +17,7 @@
 #include "pipeline/program/device_choice.h"
 #include "pipeline/run_pipeline.h"
 #include "pipeline/stages/photo_edit.h"
+#include "pipeline/stages/style_residual.h"
 #include "pipeline/workspace/style_folders.h"
 #include "stylize/image/view_stylizer.h"
 
@@ -79,6 +80,7 @@ JsonValue RecordOf(const RetouchOptions& options, const PhotoEdit& edit,
                            {"from", options.from},
                            {"change", edit.change},
                            {"local", edit.local},
+                           {"of_photo", edit.of_photo},
                            {"vignette", edit.vignette},
                            {"sharpening", edit.sharpening},
                            {"grain", edit.grain},
@@ -111,22 +113,28 @@ Image BeforeEdit(const RetouchOptions& options, const std::string& render, const
   return Resize(Colors(DecodePhoto(render, AnySize()).image), photo.width, photo.height);
 }
 
-// Writes what the style is made from to its folder, and sets style picture and method: a LUT
-// for an edit that is one map of colours, else the cleaned picture of this one photo.
+// Writes what the style is made from to its folder, and sets style picture and residual: the
+// edit's map of colours as a LUT, and what one photo has beyond it as a layer.
 void WriteEdit(const std::string& folder, const PhotoEdit& edit, const CaptureView& view,
                RunSettings* settings) {
   fs::create_directories(folder);
   settings->style.pictures = {AbsolutePath(folder + "/edit.cube")};
   WriteFileAtomically(folder + "/edit.cube", CubeText(edit.table, "edit"));
   settings->style_2d.method = StyleOptions().method;
+  settings->residual.residual = "views";
+  fs::remove_all(folder + "/retouched");
+  fs::remove_all(folder + "/layers");
   if (!edit.IsLocal()) return;
-  const std::string pictures = folder + "/retouched";
-  fs::remove_all(pictures);
-  fs::create_directories(pictures);
-  const std::string picture = pictures + "/" + Stem(view.file) + ".png";
-  WritePng16(picture, edit.picture);
-  settings->style.pictures = {AbsolutePath(picture)};
-  settings->style_2d.method = "folder:" + AbsolutePath(pictures);
+  // The network that keeps all colours is where training begins, and nothing is to be learned.
+  if (edit.of_photo) {
+    settings->network.steps = 1;
+    settings->network.rate_first = settings->network.rate_last = 0;
+  }
+  const std::string layers = folder + "/layers", pictures = folder + "/retouched";
+  for (const std::string& made : {layers, pictures}) fs::create_directories(made);
+  WritePng16(pictures + "/" + Stem(view.file) + ".png", edit.picture);
+  WriteLayer(layers + "/" + Stem(view.file) + ".png", edit.layer);
+  settings->residual.residual = "layers:" + AbsolutePath(layers);
 }
 
 }  // namespace

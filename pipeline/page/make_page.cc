@@ -32,6 +32,14 @@ std::string Thumbnail(const Image& image, int longest) {
                     kQuality);
 }
 
+// "" or "none", "views", "layers:DIR".
+std::string ResidualOf(const std::string& style_folder) {
+  if (!std::filesystem::exists(style_folder + "/residual.npz")) return "";
+  const JsonValue* const residual =
+      ReadRunFile(style_folder + "/run.json").options.Find("residual");
+  return residual != nullptr ? residual->AsString() : "";
+}
+
 double StrengthOf(const std::string& style_folder) {
   if (!std::filesystem::exists(style_folder + "/run.json")) return 1;
   const JsonValue* const strength =
@@ -66,13 +74,18 @@ std::string CheckLine(const std::string& what, const PageCheck& check) {
 
 }  // namespace
 
+std::string WhyNoPage(const std::string& style_folder) {
+  if (std::filesystem::exists(style_folder + "/object.npz")) return "is limited to masks";
+  return ResidualOf(style_folder).starts_with("layers:") ? "is the local edit of a photo" : "";
+}
+
 MadePage MakePage(const std::string& folder, const std::vector<std::string>& styles,
                   const PageOptions& options, const ProgressFunction& progress) {
   const int steps = 2 + static_cast<int>(styles.size());
   for (const std::string& style : styles)
-    if (std::filesystem::exists(StyleFolder(folder, style) + "/object.npz"))
-      throw InputError("is limited to masks, which a page does not hold", style,
-                       "name the styles of the whole scene: regrade page DIR STYLE ...");
+    if (const std::string why = WhyNoPage(StyleFolder(folder, style)); !why.empty())
+      throw InputError(why + ", which a page does not hold", style,
+                       "name styles that are networks alone: regrade page DIR STYLE ...");
   ReportOrThrow(progress, 0, steps);
   StoredField stored = ReadFieldFile(folder + "/field.npz");
   const WorkingViews views = ReadWorkingViews(folder + "/poses", kChecked, 0)
@@ -101,6 +114,10 @@ MadePage MakePage(const std::string& folder, const std::vector<std::string>& sty
     ReportOrThrow(progress, 1 + static_cast<int64_t>(i), steps);
     const std::string style_folder = StyleFolder(folder, styles[i]);
     const StoredNetwork network = ReadNetworkFile(style_folder + "/network.npz");
+    if (ResidualOf(style_folder) == "views")
+      made.report.push_back(
+          "its style " + styles[i] +
+          " is the network alone: a page does not hold the residual by voxel");
     PageStyle style = EncodeStyle(network, page, StrengthOf(style_folder));
     const Image picture = RenderHome(style.styled, home);
     if (i == 0 && style.header.At("strength").AsDouble() == 1)

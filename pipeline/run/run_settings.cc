@@ -19,11 +19,29 @@ void RunSettings::Bind(OptionSet* options) {
   options->Add("2D method", &style_2d);
   options->Add("Object", &object);
   options->Add("Network", &network);
+  options->Add("Residual", &residual);
   options->Add("Render", &render);
   options->Add("Evaluation", &consistency);
   options->Add("Page", &page);
   options->Add("Program", &program);
 }
+
+namespace {
+
+void CheckResidual(const RunSettings& settings, StyleMethodKind method) {
+  const ResidualChoice& choice = settings.residual;
+  if (choice.On() && choice.residual != "views" && choice.Layers().empty())
+    throw UsageError("\"" + choice.residual + "\" is no residual", "--residual",
+                     "use none, views or layers:DIR");
+  if (choice.On() && settings.object.On())
+    throw UsageError("a residual is of the whole scene", "--residual and --masks",
+                     "leave one of them out");
+  if (choice.On() && method == StyleMethodKind::kFolder)
+    throw UsageError("a folder has no pictures of renders",
+                     "--residual and --method folder:", "use another method");
+}
+
+}  // namespace
 
 void CheckTogether(const RunSettings& settings) {
   const size_t grids = settings.fit.resolutions.size(), steps = settings.fit.steps.size();
@@ -39,7 +57,8 @@ void CheckTogether(const RunSettings& settings) {
           Concat("belongs to a uniform field, with a side for each of ", grids, " stages"),
           flag, "leave it out, or give --fit-field uniform and the sides");
   CheckPaper(settings.run.preset, settings.run.paper_config, settings.fit.field);
-  ParseStyleMethod(settings.style_2d);
+  const StyleMethod method = ParseStyleMethod(settings.style_2d);
+  CheckResidual(settings, method.kind);
   if (!settings.object.style_mask.empty() && !settings.object.On())
     throw UsageError("labels of the style picture need labels of the photos",
                      "--style-mask and --masks",

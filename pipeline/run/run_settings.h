@@ -11,6 +11,7 @@
 #include "pipeline/program/option_binding.h"
 #include "pipeline/program/run_options.h"
 #include "pipeline/report/requirements.h"
+#include "pipeline/run/residual_choice.h"
 #include "reconstruct/colmap/poses_from_photos.h"
 #include "reconstruct/fit/fit_options.h"
 #include "reconstruct/scene/box_options.h"
@@ -125,6 +126,7 @@ struct RunSettings {
   StyleOptions style_2d;
   MaskOptions object;
   TrainNetworkOptions network;
+  ResidualChoice residual;
   RenderOptions render;
   ConsistencyOptions consistency;
   PageChoice page;

@@ -6,93 +6,39 @@
 #include "kernels/base/error.h"
 #include "kernels/image/resize.h"
 #include "pipeline/images/edge_shift.h"
+#include "pipeline/stages/photo_vignette.h"
 #include "stylize/fit_color_table.h"
+#include "stylize/image/guided_filter.h"
 #include "stylize/image/view_stylizer.h"
 
 namespace regrade {
 namespace {
 
 constexpr int kTable = 33, kDraftTable = 17;
-constexpr double kTableSmoothness = 0.1;
-constexpr int kTurns = 6;   // of fitting the map and the vignette
-constexpr int kRings = 32;  // of equal width, from the centre to a corner
-constexpr double kLeastVignette = 0.03;
-constexpr double kVignetteExplains = 0.5;
+constexpr double kTableSmoothness = 0.1, kMostSmoothness = 1e5;
+constexpr double kSteepestMap = 8;
+constexpr double kMapLeaves = 0.5;  // of the edit's variation, at most, beside a local part
+constexpr int kTurns = 6;           // of fitting the map and the vignette
 constexpr double kLocalStep = 2.0 / 255, kLocalShare = 0.2;
 
-Vec3d ColorAt(const Image& image, int64_t i) {
-  const float* p = &image.pixels[static_cast<size_t>(3 * i)];
-  return {p[0], p[1], p[2]};
-}
-
-// 1 + a r^2 + b r^4, r in half diagonals from the centre.
-struct Vignette {
-  double a = 0, b = 0;
-  double operator()(double squared) const { return 1 + a * squared + b * squared * squared; }
-};
-
-double SquaredRadius(const Image& image, int64_t i) {
-  const double x = static_cast<double>(i % image.width) + 0.5 - 0.5 * image.width;
-  const double y = static_cast<double>(i / image.width) + 0.5 - 0.5 * image.height;
-  return (x * x + y * y) * 4 /
-         (static_cast<double>(image.width) * image.width +
-          static_cast<double>(image.height) * image.height);
-}
-
 ColorTable FitTable(const Image& photo, const Image& edited, const Vignette& vignette, int size,
-                    int64_t stride) {
+                    int64_t stride, double smoothness = kTableSmoothness) {
   TableFit fit(size);
   for (int64_t i = 0; i < photo.num_pixels(); i += stride)
     fit.Add(ColorAt(photo, i), ColorAt(edited, i) * (1 / vignette(SquaredRadius(photo, i))));
-  return fit.Solve(kTableSmoothness);
+  return fit.Solve(smoothness);
 }
 
-// Factor of each ring by which the mapped photo is brighter or darker than the edit.
-struct Rings {
-  double product[kRings] = {}, square[kRings] = {};
-  double Factor(int k) const { return square[k] > 0 ? product[k] / square[k] : 1; }
-};
-
-Rings MeasureRings(const Image& mapped, const Image& edited) {
-  Rings rings;
-  for (int64_t i = 0; i < mapped.num_pixels(); ++i) {
-    const double r = std::sqrt(SquaredRadius(mapped, i));
-    const int k = std::min(kRings - 1, static_cast<int>(r * kRings));
-    const Vec3d m = ColorAt(mapped, i), e = ColorAt(edited, i);
-    rings.product[k] += Dot(m, e);
-    rings.square[k] += Dot(m, m);
+// As smooth as it takes to be no steeper than a photographer's curves: one that is steeper
+// tears apart the like colours of an edited object and of what is not edited.
+ColorTable FitGentleTable(const Image& photo, const Image& edited, const Vignette& vignette,
+                          int64_t stride) {
+  ColorTable table;
+  for (double smoothness = kTableSmoothness; smoothness <= kMostSmoothness; smoothness *= 10) {
+    table = FitTable(photo, edited, vignette, kTable, stride, smoothness);
+    if (SteepestSlope(table, kSteepestMap) <= kSteepestMap) break;
   }
-  return rings;
-}
-
-// Least squares over the rings, weighted by their light.
-Vignette FitVignette(const Rings& rings) {
-  // Factors are c (1 + a r^2 + b r^4): linear in c, c a and c b.
-  double gram[3][3] = {}, right[3] = {};
-  for (int k = 0; k < kRings; ++k) {
-    const double r = (k + 0.5) / kRings, s = r * r;
-    const double x[3] = {1, s, s * s};
-    for (int i = 0; i < 3; ++i) {
-      right[i] += rings.square[k] * x[i] * rings.Factor(k);
-      for (int j = 0; j < 3; ++j) gram[i][j] += rings.square[k] * x[i] * x[j];
-    }
-  }
-  Mat3d m;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) m(i, j) = gram[i][j];
-  const double determinant = m.Determinant();
-  if (!(std::abs(determinant) > 1e-12 * std::pow(gram[0][0], 3))) return {};
-  Vec3d solution;
-  for (int c = 0; c < 3; ++c) {
-    Mat3d replaced = m;
-    for (int i = 0; i < 3; ++i) replaced(i, c) = right[i];
-    solution[c] = replaced.Determinant() / determinant;
-  }
-  if (!(solution.x > 0.2)) return {};
-  const Vignette vignette{solution.y / solution.x, solution.z / solution.x};
-  for (double s = 0; s <= 1; s += 0.05)
-    if (!(vignette(s) > 0.05)) return {};
-  return vignette;
+  return table;
 }
 
 Image Mapped(const Image& photo, const ColorTable& table) {
@@ -141,13 +87,29 @@ Image FineDetail(const Image& image) {
   return Minus(image, Resize(half, image.width, image.height));
 }
 
-bool IsVignette(const Rings& rings, const Vignette& vignette, double left,
-                double left_without) {
-  const double centre = rings.Factor(1), half = rings.Factor(kRings / 2),
-               corner = rings.Factor(kRings - 3);
-  return std::abs(vignette(1) - 1) >= kLeastVignette &&
-         left < kVignetteExplains * left_without &&
-         std::abs(corner - half) > std::abs(half - centre);
+// The sum over pixels and channels of the steps to the next pixel.
+double Variation(const Image& image) {
+  double sum = 0;
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x)
+      for (int c = 0; c < 3; ++c) {
+        const float own = image.at(x, y)[c];
+        if (x + 1 < image.width) sum += std::abs(double{image.at(x + 1, y)[c] - own});
+        if (y + 1 < image.height) sum += std::abs(double{image.at(x, y + 1)[c] - own});
+      }
+  return sum;
+}
+
+// What is left of an edit behind its map, without sharpening and grain, with the photo's edges.
+Image LayerOf(const Image& photo, const Image& residual, const Image& fine, double sharpening) {
+  constexpr double kEps = 0.02 * 0.02;
+  const int radius = std::max(1, std::max(photo.width, photo.height) / 128);
+  Image left = residual;
+  for (size_t i = 0; i < left.pixels.size(); ++i)
+    left.pixels[i] -= static_cast<float>(sharpening) * fine.pixels[i];
+  Image layer = ApplyGuided(FitGuided(photo, left, radius, kEps), photo);
+  for (float& v : layer.pixels) v = std::clamp(v, -1.0f, 1.0f);
+  return layer;
 }
 
 }  // namespace
@@ -176,7 +138,7 @@ PhotoEdit AnalyseEdit(const Image& photo_given, const Image& edited_given) {
   if (!IsVignette(rings, vignette, left, left_without)) vignette = {};
   edit.vignette = vignette(1);
 
-  edit.table = FitTable(photo, edited, vignette, kTable, std::max<int64_t>(1, stride / 6));
+  edit.table = FitGentleTable(photo, edited, vignette, std::max<int64_t>(1, stride / 6));
   mapped = Mapped(photo, edit.table);
   const Image residual = Residual(mapped, edited, vignette), low = LowPass(residual);
   edit.local = std::sqrt(MeanSquare(low));
@@ -190,9 +152,21 @@ PhotoEdit AnalyseEdit(const Image& photo_given, const Image& edited_given) {
   const double rest = MeanSquare(above) - edit.sharpening * edit.sharpening * square /
                                               std::max<double>(1, double(fine.pixels.size()));
   edit.grain = std::sqrt(std::max(0.0, rest));
+  if (edit.IsLocal()) {
+    const Image whole = Residual(photo, edited, vignette);
+    edit.of_photo = kMapLeaves * Variation(LowPass(whole)) <= Variation(low);
+    if (edit.of_photo) {
+      edit.table = TabulateColors(2, [](const Vec3d& c) { return c; });
+      mapped = photo;
+    }
+    edit.layer = LayerOf(photo, edit.of_photo ? whole : residual, FineDetail(mapped),
+                         std::max(0.0, edit.sharpening));
+  } else {
+    edit.layer = low;
+  }
   edit.picture = mapped;
   for (size_t i = 0; i < mapped.pixels.size(); ++i)
-    edit.picture.pixels[i] = std::clamp(mapped.pixels[i] + low.pixels[i], 0.0f, 1.0f);
+    edit.picture.pixels[i] = std::clamp(mapped.pixels[i] + edit.layer.pixels[i], 0.0f, 1.0f);
   return edit;
 }
 
@@ -213,10 +187,10 @@ std::vector<std::string> EditNotices(const PhotoEdit& edit) {
   notices.push_back(
       edit.IsLocal()
           ? Format(
-                "the edit depends on the place (%.1f of 255 beyond its map of colours): it "
-                "is learned from this photo alone, and places that colours cannot tell apart "
-                "follow roughly",
-                255 * edit.local)
+                "the edit depends on the place (%.1f of 255 beyond its map of colours): what "
+                "this photo sees follows it, what it does not see follows its neighbours of "
+                "like colour%s",
+                255 * edit.local, edit.of_photo ? "" : ", after the edit's map of colours")
           : Format("the edit is one map of colours to %.1f of 255, applied to all photos; it "
                    "magnifies differences at most %.2f times",
                    255 * edit.local, SteepestSlope(edit.table)));

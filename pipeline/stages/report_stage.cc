@@ -119,7 +119,7 @@ ReportPictures PicturesOf(const RunContext& context, const RunReport& report) {
 }
 
 // scene.html beside the report; false where it is not wanted, too large, or the style is of
-// masked objects, which a page does not hold.
+// masked objects or a local edit, which a page does not hold.
 bool WriteScenePage(const RunContext& context, const ProgressFunction& progress) {
   constexpr size_t kLargest = 25'000'000;  // bytes, of --page auto
   const std::string& choice = context.settings.page.page;
@@ -127,8 +127,8 @@ bool WriteScenePage(const RunContext& context, const ProgressFunction& progress)
   const std::string path = style.Path(kScenePage);
   std::filesystem::remove(path);
   if (choice == "off") return false;
-  if (std::filesystem::exists(style.Path("object.npz"))) {
-    if (choice == "on") context.console->Warn("no page: the style is of masked objects");
+  if (const std::string why = WhyNoPage(style.folder()); !why.empty()) {
+    if (choice == "on") context.console->Warn("no page: the style " + why);
     return false;
   }
   const std::string name = std::filesystem::path(style.folder()).filename().string();

@@ -6,6 +6,7 @@
 
 #include "kernels/base/error.h"
 #include "kernels/field/pad_sh_basis.h"
+#include "pipeline/fields/residual_file.h"
 #include "pipeline/run/run_file.h"
 #include "pipeline/stages/object_edit.h"
 #include "stylize/field/apply_network.h"
@@ -15,11 +16,13 @@
 namespace regrade {
 
 StoredField StyledFieldOf(StoredField source, const StoredNetwork& network, double strength,
-                          const std::vector<float>* object_weights) {
+                          const std::vector<float>* object_weights,
+                          const VoxelResidual* residual) {
   source.field.appearance = PadShBasis(std::move(source.field.appearance), kStyledBasis);
   RadianceField styled = source.field;
   styled.background = network.background;
   styled.appearance = ApplyNetwork(network.network, source.field);
+  if (residual != nullptr) AddResidual(*residual, &styled.appearance);
   source.field = strength == 1 && object_weights == nullptr
                      ? std::move(styled)
                      : MixFields(source.field, {&styled}, {strength}, object_weights);
@@ -34,7 +37,11 @@ StoredField ReadStyledField(const std::string& scene, const std::string& style,
   std::optional<ObjectWeights> object;
   if (const std::string file = style + "/object.npz"; std::filesystem::exists(file))
     object = ReadObjectFile(file, source.field.geometry->num_voxels());
-  return StyledFieldOf(std::move(source), network, strength, object ? &object->all : nullptr);
+  std::optional<VoxelResidual> residual;
+  if (const std::string file = style + "/residual.npz"; std::filesystem::exists(file))
+    residual = ReadResidualFile(file, source.field.geometry->num_voxels());
+  return StyledFieldOf(std::move(source), network, strength, object ? &object->all : nullptr,
+                       residual ? &*residual : nullptr);
 }
 
 StoredField ReadStyledField(const std::string& scene, const std::string& style) {

@@ -7,18 +7,21 @@
 #include "kernels/scene/image.h"
 #include "pipeline/fields/field_file.h"
 #include "pipeline/fields/network_file.h"
+#include "stylize/field/voxel_residual.h"
 
 namespace regrade {
 
 // `source` restyled by the network, on the CPU, and mixed with itself by 1 - `strength`, see
 // EQ(style-mix); colours as a file stores them. `object_weights` [voxels]: the sum over the
-// regions of object.npz; null where the whole scene is styled. Deterministic: equal inputs give
+// regions of object.npz; null where the whole scene is styled. `residual`: what is
+// added behind the network, see EQ(view-scale), or null. Deterministic: equal inputs give
 // equal bits, for any number of threads.
 StoredField StyledFieldOf(StoredField source, const StoredNetwork& network, double strength,
-                          const std::vector<float>* object_weights);
+                          const std::vector<float>* object_weights,
+                          const VoxelResidual* residual = nullptr);
 
-// The same from files: field.npz of the output folder `scene`, network.npz and object.npz of
-// the style's folder. Throws Error(kInput).
+// The same from files: field.npz of the output folder `scene`, network.npz, object.npz and
+// residual.npz of the style's folder. Throws Error(kInput).
 StoredField ReadStyledField(const std::string& scene, const std::string& style,
                             double strength);
 

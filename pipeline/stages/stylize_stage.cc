@@ -1,5 +1,6 @@
-// Stage "stylize": trains a network on the pictures of views_2d/ and writes it to network.npz;
-// styled_field.h makes the styled field from it.
+// Stage "stylize": trains a network on the pictures of views_2d/ and writes it to network.npz,
+// and what it lacks to residual.npz where --residual asks for that; styled_field.h makes the
+// styled field from both.
 #include <omp.h>
 
 #include <algorithm>
@@ -11,6 +12,7 @@
 #include "pipeline/fields/field_file.h"
 #include "pipeline/fields/network_checkpoint.h"
 #include "pipeline/fields/network_file.h"
+#include "pipeline/fields/residual_file.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/program/device_choice.h"
 #include "pipeline/report/stage_metrics.h"
@@ -19,6 +21,7 @@
 #include "pipeline/stages/make_stylizer.h"
 #include "pipeline/stages/object_edit.h"
 #include "pipeline/stages/stages.h"
+#include "pipeline/stages/style_residual.h"
 #include "pipeline/stages/style_targets.h"
 #include "pipeline/workspace/metrics_json.h"
 #include "pipeline/workspace/output_names.h"
@@ -29,7 +32,8 @@
 namespace regrade {
 namespace {
 
-constexpr double kVoting = 0.2;  // of the time of training and application, roughly
+constexpr double kVoting = 0.2;      // of the time of training and application, roughly
+constexpr double kOfResidual = 0.5;  // likewise
 
 // Pairs of pixels on which LipRF's propositions are checked: so many neighbours, and as many of
 // two views.
@@ -134,7 +138,8 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
   Workspace& workspace = *context->style;
   StoredField stored = ReadFieldFile(context->workspace->Path("field.npz"));
   const WorkingViews views = context->Views().InField(stored.field_from_world, stored.ndc);
-  ProgressParts parts(progress, 1 + (settings.object.On() ? kVoting : 0));
+  ProgressParts parts(progress, 1 + (settings.object.On() ? kVoting : 0) +
+                                    (settings.residual.On() ? kOfResidual : 0));
   const std::vector<int> indices = StyledViews(workspace, views);
   const std::unique_ptr<ObjectMasks> object = OpenObjectMasks(settings, views.capture());
   ObjectWeights weights;
@@ -165,11 +170,19 @@ StageOutcome Stylize(RunContext* context, const JsonValue& inputs,
   for (const std::string& notice : restyled.notices) context->console->Info(notice);
   for (const std::string& warning : trained.warnings) context->console->Warn(warning);
 
-  WriteNetworkFile(workspace.Path("network.npz"),
-                   {trained.network, trained.k_est, restyled.styled.background});
+  const StoredNetwork network{trained.network, trained.k_est, restyled.styled.background};
+  WriteNetworkFile(workspace.Path("network.npz"), network);
   StageOutcome outcome;
   StylizeReport metrics = MetricsOfTraining(trained);
   outcome.outputs = {"network.npz"};
+  std::filesystem::remove(workspace.Path("residual.npz"));  // of an earlier style
+  if (settings.residual.On()) {
+    const StoredField source = ReadFieldFile(context->workspace->Path("field.npz"));
+    WriteResidualFile(
+        workspace.Path("residual.npz"),
+        FitStyleResidual(context, views, source, network, indices, parts.Next(kOfResidual)));
+    outcome.outputs.push_back("residual.npz");
+  }
   if (object != nullptr) {
     WriteObjectFile(workspace.Path("object.npz"), weights);
     outcome.outputs.push_back("object.npz");
@@ -207,6 +220,8 @@ Stage StylizeStage(RunContext* context) {
     stage.inputs["object"] = OptionValues(context->settings.object);
     stage.inputs["masks"] = MaskFiles(context->settings.object);
   }
+  if (context->settings.residual.On())
+    stage.inputs["residual"] = ResidualInputs(context->settings.residual);
   stage.plan = PlanText(PlanStyle(context->settings.network.steps, omp_get_max_threads()));
   stage.work = [context, inputs = stage.inputs](const ProgressFunction& progress) {
     return Stylize(context, inputs, progress);

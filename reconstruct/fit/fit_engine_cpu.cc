@@ -72,10 +72,16 @@ class CpuFitEngine : public FitEngine {
     ResetArenas();
   }
 
-  void RefineCells(const MarchOptions& march, const CellLimits& limits) override {
+  void RefineCells(const MarchOptions& march, const CellLimits& limits,
+                   int sphere_resolution) override {
     const CellStatistics statistics = MeasureCells(state_.grid, *rays_, march, kPruningStride);
     ApplyChanges(ChooseChanges(state_.grid.cells.level, statistics, limits), &state_.grid,
                  &state_.second_moment);
+    FastSpheres& spheres = state_.grid.spheres;
+    if (spheres.on() && sphere_resolution != spheres.resolution) {
+      spheres = ResampleSpheres(spheres, sphere_resolution);
+      state_.sphere_moment = Buffer<float>(spheres.texels.size());
+    }
     ResetArenas();
   }
 

@@ -88,14 +88,18 @@ class CudaFitEngine : public FitEngine {
     return RenderViewOnDevice(grid_, camera, march);
   }
 
-  void RefineCells(const MarchOptions& march, const CellLimits& limits) override {
+  void RefineCells(const MarchOptions& march, const CellLimits& limits,
+                   int sphere_resolution) override {
     const DeviceRange range("changing cells");
     constexpr int kStride = 2;  // every other row and column of a view
     const CellStatistics statistics = MeasureCellsOnDevice(grid_, views_, march, kStride);
     const auto change = ChooseChanges(grid_.cells.level.ToHost(), statistics, limits);
     grid_ = ChangeCellsOnDevice(std::move(grid_), change);
+    if (grid_.spheres.on() && sphere_resolution != grid_.spheres.resolution)
+      grid_.spheres = Resampled(std::move(grid_.spheres), sphere_resolution);
     if (grid_.num_voxels() > 0) Renew();
   }
+
   void Refine(const MarchOptions& march, const PruneLimits& limits, const Vec3i& resolution,
               int sphere_resolution) override {
     const DeviceRange range("pruning and resampling");

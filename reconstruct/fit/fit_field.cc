@@ -241,17 +241,19 @@ class Fitter {
 
   // Prunes, and resamples to the grid of stage_; `last` keeps the resolution.
   void Refine(bool last) {
+    const int last_stage = static_cast<int>(options_.resolutions.size()) - 1;
+    const int sphere_resolution = SphereResolution(std::min(stage_, last_stage));
     if (options_.adaptive()) {
       const float width = static_cast<float>(options_.resolutions[0]);
       engine_->RefineCells({options_.step, options_.stop_transmittance},
                            {options_.prune_weight / width, Levels().outward,
                             options_.cell_pixels, last ? 0 : Levels().outward + stage_,
-                            static_cast<int64_t>(double{options_.max_cells} * 1e6)});
+                            static_cast<int64_t>(double{options_.max_cells} * 1e6)},
+                           sphere_resolution);
       if (engine_->num_voxels() == 0) ThrowEmpty();
       return;
     }
     const Vec3i now = engine_->resolution();
-    const int last_stage = static_cast<int>(options_.resolutions.size()) - 1;
     const Vec3i next = last ? now : GridOfStage(options_, box_, static_cast<size_t>(stage_));
     const bool by_density = options_.prune_by == "density";
     const int side = by_density                              ? 1
@@ -260,7 +262,7 @@ class Fitter {
     engine_->Refine({options_.step, options_.stop_transmittance},
                     {by_density, options_.prune_weight / static_cast<float>(side),
                      MostVoxelsBefore(now, next)},
-                    next, SphereResolution(std::min(stage_, last_stage)));
+                    next, sphere_resolution);
   }
 
   // How many vertices may stay on a grid of `now` so that --max-voxels are left on `next`,

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <filesystem>
 
+#include "kernels/base/error.h"
 #include "pipeline/images/image_file.h"
-#include "pipeline/synth/synth_grade.h"
-#include "stylize/linear_map.h"
+#include "tests/support/edit_truth.h"
 #include "tests/support/record_error.h"
 #include "tests/support/source_dir.h"
 #include "tests/support/spawn.h"
@@ -18,6 +18,8 @@ namespace regrade {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::EditErrors;
+using testing::EditTruth;
 using testing::ProgramOutcome;
 using testing::ReadText;
 using testing::TemporaryFolder;
@@ -26,97 +28,110 @@ ProgramOutcome Regrade(const std::vector<std::string>& arguments) {
   return testing::RunProgram(REGRADE_PROGRAM, arguments);
 }
 
-std::string Frame(const std::string& style, const char* sequence, int i) {
-  return style + "/frames/" + sequence + "/0000" + std::to_string(i) + ".png";
+constexpr int kViews = 16, kEdited = 6;
+
+std::string Frame(const std::string& folder, int i) {
+  return folder + Format("/000%02d.png", i);
 }
 
-// Mean squared errors against the true grade of the unedited renders, on views that were not
-// edited.
-struct Errors {
-  double of_linear = 0;  // the best linear map, fitted to the truth itself
-  double of_lut = 0;     // the 2D frames
-  double of_scene = 0;
-};
-
-Errors AgainstTruth(const std::string& style, int views, int edited) {
-  std::vector<Image> before, truth;
-  LeastSquaresAccumulator accumulator;
-  for (int i = 0; i < views; ++i) {
-    before.push_back(ReadImage(Frame(style, "source", i)));
-    truth.push_back(before.back());
-    for (int64_t k = 0; k < truth.back().num_pixels(); ++k) {
-      float* p = &truth.back().pixels[3 * k];
-      const Vec3d from{p[0], p[1], p[2]}, to = GradeColor(from);
-      for (int c = 0; c < 3; ++c) p[c] = static_cast<float>(std::clamp(to[c], 0.0, 1.0));
-      if (i != edited) accumulator.Add(from, {p[0], p[1], p[2]});
-    }
-  }
-  const ColorMap linear = accumulator.Solve();
-  Errors errors;
-  double count = 0;
-  for (int i = 0; i < views; ++i) {
-    if (i == edited) continue;
-    const Image lut = ReadImage(Frame(style, "views_2d", i)),
-                scene = ReadImage(Frame(style, "styled", i));
-    for (int64_t k = 0; k < lut.num_pixels(); ++k) {
-      const float* p = &before[i].pixels[3 * k];
-      const Vec3d mapped = linear({p[0], p[1], p[2]});
-      for (int c = 0; c < 3; ++c, ++count) {
-        const double t = truth[i].pixels[3 * k + c];
-        errors.of_linear += std::pow(std::clamp(mapped[c], 0.0, 1.0) - t, 2);
-        errors.of_lut += std::pow(lut.pixels[3 * k + c] - t, 2);
-        errors.of_scene += std::pow(scene.pixels[3 * k + c] - t, 2);
-      }
-    }
-  }
-  for (double* sum : {&errors.of_linear, &errors.of_lut, &errors.of_scene}) *sum /= count;
-  return errors;
+std::vector<Image> Frames(const std::string& folder) {
+  std::vector<Image> frames;
+  for (int i = 0; i < kViews; ++i) frames.push_back(ReadImage(Frame(folder, i)));
+  return frames;
 }
 
-TEST(Retouch, AGlobalEditIsLiftedToTheScene) {
-  constexpr int kViews = 8, kEdited = 3;
+// TC-PSNR of neighbouring views: "styled,1,15,0,MEAN,..." of the table.
+double Consistency(const std::string& frames, const std::string& reference) {
+  const ProgramOutcome outcome = Regrade({"evaluate", "--frames", frames, "--reference",
+                                          reference, "--gaps", "1", "--table", "csv"});
+  EXPECT_EQ(outcome.code, 0) << outcome.text;
+  const size_t row = outcome.text.find("\nstyled,1,");
+  int pairs = 0, undefined = 0;
+  double mean = 0;
+  EXPECT_EQ(std::sscanf(outcome.text.c_str() + std::min(row, outcome.text.size()),
+                        "\nstyled,1,%d,%d,%lf", &pairs, &undefined, &mean),
+            3)
+      << outcome.text;
+  return mean;
+}
+
+// Of the squared error between the best linear map and the ceiling, the least squares of all
+// voxels to all true views, 90 % is to be removed for a global edit and 75 % for a local one.
+// Beside the linear map's error the ceiling is 0.084 for the global grade and below 0.006 for
+// the others (tests/benchmarks/retouch_benchmark.cc).
+TEST(Retouch, TheSceneFollowsEachEditAsItsExactTruth) {
   const TemporaryFolder folder;
-  ASSERT_EQ(
-      Regrade({"synth", folder / "s", "--views", "8", "--size", "192x144", "--grade", "global"})
-          .code,
-      0);
-  std::vector<std::string> reconstruct{
-      "reconstruct", folder / "s/truth", "--out", folder / "out", "--device",
-      "cpu",         "--holdout",        "0"};
-  const std::vector<std::string> flags{
-      "--photo-size",  "192", "--fit-resolutions", "96",    "--fit-steps", "600",
-      "--style-steps", "400", "--film-seconds",    "0.125", "--fps",       "24",
-      "--film-size",   "64",  "--threads",         "2",     "--tracks",    "given"};
-  reconstruct.insert(reconstruct.end(), flags.begin(), flags.end());
+  const auto capture = [&](const std::string& grade) { return folder / ("s_" + grade); };
+  for (const std::string grade : {"global", "local", "object", "vignette"})
+    ASSERT_EQ(Regrade({"synth", capture(grade), "--views", "16", "--size", "192x144", "--grade",
+                       grade})
+                  .code,
+              0);
+  std::vector<std::string> reconstruct{"reconstruct", capture("global") + "/truth",
+                                       "--out",       folder / "out",
+                                       "--device",    "cpu",
+                                       "--holdout",   "0"};
+  for (const std::string flag :
+       {"--photo-size", "192", "--fit-resolutions", "96", "--fit-steps", "1200",
+        "--style-steps", "200", "--film-seconds", "0.125", "--fps", "24", "--film-size", "64",
+        "--threads", "2", "--tracks", "given"})
+    reconstruct.push_back(flag);
   ProgramOutcome outcome = Regrade(reconstruct);
   ASSERT_EQ(outcome.code, 0) << outcome.text;
-  outcome = Regrade({"retouch", folder / "out", "--photo", "00003", "--edited",
-                     folder / "s/truth/graded/00003.png", "--name", "mine"});
-  ASSERT_EQ(outcome.code, 0) << outcome.text;
-  EXPECT_NE(outcome.text.find("one map of colours"), std::string::npos) << outcome.text;
-  const std::string style = folder / "out/styles/mine";
-  EXPECT_TRUE(fs::exists(style + "/edit.cube"));
-  const Errors errors = AgainstTruth(style, kViews, kEdited);
-  // The lifted edit on pixels is within a tenth of the best linear map's error. The scene is
-  // held to less than that error alone: this small fit (96^3, 400 steps of training) left 0.59
-  // of it, and how much of that no field could remove is not measured here.
-  const double left = errors.of_scene / errors.of_linear,
-               of_lut = errors.of_lut / errors.of_linear;
-  std::printf("linear %.3g, LUT %.3g, scene %.3g\n", errors.of_linear, errors.of_lut,
-              errors.of_scene);
-  EXPECT_LE(of_lut, testing::RecordBound("2D frames: share of the best linear map's error",
-                                         testing::Computed::kFloat, of_lut, 0.1));
-  EXPECT_LE(left,
-            testing::RecordBound("scene: share of the best linear map's error that is left",
-                                 testing::Computed::kFloat, left, 0.8));
+  const auto retouch = [&](const std::string& grade, const std::string& edited) {
+    return Regrade({"retouch", folder / "out", "--photo", "00006", "--edited", edited, "--name",
+                    grade, "--until", "render"});
+  };
+  const auto style = [&](const std::string& grade) { return folder / ("out/styles/" + grade); };
+  using testing::Computed;
+  using testing::RecordBound;
+  for (const std::string grade : {"global", "local", "object", "vignette"}) {
+    outcome = retouch(grade, capture(grade) + "/truth/graded/00006.png");
+    ASSERT_EQ(outcome.code, 0) << outcome.text;
+    EXPECT_TRUE(fs::exists(style(grade) + "/edit.cube"));
+    const bool local = grade == "local" || grade == "object";
+    EXPECT_NE(outcome.text.find(local ? "depends on the place" : "one map of colours"),
+              std::string::npos)
+        << outcome.text;
+    if (grade == "vignette") continue;
+    const EditTruth truth(grade, Frames(style(grade) + "/frames/source"), kEdited);
+    const EditErrors errors = truth.ErrorsOf(Frames(style(grade) + "/frames/styled"));
+    const double left = errors.inside / truth.ErrorsOf(truth.ByLinearMap()).inside;
+    const double most = local ? 0.25 : 1 - 0.9 * (1 - 0.084), outside = 255 * errors.outside;
+    EXPECT_LE(left, RecordBound(grade + " edit: share of the best linear map's squared error "
+                                        "left inside the region",
+                                Computed::kFloat, left, most));
+    EXPECT_LE(outside, RecordBound(grade + " edit: change 10 pixels and more outside, of 255",
+                                   Computed::kFloat, outside, 1));
+    EXPECT_EQ(fs::exists(style(grade) + "/layers/00006.png"), local);
+    // Consistency, beside the graded unedited renders'.
+    const std::string graded = folder / ("graded_" + grade);
+    fs::create_directories(graded);
+    for (int i = 0; i < kViews; ++i)
+      WritePng8(Frame(graded, i), truth.graded()[static_cast<size_t>(i)]);
+    const std::string reference = style(grade) + "/frames/source";
+    const double lost = Consistency(graded, reference) -
+                        Consistency(style(grade) + "/frames/styled", reference);
+    EXPECT_LE(lost, RecordBound(grade + " edit: TC-PSNR below the graded renders', dB",
+                                Computed::kFloat, lost, 0.3));
+  }
+  // The vignette belongs to the picture: the scene is that of the grade without it.
+  const std::vector<Image> with = Frames(style("vignette") + "/frames/styled"),
+                           without = Frames(style("global") + "/frames/styled");
+  double moved = 0, count = 0;
+  for (size_t i = 0; i < with.size(); ++i)
+    for (size_t k = 0; k < with[i].pixels.size(); ++k, ++count)
+      moved += std::abs(double{with[i].pixels[k]} - double{without[i].pixels[k]});
+  moved *= 255 / count;
+  EXPECT_LE(moved, RecordBound("vignette: mean change of the scene's colours, of 255",
+                               Computed::kFloat, moved, 1));
 
   // Again with another edit: the style of that name is made again; another style's is not.
   outcome = Regrade({"retouch", folder / "out", "--photo", "nothere", "--edited",
-                     folder / "s/truth/graded/00003.png", "--name", "mine"});
+                     capture("global") + "/truth/graded/00006.png", "--name", "global"});
   EXPECT_EQ(outcome.code, 3);
   EXPECT_NE(outcome.text.find("is no photo of the capture"), std::string::npos);
-  outcome = Regrade({"retouch", folder / "out", "--photo", "00003", "--edited",
-                     folder / "s/images/00005.png", "--name", "mine"});
+  outcome = retouch("global", capture("global") + "/images/00009.png");
   EXPECT_EQ(outcome.code, 3) << outcome.text;
   EXPECT_NE(outcome.text.find("photo"), std::string::npos) << outcome.text;
 }

@@ -68,6 +68,13 @@ TEST_F(CellFit, AStageThatIsLeftOutChangesNothing) {
   EXPECT_TRUE(SameBits(Fit().field, without.field));
 }
 
+TEST_F(CellFit, TheBackgroundsMapsGrowWithTheStages) {
+  box_.spheres = true;
+  options_.background_layers = 4;
+  options_.background_resolution = 32;
+  EXPECT_EQ(Fit().field.geometry->spheres.resolution, 32);
+}
+
 TEST_F(CellFit, SameBytesForAnyThreadCount) {
   EXPECT_TRUE(
       testing::RecordSameBits("1 and 3 threads", testing::Computed::kFloat,

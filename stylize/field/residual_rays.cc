@@ -1,0 +1,77 @@
+#include "stylize/field/residual_rays.h"
+
+#include <algorithm>
+
+#include "kernels/base/error.h"
+#include "kernels/base/random.h"
+#include "kernels/field/ray_weights.h"
+#include "kernels/field/trilinear.h"
+
+namespace regrade {
+
+void AddResidualRays(const RadianceField& field, const Camera& camera, const Image& missing,
+                     int64_t most, uint64_t seed, ResidualRays* rays) {
+  REGRADE_CHECK(missing.width == camera.width && missing.height == camera.height);
+  constexpr float kLeastWeight = 1e-4f;
+  const double chosen =
+      std::min(1.0, static_cast<double>(most) / static_cast<double>(missing.num_pixels()));
+  std::vector<Ray> some;
+  for (int64_t i = 0; i < missing.num_pixels(); ++i) {
+    if (!(RandomDouble(seed, 0, static_cast<uint64_t>(i)) < chosen)) continue;
+    const float* p = &missing.pixels[static_cast<size_t>(3 * i)];
+    const Vec3f lack{p[0], p[1], p[2]};
+    if (!AllFinite(lack)) continue;
+    some.push_back(camera.PixelRay(static_cast<int>(i % missing.width),
+                                   static_cast<int>(i / missing.width)));
+    rays->missing.push_back(lack);
+    rays->share.push_back(static_cast<float>(1 / chosen));
+  }
+  constexpr int64_t kBand = 16384;
+  const Geometry& geometry = *field.geometry;
+  std::vector<std::pair<int32_t, float>> row;
+  for (int64_t begin = 0; begin < std::ssize(some); begin += kBand) {
+    const int64_t count = std::min(kBand, std::ssize(some) - begin);
+    const RayWeights weights = ComputeRayWeights(geometry, {some.data() + begin, count},
+                                                 MarchOptions{field.step}, field.near_clip,
+                                                 kLeastWeight);
+    for (int64_t r = 0; r < count; ++r) {
+      row.clear();
+      for (int64_t i = weights.first[static_cast<size_t>(r)];
+           i < weights.first[static_cast<size_t>(r) + 1]; ++i) {
+        const WeightedSample& sample = weights.samples[static_cast<size_t>(i)];
+        int32_t points[8];
+        CornerPoints(geometry, sample, points);
+        for (int k = 0; k < 8; ++k)
+          if (points[k] >= 0 && points[k] < geometry.num_voxels())
+            row.emplace_back(points[k], sample.weight * CornerWeight(sample.fraction, k));
+      }
+      std::stable_sort(row.begin(), row.end(),
+                       [](const auto& a, const auto& b) { return a.first < b.first; });
+      for (size_t i = 0; i < row.size(); ++i) {
+        if (i > 0 && row[i].first == row[i - 1].first) {
+          rays->weight.back() += row[i].second;
+          continue;
+        }
+        rays->voxel.push_back(row[i].first);
+        rays->weight.push_back(row[i].second);
+      }
+      rays->first.push_back(std::ssize(rays->voxel));
+    }
+  }
+}
+
+std::vector<Vec3d> SumAlongRays(const ResidualRays& rays, const std::vector<Vec3d>& x) {
+  std::vector<Vec3d> y(rays.missing.size());
+#pragma omp parallel for schedule(static)
+  for (int64_t r = 0; r < rays.num_rays(); ++r) {
+    Vec3d sum{};
+    const size_t row = static_cast<size_t>(r);
+    for (int64_t i = rays.first[row]; i < rays.first[row + 1]; ++i)
+      sum += x[static_cast<size_t>(rays.voxel[static_cast<size_t>(i)])] *
+             double{rays.weight[static_cast<size_t>(i)]};
+    y[row] = sum;
+  }
+  return y;
+}
+
+}  // namespace regrade
