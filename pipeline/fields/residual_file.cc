@@ -13,8 +13,8 @@ constexpr int32_t kVersion = 1;
 constexpr float kNothing = 0.25f / 255;
 constexpr float kLargest = 64;  // no colour is further than a few units from another
 
-std::vector<Vec3f> ReadColors(NpzReader* file, const std::string& name, int64_t voxels, float least,
-                              float most, const std::string& path) {
+std::vector<Vec3f> ReadColors(NpzReader* file, const std::string& name, int64_t voxels,
+                              float least, float most, const std::string& path) {
   const NpzArray array = file->Read(name, ArrayType::kF32, {voxels, 3});
   const float* values = array.As<float>();
   std::vector<Vec3f> colors(static_cast<size_t>(voxels));
@@ -39,8 +39,7 @@ void WriteResidualFile(const std::string& path, const VoxelResidual& residual) {
   const int64_t voxels = std::ssize(residual.color);
   NpzWriter file;
   file.Add("residual", {voxels, 3}, values.data(), NpzPacking::kDeflate);
-  if (!scales.empty())
-    file.Add("view_scale", {voxels, 3}, scales.data(), NpzPacking::kDeflate);
+  if (!scales.empty()) file.Add("view_scale", {voxels, 3}, scales.data(), NpzPacking::kDeflate);
   file.AddScalar<int32_t>("regrade_version", kVersion);
   file.WriteTo(path);
 }

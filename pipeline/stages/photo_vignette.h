@@ -37,7 +37,6 @@ Vignette FitVignette(const Rings& rings);
 
 // Whether it is one: `left` is the mean square that the edit's map of colours leaves with it,
 // `left_without` without.
-bool IsVignette(const Rings& rings, const Vignette& vignette, double left,
-                double left_without);
+bool IsVignette(const Rings& rings, const Vignette& vignette, double left, double left_without);
 
 }  // namespace regrade

@@ -22,7 +22,8 @@ namespace {
 constexpr int64_t kMostRays = 300000;  // of all views: 0.4 GB
 // Seen from all sides a residual needs a lower cost than from one.
 constexpr double kCostOfViews = 0.001;
-constexpr int kScalings = 3;  // fits with a layer, each with the scale of the last one, see EQ(view-scale)
+constexpr int kScalings =
+    3;  // fits with a layer, each with the scale of the last one, see EQ(view-scale)
 // Below this, root mean square, a view lacks nothing that can be seen.
 constexpr double kNothing = 0.5 / 255;
 

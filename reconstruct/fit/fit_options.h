@@ -52,7 +52,7 @@ struct FitOptions {
   float tv_background_fraction = 0.01f;
   bool tv_background_decays = true;
   float initial_background_density = 0.1f;
-  float background_lead = 0.9f;
+  float background_lead = 0.25f;
   float cell_pixels = 1.0f;
   float max_cells = 8.0f;
   float free_space = 0.02f;
@@ -74,6 +74,7 @@ struct FitOptions {
     tv_decay = 0.5f;
     tv_fraction = 0.03f;
     prune_weight = 0.5f;
+    background_lead = 0.9f;
   }
   template <typename Bind>
   void Describe(Bind& bind) {

@@ -35,8 +35,8 @@ Colors ResidualQuadratic::Adjoint(const Colors& y) const {
 #pragma omp parallel for schedule(static)
   for (int64_t v = 0; v < graph_.voxels; ++v) {
     Vec3d sum{};
-    for (int64_t i = first_[static_cast<size_t>(v)];
-         i < first_[static_cast<size_t>(v) + 1]; ++i) {
+    for (int64_t i = first_[static_cast<size_t>(v)]; i < first_[static_cast<size_t>(v) + 1];
+         ++i) {
       const size_t r = static_cast<size_t>(ray_[static_cast<size_t>(i)]);
       sum += y[r] * (double{weight_[static_cast<size_t>(i)]} * double{rays_.share[r]});
     }
@@ -50,10 +50,9 @@ void ResidualQuadratic::TouchAt(const Colors& x, double cost, double width) {
 #pragma omp parallel for schedule(static)
   for (int64_t e = 0; e < std::ssize(graph_.edges); ++e) {
     const size_t k = static_cast<size_t>(e);
-    const Vec3d d = x[static_cast<size_t>(graph_.edges[k][0])] -
-                    x[static_cast<size_t>(graph_.edges[k][1])];
-    edge_[k] = cost * double{graph_.likeness[k]} /
-               std::sqrt(Dot(d, d) + width * width);
+    const Vec3d d =
+        x[static_cast<size_t>(graph_.edges[k][0])] - x[static_cast<size_t>(graph_.edges[k][1])];
+    edge_[k] = cost * double{graph_.likeness[k]} / std::sqrt(Dot(d, d) + width * width);
   }
   FindDiagonals();
 }
@@ -79,8 +78,7 @@ Colors ResidualQuadratic::Precondition(const Colors& r) const {
   Colors z(r.size());
 #pragma omp parallel for schedule(static)
   for (int64_t v = 0; v < graph_.voxels; ++v)
-    z[static_cast<size_t>(v)] =
-        r[static_cast<size_t>(v)] * inverse_[0][static_cast<size_t>(v)];
+    z[static_cast<size_t>(v)] = r[static_cast<size_t>(v)] * inverse_[0][static_cast<size_t>(v)];
   for (size_t level = 0; level < graph_.cubes.size(); ++level) {
     const std::vector<int32_t>& cube = graph_.cubes[level];
     Colors sums(inverse_[level + 1].size());

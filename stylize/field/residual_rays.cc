@@ -31,9 +31,9 @@ void AddResidualRays(const RadianceField& field, const Camera& camera, const Ima
   std::vector<std::pair<int32_t, float>> row;
   for (int64_t begin = 0; begin < std::ssize(some); begin += kBand) {
     const int64_t count = std::min(kBand, std::ssize(some) - begin);
-    const RayWeights weights = ComputeRayWeights(geometry, {some.data() + begin, count},
-                                                 MarchOptions{field.step}, field.near_clip,
-                                                 kLeastWeight);
+    const RayWeights weights =
+        ComputeRayWeights(geometry, {some.data() + begin, count}, MarchOptions{field.step},
+                          field.near_clip, kLeastWeight);
     for (int64_t r = 0; r < count; ++r) {
       row.clear();
       for (int64_t i = weights.first[static_cast<size_t>(r)];

@@ -21,8 +21,8 @@ struct ResidualRays {
   int64_t num_rays() const { return std::ssize(missing); }
 };
 
-// Of a view's pixels `most` at random, all where it has no more; those whose `missing` [H, W, 3]
-// is not finite do not count.
+// Of a view's pixels `most` at random, all where it has no more; those whose `missing` [H, W,
+// 3] is not finite do not count.
 void AddResidualRays(const RadianceField& field, const Camera& camera, const Image& missing,
                      int64_t most, uint64_t seed, ResidualRays* rays);
 

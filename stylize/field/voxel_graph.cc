@@ -10,8 +10,8 @@
 namespace regrade {
 namespace {
 
-constexpr float kWidth = 0.2f;   // of colour, in units of white: s of EQ(voxel-residual)
-constexpr float kLeast = 0.1f;   // what voxels of different colours still tell each other
+constexpr float kWidth = 0.2f;  // of colour, in units of white: s of EQ(voxel-residual)
+constexpr float kLeast = 0.1f;  // what voxels of different colours still tell each other
 constexpr int kLevels = 6;
 
 void AddCellEdges(const CellGrid& cells, std::vector<std::array<int32_t, 2>>* edges) {
@@ -53,8 +53,7 @@ std::vector<int32_t> CubesOf(const std::vector<Vec3i>& places, int level) {
   std::vector<std::pair<uint64_t, int32_t>> keys(places.size());
   for (size_t v = 0; v < places.size(); ++v) {
     uint64_t key = 0;
-    for (int a = 0; a < 3; ++a)
-      key = key << 21 | static_cast<uint64_t>(places[v][a] >> level);
+    for (int a = 0; a < 3; ++a) key = key << 21 | static_cast<uint64_t>(places[v][a] >> level);
     keys[v] = {key, static_cast<int32_t>(v)};
   }
   std::sort(keys.begin(), keys.end());

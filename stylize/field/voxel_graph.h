@@ -1,5 +1,5 @@
-// Which voxels are neighbours, and how alike their colours are: what a residual by voxel spreads
-// along.
+// Which voxels are neighbours, and how alike their colours are: what a residual by voxel
+// spreads along.
 #pragma once
 
 #include <array>

@@ -3,23 +3,24 @@
 //
 // EQ(voxel-residual): of the constant colours x_v that are added to the voxels, those that
 // minimise
-//   E(x) = sum_r m |sum_v W_rv x_v - t_r|^2 + 2 p sum_{u ~ v} k_uv (sqrt(|x_u - x_v|^2 + d^2) - d)
+//   E(x) = sum_r m |sum_v W_rv x_v - t_r|^2 + 2 p sum_{u ~ v} k_uv (sqrt(|x_u - x_v|^2 + d^2) -
+//   d)
 //          + e sum_v |x_v|^2
 // over rays r with the weight W_rv = sum_i w_i b_iv with which they see voxel v (see
 // EQ(mask-vote)); t_r is what the styled field lacks to the picture, m a ray's share of the
 // pixels. The second term is the cost of a residual, its total variation over neighbours u ~ v,
 // d = 0.01 of white what counts as no difference; k_uv = 0.1 + exp(-|c_u - c_v|^2 / (2 s^2)),
-// s = 0.2, is less between voxels of different colours c: an edit ends where colours change, and
-// places that no picture sees follow their neighbours of like colour. e = 1e-6 leaves parts that
-// know nothing at 0.
+// s = 0.2, is less between voxels of different colours c: an edit ends where colours change,
+// and places that no picture sees follow their neighbours of like colour. e = 1e-6 leaves parts
+// that know nothing at 0.
 //
 // The clamp of a sample's colour is not part of E. A constant added at a voxel changes no slope
 // of the map of coefficients there: EQ(liprf-bound) holds for network and residual as for the
 // network. That of a neighbour may be another: the bound says nothing of two positions.
 //
-// E is convex. It is minimised by quadratics that touch it from above (weights p k / sqrt(...)),
-// each by conjugate gradients; the preconditioner adds the diagonals of the cubes of 2 to 64
-// voxels, so that places far from all rays are reached in few steps.
+// E is convex. It is minimised by quadratics that touch it from above (weights p k /
+// sqrt(...)), each by conjugate gradients; the preconditioner adds the diagonals of the cubes
+// of 2 to 64 voxels, so that places far from all rays are reached in few steps.
 #pragma once
 
 #include <cstdint>
@@ -32,7 +33,7 @@
 namespace regrade {
 
 struct ResidualOptions {
-  double cost = 0.01;  // p
+  double cost = 0.01;   // p
   double width = 0.01;  // d
   double pull = 1e-6;   // e
   int turns = 3;        // quadratics
@@ -51,10 +52,10 @@ std::vector<Vec3d> FitResidual(const VoxelGraph& graph, const ResidualRays& rays
 
 // A residual as it is applied: to a voxel's coefficients s of channel c
 //
-// EQ(view-scale): s_0 += x_c / Gamma_0, s_k *= rho_c for k > 0, rho_c = clamp((a + x_c) / max(a,
-// 0.02), 0, 1), a = 1/2 + Gamma_0 s_0 the colour before. What changes with the view keeps its
-// proportion to a colour that is darkened, as under less light, and never grows: rho <= 1 keeps
-// EQ(liprf-bound).
+// EQ(view-scale): s_0 += x_c / Gamma_0, s_k *= rho_c for k > 0, rho_c = clamp((a + x_c) /
+// max(a, 0.02), 0, 1), a = 1/2 + Gamma_0 s_0 the colour before. What changes with the view
+// keeps its proportion to a colour that is darkened, as under less light, and never grows: rho
+// <= 1 keeps EQ(liprf-bound).
 struct VoxelResidual {
   std::vector<Vec3f> color;       // [voxels]: x
   std::vector<Vec3f> view_scale;  // [voxels]: rho; empty where it is 1

@@ -1,5 +1,5 @@
-// How far a lifted edit is from its exact truth: rows for the best linear map, the 2D method, the
-// network alone, the style with its residual, and the ceiling of any static field.
+// How far a lifted edit is from its exact truth: rows for the best linear map, the 2D method,
+// the network alone, the style with its residual, and the ceiling of any static field.
 //
 //   retouch_benchmark OUT GRADE STYLE EDITED
 //
@@ -86,8 +86,8 @@ class Coefficients {
         for (; at != first + rays_.first[r + 1] && *at < end; ++at)
           for (int c = 0; c < 3; ++c)
             for (int k = 0; k < 9; ++k)
-              x[kTerms * int64_t{*at} + 9 * c + k] += double{rays_.weight[at - first]} *
-                                                      double{gamma_[9 * r + k]} * colors[r][c];
+              x[kTerms * int64_t{*at} + 9 * c + k] +=
+                  double{rays_.weight[at - first]} * double{gamma_[9 * r + k]} * colors[r][c];
       }
     }
     return x;
@@ -164,8 +164,7 @@ int Run(const std::string& out, const std::string& grade, const std::string& nam
   std::printf("|---|---|---|---|\n| best linear map | %.2e | 0 %% | |\n", linear);
   row("unedited", truth.renders());
   row("2D method on renders", of_method);
-  row("network alone",
-      Renders(StyledFieldOf(source, network, 1, nullptr).field, cameras));
+  row("network alone", Renders(StyledFieldOf(source, network, 1, nullptr).field, cameras));
   row("with residual", Renders(ReadStyledField(out, style, 1).field, cameras));
   std::printf("| ceiling | %.2e | 100 %% | |\n", ceiling);
   return 0;

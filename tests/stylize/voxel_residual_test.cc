@@ -92,7 +92,8 @@ TEST(VoxelResidual, AnAdaptiveFieldsNeighboursAreTheEndsOfItsCellsEdges) {
   CellGrid& cells = geometry->cells;
   cells.finest = 1;
   std::vector<std::pair<CellKey, uint8_t>> leaves{{KeyOf({2, 0, 0}), uint8_t{0}}};
-  for (int k = 0; k < 8; ++k) leaves.emplace_back(KeyOf({k >> 2, k >> 1 & 1, k & 1}), uint8_t{1});
+  for (int k = 0; k < 8; ++k)
+    leaves.emplace_back(KeyOf({k >> 2, k >> 1 & 1, k & 1}), uint8_t{1});
   std::sort(leaves.begin(), leaves.end());
   cells.key.Resize(9), cells.level.Resize(9);
   for (int c = 0; c < 9; ++c) cells.key[c] = leaves[c].first, cells.level[c] = leaves[c].second;

@@ -1,4 +1,5 @@
-// The exact truth of an edit of the synthetic still life: its grade applied to unedited renders.
+// The exact truth of an edit of the synthetic still life: its grade applied to unedited
+// renders.
 #pragma once
 
 #include <string>
