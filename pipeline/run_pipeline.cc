@@ -105,7 +105,7 @@ void RunStyles(const std::string& first, const std::vector<NamedStyle>& styles,
   const std::vector<Requirement> required = RequirementsOf(context->settings);
   std::vector<std::string> failed;
   for (size_t i = 0; i < styles.size(); ++i) {
-    const auto& [name, picture] = styles[i];
+    const auto& [name, pictures] = styles[i];
     const std::string folder = StyleFolder(context->workspace->folder(), name);
     if (styles.size() > 1)
       context->console->Info(Concat("style ", i + 1, " of ", styles.size(), ": ", name));
@@ -115,7 +115,7 @@ void RunStyles(const std::string& first, const std::vector<NamedStyle>& styles,
     }
     Workspace workspace(folder, context->settings.start.break_lock);
     context->style = &workspace;
-    context->settings.style.pictures = {picture};
+    context->settings.style.pictures = pictures;
     context->settings.style.name = name;
     // From its beginning on the folder belongs to this picture.
     if (!std::filesystem::exists(workspace.Path("run.json"))) WriteRunFile("run", *context);

@@ -1,12 +1,14 @@
 #!/usr/bin/env python3
-"""Converts published PyTorch weights of WCT2 or CCPL to the ONNX files that `--method onnx:DIR` reads.
+"""Converts published PyTorch weights of WCT2, CCPL or CAP-VSTNet to the ONNX files that `--method onnx:DIR` reads.
 
   convert_networks.py wct2 --encoder wave_encoder_cat5_l4.pth --decoder wave_decoder_cat5_l4.pth --out DIR
   convert_networks.py ccpl --vgg vgg_normalised.pth --sct SCT.pth.tar --decoder DECODER.pth.tar --out DIR
+  convert_networks.py capvst --model photo_image.pt --out DIR
 
-Download the weights from their authors (github.com/clovaai/WCT2, github.com/JarrentWu1031/CCPL) and read their licences.
-Supported are both versions of WCT2, cat5 and sum, and CCPL's photorealistic and artistic models; the version is detected
-from the file. Needs Debian's python3-torch and python3-onnx (run it with /usr/bin/python3). Files are loaded as weights
+Download the weights from their authors (github.com/clovaai/WCT2, github.com/JarrentWu1031/CCPL,
+github.com/linfengWen98/CAP-VSTNet) and read their licences. Supported are both versions of WCT2, cat5 and sum, and the
+photorealistic and artistic models of CCPL and CAP-VSTNet; the version is detected from the file, but of CAP-VSTNet, whose
+two models have the same layers: name it with --version art. Needs Debian's python3-torch and python3-onnx (run it with /usr/bin/python3). Files are loaded as weights
 only: no code in them is executed.
 
   --random SEED    first writes files with random weights of the right shapes to DIR (--version cat5, sum, photo or art),
@@ -49,7 +51,7 @@ class Segment:
         self.weights[name] = numpy.asarray(values, kind)
         return name
 
-    def conv(self, x, state, key, out=None, relu=True, pad=True):
+    def conv(self, x, state, key, out=None, relu=True, pad=True, stride=1):
         """With `pad` reflects one pixel at each edge; then convolves without padding; with `relu` applies max(0, x)."""
         weight, bias = state.take(key)
         if weight.shape[1] != self.channels[x]:
@@ -59,7 +61,7 @@ class Segment:
             x = self.add("Pad", [x, edges], self.channels[x], mode="reflect")
         sides = list(weight.shape[2:])
         x = self.add("Conv", [x, self.constant(weight), self.constant(bias)], weight.shape[0],
-                     None if relu else out, kernel_shape=sides)
+                     None if relu else out, kernel_shape=sides, strides=[stride, stride])
         return self.add("Relu", [x], weight.shape[0], out) if relu else x
 
     def halve(self, x):
@@ -74,6 +76,22 @@ class Segment:
         count = self.channels[x]
         kernel = [[[[v / 2 for v in HAAR[band][:2]], [v / 2 for v in HAAR[band][2:]]]]] * count
         return self.add(kind, [x, self.constant(kernel)], count, out, group=count, kernel_shape=[2, 2], strides=[2, 2])
+
+    def pick(self, x, channels, out=None):
+        """The channels of these numbers; zeros for numbers that x has not."""
+        weight = [[[[float(i == k)]] for i in range(self.channels[x])] for k in channels]
+        return self.add("Conv", [x, self.constant(weight)], len(weight), out, kernel_shape=[1, 1])
+
+    def blocks(self, kind, x, out=None):
+        """The four pixels of each block of 2 x 2 as four groups of channels ("Conv"), or back ("ConvTranspose")."""
+        import numpy
+        count = self.channels[x] if kind == "Conv" else self.channels[x] // 4
+        weight = numpy.zeros((4 * count, count, 2, 2))
+        for k in range(4):
+            for c in range(count):
+                weight[k * count + c, c, k // 2, k % 2] = 1
+        return self.add(kind, [x, self.constant(weight)], 4 * count if kind == "Conv" else count, out,
+                        kernel_shape=[2, 2], strides=[2, 2])
 
     def file(self, name, outputs):
         """(name, bytes)"""
@@ -102,6 +120,8 @@ class State:
             self.tensors = torch.load(path, map_location="cpu", weights_only=True)
         except Exception:  # torch's own message recommends to trust the file
             sys.exit(f"{path}: torch cannot read weights from it; download it again")
+        if isinstance(self.tensors, dict) and isinstance(self.tensors.get("state_dict"), dict):
+            self.tensors = self.tensors["state_dict"]  # beside the state of its training
         if not isinstance(self.tensors, dict):
             sys.exit(f"{path}: does not contain a table of tensors")
 
@@ -213,15 +233,71 @@ def ccpl_files(vgg, sct, decoder):
     yield segment.file("ccpl_decoder", ["image"])
 
 
+class ReversibleBlock:
+    """A block of CAP-VSTNet on two streams: (x1, x2) -> (x2, x1 + F(x2)), at stride 2 both at half the size."""
+
+    def __init__(self, segment, state, name, stride):
+        self.segment, self.state, self.name, self.stride = segment, state, name, stride
+
+    def change(self, x):
+        for layer in ("1", "4", "7"):
+            stride = self.stride if layer == "1" else 1
+            x = self.segment.conv(x, self.state, f"{self.name}.conv.{layer}", relu=layer != "7", stride=stride)
+        return x
+
+    def there(self, x1, x2):
+        changed = self.change(x2)
+        if self.stride == 2:
+            x1, x2 = self.segment.blocks("Conv", x1), self.segment.blocks("Conv", x2)
+        return x2, self.segment.add("Add", [changed, x1], self.segment.channels[x1])
+
+    def back(self, x2, y1):
+        if self.stride == 2:
+            x2 = self.segment.blocks("ConvTranspose", x2)
+        x1 = self.segment.add("Sub", [y1, self.change(x2)], self.segment.channels[y1])
+        return self.segment.blocks("ConvTranspose", x1) if self.stride == 2 else x1, x2
+
+
+def capvst_files(model, version):
+    """The reversible network of Wen et al. 2023, with the layer names of linfengWen98/CAP-VSTNet, there and back."""
+    hidden, spreads = (64, 1) if version == "art" else (16, 2)
+    depth, widths = 10, (16, 64, 256)
+
+    def blocks(segment):
+        for i in range(len(widths) * depth):
+            yield ReversibleBlock(segment, model, f"stack.{i}", 2 if i in (depth, 2 * depth) else 1)
+        for i in range(2):
+            yield ReversibleBlock(segment, model, f"channel_reduction.block_list.{i}", 1)
+    segment = Segment(image=3)
+    # The picture and zeros in two streams of 16 channels, of which the picture has the first three.
+    x1, x2 = (segment.pick("image", range(first, first + widths[0])) for first in (0, 2 * widths[0]))
+    for block in blocks(segment):
+        x1, x2 = block.there(x1, x2)
+    x = segment.add("Concat", [x1, x2], 2 * widths[2], axis=1)
+    for i in range(spreads):
+        x = segment.blocks("ConvTranspose", x, "code" if i + 1 == spreads else None)
+    yield segment.file("capvst_encoder", ["code"])
+    count = 2 * widths[2] // 4 ** spreads
+    segment = Segment(code=count)
+    x = "code"
+    for _ in range(spreads):
+        x = segment.blocks("Conv", x)
+    x1, x2 = (segment.pick(x, range(first, first + widths[2])) for first in (0, widths[2]))
+    for block in reversed(list(blocks(segment))):
+        x1, x2 = block.back(x1, x2)
+    segment.pick(x1, range(3), "image")
+    yield segment.file("capvst_decoder", ["image"])
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("method", choices=["wct2", "ccpl"])
+    parser.add_argument("method", choices=["wct2", "ccpl", "capvst"])
     for name, text in (("encoder", "WCT2's encoder"), ("decoder", "WCT2's or CCPL's decoder"),
-                       ("vgg", "CCPL's VGG-19"), ("sct", "CCPL's SCT module")):
+                       ("vgg", "CCPL's VGG-19"), ("sct", "CCPL's SCT module"), ("model", "CAP-VSTNet's network")):
         parser.add_argument(f"--{name}", metavar="FILE", help=text)
     parser.add_argument("--out", metavar="DIR", required=True, help="folder for the ONNX files, created if missing")
     parser.add_argument("--random", metavar="SEED", type=int, help="convert random weights, see above")
-    parser.add_argument("--version", choices=["cat5", "sum", "photo", "art"], help="which model --random makes")
+    parser.add_argument("--version", choices=["cat5", "sum", "photo", "art"], help="which model --random makes, and of CAP-VSTNet which the file is (photo)")
     parser.add_argument("--check", metavar="PROGRAM", help="compare with a PyTorch forward, see above")
     options = parser.parse_args()
     try:
@@ -230,20 +306,23 @@ def main():
     except ImportError as error:
         sys.exit(f"{error}: install Debian's python3-torch and python3-onnx, and run this with /usr/bin/python3")
     os.makedirs(options.out, exist_ok=True)
-    names = ("encoder", "decoder") if options.method == "wct2" else ("vgg", "sct", "decoder")
+    versions = {"wct2": ("cat5", "sum")}.get(options.method, ("photo", "art"))
+    version = options.version or versions[0]
+    if version not in versions:
+        parser.error(f"{options.method} has no version {version}")
+    names = {"wct2": ("encoder", "decoder"), "ccpl": ("vgg", "sct", "decoder"), "capvst": ("model",)}[options.method]
     paths = {name: getattr(options, name) for name in names}
     if options.random is not None:
         import reference_networks
-        version = options.version or {"wct2": "cat5", "ccpl": "photo"}[options.method]
-        if version not in {"wct2": ("cat5", "sum"), "ccpl": ("photo", "art")}[options.method]:
-            parser.error(f"{options.method} has no version {version}")
         paths = {name: f"{options.out}/random_{name}.pth" for name in names}
-        reference_networks.write_random(options.random, version, paths)
+        reference_networks.write_random(options.method, options.random, version, paths)
     missing = [name for name in names if not paths[name]]
     if missing:
         parser.error(options.method + " also needs " + ", ".join(f"--{name}" for name in missing))
     states = {name: State(path) for name, path in paths.items()}
-    files = list({"wct2": wct2_files, "ccpl": ccpl_files}[options.method](**states))  # all, before any is written
+    convert = {"wct2": wct2_files, "ccpl": ccpl_files,
+               "capvst": lambda model: capvst_files(model, version)}[options.method]
+    files = list(convert(**states))  # all, before any is written
     for name, content in files:
         with open(os.path.join(options.out, name), "wb") as file:
             file.write(content)
@@ -251,7 +330,7 @@ def main():
     if options.check:
         import reference_networks
         tensors = {name: state.tensors for name, state in states.items()}
-        sys.exit(reference_networks.check(options.method, tensors, options.out, options.check))
+        sys.exit(reference_networks.check(options.method, version, tensors, options.out, options.check))
 
 
 if __name__ == "__main__":

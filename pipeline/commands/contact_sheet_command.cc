@@ -21,6 +21,7 @@
 #include "pipeline/run/run_context.h"
 #include "pipeline/stages/fit_pictures.h"
 #include "pipeline/stages/make_stylizer.h"
+#include "pipeline/stages/network_probe.h"
 #include "pipeline/stages/object_edit.h"
 #include "pipeline/stages/style_targets.h"
 #include "pipeline/stages/styled_field.h"
@@ -249,10 +250,13 @@ std::vector<Image> StyleRenders(RunContext* context, const Scene& scene,
 }
 
 void AddStyle(RunContext* context, const Scene& scene, const SheetOptions& sheet,
-              const std::string& picture, std::vector<SheetRow>* rows) {
+              const std::vector<std::string>& pictures, std::vector<SheetRow>* rows) {
   RunSettings& settings = context->settings;
-  settings.style.pictures = {picture};
-  const std::string name = fs::path(picture).filename().string();
+  settings.style.pictures = pictures;
+  Arguments files;
+  for (const std::string& picture : pictures)
+    files.push_back(fs::path(picture).filename().string());
+  const std::string name = Join(files, " and ");
   context->console->BeginStage(name);
   const ProgressFunction progress = context->console->StageProgress();
   const ObjectMasks* masks = scene.object.get();
@@ -265,7 +269,7 @@ void AddStyle(RunContext* context, const Scene& scene, const SheetOptions& sheet
     throw InputError(scene.object != nullptr
                          ? "the masks and the 2D method agree on no part of the photos"
                          : "the 2D method has a picture of none of the photos",
-                     picture);
+                     name);
 
   ProgressParts parts(progress, sheet.control_field ? 3 : 2);
   const uint64_t seed = settings.run.seed;
@@ -341,6 +345,7 @@ void RunContactSheet(const Command& command, const Arguments& arguments, Console
   RunSettings& settings = context.settings;
   OptionSet& options = context.options;
   options.Add("Sheet", &sheet);
+  options.Add("Style", &settings.style.match);
   options.Add("2D method", &settings.style_2d);
   options.Add("Object", &settings.object);
   options.Add("Program", &settings.program);
@@ -359,8 +364,13 @@ void RunContactSheet(const Command& command, const Arguments& arguments, Console
     throw InputError("holds no reconstruction", folder,
                      "make one with `regrade run` or `regrade reconstruct`");
   if (!sheet.dry_run) RequireValue(sheet.out, "--out", "name the PNG file to write");
-  if (styles.empty())
+  if (styles.empty()) {
     for (size_t i = 1; i < words.size(); ++i) CheckStyle(words[i], settings);
+    settings.style.pictures.assign(words.begin() + 1, words.end());
+    CheckMatch(settings);
+    if (const std::string& network = settings.style.match.network; !network.empty())
+      ProbeFeatureNetwork(network);
+  }
   ProbeMethod(&settings.style_2d,
               sheet.dry_run ? NetworkAccess() : AccessAfterYes(sheet.yes, console));
   ProbeMasks(&settings.object);
@@ -386,7 +396,12 @@ void RunContactSheet(const Command& command, const Arguments& arguments, Console
     columns.insert(columns.end(), styles.begin(), styles.end());
     rows = RowsOfStyles(scene, folder, styles);
   } else {
-    for (size_t i = 1; i < words.size(); ++i) AddStyle(&context, scene, sheet, words[i], &rows);
+    const Arguments pictures(words.begin() + 1, words.end());
+    if (settings.style.match.On())
+      AddStyle(&context, scene, sheet, pictures, &rows);
+    else
+      for (const std::string& picture : pictures)
+        AddStyle(&context, scene, sheet, {picture}, &rows);
   }
   const Image picture = MakeContactSheet(columns, rows);
   WritePng8(sheet.out, picture);

@@ -33,12 +33,12 @@ void ContinueStyle(const Command& command, const Arguments& arguments, const std
   if (!prepared) return;
   const std::string& folder = prepared->words[0];
   RunSettings& settings = context.settings;
-  if (settings.style.pictures.size() > 1)
+  if (settings.style.pictures.size() > 1 && !settings.style.match.On())
     throw UsageError("continues one style", std::string("regrade ") + command.name,
                      "name it with --name");
   ProbeStyles(&settings, console);
   const std::string given = context.options.Given("name").value_or("");
-  Continue(folder, *prepared, {{ChosenStyle(folder, given), settings.style.picture()}}, first,
+  Continue(folder, *prepared, {{ChosenStyle(folder, given), settings.style.pictures}}, first,
            &context);
 }
 
@@ -59,8 +59,11 @@ void RunStylize(const Command& command, const Arguments& arguments, Console* con
   if (!context.options.Given("style") && prepared->words.size() > 1) style.pictures.clear();
   style.pictures.insert(style.pictures.end(), prepared->words.begin() + 1,
                         prepared->words.end());
+  // That of the run belongs to its pictures.
+  const bool other = context.options.Given("style") || prepared->words.size() > 1;
+  if (other && !context.options.Given("match")) style.match = {};
   ProbeStyles(&context.settings, console);
-  Continue(folder, *prepared, NameStyles(folder, style.pictures, style.name), "style_2d",
+  Continue(folder, *prepared, NameStyles(folder, style.pictures, style.name, style.match.On()), "style_2d",
            &context);
 }
 

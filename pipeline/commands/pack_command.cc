@@ -64,6 +64,8 @@ void RunPack(const Command& command, const Arguments& arguments, Console* consol
   for (const EffectReport& effect : profile.effects) console->Info(EffectLine(effect));
   for (const std::string& notice : profile.notices) console->Info(notice);
   PackedCapture packed;
+  if (style.match.On())
+    throw UsageError("a packed capture holds one style picture", "--match", "leave it out");
   if (!style.pictures.empty()) packed.style = SmallPicture(style.picture());
   packed.scene = profile.scene;
   const WorkingViews views = as_taken.WithGains(profile.gains)

@@ -4,6 +4,7 @@
 #include "pipeline/commands/command.h"
 #include "pipeline/images/cube_file.h"
 #include "pipeline/stages/make_stylizer.h"
+#include "pipeline/stages/network_probe.h"
 
 namespace regrade {
 
@@ -26,6 +27,10 @@ void ProbeStyles(RunSettings* settings, Console* console) {
     RequireValue(picture, "--style", "name the style picture");
     picture = AbsolutePath(picture);
     CheckStyle(picture, *settings);
+  }
+  if (std::string& network = settings->style.match.network; !network.empty()) {
+    network = AbsolutePath(network);
+    ProbeFeatureNetwork(network);
   }
   const StartOptions& start = settings->start;
   ProbeMethod(&settings->style_2d,

@@ -10,6 +10,7 @@
 #include "pipeline/program/device_choice.h"
 #include "pipeline/run/run_settings.h"
 #include "pipeline/stages/mixed_film.h"
+#include "pipeline/stages/photo_vignette.h"
 #include "pipeline/stages/styled_field.h"
 #include "pipeline/workspace/output_names.h"
 #include "pipeline/workspace/style_folders.h"
@@ -88,13 +89,15 @@ void RenderStills(const std::string& folder, const std::string& name,
   const WorkingViews views =
       ReadWorkingViews(scene.Path("poses"), options.size > 0 ? options.size : kLongest, 0)
           .InField(stored.field_from_world, stored.ndc);
+  const Vignette vignette = ParseVignette(settings.render.vignette);
   std::vector<int> wanted;
   for (const std::string& still : options.still)
     wanted.push_back(PhotoNamed(views.capture(), still));
   const FieldRenderer renderer(stored.field,
                                ChooseBackend(settings.run.device, settings.run.reproducible));
   for (const int i : wanted) {
-    const Image picture = renderer.Render(views.CameraOf(i)).color;
+    Image picture = renderer.Render(views.CameraOf(i)).color;
+    PutVignette(vignette, &picture);
     const std::string ending = options.format == "jpeg"   ? ".jpg"
                                : options.format == "tiff" ? ".tif"
                                                           : ".png";

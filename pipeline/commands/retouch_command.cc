@@ -34,6 +34,7 @@ constexpr char kRenders[] = "retouch";
 struct RetouchOptions {
   std::string photo, edited;
   std::string from = "photo";
+  bool keep_vignette = false;
 
   template <typename Bind>
   void Describe(Bind& bind) {
@@ -44,6 +45,9 @@ struct RetouchOptions {
          {.help = "what was edited: the photo, or the scene's render from its place, which is "
                   "written to retouch/ of DIR, as a TIFF of 16 bits, where --edited is missing",
           .choices = "photo|render"});
+    bind("keep-vignette", keep_vignette,
+         {.help = "puts the edit's vignette onto the style's films and stills; the scene has "
+                  "none in either case"});
   }
 };
 
@@ -81,7 +85,8 @@ JsonValue RecordOf(const RetouchOptions& options, const PhotoEdit& edit,
                            {"change", edit.change},
                            {"local", edit.local},
                            {"of_photo", edit.of_photo},
-                           {"vignette", edit.vignette},
+                           {"vignette", edit.vignette(1)},
+                           {"keep_vignette", options.keep_vignette},
                            {"sharpening", edit.sharpening},
                            {"grain", edit.grain},
                            {"steepest_slope", SteepestSlope(edit.table)},
@@ -120,6 +125,7 @@ void WriteEdit(const std::string& folder, const PhotoEdit& edit, const CaptureVi
   fs::create_directories(folder);
   settings->style.pictures = {AbsolutePath(folder + "/edit.cube")};
   WriteFileAtomically(folder + "/edit.cube", CubeText(edit.table, "edit"));
+  settings->style.match = {};
   settings->style_2d.method = StyleOptions().method;
   settings->residual.residual = "views";
   fs::remove_all(folder + "/retouched");
@@ -184,12 +190,13 @@ void RunRetouch(const Command& command, const Arguments& arguments, Console* con
   const PhotoEdit edit =
       AnalyseEdit(photo, EditAtPhotoSize(Colors(DecodePhoto(retouch.edited, AnySize()).image),
                                          photo, retouch.edited));
-  const std::vector<std::string> notices = EditNotices(edit);
+  const std::vector<std::string> notices = EditNotices(edit, retouch.keep_vignette);
   for (const std::string& notice : notices) console->Info(notice);
   if (settings.start.dry_run) return;
+  settings.render.vignette = retouch.keep_vignette ? VignetteText(edit.vignette) : "none";
   WriteEdit(style, edit, views.View(view), &settings);
   WriteJsonFile(style + "/" + kRecord, RecordOf(retouch, edit, notices));
-  RunStyles("style_2d", {{name, settings.style.picture()}}, &context);
+  RunStyles("style_2d", {{name, settings.style.pictures}}, &context);
 }
 
 }  // namespace regrade

@@ -79,7 +79,8 @@ void RunStages(const Command& command, const Arguments& arguments, Console* cons
   settings.run.out = AbsolutePath(settings.run.out);
   ProbeInputs(name, &context);
   const std::vector<NamedStyle> styles =
-      name == "run" ? NameStyles(settings.run.out, settings.style.pictures, settings.style.name)
+      name == "run" ? NameStyles(settings.run.out, settings.style.pictures, settings.style.name,
+                                 settings.style.match.On())
                     : std::vector<NamedStyle>();
 
   if (settings.start.dry_run && !Workspace::Exists(settings.run.out)) {

@@ -286,6 +286,8 @@ void RunTradeoff(const Command& command, const Arguments& arguments, Console* co
   if (style) {
     if (settings.style.pictures.size() > 1)
       throw UsageError("costs are measured with one picture", "--style", "give one");
+    if (settings.style.match.On())
+      throw UsageError("costs are measured with one picture", "--match", "leave it out");
     settings.style.pictures[0] = AbsolutePath(settings.style.picture());
     CheckStyle(settings.style.picture(), settings);
     ProbeMethod(&settings.style_2d, settings.start.dry_run

@@ -62,7 +62,7 @@ JsonValue RunFileJson(const std::string& command, const RunContext& context) {
       {"arguments", words},          {"seed", context.settings.run.seed}, {"options", kept},
       {"fingerprints", fingerprints}};
   if (context.style != nullptr && !context.settings.style.pictures.empty())
-    run[kPictureHash] = HashFile(context.settings.style.picture());
+    run[kPictureHash] = PicturesHash(context.settings.style.pictures);
   return run;
 }
 

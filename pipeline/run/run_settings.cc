@@ -4,7 +4,9 @@
 #include <iterator>
 
 #include "kernels/base/error.h"
+#include "pipeline/images/cube_file.h"
 #include "pipeline/run/paper_config.h"
+#include "pipeline/run/vignette.h"
 
 namespace regrade {
 
@@ -43,6 +45,29 @@ void CheckResidual(const RunSettings& settings, StyleMethodKind method) {
 
 }  // namespace
 
+void CheckMatch(const RunSettings& settings) {
+  const StyleSource& style = settings.style;
+  if (!style.match.On()) {
+    if (!style.match.network.empty())
+      throw UsageError("a network that nothing is matched with", "--match-network",
+                       "give --match regions, too");
+    return;
+  }
+  if (style.pictures.size() < 2)
+    throw UsageError("matching needs several pictures", "--match regions",
+                     "give --style once for each, or leave --match out");
+  if (settings.object.On())
+    throw UsageError("regions come from the pictures or from masks", "--match and --masks",
+                     "leave one of them out");
+  for (const std::string& picture : style.pictures)
+    if (IsCubeFile(picture))
+      throw UsageError("a LUT has no regions", "--match regions and --style " + picture,
+                       "give pictures");
+  if (ParseStyleMethod(settings.style_2d).kind == StyleMethodKind::kFolder)
+    throw UsageError("a folder holds finished pictures", "--match and --method folder:",
+                     "use another method");
+}
+
 void CheckTogether(const RunSettings& settings) {
   const size_t grids = settings.fit.resolutions.size(), steps = settings.fit.steps.size();
   if (grids != steps)
@@ -59,6 +84,8 @@ void CheckTogether(const RunSettings& settings) {
   CheckPaper(settings.run.preset, settings.run.paper_config, settings.fit.field);
   const StyleMethod method = ParseStyleMethod(settings.style_2d);
   CheckResidual(settings, method.kind);
+  CheckMatch(settings);
+  ParseVignette(settings.render.vignette);
   if (!settings.object.style_mask.empty() && !settings.object.On())
     throw UsageError("labels of the style picture need labels of the photos",
                      "--style-mask and --masks",

@@ -11,6 +11,7 @@
 #include "pipeline/program/option_binding.h"
 #include "pipeline/program/run_options.h"
 #include "pipeline/report/requirements.h"
+#include "pipeline/run/match_choice.h"
 #include "pipeline/run/residual_choice.h"
 #include "reconstruct/colmap/poses_from_photos.h"
 #include "reconstruct/fit/fit_options.h"
@@ -38,11 +39,13 @@ struct SceneOptions {
 
 struct StyleSource {
   std::vector<std::string> pictures;
+  MatchChoice match;
   std::string name;
   double strength = 1;
   bool keep_field = false;
 
-  // The one that stages work on; empty where there is none.
+  // The one that stages work on, the first of several that are matched; empty where there is
+  // none.
   std::string picture() const { return pictures.empty() ? "" : pictures[0]; }
 
   template <typename Bind>
@@ -51,6 +54,7 @@ struct StyleSource {
         "style", pictures,
         {.help = "a style picture: the scene gets its colours, in the folder styles/NAME; give "
                  "the option once for each style. A LUT (.cube) is applied as it is"});
+    match.Describe(bind);
     bind("name", name,
          {.help = "name of the style's folder in styles/; by default that of the picture's "
                   "file"});
@@ -71,6 +75,7 @@ struct RenderOptions {
   int film_size = 1280;
   bool keep_exposure = false;
   bool exact = false;
+  std::string vignette = "none";
   PathOptions path;
 
   template <typename Bind>
@@ -95,6 +100,10 @@ struct RenderOptions {
          {.help = "renders the film's frames as exactly as the views; by default their smooth "
                   "parts are interpolated, and a GPU renders uniform fields in half precision, "
                   "with one colour for each 1/128 of opacity"});
+    bind("vignette", vignette,
+         {.help = "A,B multiplies the style's films and stills by 1 + A r^2 + B r^4, r from 0 at "
+                  "the middle to 1 at the corners, as `regrade retouch --keep-vignette` sets it; "
+                  "none. What is measured, mixtures and pages have none"});
     path.Describe(bind);
   }
 };
@@ -134,6 +143,9 @@ struct RunSettings {
   // Under the headings of the help.
   void Bind(OptionSet* options);
 };
+
+// What --match cannot go with. Throws Error(kUsage).
+void CheckMatch(const RunSettings& settings);
 
 // Throws Error(kUsage), naming both, for options that contradict each other.
 void CheckTogether(const RunSettings& settings);

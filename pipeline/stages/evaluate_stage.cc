@@ -33,6 +33,7 @@
 #include "pipeline/stages/make_stylizer.h"
 #include "pipeline/stages/photo_metrics.h"
 #include "pipeline/stages/stages.h"
+#include "pipeline/stages/style_pictures.h"
 #include "pipeline/stages/styled_field.h"
 #include "pipeline/workspace/metrics_json.h"
 #include "pipeline/workspace/output_names.h"
@@ -204,7 +205,7 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   }
   const bool of_picture = !IsCubeFile(settings.style.picture());  // not a LUT
   const Image style =
-      of_picture ? ReadStylePicture(settings.style.picture(), nullptr) : Image();
+      of_picture ? StyleExampleOf(settings.style, nullptr) : Image();
   const auto photo_2d = [&](int i) {
     Image picture = ReadImage(workspace.Path("views_2d/" + FrameName(i)));
     if (settings.style.strength != 1)
@@ -305,7 +306,7 @@ Stage EvaluateStage(RunContext* context) {
   stage.name = "evaluate";
   stage.inputs = JsonValue::Object{{"frames", context->ResultOf("render")},
                                    {"views_2d", context->ResultOf("style_2d")},
-                                   {"style", HashFile(context->settings.style.picture())},
+                                   {"style", StyleFiles(context->settings.style)},
                                    {"holdout", context->settings.run.holdout},
                                    {"options", OptionValues(context->settings.consistency)}};
   stage.work = [context](const ProgressFunction& progress) {

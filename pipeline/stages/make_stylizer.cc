@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <functional>
 #include <optional>
 #include <utility>
 
@@ -12,6 +11,7 @@
 #include "pipeline/program/question.h"
 #include "pipeline/stages/command_stylizer.h"
 #include "pipeline/stages/folder_stylizer.h"
+#include "pipeline/stages/matched_stylizer.h"
 #include "pipeline/stages/network_probe.h"
 #include "pipeline/workspace/output_names.h"
 #include "pipeline/workspace/stage_record.h"
@@ -25,10 +25,8 @@
 namespace regrade {
 namespace {
 
-// Colours of all photos, so that a scene-wide map does not depend on which are held out; of a
-// region, where `region` says which pixels are of it.
-using PhotoFunction = std::function<std::optional<Image>(size_t view)>;
-
+// `photo` gives colours of all photos, so that a scene-wide map does not depend on which are
+// held out; of a region, where its alpha says which pixels are of it.
 std::unique_ptr<ViewStylizer> MakeColorMethod(StyleMethodKind kind, const StyleOptions& options,
                                               const Image& style, const Capture& capture,
                                               const PhotoFunction& photo) {
@@ -68,11 +66,12 @@ StyleMethod MethodWithFiles(const StyleOptions& options) {
 }
 
 std::unique_ptr<ViewStylizer> MakeMethod(RunContext* context, const Capture& capture,
-                                         const Image& style, const PhotoFunction& photo) {
+                                         const std::string& path, const Image& style,
+                                         const PhotoFunction& photo) {
   const RunSettings& settings = context->settings;
   const StyleMethod method = MethodWithFiles(settings.style_2d);
-  if (const std::string look = settings.style.picture(); IsCubeFile(look)) {
-    const ColorLut lut = ReadCubeFile(look);
+  if (IsCubeFile(path)) {
+    const ColorLut lut = ReadCubeFile(path);
     const std::string notice =
         Format("the LUT magnifies differences of colours at most %.2f times", lut.Slope());
     return MakeMapStylizer(lut, "lut", {notice});
@@ -86,7 +85,7 @@ std::unique_ptr<ViewStylizer> MakeMethod(RunContext* context, const Capture& cap
       return MakeFolderStylizer(method.argument, photos);
     }
     case StyleMethodKind::kCommand:
-      return MakeCommandStylizer(method.argument, settings.style.picture(),
+      return MakeCommandStylizer(method.argument, path,
                                  settings.style_2d.command_limit_s);
     default:
       return MakeColorMethod(method.kind, settings.style_2d, style, capture, photo);
@@ -99,16 +98,24 @@ std::unique_ptr<ViewStylizer> MakeSceneStylizer(RunContext* context, const Worki
                                                 const ObjectMasks* masks,
                                                 const CoverageFunction& coverage) {
   const RunSettings& settings = context->settings;
-  std::string notice;
-  const Image style = StyleExample(settings.style.picture(), &notice);
-  if (!notice.empty()) context->console->Info(notice);
+  const std::string path = settings.style.picture();
+  const bool of_colors = MapsColors(ParseStyleMethod(settings.style_2d).kind);
   const Capture& capture = views.capture();
   const auto photo = [&](size_t i) -> std::optional<Image> {
     Image picture = views.PhotoToFit(static_cast<int>(i));
     if (picture.empty()) return std::nullopt;
     return picture;
   };
-  if (masks == nullptr) return MakeMethod(context, capture, style, photo);
+  if (settings.style.match.On())
+    return MakeMatchedStylizer(
+        settings.style, capture.views.size(), photo, of_colors,
+        [&](const std::string& picture, const Image& style, const PhotoFunction& region) {
+          return MakeMethod(context, capture, picture, style, region);
+        });
+  std::string notice;
+  const Image style = StyleExample(path, &notice);
+  if (!notice.empty()) context->console->Info(notice);
+  if (masks == nullptr) return MakeMethod(context, capture, path, style, photo);
   std::vector<std::unique_ptr<ViewStylizer>> regions;
   for (int k = 0; k < masks->num_regions(); ++k) {
     const Image part = masks->StyleRegion(k, style.width, style.height);
@@ -121,10 +128,9 @@ std::unique_ptr<ViewStylizer> MakeSceneStylizer(RunContext* context, const Worki
       if (!ShowsRegion(region)) return std::nullopt;
       return WithRegion(*picture, region);
     };
-    regions.push_back(MakeMethod(context, capture,
+    regions.push_back(MakeMethod(context, capture, path,
                                  part.empty() ? style : WithRegion(style, part), photo_region));
   }
-  const bool of_colors = MapsColors(ParseStyleMethod(settings.style_2d).kind);
   return MakeMaskedStylizer(std::move(regions), of_colors, coverage);
 }
 

@@ -8,13 +8,20 @@
 #include "kernels/base/error.h"
 #include "pipeline/program/crash_probe.h"
 #include "stylize/image/onnx_stylizer.h"
+#include "stylize/image/region_features.h"
 
 namespace regrade {
 namespace {
 
-constexpr char kStyle[] = "style", kPair[] = "pair";
+constexpr char kStyle[] = "style", kPair[] = "pair", kFeatures[] = "features";
 
 void OpenStyleNetwork(const std::string& path) { MakeOnnxStylizer(path, 64, Image(64, 64)); }
+
+void OpenFeatureNetwork(const std::string& path) {
+  const std::vector<Image> pictures = {Image(64, 64), Image(48, 64)};
+  const RegionFeatures opened(path, pictures);
+  for (const Image& picture : pictures) opened.Of(picture);
+}
 
 void ProbePairNetwork(const std::string& path) {
   RunCrashProbe(kPair, path);
@@ -26,6 +33,11 @@ void ProbePairNetwork(const std::string& path) {
 void ProbeStyleNetwork(const std::string& path) {
   RunCrashProbe(kStyle, path);
   OpenStyleNetwork(path);
+}
+
+void ProbeFeatureNetwork(const std::string& path) {
+  RunCrashProbe(kFeatures, path);
+  OpenFeatureNetwork(path);
 }
 
 void ProbeEvaluationNetworks(const ConsistencyOptions& options) {
@@ -43,6 +55,7 @@ void RunNetworkProbe(const std::vector<std::string>& arguments) {
   const std::string &kind = arguments[1], &path = arguments[2];
   try {
     if (kind == kStyle) return OpenStyleNetwork(path);
+    if (kind == kFeatures) return OpenFeatureNetwork(path);
     if (kind == kPair) {
       const Image picture(64, 64, 3);
       PairNetwork(path).Distance(picture, picture);

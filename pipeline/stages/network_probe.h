@@ -11,6 +11,8 @@ namespace regrade {
 // A network, or folder of networks, of `--method onnx:PATH`. Throws Error(kExternalProgram)
 // naming the file.
 void ProbeStyleNetwork(const std::string& path);
+// The network of --match-network, likewise.
+void ProbeFeatureNetwork(const std::string& path);
 
 // The networks of `options`: each compares two small pictures in the child. Throws
 // Error(kExternalProgram) naming the file.

@@ -136,7 +136,7 @@ PhotoEdit AnalyseEdit(const Image& photo_given, const Image& edited_given) {
   Image mapped = Mapped(photo, FitTable(photo, edited, vignette, kDraftTable, stride));
   const double left = MeanSquare(LowPass(Residual(mapped, edited, vignette)));
   if (!IsVignette(rings, vignette, left, left_without)) vignette = {};
-  edit.vignette = vignette(1);
+  edit.vignette = vignette;
 
   edit.table = FitGentleTable(photo, edited, vignette, std::max<int64_t>(1, stride / 6));
   mapped = Mapped(photo, edit.table);
@@ -170,14 +170,16 @@ PhotoEdit AnalyseEdit(const Image& photo_given, const Image& edited_given) {
   return edit;
 }
 
-std::vector<std::string> EditNotices(const PhotoEdit& edit) {
+std::vector<std::string> EditNotices(const PhotoEdit& edit, bool keep_vignette) {
   constexpr double kLeastSharpening = 0.1, kLeastGrain = 1.5 / 255;
   std::vector<std::string> notices;
-  if (edit.vignette != 1)
+  if (edit.vignette(1) != 1)
     notices.push_back(Format(
-        "a vignette (%+.0f %% at the corners) belongs to the picture, not to the scene: it is "
-        "left out",
-        100 * (edit.vignette - 1)));
+        "a vignette (%+.0f %% at the corners) belongs to the picture, not to the scene: %s",
+        100 * (edit.vignette(1) - 1),
+        keep_vignette ? "films and stills have it" : "it is left out"));
+  else if (keep_vignette)
+    notices.push_back("the edit has no vignette that could be kept");
   if (edit.sharpening >= kLeastSharpening)
     notices.push_back(
         Format("sharpening (%+.0f %% of fine detail) is left out", 100 * edit.sharpening));

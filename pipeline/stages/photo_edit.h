@@ -7,6 +7,7 @@
 
 #include "kernels/image/color_table.h"
 #include "kernels/scene/image.h"
+#include "pipeline/stages/photo_vignette.h"
 
 namespace regrade {
 
@@ -18,7 +19,7 @@ struct PhotoEdit {
   Image layer;          // of that, what the map does not carry: [H, W, 3], in [-1, 1]
   double change = 0;    // root mean square of edit - photo, in units of white
   double local = 0;     // of what the map of colours does not explain, without fine detail
-  double vignette = 1;  // factor at the corners, the centre's being 1; 1 where there is none
+  Vignette vignette;      // 1 everywhere where there is none
   double sharpening = 0;  // of the photo's fine detail, added; 0 where there is none
   double grain = 0;       // standard deviation, in units of white
   bool IsLocal() const;   // does the place matter beyond the colour?
@@ -42,7 +43,7 @@ struct PhotoEdit {
 PhotoEdit AnalyseEdit(const Image& photo, const Image& edited);
 
 // What a person should know, one sentence each.
-std::vector<std::string> EditNotices(const PhotoEdit& edit);
+std::vector<std::string> EditNotices(const PhotoEdit& edit, bool keep_vignette = false);
 
 // The edited file at the photo's size. Throws Error(kInput) where it has another shape (to 1 %)
 // or where its edges are elsewhere by more than 1.5 pixels, with the pixels and what to do.

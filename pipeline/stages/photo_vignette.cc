@@ -70,4 +70,15 @@ bool IsVignette(const Rings& rings, const Vignette& vignette, double left,
          std::abs(corner - half) > std::abs(half - centre);
 }
 
+void PutVignette(const Vignette& vignette, Image* image) {
+  if (vignette.a == 0 && vignette.b == 0) return;
+  for (int64_t i = 0; i < image->num_pixels(); ++i) {
+    const auto factor = static_cast<float>(vignette(SquaredRadius(*image, i)));
+    for (int c = 0; c < 3; ++c) {
+      float& value = image->pixels[static_cast<size_t>(3 * i + c)];
+      value = std::min(1.0f, value * factor);
+    }
+  }
+}
+
 }  // namespace regrade

@@ -5,6 +5,7 @@
 
 #include "kernels/base/vec.h"
 #include "kernels/scene/image.h"
+#include "pipeline/run/vignette.h"
 
 namespace regrade {
 
@@ -14,12 +15,6 @@ inline Vec3d ColorAt(const Image& image, int64_t i) {
   const float* p = &image.pixels[static_cast<size_t>(3 * i)];
   return {p[0], p[1], p[2]};
 }
-
-// 1 + a r^2 + b r^4, r in half diagonals from the centre.
-struct Vignette {
-  double a = 0, b = 0;
-  double operator()(double squared) const { return 1 + a * squared + b * squared * squared; }
-};
 
 // In half diagonals from the centre.
 double SquaredRadius(const Image& image, int64_t i);
@@ -38,5 +33,8 @@ Vignette FitVignette(const Rings& rings);
 // Whether it is one: `left` is the mean square that the edit's map of colours leaves with it,
 // `left_without` without.
 bool IsVignette(const Rings& rings, const Vignette& vignette, double left, double left_without);
+
+// Multiplies a picture [H, W, 3] by it, clipped to 1.
+void PutVignette(const Vignette& vignette, Image* image);
 
 }  // namespace regrade

@@ -25,6 +25,7 @@
 #include "pipeline/stages/film_renderer.h"
 #include "pipeline/stages/make_stylizer.h"
 #include "pipeline/stages/object_edit.h"
+#include "pipeline/stages/photo_vignette.h"
 #include "pipeline/stages/seen_by_few_recorder.h"
 #include "pipeline/stages/stages.h"
 #include "pipeline/stages/styled_field.h"
@@ -121,14 +122,14 @@ Frame RenderFrame(RunContext* context, FrameRenderers* renderers, const Camera& 
 // pictures and one for the films, so that a GPU does not wait for them.
 class FrameWriter {
  public:
-  FrameWriter(const Workspace& workspace, RunFilms* films)
-      : workspace_(workspace), films_(films) {}
+  FrameWriter(const Workspace& workspace, const Vignette& vignette, RunFilms* films)
+      : workspace_(workspace), vignette_(vignette), films_(films) {}
 
   // frames/<prefix>{source, styled, views_2d, transmittance}/<index>.png
   void Write(const std::shared_ptr<const Frame>& frame, const FrameSet& set, int index) {
-    if (set.of_film) film_.Do([=, this] { films_->Add(index, frame->source, frame->styled); });
+    if (set.of_film) film_.Do([=, this] { films_->Add(index, frame->source, Shown(frame->styled)); });
     if (set.of_2d_film && frame->views_2d)
-      film_.Do([=, this] { films_->AddViews2d(*frame->views_2d); });
+      film_.Do([=, this] { films_->AddViews2d(Shown(*frame->views_2d)); });
     if (set.prefix == kFilmPrefix) return;
     const std::string prefix = set.prefix;
     const auto write = [this, prefix, index](const char* sequence, const Image& image) {
@@ -153,7 +154,14 @@ class FrameWriter {
   }
 
  private:
+  // As films show it.
+  Image Shown(Image picture) const {
+    PutVignette(vignette_, &picture);
+    return picture;
+  }
+
   const Workspace& workspace_;
+  const Vignette vignette_;
   RunFilms* films_;
   OrderedWorker before_, after_, film_;
 };
@@ -215,7 +223,7 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   // In NDC the field's limit is no distance.
   SeenByFewRecorder seen(views, before.ndc.on() ? 0 : before.field.near_clip);
   {
-    FrameWriter writer(workspace, &films);
+    FrameWriter writer(workspace, ParseVignette(settings.render.vignette), &films);
     int done = 0;
     for (const FrameSet& set : sets) {
       for (int i = 0; i < static_cast<int>(set.cameras.size()); ++i) {

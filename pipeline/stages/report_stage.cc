@@ -8,7 +8,6 @@
 #include "pipeline/capture/scene_profile.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/files/atomic_file.h"
-#include "pipeline/images/cube_file.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/page/make_page.h"
 #include "pipeline/program/memory.h"
@@ -21,6 +20,7 @@
 #include "pipeline/run/run_context.h"
 #include "pipeline/run/run_file.h"
 #include "pipeline/stages/stages.h"
+#include "pipeline/stages/style_pictures.h"
 #include "pipeline/stages/videos.h"
 #include "pipeline/workspace/output_names.h"
 
@@ -93,7 +93,7 @@ ReportPictures PicturesOf(const RunContext& context, const RunReport& report) {
   pictures.title = std::filesystem::path(scene.folder()).filename().string();
   if (&workspace != &scene)
     pictures.title += " · " + std::filesystem::path(workspace.folder()).filename().string();
-  const Image style = StyleExample(context.settings.style.picture(), nullptr);
+  const Image style = StyleExampleOf(context.settings.style, nullptr);
   pictures.style = Encoded(style);
   const int count = static_cast<int>(capture.views.size());
   const int shown = std::min(count, kPagePictures);

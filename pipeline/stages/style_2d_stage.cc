@@ -15,6 +15,7 @@
 #include "pipeline/stages/make_stylizer.h"
 #include "pipeline/stages/object_edit.h"
 #include "pipeline/stages/stages.h"
+#include "pipeline/stages/style_pictures.h"
 #include "pipeline/workspace/metrics_json.h"
 #include "pipeline/workspace/output_names.h"
 
@@ -88,7 +89,7 @@ Stage Style2dStage(RunContext* context) {
   stage.name = "style_2d";
   stage.inputs = JsonValue::Object{
       {"poses", context->ResultOf("pose")},
-      {"style", HashFile(context->settings.style.picture())},
+      {"style", StyleFiles(context->settings.style)},
       {"options", OptionValues(context->settings.scene, context->settings.style_2d)}};
   const JsonValue files = MethodFiles(context->settings.style_2d);
   if (!files.IsNull()) stage.inputs["method_files"] = files;

@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "kernels/base/error.h"
+#include "kernels/base/hash.h"
 #include "kernels/base/natural_order.h"
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/files/json_file.h"
@@ -55,10 +56,17 @@ std::string StyleFolder(const std::string& folder, const std::string& name) {
   return folder + "/" + kStylesFolder + "/" + name;
 }
 
+std::string PicturesHash(const std::vector<std::string>& pictures) {
+  if (pictures.size() == 1) return HashFile(pictures[0]);
+  std::string all;
+  for (const std::string& picture : pictures) all += HashFile(picture) + "\n";
+  return HashText(HashOf(all));
+}
+
 std::vector<NamedStyle> NameStyles(const std::string& folder,
                                    const std::vector<std::string>& pictures,
-                                   const std::string& name) {
-  if (!name.empty() && pictures.size() > 1)
+                                   const std::string& name, bool together) {
+  if (!name.empty() && pictures.size() > 1 && !together)
     throw UsageError("names one style, and there are several pictures", "--name",
                      "give one --style, or leave --name out");
   if (!name.empty() && SafeStyleName(name + ".x") != name)
@@ -68,9 +76,14 @@ std::vector<NamedStyle> NameStyles(const std::string& folder,
   std::vector<NamedStyle> styles;
   std::vector<std::string> hashes;
   for (const std::string& picture : pictures) {
-    const std::string hash = HashFile(picture);
-    if (std::ranges::find(hashes, hash) != hashes.end())
+    hashes.push_back(HashFile(picture));
+    if (std::ranges::find(hashes, hashes.back()) != hashes.end() - 1)
       throw UsageError("this picture is given twice", picture, "leave one of them out");
+  }
+  for (size_t i = 0; i < pictures.size() && !(together && i > 0); ++i) {
+    const std::vector<std::string> own =
+        together ? pictures : std::vector<std::string>{pictures[i]};
+    const std::string hash = PicturesHash(own);
     const auto taken = [&](const std::string& wanted) {
       if (std::ranges::find(styles, wanted, &NamedStyle::name) != styles.end()) return true;
       const std::string of_folder = PictureHashOf(folder, wanted);
@@ -79,11 +92,12 @@ std::vector<NamedStyle> NameStyles(const std::string& folder,
     if (!name.empty() && taken(name))
       throw UsageError("style '" + name + "' belongs to another picture", "--name",
                        "choose another name");
-    const std::string stem = name.empty() ? SafeStyleName(picture) : name;
+    std::string stem = name;
+    for (size_t k = 0; name.empty() && k < own.size(); ++k)
+      stem += (k > 0 ? "-" : "") + SafeStyleName(own[k]);
     std::string free = stem;
     for (int k = 2; taken(free); ++k) free = stem + "-" + std::to_string(k);
-    styles.push_back({free, picture});
-    hashes.push_back(hash);
+    styles.push_back({free, own});
   }
   return styles;
 }

@@ -9,10 +9,14 @@ namespace regrade {
 
 inline constexpr char kStylesFolder[] = "styles";
 
-// A style picture and the name of its folder.
+// The name of a style's folder and its picture, or the several that are matched.
 struct NamedStyle {
-  std::string name, picture;
+  std::string name;
+  std::vector<std::string> pictures;
 };
+
+// The content of a style's pictures, in their order: of one picture the hash of its file.
+std::string PicturesHash(const std::vector<std::string>& pictures);
 
 // The name of a picture's file without its ending: letters, digits, '-', '_' and '.'; other
 // characters become '_', and a leading dot is removed. "style" where nothing is left.
@@ -24,13 +28,14 @@ std::string StyleFolder(const std::string& folder, const std::string& name);
 // A name for each picture: that of its file, or `name`, for a single picture, where it is not
 // empty. A picture keeps the name that it has in `folder`, which need not exist: pictures are
 // told apart by their content. Where another picture has a name, "-2" and so on is added.
+// `together`: all are the pictures of one style, named after all of them.
 //
 // Throws Error(kUsage) for a `name` that is not safe, is that of another picture, or is given
 // with several pictures; for a picture that is given twice; Error(kInput) for one that cannot
 // be read.
 std::vector<NamedStyle> NameStyles(const std::string& folder,
                                    const std::vector<std::string>& pictures,
-                                   const std::string& name);
+                                   const std::string& name, bool together = false);
 
 // Names of the styles that were begun in `folder`, in natural order.
 std::vector<std::string> StyleNames(const std::string& folder);
@@ -43,7 +48,7 @@ std::string ChosenStyle(const std::string& folder, const std::string& name);
 // of `folder`. Throws Error(kResources).
 void PublishStyle(const std::string& folder, const std::string& name);
 
-// In run.json of a style's folder: the hash of the picture's file.
+// In run.json of a style's folder: the hash of its pictures.
 inline constexpr char kPictureHash[] = "picture_hash";
 
 }  // namespace regrade

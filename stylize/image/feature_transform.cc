@@ -40,6 +40,24 @@ RowMatrix Power(const FeatureStatistics& statistics, const WhiteningRule& rule,
   return solver.eigenvectors() * values.asDiagonal() * solver.eigenvectors().transpose();
 }
 
+// The factor of a covariance, or of one that is regular enough.
+RowMatrix CholeskyFactor(const FeatureStatistics& statistics) {
+  constexpr double kRidge = 2e-5;
+  // Of the largest variance: below it, a pivot is rounding.
+  constexpr double kSingular = 1e-13;
+  RowMatrix given = SquareOf(statistics.covariance, statistics.channels);
+  REGRADE_CHECK(given.allFinite());
+  given = (given + given.transpose()).eval() / 2;
+  for (int more = 0;; ++more) {
+    if (more > 0) given.diagonal().array() += more * kRidge;
+    const Eigen::LLT<Eigen::MatrixXd> cholesky(given);
+    if (cholesky.info() != Eigen::Success) continue;
+    const RowMatrix lower = cholesky.matrixL();
+    const double least = lower.diagonal().minCoeff();
+    if (least * least > kSingular * given.diagonal().maxCoeff()) return lower;
+  }
+}
+
 }  // namespace
 
 FeatureStatistics MeasureFeatures(const FeatureMap& features, int fewer) {
@@ -69,6 +87,18 @@ FeatureAffine WhitenAndColor(const FeatureStatistics& content, const FeatureStat
   a = strength * a + (1 - strength) * RowMatrix::Identity(n, n);
   const Eigen::VectorXd from = VectorOf(content.mean), to = VectorOf(style.mean);
   const Eigen::VectorXd offset = strength * to + (1 - strength) * from - a * from;
+  REGRADE_CHECK(a.allFinite() && offset.allFinite());
+  return {n, Stored(a), {offset.data(), offset.data() + n}};
+}
+
+FeatureAffine CholeskyColor(const FeatureStatistics& content, const FeatureStatistics& style) {
+  REGRADE_CHECK_EQ(content.channels, style.channels);
+  const int n = content.channels;
+  const RowMatrix of_content = CholeskyFactor(content), of_style = CholeskyFactor(style);
+  const RowMatrix a =
+      of_style *
+      of_content.triangularView<Eigen::Lower>().solve(RowMatrix::Identity(n, n)).eval();
+  const Eigen::VectorXd offset = VectorOf(style.mean) - a * VectorOf(content.mean);
   REGRADE_CHECK(a.allFinite() && offset.allFinite());
   return {n, Stored(a), {offset.data(), offset.data() + n}};
 }

@@ -11,10 +11,11 @@ namespace {
 class MaskedStylizer : public ViewStylizer {
  public:
   MaskedStylizer(std::vector<std::unique_ptr<ViewStylizer>> regions, bool alpha_tells,
-                 CoverageFunction coverage)
+                 CoverageFunction coverage, std::vector<std::string> notices)
       : regions_(std::move(regions)),
         alpha_tells_(alpha_tells),
-        coverage_(std::move(coverage)) {
+        coverage_(std::move(coverage)),
+        notices_(std::move(notices)) {
     REGRADE_CHECK(!regions_.empty());
   }
 
@@ -43,7 +44,7 @@ class MaskedStylizer : public ViewStylizer {
   bool StylesAnything() const override { return regions_[0]->StylesAnything(); }
   bool Knows(int view_index) const override { return regions_[0]->Knows(view_index); }
   std::vector<std::string> Notices() const override {
-    std::vector<std::string> notices;
+    std::vector<std::string> notices = notices_;
     for (const auto& region : regions_)
       for (const std::string& notice : region->Notices())
         if (std::ranges::find(notices, notice) == notices.end()) notices.push_back(notice);
@@ -54,6 +55,7 @@ class MaskedStylizer : public ViewStylizer {
   std::vector<std::unique_ptr<ViewStylizer>> regions_;
   bool alpha_tells_;
   CoverageFunction coverage_;
+  std::vector<std::string> notices_;
 };
 
 }  // namespace
@@ -76,8 +78,9 @@ bool ShowsRegion(const Image& coverage) {
 
 std::unique_ptr<ViewStylizer> MakeMaskedStylizer(
     std::vector<std::unique_ptr<ViewStylizer>> regions, bool alpha_tells,
-    CoverageFunction coverage) {
-  return std::make_unique<MaskedStylizer>(std::move(regions), alpha_tells, std::move(coverage));
+    CoverageFunction coverage, std::vector<std::string> notices) {
+  return std::make_unique<MaskedStylizer>(std::move(regions), alpha_tells, std::move(coverage),
+                                          std::move(notices));
 }
 
 }  // namespace regrade

@@ -7,6 +7,7 @@
 
 #include "kernels/base/error.h"
 #include "kernels/image/resize.h"
+#include "stylize/image/capvst_stylizer.h"
 #include "stylize/image/ccpl_stylizer.h"
 #include "stylize/image/feature_transform.h"
 #include "stylize/image/network_pictures.h"
@@ -143,11 +144,13 @@ std::unique_ptr<ViewStylizer> MakeOnnxStylizer(const std::string& path, int max_
       return MakeWct2Stylizer(folder, cat5, max_side, style);
   if (fs::exists(folder + "/ccpl_encoder.onnx", error))
     return MakeCcplStylizer(folder, max_side, style);
+  if (fs::exists(folder + "/" + kCapVstFirstFile, error))
+    return MakeCapVstStylizer(folder, max_side, style);
   throw ProgramError(
       "there is no encoder.onnx in this folder", folder,
       "PCA-KD is encoder.onnx and decoder1.onnx ... decoder4.onnx, WCT encoder1.onnx ... "
       "encoder3.onnx and decoder1.onnx ... decoder3.onnx; scripts/convert_networks.py makes "
-      "the files of WCT2 and CCPL");
+      "the files of WCT2, CCPL and CAP-VSTNet");
 }
 
 }  // namespace regrade

@@ -1,5 +1,5 @@
-// 2D methods that are networks: PCA-KD (Chiu and Gurari 2022), WCT (Li et al. 2017), WCT2 and
-// CCPL, from the segments that their published weights were converted to.
+// 2D methods that are networks: PCA-KD (Chiu and Gurari 2022), WCT (Li et al. 2017), WCT2,
+// CCPL and CAP-VSTNet, from the segments that their published weights were converted to.
 #pragma once
 
 #include <memory>
@@ -19,6 +19,7 @@ namespace regrade {
 //     ridge, eigenvalues up to 1e-5 dropped. Clipped; no filter: painterly.
 //   wct2_cat5_encoder1.onnx or wct2_sum_encoder1.onnx and so on: WCT2, see wct2_stylizer.h.
 //   ccpl_encoder.onnx and so on: CCPL, see ccpl_stylizer.h.
+//   capvst_encoder.onnx and capvst_decoder.onnx: CAP-VSTNet, see capvst_stylizer.h.
 // PCA-KD and WCT work at the photo's size, or with its longer side cut to `max_side` pixels;
 // PCA-KD's sides are cut to multiples of 8 or 16, whatever its encoder halves to, and of 16 at
 // least. PCA-KD's result is brought to the photo's size by the filter, whose coefficients are

@@ -35,8 +35,8 @@ struct StyleOptions {
              "the whole distribution (the strongest change; it amplifies grain and soft "
              "edges), histogram that of each channel; pca-kd runs networks of 302 kB, "
              "which are fetched once, after a yes (--yes); onnx:DIR runs those of "
-             "PCA-KD, WCT, WCT2 or CCPL that are in DIR (scripts/convert_networks.py converts "
-             "the authors' files of the last two); folder:DIR takes photos that were styled by "
+             "PCA-KD, WCT, WCT2, CCPL or CAP-VSTNet that are in DIR "
+             "(scripts/convert_networks.py converts the authors' files of the last three); folder:DIR takes photos that were styled by "
              "any other program, by the photos' names (some may be missing); "
              "command:\"PROGRAM {input} {style} {output}\" runs a program for each view, "
              "without a shell"});

@@ -59,7 +59,7 @@ TEST(PhotoEdit, AGlobalGradeIsOneMapOfColours) {
   const Image& photo = Table().view.color;
   const PhotoEdit edit = AnalyseEdit(photo, Graded(SynthGrade::kGlobal));
   EXPECT_FALSE(edit.IsLocal()) << edit.local;
-  EXPECT_EQ(edit.vignette, 1);
+  EXPECT_EQ(edit.vignette(1), 1);
   EXPECT_LT(edit.sharpening, 0.1);
   EXPECT_NE(Said(edit).find("one map of colours"), std::string::npos) << Said(edit);
   // The table is the grade on the photo's own colours: cells of 1/32 leave less than a step.
@@ -77,7 +77,7 @@ TEST(PhotoEdit, ALocalGradeIsKeptInThePicture) {
   const Image edited = Graded(SynthGrade::kLocal);
   const PhotoEdit edit = AnalyseEdit(Table().view.color, edited);
   EXPECT_TRUE(edit.IsLocal()) << edit.local;
-  EXPECT_EQ(edit.vignette, 1);
+  EXPECT_EQ(edit.vignette(1), 1);
   EXPECT_NE(Said(edit).find("depends on the place"), std::string::npos);
   // What is above the low-pass frequency is lost beside edges.
   EXPECT_LE(MeanDifference(edit.picture, edited), 0.02);
@@ -85,7 +85,7 @@ TEST(PhotoEdit, ALocalGradeIsKeptInThePicture) {
 
 TEST(PhotoEdit, H186_AVignetteIsLeftOutAndSaid) {
   const PhotoEdit edit = AnalyseEdit(Table().view.color, Graded(SynthGrade::kVignette));
-  EXPECT_NEAR(edit.vignette, VignetteFactor(1), 0.03);
+  EXPECT_NEAR(edit.vignette(1), VignetteFactor(1), 0.03);
   EXPECT_NE(Said(edit).find("a vignette (-3"), std::string::npos) << Said(edit);
   EXPECT_FALSE(edit.IsLocal()) << edit.local;
   const double moved = MeanDifference(edit.picture, Graded(SynthGrade::kGlobal));
@@ -103,7 +103,7 @@ TEST(PhotoEdit, H186_ADodgedCentreIsNoVignette) {
             std::min(1.0f, edited.at(x, y)[c] * static_cast<float>(1 + 0.3 * std::exp(-r * r)));
     }
   const PhotoEdit edit = AnalyseEdit(Table().view.color, edited);
-  EXPECT_EQ(edit.vignette, 1) << Said(edit);
+  EXPECT_EQ(edit.vignette(1), 1) << Said(edit);
   EXPECT_TRUE(edit.IsLocal()) << edit.local;
 }
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""WCT2 and CCPL in PyTorch in double, written from the papers: the reference of convert_networks.py --check.
+"""WCT2, CCPL and CAP-VSTNet in PyTorch in double, written from the papers and facts of the published files: the reference of convert_networks.py --check.
 
 Not a program: see `convert_networks.py --help`. It shares no code with the conversion.
 """
@@ -46,8 +46,27 @@ def layers_of(version):
     return {"vgg": VGG, "sct": sct, "decoder": decoder}
 
 
-def write_random(seed, version, paths):
+def write_random_reversible(seed, paths):
+    """Blocks that change the streams a little, so that thirty-two of them stay invertible in single precision."""
+    random, tensors = torch.Generator().manual_seed(seed), {}
+
+    def block(name, inputs, width):
+        for number, before, after in (("1", inputs, width // 4), ("4", width // 4, width // 4), ("7", width // 4, width)):
+            gain = (2 / (9 * before)) ** 0.5 * (0.3 if number == "7" else 1)
+            tensors[f"{name}.conv.{number}.weight"] = torch.randn(after, before, 3, 3, generator=random) * gain
+            tensors[f"{name}.conv.{number}.bias"] = torch.randn(after, generator=random) * 0.02
+    for i in range(30):
+        width = (16, 64, 256)[i // 10]
+        block(f"stack.{i}", width // 4 if i in (10, 20) else width, width)
+    for i in range(2):
+        block(f"channel_reduction.block_list.{i}", 256, 256)
+    torch.save({"state_dict": tensors}, paths["model"])
+
+
+def write_random(method, seed, version, paths):
     """Writes weights that preserve magnitudes: features of some tens, pictures around middle grey."""
+    if method == "capvst":
+        return write_random_reversible(seed, paths)
     random = torch.Generator().manual_seed(seed)
     for file, layers in layers_of(version).items():
         tensors = {}
@@ -116,7 +135,7 @@ def whitened_and_colored(content, style):
     return rows.clamp(content.min(), content.max()).reshape(content.shape)
 
 
-def wct2(states, photo, style, transform):
+def wct2(states, photo, style, transform, version):
     encode, decode = Layers(states["encoder"]), Layers(states["decoder"])
     cat5 = decode.has("conv3_4_2")
 
@@ -161,7 +180,7 @@ def wct2(states, photo, style, transform):
     return styled[..., :height, :width]
 
 
-def ccpl(states, photo, style, transform):
+def ccpl(states, photo, style, transform, version):
     vgg, sct, decode = (Layers(states[name]) for name in ("vgg", "sct", "decoder"))
     artistic = sct.has("cnet.4")
 
@@ -198,6 +217,62 @@ def ccpl(states, photo, style, transform):
     return x[..., :photo.shape[2], :photo.shape[3]]
 
 
+def capvst(states, photo, style, transform, version):
+    tensors = {key: value.double() for key, value in states["model"].items()}
+    names = [f"stack.{i}" for i in range(30)] + [f"channel_reduction.block_list.{i}" for i in range(2)]
+
+    def change(name, x):
+        stride = 2 if name in ("stack.10", "stack.20") else 1
+        for number in ("1", "4", "7"):
+            x = functional.conv2d(functional.pad(x, (1, 1, 1, 1), mode="reflect"), tensors[f"{name}.conv.{number}.weight"],
+                                  tensors[f"{name}.conv.{number}.bias"], stride=stride if number == "1" else 1)
+            x = x.clamp(min=0) if number != "7" else x
+        return x
+
+    def gathered(x):  # the pixels of a block, one after the other
+        return torch.cat([x[..., i::2, j::2] for i in (0, 1) for j in (0, 1)], 1)
+
+    def scattered(x):
+        part = x.shape[1] // 4
+        whole = x.new_zeros(x.shape[0], part, 2 * x.shape[2], 2 * x.shape[3])
+        for k in range(4):
+            whole[..., k // 2::2, k % 2::2] = x[:, k * part:(k + 1) * part]
+        return whole
+
+    def encode(x):
+        old = torch.cat([x, x.new_zeros(1, 13, *x.shape[2:])], 1)
+        new = torch.zeros_like(old)
+        for name in names:
+            changed = change(name, new)
+            if changed.shape[2] != new.shape[2]:
+                old, new = gathered(old), gathered(new)
+            old, new = new, old + changed
+        x = torch.cat([old, new], 1)
+        return scattered(x) if version == "art" else scattered(scattered(x))
+
+    def decode(x):
+        x = gathered(x) if version == "art" else gathered(gathered(x))
+        old, new = x[:, :256], x[:, 256:]
+        for name in reversed(names):
+            half = name in ("stack.10", "stack.20")
+            before = scattered(old) if half else old
+            first = new - change(name, before)
+            old, new = scattered(first) if half else first, before
+        return old[:, :3]
+
+    def moments(x):
+        rows = x.flatten(2)[0]
+        mean = rows.mean(1, keepdim=True)
+        return rows - mean, mean, torch.linalg.cholesky((rows - mean) @ (rows - mean).T / (rows.shape[1] - 1))
+    height, width = photo.shape[2:]
+    code = encode(functional.pad(photo, (0, -width % 4, 0, -height % 4), mode="reflect"))
+    if transform:
+        rows, _, lower = moments(code)
+        _, mean, target = moments(encode(style))
+        code = (target @ torch.linalg.solve(lower, rows) + mean).reshape(code.shape)
+    return decode(code)[..., :height, :width]
+
+
 def picture(height, width, tint, seed):
     """Soft waves, an edge and grain, in [0, 1]: [1, 3, height, width]."""
     y, x = numpy.mgrid[:height, :width]
@@ -220,9 +295,9 @@ def read_picture(path):
     return torch.from_numpy(values.copy()).permute(2, 0, 1)[None].double()
 
 
-def check(method, states, folder, program):
+def check(method, version, states, folder, program):
     """Returns 0 if the program's pictures agree with this implementation to 1e-4 of white, otherwise 1."""
-    forward = {"wct2": wct2, "ccpl": ccpl}[method]
+    forward = {"wct2": wct2, "ccpl": ccpl, "capvst": capvst}[method]
     style = picture(64, 96, (1.0, 0.6, 0.35), 2)
     worst = 0.0
     with tempfile.TemporaryDirectory() as scratch, torch.no_grad():
@@ -233,8 +308,8 @@ def check(method, states, folder, program):
             write_picture(paths[0], photo)
             subprocess.run([program, folder, "1024", *paths], check=True, stdout=subprocess.DEVNULL)
             got = read_picture(paths[2])
-            expected = forward(states, photo.double(), style.double(), True)
-            without = forward(states, photo.double(), style.double(), False).clamp(0, 1)
+            expected = forward(states, photo.double(), style.double(), True, version)
+            without = forward(states, photo.double(), style.double(), False, version).clamp(0, 1)
             inside = ((expected > 0) & (expected < 1)).double().mean()
             difference = (got - expected.clamp(0, 1)).abs().max()
             worst = max(worst, difference.item())
