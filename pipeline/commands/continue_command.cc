@@ -61,7 +61,8 @@ void RunStylize(const Command& command, const Arguments& arguments, Console* con
                         prepared->words.end());
   // That of the run belongs to its pictures.
   const bool other = context.options.Given("style") || prepared->words.size() > 1;
-  if (other && !context.options.Given("match")) style.match = {};
+  if (other && !context.options.Given("match")) style.match.match = MatchChoice().match;
+  if (other && !context.options.Given("match-network")) style.match.network.clear();
   ProbeStyles(&context.settings, console);
   Continue(folder, *prepared, NameStyles(folder, style.pictures, style.name, style.match.On()), "style_2d",
            &context);

@@ -28,6 +28,7 @@ void ProbeStyles(RunSettings* settings, Console* console) {
     picture = AbsolutePath(picture);
     CheckStyle(picture, *settings);
   }
+  CheckMatch(*settings);
   if (std::string& network = settings->style.match.network; !network.empty()) {
     network = AbsolutePath(network);
     ProbeFeatureNetwork(network);

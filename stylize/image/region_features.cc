@@ -112,8 +112,8 @@ PictureFeatures RegionFeatures::Of(const Image& picture) const {
   for (int64_t i = 0; i < small.num_pixels(); ++i) {
     float* const row = &rows.values[static_cast<size_t>(i * rows.dimensions)];
     for (int c = 0; c < 3; ++c) {
-      row[c] = near.pixels[static_cast<size_t>(3 * i + c)] / 2;
-      row[3 + c] = around.pixels[static_cast<size_t>(3 * i + c)];
+      row[c] = near.pixels[static_cast<size_t>(3 * i + c)];
+      row[3 + c] = around.pixels[static_cast<size_t>(3 * i + c)] / 2;
     }
     const double above = 1 - (static_cast<double>(i / small.width) + 0.5) / small.height;
     row[kColors] = static_cast<float>(above / 5);

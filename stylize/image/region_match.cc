@@ -32,13 +32,13 @@ FeatureRows Sample(const std::vector<PictureFeatures>& pictures) {
 
 // The shares [styles] of [h, w, 1] at the size of the features.
 std::vector<Image> CoarseShares(const RegionMatch& match, const PictureFeatures& picture) {
-  const std::vector<float> shares = RegionShares(match.scene, picture.rows);
-  const size_t parts = match.scene.size();
+  const std::vector<float> shares = RegionShares(match.deciding, picture.rows);
+  const size_t parts = match.deciding.size();
   std::vector<Image> coarse(match.weight_of_style.size(),
                             Image(picture.width, picture.height, 1));
   for (int64_t i = 0; i < picture.rows.rows(); ++i)
     for (size_t k = 0; k < parts; ++k)
-      coarse[static_cast<size_t>(match.style_of_part[k])].pixels[static_cast<size_t>(i)] +=
+      coarse[static_cast<size_t>(match.style_of_deciding[k])].pixels[static_cast<size_t>(i)] +=
           shares[static_cast<size_t>(i) * parts + k];
   return coarse;
 }
@@ -107,6 +107,20 @@ RegionMatch MatchRegions(const std::vector<PictureFeatures>& photos,
     match.margin_of_part.push_back(next > 0 ? 1 - nearest / next : 0);
     match.weight_of_style[style] += part.weight;
   }
+  std::vector<double> largest(styles.size());
+  for (size_t k = 0; k < match.scene.size(); ++k) {
+    double& of_style = largest[static_cast<size_t>(match.style_of_part[k])];
+    of_style = std::max(of_style, match.margin_of_part[k]);
+  }
+  double weight = 0;
+  for (size_t k = 0; k < match.scene.size(); ++k) {
+    const size_t style = static_cast<size_t>(match.style_of_part[k]);
+    if (match.margin_of_part[k] < std::min(kDeciding, largest[style])) continue;
+    match.deciding.push_back(match.scene[k]);
+    match.style_of_deciding.push_back(match.style_of_part[k]);
+    weight += match.scene[k].weight;
+  }
+  for (RegionPart& part : match.deciding) part.weight /= weight;
   return match;
 }
 

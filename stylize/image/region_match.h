@@ -15,13 +15,18 @@ namespace regrade {
 // of each style picture one of kStyleRegions. Part k of the scene takes the style with the part
 // at the least distance d, the root of c_kl of EQ(mixture-transport); its margin is 1 - d / d',
 // d' the least distance of another style. A style's share in a pixel is the sum of the shares
-// of its parts, see EQ(gaussian-mixture), given the picture's edges by EQ(guided-filter).
+// of its parts, see EQ(gaussian-mixture), given the picture's edges by EQ(guided-filter). Only
+// parts with a margin of kDeciding have shares, or the one of largest margin of each style: what
+// is between is often the border of two regions, and belongs to the nearest parts.
 inline constexpr int kSceneRegions = 8, kStyleRegions = 3;
+inline constexpr double kDeciding = 0.4;
 // A part with less is unsure, and matching is refused where unsure parts have more weight.
 inline constexpr double kLeastMargin = 0.2, kMostUnsure = 0.05;
 
 struct RegionMatch {
   RegionMixture scene;
+  RegionMixture deciding;                // of these, those that have shares
+  std::vector<int> style_of_deciding;
   std::vector<int> style_of_part;
   std::vector<double> margin_of_part;
   std::vector<double> weight_of_style;  // of the scene's pixels; they sum to 1

@@ -3,7 +3,6 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "kernels/base/error.h"
 #include "kernels/base/random.h"
@@ -22,9 +21,9 @@ Eigen::Map<const Matrix> CovarianceOf(const RegionPart& part) {
   return {part.covariance.data(), n, n};
 }
 
-Vector RowOf(const FeatureRows& rows, int64_t i) {
-  return Eigen::Map<const Eigen::VectorXf>(&rows.values[static_cast<size_t>(i) * rows.dimensions],
-                                           rows.dimensions)
+// Columns are rows of the features: [dimensions, rows].
+Eigen::MatrixXd ColumnsOf(const FeatureRows& rows) {
+  return Eigen::Map<const Eigen::MatrixXf>(rows.values.data(), rows.dimensions, rows.rows())
       .cast<double>();
 }
 
@@ -43,110 +42,91 @@ RegionPart PartOf(double weight, const Vector& mean, const Matrix& covariance) {
           {wide.data(), wide.data() + wide.size()}};
 }
 
-// Of the rows weighted by column k of `shares` [rows, parts]; parts without rows are left out.
-RegionMixture Maximised(const FeatureRows& rows, const Matrix& shares) {
+// Of columns weighted by column k of `shares` [rows, parts]; parts without rows are left out.
+RegionMixture Maximised(const Eigen::MatrixXd& x, const Eigen::MatrixXd& shares) {
   constexpr double kEmpty = 1e-6;  // of all rows
-  const double all = static_cast<double>(rows.rows());
   RegionMixture mixture;
+  double kept = 0;
   for (Eigen::Index k = 0; k < shares.cols(); ++k) {
     const double count = shares.col(k).sum();
-    if (count <= kEmpty * all) continue;
-    Vector mean = Vector::Zero(rows.dimensions);
-    for (int64_t i = 0; i < rows.rows(); ++i) mean += shares(i, k) * RowOf(rows, i);
-    mean /= count;
-    Matrix covariance = Matrix::Zero(rows.dimensions, rows.dimensions);
-    for (int64_t i = 0; i < rows.rows(); ++i) {
-      const Vector d = RowOf(rows, i) - mean;
-      covariance.noalias() += shares(i, k) * d * d.transpose();
-    }
-    mixture.push_back(PartOf(count / all, mean, covariance / count));
+    if (count <= kEmpty * static_cast<double>(x.cols())) continue;
+    const Vector mean = x * shares.col(k) / count;
+    const Eigen::MatrixXd d = x.colwise() - mean;
+    const Eigen::MatrixXd weighted = d * shares.col(k).asDiagonal();
+    mixture.push_back(PartOf(count, mean, weighted * d.transpose() / count));
+    kept += count;
   }
-  double kept = 0;
-  for (const RegionPart& part : mixture) kept += part.weight;
   for (RegionPart& part : mixture) part.weight /= kept;
   return mixture;
 }
 
-// r_ik; returns the mean log density of a row, without the constant of all Gaussians.
-double Expect(const RegionMixture& mixture, const FeatureRows& rows, Matrix* shares) {
-  const auto parts = static_cast<Eigen::Index>(mixture.size());
-  std::vector<Matrix> whitening;
-  std::vector<double> scale;
-  for (const RegionPart& part : mixture) {
-    const Eigen::LLT<Matrix> cholesky(CovarianceOf(part));
+// r_ik [rows, parts]; returns the mean log density of a row, without the constant of all
+// Gaussians.
+double Expect(const RegionMixture& mixture, const Eigen::MatrixXd& x, Eigen::MatrixXd* shares) {
+  shares->resize(x.cols(), std::ssize(mixture));
+  for (Eigen::Index k = 0; k < shares->cols(); ++k) {
+    const RegionPart& part = mixture[static_cast<size_t>(k)];
+    const Eigen::LLT<Eigen::MatrixXd> cholesky(CovarianceOf(part));
     REGRADE_CHECK(cholesky.info() == Eigen::Success);
-    const Matrix lower = cholesky.matrixL();
-    whitening.push_back(lower.triangularView<Eigen::Lower>().solve(
-        Matrix::Identity(rows.dimensions, rows.dimensions)));
-    scale.push_back(std::log(part.weight) - lower.diagonal().array().log().sum());
+    const Eigen::MatrixXd lower = cholesky.matrixL();
+    const Eigen::MatrixXd d =
+        x.colwise() - Eigen::Map<const Vector>(part.mean.data(), x.rows());
+    const double scale = std::log(part.weight) - lower.diagonal().array().log().sum();
+    shares->col(k) = (scale - 0.5 * lower.triangularView<Eigen::Lower>()
+                                        .solve(d)
+                                        .colwise()
+                                        .squaredNorm()
+                                        .array())
+                         .matrix()
+                         .transpose();
   }
-  shares->resize(rows.rows(), parts);
-  Vector likelihood(rows.rows());
-#pragma omp parallel for schedule(static)
-  for (int64_t i = 0; i < rows.rows(); ++i) {
-    const Vector x = RowOf(rows, i);
-    for (Eigen::Index k = 0; k < parts; ++k) {
-      const size_t n = static_cast<size_t>(k);
-      const Vector d =
-          x - Eigen::Map<const Vector>(mixture[n].mean.data(), rows.dimensions);
-      (*shares)(i, k) = scale[n] - 0.5 * (whitening[n] * d).squaredNorm();
-    }
-    // The largest share is exp(0) before it is divided: the sum is at least 1.
-    const double largest = shares->row(i).maxCoeff();
-    shares->row(i) = (shares->row(i).array() - largest).max(-700.0).exp();
-    const double sum = shares->row(i).sum();
-    shares->row(i) /= sum;
-    likelihood[i] = largest + std::log(sum);
-  }
-  return likelihood.mean();
+  // The largest share is exp(0) before it is divided: the sum is at least 1.
+  const Vector largest = shares->rowwise().maxCoeff();
+  *shares = (shares->colwise() - largest).array().max(-700.0).exp();
+  const Vector sum = shares->rowwise().sum();
+  *shares = sum.cwiseInverse().asDiagonal() * *shares;
+  return (largest.array() + sum.array().log()).mean();
 }
 
-// Rows far from each other: each is drawn with the squared distance to those before it.
-std::vector<int64_t> Centres(const FeatureRows& rows, int parts, uint64_t seed) {
+// [rows, parts]: 1 for the nearest of so many rows that are far from each other, each drawn with
+// the squared distance to those before it.
+Eigen::MatrixXd FirstShares(const Eigen::MatrixXd& x, int parts, uint64_t seed) {
   constexpr uint64_t kStream = 0x7265;
-  std::vector<int64_t> centres = {static_cast<int64_t>(
-      RandomIndex(seed, kStream, 0, static_cast<uint64_t>(rows.rows())))};
-  std::vector<double> squared(static_cast<size_t>(rows.rows()),
-                              std::numeric_limits<double>::infinity());
-  while (std::ssize(centres) < parts) {
-    const Vector last = RowOf(rows, centres.back());
-    double sum = 0, farthest = 0;
-    for (size_t i = 0; i < squared.size(); ++i) {
-      squared[i] = std::min(squared[i],
-                            (RowOf(rows, static_cast<int64_t>(i)) - last).squaredNorm());
-      sum += squared[i];
-      farthest = std::max(farthest, squared[i]);
-    }
-    if (farthest <= kPartFloor) break;
-    double place = sum * RandomDouble(seed, kStream, centres.size());
-    size_t drawn = 0;
-    while (drawn + 1 < squared.size() && (place -= squared[drawn]) >= 0) ++drawn;
-    centres.push_back(static_cast<int64_t>(drawn));
+  const auto to = [&x](Eigen::Index row) -> Vector {
+    return (x.colwise() - x.col(row)).colwise().squaredNorm().transpose();
+  };
+  std::vector<Vector> squared = {to(static_cast<Eigen::Index>(
+      RandomIndex(seed, kStream, 0, static_cast<uint64_t>(x.cols()))))};
+  Vector least = squared[0];
+  while (std::ssize(squared) < parts && least.maxCoeff() > kPartFloor) {
+    double place = least.sum() * RandomDouble(seed, kStream, squared.size());
+    Eigen::Index drawn = 0;
+    while (drawn + 1 < x.cols() && (place -= least[drawn]) >= 0) ++drawn;
+    squared.push_back(to(drawn));
+    least = least.cwiseMin(squared.back());
   }
-  return centres;
+  Eigen::MatrixXd shares = Eigen::MatrixXd::Zero(x.cols(), std::ssize(squared));
+  for (Eigen::Index i = 0; i < x.cols(); ++i) {
+    Eigen::Index nearest = 0;
+    for (Eigen::Index k = 1; k < shares.cols(); ++k)
+      if (squared[static_cast<size_t>(k)][i] < squared[static_cast<size_t>(nearest)][i])
+        nearest = k;
+    shares(i, nearest) = 1;
+  }
+  return shares;
 }
 
 }  // namespace
 
 RegionMixture FitRegions(const FeatureRows& rows, int parts, uint64_t seed) {
   REGRADE_CHECK(rows.rows() > 0 && parts >= 1);
-  const std::vector<int64_t> centres = Centres(rows, parts, seed);
-  Matrix shares = Matrix::Zero(rows.rows(), std::ssize(centres));
-  for (int64_t i = 0; i < rows.rows(); ++i) {
-    Eigen::Index nearest = 0;
-    double least = std::numeric_limits<double>::infinity();
-    for (size_t k = 0; k < centres.size(); ++k) {
-      const double d = (RowOf(rows, i) - RowOf(rows, centres[k])).squaredNorm();
-      if (d < least) least = d, nearest = static_cast<Eigen::Index>(k);
-    }
-    shares(i, nearest) = 1;
-  }
-  RegionMixture mixture = Maximised(rows, shares);
-  double likelihood = Expect(mixture, rows, &shares);
+  const Eigen::MatrixXd x = ColumnsOf(rows);
+  Eigen::MatrixXd shares = FirstShares(x, parts, seed);
+  RegionMixture mixture = Maximised(x, shares);
+  double likelihood = Expect(mixture, x, &shares);
   for (int i = 0; i < kMostIterations; ++i) {
-    RegionMixture next = Maximised(rows, shares);
-    const double then = Expect(next, rows, &shares);
-    mixture = std::move(next);
+    mixture = Maximised(x, shares);
+    const double then = Expect(mixture, x, &shares);
     if (!(then - likelihood >= kLeastGain)) break;
     likelihood = then;
   }
@@ -154,11 +134,10 @@ RegionMixture FitRegions(const FeatureRows& rows, int parts, uint64_t seed) {
 }
 
 std::vector<float> RegionShares(const RegionMixture& mixture, const FeatureRows& rows) {
-  Matrix shares;
-  Expect(mixture, rows, &shares);
-  std::vector<float> values(static_cast<size_t>(shares.size()));
-  std::copy(shares.data(), shares.data() + shares.size(), values.begin());
-  return values;
+  Eigen::MatrixXd shares;
+  Expect(mixture, ColumnsOf(rows), &shares);
+  const Eigen::MatrixXf by_part = shares.transpose().cast<float>();
+  return {by_part.data(), by_part.data() + by_part.size()};
 }
 
 double PartDistance(const RegionPart& a, const RegionPart& b) {

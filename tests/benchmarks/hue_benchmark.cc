@@ -1,13 +1,14 @@
 // Where the hues of a style go on the way from the 2D method to the styled scene.
 //
-//   hue_benchmark OUT STYLE [STYLE...]
+//   hue_benchmark [--quick] OUT STYLE [STYLE...]
 //
 // OUT is the folder of a run, and the first STYLE a style of it that was rendered: its 2D
 // frames are what all rows are compared with, and the networks of the further styles, trained
 // on the same picture with other options, make a row each. All at the photos' places, at the
 // run's size. Rows: the 2D method; one linear map for all frames, on pixels and carried into
 // the field; the ceiling, the least squares of one more colour at each voxel, and of all
-// voxels' coefficients, to the 2D frames; the networks, each alone as its colour map, too. Columns: hue spread of all frames over the 2D method's; the same of each frame by
+// voxels' coefficients, to the 2D frames; the networks with their residuals, if they have
+// one, and each network's colour map alone. --quick leaves out the ceilings, which take minutes. Columns: hue spread of all frames over the 2D method's; the same of each frame by
 // itself, the mean over frames; the first without pixels whose 2D lightness is below 10; chroma
 // over the 2D method's; PSNR to the 2D frames. The heading says how many of the 2D frames'
 // pixels have a channel at 0 or 255.
@@ -87,7 +88,7 @@ void Clip(std::vector<Image>* frames) {
     for (float& v : frame.pixels) v = std::clamp(v, 0.0f, 1.0f);
 }
 
-int Run(const std::string& out, const std::vector<std::string>& styles) {
+int Run(bool quick, const std::string& out, const std::vector<std::string>& styles) {
   const JsonValue options = ReadJsonFile(out + "/run.json", 1 << 24).At("options");
   StoredField source = ReadFieldFile(out + "/field.npz");
   source.field.appearance = PadShBasis(std::move(source.field.appearance), 9);
@@ -143,10 +144,12 @@ int Run(const std::string& out, const std::vector<std::string>& styles) {
   for (size_t i = 0; i < missing.size(); ++i)
     for (size_t k = 0; k < missing[i].pixels.size(); ++k)
       missing[i].pixels[k] -= map_renders[i].pixels[k];
-  for (const int harmonics : {1, 9})
+  for (const int harmonics : {1, 9}) {
+    if (quick) continue;
     row(harmonics == 1 ? "ceiling of one colour a voxel" : "ceiling",
         testing::RendersOf(testing::FieldCeiling(of_map, cameras, missing, harmonics),
                            cameras));
+  }
   for (const std::string& style : styles) {
     const StoredNetwork network = ReadNetworkFile(out + "/styles/" + style + "/network.npz");
     row("map of " + style, testing::RendersOf(
@@ -156,7 +159,8 @@ int Run(const std::string& out, const std::vector<std::string>& styles) {
                                    .field,
                                cameras));
     row("network " + style + Format(", bound %.2f K_est", network.network.Bound() / network.k_est),
-        testing::RendersOf(StyledFieldOf(source, network, 1, nullptr).field, cameras));
+        testing::RendersOf(
+            ReadStyledField(out, out + "/styles/" + style, 1).field, cameras));
   }
   return 0;
 }
@@ -165,12 +169,14 @@ int Run(const std::string& out, const std::vector<std::string>& styles) {
 }  // namespace regrade
 
 int main(int argc, char** argv) {
-  if (argc < 3) {
-    std::fprintf(stderr, "usage: hue_benchmark OUT STYLE [STYLE...]\n");
+  const bool quick = argc > 1 && std::string(argv[1]) == "--quick";
+  if (argc < 3 + quick) {
+    std::fprintf(stderr, "usage: hue_benchmark [--quick] OUT STYLE [STYLE...]\n");
     return 2;
   }
   try {
-    return regrade::Run(argv[1], std::vector<std::string>(argv + 2, argv + argc));
+    return regrade::Run(quick, argv[1 + quick],
+                        std::vector<std::string>(argv + 2 + quick, argv + argc));
   } catch (const regrade::Error& error) {
     std::fprintf(stderr, "hue_benchmark: %s\n", error.what());
     return 1;

@@ -1,8 +1,8 @@
 // Compares the 2D methods that need nothing on folders of pictures, in their order of names:
 //
-//   method_benchmark STYLE.jpg[,STYLE.jpg...] SIDE SHEET.png FOLDER...
+//   method_benchmark METHOD[,METHOD...] STYLE.jpg[,STYLE.jpg...] SIDE SHEET.png FOLDER...
 //
-// Pictures are brought to SIDE pixels. SHEET.png shows one picture of each folder in each
+// METHOD is as of --method: mkl, gmm, reinhard, idt, histogram or onnx:DIR. Pictures are brought to SIDE pixels. SHEET.png shows one picture of each folder in each
 // style, by each method; "-" writes none. Prints a Markdown table; a row is a mean over folders
 // and styles, the worst in brackets: the distance of the styled pictures' colours to the
 // style's (sliced Wasserstein), structure (correlation of edges with the picture), temporal
@@ -28,6 +28,7 @@
 #include "stylize/image/distribution_transfer.h"
 #include "stylize/image/gaussian_mixture.h"
 #include "stylize/image/mixture_transfer.h"
+#include "stylize/image/onnx_stylizer.h"
 
 namespace regrade {
 namespace {
@@ -38,7 +39,10 @@ struct Row {
 
 std::unique_ptr<ViewStylizer> Make(const StyleOptions& options, const Image& style,
                                    const std::vector<Image>& photos) {
-  const StyleMethodKind kind = ParseStyleMethod(options).kind;
+  const StyleMethod method = ParseStyleMethod(options);
+  const StyleMethodKind kind = method.kind;
+  if (kind == StyleMethodKind::kOnnx)
+    return MakeOnnxStylizer(method.argument, options.max_side, style);
   const auto sample = [&](int64_t all) {
     std::vector<Vec3d> scene;
     for (const Image& photo : photos)
@@ -124,12 +128,12 @@ std::string Cell(const std::vector<double>& values, int digits, bool low_is_wors
 }
 
 int Main(const std::vector<std::string>& words) {
-  const int side = std::stoi(words.at(1));
+  const int side = std::stoi(words.at(2));
   std::vector<Image> styles;
-  for (const std::string& path : Split(words.at(0), ','))
+  for (const std::string& path : Split(words.at(1), ','))
     styles.push_back(ReadStylePicture(path, nullptr));
   std::vector<std::vector<Image>> captures;
-  for (size_t k = 3; k < words.size(); ++k) {
+  for (size_t k = 4; k < words.size(); ++k) {
     captures.emplace_back();
     for (const ListedFile& file : ListFolder(words[k]).files) {
       const Image photo = DecodePhoto(file.path).image;
@@ -146,24 +150,26 @@ int Main(const std::vector<std::string>& words) {
   std::printf(
       "| method | distance to the style | structure | TC, dB | slope | s a picture |\n");
   std::printf("|---|---|---|---|---|---|\n");
-  for (const char* name : {"mkl", "gmm", "reinhard", "idt", "histogram"})
+  for (const std::string& given : Split(words.at(0), ','))
     for (const bool scene_wide : {false, true}) {
       StyleOptions options;
-      options.method = name;
+      options.method = given;
+      const std::string name = given.starts_with("onnx:") ? "onnx" : given;
+      if (name == "onnx" && scene_wide) continue;
       options.scene_wide = scene_wide;
       Row row;
-      columns.push_back(std::string(name) + (scene_wide ? " scene-wide" : ""));
+      columns.push_back(name + (scene_wide ? " scene-wide" : ""));
       size_t at = 0;
       for (const std::vector<Image>& photos : captures)
         for (const Image& style : styles)
           rows[at++].cells.push_back({Measure(options, style, photos, &row), ""});
-      std::printf("| `%s`%s | %s | %s | %s | %s | %s |\n", name,
+      std::printf("| `%s`%s | %s | %s | %s | %s | %s |\n", name.c_str(),
                   scene_wide ? " scene-wide" : "", Cell(row.distance, 3, false).c_str(),
                   Cell(row.structure, 3, true).c_str(), Cell(row.consistency, 2, true).c_str(),
                   Cell(row.slope, 1, false).c_str(), Cell(row.seconds, 3, false).c_str());
       std::fflush(stdout);
     }
-  if (words.at(2) != "-") WritePng8(words.at(2), MakeContactSheet(columns, rows));
+  if (words.at(3) != "-") WritePng8(words.at(3), MakeContactSheet(columns, rows));
   return 0;
 }
 
@@ -171,8 +177,8 @@ int Main(const std::vector<std::string>& words) {
 }  // namespace regrade
 
 int main(int count, char** words) {
-  if (count < 5) {
-    std::fprintf(stderr, "usage: method_benchmark STYLE[,STYLE...] SIDE SHEET.png FOLDER...\n");
+  if (count < 6) {
+    std::fprintf(stderr, "usage: method_benchmark METHOD[,METHOD...] STYLE[,STYLE...] SIDE SHEET.png FOLDER...\n");
     return 2;
   }
   return regrade::Main(std::vector<std::string>(words + 1, words + count));

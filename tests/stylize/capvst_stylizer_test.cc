@@ -60,10 +60,15 @@ Mat3d Turn(const std::vector<float>& m) {
 Image Expected(const Image& photo, const Image& style) {
   const ColorStatistics of_photo = MeasureColor(photo), of_style = MeasureColor(style);
   const Mat3d turn = Turn(kTurn), back = Turn(kBack);
-  const auto factor = [&](const ColorStatistics& s) {
-    return Factor(turn * s.covariance * turn.Transposed());
+  // Covariances are those of n - 1.
+  const auto factor = [&](const ColorStatistics& s, const Image& image) {
+    Mat3d c = turn * s.covariance * turn.Transposed();
+    const double n = static_cast<double>(image.num_pixels());
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) c(i, j) *= n / (n - 1);
+    return Factor(c);
   };
-  const Mat3d lc = factor(of_photo), ls = factor(of_style);
+  const Mat3d lc = factor(of_photo, photo), ls = factor(of_style, style);
   Image expected = photo;
   for (int64_t i = 0; i < photo.num_pixels(); ++i) {
     float* const p = &expected.pixels[static_cast<size_t>(3 * i)];

@@ -48,7 +48,7 @@ std::vector<double> RightShares(const RegionMatch& match, const RegionFeatures& 
   return {right[0] / all[0], right[1] / all[1]};
 }
 
-TEST(RegionMatch, H193_TwoKnownRegionsTakeTheirStyles) {
+TEST(RegionMatch, H189_TwoKnownRegionsTakeTheirStyles) {
   const TwoRegions scene = SkyAndGround(6, 160, 120);
   const std::vector<Image> styles = testing::SkyAndGroundStyles();
   const RegionFeatures features("", styles);
@@ -68,7 +68,7 @@ TEST(RegionMatch, H193_TwoKnownRegionsTakeTheirStyles) {
   EXPECT_NEAR(other.weight_of_style[0], match.weight_of_style[1], 1e-9);
 }
 
-TEST(RegionMatch, H193_StylesThatLookAlikeAreUnsure) {
+TEST(RegionMatch, H189_StylesThatLookAlikeAreUnsure) {
   const TwoRegions scene = SkyAndGround(3, 160, 120);
   const std::vector<Image> styles = testing::SkyAndGroundStyles();
   const RegionFeatures features("", styles);
@@ -79,7 +79,7 @@ TEST(RegionMatch, H193_StylesThatLookAlikeAreUnsure) {
             kMostUnsure);
 }
 
-TEST(RegionMatch, H193_AStyleThatNothingResemblesHasNoWeight) {
+TEST(RegionMatch, H189_AStyleThatNothingResemblesHasNoWeight) {
   const TwoRegions scene = SkyAndGround(3, 160, 120);
   const std::vector<Image> styles = {testing::SkyAndGroundStyles()[0],
                                      testing::SkyAndGroundStyles()[1],

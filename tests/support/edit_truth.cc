@@ -1,7 +1,9 @@
 #include "tests/support/edit_truth.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
 #include <utility>
 
 #include "kernels/synthetic/ray_trace.h"
@@ -44,6 +46,18 @@ Vec3d ColorAt(const Image& image, int64_t i) {
   return {p[0], p[1], p[2]};
 }
 
+// The depth of each view, computed once for all grades.
+const std::vector<Image>& DepthsOf(const SyntheticScene& scene,
+                                   const std::vector<Camera>& cameras) {
+  static std::map<std::array<int, 3>, std::vector<Image>> known;
+  std::vector<Image>& depths =
+      known[{static_cast<int>(cameras.size()), cameras[0].width, cameras[0].height}];
+  if (depths.empty())
+    for (const Camera& camera : cameras)
+      depths.push_back(RenderSyntheticView(scene, camera).depth);
+  return depths;
+}
+
 }  // namespace
 
 EditTruth::EditTruth(const std::string& grade, std::vector<Image> renders, int edited)
@@ -52,10 +66,11 @@ EditTruth::EditTruth(const std::string& grade, std::vector<Image> renders, int e
   const int count = static_cast<int>(renders_.size());
   const std::vector<Camera> cameras =
       SyntheticCameras(scene, count, renders_[0].width, renders_[0].height);
+  const std::vector<Image>& depths = DepthsOf(scene, cameras);
   const auto ball = std::ranges::find(scene.solids, Shape::kSphere, &Solid::shape);
   for (size_t i = 0; i < renders_.size(); ++i) {
     ApplyGrade(ParseSynthGrade(grade), scene, cameras[i],
-               RenderSyntheticView(scene, cameras[i]).depth,
+               depths[i],
                static_cast<int>(ball - scene.solids.begin()), &graded_[i]);
     parts_.push_back(PartsOf(renders_[i], graded_[i]));
   }
