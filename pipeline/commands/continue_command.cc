@@ -64,8 +64,8 @@ void RunStylize(const Command& command, const Arguments& arguments, Console* con
   if (other && !context.options.Given("match")) style.match.match = MatchChoice().match;
   if (other && !context.options.Given("match-network")) style.match.network.clear();
   ProbeStyles(&context.settings, console);
-  Continue(folder, *prepared, NameStyles(folder, style.pictures, style.name, style.match.On()), "style_2d",
-           &context);
+  Continue(folder, *prepared, NameStyles(folder, style.pictures, style.name, style.match.On()),
+           "style_2d", &context);
 }
 
 }  // namespace regrade

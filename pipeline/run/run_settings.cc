@@ -64,8 +64,8 @@ void CheckMatch(const RunSettings& settings) {
       throw UsageError("a LUT has no regions", "--match regions and --style " + picture,
                        "give pictures");
   if (ParseStyleMethod(settings.style_2d).kind == StyleMethodKind::kFolder)
-    throw UsageError("a folder holds finished pictures", "--match and --method folder:",
-                     "use another method");
+    throw UsageError("a folder holds finished pictures",
+                     "--match and --method folder:", "use another method");
 }
 
 void CheckTogether(const RunSettings& settings) {

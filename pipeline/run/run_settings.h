@@ -101,9 +101,10 @@ struct RenderOptions {
                   "parts are interpolated, and a GPU renders uniform fields in half precision, "
                   "with one colour for each 1/128 of opacity"});
     bind("vignette", vignette,
-         {.help = "A,B multiplies the style's films and stills by 1 + A r^2 + B r^4, r from 0 at "
-                  "the middle to 1 at the corners, as `regrade retouch --keep-vignette` sets it; "
-                  "none. What is measured, mixtures and pages have none"});
+         {.help =
+              "A,B multiplies the style's films and stills by 1 + A r^2 + B r^4, r from 0 at "
+              "the middle to 1 at the corners, as `regrade retouch --keep-vignette` sets it; "
+              "none. What is measured, mixtures and pages have none"});
     path.Describe(bind);
   }
 };

@@ -11,8 +11,8 @@ struct Vignette {
   double operator()(double squared) const { return 1 + a * squared + b * squared * squared; }
 };
 
-// Of --vignette: "A,B", or "none" for a = b = 0. Throws Error(kUsage) for anything else, and for
-// factors outside [0.05, 4].
+// Of --vignette: "A,B", or "none" for a = b = 0. Throws Error(kUsage) for anything else, and
+// for factors outside [0.05, 4].
 Vignette ParseVignette(const std::string& text);
 std::string VignetteText(const Vignette& vignette);
 

@@ -204,8 +204,7 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
     sequences.push_back({name, frames(folder.c_str(), all)});
   }
   const bool of_picture = !IsCubeFile(settings.style.picture());  // not a LUT
-  const Image style =
-      of_picture ? StyleExampleOf(settings.style, nullptr) : Image();
+  const Image style = of_picture ? StyleExampleOf(settings.style, nullptr) : Image();
   const auto photo_2d = [&](int i) {
     Image picture = ReadImage(workspace.Path("views_2d/" + FrameName(i)));
     if (settings.style.strength != 1)

@@ -85,8 +85,7 @@ std::unique_ptr<ViewStylizer> MakeMethod(RunContext* context, const Capture& cap
       return MakeFolderStylizer(method.argument, photos);
     }
     case StyleMethodKind::kCommand:
-      return MakeCommandStylizer(method.argument, path,
-                                 settings.style_2d.command_limit_s);
+      return MakeCommandStylizer(method.argument, path, settings.style_2d.command_limit_s);
     default:
       return MakeColorMethod(method.kind, settings.style_2d, style, capture, photo);
   }

@@ -28,17 +28,18 @@ void RequireClear(const RegionMatch& match, const std::vector<std::string>& pict
                        pictures[j], Concat("leave it out, or ", kUseMasks));
   if (match.Unsure() > kMostUnsure)
     throw InputError(
-        Format("the regions of %.0f %% of the scene look alike to two of the pictures (a margin "
-               "below %.2f; at most %.0f %% may)",
-               100 * match.Unsure(), kLeastMargin, 100 * kMostUnsure),
+        Format(
+            "the regions of %.0f %% of the scene look alike to two of the pictures (a margin "
+            "below %.2f; at most %.0f %% may)",
+            100 * match.Unsure(), kLeastMargin, 100 * kMostUnsure),
         "--match regions", kUseMasks);
 }
 
 std::string Notice(const RegionMatch& match, const std::vector<std::string>& pictures) {
   std::string text;
   for (size_t j = 0; j < pictures.size(); ++j)
-    text += (j > 0 ? ", " : "") +
-            Format("%.0f %% like ", 100 * match.weight_of_style[j]) + FileName(pictures[j]);
+    text += (j > 0 ? ", " : "") + Format("%.0f %% like ", 100 * match.weight_of_style[j]) +
+            FileName(pictures[j]);
   return Format("regions of the scene: %s; the least margin is %.2f", text.c_str(),
                 match.Margin());
 }
@@ -51,8 +52,7 @@ std::unique_ptr<ViewStylizer> MakeMatchedStylizer(const StyleSource& style, size
   std::vector<Image> examples;
   for (const std::string& path : style.pictures)
     examples.push_back(StyleExample(path, nullptr));
-  const auto features =
-      std::make_shared<const RegionFeatures>(style.match.network, examples);
+  const auto features = std::make_shared<const RegionFeatures>(style.match.network, examples);
   std::vector<PictureFeatures> of_styles, of_photos;
   for (const Image& example : examples) of_styles.push_back(features->Of(example));
   for (size_t i = 0; i < views; ++i)
@@ -66,21 +66,19 @@ std::unique_ptr<ViewStylizer> MakeMatchedStylizer(const StyleSource& style, size
 
   std::vector<std::unique_ptr<ViewStylizer>> regions;
   for (size_t j = 0; j < examples.size(); ++j)
-    regions.push_back(make(style.pictures[j], examples[j],
-                           [&, j](size_t i) -> std::optional<Image> {
-                             const std::optional<Image> picture = photo(i);
-                             if (!picture) return std::nullopt;
-                             const Image region =
-                                 RegionCoverage(*match, *features, *picture)[j];
-                             if (!ShowsRegion(region)) return std::nullopt;
-                             return WithRegion(*picture, region);
-                           }));
-  return MakeMaskedStylizer(
-      std::move(regions), of_colors,
-      [match, features](const Image& view, int) {
-        return RegionCoverage(*match, *features, view);
-      },
-      {Notice(*match, style.pictures)});
+    regions.push_back(
+        make(style.pictures[j], examples[j], [&, j](size_t i) -> std::optional<Image> {
+          const std::optional<Image> picture = photo(i);
+          if (!picture) return std::nullopt;
+          const Image region = RegionCoverage(*match, *features, *picture)[j];
+          if (!ShowsRegion(region)) return std::nullopt;
+          return WithRegion(*picture, region);
+        }));
+  return MakeMaskedStylizer(std::move(regions), of_colors,
+                            [match, features](const Image& view, int) {
+                              return RegionCoverage(*match, *features, view);
+                            },
+                            {Notice(*match, style.pictures)});
 }
 
 }  // namespace regrade

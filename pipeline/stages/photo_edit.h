@@ -14,12 +14,12 @@ namespace regrade {
 struct PhotoEdit {
   ColorTable table;  // the map of colours, 33^3
   bool of_photo =
-      false;            // that map is the identity: the layer is the difference from the photo
-  Image picture;        // the edit without vignette, sharpening and grain; size of the photo
-  Image layer;          // of that, what the map does not carry: [H, W, 3], in [-1, 1]
-  double change = 0;    // root mean square of edit - photo, in units of white
-  double local = 0;     // of what the map of colours does not explain, without fine detail
-  Vignette vignette;      // 1 everywhere where there is none
+      false;          // that map is the identity: the layer is the difference from the photo
+  Image picture;      // the edit without vignette, sharpening and grain; size of the photo
+  Image layer;        // of that, what the map does not carry: [H, W, 3], in [-1, 1]
+  double change = 0;  // root mean square of edit - photo, in units of white
+  double local = 0;   // of what the map of colours does not explain, without fine detail
+  Vignette vignette;  // 1 everywhere where there is none
   double sharpening = 0;  // of the photo's fine detail, added; 0 where there is none
   double grain = 0;       // standard deviation, in units of white
   bool IsLocal() const;   // does the place matter beyond the colour?

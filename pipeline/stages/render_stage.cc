@@ -127,7 +127,8 @@ class FrameWriter {
 
   // frames/<prefix>{source, styled, views_2d, transmittance}/<index>.png
   void Write(const std::shared_ptr<const Frame>& frame, const FrameSet& set, int index) {
-    if (set.of_film) film_.Do([=, this] { films_->Add(index, frame->source, Shown(frame->styled)); });
+    if (set.of_film)
+      film_.Do([=, this] { films_->Add(index, frame->source, Shown(frame->styled)); });
     if (set.of_2d_film && frame->views_2d)
       film_.Do([=, this] { films_->AddViews2d(Shown(*frame->views_2d)); });
     if (set.prefix == kFilmPrefix) return;

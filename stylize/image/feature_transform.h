@@ -41,8 +41,8 @@ FeatureAffine WhitenAndColor(const FeatureStatistics& content, const FeatureStat
                              const WhiteningRule& rule, double strength = 1);
 
 // EQ(cholesky-coloring), Wen et al. 2023 (cWCT): v -> L_S L_C^-1 (v - m_c) + m_s, symbols as
-// above, C = L_C L_C^T and S = L_S L_S^T with lower triangular L. Where a covariance is singular
-// in double, 2e-5, 4e-5, ... is added to its diagonal until it is not.
+// above, C = L_C L_C^T and S = L_S L_S^T with lower triangular L. Where a covariance is
+// singular in double, 2e-5, 4e-5, ... is added to its diagonal until it is not.
 FeatureAffine CholeskyColor(const FeatureStatistics& content, const FeatureStatistics& style);
 
 void Apply(const FeatureAffine& affine, FeatureMap* features);

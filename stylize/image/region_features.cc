@@ -19,8 +19,7 @@ constexpr int kColors = 6;  // two scales
 
 Image SmallCopy(const Image& picture) {
   const Image colors = Colors(picture);
-  const double scale =
-      static_cast<double>(kRegionSide) / std::max(colors.width, colors.height);
+  const double scale = static_cast<double>(kRegionSide) / std::max(colors.width, colors.height);
   const auto side = [scale](int n) {
     return std::max(1, static_cast<int>(std::lround(scale * n)));
   };
@@ -118,9 +117,8 @@ PictureFeatures RegionFeatures::Of(const Image& picture) const {
     const double above = 1 - (static_cast<double>(i / small.width) + 0.5) / small.height;
     row[kColors] = static_cast<float>(above / 5);
     for (int k = 0; network_ && k < kNetworkFeatures; ++k)
-      row[kColors + 1 + k] =
-          seen.row(i).dot(Eigen::Map<const Eigen::RowVectorXf>(
-              &directions_[static_cast<size_t>(k * seen.cols())], seen.cols()));
+      row[kColors + 1 + k] = seen.row(i).dot(Eigen::Map<const Eigen::RowVectorXf>(
+          &directions_[static_cast<size_t>(k * seen.cols())], seen.cols()));
   }
   return features;
 }

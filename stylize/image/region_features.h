@@ -20,11 +20,11 @@ struct PictureFeatures {
 
 // EQ(region-features): of a copy whose longer side is kRegionSide pixels,
 //   (g_1, g_w / 2, v / 5[, e]),  g_s = (L / 2, a, b) / 100 under a Gaussian of s pixels,
-// w a sixteenth of the longer side: the colour at a pixel, in CIELAB with lightness at half, for
-// shadows change it; the colour around it, which tells a pale tile of a blue wall from one of a
-// red floor; and the height v in the picture, 0 at the bottom, 1 at the top. With a network
-// also e, its features in the kNetworkFeatures directions of largest variance over the example
-// pictures, scaled by one factor to a total variance of kNetworkVariance there.
+// w a sixteenth of the longer side: the colour at a pixel, in CIELAB with lightness at half,
+// for shadows change it; the colour around it, which tells a pale tile of a blue wall from one
+// of a red floor; and the height v in the picture, 0 at the bottom, 1 at the top. With a
+// network also e, its features in the kNetworkFeatures directions of largest variance over the
+// example pictures, scaled by one factor to a total variance of kNetworkVariance there.
 inline constexpr int kRegionSide = 96;
 inline constexpr int kNetworkFeatures = 4;
 inline constexpr double kNetworkVariance = 0.04;

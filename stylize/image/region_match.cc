@@ -5,9 +5,9 @@
 #include <limits>
 
 #include "kernels/base/error.h"
+#include "kernels/image/resize.h"
 #include "stylize/image/guided_filter.h"
 #include "stylize/image/view_stylizer.h"
-#include "kernels/image/resize.h"
 
 namespace regrade {
 namespace {

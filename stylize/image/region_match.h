@@ -16,8 +16,8 @@ namespace regrade {
 // at the least distance d, the root of c_kl of EQ(mixture-transport); its margin is 1 - d / d',
 // d' the least distance of another style. A style's share in a pixel is the sum of the shares
 // of its parts, see EQ(gaussian-mixture), given the picture's edges by EQ(guided-filter). Only
-// parts with a margin of kDeciding have shares, or the one of largest margin of each style: what
-// is between is often the border of two regions, and belongs to the nearest parts.
+// parts with a margin of kDeciding have shares, or the one of largest margin of each style:
+// what is between is often the border of two regions, and belongs to the nearest parts.
 inline constexpr int kSceneRegions = 8, kStyleRegions = 3;
 inline constexpr double kDeciding = 0.4;
 // A part with less is unsure, and matching is refused where unsure parts have more weight.
@@ -25,7 +25,7 @@ inline constexpr double kLeastMargin = 0.2, kMostUnsure = 0.05;
 
 struct RegionMatch {
   RegionMixture scene;
-  RegionMixture deciding;                // of these, those that have shares
+  RegionMixture deciding;  // of these, those that have shares
   std::vector<int> style_of_deciding;
   std::vector<int> style_of_part;
   std::vector<double> margin_of_part;

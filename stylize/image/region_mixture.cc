@@ -72,13 +72,11 @@ double Expect(const RegionMixture& mixture, const Eigen::MatrixXd& x, Eigen::Mat
     const Eigen::MatrixXd d =
         x.colwise() - Eigen::Map<const Vector>(part.mean.data(), x.rows());
     const double scale = std::log(part.weight) - lower.diagonal().array().log().sum();
-    shares->col(k) = (scale - 0.5 * lower.triangularView<Eigen::Lower>()
-                                        .solve(d)
-                                        .colwise()
-                                        .squaredNorm()
-                                        .array())
-                         .matrix()
-                         .transpose();
+    shares->col(k) =
+        (scale -
+         0.5 * lower.triangularView<Eigen::Lower>().solve(d).colwise().squaredNorm().array())
+            .matrix()
+            .transpose();
   }
   // The largest share is exp(0) before it is divided: the sum is at least 1.
   const Vector largest = shares->rowwise().maxCoeff();
@@ -88,8 +86,8 @@ double Expect(const RegionMixture& mixture, const Eigen::MatrixXd& x, Eigen::Mat
   return (largest.array() + sum.array().log()).mean();
 }
 
-// [rows, parts]: 1 for the nearest of so many rows that are far from each other, each drawn with
-// the squared distance to those before it.
+// [rows, parts]: 1 for the nearest of so many rows that are far from each other, each drawn
+// with the squared distance to those before it.
 Eigen::MatrixXd FirstShares(const Eigen::MatrixXd& x, int parts, uint64_t seed) {
   constexpr uint64_t kStream = 0x7265;
   const auto to = [&x](Eigen::Index row) -> Vector {
@@ -143,8 +141,8 @@ std::vector<float> RegionShares(const RegionMixture& mixture, const FeatureRows&
 double PartDistance(const RegionPart& a, const RegionPart& b) {
   REGRADE_CHECK_EQ(a.mean.size(), b.mean.size());
   const auto n = static_cast<Eigen::Index>(a.mean.size());
-  const Vector d = Eigen::Map<const Vector>(a.mean.data(), n) -
-                   Eigen::Map<const Vector>(b.mean.data(), n);
+  const Vector d =
+      Eigen::Map<const Vector>(a.mean.data(), n) - Eigen::Map<const Vector>(b.mean.data(), n);
   const Matrix root = Raised(CovarianceOf(a), 0, 0.5);
   const Matrix between = root * CovarianceOf(b) * root;
   const double shared = Raised((between + between.transpose()) / 2, 0, 0.5).trace();

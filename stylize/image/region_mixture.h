@@ -23,8 +23,8 @@ using RegionMixture = std::vector<RegionPart>;
 
 inline constexpr double kPartFloor = 0.02 * 0.02;
 
-// EQ(gaussian-mixture) in more dimensions: expectation maximisation from k-means++ on `seed`, 60
-// iterations at most. Fewer than `parts` where the rows have fewer clusters wider than the
+// EQ(gaussian-mixture) in more dimensions: expectation maximisation from k-means++ on `seed`,
+// 60 iterations at most. Fewer than `parts` where the rows have fewer clusters wider than the
 // floor. The same for any number of threads. There must be a row, all finite.
 RegionMixture FitRegions(const FeatureRows& rows, int parts, uint64_t seed);
 

@@ -8,7 +8,8 @@
 // run's size. Rows: the 2D method; one linear map for all frames, on pixels and carried into
 // the field; the ceiling, the least squares of one more colour at each voxel, and of all
 // voxels' coefficients, to the 2D frames; the networks with their residuals, if they have
-// one, and each network's colour map alone. --quick leaves out the ceilings, which take minutes. Columns: hue spread of all frames over the 2D method's; the same of each frame by
+// one, and each network's colour map alone. --quick leaves out the ceilings, which take
+// minutes. Columns: hue spread of all frames over the 2D method's; the same of each frame by
 // itself, the mean over frames; the first without pixels whose 2D lightness is below 10; chroma
 // over the 2D method's; PSNR to the 2D frames. The heading says how many of the 2D frames'
 // pixels have a channel at 0 or 255.
@@ -117,9 +118,10 @@ int Run(bool quick, const std::string& out, const std::vector<std::string>& styl
                 Decibels(frames, of_method));
     std::fflush(stdout);
   };
-  std::printf("| %s: %.1f %% at 0 or 255, hue spread %.3f | hue spread | of each frame | without "
-              "dark | chroma | dB |\n|---|---|---|---|---|---|\n",
-              styles[0].c_str(), 100 * clipped / pixels, reference.all);
+  std::printf(
+      "| %s: %.1f %% at 0 or 255, hue spread %.3f | hue spread | of each frame | without "
+      "dark | chroma | dB |\n|---|---|---|---|---|---|\n",
+      styles[0].c_str(), 100 * clipped / pixels, reference.all);
   row("2D method", of_method);
 
   const std::vector<Image> renders = testing::RendersOf(source.field, cameras);
@@ -152,15 +154,16 @@ int Run(bool quick, const std::string& out, const std::vector<std::string>& styl
   }
   for (const std::string& style : styles) {
     const StoredNetwork network = ReadNetworkFile(out + "/styles/" + style + "/network.npz");
-    row("map of " + style, testing::RendersOf(
-                               StyledFieldOf(source, {NetworkOfMap(network.network.data().base),
-                                                      network.k_est, network.background},
-                                             1, nullptr)
-                                   .field,
-                               cameras));
-    row("network " + style + Format(", bound %.2f K_est", network.network.Bound() / network.k_est),
-        testing::RendersOf(
-            ReadStyledField(out, out + "/styles/" + style, 1).field, cameras));
+    row("map of " + style,
+        testing::RendersOf(StyledFieldOf(source,
+                                         {NetworkOfMap(network.network.data().base),
+                                          network.k_est, network.background},
+                                         1, nullptr)
+                               .field,
+                           cameras));
+    row("network " + style +
+            Format(", bound %.2f K_est", network.network.Bound() / network.k_est),
+        testing::RendersOf(ReadStyledField(out, out + "/styles/" + style, 1).field, cameras));
   }
   return 0;
 }

@@ -2,13 +2,14 @@
 //
 //   method_benchmark METHOD[,METHOD...] STYLE.jpg[,STYLE.jpg...] SIDE SHEET.png FOLDER...
 //
-// METHOD is as of --method: mkl, gmm, reinhard, idt, histogram or onnx:DIR. Pictures are brought to SIDE pixels. SHEET.png shows one picture of each folder in each
-// style, by each method; "-" writes none. Prints a Markdown table; a row is a mean over folders
-// and styles, the worst in brackets: the distance of the styled pictures' colours to the
-// style's (sliced Wasserstein), structure (correlation of edges with the picture), temporal
-// consistency of neighbours (lai2018, dis-medium, which suits neighbours that overlap), the
-// steepest slope between neighbouring pixels' colours that differ by a step of 4 to 32 of 255
-// (the 99.9 % quantile), and seconds a picture with the map's own measuring.
+// METHOD is as of --method: mkl, gmm, reinhard, idt, histogram or onnx:DIR. Pictures are
+// brought to SIDE pixels. SHEET.png shows one picture of each folder in each style, by each
+// method; "-" writes none. Prints a Markdown table; a row is a mean over folders and styles,
+// the worst in brackets: the distance of the styled pictures' colours to the style's (sliced
+// Wasserstein), structure (correlation of edges with the picture), temporal consistency of
+// neighbours (lai2018, dis-medium, which suits neighbours that overlap), the steepest slope
+// between neighbouring pixels' colours that differ by a step of 4 to 32 of 255 (the 99.9 %
+// quantile), and seconds a picture with the map's own measuring.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -178,7 +179,9 @@ int Main(const std::vector<std::string>& words) {
 
 int main(int count, char** words) {
   if (count < 6) {
-    std::fprintf(stderr, "usage: method_benchmark METHOD[,METHOD...] STYLE[,STYLE...] SIDE SHEET.png FOLDER...\n");
+    std::fprintf(stderr,
+                 "usage: method_benchmark METHOD[,METHOD...] STYLE[,STYLE...] SIDE SHEET.png "
+                 "FOLDER...\n");
     return 2;
   }
   return regrade::Main(std::vector<std::string>(words + 1, words + count));

@@ -47,7 +47,10 @@ int Run(const std::string& out, const std::string& grade, const std::string& nam
 
   const double linear = truth.ErrorsOf(truth.ByLinearMap()).inside;
   const double ceiling =
-      truth.ErrorsOf(testing::RendersOf(testing::FieldCeiling(source.field, cameras, missing), cameras)).inside;
+      truth
+          .ErrorsOf(testing::RendersOf(testing::FieldCeiling(source.field, cameras, missing),
+                                       cameras))
+          .inside;
   const auto row = [&](const char* what, const std::vector<Image>& pictures) {
     const testing::EditErrors errors = truth.ErrorsOf(pictures);
     std::printf("| %s | %.2e | %.1f %% | %.2f |\n", what, errors.inside,
@@ -58,7 +61,8 @@ int Run(const std::string& out, const std::string& grade, const std::string& nam
   std::printf("|---|---|---|---|\n| best linear map | %.2e | 0 %% | |\n", linear);
   row("unedited", truth.renders());
   row("2D method on renders", of_method);
-  row("network alone", testing::RendersOf(StyledFieldOf(source, network, 1, nullptr).field, cameras));
+  row("network alone",
+      testing::RendersOf(StyledFieldOf(source, network, 1, nullptr).field, cameras));
   row("with residual", testing::RendersOf(ReadStyledField(out, style, 1).field, cameras));
   std::printf("| ceiling | %.2e | 100 %% | |\n", ceiling);
   return 0;

@@ -96,8 +96,9 @@ TEST(MatchedStyles, EachRegionTakesItsPictureAndTheStyleIsLikeAnyOther) {
   EXPECT_EQ(outcome.code, 0) << outcome.text;
   outcome = Regrade({"mix", folder / "out", "sky-wall", "--mix", "0.5", "--out", folder / "m"});
   EXPECT_EQ(outcome.code, 0) << outcome.text;
-  outcome = Regrade({"contact-sheet", folder / "out", sky, wall, "--match", "regions",
-                     "--steps", "2", "--size", "64", "--views", "1", "--out", folder / "c.png"});
+  outcome =
+      Regrade({"contact-sheet", folder / "out", sky, wall, "--match", "regions", "--steps", "2",
+               "--size", "64", "--views", "1", "--out", folder / "c.png"});
   EXPECT_EQ(outcome.code, 0) << outcome.text;
   EXPECT_TRUE(fs::exists(folder / "c.png"));
 
@@ -123,8 +124,7 @@ TEST(MatchedStyles, EachRegionTakesItsPictureAndTheStyleIsLikeAnyOther) {
 
 TEST(StyleFolders, PicturesOfOneStyleAreNamedTogether) {
   const TemporaryFolder folder;
-  for (const char* name : {"a.png", "b.png", "c.png"})
-    testing::WriteText(folder / name, name);
+  for (const char* name : {"a.png", "b.png", "c.png"}) testing::WriteText(folder / name, name);
   const std::vector<std::string> both = {folder / "a.png", folder / "b.png"};
   const std::vector<NamedStyle> named = NameStyles(folder / "out", both, "", true);
   ASSERT_EQ(named.size(), 1u);
@@ -133,9 +133,9 @@ TEST(StyleFolders, PicturesOfOneStyleAreNamedTogether) {
   EXPECT_EQ(NameStyles(folder / "out", both, "mine", true)[0].name, "mine");
   EXPECT_NE(PicturesHash(both), PicturesHash({both[1], both[0]}));
   // Another pair has the name.
-  testing::WriteText(folder / "out/styles/a-b/run.json",
-                     "{\"picture_hash\": \"" + PicturesHash({both[0], folder / "c.png"}) +
-                         "\"}");
+  testing::WriteText(
+      folder / "out/styles/a-b/run.json",
+      "{\"picture_hash\": \"" + PicturesHash({both[0], folder / "c.png"}) + "\"}");
   EXPECT_EQ(NameStyles(folder / "out", both, "", true)[0].name, "a-b-2");
 }
 

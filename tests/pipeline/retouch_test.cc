@@ -13,8 +13,10 @@
 #include "pipeline/images/cube_file.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/images/video_reader.h"
+#include "pipeline/run/vignette.h"
 #include "pipeline/synth/synth_grade.h"
 #include "tests/support/edit_truth.h"
+#include "tests/support/expect_error.h"
 #include "tests/support/record_error.h"
 #include "tests/support/source_dir.h"
 #include "tests/support/spawn.h"
@@ -91,10 +93,9 @@ TEST(Retouch, TheSceneFollowsEachEditAsItsExactTruth) {
     WriteGraded(edited(grade), grade);
   EXPECT_EQ(ReadImage(edited("global")).pixels,
             ReadImage(Frame(folder / "s/truth/graded", kEdited)).pixels);
-  std::vector<std::string> reconstruct{"reconstruct", folder / "s/truth",
-                                       "--out",       folder / "out",
-                                       "--device",    "cpu",
-                                       "--holdout",   "0"};
+  std::vector<std::string> reconstruct{
+      "reconstruct", folder / "s/truth", "--out", folder / "out", "--device",
+      "cpu",         "--holdout",        "0"};
   for (const std::string flag :
        {"--photo-size", "192", "--fit-resolutions", "96", "--fit-steps", "1200",
         "--style-steps", "200", "--film-seconds", "0.125", "--fps", "24", "--film-size", "64",
@@ -140,13 +141,12 @@ TEST(Retouch, TheSceneFollowsEachEditAsItsExactTruth) {
   ASSERT_EQ(steady.size(), 6u);
   for (size_t k = 0; k < 3; ++k) {
     const double lost = steady[2 * k] - steady[2 * k + 1];
-    EXPECT_LE(lost,
-              RecordBound(std::vector<std::string>{"global", "local", "object"}[k] +
-                              " edit: TC-PSNR below the graded renders', dB",
-                          Computed::kFloat, lost, 0.3));
+    EXPECT_LE(lost, RecordBound(std::vector<std::string>{"global", "local", "object"}[k] +
+                                    " edit: TC-PSNR below the graded renders', dB",
+                                Computed::kFloat, lost, 0.3));
   }
-  // The vignette belongs to the picture: the renders' colours are mapped as by the grade without
-  // it.
+  // The vignette belongs to the picture: the renders' colours are mapped as by the grade
+  // without it.
   const ColorLut with = ReadCubeFile(style("vignette") + "/edit.cube"),
                  without = ReadCubeFile(style("global") + "/edit.cube");
   double moved = 0, count = 0;
@@ -198,28 +198,28 @@ TEST(Retouch, H190_AKeptVignetteIsOnFilmsAndStillsAndNotInTheScene) {
   for (const std::string& flag : testing::TinyFlags()) reconstruct.push_back(flag);
   reconstruct[reconstruct.size() - testing::TinyFlags().size() + 1] = "192";
   ASSERT_EQ(Regrade(reconstruct).code, 0);
-  ProgramOutcome outcome =
-      Regrade({"retouch", folder / "out", "--photo", "00002", "--edited",
-               folder / "s/truth/graded/00002.png", "--name", "v", "--keep-vignette", "--until",
-               "render"});
+  ProgramOutcome outcome = Regrade({"retouch", folder / "out", "--photo", "00002", "--edited",
+                                    folder / "s/truth/graded/00002.png", "--name", "v",
+                                    "--keep-vignette", "--until", "render"});
   ASSERT_EQ(outcome.code, 0) << outcome.text;
   EXPECT_NE(outcome.text.find("films and stills have it"), std::string::npos) << outcome.text;
   const std::string style = folder / "out/styles/v";
   EXPECT_NE(ReadText(style + "/run.json").find("\"vignette\": \"-0."), std::string::npos);
-  // The film against the frames that are measured, which have none: 1 - 0.35 r^2 at the corners,
-  // r from 0.9 to 1, and nothing in the middle. The film's codec moves means by a percent.
+  // The film against the frames that are measured, which have none: 1 - 0.35 r^2 at the
+  // corners, r from 0.9 to 1, and nothing in the middle. The film's codec moves means by a
+  // percent.
   VideoReader film(style + "/styled.mp4");
   ASSERT_TRUE(film.Next());
   const Image frame = film.Picture();
   const auto [corners, middle] = CornersAndMiddle(
-      frame, Resize(ReadImage(style + "/frames/path_styled/00000.png"), frame.width,
-                    frame.height));
+      frame,
+      Resize(ReadImage(style + "/frames/path_styled/00000.png"), frame.width, frame.height));
   EXPECT_NEAR(corners, 0.68, 0.04);
   EXPECT_NEAR(middle, 1, 0.02);
   // Stills, with and without.
   const auto still = [&](const std::vector<std::string>& more) {
-    std::vector<std::string> command{"render", folder / "out", "--name", "v", "--still",
-                                     "00002"};
+    std::vector<std::string> command{"render", folder / "out", "--name",
+                                     "v",      "--still",      "00002"};
     command.insert(command.end(), more.begin(), more.end());
     EXPECT_EQ(Regrade(command).code, 0);
     return ReadImage(style + "/stills/00002.png");
@@ -228,10 +228,19 @@ TEST(Retouch, H190_AKeptVignetteIsOnFilmsAndStillsAndNotInTheScene) {
       CornersAndMiddle(still({}), still({"--vignette", "none"}));
   EXPECT_NEAR(still_corners, 0.68, 0.04);
   EXPECT_NEAR(still_middle, 1, 0.02);
-  // A factor below a twentieth, text, and one number.
-  for (const std::string bad : {"-1,0", "dark", "-0.3", "nan,0"})
-    EXPECT_EQ(Regrade({"render", folder / "out", "--name", "v", "--vignette", bad}).code, 2)
-        << bad;
+}
+
+TEST(Vignette, H190_FactorsThatBlackenAPictureAreRefused) {
+  const Vignette vignette = ParseVignette("-0.3,0.05");
+  EXPECT_EQ(vignette(0), 1);
+  EXPECT_NEAR(vignette(1), 0.75, 1e-12);
+  EXPECT_EQ(VignetteText(vignette), "-0.3,0.05");
+  EXPECT_EQ(VignetteText(ParseVignette("none")), "none");
+  // Black corners, corners five times as bright, a ring that is black, text, one number, no
+  // number.
+  for (const std::string bad :
+       {"-1,0", "4,0", "-4,4", "dark", "-0.3", "nan,0", "0,inf", "1,2,3"})
+    EXPECT_REGRADE_ERROR(ParseVignette(bad), ExitCode::kUsage, "is no vignette");
 }
 
 TEST(Retouch, ALocalEditIsLearnedFromItsPhotoAlone) {

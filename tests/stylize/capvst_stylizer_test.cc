@@ -1,4 +1,5 @@
-// CAP-VSTNet's way through its two segments, with tiny networks: a turn of the colours and back.
+// CAP-VSTNet's way through its two segments, with tiny networks: a turn of the colours and
+// back.
 #include "stylize/image/capvst_stylizer.h"
 
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // Which regions of a scene take which style picture: known regions of a synthetic scene, and
-// what cannot be told apart.
+// what cannot be distinguished.
 #include "stylize/image/region_match.h"
 
 #include <gtest/gtest.h>

@@ -69,8 +69,7 @@ EditTruth::EditTruth(const std::string& grade, std::vector<Image> renders, int e
   const std::vector<Image>& depths = DepthsOf(scene, cameras);
   const auto ball = std::ranges::find(scene.solids, Shape::kSphere, &Solid::shape);
   for (size_t i = 0; i < renders_.size(); ++i) {
-    ApplyGrade(ParseSynthGrade(grade), scene, cameras[i],
-               depths[i],
+    ApplyGrade(ParseSynthGrade(grade), scene, cameras[i], depths[i],
                static_cast<int>(ball - scene.solids.begin()), &graded_[i]);
     parts_.push_back(PartsOf(renders_[i], graded_[i]));
   }

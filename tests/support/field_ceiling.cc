@@ -13,7 +13,8 @@ namespace {
 
 constexpr int kSteps = 60;
 
-// Rays and coefficients [voxels, 3, harmonics] as a matrix: each ray's colour is linear in them.
+// Rays and coefficients [voxels, 3, harmonics] as a matrix: each ray's colour is linear in
+// them.
 class Coefficients {
  public:
   Coefficients(const RadianceField& field, const std::vector<Camera>& cameras,

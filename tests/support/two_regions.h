@@ -1,4 +1,5 @@
-// Photos of a synthetic scene with two known regions, and style pictures that look like one each.
+// Photos of a synthetic scene with two known regions, and style pictures that look like one
+// each.
 #pragma once
 
 #include <algorithm>
@@ -64,9 +65,8 @@ inline std::vector<Image> SkyAndGroundStyles() {
       const double grain =
           0.1 * (RandomDouble(3, 0, static_cast<uint64_t>(y) * wall.width + x) - 0.5);
       for (int c = 0; c < 3; ++c)
-        wall.at(x, y)[c] = static_cast<float>(
-            std::clamp((mortar ? Vec3d{0.6, 0.5, 0.4} : Vec3d{0.6, 0.28, 0.14})[c] + grain, 0.0,
-                       1.0));
+        wall.at(x, y)[c] = static_cast<float>(std::clamp(
+            (mortar ? Vec3d{0.6, 0.5, 0.4} : Vec3d{0.6, 0.28, 0.14})[c] + grain, 0.0, 1.0));
     }
   return {sky, wall};
 }
