@@ -104,9 +104,11 @@ TEST(Retouch, TheSceneFollowsEachEditAsItsExactTruth) {
   ProgramOutcome outcome = Regrade(reconstruct);
   ASSERT_EQ(outcome.code, 0) << outcome.text;
   const auto retouch = [&](const std::string& grade, const std::string& picture,
-                           const std::string& until) {
-    return Regrade({"retouch", folder / "out", "--photo", "00006", "--edited", picture,
-                    "--name", grade, "--until", until});
+                           const std::vector<std::string>& more) {
+    std::vector<std::string> command{"retouch",  folder / "out", "--photo", "00006",
+                                     "--edited", picture,        "--name",  grade};
+    command.insert(command.end(), more.begin(), more.end());
+    return Regrade(command);
   };
   const auto style = [&](const std::string& grade) { return folder / ("out/styles/" + grade); };
   using testing::Computed;
@@ -115,7 +117,9 @@ TEST(Retouch, TheSceneFollowsEachEditAsItsExactTruth) {
   std::vector<std::vector<Image>> sequences;  // graded renders and styled frames, in turn
   for (const std::string grade : {"global", "local", "object", "vignette"}) {
     // Of the vignette the map of colours is compared, from which alone the scene is made.
-    outcome = retouch(grade, edited(grade), grade == "vignette" ? "style_2d" : "render");
+    outcome = grade == "vignette"
+                  ? retouch(grade, edited(grade), {"--until", "stylize", "--style-steps", "1"})
+                  : retouch(grade, edited(grade), {"--until", "render"});
     ASSERT_EQ(outcome.code, 0) << outcome.text;
     EXPECT_TRUE(fs::exists(style(grade) + "/edit.cube"));
     const bool local = grade == "local" || grade == "object";
@@ -165,7 +169,7 @@ TEST(Retouch, TheSceneFollowsEachEditAsItsExactTruth) {
                      edited("global"), "--name", "global"});
   EXPECT_EQ(outcome.code, 3);
   EXPECT_NE(outcome.text.find("is no photo of the capture"), std::string::npos);
-  outcome = retouch("global", folder / "s/images/00009.png", "render");
+  outcome = retouch("global", folder / "s/images/00009.png", {});
   EXPECT_EQ(outcome.code, 3) << outcome.text;
   EXPECT_NE(outcome.text.find("photo"), std::string::npos) << outcome.text;
 }
