@@ -98,7 +98,7 @@ TEST(AdaptOptions, RaysFollowThePixelsOnACardOnly) {
   };
   EXPECT_EQ(rays(false, 1000000), 4096);
   EXPECT_EQ(rays(true, 100000), 4096);
-  EXPECT_EQ(rays(true, 1000000), kPasses * 1000);
+  EXPECT_EQ(rays(true, 500000), kPasses * 500);
   EXPECT_EQ(rays(true, 100000000), 14336);
   options.rays_per_step = 77;
   EXPECT_EQ(rays(true, 1000000), 77);
