@@ -72,7 +72,7 @@ def linear_weights(size, new):
 
 def embedding(w, picture):
     rows, columns = ((area_weights if size > SIDE else linear_weights)(size, SIDE) for size in picture.shape[:2])
-    square = numpy.einsum("yh,xw,hwc->yxc", rows, columns, picture)
+    square = numpy.einsum("xw,ywc->yxc", columns, numpy.einsum("yh,hwc->ywc", rows, picture))
     return numpy.maximum(conv(w["vector"], w["vector_bias"], network_input(square)), 0).mean(axis=(1, 2))
 
 

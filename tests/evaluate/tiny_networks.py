@@ -71,11 +71,12 @@ def write_networks(folder, random):
     numpy.savez(os.path.join(folder, "weights.npz"), **w)
     at = lambda name: os.path.join(folder, name + ".onnx")
 
+    # As README.md of evaluate/ exports LPIPS: the sum over channels is a convolution with ones.
     lpips = Network("first", "second")
     for x in ("first", "second"):
         f = lpips.node("Relu", [lpips.conv(x, w["lpips"], w["lpips_bias"], x + "_c")], x + "_f")
-        total = lpips.node("ReduceSum", [lpips.node("Mul", [f, f], x + "_square")], x + "_sum", axes=[1], keepdims=1)
-        length = lpips.node("Add", [lpips.node("Sqrt", [total], x + "_root"), lpips.tensor(x + "_eps", [1e-3])], x + "_length")
+        total = lpips.conv(lpips.node("Mul", [f, f], x + "_square"), numpy.ones((8, 8)), numpy.zeros(8), x + "_sum")
+        length = lpips.node("Add", [lpips.node("Sqrt", [total], x + "_root"), lpips.tensor(x + "_eps", 1e-3)], x + "_length")
         lpips.node("Div", [f, length], x + "_unit")
     d = lpips.node("Sub", ["first_unit", "second_unit"], "difference")
     lpips.conv(lpips.node("Mul", [d, d], "squares"), [w["heads"]], [0], "weighted")
