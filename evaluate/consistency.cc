@@ -41,8 +41,8 @@ double Decibel(double error) {
 struct PairTask {
   int i = 0, j = 0;
   bool warps_earlier = false;
-  std::vector<std::pair<std::shared_ptr<const Image>, std::shared_ptr<const Image>>>
-      frames = {};  // i and j of each sequence
+  std::vector<std::pair<std::shared_ptr<const Image>, std::shared_ptr<const Image>>> frames =
+      {};  // i and j of each sequence
   std::shared_ptr<const PairMotion> motion = nullptr;
   std::vector<PairResult> results = {};
 

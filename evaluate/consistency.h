@@ -62,10 +62,11 @@ struct ConsistencyOptions {
     bind("lpips", lpips,
          {.help = "ONNX file of a perceptual distance network (LPIPS), with the inputs of "
                   "--flow onnx:FILE; compares each sequence with the 2D method's frames"});
-    bind("edges", edges,
-         {.help = "compares edges with the unstyled frames' by SSIM: gradient, or the ONNX file "
-                  "of an edge network with one input, RGB from -1 to 1, and one output [1, 1, "
-                  "height, width] from 0 to 1"});
+    bind(
+        "edges", edges,
+        {.help = "compares edges with the unstyled frames' by SSIM: gradient, or the ONNX file "
+                 "of an edge network with one input, RGB from -1 to 1, and one output [1, 1, "
+                 "height, width] from 0 to 1"});
     bind("style-features", style_features,
          {.help = "ONNX file of a network with one input, RGB from -1 to 1, whose outputs [1, "
                   "channels, ...] are features (VGG's): distances of Gram matrices and of "

@@ -23,10 +23,10 @@ FeatureStatistics::FeatureStatistics(const std::vector<float>& features, int cha
   REGRADE_CHECK(channels > 0 && features.size() % static_cast<size_t>(channels) == 0);
   count_ = std::ssize(features) / channels;
   if (count_ == 0) return;
-  Matrix centred = Eigen::Map<const Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic,
-                                                  Eigen::RowMajor>>(features.data(), channels,
-                                                                    count_)
-                       .cast<double>();
+  Matrix centred =
+      Eigen::Map<const Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
+          features.data(), channels, count_)
+          .cast<double>();
   const Eigen::VectorXd mean = centred.rowwise().mean();
   centred.colwise() -= mean;
   const Matrix scatter = centred * centred.transpose();
@@ -85,8 +85,8 @@ double FrechetDistance(const FeatureStatistics& a, const FeatureStatistics& b) {
   const Matrix inner = root * of_b * root;
   const Matrix symmetric = (inner + inner.transpose()) / 2;  // up to rounding it is
   const Eigen::SelfAdjointEigenSolver<Matrix> both(symmetric, Eigen::EigenvaluesOnly);
-  return std::max(0.0, means + of_a.trace() + of_b.trace() -
-                           2 * RootsOf(both.eigenvalues()).sum());
+  return std::max(0.0,
+                  means + of_a.trace() + of_b.trace() - 2 * RootsOf(both.eigenvalues()).sum());
 }
 
 }  // namespace regrade

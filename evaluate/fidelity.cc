@@ -213,9 +213,8 @@ std::vector<FidelityRow> MeasureFidelities(const std::vector<NamedFrameSource>& 
   }
   for (int i = 0; i < frames;) {
     std::vector<FrameTask> tasks = ReadTasks(sequences, targets, i, frames);
-    ParallelTasks(0, std::ssize(tasks), [&](int64_t t) {
-      tasks[static_cast<size_t>(t)].Run(targets, sequences);
-    });
+    ParallelTasks(0, std::ssize(tasks),
+                  [&](int64_t t) { tasks[static_cast<size_t>(t)].Run(targets, sequences); });
     for (const FrameTask& task : tasks)
       for (size_t s = 0; s < sequences.size(); ++s) {
         if (task.frames[s].empty()) continue;

@@ -23,9 +23,10 @@ Image WithoutAlpha(const Image& picture) {
 }  // namespace
 
 ImageNetwork::ImageNetwork(const std::string& path)
-    : runner_(path,
-              "it must have one input, [1, 3, height, width] from -1 to 1, and take pictures of "
-              "any size") {}
+    : runner_(
+          path,
+          "it must have one input, [1, 3, height, width] from -1 to 1, and take pictures of "
+          "any size") {}
 
 std::vector<FeatureStatistics> ImageNetwork::Features(const Image& picture) const {
   std::vector<FeatureStatistics> statistics;

@@ -7,9 +7,10 @@
 namespace regrade {
 
 PairNetwork::PairNetwork(const std::string& path)
-    : runner_(path,
-              "it must have two inputs named first and second, [1, 3, height, width] from -1 to "
-              "1, and take pictures of any size") {}
+    : runner_(
+          path,
+          "it must have two inputs named first and second, [1, 3, height, width] from -1 to "
+          "1, and take pictures of any size") {}
 
 FlowField PairNetwork::Flow(const Image& from, const Image& to) const {
   const NetworkOutput output = runner_.Run({{"first", &from}, {"second", &to}});

@@ -74,9 +74,8 @@ std::optional<double> HistogramCorrelation(const Image& a, const Image& b) {
   return sum / channels;
 }
 
-PairedQuality MeasurePair(
-    const std::string& name, const Image& picture, const Image& truth,
-    const std::function<double(const Image&, const Image&)>& perceptual) {
+PairedQuality MeasurePair(const std::string& name, const Image& picture, const Image& truth,
+                          const std::function<double(const Image&, const Image&)>& perceptual) {
   PairedQuality quality;
   quality.name = name;
   quality.psnr_db = Psnr(picture, truth);
@@ -111,7 +110,8 @@ std::string FormatPairedTable(const std::vector<PairedRow>& rows, const std::str
     if (lpips) cells.back().push_back(WithInterval(row, &PairedQuality::lpips, 3));
   }
   return FormatTable(
-      "Pictures against their ground truth: means with 95 % intervals (bootstrap over pictures)",
+      "Pictures against their ground truth: means with 95 % intervals (bootstrap over "
+      "pictures)",
       cells, "", form);
 }
 

@@ -32,7 +32,8 @@ class StyleDistances {
       : style_(std::move(style)) {}
   void Add(const Image& frame);
 
-  // Mean over frames of the sum over outputs of the distance of Gram matrices, see EQ(gram-distance).
+  // Mean over frames of the sum over outputs of the distance of Gram matrices, see
+  // EQ(gram-distance).
   std::optional<double> Gram() const;
   // Sum over outputs of the Fréchet distance between the features of all frames, pooled over
   // frames and positions, and those of the style picture: see EQ(frechet-distance).

@@ -26,7 +26,8 @@ std::string Align(const std::vector<TableCells>& rows) {
 }
 
 // The cells between a start, separators and an end.
-std::string Joined(const TableCells& row, const char* start, const char* between, const char* end) {
+std::string Joined(const TableCells& row, const char* start, const char* between,
+                   const char* end) {
   std::string line = start;
   for (size_t c = 0; c < row.size(); ++c) line += (c > 0 ? between : "") + row[c];
   return line + end;
@@ -96,7 +97,7 @@ std::string TableNumber(const std::optional<double>& value, int decimals) {
 }
 
 std::string FormatTable(const std::string& title, const std::vector<TableCells>& rows,
-                  const std::string& remarks, const std::string& form) {
+                        const std::string& remarks, const std::string& form) {
   if (form == "text") return title + "\n" + Align(rows) + remarks;
   if (form == "markdown") {
     return title + "\n\n" + Markdown(rows) + (remarks.empty() ? "" : "\n" + remarks);

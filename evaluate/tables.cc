@@ -17,7 +17,7 @@ std::string Range(const std::optional<Interval>& interval) {
 
 std::string ConsistencyTable(const ConsistencyReport& report, const std::string& form) {
   std::vector<TableCells> rows{{"sequence", "gap", "pairs", "undefined", "mean of dB", "95 %",
-                           "dB of mean", "compared"}};
+                                "dB of mean", "compared"}};
   std::string remarks;
   for (const ConsistencyRow& row : report.rows) {
     rows.push_back({row.sequence, std::to_string(row.gap), std::to_string(row.pairs),
@@ -41,13 +41,14 @@ std::string ConsistencyTable(const ConsistencyReport& report, const std::string&
                               (report.error_per == "pixel" ? "" : " and channel") +
                               (report.warp == "earlier" ? ", the earlier frame warped" : "");
   return FormatTable("Consistency: TC-PSNR, higher is better (mode " + report.mode + ", flow " +
-                   report.flow + ", " + reading +
-                   "; 95 %: block bootstrap of the mean of dB, runs of the gap's length)",
-               rows, remarks, form);
+                         report.flow + ", " + reading +
+                         "; 95 %: block bootstrap of the mean of dB, runs of the gap's length)",
+                     rows, remarks, form);
 }
 
 std::string WarpedTable(const ConsistencyReport& report, const std::string& form) {
-  std::vector<TableCells> rows{{"sequence", "gap", "pairs", "RMSE published", "RMSE", "compared"}};
+  std::vector<TableCells> rows{
+      {"sequence", "gap", "pairs", "RMSE published", "RMSE", "compared"}};
   const bool lpips = std::ranges::any_of(report.warped, [](const WarpedRow& row) {
     return row.published.lpips || row.corrected.lpips;
   });
@@ -64,11 +65,12 @@ std::string WarpedTable(const ConsistencyReport& report, const std::string& form
     if (!row.why.empty())
       remarks += Concat(row.sequence, ", gap ", row.gap, ": ", row.why, "\n");
   }
-  return FormatTable("Consistency after forward warping, lower is better (mode " + report.mode +
-                   ", flow " + report.flow +
-                   "; published: flow of the measured frames, mean over all pixels; else flow "
-                   "of the unstyled frames, mean over the mask)",
-               rows, remarks, form);
+  return FormatTable(
+      "Consistency after forward warping, lower is better (mode " + report.mode + ", flow " +
+          report.flow +
+          "; published: flow of the measured frames, mean over all pixels; else flow "
+          "of the unstyled frames, mean over the mask)",
+      rows, remarks, form);
 }
 
 // A column of the table of fidelity; those of kOptionalColumns are left out where no row has a
@@ -100,9 +102,8 @@ std::string FidelityTable(const ConsistencyReport& consistency,
                           const std::vector<FidelityRow>& fidelity, const std::string& form) {
   std::vector<FidelityColumn> columns(std::begin(kColumns), std::end(kColumns));
   for (const FidelityColumn& column : kOptionalColumns)
-    if (std::ranges::any_of(fidelity, [&](const FidelityRow& row) {
-          return (row.*column.value).has_value();
-        }))
+    if (std::ranges::any_of(
+            fidelity, [&](const FidelityRow& row) { return (row.*column.value).has_value(); }))
       columns.push_back(column);
   std::vector<TableCells> rows{{"sequence"}};
   for (const FidelityColumn& column : columns) rows[0].push_back(column.name);
@@ -128,8 +129,8 @@ std::string FidelityTable(const ConsistencyReport& consistency,
         ": fidelity was not measured; high consistency may come from lost colours; give the 2D "
         "method's frames and the style picture\n";
   }
-  return FormatTable("Fidelity: closeness to the 2D method's frames and to the style's colours", rows,
-               remarks, form);
+  return FormatTable("Fidelity: closeness to the 2D method's frames and to the style's colours",
+                     rows, remarks, form);
 }
 
 }  // namespace

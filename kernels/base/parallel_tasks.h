@@ -1,5 +1,5 @@
-// Independent tasks in parallel, a whole frame or pair each: loops inside a task then run in its
-// own thread, and no thread waits for others after each of them.
+// Independent tasks in parallel, a whole frame or pair each: loops inside a task then run in
+// its own thread, and no thread waits for others after each of them.
 #pragma once
 
 #include <omp.h>

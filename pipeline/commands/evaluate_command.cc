@@ -41,9 +41,10 @@ struct FramesOptions {
     bind("target", target,
          {.help = "folder with the 2D method's version of each frame, for fidelity"});
     bind("style", style, {.help = "style picture, for fidelity"});
-    bind("pst50", pst50,
-         {.help = "folder of the 2D benchmark PST50: --frames has a method's picture of each of "
-                  "its contents, of the same names, which are compared with paired_gt"});
+    bind(
+        "pst50", pst50,
+        {.help = "folder of the 2D benchmark PST50: --frames has a method's picture of each of "
+                 "its contents, of the same names, which are compared with paired_gt"});
     // Stands for other options, which ExpandProtocol() puts in its place.
     bind("protocol", protocol,
          {.help = "a published protocol by name, also for runs: sets --mode, --gaps and "
@@ -166,11 +167,13 @@ void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& optio
 // Pictures of a 2D method against their ground truth; `words` are those of the command line.
 void EvaluatePairs(const FramesOptions& frames, const ConsistencyOptions& options,
                    const Arguments& words, Console* console) {
-  for (const auto& [flag, value] :
-       {std::pair{"--reference", frames.reference}, {"--target", frames.target},
-        {"--style", frames.style}, {"--require", frames.require}, {"--edges", options.edges},
-        {"--style-features", options.style_features},
-        {"--style-embedding", options.style_embedding}})
+  for (const auto& [flag, value] : {std::pair{"--reference", frames.reference},
+                                    {"--target", frames.target},
+                                    {"--style", frames.style},
+                                    {"--require", frames.require},
+                                    {"--edges", options.edges},
+                                    {"--style-features", options.style_features},
+                                    {"--style-embedding", options.style_embedding}})
     if (!value.empty())
       throw UsageError("pictures of PST50 are compared with its ground truth only", flag,
                        "leave it out");

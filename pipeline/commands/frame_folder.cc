@@ -88,8 +88,7 @@ Image Coloured(Image image) {
 }  // namespace
 
 FrameSource FrameFolder::Source() const {
-  return {static_cast<int>(paths.size()),
-          [paths = paths, kept = kept](int i) {
+  return {static_cast<int>(paths.size()), [paths = paths, kept = kept](int i) {
             return Coloured(kept.Read(paths.at(static_cast<size_t>(i))));
           }};
 }

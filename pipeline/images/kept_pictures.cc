@@ -69,9 +69,8 @@ Image KeptPictures::Read(const std::string& path) const {
     stored.picture.height = picture.height;
     stored.picture.channels = picture.channels;
   }
-  const int64_t size =
-      std::ssize(stored.bytes) +
-      std::ssize(stored.picture.pixels) * static_cast<int64_t>(sizeof(float));
+  const int64_t size = std::ssize(stored.bytes) +
+                       std::ssize(stored.picture.pixels) * static_cast<int64_t>(sizeof(float));
   if (size > shared_->bytes_left) return picture;
   shared_->bytes_left -= size;
   shared_->pictures.emplace(path, std::move(stored));

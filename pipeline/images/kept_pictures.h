@@ -9,9 +9,9 @@
 
 namespace regrade {
 
-// ReadImage for files that do not change meanwhile. A picture whose values are all k / 255 takes
-// a byte for each; the first ones are kept, up to a limit. For one thread at a time; copies
-// share what they keep.
+// ReadImage for files that do not change meanwhile. A picture whose values are all k / 255
+// takes a byte for each; the first ones are kept, up to a limit. For one thread at a time;
+// copies share what they keep.
 class KeptPictures {
  public:
   explicit KeptPictures(int64_t most_bytes = int64_t{320} << 20);

@@ -279,7 +279,8 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
     measured.push_back(ControlFieldFrames(*ceiling, training_cameras, kCeilingControl));
   std::vector<FidelityRow> fidelity = MeasureFidelities(
       measured, targets, parts.Next(n * kFrameSeconds * static_cast<double>(measured.size())));
-  AddFilm(context, networks, CommonCamera(cameras), &parts, &consistency, &fidelity, &heat_maps);
+  AddFilm(context, networks, CommonCamera(cameras), &parts, &consistency, &fidelity,
+          &heat_maps);
   const FidelityTargets photo_targets{of_photos,         targets.transmittance, nullptr, {}, {},
                                       /*only_psnr=*/true};
   const FidelityRow to_photos = MeasureFidelity({"styled", frames("styled", training_views)},
@@ -302,7 +303,8 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   if (!settings.consistency.lpips.empty()) {
     const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
     const auto lpips = [&](const std::vector<int>& of) {
-      return MeanOf(MeasureOnPhotos(context->Views(), of, stored, backend, networks.perceptual).lpips);
+      return MeanOf(
+          MeasureOnPhotos(context->Views(), of, stored, backend, networks.perceptual).lpips);
     };
     report.lpips_heldout = lpips(views.HeldOut());
     report.lpips_train = lpips(MeasuredTrainingViews(views));

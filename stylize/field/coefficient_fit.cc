@@ -81,9 +81,9 @@ class Coefficients {
   }
 
  private:
-  ResidualRays rays_;           // `voxel` counts those of seen_
+  ResidualRays rays_;  // `voxel` counts those of seen_
   std::vector<int64_t> seen_;
-  std::vector<float> gamma_;    // [rays, 9]
+  std::vector<float> gamma_;  // [rays, 9]
 };
 
 double Square(const std::vector<double>& x) {

@@ -57,7 +57,8 @@ int Run(const std::string& out, const std::string& grade, const std::string& nam
 
   const double linear = truth.ErrorsOf(truth.ByLinearMap()).inside;
   const double ceiling =
-      truth.ErrorsOf(Renders(FitCoefficients(source.field, cameras, missing, {}), cameras)).inside;
+      truth.ErrorsOf(Renders(FitCoefficients(source.field, cameras, missing, {}), cameras))
+          .inside;
   const auto row = [&](const char* what, const std::vector<Image>& pictures) {
     const testing::EditErrors errors = truth.ErrorsOf(pictures);
     std::printf("| %s | %.2e | %.1f %% | %.2f |\n", what, errors.inside,

@@ -71,7 +71,8 @@ TEST(FeatureStatistics, FrechetDistanceAgreesWithItsDefinition) {
   // The product is not symmetric; its eigenvalues are those of the symmetric form.
   const Eigen::EigenSolver<Eigen::MatrixXd> product(of_a * of_b);
   double roots = 0;
-  for (const auto& value : product.eigenvalues()) roots += std::sqrt(std::max(0.0, value.real()));
+  for (const auto& value : product.eigenvalues())
+    roots += std::sqrt(std::max(0.0, value.real()));
   const double expected =
       (mean_a - mean_b).squaredNorm() + of_a.trace() + of_b.trace() - 2 * roots;
   EXPECT_GT(expected, 0.01);

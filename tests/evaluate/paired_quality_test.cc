@@ -27,9 +27,10 @@ TEST(HistogramCorrelation, AgreesWithItsDefinition) {
     }
     double sa = 0, sb = 0, saa = 0, sbb = 0, sab = 0;
     for (int i = 0; i < 256; ++i)
-      sa += ha[i], sb += hb[i], saa += ha[i] * ha[i], sbb += hb[i] * hb[i], sab += ha[i] * hb[i];
-    expected += (256 * sab - sa * sb) /
-                std::sqrt((256 * saa - sa * sa) * (256 * sbb - sb * sb)) / 3;
+      sa += ha[i], sb += hb[i], saa += ha[i] * ha[i], sbb += hb[i] * hb[i],
+          sab += ha[i] * hb[i];
+    expected +=
+        (256 * sab - sa * sb) / std::sqrt((256 * saa - sa * sa) * (256 * sbb - sb * sb)) / 3;
   }
   EXPECT_NEAR(*HistogramCorrelation(a, b), expected, 1e-12);  // integers but for the shares
   EXPECT_NEAR(*HistogramCorrelation(a, a), 1, 1e-12);
@@ -54,8 +55,9 @@ TEST(PairedQuality, MeansLeaveOutWhatIsInfinite) {
   const auto distance = [](const Image& a, const Image& b) {
     return a.pixels == b.pixels ? 0.0 : 0.5;
   };
-  PairedRow row{"result",
-                {MeasurePair("1", truth, truth, distance), MeasurePair("2", other, truth, distance)}};
+  PairedRow row{
+      "result",
+      {MeasurePair("1", truth, truth, distance), MeasurePair("2", other, truth, distance)}};
   EXPECT_TRUE(std::isinf(*row.pictures[0].psnr_db));
   EXPECT_EQ(*row.Mean(&PairedQuality::psnr_db), *row.pictures[1].psnr_db);
   EXPECT_EQ(*row.Mean(&PairedQuality::lpips), 0.25);

@@ -88,8 +88,8 @@ TEST(PairedBenchmark, FromTheCommandLine) {
   WriteText(folder / "lpips.onnx", testing::DistanceNetwork(48, 64));
   const auto evaluate = [&](const std::vector<std::string>& more, std::string* text) {
     ChildOptions options;
-    options.argv = {REGRADE_PROGRAM, "evaluate",           "--pst50", folder / "pst50",
-                    "--frames",      folder / "results",   "--lpips", folder / "lpips.onnx",
+    options.argv = {REGRADE_PROGRAM, "evaluate",         "--pst50", folder / "pst50",
+                    "--frames",      folder / "results", "--lpips", folder / "lpips.onnx",
                     "--out",         folder / "out"};
     options.argv.insert(options.argv.end(), more.begin(), more.end());
     options.wall_limit_s = 120;

@@ -83,7 +83,8 @@ TEST(CoefficientFit, ReachesWhatTheseVoxelsCanShow) {
   const std::vector<Image> before = Renders(field), wanted = OtherPictures(field);
   const RadianceField fitted =
       FitCoefficients(field, Cameras(), Difference(wanted, before), {});
-  const double first = SquaredError(before, wanted), last = SquaredError(Renders(fitted), wanted);
+  const double first = SquaredError(before, wanted),
+               last = SquaredError(Renders(fitted), wanted);
   EXPECT_GT(first, 1e-4);
   EXPECT_LT(last, 1e-4 * first);  // of 60 steps; samples of a weight up to 1e-4 are left out
 }
@@ -96,9 +97,8 @@ TEST(CoefficientFit, NoOtherCoefficientsAreCloser) {
   std::vector<Image> wanted = before;
   for (size_t i = 0; i < wanted.size(); ++i)
     for (size_t k = 0; k < wanted[i].pixels.size(); ++k)
-      wanted[i].pixels[k] +=
-          static_cast<float>(0.1 * (static_cast<double>(i) - 1) +
-                             0.1 * (RandomDouble(2, i, k) - 0.5));
+      wanted[i].pixels[k] += static_cast<float>(0.1 * (static_cast<double>(i) - 1) +
+                                                0.1 * (RandomDouble(2, i, k) - 0.5));
   CoefficientFitOptions options;
   options.steps = 400;
   const RadianceField fitted =
