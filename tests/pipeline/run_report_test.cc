@@ -166,9 +166,9 @@ TEST(RunReport, ShowsEveryPartOfTheRun) {
     EXPECT_EQ(measured_rows.count(sequence), 1u) << sequence;
     EXPECT_EQ(row.At("undefined_pairs").AsInt() > 0, sequence == "photos_2d") << sequence;
   }
-  for (const char* sequence : {"photos", "photos_2d", "control_blurred", "control_grey",
-                               "control_linear_map", "path_control_grey", "control_field_2d",
-                               "control_ceiling"})
+  for (const char* sequence :
+       {"photos", "photos_2d", "control_blurred", "control_grey", "control_linear_map",
+        "path_control_grey", "control_field_2d", "control_ceiling"})
     EXPECT_EQ(measured_rows.count(sequence), 1u) << sequence;
   // The field of the 2D method's pictures is one of them, not the scene's, and is fitted once.
   const auto to_2d = [&](const char* sequence) {
