@@ -17,6 +17,7 @@ async function loadScene(header, graphics, progress) {
   await wait();
   const number = await unpackDensity('density', earlier);
   if (!onCells) places = cellsOfGrid(vertices, resolution, number);
+  places = raisedTree(places);
   const rootOfWidth = Array.from({length: 32}, (_, log2) => 2 ** (-0.5 * log2));
   const root = (i) => i < n ? number[i] * rootOfWidth[vertices.width[i]] : 0;
 
