@@ -185,9 +185,11 @@ void MakeLinks(const PageOrder& order, Geometry* geometry) {
 
 }  // namespace
 
-std::vector<int64_t> VoxelsInPageOrder(const Geometry& geometry) {
-  return VoxelsOf(geometry, OrderOf(geometry, geometry.cells.on() ? TreeOfCells(geometry)
-                                                                  : MaskOfGrid(geometry)));
+PageVoxels VoxelsInPageOrder(const Geometry& geometry) {
+  PageOrder order =
+      OrderOf(geometry, geometry.cells.on() ? TreeOfCells(geometry) : MaskOfGrid(geometry));
+  std::vector<int64_t> voxel = VoxelsOf(geometry, order);
+  return {std::move(voxel), std::move(order.earlier)};
 }
 
 PageField EncodeField(const RadianceField& field, double step) {

@@ -37,11 +37,7 @@ struct MadePage {
   RadianceField field;              // as the page has it
 };
 
-// Why a page does not hold the style of that folder, or "": a page has a network for each
-// style.
-std::string WhyNoPage(const std::string& style_folder);
-
-// `styles`: names in `folder`; whole-scene styles only. Throws Error(kInput).
+// `styles`: names in `folder`; with what they add voxel by voxel. Throws Error(kInput).
 MadePage MakePage(const std::string& folder, const std::vector<std::string>& styles,
                   const PageOptions& options, const ProgressFunction& progress);
 

@@ -22,6 +22,7 @@ async function loadScene(header, graphics, progress) {
   const root = (i) => i < n ? number[i] * rootOfWidth[vertices.width[i]] : 0;
 
   const scene = {header, top: places.top, finest: places.finest, cells: places.corner.length / 8, voxels: n};
+  if (header.styles.some((style) => style.residual)) scene.earlier = earlier;
   scene.unit = Math.max(...[0, 1, 2].map((a) => 2 * header.radius[a] / resolution[a]));
   scene.tree = graphics.texture('u4', packedTree(places, root));
   scene.corner = graphics.texture('u4', new Uint32Array(places.corner.buffer));

@@ -68,6 +68,23 @@ async function unpackDensity(id, earlier) {
   return number;
 }
 
+// What a style adds voxel by voxel, see residual_codec.h: eight bytes each, three codes of colours, a weight, three view
+// scales; `bytes`: of all texels.
+async function unpackResidual(id, {scale, view, weight}, earlier, bytes) {
+  const packed = await bytesOf(id), n = earlier.length / 3, number = new Int16Array(n), into = new Uint8Array(bytes).fill(255);
+  const channels = [];
+  for (let c = 0; c < 3 && scale; ++c) channels.push([c, (v) => v + 128]);
+  for (let c = 4; c < 7 && view; ++c) channels.push([c, (v) => 255 - v]);
+  if (weight) channels.push([3, (v) => v]);
+  if (packed.length !== 2 * n * channels.length) throw new PageError('a part of the page is damaged: ' + id);
+  if (!scale) for (let i = 0; i < n; ++i) into.fill(128, 8 * i, 8 * i + 3);
+  for (const [k, [at, code]] of channels.entries()) {
+    channelNumbers(packed, k, earlier, number);
+    for (let i = 0; i < n; ++i) into[8 * i + at] = code(number[i]);
+  }
+  return new Uint32Array(into.buffer);
+}
+
 // Codes of 8 bits: put(voxel, channel, code).
 async function unpackColors(id, header, channels, earlier, put, progress) {
   const bytes = await bytesOf(id), n = earlier.length / 3;
