@@ -259,6 +259,16 @@ TEST(TrainNetwork, H109_H110_ResumeAndThreadsAreBitwise) {
   EXPECT_EQ(straight.psnr_db, resumed.psnr_db);
 }
 
+TEST(TrainNetwork, CheckpointsComeAtTheTenthStepAndThenEvenly) {
+  const StyledBall ball(10, 3, 24, LinearStyle);
+  std::vector<int64_t> steps;
+  TrainingHooks hooks;
+  hooks.checkpoint_every = 20;
+  hooks.checkpoint = [&](const TrainingState& state) { steps.push_back(state.step); };
+  TrainNetwork(ball.field, ball.views, MapOf(ball), {}, Quick(45), hooks);
+  EXPECT_EQ(steps, (std::vector<int64_t>{10, 20, 40, 45}));
+}
+
 TEST(TrainNetwork, H109_RaysAreAFunctionOfSeedAndStep) {
   StyledBall ball(8, 6, 24, LinearStyle);
   for (auto& view : ball.views) view.mask = nullptr;
