@@ -19,6 +19,7 @@ Exit status 1 if a picture differs, 77 if there is no Chromium or no EGL.
 
 import argparse
 import base64
+import bz2
 import ctypes
 import json
 import math
@@ -28,7 +29,6 @@ import shutil
 import statistics
 import sys
 import time
-import zlib
 
 # ---- pack
 
@@ -100,10 +100,10 @@ def pack(arguments):
                 data = base64.b64decode(page.value(ROWS % json.dumps([index, y, min(64, height - y)])))
                 for k, plane in enumerate(planes):
                     plane += data[k::len(planes)]
-            name = f"texture_{index}.z"
+            name = f"texture_{index}.bz2"
             with open(os.path.join(arguments.folder, name), "wb") as file:
                 # Byte by byte of the texels, which packs better.
-                file.write(zlib.compress(b"".join(planes), 9))
+                file.write(bz2.compress(b"".join(planes)))
             scene["textures"].append({"file": name, "kind": kind, "height": height})
             print(f"{name}: {kind} x {height}", flush=True)
     with open(os.path.join(arguments.folder, "scene.json"), "w", encoding="utf-8") as file:
@@ -253,7 +253,7 @@ class Scene:
 
     def texture(self, folder, about):
         with open(os.path.join(folder, about["file"]), "rb") as file:
-            planes = zlib.decompress(file.read())
+            planes = bz2.decompress(file.read())
         width, channels, height = 4 * int(about["kind"][1]), int(about["kind"][1]), about["height"]
         data, n = bytearray(len(planes)), len(planes) // width
         for k in range(width):
