@@ -54,8 +54,7 @@ std::vector<T> Chosen(const std::vector<T>& values, const std::vector<int64_t>& 
   return chosen;
 }
 
-StyleLayers InPageOrder(const StyleLayers& layers, const Geometry& geometry) {
-  const std::vector<int64_t> of = VoxelsInPageOrder(geometry).voxel;
+StyleLayers InPageOrder(const StyleLayers& layers, const std::vector<int64_t>& of) {
   return {{Chosen(layers.residual.color, of), Chosen(layers.residual.view_scale, of)},
           Chosen(layers.weight, of)};
 }
@@ -130,6 +129,9 @@ MadePage MakePage(const std::string& folder, const std::vector<std::string>& sty
   const std::vector<Camera> checked =
       options.check ? CheckedViews(views.Cameras(), kChecked) : std::vector<Camera>{};
   MadePage made;
+  made.places = VoxelsInPageOrder(content.field, *page.geometry);
+  const std::vector<int64_t> of =
+      VoxelsInPageOrder(content.field, *stored.field.geometry).voxel;
   PageCheck check;
   if (options.check) {
     check = CheckPage(stored.field, page, checked);
@@ -142,8 +144,7 @@ MadePage MakePage(const std::string& folder, const std::vector<std::string>& sty
     const StoredNetwork network = ReadNetworkFile(style_folder + "/network.npz");
     const StyleLayers layers = ReadLayers(style_folder, stored.field.geometry->num_voxels());
     PageStyle style =
-        EncodeStyle(network, page, StrengthOf(style_folder),
-                    layers.empty() ? layers : InPageOrder(layers, *stored.field.geometry));
+        EncodeStyle(network, page, StrengthOf(style_folder), InPageOrder(layers, of), made.places);
     const Image picture = RenderHome(style.styled, home);
     if (i == 0 && style.header.At("strength").AsDouble() == 1)
       content.poster = EncodeJpeg(picture, kQuality);

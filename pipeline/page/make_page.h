@@ -8,6 +8,7 @@
 
 #include "kernels/base/progress.h"
 #include "kernels/field/radiance_field.h"
+#include "pipeline/page/field_codec.h"
 
 namespace regrade {
 
@@ -35,6 +36,7 @@ struct MadePage {
   std::vector<int64_t> style_bytes;
   std::vector<std::string> report;  // lines of --check
   RadianceField field;              // as the page has it
+  PageVoxels places;                // its voxels, as the page orders them
 };
 
 // `styles`: names in `folder`; with what they add voxel by voxel. Throws Error(kInput).

@@ -7,7 +7,6 @@
 #include "kernels/field/pad_sh_basis.h"
 #include "kernels/network/fused_mlp.h"
 #include "pipeline/files/deflate.h"
-#include "pipeline/page/field_codec.h"
 #include "pipeline/page/value_codec.h"
 #include "stylize/field/apply_network.h"
 #include "stylize/field/base_map.h"
@@ -48,8 +47,12 @@ Coded RoundToCodes(RadianceField* field) {
           RoundToCodes(&appearance.sphere_color, 3)};
 }
 
+PageStyle EncodeStyle(const StoredNetwork& stored, const RadianceField& page, double strength) {
+  return EncodeStyle(stored, page, strength, {}, {});
+}
+
 PageStyle EncodeStyle(const StoredNetwork& stored, const RadianceField& page, double strength,
-                      const StyleLayers& layers) {
+                      const StyleLayers& layers, const PageVoxels& places) {
   const LipschitzNetworkData& data = stored.network.data();
   DenseNetwork<float> dense = stored.network.Effective<float>();
   std::string halves;
@@ -73,7 +76,6 @@ PageStyle EncodeStyle(const StoredNetwork& stored, const RadianceField& page, do
   style.styled.background = stored.background;
   JsonValue residual;
   if (!layers.empty()) {
-    const PageVoxels places = VoxelsInPageOrder(*page.geometry);
     PageResidual packed = EncodeResidual(layers, places.earlier);
     ApplyLayers(packed.rounded, places.voxel, source, &style.styled);
     style.residual = std::move(packed.packed);

@@ -129,10 +129,10 @@ void WritePages(const std::string& folder, const std::string& name, const Radian
   content.cameras = CamerasOf(forward_facing);
   content.field = EncodeField(field, 0.03);
   RadianceField page = DecodeField(content.field);
+  const PageVoxels places = VoxelsInPageOrder(content.field, *page.geometry);
   StyleLayers layers;
-  if (kind != Layers::kNone)
-    layers = SomeLayers(kind, VoxelsInPageOrder(*page.geometry).voxel.size());
-  content.styles = {EncodeStyle(Style(), page, 0.5, layers)};
+  if (kind != Layers::kNone) layers = SomeLayers(kind, places.voxel.size());
+  content.styles = {EncodeStyle(Style(), page, 0.5, layers, places)};
   content.styles[0].header["id"] = "a";
   const Image picture(8, 6, 3);
   content.poster = EncodeJpeg(picture, 80);
