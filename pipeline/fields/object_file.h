@@ -1,4 +1,5 @@
-// object.npz: f32 "weights" [regions, voxels] in [0, 1], the object weights of a style that is limited to masks.
+// object.npz: f32 "weights" [regions, voxels] in [0, 1], the object weights of a style that is
+// limited to masks.
 #pragma once
 
 #include <cstdint>

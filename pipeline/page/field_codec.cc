@@ -187,8 +187,8 @@ void MakeLinks(const PageOrder& order, Geometry* geometry) {
 }  // namespace
 
 PageVoxels VoxelsInPageOrder(const PageField& page, const Geometry& geometry) {
-  PageOrder order = OrderOf(
-      geometry, SectionBytes(page, geometry.cells.on() ? "tree" : "mask", kMaxPlaces));
+  PageOrder order =
+      OrderOf(geometry, SectionBytes(page, geometry.cells.on() ? "tree" : "mask", kMaxPlaces));
   std::vector<int64_t> voxel = VoxelsOf(geometry, order);
   return {std::move(voxel), std::move(order.earlier)};
 }

@@ -45,8 +45,8 @@ PageField EncodeField(const RadianceField& field, double step);
 // memory in proportion to what the sections unpack to.
 RadianceField DecodeField(const PageField& page);
 
-// The voxels of a page in its order: which they are in `geometry`, that of the field that was encoded or decoded, and from
-// which others they are predicted.
+// The voxels of a page in its order: which they are in `geometry`, that of the field that was
+// encoded or decoded, and from which others they are predicted.
 struct PageVoxels {
   std::vector<int64_t> voxel;
   std::vector<EarlierVoxels> earlier;

@@ -143,20 +143,20 @@ MadePage MakePage(const std::string& folder, const std::vector<std::string>& sty
     const std::string style_folder = StyleFolder(folder, styles[i]);
     const StoredNetwork network = ReadNetworkFile(style_folder + "/network.npz");
     const StyleLayers layers = ReadLayers(style_folder, stored.field.geometry->num_voxels());
-    PageStyle style =
-        EncodeStyle(network, page, StrengthOf(style_folder), InPageOrder(layers, of), made.places);
+    PageStyle style = EncodeStyle(network, page, StrengthOf(style_folder),
+                                  InPageOrder(layers, of), made.places);
     const Image picture = RenderHome(style.styled, home);
     if (i == 0 && style.header.At("strength").AsDouble() == 1)
       content.poster = EncodeJpeg(picture, kQuality);
     content.style_pictures.push_back(Thumbnail(picture, kThumbnail));
     if (options.check) {
-      made.report.push_back(
-          CheckLine("its style " + styles[i],
-                    CheckPage(ExactStyle(stored.field, network, layers), style.styled, checked)));
+      made.report.push_back(CheckLine(
+          "its style " + styles[i],
+          CheckPage(ExactStyle(stored.field, network, layers), style.styled, checked)));
       if (!style.residual.empty())
-        made.report.push_back(
-            Format("what style %s adds voxel by voxel: %.0f kB of the page", styles[i].c_str(),
-                   static_cast<double>(InText(style.residual.size())) / 1e3));
+        made.report.push_back(Format("what style %s adds voxel by voxel: %.0f kB of the page",
+                                     styles[i].c_str(),
+                                     static_cast<double>(InText(style.residual.size())) / 1e3));
     }
     style.styled = {};
     style.header["id"] = PageStyleId(style_folder);

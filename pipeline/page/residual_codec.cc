@@ -18,7 +18,8 @@ int16_t Byte(float part) {
 
 }  // namespace
 
-PageResidual EncodeResidual(const StyleLayers& layers, const std::vector<EarlierVoxels>& earlier) {
+PageResidual EncodeResidual(const StyleLayers& layers,
+                            const std::vector<EarlierVoxels>& earlier) {
   const size_t n = earlier.size();
   PageResidual page;
   page.rounded = layers;
@@ -48,15 +49,16 @@ PageResidual EncodeResidual(const StyleLayers& layers, const std::vector<Earlier
     numbers.push_back(Byte(layers.weight[i]));
     page.rounded.weight[i] = static_cast<float>(numbers.back()) / 255;
   }
-  page.header = JsonValue::Object{{"scale", scales.empty() ? JsonValue() : JsonValue(std::move(scales))},
-                                  {"view", !layers.residual.view_scale.empty()},
-                                  {"weight", !layers.weight.empty()}};
+  page.header =
+      JsonValue::Object{{"scale", scales.empty() ? JsonValue() : JsonValue(std::move(scales))},
+                        {"view", !layers.residual.view_scale.empty()},
+                        {"weight", !layers.weight.empty()}};
   page.packed = Deflate(PackNumbers(numbers, static_cast<int>(numbers.size() / n), earlier));
   return page;
 }
 
-void ApplyLayers(const StyleLayers& layers, const std::vector<int64_t>& voxels, const RadianceField& source,
-                 RadianceField* styled) {
+void ApplyLayers(const StyleLayers& layers, const std::vector<int64_t>& voxels,
+                 const RadianceField& source, RadianceField* styled) {
   const int stride = styled->appearance.stride(), basis = styled->appearance.basis;
   REGRADE_CHECK_EQ(source.appearance.stride(), stride);
   for (size_t i = 0; i < voxels.size(); ++i) {

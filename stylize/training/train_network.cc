@@ -270,9 +270,9 @@ TrainNetworkResult TrainNetwork(const RadianceField& field,
   else
     training.Start(bad_pixels);
   while (training.steps_done() < options.steps) {
-    const int64_t most = std::min<int64_t>(
-        options.steps - training.steps_done(),
-        StepsToCheckpoint(training.steps_done(), hooks.checkpoint_every));
+    const int64_t most =
+        std::min<int64_t>(options.steps - training.steps_done(),
+                          StepsToCheckpoint(training.steps_done(), hooks.checkpoint_every));
     const StepResult steps = training.Advance(most);
     if (steps.stopped) {
       if (hooks.checkpoint) hooks.checkpoint(training.Capture());

@@ -1,4 +1,7 @@
-// What a style adds voxel by voxel, as a page has it: rounded by half a step at most, nothing where nothing is added.
+// What a style adds voxel by voxel, as a page has it: rounded by half a step at most, nothing
+// where nothing is added.
+#include "pipeline/page/residual_codec.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -7,7 +10,6 @@
 
 #include "pipeline/files/deflate.h"
 #include "pipeline/page/field_codec.h"
-#include "pipeline/page/residual_codec.h"
 #include "pipeline/page/value_codec.h"
 #include "tests/support/cell_field.h"
 #include "tests/support/small_field.h"

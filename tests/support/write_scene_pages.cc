@@ -116,7 +116,8 @@ StyleLayers SomeLayers(Layers kind, size_t voxels) {
       continue;
     }
     Vec3f color{}, scale{1, 1, 1};
-    for (int c = 0; c < 3 && on; ++c) color[c] = random(1, i, c) - 0.5f, scale[c] = random(2, i, c);
+    for (int c = 0; c < 3 && on; ++c)
+      color[c] = random(1, i, c) - 0.5f, scale[c] = random(2, i, c);
     layers.residual.color.push_back(color);
     layers.residual.view_scale.push_back(scale);
   }
