@@ -12,6 +12,7 @@
 #include "evaluate/frame_pairs.h"
 #include "evaluate/warped_rows.h"
 #include "kernels/base/error.h"
+#include "kernels/base/parallel_tasks.h"
 #include "kernels/image/row_sum.h"
 #include "kernels/image/warp.h"
 
@@ -35,6 +36,39 @@ struct PairSums {
 double Decibel(double error) {
   return error > 0 ? -10 * std::log10(error) : std::numeric_limits<double>::infinity();
 }
+
+// A pair of frames of every sequence, whose motion they share.
+struct PairTask {
+  int i = 0, j = 0;
+  bool warps_earlier = false;
+  std::vector<std::pair<std::shared_ptr<const Image>, std::shared_ptr<const Image>>> frames =
+      {};  // i and j of each sequence
+  std::shared_ptr<const PairMotion> motion = nullptr;
+  std::vector<PairResult> results = {};
+
+  int at() const { return warps_earlier ? j : i; }
+  int warped() const { return warps_earlier ? i : j; }
+
+  void Run(const PairMotionFunction& motion_of, const std::vector<NamedFrameSource>& sequences,
+           const ConsistencyOptions& options) {
+    motion = std::make_shared<const PairMotion>(motion_of(at(), warped()));
+    for (size_t s = 0; s < sequences.size(); ++s) {
+      const std::string& name = sequences[s].name;
+      const auto& [earlier, later] = frames[s];
+      CheckFrame(*earlier, motion->flow, *earlier, name, i);
+      CheckFrame(*later, motion->flow, *earlier, name, j);
+      PairResult result =
+          ComparePair(warps_earlier ? *later : *earlier, warps_earlier ? *earlier : *later,
+                      *motion, options.error_per == "pixel");
+      result.sequence = name;
+      result.from = i;
+      result.to = j;
+      result.low_coverage = result.coverage < options.min_coverage;
+      results.push_back(std::move(result));
+    }
+    frames.clear();
+  }
+};
 
 }  // namespace
 
@@ -140,27 +174,36 @@ ConsistencyReport EvaluateConsistency(int frames, const PairMotionFunction& moti
   report.warp = options.warp;
   report.error_per = options.error_per;
   std::map<std::pair<size_t, int>, WorstPair> worst;  // by sequence and gap
-  int64_t done = 0;
-  for (const auto& [i, j] : pairs) {
-    const int at = options.warp == "earlier" ? j : i, warped = at == i ? j : i;
-    const auto pair_motion = std::make_shared<const PairMotion>(motion(at, warped));
-    for (size_t s = 0; s < sequences.size(); ++s) {
-      const std::string& name = sequences[s].name;
-      const auto earlier = caches[s].Get(i), later = caches[s].Get(j);
-      CheckFrame(*earlier, pair_motion->flow, *earlier, name, i);
-      CheckFrame(*later, pair_motion->flow, *earlier, name, j);
-      PairResult result = ComparePair(at == i ? *earlier : *later, at == i ? *later : *earlier,
-                                      *pair_motion, options.error_per == "pixel");
-      result.sequence = name;
-      result.from = i;
-      result.to = j;
-      result.low_coverage = result.coverage < options.min_coverage;
-      WorstPair& so_far = worst[{s, j - i}];
-      if (result.error && *result.error > so_far.pair.error.value_or(0))
-        so_far = {result, pair_motion, at, warped};
-      report.pairs.push_back(std::move(result));
+  // Pairs in parallel; frames come from one thread, and results are taken in order.
+  const int64_t count = std::ssize(pairs);
+  int64_t bytes_of_pair = 0;
+  for (FrameCache& cache : caches)
+    if (count > 0) bytes_of_pair += 2 * CachedBytes(*cache.Get(pairs.front().first));
+  const int64_t at_once = TasksAtOnce(bytes_of_pair);
+  for (int64_t begin = 0; begin < count; begin += at_once) {
+    std::vector<PairTask> tasks;
+    for (int64_t p = begin; p < std::min(count, begin + at_once); ++p) {
+      const auto [i, j] = pairs[static_cast<size_t>(p)];
+      PairTask task{i, j, options.warp == "earlier"};
+      for (FrameCache& cache : caches) task.frames.emplace_back(cache.Get(i), cache.Get(j));
+      tasks.push_back(std::move(task));
     }
-    ReportOrThrow(progress, ++done, std::ssize(pairs));
+    const auto run = [&](int64_t t) {
+      tasks[static_cast<size_t>(t)].Run(motion, sequences, options);
+    };
+    if (options.mode == "geometry")  // whose depth is rendered in parallel
+      for (int64_t t = 0; t < std::ssize(tasks); ++t) run(t);
+    else
+      ParallelTasks(0, std::ssize(tasks), run);
+    for (PairTask& task : tasks)
+      for (size_t s = 0; s < sequences.size(); ++s) {
+        PairResult& result = task.results[s];
+        WorstPair& so_far = worst[{s, task.j - task.i}];
+        if (result.error && *result.error > so_far.pair.error.value_or(0))
+          so_far = {result, task.motion, task.at(), task.warped()};
+        report.pairs.push_back(std::move(result));
+      }
+    ReportOrThrow(progress, begin + std::ssize(tasks), count);
   }
   for (size_t s = 0; s < sequences.size(); ++s)
     for (const int gap : options.gaps)
@@ -204,8 +247,10 @@ ConsistencyReport EvaluateConsistency(const FrameSource& reference,
     if (!geometry)
       throw UsageError("mode geometry needs depth and cameras of the frames", "",
                        "evaluate a run's folder, or choose lai2018 or ruder2016");
-    return EvaluateConsistency(reference.count, GeometricMotion(geometry), sequences, options,
-                               progress);
+    return EvaluateConsistency(
+        reference.count,
+        GeometricMotion(geometry, FramesBetween(options.gaps, reference.count)), sequences,
+        options, progress);
   }
   if (options.mode == kWarpedMode) {
     const ConsistencyOptions plain;
@@ -215,13 +260,10 @@ ConsistencyReport EvaluateConsistency(const FrameSource& reference,
                        "leave it out, or choose another mode");
     return EvaluateWarped(reference, sequences, options, progress);
   }
-  // Both frames of a pair are used again by later pairs.
-  const auto cache =
-      std::make_shared<FrameCache>(CacheOf(reference, options.gaps, kFrameCacheBytes));
-  const FrameSource cached{reference.count, [cache](int i) { return *cache->Get(i); }};
   return EvaluateConsistency(reference.count,
-                             EstimatedMotion(cached, options.mode, options.flow), sequences,
-                             options, progress);
+                             EstimatedMotion(reference, options.mode, options.flow,
+                                             FramesBetween(options.gaps, reference.count)),
+                             sequences, options, progress);
 }
 
 }  // namespace regrade

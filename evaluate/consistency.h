@@ -22,7 +22,7 @@ struct ConsistencyOptions {
   std::string mode = "lai2018";
   std::string flow = "dis-medium";
   std::string warp = "later", error_per = "channel";
-  std::string lpips;
+  std::string lpips, edges, style_features, style_embedding;
   double min_coverage = 0.4;
   bool controls = false, control_field = false;  // the caller adds the sequences
   // Frames come in excerpts of that many, and pairs lie within one; 0: all are one sequence.
@@ -62,6 +62,19 @@ struct ConsistencyOptions {
     bind("lpips", lpips,
          {.help = "ONNX file of a perceptual distance network (LPIPS), with the inputs of "
                   "--flow onnx:FILE; compares each sequence with the 2D method's frames"});
+    bind(
+        "edges", edges,
+        {.help = "compares edges with the unstyled frames' by SSIM: gradient, or the ONNX file "
+                 "of an edge network with one input, RGB from -1 to 1, and one output [1, 1, "
+                 "height, width] from 0 to 1"});
+    bind("style-features", style_features,
+         {.help = "ONNX file of a network with one input, RGB from -1 to 1, whose outputs [1, "
+                  "channels, ...] are features (VGG's): distances of Gram matrices and of "
+                  "Fréchet to the style picture, and with --lpips a number like ArtFID"});
+    bind("style-embedding", style_embedding,
+         {.help = "ONNX file of a network with one input [1, 3, 224, 224], RGB from -1 to 1, "
+                  "whose output is a picture's vector (CLIP's): 1 - cosine to the style "
+                  "picture's"});
     bind(
         "min-coverage", min_coverage,
         {.unit = "fraction of pixels",

@@ -5,19 +5,20 @@
 #include <limits>
 
 #include "evaluate/image_quality.h"
+#include "evaluate/optional_mean.h"
 #include "evaluate/sliced_wasserstein.h"
 #include "kernels/base/error.h"
+#include "kernels/base/parallel_tasks.h"
 #include "kernels/image/hue_chroma.h"
 
 namespace regrade {
 namespace {
 
-Image Clipped(Image image) {
+void Clip(Image* image) {
   // Not std::clamp, whose result for NaN depends on the order of its comparisons: NaN stays
   // NaN.
-  for (float& p : image.pixels)
+  for (float& p : image->pixels)
     if (!std::isnan(p)) p = std::clamp(p, 0.0f, 1.0f);
-  return image;
 }
 
 void CheckCount(const NamedFrameSource& sequence, const FrameSource& other,
@@ -39,20 +40,70 @@ void CheckSize(const Image& frame, const Image& other, const std::string& what, 
 // The references of one frame; each may be empty.
 struct FrameTargets {
   Image view_2d, unstyled, transmittance;
+  Image unstyled_edges;
   HueChroma hues_2d;
 };
 
 FrameTargets ReadTargets(const FidelityTargets& targets, int i) {
   FrameTargets frame;
-  if (targets.unstyled.count > 0) frame.unstyled = Clipped(targets.unstyled.frame(i));
+  if (targets.unstyled.count > 0) frame.unstyled = targets.unstyled.frame(i);
   if (targets.views_2d.count == 0) return frame;
-  frame.view_2d = Clipped(targets.views_2d.frame(i));
-  if (!targets.only_psnr) frame.hues_2d.Add(frame.view_2d);
+  frame.view_2d = targets.views_2d.frame(i);
   if (targets.transmittance.count > 0) frame.transmittance = targets.transmittance.frame(i);
   return frame;
 }
 
-// What is summed over the frames of a sequence.
+// What is measured of one frame of one sequence without networks.
+struct FrameMeasures {
+  HueChroma hues;
+  ColourSlices colours;
+  std::optional<double> db, structure, edge_ssim;
+};
+
+// One frame of every sequence.
+struct FrameTask {
+  int index = 0;
+  FrameTargets target;
+  std::vector<Image> frames;  // of the sequences; empty where one has fewer frames
+  std::vector<FrameMeasures> measures = {};
+
+  void Run(const FidelityTargets& targets, const std::vector<NamedFrameSource>& sequences) {
+    Clip(&target.unstyled);
+    Clip(&target.view_2d);
+    if (targets.edges && !target.unstyled.empty())
+      target.unstyled_edges = targets.edges(target.unstyled);
+    if (!targets.only_psnr && !target.view_2d.empty()) target.hues_2d.Add(target.view_2d);
+    measures.resize(frames.size());
+    for (size_t s = 0; s < frames.size(); ++s) {
+      if (frames[s].empty()) continue;
+      Clip(&frames[s]);
+      Measure(targets, frames[s], sequences[s], &measures[s]);
+    }
+  }
+
+ private:
+  void Measure(const FidelityTargets& targets, const Image& frame,
+               const NamedFrameSource& sequence, FrameMeasures* measured) const {
+    if (frame.pixels == target.view_2d.pixels && frame.SameSize(target.view_2d))
+      measured->hues += target.hues_2d;
+    else if (!targets.only_psnr)
+      measured->hues.Add(frame);
+    if (targets.style != nullptr) measured->colours.Add(frame);
+    if (!target.unstyled.empty()) {
+      CheckSize(frame, target.unstyled, "the unstyled version", index, sequence);
+      measured->structure = GradientCorrelation(frame, target.unstyled);
+      if (targets.edges)
+        measured->edge_ssim = Ssim(targets.edges(frame), target.unstyled_edges);
+    }
+    if (target.view_2d.empty()) return;
+    CheckSize(frame, target.view_2d, "the 2D method's version", index, sequence);
+    const bool masked = !target.transmittance.empty();
+    if (masked) CheckSize(frame, target.transmittance, "the transmittance", index, sequence);
+    measured->db = Psnr(frame, target.view_2d, masked ? &target.transmittance : nullptr);
+  }
+};
+
+// What is summed over the frames of a sequence, in their order.
 class FidelitySums {
  public:
   FidelitySums(const NamedFrameSource& sequence, const FidelityTargets& targets)
@@ -62,21 +113,20 @@ class FidelitySums {
     CheckCount(sequence, targets.transmittance, "transmittance");
   }
 
-  void Add(int i, const FrameTargets& target) {
-    const Image frame = Clipped(sequence_.frames.frame(i));
-    if (frame.pixels == target.view_2d.pixels && frame.SameSize(target.view_2d))
-      hues_ += target.hues_2d;
-    else if (!targets_.only_psnr)
-      hues_.Add(frame);
-    if (targets_.style != nullptr) colours_.Add(frame);
-    if (!target.unstyled.empty()) {
-      CheckSize(frame, target.unstyled, "the unstyled version", i, sequence_);
-      if (const auto correlation = GradientCorrelation(frame, target.unstyled)) {
-        sum_structure_ += *correlation;
-        ++with_edges_;
-      }
+  void Add(const FrameTask& task, size_t s) {
+    const FrameMeasures& measured = task.measures[s];
+    hues_ += measured.hues;
+    colours_ += measured.colours;
+    structure_.Add(measured.structure);
+    edge_ssim_.Add(measured.edge_ssim);
+    if (!task.target.view_2d.empty()) hues_2d_ += task.target.hues_2d;
+    if (measured.db && std::isfinite(*measured.db)) {
+      sum_db_ += *measured.db;
+      ++finite_;
+    } else if (measured.db) {
+      ++perfect_;
     }
-    if (!target.view_2d.empty()) AddToTarget(frame, i, target);
+    AddByNetworks(task.frames[s], task.target);
   }
 
   FidelityRow Row(const ColourSlices& style) const {
@@ -86,48 +136,67 @@ class FidelitySums {
       row.psnr_to_2d_db = sum_db_ / finite_;
     else if (perfect_ > 0)
       row.psnr_to_2d_db = std::numeric_limits<double>::infinity();
-    if (compared_ > 0) row.lpips_to_2d = sum_lpips_ / compared_;
-    if (with_edges_ > 0) row.structure = sum_structure_ / with_edges_;
+    row.lpips_to_2d = lpips_.Value();
+    row.structure = structure_.Value();
     row.hue_std = hues_.HueStd();
     row.chroma = hues_.MeanChroma();
     row.hue_std_2d = hues_2d_.HueStd();
     row.chroma_2d = hues_2d_.MeanChroma();
     if (targets_.style != nullptr)
       row.sliced_wasserstein_to_style = SlicedWasserstein(colours_, style);
+    row.edge_ssim = edge_ssim_.Value();
+    row.lpips_to_unstyled = lpips_to_unstyled_.Value();
+    if (!targets_.style_features) return row;
+    row.gram_to_style = to_style_.Gram();
+    row.frechet_to_style = to_style_.Frechet();
+    row.embedding_to_style = to_style_.Embedding();
+    if (row.lpips_to_unstyled && row.frechet_to_style)
+      row.artfid_like = ArtFidLike(*row.lpips_to_unstyled, *row.frechet_to_style);
     return row;
   }
 
  private:
-  void AddToTarget(const Image& frame, int i, const FrameTargets& target) {
-    CheckSize(frame, target.view_2d, "the 2D method's version", i, sequence_);
-    hues_2d_ += target.hues_2d;
-    if (targets_.perceptual) {
-      Image whole = target.view_2d;  // excluded pixels are copied: they add no difference
-      for (size_t v = 0; v < whole.pixels.size(); ++v)
-        if (!std::isfinite(whole.pixels[v])) whole.pixels[v] = frame.pixels[v];
-      sum_lpips_ += targets_.perceptual(frame, whole);
-      ++compared_;
-    }
-    if (!target.transmittance.empty())
-      CheckSize(frame, target.transmittance, "the transmittance", i, sequence_);
-    const std::optional<double> db = Psnr(
-        frame, target.view_2d, target.transmittance.empty() ? nullptr : &target.transmittance);
-    if (db && std::isfinite(*db)) {
-      sum_db_ += *db;
-      ++finite_;
-    } else if (db) {
-      ++perfect_;
-    }
+  // Networks run one at a time, each in parallel.
+  void AddByNetworks(const Image& frame, const FrameTargets& target) {
+    if (targets_.style_features) to_style_.Add(frame);
+    if (!targets_.perceptual) return;
+    if (targets_.style_features && !target.unstyled.empty())
+      lpips_to_unstyled_.Add(targets_.perceptual(frame, target.unstyled));
+    if (target.view_2d.empty()) return;
+    Image whole = target.view_2d;  // excluded pixels are copied: they add no difference
+    for (size_t v = 0; v < whole.pixels.size(); ++v)
+      if (!std::isfinite(whole.pixels[v])) whole.pixels[v] = frame.pixels[v];
+    lpips_.Add(targets_.perceptual(frame, whole));
   }
 
   const NamedFrameSource& sequence_;
   const FidelityTargets& targets_;
   HueChroma hues_, hues_2d_;
   ColourSlices colours_;
-  double sum_db_ = 0, sum_lpips_ = 0, sum_structure_ = 0;
-  int compared_ = 0, with_edges_ = 0;
+  StyleDistances to_style_{targets_.style_features};
+  OptionalMean lpips_, structure_, edge_ssim_, lpips_to_unstyled_;
+  double sum_db_ = 0;
   int finite_ = 0, perfect_ = 0;
 };
+
+// Reads the frames from `begin` on, as many as are measured at once; from one thread, for a
+// source may be anything.
+std::vector<FrameTask> ReadTasks(const std::vector<NamedFrameSource>& sequences,
+                                 const FidelityTargets& targets, int begin, int end) {
+  std::vector<FrameTask> tasks;
+  int64_t at_once = 1;
+  for (int i = begin; i < end && i - begin < at_once; ++i) {
+    FrameTask task{i, ReadTargets(targets, i), {}};
+    int64_t values = 0;
+    for (const NamedFrameSource& sequence : sequences) {
+      task.frames.push_back(i < sequence.frames.count ? sequence.frames.frame(i) : Image());
+      values += std::ssize(task.frames.back().pixels);
+    }
+    if (i == begin) at_once = TasksAtOnce(2 * static_cast<int64_t>(sizeof(float)) * values);
+    tasks.push_back(std::move(task));
+  }
+  return tasks;
+}
 
 }  // namespace
 
@@ -142,13 +211,17 @@ std::vector<FidelityRow> MeasureFidelities(const std::vector<NamedFrameSource>& 
     frames = std::max(frames, sequence.frames.count);
     total += sequence.frames.count;
   }
-  for (int i = 0; i < frames; ++i) {
-    const FrameTargets target = ReadTargets(targets, i);
-    for (size_t s = 0; s < sequences.size(); ++s) {
-      if (i >= sequences[s].frames.count) continue;
-      sums[s].Add(i, target);
-      ReportOrThrow(progress, ++done, total);
-    }
+  for (int i = 0; i < frames;) {
+    std::vector<FrameTask> tasks = ReadTasks(sequences, targets, i, frames);
+    ParallelTasks(0, std::ssize(tasks),
+                  [&](int64_t t) { tasks[static_cast<size_t>(t)].Run(targets, sequences); });
+    for (const FrameTask& task : tasks)
+      for (size_t s = 0; s < sequences.size(); ++s) {
+        if (task.frames[s].empty()) continue;
+        sums[s].Add(task, s);
+        ReportOrThrow(progress, ++done, total);
+      }
+    i += static_cast<int>(tasks.size());
   }
   ColourSlices style;
   if (targets.style != nullptr) style.Add(*targets.style);

@@ -3,11 +3,14 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "evaluate/edge_map.h"
 #include "evaluate/frame_source.h"
+#include "evaluate/style_distance.h"
 #include "kernels/base/progress.h"
 
 namespace regrade {
@@ -37,6 +40,16 @@ struct FidelityRow {
   // Distance between the colours of all frames and of the style picture, in [0, 1] RGB units:
   // see EQ(sliced-wasserstein).
   std::optional<double> sliced_wasserstein_to_style;
+
+  // Mean over frames of the SSIM of edge maps with the unstyled frame's, see EQ(ssim).
+  std::optional<double> edge_ssim;
+
+  // Distances to the style picture by networks: see StyleDistances.
+  std::optional<double> gram_to_style, frechet_to_style, embedding_to_style;
+
+  // Mean over frames of the perceptual distance to the unstyled frame, and with it and
+  // frechet_to_style ArtFidLike.
+  std::optional<double> lpips_to_unstyled, artfid_like;
 };
 
 // References for the metrics of a sequence; each may be empty (null, count 0).
@@ -48,12 +61,14 @@ struct FidelityTargets {
   std::function<double(const Image&, const Image&)> perceptual;  // see PairNetwork::Distance
   FrameSource unstyled = {};                                     // each frame before styling
   bool only_psnr = false;                                        // measures nothing else
+  EdgeMapFunction edges = {};
+  std::shared_ptr<const StyleFeatures> style_features = nullptr;
 };
 
 // One row for each sequence, in one pass: a frame of `targets` is read once for all of them,
 // and what is measured of the 2D method's frame is not measured again of a sequence that has
-// it. Errors (kInput): counts or sizes that differ. At most one frame of each source is in
-// memory. Progress counts frames of all sequences.
+// it. Errors (kInput): counts or sizes that differ. A few frames of each source are in memory,
+// which are read from one thread. Progress counts frames of all sequences.
 std::vector<FidelityRow> MeasureFidelities(const std::vector<NamedFrameSource>& sequences,
                                            const FidelityTargets& targets,
                                            const ProgressFunction& progress = {});

@@ -1,42 +1,60 @@
-// Caches the most recent frames of a sequential pass, so that neighbouring pairs decode each
-// frame once.
+// Caches what a pass over pairs of frames needs of the most recent ones, so that neighbouring
+// pairs make it once.
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <utility>
 
-#include "evaluate/frame_source.h"
+#include "kernels/scene/image.h"
 
 namespace regrade {
 
-class FrameCache {
- public:
-  // Keeps at most `frames` frames and, if there are more than two, at most `bytes` of pixels.
-  FrameCache(FrameSource source, int64_t frames, int64_t bytes)
-      : source_(std::move(source)), max_frames_(frames), max_bytes_(bytes) {}
+inline int64_t CachedBytes(const Image& image) {
+  return static_cast<int64_t>(image.pixels.size() * sizeof(float));
+}
 
-  // Returns the cached frame or loads it. Beyond the limits the lowest frames are removed
-  // first: pairs are visited by ascending first frame.
-  std::shared_ptr<const Image> Get(int index) {
-    const auto found = kept_.find(index);
-    if (found != kept_.end()) return found->second;
-    const auto image = std::make_shared<const Image>(source_.frame(index));
-    kept_[index] = image;
-    const int64_t bytes_each = static_cast<int64_t>(image->pixels.size() * sizeof(float));
-    while (Size() > 2 && (Size() > max_frames_ || Size() * bytes_each > max_bytes_))
-      kept_.erase(kept_.begin());
-    return image;
+// Of values for which CachedBytes is known. Copies share what is kept; values are made one at a
+// time, from any thread.
+template <typename Value>
+class OrderedCache {
+ public:
+  // Keeps at most `count` values and, if there are more than two, at most `bytes`.
+  OrderedCache(std::function<Value(int)> make, int64_t count, int64_t bytes)
+      : make_(std::move(make)), max_count_(count), max_bytes_(bytes) {}
+
+  // Returns the cached value or makes it. Beyond the limits the lowest ones are removed first:
+  // pairs are visited by ascending first frame.
+  std::shared_ptr<const Value> Get(int index) const {
+    Shared& shared = *shared_;
+    const std::lock_guard lock(shared.mutex);
+    const auto found = shared.kept.find(index);
+    if (found != shared.kept.end()) return found->second;
+    const auto value = std::make_shared<const Value>(make_(index));
+    shared.kept[index] = value;
+    const int64_t bytes_each = CachedBytes(*value);
+    const auto size = [&] { return static_cast<int64_t>(shared.kept.size()); };
+    while (size() > 2 && (size() > max_count_ || size() * bytes_each > max_bytes_))
+      shared.kept.erase(shared.kept.begin());
+    return value;
   }
 
  private:
-  int64_t Size() const { return std::ssize(kept_); }
-
-  FrameSource source_;
-  int64_t max_frames_;
+  struct Shared {
+    std::mutex mutex;
+    std::map<int, std::shared_ptr<const Value>> kept;
+  };
+  std::function<Value(int)> make_;
+  int64_t max_count_;
   int64_t max_bytes_;
-  std::map<int, std::shared_ptr<const Image>> kept_;
+  std::shared_ptr<Shared> shared_ = std::make_shared<Shared>();
 };
+
+using FrameCache = OrderedCache<Image>;
+
+inline constexpr int64_t kFrameCacheBytes = 512ll << 20;  // for all sequences together
 
 }  // namespace regrade

@@ -4,6 +4,7 @@
 #include <iterator>
 
 #include "kernels/base/error.h"
+#include "kernels/base/parallel_tasks.h"
 
 namespace regrade {
 
@@ -19,9 +20,13 @@ std::vector<std::pair<int, int>> FramePairs(int frames, const std::vector<int>& 
   return pairs;
 }
 
-FrameCache CacheOf(const FrameSource& sequence, const std::vector<int>& gaps, int64_t bytes) {
+int64_t FramesBetween(const std::vector<int>& gaps, int frames) {
   const int longest = gaps.empty() ? 1 : *std::ranges::max_element(gaps);
-  return {sequence, std::clamp(longest, 1, std::max(1, sequence.count)) + 1, bytes};
+  return std::clamp(longest, 1, std::max(1, frames)) + TasksAtOnce(0);
+}
+
+FrameCache CacheOf(const FrameSource& sequence, const std::vector<int>& gaps, int64_t bytes) {
+  return {sequence.frame, FramesBetween(gaps, sequence.count), bytes};
 }
 
 std::vector<FrameCache> CachesOf(const std::vector<NamedFrameSource>& sequences, int frames,

@@ -12,8 +12,6 @@
 
 namespace regrade {
 
-inline constexpr int64_t kFrameCacheBytes = 512ll << 20;  // for all sequences together
-
 // Every pair (i, i + gap), by i and then by gap in the order given; with excerpt > 0 both lie
 // in one run of that many frames. Throws Error(kUsage) for a gap below 1.
 std::vector<std::pair<int, int>> FramePairs(int frames, const std::vector<int>& gaps,
@@ -24,6 +22,10 @@ std::vector<std::pair<int, int>> FramePairs(int frames, const std::vector<int>& 
 std::vector<FrameCache> CachesOf(const std::vector<NamedFrameSource>& sequences, int frames,
                                  const std::vector<int>& gaps);
 FrameCache CacheOf(const FrameSource& sequence, const std::vector<int>& gaps, int64_t bytes);
+
+// How many frames are kept so that each is made once for pairs in order: those between a pair's
+// two, and those of the pairs that run at once.
+int64_t FramesBetween(const std::vector<int>& gaps, int frames);
 
 // Colour channels of a frame: 1 or 3; alpha is ignored.
 int ColourChannels(const Image& image);

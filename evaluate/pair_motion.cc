@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "evaluate/flow_file.h"
+#include "evaluate/frame_cache.h"
 #include "evaluate/geometric_flow.h"
 #include "evaluate/optical_flow.h"
 #include "evaluate/pair_network.h"
@@ -40,6 +41,8 @@ FlowField ReadPairFlow(const std::string& folder, int i, int j, const Image& fra
 
 }  // namespace
 
+int64_t CachedBytes(const FrameGeometry& geometry) { return CachedBytes(geometry.depth); }
+
 PairFlowFunction PairFlow(const std::string& flow) {
   if (flow.starts_with(kFlowFiles))
     return [folder = flow.substr(sizeof(kFlowFiles) - 1)](int i, int j, const Image& from,
@@ -59,20 +62,23 @@ PairFlowFunction PairFlow(const std::string& flow) {
 }
 
 PairMotionFunction EstimatedMotion(const FrameSource& frames, const std::string& mode,
-                                   const std::string& flow) {
+                                   const std::string& flow, int64_t kept) {
   MakeMask(mode, FlowField(1, 1), FlowField(1, 1));  // rejects an unknown mode early
+  const FrameCache cache(frames.frame, kept, kFrameCacheBytes);
   return [=, compute = PairFlow(flow)](int i, int j) {
-    const Image from = frames.frame(i), to = frames.frame(j);
+    const auto from = cache.Get(i), to = cache.Get(j);
     PairMotion motion;
-    motion.flow = compute(i, j, from, to);
-    motion.mask = MakeMask(mode, motion.flow, compute(j, i, to, from));
+    motion.flow = compute(i, j, *from, *to);
+    motion.mask = MakeMask(mode, motion.flow, compute(j, i, *to, *from));
     return motion;
   };
 }
 
-PairMotionFunction GeometricMotion(const GeometrySource& geometry) {
+PairMotionFunction GeometricMotion(const GeometrySource& geometry, int64_t kept) {
+  const OrderedCache<FrameGeometry> cache(geometry, kept, kFrameCacheBytes);
   return [=](int i, int j) {
-    const FrameGeometry a = geometry(i), b = geometry(j);
+    const auto of_i = cache.Get(i), of_j = cache.Get(j);
+    const FrameGeometry &a = *of_i, &b = *of_j;
     if (!a.depth.SameSize(b.depth))
       throw InputError("depth images differ in size", Concat("frames ", i, " and ", j));
     PairMotion motion;

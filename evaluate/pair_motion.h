@@ -1,6 +1,7 @@
 // Flow and occlusion mask of a frame pair, computed once for all sequences that are compared.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <string>
 
@@ -34,13 +35,16 @@ struct FrameGeometry {
   Camera camera;
 };
 using GeometrySource = std::function<FrameGeometry(int)>;
+int64_t CachedBytes(const FrameGeometry& geometry);  // for OrderedCache
 
 // Motion estimated from frames, in both directions by PairFlow. `mode` is lai2018 or ruder2016
-// (see occlusion.h). Errors: kUsage for unknown names, kInput from flow and files.
+// (see occlusion.h). Any thread may ask; `kept` frames stay in memory, which come from one
+// thread at a time. Errors: kUsage for unknown names, kInput from flow and files.
 PairMotionFunction EstimatedMotion(const FrameSource& frames, const std::string& mode,
-                                   const std::string& flow);
+                                   const std::string& flow, int64_t kept = 2);
 
-// Motion from depth and cameras, see EQ(geometric-flow). Errors: kInput if sizes differ.
-PairMotionFunction GeometricMotion(const GeometrySource& geometry);
+// Motion from depth and cameras, see EQ(geometric-flow); `kept` as above. Errors: kInput if
+// sizes differ.
+PairMotionFunction GeometricMotion(const GeometrySource& geometry, int64_t kept = 2);
 
 }  // namespace regrade

@@ -1,24 +1,21 @@
-// A network with two input images, for optical flow or a perceptual distance. OpenCV's dnn
-// module runs it.
+// A network with two input images, for optical flow or a perceptual distance.
 #pragma once
 
 #include <functional>
-#include <memory>
 #include <string>
 
 #include "evaluate/flow_field.h"
+#include "evaluate/onnx_runner.h"
 #include "kernels/scene/image.h"
 
 namespace regrade {
 
 // An ONNX file with two inputs named "first" and "second", [1, 3, height, width] RGB from -1 to
 // 1, as written by torch.onnx.export(..., input_names=["first", "second"]), and one output.
-// Calls are serialised. Errors (kExternalProgram, naming the file): no file, not ONNX, an
-// operator that OpenCV lacks, other inputs, non-finite outputs.
+// Errors: those of OnnxRunner.
 class PairNetwork {
  public:
   explicit PairNetwork(const std::string& path);
-  ~PairNetwork();
 
   // The motion from `from` to `to` in pixels: the output is [1, 2, height, width], x before y,
   // as RAFT's.
@@ -29,8 +26,7 @@ class PairNetwork {
   double Distance(const Image& a, const Image& b, bool as_given = false) const;
 
  private:
-  struct Implementation;
-  std::unique_ptr<Implementation> implementation_;
+  OnnxRunner runner_;
 };
 
 // PairNetwork::Distance by the network in the file; empty for an empty path.

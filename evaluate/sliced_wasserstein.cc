@@ -35,7 +35,13 @@ const std::array<Vec3d, kDirections>& Directions() {
 
 }  // namespace
 
-ColourSlices::ColourSlices() : bins_(static_cast<size_t>(kDirections) * kBins, 0) {}
+ColourSlices& ColourSlices::operator+=(const ColourSlices& o) {
+  if (o.bins_.empty()) return *this;
+  bins_.resize(o.bins_.size());
+  for (size_t i = 0; i < bins_.size(); ++i) bins_[i] += o.bins_[i];
+  count_ += o.count_;
+  return *this;
+}
 
 void ColourSlices::Add(const Image& image) {
   int stride = 1;
@@ -52,13 +58,22 @@ void ColourSlices::Add(const Image& image) {
       colours.push_back({std::clamp(rgb.x, 0.0, 1.0), std::clamp(rgb.y, 0.0, 1.0),
                          std::clamp(rgb.z, 0.0, 1.0)});
     }
+  bins_.resize(static_cast<size_t>(kDirections) * kBins);
 #pragma omp parallel for schedule(static)
   for (int d = 0; d < kDirections; ++d) {
     const Vec3d direction = Directions()[d];
     int64_t* bins = &bins_[static_cast<size_t>(d) * kBins];
-    for (const Vec3d& rgb : colours) {
-      const double position = (Dot(direction, rgb) + kExtent) / (2 * kExtent) * kBins;
-      ++bins[std::clamp(static_cast<int>(position), 0, kBins - 1)];
+    // In blocks, so that positions are computed several at a time.
+    constexpr size_t kBlock = 256;
+    std::array<int, kBlock> bin;
+    for (size_t begin = 0; begin < colours.size(); begin += kBlock) {
+      const size_t count = std::min(kBlock, colours.size() - begin);
+      for (size_t i = 0; i < count; ++i) {
+        const double position =
+            (Dot(direction, colours[begin + i]) + kExtent) / (2 * kExtent) * kBins;
+        bin[i] = std::clamp(static_cast<int>(position), 0, kBins - 1);
+      }
+      for (size_t i = 0; i < count; ++i) ++bins[bin[i]];
     }
   }
   count_ += std::ssize(colours);

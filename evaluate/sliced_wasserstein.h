@@ -13,17 +13,17 @@ namespace regrade {
 // stored, so memory is constant and the order of images does not matter.
 class ColourSlices {
  public:
-  ColourSlices();
   // Pixels with non-finite values are skipped. An image above 65536 pixels is sampled on a
   // regular grid of at most that many.
   void Add(const Image& image);
+  ColourSlices& operator+=(const ColourSlices& o);
   int64_t count() const { return count_; }
 
  private:
   friend std::optional<double> SlicedWasserstein(const ColourSlices&, const ColourSlices&);
   std::vector<double> Quantiles(int direction) const;
 
-  std::vector<int64_t> bins_;  // [directions, bins]
+  std::vector<int64_t> bins_;  // [directions, bins]; empty before the first pixel
   int64_t count_ = 0;
 };
 

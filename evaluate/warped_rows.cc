@@ -6,29 +6,12 @@
 
 #include "evaluate/frame_cache.h"
 #include "evaluate/frame_pairs.h"
+#include "evaluate/optional_mean.h"
 #include "evaluate/pair_network.h"
 #include "kernels/base/error.h"
 
 namespace regrade {
 namespace {
-
-// A mean of the values that are there.
-class Mean {
- public:
-  void Add(const std::optional<double>& value) {
-    if (!value) return;
-    sum_ += *value;
-    ++count_;
-  }
-  std::optional<double> value() const {
-    if (count_ == 0) return std::nullopt;
-    return sum_ / count_;
-  }
-
- private:
-  double sum_ = 0;
-  int count_ = 0;
-};
 
 // The flow of a sequence itself between padded frames; nothing where files have none.
 class OwnFlow {
@@ -61,7 +44,7 @@ WarpedRow Summarize(const std::string& sequence, int gap,
   WarpedRow row;
   row.sequence = sequence;
   row.gap = gap;
-  Mean published, published_lpips, corrected, corrected_lpips, coverage;
+  OptionalMean published, published_lpips, corrected, corrected_lpips, coverage;
   for (const WarpedPair& pair : pairs) {
     if (pair.sequence != sequence || pair.to - pair.from != gap) continue;
     ++row.pairs;
@@ -71,8 +54,8 @@ WarpedRow Summarize(const std::string& sequence, int gap,
     corrected_lpips.Add(pair.corrected.lpips);
     coverage.Add(pair.corrected.coverage);
   }
-  row.published = {published.value(), published_lpips.value(), 0};
-  row.corrected = {corrected.value(), corrected_lpips.value(), coverage.value().value_or(0)};
+  row.published = {published.Value(), published_lpips.Value(), 0};
+  row.corrected = {corrected.Value(), corrected_lpips.Value(), coverage.Value().value_or(0)};
   if (row.pairs == 0)
     row.why = Concat("no pair of frames is ", gap, " apart");
   else if (!row.published.rmse)

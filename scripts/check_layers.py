@@ -74,7 +74,7 @@ LAYERS = {
 ANY_MODULE_SOURCE = r"(reconstruct|stylize|evaluate)/.*\.(cc|cu)"
 ALLOWED = (
     ("OpenCV", r"opencv2/",
-     (r"evaluate/(optical_flow|pair_network)\.cc", r"stylize/image/onnx_network\.cc",
+     (r"evaluate/(optical_flow|onnx_runner)\.cc", r"stylize/image/onnx_network\.cc",
       r"pipeline/images/(draw_text|edge_shift)\.cc")),
     ("FFmpeg", r"lib(av|sw)[a-z]+/", (r"pipeline/images/(ffmpeg_pointers|libraries|video_reader|video_writer)\.cc",)),
     ("OpenImageIO", r"OpenImageIO/", (r"pipeline/images/(image_file|libraries|still_file)\.cc",)),

@@ -29,7 +29,7 @@ NAME = re.compile(r"(?<![\w./$*{}\"'-])\w[\w-]*\.(?:py|sh|md|cc|cu|cuh|h)(?![\w/
 
 
 OPTION = re.compile(r"(?<![\w-])--([a-z][a-z0-9-]+)")
-OTHER_PROGRAMS_OPTIONS = {"cores", "profile", "configfile", "retries"}  # of snakemake
+OTHER_PROGRAMS_OPTIONS = {"cores", "profile", "configfile", "retries", "nolock", "rerun-incomplete"}  # of snakemake
 
 
 def expanded(pattern):

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
+#include <limits>
+#include <vector>
 
 #include "kernels/base/error.h"
 #include "kernels/image/color_spaces.h"
@@ -33,6 +36,42 @@ class LinearLight {
   std::array<double, 256> linear_{};
 };
 
+// Lab and chroma of a colour, to the bit as LabFromLinear gives them: neighbouring pixels and
+// frames often have the same, and three cube roots cost more than finding them again.
+class LabColours {
+  static constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+
+ public:
+  struct Entry {
+    std::array<float, 3> rgb{kNan, kNan, kNan};  // which equals nothing
+    Vec3d lab;
+    double chroma = 0;
+  };
+
+  LabColours() : entries_(kEntries) {}
+
+  const Entry& operator()(float red, float green, float blue) {
+    const std::array<float, 3> rgb{red, green, blue};
+    std::array<uint32_t, 3> bits;
+    std::memcpy(bits.data(), rgb.data(), sizeof(bits));
+    const uint32_t mixed =
+        (bits[0] * 0x9e3779b1u ^ bits[1] * 0x85ebca77u ^ bits[2] * 0xc2b2ae3du) >> kShift;
+    Entry& entry = entries_[mixed];
+    if (entry.rgb != rgb) {
+      entry.rgb = rgb;
+      entry.lab = LabFromLinear({linear_(red), linear_(green), linear_(blue)});
+      entry.chroma = std::sqrt(entry.lab.y * entry.lab.y + entry.lab.z * entry.lab.z);
+    }
+    return entry;
+  }
+
+ private:
+  static constexpr int kShift = 19;  // 8192 entries, 0.4 MB a thread
+  static constexpr size_t kEntries = size_t{1} << (32 - kShift);
+  LinearLight linear_;
+  std::vector<Entry> entries_;
+};
+
 }  // namespace
 
 HueChroma& HueChroma::operator+=(const HueChroma& o) {
@@ -50,18 +89,17 @@ void HueChroma::Add(const Image& image, const Image* mask) {
   }
   *this += SumOverRows(image.height, [&](int y) {
     HueChroma row;
-    static thread_local LinearLight linear;
+    static thread_local LabColours colours;
     for (int x = 0; x < image.width; ++x) {
       if (mask != nullptr && !(*mask->at(x, y) > 0.5f)) continue;
       const float* p = image.at(x, y);
-      Vec3d lab;
       if (image.channels >= 3) {
         if (!AllFinite(Vec3f{p[0], p[1], p[2]})) continue;
-        lab = LabFromLinear({linear(p[0]), linear(p[1]), linear(p[2])});
+        const LabColours::Entry& colour = colours(p[0], p[1], p[2]);
+        row.sum_a_ += colour.lab.y;
+        row.sum_b_ += colour.lab.z;
+        row.sum_chroma_ += colour.chroma;
       }
-      row.sum_a_ += lab.y;
-      row.sum_b_ += lab.z;
-      row.sum_chroma_ += std::sqrt(lab.y * lab.y + lab.z * lab.z);
       ++row.count_;
     }
     return row;

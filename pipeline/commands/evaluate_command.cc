@@ -3,12 +3,14 @@
 #include <filesystem>
 #include <optional>
 
+#include "evaluate/fidelity_networks.h"
 #include "evaluate/pair_network.h"
 #include "evaluate/protocols.h"
 #include "evaluate/tables.h"
 #include "kernels/base/error.h"
 #include "pipeline/commands/continue_command.h"
 #include "pipeline/commands/frame_folder.h"
+#include "pipeline/commands/paired_benchmark.h"
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/report/html.h"
@@ -26,7 +28,7 @@ namespace regrade {
 namespace {
 
 struct FramesOptions {
-  std::string frames, reference, target, style, out, protocol, table = "text", require;
+  std::string frames, reference, target, style, pst50, out, protocol, table = "text", require;
 
   template <typename Bind>
   void Describe(Bind& bind) {
@@ -39,6 +41,10 @@ struct FramesOptions {
     bind("target", target,
          {.help = "folder with the 2D method's version of each frame, for fidelity"});
     bind("style", style, {.help = "style picture, for fidelity"});
+    bind(
+        "pst50", pst50,
+        {.help = "folder of the 2D benchmark PST50: --frames has a method's picture of each of "
+                 "its contents, of the same names, which are compared with paired_gt"});
     // Stands for other options, which ExpandProtocol() puts in its place.
     bind("protocol", protocol,
          {.help = "a published protocol by name, also for runs: sets --mode, --gaps and "
@@ -75,6 +81,13 @@ void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& optio
   if (options.control_field)
     throw UsageError("a field is fitted for runs of regrade only", "--control-field",
                      "leave it out, or evaluate the folder of a run");
+  for (const auto& [flag, network] : {std::pair{"--style-features", options.style_features},
+                                      {"--style-embedding", options.style_embedding}})
+    if (!network.empty() && frames.style.empty())
+      throw UsageError("distances to a style need its picture", flag, "add --style");
+  if (!options.edges.empty() && frames.reference.empty())
+    throw UsageError("edges are compared with the unstyled frames'", "--edges",
+                     "add --reference");
   const std::vector<Requirement> required = ParseRequirements(frames.require, options.gaps);
   ProbeEvaluationNetworks(options);
   const bool has_reference = !frames.reference.empty();
@@ -115,7 +128,7 @@ void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& optio
     for (NamedFrameSource& control : ControlSequences(
              {reference, styled.frames, targets.views_2d, targets.style, has_reference}))
       sequences.push_back(std::move(control));
-  targets.perceptual = PerceptualDistance(options.lpips);
+  OpenNetworks(options, &targets);
   console->EndStage();
   std::optional<Workspace> workspace;  // before the work: the folder may be unusable
   if (!frames.out.empty()) workspace.emplace(frames.out);
@@ -151,6 +164,37 @@ void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& optio
   ThrowIfAny(FailedRequirements(required, report));
 }
 
+// Pictures of a 2D method against their ground truth; `words` are those of the command line.
+void EvaluatePairs(const FramesOptions& frames, const ConsistencyOptions& options,
+                   const Arguments& words, Console* console) {
+  for (const auto& [flag, value] : {std::pair{"--reference", frames.reference},
+                                    {"--target", frames.target},
+                                    {"--style", frames.style},
+                                    {"--require", frames.require},
+                                    {"--edges", options.edges},
+                                    {"--style-features", options.style_features},
+                                    {"--style-embedding", options.style_embedding}})
+    if (!value.empty())
+      throw UsageError("pictures of PST50 are compared with its ground truth only", flag,
+                       "leave it out");
+  ProbeEvaluationNetworks(options);
+  std::optional<Workspace> workspace;
+  if (!frames.out.empty()) workspace.emplace(frames.out);
+  console->BeginStage("evaluate");
+  const std::vector<PairedRow> rows =
+      MeasurePairedFolder({frames.pst50, frames.frames, options.controls},
+                          PerceptualDistance(options.lpips), console->StageProgress());
+  console->EndStage();
+  JsonValue report = PairedJson(rows);
+  console->Event("paired", report);
+  JsonValue command = JsonValue::Array{"regrade", "evaluate"};
+  for (const std::string& word : words) command.Append(word);
+  report["regrade"] = REGRADE_VERSION;
+  report["command"] = std::move(command);
+  if (workspace) WriteJsonFile(workspace->Path("report.json"), report);
+  console->Lines(FormatPairedTable(rows, frames.table));
+}
+
 }  // namespace
 
 void RunEvaluate(const Command& command, const Arguments& words, Console* console) {
@@ -169,6 +213,7 @@ void RunEvaluate(const Command& command, const Arguments& words, Console* consol
   if (!has_frames && !AsksForHelp(arguments))
     return ContinueStyle(command, arguments, "evaluate", console);
   if (!Prepare(command, arguments, {.least_words = 0, .most_words = 0}, &options)) return;
+  if (!frames.pst50.empty()) return EvaluatePairs(frames, consistency, words, console);
   EvaluateFrames(frames, consistency, words, console);
 }
 

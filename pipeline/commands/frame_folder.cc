@@ -9,7 +9,6 @@
 
 #include "kernels/base/error.h"
 #include "pipeline/files/folder_listing.h"
-#include "pipeline/images/image_file.h"
 
 namespace regrade {
 namespace {
@@ -78,8 +77,7 @@ bool HasFineValues(const Image& image) {
 std::string SizeText(int width, int height) { return Concat(width, " x ", height, " px"); }
 
 // Grey is replicated, so that grey frames compare with coloured ones.
-Image ReadFrame(const std::string& path) {
-  Image image = ReadImage(path);
+Image Coloured(Image image) {
   if (image.channels != 1) return image;
   Image color(image.width, image.height, 3);
   for (size_t i = 0; i < image.pixels.size(); ++i)
@@ -90,8 +88,9 @@ Image ReadFrame(const std::string& path) {
 }  // namespace
 
 FrameSource FrameFolder::Source() const {
-  return {static_cast<int>(paths.size()),
-          [paths = paths](int i) { return ReadFrame(paths.at(static_cast<size_t>(i))); }};
+  return {static_cast<int>(paths.size()), [paths = paths, kept = kept](int i) {
+            return Coloured(kept.Read(paths.at(static_cast<size_t>(i))));
+          }};
 }
 
 FrameFolder OpenFrameFolder(const std::string& folder, const ProgressFunction& progress) {
@@ -108,7 +107,7 @@ FrameFolder OpenFrameFolder(const std::string& folder, const ProgressFunction& p
   CheckNumbers(frames);
   bool alpha = false, fine = false;
   for (size_t i = 0; i < frames.paths.size(); ++i) {
-    const Image image = ReadImage(frames.paths[i]);
+    const Image image = frames.kept.Read(frames.paths[i]);
     alpha |= image.channels == 4;
     fine = fine || HasFineValues(image);
     if (i == 0) {

@@ -3,7 +3,6 @@
 #include <filesystem>
 
 #include "kernels/base/error.h"
-#include "pipeline/page/make_page.h"
 #include "pipeline/workspace/style_folders.h"
 
 namespace regrade {
@@ -17,9 +16,7 @@ std::vector<std::string> WantedStyles(const std::string& folder, const Arguments
   std::vector<std::string> styles;
   if (words.size() == 1) {
     for (const std::string& style : StyleNames(folder))
-      if (const std::string at = StyleFolder(folder, style);
-          fs::exists(at + "/network.npz") && WhyNoPage(at).empty())
-        styles.push_back(style);
+      if (fs::exists(StyleFolder(folder, style) + "/network.npz")) styles.push_back(style);
     return styles;
   }
   for (size_t i = 1; i < words.size(); ++i) styles.push_back(ChosenStyle(folder, words[i]));

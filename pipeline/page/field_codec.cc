@@ -15,6 +15,7 @@ namespace regrade {
 namespace {
 
 constexpr char kWhere[] = "page";
+constexpr uint64_t kMaxPlaces = uint64_t{1} << 29;  // bytes
 constexpr double kSphereStep = 0.02;  // of background colours, 3 coefficients a texel
 
 JsonValue::Array ArrayOf(const Vec3f& v) { return {double{v.x}, double{v.y}, double{v.z}}; }
@@ -185,9 +186,11 @@ void MakeLinks(const PageOrder& order, Geometry* geometry) {
 
 }  // namespace
 
-std::vector<int64_t> VoxelsInPageOrder(const Geometry& geometry) {
-  return VoxelsOf(geometry, OrderOf(geometry, geometry.cells.on() ? TreeOfCells(geometry)
-                                                                  : MaskOfGrid(geometry)));
+PageVoxels VoxelsInPageOrder(const PageField& page, const Geometry& geometry) {
+  PageOrder order =
+      OrderOf(geometry, SectionBytes(page, geometry.cells.on() ? "tree" : "mask", kMaxPlaces));
+  std::vector<int64_t> voxel = VoxelsOf(geometry, order);
+  return {std::move(voxel), std::move(order.earlier)};
 }
 
 PageField EncodeField(const RadianceField& field, double step) {
@@ -245,7 +248,6 @@ RadianceField DecodeField(const PageField& page) {
     if (!(frame.radius[a] > 0) || !std::isfinite(frame.radius[a]))
       throw InputError("the box is not valid", kWhere);
   const bool on_cells = !header.At("finest").IsNull();
-  constexpr uint64_t kMaxPlaces = uint64_t{1} << 29;
   const std::string places = SectionBytes(page, on_cells ? "tree" : "mask", kMaxPlaces);
   const int finest =
       on_cells ? static_cast<int>(std::clamp<int64_t>(header.At("finest").AsInt(), -1, 99)) : 0;

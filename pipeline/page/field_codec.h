@@ -16,6 +16,7 @@
 #include "kernels/field/radiance_field.h"
 #include "kernels/scene/ndc.h"
 #include "pipeline/files/json_file.h"
+#include "pipeline/page/page_order.h"
 
 namespace regrade {
 
@@ -44,7 +45,12 @@ PageField EncodeField(const RadianceField& field, double step);
 // memory in proportion to what the sections unpack to.
 RadianceField DecodeField(const PageField& page);
 
-// Voxels of a field that DecodeField has made, in the order in which its page has them.
-std::vector<int64_t> VoxelsInPageOrder(const Geometry& geometry);
+// The voxels of a page in its order: which they are in `geometry`, that of the field that was
+// encoded or decoded, and from which others they are predicted.
+struct PageVoxels {
+  std::vector<int64_t> voxel;
+  std::vector<EarlierVoxels> earlier;
+};
+PageVoxels VoxelsInPageOrder(const PageField& page, const Geometry& geometry);
 
 }  // namespace regrade

@@ -11,6 +11,8 @@
 #include "kernels/image/resize.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/fields/field_file.h"
+#include "pipeline/fields/object_file.h"
+#include "pipeline/fields/residual_file.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/page/check_page.h"
 #include "pipeline/page/keyframes.h"
@@ -18,6 +20,8 @@
 #include "pipeline/run/run_file.h"
 #include "pipeline/workspace/style_folders.h"
 #include "stylize/field/apply_network.h"
+#include "stylize/field/blend_fields.h"
+#include "stylize/training/restyle_field.h"
 
 namespace regrade {
 namespace {
@@ -32,12 +36,39 @@ std::string Thumbnail(const Image& image, int longest) {
                     kQuality);
 }
 
-// "" or "none", "views", "layers:DIR".
-std::string ResidualOf(const std::string& style_folder) {
-  if (!std::filesystem::exists(style_folder + "/residual.npz")) return "";
-  const JsonValue* const residual =
-      ReadRunFile(style_folder + "/run.json").options.Find("residual");
-  return residual != nullptr ? residual->AsString() : "";
+// What the style of a folder adds to the field voxel by voxel, in the field's order.
+StyleLayers ReadLayers(const std::string& style_folder, int64_t voxels) {
+  StyleLayers layers;
+  if (const std::string file = style_folder + "/residual.npz"; std::filesystem::exists(file))
+    layers.residual = ReadResidualFile(file, voxels);
+  if (const std::string file = style_folder + "/object.npz"; std::filesystem::exists(file))
+    layers.weight = ReadObjectFile(file, voxels).all;
+  return layers;
+}
+
+template <typename T>
+std::vector<T> Chosen(const std::vector<T>& values, const std::vector<int64_t>& of) {
+  std::vector<T> chosen;
+  for (size_t i = 0; i < of.size() && !values.empty(); ++i)
+    chosen.push_back(values[static_cast<size_t>(of[i])]);
+  return chosen;
+}
+
+StyleLayers InPageOrder(const StyleLayers& layers, const std::vector<int64_t>& of) {
+  return {{Chosen(layers.residual.color, of), Chosen(layers.residual.view_scale, of)},
+          Chosen(layers.weight, of)};
+}
+
+// The styled field without any rounding.
+RadianceField ExactStyle(const RadianceField& source, const StoredNetwork& network,
+                         const StyleLayers& layers) {
+  RadianceField padded = source;
+  padded.appearance = PadShBasis(std::move(padded.appearance), kStyledBasis);
+  RadianceField exact = padded;
+  exact.appearance = ApplyNetwork(network.network, source);
+  exact.background = network.background;
+  if (!layers.residual.color.empty()) AddResidual(layers.residual, &exact.appearance);
+  return layers.weight.empty() ? exact : MixFields(padded, {&exact}, {1}, &layers.weight);
 }
 
 double StrengthOf(const std::string& style_folder) {
@@ -67,6 +98,9 @@ void AddPhotos(const WorkingViews& views, const std::vector<int>& chosen,
   content->colors = Pool(parts);
 }
 
+// Bytes in base64.
+int64_t InText(size_t bytes) { return static_cast<int64_t>((bytes + 2) / 3 * 4); }
+
 std::string CheckLine(const std::string& what, const PageCheck& check) {
   return what + Format(" to the exact one, worst of %d views: %.1f dB (mean %.1f)", check.views,
                        check.worst_db, check.mean_db);
@@ -74,18 +108,9 @@ std::string CheckLine(const std::string& what, const PageCheck& check) {
 
 }  // namespace
 
-std::string WhyNoPage(const std::string& style_folder) {
-  if (std::filesystem::exists(style_folder + "/object.npz")) return "is limited to masks";
-  return ResidualOf(style_folder).starts_with("layers:") ? "is the local edit of a photo" : "";
-}
-
 MadePage MakePage(const std::string& folder, const std::vector<std::string>& styles,
                   const PageOptions& options, const ProgressFunction& progress) {
   const int steps = 2 + static_cast<int>(styles.size());
-  for (const std::string& style : styles)
-    if (const std::string why = WhyNoPage(StyleFolder(folder, style)); !why.empty())
-      throw InputError(why + ", which a page does not hold", style,
-                       "name styles that are networks alone: regrade page DIR STYLE ...");
   ReportOrThrow(progress, 0, steps);
   StoredField stored = ReadFieldFile(folder + "/field.npz");
   const WorkingViews views = ReadWorkingViews(folder + "/poses", kChecked, 0)
@@ -104,6 +129,9 @@ MadePage MakePage(const std::string& folder, const std::vector<std::string>& sty
   const std::vector<Camera> checked =
       options.check ? CheckedViews(views.Cameras(), kChecked) : std::vector<Camera>{};
   MadePage made;
+  made.places = VoxelsInPageOrder(content.field, *page.geometry);
+  const std::vector<int64_t> of =
+      VoxelsInPageOrder(content.field, *stored.field.geometry).voxel;
   PageCheck check;
   if (options.check) {
     check = CheckPage(stored.field, page, checked);
@@ -114,22 +142,21 @@ MadePage MakePage(const std::string& folder, const std::vector<std::string>& sty
     ReportOrThrow(progress, 1 + static_cast<int64_t>(i), steps);
     const std::string style_folder = StyleFolder(folder, styles[i]);
     const StoredNetwork network = ReadNetworkFile(style_folder + "/network.npz");
-    if (ResidualOf(style_folder) == "views")
-      made.report.push_back(
-          "its style " + styles[i] +
-          " is the network alone: a page does not hold the residual by voxel");
-    PageStyle style = EncodeStyle(network, page, StrengthOf(style_folder));
+    const StyleLayers layers = ReadLayers(style_folder, stored.field.geometry->num_voxels());
+    PageStyle style = EncodeStyle(network, page, StrengthOf(style_folder),
+                                  InPageOrder(layers, of), made.places);
     const Image picture = RenderHome(style.styled, home);
     if (i == 0 && style.header.At("strength").AsDouble() == 1)
       content.poster = EncodeJpeg(picture, kQuality);
     content.style_pictures.push_back(Thumbnail(picture, kThumbnail));
     if (options.check) {
-      RadianceField exact = stored.field;
-      exact.appearance = PadShBasis(std::move(exact.appearance), style.styled.appearance.basis);
-      exact.appearance = ApplyNetwork(network.network, exact);
-      exact.background = network.background;
-      made.report.push_back(
-          CheckLine("its style " + styles[i], CheckPage(exact, style.styled, checked)));
+      made.report.push_back(CheckLine(
+          "its style " + styles[i],
+          CheckPage(ExactStyle(stored.field, network, layers), style.styled, checked)));
+      if (!style.residual.empty())
+        made.report.push_back(Format("what style %s adds voxel by voxel: %.0f kB of the page",
+                                     styles[i].c_str(),
+                                     static_cast<double>(InText(style.residual.size())) / 1e3));
     }
     style.styled = {};
     style.header["id"] = PageStyleId(style_folder);
@@ -139,10 +166,9 @@ MadePage MakePage(const std::string& folder, const std::vector<std::string>& sty
   made.html = PageHtml(content, options.check ? &check : nullptr);
   made.field = std::move(page);
   made.voxels = content.field.header.At("voxels").AsInt();
-  const auto in_text = [](size_t bytes) { return static_cast<int64_t>((bytes + 2) / 3 * 4); };
-  made.field_bytes = in_text(content.field.bytes());
+  made.field_bytes = InText(content.field.bytes());
   for (const PageStyle& style : content.styles)
-    made.style_bytes.push_back(in_text(style.packed.size()));
+    made.style_bytes.push_back(InText(style.packed.size()) + InText(style.residual.size()));
   return made;
 }
 

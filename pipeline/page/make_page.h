@@ -8,6 +8,7 @@
 
 #include "kernels/base/progress.h"
 #include "kernels/field/radiance_field.h"
+#include "pipeline/page/field_codec.h"
 
 namespace regrade {
 
@@ -35,13 +36,10 @@ struct MadePage {
   std::vector<int64_t> style_bytes;
   std::vector<std::string> report;  // lines of --check
   RadianceField field;              // as the page has it
+  PageVoxels places;                // its voxels, as the page orders them
 };
 
-// Why a page does not hold the style of that folder, or "": a page has a network for each
-// style.
-std::string WhyNoPage(const std::string& style_folder);
-
-// `styles`: names in `folder`; whole-scene styles only. Throws Error(kInput).
+// `styles`: names in `folder`; with what they add voxel by voxel. Throws Error(kInput).
 MadePage MakePage(const std::string& folder, const std::vector<std::string>& styles,
                   const PageOptions& options, const ProgressFunction& progress);
 

@@ -111,6 +111,9 @@ std::string PageHtml(const PageContent& content, const PageCheck* check) {
   for (const PageSection& section : content.field.sections) add(section.name, section.packed);
   for (size_t i = 0; i < content.styles.size(); ++i)
     add("network_" + std::to_string(i), content.styles[i].packed);
+  for (size_t i = 0; i < content.styles.size(); ++i)
+    if (const std::string& residual = content.styles[i].residual; !residual.empty())
+      add("residual_" + std::to_string(i), residual);
   const std::string policy = PagePolicy(PolicyHash(kPageScriptHash), content.served);
   const std::string scene = InElement(DumpJson(Header(content, check), -1));
   const std::pair<const char*, std::string> parts[] = {

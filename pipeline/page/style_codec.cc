@@ -48,6 +48,11 @@ Coded RoundToCodes(RadianceField* field) {
 }
 
 PageStyle EncodeStyle(const StoredNetwork& stored, const RadianceField& page, double strength) {
+  return EncodeStyle(stored, page, strength, {}, {});
+}
+
+PageStyle EncodeStyle(const StoredNetwork& stored, const RadianceField& page, double strength,
+                      const StyleLayers& layers, const PageVoxels& places) {
   const LipschitzNetworkData& data = stored.network.data();
   DenseNetwork<float> dense = stored.network.Effective<float>();
   std::string halves;
@@ -59,6 +64,7 @@ PageStyle EncodeStyle(const StoredNetwork& stored, const RadianceField& page, do
   PageStyle style;
   style.styled = page;
   style.styled.appearance = PadShBasis(std::move(style.styled.appearance), kStyledBasis);
+  const RadianceField source = layers.empty() ? RadianceField{} : style.styled;
   style.styled.appearance = ApplyForward(
       [&](const float* features, int64_t n, float* output) {
         FusedForward(fused, features, n, output);
@@ -68,6 +74,13 @@ PageStyle EncodeStyle(const StoredNetwork& stored, const RadianceField& page, do
       },
       data.position_scale, style.styled);
   style.styled.background = stored.background;
+  JsonValue residual;
+  if (!layers.empty()) {
+    PageResidual packed = EncodeResidual(layers, places.earlier);
+    ApplyLayers(packed.rounded, places.voxel, source, &style.styled);
+    style.residual = std::move(packed.packed);
+    residual = std::move(packed.header);
+  }
   const Coded coded = RoundToCodes(&style.styled);
   const RowMap base = BaseOf(data);
   JsonValue::Array matrix;
@@ -83,7 +96,8 @@ PageStyle EncodeStyle(const StoredNetwork& stored, const RadianceField& page, do
                                    {"constant", array(base.constant)},
                                    {"scale", ArrayOf(coded.scale)},
                                    {"sphere_scale", ArrayOf(coded.sphere_scale)},
-                                   {"background", array(stored.background)},
+                                   {"background", array(style.styled.background)},
+                                   {"residual", std::move(residual)},
                                    {"strength", strength},
                                    {"bound", stored.network.Bound()}};
   style.packed = Deflate(halves);

@@ -12,17 +12,23 @@
 #include "kernels/field/radiance_field.h"
 #include "pipeline/fields/network_file.h"
 #include "pipeline/files/json_file.h"
+#include "pipeline/page/field_codec.h"
+#include "pipeline/page/residual_codec.h"
 
 namespace regrade {
 
 struct PageStyle {
   JsonValue header;
   std::string packed;    // the weights, compressed
+  std::string residual;  // what is added voxel by voxel, see residual_codec.h; may be empty
   RadianceField styled;  // as the page will have it, up to the arithmetic of its processor
 };
 
 // `page`: of DecodeField. `strength` in [0, 1]: the weight at which the style is shown first.
 PageStyle EncodeStyle(const StoredNetwork& stored, const RadianceField& page, double strength);
+// With what the style adds voxel by voxel; `places`: the page's voxels in `page`.
+PageStyle EncodeStyle(const StoredNetwork& stored, const RadianceField& page, double strength,
+                      const StyleLayers& layers, const PageVoxels& places);
 
 // The styled coefficients as a page that has run the network holds them: 27 codes for each of
 // `voxels`, see VoxelsInPageOrder.

@@ -17,6 +17,8 @@ std::string SequenceLabel(const std::string& sequence) {
   if (sequence == "control_grey") return "control: styled, grey";
   if (sequence == "control_field_2d")
     return "control: field fitted to the 2D method's pictures";
+  if (sequence == "control_ceiling")
+    return "control: every voxel fitted to the 2D method's pictures";
   return sequence;
 }
 

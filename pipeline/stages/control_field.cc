@@ -53,9 +53,10 @@ StoredField ControlField(RunContext* context, const WorkingViews& views,
 }
 
 NamedFrameSource ControlFieldFrames(const StoredField& stored,
-                                    const std::vector<Camera>& cameras) {
+                                    const std::vector<Camera>& cameras,
+                                    const std::string& name) {
   const auto grid = std::make_shared<const FastGrid>(MakeFastGrid(stored.field));
-  return {kFieldControl,
+  return {name,
           {static_cast<int>(cameras.size()), [grid, cameras, step = stored.field.step](int i) {
              Image frame =
                  RenderView(*grid, cameras[static_cast<size_t>(i)], MarchOptions{step}).color;

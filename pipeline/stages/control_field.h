@@ -26,6 +26,7 @@ StoredField ControlField(RunContext* context, const WorkingViews& views,
 
 // Its frames at the cameras, with 8 bits as frames on disk have.
 NamedFrameSource ControlFieldFrames(const StoredField& stored,
-                                    const std::vector<Camera>& cameras);
+                                    const std::vector<Camera>& cameras,
+                                    const std::string& name = kFieldControl);
 
 }  // namespace regrade

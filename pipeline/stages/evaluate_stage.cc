@@ -9,8 +9,8 @@
 
 #include "evaluate/consistency.h"
 #include "evaluate/fidelity.h"
+#include "evaluate/fidelity_networks.h"
 #include "evaluate/optical_flow.h"
-#include "evaluate/pair_network.h"
 #include "evaluate/protocols.h"
 #include "evaluate/tables.h"
 #include "kernels/base/error.h"
@@ -22,9 +22,11 @@
 #include "pipeline/fields/film_timing.h"
 #include "pipeline/images/cube_file.h"
 #include "pipeline/images/image_file.h"
+#include "pipeline/images/kept_pictures.h"
 #include "pipeline/program/device_choice.h"
 #include "pipeline/report/records.h"
 #include "pipeline/run/run_context.h"
+#include "pipeline/stages/control_ceiling.h"
 #include "pipeline/stages/control_field.h"
 #include "pipeline/stages/control_sequences.h"
 #include "pipeline/stages/film_frames.h"
@@ -42,9 +44,11 @@ namespace regrade {
 namespace {
 
 // The pictures `folder`/00000.png, ... of the given views.
-FrameSource FramesOf(const std::string& folder, const std::vector<int>& views) {
-  return {static_cast<int>(views.size()),
-          [folder, views](int i) { return ReadImage(folder + "/" + FrameName(views[i])); }};
+FrameSource FramesOf(const KeptPictures& kept, const std::string& folder,
+                     const std::vector<int>& views) {
+  return {static_cast<int>(views.size()), [kept, folder, views](int i) {
+            return kept.Read(folder + "/" + FrameName(views[i]));
+          }};
 }
 
 void Append(std::vector<NamedFrameSource> more, std::vector<NamedFrameSource>* sequences) {
@@ -114,7 +118,7 @@ ConsistencyReport Compare(const Workspace& workspace,
 }
 
 // Rough seconds on two cores at 480 pixels, for the estimate of the remaining time.
-constexpr double kControlFieldSeconds = 60;
+constexpr double kControlFieldSeconds = 60, kCeilingSeconds = 60;
 constexpr double kPairSeconds = 0.085, kFrameSeconds = 0.07, kLinearMapSeconds = 0.23;
 
 double PairWeight(const RunSettings& settings, int frames) {
@@ -130,7 +134,7 @@ bool HasFilm(const RunSettings& settings) {
 
 // Evaluates the film's frames, with flow and masks from its own unstyled ones. Mode "geometry"
 // leaves the film out: its geometry is not on disk.
-void AddFilm(RunContext* context, const Image& style, const Camera& camera,
+void AddFilm(RunContext* context, const FidelityTargets& networks, const Camera& camera,
              ProgressParts* parts, ConsistencyReport* report,
              std::vector<FidelityRow>* fidelity, std::vector<HeatMapFile>* heat_maps) {
   const RunSettings& settings = context->settings;
@@ -143,16 +147,17 @@ void AddFilm(RunContext* context, const Image& style, const Camera& camera,
   ConsistencyOptions options = settings.consistency;
   options.excerpt = SamplesOfFilm(settings.render.film_seconds, settings.render.fps).excerpt;
   const bool renders_styled = std::filesystem::exists(folder("views_2d"));
+  const KeptPictures kept;
   std::vector<NamedFrameSource> sequences;
   for (const char* name : {"source", "views_2d", "styled"}) {
     if (name == std::string("views_2d") && !renders_styled) continue;
     const std::string sequence = std::string(kPathPrefix) + name;
-    sequences.push_back({sequence, FramesOf(folder(name), all)});
+    sequences.push_back({sequence, FramesOf(kept, folder(name), all)});
   }
-  const FidelityTargets targets{
-      renders_styled ? sequences[1].frames : FrameSource(),
-      FramesOf(folder("transmittance"), all), style.empty() ? nullptr : &style,
-      PerceptualDistance(settings.consistency.lpips), sequences[0].frames};
+  FidelityTargets targets = networks;
+  if (renders_styled) targets.views_2d = sequences[1].frames;
+  targets.transmittance = FramesOf(kept, folder("transmittance"), all);
+  targets.unstyled = sequences[0].frames;
   if (options.controls)
     Append(ControlSequences({sequences[0].frames, sequences.back().frames, targets.views_2d,
                              targets.style, !settings.object.On()},
@@ -179,8 +184,9 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   std::vector<int> all(views.count());
   for (size_t i = 0; i < all.size(); ++i) all[i] = static_cast<int>(i);
   const std::vector<int> training_views = StyledViews(workspace, views);
+  const KeptPictures kept;
   const auto frames = [&](const char* sequence, const std::vector<int>& views) {
-    return FramesOf(workspace.Path(std::string("frames/") + sequence), views);
+    return FramesOf(kept, workspace.Path(std::string("frames/") + sequence), views);
   };
 
   const std::vector<Camera> cameras = views.Cameras();
@@ -193,6 +199,7 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
                   n * (4 * kFrameSeconds + kLinearMapSeconds);
   if (film > 0) weight += PairWeight(settings, film) + 3 * kFrameSeconds * film;
   if (settings.consistency.control_field) weight += kControlFieldSeconds;
+  if (settings.consistency.controls) weight += kCeilingSeconds;
   ProgressParts parts(progress, weight);
 
   // A method that styles photos only has no pictures of rendered frames.
@@ -206,7 +213,7 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   const bool of_picture = !IsCubeFile(settings.style.picture());  // not a LUT
   const Image style = of_picture ? StyleExampleOf(settings.style, nullptr) : Image();
   const auto photo_2d = [&](int i) {
-    Image picture = ReadImage(workspace.Path("views_2d/" + FrameName(i)));
+    Image picture = kept.Read(workspace.Path("views_2d/" + FrameName(i)));
     if (settings.style.strength != 1)
       MixPicture(views.Photo(i), settings.style.strength, &picture);
     views.LeaveOutMasked(i, &picture);
@@ -230,6 +237,26 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
                             parts.Next(kControlFieldSeconds));
     sequences.push_back(ControlFieldFrames(*field_2d, compared));
   }
+  // Fidelity is measured on the training views of the style, against the 2D method applied to
+  // the rendered frames, or else to the photos.
+  const FrameSource of_photos{static_cast<int>(training_views.size()),
+                              [&](int k) { return photo_2d(training_views[k]); }};
+  FidelityTargets networks;
+  if (of_picture) networks.style = &style;
+  OpenNetworks(settings.consistency, &networks);
+  FidelityTargets targets = networks;
+  targets.views_2d = renders_styled ? frames("views_2d", training_views) : of_photos;
+  targets.transmittance = frames("transmittance", training_views);
+  targets.unstyled = frames("source", training_views);
+  std::vector<Camera> training_cameras;
+  for (const int i : training_views) training_cameras.push_back(cameras[i]);
+  std::optional<StoredField> ceiling;
+  if (settings.consistency.controls) {
+    ceiling = CeilingField(ReadStyledField(context->workspace->folder(), workspace.folder()),
+                           training_cameras, targets.views_2d, settings.run.seed,
+                           parts.Next(kCeilingSeconds));
+    sequences.push_back(ControlFieldFrames(*ceiling, compared, kCeilingControl));
+  }
   BeginHeatMaps(workspace);
   std::vector<HeatMapFile> heat_maps;
   ConsistencyReport consistency =
@@ -239,14 +266,6 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
               settings.consistency,
               parts.Next(PairWeight(settings, static_cast<int>(all.size()))), &heat_maps);
 
-  // Fidelity is measured on the training views of the style, against the 2D method applied to
-  // the rendered frames, or else to the photos.
-  const FrameSource of_photos{static_cast<int>(training_views.size()),
-                              [&](int k) { return photo_2d(training_views[k]); }};
-  const FidelityTargets targets{
-      renders_styled ? frames("views_2d", training_views) : of_photos,
-      frames("transmittance", training_views), of_picture ? &style : nullptr,
-      PerceptualDistance(settings.consistency.lpips), frames("source", training_views)};
   std::vector<NamedFrameSource> measured;
   for (const char* name : {"source", "views_2d", "styled"})
     if (renders_styled || name != std::string("views_2d"))
@@ -255,12 +274,13 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
     Append(controls.Of(training_views, targets.unstyled, targets.views_2d,
                        measured.back().frames, true),
            &measured);
-  std::vector<Camera> training_cameras;
-  for (const int i : training_views) training_cameras.push_back(cameras[i]);
   if (field_2d) measured.push_back(ControlFieldFrames(*field_2d, training_cameras));
+  if (ceiling)
+    measured.push_back(ControlFieldFrames(*ceiling, training_cameras, kCeilingControl));
   std::vector<FidelityRow> fidelity = MeasureFidelities(
       measured, targets, parts.Next(n * kFrameSeconds * static_cast<double>(measured.size())));
-  AddFilm(context, style, CommonCamera(cameras), &parts, &consistency, &fidelity, &heat_maps);
+  AddFilm(context, networks, CommonCamera(cameras), &parts, &consistency, &fidelity,
+          &heat_maps);
   const FidelityTargets photo_targets{of_photos,         targets.transmittance, nullptr, {}, {},
                                       /*only_psnr=*/true};
   const FidelityRow to_photos = MeasureFidelity({"styled", frames("styled", training_views)},
@@ -281,10 +301,10 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
                                  frames("source", training_views), targets.views_2d,
                                  targets.transmittance, parts.Next(n * kLinearMapSeconds)));
   if (!settings.consistency.lpips.empty()) {
-    const auto network = PerceptualDistance(settings.consistency.lpips);
     const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
     const auto lpips = [&](const std::vector<int>& of) {
-      return MeanOf(MeasureOnPhotos(context->Views(), of, stored, backend, network).lpips);
+      return MeanOf(
+          MeasureOnPhotos(context->Views(), of, stored, backend, networks.perceptual).lpips);
     };
     report.lpips_heldout = lpips(views.HeldOut());
     report.lpips_train = lpips(MeasuredTrainingViews(views));

@@ -52,15 +52,16 @@ FittedPictures FitPictures(const WorkingViews& views, const StoredField& scene,
   }
   if (training_views.empty())
     throw InputError("the 2D method has a picture of none of the photos", "views_2d");
-  FitOptions options =
-      AdaptOptions(settings.fit, {scene.ndc.on(), backend == Backend::kCuda, pixels});
+  const SceneBox box = BoxOf(views.capture(), settings, background);
+  FitOptions options = AdaptOptions(
+      settings.fit,
+      {scene.ndc.on(), backend == Backend::kCuda, pixels, box.background.has_value()});
   options.seed = settings.run.seed;
   if (settings.run.reproducible && options.shards == 0) options.shards = kReproducibleShards;
   options.sh_degree = std::min(options.sh_degree, DegreeOf(scene.field));
   FitHooks hooks;
   hooks.progress = progress;
-  FitResult fit = FitField(training_views, BoxOf(views.capture(), settings, background),
-                           options, hooks, backend);
+  FitResult fit = FitField(training_views, box, options, hooks, backend);
   FittedPictures fitted{{std::move(fit.field), scene.field_from_world, scene.ndc},
                         fit.psnr_train_db};
   RoundAsStored(&fitted.stored.field.appearance);

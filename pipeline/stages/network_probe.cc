@@ -4,6 +4,8 @@
 #include <cstdlib>
 #include <new>
 
+#include "evaluate/edge_map.h"
+#include "evaluate/image_network.h"
 #include "evaluate/pair_network.h"
 #include "kernels/base/error.h"
 #include "pipeline/program/crash_probe.h"
@@ -13,7 +15,8 @@
 namespace regrade {
 namespace {
 
-constexpr char kStyle[] = "style", kPair[] = "pair", kFeatures[] = "features";
+constexpr char kStyle[] = "style", kPair[] = "pair", kFeatures[] = "features",
+               kEmbedding[] = "embedding", kEdges[] = "edges", kRegions[] = "regions";
 
 void OpenStyleNetwork(const std::string& path) { MakeOnnxStylizer(path, 64, Image(64, 64)); }
 
@@ -28,6 +31,12 @@ void ProbePairNetwork(const std::string& path) {
   const PairNetwork opened(path);
 }
 
+void ProbeImageNetwork(const char* kind, const std::string& path) {
+  if (path.empty()) return;
+  RunCrashProbe(kind, path);
+  const ImageNetwork opened(path);
+}
+
 }  // namespace
 
 void ProbeStyleNetwork(const std::string& path) {
@@ -36,7 +45,7 @@ void ProbeStyleNetwork(const std::string& path) {
 }
 
 void ProbeFeatureNetwork(const std::string& path) {
-  RunCrashProbe(kFeatures, path);
+  RunCrashProbe(kRegions, path);
   OpenFeatureNetwork(path);
 }
 
@@ -44,6 +53,9 @@ void ProbeEvaluationNetworks(const ConsistencyOptions& options) {
   constexpr char kOnnx[] = "onnx:";
   if (options.flow.starts_with(kOnnx)) ProbePairNetwork(options.flow.substr(sizeof(kOnnx) - 1));
   if (!options.lpips.empty()) ProbePairNetwork(options.lpips);
+  if (options.edges != kGradientEdges) ProbeImageNetwork(kEdges, options.edges);
+  ProbeImageNetwork(kFeatures, options.style_features);
+  ProbeImageNetwork(kEmbedding, options.style_embedding);
 }
 
 void RunNetworkProbe(const std::vector<std::string>& arguments) {
@@ -55,9 +67,12 @@ void RunNetworkProbe(const std::vector<std::string>& arguments) {
   const std::string &kind = arguments[1], &path = arguments[2];
   try {
     if (kind == kStyle) return OpenStyleNetwork(path);
-    if (kind == kFeatures) return OpenFeatureNetwork(path);
+    if (kind == kRegions) return OpenFeatureNetwork(path);
+    const Image picture(64, 64, 3);
+    if (kind == kFeatures) return (void)ImageNetwork(path).Features(picture);
+    if (kind == kEmbedding) return (void)ImageNetwork(path).Embedding(picture);
+    if (kind == kEdges) return (void)ImageNetwork(path).EdgeMap(picture);
     if (kind == kPair) {
-      const Image picture(64, 64, 3);
       PairNetwork(path).Distance(picture, picture);
       return;
     }

@@ -1,5 +1,5 @@
-// Styles of an object alone: object weights of voxels from masks of photos, their file, and
-// masks rendered from them.
+// Styles of an object alone: object weights of voxels from masks of photos, and masks rendered
+// from them.
 #pragma once
 
 #include <memory>
@@ -10,6 +10,7 @@
 #include "kernels/field/radiance_field.h"
 #include "kernels/scene/capture.h"
 #include "pipeline/capture/object_masks.h"
+#include "pipeline/fields/object_file.h"
 #include "pipeline/run/run_context.h"
 
 namespace regrade {
@@ -18,21 +19,10 @@ namespace regrade {
 std::unique_ptr<ObjectMasks> OpenObjectMasks(const RunSettings& settings,
                                              const Capture& capture);
 
-// Object weights [voxels] of each region, and their sum.
-struct ObjectWeights {
-  std::vector<std::vector<float>> regions;
-  std::vector<float> all;
-};
-
 // See EQ(mask-vote); the masks of `views` vote.
 ObjectWeights VoteForObject(const RunSettings& settings, const WorkingViews& working_views,
                             const std::vector<int>& views, const ObjectMasks& masks,
                             const RadianceField& field, const ProgressFunction& progress);
-
-// object.npz: f32 "weights" [regions, voxels]. Reading throws Error(kInput) for a file that
-// does not fit the field.
-void WriteObjectFile(const std::string& path, const ObjectWeights& weights);
-ObjectWeights ReadObjectFile(const std::string& path, int64_t voxels);
 
 // Renders the consensus masks from any camera: how much of each pixel belongs to each region.
 class CoverageRenderer {

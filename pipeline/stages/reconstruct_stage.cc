@@ -107,7 +107,8 @@ FitOptions OptionsForScene(RunContext* context, const NormalizedScene& scene, in
       PlannedMemory(settings.run.max_memory_gb,
                     on_device ? static_cast<uint64_t>(ReadDeviceStatus().free_bytes)
                               : ReadMemoryStatus().available);
-  FitOptions options = AdaptOptions(settings.fit, {scene.ndc.on(), on_device, pixels});
+  FitOptions options = AdaptOptions(
+      settings.fit, {scene.ndc.on(), on_device, pixels, scene.box.background.has_value()});
   const int finest = Finest(options);
   options.seed = settings.run.seed;
   // Free memory must not change the result of a reproducible run.
@@ -301,7 +302,8 @@ Stage ReconstructStage(RunContext* context) {
     const Backend backend = ChooseBackend(run.device, run.reproducible);
     const int64_t pixels = PixelsToFit(views);
     const FitOptions options = AdaptOptions(
-        context->settings.fit, {profile.scene.ndc.on(), backend == Backend::kCuda, pixels});
+        context->settings.fit, {profile.scene.ndc.on(), backend == Backend::kCuda, pixels,
+                                profile.scene.box.background.has_value()});
     stage.plan = PlanText(PlannerOf(pixels, profile.scene.box, backend)(options));
   }
   stage.work = [context, inputs = stage.inputs](const ProgressFunction& progress) {

@@ -118,8 +118,7 @@ ReportPictures PicturesOf(const RunContext& context, const RunReport& report) {
   return pictures;
 }
 
-// scene.html beside the report; false where it is not wanted, too large, or the style is of
-// masked objects or a local edit, which a page does not hold.
+// scene.html beside the report; false where it is not wanted or too large.
 bool WriteScenePage(const RunContext& context, const ProgressFunction& progress) {
   constexpr size_t kLargest = 25'000'000;  // bytes, of --page auto
   const std::string& choice = context.settings.page.page;
@@ -127,10 +126,6 @@ bool WriteScenePage(const RunContext& context, const ProgressFunction& progress)
   const std::string path = style.Path(kScenePage);
   std::filesystem::remove(path);
   if (choice == "off") return false;
-  if (const std::string why = WhyNoPage(style.folder()); !why.empty()) {
-    if (choice == "on") context.console->Warn("no page: the style " + why);
-    return false;
-  }
   const std::string name = std::filesystem::path(style.folder()).filename().string();
   const std::string html =
       MakePage(context.workspace->folder(), {name}, PageOptions{}, progress).html;

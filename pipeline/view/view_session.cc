@@ -58,7 +58,7 @@ ViewSession::ViewSession(const std::string& folder, const std::vector<std::strin
   MadePage made = MakePage(folder, styles, {.served = true}, progress);
   page_ = std::move(made.html);
   field_ = std::move(made.field);
-  voxels_ = VoxelsInPageOrder(*field_.geometry);
+  voxels_ = std::move(made.places.voxel);
 }
 
 std::vector<Route> ViewSession::Routes() {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <numeric>
 
 #include "kernels/base/error.h"
@@ -9,21 +10,38 @@
 namespace regrade {
 namespace {
 
-constexpr int64_t kLeastRays = 4096, kMostRays = 16384;
+constexpr int64_t kLeastRays = 4096, kMostRays = 14336;
+
+using Rate = float FitOptions::*;
+
+// Takes the values of `other`, except those that were asked for.
+void TakeDefaults(const FitOptions& other, std::initializer_list<Rate> rates,
+                  FitOptions* options) {
+  const FitOptions plain;
+  for (const Rate rate : rates)
+    if (options->*rate == plain.*rate) options->*rate = other.*rate;
+}
 
 // Chosen on a forward-facing capture at two sizes; see COSTS.md.
 void UseRatesOfDeviceCoordinates(FitOptions* options) {
-  const FitOptions plain;
   FitOptions other;
   other.rate_density = 12;
   other.rate_density_end = 2;
   other.tv_density = 0.1f;
   other.tv_sh = 8e-3f;
   other.free_space = 0;
-  for (float FitOptions::*value :
-       {&FitOptions::rate_density, &FitOptions::rate_density_end, &FitOptions::tv_density,
-        &FitOptions::tv_sh, &FitOptions::free_space})
-    if (options->*value == plain.*value) options->*value = other.*value;
+  TakeDefaults(other,
+               {&FitOptions::rate_density, &FitOptions::rate_density_end,
+                &FitOptions::tv_density, &FitOptions::tv_sh, &FitOptions::free_space},
+               options);
+}
+
+// Chosen on a synthetic capture with transparent photos; see COSTS.md.
+void UseRatesOfKnownBackground(FitOptions* options) {
+  FitOptions other;
+  other.tv_density = 2e-3f;
+  other.tv_sh = 1.6e-4f;
+  TakeDefaults(other, {&FitOptions::tv_density, &FitOptions::tv_sh}, options);
 }
 
 void DropStages(int64_t pixels, FitOptions* options) {
@@ -47,8 +65,12 @@ FitOptions AdaptOptions(FitOptions options, const FitConditions& conditions) {
     options.rays_per_step = static_cast<int>(
         std::clamp(rays, kLeastRays, conditions.on_card ? kMostRays : kLeastRays));
   }
-  if (conditions.device_coordinates && options.adaptive())
-    UseRatesOfDeviceCoordinates(&options);
+  if (options.adaptive()) {
+    if (conditions.device_coordinates)
+      UseRatesOfDeviceCoordinates(&options);
+    else if (conditions.known_background)
+      UseRatesOfKnownBackground(&options);
+  }
   return options;
 }
 

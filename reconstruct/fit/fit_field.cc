@@ -31,8 +31,10 @@ double PsnrOf(double squared_error, int64_t rays) {
          std::log10(squared_error / (3.0 * static_cast<double>(std::max<int64_t>(rays, 1))));
 }
 
-FitConditions ConditionsOf(const std::vector<TrainingView>& views, Backend backend) {
+FitConditions ConditionsOf(const std::vector<TrainingView>& views, const SceneBox& box,
+                           Backend backend) {
   FitConditions conditions;
+  conditions.known_background = box.background.has_value();
   conditions.on_card = backend == Backend::kCuda;
   for (const TrainingView& view : views) {
     conditions.device_coordinates = conditions.device_coordinates || view.camera.ndc.on();
@@ -48,7 +50,7 @@ class Fitter {
       : rays_(views),
         views_(views),
         box_(box),
-        options_(AdaptOptions(options, ConditionsOf(views, backend))),
+        options_(AdaptOptions(options, ConditionsOf(views, box, backend))),
         hooks_(hooks),
         sums_each_step_(backend == Backend::kCpu) {
     REGRADE_CHECK_EQ(options_.resolutions.size(), options_.steps.size());

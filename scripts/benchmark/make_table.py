@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
 """Writes the tables of a benchmark from the reports of its runs.
 
-  make_table.py WORK [SCENE=ROLE...]
+  make_table.py WORK [SCENE=ROLE...] [--results PAGE --commit TEXT]
 
 Reads WORK/runs/SCENE/STYLE/METHOD/SEED/styles/style/report.json and WORK/foreign/...; writes WORK/table.csv with every run, and
 WORK/table.md and table.tex with means over styles and seeds, each with the standard deviation between seeds. ROLE says whether
-settings were chosen on the scene. Exit status: 0, or 1 without a finished run.
+settings were chosen on the scene. PAGE gets the tables between its lines "<!-- core -->" and "<!-- end of core -->", with the
+machine, TEXT and the time that the runs took. Exit status: 0, or 1 without a finished run or without these lines.
 """
 
 import csv
@@ -129,11 +130,53 @@ def latex(head, lines):
                      body + [r"\bottomrule", r"\end{tabular}", ""])
 
 
-def main():
-    if len(sys.argv) < 2 or sys.argv[1] == "--help" or not all("=" in word for word in sys.argv[2:]):
+def machine():
+    """"2 cores of MODEL"; without the model where the system does not say."""
+    with open("/proc/cpuinfo") as file:
+        models = [line.split(":", 1)[1].strip() for line in file if line.startswith("model name")]
+    return f"{os.cpu_count()} cores" + (f" of {models[0]}" if models else "")
+
+
+def run_seconds(work):
+    """Of all stages of all runs, each fit once; runs do not overlap with `--cores 2`."""
+    fitted, total = set(), 0.0
+    for scene, _, _, seed, report in reports(work, "runs"):
+        for name, stage in report["stages"].items():
+            if name in ("pose", "reconstruct") and (scene, seed, name) in fitted:
+                continue
+            fitted.add((scene, seed, name))
+            total += stage.get("seconds") or 0
+    return total
+
+
+def write_page(page, body):
+    """Puts the text between the page's two lines."""
+    begin, end = "<!-- core -->\n", "<!-- end of core -->\n"
+    with open(page) as file:
+        text = file.read()
+    if text.count(begin) != 1 or text.count(end) != 1 or text.index(begin) > text.index(end):
+        sys.exit(f"{page}: there is no line {begin.strip()} before a line {end.strip()}")
+    with open(page + ".part", "w") as file:
+        file.write(text[:text.index(begin)] + begin + body + text[text.index(end):])
+    os.replace(page + ".part", page)
+
+
+def arguments():
+    """(work, {scene: role}, page or None, commit)"""
+    words, given = list(sys.argv[1:]), {}
+    for flag in ("--results", "--commit"):
+        if flag in words[:-1]:
+            at = words.index(flag)
+            given[flag] = words[at + 1]
+            del words[at:at + 2]
+    if not words or "--help" in words or not all("=" in word for word in words[1:]):
         print(__doc__)
-        return 0 if "--help" in sys.argv else 2
-    work, roles = sys.argv[1], dict(word.split("=", 1) for word in sys.argv[2:])
+        sys.exit(0 if "--help" in words else 2)
+    return words[0], dict(word.split("=", 1) for word in words[1:]), given.get("--results"), given.get("--commit", "")
+
+
+def main():
+    work, roles, page, commit = arguments()
     rows, seen = [], set()
     for kind in ("runs", "foreign"):
         for found in reports(work, kind):
@@ -159,6 +202,11 @@ def main():
                        markdown(["scene", "method", "TC short", "TC long"], of_paper))
     with open(os.path.join(work, "table.tex"), "w") as file:
         file.write(latex(head, lines))
+    if page:
+        runs = len({(row["scene"], row["style"], row["method"].split(" w/ ")[0].split(",")[0], row["seed"])
+                    for row in rows if row["method"] != "no style"})
+        write_page(page, f"{runs} runs in {run_seconds(work) / 60:.0f} min; {machine()}; {commit}.\n\n" +
+                   markdown(["scene", "held-out PSNR", "SSIM"], fits(rows)) + "\n" + markdown(head, lines))
     return 0
 
 

@@ -10,7 +10,8 @@
 namespace regrade {
 
 void AddResidualRays(const RadianceField& field, const Camera& camera, const Image& missing,
-                     int64_t most, uint64_t seed, ResidualRays* rays) {
+                     int64_t most, uint64_t seed, ResidualRays* rays,
+                     std::vector<Vec3f>* directions) {
   REGRADE_CHECK(missing.width == camera.width && missing.height == camera.height);
   constexpr float kLeastWeight = 1e-4f;
   const double chosen =
@@ -23,6 +24,7 @@ void AddResidualRays(const RadianceField& field, const Camera& camera, const Ima
     if (!AllFinite(lack)) continue;
     some.push_back(camera.PixelRay(static_cast<int>(i % missing.width),
                                    static_cast<int>(i / missing.width)));
+    if (directions) directions->push_back(some.back().direction);
     rays->missing.push_back(lack);
     rays->share.push_back(static_cast<float>(1 / chosen));
   }

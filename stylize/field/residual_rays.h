@@ -22,9 +22,10 @@ struct ResidualRays {
 };
 
 // Of a view's pixels `most` at random, all where it has no more; those whose `missing` [H, W,
-// 3] is not finite do not count.
+// 3] is not finite do not count. `directions`, if asked for, gets each ray's.
 void AddResidualRays(const RadianceField& field, const Camera& camera, const Image& missing,
-                     int64_t most, uint64_t seed, ResidualRays* rays);
+                     int64_t most, uint64_t seed, ResidualRays* rays,
+                     std::vector<Vec3f>* directions = nullptr);
 
 // y = W x: [rays] of [voxels].
 std::vector<Vec3d> SumAlongRays(const ResidualRays& rays, const std::vector<Vec3d>& x);

@@ -54,7 +54,7 @@ struct TrainingState {
 struct TrainingHooks {
   ProgressFunction progress;
   std::function<void(const TrainingState&)> checkpoint;  // may be empty
-  int checkpoint_every = 50;                             // steps
+  int checkpoint_every = 50;                             // steps; and at the tenth
 };
 
 struct TrainNetworkResult {

@@ -14,17 +14,27 @@
 #include <vector>
 
 #include "kernels/base/error.h"
+#include "kernels/field/cpu/render_view.h"
 #include "kernels/field/pad_sh_basis.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/fields/field_file.h"
 #include "pipeline/fields/network_file.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/stages/styled_field.h"
+#include "stylize/field/coefficient_fit.h"
 #include "tests/support/edit_truth.h"
-#include "tests/support/field_ceiling.h"
 
 namespace regrade {
 namespace {
+
+// Pictures of a field from all cameras.
+std::vector<Image> Renders(const RadianceField& field, const std::vector<Camera>& cameras) {
+  std::vector<Image> pictures;
+  const FastGrid grid = MakeFastGrid(field);
+  for (const Camera& camera : cameras)
+    pictures.push_back(RenderView(grid, camera, MarchOptions{field.step}).color);
+  return pictures;
+}
 
 int Run(const std::string& out, const std::string& grade, const std::string& name, int edited) {
   const std::string style = out + "/styles/" + name;
@@ -34,7 +44,7 @@ int Run(const std::string& out, const std::string& grade, const std::string& nam
   const WorkingViews views = ReadWorkingViews(out + "/poses", kAnySize, 0)
                                  .InField(source.field_from_world, source.ndc);
   const std::vector<Camera> cameras = views.Cameras();
-  const testing::EditTruth truth(grade, testing::RendersOf(source.field, cameras), edited);
+  const testing::EditTruth truth(grade, Renders(source.field, cameras), edited);
   std::vector<Image> missing = truth.graded();
   for (size_t i = 0; i < missing.size(); ++i)
     for (size_t k = 0; k < missing[i].pixels.size(); ++k)
@@ -47,9 +57,7 @@ int Run(const std::string& out, const std::string& grade, const std::string& nam
 
   const double linear = truth.ErrorsOf(truth.ByLinearMap()).inside;
   const double ceiling =
-      truth
-          .ErrorsOf(testing::RendersOf(testing::FieldCeiling(source.field, cameras, missing),
-                                       cameras))
+      truth.ErrorsOf(Renders(FitCoefficients(source.field, cameras, missing, {}), cameras))
           .inside;
   const auto row = [&](const char* what, const std::vector<Image>& pictures) {
     const testing::EditErrors errors = truth.ErrorsOf(pictures);
@@ -61,9 +69,8 @@ int Run(const std::string& out, const std::string& grade, const std::string& nam
   std::printf("|---|---|---|---|\n| best linear map | %.2e | 0 %% | |\n", linear);
   row("unedited", truth.renders());
   row("2D method on renders", of_method);
-  row("network alone",
-      testing::RendersOf(StyledFieldOf(source, network, 1, nullptr).field, cameras));
-  row("with residual", testing::RendersOf(ReadStyledField(out, style, 1).field, cameras));
+  row("network alone", Renders(StyledFieldOf(source, network, 1, nullptr).field, cameras));
+  row("with residual", Renders(ReadStyledField(out, style, 1).field, cameras));
   std::printf("| ceiling | %.2e | 100 %% | |\n", ceiling);
   return 0;
 }

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cmath>
 #include <filesystem>
 #include <functional>
@@ -259,7 +260,7 @@ TEST(Consistency, H120_MotionComesFromTheReferenceOnceForAllSequences) {
                          .error);
     EXPECT_EQ(*b.error, 0);  // grey is perfectly consistent for any flow
   }
-  int calls = 0;
+  std::atomic<int> calls = 0;
   const auto counted = [&](int, int) {
     ++calls;
     return StillMotion(kW, kH);

@@ -160,14 +160,15 @@ TEST(RunReport, ShowsEveryPartOfTheRun) {
   std::set<std::string> measured_rows;
   for (const JsonValue& row : table.At("fidelity").AsArray())
     measured_rows.insert(row.At("sequence").AsString());
-  EXPECT_EQ(measured_rows.size(), 3u + 6 + 3 + 3);
+  EXPECT_EQ(measured_rows.size(), 3u + 7 + 3 + 3);
   for (const JsonValue& row : table.At("consistency").AsArray()) {
     const std::string sequence = row.At("sequence").AsString();
     EXPECT_EQ(measured_rows.count(sequence), 1u) << sequence;
     EXPECT_EQ(row.At("undefined_pairs").AsInt() > 0, sequence == "photos_2d") << sequence;
   }
-  for (const char* sequence : {"photos", "photos_2d", "control_blurred", "control_grey",
-                               "control_linear_map", "path_control_grey", "control_field_2d"})
+  for (const char* sequence :
+       {"photos", "photos_2d", "control_blurred", "control_grey", "control_linear_map",
+        "path_control_grey", "control_field_2d", "control_ceiling"})
     EXPECT_EQ(measured_rows.count(sequence), 1u) << sequence;
   // The field of the 2D method's pictures is one of them, not the scene's, and is fitted once.
   const auto to_2d = [&](const char* sequence) {
@@ -176,6 +177,9 @@ TEST(RunReport, ShowsEveryPartOfTheRun) {
     return 0.0;
   };
   EXPECT_GT(to_2d("control_field_2d"), to_2d("source") + 1);
+  // No colours at these voxels are closer than those that were fitted to the pictures.
+  EXPECT_GT(to_2d("control_ceiling"), to_2d("styled"));
+  EXPECT_GT(to_2d("control_ceiling"), to_2d("control_linear_map"));
   EXPECT_NE(bounded.text.find("fitted to the 2D method's pictures"), std::string::npos);
   const testing::ProgramOutcome again_bounded =
       Regrade({"evaluate", folder / "e", "--gaps", "2", "--control-field"});

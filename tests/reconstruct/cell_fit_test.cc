@@ -98,8 +98,8 @@ TEST(AdaptOptions, RaysFollowThePixelsOnACardOnly) {
   };
   EXPECT_EQ(rays(false, 1000000), 4096);
   EXPECT_EQ(rays(true, 100000), 4096);
-  EXPECT_EQ(rays(true, 1000000), kPasses * 1000);
-  EXPECT_EQ(rays(true, 100000000), 16384);
+  EXPECT_EQ(rays(true, 500000), kPasses * 500);
+  EXPECT_EQ(rays(true, 100000000), 14336);
   options.rays_per_step = 77;
   EXPECT_EQ(rays(true, 1000000), 77);
 }
@@ -140,6 +140,19 @@ TEST(AdaptOptions, DeviceCoordinatesHaveRatesOfTheirOwnAndWhatWasAskedForStays) 
   options.MakeUniform();
   EXPECT_EQ(AdaptOptions(options, {.device_coordinates = true}).rate_density,
             options.rate_density);
+}
+
+TEST(AdaptOptions, AKnownBackgroundHasLessTotalVariation) {
+  FitOptions options;
+  options.tv_sh = 0.5f;
+  const FitOptions known = AdaptOptions(options, {.known_background = true});
+  EXPECT_LT(known.tv_density, options.tv_density);
+  EXPECT_EQ(known.tv_sh, 0.5f);
+  EXPECT_EQ(known.rate_density, options.rate_density);
+  const FitOptions again = AdaptOptions(known, {.known_background = true});
+  EXPECT_EQ(again.tv_density, known.tv_density);
+  options.MakeUniform();
+  EXPECT_EQ(AdaptOptions(options, {.known_background = true}).tv_density, options.tv_density);
 }
 
 TEST(ChooseChanges, H167_TheLimitOfCellsHoldsAndTheLargestErrorsAreSplit) {

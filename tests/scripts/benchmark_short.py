@@ -31,7 +31,9 @@ scenes:
 styles:
   sunset: {root}/assets/style_sunset.png
 methods:
-  MKL: --method mkl --mode geometry --style-steps 10 --control-field
+  MKL: --method mkl --mode geometry --style-steps 10
+first_seed: --control-field
+results: {results}
 foreign: {{other: "{work}/runs/{{scene}}/{{style}}/MKL/0/styles/style/frames/views_2d"}}
 """
 
@@ -51,8 +53,11 @@ def main():
         return 77
     with tempfile.TemporaryDirectory() as folder:
         work, config = os.path.join(folder, "work"), os.path.join(folder, "config.yaml")
+        results = os.path.join(folder, "RESULTS.md")
+        with open(results, "w") as file:
+            file.write("before\n<!-- core -->\nold\n<!-- end of core -->\nafter\n")
         with open(config, "w") as file:
-            file.write(CONFIG.format(regrade=os.path.abspath(sys.argv[1]), work=work, options=OPTIONS, root=ROOT))
+            file.write(CONFIG.format(regrade=os.path.abspath(sys.argv[1]), work=work, options=OPTIONS, root=ROOT, results=results))
         # Snakemake keeps its state beside the Snakefile.
         shutil.copytree(os.path.join(ROOT, "scripts/benchmark"), os.path.join(folder, "benchmark"),
                         ignore=shutil.ignore_patterns(".snakemake"))
@@ -69,7 +74,8 @@ def main():
         with open(os.path.join(work, "table.md")) as file:
             page = file.read()
         found = {(row["method"], row["seed"]) for row in rows}
-        wanted = {(method, seed) for method in ("no style", "MKL", "MKL, field fitted", "MKL w/ Lip") for seed in "01"} | {("other", "0")}
+        wanted = {(method, seed) for method in ("no style", "MKL", "MKL w/ Lip") for seed in "01"}
+        wanted |= {("other", "0"), ("MKL, field fitted", "0")}
         assert found == wanted, found
         reports = [os.path.join(work, f"runs/table/sunset/MKL/{seed}/styles/style/report.json") for seed in (0, 1)]
         tc = [tc_of(report, "styled", 1) for report in reports]
@@ -84,6 +90,10 @@ def main():
         cell = f"{statistics.fmean(tc):.2f} ± {statistics.stdev(tc):.2f}"
         assert f"| table | chosen on | MKL w/ Lip | geometry | {cell} |" in page, (cell, page)
         assert tc[0] != tc[1], "another seed changes nothing"
+        with open(results) as file:
+            text = file.read()
+        assert text.startswith("before\n<!-- core -->\n3 runs in ") and text.endswith("\n<!-- end of core -->\nafter\n"), text
+        assert cell in text and "old" not in text and " cores" in text, text
         frames = [len(glob.glob(os.path.join(work, place, "*.png"))) for place in
                   ("example/table/sunset", "runs/table/sunset/MKL/0/styles/style/frames/source")]
         assert frames[0] == frames[1] == 10, frames

@@ -201,7 +201,7 @@ def check_folder(browser, arguments):
             here += complaints(page)
             found += [f"{name}, {size_name}: {complaint}" for complaint in here]
             page.close()
-        if number == 0 or name == "uniform_near":
+        if number == 0 or name in ("uniform_near", "levels_residual"):
             found += [f"{name}, {c}" for c in check_cores(browser, path, views)]
     return found
 

@@ -31,4 +31,45 @@ inline std::string FlowNetwork(int height, int width) {
   return network.Bytes({1, 2, height, width});
 }
 
+// A convolution of single pixels, [out, 3].
+inline void PixelConv(TinyOnnx* network, const std::string& input, const std::string& output,
+                      const std::vector<float>& weights) {
+  const int64_t out = static_cast<int64_t>(weights.size()) / 3;
+  network->Weights(output + "_weights", {out, 3, 1, 1}, weights);
+  network->Node("Conv", {input, output + "_weights"}, output,
+                TinyOnnx::Integers("kernel_shape", {1, 1}));
+}
+
+// Pictures of any size: two outputs, (r, g - b) and (2 r); a third one, which the second is
+// made of, is no last output.
+inline std::string FeatureNetwork() {
+  TinyOnnx network;
+  network.Input("picture", 3);
+  PixelConv(&network, "picture", "first", {1, 0, 0, 0, 1, -1});
+  PixelConv(&network, "picture", "inner", {1, 0, 0, 0, 1, 0, 0, 0, 1});
+  PixelConv(&network, "inner", "second", {2, 0, 0});
+  network.Output("first", 2);
+  network.Output("second", 1);
+  return network.Bytes();
+}
+
+// The mean colour.
+inline std::string EmbeddingNetwork() {
+  TinyOnnx network;
+  network.Input("picture", 3);
+  network.Node("GlobalAveragePool", {"picture"}, "vector");
+  network.Output("vector", 3);
+  return network.Bytes();
+}
+
+// The logistic function of 3 r - 2 g.
+inline std::string EdgeNetwork() {
+  TinyOnnx network;
+  network.Input("picture", 3);
+  PixelConv(&network, "picture", "score", {3, -2, 0});
+  network.Node("Sigmoid", {"score"}, "edges");
+  network.Output("edges", 1);
+  return network.Bytes();
+}
+
 }  // namespace regrade::testing

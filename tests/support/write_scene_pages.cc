@@ -101,13 +101,39 @@ JsonValue ViewJson(const Camera& camera, double weight, const RadianceField& fie
       {"pixels", Pixels(RenderView(field, camera, MarchOptions{field.step}).color)}};
 }
 
+enum class Layers { kNone, kResidual, kObject };
+
+// Of every fifth voxel, so that most of them stay what the network makes of them.
+StyleLayers SomeLayers(Layers kind, size_t voxels) {
+  StyleLayers layers;
+  const auto random = [](uint64_t stream, size_t i, int c) {
+    return static_cast<float>(RandomDouble(11, stream, 3 * i + static_cast<uint64_t>(c)));
+  };
+  for (size_t i = 0; i < voxels; ++i) {
+    const bool on = i % 5 == 0;
+    if (kind == Layers::kObject) {
+      layers.weight.push_back(on ? random(3, i, 0) : 0);
+      continue;
+    }
+    Vec3f color{}, scale{1, 1, 1};
+    for (int c = 0; c < 3 && on; ++c)
+      color[c] = random(1, i, c) - 0.5f, scale[c] = random(2, i, c);
+    layers.residual.color.push_back(color);
+    layers.residual.view_scale.push_back(scale);
+  }
+  return layers;
+}
+
 void WritePages(const std::string& folder, const std::string& name, const RadianceField& field,
-                bool forward_facing) {
+                bool forward_facing, Layers kind = Layers::kNone) {
   PageContent content;
   content.cameras = CamerasOf(forward_facing);
   content.field = EncodeField(field, 0.03);
   RadianceField page = DecodeField(content.field);
-  content.styles = {EncodeStyle(Style(), page, 0.5)};
+  const PageVoxels places = VoxelsInPageOrder(content.field, *page.geometry);
+  StyleLayers layers;
+  if (kind != Layers::kNone) layers = SomeLayers(kind, places.voxel.size());
+  content.styles = {EncodeStyle(Style(), page, 0.5, layers, places)};
   content.styles[0].header["id"] = "a";
   const Image picture(8, 6, 3);
   content.poster = EncodeJpeg(picture, 80);
@@ -227,6 +253,9 @@ int main(int argc, char** argv) {
   RadianceField far = testing::RandomField({9, 8, 11}, 9, 0.3, 7);
   testing::AddSpheres(5, 12, 0.7, 8, &far);
   WritePages(folder, "spheres", far, false);
+  WritePages(folder, "levels_residual", testing::RandomCellField({2, 3, 2}, 3, 9, 5), false,
+             Layers::kResidual);
+  WritePages(folder, "spheres_object", far, false, Layers::kObject);
   WritePath(folder);
   WriteColorMaps(folder);
   return 0;

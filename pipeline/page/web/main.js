@@ -52,7 +52,8 @@ async function start(page) {
     return rest > 1e-6 || sets.length === 0 ? [{weight: Math.max(rest, 0), colors: scene.source}, ...sets] : sets;
   }
   const free = (set) => {
-    for (const texture of [set?.first, set?.second, set?.texel]) if (texture) graphics.free(texture);
+    for (const texture of [set?.first, set?.second, set?.texel])
+      if (texture && texture !== scene.source.texel) graphics.free(texture);
   };
   const forget = (i) => {
     free(colors[i]);

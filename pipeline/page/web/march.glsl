@@ -29,49 +29,69 @@ out vec4 color;
 
 const float kOpticalDepth = 4e-4;
 const int kBits = 11;          // textures are 2048 wide
-const float kStop = 1e-4, kStopOfStep = 0.05;  // transmittance where a ray ends; of an opacity step
-const float kLeastCorner = 0.5;                // of an opacity step
+const float kStop = 1e-4, kStopOfStep = 0.2;  // transmittance where a ray ends; of an opacity step
+const float kLeastCorner = 0.6;               // weight times opacity of the least corner, of a squared opacity step
 float fetches = 0.0;
 
 ivec2 At(int i) { return ivec2(i & 2047, i >> kBits); }
 
-// The nodes above the texel that was found last, by the logarithm of their width: first child and mask.
-uvec2 nodes[17];
+// The nodes above the texel that was found last, from the top; the one at depth i is 2^(uFinest - 2 i) wide.
+uvec4 nodes[10];
 ivec3 before;
-int shiftBefore = 99;
+int depthBefore = -1;
+
+uint Ones(uint w) {
+  w -= w >> 1 & 0x55555555u;
+  w = (w & 0x33333333u) + (w >> 2 & 0x33333333u);
+  return ((w + (w >> 4) & 0x0f0f0f0fu) * 0x01010101u) >> 24;
+}
+
+uint Eighth(ivec3 bit) { return uint(bit.x << 2 | bit.y << 1 | bit.z); }
 
 // The texel of the cell around a place, or one of bit 31 where nothing is; the width is that of the cell or the empty cube.
 uvec4 TexelAt(ivec3 at, out int width) {
   // The search goes on from the smallest node that holds both places.
   ivec3 differ = at ^ before;
-  int shift = shiftBefore + 1, bits = differ.x | differ.y | differ.z;
-  while (shift <= uFinest && bits >> shift != 0) ++shift;
+  int depth = depthBefore, shift = uFinest - 2 * depth, bits = differ.x | differ.y | differ.z;
+  while (depth >= 0 && bits >> shift != 0) {
+    --depth;
+    shift += 2;
+  }
   uvec4 texel;
-  if (shift <= uFinest) {
-    texel = uvec4(nodes[shift], 0u, 0u);
+  if (depth >= 0) {
+    texel = nodes[depth];
   } else {
+    depth = 0;
     shift = uFinest;
     ivec3 top = at >> shift;
     texel = texelFetch(uTree, At((top.x * uTop.y + top.y) * uTop.z + top.z), 0);
     fetches += 1.0;
   }
-  for (int i = 0; i < 16 && texel.x >> 31 == 1u && texel.y != 0u; ++i) {
-    nodes[shift] = texel.xy;
+  for (; texel.x >> 31 == 1u && (texel.z | texel.w) != 0u; ++depth) {
+    nodes[depth] = texel;
+    uint child = Eighth((at >> (shift - 1)) & 1), half_ = child >> 2;
+    uint word = half_ == 0u ? texel.z : texel.w, first = 8u * (child & 3u);
     --shift;
-    ivec3 bit = (at >> shift) & 1;
-    uint child = 1u << (bit.x << 2 | bit.y << 1 | bit.z), earlier = texel.y & (child - 1u);
-    if ((texel.y & child) == 0u) {
+    if ((texel.y >> child & 1u) == 0u) {
+      if ((word >> first & 255u) == 0u) {
+        texel = uvec4(1u << 31, 0u, 0u, 0u);
+        ++depth;
+        break;
+      }
+      --shift;
+      first += Eighth((at >> shift) & 1);
+    }
+    if ((word >> first & 1u) == 0u) {
       texel = uvec4(1u << 31, 0u, 0u, 0u);
+      ++depth;
       break;
     }
-    earlier = (earlier & 0x55u) + (earlier >> 1 & 0x55u);
-    earlier = (earlier & 0x33u) + (earlier >> 2 & 0x33u);
-    earlier = (earlier & 0x0fu) + (earlier >> 4);
+    uint earlier = Ones(word & (1u << first) - 1u) + (half_ == 0u ? 0u : Ones(texel.z));
     texel = texelFetch(uTree, At(int((texel.x & 0x7fffffffu) + earlier)), 0);
     fetches += 1.0;
   }
   before = at;
-  shiftBefore = shift;
+  depthBefore = depth - 1;
   width = 1 << shift;
   return texel;
 }
@@ -128,14 +148,15 @@ void Scaled(float g[9], int set, out vec4 s[7]) {
     }
 }
 
-vec3 Shade(int cell, vec3 f) {
+vec3 Shade(int cell, vec3 f, float opacity) {
   ivec4 low = ivec4(texelFetch(uCorner, At(2 * cell), 0));
   ivec4 high = ivec4(texelFetch(uCorner, At(2 * cell + 1), 0));
   fetches += 2.0;
   vec4 a, b;
   Weights(f, a, b);
-  // With opacity steps, corners of little weight are left out, and the others make up for them.
-  float least = kLeastCorner * uOpacityStep, kept = 0.0;
+  // With opacity steps, corners that change the pixel little are left out, and the others make up for them. The
+  // largest of eight weights is never below 1/8.
+  float least = min(0.12, kLeastCorner * uOpacityStep * uOpacityStep / max(opacity, 1e-6)), kept = 0.0;
   for (int k = 0; k < 8; ++k)
     if ((k < 4 ? a[k] : b[k - 4]) >= least) kept += k < 4 ? a[k] : b[k - 4];
   if (least > 0.0) {
@@ -162,6 +183,8 @@ float transmitted = 1.0, waiting = 0.0;
 int middleCell = -1;
 vec3 middleFraction;
 
+bool Ended() { return transmitted < max(kStop, kStopOfStep * uOpacityStep); }
+
 void Composite(int cell, vec3 f, float density, float delta) {
   float tau = min(max(density, 0.0) * delta, 104.0);
   if (!(tau > 0.0)) return;
@@ -175,7 +198,7 @@ void Composite(int cell, vec3 f, float density, float delta) {
   waiting += weight;
   transmitted *= exp(-tau);
   if (waiting >= uOpacityStep) {
-    sum += waiting * Shade(middleCell, middleFraction);
+    sum += waiting * Shade(middleCell, middleFraction, waiting);
     waiting = 0.0;
     middleCell = -1;
   }
@@ -212,7 +235,7 @@ void MarchCells(vec3 eye, vec3 direction) {
       vec3 inside = (o + d * (0.5 * (t + next)) - (vec3(low) - middle)) / float(width);
       vec3 f = clamp(inside, 0.0, 1.0);
       Composite(int(cell.x), f, DensityIn(cell, width, f), (next - t) / uUnit);
-      if (transmitted < max(kStop, kStopOfStep * uOpacityStep)) return;
+      if (Ended()) return;
     }
     if (last) return;
     ivec3 then = clamp(ivec3(floor(o + d * next) + middle), low, low + (width - 1));
@@ -252,7 +275,7 @@ void MarchGrid(vec3 eye, vec3 direction) {
     if (cell.x >> 31 == 0u) {
       vec3 f = p - vec3(base);
       Composite(int(cell.x), f, DensityIn(cell, width, f), delta);
-      if (transmitted < max(kStop, kStopOfStep * uOpacityStep)) return;
+      if (Ended()) return;
       ++i;
       continue;
     }
@@ -285,7 +308,7 @@ void CompositeSpheres(vec3 eye, vec3 direction) {
   nearest -= d * rest;
   along += rest;
   for (int i = 0; i < uLayers; ++i) {
-    if (transmitted < max(kStop, kStopOfStep * uOpacityStep)) return;
+    if (Ended()) return;
     float u = 1.0 - (float(i) + 0.5) / float(uLayers);
     float squared = dot(nearest, nearest) * u * u;
     if (!(squared < 1.0)) continue;
@@ -342,7 +365,14 @@ void main() {
   if (uWeight.z > 0.0) Scaled(g, 2, s2);
   if (dot(d, d) > 0.0) {
     if (uOnCells == 1) MarchCells(eye, d); else MarchGrid(eye, d);
-    if (middleCell >= 0) sum += waiting * Shade(middleCell, middleFraction);
+    if (middleCell >= 0) {
+      // What would still come through a ray that has ended takes its last colour.
+      if (Ended()) {
+        waiting += transmitted;
+        transmitted = 0.0;
+      }
+      sum += waiting * Shade(middleCell, middleFraction, waiting);
+    }
     if (uLayers > 0 && transmitted >= kStop) CompositeSpheres(eye, d);
   }
   color = vec4(clamp(sum + transmitted * uBackground, 0.0, 1.0), 1.0);

@@ -12,7 +12,9 @@ uniform vec3 uPosition;               // the place's unit: 2 / voxels
 uniform vec3 uConstant;               // of the colour map
 uniform mat3 uBase;
 uniform float uOmega, uPositionScale;
-uniform int uActivation, uOnSpheres, uLayers, uResolution;
+uniform usampler2D uResidual;         // see unpackResidual
+uniform vec3 uResidualScale;
+uniform int uHasResidual, uActivation, uOnSpheres, uLayers, uResolution;
 layout(std140) uniform Layer0 { mat4 w0[128]; };
 layout(std140) uniform Layer1 { mat4 w1[256]; };
 layout(std140) uniform Layer2 { mat4 w2[256]; };
@@ -101,6 +103,15 @@ void main() {
     vec3 mapped = uBase * vec3(s[k], s[9 + k], s[18 + k]);
     if (k == 0) mapped += uConstant;
     for (int c = 0; c < 3; ++c) r[9 * c + k] += mapped[c];
+  }
+  if (uHasResidual == 1) {  // see EQ(view-scale) and EQ(style-mix)
+    uvec2 own = texelFetch(uResidual, at, 0).xy;
+    float weight = float(own.x >> 24) / 255.0;
+    for (int c = 0; c < 3; ++c) {
+      r[9 * c] += (float(own.x >> (8 * c) & 255u) - 128.0) * uResidualScale[c];
+      for (int k = 1; k < 9; ++k) r[9 * c + k] *= float(own.y >> (8 * c) & 255u) / 255.0;
+    }
+    for (int i = 0; i < 27; ++i) r[i] = mix(s[i], r[i], weight);
   }
   if (uOnSpheres == 1) {
     first = uvec4(Packed(vec4(r[0], r[9], r[18], 0.0) / vec4(uStyledScale[0], uStyledScale[1], uStyledScale[2], 1.0)), a.yzw);

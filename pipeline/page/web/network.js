@@ -57,7 +57,10 @@ async function styleColors(graphics, scene, style, id, progress, codes = null) {
   if (codes) [colors.first, colors.second] = texturesOf(graphics, codes, scene.voxels);
   colors.first ??= graphics.blank('u4', scene.source.first.height);
   colors.second ??= graphics.blank('u4', scene.source.first.height);
-  const framebuffer = gl.createFramebuffer();
+  const framebuffer = gl.createFramebuffer(), {height} = scene.source.first;
+  const residual = style.residual && !codes
+      ? await unpackResidual(id.replace('network', 'residual'), style.residual, scene.earlier, 8 * WIDTH * height) : null;
+  const added = residual && graphics.texture('u2', residual);
 
   // False if it would take long and `mayLeave` is set.
   async function pass(targets, height, onSpheres, from, scale, styledScale, mayLeave) {
@@ -81,6 +84,9 @@ async function styleColors(graphics, scene, style, id, progress, codes = null) {
       graphics.bind(p, 'uFirst', 0, from[0]);
       graphics.bind(p, 'uSecond', 1, from[1]);
       graphics.bind(p, 'uPlaceOfColumn', 2, scene.placeOfColumn ?? graphics.empty.i);
+      graphics.bind(p, 'uResidual', 3, added ?? graphics.empty.p);
+      gl.uniform3fv(p.at('uResidualScale'), style.residual?.scale ?? [0, 0, 0]);
+      gl.uniform1i(p.at('uHasResidual'), added && onSpheres !== 1 ? 1 : 0);
       gl.uniform1fv(p.at('uScale'), scale);
       gl.uniform1fv(p.at('uStyledScale'), styledScale);
       gl.uniform3fv(p.at('uPosition'), scene.positionUnit);
@@ -116,9 +122,12 @@ async function styleColors(graphics, scene, style, id, progress, codes = null) {
                  [source.first, source.second], source.scale, style.scale, typeof Worker !== 'undefined');
   if (!codes) graphics.onCores = !fast;
   if (!codes && !fast) {
-    await restyleOnCores(graphics, scene, style, layers, colors, progress);
+    await restyleOnCores(graphics, scene, style, layers, residual, colors, progress);
   }
-  if (source.texel) {
+  if (added) graphics.free(added);
+  if (source.texel && style.residual?.weight) {  // what is not of the object stays
+    Object.assign(colors, {texel: source.texel, texelScale: source.texelScale});
+  } else if (source.texel) {
     colors.texel = graphics.blank('u2', source.texel.height);
     const scales = (three) => Float32Array.from({length: 27}, (_, i) => i < 3 ? three[i] : 1);
     await pass([colors.texel], source.texel.height, 1, [source.texel, source.texel],

@@ -21,16 +21,18 @@ class Vertices {
     let at = (Math.imul(x, 73856093) ^ Math.imul(y, 19349663) ^ Math.imul(z, 83492791));
     at = Math.imul(at ^ at >>> 15, 0x2c1b3c6d);
     const mask = this.slot.length - 1;
-    for (at = (at ^ at >>> 13) & mask; this.slot[at] >= 0; at = at + 1 & mask) {
-      const i = this.slot[at];
-      if (this.place[3 * i] === x && this.place[3 * i + 1] === y && this.place[3 * i + 2] === z)
-        return i;
+    const {slot, place} = this;
+    for (at = (at ^ at >>> 13) & mask; slot[at] >= 0; at = at + 1 & mask) {
+      const i = slot[at];
+      if (place[3 * i] === x && place[3 * i + 1] === y && place[3 * i + 2] === z) return i;
     }
     if (!add) return -1;
     if (this.count >= this.most) throw new PageError('the page has more voxels than it says');
-    this.place.set([x, y, z], 3 * this.count);
-    this.slot[at] = this.count;
-    return this.count++;
+    const own = this.count++;
+    place[3 * own] = x;
+    place[3 * own + 1] = y;
+    place[3 * own + 2] = z;
+    return this.slot[at] = own;
   }
 }
 
@@ -46,43 +48,53 @@ function placesOfTree(bytes, voxels, finest, count) {
       nodes += (byte >> s & 3) === 2;
     }
   const vertices = new Vertices(count), tree = new Int32Array(topCells + 8 * nodes).fill(-1);
-  const corner = new Int32Array(8 * cells), own = new Int32Array(8);
+  const corner = new Int32Array(8 * cells), own = new Int32Array(8), {earlier, width} = vertices;
+  // The vertices of a node's children that are known already, [levels, 3, 3, 3]: half of all would be found again.
+  const known = new Int32Array(27 * (finest + 1));
   let symbol = 0, cell = 0, node = 0, predicted = 0;
 
-  function addCell(low, log2) {
-    const {earlier, width} = vertices;
+  // `child` of the node whose vertices begin at `of` of `known`; -1: a top cell.
+  function addCell(x, y, z, log2, child, of) {
+    const side = 1 << log2, first = child < 0 ? 0 : of + 9 * (child >> 2) + 3 * (child >> 1 & 1) + (child & 1);
     for (let k = 0; k < 8; ++k) {
-      const place = cornerOf(low, 1 << log2, k);
-      own[k] = vertices.find(place[0], place[1], place[2], true);
-      width[own[k]] = Math.max(width[own[k]], log2);
-      corner[8 * cell + k] = own[k];
+      const at = first + 9 * (k >> 2) + 3 * (k >> 1 & 1) + (k & 1);
+      let i = child < 0 ? -1 : known[at];
+      if (i < 0) {
+        i = vertices.find(x + (k >> 2) * side, y + (k >> 1 & 1) * side, z + (k & 1) * side, true);
+        if (child >= 0) known[at] = i;
+      }
+      own[k] = i;
+      if (width[i] < log2) width[i] = log2;
+      corner[8 * cell + k] = i;
     }
     for (let k = 0; k < 8; ++k) {
-      if (own[k] < predicted) continue;
-      predicted = own[k] + 1;
+      const i = own[k];
+      if (i < predicted) continue;
+      predicted = i + 1;
       let n = 0;
-      for (const edge of [1, 2, 4])
-        if (own[k ^ edge] < own[k]) earlier[3 * own[k] + n++] = own[k ^ edge];
-      if (n === 0) earlier[3 * own[k]] = own[k] - 1;
+      for (let edge = 1; edge < 8; edge *= 2)
+        if (own[k ^ edge] < i) earlier[3 * i + n++] = own[k ^ edge];
+      if (n === 0) earlier[3 * i] = i - 1;
     }
     return cell++;
   }
-  function visit(low, level) {
+  function visit(x, y, z, level, child, of) {
     if (symbol >> 2 >= bytes.length) throw new PageError('the tree of cells ends too early');
     const kind = bytes[symbol >> 2] >> 2 * (symbol & 3) & 3;
     ++symbol;
     if (kind === 0) return -1;
-    if (kind === 1) return addCell(low, finest - level);
+    if (kind === 1) return addCell(x, y, z, finest - level, child, of);
     if (kind !== 2 || level >= finest) throw new PageError('the tree of cells is damaged');
-    const first = topCells + 8 * node, entry = -2 - node++;
+    const first = topCells + 8 * node, entry = -2 - node++, half = 1 << finest - level - 1, own = 27 * level;
+    known.fill(-1, own, own + 27);
     for (let k = 0; k < 8; ++k)
-      tree[first + k] = visit(cornerOf(low, 1 << finest - level - 1, k), level + 1);
+      tree[first + k] = visit(x + (k >> 2) * half, y + (k >> 1 & 1) * half, z + (k & 1) * half, level + 1, k, own);
     return entry;
   }
   let at = 0;
   for (let x = 0; x < top[0]; ++x)
     for (let y = 0; y < top[1]; ++y)
-      for (let z = 0; z < top[2]; ++z) tree[at++] = visit([x, y, z].map((v) => v << finest), 0);
+      for (let z = 0; z < top[2]; ++z) tree[at++] = visit(x << finest, y << finest, z << finest, 0, -1, 0);
   return {vertices, top, tree, corner, finest};
 }
 

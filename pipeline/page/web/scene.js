@@ -17,10 +17,12 @@ async function loadScene(header, graphics, progress) {
   await wait();
   const number = await unpackDensity('density', earlier);
   if (!onCells) places = cellsOfGrid(vertices, resolution, number);
+  places = raisedTree(places);
   const rootOfWidth = Array.from({length: 32}, (_, log2) => 2 ** (-0.5 * log2));
   const root = (i) => i < n ? number[i] * rootOfWidth[vertices.width[i]] : 0;
 
   const scene = {header, top: places.top, finest: places.finest, cells: places.corner.length / 8, voxels: n};
+  if (header.styles.some((style) => style.residual)) scene.earlier = earlier;
   scene.unit = Math.max(...[0, 1, 2].map((a) => 2 * header.radius[a] / resolution[a]));
   scene.tree = graphics.texture('u4', packedTree(places, root));
   scene.corner = graphics.texture('u4', new Uint32Array(places.corner.buffer));
@@ -30,9 +32,11 @@ async function loadScene(header, graphics, progress) {
   const channels = 3 * basis, slot = [];
   for (let j = 0; j < channels; ++j) slot.push(9 * Math.floor(j / basis) + j % basis);
   progress(0.2, 'colours');
-  await unpackColors('color', header.color, channels, earlier, (i, j, code) => {
-    const k = slot[j];
-    if (k < 16) first[16 * i + k] = code; else second[16 * i + k - 16] = code;
+  await unpackColors('color', header.color, channels, earlier, (begin, codes, count) => {
+    for (let j = 0; j < channels; ++j) {
+      const into = slot[j] < 16 ? first : second;
+      for (let i = 0, at = 16 * begin + slot[j] % 16; i < count; ++i, at += 16) into[at] = codes[i * channels + j];
+    }
   }, (part) => progress(0.2 + 0.7 * part, 'colours'));
   const words = new Uint32Array(second.buffer);
   let shift = 0;
@@ -61,7 +65,9 @@ async function loadSpheres(scene, graphics) {
   for (let i = 0; i < number.length; ++i)
     texel[2 * i + 1] = toHalf(Math.sign(number[i]) * number[i] ** 2 * OPTICAL_DEPTH * layers);
   await unpackColors('sphere_color', header, 3, spheres.earlier,
-                     (i, j, code) => texel[2 * i] |= code << 8 * j, () => {});
+                     (begin, codes, count) => {
+                       for (let i = 0; i < 3 * count; ++i) texel[2 * (begin + Math.floor(i / 3))] |= codes[i] << 8 * (i % 3);
+                     }, () => {});
   scene.column = graphics.texture('i1', spheres.links);
   scene.placeOfColumn = graphics.texture('i1', spheres.place);
   scene.source.texel = graphics.texture('u2', texel);

@@ -68,7 +68,24 @@ async function unpackDensity(id, earlier) {
   return number;
 }
 
-// Codes of 8 bits: put(voxel, channel, code).
+// What a style adds voxel by voxel, see residual_codec.h: eight bytes each, three codes of colours, a weight, three view
+// scales; `bytes`: of all texels.
+async function unpackResidual(id, {scale, view, weight}, earlier, bytes) {
+  const packed = await bytesOf(id), n = earlier.length / 3, number = new Int16Array(n), into = new Uint8Array(bytes).fill(255);
+  const channels = [];
+  for (let c = 0; c < 3 && scale; ++c) channels.push([c, (v) => v + 128]);
+  for (let c = 4; c < 7 && view; ++c) channels.push([c, (v) => 255 - v]);
+  if (weight) channels.push([3, (v) => v]);
+  if (packed.length !== 2 * n * channels.length) throw new PageError('a part of the page is damaged: ' + id);
+  if (!scale) for (let i = 0; i < n; ++i) into.fill(128, 8 * i, 8 * i + 3);
+  for (const [k, [at, code]] of channels.entries()) {
+    channelNumbers(packed, k, earlier, number);
+    for (let i = 0; i < n; ++i) into[8 * i + at] = code(number[i]);
+  }
+  return new Uint32Array(into.buffer);
+}
+
+// Codes of 8 bits; put(first voxel, codes [count, channels], count).
 async function unpackColors(id, header, channels, earlier, put, progress) {
   const bytes = await bytesOf(id), n = earlier.length / 3;
   const {matrix, scale, step} = header;
@@ -84,21 +101,31 @@ async function unpackColors(id, header, channels, earlier, put, progress) {
       await wait();
     }
   }
-  const sum = new Float64Array(channels), slice = 1 << 16;
-  for (let begin = 0; begin < n; begin += slice) {
-    for (let i = begin; i < Math.min(n, begin + slice); ++i) {
-      sum.fill(0);
-      for (let k = 0; k < channels; ++k) {
-        const y = numbers[k][i] * step;
-        if (y === 0) continue;
-        for (let j = 0; j < channels; ++j) sum[j] += matrix[k * channels + j] * y;
-      }
-      for (let j = 0; j < channels; ++j) {
-        const code = Math.fround(sum[j]) / scale[j];
-        put(i, j, Math.floor(Math.max(-127, Math.min(127, code)) + 128.5));
+  // By parts whose sums stay in a cache.
+  const part = 1024, sum = new Float64Array(part * channels), codes = new Uint8Array(part * channels);
+  const rows = numbers.map((_, k) => Float64Array.from(matrix.slice(k * channels, (k + 1) * channels)));
+  let shown = performance.now();
+  for (let begin = 0; begin < n; begin += part) {
+    const count = Math.min(part, n - begin);
+    sum.fill(0);
+    for (let k = 0; k < channels; ++k) {
+      const own = numbers[k], row = rows[k];
+      for (let i = 0, at = 0; i < count; ++i, at += channels) {
+        const number = own[begin + i];
+        if (number === 0) continue;
+        const y = number * step;
+        for (let j = 0; j < channels; ++j) sum[at + j] += row[j] * y;
       }
     }
+    for (let i = 0, j = 0; i < count * channels; ++i) {
+      const code = Math.fround(sum[i]) / scale[j];
+      codes[i] = Math.max(-127, Math.min(127, code)) + 128.5;  // rounded down
+      if (++j === channels) j = 0;
+    }
+    put(begin, codes, count);
+    if (performance.now() - shown < 50) continue;
     progress(0.5 + 0.5 * begin / n);
     await wait();
+    shown = performance.now();
   }
 }

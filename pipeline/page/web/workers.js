@@ -7,7 +7,7 @@ function workerOfStyle() {
                        (x) => 1 / (1 + Math.exp(-x)), (x) => Math.tanh(x)];
   onmessage = ({data}) => {
     if (data.layers) return void (task = data);
-    const {first, second, key} = data, n = first.length / 4;
+    const {first, second, extra, key} = data, n = first.length / 4, own = extra && new Uint8Array(extra.buffer);
     const from = [new Uint8Array(first.buffer), new Uint8Array(second.buffer)];
     const activate = activations[task.activation], {layers, base, constant} = task;
     let x = new Float64Array(64), y = new Float64Array(64);
@@ -42,8 +42,13 @@ function workerOfStyle() {
       }
       for (let j = 0; j < 27; ++j) {
         const c = Math.floor(j / 9), k = j % 9;
-        const value = x[j] + base[3 * c] * s[k] + base[3 * c + 1] * s[9 + k] + base[3 * c + 2] * s[18 + k] +
+        let value = x[j] + base[3 * c] * s[k] + base[3 * c + 1] * s[9 + k] + base[3 * c + 2] * s[18 + k] +
             (k === 0 ? constant[c] : 0);
+        if (own) {
+          const at = 8 * v, weight = own[at + 3] / 255;
+          value = k === 0 ? value + (own[at + c] - 128) * task.residualScale[c] : value * own[at + 4 + c] / 255;
+          value = (1 - weight) * s[j] + weight * value;
+        }
         const code = Math.floor(Math.max(-127, Math.min(127, value / task.styledScale[j])) + 128.5);
         if (j < 16) from[0][16 * v + j] = code; else from[1][16 * v + j - 16] = code;
       }
@@ -53,7 +58,7 @@ function workerOfStyle() {
 }
 
 // Fills `colors` from the source, strip by strip; `layers` as loadWeights has them.
-async function restyleOnCores(graphics, scene, style, layers, colors, progress) {
+async function restyleOnCores(graphics, scene, style, layers, residual, colors, progress) {
   const gl = graphics.gl, url = URL.createObjectURL(new Blob(['(' + workerOfStyle + ')()'], {type: 'text/javascript'}));
   const height = scene.source.first.height, rows = 8, framebuffer = gl.createFramebuffer();
   const read = (texture, y, count) => {
@@ -70,7 +75,7 @@ async function restyleOnCores(graphics, scene, style, layers, colors, progress) 
   };
   const setup = {layers, base: style.base, constant: style.constant, scale: scene.source.scale, styledScale: style.scale,
                  omega: style.omega, activation: style.activation, positionScale: style.position_scale,
-                 unit: scene.positionUnit, shift: scene.header.finest === null ? 0.5 : 0};
+                 residualScale: style.residual?.scale ?? [0, 0, 0], unit: scene.positionUnit, shift: scene.header.finest === null ? 0.5 : 0};
   let next = 0, done = 0;
   const workers = Array.from({length: Math.max(1, Math.min(8, navigator.hardwareConcurrency || 2))}, () => new Worker(url));
   try {
@@ -80,7 +85,8 @@ async function restyleOnCores(graphics, scene, style, layers, colors, progress) 
         const y = next, count = Math.min(rows, height - y);
         next += count;
         const first = read(scene.source.first, y, count), second = read(scene.source.second, y, count);
-        worker.postMessage({first, second, key: y}, [first.buffer, second.buffer]);
+        const extra = residual?.slice(2 * WIDTH * y, 2 * WIDTH * (y + count));
+        worker.postMessage({first, second, extra, key: y}, [first.buffer, second.buffer, ...extra ? [extra.buffer] : []]);
       };
       worker.onerror = (event) => fail(new PageError('this browser runs no workers: ' + event.message));
       worker.onmessage = ({data}) => {

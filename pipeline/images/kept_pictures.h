@@ -1,0 +1,28 @@
+// Pictures that are read several times: decoded once and kept in memory.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "kernels/scene/image.h"
+
+namespace regrade {
+
+// ReadImage for files that do not change meanwhile. A picture whose values are all k / 255
+// takes a byte for each; the first ones are kept, up to a limit. For one thread at a time;
+// copies share what they keep.
+class KeptPictures {
+ public:
+  explicit KeptPictures(int64_t most_bytes = int64_t{320} << 20);
+
+  // As ReadImage gives it, to the bit. Errors: those of ReadImage.
+  Image Read(const std::string& path) const;
+
+ private:
+  struct Stored;
+  struct Shared;
+  std::shared_ptr<Shared> shared_;
+};
+
+}  // namespace regrade

@@ -1,0 +1,55 @@
+// Pictures that are kept in memory are those of the files, to the bit.
+#include "pipeline/images/kept_pictures.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "pipeline/images/image_file.h"
+#include "tests/evaluate/synthetic_frames.h"
+#include "tests/support/temporary_folder.h"
+
+namespace regrade {
+namespace {
+
+using testing::TemporaryFolder;
+using testing::WriteText;
+
+TEST(KeptPictures, AreThoseOfTheFiles) {
+  const TemporaryFolder folder;
+  Image levels(16, 16, 1);  // every value of 8 bits
+  for (int i = 0; i < 256; ++i) levels.pixels[i] = static_cast<float>(i) / 255;
+  const Image fine = testing::NoiseImage(20, 10, 1), clear = testing::NoiseImage(9, 7, 2, 4);
+  WriteText(folder / "levels.png", EncodePng8(levels));
+  WriteText(folder / "fine.png", EncodePng16(fine));
+  WriteText(folder / "clear.png", EncodePng8(clear));
+  const KeptPictures kept;
+  for (const char* name : {"levels.png", "fine.png", "clear.png"}) {
+    const Image expected = ReadImage(folder / name);
+    for (int time = 0; time < 2; ++time) {
+      const Image picture = kept.Read(folder / name);
+      EXPECT_TRUE(picture.SameSize(expected)) << name;
+      EXPECT_EQ(picture.channels, expected.channels) << name;
+      EXPECT_TRUE(picture.pixels == expected.pixels) << name << time;
+    }
+  }
+  // Copies share what is kept: no file is read again.
+  const KeptPictures copy = kept;
+  std::filesystem::remove(folder / "fine.png");
+  EXPECT_TRUE(copy.Read(folder / "fine.png").pixels == kept.Read(folder / "fine.png").pixels);
+}
+
+TEST(KeptPictures, BeyondTheLimitFilesAreReadAgain) {
+  const TemporaryFolder folder;
+  WriteText(folder / "a.png", EncodePng8(testing::NoiseImage(20, 10, 1)));
+  WriteText(folder / "b.png", EncodePng8(testing::NoiseImage(20, 10, 2)));
+  const KeptPictures kept(20 * 10 * 3 + 100);  // one of them
+  const Image a = kept.Read(folder / "a.png"), b = kept.Read(folder / "b.png");
+  std::filesystem::remove(folder / "a.png");
+  std::filesystem::remove(folder / "b.png");
+  EXPECT_TRUE(kept.Read(folder / "a.png").pixels == a.pixels);
+  EXPECT_ANY_THROW(kept.Read(folder / "b.png"));
+}
+
+}  // namespace
+}  // namespace regrade
