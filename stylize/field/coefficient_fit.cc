@@ -24,8 +24,11 @@ class Coefficients {
       AddResidualRays(field, cameras[i], missing[i], most, options.seed + i, &rays_,
                       &directions);
     gamma_.resize(kHarmonics * directions.size());
-    for (size_t r = 0; r < directions.size(); ++r)
-      ShBasis(kHarmonics, directions[r], &gamma_[kHarmonics * r]);
+    for (size_t r = 0; r < directions.size(); ++r) {
+      float* const gamma = &gamma_[kHarmonics * r];
+      ShBasis(kHarmonics, directions[r], gamma);
+      std::fill(gamma + options.harmonics, gamma + kHarmonics, 0.0f);
+    }
     // Most voxels are seen by no ray: memory follows those that are.
     std::vector<int32_t> place(static_cast<size_t>(field.geometry->num_voxels()), -1);
     for (const int32_t voxel : rays_.voxel) place[static_cast<size_t>(voxel)] = 0;

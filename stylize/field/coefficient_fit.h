@@ -16,6 +16,7 @@ struct CoefficientFitOptions {
   int steps = 60;                        // of conjugate gradients
   int64_t most_rays = int64_t{1} << 40;  // of all views, chosen at random
   uint64_t seed = 0;
+  int harmonics = 9;  // 1: only a colour is added to each voxel
 };
 
 // EQ(coefficient-fit), as Instant Colorization solves it for splats: coefficients x_vck of

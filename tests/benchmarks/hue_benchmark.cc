@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "kernels/base/error.h"
+#include "kernels/field/cpu/render_view.h"
 #include "kernels/field/pad_sh_basis.h"
 #include "kernels/image/color_spaces.h"
 #include "kernels/image/hue_chroma.h"
@@ -31,13 +32,21 @@
 #include "pipeline/images/image_file.h"
 #include "pipeline/stages/styled_field.h"
 #include "stylize/field/base_map.h"
+#include "stylize/field/coefficient_fit.h"
 #include "stylize/linear_map.h"
-#include "tests/support/field_ceiling.h"
 
 namespace regrade {
 namespace {
 
 constexpr double kDark = 10;  // CIELAB lightness
+
+std::vector<Image> RendersOf(const RadianceField& field, const std::vector<Camera>& cameras) {
+  std::vector<Image> pictures;
+  const FastGrid grid = MakeFastGrid(field);
+  for (const Camera& camera : cameras)
+    pictures.push_back(RenderView(grid, camera, MarchOptions{field.step}).color);
+  return pictures;
+}
 
 Vec3d ColorAt(const Image& image, int64_t i) {
   const float* p = &image.pixels[static_cast<size_t>(3 * i)];
@@ -124,7 +133,7 @@ int Run(bool quick, const std::string& out, const std::vector<std::string>& styl
       styles[0].c_str(), 100 * clipped / pixels, reference.all);
   row("2D method", of_method);
 
-  const std::vector<Image> renders = testing::RendersOf(source.field, cameras);
+  const std::vector<Image> renders = RendersOf(source.field, cameras);
   LeastSquaresAccumulator accumulator;
   for (size_t i = 0; i < renders.size(); ++i)
     for (int64_t k = 0; k < renders[i].num_pixels(); ++k)
@@ -141,7 +150,7 @@ int Run(bool quick, const std::string& out, const std::vector<std::string>& styl
   RadianceField of_map = source.field;
   of_map.appearance = ApplyColorMap(of_map.appearance, map);
   of_map.background = MapBackground(map, of_map.background);
-  const std::vector<Image> map_renders = testing::RendersOf(of_map, cameras);
+  const std::vector<Image> map_renders = RendersOf(of_map, cameras);
   row("linear map, in the field", map_renders);
   for (size_t i = 0; i < missing.size(); ++i)
     for (size_t k = 0; k < missing[i].pixels.size(); ++k)
@@ -149,13 +158,12 @@ int Run(bool quick, const std::string& out, const std::vector<std::string>& styl
   for (const int harmonics : {1, 9}) {
     if (quick) continue;
     row(harmonics == 1 ? "ceiling of one colour a voxel" : "ceiling",
-        testing::RendersOf(testing::FieldCeiling(of_map, cameras, missing, harmonics),
-                           cameras));
+        RendersOf(FitCoefficients(of_map, cameras, missing, {.harmonics = harmonics}), cameras));
   }
   for (const std::string& style : styles) {
     const StoredNetwork network = ReadNetworkFile(out + "/styles/" + style + "/network.npz");
     row("map of " + style,
-        testing::RendersOf(StyledFieldOf(source,
+        RendersOf(StyledFieldOf(source,
                                          {NetworkOfMap(network.network.data().base),
                                           network.k_est, network.background},
                                          1, nullptr)
@@ -163,7 +171,7 @@ int Run(bool quick, const std::string& out, const std::vector<std::string>& styl
                            cameras));
     row("network " + style +
             Format(", bound %.2f K_est", network.network.Bound() / network.k_est),
-        testing::RendersOf(ReadStyledField(out, out + "/styles/" + style, 1).field, cameras));
+        RendersOf(ReadStyledField(out, out + "/styles/" + style, 1).field, cameras));
   }
   return 0;
 }
