@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include "evaluate/image_network.h"
 #include "kernels/image/row_sum.h"
 
 namespace regrade {
@@ -53,14 +52,6 @@ Image GradientEdges(const Image& picture) {
                                                 : std::numeric_limits<float>::quiet_NaN();
   }
   return edges;
-}
-
-EdgeMapFunction EdgeMaps(const std::string& edges) {
-  if (edges.empty()) return {};
-  if (edges == kGradientEdges) return GradientEdges;
-  return [network = OpenImageNetwork(edges)](const Image& picture) {
-    return network->EdgeMap(picture);
-  };
 }
 
 }  // namespace regrade

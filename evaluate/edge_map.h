@@ -2,8 +2,6 @@
 #pragma once
 
 #include <functional>
-#include <optional>
-#include <string>
 
 #include "kernels/scene/image.h"
 
@@ -17,10 +15,6 @@ Image GradientEdges(const Image& picture);
 
 // One channel of a picture's size, from 0 to 1.
 using EdgeMapFunction = std::function<Image(const Image&)>;
-
-// "gradient" or the ONNX file of an edge network, see ImageNetwork::EdgeMap; empty for an empty
-// text. Errors: those of ImageNetwork.
-EdgeMapFunction EdgeMaps(const std::string& edges);
 
 inline constexpr char kGradientEdges[] = "gradient";
 

@@ -59,17 +59,12 @@ std::shared_ptr<const ImageNetwork> OpenImageNetwork(const std::string& path) {
   return path.empty() ? nullptr : std::make_shared<const ImageNetwork>(path);
 }
 
-double EmbeddingDistance(const std::vector<float>& a, const std::vector<float>& b) {
-  REGRADE_CHECK_EQ(a.size(), b.size());
-  double aa = 0, bb = 0, ab = 0;
-  for (size_t i = 0; i < a.size(); ++i) {
-    const double x = a[i], y = b[i];
-    aa += x * x;
-    bb += y * y;
-    ab += x * y;
-  }
-  const double scale = std::sqrt(aa) * std::sqrt(bb);
-  return scale > 0 ? 1 - ab / scale : 1;
+EdgeMapFunction EdgeMaps(const std::string& edges) {
+  if (edges.empty()) return {};
+  if (edges == kGradientEdges) return GradientEdges;
+  return [network = OpenImageNetwork(edges)](const Image& picture) {
+    return network->EdgeMap(picture);
+  };
 }
 
 }  // namespace regrade

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "evaluate/edge_map.h"
 #include "evaluate/feature_statistics.h"
 #include "evaluate/onnx_runner.h"
 #include "kernels/scene/image.h"
@@ -38,8 +39,8 @@ class ImageNetwork {
 // Null for an empty path.
 std::shared_ptr<const ImageNetwork> OpenImageNetwork(const std::string& path);
 
-// EQ(embedding-distance), Radford et al. 2021 compare pictures so: 1 - <a, b> / (|a| |b|), from
-// 0 to 2; 1 where a vector is 0. Vectors of different length fail a check.
-double EmbeddingDistance(const std::vector<float>& a, const std::vector<float>& b);
+// "gradient" or the ONNX file of an edge network, see ImageNetwork::EdgeMap; empty for an empty
+// text. Errors: those of ImageNetwork.
+EdgeMapFunction EdgeMaps(const std::string& edges);
 
 }  // namespace regrade

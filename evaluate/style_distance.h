@@ -1,25 +1,33 @@
 // Distances of a sequence of frames to a style picture, by networks of the user.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <vector>
 
 #include "evaluate/feature_statistics.h"
-#include "evaluate/image_network.h"
 #include "kernels/scene/image.h"
 
 namespace regrade {
 
-// A style picture as networks see it. Either network may be null.
+// What a network makes of a picture: moments of each of its outputs, or one vector.
+using FeaturesFunction = std::function<std::vector<FeatureStatistics>(const Image&)>;
+using EmbeddingFunction = std::function<std::vector<float>(const Image&)>;
+
+// EQ(embedding-distance), Radford et al. 2021 compare pictures so: 1 - <a, b> / (|a| |b|), from
+// 0 to 2; 1 where a vector is 0. Vectors of different length fail a check.
+double EmbeddingDistance(const std::vector<float>& a, const std::vector<float>& b);
+
+// A style picture as networks see it. Either function may be empty.
 class StyleFeatures {
  public:
-  StyleFeatures(std::shared_ptr<const ImageNetwork> features,
-                std::shared_ptr<const ImageNetwork> embedding, const Image& style);
+  StyleFeatures(FeaturesFunction features, EmbeddingFunction embedding, const Image& style);
 
  private:
   friend class StyleDistances;
-  std::shared_ptr<const ImageNetwork> features_, embedding_;
+  FeaturesFunction features_;
+  EmbeddingFunction embedding_;
   std::vector<FeatureStatistics> statistics_;  // of each output
   std::vector<float> vector_;
 };

@@ -27,4 +27,7 @@ std::string DurationText(double seconds);
 std::vector<std::string> Split(std::string_view text, char separator);
 std::string Join(const std::vector<std::string>& parts, std::string_view separator);
 
+// ".jpg" of "a/b.JPG"; empty for a name without one.
+std::string LowerExtension(const std::string& path);
+
 }  // namespace regrade

@@ -4,7 +4,6 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
-#include <filesystem>
 #include <optional>
 
 #include "kernels/base/error.h"
@@ -17,13 +16,6 @@ namespace {
 
 constexpr uint64_t kMostBytes = uint64_t{256} << 20;
 constexpr double kLargestValue = 100, kSmallestDomain = 1e-3;
-
-std::string LowerExtension(const std::string& path) {
-  std::string extension = std::filesystem::path(path).extension().string();
-  for (char& c : extension)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  return extension;
-}
 
 class CubeParser {
  public:
@@ -168,7 +160,6 @@ class CubeParser {
 
 }  // namespace
 
-bool IsCubeFile(const std::string& path) { return LowerExtension(path) == ".cube"; }
 
 void RefuseOtherLooks(const std::string& path) {
   const std::string extension = LowerExtension(path);

@@ -6,6 +6,7 @@
 
 #include "kernels/image/color_table.h"
 #include "kernels/scene/image.h"
+#include "pipeline/files/text.h"
 
 namespace regrade {
 
@@ -23,7 +24,7 @@ struct ColorLut {
 inline constexpr int kMostTableSize = 129, kMostCurveSize = 65536;
 
 // By its name alone: does it end with .cube, in any case?
-bool IsCubeFile(const std::string& path);
+inline bool IsCubeFile(const std::string& path) { return LowerExtension(path) == ".cube"; }
 // Throws Error(kInput) for a look of another program, by its name (.xmp, .dtstyle, .3dl and
 // others): how to make a .cube of it.
 void RefuseOtherLooks(const std::string& path);

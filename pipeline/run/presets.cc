@@ -58,6 +58,7 @@ void ApplyPreset(const std::string& preset, bool on_card, RunSettings* settings)
     settings->render.film_size = 480;
   } else if (preset == "best") {
     settings->scene.photo_size = 1280;
+    settings->fit.prune_last = false;  // for what held-out views see that no photo does
     settings->network.steps = 600;
     settings->render.film_seconds = 12;
     settings->render.film_size = 1920;

@@ -36,7 +36,7 @@ struct FitOptions {
   bool bound_mean = true;
   std::string prune_by = "weight";
   float prune_weight = 0.4f;
-  bool prune_last = false;
+  bool prune_last = true;
   float max_voxels = 0;
   int initial_views = 2;
   float initial_density = 0.5f;
@@ -74,7 +74,6 @@ struct FitOptions {
     tv_decay = 0.5f;
     tv_fraction = 0.03f;
     prune_weight = 0.5f;
-    prune_last = true;
     background_lead = 0.9f;
   }
   template <typename Bind>
