@@ -160,7 +160,6 @@ class CubeParser {
 
 }  // namespace
 
-
 void RefuseOtherLooks(const std::string& path) {
   const std::string extension = LowerExtension(path);
   for (const char* other : {".xmp", ".dtstyle", ".lrtemplate", ".dcp", ".icc", ".3dl", ".look",

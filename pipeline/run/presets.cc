@@ -52,13 +52,14 @@ void ApplyPreset(const std::string& preset, bool on_card, RunSettings* settings)
   settings->run.preset = preset;
   ApplyStyleRecipe(preset == "paper" ? "paper" : "standard", &settings->network);
   UseFitEffort(preset, on_card, &settings->fit);
+  // Views between the photos see cells of little weight in all of them (COSTS.md).
+  settings->fit.prune_last = preset != "best";
   if (preset == "draft") {
     settings->scene.photo_size = 480;
     settings->render.film_seconds = 6;
     settings->render.film_size = 480;
   } else if (preset == "best") {
     settings->scene.photo_size = 1280;
-    settings->fit.prune_last = false;  // for what held-out views see that no photo does
     settings->network.steps = 600;
     settings->render.film_seconds = 12;
     settings->render.film_size = 1920;

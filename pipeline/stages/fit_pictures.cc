@@ -53,9 +53,8 @@ FittedPictures FitPictures(const WorkingViews& views, const StoredField& scene,
   if (training_views.empty())
     throw InputError("the 2D method has a picture of none of the photos", "views_2d");
   const SceneBox box = BoxOf(views.capture(), settings, background);
-  FitOptions options = AdaptOptions(
-      settings.fit,
-      {scene.ndc.on(), backend == Backend::kCuda, pixels, box.background.has_value()});
+  FitOptions options = AdaptOptions(settings.fit, {scene.ndc.on(), backend == Backend::kCuda,
+                                                   pixels, box.background.has_value()});
   options.seed = settings.run.seed;
   if (settings.run.reproducible && options.shards == 0) options.shards = kReproducibleShards;
   options.sh_degree = std::min(options.sh_degree, DegreeOf(scene.field));

@@ -301,9 +301,9 @@ Stage ReconstructStage(RunContext* context) {
                      run.effects + ",exposure=off", context->settings.scene.box);
     const Backend backend = ChooseBackend(run.device, run.reproducible);
     const int64_t pixels = PixelsToFit(views);
-    const FitOptions options = AdaptOptions(
-        context->settings.fit, {profile.scene.ndc.on(), backend == Backend::kCuda, pixels,
-                                profile.scene.box.background.has_value()});
+    const FitOptions options =
+        AdaptOptions(context->settings.fit, {profile.scene.ndc.on(), backend == Backend::kCuda,
+                                             pixels, profile.scene.box.background.has_value()});
     stage.plan = PlanText(PlannerOf(pixels, profile.scene.box, backend)(options));
   }
   stage.work = [context, inputs = stage.inputs](const ProgressFunction& progress) {

@@ -10,7 +10,7 @@ namespace regrade {
 struct FitConditions {
   bool device_coordinates = false;  // a forward-facing capture; see kernels/scene/ndc.h
   bool on_card = false;
-  int64_t pixels = 0;  // of the photos that are fitted
+  int64_t pixels = 0;             // of the photos that are fitted
   bool known_background = false;  // photos are transparent around the scene
 };
 

@@ -36,7 +36,7 @@ struct FitOptions {
   bool bound_mean = true;
   std::string prune_by = "weight";
   float prune_weight = 0.4f;
-  bool prune_last = true;
+  bool prune_last = false;
   float max_voxels = 0;
   int initial_views = 2;
   float initial_density = 0.5f;
@@ -74,6 +74,7 @@ struct FitOptions {
     tv_decay = 0.5f;
     tv_fraction = 0.03f;
     prune_weight = 0.5f;
+    prune_last = true;
     background_lead = 0.9f;
   }
   template <typename Bind>
@@ -197,7 +198,10 @@ struct FitOptions {
          {.help = "the limit of --prune-by; an adaptive field has weights",
           .min = 0,
           .max = 100});
-    bind("prune-last", prune_last, {.help = "prunes after the last stage, too"});
+    bind("prune-last", prune_last,
+         {.help =
+              "prunes after the last stage, too: smaller files, and less fog in local edits; "
+              "views between the photos lose a little"});
     bind("fit-max-voxels", max_voxels,
          {.unit = "millions of voxels",
           .help = "uniform field: pruning raises its limit where more would be kept; 0: never",

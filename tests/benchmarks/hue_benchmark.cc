@@ -158,17 +158,17 @@ int Run(bool quick, const std::string& out, const std::vector<std::string>& styl
   for (const int harmonics : {1, 9}) {
     if (quick) continue;
     row(harmonics == 1 ? "ceiling of one colour a voxel" : "ceiling",
-        RendersOf(FitCoefficients(of_map, cameras, missing, {.harmonics = harmonics}), cameras));
+        RendersOf(FitCoefficients(of_map, cameras, missing, {.harmonics = harmonics}),
+                  cameras));
   }
   for (const std::string& style : styles) {
     const StoredNetwork network = ReadNetworkFile(out + "/styles/" + style + "/network.npz");
-    row("map of " + style,
-        RendersOf(StyledFieldOf(source,
-                                         {NetworkOfMap(network.network.data().base),
-                                          network.k_est, network.background},
-                                         1, nullptr)
-                               .field,
-                           cameras));
+    row("map of " + style, RendersOf(StyledFieldOf(source,
+                                                   {NetworkOfMap(network.network.data().base),
+                                                    network.k_est, network.background},
+                                                   1, nullptr)
+                                         .field,
+                                     cameras));
     row("network " + style +
             Format(", bound %.2f K_est", network.network.Bound() / network.k_est),
         RendersOf(ReadStyledField(out, out + "/styles/" + style, 1).field, cameras));

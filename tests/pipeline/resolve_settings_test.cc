@@ -122,6 +122,10 @@ TEST(ResolveSettings, LaterSourcesOverrideEarlierOnes) {
   EXPECT_EQ(r.settings.fit.rate_density, uniform.rate_density);
   EXPECT_EQ(r.settings.fit.tv_sh, 0.5f);
   EXPECT_EQ(r.settings.fit.resolutions, FitOptions().resolutions);
+  EXPECT_FALSE(Resolve({"--preset", "best"}).settings.fit.prune_last);
+  EXPECT_TRUE(Resolve({"--preset", "draft"}).settings.fit.prune_last);
+  r = Resolve({"--preset", "best", "--fit-field", "uniform"});
+  EXPECT_TRUE(r.settings.fit.prune_last);  // a uniform field is what it was
   r = Resolve({"--preset", "paper", "--fit-field", "uniform"});
   EXPECT_EQ(r.settings.fit.rate_density, 30);  // its own: the field is uniform there, too
   r = Resolve({"--preset", "paper", "--fit-field", "adaptive"});
