@@ -47,7 +47,7 @@ class Fitter {
  public:
   Fitter(const std::vector<TrainingView>& views, const SceneBox& box, const FitOptions& options,
          const FitHooks& hooks, Backend backend)
-      : rays_(views),
+      : rays_(views, box.background),
         views_(views),
         box_(box),
         options_(AdaptOptions(options, ConditionsOf(views, box, backend))),

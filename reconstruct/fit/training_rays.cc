@@ -6,6 +6,7 @@
 
 #include "kernels/base/error.h"
 #include "kernels/base/random.h"
+#include "reconstruct/fit/drawn_pixels.h"
 
 namespace regrade {
 namespace {
@@ -34,7 +35,8 @@ uint64_t Morton(uint32_t x, uint32_t y) {
 
 }  // namespace
 
-TrainingRays::TrainingRays(const std::vector<TrainingView>& views) {
+TrainingRays::TrainingRays(const std::vector<TrainingView>& views,
+                           const std::optional<Vec3f>& background) {
   REGRADE_CHECK(!views.empty());
   std::vector<Camera> lenses;
   Vec3d sum{};
@@ -56,17 +58,14 @@ TrainingRays::TrainingRays(const std::vector<TrainingView>& views) {
                       {}};
     stored.color.resize(photo.pixels.size());
     Vec3d view_sum{};
-    for (int64_t pixel = 0; pixel < photo.num_pixels(); ++pixel) {
-      const float* const color = &photo.pixels[static_cast<size_t>(3 * pixel)];
-      if (!AllFinite(Vec3f{color[0], color[1], color[2]})) continue;
-      stored.drawn.push_back(static_cast<int32_t>(pixel));
+    stored.drawn = DrawnPixels(photo, background);
+    for (const int32_t pixel : stored.drawn)
       for (int c = 0; c < 3; ++c) {
-        const float value = std::clamp(color[c], 0.0f, 1.0f);
-        stored.color[static_cast<size_t>(3 * pixel + c)] =
-            static_cast<uint16_t>(std::lround(value * 65535.0f));
+        const size_t at = 3 * static_cast<size_t>(pixel) + static_cast<size_t>(c);
+        const float value = std::clamp(photo.pixels[at], 0.0f, 1.0f);
+        stored.color[at] = static_cast<uint16_t>(std::lround(value * 65535.0f));
         view_sum[c] += value;
       }
-    }
     if (stored.drawn.empty())
       throw Error(ExitCode::kInput,
                   "view " + std::to_string(views_.size()) + " has no unmasked pixel to fit", "",

@@ -1,8 +1,9 @@
-// The pool of training rays: all unmasked pixels of all training views, drawn by counter so
+// The pool of training rays: pixels of all training views (DrawnPixels), drawn by counter so
 // that batches depend neither on the number of threads nor on a resume.
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "kernels/field/cuda/device_views.h"
@@ -23,8 +24,10 @@ struct TrainingView {
 class TrainingRays {
  public:
   // Copies the pixels (6 bytes each: unorm16, exact for 8-bit photos) and stores one direction
-  // map per lens. Throws Error(kInput) for a view without an unmasked pixel.
-  explicit TrainingRays(const std::vector<TrainingView>& views);
+  // map per lens. `background` is the colour of transparent parts, if photos have some; see
+  // DrawnPixels. Throws Error(kInput) for a view without an unmasked pixel.
+  explicit TrainingRays(const std::vector<TrainingView>& views,
+                        const std::optional<Vec3f>& background = {});
 
   int64_t num_rays() const { return total_; }
   int num_views() const { return static_cast<int>(views_.size()); }
@@ -50,7 +53,7 @@ class TrainingRays {
     Vec3f origin;
     Mat3f world_from_camera;
     std::vector<uint16_t> color;  // [H, W, 3]
-    std::vector<int32_t> drawn;   // unmasked pixels y W + x; empty if none is masked
+    std::vector<int32_t> drawn;   // DrawnPixels; empty if these are all
     bool IsMasked(int64_t pixel) const;
   };
   std::vector<StoredView> views_;
