@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include "kernels/base/error.h"
@@ -47,7 +48,7 @@ class Fitter {
  public:
   Fitter(const std::vector<TrainingView>& views, const SceneBox& box, const FitOptions& options,
          const FitHooks& hooks, Backend backend)
-      : rays_(views, box.background),
+      : rays_(views, options.adaptive() ? box.background : std::nullopt),
         views_(views),
         box_(box),
         options_(AdaptOptions(options, ConditionsOf(views, box, backend))),
