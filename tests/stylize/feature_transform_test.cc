@@ -91,6 +91,17 @@ TEST(FeatureTransform, H26_DirectionsWithoutFeaturesAreNeverBlownUp) {
   }
 }
 
+TEST(FeatureTransform, H26_ASingularCovarianceIsMadeRegularBeforeItsCholeskyFactor) {
+  // Two channels are equal but for rounding: the second pivot is 4e-15. Divided by its root,
+  // features would grow ten million times; with the ridge of 2e-5 at most by 1 / sqrt(4e-5).
+  const FeatureStatistics content{2, {0, 0}, {1, 1 - 2e-15, 1 - 2e-15, 1}};
+  const FeatureStatistics style{2, {0, 0}, {1, 0, 0, 1}};
+  const FeatureAffine a = CholeskyColor(content, style);
+  for (const double v : a.matrix)
+    EXPECT_LE(std::abs(v),
+              testing::RecordBound("largest entry", testing::Computed::kDouble, v, 200));
+}
+
 TEST(FeatureTransform, H6_AConstantPhotoTakesTheStylesMean) {
   const FeatureStatistics style = MeasureFeatures(Features(2, 5, -3));
   for (const WhiteningRule rule : {WhiteningRule{0, 1e-5}, WhiteningRule{1, 1e-5}}) {
