@@ -80,7 +80,7 @@ enum class StyleMethodKind {
   kReinhard,
   kIdt,
   kHistogram,
-  kNetwork,  // had by name
+  kNetwork,  // fetched by the program
   kOnnx,
   kFolder,
   kCommand
