@@ -5,8 +5,7 @@ namespace regrade {
 const std::vector<Command>& AllCommands() {
   static const std::vector<Command> commands = {
       {"run", "PHOTOS|CAPTURE --style PICTURE [--style PICTURE ...] --out DIR [OPTIONS]",
-       "makes a styled 3D scene, films and a report from photos and a style picture",
-       RunStages,
+       "makes a styled 3D scene, films and a report from photos and a style picture", RunStages,
        "out preset style name strength method masks photo-masks film-seconds film-size device "
        "restart-from dry-run verbose"},
       {"pose", "PHOTOS --out DIR [OPTIONS]", "finds the camera pose of each photo", RunStages,
@@ -59,8 +58,7 @@ const std::vector<Command>& AllCommands() {
       {"clean", "DIR [OPTIONS]", "removes what can be made again from a run's folder",
        RunClean},
       {"networks", "list | remove NAME",
-       "lists or removes the networks that `--method pca-kd` fetched",
-       RunNetworks},
+       "lists or removes the networks that `--method pca-kd` fetched", RunNetworks},
       {"manual", "[OPTIONS]", "prints the man page, or bash's completion", RunManual},
       {"doctor", "[OPTIONS]", "prints what is installed and which processor runs what",
        RunDoctor},

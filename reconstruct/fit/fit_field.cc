@@ -356,8 +356,8 @@ class Fitter {
 
 float ExponentialRate(float begin, float end, double p) {
   if (begin <= 0 || end <= 0) return 0;
-  return static_cast<float>(begin *
-                            std::pow(static_cast<double>(end) / begin, std::clamp(p, 0.0, 1.0)));
+  return static_cast<float>(
+      begin * std::pow(static_cast<double>(end) / begin, std::clamp(p, 0.0, 1.0)));
 }
 
 // As in svox2, which starts at a hundredth.

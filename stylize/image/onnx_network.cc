@@ -12,9 +12,8 @@ std::vector<FeatureMap> OnnxNetwork::Run(const std::vector<Input>& inputs,
   for (const auto& [name, map] : inputs)
     arrays.push_back({name, {1, map->channels, map->height, map->width}, map->values.data()});
   OnnxModel::UseThreads(omp_get_max_threads());  // what --threads says
-  std::vector<OnnxArray> results =
-      model_.Run(arrays, outputs,
-                 "it must have the outputs " + wanted + " and take pictures of any size");
+  std::vector<OnnxArray> results = model_.Run(
+      arrays, outputs, "it must have the outputs " + wanted + " and take pictures of any size");
   std::vector<FeatureMap> maps;
   for (size_t i = 0; i < results.size(); ++i) {
     const std::vector<int>& shape = results[i].shape;

@@ -89,9 +89,8 @@ TEST(Program, ManPageAndCompletionHaveEveryCommandAndOption) {
   const Outcome man = Regrade({"manual"}), bash = Regrade({"manual", "--bash"});
   EXPECT_EQ(man.code, 0);
   EXPECT_EQ(bash.code, 0);
-  for (const char* part :
-       {".TH REGRADE 1", "regrade contact", "photo\\-size", "film\\-seconds",
-        "8 a metric of \\-\\-require"})
+  for (const char* part : {".TH REGRADE 1", "regrade contact", "photo\\-size", "film\\-seconds",
+                           "8 a metric of \\-\\-require"})
     EXPECT_SAYS(man, part);
   for (const char* part : {"    stylize) cat", "--preset draft standard paper best",
                            "complete -o default -F _regrade regrade"})
