@@ -228,7 +228,7 @@ std::vector<Camera> MakeCameraPath(const std::vector<Camera>& cameras,
   if (options.path == "orbit") return OrbitPath(cameras, moments);
   if (options.path == "spiral") return SpiralPath(cameras, moments);
   throw UsageError("'" + options.path + "' is not allowed", "--path",
-                   "allowed: smooth, views, orbit, spiral");
+                   "give one of smooth, views, orbit, spiral");
 }
 
 }  // namespace regrade
