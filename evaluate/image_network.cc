@@ -30,7 +30,7 @@ ImageNetwork::ImageNetwork(const std::string& path)
 
 std::vector<FeatureStatistics> ImageNetwork::Features(const Image& picture) const {
   std::vector<FeatureStatistics> statistics;
-  for (const NetworkOutput& output : runner_.RunAll({{"", &picture}})) {
+  for (const OnnxArray& output : runner_.RunAll({{"", &picture}})) {
     if (output.shape.size() < 3 || output.shape[0] != 1 || output.values.empty())
       runner_.Refuse("an output has no channels with positions",
                      "expected: [1, channels, height, width], or positions in one row");
@@ -45,7 +45,7 @@ std::vector<float> ImageNetwork::Embedding(const Image& picture) const {
 }
 
 Image ImageNetwork::EdgeMap(const Image& picture) const {
-  NetworkOutput output = runner_.Run({{"", &picture}});
+  OnnxArray output = runner_.Run({{"", &picture}});
   if (output.shape != std::vector<int>{1, 1, picture.height, picture.width})
     runner_.Refuse(Concat("its output is not an edge map of ", picture.width, " x ",
                           picture.height, " pixels"),

@@ -1,42 +1,41 @@
-// Runs the ONNX files of the evaluation's networks with OpenCV's dnn module.
+// Pictures as inputs of the evaluation's networks.
 #pragma once
 
-#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "kernels/onnx/onnx_model.h"
 #include "kernels/scene/image.h"
 
 namespace regrade {
 
-struct NetworkOutput {
-  std::vector<int> shape;
-  std::vector<float> values;  // all finite
-};
-
-// Calls are serialised. Errors (kExternalProgram, naming the file): no file, one that is empty
-// or above 1 GiB, not ONNX, an operator that OpenCV lacks, other inputs, outputs that are not
-// finite 32-bit numbers.
+// Errors (kExternalProgram, naming the file): those of OnnxModel, and pictures that differ in
+// size.
 class OnnxRunner {
  public:
   // `expected` says in an error what the network has to take.
-  OnnxRunner(const std::string& path, const std::string& expected);
-  ~OnnxRunner();
+  OnnxRunner(const std::string& path, const std::string& expected)
+      : model_(path), expected_(expected) {}
 
   // Inputs are [1, 3, height, width], RGB from -1 to 1, values that are not finite black;
   // `as_given` leaves other values as the picture has them. An input without a name is the
   // network's first.
   using Inputs = std::vector<std::pair<std::string, const Image*>>;
-  NetworkOutput Run(const Inputs& inputs, bool as_given = false) const;
+  OnnxArray Run(const Inputs& inputs, bool as_given = false) const;
   // Every output that feeds no other operator, in the order of the file.
-  std::vector<NetworkOutput> RunAll(const Inputs& inputs) const;
+  std::vector<OnnxArray> RunAll(const Inputs& inputs) const;
 
-  [[noreturn]] void Refuse(const std::string& what, const std::string& hint) const;
+  [[noreturn]] void Refuse(const std::string& what, const std::string& hint) const {
+    model_.Refuse(what, hint);
+  }
 
  private:
-  struct Implementation;
-  std::unique_ptr<Implementation> implementation_;
+  std::vector<OnnxArray> Run(const Inputs& inputs, bool as_given,
+                             const std::vector<std::string>& outputs) const;
+
+  OnnxModel model_;
+  std::string expected_;
 };
 
 }  // namespace regrade

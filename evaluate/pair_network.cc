@@ -13,7 +13,7 @@ PairNetwork::PairNetwork(const std::string& path)
           "1, and take pictures of any size") {}
 
 FlowField PairNetwork::Flow(const Image& from, const Image& to) const {
-  const NetworkOutput output = runner_.Run({{"first", &from}, {"second", &to}});
+  const OnnxArray output = runner_.Run({{"first", &from}, {"second", &to}});
   if (output.shape != std::vector<int>{1, 2, from.height, from.width})
     runner_.Refuse(Concat("its output is not a motion field of ", from.width, " x ",
                           from.height, " pixels"),
@@ -26,7 +26,7 @@ FlowField PairNetwork::Flow(const Image& from, const Image& to) const {
 }
 
 double PairNetwork::Distance(const Image& a, const Image& b, bool as_given) const {
-  const NetworkOutput output = runner_.Run({{"first", &a}, {"second", &b}}, as_given);
+  const OnnxArray output = runner_.Run({{"first", &a}, {"second", &b}}, as_given);
   double sum = 0;
   for (const float value : output.values) sum += value;
   return sum / static_cast<double>(output.values.size());

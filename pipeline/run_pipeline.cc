@@ -30,18 +30,20 @@ constexpr StageEntry kStages[] = {
     {"pose", PoseStage},
     // poses/ -> field.npz: density and colour fitted to the photos (reconstruct/fit), whose
     // exposure is undone where they are read (pipeline/capture/working_views.h); the loss is in
-    // kernels/field/render_ray.h
+    // kernels/field/render_ray.h, its total variation in kernels/field/cell_variation.h and, of
+    // uniform fields, total_variation.h
     {"reconstruct", ReconstructStage},
     // photos + style picture -> views_2d/: each photo styled in 2D (stylize/image)
     {"style_2d", Style2dStage},
     // field.npz + views_2d/ -> network.npz: a network of bounded Lipschitz constant that maps
     // the field's colours (stylize/training); its loss is in
-    // stylize/field/gradient_aggregation.h
+    // stylize/field/gradient_aggregation.h, its bound in stylize/field/lipschitz_network.h
     {"stylize", StylizeStage},
     // field.npz + network.npz -> frames/ (a ray in kernels/field/render_ray.h, the opacity of
     // its samples in kernels/field/volume_rendering.h), films (pipeline/images/video_writer.h)
     {"render", RenderStage},
-    // frames/ -> consistency and fidelity metrics, heatmaps/ (evaluate)
+    // frames/ -> consistency (evaluate/consistency.h) and fidelity (evaluate/fidelity.h)
+    // metrics, heatmaps/
     {"evaluate", EvaluateStage},
     // all records -> report.json, report.html (pipeline/report)
     {"report", ReportStage},

@@ -168,7 +168,8 @@ class Ingest {
     } catch (const Error& error) {
       if (error.code() != ExitCode::kInput) throw;
       candidate.problem = error.what_failed();
-      if (!error.hint().empty()) candidate.problem += "; " + error.hint();
+      if (!error.hint().empty() && candidate.problem != kNotAnImage)
+        candidate.problem += "; " + error.hint();
     }
     return candidate;
   }

@@ -54,12 +54,12 @@ bool HasFlag(const Arguments& arguments, const std::string& flag) {
   return std::find(arguments.begin(), flags_end, flag) != flags_end;
 }
 
-// What most people use; a command shows those that it has.
-const std::vector<std::string> kBasicOptions = {
-    "style",     "name",   "strength",     "out",     "preset",
-    "method",    "masks",  "photo-masks",  "still",   "film-seconds",
-    "film-size", "device", "restart-from", "dry-run", "verbose"};
-constexpr int kFewOptions = 20;  // of a command with so few all are shown
+Arguments WordsOf(const char* text) {
+  std::istringstream stream(text);
+  Arguments words;
+  for (std::string word; stream >> word;) words.push_back(word);
+  return words;
+}
 
 void PrintHelp(const Command& command, const Arguments& arguments, const OptionSet& options) {
   const std::vector<std::string> required = RequiredOptions(command.usage);
@@ -69,12 +69,15 @@ void PrintHelp(const Command& command, const Arguments& arguments, const OptionS
     std::printf("%s", options.CompletionWords().c_str());
   } else {
     std::printf("regrade %s %s\n%s\n", command.name, command.usage, command.summary);
-    const bool all = HasFlag(arguments, "--help-all") || options.count() <= kFewOptions;
+    const Arguments shown = WordsOf(command.shown);
+    const bool all = HasFlag(arguments, "--help-all") || shown.empty();
     std::printf("%s%s", all ? "" : "\n",
-                options.Help(required, all ? Arguments() : kBasicOptions).c_str());
+                options.Help(required, all ? Arguments() : shown).c_str());
     if (!all)
       std::printf("\nregrade %s --help-all lists all %d options.\n", command.name,
                   options.count());
+    else if (!shown.empty())
+      std::printf("\n--no-NAME turns off a switch that is on.\n");
   }
 }
 

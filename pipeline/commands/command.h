@@ -19,6 +19,7 @@ struct Command {
   const char* usage;    // arguments and options behind the name
   const char* summary;  // one line
   void (*run)(const Command& command, const Arguments& arguments, Console* console);
+  const char* shown = "";  // options that --help shows, with blanks between; empty: all
 };
 
 const std::vector<Command>& AllCommands();
@@ -44,7 +45,7 @@ struct Prepared {
   Arguments run_words;  // of the run that is continued: PHOTOS or CAPTURE
 };
 
-// The beginning of every command. --help prints usage and the options that most people use,
+// The beginning of every command. --help prints usage and the options of Command::shown,
 // --help-all all of them, and kHelpMan and kHelpWords what `regrade manual` is made of; each
 // returns nothing.
 // Otherwise parses the arguments, sets the options (ResolveSettings) and the number of threads.

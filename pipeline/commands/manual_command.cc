@@ -30,9 +30,9 @@ void PrintManPage(Console* console) {
   std::printf(
       ".SH EXIT STATUS\n0 done, 1 internal error, 2 usage, 3 input data, 4 an external "
       "program, "
-      "5 resources, 6 the scene cannot be reconstructed, 7 the output folder is in use, 128 + "
-      "n "
-      "ended by signal n.\n");
+      "5 resources, 6 the scene cannot be reconstructed, 7 the output folder is in use, "
+      "8 a metric of \\-\\-require is missing or out of its bound, 128 + n ended by signal "
+      "n.\n");
 }
 
 // Options of a command behind it, choices behind an option, and file names everywhere.

@@ -16,6 +16,7 @@
 #include "pipeline/stages/network_probe.h"
 #include "pipeline/stages/stages.h"
 #include "pipeline/workspace/stage_record.h"
+#include "reconstruct/fit/adapt_options.h"
 
 namespace regrade {
 namespace {
@@ -52,12 +53,13 @@ void PrintPlan(const std::string& command, RunContext* context) {
   const int threads = omp_get_max_threads();
   const int64_t photos =
       ExpectedPhotos(InputsOf(DetectCapture(context->source)), settings.ingest);
-  const int64_t side = settings.scene.photo_size;
-  context->console->Info(
-      "reconstruct: " +
-      PlanText(ChooseBackend(settings.run.device, settings.run.reproducible) == Backend::kCuda
-                   ? PlanFitOnDevice(settings.fit, photos * side * side * 3 / 4, SceneBox())
-                   : PlanFit(settings.fit, photos * side * side * 3 / 4, SceneBox(), threads)));
+  const int64_t side = settings.scene.photo_size, pixels = photos * side * side * 3 / 4;
+  const bool on_card =
+      ChooseBackend(settings.run.device, settings.run.reproducible) == Backend::kCuda;
+  const FitOptions fit = AdaptOptions(settings.fit, {.on_card = on_card, .pixels = pixels});
+  context->console->Info("reconstruct: " +
+                         PlanText(on_card ? PlanFitOnDevice(fit, pixels, SceneBox())
+                                          : PlanFit(fit, pixels, SceneBox(), threads)));
   if (command == "reconstruct") return;
   context->console->Info("stylize: " + PlanText(PlanStyle(settings.network.steps, threads)));
 }

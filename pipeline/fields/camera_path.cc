@@ -41,9 +41,9 @@ Vec3d LookAtPoint(const std::vector<Camera>& cameras, const Vec3d& center) {
   return x;
 }
 
-Camera LookingAlong(const Camera& model, const Vec3d& center, const Vec3d& forward_wish,
+Camera LookingAlong(const Camera& model, const Vec3d& center, const Vec3d& ahead,
                     const Vec3d& up) {
-  const Vec3d forward = Normalized(forward_wish);
+  const Vec3d forward = Normalized(ahead);
   Vec3d right = Cross(forward, up);
   if (Norm(right) < 1e-9) right = Cross(forward, Vec3d{1, 0, 0} + up * 0.5);
   right = Normalized(right);
@@ -228,7 +228,7 @@ std::vector<Camera> MakeCameraPath(const std::vector<Camera>& cameras,
   if (options.path == "orbit") return OrbitPath(cameras, moments);
   if (options.path == "spiral") return SpiralPath(cameras, moments);
   throw UsageError("'" + options.path + "' is not allowed", "--path",
-                   "allowed: smooth, views, orbit, spiral");
+                   "give one of smooth, views, orbit, spiral");
 }
 
 }  // namespace regrade

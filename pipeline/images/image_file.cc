@@ -30,6 +30,8 @@ namespace {
 // Picture formats guarantee at most about 1000 decoded bytes for each stored one (DEFLATE's
 // limit is 1032); a header that claims far more than its file can hold is malicious or corrupt.
 constexpr int64_t kMaxExpansion = 2000, kExpansionSlack = 16 << 20;
+constexpr char kReadFormats[] =
+    "give a JPEG, PNG, TIFF, WebP, HEIC, AVIF, OpenEXR or camera raw file";
 
 void CheckSize(int64_t width, int64_t height, int64_t pixel_bytes, int64_t file_bytes,
                const DecodeLimits& limits, const std::string& where) {
@@ -49,7 +51,8 @@ void CheckSize(int64_t width, int64_t height, int64_t pixel_bytes, int64_t file_
 
 void CheckRegularFile(const std::string& path) {
   struct stat status;
-  if (::stat(path.c_str(), &status) != 0) throw InputError(std::strerror(errno), path);
+  if (::stat(path.c_str(), &status) != 0)
+    throw InputError(std::strerror(errno), path, "check the name, and its permissions");
   const char* kind = S_ISREG(status.st_mode)    ? nullptr
                      : S_ISDIR(status.st_mode)  ? "a folder"
                      : S_ISFIFO(status.st_mode) ? "a named pipe"
@@ -232,7 +235,7 @@ StoredPicture ReadStored(const std::string& path, const DecodeLimits& limits) {
       ReadWholeFile(path, static_cast<uint64_t>(limits.max_pixels) * 16 + (64 << 20));
   if (bytes.empty()) throw InputError("empty file", path);
   const ImageFormat* format = SniffImageFormat(bytes, path);
-  if (format == nullptr) throw InputError("not an image", path);
+  if (format == nullptr) throw InputError("not an image", path, kReadFormats);
   const std::string_view decoder = format->decoder;
   if (decoder.empty())
     throw InputError(std::string(format->name) + " is not supported here", path,

@@ -1,4 +1,4 @@
-// Networks that are had by name: what they are, where they come from, where they are kept.
+// Networks that the program fetches: what they are, where they come from, where they are kept.
 #pragma once
 
 #include <cstdint>

@@ -34,7 +34,7 @@ std::string BoundsText(const OptionInfo& info) {
 
 [[noreturn]] void RefuseValue(const std::string& where, const std::string& text,
                               const std::string& allowed) {
-  throw UsageError("'" + text + "' is not allowed", where, "allowed: " + allowed);
+  throw UsageError("'" + text + "' is not allowed", where, "give " + allowed);
 }
 
 // The whole text must be one finite number within the bounds.
@@ -69,7 +69,7 @@ std::string ParseChoice(const std::string& text, const OptionInfo& info,
     if (choice == text) return text;
     listed += (listed.empty() ? "" : ", ") + choice;
   }
-  RefuseValue(where, text, listed);
+  RefuseValue(where, text, "one of " + listed);
 }
 
 // The text of a JSON value as a flag's value.

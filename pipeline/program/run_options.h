@@ -75,11 +75,11 @@ struct RunOptions {
   }
 };
 
-// Options of one start of the program; never part of a stage's inputs.
 inline constexpr char kRequireHelp[] =
     "bounds of metrics, as styled:tc-psnr:1>=30,reconstruct:psnr-heldout>=25; where one does "
     "not hold, the exit status is 8";
 
+// Options of one start of the program; never part of a stage's inputs.
 struct StartOptions {
   std::string config;
   std::string restart_from;

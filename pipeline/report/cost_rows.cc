@@ -17,6 +17,10 @@ void CheckTradeoffSchema(const JsonValue& file, const std::string& path) {
       path, "measure again with `regrade tradeoff`");
 }
 
+std::string NameOf(const CostRow& row) {
+  return row.parameter.empty() ? row.setting : row.parameter + " " + row.setting;
+}
+
 std::vector<CostRow> ReadCostTable(const std::string& path) {
   if (!std::filesystem::is_regular_file(path)) return {};
   const JsonValue file = ReadJsonFile(path);

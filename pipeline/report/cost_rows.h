@@ -1,4 +1,4 @@
-// Reads the cost table of a tradeoff.json.
+// The cost table of a tradeoff.json: its rows and their names.
 #pragma once
 
 #include <string>
@@ -12,6 +12,9 @@ namespace regrade {
 inline constexpr int kTradeoffSchema = 2;  // of tradeoff.json
 // Throws Error(kInput) if `file`, read from `path`, has another schema.
 void CheckTradeoffSchema(const JsonValue& file, const std::string& path);
+
+// "fit-steps 100,250,150", or the setting alone for a preset or baseline.
+std::string NameOf(const CostRow& row);
 
 // The rows of a tradeoff.json; none where there is no such file. Throws Error(kInput).
 std::vector<CostRow> ReadCostTable(const std::string& path);

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "pipeline/report/cost_rows.h"
 #include "pipeline/report/html_table.h"
 #include "pipeline/report/html_text.h"
 #include "pipeline/report/plot.h"
@@ -13,10 +14,6 @@ namespace regrade {
 namespace {
 
 using Rows = std::vector<const CostRow*>;
-
-std::string NameOf(const CostRow& row) {
-  return row.parameter.empty() ? row.setting : row.parameter + " " + row.setting;
-}
 
 // Accuracy over CPU time; a line joins the Pareto front.
 std::string ParetoFrontHtml(const Rows& rows) {

@@ -144,7 +144,7 @@ void UsePaperConfig(const std::string& name, RunSettings* settings) {
   const auto found = std::ranges::find(kConfigs, name, &Config::name);
   if (found == std::end(kConfigs))
     throw UsageError("'" + name + "' is not allowed", "--paper-config",
-                     "allowed: auto, syn, llff, tnt, custom");
+                     "give one of auto, syn, llff, tnt, custom");
   settings->scene.box = BoxOptions();
   settings->fit = FitOptions();
   UseCommon(settings);

@@ -48,7 +48,7 @@ bool IsPreset(const std::string& name) {
 void ApplyPreset(const std::string& preset, bool on_card, RunSettings* settings) {
   if (!IsPreset(preset))
     throw UsageError("'" + preset + "' is not allowed", "--preset",
-                     "allowed: draft, standard, paper, best");
+                     "give one of draft, standard, paper, best");
   settings->run.preset = preset;
   ApplyStyleRecipe(preset == "paper" ? "paper" : "standard", &settings->network);
   UseFitEffort(preset, on_card, &settings->fit);

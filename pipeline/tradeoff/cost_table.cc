@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <utility>
 
+#include "pipeline/report/cost_rows.h"
 #include "pipeline/report/html_text.h"
 
 namespace regrade {
@@ -39,10 +40,6 @@ bool BeatsBeyondNoise(const CostRow& a, const CostRow& b) {
   return *b.cpu_seconds.value - *a.cpu_seconds.value >
              *a.cpu_spread.value + *b.cpu_spread.value ||
          Merit(a) - Merit(b) > *a.accuracy_spread.value + *b.accuracy_spread.value;
-}
-
-std::string NameOf(const CostRow& row) {
-  return row.parameter.empty() ? row.setting : row.parameter + " " + row.setting;
 }
 
 // Relative to the accurate end of the same parameter, which may be the base.

@@ -268,7 +268,7 @@ class Fitter {
                     next, sphere_resolution);
   }
 
-  // How many vertices may stay on a grid of `now` so that --max-voxels are left on `next`,
+  // How many vertices may stay on a grid of `now` so that --fit-max-voxels are left on `next`,
   // whose vertices are closer; 0: any number.
   int64_t MostVoxelsBefore(const Vec3i& now, const Vec3i& next) const {
     if (options_.max_voxels == 0) return 0;
@@ -357,7 +357,8 @@ class Fitter {
 
 float ExponentialRate(float begin, float end, double p) {
   if (begin <= 0 || end <= 0) return 0;
-  return static_cast<float>(begin * std::pow(static_cast<double>(end) / begin, p));
+  return static_cast<float>(
+      begin * std::pow(static_cast<double>(end) / begin, std::clamp(p, 0.0, 1.0)));
 }
 
 // As in svox2, which starts at a hundredth.

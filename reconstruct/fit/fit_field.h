@@ -1,6 +1,6 @@
-// Fits a Plenoxel field to posed photos: coarse to fine, RMSProp on touched voxels, total
-// variation, pruning by rendering weight (Fridovich-Keil et al., CVPR 2022, with the settings
-// of its public code).
+// Fits a radiance field to posed photos, coarse to fine: RMSProp on touched voxels, total
+// variation and pruning by rendering weight as Plenoxels (Fridovich-Keil et al., CVPR 2022), on
+// cells of many sizes or on voxels of one width.
 #pragma once
 
 #include <functional>
@@ -67,8 +67,8 @@ struct FitHooks {
   std::function<void(const FitState&)> checkpoint;
 };
 
-// EQ(exponential-rate): rate(p) = begin^(1 - p) end^p, p in [0, 1] the fraction of all steps
-// done.
+// EQ(exponential-rate): rate(p) = begin^(1 - p) end^p, p the fraction of all steps done, or of
+// --fit-rate-steps; from p = 1 on it stays at `end`.
 float ExponentialRate(float begin, float end, double p);
 // Rises along a sine from 1/100 at step 0 to 1 at step `delay`.
 float DelayFactor(int step, float delay);

@@ -53,8 +53,8 @@ class Steepness {
     return jacobian + base_;
   }
 
-  // ||J||_2 by the power iteration on J^T J: a lower bound, so it can never accuse the network
-  // wrongly. `direction` [inputs] is where it starts and ends.
+  // ||J||_2 by the power iteration on J^T J: a lower bound, so it never exceeds the
+  // network's own constant. `direction` [inputs] is where it starts and ends.
   double NormAt(const VectorXd& point, VectorXd* direction) const {
     const MatrixXd jacobian = Jacobian(point);
     double norm = 0;

@@ -57,8 +57,8 @@ struct WeightUpdateOptions {
                   "where its views disagree; only --style-bound limits the bound"});
     bind(
         "style-spectral-normalisation", spectral_normalisation,
-        {.help = "ablation: every layer's norm is 1, and so is the network's bound: smoothest, "
-                 "and weakest in colour"});
+        {.help = "ablation: every layer's norm is 1, which is the bound of the paper's recipe; "
+                 "smoothest, and weakest in colour"});
   }
 };
 

@@ -26,20 +26,16 @@ struct StyleOptions {
   void Describe(Bind& bind) {
     bind("method", method,
          {.help =
-              "2D method that styles each view: mkl moves mean and covariance of the colours "
-              "onto the style's, gmm those of several groups of colours, each onto the "
-              "groups that suit it, reinhard mean and standard deviation of each CIELAB "
-              "channel, "
-              "idt "
-              "the whole distribution (the strongest change; it amplifies grain and soft "
-              "edges), histogram that of each channel; pca-kd runs networks of 302 kB, "
-              "which are fetched once, after a yes (--yes); onnx:DIR runs those of "
-              "PCA-KD, WCT, WCT2, CCPL or CAP-VSTNet that are in DIR "
-              "(scripts/convert_networks.py converts the authors' files of the last three); "
-              "folder:DIR takes photos that were styled by "
-              "any other program, by the photos' names (some may be missing); "
-              "command:\"PROGRAM {input} {style} {output}\" runs a program for each view, "
-              "without a shell"});
+              "2D method that styles each view. mkl moves mean and covariance of the colours "
+              "onto the style's; gmm those of several groups of colours, each onto the groups "
+              "that suit it; reinhard mean and standard deviation of each CIELAB channel; idt "
+              "the whole distribution, the strongest change, which amplifies grain and soft "
+              "edges; histogram that of each channel; pca-kd runs networks of 302 kB, which "
+              "are fetched once, after a yes (--yes); onnx:DIR runs the networks of PCA-KD, "
+              "WCT, WCT2, CCPL or CAP-VSTNet in DIR (stylize/METHODS.md says how they are "
+              "made); folder:DIR takes photos that another program styled, by the photos' "
+              "names, of which some may be missing; command:\"PROGRAM {input} {style} "
+              "{output}\" runs a program for each view, without a shell"});
     bind("scene-wide", scene_wide,
          {.help =
               "estimates one colour map from all views, instead of one for each view: frames "
@@ -80,7 +76,7 @@ enum class StyleMethodKind {
   kReinhard,
   kIdt,
   kHistogram,
-  kNetwork,  // had by name
+  kNetwork,  // fetched by the program
   kOnnx,
   kFolder,
   kCommand

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include "evaluate/fidelity.h"
 #include "evaluate/optical_flow.h"
 #include "evaluate/pair_motion.h"
@@ -59,6 +61,9 @@ TEST(PairNetwork, DistanceIsTheNetworkOutput) {
   EXPECT_NEAR(distance(a, b), 4 * (0.4 * 0.4 + 0.2 * 0.2) / 3,
               1e-5);  // floats, summed over 768 pixels
   EXPECT_FALSE(PerceptualDistance(""));
+  const Image black = Plain(0, 0, 0),
+              infinite = Plain(std::numeric_limits<float>::infinity(), 0, 0);
+  EXPECT_EQ(distance(infinite, black), 0);
 
   FidelityTargets targets;
   targets.views_2d = {2, [&](int) { return a; }};

@@ -1,4 +1,5 @@
-// Networks that are had by name: the fetch, its rules, the checkpoint's reader, the conversion.
+// Networks that the program fetches: the fetch, its rules, the checkpoint's reader, the
+// conversion.
 #include <gtest/gtest.h>
 
 #include <algorithm>

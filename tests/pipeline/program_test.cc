@@ -68,6 +68,20 @@ TEST(Program, HelpAndVersion) {
   const Outcome all = Regrade({"run", "--help-all"});
   EXPECT_SAYS(all, "--photo-size");
   EXPECT_SAYS(all, "default 800");
+  EXPECT_SAYS(all, "--no-NAME");
+}
+
+// A command's own options are in its short help, and those that it ignores are not.
+TEST(Program, HelpShowsTheOptionsOfTheCommand) {
+  const Outcome retouch = Regrade({"retouch", "--help"}), pose = Regrade({"pose", "--help"});
+  for (const char* part : {"--photo ", "--edited", "--from", "--keep-vignette"})
+    EXPECT_SAYS(retouch, part);
+  EXPECT_EQ(retouch.text.find("--masks"), std::string::npos);
+  EXPECT_EQ(pose.text.find("--style"), std::string::npos);
+  EXPECT_SAYS(Regrade({"evaluate", "--help"}), "--reference");
+  EXPECT_SAYS(Regrade({"tradeoff", "--help"}), "--budget");
+  EXPECT_SAYS(Regrade({"render", "--help"}), "--still");
+  EXPECT_SAYS(Regrade({"contact-sheet", "--help"}), "--views");
 }
 
 // Both are written from the table of options.
@@ -75,8 +89,8 @@ TEST(Program, ManPageAndCompletionHaveEveryCommandAndOption) {
   const Outcome man = Regrade({"manual"}), bash = Regrade({"manual", "--bash"});
   EXPECT_EQ(man.code, 0);
   EXPECT_EQ(bash.code, 0);
-  for (const char* part :
-       {".TH REGRADE 1", "regrade contact", "photo\\-size", "film\\-seconds"})
+  for (const char* part : {".TH REGRADE 1", "regrade contact", "photo\\-size", "film\\-seconds",
+                           "8 a metric of \\-\\-require"})
     EXPECT_SAYS(man, part);
   for (const char* part : {"    stylize) cat", "--preset draft standard paper best",
                            "complete -o default -F _regrade regrade"})
@@ -96,6 +110,17 @@ TEST(Program, F18_UsageErrorsExitWith2) {
   EXPECT_EQ(Regrade({"pose", "a"}).code, 2);
   EXPECT_EQ(Regrade({"tradeoff"}).code, 2);
   EXPECT_EQ(Regrade({"synth", "x", "--scene", "moon"}).code, 2);
+}
+
+// The number of rays is set for the photos before the fit's time is planned.
+TEST(Program, APlanOfANewFolderHasTheTimeOfTheFit) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "5", "--size", "64x48"}).code, 0);
+  const Outcome outcome =
+      Regrade({"reconstruct", folder / "s/images", "--out", folder / "o", "--dry-run"});
+  EXPECT_EQ(outcome.code, 0) << outcome.text;
+  EXPECT_SAYS(outcome, "reconstruct: about ");
+  EXPECT_EQ(outcome.text.find(" and 0 s"), std::string::npos) << outcome.text;
 }
 
 TEST(Program, F90_FilmsArePlannedAndDamagedOnesExitWith3) {
