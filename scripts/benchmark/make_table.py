@@ -205,7 +205,7 @@ def main():
     if page:
         runs = len({(row["scene"], row["style"], row["method"].split(" w/ ")[0].split(",")[0], row["seed"])
                     for row in rows if row["method"] != "no style"})
-        write_page(page, f"{runs} runs in {run_seconds(work) / 60:.0f} min; {machine()}; {commit}.\n\n" +
+        write_page(page, f"{runs} runs, {run_seconds(work) / 60:.0f} minutes of fits and styles; {machine()}; {commit}.\n\n" +
                    markdown(["scene", "held-out PSNR", "SSIM"], fits(rows)) + "\n" + markdown(head, lines))
     return 0
 

@@ -92,7 +92,7 @@ def main():
         assert tc[0] != tc[1], "another seed changes nothing"
         with open(results) as file:
             text = file.read()
-        assert text.startswith("before\n<!-- core -->\n3 runs in ") and text.endswith("\n<!-- end of core -->\nafter\n"), text
+        assert text.startswith("before\n<!-- core -->\n3 runs, ") and text.endswith("\n<!-- end of core -->\nafter\n"), text
         assert cell in text and "old" not in text and " cores" in text, text
         frames = [len(glob.glob(os.path.join(work, place, "*.png"))) for place in
                   ("example/table/sunset", "runs/table/sunset/MKL/0/styles/style/frames/source")]
