@@ -138,7 +138,7 @@ def machine():
 
 
 def run_seconds(work):
-    """Of all stages of all runs, each fit once; runs do not overlap with `--cores 2`."""
+    """The sum over all stages of all runs, each fit once."""
     fitted, total = set(), 0.0
     for scene, _, _, seed, report in reports(work, "runs"):
         for name, stage in report["stages"].items():
