@@ -32,10 +32,10 @@ struct StyleOptions {
               "the whole distribution, the strongest change, which amplifies grain and soft "
               "edges; histogram that of each channel; pca-kd runs networks of 302 kB, which "
               "are fetched once, after a yes (--yes); onnx:DIR runs the networks of PCA-KD, "
-              "WCT, WCT2, CCPL or CAP-VSTNet in DIR (stylize/METHODS.md says how they are "
-              "made); folder:DIR takes photos that another program styled, by the photos' "
-              "names, of which some may be missing; command:\"PROGRAM {input} {style} "
-              "{output}\" runs a program for each view, without a shell"});
+              "WCT, WCT2, CCPL or CAP-VSTNet in DIR (stylize/METHODS.md); folder:DIR takes "
+              "photos that another program styled, by the photos' names, some may be missing; "
+              "command:\"PROGRAM {input} {style} {output}\" runs a program for each view, "
+              "without a shell"});
     bind("scene-wide", scene_wide,
          {.help =
               "estimates one colour map from all views, instead of one for each view: frames "
