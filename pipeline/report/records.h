@@ -3,8 +3,8 @@
 
 #include <vector>
 
-#include "evaluate/consistency.h"
-#include "evaluate/fidelity.h"
+#include "evaluate/consistency_report.h"
+#include "evaluate/fidelity_row.h"
 #include "pipeline/report/data.h"
 #include "pipeline/workspace/workspace.h"
 

@@ -1,6 +1,5 @@
 #include "stylize/field/lipschitz_network.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -9,6 +8,7 @@
 #include "kernels/base/error.h"
 #include "kernels/field/background_spheres.h"
 #include "kernels/network/lipschitz_layer.h"
+#include "stylize/spectral_norm.h"
 
 namespace regrade {
 namespace {
@@ -63,12 +63,6 @@ SpectralView<float> ViewOfLayer(LipschitzNetwork* network, int layer) {
             inputs = LipschitzNetwork::Inputs(layer);
   float* vectors = network->data().singular_vectors.data() + VectorOffset(layer);
   return {outputs, inputs, network->weight(layer), vectors, vectors + outputs};
-}
-
-double SpectralNorm(const std::vector<double>& matrix, int rows, int columns) {
-  const Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>
-      map(matrix.data(), rows, columns);
-  return Eigen::JacobiSVD<Eigen::MatrixXd>(map).singularValues()(0);
 }
 
 }  // namespace

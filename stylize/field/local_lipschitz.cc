@@ -1,11 +1,12 @@
 #include "stylize/field/local_lipschitz.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <utility>
 #include <vector>
 
 #include "kernels/base/random.h"
+#include "stylize/spectral_norm.h"
 
 namespace regrade {
 namespace {
@@ -51,6 +52,21 @@ class Steepness {
           [&](double v) { return Activate(network_.activation, network_.omega, v); });
     }
     return jacobian + base_;
+  }
+
+  // The Jacobian times a direction, without its other columns.
+  VectorXd Along(const VectorXd& point, const VectorXd& direction) const {
+    VectorXd moved = direction, x = point;
+    for (size_t l = 0; l < network_.layers.size(); ++l) {
+      const VectorXd sum = Weight(l) * x + Bias(l);
+      moved = Weight(l) * moved;
+      if (l + 1 == network_.layers.size()) break;
+      for (int i = 0; i < sum.size(); ++i)
+        moved(i) *= ActivateDerivative(network_.activation, network_.omega, sum(i));
+      x = sum.unaryExpr(
+          [&](double v) { return Activate(network_.activation, network_.omega, v); });
+    }
+    return moved + base_ * direction;
   }
 
   // ||J||_2 by the power iteration on J^T J: a lower bound, so it never exceeds the
@@ -128,7 +144,10 @@ LocalLipschitz MeasureLocalLipschitz(const LipschitzNetwork& network,
   if (!steepest.empty()) {
     result.jacobians = steepest.front().first;
     const MatrixXd jacobian = f.Jacobian(steepest.front().second);
-    const auto norm = [](const MatrixXd& m) { return m.jacobiSvd().singularValues()(0); };
+    const auto norm = [](const RowMajor& m) {
+      return SpectralNorm({m.data(), m.data() + m.size()}, static_cast<int>(m.rows()),
+                          static_cast<int>(m.cols()));
+    };
     result.along_coefficients = norm(jacobian.leftCols(kNetworkSh));
     result.along_position = norm(jacobian.rightCols(kNetworkInputs - kNetworkSh));
   }
@@ -148,9 +167,7 @@ LocalLipschitz MeasureLocalLipschitz(const LipschitzNetwork& network,
       for (int k = 0; k < kNetworkInputs; ++k) {
         VectorXd plus = point, minus = point;
         plus(k) += kH, minus(k) -= kH;
-        gradient(k) =
-            ((f.Jacobian(plus) * frozen).norm() - (f.Jacobian(minus) * frozen).norm()) /
-            (2 * kH);
+        gradient(k) = (f.Along(plus, frozen).norm() - f.Along(minus, frozen).norm()) / (2 * kH);
       }
       if (!(gradient.norm() > 0)) break;
       const VectorXd next = point + step * gradient.normalized();

@@ -1,15 +1,20 @@
 #include "stylize/training/initial_network.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "kernels/base/error.h"
 #include "kernels/base/random.h"
 #include "kernels/field/spherical_harmonics.h"
+#include "stylize/spectral_norm.h"
 
 namespace regrade {
 namespace {
+
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 constexpr int kLast = kNetworkLayers - 1;
 
@@ -160,7 +165,9 @@ void SolveOutputLayer(const StyleLoss::HiddenSums& sums, double budget,
     system(kMlpHidden, kMlpHidden) += 1e-9;  // rays that meet nothing leave b free
     const Eigen::MatrixXd solution = system.ldlt().solve(right);
     const Eigen::MatrixXd w = solution.topRows(kMlpHidden);
-    if (!(hidden_bound * w.jacobiSvd().singularValues()(0) <= budget)) continue;
+    std::vector<double> rows(static_cast<size_t>(w.size()));
+    Eigen::Map<RowMajor>(rows.data(), w.rows(), w.cols()) = w;
+    if (!(hidden_bound * SpectralNorm(rows, kMlpHidden, 3) <= budget)) continue;
     for (int c = 0; c < 3; ++c) {
       for (int i = 0; i < kMlpHidden; ++i)
         network->weight(kLast)[c * 9 * kMlpHidden + i] = static_cast<float>(w(i, c));

@@ -5,6 +5,7 @@ import base64
 import contextlib
 import json
 import os
+import select
 import shutil
 import subprocess
 import sys
@@ -18,6 +19,9 @@ SIZES = {"phone": (390, 844), "desktop": (1280, 900)}
 NO_CHROMIUM = 1 if os.environ.get("REGRADE_REQUIRE_BROWSER") == "1" else 77
 TIMEOUT_S = 300  # for any answer
 WAIT_S = 120  # for a page to do something
+# Pixels of a scene page's canvas for each pixel of the window's sides, where what is checked does not depend on them: without
+# a graphics processor they are most of the work.
+FEW_PIXELS = 0.25
 
 
 class Browser:
@@ -52,7 +56,7 @@ class Browser:
             try:
                 piece = os.read(self.read_fd, 1 << 20)
             except BlockingIOError:
-                time.sleep(0.01)
+                select.select([self.read_fd], [], [], 0.1)
                 continue
             if not piece:
                 raise RuntimeError("Chromium has ended")
@@ -103,10 +107,10 @@ class Page:
     """A file, or an address that begins with http://, in one tab of one size.
 
     Pages of one `person` (from new_person) share what a browser stores; None: the browser's own. `before` is a script that
-    runs before those of the page.
+    runs before those of the page. `scale` is the page's device pixel ratio.
     """
 
-    def __init__(self, browser, path, size, script=True, person=None, before=None):
+    def __init__(self, browser, path, size, script=True, person=None, before=None, scale=1):
         self.browser, self.path = browser, path
         browser.events = []
         of_person = {"browserContextId": person} if person else {}
@@ -115,8 +119,7 @@ class Page:
         self.session = browser.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
         for domain in ["Page", "Runtime", "Log", "Network"]:
             self.call(domain + ".enable")
-        self.call("Emulation.setDeviceMetricsOverride", width=size[0], height=size[1], deviceScaleFactor=1,
-                  mobile=size[0] < 600)
+        self.set_window(size, scale)
         if not script:
             self.call("Emulation.setScriptExecutionDisabled", value=True)
         if before:
@@ -127,6 +130,10 @@ class Page:
 
     def call(self, method, **parameters):
         return self.browser.call(method, session=self.session, **parameters)
+
+    def set_window(self, size, scale):
+        self.call("Emulation.setDeviceMetricsOverride", width=size[0], height=size[1], deviceScaleFactor=scale,
+                  mobile=size[0] < 600)
 
     def reload(self):
         self.browser.events = []
@@ -176,11 +183,11 @@ def wait_until(page, expression):
     while not page.value(expression):
         if time.monotonic() > end:
             raise RuntimeError("waited in vain for " + expression)
-        time.sleep(0.1)
+        time.sleep(0.03)
 
 
-def open_page(browser, path, size, before=None):
-    page = Page(browser, path, size, before=before)
+def open_page(browser, path, size, before=None, scale=1):
+    page = Page(browser, path, size, before=before, scale=scale)
     wait_until(page, "!!globalThis.regradePage && (!!regradePage.picture || /cannot/.test(message.textContent))")
     return page
 

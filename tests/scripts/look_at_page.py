@@ -16,7 +16,7 @@ import json
 import os
 import sys
 
-from browser import SIZES, complaints, open_page, parsed, parser_of, running, status_of, wait_until
+from browser import FEW_PIXELS, SIZES, complaints, open_page, parsed, parser_of, running, status_of, wait_until
 from page_network import check_bound
 from page_pictures import compare_pictures
 
@@ -171,7 +171,7 @@ def check_film(page, folder, shots):
 
 def check_cores(browser, path, views):
     """Styles made by workers, as where the graphics processor is slow."""
-    page = open_page(browser, path, SIZES["phone"])
+    page = open_page(browser, path, SIZES["phone"], scale=FEW_PIXELS)
     page.value("location.hash = '#cores'")
     page.reload()
     wait_until(page, "!!globalThis.regradePage && !!regradePage.picture")
@@ -188,7 +188,7 @@ def check_folder(browser, arguments):
         with open(path[:-5] + ".json", encoding="utf-8") as file:
             views = json.load(file)
         for size_name, size in SIZES.items() if number == 0 else [("phone", SIZES["phone"])]:
-            page = open_page(browser, path, size)
+            page = open_page(browser, path, size, scale=1 if number == 0 or arguments.shots else FEW_PIXELS)
             here = check_controls(page, size[0])
             if size_name == "phone":
                 here += compare_pictures(page, views) + check_bound(page)

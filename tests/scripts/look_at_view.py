@@ -17,7 +17,7 @@ import sys
 import tempfile
 import time
 
-from browser import SIZES, Page, complaints, open_page, parsed, parser_of, running, status_of, wait_until
+from browser import FEW_PIXELS, SIZES, Page, complaints, open_page, parsed, parser_of, running, status_of, wait_until
 from small_run import SMALL, STYLE, call, make_capture
 
 DROP = """(async () => {
@@ -68,7 +68,7 @@ def start(regrade, folder):
 
 def check_view(browser, address, folder, shots, size):
     found = []
-    page = open_page(browser, address, size)
+    page = open_page(browser, address, size, scale=1 if shots else FEW_PIXELS)
     before = page.value("regradePage.header.styles.length")
     with open(STYLE, "rb") as file:
         picture = base64.b64encode(file.read()).decode()

@@ -14,7 +14,7 @@ import re
 import sys
 import tempfile
 
-from browser import SIZES, Page, complaints, open_page, parsed, parser_of, running, status_of, wait_until
+from browser import FEW_PIXELS, SIZES, Page, complaints, open_page, parsed, parser_of, running, status_of, wait_until
 
 # Counts what exists on the graphics processor: gpu.size() is {objects, bytes}.
 COUNTER = """(() => {
@@ -168,7 +168,7 @@ def check_damaged(browser, path, folder):
         copy = os.path.join(folder, "damaged_" + name + ".html")
         with open(copy, "w", encoding="utf-8") as file:
             file.write(damaged)
-        page = Page(browser, copy, SIZES["phone"])
+        page = Page(browser, copy, SIZES["phone"], scale=FEW_PIXELS)
         said = "the file is incomplete" if name == "end" else "cannot be shown: ."
         try:
             wait_until(page, f"/{said}/.test(message.textContent) && message.getClientRects().length > 0")
@@ -188,7 +188,7 @@ def main():
     parser.add_argument("--losses", type=int, default=4, help="lost graphics contexts (10)")
     arguments = parsed(parser)
     with tempfile.TemporaryDirectory() as scratch, running(arguments.chromium) as browser:
-        page = open_page(browser, arguments.page, SIZES["phone"], COUNTER)
+        page = open_page(browser, arguments.page, SIZES["phone"], COUNTER, FEW_PIXELS)
         found = check_strain(page, arguments) + check_losses(page, arguments.losses) + complaints(page)
         page.close()
         found += check_damaged(browser, arguments.page, scratch)

@@ -15,7 +15,7 @@ import json
 import os
 import sys
 
-from browser import SIZES, complaints, open_page, parsed, parser_of, running, status_of, wait_until
+from browser import FEW_PIXELS, SIZES, complaints, open_page, parsed, parser_of, running, status_of, wait_until
 
 KEYS = {"Tab": 9, "Enter": 13, " ": 32, "Escape": 27, "ArrowLeft": 37, "ArrowUp": 38, "ArrowRight": 39, "ArrowDown": 40}
 TEXT = {"Enter": "\r", " ": " "}
@@ -317,6 +317,7 @@ def main():
             if arguments.shots:
                 page.shot(os.path.join(arguments.shots, f"walk_{size_name}_{scheme}.png"))
             if size_name == "desktop":
+                page.set_window(SIZES[size_name], FEW_PIXELS)
                 here += check_work(page) + check_canvas(page)
             here += complaints(page)
             found += [f"{size_name}, {scheme}: {complaint}" for complaint in here]

@@ -3,8 +3,8 @@
 
   write_fault_injection.py REGRADE LIBRARY [--runs 24] [--kinds ENOSPC,EIO,SHORT]     LIBRARY: libfailing_writes.so
 
-A small synthetic capture is run once without failures in reproducible mode (the baseline). Then, after the poses and
-after the reconstruction, a copy is run with its k-th write failing, for `--runs` values of k (0: every k). A failed
+A small synthetic capture is run without failures in reproducible mode (the baseline), after the poses and after the
+reconstruction. Then a copy is run from either place with its k-th write failing, for `--runs` values of k (0: every k). A failed
 write must end the run with exit status 5 and a message that names a file (a short write must change nothing); the same
 command must then finish with the baseline's fields and frames byte for byte. Exit status: 0, or 1 if there is a finding.
 """
@@ -47,9 +47,7 @@ def main():
             if status != 0:
                 sys.exit(f"{command} of the baseline run: exit status {status}: {words}")
             begins[name] = shutil.copytree(work, os.path.join(scratch, name))
-        if call(run)[0] != 0:
-            sys.exit("the baseline run failed")
-        expected = results(work)
+        expected = None
         for name, begin in begins.items():
             def reset():
                 shutil.rmtree(work)
@@ -58,9 +56,13 @@ def main():
             reset()
             count_file = os.path.join(scratch, "count")
             base = {"LD_PRELOAD": library, "FAILING_WRITES_UNDER": work, "FAILING_WRITES_COUNT": count_file}
-            call(run, base)
+            if call(run, base)[0] != 0:
+                sys.exit("the baseline run failed")
             with open(count_file) as file:
                 count = int(file.read())
+            expected = expected or results(work)
+            if different(results(work), expected):
+                sys.exit(f"after the {name}: differs without a failed write: {different(results(work), expected)[:5]}")
             wanted = count if options.runs == 0 else min(options.runs, count)
             kinds = options.kinds.split(",")
             print(f"after the {name}: {count} write operations, {wanted} of them fail in turn", flush=True)

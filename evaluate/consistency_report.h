@@ -1,0 +1,97 @@
+// What consistency.h measures, as plain data: each pair, and the rows of the table.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "evaluate/bootstrap.h"
+#include "evaluate/warped_error.h"
+
+namespace regrade {
+
+struct PairMotion;  // see evaluate/pair_motion.h
+
+// One pair of one sequence.
+struct PairResult {
+  std::string sequence;
+  int from = 0, to = 0;  // frame indices
+
+  // EQ(tc-psnr), Lai et al. 2018: e = sum_x M(x) |O_b(x + f(x)) - O_a(x)|^2 / (C sum_x M(x)),
+  // the mean squared error over trusted pixels x of frame a and the C = 3 colour channels. f
+  // and M are flow from a to b and mask of the reference frames; O is sampled bilinearly with
+  // repeated border, values as given (white = 1, not clipped). b is the frame that is warped:
+  // the later one, or with `--warp earlier` the earlier one. `--error-per pixel` leaves C out:
+  // every value is 10 log10 3 = 4.77 dB lower. Empty if no pixel can be compared.
+  std::optional<double> error;
+  // -10 log10(e) in dB; +inf for identical frames; empty if `error` is.
+  std::optional<double> psnr_db;
+
+  double coverage = 0;        // fraction of the frame that was compared, in [0, 1]
+  bool low_coverage = false;  // below ConsistencyOptions::min_coverage
+  // Numbers of pixels, see OcclusionMask.
+  int64_t flow_not_finite = 0, out_of_frame = 0, disoccluded = 0, motion_boundary = 0;
+  int64_t colour_not_finite = 0;  // excluded: a colour of this sequence is NaN or inf
+  bool above_8bit_floor = false;  // the error per channel is below that of 8-bit frames
+};
+
+// The summary of all pairs of one sequence at one gap: one row of the table.
+struct ConsistencyRow {
+  std::string sequence;
+  int gap = 0;
+  int pairs = 0;            // all, including undefined ones
+  int undefined_pairs = 0;  // without comparable pixels: excluded from all means
+  int perfect_pairs = 0;    // identical frames (infinite dB): excluded from the mean of dB
+  int low_coverage_pairs = 0;
+  int pairs_above_8bit_floor = 0;
+
+  // Mean over pairs of psnr_db, without perfect pairs; the headline metric.
+  std::optional<double> tc_psnr_mean_db;
+  // 95 % confidence interval of that mean over the same pairs, see EQ(block-bootstrap), with
+  // runs as long as the gap. Empty for fewer than two runs.
+  std::optional<Interval> tc_psnr_interval_db;
+  // -10 log10 of the mean error over all defined pairs, including perfect ones (+inf if all are
+  // perfect). At most the mean of dB if no pair is perfect (Jensen).
+  std::optional<double> tc_psnr_of_mean_db;
+  double coverage = 0;  // mean over pairs, in [0, 1]
+  std::string why;      // why a metric is missing or infinite; else empty
+};
+
+// The pair with the largest error of a row, with its motion, which sequences share: from frame
+// `at`, where both are compared, to frame `warped`.
+struct WorstPair {
+  PairResult pair;
+  std::shared_ptr<const PairMotion> motion;
+  int at = 0, warped = 0;
+};
+
+// One pair of one sequence in mode stylegaussian, by both readings of warped_error.h.
+struct WarpedPair {
+  std::string sequence;
+  int from = 0, to = 0;  // frame indices
+  WarpedError published, corrected;
+};
+
+// The means over the pairs of one sequence at one gap, pairs without a value left out.
+struct WarpedRow {
+  std::string sequence;
+  int gap = 0;
+  int pairs = 0;
+  WarpedError published, corrected;
+  std::string why;  // why a reading is missing; else empty
+};
+
+struct ConsistencyReport {
+  std::string mode, flow, warp = "later", error_per = "channel";
+  std::vector<ConsistencyRow> rows;  // by sequence, then by gap, in the order given
+  std::vector<PairResult> pairs;     // by first frame, gap, sequence
+  // In the order of rows; rows whose pairs are all perfect or undefined have none.
+  std::vector<WorstPair> worst;
+  // Instead of the others in mode stylegaussian, in the same orders.
+  std::vector<WarpedRow> warped;
+  std::vector<WarpedPair> warped_pairs;
+};
+
+}  // namespace regrade
