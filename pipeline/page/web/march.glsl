@@ -7,12 +7,15 @@ precision highp isampler2D;
 precision highp usampler2D;
 
 uniform usampler2D uTree;      // see tree.js
-uniform usampler2D uCorner;    // of a cell, two texels of four voxels
-uniform usampler2D uFirst0, uSecond0, uFirst1, uSecond1, uFirst2, uSecond2;  // codes [27]
+uniform usampler2D uCorner;    // of a cell: eight numbers of 16 bits, voxels of its block
+uniform isampler2D uBase;      // the first voxel of a block of 2^uBlock cells
+uniform usampler2D uColor0, uColor1, uColor2;  // of a voxel, see color_code.js
 uniform isampler2D uColumn;    // of the spheres' map
 uniform usampler2D uTexel0, uTexel1, uTexel2;  // codes, density
 
-uniform float uScale[81];      // of three sets
+uniform mat3 uOpponent[3];     // of three sets
+uniform vec3 uHarmonics[81], uStepOf[27];
+uniform ivec4 uBits[21];
 uniform float uTexelScale[9];
 uniform vec3 uWeight, uBackground;
 uniform mat3 uMap;
@@ -22,7 +25,7 @@ uniform vec3 uEye;
 uniform vec4 uLens;            // focal lengths and principal point, pixels
 uniform vec2 uSize, uNdc;
 uniform ivec3 uVoxels, uTop;
-uniform int uFinest, uOnCells, uLayers, uResolution, uCount;
+uniform int uFinest, uBlock, uOnCells, uLayers, uResolution, uCount;
 uniform vec3 uCenter, uRadius;
 uniform float uUnit, uNear, uStep, uOpacityStep;
 out vec4 color;
@@ -116,14 +119,14 @@ vec4 Codes(uint w) {
   return vec4(w & 255u, w >> 8 & 255u, w >> 16 & 255u, w >> 24) - 128.0;
 }
 
-// The products of a voxel's coefficients with s, the harmonics times the scales.
-vec3 ColorOf(usampler2D first, usampler2D second, int voxel, vec4 s[7]) {
-  uvec4 a = texelFetch(first, At(voxel), 0), b = texelFetch(second, At(voxel), 0);
-  fetches += 2.0;
-  vec4 c2 = Codes(a.z), c4 = Codes(b.x);
-  return vec3(dot(Codes(a.x), s[0]) + dot(Codes(a.y), s[1]) + c2.x * s[2].x,
-              dot(c2.yzw, s[2].yzw) + dot(Codes(a.w), s[3]) + dot(c4.xy, s[4].xy),
-              dot(c4.zw, s[4].zw) + dot(Codes(b.y), s[5]) + dot(Codes(b.z).xyz, s[6].xyz));
+//@code
+// The products of a voxel's numbers with s, the steps times the turned harmonics.
+vec3 ColorOf(usampler2D colors, int voxel, int set, vec3 s[9]) {
+  vec3 q[9], sum = vec3(0.0);
+  Unpack(texelFetch(colors, At(voxel), 0), set, q);
+  fetches += 1.0;
+  for (int j = 0; j < 9; ++j) sum += q[j] * s[j];
+  return sum;
 }
 
 void Harmonics(vec3 d, out float g[9]) {
@@ -138,19 +141,19 @@ void Harmonics(vec3 d, out float g[9]) {
   g[8] = 0.5462742152960396 * (d.x * d.x - d.y * d.y);
 }
 
-vec4 s0[7], s1[7], s2[7];
+vec3 s0[9], s1[9], s2[9];
 
-void Scaled(float g[9], int set, out vec4 s[7]) {
-  for (int i = 0; i < 7; ++i)
-    for (int k = 0; k < 4; ++k) {
-      int j = 4 * i + k;
-      s[i][k] = j < 27 ? uScale[27 * set + j] * g[j - 9 * (j / 9)] : 0.0;
-    }
+void Scaled(float g[9], int set, out vec3 s[9]) {
+  vec3 a = vec3(g[0], g[1], g[2]), b = vec3(g[3], g[4], g[5]), c = vec3(g[6], g[7], g[8]);
+  for (int j = 0; j < 9; ++j) {
+    int at = 27 * set + 3 * j;
+    s[j] = uStepOf[9 * set + j] * (dot(uHarmonics[at], a) + dot(uHarmonics[at + 1], b) + dot(uHarmonics[at + 2], c));
+  }
 }
 
 vec3 Shade(int cell, vec3 f, float opacity) {
-  ivec4 low = ivec4(texelFetch(uCorner, At(2 * cell), 0));
-  ivec4 high = ivec4(texelFetch(uCorner, At(2 * cell + 1), 0));
+  uvec4 corners = texelFetch(uCorner, At(cell), 0);
+  int base = texelFetch(uBase, At(cell >> uBlock), 0).x;
   fetches += 2.0;
   vec4 a, b;
   Weights(f, a, b);
@@ -164,15 +167,16 @@ vec3 Shade(int cell, vec3 f, float opacity) {
     b /= kept;
     least /= kept;
   }
-  vec3 raw = vec3(0.5);
+  vec3 y0 = vec3(0.0), y1 = vec3(0.0), y2 = vec3(0.0);
   for (int k = 0; k < 8; ++k) {
     float w = k < 4 ? a[k] : b[k - 4];
     if (w < least) continue;
-    int voxel = k < 4 ? low[k] : high[k - 4];
-    if (uWeight.x > 0.0) raw += w * uWeight.x * ColorOf(uFirst0, uSecond0, voxel, s0);
-    if (uWeight.y > 0.0) raw += w * uWeight.y * ColorOf(uFirst1, uSecond1, voxel, s1);
-    if (uWeight.z > 0.0) raw += w * uWeight.z * ColorOf(uFirst2, uSecond2, voxel, s2);
+    int voxel = base + int(corners[k >> 1] >> (16 * (k & 1)) & 65535u);
+    if (uWeight.x > 0.0) y0 += w * ColorOf(uColor0, voxel, 0, s0);
+    if (uWeight.y > 0.0) y1 += w * ColorOf(uColor1, voxel, 1, s1);
+    if (uWeight.z > 0.0) y2 += w * ColorOf(uColor2, voxel, 2, s2);
   }
+  vec3 raw = 0.5 + uWeight.x * (uOpponent[0] * y0) + uWeight.y * (uOpponent[1] * y1) + uWeight.z * (uOpponent[2] * y2);
   return max(uMap * raw + uOffset, 0.0);
 }
 

@@ -9,7 +9,12 @@ class Painter {
     this.changed = true;
     this.next = 0;          // row of the full picture
     this.frameTime = 0;
+    this.shown = null;      // the scene whose picture is on the canvas
     this.resize();
+  }
+  take(scene) {
+    this.scene = scene;
+    this.change();
   }
   resize() {
     const ratio = Math.min(devicePixelRatio || 1, 2);
@@ -50,6 +55,7 @@ class Painter {
       this.draw(this.coarse, {y: 0, height}, this.steps.moving);
       this.graphics.settle(this.coarse);
       this.graphics.show(this.coarse, this.canvas, null);
+      this.shown = this.scene;
       this.frameTime = performance.now() - begun;
       // Half of a frame of 60 Hz, smoothly.
       const wanted = Math.sqrt(14 / Math.max(this.frameTime, 1));
