@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <set>
 #include <vector>
 
 #include "kernels/field/cell_lattice.h"
@@ -38,20 +40,29 @@ class Sums {
   const Vec3i& size() const { return size_; }
   int width() const { return width_; }
   double Density(size_t i) const { return double{sum_[i].density} / std::pow(width_, 3); }
-  Vec3f Color(size_t i) const { return sum_[i].color / sum_[i].density; }
+  Vec3d Color(size_t i) const { return (sum_[i].color / sum_[i].density).Cast<double>(); }
   size_t count() const { return sum_.size(); }
-
- private:
-  struct Sum {
-    float density = 0;
-    Vec3f color{0, 0, 0};
-  };
+  bool Has(const Vec3i& at) const {
+    for (int a = 0; a < 3; ++a)
+      if (at[a] < 0 || at[a] >= size_[a]) return false;
+    return true;
+  }
+  Vec3i At(size_t i) const {
+    const int n = static_cast<int>(i);
+    return {n / size_.z / size_.y, n / size_.z % size_.y, n % size_.z};
+  }
   size_t Index(const Vec3i& at) const {
     return (static_cast<size_t>(at.x) * static_cast<size_t>(size_.y) +
             static_cast<size_t>(at.y)) *
                static_cast<size_t>(size_.z) +
            static_cast<size_t>(at.z);
   }
+
+ private:
+  struct Sum {
+    float density = 0;
+    Vec3f color{0, 0, 0};
+  };
 
   int width_;
   Vec3i size_;
@@ -71,14 +82,33 @@ struct Mean {
   }
 };
 
+// Mean of what a ray meets in a cell: densities between the corners are blends, and those below
+// zero are empty. In the middles of the cell's eight parts.
+double MeanDensity(const float* corner) {
+  double sum = 0;
+  for (int part = 0; part < 8; ++part) {
+    double density = 0;
+    for (int k = 0; k < 8; ++k) {
+      const int apart = __builtin_popcount(static_cast<unsigned>(part ^ k));
+      density += double{corner[k]} * std::pow(0.75, 3 - apart) * std::pow(0.25, apart);
+    }
+    sum += std::max(density, 0.0);
+  }
+  return sum / 8;
+}
+
 void AddCells(const RadianceField& field, Sums* sums) {
   const CellGrid& cells = field.geometry->cells;
   for (int64_t i = 0; i < cells.num_cells(); ++i) {
     Mean mean;
-    for (int k = 0; k < 8; ++k) mean.Add(field, cells.corner[8 * i + k]);
+    float corner[8];
+    for (int k = 0; k < 8; ++k) {
+      mean.Add(field, cells.corner[8 * i + k]);
+      corner[k] = field.geometry->density[cells.corner[8 * i + k]];
+    }
     if (mean.density > 0)
-      sums->Add(PlaceOf(cells.key[i]), 1 << (cells.finest - cells.level[i]), mean.density / 8,
-                mean.color / mean.density);
+      sums->Add(PlaceOf(cells.key[i]), 1 << (cells.finest - cells.level[i]),
+                MeanDensity(corner), mean.color / mean.density);
   }
 }
 
@@ -109,29 +139,54 @@ GridFrame FrameOf(const GridFrame& fine, const Sums& sums) {
   return frame;
 }
 
+// What is around the places of `seen`: empty, with the colours of what it touches, so that a
+// surface keeps its colour up to where it ends.
+std::map<size_t, Mean> Rim(const Sums& sums, const std::vector<size_t>& seen) {
+  std::map<size_t, Mean> rim;
+  const std::set<size_t> inside(seen.begin(), seen.end());
+  for (const size_t i : seen)
+    for (int k = 0; k < 27; ++k) {
+      const Vec3i at = sums.At(i) + Vec3i{k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1};
+      if (!sums.Has(at) || inside.contains(sums.Index(at))) continue;
+      Mean& mean = rim[sums.Index(at)];
+      mean.density += sums.Density(i);
+      mean.color += sums.Density(i) * sums.Color(i);
+    }
+  return rim;
+}
+
 std::optional<RadianceField> FieldOf(const RadianceField& fine, const Sums& sums,
                                      int64_t most_voxels) {
   auto geometry = std::make_shared<Geometry>();
   geometry->frame = FrameOf(fine.geometry->frame, sums);
   const Vec3f scale = geometry->frame.Scale();
   const double width = 1 / double{std::max({scale.x, scale.y, scale.z})};
-  std::vector<size_t> kept;
-  geometry->links.Resize(static_cast<int64_t>(sums.count()));
-  for (size_t i = 0; i < sums.count(); ++i) {
-    const bool seen = sums.Density(i) * width > kLeastDepth;
-    geometry->links[static_cast<int64_t>(i)] = seen ? static_cast<int32_t>(kept.size()) : -1;
-    if (seen) kept.push_back(i);
+  std::vector<size_t> seen;
+  for (size_t i = 0; i < sums.count(); ++i)
+    if (sums.Density(i) * width > kLeastDepth) seen.push_back(i);
+  if (seen.empty() || std::ssize(seen) > most_voxels) return std::nullopt;
+  std::map<size_t, Mean> voxels = Rim(sums, seen);
+  for (auto& [i, mean] : voxels) {
+    mean.color = mean.color / mean.density;
+    mean.density = 0;
   }
-  const auto n = static_cast<int64_t>(kept.size());
-  if (n == 0 || n > most_voxels) return std::nullopt;
+  for (const size_t i : seen) voxels[i] = {sums.Density(i), sums.Color(i)};
+  const auto n = std::ssize(voxels);
+  if (n > most_voxels) return std::nullopt;
+
   RadianceField field;
   field.appearance.basis = 1;
   geometry->density.Resize(n);
   field.appearance.sh.Resize(3 * n);
-  for (int64_t v = 0; v < n; ++v) {
-    geometry->density[v] = static_cast<float>(sums.Density(kept[static_cast<size_t>(v)]));
-    const Vec3f color = sums.Color(kept[static_cast<size_t>(v)]);
-    for (int c = 0; c < 3; ++c) field.appearance.sh[3 * v + c] = color[c];
+  geometry->links.Resize(static_cast<int64_t>(sums.count()));
+  std::fill(geometry->links.begin(), geometry->links.end(), -1);
+  int32_t voxel = 0;
+  for (const auto& [i, mean] : voxels) {
+    geometry->links[static_cast<int64_t>(i)] = voxel;
+    geometry->density[voxel] = static_cast<float>(mean.density);
+    for (int c = 0; c < 3; ++c)
+      field.appearance.sh[3 * int64_t{voxel} + c] = static_cast<float>(mean.color[c]);
+    ++voxel;
   }
   field.geometry = std::move(geometry);
   field.background = fine.background;
@@ -145,8 +200,9 @@ std::optional<RadianceField> FieldOf(const RadianceField& fine, const Sums& sums
 std::optional<RadianceField> CoarseField(const RadianceField& field,
                                          const CoarseOptions& options) {
   const Geometry& geometry = *field.geometry;
-  const int64_t most =
-      std::min(options.most_voxels, geometry.num_voxels() / options.least_times);
+  const int64_t most = std::min(
+      options.most_voxels,
+      static_cast<int64_t>(options.most_part * static_cast<double>(geometry.num_voxels())));
   const Vec3i& voxels = geometry.frame.resolution;
   const int longest = std::max({voxels.x, voxels.y, voxels.z});
   for (int width = 2; width <= longest / 4; width *= 2) {

@@ -13,9 +13,9 @@
 namespace regrade {
 
 struct CoarseOptions {
-  int64_t most_voxels = 50000;
-  int longest = 160;     // voxels along the longest edge, at most
-  int least_times = 16;  // the field has as many times the voxels, or there is no coarse one
+  int64_t most_voxels = 120000;
+  int longest = 192;     // voxels along the longest edge, at most
+  double most_part = 1.0 / 16;  // of the field's voxels; small fields have no coarse one
 };
 
 std::optional<RadianceField> CoarseField(const RadianceField& field,

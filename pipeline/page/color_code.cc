@@ -10,6 +10,7 @@ namespace regrade {
 namespace {
 
 constexpr int kBins = 4096;  // of magnitudes
+constexpr int kMostBits = 12;  // of a number
 constexpr size_t kMostFitted = 1 << 18;  // voxels whose covariance is taken
 
 // The errors of one number's values, by its bits.
@@ -18,45 +19,54 @@ class NumberErrors {
   NumberErrors(double finest, double largest)
       : finest_(finest), width_(std::max(largest, 1e-9) / (kBins - 1)), count_(kBins) {}
 
-  void Add(double value) {
-    ++count_[static_cast<size_t>(std::min(kBins - 1.0, std::abs(value) / width_ + 0.5))];
+  void Add(double value, double weight) {
+    count_[static_cast<size_t>(std::min(kBins - 1.0, std::abs(value) / width_ + 0.5))] +=
+        weight;
   }
+  // After the last value.
   void Finish() {
+    std::array<std::vector<double>, 3> above;
+    for (std::vector<double>& sums : above) sums.resize(kBins + 1);
     for (int m = kBins - 1; m >= 0; --m) {
-      // Sums over all bins from here up: counts, values, squares.
-      const double n = static_cast<double>(count_[static_cast<size_t>(m)]), v = m * width_;
-      above_[0][static_cast<size_t>(m)] = above_[0][static_cast<size_t>(m) + 1] + n;
-      above_[1][static_cast<size_t>(m)] = above_[1][static_cast<size_t>(m) + 1] + n * v;
-      above_[2][static_cast<size_t>(m)] = above_[2][static_cast<size_t>(m) + 1] + n * v * v;
+      // Sums over all bins from here up: weights, values, squares.
+      const double n = count_[static_cast<size_t>(m)], v = m * width_;
+      above[0][static_cast<size_t>(m)] = above[0][static_cast<size_t>(m) + 1] + n;
+      above[1][static_cast<size_t>(m)] = above[1][static_cast<size_t>(m) + 1] + n * v;
+      above[2][static_cast<size_t>(m)] = above[2][static_cast<size_t>(m) + 1] + n * v * v;
     }
+    for (int bits = 1; bits <= kMostBits; ++bits)
+      best_[static_cast<size_t>(bits)] = Fit(bits, above);
+    count_ = {};
   }
 
   struct Choice {
     double error = 0, step = 1;
   };
+  const Choice& Best(int bits) const { return best_[static_cast<size_t>(bits)]; }
+
+ private:
   // Values beyond a limit become the limit; few large ones may cost less than a wide step.
-  Choice Best(int bits) const {
+  Choice Fit(int bits, const std::array<std::vector<double>, 3>& above) const {
     const int levels = (1 << (bits - 1)) - 1;
-    if (levels == 0) return {above_[2][0], 1};
+    if (levels == 0) return {above[2][0], 1};
     Choice best{-1, 1};
     for (double last = kBins - 1; last >= 1; last *= 0.84) {
       const double step = std::max({finest_, last * width_ / levels, 1e-9});
       const double limit = step * levels;
       const auto first = static_cast<size_t>(std::min(limit / width_, kBins - 1.0)) + 1;
-      const double clamped = above_[2][first] - 2 * limit * above_[1][first] +
-                             limit * limit * above_[0][first];
+      const double clamped = above[2][first] - 2 * limit * above[1][first] +
+                             limit * limit * above[0][first];
       // What is not clamped is rounded, but nothing is lost where all is 0.
-      const double error = std::max(clamped, 0.0) + above_[0][0] * step * step / 12;
+      const double error = std::max(clamped, 0.0) + above[0][0] * step * step / 12;
       if (best.error < 0 || error < best.error) best = {error, step};
       if (step == finest_) break;
     }
     return best;
   }
 
- private:
   double finest_, width_;
-  std::vector<int64_t> count_;
-  std::array<std::array<double, kBins + 1>, 3> above_{};
+  std::vector<double> count_;  // weights
+  std::array<Choice, kMostBits + 1> best_;
 };
 
 using Numbers = std::array<double, kCodeNumbers>;  // of one voxel, a basis + j
@@ -88,8 +98,8 @@ void FitTransforms(const std::vector<float>& spread, int basis, ColorCode* code)
   for (size_t i = 0; i < n; ++i)
     for (int k = 0; k < basis; ++k)
       for (int c = 0; c < 3; ++c) rows.push_back(at(i, c, k));
-  const ValueTransform channels = DecorrelatingTransform(rows, 3);
-  std::copy(channels.matrix.begin(), channels.matrix.end(), code->opponent.begin());
+  const ValueTransform opponent = DecorrelatingTransform(rows, 3);
+  std::copy(opponent.matrix.begin(), opponent.matrix.end(), code->opponent.begin());
 
   // Rows of harmonics, each channel's scaled to the same power: bits count, not sizes.
   std::array<double, 3> power{};
@@ -115,7 +125,8 @@ void FitTransforms(const std::vector<float>& spread, int basis, ColorCode* code)
 }
 
 std::vector<NumberErrors> ErrorsOf(const std::vector<float>& values, const ColorCode& code,
-                                   int basis, double finest) {
+                                   int basis, double finest,
+                                   const std::vector<float>& weight) {
   const size_t channels = static_cast<size_t>(3 * basis), n = values.size() / channels;
   std::vector<double> largest(channels);
   for (size_t i = 0; i < n; ++i) {
@@ -126,7 +137,7 @@ std::vector<NumberErrors> ErrorsOf(const std::vector<float>& values, const Color
   for (const double most : largest) errors.emplace_back(finest, most);
   for (size_t i = 0; i < n; ++i) {
     const Numbers y = Transformed(values.data() + i * channels, code, basis);
-    for (size_t c = 0; c < channels; ++c) errors[c].Add(y[c]);
+    for (size_t c = 0; c < channels; ++c) errors[c].Add(y[c], weight.empty() ? 1 : double{weight[i]});
   }
   for (NumberErrors& e : errors) e.Finish();
   return errors;
@@ -143,13 +154,13 @@ std::vector<double> NumbersIn(const JsonValue& json, const char* key, size_t cou
 }  // namespace
 
 ColorCode FitColorCode(const std::vector<float>& spread, const std::vector<float>& values,
-                       int basis, double finest) {
+                       int basis, double finest, const std::vector<float>& weight) {
   ColorCode code;
   for (size_t j = 0; j < kCodeHarmonics; ++j) code.harmonics[(kCodeHarmonics + 1) * j] = 1;
   code.step.fill(1);
   code.bits.fill(1);
   FitTransforms(spread, basis, &code);
-  const std::vector<NumberErrors> errors = ErrorsOf(values, code, basis, finest);
+  const std::vector<NumberErrors> errors = ErrorsOf(values, code, basis, finest, weight);
   for (size_t w = 0; w < kCodeWords; ++w) {
     // A bit goes where it lowers the error most, until the word is full or all are as fine as
     // wanted. One bit alone may gain nothing where two gain much.
@@ -167,7 +178,7 @@ ColorCode FitColorCode(const std::vector<float>& spread, const std::vector<float
         const int number = kCodeOrder[static_cast<size_t>(s)];
         if (number % kCodeHarmonics >= basis) continue;
         const int bits = code.bits[static_cast<size_t>(number)];
-        for (int more = 1; more <= std::min({rest, 2, 12 - bits}); ++more) {
+        for (int more = 1; more <= std::min({rest, 2, kMostBits - bits}); ++more) {
           const double gain = (error(number, bits) - error(number, bits + more)) / more;
           if (gain > most) most = gain, best = number, width = more;
         }
@@ -277,7 +288,7 @@ ColorCode ColorCodeOf(const JsonValue& json) {
   fill("opponent", &code.opponent, -1.001, 1.001);
   fill("harmonics", &code.harmonics, -1.001, 1.001);
   fill("step", &code.step, 0, 1e30);
-  fill("bits", &code.bits, 1, 12);
+  fill("bits", &code.bits, 1, kMostBits);
   for (size_t w = 0; w < kCodeWords; ++w) {
     int sum = 0;
     for (int s = kWordBegins[w]; s < kWordBegins[w + 1]; ++s)

@@ -37,10 +37,10 @@ struct ColorCode {
 };
 
 // The transforms that decorrelate `spread` [n, 3, basis] (channel-major), and for `values`
-// [n, 3, basis] the bits and steps of least squared error, none below `finest`. The identity's
-// for n = 0.
+// [n, 3, basis] the bits and steps of least squared error, none below `finest`. `weight` [n]: of
+// each voxel's error; empty: all alike. The identity's for n = 0.
 ColorCode FitColorCode(const std::vector<float>& spread, const std::vector<float>& values,
-                       int basis, double finest);
+                       int basis, double finest, const std::vector<float>& weight = {});
 
 // values [V, 3, basis] -> numbers [3 basis, V], those of (a, j) in row a basis + j.
 std::vector<int16_t> NumbersOf(const std::vector<float>& values, const ColorCode& code,

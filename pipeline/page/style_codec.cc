@@ -1,6 +1,7 @@
 #include "pipeline/page/style_codec.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 #include <vector>
 
@@ -37,9 +38,23 @@ std::vector<double> RoundToCodes(Buffer<float>* values, int channels) {
   return scale;
 }
 
-ColorCode RoundToWords(Buffer<float>* sh) {
+// About the opacity of each voxel: what little of it is seen may be rounded more coarsely.
+std::vector<float> Opacities(const Geometry& geometry) {
+  const Vec3f scale = geometry.frame.Scale();
+  const double width = 1 / double{std::min({scale.x, scale.y, scale.z})};
+  std::vector<float> opacity;
+  for (const float density : geometry.density)
+    opacity.push_back(
+        static_cast<float>(1.01 - std::exp(-std::max(0.0, double{density}) * width)));
+  return opacity;
+}
+
+ColorCode RoundToWords(const std::vector<float>& weight, Buffer<float>* sh) {
   const std::vector<float> values(sh->begin(), sh->end());
-  const ColorCode code = FitColorCode(values, values, kStyledBasis, 0);
+  std::vector<float> spread = values;
+  const size_t channels = values.size() / std::max<size_t>(weight.size(), 1);
+  for (size_t i = 0; i < spread.size(); ++i) spread[i] *= std::sqrt(weight[i / channels]);
+  const ColorCode code = FitColorCode(spread, values, kStyledBasis, 0, weight);
   const std::vector<float> rounded =
       ValuesOf(NumbersOf(values, code, kStyledBasis), code, kStyledBasis);
   std::copy(rounded.begin(), rounded.end(), sh->begin());
@@ -86,7 +101,8 @@ PageStyle EncodeStyle(const StoredNetwork& stored, const RadianceField& page, do
     style.residual = std::move(packed.packed);
     residual = std::move(packed.header);
   }
-  const ColorCode code = RoundToWords(&style.styled.appearance.sh);
+  const ColorCode code =
+      RoundToWords(Opacities(*page.geometry), &style.styled.appearance.sh);
   const std::vector<double> sphere_scale = RoundToCodes(&style.styled.appearance.sphere_color, 3);
   const RowMap base = BaseOf(data);
   JsonValue::Array matrix;

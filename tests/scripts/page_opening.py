@@ -32,7 +32,7 @@ CANVAS = """((name) => {
   if (kept[name]) for (let i = 0; i < pixels.length; ++i) if (i % 4 < 3) apart += (pixels[i] - kept[name][i]) ** 2 / (3 * n);
   kept[name] ??= pixels;
   return [apart, spread];
-})('%s')"""
+})('NAME')"""
 
 
 def check_coarse_first(browser, path):
@@ -46,7 +46,7 @@ def check_coarse_first(browser, path):
     if not page.value("regradePage.painter.shown.coarse === true && !regradePage.picture"):
         found.append("what is drawn first is not the coarse scene")
     wait_until(page, "regradePage.painter.settled")
-    if page.value(CANVAS % "coarse")[1] < 10:
+    if page.value(CANVAS.replace("NAME", "coarse"))[1] < 10:
         found.append("the coarse picture is of one colour")
     page.value("home.click(); globalThis.seen = JSON.stringify(regradePage.view.save()); 0")
     page.call("Input.dispatchKeyEvent", type="keyDown", key="ArrowRight")
@@ -64,7 +64,7 @@ def check_coarse_first(browser, path):
         found.append("the coarse scene stays")
     page.value("regradePage.state.amount = [0, 0]; regradePage.changed(); 0")
     wait_until(page, "regradePage.painter.settled")
-    apart, spread = page.value(CANVAS % "coarse")
+    apart, spread = page.value(CANVAS.replace("NAME", "coarse"))
     print(f"  coarse picture: {apart:.0f} in mean square from the whole one, whose own colours spread by {spread:.0f}")
     if not 0 < apart < spread:
         found.append("the coarse picture is no better than one colour, or is not coarse")

@@ -20,7 +20,7 @@ RECORD = """(() => {
   const gl = new Proxy(g.gl, {get: (of, name) => typeof of[name] !== 'function' ? of[name] : (where, ...rest) => {
     if (name.startsWith('uniform')) uniforms.push([name, where, rest.map((r) => typeof r === 'object' ? [...r] : r)]);
   }});
-  const own = Object.create(g, {gl: {value: gl}, march: {value: {program: null, at: (name) => name}}, bind: {value: (_, name, unit, texture) => {
+  const own = Object.create(g, {gl: {value: gl}, marchOf: {value: () => ({program: null, sets: 1, checked: true, at: (name) => name})}, bind: {value: (_, name, unit, texture) => {
     if (!known.includes(texture)) known.push(texture);
     textures.push([name, unit, known.indexOf(texture)]);
   }}});
@@ -30,7 +30,7 @@ RECORD = """(() => {
   return {uniforms, textures};
 })()"""
 
-SOURCES = "(() => { const {gl, march} = regradePage.graphics; return gl.getAttachedShaders(march.program).map((s) => gl.getShaderSource(s)) })()"
+SOURCES = "(() => { const {scene, graphics} = regradePage, {gl} = graphics; return gl.getAttachedShaders(graphics.marchOf(scene, 1).program).map((s) => gl.getShaderSource(s)) })()"
 
 # Rows of a texture in base64.
 ROWS = """(() => {

@@ -1,36 +1,32 @@
 // The field of a page as the textures that hold it; runs in a worker, or where there are none in slices.
 
-// Cells' corners as 16-bit numbers within blocks of 2^shift cells: each block has its own copy of the voxels that it needs, so
-// a few voxels are there twice. `order`: of the cells in the tree; voxel `voxels` is the empty one.
-// -> {corner: a texel a cell, base [blocks], shift, voxel: of each slot}
+const BLOCK = 10;  // cells that share a base, logarithm; march.glsl's, too
+
+// Cells' corners as 16-bit numbers of slots, from the base of their block on. A base is as far back as a block's new slots
+// allow, at most 8 a cell; a voxel whose slot is farther back gets another one, so a few are there twice. `order`: of the
+// cells in the tree; voxel `voxels` is the empty one.
+// -> {corner: a texel a cell, base [blocks], voxel: of each slot}
 function cornersOf(corner, order, voxels) {
-  const cells = order.length, words = new Uint32Array(4 * cells), slot = new Int32Array(voxels + 1), own = new Uint32Array(8);
-  let voxel = new Int32Array(voxels + (voxels >> 3) + 16);
-  for (let shift = 16;; --shift) {
-    const base = [];
-    let count = 0, begin = 0, cell = 0;
-    slot.fill(-1);
-    for (; cell < cells && count - begin <= 65536; ++cell) {
-      if ((cell & (1 << shift) - 1) === 0) base.push(begin = count);
-      if (count + 8 > voxel.length) {
-        const longer = new Int32Array(2 * count + 16);
-        longer.set(voxel);
-        voxel = longer;
-      }
-      for (let k = 0, from = 8 * order[cell]; k < 8; ++k) {
-        const v = corner[from + k];
-        let s = slot[v];
-        if (s < begin) {
-          s = slot[v] = count;
-          voxel[count++] = v;
-        }
-        own[k] = s - begin;
-      }
-      for (let k = 0; k < 4; ++k) words[4 * cell + k] = own[2 * k] | own[2 * k + 1] << 16;
+  const cells = order.length, words = new Uint32Array(4 * cells), slot = new Int32Array(voxels + 1).fill(-1), base = [];
+  let voxel = new Int32Array(voxels + (voxels >> 4) + 16), count = 0, begin = 0;
+  for (let cell = 0, at = 0; cell < cells; ++cell) {
+    if ((cell & (1 << BLOCK) - 1) === 0) base.push(begin = Math.max(0, count + (8 << BLOCK) - 65536));
+    if (count + 8 > voxel.length) {
+      const longer = new Int32Array(2 * count + 16);
+      longer.set(voxel);
+      voxel = longer;
     }
-    // Blocks of 2^13 cells have no more than 2^16 corners.
-    if (count - begin <= 65536) return {corner: words, base: Int32Array.from(base), shift, voxel: voxel.slice(0, count)};
+    for (let k = 0, from = 8 * order[cell]; k < 8; k += 2, ++at)
+      for (let half = 0; half < 2; ++half) {
+        const v = corner[from + k + half];
+        if (slot[v] < begin) {
+          voxel[count] = v;
+          slot[v] = count++;
+        }
+        words[at] |= slot[v] - begin << 16 * half;
+      }
   }
+  return {corner: words, base: Int32Array.from(base), voxel: voxel.slice(0, count)};
 }
 
 // `text`: of the sections places (tree or mask), density and color. Calls progress(part).
@@ -58,8 +54,8 @@ async function decodeField(header, text, progress) {
   const rootOfWidth = Array.from({length: 32}, (_, log2) => 2 ** (-0.5 * log2));
   const {tree, order} = packedTree(places, (i) => i < n ? number[i] * rootOfWidth[width[i]] : 0);
   await progress(0.5);
-  const {corner, base, shift, voxel} = cornersOf(places.corner, order, n), slots = voxel.length;
-  const made = {top: places.top, finest: places.finest, cells: order.length, voxels: n, shift, tree, corner, base, voxel};
+  const {corner, base, voxel} = cornersOf(places.corner, order, n), slots = voxel.length;
+  const made = {top: places.top, finest: places.finest, cells: order.length, voxels: n, tree, corner, base, voxel};
   places = null;
   await progress(0.6);
 

@@ -231,7 +231,9 @@ async function start(page) {
         take(path.at(state.playing));
       }
     }
-    painter.step();
+    // Programs that will be wanted are made when there is nothing to draw.
+    if (!painter.step() && !graphics.prepare(scene, view.at(1, 1), {header}, 1) && header.styles.length > 0)
+      graphics.prepare(scene, view.at(1, 1), {header}, 3);
     requestAnimationFrame(run);
   };
   run();

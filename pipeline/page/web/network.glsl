@@ -5,7 +5,9 @@ precision highp int;
 precision highp usampler2D;
 precision highp isampler2D;
 
-uniform usampler2D uColor, uPlace;    // a voxel's numbers, or a sphere's texel, and its place
+uniform usampler2D uColor;            // a voxel's numbers, or a sphere's texel
+uniform usampler2D uPlace, uResidual; // of a strip that begins at row uRow: places of voxels, and see unpackResidual
+uniform int uRow;
 uniform isampler2D uPlaceOfColumn;    // of the spheres' columns
 uniform mat3 uOpponent[2];            // of the source and the style, see color_code.js
 uniform vec3 uHarmonics[54], uStepOf[18];
@@ -15,7 +17,6 @@ uniform vec3 uPosition;               // the place's unit: 2 / voxels
 uniform vec3 uConstant;               // of the colour map
 uniform mat3 uBase;
 uniform float uOmega, uPositionScale;
-uniform usampler2D uResidual;         // see unpackResidual
 uniform vec3 uResidualScale;
 uniform int uHasResidual, uActivation, uOnSpheres, uLayers, uResolution;
 layout(std140) uniform Layer0 { mat4 w0[128]; };
@@ -55,7 +56,7 @@ void main() {
     float latitude = (0.5 - float(texel % uResolution) / float(uResolution)) * 3.14159265358979324;
     place = vec3(cos(latitude) * sin(longitude), sin(latitude), cos(latitude) * cos(longitude));
   } else {
-    uvec2 p = texelFetch(uPlace, at, 0).xy;
+    uvec2 p = texelFetch(uPlace, at - ivec2(0, uRow), 0).xy;
     if (p.y >> 31 == 1u) {  // the empty voxel stays so
       color = uvec4(0u);
       return;
@@ -108,7 +109,7 @@ void main() {
     for (int c = 0; c < 3; ++c) r[9 * c + k] += mapped[c];
   }
   if (uHasResidual == 1) {  // see EQ(view-scale) and EQ(style-mix)
-    uvec2 added = texelFetch(uResidual, at, 0).xy;
+    uvec2 added = texelFetch(uResidual, at - ivec2(0, uRow), 0).xy;
     float weight = float(added.x >> 24) / 255.0;
     for (int c = 0; c < 3; ++c) {
       r[9 * c] += (float(added.x >> (8 * c) & 255u) - 128.0) * uResidualScale[c];

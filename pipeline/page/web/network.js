@@ -1,5 +1,6 @@
 // A style: its network's weights, and the pass that sends each voxel through it.
 
+const STRIP = 256;  // rows of a pass, at most
 const LAYERS = [[30, 64], [64, 64], [64, 64], [64, 64], [64, 64], [64, 27]];
 
 // Of each layer: weights [inputs, outputs], outputs padded to a multiple of 4.
@@ -43,7 +44,7 @@ async function inSlots(scene, data, words) {
 // Colours of a style, to draw the scene with; `codes`: the words of its voxels, if they are known.
 async function styleColors(graphics, scene, style, id, progress, codes = null) {
   const gl = graphics.gl;
-  graphics.network ??= compile(gl, [[gl.VERTEX_SHADER, EVERY_PIXEL], [gl.FRAGMENT_SHADER, withCode(NETWORK_GLSL)]]);
+  graphics.network ??= check(gl, compile(gl, [[gl.VERTEX_SHADER, EVERY_PIXEL], [gl.FRAGMENT_SHADER, withCode(NETWORK_GLSL)]]));
   const p = graphics.network, layers = await loadWeights(id), buffers = buffersOf(graphics, layers);
   const names = ['Layer0', 'Layer1', 'Layer2', 'Layer3', 'Layer4', 'Layer5', 'Biases'];
   const {source} = scene, {height} = source.color;
@@ -54,7 +55,8 @@ async function styleColors(graphics, scene, style, id, progress, codes = null) {
   colors.color = codes ? graphics.texture('u4', await inSlots(scene, new Uint32Array(codes.buffer), 4)) : graphics.blank('u4', height);
   const framebuffer = gl.createFramebuffer();
   const place = codes ? null : await asWords(scene.kept.place);
-  const added = residual && graphics.texture('u2', residual), placeTexture = place && graphics.texture('u2', place);
+  // Of what goes with the voxels no more than a strip is on the graphics processor.
+  const beside = [['uPlace', place], ['uResidual', residual]].map(([name, data]) => ({name, data, texture: data && graphics.blank('u2', STRIP)}));
 
   // False if it would take long and `mayLeave` is set.
   async function pass(target, onSpheres, from, mayLeave) {
@@ -73,12 +75,15 @@ async function styleColors(graphics, scene, style, id, progress, codes = null) {
         gl.uniformBlockBinding(p.program, gl.getUniformBlockIndex(p.program, names[i]), i);
         gl.bindBufferBase(gl.UNIFORM_BUFFER, i, buffer.buffer);
       });
+      graphics.bind(p, 'uPlaceOfColumn', 1, scene.placeOfColumn ?? graphics.empty.i);
+      beside.forEach(({name, data, texture}, i) => {
+        if (data && onSpheres !== 1) graphics.write(texture, data.subarray(2 * WIDTH * y, 2 * WIDTH * (y + rows)));
+        graphics.bind(p, name, 2 + i, texture ?? graphics.empty.p);
+      });
       graphics.bind(p, 'uColor', 0, from);
-      graphics.bind(p, 'uPlace', 1, placeTexture ?? graphics.empty.p);
-      graphics.bind(p, 'uPlaceOfColumn', 2, scene.placeOfColumn ?? graphics.empty.i);
-      graphics.bind(p, 'uResidual', 3, added ?? graphics.empty.p);
       gl.uniform3fv(p.at('uResidualScale'), style.residual?.scale ?? [0, 0, 0]);
-      gl.uniform1i(p.at('uHasResidual'), added && onSpheres !== 1 ? 1 : 0);
+      gl.uniform1i(p.at('uHasResidual'), residual && onSpheres !== 1 ? 1 : 0);
+      gl.uniform1i(p.at('uRow'), y);
       graphics.setCodes(p, [source.code, colors.code]);
       gl.uniform3fv(p.at('uSphereScale'), source.texelScale);
       gl.uniform3fv(p.at('uStyledSphereScale'), colors.texelScale);
@@ -103,7 +108,7 @@ async function styleColors(graphics, scene, style, id, progress, codes = null) {
       y += rows;
       progress(Math.min(1, y / height));
       const took = performance.now() - begun;
-      if (strips > 0) rows = Math.max(1, Math.min(256, took < 40 ? 2 * rows : took > 120 ? rows >> 1 : rows));
+      if (strips > 0) rows = Math.max(1, Math.min(STRIP, took < 40 ? 2 * rows : took > 120 ? rows >> 1 : rows));
       await wait();
     }
     return true;
@@ -111,9 +116,7 @@ async function styleColors(graphics, scene, style, id, progress, codes = null) {
   const fast = !codes && (graphics.onCores !== true || !workersRun) &&
       await pass(colors.color, scene.header.finest === null ? 2 : 0, source.color, workersRun);
   if (!codes) graphics.onCores = !fast;
-  if (placeTexture) graphics.free(placeTexture);
   if (!codes && !fast) await restyleOnCores(graphics, scene, style, layers, {place, residual}, colors, progress);
-  if (added) graphics.free(added);
   if (source.texel && style.residual?.weight) {  // what is not of the object stays
     Object.assign(colors, {texel: source.texel, texelScale: source.texelScale});
   } else if (source.texel) {
@@ -121,6 +124,7 @@ async function styleColors(graphics, scene, style, id, progress, codes = null) {
     await pass(colors.texel, 1, source.texel, false);
   }
   gl.deleteFramebuffer(framebuffer);
+  beside.forEach(({texture}) => texture && graphics.free(texture));
   buffers.forEach((buffer) => graphics.freeBuffer(buffer));
   return colors;
 }

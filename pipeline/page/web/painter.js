@@ -3,7 +3,7 @@
 class Painter {
   constructor(canvas, graphics, scene, pictureOf) {
     Object.assign(this, {canvas, graphics, scene, pictureOf});
-    this.steps = {moving: 1 / 9, rest: 1 / 17};  // of opacity, a colour for each
+    this.steps = {moving: 1 / 9, rest: 1 / 28};  // of opacity, a colour for each
     this.part = 0.5;        // of the canvas's side while moving
     this.rows = 16;         // of a strip
     this.changed = true;

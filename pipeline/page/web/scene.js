@@ -55,21 +55,24 @@ async function decodedByWorker(task, progress) {
 }
 
 // What only networks need waits outside the script's memory.
-const kept = (data) => new Blob([data]);
 const asWords = async (blob) => new Uint32Array(await blob.arrayBuffer());
 const asNumbers = async (blob) => new Int32Array(await blob.arrayBuffer());
 
 function sceneOf(header, made, graphics) {
-  const {top, finest, cells, voxels, shift, positionUnit} = made, slots = made.voxel.length;
-  const scene = {header, top, finest, cells, voxels, slots, shift, positionUnit};
+  const {top, finest, cells, voxels, positionUnit} = made, slots = made.voxel.length;
+  const scene = {header, top, finest, cells, voxels, slots, positionUnit};
   scene.unit = Math.max(...[0, 1, 2].map((a) => 2 * header.radius[a] / header.resolution[a]));
-  for (const [name, kind] of [['tree', 'u4'], ['corner', 'u4'], ['base', 'i1']]) {
+  for (const [name, kind] of [['tree', 'u4'], ['corner', 'u4'], ['base', 'i1'], ['color', 'u4']]) {
     scene[name] = graphics.texture(kind, made[name]);
+    made[name] = null;  // whoever made it may keep it for long
+  }
+  scene.source = {color: scene.color, code: header.color, texelScale: [1, 1, 1], background: header.background};
+  scene.kept = {};
+  for (const name of ['place', 'voxel', 'earlier']) {
+    scene.kept[name] = new Blob([made[name]]);
     made[name] = null;
   }
-  scene.source = {color: graphics.texture('u4', made.color), code: header.color, texelScale: [1, 1, 1], background: header.background};
-  scene.kept = {place: kept(made.place), voxel: kept(made.voxel), earlier: kept(made.earlier)};
-  scene.free = () => [scene.tree, scene.corner, scene.base, scene.source.color].forEach((texture) => graphics.free(texture));
+  scene.free = () => [scene.tree, scene.corner, scene.base, scene.color].forEach((texture) => graphics.free(texture));
   return scene;
 }
 
