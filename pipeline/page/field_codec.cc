@@ -7,6 +7,7 @@
 #include "kernels/base/error.h"
 #include "kernels/base/half.h"
 #include "pipeline/files/deflate.h"
+#include "pipeline/page/color_code.h"
 #include "pipeline/page/page_order.h"
 #include "pipeline/page/sphere_order.h"
 #include "pipeline/page/value_codec.h"
@@ -54,7 +55,35 @@ std::string SectionBytes(const PageField& page, const char* name, uint64_t max_b
   throw InputError("is missing", name);
 }
 
-// The colours of a group of points: "color" or "sphere_color".
+void EncodeVoxelColors(const std::vector<float>& values, int basis,
+                       const std::vector<EarlierVoxels>& earlier, double step, PageField* page) {
+  const ColorCode code =
+      FitColorCode(Differences(values, 3 * basis, earlier), values, basis, step);
+  AddSection("color", PackNumbers(NumbersOf(values, code, basis), 3 * basis, earlier), page);
+  page->header["color"] = JsonOf(code);
+}
+
+// [V, 3, basis]
+std::vector<float> DecodeVoxelColors(const PageField& page, int basis,
+                                     const std::vector<EarlierVoxels>& earlier) {
+  const ColorCode code = ColorCodeOf(page.header.At("color"));
+  const size_t channels = static_cast<size_t>(3 * basis), n = earlier.size();
+  const std::vector<int16_t> numbers = UnpackNumbers(
+      SectionBytes(page, "color", 2 * channels * n), static_cast<int>(channels), earlier);
+  for (size_t c = 0; c < channels; ++c) {
+    const int limit = code.limit(static_cast<int>(c) / basis * kCodeHarmonics +
+                                 static_cast<int>(c) % basis);
+    for (size_t i = 0; i < n; ++i)
+      if (std::abs(numbers[c * n + i]) > limit)
+        throw InputError("a number has more bits than it may have", "color");
+  }
+  std::vector<float> values = ValuesOf(numbers, code, basis);
+  for (const float value : values)
+    if (!std::isfinite(value)) throw InputError("a coefficient is not finite", "color");
+  return values;
+}
+
+// The colours of background spheres.
 void EncodeColors(const std::vector<float>& values, int channels,
                   const std::vector<EarlierVoxels>& earlier, double step, const char* name,
                   PageField* page) {
@@ -225,7 +254,7 @@ PageField EncodeField(const RadianceField& field, double step) {
       {"step", double{field.step}}};
   AddSection(on_cells ? "tree" : "mask", places, &page);
   AddSection("density", PackNumbers(density, 1, order.earlier), &page);
-  EncodeColors(color, channels, order.earlier, step, "color", &page);
+  EncodeVoxelColors(color, field.appearance.basis, order.earlier, step, &page);
   EncodeSpheres(field, &page);
   return page;
 }
@@ -262,7 +291,8 @@ RadianceField DecodeField(const PageField& page) {
   const int channels = field.appearance.stride();
   const std::vector<int16_t> density =
       UnpackNumbers(SectionBytes(page, "density", 2 * order.place.size()), 1, order.earlier);
-  const std::vector<float> color = DecodeColors(page, channels, order.earlier, "color");
+  const std::vector<float> color =
+      DecodeVoxelColors(page, field.appearance.basis, order.earlier);
   on_cells ? MakeCells(order, finest, geometry.get()) : MakeLinks(order, geometry.get());
   const double unit = VoxelWidth(frame);
   const auto n = static_cast<int64_t>(order.place.size());

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <optional>
 #include <utility>
 
 #include "kernels/base/error.h"
@@ -15,6 +16,7 @@
 #include "pipeline/fields/residual_file.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/page/check_page.h"
+#include "pipeline/page/coarse_field.h"
 #include "pipeline/page/keyframes.h"
 #include "pipeline/page/page_file.h"
 #include "pipeline/run/run_file.h"
@@ -117,6 +119,8 @@ MadePage MakePage(const std::string& folder, const std::vector<std::string>& sty
                                  .InField(stored.field_from_world, stored.ndc);
   PageContent content;
   content.field = EncodeField(stored.field, options.step);
+  if (const std::optional<RadianceField> coarse = CoarseField(stored.field))
+    content.coarse = EncodeField(*coarse, options.step);
   RadianceField page = DecodeField(content.field);
   std::vector<int> chosen;
   const int count = std::min(views.count(), kMostPhotos);
@@ -167,6 +171,7 @@ MadePage MakePage(const std::string& folder, const std::vector<std::string>& sty
   made.field = std::move(page);
   made.voxels = content.field.header.At("voxels").AsInt();
   made.field_bytes = InText(content.field.bytes());
+  if (content.coarse) made.coarse_bytes = InText(content.coarse->bytes());
   for (const PageStyle& style : content.styles)
     made.style_bytes.push_back(InText(style.packed.size()) + InText(style.residual.size()));
   return made;

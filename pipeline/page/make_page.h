@@ -33,6 +33,7 @@ struct PageOptions {
 struct MadePage {
   std::string html;
   int64_t voxels = 0, field_bytes = 0;  // in the text of the page
+  int64_t coarse_bytes = 0;             // of what is shown first
   std::vector<int64_t> style_bytes;
   std::vector<std::string> report;  // lines of --check
   RadianceField field;              // as the page has it

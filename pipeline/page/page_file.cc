@@ -51,6 +51,7 @@ JsonValue Header(const PageContent& content, const PageCheck* check) {
   header["ndc"] =
       first.ndc.on() ? JsonValue(JsonValue::Array{first.ndc.a, first.ndc.b}) : JsonValue();
   if (header.Find("spheres") == nullptr) header["spheres"] = JsonValue();
+  header["coarse"] = content.coarse ? content.coarse->header : JsonValue();
   header["home"] = content.home;
   Vec3d up{};
   JsonValue::Array cameras;
@@ -85,7 +86,7 @@ JsonValue Header(const PageContent& content, const PageCheck* check) {
 
 std::string PagePolicy(const std::string& scripts, bool served) {
   return "default-src 'none'; base-uri 'none'; form-action 'none'; img-src data:; worker-src "
-         "blob:; script-src " +
+         "blob:; script-src 'wasm-unsafe-eval' " +
          scripts + "; style-src " + PolicyHash(kPageCssHash) +
          (served ? "; connect-src 'self'" : "");
 }
@@ -108,6 +109,9 @@ std::string PageHtml(const PageContent& content, const PageCheck* check) {
     sections += "<script type=\"application/octet-stream\" id=\"" + name + "\">" +
                 Base64(packed) + "</script>\n";
   };
+  if (content.coarse)
+    for (const PageSection& section : content.coarse->sections)
+      add("coarse_" + section.name, section.packed);
   for (const PageSection& section : content.field.sections) add(section.name, section.packed);
   for (size_t i = 0; i < content.styles.size(); ++i)
     add("network_" + std::to_string(i), content.styles[i].packed);

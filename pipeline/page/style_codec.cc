@@ -1,5 +1,7 @@
 #include "pipeline/page/style_codec.h"
 
+#include <algorithm>
+#include <cmath>
 #include <utility>
 #include <vector>
 
@@ -7,6 +9,7 @@
 #include "kernels/field/pad_sh_basis.h"
 #include "kernels/network/fused_mlp.h"
 #include "pipeline/files/deflate.h"
+#include "pipeline/page/color_code.h"
 #include "pipeline/page/value_codec.h"
 #include "stylize/field/apply_network.h"
 #include "stylize/field/base_map.h"
@@ -35,17 +38,34 @@ std::vector<double> RoundToCodes(Buffer<float>* values, int channels) {
   return scale;
 }
 
+// About the opacity of each voxel: what little of it is seen may be rounded more coarsely.
+std::vector<float> Opacities(const Geometry& geometry) {
+  const Vec3f scale = geometry.frame.Scale();
+  const double width = 1 / double{std::min({scale.x, scale.y, scale.z})};
+  std::vector<float> opacity;
+  for (const float density : geometry.density)
+    opacity.push_back(
+        static_cast<float>(1.01 - std::exp(-std::max(0.0, double{density}) * width)));
+  return opacity;
+}
+
+ColorCode RoundToWords(const std::vector<float>& weight, Buffer<float>* sh) {
+  const std::vector<float> values(sh->begin(), sh->end());
+  std::vector<float> spread = values;
+  const size_t channels = values.size() / std::max<size_t>(weight.size(), 1);
+  for (size_t i = 0; i < spread.size(); ++i) spread[i] *= std::sqrt(weight[i / channels]);
+  const ColorCode code = FitColorCode(spread, values, kStyledBasis, 0, weight);
+  const std::vector<float> rounded =
+      ValuesOf(NumbersOf(values, code, kStyledBasis), code, kStyledBasis);
+  std::copy(rounded.begin(), rounded.end(), sh->begin());
+  return code;
+}
+
 JsonValue::Array ArrayOf(const std::vector<double>& values) {
   return {values.begin(), values.end()};
 }
 
 }  // namespace
-
-Coded RoundToCodes(RadianceField* field) {
-  Appearance& appearance = field->appearance;
-  return {RoundToCodes(&appearance.sh, appearance.stride()),
-          RoundToCodes(&appearance.sphere_color, 3)};
-}
 
 PageStyle EncodeStyle(const StoredNetwork& stored, const RadianceField& page, double strength) {
   return EncodeStyle(stored, page, strength, {}, {});
@@ -81,7 +101,9 @@ PageStyle EncodeStyle(const StoredNetwork& stored, const RadianceField& page, do
     style.residual = std::move(packed.packed);
     residual = std::move(packed.header);
   }
-  const Coded coded = RoundToCodes(&style.styled);
+  const ColorCode code =
+      RoundToWords(Opacities(*page.geometry), &style.styled.appearance.sh);
+  const std::vector<double> sphere_scale = RoundToCodes(&style.styled.appearance.sphere_color, 3);
   const RowMap base = BaseOf(data);
   JsonValue::Array matrix;
   for (int r = 0; r < 3; ++r)
@@ -94,8 +116,8 @@ PageStyle EncodeStyle(const StoredNetwork& stored, const RadianceField& page, do
                                    {"position_scale", double{data.position_scale}},
                                    {"base", std::move(matrix)},
                                    {"constant", array(base.constant)},
-                                   {"scale", ArrayOf(coded.scale)},
-                                   {"sphere_scale", ArrayOf(coded.sphere_scale)},
+                                   {"color", JsonOf(code)},
+                                   {"sphere_scale", ArrayOf(sphere_scale)},
                                    {"background", array(style.styled.background)},
                                    {"residual", std::move(residual)},
                                    {"strength", strength},
@@ -104,18 +126,17 @@ PageStyle EncodeStyle(const StoredNetwork& stored, const RadianceField& page, do
   return style;
 }
 
-std::string StyledCodes(const PageStyle& style, const std::vector<int64_t>& voxels) {
+std::string StyledWords(const PageStyle& style, const std::vector<int64_t>& voxels) {
   const Appearance& appearance = style.styled.appearance;
   const int channels = appearance.stride();
-  std::vector<double> scale;
-  for (const JsonValue& s : style.header.At("scale").AsArray()) scale.push_back(s.AsDouble());
-  std::string codes;
-  codes.reserve(voxels.size() * scale.size());
-  for (const int64_t voxel : voxels)
-    for (int j = 0; j < channels; ++j)
-      codes.push_back(static_cast<char>(
-          CodeOf(appearance.sh[voxel * channels + j], scale[static_cast<size_t>(j)])));
-  return codes;
+  std::vector<float> values;
+  values.reserve(voxels.size() * static_cast<size_t>(channels));
+  for (const int64_t voxel : voxels) {
+    const float* const sh = appearance.sh.data() + voxel * channels;
+    values.insert(values.end(), sh, sh + channels);
+  }
+  const ColorCode code = ColorCodeOf(style.header.At("color"));
+  return WordsOf(NumbersOf(values, code, kStyledBasis), code);
 }
 
 }  // namespace regrade

@@ -1,8 +1,8 @@
 // Packs a style for a page: its network, which the page sends the voxels through.
 //
 // The network's effective weights, [out, in] and biases, layer after layer, are stored as
-// halves: 20,379 of them. Scales of the styled coefficients' 8-bit codes are found when the
-// page is written, on the field as the page has it.
+// halves: 20,379 of them. The code of the styled coefficients (see EQ(page-color-code)) is found
+// when the page is written, on the field as the page has it.
 #pragma once
 
 #include <cstdint>
@@ -30,14 +30,8 @@ PageStyle EncodeStyle(const StoredNetwork& stored, const RadianceField& page, do
 PageStyle EncodeStyle(const StoredNetwork& stored, const RadianceField& page, double strength,
                       const StyleLayers& layers, const PageVoxels& places);
 
-// The styled coefficients as a page that has run the network holds them: 27 codes for each of
-// `voxels`, see VoxelsInPageOrder.
-std::string StyledCodes(const PageStyle& style, const std::vector<int64_t>& voxels);
-
-// A field whose coefficients are rounded to codes of 8 bits, with the scales of each channel.
-struct Coded {
-  std::vector<double> scale, sphere_scale;
-};
-Coded RoundToCodes(RadianceField* field);
+// The styled coefficients as a page that has run the network holds them: four words of 32 bits,
+// the lowest byte first, for each of `voxels`, see VoxelsInPageOrder.
+std::string StyledWords(const PageStyle& style, const std::vector<int64_t>& voxels);
 
 }  // namespace regrade

@@ -198,7 +198,7 @@ ViewSession::Served ViewSession::Serve(const StoredNetwork& network,
   PageStyle style = EncodeStyle(network, field_, 1);
   style.header["id"] = id;
   style.header["weights"] = Base64(style.packed);
-  return {DumpJson(style.header, -1), StyledCodes(style, voxels_)};
+  return {DumpJson(style.header, -1), StyledWords(style, voxels_)};
 }
 
 }  // namespace regrade

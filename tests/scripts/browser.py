@@ -178,17 +178,18 @@ class Page:
         return found
 
 
-def wait_until(page, expression):
-    end = time.monotonic() + WAIT_S
+def wait_until(page, expression, seconds=WAIT_S):
+    end = time.monotonic() + seconds
     while not page.value(expression):
         if time.monotonic() > end:
             raise RuntimeError("waited in vain for " + expression)
         time.sleep(0.03)
 
 
-def open_page(browser, path, size, before=None, scale=1):
+def open_page(browser, path, size, before=None, scale=1, seconds=600):
+    """The page once its whole scene is there."""
     page = Page(browser, path, size, before=before, scale=scale)
-    wait_until(page, "!!globalThis.regradePage && (!!regradePage.picture || /cannot/.test(message.textContent))")
+    wait_until(page, "!!globalThis.regradePage && (!!regradePage.picture || /cannot/.test(message.textContent))", seconds)
     return page
 
 

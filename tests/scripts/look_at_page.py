@@ -5,7 +5,8 @@
 
 FOLDER is write_scene_pages's: pages NAME.html with views and pixels in NAME.json. Checked of each page: its pictures, its style's bound,
 nothing asked of the network, nothing on the console (a violation of the page's policy is an error there), no scrolling
-sideways at the sizes of a phone and a desktop; of the first one, that keys and the slider change the picture. Everything
+sideways at the sizes of a phone and a desktop; of some, that a coarse picture comes first and that workers aren't needed; of the
+first one, that keys and the slider change the picture. Everything
 that keys can do is walk_page.py's, long use and damage strain_page.py's.
 --shots keeps pictures of the pages. Exit status 1 if anything is wrong, 77 if there is no Chromium.
 """
@@ -18,6 +19,7 @@ import sys
 
 from browser import FEW_PIXELS, SIZES, complaints, open_page, parsed, parser_of, running, status_of, wait_until
 from page_network import check_bound
+from page_opening import check_coarse_first, check_without_workers
 from page_pictures import compare_pictures
 
 
@@ -201,6 +203,8 @@ def check_folder(browser, arguments):
             here += complaints(page)
             found += [f"{name}, {size_name}: {complaint}" for complaint in here]
             page.close()
+        if number == 0 or name in ("uniform", "spheres"):
+            found += [f"{name}, opening: {c}" for c in check_coarse_first(browser, path) + check_without_workers(browser, path, views)]
         if number == 0 or name in ("uniform_near", "levels_residual"):
             found += [f"{name}, {c}" for c in check_cores(browser, path, views)]
     return found

@@ -9,10 +9,12 @@ if a picture or a pair of voxels is out of bounds, 77 if there is no Chromium.
 
 The bound of pairs of voxels x, y, with f of EQ(liprf-network) and bound K = ||A|| + R of EQ(liprf-bound):
   |F(x) - F(y)| <= (||A|| + R prod_l (1 + d_l / (s_l - d_l))) |x - y| + |c| + 2 e
-F is f with weights rounded to halves and results rounded to codes. A layer's weights W change by at most d = 2^-11 |W|_F,
-and 2^-25 each where they are below the smallest normal half; s <= ||W|| comes from power iterations. Rounding to codes of
-the scales c moves a result by at most c / 2 in each channel, and limits do not move two results apart. e is of the
-graphics processor's sine, 2^-11 in each of 64 values as Vulkan allows, through the layers that follow; of doubles it is 0.
+F is f with weights rounded to halves and results rounded to numbers. A layer's weights W change by at most d = 2^-11 |W|_F,
+and 2^-25 each where they are below the smallest normal half; s <= ||W|| comes from power iterations. Rounding to numbers
+of the steps c moves a result by at most c / 2 along each axis of an orthogonal transform, and limits do not move two results
+apart. e is of the
+graphics processor's sine, 2^-11 in each of 64 values as Vulkan allows, through the layers that follow; of single precision on
+cores, 2^-18: sums of 64 terms and a sine within 2^-22.
 """
 
 import glob
@@ -24,20 +26,28 @@ from browser import SIZES, complaints, open_page, parsed, parser_of, running, st
 from page_pictures import compare_pictures
 
 BOUND = """(async () => {
-  const p = regradePage, gl = p.graphics.gl, style = p.header.styles[0], {source} = p.scene, n = p.scene.voxels;
+  const p = regradePage, gl = p.graphics.gl, style = p.header.styles[0], {source} = p.scene, n = p.scene.slots;
   await p.load(0);
-  const framebuffer = gl.createFramebuffer(), rows = Math.ceil(n / 2048);
-  const codes = (texture) => {
+  const framebuffer = gl.createFramebuffer(), rows = Math.ceil(p.scene.slots / 2048);
+  const words = (texture) => {
     const data = new Uint32Array(4 * 2048 * rows);
     gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
     gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture.texture, 0);
     gl.readPixels(0, 0, 2048, rows, gl.RGBA_INTEGER, gl.UNSIGNED_INT, data);
     return data;
   };
-  const first = codes(source.first), second = codes(source.second), styled = p.colors[0];
-  const low = new Uint8Array(first.buffer), high = new Uint8Array(second.buffer);
-  const ownLow = new Uint8Array(codes(styled.first).buffer), ownHigh = new Uint8Array(codes(styled.second).buffer);
+  const styled = p.colors[0], before27 = words(source.color), after27 = words(styled.color);
+  const places = new Uint32Array(await p.scene.kept.place.arrayBuffer());
   gl.deleteFramebuffer(framebuffer);
+  // A voxel's numbers, times their steps: coefficients but for a rotation, which keeps distances.
+  const ORDER = [[0, 11, 4, 21, 14, 24, 17], [1, 18, 19, 6, 7, 16, 25], [9, 3, 12, 13, 22, 23, 26], [2, 10, 5, 20, 15, 8]];
+  const numbers = (data, code, i, to) => ORDER.forEach((list, w) => {
+    let word = data[4 * i + w];
+    for (const k of list) {
+      to[k] = (word >> 32 - code.bits[k]) * code.step[k];
+      word <<= code.bits[k];
+    }
+  });
 
   const packed = Uint8Array.from(atob(network_0.textContent), (c) => c.charCodeAt(0));
   const bytes = await new Response(new Blob([packed]).stream().pipeThrough(new DecompressionStream('deflate'))).arrayBuffer();
@@ -72,26 +82,29 @@ BOUND = """(async () => {
   const rounded = norms.reduce((all, {s, d}) => all * (1 + d / (s - d)), 1);
   const bound = base + (style.bound - base) * rounded;
   let sine = 0;
-  if (!p.graphics.onCores) for (let l = 1; l < 6; ++l) sine = (sine + 8 * 2 ** -11) * norms[l].s * (l < 5 ? style.omega : 1);
-  const allowed = Math.hypot(...style.scale) + 2 * sine;
+  const each = 8 * (p.graphics.onCores ? 2 ** -18 : 2 ** -11);
+  for (let l = 1; l < 6; ++l) sine = (sine + each) * norms[l].s * (l < 5 ? style.omega : 1);
+  const allowed = Math.hypot(...styled.code.step) + 2 * sine;
 
   const shift = p.header.finest === null ? 0.5 : 0, x = new Float64Array(30), y = new Float64Array(30);
   const features = (i, to) => {
-    for (let k = 0; k < 27; ++k) to[k] = ((k < 16 ? low[16 * i + k] : high[16 * i + k - 16]) - 128) * source.scale[k];
-    const b = second[4 * i + 3], place = [high[16 * i + 11] | (b & 31) << 8, b >>> 5 & 8191, b >>> 18 & 8191];
-    for (let a = 0; a < 3; ++a) to[27 + a] = ((place[a] + shift) * p.scene.positionUnit[a] - 1) * style.position_scale;
+    numbers(before27, source.code, i, to);
+    const a = places[2 * i], place = [a & 8191, a >>> 13, places[2 * i + 1]];
+    for (let k = 0; k < 3; ++k) to[27 + k] = ((place[k] + shift) * p.scene.positionUnit[k] - 1) * style.position_scale;
   };
+  const own = new Float64Array(27), other = new Float64Array(27);
   let over = 0, steepest = 0, closest = 0, pairs = 0;
   for (let i = 0; i < n; ++i) {
     features(i, x);
+    numbers(after27, styled.code, i, own);
     // The next voxel is near by, the other one anywhere.
     for (const j of [(i + 1) % n, (Math.imul(i + 1, 2654435761) >>> 0) % n]) {
       if (j === i) continue;
       features(j, y);
+      numbers(after27, styled.code, j, other);
       let before = 0, after = 0;
       for (let k = 0; k < 30; ++k) before += (x[k] - y[k]) ** 2;
-      for (let k = 0; k < 27; ++k)
-        after += ((k < 16 ? ownLow[16 * i + k] - ownLow[16 * j + k] : ownHigh[16 * i + k - 16] - ownHigh[16 * j + k - 16]) * style.scale[k]) ** 2;
+      for (let k = 0; k < 27; ++k) after += (own[k] - other[k]) ** 2;
       before = Math.sqrt(before);
       after = Math.sqrt(after);
       ++pairs;

@@ -4,8 +4,8 @@
   strain_page.py SCENE.html [--drags N] [--restyles N] [--pictures N] [--losses N] [--chromium PROGRAM]
 
 Checked: drags of a style's slider, styles in the place of each other, dropped pictures and lost graphics contexts take no
-memory that stays: objects and bytes on the graphics processor, counted at WebGL's own functions, elements of the page, and the
-heap after garbage collection; after a lost context the canvas has the same pixels, the styles, the picture and the path;
+memory that stays: objects and bytes on the graphics processor, counted at WebGL's own functions, which are those that the page
+states, elements of the page, and the heap after garbage collection; after a lost context the canvas has the same pixels, the styles, the picture and the path;
 damaged copies of the page say so. The page needs a style. Exit status 1 if anything is wrong, 77 if there is no Chromium.
 """
 
@@ -82,10 +82,10 @@ def memory(page):
         heap = page.call("Runtime.getHeapUsage")
         heaps.append(heap["usedSize"] + heap.get("embedderHeapUsedSize", 0) + heap.get("backingStorageSize", 0))
     # The picture while moving has as many pixels as there is time for.
-    gpu = page.value("(() => { const s = gpu.size(), c = regradePage.painter.coarse; return {objects: s.objects, "
-                     "bytes: s.bytes - 4 * c.width * c.height} })()")
-    return {"heap": min(heaps), "elements": page.value("document.querySelectorAll('*').length"), **gpu,
-            "own": page.value("regradePage.graphics.bytes")}
+    gpu = page.value("(() => { const s = gpu.size(), c = regradePage.painter.coarse, own = regradePage.graphics.bytes, moving = "
+                     "4 * c.width * c.height; return {objects: s.objects, bytes: s.bytes - moving, own: own - moving, "
+                     "all: s.bytes - moving} })()")
+    return {"heap": min(heaps), "elements": page.value("document.querySelectorAll('*').length"), **gpu}
 
 
 def check_growth(page, what, times, repeat):
@@ -98,6 +98,9 @@ def check_growth(page, what, times, repeat):
     print(f"  {2 * times} {what}: heap {before['heap'] / 1e6:.2f} and {after['heap'] / 1e6:.2f} MB, {after['objects']} objects of "
           f"{after['bytes'] / 1e6:.2f} MB on the graphics processor, {grown['objects']} and {grown['bytes']} bytes more")
     found = [f"{times} {what} leave {grown[name]} {name} behind" for name in ["objects", "bytes", "own", "elements"] if grown[name] > 0]
+    # What the page says in its panel is what WebGL was asked for.
+    if after["own"] != after["all"]:
+        found.append(f"after {what} the page counts {after['own']} bytes on the graphics processor, and there are {after['all']}")
     if grown["heap"] > NOISE_BYTES + LEAK_BYTES * times:
         found.append(f"{times} {what} leave {grown['heap']} bytes of the heap behind")
     return found
@@ -127,7 +130,7 @@ def lose(page, times):
         # The first word after the loss says what happens.
         wait_until(page, "/graphics processor was reset/.test(message.textContent)")
         page.value("lost.restoreContext()")
-        wait_until(page, "regradePage.graphics !== globalThis.graphics && regradePage.painter.settled && "
+        wait_until(page, "regradePage.graphics !== globalThis.graphics && !regradePage.painter.scene.coarse && regradePage.painter.settled && "
                          "regradePage.weights().every((w, i) => !(w > 0) || !!regradePage.colors[i]) && message.textContent === ''")
     page.value("globalThis.graphics = globalThis.lost = null; 0")
 

@@ -19,6 +19,7 @@
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/page/check_page.h"
+#include "pipeline/page/coarse_field.h"
 #include "pipeline/page/keyframes.h"
 #include "pipeline/page/make_page.h"
 #include "pipeline/page/page_file.h"
@@ -129,6 +130,9 @@ void WritePages(const std::string& folder, const std::string& name, const Radian
   PageContent content;
   content.cameras = CamerasOf(forward_facing);
   content.field = EncodeField(field, 0.03);
+  // Small fields would have none.
+  if (const auto coarse = CoarseField(field, {.most_part = 10}))
+    content.coarse = EncodeField(*coarse, 0.03);
   RadianceField page = DecodeField(content.field);
   const PageVoxels places = VoxelsInPageOrder(content.field, *page.geometry);
   StyleLayers layers;

@@ -2,60 +2,113 @@
 
 const WIDTH = 2048;  // of all textures
 
+// A program that may still be compiling; it must be checked before it draws.
 function compile(gl, sources) {
-  const program = gl.createProgram();
-  for (const [kind, source] of sources) {
+  const program = gl.createProgram(), shaders = sources.map(([kind, source]) => {
     const shader = gl.createShader(kind);
     gl.shaderSource(shader, source);
     gl.compileShader(shader);
-    if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS) && !gl.isContextLost())
-      throw new PageError('the graphics processor refuses a program: ' + gl.getShaderInfoLog(shader));
     gl.attachShader(program, shader);
-  }
+    return shader;
+  });
   gl.linkProgram(program);
-  if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost())
-    throw new PageError('the graphics processor refuses a program: ' + gl.getProgramInfoLog(program));
   const place = {};
-  return {program, at: (name) => place[name] ??= gl.getUniformLocation(program, name)};
+  return {program, shaders, at: (name) => place[name] ??= gl.getUniformLocation(program, name)};
+}
+
+function check(gl, made) {
+  if (made.checked || gl.isContextLost()) return made;
+  for (const shader of made.shaders)
+    if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS))
+      throw new PageError('the graphics processor refuses a program: ' + gl.getShaderInfoLog(shader));
+  if (!gl.getProgramParameter(made.program, gl.LINK_STATUS))
+    throw new PageError('the graphics processor refuses a program: ' + gl.getProgramInfoLog(made.program));
+  made.checked = true;
+  return made;
 }
 
 const EVERY_PIXEL = `#version 300 es
 void main() { gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0); }`;
 
+const withCode = (text) => text.replace('//@code', codeGlsl());
+
 class Graphics {
   constructor(gl) {
     this.gl = gl;
-    this.bytes = 0;
-    this.march = compile(gl, [[gl.VERTEX_SHADER, EVERY_PIXEL], [gl.FRAGMENT_SHADER, MARCH_GLSL]]);
+    this.bytes = this.most = 0;  // of all textures and buffers, now and so far
+    this.marches = {};
     this.empty = {u: this.texture('u4', new Uint32Array(4)), i: this.texture('i1', new Int32Array(1)),
                   p: this.texture('u2', new Uint32Array(2))};
     this.array = gl.createVertexArray();
   }
-  // 2048 texels a row; kinds: u4, u2, i1 are unsigned and signed integers of 32 bits.
-  texture(kind, data) {
-    const gl = this.gl, channels = Number(kind[1]), texels = data.length / channels;
-    const height = Math.max(1, Math.ceil(texels / WIDTH));
+  // The program that draws a kind of scene, with one set of colours or three: without what it has no use for, since some
+  // processors take seconds to compile.
+  marchOf({header}, count) {
+    const gl = this.gl, sets = count > 1 ? 3 : 1;
+    const parts = `#define CELLS ${header.finest === null ? 0 : 1}\n#define SPHERES ${header.spheres ? 1 : 0}\n#define SETS ${sets}\n`;
+    return this.marches[parts] ??= {sets, warm: false, ...compile(gl, [
+      [gl.VERTEX_SHADER, EVERY_PIXEL], [gl.FRAGMENT_SHADER, withCode(MARCH_GLSL).replace('\n', '\n' + parts)]])};
+  }
+  // Prepares the program of another scene, or of more sets, by drawing a pixel of this one with it. False if there is nothing to do.
+  prepare(scene, view, kind, count) {
+    const gl = this.gl, program = this.marchOf(kind, count);
+    if (program.warm) return false;
+    const compiling = gl.getExtension('KHR_parallel_shader_compile');
+    if (compiling && !gl.getProgramParameter(program.program, compiling.COMPLETION_STATUS_KHR)) return true;
+    const target = this.target(1, 1);
+    this.draw(scene, view, [{weight: 1, colors: scene.source}], null, target, {x: 0, y: 0, width: 1, height: 1}, 1, false, program);
+    gl.flush();
+    target.free();
+    return true;
+  }
+  // 2048 texels a row, zeros; kinds: u4, u2, i1 are unsigned and signed integers of 32 bits.
+  blank(kind, height) {
+    const gl = this.gl;
     if (height > gl.getParameter(gl.MAX_TEXTURE_SIZE))
       throw new PageError('this scene has more voxels than this graphics processor can hold');
-    const [inside, format, type] = {
-      u4: [gl.RGBA32UI, gl.RGBA_INTEGER, gl.UNSIGNED_INT],
-      u2: [gl.RG32UI, gl.RG_INTEGER, gl.UNSIGNED_INT],
-      i1: [gl.R32I, gl.RED_INTEGER, gl.INT]}[kind];
-    const texture = gl.createTexture();
+    const inside = {u4: gl.RGBA32UI, u2: gl.RG32UI, i1: gl.R32I}[kind], texture = gl.createTexture();
     gl.bindTexture(gl.TEXTURE_2D, texture);
     gl.texStorage2D(gl.TEXTURE_2D, 1, inside, WIDTH, height);
     for (const side of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER])
       gl.texParameteri(gl.TEXTURE_2D, side, gl.NEAREST);
+    return this.taken({texture, height, kind, bytes: WIDTH * height * 4 * Number(kind[1])});
+  }
+  texture(kind, data) {
+    const texels = data.length / Number(kind[1]);
+    const made = this.blank(kind, Math.max(1, Math.ceil(texels / WIDTH)));
+    this.write(made, data);
+    return made;
+  }
+  // Into its first rows.
+  write({texture, kind}, data) {
+    const gl = this.gl, channels = Number(kind[1]), texels = data.length / channels;
+    gl.activeTexture(gl.TEXTURE0);
+    gl.bindTexture(gl.TEXTURE_2D, texture);
+    const [format, type] = {u4: [gl.RGBA_INTEGER, gl.UNSIGNED_INT], u2: [gl.RG_INTEGER, gl.UNSIGNED_INT],
+                            i1: [gl.RED_INTEGER, gl.INT]}[kind];
     const whole = Math.floor(texels / WIDTH), rest = texels % WIDTH;
     if (whole) gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, WIDTH, whole, format, type, data, 0);
     if (rest) gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, whole, rest, 1, format, type, data, whole * WIDTH * channels);
-    this.bytes += WIDTH * height * 4 * channels;
-    return {texture, height, kind, bytes: WIDTH * height * 4 * channels};
   }
-  blank(kind, height) { return this.texture(kind, new Uint32Array(WIDTH * height * Number(kind[1]))); }
+  taken(thing) {
+    this.bytes += thing.bytes;
+    this.most = Math.max(this.most, this.bytes);
+    return thing;
+  }
   free(texture) {
     this.gl.deleteTexture(texture.texture);
     this.bytes -= texture.bytes;
+  }
+  // Of uniforms.
+  buffer(data) {
+    const gl = this.gl, buffer = gl.createBuffer();
+    gl.bindBuffer(gl.UNIFORM_BUFFER, buffer);
+    gl.bufferData(gl.UNIFORM_BUFFER, data, gl.STATIC_DRAW);
+    return this.taken({buffer, bytes: data.byteLength});
+  }
+  freeBuffer(buffer) {
+    this.gl.deleteBuffer(buffer.buffer);
+    this.bytes -= buffer.bytes;
   }
   bind(program, name, unit, texture) {
     const gl = this.gl;
@@ -64,24 +117,32 @@ class Graphics {
     gl.uniform1i(program.at(name), unit);
   }
 
+  setCodes(program, codes) {
+    const gl = this.gl;
+    gl.uniformMatrix3fv(program.at('uOpponent'), false, codes.flatMap((c) => c.opponent));
+    gl.uniform3fv(program.at('uHarmonics'), codes.flatMap((c) => c.harmonics));
+    gl.uniform3fv(program.at('uStepOf'), codes.flatMap(stepsInOrder));
+    gl.uniform4iv(program.at('uBits'), codes.flatMap(bitsInOrder));
+  }
+
   // `sets`: {weight, colors, background} of at most three; `view`: see camera.js.
-  draw(scene, view, sets, map, target, strip, opacityStep, count) {
-    const gl = this.gl, p = this.march, h = scene.header, u = (name) => p.at(name);
+  draw(scene, view, sets, map, target, strip, opacityStep, count, program = this.marchOf(scene, sets.length)) {
+    const gl = this.gl, p = check(gl, program), h = scene.header, u = (name) => p.at(name);
+    p.warm = true;
     gl.useProgram(p.program);
     gl.bindVertexArray(this.array);
     this.bind(p, 'uTree', 0, scene.tree);
-    this.bind(p, 'uCorner', 2, scene.corner);
+    this.bind(p, 'uCorner', 1, scene.corner);
+    this.bind(p, 'uBase', 2, scene.base);
     this.bind(p, 'uColumn', 9, scene.column ?? this.empty.i);
-    const scale = new Float32Array(81), texel = new Float32Array(9), weight = [0, 0, 0];
+    const texel = new Float32Array(9), weight = [0, 0, 0];
     const background = [0, 0, 0];
     for (let i = 0; i < 3; ++i) {
       const set = sets[i];
-      this.bind(p, 'uFirst' + i, 3 + 2 * i, set?.colors.first ?? this.empty.u);
-      this.bind(p, 'uSecond' + i, 4 + 2 * i, set?.colors.second ?? this.empty.u);
+      this.bind(p, 'uColor' + i, 3 + i, set?.colors.color ?? this.empty.u);
       this.bind(p, 'uTexel' + i, 10 + i, set?.colors.texel ?? this.empty.p);
       if (!set) continue;
       weight[i] = set.weight;
-      scale.set(set.colors.scale, 27 * i);
       texel.set(set.colors.texelScale, 3 * i);
       for (let c = 0; c < 3; ++c) background[c] += set.weight * set.colors.background[c];
     }
@@ -90,7 +151,7 @@ class Graphics {
       for (let c = 0; c < 3; ++c)
         background[c] = Math.max(0, dot(map.matrix.slice(3 * c, 3 * c + 3), flat) + map.offset[c]);
     }
-    gl.uniform1fv(u('uScale'), scale);
+    this.setCodes(p, Array.from({length: p.sets}, (_, i) => (sets[i] ?? sets[0]).colors.code));
     gl.uniform1fv(u('uTexelScale'), texel);
     gl.uniform3fv(u('uWeight'), weight);
     gl.uniform3fv(u('uBackground'), background);
@@ -104,7 +165,6 @@ class Graphics {
     gl.uniform3iv(u('uVoxels'), h.resolution);
     gl.uniform3iv(u('uTop'), scene.top);
     gl.uniform1i(u('uFinest'), scene.finest);
-    gl.uniform1i(u('uOnCells'), h.finest === null ? 0 : 1);
     gl.uniform1i(u('uLayers'), h.spheres?.layers ?? 0);
     gl.uniform1i(u('uResolution'), h.spheres?.resolution ?? 0);
     gl.uniform1i(u('uCount'), count ? 1 : 0);
@@ -129,10 +189,11 @@ class Graphics {
     gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA8, width, height);
     gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
     gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, 0);
-    return {texture, framebuffer, width, height, free: () => {
+    const made = this.taken({texture, framebuffer, width, height, bytes: 4 * width * height, free: () => {
       gl.deleteFramebuffer(framebuffer);
-      gl.deleteTexture(texture);
-    }};
+      this.free(made);
+    }});
+    return made;
   }
   // All of a picture, stretched, or the rows of a strip of one of the canvas's size.
   show(target, canvas, strip) {

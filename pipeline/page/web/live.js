@@ -62,3 +62,28 @@ class Live {
     return (await this.ask('GET', '/film')).blob();
   }
 }
+
+// A dropped picture as a new style of the page, which the page shows as it develops.
+async function learnStyle(page, file) {
+  if (!page.live) return;
+  if (page.learning) return sayBriefly('Another style is being learned.');
+  page.learning = true;
+  // By way of `page`: the scene may be made again meanwhile.
+  const i = page.header.styles.length, picture = page.dropped?.url ?? '';
+  let done = false;
+  try {
+    if (i >= 16) throw new PageError('this page has 16 styles; load it again');
+    const soFar = (style) => page.putStyle(i, {...style, picture});
+    // The program makes a pass over the voxels faster than this page's cores.
+    const style = await page.live.learn(file, soFar, () => page.graphics.onCores !== false);
+    if (!style) return;
+    done = true;
+    await page.putStyle(i, {...style, picture});
+  } catch (error) {
+    if (!(error instanceof PageError)) throw error;
+    sayBriefly('The style was not learned: ' + error.message);
+  } finally {
+    page.learning = false;
+    if (!done && page.header.styles.length > i) page.removeStyle(i);
+  }
+}

@@ -1,6 +1,6 @@
 // Starts the page: unpacks the scene, binds the controls, and paints.
 
-const PAGE_FORMAT = 1;
+const PAGE_FORMAT = 2;
 
 // `added`: styles that the page has learned since it was opened.
 function readHeader(added) {
@@ -9,10 +9,10 @@ function readHeader(added) {
   if (!header || typeof header !== 'object') throw new PageError('a part of the page is damaged: scene');
   if (header.format !== PAGE_FORMAT) throw new PageError('this page was made by another version of regrade');
   const numbers = (v, n) => Array.isArray(v) && v.length === n && v.every(Number.isFinite);
-  if (!numbers(header.resolution, 3) || !numbers(header.center, 3) || !numbers(header.radius, 3) ||
-      !(header.voxels > 0 && header.voxels <= 1 << 26) || ![1, 4, 9].includes(header.basis) ||
-      !header.resolution.every((n) => n > 0 && n <= 1 << 20) || !header.cameras?.length ||
-      !(header.finest === null || header.finest >= 0 && header.finest <= 16) || !header.cameras[header.home])
+  const isField = (h) => numbers(h.resolution, 3) && numbers(h.center, 3) && numbers(h.radius, 3) &&
+      h.voxels > 0 && h.voxels <= 1 << 26 && [1, 4, 9].includes(h.basis) && h.resolution.every((n) => n > 0 && n <= 1 << 20) &&
+      (h.finest === null || h.finest >= 0 && h.finest <= 16);
+  if (!isField(header) || header.coarse && !isField(header.coarse) || !header.cameras?.[header.home])
     throw new PageError('a part of the page is damaged: scene');
   header.styles.push(...added);
   return header;
@@ -26,13 +26,30 @@ function fail(error) {
 }
 
 async function start(page) {
-  const header = readHeader(page.added ??= []), canvas = element('canvas');
+  const header = readHeader(page.added ??= []), canvas = element('canvas'), round = page.round = {};
   const gl = canvas.getContext('webgl2', {antialias: false, preserveDrawingBuffer: true, powerPreference: 'high-performance'});
   if (!gl) throw new PageError('this browser has no WebGL 2, or has switched it off');
   if (typeof DecompressionStream === 'undefined') throw new PageError('this browser is too old');
+  const decoded = decodedField(header, '', true, (part) => {
+    if (page.round === round) say('The scene is being unpacked: ' + Math.round(100 * part) + ' %');
+  });
+  decoded.catch(() => {});  // it is awaited below
   const graphics = new Graphics(gl);
   if (location.hash === '#cores') graphics.onCores = true;
-  const scene = await loadScene(header, graphics, (part) => say('The scene is being unpacked: ' + Math.round(100 * part) + ' %'));
+  let scene = await loadCoarse(header, graphics), painter = null;
+  const takeWhole = async () => {
+    const made = await decoded;
+    if (page.round !== round) return null;  // the context was lost meanwhile
+    const next = await loadScene(header, made, graphics), before = scene;
+    scene = page.scene = next;
+    before?.free();
+    painter?.take(scene);
+    return scene;
+  };
+  const whole = takeWhole();
+  whole.catch(() => {});  // it is awaited below
+  if (!scene) await whole;
+  if (page.round !== round) return;
   const view = page.view ??= new View(header);
   const state = page.state ??= {axes: [0, 1], amount: [0, 0], original: false, split: false, cut: 0.5, map: null, playing: null};
   const colors = header.styles.map(() => null), loading = header.styles.map(() => null);
@@ -52,7 +69,7 @@ async function start(page) {
     return rest > 1e-6 || sets.length === 0 ? [{weight: Math.max(rest, 0), colors: scene.source}, ...sets] : sets;
   }
   const free = (set) => {
-    for (const texture of [set?.first, set?.second, set?.texel])
+    for (const texture of [set?.color, set?.texel])
       if (texture && texture !== scene.source.texel) graphics.free(texture);
   };
   const forget = (i) => {
@@ -60,9 +77,9 @@ async function start(page) {
     colors[i] = loading[i] = null;
   };
   function load(i, codes) {
-    return loading[i] ??= styleColors(graphics, scene, header.styles[i], 'network_' + i, (part) => {
+    return loading[i] ??= whole.then(() => styleColors(graphics, scene, header.styles[i], 'network_' + i, (part) => {
       say(part < 1 ? 'Style ' + (i + 1) + ' is being applied: ' + Math.round(100 * part) + ' %' : '');
-    }, codes).then((made) => {
+    }, codes)).then((made) => {
       colors[i] = made;
       // Of many styles those that no slider shows make room.
       if (colors.filter(Boolean).length > 3)
@@ -79,7 +96,7 @@ async function start(page) {
         : [{from: 0, to: 1, sets: styled, map}];
     return {view: view.at(width, height), parts};
   };
-  const painter = new Painter(canvas, graphics, scene, pictureOf);
+  painter = new Painter(canvas, graphics, scene, pictureOf);
   const changed = () => painter.change();
   let showStyles;
   const refreshStyles = () => {
@@ -133,37 +150,15 @@ async function start(page) {
     refreshStyles();
     changed();
   };
-  const learn = async (file) => {
-    if (!page.live) return;
-    if (page.learning) return sayBriefly('Another style is being learned.');
-    page.learning = true;
-    // By way of `page`: the scene may be made again meanwhile.
-    const i = page.header.styles.length, picture = page.dropped?.url ?? '';
-    let done = false;
-    try {
-      if (i >= 16) throw new PageError('this page has 16 styles; load it again');
-      const soFar = (style) => page.putStyle(i, {...style, picture});
-      // The program makes a pass over the voxels faster than this page's cores.
-      const style = await page.live.learn(file, soFar, () => page.graphics.onCores !== false);
-      if (!style) return;
-      done = true;
-      await page.putStyle(i, {...style, picture});
-    } catch (error) {
-      if (!(error instanceof PageError)) throw error;
-      sayBriefly('The style was not learned: ' + error.message);
-    } finally {
-      page.learning = false;
-      if (!done && page.header.styles.length > i) page.removeStyle(i);
-    }
-  };
   bindPicture(header, page, (map, isNew) => {
     if (map && isNew) state.amount = [0, 0];
     state.map = map;
     refreshStyles();
     changed();
-  }, (file) => page.learned = learn(file));
+  }, (file) => page.learned = learnStyle(page, file));
   // A moment of the path, as the canvas would show it.
   const pictureOfPath = async (key, width, height) => {
+    await whole;
     for (let i = 0; i < key.weights.length; ++i) if (key.weights[i] > 0) await load(i);
     const target = graphics.target(width, height);
     const at = Object.assign(Object.create(view), {eye: key.eye, forward: key.forward, top: key.up, half: key.half});
@@ -214,71 +209,12 @@ async function start(page) {
   element('exact_film').hidden = !page.live;
   element('exact_film').onclick = save(() => page.live.film(path.text(header.styles.map((s) => s.id))));
 
-  const press = (id, on) => element(id).ariaPressed = on;
-  const sheets = [['show_path', 'path'], ['show_facts', 'facts']];
-  const toggle = (sheet) => () => {
-    const open = element(sheet).hidden;
-    for (const [b, s] of sheets) {
-      element(s).hidden = s !== sheet || !open;
-      element(b).ariaExpanded = s === sheet && open;
-    }
-    if (sheet === 'facts') factsOf(header, scene, graphics, painter);
-  };
-  const actions = {
-    home() { view.go(view.photos[header.home]); view.pivot = view.pivotOfHome; changed(); },
-    mode() { view.mode = view.mode === 'orbit' ? 'fly' : 'orbit'; press('mode', view.mode === 'fly'); },
-    original(on) { if (state.original !== on) { state.original = on; changed(); } },
-    halve() {
-      state.split = !state.split;
-      press('halve', state.split);
-      element('half').hidden = element('split').hidden = !state.split;
-      changed();
-    }};
-  actions.keys = {h: actions.home, f: actions.mode, c: () => actions.original(true), v: actions.halve,
-                  k: toggle('path'), i: toggle('facts'), escape: () => {
-                    for (const [b, s] of sheets) {
-                      if (element(s).hidden) continue;
-                      if (element(s).contains(document.activeElement)) element(b).focus();
-                      toggle(s)();
-                    }
-                  }};
-  actions.released = {c: () => actions.original(false)};
-  element('home').onclick = actions.home;
-  element('mode').onclick = actions.mode;
-  element('halve').onclick = actions.halve;
-  element('show_path').onclick = actions.keys.k;
-  element('show_facts').onclick = actions.keys.i;
-  const compare = element('compare');
-  compare.onpointerdown = () => actions.original(true);
-  compare.onpointerup = compare.onpointerleave = compare.onblur = () => actions.original(false);
-  compare.onkeydown = (event) => { if (event.key === ' ' || event.key === 'Enter') actions.original(true); };
-  compare.onkeyup = () => actions.original(false);
-  element('cut').oninput = () => {
-    state.cut = element('cut').value / 100;
-    showCut();
-    changed();
-  };
-  const showCut = () => {
-    element('split').style.left = 100 * state.cut + '%';
-    element('cut').ariaValueText = Math.round(100 * state.cut) + ' % of the width';
-  };
-  showCut();
-
+  const actions = bindActions(header, view, state, changed, () => factsOf(header, scene, graphics, painter));
   page.controls ??= bindControls(canvas, view, () => page.changed(), {
     home: () => page.actions.home(),
     keys: Object.fromEntries(Object.keys(actions.keys).map((k) => [k, () => page.actions.keys[k]()])),
     released: {c: () => page.actions.released.c()}});
-  Object.assign(page, {actions, changed, scene, graphics, painter, header, load, colors, setsOf, weights, resize: () => painter.resize()});
-  // For tests: RGBA rows from the bottom, of any view and weights; with `count` the fetches of each ray.
-  page.picture = async ({rotation, eye, lens, width, height, weights: wanted, count, opacityStep = 0}) => {
-    for (let i = 0; i < wanted.length; ++i) if (wanted[i] > 0) await load(i);
-    const target = graphics.target(width, height);
-    graphics.draw(scene, {rotation, eye, lens}, setsOf(wanted), null, target, {x: 0, y: 0, width, height}, opacityStep, count);
-    const pixels = graphics.read(target);
-    target.free();
-    return pixels;
-  };
-  say('');
+  Object.assign(page, {actions, changed, graphics, painter, header, load, colors, setsOf, weights, resize: () => painter.resize()});
   canvas.classList.add('ready');
   let before = performance.now();
   const run = page.run = () => {
@@ -295,10 +231,23 @@ async function start(page) {
         take(path.at(state.playing));
       }
     }
-    painter.step();
+    // Programs that will be wanted are made when there is nothing to draw.
+    if (!painter.step() && !graphics.prepare(scene, view.at(1, 1), {header}, 1) && header.styles.length > 0)
+      graphics.prepare(scene, view.at(1, 1), {header}, 3);
     requestAnimationFrame(run);
   };
   run();
+  if (!await whole) return;
+  say('');
+  // For tests: RGBA rows from the bottom, of any view and weights; with `count` the fetches of each ray.
+  page.picture = async ({rotation, eye, lens, width, height, weights: wanted, count, opacityStep = 0}) => {
+    for (let i = 0; i < wanted.length; ++i) if (wanted[i] > 0) await load(i);
+    const target = graphics.target(width, height);
+    graphics.draw(scene, {rotation, eye, lens}, setsOf(wanted), null, target, {x: 0, y: 0, width, height}, opacityStep, count);
+    const pixels = graphics.read(target);
+    target.free();
+    return pixels;
+  };
   weights().forEach((weight, i) => weight > 0 && load(i));
   if (!page.begun && header.styles.length > 0) {
     await load(0);

@@ -1,19 +1,25 @@
 #version 300 es
-// One ray for each pixel through cells of all levels, or a uniform grid, and background spheres;
-// see the C++ headers kernels/field/cell_walk.h, ray_march.h and background_spheres.h.
+// One ray for each pixel through cells of all levels (CELLS), or a uniform grid, and background spheres (SPHERES), with the
+// colours of up to SETS mixed; see the C++ headers kernels/field/cell_walk.h, ray_march.h and background_spheres.h.
 precision highp float;
 precision highp int;
 precision highp isampler2D;
 precision highp usampler2D;
 
 uniform usampler2D uTree;      // see tree.js
-uniform usampler2D uCorner;    // of a cell, two texels of four voxels
-uniform usampler2D uFirst0, uSecond0, uFirst1, uSecond1, uFirst2, uSecond2;  // codes [27]
+uniform usampler2D uCorner;    // of a cell: eight numbers of 16 bits, voxels of its block
+uniform isampler2D uBase;      // the first voxel of a block of 1024 cells, see decode.js
+uniform usampler2D uColor0, uColor1, uColor2;  // of a voxel, see color_code.js
+#if SPHERES
 uniform isampler2D uColumn;    // of the spheres' map
 uniform usampler2D uTexel0, uTexel1, uTexel2;  // codes, density
-
-uniform float uScale[81];      // of three sets
 uniform float uTexelScale[9];
+uniform int uLayers, uResolution;
+#endif
+
+uniform mat3 uOpponent[SETS];
+uniform vec3 uHarmonics[27 * SETS], uStepOf[9 * SETS];
+uniform ivec4 uBits[7 * SETS];
 uniform vec3 uWeight, uBackground;
 uniform mat3 uMap;
 uniform vec3 uOffset;
@@ -22,7 +28,7 @@ uniform vec3 uEye;
 uniform vec4 uLens;            // focal lengths and principal point, pixels
 uniform vec2 uSize, uNdc;
 uniform ivec3 uVoxels, uTop;
-uniform int uFinest, uOnCells, uLayers, uResolution, uCount;
+uniform int uFinest, uCount;
 uniform vec3 uCenter, uRadius;
 uniform float uUnit, uNear, uStep, uOpacityStep;
 out vec4 color;
@@ -116,14 +122,14 @@ vec4 Codes(uint w) {
   return vec4(w & 255u, w >> 8 & 255u, w >> 16 & 255u, w >> 24) - 128.0;
 }
 
-// The products of a voxel's coefficients with s, the harmonics times the scales.
-vec3 ColorOf(usampler2D first, usampler2D second, int voxel, vec4 s[7]) {
-  uvec4 a = texelFetch(first, At(voxel), 0), b = texelFetch(second, At(voxel), 0);
-  fetches += 2.0;
-  vec4 c2 = Codes(a.z), c4 = Codes(b.x);
-  return vec3(dot(Codes(a.x), s[0]) + dot(Codes(a.y), s[1]) + c2.x * s[2].x,
-              dot(c2.yzw, s[2].yzw) + dot(Codes(a.w), s[3]) + dot(c4.xy, s[4].xy),
-              dot(c4.zw, s[4].zw) + dot(Codes(b.y), s[5]) + dot(Codes(b.z).xyz, s[6].xyz));
+//@code
+// The products of a voxel's numbers with s, the steps times the turned harmonics.
+vec3 ColorOf(usampler2D colors, int voxel, int set, vec3 s[9]) {
+  vec3 q[9], sum = vec3(0.0);
+  Unpack(texelFetch(colors, At(voxel), 0), set, q);
+  fetches += 1.0;
+  for (int j = 0; j < 9; ++j) sum += q[j] * s[j];
+  return sum;
 }
 
 void Harmonics(vec3 d, out float g[9]) {
@@ -138,19 +144,22 @@ void Harmonics(vec3 d, out float g[9]) {
   g[8] = 0.5462742152960396 * (d.x * d.x - d.y * d.y);
 }
 
-vec4 s0[7], s1[7], s2[7];
+vec3 s0[9];
+#if SETS > 1
+vec3 s1[9], s2[9];
+#endif
 
-void Scaled(float g[9], int set, out vec4 s[7]) {
-  for (int i = 0; i < 7; ++i)
-    for (int k = 0; k < 4; ++k) {
-      int j = 4 * i + k;
-      s[i][k] = j < 27 ? uScale[27 * set + j] * g[j - 9 * (j / 9)] : 0.0;
-    }
+void Scaled(float g[9], int set, out vec3 s[9]) {
+  vec3 a = vec3(g[0], g[1], g[2]), b = vec3(g[3], g[4], g[5]), c = vec3(g[6], g[7], g[8]);
+  for (int j = 0; j < 9; ++j) {
+    int at = 27 * set + 3 * j;
+    s[j] = uStepOf[9 * set + j] * (dot(uHarmonics[at], a) + dot(uHarmonics[at + 1], b) + dot(uHarmonics[at + 2], c));
+  }
 }
 
 vec3 Shade(int cell, vec3 f, float opacity) {
-  ivec4 low = ivec4(texelFetch(uCorner, At(2 * cell), 0));
-  ivec4 high = ivec4(texelFetch(uCorner, At(2 * cell + 1), 0));
+  uvec4 corners = texelFetch(uCorner, At(cell), 0);
+  int base = texelFetch(uBase, At(cell >> 10), 0).x;
   fetches += 2.0;
   vec4 a, b;
   Weights(f, a, b);
@@ -164,15 +173,24 @@ vec3 Shade(int cell, vec3 f, float opacity) {
     b /= kept;
     least /= kept;
   }
-  vec3 raw = vec3(0.5);
+  vec3 y0 = vec3(0.0);
+#if SETS > 1
+  vec3 y1 = vec3(0.0), y2 = vec3(0.0);
+#endif
   for (int k = 0; k < 8; ++k) {
     float w = k < 4 ? a[k] : b[k - 4];
     if (w < least) continue;
-    int voxel = k < 4 ? low[k] : high[k - 4];
-    if (uWeight.x > 0.0) raw += w * uWeight.x * ColorOf(uFirst0, uSecond0, voxel, s0);
-    if (uWeight.y > 0.0) raw += w * uWeight.y * ColorOf(uFirst1, uSecond1, voxel, s1);
-    if (uWeight.z > 0.0) raw += w * uWeight.z * ColorOf(uFirst2, uSecond2, voxel, s2);
+    int voxel = base + int(corners[k >> 1] >> (16 * (k & 1)) & 65535u);
+    if (uWeight.x > 0.0) y0 += w * ColorOf(uColor0, voxel, 0, s0);
+#if SETS > 1
+    if (uWeight.y > 0.0) y1 += w * ColorOf(uColor1, voxel, 1, s1);
+    if (uWeight.z > 0.0) y2 += w * ColorOf(uColor2, voxel, 2, s2);
+#endif
   }
+  vec3 raw = 0.5 + uWeight.x * (uOpponent[0] * y0);
+#if SETS > 1
+  raw += uWeight.y * (uOpponent[1] * y1) + uWeight.z * (uOpponent[2] * y2);
+#endif
   return max(uMap * raw + uOffset, 0.0);
 }
 
@@ -204,7 +222,8 @@ void Composite(int cell, vec3 f, float density, float delta) {
   }
 }
 
-void MarchCells(vec3 eye, vec3 direction) {
+#if CELLS
+void March(vec3 eye, vec3 direction) {
   vec3 scale = 0.5 * vec3(uVoxels) / uRadius, middle = vec3(uVoxels) * 0.5;
   vec3 o = (eye - uCenter) * scale, d = direction * scale;
   vec3 inverse = mix(1.0 / d, vec3(0.0), equal(d, vec3(0.0)));
@@ -246,7 +265,8 @@ void MarchCells(vec3 eye, vec3 direction) {
   }
 }
 
-void MarchGrid(vec3 eye, vec3 direction) {
+#else
+void March(vec3 eye, vec3 direction) {
   vec3 scale = 0.5 * vec3(uVoxels) / uRadius;
   vec3 o = eye * scale + 0.5 * vec3(uVoxels) - 0.5 - uCenter * scale, d = direction * scale;
   float perWorld = length(d);
@@ -292,6 +312,9 @@ void MarchGrid(vec3 eye, vec3 direction) {
   }
 }
 
+#endif
+
+#if SPHERES
 vec3 LayerColor(uvec4 texel, float w, int set) {
   vec3 c = Codes(texel.x).xyz;
   return w * c * vec3(uTexelScale[3 * set], uTexelScale[3 * set + 1], uTexelScale[3 * set + 2]);
@@ -344,6 +367,8 @@ void CompositeSpheres(vec3 eye, vec3 direction) {
   }
 }
 
+#endif
+
 void main() {
   // Rows count from the top, as in pictures.
   vec2 pixel = vec2(gl_FragCoord.x, uSize.y - gl_FragCoord.y);
@@ -361,10 +386,12 @@ void main() {
   float g[9];
   Harmonics(d, g);
   Scaled(g, 0, s0);
+#if SETS > 1
   if (uWeight.y > 0.0) Scaled(g, 1, s1);
   if (uWeight.z > 0.0) Scaled(g, 2, s2);
+#endif
   if (dot(d, d) > 0.0) {
-    if (uOnCells == 1) MarchCells(eye, d); else MarchGrid(eye, d);
+    March(eye, d);
     if (middleCell >= 0) {
       // What would still come through a ray that has ended takes its last colour.
       if (Ended()) {
@@ -373,7 +400,9 @@ void main() {
       }
       sum += waiting * Shade(middleCell, middleFraction, waiting);
     }
-    if (uLayers > 0 && transmitted >= kStop) CompositeSpheres(eye, d);
+#if SPHERES
+    if (transmitted >= kStop) CompositeSpheres(eye, d);
+#endif
   }
   color = vec4(clamp(sum + transmitted * uBackground, 0.0, 1.0), 1.0);
   if (uCount == 1) color = vec4(mod(fetches, 256.0) / 255.0, floor(fetches / 256.0) / 255.0, 0.0, 1.0);

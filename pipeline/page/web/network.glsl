@@ -5,14 +5,18 @@ precision highp int;
 precision highp usampler2D;
 precision highp isampler2D;
 
-uniform usampler2D uFirst, uSecond;   // a voxel's codes and place
+uniform usampler2D uColor;            // a voxel's numbers, or a sphere's texel
+uniform usampler2D uPlace, uResidual; // of a strip that begins at row uRow: places of voxels, and see unpackResidual
+uniform int uRow;
 uniform isampler2D uPlaceOfColumn;    // of the spheres' columns
-uniform float uScale[27], uStyledScale[27];
+uniform mat3 uOpponent[2];            // of the source and the style, see color_code.js
+uniform vec3 uHarmonics[54], uStepOf[18];
+uniform ivec4 uBits[14];
+uniform vec3 uSphereScale, uStyledSphereScale;
 uniform vec3 uPosition;               // the place's unit: 2 / voxels
 uniform vec3 uConstant;               // of the colour map
 uniform mat3 uBase;
 uniform float uOmega, uPositionScale;
-uniform usampler2D uResidual;         // see unpackResidual
 uniform vec3 uResidualScale;
 uniform int uHasResidual, uActivation, uOnSpheres, uLayers, uResolution;
 layout(std140) uniform Layer0 { mat4 w0[128]; };
@@ -22,8 +26,8 @@ layout(std140) uniform Layer3 { mat4 w3[256]; };
 layout(std140) uniform Layer4 { mat4 w4[256]; };
 layout(std140) uniform Layer5 { mat4 w5[112]; };
 layout(std140) uniform Biases { vec4 bias[96]; };
-layout(location = 0) out uvec4 first;
-layout(location = 1) out uvec4 second;
+out uvec4 color;
+//@code
 
 vec4 Activate(vec4 x) {
   if (uActivation == 0) return sin(uOmega * x);
@@ -38,32 +42,32 @@ uint Packed(vec4 code) {
   return c.x | c.y << 8 | c.z << 16 | c.w << 24;
 }
 
-float CodeIn(uvec4 a, uvec4 b, int i) {
-  uint w = i < 16 ? a[i >> 2] : b[(i - 16) >> 2];
-  return float(w >> (8 * (i & 3)) & 255u) - 128.0;
-}
-
 void main() {
   ivec2 at = ivec2(gl_FragCoord.xy);
-  uvec4 a = texelFetch(uFirst, at, 0), b = texelFetch(uSecond, at, 0);
+  uvec4 own = texelFetch(uColor, at, 0);
   float s[32];
   for (int i = 0; i < 32; ++i) s[i] = 0.0;
-  vec3 place;
+  vec3 place, q[9];
   if (uOnSpheres == 1) {
-    for (int c = 0; c < 3; ++c) s[9 * c] = (float(a.x >> (8 * c) & 255u) - 128.0) * uScale[c];
+    for (int c = 0; c < 3; ++c) s[9 * c] = (float(own.x >> (8 * c) & 255u) - 128.0) * uSphereScale[c];
     int column = (at.y * 2048 + at.x) / uLayers;
     int texel = texelFetch(uPlaceOfColumn, ivec2(column & 2047, column >> 11), 0).x;
     float longitude = (float(texel / uResolution) / float(uResolution) - 1.0) * 3.14159265358979324;
     float latitude = (0.5 - float(texel % uResolution) / float(uResolution)) * 3.14159265358979324;
     place = vec3(cos(latitude) * sin(longitude), sin(latitude), cos(latitude) * cos(longitude));
   } else {
-    if (b.w >> 31 == 1u) {  // the empty voxel stays so
-      first = second = uvec4(0x80808080u);
+    uvec2 p = texelFetch(uPlace, at - ivec2(0, uRow), 0).xy;
+    if (p.y >> 31 == 1u) {  // the empty voxel stays so
+      color = uvec4(0u);
       return;
     }
-    for (int i = 0; i < 27; ++i) s[i] = CodeIn(a, b, i) * uScale[i];
-    uvec3 p = uvec3(b.z >> 24 | (b.w & 31u) << 8, b.w >> 5 & 8191u, b.w >> 18 & 8191u);
-    place = (vec3(p) + (uOnSpheres == 2 ? 0.5 : 0.0)) * uPosition - 1.0;
+    Unpack(own, 0, q);
+    for (int j = 0; j < 9; ++j) {
+      vec3 channels = uOpponent[0] * (q[j] * uStepOf[j]);
+      for (int k = 0; k < 9; ++k)
+        for (int c = 0; c < 3; ++c) s[9 * c + k] += uHarmonics[3 * j + k / 3][k % 3] * channels[c];
+    }
+    place = (vec3(p.x & 8191u, p.x >> 13, p.y) + (uOnSpheres == 2 ? 0.5 : 0.0)) * uPosition - 1.0;
   }
   for (int i = 0; i < 3; ++i) s[27 + i] = place[i] * uPositionScale;
 
@@ -105,25 +109,22 @@ void main() {
     for (int c = 0; c < 3; ++c) r[9 * c + k] += mapped[c];
   }
   if (uHasResidual == 1) {  // see EQ(view-scale) and EQ(style-mix)
-    uvec2 own = texelFetch(uResidual, at, 0).xy;
-    float weight = float(own.x >> 24) / 255.0;
+    uvec2 added = texelFetch(uResidual, at - ivec2(0, uRow), 0).xy;
+    float weight = float(added.x >> 24) / 255.0;
     for (int c = 0; c < 3; ++c) {
-      r[9 * c] += (float(own.x >> (8 * c) & 255u) - 128.0) * uResidualScale[c];
-      for (int k = 1; k < 9; ++k) r[9 * c + k] *= float(own.y >> (8 * c) & 255u) / 255.0;
+      r[9 * c] += (float(added.x >> (8 * c) & 255u) - 128.0) * uResidualScale[c];
+      for (int k = 1; k < 9; ++k) r[9 * c + k] *= float(added.y >> (8 * c) & 255u) / 255.0;
     }
     for (int i = 0; i < 27; ++i) r[i] = mix(s[i], r[i], weight);
   }
   if (uOnSpheres == 1) {
-    first = uvec4(Packed(vec4(r[0], r[9], r[18], 0.0) / vec4(uStyledScale[0], uStyledScale[1], uStyledScale[2], 1.0)), a.yzw);
-    second = uvec4(0u);
+    color = uvec4(Packed(vec4(vec3(r[0], r[9], r[18]) / uStyledSphereScale, 0.0)), own.yzw);
     return;
   }
-  uvec4 lowest = uvec4(0u), highest = uvec4(0u);
-  for (int i = 0; i < 7; ++i) {
-    vec4 code;
-    for (int k = 0; k < 4; ++k) code[k] = 4 * i + k < 27 ? r[4 * i + k] / uStyledScale[4 * i + k] : 0.0;
-    if (i < 4) lowest[i] = Packed(code); else highest[i - 4] = Packed(code);
+  for (int j = 0; j < 9; ++j) {
+    vec3 channels = vec3(0.0);
+    for (int k = 0; k < 9; ++k) channels += uHarmonics[27 + 3 * j + k / 3][k % 3] * vec3(r[k], r[9 + k], r[18 + k]);
+    q[j] = channels * uOpponent[1] / uStepOf[9 + j];
   }
-  first = lowest;
-  second = highest;
+  color = Pack(q, 1);
 }

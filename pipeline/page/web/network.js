@@ -1,5 +1,6 @@
 // A style: its network's weights, and the pass that sends each voxel through it.
 
+const STRIP = 256;  // rows of a pass, at most
 const LAYERS = [[30, 64], [64, 64], [64, 64], [64, 64], [64, 64], [64, 27]];
 
 // Of each layer: weights [inputs, outputs], outputs padded to a multiple of 4.
@@ -19,7 +20,7 @@ async function loadWeights(id) {
 }
 
 // The layers as uniform blocks of 4 x 4 matrices, column by column, and one of biases.
-function buffersOf(gl, layers) {
+function buffersOf(graphics, layers) {
   const bias = new Float32Array(96 * 4), blocks = layers.map(({inputs, outputs, weight, bias: own}, l) => {
     const across = Math.ceil(inputs / 4), block = new Float32Array(4 * across * outputs);
     for (let i = 0; i < inputs; ++i)
@@ -28,47 +29,40 @@ function buffersOf(gl, layers) {
     bias.set(own, 64 * l);
     return block;
   });
-  return [...blocks, bias].map((data) => {
-    const buffer = gl.createBuffer();
-    gl.bindBuffer(gl.UNIFORM_BUFFER, buffer);
-    gl.bufferData(gl.UNIFORM_BUFFER, data, gl.STATIC_DRAW);
-    return buffer;
-  });
+  return [...blocks, bias].map((data) => graphics.buffer(data));
 }
 
-// Textures of the codes [voxels, 27] of a style, as loadScene makes those of the source.
-function texturesOf(graphics, codes, voxels) {
-  if (codes.length !== 27 * voxels) throw new PageError('the style that came has another number of voxels');
-  const first = new Uint8Array(16 * (voxels + 1)).fill(128), second = new Uint8Array(16 * (voxels + 1)).fill(128);
-  for (let i = 0; i < voxels; ++i) {
-    first.set(codes.subarray(27 * i, 27 * i + 16), 16 * i);
-    second.set(codes.subarray(27 * i + 16, 27 * i + 27), 16 * i);
-  }
-  return [first, second].map((bytes) => graphics.texture('u4', new Uint32Array(bytes.buffer)));
+// Numbers of voxels of the page, `words` a voxel, as those of the scene's slots, in whole rows of texels.
+async function inSlots(scene, data, words) {
+  if (data.length !== words * scene.voxels) throw new PageError('the style that came has another number of voxels');
+  const voxel = await asNumbers(scene.kept.voxel), into = new Uint32Array(words * WIDTH * scene.source.color.height);
+  for (let s = 0; s < voxel.length; ++s)
+    if (voxel[s] < scene.voxels) for (let k = 0; k < words; ++k) into[words * s + k] = data[words * voxel[s] + k];
+  return into;
 }
 
-// Colours of a style, to draw the scene with; `codes`: of its voxels, if they are known.
+// Colours of a style, to draw the scene with; `codes`: the words of its voxels, if they are known.
 async function styleColors(graphics, scene, style, id, progress, codes = null) {
   const gl = graphics.gl;
-  graphics.network ??= compile(gl, [[gl.VERTEX_SHADER, EVERY_PIXEL], [gl.FRAGMENT_SHADER, NETWORK_GLSL]]);
-  const p = graphics.network, layers = await loadWeights(id), buffers = buffersOf(gl, layers);
+  graphics.network ??= check(gl, compile(gl, [[gl.VERTEX_SHADER, EVERY_PIXEL], [gl.FRAGMENT_SHADER, withCode(NETWORK_GLSL)]]));
+  const p = graphics.network, layers = await loadWeights(id), buffers = buffersOf(graphics, layers);
   const names = ['Layer0', 'Layer1', 'Layer2', 'Layer3', 'Layer4', 'Layer5', 'Biases'];
-  const colors = {scale: style.scale, texelScale: style.sphere_scale ?? [1, 1, 1], background: style.background};
-  if (codes) [colors.first, colors.second] = texturesOf(graphics, codes, scene.voxels);
-  colors.first ??= graphics.blank('u4', scene.source.first.height);
-  colors.second ??= graphics.blank('u4', scene.source.first.height);
-  const framebuffer = gl.createFramebuffer(), {height} = scene.source.first;
+  const {source} = scene, {height} = source.color;
+  const colors = {code: checkCode(style.color, id), texelScale: style.sphere_scale ?? [1, 1, 1], background: style.background};
   const residual = style.residual && !codes
-      ? await unpackResidual(id.replace('network', 'residual'), style.residual, scene.earlier, 8 * WIDTH * height) : null;
-  const added = residual && graphics.texture('u2', residual);
+      ? await inSlots(scene, await unpackResidual(textOf(id.replace('network', 'residual')), id.replace('network', 'residual'),
+                                                  style.residual, await asNumbers(scene.kept.earlier)), 2) : null;
+  colors.color = codes ? graphics.texture('u4', await inSlots(scene, new Uint32Array(codes.buffer), 4)) : graphics.blank('u4', height);
+  const framebuffer = gl.createFramebuffer();
+  const place = codes ? null : await asWords(scene.kept.place);
+  // Of what goes with the voxels no more than a strip is on the graphics processor.
+  const beside = [['uPlace', place], ['uResidual', residual]].map(([name, data]) => ({name, data, texture: data && graphics.blank('u2', STRIP)}));
 
   // False if it would take long and `mayLeave` is set.
-  async function pass(targets, height, onSpheres, from, scale, styledScale, mayLeave) {
+  async function pass(target, onSpheres, from, mayLeave) {
+    const {height} = target;
     gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
-    const attached = targets.map((t, i) => {
-      gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0 + i, gl.TEXTURE_2D, t?.texture ?? null, 0);
-      return t ? gl.COLOR_ATTACHMENT0 + i : gl.NONE;
-    });
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, target.texture, 0);
     let second = 0;
     for (let y = 0, rows = 1, strips = 0; y < height; ++strips) {
       const begun = performance.now();
@@ -79,16 +73,20 @@ async function styleColors(graphics, scene, style, id, progress, codes = null) {
       gl.bindVertexArray(graphics.array);
       buffers.forEach((buffer, i) => {
         gl.uniformBlockBinding(p.program, gl.getUniformBlockIndex(p.program, names[i]), i);
-        gl.bindBufferBase(gl.UNIFORM_BUFFER, i, buffer);
+        gl.bindBufferBase(gl.UNIFORM_BUFFER, i, buffer.buffer);
       });
-      graphics.bind(p, 'uFirst', 0, from[0]);
-      graphics.bind(p, 'uSecond', 1, from[1]);
-      graphics.bind(p, 'uPlaceOfColumn', 2, scene.placeOfColumn ?? graphics.empty.i);
-      graphics.bind(p, 'uResidual', 3, added ?? graphics.empty.p);
+      graphics.bind(p, 'uPlaceOfColumn', 1, scene.placeOfColumn ?? graphics.empty.i);
+      beside.forEach(({name, data, texture}, i) => {
+        if (data && onSpheres !== 1) graphics.write(texture, data.subarray(2 * WIDTH * y, 2 * WIDTH * (y + rows)));
+        graphics.bind(p, name, 2 + i, texture ?? graphics.empty.p);
+      });
+      graphics.bind(p, 'uColor', 0, from);
       gl.uniform3fv(p.at('uResidualScale'), style.residual?.scale ?? [0, 0, 0]);
-      gl.uniform1i(p.at('uHasResidual'), added && onSpheres !== 1 ? 1 : 0);
-      gl.uniform1fv(p.at('uScale'), scale);
-      gl.uniform1fv(p.at('uStyledScale'), styledScale);
+      gl.uniform1i(p.at('uHasResidual'), residual && onSpheres !== 1 ? 1 : 0);
+      gl.uniform1i(p.at('uRow'), y);
+      graphics.setCodes(p, [source.code, colors.code]);
+      gl.uniform3fv(p.at('uSphereScale'), source.texelScale);
+      gl.uniform3fv(p.at('uStyledSphereScale'), colors.texelScale);
       gl.uniform3fv(p.at('uPosition'), scene.positionUnit);
       gl.uniform3fv(p.at('uConstant'), style.constant);
       gl.uniformMatrix3fv(p.at('uBase'), true, style.base);
@@ -99,7 +97,6 @@ async function styleColors(graphics, scene, style, id, progress, codes = null) {
       gl.uniform1i(p.at('uLayers'), scene.header.spheres?.layers ?? 1);
       gl.uniform1i(p.at('uResolution'), scene.header.spheres?.resolution ?? 1);
       gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
-      gl.drawBuffers(attached);
       gl.viewport(0, 0, WIDTH, height);
       gl.enable(gl.SCISSOR_TEST);
       gl.scissor(0, y, WIDTH, rows);
@@ -111,29 +108,23 @@ async function styleColors(graphics, scene, style, id, progress, codes = null) {
       y += rows;
       progress(Math.min(1, y / height));
       const took = performance.now() - begun;
-      if (strips > 0) rows = Math.max(1, Math.min(256, took < 40 ? 2 * rows : took > 120 ? rows >> 1 : rows));
+      if (strips > 0) rows = Math.max(1, Math.min(STRIP, took < 40 ? 2 * rows : took > 120 ? rows >> 1 : rows));
       await wait();
     }
     return true;
   }
-  const {source} = scene;
-  const fast = !codes && graphics.onCores !== true &&
-      await pass([colors.first, colors.second], source.first.height, scene.header.finest === null ? 2 : 0,
-                 [source.first, source.second], source.scale, style.scale, typeof Worker !== 'undefined');
+  const fast = !codes && (graphics.onCores !== true || !workersRun) &&
+      await pass(colors.color, scene.header.finest === null ? 2 : 0, source.color, workersRun);
   if (!codes) graphics.onCores = !fast;
-  if (!codes && !fast) {
-    await restyleOnCores(graphics, scene, style, layers, residual, colors, progress);
-  }
-  if (added) graphics.free(added);
+  if (!codes && !fast) await restyleOnCores(graphics, scene, style, layers, {place, residual}, colors, progress);
   if (source.texel && style.residual?.weight) {  // what is not of the object stays
     Object.assign(colors, {texel: source.texel, texelScale: source.texelScale});
   } else if (source.texel) {
     colors.texel = graphics.blank('u2', source.texel.height);
-    const scales = (three) => Float32Array.from({length: 27}, (_, i) => i < 3 ? three[i] : 1);
-    await pass([colors.texel], source.texel.height, 1, [source.texel, source.texel],
-               scales(source.texelScale), scales(colors.texelScale), false);
+    await pass(colors.texel, 1, source.texel, false);
   }
   gl.deleteFramebuffer(framebuffer);
-  buffers.forEach((buffer) => gl.deleteBuffer(buffer));
+  beside.forEach(({texture}) => texture && graphics.free(texture));
+  buffers.forEach((buffer) => graphics.freeBuffer(buffer));
   return colors;
 }

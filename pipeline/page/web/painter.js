@@ -3,13 +3,18 @@
 class Painter {
   constructor(canvas, graphics, scene, pictureOf) {
     Object.assign(this, {canvas, graphics, scene, pictureOf});
-    this.steps = {moving: 1 / 9, rest: 1 / 17};  // of opacity, a colour for each
+    this.steps = {moving: 1 / 9, rest: 1 / 28};  // of opacity, a colour for each
     this.part = 0.5;        // of the canvas's side while moving
     this.rows = 16;         // of a strip
     this.changed = true;
     this.next = 0;          // row of the full picture
     this.frameTime = 0;
+    this.shown = null;      // the scene whose picture is on the canvas
     this.resize();
+  }
+  take(scene) {
+    this.scene = scene;
+    this.change();
   }
   resize() {
     const ratio = Math.min(devicePixelRatio || 1, 2);
@@ -50,6 +55,7 @@ class Painter {
       this.draw(this.coarse, {y: 0, height}, this.steps.moving);
       this.graphics.settle(this.coarse);
       this.graphics.show(this.coarse, this.canvas, null);
+      this.shown = this.scene;
       this.frameTime = performance.now() - begun;
       // Half of a frame of 60 Hz, smoothly.
       const wanted = Math.sqrt(14 / Math.max(this.frameTime, 1));

@@ -1,73 +1,110 @@
-// Decodes the field of the page and puts it on the graphics processor.
+// Brings the field of the page onto the graphics processor: unpacked by a worker, so that the page answers meanwhile.
 
-async function loadScene(header, graphics, progress) {
-  const {resolution, basis} = header, finestOfPage = header.finest, onCells = finestOfPage !== null;
-  let places = null, vertices;
-  progress(0.02, 'places');
-  if (onCells) {
-    places = placesOfTree(await bytesOf('tree'), resolution, finestOfPage, header.voxels);
-    vertices = places.vertices;
-  } else {
-    vertices = placesOfMask(await bytesOf('mask'), resolution, header.voxels);
+function textOf(id) {
+  const element = document.getElementById(id);
+  if (!element) throw new PageError('a part of the page is missing: ' + id);
+  return element.textContent;
+}
+
+const bytesOf = (id) => inflated(textOf(id), id);
+
+// Of a field whose sections' names begin with `prefix`: see decodeField.
+async function decodedField(header, prefix, inWorker, progress) {
+  const text = {places: textOf(prefix + (header.finest === null ? 'mask' : 'tree')), density: textOf(prefix + 'density'),
+                color: textOf(prefix + 'color')};
+  const {resolution, basis, finest, voxels, color} = header, residuals = header.styles?.some((s) => s.residual) ?? false;
+  const task = {header: {resolution, basis, finest, voxels, color, residuals}, text};
+  const made = inWorker && await decodedByWorker(task, progress);
+  if (made) return made;
+  return decodeField(task.header, text, async (part) => {
+    progress(part);
+    await wait();
+  });
+}
+
+let workersRun = typeof Worker !== 'undefined';
+
+// Null where workers cannot be started, as in some browsers from file://.
+async function decodedByWorker(task, progress) {
+  if (!workersRun) return null;
+  const url = URL.createObjectURL(new Blob(["'use strict';(" + decoder + ')().serveDecoder()'], {type: 'text/javascript'}));
+  let worker = null;
+  try {
+    worker = new Worker(url);
+    return await new Promise((done, fail) => {
+      worker.onerror = (event) => {
+        event.preventDefault();
+        workersRun = false;
+        done(null);
+      };
+      worker.onmessage = ({data: {part, made, error, known}}) => {
+        if (made) done(made);
+        else if (error) fail(known ? new PageError(error) : new Error(error));
+        else progress(part);
+      };
+      worker.postMessage(task);
+    });
+  } catch (error) {
+    if (worker) throw error;
+    workersRun = false;
+    return null;
+  } finally {
+    worker?.terminate();
+    URL.revokeObjectURL(url);
   }
-  const n = vertices.count, {place} = vertices;
-  if (n !== header.voxels) throw new PageError('the page has fewer voxels than it says');
-  const earlier = vertices.earlier.subarray(0, 3 * n);
-  progress(0.1, 'densities');
-  await wait();
-  const number = await unpackDensity('density', earlier);
-  if (!onCells) places = cellsOfGrid(vertices, resolution, number);
-  places = raisedTree(places);
-  const rootOfWidth = Array.from({length: 32}, (_, log2) => 2 ** (-0.5 * log2));
-  const root = (i) => i < n ? number[i] * rootOfWidth[vertices.width[i]] : 0;
+}
 
-  const scene = {header, top: places.top, finest: places.finest, cells: places.corner.length / 8, voxels: n};
-  if (header.styles.some((style) => style.residual)) scene.earlier = earlier;
-  scene.unit = Math.max(...[0, 1, 2].map((a) => 2 * header.radius[a] / resolution[a]));
-  scene.tree = graphics.texture('u4', packedTree(places, root));
-  scene.corner = graphics.texture('u4', new Uint32Array(places.corner.buffer));
+// What only networks need waits outside the script's memory.
+const asWords = async (blob) => new Uint32Array(await blob.arrayBuffer());
+const asNumbers = async (blob) => new Int32Array(await blob.arrayBuffer());
 
-  // A voxel: 27 codes, channel by channel, and its place in 39 bits; the last one is empty.
-  const first = new Uint8Array(16 * (n + 1)).fill(128), second = new Uint8Array(16 * (n + 1)).fill(128);
-  const channels = 3 * basis, slot = [];
-  for (let j = 0; j < channels; ++j) slot.push(9 * Math.floor(j / basis) + j % basis);
-  progress(0.2, 'colours');
-  await unpackColors('color', header.color, channels, earlier, (begin, codes, count) => {
-    for (let j = 0; j < channels; ++j) {
-      const into = slot[j] < 16 ? first : second;
-      for (let i = 0, at = 16 * begin + slot[j] % 16; i < count; ++i, at += 16) into[at] = codes[i * channels + j];
-    }
-  }, (part) => progress(0.2 + 0.7 * part, 'colours'));
-  const words = new Uint32Array(second.buffer);
-  let shift = 0;
-  while (Math.max(...resolution) >> shift > 8191) ++shift;
-  for (let i = 0; i < n; ++i) {
-    const [x, y, z] = [place[3 * i] >> shift, place[3 * i + 1] >> shift, place[3 * i + 2] >> shift];
-    second[16 * i + 11] = x & 255;
-    words[4 * i + 3] = (x >> 8 | y << 5 | z << 18) >>> 0;
+function sceneOf(header, made, graphics) {
+  const {top, finest, cells, voxels, positionUnit} = made, slots = made.voxel.length;
+  const scene = {header, top, finest, cells, voxels, slots, positionUnit};
+  scene.unit = Math.max(...[0, 1, 2].map((a) => 2 * header.radius[a] / header.resolution[a]));
+  for (const [name, kind] of [['tree', 'u4'], ['corner', 'u4'], ['base', 'i1'], ['color', 'u4']]) {
+    scene[name] = graphics.texture(kind, made[name]);
+    made[name] = null;  // whoever made it may keep it for long
   }
-  const scale = new Float32Array(27).fill(1);
-  slot.forEach((k, j) => scale[k] = header.color.scale[j]);
-  scene.positionUnit = resolution.map((r) => 2 * 2 ** shift / r);
-  scene.source = {first: graphics.texture('u4', new Uint32Array(first.buffer)),
-                  second: graphics.texture('u4', words), scale, texelScale: [1, 1, 1],
-                  background: header.background};
+  scene.source = {color: scene.color, code: header.color, texelScale: [1, 1, 1], background: header.background};
+  scene.kept = {};
+  for (const name of ['place', 'voxel', 'earlier']) {
+    scene.kept[name] = new Blob([made[name]]);
+    made[name] = null;
+  }
+  scene.free = () => [scene.tree, scene.corner, scene.base, scene.color].forEach((texture) => graphics.free(texture));
+  return scene;
+}
+
+// A small field that stands for the whole one until that is there; null if the page has none.
+async function loadCoarse(header, graphics) {
+  const {coarse} = header;
+  if (!coarse) return null;
+  const made = await decodedField(coarse, 'coarse_', false, () => {});
+  return {...sceneOf({...coarse, ndc: header.ndc, spheres: null}, made, graphics), coarse: true};
+}
+
+// `made`: by decodedField.
+async function loadScene(header, made, graphics) {
+  const scene = sceneOf(header, made, graphics);
   if (header.spheres) await loadSpheres(scene, graphics);
-  progress(1, '');
   return scene;
 }
 
 async function loadSpheres(scene, graphics) {
   const {layers, resolution} = scene.header.spheres, header = scene.header.sphere_color;
   const spheres = placesOfSpheres(await bytesOf('sphere_mask'), resolution, layers);
-  const number = await unpackDensity('sphere_density', spheres.earlier);
-  const texel = new Uint32Array(2 * number.length);
-  for (let i = 0; i < number.length; ++i)
-    texel[2 * i + 1] = toHalf(Math.sign(number[i]) * number[i] ** 2 * OPTICAL_DEPTH * layers);
-  await unpackColors('sphere_color', header, 3, spheres.earlier,
-                     (begin, codes, count) => {
-                       for (let i = 0; i < 3 * count; ++i) texel[2 * (begin + Math.floor(i / 3))] |= codes[i] << 8 * (i % 3);
-                     }, () => {});
+  const number = await unpackDensity(textOf('sphere_density'), 'sphere_density', spheres.earlier), n = number.length;
+  const texel = new Uint32Array(2 * n), channel = new Int16Array(n), sum = new Float64Array(3 * n);
+  for (let i = 0; i < n; ++i) texel[2 * i + 1] = toHalf(Math.sign(number[i]) * number[i] ** 2 * OPTICAL_DEPTH * layers);
+  await eachChannel(textOf('sphere_color'), 'sphere_color', n, 3, (k, bytes) => {
+    channelNumbers(bytes, spheres.earlier, channel);
+    for (let i = 0; i < 3 * n; ++i) sum[i] += header.matrix[3 * k + i % 3] * channel[Math.floor(i / 3)] * header.step;
+  });
+  for (let i = 0; i < 3 * n; ++i) {
+    const code = Math.max(-127, Math.min(127, Math.fround(sum[i]) / header.scale[i % 3])) + 128.5;
+    texel[2 * Math.floor(i / 3)] |= code << 8 * (i % 3);  // rounded down
+  }
   scene.column = graphics.texture('i1', spheres.links);
   scene.placeOfColumn = graphics.texture('i1', spheres.place);
   scene.source.texel = graphics.texture('u2', texel);

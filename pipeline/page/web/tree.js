@@ -4,7 +4,7 @@
 // a cube with eight children and their eight children each: bit 8 c + g of 64 is for grandchild g of child c, or bit 8 c for
 // a child that is a cell. So a ray reads one texel for two levels, and empty space costs none.
 //   node     2^31 | first texel of its block, mask of children that are cells, mask of grandchildren (no bit: nothing there)
-//   cell     number of the cell, densities of its eight corners in 12 bits each
+//   cell     number of the cell, in the order of the tree, densities of its eight corners in 12 bits each
 // A density is stored as v = sign(d) sqrt(|d| w / kOpticalDepth), d for each voxel and w the cell's
 // width, in quarters from -512 to 511.75: the page's own steps are 1, and more than 104 optical
 // depths in a cell are as opaque as 104.
@@ -39,18 +39,19 @@ function raisedTree({top, tree, finest, ...rest}) {
   return {top, tree: all, finest, ...rest};
 }
 
-// `root(voxel)`: sign(d) sqrt(|d| / OPTICAL_DEPTH); `places`: see raisedTree.
+// `root(voxel)`: sign(d) sqrt(|d| / OPTICAL_DEPTH); `places`: see raisedTree. -> {tree, order: cells as they are numbered in it}
 function packedTree(places, root) {
   const {tree, corner, finest} = places, topCells = places.top[0] * places.top[1] * places.top[2];
-  const packed = new Uint32Array(4 * tree.length);
-  let end = topCells;  // of the blocks so far
+  const packed = new Uint32Array(4 * tree.length), order = new Int32Array(corner.length / 8);
+  let end = topCells, numbered = 0;  // of the blocks so far; cells
   const code = new Uint32Array(8);
   const first = (entry) => topCells + 8 * (-2 - entry);  // of a node's children
 
   function putCell(at, entry, width) {
     const size = Math.sqrt(width);
     for (let k = 0; k < 8; ++k) code[k] = densityCode(root(corner[8 * entry + k]) * size);
-    packed[4 * at] = entry;
+    packed[4 * at] = numbered;
+    order[numbered++] = entry;
     packed[4 * at + 1] = code[0] | code[1] << 12 | code[6] << 24;
     packed[4 * at + 2] = code[2] | code[3] << 12 | (code[6] >> 8) << 24 | code[7] << 28;
     packed[4 * at + 3] = code[4] | code[5] << 12 | (code[7] >> 4) << 24;
@@ -84,5 +85,5 @@ function packedTree(places, root) {
     }
   }
   for (let i = 0; i < topCells; ++i) put(i, tree[i], 2 ** finest);
-  return packed.subarray(0, 4 * end);
+  return {tree: packed.slice(0, 4 * end), order};
 }

@@ -4,24 +4,53 @@ class PageError extends Error {}
 
 const wait = () => new Promise((done) => setTimeout(done, 0));
 
-async function bytesOf(id) {
-  const element = document.getElementById(id);
-  if (!element) throw new PageError('a part of the page is missing: ' + id);
+// Compressed bytes of a text in base64, as a stream.
+function streamOf(text) {
   let packed;
-  try {
-    const text = element.textContent;
-    if (Uint8Array.fromBase64) {
-      packed = Uint8Array.fromBase64(text);
-    } else {
-      const raw = atob(text);
-      packed = new Uint8Array(raw.length);
-      for (let i = 0; i < raw.length; ++i) packed[i] = raw.charCodeAt(i);
-    }
-    const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream('deflate'));
-    return new Uint8Array(await new Response(stream).arrayBuffer());
-  } catch (error) {
-    throw new PageError('a part of the page is damaged: ' + id);
+  if (Uint8Array.fromBase64) {
+    packed = Uint8Array.fromBase64(text);
+  } else {
+    const raw = atob(text);
+    packed = new Uint8Array(raw.length);
+    for (let i = 0; i < raw.length; ++i) packed[i] = raw.charCodeAt(i);
   }
+  return new Blob([packed]).stream().pipeThrough(new DecompressionStream('deflate'));
+}
+
+const damaged = (id) => new PageError('a part of the page is damaged: ' + id);
+
+async function inflated(text, id) {
+  try {
+    return new Uint8Array(await new Response(streamOf(text)).arrayBuffer());
+  } catch (error) {
+    throw damaged(id);
+  }
+}
+
+// Calls put(channel, its 2 n bytes) for each; no more than one of them is in memory.
+async function eachChannel(text, id, n, channels, put) {
+  const bytes = new Uint8Array(2 * n);
+  let filled = 0, channel = 0;
+  try {
+    const reader = streamOf(text).getReader();
+    for (;;) {
+      const {value, done} = await reader.read();
+      if (done) break;
+      for (let at = 0; at < value.length;) {
+        if (channel === channels) throw damaged(id);
+        const part = Math.min(value.length - at, bytes.length - filled);
+        bytes.set(value.subarray(at, at + part), filled);
+        filled += part;
+        at += part;
+        if (filled < bytes.length) continue;
+        await put(channel++, bytes);
+        filled = 0;
+      }
+    }
+  } catch (error) {
+    throw damaged(id);
+  }
+  if (channel !== channels || filled > 0) throw damaged(id);
 }
 
 function toHalf(value) {
@@ -46,10 +75,10 @@ function fromHalf(half) {
 }
 
 // Numbers of one channel, see EQ(page-prediction); `earlier` has three entries a voxel.
-function channelNumbers(bytes, channel, earlier, into) {
-  const n = into.length, low = 2 * n * channel, high = low + n;
+function channelNumbers(bytes, earlier, into) {
+  const n = into.length;
   for (let i = 0; i < n; ++i) {
-    const folded = bytes[low + i] | bytes[high + i] << 8;
+    const folded = bytes[i] | bytes[n + i] << 8;
     const a = earlier[3 * i], b = earlier[3 * i + 1], c = earlier[3 * i + 2];
     let p = 0;
     if (c >= 0) p = Math.floor((into[a] + into[b] + into[c]) / 3);
@@ -60,72 +89,24 @@ function channelNumbers(bytes, channel, earlier, into) {
 }
 
 // Numbers of densities, see EQ(page-density).
-async function unpackDensity(id, earlier) {
-  const bytes = await bytesOf(id), n = earlier.length / 3;
-  if (bytes.length !== 2 * n) throw new PageError('a part of the page is damaged: ' + id);
-  const number = new Int16Array(n);
-  channelNumbers(bytes, 0, earlier, number);
+async function unpackDensity(text, id, earlier) {
+  const n = earlier.length / 3, number = new Int16Array(n);
+  await eachChannel(text, id, n, 1, (_, bytes) => channelNumbers(bytes, earlier, number));
   return number;
 }
 
 // What a style adds voxel by voxel, see residual_codec.h: eight bytes each, three codes of colours, a weight, three view
-// scales; `bytes`: of all texels.
-async function unpackResidual(id, {scale, view, weight}, earlier, bytes) {
-  const packed = await bytesOf(id), n = earlier.length / 3, number = new Int16Array(n), into = new Uint8Array(bytes).fill(255);
-  const channels = [];
+// scales.
+async function unpackResidual(text, id, {scale, view, weight}, earlier) {
+  const n = earlier.length / 3, number = new Int16Array(n), into = new Uint8Array(8 * n).fill(255), channels = [];
   for (let c = 0; c < 3 && scale; ++c) channels.push([c, (v) => v + 128]);
   for (let c = 4; c < 7 && view; ++c) channels.push([c, (v) => 255 - v]);
   if (weight) channels.push([3, (v) => v]);
-  if (packed.length !== 2 * n * channels.length) throw new PageError('a part of the page is damaged: ' + id);
   if (!scale) for (let i = 0; i < n; ++i) into.fill(128, 8 * i, 8 * i + 3);
-  for (const [k, [at, code]] of channels.entries()) {
-    channelNumbers(packed, k, earlier, number);
+  await eachChannel(text, id, n, channels.length, (k, bytes) => {
+    const [at, code] = channels[k];
+    channelNumbers(bytes, earlier, number);
     for (let i = 0; i < n; ++i) into[8 * i + at] = code(number[i]);
-  }
+  });
   return new Uint32Array(into.buffer);
-}
-
-// Codes of 8 bits; put(first voxel, codes [count, channels], count).
-async function unpackColors(id, header, channels, earlier, put, progress) {
-  const bytes = await bytesOf(id), n = earlier.length / 3;
-  const {matrix, scale, step} = header;
-  if (bytes.length !== 2 * n * channels || matrix.length !== channels * channels ||
-      scale.length !== channels)
-    throw new PageError('a part of the page is damaged: ' + id);
-  const numbers = [];
-  for (let k = 0; k < channels; ++k) {
-    numbers.push(new Int16Array(n));
-    channelNumbers(bytes, k, earlier, numbers[k]);
-    if (k % 4 === 3) {
-      progress(0.5 * k / channels);
-      await wait();
-    }
-  }
-  // By parts whose sums stay in a cache.
-  const part = 1024, sum = new Float64Array(part * channels), codes = new Uint8Array(part * channels);
-  const rows = numbers.map((_, k) => Float64Array.from(matrix.slice(k * channels, (k + 1) * channels)));
-  let shown = performance.now();
-  for (let begin = 0; begin < n; begin += part) {
-    const count = Math.min(part, n - begin);
-    sum.fill(0);
-    for (let k = 0; k < channels; ++k) {
-      const own = numbers[k], row = rows[k];
-      for (let i = 0, at = 0; i < count; ++i, at += channels) {
-        const number = own[begin + i];
-        if (number === 0) continue;
-        const y = number * step;
-        for (let j = 0; j < channels; ++j) sum[at + j] += row[j] * y;
-      }
-    }
-    for (let i = 0, j = 0; i < count * channels; ++i) {
-      const code = Math.fround(sum[i]) / scale[j];
-      codes[i] = Math.max(-127, Math.min(127, code)) + 128.5;  // rounded down
-      if (++j === channels) j = 0;
-    }
-    put(begin, codes, count);
-    if (performance.now() - shown < 50) continue;
-    progress(0.5 + 0.5 * begin / n);
-    await wait();
-    shown = performance.now();
-  }
 }

@@ -2,78 +2,141 @@
 
 // What a worker runs; it must not use anything outside itself. See network.glsl.
 function workerOfStyle() {
-  let task;
+  const X = 0, Y = 4096, FIRST = 8192;  // in floats: a layer's eight voxels, the next one's, weights and biases
+  let task, floats, functions;
   const activations = [(x) => Math.sin(task.omega * x), (x) => Math.max(x, 0), (x) => Math.max(x, 0.01 * x),
                        (x) => 1 / (1 + Math.exp(-x)), (x) => Math.tanh(x)];
-  onmessage = ({data}) => {
-    if (data.layers) return void (task = data);
-    const {first, second, extra, key} = data, n = first.length / 4, own = extra && new Uint8Array(extra.buffer);
-    const from = [new Uint8Array(first.buffer), new Uint8Array(second.buffer)];
-    const activate = activations[task.activation], {layers, base, constant} = task;
-    let x = new Float64Array(64), y = new Float64Array(64);
-    const s = new Float64Array(30);
-    for (let v = 0; v < n; ++v) {
-      const b = second[4 * v + 3];
-      if (b >>> 31) {
-        first.fill(0x80808080, 4 * v, 4 * v + 4);
-        second.fill(0x80808080, 4 * v, 4 * v + 4);
-        continue;
-      }
-      for (let i = 0; i < 27; ++i) s[i] = ((i < 16 ? from[0][16 * v + i] : from[1][16 * v + i - 16]) - 128) * task.scale[i];
-      const place = [from[1][16 * v + 11] | (b & 31) << 8, b >>> 5 & 8191, b >>> 18 & 8191];
-      for (let a = 0; a < 3; ++a) s[27 + a] = ((place[a] + task.shift) * task.unit[a] - 1) * task.positionScale;
-      x.set(s);
-      for (let l = 0; l < 6; ++l) {
-        // Weights [inputs, outputs], outputs a multiple of 4.
-        const {weight, bias, inputs, outputs} = layers[l];
-        for (let o = 0; o < outputs; o += 4) {
-          let y0 = bias[o], y1 = bias[o + 1], y2 = bias[o + 2], y3 = bias[o + 3];
-          for (let i = 0, k = o; i < inputs; ++i, k += outputs) {
-            const xi = x[i];
-            y0 += weight[k] * xi;
-            y1 += weight[k + 1] * xi;
-            y2 += weight[k + 2] * xi;
-            y3 += weight[k + 3] * xi;
+  // As those of lanes.js, where WebAssembly is not allowed: two voxels at once, so that a weight is read once for both.
+  const plain = {
+    layer(x, y, weights, bias, inputs, blocks) {
+      [x, y, weights, bias] = [x / 4, y / 4, weights / 4, bias / 4];
+      for (let q = 0; q < blocks; ++q)
+        for (let h = 0; h < 8; h += 2) {
+          const b = bias + 4 * q, to = y + 32 * q + h;
+          let a0 = floats[b], a1 = floats[b + 1], a2 = floats[b + 2], a3 = floats[b + 3], b0 = a0, b1 = a1, b2 = a2, b3 = a3;
+          for (let i = 0, k = weights + 4 * inputs * q, at = x + h; i < inputs; ++i, k += 4, at += 8) {
+            const xa = floats[at], xb = floats[at + 1], w0 = floats[k], w1 = floats[k + 1], w2 = floats[k + 2], w3 = floats[k + 3];
+            a0 += w0 * xa; b0 += w0 * xb;
+            a1 += w1 * xa; b1 += w1 * xb;
+            a2 += w2 * xa; b2 += w2 * xb;
+            a3 += w3 * xa; b3 += w3 * xb;
           }
-          y[o] = y0; y[o + 1] = y1; y[o + 2] = y2; y[o + 3] = y3;
+          floats[to] = a0; floats[to + 8] = a1; floats[to + 16] = a2; floats[to + 24] = a3;
+          floats[to + 1] = b0; floats[to + 9] = b1; floats[to + 17] = b2; floats[to + 25] = b3;
         }
-        if (l < 5) for (let o = 0; o < outputs; ++o) y[o] = activate(y[o]);
+    }};
+  function begin() {
+    try {
+      functions = new WebAssembly.Instance(new WebAssembly.Module(task.program)).exports;
+      floats = new Float32Array(functions.memory.buffer);
+    } catch (error) {
+      functions = plain;
+      floats = new Float32Array(1 << 16);
+    }
+    let next = FIRST;
+    for (const layer of task.layers) {
+      const {weight, bias, inputs, outputs} = layer;
+      layer.weights = 4 * next;
+      for (let q = 0; q < outputs; q += 4) for (let i = 0; i < inputs; ++i) for (let k = 0; k < 4; ++k) floats[next++] = weight[i * outputs + q + k];
+      layer.biases = 4 * next;
+      for (const b of bias) floats[next++] = b;
+    }
+  }
+  // Numbers of 27 coefficients, [channel, harmonic], and back: `to` is y = opponent s harmonics^T.
+  const turned = new Float64Array(27);
+  function fromNumbers({opponent, harmonics}, q, s) {
+    for (let j = 0; j < 9; ++j)
+      for (let c = 0; c < 3; ++c) turned[9 * c + j] = opponent[c] * q[j] + opponent[3 + c] * q[9 + j] + opponent[6 + c] * q[18 + j];
+    s.fill(0);
+    for (let c = 0; c < 27; c += 9)
+      for (let j = 0; j < 9; ++j) for (let k = 0; k < 9; ++k) s[c + k] += harmonics[9 * j + k] * turned[c + j];
+  }
+  function toNumbers({opponent, harmonics}, s, q) {
+    turned.fill(0);
+    for (let c = 0; c < 27; c += 9)
+      for (let j = 0; j < 9; ++j) for (let k = 0; k < 9; ++k) turned[c + j] += harmonics[9 * j + k] * s[c + k];
+    for (let j = 0; j < 9; ++j)
+      for (let a = 0; a < 3; ++a)
+        q[9 * a + j] = opponent[3 * a] * turned[j] + opponent[3 * a + 1] * turned[9 + j] + opponent[3 * a + 2] * turned[18 + j];
+  }
+  onmessage = ({data}) => {
+    if (data.layers) {
+      task = data;
+      return void begin();
+    }
+    const {color, place, extra, key} = data, n = color.length / 4, own = extra && new Uint8Array(extra.buffer);
+    const activate = activations[task.activation], {layers, base, constant, from, to} = task;
+    const {word: fromWord, above: fromAbove, unused: fromUnused} = from, {word: toWord, above: toAbove, unused: toUnused} = to;
+    const most = toUnused.map((unused) => 2 ** (31 - unused) - 1);
+    const s = Array.from({length: 8}, () => new Float64Array(27)), q = new Float64Array(27), r = new Float64Array(27);
+    for (let begin = 0; begin < n; begin += 8) {
+      for (let h = 0; h < 8; ++h) {
+        const v = Math.min(begin + h, n - 1), a = place[2 * v], b = place[2 * v + 1];
+        for (let i = 0; i < 27; ++i) {
+          q[i] = (color[4 * v + fromWord[i]] << fromAbove[i] >> fromUnused[i]) * from.step[i];
+        }
+        fromNumbers(from, q, s[h]);
+        for (let i = 0; i < 27; ++i) floats[X + 8 * i + h] = s[h][i];
+        floats[X + 216 + h] = (((a & 8191) + task.shift) * task.unit[0] - 1) * task.positionScale;
+        floats[X + 224 + h] = (((a >>> 13) + task.shift) * task.unit[1] - 1) * task.positionScale;
+        floats[X + 232 + h] = (((b & 8191) + task.shift) * task.unit[2] - 1) * task.positionScale;
+      }
+      let x = X, y = Y;
+      for (let l = 0; l < 6; ++l) {
+        const {weights, biases, inputs, outputs} = layers[l];
+        functions.layer(4 * x, 4 * y, weights, biases, inputs, outputs / 4);
+        if (l < 5 && task.activation === 0 && functions.sine) functions.sine(4 * y, 2 * outputs, task.omega);
+        else if (l < 5) for (let o = y; o < y + 8 * outputs; ++o) floats[o] = activate(floats[o]);
         [x, y] = [y, x];
       }
-      for (let j = 0; j < 27; ++j) {
-        const c = Math.floor(j / 9), k = j % 9;
-        let value = x[j] + base[3 * c] * s[k] + base[3 * c + 1] * s[9 + k] + base[3 * c + 2] * s[18 + k] +
-            (k === 0 ? constant[c] : 0);
-        if (own) {
+      for (let h = 0; h < 8 && begin + h < n; ++h) {
+        const v = begin + h, source = s[h];
+        color.fill(0, 4 * v, 4 * v + 4);
+        if (place[2 * v + 1] >>> 31) continue;
+        for (let j = 0; j < 27; ++j) {
+          const c = Math.floor(j / 9), k = j % 9;
+          r[j] = floats[x + 8 * j + h] + base[3 * c] * source[k] + base[3 * c + 1] * source[9 + k] + base[3 * c + 2] * source[18 + k] +
+              (k === 0 ? constant[c] : 0);
+          if (!own) continue;
           const at = 8 * v, weight = own[at + 3] / 255;
-          value = k === 0 ? value + (own[at + c] - 128) * task.residualScale[c] : value * own[at + 4 + c] / 255;
-          value = (1 - weight) * s[j] + weight * value;
+          r[j] = k === 0 ? r[j] + (own[at + c] - 128) * task.residualScale[c] : r[j] * own[at + 4 + c] / 255;
+          r[j] = (1 - weight) * source[j] + weight * r[j];
         }
-        const code = Math.floor(Math.max(-127, Math.min(127, value / task.styledScale[j])) + 128.5);
-        if (j < 16) from[0][16 * v + j] = code; else from[1][16 * v + j - 16] = code;
+        toNumbers(to, r, q);
+        for (let i = 0; i < 27; ++i) {
+          const number = Math.max(-most[i], Math.min(most[i], Math.floor(q[i] / to.step[i] + 0.5)));
+          color[4 * v + toWord[i]] |= number << toUnused[i] >>> toAbove[i];
+        }
       }
     }
-    postMessage({first, second, key}, [first.buffer, second.buffer]);
+    postMessage({color, key}, [color.buffer]);
   };
 }
 
-// Fills `colors` from the source, strip by strip; `layers` as loadWeights has them.
-async function restyleOnCores(graphics, scene, style, layers, residual, colors, progress) {
+// Fills `colors` from the source, strip by strip; `layers` as loadWeights has them; `place` and `residual` of all slots.
+async function restyleOnCores(graphics, scene, style, layers, {place, residual}, colors, progress) {
   const gl = graphics.gl, url = URL.createObjectURL(new Blob(['(' + workerOfStyle + ')()'], {type: 'text/javascript'}));
-  const height = scene.source.first.height, rows = 8, framebuffer = gl.createFramebuffer();
+  const {height} = scene.source.color, rows = 8, framebuffer = gl.createFramebuffer();
   const read = (texture, y, count) => {
     const data = new Uint32Array(4 * WIDTH * count);
     gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
     gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture.texture, 0);
     gl.readPixels(0, y, WIDTH, count, gl.RGBA_INTEGER, gl.UNSIGNED_INT, data);
-    return data;
+    return data.subarray(0, 4 * Math.min(WIDTH * count, scene.slots - WIDTH * y)).slice();
   };
   const write = (texture, y, data) => {
+    const texels = data.length / 4, whole = Math.floor(texels / WIDTH), rest = texels % WIDTH;
     gl.activeTexture(gl.TEXTURE0);
     gl.bindTexture(gl.TEXTURE_2D, texture.texture);
-    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, y, WIDTH, data.length / 4 / WIDTH, gl.RGBA_INTEGER, gl.UNSIGNED_INT, data);
+    if (whole) gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, y, WIDTH, whole, gl.RGBA_INTEGER, gl.UNSIGNED_INT, data, 0);
+    if (rest) gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, y + whole, rest, 1, gl.RGBA_INTEGER, gl.UNSIGNED_INT, data, 4 * WIDTH * whole);
   };
-  const setup = {layers, base: style.base, constant: style.constant, scale: scene.source.scale, styledScale: style.scale,
+  const withPlaces = ({opponent, harmonics, step, bits}) => {
+    const places = placesOfNumbers(bits), column = (name) => Int32Array.from(places, (place) => place[name]);
+    return {opponent: Float64Array.from(opponent), harmonics: Float64Array.from(harmonics), step: Float64Array.from(step),
+            word: column('word'), above: column('above'), unused: column('unused')};
+  };
+  const setup = {layers, program: lanesProgram(), base: style.base, constant: style.constant, from: withPlaces(scene.source.code), to: withPlaces(colors.code),
                  omega: style.omega, activation: style.activation, positionScale: style.position_scale,
                  residualScale: style.residual?.scale ?? [0, 0, 0], unit: scene.positionUnit, shift: scene.header.finest === null ? 0.5 : 0};
   let next = 0, done = 0;
@@ -82,16 +145,14 @@ async function restyleOnCores(graphics, scene, style, layers, residual, colors, 
     await Promise.all(workers.map((worker) => new Promise((finish, fail) => {
       const give = () => {
         if (next >= height) return finish();
-        const y = next, count = Math.min(rows, height - y);
+        const y = next, count = Math.min(rows, height - y), part = (data) => data.slice(2 * WIDTH * y, 2 * WIDTH * (y + count));
         next += count;
-        const first = read(scene.source.first, y, count), second = read(scene.source.second, y, count);
-        const extra = residual?.slice(2 * WIDTH * y, 2 * WIDTH * (y + count));
-        worker.postMessage({first, second, extra, key: y}, [first.buffer, second.buffer, ...extra ? [extra.buffer] : []]);
+        const color = read(scene.source.color, y, count), places = part(place), extra = residual ? part(residual) : null;
+        worker.postMessage({color, place: places, extra, key: y}, [color.buffer, places.buffer, ...extra ? [extra.buffer] : []]);
       };
       worker.onerror = (event) => fail(new PageError('this browser runs no workers: ' + event.message));
       worker.onmessage = ({data}) => {
-        write(colors.first, data.key, data.first);
-        write(colors.second, data.key, data.second);
+        write(colors.color, data.key, data.color);
         progress(Math.min(0.999, ++done * rows / height));
         give();
       };
