@@ -17,7 +17,7 @@ if(REGRADE_FUZZ)
 endif()
 if(REGRADE_SANITIZE)
   target_compile_options(regrade_flags INTERFACE
-    -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer -g)
+    -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer -g1)
   target_link_options(regrade_flags INTERFACE -fsanitize=address,undefined)
 endif()
 
