@@ -11,6 +11,7 @@
 
 #include "kernels/process/child_process.h"
 #include "pipeline/files/json_file.h"
+#include "pipeline/page/color_code.h"
 #include "tests/support/hostile_requests.h"
 #include "tests/support/keyframes.h"
 #include "tests/support/loopback.h"
@@ -139,8 +140,9 @@ TEST(ViewCommand, ADroppedPictureBecomesAStyleAndAPathTheFilmOfRender) {
   const JsonValue style = ParseJson(BodyOf(view.Ask("GET", "/style")), "style");
   EXPECT_GT(style.At("weights").AsString().size(), 1000u);
   const std::string codes = BodyOf(view.Ask("GET", "/style/codes"));
-  EXPECT_GT(codes.size(), 27u * 100);
-  EXPECT_EQ(codes.size() % 27, 0u);
+  constexpr size_t kVoxel = 4 * kCodeWords;  // bytes
+  EXPECT_GT(codes.size(), kVoxel * 100);
+  EXPECT_EQ(codes.size() % kVoxel, 0u);
 
   JsonValue path = testing::SomeKeyframes();
   path["styles"] = JsonValue::Array{style.At("id"), "unknown"};
