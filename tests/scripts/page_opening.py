@@ -1,6 +1,6 @@
 """How a scene page opens: the coarse scene first, then the whole one, with workers and without; a module of other scripts."""
 
-from browser import SIZES, Page, complaints, open_page, wait_until
+from browser import FEW_PIXELS, SIZES, Page, complaints, open_page, wait_until
 from page_pictures import compare_pictures
 
 # Workers' answers with a field wait until the test lets them through.
@@ -38,7 +38,7 @@ CANVAS = """((name) => {
 def check_coarse_first(browser, path):
     """While the whole scene is held back, the coarse one is drawn and answers keys; then it is replaced, and its bytes are free."""
     found = []
-    page = Page(browser, path, SIZES["phone"], before=HELD)
+    page = Page(browser, path, SIZES["phone"], before=HELD, scale=FEW_PIXELS)
     try:
         wait_until(page, "!!globalThis.regradePage?.painter?.shown")
     except RuntimeError:
@@ -86,7 +86,7 @@ def check_coarse_first(browser, path):
 def check_without_workers(browser, path, views):
     found = []
     for name, script in [("no workers", NO_WORKERS), ("broken workers", BROKEN_WORKERS)]:
-        page = open_page(browser, path, SIZES["phone"], script)
+        page = open_page(browser, path, SIZES["phone"], script, FEW_PIXELS)
         found += [f"{name}: {c}" for c in compare_pictures(page, views[:1] + views[-1:]) + complaints(page)]
         page.close()
     return found

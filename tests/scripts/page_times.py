@@ -86,7 +86,7 @@ def main():
     size = tuple(map(int, arguments.size.split("x")))
     print("load     " + " ".join(f"{x:.1f}" for x in os.getloadavg()))
     with running(arguments.chromium) as browser:
-        page = open_page(browser, arguments.page, size, MARKS + (NO_WORKERS if arguments.without_workers else ""), 1200)
+        page = open_page(browser, arguments.page, size, MARKS + (NO_WORKERS if arguments.without_workers else ""), seconds=1200)
         found = measure(page, arguments.page)
     print("load     " + " ".join(f"{x:.1f}" for x in os.getloadavg()))
     for complaint in found:
