@@ -31,18 +31,26 @@ std::unique_ptr<ViewStylizer> MakeColorMethod(StyleMethodKind kind, const StyleO
                                               const Image& style, const Capture& capture,
                                               const PhotoFunction& photo) {
   // `all` colours evenly from all photos, but 256 of each at least.
-  const auto sample = [&](int64_t all) {
+  const auto sample = [&](int64_t all, std::vector<double>* heights = nullptr) {
     const int64_t most =
         std::max<int64_t>(256, all / std::max<int64_t>(1, std::ssize(capture.views)));
     std::vector<Vec3d> scene;
-    for (size_t i = 0; i < capture.views.size(); ++i)
-      if (const std::optional<Image> picture = photo(i))
-        for (const Vec3d& color : SampleColors(*picture, capture.views[i].path, most))
-          scene.push_back(color);
+    for (size_t i = 0; i < capture.views.size(); ++i) {
+      const std::optional<Image> picture = photo(i);
+      if (!picture) continue;
+      std::vector<double> of_view;
+      for (const Vec3d& color :
+           SampleColors(*picture, capture.views[i].path, most, heights ? &of_view : nullptr))
+        scene.push_back(color);
+      if (heights) heights->insert(heights->end(), of_view.begin(), of_view.end());
+    }
     return scene;
   };
-  if (kind == StyleMethodKind::kGmm)
-    return MakeMixtureTransfer(options, style, sample(kMixtureSample));
+  if (kind == StyleMethodKind::kGmm) {
+    std::vector<double> heights;
+    const std::vector<Vec3d> scene = sample(kMixtureSample, &heights);
+    return MakeMixtureTransfer(options, style, scene, heights);
+  }
   if (kind == StyleMethodKind::kIdt || kind == StyleMethodKind::kHistogram) {
     if (!options.scene_wide) return MakeDistributionTransfer(options, style);
     const std::vector<Vec3d> scene = sample(4 * kColorSample);

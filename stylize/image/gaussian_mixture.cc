@@ -78,8 +78,8 @@ GaussianMixture Maximised(const GaussianMixture& last, const std::vector<PartSum
     Mat3d covariance;
     for (int i = 0; i < 3; ++i)
       covariance.row[i] = part.second.row[i] / part.count - shift * shift[i];
-    mixture.push_back(
-        {part.count, last[k].mean + shift, WidenedCovariance(covariance, kPartVarianceFloor)});
+    mixture.push_back({part.count, last[k].mean + shift,
+                       WidenedCovariance(covariance, kPartVarianceFloor), last[k].height});
     kept += part.count;
   }
   for (GaussianPart& part : mixture) part.weight /= kept;
@@ -170,6 +170,22 @@ GaussianMixture FitMixture(const std::vector<Vec3d>& colors, int parts, uint64_t
 GaussianMixture AdaptMixture(const GaussianMixture& prior, const std::vector<Vec3d>& colors) {
   REGRADE_CHECK(!colors.empty() && !prior.empty());
   return Iterate(prior, colors, &prior);
+}
+
+void MeasureHeights(const std::vector<Vec3d>& colors, const std::vector<double>& heights,
+                    GaussianMixture* mixture) {
+  REGRADE_CHECK(colors.size() == heights.size());
+  const std::vector<PartDensity> densities = DensitiesOf(*mixture, 0);
+  std::vector<double> shares(mixture->size()), weight(mixture->size()), sum(mixture->size());
+  for (size_t i = 0; i < colors.size(); ++i) {
+    SharesOf(densities, colors[i], shares.data());
+    for (size_t k = 0; k < shares.size(); ++k) {
+      weight[k] += shares[k];
+      sum[k] += shares[k] * heights[i];
+    }
+  }
+  for (size_t k = 0; k < mixture->size(); ++k)
+    if (weight[k] > 0) (*mixture)[k].height = sum[k] / weight[k];
 }
 
 }  // namespace regrade

@@ -12,6 +12,7 @@ struct GaussianPart {
   double weight = 0;  // of the mixture; they sum to 1
   Vec3d mean{};
   Mat3d covariance;  // eigenvalues at least kPartVarianceFloor
+  double height = 0.5;  // mean of its colours in their pictures, 0 at the bottom, 1 at the top
 };
 using GaussianMixture = std::vector<GaussianPart>;
 
@@ -30,10 +31,14 @@ inline constexpr int64_t kMixtureSample = 1 << 14;  // colours that a mixture is
 // same for any number of threads. `colors` is not empty, and finite.
 GaussianMixture FitMixture(const std::vector<Vec3d>& colors, int parts, uint64_t seed);
 
-// `prior` carried over to other colours: its parts, which keep their order, count as
-// kPriorShare of the colours, so that none gets lost where few colours belong to it.
+// `prior` carried over to other colours: its parts, which keep their order and their heights,
+// count as kPriorShare of the colours, so that none gets lost where few colours belong to it.
 inline constexpr double kPriorShare = 0.02;
 GaussianMixture AdaptMixture(const GaussianMixture& prior, const std::vector<Vec3d>& colors);
+
+// Sets each part's height to the mean of `heights`, those of `colors`, weighted by r_ik.
+void MeasureHeights(const std::vector<Vec3d>& colors, const std::vector<double>& heights,
+                    GaussianMixture* mixture);
 
 // The covariance with its eigenvalues raised to `least`.
 Mat3d WidenedCovariance(const Mat3d& covariance, double least);

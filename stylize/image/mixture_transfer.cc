@@ -17,12 +17,18 @@ constexpr uint64_t kSeed = 0x67;
 class MixtureTransfer : public ViewStylizer {
  public:
   MixtureTransfer(const StyleOptions& options, const Image& style,
-                  const std::vector<Vec3d>& scene)
-      : options_(options),
-        style_(FitMixture(SampleColors(style, "the style picture", kMixtureSample),
-                          options.parts, kSeed)),
-        scene_(FitMixture(scene, options.parts, kSeed)),
-        of_scene_(ComputeMixtureMap(scene_, style_, options.max_slope)) {
+                  const std::vector<Vec3d>& scene, const std::vector<double>& heights)
+      : options_(options) {
+    std::vector<double> style_heights;
+    const std::vector<Vec3d> colors =
+        SampleColors(style, "the style picture", kMixtureSample, &style_heights);
+    style_ = FitMixture(colors, options.parts, kSeed);
+    scene_ = FitMixture(scene, options.parts, kSeed);
+    if (options.height_weight > 0) {
+      MeasureHeights(colors, style_heights, &style_);
+      MeasureHeights(scene, heights, &scene_);
+    }
+    of_scene_ = MapFrom(scene_);
     const Mat3d& c = MeasureColor(style).covariance;
     flat_ = std::max({c(0, 0), c(1, 1), c(2, 2)}) <= kRoundingVariance;
   }
@@ -33,8 +39,7 @@ class MixtureTransfer : public ViewStylizer {
     const MixtureMap map =
         options_.scene_wide
             ? of_scene_
-            : ComputeMixtureMap(AdaptMixture(scene_, SampleColors(view, where, kMixtureSample)),
-                                style_, options_.max_slope);
+            : MapFrom(AdaptMixture(scene_, SampleColors(view, where, kMixtureSample)));
     return MapView(view, std::cref(map));
   }
 
@@ -51,6 +56,10 @@ class MixtureTransfer : public ViewStylizer {
   }
 
  private:
+  MixtureMap MapFrom(const GaussianMixture& source) const {
+    return ComputeMixtureMap(source, style_, options_.max_slope, options_.height_weight);
+  }
+
   StyleOptions options_;
   GaussianMixture style_, scene_;
   MixtureMap of_scene_;
@@ -61,9 +70,10 @@ class MixtureTransfer : public ViewStylizer {
 
 std::unique_ptr<ViewStylizer> MakeMixtureTransfer(const StyleOptions& options,
                                                   const Image& style,
-                                                  const std::vector<Vec3d>& scene) {
+                                                  const std::vector<Vec3d>& scene,
+                                                  const std::vector<double>& heights) {
   REGRADE_CHECK(ParseStyleMethod(options).kind == StyleMethodKind::kGmm && !scene.empty());
-  return std::make_unique<MixtureTransfer>(options, style, scene);
+  return std::make_unique<MixtureTransfer>(options, style, scene, heights);
 }
 
 }  // namespace regrade

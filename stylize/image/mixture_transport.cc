@@ -84,7 +84,7 @@ Vec3d MixtureMap::operator()(const Vec3d& color) const {
 }
 
 MixtureMap ComputeMixtureMap(const GaussianMixture& source, const GaussianMixture& style,
-                             double max_slope) {
+                             double max_slope, double height_weight) {
   REGRADE_CHECK(!source.empty() && source.size() <= kMostParts && !style.empty() &&
                 style.size() <= kMostParts && max_slope > 0);
   constexpr double kStep = 1.25;  // of the eigenvalues, from one trial to the next
@@ -94,6 +94,10 @@ MixtureMap ComputeMixtureMap(const GaussianMixture& source, const GaussianMixtur
   for (const GaussianPart& part : source) {
     maps.push_back(MapsOf(part, style));
     cost.push_back(maps.back().cost);
+    for (size_t l = 0; l < style.size(); ++l) {
+      const double apart = height_weight * (part.height - style[l].height);
+      cost.back()[l] += apart * apart;
+    }
     from.push_back(part.weight);
   }
   for (const GaussianPart& part : style) to.push_back(part.weight);

@@ -12,7 +12,8 @@ namespace regrade {
 // EQ(mixture-transport), Delon and Desolneux 2020. Between parts with means m, n and
 // covariances S, R, the map of least squared change, and what it costs, are
 //   T_kl(x) = n_l + A (x - m_k),  A = S^-1/2 (S^1/2 R S^1/2)^1/2 S^-1/2,
-//   c_kl = |m_k - n_l|^2 + tr(S) + tr(R) - 2 tr((S^1/2 R S^1/2)^1/2).
+//   c_kl = |m_k - n_l|^2 + tr(S) + tr(R) - 2 tr((S^1/2 R S^1/2)^1/2) + h^2 (v_k - u_l)^2,
+// with v and u the parts' heights in their pictures and h = height_weight, 0 in the paper.
 // With the cheapest plan w_kl between the parts' weights (see EQ(transport-plan)) and the
 // shares r_k(x) of the source's parts (see EQ(gaussian-mixture)),
 //   T(x) = sum_k r_k(x) sum_l w_kl / w_k T_kl(x).
@@ -32,8 +33,8 @@ struct MixtureMap {
 inline constexpr int kSlopeTable = 33;
 inline constexpr int kMostParts = 16;
 
-// Both have between 1 and kMostParts parts; max_slope > 0.
+// Both have between 1 and kMostParts parts; max_slope > 0, height_weight >= 0.
 MixtureMap ComputeMixtureMap(const GaussianMixture& source, const GaussianMixture& style,
-                             double max_slope);
+                             double max_slope, double height_weight = 0);
 
 }  // namespace regrade

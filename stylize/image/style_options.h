@@ -17,6 +17,7 @@ struct StyleOptions {
   bool scene_wide = false;
   int parts = 6;
   double max_slope = 4;
+  double height_weight = 0;
   int iterations = 20;
   bool regrain = false;
   int max_side = 1024;
@@ -50,6 +51,13 @@ struct StyleOptions {
                   "groups are widened where it would be more, which makes them less distinct",
           .min = 1.5,
           .max = 100});
+    bind("height-weight", height_weight,
+         {.help = "how much the height in the picture counts, beside colour, when method gmm "
+                  "chooses groups of the style for a group of the photos, so that a sky takes "
+                  "the style's sky: from bottom to top as much as this step of one channel; 0 "
+                  "looks at colours alone",
+          .min = 0,
+          .max = 10});
     bind("style-iterations", iterations,
          {.help = "rotations of method idt; its time grows with them", .min = 1, .max = 200});
     bind("style-regrain", regrain,

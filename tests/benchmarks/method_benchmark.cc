@@ -2,7 +2,8 @@
 //
 //   method_benchmark METHOD[,METHOD...] STYLE.jpg[,STYLE.jpg...] SIDE SHEET.png FOLDER...
 //
-// METHOD is as of --method: mkl, gmm, reinhard, idt, histogram or onnx:DIR. Pictures are
+// METHOD is as of --method: mkl, gmm, reinhard, idt, histogram or onnx:DIR; gmm+height is gmm with
+// --height-weight 1. Pictures are
 // brought to SIDE pixels. SHEET.png shows one picture of each folder in each style, by each
 // method; "-" writes none. Prints a Markdown table; a row is a mean over folders and styles,
 // the worst in brackets: the distance of the styled pictures' colours to the style's (sliced
@@ -44,16 +45,21 @@ std::unique_ptr<ViewStylizer> Make(const StyleOptions& options, const Image& sty
   const StyleMethodKind kind = method.kind;
   if (kind == StyleMethodKind::kOnnx)
     return MakeOnnxStylizer(method.argument, options.max_side, style);
+  std::vector<double> heights;
   const auto sample = [&](int64_t all) {
     std::vector<Vec3d> scene;
-    for (const Image& photo : photos)
-      for (const Vec3d& c :
-           SampleColors(photo, "", std::max<int64_t>(256, all / std::ssize(photos))))
-        scene.push_back(c);
+    for (const Image& photo : photos) {
+      std::vector<double> of_photo;
+      const int64_t most = std::max<int64_t>(256, all / std::ssize(photos));
+      for (const Vec3d& c : SampleColors(photo, "", most, &of_photo)) scene.push_back(c);
+      heights.insert(heights.end(), of_photo.begin(), of_photo.end());
+    }
     return scene;
   };
-  if (kind == StyleMethodKind::kGmm)
-    return MakeMixtureTransfer(options, style, sample(kMixtureSample));
+  if (kind == StyleMethodKind::kGmm) {
+    const std::vector<Vec3d> scene = sample(kMixtureSample);
+    return MakeMixtureTransfer(options, style, scene, heights);
+  }
   if (kind == StyleMethodKind::kIdt || kind == StyleMethodKind::kHistogram) {
     const std::vector<Vec3d> scene = sample(4 * kColorSample);
     return MakeDistributionTransfer(options, style, options.scene_wide ? &scene : nullptr);
@@ -156,6 +162,10 @@ int Main(const std::vector<std::string>& words) {
       StyleOptions options;
       options.method = given;
       const std::string name = given.starts_with("onnx:") ? "onnx" : given;
+      if (given == "gmm+height") {
+        options.method = "gmm";
+        options.height_weight = 1;
+      }
       if (name == "onnx" && scene_wide) continue;
       options.scene_wide = scene_wide;
       Row row;

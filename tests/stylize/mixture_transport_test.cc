@@ -173,6 +173,56 @@ TEST(MixtureTransport, SkyAndGrassMoveApart) {
   EXPECT_LE(Norm(grass / num_grass - kDusk[1].mean), 0.02);
 }
 
+// The upper half of the picture is of one colour, the lower of another, both with grain.
+Image SkyAbove(uint64_t seed, const Vec3d& sky, const Vec3d& ground) {
+  Image image = Groups(seed, {{1, {0, 0, 0}, 0}});
+  const Image upper = Groups(seed, {{1, sky, 0.03}}), lower = Groups(seed, {{1, ground, 0.03}});
+  const size_t half = image.pixels.size() / 2;
+  for (size_t i = 0; i < image.pixels.size(); ++i)
+    image.pixels[i] = (i < half ? upper : lower).pixels[i];
+  return image;
+}
+
+TEST(MixtureTransport, WithAWeightOfHeightTheSkyTakesTheStylesSky) {
+  // By colour alone the blue sky resembles the style's blue ground.
+  const Image photo = SkyAbove(3, {0.4, 0.5, 0.8}, {0.6, 0.45, 0.3});
+  const Image style = SkyAbove(4, {0.8, 0.5, 0.3}, {0.3, 0.4, 0.6});
+  std::vector<double> heights;
+  const std::vector<Vec3d> colors = SampleColors(photo, "", kMixtureSample, &heights);
+  const auto styled_sky = [&](double weight) {
+    StyleOptions options = Gmm(100);
+    options.parts = 2;
+    options.height_weight = weight;
+    const Image styled =
+        MakeMixtureTransfer(options, style, colors, heights)->Stylize(photo, 0);
+    const int64_t half = styled.num_pixels() / 2;
+    Vec3d mean{};
+    for (int64_t i = 0; i < half; ++i) {
+      const float* p = &styled.pixels[3 * i];
+      mean += Vec3d{p[0], p[1], p[2]};
+    }
+    return mean / static_cast<double>(half);
+  };
+  EXPECT_LE(Norm(styled_sky(0) - Vec3d{0.3, 0.4, 0.6}), 0.02);
+  EXPECT_LE(Norm(styled_sky(1.5) - Vec3d{0.8, 0.5, 0.3}), 0.02);
+}
+
+TEST(MixtureTransport, AViewKeepsTheScenesHeights) {
+  const Image photo = SkyAbove(3, {0.4, 0.5, 0.8}, {0.6, 0.45, 0.3});
+  std::vector<double> heights;
+  const std::vector<Vec3d> colors = SampleColors(photo, "", kMixtureSample, &heights);
+  GaussianMixture scene = FitMixture(colors, 2, 1);
+  MeasureHeights(colors, heights, &scene);
+  // A camera that looks up sees the sky alone; its sky is as high as in all photos.
+  const GaussianMixture view =
+      AdaptMixture(scene, SampleColors(Groups(9, {{1, {0.4, 0.5, 0.8}, 0.03}}), ""));
+  ASSERT_EQ(view.size(), 2u);
+  for (size_t k = 0; k < 2; ++k) {
+    EXPECT_NEAR(scene[k].height, scene[k].mean.z > 0.5 ? 0.75 : 0.25, 0.01);
+    EXPECT_EQ(view[k].height, scene[k].height);
+  }
+}
+
 TEST(MixtureTransport, H180_BothSidesEqualGiveTheIdentity) {
   for (const std::vector<Group>& groups : {kSkyAndGrass, kDusk}) {
     const Image picture = Groups(3, groups);
