@@ -1,6 +1,7 @@
 #include "pipeline/capture/photo_gains.h"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <utility>
 
@@ -39,6 +40,7 @@ void UndoGain(const PhotoGain& gain, Image* photo) {
   if (gain == kAsTaken) return;
   for (size_t i = 0; i < photo->pixels.size(); ++i) {
     float& value = photo->pixels[i];
+    if (std::isnan(value)) continue;
     const double factor = gain.light[static_cast<int>(i % 3)];
     const double undone = SrgbFromLinear(std::min(1.0, LinearFromSrgb(value) / factor));
     // A reduced photo has values in between at the edge of what was clipped.
@@ -52,6 +54,7 @@ void PutGain(const PhotoGain& gain, Image* picture) {
   if (gain == kAsTaken) return;
   for (size_t i = 0; i < picture->pixels.size(); ++i) {
     float& value = picture->pixels[i];
+    if (std::isnan(value)) continue;
     const double light =
         LinearFromSrgb(std::clamp(value, 0.0f, 1.0f)) * gain.light[static_cast<int>(i % 3)];
     value = static_cast<float>(SrgbFromLinear(std::min(1.0, light)));

@@ -35,7 +35,7 @@ struct PhotoGains {
 PhotoGains GainsOf(const ExposureEstimate& estimate, const std::vector<Vec3d>& clipped);
 
 // Converts the photo to the capture's mean exposure: linear values over gain, clipped to [0,
-// 1].
+// 1]. NaN stays NaN, here and below.
 void UndoGain(const PhotoGain& gain, Image* photo);
 // The inverse: the render as a camera of that gain would show it.
 void PutGain(const PhotoGain& gain, Image* picture);

@@ -15,8 +15,8 @@ namespace regrade {
 inline constexpr char kCeilingControl[] = "control_ceiling";  // the row's name
 
 // `styled` with its coefficients moved by least squares to `pictures`, one for each camera, of
-// its size; NaN is left out. See EQ(coefficient-fit): 30 steps, at most 600000 rays of all
-// views.
+// its size and of the capture's mean exposure; NaN is left out. See EQ(coefficient-fit): 30
+// steps, at most 600000 rays of all views.
 StoredField CeilingField(StoredField styled, const std::vector<Camera>& cameras,
                          const FrameSource& pictures, uint64_t seed,
                          const ProgressFunction& progress);

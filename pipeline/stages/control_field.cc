@@ -53,13 +53,15 @@ StoredField ControlField(RunContext* context, const WorkingViews& views,
 }
 
 NamedFrameSource ControlFieldFrames(const StoredField& stored,
-                                    const std::vector<Camera>& cameras,
+                                    const std::vector<Camera>& cameras, const PhotoGains& gains,
                                     const std::string& name) {
   const auto grid = std::make_shared<const FastGrid>(MakeFastGrid(stored.field));
   return {name,
-          {static_cast<int>(cameras.size()), [grid, cameras, step = stored.field.step](int i) {
+          {static_cast<int>(cameras.size()),
+           [grid, cameras, gains, step = stored.field.step](int i) {
              Image frame =
                  RenderView(*grid, cameras[static_cast<size_t>(i)], MarchOptions{step}).color;
+             PutGain(gains.Of(i), &frame);
              for (float& value : frame.pixels) value = std::round(255 * value) / 255;
              return frame;
            }}};

@@ -24,9 +24,9 @@ StoredField ControlField(RunContext* context, const WorkingViews& views,
                          const std::function<Image(int)>& picture,
                          const ProgressFunction& progress);
 
-// Its frames at the cameras, with 8 bits as frames on disk have.
+// Its frames at the cameras with these gains, and with 8 bits as frames on disk have.
 NamedFrameSource ControlFieldFrames(const StoredField& stored,
-                                    const std::vector<Camera>& cameras,
+                                    const std::vector<Camera>& cameras, const PhotoGains& gains,
                                     const std::string& name = kFieldControl);
 
 }  // namespace regrade

@@ -30,6 +30,7 @@
 #include "pipeline/stages/control_field.h"
 #include "pipeline/stages/control_sequences.h"
 #include "pipeline/stages/film_frames.h"
+#include "pipeline/stages/frame_gains.h"
 #include "pipeline/stages/heat_map_files.h"
 #include "pipeline/stages/linear_map_baseline.h"
 #include "pipeline/stages/make_stylizer.h"
@@ -219,10 +220,20 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
     views.LeaveOutMasked(i, &picture);
     return picture;
   };
+  // What is compared with frames at the photos' places has their exposures.
+  const PhotoGains gains = FrameGains(views, settings.render, all),
+                   training_gains = FrameGains(views, settings.render, training_views);
+  const WorkingViews as_shown = settings.render.keep_exposure ? views.AsTaken() : views;
+  const auto photo_2d_as_shown = [&](int i) {
+    Image picture = photo_2d(i);
+    PutGain(gains.Of(i), &picture);
+    return picture;
+  };
   const ViewControls controls{
-      &views, !settings.object.On(), of_picture ? &style : nullptr,
+      &as_shown, !settings.object.On(), of_picture ? &style : nullptr,
       [&](int i) {  // held-out photos have no picture: NaN is left out
-        if (std::ranges::find(training_views, i) != training_views.end()) return photo_2d(i);
+        if (std::ranges::find(training_views, i) != training_views.end())
+          return photo_2d_as_shown(i);
         Image none = views.Photo(i);
         std::ranges::fill(none.pixels, std::nanf(""));
         return none;
@@ -235,12 +246,12 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   if (settings.consistency.control_field) {
     field_2d = ControlField(context, views, stored, training_views, photo_2d,
                             parts.Next(kControlFieldSeconds));
-    sequences.push_back(ControlFieldFrames(*field_2d, compared));
+    sequences.push_back(ControlFieldFrames(*field_2d, compared, gains));
   }
   // Fidelity is measured on the training views of the style, against the 2D method applied to
   // the rendered frames, or else to the photos.
   const FrameSource of_photos{static_cast<int>(training_views.size()),
-                              [&](int k) { return photo_2d(training_views[k]); }};
+                              [&](int k) { return photo_2d_as_shown(training_views[k]); }};
   FidelityTargets networks;
   if (of_picture) networks.style = &style;
   OpenNetworks(settings.consistency, &networks);
@@ -253,9 +264,9 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   std::optional<StoredField> ceiling;
   if (settings.consistency.controls) {
     ceiling = CeilingField(ReadStyledField(context->workspace->folder(), workspace.folder()),
-                           training_cameras, targets.views_2d, settings.run.seed,
-                           parts.Next(kCeilingSeconds));
-    sequences.push_back(ControlFieldFrames(*ceiling, compared, kCeilingControl));
+                           training_cameras, UndoGains(targets.views_2d, training_gains),
+                           settings.run.seed, parts.Next(kCeilingSeconds));
+    sequences.push_back(ControlFieldFrames(*ceiling, compared, gains, kCeilingControl));
   }
   BeginHeatMaps(workspace);
   std::vector<HeatMapFile> heat_maps;
@@ -274,9 +285,11 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
     Append(controls.Of(training_views, targets.unstyled, targets.views_2d,
                        measured.back().frames, true),
            &measured);
-  if (field_2d) measured.push_back(ControlFieldFrames(*field_2d, training_cameras));
+  if (field_2d)
+    measured.push_back(ControlFieldFrames(*field_2d, training_cameras, training_gains));
   if (ceiling)
-    measured.push_back(ControlFieldFrames(*ceiling, training_cameras, kCeilingControl));
+    measured.push_back(
+        ControlFieldFrames(*ceiling, training_cameras, training_gains, kCeilingControl));
   std::vector<FidelityRow> fidelity = MeasureFidelities(
       measured, targets, parts.Next(n * kFrameSeconds * static_cast<double>(measured.size())));
   AddFilm(context, networks, CommonCamera(cameras), &parts, &consistency, &fidelity,
@@ -299,7 +312,8 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
           ? Metric::Undefined("one map of the whole scene does not compare with an object's")
           : Metric(LinearMapPsnr(stored.field, training_cameras,
                                  frames("source", training_views), targets.views_2d,
-                                 targets.transmittance, parts.Next(n * kLinearMapSeconds)));
+                                 targets.transmittance, training_gains,
+                                 parts.Next(n * kLinearMapSeconds)));
   if (!settings.consistency.lpips.empty()) {
     const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
     const auto lpips = [&](const std::vector<int>& of) {

@@ -7,6 +7,7 @@
 #include "kernels/field/cpu/render_view.h"
 #include "kernels/field/packed_grid.h"
 #include "kernels/image/color_statistics.h"
+#include "pipeline/stages/frame_gains.h"
 #include "stylize/image/monge_kantorovich.h"
 
 namespace regrade {
@@ -63,9 +64,10 @@ std::optional<ColorMap> BestLinearMap(const FrameSource& source, const FrameSour
 std::optional<double> LinearMapPsnr(const RadianceField& field,
                                     const std::vector<Camera>& cameras,
                                     const FrameSource& source, const FrameSource& views_2d,
-                                    const FrameSource& transmittance,
+                                    const FrameSource& transmittance, const PhotoGains& gains,
                                     const ProgressFunction& progress) {
-  const std::optional<ColorMap> better = BestLinearMap(source, views_2d);
+  const std::optional<ColorMap> better =
+      BestLinearMap(UndoGains(source, gains), UndoGains(views_2d, gains));
   if (!better) return std::nullopt;
   RadianceField mapped = field;
   mapped.appearance = ApplyColorMap(field.appearance, *better);
@@ -74,7 +76,7 @@ std::optional<double> LinearMapPsnr(const RadianceField& field,
   const FrameSource rendered{
       source.count,
       [&](int i) { return RenderView(grid, cameras[i], MarchOptions{field.step}).color; }};
-  return MeasureFidelity({"linear_map", rendered},
+  return MeasureFidelity({"linear_map", PutGains(rendered, gains)},
                          {views_2d, transmittance, nullptr, {}, {}, /*only_psnr=*/true},
                          progress)
       .psnr_to_2d_db;

@@ -8,6 +8,7 @@
 #include "kernels/base/progress.h"
 #include "kernels/field/radiance_field.h"
 #include "kernels/scene/camera.h"
+#include "pipeline/capture/photo_gains.h"
 #include "stylize/linear_map.h"
 
 namespace regrade {
@@ -18,11 +19,12 @@ namespace regrade {
 std::optional<ColorMap> BestLinearMap(const FrameSource& source, const FrameSource& views_2d);
 
 // PSNR, measured as psnr_to_2d_db, of the field under BestLinearMap carried into its
-// coefficients (see EQ(sh-color-map)) and rendered at `cameras`.
+// coefficients (see EQ(sh-color-map)) and rendered at `cameras`. The frames have `gains`: the
+// map is that of frames without them, and they are put on what is rendered.
 std::optional<double> LinearMapPsnr(const RadianceField& field,
                                     const std::vector<Camera>& cameras,
                                     const FrameSource& source, const FrameSource& views_2d,
-                                    const FrameSource& transmittance,
+                                    const FrameSource& transmittance, const PhotoGains& gains,
                                     const ProgressFunction& progress);
 
 }  // namespace regrade

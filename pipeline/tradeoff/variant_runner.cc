@@ -245,8 +245,8 @@ void VariantRunner::MeasureStyle(const Variant& variant, const ProgressFunction&
   const bool of_renders = fs::exists(base.Path("frames/views_2d"));
   std::vector<double> psnr;
   for (const int i : EvenlySpaced(StyledViews(base, views), kStyledViews)) {
-    const RenderedView view =
-        RenderView(grid, views.CameraOf(i), MarchOptions{styled.field.step});
+    RenderedView view = RenderView(grid, views.CameraOf(i), MarchOptions{styled.field.step});
+    if (of_renders && base_->settings.render.keep_exposure) PutGain(views.Gain(i), &view.color);
     Image target = ReadImage(
         base.Path(std::string(of_renders ? "frames/views_2d/" : "views_2d/") + FrameName(i)));
     if (!of_renders) views.LeaveOutMasked(i, &target);

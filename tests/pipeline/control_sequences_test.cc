@@ -8,8 +8,14 @@
 #include <map>
 
 #include "evaluate/fidelity.h"
+#include "kernels/field/cpu/render_view.h"
 #include "kernels/image/color_statistics.h"
+#include "pipeline/stages/control_ceiling.h"
+#include "pipeline/stages/control_field.h"
+#include "pipeline/stages/frame_gains.h"
+#include "pipeline/stages/linear_map_baseline.h"
 #include "tests/evaluate/synthetic_frames.h"
+#include "tests/support/small_field.h"
 
 namespace regrade {
 namespace {
@@ -102,6 +108,79 @@ TEST(ControlSequences, TheMapNeedsATarget) {
   const Vec3d want = MeasureColor(style).mean, have = MeasureColor(mapped).mean;
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(have[c], want[c], 0.03);  // colours are clipped
   EXPECT_EQ(ControlSequences({frames, frames, {}, &style, false}).size(), 2u);
+}
+
+// --- frames with the exposures of their photos
+
+// Two views of a field whose style is a linear map: nothing is clipped.
+struct ExposedViews {
+  StoredField stored{testing::RandomField({8, 8, 8}, 1, 1.0, 3), {}, {}};
+  std::vector<Camera> cameras = std::vector<Camera>(2);
+  PhotoGains gains{{{{0.5, 0.5, 0.6}}, {{1.4, 1.3, 1.2}}}};
+  FrameSource source, views_2d;
+  Vec3f background_2d;
+
+  ExposedViews() {
+    RadianceField& field = stored.field;
+    for (int64_t i = 0; i < field.appearance.sh.size(); ++i) field.appearance.sh[i] *= 0.4f;
+    for (size_t i = 0; i < cameras.size(); ++i) {
+      Camera& camera = cameras[i];
+      camera.width = 40, camera.height = 30;
+      camera.fx = camera.fy = 40, camera.cx = 20, camera.cy = 15;
+      camera.camera_from_world.translation = {0.3 * static_cast<double>(i), 0, 4};
+    }
+    ColorMap map;
+    map.matrix.row[0] = {0.7, 0.2, 0};
+    map.offset = {0, 0.1, -0.05};
+    RadianceField styled = field;
+    styled.appearance = ApplyColorMap(field.appearance, map);
+    styled.background = background_2d = MapBackground(map, field.background);
+    source = PutGains(Rendered(field), gains);
+    views_2d = PutGains(Rendered(styled), gains);
+  }
+
+  FrameSource Rendered(const RadianceField& field) const {
+    return {static_cast<int>(cameras.size()), [this, field](int i) {
+              return RenderView(field, cameras[static_cast<size_t>(i)],
+                                MarchOptions{field.step})
+                  .color;
+            }};
+  }
+};
+
+TEST(FrameGains, TheLinearMapsFieldIsComparedInTheFramesExposures) {
+  const ExposedViews v;
+  const auto psnr = [&v](const PhotoGains& gains) {
+    return *LinearMapPsnr(v.stored.field, v.cameras, v.source, v.views_2d, {}, gains, {});
+  };
+  EXPECT_GT(psnr(v.gains), 50);
+  EXPECT_LT(psnr({}), 25);
+}
+
+TEST(FrameGains, TheCeilingIsFittedAndComparedInTheFramesExposures) {
+  ExposedViews v;
+  v.stored.field.background = v.background_2d;  // which is not fitted
+  const auto psnr = [&v](const PhotoGains& gains) {
+    const StoredField ceiling =
+        CeilingField(v.stored, v.cameras, UndoGains(v.views_2d, gains), 1, {});
+    return *MeasureFidelity(ControlFieldFrames(ceiling, v.cameras, gains, kCeilingControl),
+                            {v.views_2d, {}, nullptr, {}, {}, /*only_psnr=*/true})
+                .psnr_to_2d_db;
+  };
+  EXPECT_GT(psnr(v.gains), 35);
+  EXPECT_LT(psnr({}), 30);
+}
+
+TEST(FrameGains, AreThoseOfThePhotosWithKeepExposureOnly) {
+  Capture capture;
+  capture.views.resize(3);
+  const std::vector<PhotoGain> of_view{{{0.5, 1, 1}}, kAsTaken, {{1, 1, 2}, 0.25}};
+  const WorkingViews views = WorkingViews(capture, 100, 0).WithGains({of_view});
+  RenderOptions options;
+  EXPECT_TRUE(FrameGains(views, options, {0, 2}).of_view.empty());
+  options.keep_exposure = true;
+  EXPECT_EQ(FrameGains(views, options, {2, 0}).of_view,
+            (std::vector<PhotoGain>{of_view[2], of_view[0]}));
 }
 
 }  // namespace

@@ -6,16 +6,21 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <map>
 
 #include "kernels/base/error.h"
 #include "kernels/scene/srgb.h"
 #include "pipeline/capture/scene_profile.h"
 #include "pipeline/capture/track_colors.h"
 #include "pipeline/capture/working_views.h"
+#include "pipeline/files/json_file.h"
+#include "pipeline/images/image_file.h"
 #include "pipeline/synth/synth_effects.h"
 #include "tests/support/expect_error.h"
+#include "tests/support/source_dir.h"
 #include "tests/support/synthetic_photos.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/support/tiny_run.h"
 
 namespace regrade {
 namespace {
@@ -142,6 +147,18 @@ TEST(PhotoGains, PutBackIsTheInverse) {
     EXPECT_NEAR(photo.pixels[i], before.pixels[i], 1e-6);
 }
 
+// Pixels that are left out stay left out, whatever the gain.
+TEST(PhotoGains, NanStaysNan) {
+  Image photo(1, 1);
+  photo.pixels = {std::nanf(""), 0.5f, std::nanf("")};
+  for (const double factor : {0.5, 2.0}) {
+    PutGain({{factor, factor, factor}, 0.5}, &photo);
+    UndoGain({{factor, factor, factor}, 0.5}, &photo);
+    EXPECT_TRUE(std::isnan(photo.pixels[0]) && std::isnan(photo.pixels[2])) << factor;
+    EXPECT_NEAR(photo.pixels[1], 0.5, 1e-6);
+  }
+}
+
 TEST(PhotoGains, H155_AsTakenIsBitForBit) {
   Image photo(2, 1);
   for (size_t i = 0; i < photo.pixels.size(); ++i)
@@ -182,6 +199,56 @@ TEST(PhotoGains, AreStoredBesideThePoses) {
   WriteGains(poses, capture, estimate, {});
   EXPECT_FALSE(fs::exists(file));
   fs::remove_all(folder);
+}
+
+// Every other photo has 0.4 of the light. With --keep-exposure so have its frames, and what
+// they are compared with. A tenth of the style leaves exposures as most of what can differ: in
+// one exposure the ceiling would have 27 dB, the field of the 2D method's pictures and the
+// linear map 20 dB, and both rows of photos two decibels less.
+TEST(KeepExposure, WhatFramesAreComparedWithHasTheirExposures) {
+  const testing::TemporaryFolder folder;
+  testing::SyntheticPhotos photos{.width = 100, .height = 75, .pixels_a_point = 5};
+  photos.effects.noise = false;
+  testing::WriteSyntheticWorkspace(photos, folder / "s");
+  for (int i = 0; i < photos.views; i += 2) {
+    const std::string path = folder / ("s/images/" + FrameName(i));
+    Image photo = ReadImage(path);
+    ApplyGain(0.4, &photo);
+    WritePng8(path, photo);
+  }
+  const auto run = [](std::vector<std::string> words, const std::vector<std::string>& more) {
+    words.insert(words.end(), more.begin(), more.end());
+    const testing::ProgramOutcome done = testing::RunProgram(REGRADE_PROGRAM, words);
+    ASSERT_EQ(done.code, 0) << done.text;
+  };
+  run({"run",        folder / "s",
+       "--style",    testing::SourceDir() + "/assets/style_sunset.png",
+       "--out",      folder / "o",
+       "--preset",   "draft",
+       "--effects",  "exposure=on,view-dependence=off",
+       "--device",   "cpu",
+       "--controls", "--control-field",
+       "--gaps",     "1",
+       "--strength", "0.1",
+       "--page",     "off"},
+      testing::TinyFlags());
+  const auto metrics = [&folder] {
+    const JsonValue report = ReadJsonFile(folder / "o/styles/style_sunset/report.json");
+    std::map<std::string, double> found;
+    for (const JsonValue& row : report.At("fidelity").AsArray())
+      if (const JsonValue& db = row.At("psnr_to_2d_db"); db.IsNumber())
+        found[row.At("sequence").AsString()] = db.AsDouble();
+    for (const char* name : {"psnr_to_2d_photos_db", "linear_map_psnr_to_2d_db"})
+      found[name] = report.At("stages").At("evaluate").At(name).AsDouble();
+    return found;
+  };
+  std::map<std::string, double> one = metrics();
+  run({"render", folder / "o", "--keep-exposure"}, {});
+  std::map<std::string, double> kept = metrics();
+  EXPECT_GT(kept["control_ceiling"], kept["styled"]);
+  EXPECT_GT(kept["linear_map_psnr_to_2d_db"], kept["source"]);
+  for (const char* name : {"control_field_2d", "photos_2d", "psnr_to_2d_photos_db"})
+    EXPECT_NEAR(kept[name], one[name], 1.2) << name;
 }
 
 TEST(TrackColors, WindowIsTheMeanLightAroundAPoint) {
