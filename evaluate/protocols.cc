@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <optional>
 #include <sstream>
+#include <utility>
 
 #include "kernels/base/error.h"
 
@@ -36,24 +37,34 @@ std::vector<int> GapsOf(const Protocol& protocol) {
 
 [[noreturn]] void Refuse(const Protocol& protocol, const std::string& flag,
                          const std::string& why) {
-  throw UsageError(
-      "--protocol " + protocol.name + " " + why, flag,
-      "leave out " + flag + ", or give --mode, --gaps, --warp and --flow without " + kProtocol);
+  throw UsageError("--protocol " + protocol.name + " " + why, flag,
+                   "leave out " + flag +
+                       ", or give --mode, --gaps, --warp, --error-per and --flow without " +
+                       kProtocol);
+}
+
+// The flags that a protocol may leave to the user, with its values.
+std::vector<std::pair<std::string, std::string>> SwitchesOf(const Protocol& protocol) {
+  return {{"--mode", protocol.mode},
+          {"--gaps", protocol.gaps},
+          {"--warp", protocol.warp},
+          {"--error-per", protocol.error_per}};
 }
 
 }  // namespace
 
 const std::vector<Protocol>& Protocols() {
   static const std::vector<Protocol> protocols{
-      {"liprf", "ruder2016", "1,5", "earlier", true,
+      {"liprf", "ruder2016", "1,5", "earlier", "", true,
        "LipRF: short and long range, the mask of Ruder et al., the earlier frame warped"},
-      {"lai2018", "lai2018", "1", "later", true,
+      {"lai2018", "lai2018", "1", "later", "channel", true,
        "Lai et al. 2018, as their evaluator computes it"},
-      {"ruder2016", "ruder2016", "1", "", true,
+      {"ruder2016", "ruder2016", "1", "", "channel", true,
        "Ruder et al. 2016, as their checker computes it"},
-      {"stylegaussian", "stylegaussian", "1,7", "", true,
+      {"stylegaussian", "stylegaussian", "1,7", "", "", true,
        "StyleGaussian: RMSE and LPIPS after forward warping, as published and corrected"},
-      {"geometry", "geometry", "1,5", "", false, "exact motion from depth and cameras"},
+      {"geometry", "geometry", "1,5", "", "channel", false,
+       "exact motion from depth and cameras"},
   };
   return protocols;
 }
@@ -73,12 +84,16 @@ void UseProtocol(const std::string& name, ConsistencyOptions* options) {
   options->mode = protocol.mode;
   options->gaps = GapsOf(protocol);
   if (!protocol.warp.empty()) options->warp = protocol.warp;
+  if (!protocol.error_per.empty()) options->error_per = protocol.error_per;
 }
 
 std::string ProtocolOf(const ConsistencyOptions& options) {
+  const auto agrees = [](const std::string& value, const std::string& own) {
+    return own.empty() || value == own;
+  };
   for (const Protocol& protocol : Protocols())
     if (options.mode == protocol.mode && options.gaps == GapsOf(protocol) &&
-        (protocol.warp.empty() || options.warp == protocol.warp))
+        agrees(options.warp, protocol.warp) && agrees(options.error_per, protocol.error_per))
       return protocol.name;
   return "";
 }
@@ -99,19 +114,18 @@ std::vector<std::string> ExpandProtocol(const std::vector<std::string>& words) {
   }
   if (!protocol) return words;
 
-  std::vector<std::string> flags{"--mode=" + protocol->mode, "--gaps=" + protocol->gaps};
-  if (!protocol->warp.empty()) flags.push_back("--warp=" + protocol->warp);
+  std::vector<std::string> flags;
+  for (const auto& [flag, value] : SwitchesOf(*protocol))
+    if (!value.empty()) flags.push_back(flag + "=" + value);
   for (size_t i = 0; i < end; ++i) {
     if (!protocol->has_flow && ValueAt(words, i, "--flow"))
       Refuse(*protocol, "--flow", "takes motion from depth and cameras, not from flow");
-    for (const auto& [flag, value] :
-         {std::pair{"--mode", protocol->mode}, std::pair{"--gaps", protocol->gaps},
-          std::pair{"--warp", protocol->warp}}) {
+    for (const auto& [flag, value] : SwitchesOf(*protocol)) {
       const auto given = ValueAt(words, i, flag);
       if (!given || value.empty()) continue;
       if (*given != value)
-        Refuse(*protocol, flag, std::string("has ") + flag + " " + value + ", not " + *given);
-      std::erase(flags, std::string(flag) + "=" + value);
+        Refuse(*protocol, flag, "has " + flag + " " + value + ", not " + *given);
+      std::erase(flags, flag + "=" + value);
     }
   }
   kept.insert(kept.begin(), flags.begin(), flags.end());

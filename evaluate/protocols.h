@@ -11,9 +11,10 @@ namespace regrade {
 // One protocol. An empty text leaves the flag to the user.
 struct Protocol {
   std::string name;
-  std::string mode;  // --mode
-  std::string gaps;  // --gaps
-  std::string warp;  // --warp
+  std::string mode;       // --mode
+  std::string gaps;       // --gaps
+  std::string warp;       // --warp
+  std::string error_per;  // --error-per
   // A protocol with exact motion has none to estimate, so --flow contradicts it.
   bool has_flow = true;
   std::string source;  // the definition that it follows
