@@ -51,9 +51,9 @@ void PrintPlan(const std::string& command, RunContext* context) {
                          pose.plan);
   if (command == "pose") return;
   const int threads = omp_get_max_threads();
-  const int64_t photos =
-      ExpectedPhotos(InputsOf(DetectCapture(context->source)), settings.ingest);
-  const int64_t side = settings.scene.photo_size, pixels = photos * side * side * 3 / 4;
+  const int64_t pixels =
+      ExpectedPixels(ExpectedPhotos(InputsOf(DetectCapture(context->source)), settings.ingest),
+                     settings.scene.photo_size, settings.run.holdout);
   const bool on_card =
       ChooseBackend(settings.run.device, settings.run.reproducible) == Backend::kCuda;
   const FitOptions fit = AdaptOptions(settings.fit, {.on_card = on_card, .pixels = pixels});

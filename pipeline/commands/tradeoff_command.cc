@@ -11,12 +11,14 @@
 #include "kernels/base/hash.h"
 #include "kernels/field/cpu/rays.h"
 #include "pipeline/capture/capture_store.h"
+#include "pipeline/capture/ingest_photos.h"
 #include "pipeline/commands/command.h"
 #include "pipeline/commands/probe_styles.h"
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/program/interrupt.h"
 #include "pipeline/report/cost_rows.h"
 #include "pipeline/report/html.h"
+#include "pipeline/run/plan.h"
 #include "pipeline/run/resolve_settings.h"
 #include "pipeline/run/run_file.h"
 #include "pipeline/run_pipeline.h"
@@ -172,7 +174,10 @@ void MeasureAll(RunContext* base, const TradeoffOptions& tradeoff, const std::st
   std::erase_if(
       jobs, [&](const Job& job) { return store->Find(*job.variant, job.repeat) != nullptr; });
   Console* console = base->console;
-  DurationEstimate estimate(base->settings, store->all());
+  const Capture capture = ReadCapture(base->workspace->Path("poses"));
+  DurationEstimate estimate(
+      base->settings, store->all(),
+      [&capture](const RunSettings& settings) { return FittedPixels(settings, capture); });
   VariantRunner runner(base, folder + "/work");
   for (size_t i = 0; i < jobs.size(); ++i) {
     double left = 0;
@@ -300,7 +305,10 @@ void RunTradeoff(const Command& command, const Arguments& arguments, Console* co
   const std::string base_name = BaseName(settings, base.options, &choice.presets);
   const std::vector<Variant> variants = VariantsOf(settings, choice);
   if (settings.start.dry_run) {
-    const DurationEstimate estimate(settings, {});
+    const int64_t photos = ExpectedPhotos(InputsOf(source), settings.ingest);
+    const DurationEstimate estimate(settings, {}, [photos](const RunSettings& of) {
+      return ExpectedPixels(photos, of.scene.photo_size, of.run.holdout);
+    });
     double all = 0;
     for (const Variant& variant : variants) {
       console->Info(NameOf(variant) + ", about " + DurationText(estimate.Seconds(variant)));

@@ -48,6 +48,11 @@ std::string MemoryText(double bytes) {
 
 }  // namespace
 
+int64_t ExpectedPixels(int64_t photos, int photo_size, int holdout) {
+  const int64_t held_out = holdout > 0 ? (photos + holdout - 1) / holdout : 0;
+  return (photos - held_out) * photo_size * photo_size * 3 / 4;
+}
+
 StagePlan PlanFit(const FitOptions& options, int64_t photo_pixels, const SceneBox& box,
                   int threads) {
   const double record = 4.0 * RecordLanes(BasisOfDegree(options.sh_degree));

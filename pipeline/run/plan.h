@@ -44,6 +44,10 @@ struct StagePlan {
   double seconds = 0;
 };
 
+// Pixels of the photos that are fitted, at working size, before any is read: of `photos` every
+// `holdout`-th is kept out, as in HeldOutViews, and all are taken for 4:3 and no smaller.
+int64_t ExpectedPixels(int64_t photos, int photo_size, int holdout);
+
 // `photo_pixels`: of all fitted photos, at working size. A cube, the upper bound, for a `box`
 // that is not known yet.
 StagePlan PlanFit(const FitOptions& options, int64_t photo_pixels, const SceneBox& box,

@@ -2,6 +2,8 @@
 
 #include <omp.h>
 
+#include <utility>
+
 #include "pipeline/run/plan.h"
 #include "reconstruct/fit/adapt_options.h"
 
@@ -16,8 +18,9 @@ std::string KeyOf(const std::string& benchmark, const std::string& parameter,
 }  // namespace
 
 DurationEstimate::DurationEstimate(const RunSettings& base,
-                                   const std::vector<Measurement>& measured)
-    : base_(base) {
+                                   const std::vector<Measurement>& measured,
+                                   FittedPixelsFunction pixels_of)
+    : base_(base), pixels_of_(std::move(pixels_of)) {
   for (const Measurement& m : measured) Add(m);
 }
 
@@ -49,8 +52,11 @@ double DurationEstimate::Rough(const Variant& variant) const {
   if (variant.benchmark == "fit" || variant.benchmark == "style")
     options.ApplyConfig(variant.options, "tradeoff");
   const int threads = omp_get_max_threads();
-  if (variant.benchmark == "fit")
-    return PlanFit(AdaptOptions(settings.fit, {}), 0, SceneBox(), threads).seconds;
+  if (variant.benchmark == "fit") {
+    const int64_t pixels = pixels_of_(settings);
+    return PlanFit(AdaptOptions(settings.fit, {.pixels = pixels}), pixels, SceneBox(), threads)
+        .seconds;
+  }
   if (variant.benchmark == "style") return PlanStyle(settings.network.steps, threads).seconds;
   return variant.benchmark == "poses" ? kPoses : kFewSeconds;
 }

@@ -1,6 +1,8 @@
 // Estimates the duration of measurements from rough rates, corrected by what has been measured.
 #pragma once
 
+#include <cstdint>
+#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -11,7 +13,11 @@ namespace regrade {
 
 class DurationEstimate {
  public:
-  DurationEstimate(const RunSettings& base, const std::vector<Measurement>& measured);
+  // `pixels_of`: of the photos that a fit with these settings has, at working size; small ones
+  // have fewer stages.
+  using FittedPixelsFunction = std::function<int64_t(const RunSettings&)>;
+  DurationEstimate(const RunSettings& base, const std::vector<Measurement>& measured,
+                   FittedPixelsFunction pixels_of);
 
   void Add(const Measurement& measurement);
   double Seconds(const Variant& variant) const;
@@ -23,6 +29,7 @@ class DurationEstimate {
   double Rough(const Variant& variant) const;
 
   RunSettings base_;
+  FittedPixelsFunction pixels_of_;
   std::map<std::string, Sum> benchmarks_;  // measured and estimated seconds of the base
   std::map<std::string, double> last_;     // last measured seconds of each variant
 };

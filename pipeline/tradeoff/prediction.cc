@@ -35,13 +35,15 @@ const std::vector<StageUnits>& AllUnits() {
   return all;
 }
 
+int64_t PixelsOf(const CaptureView& view, const RunSettings& settings) {
+  const Camera camera = WorkingCamera(view.camera, settings.scene.photo_size, {}, {});
+  return int64_t{camera.width} * camera.height;
+}
+
 double PhotoPixels(const RunSettings& settings, const Capture& capture) {
-  double pixels = 0;
-  for (const CaptureView& view : capture.views) {
-    const Camera camera = WorkingCamera(view.camera, settings.scene.photo_size, {}, {});
-    pixels += static_cast<double>(camera.width) * camera.height;
-  }
-  return pixels;
+  int64_t pixels = 0;
+  for (const CaptureView& view : capture.views) pixels += PixelsOf(view, settings);
+  return static_cast<double>(pixels);
 }
 
 // A measured time and the amount of each unit.
@@ -106,6 +108,14 @@ double FilmPixels(const RunSettings& settings, const Capture& capture, const Cam
 
 }  // namespace
 
+int64_t FittedPixels(const RunSettings& settings, const Capture& capture) {
+  const std::vector<bool> held_out = HeldOutViews(capture, settings.run.holdout);
+  int64_t pixels = 0;
+  for (size_t i = 0; i < capture.views.size(); ++i)
+    if (!held_out[i]) pixels += PixelsOf(capture.views[i], settings);
+  return pixels;
+}
+
 double AmountOf(const std::string& unit, const RunSettings& settings, const Capture& capture) {
   const double photos = static_cast<double>(capture.views.size());
   const double pixels = PhotoPixels(settings, capture);
@@ -137,7 +147,8 @@ double AmountOf(const std::string& unit, const RunSettings& settings, const Capt
     return sum;
   }
   if (unit == "ray voxels") {
-    const FitOptions fit = AdaptOptions(settings.fit, {});
+    const FitOptions fit =
+        AdaptOptions(settings.fit, {.pixels = FittedPixels(settings, capture)});
     double sum = 0;
     for (size_t s = 0; s < std::min(fit.steps.size(), fit.resolutions.size()); ++s)
       sum += static_cast<double>(fit.steps[s]) * fit.rays_per_step * fit.resolutions[s];

@@ -22,9 +22,13 @@ struct StageTime {
   double seconds = 0, cpu_seconds = 0;
 };
 
+// Pixels of the photos that are fitted, at working size.
+int64_t FittedPixels(const RunSettings& settings, const Capture& capture);
+
 // The amount of `unit` in a run with these settings:
 //   trials: of view dependence, 1 or 0, the same work for every capture |
-//   photo megapixels: at matching size | ray voxels: rays times the grid's side, over the fit |
+//   photo megapixels: at matching size | ray voxels: rays times the grid's side, over the
+//   stages that the fit of these photos has (see AdaptOptions) |
 //   photo pixels: at working size | staged pixels: at the original size | style rays |
 //   frame pixels | pair pixels
 double AmountOf(const std::string& unit, const RunSettings& settings, const Capture& capture);
