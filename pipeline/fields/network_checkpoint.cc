@@ -5,7 +5,7 @@
 namespace regrade {
 namespace {
 
-constexpr uint32_t kVersion = 2;
+constexpr uint32_t kVersion = 3;
 
 // Lists the members once for both directions.
 template <typename Visitor, typename State>
@@ -16,10 +16,11 @@ void Visit(Visitor* visit, State* state) {
   visit->Value(&network.sh_scale);
   visit->Value(&network.position_scale);
   visit->Value(&network.has_base);
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) visit->Value(&network.base.matrix(i, j));
-    visit->Value(&network.base.offset[i]);
-  }
+  for (auto* map : {&network.base, &state->linear_map})
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) visit->Value(&map->matrix(i, j));
+      visit->Value(&map->offset[i]);
+    }
   visit->Values(&network.parameters);
   visit->Values(&network.singular_vectors);
   visit->Values(&state->adam.first_moment);

@@ -120,12 +120,12 @@ ColorMap Training::BetterMap(double* mse) {
 }
 
 ColorMap Training::ChooseBase() {
-  result_.linear_map = BetterMap(&state_.linear_map_mse);
+  state_.linear_map = BetterMap(&state_.linear_map_mse);
   // Where the 2D method is no colour map, least squares may find a map of large norm, which
   // amplifies every voxel's noise; from the other map the network learns as much.
-  const double least_squares = SpectralNorm(result_.linear_map.matrix);
+  const double least_squares = SpectralNorm(state_.linear_map.matrix);
   const bool steep = least_squares > SpectralNorm(scene_map_.map.matrix);
-  return options_.base == "best" && steep ? scene_map_.map : result_.linear_map;
+  return options_.base == "best" && steep ? scene_map_.map : state_.linear_map;
 }
 
 void Training::Start(int64_t bad_pixels) {
@@ -230,6 +230,7 @@ TrainNetworkResult Training::Conclude() {
   if (result_.smallest_k < 10 * std::sqrt(kSquareplusB))
     result_.warnings.push_back("a layer's norm has vanished: the network is constant");
   result_.psnr_db = Psnr(mse);
+  result_.linear_map = state_.linear_map;
   result_.linear_map_psnr_db = network_.data().has_base ? Psnr(state_.linear_map_mse) : 0;
   result_.steps = state_.step;
   result_.history = std::move(state_.history);

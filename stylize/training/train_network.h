@@ -45,7 +45,8 @@ struct BoundHistory {
 struct TrainingState {
   LipschitzNetworkData network;
   AdamState adam;
-  int64_t step = 0;  // done
+  int64_t step = 0;     // done
+  ColorMap linear_map;  // see TrainNetworkResult
   double linear_map_mse = 0;
   int64_t left_out_pixels = 0;
   BoundHistory history;

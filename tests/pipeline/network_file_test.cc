@@ -4,8 +4,10 @@
 
 #include <cstring>
 #include <limits>
+#include <utility>
 
 #include "kernels/base/random.h"
+#include "pipeline/fields/network_checkpoint.h"
 #include "pipeline/files/npz_file.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"
@@ -67,6 +69,24 @@ TEST(NetworkFile, RoundTripKeepsAllBits) {
   // Written again, it is the same file.
   WriteNetworkFile(folder / "again.npz", in);
   EXPECT_EQ(ReadText(folder / "again.npz"), ReadText(folder / "network.npz"));
+}
+
+TEST(NetworkCheckpoint, KeepsBothMaps) {
+  TrainingState state;
+  state.network = SmallNetwork().network.data();
+  state.linear_map_mse = 1.0 / 7;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) state.linear_map.matrix(i, j) = 1.0 / (20 + 3 * i + j);
+    state.linear_map.offset[i] = 0.3 * (i + 1);
+  }
+  const auto back = UnpackTrainingState(PackTrainingState(state));
+  ASSERT_TRUE(back);
+  for (const auto& [in, out] : {std::pair{back->linear_map, state.linear_map},
+                                std::pair{back->network.base, state.network.base}}) {
+    for (int i = 0; i < 3; ++i) EXPECT_EQ(in.matrix.row[i], out.matrix.row[i]);
+    EXPECT_EQ(in.offset, out.offset);
+  }
+  EXPECT_EQ(back->linear_map_mse, state.linear_map_mse);
 }
 
 TEST(NetworkFile, ArraysHaveTheirNames) {

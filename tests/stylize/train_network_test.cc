@@ -259,6 +259,7 @@ TEST(TrainNetwork, H109_H110_ResumeAndThreadsAreBitwise) {
   EXPECT_EQ(straight.network.data().singular_vectors, resumed.network.data().singular_vectors);
   EXPECT_EQ(straight.bound, resumed.bound);
   EXPECT_EQ(straight.psnr_db, resumed.psnr_db);
+  EXPECT_EQ(straight.linear_map({0.1, 0.5, 0.8}), resumed.linear_map({0.1, 0.5, 0.8}));
 }
 
 TEST(TrainNetwork, H109_RaysAreAFunctionOfSeedAndStep) {
