@@ -21,22 +21,6 @@ constexpr size_t kLeastOfEachClip = 8;  // frames
 constexpr double kFinerBy = 1.25;
 constexpr int kDivisions = 12;
 
-double SharpnessOf(const Image& grey) {
-  double sum = 0, sum_of_squares = 0, gradient = 0;
-  for (int y = 0; y < grey.height; ++y)
-    for (int x = 0; x < grey.width; ++x) {
-      const double v = *grey.at(x, y);
-      sum += v;
-      sum_of_squares += v * v;
-      const double dx = x + 1 < grey.width ? *grey.at(x + 1, y) - v : 0;
-      const double dy = y + 1 < grey.height ? *grey.at(x, y + 1) - v : 0;
-      gradient += dx * dx + dy * dy;
-    }
-  const double n = static_cast<double>(grey.num_pixels());
-  const double variance = std::max(0.0, sum_of_squares / n - sum / n * (sum / n));
-  return gradient / n / (variance + 1e-4);
-}
-
 Image Smaller(const Image& grey) {
   const double scale =
       std::min(1.0, static_cast<double>(kFlowSide) / std::max(grey.width, grey.height));
@@ -115,6 +99,23 @@ std::vector<size_t> PickFramesOfClip(const std::vector<FrameMeasure>& frames, si
 }
 
 }  // namespace
+
+double SharpnessOf(const Image& grey) {
+  const double n = static_cast<double>(grey.num_pixels());
+  double sum = 0;
+  for (const float v : grey.pixels) sum += v;
+  const double mean = sum / n;
+  double squares = 0, gradient = 0;
+  for (int y = 0; y < grey.height; ++y)
+    for (int x = 0; x < grey.width; ++x) {
+      const double v = *grey.at(x, y);
+      squares += (v - mean) * (v - mean);
+      const double dx = x + 1 < grey.width ? *grey.at(x + 1, y) - v : 0;
+      const double dy = y + 1 < grey.height ? *grey.at(x, y + 1) - v : 0;
+      gradient += dx * dx + dy * dy;
+    }
+  return gradient / n / (squares / n + 1e-4);
+}
 
 ClipSurvey SurveyClip(const std::string& file, const std::string& path,
                       const VideoLimits& limits, const ProgressFunction& progress) {

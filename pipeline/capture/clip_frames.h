@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "kernels/base/progress.h"
+#include "kernels/scene/image.h"
 #include "pipeline/images/video_reader.h"
 
 namespace regrade {
@@ -13,7 +14,7 @@ namespace regrade {
 // Of a frame that was decoded.
 struct FrameMeasure {
   double seconds = 0;    // since the film's first frame
-  double sharpness = 0;  // mean squared gradient over the variance of grey values
+  double sharpness = 0;  // see SharpnessOf
   double travel = 0;     // steps of the camera since the first frame; never decreases
 };
 
@@ -32,6 +33,11 @@ struct ClipSurvey {
 // other by that. Photos of a usual capture are one to three such steps apart.
 inline constexpr double kMotionStep = 0.06, kParallaxStep = 0.01;
 inline constexpr int kLeastFrames = 40, kMostFrames = 120;
+
+// Of a grey picture [H, W, 1]: the mean squared difference to the pixels on the right and
+// below, over the variance of its values, to which 1e-4 is added. Brightness does not change
+// it.
+double SharpnessOf(const Image& grey);
 
 // Decodes the whole film once, with two small grey frames in memory. What is wrong with the
 // file becomes its problem. Throws Interrupted.

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "kernels/base/random.h"
 #include "kernels/image/resize.h"
 #include "pipeline/capture/ingest_photos.h"
 #include "reconstruct/colmap/listed_pairs.h"
@@ -34,6 +35,19 @@ std::vector<FrameMeasure> Walk(int count, double steps) {
   std::vector<FrameMeasure> frames;
   for (int i = 0; i < count; ++i) frames.push_back({i / 30.0, 1, steps * i / (count - 1)});
   return frames;
+}
+
+// The noise is exact in floats at both brightnesses, so that only the sums round: of squares
+// near 2^48 no digit of a variance of 1 is left.
+TEST(SharpnessOf, BrightnessDoesNotChangeIt) {
+  Image noise(64, 48, 1);
+  for (size_t i = 0; i < noise.pixels.size(); ++i)
+    noise.pixels[i] = 2 * static_cast<float>(RandomIndex(1, 0, i, 2));
+  Image bright = noise;
+  for (float& v : bright.pixels) v += 0x1p24f;
+  const double sharp = SharpnessOf(noise);
+  EXPECT_NEAR(sharp, 4, 0.3);  // two differences of variance 2 over a variance of 1
+  EXPECT_NEAR(SharpnessOf(bright), sharp, 1e-9);
 }
 
 TEST(PickFrames, F90_TheirNumberFollowsTheTravel) {
