@@ -116,20 +116,45 @@ Requirement ParseRequirement(const std::string& text) {
   return wanted;
 }
 
+// A number that the report does not have, but these rows or stages.
+Metric OnlyOf(const std::vector<std::string>& there) {
+  return Metric::Undefined(there.empty() ? "nothing was measured"
+                                         : "measured: " + Join(there, ", "));
+}
+
+// The number, or why there is none.
 Metric Measured(const Requirement& wanted, const RunReport& report) {
+  std::vector<std::string> there;
   if (!IsSequence(wanted.subject)) {
-    bool known;
-    return NumberOfStage(report.stages, wanted, &known).value_or(Metric());
+    bool has_run = false, known = false;
+    StagesReport stages = report.stages;
+    stages.ForEach([&](const char* name, const auto& stage) {
+      if (stage) there.push_back(name);
+      has_run = has_run || (stage && name == wanted.subject);
+    });
+    return has_run ? NumberOfStage(stages, wanted, &known).value_or(Metric()) : OnlyOf(there);
   }
   if (wanted.gap) {
-    for (const ConsistencyMetrics& row : report.evaluation.consistency)
+    for (const ConsistencyMetrics& row : report.evaluation.consistency) {
       if (row.sequence == wanted.subject && row.gap == *wanted.gap)
         return NumberIn(row, wanted.metric).value_or(Metric());
-    return {};
+      there.push_back(Concat(row.sequence, " at gap ", row.gap));
+    }
+    return OnlyOf(there);
   }
-  for (const FidelityMetrics& row : report.evaluation.fidelity)
+  for (const FidelityMetrics& row : report.evaluation.fidelity) {
     if (row.sequence == wanted.subject) return NumberIn(row, wanted.metric).value_or(Metric());
-  return {};
+    there.push_back(row.sequence);
+  }
+  return OnlyOf(there);
+}
+
+// "tc_psnr of styled at gap 5 has no value (too few frames)"
+std::string NoValue(const Requirement& wanted, const Metric& measured) {
+  return wanted.metric + " of " + wanted.subject +
+         (wanted.gap ? Concat(" at gap ", *wanted.gap) : "") + " has no value" +
+         (measured.why.empty() ? ", and the report does not say why"
+                               : " (" + measured.why + ")");
 }
 
 }  // namespace
@@ -152,7 +177,7 @@ std::vector<std::string> FailedRequirements(const std::vector<Requirement>& requ
     const Metric measured = Measured(wanted, report);
     if (!measured.value) {
       if (!measured.infinite || !wanted.at_least)
-        failed.push_back(wanted.text + ": there is no value (" + measured.why + ")");
+        failed.push_back(wanted.text + ": " + NoValue(wanted, measured));
     } else if (wanted.at_least ? *measured.value < wanted.bound
                                : *measured.value > wanted.bound) {
       failed.push_back(Format("%s: measured %.6g", wanted.text.c_str(), *measured.value));

@@ -47,14 +47,36 @@ TEST(Requirements, HoldOrNameValueAndBound) {
 // A missing stage, row or number holds nothing; no error at all is better than any bound.
 TEST(Requirements, WithoutANumber) {
   EXPECT_EQ(Failed("styled:tc-psnr:5>=1")[0],
-            "styled:tc-psnr:5>=1: there is no value (too few frames)");
+            "styled:tc-psnr:5>=1: tc_psnr of styled at gap 5 has no value (too few frames)");
   EXPECT_EQ(Failed("styled:psnr-to-2d>=1")[0],
-            "styled:psnr-to-2d>=1: there is no value (not a number)");
+            "styled:psnr-to-2d>=1: psnr_to_2d of styled has no value (not a number)");
   for (const char* text : {"source:tc-psnr:1>=1", "stylize:bound<=9", "styled:lpips-to-2d<=1",
                            "reconstruct:trial-seconds<=1"})
     EXPECT_EQ(Failed(text).size(), 1u) << text;
   EXPECT_TRUE(Failed("path-styled:tc-psnr:1>=99").empty());
   EXPECT_EQ(Failed("path-styled:tc-psnr:1<=99").size(), 1u);
+}
+
+// A sentence names the metric and what the report has in its place; no brackets are empty.
+TEST(Requirements, WithoutANumberTheSentenceSaysWhatIsThere) {
+  EXPECT_EQ(Failed("source:tc-psnr:1>=1")[0],
+            "source:tc-psnr:1>=1: tc_psnr of source at gap 1 has no value (measured: styled at "
+            "gap 1, styled at gap 5, path_styled at gap 1)");
+  EXPECT_EQ(Failed("source:structure>=1")[0],
+            "source:structure>=1: structure of source has no value (measured: styled)");
+  EXPECT_EQ(Failed("stylize:bound<=9")[0],
+            "stylize:bound<=9: bound of stylize has no value (measured: reconstruct)");
+  RunReport report;
+  const auto sentence = [&report](const char* text) {
+    return FailedRequirements(ParseRequirements(text, {1}), report)[0];
+  };
+  EXPECT_EQ(sentence("styled:structure>=1"),
+            "styled:structure>=1: structure of styled has no value (nothing was measured)");
+  FidelityMetrics silent{.sequence = "styled"};
+  silent.chroma = Metric::Undefined("");
+  report.evaluation.fidelity.push_back(silent);
+  EXPECT_EQ(sentence("styled:chroma>=1"),
+            "styled:chroma>=1: chroma of styled has no value, and the report does not say why");
 }
 
 TEST(Requirements, AreRefusedBeforeWork) {
