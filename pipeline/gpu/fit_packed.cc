@@ -15,7 +15,9 @@
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/gpu/gpu_commands.h"
+#include "pipeline/run/fit_memory.h"
 #include "pipeline/run/paper_config.h"
+#include "reconstruct/fit/adapt_options.h"
 #include "reconstruct/fit/fit_engine.h"
 #include "reconstruct/fit/fit_field.h"
 
@@ -73,6 +75,22 @@ std::string ChoosePaper(const FitPackedOptions& settings, const PackedCapture& c
   return choice.name;
 }
 
+// The options for this capture, lowered to memory, which is reported; checkpoints are of those
+// that were asked for.
+FitOptions OptionsForCapture(const FitPackedOptions& settings, const FitOptions& asked,
+                             const PackedCapture& capture, Backend backend) {
+  int64_t pixels = 0;
+  for (const PackedView& view : capture.views)
+    if (!view.held_out) pixels += view.photo.num_pixels();
+  const SceneBox& box = capture.scene.box;
+  PlannedFit fit =
+      FitWithinMemory(AdaptOptions(asked, {capture.scene.ndc.on(), backend == Backend::kCuda,
+                                           pixels, box.background.has_value()}),
+                      {backend, pixels, box, settings.max_memory_gb, settings.reproducible});
+  if (!fit.notice.empty()) std::fprintf(stderr, "%s\n", fit.notice.c_str());
+  return fit.options;
+}
+
 // What a fit depends on: a checkpoint of another one is not continued.
 std::string IdentityOf(const FitPackedOptions& settings, const FitOptions& options) {
   return DumpJson(
@@ -105,18 +123,19 @@ void FitPacked(const FitPackedOptions& settings, const FitOptions& fit_options,
   const PackedCapture capture = ReadPackedCapture(settings.capture);
   std::string paper;
   if (settings.preset == "paper") paper = ChoosePaper(settings, capture, bound);
-  FitOptions options = fit_options;
-  options.seed = settings.seed;
+  const Backend backend = settings.device == "cpu" ? Backend::kCpu : Backend::kCuda;
+  FitOptions asked = fit_options;
+  asked.seed = settings.seed;
+  const FitOptions options = OptionsForCapture(settings, asked, capture, backend);
   std::vector<TrainingView> views;
   for (const PackedView& view : capture.views)
     if (!view.held_out) views.push_back({view.camera, &view.photo, view.points});
   const double read_seconds = ClockSeconds() - start;
   const double fit_start = ClockSeconds();
-  const Backend backend = settings.device == "cpu" ? Backend::kCpu : Backend::kCuda;
   FitHooks hooks;
   std::optional<FitState> resume;
   if (!settings.checkpoint.empty()) {
-    const std::string identity = IdentityOf(settings, options);
+    const std::string identity = IdentityOf(settings, asked);
     resume = ReadFitCheckpoint(settings.checkpoint, identity);
     hooks.checkpoint = [&settings, identity](const FitState& state) {
       WriteFileAtomically(settings.checkpoint, PackFitState(state, identity).Pieces());
@@ -168,6 +187,7 @@ void FitPacked(const FitPackedOptions& settings, const FitOptions& fit_options,
                         {"device", settings.device == "cpu" ? "cpu" : device.name},
                         {"paper_config", paper.empty() ? JsonValue() : JsonValue(paper)},
                         {"not_to_the_letter", std::move(differences)},
+                        {"finest_grid", std::ranges::max(options.resolutions)},
                         {"seconds_read", read_seconds},
                         {"seconds_fit", fit_seconds},
                         {"seconds_steps", fit.seconds},

@@ -24,7 +24,8 @@ struct FitPackedOptions {
   double stop_after = 0;
   std::string device = "cuda";
   uint64_t seed = 0;
-  bool reproducible = false;  // see RunOptions
+  double max_memory_gb = 0;   // see RunOptions
+  bool reproducible = false;  // likewise
 
   template <typename Bind>
   void Describe(Bind& bind) {
@@ -46,6 +47,8 @@ struct FitPackedOptions {
     bind("frames", frames, {.help = "a folder for .ppm pictures of the held-out views"});
     bind("device", device, {.help = "where arithmetic runs", .choices = "cpu|cuda"});
     bind("seed", seed, {.help = "seed of all random numbers"});
+    bind("max-memory", max_memory_gb,
+         {.unit = "GB", .help = kMaxMemoryHelp, .min = 0, .max = 1e6});
     bind("reproducible", reproducible, {.help = "two fits give the same bytes"});
   }
 };
@@ -126,8 +129,8 @@ void StylePacked(const StylePackedOptions& settings, const TrainNetworkOptions& 
 
 // Prints one line of JSON: times, counts, PSNR, SSIM and fine detail of the held-out views,
 // milliseconds a rendered view. `curve_heldout` has [seconds, PSNR, SSIM, detail kept]; seconds
-// are of this call. `bound` has `settings` and `fit`, which --preset paper sets by the capture.
-// Throws Interrupted after --stop-after.
+// are of this call. The grid is lowered to memory as `regrade run` does. `bound` has `settings`
+// and `fit`, which --preset paper sets by the capture. Throws Interrupted after --stop-after.
 void FitPacked(const FitPackedOptions& settings, const FitOptions& fit, OptionSet* bound);
 
 }  // namespace regrade

@@ -28,6 +28,9 @@ inline constexpr char kPaperConfigHelp[] =
     "of --preset paper: the configuration of Plenoxels' code. auto takes syn for transparent "
     "photos, llff for forward-facing captures, else custom";
 
+inline constexpr char kMaxMemoryHelp[] =
+    "limit on planned memory, of 10^9 bytes; 0 takes what is free";
+
 struct RunOptions {
   std::string out;
   std::string preset = "standard";
@@ -62,10 +65,7 @@ struct RunOptions {
                   "ndc=off,exposure=on overrides that for ndc, alpha, background, exposure, "
                   "view-dependence and pose-refinement"});
     bind("max-memory", max_memory_gb,
-         {.unit = "GB",
-          .help = "limit on planned memory, of 10^9 bytes; 0 takes what is free",
-          .min = 0,
-          .max = 1e6});
+         {.unit = "GB", .help = kMaxMemoryHelp, .min = 0, .max = 1e6});
     bind(
         "reproducible", reproducible,
         {.help = "gives the same bytes for any number of threads and any interruption, from "

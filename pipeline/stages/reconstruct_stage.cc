@@ -1,14 +1,10 @@
 // Stage "reconstruct": fits field.npz to the capture, and measures it on held-out photos.
-#include <omp.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <functional>
 #include <string>
 
 #include "kernels/base/error.h"
-#include "kernels/device/device_memory.h"
 #include "kernels/image/detail_kept.h"
 #include "pipeline/capture/capture_store.h"
 #include "pipeline/capture/scene_profile.h"
@@ -18,11 +14,10 @@
 #include "pipeline/files/text.h"
 #include "pipeline/program/cpu_time.h"
 #include "pipeline/program/device_choice.h"
-#include "pipeline/program/memory.h"
 #include "pipeline/report/stage_metrics.h"
+#include "pipeline/run/fit_memory.h"
 #include "pipeline/run/paper_config.h"
 #include "pipeline/run/paper_traits.h"
-#include "pipeline/run/plan.h"
 #include "pipeline/run/run_context.h"
 #include "pipeline/stages/photo_metrics.h"
 #include "pipeline/stages/stages.h"
@@ -88,42 +83,18 @@ int64_t PixelsToFit(const WorkingViews& views) {
   return pixels;
 }
 
-// Memory and time of a fit of these photos, by its options.
-std::function<StagePlan(const FitOptions&)> PlannerOf(int64_t pixels, const SceneBox& box,
-                                                      Backend backend) {
-  return [pixels, box, backend](const FitOptions& options) {
-    return backend == Backend::kCuda ? PlanFitOnDevice(options, pixels, box)
-                                     : PlanFit(options, pixels, box, omp_get_max_threads());
-  };
-}
-
 // The fit's options for the scene, lowered to fit into memory, which is reported.
 FitOptions OptionsForScene(RunContext* context, const NormalizedScene& scene, int64_t pixels,
                            Backend backend) {
-  const auto plan_of = PlannerOf(pixels, scene.box, backend);
   const RunSettings& settings = context->settings;
-  const bool on_device = backend == Backend::kCuda;
-  const uint64_t limit =
-      PlannedMemory(settings.run.max_memory_gb,
-                    on_device ? static_cast<uint64_t>(ReadDeviceStatus().free_bytes)
-                              : ReadMemoryStatus().available);
-  FitOptions options = AdaptOptions(
-      settings.fit, {scene.ndc.on(), on_device, pixels, scene.box.background.has_value()});
-  const int finest = Finest(options);
-  options.seed = settings.run.seed;
-  // Free memory must not change the result of a reproducible run.
-  if ((!settings.run.reproducible || settings.run.max_memory_gb > 0) &&
-      LowerToMemory(plan_of, limit, &options))
-    context->console->Info(
-        (options.adaptive()
-             ? Format("the field has at most %.1f million cells", double{options.max_cells})
-             : Concat("the finest grid has ", Finest(options), " voxels a side instead of ",
-                      finest)) +
-        " to fit into " + (settings.run.max_memory_gb > 0 ? "--max-memory" : "free memory"));
-  const StagePlan plan = plan_of(options);
-  context->console->Info("the fit will take " + PlanText(plan));
-  CheckFitsMemory(plan, limit, on_device ? "GPU memory" : "memory");
-  return options;
+  PlannedFit fit = FitWithinMemory(
+      AdaptOptions(settings.fit, {scene.ndc.on(), backend == Backend::kCuda, pixels,
+                                  scene.box.background.has_value()}),
+      {backend, pixels, scene.box, settings.run.max_memory_gb, settings.run.reproducible});
+  if (!fit.notice.empty()) context->console->Info(fit.notice);
+  context->console->Info("the fit will take " + PlanText(fit.plan));
+  fit.options.seed = settings.run.seed;
+  return fit.options;
 }
 
 // Decides whether the fit keeps its spherical harmonics, with the evidence.
@@ -304,7 +275,7 @@ Stage ReconstructStage(RunContext* context) {
     const FitOptions options =
         AdaptOptions(context->settings.fit, {profile.scene.ndc.on(), backend == Backend::kCuda,
                                              pixels, profile.scene.box.background.has_value()});
-    stage.plan = PlanText(PlannerOf(pixels, profile.scene.box, backend)(options));
+    stage.plan = PlanText(PlanFitAt({backend, pixels, profile.scene.box}, options));
   }
   stage.work = [context, inputs = stage.inputs](const ProgressFunction& progress) {
     return Reconstruct(context, inputs, progress);

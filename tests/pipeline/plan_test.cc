@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "pipeline/run/fit_memory.h"
 #include "tests/support/expect_error.h"
 
 namespace regrade {
@@ -59,6 +60,13 @@ TEST(Plan, TimeFollowsRaysResolutionAndThreads) {
   EXPECT_NEAR(PlanStyle(300, 4).seconds, 11.25, 1e-9);
 }
 
+// Of 17 photos the first, the ninth and the last are held out.
+TEST(Plan, ExpectedPixelsAreThoseThatAreFitted) {
+  EXPECT_EQ(ExpectedPixels(17, 800, 8), 14 * 800 * 600);
+  EXPECT_EQ(ExpectedPixels(17, 800, 0), 17 * 800 * 600);
+  EXPECT_EQ(ExpectedPixels(1, 800, 8), 0);
+}
+
 TEST(Plan, DeviceMemoryByHand) {
   // 100^3 vertices, all stored: three records of 128 B and an index; link, density, two
   // distances; 1 GiB of samples.
@@ -114,6 +122,25 @@ TEST(Plan, ResolutionsAreLoweredToMemory) {
   EXPECT_TRUE(LowerToMemory(plan_of, 1, &options));  // in vain: CheckFitsMemory then says so
   EXPECT_EQ(options.resolutions, (std::vector<int>{64, 64, 64}));
   EXPECT_FALSE(LowerToMemory(plan_of, 1, &options));
+}
+
+// What was lowered is said; a reproducible fit is lowered to a given limit only.
+TEST(Plan, AFitIsLoweredToItsLimit) {
+  const FitOptions asked = Fit({16, 96}, {10, 10});
+  const double gigabytes = 0.7e-9 * static_cast<double>(PlanFitAt({}, asked).memory);
+  const PlannedFit fit = FitWithinMemory(asked, {.max_memory_gb = gigabytes});
+  EXPECT_LT(fit.options.resolutions[1], 96);
+  EXPECT_EQ(fit.notice, Concat("the finest grid has ", fit.options.resolutions[1],
+                               " voxels a side instead of 96 to fit into --max-memory"));
+  EXPECT_EQ(fit.plan.memory, PlanFitAt({}, fit.options).memory);
+  const PlannedFit unlimited = FitWithinMemory(asked, {.reproducible = true});
+  EXPECT_EQ(unlimited.options.resolutions, asked.resolutions);
+  EXPECT_EQ(unlimited.notice, "");
+  EXPECT_LT(FitWithinMemory(asked, {.max_memory_gb = gigabytes, .reproducible = true})
+                .options.resolutions[1],
+            96);
+  EXPECT_REGRADE_ERROR(FitWithinMemory(asked, {.max_memory_gb = 0.01}), ExitCode::kResources,
+                       "of memory");
 }
 
 // 100^3 cells of level 0; later 25 times the square of the resolution, up to the limit. 1.2
