@@ -1,5 +1,8 @@
 #include "pipeline/report/records.h"
 
+#include <limits>
+#include <optional>
+
 #include "pipeline/workspace/metrics_json.h"
 #include "pipeline/workspace/stage_runner.h"
 
@@ -13,7 +16,9 @@ ConsistencyMetrics MetricsOfRow(const ConsistencyRow& row,
   metrics.gap = row.gap;
   metrics.pairs = row.pairs;
   metrics.undefined_pairs = row.undefined_pairs;
-  metrics.tc_psnr_mean_db = Metric(row.tc_psnr_mean_db, row.why);
+  std::optional<double> mean = row.tc_psnr_mean_db;
+  if (!mean && row.perfect_pairs > 0) mean = std::numeric_limits<double>::infinity();
+  metrics.tc_psnr_mean_db = Metric(mean, row.why);
   metrics.tc_psnr_of_mean_db = Metric(row.tc_psnr_of_mean_db, row.why);
   metrics.tc_psnr_low_db = metrics.tc_psnr_high_db =
       Metric::Undefined(row.why.empty() ? "too few pairs for an interval" : row.why);

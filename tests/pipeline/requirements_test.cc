@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "pipeline/report/records.h"
 #include "tests/support/expect_error.h"
 
 namespace regrade {
@@ -77,6 +78,29 @@ TEST(Requirements, WithoutANumberTheSentenceSaysWhatIsThere) {
   report.evaluation.fidelity.push_back(silent);
   EXPECT_EQ(sentence("styled:chroma>=1"),
             "styled:chroma>=1: chroma of styled has no value, and the report does not say why");
+}
+
+TEST(Requirements, FramesThatDoNotChangeAreAboveEveryBound) {
+  ConsistencyReport still;
+  ConsistencyRow row;
+  row.sequence = "styled";
+  row.gap = 1;
+  row.pairs = row.perfect_pairs = 3;
+  row.tc_psnr_of_mean_db = std::numeric_limits<double>::infinity();
+  row.why = "all compared pairs are identical: infinite";
+  still.rows = {row};
+  RunReport report;
+  report.evaluation = MetricsOf(still, {});
+  const auto failed = [&](const std::string& text) {
+    return FailedRequirements(ParseRequirements(text, {1}), report);
+  };
+  EXPECT_TRUE(failed("styled:tc-psnr:1>=30,styled:tc-psnr-of-mean:1>=30").empty());
+  EXPECT_EQ(failed("styled:tc-psnr:1<=30").size(), 1u);
+  // Without a pixel to compare there is no number, which holds no bound.
+  still.rows[0].perfect_pairs = 0;
+  still.rows[0].undefined_pairs = 3;
+  report.evaluation = MetricsOf(still, {});
+  EXPECT_EQ(failed("styled:tc-psnr:1>=30").size(), 1u);
 }
 
 TEST(Requirements, AreRefusedBeforeWork) {
