@@ -11,7 +11,7 @@ namespace regrade {
 struct GaussianPart {
   double weight = 0;  // of the mixture; they sum to 1
   Vec3d mean{};
-  Mat3d covariance;  // eigenvalues at least kPartVarianceFloor
+  Mat3d covariance;     // eigenvalues at least kPartVarianceFloor
   double height = 0.5;  // mean of its colours in their pictures, 0 at the bottom, 1 at the top
 };
 using GaussianMixture = std::vector<GaussianPart>;
