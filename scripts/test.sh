@@ -25,7 +25,11 @@ cmake --build --preset cpu --parallel "$jobs"
 echo "== tests"
 # Threads that wait would take the cores of the test beside them.
 export OMP_WAIT_POLICY=passive
-ctest --test-dir build/cpu --output-on-failure -j2
+if ! ctest --test-dir build/cpu --output-on-failure -j2; then
+  echo "== what failed, once more"
+  grep -A12 ': Failure$' build/cpu/Testing/Temporary/LastTest.log | tail -n 100
+  exit 1
+fi
 
 echo "== build with sanitizers"
 # Of the libraries only what these programs need.

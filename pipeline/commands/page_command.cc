@@ -50,7 +50,8 @@ void RunPage(const Command& command, const Arguments& arguments, Console* consol
       Format("%.2f", static_cast<double>(made.field_bytes) / static_cast<double>(made.voxels)),
       " bytes, ", styles.size(), " styles"));
   if (made.coarse_bytes > 0)
-    console->Info(Concat("  a coarse scene, which it shows first: ", (made.coarse_bytes + 999) / 1000, " kB"));
+    console->Info(Concat(
+        "  a coarse scene, which it shows first: ", (made.coarse_bytes + 999) / 1000, " kB"));
   for (size_t i = 0; i < styles.size(); ++i)
     console->Info(Concat("  ", styles[i], ": ", (made.style_bytes[i] + 999) / 1000, " kB"));
   console->Info(

@@ -121,8 +121,7 @@ void AddGrid(const RadianceField& field, Sums* sums) {
         const int32_t voxel = geometry.links[geometry.frame.Vertex(x, y, z)];
         Mean mean;
         if (voxel >= 0) mean.Add(field, voxel);
-        if (mean.density > 0)
-          sums->Add({x, y, z}, 1, mean.density, mean.color / mean.density);
+        if (mean.density > 0) sums->Add({x, y, z}, 1, mean.density, mean.color / mean.density);
       }
 }
 

@@ -14,7 +14,7 @@ namespace regrade {
 
 struct CoarseOptions {
   int64_t most_voxels = 120000;
-  int longest = 192;     // voxels along the longest edge, at most
+  int longest = 192;            // voxels along the longest edge, at most
   double most_part = 1.0 / 16;  // of the field's voxels; small fields have no coarse one
 };
 

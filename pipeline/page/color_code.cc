@@ -9,8 +9,8 @@
 namespace regrade {
 namespace {
 
-constexpr int kBins = 4096;  // of magnitudes
-constexpr int kMostBits = 12;  // of a number
+constexpr int kBins = 4096;              // of magnitudes
+constexpr int kMostBits = 12;            // of a number
 constexpr size_t kMostFitted = 1 << 18;  // voxels whose covariance is taken
 
 // The errors of one number's values, by its bits.
@@ -54,8 +54,8 @@ class NumberErrors {
       const double step = std::max({finest_, last * width_ / levels, 1e-9});
       const double limit = step * levels;
       const auto first = static_cast<size_t>(std::min(limit / width_, kBins - 1.0)) + 1;
-      const double clamped = above[2][first] - 2 * limit * above[1][first] +
-                             limit * limit * above[0][first];
+      const double clamped =
+          above[2][first] - 2 * limit * above[1][first] + limit * limit * above[0][first];
       // What is not clamped is rounded, but nothing is lost where all is 0.
       const double error = std::max(clamped, 0.0) + above[0][0] * step * step / 12;
       if (best.error < 0 || error < best.error) best = {error, step};
@@ -105,12 +105,14 @@ void FitTransforms(const std::vector<float>& spread, int basis, ColorCode* code)
   std::array<double, 3> power{};
   const auto turned = [&](size_t i, int a, int k) {
     double y = 0;
-    for (int c = 0; c < 3; ++c) y += code->opponent[static_cast<size_t>(3 * a + c)] * at(i, c, k);
+    for (int c = 0; c < 3; ++c)
+      y += code->opponent[static_cast<size_t>(3 * a + c)] * at(i, c, k);
     return y;
   };
   for (size_t i = 0; i < n; ++i)
     for (int a = 0; a < 3; ++a)
-      for (int k = 0; k < basis; ++k) power[static_cast<size_t>(a)] += std::pow(turned(i, a, k), 2);
+      for (int k = 0; k < basis; ++k)
+        power[static_cast<size_t>(a)] += std::pow(turned(i, a, k), 2);
   rows.clear();
   for (size_t i = 0; i < n; ++i)
     for (int a = 0; a < 3; ++a)
@@ -125,8 +127,7 @@ void FitTransforms(const std::vector<float>& spread, int basis, ColorCode* code)
 }
 
 std::vector<NumberErrors> ErrorsOf(const std::vector<float>& values, const ColorCode& code,
-                                   int basis, double finest,
-                                   const std::vector<float>& weight) {
+                                   int basis, double finest, const std::vector<float>& weight) {
   const size_t channels = static_cast<size_t>(3 * basis), n = values.size() / channels;
   std::vector<double> largest(channels);
   for (size_t i = 0; i < n; ++i) {
@@ -137,7 +138,8 @@ std::vector<NumberErrors> ErrorsOf(const std::vector<float>& values, const Color
   for (const double most : largest) errors.emplace_back(finest, most);
   for (size_t i = 0; i < n; ++i) {
     const Numbers y = Transformed(values.data() + i * channels, code, basis);
-    for (size_t c = 0; c < channels; ++c) errors[c].Add(y[c], weight.empty() ? 1 : double{weight[i]});
+    for (size_t c = 0; c < channels; ++c)
+      errors[c].Add(y[c], weight.empty() ? 1 : double{weight[i]});
   }
   for (NumberErrors& e : errors) e.Finish();
   return errors;
@@ -229,8 +231,9 @@ std::vector<float> ValuesOf(const std::vector<int16_t>& numbers, const ColorCode
     double turned[3][kCodeHarmonics] = {};
     for (int a = 0; a < 3; ++a)
       for (int j = 0; j < basis; ++j) {
-        const double y = numbers[static_cast<size_t>(a * basis + j) * n + static_cast<size_t>(i)] *
-                         code.step[static_cast<size_t>(kCodeHarmonics * a + j)];
+        const double y =
+            numbers[static_cast<size_t>(a * basis + j) * n + static_cast<size_t>(i)] *
+            code.step[static_cast<size_t>(kCodeHarmonics * a + j)];
         for (int c = 0; c < 3; ++c)
           turned[c][j] += code.opponent[static_cast<size_t>(3 * a + c)] * y;
       }

@@ -1,11 +1,12 @@
-// A voxel's colours in 128 bits: what a page stores, and what a graphics processor holds of them.
+// A voxel's colours in 128 bits: what a page stores, and what a graphics processor holds of
+// them.
 //
 // EQ(page-color-code): of coefficients s [3, basis] the numbers are
 //   q_aj = round(y_aj / step_aj),  y_aj = sum_ck opponent_ac harmonics_jk s_ck,
-// two orthogonal transforms, of the channels and of the harmonics, so that a ray needs one sum of
-// harmonics for each j and a sample one product with the channels' matrix. A number has bits_aj
-// bits, two's complement within +-(2^(bits-1) - 1). A voxel is four words of 32 bits; the numbers
-// of a word, kCodeOrder's, follow each other from the highest bit down.
+// two orthogonal transforms, of the channels and of the harmonics, so that a ray needs one sum
+// of harmonics for each j and a sample one product with the channels' matrix. A number has
+// bits_aj bits, two's complement within +-(2^(bits-1) - 1). A voxel is four words of 32 bits;
+// the numbers of a word, kCodeOrder's, follow each other from the highest bit down.
 //
 // Rounding in y is rounding in s: transposed matrices lead back, and sums of squares stay.
 #pragma once
@@ -23,22 +24,23 @@ inline constexpr int kCodeHarmonics = 9, kCodeNumbers = 27, kCodeWords = 4;
 
 // The numbers of each word, as 9 a + j: large and small ones in each, so that all words fill.
 inline constexpr std::array<int, kCodeWords + 1> kWordBegins = {0, 7, 14, 21, 27};
-inline constexpr std::array<int, kCodeNumbers> kCodeOrder = {
-    0, 11, 4, 21, 14, 24, 17, 1, 18, 19, 6, 7, 16, 25, 9, 3, 12, 13, 22, 23, 26, 2, 10, 5, 20, 15, 8};
+inline constexpr std::array<int, kCodeNumbers> kCodeOrder = {0,  11, 4,  21, 14, 24, 17, 1,  18,
+                                                             19, 6,  7,  16, 25, 9,  3,  12, 13,
+                                                             22, 23, 26, 2,  10, 5,  20, 15, 8};
 
 // Harmonics that a basis lacks have rows of the identity, and numbers that are 0 in one bit.
 struct ColorCode {
-  std::array<double, 9> opponent{};                              // [3, 3], the largest first
+  std::array<double, 9> opponent{};                                 // [3, 3], the largest first
   std::array<double, kCodeHarmonics * kCodeHarmonics> harmonics{};  // [9, 9]
-  std::array<double, kCodeNumbers> step{};                       // of 9 a + j
+  std::array<double, kCodeNumbers> step{};                          // of 9 a + j
   std::array<int, kCodeNumbers> bits{};
 
   int limit(int number) const { return (1 << (bits[static_cast<size_t>(number)] - 1)) - 1; }
 };
 
 // The transforms that decorrelate `spread` [n, 3, basis] (channel-major), and for `values`
-// [n, 3, basis] the bits and steps of least squared error, none below `finest`. `weight` [n]: of
-// each voxel's error; empty: all alike. The identity's for n = 0.
+// [n, 3, basis] the bits and steps of least squared error, none below `finest`. `weight` [n]:
+// of each voxel's error; empty: all alike. The identity's for n = 0.
 ColorCode FitColorCode(const std::vector<float>& spread, const std::vector<float>& values,
                        int basis, double finest, const std::vector<float>& weight = {});
 

@@ -56,7 +56,8 @@ std::string SectionBytes(const PageField& page, const char* name, uint64_t max_b
 }
 
 void EncodeVoxelColors(const std::vector<float>& values, int basis,
-                       const std::vector<EarlierVoxels>& earlier, double step, PageField* page) {
+                       const std::vector<EarlierVoxels>& earlier, double step,
+                       PageField* page) {
   const ColorCode code =
       FitColorCode(Differences(values, 3 * basis, earlier), values, basis, step);
   AddSection("color", PackNumbers(NumbersOf(values, code, basis), 3 * basis, earlier), page);
@@ -71,8 +72,8 @@ std::vector<float> DecodeVoxelColors(const PageField& page, int basis,
   const std::vector<int16_t> numbers = UnpackNumbers(
       SectionBytes(page, "color", 2 * channels * n), static_cast<int>(channels), earlier);
   for (size_t c = 0; c < channels; ++c) {
-    const int limit = code.limit(static_cast<int>(c) / basis * kCodeHarmonics +
-                                 static_cast<int>(c) % basis);
+    const int limit =
+        code.limit(static_cast<int>(c) / basis * kCodeHarmonics + static_cast<int>(c) % basis);
     for (size_t i = 0; i < n; ++i)
       if (std::abs(numbers[c * n + i]) > limit)
         throw InputError("a number has more bits than it may have", "color");

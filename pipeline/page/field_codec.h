@@ -1,9 +1,10 @@
 // Packs a radiance field for a page, and unpacks it as the page does.
 //
 // Sections, each compressed by itself (see deflate.h): "tree" or "mask" (page_order.h);
-// "density" (see EQ(page-density)); "color" (see EQ(page-color-code)); and of background spheres "sphere_mask" (a bit for each texel of the map, [2R, R], the lowest
-// bit first), "sphere_density" and "sphere_color" of texels [columns, layers]. Numbers are
-// packed as EQ(page-prediction) says. What is no array is in the header, a JSON object.
+// "density" (see EQ(page-density)); "color" (see EQ(page-color-code)); and of background
+// spheres "sphere_mask" (a bit for each texel of the map, [2R, R], the lowest bit first),
+// "sphere_density" and "sphere_color" of texels [columns, layers]. Numbers are packed as
+// EQ(page-prediction) says. What is no array is in the header, a JSON object.
 //
 // The field that comes out holds what a graphics processor holds: densities in half precision,
 // in units of one over a voxel's width, coefficients in the 128 bits of a voxel, and spheres'

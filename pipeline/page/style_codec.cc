@@ -101,9 +101,9 @@ PageStyle EncodeStyle(const StoredNetwork& stored, const RadianceField& page, do
     style.residual = std::move(packed.packed);
     residual = std::move(packed.header);
   }
-  const ColorCode code =
-      RoundToWords(Opacities(*page.geometry), &style.styled.appearance.sh);
-  const std::vector<double> sphere_scale = RoundToCodes(&style.styled.appearance.sphere_color, 3);
+  const ColorCode code = RoundToWords(Opacities(*page.geometry), &style.styled.appearance.sh);
+  const std::vector<double> sphere_scale =
+      RoundToCodes(&style.styled.appearance.sphere_color, 3);
   const RowMap base = BaseOf(data);
   JsonValue::Array matrix;
   for (int r = 0; r < 3; ++r)

@@ -1,8 +1,8 @@
 // Packs a style for a page: its network, which the page sends the voxels through.
 //
 // The network's effective weights, [out, in] and biases, layer after layer, are stored as
-// halves: 20,379 of them. The code of the styled coefficients (see EQ(page-color-code)) is found
-// when the page is written, on the field as the page has it.
+// halves: 20,379 of them. The code of the styled coefficients (see EQ(page-color-code)) is
+// found when the page is written, on the field as the page has it.
 #pragma once
 
 #include <cstdint>

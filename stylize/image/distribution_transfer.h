@@ -50,8 +50,8 @@ StyleTurns MeasureTurns(const std::vector<Vec3d>& style, int iterations);
 DistributionMap LearnDistributionMap(std::vector<Vec3d> source, const StyleTurns& style);
 
 // At most kColorSample colours, evenly strided over the pixels that are finite and not
-// transparent. Error(kInput) naming `where` if there is none. `heights`, where it is given, gets
-// the height of each of them in the picture, from 0 at the bottom to 1 at the top.
+// transparent. Error(kInput) naming `where` if there is none. `heights`, where it is given,
+// gets the height of each of them in the picture, from 0 at the bottom to 1 at the top.
 inline constexpr int64_t kColorSample = 1 << 16;
 std::vector<Vec3d> SampleColors(const Image& image, const std::string& where,
                                 int64_t most = kColorSample,

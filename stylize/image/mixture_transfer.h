@@ -12,8 +12,8 @@ namespace regrade {
 
 // `scene`, colours of all views, gives the mixture that the views share: each view's mixture
 // starts from it, so that the parts of neighbouring views correspond, or is it where
-// options.scene_wide. `heights` are those of the colours in their views, from 0 at the bottom to
-// 1 at the top; only a positive options.height_weight needs them. See EQ(mixture-transport).
+// options.scene_wide. `heights` are those of the colours in their views, from 0 at the bottom
+// to 1 at the top; only a positive options.height_weight needs them. See EQ(mixture-transport).
 std::unique_ptr<ViewStylizer> MakeMixtureTransfer(const StyleOptions& options,
                                                   const Image& style,
                                                   const std::vector<Vec3d>& scene,

@@ -4,12 +4,12 @@
 //
 // METHOD is as of --method: mkl, gmm, reinhard, idt, histogram or onnx:DIR; gmm+height is gmm
 // with --height-weight 1. Pictures are brought to SIDE pixels. SHEET.png shows one picture of
-// each folder in each style, by each method; "-" writes none. Prints a Markdown table; a row is a mean over folders and styles,
-// the worst in brackets: the distance of the styled pictures' colours to the style's (sliced
-// Wasserstein), structure (correlation of edges with the picture), temporal consistency of
-// neighbours (lai2018, dis-medium, which suits neighbours that overlap), the steepest slope
-// between neighbouring pixels' colours that differ by a step of 4 to 32 of 255 (the 99.9 %
-// quantile), and seconds a picture with the map's own measuring.
+// each folder in each style, by each method; "-" writes none. Prints a Markdown table; a row is
+// a mean over folders and styles, the worst in brackets: the distance of the styled pictures'
+// colours to the style's (sliced Wasserstein), structure (correlation of edges with the
+// picture), temporal consistency of neighbours (lai2018, dis-medium, which suits neighbours
+// that overlap), the steepest slope between neighbouring pixels' colours that differ by a step
+// of 4 to 32 of 255 (the 99.9 % quantile), and seconds a picture with the map's own measuring.
 #include <algorithm>
 #include <chrono>
 #include <cmath>

@@ -74,7 +74,8 @@ TEST(CoarseField, AWallStaysOpaqueAndKeepsItsColour) {
         const int64_t v = geometry->links[geometry->frame.Vertex(x, y, z)];
         if (v < 0) continue;
         geometry->density[v] = x >= 14 && x < 18 ? 40.0f : 0.0f;
-        for (int c = 0; c < 3; ++c) field.appearance.sh[3 * v + c] = 0.5f * static_cast<float>(c);
+        for (int c = 0; c < 3; ++c)
+          field.appearance.sh[3 * v + c] = 0.5f * static_cast<float>(c);
       }
   field.geometry = geometry;
   const auto coarse = CoarseField(field, {.most_part = 10});
@@ -82,7 +83,8 @@ TEST(CoarseField, AWallStaysOpaqueAndKeepsItsColour) {
   const Vec3f center = geometry->frame.center;
   const float far = 3 * geometry->frame.radius.x;
   const Ray ray{{center.x - far, center.y + 0.1f, center.z - 0.1f}, {1, 0, 0}};
-  const auto exact = RenderRay(ViewOf(field), ray, {}), seen = RenderRay(ViewOf(*coarse), ray, {});
+  const auto exact = RenderRay(ViewOf(field), ray, {}),
+             seen = RenderRay(ViewOf(*coarse), ray, {});
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(seen.color[c], exact.color[c], 0.02);
 }
 

@@ -95,6 +95,26 @@ TEST(RegionMatch, H189_AStyleThatNothingResemblesHasNoWeight) {
   EXPECT_NEAR(*std::ranges::min_element(coverage[0].pixels), 1, 1e-5);
 }
 
+// A spot in the sky that turns into ground by and by: on the way its share is small.
+TEST(RegionMatch, H189_AViewShowsARegionByMoreThanAHalfOrNotAtAll) {
+  const TwoRegions scene = SkyAndGround(3, 160, 120);
+  const std::vector<Image> styles = testing::SkyAndGroundStyles();
+  const RegionFeatures features("", styles);
+  const RegionMatch match = Match(features, scene.photos, styles);
+  float most = 0;
+  for (int t = 35; t <= 50; ++t) {
+    Image picture = styles[0];
+    for (int y = 20; y < 23; ++y)
+      for (int x = 20; x < 23; ++x)
+        for (int c = 0; c < 3; ++c)
+          picture.at(x, y)[c] +=
+              static_cast<float>(t) / 50 * (styles[1].at(x, y)[c] - picture.at(x, y)[c]);
+    most = *std::ranges::max_element(RegionCoverage(match, features, picture)[1].pixels);
+    EXPECT_TRUE(most == 0 || most > 0.5f) << t << " " << most;
+  }
+  EXPECT_GT(most, 0.5f);
+}
+
 TEST(RegionMatch, H6_PicturesOfOneColourAreMatched) {
   const std::vector<Image> styles = {Plain(64, 48, {0.2, 0.3, 0.8}),
                                      Plain(64, 48, {0.8, 0.5, 0.2})};

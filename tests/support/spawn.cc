@@ -26,8 +26,8 @@ int Spawn(const char* program, const std::vector<std::string>& arguments, int fd
     ::_exit(127);
   }
   if (signal != 0) {
-    for (int i = 0; i < 6000 && !std::filesystem::exists(when); ++i)
-      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    for (int i = 0; i < 30000 && !std::filesystem::exists(when); ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
     ::kill(child, signal);
   }
   int status = 0;
