@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <future>
 #include <optional>
 #include <utility>
 
@@ -89,15 +90,34 @@ Image RenderHome(const RadianceField& field, const Camera& home) {
       .color;
 }
 
-void AddPhotos(const WorkingViews& views, const std::vector<int>& chosen,
-               PageContent* content) {
+void AddPhotos(const WorkingViews& views, PageContent* content) {
   std::vector<ColorStatistics> parts;
-  for (size_t i = 0; i < chosen.size(); ++i) {
-    const Image photo = views.Photo(chosen[i]);
-    content->photos.push_back({static_cast<int>(i), Thumbnail(photo, kThumbnail)});
+  const int count = std::min(views.count(), kMostPhotos);
+  for (int i = 0; i < count; ++i) {
+    const int chosen = i * views.count() / count;
+    content->cameras.push_back(views.CameraOf(chosen).Undistorted());
+    const Image photo = views.Photo(chosen);
+    content->photos.push_back({i, Thumbnail(photo, kThumbnail)});
     parts.push_back(MeasureColor(photo));
   }
   content->colors = Pool(parts);
+  content->home = HomeCamera(content->cameras);
+}
+
+const Camera& HomeOf(const PageContent& content) {
+  return content.cameras[static_cast<size_t>(content.home)];
+}
+
+// The field, and beside it what takes one core: the coarse scene and the photos.
+void EncodeScene(const RadianceField& field, const WorkingViews& views, double step,
+                 PageContent* content) {
+  std::future<void> beside = std::async(std::launch::async, [&] {
+    if (const std::optional<RadianceField> coarse = CoarseField(field))
+      content->coarse = EncodeField(*coarse, step);
+    AddPhotos(views, content);
+  });
+  content->field = EncodeField(field, step);
+  beside.get();
 }
 
 // Bytes in base64.
@@ -106,6 +126,35 @@ int64_t InText(size_t bytes) { return static_cast<int64_t>((bytes + 2) / 3 * 4);
 std::string CheckLine(const std::string& what, const PageCheck& check) {
   return what + Format(" to the exact one, worst of %d views: %.1f dB (mean %.1f)", check.views,
                        check.worst_db, check.mean_db);
+}
+
+// A style of the page `made`, with what it adds to the exact `source` voxel by voxel; it is
+// compared with the exact style in the views `checked`.
+void AddStyle(const std::string& style_folder, const std::string& name,
+              const RadianceField& source, const std::vector<Camera>& checked,
+              PageContent* content, MadePage* made) {
+  const StoredNetwork network = ReadNetworkFile(style_folder + "/network.npz");
+  const StyleLayers layers = ReadLayers(style_folder, source.geometry->num_voxels());
+  std::vector<int64_t> of;
+  if (!layers.empty()) of = VoxelsInPageOrder(content->field, *source.geometry).voxel;
+  PageStyle style = EncodeStyle(network, made->field, StrengthOf(style_folder),
+                                InPageOrder(layers, of), made->places);
+  const Image picture = RenderHome(style.styled, HomeOf(*content));
+  if (content->styles.empty() && style.header.At("strength").AsDouble() == 1)
+    content->poster = EncodeJpeg(picture, kQuality);
+  content->style_pictures.push_back(Thumbnail(picture, kThumbnail));
+  if (!checked.empty()) {
+    made->report.push_back(
+        CheckLine("its style " + name,
+                  CheckPage(ExactStyle(source, network, layers), style.styled, checked)));
+    if (!style.residual.empty())
+      made->report.push_back(Format("what style %s adds voxel by voxel: %.0f kB of the page",
+                                    name.c_str(),
+                                    static_cast<double>(InText(style.residual.size())) / 1e3));
+  }
+  style.styled = {};
+  style.header["id"] = PageStyleId(style_folder);
+  content->styles.push_back(std::move(style));
 }
 
 }  // namespace
@@ -118,57 +167,27 @@ MadePage MakePage(const std::string& folder, const std::vector<std::string>& sty
   const WorkingViews views = ReadWorkingViews(folder + "/poses", kChecked, 0)
                                  .InField(stored.field_from_world, stored.ndc);
   PageContent content;
-  content.field = EncodeField(stored.field, options.step);
-  if (const std::optional<RadianceField> coarse = CoarseField(stored.field))
-    content.coarse = EncodeField(*coarse, options.step);
-  RadianceField page = DecodeField(content.field);
-  std::vector<int> chosen;
-  const int count = std::min(views.count(), kMostPhotos);
-  for (int i = 0; i < count; ++i) chosen.push_back(i * views.count() / count);
-  for (const int i : chosen) content.cameras.push_back(views.CameraOf(i).Undistorted());
-  AddPhotos(views, chosen, &content);
   content.served = options.served;
-  content.home = HomeCamera(content.cameras);
-  const Camera& home = content.cameras[static_cast<size_t>(content.home)];
-  const std::vector<Camera> checked =
-      options.check ? CheckedViews(views.Cameras(), kChecked) : std::vector<Camera>{};
+  EncodeScene(stored.field, views, options.step, &content);
   MadePage made;
-  made.places = VoxelsInPageOrder(content.field, *page.geometry);
-  const std::vector<int64_t> of =
-      VoxelsInPageOrder(content.field, *stored.field.geometry).voxel;
+  made.field = DecodeField(content.field);
+  made.places = VoxelsInPageOrder(content.field, *made.field.geometry);
+  std::vector<Camera> checked;
   PageCheck check;
   if (options.check) {
-    check = CheckPage(stored.field, page, checked);
+    checked = CheckedViews(views.Cameras(), kChecked);
+    check = CheckPage(stored.field, made.field, checked);
     made.report.push_back(CheckLine("the page's field", check));
+  } else {
+    stored.field.appearance = {};  // fields have gigabytes
   }
-  content.poster = EncodeJpeg(RenderHome(page, home), kQuality);
+  content.poster = EncodeJpeg(RenderHome(made.field, HomeOf(content)), kQuality);
   for (size_t i = 0; i < styles.size(); ++i) {
     ReportOrThrow(progress, 1 + static_cast<int64_t>(i), steps);
-    const std::string style_folder = StyleFolder(folder, styles[i]);
-    const StoredNetwork network = ReadNetworkFile(style_folder + "/network.npz");
-    const StyleLayers layers = ReadLayers(style_folder, stored.field.geometry->num_voxels());
-    PageStyle style = EncodeStyle(network, page, StrengthOf(style_folder),
-                                  InPageOrder(layers, of), made.places);
-    const Image picture = RenderHome(style.styled, home);
-    if (i == 0 && style.header.At("strength").AsDouble() == 1)
-      content.poster = EncodeJpeg(picture, kQuality);
-    content.style_pictures.push_back(Thumbnail(picture, kThumbnail));
-    if (options.check) {
-      made.report.push_back(CheckLine(
-          "its style " + styles[i],
-          CheckPage(ExactStyle(stored.field, network, layers), style.styled, checked)));
-      if (!style.residual.empty())
-        made.report.push_back(Format("what style %s adds voxel by voxel: %.0f kB of the page",
-                                     styles[i].c_str(),
-                                     static_cast<double>(InText(style.residual.size())) / 1e3));
-    }
-    style.styled = {};
-    style.header["id"] = PageStyleId(style_folder);
-    content.styles.push_back(std::move(style));
+    AddStyle(StyleFolder(folder, styles[i]), styles[i], stored.field, checked, &content, &made);
   }
   ReportOrThrow(progress, steps - 1, steps);
   made.html = PageHtml(content, options.check ? &check : nullptr);
-  made.field = std::move(page);
   made.voxels = content.field.header.At("voxels").AsInt();
   made.field_bytes = InText(content.field.bytes());
   if (content.coarse) made.coarse_bytes = InText(content.coarse->bytes());

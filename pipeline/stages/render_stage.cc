@@ -40,7 +40,7 @@ constexpr double kMuchSeenByFew = 0.2;  // of the film: worth a warning
 
 // The two fields and the 2D method.
 struct FrameRenderers {
-  FieldRenderer source, styled;
+  std::optional<FieldRenderer> source, styled;
   std::unique_ptr<ViewStylizer> stylizer;
   std::unique_ptr<CoverageRenderer> object;  // null where the whole scene is styled
   std::vector<Image> coverage;               // of the current frame
@@ -98,8 +98,9 @@ std::string PlanOf(const std::vector<FrameSet>& sets) {
 Frame RenderFrame(RunContext* context, FrameRenderers* renderers, const Camera& camera,
                   const PhotoGain& gain, int index, bool fast, bool with_2d) {
   const double begin = context->console->StageSeconds();
-  RenderedPair pair = fast ? renderers->source.RenderFastWith(renderers->styled, camera)
-                           : renderers->source.RenderWith(renderers->styled, camera);
+  const FieldRenderer &source = *renderers->source, &styled = *renderers->styled;
+  RenderedPair pair =
+      fast ? source.RenderFastWith(styled, camera) : source.RenderWith(styled, camera);
   renderers->seconds += context->console->StageSeconds() - begin;
   RenderedView& plain = pair.view;
   Frame frame;
@@ -167,33 +168,39 @@ class FrameWriter {
   OrderedWorker before_, after_, film_;
 };
 
-StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
-  const RunSettings& settings = context->settings;
-  Workspace &workspace = *context->style, &scene = *context->workspace;
-  const StoredField before = ReadFieldFile(scene.Path("field.npz"));
-  const WorkingViews views = context->Views().InField(before.field_from_world, before.ndc);
-  const double strength = settings.style.strength;
-  const StoredField after = ReadStyledField(scene.folder(), workspace.folder(), strength);
-  const std::string kept = workspace.Path("styled.npz");
+// The renderers of the scene's field and of the style's. Fields have gigabytes: neither stays.
+void PrepareFields(const RunSettings& settings, const Workspace& style, Backend backend,
+                   StoredField before, FrameRenderers* renderers) {
+  renderers->source.emplace(before.field, backend);
+  const StoredField after =
+      StyledFieldOf(std::move(before), style.folder(), settings.style.strength);
+  const std::string kept = style.Path("styled.npz");
   if (settings.style.keep_field)
     WriteFieldFile(kept, after);
   else
     std::filesystem::remove(kept);  // of an earlier style
-  const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
-  FrameRenderers renderers{FieldRenderer(before.field, backend),
-                           FieldRenderer(after.field, backend),
-                           nullptr,
-                           nullptr,
-                           {}};
+  renderers->styled.emplace(after.field, backend);
+}
+
+StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
+  const RunSettings& settings = context->settings;
+  Workspace &workspace = *context->style, &scene = *context->workspace;
+  StoredField before = ReadFieldFile(scene.Path("field.npz"));
+  const WorkingViews views = context->Views().InField(before.field_from_world, before.ndc);
+  // In NDC the field's limit is no distance.
+  SeenByFewRecorder seen(views, before.ndc.on() ? 0 : before.field.near_clip);
+  const FilmPath path = MakeFilmPath(views, settings.render, &before.field);
   const std::unique_ptr<ObjectMasks> masks = OpenObjectMasks(settings, views.capture());
+  FrameRenderers renderers;
   if (masks != nullptr)
     renderers.object = std::make_unique<CoverageRenderer>(
         before.field,
         ReadObjectFile(workspace.Path("object.npz"), before.field.geometry->num_voxels()));
+  const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
+  PrepareFields(settings, workspace, backend, std::move(before), &renderers);
   renderers.stylizer = MakeSceneStylizer(context, views, masks.get(),
                                          [&](const Image&, int) { return renderers.coverage; });
 
-  const FilmPath path = MakeFilmPath(views, settings.render, &before.field);
   if (path.narrowed)
     context->console->Info(
         "the film keeps close to the photos' places: a smoother path would pass through "
@@ -211,7 +218,7 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
     context->console->Info(ComparisonNote(common->cameras[0]));
 
   const std::string why_exact =
-      PrepareFilm(settings, film.of_photos, &renderers.source, &renderers.styled);
+      PrepareFilm(settings, film.of_photos, &*renderers.source, &*renderers.styled);
   renderers.fast_film = why_exact.empty();
   context->console->Detail("renderer of the film: " + FilmRendererText(why_exact, backend));
 
@@ -221,8 +228,6 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   if (settings.style.keep_field) outcome.outputs.push_back("styled.npz");
   RunFilms films(workspace, settings.render.fps, static_cast<int>(film.cameras.size()),
                  film.of_photos ? settings.render.fps : kSampleRate);
-  // In NDC the field's limit is no distance.
-  SeenByFewRecorder seen(views, before.ndc.on() ? 0 : before.field.near_clip);
   {
     FrameWriter writer(workspace, ParseVignette(settings.render.vignette), &films);
     int done = 0;
@@ -251,7 +256,7 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   report.path_transmittance = path.transmittance;
   report.path_photo_distance = path.photo_distance;
   report.film = {film.cameras[0].width, film.cameras[0].height};
-  report.strength = strength;
+  report.strength = settings.style.strength;
   report.film_renderer = FilmRendererText(why_exact, backend);
   if (renderers.seconds > 0) report.frames_per_second = total / renderers.seconds;
   report.seen_by_few = seen.metrics();

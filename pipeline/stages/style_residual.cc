@@ -24,6 +24,7 @@ constexpr int64_t kMostRays = 300000;  // of all views: 0.4 GB
 constexpr double kCostOfViews = 0.001;
 constexpr int kScalings =
     3;  // fits with a layer, each with the scale of the last one, see EQ(view-scale)
+constexpr int kTurnsAgain = 4;  // of these fits but the first: they begin where the last ended
 // Below this, root mean square, a view lacks nothing that can be seen.
 constexpr double kNothing = 0.5 / 255;
 
@@ -65,10 +66,10 @@ class ResidualFit {
   }
 
   // What the styled field with `so_far` lacks, at the views, to method(render), plus `layer(i)`
-  // where there are layers.
+  // where there are layers. The fit begins at `start`, unless empty.
   std::vector<Vec3d> Fit(const std::vector<int>& indices, const VoxelResidual& so_far,
                          const std::function<Image(int)>& layer, const ResidualOptions& options,
-                         const ProgressFunction& progress) const {
+                         std::vector<Vec3d> start, const ProgressFunction& progress) const {
     RadianceField styled = styled_.field;
     if (!so_far.color.empty()) AddResidual(so_far, &styled.appearance);
     const FieldRenderer of_styled(styled, backend_);
@@ -95,7 +96,7 @@ class ResidualFit {
     }
     const ProgressFunction fitting = parts.Next(1);
     if (rays.num_rays() == 0) return std::vector<Vec3d>(static_cast<size_t>(graph_.voxels));
-    return FitResidual(graph_, rays, options, fitting);
+    return FitResidual(graph_, rays, options, std::move(start), fitting);
   }
 
   // rho of colours that are added to the styled field.
@@ -125,7 +126,7 @@ VoxelResidual FitStyleResidual(RunContext* context, const WorkingViews& views,
   const ResidualFit fit(context, views, source, network);
   ResidualOptions options;
   options.cost = kCostOfViews;
-  const std::vector<Vec3d> of_views = fit.Fit(indices, {}, nullptr, options, parts.Next(1));
+  const std::vector<Vec3d> of_views = fit.Fit(indices, {}, nullptr, options, {}, parts.Next(1));
   VoxelResidual residual{Floats(of_views), {}};
   if (choice.Layers().empty()) return residual;
 
@@ -139,9 +140,12 @@ VoxelResidual FitStyleResidual(RunContext* context, const WorkingViews& views,
     const Camera camera = views.CameraOf(i);
     return ReadLayer(paths[static_cast<size_t>(i)], camera.width, camera.height);
   };
-  std::vector<Vec3d> all;
+  std::vector<Vec3d> all, edit;
   for (int turn = 0; turn < kScalings; ++turn) {
-    all = fit.Fit(with_layer, residual, layer, ResidualOptions(), parts.Next(1));
+    options = ResidualOptions();
+    if (turn > 0) options.turns = kTurnsAgain;
+    edit = fit.Fit(with_layer, residual, layer, options, std::move(edit), parts.Next(1));
+    all = edit;
     for (size_t v = 0; v < all.size(); ++v) all[v] += of_views[v];
     if (turn + 1 < kScalings) residual.view_scale = fit.ScaleOf(all);
   }

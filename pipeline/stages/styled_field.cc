@@ -18,21 +18,23 @@ namespace regrade {
 StoredField StyledFieldOf(StoredField source, const StoredNetwork& network, double strength,
                           const std::vector<float>* object_weights,
                           const VoxelResidual* residual) {
-  source.field.appearance = PadShBasis(std::move(source.field.appearance), kStyledBasis);
-  RadianceField styled = source.field;
-  styled.background = network.background;
-  styled.appearance = ApplyNetwork(network.network, source.field);
-  if (residual != nullptr) AddResidual(*residual, &styled.appearance);
-  source.field = strength == 1 && object_weights == nullptr
-                     ? std::move(styled)
-                     : MixFields(source.field, {&styled}, {strength}, object_weights);
+  RadianceField& field = source.field;
+  field.appearance = PadShBasis(std::move(field.appearance), kStyledBasis);
+  Appearance styled = ApplyNetwork(network.network, field);
+  if (residual != nullptr) AddResidual(*residual, &styled);
+  if (strength == 1 && object_weights == nullptr) {
+    field.appearance = std::move(styled);
+    field.background = network.background;
+  } else {
+    const RadianceField all{field.geometry, std::move(styled), network.background,
+                            field.near_clip, field.step};
+    field = MixFields(field, {&all}, {strength}, object_weights);
+  }
   RoundAsStored(&source.field.appearance);
   return source;
 }
 
-StoredField ReadStyledField(const std::string& scene, const std::string& style,
-                            double strength) {
-  StoredField source = ReadFieldFile(scene + "/field.npz");
+StoredField StyledFieldOf(StoredField source, const std::string& style, double strength) {
   const StoredNetwork network = ReadNetworkFile(style + "/network.npz");
   std::optional<ObjectWeights> object;
   if (const std::string file = style + "/object.npz"; std::filesystem::exists(file))
@@ -42,6 +44,11 @@ StoredField ReadStyledField(const std::string& scene, const std::string& style,
     residual = ReadResidualFile(file, source.field.geometry->num_voxels());
   return StyledFieldOf(std::move(source), network, strength, object ? &object->all : nullptr,
                        residual ? &*residual : nullptr);
+}
+
+StoredField ReadStyledField(const std::string& scene, const std::string& style,
+                            double strength) {
+  return StyledFieldOf(ReadFieldFile(scene + "/field.npz"), style, strength);
 }
 
 StoredField ReadStyledField(const std::string& scene, const std::string& style) {

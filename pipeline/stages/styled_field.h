@@ -20,8 +20,11 @@ StoredField StyledFieldOf(StoredField source, const StoredNetwork& network, doub
                           const std::vector<float>* object_weights,
                           const VoxelResidual* residual = nullptr);
 
-// The same from files: field.npz of the output folder `scene`, network.npz, object.npz and
-// residual.npz of the style's folder. Throws Error(kInput).
+// The same with the network.npz, object.npz and residual.npz of the style's folder. Throws
+// Error(kInput).
+StoredField StyledFieldOf(StoredField source, const std::string& style, double strength);
+
+// The same of field.npz in the output folder `scene`.
 StoredField ReadStyledField(const std::string& scene, const std::string& style,
                             double strength);
 

@@ -28,6 +28,16 @@ ResidualQuadratic::ResidualQuadratic(const VoxelGraph& graph, const ResidualRays
       ray_[to] = static_cast<int32_t>(r);
       weight_[to] = rays.weight[from];
     }
+  for (size_t level = 0; level + 1 < graph.cubes.size(); ++level) {
+    const std::vector<int32_t>&cube = graph.cubes[level], &wider = graph.cubes[level + 1];
+    std::vector<int32_t> parent;
+    for (size_t v = 0; v < cube.size(); ++v) {
+      const size_t c = static_cast<size_t>(cube[v]);
+      if (parent.size() <= c) parent.resize(c + 1);
+      parent[c] = wider[v];
+    }
+    parent_.push_back(std::move(parent));
+  }
 }
 
 Colors ResidualQuadratic::Adjoint(const Colors& y) const {
@@ -75,18 +85,30 @@ Colors ResidualQuadratic::Apply(const Colors& x) const {
 }
 
 Colors ResidualQuadratic::Precondition(const Colors& r) const {
+  // P^T r: of a cube, from its halves.
+  std::vector<Colors> sums(graph_.cubes.size());
+  for (size_t level = 0; level < sums.size(); ++level) {
+    const Colors& finer = level == 0 ? r : sums[level - 1];
+    const std::vector<int32_t>& parent = level == 0 ? graph_.cubes[0] : parent_[level - 1];
+    sums[level].resize(inverse_[level + 1].size());
+    for (size_t i = 0; i < finer.size(); ++i)
+      sums[level][static_cast<size_t>(parent[i])] += finer[i];
+  }
+  // The sum over the levels, from the widest cubes on.
+  for (size_t level = sums.size(); level-- > 0;) {
+    Colors& own = sums[level];
+    for (size_t c = 0; c < own.size(); ++c) {
+      own[c] = own[c] * inverse_[level + 1][c];
+      if (level + 1 < sums.size())
+        own[c] += sums[level + 1][static_cast<size_t>(parent_[level][c])];
+    }
+  }
   Colors z(r.size());
 #pragma omp parallel for schedule(static)
-  for (int64_t v = 0; v < graph_.voxels; ++v)
-    z[static_cast<size_t>(v)] = r[static_cast<size_t>(v)] * inverse_[0][static_cast<size_t>(v)];
-  for (size_t level = 0; level < graph_.cubes.size(); ++level) {
-    const std::vector<int32_t>& cube = graph_.cubes[level];
-    Colors sums(inverse_[level + 1].size());
-    for (size_t v = 0; v < r.size(); ++v) sums[static_cast<size_t>(cube[v])] += r[v];
-    for (size_t c = 0; c < sums.size(); ++c) sums[c] = sums[c] * inverse_[level + 1][c];
-#pragma omp parallel for schedule(static)
-    for (int64_t v = 0; v < graph_.voxels; ++v)
-      z[static_cast<size_t>(v)] += sums[static_cast<size_t>(cube[static_cast<size_t>(v)])];
+  for (int64_t v = 0; v < graph_.voxels; ++v) {
+    const size_t own = static_cast<size_t>(v);
+    z[own] = r[own] * inverse_[0][own];
+    if (!sums.empty()) z[own] += sums[0][static_cast<size_t>(graph_.cubes[0][own])];
   }
   return z;
 }

@@ -37,6 +37,7 @@ class ResidualQuadratic {
   std::vector<int64_t> first_;
   std::vector<int32_t> ray_;
   std::vector<float> weight_;
+  std::vector<std::vector<int32_t>> parent_;  // of each level's cubes, that of the next level
   std::vector<double> edge_;                  // w
   std::vector<std::vector<double>> inverse_;  // D^-1 of the voxels, then of each level's cubes
 };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "kernels/base/error.h"
 #include "kernels/field/spherical_harmonics.h"
@@ -61,35 +62,42 @@ double ResidualEnergy(const VoxelGraph& graph, const ResidualRays& rays,
 }
 
 std::vector<Vec3d> FitResidual(const VoxelGraph& graph, const ResidualRays& rays,
-                               const ResidualOptions& options,
+                               const ResidualOptions& options, std::vector<Vec3d> start,
                                const ProgressFunction& progress) {
-  Colors x(static_cast<size_t>(graph.voxels));
+  Colors x = std::move(start);
+  x.resize(static_cast<size_t>(graph.voxels));
   Colors missing;
   for (const Vec3f& t : rays.missing) missing.push_back(t.Cast<double>());
   ResidualQuadratic quadratic(graph, rays, options.pull);
   const Colors right = quadratic.Adjoint(missing);
-  const double enough = 1e-12 * Product(right, right);
+  double enough = 0;
   for (int turn = 0; turn < options.turns; ++turn) {
     quadratic.TouchAt(x, options.cost, options.width);
     Colors r = quadratic.Apply(x);
     for (size_t v = 0; v < r.size(); ++v) r[v] = right[v] - r[v];
     Colors z = quadratic.Precondition(r), p = z;
     double rz = Product(r, z);
-    for (int step = 0; step < options.steps; ++step) {
+    if (turn == 0) enough = 1e-12 * rz;
+    for (int step = 0; step < options.steps && rz > enough; ++step) {
       ReportOrThrow(progress, turn * options.steps + step, options.turns * options.steps,
                     "residual by voxel");
-      if (!(Product(r, r) > enough)) break;
       const Colors q = quadratic.Apply(p);
       const double along = Product(p, q);
       if (!(along > 0)) break;
       const double a = rz / along;
-      for (size_t v = 0; v < x.size(); ++v) {
+#pragma omp parallel for schedule(static)
+      for (int64_t i = 0; i < graph.voxels; ++i) {
+        const size_t v = static_cast<size_t>(i);
         x[v] += p[v] * a;
         r[v] += q[v] * -a;
       }
       z = quadratic.Precondition(r);
       const double next = Product(r, z);
-      for (size_t v = 0; v < x.size(); ++v) p[v] = z[v] + p[v] * (next / rz);
+#pragma omp parallel for schedule(static)
+      for (int64_t i = 0; i < graph.voxels; ++i) {
+        const size_t v = static_cast<size_t>(i);
+        p[v] = z[v] + p[v] * (next / rz);
+      }
       rz = next;
     }
   }

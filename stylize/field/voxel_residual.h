@@ -36,8 +36,8 @@ struct ResidualOptions {
   double cost = 0.01;   // p
   double width = 0.01;  // d
   double pull = 1e-6;   // e
-  int turns = 3;        // quadratics
-  int steps = 40;       // of conjugate gradients for each
+  int turns = 6;        // quadratics
+  int steps = 15;       // of conjugate gradients for each
 };
 
 // E, and its gradient [voxels] unless null: the plain specification.
@@ -45,9 +45,9 @@ double ResidualEnergy(const VoxelGraph& graph, const ResidualRays& rays,
                       const ResidualOptions& options, const std::vector<Vec3d>& x,
                       std::vector<Vec3d>* gradient);
 
-// [voxels]. The same for any number of threads.
+// [voxels]. The same for any number of threads. `start`: [voxels], or empty for 0.
 std::vector<Vec3d> FitResidual(const VoxelGraph& graph, const ResidualRays& rays,
-                               const ResidualOptions& options,
+                               const ResidualOptions& options, std::vector<Vec3d> start = {},
                                const ProgressFunction& progress = nullptr);
 
 // A residual as it is applied: to a voxel's coefficients s of channel c
