@@ -128,8 +128,9 @@ std::string CheckLine(const std::string& what, const PageCheck& check) {
                        check.worst_db, check.mean_db);
 }
 
-// A style of the page `made`, with what it adds to the exact `source` voxel by voxel; it is
-// compared with the exact style in the views `checked`.
+// A style of the page `made`, with what it adds to the exact `source` voxel by voxel. It is
+// compared with the exact style in the views `checked`; the source's colours are read only
+// then.
 void AddStyle(const std::string& style_folder, const std::string& name,
               const RadianceField& source, const std::vector<Camera>& checked,
               PageContent* content, MadePage* made) {

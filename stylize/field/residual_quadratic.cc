@@ -85,7 +85,7 @@ Colors ResidualQuadratic::Apply(const Colors& x) const {
 }
 
 Colors ResidualQuadratic::Precondition(const Colors& r) const {
-  // P^T r: of a cube, from its halves.
+  // P^T r: a cube's sum is that of the cubes of half its width in it.
   std::vector<Colors> sums(graph_.cubes.size());
   for (size_t level = 0; level < sums.size(); ++level) {
     const Colors& finer = level == 0 ? r : sums[level - 1];

@@ -1,5 +1,5 @@
-// Styles of one scene, each in its own folder: nothing overwritten, the styled field
-// remade from field and network, strength, and kills in the midst.
+// Styles of one scene, each in its own folder: nothing overwritten, the styled field remade
+// from field and network, strength, and kills in the midst.
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -166,8 +166,8 @@ TEST(Styles, StrengthIsAMixOfSceneAndStyle) {
   EXPECT_EQ(Regrade({"stylize", folder / "e", "--name", "s", "--strength", "1.5"}).code, 2);
 }
 
-// Starts the run, kills it and goes on, three times, within the second and third style; false
-// if it ended before it was killed.
+// Starts the run three times and kills it each time, within the second and the third style;
+// false if it ended before it was killed.
 bool KillWithinStyles(const TemporaryFolder& folder, const std::vector<std::string>& run) {
   const int null = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
   bool killed = true;
