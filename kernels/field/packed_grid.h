@@ -7,6 +7,8 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
+#include <utility>
 
 #include "kernels/base/buffer.h"
 #include "kernels/field/radiance_field.h"
@@ -42,10 +44,10 @@ struct Probe {
   int32_t link;   // voxel, or -1
 };
 
-// A field in the packed layout, with the arrays derived from it.
+// A field in the packed layout, with the arrays derived from it. An adaptive field has cells
+// and no arrays over the box.
 struct FastGrid {
   GridFrame frame;
-  CellGrid cells;                // of an adaptive field, which has no arrays over the box
   Buffer<float> vertex_density;  // [N]: densities of an adaptive field, side by side
   // [N], or empty: factors of the optimizer's rate of each voxel's density, in a fit.
   Buffer<float> density_rate;
@@ -60,6 +62,13 @@ struct FastGrid {
   Vec3f background{0, 0, 0};
   float near_clip = 0;  // world units
   FastSpheres spheres;  // background layers, if any
+
+  // Fields of one geometry share them; a uniform one has none.
+  const CellGrid& cells() const { return *shared_cells; }
+  void SetCells(CellGrid cells) {
+    shared_cells = std::make_shared<const CellGrid>(std::move(cells));
+  }
+  std::shared_ptr<const CellGrid> shared_cells = std::make_shared<const CellGrid>();
 
   Vec3i bricks() const {
     return {(frame.resolution.x + kBrick - 1) / kBrick,

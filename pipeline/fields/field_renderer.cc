@@ -27,28 +27,31 @@ RenderedPair FieldRenderer::RenderWith(const FieldRenderer& other, const Camera&
 
 std::string FieldRenderer::PrepareFast() {
   if (backend_ == Backend::kCpu) return "";
-  if (device_.cells.on()) return "the fast renderer needs a uniform field";
   try {
-    half_ = MakeHalfGrid(device_);
+    if (device_.cells.on())
+      colors_ = MakeVertexColors(device_);
+    else
+      half_ = MakeHalfGrid(device_);
   } catch (const Error& error) {
     if (error.code() != ExitCode::kResources) throw;
-    return "the GPU has no memory for a copy of the field in half precision";
+    return "the GPU has no memory for the fast renderer's copy of the field";
   }
-  return half_.empty() ? "the fast renderer needs colours of degree 2" : "";
+  return half_.empty() && colors_.empty() ? "the fast renderer needs colours of degree 2" : "";
 }
 
 RenderedPair FieldRenderer::RenderFastWith(const FieldRenderer& other,
                                            const Camera& camera) const {
   REGRADE_CHECK(backend_ == other.backend_ && camera.lens == LensModel::kPinhole);
-  if (backend_ == Backend::kCuda) return {RenderHalf(camera), other.RenderHalf(camera).color};
+  if (backend_ == Backend::kCuda) return {RenderFast(camera), other.RenderFast(camera).color};
   return RenderFilmFrame(grid_, other.grid_, camera, {march_.step, kFastStop}, kSmoothTolerance)
       .pair;
 }
 
-RenderedView FieldRenderer::RenderHalf(const Camera& camera) const {
-  REGRADE_CHECK(!half_.empty());
-  return RenderViewOnDevice(device_, camera, {march_.step, kFastStop}, kFastOpacityStep,
-                            &half_);
+RenderedView FieldRenderer::RenderFast(const Camera& camera) const {
+  REGRADE_CHECK(!half_.empty() || !colors_.empty());
+  return RenderViewOnDevice(
+      device_, camera, {march_.step, kFastStop},
+      {.opacity_step = kFastOpacityStep, .half = &half_, .colors = &colors_});
 }
 
 }  // namespace regrade

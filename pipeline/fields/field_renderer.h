@@ -6,6 +6,7 @@
 #include "kernels/device/backend.h"
 #include "kernels/field/cpu/render_view.h"
 #include "kernels/field/cuda/device_grid.h"
+#include "kernels/field/cuda/device_rays.h"
 #include "kernels/field/cuda/half_grid.h"
 #include "kernels/field/packed_grid.h"
 #include "kernels/field/ray_march.h"
@@ -14,13 +15,13 @@
 namespace regrade {
 
 // Of the fast renderers: the transmittance at which a ray ends; on a GPU the step of opacity at
-// which a colour is evaluated, see EQ(opacity-steps); on the CPU the tolerance of
-// EQ(smooth-pixels). Errors and times are in COSTS.md.
+// which a colour of a uniform field is evaluated, see EQ(opacity-steps); on the CPU the
+// tolerance of EQ(smooth-pixels). Errors and times are in COSTS.md.
 inline constexpr float kFastStop = 1e-3f, kFastOpacityStep = 1.0f / 128,
                        kSmoothTolerance = 1.5f / 255;
 inline constexpr char kFastRendererOfGpu[] =
-    "half precision, steps where opacity changes by 1/128; at least 55 dB from the exact "
-    "frames";
+    "a uniform field in half precision, steps where opacity changes by 1/128; of an adaptive "
+    "field, colours of vertices; at least 55 dB from the exact frames";
 inline constexpr char kFastRendererOfCpu[] =
     "smooth parts interpolated between rays; at least 55 dB from the exact frames";
 
@@ -35,22 +36,24 @@ class FieldRenderer {
   // processor; exact. The CPU marches once for both.
   RenderedPair RenderWith(const FieldRenderer& other, const Camera& camera) const;
 
-  // Prepares the fast renderer: on a GPU a copy of the field in half precision. Returns why
-  // there is none, or an empty text.
+  // Prepares the fast renderer: on a GPU a copy of a uniform field in half precision, or room
+  // for the colours of an adaptive field's vertices. Returns why there is none, or an empty
+  // text.
   std::string PrepareFast();
-  // Frees that copy.
-  void ForgetFast() { half_ = {}; }
+  // Frees that memory.
+  void ForgetFast() { half_ = {}, colors_ = {}; }
   // As RenderWith; both are prepared, and the camera has no distortion.
   RenderedPair RenderFastWith(const FieldRenderer& other, const Camera& camera) const;
 
  private:
-  RenderedView RenderHalf(const Camera& camera) const;
+  RenderedView RenderFast(const Camera& camera) const;
 
   Backend backend_;
   MarchOptions march_;
   FastGrid grid_;  // one of the two
   DeviceGrid device_;
   HalfGrid half_;
+  VertexColors colors_;
 };
 
 }  // namespace regrade

@@ -12,8 +12,8 @@ bool Consistent(const FastGrid& grid) {
   if (grid.basis != 1 && grid.basis != 4 && grid.basis != 9) return false;
   const int64_t voxels = grid.records.size() / grid.lanes();
   if (grid.density_rate.size() != 0 && grid.density_rate.size() != voxels) return false;
-  if (grid.cells.on())
-    return grid.links.size() == 0 && grid.cells.num_vertices() == voxels &&
+  if (grid.cells().on())
+    return grid.links.size() == 0 && grid.cells().num_vertices() == voxels &&
            grid.records.size() == voxels * grid.lanes();
   for (int a = 0; a < 3; ++a)
     if (grid.frame.resolution[a] < 2 || grid.frame.resolution[a] > 1 << 14) return false;
@@ -39,15 +39,15 @@ bool Consistent(const FastSpheres& spheres) {
 }
 
 void PackCells(const FastGrid& grid, BytePacker* packer) {
-  packer->Value(grid.cells.finest);
-  packer->Reference(grid.cells.key);
-  packer->Reference(grid.cells.level);
+  packer->Value(grid.cells().finest);
+  packer->Reference(grid.cells().key);
+  packer->Reference(grid.cells().level);
   packer->Reference(grid.density_rate);
 }
 
 // Vertices and tree are found again, if keys and levels are those of cells.
 bool UnpackCells(ByteUnpacker* unpacker, FastGrid* grid) {
-  CellGrid& cells = grid->cells;
+  CellGrid cells;
   unpacker->Value(&cells.finest);
   unpacker->Values(&cells.key);
   unpacker->Values(&cells.level);
@@ -56,6 +56,7 @@ bool UnpackCells(ByteUnpacker* unpacker, FastGrid* grid) {
     return false;
   FindVertices(&cells);
   BuildTree(grid->frame.resolution, &cells);
+  grid->SetCells(std::move(cells));
   return true;
 }
 
@@ -96,7 +97,7 @@ void UnpackTally(ByteUnpacker* unpacker, FitTally* tally) {
 BytePacker PackFitState(const FitState& state, const std::string& note) {
   const FastGrid& grid = state.grid;
   BytePacker packer;
-  packer.Value(grid.cells.on() ? kCellsVersion : kUniformVersion);
+  packer.Value(grid.cells().on() ? kCellsVersion : kUniformVersion);
   packer.Values(note);
   packer.Value(grid.basis);
   packer.Value(state.stage);
@@ -110,7 +111,7 @@ BytePacker PackFitState(const FitState& state, const std::string& note) {
   packer.Value(grid.near_clip);
   PackTally(state.tally, &packer);
   packer.Reference(grid.links);
-  if (grid.cells.on()) PackCells(grid, &packer);
+  if (grid.cells().on()) PackCells(grid, &packer);
   packer.Reference(grid.records);
   packer.Reference(state.second_moment);
   if (!grid.spheres.on()) return packer;

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "kernels/base/options.h"
-#include "kernels/field/cuda/half_grid.h"
+#include "kernels/field/cuda/device_rays.h"
 #include "pipeline/capture/packed_capture.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/program/option_binding.h"
@@ -102,9 +102,8 @@ struct RenderPackedOptions {
 // Milliseconds from a held-out view's camera (through a lens without distortion) to its pixels
 // on the device: the median of all.
 double RenderMilliseconds(const DeviceGrid& grid, const PackedCapture& capture,
-                          const MarchOptions& march, float opacity_step = 0,
-                          const HalfGrid* half = nullptr);
-// The same for a row of settings of the march and of opacity_step: milliseconds, and the error
+                          const MarchOptions& march, const FastFrames& fast = {});
+// The same for a row of settings of the march and of faster frames: milliseconds, and the error
 // against the first in dB, PSNR, SSIM and detail kept to the photos.
 JsonValue RenderCosts(const DeviceGrid& grid, const PackedCapture& capture, float step);
 

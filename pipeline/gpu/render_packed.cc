@@ -36,9 +36,6 @@ void RenderHeldOut(const DeviceGrid& grid, const PackedCapture& capture,
 void RenderPacked(const RenderPackedOptions& settings) {
   const PackedCapture capture = ReadPackedCapture(settings.capture);
   const StoredField stored = ReadFieldFile(settings.field);
-  if (settings.compare && stored.field.geometry->cells.on())
-    throw InputError("is an adaptive field, which has one renderer", settings.field,
-                     "leave out --compare, or fit with --fit-field uniform");
   const DeviceGrid grid = UploadGrid(MakeFastGrid(stored.field));
   if (!settings.frames.empty() && !settings.compare)
     RenderHeldOut(grid, capture, {stored.field.step}, settings.frames, "frame");

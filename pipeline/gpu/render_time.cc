@@ -10,7 +10,7 @@
 
 namespace regrade {
 double RenderMilliseconds(const DeviceGrid& grid, const PackedCapture& capture,
-                          const MarchOptions& march, float opacity_step, const HalfGrid* half) {
+                          const MarchOptions& march, const FastFrames& fast) {
   std::vector<double> milliseconds;
   for (const PackedView& view : capture.views) {
     if (!view.held_out) continue;
@@ -22,8 +22,7 @@ double RenderMilliseconds(const DeviceGrid& grid, const PackedCapture& capture,
       DeviceWait("rendering");
       const double start = ClockSeconds();
       RenderFrameOnDevice(grid, camera, march,
-                          {color.data(), depth.data(), transmittance.data()}, opacity_step,
-                          half);
+                          {color.data(), depth.data(), transmittance.data()}, fast);
       DeviceWait("rendering");
       if (repeat > 0) milliseconds.push_back(1e3 * (ClockSeconds() - start));
     }
@@ -31,51 +30,62 @@ double RenderMilliseconds(const DeviceGrid& grid, const PackedCapture& capture,
   return Median(milliseconds);
 }
 
-JsonValue RenderCosts(const DeviceGrid& grid, const PackedCapture& capture, float step) {
-  struct Setting {
-    float stop, opacity_step, step;
-    bool half;
-  };
+namespace {
+
+// `copy`: a uniform field in half precision, or colours of an adaptive field's vertices.
+struct Setting {
+  float stop, opacity_step, step;
+  bool copy;
+};
+
+std::vector<Setting> SettingsOf(const DeviceGrid& grid, float step) {
+  if (grid.cells.on())
+    return {{1e-4f, 0, step, false}, {1e-3f, 0, step, false}, {1e-2f, 0, step, false},
+            {1e-4f, 0, step, true},  {1e-3f, 0, step, true},  {1e-2f, 0, step, true}};
   const float coarse = 2 * step;
-  const Setting settings[] = {
-      {1e-4f, 0, step, false},          {1e-3f, 0, step, false},
-      {1e-2f, 0, step, false},          {1e-3f, 1.0f / 256, step, false},
-      {1e-3f, 1.0f / 128, step, false}, {1e-3f, 1.0f / 64, step, false},
-      {1e-3f, 1.0f / 32, step, false},  {1e-2f, 1.0f / 64, step, false},
-      {1e-3f, 0, coarse, false},        {1e-4f, 0, step, true},
-      {1e-3f, 0, step, true},           {1e-3f, 1.0f / 64, step, true},
-      {1e-2f, 1.0f / 64, step, true},   {1e-2f, 1.0f / 32, step, true},
-      {1e-3f, 0, coarse, true},         {1e-2f, 1.0f / 64, coarse, true}};
+  return {{1e-4f, 0, step, false},          {1e-3f, 0, step, false},
+          {1e-2f, 0, step, false},          {1e-3f, 1.0f / 256, step, false},
+          {1e-3f, 1.0f / 128, step, false}, {1e-3f, 1.0f / 64, step, false},
+          {1e-3f, 1.0f / 32, step, false},  {1e-2f, 1.0f / 64, step, false},
+          {1e-3f, 0, coarse, false},        {1e-4f, 0, step, true},
+          {1e-3f, 0, step, true},           {1e-3f, 1.0f / 64, step, true},
+          {1e-2f, 1.0f / 64, step, true},   {1e-2f, 1.0f / 32, step, true},
+          {1e-3f, 0, coarse, true},         {1e-2f, 1.0f / 64, coarse, true}};
+}
+
+}  // namespace
+
+JsonValue RenderCosts(const DeviceGrid& grid, const PackedCapture& capture, float step) {
+  const bool adaptive = grid.cells.on();
   const HalfGrid half = MakeHalfGrid(grid);
+  const VertexColors colors = adaptive ? MakeVertexColors(grid) : VertexColors();
   std::vector<Image> exact;
   JsonValue::Array rows;
-  for (const Setting& setting : settings) {
-    // Of an adaptive field every sample is shaded.
-    if (grid.cells.on() && (setting.half || setting.opacity_step > 0)) continue;
+  for (const Setting& setting : SettingsOf(grid, step)) {
     const MarchOptions march{setting.step, setting.stop};
-    const HalfGrid* halves = setting.half ? &half : nullptr;
+    FastFrames fast{.opacity_step = setting.opacity_step};
+    if (setting.copy) fast.half = &half, fast.colors = &colors;
     std::vector<double> against_exact, against_photo, ssim, detail_kept;
     size_t index = 0;
     for (const PackedView& view : capture.views) {
       if (!view.held_out) continue;
-      const Image image =
-          RenderViewOnDevice(grid, view.camera, march, setting.opacity_step, halves).color;
+      const Image image = RenderViewOnDevice(grid, view.camera, march, fast).color;
       if (rows.empty()) exact.push_back(image);
       against_exact.push_back(Psnr(image, exact[index++]).value_or(0));
       against_photo.push_back(Psnr(image, view.photo).value_or(0));
       ssim.push_back(Ssim(image, view.photo).value_or(0));
       detail_kept.push_back(MeasureFineDetail(image, view.photo).kept.value_or(0));
     }
-    rows.push_back(JsonValue::Object{
-        {"stop", setting.stop},
-        {"opacity_step", setting.opacity_step},
-        {"step", setting.step},
-        {"half", setting.half},
-        {"ms", RenderMilliseconds(grid, capture, march, setting.opacity_step, halves)},
-        {"db_against_first", rows.empty() ? 0.0 : Median(against_exact)},
-        {"db_against_photos", Median(against_photo)},
-        {"ssim_against_photos", Median(ssim)},
-        {"detail_kept_against_photos", Median(detail_kept)}});
+    rows.push_back(
+        JsonValue::Object{{"stop", setting.stop},
+                          {"opacity_step", setting.opacity_step},
+                          {"step", setting.step},
+                          {adaptive ? "vertex_colors" : "half", setting.copy},
+                          {"ms", RenderMilliseconds(grid, capture, march, fast)},
+                          {"db_against_first", rows.empty() ? 0.0 : Median(against_exact)},
+                          {"db_against_photos", Median(against_photo)},
+                          {"ssim_against_photos", Median(ssim)},
+                          {"detail_kept_against_photos", Median(detail_kept)}});
   }
   return rows;
 }

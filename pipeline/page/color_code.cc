@@ -11,7 +11,7 @@ namespace {
 
 constexpr int kBins = 4096;              // of magnitudes
 constexpr int kMostBits = 12;            // of a number
-constexpr size_t kMostFitted = 1 << 18;  // voxels whose covariance is taken
+constexpr size_t kMostFitted = 1 << 18;  // voxels that a code is fitted to
 
 // The errors of one number's values, by its bits.
 class NumberErrors {
@@ -89,11 +89,10 @@ Numbers Transformed(const float* values, const ColorCode& code, int basis) {
 
 // Matrices that decorrelate channels, and then harmonics of all channels alike.
 void FitTransforms(const std::vector<float>& spread, int basis, ColorCode* code) {
-  const size_t channels = static_cast<size_t>(3 * basis), all = spread.size() / channels;
-  const size_t stride = all / kMostFitted + 1, n = (all + stride - 1) / stride;
+  const size_t channels = static_cast<size_t>(3 * basis), n = spread.size() / channels;
   std::vector<float> rows;
   const auto at = [&](size_t i, int c, int k) {
-    return spread[i * stride * channels + static_cast<size_t>(c * basis + k)];
+    return spread[i * channels + static_cast<size_t>(c * basis + k)];
   };
   for (size_t i = 0; i < n; ++i)
     for (int k = 0; k < basis; ++k)
@@ -128,19 +127,19 @@ void FitTransforms(const std::vector<float>& spread, int basis, ColorCode* code)
 
 std::vector<NumberErrors> ErrorsOf(const std::vector<float>& values, const ColorCode& code,
                                    int basis, double finest, const std::vector<float>& weight) {
-  const size_t channels = static_cast<size_t>(3 * basis), n = values.size() / channels;
+  const size_t channels = static_cast<size_t>(3 * basis);
+  std::vector<Numbers> rows(values.size() / channels);
   std::vector<double> largest(channels);
-  for (size_t i = 0; i < n; ++i) {
-    const Numbers y = Transformed(values.data() + i * channels, code, basis);
-    for (size_t c = 0; c < channels; ++c) largest[c] = std::max(largest[c], std::abs(y[c]));
+  for (size_t i = 0; i < rows.size(); ++i) {
+    rows[i] = Transformed(values.data() + i * channels, code, basis);
+    for (size_t c = 0; c < channels; ++c)
+      largest[c] = std::max(largest[c], std::abs(rows[i][c]));
   }
   std::vector<NumberErrors> errors;
   for (const double most : largest) errors.emplace_back(finest, most);
-  for (size_t i = 0; i < n; ++i) {
-    const Numbers y = Transformed(values.data() + i * channels, code, basis);
+  for (size_t i = 0; i < rows.size(); ++i)
     for (size_t c = 0; c < channels; ++c)
-      errors[c].Add(y[c], weight.empty() ? 1 : double{weight[i]});
-  }
+      errors[c].Add(rows[i][c], weight.empty() ? 1 : double{weight[i]});
   for (NumberErrors& e : errors) e.Finish();
   return errors;
 }
@@ -154,6 +153,12 @@ std::vector<double> NumbersIn(const JsonValue& json, const char* key, size_t cou
 }
 
 }  // namespace
+
+std::vector<size_t> FittedVoxels(size_t n) {
+  std::vector<size_t> fitted;
+  for (size_t i = 0; i < n; i += n / kMostFitted + 1) fitted.push_back(i);
+  return fitted;
+}
 
 ColorCode FitColorCode(const std::vector<float>& spread, const std::vector<float>& values,
                        int basis, double finest, const std::vector<float>& weight) {
@@ -201,52 +206,47 @@ ColorCode FitColorCode(const std::vector<float>& spread, const std::vector<float
   return code;
 }
 
-std::vector<int16_t> NumbersOf(const std::vector<float>& values, const ColorCode& code,
-                               int basis) {
-  const size_t channels = static_cast<size_t>(3 * basis), n = values.size() / channels;
-  std::vector<int16_t> numbers(values.size());
+std::vector<int16_t> NumbersOf(const ColorRows& rows, const ColorCode& code) {
+  const int basis = rows.basis;
+  const size_t n = rows.size();
+  std::vector<int16_t> numbers(static_cast<size_t>(3 * basis) * n);
 #pragma omp parallel for schedule(static)
-  for (int64_t i = 0; i < static_cast<int64_t>(n); ++i) {
-    const Numbers y =
-        Transformed(values.data() + static_cast<size_t>(i) * channels, code, basis);
+  for (size_t i = 0; i < n; ++i) {
+    const Numbers y = Transformed(rows[i], code, basis);
     for (int a = 0; a < 3; ++a)
       for (int j = 0; j < basis; ++j) {
         const int number = kCodeHarmonics * a + j;
         const double most = code.limit(number);
         const size_t c = static_cast<size_t>(a * basis + j);
         const double q = std::floor(y[c] / code.step[static_cast<size_t>(number)] + 0.5);
-        numbers[c * n + static_cast<size_t>(i)] =
-            static_cast<int16_t>(std::clamp(q, -most, most));
+        numbers[c * n + i] = static_cast<int16_t>(std::clamp(q, -most, most));
       }
   }
   return numbers;
 }
 
-std::vector<float> ValuesOf(const std::vector<int16_t>& numbers, const ColorCode& code,
-                            int basis) {
-  const size_t channels = static_cast<size_t>(3 * basis), n = numbers.size() / channels;
-  std::vector<float> values(numbers.size());
+void PutValues(const std::vector<int16_t>& numbers, const ColorCode& code, int basis,
+               const std::vector<int64_t>& voxel, float* values) {
+  const size_t n = voxel.size();
 #pragma omp parallel for schedule(static)
-  for (int64_t i = 0; i < static_cast<int64_t>(n); ++i) {
+  for (size_t i = 0; i < n; ++i) {
     double turned[3][kCodeHarmonics] = {};
     for (int a = 0; a < 3; ++a)
       for (int j = 0; j < basis; ++j) {
-        const double y =
-            numbers[static_cast<size_t>(a * basis + j) * n + static_cast<size_t>(i)] *
-            code.step[static_cast<size_t>(kCodeHarmonics * a + j)];
+        const double y = numbers[static_cast<size_t>(a * basis + j) * n + i] *
+                         code.step[static_cast<size_t>(kCodeHarmonics * a + j)];
         for (int c = 0; c < 3; ++c)
           turned[c][j] += code.opponent[static_cast<size_t>(3 * a + c)] * y;
       }
+    float* const row = values + 3 * basis * voxel[i];
     for (int c = 0; c < 3; ++c)
       for (int k = 0; k < basis; ++k) {
         double sum = 0;
         for (int j = 0; j < basis; ++j)
           sum += code.harmonics[static_cast<size_t>(kCodeHarmonics * j + k)] * turned[c][j];
-        values[static_cast<size_t>(i) * channels + static_cast<size_t>(c * basis + k)] =
-            static_cast<float>(sum);
+        row[c * basis + k] = static_cast<float>(sum);
       }
   }
-  return values;
 }
 
 std::string WordsOf(const std::vector<int16_t>& numbers, const ColorCode& code) {

@@ -38,18 +38,30 @@ struct ColorCode {
   int limit(int number) const { return (1 << (bits[static_cast<size_t>(number)] - 1)) - 1; }
 };
 
+// Voxels' coefficients where a field has them.
+struct ColorRows {
+  const float* values = nullptr;  // [3, basis] of each voxel, channel-major
+  int basis = 9;
+  const std::vector<int64_t>& voxel;  // [n]: whose these are
+
+  size_t size() const { return voxel.size(); }
+  const float* operator[](size_t i) const { return values + 3 * basis * voxel[i]; }
+};
+
+// Of n voxels those that a code is fitted to: all, or every second, third, ...
+std::vector<size_t> FittedVoxels(size_t n);
+
 // The transforms that decorrelate `spread` [n, 3, basis] (channel-major), and for `values`
 // [n, 3, basis] the bits and steps of least squared error, none below `finest`. `weight` [n]:
 // of each voxel's error; empty: all alike. The identity's for n = 0.
 ColorCode FitColorCode(const std::vector<float>& spread, const std::vector<float>& values,
                        int basis, double finest, const std::vector<float>& weight = {});
 
-// values [V, 3, basis] -> numbers [3 basis, V], those of (a, j) in row a basis + j.
-std::vector<int16_t> NumbersOf(const std::vector<float>& values, const ColorCode& code,
-                               int basis);
-// Back: [V, 3, basis].
-std::vector<float> ValuesOf(const std::vector<int16_t>& numbers, const ColorCode& code,
-                            int basis);
+// Numbers [3 basis, V], those of (a, j) in row a basis + j.
+std::vector<int16_t> NumbersOf(const ColorRows& rows, const ColorCode& code);
+// Back, to the rows that they came from; `values` as in ColorRows.
+void PutValues(const std::vector<int16_t>& numbers, const ColorCode& code, int basis,
+               const std::vector<int64_t>& voxel, float* values);
 
 // Numbers [27, V] of nine harmonics as words: 16 bytes a voxel, the lowest of a word first.
 std::string WordsOf(const std::vector<int16_t>& numbers, const ColorCode& code);

@@ -55,18 +55,31 @@ std::string SectionBytes(const PageField& page, const char* name, uint64_t max_b
   throw InputError("is missing", name);
 }
 
-void EncodeVoxelColors(const std::vector<float>& values, int basis,
-                       const std::vector<EarlierVoxels>& earlier, double step,
-                       PageField* page) {
-  const ColorCode code =
-      FitColorCode(Differences(values, 3 * basis, earlier), values, basis, step);
-  AddSection("color", PackNumbers(NumbersOf(values, code, basis), 3 * basis, earlier), page);
+// The mean of a coefficient over a voxel's earlier neighbours, 0 without any.
+float EarlierMean(const ColorRows& rows, const EarlierVoxels& earlier, int coefficient) {
+  float sum = 0, n = 0;
+  for (const int32_t other : earlier)
+    if (other >= 0) sum += rows[static_cast<size_t>(other)][coefficient], ++n;
+  return n > 0 ? sum / n : 0;
+}
+
+void EncodeVoxelColors(const ColorRows& rows, const std::vector<EarlierVoxels>& earlier,
+                       double step, PageField* page) {
+  const int channels = 3 * rows.basis;
+  std::vector<float> values, differences;
+  for (const size_t i : FittedVoxels(rows.size())) {
+    values.insert(values.end(), rows[i], rows[i] + channels);
+    for (int c = 0; c < channels; ++c)
+      differences.push_back(rows[i][c] - EarlierMean(rows, earlier[i], c));
+  }
+  const ColorCode code = FitColorCode(differences, values, rows.basis, step);
+  AddSection("color", PackNumbers(NumbersOf(rows, code), channels, earlier), page);
   page->header["color"] = JsonOf(code);
 }
 
-// [V, 3, basis]
-std::vector<float> DecodeVoxelColors(const PageField& page, int basis,
-                                     const std::vector<EarlierVoxels>& earlier) {
+// Sets the coefficients [V, 3, basis] of the voxels `voxel`.
+void DecodeVoxelColors(const PageField& page, int basis, const std::vector<int64_t>& voxel,
+                       const std::vector<EarlierVoxels>& earlier, Buffer<float>* sh) {
   const ColorCode code = ColorCodeOf(page.header.At("color"));
   const size_t channels = static_cast<size_t>(3 * basis), n = earlier.size();
   const std::vector<int16_t> numbers = UnpackNumbers(
@@ -78,10 +91,9 @@ std::vector<float> DecodeVoxelColors(const PageField& page, int basis,
       if (std::abs(numbers[c * n + i]) > limit)
         throw InputError("a number has more bits than it may have", "color");
   }
-  std::vector<float> values = ValuesOf(numbers, code, basis);
-  for (const float value : values)
+  PutValues(numbers, code, basis, voxel, sh->data());
+  for (const float value : *sh)
     if (!std::isfinite(value)) throw InputError("a coefficient is not finite", "color");
-  return values;
 }
 
 // The colours of background spheres.
@@ -231,16 +243,11 @@ PageField EncodeField(const RadianceField& field, double step) {
   const std::string places = on_cells ? TreeOfCells(geometry) : MaskOfGrid(geometry);
   const PageOrder order = OrderOf(geometry, places);
   const std::vector<int64_t> voxel = VoxelsOf(geometry, order);
-  const int channels = field.appearance.stride();
   std::vector<int16_t> density;
-  std::vector<float> color;
   const double unit = VoxelWidth(frame);
-  for (size_t i = 0; i < voxel.size(); ++i) {
+  for (size_t i = 0; i < voxel.size(); ++i)
     density.push_back(
         DensityNumber(geometry.density[voxel[i]], unit * (1 << order.width_log2[i])));
-    const float* const sh = field.appearance.sh.data() + voxel[i] * channels;
-    color.insert(color.end(), sh, sh + channels);
-  }
   page.header = JsonValue::Object{
       {"format", kPageFormat},
       {"voxels", static_cast<int64_t>(voxel.size())},
@@ -255,7 +262,8 @@ PageField EncodeField(const RadianceField& field, double step) {
       {"step", double{field.step}}};
   AddSection(on_cells ? "tree" : "mask", places, &page);
   AddSection("density", PackNumbers(density, 1, order.earlier), &page);
-  EncodeVoxelColors(color, field.appearance.basis, order.earlier, step, &page);
+  EncodeVoxelColors({field.appearance.sh.data(), field.appearance.basis, voxel}, order.earlier,
+                    step, &page);
   EncodeSpheres(field, &page);
   return page;
 }
@@ -292,8 +300,6 @@ RadianceField DecodeField(const PageField& page) {
   const int channels = field.appearance.stride();
   const std::vector<int16_t> density =
       UnpackNumbers(SectionBytes(page, "density", 2 * order.place.size()), 1, order.earlier);
-  const std::vector<float> color =
-      DecodeVoxelColors(page, field.appearance.basis, order.earlier);
   on_cells ? MakeCells(order, finest, geometry.get()) : MakeLinks(order, geometry.get());
   const double unit = VoxelWidth(frame);
   const auto n = static_cast<int64_t>(order.place.size());
@@ -303,9 +309,8 @@ RadianceField DecodeField(const PageField& page) {
   for (size_t i = 0; i < voxel.size(); ++i) {
     geometry->density[voxel[i]] =
         AsHalf(DensityOfNumber(density[i], unit * (1 << order.width_log2[i])), unit);
-    std::copy_n(color.data() + i * static_cast<size_t>(channels), channels,
-                field.appearance.sh.data() + voxel[i] * channels);
   }
+  DecodeVoxelColors(page, field.appearance.basis, voxel, order.earlier, &field.appearance.sh);
   DecodeSpheres(page, geometry.get(), &field.appearance.sphere_color);
   field.background = Vec3At(header, "background");
   field.near_clip = static_cast<float>(header.At("near").AsDouble());

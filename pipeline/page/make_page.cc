@@ -170,6 +170,7 @@ MadePage MakePage(const std::string& folder, const std::vector<std::string>& sty
   PageContent content;
   content.served = options.served;
   EncodeScene(stored.field, views, options.step, &content);
+  if (!options.check) stored.field.appearance = {};  // fields have gigabytes
   MadePage made;
   made.field = DecodeField(content.field);
   made.places = VoxelsInPageOrder(content.field, *made.field.geometry);
@@ -179,8 +180,6 @@ MadePage MakePage(const std::string& folder, const std::vector<std::string>& sty
     checked = CheckedViews(views.Cameras(), kChecked);
     check = CheckPage(stored.field, made.field, checked);
     made.report.push_back(CheckLine("the page's field", check));
-  } else {
-    stored.field.appearance = {};  // fields have gigabytes
   }
   content.poster = EncodeJpeg(RenderHome(made.field, HomeOf(content)), kQuality);
   for (size_t i = 0; i < styles.size(); ++i) {

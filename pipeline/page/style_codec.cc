@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -38,26 +39,27 @@ std::vector<double> RoundToCodes(Buffer<float>* values, int channels) {
   return scale;
 }
 
-// About the opacity of each voxel: what little of it is seen may be rounded more coarsely.
-std::vector<float> Opacities(const Geometry& geometry) {
-  const Vec3f scale = geometry.frame.Scale();
-  const double width = 1 / double{std::min({scale.x, scale.y, scale.z})};
-  std::vector<float> opacity;
-  for (const float density : geometry.density)
-    opacity.push_back(
-        static_cast<float>(1.01 - std::exp(-std::max(0.0, double{density}) * width)));
-  return opacity;
+// About the opacity of a voxel: what little of it is seen may be rounded more coarsely.
+float Opacity(double density, double width) {
+  return static_cast<float>(1.01 - std::exp(-std::max(0.0, density) * width));
 }
 
-ColorCode RoundToWords(const std::vector<float>& weight, Buffer<float>* sh) {
-  const std::vector<float> values(sh->begin(), sh->end());
-  std::vector<float> spread = values;
-  const size_t channels = values.size() / std::max<size_t>(weight.size(), 1);
-  for (size_t i = 0; i < spread.size(); ++i) spread[i] *= std::sqrt(weight[i / channels]);
+ColorCode RoundToWords(const Geometry& geometry, Buffer<float>* sh) {
+  std::vector<int64_t> voxel(static_cast<size_t>(geometry.density.size()));
+  std::iota(voxel.begin(), voxel.end(), 0);
+  const ColorRows rows{sh->data(), kStyledBasis, voxel};
+  const Vec3f scale = geometry.frame.Scale();
+  const double width = 1 / double{std::min({scale.x, scale.y, scale.z})};
+  std::vector<float> values, spread, weight;
+  for (const size_t i : FittedVoxels(rows.size())) {
+    weight.push_back(Opacity(geometry.density[voxel[i]], width));
+    for (int c = 0; c < 3 * kStyledBasis; ++c) {
+      values.push_back(rows[i][c]);
+      spread.push_back(rows[i][c] * std::sqrt(weight.back()));
+    }
+  }
   const ColorCode code = FitColorCode(spread, values, kStyledBasis, 0, weight);
-  const std::vector<float> rounded =
-      ValuesOf(NumbersOf(values, code, kStyledBasis), code, kStyledBasis);
-  std::copy(rounded.begin(), rounded.end(), sh->begin());
+  PutValues(NumbersOf(rows, code), code, kStyledBasis, voxel, sh->data());
   return code;
 }
 
@@ -82,9 +84,13 @@ PageStyle EncodeStyle(const StoredNetwork& stored, const RadianceField& page, do
   }
   const FusedMlp fused = MakeFusedMlp(dense);
   PageStyle style;
-  style.styled = page;
-  style.styled.appearance = PadShBasis(std::move(style.styled.appearance), kStyledBasis);
-  const RadianceField source = layers.empty() ? RadianceField{} : style.styled;
+  style.styled = {page.geometry, {}, stored.background, page.near_clip, page.step};
+  RadianceField padded;  // of a page with fewer harmonics
+  if (page.appearance.basis != kStyledBasis) {
+    padded = page;
+    padded.appearance = PadShBasis(std::move(padded.appearance), kStyledBasis);
+  }
+  const RadianceField& source = padded.geometry ? padded : page;
   style.styled.appearance = ApplyForward(
       [&](const float* features, int64_t n, float* output) {
         FusedForward(fused, features, n, output);
@@ -92,8 +98,7 @@ PageStyle EncodeStyle(const StoredNetwork& stored, const RadianceField& page, do
         for (int64_t r = 0; r < n; ++r)
           AddBaseMap(data.base, features + r * kFeatureStride, output + r * kFeatureStride);
       },
-      data.position_scale, style.styled);
-  style.styled.background = stored.background;
+      data.position_scale, source);
   JsonValue residual;
   if (!layers.empty()) {
     PageResidual packed = EncodeResidual(layers, places.earlier);
@@ -101,7 +106,7 @@ PageStyle EncodeStyle(const StoredNetwork& stored, const RadianceField& page, do
     style.residual = std::move(packed.packed);
     residual = std::move(packed.header);
   }
-  const ColorCode code = RoundToWords(Opacities(*page.geometry), &style.styled.appearance.sh);
+  const ColorCode code = RoundToWords(*page.geometry, &style.styled.appearance.sh);
   const std::vector<double> sphere_scale =
       RoundToCodes(&style.styled.appearance.sphere_color, 3);
   const RowMap base = BaseOf(data);
@@ -127,16 +132,9 @@ PageStyle EncodeStyle(const StoredNetwork& stored, const RadianceField& page, do
 }
 
 std::string StyledWords(const PageStyle& style, const std::vector<int64_t>& voxels) {
-  const Appearance& appearance = style.styled.appearance;
-  const int channels = appearance.stride();
-  std::vector<float> values;
-  values.reserve(voxels.size() * static_cast<size_t>(channels));
-  for (const int64_t voxel : voxels) {
-    const float* const sh = appearance.sh.data() + voxel * channels;
-    values.insert(values.end(), sh, sh + channels);
-  }
   const ColorCode code = ColorCodeOf(style.header.At("color"));
-  return WordsOf(NumbersOf(values, code, kStyledBasis), code);
+  return WordsOf(NumbersOf({style.styled.appearance.sh.data(), kStyledBasis, voxels}, code),
+                 code);
 }
 
 }  // namespace regrade

@@ -75,7 +75,7 @@ class CpuFitEngine : public FitEngine {
   void RefineCells(const MarchOptions& march, const CellLimits& limits,
                    int sphere_resolution) override {
     const CellStatistics statistics = MeasureCells(state_.grid, *rays_, march, kPruningStride);
-    ApplyChanges(ChooseChanges(state_.grid.cells.level, statistics, limits), &state_.grid,
+    ApplyChanges(ChooseChanges(state_.grid.cells().level, statistics, limits), &state_.grid,
                  &state_.second_moment);
     FastSpheres& spheres = state_.grid.spheres;
     if (spheres.on() && sphere_resolution != spheres.resolution) {
@@ -117,8 +117,8 @@ class CpuFitEngine : public FitEngine {
     // The sampling run of total variation (see FitStep): contiguous vertices, or cells, from a
     // random start, wrapping around, scaled so that the expectation is lambda times the mean
     // over all.
-    const int64_t vertices = state_.grid.cells.on() ? state_.grid.cells.num_cells()
-                                                    : state_.grid.frame.NumVertices();
+    const int64_t vertices = state_.grid.cells().on() ? state_.grid.cells().num_cells()
+                                                      : state_.grid.frame.NumVertices();
     const int64_t run = static_cast<int64_t>(step.tv_fraction * static_cast<float>(vertices));
     const int64_t run_begin = static_cast<int64_t>(RandomIndex(
         seed_ ^ kRandomTotalVariation, step.number, 0, static_cast<uint64_t>(vertices)));

@@ -115,23 +115,25 @@ FastGrid MakeInitialCells(const TrainingRays& rays, const GridFrame& frame,
       for (int z = 0; z < top.z; ++z)
         ForFirstCells(frame, levels, {x * width, y * width, z * width}, 0, keep_seen);
   }
-  std::vector<FirstCell> cells;
-  for (const auto& row : rows) cells.insert(cells.end(), row.begin(), row.end());
-  std::ranges::sort(cells, {}, &FirstCell::key);
-  grid.cells.finest = levels.all();
-  grid.cells.key = Buffer<CellKey>(static_cast<int64_t>(cells.size()));
-  grid.cells.level = Buffer<uint8_t>(grid.cells.key.size());
-  for (size_t i = 0; i < cells.size(); ++i) {
-    grid.cells.key[static_cast<int64_t>(i)] = cells[i].key;
-    grid.cells.level[static_cast<int64_t>(i)] = cells[i].level;
+  std::vector<FirstCell> first;
+  for (const auto& row : rows) first.insert(first.end(), row.begin(), row.end());
+  std::ranges::sort(first, {}, &FirstCell::key);
+  CellGrid cells;
+  cells.finest = levels.all();
+  cells.key = Buffer<CellKey>(static_cast<int64_t>(first.size()));
+  cells.level = Buffer<uint8_t>(cells.key.size());
+  for (size_t i = 0; i < first.size(); ++i) {
+    cells.key[static_cast<int64_t>(i)] = first[i].key;
+    cells.level[static_cast<int64_t>(i)] = first[i].level;
   }
-  FindVertices(&grid.cells);
-  BuildTree(frame.resolution, &grid.cells);
+  FindVertices(&cells);
+  BuildTree(frame.resolution, &cells);
+  grid.SetCells(std::move(cells));
   const int lanes = grid.lanes();
-  grid.records.Resize(grid.cells.num_vertices() * lanes);
+  grid.records.Resize(grid.cells().num_vertices() * lanes);
   for (int64_t v = 0; v < grid.num_voxels(); ++v)
     grid.records[v * lanes + DensityLane(basis)] = density;
-  grid.density_rate = DensityRates(rays, frame, grid.cells, near_clip);
+  grid.density_rate = DensityRates(rays, frame, grid.cells(), near_clip);
   RefreshDerived(&grid);
   return grid;
 }

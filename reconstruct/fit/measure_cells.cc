@@ -40,7 +40,7 @@ struct Partial {
 void MeasurePhoto(const FastGrid& grid, const TrainingRays& rays, int view,
                   const MarchOptions& march, int stride, Partial* partial) {
   const Camera& camera = rays.camera(view);
-  const CellsView cells = ViewOf(grid.cells, grid.frame.resolution);
+  const CellsView cells = ViewOf(grid.cells(), grid.frame.resolution);
   std::vector<Ray> row, beside;
   std::vector<float> color, depth, transmittance;
   std::vector<CompositedCell<float>> samples;
@@ -84,7 +84,7 @@ void MeasurePhoto(const FastGrid& grid, const TrainingRays& rays, int view,
 
 CellStatistics MeasureCells(const FastGrid& grid, const TrainingRays& rays,
                             const MarchOptions& march, int stride) {
-  const int64_t n = grid.cells.num_cells();
+  const int64_t n = grid.cells().num_cells();
   const int threads = std::min(omp_get_max_threads(), kMostThreads);
   std::vector<Partial> partials(static_cast<size_t>(threads), Partial(n));
 #pragma omp parallel for schedule(dynamic, 1) num_threads(threads)
@@ -138,17 +138,17 @@ std::vector<CellChange> ChooseChanges(const Buffer<uint8_t>& level,
 void ApplyChanges(const std::vector<CellChange>& change, FastGrid* grid,
                   Buffer<float>* second_moment) {
   std::vector<VertexSource> sources;
-  CellGrid cells = ChangeCells(grid->cells, grid->frame.resolution, change, &sources);
+  CellGrid cells = ChangeCells(grid->cells(), grid->frame.resolution, change, &sources);
   const auto move = [&](Buffer<float>* values, int lanes) {
     if (values->size() == 0) return;
     Buffer<float> moved(cells.num_vertices() * lanes);
-    MoveValues(grid->cells, cells, sources, values->data(), lanes, moved.data());
+    MoveValues(grid->cells(), cells, sources, values->data(), lanes, moved.data());
     *values = std::move(moved);
   };
   move(&grid->records, grid->lanes());
   move(second_moment, grid->lanes());
   move(&grid->density_rate, 1);
-  grid->cells = std::move(cells);
+  grid->SetCells(std::move(cells));
   RefreshDerived(grid);
 }
 

@@ -10,14 +10,17 @@
 #include "kernels/base/random.h"
 #include "kernels/field/cell_variation.h"
 #include "kernels/field/cpu/render_view.h"
+#include "kernels/field/cuda/device_cell_render.h"
 #include "kernels/field/cuda/device_cell_statistics.h"
 #include "kernels/field/cuda/device_free_space.h"
 #include "kernels/field/cuda/device_rays.h"
 #include "kernels/field/packed_grid.h"
 #include "kernels/field/render.h"
 #include "kernels/field/render_ray.h"
+#include "kernels/field/resolve_pixel.h"
 #include "reconstruct/fit/measure_cells.h"
 #include "tests/support/cell_field.h"
+#include "tests/support/device_rays_on_host.h"
 #include "tests/support/device_test.h"
 #include "tests/support/double_field.h"
 #include "tests/support/parity_row.h"
@@ -80,18 +83,24 @@ TEST_P(DeviceCellsTest, AnAdaptiveFieldHasNoHalfGrid) {
   EXPECT_TRUE(MakeHalfGrid(UploadGrid(MakeFastGrid(field))).empty());
 }
 
-// A frame's rays are made on the device; a view's, on the host for a lens with distortion.
-TEST_P(DeviceCellsTest, AFrameIsTheViewOfItsRays) {
-  const RadianceField field = RandomCellField({5, 4, 4}, 3, basis(), 33);
-  const FastGrid host = MakeFastGrid(field);
-  const DeviceGrid grid = UploadGrid(host);
+Camera FrameCamera(bool ndc) {
   Camera camera;
   camera.width = 53;  // not whole tiles
   camera.height = 37;
   camera.fx = camera.fy = 40;
   camera.cx = 26;
   camera.cy = 18;
-  camera.camera_from_world.translation = {0, 0, 3};
+  camera.camera_from_world.translation = {0, 0, ndc ? -0.1 : 3};
+  if (ndc) camera.ndc = {2 * 40.0 / 53, 2 * 40.0 / 37};
+  return camera;
+}
+
+// A frame's rays are made on the device; a view's, on the host for a lens with distortion.
+TEST_P(DeviceCellsTest, AFrameIsTheViewOfItsRays) {
+  const RadianceField field = RandomCellField({5, 4, 4}, 3, basis(), 33);
+  const FastGrid host = MakeFastGrid(field);
+  const DeviceGrid grid = UploadGrid(host);
+  const Camera camera = FrameCamera(false);
   const MarchOptions options{0.5f, 1e-4f};
   const RenderedView is = RenderViewOnDevice(grid, camera, options);
   const RenderedView should = RenderView(host, camera, options);
@@ -104,6 +113,47 @@ TEST_P(DeviceCellsTest, AFrameIsTheViewOfItsRays) {
           std::max(depth_off, std::abs(double{is.depth.pixels[i]} - should.depth.pixels[i]));
   Row("frame", basis(), "CPU", off, 2e-5);
   Row("depths of a frame", basis(), "CPU", depth_off, 1e-3);
+}
+
+// The host's rays are tested in cell_ray_test.cc.
+TEST_P(DeviceCellsTest, VertexColorsGiveTheHostsPixels) {
+  FastGrid host = MakeFastGrid(RandomCellField({5, 4, 4}, 3, basis(), 33));
+  const DeviceGridView view = testing::HostView(&host);
+  const DeviceGrid grid = UploadGrid(host);
+  const VertexColors room = MakeVertexColors(grid);
+  for (const bool ndc : {false, true})
+    for (const float wide_angle : {1e9f, 1.0f / 40}) {  // no cell is wide, some are
+      const Camera camera = FrameCamera(ndc);
+      const int64_t n = int64_t{camera.width} * camera.height;
+      DeviceBuffer<Vec3f> color(n, "colours");
+      DeviceBuffer<float> depth(n, "depths"), transmittance(n, "transmittances");
+      RenderCellFrame(grid, camera, {0.5f, 1e-4f},
+                      {color.data(), depth.data(), transmittance.data()}, &room, wide_angle);
+      const Buffer<Vec3f> is = color.ToHost();
+      const PinholeRays rays(camera);
+      const ResolvePixel resolve(camera);
+      const Vec3f scale = host.frame.Scale();
+      const float wide_until =
+          ndc ? 0 : 1 / (std::min({scale.x, scale.y, scale.z}) * wide_angle);
+      double off = 0;
+      const auto compare = [&](auto constant) {
+        const std::vector<FourFloats> colors = testing::ColorsOf<constant.value>(view, rays);
+        for (int64_t i = 0; i < n; ++i) {
+          const Ray ray =
+              rays.At(static_cast<int>(i % camera.width), static_cast<int>(i / camera.width));
+          CellRaySums sums =
+              RenderCellRay<constant.value, true>(view, ray, colors.data(), wide_until, 1e-4f);
+          resolve(ray, sums.transmittance, &sums.color, &sums.depth);
+          for (int c = 0; c < 3; ++c)
+            off = std::max(off, std::abs(double{is[i][c]} - sums.color[c]));
+        }
+      };
+      if (basis() == 9) compare(std::integral_constant<int, 9>());
+      if (basis() == 4) compare(std::integral_constant<int, 4>());
+      if (basis() == 1) compare(std::integral_constant<int, 1>());
+      Row(ndc ? "frame by vertices' colours, NDC" : "frame by vertices' colours", basis(),
+          wide_angle > 1 ? "host, no cell wide" : "host, some cells wide", off, 2e-5);
+    }
 }
 
 TEST_P(DeviceCellsTest, FitGradientAndVariation) {
@@ -218,7 +268,7 @@ TEST_P(DeviceCellsTest, ChangesEqualTheHosts) {
   Buffer<float> moment(host.records.size());
   for (int64_t i = 0; i < moment.size(); ++i) moment[i] = static_cast<float>(i % 11);
   std::vector<CellChange> change;
-  for (int64_t c = 0; c < host.cells.num_cells(); ++c)
+  for (int64_t c = 0; c < host.cells().num_cells(); ++c)
     change.push_back(c % 4 == 0   ? CellChange::kRemove
                      : c % 4 == 1 ? CellChange::kSplit
                                   : CellChange::kKeep);
@@ -230,12 +280,12 @@ TEST_P(DeviceCellsTest, ChangesEqualTheHosts) {
     return a.size() == b.size() &&
            std::memcmp(a.data(), b.data(), static_cast<size_t>(a.size()) * sizeof(a[0])) == 0;
   };
-  EXPECT_TRUE(same(down.cells.key, host.cells.key));
-  EXPECT_TRUE(same(down.cells.level, host.cells.level));
-  EXPECT_TRUE(same(down.cells.corner, host.cells.corner));
-  EXPECT_TRUE(same(down.cells.vertex_key, host.cells.vertex_key));
-  EXPECT_TRUE(same(down.cells.top, host.cells.top));
-  EXPECT_TRUE(same(down.cells.nodes, host.cells.nodes));
+  EXPECT_TRUE(same(down.cells().key, host.cells().key));
+  EXPECT_TRUE(same(down.cells().level, host.cells().level));
+  EXPECT_TRUE(same(down.cells().corner, host.cells().corner));
+  EXPECT_TRUE(same(down.cells().vertex_key, host.cells().vertex_key));
+  EXPECT_TRUE(same(down.cells().top, host.cells().top));
+  EXPECT_TRUE(same(down.cells().nodes, host.cells().nodes));
   double error = 0;  // blends may be contracted
   for (int64_t i = 0; i < host.records.size(); ++i)
     error = std::max(error, std::abs(double{down.records[i]} - host.records[i]));
@@ -272,7 +322,7 @@ TEST_P(DeviceCellsTest, StatisticsEqualTheHosts) {
   const CellStatistics device =
       MeasureCellsOnDevice(UploadGrid(host), rays.ToDevice(), march, 2);
   double weight = 0, pixels = 0, error = 0, total = 0;
-  for (int64_t c = 0; c < host.cells.num_cells(); ++c) {
+  for (int64_t c = 0; c < host.cells().num_cells(); ++c) {
     weight = std::max(weight, std::abs(double{plain.weight[c]} - device.weight[c]));
     // A weight at the limit may count on one side only.
     if (std::abs(plain.weight[c] - kSeenWeight) > 1e-5f)

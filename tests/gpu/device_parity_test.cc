@@ -116,7 +116,7 @@ TEST_P(DeviceParity, Frame) {
     const RenderedView plain = RenderViewPlain(field, camera, options);
     double error = 0, depth_error = 0, half_error = 0, seen = 0;
     const RenderedView view = RenderViewOnDevice(grid, camera, options);
-    const RenderedView halved = RenderViewOnDevice(grid, camera, options, 0, &half);
+    const RenderedView halved = RenderViewOnDevice(grid, camera, options, {.half = &half});
     for (size_t i = 0; i < plain.color.pixels.size(); ++i) {
       const double value = plain.color.pixels[i];
       error = std::max(error, std::abs(double{view.color.pixels[i]} - value));

@@ -111,7 +111,7 @@ TEST_P(DeviceSpheresParity, Frame) {
   const MarchOptions options{0.5f, 1e-4f};
   const RenderedView plain = RenderViewPlain(field, camera, options);
   const RenderedView view = RenderViewOnDevice(grid, camera, options);
-  const RenderedView halved = RenderViewOnDevice(grid, camera, options, 0, &half);
+  const RenderedView halved = RenderViewOnDevice(grid, camera, options, {.half = &half});
   camera.lens = LensModel::kOpenCv;  // without distortion, but rays come from the host
   const RenderedView listed = RenderViewOnDevice(grid, camera, options);
   double error = 0, half_error = 0, listed_error = 0, depth_error = 0;

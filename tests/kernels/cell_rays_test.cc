@@ -89,7 +89,7 @@ TEST(CellRays, FastPathsEqualThePlainRay) {
       std::vector<float> color(1200), depth(400), transmittance(400);
       functions->render(grid, rays.data(), 400, options, color.data(), depth.data(),
                         transmittance.data());
-      std::vector<float> plain_weights(static_cast<size_t>(grid.cells.num_cells()));
+      std::vector<float> plain_weights(static_cast<size_t>(grid.cells().num_cells()));
       const RayWeights weights =
           ComputeRayWeights(*field.geometry, {rays.data(), 400}, options, field.near_clip);
       for (const WeightedSample& s : weights.samples)
@@ -160,10 +160,10 @@ TEST(CellRays, FastGradientsEqualThePlainAdjoint) {
       RenderRayAdjoint(d.view(), ray, options, result, d_color, d_density.data(), d_sh.data(),
                        PlainAdd());
     }
-    const CellsView cells = ViewOf(grid.cells, grid.frame.resolution);
-    std::vector<double> unit, one(static_cast<size_t>(grid.cells.finest) + 1, 1.0);
-    for (int level = 0; level <= grid.cells.finest; ++level)
-      unit.push_back(WorldWidth(grid.frame, 1 << (grid.cells.finest - level)));
+    const CellsView cells = ViewOf(grid.cells(), grid.frame.resolution);
+    std::vector<double> unit, one(static_cast<size_t>(grid.cells().finest) + 1, 1.0);
+    for (int level = 0; level <= grid.cells().finest; ++level)
+      unit.push_back(WorldWidth(grid.frame, 1 << (grid.cells().finest - level)));
     CellVariation<double>(cells, d.density.data(), 1, 0, unit.data(), 5, 40, 0.7,
                           d_density.data());
     const int stride = 3 * basis;
@@ -195,7 +195,7 @@ TEST(CellRays, AStepScalesTheRateOfEachDensity) {
     grid.density_rate[v] = v % 2 == 0 ? 1.0f : 0.25f;
   GradientArena arena;
   arena.Reset(grid.num_voxels());
-  FastRays().total_variation(grid, 0, grid.cells.num_cells(), 1.0f, 1.0f, &arena);
+  FastRays().total_variation(grid, 0, grid.cells().num_cells(), 1.0f, 1.0f, &arena);
   Buffer<float> moment(grid.records.size());
   RmspropOptions options;
   options.rate_density = 1;

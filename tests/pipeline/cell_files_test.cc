@@ -210,7 +210,7 @@ TEST(CellCheckpoint, CellsComeBackBitForBit) {
     ASSERT_TRUE(back);
     EXPECT_EQ(note, "a note");
     EXPECT_EQ(back->step, 17);
-    ExpectSameCells(back->grid.cells, state.grid.cells);
+    ExpectSameCells(back->grid.cells(), state.grid.cells());
     EXPECT_TRUE(Same(back->grid.records, state.grid.records));
     EXPECT_TRUE(Same(back->grid.density_rate, state.grid.density_rate));
     EXPECT_TRUE(Same(back->grid.vertex_density, state.grid.vertex_density));
@@ -228,10 +228,17 @@ TEST(CellCheckpoint, DamagedCellsAreRefused) {
   };
   EXPECT_TRUE(unpacks([](FastGrid*) {}));
   EXPECT_TRUE(unpacks([](FastGrid* grid) { grid->density_rate = {}; }));
-  EXPECT_FALSE(
-      unpacks([](FastGrid* grid) { std::swap(grid->cells.key[0], grid->cells.key[1]); }));
-  EXPECT_FALSE(unpacks([](FastGrid* grid) { grid->cells.level[0] = 200; }));
-  EXPECT_FALSE(unpacks([](FastGrid* grid) { grid->cells.finest = 40; }));
+  const auto unpacks_cells = [&unpacks](const std::function<void(CellGrid*)>& damage) {
+    return unpacks([&damage](FastGrid* grid) {
+      CellGrid cells = grid->cells();
+      damage(&cells);
+      grid->SetCells(std::move(cells));
+    });
+  };
+  EXPECT_TRUE(unpacks_cells([](CellGrid*) {}));
+  EXPECT_FALSE(unpacks_cells([](CellGrid* cells) { std::swap(cells->key[0], cells->key[1]); }));
+  EXPECT_FALSE(unpacks_cells([](CellGrid* cells) { cells->level[0] = 200; }));
+  EXPECT_FALSE(unpacks_cells([](CellGrid* cells) { cells->finest = 40; }));
   EXPECT_FALSE(unpacks([](FastGrid* grid) { grid->frame.resolution.y = 1 << 24; }));
   EXPECT_FALSE(
       unpacks([](FastGrid* grid) { grid->records.Resize(grid->records.size() - 16); }));

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numeric>
 #include <vector>
 
 #include "kernels/base/random.h"
@@ -28,6 +29,26 @@ std::vector<float> SomeValues(int n, int basis, double view) {
   return values;
 }
 
+std::vector<int64_t> AllOf(size_t n) {
+  std::vector<int64_t> voxel(n);
+  std::iota(voxel.begin(), voxel.end(), 0);
+  return voxel;
+}
+
+std::vector<int16_t> Numbers(const std::vector<float>& values, const ColorCode& code,
+                             int basis) {
+  const std::vector<int64_t> voxel = AllOf(values.size() / static_cast<size_t>(3 * basis));
+  return NumbersOf({values.data(), basis, voxel}, code);
+}
+
+std::vector<float> Values(const std::vector<int16_t>& numbers, const ColorCode& code,
+                          int basis) {
+  std::vector<float> values(numbers.size());
+  PutValues(numbers, code, basis, AllOf(numbers.size() / static_cast<size_t>(3 * basis)),
+            values.data());
+  return values;
+}
+
 double MeanSquare(const std::vector<float>& a, const std::vector<float>& b) {
   double sum = 0;
   for (size_t i = 0; i < a.size(); ++i) sum += std::pow(double{a[i]} - double{b[i]}, 2);
@@ -45,8 +66,8 @@ TEST(PageColorCode, NumbersFitTheirBitsAndComeBack) {
         bits += code.bits[static_cast<size_t>(kCodeOrder[static_cast<size_t>(s)])];
       EXPECT_LE(bits, 32);
     }
-    const std::vector<int16_t> numbers = NumbersOf(values, code, basis);
-    const std::vector<float> rounded = ValuesOf(numbers, code, basis);
+    const std::vector<int16_t> numbers = Numbers(values, code, basis);
+    const std::vector<float> rounded = Values(numbers, code, basis);
     for (int a = 0; a < 3; ++a)
       for (int j = 0; j < basis; ++j)
         for (size_t i = 0; i < 500; ++i)
@@ -54,7 +75,7 @@ TEST(PageColorCode, NumbersFitTheirBitsAndComeBack) {
                     code.limit(9 * a + j));
     // Where all steps are the finest one, errors are uniform within half a step.
     EXPECT_LE(MeanSquare(values, rounded), 1.05 * 0.03 * 0.03 / 12);
-    EXPECT_EQ(NumbersOf(rounded, code, basis), numbers);
+    EXPECT_EQ(Numbers(rounded, code, basis), numbers);
   }
 }
 
@@ -65,8 +86,7 @@ TEST(PageColorCode, WideValuesLoseLittle) {
   for (uint64_t i = 0; i < 27 * 500; ++i)
     values.push_back(static_cast<float>(2 * RandomDouble(7, 1, i) - 1));
   const ColorCode code = FitColorCode(values, values, 9, 0.001);
-  const double error =
-      std::sqrt(MeanSquare(values, ValuesOf(NumbersOf(values, code, 9), code, 9)));
+  const double error = std::sqrt(MeanSquare(values, Values(Numbers(values, code, 9), code, 9)));
   EXPECT_LT(error, 0.045);
   EXPECT_GT(error, 0.01);
 }
@@ -74,7 +94,7 @@ TEST(PageColorCode, WideValuesLoseLittle) {
 TEST(PageColorCode, WordsHoldTheNumbers) {
   const std::vector<float> values = SomeValues(20, 9, 0.4);
   const ColorCode code = FitColorCode(values, values, 9, 0.03);
-  const std::vector<int16_t> numbers = NumbersOf(values, code, 9);
+  const std::vector<int16_t> numbers = Numbers(values, code, 9);
   const std::string words = WordsOf(numbers, code);
   ASSERT_EQ(words.size(), 20u * 16);
   for (size_t i = 0; i < 20; ++i)
@@ -106,11 +126,39 @@ TEST(PageColorCode, JsonComesBackAndDamageIsRefused) {
   EXPECT_REGRADE_ERROR(ColorCodeOf(few), ExitCode::kInput, "27 expected");
 }
 
+// Voxels of a field in another order have its numbers in that order, and go back to their rows.
+TEST(PageColorCode, RowsMayComeInAnyOrder) {
+  const std::vector<float> values = SomeValues(30, 9, 0.4);
+  const ColorCode code = FitColorCode(values, values, 9, 0.03);
+  const std::vector<int16_t> all = Numbers(values, code, 9);
+  const std::vector<int64_t> voxel = {17, 3, 29, 0};
+  const std::vector<int16_t> chosen = NumbersOf({values.data(), 9, voxel}, code);
+  std::vector<float> back(values.size());
+  PutValues(chosen, code, 9, voxel, back.data());
+  const std::vector<float> rounded = Values(all, code, 9);
+  for (size_t i = 0; i < voxel.size(); ++i)
+    for (size_t c = 0; c < 27; ++c) {
+      EXPECT_EQ(chosen[c * 4 + i], all[c * 30 + static_cast<size_t>(voxel[i])]);
+      EXPECT_EQ(back[27 * static_cast<size_t>(voxel[i]) + c],
+                rounded[27 * static_cast<size_t>(voxel[i]) + c]);
+    }
+  EXPECT_EQ(back[27], 0);  // of voxel 1, which was not chosen
+}
+
+TEST(PageColorCode, AMillionVoxelsAreFittedToSome) {
+  EXPECT_EQ(FittedVoxels(5).size(), 5u);
+  EXPECT_TRUE(FittedVoxels(0).empty());
+  const std::vector<size_t> some = FittedVoxels(1000000);
+  EXPECT_LE(some.size(), size_t{1} << 18);
+  EXPECT_GT(some.size(), size_t{1} << 17);
+  EXPECT_GT(some.back(), 999990u);
+}
+
 // A field of one colour, or without voxels, has a code.
 TEST(PageColorCode, NothingToDecorrelate) {
   const std::vector<float> grey(27 * 10, 0.25f);
   const ColorCode code = FitColorCode(std::vector<float>(27 * 10, 0.0f), grey, 9, 0.03);
-  EXPECT_LE(MeanSquare(grey, ValuesOf(NumbersOf(grey, code, 9), code, 9)), 0.02 * 0.02);
+  EXPECT_LE(MeanSquare(grey, Values(Numbers(grey, code, 9), code, 9)), 0.02 * 0.02);
   EXPECT_NO_THROW(ColorCodeOf(JsonOf(FitColorCode({}, {}, 9, 0))));
 }
 

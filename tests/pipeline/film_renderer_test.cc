@@ -63,8 +63,8 @@ TEST(FilmRenderer, ThePreparedRenderersAreBothFastOrTheReasonIsGiven) {
 TEST(FilmRenderer, TheReportNamesIt) {
   EXPECT_EQ(
       FilmRendererText("", Backend::kCuda),
-      "half precision, steps where opacity changes by 1/128; at least 55 dB from the exact "
-      "frames");
+      "a uniform field in half precision, steps where opacity changes by 1/128; of an adaptive "
+      "field, colours of vertices; at least 55 dB from the exact frames");
   EXPECT_EQ(kFastOpacityStep, 1.0f / 128);  // as the text says
   EXPECT_EQ(FilmRendererText("", Backend::kCpu),
             "smooth parts interpolated between rays; at least 55 dB from the exact frames");

@@ -251,14 +251,14 @@ TEST(InitialCells, TheBoxHasTheCellsThatItHasAlone) {
   const FastGrid in_box = MakeInitialCells(rays, inner, alone, 1, 0.5f, 0, 2, false);
   const FastGrid all = MakeInitialCells(rays, outer, around, 1, 0.5f, 0, 2, false);
   std::set<CellKey> expected, found;
-  for (const CellKey key : in_box.cells.key) expected.insert(key);
+  for (const CellKey key : in_box.cells().key) expected.insert(key);
   int64_t outside = 0;
-  for (int64_t c = 0; c < all.cells.num_cells(); ++c) {
-    if (all.cells.level[c] < around.outward) {
+  for (int64_t c = 0; c < all.cells().num_cells(); ++c) {
+    if (all.cells().level[c] < around.outward) {
       ++outside;
       continue;
     }
-    const Vec3i low = PlaceOf(all.cells.key[c]);
+    const Vec3i low = PlaceOf(all.cells().key[c]);
     found.insert(KeyOf({low.x - 3 * inner.resolution.x / 2, low.y - 3 * inner.resolution.y / 2,
                         low.z - 3 * inner.resolution.z / 2}));
   }
@@ -271,7 +271,7 @@ TEST(DensityRates, FallWhereFewPhotosSee) {
   const TrainingRays rays(three.views());
   const GridFrame frame{{16, 16, 16}, {0, 0, 0}, {1, 1, 1}};
   const FastGrid grid = MakeInitialCells(rays, frame, {2, 0}, 1, 0.5f, 0, 1, false);
-  ASSERT_EQ(grid.density_rate.size(), grid.cells.num_vertices());
+  ASSERT_EQ(grid.density_rate.size(), grid.cells().num_vertices());
   float least = 2, most = 0;
   for (const float rate : grid.density_rate) {
     least = std::min(least, rate);

@@ -1,9 +1,8 @@
 // Marches the density of an adaptive field along rays; compiled once per instruction set.
 //
-// kWide rays walk side by side, one per lane: EQ(cell-march) for all of them at once. Only the
-// search for the next cell is scalar; its loads are independent from lane to lane. What a lane
-// finds is collected kWide cells at a time, and their densities and opacities are vectors, as
-// in march_simd.h. A lane whose ray has ended takes the next one.
+// kWide rays walk side by side, one per lane: EQ(cell-march) for all of them at once. What a
+// lane finds is collected kWide cells at a time, and their densities and opacities are vectors,
+// as in march_simd.h. A lane whose ray has ended takes the next one.
 #pragma once
 
 #include <algorithm>
@@ -42,7 +41,7 @@ inline void MarchCellBlock(const FastGrid& grid, const CellBlock& in, StepBlock*
   std::memcpy(block->t, in.t, sizeof(in.t));
   alignas(64) float corner[8][kWide];
   for (int lane = 0; lane < kWide; ++lane) {
-    const int32_t* const vertex = grid.cells.corner.data() + 8 * int64_t{in.cell[lane]};
+    const int32_t* const vertex = grid.cells().corner.data() + 8 * int64_t{in.cell[lane]};
     for (int k = 0; k < 8; ++k) corner[k][lane] = grid.vertex_density[vertex[k]];
   }
   const Wide x1 = LoadWide(in.x), y1 = LoadWide(in.y), z1 = LoadWide(in.z);
@@ -69,6 +68,69 @@ struct alignas(64) CellStep {
   int32_t cell[kWide] = {}, width[kWide] = {};
   float fraction[3][kWide], t[kWide], delta[kWide];
   int32_t ended[kWide];  // -1: the ray leaves the box
+};
+
+// CellPath (cell_grid.h) for all lanes: they go down the tree side by side, so that their loads
+// overlap.
+class CellPaths {
+ public:
+  explicit CellPaths(const CellsView& cells) : cells_(cells) {}
+
+  // Finds the cell or cube at the voxel of each lane.
+  void Find(const int32_t (&at)[3][kWide], CellStep* step) {
+    const WideInt x = LoadWide(at[0]), y = LoadWide(at[1]), z = LoadWide(at[2]);
+    // The cube that holds the last voxel, too, is 2^shift wide: a float's exponent is the
+    // number of bits, for a lattice has fewer than 2^24 voxels along an axis.
+    const Wide differs = __builtin_convertvector((x ^ x_) | (y ^ y_) | (z ^ z_), Wide);
+    WideInt bits;
+    std::memcpy(&bits, &differs, sizeof(bits));
+    WideInt shift = (bits >> 23) - 126;
+    shift = shift > leaf_shift_ ? shift : leaf_shift_;
+    x_ = x, y_ = y, z_ = z;
+    alignas(64) int32_t entry[kWide], from[kWide], index[kWide];
+    std::memcpy(from, &shift, sizeof(from));
+    for (int l = 0; l < kWide; ++l) {
+      if (from[l] > cells_.finest) {
+        from[l] = cells_.finest;
+        entry_[from[l]][l] =
+            cells_.top[((at[0][l] >> from[l]) * cells_.top_size.y + (at[1][l] >> from[l])) *
+                           cells_.top_size.z +
+                       (at[2][l] >> from[l])];
+      }
+      entry[l] = entry_[from[l]][l];
+    }
+    shift = LoadWide(from);
+    for (WideInt found = LoadWide(entry);;) {
+      const WideInt node = found < WideInt{} + kNoCell;  // -1: has children
+      if (!AnyOf(node)) {
+        leaf_shift_ = shift;
+        const WideInt width = (WideInt{} + 1) << shift;
+        std::memcpy(step->cell, &found, sizeof(found));
+        std::memcpy(step->width, &width, sizeof(width));
+        return;
+      }
+      shift += node;
+      const WideInt child = (x >> shift & 1) << 2 | (y >> shift & 1) << 1 | (z >> shift & 1);
+      const WideInt place = node ? (-2 - found) * 8 + child : WideInt{};
+      std::memcpy(index, &place, sizeof(place));
+      std::memcpy(from, &shift, sizeof(from));
+      std::memcpy(entry, &found, sizeof(found));
+      for (int l = 0; l < kWide; ++l) {
+        const int32_t below = cells_.nodes[static_cast<uint32_t>(index[l])];
+        entry[l] = IsNode(entry[l]) ? below : entry[l];
+        entry_[from[l]][l] = entry[l];
+      }
+      found = LoadWide(entry);
+    }
+  }
+
+ private:
+  static constexpr int kMostLevels = 32;
+
+  CellsView cells_;
+  WideInt x_{}, y_{}, z_{};                 // the last voxels
+  WideInt leaf_shift_ = WideInt{} + 31;     // so that the first search begins at the top
+  int32_t entry_[kMostLevels][kWide] = {};  // of the cube of 2^k voxels with the last voxel
 };
 
 // Begins a ray in a lane; false if it has no samples.
@@ -166,14 +228,13 @@ template <typename Done>
 void MarchCellRays(const FastGrid& grid, const Ray* rays, int64_t n,
                    const MarchOptions& options, const Done& done) {
   struct Lane {
-    CellPath cell_at;
     int64_t ray = -1;  // none
     CellBlock cells;
     Marched marched;
-    explicit Lane(const CellsView& view) : cell_at(view) {}
   };
-  const CellsView view = ViewOf(grid.cells, grid.frame.resolution);
-  std::vector<Lane> lane(static_cast<size_t>(std::min<int64_t>(n, kWide)), Lane(view));
+  const CellsView view = ViewOf(grid.cells(), grid.frame.resolution);
+  std::vector<Lane> lane(static_cast<size_t>(std::min<int64_t>(n, kWide)));
+  CellPaths paths(view);
   const int used = static_cast<int>(lane.size());
   CellLanes lanes;
   CellStep step;
@@ -193,25 +254,19 @@ void MarchCellRays(const FastGrid& grid, const Ray* rays, int64_t n,
       }
       done(ray, &own.marched);
     }
-    // Steps of a lane without a ray stay at the first voxel.
+    // Steps of a lane without a ray stay in the first cube.
     for (int a = 0; a < 3; ++a) lanes.direction[a][l] = 0, lanes.at[a][l] = 0;
-    step.width[l] = 1;
     --walking;
   };
   walking = used;
   for (int l = 0; l < used; ++l) begin(l);
-  for (int l = used; l < kWide; ++l) step.width[l] = 1;
   const auto composite = [&](Lane* own) {
     MarchCellBlock(grid, own->cells, own->marched.next_block());
     own->cells.count = 0;
     return own->marched.Composite(options.stop_transmittance);
   };
   while (walking > 0) {
-    for (int l = 0; l < used; ++l) {
-      if (lane[static_cast<size_t>(l)].ray < 0) continue;
-      step.cell[l] = lane[static_cast<size_t>(l)].cell_at(
-          {lanes.at[0][l], lanes.at[1][l], lanes.at[2][l]}, &step.width[l]);
-    }
+    paths.Find(lanes.at, &step);
     StepLanes(grid.frame, &lanes, &step);
     for (int l = 0; l < used; ++l) {
       Lane& own = lane[static_cast<size_t>(l)];
@@ -219,6 +274,7 @@ void MarchCellRays(const FastGrid& grid, const Ray* rays, int64_t n,
       bool stopped = false;
       if (step.cell[l] != kNoCell) {
         const int i = own.cells.count++;
+        __builtin_prefetch(view.corner + 8 * int64_t{step.cell[l]});
         own.cells.cell[i] = step.cell[l];
         own.cells.x[i] = step.fraction[0][l];
         own.cells.y[i] = step.fraction[1][l];

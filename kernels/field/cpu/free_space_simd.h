@@ -12,7 +12,7 @@ namespace {
 inline void FreeSpace(const FastGrid& grid, const FreeRay* rays, int64_t n, float scale,
                       GradientArena* arena) {
   const int lanes = grid.lanes(), lane = DensityLane(grid.basis);
-  const CellsView cells = ViewOf(grid.cells, grid.frame.resolution);
+  const CellsView cells = ViewOf(grid.cells(), grid.frame.resolution);
   const float* const density = grid.vertex_density.data();
   std::vector<std::pair<int32_t, float>> terms;  // of one ray
   for (int64_t r = 0; r < n; ++r) {

@@ -20,7 +20,7 @@ namespace {
 template <typename Done>
 void MarchRays(const FastGrid& grid, const Ray* rays, int64_t n, const MarchOptions& options,
                const Done& done) {
-  if (grid.cells.on()) return MarchCellRays(grid, rays, n, options, done);
+  if (grid.cells().on()) return MarchCellRays(grid, rays, n, options, done);
   Marched marched;
   for (int64_t r = 0; r < n; ++r) {
     March(grid, rays[r], options, &marched);
@@ -112,7 +112,7 @@ void MaxWeights(const FastGrid& grid, const Ray* rays, int64_t n, const MarchOpt
     for (int64_t i = 0; i < marched->num_samples; ++i) {
       const Sample& s = marched->samples[static_cast<size_t>(i)];
       const float w = marched->weight(s);
-      if (grid.cells.on()) {
+      if (grid.cells().on()) {
         float& most = weights[marched->block(s).vertex[s.lane]];
         most = std::max(most, w);
         continue;
@@ -171,7 +171,7 @@ const FastRayFunctions kFunctions = {
     [](const FastGrid& g, int64_t begin, int64_t end, float density, float sh,
        GradientArena* arena) {
       const auto add = [&](auto basis) {
-        if (g.cells.on())
+        if (g.cells().on())
           CellVariation<basis.value>(g, begin, end, density, sh, arena);
         else
           TotalVariation<basis.value>(g, begin, end, density, sh, arena);

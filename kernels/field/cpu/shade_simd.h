@@ -32,8 +32,8 @@ struct RayBasis {
 // `vertex`: see StepBlock.
 inline void LoadLinks(const FastGrid& grid, const CornerOffsets& offsets, int32_t vertex,
                       int32_t* link) {
-  if (grid.cells.on()) {
-    std::memcpy(link, grid.cells.corner.data() + 8 * int64_t{vertex}, 8 * sizeof(int32_t));
+  if (grid.cells().on()) {
+    std::memcpy(link, grid.cells().corner.data() + 8 * int64_t{vertex}, 8 * sizeof(int32_t));
     return;
   }
   const Probe* lowest = grid.probes.data() + vertex;
@@ -85,8 +85,13 @@ inline Quad Shade(const FastGrid& grid, const RayBasis<kBasis>& basis, Marched* 
   Sample* const samples = marched->samples.data();
   const float* const records = grid.records.data();
   Quad color{};
-  for (int64_t i = -kAhead; i < n; ++i) {
-    if (i + kAhead < n) {
+  const int32_t* const corners = grid.cells().on() ? grid.cells().corner.data() : nullptr;
+  for (int64_t i = -2 * kAhead; i < n; ++i) {
+    if (corners != nullptr && i + 2 * kAhead < n) {
+      const Sample& ahead = samples[i + 2 * kAhead];
+      __builtin_prefetch(corners + 8 * int64_t{marched->block(ahead).vertex[ahead.lane]});
+    }
+    if (i >= -kAhead && i + kAhead < n) {
       Sample& ahead = samples[i + kAhead];
       const int32_t vertex = marched->block(ahead).vertex[ahead.lane];
       LoadLinks(grid, offsets, vertex, ahead.corner);

@@ -89,7 +89,7 @@ void CellVariation(const FastGrid& grid, int64_t begin, int64_t end, float scale
   using Shape = RecordShape<kBasis>;
   using Vector = typename Shape::Vector;
   constexpr int kLanes = Shape::kLanes;
-  const CellGrid& cells = grid.cells;
+  const CellGrid& cells = grid.cells();
   R unit[kMaxCellLevel + 1], scale[kMaxCellLevel + 1];
   for (int level = 0; level <= cells.finest; ++level) {
     alignas(64) float units[kLanes], scales[kLanes] = {};
@@ -151,7 +151,7 @@ int64_t Step(FastGrid* grid, float* second_moment, const GradientArena* arenas, 
     high_lanes[l] = bound;
   }
   const R low = R::Load(low_lanes), high = R::Load(high_lanes);
-  const bool adaptive = grid->cells.on();
+  const bool adaptive = grid->cells().on();
   // The copy of a voxel's density that marches read.
   const auto density_of = [&](int32_t voxel) {
     return adaptive ? &grid->vertex_density[voxel]

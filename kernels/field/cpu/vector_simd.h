@@ -41,6 +41,23 @@ inline Wide Ramp() {
 #endif
 }
 
+// Whether a lane of `mask`, of zeros and -1, is not zero.
+inline bool AnyOf(const WideInt& mask) {
+#if defined(__AVX512F__)
+  __m512i lanes;
+  std::memcpy(&lanes, &mask, sizeof(lanes));
+  return _mm512_test_epi32_mask(lanes, lanes) != 0;
+#elif defined(__AVX2__)
+  __m256i lanes;
+  std::memcpy(&lanes, &mask, sizeof(lanes));
+  return _mm256_testz_si256(lanes, lanes) == 0;
+#else
+  int32_t any = 0;
+  for (int l = 0; l < kWide; ++l) any |= mask[l];
+  return any != 0;
+#endif
+}
+
 // first[l] and second[l]: the densities at vertex at[l] and at its neighbour along z. One load
 // of four words has both, with their links in between.
 inline void GatherDensities(const Probe* base, const int32_t* at, Wide* first, Wide* second) {

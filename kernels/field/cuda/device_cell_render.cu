@@ -1,125 +1,106 @@
-// Rendering of adaptive fields: samples of many rays are listed, then shaded, a warp a ray.
-#include <algorithm>
-
 #include "kernels/base/error.h"
+#include "kernels/field/cuda/cell_ray.h"
 #include "kernels/field/cuda/device_cell_render.h"
 #include "kernels/field/cuda/launch.h"
 #include "kernels/field/cuda/rendered_rays.h"
-#include "kernels/field/cuda/warp_shade.h"
 
 namespace regrade {
+
+VertexColors MakeVertexColors(const DeviceGrid& grid) {
+  REGRADE_CHECK(grid.cells.on());
+  return {DeviceBuffer<float>(4 * grid.num_voxels(), "colours of vertices")};
+}
 
 #if defined(__CUDACC__)
 
 namespace {
 
-// Sums of an adaptive field's rays, whose samples are in lists; a warp a ray.
+constexpr int kBlock = 128;  // rays; four tiles of 8 x 4 pixels of a frame
+
 template <int kBasis>
-__global__ void RenderCellRaysKernel(DeviceGridView grid, const Ray* rays, int64_t n,
-                                     CellSamples lists, DeviceRenderTarget target) {
-  using Layout = RecordLayout<kBasis>;
-  const int lane = static_cast<int>(threadIdx.x & 31);
-  const int64_t r = (blockIdx.x * static_cast<int64_t>(blockDim.x) + threadIdx.x) / 32;
-  if (r >= n) return;
-  const float4* const place = reinterpret_cast<const float4*>(lists.place) + r * lists.capacity;
-  const float4* const raw_tau =
-      reinterpret_cast<const float4*>(lists.raw_tau) + r * lists.capacity;
-  const float4* const rest = reinterpret_cast<const float4*>(lists.rest) + r * lists.capacity;
-  float basis[kMaxBasis];
-  ShBasis(kBasis, rays[r].direction, basis);
-  const LaneValues<kBasis> values(lane, basis);
-  const int count = lists.count[r];
-  Vec3f color{};
-  float depth = 0;
-  for (int first = 0; first < count; first += Layout::kSamples) {
-    const int at = first + lane / Layout::kGroup;
-    const bool valid = at < count;
-    const float4 p = valid ? place[at] : float4{};
-    const Vec3f raw = RawColor<kBasis, CellSampler>(grid, values, __float_as_int(p.x),
-                                                    {p.y, p.z, p.w}, valid, lane);
-    if (!valid || lane % Layout::kGroup != 0) continue;
-    const float w = rest[at].x * Opacity(raw_tau[at].w);
-    for (int c = 0; c < 3; ++c) color[c] += w * fmaxf(raw[c], 0.0f);
-    depth += w * rest[at].z;
-  }
-  for (int c = 0; c < 3; ++c) color[c] = WarpSum(color[c]);
-  depth = WarpSum(depth);
-  if (lane != 0) return;
-  target.color[r] = color + grid.background * lists.transmittance[r];
-  target.depth[r] = depth;
-  target.transmittance[r] = lists.transmittance[r];
+__global__ void VertexColorsKernel(DeviceGridView grid, PinholeRays camera,
+                                   FourFloats* colors) {
+  const int64_t v = blockIdx.x * int64_t{blockDim.x} + threadIdx.x;
+  if (v < grid.num_voxels)
+    colors[v] = ColorOfVertex<kBasis>(grid, camera, static_cast<int32_t>(v));
 }
 
-// Lists a frame's rays in their order; those beyond its border have no direction, and so no
-// samples.
-__global__ void ListRaysKernel(FrameRays frame, int64_t n, Ray* rays) {
-  const int64_t i = blockIdx.x * int64_t{blockDim.x} + threadIdx.x;
-  int64_t place;
-  if (i < n && !frame.Get(i, &rays[i], &place)) rays[i] = Ray{};
-}
-__global__ void ResolveFrameKernel(FrameRays frame, int64_t n, DeviceRenderTarget listed,
-                                   DeviceRenderTarget target) {
-  const int64_t i = blockIdx.x * int64_t{blockDim.x} + threadIdx.x;
+template <int kBasis, bool kColors, typename Rays>
+__global__ void __launch_bounds__(kBlock)
+    RenderCellsKernel(DeviceGridView grid, Rays rays, const FourFloats* colors,
+                      float wide_until, float stop, DeviceRenderTarget target, bool resolve) {
   Ray ray;
   int64_t place;
-  if (i >= n || !frame.Get(i, &ray, &place)) return;
-  Vec3f color = listed.color[i];
-  float depth = listed.depth[i];
-  frame.Resolve(ray, listed.transmittance[i], &color, &depth);
-  target.color[place] = color;
-  target.depth[place] = depth;
-  target.transmittance[place] = listed.transmittance[i];
+  if (!rays.Get(blockIdx.x * int64_t{kBlock} + threadIdx.x, &ray, &place)) return;
+  CellRaySums sums = RenderCellRay<kBasis, kColors>(grid, ray, colors, wide_until, stop);
+  if (resolve) rays.Resolve(ray, sums.transmittance, &sums.color, &sums.depth);
+  target.color[place] = sums.color;
+  target.depth[place] = sums.depth;
+  target.transmittance[place] = sums.transmittance;
+}
+
+// `colors` is null where every sample is evaluated from the records.
+template <typename Rays>
+void Render(const DeviceGrid& grid, const Rays& rays, const FourFloats* colors,
+            float wide_until, const MarchOptions& options, const DeviceRenderTarget& target) {
+  const int64_t n = rays.Blocks() * kRenderedRays;
+  if (n == 0) return;
+  DeviceGridView view = grid.view();
+  const bool resolve = !grid.spheres.on();
+  if (!resolve) view.background = {};  // the layers are composited before it
+  const auto blocks = static_cast<unsigned>((n + kBlock - 1) / kBlock);
+  ByBasis(grid.basis, colors != nullptr, [&](auto basis, auto from_colors) {
+    RenderCellsKernel<basis.value, from_colors.value><<<blocks, kBlock>>>(
+        view, rays, colors, wide_until, options.stop_transmittance, target, resolve);
+  });
+  CheckLaunch("render_cells");
+  if (resolve) return;
+  RenderSpheresKernel<<<BlocksFor(32 * n), kThreads>>>(grid.view(), rays,
+                                                       options.stop_transmittance, target);
+  CheckLaunch("render_spheres");
+}
+
+// The ray length below which a cell of one voxel is wide. Directions in NDC of one camera are
+// nearly parallel, and lengths there begin at the near plane: no cell is wide.
+float WideUntil(const DeviceGrid& grid, const Camera& camera, float wide_angle) {
+  if (camera.ndc.on()) return 0;
+  const Vec3f scale = grid.frame.Scale();
+  return 1 / (std::fmin(scale.x, std::fmin(scale.y, scale.z)) * wide_angle);
 }
 
 }  // namespace
 
 void RenderCellRays(const DeviceGrid& grid, const Ray* rays, int64_t n,
                     const MarchOptions& options, const DeviceRenderTarget& target) {
-  constexpr int64_t kMostRays = 1 << 16, kMostBytes = int64_t{2} << 30;
-  CellSampleStore store(grid.frame, std::min(n, kMostRays), kMostBytes);
-  const CellSamples lists = store.view();
-  DeviceGridView view = grid.view();
-  if (grid.spheres.on()) view.background = {};  // the layers are composited before it
-  for (int64_t begin = 0; begin < n; begin += store.rays()) {
-    const int64_t size = std::min(n - begin, store.rays());
-    MarchCellsOnDevice(grid, rays + begin, size, options, lists);
-    ByBasis(grid.basis, [&](auto basis) {
-      RenderCellRaysKernel<basis.value><<<BlocksFor(32 * size), kThreads>>>(
-          view, rays + begin, size, lists,
-          {target.color + begin, target.depth + begin, target.transmittance + begin});
-    });
-    CheckLaunch("render_cell_rays");
-  }
-  if (!grid.spheres.on()) return;
-  RenderSpheresKernel<<<BlocksFor(32 * n), kThreads>>>(grid.view(), ListedRays{rays, n},
-                                                       options.stop_transmittance, target);
-  CheckLaunch("render_spheres");
+  Render(grid, ListedRays{rays, n}, nullptr, 0, options, target);
 }
 
 void RenderCellFrame(const DeviceGrid& grid, const Camera& camera, const MarchOptions& options,
-                     const DeviceRenderTarget& target) {
-  const FrameRays frame{PinholeRays(camera), ResolvePixel(camera)};
-  const int64_t n = frame.Blocks() * kRenderedRays;
-  DeviceBuffer<Ray> rays(n, "rays of a frame");
-  DeviceBuffer<Vec3f> color(n, "colours of a frame");
-  DeviceBuffer<float> depth(n, "depths of a frame"), transmittance(n, "transmittances");
-  ListRaysKernel<<<BlocksFor(n), kThreads>>>(frame, n, rays.data());
-  CheckLaunch("list_rays");
-  const DeviceRenderTarget listed{color.data(), depth.data(), transmittance.data()};
-  RenderCellRays(grid, rays.data(), n, options, listed);
-  ResolveFrameKernel<<<BlocksFor(n), kThreads>>>(frame, n, listed, target);
-  CheckLaunch("resolve_frame");
+                     const DeviceRenderTarget& target, const VertexColors* colors,
+                     float wide_angle) {
+  const FrameRays rays{PinholeRays(camera), ResolvePixel(camera)};
+  if (colors == nullptr || colors->empty()) {
+    Render(grid, rays, nullptr, 0, options, target);
+    return;
+  }
+  auto* const of_vertices = reinterpret_cast<FourFloats*>(colors->values.data());
+  ByBasis(grid.basis, [&](auto basis) {
+    VertexColorsKernel<basis.value>
+        <<<BlocksFor(grid.num_voxels()), kThreads>>>(grid.view(), rays.camera, of_vertices);
+  });
+  CheckLaunch("vertex_colors");
+  Render(grid, rays, of_vertices, WideUntil(grid, camera, wide_angle), options, target);
 }
 
 #else
 
 void RenderCellRays(const DeviceGrid&, const Ray*, int64_t, const MarchOptions&,
                     const DeviceRenderTarget&) {
-  DeviceWait("render_cell_rays");
+  DeviceWait("render_cells");
 }
 void RenderCellFrame(const DeviceGrid&, const Camera&, const MarchOptions&,
-                     const DeviceRenderTarget&) {
-  DeviceWait("render_cell_rays");
+                     const DeviceRenderTarget&, const VertexColors*, float) {
+  DeviceWait("render_cells");
 }
 
 #endif

@@ -33,7 +33,7 @@ DeviceGrid UploadGrid(const FastGrid& grid, bool fitting, const Buffer<float>& s
   device.background = grid.background;
   device.near_clip = grid.near_clip;
   device.links = DeviceBuffer<int32_t>::Of(grid.links, "links");
-  device.cells = UploadCells(grid.cells);
+  device.cells = UploadCells(grid.cells());
   device.density_rate = DeviceBuffer<float>::Of(grid.density_rate, "rates of densities");
   device.fitting = fitting;
   device.exact_sums = exact_sums;
@@ -113,7 +113,7 @@ FastGrid DownloadGrid(const DeviceGrid& device) {
   grid.background = device.background;
   grid.near_clip = device.near_clip;
   grid.links = device.links.ToHost();
-  grid.cells = DownloadCells(device.cells);
+  grid.SetCells(DownloadCells(device.cells));
   grid.density_rate = device.density_rate.ToHost();
   grid.records = DownloadRows(device, device.records.data());
   RefreshDerived(&grid);

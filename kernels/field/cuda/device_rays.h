@@ -31,18 +31,30 @@ void RenderOnDevice(const DeviceGrid& grid, const Ray* rays, int64_t n,
                     const MarchOptions& options, const DeviceRenderTarget& target,
                     float opacity_step = 0);
 
+// Room for the colours of an adaptive field's vertices in a frame; see EQ(vertex-colors).
+struct VertexColors {
+  DeviceBuffer<float> values;  // [V, 4]
+  bool empty() const { return values.empty(); }
+};
+VertexColors MakeVertexColors(const DeviceGrid& grid);
+
+// What makes frames faster, and not exact. The last two need memory; null: exact.
+struct FastFrames {
+  float opacity_step = 0;          // of a uniform field
+  const HalfGrid* half = nullptr;  // of a uniform field: replaces its colours and densities
+  const VertexColors* colors = nullptr;  // of an adaptive field
+};
+
 // A frame at a camera without distortion: rays are generated and pixels resolved (see
-// ResolvePixel) inside the kernel. `target` [height, width]; does not wait. `half`, if not null
-// and not empty, replaces the grid's own colours and densities. An adaptive field's frames are
-// exact: `opacity_step` and `half` are not used.
+// ResolvePixel) inside the kernel. `target` [height, width]; does not wait.
 void RenderFrameOnDevice(const DeviceGrid& grid, const Camera& camera,
                          const MarchOptions& options, const DeviceRenderTarget& target,
-                         float opacity_step = 0, const HalfGrid* half = nullptr);
+                         const FastFrames& fast = {});
 
-// A whole view, colours clipped, depths along the optical axis; see render.h.
+// A whole view, colours clipped, depths along the optical axis; see render.h. With a lens that
+// distorts, of `fast` only the opacity step counts.
 RenderedView RenderViewOnDevice(const DeviceGrid& grid, const Camera& camera,
-                                const MarchOptions& options, float opacity_step = 0,
-                                const HalfGrid* half = nullptr);
+                                const MarchOptions& options, const FastFrames& fast = {});
 
 // Sums over many steps; reading them waits for the device.
 struct DeviceFitSums {

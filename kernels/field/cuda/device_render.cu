@@ -12,8 +12,7 @@
 namespace regrade {
 
 RenderedView RenderViewOnDevice(const DeviceGrid& grid, const Camera& camera,
-                                const MarchOptions& options, float opacity_step,
-                                const HalfGrid* half) {
+                                const MarchOptions& options, const FastFrames& fast) {
   const int64_t n = int64_t{camera.width} * camera.height;
   DeviceBuffer<Vec3f> color(n, "colours of a view");
   DeviceBuffer<float> depth(n, "depths of a view"),
@@ -28,7 +27,7 @@ RenderedView RenderViewOnDevice(const DeviceGrid& grid, const Camera& camera,
     transmittance.CopyOut(view.transmittance.pixels.data(), n);
   };
   if (camera.lens == LensModel::kPinhole) {
-    RenderFrameOnDevice(grid, camera, options, target, opacity_step, half);
+    RenderFrameOnDevice(grid, camera, options, target, fast);
     take();
     return view;
   }
@@ -39,7 +38,7 @@ RenderedView RenderViewOnDevice(const DeviceGrid& grid, const Camera& camera,
       rays[static_cast<size_t>(y) * camera.width + x] = camera.PixelRay(x, y);
   DeviceBuffer<Ray> device_rays(n, "rays of a view");
   device_rays.CopyIn(rays.data(), n);
-  RenderOnDevice(grid, device_rays.data(), n, options, target, opacity_step);
+  RenderOnDevice(grid, device_rays.data(), n, options, target, fast.opacity_step);
   take();
   FinishView(camera, rays, &view);
   return view;
@@ -230,14 +229,14 @@ void RenderOnDevice(const DeviceGrid& grid, const Ray* rays, int64_t n,
 
 void RenderFrameOnDevice(const DeviceGrid& grid, const Camera& camera,
                          const MarchOptions& options, const DeviceRenderTarget& target,
-                         float opacity_step, const HalfGrid* half) {
+                         const FastFrames& fast) {
   REGRADE_CHECK(camera.lens == LensModel::kPinhole);
   const DeviceRange range("frame");
   if (grid.cells.on())
-    RenderCellFrame(grid, camera, options, target);
+    RenderCellFrame(grid, camera, options, target, fast.colors);
   else
-    RenderBlocks(grid, half, FrameRays{PinholeRays(camera), ResolvePixel(camera)}, options,
-                 opacity_step, target);
+    RenderBlocks(grid, fast.half, FrameRays{PinholeRays(camera), ResolvePixel(camera)}, options,
+                 fast.opacity_step, target);
 }
 
 #else
@@ -247,7 +246,7 @@ void RenderOnDevice(const DeviceGrid&, const Ray*, int64_t, const MarchOptions&,
   DeviceWait("render_rays");
 }
 void RenderFrameOnDevice(const DeviceGrid&, const Camera&, const MarchOptions&,
-                         const DeviceRenderTarget&, float, const HalfGrid*) {
+                         const DeviceRenderTarget&, const FastFrames&) {
   DeviceWait("render_rays");
 }
 
