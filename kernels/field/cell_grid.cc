@@ -1,6 +1,7 @@
 #include "kernels/field/cell_grid.h"
 
 #include <algorithm>
+#include <bit>
 #include <vector>
 
 #include "kernels/base/error.h"
@@ -23,6 +24,29 @@ std::vector<CellKey> NodesOf(const CellGrid& grid, int level) {
   return nodes;
 }
 
+// Numbers different keys from 0 on, as they come.
+class KeyNumbers {
+ public:
+  KeyNumbers(int64_t most_keys, std::vector<CellKey>* keys)
+      : slots_(std::bit_ceil(static_cast<size_t>(2 * most_keys)), -1), keys_(*keys) {}
+
+  int32_t Of(CellKey key) {
+    const size_t mask = slots_.size() - 1;
+    for (size_t at = (key * 0x9e3779b97f4a7c15u >> 32) & mask;; at = (at + 1) & mask) {
+      int32_t& slot = slots_[at];
+      if (slot < 0) {
+        slot = static_cast<int32_t>(keys_.size());
+        keys_.push_back(key);
+      }
+      if (keys_[static_cast<size_t>(slot)] == key) return slot;
+    }
+  }
+
+ private:
+  std::vector<int32_t> slots_;
+  std::vector<CellKey>& keys_;
+};
+
 }  // namespace
 
 int64_t FindKey(const Buffer<CellKey>& keys, CellKey key) {
@@ -33,22 +57,34 @@ int64_t FindKey(const Buffer<CellKey>& keys, CellKey key) {
 void FindVertices(CellGrid* grid) {
   const int64_t corners = 8 * grid->num_cells();
   REGRADE_CHECK(corners <= INT32_MAX);
-  std::vector<CellKey> keys(static_cast<size_t>(corners));
-#pragma omp parallel for schedule(static)
-  for (int64_t i = 0; i < corners; ++i)
-    keys[static_cast<size_t>(i)] =
-        KeyOf(CornerOf(PlaceOf(grid->key[i / 8]), 1 << (grid->finest - grid->level[i / 8]),
-                       static_cast<int>(i % 8)));
-  std::vector<CellKey> sorted = keys;
+  grid->corner = Buffer<int32_t>(corners);
+  // Cells that follow each other are neighbours: most corners of a block are the same vertices.
+  constexpr int64_t kBlock = 8 * 4096;
+  const int64_t blocks = (corners + kBlock - 1) / kBlock;
+  std::vector<std::vector<CellKey>> keys(static_cast<size_t>(blocks));
+#pragma omp parallel for schedule(dynamic)
+  for (int64_t b = 0; b < blocks; ++b) {
+    KeyNumbers numbers(kBlock, &keys[static_cast<size_t>(b)]);
+    for (int64_t i = b * kBlock; i < std::min((b + 1) * kBlock, corners); ++i)
+      grid->corner[i] = numbers.Of(
+          KeyOf(CornerOf(PlaceOf(grid->key[i / 8]), 1 << (grid->finest - grid->level[i / 8]),
+                         static_cast<int>(i % 8))));
+  }
+  std::vector<CellKey> sorted;
+  for (const std::vector<CellKey>& of_block : keys)
+    sorted.insert(sorted.end(), of_block.begin(), of_block.end());
   std::sort(sorted.begin(), sorted.end());
   sorted.erase(std::unique(sorted.begin(), sorted.end()), sorted.end());
   grid->vertex_key = Buffer<CellKey>(static_cast<int64_t>(sorted.size()));
   std::copy(sorted.begin(), sorted.end(), grid->vertex_key.begin());
-  grid->corner = Buffer<int32_t>(corners);
-#pragma omp parallel for schedule(static)
-  for (int64_t i = 0; i < corners; ++i)
-    grid->corner[i] =
-        static_cast<int32_t>(FindKey(grid->vertex_key, keys[static_cast<size_t>(i)]));
+#pragma omp parallel for schedule(dynamic)
+  for (int64_t b = 0; b < blocks; ++b) {
+    std::vector<int32_t> vertex;
+    for (const CellKey key : keys[static_cast<size_t>(b)])
+      vertex.push_back(static_cast<int32_t>(FindKey(grid->vertex_key, key)));
+    for (int64_t i = b * kBlock; i < std::min((b + 1) * kBlock, corners); ++i)
+      grid->corner[i] = vertex[static_cast<size_t>(grid->corner[i])];
+  }
 }
 
 void BuildTree(const Vec3i& voxels, CellGrid* grid) {

@@ -3,6 +3,7 @@
 #include <zlib.h>
 
 #include <algorithm>
+#include <vector>
 
 #include "kernels/base/error.h"
 
@@ -10,33 +11,51 @@ namespace regrade {
 namespace {
 
 constexpr size_t kPiece = 1 << 20;  // bytes at a time
+constexpr size_t kPart = 8 << 20;   // bytes that one thread compresses
+constexpr size_t kWindow = 1 << 15;
+constexpr char kHeader[] = "\x78\xda";  // a window of 32 KB, a level above the usual one
+
+// The i-th part of `bytes` as blocks of a stream (RFC 1951) that begins where the one of the
+// part before ends. False if there is no memory.
+bool DeflatePart(std::string_view bytes, size_t i, std::string* packed) {
+  // On a page's 152 MB of coefficients level 9 takes 42 s on one core, and is 5 % smaller than
+  // this in 5 s. Z_FILTERED suits small numbers.
+  constexpr int kLevel = 7, kRawWindowBits = -15, kMemory = 9;
+  z_stream stream{};
+  if (deflateInit2(&stream, kLevel, Z_DEFLATED, kRawWindowBits, kMemory, Z_FILTERED) != Z_OK)
+    return false;
+  const auto at = [&](size_t place) {
+    return reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data() + place));
+  };
+  const size_t begin = i * kPart, size = std::min(bytes.size() - begin, kPart);
+  const bool last = begin + size == bytes.size();
+  if (i > 0) deflateSetDictionary(&stream, at(begin - kWindow), kWindow);
+  constexpr uLong kFlush = 16;
+  packed->resize(deflateBound(&stream, static_cast<uLong>(size)) + kFlush);
+  stream.next_in = at(begin);
+  stream.avail_in = static_cast<uInt>(size);
+  stream.next_out = reinterpret_cast<Bytef*>(packed->data());
+  stream.avail_out = static_cast<uInt>(packed->size());
+  const int status = deflate(&stream, last ? Z_FINISH : Z_SYNC_FLUSH);
+  packed->resize(packed->size() - stream.avail_out);
+  deflateEnd(&stream);
+  return status == (last ? Z_STREAM_END : Z_OK) && stream.avail_in == 0;
+}
 
 }  // namespace
 
 std::string Deflate(std::string_view bytes) {
-  // On a page's 152 MB of coefficients level 9 takes 42 s, and is 5 % smaller than this in 5 s.
-  // Z_FILTERED suits small numbers.
-  constexpr int kLevel = 7, kWindowBits = 15, kMemory = 9;
-  z_stream stream{};
-  if (deflateInit2(&stream, kLevel, Z_DEFLATED, kWindowBits, kMemory, Z_FILTERED) != Z_OK)
-    throw ResourceError("there is no memory to compress with");
-  std::string packed(deflateBound(&stream, static_cast<uLong>(bytes.size())), '\0');
-  stream.next_out = reinterpret_cast<Bytef*>(packed.data());
-  size_t in = 0, out = 0;
-  int status = Z_OK;
-  while (status == Z_OK) {
-    const size_t piece = std::min(bytes.size() - in, kPiece);
-    const size_t room = std::min(packed.size() - out, kPiece);
-    stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data() + in));
-    stream.avail_in = static_cast<uInt>(piece);
-    stream.avail_out = static_cast<uInt>(room);
-    status = deflate(&stream, in + piece == bytes.size() ? Z_FINISH : Z_NO_FLUSH);
-    in += piece - stream.avail_in;
-    out += room - stream.avail_out;
-  }
-  deflateEnd(&stream);
-  if (status != Z_STREAM_END) throw ResourceError("bytes cannot be compressed");
-  packed.resize(out);
+  std::vector<std::string> parts(std::max<size_t>((bytes.size() + kPart - 1) / kPart, 1));
+  bool done = true;
+#pragma omp parallel for schedule(dynamic) reduction(&& : done)
+  for (size_t i = 0; i < parts.size(); ++i) done = done && DeflatePart(bytes, i, &parts[i]);
+  if (!done) throw ResourceError("bytes cannot be compressed: is there memory?");
+  std::string packed = kHeader;
+  for (const std::string& part : parts) packed += part;
+  const uLong sum = adler32_z(adler32_z(0, nullptr, 0),
+                              reinterpret_cast<const Bytef*>(bytes.data()), bytes.size());
+  for (int shift = 24; shift >= 0; shift -= 8)
+    packed.push_back(static_cast<char>(sum >> shift & 255));
   return packed;
 }
 

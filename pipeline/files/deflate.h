@@ -7,7 +7,7 @@
 
 namespace regrade {
 
-// Equal bytes give equal results.
+// Equal bytes give equal results, with any number of threads.
 std::string Deflate(std::string_view bytes);
 
 // Throws Error(kInput) with `where` for bytes that are damaged, followed by others, or larger

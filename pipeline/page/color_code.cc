@@ -251,8 +251,8 @@ void PutValues(const std::vector<int16_t>& numbers, const ColorCode& code, int b
 
 std::string WordsOf(const std::vector<int16_t>& numbers, const ColorCode& code) {
   const size_t n = numbers.size() / kCodeNumbers;
-  std::string bytes;
-  bytes.reserve(4 * kCodeWords * n);
+  std::string bytes(4 * kCodeWords * n, '\0');
+#pragma omp parallel for schedule(static)
   for (size_t i = 0; i < n; ++i)
     for (size_t w = 0; w < kCodeWords; ++w) {
       uint32_t word = 0;
@@ -263,7 +263,8 @@ std::string WordsOf(const std::vector<int16_t>& numbers, const ColorCode& code) 
         rest -= bits;
         word |= (static_cast<uint32_t>(numbers[number * n + i]) & ((1u << bits) - 1)) << rest;
       }
-      for (int b = 0; b < 4; ++b) bytes.push_back(static_cast<char>(word >> (8 * b) & 255));
+      for (size_t b = 0; b < 4; ++b)
+        bytes[4 * (kCodeWords * i + w) + b] = static_cast<char>(word >> (8 * b) & 255);
     }
   return bytes;
 }

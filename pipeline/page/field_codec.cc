@@ -73,7 +73,8 @@ void EncodeVoxelColors(const ColorRows& rows, const std::vector<EarlierVoxels>& 
       differences.push_back(rows[i][c] - EarlierMean(rows, earlier[i], c));
   }
   const ColorCode code = FitColorCode(differences, values, rows.basis, step);
-  AddSection("color", PackNumbers(NumbersOf(rows, code), channels, earlier), page);
+  const std::string bytes = PackNumbers(NumbersOf(rows, code), channels, earlier);
+  AddSection("color", bytes, page);  // the numbers are gone
   page->header["color"] = JsonOf(code);
 }
 

@@ -187,6 +187,7 @@ MadePage MakePage(const std::string& folder, const std::vector<std::string>& sty
     AddStyle(StyleFolder(folder, styles[i]), styles[i], stored.field, checked, &content, &made);
   }
   ReportOrThrow(progress, steps - 1, steps);
+  if (!options.served) made.field = {}, made.places = {};
   made.html = PageHtml(content, options.check ? &check : nullptr);
   made.voxels = content.field.header.At("voxels").AsInt();
   made.field_bytes = InText(content.field.bytes());

@@ -64,6 +64,8 @@ class FitEngine {
   virtual void ReadState(const std::function<void(FitState*)>& read) = 0;
   // Calls `edit` in the same way and continues from the edited state.
   virtual void EditState(const std::function<void(FitState*)>& edit) = 0;
+  // No step follows: frees what only steps need, moments and gradients, as far as it can.
+  virtual void EndSteps() {}
   virtual int64_t num_voxels() const = 0;
   virtual Vec3i resolution() const = 0;
   virtual void Step(const FitStep& step) = 0;

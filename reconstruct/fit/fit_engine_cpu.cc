@@ -36,6 +36,11 @@ class CpuFitEngine : public FitEngine {
   }
   void ReadState(const std::function<void(FitState*)>& read) override { read(&state_); }
   void EditState(const std::function<void(FitState*)>& edit) override { edit(&state_); }
+  void EndSteps() override {
+    arenas_.clear();
+    state_.second_moment = {};
+    state_.sphere_moment = {};
+  }
   int64_t num_voxels() const override { return state_.grid.num_voxels(); }
   Vec3i resolution() const override { return state_.grid.frame.resolution; }
 

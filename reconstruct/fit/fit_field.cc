@@ -103,6 +103,7 @@ class Fitter {
       step_ = 0;
       SaveCheckpoint();
     }
+    engine_->EndSteps();
     // Prunes once more without resampling: removes voxels that no training view sees.
     if (options_.prune_last) Refine(true);
     result_.seconds = SecondsSince(start_) - idle_seconds_;

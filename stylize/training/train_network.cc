@@ -244,14 +244,6 @@ TrainNetworkResult Training::Conclude() {
   return std::move(result_);
 }
 
-// Whoever watches the training sees the first network soon.
-constexpr int64_t kFirstCheckpoint = 10;
-
-int64_t StepsToCheckpoint(int64_t done, int64_t every) {
-  if (done < kFirstCheckpoint && kFirstCheckpoint < every) return kFirstCheckpoint - done;
-  return every - done % every;
-}
-
 }  // namespace
 
 TrainNetworkResult TrainNetwork(const RadianceField& field,
@@ -266,14 +258,17 @@ TrainNetworkResult TrainNetwork(const RadianceField& field,
     engine = on_cpu.get();
   }
   Training training(field, views, scene_map, march, options, engine);
-  if (resume != nullptr)
+  if (resume != nullptr) {
     training.Resume(*resume);
-  else
+  } else {
     training.Start(bad_pixels);
+    // Whoever watches the training sees the first network soon.
+    if (hooks.checkpoint) hooks.checkpoint(training.Capture());
+  }
   while (training.steps_done() < options.steps) {
-    const int64_t most =
-        std::min<int64_t>(options.steps - training.steps_done(),
-                          StepsToCheckpoint(training.steps_done(), hooks.checkpoint_every));
+    const int64_t most = std::min<int64_t>(
+        options.steps - training.steps_done(),
+        hooks.checkpoint_every - training.steps_done() % hooks.checkpoint_every);
     const StepResult steps = training.Advance(most);
     if (steps.stopped) {
       if (hooks.checkpoint) hooks.checkpoint(training.Capture());
@@ -288,8 +283,7 @@ TrainNetworkResult TrainNetwork(const RadianceField& field,
                Format("%.1f dB on this step's rays", Psnr(steps.last.Mse())));
     const bool last =
         control != LoopControl::kContinue || training.steps_done() == options.steps;
-    if (hooks.checkpoint && (last || training.steps_done() == kFirstCheckpoint ||
-                             training.steps_done() % hooks.checkpoint_every == 0))
+    if (hooks.checkpoint && (last || training.steps_done() % hooks.checkpoint_every == 0))
       hooks.checkpoint(training.Capture());
     if (control == LoopControl::kStop) throw Interrupted();
   }

@@ -55,7 +55,7 @@ struct TrainingState {
 struct TrainingHooks {
   ProgressFunction progress;
   std::function<void(const TrainingState&)> checkpoint;  // may be empty
-  int checkpoint_every = 50;                             // steps; and at the tenth
+  int checkpoint_every = 50;                             // steps; and before the first
 };
 
 struct TrainNetworkResult {

@@ -105,9 +105,9 @@ RadianceField LinearField(int cells) {
     const Vec3i at = PlaceOf(geometry->cells.vertex_key[v]);
     geometry->density[v] = 1.5f;
     for (int k = 0; k < 27; ++k)
-      field.appearance.sh[27 * v + k] =
-          0.3f * std::sin(static_cast<float>(k)) *
-          static_cast<float>(at[k % 3] * 2 - cells) / static_cast<float>(cells);
+      field.appearance.sh[27 * v + k] = 0.3f * std::sin(static_cast<float>(k)) *
+                                        static_cast<float>(at[k % 3] * 2 - cells) /
+                                        static_cast<float>(cells);
   }
   field.geometry = geometry;
   return field;

@@ -69,6 +69,7 @@ def start(regrade, folder):
 def check_view(browser, address, folder, shots, size):
     found = []
     page = open_page(browser, address, size, scale=1 if shots else FEW_PIXELS)
+    wait_until(page, "regradePage.begun && regradePage.painter.settled")
     before = page.value("regradePage.header.styles.length")
     with open(STYLE, "rb") as file:
         picture = base64.b64encode(file.read()).decode()

@@ -2,9 +2,10 @@
 // the device does for a pixel. Host and device, so that tests need no GPU.
 //
 // EQ(vertex-colors): all rays of a frame begin at one point o, which sees a vertex v of the
-// field in one direction d_v only. So its colour c_v = sum_j k_vj Gamma_j(d_v) + 1/2 is evaluated
-// once a frame, and a sample takes the blend of its corners' colours instead of the colour of
-// their blended coefficients at the ray's direction d. With weights w_v and k = sum_v w_v k_v,
+// field in one direction d_v only. So its colour c_v = sum_j k_vj Gamma_j(d_v) + 1/2 is
+// evaluated once a frame, and a sample takes the blend of its corners' colours instead of the
+// colour of their blended coefficients at the ray's direction d. With weights w_v and k = sum_v
+// w_v k_v,
 //   sum_v w_v k_v . Gamma(d_v) - k . Gamma(d)
 //     = sum_v w_v (k_v - k) . (Gamma(d_v) - Gamma(d)) + k . sum_v w_v (Gamma(d_v) - Gamma(d)),
 // a product of two differences within a cell, and the curvature of Gamma across it: both fall
@@ -80,9 +81,9 @@ struct CellRaySums {
   float transmittance = 1;
 };
 
-// `colors` [V]: see EQ(vertex-colors); of the camera that the ray comes from. A sample takes the
-// coefficients of its corners instead where its cell, of n voxels, is wide: at ray lengths below
-// n * wide_until (world units); and everywhere without kColors.
+// `colors` [V]: see EQ(vertex-colors); of the camera that the ray comes from. A sample takes
+// the coefficients of its corners instead where its cell, of n voxels, is wide: at ray lengths
+// below n * wide_until (world units); and everywhere without kColors.
 template <int kBasis, bool kColors>
 HD CellRaySums RenderCellRay(const DeviceGridView& grid, const Ray& ray,
                              const FourFloats* colors, float wide_until, float stop) {
@@ -92,8 +93,8 @@ HD CellRaySums RenderCellRay(const DeviceGridView& grid, const Ray& ray,
   float optical_depth = 0;
   WalkCells(grid.frame, grid.cells, ray, grid.near_clip, [&](const CellSample<float>& sample) {
     if (sample.cell == kNoCell) return true;
-    const auto* corners = reinterpret_cast<const FourVertices*>(grid.cells.corner +
-                                                                int64_t{8} * sample.cell);
+    const auto* corners =
+        reinterpret_cast<const FourVertices*>(grid.cells.corner + int64_t{8} * sample.cell);
     const FourVertices low = corners[0], high = corners[1];
     const int32_t corner[8] = {low.of[0],  low.of[1],  low.of[2],  low.of[3],
                                high.of[0], high.of[1], high.of[2], high.of[3]};
