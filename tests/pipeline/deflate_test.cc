@@ -24,8 +24,8 @@ std::string SomeBytes(size_t size) {
 
 TEST(Deflate, BytesOfSeveralPartsComeBack) {
   constexpr size_t kPart = size_t{8} << 20;
-  for (const size_t size : {size_t{0}, size_t{1}, size_t{1000}, kPart - 1, kPart, kPart + 1,
-                            2 * kPart + 12345}) {
+  for (const size_t size :
+       {size_t{0}, size_t{1}, size_t{1000}, kPart - 1, kPart, kPart + 1, 2 * kPart + 12345}) {
     const std::string bytes = SomeBytes(size), packed = Deflate(bytes);
     EXPECT_TRUE(Inflate(packed, size, "test") == bytes) << size;
     EXPECT_LT(packed.size(), size / 2 + 100);
