@@ -13,7 +13,7 @@ namespace {
 constexpr size_t kPiece = 1 << 20;  // bytes at a time
 constexpr size_t kPart = 8 << 20;   // bytes that one thread compresses
 constexpr size_t kWindow = 1 << 15;
-constexpr char kHeader[] = "\x78\xda";  // a window of 32 KB, a level above the usual one
+constexpr char kHeader[] = "\x78\xda";  // a window of 32 KB, levels 7 to 9
 
 // The i-th part of `bytes` as blocks of a stream (RFC 1951) that begins where the one of the
 // part before ends. False if there is no memory.

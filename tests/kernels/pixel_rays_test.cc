@@ -10,8 +10,7 @@
 namespace regrade {
 namespace {
 
-// The same operations in the same order: bit-identical.
-TEST(PinholeRays, EqualTheCamerasRays) {
+Camera SmallCamera() {
   Camera camera;
   camera.width = 40;
   camera.height = 30;
@@ -19,6 +18,12 @@ TEST(PinholeRays, EqualTheCamerasRays) {
   camera.fy = 39;
   camera.cx = 21;
   camera.cy = 14;
+  return camera;
+}
+
+// The same operations in the same order: bit-identical.
+TEST(PinholeRays, EqualTheCamerasRays) {
+  Camera camera = SmallCamera();
   const double angle = 0.4;
   camera.camera_from_world.rotation.row[0] = {std::cos(angle), 0, -std::sin(angle)};
   camera.camera_from_world.rotation.row[2] = {std::sin(angle), 0, std::cos(angle)};
@@ -37,13 +42,7 @@ TEST(PinholeRays, EqualTheCamerasRays) {
 
 // The direction to a point of a ray is the ray's, near, far, and in NDC at infinity.
 TEST(PinholeRays, TheDirectionToAPointOfARayIsItsOwn) {
-  Camera camera;
-  camera.width = 40;
-  camera.height = 30;
-  camera.fx = 37;
-  camera.fy = 39;
-  camera.cx = 21;
-  camera.cy = 14;
+  Camera camera = SmallCamera();
   camera.camera_from_world.translation = {0.3, -0.2, 0.4};
   for (const bool ndc : {false, true}) {
     if (ndc) camera.ndc = {2 * 37.0 / 40, 2 * 39.0 / 30};

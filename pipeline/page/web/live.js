@@ -68,7 +68,6 @@ async function learnStyle(page, file) {
   if (!page.live) return;
   if (page.learning) return sayBriefly('Another style is being learned.');
   page.learning = true;
-  page.painter.spare = page.graphics.onCores !== false;
   // By way of `page`: the scene may be made again meanwhile.
   const i = page.header.styles.length, picture = page.dropped?.url ?? '';
   let done = false;
@@ -84,7 +83,7 @@ async function learnStyle(page, file) {
     if (!(error instanceof PageError)) throw error;
     sayBriefly('The style was not learned: ' + error.message);
   } finally {
-    page.learning = page.painter.spare = false;
+    page.learning = false;
     if (!done && page.header.styles.length > i) page.removeStyle(i);
   }
 }

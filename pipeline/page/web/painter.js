@@ -7,7 +7,6 @@ class Painter {
     this.part = 0.5;        // of the canvas's side while moving
     this.rows = 16;         // of a strip
     this.changed = true;
-    this.spare = false;     // true: nothing is painted at full size, for others need the cores
     this.next = 0;          // row of the full picture
     this.frameTime = 0;
     this.shown = null;      // the scene whose picture is on the canvas
@@ -64,7 +63,7 @@ class Painter {
       this.rest = performance.now() + 120;
       return true;
     }
-    if (this.spare || this.next >= this.full.height) return false;
+    if (this.next >= this.full.height) return false;
     if (begun < this.rest) return true;
     const height = Math.min(this.rows, this.full.height - this.next);
     const strip = {y: this.full.height - this.next - height, height};  // from the top
