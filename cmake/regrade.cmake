@@ -6,6 +6,8 @@ target_include_directories(regrade_flags INTERFACE ${PROJECT_SOURCE_DIR})
 target_compile_options(regrade_flags INTERFACE
   # -Wrestrict misfires on std::string + in GCC 12 (GCC PR 105651).
   $<$<COMPILE_LANGUAGE:CXX>:-Wall -Wextra -Wno-unknown-pragmas -Wno-missing-field-initializers -Wno-restrict>
+  # GCC 13 and later take references to elements for temporaries, and parts of a std::variant for used.
+  $<$<AND:$<COMPILE_LANG_AND_ID:CXX,GNU>,$<VERSION_GREATER_EQUAL:$<CXX_COMPILER_VERSION>,13>>:-Wno-dangling-reference -Wno-maybe-uninitialized>
   $<$<AND:$<BOOL:${REGRADE_WERROR}>,$<COMPILE_LANGUAGE:CXX>>:-Werror>)
 # Eigen's own threads wait for each other in busy loops, and its products here are small.
 target_compile_definitions(regrade_flags INTERFACE

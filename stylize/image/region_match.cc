@@ -92,17 +92,20 @@ RegionMatch MatchRegions(const std::vector<PictureFeatures>& photos,
   match.scene = FitRegions(Sample(photos), kSceneRegions, kSeed);
   match.weight_of_style.resize(styles.size());
   for (const RegionPart& part : match.scene) {
-    std::vector<double> distances;
-    for (const RegionMixture& style : of_styles) {
-      double least = std::numeric_limits<double>::infinity();
-      for (const RegionPart& other : style) least = std::min(least, PartDistance(part, other));
-      distances.push_back(std::sqrt(least));
+    constexpr double kFar = std::numeric_limits<double>::infinity();
+    double nearest = kFar, next = kFar;
+    size_t style = 0;
+    for (size_t k = 0; k < of_styles.size(); ++k) {
+      double least = kFar;
+      for (const RegionPart& other : of_styles[k])
+        least = std::min(least, PartDistance(part, other));
+      const double distance = std::sqrt(least);
+      next = std::min(next, std::max(nearest, distance));
+      if (distance < nearest) {
+        nearest = distance;
+        style = k;
+      }
     }
-    const auto best = std::ranges::min_element(distances);
-    const double nearest = *best;
-    const auto style = static_cast<size_t>(best - distances.begin());
-    distances.erase(best);
-    const double next = *std::ranges::min_element(distances);
     match.style_of_part.push_back(static_cast<int>(style));
     match.margin_of_part.push_back(next > 0 ? 1 - nearest / next : 0);
     match.weight_of_style[style] += part.weight;

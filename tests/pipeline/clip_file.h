@@ -71,9 +71,17 @@ inline bool WriteClip(const std::string& path, const std::vector<Image>& frames,
   stream->time_base = encoder->time_base;
   stream->sample_aspect_ratio = spec.aspect;
   if (spec.turn != 0) {
-    auto* matrix = reinterpret_cast<int32_t*>(
-        av_stream_new_side_data(stream, AV_PKT_DATA_DISPLAYMATRIX, 9 * sizeof(int32_t)));
-    av_display_rotation_set(matrix, spec.turn);
+    constexpr size_t kBytes = 9 * sizeof(int32_t);
+#if LIBAVFORMAT_VERSION_INT >= AV_VERSION_INT(60, 15, 100)
+    AVCodecParameters& codecpar = *stream->codecpar;
+    uint8_t* const data =
+        av_packet_side_data_new(&codecpar.coded_side_data, &codecpar.nb_coded_side_data,
+                                AV_PKT_DATA_DISPLAYMATRIX, kBytes, 0)
+            ->data;
+#else
+    uint8_t* const data = av_stream_new_side_data(stream, AV_PKT_DATA_DISPLAYMATRIX, kBytes);
+#endif
+    av_display_rotation_set(reinterpret_cast<int32_t*>(data), spec.turn);
   }
   EXPECT_GE(avio_open(&opened->pb, Url(path).c_str(), AVIO_FLAG_WRITE), 0);
   EXPECT_GE(avformat_write_header(opened, nullptr), 0);
