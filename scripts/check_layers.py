@@ -104,7 +104,7 @@ ALLOWED = (
 C_HEADERS = re.compile(r"(assert|errno|limits|math|signal|stddef|stdint|stdio|stdlib|string|time)\.h")
 POSIX_HEADERS = re.compile(
     r"(sys|netinet|arpa)/[a-z_]+\.h|"
-    r"(dirent|dlfcn|fcntl|fnmatch|glob|langinfo|locale|poll|pthread|sched|spawn|strings|termios|unistd|wait)\.h")
+    r"(dirent|dlfcn|fcntl|fnmatch|glob|langinfo|locale|malloc|poll|pthread|sched|spawn|strings|termios|unistd|wait)\.h")
 
 # Patterns that are forbidden in code, with the reason.
 FORBIDDEN = (

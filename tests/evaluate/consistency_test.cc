@@ -220,9 +220,9 @@ TEST(Consistency, H118_LowCoverageIsFlagged) {
 }
 
 TEST(Consistency, H118_UnrelatedNoiseCoversLessThanOneSurface) {
-  // Flow is always finite, and here smooth enough that a third of it agrees in both directions;
-  // the low coverage and its threshold reveal it.
-  const FrameSource noise = Frames({NoiseImage(96, 96, 1), NoiseImage(96, 96, 2)});
+  // Flow is always finite, and a tenth of it agrees in both directions by chance: the low
+  // coverage and its threshold reveal it. Of small frames more does (0.4 of 96 x 96 pixels).
+  const FrameSource noise = Frames({NoiseImage(192, 192, 1), NoiseImage(192, 192, 2)});
   const FrameSource waves = Frames({WaveImage(96, 96, 0, 0), WaveImage(96, 96, 2, 1)});
   for (const char* mode : {"lai2018", "ruder2016"}) {
     ConsistencyOptions options = Gaps({1});

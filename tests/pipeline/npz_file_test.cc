@@ -200,7 +200,9 @@ TEST(Npz, F71_DeflateRatioAndStoredSizes) {
   EXPECT_REGRADE_ERROR(ReadEverything(folder / "a.npz"), ExitCode::kInput,
                        "more than deflate can do");
   WriteText(folder / "a.npz", Patched(Patched(bytes, central + 24, 1000, 4), 22, 1000, 4));
-  EXPECT_REGRADE_ERROR(ReadEverything(folder / "a.npz"), ExitCode::kInput, "sizes differ");
+  // By its two sizes, or, where libzip is newer, by libzip.
+  EXPECT_REGRADE_ERROR(ReadEverything(folder / "a.npz"), ExitCode::kInput,
+                       "the file is damaged or malicious");
   // The two headers disagree.
   WriteText(folder / "a.npz", Patched(bytes, second_local + 22, 4000, 4));
   EXPECT_REGRADE_ERROR(ReadEverything(folder / "a.npz"), ExitCode::kInput, "disagree");

@@ -138,13 +138,14 @@ std::string WithChunk(const std::string& png, const std::string& body) {
 // Warnings of libpng become notices of the photo and are not printed.
 TEST_F(PngDecoder, F4_RemarksAreNoticesAndNothingIsPrinted) {
   const std::string whole = LibpngFile({PNG_COLOR_TYPE_RGB, 8}, 80, 70);
-  const std::string profile("iCCPodd\0\0not deflated", 22), gamma("gAMA\0\0\0\0", 8);
+  const std::string profile("iCCPodd\0\0not deflated", 22), gamma("gAMA\0\0\0\0", 8),
+      sizes("pHYs\1", 5);
   std::string flipped = WithChunk(whole, gamma);
   flipped[8 + 12 + 13 + 9] ^= 1;
   ::testing::internal::CaptureStderr();
   const DecodedPhoto odd = DecodePhoto(Put("a.png", WithChunk(whole, profile)));
   const DecodedPhoto twice =
-      DecodePhoto(Put("b.png", WithChunk(WithChunk(whole, gamma), profile)));
+      DecodePhoto(Put("b.png", WithChunk(WithChunk(whole, sizes), profile)));
   const std::string damage = Refusal(Put("c.png", flipped));
   EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
   EXPECT_TRUE(Contains(odd.notice, "an odd PNG (1 remark: ")) << odd.notice;
