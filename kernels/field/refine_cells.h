@@ -23,6 +23,11 @@ struct VertexSource {
 CellGrid ChangeCells(const CellGrid& old, const Vec3i& voxels,
                      const std::vector<CellChange>& change, std::vector<VertexSource>* sources);
 
+// RMSProp's moments, means of squared gradients, are moved times this: half as wide, a cell is
+// crossed by a quarter of the rays, and a sum over them is a quarter. With the parents' moments
+// as they are, the first twenty or so steps of every vertex are too short (COSTS.md).
+inline constexpr float kMomentOfChildren = 1.0f / 16;
+
 // values [old V, lanes] at the vertices of `to`: out [new V, lanes]. Vertices that were there
 // keep their values, so a split leaves the blend inside of a cell as it was, up to rounding,
 // unless a finer neighbour has a vertex of its own in one of the cell's faces: that one becomes

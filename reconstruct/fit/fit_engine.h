@@ -72,8 +72,8 @@ class FitEngine {
   virtual FitSums TakeSums() = 0;  // since the last call; may wait for queued steps
   // Renders the current field, colours clipped. Copies only the image to the host.
   virtual RenderedView Render(const Camera& camera, const MarchOptions& march) = 0;
-  // Of an adaptive field: removes and splits cells; moments stay. Background spheres, if any,
-  // get maps of `sphere_resolution`; their moments become 0 where that is another one.
+  // Of an adaptive field: removes and splits cells, as ApplyChanges does. Background spheres,
+  // if any, get maps of `sphere_resolution`; their moments become 0 where that is another one.
   virtual void RefineCells(const MarchOptions& march, const CellLimits& limits,
                            int sphere_resolution) = 0;
   // Prunes voxels and resamples; resets the optimizer's state, as in svox2. Background spheres,

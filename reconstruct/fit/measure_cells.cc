@@ -147,6 +147,7 @@ void ApplyChanges(const std::vector<CellChange>& change, FastGrid* grid,
   };
   move(&grid->records, grid->lanes());
   move(second_moment, grid->lanes());
+  for (float& moment : *second_moment) moment *= kMomentOfChildren;
   move(&grid->density_rate, 1);
   grid->SetCells(std::move(cells));
   RefreshDerived(grid);

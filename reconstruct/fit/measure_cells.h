@@ -33,7 +33,7 @@ std::vector<CellChange> ChooseChanges(const Buffer<uint8_t>& level,
                                       const CellStatistics& statistics,
                                       const CellLimits& limits);
 
-// Changes cells and moves records, moments [V, lanes] and rates.
+// Changes cells and moves records, rates, and moments [V, lanes], times kMomentOfChildren.
 void ApplyChanges(const std::vector<CellChange>& change, FastGrid* grid,
                   Buffer<float>* second_moment);
 

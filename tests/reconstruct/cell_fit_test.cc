@@ -12,6 +12,7 @@
 #include "reconstruct/fit/initial_cells.h"
 #include "reconstruct/fit/measure_cells.h"
 #include "tests/support/ball_views.h"
+#include "tests/support/cell_field.h"
 #include "tests/support/record_error.h"
 
 namespace regrade {
@@ -153,6 +154,30 @@ TEST(AdaptOptions, AKnownBackgroundHasLessTotalVariation) {
   EXPECT_EQ(again.tv_density, known.tv_density);
   options.MakeUniform();
   EXPECT_EQ(AdaptOptions(options, {.known_background = true}).tv_density, options.tv_density);
+}
+
+TEST(ApplyChanges, ValuesStayAndMomentsFall) {
+  const RadianceField field = testing::RandomCellField({2, 2, 2}, 3, 1, 5);
+  FastGrid grid = MakeFastGrid(field);
+  const CellGrid old = grid.cells();
+  const Buffer<float> records = grid.records;
+  Buffer<float> moment(grid.records.size());
+  for (int64_t i = 0; i < moment.size(); ++i) moment[i] = static_cast<float>(i + 1);
+  const Buffer<float> old_moment = moment;
+  ApplyChanges(
+      std::vector<CellChange>(static_cast<size_t>(old.num_cells()), CellChange::kSplit), &grid,
+      &moment);
+  ASSERT_GT(grid.cells().num_vertices(), old.num_vertices());
+  const int lanes = grid.lanes();
+  ASSERT_EQ(moment.size(), grid.cells().num_vertices() * lanes);
+  for (int64_t v = 0; v < old.num_vertices(); ++v) {
+    const int64_t now = FindKey(grid.cells().vertex_key, old.vertex_key[v]);
+    ASSERT_GE(now, 0);
+    for (int i = 0; i < lanes; ++i) {
+      EXPECT_EQ(grid.records[now * lanes + i], records[v * lanes + i]);
+      EXPECT_EQ(moment[now * lanes + i], old_moment[v * lanes + i] / 16);
+    }
+  }
 }
 
 TEST(ChooseChanges, H167_TheLimitOfCellsHoldsAndTheLargestErrorsAreSplit) {

@@ -32,10 +32,9 @@ DeviceCells ChangeCellsOnDevice(const DeviceCells& old, const Vec3i& voxels,
                                 const std::vector<CellChange>& change,
                                 DeviceBuffer<VertexSource>* sources);
 
-// MoveValues: rows of `lanes` floats, a multiple of 1; rows begin `stride` floats apart in
-// both.
+// MoveValues, times `factor`: rows of `lanes` floats that begin `stride` floats apart in both.
 void MoveValuesOnDevice(const DeviceCells& from, const DeviceCells& to,
                         const DeviceBuffer<VertexSource>& sources, const float* values,
-                        int lanes, int64_t stride, float* out);
+                        int lanes, int64_t stride, float factor, float* out);
 
 }  // namespace regrade

@@ -69,19 +69,21 @@ DeviceGrid ChangeCellsOnDevice(DeviceGrid grid, const std::vector<CellChange>& c
     grid.records = {};
     return grid;
   }
-  const auto move = [&](const float* values, int lanes, int64_t pitch, float* out) {
-    MoveValuesOnDevice(grid.cells, cells, sources, values, lanes, pitch, out);
+  const auto move = [&](const float* values, int lanes, int64_t pitch, float factor,
+                        float* out) {
+    MoveValuesOnDevice(grid.cells, cells, sources, values, lanes, pitch, factor, out);
   };
   DeviceBuffer<float> records(n * stride, "voxels");
   if (grid.fitting) {
     records.Zero();
-    move(grid.second_moment(), grid.lanes(), stride, records.data() + (stride - grid.lanes()));
+    move(grid.second_moment(), grid.lanes(), stride, kMomentOfChildren,
+         records.data() + (stride - grid.lanes()));
   }
-  move(grid.records.data(), grid.lanes(), stride, records.data());
+  move(grid.records.data(), grid.lanes(), stride, 1, records.data());
   grid.records = std::move(records);
   if (grid.density_rate.size() > 0) {
     DeviceBuffer<float> rates(n, "rates of densities");
-    move(grid.density_rate.data(), 1, 1, rates.data());
+    move(grid.density_rate.data(), 1, 1, 1, rates.data());
     grid.density_rate = std::move(rates);
   }
   grid.cells = std::move(cells);

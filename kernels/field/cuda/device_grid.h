@@ -82,8 +82,8 @@ FastGrid DownloadGrid(const DeviceGrid& grid);
 // records; `num_voxels` is the number of non-negative links.
 void RefreshDerived(DeviceGrid* grid, int64_t num_voxels);
 
-// Changes the cells of an adaptive field, and moves its values; gradients become 0 and moments
-// stay.
+// Changes the cells of an adaptive field and moves its values as ApplyChanges does; gradients
+// become 0.
 DeviceGrid ChangeCellsOnDevice(DeviceGrid grid, const std::vector<CellChange>& change);
 
 // Prunes and resamples as Resample in resample_grid.h does: a new vertex is kept if the old
