@@ -22,18 +22,16 @@ void TakeDefaults(const FitOptions& other, std::initializer_list<Rate> rates,
     if (options->*rate == plain.*rate) options->*rate = other.*rate;
 }
 
-// Chosen on a forward-facing capture at two sizes; see COSTS.md.
+// Chosen on a forward-facing capture at two sizes and on a synthetic one; see COSTS.md.
 void UseRatesOfDeviceCoordinates(FitOptions* options) {
   FitOptions other;
   other.rate_density = 12;
   other.rate_density_end = 2;
-  other.tv_density = 0.1f;
-  other.tv_sh = 8e-3f;
   other.free_space = 0;
-  TakeDefaults(other,
-               {&FitOptions::rate_density, &FitOptions::rate_density_end,
-                &FitOptions::tv_density, &FitOptions::tv_sh, &FitOptions::free_space},
-               options);
+  TakeDefaults(
+      other,
+      {&FitOptions::rate_density, &FitOptions::rate_density_end, &FitOptions::free_space},
+      options);
 }
 
 // Chosen on a synthetic capture with transparent photos; see COSTS.md.

@@ -129,14 +129,14 @@ TEST(AdaptOptions, DeviceCoordinatesHaveRatesOfTheirOwnAndWhatWasAskedForStays) 
   const FitOptions elsewhere = AdaptOptions(options, {});
   EXPECT_EQ(elsewhere.rate_density, options.rate_density);
   EXPECT_GT(elsewhere.free_space, 0);
-  options.tv_sh = 0.5f;
+  options.rate_density_end = 7;
   const FitOptions forward = AdaptOptions(options, {.device_coordinates = true});
   EXPECT_LT(forward.rate_density, options.rate_density);
   EXPECT_EQ(forward.free_space, 0);
-  EXPECT_EQ(forward.tv_sh, 0.5f);
+  EXPECT_EQ(forward.rate_density_end, 7);
   const FitOptions again = AdaptOptions(forward, {.device_coordinates = true});
   EXPECT_EQ(again.rate_density, forward.rate_density);
-  EXPECT_EQ(again.tv_density, forward.tv_density);
+  EXPECT_EQ(again.rate_density_end, forward.rate_density_end);
   EXPECT_EQ(again.rays_per_step, forward.rays_per_step);
   options.MakeUniform();
   EXPECT_EQ(AdaptOptions(options, {.device_coordinates = true}).rate_density,
