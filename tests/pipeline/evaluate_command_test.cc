@@ -325,7 +325,10 @@ TEST(EvaluateCommand, OddInputsHaveTheirSentences) {
       if (!no_pair || mode == std::string("lai2018")) {
         EXPECT_OUTPUT(outcome, test.sentence);
       }
-      EXPECT_EQ(outcome.text.find("nan"), std::string::npos) << outcome.text;
+      std::string words_said = outcome.text;  // the folder's name is random
+      while (words_said.find(folder.path()) != std::string::npos)
+        words_said.erase(words_said.find(folder.path()), std::string(folder.path()).size());
+      EXPECT_EQ(words_said.find("nan"), std::string::npos) << words_said;
     }
   }
 }
