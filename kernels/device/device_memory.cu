@@ -1,3 +1,7 @@
+#include <algorithm>
+#include <mutex>
+#include <unordered_map>
+
 #include "kernels/base/error.h"
 #include "kernels/device/device_memory.h"
 #include "kernels/device/device_stream.h"
@@ -19,6 +23,34 @@ void Require(cudaError_t status, const std::string& what) {
 }
 
 std::string Mebibytes(int64_t bytes) { return std::to_string(bytes >> 20) + " MiB"; }
+
+// Sizes of what is allocated. Never destroyed: owners of static lifetime free after it.
+struct Allocations {
+  std::mutex mutex;
+  std::unordered_map<void*, int64_t> bytes;
+  int64_t now = 0, peak = 0;
+};
+Allocations& AllAllocations() {
+  static Allocations* const all = new Allocations;
+  return *all;
+}
+
+void NoteAllocated(void* pointer, int64_t bytes) {
+  Allocations& all = AllAllocations();
+  const std::lock_guard lock(all.mutex);
+  all.bytes[pointer] = bytes;
+  all.now += bytes;
+  all.peak = std::max(all.peak, all.now);
+}
+
+void NoteFreed(void* pointer) {
+  Allocations& all = AllAllocations();
+  const std::lock_guard lock(all.mutex);
+  const auto found = all.bytes.find(pointer);
+  if (found == all.bytes.end()) return;
+  all.now -= found->second;
+  all.bytes.erase(found);
+}
 
 }  // namespace
 
@@ -47,7 +79,10 @@ DeviceStatus ReadDeviceStatus() {
 void* DeviceAllocate(int64_t bytes, const char* what) {
   void* pointer = nullptr;
   const cudaError_t status = cudaMalloc(&pointer, static_cast<size_t>(bytes));
-  if (status == cudaSuccess) return pointer;
+  if (status == cudaSuccess) {
+    NoteAllocated(pointer, bytes);
+    return pointer;
+  }
   cudaGetLastError();
   size_t free_bytes = 0, total_bytes = 0;
   cudaMemGetInfo(&free_bytes, &total_bytes);
@@ -60,7 +95,17 @@ void* DeviceAllocate(int64_t bytes, const char* what) {
               "GPU", "lower --fit-resolutions, use --device cpu, or close other GPU programs");
 }
 
-void DeviceFree(void* pointer) noexcept { cudaFree(pointer); }
+void DeviceFree(void* pointer) noexcept {
+  if (pointer == nullptr) return;
+  NoteFreed(pointer);
+  cudaFree(pointer);
+}
+
+int64_t DevicePeakBytes() {
+  Allocations& all = AllAllocations();
+  const std::lock_guard lock(all.mutex);
+  return all.peak;
+}
 
 DeviceRange::DeviceRange(const char* name) { nvtxRangePushA(name); }
 DeviceRange::~DeviceRange() { nvtxRangePop(); }
@@ -123,6 +168,7 @@ DeviceStatus ReadDeviceStatus() {
 }
 void* DeviceAllocate(int64_t, const char*) { NoDevice(); }
 void DeviceFree(void*) noexcept {}
+int64_t DevicePeakBytes() { return 0; }
 void DeviceCopyIn(void*, const void*, int64_t) { NoDevice(); }
 void DeviceCopyOut(void*, const void*, int64_t) { NoDevice(); }
 void DeviceCopyRows(void*, int64_t, const void*, int64_t, int64_t, int64_t) { NoDevice(); }

@@ -26,6 +26,8 @@ DeviceStatus ReadDeviceStatus();
 // with the requested and the free size.
 void* DeviceAllocate(int64_t bytes, const char* what);
 void DeviceFree(void* pointer) noexcept;
+// The most bytes that this program has had allocated at once, without those of the driver.
+int64_t DevicePeakBytes();
 void DeviceCopyIn(void* device, const void* host, int64_t bytes);
 void DeviceCopyOut(void* host, const void* device, int64_t bytes);  // waits for running kernels
 // Copies rows of `bytes` each; rows begin `to_pitch` and `from_pitch` bytes apart. Any

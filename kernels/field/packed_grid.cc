@@ -66,6 +66,7 @@ RadianceField ToRadianceField(const FastGrid& grid) {
   field.appearance.basis = grid.basis;
   const int stride = field.appearance.stride();
   field.appearance.sh.Resize(n * stride);
+#pragma omp parallel for schedule(static)
   for (int64_t v = 0; v < n; ++v) {
     std::copy_n(grid.records.data() + v * lanes, stride,
                 field.appearance.sh.data() + v * stride);

@@ -202,6 +202,7 @@ void FitPacked(const FitPackedOptions& settings, const FitOptions& fit_options,
                         {"detail_kept_heldout", measured.detail_kept},
                         {"detail_error_heldout", measured.detail_error},
                         {"transmittance_heldout", measured.transmittance},
+                        {"device_memory", DevicePeakBytes()},
                         {"render", std::move(render)},
                         {"curve_heldout", std::move(stages)},
                         {"curve_train", std::move(curve)}};

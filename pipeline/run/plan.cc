@@ -84,15 +84,25 @@ StagePlan PlanFitOnDevice(const FitOptions& options, int64_t photo_pixels,
                           const SceneBox& box) {
   constexpr double kSampleStore = 1 << 30, kVertexBytes = 4 + 4 + 1 + 1, kSamplesPerRay = 40,
                    kExactSumsSlower = 2;
+  // Of an adaptive field's vertex its density, that one's rate and its key; where it comes from.
+  constexpr double kCellVertexBytes = 4 + 4 + 8, kSourceBytes = 8;
   const double record = 4.0 * RecordLanes(BasisOfDegree(options.sh_degree));
   double peak = 0, coarser = 0, seconds = 0;
   for (size_t s = 0; s < options.resolutions.size(); ++s) {
     const auto [cells, voxels, vertices] = SizeOf(options, box, s);
     // Values, gradients, moments; exact sums are twice as wide.
-    const double field = voxels * ((options.exact_sums ? 4 : 3) * record + kIndexBytes) +
-                         vertices * kVertexBytes + cells * (kCellBytes + kStatisticBytes);
-    peak = std::max(peak, field + coarser);
-    coarser = field + 4 * voxels;  // with weights, which decide what is kept
+    const double wide = (options.exact_sums ? 4 : 3) * record;
+    if (cells > 0) {
+      const double beside = voxels * kCellVertexBytes + cells * kCellBytes;
+      const double field = voxels * wide + beside;
+      peak = std::max(peak, field + std::max(kSampleStore + cells * kStatisticBytes,
+                                             coarser + voxels * kSourceBytes));
+      coarser = voxels * record + beside;  // first its moments, then its values
+    } else {
+      const double field = voxels * (wide + kIndexBytes) + vertices * kVertexBytes;
+      peak = std::max(peak, field + std::max(kSampleStore, coarser));
+      coarser = field + 4 * voxels;  // with weights, which decide what is kept
+    }
     seconds += static_cast<double>(options.steps[s]) * options.rays_per_step * kSamplesPerRay /
                kDeviceSamplesPerSecond;
   }
@@ -102,8 +112,7 @@ StagePlan PlanFitOnDevice(const FitOptions& options, int64_t photo_pixels,
                                      (options.exact_sums ? 4 : 3) * 16);
   }
   if (options.exact_sums) seconds *= kExactSumsSlower;
-  return {static_cast<uint64_t>(peak + kSampleStore + 6.0 * static_cast<double>(photo_pixels)),
-          seconds};
+  return {static_cast<uint64_t>(peak + 6.0 * static_cast<double>(photo_pixels)), seconds};
 }
 
 StagePlan PlanPoses(int64_t photos, int threads) {

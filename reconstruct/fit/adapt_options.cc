@@ -22,15 +22,25 @@ void TakeDefaults(const FitOptions& other, std::initializer_list<Rate> rates,
     if (options->*rate == plain.*rate) options->*rate = other.*rate;
 }
 
-// Chosen on a forward-facing capture at two sizes and on a synthetic one; see COSTS.md.
+// Cells a side, from which on total variation grows with them.
+constexpr float kVariationSide = 768;
+
+// Chosen on a forward-facing capture at two sizes and on a synthetic one; see COSTS.md. Across
+// a cell half as wide values differ half as much, so total variation weighs twice as much.
 void UseRatesOfDeviceCoordinates(FitOptions* options) {
   FitOptions other;
+  const float finer =
+      std::max(1.0f, static_cast<float>(options->resolutions.back()) / kVariationSide);
+  other.tv_density *= finer;
+  other.tv_sh *= finer;
+  options->max_cells = std::min(options->max_cells, options->max_forward_cells);
   other.rate_density = 12;
   other.rate_density_end = 2;
   other.free_space = 0;
   TakeDefaults(
       other,
-      {&FitOptions::rate_density, &FitOptions::rate_density_end, &FitOptions::free_space},
+      {&FitOptions::rate_density, &FitOptions::rate_density_end, &FitOptions::free_space,
+       &FitOptions::tv_density, &FitOptions::tv_sh},
       options);
 }
 

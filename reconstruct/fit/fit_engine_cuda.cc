@@ -41,6 +41,10 @@ class CudaFitEngine : public FitEngine {
     edit(&state);
     SetState(std::move(state));
   }
+  void EndSteps() override {
+    DropFitter();
+    ended_ = true;
+  }
   int64_t num_voxels() const override { return grid_.num_voxels(); }
   Vec3i resolution() const override { return grid_.frame.resolution; }
 
@@ -92,6 +96,7 @@ class CudaFitEngine : public FitEngine {
                    int sphere_resolution) override {
     const DeviceRange range("changing cells");
     constexpr int kStride = 2;  // every other row and column of a view
+    DropFitter();
     const CellStatistics statistics = MeasureCellsOnDevice(grid_, views_, march, kStride);
     const auto change = ChooseChanges(grid_.cells.level.ToHost(), statistics, limits);
     grid_ = ChangeCellsOnDevice(std::move(grid_), change);
@@ -108,6 +113,7 @@ class CudaFitEngine : public FitEngine {
         limits.max_voxels == 0
             ? limits.least
             : BoundedLimit(weights.ToHost(), limits.least, limits.max_voxels);
+    DropFitter();
     DeviceGrid next = ResampleOnDevice(grid_, weights, threshold, resolution);
     if (next.num_voxels() == 0)
       throw Error(ExitCode::kScene,
@@ -143,7 +149,8 @@ class CudaFitEngine : public FitEngine {
   }
 
   FitState Download() const {
-    FitState state{DownloadGrid(grid_), DownloadSecondMoment(grid_), 0, 0};
+    FitState state{
+        DownloadGrid(grid_), ended_ ? Buffer<float>() : DownloadSecondMoment(grid_), 0, 0};
     if (grid_.spheres.on()) state.sphere_moment = grid_.spheres.second_moment.ToHost();
     return state;
   }
@@ -181,10 +188,15 @@ class CudaFitEngine : public FitEngine {
     sums_.rejected_voxels += static_cast<int64_t>(sums.rejected_voxels);
   }
 
-  // Renews all buffers that depend on the grid.
-  void Renew() {
+  // Before a new field is made, and what it needs is measured: the samples of rays would lie
+  // beside both.
+  void DropFitter() {
     KeepSums();
     fitter_.reset();
+  }
+  // Renews all buffers that depend on the grid.
+  void Renew() {
+    DropFitter();
     touched_ = DeviceTouched(grid_);
   }
   void Reserve(int64_t rays) {
@@ -195,6 +207,7 @@ class CudaFitEngine : public FitEngine {
 
   uint64_t seed_;
   bool exact_sums_;
+  bool ended_ = false;  // moments are not needed any more
   DeviceViews views_;
   DeviceGrid grid_;
   DeviceTouched touched_;

@@ -72,16 +72,33 @@ TEST(Plan, DeviceMemoryByHand) {
   // distances; 1 GiB of samples.
   const StagePlan one = PlanFitOnDevice(Fit({100}, {10}), 1000, kCube);
   EXPECT_EQ(one.memory, 1000000u * (3 * 128 + 4 + 10) + 6000u + (1u << 30));
-  // The coarser grid and its weights stay until the finer one, two fifths of it stored, is
-  // there.
   FitOptions exact = Fit({100}, {10});
   exact.exact_sums = true;  // a million voxels of 32 floats more, and slower
   EXPECT_NEAR(static_cast<double>(PlanFitOnDevice(exact, 1000, kCube).memory - one.memory),
               128e6, 1e6);
   EXPECT_GT(PlanFitOnDevice(exact, 1000, kCube).seconds, one.seconds);
-  const StagePlan two = PlanFitOnDevice(Fit({100, 200}, {10, 10}), 0, kCube);
-  EXPECT_EQ(two.memory, 1000000u * (3 * 128 + 4 + 10 + 4) + 3200000u * (3 * 128 + 4) +
-                            8000000u * 10 + (1u << 30));
+  // The coarser grid and its weights stay until the finer one, two fifths of it stored, is
+  // there; no samples are stored then.
+  const StagePlan two = PlanFitOnDevice(Fit({200, 200}, {10, 10}), 0, kCube);
+  EXPECT_EQ(two.memory, uint64_t{8000000} * (3 * 128 + 4 + 10 + 4) + 3200000u * (3 * 128 + 4) +
+                            8000000u * 10);
+  const StagePlan small = PlanFitOnDevice(Fit({100, 200}, {10, 10}), 0, kCube);
+  EXPECT_EQ(small.memory, 3200000u * (3 * 128 + 4) + 8000000u * 10 + (1u << 30));
+}
+
+// 1.2 vertices a cell: three records of 128 B, density, rate and key; 45 B a cell. Beside them
+// the samples of rays and statistics, or the field before: one record of it, and its cells.
+TEST(Plan, DeviceMemoryOfAnAdaptiveFieldByHand) {
+  FitOptions fit = Fit({100, 400}, {10, 10});
+  fit.field = "auto";
+  fit.max_cells = 20;
+  const double cell = 1.2 * (3 * 128 + 16) + 45, before = 1.2 * (128 + 16) + 45;
+  const auto memory = [&] {
+    return static_cast<double>(PlanFitOnDevice(fit, 0, kCube).memory);
+  };
+  EXPECT_NEAR(memory(), 4e6 * (cell + 24) + (1 << 30), 2);
+  fit.resolutions = {200, 1000};
+  EXPECT_NEAR(memory(), 20e6 * (cell + 1.2 * 8) + 8e6 * before, 2);
 }
 
 TEST(Plan, TooLittleMemoryNamesWhatToLower) {

@@ -134,6 +134,7 @@ TEST(AdaptOptions, DeviceCoordinatesHaveRatesOfTheirOwnAndWhatWasAskedForStays) 
   EXPECT_LT(forward.rate_density, options.rate_density);
   EXPECT_EQ(forward.free_space, 0);
   EXPECT_EQ(forward.rate_density_end, 7);
+  EXPECT_EQ(forward.tv_sh, options.tv_sh);
   const FitOptions again = AdaptOptions(forward, {.device_coordinates = true});
   EXPECT_EQ(again.rate_density, forward.rate_density);
   EXPECT_EQ(again.rate_density_end, forward.rate_density_end);
@@ -141,6 +142,25 @@ TEST(AdaptOptions, DeviceCoordinatesHaveRatesOfTheirOwnAndWhatWasAskedForStays) 
   options.MakeUniform();
   EXPECT_EQ(AdaptOptions(options, {.device_coordinates = true}).rate_density,
             options.rate_density);
+}
+
+// Twice as many cells a side have twice the total variation, for values differ half as much
+// across each; and they are fewer.
+TEST(AdaptOptions, NarrowCellsInDeviceCoordinates) {
+  FitOptions options;
+  options.resolutions = {48, 1536};
+  options.steps = {1, 1};
+  options.max_cells = 20;
+  options.tv_sh = 0.5f;
+  const FitOptions forward = AdaptOptions(options, {.device_coordinates = true});
+  EXPECT_FLOAT_EQ(forward.tv_density, 2 * options.tv_density);
+  EXPECT_EQ(forward.tv_sh, 0.5f);
+  EXPECT_EQ(forward.max_cells, options.max_forward_cells);
+  const FitOptions again = AdaptOptions(forward, {.device_coordinates = true});
+  EXPECT_EQ(again.tv_density, forward.tv_density);
+  options.max_cells = 3;
+  EXPECT_EQ(AdaptOptions(options, {.device_coordinates = true}).max_cells, 3);
+  EXPECT_EQ(AdaptOptions(options, {}).tv_density, options.tv_density);
 }
 
 TEST(AdaptOptions, AKnownBackgroundHasLessTotalVariation) {

@@ -83,7 +83,7 @@ CellStatistics MeasureCellsOnDevice(const DeviceGrid& grid, const DeviceViews& v
   DeviceBuffer<Vec3f> colors(most, "colours of a view"), targets(most, "colours of a photo");
   DeviceBuffer<float> depths(most, "depths of a view"),
       transmittances(most, "transmittances of a view");
-  CellSampleStore store(grid.frame, std::min<int64_t>(most, 1 << 16), int64_t{2} << 30);
+  CellSampleStore store(grid.frame, std::min<int64_t>(most, 1 << 16), int64_t{1} << 30);
   const CellSamples lists = store.view();
   for (int view = 0; view < views.num_views(); ++view) {
     const int64_t size = views.RaysOf(view, stride, rays.data());

@@ -195,13 +195,13 @@ __global__ void FillEntries(int64_t n, int32_t* entries) {
 __global__ void MoveRows(const CellKey* from_key, const uint8_t* from_level,
                          const int32_t* from_corner, int finest, const CellKey* vertex_key,
                          const VertexSource* sources, int64_t n, const float* values, int lanes,
-                         int64_t stride, float factor, float* out) {
+                         float factor, int64_t stride, float* out) {
   const int64_t v = Thread() / lanes;
   const int lane = static_cast<int>(Thread() % lanes);
   if (v >= n) return;
   const VertexSource source = sources[v];
   if (source.vertex >= 0) {
-    out[v * stride + lane] = factor * values[source.vertex * stride + lane];
+    out[v * stride + lane] = factor * values[int64_t{source.vertex} * lanes + lane];
     return;
   }
   const int64_t c = source.cell;
@@ -210,7 +210,7 @@ __global__ void MoveRows(const CellKey* from_key, const uint8_t* from_level,
       offset.Cast<float>() / static_cast<float>(1 << (finest - from_level[c]));
   float sum = 0;
   for (int k = 0; k < 8; ++k)
-    sum += CornerWeight(fraction, k) * values[from_corner[8 * c + k] * stride + lane];
+    sum += CornerWeight(fraction, k) * values[int64_t{from_corner[8 * c + k]} * lanes + lane];
   out[v * stride + lane] = factor * sum;
 }
 
@@ -340,10 +340,10 @@ DeviceCells ChangeCellsOnDevice(const DeviceCells& old, const Vec3i& voxels,
 
 void MoveValuesOnDevice(const DeviceCells& from, const DeviceCells& to,
                         const DeviceBuffer<VertexSource>& sources, const float* values,
-                        int lanes, int64_t stride, float factor, float* out) {
+                        int lanes, float factor, int64_t stride, float* out) {
   MoveRows<<<BlocksFor(to.num_vertices() * lanes), kThreads>>>(
       from.key.data(), from.level.data(), from.corner.data(), from.finest, to.vertex_key.data(),
-      sources.data(), to.num_vertices(), values, lanes, stride, factor, out);
+      sources.data(), to.num_vertices(), values, lanes, factor, stride, out);
   CheckLaunch("move_rows");
 }
 
@@ -355,7 +355,7 @@ DeviceCells ChangeCellsOnDevice(const DeviceCells&, const Vec3i&,
   return {};
 }
 void MoveValuesOnDevice(const DeviceCells&, const DeviceCells&,
-                        const DeviceBuffer<VertexSource>&, const float*, int, int64_t, float,
+                        const DeviceBuffer<VertexSource>&, const float*, int, float, int64_t,
                         float*) {
   DeviceWait("cells");
 }

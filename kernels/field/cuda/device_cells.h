@@ -32,9 +32,10 @@ DeviceCells ChangeCellsOnDevice(const DeviceCells& old, const Vec3i& voxels,
                                 const std::vector<CellChange>& change,
                                 DeviceBuffer<VertexSource>* sources);
 
-// MoveValues, times `factor`: rows of `lanes` floats that begin `stride` floats apart in both.
+// MoveValues, times `factor`: rows of `lanes` floats, one after the other in `values` and
+// `stride` floats apart in `out`.
 void MoveValuesOnDevice(const DeviceCells& from, const DeviceCells& to,
                         const DeviceBuffer<VertexSource>& sources, const float* values,
-                        int lanes, int64_t stride, float factor, float* out);
+                        int lanes, float factor, int64_t stride, float* out);
 
 }  // namespace regrade

@@ -51,39 +51,50 @@ DeviceGrid UploadGrid(const FastGrid& grid, bool fitting, const Buffer<float>& s
 
 namespace {
 
-Buffer<float> DownloadRows(const DeviceGrid& device, const float* from) {
+// Rows of a field's lanes, one after the other. The host copies them in one piece.
+DeviceBuffer<float> RowsOf(const DeviceGrid& device, const float* from) {
   const int64_t n = device.num_voxels(), row = device.lanes() * int64_t{sizeof(float)};
-  Buffer<float> rows(n * device.lanes());
+  DeviceBuffer<float> rows(n * device.lanes(), "rows of voxels");
   DeviceCopyRows(rows.data(), row, from, device.stride() * int64_t{sizeof(float)}, row, n);
   return rows;
+}
+
+Buffer<float> DownloadRows(const DeviceGrid& device, const float* from) {
+  return RowsOf(device, from).ToHost();
 }
 
 }  // namespace
 
 DeviceGrid ChangeCellsOnDevice(DeviceGrid grid, const std::vector<CellChange>& change) {
+  // The new field is the larger one. Of the old one only the moments lie beside it, and then,
+  // back from the host, only the values.
+  const Buffer<float> on_host = DownloadRows(grid, grid.records.data());
+  DeviceBuffer<float> moments;
+  if (grid.fitting) moments = RowsOf(grid, grid.second_moment());
+  grid.records = {};
   DeviceBuffer<VertexSource> sources;
   DeviceCells cells = ChangeCellsOnDevice(grid.cells, grid.frame.resolution, change, &sources);
   const int64_t n = cells.num_vertices(), stride = grid.stride();
   if (n == 0) {
     grid.cells = {};
-    grid.records = {};
     return grid;
   }
-  const auto move = [&](const float* values, int lanes, int64_t pitch, float factor,
-                        float* out) {
-    MoveValuesOnDevice(grid.cells, cells, sources, values, lanes, pitch, factor, out);
+  const int lanes = grid.lanes();
+  const auto move = [&](const DeviceBuffer<float>& values, int width, float factor,
+                        int64_t pitch, float* out) {
+    MoveValuesOnDevice(grid.cells, cells, sources, values.data(), width, factor, pitch, out);
   };
   DeviceBuffer<float> records(n * stride, "voxels");
   if (grid.fitting) {
     records.Zero();
-    move(grid.second_moment(), grid.lanes(), stride, kMomentOfChildren,
-         records.data() + (stride - grid.lanes()));
+    move(moments, lanes, kMomentOfChildren, stride, records.data() + (stride - lanes));
+    moments = {};
   }
-  move(grid.records.data(), grid.lanes(), stride, 1, records.data());
+  move(DeviceBuffer<float>::Of(on_host, "rows of voxels"), lanes, 1, stride, records.data());
   grid.records = std::move(records);
   if (grid.density_rate.size() > 0) {
     DeviceBuffer<float> rates(n, "rates of densities");
-    move(grid.density_rate.data(), 1, 1, 1, rates.data());
+    move(grid.density_rate, 1, 1, 1, rates.data());
     grid.density_rate = std::move(rates);
   }
   grid.cells = std::move(cells);
