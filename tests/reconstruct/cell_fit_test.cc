@@ -146,7 +146,7 @@ TEST(AdaptOptions, DeviceCoordinatesHaveRatesOfTheirOwnAndWhatWasAskedForStays) 
 
 // Twice as many cells a side have twice the total variation, for values differ half as much
 // across each; and they are fewer.
-TEST(AdaptOptions, NarrowCellsInDeviceCoordinates) {
+TEST(AdaptOptions, H192_NarrowCellsInDeviceCoordinates) {
   FitOptions options;
   options.resolutions = {48, 1536};
   options.steps = {1, 1};
@@ -176,7 +176,7 @@ TEST(AdaptOptions, AKnownBackgroundHasLessTotalVariation) {
   EXPECT_EQ(AdaptOptions(options, {.known_background = true}).tv_density, options.tv_density);
 }
 
-TEST(ApplyChanges, ValuesStayAndMomentsFall) {
+TEST(ApplyChanges, H191_ValuesStayAndMomentsFall) {
   const RadianceField field = testing::RandomCellField({2, 2, 2}, 3, 1, 5);
   FastGrid grid = MakeFastGrid(field);
   const CellGrid old = grid.cells();
