@@ -8,6 +8,7 @@
 
 #include "kernels/base/error.h"
 #include "kernels/field/cpu/render_view.h"
+#include "kernels/field/field_seen_by.h"
 #include "kernels/field/pad_sh_basis.h"
 #include "kernels/image/color_statistics.h"
 #include "kernels/image/resize.h"
@@ -83,11 +84,12 @@ double StrengthOf(const std::string& style_folder) {
 
 Image RenderHome(const RadianceField& field, const Camera& home) {
   const double scale = std::min(1.0, double{kPoster} / std::max(home.width, home.height));
-  return RenderView(field,
-                    home.Resized(std::max(1, static_cast<int>(home.width * scale)),
-                                 std::max(1, static_cast<int>(home.height * scale))),
-                    MarchOptions{field.step})
-      .color;
+  const Camera camera = home.Resized(std::max(1, static_cast<int>(home.width * scale)),
+                                     std::max(1, static_cast<int>(home.height * scale)));
+  const MarchOptions options{field.step};
+  return field.geometry->cells.on()
+             ? RenderView(FieldSeenBy(field, camera), camera, options).color
+             : RenderView(field, camera, options).color;
 }
 
 void AddPhotos(const WorkingViews& views, PageContent* content) {

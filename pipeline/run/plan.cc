@@ -84,7 +84,8 @@ StagePlan PlanFitOnDevice(const FitOptions& options, int64_t photo_pixels,
                           const SceneBox& box) {
   constexpr double kSampleStore = 1 << 30, kVertexBytes = 4 + 4 + 1 + 1, kSamplesPerRay = 40,
                    kExactSumsSlower = 2;
-  // Of an adaptive field's vertex its density, that one's rate and its key; where it comes from.
+  // Of an adaptive field's vertex its density, that one's rate and its key; where it comes
+  // from.
   constexpr double kCellVertexBytes = 4 + 4 + 8, kSourceBytes = 8;
   const double record = 4.0 * RecordLanes(BasisOfDegree(options.sh_degree));
   double peak = 0, coarser = 0, seconds = 0;

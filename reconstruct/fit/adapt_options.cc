@@ -37,11 +37,10 @@ void UseRatesOfDeviceCoordinates(FitOptions* options) {
   other.rate_density = 12;
   other.rate_density_end = 2;
   other.free_space = 0;
-  TakeDefaults(
-      other,
-      {&FitOptions::rate_density, &FitOptions::rate_density_end, &FitOptions::free_space,
-       &FitOptions::tv_density, &FitOptions::tv_sh},
-      options);
+  TakeDefaults(other,
+               {&FitOptions::rate_density, &FitOptions::rate_density_end,
+                &FitOptions::free_space, &FitOptions::tv_density, &FitOptions::tv_sh},
+               options);
 }
 
 // Chosen on a synthetic capture with transparent photos; see COSTS.md.

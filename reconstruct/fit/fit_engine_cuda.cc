@@ -149,8 +149,8 @@ class CudaFitEngine : public FitEngine {
   }
 
   FitState Download() const {
-    FitState state{
-        DownloadGrid(grid_), ended_ ? Buffer<float>() : DownloadSecondMoment(grid_), 0, 0};
+    FitState state{DownloadGrid(grid_), ended_ ? Buffer<float>() : DownloadSecondMoment(grid_),
+                   0, 0};
     if (grid_.spheres.on()) state.sphere_moment = grid_.spheres.second_moment.ToHost();
     return state;
   }

@@ -8,6 +8,7 @@
 #include <memory>
 #include <vector>
 
+#include "kernels/field/field_seen_by.h"
 #include "kernels/field/packed_grid.h"
 #include "kernels/field/render_ray.h"
 #include "tests/support/cell_field.h"
@@ -74,13 +75,8 @@ TEST(CellRay, FromVertexColorsItIsAFieldOfDegree0) {
         const DeviceGridView view = HostView(&grid);
         const PinholeRays rays(CameraAt({0.1, -0.2, ndc ? 0.1 : -3.0}, ndc));
         const std::vector<FourFloats> colors = ColorsOf<constant.value>(view, rays);
-        RadianceField flat = field;
-        flat.appearance.basis = 1;
-        flat.appearance.sh.Resize(3 * view.num_voxels);
-        for (int32_t v = 0; v < view.num_voxels; ++v)
-          for (int c = 0; c < 3; ++c)
-            flat.appearance.sh[3 * v + c] =
-                (colors[static_cast<size_t>(v)].of[c] - 0.5f) / static_cast<float>(kSh0);
+        const RadianceField flat =
+            FieldSeenBy(field, CameraAt({0.1, -0.2, ndc ? 0.1 : -3.0}, ndc));
         double seen = 0;
         for (int y = 0; y < rays.height; ++y)
           for (int x = 0; x < rays.width; ++x) {

@@ -17,10 +17,10 @@
 
 #include "kernels/field/cell_walk.h"
 #include "kernels/field/cuda/device_grid.h"
+#include "kernels/field/direction_to_vertex.h"
 #include "kernels/field/spherical_harmonics.h"
 #include "kernels/field/trilinear.h"
 #include "kernels/field/volume_rendering.h"
-#include "kernels/scene/pinhole_rays.h"
 
 namespace regrade {
 
@@ -51,17 +51,6 @@ HD Vec3f ColorOfRecords(const DeviceGridView& grid, const int32_t (&corner)[kCor
     }
   }
   return raw;
-}
-
-// d_v in the field's space; 0 where the camera has no ray through the vertex.
-HD inline Vec3f DirectionToVertex(const GridFrame& frame, CellKey key,
-                                  const PinholeRays& camera) {
-  const Vec3i at = PlaceOf(key);
-  const Vec3f scale = frame.Scale();
-  Vec3d p;
-  for (int a = 0; a < 3; ++a)
-    p[a] = frame.center[a] + (at[a] - frame.resolution[a] / 2) / double{scale[a]};
-  return camera.DirectionTo(p);
 }
 
 // A vertex's colour before the clamp as the camera sees it, and its density.

@@ -1,0 +1,13 @@
+// A field in the colours in which one camera sees it.
+#pragma once
+
+#include "kernels/field/radiance_field.h"
+#include "kernels/scene/camera.h"
+
+namespace regrade {
+
+// A field of degree 0 with the colours of EQ(vertex-colors), for one frame of an adaptive field
+// in a fifth of the memory. `camera` has no distortion. The geometry is shared.
+RadianceField FieldSeenBy(const RadianceField& field, const Camera& camera);
+
+}  // namespace regrade
