@@ -80,7 +80,12 @@ void* DeviceAllocate(int64_t bytes, const char* what) {
   void* pointer = nullptr;
   const cudaError_t status = cudaMalloc(&pointer, static_cast<size_t>(bytes));
   if (status == cudaSuccess) {
-    NoteAllocated(pointer, bytes);
+    try {
+      NoteAllocated(pointer, bytes);
+    } catch (...) {
+      cudaFree(pointer);
+      throw;
+    }
     return pointer;
   }
   cudaGetLastError();

@@ -83,10 +83,13 @@ FitOptions OptionsForCapture(const FitPackedOptions& settings, const FitOptions&
   for (const PackedView& view : capture.views)
     if (!view.held_out) pixels += view.photo.num_pixels();
   const SceneBox& box = capture.scene.box;
-  PlannedFit fit =
-      FitWithinMemory(AdaptOptions(asked, {capture.scene.ndc.on(), backend == Backend::kCuda,
-                                           pixels, box.background.has_value()}),
-                      {backend, pixels, box, settings.max_memory_gb, settings.reproducible});
+  const FitOptions adapted = AdaptOptions(
+      asked,
+      {capture.scene.ndc.on(), backend == Backend::kCuda, pixels, box.background.has_value()});
+  if (const std::string note = NoteOfAdapting(asked, adapted); !note.empty())
+    std::fprintf(stderr, "%s\n", note.c_str());
+  PlannedFit fit = FitWithinMemory(
+      adapted, {backend, pixels, box, settings.max_memory_gb, settings.reproducible});
   if (!fit.notice.empty()) std::fprintf(stderr, "%s\n", fit.notice.c_str());
   return fit.options;
 }

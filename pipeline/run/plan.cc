@@ -84,9 +84,11 @@ StagePlan PlanFitOnDevice(const FitOptions& options, int64_t photo_pixels,
                           const SceneBox& box) {
   constexpr double kSampleStore = 1 << 30, kVertexBytes = 4 + 4 + 1 + 1, kSamplesPerRay = 40,
                    kExactSumsSlower = 2;
-  // Of an adaptive field's vertex its density, that one's rate and its key; where it comes
-  // from.
-  constexpr double kCellVertexBytes = 4 + 4 + 8, kSourceBytes = 8;
+  // Of an adaptive field's vertex its density, that one's rate and its key, and where it comes
+  // from; of a cell while vertices are numbered itself, and its corners in two orders with what
+  // their sort needs.
+  constexpr double kCellVertexBytes = 4 + 4 + 8, kSourceBytes = 8,
+                   kSortedCellBytes = 13 + 8 * (2 * 12 + 12);
   const double record = 4.0 * RecordLanes(BasisOfDegree(options.sh_degree));
   double peak = 0, coarser = 0, seconds = 0;
   for (size_t s = 0; s < options.resolutions.size(); ++s) {
@@ -96,12 +98,13 @@ StagePlan PlanFitOnDevice(const FitOptions& options, int64_t photo_pixels,
     if (cells > 0) {
       const double beside = voxels * kCellVertexBytes + cells * kCellBytes;
       const double field = voxels * wide + beside;
-      peak = std::max(peak, field + std::max(kSampleStore + cells * kStatisticBytes,
-                                             coarser + voxels * kSourceBytes));
+      peak = std::max({peak, field + kSampleStore + cells * kStatisticBytes,
+                       field + coarser + voxels * kSourceBytes,
+                       coarser + cells * kSortedCellBytes});
       coarser = voxels * record + beside;  // first its moments, then its values
     } else {
       const double field = voxels * (wide + kIndexBytes) + vertices * kVertexBytes;
-      peak = std::max(peak, field + std::max(kSampleStore, coarser));
+      peak = std::max(peak, field + coarser + kSampleStore);
       coarser = field + 4 * voxels;  // with weights, which decide what is kept
     }
     seconds += static_cast<double>(options.steps[s]) * options.rays_per_step * kSamplesPerRay /

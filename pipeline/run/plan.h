@@ -52,9 +52,10 @@ int64_t ExpectedPixels(int64_t photos, int photo_size, int holdout);
 // that is not known yet.
 StagePlan PlanFit(const FitOptions& options, int64_t photo_pixels, const SceneBox& box,
                   int threads);
-// On a GPU: values, gradients and moments per voxel; links, densities and distances per vertex;
-// the coarser grid beside the finer one during resampling; 6 B per pixel; and the buffer of
-// samples in flight.
+// On a GPU: values, gradients and moments per voxel; links, densities and distances per vertex
+// of a uniform grid, and the coarser one beside the finer one during resampling; the cells of
+// an adaptive field, and values or moments of the field before beside a new one; 6 B per pixel;
+// and the buffer of samples in flight.
 StagePlan PlanFitOnDevice(const FitOptions& options, int64_t photo_pixels, const SceneBox& box);
 StagePlan PlanPoses(int64_t photos, int threads);
 StagePlan PlanTracks(int64_t photos, int threads);

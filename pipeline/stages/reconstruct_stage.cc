@@ -87,9 +87,13 @@ int64_t PixelsToFit(const WorkingViews& views) {
 FitOptions OptionsForScene(RunContext* context, const NormalizedScene& scene, int64_t pixels,
                            Backend backend) {
   const RunSettings& settings = context->settings;
+  const FitOptions adapted = AdaptOptions(
+      settings.fit,
+      {scene.ndc.on(), backend == Backend::kCuda, pixels, scene.box.background.has_value()});
+  if (const std::string note = NoteOfAdapting(settings.fit, adapted); !note.empty())
+    context->console->Info(note);
   PlannedFit fit = FitWithinMemory(
-      AdaptOptions(settings.fit, {scene.ndc.on(), backend == Backend::kCuda, pixels,
-                                  scene.box.background.has_value()}),
+      adapted,
       {backend, pixels, scene.box, settings.run.max_memory_gb, settings.run.reproducible});
   if (!fit.notice.empty()) context->console->Info(fit.notice);
   context->console->Info("the fit will take " + PlanText(fit.plan));

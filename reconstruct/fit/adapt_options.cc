@@ -26,7 +26,7 @@ void TakeDefaults(const FitOptions& other, std::initializer_list<Rate> rates,
 constexpr float kVariationSide = 768;
 
 // Chosen on a forward-facing capture at two sizes and on a synthetic one; see COSTS.md. Across
-// a cell half as wide values differ half as much, so total variation weighs twice as much.
+// a cell half as wide values differ half as much, so the weight of total variation is doubled.
 void UseRatesOfDeviceCoordinates(FitOptions* options) {
   FitOptions other;
   const float finer =
@@ -79,6 +79,13 @@ FitOptions AdaptOptions(FitOptions options, const FitConditions& conditions) {
       UseRatesOfKnownBackground(&options);
   }
   return options;
+}
+
+std::string NoteOfAdapting(const FitOptions& asked, const FitOptions& adapted) {
+  if (!asked.adaptive() || asked.max_cells <= adapted.max_cells) return "";
+  return Format("the photos face one way, so the field has at most %g million cells",
+                double{adapted.max_cells}) +
+         " (--fit-max-forward-cells)";
 }
 
 }  // namespace regrade

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 
 #include "reconstruct/fit/fit_options.h"
 
@@ -20,11 +21,15 @@ struct FitConditions {
 // - Stages of an adaptive field, with fewer_stages: none is finer than half the square root of
 //   the pixels. Nine photos of 640 x 480 pixels lose 0.5 dB and .05 of SSIM by cells half as
 //   wide (COSTS.md).
-// - In device coordinates an adaptive field has its own rates, and no loss of free space; where
+// - In device coordinates an adaptive field has its own rates, no loss of free space, at most
+//   max_forward_cells, and from 768 cells a side on more total variation with each; where
 //   the background is known it has less total variation, for silhouettes determine the
-//   densities. An option that is not at its default was asked for, and stays.
-// Applied twice, it changes nothing more.
+//   densities. Of rates and losses one that is not at its default was asked for, and stays.
+// Applied twice with the same conditions, it changes nothing more.
 FitOptions AdaptOptions(FitOptions options, const FitConditions& conditions);
+
+// What a user should know of it, or nothing.
+std::string NoteOfAdapting(const FitOptions& asked, const FitOptions& adapted);
 
 inline constexpr int kPasses = 16;
 

@@ -108,12 +108,12 @@ class CudaFitEngine : public FitEngine {
   void Refine(const MarchOptions& march, const PruneLimits& limits, const Vec3i& resolution,
               int sphere_resolution) override {
     const DeviceRange range("pruning and resampling");
+    DropFitter();
     const DeviceBuffer<float> weights = limits.by_density ? Densities() : MaxWeights(march);
     const float threshold =
         limits.max_voxels == 0
             ? limits.least
             : BoundedLimit(weights.ToHost(), limits.least, limits.max_voxels);
-    DropFitter();
     DeviceGrid next = ResampleOnDevice(grid_, weights, threshold, resolution);
     if (next.num_voxels() == 0)
       throw Error(ExitCode::kScene,
@@ -207,7 +207,7 @@ class CudaFitEngine : public FitEngine {
 
   uint64_t seed_;
   bool exact_sums_;
-  bool ended_ = false;  // moments are not needed any more
+  bool ended_ = false;  // no step follows, and nobody reads moments
   DeviceViews views_;
   DeviceGrid grid_;
   DeviceTouched touched_;

@@ -54,7 +54,7 @@ struct FitOptions {
   float initial_background_density = 0.1f;
   float background_lead = 0.25f;
   float cell_pixels = 1.0f;
-  float max_cells = 8.0f, max_forward_cells = 12.0f;
+  float max_cells = 5.0f, max_forward_cells = 12.0f;
   float free_space = 0.02f;
   int outward = 2;
   int shards = 0;
@@ -270,7 +270,7 @@ struct FitOptions {
     bind("fit-max-cells", max_cells,
          {.unit = "millions of cells",
           .help = "adaptive field: where more would be halved, those that explain the largest "
-                  "errors are",
+                  "errors are; see --fit-max-forward-cells",
           .min = 0.001,
           .max = 200});
     bind("fit-max-forward-cells", max_forward_cells,

@@ -158,8 +158,13 @@ TEST(AdaptOptions, H192_NarrowCellsInDeviceCoordinates) {
   EXPECT_EQ(forward.max_cells, options.max_forward_cells);
   const FitOptions again = AdaptOptions(forward, {.device_coordinates = true});
   EXPECT_EQ(again.tv_density, forward.tv_density);
+  EXPECT_EQ(NoteOfAdapting(options, forward),
+            "the photos face one way, so the field has at most 12 million cells "
+            "(--fit-max-forward-cells)");
   options.max_cells = 3;
-  EXPECT_EQ(AdaptOptions(options, {.device_coordinates = true}).max_cells, 3);
+  const FitOptions few = AdaptOptions(options, {.device_coordinates = true});
+  EXPECT_EQ(few.max_cells, 3);
+  EXPECT_EQ(NoteOfAdapting(options, few), "");
   EXPECT_EQ(AdaptOptions(options, {}).tv_density, options.tv_density);
 }
 

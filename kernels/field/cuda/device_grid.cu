@@ -1,4 +1,6 @@
 // Upload and download of a grid, and the arrays derived from links and records.
+#include <algorithm>
+
 #include "kernels/field/cuda/device_grid.h"
 #include "kernels/field/cuda/gradient_view.h"
 #include "kernels/field/cuda/launch.h"
@@ -51,26 +53,30 @@ DeviceGrid UploadGrid(const FastGrid& grid, bool fitting, const Buffer<float>& s
 
 namespace {
 
-// Rows of a field's lanes, one after the other. The host copies them in one piece.
-DeviceBuffer<float> RowsOf(const DeviceGrid& device, const float* from) {
-  const int64_t n = device.num_voxels(), row = device.lanes() * int64_t{sizeof(float)};
-  DeviceBuffer<float> rows(n * device.lanes(), "rows of voxels");
-  DeviceCopyRows(rows.data(), row, from, device.stride() * int64_t{sizeof(float)}, row, n);
-  return rows;
-}
-
+// The lanes of all voxels from `from` on, one after the other: gathered on the device piece by
+// piece, since the host would copy each row by itself.
 Buffer<float> DownloadRows(const DeviceGrid& device, const float* from) {
-  return RowsOf(device, from).ToHost();
+  constexpr int64_t kPieceBytes = 64 << 20;
+  const int64_t n = device.num_voxels(), lanes = device.lanes(), stride = device.stride();
+  const int64_t row = lanes * int64_t{sizeof(float)}, piece = kPieceBytes / row;
+  Buffer<float> rows(n * lanes);
+  DeviceBuffer<float> gathered(std::min(n, piece) * lanes, "voxels on their way to the host");
+  for (int64_t first = 0; first < n; first += piece) {
+    const int64_t count = std::min(piece, n - first);
+    DeviceCopyRows(gathered.data(), row, from + first * stride, stride * int64_t{sizeof(float)},
+                   row, count);
+    gathered.CopyOut(rows.data() + first * lanes, count * lanes);
+  }
+  return rows;
 }
 
 }  // namespace
 
 DeviceGrid ChangeCellsOnDevice(DeviceGrid grid, const std::vector<CellChange>& change) {
-  // The new field is the larger one. Of the old one only the moments lie beside it, and then,
-  // back from the host, only the values.
-  const Buffer<float> on_host = DownloadRows(grid, grid.records.data());
-  DeviceBuffer<float> moments;
-  if (grid.fitting) moments = RowsOf(grid, grid.second_moment());
+  // Of the old field's records only one array at a time lies beside the new ones.
+  const Buffer<float> values = DownloadRows(grid, grid.records.data());
+  Buffer<float> moments;
+  if (grid.fitting) moments = DownloadRows(grid, grid.second_moment());
   grid.records = {};
   DeviceBuffer<VertexSource> sources;
   DeviceCells cells = ChangeCellsOnDevice(grid.cells, grid.frame.resolution, change, &sources);
@@ -87,10 +93,10 @@ DeviceGrid ChangeCellsOnDevice(DeviceGrid grid, const std::vector<CellChange>& c
   DeviceBuffer<float> records(n * stride, "voxels");
   if (grid.fitting) {
     records.Zero();
-    move(moments, lanes, kMomentOfChildren, stride, records.data() + (stride - lanes));
-    moments = {};
+    move(DeviceBuffer<float>::Of(moments, "moments of before"), lanes, kMomentOfChildren,
+         stride, records.data() + (stride - lanes));
   }
-  move(DeviceBuffer<float>::Of(on_host, "rows of voxels"), lanes, 1, stride, records.data());
+  move(DeviceBuffer<float>::Of(values, "voxels of before"), lanes, 1, stride, records.data());
   grid.records = std::move(records);
   if (grid.density_rate.size() > 0) {
     DeviceBuffer<float> rates(n, "rates of densities");
