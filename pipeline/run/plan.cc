@@ -104,6 +104,7 @@ StagePlan PlanFitOnDevice(const FitOptions& options, int64_t photo_pixels,
       coarser = voxels * record + beside;  // first its moments, then its values
     } else {
       const double field = voxels * (wide + kIndexBytes) + vertices * kVertexBytes;
+      // No samples are stored during resampling, which needs marks and ranks of vertices.
       peak = std::max(peak, field + coarser + kSampleStore);
       coarser = field + 4 * voxels;  // with weights, which decide what is kept
     }

@@ -22,29 +22,29 @@ void TakeDefaults(const FitOptions& other, std::initializer_list<Rate> rates,
     if (options->*rate == plain.*rate) options->*rate = other.*rate;
 }
 
-// Cells a side, from which on total variation grows with them.
+// Cells a side, from which on the weight of total variation grows with them.
 constexpr float kVariationSide = 768;
 
 // Chosen on a forward-facing capture at two sizes and on a synthetic one; see COSTS.md. Across
 // a cell half as wide values differ half as much, so the weight of total variation is doubled.
-void UseRatesOfDeviceCoordinates(FitOptions* options) {
+void AdaptToDeviceCoordinates(FitOptions* options) {
   FitOptions other;
+  other.rate_density = 12;
+  other.rate_density_end = 2;
+  other.free_space = 0;
   const float finer =
       std::max(1.0f, static_cast<float>(options->resolutions.back()) / kVariationSide);
   other.tv_density *= finer;
   other.tv_sh *= finer;
-  options->max_cells = std::min(options->max_cells, options->max_forward_cells);
-  other.rate_density = 12;
-  other.rate_density_end = 2;
-  other.free_space = 0;
   TakeDefaults(other,
                {&FitOptions::rate_density, &FitOptions::rate_density_end,
                 &FitOptions::free_space, &FitOptions::tv_density, &FitOptions::tv_sh},
                options);
+  options->max_cells = std::min(options->max_cells, options->max_forward_cells);
 }
 
 // Chosen on a synthetic capture with transparent photos; see COSTS.md.
-void UseRatesOfKnownBackground(FitOptions* options) {
+void AdaptToKnownBackground(FitOptions* options) {
   FitOptions other;
   other.tv_density = 2e-3f;
   other.tv_sh = 1.6e-4f;
@@ -74,9 +74,9 @@ FitOptions AdaptOptions(FitOptions options, const FitConditions& conditions) {
   }
   if (options.adaptive()) {
     if (conditions.device_coordinates)
-      UseRatesOfDeviceCoordinates(&options);
+      AdaptToDeviceCoordinates(&options);
     else if (conditions.known_background)
-      UseRatesOfKnownBackground(&options);
+      AdaptToKnownBackground(&options);
   }
   return options;
 }

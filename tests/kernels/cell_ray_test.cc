@@ -73,10 +73,10 @@ TEST(CellRay, FromVertexColorsItIsAFieldOfDegree0) {
         const RadianceField field = testing::RandomCellField({3, 2, 2}, 3, basis, 33);
         FastGrid grid = MakeFastGrid(field);
         const DeviceGridView view = HostView(&grid);
-        const PinholeRays rays(CameraAt({0.1, -0.2, ndc ? 0.1 : -3.0}, ndc));
+        const Camera camera = CameraAt({0.1, -0.2, ndc ? 0.1 : -3.0}, ndc);
+        const PinholeRays rays(camera);
         const std::vector<FourFloats> colors = ColorsOf<constant.value>(view, rays);
-        const RadianceField flat =
-            FieldSeenBy(field, CameraAt({0.1, -0.2, ndc ? 0.1 : -3.0}, ndc));
+        const RadianceField flat = FieldSeenBy(field, camera);
         double seen = 0;
         for (int y = 0; y < rays.height; ++y)
           for (int x = 0; x < rays.width; ++x) {
