@@ -67,7 +67,7 @@ run() {
   export LD_LIBRARY_PATH=$dir${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}
   : >"$out/parity.txt"
   for test in device_{cells,film,parity,style,training}_test; do
-    # `hard_cases.py --measured OUT/*.xml` adds these numbers to RESULTS.md.
+    # `hard_cases.py OUT/*.xml` prints these numbers.
     "$dir/$test" --gtest_output="xml:$out/$test.xml" >>"$out/parity.txt" || status=1
   done
   grep -E '^parity|PASSED|FAILED|SKIPPED' "$out/parity.txt"

@@ -1,5 +1,5 @@
 // Records what a test measured and what it allows as properties of the test in GoogleTest's
-// report, which scripts/hard_cases.py --measured gathers.
+// report, which scripts/hard_cases.py prints.
 #pragma once
 
 #include <gtest/gtest.h>
