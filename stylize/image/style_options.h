@@ -33,7 +33,7 @@ struct StyleOptions {
               "the whole distribution, the strongest change, which amplifies grain and soft "
               "edges; histogram that of each channel; pca-kd runs networks of 302 kB, which "
               "are fetched once, after a yes (--yes); onnx:DIR runs the networks of PCA-KD, "
-              "WCT, WCT2, CCPL or CAP-VSTNet in DIR (stylize/METHODS.md); folder:DIR takes "
+              "WCT, WCT2, CCPL or CAP-VSTNet in DIR (stylize/README.md); folder:DIR takes "
               "photos that another program styled, by the photos' names, some may be missing; "
               "command:\"PROGRAM {input} {style} {output}\" runs a program for each view, "
               "without a shell"});

@@ -94,7 +94,7 @@ struct TrainNetworkOptions : WeightUpdateOptions {
 
 // Sets every option that the recipe decides: "standard", or "paper" (LipRF Sec. 6: no colour
 // map, PyTorch's default initialisation, a whole view a step, 300 steps, 1e-2 to 1e-4, one
-// step of the power iteration; RECIPE.md lists the readings that were chosen). Call it
+// step of the power iteration; stylize/README.md lists the readings that were chosen). Call it
 // before options are read. Throws Error(kUsage) for another name.
 void ApplyStyleRecipe(const std::string& recipe, TrainNetworkOptions* options);
 
