@@ -6,7 +6,7 @@
 Checked are paths that begin with a top folder of the tree (also as patterns: {a,b}, *, regular expressions), targets of
 Markdown links, names of sources, scripts and Markdown files, and, in Markdown and in comments of scripts, options: a
 source or script must contain "name" or "--name". Words in capitals are placeholders (tests/fuzz/TARGET). Not checked:
-CHANGELOG.md and check_words.py (retired names).
+CHANGELOG.md.
 Exit status: 0, or 1 if there is a finding.
 """
 
@@ -19,7 +19,7 @@ import tokenize
 
 from tree_files import parser_of, text_of, tree_files
 
-EXEMPT = ("CHANGELOG.md", "scripts/check_names.py", "scripts/check_words.py")
+EXEMPT = ("CHANGELOG.md", "scripts/check_names.py")
 OTHER_SCRIPTS = re.compile(r"scripts/.*(\.sh|\.yaml|Snakefile)|\.ci/run|CMakePresets\.json")
 LINK = re.compile(r"\]\(([^)#\s]+)(?:#[^)]*)?\)")
 FOREIGN = re.compile(r"https?://\S+|github\.com/\S+")

@@ -15,7 +15,8 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 
 
 def table(name, entry):
-    source = "; ".join(filter(None, (f"`{entry['command']}`" if "command" in entry else "", entry.get("commit", ""))))
+    source = "; ".join(filter(None, (*(f"`{command}`" for command in entry.get("command", "").split("; ") if command),
+                                       entry.get("commit", ""))))
     lines = [entry["note"] + (f" ({source})" if source else "") + f" <!-- {name} -->", ""]
     lines += ["| " + " | ".join(row) + " |" for row in (entry["columns"], ["---"] * len(entry["columns"]), *entry["rows"])]
     return "\n".join(lines)
