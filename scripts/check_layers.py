@@ -39,6 +39,7 @@ LAYERS = {
     "kernels/network/cuda": 2,
     "kernels/field/cpu": 3,
     "kernels/field/cuda": 3,
+    "kernels/splats": 3,
     "reconstruct/scene": 0,
     "reconstruct/colmap": 1,
     "reconstruct/fit": 1,
