@@ -8,6 +8,7 @@
 
 #include "kernels/base/error.h"
 #include "pipeline/capture/given_models.h"
+#include "pipeline/capture/name_index.h"
 #include "pipeline/capture/nsvf_cameras.h"
 #include "pipeline/files/json_file.h"
 #include "reconstruct/colmap/resized_model.h"
@@ -21,14 +22,61 @@ constexpr int64_t kSchema = 2;         // of photos.json
 constexpr char kAbsent[] = "absent/";  // no staged photo's name has a slash
 constexpr char kNoPicture[] = "has a pose, but the picture is missing";
 
-void NoteMissing(const std::vector<PhotoStatus>& statuses, std::vector<std::string>* notes) {
+void NoteMissing(const std::vector<PhotoStatus>& statuses, const NameIndex& names,
+                 std::vector<std::string>* notes) {
   std::string first;
   int count = 0;
   for (const PhotoStatus& photo : statuses)
     if (photo.why == kNoPicture && count++ == 0) first = photo.file;
-  if (count > 0)
-    notes->push_back(Concat("the pictures of ", count, " poses are missing: ", first,
-                            (count > 1 ? " and others" : "")));
+  if (count == 0) return;
+  const std::string nearest = names.Nearest(first);
+  notes->push_back(Concat("the pictures of ", count, " poses are missing: ", first,
+                          (count > 1 ? " and others" : ""),
+                          (nearest.empty() ? "" : "; the nearest name is " + nearest)));
+}
+
+// Gives images of the model staged names. An image without a staged photo gets a name that no
+// photo has: its own may be the staged name of another.
+void UseStagedNames(const CaptureSource& source, const std::vector<StagedPhoto>& photos,
+                    ColmapModel* model, std::vector<std::string>* notes) {
+  std::map<std::string, std::string> staged_of;  // by the user's names, without those in use
+  for (const StagedPhoto& photo : photos) staged_of[photo.file] = photo.name;
+  std::vector<ColmapImage*> others;
+  for (ColmapImage& image : model->images)
+    if (const auto found = staged_of.find(image.name); found != staged_of.end()) {
+      image.name = found->second;
+      staged_of.erase(found);
+    } else {
+      others.push_back(&image);
+    }
+  std::vector<std::string> free;
+  for (const auto& [file, name] : staged_of) free.push_back(file);
+  const NameIndex index(free);
+  int renamed = 0;
+  std::string first;
+  for (ColmapImage* image : others) {
+    // Names of our own are exact.
+    const std::string file =
+        source.kind == CaptureKind::kPosed ? std::string() : index.Find(image->name);
+    const auto found = staged_of.find(file);
+    if (found == staged_of.end()) {
+      if (!image->name.starts_with(kAbsent)) image->name = kAbsent + image->name;
+      continue;
+    }
+    if (renamed++ == 0) first = file + " is taken for \"" + image->name + "\"";
+    image->name = found->second;
+    staged_of.erase(found);
+  }
+  if (renamed > 0)
+    notes->push_back(Concat(renamed, " pictures have other names than in the poses: ", first,
+                            (renamed > 1 ? ", and so on" : "")));
+  if (staged_of.size() < photos.size() || model->images.empty()) return;
+  const std::string wanted = model->images[0].name.substr(std::string(kAbsent).size());
+  const std::string nearest = index.Nearest(wanted);
+  throw InputError(
+      Concat("none of the pictures of its ", model->images.size(), " poses is there, e.g. \"",
+             wanted, "\"", (nearest.empty() ? "" : "; nearest to it is \"" + nearest + "\"")),
+      source.poses, "names are relative to " + source.photos);
 }
 
 JsonValue StatusesJson(const std::vector<PhotoStatus>& statuses) {
@@ -114,15 +162,7 @@ Capture ImportPoses(const CaptureSource& source, const std::vector<StagedPhoto>&
       test = TestPhotos(index, "name");  // its photos are the staged ones
       box = BoxOf(index);
     }
-    // Images get staged names. An image without a staged photo gets a name that no photo has:
-    // its own may be the staged name of another.
-    std::map<std::string, std::string> name_of;
-    for (const StagedPhoto& photo : photos) name_of[photo.file] = photo.name;
-    for (ColmapImage& image : model.images)
-      if (const auto found = name_of.find(image.name); found != name_of.end())
-        image.name = found->second;
-      else if (!image.name.starts_with(kAbsent))
-        image.name = kAbsent + image.name;
+    UseStagedNames(source, photos, &model, notes);
   }
   if (const int resized = ResizeToPhotos(photos, &model); resized > 0)
     notes->push_back(
@@ -143,7 +183,9 @@ Capture ImportPoses(const CaptureSource& source, const std::vector<StagedPhoto>&
   capture.statuses = MergeStatuses(statuses, posed);
   for (const std::string& file : missing)
     capture.statuses.push_back({file, PhotoState::kSkipped, kNoPicture});
-  NoteMissing(capture.statuses, notes);
+  std::vector<std::string> names;
+  for (const PhotoStatus& photo : statuses) names.push_back(photo.file);
+  NoteMissing(capture.statuses, NameIndex(names), notes);
   return capture;
 }
 

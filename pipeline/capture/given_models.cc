@@ -10,6 +10,7 @@
 #include "pipeline/capture/dtu_cameras.h"
 #include "pipeline/capture/llff_poses.h"
 #include "pipeline/capture/nsvf_cameras.h"
+#include "pipeline/capture/polycam_cameras.h"
 #include "pipeline/capture/transforms_json.h"
 #include "reconstruct/colmap/colmap_lens.h"
 
@@ -40,12 +41,12 @@ ColmapModel ModelFromTransforms(const CaptureSource& source,
                                 const std::vector<StagedPhoto>& photos,
                                 std::vector<std::string>* missing) {
   const fs::path folder = fs::path(source.poses).parent_path();
-  std::map<std::string, const StagedPhoto*> by_path;
+  std::map<fs::path, const StagedPhoto*> by_path;
   for (const StagedPhoto& photo : photos)
-    by_path[fs::weakly_canonical(fs::path(source.photos) / photo.file).string()] = &photo;
+    by_path[(fs::path(source.photos) / photo.file).lexically_normal()] = &photo;
   const PictureSizeFunction size_of = [&by_path](const std::string& path, int* width,
                                                  int* height) {
-    const auto found = by_path.find(fs::weakly_canonical(path).string());
+    const auto found = by_path.find(fs::path(path).lexically_normal());
     *width = found == by_path.end() ? 1 : found->second->width;
     *height = found == by_path.end() ? 1 : found->second->height;
   };
@@ -58,7 +59,7 @@ ColmapModel ModelFromTransforms(const CaptureSource& source,
     file.frames.insert(file.frames.end(), tests.frames.begin(), tests.frames.end());
   }
   for (const TransformsFrame& frame : file.frames) {
-    const auto found = by_path.find(fs::weakly_canonical(folder / frame.file).string());
+    const auto found = by_path.find((folder / frame.file).lexically_normal());
     if (found == by_path.end()) continue;  // left out at ingest, with a reason
     const uint32_t id = static_cast<uint32_t>(model.images.size()) + 1;
     model.cameras.push_back({id, ColmapLensOf(frame.camera.lens), frame.camera});
@@ -111,6 +112,21 @@ ColmapModel ModelFromNsvf(const CaptureSource& source, const std::vector<StagedP
   return model;
 }
 
+// Each picture has a camera of its name.
+ColmapModel ModelFromPolycam(const CaptureSource& source,
+                             const std::vector<StagedPhoto>& photos) {
+  ColmapModel model;
+  for (const StagedPhoto& photo : photos) {
+    const fs::path camera = fs::path(source.poses) / (StemOf(photo.file) + ".json");
+    if (fs::is_regular_file(camera))
+      AddPinhole(ReadPolycamCamera(camera.string()), photo.name, &model);
+  }
+  if (model.images.empty())
+    throw InputError("holds a camera of none of the photos", source.poses,
+                     "cameras have the pictures' names, and .json");
+  return model;
+}
+
 // Pictures are numbered, as their cameras are.
 ColmapModel ModelFromDtu(const CaptureSource& source, const std::vector<StagedPhoto>& photos,
                          std::vector<std::string>* missing) {
@@ -145,6 +161,8 @@ ColmapModel ModelOfPoses(const CaptureSource& source, const std::vector<StagedPh
       return ModelFromLlff(source, photos, nearest_depth);
     case CaptureKind::kNsvf:
       return ModelFromNsvf(source, photos, missing);
+    case CaptureKind::kPolycam:
+      return ModelFromPolycam(source, photos);
     default:
       REGRADE_CHECK(source.kind == CaptureKind::kDtu);
       return ModelFromDtu(source, photos, missing);

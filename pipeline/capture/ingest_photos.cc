@@ -97,7 +97,7 @@ class Ingest {
       : source_(source),
         staging_(fs::absolute(staging_folder).lexically_normal().string()),
         options_(options),
-        inputs_(ListInputs(source, options.take_clips, options.only)) {
+        inputs_(ListInputs(source, options.take_clips, options.only, options.not_photos)) {
     limits_.max_pixels = options.max_megapixels * 1'000'000;
     limits_.accept_damaged = options.accept_damaged;
     video_limits_.max_pixels = limits_.max_pixels;
@@ -282,6 +282,8 @@ class Ingest {
     RemoveLeftovers(staging_, staged);
     result_.hidden = inputs_.hidden;
     result_.notices = notices_.Texts();
+    for (const std::string& run : inputs_.runs)
+      result_.notices.push_back("left out, the results of regrade in " + run);
     result_.summary = TakenAndLeft(result_.photos, clips_, left_);
     result_.fingerprint = HashText(fingerprint.Value());
   }
@@ -309,7 +311,8 @@ IngestResult IngestPhotos(const std::string& source, const std::string& staging_
 }
 
 InputFiles InputsOf(const CaptureSource& source) {
-  return ListInputs(source.photos, source.kind == CaptureKind::kPhotos, source.only);
+  return ListInputs(source.photos, source.kind == CaptureKind::kPhotos, source.only,
+                    source.not_photos);
 }
 
 int64_t ExpectedPhotos(const InputFiles& inputs, const IngestOptions& options) {

@@ -19,8 +19,10 @@ struct IngestOptions {
   bool accept_damaged = false;
   int64_t max_megapixels = 128;
   int video_frames = 0;
-  bool take_clips = true;      // films; they have no given poses. Has no flag.
-  std::set<std::string> only;  // see ListInputs. Has no flag.
+  // See ListInputs. These have no flags.
+  bool take_clips = true;  // films; they have no given poses
+  std::set<std::string> only;
+  std::vector<std::string> not_photos;
 
   template <typename Bind>
   void Describe(Bind& bind) {

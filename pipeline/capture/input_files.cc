@@ -7,6 +7,7 @@
 
 #include "kernels/base/error.h"
 #include "kernels/base/natural_order.h"
+#include "pipeline/files/text.h"
 #include "pipeline/images/image_format.h"
 #include "pipeline/images/video_reader.h"
 
@@ -17,14 +18,9 @@ namespace fs = std::filesystem;
 
 constexpr size_t kSniffedBytes = 4096;
 
-std::string Lower(std::string text) {
-  for (char& c : text)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  return text;
-}
-
-std::string ExtensionOf(const std::string& name) {
-  return Lower(fs::path(name).extension().string());
+bool IsIn(const fs::path& path, const fs::path& folder) {
+  return std::mismatch(folder.begin(), folder.end(), path.begin(), path.end()).first ==
+         folder.end();
 }
 
 // Folder and name without the extension: the same for the parts of one shot.
@@ -74,21 +70,25 @@ int InputFiles::Count(InputKind kind) const {
 }
 
 InputFiles ListInputs(const std::string& path, bool take_clips,
-                      const std::set<std::string>& only) {
+                      const std::set<std::string>& only,
+                      const std::vector<std::string>& not_photos) {
   std::error_code none;
   if (fs::is_regular_file(path, none)) return OneFilm(path);
-  FolderListing listing = ListFolder(path);
-  if (!only.empty())
-    std::erase_if(listing.files,
-                  [&](const ListedFile& file) { return !only.contains(file.name); });
+  FolderListing listing = only.empty() ? ListFolder(path) : ListNames(path, only);
+  const fs::path root = fs::weakly_canonical(path, none);
+  for (const std::string& folder : not_photos)
+    if (only.empty() && !IsIn(root, folder))
+      std::erase_if(listing.files,
+                    [&](const ListedFile& file) { return IsIn(root / file.name, folder); });
   InputFiles inputs;
   inputs.hidden = listing.hidden;
+  inputs.runs = listing.runs;
   std::map<std::string, std::string> picture_of_shot;
   std::set<size_t> raw;
   for (ListedFile& file : listing.files) {
     inputs.files.push_back({std::move(file), InputKind::kPhoto, "", ""});
     InputFile& input = inputs.files.back();
-    const std::string name = input.file.name, extension = ExtensionOf(name);
+    const std::string name = input.file.name, extension = LowerExtension(name);
     if (!input.file.problem.empty()) continue;
     const ImageFormat* format = FormatOf(input.file);
     if (format == nullptr) continue;

@@ -24,8 +24,9 @@ struct InputFile {
 };
 
 struct InputFiles {
-  std::vector<InputFile> files;  // in natural order of names
-  int hidden = 0;                // files and folders whose name begins with a dot
+  std::vector<InputFile> files;   // in natural order of names
+  int hidden = 0;                 // files and folders whose name begins with a dot
+  std::vector<std::string> runs;  // folders with results of our own, which are no photos
 
   int Count(InputKind kind) const;
 };
@@ -35,11 +36,12 @@ struct InputFiles {
 // (.thm) and small films (.lrv, .lrf); the clip of a live photo, which is a film of at most
 // kLongestLiveClip seconds beside a picture of the same name; a camera raw file beside a
 // picture of the same name, which the camera or the user developed from it; films, where
-// `take_clips` is false. Files that are not in `only`, unless that is empty, are not listed.
-// Throws as ListFolder, and Error(kInput) for a path that is a file and
-// no film.
+// `take_clips` is false. Files in the folders `not_photos` (absolute paths) are not listed. If
+// `only` is not empty, its files alone are looked at, wherever links lead. Throws as
+// ListFolder, and Error(kInput) for a path that is a file and no film.
 InputFiles ListInputs(const std::string& path, bool take_clips = true,
-                      const std::set<std::string>& only = {});
+                      const std::set<std::string>& only = {},
+                      const std::vector<std::string>& not_photos = {});
 inline constexpr double kLongestLiveClip = 6;
 
 // By its header; 0 if that cannot be read.

@@ -1,10 +1,10 @@
 #include "pipeline/capture/number_file.h"
 
-#include <charconv>
 #include <cmath>
 #include <string_view>
 
 #include "kernels/base/error.h"
+#include "kernels/base/number_text.h"
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/files/text.h"
 
@@ -15,10 +15,8 @@ constexpr uint64_t kMostBytes = 64 << 10;
 constexpr char kBetween[] = " \t\r,";
 
 double NumberOf(std::string_view word, const std::string& where) {
-  if (word.starts_with('+')) word.remove_prefix(1);
   double value = 0;
-  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-  if (error != std::errc() || end != word.data() + word.size() || !std::isfinite(value))
+  if (!ParseNumber(word, &value) || !std::isfinite(value))
     throw InputError("'" + Printable(word.substr(0, 40)) + "' is not a number", where,
                      "the file is damaged, or was written by another program");
   return value;
@@ -30,7 +28,7 @@ std::vector<std::vector<double>> ReadNumberFile(const std::string& path) {
   const std::string text = ReadWholeFile(path, kMostBytes);
   std::vector<std::vector<double>> lines;
   int number = 0;
-  for (const std::string& line : Split(text, '\n')) {
+  for (const std::string& line : Split(WithoutByteOrderMark(text), '\n')) {
     ++number;
     std::vector<double> values;
     for (size_t at = line.find_first_not_of(kBetween); at != std::string::npos;) {

@@ -7,6 +7,7 @@
 
 #include "kernels/base/error.h"
 #include "kernels/image/resize.h"
+#include "pipeline/capture/mask_picture.h"
 #include "pipeline/capture/photo_names.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/workspace/stage_record.h"
@@ -16,13 +17,6 @@ namespace {
 
 // JPEG's ringing around a plain colour; labels must differ by more than twice that.
 constexpr float kSameLabel = 24.0f / 255;
-
-Vec3f ColorOf(const Image& image, int64_t pixel) {
-  const float* p = &image.pixels[pixel * image.channels];
-  const float alpha = image.channels == 4 ? p[3] : 1;
-  const bool grey = image.channels < 3;
-  return Vec3f{p[0], p[grey ? 0 : 1], p[grey ? 0 : 2]} * alpha;
-}
 
 bool Same(const Vec3f& a, const Vec3f& b) {
   return std::abs(a.x - b.x) <= kSameLabel && std::abs(a.y - b.y) <= kSameLabel &&
@@ -36,7 +30,7 @@ std::vector<Vec3f> LabelsOf(const std::string& path) {
   std::vector<Vec3f> labels;
   std::vector<int64_t> counts;
   for (int64_t i = 0; i < mask.num_pixels(); ++i) {
-    const Vec3f color = ColorOf(mask, i);
+    const Vec3f color = MaskColor(mask, i);
     if (Same(color, {0, 0, 0})) continue;
     size_t k = 0;
     while (k < labels.size() && !Same(labels[k], color)) ++k;
@@ -74,18 +68,15 @@ int ObjectMasks::num_known() const {
 }
 
 std::vector<Image> ObjectMasks::Regions(const std::string& path, int width, int height) const {
-  const Image mask = ReadImage(path);
+  const Image mask = labels_.empty() ? ReadMask(path) : ReadImage(path);
   CheckAspect(mask, width, height, path, ExitCode::kInput);
   std::vector<Image> regions;
   for (int k = 0; k < num_regions(); ++k) {
-    Image region(mask.width, mask.height, 1);
-    for (int64_t i = 0; i < mask.num_pixels(); ++i) {
-      const Vec3f color = ColorOf(mask, i);
-      float& m = region.pixels[i];
-      if (labels_.empty())
-        m = (color.x + color.y + color.z) / 3;
-      else
-        m = Same(color, labels_[k]) ? 1.0f : 0.0f;
+    Image region = mask;
+    if (!labels_.empty()) {
+      region = Image(mask.width, mask.height, 1);
+      for (int64_t i = 0; i < mask.num_pixels(); ++i)
+        region.pixels[i] = Same(MaskColor(mask, i), labels_[k]) ? 1.0f : 0.0f;
     }
     regions.push_back(region.width == width && region.height == height
                           ? std::move(region)

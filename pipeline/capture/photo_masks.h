@@ -9,11 +9,15 @@
 
 namespace regrade {
 
-// Writes `folder`/00007.png.png, of the photo's size, for each photo that has a picture in
-// `masks`, by its name without or with extension (IMG_7.png, IMG_7.jpg.png). As COLMAP needs
-// them: black where no feature is extracted, white elsewhere, split at mid-grey. Returns their
-// number. Throws Error(kInput) for a missing folder, one without a mask of any photo, a mask of
-// another aspect than its photo, and one that is entirely black.
+// Writes `folder`/00007.png.png, of the photo's size, for each photo that has a mask in
+// `masks`: its path, or an empty text. As COLMAP needs them: black where no feature is
+// extracted, white elsewhere, split at mid-grey. Returns their number. Throws Error(kInput) for
+// a mask of another aspect than its photo, and one without anything brighter than mid-grey.
+int StageMasks(const std::vector<std::string>& masks, const std::vector<StagedPhoto>& photos,
+               const std::string& folder);
+
+// The same for the pictures of the folder `masks` that have the photos' names (photo_names.h).
+// Throws Error(kInput) for a missing folder and one without a mask of any photo, too.
 int StagePhotoMasks(const std::string& masks, const std::vector<StagedPhoto>& photos,
                     const std::string& folder);
 

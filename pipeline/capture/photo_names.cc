@@ -7,6 +7,7 @@
 #include <map>
 
 #include "kernels/base/error.h"
+#include "pipeline/capture/name_index.h"
 #include "pipeline/files/folder_listing.h"
 #include "pipeline/images/image_format.h"
 
@@ -15,15 +16,6 @@ namespace {
 
 std::string StemOf(const std::string& name) {
   return std::filesystem::path(name).stem().string();
-}
-
-bool HasPictureName(const std::string& path) {
-  std::string extension = std::filesystem::path(path).extension().string();
-  for (char& c : extension)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  for (const char* name : {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".exr"})
-    if (extension == name) return true;
-  return false;
 }
 
 // By content or name, so that a damaged picture is reported rather than ignored.
@@ -35,6 +27,79 @@ bool IsMeantAsPicture(const std::string& path) {
   begin.resize(std::max<std::streamsize>(0, file.gcount()));
   return SniffImageFormat(begin, path) != nullptr;
 }
+
+// A photo whose name a picture has.
+struct Match {
+  size_t photo = 0;
+  int closeness = 0;     // 0: none has it
+  bool several = false;  // others are as close
+
+  int Folders() const { return closeness / 2; }  // the part of it that folders have
+};
+
+// Photos by their names. Of photos with one name that are in different folders, the picture's
+// own folders decide: COLMAP's masks of several cameras are masks/cam0/00000.jpg.png.
+class PhotoFinder {
+ public:
+  explicit PhotoFinder(const std::vector<std::string>& photos) : photos_(photos) {
+    for (size_t i = 0; i < photos.size(); ++i) by_stem_[StemOf(photos[i])].push_back(i);
+  }
+
+  Match Find(const std::string& picture) const {
+    auto found = by_stem_.find(StemOf(picture));
+    // IMG_7.jpg.png, as COLMAP names masks.
+    if (found == by_stem_.end() && HasPictureName(StemOf(picture)))
+      found = by_stem_.find(StemOf(StemOf(picture)));
+    if (found == by_stem_.end()) return {};
+    Match best;
+    for (const size_t photo : found->second) {
+      const int closeness = Closeness(photos_[photo], picture);
+      if (closeness > best.closeness)
+        best = {photo, closeness, false};
+      else if (closeness == best.closeness)
+        best.several = true;
+    }
+    return best;
+  }
+
+  // Photos that share a name and have no picture, while one is there that may be of each.
+  std::string Twins(const std::vector<std::string>& paths, const std::string& unclear) const {
+    std::string twins;
+    for (const std::string& stem : {StemOf(unclear), StemOf(StemOf(unclear))})
+      if (const auto found = by_stem_.find(stem); twins.empty() && found != by_stem_.end())
+        for (const size_t photo : found->second)
+          if (paths[photo].empty()) twins += (twins.empty() ? "" : ", ") + photos_[photo];
+    return twins;
+  }
+
+  // A name that is found; of photos that share one, with its folder.
+  std::string Example() const {
+    for (const auto& [stem, photos] : by_stem_)
+      if (photos.size() > 1)
+        return std::filesystem::path(photos_[photos[0]]).replace_extension(".png").string() +
+               " (two photos have the name \"" + stem + "\")";
+    return StemOf(photos_[0]) + ".png";
+  }
+
+ private:
+  // At least 2; more for each folder that the paths share at their ends, and for an ending that
+  // the picture's name repeats.
+  static int Closeness(const std::string& photo, const std::string& picture) {
+    const std::filesystem::path a(photo), b(picture);
+    const bool repeats = b.stem() == a.filename();
+    int closeness = repeats ? 3 : 2;
+    auto folder_a = a.parent_path(), folder_b = b.parent_path();
+    for (; !folder_a.empty() && folder_a.filename() == folder_b.filename(); closeness += 2) {
+      folder_a = folder_a.parent_path();
+      folder_b = folder_b.parent_path();
+    }
+    // The same folders, not only the same end of them.
+    return closeness + (folder_a.empty() && folder_b.empty() ? 2 : 0);
+  }
+
+  const std::vector<std::string>& photos_;
+  std::map<std::string, std::vector<size_t>> by_stem_;
+};
 
 std::string SizeOf(const Image& image) { return Concat(image.width, " x ", image.height); }
 
@@ -56,32 +121,36 @@ void CheckAspect(const Image& picture, int width, int height, const std::string&
 std::vector<std::string> PicturesByPhotoName(const std::string& folder,
                                              const std::vector<std::string>& photos,
                                              const std::string& what) {
-  std::map<std::string, size_t> view_of;
-  for (size_t i = 0; i < photos.size(); ++i)
-    if (!view_of.emplace(StemOf(photos[i]), i).second)
-      throw InputError("two photos have the name \"" + StemOf(photos[i]) + "\"", photos[i],
-                       what + "s are found by name: give the photos different names");
+  const PhotoFinder finder(photos);
+  std::vector<Match> best(photos.size());
   std::vector<std::string> paths(photos.size());
-  bool any = false;
+  std::vector<std::string> unclear;
   for (const ListedFile& file : ListFolder(folder).files) {
-    auto match = view_of.find(StemOf(file.name));
-    // IMG_7.jpg.png, as COLMAP names masks.
-    if (match == view_of.end() && HasPictureName(StemOf(file.name)))
-      match = view_of.find(StemOf(StemOf(file.name)));
-    if (match == view_of.end()) continue;
+    const Match match = finder.Find(file.name);
+    if (match.closeness == 0) continue;
+    if (file.problem.empty() && !IsMeantAsPicture(file.path)) continue;
+    if (match.several) {
+      unclear.push_back(file.name);
+      continue;
+    }
+    Match& before = best[match.photo];
+    if (match.Folders() < before.Folders()) continue;
     if (!file.problem.empty()) throw InputError(file.problem, file.path);
-    if (!IsMeantAsPicture(file.path)) continue;
-    std::string& path = paths[match->second];
-    if (!path.empty())
-      throw InputError("two " + what + "s for the photo " + photos[match->second],
+    std::string& path = paths[match.photo];
+    if (match.Folders() == before.Folders())
+      throw InputError("two " + what + "s for the photo " + photos[match.photo],
                        path + " and " + file.path, "leave one of them");
+    before = match;
     path = file.path;
-    any = true;
   }
-  if (!any)
-    throw InputError(
-        "has no picture with the name of a photo", folder,
-        photos.empty() ? "" : "expected are names like " + StemOf(photos[0]) + ".png");
+  for (const std::string& picture : unclear)
+    if (const std::string twins = finder.Twins(paths, picture); !twins.empty())
+      throw InputError("\"" + picture + "\" may belong to one of several photos: " + twins,
+                       folder,
+                       "put the " + what + "s into folders named like those of the photos");
+  if (std::ranges::all_of(paths, [](const std::string& path) { return path.empty(); }))
+    throw InputError("has no picture with the name of a photo", folder,
+                     photos.empty() ? "" : "expected are names like " + finder.Example());
   return paths;
 }
 

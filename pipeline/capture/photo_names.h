@@ -10,8 +10,9 @@
 namespace regrade {
 
 // The picture in `folder` for each photo, by the names' stems, the photo's own extension kept
-// or not (IMG_7.jpg.png); empty where there is none.
-// `what` names such pictures ("mask"). Throws as MakeFolderStylizer does.
+// or not (IMG_7.jpg.png); empty where there is none. Of photos with one name in different
+// folders that one is meant whose folders the picture's path has (cam0/IMG_7.jpg.png). `what`
+// names such pictures ("mask"). Throws as MakeFolderStylizer does.
 std::vector<std::string> PicturesByPhotoName(const std::string& folder,
                                              const std::vector<std::string>& photos,
                                              const std::string& what);

@@ -3,12 +3,15 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <set>
 
 #include "kernels/base/error.h"
 #include "kernels/scene/camera_checks.h"
+#include "pipeline/capture/listed_pictures.h"
 #include "pipeline/capture/rigid_matrix.h"
+#include "pipeline/capture/transforms_split.h"
 #include "pipeline/files/json_file.h"
 
 namespace regrade {
@@ -20,7 +23,7 @@ constexpr int kMaxSide = 1 << 16;  // pixels
 
 [[noreturn]] void Refuse(const std::string& path, const JsonValue& at,
                          const std::string& what) {
-  throw InputError(what, Concat(path, ":", at.line(), ":", at.column()));
+  throw InputError(what, PlaceIn(path, at));
 }
 
 // Intrinsics of one frame: its own members first, then those at the top of the file.
@@ -116,12 +119,22 @@ RigidTransform ReadPose(const std::string& path, const JsonValue& frame) {
   return world_from_camera.Inverse();
 }
 
-// The picture's name with its extension; empty if there is no such file.
-std::string FindPicture(const fs::path& folder, const std::string& name) {
-  std::error_code ignored;
-  for (const char* extension : {"", ".png", ".jpg", ".jpeg"})
-    if (fs::is_regular_file(folder / (name + extension), ignored)) return name + extension;
-  return "";
+// A member that names a file; empty if it is missing or null.
+std::string NameIn(const std::string& path, const JsonValue& frame, const char* key) {
+  const JsonValue* name = frame.Find(key);
+  if (name == nullptr || name->IsNull()) return "";
+  if (!name->IsString() || name->AsString().find('\0') != std::string::npos)
+    Refuse(path, *name, std::string(key) + " is not a file's name");
+  return name->AsString();
+}
+
+void CountRenamed(const std::string& name, const std::string& file, TransformsFile* result) {
+  const std::string plain = fs::path(name).lexically_normal().generic_string();
+  if (plain == file || WithoutPictureEnding(file) == plain || fs::path(name).is_absolute())
+    return;
+  if (result->renamed++ > 0) return;
+  result->listed_name = name;
+  result->real_name = file;
 }
 
 Camera ReadCamera(const std::string& path, const JsonValue& top, const JsonValue& frame,
@@ -186,26 +199,41 @@ TransformsFile ReadTransformsJson(const std::string& path, const PictureSizeFunc
   if (frames == nullptr || !frames->IsArray())
     Refuse(path, top, "this is not a transforms.json: it has no list \"frames\"");
   const fs::path folder = fs::path(path).parent_path();
+  ListedPictures pictures(folder);
   TransformsFile result;
+  std::map<std::string, std::string> file_of;  // by the name in the file
   std::set<std::string> seen;
   for (const JsonValue& frame : frames->AsArray()) {
-    const JsonValue* name = frame.Find("file_path");
-    if (name == nullptr || !name->IsString() || name->AsString().empty() ||
-        name->AsString().find('\0') != std::string::npos)
-      Refuse(path, frame, "a frame has no file_path");
-    const std::string file = FindPicture(folder, name->AsString());
+    const std::string name = NameIn(path, frame, "file_path");
+    if (name.empty()) Refuse(path, frame, "a frame has no file_path");
+    const JsonValue& at = *frame.Find("file_path");
+    const std::string file = pictures.Find(name, PlaceIn(path, at));
+    file_of[name] = file;
     if (file.empty()) {
-      result.missing.push_back(name->AsString());
+      if (result.missing.empty()) result.nearest = pictures.Nearest(name);
+      result.missing.push_back(name);
       continue;
     }
-    if (!seen.insert(file).second) Refuse(path, *name, "\"" + file + "\" is listed twice");
+    if (!seen.insert(file).second) Refuse(path, at, "\"" + name + "\" is listed twice");
+    CountRenamed(name, file, &result);
     result.frames.push_back(
         {file, ReadCamera(path, top, frame, (folder / file).string(), size_of)});
+    if (const std::string mask = NameIn(path, frame, "mask_path"); !mask.empty()) {
+      result.frames.back().mask = pictures.Find(mask, PlaceIn(path, *frame.Find("mask_path")));
+      if (result.frames.back().mask.empty()) result.missing_masks.push_back(mask);
+    }
   }
+  const TransformsSplit split = ReadTransformsSplit(path, top, file_of);
+  for (const TransformsFrame& frame : result.frames)
+    if (split.test.contains(frame.file))
+      result.test.insert(frame.file);
+    else if (split.IsLeft(frame.file))
+      result.left.insert(frame.file);
   if (result.frames.empty() && !may_be_empty)
     throw InputError(
         Concat("none of the ", result.missing.size(), " listed pictures is there",
-               (result.missing.empty() ? "" : ", e.g. \"" + result.missing[0] + "\"")),
+               (result.missing.empty() ? "" : ", e.g. \"" + result.missing[0] + "\""),
+               (result.nearest.empty() ? "" : "; nearest to it is \"" + result.nearest + "\"")),
         path, "file paths are relative to the folder of transforms.json");
   return result;
 }

@@ -29,6 +29,9 @@ void ProbeInputs(const std::string& command, RunContext* context) {
   const std::filesystem::path out =
       std::filesystem::weakly_canonical(context->settings.run.out);
   const bool posed = DetectCapture(context->source).kind == CaptureKind::kPosed;
+  if (!posed && std::filesystem::weakly_canonical(context->source) == out)
+    throw UsageError("is the folder of the photos", "--out",
+                     "name another folder; it may be inside of that");
   for (const std::filesystem::path& folder : {out, out / "poses"})
     if (posed && std::filesystem::weakly_canonical(context->source) == folder)
       throw UsageError(
@@ -52,7 +55,7 @@ void PrintPlan(const std::string& command, RunContext* context) {
   if (command == "pose") return;
   const int threads = omp_get_max_threads();
   const int64_t pixels =
-      ExpectedPixels(ExpectedPhotos(InputsOf(DetectCapture(context->source)), settings.ingest),
+      ExpectedPixels(ExpectedPhotos(InputsOf(context->Source()), settings.ingest),
                      settings.scene.photo_size, settings.run.holdout);
   const bool on_card =
       ChooseBackend(settings.run.device, settings.run.reproducible) == Backend::kCuda;

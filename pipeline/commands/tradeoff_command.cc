@@ -286,7 +286,7 @@ void RunTradeoff(const Command& command, const Arguments& arguments, Console* co
   CheckOptions(settings, tradeoff);
   CheckTogether(settings);
   base.source = AbsolutePath(words[0]);
-  const CaptureSource source = DetectCapture(base.source);
+  const CaptureSource source = base.Source();
   const bool style = !settings.style.pictures.empty();
   if (style) {
     if (settings.style.pictures.size() > 1)

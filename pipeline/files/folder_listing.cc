@@ -75,6 +75,8 @@ void ListInto(const fs::path& folder, const std::string& prefix, const fs::path&
       listing->files.push_back({name, entry->path().string(), status_error.message()});
     else if (type == fs::file_type::symlink)
       listing->files.push_back(ResolveLink(name, entry->path(), root));
+    else if (type == fs::file_type::directory && IsRunFolder(entry->path()))
+      listing->runs.push_back(name);
     else if (type == fs::file_type::directory)
       ListInto(entry->path(), name, root, listing);
     else
@@ -97,7 +99,28 @@ FolderListing ListFolder(const std::string& folder) {
   FolderListing listing;
   ListInto(root, "", root, &listing);
   std::ranges::sort(listing.files, NaturalLess, &ListedFile::name);
+  std::ranges::sort(listing.runs, NaturalLess);
   return listing;
+}
+
+FolderListing ListNames(const std::string& folder, const std::set<std::string>& names) {
+  FolderListing listing;
+  for (const std::string& name : names) {
+    const fs::path path = fs::path(folder) / name;
+    std::error_code error;
+    const fs::path target = fs::canonical(path, error);
+    const fs::file_type type = error ? fs::file_type::none : fs::status(target, error).type();
+    std::string problem = error ? error.message() : ProblemOf(type);
+    if (type == fs::file_type::directory) problem = "a folder, not a file";
+    listing.files.push_back({name, problem.empty() ? target.string() : path.string(), problem});
+  }
+  std::ranges::sort(listing.files, NaturalLess, &ListedFile::name);
+  return listing;
+}
+
+bool IsRunFolder(const std::string& folder) {
+  std::error_code error;
+  return fs::is_directory(fs::path(folder) / ".regrade", error);
 }
 
 }  // namespace regrade

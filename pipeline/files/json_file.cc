@@ -237,6 +237,10 @@ JsonValue ParseJson(std::string_view text, const std::string& where, ExitCode co
   return builder.Take();
 }
 
+std::string PlaceIn(const std::string& path, const JsonValue& at) {
+  return Concat(path, ":", at.line(), ":", at.column());
+}
+
 JsonValue ReadJsonFile(const std::string& path, uint64_t max_bytes, ExitCode code) {
   return ParseJson(ReadWholeFile(path, max_bytes), path, code);
 }

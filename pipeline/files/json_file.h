@@ -75,6 +75,8 @@ class JsonValue {
 // `where` names the text in errors.
 JsonValue ParseJson(std::string_view text, const std::string& where,
                     ExitCode code = ExitCode::kInput);
+// "path:line:column", for errors.
+std::string PlaceIn(const std::string& path, const JsonValue& at);
 JsonValue ReadJsonFile(const std::string& path, uint64_t max_bytes = 64 << 20,
                        ExitCode code = ExitCode::kInput);
 

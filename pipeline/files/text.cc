@@ -64,11 +64,14 @@ std::string Join(const std::vector<std::string>& parts, std::string_view separat
   return text;
 }
 
-std::string LowerExtension(const std::string& path) {
-  std::string extension = std::filesystem::path(path).extension().string();
-  for (char& c : extension)
+std::string LowerCase(std::string text) {
+  for (char& c : text)
     if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  return extension;
+  return text;
+}
+
+std::string LowerExtension(const std::string& path) {
+  return LowerCase(std::filesystem::path(path).extension().string());
 }
 
 }  // namespace regrade

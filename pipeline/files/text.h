@@ -27,6 +27,9 @@ std::string DurationText(double seconds);
 std::vector<std::string> Split(std::string_view text, char separator);
 std::string Join(const std::vector<std::string>& parts, std::string_view separator);
 
+// Of ASCII letters.
+std::string LowerCase(std::string text);
+
 // ".jpg" of "a/b.JPG"; empty for a name without one.
 std::string LowerExtension(const std::string& path);
 

@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "pipeline/capture/capture_source.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/program/console.h"
 #include "pipeline/run/run_settings.h"
@@ -19,6 +20,10 @@ struct RunContext {
   Workspace* style = nullptr;      // of the style that is being made: styles/NAME
   Console* console = nullptr;
 
+  // What `source` is. Folders of masks in it hold no photos.
+  CaptureSource Source() const {
+    return DetectCapture(source, {settings.pose.photo_masks, settings.object.masks});
+  }
   // Of the finished stage "pose", with the gains of "reconstruct"; cameras in the capture's
   // world.
   WorkingViews Views() const {

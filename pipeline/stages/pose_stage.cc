@@ -77,6 +77,17 @@ std::string MasksOf(const RunContext& context, const CaptureSource& source) {
   return std::filesystem::is_directory(staged) ? staged.string() : "";
 }
 
+// The masks that the poses name, for the photos that were taken.
+std::vector<std::string> MasksByPhoto(const CaptureSource& source,
+                                      const std::vector<StagedPhoto>& photos) {
+  std::vector<std::string> masks;
+  for (const StagedPhoto& photo : photos) {
+    const auto found = source.masks.find(photo.file);
+    masks.push_back(found == source.masks.end() ? "" : found->second);
+  }
+  return masks;
+}
+
 StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
                        const ProgressFunction& progress) {
   const RunSettings& settings = context->settings;
@@ -93,10 +104,12 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
   IngestOptions ingest_options = settings.ingest;
   ingest_options.take_clips = source.kind == CaptureKind::kPhotos;
   ingest_options.only = source.only;
+  ingest_options.not_photos = source.not_photos;
   const IngestResult ingest =
       IngestPhotos(source.photos, photo_folder, ingest_options, parts.Next(seconds.ingest));
-  std::vector<std::string> said = ingest.notices;
-  if (!ingest.summary.empty()) said.insert(said.begin(), ingest.summary);
+  std::vector<std::string> said = source.notes;
+  if (!ingest.summary.empty()) said.push_back(ingest.summary);
+  said.insert(said.end(), ingest.notices.begin(), ingest.notices.end());
   for (const std::string& notice : said) context->console->Info(notice);
   const std::vector<StagedPhoto> colmap_photos =
       PhotosForColmap(ingest.photos, workspace.Path(kColmapPhotos));
@@ -110,9 +123,13 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
   const std::string mask_folder = workspace.Path("poses/masks");
   std::filesystem::remove_all(mask_folder);  // of an earlier run
   std::filesystem::remove(workspace.Path("poses") + "/" + kExposureFile);
-  if (const std::string folder = MasksOf(*context, source); !folder.empty()) {
+  const std::string masks_of_photos = MasksOf(*context, source);
+  if (!masks_of_photos.empty() || !source.masks.empty()) {
     options.mask_folder = mask_folder;
-    const int masks = StagePhotoMasks(folder, ingest.photos, options.mask_folder);
+    const int masks =
+        masks_of_photos.empty()
+            ? StageMasks(MasksByPhoto(source, ingest.photos), ingest.photos, mask_folder)
+            : StagePhotoMasks(masks_of_photos, ingest.photos, mask_folder);
     context->console->Info(std::to_string(masks) +
                            " masks: their black parts are neither matched nor fitted");
     metrics.photo_masks = masks;
@@ -174,13 +191,13 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
 }  // namespace
 
 Stage PoseStage(RunContext* context) {
-  const CaptureSource source = DetectCapture(context->source);
+  const CaptureSource source = context->Source();
   Stage stage;
   stage.name = "pose";
   stage.inputs = JsonValue::Object{
       {"photos", PhotoSet(source)},
       {"options", OptionValues(context->settings.ingest, context->settings.pose)}};
-  if (source.kind == CaptureKind::kNsvf)
+  if (source.kind == CaptureKind::kNsvf || source.kind == CaptureKind::kPolycam)
     stage.inputs["poses"] = HashFolder(source.poses);
   else if (LacksPoints(source.kind))
     stage.inputs["poses"] = HashFile(source.poses);
@@ -202,6 +219,9 @@ Stage PoseStage(RunContext* context) {
     stage.inputs[kPoseRefinement] = refine->second;
   if (const std::string folder = MasksOf(*context, source); !folder.empty())
     stage.inputs["photo_masks"] = HashFolder(folder);
+  else
+    for (const auto& [photo, mask] : source.masks)
+      stage.inputs["photo_masks"][photo] = HashFile(mask);
   stage.refuse_changes = true;
   const InputFiles inputs = InputsOf(source);
   const int64_t photos = ExpectedPhotos(inputs, context->settings.ingest);

@@ -27,6 +27,12 @@ const ColmapLensInfo& InfoOf(ColmapLens lens) {
   return kLenses[number];
 }
 
+void RefuseNewerLens(const std::string& what, const std::string& where) {
+  throw InputError(what + ": it is of a newer COLMAP and not supported", where,
+                   "run colmap image_undistorter, or pose the photos with OPENCV_FISHEYE (for "
+                   "fisheye lenses) or OPENCV");
+}
+
 ColmapLens ColmapLensOf(LensModel lens) {
   switch (lens) {
     case LensModel::kPinhole:

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 
 #include "kernels/scene/camera.h"
 
@@ -37,6 +38,10 @@ const ColmapLensInfo& InfoOf(ColmapLens lens);
 
 // The model with the parameters of ours, and two focal lengths.
 ColmapLens ColmapLensOf(LensModel lens);
+
+// For a camera model that is not among them. Throws Error(kInput): the model is of a newer
+// COLMAP.
+[[noreturn]] void RefuseNewerLens(const std::string& what, const std::string& where);
 
 inline const char* ColmapLensName(ColmapLens lens) { return InfoOf(lens).name; }
 

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <iterator>
 #include <set>
 
 #include "kernels/base/checked_math.h"
@@ -22,9 +23,11 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "the files are little-endian");
 
 constexpr size_t kLongestName = 4096;
-constexpr int64_t kLargestSide = 1 << 18;      // pixels
-constexpr double kLargestCoordinate = 1e12;    // world units
-constexpr double kQuaternionTolerance = 1e-3;  // rounding in other programs
+constexpr uint64_t kSmallestImage = 4 + 7 * 8 + 4 + 1 + 8;  // bytes
+constexpr int64_t kLargestSide = 1 << 18;                   // pixels
+constexpr int32_t kLargestNewLens = 999;                    // beyond, a file is rather damaged
+constexpr double kLargestCoordinate = 1e12;                 // world units
+constexpr double kQuaternionTolerance = 1e-3;               // rounding in other programs
 
 constexpr const char* kDamagedHint =
     "the file is damaged or was not written to its end; let COLMAP write the model again";
@@ -92,6 +95,8 @@ class Reader {
     if (Left() > 0) Fail(std::to_string(Left()) + " bytes follow after the last record");
   }
 
+  const std::string& path() const { return path_; }
+
   [[noreturn]] void Fail(const std::string& why) const {
     throw InputError(Concat(why, ", at byte ", position_), path_, kDamagedHint);
   }
@@ -112,14 +117,18 @@ std::vector<ColmapCamera> ReadCameras(const std::string& folder) {
   for (ColmapCamera& camera : cameras) {
     camera.id = reader.Read<uint32_t>("a camera");
     const int32_t lens = reader.Read<int32_t>("a camera");
-    if (lens < 0 || lens >= kNumColmapLenses)
-      reader.Fail(Concat(CameraText(camera.id), " has the unknown camera model ", lens));
+    if (lens < 0 || lens >= kNumColmapLenses) {
+      const std::string unknown =
+          Concat(CameraText(camera.id), " has the unknown camera model ", lens);
+      if (lens < 0 || lens > kLargestNewLens) reader.Fail(unknown);
+      RefuseNewerLens(unknown, reader.path());
+    }
     camera.lens = static_cast<ColmapLens>(lens);
     const ColmapLensInfo& info = InfoOf(camera.lens);
     if (info.focals == 0)
       throw InputError(CameraText(camera.id) + " has the camera model " + info.name +
                            ", which is not supported",
-                       folder + "/cameras.bin",
+                       reader.path(),
                        "run colmap image_undistorter, or pose the photos with OPENCV or "
                        "OPENCV_FISHEYE");
     Camera& c = camera.intrinsics;
@@ -172,7 +181,7 @@ Mat3d ReadRotation(Reader& reader, uint32_t image_id) {
 
 std::vector<ColmapImage> ReadImages(const std::string& folder) {
   Reader reader(folder, "images");
-  const size_t count = reader.ReadCount("images", 4 + 7 * 8 + 4 + 1 + 8);
+  const size_t count = reader.ReadCount("images", kSmallestImage);
   std::vector<ColmapImage> images(count);
   std::set<std::string> names;
   for (ColmapImage& image : images) {
@@ -270,6 +279,20 @@ Camera ColmapModel::CameraOf(const ColmapImage& image) const {
   Camera camera = found->intrinsics;
   camera.camera_from_world = image.camera_from_world;
   return camera;
+}
+
+uint64_t CountColmapImages(const std::string& folder) {
+  std::ifstream binary(folder + "/images.bin", std::ios::binary | std::ios::ate);
+  if (binary) {
+    const auto bytes = static_cast<uint64_t>(std::max<std::streamoff>(0, binary.tellg()));
+    uint64_t count = 0;
+    binary.seekg(0);
+    if (!binary.read(reinterpret_cast<char*>(&count), sizeof count)) return 0;
+    const auto needed = CheckedMul(count, kSmallestImage);
+    return needed && *needed <= bytes ? count : 0;
+  }
+  std::ifstream text(folder + "/images.txt", std::ios::binary);
+  return CountTextImages({std::istreambuf_iterator<char>(text), {}});
 }
 
 ColmapModel ReadColmapModel(const std::string& folder) {

@@ -67,6 +67,11 @@ struct ColmapModel {
 // Error(kInput) with the file, the position and the reason.
 ColmapModel ReadColmapModel(const std::string& folder);
 
+// How many photos the model in `folder` has poses of, by images.bin, or images.txt where there
+// is no .bin; 0 if there is neither, or if the file is too short for its count. Reads no
+// record.
+uint64_t CountColmapImages(const std::string& folder);
+
 // The unit quaternion w x y z of a rotation, w >= 0.
 std::array<double, 4> QuaternionOf(const Mat3d& rotation);
 

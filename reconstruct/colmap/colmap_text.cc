@@ -8,20 +8,22 @@
 #include <fstream>
 
 #include "kernels/base/error.h"
+#include "kernels/base/number_text.h"
 
 namespace regrade {
 namespace {
 
 class LineReader {
  public:
-  LineReader(const std::string& text, const std::string& path) : text_(text), path_(path) {}
+  LineReader(std::string_view text, const std::string& path)
+      : path_(path), text_(WithoutByteOrderMark(text)) {}
 
   // Moves to the next line that is not a comment; skips blank lines unless `blank_counts`.
   // False at the end.
   bool Next(bool blank_counts) {
     while (position_ < text_.size()) {
       const size_t end = std::min(text_.find('\n', position_), text_.size());
-      line_ = std::string_view(text_).substr(position_, end - position_);
+      line_ = text_.substr(position_, end - position_);
       position_ = end + 1;
       ++number_;
       if (!line_.empty() && line_.back() == '\r') line_.remove_suffix(1);
@@ -52,20 +54,20 @@ class LineReader {
   T Number(const char* what) {
     const std::string_view word = Word(what);
     T value{};
-    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-    if (error != std::errc() || end != word.data() + word.size())
+    if (!ParseNumber(word, &value))
       Fail("has '" + std::string(word.substr(0, 40)) + "' for " + what);
     return value;
   }
+  const std::string& path() const { return path_; }
+  int64_t number() const { return number_; }
   [[noreturn]] void Fail(const std::string& why) const {
     throw InputError(Concat("line ", number_, " ", why), path_,
                      "the file is damaged; let COLMAP write the model again");
   }
 
  private:
-  const std::string& text_;
   std::string path_;
-  std::string_view line_;
+  std::string_view text_, line_;
   size_t position_ = 0;
   int64_t number_ = 0;
 };
@@ -78,7 +80,11 @@ void Append(std::string* bytes, const T& value) {
 ColmapLens LensOfName(std::string_view name, const LineReader& lines) {
   for (int i = 0; i < kNumColmapLenses; ++i)
     if (name == ColmapLensName(static_cast<ColmapLens>(i))) return static_cast<ColmapLens>(i);
-  lines.Fail("has the unknown camera model '" + std::string(name.substr(0, 40)) + "'");
+  const std::string unknown =
+      "has the unknown camera model '" + std::string(name.substr(0, 40)) + "'";
+  if (name.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_") != std::string_view::npos)
+    lines.Fail(unknown);
+  RefuseNewerLens(Concat("line ", lines.number(), " ", unknown), lines.path());
 }
 
 void AppendCamera(LineReader* lines, std::string* bytes) {
@@ -133,6 +139,13 @@ void WriteTextFile(const std::string& path, const std::string& text) {
 }
 
 }  // namespace
+
+uint64_t CountTextImages(const std::string& text) {
+  LineReader lines(text, "");
+  uint64_t count = 0;
+  for (; lines.Next(false); ++count) lines.Next(true);
+  return count;
+}
 
 std::string BinaryOfColmapText(const std::string& name, const std::string& text,
                                const std::string& path) {

@@ -1,6 +1,7 @@
 // Reads and writes COLMAP's text models: cameras.txt, images.txt and points3D.txt.
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 #include "reconstruct/colmap/colmap_model.h"
@@ -13,6 +14,9 @@ namespace regrade {
 // model.
 std::string BinaryOfColmapText(const std::string& name, const std::string& text,
                                const std::string& path);
+
+// The images that the text of images.txt has, without reading them.
+uint64_t CountTextImages(const std::string& text);
 
 // Writes the three text files into the existing `folder`; numbers are read back exactly. Throws
 // Error(kResources) if the disk is full.

@@ -8,6 +8,7 @@
 #include "kernels/process/child_process.h"
 #include "pipeline/capture/capture_store.h"
 #include "pipeline/capture/transforms_json.h"
+#include "pipeline/files/json_file.h"
 #include "pipeline/files/npz_file.h"
 #include "pipeline/images/image_file.h"
 #include "tests/support/expect_error.h"
@@ -208,6 +209,88 @@ TEST_F(CaptureLayouts, BlendersTestPhotosAreHeldOut) {
   WriteTransformsJson(folder_ / "b/transforms_test.json", {train[0]});
   EXPECT_REGRADE_ERROR(DetectCapture(folder_ / "b"), ExitCode::kInput,
                        "for training and for tests");
+}
+
+TEST_F(CaptureLayouts, NerfstudiosMasksAndTestPhotos) {
+  std::vector<TransformsFrame> frames;
+  for (int i = 0; i < kPhotos; ++i) {
+    const std::string name = std::to_string(i) + ".png";
+    CopyPicture(i, "f/images/" + name);
+    frames.push_back({"images/" + name, cameras_[static_cast<size_t>(i)]});
+  }
+  const std::string file = folder_ / "f/transforms.json";
+  WriteTransformsJson(file, frames);
+  Image mask(96, 72, 1);
+  std::fill_n(mask.pixels.begin(), 96 * 10, 1.0f);
+  fs::create_directories(folder_ / "f/masks");
+  WritePng8(folder_ / "f/masks/m5.png", mask);
+  JsonValue json = ReadJsonFile(file);
+  JsonValue::Array list = json.At("frames").AsArray();
+  list[5]["mask_path"] = "masks/m5.png";
+  json["frames"] = std::move(list);
+  json["test_filenames"] = JsonValue::Array{"images/2.png", "images/7.png"};
+  WriteJsonFile(file, json);
+  const Capture capture = Pose("f", "out");
+  ASSERT_EQ(capture.views.size(), 8u);
+  EXPECT_EQ(FilesOf(capture, HeldOut(capture, 8)),
+            (std::vector<std::string>{"2.png", "7.png"}));
+  EXPECT_EQ(ReadImage(folder_ / "out/poses/masks/00005.png.png").pixels, mask.pixels);
+  EXPECT_FALSE(fs::exists(folder_ / "out/poses/masks/00004.png.png"));
+  // Another mask is another input.
+  EXPECT_EQ(Regrade({"pose", folder_ / "f", "--out", folder_ / "out", "--tracks", "given"}), 0);
+  mask.pixels[96 * 20] = 1;
+  WritePng8(folder_ / "f/masks/m5.png", mask);
+  EXPECT_EQ(Regrade({"pose", folder_ / "f", "--out", folder_ / "out", "--tracks", "given"}), 3);
+}
+
+TEST_F(CaptureLayouts, PolycamsCameras) {
+  for (int i = 0; i < kPhotos; ++i) {
+    const Camera& camera = cameras_[static_cast<size_t>(i)];
+    const RigidTransform world = camera.camera_from_world.Inverse();
+    JsonValue json = JsonValue::Object{{"fx", camera.fx},       {"fy", camera.fy},
+                                       {"cx", camera.cx},       {"cy", camera.cy},
+                                       {"width", camera.width}, {"height", camera.height},
+                                       {"blur_score", 120.0}};
+    for (int a = 0; a < 3; ++a) {
+      for (int b = 0; b < 3; ++b)
+        json[Concat("t_", a, b)] = (b == 0 ? 1 : -1) * world.rotation(a, b);
+      json[Concat("t_", a, 3)] = world.translation[a];
+    }
+    const std::string name = "17000" + std::to_string(i);
+    CopyPicture(i, "p/keyframes/corrected_images/" + name + ".png");
+    WriteText(folder_ / ("p/keyframes/corrected_cameras/" + name + ".json"), DumpJson(json));
+    WriteText(folder_ / ("p/keyframes/depth/" + name + ".png"), "no photo");
+  }
+  const Capture capture = Pose("p", "out");
+  ASSERT_EQ(capture.views.size(), 8u);
+  EXPECT_EQ(capture.statuses.size(), 8u);
+  for (int i = 0; i < kPhotos; ++i) {
+    const Camera &found = capture.views[static_cast<size_t>(i)].camera,
+                 &truth = cameras_[static_cast<size_t>(i)];
+    EXPECT_NEAR(Norm(found.Center() - truth.Center()), 0, 1e-9);
+    EXPECT_NEAR(Norm(found.Forward() - truth.Forward()), 0, 1e-9);
+    EXPECT_NEAR(found.fy, truth.fy, 1e-9);
+  }
+  WriteText(folder_ / "p/keyframes/corrected_cameras/170000.json", "{\"fx\": 1}");
+  EXPECT_EQ(Regrade({"pose", folder_ / "p", "--out", folder_ / "other", "--tracks", "given"}),
+            3);
+}
+
+// The output folder may be inside the folder of photos: the same command goes on.
+TEST_F(CaptureLayouts, ResultsInsideThePhotosAreNoPhotos) {
+  const std::vector<std::string> pose{
+      "pose", folder_ / "all", "--out", folder_ / "all/images/out", "--tracks", "given"};
+  ASSERT_EQ(
+      Regrade({"pose", folder_ / "s/truth", "--out", folder_ / "first", "--tracks", "given"}),
+      0);
+  ASSERT_EQ(Regrade({"export", folder_ / "first", "--out", folder_ / "all"}), 0);
+  for (int i = 0; i < 2; ++i) {
+    ASSERT_EQ(Regrade(pose), 0) << i;
+    EXPECT_EQ(ReadCapture(folder_ / "all/images/out/poses").statuses.size(), 8u) << i;
+  }
+  // But it is not the folder of photos itself.
+  EXPECT_EQ(Regrade({"pose", folder_ / "all", "--out", folder_ / "all/."}), 2);
+  EXPECT_FALSE(fs::exists(folder_ / "all/.regrade"));
 }
 
 }  // namespace

@@ -32,6 +32,8 @@ TEST_F(GivenCameras, NumbersOfATextFile) {
   ASSERT_EQ(lines.size(), 2u);
   EXPECT_EQ(lines[0], (std::vector<double>{1, -2500, 4}));
   EXPECT_EQ(lines[1], std::vector<double>{0.5});
+  EXPECT_EQ(ReadNumberFile(Write("\xef\xbb\xbf+0.5 -1"))[0], (std::vector<double>{0.5, -1}));
+  EXPECT_REGRADE_ERROR(ReadNumberFile(Write("+-1")), ExitCode::kInput, "not a number");
   EXPECT_REGRADE_ERROR(ReadNumberFile(Write("1\n2 x")), ExitCode::kInput,
                        "'x' is not a number");
   EXPECT_REGRADE_ERROR(ReadNumberFile(Write("1\n2 nan")), ExitCode::kInput, "numbers.txt:2");

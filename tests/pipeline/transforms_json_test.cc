@@ -114,7 +114,7 @@ TEST_F(TransformsJson, BlenderDialect) {
       Read(OneFrame(R"("camera_angle_x":1.5707963267948966)", "./a"),
            [](const std::string&, int* w, int* h) { *w = 800, *h = 600; });
   ASSERT_EQ(file.frames.size(), 1u);
-  EXPECT_EQ(file.frames[0].file, "./a.png");
+  EXPECT_EQ(file.frames[0].file, "a.png");
   EXPECT_NEAR(file.frames[0].camera.fx, 400, 1e-9);
   EXPECT_NEAR(file.frames[0].camera.fy, 400, 1e-9);
   EXPECT_EQ(file.frames[0].camera.cy, 300);

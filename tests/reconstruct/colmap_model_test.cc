@@ -308,6 +308,7 @@ TEST_F(ColmapModelFile, H136_EveryCameraModelNumber) {
   for (const int32_t unknown : {-1, 11, 77}) {
     Patch("cameras.bin", kCameraModel, unknown);
     ExpectRefusal("unknown camera model");
+    ExpectRefusal(unknown < 0 ? "damaged" : "newer COLMAP");
   }
 }
 

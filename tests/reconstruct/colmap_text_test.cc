@@ -66,6 +66,68 @@ TEST_F(ColmapText, TextIsReadLikeBinary) {
   }
 }
 
+// As editors and other programs write it: a byte-order mark, carriage returns, signs, tabs.
+TEST_F(ColmapText, MarksReturnsAndSignsAreRead) {
+  WriteColmapText(model_, folder_);
+  for (const char* name : {"cameras", "images", "points3D"}) {
+    fs::remove(folder_ + "/" + name + ".bin");
+    const std::string path = folder_ + "/" + name + ".txt";
+    std::string text = "\xef\xbb\xbf", line_end = "\r\n";
+    for (const char c : testing::ReadText(path)) c == '\n' ? text += line_end : text += c;
+    testing::WriteText(path, text);
+  }
+  testing::WriteText(folder_ + "/cameras.txt",
+                     "\xef\xbb\xbf"
+                     "1\tSIMPLE_RADIAL +640 480\t+6e2 +320.5 240 -0.25\r\n");
+  const ColmapModel read = ReadColmapModel(folder_);
+  EXPECT_EQ(read.images.size(), model_.images.size());
+  EXPECT_EQ(read.images[1].name, model_.images[1].name);
+  EXPECT_EQ(read.images[1].keypoints.size(), model_.images[1].keypoints.size());
+  EXPECT_EQ(read.cameras[0].intrinsics.width, 640);
+  EXPECT_EQ(read.cameras[0].intrinsics.fx, 600);
+  EXPECT_EQ(read.cameras[0].intrinsics.cx, 320.5);
+  EXPECT_EQ(read.cameras[0].intrinsics.distortion[0], -0.25);
+  testing::WriteText(folder_ + "/cameras.txt", "1 SIMPLE_RADIAL 640 480 +-6 320 240 0\n");
+  EXPECT_NE(Refusal().find("'+-6'"), std::string::npos);
+}
+
+TEST_F(ColmapText, ImagesAreCountedWithoutReadingThem) {
+  for (const int images : {1, 3}) {
+    model_ = testing::MakeSyntheticModel({.images = images, .points = 4});
+    model_.images.back().keypoints.clear();
+    WriteColmapText(model_, folder_);
+    EXPECT_EQ(CountColmapImages(folder_), static_cast<uint64_t>(images));
+  }
+  WriteColmapModel(testing::MakeSyntheticModel({.images = 5, .points = 4}), folder_);
+  EXPECT_EQ(CountColmapImages(folder_), 5u) << "binary comes first";
+  fs::resize_file(folder_ + "/images.bin", 100);
+  EXPECT_EQ(CountColmapImages(folder_), 0u);
+  EXPECT_EQ(CountColmapImages(folder_ + "/none"), 0u);
+}
+
+// A camera model that is not known is a newer COLMAP's, not damage.
+TEST_F(ColmapText, ModelsOfANewerColmap) {
+  WriteColmapText(model_, folder_);
+  for (const char* name : {"cameras", "images", "points3D"})
+    fs::remove(folder_ + "/" + name + ".bin");
+  for (const char* lens : {"SIMPLE_FISHEYE", "RAD_TAN_THIN_PRISM_FISHEYE", "EUCM_2"}) {
+    testing::WriteText(folder_ + "/cameras.txt", Concat("1 ", lens, " 640 480 600 320 240\n"));
+    try {
+      ReadColmapModel(folder_);
+      ADD_FAILURE() << lens;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.where(), folder_ + "/cameras.txt");
+      EXPECT_NE(error.what_failed().find(lens), std::string::npos);
+      EXPECT_NE(error.what_failed().find("newer COLMAP"), std::string::npos);
+      EXPECT_NE(error.hint().find("OPENCV_FISHEYE"), std::string::npos);
+    }
+  }
+  testing::WriteText(folder_ + "/cameras.txt", "1 P!NHOLE 640 480 600 320 240\n");
+  EXPECT_NE(Refusal().find("damaged"), std::string::npos);
+  testing::WriteText(folder_ + "/cameras.txt", "1 FOV 640 480 600 600 320 240 1\n");
+  EXPECT_NE(Refusal().find("cameras.txt"), std::string::npos) << "the file that was read";
+}
+
 TEST_F(ColmapText, F58_DamagedTextIsRefusedWithItsLine) {
   WriteColmapText(model_, folder_);
   for (const char* name : {"cameras", "images", "points3D"})
