@@ -21,7 +21,7 @@ int StagePhotoMasks(const std::string& masks, const std::vector<StagedPhoto>& ph
   for (size_t i = 0; i < photos.size(); ++i) {
     if (paths[i].empty()) continue;
     const StagedPhoto& photo = photos[i];
-    Image mask = ReadImage(paths[i]);
+    Image mask = ReadGivenImage(paths[i]);
     CheckAspect(mask, photo.width, photo.height, paths[i], ExitCode::kInput);
     if (mask.width != photo.width || mask.height != photo.height)
       mask = Resize(mask, photo.width, photo.height);
