@@ -29,9 +29,9 @@ constexpr int64_t kLibraryBytes = int64_t{2} << 30, kThreadBytes = int64_t{16} <
 // While a pixel is decoded: 16 bytes as four floats, twice where it is turned upright, and what
 // is stored of it, in several forms. A film's decoder keeps up to 16 frames, and as many as it
 // has threads.
+constexpr int64_t kPicturePixelBytes = 64, kFilmPixelBytes = 128;
 // With less, no file is to blame if it cannot be decoded.
 constexpr int64_t kLittleBytes = int64_t{1} << 30;
-constexpr int64_t kPicturePixelBytes = 64, kFilmPixelBytes = 128;
 
 int64_t AddressSpace() {
   int64_t pages = 0;

@@ -276,7 +276,9 @@ TEST(Cicp, WhiteOfHlgIsThatOfPq) {
       for (int c = 0; c < 3; ++c)  // the standards round the signals to a few digits
         EXPECT_NEAR(of_hlg.pixels[c] / of_pq.pixels[c], 1, 0.02) << hlg;
       EXPECT_NEAR(grey.pixels[0], of_hlg.pixels[0], 1e-3);
-      if (hlg == 0.75f) EXPECT_NEAR(of_hlg.pixels[0], 1, 2e-3);
+      if (hlg == 0.75f) {
+        EXPECT_NEAR(of_hlg.pixels[0], 1, 2e-3);
+      }
     }
   }
   EXPECT_EQ(CicpName(9, 18), "BT.2020, HLG");
