@@ -12,6 +12,9 @@
 
 #include "kernels/base/error.h"
 #include "pipeline/commands/command.h"
+#include "pipeline/images/decoder_message.h"
+#include "pipeline/images/decoder_process.h"
+#include "pipeline/images/decoder_server.h"
 #include "pipeline/program/console.h"
 #include "pipeline/program/crash_probe.h"
 #include "pipeline/program/interrupt.h"
@@ -43,6 +46,8 @@ void Dispatch(const Arguments& arguments, Console* console) {
   }
   if (name == kProbeFlag)
     return RunNetworkProbe(Arguments(arguments.begin() + 1, arguments.end()));
+  if (name == kDecoderFlag) ServeDecoding();
+  DecodeApart({.command = {"/proc/self/exe", kDecoderFlag}});
   std::vector<std::string> names = {"help"};
   for (const Command& command : AllCommands()) {
     if (name == command.name)

@@ -77,8 +77,8 @@ ANY_MODULE_SOURCE = r"(reconstruct|stylize|evaluate)/.*\.(cc|cu)"
 ALLOWED = (
     ("OpenCV", r"opencv2/",
      (r"evaluate/optical_flow\.cc", r"kernels/onnx/onnx_model\.cc", r"pipeline/images/(draw_text|edge_shift)\.cc")),
-    ("FFmpeg", r"lib(av|sw)[a-z]+/", (r"pipeline/images/(ffmpeg_pointers|libraries|video_reader|video_writer)\.cc",)),
-    ("OpenImageIO", r"OpenImageIO/", (r"pipeline/images/(image_file|libraries|still_file)\.cc",)),
+    ("FFmpeg", r"lib(av|sw)[a-z]+/", (r"pipeline/images/(ffmpeg_pointers|film_(decoder|frame)|libraries|video_writer)\.cc",)),
+    ("OpenImageIO", r"OpenImageIO/", (r"pipeline/images/(image_file|libraries|picture_decoder|still_file)\.cc",)),
     ("libjpeg-turbo", r"(jpeglib|jerror|jmorecfg|turbojpeg)\.h", (r"pipeline/images/jpeg_decoder\.cc",)),
     ("libheif", r"libheif/", (r"pipeline/images/(heif_decoder|libraries)\.cc",)),
     ("Little CMS", r"lcms2(_plugin)?\.h", (r"pipeline/images/color_profile\.cc",)),

@@ -135,6 +135,7 @@ ClipSurvey SurveyClip(const std::string& file, const std::string& path,
                     Concat(file, ": ", clip.frames.size(), " frames looked at"));
     }
     clip.damaged = reader.damaged();
+    clip.interlaced = reader.interlaced();
   } catch (const Error& error) {
     if (error.code() != ExitCode::kInput) throw;
     clip.frames.clear();

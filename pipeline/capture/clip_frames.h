@@ -23,8 +23,8 @@ struct ClipSurvey {
   std::string path;
   VideoInfo info;
   std::vector<FrameMeasure> frames;
-  int64_t damaged = 0;
-  std::string problem;  // why the film cannot be used; empty if it can
+  int64_t damaged = 0, interlaced = 0;  // frames
+  std::string problem;                  // why the film cannot be used; empty if it can
 
   double Travel() const { return frames.empty() ? 0 : frames.back().travel; }
 };

@@ -59,6 +59,10 @@ void IngestNotices::AddClip(const ClipSurvey& clip, size_t frames) {
                             clip.frames.empty() ? 0 : clip.frames.back().seconds);
   if (clip.Travel() < kHardlyMoves) text += "; the camera hardly moves in it";
   if (clip.damaged > 0) text += Concat("; ", clip.damaged, " could not be decoded");
+  if (clip.interlaced > 0)
+    text +=
+        "; it is interlaced: of each frame the rows of the first moment are kept, and the "
+        "others are interpolated";
   if (!clip.info.colors.empty()) text += "; " + ColorNotice(clip.info.colors, 0);
   clips_.push_back(text);
 }

@@ -44,7 +44,7 @@ Vec3f MaskColor(const Image& mask, int64_t pixel) {
 }
 
 Image ReadMask(const std::string& path) {
-  const Image picture = ReadImage(path);
+  const Image picture = ReadGivenImage(path);
   const bool cut_out = IsCutOut(picture);
   Image mask(picture.width, picture.height, 1);
   for (int64_t i = 0; i < mask.num_pixels(); ++i) {

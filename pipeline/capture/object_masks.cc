@@ -26,7 +26,7 @@ bool Same(const Vec3f& a, const Vec3f& b) {
 // Plain colours except black, each on at least a thousandth of the picture: mixtures along
 // edges are fewer.
 std::vector<Vec3f> LabelsOf(const std::string& path) {
-  const Image mask = ReadImage(path);
+  const Image mask = ReadGivenImage(path);
   std::vector<Vec3f> labels;
   std::vector<int64_t> counts;
   for (int64_t i = 0; i < mask.num_pixels(); ++i) {
@@ -68,7 +68,7 @@ int ObjectMasks::num_known() const {
 }
 
 std::vector<Image> ObjectMasks::Regions(const std::string& path, int width, int height) const {
-  const Image mask = labels_.empty() ? ReadMask(path) : ReadImage(path);
+  const Image mask = labels_.empty() ? ReadMask(path) : ReadGivenImage(path);
   CheckAspect(mask, width, height, path, ExitCode::kInput);
   std::vector<Image> regions;
   for (int k = 0; k < num_regions(); ++k) {

@@ -16,7 +16,7 @@ struct FrameFolder {
   std::vector<std::string> names;  // relative to the folder
   int width = 0, height = 0;       // of every frame
   std::string notice;  // what of the frames is used in a way that may surprise; or empty
-  KeptPictures kept;   // the frames, as far as they fit
+  KeptPictures kept{KeptPictures::Origin::kGiven};  // the frames, as far as they fit
 
   FrameSource Source() const;
 };

@@ -27,6 +27,9 @@ void ProbeStyles(RunSettings* settings, Console* console) {
     RequireValue(picture, "--style", "name the style picture");
     picture = AbsolutePath(picture);
     CheckStyle(picture, *settings);
+    if (!IsCubeFile(picture)) continue;
+    if (const ColorLut lut = ReadCubeFile(picture); lut.Slope() > kHarmlessSlope)
+      console->Warn(picture + ": " + SlopeText(lut));
   }
   CheckMatch(*settings);
   if (std::string& network = settings->style.match.network; !network.empty()) {

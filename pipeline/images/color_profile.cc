@@ -22,7 +22,8 @@ namespace {
 constexpr size_t kLargestProfile = 32 << 20;
 // In values of 8 bits.
 constexpr double kSameStep = 0.5;
-constexpr double kPqPeak = 10000, kPqWhite = 203;  // cd/m^2
+// White of a picture that is made for HDR (BT.2408), and the peaks that its curves refer to.
+constexpr double kWhite = 203, kPqPeak = 10000, kHlgPeak = 1000;  // cd/m^2
 
 // A profile of some bytes may claim tables of any size.
 constexpr cmsUInt32Number kLargestTable = 64 << 20;
@@ -124,13 +125,34 @@ std::string DescriptionOf(const Profile& profile) {
   return text[0] == '\0' ? "a colour profile without a name" : text;
 }
 
-// SMPTE ST 2084: linear light, 1 at kPqWhite.
+// SMPTE ST 2084: linear light, 1 at kWhite.
 float LightFromPq(float encoded) {
   constexpr double m1 = 2610 / 16384.0, m2 = 2523 / 4096.0 * 128, c1 = 3424 / 4096.0,
                    c2 = 2413 / 4096.0 * 32, c3 = 2392 / 4096.0 * 32;
   const double power = std::pow(std::clamp(static_cast<double>(encoded), 0.0, 1.0), 1 / m2);
   const double light = std::pow(std::max(power - c1, 0.0) / (c2 - c3 * power), 1 / m1);
-  return static_cast<float>(light * kPqPeak / kPqWhite);
+  return static_cast<float>(light * kPqPeak / kWhite);
+}
+
+// HLG's inverse OETF (BT.2100): light of the scene, 1 at the peak.
+float SceneLightFromHlg(float encoded) {
+  constexpr double a = 0.17883277, b = 1 - 4 * a, c = 0.55991073;
+  const double e = std::clamp(static_cast<double>(encoded), 0.0, 1.0);
+  return static_cast<float>(e <= 0.5 ? e * e / 3 : (std::exp((e - c) / a) + b) / 12);
+}
+
+// HLG's OOTF for a screen of kHlgPeak: light of the scene, RGB of sRGB's primaries, becomes
+// that of the screen, 1 at kWhite. It multiplies each colour by a power of its luminance, which
+// is the same in all primaries.
+void ShowHlg(Image* image) {
+  constexpr double kGamma = 1.2;
+  const int colors = std::min(image->channels, 3);
+  for (int64_t i = 0; i < image->num_pixels(); ++i) {
+    float* const v = &image->pixels[i * image->channels];
+    const double luminance = colors == 1 ? v[0] : 0.2126 * v[0] + 0.7152 * v[1] + 0.0722 * v[2];
+    const double factor = kHlgPeak / kWhite * std::pow(std::max(luminance, 0.0), kGamma - 1);
+    for (int c = 0; c < colors; ++c) v[c] = static_cast<float>(factor * v[c]);
+  }
 }
 
 enum Transfer { kGamma22 = 4, kGamma28 = 5, kLinearLight = 8, kPq = 16, kHlg = 18 };
@@ -140,6 +162,7 @@ float LightFromCicp(int transfer, float encoded) {
   if (transfer == kGamma28) return std::pow(std::max(encoded, 0.f), 2.8f);
   if (transfer == kLinearLight) return encoded;
   if (transfer == kPq) return LightFromPq(encoded);
+  if (transfer == kHlg) return SceneLightFromHlg(encoded);
   return static_cast<float>(LinearFromSrgb(encoded));
 }
 
@@ -161,7 +184,7 @@ const NamedPrimaries* FindPrimaries(int code) {
 
 bool HasOwnCurve(int transfer) {
   return transfer == kGamma22 || transfer == kGamma28 || transfer == kLinearLight ||
-         transfer == kPq;
+         transfer == kPq || transfer == kHlg;
 }
 
 }  // namespace
@@ -227,6 +250,7 @@ std::string LinearizeByCicp(int primaries, int transfer, Image* image) {
   const NamedPrimaries* named = FindPrimaries(primaries);
   if (named != nullptr && image->channels != 1)
     Apply(ToLinear(RgbProfile(named->chromaticities, 1), image->channels), image);
+  if (transfer == kHlg) ShowHlg(image);
   return CicpName(primaries, transfer);
 }
 

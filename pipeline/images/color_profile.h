@@ -22,8 +22,8 @@ namespace regrade {
 std::string LinearizeByProfile(std::string_view icc, Image* image, std::string* problem);
 
 // By code points of ITU-T H.273, as films and HEIF files have them. A camera's curve (BT.709
-// and its relatives) and HLG count as sRGB's, which is how screens without HDR show them; of PQ
-// 203 cd/m^2 are white (BT.2408).
+// and its relatives) counts as sRGB's, which is how screens show it. Of PQ and HLG 203 cd/m^2
+// are white (BT.2408), which is 75 % of HLG's signal, on its screen of 1000 cd/m^2.
 std::string LinearizeByCicp(int primaries, int transfer, Image* image);
 bool IsSrgbLike(int primaries, int transfer);
 std::string CicpName(int primaries, int transfer);

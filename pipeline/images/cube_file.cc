@@ -1,12 +1,11 @@
 #include "pipeline/images/cube_file.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <cstdio>
-#include <optional>
 
 #include "kernels/base/error.h"
+#include "kernels/base/number_text.h"
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/files/text.h"
 #include "pipeline/images/image_file.h"
@@ -81,9 +80,7 @@ class CubeParser {
   double Number(std::string_view word) const {
     if (word.empty()) Fail("ends before its last number");
     double value = 0;
-    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-    if (error != std::errc() || end != word.data() + word.size())
-      Fail("has '" + Shown(word) + "' in place of a number");
+    if (!ParseNumber(word, &value)) Fail("has '" + Shown(word) + "' in place of a number");
     if (!(std::abs(value) <= kLargestValue))
       Fail("has the number " + Shown(word) + ", beyond -100 to 100");
     return value;
@@ -91,8 +88,7 @@ class CubeParser {
   int Size(int most) {
     const std::string_view word = Word();
     int value = 0;
-    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-    if (error != std::errc() || end != word.data() + word.size() || value < 2 || value > most)
+    if (!ParseNumber(word, &value) || value < 2 || value > most)
       Fail(Concat("has the size '", Shown(word), "', not one from 2 to ", most));
     if (table_size_ > 0 || curve_size_ > 0)
       Fail("has a second size: one table or one set of curves can be read, not both");
@@ -160,6 +156,18 @@ class CubeParser {
 
 }  // namespace
 
+std::string SlopeText(const ColorLut& lut) {
+  const double slope = lut.Slope();
+  const std::string text =
+      Format("the LUT magnifies differences of colours at most %.2f times", slope);
+  if (slope <= kHarmlessSlope) return text + ", which is harmless";
+  return text + Format(
+                    ", more than %.0f: it magnifies noise and the steps of 8-bit photos as "
+                    "much, which show as grain and bands; smooth it in the program that made "
+                    "it, or lower --strength",
+                    kHarmlessSlope);
+}
+
 void RefuseOtherLooks(const std::string& path) {
   const std::string extension = LowerExtension(path);
   for (const char* other : {".xmp", ".dtstyle", ".lrtemplate", ".dcp", ".icc", ".3dl", ".look",
@@ -174,8 +182,7 @@ void RefuseOtherLooks(const std::string& path) {
 }
 
 ColorLut ParseCube(std::string_view text, const std::string& path) {
-  if (text.starts_with("\xef\xbb\xbf")) text.remove_prefix(3);
-  return CubeParser(text, path).Parse();
+  return CubeParser(WithoutByteOrderMark(text), path).Parse();
 }
 
 ColorLut ReadCubeFile(const std::string& path) {

@@ -21,6 +21,12 @@ struct ColorLut {
   double Slope() const { return table.size > 0 ? SteepestSlope(table) : SteepestSlope(curves); }
 };
 
+// A steeper LUT makes a step of an 8-bit photo a visible band: 8 of 255 steps, 3 % of the
+// range. Curves of photographers stay below.
+inline constexpr double kHarmlessSlope = 8;
+// How steep it is, in a sentence for the user, and what comes of that.
+std::string SlopeText(const ColorLut& lut);
+
 inline constexpr int kMostTableSize = 129, kMostCurveSize = 65536;
 
 // By its name alone: does it end with .cube, in any case?
@@ -33,7 +39,9 @@ void RefuseOtherLooks(const std::string& path);
 // DaVinci Resolve: TITLE, LUT_3D_SIZE (2 to kMostTableSize) or LUT_1D_SIZE (2 to
 // kMostCurveSize), DOMAIN_MIN, DOMAIN_MAX, comments with #, then one colour a line, red
 // fastest. Numbers are finite and between -100 and 100, each side of the domain is at least
-// 1e-3 long, the number of colours is that of the size. Throws Error(kInput) with the line.
+// 1e-3 long, the number of colours is that of the size. Spaces and tabs
+// separate them, a plus may stand before them, and lines end as on any system. Throws
+// Error(kInput) with the line.
 ColorLut ParseCube(std::string_view text, const std::string& path);
 ColorLut ReadCubeFile(const std::string& path);
 

@@ -1,5 +1,6 @@
 // Reads and writes picture files. Readers return a whole picture or throw the reason why there
-// is none; writers encode in memory and write atomically. JPEG, PNG and HEIC have decoders of
+// is none; all but ReadImage decode in a child process where decoder_process.h says so. Writers
+// encode in memory and write atomically. JPEG, PNG and HEIC have decoders of
 // our own over libjpeg, libpng and libheif, because OpenImageIO hides their warnings and
 // profiles.
 #pragma once
@@ -8,14 +9,9 @@
 #include <string>
 
 #include "kernels/scene/image.h"
+#include "pipeline/images/picture_decoder.h"
 
 namespace regrade {
-
-struct DecodeLimits {
-  int64_t max_pixels = 128'000'000;  // checked from the header, before pixels are allocated
-  int min_side = 64;                 // pixels
-  bool accept_damaged = false;       // JPEG with lost parts: accepted with a notice
-};
 
 struct DecodedPhoto {
   Image image;               // RGB, or RGB + straight alpha; sRGB in [0, 1], upright
@@ -37,8 +33,10 @@ struct DecodedPhoto {
 // camera's white balance and no automatic brightness.
 DecodedPhoto DecodePhoto(const std::string& path, const DecodeLimits& limits = {});
 
-// A picture of any size; 1, 3 or 4 channels as in the file.
+// A picture of any size; 1, 3 or 4 channels as in the file. ReadImage is for pictures that this
+// program wrote into its folders, and always decodes in this process.
 Image ReadImage(const std::string& path);
+Image ReadGivenImage(const std::string& path);
 
 // The style picture: RGB of any size. Transparency is laid over white; `notice` (may be null)
 // gets remarks for the user.

@@ -44,7 +44,8 @@ struct KeptPictures::Shared {
   std::map<std::string, Stored> pictures;
 };
 
-KeptPictures::KeptPictures(int64_t most_bytes) : shared_(std::make_shared<Shared>()) {
+KeptPictures::KeptPictures(Origin origin, int64_t most_bytes)
+    : origin_(origin), shared_(std::make_shared<Shared>()) {
   shared_->bytes_left = most_bytes;
 }
 
@@ -58,7 +59,7 @@ Image KeptPictures::Read(const std::string& path) const {
     }
     return picture;
   }
-  Image picture = ReadImage(path);
+  Image picture = origin_ == Origin::kOurs ? ReadImage(path) : ReadGivenImage(path);
   if (shared_->bytes_left <= 0) return picture;
   Stored stored;
   stored.bytes = BytesOf(picture.pixels);

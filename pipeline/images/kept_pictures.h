@@ -9,19 +9,21 @@
 
 namespace regrade {
 
-// ReadImage for files that do not change meanwhile. A picture whose values are all k / 255
-// takes a byte for each; the first ones are kept, up to a limit. For one thread at a time;
-// copies share what they keep.
+// ReadImage, or ReadGivenImage, for files that do not change meanwhile. A picture whose values
+// are all k / 255 takes a byte for each; the first ones are kept, up to a limit. For one thread
+// at a time; copies share what they keep.
 class KeptPictures {
  public:
-  explicit KeptPictures(int64_t most_bytes = int64_t{320} << 20);
+  enum class Origin { kOurs, kGiven };
+  explicit KeptPictures(Origin origin, int64_t most_bytes = int64_t{320} << 20);
 
-  // As ReadImage gives it, to the bit. Errors: those of ReadImage.
+  // As the reader gives it, to the bit. Errors: its.
   Image Read(const std::string& path) const;
 
  private:
   struct Stored;
   struct Shared;
+  Origin origin_;
   std::shared_ptr<Shared> shared_;
 };
 

@@ -117,6 +117,19 @@ void TakePixels(const std::vector<unsigned char>& bytes, int channels, float max
   }
 }
 
+// The body of the first chunk of that name; empty if there is none. A chunk is the size of its
+// body, big-endian, the name, the body and a checksum.
+std::string_view ChunkOf(std::string_view bytes, std::string_view name) {
+  constexpr size_t kSignature = 8, kAround = 12;
+  for (size_t at = kSignature; at + kAround <= bytes.size();) {
+    size_t size = 0;
+    for (size_t i = 0; i < 4; ++i) size = size << 8 | static_cast<unsigned char>(bytes[at + i]);
+    if (bytes.substr(at + 4, 4) == name) return bytes.substr(at + 8, size);
+    at += kAround + size;
+  }
+  return {};
+}
+
 }  // namespace
 
 PngPicture DecodePng(std::string_view bytes, const std::string& where,
@@ -129,8 +142,16 @@ PngPicture DecodePng(std::string_view bytes, const std::string& where,
   PngPicture picture;
   std::string_view exif, icc;
   if (!png.ReadHeader() || !png.ReadColours(&picture.linear_light, &exif, &icc)) refuse();
-  picture.exif = exif;
+  // libpng passes over EXIF that follows the pixels.
+  picture.exif = exif.empty() ? ChunkOf(bytes, "eXIf") : exif;
   picture.icc = icc;
+  // libpng 1.6.39 does not know code points, which come before all other marks of colours.
+  if (const std::string_view cicp = ChunkOf(bytes, "cICP"); cicp.size() == 4) {
+    picture.primaries = static_cast<unsigned char>(cicp[0]);
+    picture.transfer = static_cast<unsigned char>(cicp[1]);
+    picture.icc.clear();
+    picture.linear_light = false;
+  }
   picture.bits = png.bits();
   const int channels = png.channels();
   check(png.width(), png.height(), channels * picture.bits / 8);

@@ -148,7 +148,7 @@ void AddFilm(RunContext* context, const FidelityTargets& networks, const Camera&
   ConsistencyOptions options = settings.consistency;
   options.excerpt = SamplesOfFilm(settings.render.film_seconds, settings.render.fps).excerpt;
   const bool renders_styled = std::filesystem::exists(folder("views_2d"));
-  const KeptPictures kept;
+  const KeptPictures kept(KeptPictures::Origin::kOurs);
   std::vector<NamedFrameSource> sequences;
   for (const char* name : {"source", "views_2d", "styled"}) {
     if (name == std::string("views_2d") && !renders_styled) continue;
@@ -185,7 +185,7 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   std::vector<int> all(views.count());
   for (size_t i = 0; i < all.size(); ++i) all[i] = static_cast<int>(i);
   const std::vector<int> training_views = StyledViews(workspace, views);
-  const KeptPictures kept;
+  const KeptPictures kept(KeptPictures::Origin::kOurs);
   const auto frames = [&](const char* sequence, const std::vector<int>& views) {
     return FramesOf(kept, workspace.Path(std::string("frames/") + sequence), views);
   };

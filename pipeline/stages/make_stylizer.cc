@@ -80,9 +80,7 @@ std::unique_ptr<ViewStylizer> MakeMethod(RunContext* context, const Capture& cap
   const StyleMethod method = MethodWithFiles(settings.style_2d);
   if (IsCubeFile(path)) {
     const ColorLut lut = ReadCubeFile(path);
-    const std::string notice =
-        Format("the LUT magnifies differences of colours at most %.2f times", lut.Slope());
-    return MakeMapStylizer(lut, "lut", {notice});
+    return MakeMapStylizer(lut, "lut", {SlopeText(lut)});
   }
   switch (method.kind) {
     case StyleMethodKind::kOnnx:

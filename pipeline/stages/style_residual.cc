@@ -29,7 +29,7 @@ constexpr int kTurnsAgain = 4;  // of these fits but the first: they begin where
 constexpr double kNothing = 0.5 / 255;
 
 Image ReadLayer(const std::string& path, int width, int height) {
-  Image layer = Colors(ReadImage(path));
+  Image layer = Colors(ReadGivenImage(path));
   for (float& v : layer.pixels) v = 2 * v - 1;
   return layer.width == width && layer.height == height ? layer : Resize(layer, width, height);
 }

@@ -25,6 +25,8 @@ struct ClipSpec {
   const char* encoder = "libx264";  // or "libx265"
   const char* container = "mp4";    // or "mov", "matroska"
   int turn = 0;                     // degrees clockwise that a player turns the frames
+  bool mirrored = false;            // it then shows them with left and right exchanged
+  bool interlaced = false;          // marks the frames as two moments, even rows first
   std::vector<int64_t> times = {};  // of the frames, in 1/600 s; empty: 25 a second
   AVColorPrimaries primaries = AVCOL_PRI_BT709;
   AVColorTransferCharacteristic transfer = AVCOL_TRC_BT709;
@@ -60,6 +62,7 @@ inline bool WriteClip(const std::string& path, const std::vector<Image>& frames,
   encoder->sample_aspect_ratio = spec.aspect;
   encoder->gop_size = 12;
   encoder->thread_count = 1;
+  if (spec.interlaced) encoder->flags |= AV_CODEC_FLAG_INTERLACED_DCT;
   if ((output->oformat->flags & AVFMT_GLOBALHEADER) != 0)
     encoder->flags |= AV_CODEC_FLAG_GLOBAL_HEADER;
   av_opt_set(encoder->priv_data, "crf", "4", 0);
@@ -70,7 +73,7 @@ inline bool WriteClip(const std::string& path, const std::vector<Image>& frames,
   avcodec_parameters_from_context(stream->codecpar, encoder.get());
   stream->time_base = encoder->time_base;
   stream->sample_aspect_ratio = spec.aspect;
-  if (spec.turn != 0) {
+  if (spec.turn != 0 || spec.mirrored) {
     constexpr size_t kBytes = 9 * sizeof(int32_t);
 #if LIBAVFORMAT_VERSION_INT >= AV_VERSION_INT(60, 15, 100)
     AVCodecParameters& codecpar = *stream->codecpar;
@@ -82,6 +85,7 @@ inline bool WriteClip(const std::string& path, const std::vector<Image>& frames,
     uint8_t* const data = av_stream_new_side_data(stream, AV_PKT_DATA_DISPLAYMATRIX, kBytes);
 #endif
     av_display_rotation_set(reinterpret_cast<int32_t*>(data), spec.turn);
+    av_display_matrix_flip(reinterpret_cast<int32_t*>(data), spec.mirrored, 0);
   }
   EXPECT_GE(avio_open(&opened->pb, Url(path).c_str(), AVIO_FLAG_WRITE), 0);
   EXPECT_GE(avformat_write_header(opened, nullptr), 0);
@@ -112,6 +116,12 @@ inline bool WriteClip(const std::string& path, const std::vector<Image>& frames,
     const int stride[] = {6 * w};
     sws_scale(scaler.get(), rows, stride, 0, h, frame->data, frame->linesize);
     frame->pts = spec.times.empty() ? static_cast<int64_t>(i) * kTicks : spec.times[i];
+#if LIBAVUTIL_VERSION_INT >= AV_VERSION_INT(58, 7, 100)
+    if (spec.interlaced)
+      frame->flags |= AV_FRAME_FLAG_INTERLACED | AV_FRAME_FLAG_TOP_FIELD_FIRST;
+#else
+    frame->interlaced_frame = frame->top_field_first = spec.interlaced ? 1 : 0;
+#endif
     EXPECT_GE(avcodec_send_frame(encoder.get(), frame.get()), 0);
     drain();
   }

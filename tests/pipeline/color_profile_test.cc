@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "pipeline/capture/ingest_photos.h"
 #include "tests/pipeline/color_files.h"
@@ -229,10 +230,25 @@ TEST_F(ColorProfile, F91_AHeicOfAPhoneKeepsItsColours) {
   EXPECT_NE(testing::Refusal(Put("half.heic", bytes.substr(0, bytes.size() / 2))), "");
 }
 
+// Code points come before a gamma, as in browsers. PQ of 58 % is white.
+TEST_F(ColorProfile, CodePointsOfPngAreApplied) {
+  Image image = Photo(64, 64, 2);
+  for (float& v : image.pixels) v = 0.58069f;
+  const std::string png = EncodePng16(image);
+  const std::string gamma("gAMA\0\1\x86\xa0", 8), pq("cICP\x09\x10\0\1", 8),
+      srgb("cICP\x01\x0d\0\1", 8);
+  const DecodedPhoto photo =
+      DecodePhoto(Put("a.png", testing::WithChunk(testing::WithChunk(png, gamma), pq)));
+  EXPECT_EQ(photo.colors, "BT.2020, PQ");
+  EXPECT_NEAR(photo.image.pixels[0], 1, 1e-3);
+  EXPECT_EQ(DecodePhoto(Put("b.png", testing::WithChunk(png, srgb))).image.pixels,
+            DecodePhoto(Put("c.png", png)).image.pixels);
+}
+
 TEST(Cicp, CodePointsOfSrgbChangeNothing) {
   Image image = Photo(16, 16, 1);
   const std::vector<float> before = image.pixels;
-  for (const int transfer : {0, 1, 2, 6, 13, 14, 15, 18})
+  for (const int transfer : {0, 1, 2, 6, 13, 14, 15})
     EXPECT_EQ(LinearizeByCicp(transfer % 3, transfer, &image), "");
   EXPECT_EQ(image.pixels, before);
   EXPECT_EQ(CicpName(9, 16), "BT.2020, PQ");
@@ -242,6 +258,30 @@ TEST(Cicp, CodePointsOfSrgbChangeNothing) {
   EXPECT_EQ(LinearizeByCicp(1, 16, &white), "sRGB's primaries, PQ");
   EXPECT_NEAR(white.pixels[0], 1, 1e-3);
   EXPECT_NEAR(white.pixels[2], 10000 / 203.0, 1e-2);
+}
+
+// BT.2100 and BT.2408: of a screen of 1000 cd/m^2, 75 % of HLG's signal is white of 203, 38 %
+// is 18 % of that, 100 % the screen's peak. PQ's signals for the same light give the same.
+TEST(Cicp, WhiteOfHlgIsThatOfPq) {
+  for (const int primaries : {1, 9}) {
+    for (const auto& [hlg, pq] :
+         {std::pair{0.75f, 0.58069f}, {0.38f, 0.38085f}, {1.f, 0.7518f}}) {
+      Image of_hlg(1, 1, 3), of_pq(1, 1, 3), grey(1, 1, 1);
+      std::ranges::fill(of_hlg.pixels, hlg);
+      std::ranges::fill(grey.pixels, hlg);
+      std::ranges::fill(of_pq.pixels, pq);
+      EXPECT_NE(LinearizeByCicp(primaries, 18, &of_hlg), "");
+      LinearizeByCicp(primaries, 16, &of_pq);
+      LinearizeByCicp(primaries, 18, &grey);
+      for (int c = 0; c < 3; ++c)  // the standards round the signals to a few digits
+        EXPECT_NEAR(of_hlg.pixels[c] / of_pq.pixels[c], 1, 0.02) << hlg;
+      EXPECT_NEAR(grey.pixels[0], of_hlg.pixels[0], 1e-3);
+      if (hlg == 0.75f) {
+        EXPECT_NEAR(of_hlg.pixels[0], 1, 2e-3);
+      }
+    }
+  }
+  EXPECT_EQ(CicpName(9, 18), "BT.2020, HLG");
 }
 
 }  // namespace

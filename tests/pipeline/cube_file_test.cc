@@ -49,6 +49,27 @@ TEST(CubeFile, CurvesCommentsTitlesAndLineEnds) {
   EXPECT_NEAR(lut.Slope(), 1.5, 1e-12);
 }
 
+TEST(CubeFile, NumbersAreThoseOfAnyProgram) {
+  const ColorLut lut = Parse(
+      "\xef\xbb\xbfLUT_1D_SIZE\t+2\t\r\nDOMAIN_MIN +0 -0 0.\r\n"
+      "+0.5\t.25 +2.5E-01 \t\r\n+1.0e+00 1. 1E0\t\r\n");
+  ASSERT_EQ(lut.curves.values.size(), 2u);
+  EXPECT_EQ(lut({0, 0, 0}), (Vec3d{0.5, 0.25, 0.25}));
+  EXPECT_EQ(lut({1, 1, 1}), (Vec3d{1, 1, 1}));
+  for (const char* word : {"++1", "+-1", "-+1", "+", "0x1", "1,5", "1e", "inf"})
+    EXPECT_REGRADE_ERROR(Parse(std::string("LUT_1D_SIZE 2\n0 0 0\n1 ") + word + " 1\n"),
+                         ExitCode::kInput, "line 3");
+}
+
+TEST(CubeFile, HowSteepALutIsIsSaid) {
+  const auto ramp = [](double slope) {
+    return Parse("LUT_1D_SIZE 2\n0 0 0\n" + Format("%g 1 1\n", slope));
+  };
+  EXPECT_NE(SlopeText(ramp(kHarmlessSlope)).find("8.00 times, which is harmless"),
+            std::string::npos);
+  EXPECT_NE(SlopeText(ramp(61.7)).find("61.70 times, more than 8"), std::string::npos);
+}
+
 TEST(CubeFile, F94_DamagedFilesAreRefusedWithTheirLine) {
   const struct {
     const char* text;

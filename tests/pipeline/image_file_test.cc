@@ -7,6 +7,9 @@
 #include <sys/resource.h>
 
 #include <limits>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "tests/pipeline/libjpeg_file.h"
 #include "tests/pipeline/picture_corpus.h"
@@ -22,6 +25,9 @@ using testing::MaxDifference;
 using testing::Photo;
 using testing::ReadBytes;
 using testing::Refusal;
+using testing::WebpOf;
+using testing::WithChunk;
+using testing::WithLateChunk;
 using testing::WithSegment;
 
 class ImageFile : public testing::PictureTest {};
@@ -141,13 +147,28 @@ TEST_F(ImageFile, JpegLooksLikeThePhoto) {
 
 // --- kinds of photos
 
+// The lossy chunk of a WebP file.
+std::string WebpPixels(const Image& image) {
+  const testing::ScratchFolder folder;
+  const std::string path = folder / "a.webp";
+  OIIO::ImageSpec spec(image.width, image.height, 3, OIIO::TypeDesc::UINT8);
+  const auto output = OIIO::ImageOutput::create("webp");
+  EXPECT_TRUE(output->open(path, spec) &&
+              output->write_image(OIIO::TypeDesc::FLOAT, image.pixels.data()) &&
+              output->close());
+  const std::string file = ReadBytes(path);
+  EXPECT_EQ(file.substr(8, 8), "WEBPVP8 ");
+  return file.substr(20);
+}
+
 TEST_F(ImageFile, H141_EveryExifOrientationComesUpright) {
   // Stored 96 x 64 with a bright top left eighth; its upright position by the EXIF standard.
   Image stored(96, 64, 3);
   for (int y = 0; y < 16; ++y)
     for (int x = 0; x < 32; ++x)
       for (int c = 0; c < 3; ++c) stored.at(x, y)[c] = 1.f;
-  const std::string jpeg = EncodeJpeg(stored, 95);
+  const std::string jpeg = EncodeJpeg(stored, 95), png = EncodePng8(stored);
+  const std::string pixels = WebpPixels(stored);
   struct Seen {
     bool turned, right, bottom;
   };
@@ -155,24 +176,39 @@ TEST_F(ImageFile, H141_EveryExifOrientationComesUpright) {
                            {false, false, true},  {true, false, false}, {true, true, false},
                            {true, true, true},    {true, false, true}};
   for (int o = 1; o <= 8; ++o) {
-    const Image seen =
-        DecodePhoto(Put("o.jpg", WithSegment(jpeg, 0xe1, ExifBlock(o, 0)))).image;
-    const Seen& e = expected[o - 1];
-    EXPECT_EQ(seen.width, e.turned ? 64 : 96) << o;
-    ASSERT_EQ(seen.height, e.turned ? 96 : 64) << o;
-    const int x = e.right ? seen.width - 3 : 2, y = e.bottom ? seen.height - 3 : 2;
-    EXPECT_GT(*seen.at(x, y), 0.9f) << o;
-    EXPECT_LT(*seen.at(seen.width - 1 - x, seen.height - 1 - y), 0.1f) << o;
-    // The longer side of the mark lies along the stored rows.
-    EXPECT_GT(*seen.at(e.turned  ? x
-                       : e.right ? seen.width - 28
-                                 : 27,
-                       e.turned ? (e.bottom ? seen.height - 28 : 27) : y),
-              0.9f)
-        << o;
+    const std::string exif = ExifBlock(o, 0), tiff = exif.substr(6);
+    const std::vector<std::pair<std::string, std::string>> files = {
+        {"o.jpg", WithSegment(jpeg, 0xe1, exif)},
+        {"o.png", WithChunk(png, "eXIf" + tiff)},
+        {"late.png", WithLateChunk(png, "eXIf" + tiff)},
+        {"o.webp", WebpOf(96, 64, {{"VP8 ", pixels}, {"EXIF", tiff}})},
+        {"named.webp", WebpOf(96, 64, {{"VP8 ", pixels}, {"EXIF", exif}})}};
+    for (const auto& [name, bytes] : files) {
+      const Image seen = DecodePhoto(Put(name, bytes)).image;
+      const Seen& e = expected[o - 1];
+      EXPECT_EQ(seen.width, e.turned ? 64 : 96) << name << o;
+      ASSERT_EQ(seen.height, e.turned ? 96 : 64) << name << o;
+      const int x = e.right ? seen.width - 3 : 2, y = e.bottom ? seen.height - 3 : 2;
+      EXPECT_GT(*seen.at(x, y), 0.9f) << name << o;
+      EXPECT_LT(*seen.at(seen.width - 1 - x, seen.height - 1 - y), 0.1f) << name << o;
+      // The longer side of the mark lies along the stored rows.
+      EXPECT_GT(*seen.at(e.turned  ? x
+                         : e.right ? seen.width - 28
+                                   : 27,
+                         e.turned ? (e.bottom ? seen.height - 28 : 27) : y),
+                0.9f)
+          << name << o;
+    }
   }
   EXPECT_EQ(DecodePhoto(Put("o.jpg", WithSegment(jpeg, 0xe1, ExifBlock(77, 0)))).image.width,
             96);
+}
+
+// A header of a few bytes; the decoder would allocate its canvas before anything else.
+TEST_F(ImageFile, AHugeCanvasOfWebpIsRefusedBeforeItIsAllocated) {
+  const std::string path = Put("a.webp", WebpOf(65535, 65535, {{"VP8 ", "x"}}));
+  EXPECT_TRUE(Contains(Refusal(path), "65535 x 65535 pixels, more than the limit"));
+  EXPECT_TRUE(Contains(Refusal(path, {.max_pixels = int64_t{1} << 40}), "the header claims"));
 }
 
 TEST_F(ImageFile, FocalLengthFromExif) {

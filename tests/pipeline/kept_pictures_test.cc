@@ -23,7 +23,7 @@ TEST(KeptPictures, AreThoseOfTheFiles) {
   WriteText(folder / "levels.png", EncodePng8(levels));
   WriteText(folder / "fine.png", EncodePng16(fine));
   WriteText(folder / "clear.png", EncodePng8(clear));
-  const KeptPictures kept;
+  const KeptPictures kept(KeptPictures::Origin::kGiven);
   for (const char* name : {"levels.png", "fine.png", "clear.png"}) {
     const Image expected = ReadImage(folder / name);
     for (int time = 0; time < 2; ++time) {
@@ -43,7 +43,7 @@ TEST(KeptPictures, BeyondTheLimitFilesAreReadAgain) {
   const TemporaryFolder folder;
   WriteText(folder / "a.png", EncodePng8(testing::NoiseImage(20, 10, 1)));
   WriteText(folder / "b.png", EncodePng8(testing::NoiseImage(20, 10, 2)));
-  const KeptPictures kept(20 * 10 * 3 + 100);  // one of them
+  const KeptPictures kept(KeptPictures::Origin::kOurs, 20 * 10 * 3 + 100);  // one of them
   const Image a = kept.Read(folder / "a.png"), b = kept.Read(folder / "b.png");
   std::filesystem::remove(folder / "a.png");
   std::filesystem::remove(folder / "b.png");

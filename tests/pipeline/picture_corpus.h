@@ -11,6 +11,8 @@
 #include <iterator>
 #include <map>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "kernels/base/error.h"
 #include "kernels/base/random.h"
@@ -100,6 +102,39 @@ inline std::string WithSegment(const std::string& jpeg, int marker, const std::s
   segment += static_cast<char>((body.size() + 2) >> 8);
   segment += static_cast<char>((body.size() + 2) & 255);
   return jpeg.substr(0, 2) + segment + body + jpeg.substr(2);
+}
+
+// A chunk of PNG: `body` begins with its name.
+inline std::string PngChunk(const std::string& body) {
+  uint32_t crc = ~0u;
+  for (const char c : body) {
+    crc ^= static_cast<unsigned char>(c);
+    for (int bit = 0; bit < 8; ++bit) crc = (crc >> 1) ^ (crc & 1 ? 0xedb88320u : 0u);
+  }
+  const auto big = [](uint32_t v) {
+    std::string text;
+    for (int shift = 24; shift >= 0; shift -= 8) text += static_cast<char>(v >> shift);
+    return text;
+  };
+  return big(static_cast<uint32_t>(body.size()) - 4) + body + big(~crc);
+}
+
+// A PNG with the chunk inserted before the pixels, or after them.
+inline std::string WithChunk(const std::string& png, const std::string& body) {
+  return std::string(png).insert(8 + 12 + 13, PngChunk(body));
+}
+inline std::string WithLateChunk(const std::string& png, const std::string& body) {
+  return std::string(png).insert(png.size() - 12, PngChunk(body));
+}
+
+// A WebP of chunks: names of four letters and bodies. The canvas is given to the chunk VP8X.
+inline std::string WebpOf(int width, int height,
+                          const std::vector<std::pair<std::string, std::string>>& chunks) {
+  std::string body = "WEBPVP8X" + Little(10, 4) + Little(0x28, 4) + Little(width - 1, 3) +
+                     Little(height - 1, 3);
+  for (const auto& [name, bytes] : chunks)
+    body += name + Little(bytes.size(), 4) + bytes + std::string(bytes.size() % 2, '\0');
+  return "RIFF" + Little(body.size(), 4) + body;
 }
 
 // A plain TIFF of floats, `channels` samples a pixel.

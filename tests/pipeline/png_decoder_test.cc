@@ -15,6 +15,7 @@ namespace {
 
 using testing::Contains;
 using testing::Refusal;
+using testing::WithChunk;
 
 struct Kind {
   int color, bits;
@@ -116,23 +117,6 @@ TEST_F(PngDecoder, EveryKindIsReadAsOpenImageIoReadsIt) {
           ++kinds;
         }
   EXPECT_EQ(kinds, 44);
-}
-
-// A chunk with a right checksum, put before the pixels.
-std::string WithChunk(const std::string& png, const std::string& body) {
-  uint32_t crc = ~0u;
-  for (const char c : body) {
-    crc ^= static_cast<unsigned char>(c);
-    for (int bit = 0; bit < 8; ++bit) crc = (crc >> 1) ^ (crc & 1 ? 0xedb88320u : 0u);
-  }
-  const auto big = [](uint32_t v) {
-    std::string text;
-    for (int shift = 24; shift >= 0; shift -= 8) text += static_cast<char>(v >> shift);
-    return text;
-  };
-  constexpr size_t kHeader = 8 + 12 + 13;
-  return png.substr(0, kHeader) + big(static_cast<uint32_t>(body.size()) - 4) + body +
-         big(~crc) + png.substr(kHeader);
 }
 
 // Warnings of libpng become notices of the photo and are not printed.

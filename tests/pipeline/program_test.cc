@@ -269,6 +269,24 @@ TEST(Program, F22_ConfigErrorsNameTheLine) {
   EXPECT_SAYS(outcome, "c.json:2:");
 }
 
+// A style is read by the child that decodes, also before any work.
+TEST(Program, AStyleThatCannotBeUsedOrIsSteepIsSaidBeforeAnyWork) {
+  const TemporaryFolder folder;
+  WriteText(folder / "photos/a.png", "x");
+  const auto plan = [&](const std::string& style) {
+    return Regrade({"run", folder / "photos", "--style", folder / style, "--out",
+                    folder / "out", "--dry-run"});
+  };
+  WriteText(folder / "steep.cube", "LUT_1D_SIZE 2\n+0 0 0\n+61.7 1 1\n");
+  const Outcome steep = plan("steep.cube");
+  EXPECT_EQ(steep.code, 0) << steep.text;
+  EXPECT_SAYS(steep, "61.70 times");
+  WriteText(folder / "half.png", "\x89PNG\r\n\x1a\n");
+  const Outcome half = plan("half.png");
+  EXPECT_EQ(half.code, 3) << half.text;
+  EXPECT_SAYS(half, folder / "half.png");
+}
+
 TEST(Program, DryRunTouchesNothing) {
   const TemporaryFolder folder;
   WriteText(folder / "photos/a.png", "x");

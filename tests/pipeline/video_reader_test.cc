@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "tests/pipeline/clip_file.h"
@@ -95,26 +96,64 @@ TEST_F(VideoReaderTest, F90_VariableFrameRatesKeepTheirTimes) {
   EXPECT_FALSE(reader.Next());
 }
 
+// All eight display matrices: turned clockwise, then mirrored.
 TEST_F(VideoReaderTest, F90_PhonesFilmsComeUpright) {
-  for (const int turn : {0, 90, 180, 270}) {
-    WriteClip(scratch_ / "a.mp4", FilmFrames(3), {.turn = turn});
+  constexpr int kOrientations[2][4] = {{1, 6, 3, 8}, {2, 5, 4, 7}};  // of EXIF
+  for (const bool mirrored : {false, true})
+    for (const int turn : {0, 90, 180, 270}) {
+      WriteClip(scratch_ / "a.mp4", FilmFrames(3), {.turn = turn, .mirrored = mirrored});
+      VideoReader reader(scratch_ / "a.mp4");
+      ASSERT_TRUE(reader.Next());
+      const Image picture = reader.Picture(), grey = reader.Grey(80);
+      const bool turned = turn % 180 != 0;
+      EXPECT_EQ(reader.info().orientation, kOrientations[mirrored][turn / 90]);
+      EXPECT_EQ(reader.info().width, turned ? 96 : 160);
+      EXPECT_EQ(picture.width, turned ? 96 : 160);
+      EXPECT_EQ(picture.height, turned ? 160 : 96);
+      EXPECT_EQ(grey.width, turned ? 48 : 80);
+      // The square was in the top left corner; clockwise it goes right, down, left.
+      const bool right = (turn == 90 || turn == 180) != mirrored;
+      const bool bottom = turn == 180 || turn == 270;
+      for (const Image* image : {&picture, &grey}) {
+        const int x = right ? image->width - 5 : 4, y = bottom ? image->height - 5 : 4;
+        EXPECT_GT(*image->at(x, y), 0.85f) << turn << mirrored;
+        EXPECT_LT(*image->at(image->width - 1 - x, y), 0.8f) << turn << mirrored;
+        EXPECT_LT(*image->at(x, image->height - 1 - y), 0.8f) << turn << mirrored;
+      }
+      // Red grows along a stored row, which the corners do not tell from a column.
+      const auto red = [&](double across, double down) {
+        return *picture.at(static_cast<int>(across * (picture.width - 1)),
+                           static_cast<int>(down * (picture.height - 1)));
+      };
+      const double along =
+          turned ? red(0.5, 0.7) - red(0.5, 0.3) : red(0.7, 0.5) - red(0.3, 0.5);
+      EXPECT_GT(std::abs(along), 0.08) << turn << mirrored;
+    }
+}
+
+// Even rows of the first moment, odd rows of a later one.
+TEST_F(VideoReaderTest, OneMomentOfInterlacedFramesIsKept) {
+  Image combed(160, 96, 3);
+  for (int y = 0; y < combed.height; ++y)
+    for (int x = 0; x < combed.width; ++x)
+      std::fill_n(combed.at(x, y), 3,
+                  y % 2 == 1 ? 0.2f : 0.3f + 0.4f * static_cast<float>(y) / 95);
+  for (const bool interlaced : {true, false}) {
+    if (!WriteClip(scratch_ / "a.mp4", {combed, combed, combed}, {.interlaced = interlaced}))
+      GTEST_SKIP() << "no H.264 encoder";
     VideoReader reader(scratch_ / "a.mp4");
     ASSERT_TRUE(reader.Next());
-    const Image picture = reader.Picture(), grey = reader.Grey(80);
-    const bool turned = turn % 180 != 0;
-    EXPECT_EQ(reader.info().turn, turn);
-    EXPECT_EQ(reader.info().width, turned ? 96 : 160);
-    EXPECT_EQ(picture.width, turned ? 96 : 160);
-    EXPECT_EQ(picture.height, turned ? 160 : 96);
-    EXPECT_EQ(grey.width, turned ? 48 : 80);
-    // The square was in the top left corner; clockwise it goes right, down, left.
-    const bool right = turn == 90 || turn == 180, bottom = turn == 180 || turn == 270;
-    for (const Image* image : {&picture, &grey}) {
-      const int x = right ? image->width - 5 : 4, y = bottom ? image->height - 5 : 4;
-      EXPECT_GT(*image->at(x, y), 0.85f) << turn;
-      EXPECT_LT(*image->at(image->width - 1 - x, y), 0.8f) << turn;
-      EXPECT_LT(*image->at(x, image->height - 1 - y), 0.8f) << turn;
+    const Image picture = reader.Picture();
+    double worst = 0;  // of all rows against the first moment's brightness there
+    for (int y = 0; y < picture.height - 1; ++y)
+      worst = std::max(worst, std::abs(*picture.at(80, y) - (0.3 + 0.4 * y / 95)));
+    if (interlaced)
+      EXPECT_LT(worst, 0.03);  // the codec's noise; the other moment is 0.1 to 0.5 darker
+    else
+      EXPECT_GT(worst, 0.4);
+    while (reader.Next()) {
     }
+    EXPECT_EQ(reader.interlaced(), interlaced ? 3 : 0);
   }
 }
 
@@ -136,9 +175,10 @@ TEST_F(VideoReaderTest, WideGamutsBecomeSrgb) {
                       .pixels = AV_PIX_FMT_YUV420P10};
   Image frame(128, 64, 3);
   for (int64_t i = 0; i < frame.num_pixels(); ++i) {
-    // Linear sRGB (0.5, 0.2, 0.1) by the matrix of BT.2087: (0.3899, 0.2184, 0.1138).
-    frame.pixels[3 * i] = 0.6583f, frame.pixels[3 * i + 1] = 0.5047f;
-    frame.pixels[3 * i + 2] = 0.3720f;
+    // Linear sRGB (0.5, 0.2, 0.1) by the matrix of BT.2087: (0.3899, 0.2184, 0.1138), which is
+    // times 203 cd/m^2, over HLG's peak of 1000 and the power 0.2 of the scene's luminance.
+    frame.pixels[3 * i] = 0.6025f, frame.pixels[3 * i + 1] = 0.4664f;
+    frame.pixels[3 * i + 2] = 0.3367f;
   }
   if (!WriteClip(scratch_ / "a.mp4", {frame, frame}, wide)) GTEST_SKIP() << "no HEVC encoder";
   VideoReader reader(scratch_ / "a.mp4");
