@@ -7,9 +7,11 @@
 #include <cmath>
 #include <filesystem>
 #include <functional>
+#include <limits>
 
 #include "evaluate/flow_file.h"
 #include "evaluate/optical_flow.h"
+#include "evaluate/paired_difference.h"
 #include "kernels/base/error.h"
 #include "tests/evaluate/synthetic_frames.h"
 #include "tests/support/record_error.h"
@@ -367,6 +369,55 @@ TEST(Consistency, EachFrameIsFetchedOnceForEachSequence) {
                            }};
   EvaluateConsistency(9, Still(), {{"s", frames}}, Gaps({1, 5}));
   for (const int count : fetched) EXPECT_EQ(count, 1);
+}
+
+// A mask that hides the pixels of the largest error raises the metric: by how much is a number
+// of its own, over all pixels whose flow stays in the frame.
+TEST(Consistency, WithAndWithoutTheMask) {
+  Image first(4, 1, 3), second(4, 1, 3);
+  for (int x = 0; x < 4; ++x)
+    for (int c = 0; c < 3; ++c) second.at(x, 0)[c] = x == 3 ? 0.9f : x == 0 ? 0.3f : 0.1f;
+  PairMotion motion{FlowField(4, 1), {}};
+  motion.mask.weight = Image(4, 1, 1);
+  for (const int x : {1, 2}) *motion.mask.weight.at(x, 0) = 1;
+  motion.flow.at(3, 0)[0] = 9;  // leaves the frame
+  const PairResult pair = ComparePair(first, second, motion);
+  EXPECT_NEAR(*pair.psnr_db, 20, 1e-5);
+  const double mean = (0.3 * 0.3 + 2 * 0.1 * 0.1) / 3;
+  EXPECT_NEAR(*pair.unmasked_psnr_db, -10 * std::log10(mean), 1e-5);
+  EXPECT_NEAR(pair.coverage, 0.5, 1e-12);
+}
+
+// Both sequences find the same pairs difficult: the difference of each pair is the same.
+TEST(Consistency, DifferencesArePairedByFrames) {
+  ConsistencyReport report;
+  const double hard[] = {30, 20, 35, 22, 31, 24, 33, 21};
+  for (int i = 0; i < 8; ++i) {
+    PairResult pair;
+    pair.from = i;
+    pair.to = i + 1;
+    pair.sequence = "styled";
+    pair.psnr_db = hard[i];
+    report.pairs.push_back(pair);
+    pair.sequence = "styled_2";
+    pair.psnr_db = hard[i] - 1.5;
+    if (i == 3) pair.psnr_db = std::numeric_limits<double>::infinity();
+    if (i == 5) pair.psnr_db.reset();
+    report.pairs.push_back(pair);
+  }
+  for (const char* name : {"styled", "styled_2"}) {
+    ConsistencyRow row;
+    row.sequence = name;
+    row.gap = 1;
+    report.rows.push_back(row);
+  }
+  AddDifferences("styled", &report);
+  EXPECT_FALSE(report.rows[0].difference);
+  const PairedDifference& difference = report.rows[1].difference.value();
+  EXPECT_EQ(difference.pairs, 6);
+  EXPECT_NEAR(*difference.mean, -1.5, 1e-12);
+  EXPECT_NEAR(difference.interval->low, -1.5, 1e-12);
+  EXPECT_NEAR(difference.interval->high, -1.5, 1e-12);
 }
 
 }  // namespace
