@@ -75,7 +75,7 @@ std::string MeasurementsHtml(const Stage& stage) {
     if (stage.models_found > 1)
       row.Add(std::to_string(stage.models_found) + " separate models found");
   if constexpr (std::is_same_v<Stage, RenderReport>)
-    if (stage.film_frames > 0)
+    if (stage.film.width > 0)
       row.Add("film <b>" + std::to_string(stage.film.width) + " × " +
               std::to_string(stage.film.height) + "&nbsp;px</b>");
   if constexpr (std::is_same_v<Stage, RenderReport>)

@@ -11,7 +11,6 @@
 
 #include "evaluate/flow_file.h"
 #include "evaluate/optical_flow.h"
-#include "evaluate/paired_difference.h"
 #include "kernels/base/error.h"
 #include "tests/evaluate/synthetic_frames.h"
 #include "tests/support/record_error.h"
@@ -386,38 +385,6 @@ TEST(Consistency, WithAndWithoutTheMask) {
   const double mean = (0.3 * 0.3 + 2 * 0.1 * 0.1) / 3;
   EXPECT_NEAR(*pair.unmasked_psnr_db, -10 * std::log10(mean), 1e-5);
   EXPECT_NEAR(pair.coverage, 0.5, 1e-12);
-}
-
-// Both sequences find the same pairs difficult: the difference of each pair is the same.
-TEST(Consistency, DifferencesArePairedByFrames) {
-  ConsistencyReport report;
-  const double hard[] = {30, 20, 35, 22, 31, 24, 33, 21};
-  for (int i = 0; i < 8; ++i) {
-    PairResult pair;
-    pair.from = i;
-    pair.to = i + 1;
-    pair.sequence = "styled";
-    pair.psnr_db = hard[i];
-    report.pairs.push_back(pair);
-    pair.sequence = "styled_2";
-    pair.psnr_db = hard[i] - 1.5;
-    if (i == 3) pair.psnr_db = std::numeric_limits<double>::infinity();
-    if (i == 5) pair.psnr_db.reset();
-    report.pairs.push_back(pair);
-  }
-  for (const char* name : {"styled", "styled_2"}) {
-    ConsistencyRow row;
-    row.sequence = name;
-    row.gap = 1;
-    report.rows.push_back(row);
-  }
-  AddDifferences("styled", &report);
-  EXPECT_FALSE(report.rows[0].difference);
-  const PairedDifference& difference = report.rows[1].difference.value();
-  EXPECT_EQ(difference.pairs, 6);
-  EXPECT_NEAR(*difference.mean, -1.5, 1e-12);
-  EXPECT_NEAR(difference.interval->low, -1.5, 1e-12);
-  EXPECT_NEAR(difference.interval->high, -1.5, 1e-12);
 }
 
 }  // namespace
