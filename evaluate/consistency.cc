@@ -10,6 +10,7 @@
 
 #include "evaluate/frame_cache.h"
 #include "evaluate/frame_pairs.h"
+#include "evaluate/optional_mean.h"
 #include "evaluate/warped_rows.h"
 #include "kernels/base/error.h"
 #include "kernels/base/parallel_tasks.h"
@@ -24,10 +25,13 @@ const double kByteFloorDb = -10 * std::log10(1.0 / 12 / (255.0 * 255.0));
 
 struct PairSums {
   double squared_error = 0, weight = 0;
-  int64_t colour_not_finite = 0;
+  double unmasked_error = 0;
+  int64_t unmasked = 0, colour_not_finite = 0;
   PairSums& operator+=(const PairSums& o) {
     squared_error += o.squared_error;
     weight += o.weight;
+    unmasked_error += o.unmasked_error;
+    unmasked += o.unmasked;
     colour_not_finite += o.colour_not_finite;
     return *this;
   }
@@ -85,19 +89,24 @@ PairResult ComparePair(const Image& at, const Image& warped, const PairMotion& m
     PairSums row;
     for (int x = 0; x < flow.width; ++x) {
       const double weight = *motion.mask.weight.at(x, y);
-      if (!(weight > 0)) continue;
       const float* f = flow.at(x, y);
       const BilinearTaps taps = TapsAt(x + static_cast<double>(f[0]),
                                        y + static_cast<double>(f[1]), flow.width, flow.height);
+      if (!(weight > 0) && !taps.in_frame) continue;
       double squared = 0;
       for (int c = 0; c < channels; ++c) {
         const double difference = Sample(taps, warped, c) - at.at(x, y)[c];
         squared += difference * difference;
       }
       if (!std::isfinite(squared)) {
-        ++row.colour_not_finite;
+        row.colour_not_finite += weight > 0;
         continue;
       }
+      if (taps.in_frame) {
+        row.unmasked_error += squared;
+        ++row.unmasked;
+      }
+      if (!(weight > 0)) continue;
       row.squared_error += weight * squared;
       row.weight += weight;
     }
@@ -110,6 +119,10 @@ PairResult ComparePair(const Image& at, const Image& warped, const PairMotion& m
     result.error = per_pixel ? channels * per_channel : per_channel;
     result.psnr_db = Decibel(*result.error);
     result.above_8bit_floor = Decibel(per_channel) > kByteFloorDb;
+  }
+  if (sums.unmasked > 0) {
+    const double divisor = (per_pixel ? 1.0 : channels) * static_cast<double>(sums.unmasked);
+    result.unmasked_psnr_db = Decibel(sums.unmasked_error / divisor);
   }
   result.coverage = sums.weight / static_cast<double>(at.num_pixels());
   result.flow_not_finite = motion.mask.not_finite;
@@ -128,11 +141,14 @@ ConsistencyRow Summarize(const std::string& sequence, int gap,
   double sum_error = 0, sum_coverage = 0;
   int defined = 0;
   std::vector<double> finite_db;  // in order of time
+  OptionalMean unmasked;
   for (const PairResult& pair : pairs) {
     if (pair.sequence != sequence || pair.to - pair.from != gap) continue;
     ++row.pairs;
     sum_coverage += pair.coverage;
     row.low_coverage_pairs += pair.low_coverage;
+    if (pair.unmasked_psnr_db && std::isfinite(*pair.unmasked_psnr_db))
+      unmasked.Add(pair.unmasked_psnr_db);
     if (!pair.error) {
       ++row.undefined_pairs;
       continue;
@@ -147,6 +163,7 @@ ConsistencyRow Summarize(const std::string& sequence, int gap,
     finite_db.push_back(*pair.psnr_db);
   }
   if (row.pairs > 0) row.coverage = sum_coverage / row.pairs;
+  row.tc_psnr_unmasked_mean_db = unmasked.Value();
   if (defined > 0) row.tc_psnr_of_mean_db = Decibel(sum_error / defined);
   if (!finite_db.empty()) {
     row.tc_psnr_mean_db = std::accumulate(finite_db.begin(), finite_db.end(), 0.0) /
@@ -173,6 +190,7 @@ ConsistencyReport EvaluateConsistency(int frames, const PairMotionFunction& moti
   report.flow = options.mode == "geometry" ? "depth and cameras" : options.flow;
   report.warp = options.warp;
   report.error_per = options.error_per;
+  report.frames = frames;
   std::map<std::pair<size_t, int>, WorstPair> worst;  // by sequence and gap
   // Pairs in parallel; frames come from one thread, and results are taken in order.
   const int64_t count = std::ssize(pairs);
@@ -195,6 +213,8 @@ ConsistencyReport EvaluateConsistency(int frames, const PairMotionFunction& moti
       for (int64_t t = 0; t < std::ssize(tasks); ++t) run(t);
     else
       ParallelTasks(0, std::ssize(tasks), run);
+    report.width = tasks.front().motion->flow.width;
+    report.height = tasks.front().motion->flow.height;
     for (PairTask& task : tasks)
       for (size_t s = 0; s < sequences.size(); ++s) {
         PairResult& result = task.results[s];
@@ -262,7 +282,8 @@ ConsistencyReport EvaluateConsistency(const FrameSource& reference,
   }
   return EvaluateConsistency(reference.count,
                              EstimatedMotion(reference, options.mode, options.flow,
-                                             FramesBetween(options.gaps, reference.count)),
+                                             FramesBetween(options.gaps, reference.count),
+                                             options.flow_frames),
                              sequences, options, progress);
 }
 

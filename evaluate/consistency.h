@@ -24,6 +24,9 @@ struct ConsistencyOptions {
   // Frames come in excerpts of that many, and pairs lie within one; 0: all are one sequence.
   // Not an option of the user: it follows from the frames.
   int excerpt = 0;
+  // What --flow files:DIR calls the frames, if not 0, 1, ... (see flow_folder.h). Not an option
+  // of the user either.
+  std::vector<int64_t> flow_frames = {};
 
   template <typename Bind>
   void Describe(Bind& bind) {

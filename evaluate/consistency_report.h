@@ -29,12 +29,24 @@ struct PairResult {
   // -10 log10(e) in dB; +inf for identical frames; empty if `error` is.
   std::optional<double> psnr_db;
 
+  // The same over all pixels that the flow leads to a place inside the frame, without the mask.
+  std::optional<double> unmasked_psnr_db;
+
   double coverage = 0;        // fraction of the frame that was compared, in [0, 1]
   bool low_coverage = false;  // below ConsistencyOptions::min_coverage
   // Numbers of pixels, see OcclusionMask.
   int64_t flow_not_finite = 0, out_of_frame = 0, disoccluded = 0, motion_boundary = 0;
   int64_t colour_not_finite = 0;  // excluded: a colour of this sequence is NaN or inf
   bool above_8bit_floor = false;  // the error per channel is below that of 8-bit frames
+};
+
+// What a sequence has more than another one, over the pairs of frames that both have.
+struct PairedDifference {
+  int pairs = 0;
+  std::optional<double> mean;
+  // 95 % confidence interval of that mean, see EQ(block-bootstrap), with runs as long as the
+  // gap: narrower than those of the two means, for both find the same pairs difficult.
+  std::optional<Interval> interval;
 };
 
 // The summary of all pairs of one sequence at one gap: one row of the table.
@@ -55,8 +67,12 @@ struct ConsistencyRow {
   // -10 log10 of the mean error over all defined pairs, including perfect ones (+inf if all are
   // perfect). At most the mean of dB if no pair is perfect (Jensen).
   std::optional<double> tc_psnr_of_mean_db;
+  // Mean over pairs of unmasked_psnr_db, infinite ones left out: what the mask changes.
+  std::optional<double> tc_psnr_unmasked_mean_db;
   double coverage = 0;  // mean over pairs, in [0, 1]
   std::string why;      // why a metric is missing or infinite; else empty
+  // This row's dB less those of ConsistencyReport::compared_with; see AddDifferences.
+  std::optional<PairedDifference> difference;
 };
 
 // The pair with the largest error of a row, with its motion, which sequences share: from frame
@@ -81,10 +97,13 @@ struct WarpedRow {
   int pairs = 0;
   WarpedError published, corrected;
   std::string why;  // why a reading is missing; else empty
+  std::optional<PairedDifference> difference;  // of the corrected RMSE, as of ConsistencyRow
 };
 
 struct ConsistencyReport {
   std::string mode, flow, warp = "later", error_per = "channel";
+  int frames = 0, width = 0, height = 0;  // 0 where no pair was compared
+  std::string compared_with;              // the sequence of the rows' differences; or empty
   std::vector<ConsistencyRow> rows;  // by sequence, then by gap, in the order given
   std::vector<PairResult> pairs;     // by first frame, gap, sequence
   // In the order of rows; rows whose pairs are all perfect or undefined have none.

@@ -1,9 +1,8 @@
 #include "evaluate/pair_motion.h"
 
-#include <filesystem>
 #include <memory>
 
-#include "evaluate/flow_file.h"
+#include "evaluate/flow_folder.h"
 #include "evaluate/frame_cache.h"
 #include "evaluate/geometric_flow.h"
 #include "evaluate/optical_flow.h"
@@ -25,30 +24,18 @@ OcclusionMask MakeMask(const std::string& mode, const FlowField& forward,
       "cameras)");
 }
 
-// Reads the precomputed motion from frame i to frame j; `frame` is any frame of the sequence.
-FlowField ReadPairFlow(const std::string& folder, int i, int j, const Image& frame) {
-  const std::string path = folder + "/" + FlowFileName(i, j);
-  if (!std::filesystem::exists(path))
-    throw InputError(Concat("there is no flow file from frame ", i, " to frame ", j), path,
-                     "every pair of --gaps needs its flow in both directions");
-  FlowField flow = ReadFlowFile(path);
-  if (flow.width != frame.width || flow.height != frame.height)
-    throw InputError(Concat("the flow is ", flow.width, " x ", flow.height, " px, the frames ",
-                            frame.width, " x ", frame.height, " px"),
-                     path, "compute it at the frames' size");
-  return flow;
-}
-
 }  // namespace
 
 int64_t CachedBytes(const FrameGeometry& geometry) { return CachedBytes(geometry.depth); }
 
-PairFlowFunction PairFlow(const std::string& flow) {
-  if (flow.starts_with(kFlowFiles))
-    return [folder = flow.substr(sizeof(kFlowFiles) - 1)](int i, int j, const Image& from,
-                                                          const Image&) {
-      return ReadPairFlow(folder, i, j, from);
+PairFlowFunction PairFlow(const std::string& flow, const std::vector<int64_t>& frames) {
+  if (flow.starts_with(kFlowFiles)) {
+    const auto folder =
+        std::make_shared<const FlowFolder>(flow.substr(sizeof(kFlowFiles) - 1), frames);
+    return [folder](int i, int j, const Image& from, const Image&) {
+      return folder->Read(i, j, from.width, from.height);
     };
+  }
   if (flow.starts_with(kOnnxPrefix)) {
     const auto network =
         std::make_shared<const PairNetwork>(flow.substr(sizeof(kOnnxPrefix) - 1));
@@ -62,10 +49,11 @@ PairFlowFunction PairFlow(const std::string& flow) {
 }
 
 PairMotionFunction EstimatedMotion(const FrameSource& frames, const std::string& mode,
-                                   const std::string& flow, int64_t kept) {
+                                   const std::string& flow, int64_t kept,
+                                   const std::vector<int64_t>& flow_frames) {
   MakeMask(mode, FlowField(1, 1), FlowField(1, 1));  // rejects an unknown mode early
   const FrameCache cache(frames.frame, kept, kFrameCacheBytes);
-  return [=, compute = PairFlow(flow)](int i, int j) {
+  return [=, compute = PairFlow(flow, flow_frames)](int i, int j) {
     const auto from = cache.Get(i), to = cache.Get(j);
     PairMotion motion;
     motion.flow = compute(i, j, *from, *to);

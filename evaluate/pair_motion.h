@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "evaluate/flow_field.h"
 #include "evaluate/frame_source.h"
@@ -20,11 +21,12 @@ struct PairMotion {
 using PairMotionFunction = std::function<PairMotion(int i, int j)>;
 
 // Motion from frame i to frame j, given both. `flow` is a method of optical_flow.h, or
-// "files:DIR", where DIR holds 00003_00004.flo for the pair (3, 4), of the frames' size, or
-// "onnx:FILE", a network (see pair_network.h). Errors: those of the source.
+// "files:DIR", where DIR holds 00003_00004.flo for the pair (3, 4), of the frames' size (see
+// flow_folder.h, also for `frames`), or "onnx:FILE", a network (see pair_network.h). Errors:
+// those of the source.
 using PairFlowFunction =
     std::function<FlowField(int i, int j, const Image& from, const Image& to)>;
-PairFlowFunction PairFlow(const std::string& flow);
+PairFlowFunction PairFlow(const std::string& flow, const std::vector<int64_t>& frames = {});
 
 inline constexpr char kFlowFiles[] = "files:";
 
@@ -41,7 +43,8 @@ int64_t CachedBytes(const FrameGeometry& geometry);  // for OrderedCache
 // (see occlusion.h). Any thread may ask; `kept` frames stay in memory, which come from one
 // thread at a time. Errors: kUsage for unknown names, kInput from flow and files.
 PairMotionFunction EstimatedMotion(const FrameSource& frames, const std::string& mode,
-                                   const std::string& flow, int64_t kept = 2);
+                                   const std::string& flow, int64_t kept = 2,
+                                   const std::vector<int64_t>& flow_frames = {});
 
 // Motion from depth and cameras, see EQ(geometric-flow); `kept` as above. Errors: kInput if
 // sizes differ.

@@ -54,9 +54,7 @@ std::string WithInterval(const PairedRow& row, std::optional<double> PairedQuali
       values.push_back(*(picture.*metric));
   const auto interval = BootstrapMean(values, 1);
   std::string text = TableNumber(mean, decimals);
-  if (interval)
-    text += " [" + TableNumber(interval->low, decimals) + ", " +
-            TableNumber(interval->high, decimals) + "]";
+  if (interval) text += " " + IntervalText(interval->low, interval->high, decimals);
   return text;
 }
 
@@ -112,7 +110,7 @@ std::string FormatPairedTable(const std::vector<PairedRow>& rows, const std::str
   return FormatTable(
       "Pictures against their ground truth: means with 95 % intervals (bootstrap over "
       "pictures)",
-      cells, "", form);
+      cells, "", {form, "tab:pictures"});
 }
 
 }  // namespace regrade

@@ -17,12 +17,13 @@ namespace {
 class OwnFlow {
  public:
   // `of_reference`: the motion of the reference is this sequence's own.
-  OwnFlow(const std::string& sequence, const std::string& flow, bool of_reference)
-      : flow_(PairFlow(flow)) {
+  OwnFlow(const std::string& sequence, const std::string& flow,
+          const std::vector<int64_t>& frames, bool of_reference)
+      : flow_(PairFlow(flow, frames)) {
     if (!flow.starts_with(kFlowFiles)) return;
     const std::string folder = flow + "/" + sequence;
     if (std::filesystem::is_directory(folder.substr(sizeof(kFlowFiles) - 1)))
-      flow_ = PairFlow(folder);
+      flow_ = PairFlow(folder, frames);
     else if (!of_reference)
       flow_ = {};
     pads_flow_ = true;
@@ -74,21 +75,24 @@ ConsistencyReport EvaluateWarped(const FrameSource& reference,
   ConsistencyReport report;
   report.mode = options.mode;
   report.flow = options.flow;
+  report.frames = reference.count;
   const auto pairs = FramePairs(reference.count, options.gaps, options.excerpt);
   FrameCache unstyled = CacheOf(reference, options.gaps, kFrameCacheBytes);
   std::vector<FrameCache> caches = CachesOf(sequences, reference.count, options.gaps);
-  const PairFlowFunction flow = PairFlow(options.flow);
+  const PairFlowFunction flow = PairFlow(options.flow, options.flow_frames);
   const PairDistance lpips = PerceptualDistance(options.lpips),
                      raw_lpips = PerceptualDistance(options.lpips, /*as_given=*/true);
   std::vector<OwnFlow> own;
   const bool has_source = sequences.front().name.ends_with("source");
   for (const NamedFrameSource& sequence : sequences)
-    own.emplace_back(sequence.name, options.flow,
+    own.emplace_back(sequence.name, options.flow, options.flow_frames,
                      sequence.name.ends_with(has_source ? "source" : "styled"));
   int64_t done = 0;
   for (const auto& [i, j] : pairs) {
     const auto from = unstyled.Get(i), to = unstyled.Get(j);
     const FlowField motion = flow(i, j, *from, *to);
+    report.width = motion.width;
+    report.height = motion.height;
     for (size_t s = 0; s < sequences.size(); ++s) {
       const std::string& name = sequences[s].name;
       const auto earlier = caches[s].Get(i), later = caches[s].Get(j);

@@ -8,7 +8,7 @@
 #include "pipeline/files/text.h"
 #include "pipeline/report/assessment.h"
 #include "pipeline/report/records.h"
-#include "pipeline/report/requirements.h"
+#include "pipeline/report/requirement_results.h"
 #include "pipeline/run/run_file.h"
 #include "pipeline/stages/stages.h"
 #include "pipeline/workspace/folder_size.h"
@@ -105,7 +105,8 @@ void RunStyles(const std::string& first, const std::vector<NamedStyle>& styles,
     throw UsageError("stage " + until + " comes before " + first, "--until",
                      "leave it out, or use `regrade stylize`");
   const std::vector<Requirement> required = RequirementsOf(context->settings);
-  std::vector<std::string> failed;
+  std::vector<CheckedRequirement> checked;
+  if (!context->settings.start.dry_run) BeginJUnit(context->settings.start.junit);
   for (size_t i = 0; i < styles.size(); ++i) {
     const auto& [name, pictures] = styles[i];
     const std::string folder = StyleFolder(context->workspace->folder(), name);
@@ -127,13 +128,14 @@ void RunStyles(const std::string& first, const std::vector<NamedStyle>& styles,
       PublishStyle(context->workspace->folder(), name);
       const RunReport report = ReportFromRecords(*context->workspace, workspace);
       PrintSummary(report, *context);
-      for (const std::string& sentence : FailedRequirements(required, report))
-        failed.push_back(name + ": " + sentence);
+      std::ranges::move(CheckRequirements(required, report, name),
+                        std::back_inserter(checked));
     }
     context->style = nullptr;
     context->settings.style = given;
   }
-  ThrowIfAny(failed);
+  if (!context->settings.start.dry_run)
+    FinishRequirements(checked, context->settings.start.junit, context->console);
 }
 
 }  // namespace regrade

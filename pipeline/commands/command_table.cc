@@ -6,8 +6,8 @@ const std::vector<Command>& AllCommands() {
   static const std::vector<Command> commands = {
       {"run", "PHOTOS|CAPTURE --style PICTURE [--style PICTURE ...] --out DIR [OPTIONS]",
        "makes a styled 3D scene, films and a report from photos and a style picture", RunStages,
-       "out preset style name strength method masks photo-masks film-seconds film-size device "
-       "restart-from dry-run verbose"},
+       "out preset style name strength method masks photo-masks films film-seconds film-size "
+       "device restart-from dry-run verbose"},
       {"pose", "PHOTOS --out DIR [OPTIONS]", "finds the camera pose of each photo", RunStages,
        "out photo-masks video-frames device restart-from dry-run verbose"},
       {"reconstruct", "PHOTOS|CAPTURE --out DIR [OPTIONS]",
@@ -33,7 +33,8 @@ const std::vector<Command>& AllCommands() {
        "makes one picture that compares a folder's styles, or styling methods",
        RunContactSheet},
       {"evaluate",
-       "DIR [OPTIONS] | --frames DIR [--reference DIR] [--target DIR] [--style PICTURE]",
+       "DIR [OPTIONS] | --frames DIR [DIR ...] [--label TEXT ...] [--reference DIR] "
+       "[--target DIR] [--style PICTURE]",
        "measures consistency and fidelity, of a run or of any program's frames", RunEvaluate},
       {"study", "A B [C ...] --out FILE.html [OPTIONS] | --analyse ANSWERS.json ...",
        "makes a page that asks people which film they prefer, and analyses their answers",

@@ -14,6 +14,7 @@ struct FrameFolder {
   std::string folder;
   std::vector<std::string> paths;  // in natural order of names
   std::vector<std::string> names;  // relative to the folder
+  std::vector<int> places;         // of the frames among all of the folder, from 0
   int width = 0, height = 0;       // of every frame
   std::string notice;  // what of the frames is used in a way that may surprise; or empty
   KeptPictures kept{KeptPictures::Origin::kGiven};  // the frames, as far as they fit
@@ -23,15 +24,11 @@ struct FrameFolder {
 
 // Lists the folder and decodes each frame once, so that errors appear early: a damaged or
 // unreadable file, frames of different sizes, a number missing from evenly numbered names (the
-// pairs across it would be further apart than their gap), a number that two files share. Only
-// names that are a common prefix and a number are checked for numbers. The notice says where
-// frames have alpha (it is ignored) or more than 8 bits. Progress counts frames.
+// pairs across it would be further apart than their gap), a number that two files share; see
+// FrameNumbers. The notice says where frames have alpha (it is ignored) or more than 8 bits.
+// Progress counts frames.
 //
 // Errors: kInput, with the file.
 FrameFolder OpenFrameFolder(const std::string& folder, const ProgressFunction& progress = {});
-
-// Throws Error(kInput) unless both have the same number of frames, of the same size; names the
-// first one without a counterpart if names are numbered.
-void CheckSameFrames(const FrameFolder& reference, const FrameFolder& sequence);
 
 }  // namespace regrade

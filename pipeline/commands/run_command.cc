@@ -10,6 +10,7 @@
 #include "pipeline/commands/probe_styles.h"
 #include "pipeline/program/device_choice.h"
 #include "pipeline/report/records.h"
+#include "pipeline/report/requirement_results.h"
 #include "pipeline/run/plan.h"
 #include "pipeline/run/run_file.h"
 #include "pipeline/run_pipeline.h"
@@ -92,6 +93,7 @@ void RunStages(const Command& command, const Arguments& arguments, Console* cons
     PrintPlan(name, &context);
     return;
   }
+  if (!settings.start.dry_run) BeginJUnit(settings.start.junit);
   Workspace workspace(settings.run.out, settings.start.break_lock);
   context.workspace = &workspace;
   console->OpenLog(workspace.Path(".regrade/log.txt"));
@@ -102,8 +104,9 @@ void RunStages(const Command& command, const Arguments& arguments, Console* cons
   if (!settings.start.dry_run) WriteRunFile(name, context);
   if (name != "run") {
     if (!settings.start.dry_run)
-      ThrowIfAny(FailedRequirements(RequirementsOf(settings),
-                                    ReportFromRecords(workspace, workspace)));
+      FinishRequirements(CheckRequirements(RequirementsOf(settings),
+                                           ReportFromRecords(workspace, workspace)),
+                         settings.start.junit, console);
     return;
   }
   if (done)

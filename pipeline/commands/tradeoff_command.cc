@@ -58,8 +58,8 @@ struct TradeoffOptions {
     bind(
         "budget", budget,
         {.unit = "minutes",
-         .help = "starts no further measurement after this time; the same command continues; 0 "
-                 "has no limit",
+         .help = "starts no further measurement after this time, the base run included, which "
+                 "is made to its end; the same command continues; 0 has no limit",
          .min = 0,
          .max = 1e6});
     bind("with-poses", with_poses,
@@ -167,9 +167,47 @@ void WriteResults(const RunContext& base, const TradeoffOptions& tradeoff,
   base.console->Lines(CostTableText(rows));
 }
 
-// Makes the missing measurements, one at a time, until the budget is spent.
+// What changes when a stage is done again; "" without a record.
+std::string StateOf(const Workspace& workspace, const char* stage) {
+  const auto record = workspace.Find(stage);
+  if (!record) return "";
+  return DumpJson(record->inputs, -1) + Format(" %.17g", record->seconds);
+}
+
+// The time of measurements, and of the base run where there was none.
+struct Budget {
+  double begin = 0;         // of the command, in ClockSeconds()
+  double seconds = 0;       // 0: no limit
+  bool made_base = false;  // in this start
+
+  bool Spent() const { return seconds > 0 && ClockSeconds() - begin > seconds; }
+};
+
+// Before the work: what is the least budget that a measurement fits into?
+void SayLeastBudget(const TradeoffOptions& tradeoff, double base_seconds, double first_seconds,
+                    Console* console) {
+  if (tradeoff.budget <= 0) return;
+  const double least = (base_seconds + first_seconds) / 60;
+  const std::string text =
+      (base_seconds > 0 ? "the base run takes about " + DurationText(base_seconds) + " and "
+                        : std::string()) +
+      "the first measurement takes about " + DurationText(first_seconds) +
+      Format(": the least useful --budget is about %.1f minutes", least);
+  console->Event("budget", JsonValue::Object{{"minutes", tradeoff.budget},
+                                             {"least_minutes", least},
+                                             {"base_seconds", base_seconds},
+                                             {"first_seconds", first_seconds}});
+  if (tradeoff.budget < least)
+    console->Warn(text + Format(", not %g", tradeoff.budget));
+  else
+    console->Info(text);
+}
+
+// Makes the missing measurements, one at a time, until the budget is spent. One is made in any
+// case, unless this start has made the base run: so that starts with a small budget go on.
 void MeasureAll(RunContext* base, const TradeoffOptions& tradeoff, const std::string& folder,
-                const std::vector<Variant>& variants, double begin, MeasurementStore* store) {
+                const std::vector<Variant>& variants, const Budget& budget,
+                MeasurementStore* store) {
   std::vector<Job> jobs = JobsOf(variants, tradeoff.repeats);
   std::erase_if(
       jobs, [&](const Job& job) { return store->Find(*job.variant, job.repeat) != nullptr; });
@@ -182,7 +220,7 @@ void MeasureAll(RunContext* base, const TradeoffOptions& tradeoff, const std::st
   for (size_t i = 0; i < jobs.size(); ++i) {
     double left = 0;
     for (size_t k = i; k < jobs.size(); ++k) left += estimate.Seconds(*jobs[k].variant);
-    if (i > 0 && tradeoff.budget > 0 && ClockSeconds() - begin > 60 * tradeoff.budget) {
+    if ((i > 0 || budget.made_base) && budget.Spent()) {
       console->Warn(Concat("the budget is spent: ", jobs.size() - i,
                            " measurements remain, about ", DurationText(left),
                            "; the same command continues"));
@@ -264,7 +302,7 @@ void PrintPrediction(const TradeoffOptions& tradeoff, Console* console) {
 }  // namespace
 
 void RunTradeoff(const Command& command, const Arguments& arguments, Console* console) {
-  const double begin = ClockSeconds();
+  Budget budget{ClockSeconds()};
   TradeoffOptions tradeoff;
   RunContext base;
   base.console = console;
@@ -304,11 +342,11 @@ void RunTradeoff(const Command& command, const Arguments& arguments, Console* co
                          Words(tradeoff.presets)};
   const std::string base_name = BaseName(settings, base.options, &choice.presets);
   const std::vector<Variant> variants = VariantsOf(settings, choice);
+  const int64_t photos = ExpectedPhotos(InputsOf(source), settings.ingest);
+  const DurationEstimate estimate(settings, {}, [photos](const RunSettings& of) {
+    return ExpectedPixels(photos, of.scene.photo_size, of.run.holdout);
+  });
   if (settings.start.dry_run) {
-    const int64_t photos = ExpectedPhotos(InputsOf(source), settings.ingest);
-    const DurationEstimate estimate(settings, {}, [photos](const RunSettings& of) {
-      return ExpectedPixels(photos, of.scene.photo_size, of.run.holdout);
-    });
     double all = 0;
     for (const Variant& variant : variants) {
       console->Info(NameOf(variant) + ", about " + DurationText(estimate.Seconds(variant)));
@@ -325,7 +363,14 @@ void RunTradeoff(const Command& command, const Arguments& arguments, Console* co
   Workspace workspace(settings.run.out, settings.start.break_lock);
   base.workspace = &workspace;
   console->OpenLog(workspace.Path(".regrade/log.txt"));
+  budget.seconds = 60 * tradeoff.budget;
+  const bool has_base = workspace.Find("reconstruct").has_value();
+  if (!variants.empty())
+    SayLeastBudget(tradeoff, has_base ? 0 : estimate.BaseSeconds(photos, style),
+                   estimate.Seconds(variants.front()), console);
+  const std::string scene_before = StateOf(workspace, "reconstruct");
   RunPipeline("pose", "reconstruct", &base);
+  budget.made_base = StateOf(workspace, "reconstruct") != scene_before;
   WriteRunFile("run", base);
   std::optional<Workspace> of_style;
   if (style) {
@@ -335,11 +380,14 @@ void RunTradeoff(const Command& command, const Arguments& arguments, Console* co
     of_style.emplace(StyleFolder(settings.run.out, named.name));
     base.style = &*of_style;
     WriteRunFile("run", base);
+    const std::string style_before = StateOf(*of_style, "evaluate");
     RunPipeline("style_2d", "evaluate", &base);
+    budget.made_base = budget.made_base || StateOf(*of_style, "evaluate") != style_before;
     WriteRunFile("run", base);
   }
   MeasurementStore store(folder + "/measurements.json", Fingerprint(base));
-  MeasureAll(&base, tradeoff, folder, variants, begin, &store);
+  MeasureAll(&base, tradeoff, folder, variants, budget, &store);
+  if (store.all().empty()) return;  // the budget went into the base run
   WriteResults(base, tradeoff, folder, variants, store, base_name);
 }
 

@@ -47,8 +47,9 @@ struct RunOptions {
     bind("out", out,
          {.help = "the output folder; the same command again continues what is in it"});
     bind("preset", preset,
-         {.help = "trade-off between accuracy and time; single options override it",
-          .choices = "draft|standard|paper|best"});
+         {.help = "trade-off between accuracy and time; smoke only shows that everything runs; "
+                  "single options override it",
+          .choices = "smoke|draft|standard|paper|best"});
     bind("paper-config", paper_config,
          {.help = kPaperConfigHelp, .choices = "auto|syn|llff|tnt|custom"});
     bind("device", device,
@@ -79,12 +80,15 @@ inline constexpr char kRequireHelp[] =
     "bounds of metrics, as styled:tc-psnr:1>=30,reconstruct:psnr-heldout>=25; where one does "
     "not hold, the exit status is 8";
 
+inline constexpr char kJUnitHelp[] =
+    "writes the outcome of each bound of --require to this file, as JUnit XML for CI systems";
+
 // Options of one start of the program; never part of a stage's inputs.
 struct StartOptions {
   std::string config;
   std::string restart_from;
   std::string until = "report";
-  std::string require;
+  std::string require, junit;
   bool dry_run = false;
   bool break_lock = false;
   bool yes = false;
@@ -100,6 +104,7 @@ struct StartOptions {
          {.help = "ends each style after this stage; `regrade render` goes on",
           .choices = "stylize|render|evaluate|report"});
     bind("require", require, {.help = kRequireHelp});
+    bind("junit", junit, {.help = kJUnitHelp});
     bind("dry-run", dry_run, {.help = "prints what would be done, and does nothing"});
     bind("break-lock", break_lock,
          {.help = "takes over a folder whose last run died on another machine"});

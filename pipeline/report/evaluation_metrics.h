@@ -20,7 +20,12 @@ struct ConsistencyMetrics {
   Metric tc_psnr_mean_db;                  // mean of the pairs' dB
   Metric tc_psnr_of_mean_db;               // dB of the pairs' mean squared error
   Metric tc_psnr_low_db, tc_psnr_high_db;  // 95 % interval of the mean of dB
-  Metric coverage;                         // mean fraction of compared pixels
+  std::optional<double> tc_psnr_unmasked_mean_db;  // over all pixels that stay in the frame
+  // Less the pairs of the first of several folders: mean, 95 % interval, number of pairs.
+  std::optional<double> tc_psnr_difference_db, tc_psnr_difference_low_db,
+      tc_psnr_difference_high_db;
+  std::optional<int> difference_pairs;
+  Metric coverage;                       // mean fraction of compared pixels
   std::vector<Metric> tc_psnr_pairs_db;    // one for each pair in order of time
   std::string heat_map;  // picture of the worst pair, relative to the folder; may be empty
   std::optional<int> heat_map_from;  // first frame of that pair
@@ -35,6 +40,11 @@ struct ConsistencyMetrics {
     visit("tc_psnr_of_mean_db", tc_psnr_of_mean_db);
     visit("tc_psnr_low_db", tc_psnr_low_db);
     visit("tc_psnr_high_db", tc_psnr_high_db);
+    visit("tc_psnr_unmasked_mean_db", tc_psnr_unmasked_mean_db);
+    visit("tc_psnr_difference_db", tc_psnr_difference_db);
+    visit("tc_psnr_difference_low_db", tc_psnr_difference_low_db);
+    visit("tc_psnr_difference_high_db", tc_psnr_difference_high_db);
+    visit("difference_pairs", difference_pairs);
     visit("coverage", coverage);
     visit("tc_psnr_pairs_db", tc_psnr_pairs_db);
     visit("heat_map", heat_map, {.optional = true});
@@ -112,6 +122,9 @@ struct WarpedMetrics {
   int pairs = 0;
   Metric rmse_published, rmse;
   std::optional<double> lpips_published, lpips;          // where a network was given
+  // Of `rmse`, as in ConsistencyMetrics.
+  std::optional<double> rmse_difference, rmse_difference_low, rmse_difference_high;
+  std::optional<int> difference_pairs;
   double coverage = 0;                                   // mean fraction of compared pixels
   std::vector<Metric> rmse_pairs_published, rmse_pairs;  // one for each pair in order of time
 
@@ -124,9 +137,24 @@ struct WarpedMetrics {
     visit("rmse", rmse);
     visit("lpips_published", lpips_published);
     visit("lpips", lpips);
+    visit("rmse_difference", rmse_difference);
+    visit("rmse_difference_low", rmse_difference_low);
+    visit("rmse_difference_high", rmse_difference_high);
+    visit("difference_pairs", difference_pairs);
     visit("coverage", coverage);
     visit("rmse_pairs_published", rmse_pairs_published);
     visit("rmse_pairs", rmse_pairs);
+  }
+};
+
+// A row of --controls that could not be made.
+struct MissingControl {
+  std::string sequence, why;
+
+  template <typename Visit>
+  void Describe(Visit& visit) {
+    visit("sequence", sequence);
+    visit("why", why);
   }
 };
 
@@ -137,6 +165,7 @@ struct EvaluationMetrics {
   std::vector<PairMetrics> pairs;  // of all sequences, by first frame
   // In place of consistency and pairs in mode stylegaussian.
   std::optional<std::vector<WarpedMetrics>> warped;
+  std::optional<std::vector<MissingControl>> missing_controls;  // absent where none is missing
 
   template <typename Visit>
   void Describe(Visit& visit) {
@@ -144,6 +173,7 @@ struct EvaluationMetrics {
     visit("fidelity", fidelity);
     visit("consistency_pairs", pairs);
     visit("warped", warped);
+    visit("missing_controls", missing_controls);
   }
 };
 

@@ -26,6 +26,15 @@ ConsistencyMetrics MetricsOfRow(const ConsistencyRow& row,
     metrics.tc_psnr_low_db = row.tc_psnr_interval_db->low;
     metrics.tc_psnr_high_db = row.tc_psnr_interval_db->high;
   }
+  metrics.tc_psnr_unmasked_mean_db = row.tc_psnr_unmasked_mean_db;
+  if (row.difference) {
+    metrics.difference_pairs = row.difference->pairs;
+    metrics.tc_psnr_difference_db = row.difference->mean;
+    if (const auto& interval = row.difference->interval) {
+      metrics.tc_psnr_difference_low_db = interval->low;
+      metrics.tc_psnr_difference_high_db = interval->high;
+    }
+  }
   metrics.coverage = row.coverage;
   for (const PairResult& pair : pairs)
     if (pair.sequence == row.sequence && pair.to - pair.from == row.gap)
@@ -60,6 +69,14 @@ WarpedMetrics MetricsOfWarped(const WarpedRow& row, const std::vector<WarpedPair
   metrics.rmse = Metric(row.corrected.rmse, row.why);
   metrics.lpips_published = row.published.lpips;
   metrics.lpips = row.corrected.lpips;
+  if (row.difference) {
+    metrics.difference_pairs = row.difference->pairs;
+    metrics.rmse_difference = row.difference->mean;
+    if (const auto& interval = row.difference->interval) {
+      metrics.rmse_difference_low = interval->low;
+      metrics.rmse_difference_high = interval->high;
+    }
+  }
   metrics.coverage = row.corrected.coverage;
   for (const WarpedPair& pair : pairs) {
     if (pair.sequence != row.sequence || pair.to - pair.from != row.gap) continue;

@@ -48,7 +48,10 @@ bool ReadNumber(const std::string& text, T* value) {
   return error == std::errc() && rest == end;
 }
 
-bool IsSequence(const std::string& name) {
+// `styled`: how many sequences styled, styled_2, ... there are.
+bool IsSequence(const std::string& name, int styled) {
+  for (int i = 2; i <= styled; ++i)
+    if (name == Concat("styled_", i)) return true;
   const std::string plain = name.starts_with("path_") ? name.substr(5) : name;
   return plain == "source" || plain == "views_2d" || plain == "styled" || plain == "photos";
 }
@@ -70,11 +73,11 @@ std::optional<Metric> NumberOfStage(StagesReport stages, const Requirement& want
 }
 
 // Throws unless an evaluation can measure it.
-void CheckName(const Requirement& wanted, const std::vector<int>& gaps) {
+void CheckName(const Requirement& wanted, const std::vector<int>& gaps, int styled) {
   const bool of_pairs = NumberIn(ConsistencyMetrics(), wanted.metric).has_value();
   const bool of_frames = NumberIn(FidelityMetrics(), wanted.metric).has_value();
   bool known_metric = of_pairs || of_frames;
-  if (!IsSequence(wanted.subject)) {
+  if (!IsSequence(wanted.subject, styled)) {
     bool known = false;
     known_metric = NumberOfStage({}, wanted, &known).has_value();
     if (!known)
@@ -116,6 +119,13 @@ Requirement ParseRequirement(const std::string& text) {
   return wanted;
 }
 
+bool IsStage(const std::string& name) {
+  bool known = false;
+  StagesReport stages;
+  stages.ForEach([&](const char* stage, const auto&) { known = known || stage == name; });
+  return known;
+}
+
 // A number that the report does not have, but these rows or stages.
 Metric OnlyOf(const std::vector<std::string>& there) {
   return Metric::Undefined(there.empty() ? "nothing was measured"
@@ -125,7 +135,7 @@ Metric OnlyOf(const std::vector<std::string>& there) {
 // The number, or why there is none.
 Metric Measured(const Requirement& wanted, const RunReport& report) {
   std::vector<std::string> there;
-  if (!IsSequence(wanted.subject)) {
+  if (IsStage(wanted.subject)) {
     bool has_run = false, known = false;
     StagesReport stages = report.stages;
     stages.ForEach([&](const char* name, const auto& stage) {
@@ -160,38 +170,37 @@ std::string NoValue(const Requirement& wanted, const Metric& measured) {
 }  // namespace
 
 std::vector<Requirement> ParseRequirements(const std::string& text,
-                                           const std::vector<int>& gaps) {
+                                           const std::vector<int>& gaps, int styled) {
   std::vector<Requirement> requirements;
   if (text.empty()) return requirements;
   for (const std::string& part : Split(text, ',')) {
     requirements.push_back(ParseRequirement(part));
-    CheckName(requirements.back(), gaps);
+    CheckName(requirements.back(), gaps, styled);
   }
   return requirements;
 }
 
-std::vector<std::string> FailedRequirements(const std::vector<Requirement>& requirements,
-                                            const RunReport& report) {
-  std::vector<std::string> failed;
-  for (const Requirement& wanted : requirements) {
-    const Metric measured = Measured(wanted, report);
-    if (!measured.value) {
-      if (!measured.infinite || !wanted.at_least)
-        failed.push_back(wanted.text + ": " + NoValue(wanted, measured));
-    } else if (wanted.at_least ? *measured.value < wanted.bound
-                               : *measured.value > wanted.bound) {
-      failed.push_back(Format("%s: measured %.6g", wanted.text.c_str(), *measured.value));
-    }
-  }
-  return failed;
+std::string CheckedRequirement::Sentence() const {
+  const std::string head = (of.empty() ? "" : of + ": ") + wanted.text + ": ";
+  if (measured.value) return head + Format("measured %.6g", *measured.value);
+  if (holds) return head + "infinite, no error at all";
+  return head + NoValue(wanted, measured);
 }
 
-void ThrowIfAny(const std::vector<std::string>& failed) {
-  if (failed.empty()) return;
-  std::string all;
-  for (const std::string& sentence : failed) all += (all.empty() ? "" : "; ") + sentence;
-  throw Error(ExitCode::kRequirement, "a required metric is out of its bound", all,
-              "report.json has all metrics; the results are complete");
+std::vector<CheckedRequirement> CheckRequirements(const std::vector<Requirement>& requirements,
+                                                  const RunReport& report,
+                                                  const std::string& of) {
+  std::vector<CheckedRequirement> checked;
+  for (const Requirement& wanted : requirements) {
+    CheckedRequirement result{wanted, Measured(wanted, report), false, of};
+    const std::optional<double>& value = result.measured.value;
+    if (value)
+      result.holds = wanted.at_least ? *value >= wanted.bound : *value <= wanted.bound;
+    else
+      result.holds = result.measured.infinite && wanted.at_least;
+    checked.push_back(std::move(result));
+  }
+  return checked;
 }
 
 }  // namespace regrade

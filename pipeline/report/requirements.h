@@ -19,17 +19,27 @@ struct Requirement {
   double bound = 0;
 };
 
-// Requirements separated by commas; none for an empty text. Throws Error(kUsage) for what is no
-// requirement, and for a sequence, stage, metric or gap that no evaluation with `gaps` has.
+// Requirements separated by commas; none for an empty text. `styled`: how many sequences
+// styled, styled_2, ... there are. Throws Error(kUsage) for what is no requirement, and for a
+// sequence, stage, metric or gap that no evaluation with `gaps` has.
 std::vector<Requirement> ParseRequirements(const std::string& text,
-                                           const std::vector<int>& gaps);
+                                           const std::vector<int>& gaps, int styled = 1);
 
-// A sentence for each requirement that does not hold, with the measured value and the bound. A
-// missing metric or one that is not a number holds none; an infinite one holds ">=".
-std::vector<std::string> FailedRequirements(const std::vector<Requirement>& requirements,
-                                            const RunReport& report);
+// A requirement with what was measured.
+struct CheckedRequirement {
+  Requirement wanted;
+  Metric measured;
+  bool holds = false;
+  std::string of;  // the style, where a run may have several
 
-// Throws Error(kRequirement) with all sentences, unless there are none.
-void ThrowIfAny(const std::vector<std::string>& failed);
+  // "style: styled:tc-psnr:1>=30: measured 31.5", or why there is no number.
+  std::string Sentence() const;
+};
+
+// One for each requirement, in their order. A missing metric or one that is not a number holds
+// none; an infinite one holds ">=".
+std::vector<CheckedRequirement> CheckRequirements(const std::vector<Requirement>& requirements,
+                                                  const RunReport& report,
+                                                  const std::string& of = "");
 
 }  // namespace regrade

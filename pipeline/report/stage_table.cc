@@ -75,8 +75,9 @@ std::string MeasurementsHtml(const Stage& stage) {
     if (stage.models_found > 1)
       row.Add(std::to_string(stage.models_found) + " separate models found");
   if constexpr (std::is_same_v<Stage, RenderReport>)
-    row.Add("film <b>" + std::to_string(stage.film.width) + " × " +
-            std::to_string(stage.film.height) + "&nbsp;px</b>");
+    if (stage.film.width > 0)
+      row.Add("film <b>" + std::to_string(stage.film.width) + " × " +
+              std::to_string(stage.film.height) + "&nbsp;px</b>");
   if constexpr (std::is_same_v<Stage, RenderReport>)
     if (const std::string sentence = stage.seen_by_few.Sentence(); !sentence.empty())
       row.Add(EscapeHtml(sentence));

@@ -12,7 +12,7 @@ namespace regrade {
 namespace {
 
 // The fit takes about 1, 5 and 20 minutes on two cores, at most 10, 40 and 120 s on a card of
-// the class of an H200.
+// the class of an H200; that of smoke a few seconds, and no film of it is worth a look.
 struct FitEffort {
   const char* preset;
   bool on_card;
@@ -21,9 +21,11 @@ struct FitEffort {
 };
 
 const FitEffort kFitEfforts[] = {
+    {"smoke", false, {24, 48, 96}, {100, 100, 100}, 0.2f},
     {"draft", false, {48, 96, 192, 384}, {350, 350, 400, 450}, 2},
     {"standard", false, {48, 96, 192, 384, 768}, {600, 700, 900, 1200, 1400}, 5},
     {"best", false, {48, 96, 192, 384, 768}, {1500, 1500, 2000, 3000, 4500}, 16},
+    {"smoke", true, {24, 48, 96}, {100, 100, 100}, 0.2f},
     {"draft", true, {48, 96, 192, 384}, {600, 600, 700, 1100}, 6},
     {"standard", true, {48, 96, 192, 384, 768}, {800, 800, 1000, 1200, 2400}, 12},
     {"best", true, {48, 96, 192, 384, 768, 1536}, {2000, 2000, 2400, 2400, 3600, 6000}, 20},
@@ -48,13 +50,18 @@ bool IsPreset(const std::string& name) {
 void ApplyPreset(const std::string& preset, bool on_card, RunSettings* settings) {
   if (!IsPreset(preset))
     throw UsageError("'" + preset + "' is not allowed", "--preset",
-                     "give one of draft, standard, paper, best");
+                     "give one of smoke, draft, standard, paper, best");
   settings->run.preset = preset;
   ApplyStyleRecipe(preset == "paper" ? "paper" : "standard", &settings->network);
   UseFitEffort(preset, on_card, &settings->fit);
   // Views between the photos see cells of little weight in all of them (COSTS.md).
   settings->fit.prune_last = preset != "best";
-  if (preset == "draft") {
+  if (preset == "smoke") {
+    settings->scene.photo_size = 160;
+    settings->network.steps = 60;
+    settings->render.film_seconds = 1;
+    settings->render.film_size = 160;
+  } else if (preset == "draft") {
     settings->scene.photo_size = 480;
     settings->render.film_seconds = 6;
     settings->render.film_size = 480;

@@ -7,7 +7,7 @@
 
 namespace regrade {
 
-inline constexpr const char* kPresets[] = {"draft", "standard", "paper", "best"};
+inline constexpr const char* kPresets[] = {"smoke", "draft", "standard", "paper", "best"};
 bool IsPreset(const std::string& name);
 
 // Changes default settings to those of a preset on a kind of processor; see PrefersCard. The

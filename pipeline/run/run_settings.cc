@@ -7,6 +7,7 @@
 #include "pipeline/images/cube_file.h"
 #include "pipeline/run/paper_config.h"
 #include "pipeline/run/vignette.h"
+#include "pipeline/workspace/output_names.h"
 
 namespace regrade {
 
@@ -23,6 +24,7 @@ void RunSettings::Bind(OptionSet* options) {
   options->Add("Network", &network);
   options->Add("Residual", &residual);
   options->Add("Render", &render);
+  options->Add("Render", &render.films);
   options->Add("Evaluation", &consistency);
   options->Add("Page", &page);
   options->Add("Program", &program);
@@ -68,6 +70,34 @@ void CheckMatch(const RunSettings& settings) {
                      "--match and --method folder:", "use another method");
 }
 
+namespace {
+
+// A requirement that this run cannot measure fails before the work.
+void CheckRequirements(const RunSettings& settings) {
+  const std::vector<Requirement> required = RequirementsOf(settings);
+  if (required.empty() && !settings.start.junit.empty())
+    throw UsageError("there are no requirements to report", "--junit", "add --require");
+  if (!required.empty() && settings.start.until != "report")
+    throw UsageError("metrics are measured after stage " + settings.start.until, "--require",
+                     "leave out --until");
+  for (const Requirement& wanted : required) {
+    if (!wanted.subject.starts_with(kPathPrefix) || MeasuresFilm(settings)) continue;
+    const bool views = settings.render.path.path == "views";
+    throw UsageError("the film is not measured on its path, " + wanted.text + " has no number",
+                     settings.consistency.mode == "geometry" ? "--mode geometry"
+                     : views                                 ? "--path views"
+                                                             : "--no-films",
+                     "leave it out, or require the metric without path-");
+  }
+}
+
+}  // namespace
+
+bool MeasuresFilm(const RunSettings& settings) {
+  return settings.render.films.films && settings.render.path.path != "views" &&
+         settings.consistency.mode != "geometry";
+}
+
 void CheckTogether(const RunSettings& settings) {
   const size_t grids = settings.fit.resolutions.size(), steps = settings.fit.steps.size();
   if (grids != steps)
@@ -90,9 +120,7 @@ void CheckTogether(const RunSettings& settings) {
     throw UsageError("labels of the style picture need labels of the photos",
                      "--style-mask and --masks",
                      "give --masks, a folder of labels for the photos");
-  if (!RequirementsOf(settings).empty() && settings.start.until != "report")
-    throw UsageError("metrics are measured after stage " + settings.start.until, "--require",
-                     "leave out --until");
+  CheckRequirements(settings);
 }
 
 std::vector<Requirement> RequirementsOf(const RunSettings& settings) {

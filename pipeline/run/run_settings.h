@@ -69,6 +69,17 @@ struct StyleSource {
   }
 };
 
+struct FilmChoice {
+  bool films = true;
+
+  template <typename Bind>
+  void Describe(Bind& bind) {
+    bind("films", films,
+         {.help = "makes films, and measures the scene along their path; --no-films leaves both "
+                  "out, and what is measured at the photos' places stays"});
+  }
+};
+
 struct RenderOptions {
   double fps = 30;
   double film_seconds = 10;
@@ -77,6 +88,7 @@ struct RenderOptions {
   bool exact = false;
   std::string vignette = "none";
   PathOptions path;
+  FilmChoice films;  // bound by itself: where films are made, stages know nothing of it
 
   template <typename Bind>
   void Describe(Bind& bind) {
@@ -150,6 +162,9 @@ void CheckMatch(const RunSettings& settings);
 
 // Throws Error(kUsage), naming both, for options that contradict each other.
 void CheckTogether(const RunSettings& settings);
+
+// Is the film measured, on frames along its path?
+bool MeasuresFilm(const RunSettings& settings);
 
 // What --require demands. Throws Error(kUsage).
 std::vector<Requirement> RequirementsOf(const RunSettings& settings);

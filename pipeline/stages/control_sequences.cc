@@ -45,10 +45,9 @@ FrameSource Rgb(const FrameSource& frames) {
 }
 
 std::optional<ColorMap> MapOf(const ControlInputs& inputs) {
-  if (!inputs.one_map) return std::nullopt;
+  if (!WhyNoLinearMap(inputs).empty()) return std::nullopt;
   if (inputs.views_2d.count > 0)
     return BestLinearMap(Rgb(inputs.unstyled), Rgb(inputs.views_2d));
-  if (inputs.style == nullptr || inputs.unstyled.count == 0) return std::nullopt;
   std::vector<ColorStatistics> frames;
   for (int i = 0; i < inputs.unstyled.count; ++i)
     frames.push_back(MeasureColor(inputs.unstyled.frame(i)));
@@ -76,6 +75,14 @@ std::vector<NamedFrameSource> ControlSequences(const ControlInputs& inputs,
   add(kBlurredControl, inputs.styled, Blurred);
   add(kGreyControl, inputs.styled, [](const Image& frame) { return Changed(frame, Grey); });
   return controls;
+}
+
+std::string WhyNoLinearMap(const ControlInputs& inputs) {
+  if (!inputs.one_map) return "only a part of the scene is styled";
+  if (inputs.views_2d.count > 0) return "";
+  if (inputs.style == nullptr)
+    return "there are neither frames of the 2D method (--target) nor a style picture (--style)";
+  return inputs.unstyled.count == 0 ? "there are no unstyled frames" : "";
 }
 
 }  // namespace regrade

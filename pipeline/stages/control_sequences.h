@@ -29,4 +29,7 @@ struct ControlInputs {
 std::vector<NamedFrameSource> ControlSequences(const ControlInputs& inputs,
                                                const std::string& prefix = "");
 
+// Why ControlSequences has no linear map; empty where it has one.
+std::string WhyNoLinearMap(const ControlInputs& inputs);
+
 }  // namespace regrade

@@ -129,17 +129,13 @@ double PairWeight(const RunSettings& settings, int frames) {
   return std::max(weight, kPairSeconds);
 }
 
-bool HasFilm(const RunSettings& settings) {
-  return settings.render.path.path != "views" && settings.consistency.mode != "geometry";
-}
-
 // Evaluates the film's frames, with flow and masks from its own unstyled ones. Mode "geometry"
 // leaves the film out: its geometry is not on disk.
 void AddFilm(RunContext* context, const FidelityTargets& networks, const Camera& camera,
              ProgressParts* parts, ConsistencyReport* report,
              std::vector<FidelityRow>* fidelity, std::vector<HeatMapFile>* heat_maps) {
   const RunSettings& settings = context->settings;
-  if (!HasFilm(settings)) return;
+  if (!MeasuresFilm(settings)) return;
   std::vector<int> all(CountSamples(settings.render));
   for (size_t i = 0; i < all.size(); ++i) all[i] = static_cast<int>(i);
   const auto folder = [&](const char* name) {
@@ -177,6 +173,23 @@ void AddFilm(RunContext* context, const FidelityTargets& networks, const Camera&
                     std::back_inserter(*fidelity));
 }
 
+// Rows of --controls that the table of neighbouring views cannot have. `map_has_target`: there
+// is a picture, or the 2D method's frames, that one map of colours could lead to.
+std::vector<MissingControl> MissingControls(const RunSettings& settings, bool map_has_target,
+                                            bool same_camera) {
+  std::vector<MissingControl> missing;
+  if (!settings.consistency.controls) return missing;
+  if (settings.object.On())
+    missing.push_back({kLinearMapControl, "only a part of the scene is styled"});
+  else if (!map_has_target)
+    missing.push_back({kLinearMapControl,
+                       "the 2D method styles no renders and the style is no picture"});
+  if (!same_camera)
+    for (const char* name : {"photos", "photos_2d"})
+      missing.push_back({name, "neighbouring photos differ in size or lens"});
+  return missing;
+}
+
 StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   const RunSettings& settings = context->settings;
   Workspace& workspace = *context->style;
@@ -195,7 +208,7 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   const std::vector<Camera> compared = WithCommonIntrinsics(cameras);
 
   const double n = static_cast<double>(training_views.size());
-  const int film = HasFilm(settings) ? CountSamples(settings.render) : 0;
+  const int film = MeasuresFilm(settings) ? CountSamples(settings.render) : 0;
   double weight = PairWeight(settings, static_cast<int>(all.size())) +
                   n * (4 * kFrameSeconds + kLinearMapSeconds);
   if (film > 0) weight += PairWeight(settings, film) + 3 * kFrameSeconds * film;
@@ -324,10 +337,21 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
     report.lpips_train = lpips(MeasuredTrainingViews(views));
   }
   if (!same_camera) context->console->Info(report.comparison_note);
-  context->console->DetailLines(FormatTables(consistency, fidelity));
+  TableContext table;
+  table.protocol = report.protocol;
+  table.version = REGRADE_VERSION;
+  const std::vector<MissingControl> missing =
+      MissingControls(settings, renders_styled || of_picture, same_camera);
+  for (const MissingControl& control : missing) {
+    table.remarks.push_back(control.sequence + ": left out, " + control.why);
+    context->console->Info(table.remarks.back());
+  }
+  context->console->DetailLines(FormatTables(consistency, fidelity, table));
   StageOutcome outcome;
   outcome.outputs = {kHeatMapFolder};
-  PutMetrics(MetricsOf(consistency, fidelity, heat_maps), &outcome.metrics);
+  EvaluationMetrics metrics = MetricsOf(consistency, fidelity, heat_maps);
+  if (!missing.empty()) metrics.missing_controls = missing;
+  PutMetrics(metrics, &outcome.metrics);
   PutMetrics(report, &outcome.metrics);
   return outcome;
 }

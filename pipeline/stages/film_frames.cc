@@ -64,18 +64,19 @@ FilmPath MakeFilmPath(const WorkingViews& views, const RenderOptions& options,
 std::vector<FrameSet> FrameSetsOf(const WorkingViews& views, const RenderOptions& options,
                                   const FilmPath& path) {
   const std::vector<Camera> cameras = views.Cameras();
-  const bool same = HaveSameIntrinsics(cameras), of_views = options.path.path == "views";
+  const bool same = HaveSameIntrinsics(cameras), films = options.films.films,
+             of_views = films && options.path.path == "views";
   std::vector<FrameSet> sets = {{"", cameras, true, of_views && same, of_views && same}};
   if (!same)
     sets.push_back({kCommonPrefix, WithCommonIntrinsics(cameras), true, of_views, of_views});
-  if (of_views) return sets;
+  if (of_views || !films) return sets;
   sets.push_back({kPathPrefix, path.samples, false, false, true});
   sets.push_back({kFilmPrefix, path.film, false, true, false});
   return sets;
 }
 
 int CountSamples(const RenderOptions& options) {
-  if (options.path.path == "views") return 0;
+  if (options.path.path == "views" || !options.films.films) return 0;
   return static_cast<int>(SamplesOfFilm(options.film_seconds, options.fps).moments.size());
 }
 

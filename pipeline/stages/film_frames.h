@@ -41,12 +41,12 @@ FilmPath MakeFilmPath(const WorkingViews& views, const RenderOptions& options,
 
 // All frames of a run: at the photos' places, with one camera where photos differ in size or
 // lens, the film's samples, and the film. With --path views the film is made of frames at the
-// photos' places.
+// photos' places, with --no-films there is none.
 std::vector<FrameSet> FrameSetsOf(const WorkingViews& views, const RenderOptions& options,
                                   const FilmPath& path);
 
 // Frames on disk along the film's path, an excerpt of the film's time after the other; 0 with
-// --path views.
+// --path views and --no-films.
 int CountSamples(const RenderOptions& options);
 
 }  // namespace regrade

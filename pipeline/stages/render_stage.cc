@@ -62,11 +62,20 @@ const FrameSet* CommonSet(const std::vector<FrameSet>& sets) {
   return common == sets.end() ? nullptr : &*common;
 }
 
+// The way of the film, if there is one.
+FilmPath PathOf(const WorkingViews& views, const RenderOptions& options,
+                const RadianceField* field) {
+  if (options.films.films) return MakeFilmPath(views, options, field);
+  FilmPath path;
+  path.transmittance = path.photo_distance = Metric::Undefined("films were left out");
+  return path;
+}
+
 // The sets before there is a field: poses in the capture's world, final sizes.
 std::vector<FrameSet> PlannedSets(const RunContext& context) {
   const WorkingViews views = context.Views();
   const RenderOptions& options = context.settings.render;
-  return FrameSetsOf(views, options, MakeFilmPath(views, options, nullptr));
+  return FrameSetsOf(views, options, PathOf(views, options, nullptr));
 }
 
 // "24 frames at the photos' positions, 24 there with one camera (480x360 px), 60 where the film
@@ -189,7 +198,7 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   const WorkingViews views = context->Views().InField(before.field_from_world, before.ndc);
   // In NDC the field's limit is no distance.
   SeenByFewRecorder seen(views, before.ndc.on() ? 0 : before.field.near_clip);
-  const FilmPath path = MakeFilmPath(views, settings.render, &before.field);
+  const FilmPath path = PathOf(views, settings.render, &before.field);
   const std::unique_ptr<ObjectMasks> masks = OpenObjectMasks(settings, views.capture());
   FrameRenderers renderers;
   if (masks != nullptr)
@@ -212,22 +221,29 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   const std::vector<FrameSet> sets = FrameSetsOf(views, settings.render, path);
   int total = 0;
   for (const FrameSet& set : sets) total += static_cast<int>(set.cameras.size());
-  const FrameSet& film =
-      *std::find_if(sets.begin(), sets.end(), [](const FrameSet& set) { return set.of_film; });
+  const auto film =
+      std::find_if(sets.begin(), sets.end(), [](const FrameSet& set) { return set.of_film; });
+  const bool has_film = film != sets.end();
+  const int film_frames = has_film ? static_cast<int>(film->cameras.size()) : 0;
+  const bool film_of_views = !has_film || film->of_photos;
   if (const FrameSet* common = CommonSet(sets))
     context->console->Info(ComparisonNote(common->cameras[0]));
 
   const std::string why_exact =
-      PrepareFilm(settings, film.of_photos, &*renderers.source, &*renderers.styled);
+      PrepareFilm(settings, film_of_views, &*renderers.source, &*renderers.styled);
   renderers.fast_film = why_exact.empty();
-  context->console->Detail("renderer of the film: " + FilmRendererText(why_exact, backend));
+  if (has_film)
+    context->console->Detail("renderer of the film: " + FilmRendererText(why_exact, backend));
 
   std::filesystem::remove_all(workspace.Path("frames"));
+  if (!has_film)  // films of an earlier start
+    for (const char* name : {kStyledFilm, kWipeFilm, kViews2dFilm})
+      std::filesystem::remove(workspace.Path(name));
   StageOutcome outcome;
   outcome.outputs = {"frames"};
   if (settings.style.keep_field) outcome.outputs.push_back("styled.npz");
-  RunFilms films(workspace, settings.render.fps, static_cast<int>(film.cameras.size()),
-                 film.of_photos ? settings.render.fps : kSampleRate);
+  RunFilms films(workspace, settings.render.fps, film_frames,
+                 film_of_views ? settings.render.fps : kSampleRate);
   {
     FrameWriter writer(workspace, ParseVignette(settings.render.vignette), &films);
     int done = 0;
@@ -245,19 +261,19 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
     }
     writer.Finish();
   }
-  films.Finish(&outcome.outputs);
+  if (has_film) films.Finish(&outcome.outputs);
   if (!films.why_none().empty()) context->console->Warn("no film: " + films.why_none());
   RenderReport report;
   report.device = DeviceName(backend);
   report.frames = total;
   report.path_frames = CountSamples(settings.render);
-  report.film_frames = static_cast<int>(film.cameras.size());
+  report.film_frames = film_frames;
   report.film_seconds = report.film_frames / settings.render.fps;
   report.path_transmittance = path.transmittance;
   report.path_photo_distance = path.photo_distance;
-  report.film = {film.cameras[0].width, film.cameras[0].height};
+  if (has_film) report.film = {film->cameras[0].width, film->cameras[0].height};
   report.strength = settings.style.strength;
-  report.film_renderer = FilmRendererText(why_exact, backend);
+  if (has_film) report.film_renderer = FilmRendererText(why_exact, backend);
   if (renderers.seconds > 0) report.frames_per_second = total / renderers.seconds;
   report.seen_by_few = seen.metrics();
   if (report.seen_by_few.film.value.value_or(0) > kMuchSeenByFew)
@@ -281,6 +297,7 @@ Stage RenderStage(RunContext* context) {
       {"exact_film", WantsExactFilm(context->settings)},
       {"options", OptionValues(context->settings.scene, context->settings.render,
                                context->settings.style_2d)}};
+  if (!context->settings.render.films.films) stage.inputs["films"] = false;
   if (context->workspace->Find("pose")) {
     const std::vector<FrameSet> sets = PlannedSets(*context);
     stage.plan = PlanOf(sets);

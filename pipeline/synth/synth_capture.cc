@@ -129,12 +129,12 @@ void WriteDepth(const std::string& path, const Image& depth) {
   WriteFileAtomically(path, bytes);
 }
 
-void WriteMotion(const fs::path& truth, int index, SyntheticMotion motion) {
+void WriteMotion(const fs::path& truth, int from, int to, SyntheticMotion motion) {
   FlowField flow;
   flow.width = motion.width;
   flow.height = motion.height;
   flow.uv = std::move(motion.uv);
-  const std::string name = FlowFileName(index, index + 1);
+  const std::string name = FlowFileName(from, to);
   WriteFlowFile((truth / "flow" / name).string(), flow);
   Image mask(motion.width, motion.height, 1);
   for (size_t i = 0; i < motion.visible.size(); ++i) mask.pixels[i] = motion.visible[i];
@@ -175,8 +175,10 @@ void WriteSyntheticCapture(const std::string& out, const SynthOptions& options,
       WritePng8((truth / "masks" / name).string(), mask);
       WritePng8((fs::path(out) / "masks" / name).string(), FaultyMask(mask, SynthMaskFault(i)));
     }
-    if (i + 1 < options.views)
-      WriteMotion(truth, i, TrueMotion(scene, cameras[i], cameras[i + 1]));
+    for (const int gap : kSynthGaps)
+      for (const int j : {i - gap, i + gap})
+        if (j >= 0 && j < options.views)
+          WriteMotion(truth, i, j, TrueMotion(scene, cameras[i], cameras[j]));
     frames.push_back({"../images/" + name, cameras[i]});
     if (effects.poses) depths.push_back(std::move(view.depth));
     ReportOrThrow(progress, i + 1, options.views, name);

@@ -43,12 +43,16 @@ struct SynthOptions {
   }
 };
 
+// The gaps of the published protocols, and of --gaps' default.
+inline constexpr int kSynthGaps[] = {1, 5};
+
 // Writes
 //   OUT/images/00000.png ...              8-bit sRGB photos
 //   OUT/truth/transforms.json             cameras; file paths relative to OUT/truth
 //   OUT/truth/depth/00000.npy             [H, W] float32, z along the optical axis, world units
-//   OUT/truth/flow/00000_00001.flo        motion of view i to view i + 1, pixels
-//   OUT/truth/visible/00000_00001.png     255 where view i + 1 sees the same point
+//   OUT/truth/flow/00000_00001.flo        motion of view i to view j, pixels, for views
+//                                         kSynthGaps apart, in both directions
+//   OUT/truth/visible/00000_00001.png     255 where view j sees the same point
 //   with `masks`: OUT/masks/00000.png, some of them wrong, and correct ones in OUT/truth/masks/
 //   with `poses`: OUT/sparse/0/, a COLMAP model with pose errors (synth_model.h)
 //   with `grade`: OUT/truth/graded/00000.png, what the true grade makes of each photo

@@ -2,9 +2,12 @@
 
 #include <omp.h>
 
+#include <algorithm>
 #include <utility>
 
+#include "pipeline/fields/film_timing.h"
 #include "pipeline/run/plan.h"
+#include "pipeline/stages/film_frames.h"
 #include "reconstruct/fit/adapt_options.h"
 
 namespace regrade {
@@ -42,6 +45,24 @@ double DurationEstimate::Seconds(const Variant& variant) const {
                                 ? benchmark->second.measured / benchmark->second.rough
                                 : 1;
   return correction * Rough(variant);
+}
+
+double DurationEstimate::BaseSeconds(int64_t photos, bool style) const {
+  const double fit = Seconds({"fit", "", ""});
+  if (!style) return fit;
+  // Of a megapixel: a frame of both fields with its pictures, one of the film by the fast
+  // renderer, and a pair's flow and errors.
+  constexpr double kFrame = 1.5, kFilmFrame = 0.8, kPair = 0.6;
+  const auto megapixels = [](int side) { return 0.75e-6 * side * side; };
+  const double samples = CountSamples(base_.render), views = static_cast<double>(photos);
+  double seconds = kFrame * (views + samples);
+  for (const int gap : base_.consistency.gaps)
+    seconds += kPair * (std::max(0.0, views - gap) + std::max(0.0, samples - gap));
+  seconds *= megapixels(base_.scene.photo_size);
+  if (samples > 0)
+    seconds += kFilmFrame * megapixels(base_.render.film_size) *
+               FilmFrames(base_.render.film_seconds, base_.render.fps);
+  return fit + Seconds({"style", "", ""}) + seconds;
 }
 
 double DurationEstimate::Rough(const Variant& variant) const {

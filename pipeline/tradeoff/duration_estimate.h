@@ -22,6 +22,10 @@ class DurationEstimate {
   void Add(const Measurement& measurement);
   double Seconds(const Variant& variant) const;
 
+  // Of the base run from poses on, of that many photos, before anything was measured: fit and,
+  // with a style, training, frames, films and metrics. Roughly, on two cores.
+  double BaseSeconds(int64_t photos, bool style) const;
+
  private:
   struct Sum {
     double measured = 0, rough = 0;

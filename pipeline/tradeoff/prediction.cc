@@ -96,7 +96,7 @@ RunSettings SettingsOf(const RunSettings& base, const Variant& variant) {
 // Of the frames that are only in the film, whose camera at working size is `common`.
 double FilmPixels(const RunSettings& settings, const Capture& capture, const Camera& common) {
   const RenderOptions& render = settings.render;
-  if (render.path.path == "views") return 0;
+  if (render.path.path == "views" || !render.films.films) return 0;
   double side = 0;  // of the photos' files
   for (const CaptureView& view : capture.views)
     side = std::max<double>(side, std::max(view.camera.width, view.camera.height));
@@ -119,9 +119,7 @@ int64_t FittedPixels(const RunSettings& settings, const Capture& capture) {
 double AmountOf(const std::string& unit, const RunSettings& settings, const Capture& capture) {
   const double photos = static_cast<double>(capture.views.size());
   const double pixels = PhotoPixels(settings, capture);
-  const double film = settings.render.path.path == "views"
-                          ? 0
-                          : static_cast<double>(CountSamples(settings.render));
+  const double film = CountSamples(settings.render);
   const double frame = photos > 0 ? pixels / photos : 0;
   if (unit == "photo megapixels") {
     double sum = 0;

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <filesystem>
 #include <functional>
+#include <limits>
 
 #include "evaluate/flow_file.h"
 #include "evaluate/optical_flow.h"
@@ -367,6 +368,23 @@ TEST(Consistency, EachFrameIsFetchedOnceForEachSequence) {
                            }};
   EvaluateConsistency(9, Still(), {{"s", frames}}, Gaps({1, 5}));
   for (const int count : fetched) EXPECT_EQ(count, 1);
+}
+
+// A mask that hides the pixels of the largest error raises the metric: by how much is a number
+// of its own, over all pixels whose flow stays in the frame.
+TEST(Consistency, WithAndWithoutTheMask) {
+  Image first(4, 1, 3), second(4, 1, 3);
+  for (int x = 0; x < 4; ++x)
+    for (int c = 0; c < 3; ++c) second.at(x, 0)[c] = x == 3 ? 0.9f : x == 0 ? 0.3f : 0.1f;
+  PairMotion motion{FlowField(4, 1), {}};
+  motion.mask.weight = Image(4, 1, 1);
+  for (const int x : {1, 2}) *motion.mask.weight.at(x, 0) = 1;
+  motion.flow.at(3, 0)[0] = 9;  // leaves the frame
+  const PairResult pair = ComparePair(first, second, motion);
+  EXPECT_NEAR(*pair.psnr_db, 20, 1e-5);
+  const double mean = (0.3 * 0.3 + 2 * 0.1 * 0.1) / 3;
+  EXPECT_NEAR(*pair.unmasked_psnr_db, -10 * std::log10(mean), 1e-5);
+  EXPECT_NEAR(pair.coverage, 0.5, 1e-12);
 }
 
 }  // namespace

@@ -8,8 +8,11 @@
 #include <fstream>
 #include <random>
 
+#include "evaluate/flow_folder.h"
 #include "kernels/base/error.h"
 #include "tests/evaluate/synthetic_frames.h"
+#include "tests/support/expect_error.h"
+#include "tests/support/temporary_folder.h"
 
 namespace regrade {
 namespace {
@@ -89,6 +92,27 @@ TEST_F(FlowFile, HostileFilesAreRefused) {
 TEST(FlowFileName, OneForEachDirection) {
   EXPECT_EQ(FlowFileName(3, 4), "00003_00004.flo");
   EXPECT_EQ(FlowFileName(4, 3), "00004_00003.flo");
+}
+
+// Whatever programs call frames: their numbers count, not their zeros.
+TEST(FlowFolder, FilesAreFoundByTheirNumbers) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directories(folder.path());
+  WriteFlowFile(folder / "flow_7_8.flo", ConstantFlow(12, 12, 1, 0));
+  WriteFlowFile(folder / "00008_00007.flo", ConstantFlow(12, 12, 2, 0));
+  WriteFlowFile(folder / "8_007.flo", ConstantFlow(12, 12, 3, 0));  // the exact name has precedence
+  WriteText(folder / "readme.txt", "");
+  const FlowFolder flow(folder.path(), {7, 8});
+  EXPECT_EQ(flow.LeastFrame(), 7);
+  EXPECT_TRUE(flow.Has(0, 1));
+  EXPECT_FALSE(FlowFolder(folder.path()).Has(0, 1));
+  EXPECT_EQ(flow.Read(0, 1, 12, 12).at(0, 0)[0], 1);
+  EXPECT_EQ(flow.Read(1, 0, 12, 12).at(0, 0)[0], 2);
+  EXPECT_REGRADE_ERROR(flow.Read(0, 1, 16, 12), ExitCode::kInput, "12 x 12 px");
+  EXPECT_REGRADE_ERROR(FlowFolder(folder.path()).Read(0, 1, 12, 12), ExitCode::kInput,
+                       "00000_00001.flo");
+  WriteFlowFile(folder / "flow_07_08.flo", ConstantFlow(12, 12, 1, 0));
+  EXPECT_REGRADE_ERROR(FlowFolder(folder.path()), ExitCode::kInput, "flow_7_8.flo");
 }
 
 }  // namespace

@@ -3,59 +3,20 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
 #include <functional>
 
 #include "evaluate/flow_file.h"
-#include "kernels/process/child_process.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/images/image_file.h"
+#include "tests/support/evaluated_frames.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/tiny_onnx.h"
 
 namespace regrade {
 namespace {
 
-using testing::TemporaryFolder;
-using testing::WriteText;
-
-struct Outcome {
-  int code = 0;
-  std::string text;
-};
-
-Outcome Evaluate(const std::vector<std::string>& arguments) {
-  ChildOptions options;
-  options.argv = {REGRADE_PROGRAM, "evaluate"};
-  options.argv.insert(options.argv.end(), arguments.begin(), arguments.end());
-  options.wall_limit_s = 120;
-  Outcome outcome;
-  const ChildResult result =
-      RunChild(options, [&outcome](const std::string& line) { outcome.text += line + "\n"; });
-  outcome.code = result.end == ChildEnd::kExited ? result.exit_status : 128 + result.signal;
-  return outcome;
-}
-
-#define EXPECT_OUTPUT(outcome, part) \
-  EXPECT_NE(outcome.text.find(part), std::string::npos) << outcome.text
-
-// A wave that moves by a pixel per frame.
-Image Frame(int i, float flicker = 0) {
-  Image image(64, 48, 3);
-  for (int y = 0; y < image.height; ++y)
-    for (int x = 0; x < image.width; ++x)
-      for (int c = 0; c < 3; ++c)
-        image.at(x, y)[c] =
-            static_cast<float>(0.5 + 0.2 * std::sin(0.4 * (x - i) + 0.2 * y + c) +
-                               0.15 * std::sin(0.3 * y) + flicker * ((i * 37) % 5 - 2));
-  return image;
-}
-
-void WriteFrames(const std::string& folder, int count, float flicker = 0) {
-  for (int i = 0; i < count; ++i)
-    WriteText(folder + "/0000" + std::to_string(i) + ".png", EncodePng8(Frame(i, flicker)));
-}
+using namespace regrade::testing;
 
 TEST(EvaluateCommand, WritesMetricsIntervalsAndHeatMaps) {
   const TemporaryFolder folder;
@@ -130,8 +91,10 @@ TEST(EvaluateCommand, UnusableFramesAreNamed) {
   outcome = outcome_of();
   EXPECT_EQ(outcome.code, 3);
   EXPECT_OUTPUT(outcome, "this frame is 64 x 40 px, 00000.png is 64 x 48 px");
-  std::filesystem::remove(folder / "styled/00002.png");
-  std::filesystem::remove(folder / "styled/00003.png");
+  for (const char* name : {"00000.png", "00001.png", "00002.png", "00003.png"})
+    std::filesystem::remove(folder / (std::string("styled/") + name));
+  WriteText(folder / "styled/left.png", EncodePng8(Frame(0)));
+  WriteText(folder / "styled/right.png", EncodePng8(Frame(1)));
   outcome = outcome_of();
   EXPECT_EQ(outcome.code, 3);
   EXPECT_OUTPUT(outcome, "2 frames, the reference has 4");
@@ -274,8 +237,8 @@ TEST(EvaluateCommand, OddInputsHaveTheirSentences) {
        [](const auto& folder) { std::filesystem::remove(folder / "styled/00001.png"); }, 3,
        "frame 00001 is missing"},
       {"missing at the end",
-       [](const auto& folder) { std::filesystem::remove(folder / "styled/00003.png"); }, 3,
-       "00003.png of"},
+       [](const auto& folder) { std::filesystem::remove(folder / "styled/00003.png"); }, 0,
+       "of the reference 00003.png"},
       {"no folder", [](const auto& folder) { std::filesystem::remove_all(folder / "styled"); },
        3, "styled"},
       {"no frames",

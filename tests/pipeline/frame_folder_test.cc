@@ -5,7 +5,10 @@
 #include <filesystem>
 
 #include "kernels/base/error.h"
+#include "pipeline/commands/frame_numbers.h"
+#include "pipeline/commands/frame_pairing.h"
 #include "pipeline/images/image_file.h"
+#include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"
 
 namespace regrade {
@@ -102,19 +105,111 @@ TEST(FrameFolder, NoFramesAndNoFolder) {
   EXPECT_NE(ErrorOf(folder / "none", {}), "");
 }
 
-TEST(FrameFolder, DifferentNumbersOfFramesNameTheOdd) {
+std::vector<int64_t> Numbers(const std::vector<std::string>& names) {
+  std::vector<int64_t> numbers;
+  for (const FrameNumber& number : FrameNumbers(names)) numbers.push_back(number.number);
+  return numbers;
+}
+
+TEST(FrameNumbers, AreTheDigitsThatDiffer) {
+  using List = std::vector<int64_t>;
+  EXPECT_EQ(Numbers({"scene2_0001.png", "scene2_0002.png"}), (List{1, 2}));
+  EXPECT_EQ(Numbers({"0001_scene2.png", "0002_scene2.jpg"}), (List{1, 2}));
+  EXPECT_EQ(Numbers({"f9.png", "f010.png"}), (List{9, 10}));
+  EXPECT_EQ(Numbers({"frame.0003", "frame.0004"}), (List{3, 4}));
+  EXPECT_EQ(Numbers({"0001_t0.04.png", "0002_t0.08.png"}), (List{1, 2}));  // the first
+  EXPECT_EQ(Numbers({"cam1_08.png", "cam1_09.png", "cam2_01.png"}), List());
+  EXPECT_EQ(Numbers({"left.png", "right.png"}), List());
+  EXPECT_EQ(Numbers({"a1.png", "b2.png"}), List());
+  EXPECT_EQ(Numbers({"1403636579763555584.png", "1403636579813555456.png"}), List());  // too long
+}
+
+// Two or more folders after pairing, the reference first.
+struct Paired {
+  std::vector<FrameFolder> folders;
+  std::vector<FramePairing> pairings;
+};
+
+Paired PairOf(const TemporaryFolder& folder,
+              const std::vector<std::vector<std::string>>& names) {
+  static int number = 0;
+  Paired paired;
+  for (const auto& some : names)
+    paired.folders.push_back(Open(folder / std::to_string(++number), some));
+  std::vector<FrameFolder*> sequences;
+  for (size_t i = 1; i < names.size(); ++i) sequences.push_back(&paired.folders[i]);
+  paired.pairings = PairFolders(&paired.folders[0], sequences);
+  return paired;
+}
+
+TEST(FramePairing, ByNumberWhereNumbersOverlap) {
+  using Names = std::vector<std::string>;
   const TemporaryFolder folder;
-  const FrameFolder reference = Open(folder / "r", {"00000.png", "00001.png", "00002.png"});
-  const FrameFolder fewer = Open(folder / "s", {"x1.png", "x2.png"});
-  EXPECT_NO_THROW(CheckSameFrames(reference, reference));
-  try {
-    CheckSameFrames(reference, fewer);
-    FAIL() << "3 frames and 2 frames were accepted";
-  } catch (const Error& error) {
-    const std::string text = error.what();
-    EXPECT_TRUE(Has(text, "2 frames, the reference has 3")) << text;
-    EXPECT_TRUE(Has(text, "00000.png of " + (folder / "r") + " has no counterpart")) << text;
+  const Paired shifted =
+      PairOf(folder, {{"0.png", "1.png", "2.png"}, {"x_0001.png", "x_0002.png", "x_0003.png"}});
+  EXPECT_EQ(shifted.pairings[0].by, "number");
+  EXPECT_EQ(shifted.folders[0].names, (Names{"1.png", "2.png"}));
+  EXPECT_EQ(shifted.folders[1].names, (Names{"x_0001.png", "x_0002.png"}));
+  EXPECT_EQ(shifted.folders[0].places, (std::vector<int>{1, 2}));
+  EXPECT_EQ(shifted.folders[0].Source().count, 2);
+  EXPECT_EQ(shifted.pairings[0].left_out, Names{"x_0003.png"});
+  EXPECT_EQ(shifted.pairings[0].reference_left_out, Names{"0.png"});
+  EXPECT_FALSE(shifted.pairings[0].notice.empty());
+  // Every second frame of the reference, and one number fewer than it.
+  EXPECT_EQ(PairOf(folder, {{"0.png", "1.png", "2.png", "3.png", "4.png"},
+                            {"00.png", "02.png", "04.png"}})
+                .folders[0]
+                .names,
+            (Names{"0.png", "2.png", "4.png"}));
+  // The same numbers, whatever stands around them, are worth no notice.
+  const Paired same = PairOf(folder, {{"8.png", "9.png", "10.png"},
+                                      {"cam2_08.png", "cam2_09.png", "cam2_10.png"}});
+  EXPECT_EQ(same.pairings[0].by, "number");
+  EXPECT_EQ(same.pairings[0].notice, "");
+  EXPECT_EQ(same.folders[0].Source().count, 3);
+}
+
+TEST(FramePairing, ByNameOrInOrderWithANotice) {
+  using Names = std::vector<std::string>;
+  const TemporaryFolder folder;
+  const Paired names =
+      PairOf(folder, {{"left.png", "mid.png", "right.png"}, {"mid.jpg", "right.jpg", "top.jpg"}});
+  EXPECT_EQ(names.pairings[0].by, "name");
+  EXPECT_EQ(names.folders[1].names, (Names{"mid.jpg", "right.jpg"}));
+  EXPECT_EQ(names.pairings[0].left_out, Names{"top.jpg"});
+  EXPECT_EQ(PairOf(folder, {{"a.png", "b.png"}, {"a.jpg", "b.jpg"}}).pairings[0].notice, "");
+  for (const Names& other :
+       {Names{"100.png", "101.png"}, Names{"a.png", "b.png"}, Names{"1.png", "2.png"}}) {
+    const Paired order = PairOf(folder, {{"0.png", "1.png"}, other});  // at most one in common
+    EXPECT_EQ(order.pairings[0].by, "order");
+    EXPECT_FALSE(order.pairings[0].notice.empty());
+    EXPECT_EQ(order.folders[1].names, other);
   }
+}
+
+TEST(FramePairing, AllFoldersHaveTheSameMoments) {
+  using Names = std::vector<std::string>;
+  const TemporaryFolder folder;
+  const Paired three = PairOf(folder, {{"0.png", "1.png", "2.png", "3.png"},
+                                       {"1.png", "2.png", "3.png"},
+                                       {"0.png", "1.png", "2.png"}});
+  for (const FrameFolder& each : three.folders) EXPECT_EQ(each.names, (Names{"1.png", "2.png"}));
+}
+
+TEST(FramePairing, WhatCannotBePairedIsNamed) {
+  const TemporaryFolder folder;
+  EXPECT_REGRADE_ERROR(PairOf(folder, {{"0.png", "1.png", "2.png"}, {"a.png", "b.png"}}),
+                       ExitCode::kInput, "2 frames, the reference has 3");
+  EXPECT_REGRADE_ERROR(PairOf(folder, {{"a.png", "b.png", "c.png", "d.png"},
+                                       {"a.png", "b.png", "d.png"}}),
+                       ExitCode::kInput, "c.png of");
+  EXPECT_REGRADE_ERROR(
+      PairOf(folder, {{"0.png", "1.png", "2.png", "3.png"}, {"0.png", "1.png"}, {"2.png", "3.png"}}),
+      ExitCode::kInput, "no frame has a counterpart");
+  FrameFolder reference = Open(folder / "wide", {"0.png", "1.png"}, 32),
+              small = Open(folder / "small", {"0.png", "1.png"});
+  EXPECT_REGRADE_ERROR(PairFolders(&reference, {&small}), ExitCode::kInput,
+                       "16 x 12 px, the reference has 32 x 12 px");
 }
 
 }  // namespace

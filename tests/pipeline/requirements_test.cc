@@ -4,10 +4,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 #include <limits>
 
 #include "pipeline/report/records.h"
+#include "pipeline/report/requirement_results.h"
 #include "tests/support/expect_error.h"
+#include "tests/support/temporary_folder.h"
 
 namespace regrade {
 namespace {
@@ -29,8 +32,18 @@ RunReport Report() {
   return report;
 }
 
+// The sentences of those that do not hold.
+std::vector<std::string> Failed(const std::string& text, const RunReport& report,
+                                const std::vector<int>& gaps) {
+  std::vector<std::string> failed;
+  for (const CheckedRequirement& checked :
+       CheckRequirements(ParseRequirements(text, gaps), report))
+    if (!checked.holds) failed.push_back(checked.Sentence());
+  return failed;
+}
+
 std::vector<std::string> Failed(const std::string& text) {
-  return FailedRequirements(ParseRequirements(text, {1, 5}), Report());
+  return Failed(text, Report(), {1, 5});
 }
 
 TEST(Requirements, HoldOrNameValueAndBound) {
@@ -69,7 +82,7 @@ TEST(Requirements, WithoutANumberTheSentenceSaysWhatIsThere) {
             "stylize:bound<=9: bound of stylize has no value (measured: reconstruct)");
   RunReport report;
   const auto sentence = [&report](const char* text) {
-    return FailedRequirements(ParseRequirements(text, {1}), report)[0];
+    return Failed(text, report, {1})[0];
   };
   EXPECT_EQ(sentence("styled:structure>=1"),
             "styled:structure>=1: structure of styled has no value (nothing was measured)");
@@ -92,7 +105,7 @@ TEST(Requirements, FramesThatDoNotChangeAreAboveEveryBound) {
   RunReport report;
   report.evaluation = MetricsOf(still, {});
   const auto failed = [&](const std::string& text) {
-    return FailedRequirements(ParseRequirements(text, {1}), report);
+    return Failed(text, report, {1});
   };
   EXPECT_TRUE(failed("styled:tc-psnr:1>=30,styled:tc-psnr-of-mean:1>=30").empty());
   EXPECT_EQ(failed("styled:tc-psnr:1<=30").size(), 1u);
@@ -124,8 +137,46 @@ TEST(Requirements, AreRefusedBeforeWork) {
 }
 
 TEST(Requirements, FailWithAStatusOfTheirOwn) {
-  ThrowIfAny({});
-  EXPECT_REGRADE_ERROR(ThrowIfAny({"a", "b"}), ExitCode::kRequirement, "a; b");
+  Console console(false);
+  FinishRequirements({}, "", &console);
+  const auto checked = CheckRequirements(
+      ParseRequirements("styled:structure>=0.99,styled:tc-psnr:1>=40", {1}), Report(), "a");
+  EXPECT_REGRADE_ERROR(FinishRequirements(checked, "", &console), ExitCode::kRequirement,
+                       "0.97; a: styled:tc-psnr:1>=40: measured 31.5");
+}
+
+// One test case for each requirement; names are data, not markup.
+TEST(Requirements, JUnitHasATestCaseForEach) {
+  const testing::TemporaryFolder folder;
+  const auto requirements =
+      ParseRequirements("styled:tc-psnr:1>=30,styled:structure>=0.98,styled:tc-psnr:5>=1", {1, 5});
+  const auto checked = CheckRequirements(requirements, Report(), "a<b>&\"c\"\x01");
+  const std::string xml = JUnitXml(checked);
+  const auto count = [&](const std::string& part) {
+    int found = 0;
+    for (size_t at = xml.find(part); at != std::string::npos; at = xml.find(part, at + 1)) ++found;
+    return found;
+  };
+  EXPECT_EQ(count("<testcase "), 3);
+  EXPECT_EQ(count("</testcase>"), 3);
+  EXPECT_EQ(count("<failure "), 2);
+  EXPECT_EQ(count("tests=\"3\" failures=\"2\""), 2);
+  EXPECT_EQ(count("name=\"styled:tc-psnr:1&gt;=30\""), 1);
+  EXPECT_EQ(count("classname=\"regrade.a&lt;b&gt;&amp;&quot;c&quot;\\x01\""), 3);
+  EXPECT_EQ(count("measured 31.5, required at least 30"), 1);
+  EXPECT_EQ(count("message=\"measured 0.97, required at least 0.98\""), 1);
+  EXPECT_EQ(count("no value (too few frames), required at least 1"), 1);
+  for (const char c : xml) EXPECT_TRUE(c == '\n' || static_cast<unsigned char>(c) >= ' ');
+
+  Console console(false);
+  const std::string path = folder / "junit.xml";
+  EXPECT_REGRADE_ERROR(FinishRequirements(checked, path, &console), ExitCode::kRequirement,
+                       "structure");
+  EXPECT_EQ(testing::ReadText(path), xml);  // in spite of the error
+  BeginJUnit(path);
+  EXPECT_FALSE(std::filesystem::exists(path));
+  EXPECT_REGRADE_ERROR(BeginJUnit(folder / "none/junit.xml"), ExitCode::kInput, "folder");
+  EXPECT_REGRADE_ERROR(BeginJUnit(folder.path()), ExitCode::kInput, "folder");
 }
 
 }  // namespace

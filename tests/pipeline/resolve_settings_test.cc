@@ -60,6 +60,7 @@ TEST(ResolveSettings, PresetsGiveTheirValues) {
     ResolveSettings({}, &options);
     EXPECT_EQ(DumpJson(options.Values()), DumpJson(bound.Values())) << preset;
   }
+  EXPECT_LT(Resolve({"--preset", "smoke"}).settings.fit.max_cells, 1);
   EXPECT_REGRADE_ERROR(Resolve({"--preset", "fast"}), ExitCode::kUsage, "draft");
   EXPECT_EQ(Resolve({}, {.preset = "draft"}).settings.scene.photo_size, 480);
   EXPECT_EQ(Resolve({"--preset=standard"}, {.preset = "draft"}).settings.scene.photo_size, 800);

@@ -94,10 +94,14 @@ TEST_F(SynthCapture, WritesPhotosAndTruth) {
                                              "truth/depth/00002.npy",
                                              "truth/effects.json",
                                              "truth/flow/00000_00001.flo",
+                                             "truth/flow/00001_00000.flo",
                                              "truth/flow/00001_00002.flo",
+                                             "truth/flow/00002_00001.flo",
                                              "truth/transforms.json",
                                              "truth/visible/00000_00001.png",
-                                             "truth/visible/00001_00002.png"};
+                                             "truth/visible/00001_00000.png",
+                                             "truth/visible/00001_00002.png",
+                                             "truth/visible/00002_00001.png"};
   EXPECT_EQ(names, expected);
 }
 
@@ -121,6 +125,25 @@ TEST_F(SynthCapture, TruthOnDiskIsThatOfTheScene) {
   EXPECT_EQ(std::memcmp(npy.data() + npy.size() - size, view.depth.pixels.data(), size), 0);
   const FlowField flow = ReadFlowFile((out / "truth/flow/00001_00002.flo").string());
   EXPECT_EQ(flow.uv, TrueMotion(scene, cameras[1], cameras[2]).uv);
+}
+
+// What the evaluator needs at its default gaps, in both directions.
+TEST_F(SynthCapture, MotionIsThatOfBothGapsAndDirections) {
+  const fs::path flow = Write("a", "", {}, 7) / "truth/flow";
+  const SyntheticScene scene = MakeSyntheticScene("table", 0);
+  const std::vector<Camera> cameras = SyntheticCameras(scene, 7, 64, 48);
+  int files = 0;
+  for (const int gap : {1, 5})
+    for (int i = 0; i + gap < 7; ++i)
+      for (const auto& [from, to] : {std::pair{i, i + gap}, {i + gap, i}}) {
+        EXPECT_EQ(ReadFlowFile((flow / FlowFileName(from, to)).string()).uv,
+                  TrueMotion(scene, cameras[static_cast<size_t>(from)],
+                             cameras[static_cast<size_t>(to)])
+                      .uv)
+            << from << " " << to;
+        ++files;
+      }
+  EXPECT_EQ(std::distance(fs::directory_iterator(flow), {}), files);
 }
 
 TEST_F(SynthCapture, SameBytesForAnyNumberOfThreadsAndEveryTime) {

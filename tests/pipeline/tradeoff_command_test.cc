@@ -45,12 +45,29 @@ TEST(TradeoffCommand, MeasuresContinuesAndPredicts) {
   EXPECT_NE(outcome.text.find("flow: flow dis-ultrafast, about"), std::string::npos);
   EXPECT_FALSE(std::filesystem::exists(folder / "t"));
 
-  // With no budget, makes one measurement and reports the number of the others.
+  // The base run counts: it spends this budget, and what budget is useful was said before it.
+  outcome = tradeoff({"--repeats", "1", "--budget", "1e-9", "--json"});
+  ASSERT_EQ(outcome.code, 0) << outcome.text;
+  EXPECT_NE(outcome.text.find("the budget is spent: 16 measurements"), std::string::npos)
+      << outcome.text;
+  EXPECT_FALSE(std::filesystem::exists(folder / "t/measurements.json"));
+  const size_t said = outcome.text.find("{\"event\":\"budget\"");
+  ASSERT_LT(said, outcome.text.find("\"stage_begin\"")) << outcome.text;
+  const std::string line = outcome.text.substr(said, outcome.text.find('\n', said) - said);
+  const JsonValue budget = ParseJson(line, "stdout");
+  EXPECT_GT(budget.At("base_seconds").AsDouble(), 0);
+  EXPECT_NEAR(
+      60 * budget.At("least_minutes").AsDouble(),
+      budget.At("base_seconds").AsDouble() + budget.At("first_seconds").AsDouble(), 1e-9);
+
+  // With the base run there, the same budget is for one measurement.
   outcome = tradeoff({"--repeats", "1", "--budget", "1e-9"});
   ASSERT_EQ(outcome.code, 0) << outcome.text;
-  EXPECT_NE(outcome.text.find("the budget is spent"), std::string::npos) << outcome.text;
+  EXPECT_NE(outcome.text.find("the budget is spent: 15 measurements"), std::string::npos)
+      << outcome.text;
   const size_t left =
       ReadJsonFile(folder / "t/measurements.json").At("measurements").AsArray().size();
+  EXPECT_EQ(left, 1u);
 
   outcome = tradeoff({"--repeats", "1"});
   ASSERT_EQ(outcome.code, 0) << outcome.text;

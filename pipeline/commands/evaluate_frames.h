@@ -1,0 +1,66 @@
+// regrade evaluate --frames: options, and the evaluation of folders of frames.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "evaluate/consistency.h"
+#include "evaluate/protocols.h"
+#include "evaluate/table_text.h"
+#include "pipeline/commands/command.h"
+
+namespace regrade {
+
+struct FramesOptions {
+  std::vector<std::string> frames, label;
+  std::string reference, target, style, poses, depth, pst50, out, protocol, table = "text",
+      require, junit;
+
+  template <typename Bind>
+  void Describe(Bind& bind) {
+    bind("frames", frames,
+         {.help =
+              "folder with the styled frames and no other files; sorted by name, 9 before 10; "
+              "several folders, one after the other, are compared with the first one, pair by "
+              "pair"});
+    bind("label", label,
+         {.help = "what tables call each folder of --frames, in the same order; without it "
+                  "styled, styled_2, ..."});
+    bind("reference", reference,
+         {.help = "folder with the same frames before styling; motion and masks come from "
+                  "them. Frames belong together by the numbers in their names, or else by "
+                  "equal names, or else by order"});
+    bind("target", target,
+         {.help = "folder with the 2D method's version of each frame, for fidelity"});
+    bind("style", style, {.help = "style picture, for fidelity"});
+    bind("poses", poses,
+         {.help = "of --mode geometry: a transforms.json with the camera of each frame of "
+                  "--reference"});
+    bind("depth", depth,
+         {.help = "of --mode geometry: folder with a depth map of each frame of --reference, "
+                  ".npy of height x width, along the optical axis in the unit of --poses"});
+    bind(
+        "pst50", pst50,
+        {.help = "folder of the 2D benchmark PST50: --frames has a method's picture of each of "
+                 "its contents, of the same names, which are compared with paired_gt"});
+    // Stands for other options, which ExpandProtocol() puts in its place.
+    bind("protocol", protocol,
+         {.help = "a published protocol by name, also for runs: sets --mode, --gaps and "
+                  "--warp where it says so, and refuses others; geometry of frames needs "
+                  "--poses and --depth; evaluate/PROTOCOLS.md defines each",
+          .choices = ProtocolChoices()});
+    bind("table", table,
+         {.help = "form of the printed tables; latex needs the package booktabs",
+          .choices = kTableForms});
+    bind("require", require, {.help = kRequireHelp});
+    bind("junit", junit, {.help = kJUnitHelp});
+    bind("out", out,
+         {.help = "folder for report.html, report.json and heatmaps/ of the worst pairs"});
+  }
+};
+
+// `words` are those of the command line.
+void EvaluateFrames(const FramesOptions& frames, const ConsistencyOptions& options,
+                    const Arguments& words, Console* console);
+
+}  // namespace regrade

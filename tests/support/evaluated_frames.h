@@ -1,0 +1,53 @@
+// `regrade evaluate --frames` from tests: the program, and frames of a moving wave.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "kernels/process/child_process.h"
+#include "pipeline/images/image_file.h"
+#include "tests/support/temporary_folder.h"
+
+namespace regrade::testing {
+
+struct Outcome {
+  int code = 0;
+  std::string text;
+};
+
+inline Outcome Evaluate(const std::vector<std::string>& arguments) {
+  ChildOptions options;
+  options.argv = {REGRADE_PROGRAM, "evaluate"};
+  options.argv.insert(options.argv.end(), arguments.begin(), arguments.end());
+  options.wall_limit_s = 120;
+  Outcome outcome;
+  const ChildResult result =
+      RunChild(options, [&outcome](const std::string& line) { outcome.text += line + "\n"; });
+  outcome.code = result.end == ChildEnd::kExited ? result.exit_status : 128 + result.signal;
+  return outcome;
+}
+
+#define EXPECT_OUTPUT(outcome, part) \
+  EXPECT_NE(outcome.text.find(part), std::string::npos) << outcome.text
+
+// A wave that moves by a pixel per frame.
+inline Image Frame(int i, float flicker = 0) {
+  Image image(64, 48, 3);
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x)
+      for (int c = 0; c < 3; ++c)
+        image.at(x, y)[c] =
+            static_cast<float>(0.5 + 0.2 * std::sin(0.4 * (x - i) + 0.2 * y + c) +
+                               0.15 * std::sin(0.3 * y) + flicker * ((i * 37) % 5 - 2));
+  return image;
+}
+
+inline void WriteFrames(const std::string& folder, int count, float flicker = 0) {
+  for (int i = 0; i < count; ++i)
+    WriteText(folder + "/0000" + std::to_string(i) + ".png", EncodePng8(Frame(i, flicker)));
+}
+
+}  // namespace regrade::testing
