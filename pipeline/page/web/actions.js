@@ -3,7 +3,7 @@
 // `changed` asks for a new picture, `fillFacts` for the sheet about the scene.
 function bindActions(header, view, state, changed, fillFacts) {
   const press = (id, on) => element(id).ariaPressed = on;
-  const sheets = [['show_path', 'path'], ['show_facts', 'facts']];
+  const sheets = [['show_path', 'path'], ['show_facts', 'facts'], ['show_help', 'help']];
   const toggle = (sheet) => () => {
     const open = element(sheet).hidden;
     for (const [b, s] of sheets) {
@@ -11,6 +11,7 @@ function bindActions(header, view, state, changed, fillFacts) {
       element(b).ariaExpanded = s === sheet && open;
     }
     if (sheet === 'facts') fillFacts();
+    if (sheet === 'help' && open) element('help').focus();  // it has nothing else to reach by keys
   };
   const actions = {
     home() { view.go(view.photos[header.home]); view.pivot = view.pivotOfHome; changed(); },
@@ -23,7 +24,7 @@ function bindActions(header, view, state, changed, fillFacts) {
       changed();
     }};
   actions.keys = {h: actions.home, f: actions.mode, c: () => actions.original(true), v: actions.halve,
-                  k: toggle('path'), i: toggle('facts'), escape: () => {
+                  k: toggle('path'), i: toggle('facts'), '?': toggle('help'), escape: () => {
                     for (const [b, s] of sheets) {
                       if (element(s).hidden) continue;
                       if (element(s).contains(document.activeElement)) element(b).focus();
@@ -36,6 +37,7 @@ function bindActions(header, view, state, changed, fillFacts) {
   element('halve').onclick = actions.halve;
   element('show_path').onclick = actions.keys.k;
   element('show_facts').onclick = actions.keys.i;
+  element('show_help').onclick = actions.keys['?'];
   const compare = element('compare');
   compare.onpointerdown = () => actions.original(true);
   compare.onpointerup = compare.onpointerleave = compare.onblur = () => actions.original(false);
