@@ -7,6 +7,7 @@ function bindActions(header, view, state, changed, fillFacts) {
   const toggle = (sheet) => () => {
     const open = element(sheet).hidden;
     for (const [b, s] of sheets) {
+      if (element(s).contains(document.activeElement)) element(b).focus();
       element(s).hidden = s !== sheet || !open;
       element(b).ariaExpanded = s === sheet && open;
     }
@@ -25,11 +26,7 @@ function bindActions(header, view, state, changed, fillFacts) {
     }};
   actions.keys = {h: actions.home, f: actions.mode, c: () => actions.original(true), v: actions.halve,
                   k: toggle('path'), i: toggle('facts'), '?': toggle('help'), escape: () => {
-                    for (const [b, s] of sheets) {
-                      if (element(s).hidden) continue;
-                      if (element(s).contains(document.activeElement)) element(b).focus();
-                      toggle(s)();
-                    }
+                    for (const [, s] of sheets) if (!element(s).hidden) toggle(s)();
                   }};
   actions.released = {c: () => actions.original(false)};
   element('home').onclick = actions.home;

@@ -33,14 +33,21 @@ async function start(page) {
   // It opens as its first style shows it. `ready`: a style can be shown.
   const state = page.state ??= {axes: [0, 1], amount: [header.styles[0]?.strength ?? 0, 0], ready: header.styles.length === 0,
                                 original: false, split: false, cut: 0.5, map: null, playing: null};
-  const sayUnpacked = (part) => say((state.ready ? '' : styleTitle(header, 0) + ' is coming. ') +
-                                    'The scene is being unpacked: ' + Math.round(100 * part) + ' %');
-  sayUnpacked(0);
-  const decoded = decodedField(header, '', true, (part) => { if (page.round === round) sayUnpacked(part); });
+  let unpacked = 0;
+  const sayUnpacked = () => say((state.ready ? '' : styleTitle(header, 0) + ' is coming. ') +
+                                    'The scene is being unpacked: ' + Math.round(100 * unpacked) + ' %');
+  sayUnpacked();
+  const decoded = decodedField(header, '', true, (part) => {
+    unpacked = part;
+    if (page.round === round) sayUnpacked();
+  });
   const graphics = new Graphics(gl);
   if (location.hash === '#cores') graphics.onCores = true;
   // Null: the context was lost meanwhile.
-  const whole = decoded.then((made) => page.round === round ? loadScene(header, made, graphics) : null);
+  const whole = decoded.then((made) => {
+    unpacked = 1;
+    return page.round === round ? loadScene(header, made, graphics) : null;
+  });
   whole.catch(() => {});  // it is awaited below
   let scene = await loadCoarse(header, graphics) ?? await whole, painter = null;
   if (page.round !== round) return;
@@ -64,6 +71,7 @@ async function start(page) {
     return rest > 1e-6 || sets.length === 0 ? [{weight: Math.max(rest, 0), colors: of.source}, ...sets] : sets;
   }
   const failed = (error) => { if (page.round === round && !gl.isContextLost()) fail(error); };
+  const tried = new Set();  // styles whose loading has ended, well or not
   function load(i, codes) {
     return loading[i] ??= styles.make(i, (part) => {
       say(part < 1 ? styleTitle(header, i) + ' is being applied: ' + Math.round(100 * part) + ' %' : '');
@@ -73,7 +81,7 @@ async function start(page) {
         colors.forEach((c, k) => { if (c && k !== i && !state.axes.includes(k)) styles.forget(k); });
       say('');
       painter.change();
-    }).catch(failed);
+    }).catch(failed).finally(() => tried.add(i));
   }
   // What the sliders want, of the scene that is shown and of the whole one.
   const wanted = () => weights().flatMap((weight, i) => weight > 0 ? [i] : []);
@@ -91,8 +99,7 @@ async function start(page) {
     return {view: view.inWindow(width, height), parts};
   };
   painter = new Painter(canvas, graphics, scene, pictureOf);
-  let sayUnstyled;
-  const unstyled = new Promise((done) => sayUnstyled = done);
+  let sayUnstyled = () => {};
   const changed = () => {
     if (wanted().length === 0) sayUnstyled();
     painter.change();
@@ -220,6 +227,7 @@ async function start(page) {
     showStyles();
   };
   showReady();
+  if (scene.coarse && state.ready && unpacked < 1) sayUnpacked();
   canvas.classList.add('ready');
   let before = performance.now();
   const run = page.run = () => {
@@ -244,8 +252,9 @@ async function start(page) {
   run();
   const full = await whole;
   if (!full) return;
-  // So does the coarse scene, unless nobody wants a style.
-  await Promise.race([unstyled, Promise.all(wanted().map((i) => load(i)))]);
+  // So does the coarse scene, unless no style is wanted.
+  while (wanted().some((i) => !tried.has(i)))
+    await Promise.race([new Promise((done) => sayUnstyled = done), Promise.all(wanted().map((i) => load(i)))]);
   if (page.round !== round) return;
   const first = scene;
   scene = page.scene = full;
