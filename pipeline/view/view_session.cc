@@ -136,7 +136,7 @@ std::vector<Route> ViewSession::Routes() {
        [this, codes](const HttpRequest&) { return codes(style_); }},
       {"GET", "/film", 0, false, film}};
   for (Route& route : routes)
-    if (!route.open)
+    if (route.target != "/")  // which holds nothing of the scene
       route.answer = [this, target = route.target,
                       answer = std::move(route.answer)](const HttpRequest& request) {
         const std::optional<HttpResponse> not_yet = NotYet(target);
