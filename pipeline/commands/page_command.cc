@@ -54,9 +54,10 @@ void RunPage(const Command& command, const Arguments& arguments, Console* consol
         "  a coarse scene, which it shows first: ", (made.coarse_bytes + 999) / 1000, " kB"));
   for (size_t i = 0; i < styles.size(); ++i)
     console->Info(Concat("  ", styles[i], ": ", (made.style_bytes[i] + 999) / 1000, " kB"));
-  console->Info(
-      "The page is a copy of the place: whoever has it can look around there. Names, paths and "
-      "photos' metadata are not in it; small pictures of the photos are.");
+  console->Info(Concat(
+      "The page is a copy of the place: whoever has it can look around there. Small "
+      "pictures of the photos are in it, their metadata are not; ",
+      page.names == "off" ? "nor are names." : "names are, and --names off leaves them out."));
 }
 
 }  // namespace regrade

@@ -1,14 +1,19 @@
 // regrade view: the page of a scene, served to a browser on this machine, which learns styles
 // from pictures that are dropped on it.
 #include <fcntl.h>
+#include <omp.h>
 #include <signal.h>
 #include <spawn.h>
 #include <stdlib.h>
 #include <unistd.h>
 
+#include <atomic>
+#include <chrono>
 #include <cstring>
 #include <filesystem>
+#include <future>
 #include <optional>
+#include <thread>
 
 #include "kernels/base/error.h"
 #include "pipeline/commands/command.h"
@@ -17,6 +22,7 @@
 #include "pipeline/program/interrupt.h"
 #include "pipeline/report/html_text.h"
 #include "pipeline/view/view_session.h"
+#include "pipeline/workspace/workspace.h"
 
 namespace regrade {
 namespace {
@@ -84,6 +90,29 @@ void StartBrowser(const std::string& file, Console* console) {
     console->Warn(Concat("no browser was opened: xdg-open: ", std::strerror(status)));
 }
 
+// A folder in which a run has begun gets its scene later; styles that are named are not there
+// before it.
+bool MayWait(const std::string& folder, const Arguments& words) {
+  return words.size() == 1 && Workspace::Exists(folder);
+}
+
+// False if the program is to end.
+bool AwaitScene(const std::string& folder, ViewSession* session, Console* console) {
+  const auto is_there = [&folder] { return fs::exists(folder + "/field.npz"); };
+  if (is_there()) return true;
+  const std::string awaited =
+      folder +
+      " has no scene yet. It opens here when a run has fitted it; where no run is working, "
+      "start its command again";
+  session->SayWhatIsAwaited(awaited + ".");
+  console->Info(awaited);
+  while (!is_there()) {
+    if (StopRequested()) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  }
+  return true;
+}
+
 }  // namespace
 
 void RunView(const Command& command, const Arguments& arguments, Console* console) {
@@ -96,10 +125,8 @@ void RunView(const Command& command, const Arguments& arguments, Console* consol
       Prepare(command, arguments, {.most_words = 1 + kMostPageStyles}, &options);
   if (!prepared) return;
   const std::string& folder = prepared->words[0];
-  const std::vector<std::string> styles = WantedStyles(folder, prepared->words);
-  console->BeginStage("page");
-  ViewSession session(AbsolutePath(folder), styles, console->StageProgress());
-  console->EndStage();
+  if (!MayWait(folder, prepared->words)) WantedStyles(folder, prepared->words);  // throws
+  ViewSession session(AbsolutePath(folder));
   LocalServer server(session.Routes(), MakeToken());
   console->Info("open " + server.Address());
   console->Info(
@@ -110,7 +137,27 @@ void RunView(const Command& command, const Arguments& arguments, Console* consol
     file.emplace(server.Address());
     StartBrowser(file->path(), console);
   }
-  server.Run([] { return !StopRequested(); });
+  // Beside the server, which says meanwhile what it waits for. This thread prints nothing.
+  std::atomic<bool> failed = false;
+  const int threads = omp_get_max_threads();  // a number that each thread has of its own
+  std::future<void> page = std::async(std::launch::async, [&] {
+    omp_set_num_threads(threads);
+    try {
+      if (!AwaitScene(folder, &session, console)) return;
+      const std::vector<std::string> styles = WantedStyles(folder, prepared->words);
+      console->BeginStage("page");
+      session.MakePageOf(styles, console->StageProgress());
+      console->EndStage();
+      if (styles.empty())
+        console->Info(
+            "the scene has no style yet; `regrade view` shows those there are when it starts");
+    } catch (...) {
+      failed = true;
+      throw;
+    }
+  });
+  server.Run([&failed] { return !StopRequested() && !failed; });
+  page.get();
   console->Info("stopped");
 }
 

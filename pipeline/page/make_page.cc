@@ -16,6 +16,7 @@
 #include "pipeline/fields/field_file.h"
 #include "pipeline/fields/object_file.h"
 #include "pipeline/fields/residual_file.h"
+#include "pipeline/files/text.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/page/check_page.h"
 #include "pipeline/page/coarse_field.h"
@@ -92,14 +93,15 @@ Image RenderHome(const RadianceField& field, const Camera& home) {
              : RenderView(field, camera, options).color;
 }
 
-void AddPhotos(const WorkingViews& views, PageContent* content) {
+void AddPhotos(const WorkingViews& views, bool named, PageContent* content) {
   std::vector<ColorStatistics> parts;
   const int count = std::min(views.count(), kMostPhotos);
   for (int i = 0; i < count; ++i) {
     const int chosen = i * views.count() / count;
     content->cameras.push_back(views.CameraOf(chosen).Undistorted());
     const Image photo = views.Photo(chosen);
-    content->photos.push_back({i, Thumbnail(photo, kThumbnail)});
+    content->photos.push_back({i, Thumbnail(photo, kThumbnail),
+                               named ? Printable(views.View(chosen).file) : std::string()});
     parts.push_back(MeasureColor(photo));
   }
   content->colors = Pool(parts);
@@ -111,14 +113,14 @@ const Camera& HomeOf(const PageContent& content) {
 }
 
 // The field, and beside it what takes one core: the coarse scene and the photos.
-void EncodeScene(const RadianceField& field, const WorkingViews& views, double step,
-                 PageContent* content) {
+void EncodeScene(const RadianceField& field, const WorkingViews& views,
+                 const PageOptions& options, PageContent* content) {
   std::future<void> beside = std::async(std::launch::async, [&] {
     if (const std::optional<RadianceField> coarse = CoarseField(field))
-      content->coarse = EncodeField(*coarse, step);
-    AddPhotos(views, content);
+      content->coarse = EncodeField(*coarse, options.step);
+    AddPhotos(views, options.names == "on", content);
   });
-  content->field = EncodeField(field, step);
+  content->field = EncodeField(field, options.step);
   beside.get();
 }
 
@@ -171,7 +173,7 @@ MadePage MakePage(const std::string& folder, const std::vector<std::string>& sty
                                  .InField(stored.field_from_world, stored.ndc);
   PageContent content;
   content.served = options.served;
-  EncodeScene(stored.field, views, options.step, &content);
+  EncodeScene(stored.field, views, options, &content);
   if (!options.check) stored.field.appearance = {};  // fields have gigabytes
   MadePage made;
   made.field = DecodeField(content.field);
@@ -187,6 +189,7 @@ MadePage MakePage(const std::string& folder, const std::vector<std::string>& sty
   for (size_t i = 0; i < styles.size(); ++i) {
     ReportOrThrow(progress, 1 + static_cast<int64_t>(i), steps);
     AddStyle(StyleFolder(folder, styles[i]), styles[i], stored.field, checked, &content, &made);
+    if (options.names != "off") content.styles.back().header["name"] = styles[i];
   }
   ReportOrThrow(progress, steps - 1, steps);
   if (!options.served) made.field = {}, made.places = {};

@@ -15,6 +15,7 @@ namespace regrade {
 struct PageOptions {
   double step = 0.03;
   bool check = false;
+  std::string names = "on";
   bool served = false;  // by `regrade view`
 
   template <typename Bind>
@@ -27,6 +28,11 @@ struct PageOptions {
     bind("check", check,
          {.help = "measures how far renders of the page's field and styles are from the exact "
                   "ones, and prints it"});
+    bind("names", names,
+         {.help =
+              "what the page names: on is styles and photos' files, styles are styles alone, "
+              "as in a run's own page, off is nothing, for a page that others get",
+          .choices = "on|styles|off"});
   }
 };
 

@@ -62,9 +62,12 @@ JsonValue Header(const PageContent& content, const PageCheck* check) {
   header["cameras"] = std::move(cameras);
   header["up"] = ArrayOf(Norm(up) > 1e-6 ? Normalized(up) : first.Up());
   JsonValue::Array photos, styles;
-  for (const PagePhoto& photo : content.photos)
-    photos.push_back(
-        JsonValue::Object{{"camera", photo.camera}, {"picture", JpegUrl(photo.jpeg)}});
+  for (const PagePhoto& photo : content.photos) {
+    JsonValue entry =
+        JsonValue::Object{{"camera", photo.camera}, {"picture", JpegUrl(photo.jpeg)}};
+    if (!photo.name.empty()) entry["name"] = photo.name;
+    photos.push_back(std::move(entry));
+  }
   for (size_t i = 0; i < content.styles.size(); ++i) {
     JsonValue style = content.styles[i].header;
     style["picture"] = JpegUrl(content.style_pictures.at(i));

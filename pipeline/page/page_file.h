@@ -1,6 +1,7 @@
 // Writes the page: one HTML file with the field, the styles, and what draws them.
 //
-// A page holds no names, no paths and no metadata of photos; pictures in it are encoded anew.
+// A page holds no metadata of photos; pictures in it are encoded anew. Names of styles and
+// photos are in it where its maker wants them, and nothing of where they are stored.
 // Its policy lets it load nothing: style sheet and script are named by their hashes.
 #pragma once
 
@@ -19,6 +20,7 @@ namespace regrade {
 struct PagePhoto {
   int camera = 0;    // index of PageContent::cameras
   std::string jpeg;  // a thumbnail
+  std::string name;  // printable; empty: it has none in the page
 };
 
 struct PageContent {

@@ -128,7 +128,7 @@ bool WriteScenePage(const RunContext& context, const ProgressFunction& progress)
   if (choice == "off") return false;
   const std::string name = std::filesystem::path(style.folder()).filename().string();
   const std::string html =
-      MakePage(context.workspace->folder(), {name}, PageOptions{}, progress).html;
+      MakePage(context.workspace->folder(), {name}, {.names = "styles"}, progress).html;
   if (choice == "auto" && html.size() > kLargest) {
     context.console->Info(Format("no page: it would have %.0f MB; --page on writes it",
                                  static_cast<double>(html.size()) / 1e6));

@@ -1,5 +1,6 @@
 #include "pipeline/view/view_session.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <utility>
 
@@ -52,13 +53,36 @@ void MakeFolder(const std::string& folder) {
 
 }  // namespace
 
-ViewSession::ViewSession(const std::string& folder, const std::vector<std::string>& styles,
-                         const ProgressFunction& progress)
-    : folder_(folder) {
-  MadePage made = MakePage(folder, styles, {.served = true}, progress);
+ViewSession::ViewSession(const std::string& folder) : folder_(folder) {}
+
+void ViewSession::SayWhatIsAwaited(const std::string& text) {
+  const std::lock_guard lock(mutex_);
+  awaited_ = text;
+}
+
+void ViewSession::MakePageOf(const std::vector<std::string>& styles,
+                             const ProgressFunction& progress) {
+  const auto tell = [&](const Progress& part) {
+    SayWhatIsAwaited(
+        Format("The page is being made: %.0f %%", 100 * part.done / std::max(part.total, 1.0)));
+    return Report(progress, part.done, part.total, part.note);
+  };
+  MadePage made = MakePage(folder_, styles, {.served = true}, tell);
   page_ = std::move(made.html);
   field_ = std::move(made.field);
   voxels_ = std::move(made.places.voxel);
+  const std::lock_guard lock(mutex_);
+  made_ = true;
+}
+
+std::optional<HttpResponse> ViewSession::NotYet(const std::string& target) const {
+  const std::lock_guard lock(mutex_);
+  if (made_) return std::nullopt;
+  if (target != "/page") return RefusedRequest(503, "the page is not there yet");
+  HttpResponse response;
+  response.status = 202;
+  response.body = DumpJson(JsonValue::Object{{"awaited", awaited_}}, -1);
+  return response;
 }
 
 std::vector<Route> ViewSession::Routes() {
@@ -95,21 +119,30 @@ std::vector<Route> ViewSession::Routes() {
     job_.Cancel();
     return JobState();
   };
-  return {{"GET", "/", 0, true, [this](const HttpRequest&) { return Opening(); }},
-          {"GET", "/page", 0, false, page},
-          {"POST", "/style", kMostPictureBytes, false,
-           [this](const HttpRequest& request) { return TakePicture(request); }},
-          {"POST", "/film", kMostPathBytes, false,
-           [this](const HttpRequest& request) { return TakePath(request); }},
-          {"GET", "/job", 0, false, [this](const HttpRequest&) { return JobState(); }},
-          {"DELETE", "/job", 0, false, cancel},
-          {"GET", "/learning", 0, false, [this](const HttpRequest&) { return StyleSoFar(); }},
-          {"GET", "/learning/codes", 0, false,
-           [this, codes](const HttpRequest&) { return codes(so_far_); }},
-          {"GET", "/style", 0, false, style},
-          {"GET", "/style/codes", 0, false,
-           [this, codes](const HttpRequest&) { return codes(style_); }},
-          {"GET", "/film", 0, false, film}};
+  std::vector<Route> routes{
+      {"GET", "/", 0, true, [this](const HttpRequest&) { return Opening(); }},
+      {"GET", "/page", 0, false, page},
+      {"POST", "/style", kMostPictureBytes, false,
+       [this](const HttpRequest& request) { return TakePicture(request); }},
+      {"POST", "/film", kMostPathBytes, false,
+       [this](const HttpRequest& request) { return TakePath(request); }},
+      {"GET", "/job", 0, false, [this](const HttpRequest&) { return JobState(); }},
+      {"DELETE", "/job", 0, false, cancel},
+      {"GET", "/learning", 0, false, [this](const HttpRequest&) { return StyleSoFar(); }},
+      {"GET", "/learning/codes", 0, false,
+       [this, codes](const HttpRequest&) { return codes(so_far_); }},
+      {"GET", "/style", 0, false, style},
+      {"GET", "/style/codes", 0, false,
+       [this, codes](const HttpRequest&) { return codes(style_); }},
+      {"GET", "/film", 0, false, film}};
+  for (Route& route : routes)
+    if (route.target != "/")  // which holds nothing of the scene
+      route.answer = [this, target = route.target,
+                      answer = std::move(route.answer)](const HttpRequest& request) {
+        const std::optional<HttpResponse> not_yet = NotYet(target);
+        return not_yet ? *not_yet : answer(request);
+      };
+  return routes;
 }
 
 // It holds nothing of the scene: whoever lacks the token sees an empty page.
@@ -140,8 +173,9 @@ HttpResponse ViewSession::TakePicture(const HttpRequest& request) {
   step_ = -1;
   return Accepted(job_.Start(
       "style", {"stylize", folder_, "--style", picture, "--name", name, "--until", "stylize"},
-      [this, folder = learning_] {
-        Served style = Serve(ReadNetworkFile(folder + "/network.npz"), PageStyleId(folder));
+      [this, name, folder = learning_] {
+        Served style =
+            Serve(ReadNetworkFile(folder + "/network.npz"), PageStyleId(folder), name);
         const std::lock_guard lock(mutex_);
         style_ = std::move(style);
       }));
@@ -155,7 +189,8 @@ HttpResponse ViewSession::StyleSoFar() {
   if (!state || state->step == step_) return nothing();
   step_ = state->step;
   HttpResponse response;
-  so_far_ = Serve({LipschitzNetwork(state->network), 0, field_.background}, "learning");
+  so_far_ = Serve({LipschitzNetwork(state->network), 0, field_.background}, "learning",
+                  fs::path(learning_).filename().string());
   response.body = so_far_.json;
   return response;
 }
@@ -193,10 +228,11 @@ HttpResponse ViewSession::JobState() const {
   return response;
 }
 
-ViewSession::Served ViewSession::Serve(const StoredNetwork& network,
-                                       const std::string& id) const {
+ViewSession::Served ViewSession::Serve(const StoredNetwork& network, const std::string& id,
+                                       const std::string& name) const {
   PageStyle style = EncodeStyle(network, field_, 1);
   style.header["id"] = id;
+  style.header["name"] = name;
   style.header["weights"] = Base64(style.packed);
   return {DumpJson(style.header, -1), StyledWords(style, voxels_)};
 }

@@ -2,7 +2,8 @@
 // it, and exact films of its camera paths.
 //
 //   GET /         opens the page: asks for it with the token of the address
-//   GET /page     the page, as `regrade page` writes it, allowed to ask here
+//   GET /page     the page, as `regrade page` writes it, allowed to ask here; status 202 and
+//                 what it waits for until it is made, when what follows is refused
 //   POST /style   a picture; `regrade stylize` learns it in styles/NAME/. The answer is a job
 //   POST /film    camera_path.json; `regrade render --path` writes films/. The answer is a job
 //   GET /job      the job's state
@@ -15,6 +16,7 @@
 #pragma once
 
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -30,15 +32,18 @@ inline constexpr uint64_t kMostPictureBytes = 32 << 20, kMostPathBytes = 4 << 20
 
 class ViewSession {
  public:
-  // Makes the page of the folder with these styles. Throws as MakePage.
-  ViewSession(const std::string& folder, const std::vector<std::string>& styles,
-              const ProgressFunction& progress);
+  explicit ViewSession(const std::string& folder);
 
-  // They refer to this object.
+  // They refer to this object, and may be asked before and while the page is made.
   std::vector<Route> Routes();
+  // What whoever opens the page reads until it is made.
+  void SayWhatIsAwaited(const std::string& text);
+  // Makes the page of the folder with these styles, once. Throws as MakePage.
+  void MakePageOf(const std::vector<std::string>& styles, const ProgressFunction& progress);
 
  private:
   HttpResponse Opening() const;
+  std::optional<HttpResponse> NotYet(const std::string& target) const;
   HttpResponse TakePicture(const HttpRequest& request);
   HttpResponse TakePath(const HttpRequest& request);
   HttpResponse JobState() const;
@@ -47,13 +52,16 @@ class ViewSession {
   struct Served {
     std::string json, codes;
   };
-  Served Serve(const StoredNetwork& network, const std::string& id) const;
+  Served Serve(const StoredNetwork& network, const std::string& id,
+               const std::string& name) const;
 
   const std::string folder_;
-  std::string page_;
+  std::string page_;             // with the next two unchanged once made_ is set
   RadianceField field_;          // the page's
   std::vector<int64_t> voxels_;  // of the field, in the page's order
-  mutable std::mutex mutex_;     // of what follows: jobs end on their own thread
+  mutable std::mutex mutex_;     // of what follows: pages and jobs end on their own threads
+  bool made_ = false;
+  std::string awaited_;
   Served style_, so_far_;
   std::string film_;      // the file's path
   std::string learning_;  // the style's folder

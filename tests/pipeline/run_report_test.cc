@@ -110,16 +110,30 @@ TEST(RunReport, ShowsEveryPartOfTheRun) {
     ++posters;
   EXPECT_EQ(posters, 3u);
 
-  // The scene to walk through, beside the report: without names, paths, or metadata of photos.
+  // The scene to walk through, beside the report: without paths, or names or metadata of
+  // photos.
   EXPECT_NE(page.find("<a href=\"scene.html\">"), std::string::npos);
   const std::string scene = testing::ReadText(folder / "e/styles/style_sunset/scene.html");
-  for (const char* private_part : {"sunset", ".png", ".jpg", "e/styles"})
+  EXPECT_NE(scene.find("\"name\":\"style_sunset\""), std::string::npos);
+  for (const char* private_part : {".png", ".jpg", "e/styles"})
     EXPECT_EQ(scene.find(private_part), std::string::npos) << private_part;
   EXPECT_EQ(scene.find(folder / ""), std::string::npos);
   EXPECT_NE(scene.find("id=\"network_0\""), std::string::npos);
   // "Exif" in base64: the encoder's block, without entries.
   for (size_t at = 0; (at = scene.find("RXhpZg", at)) != std::string::npos; ++at)
     EXPECT_EQ(scene.substr(at, 27), "RXhpZgAASUkqAAgAAAAAAAAAAAD");
+
+  // A page of its own names the photos, too, or nothing.
+  const auto page_of = [&folder](const std::string& names) {
+    EXPECT_EQ(
+        Regrade({"page", folder / "e", "--names", names, "--out", folder / "p.html"}).code, 0);
+    return testing::ReadText(folder / "p.html");
+  };
+  const std::string named = page_of("on"), anonymous = page_of("off");
+  EXPECT_NE(named.find("\"name\":\"style_sunset\""), std::string::npos);
+  EXPECT_NE(named.find("\"name\":\"00000.png\""), std::string::npos);
+  for (const char* private_part : {"sunset", ".png", ".jpg", "\"name\""})
+    EXPECT_EQ(anonymous.find(private_part), std::string::npos) << private_part;
 
   // The command in the report results in the same options.
   std::vector<std::string> again;

@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "kernels/process/child_process.h"
+#include "pipeline/files/atomic_file.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/page/color_code.h"
 #include "tests/support/hostile_requests.h"
@@ -106,8 +107,19 @@ TEST(ViewCommand, ADroppedPictureBecomesAStyleAndAPathTheFilmOfRender) {
   ASSERT_EQ(made.code, 0) << made.text;
   const auto before = OtherFiles(folder / "");
 
+  // The address comes before the scene, whose fit may still be at work, and the page with it.
+  fs::rename(folder / "e/field.npz", folder / "field.npz");
   const ViewProgram view(folder / "e");
   ASSERT_NE(view.port(), 0);
+  EXPECT_EQ(StatusOf(view.Ask("GET", "/")), 200);
+  const std::string awaited = view.Ask("GET", "/page");
+  EXPECT_EQ(StatusOf(awaited), 202);
+  EXPECT_NE(ParseJson(BodyOf(awaited), "page").At("awaited").AsString().find(folder / "e"),
+            std::string::npos);
+  EXPECT_EQ(StatusOf(view.Ask("GET", "/job")), 503);
+  fs::rename(folder / "field.npz", folder / "e/field.npz");
+  while (StatusOf(view.Ask("GET", "/page")) == 202)
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
   const std::string opening = view.Ask("GET", "/");
   EXPECT_EQ(StatusOf(opening), 200);
   EXPECT_EQ(opening.find("id=\"scene\""), std::string::npos);
@@ -139,6 +151,7 @@ TEST(ViewCommand, ADroppedPictureBecomesAStyleAndAPathTheFilmOfRender) {
   EXPECT_FALSE(fs::exists(folder / "e/styles/an_evil_name/frames"));  // of later stages
   const JsonValue style = ParseJson(BodyOf(view.Ask("GET", "/style")), "style");
   EXPECT_GT(style.At("weights").AsString().size(), 1000u);
+  EXPECT_EQ(style.At("name").AsString(), "an_evil_name");
   const std::string codes = BodyOf(view.Ask("GET", "/style/codes"));
   constexpr size_t kVoxel = 4 * kCodeWords;  // bytes
   EXPECT_GT(codes.size(), kVoxel * 100);
@@ -171,6 +184,19 @@ TEST(ViewCommand, ADroppedPictureBecomesAStyleAndAPathTheFilmOfRender) {
   EXPECT_EQ(view.Finished().At("state").AsString(), "cancelled");
 
   EXPECT_EQ(OtherFiles(folder / ""), before);
+}
+
+TEST(ViewCommand, EndsWhereNoSceneWillCome) {
+  const TemporaryFolder folder;
+  const auto code_of = [&folder](const std::vector<std::string>& words) {
+    return testing::RunProgram(REGRADE_PROGRAM, words).code;
+  };
+  fs::create_directories(folder / "no run");
+  EXPECT_EQ(code_of({"view", folder / "no run"}), 3);
+  fs::create_directories(folder / "begun/.regrade");
+  EXPECT_EQ(code_of({"view", folder / "begun", "night"}), 3);  // a style before its scene
+  WriteFileAtomically(folder / "begun/field.npz", "damaged");
+  EXPECT_EQ(code_of({"view", folder / "begun"}), 3);
 }
 
 }  // namespace

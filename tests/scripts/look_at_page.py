@@ -5,7 +5,7 @@
 
 FOLDER is write_scene_pages's: pages NAME.html with views and pixels in NAME.json. Checked of each page: its pictures, its style's bound,
 nothing asked of the network, nothing on the console (a violation of the page's policy is an error there), no scrolling
-sideways at the sizes of a phone and a desktop; of some, that a coarse picture comes first and that workers aren't needed; of the
+sideways at the sizes of a phone and a desktop, where words and the first view are in the window, names; of some, that it opens styled, that a coarse picture comes first and that workers aren't needed; of the
 first one, that keys and the slider change the picture. Everything
 that keys can do is walk_page.py's, long use and damage strain_page.py's.
 --shots keeps pictures of the pages. Exit status 1 if anything is wrong, 77 if there is no Chromium.
@@ -34,6 +34,35 @@ def check_controls(page, width):
     if outside:
         found.append(f"{outside} controls are outside the window")
     return found
+
+
+def check_places(page, size):
+    """Words leave the scene's middle free, and in a window narrower than the photo all of the photo's width is seen at home."""
+    found = []
+    page.value("globalThis.said = message.textContent; message.textContent = 'A sentence of several words. '.repeat(3); "
+               "cancel.hidden = false; 0")
+    for id in ["message", "cancel"]:
+        box = page.value("(() => { const r = %s.getBoundingClientRect(); return [r.left, r.top, r.right, r.bottom] })()" % id)
+        middle = [0.25 * size[0], 0.25 * size[1], 0.75 * size[0], 0.75 * size[1]]
+        if box[0] < middle[2] and box[2] > middle[0] and box[1] < middle[3] and box[3] > middle[1]:
+            found.append(f"{id} covers the scene's middle: {[round(v) for v in box]} of {size}")
+        if not (0 <= box[0] < box[2] <= size[0] and 0 <= box[1] < box[3] <= size[1]):
+            found.append(f"{id} is not in the window: {[round(v) for v in box]} of {size}")
+    page.value("message.textContent = said; cancel.hidden = true; home.click(); 0")
+    # Half the width over the focal length: the tangent of what is seen to each side.
+    seen, photo, high = page.value("(() => { const {painter, view} = regradePage, {width, height} = painter.full, {lens} = "
+                                   "painter.pictureOf(width, height).view; return [width / 2 / lens[0], view.half[0], "
+                                   "height / 2 / lens[1] / view.half[1]] })()")
+    narrow = size[0] / size[1] < photo / page.value("regradePage.view.half[1]")
+    if narrow and abs(seen / photo - 1) > 1e-9 or not narrow and not (seen >= photo and high < 1):
+        found.append(f"a window of {size} shows {seen / photo:.3f} of the photo's width and {high:.3f} of its height")
+    return found
+
+
+def check_names(page):
+    """The owner's page says what styles and photos are called."""
+    said = page.value("[styles.textContent.includes('evening'), photos.querySelector('button').ariaLabel.endsWith('left.jpg')]")
+    return [] if all(said) else ["the page does not name its style and its photos"]
 
 
 def check_input(page):
@@ -191,7 +220,7 @@ def check_folder(browser, arguments):
             views = json.load(file)
         for size_name, size in SIZES.items() if number == 0 else [("phone", SIZES["phone"])]:
             page = open_page(browser, path, size, scale=1 if number == 0 or arguments.shots else FEW_PIXELS)
-            here = check_controls(page, size[0])
+            here = check_controls(page, size[0]) + check_places(page, size) + check_names(page)
             if size_name == "phone":
                 here += compare_pictures(page, views) + check_bound(page)
             elif number == 0:
@@ -203,7 +232,7 @@ def check_folder(browser, arguments):
             here += complaints(page)
             found += [f"{name}, {size_name}: {complaint}" for complaint in here]
             page.close()
-        if number == 0 or name in ("uniform", "spheres"):
+        if number == 0 or name in ("uniform", "spheres", "spheres_object"):
             found += [f"{name}, opening: {c}" for c in check_coarse_first(browser, path) + check_without_workers(browser, path, views)]
         if number == 0 or name in ("uniform_near", "levels_residual"):
             found += [f"{name}, {c}" for c in check_cores(browser, path, views)]

@@ -3,7 +3,7 @@
 
   look_at_view.py REGRADE [--run FOLDER] [--shots FOLDER] [--chromium PROGRAM]
 
-Checked: the opening answer becomes the page; a dropped picture shows its colours at once, then its style, which the page
+Checked: the opening answer says that the scene is awaited, and becomes the page; a dropped picture shows its colours at once, then its style, which the page
 draws, and the folder keeps it; the exact film comes; a second tab without the token sees nothing; nothing is asked of
 another host, and nothing is on the console. --run takes a folder of `regrade run` or `reconstruct` instead of a small scene, and writes
 into it; the window then has 320 x 180 pixels. Exit status 1 if anything is wrong, 77 if there is no Chromium.
@@ -66,6 +66,17 @@ def start(regrade, folder):
     raise RuntimeError("regrade view has ended")
 
 
+def check_waiting(browser, address, field, away):
+    """Before the scene is there the page says what it waits for; then it opens by itself."""
+    page = Page(browser, address, SIZES["phone"], scale=FEW_PIXELS)
+    wait_until(page, "/has no scene yet/.test(message.textContent)")
+    os.rename(away, field)
+    wait_until(page, "!!globalThis.regradePage?.begun")
+    found = complaints(page)
+    page.close()
+    return found
+
+
 def check_view(browser, address, folder, shots, size):
     found = []
     page = open_page(browser, address, size, scale=1 if shots else FEW_PIXELS)
@@ -115,10 +126,14 @@ def main():
             status, error = call([arguments.regrade, "reconstruct", capture, "--out", folder] + SMALL)
             if status:
                 raise RuntimeError(error)
+        field, away = os.path.join(folder, "field.npz"), os.path.join(scratch, "field.npz")
+        if not arguments.run:
+            os.rename(field, away)
         program, address = start(arguments.regrade, folder)
         try:
             with running(arguments.chromium) as browser:
-                found = check_view(browser, address, folder, arguments.shots, (320, 180) if arguments.run else SIZES["phone"])
+                found = [] if arguments.run else check_waiting(browser, address, field, away)
+                found += check_view(browser, address, folder, arguments.shots, (320, 180) if arguments.run else SIZES["phone"])
         finally:
             program.terminate()
             time.sleep(0.2)

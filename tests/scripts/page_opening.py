@@ -1,4 +1,4 @@
-"""How a scene page opens: the coarse scene first, then the whole one, with workers and without; a module of other scripts."""
+"""How a scene page opens: styled, the coarse scene first, then the whole one, with workers and without; a module of other scripts."""
 
 from browser import FEW_PIXELS, SIZES, Page, complaints, open_page, wait_until
 from page_pictures import compare_pictures
@@ -35,6 +35,40 @@ CANVAS = """((name) => {
 })('NAME')"""
 
 
+# What each drawn scene shows first, noted as the painter takes it: whether it has the style that is wanted.
+TAKEN = """(() => {
+  const {painter} = regradePage, take = painter.take;
+  globalThis.taken = [];
+  painter.take = (scene) => {
+    taken.push(regradePage.setsOf(regradePage.weights(), scene).some((set) => set.colors !== scene.source));
+    take.call(painter, scene);
+  };
+})()"""
+
+
+def check_styled_first(page):
+    """While the whole scene is held back, the coarse one has the style, and its slider works; the words name what is not there yet."""
+    found = []
+    style = page.value("regradePage.header.styles[0]")
+    if page.value("regradePage.weights()[0]") != style["strength"]:
+        found.append("the style does not begin with its strength")
+    for_object = bool((style.get("residual") or {}).get("weight"))
+    words = page.value("message.textContent")
+    # What a style does to an object only is not known of coarse voxels.
+    if page.value("style0.disabled") != for_object or (style["name"] in words) != for_object:
+        found.append(f"the slider of what {'is not' if for_object else 'is'} shown is wrong, or the words: '{words}'")
+    if for_object:
+        return found
+    page.value(CANVAS.replace("NAME", "styled"))
+    page.value("style0.value = 0; style0.dispatchEvent(new Event('input')); 0")
+    wait_until(page, "regradePage.painter.settled")
+    if page.value(CANVAS.replace("NAME", "styled"))[0] < 10:
+        found.append("the coarse scene is not styled, or its slider does nothing")
+    page.value("style0.value = 100; style0.dispatchEvent(new Event('input')); 0")
+    wait_until(page, "regradePage.painter.settled")
+    return found
+
+
 def check_coarse_first(browser, path):
     """While the whole scene is held back, the coarse one is drawn and answers keys; then it is replaced, and its bytes are free."""
     found = []
@@ -48,7 +82,11 @@ def check_coarse_first(browser, path):
     wait_until(page, "regradePage.painter.settled")
     if page.value(CANVAS.replace("NAME", "coarse"))[1] < 10:
         found.append("the coarse picture is of one colour")
-    page.value("home.click(); globalThis.seen = JSON.stringify(regradePage.view.save()); 0")
+    found += check_styled_first(page)
+    page.value("globalThis.kept = null; home.click(); 0")
+    wait_until(page, "regradePage.painter.settled")
+    page.value(CANVAS.replace("NAME", "coarse"))
+    page.value("globalThis.seen = JSON.stringify(regradePage.view.save()); 0")
     page.call("Input.dispatchKeyEvent", type="keyDown", key="ArrowRight")
     try:
         wait_until(page, "JSON.stringify(regradePage.view.save()) !== seen", 20)
@@ -58,12 +96,13 @@ def check_coarse_first(browser, path):
     wait_until(page, "regradePage.painter.settled")
     page.value("home.click(); 0")
     coarse = page.value("[regradePage.scene].concat(regradePage.painter.scene.tree.bytes)")[1]
+    page.value(TAKEN)
     page.value("letThrough(); 0")
     wait_until(page, "!!regradePage.picture && regradePage.begun && regradePage.painter.settled && message.textContent === ''")
     if page.value("!!regradePage.painter.shown.coarse || regradePage.painter.scene !== regradePage.scene"):
         found.append("the coarse scene stays")
-    page.value("regradePage.state.amount = [0, 0]; regradePage.changed(); 0")
-    wait_until(page, "regradePage.painter.settled")
+    if page.value("taken.join()") != "true" or page.value("style0.disabled"):
+        found.append("the whole scene is shown without its style, or not once")
     apart, spread = page.value(CANVAS.replace("NAME", "coarse"))
     print(f"  coarse picture: {apart:.0f} in mean square from the whole one, whose own colours spread by {spread:.0f}")
     # An unrelated picture of the same colours would be twice their spread apart. The scenes are random: their means say little.

@@ -4,8 +4,8 @@
   page_times.py SCENE.html [--size WxH] [--without-workers] [--chromium PROGRAM]
 
 Prints seconds from the beginning of the navigation: the picture in the file, the coarse scene drawn, the whole scene drawn as
-while moving and at rest; of the first style from then on, of each other one from its beginning; the longest pause of the page's own thread
-until the whole scene is there; bytes on the graphics processor, now and at most; the heap after garbage collection and the
+while moving and at rest, both with the first style; of each other style from its beginning; the longest pause of the page's own thread
+until the whole scene is drawn; bytes on the graphics processor, now and at most; the heap after garbage collection and the
 page's bytes; requests, and violations of the page's policy or other messages; and the machine's load. --without-workers
 takes the workers away, as some browsers do for a file. Exit status 1 for requests, messages or a heap of 3 pages, 77 if
 there is no Chromium.
@@ -22,14 +22,13 @@ MARKS = """(() => {
   let before = performance.now();
   const look = () => {
     const now = performance.now(), p = globalThis.regradePage, shown = p?.painter?.shown;
-    if (!marks.source) marks.pause = Math.max(marks.pause, (now - before) / 1000);
+    if (!marks.whole) marks.pause = Math.max(marks.pause, (now - before) / 1000);
     before = now;
     const mark = (name, is) => { if (is) marks[name] ??= now / 1000; };
     mark('picture', document.getElementById('poster')?.complete);
     mark('coarse', shown);
-    mark('source', shown && !shown.coarse);
-    mark('at rest', marks.source && p.painter.settled);
-    mark('style 1', p?.begun && p.header.styles.length > 0);
+    mark('whole', shown && !shown.coarse);
+    mark('at rest', marks.whole && p.painter.settled);
     if (!p?.begun || !marks['at rest']) setTimeout(look, 5);
   };
   look();
@@ -51,14 +50,12 @@ HEAP_PAGES = 3
 
 def measure(page, file):
     found = []
-    wait_until(page, "!!marks.source && regradePage.begun && regradePage.painter.settled && message.textContent === ''", 1200)
+    wait_until(page, "!!marks.whole && regradePage.begun && regradePage.painter.settled && message.textContent === ''", 1200)
     marks = page.value("marks")
     pause = marks.pop("pause")
-    for name in ["picture", "coarse", "source", "at rest"]:
+    for name in ["picture", "coarse", "whole", "at rest"]:
         print(f"{name:8} {marks.get(name, float('nan')):7.2f} s")
-    if "style 1" in marks:
-        print(f"style 1  {marks['style 1'] - marks['source']:7.2f} s after the source")
-    print(f"pause    {pause:7.2f} s at the longest, until the source is there")
+    print(f"pause    {pause:7.2f} s at the longest, until the whole scene is drawn")
     print(f"graphics {page.value('regradePage.graphics.bytes') / 1e6:7.1f} MB, at most {page.value('regradePage.graphics.most') / 1e6:.1f}, with "
           f"{page.value('regradePage.colors.filter(Boolean).length')} styles")
     for i in range(1, page.value("regradePage.header.styles.length")):

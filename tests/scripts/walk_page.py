@@ -25,8 +25,8 @@ RING_CONTRAST = 3  # WCAG 2.2, 1.4.11
 # Everything that can be operated, with what says that it was.
 SETUP = """(async () => {
   const p = regradePage, style = {...p.header.styles[0], weights: network_0.textContent};
-  await p.putStyle(1, style);
-  await p.putStyle(2, style);
+  await p.putStyle(1, {...style, name: 'noon'});
+  await p.putStyle(2, {...style, name: 'night'});
   const c = document.createElement('canvas'), x = c.getContext('2d');
   c.width = c.height = 64;
   x.fillStyle = '#a60'; x.fillRect(0, 0, 40, 64);
@@ -219,6 +219,14 @@ def check_work(page):
     at("#film_fps", "Escape", "path.hidden && document.activeElement === show_path")
     at("#show_facts", " ", "!facts.hidden && show_facts.ariaExpanded === 'true' && facts.textContent.includes('Voxels')")
     at("#show_facts", " ", "facts.hidden && show_facts.ariaExpanded === 'false'")
+    at("#show_help", "Enter", "!help.hidden && show_help.ariaExpanded === 'true' && document.activeElement === help")
+    found.extend(check_contrast(page))
+    press(page, "Escape")
+    found.extend(has(page, "the controls", "help.hidden && document.activeElement === show_help", "Escape"))
+    press(page, "?")
+    found.extend(has(page, "the controls", "document.activeElement === help && /W A S D/.test(help.textContent)", "?"))
+    press(page, "?")
+    found.extend(has(page, "the controls", "help.hidden && show_help.ariaExpanded === 'false'", "? again"))
     at("#remove_picture", " ", "dropped.hidden")
     page.call("Page.setInterceptFileChooserDialog", enabled=True)
     for place, sheet in [("#open_picture", None), ("#open_path", "show_path.click()")]:

@@ -139,12 +139,13 @@ void WritePages(const std::string& folder, const std::string& name, const Radian
   if (kind != Layers::kNone) layers = SomeLayers(kind, places.voxel.size());
   content.styles = {EncodeStyle(Style(), page, 0.5, layers, places)};
   content.styles[0].header["id"] = "a";
+  content.styles[0].header["name"] = "evening";
   const Image picture(8, 6, 3);
   content.poster = EncodeJpeg(picture, 80);
   content.style_pictures = {content.poster};
   content.colors.mean = {0.4, 0.3, 0.5};
   content.colors.covariance = {{{0.05, 0.02, 0.01}, {0.02, 0.04, 0.01}, {0.01, 0.01, 0.06}}};
-  content.photos = {{0, content.poster}, {1, content.poster}};
+  content.photos = {{0, content.poster, "left.jpg"}, {1, content.poster, "right.jpg"}};
   JsonValue::Array views;
   page.appearance = PadShBasis(std::move(page.appearance), 9);
   const RadianceField& styled = content.styles[0].styled;

@@ -3,14 +3,16 @@
 // `changed` asks for a new picture, `fillFacts` for the sheet about the scene.
 function bindActions(header, view, state, changed, fillFacts) {
   const press = (id, on) => element(id).ariaPressed = on;
-  const sheets = [['show_path', 'path'], ['show_facts', 'facts']];
+  const sheets = [['show_path', 'path'], ['show_facts', 'facts'], ['show_help', 'help']];
   const toggle = (sheet) => () => {
     const open = element(sheet).hidden;
     for (const [b, s] of sheets) {
+      if (element(s).contains(document.activeElement)) element(b).focus();
       element(s).hidden = s !== sheet || !open;
       element(b).ariaExpanded = s === sheet && open;
     }
     if (sheet === 'facts') fillFacts();
+    if (sheet === 'help' && open) element('help').focus();  // it has nothing else to reach by keys
   };
   const actions = {
     home() { view.go(view.photos[header.home]); view.pivot = view.pivotOfHome; changed(); },
@@ -23,12 +25,8 @@ function bindActions(header, view, state, changed, fillFacts) {
       changed();
     }};
   actions.keys = {h: actions.home, f: actions.mode, c: () => actions.original(true), v: actions.halve,
-                  k: toggle('path'), i: toggle('facts'), escape: () => {
-                    for (const [b, s] of sheets) {
-                      if (element(s).hidden) continue;
-                      if (element(s).contains(document.activeElement)) element(b).focus();
-                      toggle(s)();
-                    }
+                  k: toggle('path'), i: toggle('facts'), '?': toggle('help'), escape: () => {
+                    for (const [, s] of sheets) if (!element(s).hidden) toggle(s)();
                   }};
   actions.released = {c: () => actions.original(false)};
   element('home').onclick = actions.home;
@@ -36,6 +34,7 @@ function bindActions(header, view, state, changed, fillFacts) {
   element('halve').onclick = actions.halve;
   element('show_path').onclick = actions.keys.k;
   element('show_facts').onclick = actions.keys.i;
+  element('show_help').onclick = actions.keys['?'];
   const compare = element('compare');
   compare.onpointerdown = () => actions.original(true);
   compare.onpointerup = compare.onpointerleave = compare.onblur = () => actions.original(false);

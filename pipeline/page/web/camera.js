@@ -107,6 +107,11 @@ class View {
     const focal = Math.sqrt(wide * high);
     return {rotation, eye: this.eye, lens: exact ?? [focal, focal, width / 2, height / 2]};
   }
+  // For a window, which may be a phone's held upright: the photo's whole width is seen in it, so that nothing is cut off at the sides.
+  inWindow(width, height) {
+    const at = this.at(width, height), focal = Math.min(at.lens[0], width / (2 * this.half[0]));
+    return {...at, lens: [focal, focal, width / 2, height / 2]};
+  }
   // For keyframes.
   save() { return {eye: this.eye.slice(), forward: this.forward.slice(), up: this.top.slice(), half: this.half.slice()}; }
 }

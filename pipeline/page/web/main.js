@@ -30,78 +30,84 @@ async function start(page) {
   const gl = canvas.getContext('webgl2', {antialias: false, preserveDrawingBuffer: true, powerPreference: 'high-performance'});
   if (!gl) throw new PageError('this browser has no WebGL 2, or has switched it off');
   if (typeof DecompressionStream === 'undefined') throw new PageError('this browser is too old');
+  // It opens as its first style shows it. `ready`: a style can be shown.
+  const state = page.state ??= {axes: [0, 1], amount: [header.styles[0]?.strength ?? 0, 0], ready: header.styles.length === 0,
+                                original: false, split: false, cut: 0.5, map: null, playing: null};
+  let unpacked = 0;
+  const sayUnpacked = () => say((state.ready ? '' : styleTitle(header, 0) + ' is coming. ') +
+                                    'The scene is being unpacked: ' + Math.round(100 * unpacked) + ' %');
+  sayUnpacked();
   const decoded = decodedField(header, '', true, (part) => {
-    if (page.round === round) say('The scene is being unpacked: ' + Math.round(100 * part) + ' %');
+    unpacked = part;
+    if (page.round === round) sayUnpacked();
   });
-  decoded.catch(() => {});  // it is awaited below
   const graphics = new Graphics(gl);
   if (location.hash === '#cores') graphics.onCores = true;
-  let scene = await loadCoarse(header, graphics), painter = null;
-  const takeWhole = async () => {
-    const made = await decoded;
-    if (page.round !== round) return null;  // the context was lost meanwhile
-    const next = await loadScene(header, made, graphics), before = scene;
-    scene = page.scene = next;
-    before?.free();
-    painter?.take(scene);
-    return scene;
-  };
-  const whole = takeWhole();
+  // Null: the context was lost meanwhile.
+  const whole = decoded.then((made) => {
+    unpacked = 1;
+    return page.round === round ? loadScene(header, made, graphics) : null;
+  });
   whole.catch(() => {});  // it is awaited below
-  if (!scene) await whole;
+  let scene = await loadCoarse(header, graphics) ?? await whole, painter = null;
   if (page.round !== round) return;
   const view = page.view ??= new View(header);
-  const state = page.state ??= {axes: [0, 1], amount: [0, 0], original: false, split: false, cut: 0.5, map: null, playing: null};
-  const colors = header.styles.map(() => null), loading = header.styles.map(() => null);
+  const coarse = scene.coarse ? new SceneStyles(graphics, Promise.resolve(scene), header) : null;
+  const styles = new SceneStyles(graphics, whole, header), {colors, loading} = styles;
 
   const weights = () => header.styles.map((_, i) => {
     const axis = state.axes.indexOf(i);
     return axis >= 0 ? state.amount[axis] ?? 0 : 0;
   });
-  function setsOf(wanted) {
+  const stylesOf = (of) => of.coarse ? coarse : styles;
+  function setsOf(wanted, of = scene) {
     let rest = 1;
-    const sets = [];
+    const sets = [], known = stylesOf(of).colors;
     wanted.forEach((weight, i) => {
-      if (!(weight > 0) || !colors[i] || sets.length === 2) return;
-      sets.push({weight, colors: colors[i]});
+      if (!(weight > 0) || !known[i] || sets.length === 2) return;
+      sets.push({weight, colors: known[i]});
       rest -= weight;
     });
-    return rest > 1e-6 || sets.length === 0 ? [{weight: Math.max(rest, 0), colors: scene.source}, ...sets] : sets;
+    return rest > 1e-6 || sets.length === 0 ? [{weight: Math.max(rest, 0), colors: of.source}, ...sets] : sets;
   }
-  const free = (set) => {
-    for (const texture of [set?.color, set?.texel])
-      if (texture && texture !== scene.source.texel) graphics.free(texture);
-  };
-  const forget = (i) => {
-    free(colors[i]);
-    colors[i] = loading[i] = null;
-  };
+  const failed = (error) => { if (page.round === round && !gl.isContextLost()) fail(error); };
+  const tried = new Set();  // styles whose loading has ended, well or not
   function load(i, codes) {
-    return loading[i] ??= whole.then(() => styleColors(graphics, scene, header.styles[i], 'network_' + i, (part) => {
-      say(part < 1 ? 'Style ' + (i + 1) + ' is being applied: ' + Math.round(100 * part) + ' %' : '');
-    }, codes)).then((made) => {
-      colors[i] = made;
+    return loading[i] ??= styles.make(i, (part) => {
+      say(part < 1 ? styleTitle(header, i) + ' is being applied: ' + Math.round(100 * part) + ' %' : '');
+    }, codes).then(() => {
       // Of many styles those that no slider shows make room.
       if (colors.filter(Boolean).length > 3)
-        colors.forEach((c, k) => { if (c && k !== i && !state.axes.includes(k)) forget(k); });
+        colors.forEach((c, k) => { if (c && k !== i && !state.axes.includes(k)) styles.forget(k); });
       say('');
       painter.change();
-    }).catch(fail);
+    }).catch(failed).finally(() => tried.add(i));
   }
+  // What the sliders want, of the scene that is shown and of the whole one.
+  const wanted = () => weights().flatMap((weight, i) => weight > 0 ? [i] : []);
+  const loadWanted = () => Promise.all(wanted().map((i) => {
+    const made = load(i);
+    return scene.coarse ? coarse.loading[i] ??= coarse.make(i, () => {}, null).then(() => painter.change()).catch(failed) : made;
+  }));
+  const isStyled = () => wanted().every((i) => stylesOf(scene).colors[i]);
   const pictureOf = (width, height) => {
     const styled = setsOf(weights()), source = [{weight: 1, colors: scene.source}];
     const {map} = state;
     const parts = state.original ? [{from: 0, to: 1, sets: source}]
         : state.split ? [{from: 0, to: state.cut, sets: source}, {from: state.cut, to: 1, sets: styled, map}]
         : [{from: 0, to: 1, sets: styled, map}];
-    return {view: view.at(width, height), parts};
+    return {view: view.inWindow(width, height), parts};
   };
   painter = new Painter(canvas, graphics, scene, pictureOf);
-  const changed = () => painter.change();
+  let sayUnstyled = () => {};
+  const changed = () => {
+    if (wanted().length === 0) sayUnstyled();
+    painter.change();
+  };
   let showStyles;
   const refreshStyles = () => {
     showStyles = bindStyles(header, state, () => {
-      weights().forEach((weight, i) => weight > 0 && !loading[i] && load(i));
+      loadWanted();
       changed();
     });
     element('compare').hidden = element('halve').hidden = header.styles.length === 0 && !state.map;
@@ -112,7 +118,7 @@ async function start(page) {
   const take = (key) => {
     Object.assign(view, {eye: key.eye.slice(), forward: unit(key.forward), top: unit(key.up), half: key.half.slice()});
     state.axes.forEach((style, axis) => { if (style < key.weights.length) state.amount[axis] = key.weights[style]; });
-    key.weights.forEach((weight, i) => weight > 0 && !loading[i] && load(i));
+    loadWanted();
     showStyles();
     changed();
   };
@@ -122,10 +128,7 @@ async function start(page) {
     const isNew = i === header.styles.length, before = colors[i];
     element('network_' + i)?.remove();
     document.body.append(make('script', {type: 'application/octet-stream', id: 'network_' + i, textContent: packed}));
-    if (isNew) {
-      colors.push(null);
-      loading.push(null);
-    } else {
+    if (!isNew) {
       loading[i] = null;  // what is shown stays until the next one is ready
       page.added.pop();
       header.styles.pop();
@@ -133,7 +136,7 @@ async function start(page) {
     page.added.push(style);
     header.styles.push(style);
     await load(i, codes);
-    if (before !== colors[i]) free(before);
+    if (before !== colors[i]) styles.free(before);
     if (!isNew) return;
     const axis = Math.min(i, 1);
     state.axes = axis === 0 ? [0, 1] : [state.axes[0], i];
@@ -144,8 +147,9 @@ async function start(page) {
     changed();
   };
   const removeStyle = (i) => {
-    forget(i);
-    for (const list of [header.styles, page.added, colors, loading]) list.pop();
+    styles.forget(i);
+    header.styles.pop();
+    page.added.pop();
     Object.assign(state, {axes: [0, 1], amount: [0, 0]});
     refreshStyles();
     changed();
@@ -158,11 +162,11 @@ async function start(page) {
   }, (file) => page.learned = learnStyle(page, file));
   // A moment of the path, as the canvas would show it.
   const pictureOfPath = async (key, width, height) => {
-    await whole;
+    const full = await whole;
     for (let i = 0; i < key.weights.length; ++i) if (key.weights[i] > 0) await load(i);
     const target = graphics.target(width, height);
     const at = Object.assign(Object.create(view), {eye: key.eye, forward: key.forward, top: key.up, half: key.half});
-    graphics.draw(scene, at.at(width, height), setsOf(key.weights), state.map, target, {x: 0, y: 0, width, height}, 1 / 64, false);
+    graphics.draw(full, at.at(width, height), setsOf(key.weights, full), state.map, target, {x: 0, y: 0, width, height}, 1 / 64, false);
     const pixels = graphics.read(target);
     target.free();
     await wait();
@@ -215,6 +219,15 @@ async function start(page) {
     keys: Object.fromEntries(Object.keys(actions.keys).map((k) => [k, () => page.actions.keys[k]()])),
     released: {c: () => page.actions.released.c()}});
   Object.assign(page, {actions, changed, graphics, painter, header, load, colors, setsOf, weights, resize: () => painter.resize()});
+  // The picture in the file, which has the style, stays until the scene has it too.
+  await loadWanted();
+  if (page.round !== round) return;
+  const showReady = () => {
+    state.ready ||= isStyled();
+    showStyles();
+  };
+  showReady();
+  if (scene.coarse && state.ready && unpacked < 1) sayUnpacked();
   canvas.classList.add('ready');
   let before = performance.now();
   const run = page.run = () => {
@@ -237,8 +250,21 @@ async function start(page) {
     requestAnimationFrame(run);
   };
   run();
-  if (!await whole) return;
-  say('');
+  const full = await whole;
+  if (!full) return;
+  // So does the coarse scene, unless no style is wanted.
+  while (wanted().some((i) => !tried.has(i)))
+    await Promise.race([new Promise((done) => sayUnstyled = done), Promise.all(wanted().map((i) => load(i)))]);
+  if (page.round !== round) return;
+  const first = scene;
+  scene = page.scene = full;
+  if (first.coarse) {
+    painter.take(scene);
+    await coarse.end();
+    first.free();
+  }
+  showReady();
+  if (isStyled()) say('');
   // For tests: RGBA rows from the bottom, of any view and weights; with `count` the fetches of each ray.
   page.picture = async ({rotation, eye, lens, width, height, weights: wanted, count, opacityStep = 0}) => {
     for (let i = 0; i < wanted.length; ++i) if (wanted[i] > 0) await load(i);
@@ -248,15 +274,6 @@ async function start(page) {
     target.free();
     return pixels;
   };
-  weights().forEach((weight, i) => weight > 0 && load(i));
-  if (!page.begun && header.styles.length > 0) {
-    await load(0);
-    if (colors[0] && !state.map && state.amount.every((v) => v === 0)) {
-      state.amount[0] = header.styles[0].strength;
-      showStyles();
-      changed();
-    }
-  }
   page.begun = true;
 }
 

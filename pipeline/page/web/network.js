@@ -67,7 +67,7 @@ async function styleColors(graphics, scene, style, id, progress, codes = null) {
     for (let y = 0, rows = 1, strips = 0; y < height; ++strips) {
       const begun = performance.now();
       // The first strip compiles; the second says how long all would take.
-      if (strips === 2 && mayLeave && (begun - second) * height / 1000 > 5) return false;
+      if (strips === 2 && mayLeave && (begun - second) * height / 1000 > (scene.coarse ? 1 : 5)) return false;
       if (strips === 1) second = begun;
       gl.useProgram(p.program);
       gl.bindVertexArray(graphics.array);
@@ -115,7 +115,7 @@ async function styleColors(graphics, scene, style, id, progress, codes = null) {
   }
   const fast = !codes && (graphics.onCores !== true || !workersRun) &&
       await pass(colors.color, scene.header.finest === null ? 2 : 0, source.color, workersRun);
-  if (!codes) graphics.onCores = !fast;
+  if (!codes && !scene.coarse) graphics.onCores = !fast;
   if (!codes && !fast) await restyleOnCores(graphics, scene, style, layers, {place, residual}, colors, progress);
   if (source.texel && style.residual?.weight) {  // what is not of the object stays
     Object.assign(colors, {texel: source.texel, texelScale: source.texelScale});

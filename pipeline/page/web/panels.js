@@ -32,13 +32,17 @@ function saveFile(blob, name) {
   setTimeout(() => URL.revokeObjectURL(url), 10000);
 }
 
+// A page that is made for others may have no names.
+const styleName = (header, i) => header.styles[i].name ?? 'Style ' + (i + 1);
+const styleTitle = (header, i) => header.styles[i].name ? 'Style "' + header.styles[i].name + '"' : 'Style ' + (i + 1);
+
 // A slider for each of two axes; of two styles or more, the axes' styles can be chosen.
 function bindStyles(header, state, changed) {
   const count = header.styles.length, box = element('styles');
   box.replaceChildren();
   const update = [];
   for (let axis = 0; axis < Math.min(2, count); ++axis) {
-    const id = 'style' + axis, name = (i) => 'Style ' + (i + 1);
+    const id = 'style' + axis, name = (i) => styleName(header, i);
     const picture = make('img', {alt: '', src: header.styles[state.axes[axis]].picture});
     const output = make('output', {htmlFor: id, ariaHidden: 'true'});  // the slider says it
     const slider = make('input', {id, type: 'range', min: 0, max: 100, value: 100 * state.amount[axis]});
@@ -56,12 +60,14 @@ function bindStyles(header, state, changed) {
       });
       label.append(select);
     } else {
-      label.append(make('label', {htmlFor: id, textContent: count > 1 ? name(axis) : 'Original to style'}));
+      const text = count > 1 || header.styles[axis].name ? name(axis) : 'Original to style';
+      label.append(make('label', {htmlFor: id, textContent: text, title: text}));
     }
     const show = () => {
       slider.value = Math.round(100 * state.amount[axis]);
+      slider.disabled = !state.ready;
       slider.ariaValueText = output.textContent = Math.round(100 * state.amount[axis]) + ' %';
-      if (count > 2) slider.ariaLabel = 'Weight of style ' + (state.axes[axis] + 1);
+      if (count > 2) slider.ariaLabel = 'Weight of ' + name(state.axes[axis]);
     };
     slider.addEventListener('input', () => {
       state.amount[axis] = slider.value / 100;
@@ -83,7 +89,7 @@ function bindPhotos(header, view, changed) {
   const box = element('photos');
   box.replaceChildren();
   header.photos.forEach((photo, i) => {
-    const button = make('button', {title: 'Place of photo ' + (i + 1), ariaLabel: 'Place of photo ' + (i + 1)},
+    const place = 'Place of photo ' + (photo.name ?? i + 1), button = make('button', {title: place, ariaLabel: place},
                         make('img', {alt: '', src: photo.picture, loading: 'lazy'}));
     button.addEventListener('click', () => {
       view.go(view.photos[photo.camera]);
@@ -156,7 +162,7 @@ function factsOf(header, scene, graphics, painter) {
     ['A frame while moving', painter.frameTime.toFixed(0) + ' ms at ' + Math.round(100 * painter.part) + ' %']];
   if (header.check) rows.push(['To the exact field', header.check.worst_db.toFixed(1) + ' dB at least, of ' + header.check.views + ' views']);
   header.styles.forEach((style, i) => {
-    if (style.bound) rows.push(['Certified bound, style ' + (i + 1), style.bound.toFixed(2)]);
+    if (style.bound) rows.push(['Certified bound, ' + styleName(header, i), style.bound.toFixed(2)]);
   });
   const list = make('dl', {});
   for (const [name, value] of rows) list.append(make('dt', {textContent: name}), make('dd', {textContent: value}));
