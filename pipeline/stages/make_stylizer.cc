@@ -9,6 +9,7 @@
 #include "pipeline/images/cube_file.h"
 #include "pipeline/networks/fetch_file.h"
 #include "pipeline/program/question.h"
+#include "pipeline/report/stage_metrics.h"
 #include "pipeline/stages/command_stylizer.h"
 #include "pipeline/stages/folder_stylizer.h"
 #include "pipeline/stages/matched_stylizer.h"
@@ -82,7 +83,7 @@ std::unique_ptr<ViewStylizer> MakeMethod(RunContext* context, const Capture& cap
     const ColorLut lut = ReadCubeFile(path);
     const std::string notice =
         Format("the LUT magnifies differences of colours at most %.2f times", lut.Slope());
-    return MakeMapStylizer(lut, "lut", {notice});
+    return MakeMapStylizer(lut, kLutMethod, {notice});
   }
   switch (method.kind) {
     case StyleMethodKind::kOnnx:

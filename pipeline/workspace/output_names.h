@@ -15,6 +15,9 @@ inline constexpr char kPathPrefix[] = "path_";
 // are compared on these.
 inline constexpr char kCommonPrefix[] = "common_";
 
+// frames/edited/, frames/path_edited/: where an edit of single photos says what a frame should be.
+inline constexpr char kEditedFrames[] = "edited";
+
 inline constexpr char kStyledFilm[] = "styled.mp4", kWipeFilm[] = "source_vs_styled.mp4",
                       kViews2dFilm[] = "views_2d.mp4";
 
