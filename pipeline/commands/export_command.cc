@@ -173,7 +173,9 @@ void ExportFields(const ExportOptions& options, const std::string& folder, Conso
   if (!fs::exists(folder + "/field.npz"))
     throw InputError("holds no reconstruction", folder,
                      "make one with `regrade run` or `regrade reconstruct`");
-  const std::vector<std::string> styles = StyleNames(folder);
+  std::vector<std::string> left;
+  const std::vector<std::string> styles = LearnedStyles(folder, &left);
+  if (!left.empty()) console->Info(LeftOutText(folder, left));
   if (options.dry_run) {
     console->Info(Concat("the field and ", styles.size(), " styles would be written to ",
                          options.out, " as ", options.format));
@@ -188,16 +190,15 @@ void ExportFields(const ExportOptions& options, const std::string& folder, Conso
   };
   write("field", ReadFieldFile(folder + "/field.npz"));
   for (const std::string& style : styles)
-    if (fs::exists(StyleFolder(folder, style) + "/network.npz"))
-      write(style == "field" ? "field-style" : style,
-            ReadStyledField(folder, StyleFolder(folder, style)));
+    write(style == "field" ? "field-style" : style,
+          ReadStyledField(folder, StyleFolder(folder, style)));
 }
 
 // The style as one map of colours: fitted to renders before and after, on views that it is not
 // measured on.
 void ExportLut(const ExportOptions& options, const std::string& folder, Console* console) {
   constexpr int kViews = 12, kSize = 33, kStride = 4;  // of pixels
-  const std::string name = ChosenStyle(folder, options.name);
+  const std::string name = ChosenLearnedStyle(folder, options.name);
   const std::string style = StyleFolder(folder, name);
   if (options.dry_run) {
     console->Info(Concat("style ", name, " would be written to ", options.out, " as a LUT of ",

@@ -140,17 +140,14 @@ void RunMix(const Command& command, const Arguments& arguments, Console* console
   const std::string& folder = words[0];
   Arguments chosen;  // names of styles, or files
   for (size_t i = 1; i < words.size(); ++i)
-    chosen.push_back(IsFieldFile(words[i]) ? words[i] : ChosenStyle(folder, words[i]));
-  if (chosen.empty()) chosen.push_back(ChosenStyle(folder, ""));
+    chosen.push_back(IsFieldFile(words[i]) ? words[i] : ChosenLearnedStyle(folder, words[i]));
+  if (chosen.empty()) chosen.push_back(ChosenLearnedStyle(folder, ""));
   const MixKeys keys = ParseMixKeys(settings.mix, static_cast<int>(chosen.size()));
   if (!settings.dry_run) RequireValue(settings.out, "--out", "name the folder to write");
   ChooseBackend(settings.device, false);
-  for (const std::string& style : chosen) {
-    const std::string file =
-        IsFieldFile(style) ? style : StyleFolder(folder, style) + "/network.npz";
-    if (!fs::is_regular_file(file))
-      throw InputError("there is no such style", file, "make it with `regrade stylize`");
-  }
+  for (const std::string& style : chosen)
+    if (IsFieldFile(style) && !fs::is_regular_file(style))
+      throw InputError("there is no such style", style, "make it with `regrade stylize`");
 
   StoredField stored = ReadFieldFile(folder + "/field.npz");
   const Backend backend = ChooseBackend(settings.device, false);

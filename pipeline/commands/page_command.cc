@@ -3,6 +3,7 @@
 #include "pipeline/commands/page_styles.h"
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/page/make_page.h"
+#include "pipeline/workspace/style_folders.h"
 
 namespace regrade {
 namespace {
@@ -32,7 +33,9 @@ void RunPage(const Command& command, const Arguments& arguments, Console* consol
       Prepare(command, arguments, {.most_words = 1 + kMostPageStyles}, &options);
   if (!prepared) return;
   const std::string& folder = prepared->words[0];
-  const std::vector<std::string> styles = WantedStyles(folder, prepared->words);
+  std::vector<std::string> left;
+  const std::vector<std::string> styles = WantedStyles(folder, prepared->words, &left);
+  if (!left.empty()) console->Info(LeftOutText(folder, left));
   if (!file.dry_run) RequireValue(file.out, "--out", "name the page to write");
   if (file.dry_run) {
     console->Info(

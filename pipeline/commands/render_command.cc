@@ -162,7 +162,7 @@ void RunRender(const Command& command, const Arguments& arguments, Console* cons
   const auto prepared = Prepare(command, arguments, {.continues_style = true}, &options);
   if (!prepared) return;
   const std::string& folder = prepared->words[0];
-  const std::string name = ChosenStyle(folder, options.Given("name").value_or(""));
+  const std::string name = ChosenLearnedStyle(folder, options.Given("name").value_or(""));
   if (settings.start.dry_run) {
     console->Info(Concat(still.still.size(), " stills of style ", name, " would be written to ",
                          StyleFolder(folder, name), "/stills"));

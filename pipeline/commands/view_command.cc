@@ -17,6 +17,7 @@
 #include "pipeline/program/interrupt.h"
 #include "pipeline/report/html_text.h"
 #include "pipeline/view/view_session.h"
+#include "pipeline/workspace/style_folders.h"
 
 namespace regrade {
 namespace {
@@ -96,7 +97,9 @@ void RunView(const Command& command, const Arguments& arguments, Console* consol
       Prepare(command, arguments, {.most_words = 1 + kMostPageStyles}, &options);
   if (!prepared) return;
   const std::string& folder = prepared->words[0];
-  const std::vector<std::string> styles = WantedStyles(folder, prepared->words);
+  std::vector<std::string> left;
+  const std::vector<std::string> styles = WantedStyles(folder, prepared->words, &left);
+  if (!left.empty()) console->Info(LeftOutText(folder, left));
   console->BeginStage("page");
   ViewSession session(AbsolutePath(folder), styles, console->StageProgress());
   console->EndStage();

@@ -61,11 +61,9 @@ StageSeconds EstimateSeconds(const CaptureSource& source) {
 }
 
 // The clause of a dry run about tracks, which may be needed.
-std::string PlannedTracks(const RunSettings& settings, const CaptureSource& source,
-                          int64_t photos) {
+std::string PlannedTracks(const RunSettings& settings, const CaptureSource& source) {
   if (!LacksPoints(source.kind) || settings.pose.tracks != "auto") return "";
-  return "; points by COLMAP, unless photos are transparent: " +
-         PlanText(PlanTracks(photos, omp_get_max_threads()));
+  return "; points by COLMAP, unless photos are transparent";
 }
 
 // The folder of masks: that of the options, or of the run that the poses come from.
@@ -204,13 +202,12 @@ Stage PoseStage(RunContext* context) {
     stage.inputs["photo_masks"] = HashFolder(folder);
   stage.refuse_changes = true;
   const InputFiles inputs = InputsOf(source);
-  const int64_t photos = ExpectedPhotos(inputs, context->settings.ingest);
   stage.plan =
       Concat(PlannedInputs(inputs, context->settings.ingest), " in ", source.photos,
              (source.kind == CaptureKind::kPhotos
-                  ? ", poses by COLMAP: " + PlanText(PlanPoses(photos, omp_get_max_threads()))
+                  ? ", poses by COLMAP"
                   : ", poses from " + source.poses +
-                        PlannedTracks(context->settings, source, photos)));
+                        PlannedTracks(context->settings, source)));
   stage.work = [context, source](const ProgressFunction& progress) {
     return FindPoses(context, source, progress);
   };

@@ -21,6 +21,7 @@
 #include "pipeline/run/run_context.h"
 #include "pipeline/stages/photo_metrics.h"
 #include "pipeline/stages/stages.h"
+#include "pipeline/workspace/folder_size.h"
 #include "pipeline/workspace/metrics_json.h"
 #include "reconstruct/fit/adapt_options.h"
 #include "reconstruct/fit/choose_degree.h"
@@ -279,7 +280,11 @@ Stage ReconstructStage(RunContext* context) {
     const FitOptions options =
         AdaptOptions(context->settings.fit, {profile.scene.ndc.on(), backend == Backend::kCuda,
                                              pixels, profile.scene.box.background.has_value()});
-    stage.plan = PlanText(PlanFitAt({backend, pixels, profile.scene.box}, options));
+    const FitPlace place{backend, pixels, profile.scene.box, run.max_memory_gb,
+                         run.reproducible};
+    stage.plan = "about " + SizeText(PlanFitAt(place, options).memory) + " of memory";
+    if (const std::string warning = MemoryWarning(options, place); !warning.empty())
+      stage.plan_warnings.push_back(warning);
   }
   stage.work = [context, inputs = stage.inputs](const ProgressFunction& progress) {
     return Reconstruct(context, inputs, progress);
