@@ -15,6 +15,7 @@
 #include "pipeline/commands/probe_styles.h"
 #include "pipeline/commands/sheet_options.h"
 #include "pipeline/fields/field_file.h"
+#include "pipeline/files/text.h"
 #include "pipeline/images/contact_sheet.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/program/device_choice.h"
@@ -345,10 +346,13 @@ void RunContactSheet(const Command& command, const Arguments& arguments, Console
   Scene scene = ReadScene(workspace, sheet, settings);
   scene.backend = backend;
   const std::string plan = styles.empty()
-                               ? Concat(words.size() - 1, " styles, ", scene.shown.size(),
-                                        " views each, trained on ", scene.training_views.size(),
-                                        " photos at ", sheet.size, " pixels")
-                               : Concat(scene.shown.size(), " views of ", Join(styles, ", "));
+                               ? Concat(Counted(std::ssize(words) - 1, "style"), ", ",
+                                        Counted(std::ssize(scene.shown), "view"),
+                                        " each, trained on ",
+                                        Counted(std::ssize(scene.training_views), "photo"),
+                                        " at ", sheet.size, " pixels")
+                               : Concat(Counted(std::ssize(scene.shown), "view"), " of ",
+                                        Join(styles, ", "));
   console->Info(plan);
   if (sheet.dry_run) return;
   std::vector<SheetRow> rows;

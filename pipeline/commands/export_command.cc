@@ -16,6 +16,7 @@
 #include "pipeline/fields/surface_points.h"
 #include "pipeline/fields/uniform_field.h"
 #include "pipeline/files/atomic_file.h"
+#include "pipeline/files/text.h"
 #include "pipeline/images/cube_file.h"
 #include "pipeline/program/memory.h"
 #include "pipeline/stages/styled_field.h"
@@ -85,8 +86,8 @@ void WritePoses(const ExportOptions& options, const std::string& folder,
 void ExportCapture(const ExportOptions& options, const std::string& folder, Console* console) {
   const Capture capture = ReadPosedCapture(folder);
   if (options.dry_run) {
-    console->Info(Concat(capture.views.size(), " photos and their poses would be written to ",
-                         options.out));
+    console->Info(Concat(Counted(std::ssize(capture.views), "photo"),
+                         " with poses would be written to ", options.out));
     return;
   }
   MakeEmptyFolder(options.out, "images");
@@ -98,7 +99,8 @@ void ExportCapture(const ExportOptions& options, const std::string& folder, Cons
   }
   WritePoses(options, folder, capture);
   console->Info(
-      Concat("wrote ", capture.views.size(), " photos and their poses to ", options.out));
+      Concat("wrote ", Counted(std::ssize(capture.views), "photo"), " with poses to ",
+             options.out));
 }
 
 constexpr int kComparedViews = 3;
@@ -166,7 +168,7 @@ void ExportPoints(const ExportOptions& options, const std::string& folder,
   const std::string to = options.out + "/" + name + ".ply";
   WritePly(to, points, stored.field_from_world,
            "approximate: points at the expected depth of rays, colours as photos saw them");
-  console->Info(Concat("wrote ", to, ": ", points.size(), " points, approximate"));
+  console->Info(Concat("wrote ", to, ": ", Counted(std::ssize(points), "point"), ", approximate"));
 }
 
 void ExportFields(const ExportOptions& options, const std::string& folder, Console* console) {
@@ -177,7 +179,8 @@ void ExportFields(const ExportOptions& options, const std::string& folder, Conso
   const std::vector<std::string> styles = LearnedStyles(folder, &left);
   if (!left.empty()) console->Info(LeftOutText(folder, left));
   if (options.dry_run) {
-    console->Info(Concat("the field and ", styles.size(), " styles would be written to ",
+    console->Info(Concat("the field and ", Counted(std::ssize(styles), "style"),
+                         " would be written to ",
                          options.out, " as ", options.format));
     return;
   }

@@ -11,6 +11,7 @@
 #include "pipeline/fields/field_file.h"
 #include "pipeline/fields/field_renderer.h"
 #include "pipeline/files/json_file.h"
+#include "pipeline/files/text.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/images/video_writer.h"
 #include "pipeline/program/device_choice.h"
@@ -153,10 +154,10 @@ void RunMix(const Command& command, const Arguments& arguments, Console* console
   const Backend backend = ChooseBackend(settings.device, false);
   const MixCameras cameras = CamerasOf(folder, stored, scene, render);
   if (settings.dry_run) {
-    console->Info(Concat(cameras.film.size(), " frames of ", cameras.film[0].width, "x",
+    console->Info(Concat(Counted(std::ssize(cameras.film), "frame"), " of ", cameras.film[0].width, "x",
                          cameras.film[0].height, " along ", render.path.path, ", ",
-                         keys.points.size(), (keys.points.size() == 1 ? " point" : " points"),
-                         " of ", chosen.size(), (chosen.size() == 1 ? " style" : " styles")));
+                         Counted(std::ssize(keys.points), "point"), " of ",
+                         Counted(std::ssize(chosen), "style")));
     return;
   }
   std::vector<StoredField> styles;
@@ -191,7 +192,7 @@ void RunMix(const Command& command, const Arguments& arguments, Console* console
     mixed.field = MixFields(stored.field, fields, keys.points[0], object_weights);
     WriteFieldFile(settings.out + "/mixed.npz", mixed);
   }
-  console->Info(Concat("wrote ", cameras.film.size(), " frames to ", settings.out));
+  console->Info(Concat("wrote ", Counted(std::ssize(cameras.film), "frame"), " to ", settings.out));
 }
 
 }  // namespace regrade

@@ -2,6 +2,7 @@
 #include "kernels/base/error.h"
 #include "pipeline/commands/page_styles.h"
 #include "pipeline/files/atomic_file.h"
+#include "pipeline/files/text.h"
 #include "pipeline/page/make_page.h"
 #include "pipeline/workspace/style_folders.h"
 
@@ -39,7 +40,8 @@ void RunPage(const Command& command, const Arguments& arguments, Console* consol
   if (!file.dry_run) RequireValue(file.out, "--out", "name the page to write");
   if (file.dry_run) {
     console->Info(
-        Concat("the scene and ", styles.size(), " styles would be written as a page"));
+        Concat("the scene and ", Counted(std::ssize(styles), "style"),
+               " would be written as a page"));
     return;
   }
   console->BeginStage("page");
@@ -51,7 +53,7 @@ void RunPage(const Command& command, const Arguments& arguments, Console* consol
   console->Info(Concat(
       "wrote ", file.out, ": ", Format("%.1f", megabytes), " MB, ", made.voxels, " voxels of ",
       Format("%.2f", static_cast<double>(made.field_bytes) / static_cast<double>(made.voxels)),
-      " bytes, ", styles.size(), " styles"));
+      " bytes, ", Counted(std::ssize(styles), "style")));
   if (made.coarse_bytes > 0)
     console->Info(Concat(
         "  a coarse scene, which it shows first: ", (made.coarse_bytes + 999) / 1000, " kB"));

@@ -13,6 +13,7 @@
 #include "pipeline/capture/pose_profile.h"
 #include "pipeline/capture/pose_tracks.h"
 #include "pipeline/capture/scene_profile.h"
+#include "pipeline/files/text.h"
 #include "pipeline/report/stage_metrics.h"
 #include "pipeline/run/plan.h"
 #include "pipeline/run/run_context.h"
@@ -111,8 +112,8 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
   if (const std::string folder = MasksOf(*context, source); !folder.empty()) {
     options.mask_folder = mask_folder;
     const int masks = StagePhotoMasks(folder, ingest.photos, options.mask_folder);
-    context->console->Info(std::to_string(masks) +
-                           " masks: their black parts are neither matched nor fitted");
+    context->console->Info(Counted(masks, "mask") +
+                           ": what is black there is neither matched nor fitted");
     metrics.photo_masks = masks;
   }
   if (source.kind == CaptureKind::kPhotos) {
@@ -163,9 +164,10 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
   metrics.models_found = capture.models_found;
   PutMetrics(metrics, &outcome.metrics);
   outcome.outputs = {"poses"};
-  context->console->Info(Concat("registered ", capture.views.size(), " of ",
-                                ingest.photos.size(), " photos, ", capture.points.size(),
-                                " points"));
+  context->console->Info(Concat("found the place of ", capture.views.size(), " of ",
+                                Counted(std::ssize(ingest.photos), "photo"), ", and ",
+                                Counted(std::ssize(capture.points), "point"),
+                                " of the scene"));
   return outcome;
 }
 
