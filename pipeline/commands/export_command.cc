@@ -19,7 +19,9 @@
 #include "pipeline/files/text.h"
 #include "pipeline/images/cube_file.h"
 #include "pipeline/program/memory.h"
+#include "pipeline/run/run_file.h"
 #include "pipeline/stages/styled_field.h"
+#include "pipeline/workspace/output_names.h"
 #include "pipeline/workspace/style_folders.h"
 #include "reconstruct/colmap/colmap_text.h"
 #include "stylize/fit_color_table.h"
@@ -197,16 +199,37 @@ void ExportFields(const ExportOptions& options, const std::string& folder, Conso
           ReadStyledField(folder, StyleFolder(folder, style)));
 }
 
+// The map of a retouch that is one map of colours, at the style's strength; size 0 for others.
+ColorTable OwnMapOf(const std::string& style) {
+  if (!fs::exists(style + "/" + kRetouchRecord) || fs::exists(style + "/layers")) return {};
+  const ColorLut lut = ReadCubeFile(style + "/" + kEditLut);
+  const RunFile run = ReadRunFile(style + "/run.json");
+  const JsonValue* value = run.options.Find("strength");
+  const double strength = value != nullptr ? value->AsDouble() : 1;
+  return TabulateColors(lut.table.size, [&](const Vec3d& c) {
+    return c * (1 - strength) + lut(c) * strength;
+  });
+}
+
 // The style as one map of colours: fitted to renders before and after, on views that it is not
 // measured on.
 void ExportLut(const ExportOptions& options, const std::string& folder, Console* console) {
   constexpr int kViews = 12, kSize = 33, kStride = 4;  // of pixels
-  const std::string name = ChosenLearnedStyle(folder, options.name);
+  const std::string name = ChosenStyle(folder, options.name);
   const std::string style = StyleFolder(folder, name);
+  const ColorTable own = OwnMapOf(style);
+  if (own.size == 0) ChosenLearnedStyle(folder, name);
   if (options.dry_run) {
     console->Info(Concat("style ", name, " would be written to ", options.out, " as a LUT of ",
                          kSize, "^3 colours"));
     return;
+  }
+  if (own.size > 0) {
+    WriteFileAtomically(options.out, CubeText(own, name));
+    return console->Info(Format(
+        "wrote %s: the edit's own map of colours as a LUT of %d^3 colours, which magnifies "
+        "differences at most %.2f times",
+        options.out.c_str(), own.size, SteepestSlope(own)));
   }
   const StoredField stored = ReadFieldFile(folder + "/field.npz");
   const std::vector<Camera> cameras = ViewsOf(folder, stored, kViews);

@@ -1,5 +1,6 @@
 #include "pipeline/stages/film_frames.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "kernels/base/error.h"
@@ -75,6 +76,14 @@ std::vector<FrameSet> FrameSetsOf(const WorkingViews& views, const RenderOptions
   sets.push_back({kPathPrefix, path.samples, false, false, true});
   sets.push_back({kFilmPrefix, path.film, false, true, false});
   return sets;
+}
+
+std::string SmallerFilmNote(const RenderOptions& options, const std::vector<Camera>& film) {
+  if (options.path.path == "views" || film.empty()) return "";
+  const int longer = std::max(film[0].width, film[0].height);
+  if (longer >= options.film_size) return "";
+  return Concat("the film is capped at ", longer, " pixels, the photos' size (--film-size asks for ",
+                options.film_size, ")");
 }
 
 std::string PlanOfFrames(const std::vector<FrameSet>& sets) {

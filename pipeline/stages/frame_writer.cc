@@ -2,10 +2,17 @@
 
 #include <string>
 
+#include "pipeline/files/json_file.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/workspace/output_names.h"
 
 namespace regrade {
+
+void WriteFrameNames(const WorkingViews& views, const Workspace& workspace) {
+  JsonValue names = JsonValue::Object();
+  for (int i = 0; i < views.count(); ++i) names[FrameName(i)] = views.View(i).file;
+  WriteJsonFile(workspace.NewPath("frames/names.json"), names);
+}
 
 void FrameWriter::Write(const std::shared_ptr<const Frame>& frame, const FrameSet& set,
                         int index) {

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "kernels/scene/image.h"
+#include "pipeline/capture/working_views.h"
 #include "pipeline/program/ordered_worker.h"
 #include "pipeline/stages/film_frames.h"
 #include "pipeline/stages/photo_vignette.h"
@@ -12,6 +13,10 @@
 #include "pipeline/workspace/workspace.h"
 
 namespace regrade {
+
+// frames/names.json: {"00000.png": "IMG_1.jpg", ...}, the photo at whose place each frame is;
+// of frames/source, styled, views_2d, and the same with one camera.
+void WriteFrameNames(const WorkingViews& views, const Workspace& workspace);
 
 // The frames of one camera.
 struct Frame {

@@ -94,6 +94,13 @@ Frame RenderFrame(RunContext* context, FrameRenderers* renderers, const Camera& 
   return frame;
 }
 
+// For the time that is left: a frame's pixels, of which those that are only in the film cost a
+// third (pipeline/run/stage_estimate.cc).
+double WorkOf(const FrameSet& set) {
+  const Camera& camera = set.cameras[0];
+  return 1e-6 * camera.width * camera.height * (set.prefix == kFilmPrefix ? 1.0 / 3 : 1);
+}
+
 // The renderers of the scene's field and of the style's. Fields have gigabytes: neither stays.
 void PrepareFields(const RunSettings& settings, const Workspace& style, Backend backend,
                    StoredField before, FrameRenderers* renderers) {
@@ -138,11 +145,17 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
         "--path views shows the photos' places one by one");
   const std::vector<FrameSet> sets = FrameSetsOf(views, settings.render, path);
   int total = 0;
-  for (const FrameSet& set : sets) total += static_cast<int>(set.cameras.size());
+  double work = 0;
+  for (const FrameSet& set : sets) {
+    total += static_cast<int>(set.cameras.size());
+    work += WorkOf(set) * static_cast<double>(set.cameras.size());
+  }
   const FrameSet& film =
       *std::find_if(sets.begin(), sets.end(), [](const FrameSet& set) { return set.of_film; });
   if (const FrameSet* common = CommonSet(sets))
     context->console->Info(ComparisonNote(common->cameras[0]));
+  if (const std::string note = SmallerFilmNote(settings.render, path.film); !note.empty())
+    context->console->Info(note);
 
   const std::string why_exact =
       PrepareFilm(settings, film.of_photos, &*renderers.source, &*renderers.styled);
@@ -157,10 +170,11 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
                  film.of_photos ? settings.render.fps : kSampleRate);
   {
     FrameWriter writer(workspace, ParseVignette(settings.render.vignette), &films);
-    int done = 0;
+    double done = 0;
     for (const FrameSet& set : sets) {
       for (int i = 0; i < static_cast<int>(set.cameras.size()); ++i) {
-        if (Report(progress, done++, total) == LoopControl::kStop) throw Interrupted();
+        ReportOrThrow(progress, done, work);
+        done += WorkOf(set);
         const auto frame = std::make_shared<const Frame>(RenderFrame(
             context, &renderers, set.cameras[static_cast<size_t>(i)],
             set.of_photos && settings.render.keep_exposure ? views.Gain(i) : kAsTaken, i,
@@ -172,6 +186,7 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
     }
     writer.Finish();
   }
+  WriteFrameNames(views, workspace);
   films.Finish(&outcome.outputs);
   if (!films.why_none().empty()) context->console->Warn("no film: " + films.why_none());
   RenderReport report;
@@ -187,9 +202,11 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   report.film_renderer = FilmRendererText(why_exact, backend);
   if (renderers.seconds > 0) report.frames_per_second = total / renderers.seconds;
   report.seen_by_few = seen.metrics();
+  const std::string few = report.seen_by_few.Sentence();
   if (report.seen_by_few.film.value.value_or(0) > kMuchSeenByFew)
-    context->console->Warn(report.seen_by_few.Sentence() +
-                           ": it may look wrong there; more photos of these parts help");
+    context->console->Warn(few + ": it may look wrong there; more photos of these parts help");
+  else if (!few.empty())
+    context->console->Info(few);
   PutMetrics(report, &outcome.metrics);
   return outcome;
 }
@@ -211,6 +228,11 @@ Stage RenderStage(RunContext* context) {
   if (context->workspace->Find("pose")) {
     const std::vector<FrameSet> sets = PlannedSets(*context);
     stage.plan = PlanOfFrames(sets);
+    for (const FrameSet& set : sets)
+      if (set.prefix == kFilmPrefix)
+        if (const std::string note = SmallerFilmNote(context->settings.render, set.cameras);
+            !note.empty())
+          stage.plan += "; " + note;
     if (const FrameSet* common = CommonSet(sets))
       stage.inputs["common_camera"] = ComparisonNote(common->cameras[0]);
   }
