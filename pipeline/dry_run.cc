@@ -51,9 +51,8 @@ std::vector<StageEstimate> MeasuredStages(const Workspace& scene) {
 }
 
 JsonValue ToJson(const PlannedStage& planned) {
-  JsonValue json = JsonValue::Object{{"stage", planned.stage},
-                                     {"done", planned.done},
-                                     {"seconds", planned.seconds}};
+  JsonValue json = JsonValue::Object{
+      {"stage", planned.stage}, {"done", planned.done}, {"seconds", planned.seconds}};
   if (!planned.style.empty()) json["style"] = planned.style;
   if (planned.memory > 0) json["memory"] = static_cast<int64_t>(planned.memory);
   return json;
@@ -81,10 +80,9 @@ std::vector<StageEstimate> ExpectedStages(RunContext* context) {
   const bool posed = context->workspace != nullptr && context->workspace->Find("pose");
   const CaptureSize size = posed ? SizeOfCapture(ReadCapture(context->workspace->Path("poses")))
                                  : SizeOfSource(context);
-  std::vector<StageEstimate> stages =
-      EstimateStages(settings, size,
-                     ChooseBackend(settings.run.device, settings.run.reproducible),
-                     omp_get_max_threads());
+  std::vector<StageEstimate> stages = EstimateStages(
+      settings, size, ChooseBackend(settings.run.device, settings.run.reproducible),
+      omp_get_max_threads());
   if (!posed) return stages;
   const double pace = MeasuredPace(stages, MeasuredStages(*context->workspace));
   for (StageEstimate& stage : stages) stage.seconds *= pace;
@@ -122,11 +120,9 @@ void PlanNewScene(const std::string& last, RunContext* context) {
   if (last == "pose") return;
   const Backend backend = ChooseBackend(settings.run.device, settings.run.reproducible);
   const int64_t pixels = PixelsToFit(settings, SizeOfSource(context));
-  const std::string warning =
-      MemoryWarning(AdaptOptions(settings.fit, {.on_card = backend == Backend::kCuda,
-                                                .pixels = pixels}),
-                    {backend, pixels, SceneBox(), settings.run.max_memory_gb,
-                     settings.run.reproducible});
+  const std::string warning = MemoryWarning(
+      AdaptOptions(settings.fit, {.on_card = backend == Backend::kCuda, .pixels = pixels}),
+      {backend, pixels, SceneBox(), settings.run.max_memory_gb, settings.run.reproducible});
   if (!warning.empty()) context->console->Warn(warning);
 }
 

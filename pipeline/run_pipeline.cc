@@ -71,8 +71,8 @@ void Expect(const std::string& first, const std::string& last, int styles_after,
     seconds[entry->name] = SecondsOf(stages, entry->name, entry->name);
     if (last == entry->name) break;
   }
-  runner->Expect(seconds, styles_after * SecondsOf(stages, "style_2d",
-                                                   context->settings.start.until));
+  runner->Expect(seconds,
+                 styles_after * SecondsOf(stages, "style_2d", context->settings.start.until));
 }
 
 PlannedStage Planned(const Stage& stage, bool done, RunContext* context) {
@@ -188,8 +188,10 @@ void RunStyles(const std::string& first, const std::vector<NamedStyle>& styles,
       failed.push_back(name + ": " + sentence);
     context->settings.style = given;
   }
-  if (start.dry_run) SayPlan(*context);
-  else if (styles.size() > 1) console->Info("took " + DurationText(console->Seconds()) + " in all");
+  if (start.dry_run)
+    SayPlan(*context);
+  else if (styles.size() > 1)
+    console->Info("took " + DurationText(console->Seconds()) + " in all");
   ThrowIfAny(failed);
 }
 

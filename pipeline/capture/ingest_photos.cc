@@ -326,8 +326,7 @@ std::string PlannedInputs(const InputFiles& inputs, const IngestOptions& options
   for (const InputFile& input : inputs.files)
     if (input.kind == InputKind::kClip) seconds += SecondsOfFilm(input.file.path);
   return (inputs.files.size() > static_cast<size_t>(clips) ? files + " and " : "") +
-         Counted(clips, "film") +
-         Format(" (%.1f s), of which ", seconds) +
+         Counted(clips, "film") + Format(" (%.1f s), of which ", seconds) +
          (options.video_frames > 0 ? std::to_string(options.video_frames)
                                    : Concat(kLeastFrames, " to ", kMostFrames)) +
          " frames are picked";

@@ -323,7 +323,8 @@ void RunContactSheet(const Command& command, const Arguments& arguments, Console
   if (!prepared) return;
   const Arguments& words = prepared->words;
   const std::string& folder = words[0];
-  const Arguments styles = fs::exists(folder + "/field.npz") ? StylesAmong(words, console) : Arguments();
+  const Arguments styles =
+      fs::exists(folder + "/field.npz") ? StylesAmong(words, console) : Arguments();
   if (!fs::exists(folder + "/field.npz"))
     throw InputError("holds no reconstruction", folder,
                      "make one with `regrade run` or `regrade reconstruct`");
@@ -345,14 +346,13 @@ void RunContactSheet(const Command& command, const Arguments& arguments, Console
   const Backend backend = ChooseBackend(sheet.device, false);  // before work begins
   Scene scene = ReadScene(workspace, sheet, settings);
   scene.backend = backend;
-  const std::string plan = styles.empty()
-                               ? Concat(Counted(std::ssize(words) - 1, "style"), ", ",
-                                        Counted(std::ssize(scene.shown), "view"),
-                                        " each, trained on ",
-                                        Counted(std::ssize(scene.training_views), "photo"),
-                                        " at ", sheet.size, " pixels")
-                               : Concat(Counted(std::ssize(scene.shown), "view"), " of ",
-                                        Join(styles, ", "));
+  const std::string plan =
+      styles.empty()
+          ? Concat(Counted(std::ssize(words) - 1, "style"), ", ",
+                   Counted(std::ssize(scene.shown), "view"), " each, trained on ",
+                   Counted(std::ssize(scene.training_views), "photo"), " at ", sheet.size,
+                   " pixels")
+          : Concat(Counted(std::ssize(scene.shown), "view"), " of ", Join(styles, ", "));
   console->Info(plan);
   if (sheet.dry_run) return;
   std::vector<SheetRow> rows;

@@ -100,9 +100,8 @@ void ExportCapture(const ExportOptions& options, const std::string& folder, Cons
     if (error) throw ResourceError(error.message(), to);
   }
   WritePoses(options, folder, capture);
-  console->Info(
-      Concat("wrote ", Counted(std::ssize(capture.views), "photo"), " with poses to ",
-             options.out));
+  console->Info(Concat("wrote ", Counted(std::ssize(capture.views), "photo"), " with poses to ",
+                       options.out));
 }
 
 constexpr int kComparedViews = 3;
@@ -170,7 +169,8 @@ void ExportPoints(const ExportOptions& options, const std::string& folder,
   const std::string to = options.out + "/" + name + ".ply";
   WritePly(to, points, stored.field_from_world,
            "approximate: points at the expected depth of rays, colours as photos saw them");
-  console->Info(Concat("wrote ", to, ": ", Counted(std::ssize(points), "point"), ", approximate"));
+  console->Info(
+      Concat("wrote ", to, ": ", Counted(std::ssize(points), "point"), ", approximate"));
 }
 
 void ExportFields(const ExportOptions& options, const std::string& folder, Console* console) {
@@ -182,8 +182,7 @@ void ExportFields(const ExportOptions& options, const std::string& folder, Conso
   if (!left.empty()) console->Info(LeftOutText(folder, left));
   if (options.dry_run) {
     console->Info(Concat("the field and ", Counted(std::ssize(styles), "style"),
-                         " would be written to ",
-                         options.out, " as ", options.format));
+                         " would be written to ", options.out, " as ", options.format));
     return;
   }
   MakeEmptyFolder(options.out, "");
@@ -206,9 +205,8 @@ ColorTable OwnMapOf(const std::string& style) {
   const RunFile run = ReadRunFile(style + "/run.json");
   const JsonValue* value = run.options.Find("strength");
   const double strength = value != nullptr ? value->AsDouble() : 1;
-  return TabulateColors(lut.table.size, [&](const Vec3d& c) {
-    return c * (1 - strength) + lut(c) * strength;
-  });
+  return TabulateColors(lut.table.size,
+                        [&](const Vec3d& c) { return c * (1 - strength) + lut(c) * strength; });
 }
 
 // The style as one map of colours: fitted to renders before and after, on views that it is not

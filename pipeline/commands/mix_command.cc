@@ -154,10 +154,10 @@ void RunMix(const Command& command, const Arguments& arguments, Console* console
   const Backend backend = ChooseBackend(settings.device, false);
   const MixCameras cameras = CamerasOf(folder, stored, scene, render);
   if (settings.dry_run) {
-    console->Info(Concat(Counted(std::ssize(cameras.film), "frame"), " of ", cameras.film[0].width, "x",
-                         cameras.film[0].height, " along ", render.path.path, ", ",
-                         Counted(std::ssize(keys.points), "point"), " of ",
-                         Counted(std::ssize(chosen), "style")));
+    console->Info(Concat(Counted(std::ssize(cameras.film), "frame"), " of ",
+                         cameras.film[0].width, "x", cameras.film[0].height, " along ",
+                         render.path.path, ", ", Counted(std::ssize(keys.points), "point"),
+                         " of ", Counted(std::ssize(chosen), "style")));
     return;
   }
   std::vector<StoredField> styles;
@@ -192,7 +192,8 @@ void RunMix(const Command& command, const Arguments& arguments, Console* console
     mixed.field = MixFields(stored.field, fields, keys.points[0], object_weights);
     WriteFieldFile(settings.out + "/mixed.npz", mixed);
   }
-  console->Info(Concat("wrote ", Counted(std::ssize(cameras.film), "frame"), " to ", settings.out));
+  console->Info(
+      Concat("wrote ", Counted(std::ssize(cameras.film), "frame"), " to ", settings.out));
 }
 
 }  // namespace regrade

@@ -39,9 +39,8 @@ void RunPage(const Command& command, const Arguments& arguments, Console* consol
   if (!left.empty()) console->Info(LeftOutText(folder, left));
   if (!file.dry_run) RequireValue(file.out, "--out", "name the page to write");
   if (file.dry_run) {
-    console->Info(
-        Concat("the scene and ", Counted(std::ssize(styles), "style"),
-               " would be written as a page"));
+    console->Info(Concat("the scene and ", Counted(std::ssize(styles), "style"),
+                         " would be written as a page"));
     return;
   }
   console->BeginStage("page");

@@ -135,8 +135,8 @@ void RenderPath(const Command& command, const Arguments& arguments, Console* con
   const PathFilm film = PlanPathFilm(folder, path, settings.film_size, fps);
   const std::string name =
       std::string(kFilmsFolder) + "/" + SafeStyleName(settings.path) + ".mp4";
-  const std::string what = Concat(Counted(film.frames, "frame"), " of ", film.width, "x", film.height,
-                                  " to ", folder, "/", name);
+  const std::string what = Concat(Counted(film.frames, "frame"), " of ", film.width, "x",
+                                  film.height, " to ", folder, "/", name);
   if (settings.dry_run) return console->Info("would render " + what);
   const Backend backend = ChooseBackend(settings.device, false);
   const Workspace scene(folder);
@@ -166,8 +166,7 @@ void RunRender(const Command& command, const Arguments& arguments, Console* cons
   const std::string name = ChosenLearnedStyle(folder, options.Given("name").value_or(""));
   if (settings.start.dry_run) {
     console->Info(Concat(Counted(std::ssize(still.still), "still"), " of style ", name,
-                         " would be written to ",
-                         StyleFolder(folder, name), "/stills"));
+                         " would be written to ", StyleFolder(folder, name), "/stills"));
     return;
   }
   RenderStills(folder, name, still, settings, console);

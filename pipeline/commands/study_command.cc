@@ -49,8 +49,8 @@ void RunStudy(const Command& command, const Arguments& arguments, Console* conso
   RequireValue(file.out, "--out", "name the page to write");
   const MadeStudy made = MakeStudy(prepared->words, study);
   WriteFileAtomically(file.out, made.html);
-  console->Info(Concat("wrote ", file.out, ": ", Counted(std::ssize(made.methods), "method"), ", ",
-                       Counted(std::ssize(made.clips), "clip"), ", ",
+  console->Info(Concat("wrote ", file.out, ": ", Counted(std::ssize(made.methods), "method"),
+                       ", ", Counted(std::ssize(made.clips), "clip"), ", ",
                        Format("%.1f", static_cast<double>(made.html.size()) / 1e6), " MB"));
   console->Info(
       "The page does not show which film is whose, but its source has the methods' names; each "

@@ -47,7 +47,9 @@ std::string DurationText(double seconds) {
 
 std::string Counted(int64_t count, const std::string& thing, const std::string& things) {
   return std::to_string(count) + " " +
-         (count == 1 ? thing : things.empty() ? thing + "s" : things);
+         (count == 1       ? thing
+          : things.empty() ? thing + "s"
+                           : things);
 }
 
 std::vector<std::string> Split(std::string_view text, char separator) {

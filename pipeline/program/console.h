@@ -49,8 +49,8 @@ class Console {
 
   // `title`: what a person reads in place of the stage's name; `expected`: seconds of this
   // stage and of all that follows it in this command, 0 where nobody knows.
-  void BeginStage(const std::string& stage, const std::string& title = "",
-                  double expected = 0, double later = 0);
+  void BeginStage(const std::string& stage, const std::string& title = "", double expected = 0,
+                  double later = 0);
   void EndStage();
   double StageSeconds() const;
   // Since this console was made, when the program began.

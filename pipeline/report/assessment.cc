@@ -111,12 +111,11 @@ Part Faithful(const RunReport& report) {
   const auto& evaluate = report.stages.evaluate;
   const bool edit = evaluate && evaluate->edit_seen;
   Part part;
-  part.sentence =
-      Format("faithful: %.1f dB to the %s, %s", *psnr.value,
-             edit ? "edit where its photo sees the scene" : "recoloured photos",
-             *psnr.value >= 30   ? "close"
-             : *psnr.value >= 25 ? "mostly close"
-                                 : "apart in places");
+  part.sentence = Format("faithful: %.1f dB to the %s, %s", *psnr.value,
+                         edit ? "edit where its photo sees the scene" : "recoloured photos",
+                         *psnr.value >= 30   ? "close"
+                         : *psnr.value >= 25 ? "mostly close"
+                                             : "apart in places");
   part.grade = *psnr.value / 30;
   part.advice =
       edit ? "edit a photo that shows more of what is to change, seen from nearby"

@@ -18,8 +18,8 @@ struct Assessment {
   std::string Line() const;  // the sentences, joined
 };
 
-// Photos that took no part in the fit are far worse than fitted ones: what is missing is photos,
-// and no finer field makes up for them.
+// Photos that took no part in the fit are far worse than fitted ones: what is missing is
+// photos, and no finer field makes up for them.
 bool LacksPhotos(const ReconstructReport& fit);
 
 Assessment AssessmentOf(const RunReport& report);

@@ -16,8 +16,8 @@ namespace {
 // film's, and of compared pairs; and of a report with its page.
 constexpr double kDecode = 0.03, kStyle2d = 0.17, kExactFrame = 2.3, kFilmFrame = 0.75,
                  kPair = 0.55, kReport = 3, kPageOfMillionCells = 4.5;
-constexpr double kAroundFit = 1.16;    // the trial of degrees, pruning and measuring
-constexpr double kOfResidual = 1.5;    // of exact frames at the photos' places
+constexpr double kAroundFit = 1.16;        // the trial of degrees, pruning and measuring
+constexpr double kOfResidual = 1.5;        // of exact frames at the photos' places
 constexpr double kFasterOnCard = 1.0 / 8;  // training and frames, roughly
 
 double Scaled(double seconds, int threads) { return seconds * 2 / std::max(threads, 1); }
@@ -47,8 +47,8 @@ double RenderSeconds(const RunSettings& settings, const CaptureSize& size) {
   const double photo = Megapixels(size, settings.scene.photo_size);
   double exact = static_cast<double>(size.photos) * photo, film = 0;
   if (render.path.path != "views") {
-    exact += photo * static_cast<double>(
-                         SamplesOfFilm(render.film_seconds, render.fps).moments.size());
+    exact += photo *
+             static_cast<double>(SamplesOfFilm(render.film_seconds, render.fps).moments.size());
     film = FilmFrames(render.film_seconds, render.fps) * Megapixels(size, render.film_size);
   }
   return kExactFrame * exact + (render.exact ? kExactFrame : kFilmFrame) * film;
@@ -99,13 +99,15 @@ std::vector<StageEstimate> EstimateStages(const RunSettings& settings, const Cap
   double stylize = PlanStyle(settings.network.steps, threads).seconds;
   if (settings.residual.On())
     stylize += Scaled(kOfResidual * kExactFrame * photos * photo, threads);
-  const double page =
-      settings.page.page == "off" ? 0 : kPageOfMillionCells * double{settings.fit.max_cells};
+  const double finest = *std::ranges::max_element(settings.fit.resolutions),
+               cells = std::min(double{settings.fit.max_cells},
+                                1e-6 * kCellsOfSquare * finest * finest);
+  const double page = settings.page.page == "off" ? 0 : kPageOfMillionCells * cells;
   return {
       {"pose", PoseSeconds(size, threads)},
       {"reconstruct", kAroundFit * fit.seconds, fit.memory},
-      {"style_2d", Scaled(photos * (kDecode * Megapixels(size, 1 << 20) + kStyle2d * photo),
-                          threads)},
+      {"style_2d",
+       Scaled(photos * (kDecode * Megapixels(size, 1 << 20) + kStyle2d * photo), threads)},
       {"stylize", on_card * stylize},
       {"render", on_card * Scaled(RenderSeconds(settings, size), threads)},
       {"evaluate", Scaled(EvaluateSeconds(settings, size), threads)},

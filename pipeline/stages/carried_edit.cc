@@ -41,7 +41,8 @@ struct Bilinear {
   }
 };
 
-// What the layer of a photo adds to a point of the scene; false where the photo does not see it.
+// What the layer of a photo adds to a point of the scene; false where the photo does not see
+// it.
 bool LayerAt(const Camera& camera, const Image& layer, const Image& depth, const Vec3d& point,
              Vec3d* added) {
   double u, v, z;

@@ -261,7 +261,8 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   OpenNetworks(settings.consistency, &networks);
   FidelityTargets targets = networks;
   targets.views_2d = renders_styled ? frames("views_2d", training_views) : of_photos;
-  const bool edited = std::filesystem::exists(workspace.Path("frames/" + std::string(kEditedFrames)));
+  const bool edited =
+      std::filesystem::exists(workspace.Path("frames/" + std::string(kEditedFrames)));
   if (edited)
     targets.views_2d = WhereEdited(targets.views_2d, frames(kEditedFrames, training_views));
   targets.transmittance = frames("transmittance", training_views);

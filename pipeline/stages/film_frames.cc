@@ -82,8 +82,8 @@ std::string SmallerFilmNote(const RenderOptions& options, const std::vector<Came
   if (options.path.path == "views" || film.empty()) return "";
   const int longer = std::max(film[0].width, film[0].height);
   if (longer >= options.film_size) return "";
-  return Concat("the film is capped at ", longer, " pixels, the photos' size (--film-size asks for ",
-                options.film_size, ")");
+  return Concat("the film is capped at ", longer,
+                " pixels, the photos' size (--film-size asks for ", options.film_size, ")");
 }
 
 std::string PlanOfFrames(const std::vector<FrameSet>& sets) {

@@ -166,8 +166,7 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
   outcome.outputs = {"poses"};
   context->console->Info(Concat("found the place of ", capture.views.size(), " of ",
                                 Counted(std::ssize(ingest.photos), "photo"), ", and ",
-                                Counted(std::ssize(capture.points), "point"),
-                                " of the scene"));
+                                Counted(std::ssize(capture.points), "point"), " of the scene"));
   return outcome;
 }
 
@@ -208,8 +207,7 @@ Stage PoseStage(RunContext* context) {
       Concat(PlannedInputs(inputs, context->settings.ingest), " in ", source.photos,
              (source.kind == CaptureKind::kPhotos
                   ? ", poses by COLMAP"
-                  : ", poses from " + source.poses +
-                        PlannedTracks(context->settings, source)));
+                  : ", poses from " + source.poses + PlannedTracks(context->settings, source)));
   stage.work = [context, source](const ProgressFunction& progress) {
     return FindPoses(context, source, progress);
   };

@@ -236,15 +236,13 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   SetPhotoMetrics(MeasureOnPhotos(views, views.HeldOut(), stored, backend),
                   MeasureOnPhotos(views, MeasuredTrainingViews(views), stored, backend),
                   &metrics);
-  if (const Metric& kept = metrics.heldout.empty() ? metrics.detail_kept_train
-                                                   : metrics.detail_kept_heldout;
+  if (const Metric& kept =
+          metrics.heldout.empty() ? metrics.detail_kept_train : metrics.detail_kept_heldout;
       kept.value)
-    context->console->Info(Format("the scene shows %.0f %% of the fine detail of %s: %s",
-                                  100 * *kept.value,
-                                  metrics.heldout.empty()
-                                      ? "the photos"
-                                      : "photos that were kept out of the fit",
-                                  metrics.sharpness.c_str()));
+    context->console->Info(
+        Format("the scene shows %.0f %% of the fine detail of %s: %s", 100 * *kept.value,
+               metrics.heldout.empty() ? "the photos" : "photos that were kept out of the fit",
+               metrics.sharpness.c_str()));
   context->console->Detail(QualityLine(metrics));
   PutMetrics(metrics, &outcome.metrics);
   return outcome;

@@ -15,7 +15,8 @@ inline constexpr char kPathPrefix[] = "path_";
 // are compared on these.
 inline constexpr char kCommonPrefix[] = "common_";
 
-// frames/edited/, frames/path_edited/: where an edit of single photos says what a frame should be.
+// frames/edited/, frames/path_edited/: where an edit of single photos says what a frame should
+// be.
 inline constexpr char kEditedFrames[] = "edited";
 
 // Of `regrade retouch`, in the style's folder: what was found in the edit, and its map of

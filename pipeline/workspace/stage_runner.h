@@ -37,7 +37,7 @@ struct Stage {
   // If the recorded inputs differ: redo the stage, or refuse with the difference (for work that
   // a typing mistake should not discard).
   bool refuse_changes = false;
-  std::string plan;  // a clause for --dry-run: sizes and memory
+  std::string plan;                        // a clause for --dry-run: sizes and memory
   std::vector<std::string> plan_warnings;  // for --dry-run
   std::function<StageOutcome(const ProgressFunction&)> work;
 };

@@ -58,7 +58,8 @@ std::string LeftOutText(const std::string& folder, const std::vector<std::string
 std::string ChosenLearnedStyle(const std::string& folder, const std::string& name);
 
 // The style that a command continues: `name`, or the last one that was finished, or the only
-// one that was learned or, where none was, begun. Throws Error(kInput), which lists the names, where there is none.
+// one that was learned or, where none was, begun. Throws Error(kInput), which lists the names,
+// where there is none.
 std::string ChosenStyle(const std::string& folder, const std::string& name);
 
 // Notes that this style was finished last, and copies its film, where it has one, to styled.mp4
