@@ -13,7 +13,7 @@ namespace regrade {
 namespace {
 
 // A photo sees a point whose depth is that of all four pixels around, up to this fraction: at
-// an outline the layer is of either side.
+// a silhouette the layer is of either side.
 constexpr double kDepthTolerance = 0.03;
 
 bool SameView(const Camera& a, const Camera& b) {
