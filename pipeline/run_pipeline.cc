@@ -3,13 +3,16 @@
 #include <algorithm>
 #include <filesystem>
 #include <iterator>
+#include <map>
 
 #include "kernels/base/error.h"
+#include "pipeline/dry_run.h"
 #include "pipeline/files/text.h"
 #include "pipeline/report/assessment.h"
 #include "pipeline/report/records.h"
 #include "pipeline/report/requirement_results.h"
 #include "pipeline/run/run_file.h"
+#include "pipeline/stages/run_facts.h"
 #include "pipeline/stages/stages.h"
 #include "pipeline/workspace/folder_size.h"
 #include "pipeline/workspace/output_names.h"
@@ -57,20 +60,50 @@ const StageEntry* Find(const std::string& name) {
 
 }  // namespace
 
-bool RunPipeline(const std::string& first, const std::string& last, RunContext* context) {
+namespace {
+
+// What the stages of one call take, and what comes behind them in this command.
+void Expect(const std::string& first, const std::string& last, int styles_after,
+            RunContext* context, StageRunner* runner) {
+  const std::vector<StageEstimate> stages = ExpectedStages(context);
+  std::map<std::string, double> seconds;
+  for (const StageEntry* entry = Find(first); entry != std::end(kStages); ++entry) {
+    seconds[entry->name] = SecondsOf(stages, entry->name, entry->name);
+    if (last == entry->name) break;
+  }
+  runner->Expect(seconds,
+                 styles_after * SecondsOf(stages, "style_2d", context->settings.start.until));
+}
+
+PlannedStage Planned(const Stage& stage, bool done, RunContext* context) {
+  PlannedStage planned{IsOfScene(stage.name) ? "" : context->settings.style.name, stage.name,
+                       done};
+  for (const StageEstimate& estimate : ExpectedStages(context))
+    if (estimate.stage == stage.name)
+      planned.seconds = estimate.seconds, planned.memory = estimate.memory;
+  return planned;
+}
+
+}  // namespace
+
+bool RunPipeline(const std::string& first, const std::string& last, RunContext* context,
+                 int styles_after) {
+  const bool dry_run = context->settings.start.dry_run;
   StageRunner runner(context->workspace, context->style, context->console);
-  runner.SetDryRun(context->settings.start.dry_run);
+  runner.SetDryRun(dry_run);
   const StageEntry* const restart = Find(context->settings.start.restart_from);
   if (restart <= Find(last)) runner.RestartFrom(std::max(restart, Find(first))->name);
   for (const StageEntry* before = std::begin(kStages); before != Find(first); ++before)
     runner.Require(before->name, "regrade run");
+  Expect(first, last, styles_after, context, &runner);
   for (const StageEntry* entry = Find(first); entry != std::end(kStages); ++entry) {
+    const Stage stage = entry->make(context);
+    const bool done = runner.Run(stage);
+    if (dry_run) context->planned.push_back(Planned(stage, done, context));
     // In a dry run the stages after an undone one have no inputs yet.
-    if (!runner.Run(entry->make(context))) {
-      for (; last != entry->name; ++entry)
-        context->console->Info(std::string(entry[1].name) + ": would follow");
-      return false;
-    }
+    if (!done && last != entry->name)
+      PlanStages(entry[1].name, last, context->planned.back().style, context);
+    if (!done) return false;
     if (last == entry->name) break;
   }
   return true;
@@ -78,21 +111,51 @@ bool RunPipeline(const std::string& first, const std::string& last, RunContext* 
 
 namespace {
 
-// Four lines: where film and page are, how long it took, how it went, and what to do next.
-void PrintSummary(RunReport report, const RunContext& context) {
+// Where film and page are, how long this command took for them, how it went, and what to do
+// next.
+void PrintSummary(const RunContext& context, double seconds) {
   const Workspace &scene = *context.workspace, &style = *context.style;
-  report.preset = context.settings.run.preset;
-  for (const char* stage : kStageNames)
-    if (const auto record = context.FolderOf(stage).Find(stage))
-      report.seconds += record->seconds;
-  const Assessment assessment = AssessmentOf(report);
-  const bool film = std::filesystem::exists(style.Path(kStyledFilm));
-  context.console->Info((film ? "film " + style.Path(kStyledFilm) + ", " : std::string()) +
-                        "page " + style.Path("report.html"));
-  context.console->Info("took " + DurationText(report.seconds) + "; the folder " +
-                        scene.folder() + " has " + SizeText(SizeOnDisk(scene.folder())));
+  const bool whole = context.settings.start.until == "report";
+  std::vector<std::string> made;
+  if (std::filesystem::exists(style.Path(kStyledFilm)))
+    made.push_back("film " + style.Path(kStyledFilm));
+  if (whole) made.push_back("page " + style.Path("report.html"));
+  if (!made.empty()) context.console->Info(Join(made, ", "));
+  context.console->Info("took " + DurationText(seconds) + "; the folder " + scene.folder() +
+                        " has " + SizeText(SizeOnDisk(scene.folder())));
+  if (!whole)
+    return context.console->Info("next: `regrade evaluate " + scene.folder() + " --name " +
+                                 context.settings.style.name +
+                                 "` measures it and writes its page");
+  const Assessment assessment = AssessmentOf(ReportOfRun(context));
   context.console->Info(assessment.Line());
   context.console->Info("next: " + assessment.advice);
+}
+
+// The stages of one style, in its folder; what became of the requirements.
+std::vector<CheckedRequirement> RunStyle(const std::string& first, const std::string& folder,
+                                         const std::vector<Requirement>& required,
+                                         int styles_after, double begin, RunContext* context) {
+  const RunSettings& settings = context->settings;
+  const std::string &name = settings.style.name, &until = settings.start.until;
+  Workspace workspace(folder, settings.start.break_lock);
+  context->style = &workspace;
+  // From its beginning on the folder belongs to this picture.
+  if (!std::filesystem::exists(workspace.Path("run.json"))) WriteRunFile("run", *context);
+  RunPipeline(first, until, context, styles_after);
+  std::vector<CheckedRequirement> checked;
+  if (!settings.start.dry_run) {
+    WriteRunFile("run", *context);
+    if (Find(until) >= Find("render")) {
+      PublishStyle(context->workspace->folder(), name);
+      PrintSummary(*context, context->console->Seconds() - begin);
+    }
+    if (until == "report")
+      checked = CheckRequirements(required, ReportFromRecords(*context->workspace, workspace),
+                                  name);
+  }
+  context->style = nullptr;
+  return checked;
 }
 
 }  // namespace
@@ -100,42 +163,36 @@ void PrintSummary(RunReport report, const RunContext& context) {
 void RunStyles(const std::string& first, const std::vector<NamedStyle>& styles,
                RunContext* context) {
   const StyleSource given = context->settings.style;
-  const std::string& until = context->settings.start.until;
-  if (Find(until) < Find(first))
-    throw UsageError("stage " + until + " comes before " + first, "--until",
+  const StartOptions& start = context->settings.start;
+  Console* const console = context->console;
+  if (Find(start.until) < Find(first))
+    throw UsageError("stage " + start.until + " comes before " + first, "--until",
                      "leave it out, or use `regrade stylize`");
   const std::vector<Requirement> required = RequirementsOf(context->settings);
   std::vector<CheckedRequirement> checked;
-  if (!context->settings.start.dry_run) BeginJUnit(context->settings.start.junit);
+  if (!start.dry_run) BeginJUnit(start.junit);
+  // Nothing can be said of a style's stages before the scene is done.
+  const bool scene_first = WouldWork(*context);
   for (size_t i = 0; i < styles.size(); ++i) {
     const auto& [name, pictures] = styles[i];
-    const std::string folder = StyleFolder(context->workspace->folder(), name);
-    if (styles.size() > 1)
-      context->console->Info(Concat("style ", i + 1, " of ", styles.size(), ": ", name));
-    if (context->settings.start.dry_run && !Workspace::Exists(folder)) {
-      context->console->Info(folder + " is new: every stage of a style would run");
+    const std::string folder = StyleFolder(context->settings.run.out, name);
+    if (start.dry_run && (scene_first || !Workspace::Exists(folder))) {
+      PlanStyles(first, {styles[i]}, context);
       continue;
     }
-    Workspace workspace(folder, context->settings.start.break_lock);
-    context->style = &workspace;
+    if (styles.size() > 1)
+      console->Info(Concat("style ", i + 1, " of ", styles.size(), ": ", name));
     context->settings.style.pictures = pictures;
     context->settings.style.name = name;
-    // From its beginning on the folder belongs to this picture.
-    if (!std::filesystem::exists(workspace.Path("run.json"))) WriteRunFile("run", *context);
-    RunPipeline(first, until, context);
-    if (!context->settings.start.dry_run) WriteRunFile("run", *context);
-    if (!context->settings.start.dry_run && until == "report") {
-      PublishStyle(context->workspace->folder(), name);
-      const RunReport report = ReportFromRecords(*context->workspace, workspace);
-      PrintSummary(report, *context);
-      std::ranges::move(CheckRequirements(required, report, name),
-                        std::back_inserter(checked));
-    }
-    context->style = nullptr;
+    std::ranges::move(RunStyle(first, folder, required, static_cast<int>(styles.size() - i - 1),
+                               i == 0 ? 0 : console->Seconds(), context),
+                      std::back_inserter(checked));
     context->settings.style = given;
   }
-  if (!context->settings.start.dry_run)
-    FinishRequirements(checked, context->settings.start.junit, context->console);
+  if (start.dry_run) return SayPlan(*context);
+  if (styles.size() > 1)
+    console->Info("took " + DurationText(console->Seconds()) + " in all");
+  FinishRequirements(checked, start.junit, console);
 }
 
 }  // namespace regrade

@@ -15,6 +15,7 @@
 #include "pipeline/capture/ingest_summary.h"
 #include "pipeline/capture/input_files.h"
 #include "pipeline/capture/staged_files.h"
+#include "pipeline/files/text.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/images/normalize_photo.h"
 
@@ -322,14 +323,13 @@ int64_t ExpectedPhotos(const InputFiles& inputs, const IngestOptions& options) {
 
 std::string PlannedInputs(const InputFiles& inputs, const IngestOptions& options) {
   const int clips = inputs.Count(InputKind::kClip);
-  const std::string files = Concat(inputs.files.size() - static_cast<size_t>(clips), " files");
+  const std::string files = Counted(std::ssize(inputs.files) - clips, "file");
   if (clips == 0) return files;
   double seconds = 0;
   for (const InputFile& input : inputs.files)
     if (input.kind == InputKind::kClip) seconds += SecondsOfFilm(input.file.path);
   return (inputs.files.size() > static_cast<size_t>(clips) ? files + " and " : "") +
-         Concat(clips, clips == 1 ? " film" : " films") +
-         Format(" (%.1f s), of which ", seconds) +
+         Counted(clips, "film") + Format(" (%.1f s), of which ", seconds) +
          (options.video_frames > 0 ? std::to_string(options.video_frames)
                                    : Concat(kLeastFrames, " to ", kMostFrames)) +
          " frames are picked";

@@ -15,6 +15,7 @@
 #include "pipeline/commands/probe_styles.h"
 #include "pipeline/commands/sheet_options.h"
 #include "pipeline/fields/field_file.h"
+#include "pipeline/files/text.h"
 #include "pipeline/images/contact_sheet.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/program/device_choice.h"
@@ -265,26 +266,34 @@ void AddStyle(RunContext* context, const Scene& scene, const SheetOptions& sheet
 std::vector<SheetRow> RowsOfStyles(const Scene& scene, const std::string& folder,
                                    const Arguments& names) {
   std::vector<SheetRow> rows(scene.shown.size());
-  for (size_t k = 0; k < rows.size(); ++k)
-    rows[k].cells.push_back({scene.photos[static_cast<size_t>(scene.shown[k])], ""});
+  for (size_t k = 0; k < rows.size(); ++k) {
+    const int i = scene.shown[k];
+    rows[k].cells.push_back({scene.photos[static_cast<size_t>(i)], scene.views.View(i).file});
+  }
   for (const std::string& name : names) {
     const std::vector<Image> renders =
         Shown(scene, ReadStyledField(folder, StyleFolder(folder, name)).field);
-    for (size_t k = 0; k < rows.size(); ++k) rows[k].cells.push_back({renders[k], ""});
+    for (size_t k = 0; k < rows.size(); ++k) rows[k].cells.push_back({renders[k], name});
   }
   return rows;
 }
 
-// The styles of the folder that `words` behind it name, all without any; empty for pictures.
-Arguments StylesAmong(const Arguments& words) {
-  const Arguments known = StyleNames(words[0]);
+// The styles of the folder that `words` behind it name, all that were learned without any;
+// empty for pictures.
+Arguments StylesAmong(const Arguments& words, Console* console) {
+  const std::string& folder = words[0];
   if (words.size() == 1) {
-    ChosenStyle(words[0], "");  // refuses a folder without styles
-    return known;
+    Arguments left;
+    const Arguments learned = LearnedStyles(folder, &left);
+    if (learned.empty()) ChosenLearnedStyle(folder, left.empty() ? "" : left[0]);  // refuses
+    if (!left.empty()) console->Info(LeftOutText(folder, left));
+    return learned;
   }
+  const Arguments known = StyleNames(folder);
   Arguments styles;
   for (size_t i = 1; i < words.size(); ++i)
-    if (std::ranges::find(known, words[i]) != known.end()) styles.push_back(words[i]);
+    if (std::ranges::find(known, words[i]) != known.end())
+      styles.push_back(ChosenLearnedStyle(folder, words[i]));
   if (!styles.empty() && styles.size() + 1 != words.size())
     throw UsageError("names of styles and pictures are mixed", "regrade contact-sheet",
                      "name styles of the folder (" + Join(known, ", ") + "), or pictures");
@@ -314,7 +323,8 @@ void RunContactSheet(const Command& command, const Arguments& arguments, Console
   if (!prepared) return;
   const Arguments& words = prepared->words;
   const std::string& folder = words[0];
-  const Arguments styles = fs::exists(folder + "/field.npz") ? StylesAmong(words) : Arguments();
+  const Arguments styles =
+      fs::exists(folder + "/field.npz") ? StylesAmong(words, console) : Arguments();
   if (!fs::exists(folder + "/field.npz"))
     throw InputError("holds no reconstruction", folder,
                      "make one with `regrade run` or `regrade reconstruct`");
@@ -336,11 +346,13 @@ void RunContactSheet(const Command& command, const Arguments& arguments, Console
   const Backend backend = ChooseBackend(sheet.device, false);  // before work begins
   Scene scene = ReadScene(workspace, sheet, settings);
   scene.backend = backend;
-  const std::string plan = styles.empty()
-                               ? Concat(words.size() - 1, " styles, ", scene.shown.size(),
-                                        " views each, trained on ", scene.training_views.size(),
-                                        " photos at ", sheet.size, " pixels")
-                               : Concat(scene.shown.size(), " views of ", Join(styles, ", "));
+  const std::string plan =
+      styles.empty()
+          ? Concat(Counted(std::ssize(words) - 1, "style"), ", ",
+                   Counted(std::ssize(scene.shown), "view"), " each, trained on ",
+                   Counted(std::ssize(scene.training_views), "photo"), " at ", sheet.size,
+                   " pixels")
+          : Concat(Counted(std::ssize(scene.shown), "view"), " of ", Join(styles, ", "));
   console->Info(plan);
   if (sheet.dry_run) return;
   std::vector<SheetRow> rows;

@@ -16,9 +16,12 @@
 #include "pipeline/fields/surface_points.h"
 #include "pipeline/fields/uniform_field.h"
 #include "pipeline/files/atomic_file.h"
+#include "pipeline/files/text.h"
 #include "pipeline/images/cube_file.h"
 #include "pipeline/program/memory.h"
+#include "pipeline/run/run_file.h"
 #include "pipeline/stages/styled_field.h"
+#include "pipeline/workspace/output_names.h"
 #include "pipeline/workspace/style_folders.h"
 #include "reconstruct/colmap/colmap_text.h"
 #include "stylize/fit_color_table.h"
@@ -85,8 +88,8 @@ void WritePoses(const ExportOptions& options, const std::string& folder,
 void ExportCapture(const ExportOptions& options, const std::string& folder, Console* console) {
   const Capture capture = ReadPosedCapture(folder);
   if (options.dry_run) {
-    console->Info(Concat(capture.views.size(), " photos and their poses would be written to ",
-                         options.out));
+    console->Info(Concat(Counted(std::ssize(capture.views), "photo"),
+                         " with poses would be written to ", options.out));
     return;
   }
   MakeEmptyFolder(options.out, "images");
@@ -97,8 +100,8 @@ void ExportCapture(const ExportOptions& options, const std::string& folder, Cons
     if (error) throw ResourceError(error.message(), to);
   }
   WritePoses(options, folder, capture);
-  console->Info(
-      Concat("wrote ", capture.views.size(), " photos and their poses to ", options.out));
+  console->Info(Concat("wrote ", Counted(std::ssize(capture.views), "photo"), " with poses to ",
+                       options.out));
 }
 
 constexpr int kComparedViews = 3;
@@ -166,17 +169,20 @@ void ExportPoints(const ExportOptions& options, const std::string& folder,
   const std::string to = options.out + "/" + name + ".ply";
   WritePly(to, points, stored.field_from_world,
            "approximate: points at the expected depth of rays, colours as photos saw them");
-  console->Info(Concat("wrote ", to, ": ", points.size(), " points, approximate"));
+  console->Info(
+      Concat("wrote ", to, ": ", Counted(std::ssize(points), "point"), ", approximate"));
 }
 
 void ExportFields(const ExportOptions& options, const std::string& folder, Console* console) {
   if (!fs::exists(folder + "/field.npz"))
     throw InputError("holds no reconstruction", folder,
                      "make one with `regrade run` or `regrade reconstruct`");
-  const std::vector<std::string> styles = StyleNames(folder);
+  std::vector<std::string> left;
+  const std::vector<std::string> styles = LearnedStyles(folder, &left);
+  if (!left.empty()) console->Info(LeftOutText(folder, left));
   if (options.dry_run) {
-    console->Info(Concat("the field and ", styles.size(), " styles would be written to ",
-                         options.out, " as ", options.format));
+    console->Info(Concat("the field and ", Counted(std::ssize(styles), "style"),
+                         " would be written to ", options.out, " as ", options.format));
     return;
   }
   MakeEmptyFolder(options.out, "");
@@ -188,9 +194,19 @@ void ExportFields(const ExportOptions& options, const std::string& folder, Conso
   };
   write("field", ReadFieldFile(folder + "/field.npz"));
   for (const std::string& style : styles)
-    if (fs::exists(StyleFolder(folder, style) + "/network.npz"))
-      write(style == "field" ? "field-style" : style,
-            ReadStyledField(folder, StyleFolder(folder, style)));
+    write(style == "field" ? "field-style" : style,
+          ReadStyledField(folder, StyleFolder(folder, style)));
+}
+
+// The map of a retouch that is one map of colours, at the style's strength; size 0 for others.
+ColorTable OwnMapOf(const std::string& style) {
+  if (!fs::exists(style + "/" + kRetouchRecord) || fs::exists(style + "/layers")) return {};
+  const ColorLut lut = ReadCubeFile(style + "/" + kEditLut);
+  const RunFile run = ReadRunFile(style + "/run.json");
+  const JsonValue* value = run.options.Find("strength");
+  const double strength = value != nullptr ? value->AsDouble() : 1;
+  return TabulateColors(lut.table.size,
+                        [&](const Vec3d& c) { return c * (1 - strength) + lut(c) * strength; });
 }
 
 // The style as one map of colours: fitted to renders before and after, on views that it is not
@@ -199,10 +215,19 @@ void ExportLut(const ExportOptions& options, const std::string& folder, Console*
   constexpr int kViews = 12, kSize = 33, kStride = 4;  // of pixels
   const std::string name = ChosenStyle(folder, options.name);
   const std::string style = StyleFolder(folder, name);
+  const ColorTable own = OwnMapOf(style);
+  if (own.size == 0) ChosenLearnedStyle(folder, name);
   if (options.dry_run) {
     console->Info(Concat("style ", name, " would be written to ", options.out, " as a LUT of ",
                          kSize, "^3 colours"));
     return;
+  }
+  if (own.size > 0) {
+    WriteFileAtomically(options.out, CubeText(own, name));
+    return console->Info(Format(
+        "wrote %s: the edit's own map of colours as a LUT of %d^3 colours, which magnifies "
+        "differences at most %.2f times",
+        options.out.c_str(), own.size, SteepestSlope(own)));
   }
   const StoredField stored = ReadFieldFile(folder + "/field.npz");
   const std::vector<Camera> cameras = ViewsOf(folder, stored, kViews);

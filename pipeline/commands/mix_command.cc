@@ -11,6 +11,7 @@
 #include "pipeline/fields/field_file.h"
 #include "pipeline/fields/field_renderer.h"
 #include "pipeline/files/json_file.h"
+#include "pipeline/files/text.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/images/video_writer.h"
 #include "pipeline/program/device_choice.h"
@@ -140,26 +141,23 @@ void RunMix(const Command& command, const Arguments& arguments, Console* console
   const std::string& folder = words[0];
   Arguments chosen;  // names of styles, or files
   for (size_t i = 1; i < words.size(); ++i)
-    chosen.push_back(IsFieldFile(words[i]) ? words[i] : ChosenStyle(folder, words[i]));
-  if (chosen.empty()) chosen.push_back(ChosenStyle(folder, ""));
+    chosen.push_back(IsFieldFile(words[i]) ? words[i] : ChosenLearnedStyle(folder, words[i]));
+  if (chosen.empty()) chosen.push_back(ChosenLearnedStyle(folder, ""));
   const MixKeys keys = ParseMixKeys(settings.mix, static_cast<int>(chosen.size()));
   if (!settings.dry_run) RequireValue(settings.out, "--out", "name the folder to write");
   ChooseBackend(settings.device, false);
-  for (const std::string& style : chosen) {
-    const std::string file =
-        IsFieldFile(style) ? style : StyleFolder(folder, style) + "/network.npz";
-    if (!fs::is_regular_file(file))
-      throw InputError("there is no such style", file, "make it with `regrade stylize`");
-  }
+  for (const std::string& style : chosen)
+    if (IsFieldFile(style) && !fs::is_regular_file(style))
+      throw InputError("there is no such style", style, "make it with `regrade stylize`");
 
   StoredField stored = ReadFieldFile(folder + "/field.npz");
   const Backend backend = ChooseBackend(settings.device, false);
   const MixCameras cameras = CamerasOf(folder, stored, scene, render);
   if (settings.dry_run) {
-    console->Info(Concat(cameras.film.size(), " frames of ", cameras.film[0].width, "x",
-                         cameras.film[0].height, " along ", render.path.path, ", ",
-                         keys.points.size(), (keys.points.size() == 1 ? " point" : " points"),
-                         " of ", chosen.size(), (chosen.size() == 1 ? " style" : " styles")));
+    console->Info(Concat(Counted(std::ssize(cameras.film), "frame"), " of ",
+                         cameras.film[0].width, "x", cameras.film[0].height, " along ",
+                         render.path.path, ", ", Counted(std::ssize(keys.points), "point"),
+                         " of ", Counted(std::ssize(chosen), "style")));
     return;
   }
   std::vector<StoredField> styles;
@@ -194,7 +192,8 @@ void RunMix(const Command& command, const Arguments& arguments, Console* console
     mixed.field = MixFields(stored.field, fields, keys.points[0], object_weights);
     WriteFieldFile(settings.out + "/mixed.npz", mixed);
   }
-  console->Info(Concat("wrote ", cameras.film.size(), " frames to ", settings.out));
+  console->Info(
+      Concat("wrote ", Counted(std::ssize(cameras.film), "frame"), " to ", settings.out));
 }
 
 }  // namespace regrade

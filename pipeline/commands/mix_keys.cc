@@ -31,8 +31,8 @@ std::vector<double> ParsePoint(const std::string& text, int styles) {
     sum += weight;
   }
   if (static_cast<int>(weights.size()) != styles)
-    refuse(Concat("has ", weights.size(), " weights for ", styles,
-                  (styles == 1 ? " style" : " styles")));
+    refuse(Concat("has ", Counted(std::ssize(weights), "weight"), " for ",
+                  Counted(styles, "style")));
   if (sum > 1 + 1e-9) refuse("adds up to more than 1");
   return weights;
 }

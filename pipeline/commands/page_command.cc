@@ -2,7 +2,9 @@
 #include "kernels/base/error.h"
 #include "pipeline/commands/page_styles.h"
 #include "pipeline/files/atomic_file.h"
+#include "pipeline/files/text.h"
 #include "pipeline/page/make_page.h"
+#include "pipeline/workspace/style_folders.h"
 
 namespace regrade {
 namespace {
@@ -32,11 +34,13 @@ void RunPage(const Command& command, const Arguments& arguments, Console* consol
       Prepare(command, arguments, {.most_words = 1 + kMostPageStyles}, &options);
   if (!prepared) return;
   const std::string& folder = prepared->words[0];
-  const std::vector<std::string> styles = WantedStyles(folder, prepared->words);
+  std::vector<std::string> left;
+  const std::vector<std::string> styles = WantedStyles(folder, prepared->words, &left);
+  if (!left.empty()) console->Info(LeftOutText(folder, left));
   if (!file.dry_run) RequireValue(file.out, "--out", "name the page to write");
   if (file.dry_run) {
-    console->Info(
-        Concat("the scene and ", styles.size(), " styles would be written as a page"));
+    console->Info(Concat("the scene and ", Counted(std::ssize(styles), "style"),
+                         " would be written as a page"));
     return;
   }
   console->BeginStage("page");
@@ -48,7 +52,7 @@ void RunPage(const Command& command, const Arguments& arguments, Console* consol
   console->Info(Concat(
       "wrote ", file.out, ": ", Format("%.1f", megabytes), " MB, ", made.voxels, " voxels of ",
       Format("%.2f", static_cast<double>(made.field_bytes) / static_cast<double>(made.voxels)),
-      " bytes, ", styles.size(), " styles"));
+      " bytes, ", Counted(std::ssize(styles), "style")));
   if (made.coarse_bytes > 0)
     console->Info(Concat(
         "  a coarse scene, which it shows first: ", (made.coarse_bytes + 999) / 1000, " kB"));

@@ -9,17 +9,15 @@ namespace regrade {
 
 namespace fs = std::filesystem;
 
-std::vector<std::string> WantedStyles(const std::string& folder, const Arguments& words) {
+std::vector<std::string> WantedStyles(const std::string& folder, const Arguments& words,
+                                      std::vector<std::string>* left) {
   if (!fs::exists(folder + "/field.npz"))
     throw InputError("holds no reconstruction", folder,
                      "make one with `regrade run` or `regrade reconstruct`");
+  if (words.size() == 1) return LearnedStyles(folder, left);
   std::vector<std::string> styles;
-  if (words.size() == 1) {
-    for (const std::string& style : StyleNames(folder))
-      if (fs::exists(StyleFolder(folder, style) + "/network.npz")) styles.push_back(style);
-    return styles;
-  }
-  for (size_t i = 1; i < words.size(); ++i) styles.push_back(ChosenStyle(folder, words[i]));
+  for (size_t i = 1; i < words.size(); ++i)
+    styles.push_back(ChosenLearnedStyle(folder, words[i]));
   return styles;
 }
 

@@ -10,8 +10,10 @@ namespace regrade {
 
 inline constexpr size_t kMostPageStyles = 16;
 
-// Of the words DIR [STYLE ...]: the styles that are named, or all whole-scene styles of the
-// folder that have a network. Throws Error(kInput), also for a folder without a field.
-std::vector<std::string> WantedStyles(const std::string& folder, const Arguments& words);
+// Of the words DIR [STYLE ...]: the styles that are named, or all of the folder that were
+// learned; the others are added to `left`, if that is not null. Throws Error(kInput), also for
+// a folder without a field and for a named style that was not learned.
+std::vector<std::string> WantedStyles(const std::string& folder, const Arguments& words,
+                                      std::vector<std::string>* left = nullptr);
 
 }  // namespace regrade

@@ -6,6 +6,7 @@
 #include "pipeline/capture/working_views.h"
 #include "pipeline/commands/continue_command.h"
 #include "pipeline/fields/field_renderer.h"
+#include "pipeline/files/text.h"
 #include "pipeline/images/still_file.h"
 #include "pipeline/program/device_choice.h"
 #include "pipeline/run/run_settings.h"
@@ -134,8 +135,8 @@ void RenderPath(const Command& command, const Arguments& arguments, Console* con
   const PathFilm film = PlanPathFilm(folder, path, settings.film_size, fps);
   const std::string name =
       std::string(kFilmsFolder) + "/" + SafeStyleName(settings.path) + ".mp4";
-  const std::string what = Concat(film.frames, " frames of ", film.width, "x", film.height,
-                                  " to ", folder, "/", name);
+  const std::string what = Concat(Counted(film.frames, "frame"), " of ", film.width, "x",
+                                  film.height, " to ", folder, "/", name);
   if (settings.dry_run) return console->Info("would render " + what);
   const Backend backend = ChooseBackend(settings.device, false);
   const Workspace scene(folder);
@@ -162,10 +163,10 @@ void RunRender(const Command& command, const Arguments& arguments, Console* cons
   const auto prepared = Prepare(command, arguments, {.continues_style = true}, &options);
   if (!prepared) return;
   const std::string& folder = prepared->words[0];
-  const std::string name = ChosenStyle(folder, options.Given("name").value_or(""));
+  const std::string name = ChosenLearnedStyle(folder, options.Given("name").value_or(""));
   if (settings.start.dry_run) {
-    console->Info(Concat(still.still.size(), " stills of style ", name, " would be written to ",
-                         StyleFolder(folder, name), "/stills"));
+    console->Info(Concat(Counted(std::ssize(still.still), "still"), " of style ", name,
+                         " would be written to ", StyleFolder(folder, name), "/stills"));
     return;
   }
   RenderStills(folder, name, still, settings, console);

@@ -6,6 +6,7 @@
 #include "kernels/image/resize.h"
 #include "pipeline/capture/photo_names.h"
 #include "pipeline/commands/command.h"
+#include "pipeline/dry_run.h"
 #include "pipeline/fields/field_file.h"
 #include "pipeline/fields/field_renderer.h"
 #include "pipeline/files/atomic_file.h"
@@ -18,6 +19,7 @@
 #include "pipeline/run_pipeline.h"
 #include "pipeline/stages/photo_edit.h"
 #include "pipeline/stages/style_residual.h"
+#include "pipeline/workspace/output_names.h"
 #include "pipeline/workspace/style_folders.h"
 #include "stylize/image/view_stylizer.h"
 
@@ -26,8 +28,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// In the style's folder: what was found in the edit.
-constexpr char kRecord[] = "retouch.json";
 // In the output folder: renders to be edited.
 constexpr char kRenders[] = "retouch";
 
@@ -118,29 +118,34 @@ Image BeforeEdit(const RetouchOptions& options, const std::string& render, const
   return Resize(Colors(DecodePhoto(render, AnySize()).image), photo.width, photo.height);
 }
 
-// Writes what the style is made from to its folder, and sets style picture and residual: the
-// edit's map of colours as a LUT, and what one photo has beyond it as a layer.
-void WriteEdit(const std::string& folder, const PhotoEdit& edit, const CaptureView& view,
-               RunSettings* settings) {
-  fs::create_directories(folder);
-  settings->style.pictures = {AbsolutePath(folder + "/edit.cube")};
-  WriteFileAtomically(folder + "/edit.cube", CubeText(edit.table, "edit"));
+// Sets style picture and residual: the edit's map of colours as a LUT, and what one photo has
+// beyond it as a layer, in the style's folder.
+void UseEdit(const std::string& folder, const PhotoEdit& edit, RunSettings* settings) {
+  settings->style.pictures = {AbsolutePath(folder + "/" + kEditLut)};
   settings->style.match = {};
   settings->style_2d.method = StyleOptions().method;
   settings->residual.residual = "views";
-  fs::remove_all(folder + "/retouched");
-  fs::remove_all(folder + "/layers");
   if (!edit.IsLocal()) return;
   // The network that keeps all colours is where training begins, and nothing is to be learned.
   if (edit.of_photo) {
     settings->network.steps = 1;
     settings->network.rate_first = settings->network.rate_last = 0;
   }
+  settings->residual.residual = "layers:" + AbsolutePath(folder + "/layers");
+}
+
+// Writes what UseEdit names.
+void WriteEdit(const std::string& folder, const PhotoEdit& edit, const CaptureView& view) {
+  fs::create_directories(folder);
+  WriteFileAtomically(folder + "/" + kEditLut, CubeText(edit.table, "edit"));
   const std::string layers = folder + "/layers", pictures = folder + "/retouched";
-  for (const std::string& made : {layers, pictures}) fs::create_directories(made);
+  for (const std::string& made : {layers, pictures}) {
+    fs::remove_all(made);
+    if (edit.IsLocal()) fs::create_directories(made);
+  }
+  if (!edit.IsLocal()) return;
   WritePng16(pictures + "/" + Stem(view.file) + ".png", edit.picture);
   WriteLayer(layers + "/" + Stem(view.file) + ".png", edit.layer);
-  settings->residual.residual = "layers:" + AbsolutePath(layers);
 }
 
 }  // namespace
@@ -170,7 +175,7 @@ void RunRetouch(const Command& command, const Arguments& arguments, Console* con
     throw UsageError("'" + name + "' is not allowed", "--name",
                      "use letters, digits, '-', '_' and '.', not first");
   const std::string style = StyleFolder(folder, name);
-  if (fs::exists(style + "/run.json") && !fs::exists(style + "/" + kRecord))
+  if (fs::exists(style + "/run.json") && !fs::exists(style + "/" + kRetouchRecord))
     throw UsageError("style '" + name + "' belongs to another picture", "--name",
                      "choose another name");
   if (!prepared->run_words.empty()) context.source = prepared->run_words[0];
@@ -192,10 +197,17 @@ void RunRetouch(const Command& command, const Arguments& arguments, Console* con
                                          photo, retouch.edited));
   const std::vector<std::string> notices = EditNotices(edit, retouch.keep_vignette);
   for (const std::string& notice : notices) console->Info(notice);
-  if (settings.start.dry_run) return;
   settings.render.vignette = retouch.keep_vignette ? VignetteText(edit.vignette) : "none";
-  WriteEdit(style, edit, views.View(view), &settings);
-  WriteJsonFile(style + "/" + kRecord, RecordOf(retouch, edit, notices));
+  UseEdit(style, edit, &settings);
+  if (settings.start.dry_run) {
+    PlanStyles("style_2d", {{name, settings.style.pictures}}, &context);
+    return SayPlan(context);
+  }
+  WriteEdit(style, edit, views.View(view));
+  if (!edit.IsLocal())
+    console->Info("the map of colours is " + style + "/" + kEditLut +
+                  ", a LUT for other programs");
+  WriteJsonFile(style + "/" + kRetouchRecord, RecordOf(retouch, edit, notices));
   RunStyles("style_2d", {{name, settings.style.pictures}}, &context);
 }
 

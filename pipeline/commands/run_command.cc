@@ -1,23 +1,18 @@
 // regrade run, pose, reconstruct: runs the pipeline from photos up to a given stage.
-#include <omp.h>
-
 #include <filesystem>
 
 #include "kernels/base/error.h"
 #include "pipeline/capture/capture_store.h"
-#include "pipeline/capture/ingest_photos.h"
 #include "pipeline/commands/command.h"
 #include "pipeline/commands/probe_styles.h"
+#include "pipeline/dry_run.h"
 #include "pipeline/program/device_choice.h"
 #include "pipeline/report/records.h"
 #include "pipeline/report/requirement_results.h"
-#include "pipeline/run/plan.h"
 #include "pipeline/run/run_file.h"
 #include "pipeline/run_pipeline.h"
 #include "pipeline/stages/network_probe.h"
-#include "pipeline/stages/stages.h"
 #include "pipeline/workspace/stage_record.h"
-#include "reconstruct/fit/adapt_options.h"
 
 namespace regrade {
 namespace {
@@ -47,27 +42,6 @@ void ProbeInputs(const std::string& command, RunContext* context) {
   ProbeEvaluationNetworks(context->settings.consistency);
 }
 
-// The plan of a dry run for a new folder: photos are assumed to be 4:3, the scene's box a cube.
-void PrintPlan(const std::string& command, RunContext* context) {
-  const RunSettings& settings = context->settings;
-  const Stage pose = PoseStage(context);
-  context->console->Info(settings.run.out + " is new: every stage would run, from " +
-                         pose.plan);
-  if (command == "pose") return;
-  const int threads = omp_get_max_threads();
-  const int64_t pixels =
-      ExpectedPixels(ExpectedPhotos(InputsOf(context->Source()), settings.ingest),
-                     settings.scene.photo_size, settings.run.holdout);
-  const bool on_card =
-      ChooseBackend(settings.run.device, settings.run.reproducible) == Backend::kCuda;
-  const FitOptions fit = AdaptOptions(settings.fit, {.on_card = on_card, .pixels = pixels});
-  context->console->Info("reconstruct: " +
-                         PlanText(on_card ? PlanFitOnDevice(fit, pixels, SceneBox())
-                                          : PlanFit(fit, pixels, SceneBox(), threads)));
-  if (command == "reconstruct") return;
-  context->console->Info("stylize: " + PlanText(PlanStyle(settings.network.steps, threads)));
-}
-
 }  // namespace
 
 void RunStages(const Command& command, const Arguments& arguments, Console* console) {
@@ -89,9 +63,11 @@ void RunStages(const Command& command, const Arguments& arguments, Console* cons
                                  settings.style.match.On())
                     : std::vector<NamedStyle>();
 
+  const std::string last = name == "pose" ? "pose" : "reconstruct";
   if (settings.start.dry_run && !Workspace::Exists(settings.run.out)) {
-    PrintPlan(name, &context);
-    return;
+    PlanNewScene(last, &context);
+    if (name != "run") return SayPlan(context);
+    return RunStyles("style_2d", styles, &context);
   }
   if (!settings.start.dry_run) BeginJUnit(settings.start.junit);
   Workspace workspace(settings.run.out, settings.start.break_lock);
@@ -100,20 +76,13 @@ void RunStages(const Command& command, const Arguments& arguments, Console* cons
   // Later commands take their options from it, also after an interruption.
   const bool first_start = !std::filesystem::exists(workspace.Path("run.json"));
   if (first_start && !settings.start.dry_run) WriteRunFile(name, context);
-  const bool done = RunPipeline("pose", name == "pose" ? "pose" : "reconstruct", &context);
+  RunPipeline("pose", last, &context, static_cast<int>(styles.size()));
   if (!settings.start.dry_run) WriteRunFile(name, context);
-  if (name != "run") {
-    if (!settings.start.dry_run)
-      FinishRequirements(CheckRequirements(RequirementsOf(settings),
-                                           ReportFromRecords(workspace, workspace)),
-                         settings.start.junit, console);
-    return;
-  }
-  if (done)
-    RunStyles("style_2d", styles, &context);
-  else
-    for (const NamedStyle& style : styles)
-      console->Info("style " + style.name + ": would follow");
+  if (name == "run") return RunStyles("style_2d", styles, &context);
+  if (settings.start.dry_run) return SayPlan(context);
+  FinishRequirements(
+      CheckRequirements(RequirementsOf(settings), ReportFromRecords(workspace, workspace)),
+      settings.start.junit, console);
 }
 
 }  // namespace regrade

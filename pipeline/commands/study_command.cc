@@ -2,6 +2,7 @@
 #include "kernels/base/error.h"
 #include "pipeline/commands/command.h"
 #include "pipeline/files/atomic_file.h"
+#include "pipeline/files/text.h"
 #include "pipeline/study/make_study.h"
 #include "pipeline/study/study_answers.h"
 
@@ -48,8 +49,8 @@ void RunStudy(const Command& command, const Arguments& arguments, Console* conso
   RequireValue(file.out, "--out", "name the page to write");
   const MadeStudy made = MakeStudy(prepared->words, study);
   WriteFileAtomically(file.out, made.html);
-  console->Info(Concat("wrote ", file.out, ": ", made.methods.size(), " methods, ",
-                       made.clips.size(), " clips, ",
+  console->Info(Concat("wrote ", file.out, ": ", Counted(std::ssize(made.methods), "method"),
+                       ", ", Counted(std::ssize(made.clips), "clip"), ", ",
                        Format("%.1f", static_cast<double>(made.html.size()) / 1e6), " MB"));
   console->Info(
       "The page does not show which film is whose, but its source has the methods' names; each "

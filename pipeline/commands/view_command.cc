@@ -23,6 +23,7 @@
 #include "pipeline/report/html_text.h"
 #include "pipeline/view/view_session.h"
 #include "pipeline/workspace/workspace.h"
+#include "pipeline/workspace/style_folders.h"
 
 namespace regrade {
 namespace {
@@ -144,7 +145,9 @@ void RunView(const Command& command, const Arguments& arguments, Console* consol
     omp_set_num_threads(threads);
     try {
       if (!AwaitScene(folder, &session, console)) return;
-      const std::vector<std::string> styles = WantedStyles(folder, prepared->words);
+      std::vector<std::string> left;
+      const std::vector<std::string> styles = WantedStyles(folder, prepared->words, &left);
+      if (!left.empty()) console->Info(LeftOutText(folder, left));
       console->BeginStage("page");
       session.MakePageOf(styles, console->StageProgress());
       console->EndStage();

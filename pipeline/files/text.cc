@@ -45,6 +45,13 @@ std::string DurationText(double seconds) {
   return Format("%lld s", whole);
 }
 
+std::string Counted(int64_t count, const std::string& thing, const std::string& things) {
+  return std::to_string(count) + " " +
+         (count == 1       ? thing
+          : things.empty() ? thing + "s"
+                           : things);
+}
+
 std::vector<std::string> Split(std::string_view text, char separator) {
   std::vector<std::string> parts(1);
   for (const char c : text)

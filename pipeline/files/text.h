@@ -23,6 +23,9 @@ std::string Printable(std::string_view text);
 // "2 h 03 min", "4 min 12 s", "8 s".
 std::string DurationText(double seconds);
 
+// "1 photo", "3 photos"; `things` where the plural is not that with an s.
+std::string Counted(int64_t count, const std::string& thing, const std::string& things = "");
+
 // Parts between separators, empty ones included: at least one.
 std::vector<std::string> Split(std::string_view text, char separator);
 std::string Join(const std::vector<std::string>& parts, std::string_view separator);

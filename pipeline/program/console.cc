@@ -40,7 +40,7 @@ Console::Console(bool json) : json_(json) {
   const char* term = std::getenv("TERM");
   const bool dumb = term == nullptr || std::string(term) == "dumb";
   color_ = terminal_ && !dumb && (no_color == nullptr || *no_color == '\0');
-  stage_begin_ = last_drawn_ = ClockSeconds();
+  begin_ = stage_begin_ = last_drawn_ = ClockSeconds();
 }
 
 Console::~Console() { Erase(); }
@@ -122,10 +122,12 @@ void Console::Event(const std::string& name, const JsonValue& members) {
   Put(stdout, DumpJson(line, -1) + "\n");
 }
 
-void Console::BeginStage(const std::string& stage, const std::string& title, double later) {
+void Console::BeginStage(const std::string& stage, const std::string& title, double expected,
+                         double later) {
   stage_ = stage;
   title_ = title.empty() ? stage : title;
-  later_ = later;
+  expected_.current = expected;
+  expected_.later = later;
   eta_ = EtaEstimator();
   stage_begin_ = ClockSeconds();
   last_drawn_ = stage_begin_ - 3600;
@@ -134,8 +136,15 @@ void Console::BeginStage(const std::string& stage, const std::string& title, dou
 
 double Console::StageSeconds() const { return ClockSeconds() - stage_begin_; }
 
+double Console::Seconds() const { return ClockSeconds() - begin_; }
+
 void Console::EndStage() {
   Erase();
+  if (expected_.current > 0) {
+    expected_.finished += expected_.current;
+    finished_s_ += StageSeconds();
+  }
+  expected_.current = expected_.later = 0;
   Event("stage_end", JsonValue::Object{{"stage", stage_}, {"seconds", StageSeconds()}});
 }
 
@@ -147,42 +156,41 @@ ProgressFunction Console::StageProgress() {
 }
 
 void Console::Draw(const Progress& progress) {
-  if (quiet_) return;
+  if (quiet_ || (!terminal_ && !json_)) return;
   const double now = ClockSeconds();
   eta_.Add(now - stage_begin_, progress.done, progress.total);
-  const double interval = terminal_ ? 0.1 : json_ ? 1.0 : 10.0;  // seconds
+  const double interval = terminal_ ? 0.1 : 1.0;  // seconds
   const bool last = progress.total > 0 && progress.done >= progress.total;
   if (now - last_drawn_ < interval && !(last && terminal_)) return;
   last_drawn_ = now;
 
   const std::optional<double> left = eta_.Remaining();
-  std::string line = title_;
-  if (progress.total > 0) {
-    line += Format("  %3.0f %%", 100 * std::min(1.0, progress.done / progress.total));
-  }
-  if (left && later_ > 0 && progress.done > 0) {
-    // The later stages take a multiple of this one, as they usually do.
-    const double in_all = *left + later_ * (now - stage_begin_ + *left);
-    line += "  about " + DurationText(in_all) + " left in all";
-  } else if (left) {
-    line += "  " + DurationText(*left) + " left";
-  }
-  if (!progress.note.empty()) line += "  " + Printable(progress.note);
-  if (terminal_) {
-    winsize size = {};
-    const bool known = ::ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0;
-    const size_t width = known ? size.ws_col : 80;
-    if (line.size() >= width) line.resize(width - 1);
-    Put(stderr, "\r\033[K" + line);
-    line_drawn_ = true;
-  } else if (!json_) {
-    Put(stderr, line + "\n");
-  }
+  if (terminal_) DrawLine(progress, left, now);
   Event("progress", JsonValue::Object{{"stage", stage_},
                                       {"done", progress.done},
                                       {"total", progress.total},
                                       {"seconds_left", left ? JsonValue(*left) : JsonValue()},
                                       {"note", progress.note}});
+}
+
+void Console::DrawLine(const Progress& progress, std::optional<double> left, double now) {
+  std::string line = title_;
+  if (progress.total > 0) {
+    line += Format("  %3.0f %%", 100 * std::min(1.0, progress.done / progress.total));
+  }
+  if (left && expected_.later > 0 && progress.done > 0)
+    line += "  about " +
+            DurationText(LeftInAll(expected_, finished_s_, now - stage_begin_, *left)) +
+            " left in all";
+  else if (left)
+    line += "  " + DurationText(*left) + " left";
+  if (verbose_ && !progress.note.empty()) line += "  " + Printable(progress.note);
+  winsize size = {};
+  const bool known = ::ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0;
+  const size_t width = known ? size.ws_col : 80;
+  if (line.size() >= width) line.resize(width - 1);
+  Put(stderr, "\r\033[K" + line);
+  line_drawn_ = true;
 }
 
 void Console::Erase() {

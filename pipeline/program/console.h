@@ -3,6 +3,7 @@
 #pragma once
 
 #include <fstream>
+#include <optional>
 #include <string>
 
 #include "kernels/base/error.h"
@@ -19,7 +20,7 @@ std::string MessageFor(const Error& error, const std::string& kept);
 class Console {
  public:
   // `json`: events as lines of JSON on stdout. The progress line is drawn in place on a
-  // terminal and printed every few seconds elsewhere; colour obeys NO_COLOR and TERM=dumb.
+  // terminal; elsewhere, in a file, there is none. Colour obeys NO_COLOR and TERM=dumb.
   explicit Console(bool json);
   ~Console();
   Console(const Console&) = delete;
@@ -46,11 +47,14 @@ class Console {
   // A line of JSON {"event": name, ...members} with --json, nothing without.
   void Event(const std::string& name, const JsonValue& members);
 
-  // `title`: what a person reads in place of the stage's name; `later`: the time of what
-  // follows, in times of this stage.
-  void BeginStage(const std::string& stage, const std::string& title = "", double later = 0);
+  // `title`: what a person reads in place of the stage's name; `expected`: seconds of this
+  // stage and of all that follows it in this command, 0 where nobody knows.
+  void BeginStage(const std::string& stage, const std::string& title = "", double expected = 0,
+                  double later = 0);
   void EndStage();
   double StageSeconds() const;
+  // Since this console was made, when the program began.
+  double Seconds() const;
   // Draws the progress line, updates the estimate, and returns kStop after a signal.
   ProgressFunction StageProgress();
 
@@ -58,6 +62,7 @@ class Console {
   void Log(const char* level, const std::string& line);
   void Say(const std::string& text, bool warning);
   void Draw(const Progress& progress);
+  void DrawLine(const Progress& progress, std::optional<double> left, double now);
   void Erase();
 
   const bool json_;
@@ -68,9 +73,10 @@ class Console {
   bool verbose_ = false;
   std::ofstream log_;
   std::string stage_, title_, kept_;
-  double later_ = 0;
+  ExpectedTime expected_;
+  double finished_s_ = 0;  // what finished stages took of which something was expected
   EtaEstimator eta_;
-  double stage_begin_, last_drawn_;  // of ClockSeconds()
+  double begin_, stage_begin_, last_drawn_;  // of ClockSeconds()
 };
 
 }  // namespace regrade

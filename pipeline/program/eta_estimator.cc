@@ -13,6 +13,16 @@ constexpr double kSmallFirstFraction = 0.02;  // of the work: before it were pre
 
 }  // namespace
 
+double LeftInAll(const ExpectedTime& expected, double spent_on_finished,
+                 double spent_on_current, double left) {
+  constexpr double kTrust = 0.5;  // in what was expected, as a part of all of it
+  const double seen = expected.finished + expected.current, all = seen + expected.later;
+  if (!(all > 0)) return left;
+  const double pace =
+      (spent_on_finished + spent_on_current + left + kTrust * all) / (seen + kTrust * all);
+  return left + pace * expected.later;
+}
+
 void EtaEstimator::Add(double seconds, double done, double total) {
   total_ = total;
   if (points_.empty()) {

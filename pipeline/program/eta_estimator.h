@@ -10,6 +10,16 @@ namespace regrade {
 // change of pace are forgotten, and single slow steps are averaged out. The rate since the
 // start has a weight of a third. A first report of a small fraction of the work ends
 // preparations, whose rate is ignored.
+// Seconds left of a whole command: `left` of the current stage and what follows it. Expected
+// seconds are rough, so they are multiplied by the pace so far: what finished stages and the
+// current one take of what was expected of them. The pace counts as little as the part of the
+// work that it was measured on.
+struct ExpectedTime {
+  double finished = 0, current = 0, later = 0;  // expected seconds of stages
+};
+double LeftInAll(const ExpectedTime& expected, double spent_on_finished,
+                 double spent_on_current, double left);
+
 class EtaEstimator {
  public:
   // `seconds` since the stage began, from a clock that never goes back; `done` of `total`.

@@ -100,9 +100,12 @@ struct StartOptions {
     bind("restart-from", restart_from,
          {.help = "repeats this stage and all later ones, even where they are done",
           .choices = "|pose|reconstruct|style_2d|stylize|render|evaluate|report"});
-    bind("until", until,
-         {.help = "ends each style after this stage; `regrade render` goes on",
-          .choices = "stylize|render|evaluate|report"});
+    bind(
+        "until", until,
+        {.help =
+             "ends each style after this stage: render leaves out measuring and page; `regrade "
+             "render` goes on",
+         .choices = "stylize|render|evaluate|report"});
     bind("require", require, {.help = kRequireHelp});
     bind("junit", junit, {.help = kJUnitHelp});
     bind("dry-run", dry_run, {.help = "prints what would be done, and does nothing"});

@@ -6,6 +6,7 @@
 
 #include "kernels/base/error.h"
 #include "pipeline/files/text.h"
+#include "pipeline/workspace/output_names.h"
 
 namespace regrade {
 namespace {
@@ -15,6 +16,33 @@ struct Part {
   std::string sentence, advice;
   std::optional<double> grade = {};
 };
+
+bool OptionIs(const RunReport& report, const std::string& name, const std::string& value) {
+  return std::ranges::any_of(report.options, [&](const OptionValue& option) {
+    return option.name == name && option.value == value;
+  });
+}
+
+// A LUT, which is what `regrade retouch` makes of an edit, is one map for all photos already.
+bool IsOneMap(const RunReport& report) {
+  return (report.stages.style_2d && report.stages.style_2d->method == kLutMethod) ||
+         OptionIs(report, "scene-wide", "true");
+}
+
+// "photos are far apart: add some between 00.png and 02.png; 01.png was not placed".
+std::string MorePhotos(const PhotoSpacing& spacing) {
+  constexpr size_t kMostNames = 3;
+  std::string text = spacing.far_apart() ? "photos are far apart: add some" : "add photos";
+  if (!spacing.before.empty())
+    text += (spacing.far_apart() ? " between " : ", most of all between ") + spacing.before +
+            " and " + spacing.after;
+  const std::vector<std::string>& lost = spacing.not_placed;
+  if (lost.empty()) return text;
+  const size_t named = std::min(lost.size(), kMostNames);
+  text += "; " + Join({lost.begin(), lost.begin() + static_cast<long>(named)}, ", ");
+  if (named < lost.size()) text += Concat(" and ", lost.size() - named, " more");
+  return text + (lost.size() == 1 ? " was not placed" : " were not placed");
+}
 
 // Detail kept of 0.9 is sharp, and 0.5 soft (SharpnessWord).
 Part Sharp(const RunReport& report) {
@@ -32,6 +60,7 @@ Part Sharp(const RunReport& report) {
                     ? "run again with --preset standard and another --out: its field is finer"
                     : "more photos from nearby, held still, make the scene sharper; --preset "
                       "best has a finer field";
+  if (LacksPhotos(*fit) && report.spacing) part.advice = MorePhotos(*report.spacing);
   return part;
 }
 
@@ -42,12 +71,17 @@ const ConsistencyMetrics* Nearest(const RunReport& report, const std::string& se
   return found;
 }
 
+// Of the film; one along the photos' places (--path views) has no frames of its own.
 Part Steady(const RunReport& report) {
-  const ConsistencyMetrics *styled = Nearest(report, "styled"),
-                           *other = Nearest(report, "views_2d");
+  const bool own_frames = report.stages.render && report.stages.render->path_frames > 0;
+  const auto of_film = [&](const char* sequence) {
+    return Nearest(report, (own_frames ? kPathPrefix : "") + std::string(sequence));
+  };
+  const ConsistencyMetrics *styled = of_film("styled"), *other = of_film("views_2d");
   const bool frame_by_frame = other != nullptr;
-  if (!frame_by_frame) other = Nearest(report, "source");
+  if (!frame_by_frame) other = of_film("source");
   if (styled == nullptr || other == nullptr) return {"steady: not measured", ""};
+  if (styled->tc_psnr_mean_db.infinite) return {"steady: nothing of the film flickers", "", 1};
   for (const ConsistencyMetrics* row : {styled, other})
     if (!row->tc_psnr_mean_db.value)
       return {"steady: not measured (" + row->tc_psnr_mean_db.why + ")", ""};
@@ -56,11 +90,13 @@ Part Steady(const RunReport& report) {
   constexpr double kNoDifference = 0.05;  // below what is printed
   Part part;
   part.sentence = std::abs(gain) < kNoDifference
-                      ? "steady: as " + than
-                      : Format("steady: %.1f dB %s than %s", std::abs(gain),
+                      ? "steady: the film is as steady as " + than
+                      : Format("steady: the film is %.1f dB %s than %s", std::abs(gain),
                                gain > 0 ? "steadier" : "less steady", than.c_str());
   part.grade = 1 + std::min(0.0, gain) / 3;  // 3 dB twice the squared error
-  part.advice = "--scene-wide uses one colour map for all photos, the steadiest there is";
+  part.advice = IsOneMap(report)
+                    ? "--strength 0.7 applies less of the style, which is steadier"
+                    : "--scene-wide uses one colour map for all photos, the steadiest there is";
   return part;
 }
 
@@ -70,19 +106,34 @@ Part Faithful(const RunReport& report) {
                                      &FidelityMetrics::sequence);
   if (row == report.evaluation.fidelity.end()) return {"faithful: not measured", ""};
   const Metric& psnr = row->psnr_to_2d_db;
+  if (psnr.infinite) return {"faithful: exactly the recoloured photos", "", 1};
   if (!psnr.value) return {"faithful: not measured (" + psnr.why + ")", ""};
+  const auto& evaluate = report.stages.evaluate;
+  const bool edit = evaluate && evaluate->edit_seen;
   Part part;
-  part.sentence = Format("faithful: %.1f dB to the recoloured photos, %s", *psnr.value,
+  part.sentence = Format("faithful: %.1f dB to the %s, %s", *psnr.value,
+                         edit ? "edit where its photo sees the scene" : "recoloured photos",
                          *psnr.value >= 30   ? "close"
                          : *psnr.value >= 25 ? "mostly close"
                                              : "apart in places");
   part.grade = *psnr.value / 30;
   part.advice =
-      "--style-view-weight 0 follows each recoloured photo more closely, and is less steady";
+      edit ? "edit a photo that shows more of what is to change, seen from nearby"
+           : "--style-view-weight 0 follows each recoloured photo more closely, and is less "
+             "steady";
   return part;
 }
 
 }  // namespace
+
+bool LacksPhotos(const ReconstructReport& fit) {
+  // Captures of 20 photos and more lose up to 3 dB; those of a dozen 5 to 13.
+  constexpr double kFarBelowDb = 5, kDetailLeft = 0.6;
+  const auto &train_db = fit.psnr_train_db.value, &held_out_db = fit.psnr_heldout_db.value,
+             &train = fit.detail_kept_train.value, &held_out = fit.detail_kept_heldout.value;
+  return (train_db && held_out_db && *held_out_db < *train_db - kFarBelowDb) ||
+         (train && held_out && *held_out < kDetailLeft * *train);
+}
 
 std::string Assessment::Line() const { return Join(sentences, "; "); }
 

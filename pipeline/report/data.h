@@ -8,6 +8,7 @@
 
 #include "kernels/scene/capture.h"
 #include "pipeline/report/evaluation_metrics.h"
+#include "pipeline/report/photo_spacing.h"
 #include "pipeline/report/stage_metrics.h"
 #include "pipeline/workspace/metric.h"
 
@@ -73,6 +74,7 @@ struct RunReport {
   double seconds = 0;
   Metric peak_memory_mb;
   std::optional<PhotosReport> photos;
+  std::optional<PhotoSpacing> spacing;  // for advice
   std::vector<EffectReport> effects;
   StagesReport stages;
   EvaluationMetrics evaluation;

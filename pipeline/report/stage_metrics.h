@@ -118,6 +118,9 @@ struct ReconstructReport {
   }
 };
 
+// The 2D method of a LUT, and of what `regrade retouch` makes of an edit.
+inline constexpr char kLutMethod[] = "lut";
+
 struct Style2dReport {
   RecordedTime time;
   std::string method;
@@ -285,7 +288,11 @@ struct EvaluateReport {
   std::string protocol;         // whose values these are; empty for none
   // Which frames stand for neighbouring views that differ in size or lens; else empty.
   std::string comparison_note;
-  Metric psnr_to_2d_photos_db;      // styled frames against the 2D method on the photos
+  // Styled frames against the 2D method on the photos; of an edit of single photos, on these.
+  Metric psnr_to_2d_photos_db;
+  // Of such an edit: the share of the measured pixels that these photos see. What they do not
+  // see is in no fidelity.
+  std::optional<double> edit_seen = {};
   Metric linear_map_psnr_to_2d_db;  // of the better of two linear colour maps
   // Of renders without style to the photos, as those of ReconstructReport; where a network was
   // given.
@@ -301,6 +308,7 @@ struct EvaluateReport {
     visit("comparison_note", comparison_note, {.optional = true});
     visit("psnr_to_2d_photos_db", psnr_to_2d_photos_db,
           {.label = "PSNR to the styled photos", .unit = "dB"});
+    visit("edit_seen", edit_seen, {.label = "share that the edited photo sees"});
     visit("linear_map_psnr_to_2d_db", linear_map_psnr_to_2d_db,
           {.label = "PSNR of the best linear colour map", .unit = "dB"});
     visit("lpips_heldout", lpips_heldout,

@@ -41,4 +41,13 @@ PlannedFit FitWithinMemory(FitOptions options, const FitPlace& place) {
   return fit;
 }
 
+std::string MemoryWarning(const FitOptions& options, const FitPlace& place) {
+  try {
+    return FitWithinMemory(options, place).notice;
+  } catch (const Error& error) {
+    if (error.code() != ExitCode::kResources) throw;
+    return error.what_failed() + (error.hint().empty() ? "" : ": " + error.hint());
+  }
+}
+
 }  // namespace regrade

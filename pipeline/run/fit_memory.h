@@ -30,4 +30,8 @@ struct PlannedFit {
 // to a given limit. Throws Error(kResources) if the plan takes too much all the same.
 PlannedFit FitWithinMemory(FitOptions options, const FitPlace& place);
 
+// What a person should know of the fit's memory before it begins: that less than it takes is
+// free, and what it is lowered to; or nothing.
+std::string MemoryWarning(const FitOptions& options, const FitPlace& place);
+
 }  // namespace regrade

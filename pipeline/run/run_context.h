@@ -1,16 +1,29 @@
 // What every stage gets: the settings, the output folder and the console.
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "pipeline/capture/capture_source.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/program/console.h"
 #include "pipeline/run/run_settings.h"
+#include "pipeline/run/stage_estimate.h"
 #include "pipeline/workspace/stage_runner.h"
 #include "pipeline/workspace/workspace.h"
 
 namespace regrade {
+
+// What a dry run says of a stage.
+struct PlannedStage {
+  std::string style;  // empty for stages of the scene
+  std::string stage;
+  bool done = false;  // before; else it would be done
+  double seconds = 0;
+  uint64_t memory = 0;  // bytes; 0 if not planned
+};
 
 struct RunContext {
   RunSettings settings;
@@ -19,6 +32,8 @@ struct RunContext {
   Workspace* workspace = nullptr;  // of the scene
   Workspace* style = nullptr;      // of the style that is being made: styles/NAME
   Console* console = nullptr;
+  std::optional<CaptureSize> source_size = {};  // of the photos, once somebody asked for it
+  std::vector<PlannedStage> planned = {};       // in a dry run
 
   // What `source` is. Folders of masks in it hold no photos.
   CaptureSource Source() const {

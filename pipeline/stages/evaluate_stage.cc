@@ -26,6 +26,7 @@
 #include "pipeline/program/device_choice.h"
 #include "pipeline/report/records.h"
 #include "pipeline/run/run_context.h"
+#include "pipeline/stages/carried_edit.h"
 #include "pipeline/stages/control_ceiling.h"
 #include "pipeline/stages/control_field.h"
 #include "pipeline/stages/control_sequences.h"
@@ -153,6 +154,9 @@ void AddFilm(RunContext* context, const FidelityTargets& networks, const Camera&
   }
   FidelityTargets targets = networks;
   if (renders_styled) targets.views_2d = sequences[1].frames;
+  if (std::filesystem::exists(folder(kEditedFrames)))
+    targets.views_2d =
+        WhereEdited(targets.views_2d, FramesOf(kept, folder(kEditedFrames), all));
   targets.transmittance = FramesOf(kept, folder("transmittance"), all);
   targets.unstyled = sequences[0].frames;
   if (options.controls)
@@ -270,6 +274,10 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   OpenNetworks(settings.consistency, &networks);
   FidelityTargets targets = networks;
   targets.views_2d = renders_styled ? frames("views_2d", training_views) : of_photos;
+  const bool edited =
+      std::filesystem::exists(workspace.Path("frames/" + std::string(kEditedFrames)));
+  if (edited)
+    targets.views_2d = WhereEdited(targets.views_2d, frames(kEditedFrames, training_views));
   targets.transmittance = frames("transmittance", training_views);
   targets.unstyled = frames("source", training_views);
   std::vector<Camera> training_cameras;
@@ -307,9 +315,25 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
       measured, targets, parts.Next(n * kFrameSeconds * static_cast<double>(measured.size())));
   AddFilm(context, networks, CommonCamera(cameras), &parts, &consistency, &fidelity,
           &heat_maps);
-  const FidelityTargets photo_targets{of_photos,         targets.transmittance, nullptr, {}, {},
-                                      /*only_psnr=*/true};
-  const FidelityRow to_photos = MeasureFidelity({"styled", frames("styled", training_views)},
+  // Of an edit of single photos only these say what is wanted.
+  const std::vector<Image> layers = LayersOf(settings.residual, views);
+  std::vector<int> wanted = training_views;
+  if (edited) {
+    wanted = all;
+    std::erase_if(wanted, [&](int i) { return layers[static_cast<size_t>(i)].empty(); });
+  }
+  const FrameSource wanted_photos{static_cast<int>(wanted.size()), [&](int k) {
+                                    const int i = wanted[static_cast<size_t>(k)];
+                                    Image photo = photo_2d(i);
+                                    if (edited)
+                                      photo = WithLayer(photo, layers[static_cast<size_t>(i)],
+                                                        settings.style.strength);
+                                    PutGain(gains.Of(i), &photo);
+                                    return photo;
+                                  }};
+  const FidelityTargets photo_targets{
+      wanted_photos, frames("transmittance", wanted), nullptr, {}, {}, /*only_psnr=*/true};
+  const FidelityRow to_photos = MeasureFidelity({"styled", frames("styled", wanted)},
                                                 photo_targets, parts.Next(n * kFrameSeconds));
 
   EvaluateReport report;
@@ -319,6 +343,7 @@ StageOutcome Evaluate(RunContext* context, const ProgressFunction& progress) {
   report.error_per = settings.consistency.error_per;
   report.protocol = ProtocolOf(settings.consistency);
   if (!same_camera) report.comparison_note = ComparisonNote(compared[0]);
+  if (edited) report.edit_seen = MeanOfPictures(frames(kEditedFrames, training_views));
   report.psnr_to_2d_photos_db = Metric(to_photos.psnr_to_2d_db);
   report.linear_map_psnr_to_2d_db =
       settings.object.On()

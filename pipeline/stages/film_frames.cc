@@ -1,5 +1,9 @@
 #include "pipeline/stages/film_frames.h"
 
+#include <algorithm>
+#include <cmath>
+
+#include "kernels/base/error.h"
 #include "kernels/scene/common_camera.h"
 #include "pipeline/fields/camera_path.h"
 #include "pipeline/fields/film_timing.h"
@@ -73,6 +77,37 @@ std::vector<FrameSet> FrameSetsOf(const WorkingViews& views, const RenderOptions
   sets.push_back({kPathPrefix, path.samples, false, false, true});
   sets.push_back({kFilmPrefix, path.film, false, true, false});
   return sets;
+}
+
+std::string SmallerFilmNote(const RenderOptions& options, const std::vector<Camera>& film) {
+  if (options.path.path == "views" || film.empty()) return "";
+  const int longer = std::max(film[0].width, film[0].height);
+  if (longer >= options.film_size) return "";
+  return Concat("the film is capped at ", longer,
+                " pixels, the photos' size (--film-size asks for ", options.film_size, ")");
+}
+
+std::string PlanOfFrames(const std::vector<FrameSet>& sets) {
+  constexpr double kBytesPerPixel = 5;  // of three PNGs in colour and one in grey, measured
+  std::string text;
+  double pixels = 0;
+  for (const FrameSet& set : sets) {
+    const std::string size =
+        Concat(" (", set.cameras[0].width, "x", set.cameras[0].height, " px), ");
+    text += std::to_string(set.cameras.size());
+    if (set.prefix == kCommonPrefix)
+      text += " there with one camera" + size;
+    else if (set.prefix == kFilmPrefix)
+      text += " of the film" + size;
+    else
+      text += set.of_photos ? " frames at the photos' positions, "
+                            : " where the film is measured, ";
+    if (set.prefix == kFilmPrefix) continue;
+    for (const Camera& camera : set.cameras)
+      pixels += static_cast<double>(camera.width) * camera.height;
+  }
+  return text + "about " + std::to_string(std::lround(pixels * kBytesPerPixel * 1e-6)) +
+         " MB of pictures";
 }
 
 int CountSamples(const RenderOptions& options) {

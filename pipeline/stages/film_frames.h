@@ -45,6 +45,14 @@ FilmPath MakeFilmPath(const WorkingViews& views, const RenderOptions& options,
 std::vector<FrameSet> FrameSetsOf(const WorkingViews& views, const RenderOptions& options,
                                   const FilmPath& path);
 
+// That a film of these cameras is smaller than --film-size, and why; empty where it is not, or
+// where the size of photos decides (--path views).
+std::string SmallerFilmNote(const RenderOptions& options, const std::vector<Camera>& film);
+
+// "24 frames at the photos' positions, 24 there with one camera (480x360 px), 60 where the film
+// is measured, 180 of the film (480x360 px), about 53 MB of pictures".
+std::string PlanOfFrames(const std::vector<FrameSet>& sets);
+
 // Frames on disk along the film's path, an excerpt of the film's time after the other; 0 with
 // --path views and --no-films.
 int CountSamples(const RenderOptions& options);

@@ -9,6 +9,7 @@
 #include "pipeline/images/cube_file.h"
 #include "pipeline/networks/fetch_file.h"
 #include "pipeline/program/question.h"
+#include "pipeline/report/stage_metrics.h"
 #include "pipeline/stages/command_stylizer.h"
 #include "pipeline/stages/folder_stylizer.h"
 #include "pipeline/stages/matched_stylizer.h"
@@ -80,7 +81,7 @@ std::unique_ptr<ViewStylizer> MakeMethod(RunContext* context, const Capture& cap
   const StyleMethod method = MethodWithFiles(settings.style_2d);
   if (IsCubeFile(path)) {
     const ColorLut lut = ReadCubeFile(path);
-    return MakeMapStylizer(lut, "lut", {SlopeText(lut)});
+    return MakeMapStylizer(lut, kLutMethod, {SlopeText(lut)});
   }
   switch (method.kind) {
     case StyleMethodKind::kOnnx:

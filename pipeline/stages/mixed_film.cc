@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <map>
 #include <utility>
 
@@ -16,8 +15,6 @@
 
 namespace regrade {
 namespace {
-
-namespace fs = std::filesystem;
 
 // Whether any keyframe shows style `i`.
 bool IsShown(const KeyframePath& path, size_t i) {
@@ -78,9 +75,8 @@ PathFilm PlanPathFilm(const std::string& folder, const KeyframePath& path, int l
   film.width = EvenSide(longest * half[0] / larger);
   film.height = EvenSide(longest * half[1] / larger);
   std::map<std::string, std::string> names;
-  for (const std::string& name : StyleNames(folder))
-    if (const std::string style = StyleFolder(folder, name); fs::exists(style + "/network.npz"))
-      names.emplace(PageStyleId(style), name);
+  for (const std::string& name : LearnedStyles(folder))
+    names.emplace(PageStyleId(StyleFolder(folder, name)), name);
   for (size_t i = 0; i < path.styles.size(); ++i) {
     const auto found = names.find(path.styles[i]);
     if (found != names.end()) {

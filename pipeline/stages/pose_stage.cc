@@ -13,6 +13,7 @@
 #include "pipeline/capture/pose_profile.h"
 #include "pipeline/capture/pose_tracks.h"
 #include "pipeline/capture/scene_profile.h"
+#include "pipeline/files/text.h"
 #include "pipeline/report/stage_metrics.h"
 #include "pipeline/run/plan.h"
 #include "pipeline/run/run_context.h"
@@ -61,11 +62,9 @@ StageSeconds EstimateSeconds(const CaptureSource& source) {
 }
 
 // The clause of a dry run about tracks, which may be needed.
-std::string PlannedTracks(const RunSettings& settings, const CaptureSource& source,
-                          int64_t photos) {
+std::string PlannedTracks(const RunSettings& settings, const CaptureSource& source) {
   if (!LacksPoints(source.kind) || settings.pose.tracks != "auto") return "";
-  return "; points by COLMAP, unless photos are transparent: " +
-         PlanText(PlanTracks(photos, omp_get_max_threads()));
+  return "; points by COLMAP, unless photos are transparent";
 }
 
 // The folder of masks: that of the options, or of the run that the poses come from.
@@ -130,8 +129,8 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
         masks_of_photos.empty()
             ? StageMasks(MasksByPhoto(source, ingest.photos), ingest.photos, mask_folder)
             : StagePhotoMasks(masks_of_photos, ingest.photos, mask_folder);
-    context->console->Info(std::to_string(masks) +
-                           " masks: their black parts are neither matched nor fitted");
+    context->console->Info(Counted(masks, "mask") +
+                           ": what is black there is neither matched nor fitted");
     metrics.photo_masks = masks;
   }
   if (source.kind == CaptureKind::kPhotos) {
@@ -182,9 +181,9 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
   metrics.models_found = capture.models_found;
   PutMetrics(metrics, &outcome.metrics);
   outcome.outputs = {"poses"};
-  context->console->Info(Concat("registered ", capture.views.size(), " of ",
-                                ingest.photos.size(), " photos, ", capture.points.size(),
-                                " points"));
+  context->console->Info(Concat("found the place of ", capture.views.size(), " of ",
+                                Counted(std::ssize(ingest.photos), "photo"), ", and ",
+                                Counted(std::ssize(capture.points), "point"), " of the scene"));
   return outcome;
 }
 
@@ -224,13 +223,11 @@ Stage PoseStage(RunContext* context) {
       stage.inputs["photo_masks"][photo] = HashFile(mask);
   stage.refuse_changes = true;
   const InputFiles inputs = InputsOf(source);
-  const int64_t photos = ExpectedPhotos(inputs, context->settings.ingest);
   stage.plan =
       Concat(PlannedInputs(inputs, context->settings.ingest), " in ", source.photos,
              (source.kind == CaptureKind::kPhotos
-                  ? ", poses by COLMAP: " + PlanText(PlanPoses(photos, omp_get_max_threads()))
-                  : ", poses from " + source.poses +
-                        PlannedTracks(context->settings, source, photos)));
+                  ? ", poses by COLMAP"
+                  : ", poses from " + source.poses + PlannedTracks(context->settings, source)));
   stage.work = [context, source](const ProgressFunction& progress) {
     return FindPoses(context, source, progress);
   };

@@ -21,6 +21,7 @@
 #include "pipeline/run/run_context.h"
 #include "pipeline/stages/photo_metrics.h"
 #include "pipeline/stages/stages.h"
+#include "pipeline/workspace/folder_size.h"
 #include "pipeline/workspace/metrics_json.h"
 #include "reconstruct/fit/adapt_options.h"
 #include "reconstruct/fit/choose_degree.h"
@@ -235,7 +236,14 @@ StageOutcome Reconstruct(RunContext* context, const JsonValue& inputs,
   SetPhotoMetrics(MeasureOnPhotos(views, views.HeldOut(), stored, backend),
                   MeasureOnPhotos(views, MeasuredTrainingViews(views), stored, backend),
                   &metrics);
-  context->console->Info(QualityLine(metrics));
+  if (const Metric& kept =
+          metrics.heldout.empty() ? metrics.detail_kept_train : metrics.detail_kept_heldout;
+      kept.value)
+    context->console->Info(
+        Format("the scene shows %.0f %% of the fine detail of %s: %s", 100 * *kept.value,
+               metrics.heldout.empty() ? "the photos" : "photos that were kept out of the fit",
+               metrics.sharpness.c_str()));
+  context->console->Detail(QualityLine(metrics));
   PutMetrics(metrics, &outcome.metrics);
   return outcome;
 }
@@ -279,7 +287,11 @@ Stage ReconstructStage(RunContext* context) {
     const FitOptions options =
         AdaptOptions(context->settings.fit, {profile.scene.ndc.on(), backend == Backend::kCuda,
                                              pixels, profile.scene.box.background.has_value()});
-    stage.plan = PlanText(PlanFitAt({backend, pixels, profile.scene.box}, options));
+    const FitPlace place{backend, pixels, profile.scene.box, run.max_memory_gb,
+                         run.reproducible};
+    stage.plan = "about " + SizeText(PlanFitAt(place, options).memory) + " of memory";
+    if (const std::string warning = MemoryWarning(options, place); !warning.empty())
+      stage.plan_warnings.push_back(warning);
   }
   stage.work = [context, inputs = stage.inputs](const ProgressFunction& progress) {
     return Reconstruct(context, inputs, progress);

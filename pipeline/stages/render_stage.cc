@@ -5,7 +5,6 @@
 // exact. The 2D method styles frames at the photos' positions, and of the film those on which
 // it is measured.
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -16,13 +15,13 @@
 #include "pipeline/fields/field_file.h"
 #include "pipeline/fields/field_renderer.h"
 #include "pipeline/fields/film_timing.h"
-#include "pipeline/images/image_file.h"
 #include "pipeline/program/device_choice.h"
-#include "pipeline/program/ordered_worker.h"
 #include "pipeline/report/stage_metrics.h"
 #include "pipeline/run/run_context.h"
+#include "pipeline/stages/carried_edit.h"
 #include "pipeline/stages/film_frames.h"
 #include "pipeline/stages/film_renderer.h"
+#include "pipeline/stages/frame_writer.h"
 #include "pipeline/stages/make_stylizer.h"
 #include "pipeline/stages/object_edit.h"
 #include "pipeline/stages/photo_vignette.h"
@@ -44,15 +43,9 @@ struct FrameRenderers {
   std::unique_ptr<ViewStylizer> stylizer;
   std::unique_ptr<CoverageRenderer> object;  // null where the whole scene is styled
   std::vector<Image> coverage;               // of the current frame
+  std::optional<CarriedEdit> edit;           // what single photos have beyond the 2D method
   double seconds = 0;                        // of rendering both fields
   bool fast_film = false;                    // both renderers are prepared for it
-};
-
-// The frames of one camera.
-struct Frame {
-  Image source, styled, transmittance;
-  Image depth;                    // of the source
-  std::optional<Image> views_2d;  // of methods that can style a render
 };
 
 const FrameSet* CommonSet(const std::vector<FrameSet>& sets) {
@@ -78,31 +71,6 @@ std::vector<FrameSet> PlannedSets(const RunContext& context) {
   return FrameSetsOf(views, options, PathOf(views, options, nullptr));
 }
 
-// "24 frames at the photos' positions, 24 there with one camera (480x360 px), 60 where the film
-// is measured, 180 of the film (480x360 px), about 53 MB of pictures".
-std::string PlanOf(const std::vector<FrameSet>& sets) {
-  constexpr double kBytesPerPixel = 5;  // of three PNGs in colour and one in grey, measured
-  std::string text;
-  double pixels = 0;
-  for (const FrameSet& set : sets) {
-    const std::string size =
-        Concat(" (", set.cameras[0].width, "x", set.cameras[0].height, " px), ");
-    text += std::to_string(set.cameras.size());
-    if (set.prefix == kCommonPrefix)
-      text += " there with one camera" + size;
-    else if (set.prefix == kFilmPrefix)
-      text += " of the film" + size;
-    else
-      text += set.of_photos ? " frames at the photos' positions, "
-                            : " where the film is measured, ";
-    if (set.prefix == kFilmPrefix) continue;
-    for (const Camera& camera : set.cameras)
-      pixels += static_cast<double>(camera.width) * camera.height;
-  }
-  return text + "about " + std::to_string(std::lround(pixels * kBytesPerPixel * 1e-6)) +
-         " MB of pictures";
-}
-
 // The scene as a camera of that gain records it.
 Frame RenderFrame(RunContext* context, FrameRenderers* renderers, const Camera& camera,
                   const PhotoGain& gain, int index, bool fast, bool with_2d) {
@@ -123,59 +91,24 @@ Frame RenderFrame(RunContext* context, FrameRenderers* renderers, const Camera& 
   if (renderers->object != nullptr) renderers->coverage = renderers->object->Render(camera);
   if (renderers->stylizer->StylesAnything()) {
     frame.views_2d = renderers->stylizer->Stylize(frame.source, index);
+    if (!renderers->edit->empty())
+      frame.edited = renderers->edit->AddTo(camera, frame.depth, &*frame.views_2d);
     MixPicture(frame.source, context->settings.style.strength, &*frame.views_2d);
+    // Nobody said what is wanted where the photo does not look: no difference is shown there.
+    for (int64_t p = 0; p < frame.edited.num_pixels(); ++p)
+      if (frame.edited.pixels[static_cast<size_t>(p)] == 0)
+        std::copy_n(&frame.styled.pixels[static_cast<size_t>(3 * p)], 3,
+                    &frame.views_2d->pixels[static_cast<size_t>(3 * p)]);
   }
   return frame;
 }
 
-// Writes files and films while the next frames are rendered: one thread for each half of the
-// pictures and one for the films, so that a GPU does not wait for them.
-class FrameWriter {
- public:
-  FrameWriter(const Workspace& workspace, const Vignette& vignette, RunFilms* films)
-      : workspace_(workspace), vignette_(vignette), films_(films) {}
-
-  // frames/<prefix>{source, styled, views_2d, transmittance}/<index>.png
-  void Write(const std::shared_ptr<const Frame>& frame, const FrameSet& set, int index) {
-    if (set.of_film)
-      film_.Do([=, this] { films_->Add(index, frame->source, Shown(frame->styled)); });
-    if (set.of_2d_film && frame->views_2d)
-      film_.Do([=, this] { films_->AddViews2d(Shown(*frame->views_2d)); });
-    if (set.prefix == kFilmPrefix) return;
-    const std::string prefix = set.prefix;
-    const auto write = [this, prefix, index](const char* sequence, const Image& image) {
-      WritePng8(workspace_.NewPath("frames/" + prefix + sequence + "/" + FrameName(index)),
-                image);
-    };
-    before_.Do([=] {
-      write("source", frame->source);
-      // Fidelity, which is not measured on the common camera's frames, ignores pixels of high
-      // transmittance.
-      if (prefix != kCommonPrefix) write("transmittance", frame->transmittance);
-    });
-    after_.Do([=] {
-      write("styled", frame->styled);
-      if (frame->views_2d) write("views_2d", *frame->views_2d);
-    });
-  }
-  void Finish() {
-    before_.Finish();
-    after_.Finish();
-    film_.Finish();
-  }
-
- private:
-  // As films show it.
-  Image Shown(Image picture) const {
-    PutVignette(vignette_, &picture);
-    return picture;
-  }
-
-  const Workspace& workspace_;
-  const Vignette vignette_;
-  RunFilms* films_;
-  OrderedWorker before_, after_, film_;
-};
+// For the time that is left: a frame's pixels, of which those that are only in the film cost a
+// third (pipeline/run/stage_estimate.cc).
+double WorkOf(const FrameSet& set) {
+  const Camera& camera = set.cameras[0];
+  return 1e-6 * camera.width * camera.height * (set.prefix == kFilmPrefix ? 1.0 / 3 : 1);
+}
 
 // The renderers of the scene's field and of the style's. Fields have gigabytes: neither stays.
 void PrepareFields(const RunSettings& settings, const Workspace& style, Backend backend,
@@ -209,6 +142,7 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   PrepareFields(settings, workspace, backend, std::move(before), &renderers);
   renderers.stylizer = MakeSceneStylizer(context, views, masks.get(),
                                          [&](const Image&, int) { return renderers.coverage; });
+  renderers.edit.emplace(settings.residual, views, *renderers.source);
 
   if (path.narrowed)
     context->console->Info(
@@ -220,7 +154,11 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
         "--path views shows the photos' places one by one");
   const std::vector<FrameSet> sets = FrameSetsOf(views, settings.render, path);
   int total = 0;
-  for (const FrameSet& set : sets) total += static_cast<int>(set.cameras.size());
+  double work = 0;
+  for (const FrameSet& set : sets) {
+    total += static_cast<int>(set.cameras.size());
+    work += WorkOf(set) * static_cast<double>(set.cameras.size());
+  }
   const auto film =
       std::find_if(sets.begin(), sets.end(), [](const FrameSet& set) { return set.of_film; });
   const bool has_film = film != sets.end();
@@ -228,6 +166,8 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   const bool film_of_views = !has_film || film->of_photos;
   if (const FrameSet* common = CommonSet(sets))
     context->console->Info(ComparisonNote(common->cameras[0]));
+  if (const std::string note = SmallerFilmNote(settings.render, path.film); !note.empty())
+    context->console->Info(note);
 
   const std::string why_exact =
       PrepareFilm(settings, film_of_views, &*renderers.source, &*renderers.styled);
@@ -246,10 +186,11 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
                  film_of_views ? settings.render.fps : kSampleRate);
   {
     FrameWriter writer(workspace, ParseVignette(settings.render.vignette), &films);
-    int done = 0;
+    double done = 0;
     for (const FrameSet& set : sets) {
       for (int i = 0; i < static_cast<int>(set.cameras.size()); ++i) {
-        if (Report(progress, done++, total) == LoopControl::kStop) throw Interrupted();
+        ReportOrThrow(progress, done, work);
+        done += WorkOf(set);
         const auto frame = std::make_shared<const Frame>(RenderFrame(
             context, &renderers, set.cameras[static_cast<size_t>(i)],
             set.of_photos && settings.render.keep_exposure ? views.Gain(i) : kAsTaken, i,
@@ -261,6 +202,7 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
     }
     writer.Finish();
   }
+  WriteFrameNames(views, workspace);
   if (has_film) films.Finish(&outcome.outputs);
   if (!films.why_none().empty()) context->console->Warn("no film: " + films.why_none());
   RenderReport report;
@@ -276,9 +218,11 @@ StageOutcome Render(RunContext* context, const ProgressFunction& progress) {
   if (has_film) report.film_renderer = FilmRendererText(why_exact, backend);
   if (renderers.seconds > 0) report.frames_per_second = total / renderers.seconds;
   report.seen_by_few = seen.metrics();
+  const std::string few = report.seen_by_few.Sentence();
   if (report.seen_by_few.film.value.value_or(0) > kMuchSeenByFew)
-    context->console->Warn(report.seen_by_few.Sentence() +
-                           ": it may look wrong there; more photos of these parts help");
+    context->console->Warn(few + ": it may look wrong there; more photos of these parts help");
+  else if (!few.empty())
+    context->console->Info(few);
   PutMetrics(report, &outcome.metrics);
   return outcome;
 }
@@ -300,7 +244,12 @@ Stage RenderStage(RunContext* context) {
   if (!context->settings.render.films.films) stage.inputs["films"] = false;
   if (context->workspace->Find("pose")) {
     const std::vector<FrameSet> sets = PlannedSets(*context);
-    stage.plan = PlanOf(sets);
+    stage.plan = PlanOfFrames(sets);
+    for (const FrameSet& set : sets)
+      if (set.prefix == kFilmPrefix)
+        if (const std::string note = SmallerFilmNote(context->settings.render, set.cameras);
+            !note.empty())
+          stage.plan += "; " + note;
     if (const FrameSet* common = CommonSet(sets))
       stage.inputs["common_camera"] = ComparisonNote(common->cameras[0]);
   }

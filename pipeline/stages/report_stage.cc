@@ -4,8 +4,6 @@
 
 #include "kernels/base/error.h"
 #include "kernels/field/cpu/rays.h"
-#include "pipeline/capture/capture_store.h"
-#include "pipeline/capture/scene_profile.h"
 #include "pipeline/capture/working_views.h"
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/images/image_file.h"
@@ -14,11 +12,11 @@
 #include "pipeline/report/cost_rows.h"
 #include "pipeline/report/html.h"
 #include "pipeline/report/json.h"
-#include "pipeline/report/records.h"
 #include "pipeline/report/run_pictures.h"
 #include "pipeline/run/equivalent_command.h"
 #include "pipeline/run/run_context.h"
 #include "pipeline/run/run_file.h"
+#include "pipeline/stages/run_facts.h"
 #include "pipeline/stages/stages.h"
 #include "pipeline/stages/style_pictures.h"
 #include "pipeline/stages/videos.h"
@@ -31,16 +29,6 @@ constexpr int kPagePictures = 5;  // viewpoints shown
 constexpr int kJpegQuality = 85;
 constexpr char kCostTable[] =
     "tradeoff/tradeoff.json";  // of `regrade tradeoff DIR --out DIR/tradeoff`
-
-PhotosReport PhotosOf(const Capture& capture) {
-  PhotosReport photos;
-  photos.given = static_cast<int>(capture.statuses.size());
-  photos.registered = static_cast<int>(capture.views.size());
-  photos.used = static_cast<int>(
-      std::ranges::count(capture.statuses, PhotoState::kUsed, &PhotoStatus::status));
-  photos.statuses = capture.statuses;
-  return photos;
-}
 
 // Of this program, its compiler and instruction set, and the programs that it started.
 std::vector<OptionValue> VersionsOf(const StagesReport& stages) {
@@ -139,35 +127,18 @@ bool WriteScenePage(const RunContext& context, const ProgressFunction& progress)
 }
 
 StageOutcome WriteReport(RunContext* context, const ProgressFunction& progress) {
-  const RunSettings& settings = context->settings;
   Workspace &workspace = *context->style, &scene = *context->workspace;
-  const Capture capture = ReadCapture(scene.Path("poses"));
-  RunReport report = ReportFromRecords(scene, workspace);
+  RunReport report = ReportOfRun(*context);
   report.version = REGRADE_VERSION;
   report.command = EquivalentCommand(*context);
   report.versions = VersionsOf(report.stages);
-  report.preset = settings.run.preset;
-  if (report.stages.reconstruct) report.device = report.stages.reconstruct->device;
-  report.seed = settings.run.seed;
-  for (const char* stage : kStageNames)
-    if (const auto record = context->FolderOf(stage).Find(stage))
-      report.seconds += record->seconds;
   report.peak_memory_mb = static_cast<double>(ReadMemoryStatus().peak_used >> 20);
-  report.photos = PhotosOf(capture);
-  for (const char* stage : {"pose", "reconstruct"})
-    if (const auto record = scene.Find(stage))
-      if (const JsonValue* effects = record->metrics.Find("effects"))
-        for (const EffectReport& effect : EffectsOfRecord(*effects))
-          report.effects.push_back(effect);
   try {
     report.costs = ReadCostTable(scene.Path(kCostTable));
   } catch (const Error& error) {
     context->console->Warn("the report does without " + std::string(kCostTable) + ": " +
                            error.what_failed());
   }
-  const JsonValue options = context->options.Values();
-  for (const auto& [name, value] : options.AsObject())
-    report.options.push_back({name, value.IsString() ? value.AsString() : DumpJson(value, -1)});
   WriteJsonFile(workspace.Path("report.json"), ReportJson(report));
   ReportPictures pictures = PicturesOf(*context, report);
   StageOutcome outcome;

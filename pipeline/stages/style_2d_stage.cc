@@ -8,6 +8,7 @@
 #include "pipeline/capture/working_views.h"
 #include "pipeline/fields/field_file.h"
 #include "pipeline/fields/field_renderer.h"
+#include "pipeline/files/text.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/program/device_choice.h"
 #include "pipeline/report/stage_metrics.h"
@@ -59,8 +60,9 @@ StageOutcome StyleViews(RunContext* context, const ProgressFunction& progress) {
       context, views, masks.get(),
       [&](const Image& view, int i) { return masks->Coverage(i, view.width, view.height); });
   if (masks != nullptr && masks->num_known() < std::ssize(capture.views))
-    context->console->Info(Concat(masks->num_known(), " of ", capture.views.size(),
-                                  " photos have a mask; the style is learned from these"));
+    context->console->Info(Concat(masks->num_known(), " of ",
+                                  Counted(std::ssize(capture.views), "photo"),
+                                  " have a mask; the style is learned from these"));
   const std::vector<std::string> notices = stylizer->Notices();
   for (const std::string& notice : notices) context->console->Info(notice);
 

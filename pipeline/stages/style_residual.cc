@@ -6,11 +6,10 @@
 #include <utility>
 
 #include "kernels/base/error.h"
-#include "kernels/image/resize.h"
-#include "pipeline/capture/photo_names.h"
 #include "pipeline/fields/field_renderer.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/program/device_choice.h"
+#include "pipeline/stages/carried_edit.h"
 #include "pipeline/stages/make_stylizer.h"
 #include "pipeline/stages/styled_field.h"
 #include "pipeline/workspace/stage_record.h"
@@ -27,12 +26,6 @@ constexpr int kScalings =
 constexpr int kTurnsAgain = 4;  // of these fits but the first: they begin where the last ended
 // Below this, root mean square, a view lacks nothing that can be seen.
 constexpr double kNothing = 0.5 / 255;
-
-Image ReadLayer(const std::string& path, int width, int height) {
-  Image layer = Colors(ReadGivenImage(path));
-  for (float& v : layer.pixels) v = 2 * v - 1;
-  return layer.width == width && layer.height == height ? layer : Resize(layer, width, height);
-}
 
 double RootMeanSquare(const Image& image) {
   double sum = 0, count = 0;
@@ -130,16 +123,11 @@ VoxelResidual FitStyleResidual(RunContext* context, const WorkingViews& views,
   VoxelResidual residual{Floats(of_views), {}};
   if (choice.Layers().empty()) return residual;
 
-  std::vector<std::string> photos;
-  for (const CaptureView& view : views.capture().views) photos.push_back(view.file);
-  const std::vector<std::string> paths = PicturesByPhotoName(choice.Layers(), photos, "layer");
+  const std::vector<Image> layers = LayersOf(choice, views);
   std::vector<int> with_layer;
   for (int i = 0; i < views.count(); ++i)
-    if (!paths[static_cast<size_t>(i)].empty()) with_layer.push_back(i);
-  const auto layer = [&](int i) {
-    const Camera camera = views.CameraOf(i);
-    return ReadLayer(paths[static_cast<size_t>(i)], camera.width, camera.height);
-  };
+    if (!layers[static_cast<size_t>(i)].empty()) with_layer.push_back(i);
+  const auto layer = [&](int i) { return layers[static_cast<size_t>(i)]; };
   std::vector<Vec3d> all, edit;
   for (int turn = 0; turn < kScalings; ++turn) {
     options = ResidualOptions();

@@ -1,8 +1,6 @@
 // Stage "stylize": trains a network on the pictures of views_2d/ and writes it to network.npz,
 // and what it lacks to residual.npz where --residual asks for that; styled_field.h makes the
 // styled field from both.
-#include <omp.h>
-
 #include <algorithm>
 #include <filesystem>
 #include <utility>
@@ -16,7 +14,6 @@
 #include "pipeline/images/image_file.h"
 #include "pipeline/program/device_choice.h"
 #include "pipeline/report/stage_metrics.h"
-#include "pipeline/run/plan.h"
 #include "pipeline/run/run_context.h"
 #include "pipeline/stages/make_stylizer.h"
 #include "pipeline/stages/object_edit.h"
@@ -222,7 +219,6 @@ Stage StylizeStage(RunContext* context) {
   }
   if (context->settings.residual.On())
     stage.inputs["residual"] = ResidualInputs(context->settings.residual);
-  stage.plan = PlanText(PlanStyle(context->settings.network.steps, omp_get_max_threads()));
   stage.work = [context, inputs = stage.inputs](const ProgressFunction& progress) {
     return Stylize(context, inputs, progress);
   };

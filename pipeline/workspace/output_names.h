@@ -15,6 +15,14 @@ inline constexpr char kPathPrefix[] = "path_";
 // are compared on these.
 inline constexpr char kCommonPrefix[] = "common_";
 
+// frames/edited/, frames/path_edited/: where an edit of single photos says what a frame should
+// be.
+inline constexpr char kEditedFrames[] = "edited";
+
+// Of `regrade retouch`, in the style's folder: what was found in the edit, and its map of
+// colours as a LUT.
+inline constexpr char kRetouchRecord[] = "retouch.json", kEditLut[] = "edit.cube";
+
 inline constexpr char kStyledFilm[] = "styled.mp4", kWipeFilm[] = "source_vs_styled.mp4",
                       kViews2dFilm[] = "views_2d.mp4";
 

@@ -12,18 +12,14 @@
 namespace regrade {
 namespace {
 
-// What a person reads, and the stage's part of the time of a draft of 24 photos on two cores.
-struct StageFacts {
-  const char* words;
-  double part;
-};
-constexpr StageFacts kFacts[] = {{"finding where each photo was taken", 0.12},
-                                 {"fitting the scene to the photos", 0.22},
-                                 {"recolouring each photo", 0.01},
-                                 {"applying the style to the scene", 0.10},
-                                 {"rendering frames and films", 0.37},
-                                 {"measuring", 0.11},
-                                 {"writing the report", 0.07}};
+// What a person reads.
+constexpr const char* kTitles[] = {"finding where each photo was taken",
+                                   "fitting the scene to the photos",
+                                   "recolouring each photo",
+                                   "applying the style to the scene",
+                                   "rendering frames and films",
+                                   "measuring",
+                                   "writing the report"};
 
 size_t PlaceOf(const std::string& stage) {
   const auto* found = std::find(std::begin(kStageNames), std::end(kStageNames), stage);
@@ -35,7 +31,12 @@ size_t PlaceOf(const std::string& stage) {
 
 std::string StageTitle(const std::string& stage) {
   const size_t place = PlaceOf(stage);
-  return Concat("stage ", place + 1, " of ", std::size(kStageNames), ": ", kFacts[place].words);
+  return Concat("stage ", place + 1, " of ", std::size(kStageNames), ": ", kTitles[place]);
+}
+
+std::string StageRunner::About(const std::string& stage) const {
+  const auto own = expected_.find(stage);
+  return own == expected_.end() ? "" : ", about " + DurationText(own->second);
 }
 
 void StageRunner::RestartFrom(const std::string& stage) {
@@ -62,7 +63,7 @@ void StageRunner::ForgetAfter(const std::string& stage) {
 
 bool StageRunner::Run(const Stage& stage) {
   if (stage.name == planned_restart_) {
-    console_->Info(stage.name + ": would be done again");
+    console_->Info(stage.name + ": would be done again" + About(stage.name));
     return false;
   }
   Workspace* const folder = FolderOf(stage.name);
@@ -80,7 +81,8 @@ bool StageRunner::Run(const Stage& stage) {
   const std::string why = status.why.empty() ? "" : " (" + Join(status.why, "; ") + ")";
   if (dry_run_) {
     console_->Info(stage.name + ": would be done" + why +
-                   (stage.plan.empty() ? "" : ": " + stage.plan));
+                   (stage.plan.empty() ? "" : ": " + stage.plan) + About(stage.name));
+    for (const std::string& warning : stage.plan_warnings) console_->Warn(warning);
     return false;
   }
   if (!why.empty()) console_->Info(stage.name + ": is done again" + why);
@@ -89,13 +91,14 @@ bool StageRunner::Run(const Stage& stage) {
   if (status.state != StageState::kNeverDone) folder->Forget(stage.name);
   ForgetAfter(stage.name);
   console_->SetKept(Finished());
-  const size_t place = PlaceOf(stage.name);
-  double later = 0;
-  // Without a style the scene is all.
-  for (size_t i = place + 1; i < (style_ == nullptr ? 2 : std::size(kStageNames)); ++i)
-    later += kFacts[i].part;
+  double later = later_;
+  for (size_t i = PlaceOf(stage.name) + 1; i < std::size(kStageNames); ++i)
+    if (const auto next = expected_.find(kStageNames[i]); next != expected_.end())
+      later += next->second;
+  const auto own = expected_.find(stage.name);
   console_->Info(StageTitle(stage.name));
-  console_->BeginStage(stage.name, StageTitle(stage.name), later / kFacts[place].part);
+  console_->BeginStage(stage.name, StageTitle(stage.name),
+                       own != expected_.end() ? own->second : 0, later);
   const double cpu_before = CpuSeconds();
   StageOutcome outcome;
   try {

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "kernels/base/progress.h"
@@ -35,7 +37,8 @@ struct Stage {
   // If the recorded inputs differ: redo the stage, or refuse with the difference (for work that
   // a typing mistake should not discard).
   bool refuse_changes = false;
-  std::string plan;  // a clause for --dry-run: sizes, memory, time where they are known
+  std::string plan;                        // a clause for --dry-run: sizes and memory
+  std::vector<std::string> plan_warnings;  // for --dry-run
   std::function<StageOutcome(const ProgressFunction&)> work;
 };
 
@@ -48,6 +51,10 @@ class StageRunner {
   // Forgets this stage and the later ones; an empty name forgets none.
   void RestartFrom(const std::string& stage);
   void SetDryRun(bool dry_run) { dry_run_ = dry_run; }
+  // Expected seconds of the stages of this command, and of what follows them.
+  void Expect(std::map<std::string, double> seconds, double later) {
+    expected_ = std::move(seconds), later_ = later;
+  }
 
   // False only in a dry run, when the stage would have to be done. Throws Error(kInput) for
   // refused changes, Interrupted, and what the work throws; running out of memory becomes
@@ -64,11 +71,14 @@ class StageRunner {
     return IsOfScene(stage) ? scene_ : style_;
   }
   std::string Finished() const;
+  std::string About(const std::string& stage) const;  // ", about 24 s", or nothing
 
   Workspace* scene_;
   Workspace* style_;
   Console* console_;
   bool dry_run_ = false;
+  std::map<std::string, double> expected_;
+  double later_ = 0;
   std::string planned_restart_;  // in a dry run nothing is forgotten
 };
 

@@ -113,20 +113,61 @@ std::vector<std::string> StyleNames(const std::string& folder) {
   return names;
 }
 
+bool IsLearned(const std::string& folder, const std::string& name) {
+  const std::string style = StyleFolder(folder, name);
+  return fs::is_regular_file(style + "/network.npz") &&
+         (fs::is_regular_file(style + "/.regrade/stages/stylize.json") ||
+          !fs::exists(style + "/.regrade"));
+}
+
+std::vector<std::string> LearnedStyles(const std::string& folder,
+                                       std::vector<std::string>* left) {
+  std::vector<std::string> learned;
+  for (const std::string& name : StyleNames(folder))
+    if (IsLearned(folder, name))
+      learned.push_back(name);
+    else if (left != nullptr)
+      left->push_back(name);
+  return learned;
+}
+
+std::string LeftOutText(const std::string& folder, const std::vector<std::string>& left) {
+  if (left.empty()) return "";
+  return "left out: " + Join(left, ", ") + (left.size() == 1 ? " is" : " are") +
+         " not finished; `regrade stylize " + folder + " --name NAME --style PICTURE` goes on";
+}
+
 std::string ChosenStyle(const std::string& folder, const std::string& name) {
   const std::vector<std::string> names = StyleNames(folder);
   if (names.empty())
     throw InputError("has no styles", folder,
                      "make one with `regrade stylize " + folder + " --style PICTURE`");
+  const auto known = [&names](const std::string& style) {
+    return std::ranges::find(names, style) != names.end();
+  };
   std::string chosen = name;
-  if (chosen.empty() && fs::is_regular_file(folder + kLastStyle))
-    chosen = ReadJsonFile(folder + kLastStyle).At("name").AsString();
+  if (chosen.empty() && fs::is_regular_file(folder + kLastStyle)) {
+    const std::string last = ReadJsonFile(folder + kLastStyle).At("name").AsString();
+    if (known(last)) chosen = last;  // its folder may have been deleted
+  }
+  const std::vector<std::string> learned = LearnedStyles(folder);
+  if (chosen.empty() && learned.size() == 1) chosen = learned[0];
   if (chosen.empty() && names.size() == 1) chosen = names[0];
-  if (std::ranges::find(names, chosen) == names.end())
-    throw InputError(chosen.empty() ? "several styles, none of them finished"
+  if (!known(chosen))
+    throw InputError(chosen.empty() ? "several styles, and none was finished last"
                                     : "has no style '" + chosen + "'",
                      folder, "its styles, for --name: " + Join(names, ", "));
   return chosen;
+}
+
+std::string ChosenLearnedStyle(const std::string& folder, const std::string& name) {
+  const std::string chosen = ChosenStyle(folder, name);
+  if (IsLearned(folder, chosen)) return chosen;
+  const std::vector<std::string> learned = LearnedStyles(folder);
+  throw InputError("style '" + chosen + "' is not finished", folder,
+                   "go on with `regrade stylize " + folder + " --name " + chosen +
+                       " --style PICTURE`" +
+                       (learned.empty() ? "" : ", or name one of " + Join(learned, ", ")));
 }
 
 void PublishStyle(const std::string& folder, const std::string& name) {

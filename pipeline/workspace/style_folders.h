@@ -40,8 +40,26 @@ std::vector<NamedStyle> NameStyles(const std::string& folder,
 // Names of the styles that were begun in `folder`, in natural order.
 std::vector<std::string> StyleNames(const std::string& folder);
 
+// A style that was learned, so that it can be shown: it has a network, and its stage "stylize"
+// was not begun again since. One that was begun and ended before, also from `regrade view`, is
+// none.
+bool IsLearned(const std::string& folder, const std::string& name);
+
+// Those of StyleNames that were learned; the others are added to `left`, if that is not null.
+std::vector<std::string> LearnedStyles(const std::string& folder,
+                                       std::vector<std::string>* left = nullptr);
+
+// "left out: sunset is not finished", "left out: dusk, sunset are not finished", and what to
+// do; empty where nothing is left out.
+std::string LeftOutText(const std::string& folder, const std::vector<std::string>& left);
+
+// ChosenStyle of a command that shows it. Throws Error(kInput), also for a style that was not
+// learned.
+std::string ChosenLearnedStyle(const std::string& folder, const std::string& name);
+
 // The style that a command continues: `name`, or the last one that was finished, or the only
-// one. Throws Error(kInput), which lists the names, where there is none.
+// one that was learned or, where none was, begun. Throws Error(kInput), which lists the names,
+// where there is none.
 std::string ChosenStyle(const std::string& folder, const std::string& name);
 
 // Notes that this style was finished last, and copies its film, where it has one, to styled.mp4

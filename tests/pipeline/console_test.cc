@@ -70,6 +70,26 @@ TEST(EtaEstimator, PreparationsAreIgnored) {
   EXPECT_NEAR(eta.Remaining().value(), 29.8, 0.1);
 }
 
+// What is left of a command: 60 s are expected of this stage and 300 s of what follows.
+TEST(LeftInAll, FollowsThePaceWithoutBelievingAShortStage) {
+  const ExpectedTime expected{.current = 60, .later = 300};
+  // As expected, half done.
+  EXPECT_NEAR(LeftInAll(expected, 0, 30, 30), 330, 1e-9);
+  // A stage of 60 s that takes ten times as long says little of the other 300.
+  EXPECT_LT(LeftInAll(expected, 0, 300, 300), 300 + 4 * 300);
+  EXPECT_GT(LeftInAll(expected, 0, 300, 300), 300 + 2 * 300);
+  // Most of the work took twice its time.
+  EXPECT_NEAR(LeftInAll({.finished = 300, .current = 30, .later = 30}, 600, 30, 30),
+              30 + 30 * 1.65, 2);
+  EXPECT_EQ(LeftInAll({}, 0, 5, 7), 7);
+}
+
+TEST(Counted, HasOneOrMore) {
+  EXPECT_EQ(Counted(1, "clip"), "1 clip");
+  EXPECT_EQ(Counted(0, "clip"), "0 clips");
+  EXPECT_EQ(Counted(2, "body", "bodies"), "2 bodies");
+}
+
 TEST(EtaEstimator, EmptyWithoutData) {
   EtaEstimator eta;
   EXPECT_FALSE(eta.Remaining());

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "pipeline/run/fit_memory.h"
+#include "pipeline/run/stage_estimate.h"
 #include "tests/support/expect_error.h"
 
 namespace regrade {
@@ -65,6 +66,41 @@ TEST(Plan, ExpectedPixelsAreThoseThatAreFitted) {
   EXPECT_EQ(ExpectedPixels(17, 800, 8), 14 * 800 * 600);
   EXPECT_EQ(ExpectedPixels(17, 800, 0), 17 * 800 * 600);
   EXPECT_EQ(ExpectedPixels(1, 800, 8), 0);
+}
+
+TEST(StageEstimate, FollowsSizesAndTheMachinesPace) {
+  RunSettings settings;
+  const CaptureSize size{.photos = 50, .width = 1080, .height = 1920, .placed = true};
+  const auto seconds = [&](const RunSettings& of, const CaptureSize& at, const char* stage) {
+    return SecondsOf(EstimateStages(of, at, Backend::kCpu, 2), stage, stage);
+  };
+  const std::vector<StageEstimate> stages = EstimateStages(settings, size, Backend::kCpu, 2);
+  ASSERT_EQ(stages.size(), 7u);
+  double sum = 0;
+  for (const StageEstimate& stage : stages) sum += stage.seconds;
+  EXPECT_NEAR(SecondsOf(stages, "pose", "report"), sum, 1e-9);
+  EXPECT_GT(stages[1].memory, 0u);
+  // COLMAP takes longer than reading, a larger film longer, twice the threads half as long.
+  CaptureSize unplaced = size;
+  unplaced.placed = false;
+  EXPECT_GT(seconds(settings, unplaced, "pose"), seconds(settings, size, "pose") + 10);
+  RunSettings longer = settings;
+  longer.render.film_seconds *= 2;
+  EXPECT_GT(seconds(longer, size, "render"), 1.3 * seconds(settings, size, "render"));
+  EXPECT_NEAR(SecondsOf(EstimateStages(settings, size, Backend::kCpu, 4), "render", "render"),
+              0.5 * seconds(settings, size, "render"), 1e-9);
+  // A machine of half the speed, and one whose record is no measure.
+  EXPECT_NEAR(MeasuredPace(stages, {{"reconstruct", 2 * stages[1].seconds}}), 2, 1e-9);
+  EXPECT_EQ(MeasuredPace(stages, {{"reconstruct", 1e-3 * stages[1].seconds}}), 0.25);
+  EXPECT_EQ(MeasuredPace(stages, {}), 1);
+}
+
+TEST(Plan, TooLittleMemoryIsAWarningThatNamesTheReason) {
+  const FitOptions fit = Fit({64, 128}, {10, 10});
+  FitPlace place{.max_memory_gb = 100};
+  EXPECT_EQ(MemoryWarning(fit, place), "");
+  place.max_memory_gb = 0.001;
+  EXPECT_NE(MemoryWarning(fit, place), "");
 }
 
 TEST(Plan, DeviceMemoryByHand) {

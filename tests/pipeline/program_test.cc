@@ -8,6 +8,7 @@
 #include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <sstream>
 #include <thread>
 
 #include "kernels/process/child_process.h"
@@ -112,15 +113,53 @@ TEST(Program, F18_UsageErrorsExitWith2) {
   EXPECT_EQ(Regrade({"synth", "x", "--scene", "moon"}).code, 2);
 }
 
+// The event "plan" of a dry run with --json.
+JsonValue PlanIn(const std::string& text) {
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);)
+    if (line.starts_with("{\"event\":\"plan\"")) return ParseJson(line, "plan");
+  ADD_FAILURE() << text;
+  return {};
+}
+
+// Every stage of every style has its seconds, and the whole is their sum; nothing is written.
+TEST(Program, ADryRunListsTheStagesOfEachStyle) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "5", "--size", "64x48"}).code, 0);
+  const std::string assets = testing::SourceDir() + "/assets/style_";
+  const Outcome outcome = Regrade({"run", folder / "s/images", "--style", assets + "sunset.png",
+                                   "--style", assets + "night.png", "--out", folder / "o",
+                                   "--max-memory", "0.05", "--dry-run", "--json"});
+  EXPECT_EQ(outcome.code, 0) << outcome.text;
+  const JsonValue plan = PlanIn(outcome.text);
+  const JsonValue::Array& stages = plan.At("stages").AsArray();
+  ASSERT_EQ(stages.size(), 2u + 5 + 5);
+  double sum = 0;
+  for (const JsonValue& stage : stages) sum += stage.At("seconds").AsDouble();
+  EXPECT_NEAR(plan.At("seconds").AsDouble(), sum, 1e-9);
+  EXPECT_EQ(stages[0].Find("style"), nullptr);
+  EXPECT_EQ(stages[2].At("style").AsString(), "style_sunset");
+  EXPECT_EQ(stages[11].At("style").AsString(), "style_night");
+  EXPECT_EQ(stages[11].At("stage").AsString(), "report");
+  // The fit takes more than the limit.
+  EXPECT_NE(outcome.text.find("{\"event\":\"warning\""), std::string::npos) << outcome.text;
+  EXPECT_FALSE(std::filesystem::exists(folder / "o"));
+}
+
 // The number of rays is set for the photos before the fit's time is planned.
 TEST(Program, APlanOfANewFolderHasTheTimeOfTheFit) {
   const TemporaryFolder folder;
   ASSERT_EQ(Regrade({"synth", folder / "s", "--views", "5", "--size", "64x48"}).code, 0);
-  const Outcome outcome =
-      Regrade({"reconstruct", folder / "s/images", "--out", folder / "o", "--dry-run"});
+  const Outcome outcome = Regrade(
+      {"reconstruct", folder / "s/images", "--out", folder / "o", "--dry-run", "--json"});
   EXPECT_EQ(outcome.code, 0) << outcome.text;
-  EXPECT_SAYS(outcome, "reconstruct: about ");
-  EXPECT_EQ(outcome.text.find(" and 0 s"), std::string::npos) << outcome.text;
+  const JsonValue plan = PlanIn(outcome.text);
+  ASSERT_EQ(plan.At("stages").AsArray().size(), 2u);
+  const JsonValue& fit = plan.At("stages").AsArray()[1];
+  EXPECT_EQ(fit.At("stage").AsString(), "reconstruct");
+  EXPECT_FALSE(fit.At("done").AsBool());
+  EXPECT_GT(fit.At("seconds").AsDouble(), 1);
+  EXPECT_GT(fit.At("memory").AsInt(), 100'000'000);
 }
 
 TEST(Program, F90_FilmsArePlannedAndDamagedOnesExitWith3) {

@@ -10,6 +10,7 @@
 #include "kernels/image/resize.h"
 #include "kernels/synthetic/ray_trace.h"
 #include "kernels/synthetic/synthetic_scene.h"
+#include "pipeline/files/json_file.h"
 #include "pipeline/images/cube_file.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/images/video_reader.h"
@@ -266,6 +267,29 @@ TEST(Retouch, ALocalEditIsLearnedFromItsPhotoAlone) {
   EXPECT_TRUE(fs::exists(folder / "out/styles/dark/retouched/00002.png"));
   EXPECT_NE(ReadText(folder / "out/styles/dark/retouch.json").find("\"local\""),
             std::string::npos);
+  // What is measured is the edit: the scene without it is far from it, and at its photo's place
+  // it is all seen.
+  const std::string frames = folder / "out/styles/dark/frames";
+  const JsonValue report = ReadJsonFile(folder / "out/styles/dark/report.json");
+  const auto to_edit = [&](const std::string& sequence) {
+    for (const JsonValue& row : report.At("fidelity").AsArray())
+      if (row.At("sequence").AsString() == sequence) return row.At("psnr_to_2d_db").AsDouble();
+    return 0.0;
+  };
+  EXPECT_GT(to_edit("styled"), to_edit("source") + 3);
+  EXPECT_GT(to_edit("path_styled"), to_edit("path_source"));
+  const double seen = report.At("stages").At("evaluate").At("edit_seen").AsDouble();
+  EXPECT_GT(seen, 0.2);
+  EXPECT_LE(seen, 1);
+  for (const float v : ReadImage(frames + "/edited/00002.png").pixels) EXPECT_EQ(v, 1);
+  const Image source = ReadImage(frames + "/source/00002.png"),
+              wanted = ReadImage(frames + "/views_2d/00002.png"),
+              layer = ReadImage(folder / "out/styles/dark/layers/00002.png");
+  ASSERT_TRUE(source.SameSize(layer));
+  for (size_t i = 0; i < source.pixels.size(); ++i)
+    ASSERT_NEAR(wanted.pixels[i],
+                std::clamp(source.pixels[i] + 2 * layer.pixels[i] - 1, 0.0f, 1.0f), 1.6 / 255);
+  EXPECT_EQ(ReadJsonFile(frames + "/names.json").At("00002.png").AsString(), "00002.png");
 }
 
 TEST(Retouch, ARenderIsWrittenToBeEdited) {
@@ -309,6 +333,24 @@ TEST(Retouch, ARenderIsWrittenToBeEdited) {
   EXPECT_TRUE(fs::exists(folder / "out/styles/dim/edit.cube"));
   EXPECT_NE(ReadText(folder / "out/styles/dim/retouch.json").find("\"render\""),
             std::string::npos);
+  // Its LUT is the edit's own map.
+  ASSERT_EQ(Regrade({"export", folder / "out", "--format", "cube", "--name", "dim", "--out",
+                     folder / "dim.cube"})
+                .code,
+            0);
+  const ColorLut own = ReadCubeFile(folder / "dim.cube"),
+                 edit = ReadCubeFile(folder / "out/styles/dim/edit.cube");
+  ASSERT_EQ(own.table.values.size(), edit.table.values.size());
+  for (size_t i = 0; i < own.table.values.size(); ++i)
+    for (int c = 0; c < 3; ++c)
+      ASSERT_NEAR(own.table.values[i][c], edit.table.values[i][c], 1e-5);
+  // Frames and film alone: nothing is measured, and the film is published.
+  outcome = Regrade(
+      {"render", folder / "out", "--name", "dim", "--film-size", "48", "--until", "render"});
+  ASSERT_EQ(outcome.code, 0) << outcome.text;
+  EXPECT_FALSE(fs::exists(folder / "out/styles/dim/.regrade/stages/evaluate.json"));
+  EXPECT_EQ(ReadText(folder / "out/styled.mp4"),
+            ReadText(folder / "out/styles/dim/styled.mp4"));
 }
 
 }  // namespace

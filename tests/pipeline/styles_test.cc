@@ -107,6 +107,24 @@ TEST(Styles, EachHasItsFolderAndNothingIsOverwritten) {
                   folder / "sheet.png"});
   ASSERT_EQ(done.code, 0) << done.text;
   EXPECT_GE(ReadImage(folder / "sheet.png").width, 4 * 64);  // photo and three styles
+  // A style that was begun and not finished is left out, or refused by its name.
+  fs::create_directories(folder / "e/styles/begun");
+  fs::copy_file(folder / "e/styles/style_night/run.json", folder / "e/styles/begun/run.json");
+  fs::remove(folder / "e/.regrade/last_style.json");
+  EXPECT_EQ(LearnedStyles(folder / "e").size(), 3u);
+  done = Regrade({"contact-sheet", folder / "e", "--size", "64", "--views", "1", "--out",
+                  folder / "again.png"});
+  ASSERT_EQ(done.code, 0) << done.text;
+  EXPECT_EQ(ReadImage(folder / "again.png").width, ReadImage(folder / "sheet.png").width);
+  for (const std::vector<std::string>& shown :
+       {std::vector<std::string>{"contact-sheet", folder / "e", "begun", "--out", folder / "x"},
+        {"mix", folder / "e", "begun", "--out", folder / "x"},
+        {"render", folder / "e", "--name", "begun", "--still", "00001"},
+        {"export", folder / "e", "--format", "cube", "--name", "begun", "--out", folder / "x"}})
+    EXPECT_EQ(Regrade(shown).code, 3) << shown[0];
+  EXPECT_EQ(Regrade({"export", folder / "e", "--format", "ply", "--out", folder / "y"}).code,
+            0);
+  fs::remove_all(folder / "e/styles/begun");
   EXPECT_EQ(Regrade({"contact-sheet", folder / "e", "style_night", Asset("sunset"), "--out",
                      folder / "x.png"})
                 .code,

@@ -1,0 +1,139 @@
+#include "pipeline/run/stage_estimate.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "pipeline/fields/film_timing.h"
+#include "pipeline/run/fit_memory.h"
+#include "pipeline/run/plan.h"
+#include "reconstruct/fit/adapt_options.h"
+
+namespace regrade {
+namespace {
+
+// Seconds with two threads (AMD EPYC) for a million pixels: of files that are decoded, of
+// photos that the 2D method styles, of exact frames with both fields and the 2D method, of the
+// film's, and of compared pairs; and of a report with its page.
+constexpr double kDecode = 0.03, kStyle2d = 0.17, kExactFrame = 2.3, kFilmFrame = 0.75,
+                 kPair = 0.55, kReport = 3, kPageOfMillionCells = 4.5;
+constexpr double kAroundFit = 1.16;        // the trial of degrees, pruning and measuring
+constexpr double kOfResidual = 1.5;        // of exact frames at the photos' places
+constexpr double kFasterOnCard = 1.0 / 8;  // training and frames, roughly
+
+double Scaled(double seconds, int threads) { return seconds * 2 / std::max(threads, 1); }
+
+// Megapixels of a photo whose longer side is at most `longest`.
+double Megapixels(const CaptureSize& size, int longest) {
+  const double scale = std::min(1.0, double(longest) / std::max({1, size.width, size.height}));
+  return 1e-6 * size.width * size.height * scale * scale;
+}
+
+double PoseSeconds(const CaptureSize& size, int threads) {
+  const double photos = static_cast<double>(size.photos);
+  const double decode = Scaled(kDecode * photos * Megapixels(size, 1 << 20), threads);
+  if (!size.placed) return decode + PlanPoses(size.photos, threads).seconds;
+  return decode + (size.lacks_points ? PlanTracks(size.photos, threads).seconds : 0);
+}
+
+StagePlan FitPlan(const RunSettings& settings, const CaptureSize& size, Backend backend) {
+  const int64_t pixels = PixelsToFit(settings, size);
+  const FitOptions fit =
+      AdaptOptions(settings.fit, {.on_card = backend == Backend::kCuda, .pixels = pixels});
+  return PlanFitAt({backend, pixels, SceneBox()}, fit);
+}
+
+double RenderSeconds(const RunSettings& settings, const CaptureSize& size) {
+  const RenderOptions& render = settings.render;
+  const double photo = Megapixels(size, settings.scene.photo_size);
+  double exact = static_cast<double>(size.photos) * photo, film = 0;
+  if (render.path.path != "views") {
+    exact += photo *
+             static_cast<double>(SamplesOfFilm(render.film_seconds, render.fps).moments.size());
+    film = FilmFrames(render.film_seconds, render.fps) * Megapixels(size, render.film_size);
+  }
+  return kExactFrame * exact + (render.exact ? kExactFrame : kFilmFrame) * film;
+}
+
+double EvaluateSeconds(const RunSettings& settings, const CaptureSize& size) {
+  const RenderOptions& render = settings.render;
+  double pairs = 0;
+  for (const int gap : settings.consistency.gaps) {
+    pairs += std::max<double>(0, static_cast<double>(size.photos) - gap);
+    if (render.path.path != "views")
+      pairs += std::max<double>(
+          0, std::ssize(SamplesOfFilm(render.film_seconds, render.fps).moments) - gap);
+  }
+  return kPair * pairs * Megapixels(size, settings.scene.photo_size);
+}
+
+}  // namespace
+
+CaptureSize SizeOfCapture(const Capture& capture) {
+  CaptureSize size;
+  size.photos = std::ssize(capture.views);
+  size.placed = true;
+  if (capture.views.empty()) return size;
+  // The photo in the middle by its number of pixels.
+  std::vector<std::pair<int64_t, const Camera*>> cameras;
+  for (const CaptureView& view : capture.views)
+    cameras.emplace_back(int64_t{view.camera.width} * view.camera.height, &view.camera);
+  std::ranges::nth_element(cameras, cameras.begin() + std::ssize(cameras) / 2);
+  const Camera& middle = *cameras[cameras.size() / 2].second;
+  size.width = middle.width, size.height = middle.height;
+  return size;
+}
+
+int64_t PixelsToFit(const RunSettings& settings, const CaptureSize& size) {
+  const int holdout = settings.run.holdout;
+  const int64_t held_out = holdout > 0 ? (size.photos + holdout - 1) / holdout : 0;
+  return std::llround(1e6 * Megapixels(size, settings.scene.photo_size) *
+                      static_cast<double>(size.photos - held_out));
+}
+
+std::vector<StageEstimate> EstimateStages(const RunSettings& settings, const CaptureSize& size,
+                                          Backend backend, int threads) {
+  const double on_card = backend == Backend::kCuda ? kFasterOnCard : 1;
+  const double photo = Megapixels(size, settings.scene.photo_size),
+               photos = static_cast<double>(size.photos);
+  const StagePlan fit = FitPlan(settings, size, backend);
+  double stylize = PlanStyle(settings.network.steps, threads).seconds;
+  if (settings.residual.On())
+    stylize += Scaled(kOfResidual * kExactFrame * photos * photo, threads);
+  const double finest = *std::ranges::max_element(settings.fit.resolutions),
+               cells = std::min(double{settings.fit.max_cells},
+                                1e-6 * kCellsOfSquare * finest * finest);
+  const double page = settings.page.page == "off" ? 0 : kPageOfMillionCells * cells;
+  return {
+      {"pose", PoseSeconds(size, threads)},
+      {"reconstruct", kAroundFit * fit.seconds, fit.memory},
+      {"style_2d",
+       Scaled(photos * (kDecode * Megapixels(size, 1 << 20) + kStyle2d * photo), threads)},
+      {"stylize", on_card * stylize},
+      {"render", on_card * Scaled(RenderSeconds(settings, size), threads)},
+      {"evaluate", Scaled(EvaluateSeconds(settings, size), threads)},
+      {"report", Scaled(kReport + page, threads)},
+  };
+}
+
+double MeasuredPace(const std::vector<StageEstimate>& estimates,
+                    const std::vector<StageEstimate>& measured) {
+  double estimated = 0, took = 0;
+  for (const StageEstimate& stage : measured)
+    for (const StageEstimate& estimate : estimates)
+      if (estimate.stage == stage.stage) estimated += estimate.seconds, took += stage.seconds;
+  return estimated > 0 && took > 0 ? std::clamp(took / estimated, 0.25, 4.0) : 1;
+}
+
+double SecondsOf(const std::vector<StageEstimate>& estimates, const std::string& first,
+                 const std::string& last) {
+  double seconds = 0;
+  bool within = false;
+  for (const StageEstimate& estimate : estimates) {
+    within = within || estimate.stage == first;
+    if (within) seconds += estimate.seconds;
+    if (estimate.stage == last) break;
+  }
+  return seconds;
+}
+
+}  // namespace regrade
