@@ -83,6 +83,7 @@ void WritePoses(const ExportOptions& options, const std::string& folder,
 }
 
 void ExportCapture(const ExportOptions& options, const std::string& folder, Console* console) {
+  CheckResults(folder, {});
   const Capture capture = ReadPosedCapture(folder);
   if (options.dry_run) {
     console->Info(Concat(capture.views.size(), " photos and their poses would be written to ",
@@ -179,6 +180,7 @@ void ExportFields(const ExportOptions& options, const std::string& folder, Conso
                          options.out, " as ", options.format));
     return;
   }
+  CheckResults(folder, styles);
   MakeEmptyFolder(options.out, "");
   const auto write = [&](const std::string& name, StoredField stored) {
     if (options.format == "ply")
@@ -204,6 +206,7 @@ void ExportLut(const ExportOptions& options, const std::string& folder, Console*
                          kSize, "^3 colours"));
     return;
   }
+  CheckResults(folder, {name});
   const StoredField stored = ReadFieldFile(folder + "/field.npz");
   const std::vector<Camera> cameras = ViewsOf(folder, stored, kViews);
   const std::vector<Image> before = Renders(stored.field, cameras),

@@ -17,9 +17,9 @@ std::vector<std::string> WantedStyles(const std::string& folder, const Arguments
   if (words.size() == 1) {
     for (const std::string& style : StyleNames(folder))
       if (fs::exists(StyleFolder(folder, style) + "/network.npz")) styles.push_back(style);
-    return styles;
   }
   for (size_t i = 1; i < words.size(); ++i) styles.push_back(ChosenStyle(folder, words[i]));
+  CheckResults(folder, styles);
   return styles;
 }
 

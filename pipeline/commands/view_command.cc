@@ -16,6 +16,8 @@
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/program/interrupt.h"
 #include "pipeline/report/html_text.h"
+#include "pipeline/run/resolve_settings.h"
+#include "pipeline/run/run_settings.h"
 #include "pipeline/view/view_session.h"
 
 namespace regrade {
@@ -84,6 +86,32 @@ void StartBrowser(const std::string& file, Console* console) {
     console->Warn(Concat("no browser was opened: xdg-open: ", std::strerror(status)));
 }
 
+// Flags for `regrade stylize` in place of what run.json would run or read outside of the
+// folder, which may come from somebody else: a page does none of that.
+std::vector<std::string> FlagsWithoutOutside(const std::string& folder, Console* console) {
+  const std::string run_json = folder + "/run.json";
+  if (!fs::exists(run_json)) return {};
+  RunSettings settings;
+  OptionSet options;
+  settings.Bind(&options);
+  const JsonValue plain = options.Values();
+  std::vector<std::string> flags;
+  std::string named;
+  const auto refuse = [&](const OutsideOptions& outside) {
+    for (const OptionSet::Outside& option : outside) {
+      named += " --" + option.name + " '" + option.text + "'";
+      flags.insert(flags.end(), {"--" + option.name, plain.At(option.name).AsString()});
+    }
+    return false;
+  };
+  ResolveSettings({.run_json = run_json, .folder = folder, .accept_outside = refuse}, &options);
+  if (!flags.empty())
+    console->Warn(run_json +
+                  " names what would be run or read elsewhere; the page goes on without:" +
+                  named + ". `regrade stylize` asks for it");
+  return flags;
+}
+
 }  // namespace
 
 void RunView(const Command& command, const Arguments& arguments, Console* console) {
@@ -98,7 +126,8 @@ void RunView(const Command& command, const Arguments& arguments, Console* consol
   const std::string& folder = prepared->words[0];
   const std::vector<std::string> styles = WantedStyles(folder, prepared->words);
   console->BeginStage("page");
-  ViewSession session(AbsolutePath(folder), styles, console->StageProgress());
+  ViewSession session(AbsolutePath(folder), styles, FlagsWithoutOutside(folder, console),
+                      console->StageProgress());
   console->EndStage();
   LocalServer server(session.Routes(), MakeToken());
   console->Info("open " + server.Address());
@@ -110,7 +139,10 @@ void RunView(const Command& command, const Arguments& arguments, Console* consol
     file.emplace(server.Address());
     StartBrowser(file->path(), console);
   }
-  server.Run([] { return !StopRequested(); });
+  server.Run([&session] {
+    session.CheckFolder();
+    return !StopRequested();
+  });
   console->Info("stopped");
 }
 

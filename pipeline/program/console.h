@@ -2,10 +2,10 @@
 // and all messages in the output folder's log.
 #pragma once
 
-#include <fstream>
 #include <string>
 
 #include "kernels/base/error.h"
+#include "kernels/base/file_descriptor.h"
 #include "kernels/base/progress.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/files/text.h"
@@ -66,7 +66,7 @@ class Console {
   bool line_drawn_ = false;
   bool quiet_ = false;
   bool verbose_ = false;
-  std::ofstream log_;
+  FileDescriptor log_;
   std::string stage_, title_, kept_;
   double later_ = 0;
   EtaEstimator eta_;

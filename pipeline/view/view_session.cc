@@ -7,6 +7,7 @@
 #include "pipeline/fields/network_checkpoint.h"
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/files/json_file.h"
+#include "pipeline/files/own_files.h"
 #include "pipeline/images/image_format.h"
 #include "pipeline/page/field_codec.h"
 #include "pipeline/page/keyframes.h"
@@ -53,12 +54,19 @@ void MakeFolder(const std::string& folder) {
 }  // namespace
 
 ViewSession::ViewSession(const std::string& folder, const std::vector<std::string>& styles,
+                         const std::vector<std::string>& style_flags,
                          const ProgressFunction& progress)
-    : folder_(folder) {
+    : folder_(folder), identity_(folder), style_flags_(style_flags) {
   MadePage made = MakePage(folder, styles, {.served = true}, progress);
   page_ = std::move(made.html);
   field_ = std::move(made.field);
   voxels_ = std::move(made.places.voxel);
+}
+
+void ViewSession::CheckFolder() const {
+  if (identity_.Holds()) return;
+  throw ResourceError("the folder was moved or removed while its page was open", folder_,
+                      "start `regrade view` again where it is now");
 }
 
 std::vector<Route> ViewSession::Routes() {
@@ -126,7 +134,10 @@ HttpResponse ViewSession::TakePicture(const HttpRequest& request) {
   if (format == nullptr || IsVideo(*format))
     return RefusedRequest(415, "this file is no picture");
   if (job_.Running()) return Accepted(0);
+  CheckFolder();
   const std::string pictures = folder_ + "/" + kPicturesFolder;
+  RefuseForeign(folder_ + "/" + kStylesFolder);
+  RefuseForeignBelow(pictures);
   MakeFolder(pictures);
   // What a file is, its first bytes say: its ending is left out. A picture that comes again is
   // the same file, and gives the same style.
@@ -138,13 +149,14 @@ HttpResponse ViewSession::TakePicture(const HttpRequest& request) {
   const std::string name = NameStyles(folder_, {picture}, "")[0].name;
   learning_ = StyleFolder(folder_, name);
   step_ = -1;
-  return Accepted(job_.Start(
-      "style", {"stylize", folder_, "--style", picture, "--name", name, "--until", "stylize"},
-      [this, folder = learning_] {
-        Served style = Serve(ReadNetworkFile(folder + "/network.npz"), PageStyleId(folder));
-        const std::lock_guard lock(mutex_);
-        style_ = std::move(style);
-      }));
+  std::vector<std::string> words = {"stylize", folder_, "--style", picture,
+                                    "--name",  name,    "--until", "stylize"};
+  words.insert(words.end(), style_flags_.begin(), style_flags_.end());
+  return Accepted(job_.Start("style", words, [this, folder = learning_] {
+    Served style = Serve(ReadNetworkFile(folder + "/network.npz"), PageStyleId(folder));
+    const std::lock_guard lock(mutex_);
+    style_ = std::move(style);
+  }));
 }
 
 HttpResponse ViewSession::StyleSoFar() {
@@ -163,7 +175,9 @@ HttpResponse ViewSession::StyleSoFar() {
 HttpResponse ViewSession::TakePath(const HttpRequest& request) {
   ParseKeyframePath(request.body, "camera_path.json");
   if (job_.Running()) return Accepted(0);
+  CheckFolder();
   const std::string films = folder_ + "/" + kFilmsFolder;
+  RefuseForeignBelow(films);
   MakeFolder(films);
   const std::string path =
       FreePath(films, "film",

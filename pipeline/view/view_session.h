@@ -21,6 +21,7 @@
 #include "kernels/base/progress.h"
 #include "kernels/field/radiance_field.h"
 #include "pipeline/fields/network_file.h"
+#include "pipeline/files/folder_identity.h"
 #include "pipeline/view/local_server.h"
 #include "pipeline/view/view_job.h"
 
@@ -30,12 +31,15 @@ inline constexpr uint64_t kMostPictureBytes = 32 << 20, kMostPathBytes = 4 << 20
 
 class ViewSession {
  public:
-  // Makes the page of the folder with these styles. Throws as MakePage.
+  // Makes the page of the folder with these styles. `style_flags`: of the commands that learn
+  // styles, besides their picture and name. Throws as MakePage.
   ViewSession(const std::string& folder, const std::vector<std::string>& styles,
-              const ProgressFunction& progress);
+              const std::vector<std::string>& style_flags, const ProgressFunction& progress);
 
   // They refer to this object.
   std::vector<Route> Routes();
+  // Throws Error(kResources) once the folder is not where it was.
+  void CheckFolder() const;
 
  private:
   HttpResponse Opening() const;
@@ -50,6 +54,8 @@ class ViewSession {
   Served Serve(const StoredNetwork& network, const std::string& id) const;
 
   const std::string folder_;
+  const FolderIdentity identity_;
+  const std::vector<std::string> style_flags_;
   std::string page_;
   RadianceField field_;          // the page's
   std::vector<int64_t> voxels_;  // of the field, in the page's order
