@@ -83,7 +83,7 @@ struct RequestReader::State {
   const std::string& token;
   const int port;
   Parser parser = {};
-  std::string pending = {};        // bytes that the parser has not used yet
+  std::string pending = {};      // bytes that the parser has not used yet
   const Route* route = nullptr;  // of an accepted header
 
   uint64_t MostBytes() const;
