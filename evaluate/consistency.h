@@ -47,7 +47,9 @@ struct ConsistencyOptions {
                   "dis-medium, dis-tuned, farneback (relative times 1 : 1.3 : 5 : 25 : 16, "
                   "errors in COSTS.md); with OpenCV's optflow module deepflow, tvl1, pca-flow, "
                   "rlof; files:DIR reads 00000_00001.flo and 00001_00000.flo; onnx:FILE runs a "
-                  "network with inputs named first and second, RGB from -1 to 1"});
+                  "network with inputs named first and second, RGB from -1 to 1",
+          .runs = "onnx:",
+          .reads = "files:"});
     bind("warp", warp,
          {.help = "which frame of a pair is warped onto the other, where both are compared and "
                   "the mask is made: later as Lai et al. compute it, earlier as LipRF writes "
@@ -60,20 +62,24 @@ struct ConsistencyOptions {
           .choices = "channel|pixel"});
     bind("lpips", lpips,
          {.help = "ONNX file of a perceptual distance network (LPIPS), with the inputs of "
-                  "--flow onnx:FILE; compares each sequence with the 2D method's frames"});
+                  "--flow onnx:FILE; compares each sequence with the 2D method's frames",
+          .runs = "*"});
     bind(
         "edges", edges,
         {.help = "compares edges with the unstyled frames' by SSIM: gradient, or the ONNX file "
                  "of an edge network with one input, RGB from -1 to 1, and one output [1, 1, "
-                 "height, width] from 0 to 1"});
+                 "height, width] from 0 to 1",
+         .runs = "*|!gradient"});
     bind("style-features", style_features,
          {.help = "ONNX file of a network with one input, RGB from -1 to 1, whose outputs [1, "
                   "channels, ...] are features (VGG's): distances of Gram matrices and of "
-                  "Fréchet to the style picture, and with --lpips a number like ArtFID"});
+                  "Fréchet to the style picture, and with --lpips a number like ArtFID",
+          .runs = "*"});
     bind("style-embedding", style_embedding,
          {.help = "ONNX file of a network with one input [1, 3, 224, 224], RGB from -1 to 1, "
                   "whose output is a picture's vector (CLIP's): 1 - cosine to the style "
-                  "picture's"});
+                  "picture's",
+          .runs = "*"});
     bind(
         "min-coverage", min_coverage,
         {.unit = "fraction of pixels",

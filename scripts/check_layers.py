@@ -84,7 +84,7 @@ ALLOWED = (
     ("Little CMS", r"lcms2(_plugin)?\.h", (r"pipeline/images/color_profile\.cc",)),
     ("libpng", r"(png|pngconf|pnglibconf)\.h", (r"pipeline/images/png_decoder\.cc",)),
     ("Ceres", r"(ceres|glog)/", (r"reconstruct/refinement/(bundle|exposure|refine_poses)\.cc",)),
-    ("Boost", r"boost/", (r"pipeline/program/option_binding\.cc", r"pipeline/view/local_server\.cc",
+    ("Boost", r"boost/", (r"pipeline/program/option_binding\.cc", r"pipeline/view/(local_server|request_reader)\.cc",
       r"pipeline/networks/tensor_bundle\.cc")),
     ("nlohmann-json", r"nlohmann/", (r"pipeline/files/[^/]*\.cc",)),
     ("libzip", r"(zip|zipconf|zlib)\.h", (r"pipeline/files/[^/]*\.cc",)),

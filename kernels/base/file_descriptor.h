@@ -1,5 +1,7 @@
-// Owner of a file descriptor.
+// Owner of a file descriptor, and how files of our own are opened.
 #pragma once
+
+#include <string>
 
 namespace regrade {
 
@@ -29,5 +31,10 @@ class FileDescriptor {
  private:
   int fd_ = -1;
 };
+
+// open() with `flags`, O_CLOEXEC and, for a new file, `mode`, of a file that is ours: a link is
+// not followed, a named pipe is not waited for, and what is no regular file is closed again.
+// Negative, with errno, where there is none: ELOOP for a link, ENXIO for a pipe or device.
+int OpenOwnFile(const std::string& path, int flags, unsigned mode = 0644);
 
 }  // namespace regrade

@@ -14,10 +14,12 @@
 #include <cstdlib>
 #include <cstring>
 #include <deque>
+#include <optional>
 
 #include "kernels/base/clock.h"
 #include "kernels/base/error.h"
 #include "kernels/base/file_descriptor.h"
+#include "kernels/process/private_folder.h"
 #include "kernels/process/process_guard.h"
 
 namespace regrade {
@@ -36,7 +38,7 @@ class Log {
  public:
   Log(const std::string& path, int64_t cap) : path_(path), left_(cap) {
     if (path.empty()) return;
-    file_.Reset(open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666));
+    file_.Reset(OpenOwnFile(path, O_WRONLY | O_CREAT | O_TRUNC));
     if (file_.get() < 0) ThrowNoResources("cannot write the log " + path, errno);
   }
 
@@ -103,9 +105,16 @@ class Lines {
   std::string line_;
 };
 
-std::vector<std::string> MinimalEnvironment(const ChildOptions& options) {
+bool GivesTemporaryFolder(const ChildOptions& options) {
+  return std::ranges::any_of(options.environment,
+                             [](const auto& entry) { return entry.first == "TMPDIR"; });
+}
+
+std::vector<std::string> MinimalEnvironment(const ChildOptions& options,
+                                            const std::string& temporary) {
   std::vector<std::string> environment;
-  for (const char* name : {"PATH", "HOME", "TMPDIR", "LD_LIBRARY_PATH", "CUDA_VISIBLE_DEVICES"})
+  if (!temporary.empty()) environment.push_back("TMPDIR=" + temporary);
+  for (const char* name : {"PATH", "HOME", "LD_LIBRARY_PATH", "CUDA_VISIBLE_DEVICES"})
     if (const char* value = std::getenv(name))
       environment.push_back(std::string(name) + "=" + value);
   environment.push_back("LC_ALL=C.UTF-8");
@@ -125,7 +134,8 @@ std::vector<char*> Pointers(const std::vector<std::string>& strings) {
 // the group's guard kills the group.
 class Child {
  public:
-  Child(const ChildOptions& options, int output) {
+  // `temporary`: the child's TMPDIR; empty: what the options say.
+  Child(const ChildOptions& options, const std::string& temporary, int output) {
     posix_spawn_file_actions_t actions;
     posix_spawnattr_t attributes;
     if (posix_spawn_file_actions_init(&actions) != 0 || posix_spawnattr_init(&attributes) != 0)
@@ -145,7 +155,7 @@ class Child {
     posix_spawnattr_setpgroup(&attributes, guard_.group());
     posix_spawnattr_setflags(
         &attributes, POSIX_SPAWN_SETPGROUP | POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
-    const std::vector<std::string> environment = MinimalEnvironment(options);
+    const std::vector<std::string> environment = MinimalEnvironment(options, temporary);
     const int status =
         posix_spawnp(&pid_, options.argv[0].c_str(), &actions, &attributes,
                      Pointers(options.argv).data(), Pointers(environment).data());
@@ -224,8 +234,11 @@ ChildResult RunChild(const ChildOptions& options, const LineFunction& on_line,
   std::deque<std::string> last;
   Lines lines(on_line, &last);
 
+  std::optional<PrivateFolder> temporary;  // outlives the child
+  if (!GivesTemporaryFolder(options)) temporary.emplace(options.temporary_parent);
+
   const double start = ClockSeconds();
-  Child child(options, output.get());
+  Child child(options, temporary ? temporary->path() : "", output.get());
   output.Close();
 
   ChildResult result;

@@ -14,13 +14,15 @@ struct ChildOptions {
   // argv[0] is a path or a name on PATH. No shell parses anything.
   std::vector<std::string> argv;
   std::string working_folder;  // empty: that of this process
-  // Added to the child's minimal environment: PATH, HOME, TMPDIR, LD_LIBRARY_PATH and
-  // CUDA_VISIBLE_DEVICES where set, and LC_ALL=C.UTF-8.
+  // Added to the child's minimal environment: PATH, HOME, LD_LIBRARY_PATH and
+  // CUDA_VISIBLE_DEVICES where set, LC_ALL=C.UTF-8, and TMPDIR, a PrivateFolder that is removed
+  // at the child's end, unless one is given here.
   std::vector<std::pair<std::string, std::string>> environment;
-  double wall_limit_s = 0;   // 0: none
-  double quiet_limit_s = 0;  // longest silence on stdout and stderr together; 0: none
-  double grace_s = 5;        // between SIGTERM and SIGKILL
-  std::string log_path;      // gets stdout and stderr; empty: none
+  std::string temporary_parent;  // of that folder; empty: the system's temporary folder
+  double wall_limit_s = 0;       // 0: none
+  double quiet_limit_s = 0;      // longest silence on stdout and stderr together; 0: none
+  double grace_s = 5;            // between SIGTERM and SIGKILL
+  std::string log_path;          // gets stdout and stderr; empty: none
   int64_t log_cap_bytes = 16 << 20;
 };
 

@@ -117,12 +117,12 @@ std::optional<WorldBox> BoxOf(const JsonValue& index) {
   if (corners == nullptr) return std::nullopt;
   const JsonValue::Array& numbers = corners->AsArray();
   WorldBox box;
-  if (numbers.size() != 6) throw InputError("the box is not two corners");
+  if (numbers.size() != 6) throw InputError("the box is not two corners", corners->Place());
   for (int a = 0; a < 3; ++a) {
     box.low[a] = numbers[static_cast<size_t>(a)].AsDouble();
     box.high[a] = numbers[static_cast<size_t>(a) + 3].AsDouble();
   }
-  if (!IsSound(box)) throw InputError("the box has no volume");
+  if (!IsSound(box)) throw InputError("the box has no volume", corners->Place());
   return box;
 }
 

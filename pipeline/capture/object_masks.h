@@ -24,11 +24,13 @@ struct MaskOptions {
     bind("masks", masks,
          {.help = "folder of masks by the photos' names: white for the object to restyle, "
                   "black elsewhere, grey for soft edges. They may be rough, disagree, or be "
-                  "missing for some photos. Empty restyles the whole scene"});
+                  "missing for some photos. Empty restyles the whole scene",
+          .reads = "*"});
     bind("style-mask", style_mask,
          {.help = "labels of the style picture, one plain colour per region; masks then use "
                   "the same colours, each region gets the style of its label, and black stays "
-                  "unchanged"});
+                  "unchanged",
+          .reads = "*"});
     bind("mask-vote", vote,
          {.help = "fraction of the photos' votes at which a voxel has object weight 0.5; "
                   "lower values extend the object and rely on fewer masks",

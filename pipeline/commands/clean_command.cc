@@ -38,6 +38,7 @@ std::vector<Removable> RemovableIn(const std::string& folder) {
       {".regrade/checkpoints", "a stage that was interrupted would begin from its start"}};
   for (const std::string& name : StyleNames(folder)) {
     const std::string style = std::string(kStylesFolder) + "/" + name;
+    Workspace::RefuseLinks(StyleFolder(folder, name));
     all.push_back({style + "/frames", "`regrade render` makes them again"});
     all.push_back(
         {style + "/field_2d.npz", "made again by `regrade evaluate --control-field`"});

@@ -14,6 +14,8 @@
 
 #include "kernels/base/error.h"
 #include "pipeline/capture/capture_store.h"
+#include "pipeline/files/text.h"
+#include "pipeline/program/question.h"
 #include "pipeline/run/resolve_settings.h"
 #include "pipeline/run/run_file.h"
 #include "pipeline/workspace/style_folders.h"
@@ -81,6 +83,23 @@ void PrintHelp(const Command& command, const Arguments& arguments, const OptionS
   }
 }
 
+// A folder may come from somebody else: what its run.json would run, or read elsewhere, is
+// shown and asked for. Throws Error(kUsage) where nobody can answer, and after a no.
+bool AcceptOutside(const std::string& run_json, const OutsideOptions& outside, bool yes) {
+  std::string shown;
+  for (const OptionSet::Outside& option : outside)
+    shown += (shown.empty() ? "--" : ", --") + option.name + " '" + option.text + "'";
+  const bool runs = std::ranges::any_of(
+      outside, [](const OptionSet::Outside& option) { return option.path.empty(); });
+  const std::string what = std::string("names what would be ") +
+                           (runs ? "run" : "read outside of the folder") + ": " + shown;
+  if (yes) return true;
+  if (CanAsk() && AnsweredYes(Printable(run_json + " " + what + ". Go on with it?")))
+    return true;
+  throw UsageError(what, run_json,
+                   "if you trust it, add --yes, or give these options as flags");
+}
+
 }  // namespace
 
 bool AsksForHelp(const Arguments& arguments) {
@@ -136,6 +155,10 @@ std::optional<Prepared> Prepare(const Command& command, const Arguments& argumen
             ? StyleFolder(folder, ChosenStyle(folder, options->Given("name").value_or("")))
             : folder;
     sources.run_json = style + "/run.json";
+    sources.folder = folder;
+    sources.accept_outside = [&](const OutsideOptions& outside) {
+      return AcceptOutside(sources.run_json, outside, options->Given("yes") == "true");
+    };
   }
   prepared.run_words = ResolveSettings(sources, options);
   if (prepared.words.empty() && options->Given("config")) prepared.words = prepared.run_words;

@@ -341,6 +341,7 @@ void RunContactSheet(const Command& command, const Arguments& arguments, Console
   ProbeMasks(&settings.object);
 
   Workspace workspace(folder);
+  CheckResults(folder, styles);
   context.workspace = context.style = &workspace;
   settings.scene.photo_size = sheet.size;
   const Backend backend = ChooseBackend(sheet.device, false);  // before work begins

@@ -86,6 +86,7 @@ void WritePoses(const ExportOptions& options, const std::string& folder,
 }
 
 void ExportCapture(const ExportOptions& options, const std::string& folder, Console* console) {
+  CheckResults(folder, {});
   const Capture capture = ReadPosedCapture(folder);
   if (options.dry_run) {
     console->Info(Concat(Counted(std::ssize(capture.views), "photo"),
@@ -185,6 +186,7 @@ void ExportFields(const ExportOptions& options, const std::string& folder, Conso
                          " would be written to ", options.out, " as ", options.format));
     return;
   }
+  CheckResults(folder, styles);
   MakeEmptyFolder(options.out, "");
   const auto write = [&](const std::string& name, StoredField stored) {
     if (options.format == "ply")
@@ -229,6 +231,7 @@ void ExportLut(const ExportOptions& options, const std::string& folder, Console*
         "differences at most %.2f times",
         options.out.c_str(), own.size, SteepestSlope(own)));
   }
+  CheckResults(folder, {name});
   const StoredField stored = ReadFieldFile(folder + "/field.npz");
   const std::vector<Camera> cameras = ViewsOf(folder, stored, kViews);
   const std::vector<Image> before = Renders(stored.field, cameras),

@@ -150,6 +150,9 @@ void RunMix(const Command& command, const Arguments& arguments, Console* console
     if (IsFieldFile(style) && !fs::is_regular_file(style))
       throw InputError("there is no such style", style, "make it with `regrade stylize`");
 
+  Arguments own = chosen;
+  std::erase_if(own, IsFieldFile);
+  CheckResults(folder, own);
   StoredField stored = ReadFieldFile(folder + "/field.npz");
   const Backend backend = ChooseBackend(settings.device, false);
   const MixCameras cameras = CamerasOf(folder, stored, scene, render);

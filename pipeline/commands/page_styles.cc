@@ -14,10 +14,11 @@ std::vector<std::string> WantedStyles(const std::string& folder, const Arguments
   if (!fs::exists(folder + "/field.npz"))
     throw InputError("holds no reconstruction", folder,
                      "make one with `regrade run` or `regrade reconstruct`");
-  if (words.size() == 1) return LearnedStyles(folder, left);
   std::vector<std::string> styles;
+  if (words.size() == 1) styles = LearnedStyles(folder, left);
   for (size_t i = 1; i < words.size(); ++i)
     styles.push_back(ChosenLearnedStyle(folder, words[i]));
+  CheckResults(folder, styles);
   return styles;
 }
 

@@ -85,6 +85,7 @@ int PhotoNamed(const Capture& capture, const std::string& name) {
 void RenderStills(const std::string& folder, const std::string& name,
                   const StillOptions& options, const RunSettings& settings, Console* console) {
   Workspace scene(folder), style(StyleFolder(folder, name));
+  CheckResults(folder, {name});
   constexpr int kLongest = 1 << 16;
   const StoredField stored = ReadStyledField(folder, style.folder(), settings.style.strength);
   const WorkingViews views =

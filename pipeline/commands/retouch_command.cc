@@ -185,6 +185,8 @@ void RunRetouch(const Command& command, const Arguments& arguments, Console* con
   Workspace workspace(folder, settings.start.break_lock);
   context.workspace = &workspace;
   console->OpenLog(workspace.Path(".regrade/log.txt"));
+  CheckResults(folder, {});
+  Workspace::RefuseLinks(style);
   const WorkingViews views = context.Views();
   const int view = ViewOf(views, retouch.photo);
   const std::string render = std::string(kRenders) + "/" + Stem(views.View(view).file) + ".tif";

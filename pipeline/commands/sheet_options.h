@@ -49,7 +49,9 @@ struct SheetOptions {
           .max = 1000});
     bind("device", device, {.help = "where networks are trained", .choices = "auto|cpu|cuda"});
     bind("dry-run", dry_run, {.help = "prints what would be done, and does nothing"});
-    bind("yes", yes, {.help = "fetches what --method pca-kd needs without asking"});
+    bind("yes", yes,
+         {.help = "answers yes: fetches what --method pca-kd needs, and reads the masks that "
+                  "the folder's run.json names outside of it"});
   }
 };
 

@@ -266,7 +266,10 @@ void PrintPrediction(const TradeoffOptions& tradeoff, Console* console) {
   RunContext run;
   run.settings.Bind(&run.options);
   const std::string style = StyleFolder(folder, ChosenStyle(folder, ""));
-  ResolveSettings({.run_json = style + "/run.json"}, &run.options);
+  // Nothing of it is run.
+  ResolveSettings({.run_json = style + "/run.json",
+                   .accept_outside = [](const OutsideOptions&) { return true; }},
+                  &run.options);
   Workspace workspace(folder), of_style(style);
   const Capture capture = ReadCapture(workspace.Path("poses"));
   console->Lines(Format("%-12s %12s %12s %7s %12s %12s %7s", "stage", "predicted s", "took s",

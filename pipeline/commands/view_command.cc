@@ -21,6 +21,8 @@
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/program/interrupt.h"
 #include "pipeline/report/html_text.h"
+#include "pipeline/run/resolve_settings.h"
+#include "pipeline/run/run_settings.h"
 #include "pipeline/view/view_session.h"
 #include "pipeline/workspace/workspace.h"
 #include "pipeline/workspace/style_folders.h"
@@ -114,6 +116,32 @@ bool AwaitScene(const std::string& folder, ViewSession* session, Console* consol
   return true;
 }
 
+// Flags for `regrade stylize` in place of what run.json would run or read outside of the
+// folder, which may come from somebody else: a page does none of that.
+std::vector<std::string> FlagsWithoutOutside(const std::string& folder, Console* console) {
+  const std::string run_json = folder + "/run.json";
+  if (!fs::exists(run_json)) return {};
+  RunSettings settings;
+  OptionSet options;
+  settings.Bind(&options);
+  const JsonValue plain = options.Values();
+  std::vector<std::string> flags;
+  std::string named;
+  const auto refuse = [&](const OutsideOptions& outside) {
+    for (const OptionSet::Outside& option : outside) {
+      named += " --" + option.name + " '" + option.text + "'";
+      flags.insert(flags.end(), {"--" + option.name, plain.At(option.name).AsString()});
+    }
+    return false;
+  };
+  ResolveSettings({.run_json = run_json, .folder = folder, .accept_outside = refuse}, &options);
+  if (!flags.empty())
+    console->Warn(run_json +
+                  " names what would be run or read elsewhere; the page goes on without:" +
+                  named + ". `regrade stylize` asks for it");
+  return flags;
+}
+
 }  // namespace
 
 void RunView(const Command& command, const Arguments& arguments, Console* console) {
@@ -127,7 +155,7 @@ void RunView(const Command& command, const Arguments& arguments, Console* consol
   if (!prepared) return;
   const std::string& folder = prepared->words[0];
   if (!MayWait(folder, prepared->words)) WantedStyles(folder, prepared->words);  // throws
-  ViewSession session(AbsolutePath(folder));
+  ViewSession session(AbsolutePath(folder), FlagsWithoutOutside(folder, console));
   LocalServer server(session.Routes(), MakeToken());
   console->Info("open " + server.Address());
   console->Info(
@@ -159,7 +187,10 @@ void RunView(const Command& command, const Arguments& arguments, Console* consol
       throw;
     }
   });
-  server.Run([&failed] { return !StopRequested() && !failed; });
+  server.Run([&] {
+    session.CheckFolder();
+    return !StopRequested() && !failed;
+  });
   page.get();
   console->Info("stopped");
 }

@@ -10,6 +10,7 @@
 #include <filesystem>
 
 #include "kernels/base/error.h"
+#include "pipeline/files/file_problem.h"
 
 namespace regrade {
 namespace {
@@ -19,10 +20,8 @@ constexpr size_t kPending = 1 << 20;  // bytes
 [[noreturn]] void ThrowWriteError(const std::string& path, const char* step, uint64_t bytes) {
   const int error = errno;
   throw ResourceError(
-      Concat("cannot ", step, " (", bytes, " bytes): ", std::strerror(error)), path,
-      error == ENOSPC || error == EDQUOT || error == EFBIG
-          ? "free some space or raise the limit, then run the same command again"
-          : "check the folder's permissions, then run the same command again");
+      Concat("cannot ", step, " (", bytes, " bytes): ", FileProblem(error)), path,
+      FileRemedy(error, "check the folder's permissions, then run the same command again"));
 }
 
 void SyncFolder(const std::string& folder) {
@@ -37,9 +36,9 @@ void SyncFolder(const std::string& folder) {
 
 AtomicFile::AtomicFile(const std::string& path, uint64_t bytes)
     : path_(path), temporary_(path + kTemporarySuffix), bytes_(bytes) {
-  fd_.Reset(
-      ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0644));
-  if (fd_.get() < 0) ThrowWriteError(path_, "create", bytes_);
+  fd_.Reset(OpenOwnFile(temporary_, O_WRONLY | O_CREAT | O_TRUNC));
+  if (fd_.get() < 0)
+    ThrowWriteError(errno == ELOOP || errno == ENXIO ? temporary_ : path_, "create", bytes_);
 }
 
 AtomicFile::~AtomicFile() {
@@ -102,7 +101,7 @@ void WriteFileAtomically(const std::string& path, const std::vector<std::string_
 }
 
 void SyncFile(const std::string& path) {
-  const FileDescriptor fd(::open(path.c_str(), O_WRONLY | O_CLOEXEC));
+  const FileDescriptor fd(OpenOwnFile(path, O_WRONLY));
   if (fd.get() < 0) ThrowWriteError(path, "open again", 0);
   if (::fsync(fd.get()) != 0) ThrowWriteError(path, "flush to disk", 0);
 }
@@ -118,9 +117,8 @@ void ThrowReadError(const std::string& path) {
     throw ResourceError(std::string("cannot read: ") + std::strerror(error), path,
                         "is its drive still there? then run the same command again");
   if (error == EMFILE || error == ENFILE || error == ENOMEM)
-    throw ResourceError(
-        std::string("cannot read: ") + std::strerror(error), path,
-        "raise the limit (ulimit -n, ulimit -v), then run the same command again");
+    throw ResourceError(std::string("cannot read: ") + std::strerror(error), path,
+                        FileRemedy(error, ""));
   throw InputError(std::strerror(error), path);
 }
 

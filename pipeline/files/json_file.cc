@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <mutex>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -43,10 +44,19 @@ struct CountingIterator {
   bool operator!=(const CountingIterator& o) const { return at != o.at; }
 };
 
+// The same text for the life of the program, so that values can refer to it. There are as many
+// as files are read.
+const std::string* Kept(const std::string& where) {
+  static std::mutex mutex;
+  static std::set<std::string> all;
+  const std::lock_guard lock(mutex);
+  return &*all.insert(where).first;
+}
+
 class Builder : public nlohmann::json_sax<nlohmann::json> {
  public:
   Builder(const Position* position, const std::string& where, ExitCode code)
-      : position_(position), where_(where), code_(code) {}
+      : position_(position), where_(Kept(where)), code_(code) {}
 
   JsonValue Take() { return std::move(root_); }
 
@@ -90,10 +100,13 @@ class Builder : public nlohmann::json_sax<nlohmann::json> {
 
   [[noreturn]] void Refuse(const std::string& why) const {
     throw Error(code_, why,
-                Concat(where_, ":", position_->line, ":", std::max(1, position_->column)));
+                Concat(*where_, ":", position_->line, ":", std::max(1, position_->column)));
+  }
+  void SetPosition(JsonValue* value) const {
+    value->SetPosition(where_, position_->line, std::max(1, position_->column));
   }
   bool Put(JsonValue value) {
-    if (value.line() == 0) value.SetPosition(position_->line, std::max(1, position_->column));
+    if (value.line() == 0) SetPosition(&value);
     if (levels_.empty())
       root_ = std::move(value);
     else if (levels_.back().value.IsArray())
@@ -105,7 +118,7 @@ class Builder : public nlohmann::json_sax<nlohmann::json> {
   }
   bool Open(JsonValue value) {
     if (levels_.size() >= kMaxDepth) Refuse("more than 64 levels");
-    value.SetPosition(position_->line, std::max(1, position_->column));
+    SetPosition(&value);
     levels_.push_back({std::move(value), std::move(key_), {}});
     return true;
   }
@@ -117,7 +130,7 @@ class Builder : public nlohmann::json_sax<nlohmann::json> {
   }
 
   const Position* position_;
-  const std::string& where_;
+  const std::string* where_;
   ExitCode code_;
   JsonValue root_;
   std::vector<Level> levels_;
@@ -153,9 +166,12 @@ bool JsonValue::IsNumber() const {
          std::holds_alternative<double>(value_);
 }
 
+std::string JsonValue::Place() const {
+  return text_ == nullptr ? "" : Concat(*text_, ", line ", line_);
+}
+
 void JsonValue::RefuseKind(const char* expected) const {
-  throw InputError(std::string(expected) + " expected",
-                   line_ > 0 ? "line " + std::to_string(line_) : "");
+  throw InputError(std::string(expected) + " expected", Place());
 }
 
 bool JsonValue::AsBool() const {
@@ -203,8 +219,7 @@ const JsonValue* JsonValue::Find(std::string_view key) const {
 
 const JsonValue& JsonValue::At(std::string_view key) const {
   if (const JsonValue* value = Find(key)) return *value;
-  throw InputError("\"" + std::string(key) + "\" is missing",
-                   line_ > 0 ? "line " + std::to_string(line_) : "");
+  throw InputError("\"" + std::string(key) + "\" is missing", Place());
 }
 
 JsonValue& JsonValue::operator[](std::string_view key) {

@@ -1,4 +1,4 @@
-// JSON values: objects keep their order, parsed values keep their line and column.
+// JSON values: objects keep their order, parsed values keep their file, line and column.
 #pragma once
 
 #include <cstdint>
@@ -37,7 +37,7 @@ class JsonValue {
   bool IsObject() const { return std::holds_alternative<Object>(value_); }
   bool IsBool() const { return std::holds_alternative<bool>(value_); }
 
-  // These throw Error(kInput) with the value's line if it has another type.
+  // These throw Error(kInput) with the value's place if it has another type.
   bool AsBool() const;
   int64_t AsInt() const;  // whole numbers in range
   double AsDouble() const;
@@ -58,7 +58,12 @@ class JsonValue {
 
   int line() const { return line_; }  // 1-based; 0: not parsed from a text
   int column() const { return column_; }
-  void SetPosition(int line, int column) { line_ = line, column_ = column; }
+  // `text` is the name of the text, and must stay.
+  void SetPosition(const std::string* text, int line, int column) {
+    text_ = text, line_ = line, column_ = column;
+  }
+  // "FILE, line LINE"; empty for a value that was not parsed.
+  std::string Place() const;
 
   const auto& variant() const { return value_; }
 
@@ -67,6 +72,7 @@ class JsonValue {
 
   std::variant<std::monostate, bool, int64_t, uint64_t, double, std::string, Array, Object>
       value_;
+  const std::string* text_ = nullptr;
   int line_ = 0, column_ = 0;
 };
 
@@ -79,6 +85,17 @@ JsonValue ParseJson(std::string_view text, const std::string& where,
 std::string PlaceIn(const std::string& path, const JsonValue& at);
 JsonValue ReadJsonFile(const std::string& path, uint64_t max_bytes = 64 << 20,
                        ExitCode code = ExitCode::kInput);
+
+// What `read` returns; an Error of it that names no place gets `where`.
+template <typename Read>
+auto InFile(const std::string& where, const Read& read) {
+  try {
+    return read();
+  } catch (const Error& error) {
+    if (!error.where().empty()) throw;
+    throw Error(error.code(), error.what_failed(), where, error.hint());
+  }
+}
 
 // Doubles get the shortest text that reads back exactly. indent < 0: everything on one line.
 // Invalid UTF-8 becomes replacement characters.

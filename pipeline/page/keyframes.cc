@@ -143,12 +143,8 @@ KeyframePath ParseKeyframePath(std::string_view text, const std::string& where) 
   try {
     return PathOf(ParseJson(text, where), where);
   } catch (const Error& error) {
-    // Of a value's type or a missing member: with the line, without the file.
     if (!error.hint().empty()) throw;
-    throw InputError(error.what_failed(),
-                     error.where().find(where) == std::string::npos
-                         ? where + ": " + error.where()
-                         : error.where(),
+    throw InputError(error.what_failed(), error.where().empty() ? where : error.where(),
                      kRemedy);
   }
 }

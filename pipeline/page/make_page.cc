@@ -76,13 +76,6 @@ RadianceField ExactStyle(const RadianceField& source, const StoredNetwork& netwo
   return layers.weight.empty() ? exact : MixFields(padded, {&exact}, {1}, &layers.weight);
 }
 
-double StrengthOf(const std::string& style_folder) {
-  if (!std::filesystem::exists(style_folder + "/run.json")) return 1;
-  const JsonValue* const strength =
-      ReadRunFile(style_folder + "/run.json").options.Find("strength");
-  return strength != nullptr ? strength->AsDouble() : 1;
-}
-
 Image RenderHome(const RadianceField& field, const Camera& home) {
   const double scale = std::min(1.0, double{kPoster} / std::max(home.width, home.height));
   const Camera camera = home.Resized(std::max(1, static_cast<int>(home.width * scale)),

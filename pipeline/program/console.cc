@@ -1,5 +1,6 @@
 #include "pipeline/program/console.h"
 
+#include <fcntl.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
 
@@ -12,6 +13,7 @@
 
 #include "kernels/base/clock.h"
 #include "kernels/base/error.h"
+#include "pipeline/files/file_problem.h"
 #include "pipeline/program/interrupt.h"
 
 namespace regrade {
@@ -46,21 +48,20 @@ Console::Console(bool json) : json_(json) {
 Console::~Console() { Erase(); }
 
 void Console::OpenLog(const std::string& path) {
-  log_.close();
-  log_.clear();
-  log_.open(path, std::ios::app);
-  if (!log_) Warn("no log is kept: cannot write " + path + ": " + std::strerror(errno));
+  log_.Reset(OpenOwnFile(path, O_WRONLY | O_CREAT | O_APPEND));
+  if (log_.get() < 0) Warn("no log is kept: cannot write " + path + ": " + FileProblem(errno));
 }
 
 void Console::Log(const char* level, const std::string& line) {
-  if (!log_.is_open()) return;
+  if (log_.get() < 0) return;
   const std::time_t now = std::time(nullptr);
   std::tm local{};
   char time[32] = "";
   if (::localtime_r(&now, &local) != nullptr)
     std::strftime(time, sizeof time, "%Y-%m-%dT%H:%M:%S%z", &local);
-  log_ << time << ' ' << level << ' ' << line << std::endl;
-  log_.clear();  // a full disk is reported by the writers of results
+  const std::string text = Concat(time, ' ', level, ' ', line, '\n');
+  // A full disk is reported by the writers of results.
+  [[maybe_unused]] const ssize_t written = ::write(log_.get(), text.data(), text.size());
 }
 
 void Console::Say(const std::string& text, bool warning) {

@@ -2,11 +2,11 @@
 // and all messages in the output folder's log.
 #pragma once
 
-#include <fstream>
 #include <optional>
 #include <string>
 
 #include "kernels/base/error.h"
+#include "kernels/base/file_descriptor.h"
 #include "kernels/base/progress.h"
 #include "pipeline/files/json_file.h"
 #include "pipeline/files/text.h"
@@ -71,7 +71,7 @@ class Console {
   bool line_drawn_ = false;
   bool quiet_ = false;
   bool verbose_ = false;
-  std::ofstream log_;
+  FileDescriptor log_;
   std::string stage_, title_, kept_;
   ExpectedTime expected_;
   double finished_s_ = 0;  // what finished stages took of which something was expected

@@ -84,6 +84,20 @@ std::string FlagText(const JsonValue& value) {
   return text;
 }
 
+// The text behind the one of `beginnings` that it has, see OptionInfo::runs; nothing without.
+std::optional<std::string> Behind(const std::string& text, const char* beginnings) {
+  std::optional<std::string> found;
+  for (const std::string& beginning : Split(beginnings, '|')) {
+    if (beginning.empty()) continue;
+    if (beginning == "!" + text) return std::nullopt;
+    if (beginning == "*" && !text.empty())
+      found = text;
+    else if (beginning != "*" && text.starts_with(beginning))
+      found = text.substr(beginning.size());
+  }
+  return found;
+}
+
 std::string Wrapped(const std::string& text, size_t indent, size_t width) {
   std::string result;
   size_t column = indent;
@@ -267,6 +281,32 @@ JsonValue OptionSet::ValueOf(const Entry& entry) {
         }
       },
       entry.target);
+}
+
+std::vector<OptionSet::Outside> OptionSet::OutsideOf(const JsonValue& values) const {
+  std::vector<Outside> all;
+  if (!values.IsObject()) return all;
+  for (const auto& [name, value] : values.AsObject()) {
+    const Entry* const entry = Find(name);
+    if (entry == nullptr || value.IsObject()) continue;
+    const auto add = [&](const JsonValue& part) {
+      const std::string text = FlagText(part);
+      if (Behind(text, entry->info.runs))
+        all.push_back({entry->name, text, ""});
+      else if (const auto path = Behind(text, entry->info.reads))
+        all.push_back({entry->name, text, *path});
+    };
+    if (value.IsArray() && IsTextList(*entry))
+      for (const JsonValue& part : value.AsArray()) add(part);
+    else
+      add(value);
+  }
+  return all;
+}
+
+bool OptionSet::IsOnce(const std::string& name) const {
+  const Entry* const entry = Find(name);
+  return entry != nullptr && entry->info.once;
 }
 
 JsonValue OptionSet::Values() const {

@@ -44,6 +44,16 @@ class OptionSet {
   // {"name": value, ...} of everything in effect.
   JsonValue Values() const;
 
+  // An option's text that leads out of a run's folder, see OptionInfo.
+  struct Outside {
+    std::string name, text;
+    std::string path;  // that is read; empty for what runs
+  };
+  // Those among {"name": value, ...}; names that are not in the set are skipped.
+  std::vector<Outside> OutsideOf(const JsonValue& values) const;
+  // Is it an option of one start?
+  bool IsOnce(const std::string& name) const;
+
   // Names, units, effects, defaults and bounds, of the options named in `only`, or of all. Call
   // before flags are applied. `required`: names of options that the command demands.
   std::string Help(const Texts& required = {}, const Texts& only = {}) const;

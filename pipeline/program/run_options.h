@@ -96,22 +96,29 @@ struct StartOptions {
   template <typename Bind>
   void Describe(Bind& bind) {
     bind("config", config,
-         {.help = "a run.json to take options and arguments from; flags override them"});
+         {.help = "a run.json to take options and arguments from; flags override them",
+          .once = true});
     bind("restart-from", restart_from,
          {.help = "repeats this stage and all later ones, even where they are done",
-          .choices = "|pose|reconstruct|style_2d|stylize|render|evaluate|report"});
+          .choices = "|pose|reconstruct|style_2d|stylize|render|evaluate|report",
+          .once = true});
     bind(
         "until", until,
         {.help =
              "ends each style after this stage: render leaves out measuring and page; `regrade "
              "render` goes on",
-         .choices = "stylize|render|evaluate|report"});
-    bind("require", require, {.help = kRequireHelp});
-    bind("junit", junit, {.help = kJUnitHelp});
-    bind("dry-run", dry_run, {.help = "prints what would be done, and does nothing"});
+         .choices = "stylize|render|evaluate|report",
+         .once = true});
+    bind("require", require, {.help = kRequireHelp, .once = true});
+    bind("junit", junit, {.help = kJUnitHelp, .once = true});
+    bind("dry-run", dry_run,
+         {.help = "prints what would be done, and does nothing", .once = true});
     bind("break-lock", break_lock,
-         {.help = "takes over a folder whose last run died on another machine"});
-    bind("yes", yes, {.help = "fetches what --method pca-kd needs without asking"});
+         {.help = "takes over a folder whose last run died on another machine", .once = true});
+    bind("yes", yes,
+         {.help = "answers yes: fetches what --method pca-kd needs, and runs and reads what a "
+                  "folder's run.json names outside of it",
+          .once = true});
   }
 };
 

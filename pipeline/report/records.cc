@@ -111,9 +111,9 @@ Metrics ReadMetrics(const Workspace& workspace, const char* stage, const JsonVal
   try {
     return MetricsFromJson<Metrics>(metrics);
   } catch (const Error& error) {
-    throw Error(ExitCode::kInput,
-                error.what_failed() + (error.where().empty() ? "" : ", " + error.where()),
-                workspace.StagePath(stage), "delete this file: its stage will be done again");
+    throw InputError(error.what_failed(),
+                     error.where().empty() ? workspace.StagePath(stage) : error.where(),
+                     "delete this file: its stage will be done again");
   }
 }
 

@@ -23,7 +23,8 @@ struct MatchChoice {
           .choices = "none|regions"});
     bind("match-network", network,
          {.help = "an ONNX network (input \"image\", output \"feat\") whose features --match "
-                  "regions compares, too"});
+                  "regions compares, too",
+          .runs = "*"});
   }
 };
 

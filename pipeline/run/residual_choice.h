@@ -23,7 +23,8 @@ struct ResidualChoice {
                   "at each voxel: none; views fits it to the method's pictures of all renders; "
                   "layers:DIR, as `regrade retouch` sets it, also to what single photos have "
                   "beyond the method: 16-bit pictures by the photos' names, mid-grey where "
-                  "that is nothing"});
+                  "that is nothing",
+          .reads = "layers:"});
   }
 };
 

@@ -1,6 +1,7 @@
 #include "pipeline/run/resolve_settings.h"
 
 #include <algorithm>
+#include <filesystem>
 
 #include "pipeline/program/device_choice.h"
 #include "pipeline/run/paper_config.h"
@@ -85,6 +86,38 @@ bool OnCard(const OptionSet& options) {
                      options.Given("reproducible").has_value() || reproducible->AsBool());
 }
 
+bool IsInside(const std::string& path, const std::string& folder) {
+  if (folder.empty()) return false;
+  std::error_code error;
+  const std::filesystem::path at = std::filesystem::weakly_canonical(path, error),
+                              root = std::filesystem::weakly_canonical(folder, error);
+  return !error &&
+         std::mismatch(root.begin(), root.end(), at.begin(), at.end()).first == root.end();
+}
+
+// The options of a folder that may come from somebody else, without those that are refused.
+JsonValue OfFolder(const RunFile& file, const SettingsSources& sources, const JsonValue& config,
+                   const OptionSet& options) {
+  OutsideOptions outside = options.OutsideOf(file.options);
+  std::erase_if(outside, [&](const OptionSet::Outside& option) {
+    const bool taken = sources.taken.empty() ||
+                       std::ranges::find(sources.taken, option.name) != sources.taken.end();
+    return !taken || options.Given(option.name) || config.Find(option.name) != nullptr ||
+           (!option.path.empty() && IsInside(option.path, sources.folder));
+  });
+  const bool accepted =
+      outside.empty() || (sources.accept_outside && sources.accept_outside(outside));
+  JsonValue kept = JsonValue::Object();
+  if (!file.options.IsObject()) return file.options;  // refused below, with its line
+  for (const auto& [name, value] : file.options.AsObject()) {
+    const bool refused =
+        !accepted &&
+        std::ranges::find(outside, name, &OptionSet::Outside::name) != outside.end();
+    if (!refused && !options.IsOnce(name)) kept[name] = value;
+  }
+  return kept;
+}
+
 void ApplyRunFile(const RunFile& file, const std::string& path,
                   const std::vector<std::string>& taken, bool on_card, OptionSet* options) {
   if (taken.empty()) {
@@ -109,15 +142,17 @@ std::vector<std::string> ResolveSettings(const SettingsSources& sources, OptionS
   // Not to a command that no preset is meant for: `regrade synth` has --effects of its own.
   if (options->Values().Find("preset") != nullptr || !sources.run_json.empty())
     ApplyKnown(PresetValues(sources.preset, on_card), "--preset", options);
+  const auto config = options->Given("config");
+  const RunFile given = config ? ReadRunFile(*config) : RunFile();
   if (!sources.run_json.empty()) {
-    const RunFile file = ReadRunFile(sources.run_json);
+    RunFile file = ReadRunFile(sources.run_json);
+    file.options = OfFolder(file, sources, given.options, *options);
     ApplyRunFile(file, sources.run_json, sources.taken, on_card, options);
     words = file.words;
   }
-  if (const auto config = options->Given("config")) {
-    const RunFile file = ReadRunFile(*config);
-    ApplyRunFile(file, *config, {}, on_card, options);
-    if (sources.run_json.empty()) words = file.words;
+  if (config) {
+    ApplyRunFile(given, *config, {}, on_card, options);
+    if (sources.run_json.empty()) words = given.words;
   }
   if (const auto preset = options->Given("preset"))
     ApplyKnown(PresetValues(*preset, on_card), "--preset", options);

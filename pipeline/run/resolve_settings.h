@@ -2,6 +2,7 @@
 // has their order.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -9,16 +10,23 @@
 
 namespace regrade {
 
+// Options of a continued folder that run or read something outside of it.
+using OutsideOptions = std::vector<OptionSet::Outside>;
+
 struct SettingsSources {
   std::string preset = "standard";      // where neither a flag nor a run.json names one
   std::string run_json = "";            // file of the run that a command continues; empty: none
+  std::string folder = "";              // of that run: what it names in there is its own
   std::vector<std::string> taken = {};  // names of the options taken from it; empty: all
+  // Asked about what `run_json` names outside, where neither flags nor --config do: true takes
+  // it. Without this function and after a no, such options keep their defaults.
+  std::function<bool(const OutsideOptions&)> accept_outside = {};
 };
 
 // Writes the options that are bound in `options`, whose flags have been parsed. Later sources
 // override earlier ones:
 //   1. the preset: that of the run.json, or else of `sources`
-//   2. `sources.run_json`, then the file of --config
+//   2. `sources.run_json`, without options of one start, then the file of --config
 //   3. --preset, for the options that presets set
 //   4. --paper-config, with the preset paper, for what it decides
 //   5. --recipe, for all options of the style network

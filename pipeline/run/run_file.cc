@@ -1,5 +1,7 @@
 #include "pipeline/run/run_file.h"
 
+#include <filesystem>
+
 #include "kernels/base/error.h"
 #include "kernels/base/hash.h"
 #include "pipeline/workspace/stage_runner.h"
@@ -33,11 +35,21 @@ RunFile ReadRunFile(const std::string& path) {
     return file;
   } catch (const Error& error) {
     throw UsageError(
-        error.what_failed(),
-        error.where().find(path) == std::string::npos ? path + ": " + error.where()
-                                                      : error.where(),
+        error.what_failed(), error.where().empty() ? path : error.where(),
         error.hint().empty() ? "give a run.json that regrade wrote" : error.hint());
   }
+}
+
+double StrengthOf(const std::string& style) {
+  StyleSource source;
+  const std::string file = style + "/run.json";
+  if (!std::filesystem::exists(file)) return source.strength;
+  const RunFile run = ReadRunFile(file);
+  OptionSet options;
+  options.Add("", &source);
+  if (const JsonValue* strength = run.options.Find("strength"))
+    options.ApplyConfig(JsonValue::Object{{"strength", *strength}}, file);
+  return source.strength;
 }
 
 JsonValue RunFileJson(const std::string& command, const RunContext& context) {

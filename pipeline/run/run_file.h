@@ -16,6 +16,10 @@ struct RunFile {
 // Throws Error(kUsage) with line and column for what is not such a file, or of another schema.
 RunFile ReadRunFile(const std::string& path);
 
+// The strength in run.json of a style's folder, 1 without that file. Throws Error(kUsage) for
+// one that --strength would not take.
+double StrengthOf(const std::string& style);
+
 // The content for `command`, with the fingerprints of finished stages; of the style's folder,
 // if a style is chosen, with its picture's hash (style_folders.h).
 JsonValue RunFileJson(const std::string& command, const RunContext& context);

@@ -1,12 +1,11 @@
 #include "pipeline/stages/command_stylizer.h"
 
-#include <stdlib.h>
-
 #include <algorithm>
 #include <filesystem>
 
 #include "kernels/base/error.h"
 #include "kernels/process/child_process.h"
+#include "kernels/process/private_folder.h"
 #include "pipeline/images/image_file.h"
 #include "pipeline/stages/folder_stylizer.h"
 
@@ -17,28 +16,6 @@ namespace fs = std::filesystem;
 
 constexpr char kHint[] =
     "for example command:\"restyle --content {input} --style {style} -o {output}\"";
-
-// A folder of our own for a view's files, gone afterwards.
-class ScratchFolder {
- public:
-  ScratchFolder() {
-    std::string name = (fs::temp_directory_path() / "regrade-view-XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr)
-      throw ResourceError("cannot make a temporary folder", name,
-                          "set TMPDIR to a disk with space");
-    path_ = name;
-  }
-  ~ScratchFolder() {
-    std::error_code error;
-    fs::remove_all(path_, error);
-  }
-  ScratchFolder(const ScratchFolder&) = delete;
-  ScratchFolder& operator=(const ScratchFolder&) = delete;
-  std::string operator/(const char* name) const { return path_ + "/" + name; }
-
- private:
-  std::string path_;
-};
 
 // One pass from left to right, so that braces in a path stay what they are.
 std::string Filled(const std::string& word,
@@ -65,7 +42,7 @@ class CommandStylizer : public ViewStylizer {
   Image Stylize(const Image& view, int view_index) const override {
     const std::string where = Concat(words_[0], " on view ", view_index);
     CountNotFinite(view, where);
-    const ScratchFolder folder;
+    const PrivateFolder folder;
     const std::string input = folder / "input.png", output = folder / "output.png";
     WritePng8(input, Colors(view));
     ChildOptions options;

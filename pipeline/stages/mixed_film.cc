@@ -95,16 +95,18 @@ PathFilm PlanPathFilm(const std::string& folder, const KeyframePath& path, int l
 
 void WritePathFilm(const std::string& folder, const KeyframePath& path, const PathFilm& film,
                    Backend backend, const std::string& file, const ProgressFunction& progress) {
-  StoredField source = ReadFieldFile(folder + "/field.npz");
-  std::vector<StoredField> styles;
   std::vector<std::string> names;
   std::vector<size_t> shown;
   for (size_t i = 0; i < path.styles.size(); ++i) {
     if (!IsShown(path, i)) continue;
     shown.push_back(i);
     names.push_back(film.styles[i]);
-    styles.push_back(ReadStyledField(folder, StyleFolder(folder, film.styles[i]), 1));
   }
+  CheckResults(folder, names);
+  StoredField source = ReadFieldFile(folder + "/field.npz");
+  std::vector<StoredField> styles;
+  for (const std::string& name : names)
+    styles.push_back(ReadStyledField(folder, StyleFolder(folder, name), 1));
   MakeMixable(folder, names, &source, &styles);
   MixRenderer renderer(source.field, styles, nullptr, backend);
   VideoWriter writer(file, film.width, film.height, film.fps);

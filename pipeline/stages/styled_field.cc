@@ -52,9 +52,7 @@ StoredField ReadStyledField(const std::string& scene, const std::string& style,
 }
 
 StoredField ReadStyledField(const std::string& scene, const std::string& style) {
-  const RunFile run = ReadRunFile(style + "/run.json");
-  const JsonValue* strength = run.options.Find("strength");
-  return ReadStyledField(scene, style, strength != nullptr ? strength->AsDouble() : 1);
+  return ReadStyledField(scene, style, StrengthOf(style));
 }
 
 void MixPicture(const Image& before, double strength, Image* after) {

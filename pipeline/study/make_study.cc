@@ -10,6 +10,7 @@
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/files/folder_listing.h"
 #include "pipeline/files/json_file.h"
+#include "pipeline/files/own_files.h"
 #include "pipeline/report/html_text.h"
 #include "pipeline/study/study_assets.h"
 
@@ -36,7 +37,9 @@ bool IsFilm(const std::string& name) {
 // Films of a method by the clip's name; a single film is the clip "film".
 std::map<std::string, std::string> FilmsOf(const std::string& method) {
   if (!fs::is_directory(method)) return {{"film", method}};
-  if (fs::exists(method + "/" + kFilmOfRun)) return {{"film", method + "/" + kFilmOfRun}};
+  const std::string of_run = method + "/" + kFilmOfRun;
+  RefuseForeign(of_run);
+  if (fs::exists(of_run)) return {{"film", of_run}};
   std::map<std::string, std::string> films;
   for (const ListedFile& file : ListFolder(method).files)
     if (file.problem.empty() && IsFilm(file.name))

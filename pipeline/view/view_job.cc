@@ -30,15 +30,15 @@ int ViewJob::Start(const std::string& kind, const std::vector<std::string>& argu
                    std::function<void()> finish) {
   if (Running()) return 0;
   if (thread_.joinable()) thread_.join();
-  const std::lock_guard lock(mutex_);
+  const std::lock_guard lock(mutex_);  // the thread waits for it where it reads the status
+  cancelled_ = false;
+  thread_ =
+      std::jthread([this, arguments, finish = std::move(finish)] { Work(arguments, finish); });
   const int number = status_.number + 1;
   status_ = {};
   status_.number = number;
   status_.kind = kind;
   status_.state = "running";
-  cancelled_ = false;
-  thread_ =
-      std::jthread([this, arguments, finish = std::move(finish)] { Work(arguments, finish); });
   return number;
 }
 
@@ -95,6 +95,8 @@ void ViewJob::Work(const std::vector<std::string>& arguments,
     }
   } catch (const std::exception& failure) {
     error = failure.what();
+  } catch (...) {
+    error = "an unknown error";
   }
   const std::lock_guard lock(mutex_);
   status_.state = state;

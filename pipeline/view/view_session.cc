@@ -8,6 +8,7 @@
 #include "pipeline/fields/network_checkpoint.h"
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/files/json_file.h"
+#include "pipeline/files/own_files.h"
 #include "pipeline/images/image_format.h"
 #include "pipeline/page/field_codec.h"
 #include "pipeline/page/keyframes.h"
@@ -53,7 +54,8 @@ void MakeFolder(const std::string& folder) {
 
 }  // namespace
 
-ViewSession::ViewSession(const std::string& folder) : folder_(folder) {}
+ViewSession::ViewSession(const std::string& folder, const std::vector<std::string>& style_flags)
+    : folder_(folder), identity_(folder), style_flags_(style_flags) {}
 
 void ViewSession::SayWhatIsAwaited(const std::string& text) {
   const std::lock_guard lock(mutex_);
@@ -83,6 +85,12 @@ std::optional<HttpResponse> ViewSession::NotYet(const std::string& target) const
   response.status = 202;
   response.body = DumpJson(JsonValue::Object{{"awaited", awaited_}}, -1);
   return response;
+}
+
+void ViewSession::CheckFolder() const {
+  if (identity_.Holds()) return;
+  throw ResourceError("the folder was moved or removed while its page was open", folder_,
+                      "start `regrade view` again where it is now");
 }
 
 std::vector<Route> ViewSession::Routes() {
@@ -159,7 +167,10 @@ HttpResponse ViewSession::TakePicture(const HttpRequest& request) {
   if (format == nullptr || IsVideo(*format))
     return RefusedRequest(415, "this file is no picture");
   if (job_.Running()) return Accepted(0);
+  CheckFolder();
   const std::string pictures = folder_ + "/" + kPicturesFolder;
+  RefuseForeign(folder_ + "/" + kStylesFolder);
+  RefuseForeignBelow(pictures);
   MakeFolder(pictures);
   // What a file is, its first bytes say: its ending is left out. A picture that comes again is
   // the same file, and gives the same style.
@@ -171,14 +182,14 @@ HttpResponse ViewSession::TakePicture(const HttpRequest& request) {
   const std::string name = NameStyles(folder_, {picture}, "")[0].name;
   learning_ = StyleFolder(folder_, name);
   step_ = -1;
-  return Accepted(job_.Start(
-      "style", {"stylize", folder_, "--style", picture, "--name", name, "--until", "stylize"},
-      [this, name, folder = learning_] {
-        Served style =
-            Serve(ReadNetworkFile(folder + "/network.npz"), PageStyleId(folder), name);
-        const std::lock_guard lock(mutex_);
-        style_ = std::move(style);
-      }));
+  std::vector<std::string> words = {"stylize", folder_, "--style", picture,
+                                    "--name",  name,    "--until", "stylize"};
+  words.insert(words.end(), style_flags_.begin(), style_flags_.end());
+  return Accepted(job_.Start("style", words, [this, name, folder = learning_] {
+    Served style = Serve(ReadNetworkFile(folder + "/network.npz"), PageStyleId(folder), name);
+    const std::lock_guard lock(mutex_);
+    style_ = std::move(style);
+  }));
 }
 
 HttpResponse ViewSession::StyleSoFar() {
@@ -198,7 +209,9 @@ HttpResponse ViewSession::StyleSoFar() {
 HttpResponse ViewSession::TakePath(const HttpRequest& request) {
   ParseKeyframePath(request.body, "camera_path.json");
   if (job_.Running()) return Accepted(0);
+  CheckFolder();
   const std::string films = folder_ + "/" + kFilmsFolder;
+  RefuseForeignBelow(films);
   MakeFolder(films);
   const std::string path =
       FreePath(films, "film",

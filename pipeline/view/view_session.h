@@ -23,6 +23,7 @@
 #include "kernels/base/progress.h"
 #include "kernels/field/radiance_field.h"
 #include "pipeline/fields/network_file.h"
+#include "pipeline/files/folder_identity.h"
 #include "pipeline/view/local_server.h"
 #include "pipeline/view/view_job.h"
 
@@ -32,7 +33,8 @@ inline constexpr uint64_t kMostPictureBytes = 32 << 20, kMostPathBytes = 4 << 20
 
 class ViewSession {
  public:
-  explicit ViewSession(const std::string& folder);
+  // `style_flags`: of the commands that learn styles, besides their picture and name.
+  ViewSession(const std::string& folder, const std::vector<std::string>& style_flags);
 
   // They refer to this object, and may be asked before and while the page is made.
   std::vector<Route> Routes();
@@ -40,6 +42,8 @@ class ViewSession {
   void SayWhatIsAwaited(const std::string& text);
   // Makes the page of the folder with these styles, once. Throws as MakePage.
   void MakePageOf(const std::vector<std::string>& styles, const ProgressFunction& progress);
+  // Throws Error(kResources) once the folder is not where it was.
+  void CheckFolder() const;
 
  private:
   HttpResponse Opening() const;
@@ -56,6 +60,8 @@ class ViewSession {
                const std::string& name) const;
 
   const std::string folder_;
+  const FolderIdentity identity_;
+  const std::vector<std::string> style_flags_;
   std::string page_;             // with the next two unchanged once made_ is set
   RadianceField field_;          // the page's
   std::vector<int64_t> voxels_;  // of the field, in the page's order

@@ -12,6 +12,7 @@
 #include <filesystem>
 
 #include "kernels/base/error.h"
+#include "pipeline/files/file_problem.h"
 #include "pipeline/files/json_file.h"
 
 namespace regrade {
@@ -71,7 +72,7 @@ Holder ReadHolder(int fd) {
 // Another run may have replaced the file between open and flock.
 bool StillInPlace(int fd, const std::string& path) {
   struct stat ours, there;
-  return ::fstat(fd, &ours) == 0 && ::stat(path.c_str(), &there) == 0 &&
+  return ::fstat(fd, &ours) == 0 && ::lstat(path.c_str(), &there) == 0 &&
          ours.st_dev == there.st_dev && ours.st_ino == there.st_ino;
 }
 
@@ -80,10 +81,13 @@ bool StillInPlace(int fd, const std::string& path) {
 FolderLock::FolderLock(const std::string& path, bool break_lock) {
   const std::string folder = std::filesystem::path(path).parent_path().parent_path().string();
   while (true) {
-    fd_.Reset(::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0644));
-    if (fd_.get() < 0)
-      throw ResourceError(std::string("cannot write here: ") + std::strerror(errno), path,
-                          "choose another folder with --out, or correct its permissions");
+    fd_.Reset(OpenOwnFile(path, O_RDWR | O_CREAT));
+    if (fd_.get() < 0) {
+      const int error = errno;
+      throw ResourceError(
+          "cannot write here: " + FileProblem(error), path,
+          FileRemedy(error, "choose another folder with --out, or correct its permissions"));
+    }
     int status;
     do status = ::flock(fd_.get(), LOCK_EX | LOCK_NB);
     while (status != 0 && errno == EINTR);

@@ -112,7 +112,7 @@ T ValueFromJson(const JsonValue& json) {
     return json.AsBool();
   } else if constexpr (std::is_integral_v<T>) {
     const int64_t value = json.AsInt();
-    if (!std::in_range<T>(value)) throw InputError("number out of range");
+    if (!std::in_range<T>(value)) throw InputError("number out of range", json.Place());
     return static_cast<T>(value);
   } else if constexpr (std::is_floating_point_v<T>) {
     return json.AsDouble();
@@ -122,7 +122,7 @@ T ValueFromJson(const JsonValue& json) {
     return json.IsNull() ? Metric::Undefined("not defined") : Metric(json.AsDouble());
   } else if constexpr (kIsPair<T>) {
     const JsonValue::Array& pair = json.AsArray();
-    if (pair.size() != 2) throw InputError("a pair of numbers is expected");
+    if (pair.size() != 2) throw InputError("a pair of numbers is expected", json.Place());
     return {ValueFromJson<typename T::first_type>(pair[0]),
             ValueFromJson<typename T::second_type>(pair[1])};
   } else if constexpr (kIsVector<T>) {

@@ -32,6 +32,16 @@ inline constexpr char kScenePage[] = "scene.html";
 // Films of camera paths that were made in a page.
 inline constexpr char kFilmsFolder[] = "films";
 
+// What is at the top of the output folder and of a style's, besides `styles`: files and whole
+// folders of our own.
+inline constexpr const char* kOwnNames[] = {
+    ".regrade",        "run.json",   "poses",        "field.npz",   "field_2d.npz",
+    "network.npz",     "object.npz", "residual.npz", "styled.npz",  "views_2d",
+    "frames",          "heatmaps",   "stills",       "layers",      "retouched",
+    "retouch",         "edit.cube",  "retouch.json", "report.json", "report.html",
+    kScenePage,        kFilmsFolder, kStyledFilm,    kWipeFilm,     kViews2dFilm,
+    "styles/.pictures"};
+
 // "00007.png"
 inline std::string FrameName(int index) { return Format("%05d.png", index); }
 

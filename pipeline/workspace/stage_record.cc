@@ -11,6 +11,7 @@
 #include "kernels/base/hash.h"
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/files/folder_listing.h"
+#include "pipeline/files/own_files.h"
 
 namespace regrade {
 namespace {
@@ -92,6 +93,7 @@ std::vector<StageOutput> DescribeOutputs(const std::string& root,
   };
   for (const std::string& path : paths) {
     const fs::path full = fs::path(root) / path;
+    RefuseForeign(full.string());
     if (fs::is_directory(full)) {
       for (const auto& entry : fs::recursive_directory_iterator(full))
         if (entry.is_regular_file() && !entry.is_symlink()) add(entry.path());
@@ -116,8 +118,10 @@ std::vector<std::string> ChangedOutputs(const std::string& root, const StageReco
   for (const StageOutput& output : record.outputs) {
     const fs::path full = fs::path(root) / output.path;
     std::error_code error;
-    if (!fs::is_regular_file(full, error)) {
-      changed.push_back(output.path + " is gone");
+    const fs::file_type type = fs::symlink_status(full, error).type();
+    if (type != fs::file_type::regular) {
+      changed.push_back(output.path +
+                        (type == fs::file_type::symlink ? " is a link" : " is gone"));
       continue;
     }
     const auto bytes = fs::file_size(full, error);

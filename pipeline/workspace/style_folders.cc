@@ -9,9 +9,11 @@
 #include "kernels/base/natural_order.h"
 #include "pipeline/files/atomic_file.h"
 #include "pipeline/files/json_file.h"
+#include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
 #include "pipeline/workspace/output_names.h"
 #include "pipeline/workspace/stage_record.h"
+#include "pipeline/workspace/workspace.h"
 
 namespace regrade {
 namespace {
@@ -53,7 +55,10 @@ std::string SafeStyleName(const std::string& picture) {
 }
 
 std::string StyleFolder(const std::string& folder, const std::string& name) {
-  return folder + "/" + kStylesFolder + "/" + name;
+  const std::string styles = folder + "/" + kStylesFolder, path = styles + "/" + name;
+  RefuseForeign(styles);
+  RefuseForeign(path);
+  return path;
 }
 
 std::string PicturesHash(const std::vector<std::string>& pictures) {
@@ -107,7 +112,8 @@ std::vector<std::string> StyleNames(const std::string& folder) {
   std::error_code error;
   for (fs::directory_iterator it(folder + "/" + kStylesFolder, error), end; !error && it != end;
        it.increment(error))
-    if (fs::is_regular_file(it->path() / "run.json"))
+    if (fs::is_directory(it->symlink_status(error)) &&
+        fs::is_regular_file(it->path() / "run.json", error))
       names.push_back(it->path().filename().string());
   std::ranges::sort(names, NaturalLess);
   return names;
@@ -153,6 +159,8 @@ std::string ChosenStyle(const std::string& folder, const std::string& name) {
   const std::vector<std::string> learned = LearnedStyles(folder);
   if (chosen.empty() && learned.size() == 1) chosen = learned[0];
   if (chosen.empty() && names.size() == 1) chosen = names[0];
+  if (!chosen.empty() && SafeStyleName(chosen + ".x") == chosen)
+    StyleFolder(folder, chosen);  // refuses a link, which is not among the names
   if (!known(chosen))
     throw InputError(chosen.empty() ? "several styles, and none was finished last"
                                     : "has no style '" + chosen + "'",
@@ -168,6 +176,12 @@ std::string ChosenLearnedStyle(const std::string& folder, const std::string& nam
                    "go on with `regrade stylize " + folder + " --name " + chosen +
                        " --style PICTURE`" +
                        (learned.empty() ? "" : ", or name one of " + Join(learned, ", ")));
+}
+
+void CheckResults(const std::string& folder, const std::vector<std::string>& styles) {
+  Workspace::CheckResults(folder, {"pose", "reconstruct"});
+  for (const std::string& style : styles)
+    Workspace::CheckResults(StyleFolder(folder, style), {"stylize"});
 }
 
 void PublishStyle(const std::string& folder, const std::string& name) {

@@ -22,7 +22,7 @@ std::string PicturesHash(const std::vector<std::string>& pictures);
 // characters become '_', and a leading dot is removed. "style" where nothing is left.
 std::string SafeStyleName(const std::string& picture);
 
-// The path of a style's folder in an output folder.
+// The path of a style's folder in an output folder. Throws Error(kInput) where it is a link.
 std::string StyleFolder(const std::string& folder, const std::string& name);
 
 // A name for each picture: that of its file, or `name`, for a single picture, where it is not
@@ -37,7 +37,7 @@ std::vector<NamedStyle> NameStyles(const std::string& folder,
                                    const std::vector<std::string>& pictures,
                                    const std::string& name, bool together = false);
 
-// Names of the styles that were begun in `folder`, in natural order.
+// Names of the styles that were begun in `folder`, in natural order; links are none.
 std::vector<std::string> StyleNames(const std::string& folder);
 
 // A style that was learned, so that it can be shown: it has a network, and its stage "stylize"
@@ -61,6 +61,9 @@ std::string ChosenLearnedStyle(const std::string& folder, const std::string& nam
 // one that was learned or, where none was, begun. Throws Error(kInput), which lists the names,
 // where there is none.
 std::string ChosenStyle(const std::string& folder, const std::string& name);
+
+// For what only reads: Workspace::CheckResults of the scene and of these styles.
+void CheckResults(const std::string& folder, const std::vector<std::string>& styles);
 
 // Notes that this style was finished last, and copies its film, where it has one, to styled.mp4
 // of `folder`. Throws Error(kResources).

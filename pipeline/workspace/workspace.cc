@@ -6,6 +6,10 @@
 #include "kernels/base/error.h"
 #include "kernels/base/hash.h"
 #include "pipeline/files/atomic_file.h"
+#include "pipeline/files/own_files.h"
+#include "pipeline/files/text.h"
+#include "pipeline/workspace/output_names.h"
+#include "pipeline/workspace/style_folders.h"
 
 namespace regrade {
 namespace {
@@ -38,6 +42,10 @@ void MakeFolder(const std::string& folder) {
         "choose another folder with --out");
 }
 
+std::string StagePathIn(const std::string& folder, const std::string& stage) {
+  return folder + kOwnFolder + "/stages/" + stage + ".json";
+}
+
 // The lock is held: no other run is writing them.
 void RemoveTemporaries(const std::string& folder) {
   std::vector<fs::path> found;
@@ -58,6 +66,26 @@ bool Workspace::Exists(const std::string& folder) {
   return fs::is_directory(folder + kOwnFolder, error);
 }
 
+void Workspace::RefuseLinks(const std::string& folder) {
+  RefuseForeign(folder + "/" + kStylesFolder);
+  for (const char* name : kOwnNames) RefuseForeignBelow(folder + "/" + name);
+}
+
+void Workspace::CheckResults(const std::string& folder,
+                             const std::vector<std::string>& stages) {
+  RefuseLinks(folder);
+  for (const std::string& stage : stages) {
+    const std::string path = StagePathIn(folder, stage);
+    if (!fs::exists(path)) continue;
+    const std::vector<std::string> changed =
+        ChangedOutputs(folder, StageRecordFromJson(ReadJsonFile(path, kMaxRecord), path));
+    if (!changed.empty())
+      throw InputError(
+          Join(changed, "; "), folder,
+          "run `regrade run` or `regrade stylize` again: it will redo stage " + stage);
+  }
+}
+
 Workspace::Workspace(const std::string& folder, bool break_lock) {
   std::error_code error;
   folder_ = fs::absolute(folder, error).lexically_normal().string();
@@ -67,6 +95,7 @@ Workspace::Workspace(const std::string& folder, bool break_lock) {
   while (folder_.size() > 1 && folder_.back() == '/') folder_.pop_back();
   MakeFolder(folder_);
   RefuseForeignFolder(folder_);
+  RefuseLinks(folder_);
   MakeFolder(folder_ + kOwnFolder);
   lock_.emplace(folder_ + kOwnFolder + "/lock", break_lock);
   MakeFolder(Path(".regrade/stages"));
@@ -94,7 +123,7 @@ void Workspace::RefuseOlderRecords() const {
 }
 
 std::string Workspace::StagePath(const std::string& stage) const {
-  return Path(".regrade/stages/" + stage + ".json");
+  return StagePathIn(folder_, stage);
 }
 
 std::string Workspace::CheckpointPath(const std::string& stage) const {

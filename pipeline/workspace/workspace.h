@@ -34,11 +34,19 @@ class Workspace {
   // Creates the folder if it is new, locks it, and removes temporaries of interrupted writers.
   // Throws before any work: Error(kResources) if it cannot be written or is not a folder,
   // Error(kFolderInUse), Error(kInput) if it holds files under our names that we did not write,
-  // or stage records of an older schema.
+  // links among its files (RefuseLinks), or stage records of an older schema.
   explicit Workspace(const std::string& folder, bool break_lock = false);
 
   // True if a run has worked here. Changes nothing.
   static bool Exists(const std::string& folder);
+
+  // Throws Error(kInput), which names it, for a link, a named pipe or a device among the files
+  // of a run in `folder`, which may itself be a link. Those of its styles are their own
+  // folders'.
+  static void RefuseLinks(const std::string& folder);
+  // For what only reads: RefuseLinks, and Error(kInput) for a result of these stages that is
+  // not what was recorded. Stages without a record are not checked.
+  static void CheckResults(const std::string& folder, const std::vector<std::string>& stages);
 
   const std::string& folder() const { return folder_; }
   std::string Path(const std::string& relative) const { return folder_ + "/" + relative; }

@@ -24,8 +24,8 @@ constexpr std::pair<const char*, const char*> kRenamed[] = {
     {"BundleAdjustment.function_tolerance", "BundleAdjustmentCeres.function_tolerance"},
 };
 
-// COLMAP's Qt aborts without a display. Its log files would otherwise remain in the system's
-// temporary folder.
+// COLMAP's Qt aborts without a display. Its log files go to its TMPDIR, whatever the flags of
+// its log say.
 const std::vector<std::pair<std::string, std::string>> kEnvironment = {
     {"QT_QPA_PLATFORM", "offscreen"}, {"GLOG_logtostderr", "1"}};
 
@@ -61,8 +61,10 @@ ColmapProgram::ColmapProgram(const std::string& program, const std::string& log_
                              const std::string& gpu)
     : program_(program.find('/') == std::string::npos ? program : Absolute(program)),
       log_folder_(log_folder) {
-  ChildOptions options{
-      .argv = {program_, "help"}, .environment = kEnvironment, .wall_limit_s = 60};
+  ChildOptions options{.argv = {program_, "help"},
+                       .environment = kEnvironment,
+                       .temporary_parent = log_folder_,
+                       .wall_limit_s = 60};
   options.log_path = LogPath("help");
   int major = 0, minor = 0;
   bool found = false, has_cuda = false;
@@ -117,6 +119,8 @@ ChildResult ColmapProgram::RunOnce(const std::string& command, const ColmapArgum
   ChildOptions options;
   options.argv = CommandLine(command, arguments);
   options.environment = kEnvironment;
+  options.temporary_parent =
+      log_folder_;  // what a killed run leaves there, the next one removes
   options.wall_limit_s = limits.wall_s;
   options.quiet_limit_s = limits.quiet_s;
   options.log_path = LogPath(log_name);
@@ -146,8 +150,10 @@ const std::set<std::string>& ColmapProgram::OptionsOf(const std::string& command
   const auto it = options_.find(command);
   if (it != options_.end()) return it->second;
   std::set<std::string>& names = options_[command];
-  ChildOptions options{
-      .argv = {program_, command, "-h"}, .environment = kEnvironment, .wall_limit_s = 60};
+  ChildOptions options{.argv = {program_, command, "-h"},
+                       .environment = kEnvironment,
+                       .temporary_parent = log_folder_,
+                       .wall_limit_s = 60};
   RunChild(options, [&](const std::string& line) {
     const size_t begin = line.find("--");
     if (begin == std::string::npos) return;

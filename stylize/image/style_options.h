@@ -36,7 +36,9 @@ struct StyleOptions {
               "WCT, WCT2, CCPL or CAP-VSTNet in DIR (stylize/README.md); folder:DIR takes "
               "photos that another program styled, by the photos' names, some may be missing; "
               "command:\"PROGRAM {input} {style} {output}\" runs a program for each view, "
-              "without a shell"});
+              "without a shell",
+          .runs = "command:|onnx:",
+          .reads = "folder:"});
     bind("scene-wide", scene_wide,
          {.help =
               "estimates one colour map from all views, instead of one for each view: frames "

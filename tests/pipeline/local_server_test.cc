@@ -3,13 +3,20 @@
 #include "pipeline/view/local_server.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <atomic>
 #include <chrono>
+#include <filesystem>
 #include <memory>
+#include <new>
+#include <stdexcept>
+#include <system_error>
 #include <thread>
+#include <utility>
 #include <vector>
 
+#include "tests/support/expect_error.h"
 #include "tests/support/hostile_requests.h"
 #include "tests/support/loopback.h"
 
@@ -41,7 +48,9 @@ struct Reached {
 // A server on a thread of its own.
 class Running {
  public:
-  explicit Running(Reached* reached) : server_(reached->Routes(), std::string(64, 'a')) {
+  explicit Running(Reached* reached) : Running(reached->Routes()) {}
+  explicit Running(std::vector<Route> routes)
+      : server_(std::move(routes), std::string(64, 'a')) {
     thread_ = std::thread([this] { server_.Run([this] { return !stop_; }); });
   }
   ~Running() {
@@ -145,6 +154,78 @@ TEST(LocalServer, F96_OfAHundredConnectionsAFewAreHeldAndItGoesOn) {
   }
   EXPECT_EQ(StatusOf(page), 200);
   EXPECT_EQ(reached.times, 1);
+}
+
+// A route, the name of a kind of failure, that throws `thrown`.
+template <typename T>
+Route Throwing(const std::string& target, const T& thrown) {
+  return {"GET", target, 0, true,
+          [thrown](const HttpRequest&) -> HttpResponse { throw thrown; }};
+}
+
+TEST(LocalServer, WhatARouteThrowsIsAnAnswerAndTheServerGoesOn) {
+  Reached reached;
+  std::vector<Route> routes = reached.Routes();
+  const std::vector<std::pair<Route, int>> failures = {
+      {Throwing("/input", InputError("bad", "a.png")), 422},
+      {Throwing("/resources", ResourceError("full", "a.png")), 507},
+      {Throwing("/disk", std::filesystem::filesystem_error(
+                             "write", std::make_error_code(std::errc::no_space_on_device))),
+       507},
+      {Throwing("/loop",
+                std::filesystem::filesystem_error(
+                    "status", std::make_error_code(std::errc::too_many_symbolic_link_levels))),
+       500},
+      {Throwing("/memory", std::bad_alloc()), 500},
+      {Throwing("/length", std::length_error("too long")), 500},
+      {Throwing("/number", 7), 500}};
+  for (const auto& [route, status] : failures) routes.push_back(route);
+  const Running server(routes);
+  for (const auto& [route, status] : failures)
+    EXPECT_EQ(StatusOf(server.Ask(PlainRequest("GET", route.target, server.port(), ""))),
+              status)
+        << route.target;
+  EXPECT_EQ(StatusOf(server.Ask(PlainRequest("GET", "/", server.port(), ""))), 200);
+}
+
+TEST(LocalServer, ABodyEndsWhereItsLengthSays) {
+  Reached reached;
+  const Running server(&reached);
+  const std::string token(64, 'a');
+  const std::string first =
+      PlainRequest("POST", "/style", server.port(), token, "Expect: 100-continue\r\n", "abc");
+  const std::string answer =
+      server.Ask(first + PlainRequest("GET", "/page", server.port(), token));
+  EXPECT_EQ(BodyOf(answer), "reached abc");  // and nothing of a second request
+  EXPECT_EQ(reached.times, 1);
+}
+
+TEST(LocalServer, WhatIsAskedToKeepGoingMayEndIt) {
+  Reached reached;
+  LocalServer server(reached.Routes(), std::string(64, 'a'));
+  EXPECT_REGRADE_ERROR(server.Run([]() -> bool { throw ResourceError("it is gone"); }),
+                       ExitCode::kResources, "it is gone");
+}
+
+TEST(LocalServer, GoesOnOnceThereAreFilesAgain) {
+  Reached reached;
+  LocalServer server(reached.Routes(), std::string(64, 'a'));
+  const Loopback client(server.port());  // waits to be accepted
+  client.Send(PlainRequest("GET", "/", server.port(), ""));
+  rlimit before;
+  ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &before), 0);
+  rlimit none = before;
+  none.rlim_cur = 0;
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &none), 0);
+  int asked = 0;
+  server.Run([&] {
+    if (++asked == 3) {
+      EXPECT_EQ(reached.times, 0);
+      ::setrlimit(RLIMIT_NOFILE, &before);
+    }
+    return asked < 6;
+  });
+  EXPECT_EQ(StatusOf(client.Receive()), 200);
 }
 
 TEST(LocalServer, F96_TokensHave256BitsAndDiffer) {

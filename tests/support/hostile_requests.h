@@ -18,6 +18,12 @@ inline std::string PlainRequest(const std::string& method, const std::string& ta
                 body);
 }
 
+inline std::string ManyLines(int count) {
+  std::string lines;
+  for (int i = 0; i < count; ++i) lines += "A: b\r\n";
+  return lines;
+}
+
 struct HostileRequest {
   std::string name;
   int status;
@@ -82,13 +88,25 @@ inline std::vector<HostileRequest> HostileRequests(int port, const std::string& 
       {"a question about other origins", 401,
        PlainRequest("OPTIONS", "/style", port, "", "Access-Control-Request-Method: POST\r\n")},
       {"a body where there is none", 413, get("/page", "Content-Length: 5\r\n") + "12345"},
-      {"a chunk where there is none", 413,
+      {"a chunk where there is none", 501,
        get("/page", "Transfer-Encoding: chunked\r\n") + "1\r\nx\r\n0\r\n\r\n"},
+      {"a trailer of 70 kB", 501,
+       PlainRequest("GET", "/", port, "", "Transfer-Encoding: chunked\r\n") +
+           "0\r\nX: " + std::string(70000, 'a') + "\r\n\r\n"},
+      {"an extension of a chunk without end", 501,
+       PlainRequest("POST", "/style", port, token, "Transfer-Encoding: chunked\r\n") +
+           "1;x=" + std::string(2 << 20, 'a')},
+      {"a compressed body", 501,
+       PlainRequest("POST", "/style", port, token, "Transfer-Encoding: gzip\r\n")},
       {"a body of 1 GB", 413,
        PlainRequest("POST", "/style", port, token, "Content-Length: 1000000000\r\n")},
       {"a body of 2^64 bytes", 400,
        PlainRequest("POST", "/style", port, token, "Content-Length: 18446744073709551616\r\n")},
-      {"a chunk of 1 GB", 413,
+      {"a negative length", 400,
+       PlainRequest("POST", "/style", port, token, "Content-Length: -1\r\n")},
+      {"a length that is no number", 400,
+       PlainRequest("POST", "/style", port, token, "Content-Length: 1e2\r\n")},
+      {"a chunk of 1 GB", 501,
        PlainRequest("POST", "/style", port, token, "Transfer-Encoding: chunked\r\n") +
            "3b9aca00\r\n" + std::string(2000, 'x')},
       {"two lengths", 400,
@@ -100,6 +118,8 @@ inline std::vector<HostileRequest> HostileRequests(int port, const std::string& 
                     "Content-Length: 3\r\nTransfer-Encoding: chunked\r\n") +
            "abc"},
       {"a header of 1 MB", 431, get("/page", "X: " + std::string(1 << 20, 'x') + "\r\n")},
+      {"a header of 4000 lines", 431, get("/page", ManyLines(4000))},
+      {"a header without end", 431, get("/page").substr(0, 40) + std::string(1 << 20, 'x')},
       {"a line that is folded", 400, get("/page", "Host: x\n y\r\n")},
       {"an older version", 505, "GET /page HTTP/1.0\r\n\r\n"},
       {"another protocol", 400,

@@ -1,0 +1,56 @@
+#include "pipeline/files/own_files.h"
+
+#include <filesystem>
+
+#include "kernels/base/error.h"
+
+namespace regrade {
+namespace {
+
+namespace fs = std::filesystem;
+
+void Refuse(const std::string& path, fs::file_type type, const std::error_code& error) {
+  const char* what = nullptr;
+  switch (type) {
+    case fs::file_type::not_found:
+    case fs::file_type::regular:
+    case fs::file_type::directory:
+      return;
+    case fs::file_type::symlink:
+      what = "is a link: files of a run are not looked for elsewhere";
+      break;
+    case fs::file_type::fifo:
+      what = "is a named pipe, not a file";
+      break;
+    case fs::file_type::socket:
+      what = "is a socket, not a file";
+      break;
+    case fs::file_type::none:
+      throw ResourceError("cannot look at it: " + error.message(), path);
+    default:
+      what = "is a device, not a file";
+  }
+  throw InputError(what, path, "remove it, or put the file or folder itself in its place");
+}
+
+}  // namespace
+
+void RefuseForeign(const std::string& path) {
+  std::error_code error;
+  const fs::file_type type = fs::symlink_status(path, error).type();
+  Refuse(path, type, error);
+}
+
+void RefuseForeignBelow(const std::string& path) {
+  RefuseForeign(path);
+  std::error_code error;
+  if (!fs::is_directory(fs::symlink_status(path, error))) return;
+  for (fs::recursive_directory_iterator it(path, error), end; !error && it != end;
+       it.increment(error)) {
+    std::error_code of_entry;
+    Refuse(it->path().string(), it->symlink_status(of_entry).type(), of_entry);
+  }
+  if (error) throw ResourceError("cannot list the folder: " + error.message(), path);
+}
+
+}  // namespace regrade
