@@ -290,13 +290,13 @@ struct EvaluateReport {
   std::string comparison_note;
   // Styled frames against the 2D method on the photos; of an edit of single photos, on these.
   Metric psnr_to_2d_photos_db;
-  // Of such an edit: the share of the measured pixels that these photos see. What they do not
-  // see is in no fidelity.
-  std::optional<double> edit_seen = {};
   Metric linear_map_psnr_to_2d_db;  // of the better of two linear colour maps
   // Of renders without style to the photos, as those of ReconstructReport; where a network was
   // given.
   std::optional<double> lpips_heldout = {}, lpips_train = {};
+  // Of an edit of single photos: the share of the measured pixels that these photos see. What
+  // they do not see is in no fidelity.
+  std::optional<double> edit_seen = {};
 
   template <typename Visit>
   void Describe(Visit& visit) {
