@@ -9,7 +9,9 @@
 #include "kernels/base/error.h"
 #include "pipeline/capture/given_models.h"
 #include "pipeline/capture/nsvf_cameras.h"
+#include "pipeline/capture/posed_orientation.h"
 #include "pipeline/files/json_file.h"
+#include "reconstruct/colmap/far_cameras.h"
 #include "reconstruct/colmap/resized_model.h"
 
 namespace regrade {
@@ -29,6 +31,20 @@ void NoteMissing(const std::vector<PhotoStatus>& statuses, std::vector<std::stri
   if (count > 0)
     notes->push_back(Concat("the pictures of ", count, " poses are missing: ", first,
                             (count > 1 ? " and others" : "")));
+}
+
+// Says of photos that they are left out for their camera.
+void NameFarCameras(const std::vector<FarCamera>& far, const std::vector<StagedPhoto>& photos,
+                    std::vector<PhotoStatus>* statuses, std::vector<std::string>* notes) {
+  for (const FarCamera& camera : far)
+    for (const StagedPhoto& photo : photos) {
+      if (photo.name != camera.image) continue;
+      const std::string why =
+          Format("its camera is %.3g times as far from the middle as the others", camera.times);
+      for (PhotoStatus& status : *statuses)
+        if (status.file == photo.file) status.why = why;
+      notes->push_back(photo.file + ": left out, " + why);
+    }
 }
 
 JsonValue StatusesJson(const std::vector<PhotoStatus>& statuses) {
@@ -95,9 +111,10 @@ JsonValue KnownBesideModel(const CaptureSource& posed) {
   return known;
 }
 
-Capture ImportPoses(const CaptureSource& source, const std::vector<StagedPhoto>& photos,
+Capture ImportPoses(const CaptureSource& source, std::vector<StagedPhoto>* staged,
                     const std::vector<PhotoStatus>& statuses, const std::string& sparse_folder,
                     std::vector<std::string>* notes) {
+  std::vector<StagedPhoto>& photos = *staged;
   ColmapModel model;
   double nearest_depth = 0;
   std::vector<std::string> missing;
@@ -105,7 +122,7 @@ Capture ImportPoses(const CaptureSource& source, const std::vector<StagedPhoto>&
   std::optional<WorldBox> box;
   if (!source.box.empty()) box = ReadNsvfBox(source.box);
   if (LacksPoints(source.kind)) {
-    model = ModelOfPoses(source, photos, &nearest_depth, &missing);
+    model = ModelOfPoses(source, AsStored(photos), &nearest_depth, &missing);
   } else {
     model = ReadColmapModel(source.poses);
     if (source.kind == CaptureKind::kPosed) {
@@ -124,6 +141,9 @@ Capture ImportPoses(const CaptureSource& source, const std::vector<StagedPhoto>&
       else if (!image.name.starts_with(kAbsent))
         image.name = kAbsent + image.name;
   }
+  if (const std::string turned = MatchOrientations(&model, &photos); !turned.empty())
+    notes->push_back(turned);
+  const std::vector<FarCamera> far = TakeOutFarCameras(&model);
   if (const int resized = ResizeToPhotos(photos, &model); resized > 0)
     notes->push_back(
         std::to_string(resized) +
@@ -140,6 +160,7 @@ Capture ImportPoses(const CaptureSource& source, const std::vector<StagedPhoto>&
       missing.push_back(photo.file.substr(std::string(kAbsent).size()));
     else
       posed.push_back(photo);
+  NameFarCameras(far, photos, &posed, notes);
   capture.statuses = MergeStatuses(statuses, posed);
   for (const std::string& file : missing)
     capture.statuses.push_back({file, PhotoState::kSkipped, kNoPicture});
