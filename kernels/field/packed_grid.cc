@@ -118,7 +118,7 @@ void RefreshDerived(FastGrid* grid) {
   const Vec3i n = frame.resolution;
   const int lanes = grid->lanes();
   const int64_t voxels = grid->records.size() / lanes;
-  if (grid->cells().on()) {
+  if (grid->links.size() == 0) {  // of cells, of which there may be none
     grid->vertex_density = Buffer<float>(voxels);
     for (int64_t v = 0; v < voxels; ++v)
       grid->vertex_density[v] = grid->records[v * lanes + DensityLane(grid->basis)];

@@ -219,7 +219,7 @@ std::string ChildResult::Describe() const {
 
 std::string ChildResult::LastLines() const {
   std::string text;
-  for (const std::string& line : last_lines) text += (text.empty() ? "" : "\n") + line;
+  for (const std::string& line : last_lines) text += "\n  " + line;
   return text;
 }
 

@@ -38,7 +38,7 @@ struct ChildResult {
   bool Succeeded() const { return end == ChildEnd::kExited && exit_status == 0; }
   bool TimedOut() const { return end == ChildEnd::kWallLimit || end == ChildEnd::kQuietLimit; }
   std::string Describe() const;   // "exit status 1", "killed by signal 9 (Killed)", ...
-  std::string LastLines() const;  // joined by newlines
+  std::string LastLines() const;  // each after a newline and two spaces
 };
 
 // Gets one line without its newline; lines above 4096 bytes come in pieces. Both callbacks run

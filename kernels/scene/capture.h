@@ -23,6 +23,7 @@ struct StagedPhoto {
   double exif_focal_px = 0;  // focal length in pixels from EXIF; 0 where unknown
   int bits = 8;              // of a value in the PNG: 8 or 16
   int clip = -1;             // index of the film that it is a frame of; -1: a photo
+  int orientation = 1;       // of EXIF, 1..8: how the file's pixels were turned
 };
 
 // A registered photo. `name` is the staged name ("00007.png"); `file` the user's.
@@ -67,20 +68,13 @@ struct Capture {
 };
 
 // Whether the poses name photos for tests, and others.
-inline bool HasTestSplit(const Capture& capture) {
-  size_t test = 0;
-  for (const CaptureView& view : capture.views) test += view.test;
-  return test > 0 && test < capture.views.size();
-}
+bool HasTestSplit(const Capture& capture);
 
-// [views]: true for held-out views. These are the test photos where the poses name some, or
-// else every `holdout`-th in order, starting with the first; holdout 0 keeps none.
-inline std::vector<bool> HeldOutViews(const Capture& capture, int holdout) {
-  std::vector<bool> held_out(capture.views.size(), false);
-  const bool split = HasTestSplit(capture);
-  for (size_t i = 0; i < held_out.size() && holdout > 0; ++i)
-    held_out[i] = split ? capture.views[i].test : i % static_cast<size_t>(holdout) == 0;
-  return held_out;
-}
+// [views]: true for held-out views. These are the test photos where the poses name some. Else
+// they are every `holdout`-th in order, starting with the first, where photos from one place
+// (twins: two files of one shot, a burst) count as one and are held out together, so that none
+// is fitted that shows what a held-out one does. A place that would leave less than half of the
+// photos, or less than two, is passed over. holdout 0 keeps none.
+std::vector<bool> HeldOutViews(const Capture& capture, int holdout);
 
 }  // namespace regrade

@@ -10,7 +10,9 @@
 #include "pipeline/capture/given_models.h"
 #include "pipeline/capture/name_index.h"
 #include "pipeline/capture/nsvf_cameras.h"
+#include "pipeline/capture/posed_orientation.h"
 #include "pipeline/files/json_file.h"
+#include "reconstruct/colmap/far_cameras.h"
 #include "reconstruct/colmap/resized_model.h"
 
 namespace regrade {
@@ -79,6 +81,20 @@ void UseStagedNames(const CaptureSource& source, const std::vector<StagedPhoto>&
       source.poses, "names are relative to " + source.photos);
 }
 
+// Says of photos that they are left out for their camera.
+void NameFarCameras(const std::vector<FarCamera>& far, const std::vector<StagedPhoto>& photos,
+                    std::vector<PhotoStatus>* statuses, std::vector<std::string>* notes) {
+  for (const FarCamera& camera : far)
+    for (const StagedPhoto& photo : photos) {
+      if (photo.name != camera.image) continue;
+      const std::string why =
+          Format("its camera is %.3g times as far from the middle as the others", camera.times);
+      for (PhotoStatus& status : *statuses)
+        if (status.file == photo.file) status.why = why;
+      notes->push_back(photo.file + ": left out, " + why);
+    }
+}
+
 JsonValue StatusesJson(const std::vector<PhotoStatus>& statuses) {
   JsonValue::Array array;
   for (const PhotoStatus& photo : statuses)
@@ -143,9 +159,10 @@ JsonValue KnownBesideModel(const CaptureSource& posed) {
   return known;
 }
 
-Capture ImportPoses(const CaptureSource& source, const std::vector<StagedPhoto>& photos,
+Capture ImportPoses(const CaptureSource& source, std::vector<StagedPhoto>* staged,
                     const std::vector<PhotoStatus>& statuses, const std::string& sparse_folder,
                     std::vector<std::string>* notes) {
+  std::vector<StagedPhoto>& photos = *staged;
   ColmapModel model;
   double nearest_depth = 0;
   std::vector<std::string> missing;
@@ -153,7 +170,7 @@ Capture ImportPoses(const CaptureSource& source, const std::vector<StagedPhoto>&
   std::optional<WorldBox> box;
   if (!source.box.empty()) box = ReadNsvfBox(source.box);
   if (LacksPoints(source.kind)) {
-    model = ModelOfPoses(source, photos, &nearest_depth, &missing);
+    model = ModelOfPoses(source, AsStored(photos), &nearest_depth, &missing);
   } else {
     model = ReadColmapModel(source.poses);
     if (source.kind == CaptureKind::kPosed) {
@@ -164,6 +181,9 @@ Capture ImportPoses(const CaptureSource& source, const std::vector<StagedPhoto>&
     }
     UseStagedNames(source, photos, &model, notes);
   }
+  if (const std::string turned = MatchOrientations(&model, &photos); !turned.empty())
+    notes->push_back(turned);
+  const std::vector<FarCamera> far = TakeOutFarCameras(&model);
   if (const int resized = ResizeToPhotos(photos, &model); resized > 0)
     notes->push_back(
         std::to_string(resized) +
@@ -180,6 +200,7 @@ Capture ImportPoses(const CaptureSource& source, const std::vector<StagedPhoto>&
       missing.push_back(photo.file.substr(std::string(kAbsent).size()));
     else
       posed.push_back(photo);
+  NameFarCameras(far, photos, &posed, notes);
   capture.statuses = MergeStatuses(statuses, posed);
   for (const std::string& file : missing)
     capture.statuses.push_back({file, PhotoState::kSkipped, kNoPicture});

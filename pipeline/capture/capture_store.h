@@ -15,9 +15,11 @@ namespace regrade {
 JsonValue KnownBesideModel(const CaptureSource& posed);
 
 // Reads given poses of the staged photos and writes the model to `sparse_folder`. Photos that
-// were resampled since get cameras of their size. `notes`: sentences for the user. Throws
-// Error(kInput) if photos and poses do not fit each other.
-Capture ImportPoses(const CaptureSource& source, const std::vector<StagedPhoto>& photos,
+// were resampled since get cameras of their size; EXIF orientation is matched, which may stage
+// photos again (posed_orientation.h). Cameras that are impossibly far away (far_cameras.h) are
+// left out. `notes`: sentences for the user. Throws Error(kInput) if photos and poses do not
+// fit each other.
+Capture ImportPoses(const CaptureSource& source, std::vector<StagedPhoto>* staged,
                     const std::vector<PhotoStatus>& statuses, const std::string& sparse_folder,
                     std::vector<std::string>* notes);
 

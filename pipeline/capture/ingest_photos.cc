@@ -14,6 +14,7 @@
 #include "pipeline/capture/clip_frames.h"
 #include "pipeline/capture/ingest_summary.h"
 #include "pipeline/capture/input_files.h"
+#include "pipeline/capture/repeated_shots.h"
 #include "pipeline/capture/staged_files.h"
 #include "pipeline/files/text.h"
 #include "pipeline/images/image_file.h"
@@ -35,13 +36,15 @@ constexpr double kSurveyWeight = 0.6;
 // A photo, or why there is none.
 struct Candidate {
   DecodedPhoto photo;
-  Image rgb;  // over white
+  Image rgb;   // over white
+  Image look;  // see ShotLook
   uint64_t pixel_hash = 0;
   std::string problem;
 
   void Complete() {
     pixel_hash = PixelHash8(photo.image);
     rgb = CompositeOnWhite(photo.image);
+    look = LookOf(rgb);
   }
 };
 
@@ -115,7 +118,8 @@ class Ingest {
     ProgressParts parts(progress, photos + films);
     if (clips > 0) SurveyClips(parts.Next(kSurveyWeight * films));
     StageAll(clips > 0 ? parts.Next(photos + (1 - kSurveyWeight) * films) : progress);
-    DropThumbnails();
+    Drop(Thumbnails());
+    if (options_.one_a_shot) Drop(Repeated());
     Finish();
     return std::move(result_);
   }
@@ -238,26 +242,54 @@ class Ingest {
     notices_.AddColors(candidate.photo.colors, candidate.photo.clipped, item.name);
     result_.statuses.push_back({item.name, PhotoState::kUsed, notice});
     result_.photos.push_back({item.name, name, path, candidate.rgb.width, candidate.rgb.height,
-                              candidate.photo.exif_focal_px, bits, item.clip});
+                              candidate.photo.exif_focal_px, bits, item.clip,
+                              candidate.photo.orientation});
+    looks_.push_back({item.name, candidate.rgb.width, candidate.rgb.height,
+                      candidate.photo.bits, candidate.photo.taken, candidate.photo.light,
+                      candidate.look});
     hashes_.push_back(candidate.pixel_hash);
   }
 
   // Only all sizes together show which photos are thumbnails of others.
-  void DropThumbnails() {
+  std::vector<LeftShot> Thumbnails() const {
     std::vector<int> sides;
     for (const StagedPhoto& photo : result_.photos)
       if (photo.clip < 0) sides.push_back(std::max(photo.width, photo.height));
     const double limit = kThumbnail * Quantile(sides, kLargerPhotos);
+    std::vector<LeftShot> left(result_.photos.size());
+    for (size_t i = 0; i < left.size(); ++i) {
+      const StagedPhoto& photo = result_.photos[i];
+      if (photo.clip < 0 && std::max(photo.width, photo.height) < limit)
+        left[i] = {"thumbnail", Concat("a thumbnail: ", photo.width, " x ", photo.height)};
+    }
+    return left;
+  }
+
+  std::vector<LeftShot> Repeated() const {
+    std::vector<ShotLook> stills;
+    std::vector<size_t> index;
+    for (size_t i = 0; i < result_.photos.size(); ++i)
+      if (result_.photos[i].clip < 0) {
+        stills.push_back(looks_[i]);
+        index.push_back(i);
+      }
+    std::vector<LeftShot> left(result_.photos.size());
+    const std::vector<LeftShot> of_stills = RepeatedShots(stills);
+    for (size_t s = 0; s < index.size(); ++s) left[index[s]] = of_stills[s];
+    return left;
+  }
+
+  void Drop(const std::vector<LeftShot>& left) {
     const std::vector<StagedPhoto> all = std::move(result_.photos);
     result_.photos.clear();
     for (size_t i = 0; i < all.size(); ++i) {
       StagedPhoto photo = all[i];
       const size_t index = result_.photos.size();
-      if (photo.clip < 0 && std::max(photo.width, photo.height) < limit) {
-        const std::string why = Concat("a thumbnail: ", photo.width, " x ", photo.height);
+      if (!left[i].as.empty()) {
         for (PhotoStatus& status : result_.statuses)
-          if (status.file == photo.file) status = {photo.file, PhotoState::kSkipped, why};
-        ++left_["thumbnail"];
+          if (status.file == photo.file)
+            status = {photo.file, PhotoState::kSkipped, left[i].why};
+        ++left_[left[i].as];
         continue;
       }
       if (index != i) {
@@ -266,6 +298,7 @@ class Ingest {
         photo.path = staging_ + "/" + photo.name;
         hashes_[index] = hashes_[i];
         has_alpha_[index] = has_alpha_[i];
+        looks_[index] = looks_[i];
       }
       result_.photos.push_back(photo);
     }
@@ -299,6 +332,7 @@ class Ingest {
   IngestResult result_;
   std::vector<uint64_t> hashes_;  // of the photos' pixels
   std::vector<bool> has_alpha_;
+  std::vector<ShotLook> looks_;
   std::unordered_map<uint64_t, std::string> file_of_pixels_;
   std::map<std::string, int> left_;  // by what they are
   IngestNotices notices_;

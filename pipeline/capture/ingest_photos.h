@@ -19,8 +19,11 @@ struct IngestOptions {
   bool accept_damaged = false;
   int64_t max_megapixels = 128;
   int video_frames = 0;
-  // See ListInputs. These have no flags.
+  // What follows has no flags.
   bool take_clips = true;  // films; they have no given poses
+  // Leaves out repeated shots (repeated_shots.h): not where poses decide.
+  bool one_a_shot = true;
+  // See ListInputs.
   std::set<std::string> only;
   std::vector<std::string> not_photos;
 
@@ -57,12 +60,12 @@ struct IngestResult {
 // channel where the file has more than 8, else with 8. A photo with alpha is composited on
 // white; its alpha is written as 00007.alpha.png. Of films, frames are picked (clip_frames.h);
 // they count as photos of their own, "CLIP.mp4/003.250s.png". Files that are no photo
-// (input_files.h), damaged, the same picture (in 8 bits) as an earlier one, or less than a
-// quarter as large as most (thumbnails) are left out, with a status that says why. Staged files
-// of an earlier call that are not of this one are deleted; those that already hold the right
-// pixels are not written again. Three photos are in memory at a time. Throws Error(kInput) when
-// there is no usable photo, Error(kScene) for 1 or 2, Error(kResources) when a disk fails,
-// Interrupted.
+// (input_files.h), damaged, the same picture (in 8 bits) as an earlier one, less than a
+// quarter as large as most (thumbnails), or repeated shots (repeated_shots.h) are left out,
+// with a status that says why. Staged files of an earlier call that are not of this one are
+// deleted; those that already hold the right pixels are not written again. Three photos are in
+// memory at a time. Throws Error(kInput) when there is no usable photo, Error(kScene) for 1 or
+// 2, Error(kResources) when a disk fails, Interrupted.
 IngestResult IngestPhotos(const std::string& source, const std::string& staging_folder,
                           const IngestOptions& options, const ProgressFunction& progress);
 

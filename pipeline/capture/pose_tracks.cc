@@ -67,8 +67,8 @@ PoseTracks AddTracks(const PoseOptions& options, const std::string& effects,
         TracksForPoses(ReadColmapModel(sparse_folder), photos, options, work_folder, progress);
   } catch (const Error& error) {
     if (error.code() != ExitCode::kExternalProgram) throw;
-    result.note =
-        "COLMAP found no tracks for the poses: " + error.what_failed() + "." + kWithoutPoints;
+    result.note = std::string("COLMAP found no tracks for the poses.") + kWithoutPoints + ": " +
+                  error.what_failed();
     result.metrics = JsonValue::Object{{"points", 0}, {"failed", error.what_failed()}};
     return result;
   }

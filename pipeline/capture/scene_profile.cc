@@ -9,6 +9,7 @@
 #include "pipeline/images/image_file.h"
 #include "pipeline/workspace/metrics_json.h"
 #include "reconstruct/scene/forward_facing.h"
+#include "reconstruct/scene/scene_checks.h"
 #include "reconstruct/scene/visual_hull.h"
 
 namespace regrade {
@@ -160,14 +161,15 @@ SceneProfile ProfileScene(const Capture& capture, int sh_degree, const std::stri
   const double clear = TransparentFraction(silhouettes);
   const bool alpha = decided("alpha", clear > kAlphaFraction);
 
-  const ForwardFacing forward = MeasureForwardFacing(capture);
+  const Capture sure = WithParallax(capture);
+  const ForwardFacing forward = MeasureForwardFacing(sure);
   const bool ndc = decided("ndc", forward.on && !alpha);
   profile.effects.push_back(Row("ndc", ndc, forward.angle_deg, kForwardAngle,
                                 "forward-facing cameras: largest angle of an optical axis "
                                 "to their mean, degrees"));
   profile.effects.push_back(Row("alpha", alpha, clear, kAlphaFraction,
                                 "fraction of transparent pixels, if every photo has some"));
-  const Surroundings surroundings = MeasureSurroundings(capture, box.camera_range);
+  const Surroundings surroundings = MeasureSurroundings(sure, box.camera_range);
   const bool background =
       decided("background", surroundings.far_fraction > kFarFraction && !ndc && !alpha);
   if (background && (ndc || alpha))
@@ -182,9 +184,9 @@ SceneProfile ProfileScene(const Capture& capture, int sh_degree, const std::stri
                                 "degree of the fit's spherical harmonics, as set"));
 
   const bool cube = !ndc && box.camera_range > 0;
-  profile.scene = ndc                  ? NormalizeForwardFacing(capture, forward, box.margin)
-                  : background || cube ? NormalizeSurrounded(capture, surroundings)
-                                       : NormalizeScene(capture);
+  profile.scene = ndc                  ? NormalizeForwardFacing(sure, forward, box.margin)
+                  : background || cube ? NormalizeSurrounded(sure, surroundings)
+                                       : NormalizeScene(sure);
   profile.scene.box.spheres = background;
   if (alpha && !silhouettes.empty()) {
     if (!ndc && !cube) profile.scene = TightenToSilhouettes(profile.scene, silhouettes);

@@ -38,6 +38,19 @@ std::string Printable(std::string_view text) {
   return result;
 }
 
+std::string PrintableLines(std::string_view text) {
+  constexpr std::string_view kBreak = "\n  ";
+  std::string result;
+  for (size_t begin = 0; begin <= text.size();) {
+    const size_t end = std::min(text.find(kBreak, begin), text.size());
+    result += Printable(text.substr(begin, end - begin));
+    if (end == text.size()) break;
+    result += kBreak;
+    begin = end + kBreak.size();
+  }
+  return result;
+}
+
 std::string DurationText(double seconds) {
   const long long whole = std::llround(std::min(seconds, 1e15));
   if (whole >= 3600) return Format("%lld h %02lld min", whole / 3600, whole / 60 % 60);

@@ -19,6 +19,9 @@ CodePoint FirstCodePoint(std::string_view text);
 // The text with control characters and invalid UTF-8 written as \xNN, so that a file name
 // cannot steer a terminal.
 std::string Printable(std::string_view text);
+// The same, with line breaks kept where two spaces follow: lists and other programs' output
+// are indented so.
+std::string PrintableLines(std::string_view text);
 
 // "2 h 03 min", "4 min 12 s", "8 s".
 std::string DurationText(double seconds);

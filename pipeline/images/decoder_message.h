@@ -82,9 +82,9 @@ inline void PutPicture(const StoredPicture& picture, MessageWriter* message) {
   for (const int value : {picture.bits, picture.orientation}) message->Put(value);
   for (const double value :
        {picture.focal_mm, picture.focal_35mm, picture.focal_plane_px_per_mm, picture.exif_width,
-        picture.clipped})
+        picture.clipped, picture.light})
     message->Put(value);
-  message->PutText(picture.colors);
+  for (const std::string& text : {picture.colors, picture.taken}) message->PutText(text);
   message->Put<uint64_t>(picture.notices.size());
   for (const std::string& notice : picture.notices) message->PutText(notice);
   PutSize(picture.image, message);
@@ -93,9 +93,9 @@ inline StoredPicture TakePicture(MessageReader* message) {
   StoredPicture picture;
   for (int* value : {&picture.bits, &picture.orientation}) *value = message->Take<int>();
   for (double* value : {&picture.focal_mm, &picture.focal_35mm, &picture.focal_plane_px_per_mm,
-                        &picture.exif_width, &picture.clipped})
+                        &picture.exif_width, &picture.clipped, &picture.light})
     *value = message->Take<double>();
-  picture.colors = message->TakeText();
+  for (std::string* text : {&picture.colors, &picture.taken}) *text = message->TakeText();
   for (uint64_t left = message->Take<uint64_t>(); left > 0; --left)
     picture.notices.push_back(message->TakeText());
   picture.image = TakeSize(message);

@@ -69,6 +69,9 @@ DecodedPhoto DecodePhoto(const std::string& path, const DecodeLimits& limits) {
   DecodedPhoto photo;
   photo.exif_focal_px = FocalInPixels(stored);
   photo.bits = stored.bits;
+  photo.orientation = stored.orientation;
+  photo.taken = stored.taken;
+  photo.light = stored.light;
   photo.notice = Join(stored.notices, "; ");
   photo.colors = stored.colors;
   photo.clipped = stored.clipped;

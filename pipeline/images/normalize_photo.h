@@ -15,6 +15,8 @@ struct StoredPicture {
   Image image;                      // 1, 3 or 4 channels
   int bits = 8;                     // per value in the file; 32 means floating point
   int orientation = 1;              // EXIF, 1..8
+  std::string taken;                // EXIF DateTimeOriginal with its fraction of a second
+  double light = 0;                 // see DecodedPhoto
   bool linear_light = false;        // values are not encoded by a curve
   std::string icc;                  // the colour profile; empty if there is none
   int primaries = 0, transfer = 0;  // ITU-T H.273, if there is no profile; 0: not given

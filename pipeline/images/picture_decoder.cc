@@ -61,10 +61,28 @@ void CheckRegularFile(const std::string& path) {
   if (kind) throw InputError(std::string(kind) + ", not a picture file", path);
 }
 
+// Seconds times sensitivity over the square of the f-number, which is 1 where it is not given.
+double LightOf(const OIIO::ImageSpec& spec) {
+  const auto number = [&spec](std::initializer_list<const char*> names) {
+    for (const char* name : names)
+      if (const float value = spec.get_float_attribute(name); value > 0) return value;
+    return 1.0f;
+  };
+  const float seconds = spec.get_float_attribute("ExposureTime");
+  const float sensitivity =
+      number({"Exif:PhotographicSensitivity", "Exif:ISOSpeedRatings", "Exif:ISOSpeed"});
+  const float stop = number({"FNumber"});
+  return seconds > 0 ? double{seconds} * sensitivity / (double{stop} * stop) : 0;
+}
+
 // Metadata under OpenImageIO's names.
 void TakeMetadata(const OIIO::ImageSpec& spec, StoredPicture* picture) {
   const int orientation = spec.get_int_attribute("Orientation", 1);
   picture->orientation = orientation >= 1 && orientation <= 8 ? orientation : 1;
+  picture->taken = spec.get_string_attribute("Exif:DateTimeOriginal");
+  const std::string fraction = spec.get_string_attribute("Exif:SubsecTimeOriginal");
+  if (!picture->taken.empty() && !fraction.empty()) picture->taken += "." + fraction;
+  picture->light = LightOf(spec);
   picture->focal_mm = spec.get_float_attribute("Exif:FocalLength");
   picture->focal_35mm = spec.get_float_attribute("Exif:FocalLengthIn35mmFilm");
   picture->exif_width = spec.get_float_attribute("Exif:PixelXDimension");

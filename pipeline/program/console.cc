@@ -29,11 +29,11 @@ void Put(std::FILE* stream, const std::string& text) {
 }  // namespace
 
 std::string MessageFor(const Error& error, const std::string& kept) {
-  std::string text = error.where().empty() ? "" : error.where() + ": ";
+  std::string text = error.where().empty() ? "" : Printable(error.where()) + ": ";
   text += error.what_failed();
   if (!error.hint().empty()) text += ". To do: " + error.hint();
   if (!kept.empty()) text += ". Kept: " + kept;
-  return Printable(text);
+  return PrintableLines(text);
 }
 
 Console::Console(bool json) : json_(json) {
@@ -65,7 +65,7 @@ void Console::Log(const char* level, const std::string& line) {
 }
 
 void Console::Say(const std::string& text, bool warning) {
-  const std::string line = Printable(text);
+  const std::string line = PrintableLines(text);
   Erase();
   const char* begin = warning && color_ ? "\033[33m" : "";
   const char* end = warning && color_ ? "\033[0m" : "";
@@ -109,7 +109,7 @@ void Console::Fail(const Error& error) { Fail(MessageFor(error, kept_), error.co
 
 void Console::Fail(const std::string& text, ExitCode code) {
   Erase();
-  const std::string line = Printable(text);
+  const std::string line = PrintableLines(text);
   Put(stderr, std::string(color_ ? "\033[31m" : "") + "regrade: " + line +
                   (color_ ? "\033[0m" : "") + "\n");
   Log("error", line);

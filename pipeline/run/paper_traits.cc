@@ -2,11 +2,12 @@
 
 #include "pipeline/capture/scene_profile.h"
 #include "reconstruct/scene/forward_facing.h"
+#include "reconstruct/scene/scene_checks.h"
 
 namespace regrade {
 
 PaperTraits TraitsOf(const Capture& capture) {
-  return {ShowsThroughPhotos(capture), MeasureForwardFacing(capture).on};
+  return {ShowsThroughPhotos(capture), MeasureForwardFacing(WithParallax(capture)).on};
 }
 
 }  // namespace regrade

@@ -52,8 +52,7 @@ class CommandStylizer : public ViewStylizer {
     options.wall_limit_s = limit_s_;
     const ChildResult result = RunChild(options);
     if (!result.Succeeded())
-      throw ProgramError("the style command failed: " + result.Describe() +
-                             (result.last_lines.empty() ? "" : "\n" + result.LastLines()),
+      throw ProgramError("the style command failed: " + result.Describe() + result.LastLines(),
                          where,
                          result.TimedOut() ? "--style-command-limit gives it longer"
                                            : "run the command by hand on one photo");

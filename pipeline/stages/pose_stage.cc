@@ -19,6 +19,8 @@
 #include "pipeline/run/run_context.h"
 #include "pipeline/stages/stages.h"
 #include "pipeline/workspace/metrics_json.h"
+#include "reconstruct/colmap/photo_statuses.h"
+#include "reconstruct/scene/given_poses.h"
 
 namespace regrade {
 namespace {
@@ -104,21 +106,33 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
   ingest_options.take_clips = source.kind == CaptureKind::kPhotos;
   ingest_options.only = source.only;
   ingest_options.not_photos = source.not_photos;
-  const IngestResult ingest =
+  ingest_options.one_a_shot = source.kind == CaptureKind::kPhotos;
+  IngestResult ingest =
       IngestPhotos(source.photos, photo_folder, ingest_options, parts.Next(seconds.ingest));
   std::vector<std::string> said = source.notes;
   if (!ingest.summary.empty()) said.push_back(ingest.summary);
   said.insert(said.end(), ingest.notices.begin(), ingest.notices.end());
   for (const std::string& notice : said) context->console->Info(notice);
-  const std::vector<StagedPhoto> colmap_photos =
-      PhotosForColmap(ingest.photos, workspace.Path(kColmapPhotos));
 
   StageOutcome outcome;
   PoseStageReport metrics;
-  metrics.notices = said;
   Capture capture;
   PoseOptions options = settings.pose;
   options.threads = settings.program.threads;
+  if (source.kind != CaptureKind::kPhotos) {
+    std::vector<std::string> notes;
+    capture = ImportPoses(source, &ingest.photos, ingest.statuses, sparse_folder, &notes);
+    for (const std::string& note : notes) context->console->Info(note);
+    said.insert(said.end(), notes.begin(), notes.end());
+    metrics.given_poses = source.poses;
+    // A run has already held its own poses to them.
+    if (source.kind != CaptureKind::kPosed)
+      RequirePoses(capture, ingest.photos, options, source.poses);
+    RequireSoundPoses(capture, source.poses);
+  }
+  metrics.notices = said;
+  const std::vector<StagedPhoto> colmap_photos =
+      PhotosForColmap(ingest.photos, workspace.Path(kColmapPhotos));
   const std::string mask_folder = workspace.Path("poses/masks");
   std::filesystem::remove_all(mask_folder);  // of an earlier run
   std::filesystem::remove(workspace.Path("poses") + "/" + kExposureFile);
@@ -152,11 +166,6 @@ StageOutcome FindPoses(RunContext* context, const CaptureSource& source,
     metrics.attempts = report.attempts;
     metrics.notices.insert(metrics.notices.end(), report.notes.begin(), report.notes.end());
     metrics.lens = report.lens;
-  } else {
-    std::vector<std::string> notes;
-    capture = ImportPoses(source, ingest.photos, ingest.statuses, sparse_folder, &notes);
-    for (const std::string& note : notes) context->console->Info(note);
-    metrics.given_poses = source.poses;
   }
   PoseTracks tracks;
   if (source.kind != CaptureKind::kPhotos)

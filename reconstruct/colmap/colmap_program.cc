@@ -81,7 +81,7 @@ ColmapProgram::ColmapProgram(const std::string& program, const std::string& log_
   }
   if (!found) {
     const std::string first =
-        result.last_lines.empty() ? "it printed nothing" : "it printed: " + result.LastLines();
+        result.last_lines.empty() ? "it printed nothing" : "it printed:" + result.LastLines();
     throw ProgramError(
         "this is not COLMAP, or it does not work (" + result.Describe() + "; " + first + ")",
         program, kInstall);
@@ -142,7 +142,7 @@ ChildResult ColmapProgram::RunOnce(const std::string& command, const ColmapArgum
 void ColmapProgram::Fail(const std::string& command, const ChildResult& result,
                          const std::string& log_name) const {
   std::string what = "colmap " + command + " failed: " + result.Describe();
-  if (!result.last_lines.empty()) what += "; its last lines were:\n" + result.LastLines();
+  if (!result.last_lines.empty()) what += "; its last lines were:" + result.LastLines();
   throw ProgramError(what, LogPath(log_name), LikelyCause(result));
 }
 

@@ -1,5 +1,10 @@
 #include "reconstruct/colmap/photo_statuses.h"
 
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <set>
+
 #include "kernels/base/error.h"
 
 namespace regrade {
@@ -97,6 +102,32 @@ void RefuseUnregistered(const Capture& capture) {
       "",
       "give photos of one scene that overlap by two thirds, or lower "
       "--pose-min-registered to continue with the registered ones");
+}
+
+void RequirePoses(const Capture& capture, const std::vector<StagedPhoto>& photos,
+                  const PoseOptions& options, const std::string& poses) {
+  const auto shot = [](const std::string& file) {
+    return std::filesystem::path(file).replace_extension().string();
+  };
+  std::set<std::string> posed, shots;
+  for (const CaptureView& view : capture.views) posed.insert(shot(view.file));
+  for (const StagedPhoto& photo : photos) shots.insert(shot(photo.file));
+  const size_t count = capture.views.size();
+  // Test pictures may have one name for two: views, and shots without any.
+  const size_t all = count + shots.size() - posed.size();
+  const std::string have =
+      Concat(count, " of ", Photos(all), count == 1 ? " has" : " have", " a pose");
+  const std::string remedy = "give poses of more of the photos, or take out photos without one";
+  if (static_cast<int>(count) < options.min_photos)
+    throw SceneError(
+        Concat(have, ", and a scene in 3D needs at least ", options.min_photos), poses,
+        remedy + (count < 2 ? std::string()
+                            : Concat("; --pose-min-photos ", count, " tries with fewer")));
+  const double least = options.min_registered * static_cast<double>(all);
+  if (static_cast<double>(count) < least)
+    throw SceneError(have + Format(", and at least %.0f are needed (--pose-min-registered)",
+                                   std::ceil(least)),
+                     poses, remedy + ", or lower --pose-min-registered");
 }
 
 }  // namespace regrade

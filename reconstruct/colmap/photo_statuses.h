@@ -10,6 +10,7 @@
 #include "reconstruct/colmap/colmap_model.h"
 #include "reconstruct/colmap/colmap_output.h"
 #include "reconstruct/colmap/colmap_strategies.h"
+#include "reconstruct/colmap/poses_from_photos.h"
 #include "reconstruct/colmap/simpler_lens.h"
 
 namespace regrade {
@@ -57,5 +58,12 @@ std::string NoteOnOtherModels(const AttemptResult& attempt);
 [[noreturn]] void Refuse(const Reason& reason, size_t photos_given, int min_photos);
 [[noreturn]] void RefuseTooFew(size_t photos_given, int min_photos);
 [[noreturn]] void RefuseUnregistered(const Capture& capture);
+
+// Throws Error(kScene) unless the given poses of `capture`, from the file or folder `poses`,
+// are as many as options ask for photos that are registered (--pose-min-photos and
+// --pose-min-registered). Not counted are photos beside a posed one whose file has the same
+// name with another extension: two files of one shot.
+void RequirePoses(const Capture& capture, const std::vector<StagedPhoto>& photos,
+                  const PoseOptions& options, const std::string& poses);
 
 }  // namespace regrade

@@ -8,15 +8,11 @@
 #include <tuple>
 
 namespace regrade {
-namespace {
 
-// Tolerates that each side is rounded to whole pixels.
 bool SameAspect(const Camera& camera, int width, int height) {
   const double w = camera.width, h = camera.height;
   return std::abs(width - height * w / h) < 1 || std::abs(height - width * h / w) < 1;
 }
-
-}  // namespace
 
 int ResizeToPhotos(const std::vector<StagedPhoto>& photos, ColmapModel* model) {
   std::map<std::string, const StagedPhoto*> by_name;

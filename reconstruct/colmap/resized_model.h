@@ -8,6 +8,10 @@
 
 namespace regrade {
 
+// Whether pictures of width x height are the camera's in another size; tolerates that each side
+// is rounded to whole pixels.
+bool SameAspect(const Camera& camera, int width, int height);
+
 // Gives images whose photo (by staged name) has another size than their camera, but the same
 // aspect ratio to a pixel, a camera of that size and scaled keypoints. Returns the number of
 // those images. Skips photos of another aspect ratio: CaptureFromModel refuses them.

@@ -78,9 +78,17 @@ class Fitter {
     } else {
       state.grid = InitialGrid();
       if (box_.background) state.grid.background = *box_.background;
-      if (state.grid.num_voxels() == 0)
-        throw Error(ExitCode::kScene, "no part of the scene's box is seen by two cameras",
-                    "reconstruct", "the poses are inconsistent; take photos with more overlap");
+      if (state.grid.num_voxels() == 0 ||
+          (options_.initial_views < 2 &&
+           !TwoViewsShareAPlace(rays_, state.grid.frame, box_.near_clip)))
+        throw SceneError(
+            Concat("no place is seen by ",
+                   options_.initial_views <= 2 ? "two" : std::to_string(options_.initial_views),
+                   " of the ", views_.size(),
+                   " photos that are fitted: wrong poses, or too few"),
+            "reconstruct",
+            "check the poses against the photos, or give more photos that "
+            "overlap by two thirds");
       if (box_.spheres) {
         state.grid.spheres = MakeInitialSpheres(
             rays_, state.grid.frame, options_.background_layers, SphereResolution(0),

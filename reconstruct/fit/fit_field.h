@@ -73,8 +73,8 @@ float ExponentialRate(float begin, float end, double p);
 // Rises along a sine from 1/100 at step 0 to 1 at step `delay`.
 float DelayFactor(int step, float delay);
 
-// Throws Error(kScene) if the field becomes empty, Interrupted after kStop (after calling
-// `checkpoint`).
+// Throws Error(kScene) if no place of the box is seen by two photos or the field becomes empty,
+// Interrupted after kStop (after calling `checkpoint`).
 FitResult FitField(const std::vector<TrainingView>& views, const SceneBox& box,
                    const FitOptions& options, const FitHooks& hooks,
                    Backend backend = Backend::kCpu);

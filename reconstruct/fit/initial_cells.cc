@@ -138,6 +138,21 @@ FastGrid MakeInitialCells(const TrainingRays& rays, const GridFrame& frame,
   return grid;
 }
 
+bool TwoViewsShareAPlace(const TrainingRays& rays, const GridFrame& frame, float near_clip) {
+  constexpr int kMostPlaces = 32;  // a side
+  Vec3i places;
+  for (int a = 0; a < 3; ++a) places[a] = std::clamp(frame.resolution[a], 1, kMostPlaces);
+  for (int x = 0; x <= places.x; ++x)
+    for (int y = 0; y <= places.y; ++y)
+      for (int z = 0; z <= places.z; ++z) {
+        const Vec3d at{double(x) * frame.resolution.x / places.x,
+                       double(y) * frame.resolution.y / places.y,
+                       double(z) * frame.resolution.z / places.z};
+        if (ViewsThatSee(rays, WorldOfLattice(frame, at), near_clip, 0.02, 2) >= 2) return true;
+      }
+  return false;
+}
+
 Buffer<float> DensityRates(const TrainingRays& rays, const GridFrame& frame,
                            const CellGrid& cells, float near_clip) {
   Buffer<float> rates(cells.num_vertices());

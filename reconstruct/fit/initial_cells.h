@@ -21,10 +21,14 @@ GridFrame CellFrame(const SceneBox& box, int coarsest, const CellLevels& levels)
 
 // A mid-grey field of one density: cells of level `outward` in the box and of level 0 around
 // it, of which at least `min_views` cameras see the centre or a corner, beyond near_clip. With
-// `ball`, only cells that touch the frame's sphere.
+// `ball`, only cells that touch the frame's sphere. There may be none.
 FastGrid MakeInitialCells(const TrainingRays& rays, const GridFrame& frame,
                           const CellLevels& levels, int basis, float density, float near_clip,
                           int min_views, bool ball);
+
+// Whether two cameras see one place of the frame, beyond near_clip: looks at as many places a
+// side as the frame has vertices, and at 32 of more.
+bool TwoViewsShareAPlace(const TrainingRays& rays, const GridFrame& frame, float near_clip);
 
 // Factors of the density's rate, [V]: the number of photos that see a vertex, over the number
 // that see the best seen one. What few photos see settles slowly, so that it takes shape where

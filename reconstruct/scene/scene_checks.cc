@@ -7,6 +7,7 @@
 
 #include "kernels/base/error.h"
 #include "kernels/base/quantile.h"
+#include "reconstruct/scene/lens_fold.h"
 
 namespace regrade {
 namespace {
@@ -16,10 +17,6 @@ namespace {
 constexpr size_t kViewsOfATrack = 32;
 // Focal length over the longer side: the limits of COLMAP's mapper, 157 to 6 degrees.
 constexpr double kLeastFocal = 0.1, kMostFocal = 10;
-// A ray through an image point is projected to that point, within pixels, unless the distortion
-// folds over before it: the error is then the distance to the fold.
-constexpr double kMostFoldError = 0.5;
-constexpr int kBorderSteps = 16;  // of a side
 
 double LargestAngle(const Vec3d& point, const std::vector<int32_t>& views,
                     const std::vector<Vec3d>& centers) {
@@ -42,35 +39,30 @@ std::vector<Vec3d> Centers(const Capture& capture) {
   return centers;
 }
 
-// Whether some point of the picture's border is the image of no ray.
-bool FoldsOver(Camera camera) {
-  camera.camera_from_world = {};
-  for (int i = 0; i <= kBorderSteps; ++i) {
-    const double x = camera.width * i / double{kBorderSteps};
-    const double y = camera.height * i / double{kBorderSteps};
-    for (const auto& [u, v] : {std::pair(x, 0.0), std::pair(x, double(camera.height)),
-                               std::pair(0.0, y), std::pair(double(camera.width), y)}) {
-      const Vec3d ray = camera.CameraRay(u, v);
-      double back_u, back_v;
-      if (ray.z <= 0) continue;  // of a fisheye lens, behind its image plane
-      if (!camera.Project(ray, &back_u, &back_v) ||
-          !(std::hypot(back_u - u, back_v - v) < kMostFoldError))
-        return true;
-    }
-  }
-  return false;
-}
-
 std::string Rounded(double value, int digits) { return Format("%.*f", digits, value); }
 
 }  // namespace
 
-double MedianTriangulationAngle(const Capture& capture) {
+std::vector<double> TriangulationAngles(const Capture& capture) {
   const std::vector<Vec3d> centers = Centers(capture);
   std::vector<double> angles;
   for (const ScenePoint& point : capture.points)
     angles.push_back(LargestAngle(point.position, point.views, centers));
-  return Median(std::move(angles));
+  return angles;
+}
+
+double MedianTriangulationAngle(const Capture& capture) {
+  return Median(TriangulationAngles(capture));
+}
+
+Capture WithParallax(const Capture& capture) {
+  constexpr size_t kFewest = 50;
+  const std::vector<double> angles = TriangulationAngles(capture);
+  Capture sure = capture;
+  sure.points.clear();
+  for (size_t i = 0; i < angles.size(); ++i)
+    if (angles[i] >= kLeastParallaxDeg * M_PI / 180) sure.points.push_back(capture.points[i]);
+  return sure.points.size() < std::max(kFewest, capture.points.size() / 10) ? capture : sure;
 }
 
 Vec3d PointExtents(const Capture& capture) {
@@ -132,7 +124,7 @@ std::string ImplausibleLens(const Capture& capture, double max_pixel_aspect) {
     const double focal = std::min(last->fx, last->fy) / std::max(last->width, last->height);
     if (!(focal > kLeastFocal && focal < kMostFocal))
       return "a focal length of " + Rounded(focal, 2) + " times the picture's longer side";
-    if (FoldsOver(*last)) return "a distortion that folds the picture over";
+    if (FoldRadius(*last) > 0) return "a distortion that folds the picture over";
   }
   return "";
 }

@@ -8,9 +8,18 @@
 
 namespace regrade {
 
-// Median over the points of the largest angle, in radians, between two rays that see the point.
-// 0 without points. Small angles mean inaccurate depth.
+// Of each point the largest angle, in radians, between two rays that see it: small angles mean
+// inaccurate depth.
+std::vector<double> TriangulationAngles(const Capture& capture);
+// Their median; 0 without points.
 double MedianTriangulationAngle(const Capture& capture);
+
+// The capture without the points that are seen under less than kLeastParallaxDeg: their
+// distance is unknown, so they may lie thousands of times too far. Unchanged if that leaves
+// fewer than 50 points or a tenth of them, as of distant scenes.
+Capture WithParallax(const Capture& capture);
+// COLMAP's own limit, Mapper.filter_min_tri_angle, which points that it adds last escape.
+inline constexpr double kLeastParallaxDeg = 1.5;
 
 // Root-mean-square extents of the points along their principal axes, largest first, in world
 // units, without the tenth of the points farthest from the median (outliers and sky).
@@ -32,7 +41,7 @@ std::string ImplausibleLens(const Capture& capture, double max_pixel_aspect);
 
 struct SceneLimits {
   int min_views = 5;
-  double min_triangulation_angle_deg = 1.5;
+  double min_triangulation_angle_deg = kLeastParallaxDeg;
   double max_pixel_aspect = 1.05;  // fx / fy within [1 / this, this]
   double min_thickness = 0.02;     // third extent over second; below: nearly a plane
 };

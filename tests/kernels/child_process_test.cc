@@ -52,7 +52,7 @@ TEST(ChildProcess, ExitStatusAndBothOutputs) {
   EXPECT_EQ(result.exit_status, 3);
   EXPECT_FALSE(result.Succeeded());
   EXPECT_EQ(lines, (std::vector<std::string>{"out", "err", "end"}));
-  EXPECT_EQ(result.LastLines(), "out\nerr\nend");
+  EXPECT_EQ(result.LastLines(), "\n  out\n  err\n  end");
 }
 
 TEST(ChildProcess, F45_MissingProgramIsAnErrorWithTheReason) {
@@ -78,7 +78,7 @@ TEST(ChildProcess, F49_DeathBySignalIsNamed) {
   EXPECT_EQ(result.end, ChildEnd::kSignal);
   EXPECT_EQ(result.signal, SIGSEGV);
   EXPECT_NE(result.Describe().find("Segmentation fault"), std::string::npos);
-  EXPECT_EQ(result.LastLines(), "before");
+  EXPECT_EQ(result.LastLines(), "\n  before");
 }
 
 TEST(ChildProcess, F50_HangEndsAtTheWallLimit) {

@@ -25,6 +25,13 @@ TEST(MessageFor, IsOneLine) {
             "a\\x0ab.jpg: empty file. To do: remove it. Kept: pose");
 }
 
+// What another program printed keeps its lines, and steers no terminal.
+TEST(MessageFor, KeepsIndentedLines) {
+  const Error error(ExitCode::kExternalProgram, "failed:\n  one\n  two\x1b[31m\nthree",
+                    "x\n  y");
+  EXPECT_EQ(MessageFor(error, ""), "x\\x0a  y: failed:\n  one\n  two\\x1b[31m\\x0athree");
+}
+
 TEST(DurationText, ReadsWell) {
   EXPECT_EQ(DurationText(8.4), "8 s");
   EXPECT_EQ(DurationText(61), "1 min 01 s");

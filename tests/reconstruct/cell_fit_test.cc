@@ -13,6 +13,7 @@
 #include "reconstruct/fit/measure_cells.h"
 #include "tests/support/ball_views.h"
 #include "tests/support/cell_field.h"
+#include "tests/support/expect_error.h"
 #include "tests/support/record_error.h"
 
 namespace regrade {
@@ -330,6 +331,74 @@ TEST(DensityRates, FallWhereFewPhotosSee) {
   EXPECT_FLOAT_EQ(most, 1);  // all three see the middle
   EXPECT_LT(least, 0.7f);
   EXPECT_GT(least, 0);
+}
+
+// Three cameras that look outwards from a circle around the box's middle.
+std::vector<TrainingView> OutwardViews(const Image& photo) {
+  std::vector<TrainingView> views;
+  for (const double angle : {0.0, 2 * M_PI / 3, 4 * M_PI / 3}) {
+    Camera camera;
+    camera.width = photo.width;
+    camera.height = photo.height;
+    camera.fx = camera.fy = photo.width;
+    camera.cx = photo.width / 2.0;
+    camera.cy = photo.height / 2.0;
+    const double s = std::sin(angle), c = std::cos(angle);
+    camera.camera_from_world = {{{{c, 0, -s}, {0, 1, 0}, {s, 0, c}}}, {0, 0, -0.5}};
+    views.push_back({camera, &photo});
+  }
+  return views;
+}
+
+TEST(FitOfWrongPoses, NoPlaceIsSeenByTwoPhotos) {
+  Image photo(32, 32, 3);
+  std::ranges::fill(photo.pixels, 0.5f);
+  const std::vector<TrainingView> outward = OutwardViews(photo);
+  FitOptions adaptive;
+  adaptive.resolutions = {8, 16};
+  adaptive.steps = {2, 2};
+  adaptive.fewer_stages = false;
+  FitOptions uniform = adaptive, whole_box = adaptive;
+  uniform.MakeUniform();
+  whole_box.MakeUniform();
+  whole_box.initial_views = 0;
+  for (const FitOptions& options : {adaptive, uniform, whole_box}) {
+    EXPECT_REGRADE_ERROR(FitField(outward, {}, options, {}), ExitCode::kScene,
+                         "no place is seen by two of the 3 photos");
+    SceneBox spheres;
+    spheres.spheres = true;
+    EXPECT_REGRADE_ERROR(FitField(outward, spheres, options, {}), ExitCode::kScene,
+                         "no place is seen by two of the 3 photos");
+  }
+}
+
+// In device coordinates: cameras that see different parts of the box.
+TEST(FitOfWrongPoses, NoPlaceInDeviceCoordinatesIsSeenByTwoPhotos) {
+  Image photo(32, 32, 3);
+  std::ranges::fill(photo.pixels, 0.5f);
+  std::vector<TrainingView> apart = OutwardViews(photo);
+  SceneBox box;
+  box.layers = 16;
+  for (size_t i = 0; i < apart.size(); ++i) {
+    apart[i].camera.camera_from_world = {{}, {-1e6 * static_cast<double>(i), 0, 0}};
+    apart[i].camera.ndc = {2, 2};
+  }
+  FitOptions options;
+  options.resolutions = {8};
+  options.steps = {2};
+  EXPECT_REGRADE_ERROR(FitField(apart, box, options, {}), ExitCode::kScene,
+                       "no place is seen by two");
+}
+
+TEST(FitOfWrongPoses, PruningEveryCellIsAnError) {
+  const ThreeViews three;
+  FitOptions options;
+  options.resolutions = {8, 16};
+  options.steps = {2, 2};
+  options.fewer_stages = false;
+  options.prune_weight = 1e6f;
+  EXPECT_REGRADE_ERROR(FitField(three.views(), {}, options, {}), ExitCode::kScene,
+                       "no cell of the scene is left");
 }
 
 }  // namespace

@@ -6,6 +6,9 @@
 #include <cmath>
 
 #include "reconstruct/colmap/colmap_model.h"
+#include "reconstruct/scene/given_poses.h"
+#include "reconstruct/scene/lens_fold.h"
+#include "tests/support/expect_error.h"
 #include "tests/support/record_error.h"
 #include "tests/support/synthetic_model.h"
 
@@ -122,6 +125,74 @@ TEST(SceneChecks, H140_ScaleDoesNotMatter) {
                                      MedianTriangulationAngle(capture) - angle, 1e-9));
     EXPECT_EQ(AssessScene(capture).refusal, "");
   }
+}
+
+TEST(FoldRadius, IsWhereTheDistortionStopsGrowing) {
+  Camera camera;
+  camera.width = 640, camera.height = 480;
+  camera.fx = camera.fy = 500;
+  camera.cx = 320, camera.cy = 240;
+  EXPECT_EQ(FoldRadius(camera), 0);
+  camera.lens = LensModel::kOpenCv;
+  camera.distortion = {-0.2};
+  EXPECT_EQ(FoldRadius(camera), 0);
+  // r - r^3 grows up to r = 1 / sqrt(3), where it is 0.385.
+  camera.distortion = {-1};
+  EXPECT_NEAR(FoldRadius(camera), 500 * 0.3849, 1);
+  // r - 1e5 r^5 grows up to r = 5e5^(-1/4).
+  camera.distortion = {0, -1e5};
+  EXPECT_NEAR(FoldRadius(camera), 500 * 0.8 * std::pow(5e5, -0.25), 0.5);
+  // Falls between r = 0.45 and 0.47, within the picture, and grows again to its corner.
+  camera.distortion = {-3.2, 4.6};
+  EXPECT_GT(FoldRadius(camera), 100);
+  EXPECT_LT(FoldRadius(camera), 200);
+  camera.lens = LensModel::kFisheye;
+  camera.distortion = {};
+  EXPECT_EQ(FoldRadius(camera), 0);
+  camera.distortion = {-2};
+  EXPECT_NEAR(FoldRadius(camera), 500 * 2 / 3.0 / std::sqrt(6.0), 1);
+}
+
+void ExpectRefused(const Capture& capture, const char* part) {
+  EXPECT_REGRADE_ERROR(RequireSoundPoses(capture, "poses"), ExitCode::kScene, part);
+}
+
+TEST(RequireSoundPoses, PosesWithoutABaselineShowNoDepth) {
+  RequireSoundPoses(CaptureOf({}), "poses");
+  RequireSoundPoses(CaptureOf({.arc_deg = 2}), "poses");
+  ExpectRefused(CaptureOf({.arc_deg = 0.1}), "degrees (needed");
+  ExpectRefused(CaptureOf({.arc_deg = 0}), "at one place");
+  Capture turning = CaptureOf({});
+  turning.points.clear();
+  RequireSoundPoses(turning, "poses");
+  turning.nearest_depth = 1e4;
+  ExpectRefused(turning, "degrees");
+  turning.nearest_depth = 0;
+  for (CaptureView& view : turning.views) view.camera.camera_from_world.translation = {};
+  ExpectRefused(turning, "at one place");
+}
+
+TEST(RequireSoundPoses, ALensThatFoldsThePictureIsRefusedWithThePhoto) {
+  Capture capture = CaptureOf({.lens = ColmapLens::kOpenCv});
+  capture.views[3].camera.distortion = {0, -1e5};
+  ExpectRefused(capture, capture.views[3].file.c_str());
+}
+
+// Points that only two photos from one place see lie anywhere along their rays.
+TEST(WithParallax, LeavesOutPointsOfUnknownDistance) {
+  Capture capture = CaptureOf({.points = 200});
+  CaptureView twin = capture.views[0];
+  twin.camera.camera_from_world.translation.x += 1e-4;
+  capture.views.push_back(twin);
+  const int32_t last = static_cast<int32_t>(capture.views.size()) - 1;
+  const size_t sound = capture.points.size();
+  for (int i = 0; i < 20; ++i)
+    capture.points.push_back({{1e4, 10.0 * i, 1e5}, {}, 0, {0, last}});
+  const Capture sure = WithParallax(capture);
+  EXPECT_EQ(sure.points.size(), sound);
+  EXPECT_EQ(sure.views.size(), capture.views.size());
+  const Capture distant = CaptureOf({.points = 200, .arc_deg = 1});
+  EXPECT_EQ(WithParallax(distant).points.size(), distant.points.size());
 }
 
 }  // namespace
