@@ -326,7 +326,7 @@ class ColmapNames : public CaptureFolder {
       photos.push_back(photo);
       statuses.push_back({files[i], PhotoState::kUsed, ""});
     }
-    return ImportPoses({CaptureKind::kColmap, root_ + "/images", root_ + "/sparse"}, photos,
+    return ImportPoses({CaptureKind::kColmap, root_ + "/images", root_ + "/sparse"}, &photos,
                        statuses, root_ + "/staged", notes);
   }
 };
