@@ -40,6 +40,7 @@ LAYERS = {
     "kernels/field/cpu": 3,
     "kernels/field/cuda": 3,
     "kernels/splats": 3,
+    "kernels/splats/cpu": 4,
     "reconstruct/scene": 0,
     "reconstruct/colmap": 1,
     "reconstruct/fit": 1,

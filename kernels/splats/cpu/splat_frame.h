@@ -1,0 +1,34 @@
+// The splats that a camera sees, in order, and which tiles of the picture each of them meets.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "kernels/scene/camera.h"
+#include "kernels/splats/seen_splat.h"
+
+namespace regrade {
+
+inline constexpr int kSplatTile = 16;  // pixels, both sides
+
+// An entry is a splat in a tile. `splats` must outlive the frame.
+struct SplatFrame {
+  SplatsView<float> splats;
+  SplatCamera camera;
+  SplatOptions options;
+  std::vector<SeenSplat<float>> seen;  // as SeeSplats, without those beside the picture
+  std::vector<PixelBox> box;           // [seen]
+  std::vector<int64_t> first_slot;     // [seen + 1]: entries numbered by splat, then by tile
+  int tiles_x = 0, tiles_y = 0;
+  std::vector<int64_t> first_entry;  // [tiles + 1]: entries by tile, then front to back
+  std::vector<int32_t> entry_splat;  // [entries]: place in `seen`
+  std::vector<int64_t> entry_slot;   // [entries]
+
+  int num_tiles() const { return tiles_x * tiles_y; }
+};
+
+// Requires what SeeSplats does. The result does not depend on the number of threads.
+SplatFrame MakeSplatFrame(const SplatsView<float>& splats, const Camera& camera,
+                          const SplatOptions& options);
+
+}  // namespace regrade
